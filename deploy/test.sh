@@ -127,6 +127,7 @@ fi
 waits release
 count release
 step "sources are formatted" sh "$tree/tests/house/check_format.sh" "$tree"
+step "viewer: formatted" sh "$tree/tests/house/check_viewer.sh" format "$build"
 step "viewer: types" sh "$tree/tests/house/check_viewer.sh" types "$build"
 step "viewer: node tests" sh "$tree/tests/house/check_viewer.sh" test "$build"
 if [ -z "$fast" ]; then

@@ -149,7 +149,7 @@ static void add_scalar(writer *w, const pal_control_field *f, const uint8_t *at)
         add_number(w, (double)u64);
         break;
     case F64:
-    case KNOWN:
+    case NUMBER_OR_NAN:
         memcpy(&f64, at, sizeof f64);
         add_number(w, f64);
         break;
@@ -175,7 +175,7 @@ static void add_list(writer *w, const pal_control_field *f, const uint8_t *base)
         if (i && f->type != ARGS) add(w, ",", 1);
         if (f->type == NUMBERS) {
             add_number(w, ((const double *)(const void *)at)[i]);
-        } else if (f->type == TEXTS || f->type == TEXTS_SAID) {
+        } else if (f->type == TEXTS || f->type == TEXTS_OR_EMPTY) {
             add_text(w, (const char *)at + i * f->size, f->size);
         } else if (f->type == OBJECTS) {
             add(w, "{", 1);
@@ -200,13 +200,13 @@ static bool left_out(const pal_control_field *f, const uint8_t *base)
     uint32_t n = 1;
     double value = 0;
     if (f->required) return false;
-    if (f->type == SAID) return !base[f->offset];
-    if (f->type == KNOWN) {
+    if (f->type == TEXT_OR_EMPTY) return !base[f->offset];
+    if (f->type == NUMBER_OR_NAN) {
         memcpy(&value, base + f->offset, sizeof value);
         return isnan(value);
     }
     if (f->type <= BOOL) return memcmp(base + f->offset, zero, size[f->type]) == 0;
-    if (f->type == OBJECTS || f->type == NUMBERS || f->type == TEXTS_SAID) memcpy(&n, base + f->count, sizeof n);
+    if (f->type == OBJECTS || f->type == NUMBERS || f->type == TEXTS_OR_EMPTY) memcpy(&n, base + f->count, sizeof n);
     return n == 0;
 }
 
@@ -220,7 +220,7 @@ static void add_fields(writer *w, const pal_control_field *f, const uint8_t *bas
             bool value;
             memcpy(&value, base + f->offset, sizeof value);
             add(w, value ? "true" : "false", value ? 4 : 5);
-        } else if (f->type == TEXT || f->type == SAID) {
+        } else if (f->type == TEXT || f->type == TEXT_OR_EMPTY) {
             add_text(w, (const char *)base + f->offset, f->size);
         } else if (f->type == OBJECT) {
             add(w, "{", 1);
@@ -333,7 +333,7 @@ static int read_scalar(const pal_control_field *f, const cJSON *item, uint8_t *a
         if (f->type == U16) memcpy(at, &u16, sizeof u16);
         if (f->type == U32) memcpy(at, &u32, sizeof u32);
         if (f->type == U64) memcpy(at, &u64, sizeof u64);
-    } else if (f->type == F64 || f->type == KNOWN) {
+    } else if (f->type == F64 || f->type == NUMBER_OR_NAN) {
         refusal = read_number(item, &v);
         memcpy(at, &v, sizeof v);
     } else if (f->type == BOOL) {
@@ -364,7 +364,7 @@ static int read_list(const pal_control_field *f, const cJSON *list, uint8_t *bas
         if (n >= f->max) return PAL_REFUSAL_COUNT;
         if (f->type == NUMBERS) {
             refusal = read_number(item, (double *)(void *)at + n);
-        } else if (f->type == TEXTS || f->type == TEXTS_SAID) {
+        } else if (f->type == TEXTS || f->type == TEXTS_OR_EMPTY) {
             refusal = read_text(item, (char *)at + n * f->size, f->size);
         } else if (f->type == OBJECTS) {
             refusal = read_fields(f->sub, item, at + n * f->size);
@@ -392,9 +392,9 @@ static int read_fields(const pal_control_field *f, const cJSON *object, uint8_t 
             const int none = PAL_WIRE_TOOL_NONE;
             const double unknown = NAN;
             if (f->type == TOOL) memcpy(base + f->offset, &none, sizeof none);
-            if (f->type == KNOWN) memcpy(base + f->offset, &unknown, sizeof unknown);
+            if (f->type == NUMBER_OR_NAN) memcpy(base + f->offset, &unknown, sizeof unknown);
             if (f->required) refusal = PAL_REFUSAL_FIELD;
-        } else if (f->type == TEXT || f->type == SAID) {
+        } else if (f->type == TEXT || f->type == TEXT_OR_EMPTY) {
             refusal = read_text(item, (char *)base + f->offset, f->size);
         } else if (f->type == OBJECT) {
             refusal = read_fields(f->sub, item, base);

@@ -18,13 +18,13 @@
 #define PAL_CONTROL_OUT_MAX    65536 /* bytes of a text message from the server */
 #define PAL_WIRE_NAME_BYTES    64
 #define PAL_WIRE_TEXT_BYTES    256
-#define PAL_WIRE_ROW_MAX       64
+#define PAL_WIRE_COMPONENT_MAX 64
 #define PAL_WIRE_MEMBER_MAX    256
 #define PAL_WIRE_MEMBER_NAME   32
 #define PAL_WIRE_ARG_MAX       16
 #define PAL_WIRE_FIELDS_MAX    8 /* fields that a part may offer */
 #define PAL_WIRE_FIELD_BYTES   24
-#define PAL_WIRE_WHY_BYTES     128
+#define PAL_WIRE_REASON_BYTES  128
 #define PAL_WIRE_LABEL_BYTES   120
 #define PAL_WIRE_METHOD_BYTES  32
 #define PAL_WIRE_POINT_MAX     128 /* points of a study that are sent; a point's own index may be larger */
@@ -74,21 +74,22 @@ typedef struct pal_wire_part_info {
     double error_m;                  /* bound per axis of its frames in normal use */
     uint32_t n_field;                /* what `view` may ask for; 0 also from servers that know no fields */
     char field[PAL_WIRE_FIELDS_MAX][PAL_WIRE_FIELD_BYTES]; /* "displacement", "von_mises" ...           */
-    bool sculpts; /* its control cells and material can be changed by commands; false is not on the wire */
-    bool adapts;  /* its triangles change while it runs: PATCH goes to clients that take it; n_triangle counts places */
-} pal_wire_part_info; /* its place in the array is its part index   */
+    bool is_sculptable; /* its control cells and material can be changed by commands; false is not on the wire */
+    bool is_adaptive;   /* its triangles change while it runs: PATCH goes to clients that take it; n_triangle counts
+                           places */
+} pal_wire_part_info;   /* its place in the array is its part index   */
 /* rows of a plan in order, of hello, topology and status: each with the part whose body it works on, -1 the whole
  * scene, why it is there (which key of the scene called for it), and whether it can be switched off (1: it cannot).
- * n_row_part, n_row_why and n_row_fixed 0: nobody said, and then they are not on the wire; else as many as there are
- * rows */
+ * n_component_part, n_component_reason and n_component_required 0: nobody said, and then they are not on the wire; else
+ * as many as there are rows */
 typedef struct pal_wire_topology {
     uint32_t n_part;
     pal_wire_part_info part[PAL_WIRE_PART_MAX];
-    uint32_t n_row, n_row_part, n_row_why, n_row_fixed; /* n_row 0: the rows did not change */
-    char row[PAL_WIRE_ROW_MAX][PAL_WIRE_NAME_BYTES];
-    double row_part[PAL_WIRE_ROW_MAX];
-    char row_why[PAL_WIRE_ROW_MAX][PAL_WIRE_WHY_BYTES];
-    double row_fixed[PAL_WIRE_ROW_MAX];
+    uint32_t n_row, n_component_part, n_component_reason, n_component_required; /* n_row 0: the rows did not change */
+    char row[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_NAME_BYTES];
+    double component_part[PAL_WIRE_COMPONENT_MAX];
+    char component_reason[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_REASON_BYTES];
+    double component_required[PAL_WIRE_COMPONENT_MAX];
 } pal_wire_topology;
 
 typedef struct pal_wire_tool_info {
@@ -109,11 +110,11 @@ typedef struct pal_wire_hello {
     uint32_t n_part, n_tool, n_row;
     pal_wire_part_info part[PAL_WIRE_PART_MAX];
     pal_wire_tool_info tool[PAL_WIRE_TOOL_MAX];
-    char row[PAL_WIRE_ROW_MAX][PAL_WIRE_NAME_BYTES]; /* the plan, in order                                */
-    uint32_t n_row_part, n_row_why, n_row_fixed;
-    double row_part[PAL_WIRE_ROW_MAX];
-    char row_why[PAL_WIRE_ROW_MAX][PAL_WIRE_WHY_BYTES];
-    double row_fixed[PAL_WIRE_ROW_MAX];
+    char row[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_NAME_BYTES]; /* the plan, in order                                */
+    uint32_t n_component_part, n_component_reason, n_component_required;
+    double component_part[PAL_WIRE_COMPONENT_MAX];
+    char component_reason[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_REASON_BYTES];
+    double component_required[PAL_WIRE_COMPONENT_MAX];
     bool estimates;  /* `estimate` may be asked for; false is not on the wire */
     uint16_t you_id; /* member id, > 0                                              */
     pal_wire_role you_role;
@@ -131,17 +132,17 @@ typedef struct pal_wire_active {
 /* a part of which there is something to tell; what is false, empty or 0 is not on the wire */
 typedef struct pal_wire_part_state {
     uint32_t part;
-    bool frozen;                     /* its guard has stopped it; `reset` with its body as target brings it back */
-    bool asleep;                     /* at rest: its rows do not run                                     */
-    char reason[PAL_WIRE_WHY_BYTES]; /* it was stopped, one sentence                                  */
-    uint64_t n_rescue;               /* steps that would have gone wrong without a guard, total         */
-    double rescue_ms;                /* what they took, total                                           */
+    bool frozen;                        /* its guard has stopped it; `reset` with its body as target brings it back */
+    bool asleep;                        /* at rest: its rows do not run                                     */
+    char reason[PAL_WIRE_REASON_BYTES]; /* it was stopped, one sentence                                  */
+    uint64_t n_safeguard;               /* steps that would have gone wrong without a guard, total         */
+    double safeguard_ms;                /* what they took, total                                           */
 } pal_wire_part_state;
 /* a row that was switched off and could be switched on */
-typedef struct pal_wire_off {
+typedef struct pal_wire_disabled {
     char row[PAL_WIRE_NAME_BYTES];
     uint32_t part;
-} pal_wire_off;
+} pal_wire_disabled;
 
 typedef struct pal_wire_status {
     uint64_t tick; /* steps done                                                     */
@@ -152,9 +153,9 @@ typedef struct pal_wire_status {
     uint32_t substeps;
     double step_ms; /* mean time of one step                                          */
     uint32_t n_row;
-    double row_ms[PAL_WIRE_ROW_MAX];                 /* mean time of each row of the plan in one step           */
-    uint32_t n_row_name;                             /* 0: the rows are those of hello                          */
-    char row[PAL_WIRE_ROW_MAX][PAL_WIRE_NAME_BYTES]; /* the plan while fields are shown         */
+    double row_ms[PAL_WIRE_COMPONENT_MAX];                 /* mean time of each row of the plan in one step           */
+    uint32_t n_component_name;                             /* 0: the rows are those of hello                          */
+    char row[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_NAME_BYTES]; /* the plan while fields are shown         */
     uint32_t n_member;
     double bytes_s;                 /* sent by the server to this member, bytes per second            */
     double rtt_ms;                  /* of this member as the server sees it; 0 unknown                */
@@ -164,13 +165,13 @@ typedef struct pal_wire_status {
     char diag[PAL_WIRE_TEXT_BYTES]; /* one sentence for people, or ""                           */
     uint32_t n_active;              /* parts that adapt; 0: not on the wire                     */
     pal_wire_active active[PAL_WIRE_PART_MAX];
-    uint32_t n_row_part; /* with n_row_name                                           */
-    double row_part[PAL_WIRE_ROW_MAX];
+    uint32_t n_component_part; /* with n_component_name                                           */
+    double component_part[PAL_WIRE_COMPONENT_MAX];
     uint32_t n_state; /* parts that are frozen or asleep or were rescued           */
     pal_wire_part_state state[PAL_WIRE_PART_MAX];
     uint32_t n_off;
-    pal_wire_off off[PAL_WIRE_ROW_MAX];
-    uint64_t n_unwatched; /* steps of which nothing was shown because nobody looked     */
+    pal_wire_disabled off[PAL_WIRE_COMPONENT_MAX];
+    uint64_t n_unobserved; /* steps of which nothing was shown because nobody looked     */
 } pal_wire_status;
 
 typedef struct pal_wire_member {
@@ -185,10 +186,10 @@ typedef struct pal_wire_members {
     pal_wire_member member[PAL_WIRE_MEMBER_MAX];
 } pal_wire_members;
 
-typedef struct pal_wire_problem {
+typedef struct pal_wire_error {
     char code[PAL_WIRE_NAME_BYTES]; /* one word: "role", "tool_taken", "budget", "verb" ... */
     char text[PAL_WIRE_TEXT_BYTES]; /* one sentence for people                              */
-} pal_wire_problem;
+} pal_wire_error;
 
 typedef struct pal_wire_join {
     char name[PAL_WIRE_MEMBER_NAME];
@@ -201,12 +202,12 @@ typedef struct pal_wire_arg {
     char key[32];
     double value;
 } pal_wire_arg;
-typedef struct pal_wire_order {       /* an order to the session */
+typedef struct pal_wire_command {     /* an order to the session */
     char verb[32];                    /* pause resume step reset material ...                     */
     char target[PAL_WIRE_NAME_BYTES]; /* what it is about (a body, a row), or ""                 */
     uint32_t n_arg;
     pal_wire_arg arg[PAL_WIRE_ARG_MAX]; /* numbers by name, SI, e.g. young_Pa                       */
-} pal_wire_order;
+} pal_wire_command;
 
 /* to the one who gave the order: what was done, in a sentence, and its numbers (README.md, "Sculpting") */
 typedef struct pal_wire_answer {
@@ -217,19 +218,19 @@ typedef struct pal_wire_answer {
 } pal_wire_answer;
 
 /* one setting of a study: what it costs and how far off it is (README.md, "What accuracy costs") */
-typedef struct pal_wire_point {
+typedef struct pal_wire_study_point {
     uint32_t index;                     /* in the server's list: arg of the order `point`        */
     char method[PAL_WIRE_METHOD_BYTES]; /* points of one method belong together                 */
     char label[PAL_WIRE_LABEL_BYTES];   /* for people                                           */
     double ms, error_m;                 /* of a step, as the study measured it; largest error    */
     bool front;                         /* nothing else is both cheaper and nearer              */
-} pal_wire_point;
+} pal_wire_study_point;
 typedef struct pal_wire_study {
     char body[PAL_WIRE_NAME_BYTES];
     double step_ms;     /* the time that all `ms` of study and estimate are for: a step of the scene as it was opened */
     double reference_m; /* error of what the study compared with, NaN: not known: below it nothing is told apart */
     uint32_t n_point;   /* 0: there is no study, `estimate` alone */
-    pal_wire_point point[PAL_WIRE_POINT_MAX];
+    pal_wire_study_point point[PAL_WIRE_POINT_MAX];
 } pal_wire_study;
 
 /* a neighbour on a knob, as foreseen; NaN: not known, and not on the wire */
@@ -247,23 +248,23 @@ typedef struct pal_wire_estimate {
     double point;                       /* its index in the study; NaN: it is none of those      */
     uint64_t tick;                      /* of the state that was looked at; 0: there is none yet */
     double time_s;
-    double age_s;   /* steps in which the body was awake since that state                     */
-    double ms;      /* of a live step, median of the last second                              */
-    double own_ms;  /* processor time that the estimate took                                  */
-    double max_m;   /* largest displacement then                                              */
-    double error_m; /* largest error of a displacement, of these parts together:              */
+    double age_s;       /* steps in which the body was awake since that state                     */
+    double ms;          /* of a live step, median of the last second                              */
+    double estimate_ms; /* processor time that the estimate took                                  */
+    double max_m;       /* largest displacement then                                              */
+    double error_m;     /* largest error of a displacement, of these parts together:              */
     double discretisation_m, algebraic_m, time_m, model_m;
-    double zz_percent;              /* error over solution, in energy                          */
+    double energy_error_percent;    /* error over solution, in energy                          */
     bool locking;                   /* the estimate is known to be too small                   */
     char diag[PAL_WIRE_TEXT_BYTES]; /* what is not known and why, or ""                        */
     uint32_t n_neighbour;
     pal_wire_neighbour neighbour[PAL_WIRE_NEIGHBOUR_MAX];
 } pal_wire_estimate;
 
-typedef struct pal_wire_view {
+typedef struct pal_wire_field_subscription {
     uint32_t part;
     char field[PAL_WIRE_FIELD_BYTES]; /* as in the part's list, or "none" */
-} pal_wire_view;
+} pal_wire_field_subscription;
 
 typedef struct pal_control {
     pal_control_type type;
@@ -272,12 +273,12 @@ typedef struct pal_control {
         pal_wire_topology topology;
         pal_wire_status status;
         pal_wire_members members;
-        pal_wire_problem problem; /* error             */
+        pal_wire_error problem; /* error             */
         pal_wire_join join;
-        pal_wire_order order; /* command               */
-        int tool;             /* take: index or PAL_WIRE_TOOL_ANY; leave: unused */
-        double stamp_ms;      /* ping, pong: the pinger's own clock         */
-        pal_wire_view view;
+        pal_wire_command order; /* command               */
+        int tool;               /* take: index or PAL_WIRE_TOOL_ANY; leave: unused */
+        double stamp_ms;        /* ping, pong: the pinger's own clock         */
+        pal_wire_field_subscription view;
         pal_wire_answer answer;
         pal_wire_study study;
         pal_wire_estimate estimate;

@@ -11,18 +11,18 @@ typedef enum pal_control_field_type {
     U32,
     U64,
     F64,
-    KNOWN,      /* double; NaN: not known, and then it is left out */
-    BOOL,       /* not required: left out while it is false        */
-    TEXT,       /* char[size]                                      */
-    SAID,       /* the same, left out while it is empty            */
-    ROLE,       /* pal_wire_role as its name                       */
-    TOOL,       /* int: index, -1 any, none as null or absent      */
-    NUMBERS,    /* double[max], counted or FIXED; counted and not required: left out while there is none */
-    TEXTS,      /* char[max][size], counted */
-    TEXTS_SAID, /* the same, left out while there is none */
-    OBJECT,     /* sub, whose offsets are those of the outer struct */
-    OBJECTS,    /* struct[max] of size bytes, counted; not required: left out while there is none */
-    ARGS        /* object of numbers: pal_wire_arg[max], counted   */
+    NUMBER_OR_NAN,  /* double; NaN: not known, and then it is left out */
+    BOOL,           /* not required: left out while it is false        */
+    TEXT,           /* char[size]                                      */
+    TEXT_OR_EMPTY,  /* the same, left out while it is empty            */
+    ROLE,           /* pal_wire_role as its name                       */
+    TOOL,           /* int: index, -1 any, none as null or absent      */
+    NUMBERS,        /* double[max], counted or FIXED; counted and not required: left out while there is none */
+    TEXTS,          /* char[max][size], counted */
+    TEXTS_OR_EMPTY, /* the same, left out while there is none */
+    OBJECT,         /* sub, whose offsets are those of the outer struct */
+    OBJECTS,        /* struct[max] of size bytes, counted; not required: left out while there is none */
+    ARGS            /* object of numbers: pal_wire_arg[max], counted   */
 } pal_control_field_type;
 
 typedef struct pal_control_field {

@@ -404,7 +404,7 @@ static double enlargement(const float affine[12])
     return most;
 }
 
-int pal_frame_put(pal_frame_encoder *e, const pal_frame_given *given, uint8_t *dst, size_t cap,
+int pal_frame_put(pal_frame_encoder *e, const pal_frame_input *given, uint8_t *dst, size_t cap,
                   pal_frame_result *result)
 {
     double inverse[12], enlarge = 1;

@@ -40,7 +40,7 @@ typedef struct pal_frame_head {
 size_t pal_frame_bound(uint32_t n_vertex);
 
 /* what the caller says of a frame */
-typedef struct pal_frame_given {
+typedef struct pal_frame_input {
     uint16_t part;
     uint32_t epoch, seq, cycle;
     uint64_t sim_time_us;
@@ -48,7 +48,7 @@ typedef struct pal_frame_given {
     const float *position_m; /* shown vertices in the asset's vertex order, borrowed  [n_vertex][3]        */
     const float *affine;     /* NULL, or an invertible 3x4 that takes most of a large motion, borrowed [12] */
     const uint8_t *hidden;   /* NULL, or not 0: in no triangle now, its position is never read, borrowed [n_vertex] */
-} pal_frame_given;
+} pal_frame_input;
 typedef struct pal_frame_result {
     size_t n_byte;  /* of the message in dst                                                               */
     double error_m; /* bound that holds; larger than asked when the range forced a larger q                */
@@ -64,7 +64,7 @@ void pal_frame_encoder_destroy(pal_frame_encoder *e); /* NULL allowed */
 /* [any] one whole FRAME message into dst; allocates nothing. NAN: a position of a vertex that is not hidden is not
  * finite; SPACE: cap is less than pal_frame_bound(n_vertex); RANGE: error_m, affine or a displacement beyond any use.
  * On failure the encoder is as before the call. */
-int pal_frame_put(pal_frame_encoder *e, const pal_frame_given *given, uint8_t *dst, size_t cap,
+int pal_frame_put(pal_frame_encoder *e, const pal_frame_input *given, uint8_t *dst, size_t cap,
                   pal_frame_result *result);
 
 /* [any] head of a FRAME message, lengths checked against n_byte */

@@ -463,8 +463,8 @@ static int extend(const pal_frame_order *coarse, const uint32_t *parent, uint32_
     return 0;
 }
 
-int pal_frame_order_families(const float *rest_m, uint32_t n_vertex, uint32_t n_coarse, const uint32_t *parent,
-                             const uint32_t *coarse_triangle, uint32_t n_coarse_triangle, pal_frame_order **out)
+int pal_frame_order_hierarchy(const float *rest_m, uint32_t n_vertex, uint32_t n_coarse, const uint32_t *parent,
+                              const uint32_t *coarse_triangle, uint32_t n_coarse_triangle, pal_frame_order **out)
 {
     pal_frame_order *coarse = NULL, *o = NULL;
     if (n_coarse == 0 || n_coarse > n_vertex || n_vertex > PAL_ORDER_VERTEX_MAX) return PAL_REFUSAL_COUNT;

@@ -35,8 +35,8 @@ int pal_frame_order_create(const float *rest_m, uint32_t n_vertex, const uint32_
  * the mean of their parents: exact for any motion that is linear on coarse triangles, and what is right for vertices
  * that are not in use. All borrowed. COUNT: n_coarse is 0 or above n_vertex; RANGE: a parent that is not smaller; as
  * pal_frame_order_create */
-int pal_frame_order_families(const float *rest_m, uint32_t n_vertex, uint32_t n_coarse, const uint32_t *parent,
-                             const uint32_t *coarse_triangle, uint32_t n_coarse_triangle, pal_frame_order **out);
+int pal_frame_order_hierarchy(const float *rest_m, uint32_t n_vertex, uint32_t n_coarse, const uint32_t *parent,
+                              const uint32_t *coarse_triangle, uint32_t n_coarse_triangle, pal_frame_order **out);
 void pal_frame_order_destroy(pal_frame_order *order); /* NULL allowed */
 
 /* Checks all that a frame decoder trusts: vertex_of is a permutation, every neighbour is smaller than its own index,

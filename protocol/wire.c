@@ -91,7 +91,7 @@ static bool take_doubles(const uint8_t **at, double *v, int n)
 static bool known_kind(uint8_t kind)
 {
     return kind == PAL_WIRE_FRAME || kind == PAL_WIRE_TOOLS || kind == PAL_WIRE_HAPTIC || kind == PAL_WIRE_FIELD ||
-           kind == PAL_WIRE_PATCH || kind == PAL_WIRE_POSE || kind == PAL_WIRE_ACK;
+           kind == PAL_WIRE_TOPOLOGY_DELTA || kind == PAL_WIRE_POSE || kind == PAL_WIRE_ACK;
 }
 
 int pal_wire_get_head(const uint8_t *bytes, size_t n_byte, pal_wire_head *out)
@@ -165,7 +165,7 @@ int pal_wire_get_pose(const uint8_t *bytes, size_t n_byte, pal_wire_pose *out)
     p.model_stamp_us = take64(&bytes);
 
     if (!finite) return PAL_REFUSAL_NAN;
-    if (p.flags & ~(uint32_t)PAL_WIRE_POSE_FLAGS || p.buttons & ~(uint32_t)PAL_WIRE_GRAB) return PAL_REFUSAL_FLAGS;
+    if (p.flags & ~(uint32_t)PAL_WIRE_POSE_FLAGS || p.buttons & ~(uint32_t)PAL_WIRE_GRASP) return PAL_REFUSAL_FLAGS;
     double norm2 = 0;
     for (int i = 0; i < 4; i++) norm2 += p.quaternion[i] * p.quaternion[i];
     for (int i = 0; i < 3; i++)
@@ -260,7 +260,7 @@ int pal_wire_get_tools(const uint8_t *bytes, size_t n_byte, pal_wire_tools *out)
 
 size_t pal_wire_put_haptic(uint8_t *dst, size_t cap, const pal_wire_haptic *h)
 {
-    if (h->n_patch > PAL_WIRE_PATCH_MAX || cap < PAL_WIRE_HAPTIC_BYTES(h->n_patch)) return 0;
+    if (h->n_patch > PAL_WIRE_CONTACT_PATCH_MAX || cap < PAL_WIRE_HAPTIC_BYTES(h->n_patch)) return 0;
     put_head(&dst, PAL_WIRE_HAPTIC, h->tool);
     put32(&dst, h->seq);
     put32(&dst, h->flags);
@@ -276,9 +276,9 @@ size_t pal_wire_put_haptic(uint8_t *dst, size_t cap, const pal_wire_haptic *h)
     put_floats(&dst, h->grasp_x0_m, 3);
     put_floats(&dst, h->grasp_f0_N, 3);
     put_floats(&dst, h->grasp_k_N_m, 6);
-    put_floats(&dst, &h->grip_b_N_s_m, 1);
+    put_floats(&dst, &h->grasp_b_N_s_m, 1);
     for (uint32_t i = 0; i < h->n_patch; i++) {
-        const pal_wire_patch *p = &h->patch[i];
+        const pal_wire_contact_patch *p = &h->patch[i];
         put16(&dst, p->id);
         put16(&dst, p->group);
         put_floats(&dst, p->p_m, 3);
@@ -290,7 +290,7 @@ size_t pal_wire_put_haptic(uint8_t *dst, size_t cap, const pal_wire_haptic *h)
     return PAL_WIRE_HAPTIC_BYTES(h->n_patch);
 }
 
-static bool take_patch(const uint8_t **at, pal_wire_patch *p)
+static bool take_patch(const uint8_t **at, pal_wire_contact_patch *p)
 {
     float scalar[7];
     bool finite = true;
@@ -311,7 +311,7 @@ static bool take_patch(const uint8_t **at, pal_wire_patch *p)
 }
 
 /* a unit normal and no negative constant but the slope: what a bridge renders unseen must at least be passive */
-static bool good_patch(const pal_wire_patch *p)
+static bool good_patch(const pal_wire_contact_patch *p)
 {
     double norm2 = 0;
     for (int i = 0; i < 3; i++) norm2 += (double)p->n[i] * (double)p->n[i];
@@ -334,7 +334,7 @@ int pal_wire_get_haptic(const uint8_t *bytes, size_t n_byte, pal_wire_haptic *ou
     h.hold_us = take32(&bytes);
     h.frame_us = take32(&bytes);
     h.n_patch = take32(&bytes);
-    if (h.n_patch > PAL_WIRE_PATCH_MAX) return PAL_REFUSAL_COUNT;
+    if (h.n_patch > PAL_WIRE_CONTACT_PATCH_MAX) return PAL_REFUSAL_COUNT;
     refusal = exact(n_byte, PAL_WIRE_HAPTIC_BYTES(h.n_patch));
     if (refusal) return refusal;
     finite &= take_doubles(&bytes, h.origin_m, 3);
@@ -343,12 +343,12 @@ int pal_wire_get_haptic(const uint8_t *bytes, size_t n_byte, pal_wire_haptic *ou
     finite &= take_floats(&bytes, h.grasp_x0_m, 3);
     finite &= take_floats(&bytes, h.grasp_f0_N, 3);
     finite &= take_floats(&bytes, h.grasp_k_N_m, 6);
-    finite &= take_floats(&bytes, &h.grip_b_N_s_m, 1);
+    finite &= take_floats(&bytes, &h.grasp_b_N_s_m, 1);
     for (uint32_t i = 0; i < h.n_patch; i++) finite &= take_patch(&bytes, &h.patch[i]);
 
     if (!finite) return PAL_REFUSAL_NAN;
     if (h.flags & ~(uint32_t)PAL_WIRE_HAPTIC_FLAGS) return PAL_REFUSAL_FLAGS;
-    if (h.tool >= PAL_WIRE_TOOL_MAX || h.has_grasp > 1 || h.grip_b_N_s_m < 0) return PAL_REFUSAL_RANGE;
+    if (h.tool >= PAL_WIRE_TOOL_MAX || h.has_grasp > 1 || h.grasp_b_N_s_m < 0) return PAL_REFUSAL_RANGE;
     for (uint32_t i = 0; i < h.n_patch; i++)
         if (!good_patch(&h.patch[i])) return PAL_REFUSAL_RANGE;
     if (h.stamp_us >= STAMP_MAX || h.echo_stamp_us >= STAMP_MAX) return PAL_REFUSAL_RANGE;

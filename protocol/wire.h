@@ -18,7 +18,7 @@
 #define PAL_WIRE_HEAD_BYTES            8
 #define PAL_WIRE_TOOL_MAX              32         /* tools of a session */
 #define PAL_WIRE_PART_MAX              16         /* mesh parts of a session */
-#define PAL_WIRE_PATCH_MAX             8          /* contact patches of a haptic model */
+#define PAL_WIRE_CONTACT_PATCH_MAX     8          /* contact patches of a haptic model */
 #define PAL_WIRE_VERTEX_MAX            (1u << 22) /* shown vertices of a part, PAL_ORDER_VERTEX_MAX */
 #define PAL_WIRE_POSE_BYTES            152
 #define PAL_WIRE_ACK_BYTES             16
@@ -26,16 +26,16 @@
 #define PAL_WIRE_TOOLS_BYTES(n_tool)   (24u + 68u * (n_tool))
 #define PAL_WIRE_HAPTIC_BYTES(n_patch) (140u + 68u * (n_patch))
 #define PAL_WIRE_TOOLS_MAX             PAL_WIRE_TOOLS_BYTES(PAL_WIRE_TOOL_MAX)
-#define PAL_WIRE_HAPTIC_MAX            PAL_WIRE_HAPTIC_BYTES(PAL_WIRE_PATCH_MAX)
+#define PAL_WIRE_HAPTIC_MAX            PAL_WIRE_HAPTIC_BYTES(PAL_WIRE_CONTACT_PATCH_MAX)
 
 typedef enum pal_wire_kind {
-    PAL_WIRE_FRAME = 1,  /* server to client: shown vertices of one part, frame_codec.h */
-    PAL_WIRE_TOOLS = 2,  /* server to client: all tools; closes a cycle                 */
-    PAL_WIRE_HAPTIC = 3, /* server to client: contact model for one tool's holder       */
-    PAL_WIRE_FIELD = 4,  /* server to client that asked: numbers for colours, field_codec.h */
-    PAL_WIRE_PATCH = 5,  /* server to client that takes them: changed triangles, patch_codec.h */
-    PAL_WIRE_POSE = 16,  /* client to server: pose of the tool it holds                 */
-    PAL_WIRE_ACK = 17    /* client to server: cycle taken in, gives credit              */
+    PAL_WIRE_FRAME = 1,          /* server to client: shown vertices of one part, frame_codec.h */
+    PAL_WIRE_TOOLS = 2,          /* server to client: all tools; closes a cycle                 */
+    PAL_WIRE_HAPTIC = 3,         /* server to client: contact model for one tool's holder       */
+    PAL_WIRE_FIELD = 4,          /* server to client that asked: numbers for colours, field_codec.h */
+    PAL_WIRE_TOPOLOGY_DELTA = 5, /* server to client that takes them: changed triangles, topology_delta_codec.h */
+    PAL_WIRE_POSE = 16,          /* client to server: pose of the tool it holds                 */
+    PAL_WIRE_ACK = 17            /* client to server: cycle taken in, gives credit              */
 } pal_wire_kind;
 
 /* websocket close codes with the meaning they have here (README.md, "Closing") */
@@ -75,7 +75,7 @@ enum {
         256, /* the tool is lifted out of the scene: touches and grabs nothing until a pose without it */
     PAL_WIRE_POSE_FLAGS = 511
 };
-enum { PAL_WIRE_GRAB = 1 };
+enum { PAL_WIRE_GRASP = 1 };
 
 /* POSE, client to server. Carries all of tool_state_t, so that palpate-lcm can pass it on unchanged. */
 typedef struct pal_wire_pose {
@@ -90,7 +90,7 @@ typedef struct pal_wire_pose {
     float force_N[3]; /* really commanded to the device, world frame, acting on the hand        */
     float torque_N_m[3];
     float grip;         /* opening, rad or m; 0 without a gripper                                 */
-    uint32_t buttons;   /* PAL_WIRE_GRAB                                                           */
+    uint32_t buttons;   /* PAL_WIRE_GRASP                                                           */
     uint32_t model_seq; /* newest haptic model in use by the sender, 0 none                       */
     uint32_t model_age_us;
     uint64_t model_stamp_us; /* stamp_us of that model                                                 */
@@ -109,8 +109,8 @@ int pal_wire_get_ack(const uint8_t *bytes, size_t n_byte, pal_wire_ack *out);
 /* pal_wire_tool.flags */
 enum {
     PAL_WIRE_TOOL_HELD = 1,    /* some member holds it                         */
-    PAL_WIRE_TOOL_TOUCHES = 2, /* its force on the tissue is not zero          */
-    PAL_WIRE_TOOL_GRABS = 4,   /* a grab spring is attached                    */
+    PAL_WIRE_TOOL_CONTACT = 2, /* its force on the tissue is not zero          */
+    PAL_WIRE_TOOL_GRASPS = 4,  /* a grab spring is attached                    */
     PAL_WIRE_TOOL_STALE = 8,   /* no pose for longer than the stale time       */
     PAL_WIRE_TOOL_AWAY = 16,   /* lifted out of the scene: do not draw         */
     PAL_WIRE_TOOL_FLAGS = 31
@@ -139,13 +139,13 @@ size_t pal_wire_put_tools(uint8_t *dst, size_t cap, const pal_wire_tools *t);
 int pal_wire_get_tools(const uint8_t *bytes, size_t n_byte, pal_wire_tools *out);
 
 /* one tangent contact patch, contact_patch_t of haptics.md 5 */
-typedef struct pal_wire_patch {
+typedef struct pal_wire_contact_patch {
     uint16_t id, group;
     float p_m[3]; /* point of the zero-force surface, relative to the model's origin */
     float n[3];   /* unit normal, out of the tissue; |n|^2 is 1 +- 1e-3           */
     float v_m_s[3];
     float k1_N_m, k2_N_m2, b_N_s_m, kt_N_m, mu_s, mu_d, radius_m; /* >= 0, k2 of any sign */
-} pal_wire_patch;
+} pal_wire_contact_patch;
 enum {
     PAL_WIRE_HAPTIC_FREEZE = 1,
     PAL_WIRE_HAPTIC_FORCE_OFF = 2,
@@ -168,8 +168,8 @@ typedef struct pal_wire_haptic {
     uint32_t has_grasp; /* 1: grip_* hold a bilateral spring              */
     float grasp_x0_m[3], grasp_f0_N[3];
     float grasp_k_N_m[6]; /* xx xy xz yy yz zz                              */
-    float grip_b_N_s_m;
-    pal_wire_patch patch[PAL_WIRE_PATCH_MAX];
+    float grasp_b_N_s_m;
+    pal_wire_contact_patch patch[PAL_WIRE_CONTACT_PATCH_MAX];
 } pal_wire_haptic;
 size_t pal_wire_put_haptic(uint8_t *dst, size_t cap, const pal_wire_haptic *h);
 int pal_wire_get_haptic(const uint8_t *bytes, size_t n_byte, pal_wire_haptic *out);

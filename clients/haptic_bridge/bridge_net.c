@@ -66,7 +66,7 @@ static void net_place(pal_bridge_net *n)
     if (n->o.has_origin || !n->asset || !(n->asset->ready || n->asset->failed)) return;
     n->placed = true;
     if (!n->asset->ready) return;
-    if (!pal_asset_furthest(n->asset->asset, n->o.up, point)) return;
+    if (!pal_asset_extreme_vertex(n->asset->asset, n->o.up, point)) return;
     pal_axpy3(point, n->radius_m, n->o.up);
     pal_servo_put_origin(n->servo, point);
 }
@@ -98,7 +98,7 @@ static void ws_control(void *user, pal_link *link, const pal_control *c)
                           : 0.01;
         net_joined(n);
         if (hello->n_part > 0)
-            n->asset = pal_asset_store_want(n->store, hello->part[0].asset);
+            n->asset = pal_asset_store_request(n->store, hello->part[0].asset);
         else
             n->placed = true;
         net_place(n);
@@ -338,9 +338,9 @@ pal_err pal_bridge_net_open(pal_link_loop *loop, pal_servo *servo, pal_servo_thr
     if (bus && n->o.tool < 0) n->o.tool = 0;
     if (bus) n->count.tool = n->o.tool;
     pal_err err = bus ? net_open_lcm(n, diag) : net_open_ws(n, diag);
-    if (!err && (!pal_link_every(loop, POSE_PERIOD_US, net_send_pose, n) ||
-                 !pal_link_every(loop, EVENT_PERIOD_US, net_send_events, n) ||
-                 !pal_link_every(loop, STATUS_PERIOD_US, net_send_status, n)))
+    if (!err && (!pal_link_add_timer(loop, POSE_PERIOD_US, net_send_pose, n) ||
+                 !pal_link_add_timer(loop, EVENT_PERIOD_US, net_send_events, n) ||
+                 !pal_link_add_timer(loop, STATUS_PERIOD_US, net_send_status, n)))
         err = PAL_ERR_MEMORY;
     /* the loop may hold timers and links of a half-open one: it frees them, the rest is freed after it */
     *out = n;

@@ -12,7 +12,7 @@
 #define PAL_HAPTIC_ABI 1
 
 enum { PAL_DEVICE_POLLED = 0, PAL_DEVICE_CALLBACK = 1, PAL_DEVICE_REQUEST_REPLY = 2 }; /* thread_model */
-enum { PAL_DEVICE_BUTTON_GRAB = 1, PAL_DEVICE_BUTTON_CLUTCH = 2, PAL_DEVICE_BUTTON_DEADMAN = 1 << 30 };
+enum { PAL_DEVICE_BUTTON_GRASP = 1, PAL_DEVICE_BUTTON_CLUTCH = 2, PAL_DEVICE_BUTTON_DEADMAN = 1 << 30 };
 
 typedef struct pal_dev_info {
     uint32_t size; /* sizeof of the caller's struct */

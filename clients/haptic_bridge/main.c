@@ -91,7 +91,7 @@ static pal_err main_workspace(bridge *b, pal_bridge_net_options *net, pal_diagno
 {
     pal_servo_options *o = &b->servo_options;
     double ex[3], ey[3];
-    if (!pal_client_triple(b->up, net->up) || !pal_unit3(net->up, net->up, 1e-9))
+    if (!pal_client_parse_vector(b->up, net->up) || !pal_unit3(net->up, net->up, 1e-9))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--up wants three numbers, not \"%s\"", b->up);
     const double other[3] = {fabs(net->up[0]) < 0.9, fabs(net->up[0]) >= 0.9, 0};
     pal_cross3(ey, net->up, other);
@@ -100,7 +100,7 @@ static pal_err main_workspace(bridge *b, pal_bridge_net_options *net, pal_diagno
     for (int k = 0; k < 3; k++)
         o->rotation[3 * k] = ex[k], o->rotation[3 * k + 1] = ey[k], o->rotation[3 * k + 2] = net->up[k];
     net->has_origin = b->origin != NULL;
-    if (b->origin && !pal_client_triple(b->origin, o->origin_m))
+    if (b->origin && !pal_client_parse_vector(b->origin, o->origin_m))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--origin wants three numbers, not \"%s\"", b->origin);
     return PAL_ERR_OK;
 }
@@ -140,7 +140,7 @@ static void main_json(const bridge *b, const pal_servo_timing *t, const pal_serv
     cJSON_AddNumberToObject(o, "force_max_N", v->force_max_N);
     cJSON_AddNumberToObject(o, "force_rms_N", v->force_rms_N);
     cJSON_AddNumberToObject(o, "jump_max_N", v->jump_max_N);
-    cJSON_AddNumberToObject(o, "felt_N_m", v->felt_N_m);
+    cJSON_AddNumberToObject(o, "felt_N_m", v->rendered_stiffness_N_m);
     cJSON_AddNumberToObject(o, "models", (double)v->n_model);
     cJSON_AddNumberToObject(o, "models_old", (double)v->n_model_old);
     cJSON_AddNumberToObject(o, "stale", (double)v->n_stale);
@@ -170,7 +170,7 @@ static void main_table(const bridge *b, const pal_servo_timing *t, const pal_ser
                pal_jitter_at_us(row[i], 0.99), pal_jitter_at_us(row[i], 0.999), (double)row[i]->max_ns * 1e-3);
     printf(
         "force N: max %.2f  rms %.2f  largest step at an update %.3f; felt %.0f N/m; %llu models, %llu times stale\n",
-        v->force_max_N, v->force_rms_N, v->jump_max_N, v->felt_N_m, (unsigned long long)v->n_model,
+        v->force_max_N, v->force_rms_N, v->jump_max_N, v->rendered_stiffness_N_m, (unsigned long long)v->n_model,
         (unsigned long long)v->n_stale);
 }
 
@@ -201,8 +201,8 @@ static pal_err main_start(bridge *b, pal_diagnostic *diag)
         pal_log(PAL_LOG_WARN, "real_time", "%s: forces are limited when the loop is late", refused.text);
     net.servo = *o;
     PAL_TRY(pal_bridge_net_open(b->loop, b->servo, b->thread, &net, diag, &b->net));
-    if (b->stdin_stop) PAL_TRY(pal_link_watch(b->loop, STDIN_FILENO, main_stdin, b));
-    return pal_link_every(b->loop, 50000, main_watch, b->loop) ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    if (b->stdin_stop) PAL_TRY(pal_link_poll_fd(b->loop, STDIN_FILENO, main_stdin, b));
+    return pal_link_add_timer(b->loop, 50000, main_watch, b->loop) ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 static int main_run(bridge *b)

@@ -1,5 +1,5 @@
 #include "clients/haptic_bridge/servo.h"
-#include "clients/haptic_bridge/local_patch.h"
+#include "clients/haptic_bridge/local_contact.h"
 #include "server/base/command_queue.h"
 #include "server/base/triple_buffer.h"
 #include "server/base/vec3.h"
@@ -63,7 +63,7 @@ struct pal_servo {
     double force_prev[3], patch_prev[3];
     bool model_changed;
     pal_dev_state device;
-    pal_patch_memory memory;
+    pal_local_contact_state memory;
     pal_servo_view view;
 };
 
@@ -312,16 +312,16 @@ static bool servo_states(pal_servo *s, uint64_t now, double dt)
 }
 
 /* patches of the model, or nothing; world frame */
-static void servo_patches(pal_servo *s, uint64_t now, double force[3], pal_patch_result *result)
+static void servo_patches(pal_servo *s, uint64_t now, double force[3], pal_local_contact_result *result)
 {
     double k_max = s->o.info.stiffness_max_N_m / (s->o.scale * s->o.force_scale);
     if (s->degraded >= 1) k_max = fmin(k_max, DEGRADED_K_N_M);
-    const pal_patch_limits limits = {k_max, s->o.info.damping_max_Ns_m, s->o.hand_off ? 5e-3 : 2.5e-3};
-    *result = (pal_patch_result){.finite = true};
+    const pal_local_contact_limits limits = {k_max, s->o.info.damping_max_Ns_m, s->o.hand_off ? 5e-3 : 2.5e-3};
+    *result = (pal_local_contact_result){.finite = true};
     pal_set3(force, 0, 0, 0);
     if (s->model.empty || s->fade <= 0) return;
-    pal_patch_force(&s->model.haptic, (double)(now - s->model.arrival_ns) * 1e-9, s->x, s->v, &limits, &s->memory,
-                    result);
+    pal_local_contact_force(&s->model.haptic, (double)(now - s->model.arrival_ns) * 1e-9, s->x, s->v, &limits,
+                            &s->memory, result);
     pal_scale3(force, s->fade * s->clutch_fade, result->force_N);
     if (s->model_changed) {
         const double jump = pal_dist3(force, s->patch_prev);
@@ -365,7 +365,7 @@ static bool servo_limit(pal_servo *s, double force_d[3], double dt)
 /* everything that gives force; result in the device's frame */
 static void servo_render(pal_servo *s, uint64_t now, double dt, double force_d[3])
 {
-    pal_patch_result patch;
+    pal_local_contact_result patch;
     double force[3];
     servo_patches(s, now, force, &patch);
     pal_copy3(s->patch_prev, force);
@@ -390,7 +390,7 @@ static void servo_render(pal_servo *s, uint64_t now, double dt, double force_d[3
     if (patch.clamped) s->view.flags |= PAL_WIRE_POSE_STIFF_CLAMPED;
     if (patch.n_contact > 0) s->view.flags |= PAL_WIRE_POSE_CONTACT;
     s->view.depth_m = patch.depth_m;
-    s->view.felt_N_m = patch.depth_m > 0 ? pal_norm3(force) / patch.depth_m : 0;
+    s->view.rendered_stiffness_N_m = patch.depth_m > 0 ? pal_norm3(force) / patch.depth_m : 0;
     s->view.state = s->stale && s->fade > 0 && s->view.n_model > 0
                         ? PAL_SERVO_STALE
                         : (patch.n_contact > 0 && s->fade > 0 ? PAL_SERVO_CONTACT : PAL_SERVO_FREE);
@@ -408,7 +408,7 @@ static void servo_publish(pal_servo *s, uint64_t now, const double force_d[3])
     pal_mul33(v->force_N, s->o.rotation, force_d);
     v->fade = s->fade;
     v->grip = s->device.grip;
-    v->buttons = s->device.buttons & PAL_DEVICE_BUTTON_GRAB ? PAL_WIRE_GRAB : 0;
+    v->buttons = s->device.buttons & PAL_DEVICE_BUTTON_GRASP ? PAL_WIRE_GRASP : 0;
     v->motor_temperature = s->device.motor_temperature;
     const double size = pal_norm3(force_d);
     v->force_rms_N = sqrt(s->mean_square);
@@ -439,7 +439,7 @@ void pal_servo_tick(pal_servo *s, uint64_t now_ns)
     double force_d[3] = {0, 0, 0};
     const double none[3] = {0, 0, 0};
     s->view.flags = 0;
-    s->view.depth_m = s->view.felt_N_m = 0;
+    s->view.depth_m = s->view.rendered_stiffness_N_m = 0;
     const bool good = !s->lost && servo_read(s, dt);
     servo_take_model(s);
     if (good) {

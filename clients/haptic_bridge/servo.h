@@ -99,13 +99,13 @@ typedef struct pal_servo_view {
     double force_N[3];                              /* world, really commanded, on the hand */
     double device_m[3];
     double fade, grip;
-    uint32_t flags, buttons; /* PAL_WIRE_POSE_*, PAL_WIRE_GRAB       */
+    uint32_t flags, buttons; /* PAL_WIRE_POSE_*, PAL_WIRE_GRASP       */
     uint32_t model_seq, model_age_us;
     uint64_t model_stamp_us;
     uint64_t n_model, n_model_old, n_bad_read, n_saturated, n_clamped, n_stale, n_fault, n_not_finite;
     double force_rms_N, force_max_N, jump_max_N; /* jump: largest step at a model change */
     double depth_m, motor_temperature;
-    double felt_N_m; /* tangent force over depth, 0 out of contact */
+    double rendered_stiffness_N_m; /* tangent force over depth, 0 out of contact */
 } pal_servo_view;
 /* [net] newest unseen view or NULL; valid until the next call */
 const pal_servo_view *pal_servo_take_view(pal_servo *servo);

@@ -186,7 +186,7 @@ static void tool_message(void *user, pal_link *link, const pal_wire_head *head, 
     if (head->kind != PAL_WIRE_HAPTIC || pal_wire_get_haptic(bytes, n_byte, &haptic) || haptic.tool != tool->index)
         return;
     palpate_haptic_model_t model;
-    palpate_contact_patch_t patch[PAL_WIRE_PATCH_MAX];
+    palpate_contact_patch_t patch[PAL_WIRE_CONTACT_PATCH_MAX];
     char channel[PAL_LCM_CHANNEL_MAX + 1];
     pal_lcm_from_haptic(&haptic, &model, patch);
     pal_lcm_channel(channel, b->session, "HMODEL", tool->index);
@@ -284,17 +284,17 @@ static void bridge_tidy(void *user)
     for (int i = 0; i < PAL_WIRE_TOOL_MAX; i++) {
         bridge_tool *tool = &b->tool[i];
         if (!tool->link) continue;
-        if (now - tool->last_ns > SILENCE_NS || pal_link_now(tool->link) == PAL_LINK_ENDED) {
+        if (now - tool->last_ns > SILENCE_NS || pal_link_current_state(tool->link) == PAL_LINK_ENDED) {
             pal_link_close(tool->link);
             tool->link = NULL;
             b->count.n_tool--;
-        } else if (pal_link_now(tool->link) == PAL_LINK_JOINED && tool->fixed != i) {
+        } else if (pal_link_current_state(tool->link) == PAL_LINK_JOINED && tool->fixed != i) {
             pal_link_send_control(tool->link, &(pal_control){.type = PAL_CONTROL_TAKE, .tool = i});
         }
     }
     for (uint32_t i = 0; i < b->topology.n_part; i++)
         if (b->part[i].n_byte > 0 && now - b->part[i].sent_ns > REPEAT_NS) bridge_body(b, i);
-    if (pal_link_now(b->watcher) != PAL_LINK_JOINED && now - b->status_ns > REPEAT_NS && b->session[0])
+    if (pal_link_current_state(b->watcher) != PAL_LINK_JOINED && now - b->status_ns > REPEAT_NS && b->session[0])
         bridge_status(b, NULL);
 }
 
@@ -319,7 +319,7 @@ pal_err pal_lcm_bridge_open(pal_link_loop *loop, const pal_lcm_bridge_options *o
     pal_err err = pal_lcm_link_open(loop, options->lcm, &lcm_events, b, diag, &b->lcm);
     if (!err) err = pal_lcm_link_subscribe(b->lcm, PAL_LCM_PREFIX "/.*/TOOL/.*", palpate_tool_state_t_get_type_info());
     if (!err) err = pal_link_open(loop, &link, diag, &b->watcher);
-    if (!err && !pal_link_every(loop, 250000, bridge_tidy, b)) err = PAL_ERR_MEMORY;
+    if (!err && !pal_link_add_timer(loop, 250000, bridge_tidy, b)) err = PAL_ERR_MEMORY;
     if (err) {
         pal_link_close(b->watcher);
         pal_lcm_link_close(b->lcm);

@@ -54,7 +54,7 @@ int main(int argc, char **argv)
     pal_lcm_bridge *bridge = NULL;
     pal_err err = pal_link_loop_create(&loop);
     if (!err) err = pal_lcm_bridge_open(loop, &(pal_lcm_bridge_options){server, lcm, session}, &diag, &bridge);
-    if (!err && !pal_link_every(loop, 50000, main_watch, loop)) err = PAL_ERR_MEMORY;
+    if (!err && !pal_link_add_timer(loop, 50000, main_watch, loop)) err = PAL_ERR_MEMORY;
     if (err) {
         fprintf(stderr, "palpate-lcm: %s\n", diag.text[0] ? diag.text : pal_err_text(err));
     } else if (seconds > 0) {

@@ -81,7 +81,7 @@ static void store_got(void *user, int status, const uint8_t *bytes, size_t n_byt
     entry->store->changed(entry->store->user, &entry->shown);
 }
 
-pal_stored_asset *pal_asset_store_want(pal_asset_store *store, const char *path)
+pal_stored_asset *pal_asset_store_request(pal_asset_store *store, const char *path)
 {
     store_entry *entry = store->entries;
     while (entry && strcmp(entry->shown.path, path)) entry = entry->next;
@@ -104,8 +104,8 @@ pal_stored_asset *pal_asset_store_want(pal_asset_store *store, const char *path)
     return &entry->shown;
 }
 
-bool pal_asset_furthest_near(const pal_asset *asset, const double up[3], const double near[3], double reach_m,
-                             double point_m[3])
+bool pal_asset_extreme_vertex_near(const pal_asset *asset, const double up[3], const double near[3], double reach_m,
+                                   double point_m[3])
 {
     double best = -INFINITY;
     for (uint32_t i = 0; i < asset->order->n_vertex; i++) {
@@ -121,8 +121,8 @@ bool pal_asset_furthest_near(const pal_asset *asset, const double up[3], const d
     return best > -INFINITY;
 }
 
-bool pal_asset_furthest(const pal_asset *asset, const double up[3], double point_m[3])
+bool pal_asset_extreme_vertex(const pal_asset *asset, const double up[3], double point_m[3])
 {
     const double origin[3] = {0, 0, 0};
-    return pal_asset_furthest_near(asset, up, origin, INFINITY, point_m);
+    return pal_asset_extreme_vertex_near(asset, up, origin, INFINITY, point_m);
 }

@@ -22,12 +22,12 @@ pal_asset_store *pal_asset_store_create(pal_link_loop *loop, const char *url,
                                         void (*changed)(void *user, const pal_stored_asset *a), void *user);
 void pal_asset_store_destroy(pal_asset_store *store); /* after the loop is destroyed; NULL is fine */
 /* the asset of that path, fetched at the first call and again after a failure to connect; NULL: out of memory */
-pal_stored_asset *pal_asset_store_want(pal_asset_store *store, const char *path);
+pal_stored_asset *pal_asset_store_request(pal_asset_store *store, const char *path);
 
 /* vertex of the rest pose that lies furthest along up; false when the asset has no vertex */
-bool pal_asset_furthest(const pal_asset *asset, const double up[3], double point_m[3]);
+bool pal_asset_extreme_vertex(const pal_asset *asset, const double up[3], double point_m[3]);
 /* outermost vertex along up among those within reach_m, across up, of the axis through `near` (all: reach_m infinite)
  */
-bool pal_asset_furthest_near(const pal_asset *asset, const double up[3], const double near[3], double reach_m,
-                             double point_m[3]);
+bool pal_asset_extreme_vertex_near(const pal_asset *asset, const double up[3], const double near[3], double reach_m,
+                                   double point_m[3]);
 #endif

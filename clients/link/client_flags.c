@@ -60,7 +60,7 @@ int pal_client_flags_parse(const pal_client_table *table, int argc, char **argv,
             return 0;
         }
         if (word[0] != '-' || word[1] == 0) {
-            if (n == table->most_operand) return flags_refuse(table, word, "one operand too many");
+            if (n == table->max_operand) return flags_refuse(table, word, "one operand too many");
             operand[n++] = word;
             continue;
         }
@@ -79,12 +79,12 @@ int pal_client_flags_parse(const pal_client_table *table, int argc, char **argv,
         const int code = flags_set(table, flag, text);
         if (code >= 0) return code;
     }
-    if (n < table->least_operand) return flags_refuse(table, "operand missing", table->usage);
+    if (n < table->min_operand) return flags_refuse(table, "operand missing", table->usage);
     *n_operand = n;
     return -1;
 }
 
-bool pal_client_triple(const char *text, double out[3])
+bool pal_client_parse_vector(const char *text, double out[3])
 {
     for (int i = 0; i < 3; i++) {
         char *end;

@@ -21,11 +21,11 @@ typedef struct pal_client_table {
     const char *program, *usage, *about;
     const pal_client_flag *flag;
     int n_flag;
-    int least_operand, most_operand;
+    int min_operand, max_operand;
 } pal_client_table;
 
-/* -1: go on; else the exit code (0 after --help, 2 after one line on stderr). operand: most_operand places */
+/* -1: go on; else the exit code (0 after --help, 2 after one line on stderr). operand: max_operand places */
 int pal_client_flags_parse(const pal_client_table *table, int argc, char **argv, const char **operand, int *n_operand);
 /* three numbers "x,y,z"; false: not that */
-bool pal_client_triple(const char *text, double out[3]);
+bool pal_client_parse_vector(const char *text, double out[3]);
 #endif

@@ -18,7 +18,7 @@ pal_err pal_lcm_to_pose(const void *bytes, size_t n_byte, pal_wire_pose *out)
                        .flags = (uint32_t)s.flags & 255,
                        .stamp_us = (uint64_t)s.utime,
                        .grip = s.grip,
-                       .buttons = (uint32_t)s.buttons & PAL_WIRE_GRAB,
+                       .buttons = (uint32_t)s.buttons & PAL_WIRE_GRASP,
                        .model_seq = (uint32_t)s.model_seq,
                        .model_age_us = (uint32_t)s.model_age_us,
                        .model_stamp_us = (uint64_t)s.model_utime};
@@ -57,17 +57,17 @@ void pal_lcm_from_pose(const pal_wire_pose *p, palpate_tool_state_t *out)
     COPY(out->torque, p->torque_N_m);
 }
 
-static void convert_patch(const palpate_contact_patch_t *c, pal_wire_patch *w)
+static void convert_patch(const palpate_contact_patch_t *c, pal_wire_contact_patch *w)
 {
-    *w = (pal_wire_patch){.id = (uint16_t)c->id,
-                          .group = (uint16_t)c->group,
-                          .k1_N_m = c->k1,
-                          .k2_N_m2 = c->k2,
-                          .b_N_s_m = c->b,
-                          .kt_N_m = c->kt,
-                          .mu_s = c->mu_s,
-                          .mu_d = c->mu_d,
-                          .radius_m = c->radius};
+    *w = (pal_wire_contact_patch){.id = (uint16_t)c->id,
+                                  .group = (uint16_t)c->group,
+                                  .k1_N_m = c->k1,
+                                  .k2_N_m2 = c->k2,
+                                  .b_N_s_m = c->b,
+                                  .kt_N_m = c->kt,
+                                  .mu_s = c->mu_s,
+                                  .mu_d = c->mu_d,
+                                  .radius_m = c->radius};
     COPY(w->p_m, c->p);
     COPY(w->n, c->n);
     COPY(w->v_m_s, c->v);
@@ -79,7 +79,7 @@ pal_err pal_lcm_to_haptic(const void *bytes, size_t n_byte, pal_wire_haptic *out
     memset(&m, 0, sizeof m);
     if (palpate_haptic_model_t_decode(bytes, 0, (int)n_byte, &m) < 0) return PAL_ERR_REFUSED;
     const bool good = m.version == PAL_LCM_VERSION && m.tool >= 0 && m.tool < PAL_WIRE_TOOL_MAX && m.npatch >= 0 &&
-                      m.npatch <= PAL_WIRE_PATCH_MAX && (m.has_grasp == 0 || m.has_grasp == 1) &&
+                      m.npatch <= PAL_WIRE_CONTACT_PATCH_MAX && (m.has_grasp == 0 || m.has_grasp == 1) &&
                       (m.flags & ~PAL_WIRE_HAPTIC_FLAGS) == 0;
     pal_wire_haptic h = {.tool = (uint16_t)m.tool,
                          .seq = (uint32_t)m.seq,
@@ -91,12 +91,12 @@ pal_err pal_lcm_to_haptic(const void *bytes, size_t n_byte, pal_wire_haptic *out
                          .frame_us = (uint32_t)m.frame_us,
                          .n_patch = good ? (uint32_t)m.npatch : 0,
                          .has_grasp = (uint32_t)m.has_grasp,
-                         .grip_b_N_s_m = m.grip_b};
+                         .grasp_b_N_s_m = m.grasp_b};
     COPY(h.origin_m, m.origin);
     COPY(h.f_ref_N, m.f_ref);
-    COPY(h.grasp_x0_m, m.grip_x0);
-    COPY(h.grasp_f0_N, m.grip_f0);
-    COPY(h.grasp_k_N_m, m.grip_k);
+    COPY(h.grasp_x0_m, m.grasp_x0);
+    COPY(h.grasp_f0_N, m.grasp_f0);
+    COPY(h.grasp_k_N_m, m.grasp_k);
     for (uint32_t i = 0; i < h.n_patch; i++) convert_patch(&m.patch[i], &h.patch[i]);
     palpate_haptic_model_t_decode_cleanup(&m);
     /* the protocol's own decoder has the last word on ranges */
@@ -109,7 +109,7 @@ pal_err pal_lcm_to_haptic(const void *bytes, size_t n_byte, pal_wire_haptic *out
 
 void pal_lcm_from_haptic(const pal_wire_haptic *h, palpate_haptic_model_t *out, palpate_contact_patch_t *patch)
 {
-    const uint32_t n = h->n_patch < PAL_WIRE_PATCH_MAX ? h->n_patch : PAL_WIRE_PATCH_MAX;
+    const uint32_t n = h->n_patch < PAL_WIRE_CONTACT_PATCH_MAX ? h->n_patch : PAL_WIRE_CONTACT_PATCH_MAX;
     *out = (palpate_haptic_model_t){.utime = (int64_t)h->stamp_us,
                                     .seq = (int32_t)h->seq,
                                     .version = PAL_LCM_VERSION,
@@ -120,16 +120,16 @@ void pal_lcm_from_haptic(const pal_wire_haptic *h, palpate_haptic_model_t *out, 
                                     .frame_us = (int32_t)h->frame_us,
                                     .flags = (int32_t)h->flags,
                                     .has_grasp = (int8_t)h->has_grasp,
-                                    .grip_b = h->grip_b_N_s_m,
+                                    .grasp_b = h->grasp_b_N_s_m,
                                     .npatch = (int8_t)n,
                                     .patch = patch};
     COPY(out->origin, h->origin_m);
     COPY(out->f_ref, h->f_ref_N);
-    COPY(out->grip_x0, h->grasp_x0_m);
-    COPY(out->grip_f0, h->grasp_f0_N);
-    COPY(out->grip_k, h->grasp_k_N_m);
+    COPY(out->grasp_x0, h->grasp_x0_m);
+    COPY(out->grasp_f0, h->grasp_f0_N);
+    COPY(out->grasp_k, h->grasp_k_N_m);
     for (uint32_t i = 0; i < n; i++) {
-        const pal_wire_patch *w = &h->patch[i];
+        const pal_wire_contact_patch *w = &h->patch[i];
         patch[i] = (palpate_contact_patch_t){.id = (int16_t)w->id,
                                              .group = (int16_t)w->group,
                                              .k1 = w->k1_N_m,

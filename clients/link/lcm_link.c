@@ -108,7 +108,7 @@ static bool lcm_try(pal_lcm_link *link)
         return false;
     }
     for (int i = 0; i < link->n_subscriber; i++) lcm_attach(link, &link->subscriber[i]);
-    if (link->loop) pal_link_watch(link->loop, lcm_get_fileno(link->lcm), lcm_readable, link);
+    if (link->loop) pal_link_poll_fd(link->loop, lcm_get_fileno(link->lcm), lcm_readable, link);
     return true;
 }
 
@@ -153,7 +153,8 @@ pal_err pal_lcm_link_open(pal_link_loop *loop, const char *url, const pal_lcm_ev
     pal_err err = link->buffer ? lcm_url(link->url, url, &link->memory, diag) : PAL_ERR_MEMORY;
     /* a memory queue belongs to its caller's own loop of calls */
     link->loop = link->memory ? NULL : loop;
-    if (!err && link->loop && !pal_link_every(loop, LCM_RETRY_S * 1000000ull, lcm_retry, link)) err = PAL_ERR_MEMORY;
+    if (!err && link->loop && !pal_link_add_timer(loop, LCM_RETRY_S * 1000000ull, lcm_retry, link))
+        err = PAL_ERR_MEMORY;
     if (err) {
         pal_lcm_link_close(link);
         return err;
@@ -172,7 +173,7 @@ void pal_lcm_link_close(pal_lcm_link *link)
     free(link);
 }
 
-bool pal_lcm_link_up(const pal_lcm_link *link)
+bool pal_lcm_link_is_up(const pal_lcm_link *link)
 {
     return link->lcm != NULL;
 }

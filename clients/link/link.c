@@ -1,5 +1,5 @@
 /* One link: connect, join, messages in and out, reconnect (link.h). */
-#include "clients/link/link_inside.h"
+#include "clients/link/link_core.h"
 #include "protocol/frame_codec.h"
 #include "server/base/clock.h"
 
@@ -197,7 +197,7 @@ void link_free_all(pal_link_loop *loop)
     while (loop->links) link_free(loop->links);
 }
 
-pal_link_state pal_link_now(const pal_link *link)
+pal_link_state pal_link_current_state(const pal_link *link)
 {
     return link->state;
 }
@@ -245,7 +245,7 @@ pal_err pal_link_send_control(pal_link *link, const pal_control *c)
     return PAL_ERR_OK;
 }
 
-void pal_link_hold(pal_link *link, bool hold)
+void pal_link_pause_reading(pal_link *link, bool hold)
 {
     link->fixed = hold;
     if (link->wsi && link->up && !link->pause_reading) lws_rx_flow_control(link->wsi, !hold);

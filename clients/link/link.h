@@ -1,4 +1,4 @@
-/* A client of palpate.v1 over libwebsockets, and the one event loop it runs on: shared by palpate-trainee,
+/* A client of palpate.v1 over libwebsockets, and the one event loop it runs on: shared by palpate-client,
  * palpate-lcm and palpate-bridge.
  *
  * A pal_link_loop is one libwebsockets context; all its links, gets, timers and watched descriptors call back on the
@@ -33,7 +33,7 @@ void pal_link_run_for(pal_link_loop *loop, double seconds); /* the same, for at 
 void pal_link_stop(pal_link_loop *loop);                    /* [any] */
 /* [any] makes the loop call `woken` soon; several wakes may become one call */
 void pal_link_wake(pal_link_loop *loop);
-void pal_link_on_wake(pal_link_loop *loop, void (*woken)(void *user), void *user); /* [load] */
+void pal_link_set_wake(pal_link_loop *loop, void (*woken)(void *user), void *user); /* [load] */
 
 typedef enum pal_link_state {
     PAL_LINK_CONNECTING,
@@ -60,7 +60,7 @@ typedef struct pal_link_options {
     const char *name; /* of the member; copied                                             */
     pal_wire_role role;
     int tool;                      /* wanted: index, PAL_WIRE_TOOL_ANY or PAL_WIRE_TOOL_NONE                      */
-    bool patches;                  /* takes PATCH (patch_table.h); else parts that adapt look as at load          */
+    bool patches;                  /* takes PATCH (triangle_table.h); else parts that adapt look as at load          */
     bool once;                     /* do not connect again after the first loss                                   */
     double read_bytes_s;           /* > 0: take no more than this many bytes per second (a slow client)           */
     const pal_link_events *events; /* borrowed while the link lives                                               */
@@ -72,7 +72,7 @@ pal_err pal_link_open(pal_link_loop *loop, const pal_link_options *options, pal_
 /* says goodbye (1000) and frees the link, no further events. [net] or after pal_link_run; NULL is fine */
 void pal_link_close(pal_link *link);
 
-pal_link_state pal_link_now(const pal_link *link);
+pal_link_state pal_link_current_state(const pal_link *link);
 /* copy of the last hello; NULL before the first one */
 const pal_wire_hello *pal_link_hello(const pal_link *link);
 
@@ -82,7 +82,7 @@ pal_err pal_link_send_ack(pal_link *link, const pal_wire_ack *ack);
 /* FULL: 16 are waiting; STATE: not connected; REFUSED: does not fit the protocol */
 pal_err pal_link_send_control(pal_link *link, const pal_control *c);
 /* stop reading from the socket (a stalled client) or go on */
-void pal_link_hold(pal_link *link, bool hold);
+void pal_link_pause_reading(pal_link *link, bool hold);
 
 typedef struct pal_link_counts {
     uint64_t bytes_in, messages_in, bytes_out, messages_out;
@@ -93,14 +93,14 @@ pal_link_counts pal_link_count(const pal_link *link);
 
 /* GET of a path on the server that url names: done is called once, status 200 with the whole body (borrowed), else the
  * status or 0 and the reason in why. REFUSED: URL; the body may have up to most bytes. [net] or before pal_link_run */
-typedef void (*pal_link_got)(void *user, int status, const uint8_t *bytes, size_t n_byte, const char *reason);
-pal_err pal_link_get(pal_link_loop *loop, const char *url, const char *path, size_t most, pal_link_got done, void *user,
-                     pal_diagnostic *diag);
+typedef void (*pal_link_get_done)(void *user, int status, const uint8_t *bytes, size_t n_byte, const char *reason);
+pal_err pal_link_get(pal_link_loop *loop, const char *url, const char *path, size_t most, pal_link_get_done done,
+                     void *user, pal_diagnostic *diag);
 
 /* calls fn every period_us after the call before has returned, so never more often than asked; ends with the loop or
- * pal_link_never. NULL: out of memory */
-pal_link_timer *pal_link_every(pal_link_loop *loop, uint64_t period_us, void (*fn)(void *user), void *user);
-void pal_link_never(pal_link_timer *timer); /* ends and frees; not from its own fn; NULL is fine */
+ * pal_link_remove_timer. NULL: out of memory */
+pal_link_timer *pal_link_add_timer(pal_link_loop *loop, uint64_t period_us, void (*fn)(void *user), void *user);
+void pal_link_remove_timer(pal_link_timer *timer); /* ends and frees; not from its own fn; NULL is fine */
 /* calls fn when the descriptor is readable; borrows fd (a copy of it is polled). IO */
-pal_err pal_link_watch(pal_link_loop *loop, int fd, void (*fn)(void *user), void *user);
+pal_err pal_link_poll_fd(pal_link_loop *loop, int fd, void (*fn)(void *user), void *user);
 #endif

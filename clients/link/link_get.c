@@ -1,5 +1,5 @@
 /* GET of one path over HTTP/1.1, for assets. */
-#include "clients/link/link_inside.h"
+#include "clients/link/link_core.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -8,7 +8,7 @@ struct link_get {
     link_get *next;
     pal_link_loop *loop;
     struct lws *wsi;
-    pal_link_got done;
+    pal_link_get_done done;
     void *user;
     size_t most, n_byte, cap;
     uint8_t *bytes;
@@ -83,8 +83,8 @@ int link_get_callback(struct lws *wsi, enum lws_callback_reasons reason, void *u
     return 0;
 }
 
-pal_err pal_link_get(pal_link_loop *loop, const char *url, const char *path, size_t most, pal_link_got done, void *user,
-                     pal_diagnostic *diag)
+pal_err pal_link_get(pal_link_loop *loop, const char *url, const char *path, size_t most, pal_link_get_done done,
+                     void *user, pal_diagnostic *diag)
 {
     link_address address;
     PAL_TRY(link_address_parse(url, &address, diag));

@@ -3,7 +3,7 @@
  * EVENT_WAIT_CANCELLED on every protocol; a flag set inside a timer needs it too, because timers run before the sleep
  * of the next service call; adopted descriptors are closed by the library, so a copy is handed over; extensions stay
  * NULL (permessage-deflate can abort a process). */
-#include "clients/link/link_inside.h"
+#include "clients/link/link_core.h"
 #include "server/base/clock.h"
 #include "server/base/log.h"
 
@@ -77,7 +77,7 @@ pal_err pal_link_loop_create(pal_link_loop **out)
 void pal_link_loop_destroy(pal_link_loop *loop)
 {
     if (!loop) return;
-    while (loop->timers) pal_link_never(loop->timers);
+    while (loop->timers) pal_link_remove_timer(loop->timers);
     /* goodbyes get a fifth of a second; a cancelled wait keeps the service call from sleeping longer */
     link_close_all(loop);
     const uint64_t end = pal_clock_ns() + 200000000;
@@ -108,9 +108,9 @@ static void link_time_is_up(void *loop)
 
 void pal_link_run_for(pal_link_loop *loop, double seconds)
 {
-    pal_link_timer *timer = pal_link_every(loop, (uint64_t)(seconds * 1e6), link_time_is_up, loop);
+    pal_link_timer *timer = pal_link_add_timer(loop, (uint64_t)(seconds * 1e6), link_time_is_up, loop);
     if (timer) pal_link_run(loop);
-    pal_link_never(timer);
+    pal_link_remove_timer(timer);
     atomic_store(&loop->stop, false);
 }
 
@@ -125,7 +125,7 @@ void pal_link_wake(pal_link_loop *loop)
     lws_cancel_service(loop->context);
 }
 
-void pal_link_on_wake(pal_link_loop *loop, void (*woken)(void *user), void *user)
+void pal_link_set_wake(pal_link_loop *loop, void (*woken)(void *user), void *user)
 {
     loop->woken = woken;
     loop->woken_user = user;
@@ -138,7 +138,7 @@ static void link_timer_fired(lws_sorted_usec_list_t *sul)
     lws_sul_schedule(timer->loop->context, 0, &timer->sul, link_timer_fired, (lws_usec_t)timer->period_us);
 }
 
-pal_link_timer *pal_link_every(pal_link_loop *loop, uint64_t period_us, void (*fn)(void *user), void *user)
+pal_link_timer *pal_link_add_timer(pal_link_loop *loop, uint64_t period_us, void (*fn)(void *user), void *user)
 {
     pal_link_timer *timer = calloc(1, sizeof *timer);
     if (!timer) return NULL;
@@ -152,7 +152,7 @@ pal_link_timer *pal_link_every(pal_link_loop *loop, uint64_t period_us, void (*f
     return timer;
 }
 
-void pal_link_never(pal_link_timer *timer)
+void pal_link_remove_timer(pal_link_timer *timer)
 {
     if (!timer) return;
     pal_link_timer **place = &timer->loop->timers;
@@ -162,7 +162,7 @@ void pal_link_never(pal_link_timer *timer)
     free(timer);
 }
 
-pal_err pal_link_watch(pal_link_loop *loop, int fd, void (*fn)(void *user), void *user)
+pal_err pal_link_poll_fd(pal_link_loop *loop, int fd, void (*fn)(void *user), void *user)
 {
     link_watch *watch = calloc(1, sizeof *watch);
     if (!watch) return PAL_ERR_MEMORY;

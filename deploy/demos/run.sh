@@ -1,5 +1,5 @@
 #!/bin/sh
-# Plays a demo: serves its scene on a free port, lets palpate-trainee give its orders, ends what it started.
+# Plays a demo: serves its scene on a free port, lets palpate-client give its orders, ends what it started.
 # usage: deploy/demos/run.sh NAME [--wait S] [--stay] [--json] [palpate serve options...]
 #   NAME     head, chair, paint, mass, nozzle or bridge; README.md tells what each shows
 #   --wait   seconds before it plays, to open the printed address
@@ -72,7 +72,7 @@ players='' code=0
 for orders in "$here/$name".orders "$here/$name"_*.orders; do
     [ -e "$orders" ] || continue
     file=$(basename "$orders" .orders)
-    "$bin/palpate-trainee" "ws://127.0.0.1:$port/ws" --name "$file" $flags --sculpt "$orders" $json >"$work/$file.told" &
+    "$bin/palpate-client" "ws://127.0.0.1:$port/ws" --name "$file" $flags --sculpt "$orders" $json >"$work/$file.told" &
     players="$players $!"
     pids="$pids $!"
 done

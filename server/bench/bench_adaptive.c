@@ -177,7 +177,7 @@ static void load(pal_world *world, const pressed *p, double share)
 static double moved(const pal_body *body, const pressed *p)
 {
     int best = 0;
-    for (int i = 1; i < body->adaptive->levels.n_vertex[0]; i++)
+    for (int i = 1; i < body->model.adaptive->levels.n_vertex[0]; i++)
         if (pal_dist3(body->x_rest + 3 * i, p->at) < pal_dist3(body->x_rest + 3 * best, p->at)) best = i;
     return pal_dist3(body->x + 3 * best, body->x_rest + 3 * best);
 }
@@ -200,8 +200,9 @@ static double go(pal_world *world, const pressed *p, double share, int n_step, d
         int *node = told->n_node[kind], *spring = told->n_spring[kind];
         node[0] = body->n_active < node[0] || !node[0] ? body->n_active : node[0];
         node[1] = body->n_active > node[1] ? body->n_active : node[1];
-        spring[0] = body->adaptive->n_spring < spring[0] || !spring[0] ? body->adaptive->n_spring : spring[0];
-        spring[1] = body->adaptive->n_spring > spring[1] ? body->adaptive->n_spring : spring[1];
+        spring[0] =
+            body->model.adaptive->n_spring < spring[0] || !spring[0] ? body->model.adaptive->n_spring : spring[0];
+        spring[1] = body->model.adaptive->n_spring > spring[1] ? body->model.adaptive->n_spring : spring[1];
     }
     return 1e-9 * (double)spent;
 }
@@ -291,7 +292,7 @@ static pal_err run_palm(const pressed *p, palm_row *out, pal_diagnostic *diag)
     if (err == PAL_ERR_FROZEN) pal_diagnostic_set(diag, err, "four levels: it diverged");
     for (int k = 0; k < 2; k++) {
         if (!err) {
-            const pal_adaptive_surface *adaptive = pal_world_body(world[k], 0)->adaptive;
+            const pal_adaptive_surface *adaptive = pal_world_body(world[k], 0)->model.adaptive;
             out->n_node[k] = adaptive->n_node, out->n_spring[k] = adaptive->n_spring;
             out->second_s[k] = pal_median(run_s[k], PALM_ROUNDS);
         }
@@ -344,7 +345,7 @@ static int32_t find_leaf(pal_adaptive_surface *adaptive, pal_body *body)
 static pal_err run_switches(pal_world *world, live_row *out, pal_diagnostic *diag)
 {
     pal_body *body = pal_world_body(world, 0);
-    pal_adaptive_surface *adaptive = body->adaptive;
+    pal_adaptive_surface *adaptive = body->model.adaptive;
     double us[2][SWITCHES], more[SWITCHES];
     int32_t face = find_leaf(adaptive, body);
     if (face < 0) return pal_diagnostic_set(diag, PAL_ERR_INTERNAL, "no face can be split alone");
@@ -386,7 +387,7 @@ static pal_err run_live(const pressed *p, live_row *out, pal_diagnostic *diag)
     if (!err) {
         *out = (live_row){.n_finest = body->n_node,
                           .n_node = body->n_active,
-                          .n_spring = body->adaptive->n_spring,
+                          .n_spring = body->model.adaptive->n_spring,
                           .n_sub = pal_world_substeps(world)};
         out->p50_ms = pal_median(step_ms, LIVE_STEPS), out->p95_ms = step_ms[LIVE_STEPS * 95 / 100];
         tell_rows(world, row_ms[0], LIVE_STEPS, out);

@@ -11,7 +11,7 @@
 #include "server/cli/median.h"
 #include "server/estimate/estimate_work.h"
 #include "server/scene/scene_file.h"
-#include "server/session/switching.h"
+#include "server/session/configuration_switch.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -125,27 +125,27 @@ static pal_err in_turn(pal_world *was, double was_s, pal_world *now, double now_
 
 static pal_err try_neighbour(const pal_scene *scene, pal_world *world, row *r, pal_diagnostic *diag)
 {
-    pal_switch *change = NULL;
+    pal_configuration_switch *change = NULL;
     pal_world *next = NULL;
     pal_estimate own = {.error_m = NAN};
     if (pal_configuration_estimate_nodes(scene, 0, &r->foreseen.setting) > MOST_NODE)
         return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "more than %d nodes", MOST_NODE);
     pal_err err = swing(world, scene);
-    if (!err) err = pal_switch_prepare(scene, NULL, 0, &r->foreseen.setting, diag, &change);
-    if (!err) err = pal_world_create(pal_switch_scene(change), diag, &next);
+    if (!err) err = pal_configuration_switch_prepare(scene, NULL, 0, &r->foreseen.setting, diag, &change);
+    if (!err) err = pal_world_create(pal_configuration_switch_scene(change), diag, &next);
     if (!err) {
-        pal_switch_carry(change, next, world);
-        err = put_load(next, pal_switch_scene(change));
+        pal_configuration_switch_transfer(change, next, world);
+        err = put_load(next, pal_configuration_switch_scene(change));
     }
     if (!err) {
         r->n_node = pal_world_view_body(next, 0)->n_node;
-        const pal_scene *to = pal_switch_scene(change);
+        const pal_scene *to = pal_configuration_switch_scene(change);
         err = estimate(to, next, NULL, 0, &own, diag);
         r->own_m = own.error_m;
         if (!err) err = in_turn(world, scene->step_s, next, to->step_s, r);
     }
     pal_world_destroy(next);
-    pal_switch_free(change);
+    pal_configuration_switch_free(change);
     return err;
 }
 

@@ -24,8 +24,8 @@ enum { N_CASE = 4, N_STEP = 40, N_WARM = 8 };
 typedef struct guards {
     const char *model;
     int n_point, n_sub;
-    bool watches;      /* an implicit solver's energy */
-    uint64_t n_rescue; /* 0, else something did go wrong */
+    bool watches;         /* an implicit solver's energy */
+    uint64_t n_safeguard; /* 0, else something did go wrong */
     double with_ms, without_ms, row_ms, looks_ms, watch_ms;
 } guards;
 
@@ -165,7 +165,7 @@ static pal_err one_round(const bodies *b, int which, int round, times *t, guards
     if (!err) {
         out->n_point = pal_world_body(world[1], 0)->n_active;
         out->n_sub = pal_world_substeps(world[1]);
-        out->n_rescue += pal_safeguards_sum(&pal_world_body(world[1], 0)->safeguards);
+        out->n_safeguard += pal_safeguards_sum(&pal_world_body(world[1], 0)->safeguards);
         out->looks_ms = looks_ms(world[1]);
         out->watches = pal_world_body(world[1], 0)->implicit;
     }
@@ -206,7 +206,7 @@ static double share(const guards *r)
 
 static bool fits(const guards *r)
 {
-    return share(r) <= most_share && r->n_rescue == 0;
+    return share(r) <= most_share && r->n_safeguard == 0;
 }
 
 static void print(const guards *r)
@@ -217,9 +217,9 @@ static void print(const guards *r)
         printf("%-18s %8d %10d %12.4f %12.4f %8.2f %14.2f %8.2f  %s\n", r[k].model, r[k].n_point, r[k].n_sub,
                r[k].with_ms, r[k].without_ms, 100 * r[k].row_ms / r[k].with_ms, 100 * checks_ms(&r[k]) / r[k].with_ms,
                100 * share(&r[k]),
-               r[k].n_rescue ? "something went wrong"
-               : fits(&r[k]) ? "ok"
-                             : "too much");
+               r[k].n_safeguard ? "something went wrong"
+               : fits(&r[k])    ? "ok"
+                                : "too much");
     printf("asked: a sum of at most %g %%. Not priced: %s\n", 100 * most_share, not_priced);
 }
 
@@ -232,7 +232,7 @@ static void print_json(const guards *r)
         cJSON_AddItemToArray(list, one);
         cJSON_AddStringToObject(one, "model", r[k].model);
         cJSON_AddNumberToObject(one, "points", r[k].n_point);
-        cJSON_AddNumberToObject(one, "rescues", (double)r[k].n_rescue);
+        cJSON_AddNumberToObject(one, "rescues", (double)r[k].n_safeguard);
         cJSON_AddNumberToObject(one, "with_ms", r[k].with_ms);
         cJSON_AddNumberToObject(one, "without_ms", r[k].without_ms);
         cJSON_AddNumberToObject(one, "row_share", r[k].row_ms / r[k].with_ms);

@@ -145,7 +145,7 @@ static int measure_motion(bench *b, int motion)
     for (int k = 0; k < FRAMES; k++) {
         place(b, motion, k);
         for (int e = 0; e < BOUNDS; e++) {
-            const pal_frame_given given = {.seq = (uint32_t)k, .error_m = bound_m[e], .position_m = b->given};
+            const pal_frame_input given = {.seq = (uint32_t)k, .error_m = bound_m[e], .position_m = b->given};
             pal_frame_result result;
             pal_frame_head head;
             double begin = thread_s();

@@ -141,9 +141,9 @@ static void describe(const pal_cell_model *model, const body *b, result *out)
     const pal_body *of = pal_world_body(b->world, 0);
     out->model = model;
     out->n_cell = b->cells.n_cell, out->n_point = of->n_dof;
-    out->n_element = pal_cell_elements_count(&of->solid->elements);
+    out->n_element = pal_cell_elements_count(&of->model.solid->elements);
     for (pal_cell_kind k = 0; k < PAL_CELL_KINDS; k++)
-        out->percent[k] = pal_cell_elements_percent(&of->solid->elements, k);
+        out->percent[k] = pal_cell_elements_percent(&of->model.solid->elements, k);
     for (size_t k = 0; k < sizeof paper / sizeof paper[0]; k++)
         if (!strcmp(paper[k].name, model->name)) out->paper_ms = paper[k].ms;
 }

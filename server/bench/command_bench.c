@@ -30,8 +30,8 @@ int command_bench(int argc, char **argv)
                  "  latency   from a pose put into a session to the frame that shows it\n",
         .flag = flag,
         .n_flag = sizeof flag / sizeof flag[0],
-        .least_operand = 1,
-        .most_operand = 2};
+        .min_operand = 1,
+        .max_operand = 2};
     pal_flag_common common;
     const char *word[2] = {NULL, NULL};
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);

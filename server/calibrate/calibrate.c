@@ -54,10 +54,10 @@ static void take_material(pal_calibration *c)
         young += log(m->young_Pa) / t->n_tet;
         poisson += m->poisson / t->n_tet;
         density += m->density_kg_m3 / t->n_tet;
-        c->clamped |= m->poisson > 0.4999;
+        c->clamped |= m->poisson > PAL_POISSON_CLAMP;
     }
     c->mean_young_Pa = exp(young);
-    c->mean_poisson = fmin(poisson, 0.4999);
+    c->mean_poisson = fmin(poisson, PAL_POISSON_CLAMP);
     c->mean_density = density;
 }
 

@@ -34,7 +34,7 @@ static void take_material(const pal_calibrate_run *run, pal_material *out)
     const pal_tets *t = &run->info.mesh->tets;
     double poisson = p->material[0].poisson, density = p->material[0].density_kg_m3;
     out->young_Pa = p->n_material > 1 ? run->info.mean_young_Pa : p->material[0].young_Pa;
-    out->poisson = fmin(p->material[0].poisson, 0.4999);
+    out->poisson = fmin(p->material[0].poisson, PAL_POISSON_CLAMP);
     out->density_kg_m3 = p->material[0].density_kg_m3;
     for (int e = 0; e < t->n_tet && p->n_material > 1; e++) {
         const pal_problem_material *m = &p->material[0];
@@ -48,7 +48,7 @@ static void take_material(const pal_calibrate_run *run, pal_material *out)
         density += (m->density_kg_m3 - p->material[0].density_kg_m3) / t->n_tet;
     }
     if (p->n_material == 1) return;
-    out->poisson = fmin(poisson, 0.4999);
+    out->poisson = fmin(poisson, PAL_POISSON_CLAMP);
     out->density_kg_m3 = density;
 }
 

@@ -2,7 +2,7 @@
 #include "server/cli/config.h"
 
 #include "server/base/utf8.h"
-#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/files/file_bytes.h"
 
 #include <cjson/cJSON.h>
 #include <ctype.h>
@@ -23,7 +23,7 @@ static const pal_config_key setting[] = {
     {"viewer", "FOLDER", PAL_CONFIG_KEY_TEXT, PLACE(viewer), 0, 0, "files of the page (those beside the program)"},
     {"error_m", "M", PAL_CONFIG_KEY_NUMBER, PLACE(error_m), 0, 0.01,
      "most error of streamed positions, m (1/3000 of the box, at most 0.00005)"},
-    {"most_clients", "N", PAL_CONFIG_KEY_INT, PLACE(most_clients), 1, 10000, "clients at once (200)"},
+    {"most_clients", "N", PAL_CONFIG_KEY_INT, PLACE(max_clients), 1, 10000, "clients at once (200)"},
     {"lcm", "URL", PAL_CONFIG_KEY_TEXT, PLACE(lcm), 0, 0, "also speak LCM there, in a process of its own (off)"},
     {"log", "LEVEL", PAL_CONFIG_KEY_TEXT, PLACE(log), 0, 0, "error, warn, info or debug (info)"},
     {"record", "FILE", PAL_CONFIG_KEY_TEXT, PLACE(record), 0, 0, "write the input log there, for palpate replay (off)"},
@@ -39,7 +39,7 @@ const pal_config_key *pal_config_settings(int *n)
 
 void pal_config_default(pal_config *config)
 {
-    *config = (pal_config){.listen = "127.0.0.1", .port = 8090, .most_clients = 200, .log = "info"};
+    *config = (pal_config){.listen = "127.0.0.1", .port = 8090, .max_clients = 200, .log = "info"};
 }
 
 pal_log_level pal_config_log_level(const pal_config *config)

@@ -19,7 +19,7 @@ typedef struct pal_config {
     bool allow_remote;            /* false: only loopback addresses may be listened on                   */
     char viewer[PAL_CONFIG_TEXT]; /* folder of the page's files; "": the one beside the program          */
     double error_m;               /* bound of streamed positions; 0: 1/3000 of the box, at most 0.05 mm  */
-    int most_clients;             /* 200                                                                 */
+    int max_clients;              /* 200                                                                 */
     char lcm[PAL_CONFIG_TEXT];    /* LCM URL: start palpate-lcm with it; "": no LCM                      */
     char log[8];                  /* "error" | "warn" | "info" | "debug"; info                           */
     char record[PAL_CONFIG_TEXT]; /* write the input log there; "": do not                               */

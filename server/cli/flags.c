@@ -209,11 +209,11 @@ int pal_flags_parse(const pal_flag_table *table, int argc, char **argv, pal_flag
             int code = take(&p, argc, argv, &k);
             if (code >= 0) return code;
         } else {
-            if (n == table->most_operand) return wrong(&p, "\"%.60s\" is one word too many", word);
+            if (n == table->max_operand) return wrong(&p, "\"%.60s\" is one word too many", word);
             operand[n++] = word;
         }
     }
-    if (n < table->least_operand) return wrong(&p, "%s", n ? "a word is missing" : "nothing to work on was named");
+    if (n < table->min_operand) return wrong(&p, "%s", n ? "a word is missing" : "nothing to work on was named");
     if (n_operand) *n_operand = n;
     return table->config ? configure(&p) : -1;
 }

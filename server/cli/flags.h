@@ -6,7 +6,7 @@
  *         {"--grid", NULL, PAL_FLAG_SWITCH, &grid, 0, 0, "keep the grid"},
  *     };
  *     const pal_flag_table table = {.usage = "prepare IN -o DIR", .about = "...", .flag = flag, .n_flag = 2,
- *                                   .least_operand = 1, .most_operand = 1};
+ *                                   .min_operand = 1, .max_operand = 1};
  *     int code = pal_flags_parse(&table, argc, argv, &common, in, &n_in);
  *     if (code >= 0) return code;
  *
@@ -43,7 +43,7 @@ typedef struct pal_flag_table {
     const char *usage, *about; /* "prepare IN -o DIR [flags]"; sentences of the manual, ended by \n */
     const pal_flag *flag;
     int n_flag;
-    int least_operand, most_operand;
+    int min_operand, max_operand;
     /* not NULL: every key of the configuration is a flag as well (allow_remote: --allow-remote), and --config FILE;
      * on success the struct holds defaults < file < environment < flags. A setting of PAL_CONFIG_KEY_BOOL is a switch.
      */
@@ -51,7 +51,7 @@ typedef struct pal_flag_table {
 } pal_flag_table;
 
 /* -1: go on; else the exit code: 0 after --help, 2 after one line about wrong usage, 1 for a refused configuration.
- * operand: most_operand places; both may be NULL when that is 0. */
+ * operand: max_operand places; both may be NULL when that is 0. */
 int pal_flags_parse(const pal_flag_table *table, int argc, char **argv, pal_flag_common *common, const char **operand,
                     int *n_operand);
 #endif

@@ -535,8 +535,8 @@ static int parse(job *j, int argc, char **argv)
                                   .about = about,
                                   .flag = flag,
                                   .n_flag = sizeof flag / sizeof flag[0],
-                                  .least_operand = 1,
-                                  .most_operand = MOST_PROBLEM};
+                                  .min_operand = 1,
+                                  .max_operand = MOST_PROBLEM};
     pal_calibrate_default(&j->options);
     j->options.voxel.resolution = 0;
     j->n_worker = 1;

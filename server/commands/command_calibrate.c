@@ -404,8 +404,8 @@ int command_calibrate(int argc, char **argv)
                                   .about = about,
                                   .flag = flag,
                                   .n_flag = sizeof flag / sizeof flag[0],
-                                  .least_operand = 1,
-                                  .most_operand = 1};
+                                  .min_operand = 1,
+                                  .max_operand = 1};
     int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.wish.problem, &n);
     if (code >= 0) return code;
     const char *sentence = take_words(&run, &w);

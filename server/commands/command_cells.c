@@ -351,7 +351,7 @@ int command_cells(int argc, char **argv)
                                   .about = about,
                                   .flag = flag,
                                   .n_flag = sizeof flag / sizeof flag[0],
-                                  .most_operand = 1};
+                                  .max_operand = 1};
     pal_flag_common common;
     const char *word[1] = {NULL};
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);

@@ -65,7 +65,7 @@ static void add_levels(cJSON *body, const pal_adaptive_surface *adaptive)
 /* elements of each kind, what moves them and what that takes */
 static void add_solid(cJSON *body, const pal_body_def *def, const pal_body *b)
 {
-    const pal_subdivision_solid *solid = b->solid;
+    const pal_subdivision_solid *solid = b->model.solid;
     static const char *const kind[PAL_CELL_KINDS] = {"cubic_percent", "hex_percent", "pyramid_percent"};
     cJSON_AddNumberToObject(body, "control_cells", def->cells->n_cell);
     cJSON_AddNumberToObject(body, "control_points", b->n_dof);
@@ -127,16 +127,16 @@ static cJSON *as_json(const pal_studied *studied, pal_world *world, cost *c)
         cJSON_AddItemToArray(bodies, body);
         cJSON_AddStringToObject(body, "name", scene->body[b].name);
         const pal_body *moving = pal_world_body(world, b);
-        if (moving->adaptive) {
-            add_levels(body, moving->adaptive);
-        } else if (moving->solid) {
+        if (moving->model.adaptive) {
+            add_levels(body, moving->model.adaptive);
+        } else if (moving->model.solid) {
             add_solid(body, &scene->body[b], moving);
         } else {
             cJSON_AddNumberToObject(body, "tets", scene->body[b].mesh->tets.n_tet);
             cJSON_AddNumberToObject(body, "nodes", scene->body[b].mesh->tets.n_node);
         }
         cJSON_AddNumberToObject(body, "triangles",
-                                moving->solid ? moving->surface->n_tri : scene->body[b].mesh->surface.n_tri);
+                                moving->model.solid ? moving->surface->n_tri : scene->body[b].mesh->surface.n_tri);
     }
     cJSON *rows = cJSON_AddArrayToObject(o, "rows");
     for (int r = 0; r < pal_world_component_count(world); r++) {
@@ -165,14 +165,15 @@ static void print_shell(const char *name, const pal_adaptive_surface *adaptive)
 
 static void print_solid(const pal_body_def *def, const pal_body *b)
 {
-    const pal_cell_elements *e = &b->solid->elements;
+    const pal_cell_elements *e = &b->model.solid->elements;
     printf("%s: %d control cells (#CC), after %d level%s %d elements (#FE): %.0f %% cubic, %.0f %% hexahedra, %.0f %% "
            "pyramids\n",
-           def->name, def->cells->n_cell, b->solid->subdivision.n_level, b->solid->subdivision.n_level == 1 ? "" : "s",
-           pal_cell_elements_count(e), pal_cell_elements_percent(e, PAL_CELL_CUBIC),
-           pal_cell_elements_percent(e, PAL_CELL_HEX), pal_cell_elements_percent(e, PAL_CELL_PYRAMID));
+           def->name, def->cells->n_cell, b->model.solid->subdivision.n_level,
+           b->model.solid->subdivision.n_level == 1 ? "" : "s", pal_cell_elements_count(e),
+           pal_cell_elements_percent(e, PAL_CELL_CUBIC), pal_cell_elements_percent(e, PAL_CELL_HEX),
+           pal_cell_elements_percent(e, PAL_CELL_PYRAMID));
     printf("  %d control points carry %d nodes, %d shown triangles; the solid has %.1f MB\n", b->n_dof, b->n_node,
-           b->surface->n_tri, 1e-6 * (double)b->solid->n_byte);
+           b->surface->n_tri, 1e-6 * (double)b->model.solid->n_byte);
 }
 
 static void print_absent(const pal_world *world)
@@ -190,12 +191,12 @@ static void print(const pal_studied *studied, pal_world *world, cost *c)
     if (studied->said[0]) printf("%s\n", studied->said);
     if (studied->warn[0]) printf("%s\n", studied->warn);
     for (int b = 0; b < scene->n_body; b++) {
-        const pal_adaptive_surface *adaptive = pal_world_body(world, b)->adaptive;
+        const pal_adaptive_surface *adaptive = pal_world_body(world, b)->model.adaptive;
         if (adaptive) {
             print_shell(scene->body[b].name, adaptive);
             continue;
         }
-        if (pal_world_body(world, b)->solid) {
+        if (pal_world_body(world, b)->model.solid) {
             print_solid(&scene->body[b], pal_world_body(world, b));
             continue;
         }
@@ -230,8 +231,8 @@ int command_plan(int argc, char **argv)
                                   .about = "Shows the rows that a scene calls for, in the order of a step, with their "
                                            "memory and their measured cost here.\nSCENE is a scene.json, its folder, "
                                            "control cells (.palcells), or any surface or scan.\n",
-                                  .least_operand = 1,
-                                  .most_operand = 1};
+                                  .min_operand = 1,
+                                  .max_operand = 1};
     pal_flag_common common;
     const char *word[1];
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);

@@ -326,7 +326,7 @@ static void print(const pal_loaded_scene *loaded, const plan_requests *wish, con
     else
         print_solid(mesh, r);
     if (n_component > 1) printf("the components do not hang together, each is held by itself (--largest keeps one)\n");
-    pal_loose_parts_tell(&loaded->loose[0], loaded->scene.body[0].name, &told);
+    pal_loose_components_describe(&loaded->loose[0], loaded->scene.body[0].name, &told);
     if (told.text[0]) printf("%s\n", told.text);
     if (d->n_degenerate + d->n_duplicate + d->n_nonfinite + d->n_folded > 0)
         printf("dropped triangles: %lld degenerate, %lld duplicate, %lld not finite, %lld folded\n",
@@ -503,11 +503,14 @@ static const pal_flag flag[] = {
      "scan (1,500) or a surface file (as many as it has, 1,500 when it has more than 3,000)"},
     {"--largest", NULL, PAL_FLAG_SWITCH, &wish.scene.largest_only, 0, 0,
      "keep only the largest of several components (of adaptive: pieces)"},
-    {"--young-Pa", "E", PAL_FLAG_NUMBER, &wish.scene.material.young_Pa, 1e-6, 1e12,
+    {"--young-Pa", "E", PAL_FLAG_NUMBER, &wish.scene.material.young_Pa, PAL_YOUNG_MIN_PA, PAL_YOUNG_MAX_PA,
      "stiffness of the tissue (5000; adaptive: 50,000)"},
-    {"--poisson", "NU", PAL_FLAG_NUMBER, &wish.scene.material.poisson, -0.9999, 0.499999, "its Poisson ratio (0.45)"},
-    {"--density-kg-m3", "RHO", PAL_FLAG_NUMBER, &wish.scene.material.density_kg_m3, 1e-3, 1e6, "its density (1000)"},
-    {"--damping-1-s", "C", PAL_FLAG_NUMBER, &wish.scene.material.damping_1_s, 0, 1e6, "its damping rate (4)"},
+    {"--poisson", "NU", PAL_FLAG_NUMBER, &wish.scene.material.poisson, PAL_POISSON_MIN, PAL_POISSON_MAX,
+     "its Poisson ratio (0.45)"},
+    {"--density-kg-m3", "RHO", PAL_FLAG_NUMBER, &wish.scene.material.density_kg_m3, PAL_DENSITY_MIN_KG_M3,
+     PAL_DENSITY_MAX_KG_M3, "its density (1000)"},
+    {"--damping-1-s", "C", PAL_FLAG_NUMBER, &wish.scene.material.damping_1_s, 0, PAL_DAMPING_MAX_1_S,
+     "its damping rate (4)"},
     {"--up", "AXIS", PAL_FLAG_TEXT, &wish.up, 0, 0, "x, y, z, -x, -y or -z points away from the ground (z)"},
     {"--hold", "PERCENT", PAL_FLAG_NUMBER, &wish.hold_percent, 0.1, 100,
      "lowest part of the height that is held in place (5; an open surface of adaptive: its open edges)"},
@@ -531,7 +534,7 @@ int command_prepare(int argc, char **argv)
                                   .about = about,
                                   .flag = flag,
                                   .n_flag = sizeof flag / sizeof flag[0],
-                                  .most_operand = 1};
+                                  .max_operand = 1};
     pal_flag_common common;
     const char *in[1] = {NULL};
     int n_in = 0, code = pal_flags_parse(&table, argc, argv, &common, in, &n_in);

@@ -34,8 +34,8 @@ int command_replay(int argc, char **argv)
                                   .about = "Runs an input log (palpate serve --record LOG) again and compares the hash "
                                            "of the world now and then.\nSCENE is the scene that was served.\n"
                                            "Exit code 1 when a hash differs.\n",
-                                  .least_operand = 2,
-                                  .most_operand = 2};
+                                  .min_operand = 2,
+                                  .max_operand = 2};
     pal_flag_common common;
     const char *word[2];
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);

@@ -382,8 +382,8 @@ int command_solve(int argc, char **argv)
                                   .about = about,
                                   .flag = flag,
                                   .n_flag = sizeof flag / sizeof flag[0],
-                                  .least_operand = 1,
-                                  .most_operand = 1};
+                                  .min_operand = 1,
+                                  .max_operand = 1};
     pal_flag_common common;
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, &wish.problem, &n);
     if (code >= 0) return code;

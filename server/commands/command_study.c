@@ -673,8 +673,8 @@ int command_study(int argc, char **argv)
                                   .about = about,
                                   .flag = flag,
                                   .n_flag = sizeof flag / sizeof flag[0],
-                                  .least_operand = 1,
-                                  .most_operand = 1};
+                                  .min_operand = 1,
+                                  .max_operand = 1};
     int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.question.word, &n);
     if (code >= 0) return code;
     char sentence[240] = "";

@@ -130,8 +130,8 @@ int command_torture(int argc, char **argv)
                                   .about = about,
                                   .flag = flag,
                                   .n_flag = sizeof flag / sizeof flag[0],
-                                  .least_operand = 1,
-                                  .most_operand = 1};
+                                  .min_operand = 1,
+                                  .max_operand = 1};
     pal_flag_common common;
     const char *word[1];
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);

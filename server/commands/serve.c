@@ -143,7 +143,7 @@ static pal_err open_sessions(serve_run *run, pal_diagnostic *diag)
     for (int i = 0; i < run->n; i++) {
         const pal_scene *scene = run->studied[i].scene;
         PAL_TRY(pal_preflight_look(scene, PAL_PREFLIGHT_QUICK, &run->preflight[i], diag));
-        pal_session_options options = {.wake = pal_server_gate_wake, .user = run->gate, .only_watched = true};
+        pal_session_options options = {.wake = pal_server_gate_wake, .user = run->gate, .only_observed = true};
         snprintf(record, sizeof record, run->n > 1 ? "%s.%s" : "%s", run->config.record, scene->name);
         if (run->config.record[0]) options.record_path = record;
         PAL_TRY(pal_session_open(scene, &options, diag, &run->session[i]));
@@ -165,7 +165,7 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
                                   .allow_remote = run->config.allow_remote,
                                   .viewer_folder = viewer_folder(&run->config, folder, sizeof folder),
                                   .error_m = run->config.error_m,
-                                  .most_clients = run->config.most_clients,
+                                  .max_clients = run->config.max_clients,
                                   .setting = run->setting,
                                   .n_setting = run->n_setting,
                                   .setting_body = run->setting_body,
@@ -404,7 +404,7 @@ int command_serve(int argc, char **argv)
                                   .about = about,
                                   .flag = flag,
                                   .n_flag = sizeof flag / sizeof *flag,
-                                  .most_operand = MOST_SESSIONS,
+                                  .max_operand = MOST_SESSIONS,
                                   .config = &run.config};
     int code = pal_flags_parse(&table, argc, argv, &run.common, input, &n_input);
     if (code >= 0) return code;

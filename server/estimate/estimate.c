@@ -75,7 +75,7 @@ static pal_estimate nothing(const char *reason)
                          .algebraic_m = NAN,
                          .time_m = NAN,
                          .model_m = NAN,
-                         .zz_percent = NAN,
+                         .energy_error_percent = NAN,
                          .max_m = NAN,
                          .ms = NAN};
     snprintf(none.diag, sizeof none.diag, "%.159s", reason);
@@ -110,7 +110,7 @@ static void *estimate(void *user)
         pal_estimate out;
         uint64_t before = pal_clock_thread_ns();
         bool whole = pal_estimate_work_run(e->work, &out);
-        out.own_ms = 1e-6 * (double)(pal_clock_thread_ns() - before);
+        out.estimate_ms = 1e-6 * (double)(pal_clock_thread_ns() - before);
         if (whole) publish(e, &out, false);
     }
     pal_estimate_work_close(e->work);

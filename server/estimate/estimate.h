@@ -50,10 +50,10 @@ typedef struct pal_estimate {
     /* largest displacement errors, m; NaN: not known for this body (note says why) */
     double error_m; /* of all parts together: their sum; NaN: a large one is not known (above) */
     double discretisation_m, algebraic_m, time_m, model_m;
-    double zz_percent; /* energy norm of the error over that of the solution    */
-    bool locking;      /* nearly incompressible in elements that lock: the estimate is too small (numerics.md) */
-    double ms;         /* of a live step, median of the last second awake; never awake: of steps beside it */
-    double own_ms;     /* processor time that this estimate took                 */
+    double energy_error_percent; /* energy norm of the error over that of the solution    */
+    bool locking;       /* nearly incompressible in elements that lock: the estimate is too small (numerics.md) */
+    double ms;          /* of a live step, median of the last second awake; never awake: of steps beside it */
+    double estimate_ms; /* processor time that this estimate took                 */
     /* next lower and higher choice on each knob, with what they are foreseen to cost and to leave */
     int n_neighbour;
     pal_measured_configuration neighbour[PAL_ESTIMATE_NEIGHBOURS];

@@ -225,7 +225,7 @@ static pal_err open_work(pal_estimate_work *w, const pal_scene *scene, int body,
     pal_configuration_of(scene, body, &w->foresight.setting);
     w->foresight.scene = w->scene, w->foresight.body = 0;
     PAL_TRY(make_live(w, diag));
-    if (pal_world_body(w->live, 0)->adaptive)
+    if (pal_world_body(w->live, 0)->active)
         return pal_diagnostic_set(
             diag, PAL_ERR_REFUSED,
             "body \"%s\" is refined while it runs: its error is not estimated (`palpate study` measures "

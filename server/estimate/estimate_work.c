@@ -189,7 +189,7 @@ static void discretise(pal_estimate_work *w, const pal_body *body, pal_estimate 
 {
     pal_zz_error zz;
     bool fresh = false;
-    if (!pal_zz_estimate(w->fine.world, 0, NULL, &zz, NULL)) out->zz_percent = zz.percent;
+    if (!pal_zz_estimate(w->fine.world, 0, NULL, &zz, NULL)) out->energy_error_percent = zz.percent;
     if (!pal_rest_find(&w->coarse, &w->state, body, NULL, w->stop)) {
         if (w->coarse.world) tell(out, "discretisation: the coarser mesh finds no rest under these loads");
         return;
@@ -259,7 +259,7 @@ static void find_rests(pal_estimate_work *w, pal_estimate *out)
     out->locking = w->locks;
     if (!has_moved(w, out)) {
         if (w->coarse.world) out->discretisation_m = 0;
-        out->model_m = out->zz_percent = 0;
+        out->model_m = out->energy_error_percent = 0;
         return;
     }
     if (!find_borne(w) || !pal_rest_find(&w->fine, &w->state, body, w->state.x, w->stop)) {
@@ -313,7 +313,7 @@ bool pal_estimate_work_run(pal_estimate_work *w, pal_estimate *out)
                           .algebraic_m = NAN,
                           .time_m = NAN,
                           .model_m = NAN,
-                          .zz_percent = NAN,
+                          .energy_error_percent = NAN,
                           .ms = middle(&w->state, ms_of)};
     memcpy(out->diag, w->diag, sizeof out->diag);
     price_sleep(w, out);

@@ -2,7 +2,7 @@
  * order. A label goes to the first of some places around its point where it meets nothing that was drawn. */
 #include "server/figure/plot.h"
 
-#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/files/file_bytes.h"
 
 #include <math.h>
 #include <stdlib.h>

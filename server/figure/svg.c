@@ -2,7 +2,7 @@
 #include "server/figure/svg.h"
 
 #include "server/base/utf8.h"
-#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/files/file_bytes.h"
 
 #include <math.h>
 #include <stdlib.h>

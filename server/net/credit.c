@@ -24,7 +24,7 @@ bool pal_credit_free(const pal_credit *credit)
 
 void pal_credit_sent(pal_credit *credit, uint32_t cycle, uint64_t now_ns)
 {
-    if (credit->n_flight == PAL_CREDIT_MOST) return;
+    if (credit->n_flight == PAL_CREDIT_MAX) return;
     if (credit->n_flight == 0) {
         credit->heard_ns = now_ns;
         credit->first_alone = true;
@@ -47,7 +47,7 @@ static void learn(pal_credit *c, double rtt_s, bool alone, uint64_t now_ns)
     c->probing = false;
     c->least_s[1] = fmin(c->least_s[1], rtt_s);
     double k = 1 + ceil(c->rate_hz * fmin(c->least_s[0], c->least_s[1]));
-    c->most = (int)fmax(PAL_CREDIT_LEAST, fmin(k, PAL_CREDIT_MOST));
+    c->most = (int)fmax(PAL_CREDIT_MIN, fmin(k, PAL_CREDIT_MAX));
 }
 
 bool pal_credit_acknowledge(pal_credit *credit, uint32_t cycle, uint64_t now_ns)

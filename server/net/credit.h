@@ -9,14 +9,14 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { PAL_CREDIT_LEAST = 2, PAL_CREDIT_MOST = 12 };
+enum { PAL_CREDIT_MIN = 2, PAL_CREDIT_MAX = 12 };
 
 typedef struct pal_credit {
     double rate_hz; /* of cycles                                          */
     int most;       /* K = 1 + ceil(rate x smallest round trip), clamped  */
     int n_flight;   /* sent and not acknowledged, oldest first            */
-    uint32_t cycle[PAL_CREDIT_MOST];
-    uint64_t sent_ns[PAL_CREDIT_MOST];
+    uint32_t cycle[PAL_CREDIT_MAX];
+    uint64_t sent_ns[PAL_CREDIT_MAX];
     uint32_t acknowledged; /* newest acknowledged cycle; 0: none                 */
     uint64_t heard_ns;     /* last acknowledgement, or the first cycle sent      */
     double rtt_s;          /* smoothed; 0: none yet                              */

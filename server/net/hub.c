@@ -1,5 +1,5 @@
 /* The hub's peers: coming, going, and what each is sent next (streaming.md 1.6, 2.3). */
-#include "server/net/hub_parts.h"
+#include "server/net/hub_core.h"
 
 #include "server/base/log.h"
 #include "server/net/plain_text.h"
@@ -40,14 +40,14 @@ static void leave_room(pal_hub *hub, pal_client *c)
     pal_hub_room *room = c->room;
     empty(c);
     if (!c->id) return;
-    pal_hub_look_away(c);
-    pal_hub_estimate_none(c);
+    pal_hub_unsubscribe_fields(c);
+    pal_hub_unsubscribe_estimates(c);
     pal_member_entry *member = pal_members_find(&room->members, c->id);
     int tool = member ? member->tool : -1;
     pal_members_leave(&room->members, c->id);
     if (tool >= 0) pal_hub_release_tool(room, tool);
     room->tier_users[c->tier]--;
-    pal_session_watch(room->session, false);
+    pal_session_observe(room->session, false);
     c->id = 0;
     pal_hub_members_changed(hub, room);
 }
@@ -89,13 +89,13 @@ pal_packet *pal_hub_encode(pal_hub *hub, const pal_control *control)
     return pal_packet_create(hub->text, n, true);
 }
 
-void pal_hub_say(pal_hub *hub, pal_client *client, const pal_control *control)
+void pal_hub_send(pal_hub *hub, pal_client *client, const pal_control *control)
 {
     if (client->peer->drop_code) return;
     queue(hub, client, pal_hub_encode(hub, control));
 }
 
-void pal_hub_complain(pal_hub *hub, pal_client *client, const char *code, const char *format, ...)
+void pal_hub_send_error(pal_hub *hub, pal_client *client, const char *code, const char *format, ...)
 {
     char text[512];
     va_list args;
@@ -106,12 +106,12 @@ void pal_hub_complain(pal_hub *hub, pal_client *client, const char *code, const 
     hub->control->type = PAL_CONTROL_ERROR;
     pal_plain_text(hub->control->problem.code, sizeof hub->control->problem.code, code);
     pal_plain_text(hub->control->problem.text, sizeof hub->control->problem.text, text);
-    pal_hub_say(hub, client, hub->control);
+    pal_hub_send(hub, client, hub->control);
 }
 
 void pal_hub_members_changed(pal_hub *hub, pal_hub_room *room)
 {
-    for (int i = 0; i < hub->most_clients; i++) {
+    for (int i = 0; i < hub->max_clients; i++) {
         pal_client *c = &hub->client[i];
         if (!c->peer || c->room != room || !c->id || c->peer->drop_code) continue;
         c->members_due = true;
@@ -183,7 +183,7 @@ static pal_packet *status_message(pal_hub *hub, pal_client *c)
         w->bytes_s = (double)(c->n_byte - c->status_byte) / ((double)(now - c->status_ns) * 1e-9);
     c->status_ns = now;
     c->status_byte = c->n_byte;
-    pal_session_last_note(c->room->session, &diag);
+    pal_session_last_diagnostic(c->room->session, &diag);
     pal_plain_text(w->diag, sizeof w->diag, diag.text);
     w->step_rate_hz = s->step_rate_hz;
     w->step_ms = s->step_ms;
@@ -213,8 +213,9 @@ static bool add_patch(pal_hub *hub, pal_client *c, int p)
 {
     const pal_stream_part *part = &c->room->stream->part[p];
     if (!c->patches || !part->places || c->sent_change[p] == part->places->change) return true;
-    pal_packet *packet =
-        part->frame_change[c->tier] == part->places->change ? pal_places_patch(part->places, c->sent_change[p]) : NULL;
+    pal_packet *packet = part->frame_change[c->tier] == part->places->change
+                             ? pal_triangle_slots_delta(part->places, c->sent_change[p])
+                             : NULL;
     if (!packet) return false;
     c->out[c->n_out++] = packet;
     c->sent_change[p] = part->places->change;
@@ -310,10 +311,10 @@ static void client_opened(void *user, pal_peer *peer, const char *session)
             pal_peer_drop(peer, PAL_WIRE_CLOSE_NO_SESSION, "there is no session of that name");
         return;
     }
-    while (i < hub->most_clients && hub->client[i].peer) i++;
-    if (i == hub->most_clients) {
+    while (i < hub->max_clients && hub->client[i].peer) i++;
+    if (i == hub->max_clients) {
         hub->count.n_refused_join++;
-        pal_peer_drop(peer, PAL_WIRE_CLOSE_FULL, "the server has its %d clients", hub->most_clients);
+        pal_peer_drop(peer, PAL_WIRE_CLOSE_FULL, "the server has its %d clients", hub->max_clients);
         return;
     }
     pal_client *c = &hub->client[i];
@@ -344,7 +345,7 @@ static void client_closed(void *user, pal_peer *peer)
 
 static void offer_cycle(pal_hub *hub, pal_hub_room *room)
 {
-    for (int i = 0; i < hub->most_clients; i++) {
+    for (int i = 0; i < hub->max_clients; i++) {
         pal_client *c = &hub->client[i];
         if (!c->peer || c->room != room || !c->id || c->peer->drop_code) continue;
         pal_member_entry *m = pal_members_find(&room->members, c->id);
@@ -366,13 +367,13 @@ static void hub_wake(void *user)
             if (!due || next < due) due = next;
         } else {
             for (int t = 0; t < PAL_STREAM_TIER; t++) used[t] = room->tier_users[t] > 0;
-            if (pal_stream_turn(room->stream, now, used, room->tool)) offer_cycle(hub, room);
+            if (pal_stream_update(room->stream, now, used, room->tool)) offer_cycle(hub, room);
         }
         next = pal_hub_make_fields(hub, room, now);
         if (next && (!due || next < due)) due = next;
     }
-    pal_hub_works_turn(hub);
-    if (due) pal_loop_due(hub->loop, due);
+    pal_hub_jobs_update(hub);
+    if (due) pal_loop_set_due(hub->loop, due);
 }
 
 /* a client that skips more than a quarter of the cycles for 2 s gets coarser frames, after 10 s without finer ones */
@@ -401,11 +402,11 @@ static void hub_tick(void *user)
     hub_wake(hub);
     for (int r = 0; r < hub->n_room; r++) {
         pal_stream_measure(hub->room[r].stream, now);
-        pal_hub_tell_fields(&hub->room[r]);
-        pal_hub_tell_estimates(&hub->room[r]);
-        pal_hub_count_unwatched(&hub->room[r]);
+        pal_hub_update_fields(&hub->room[r]);
+        pal_hub_update_estimates(&hub->room[r]);
+        pal_hub_count_unobserved(&hub->room[r]);
     }
-    for (int i = 0; i < hub->most_clients; i++) {
+    for (int i = 0; i < hub->max_clients; i++) {
         pal_client *c = &hub->client[i];
         if (!c->peer || c->peer->drop_code) continue;
         if (!c->id) {
@@ -418,7 +419,7 @@ static void hub_tick(void *user)
             continue;
         }
         judge_tier(hub, c, now);
-        pal_hub_row_answer(hub, c);
+        pal_hub_component_result(hub, c);
         c->status_due = true;
         pal_hub_estimates_due(c);
         c->peer->ops->ready(c->peer);
@@ -435,9 +436,9 @@ pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_sessi
     hub->site = options->site;
     hub->session = session;
     hub->error_m = options->error_m;
-    hub->most_clients = options->most_clients > 0 ? options->most_clients : 200;
+    hub->max_clients = options->max_clients > 0 ? options->max_clients : 200;
     hub->room = calloc((size_t)n_session, sizeof *hub->room);
-    hub->client = calloc((size_t)hub->most_clients, sizeof *hub->client);
+    hub->client = calloc((size_t)hub->max_clients, sizeof *hub->client);
     hub->control = malloc(sizeof *hub->control);
     hub->text = malloc(PAL_CONTROL_OUT_MAX + 1);
     if (!hub->room || !hub->client || !hub->control || !hub->text) err = PAL_ERR_MEMORY;
@@ -466,10 +467,10 @@ pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_sessi
 void pal_hub_destroy(pal_hub *hub)
 {
     if (!hub) return;
-    pal_hub_works_end(hub);
+    pal_hub_jobs_end(hub);
     for (int i = 0; i < hub->n_room; i++) {
         pal_stream_close(hub->room[i].stream);
-        for (int k = 0; k < PAL_HUB_PAST; k++) pal_packet_drop(hub->room[i].past[k].asset);
+        for (int k = 0; k < PAL_HUB_OLD_ASSETS; k++) pal_packet_drop(hub->room[i].past[k].asset);
     }
     free(hub->room);
     free(hub->client);
@@ -492,7 +493,7 @@ void pal_hub_events(pal_hub *hub, pal_peer_events *out)
 void pal_hub_goodbye(pal_hub *hub)
 {
     hub->leaving = true;
-    for (int i = 0; i < hub->most_clients; i++)
+    for (int i = 0; i < hub->max_clients; i++)
         if (hub->client[i].peer) pal_hub_drop(hub, &hub->client[i], PAL_WIRE_CLOSE_GOING_AWAY, "the server ends");
 }
 

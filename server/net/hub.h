@@ -15,7 +15,7 @@ typedef struct pal_hub pal_hub;
 
 typedef struct pal_hub_options {
     double error_m;
-    int most_clients;
+    int max_clients;
     pal_site *site; /* borrowed; NULL: no files */
     /* settings of a study of each session's scene, as in pal_server_options; borrowed; NULL: none */
     const pal_measured_configuration *const *setting;

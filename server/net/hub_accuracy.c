@@ -1,7 +1,7 @@
 /* What accuracy costs, as clients see it (protocol/README.md): the study's points once, then a body's estimate at every
  * tick of the hub, to those who ask for it. Who looks is counted as with fields; the session estimates while anybody
  * does, and nothing of it is there while nobody does. */
-#include "server/net/hub_parts.h"
+#include "server/net/hub_core.h"
 
 #include "server/net/plain_text.h"
 
@@ -11,14 +11,14 @@
 #include <stdio.h>
 #include <string.h>
 
-void pal_hub_tell_estimates(pal_hub_room *room)
+void pal_hub_update_estimates(pal_hub_room *room)
 {
     for (int b = 0; b < room->stream->n_part; b++) {
         bool wanted = room->n_estimate[b] > 0;
-        if (wanted == room->told_estimate[b]) continue;
+        if (wanted == room->estimate_requested[b]) continue;
         pal_command command = {.kind = PAL_COMMAND_ESTIMATE, .body = b, .wanted = wanted};
         /* a session whose queue is full is told at the next tick */
-        if (pal_session_command(room->session, &command) == PAL_ERR_OK) room->told_estimate[b] = wanted;
+        if (pal_session_command(room->session, &command) == PAL_ERR_OK) room->estimate_requested[b] = wanted;
     }
 }
 
@@ -30,10 +30,10 @@ static void look(pal_client *c, int body, bool wanted)
     if (!wanted) c->estimate_due[body] = false;
 }
 
-void pal_hub_estimate_none(pal_client *c)
+void pal_hub_unsubscribe_estimates(pal_client *c)
 {
     for (int b = 0; b < c->room->stream->n_part; b++) look(c, b, false);
-    pal_hub_tell_estimates(c->room);
+    pal_hub_update_estimates(c->room);
 }
 
 /* ---- the study ---- */
@@ -65,12 +65,12 @@ static void say_study(pal_hub *hub, pal_client *c, int body)
         char text[PAL_CONFIGURATION_TEXT];
         if (!isfinite(p->ms) || !isfinite(p->error_m) || (!p->front && room_left == 0)) continue;
         room_left -= !p->front;
-        pal_wire_point *to = &study->point[study->n_point++];
-        *to = (pal_wire_point){.index = (uint32_t)i, .ms = p->ms, .error_m = p->error_m, .front = p->front};
+        pal_wire_study_point *to = &study->point[study->n_point++];
+        *to = (pal_wire_study_point){.index = (uint32_t)i, .ms = p->ms, .error_m = p->error_m, .front = p->front};
         method_text(&p->setting, to->method);
         pal_plain_text(to->label, sizeof to->label, pal_configuration_text(&p->setting, text));
     }
-    pal_hub_say(hub, c, hub->control);
+    pal_hub_send(hub, c, hub->control);
 }
 
 /* ---- where it is in the study ---- */
@@ -192,11 +192,12 @@ static void put_estimate(const pal_hub_room *room, const pal_estimate *from, con
 {
     to->tick = from->tick, to->age_s = from->age_s;
     to->time_s = isfinite(from->time_s) ? from->time_s : 0;
-    to->own_ms = isfinite(from->own_ms) ? from->own_ms : 0;
+    to->estimate_ms = isfinite(from->estimate_ms) ? from->estimate_ms : 0;
     if (isfinite(from->ms) && from->ms > 0) to->ms = price(room, from->ms, now->step_s);
     to->max_m = known(from->max_m), to->error_m = known(from->error_m);
     to->discretisation_m = known(from->discretisation_m), to->algebraic_m = known(from->algebraic_m);
-    to->time_m = known(from->time_m), to->model_m = known(from->model_m), to->zz_percent = known(from->zz_percent);
+    to->time_m = known(from->time_m), to->model_m = known(from->model_m),
+    to->energy_error_percent = known(from->energy_error_percent);
     to->locking = from->locking;
     pal_plain_text(to->diag, sizeof to->diag, from->diag);
     for (int i = 0; i < from->n_neighbour && i < PAL_WIRE_NEIGHBOUR_MAX; i++)
@@ -236,7 +237,7 @@ pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *c)
     bool known_ms = awake && c->room->stream->step_ms > 0;
     out->ms = known_ms ? price(c->room, c->room->stream->step_ms, now.step_s) : NAN;
     out->age_s = out->max_m = out->error_m = out->discretisation_m = out->algebraic_m = out->time_m = out->model_m =
-        out->zz_percent = NAN;
+        out->energy_error_percent = NAN;
     if (pal_session_estimate(c->room->session, b, &estimate)) put_estimate(c->room, &estimate, &now, out);
     tell_far(c->room, out);
     return pal_hub_encode(hub, hub->control);
@@ -254,7 +255,7 @@ void pal_hub_estimates_due(pal_client *c)
     for (int b = 0; b < c->room->stream->n_part; b++) c->estimate_due[b] = c->estimate[b];
 }
 
-bool pal_hub_estimate_order(pal_hub *hub, pal_client *c, const pal_wire_order *order)
+bool pal_hub_estimate_command(pal_hub *hub, pal_client *c, const pal_wire_command *order)
 {
     const pal_stream *s = c->room->stream;
     int body = order->target[0] ? -1 : 0;
@@ -262,16 +263,16 @@ bool pal_hub_estimate_order(pal_hub *hub, pal_client *c, const pal_wire_order *o
     for (int b = 0; b < s->n_part; b++)
         if (!strcmp(s->part[b].info.name, order->target)) body = b;
     if (body < 0) {
-        pal_hub_complain(hub, c, "target", "there is no body %s", order->target);
+        pal_hub_send_error(hub, c, "target", "there is no body %s", order->target);
         return true;
     }
     if (order->n_arg != 1 || strcmp(order->arg[0].key, "on")) {
-        pal_hub_complain(hub, c, "args", "estimate takes on");
+        pal_hub_send_error(hub, c, "args", "estimate takes on");
         return true;
     }
     bool wanted = order->arg[0].value != 0, before = c->estimate[body];
     look(c, body, wanted);
-    pal_hub_tell_estimates(c->room);
+    pal_hub_update_estimates(c->room);
     if (wanted && !before) say_study(hub, c, body);
     c->estimate_due[body] = wanted;
     c->peer->ops->ready(c->peer);

@@ -2,7 +2,7 @@
  * of each part at most; a field that nobody looks at is neither computed nor encoded. Values go out at most 10 times a
  * second, newest first and the rest never, only while the client's credit is free, behind control and before the next
  * cycle. */
-#include "server/net/hub_parts.h"
+#include "server/net/hub_core.h"
 
 #include "protocol/field_codec.h"
 
@@ -16,7 +16,7 @@ _Static_assert((int)PAL_WIRE_FIELD_DISPLACEMENT_M == (int)PAL_FIELD_DISPLACEMENT
                    (int)PAL_WIRE_FIELD_COUNT == (int)PAL_FIELD_COUNT,
                "fields are numbered alike");
 
-void pal_hub_tell_fields(pal_hub_room *room)
+void pal_hub_update_fields(pal_hub_room *room)
 {
     for (int p = 0; p < room->stream->n_part; p++)
         for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++) {
@@ -38,32 +38,32 @@ static void look(pal_client *c, int part, pal_field field)
     c->sent_field[part] = 0;
 }
 
-void pal_hub_look_away(pal_client *c)
+void pal_hub_unsubscribe_fields(pal_client *c)
 {
     for (int p = 0; p < c->room->stream->n_part; p++) look(c, p, PAL_FIELD_NONE);
-    pal_hub_tell_fields(c->room);
+    pal_hub_update_fields(c->room);
 }
 
-void pal_hub_view(pal_hub *hub, pal_client *c, const pal_wire_view *view)
+void pal_hub_subscribe_field(pal_hub *hub, pal_client *c, const pal_wire_field_subscription *view)
 {
     const pal_stream *s = c->room->stream;
     pal_wire_field field = pal_wire_field_find(view->field);
     if (view->part >= (uint32_t)s->n_part) {
-        pal_hub_complain(hub, c, "part", "there is no part %u, the scene has %d", view->part, s->n_part);
+        pal_hub_send_error(hub, c, "part", "there is no part %u, the scene has %d", view->part, s->n_part);
         return;
     }
     int part = (int)view->part;
     if (field == PAL_WIRE_FIELD_COUNT) {
-        pal_hub_complain(hub, c, "field", "there is no field %s", view->field);
+        pal_hub_send_error(hub, c, "field", "there is no field %s", view->field);
         return;
     }
-    if (field != PAL_WIRE_FIELD_NONE && !pal_session_gives(c->room->session, part, (pal_field)field)) {
-        pal_hub_complain(hub, c, "field", "%s gives no %s: its model has no finite elements", s->part[part].info.name,
-                         pal_field_title((pal_field)field));
+    if (field != PAL_WIRE_FIELD_NONE && !pal_session_has_field(c->room->session, part, (pal_field)field)) {
+        pal_hub_send_error(hub, c, "field", "%s gives no %s: its model has no finite elements", s->part[part].info.name,
+                           pal_field_title((pal_field)field));
         return;
     }
     look(c, part, (pal_field)field);
-    pal_hub_tell_fields(c->room);
+    pal_hub_update_fields(c->room);
     c->peer->ops->ready(c->peer); /* others may look at it already */
 }
 
@@ -96,7 +96,7 @@ uint64_t pal_hub_make_fields(pal_hub *hub, pal_hub_room *room, uint64_t now)
 {
     uint64_t due = 0;
     if (!pal_stream_fields(room->stream, now, room->n_look, &due)) return due;
-    for (int i = 0; i < hub->most_clients; i++) {
+    for (int i = 0; i < hub->max_clients; i++) {
         pal_client *c = &hub->client[i];
         if (c->peer && c->room == room && !c->peer->drop_code && pal_hub_wants_field(c)) c->peer->ops->ready(c->peer);
     }

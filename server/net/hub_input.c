@@ -1,7 +1,7 @@
 /* The hub's input: every message of a client is counted, decoded (untrusted), checked against who may do what, and
  * handed to the session. A malformed message closes the connection with its refusal's sentence; a well-formed one that
  * cannot be granted is answered with `error`; poses of a tool that the sender does not hold are ignored. */
-#include "server/net/hub_parts.h"
+#include "server/net/hub_core.h"
 
 #include "server/base/clock.h"
 #include "server/net/plain_text.h"
@@ -27,7 +27,7 @@ static pal_err take_tool(pal_client *c, int wanted)
 {
     pal_hub_room *room = c->room;
     int before = pal_members_find(&room->members, c->id)->tool, taken = -1;
-    PAL_TRY(pal_members_take(&room->members, c->id, wanted == PAL_WIRE_TOOL_ANY ? -1 : wanted, &taken));
+    PAL_TRY(pal_members_take_tool(&room->members, c->id, wanted == PAL_WIRE_TOOL_ANY ? -1 : wanted, &taken));
     if (before == taken) return PAL_ERR_OK;
     if (before >= 0) pal_hub_release_tool(room, before);
     room->tool[taken] = (pal_stream_tool){c->id, pal_hub_colour(c->id), pal_clock_ns()};
@@ -39,14 +39,14 @@ static void explain_take(pal_hub *hub, pal_client *c, int wanted, pal_err err)
     pal_member_list *members = &c->room->members;
     int holder = wanted >= 0 && wanted < members->n_tool ? members->holder[wanted] : 0;
     if (err == PAL_ERR_STATE && holder)
-        pal_hub_complain(hub, c, "tool_taken", "tool %d is held by %s", wanted,
-                         pal_members_find(members, holder)->name);
+        pal_hub_send_error(hub, c, "tool_taken", "tool %d is held by %s", wanted,
+                           pal_members_find(members, holder)->name);
     else if (err == PAL_ERR_STATE)
-        pal_hub_complain(hub, c, "tool_taken", "no tool is free");
+        pal_hub_send_error(hub, c, "tool_taken", "no tool is free");
     else if (pal_members_find(members, c->id)->role == PAL_MEMBER_VIEWER)
-        pal_hub_complain(hub, c, "role", "a viewer holds no tool");
+        pal_hub_send_error(hub, c, "role", "a viewer holds no tool");
     else
-        pal_hub_complain(hub, c, "tool", "there is no tool %d", wanted);
+        pal_hub_send_error(hub, c, "tool", "there is no tool %d", wanted);
 }
 
 static void say_hello(pal_hub *hub, pal_client *c)
@@ -56,14 +56,14 @@ static void say_hello(pal_hub *hub, pal_client *c)
     memset(hub->control, 0, sizeof *hub->control);
     hub->control->type = PAL_CONTROL_HELLO;
     pal_stream_hello(c->room->stream, hello);
-    pal_hub_hello_rows(c->room, hello);
+    pal_hub_hello_components(c->room, hello);
     hello->estimates = true;
     hello->credit = (uint32_t)c->credit.most;
     hello->you_id = pal_stream_wire_id(m->id);
     hello->you_role = (pal_wire_role)m->role;
     hello->you_tool = m->tool >= 0 ? m->tool : PAL_WIRE_TOOL_NONE;
     pal_plain_text(hello->you_name, sizeof hello->you_name, m->name);
-    pal_hub_say(hub, c, hub->control);
+    pal_hub_send(hub, c, hub->control);
 }
 
 static void join(pal_hub *hub, pal_client *c, const pal_wire_join *wanted)
@@ -72,7 +72,7 @@ static void join(pal_hub *hub, pal_client *c, const pal_wire_join *wanted)
                                                                PAL_MEMBER_INSTRUCTOR};
     pal_hub_room *room = c->room;
     if (c->id) {
-        pal_hub_complain(hub, c, "joined", "you have joined already");
+        pal_hub_send_error(hub, c, "joined", "you have joined already");
         return;
     }
     if (pal_members_join(&room->members, roles[wanted->role], wanted->name, &c->id)) {
@@ -83,7 +83,7 @@ static void join(pal_hub *hub, pal_client *c, const pal_wire_join *wanted)
     }
     hub->count.n_joined++;
     c->patches = wanted->patches;
-    pal_session_watch(room->session, true);
+    pal_session_observe(room->session, true);
     if (room->tier_users[c->tier]++ == 0) pal_stream_begin_tier(room->stream, c->tier);
     /* hello says which tool was given; a refusal follows it */
     pal_err err = PAL_ERR_OK;
@@ -107,21 +107,21 @@ static void leave(pal_hub *hub, pal_client *c)
     pal_member_entry *m = pal_members_find(&c->room->members, c->id);
     int tool = m->tool;
     if (tool < 0) return;
-    pal_members_give_back(&c->room->members, c->id);
+    pal_members_release_tool(&c->room->members, c->id);
     pal_hub_release_tool(c->room, tool);
     pal_packet_replace(&c->haptic, NULL);
     pal_hub_members_changed(hub, c->room);
 }
 
 /* fills the command's material from what holds now and the numbers given; false: complained */
-static bool read_material(pal_hub *hub, pal_client *c, const pal_wire_order *order, pal_command *command)
+static bool read_material(pal_hub *hub, pal_client *c, const pal_wire_command *order, pal_command *command)
 {
     const pal_scene *scene = pal_session_scene(c->room->session);
     int body = order->target[0] ? -1 : 0;
     for (int i = 0; i < scene->n_body; i++)
         if (!strcmp(scene->body[i].name, order->target)) body = i;
     if (body < 0) {
-        pal_hub_complain(hub, c, "target", "there is no body %s", order->target);
+        pal_hub_send_error(hub, c, "target", "there is no body %s", order->target);
         return false;
     }
     pal_material m = c->room->material[body];
@@ -133,7 +133,7 @@ static bool read_material(pal_hub *hub, pal_client *c, const pal_wire_order *ord
                      : !strcmp(key, "damping_1_s")   ? &m.damping_1_s
                                                      : NULL;
         if (!to) {
-            pal_hub_complain(hub, c, "args", "a material has no %s", key);
+            pal_hub_send_error(hub, c, "args", "a material has no %s", key);
             return false;
         }
         *to = order->arg[i].value;
@@ -143,27 +143,27 @@ static bool read_material(pal_hub *hub, pal_client *c, const pal_wire_order *ord
     return true;
 }
 
-static void command(pal_hub *hub, pal_client *c, const pal_wire_order *order)
+static void command(pal_hub *hub, pal_client *c, const pal_wire_command *order)
 {
     static const char *const verbs[PAL_COMMAND_FIELD] = {"pause", "resume", "step", "reset", "material"};
     pal_command command = {.kind = PAL_COMMAND_COUNT};
-    if (pal_hub_estimate_order(hub, c, order)) return; /* everybody may look */
-    if (pal_hub_plan_order(hub, c, order)) return;
+    if (pal_hub_estimate_command(hub, c, order)) return; /* everybody may look */
+    if (pal_hub_plan_command(hub, c, order)) return;
     if (!pal_members_may_command(&c->room->members, c->id)) {
-        pal_hub_complain(hub, c, "role", "a viewer gives no commands");
+        pal_hub_send_error(hub, c, "role", "a viewer gives no commands");
         return;
     }
-    if (pal_hub_sculpt_order(hub, c, order) || pal_hub_switch_order(hub, c, order)) return;
+    if (pal_hub_sculpt_command(hub, c, order) || pal_hub_switch_command(hub, c, order)) return;
     for (int i = 0; i < PAL_COMMAND_FIELD; i++) /* fields are asked for with `view` */
         if (!strcmp(order->verb, verbs[i])) command.kind = (pal_command_kind)i;
     if (command.kind == PAL_COMMAND_COUNT) {
-        pal_hub_complain(hub, c, "verb", "there is no command %s", order->verb);
+        pal_hub_send_error(hub, c, "verb", "there is no command %s", order->verb);
         return;
     }
     if (command.kind == PAL_COMMAND_MATERIAL && !read_material(hub, c, order, &command)) return;
     pal_err err = pal_session_command(c->room->session, &command);
     if (err)
-        pal_hub_complain(hub, c, err == PAL_ERR_FULL ? "busy" : "refused", "%s: %s", order->verb, pal_err_text(err));
+        pal_hub_send_error(hub, c, err == PAL_ERR_FULL ? "busy" : "refused", "%s: %s", order->verb, pal_err_text(err));
     else if (command.kind == PAL_COMMAND_MATERIAL)
         c->room->material[command.body] = command.material;
 }
@@ -196,13 +196,13 @@ static void control(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_
         command(hub, c, &in.order);
         break;
     case PAL_CONTROL_VIEW:
-        pal_hub_view(hub, c, &in.view);
+        pal_hub_subscribe_field(hub, c, &in.view);
         break;
     case PAL_CONTROL_PING:
         memset(hub->control, 0, sizeof *hub->control);
         hub->control->type = PAL_CONTROL_PONG;
         hub->control->stamp_ms = in.stamp_ms;
-        pal_hub_say(hub, c, hub->control);
+        pal_hub_send(hub, c, hub->control);
         break;
     default:
         malformed(hub, c, PAL_REFUSAL_KIND);
@@ -223,9 +223,9 @@ static void pose(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_byt
     const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
     if (m->tool < 0 || m->tool != w.tool) {
         hub->count.n_pose_ignored++;
-        if (m->role == PAL_MEMBER_VIEWER && (c->scold_ns == 0 || now - c->scold_ns > SCOLD_NS)) {
-            c->scold_ns = now;
-            pal_hub_complain(hub, c, "role", "a viewer moves no tool");
+        if (m->role == PAL_MEMBER_VIEWER && (c->pose_error_ns == 0 || now - c->pose_error_ns > SCOLD_NS)) {
+            c->pose_error_ns = now;
+            pal_hub_send_error(hub, c, "role", "a viewer moves no tool");
         }
         return;
     }
@@ -233,7 +233,7 @@ static void pose(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_byt
         (void)pal_session_put_pose(c->room->session, m->tool, NULL);
         return;
     }
-    pal_pose p = {.buttons = w.buttons & PAL_WIRE_GRAB, .seq = w.seq, .stamp_us = w.stamp_us};
+    pal_pose p = {.buttons = w.buttons & PAL_WIRE_GRASP, .seq = w.seq, .stamp_us = w.stamp_us};
     for (int i = 0; i < 3; i++) {
         p.position_m[i] = w.position_m[i];
         p.velocity_m_s[i] = w.velocity_m_s[i];

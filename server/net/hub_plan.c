@@ -1,7 +1,7 @@
 /* What clients are told of a plan: its rows, whose they are, which of them are switched off; and of its bodies: who
  * stands still and why, who sleeps. Rows are switched and single bodies reset by orders (protocol/README.md, "Rows,
  * rescues, sleep"). */
-#include "server/net/hub_parts.h"
+#include "server/net/hub_core.h"
 
 #include "server/base/clock.h"
 #include "server/net/plain_text.h"
@@ -20,48 +20,48 @@ static int body_of(const pal_session *session, const char *name)
 
 /* rows of the plan as the session was opened, as hello and topology name them */
 static uint32_t plan_rows(const pal_session *session, char (*name)[PAL_WIRE_NAME_BYTES], double *part,
-                          char (*reason)[PAL_WIRE_WHY_BYTES], double *fixed)
+                          char (*reason)[PAL_WIRE_REASON_BYTES], double *fixed)
 {
-    int n = pal_session_rows(session);
+    int n = pal_session_component_count(session);
     uint32_t n_row = 0;
-    for (int r = 0; r < n && r < PAL_WIRE_ROW_MAX; r++, n_row++) {
+    for (int r = 0; r < n && r < PAL_WIRE_COMPONENT_MAX; r++, n_row++) {
         pal_component_info row;
-        pal_session_row(session, r, &row);
+        pal_session_component_info(session, r, &row);
         pal_plain_text(name[r], PAL_WIRE_NAME_BYTES, row.name);
-        pal_plain_text(reason[r], PAL_WIRE_WHY_BYTES, row.reason);
+        pal_plain_text(reason[r], PAL_WIRE_REASON_BYTES, row.reason);
         part[r] = body_of(session, row.body);
         fixed[r] = row.fixed || part[r] < 0;
     }
     return n_row;
 }
 
-void pal_hub_hello_rows(const pal_hub_room *room, pal_wire_hello *out)
+void pal_hub_hello_components(const pal_hub_room *room, pal_wire_hello *out)
 {
-    out->n_row = out->n_row_part = out->n_row_why = out->n_row_fixed =
-        plan_rows(room->session, out->row, out->row_part, out->row_why, out->row_fixed);
+    out->n_row = out->n_component_part = out->n_component_reason = out->n_component_required =
+        plan_rows(room->session, out->row, out->component_part, out->component_reason, out->component_required);
 }
 
-void pal_hub_topology_rows(const pal_hub_room *room, pal_wire_topology *out)
+void pal_hub_topology_components(const pal_hub_room *room, pal_wire_topology *out)
 {
-    out->n_row = out->n_row_part = out->n_row_why = out->n_row_fixed =
-        plan_rows(room->session, out->row, out->row_part, out->row_why, out->row_fixed);
+    out->n_row = out->n_component_part = out->n_component_reason = out->n_component_required =
+        plan_rows(room->session, out->row, out->component_part, out->component_reason, out->component_required);
 }
 
 /* rows of the opened plan that are not in the running one have been switched off; others (fields, brushes) have come.
  * Both lists keep the plan's order */
 static void tell_rows(const pal_hub_room *room, const pal_frame *f, pal_wire_status *w)
 {
-    int n = pal_session_rows(room->session), n_found = 0;
+    int n = pal_session_component_count(room->session), n_found = 0;
     bool same = n == f->n_row && !room->own;
     for (int r = 0, at = 0; r < n; r++) {
         pal_component_info row;
         int i = at;
-        pal_session_row(room->session, r, &row);
+        pal_session_component_info(room->session, r, &row);
         int body = body_of(room->session, row.body);
         while (i < f->n_row && (strcmp(f->component_name[i], row.name) || f->component_body[i] != body)) i++;
         if (i < f->n_row) {
             at = i + 1, n_found++;
-        } else if (w->n_off < PAL_WIRE_ROW_MAX) {
+        } else if (w->n_off < PAL_WIRE_COMPONENT_MAX) {
             pal_plain_text(w->off[w->n_off].row, PAL_WIRE_NAME_BYTES, row.name);
             w->off[w->n_off++].part = body < 0 ? 0 : (uint32_t)body;
         }
@@ -69,8 +69,8 @@ static void tell_rows(const pal_hub_room *room, const pal_frame *f, pal_wire_sta
     /* as they are now, when that is not the plan of hello, or when hello spoke of a session that has been replaced */
     if (same && n_found == n) return;
     for (int r = 0; r < f->n_row; r++) {
-        pal_plain_text(w->row[w->n_row_name++], PAL_WIRE_NAME_BYTES, f->component_name[r]);
-        w->row_part[w->n_row_part++] = f->component_body[r];
+        pal_plain_text(w->row[w->n_component_name++], PAL_WIRE_NAME_BYTES, f->component_name[r]);
+        w->component_part[w->n_component_part++] = f->component_body[r];
     }
 }
 
@@ -83,17 +83,17 @@ void pal_hub_status_plan(const pal_hub_room *room, const pal_frame *f, pal_wire_
         *to = (pal_wire_part_state){.part = (uint32_t)p,
                                     .frozen = part->frozen,
                                     .asleep = part->asleep,
-                                    .n_rescue = part->n_rescue,
-                                    .rescue_ms = (double)part->rescue_ns * 1e-6};
+                                    .n_safeguard = part->n_safeguard,
+                                    .safeguard_ms = (double)part->rescue_ns * 1e-6};
         if (part->frozen) pal_plain_text(to->reason, sizeof to->reason, part->reason);
         w->frozen |= part->frozen;
-        w->n_state += part->frozen || part->asleep || part->n_rescue > 0;
+        w->n_state += part->frozen || part->asleep || part->n_safeguard > 0;
     }
-    w->n_unwatched = room->n_unwatched;
+    w->n_unobserved = room->n_unobserved;
 }
 
 /* steps since the last call of which nothing was shown, if nobody has looked since */
-void pal_hub_count_unwatched(pal_hub_room *room)
+void pal_hub_count_unobserved(pal_hub_room *room)
 {
     const pal_frame *f = room->stream->frame;
     uint64_t n_output = 0;
@@ -102,33 +102,33 @@ void pal_hub_count_unwatched(pal_hub_room *room)
         if (f->part[p].n_output > n_output) n_output = f->part[p].n_output;
     uint64_t n_step = f->tick > room->seen_tick ? f->tick - room->seen_tick : 0;
     uint64_t n_shown = n_output > room->seen_output ? n_output - room->seen_output : 0;
-    if (room->left_alone && n_step > n_shown) room->n_unwatched += n_step - n_shown;
+    if (room->was_unobserved && n_step > n_shown) room->n_unobserved += n_step - n_shown;
     room->seen_tick = f->tick, room->seen_output = n_output;
-    room->left_alone = room->members.n_member == 0;
+    room->was_unobserved = room->members.n_member == 0;
 }
 
 /* the order's body; -1: complained */
 static int body_named(pal_hub *hub, pal_client *c, const char *name)
 {
     int body = body_of(c->room->session, name);
-    if (body < 0) pal_hub_complain(hub, c, "target", "there is no body %s", name);
+    if (body < 0) pal_hub_send_error(hub, c, "target", "there is no body %s", name);
     return body;
 }
 
 static void give(pal_hub *hub, pal_client *c, const char *verb, const pal_command *command)
 {
     pal_err err = pal_session_command(c->room->session, command);
-    if (err) pal_hub_complain(hub, c, err == PAL_ERR_FULL ? "busy" : "refused", "%s: %s", verb, pal_err_text(err));
+    if (err) pal_hub_send_error(hub, c, err == PAL_ERR_FULL ? "busy" : "refused", "%s: %s", verb, pal_err_text(err));
 }
 
 /* a body that stands still does so for everybody, so whoever sees it may bring it back */
-static void reset_body(pal_hub *hub, pal_client *c, const pal_wire_order *order)
+static void reset_body(pal_hub *hub, pal_client *c, const pal_wire_command *order)
 {
     int body = body_named(hub, c, order->target);
     const pal_frame *f = c->room->stream->frame;
     if (body < 0) return;
     if (!pal_members_may_command(&c->room->members, c->id) && !(f && body < f->n_part && f->part[body].frozen))
-        pal_hub_complain(hub, c, "role", "a viewer resets nothing but a body that was stopped");
+        pal_hub_send_error(hub, c, "role", "a viewer resets nothing but a body that was stopped");
     else
         give(hub, c, "reset", &(pal_command){.kind = PAL_COMMAND_RESET_BODY, .body = body});
 }
@@ -138,28 +138,28 @@ static void reset_body(pal_hub *hub, pal_client *c, const pal_wire_order *order)
 static void note_asked(pal_client *c)
 {
     const pal_frame *f = c->room->stream->frame;
-    c->row_until_ns = pal_clock_ns() + ASKED_NS;
-    c->row_refused = f ? f->n_refused : 0;
+    c->component_until_ns = pal_clock_ns() + ASKED_NS;
+    c->component_refused = f ? f->n_refused : 0;
 }
 
-void pal_hub_row_answer(pal_hub *hub, pal_client *c)
+void pal_hub_component_result(pal_hub *hub, pal_client *c)
 {
     const pal_frame *f = c->room->stream->frame;
     pal_diagnostic diag = {""};
-    if (!c->row_until_ns || !f) return;
-    bool refused = f->n_refused > c->row_refused;
-    if (refused) pal_session_last_note(c->room->session, &diag);
-    if (diag.text[0]) pal_hub_complain(hub, c, "refused", "row: %s", diag.text);
-    if (refused || pal_clock_ns() > c->row_until_ns) c->row_until_ns = 0;
+    if (!c->component_until_ns || !f) return;
+    bool refused = f->n_refused > c->component_refused;
+    if (refused) pal_session_last_diagnostic(c->room->session, &diag);
+    if (diag.text[0]) pal_hub_send_error(hub, c, "refused", "row: %s", diag.text);
+    if (refused || pal_clock_ns() > c->component_until_ns) c->component_until_ns = 0;
 }
 
-static void switch_row(pal_hub *hub, pal_client *c, const pal_wire_order *order)
+static void switch_row(pal_hub *hub, pal_client *c, const pal_wire_command *order)
 {
-    pal_command command = {.kind = PAL_COMMAND_ROW, .body = -1};
+    pal_command command = {.kind = PAL_COMMAND_COMPONENT, .body = -1};
     int on = -1;
     const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
     if (!m || m->role != PAL_MEMBER_INSTRUCTOR) {
-        pal_hub_complain(hub, c, "role", "only an instructor switches rows");
+        pal_hub_send_error(hub, c, "role", "only an instructor switches rows");
         return;
     }
     for (uint32_t i = 0; i < order->n_arg; i++) {
@@ -169,11 +169,11 @@ static void switch_row(pal_hub *hub, pal_client *c, const pal_wire_order *order)
             command.body = (int)arg->value;
     }
     if (order->n_arg != 2 || on < 0 || command.body < 0) {
-        pal_hub_complain(hub, c, "args", "row takes part (0 to %d) and on", c->room->stream->n_part - 1);
+        pal_hub_send_error(hub, c, "args", "row takes part (0 to %d) and on", c->room->stream->n_part - 1);
         return;
     }
     if (strlen(order->target) >= sizeof command.row) {
-        pal_hub_complain(hub, c, "target", "there is no row %s", order->target);
+        pal_hub_send_error(hub, c, "target", "there is no row %s", order->target);
         return;
     }
     command.wanted = on == 1;
@@ -182,7 +182,7 @@ static void switch_row(pal_hub *hub, pal_client *c, const pal_wire_order *order)
     give(hub, c, "row", &command);
 }
 
-bool pal_hub_plan_order(pal_hub *hub, pal_client *c, const pal_wire_order *order)
+bool pal_hub_plan_command(pal_hub *hub, pal_client *c, const pal_wire_command *order)
 {
     if (!strcmp(order->verb, "reset") && order->target[0]) {
         reset_body(hub, c, order);

@@ -1,6 +1,6 @@
 /* Commands of sculpting at the hub (protocol/README.md, "Sculpting"): who may, what is meant and how it is answered;
- * brushes and probes at once, edits through hub_works.c. */
-#include "server/net/hub_works.h"
+ * brushes and probes at once, edits through hub_jobs.c. */
+#include "server/net/hub_jobs.h"
 
 #include "server/base/vec3.h"
 
@@ -41,25 +41,25 @@ static const struct verb *find_verb(const char *name)
     return v->name ? v : NULL;
 }
 
-static double arg(const pal_wire_order *order, const char *key, double otherwise)
+static double arg(const pal_wire_command *order, const char *key, double otherwise)
 {
     const pal_wire_arg *a = pal_hub_arg(order, key);
     return a ? a->value : otherwise;
 }
 
 /* the body named, or the first that sculpts; -1: complained */
-static int find_body(pal_hub *hub, pal_client *c, const pal_wire_order *order)
+static int find_body(pal_hub *hub, pal_client *c, const pal_wire_command *order)
 {
     const pal_stream *s = c->room->stream;
     for (int b = 0; b < s->n_part; b++) {
-        bool named = !order->target[0] ? s->part[b].info.sculpts : !strcmp(s->part[b].info.name, order->target);
-        if (named && s->part[b].info.sculpts) return b;
+        bool named = !order->target[0] ? s->part[b].info.is_sculptable : !strcmp(s->part[b].info.name, order->target);
+        if (named && s->part[b].info.is_sculptable) return b;
         if (named) break;
     }
     if (order->target[0])
-        pal_hub_complain(hub, c, "target", "%s cannot be sculpted", order->target);
+        pal_hub_send_error(hub, c, "target", "%s cannot be sculpted", order->target);
     else
-        pal_hub_complain(hub, c, "target", "nothing here can be sculpted");
+        pal_hub_send_error(hub, c, "target", "nothing here can be sculpted");
     return -1;
 }
 
@@ -150,13 +150,13 @@ static bool point_at(const pal_hub_room *room, int body, const double at[3], pic
     return true;
 }
 
-static bool pick_first(pal_hub *hub, pal_client *c, int body, const pal_wire_order *order, bool second, pick *out)
+static bool pick_first(pal_hub *hub, pal_client *c, int body, const pal_wire_command *order, bool second, pick *out)
 {
     const double at[3] = {arg(order, second ? "x2_m" : "x_m", 0), arg(order, second ? "y2_m" : "y_m", 0),
                           arg(order, second ? "z2_m" : "z_m", 0)};
     if (point_at(c->room, body, at, out)) return true;
-    pal_hub_complain(hub, c, "refused", "%s: nothing of %s is at %g %g %g m", order->verb,
-                     c->room->stream->part[body].info.name, at[0], at[1], at[2]);
+    pal_hub_send_error(hub, c, "refused", "%s: nothing of %s is at %g %g %g m", order->verb,
+                       c->room->stream->part[body].info.name, at[0], at[1], at[2]);
     return false;
 }
 
@@ -171,7 +171,7 @@ static double *points_now(const pal_hub_room *room, int body, int *n)
 }
 
 /* an edit of cells from what was pointed at; false: complained */
-static bool read_edit(pal_hub *hub, pal_client *c, int body, const struct verb *v, const pal_wire_order *order,
+static bool read_edit(pal_hub *hub, pal_client *c, int body, const struct verb *v, const pal_wire_command *order,
                       const pal_sculptor *sculptor, pal_sculpt *to)
 {
     pick a, b = {.face = -1};
@@ -184,8 +184,8 @@ static bool read_edit(pal_hub *hub, pal_client *c, int body, const struct verb *
                                 .cell = pal_sculptor_cell(sculptor, a.face),
                                 .face = a.face,
                                 .other_face = b.face,
-                                .edge = pal_sculptor_near_edge(sculptor, a.face, a.rest_m),
-                                .vertex = pal_sculptor_near_vertex(sculptor, a.face, a.rest_m),
+                                .edge = pal_sculptor_nearest_edge(sculptor, a.face, a.rest_m),
+                                .vertex = pal_sculptor_nearest_vertex(sculptor, a.face, a.rest_m),
                                 .distance_m = arg(order, "distance_m", 0),
                                 .scale = arg(order, "scale", 1),
                                 .sharp = (float)arg(order, "sharp", 0)};
@@ -193,13 +193,13 @@ static bool read_edit(pal_hub *hub, pal_client *c, int body, const struct verb *
     double what = arg(order, "what", 0);
     edit->kind = what == 0 ? PAL_CELLS_SHARPEN_VERTEX : what == 1 ? PAL_CELLS_SHARPEN_EDGE : PAL_CELLS_SHARPEN_FACE;
     if (what == 0 || what == 1 || what == 2) return true;
-    pal_hub_complain(hub, c, "args", "sharpen: what is %g, wanted 0 (vertex), 1 (edge) or 2 (face)", what);
+    pal_hub_send_error(hub, c, "args", "sharpen: what is %g, wanted 0 (vertex), 1 (edge) or 2 (face)", what);
     return false;
 }
 
 /* fills the command; *point_m is the caller's. false: complained */
-static bool read_order(pal_hub *hub, pal_client *c, int body, const pal_wire_order *order, const pal_sculptor *sculptor,
-                       pal_sculpt *to, double **point_m)
+static bool read_order(pal_hub *hub, pal_client *c, int body, const pal_wire_command *order,
+                       const pal_sculptor *sculptor, pal_sculpt *to, double **point_m)
 {
     const struct verb *v = find_verb(order->verb);
     pick a;
@@ -213,7 +213,7 @@ static bool read_order(pal_hub *hub, pal_client *c, int body, const pal_wire_ord
         to->cut_m = arg(order, "offset_m", 0) - frame_offset(c->room, body, to->cut_normal);
     }
     if (!strcmp(v->name, "keep")) {
-        to->kind = PAL_SCULPT_KEEP;
+        to->kind = PAL_SCULPT_SET_REST;
         *point_m = points_now(c->room, body, &to->n_point);
         to->point_m = *point_m;
     }
@@ -231,9 +231,9 @@ static bool read_order(pal_hub *hub, pal_client *c, int body, const pal_wire_ord
 
 /* ---- answers ---- */
 
-void pal_hub_sculpt_answer(pal_hub *hub, pal_client *c, const pal_work *work)
+void pal_hub_sculpt_answer(pal_hub *hub, pal_client *c, const pal_job *work)
 {
-    const pal_hub_works *s = hub->works;
+    const pal_hub_jobs *s = hub->jobs;
     const char *verb = s->now.order.verb;
     const pal_sculptor *sculptor = s->place[c->room - hub->room][s->body].sculptor;
     pal_wire_answer *a = pal_hub_answer_begin(hub, verb);
@@ -241,14 +241,14 @@ void pal_hub_sculpt_answer(pal_hub *hub, pal_client *c, const pal_work *work)
     snprintf(a->text, sizeof a->text, "%s: %d control cells, made in %.0f ms", verb, n_cell,
              1e-6 * (double)(work->made_ns - work->asked_ns));
     pal_hub_answer_arg(a, "cells", n_cell);
-    pal_hub_answer_arg(a, "can_undo", pal_sculptor_past(sculptor));
-    pal_hub_answer_arg(a, "can_redo", pal_sculptor_future(sculptor));
+    pal_hub_answer_arg(a, "can_undo", pal_sculptor_undo_count(sculptor));
+    pal_hub_answer_arg(a, "can_redo", pal_sculptor_redo_count(sculptor));
     pal_hub_answer_arg(a, "made_ms", 1e-6 * (double)(work->made_ns - work->asked_ns));
-    pal_hub_say(hub, c, hub->control);
+    pal_hub_send(hub, c, hub->control);
 }
 
 /* the material where the surface is touched */
-static void probe(pal_hub *hub, pal_client *c, int body, const pal_wire_order *order)
+static void probe(pal_hub *hub, pal_client *c, int body, const pal_wire_command *order)
 {
     const pal_scene *scene = pal_session_scene(c->room->session);
     pal_body_def *def = malloc(sizeof *def);
@@ -264,7 +264,7 @@ static void probe(pal_hub *hub, pal_client *c, int body, const pal_wire_order *o
         pal_hub_answer_arg(to, "poisson", m.poisson);
         pal_hub_answer_arg(to, "density_kg_m3", m.density_kg_m3);
         pal_hub_answer_arg(to, "face", a.face);
-        pal_hub_say(hub, c, hub->control);
+        pal_hub_send(hub, c, hub->control);
     }
     free(def);
 }
@@ -273,7 +273,7 @@ static void probe(pal_hub *hub, pal_client *c, int body, const pal_wire_order *o
 
 /* places of a brush at rest. One whose places are those of the brush that the hand holds stays where that is, however
  * far the surface has moved since; false: complained */
-static bool place_brush(pal_hub *hub, pal_client *c, int body, const pal_wire_order *order, pal_hub_hand *h,
+static bool place_brush(pal_hub *hub, pal_client *c, int body, const pal_wire_command *order, pal_hub_tool_brush *h,
                         pal_brush *to)
 {
     static const char *const key[6] = {"x_m", "y_m", "z_m", "x2_m", "y2_m", "z2_m"};
@@ -297,9 +297,9 @@ static bool place_brush(pal_hub *hub, pal_client *c, int body, const pal_wire_or
     return true;
 }
 
-static void give_brush(pal_hub *hub, pal_client *c, int body, int tool, const pal_wire_order *order)
+static void give_brush(pal_hub *hub, pal_client *c, int body, int tool, const pal_wire_command *order)
 {
-    pal_hub_hand *h = &hub->works->hand[c->room - hub->room][tool], next = *h;
+    pal_hub_tool_brush *h = &hub->jobs->hand[c->room - hub->room][tool], next = *h;
     pal_diagnostic diag = {""};
     pal_command command = {.kind = PAL_COMMAND_BRUSH, .body = body, .slot = tool};
     pal_brush *b = &command.brush;
@@ -315,53 +315,53 @@ static void give_brush(pal_hub *hub, pal_client *c, int body, int tool, const pa
     pal_err err = b->kind == PAL_BRUSH_NONE ? PAL_ERR_OK : pal_brush_check(b, &diag);
     if (!err) err = pal_session_command(c->room->session, &command);
     if (err) {
-        pal_hub_complain(hub, c, "refused", "%s: %s", verb, diag.text[0] ? diag.text : pal_err_text(err));
+        pal_hub_send_error(hub, c, "refused", "%s: %s", verb, diag.text[0] ? diag.text : pal_err_text(err));
         return;
     }
     *h = next;
     h->brush = *b;
     pal_wire_answer *a = pal_hub_answer_begin(hub, verb);
     snprintf(a->text, sizeof a->text, b->kind == PAL_BRUSH_NONE ? "%s: tool %d" : "%s: with tool %d", verb, tool);
-    pal_hub_say(hub, c, hub->control);
+    pal_hub_send(hub, c, hub->control);
 }
 
-bool pal_hub_sculpt_read(pal_hub *hub, pal_client *c, const pal_wire_order *order, pal_work *to, int *body)
+bool pal_hub_sculpt_read(pal_hub *hub, pal_client *c, const pal_wire_command *order, pal_job *to, int *body)
 {
     pal_diagnostic diag = {""};
     *body = find_body(hub, c, order);
     if (*body < 0) return false;
-    pal_hub_place *at = &hub->works->place[c->room - hub->room][*body];
+    pal_hub_body_edits *at = &hub->jobs->place[c->room - hub->room][*body];
     if (!at->sculptor && pal_sculptor_create(pal_session_scene(c->room->session), *body, &diag, &at->sculptor)) {
-        pal_hub_complain(hub, c, "refused", "%s: %s", order->verb, diag.text);
+        pal_hub_send_error(hub, c, "refused", "%s: %s", order->verb, diag.text);
         return false;
     }
     to->sculptor = at->sculptor;
     return read_order(hub, c, *body, order, at->sculptor, &to->command, &to->point_m);
 }
 
-bool pal_hub_sculpt_order(pal_hub *hub, pal_client *c, const pal_wire_order *order)
+bool pal_hub_sculpt_command(pal_hub *hub, pal_client *c, const pal_wire_command *order)
 {
     const struct verb *v = find_verb(order->verb);
     if (!v) return false;
     bool probes = !strcmp(v->name, "probe");
-    if (!probes && !pal_hub_works_may(hub, c, v->name, "sculpts")) return true;
+    if (!probes && !pal_hub_jobs_check_rights(hub, c, v->name, "sculpts")) return true;
     int body = find_body(hub, c, order);
-    if (body < 0 || !pal_hub_args_good(hub, c, v->args, order)) return true;
+    if (body < 0 || !pal_hub_check_args(hub, c, v->args, order)) return true;
     if (probes) {
         probe(hub, c, body, order);
         return true;
     }
-    if (!pal_hub_works_make(hub)) {
-        pal_hub_complain(hub, c, "refused", "%s: %s", v->name, pal_err_text(PAL_ERR_MEMORY));
+    if (!pal_hub_jobs_create(hub)) {
+        pal_hub_send_error(hub, c, "refused", "%s: %s", v->name, pal_err_text(PAL_ERR_MEMORY));
         return true;
     }
     bool brush = !strcmp(v->name, "inflate") || !strcmp(v->name, "curve") || !strcmp(v->name, "release");
     int tool = pal_members_find(&c->room->members, c->id)->tool;
     if (brush && tool < 0)
-        pal_hub_complain(hub, c, "tool", "%s: take a tool first, its hand does it", v->name);
+        pal_hub_send_error(hub, c, "tool", "%s: take a tool first, its hand does it", v->name);
     else if (brush)
         give_brush(hub, c, body, tool, order);
     else
-        pal_hub_works_wait(hub, c, PAL_WORK_SCULPT, order);
+        pal_hub_jobs_enqueue(hub, c, PAL_JOB_SCULPT, order);
     return true;
 }

@@ -61,7 +61,7 @@ static void wake_due(lws_sorted_usec_list_t *timer)
     if (loop->events.wake) loop->events.wake(loop->events.user);
 }
 
-static pal_err open_context(pal_loop *loop, int most_socket, pal_diagnostic *diag)
+static pal_err open_context(pal_loop *loop, int max_socket, pal_diagnostic *diag)
 {
     struct lws_context_creation_info info;
     memset(&info, 0, sizeof info);
@@ -69,9 +69,9 @@ static pal_err open_context(pal_loop *loop, int most_socket, pal_diagnostic *dia
     info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS;
     info.port = CONTEXT_PORT_NO_LISTEN_SERVER;
     info.user = loop;
-    info.fd_limit_per_thread = (unsigned)most_socket;
+    info.fd_limit_per_thread = (unsigned)max_socket;
     /* one per socket, made on demand: with fewer, that many idle connections keep everybody else waiting */
-    info.max_http_header_pool = (unsigned short)(most_socket < 4096 ? most_socket : 4096);
+    info.max_http_header_pool = (unsigned short)(max_socket < 4096 ? max_socket : 4096);
     info.timeout_secs = 5;
     loop->context = lws_create_context(&info);
     if (!loop->context) return pal_diagnostic_set(diag, PAL_ERR_IO, "the network context could not be made");
@@ -84,12 +84,12 @@ static pal_err open_context(pal_loop *loop, int most_socket, pal_diagnostic *dia
     return PAL_ERR_OK;
 }
 
-pal_err pal_loop_create(bool sockets, int most_socket, pal_diagnostic *diag, pal_loop **out)
+pal_err pal_loop_create(bool sockets, int max_socket, pal_diagnostic *diag, pal_loop **out)
 {
     pal_loop *loop = calloc(1, sizeof *loop);
     if (!loop) return PAL_ERR_MEMORY;
     if (sockets) {
-        pal_err err = open_context(loop, most_socket, diag);
+        pal_err err = open_context(loop, max_socket, diag);
         if (err) return pal_loop_destroy(loop), err;
         lws_sul_schedule(loop->context, 0, &loop->tick_timer, tick_due, PAL_LOOP_TICK_NS / 1000);
     }
@@ -122,7 +122,7 @@ uint64_t pal_loop_now_ns(const pal_loop *loop)
     return loop->context ? pal_clock_ns() : loop->now_ns;
 }
 
-void pal_loop_due(pal_loop *loop, uint64_t when_ns)
+void pal_loop_set_due(pal_loop *loop, uint64_t when_ns)
 {
     uint64_t now = pal_loop_now_ns(loop);
     loop->due_ns = when_ns;
@@ -153,11 +153,11 @@ pal_err pal_loop_run(pal_loop *loop)
 pal_err pal_loop_step(pal_loop *loop, uint64_t until_ns)
 {
     if (!loop->context) return PAL_ERR_STATE;
-    pal_loop_due(loop, until_ns);
+    pal_loop_set_due(loop, until_ns);
     return lws_service(loop->context, 0) < 0 ? PAL_ERR_IO : PAL_ERR_OK;
 }
 
-void pal_loop_turn(pal_loop *loop, uint64_t now_ns)
+void pal_loop_advance(pal_loop *loop, uint64_t now_ns)
 {
     PAL_ASSERT(!loop->context);
     loop->now_ns = now_ns;

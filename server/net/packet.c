@@ -8,13 +8,13 @@ static _Atomic size_t total; /* of all servers of the process */
 
 pal_packet *pal_packet_create(const void *bytes, size_t n_byte, bool text)
 {
-    if (n_byte > SIZE_MAX - sizeof(pal_packet) - PAL_PACKET_FRONT) return NULL;
-    pal_packet *p = malloc(sizeof *p + PAL_PACKET_FRONT + n_byte);
+    if (n_byte > SIZE_MAX - sizeof(pal_packet) - PAL_PACKET_HEADROOM) return NULL;
+    pal_packet *p = malloc(sizeof *p + PAL_PACKET_HEADROOM + n_byte);
     if (!p) return NULL;
     p->n_byte = n_byte;
     atomic_init(&p->n_user, 1);
     p->text = text;
-    p->bytes = (uint8_t *)(p + 1) + PAL_PACKET_FRONT;
+    p->bytes = (uint8_t *)(p + 1) + PAL_PACKET_HEADROOM;
     if (bytes)
         memcpy(p->bytes, bytes, n_byte);
     else

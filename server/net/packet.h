@@ -10,13 +10,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { PAL_PACKET_FRONT = 32 };
+enum { PAL_PACKET_HEADROOM = 32 };
 
 typedef struct pal_packet {
     size_t n_byte;
     atomic_int n_user;
     bool text;      /* control message, else binary */
-    uint8_t *bytes; /* [n_byte], writable room of PAL_PACKET_FRONT bytes before it */
+    uint8_t *bytes; /* [n_byte], writable room of PAL_PACKET_HEADROOM bytes before it */
 } pal_packet;
 
 /* copies; the caller holds it once. bytes may be NULL: zeroed, to be filled before it is handed on. NULL: out of

@@ -100,7 +100,7 @@ static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_
 {
     char url[160];
     pal_hub_options hub = {.error_m = options->error_m,
-                           .most_clients = options->most_clients > 0 ? options->most_clients : 200};
+                           .max_clients = options->max_clients > 0 ? options->max_clients : 200};
     pal_peer_events events;
     PAL_TRY(make_url(options, url, sizeof url, diag));
     if (options->viewer_folder) PAL_TRY(pal_site_open(options->viewer_folder, diag, &s->site));
@@ -108,7 +108,7 @@ static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_
     hub.setting = options->setting, hub.n_setting = options->n_setting, hub.setting_body = options->setting_body;
     hub.reference_m = options->reference_m;
     /* besides the clients: page loads, and what lws needs itself */
-    PAL_TRY(pal_loop_create(s->road == &pal_ws_road, hub.most_clients + 128, diag, &s->loop));
+    PAL_TRY(pal_loop_create(s->road == &pal_ws_transport, hub.max_clients + 128, diag, &s->loop));
     PAL_TRY(pal_hub_create(s->loop, &hub, session, n_session, diag, &s->hub));
     pal_hub_events(s->hub, &events);
     return s->road->open(s->loop, url, &events, diag, &s->transport);
@@ -120,7 +120,8 @@ pal_err pal_server_open(const pal_server_options *options, pal_session **session
     if (n_session < 1) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "a server needs a session");
     pal_server *s = calloc(1, sizeof *s);
     if (!s) return PAL_ERR_MEMORY;
-    s->road = options->road && !strcmp(options->road, pal_mem_road.scheme) ? &pal_mem_road : &pal_ws_road;
+    s->road =
+        options->road && !strcmp(options->road, pal_mem_transport.scheme) ? &pal_mem_transport : &pal_ws_transport;
     pal_err err = open_parts(s, options, session, n_session, diag);
     if (err) return pal_server_close(s), err;
     *out = s;
@@ -165,7 +166,7 @@ pal_transport *pal_server_transport(pal_server *server)
     return server->transport;
 }
 
-void pal_server_turn(pal_server *server, uint64_t now_ns)
+void pal_server_advance(pal_server *server, uint64_t now_ns)
 {
-    pal_loop_turn(server->loop, now_ns);
+    pal_loop_advance(server->loop, now_ns);
 }

@@ -13,7 +13,7 @@ typedef struct pal_server_options {
     bool allow_remote;  /* also: take requests under any Host name (a proxy before us), not only loopback names */
     const char *viewer_folder; /* files served at /; NULL: none                                             */
     double error_m;            /* bound of streamed positions per axis; 0: 1/3000 of the box, at most 0.05 mm */
-    int most_clients;          /* 0: 200                                                                    */
+    int max_clients;           /* 0: 200                                                                    */
     const char *road;          /* "ws" (default) or "mem" (tests)                                           */
     /* what a study of each session's scene found, for those who pick a point of it live: lists by ascending ms and the
      * body they are of, in the order of the sessions; borrowed until close. NULL, or n_setting 0: no study */
@@ -42,5 +42,5 @@ void pal_server_close(pal_server *server); /* [load] */
 /* road "mem" only: the transport for pal_mem_connect, and one turn of the loop at a time of the caller's choosing
  * (instead of pal_server_run). This thread is [net]. */
 struct pal_transport *pal_server_transport(pal_server *server);
-void pal_server_turn(pal_server *server, uint64_t now_ns);
+void pal_server_advance(pal_server *server, uint64_t now_ns);
 #endif

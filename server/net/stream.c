@@ -47,9 +47,9 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
 
     int refusal =
         shown->parent
-            ? pal_frame_order_families(shown->rest_m, (uint32_t)shown->n_vertex, (uint32_t)shown->n_coarse,
-                                       (const uint32_t *)shown->parent, (const uint32_t *)shown->coarse_tri,
-                                       (uint32_t)shown->n_coarse_tri, &order)
+            ? pal_frame_order_hierarchy(shown->rest_m, (uint32_t)shown->n_vertex, (uint32_t)shown->n_coarse,
+                                        (const uint32_t *)shown->parent, (const uint32_t *)shown->coarse_tri,
+                                        (uint32_t)shown->n_coarse_tri, &order)
             : pal_frame_order_create(shown->rest_m, (uint32_t)shown->n_vertex, tri, (uint32_t)shown->n_tri, &order);
     if (refusal) return refuse(diag, refusal, shown->name, "no vertex order");
     refusal = pal_asset_encode(shown->rest_m, order, tri, (uint32_t)shown->n_tri, &bytes, &n_byte);
@@ -66,11 +66,11 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
         part->info.epoch = 1;
         part->info.n_vertex = (uint32_t)shown->n_vertex;
         part->info.n_triangle = (uint32_t)shown->n_tri;
-        part->info.adapts = shown->adapts;
-        part->info.sculpts = shown->face != NULL;
-        if (shown->adapts) err = pal_places_make(index, part->info.epoch, shown, diag, &part->places);
+        part->info.is_adaptive = shown->is_adaptive;
+        part->info.is_sculptable = shown->face != NULL;
+        if (shown->is_adaptive) err = pal_triangle_slots_make(index, part->info.epoch, shown, diag, &part->places);
         for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++)
-            if (pal_session_gives(s->session, index, (pal_field)k))
+            if (pal_session_has_field(s->session, index, (pal_field)k))
                 pal_plain_text(part->info.field[part->info.n_field++], PAL_WIRE_FIELD_BYTES,
                                pal_field_name((pal_field)k));
     }
@@ -119,7 +119,7 @@ pal_err pal_stream_open(pal_session *session, double error_m, pal_diagnostic *di
     if (!s) return PAL_ERR_MEMORY;
     s->session = session;
     s->scene = pal_session_scene(session);
-    s->n_part = pal_session_parts(session);
+    s->n_part = pal_session_part_count(session);
     s->part = calloc((size_t)(s->n_part ? s->n_part : 1), sizeof *s->part);
     s->coder = calloc(1, sizeof *s->coder);
     pal_err err = s->part && s->coder ? PAL_ERR_OK : PAL_ERR_MEMORY;
@@ -137,7 +137,7 @@ void pal_stream_close(pal_stream *stream)
     if (!stream) return;
     for (int p = 0; stream->part && p < stream->n_part; p++) {
         pal_packet_drop(stream->part[p].asset);
-        pal_places_free(stream->part[p].places);
+        pal_triangle_slots_free(stream->part[p].places);
         for (int k = 0; k < PAL_FIELD_COUNT; k++) pal_packet_drop(stream->part[p].field[k]);
         for (int t = 0; t < PAL_STREAM_TIER; t++) {
             pal_packet_drop(stream->part[p].frame[t]);
@@ -152,7 +152,7 @@ void pal_stream_close(pal_stream *stream)
     free(stream);
 }
 
-void pal_stream_follow(pal_stream *stream, const pal_stream *before)
+void pal_stream_transfer(pal_stream *stream, const pal_stream *before)
 {
     struct pal_stream_coder *coder = stream->coder;
     stream->cycle = before->cycle, stream->cycle_ns = before->cycle_ns;
@@ -195,7 +195,7 @@ static void encode_part(pal_stream *s, int p, int tier, bool anew)
 {
     pal_stream_part *part = &s->part[p];
     const pal_frame_part *from = &s->frame->part[p];
-    pal_frame_given given = {.part = (uint16_t)p,
+    pal_frame_input given = {.part = (uint16_t)p,
                              .epoch = part->info.epoch,
                              .seq = s->coder->seq[p] + 1,
                              .cycle = s->cycle,
@@ -264,8 +264,8 @@ static void put_tools(pal_stream *s, const pal_stream_tool tool[PAL_TOOL_MAX])
         pal_wire_tool *to = &w.tool[i];
         to->holder = pal_stream_wire_id(tool[i].holder);
         to->colour = tool[i].holder ? tool[i].colour : 0;
-        to->flags = (uint16_t)((tool[i].holder ? PAL_WIRE_TOOL_HELD : 0) | (f->touching ? PAL_WIRE_TOOL_TOUCHES : 0) |
-                               (f->holding ? PAL_WIRE_TOOL_GRABS : 0) | (f->present ? 0 : PAL_WIRE_TOOL_AWAY) |
+        to->flags = (uint16_t)((tool[i].holder ? PAL_WIRE_TOOL_HELD : 0) | (f->touching ? PAL_WIRE_TOOL_CONTACT : 0) |
+                               (f->holding ? PAL_WIRE_TOOL_GRASPS : 0) | (f->present ? 0 : PAL_WIRE_TOOL_AWAY) |
                                (f->present && clock_ns > f->pose_ns + STALE_NS ? PAL_WIRE_TOOL_STALE : 0));
         to->radius_m = (float)f->radius_m;
         copy_f3(to->position_m, f->pose.position_m);
@@ -281,7 +281,7 @@ static void put_tools(pal_stream *s, const pal_stream_tool tool[PAL_TOOL_MAX])
     if (packet) pal_packet_replace(&s->tools, packet);
 }
 
-static void copy_patch(pal_wire_patch *to, const pal_contact_patch *from, const double origin[3])
+static void copy_patch(pal_wire_contact_patch *to, const pal_contact_patch *from, const double origin[3])
 {
     double p[3];
     for (int i = 0; i < 3; i++) p[i] = from->point_m[i] - origin[i];
@@ -317,7 +317,7 @@ static void put_haptic(pal_stream *s, int i, const pal_stream_tool *tool)
                          .stamp_us = clock_ns / 1000,
                          .frame_us = (uint32_t)(1e6 / pal_stream_rate_hz(s)),
                          .has_grasp = f->has_grasp,
-                         .grip_b_N_s_m = (float)f->grasp_b_Ns_m};
+                         .grasp_b_N_s_m = (float)f->grasp_b_Ns_m};
     if (echoes(f, tool)) {
         w.echo_stamp_us = f->pose.stamp_us;
         w.echo_seq = f->pose.seq;
@@ -339,8 +339,8 @@ static void put_haptic(pal_stream *s, int i, const pal_stream_tool *tool)
     pal_packet_replace(&s->haptic[i], n ? pal_packet_create(s->coder->buffer, n, false) : NULL);
 }
 
-bool pal_stream_turn(pal_stream *stream, uint64_t now_ns, const bool used[PAL_STREAM_TIER],
-                     const pal_stream_tool tool[PAL_TOOL_MAX])
+bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_STREAM_TIER],
+                       const pal_stream_tool tool[PAL_TOOL_MAX])
 {
     const pal_frame *frame = pal_session_take_frame(stream->session);
     if (!frame) return false;
@@ -350,7 +350,7 @@ bool pal_stream_turn(pal_stream *stream, uint64_t now_ns, const bool used[PAL_ST
     for (int p = 0; p < stream->n_part; p++) {
         const pal_frame_part *part = &frame->part[p];
         if (stream->part[p].places && part->n_slot == (int)stream->part[p].places->n_place)
-            pal_places_take(stream->part[p].places, part->slot, part->revision);
+            pal_triangle_slots_update(stream->part[p].places, part->slot, part->revision);
         for (int t = 0; t < PAL_STREAM_TIER; t++)
             if (used[t]) encode_part(stream, p, t, false);
     }

@@ -3,14 +3,14 @@
  * A cycle is one simulation output (protocol/README.md, "Cycles and credit"): FRAME messages of the parts that look
  * different, one TOOLS message. Frames stand alone, so the newest messages serve everybody: the client that keeps up,
  * the one that skipped cycles, and the one that has just come. Triangles of parts that adapt do not stand alone: they
- * go as differences to what the client has (places.h), with the frame of their vertices. Tiers are accuracies of the
- * same part; a tier that nobody uses is not encoded, nor is a part whose positions were not computed anew. Thread:
- * [net], except open and close [load]. */
+ * go as differences to what the client has (triangle_slots.h), with the frame of their vertices. Tiers are accuracies
+ * of the same part; a tier that nobody uses is not encoded, nor is a part whose positions were not computed anew.
+ * Thread: [net], except open and close [load]. */
 #ifndef PAL_NET_STREAM_H
 #define PAL_NET_STREAM_H
 #include "protocol/control.h"
 #include "server/net/packet.h"
-#include "server/net/places.h"
+#include "server/net/triangle_slots.h"
 #include "server/session/members.h"
 #include "server/session/session.h"
 
@@ -24,9 +24,9 @@ typedef struct pal_stream_part {
     pal_packet *frame[PAL_STREAM_TIER];       /* newest, NULL before the first          */
     uint32_t frame_seq[PAL_STREAM_TIER];      /* its number: grows per part, all tiers together */
     uint32_t frame_cycle[PAL_STREAM_TIER];    /* cycle that made it                     */
-    uint32_t frame_change[PAL_STREAM_TIER];   /* table of triangles that it belongs to, of pal_places.change */
+    uint32_t frame_change[PAL_STREAM_TIER];   /* table of triangles that it belongs to, of pal_triangle_slots.change */
     uint64_t frame_output[PAL_STREAM_TIER];   /* pal_frame_part.n_output that was encoded last */
-    pal_places *places;                       /* of a part that adapts, else NULL       */
+    pal_triangle_slots *places;               /* of a part that adapts, else NULL       */
     pal_packet *field[PAL_FIELD_COUNT];       /* newest values, NULL: nobody looks or none yet */
     uint64_t field_made[PAL_FIELD_COUNT];     /* another number for every message       */
     uint64_t field_revision[PAL_FIELD_COUNT]; /* of what was encoded last            */
@@ -63,7 +63,7 @@ void pal_stream_close(pal_stream *stream); /* NULL is fine. [load] */
 
 /* a stream that has sent nothing yet goes on where another of the same session's bodies is: cycles and numbers count
  * on, epochs are one higher; the other only closes. [net] */
-void pal_stream_follow(pal_stream *stream, const pal_stream *before);
+void pal_stream_transfer(pal_stream *stream, const pal_stream *before);
 
 /* what the hub knows of a tool and a step does not */
 typedef struct pal_stream_tool {
@@ -76,8 +76,8 @@ typedef struct pal_stream_tool {
 uint16_t pal_stream_wire_id(int member);
 /* takes the session's newest frame, if there is a new one, and makes a cycle of it: encodes the tiers of which used[]
  * is true, tools, contact models. false: nothing new. */
-bool pal_stream_turn(pal_stream *stream, uint64_t now_ns, const bool used[PAL_STREAM_TIER],
-                     const pal_stream_tool tool[PAL_TOOL_MAX]);
+bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_STREAM_TIER],
+                       const pal_stream_tool tool[PAL_TOOL_MAX]);
 /* encodes the newest values of every field that n_look clients look at, drops those of the others. true: there is
  * something new; *due_ns: when values that came too soon may be encoded, 0: none wait */
 bool pal_stream_fields(pal_stream *stream, uint64_t now_ns, int n_look[PAL_BODY_MAX][PAL_FIELD_COUNT],

@@ -55,7 +55,7 @@ struct pal_transport_ops {
     void (*close)(pal_transport *transport);     /* after pal_loop_shut; peers still there are closed. [load] */
 };
 
-extern const pal_transport_ops pal_ws_road, pal_mem_road;
+extern const pal_transport_ops pal_ws_transport, pal_mem_transport;
 
 /* marks a peer for closing with a websocket close code and a reason of at most 123 bytes; the first mark wins */
 void pal_peer_drop(pal_peer *peer, int code, const char *format, ...) __attribute__((format(printf, 3, 4)));

@@ -7,7 +7,6 @@
 #include "server/num/random.h"
 #include "server/robustness/torture_parts.h"
 #include "server/sim/elements/elastic_hex.h"
-#include "server/sim/surface/adaptive_surface.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -142,7 +141,7 @@ double pal_rig_random(pal_rig *rig)
 /* points that are there in every state of a body: of one that adapts those of its coarsest level */
 static int common_points(const pal_body *body)
 {
-    return body->adaptive ? body->adaptive->levels.n_vertex[0] : body->n_dof;
+    return body->active ? body->dofs.levels->n_vertex[0] : body->n_dof;
 }
 
 static bool is_free(const pal_body *body)
@@ -577,7 +576,7 @@ static void look_at_rows(pal_rig *rig)
             if (info.body == pal_world_body(rig->world, b)->name) rig->body = b, first = false;
         rig->touches = true;
     }
-    for (int b = 0; b < rig->scene->n_body; b++) rig->anew |= pal_world_body(rig->world, b)->adaptive != NULL;
+    for (int b = 0; b < rig->scene->n_body; b++) rig->anew |= pal_world_body(rig->world, b)->active != NULL;
 }
 
 static pal_err open_rig(pal_rig *rig, const pal_scene *scene)

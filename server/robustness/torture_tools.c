@@ -282,7 +282,7 @@ void pal_insult_supports(pal_rig *rig)
         return;
     }
     for (int b = 0; b < rig->scene->n_body; b++)
-        if (pal_world_body(rig->world, b)->adaptive) {
+        if (pal_world_body(rig->world, b)->active) {
             pal_rig_skip(rig, "a surface that adapts begins at rest when its scene changes");
             return;
         }

@@ -3,6 +3,7 @@
 #include "server/scene/problem_file.h"
 
 #include "server/base/vec3.h"
+#include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/json_reader.h"
 
@@ -94,9 +95,9 @@ static pal_err read_young(const reader *r, const cJSON *object, const char *path
 {
     char at[PAL_JSON_PATH];
     PAL_TRY(pal_json_number(&r->json, object, path, "E", -INFINITY, INFINITY, out));
-    if (has(object, "E") && !(*out >= 1e-6 && *out <= 1e15))
-        return pal_json_bad(&r->json, pal_json_key(at, path, "E"), "%g Pa is not a stiffness: wanted %s, 1e-6 to 1e15",
-                            *out, *out > 0 ? "less extreme" : "more than 0");
+    if (has(object, "E") && !(*out >= PAL_YOUNG_MIN_PA && *out <= PAL_YOUNG_MAX_PA))
+        return pal_json_bad(&r->json, pal_json_key(at, path, "E"), "%g Pa is not a stiffness: wanted %s, %g to %g",
+                            *out, *out > 0 ? "less extreme" : "more than 0", PAL_YOUNG_MIN_PA, PAL_YOUNG_MAX_PA);
     return PAL_ERR_OK;
 }
 
@@ -107,8 +108,9 @@ static pal_err read_poisson(const reader *r, const cJSON *object, const char *pa
     if (has(object, "nu") && !(*out > -1 && *out < 0.5))
         return pal_json_bad(&r->json, pal_json_key(at, path, "nu"),
                             "%g is not a Poisson ratio: wanted more than -1 and less than 0.5", *out);
-    if (has(object, "nu") && *out < -0.9999)
-        return pal_json_bad(&r->json, pal_json_key(at, path, "nu"), "%g is nearer to -1 than -0.9999", *out);
+    if (has(object, "nu") && *out < PAL_POISSON_MIN)
+        return pal_json_bad(&r->json, pal_json_key(at, path, "nu"), "%g is nearer to -1 than %g", *out,
+                            PAL_POISSON_MIN);
     return PAL_ERR_OK;
 }
 
@@ -158,7 +160,8 @@ static pal_err read_material(const reader *r, const cJSON *object, int index)
     PAL_TRY(read_young(r, object, path, &m->young_Pa));
     PAL_TRY(read_poisson(r, object, path, &m->poisson));
     m->density_kg_m3 = 1000;
-    return pal_json_number(&r->json, object, path, "density", 1e-24, 1e24, &m->density_kg_m3);
+    return pal_json_number(&r->json, object, path, "density", PAL_DENSITY_MIN_KG_M3, PAL_DENSITY_MAX_KG_M3,
+                           &m->density_kg_m3);
 }
 
 static pal_err read_support(const reader *r, const cJSON *object, int index)

@@ -6,7 +6,7 @@
 #include "server/scene/region_file.h"
 
 #include "server/base/vec3.h"
-#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/files/file_bytes.h"
 #include "server/mesh/scan/label_volume.h"
 
 #include <math.h>
@@ -26,7 +26,8 @@ static const double *origin_of(const pal_body_def *def)
 /* ---- reading ---- */
 
 static const char *const value_key[3] = {"young_Pa", "poisson", "density_kg_m3"};
-static const double value_low[3] = {1e-6, -0.9999, 1e-3}, value_high[3] = {1e12, 0.5, 1e6};
+static const double value_low[3] = {PAL_YOUNG_MIN_PA, PAL_POISSON_MIN, PAL_DENSITY_MIN_KG_M3},
+                    value_high[3] = {PAL_YOUNG_MAX_PA, PAL_POISSON_MAX, PAL_DENSITY_MAX_KG_M3};
 static const char *const spring_key[3] = {"k_distance_J", "k_area_J", "k_volume_J"};
 static const double spring_low = 1e-60, spring_high = 1e60;
 

@@ -2,6 +2,7 @@
  * that belong to the simulation are checked by pal_scene_check at the end. */
 #include "server/scene/scene_file.h"
 
+#include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/json_reader.h"
 #include "server/scene/region_file.h"
@@ -80,10 +81,11 @@ static pal_err read_material(const pal_json *json, const cJSON *body, const char
     if (!object) return PAL_ERR_OK;
     pal_json_key(at, path, "material");
     PAL_TRY(pal_json_object(json, object, at, known));
-    PAL_TRY(pal_json_number(json, object, at, "young_Pa", 1e-6, 1e12, &m->young_Pa));
-    PAL_TRY(pal_json_number(json, object, at, "poisson", -0.9999, 0.5, &m->poisson));
-    PAL_TRY(pal_json_number(json, object, at, "density_kg_m3", 1e-3, 1e6, &m->density_kg_m3));
-    return pal_json_number(json, object, at, "damping_1_s", 0, 1e6, &m->damping_1_s);
+    PAL_TRY(pal_json_number(json, object, at, "young_Pa", PAL_YOUNG_MIN_PA, PAL_YOUNG_MAX_PA, &m->young_Pa));
+    PAL_TRY(pal_json_number(json, object, at, "poisson", PAL_POISSON_MIN, PAL_POISSON_MAX, &m->poisson));
+    PAL_TRY(pal_json_number(json, object, at, "density_kg_m3", PAL_DENSITY_MIN_KG_M3, PAL_DENSITY_MAX_KG_M3,
+                            &m->density_kg_m3));
+    return pal_json_number(json, object, at, "damping_1_s", 0, PAL_DAMPING_MAX_1_S, &m->damping_1_s);
 }
 
 static pal_err read_support(const pal_json *json, const cJSON *object, const char *path, pal_support_def *out)

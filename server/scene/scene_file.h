@@ -17,7 +17,7 @@
  *     "largest": true,                                     keep only the largest of its components: what is joined by
  *                                                          faces. Without it components without support are dropped
  *                                                          below 1 % of the largest one and refused above, unless
- *                                                          nothing of the body is held (mesh/loose_parts.h)
+ *                                                          nothing of the body is held (mesh/loose_components.h)
  *     "material": {"young_Pa": 5000, "poisson": 0.45, "density_kg_m3": 1000, "damping_1_s": 4},
  *     "regions": [                                         other materials in parts of the body, at most 32; what a
  *                                                          region does not give is the body's; later ones win. Springs
@@ -61,7 +61,7 @@
 #ifndef PAL_SCENE_SCENE_FILE_H
 #define PAL_SCENE_SCENE_FILE_H
 #include "server/mesh/geometry/levels.h"
-#include "server/mesh/volume/loose_parts.h"
+#include "server/mesh/volume/loose_components.h"
 #include "server/sim/core/definition.h"
 
 /* what a region borrows */
@@ -75,10 +75,10 @@ typedef struct pal_loaded_scene {
     pal_scene scene;
     pal_prepared mesh[PAL_BODY_MAX];
     pal_loaded_region region[PAL_BODY_MAX][PAL_REGION_MAX];
-    pal_cells cells[PAL_BODY_MAX];       /* control cells about the body's origin; of another model none   */
-    pal_stroke *stroke[PAL_BODY_MAX];    /* what a body's strokes borrow, from malloc; NULL: none          */
-    double *spring_grid[PAL_BODY_MAX];   /* what a body's spring_grid borrows, from malloc; NULL: none */
-    pal_loose_parts loose[PAL_BODY_MAX]; /* components left out because nothing holds them */
+    pal_cells cells[PAL_BODY_MAX];            /* control cells about the body's origin; of another model none   */
+    pal_stroke *stroke[PAL_BODY_MAX];         /* what a body's strokes borrow, from malloc; NULL: none          */
+    double *spring_grid[PAL_BODY_MAX];        /* what a body's spring_grid borrows, from malloc; NULL: none */
+    pal_loose_components loose[PAL_BODY_MAX]; /* components left out because nothing holds them */
     int n_mesh;
 } pal_loaded_scene;
 

@@ -10,9 +10,9 @@ pal_err pal_scene_drop_loose(pal_loaded_scene *loaded, int index, bool largest_o
     const pal_body_def *def = &loaded->scene.body[index];
     pal_prepared *mesh = &loaded->mesh[index];
     pal_cells *cells = &loaded->cells[index];
-    pal_loose_parts *parts = &loaded->loose[index];
+    pal_loose_components *parts = &loaded->loose[index];
     pal_diagnostic reason = {""};
-    *parts = (pal_loose_parts){0};
+    *parts = (pal_loose_components){0};
     /* anchors of the surface hold every piece of it */
     if (!strcmp(def->model.name, "adaptive_springs")) return PAL_ERR_OK;
     const int n = def->cells ? cells->n_vertex : mesh->tets.n_node;
@@ -21,7 +21,7 @@ pal_err pal_scene_drop_loose(pal_loaded_scene *loaded, int index, bool largest_o
         return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "body \"%s\": no memory to find what is held", def->name);
     pal_body_def_hold(def, loaded->scene.up, def->cells ? cells->x : mesh->tets.x, n, fixed);
     pal_err err = def->cells ? pal_loose_cells_drop(def->name, fixed, largest_only, cells, parts, &reason)
-                             : pal_loose_parts_drop(def->name, fixed, largest_only, mesh, parts, &reason);
+                             : pal_loose_components_drop(def->name, fixed, largest_only, mesh, parts, &reason);
     free(fixed);
     if (err == PAL_ERR_REFUSED)
         pal_diagnostic_set(diag, err, "%s, or keep only the largest one (--largest, \"largest\": true in a scene)",

@@ -6,8 +6,8 @@
 /* reads, contours a label if it is a volume, chooses the resolution, makes tetrahedra and skin; report may be NULL */
 pal_err pal_scene_prepare_file(const char *path, const pal_surface_scene *options, pal_prepared *out,
                                pal_surface_scene_report *report, pal_diagnostic *diag);
-/* Leaves out what of body `index` nothing holds (scene_loose.c, mesh/loose_parts.h), once its supports and effects are
- * there, and says in loaded->loose what that was. Model adaptive_springs keeps all pieces. Errors name the body */
+/* Leaves out what of body `index` nothing holds (scene_loose.c, mesh/loose_components.h), once its supports and effects
+ * are there, and says in loaded->loose what that was. Model adaptive_springs keeps all pieces. Errors name the body */
 pal_err pal_scene_drop_loose(pal_loaded_scene *loaded, int index, bool largest_only, pal_diagnostic *diag);
 /* Model adaptive_springs (scene_shell.c). The surface alone, or its largest piece, as a prepared mesh; errors have no
  * file's name */

@@ -3,7 +3,7 @@
 #include "server/scene/scene_file.h"
 
 #include "server/mesh/cells/cell_file.h"
-#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/files/file_bytes.h"
 #include "server/scene/region_file.h"
 #include "server/scene/scene_make.h"
 #include "server/scene/solid_file.h"

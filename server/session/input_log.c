@@ -64,13 +64,13 @@ static int payload_of(pal_input_kind kind)
         return 32;
     case PAL_INPUT_BRUSH:
         return 112;
-    case PAL_INPUT_ROW:
+    case PAL_INPUT_COMPONENT:
         return 4 + PAL_NAME;
     case PAL_INPUT_HASH:
         return 8;
     case PAL_INPUT_END:
         return 16;
-    case PAL_INPUT_LET_GO:
+    case PAL_INPUT_RELEASE:
     case PAL_INPUT_RESET:
     case PAL_INPUT_RESET_BODY:
         return 0;
@@ -285,7 +285,7 @@ static size_t encode(const pal_input_record *record, uint8_t bytes[PAL_INPUT_HEA
         put_f(&at, (double[3]){b->radius_m, b->soft, b->pressure_Pa}, 3);
         put_f(&at, b->lift_m, 3);
         put_f(&at, &b->stiffness_N_m, 1);
-    } else if (record->kind == PAL_INPUT_ROW) {
+    } else if (record->kind == PAL_INPUT_COMPONENT) {
         put_u(&at, record->wanted, 4);
         memcpy(at, record->row, PAL_NAME), at += PAL_NAME;
     } else if (record->kind == PAL_INPUT_HASH || record->kind == PAL_INPUT_END) {
@@ -348,9 +348,9 @@ pal_err pal_input_get_header(const char *name, const uint8_t *bytes, size_t n_by
     header.fingerprint = get_u(&from, 8);
     header.n_body = (uint32_t)get_u(&from, 4);
     header.n_tool = (uint32_t)get_u(&from, 4);
-    if (header.hash_steps < 1 || header.hash_steps > PAL_INPUT_HASH_MOST)
+    if (header.hash_steps < 1 || header.hash_steps > PAL_INPUT_HASH_MAX)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte 12: %u steps between hashes are outside 1 .. %d",
-                                  name, header.hash_steps, PAL_INPUT_HASH_MOST);
+                                  name, header.hash_steps, PAL_INPUT_HASH_MAX);
     *out = header;
     *at = PAL_INPUT_HEADER;
     return PAL_ERR_OK;
@@ -397,7 +397,7 @@ pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_by
         get_f(&from, &b->pressure_Pa, 1);
         get_f(&from, b->lift_m, 3);
         get_f(&from, &b->stiffness_N_m, 1);
-    } else if (record.kind == PAL_INPUT_ROW) {
+    } else if (record.kind == PAL_INPUT_COMPONENT) {
         uint64_t on = get_u(&from, 4);
         if (on > 1 || from[PAL_NAME - 1] != 0)
             return pal_diagnostic_set(diag, PAL_ERR_REFUSED,

@@ -28,19 +28,19 @@ enum {
     PAL_INPUT_HEAD = 16,
     PAL_INPUT_PAYLOAD = 112,
     PAL_INPUT_HASH_STEPS = 60,
-    PAL_INPUT_HASH_MOST = 3600
+    PAL_INPUT_HASH_MAX = 3600
 };
 
 typedef enum pal_input_kind {
     PAL_INPUT_POSE = 1,
-    PAL_INPUT_LET_GO,
+    PAL_INPUT_RELEASE,
     PAL_INPUT_RESET,
     PAL_INPUT_MATERIAL,
     PAL_INPUT_HASH,
     PAL_INPUT_END,
     PAL_INPUT_BRUSH,
     PAL_INPUT_RESET_BODY,
-    PAL_INPUT_ROW
+    PAL_INPUT_COMPONENT
 } pal_input_kind;
 
 typedef struct pal_input_record {

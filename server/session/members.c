@@ -69,7 +69,7 @@ pal_member_entry *pal_members_find(pal_member_list *members, int id)
     return NULL;
 }
 
-void pal_members_give_back(pal_member_list *members, int id)
+void pal_members_release_tool(pal_member_list *members, int id)
 {
     pal_member_entry *member = pal_members_find(members, id);
     if (!member || member->tool < 0) return;
@@ -81,12 +81,12 @@ void pal_members_leave(pal_member_list *members, int id)
 {
     pal_member_entry *member = pal_members_find(members, id);
     if (!member) return;
-    pal_members_give_back(members, id);
+    pal_members_release_tool(members, id);
     *member = (pal_member_entry){.tool = -1};
     members->n_member--;
 }
 
-pal_err pal_members_take(pal_member_list *members, int id, int tool, int *taken)
+pal_err pal_members_take_tool(pal_member_list *members, int id, int tool, int *taken)
 {
     pal_member_entry *member = pal_members_find(members, id);
     if (!member || member->role == PAL_MEMBER_VIEWER || tool < -1 || tool >= members->n_tool) return PAL_ERR_REFUSED;
@@ -95,7 +95,7 @@ pal_err pal_members_take(pal_member_list *members, int id, int tool, int *taken)
     for (int k = 0; k < members->n_tool && tool == -1; k++)
         if (!members->holder[k]) tool = k;
     if (tool == -1 || (members->holder[tool] && members->holder[tool] != id)) return PAL_ERR_STATE;
-    pal_members_give_back(members, id);
+    pal_members_release_tool(members, id);
     members->holder[tool] = id;
     member->tool = tool;
     *taken = tool;

@@ -29,7 +29,7 @@ void pal_members_leave(pal_member_list *members, int id); /* its tool becomes fr
 pal_member_entry *pal_members_find(pal_member_list *members, int id);
 /* tool -1: any free one. STATE: held by somebody else or none free; REFUSED: a viewer, or no such tool. Taking another
  * tool gives back the one held. */
-pal_err pal_members_take(pal_member_list *members, int id, int tool, int *taken);
-void pal_members_give_back(pal_member_list *members, int id);
+pal_err pal_members_take_tool(pal_member_list *members, int id, int tool, int *taken);
+void pal_members_release_tool(pal_member_list *members, int id);
 bool pal_members_may_command(const pal_member_list *members, int id); /* trainees and instructors; viewers not */
 #endif

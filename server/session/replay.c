@@ -2,7 +2,7 @@
  * and the record takes effect, exactly as in the session that wrote it. */
 #include "server/session/replay.h"
 
-#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/files/file_bytes.h"
 #include "server/session/input_log.h"
 
 #include <stdlib.h>
@@ -27,10 +27,10 @@ static pal_err check(const char *name, const uint8_t *bytes, size_t n_byte, pal_
                                       place, (unsigned long long)record.step, (unsigned long long)step);
         step = record.step;
         if (record.kind == PAL_INPUT_HASH) hash_step = step;
-        bool tool = record.kind == PAL_INPUT_POSE || record.kind == PAL_INPUT_LET_GO;
+        bool tool = record.kind == PAL_INPUT_POSE || record.kind == PAL_INPUT_RELEASE;
         if ((tool && record.index >= (int)header->n_tool) ||
             ((record.kind == PAL_INPUT_MATERIAL || record.kind == PAL_INPUT_BRUSH ||
-              record.kind == PAL_INPUT_RESET_BODY || record.kind == PAL_INPUT_ROW) &&
+              record.kind == PAL_INPUT_RESET_BODY || record.kind == PAL_INPUT_COMPONENT) &&
              record.index >= (int)header->n_body))
             return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %zu: the scene has no %s %d", name, place,
                                       tool ? "tool" : "body", record.index);
@@ -55,7 +55,7 @@ static pal_err apply(pal_world *world, const pal_scene *scene, const pal_input_r
                                       "step %llu: the world refuses a pose that the log says it took",
                                       (unsigned long long)record->step);
         break;
-    case PAL_INPUT_LET_GO:
+    case PAL_INPUT_RELEASE:
         return pal_world_pose(world, record->index, NULL);
     case PAL_INPUT_RESET:
         report->n_command++, pal_world_reset(world);
@@ -69,7 +69,7 @@ static pal_err apply(pal_world *world, const pal_scene *scene, const pal_input_r
     case PAL_INPUT_BRUSH:
         report->n_command++;
         return pal_world_brush(world, record->index, record->slot, &record->brush, diag);
-    case PAL_INPUT_ROW:
+    case PAL_INPUT_COMPONENT:
         report->n_command++;
         return pal_world_switch_component(world, scene, record->index, record->row, record->wanted, diag);
     case PAL_INPUT_HASH:
@@ -135,7 +135,7 @@ pal_err pal_replay_run(const char *path, const pal_scene *scene, pal_replay_repo
 {
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, PAL_REPLAY_MOST, &bytes, &n_byte, diag));
+    PAL_TRY(pal_file_read(path, PAL_REPLAY_BYTES_MAX, &bytes, &n_byte, diag));
     pal_err err = pal_replay_parse(path, bytes, n_byte, scene, out, diag);
     free(bytes);
     return err;

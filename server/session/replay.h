@@ -14,7 +14,7 @@ typedef struct pal_replay_report {
 } pal_replay_report;
 
 /* the most bytes of a log that is read: 1 GiB, about 10 h of eight busy tools */
-#define PAL_REPLAY_MOST ((size_t)1 << 30)
+#define PAL_REPLAY_BYTES_MAX ((size_t)1 << 30)
 
 /* runs the log at path against a world of this scene. A hash that differs is no error: see the report. REFUSED: not a
  * log, cut, of another scene, or one that lost records while it was written; IO, MEMORY, and what pal_world_create

@@ -19,11 +19,11 @@ struct pal_sculptor {
     double origin_m[3]; /* of the body's frame, whatever becomes of its shape */
     bool cut;
     double cut_normal[3], cut_m;
-    shape now, past[PAL_SCULPT_PAST], future[PAL_SCULPT_PAST]; /* newest last */
-    int n_past, n_future;
+    shape now, past[PAL_SCULPT_HISTORY], future[PAL_SCULPT_HISTORY]; /* newest last */
+    int n_old_asset, n_future;
 };
 
-struct pal_sculpt_turn {
+struct pal_sculpt_edit {
     pal_sculpt_kind kind;
     int body;
     const pal_cells *from;   /* the sculptor's, until the turn is taken        */
@@ -72,9 +72,9 @@ static pal_err copy_shape(const shape *from, shape *to)
 /* puts a shape on top of a list, the oldest falls out */
 static void push(shape *list, int *n, const shape *s)
 {
-    if (*n == PAL_SCULPT_PAST) {
+    if (*n == PAL_SCULPT_HISTORY) {
         free_shape(&list[0]);
-        memmove(list, list + 1, sizeof *list * (size_t)(PAL_SCULPT_PAST - 1));
+        memmove(list, list + 1, sizeof *list * (size_t)(PAL_SCULPT_HISTORY - 1));
         --*n;
     }
     list[(*n)++] = *s;
@@ -105,7 +105,7 @@ void pal_sculptor_destroy(pal_sculptor *sculptor)
 {
     if (!sculptor) return;
     free_shape(&sculptor->now);
-    for (int i = 0; i < sculptor->n_past; i++) free_shape(&sculptor->past[i]);
+    for (int i = 0; i < sculptor->n_old_asset; i++) free_shape(&sculptor->past[i]);
     for (int i = 0; i < sculptor->n_future; i++) free_shape(&sculptor->future[i]);
     free(sculptor);
 }
@@ -115,12 +115,12 @@ const pal_cells *pal_sculptor_cells(const pal_sculptor *sculptor)
     return &sculptor->now.cells;
 }
 
-int pal_sculptor_past(const pal_sculptor *sculptor)
+int pal_sculptor_undo_count(const pal_sculptor *sculptor)
 {
-    return sculptor->n_past;
+    return sculptor->n_old_asset;
 }
 
-int pal_sculptor_future(const pal_sculptor *sculptor)
+int pal_sculptor_redo_count(const pal_sculptor *sculptor)
 {
     return sculptor->n_future;
 }
@@ -162,7 +162,7 @@ static pal_err keep(const pal_sculptor *s, const pal_sculpt *command, shape *to,
 }
 
 /* back or forth: the shape and the state it was left in */
-static pal_err turn_to(const shape *list, int n, const char *what, pal_sculpt_turn *turn, pal_diagnostic *diag)
+static pal_err turn_to(const shape *list, int n, const char *what, pal_sculpt_edit *turn, pal_diagnostic *diag)
 {
     if (n == 0) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is nothing to %s", what);
     const shape *from = &list[n - 1];
@@ -174,7 +174,7 @@ static pal_err turn_to(const shape *list, int n, const char *what, pal_sculpt_tu
     return turn->next_x && turn->next_v ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-static pal_err set_cut(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt_turn *turn, pal_diagnostic *diag)
+static pal_err set_cut(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt_edit *turn, pal_diagnostic *diag)
 {
     double length = pal_norm3(command->cut_normal);
     turn->cut = command->cut;
@@ -187,7 +187,7 @@ static pal_err set_cut(const pal_sculptor *s, const pal_sculpt *command, pal_scu
     return copy_shape(&s->now, &turn->to);
 }
 
-static pal_err obey(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt_turn *turn, pal_diagnostic *diag)
+static pal_err obey(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt_edit *turn, pal_diagnostic *diag)
 {
     switch (command->kind) {
     case PAL_SCULPT_CELLS:
@@ -198,12 +198,12 @@ static pal_err obey(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt
         return pal_cells_copy(&turn->edit.cells, &turn->to.cells);
     case PAL_SCULPT_PAINT:
         return paint(s, &command->stroke, &turn->to, diag);
-    case PAL_SCULPT_KEEP:
+    case PAL_SCULPT_SET_REST:
         return keep(s, command, &turn->to, diag);
     case PAL_SCULPT_CUT:
         return set_cut(s, command, turn, diag);
     case PAL_SCULPT_UNDO:
-        return turn_to(s->past, s->n_past, "undo", turn, diag);
+        return turn_to(s->past, s->n_old_asset, "undo", turn, diag);
     case PAL_SCULPT_REDO:
         return turn_to(s->future, s->n_future, "redo", turn, diag);
     case PAL_SCULPT_KINDS:
@@ -215,7 +215,7 @@ static pal_err obey(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt
 /* ---- turns ---- */
 
 /* the scene with the body's new shape; everything that the body borrows is the turn's */
-static pal_err make_scene(const pal_sculptor *s, const pal_scene *scene, pal_sculpt_turn *turn)
+static pal_err make_scene(const pal_sculptor *s, const pal_scene *scene, pal_sculpt_edit *turn)
 {
     pal_surface surface = {0};
     turn->scene = *scene;
@@ -236,7 +236,7 @@ static pal_err make_scene(const pal_sculptor *s, const pal_scene *scene, pal_scu
     return err;
 }
 
-static pal_err make_room(const pal_sculptor *s, pal_sculpt_turn *turn)
+static pal_err make_room(const pal_sculptor *s, pal_sculpt_edit *turn)
 {
     size_t before = 3 * sizeof(double) * (size_t)s->now.cells.n_vertex;
     size_t after = 3 * sizeof(double) * (size_t)turn->to.cells.n_vertex;
@@ -248,10 +248,10 @@ static pal_err make_room(const pal_sculptor *s, pal_sculpt_turn *turn)
 }
 
 pal_err pal_sculptor_prepare(const pal_sculptor *sculptor, const pal_scene *scene, const pal_sculpt *command,
-                             pal_diagnostic *diag, pal_sculpt_turn **out)
+                             pal_diagnostic *diag, pal_sculpt_edit **out)
 {
     const pal_sculptor *s = sculptor;
-    pal_sculpt_turn *turn = calloc(1, sizeof *turn);
+    pal_sculpt_edit *turn = calloc(1, sizeof *turn);
     if (!turn) return PAL_ERR_MEMORY;
     turn->kind = command->kind;
     turn->from = &s->now.cells;
@@ -262,28 +262,28 @@ pal_err pal_sculptor_prepare(const pal_sculptor *sculptor, const pal_scene *scen
     if (!err) err = make_room(s, turn);
     if (!err) err = make_scene(s, scene, turn);
     if (err)
-        pal_sculpt_free(turn);
+        pal_sculpt_edit_free(turn);
     else
         *out = turn;
     return err;
 }
 
-const pal_scene *pal_sculpt_scene(const pal_sculpt_turn *turn)
+const pal_scene *pal_sculpt_edit_scene(const pal_sculpt_edit *turn)
 {
     return &turn->scene;
 }
 
 /* where an edit's points stand now */
-static void carry_points(pal_sculpt_turn *turn)
+static void carry_points(pal_sculpt_edit *turn)
 {
     const pal_cells_edit *edit = &turn->edit;
     pal_cells_edit_positions(edit, turn->from, turn->x, turn->next_x);
     pal_interpolation_apply(&edit->rows, turn->v, turn->next_v);
 }
 
-void pal_sculpt_carry(void *user, pal_world *next, const pal_world *before)
+void pal_sculpt_transfer(void *user, pal_world *next, const pal_world *before)
 {
-    pal_sculpt_turn *turn = user;
+    pal_sculpt_edit *turn = user;
     const pal_body *from = pal_world_body((pal_world *)(uintptr_t)before, turn->body);
     size_t n_byte = 3 * sizeof(double) * (size_t)turn->n_before;
     memcpy(turn->x, from->x, n_byte);
@@ -299,7 +299,7 @@ void pal_sculpt_carry(void *user, pal_world *next, const pal_world *before)
     pal_world_transfer_loads(next, turn->body, before);
 }
 
-void pal_sculptor_accept(pal_sculptor *sculptor, pal_sculpt_turn *turn)
+void pal_sculptor_commit(pal_sculptor *sculptor, pal_sculpt_edit *turn)
 {
     pal_sculptor *s = sculptor;
     s->cut = turn->cut, s->cut_m = turn->cut_m;
@@ -311,7 +311,7 @@ void pal_sculptor_accept(pal_sculptor *sculptor, pal_sculpt_turn *turn)
     s->now = turn->to;
     turn->to = (shape){.n_stroke = 0};
     if (turn->kind == PAL_SCULPT_UNDO) {
-        free_shape(&s->past[--s->n_past]);
+        free_shape(&s->past[--s->n_old_asset]);
         push(s->future, &s->n_future, &left);
         return;
     }
@@ -320,10 +320,10 @@ void pal_sculptor_accept(pal_sculptor *sculptor, pal_sculpt_turn *turn)
     } else {
         while (s->n_future > 0) free_shape(&s->future[--s->n_future]);
     }
-    push(s->past, &s->n_past, &left);
+    push(s->past, &s->n_old_asset, &left);
 }
 
-void pal_sculpt_free(pal_sculpt_turn *turn)
+void pal_sculpt_edit_free(pal_sculpt_edit *turn)
 {
     if (!turn) return;
     free_shape(&turn->to);
@@ -365,14 +365,14 @@ static int32_t nearest_use(const pal_cells *c, int32_t face, const double at[3],
     return best;
 }
 
-int32_t pal_sculptor_near_edge(const pal_sculptor *sculptor, int32_t face, const double at_m[3])
+int32_t pal_sculptor_nearest_edge(const pal_sculptor *sculptor, int32_t face, const double at_m[3])
 {
     const pal_cells *c = &sculptor->now.cells;
     int32_t use = nearest_use(c, face, at_m, false);
     return use < 0 ? -1 : c->edge_use[use].edge;
 }
 
-int32_t pal_sculptor_near_vertex(const pal_sculptor *sculptor, int32_t face, const double at_m[3])
+int32_t pal_sculptor_nearest_vertex(const pal_sculptor *sculptor, int32_t face, const double at_m[3])
 {
     const pal_cells *c = &sculptor->now.cells;
     int32_t use = nearest_use(c, face, at_m, true);

@@ -1,10 +1,10 @@
 /* The simulation thread: take commands and newest poses, step the world, publish a frame, sleep until the next absolute
  * time. Nothing here waits for another thread: poses and frames go through trios, commands through a ring, and the only
- * lock guards the one sentence of pal_session_last_note, which the thread touches when a command was refused or a body
- * frozen, never in an ordinary step.
+ * lock guards the one sentence of pal_session_last_diagnostic, which the thread touches when a command was refused or a
+ * body frozen, never in an ordinary step.
  *
  * Slowdown is real over simulated time since a mark that is between 1 and 1 + 1/16 s old. */
-#include "server/session/session_parts.h"
+#include "server/session/session_core.h"
 
 #include "server/base/clock.h"
 #include "server/base/log.h"
@@ -105,7 +105,7 @@ static bool take_poses(pal_session *s, uint64_t now)
         } else if ((place->present && (slot || gone)) || (place->brushes && slot && !slot->present)) {
             pal_world_pose(s->world, t, NULL);
             place->present = place->brushes = false;
-            record.kind = PAL_INPUT_LET_GO;
+            record.kind = PAL_INPUT_RELEASE;
         } else {
             continue;
         }
@@ -154,7 +154,7 @@ static void switch_row(pal_session *s, const pal_command *command)
         atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
     } else {
         pal_input_record record = {
-            .kind = PAL_INPUT_ROW, .index = command->body, .step = s->step, .wanted = command->wanted};
+            .kind = PAL_INPUT_COMPONENT, .index = command->body, .step = s->step, .wanted = command->wanted};
         memcpy(record.row, command->row, sizeof record.row);
         pal_input_log_put(s->log, &record);
         diag.text[0] = 0;
@@ -165,7 +165,7 @@ static void switch_row(pal_session *s, const pal_command *command)
 /* has somebody begun to look, or the last one ceased to? true: what is shown is new */
 static bool look_around(pal_session *s)
 {
-    bool watched = !s->options.only_watched || atomic_load_explicit(&s->n_watch, memory_order_relaxed) > 0;
+    bool watched = !s->options.only_observed || atomic_load_explicit(&s->n_observer, memory_order_relaxed) > 0;
     if (watched == s->watched) return false;
     s->watched = watched;
     pal_world_watch(s->world, watched);
@@ -221,7 +221,7 @@ static void obey(pal_session *s, const pal_command *command)
     case PAL_COMMAND_ESTIMATE:
         pal_watch_ask(&s->watch, command->body, command->wanted);
         break;
-    case PAL_COMMAND_ROW:
+    case PAL_COMMAND_COMPONENT:
         switch_row(s, command);
         break;
     case PAL_COMMAND_COUNT:
@@ -444,18 +444,18 @@ const pal_scene *pal_session_scene(const pal_session *s)
     return s->scene;
 }
 
-int pal_session_rows(const pal_session *s)
+int pal_session_component_count(const pal_session *s)
 {
     return s->n_row;
 }
 
-void pal_session_row(const pal_session *s, int row, pal_component_info *out)
+void pal_session_component_info(const pal_session *s, int row, pal_component_info *out)
 {
     *out = row >= 0 && row < s->n_row ? s->row[row]
                                       : (pal_component_info){.name = "", .body = "", .stage = "", .reason = ""};
 }
 
-int pal_session_parts(const pal_session *s)
+int pal_session_part_count(const pal_session *s)
 {
     return s->n_part;
 }
@@ -465,7 +465,7 @@ void pal_session_shown(const pal_session *s, int part, pal_shown *out)
     *out = part >= 0 && part < s->n_part ? s->part[part] : (pal_shown){.name = ""};
 }
 
-bool pal_session_gives(const pal_session *s, int body, pal_field field)
+bool pal_session_has_field(const pal_session *s, int body, pal_field field)
 {
     bool there = body >= 0 && body < PAL_BODY_MAX && (int)field >= 0 && field < PAL_FIELD_COUNT;
     return there && s->gives[body][field];
@@ -502,7 +502,8 @@ pal_err pal_session_command(pal_session *s, const pal_command *command)
         return refuse(s);
     if (command->kind == PAL_COMMAND_RESET_BODY && (command->body < 0 || command->body >= s->scene->n_body))
         return refuse(s);
-    if (command->kind == PAL_COMMAND_FIELD && !pal_session_gives(s, command->body, command->field)) return refuse(s);
+    if (command->kind == PAL_COMMAND_FIELD && !pal_session_has_field(s, command->body, command->field))
+        return refuse(s);
     if (command->kind == PAL_COMMAND_BRUSH &&
         (command->body < 0 || command->body >= s->scene->n_body || command->slot < 0 ||
          command->slot >= s->scene->n_tool ||
@@ -510,7 +511,7 @@ pal_err pal_session_command(pal_session *s, const pal_command *command)
         return refuse(s);
     if (command->kind == PAL_COMMAND_ESTIMATE && (command->body < 0 || command->body >= s->scene->n_body))
         return refuse(s);
-    if (command->kind == PAL_COMMAND_ROW &&
+    if (command->kind == PAL_COMMAND_COMPONENT &&
         (command->body < 0 || command->body >= s->scene->n_body || !memchr(command->row, 0, sizeof command->row)))
         return refuse(s);
     return pal_command_queue_put(s->command, command);
@@ -526,12 +527,12 @@ const pal_frame *pal_session_take_frame(pal_session *s)
     return pal_triple_buffer_take(&s->frames);
 }
 
-void pal_session_watch(pal_session *s, bool looks)
+void pal_session_observe(pal_session *s, bool looks)
 {
-    atomic_fetch_add_explicit(&s->n_watch, looks ? 1 : -1, memory_order_relaxed);
+    atomic_fetch_add_explicit(&s->n_observer, looks ? 1 : -1, memory_order_relaxed);
 }
 
-bool pal_session_alive(const pal_session *s)
+bool pal_session_is_alive(const pal_session *s)
 {
     uint64_t beat = atomic_load_explicit(&s->beat_ns, memory_order_relaxed), now = pal_clock_ns();
     return now < beat || now - beat < SECOND_NS || atomic_load_explicit(&s->replaced, memory_order_relaxed);
@@ -544,7 +545,7 @@ void pal_session_material(pal_session *s, int body, pal_material *out)
     pthread_mutex_unlock(&s->note_lock);
 }
 
-void pal_session_last_note(pal_session *s, pal_diagnostic *out)
+void pal_session_last_diagnostic(pal_session *s, pal_diagnostic *out)
 {
     pthread_mutex_lock(&s->note_lock);
     *out = s->diag;

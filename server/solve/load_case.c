@@ -11,7 +11,7 @@
 #include "server/solve/load_case.h"
 
 #include "server/base/vec3.h"
-#include "server/mesh/volume/loose_parts.h"
+#include "server/mesh/volume/loose_components.h"
 #include "server/num/shape_functions.h"
 
 #include <math.h>
@@ -78,11 +78,11 @@ static double missing(const pal_prepared *mesh)
     return 1 - sum / fabs(pal_surface_volume(&mesh->surface));
 }
 
-/* what no support holds is left out, as where a scene is made ready (mesh/loose_parts.h) */
+/* what no support holds is left out, as where a scene is made ready (mesh/loose_components.h) */
 static pal_err drop_loose(const pal_problem *p, pal_prepared *mesh, pal_diagnostic *diag)
 {
     const pal_tets *tets = &mesh->tets;
-    pal_loose_parts parts;
+    pal_loose_components parts;
     uint8_t *fixed = calloc((size_t)tets->n_node, sizeof *fixed);
     if (!fixed) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory to find what is held");
     for (int i = 0; i < tets->n_node; i++) {
@@ -91,7 +91,7 @@ static pal_err drop_loose(const pal_problem *p, pal_prepared *mesh, pal_diagnost
         for (int k = 0; k < p->n_support && !fixed[i]; k++)
             fixed[i] = pal_box_holds(&p->support[k].region, x, pal_case_slack(tets));
     }
-    pal_err err = pal_loose_parts_drop("problem", fixed, false, mesh, &parts, diag);
+    pal_err err = pal_loose_components_drop("problem", fixed, false, mesh, &parts, diag);
     free(fixed);
     return err;
 }

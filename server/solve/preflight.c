@@ -6,8 +6,6 @@
 #include "server/num/conjugate_gradient.h"
 #include "server/num/lanczos.h"
 #include "server/sim/springs/spring_constraint.h"
-#include "server/sim/subdivision/subdivision_solid.h"
-#include "server/sim/surface/adaptive_surface.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -78,10 +76,8 @@ static double shape_of(const double *x, const int32_t *corner, int n, double mea
 static void look_at_elements(const pal_body *body, bool volumes, pal_preflight_body *out)
 {
     const pal_tets *tets = body->interpolation ? NULL : body->tets;
-    const int n = tets ? 4 : 3, n_simplex = tets             ? tets->n_tet
-                                            : body->adaptive ? body->adaptive->levels.first_face[1]
-                                                             : 0;
-    const int32_t *simplex = tets ? tets->tet : body->adaptive ? body->adaptive->levels.face : NULL;
+    const int n = tets ? 4 : 3, n_simplex = tets ? tets->n_tet : body->active ? body->dofs.levels->first_face[1] : 0;
+    const int32_t *simplex = tets ? tets->tet : body->active ? body->dofs.levels->face : NULL;
     for (int e = 0; e < n_simplex; e++) {
         const int32_t *corner = simplex + (size_t)n * (size_t)e;
         double mean2, at[3];
@@ -98,9 +94,9 @@ static void look_at_elements(const pal_body *body, bool volumes, pal_preflight_b
         middle(body->x_rest, element + (size_t)e * (size_t)n_corner, n_corner, at);
         if ((double)body->fill[e] < min_fill) weak(&out->thin, e, (double)body->fill[e], at, body);
     }
-    out->n_element = body->element ? body->n_element
-                     : body->solid ? pal_cell_elements_count(&body->solid->elements)
-                                   : n_simplex;
+    out->n_element = body->element         ? body->n_element
+                     : body->dofs.n_clique ? pal_dofs_element_count(&body->dofs)
+                                           : n_simplex;
 }
 
 static void look_at_masses(const pal_body *body, pal_preflight_body *out)
@@ -266,8 +262,8 @@ static bool look_at_modes(probe *p, pal_preflight_body *out)
  */
 static double component_ns(const pal_body *body, const char *name)
 {
-    const double n_tet = body->tets ? body->tets->n_tet : 0, n_spring = body->adaptive ? body->adaptive->n_spring : 0;
-    const double n_cell = body->solid ? pal_cell_elements_count(&body->solid->elements) : 0;
+    const double n_tet = body->tets ? body->tets->n_tet : 0, n_spring = body->dofs.n_spring;
+    const double n_cell = pal_dofs_element_count(&body->dofs);
     const struct {
         const char *name;
         double ns;

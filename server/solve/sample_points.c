@@ -3,7 +3,7 @@
 #include "server/solve/sample_points.h"
 
 #include "server/base/vec3.h"
-#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/files/file_bytes.h"
 
 #include <math.h>
 #include <stdio.h>

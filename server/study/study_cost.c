@@ -164,7 +164,7 @@ static cost_law best_fit(const seen *p, int n)
 
 /* ---- counts ---- */
 
-static bool adapts(const pal_configuration *s)
+static bool is_adaptive(const pal_configuration *s)
 {
     return pal_study_is(s->model, "adaptive_springs") && !pal_study_is(s->element, "refined") && s->size > 1;
 }
@@ -214,7 +214,7 @@ static double nodes_in_use(const pal_study *study, int leave_out, const pal_conf
         if (counts(study, i, leave_out, s) && study->point[i].priced.setting.size == 1) coarse = study->point[i].n_node;
     for (int i = 0; i < study->n_point; i++) {
         const pal_study_point *p = &study->point[i];
-        if (!counts(study, i, leave_out, s) || !adapts(&p->priced.setting)) continue;
+        if (!counts(study, i, leave_out, s) || !is_adaptive(&p->priced.setting)) continue;
         double full = refined_nodes(study, leave_out, &p->priced.setting, coarse);
         share += (p->n_node - coarse) / (full - coarse);
         n++;
@@ -257,8 +257,8 @@ bool pal_study_foresee_cost(const pal_study *study, const pal_configuration *s, 
 {
     seen p[PAL_STUDY_POINTS];
     int n = 0;
-    double nodes = adapts(s) ? nodes_in_use(study, leave_out, s) : n_node, off = 0, weight = trust;
-    double substeps = adapts(s) ? finest_substeps(study, leave_out, s) : n_substep;
+    double nodes = is_adaptive(s) ? nodes_in_use(study, leave_out, s) : n_node, off = 0, weight = trust;
+    double substeps = is_adaptive(s) ? finest_substeps(study, leave_out, s) : n_substep;
     const bool by_element = n_element > 0 && are_counted(study, leave_out, s);
     if (!(nodes > 0) || !(substeps >= 1) || !(s->step_s > 0) || !(study->step_s > 0)) return false;
     for (int i = 0; i < study->n_point; i++) {

@@ -1,6 +1,7 @@
 /* A word of the command line -> body and loads of a study. */
 #include "server/study/study_input.h"
 
+#include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/json_reader.h"
 #include "server/scene/problem_file.h"

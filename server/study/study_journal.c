@@ -1,7 +1,7 @@
 /* A study's journal: every record is in memory as it is in the file. */
 #include "server/study/study_journal.h"
 
-#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/files/file_bytes.h"
 #include "server/study/study_store.h"
 
 #include <errno.h>

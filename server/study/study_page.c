@@ -2,7 +2,7 @@
 #include "server/study/study_page.h"
 
 #include "server/figure/plot.h"
-#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/files/file_bytes.h"
 
 #include <math.h>
 #include <stdlib.h>

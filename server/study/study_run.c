@@ -144,7 +144,7 @@ pal_err pal_study_way(pal_study_job *job, const pal_configuration *setting, doub
     }
     if (facts) {
         /* what adapts takes the sub-steps of the finest level that it came to use */
-        facts->n_substep = w.body->adaptive ? pal_world_substeps(w.world) : n_substep;
+        facts->n_substep = w.body->active ? pal_world_substeps(w.world) : n_substep;
         if (facts->n_node == 0) facts->n_node = pal_body_nodes(w.body);
         facts->prepare_s = w.prepare_s;
         facts->read_ms = read_ms(w.world);

@@ -1,7 +1,7 @@
 /* Studies as JSON and CSV. Every point has the same keys; a table says where they are in memory. */
 #include "server/study/study_store.h"
 
-#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/files/file_bytes.h"
 #include "server/scene/json_reader.h"
 
 #include <inttypes.h>

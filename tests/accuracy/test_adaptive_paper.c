@@ -115,8 +115,8 @@ static void counts_of(bool (*take)(shell_scene *, body_case *), int n0, int e0, 
         body_case c;
         if (!take(&s, &c)) return;
         REQUIRE(start(&s, &c, (run_kind)kind, true));
-        CHECK_INT(s.body->adaptive->n_node, kind == COARSE ? n0 : n1);
-        CHECK_INT(s.body->adaptive->n_spring, kind == COARSE ? e0 : e1);
+        CHECK_INT(s.body->model.adaptive->n_node, kind == COARSE ? n0 : n1);
+        CHECK_INT(s.body->model.adaptive->n_spring, kind == COARSE ? e0 : e1);
         shell_scene_close(&s);
     }
     CHECK_INT(e1, 4 * e0);

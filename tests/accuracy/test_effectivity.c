@@ -248,9 +248,9 @@ static void tell(const row *r, const pal_estimate *e, double said_m, double true
     printf("  | %s, %s, %s, %d | %.3f | %.3f | %.2f |", r->name, r->element, r->law, r->resolution, 1e3 * true_m,
            1e3 * said_m, said_m / true_m);
     if (true_percent > 0)
-        printf(" %.1f | %.1f | %.2f |", true_percent, e->zz_percent, e->zz_percent / true_percent);
+        printf(" %.1f | %.1f | %.2f |", true_percent, e->energy_error_percent, e->energy_error_percent / true_percent);
     else
-        printf(" | %.1f | |", e->zz_percent);
+        printf(" | %.1f | |", e->energy_error_percent);
     printf("%s\n", e->locking ? " locks |" : " |");
 }
 
@@ -271,7 +271,8 @@ static void compare(const subject *s, const pal_samples *samples)
         tell(r, &e, said_m, true_m, percent);
         CHECK(e.locking == r->locks && (strstr(e.diag, "voxels are cut") != NULL) == r->cut);
         CHECK(r->locks || (said_m >= true_m / 2 && said_m <= 2 * true_m));
-        CHECK(percent == 0 || r->locks || (e.zz_percent >= 0.5 * percent && e.zz_percent <= 2 * percent));
+        CHECK(percent == 0 || r->locks ||
+              (e.energy_error_percent >= 0.5 * percent && e.energy_error_percent <= 2 * percent));
         CHECK(isfinite(e.time_m) && isfinite(e.algebraic_m) && e.error_m >= e.discretisation_m);
     }
     solved_free(&own);

@@ -52,7 +52,7 @@ static double deflection_m(int n, int level, int q, int load, int op)
         end = solid_beam_end(&b);
         printf("  nu %.2f, %d Pa, %s, %2d x %d x %d cells, %d levels, %4d elements: %7.3f mm, %+.2f %% of model fem\n",
                poisson[q], (int)load_Pa[load], operator_name[op], 4 * n, n, n, level,
-               pal_cell_elements_count(&b.s.body->solid->elements), 1e3 * end, 100 * (end / fem_m[q][load] - 1));
+               pal_cell_elements_count(&b.s.body->model.solid->elements), 1e3 * end, 100 * (end / fem_m[q][load] - 1));
     }
     solid_scene_close(&b.s);
     return end;

@@ -92,7 +92,7 @@ start_server() {
 }
 
 # members N: until the session has so many, for a minute at most
-members() { timeout 70 "$bin/palpate-trainee" "$url" --script idle --name waits --seconds 60 --until members=$(($1 + 1)),frames=1 --quiet; }
+members() { timeout 70 "$bin/palpate-client" "$url" --script idle --name waits --seconds 60 --until members=$(($1 + 1)),frames=1 --quiet; }
 
 # json KEY FILE: first number (or word) of that key
 json() { tr ',{}' '\n\n\n' <"$2" | sed -n "s/^\"$1\":\"\{0,1\}\([^\"]*\)\"\{0,1\}\$/\1/p" | head -1; }

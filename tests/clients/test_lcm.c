@@ -261,15 +261,15 @@ static void haptic_model_survives_the_way_to_lcm_and_back(void)
                          .origin_m = {0.1, 0.2, 0.3},
                          .f_ref_N = {1, 2, 3}};
     for (uint32_t i = 0; i < 3; i++)
-        h.patch[i] = (pal_wire_patch){.id = (uint16_t)(i + 5),
-                                      .group = (uint16_t)i,
-                                      .p_m = {0.001f, 0, 0},
-                                      .n = {0, 0, 1},
-                                      .k1_N_m = 300,
-                                      .b_N_s_m = 1,
-                                      .radius_m = 0.01f};
+        h.patch[i] = (pal_wire_contact_patch){.id = (uint16_t)(i + 5),
+                                              .group = (uint16_t)i,
+                                              .p_m = {0.001f, 0, 0},
+                                              .n = {0, 0, 1},
+                                              .k1_N_m = 300,
+                                              .b_N_s_m = 1,
+                                              .radius_m = 0.01f};
     palpate_haptic_model_t model;
-    palpate_contact_patch_t patch[PAL_WIRE_PATCH_MAX];
+    palpate_contact_patch_t patch[PAL_WIRE_CONTACT_PATCH_MAX];
     static uint8_t bytes[4096];
     static pal_wire_haptic back;
     pal_lcm_from_haptic(&h, &model, patch);
@@ -307,7 +307,7 @@ static void states_of_many_tools_come_through_the_memory_bus(void)
     static const pal_lcm_events events = {on_message, on_refused};
     pal_lcm_link *link = NULL;
     REQUIRE(pal_lcm_link_open(NULL, "memq://", &events, NULL, NULL, &link) == PAL_ERR_OK);
-    CHECK(pal_lcm_link_up(link));
+    CHECK(pal_lcm_link_is_up(link));
     CHECK_INT(pal_lcm_link_subscribe(link, "PALPATE1/.*/TOOL/.*", palpate_tool_state_t_get_type_info()), PAL_ERR_OK);
     for (int tool = 0; tool < 8; tool++) {
         palpate_tool_state_t state = a_state();

@@ -13,7 +13,7 @@ before=$(lcm_pid)
 check "the server runs palpate-lcm" "$(echo "$before" | wc -w)" == 1
 
 # a watcher over the whole time: the session may not miss a step
-timeout 60 "$bin/palpate-trainee" "$url" --script press --seconds 7 --json >"$work/watch" 2>"$work/watch.err" &
+timeout 60 "$bin/palpate-client" "$url" --script press --seconds 7 --json >"$work/watch" 2>"$work/watch.err" &
 watch=$!
 sleep 2
 start=$(date +%s%N)

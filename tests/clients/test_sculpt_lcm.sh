@@ -18,7 +18,7 @@ frames() { grep -ao 'PALPATE1/block/BODY/0' "$work/record" 2>/dev/null | wc -l; 
 await 30 named 1
 check "the status names the asset" $? == 0
 printf '0 extrude at=top distance_m=0.02\n2.5 divide at=left\n' >"$work/orders"
-timeout 100 "$bin/palpate-trainee" "$url" --json --script idle --sculpt "$work/orders" --seconds 60 --until orders=2 >"$work/sculpt" 2>"$work/sculpt.err"
+timeout 100 "$bin/palpate-client" "$url" --json --script idle --sculpt "$work/orders" --seconds 60 --until orders=2 >"$work/sculpt" 2>"$work/sculpt.err"
 check "it is sculpted" $? == 0
 await 30 named 3
 check "each topology's asset is named" "$(assets)" '>=' 3

@@ -1,5 +1,5 @@
 #!/bin/sh
-# A solid that is sculpted while it runs, from a real server to palpate-trainee and palpate-bridge: every frame fits the
+# A solid that is sculpted while it runs, from a real server to palpate-client and palpate-bridge: every frame fits the
 # topology it belongs to for who gives the orders, who looks on and who presses. They press 4 mm deep, and what is kept and
 # loses a cell then has no divided cells: their thin parts, pressed flat and cut open, may be folded over, which is rightly
 # refused. usage: test_sculpt_server.sh PROGRAMS
@@ -10,7 +10,7 @@ start_server --port 0
 ask() { # NAME flags: gives the orders of $work/orders; report in $work/NAME, exit code in $code
     name=$1
     shift
-    timeout 120 "$bin/palpate-trainee" "$url" --json --script idle --sculpt "$work/orders" "$@" >"$work/$name" 2>"$work/$name.err"
+    timeout 120 "$bin/palpate-client" "$url" --json --script idle --sculpt "$work/orders" "$@" >"$work/$name" 2>"$work/$name.err"
     code=$?
 }
 
@@ -32,10 +32,10 @@ cat >"$work/orders" <<'ORDERS'
 ? 2.0 extrude at=top distance_m=-1
 ? 2.0 delete x_m=9 y_m=0 z_m=0
 ORDERS
-timeout 120 "$bin/palpate-trainee" "$url" --json --script press --depth 0.004 --seconds 110 --name presses \
+timeout 120 "$bin/palpate-client" "$url" --json --script press --depth 0.004 --seconds 110 --name presses \
     --until topologies=11,cycles_of_it=20,force_N=0.01 >"$work/press" 2>"$work/press.err" &
 press=$!
-timeout 120 "$bin/palpate-trainee" "$url" --json --script idle --seconds 110 --name looks --field displacement \
+timeout 120 "$bin/palpate-client" "$url" --json --script idle --seconds 110 --name looks --field displacement \
     --until topologies=11,cycles_of_it=20,fields=3 >"$work/look" 2>"$work/look.err" &
 look=$!
 timeout 120 "$bin/palpate-bridge" --server "$url" --device virtual:premium --options depth=4 --seconds 115 \

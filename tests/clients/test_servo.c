@@ -26,7 +26,7 @@ static bool rig_open(rig *r, const char *id, double k1)
     o.device = r->device;
     pal_device_virtual()->force_enable(r->device, 1);
     r->model = (pal_wire_haptic){.n_patch = 1, .frame_us = 16667};
-    r->model.patch[0] = (pal_wire_patch){.id = 1, .group = 1, .n = {0, 0, 1}, .k1_N_m = (float)k1};
+    r->model.patch[0] = (pal_wire_contact_patch){.id = 1, .group = 1, .n = {0, 0, 1}, .k1_N_m = (float)k1};
     return pal_servo_create(&o, &r->servo) == PAL_ERR_OK;
 }
 static void rig_close(rig *r)
@@ -92,7 +92,7 @@ static void press_and_hold_on_a_plane_is_stable_and_feels_its_stiffness(void)
             /* the encoder's floor makes the device look deeper by half a step on average */
             CHECK_NEAR(f_sum / d_sum, 300, 0.01 * 300 + 300 * 0.064e-3 * 500 / d_sum);
             CHECK_INT(r.view.state, PAL_SERVO_CONTACT);
-            CHECK_NEAR(r.view.felt_N_m, 300, 3);
+            CHECK_NEAR(r.view.rendered_stiffness_N_m, 300, 3);
             rig_close(&r);
         }
     }
@@ -200,11 +200,11 @@ static void stiffness_above_the_device_is_rendered_at_its_clamp(void)
     rig r;
     REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 3000));
     rig_run(&r, 4);
-    CHECK_NEAR(r.view.felt_N_m, 800, 8);
+    CHECK_NEAR(r.view.rendered_stiffness_N_m, 800, 8);
     CHECK(r.view.flags & PAL_WIRE_POSE_STIFF_CLAMPED);
     pal_servo_set_degraded(r.servo, 1);
     rig_run(&r, 2);
-    CHECK_NEAR(r.view.felt_N_m, 300, 3);
+    CHECK_NEAR(r.view.rendered_stiffness_N_m, 300, 3);
     pal_servo_set_degraded(r.servo, 2);
     rig_run(&r, 1);
     CHECK_NEAR(r.view.fade, 0, 0);

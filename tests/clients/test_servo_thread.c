@@ -31,7 +31,7 @@ static void rig_end(rig *r, pal_servo_timing *timing)
 static void serve(rig *r, uint32_t seq, pal_servo_view *view)
 {
     pal_wire_haptic model = {.seq = seq, .n_patch = 1, .frame_us = 16667};
-    model.patch[0] = (pal_wire_patch){.id = 1, .group = 1, .n = {0, 0, 1}, .k1_N_m = 300};
+    model.patch[0] = (pal_wire_contact_patch){.id = 1, .group = 1, .n = {0, 0, 1}, .k1_N_m = 300};
     pal_servo_put_model(r->servo, &model, 1, pal_clock_ns());
     const pal_servo_view *fresh = pal_servo_take_view(r->servo);
     if (fresh) *view = *fresh;

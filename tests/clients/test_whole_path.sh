@@ -44,9 +44,9 @@ pids="$pids $logger"
 await 30 has STATUS 1
 check "lcm-logger records" $? == 0
 
-begin one palpate-trainee "$url" --script press --depth 0.006 --seconds 110 --tool 2 --name one
+begin one palpate-client "$url" --script press --depth 0.006 --seconds 110 --tool 2 --name one
 one=$job
-begin two palpate-trainee "$url" --script idle --seconds 110 --name two
+begin two palpate-client "$url" --script idle --seconds 110 --name two
 two=$job
 for try in $(seq $tries); do
     wanted=$(($(heard HMODEL/0) + 300)) # at 60 Hz five seconds of touch

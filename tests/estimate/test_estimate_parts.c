@@ -3,12 +3,12 @@
 #include "server/estimate/estimate_family.h"
 #include "server/estimate/estimate_foresee.h"
 #include "server/estimate/estimate_work.h"
-#include "server/session/switching.h"
+#include "server/session/configuration_switch.h"
 #include "server/sim/springs/spring_law.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 #include "tests/fixtures/estimate_scene.h"
-#include "tests/session/clay.h"
+#include "tests/session/sculpt_body.h"
 
 /* pushed from the side by all nodes of its upper half for a while, then as it is after some free steps */
 static pal_world *swinging(const pal_scene *at, int n_free)
@@ -117,10 +117,10 @@ static void every_part_is_known_of_finite_elements_and_of_springs(void)
         printf("  %s: largest way %.3g mm; discretisation %.3g, algebraic %.3g, time %.3g, model %.3g mm, zz %.3g %%, "
                "%s\n",
                at->body[0].model.name, 1e3 * e.max_m, 1e3 * e.discretisation_m, 1e3 * e.algebraic_m, 1e3 * e.time_m,
-               1e3 * e.model_m, e.zz_percent, e.diag);
+               1e3 * e.model_m, e.energy_error_percent, e.diag);
         CHECK_NEAR(e.error_m, e.discretisation_m + e.algebraic_m + e.time_m + e.model_m, 1e-15);
         CHECK(k == 0 || e.model_m < 0.5 * e.max_m + 2 * e.discretisation_m);
-        CHECK(e.discretisation_m > 0 && e.model_m > 0 && e.zz_percent > 0 && e.zz_percent < 100);
+        CHECK(e.discretisation_m > 0 && e.model_m > 0 && e.energy_error_percent > 0 && e.energy_error_percent < 100);
         CHECK(k ? e.algebraic_m == 0 : e.algebraic_m > 0);
         CHECK(!e.locking);
         CHECK_NEAR(e.ms, 3, 0);
@@ -208,11 +208,11 @@ static void neighbours_are_what_a_switch_makes(void)
         CHECK_INT(e.n_neighbour, k ? 2 : 6);
         for (int i = 0; i < e.n_neighbour; i++) {
             const pal_configuration *to = &e.neighbour[i].setting;
-            pal_switch *change = NULL;
+            pal_configuration_switch *change = NULL;
             pal_world *next = NULL;
             pal_diagnostic diag = {""};
-            pal_err err = pal_switch_prepare(at, NULL, 0, to, &diag, &change);
-            if (!err) err = pal_world_create(pal_switch_scene(change), &diag, &next);
+            pal_err err = pal_configuration_switch_prepare(at, NULL, 0, to, &diag, &change);
+            if (!err) err = pal_world_create(pal_configuration_switch_scene(change), &diag, &next);
             if (err) CHECK_FAIL("%s", diag.text);
             double nodes = pal_world_view_body(next, 0)->n_node;
             printf("  %s %d voxels, %g ms: nodes %d foreseen, %g made, sub-steps %d, %d\n", to->model, to->size,
@@ -224,7 +224,7 @@ static void neighbours_are_what_a_switch_makes(void)
             for (int r = 0; r < pal_world_component_count(w) && r < pal_world_component_count(next); r++)
                 CHECK(pal_world_component(next, r)->effect == pal_world_component(w, r)->effect);
             pal_world_destroy(next);
-            pal_switch_free(change);
+            pal_configuration_switch_free(change);
         }
         pal_world_destroy(w);
         pal_configured_scene_free(set);
@@ -421,11 +421,11 @@ static void a_body_let_go_errs_as_it_did_under_load(void)
         REQUIRE(estimate_of(at, w, &gone));
         printf("  %s: held %.6g, let go %.6g mm of %.4g mm; model %.6g, %.6g mm; zz %.4g, %.4g %%\n",
                at->body[0].model.name, 1e3 * fixed.discretisation_m, 1e3 * gone.discretisation_m, 1e3 * fixed.max_m,
-               1e3 * fixed.model_m, 1e3 * gone.model_m, fixed.zz_percent, gone.zz_percent);
+               1e3 * fixed.model_m, 1e3 * gone.model_m, fixed.energy_error_percent, gone.energy_error_percent);
         CHECK(fixed.discretisation_m > 0.01 * fixed.max_m && fixed.model_m > 0);
         CHECK_NEAR(gone.discretisation_m, fixed.discretisation_m, 1e-6 * fixed.discretisation_m);
         CHECK_NEAR(gone.model_m, fixed.model_m, 1e-3 * fixed.model_m + 1e-9);
-        CHECK_NEAR(gone.zz_percent, fixed.zz_percent, 1e-3);
+        CHECK_NEAR(gone.energy_error_percent, fixed.energy_error_percent, 1e-3);
         CHECK(gone.n_neighbour >= 2 && gone.neighbour[1].error_m < gone.error_m);
         pal_world_destroy(w);
         free(at);
@@ -445,7 +445,7 @@ static void what_rounding_moved_has_no_error(void)
         for (int i = 0; i < 3 * body->n_dof; i++) body->x[i] += i % 7 * 1e-17;
         REQUIRE(estimate_of(at, w, &e));
         CHECK(e.max_m > 0 && e.error_m == 0 && e.discretisation_m == 0 && e.model_m == 0 && e.time_m == 0);
-        CHECK(e.zz_percent == 0);
+        CHECK(e.energy_error_percent == 0);
         CHECK_TEXT(e.diag, "");
         pal_world_destroy(w);
         free(at);

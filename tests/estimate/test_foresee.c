@@ -1,9 +1,9 @@
 /* What is offered as a neighbour on a knob is what a switch takes (estimate_foresee.h): the same check on both sides.
  */
 #include "server/estimate/estimate_foresee.h"
-#include "server/session/switching.h"
+#include "server/session/configuration_switch.h"
 #include "tests/check.h"
-#include "tests/session/small_scene.h"
+#include "tests/session/session_scene.h"
 
 #include <string.h>
 
@@ -48,13 +48,13 @@ static void what_is_offered_is_taken_and_the_other_way_round(void)
         pal_foresight f = foresight(size, true);
         pal_estimate e;
         pal_diagnostic diag = {""};
-        pal_switch *change = NULL;
+        pal_configuration_switch *change = NULL;
         foresee(&f, &e);
         for (int i = 0; i < e.n_neighbour; i++, n_offered++)
             CHECK_INT(pal_configuration_check_live(&scene, 0, &e.neighbour[i].setting, &diag), PAL_ERR_OK);
         if (offers(&e, 2 * size)) continue;
         f.setting.size = 2 * size;
-        CHECK_INT(pal_switch_prepare(&scene, NULL, 0, &f.setting, &diag, &change), PAL_ERR_REFUSED);
+        CHECK_INT(pal_configuration_switch_prepare(&scene, NULL, 0, &f.setting, &diag, &change), PAL_ERR_REFUSED);
         CHECK(!change && strstr(diag.text, "a live switch takes 100000 at most") != NULL);
         n_refused++;
     }
@@ -70,9 +70,10 @@ static void what_is_offered_can_be_made(void)
     CHECK_INT(e.n_neighbour, 6);
     for (int i = 0; i < e.n_neighbour; i++) {
         pal_diagnostic diag = {""};
-        pal_switch *change = NULL;
-        if (pal_switch_prepare(&scene, NULL, 0, &e.neighbour[i].setting, &diag, &change)) CHECK_FAIL("%s", diag.text);
-        pal_switch_free(change);
+        pal_configuration_switch *change = NULL;
+        if (pal_configuration_switch_prepare(&scene, NULL, 0, &e.neighbour[i].setting, &diag, &change))
+            CHECK_FAIL("%s", diag.text);
+        pal_configuration_switch_free(change);
     }
 }
 

@@ -30,7 +30,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
         free(copy);
     }
     if (asset && !pal_frame_encoder_create(asset->rest_m, asset->order, &e)) {
-        const pal_frame_given given = {.error_m = 1e-4, .position_m = asset->rest_m};
+        const pal_frame_input given = {.error_m = 1e-4, .position_m = asset->rest_m};
         size_t cap = pal_frame_bound(asset->order->n_vertex);
         pal_frame_result result;
         uint8_t *frame = malloc(cap);

@@ -2,8 +2,8 @@
  * Input: records of one byte what (1: text, else binary; 2: pull messages after it; 4: a turn of the loop after it),
  * two bytes length (little endian) and the message. The first record is preceded by a valid join when its byte has
  * bit 7. */
+#include "tests/net/hub_scene.h"
 #include "tests/net/mem_client.h"
-#include "tests/net/small_scene.h"
 
 #include "server/net/server.h"
 
@@ -36,7 +36,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
         if (n > n_byte - at) n = n_byte - at;
         pal_mem_send(peer, bytes + at, n, what & 1);
         at += n;
-        if (what & 4) pal_server_turn(server, now_ns += 16666667);
+        if (what & 4) pal_server_advance(server, now_ns += 16666667);
         for (int i = 0; i < 8 && what & 2; i++)
             if (!pal_mem_receive(peer)) break;
     }

@@ -1,9 +1,11 @@
 #!/bin/sh
-# The viewer's checks: `types` runs tsc over the JSDoc types, `test` runs node --test. Packages come from the lock file
-# into the build folder (deploy/common.sh). usage: check_viewer.sh types|test [BUILD]
+# The viewer's checks: `types` runs tsc over the JSDoc types, `test` runs node --test, `format` asks prettier whether the
+# viewer and every script of the tests is formatted, `reformat` formats them. Packages come from the lock file into the
+# build folder (deploy/common.sh). usage: check_viewer.sh types|test|format|reformat [BUILD]
 set -u
 tree=$(cd "$(dirname "$0")/../.." && pwd)
 build=${2:-$tree/build}
+build=$(cd "$build" && pwd) || exit 2
 packages=$build/viewer_packages
 case ${1-} in
 types)
@@ -19,9 +21,18 @@ types)
 JSON
     exec "$packages/node_modules/.bin/tsc" --noEmit -p "$packages/tsconfig.json"
     ;;
-test) cd "$tree/clients/viewer" && exec node --test test/ ;;
+format | reformat)
+    mode=--check
+    [ "$1" = format ] || mode=--write
+    cd "$tree" || exit 2
+    # shellcheck disable=SC2046
+    exec "$packages/node_modules/.bin/prettier" --log-level warn --config clients/viewer/package.json $mode \
+        $(find clients/viewer tests -name node_modules -prune -o \( -name '*.js' -o -name '*.mjs' \) -print | sort) \
+        clients/viewer/index.html clients/viewer/*.css clients/viewer/package.json clients/viewer/jsconfig.json
+    ;;
+test) cd "$tree/clients/viewer" && exec node --test test/*.test.js ;;
 *)
-    echo "usage: check_viewer.sh types|test [BUILD]" >&2
+    echo "usage: check_viewer.sh types|test|format|reformat [BUILD]" >&2
     exit 2
     ;;
 esac

@@ -51,6 +51,14 @@ for file in scene.json box.palmesh box.node box.ele box.face; do check "$file is
 check "something else is in the folder" test "$(ls -A scene | wc -l)" -eq 5
 end
 
+begin "prepare refuses material numbers outside the range of scenes (tests/scene/test_material_limits.c)"
+for bad_number in "--young-Pa 1.001e15" "--young-Pa 0.999e-6" "--poisson -0.99991" "--poisson 0.4999991" "--density-kg-m3 1.001e24" "--density-kg-m3 0.999e-24"; do
+    run prepare box.obj -o limits $bad_number
+    check "$bad_number is refused" [ "$code" -ne 0 ]
+    check "$bad_number is named" grep -q -e "${bad_number%% *}" err
+done
+end
+
 begin "prepare --json has every figure and is one object"
 run prepare box.obj -o scene2 --json --resolution 12 --units mm
 check "exit code $code" code_is 0

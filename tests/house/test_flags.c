@@ -26,7 +26,7 @@ static int parse(bool with_config, char **word)
                                   .about = "",
                                   .flag = flag,
                                   .n_flag = 4,
-                                  .most_operand = 2,
+                                  .max_operand = 2,
                                   .config = with_config ? &config : NULL};
     int argc = 0;
     while (word[argc]) argc++;
@@ -106,13 +106,13 @@ static void flags_win_over_environment_over_file_over_defaults(void)
     CHECK_INT(config.port, 8090);
     CHECK_TEXT(config.listen, "127.0.0.1");
     CHECK(!config.allow_remote);
-    CHECK_INT(config.most_clients, 200);
+    CHECK_INT(config.max_clients, 200);
     CHECK_INT(pal_config_log_level(&config), PAL_LOG_INFO);
     setenv("PALPATE_PORT", "2222", 1);
     setenv("PALPATE_ALLOW_REMOTE", "false", 1);
     CHECK_INT(CONFIGURE("a", "--config", path), -1);
     CHECK_INT(config.port, 2222);
-    CHECK_INT(config.most_clients, 7);
+    CHECK_INT(config.max_clients, 7);
     CHECK(!config.allow_remote);
     CHECK_INT(pal_config_log_level(&config), PAL_LOG_DEBUG);
     CHECK_INT(CONFIGURE("a", "--port", "3333", "--config", path, "--allow-remote"), -1);
@@ -120,7 +120,7 @@ static void flags_win_over_environment_over_file_over_defaults(void)
     CHECK(config.allow_remote);
     setenv("PALPATE_CONFIG", path, 1);
     CHECK_INT(CONFIGURE("a"), -1);
-    CHECK_INT(config.most_clients, 7);
+    CHECK_INT(config.max_clients, 7);
     unsetenv("PALPATE_CONFIG");
     setenv("PALPATE_PORT", "x", 1);
     CHECK_INT(CONFIGURE("a"), 1);
@@ -165,7 +165,7 @@ static void a_bad_file_changes_nothing_and_names_file_and_key(void)
     pal_diagnostic diag = {""};
     CHECK_INT(pal_config_environment(&config, variable, &diag), PAL_ERR_REFUSED);
     CHECK_TEXT(diag.text, "PALPATE_PORT: 70000 is outside 0 .. 65535");
-    CHECK_INT(config.most_clients, 200);
+    CHECK_INT(config.max_clients, 200);
 }
 
 static void long_texts_are_refused(void)

@@ -14,7 +14,7 @@ verdict() { # NAME WANTED GOT
 }
 plant() { # NAME FILE TEXT [EXIT [FILE TEXT]]: a clean little tree with what is planted must be refused
     tree=$(mktemp -d)
-    mkdir -p "$tree/server/base" "$tree/server/sim/core" "$tree/server/sim/effects" "$tree/server/mesh/geometry" "$tree/protocol" "$tree/clients/trainee"
+    mkdir -p "$tree/server/base" "$tree/server/sim/core" "$tree/server/sim/effects" "$tree/server/mesh/geometry" "$tree/protocol" "$tree/clients/scripted_client"
     echo '#include "server/base/err.h"' >"$tree/server/mesh/geometry/clean.c"
     if [ -n "$2" ]; then printf '%s\n' "$3" >"$tree/$2"; fi
     if [ -n "${5-}" ]; then printf '%s\n' "$6" >"$tree/$5"; fi
@@ -28,7 +28,7 @@ verdict "the tree keeps its floors" 0 $?
 plant "a clean tree passes" "" "" 0
 plant "finds an upward include" server/base/up.c '#include "server/mesh/geometry/surface.h"'
 plant "finds a sideways include" protocol/side.c '#include "server/base/err.h"'
-plant "finds a client that sees the server" clients/trainee/peek.c '#include "server/sim/world/world.h"'
+plant "finds a client that sees the server" clients/scripted_client/peek.c '#include "server/sim/world/world.h"'
 plant "finds an effect that sees the world" server/sim/effects/big.c '#include "server/sim/world/world.h"'
 plant "finds threads in sim" server/sim/core/threads.c '#include <pthread.h>'
 plant "finds a room without a floor" server/sim/loose.c '#include "server/base/err.h"'

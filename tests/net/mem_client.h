@@ -5,8 +5,8 @@
 #include "protocol/control.h"
 #include "protocol/field_codec.h"
 #include "protocol/frame_codec.h"
-#include "protocol/patch_codec.h"
-#include "server/net/mem_road.h"
+#include "protocol/topology_delta_codec.h"
+#include "server/net/mem_transport.h"
 #include "tests/check.h"
 
 typedef struct mem_client {
@@ -27,7 +27,7 @@ typedef struct mem_client {
     float *position_m; /* [n_vertex][3] */
     bool mute;         /* does not acknowledge */
     int n_patch;
-    pal_patch_head patch;
+    pal_topology_delta_head patch;
     uint32_t *tri; /* triangles as patched [n_triangle][3] */
     bool patched;  /* a patch has come and not yet its frame */
 } mem_client;
@@ -113,9 +113,10 @@ static inline void mem_take_patch(mem_client *c, const pal_packet *p)
 {
     c->n_patch++;
     uint32_t n = c->asset ? c->asset->n_triangle : 0;
-    uint8_t *work = malloc(PAL_PATCH_WORK_BYTES(n) + 1);
+    uint8_t *work = malloc(PAL_TOPOLOGY_DELTA_WORK_BYTES(n) + 1);
     uint64_t before = c->patch.revision;
-    if (c->patched || pal_patch_get(p->bytes, p->n_byte, n, n ? c->asset->order->n_vertex : 0, work, &c->patch, c->tri))
+    if (c->patched ||
+        pal_topology_delta_get(p->bytes, p->n_byte, n, n ? c->asset->order->n_vertex : 0, work, &c->patch, c->tri))
         c->n_bad++;
     else if (c->patch.revision <= before || c->patch.part != 0 || c->patch.epoch != 1)
         c->n_bad++;
@@ -129,7 +130,7 @@ static inline void mem_take_binary(mem_client *c, const pal_packet *p)
     int refusal = pal_wire_get_head(p->bytes, p->n_byte, &head);
     if (refusal || (c->patched && head.kind != PAL_WIRE_FRAME && head.kind != PAL_WIRE_HAPTIC)) {
         c->n_bad++;
-    } else if (head.kind == PAL_WIRE_PATCH) {
+    } else if (head.kind == PAL_WIRE_TOPOLOGY_DELTA) {
         mem_take_patch(c, p);
     } else if (head.kind == PAL_WIRE_FRAME) {
         pal_frame_head frame = {0};

@@ -1,7 +1,7 @@
 /* What accuracy costs over mem://: the study and the estimates come to those who ask, and are there only for them. */
 #include "server/estimate/estimate.h"
-#include "tests/net/served.h"
-#include "tests/net/small_scene.h"
+#include "tests/net/hub_scene.h"
+#include "tests/net/server_fixture.h"
 
 static small_scene organ;
 enum { POINTS = 5 };

@@ -2,8 +2,8 @@
  * cost the others. Time is the test's own. */
 #include "server/net/server.h"
 #include "server/net/stream.h"
+#include "tests/net/hub_scene.h"
 #include "tests/net/mem_client.h"
-#include "tests/net/small_scene.h"
 
 #include <time.h>
 
@@ -17,14 +17,14 @@ static pal_transport *road;
 static uint64_t now_ns, apart_ns; /* time, and what a turn adds to it */
 static bool running;
 
-static void begin(bool paused, int most_clients)
+static void begin(bool paused, int max_clients)
 {
     pal_session *list[1];
     pal_diagnostic diag = {""};
     gate = pal_server_gate_create();
     pal_session_options options = {
         .lease_s = 60, .start_paused = paused, .unpaced = !paused, .wake = pal_server_gate_wake, .user = gate};
-    pal_server_options net = {.road = "mem", .most_clients = most_clients};
+    pal_server_options net = {.road = "mem", .max_clients = max_clients};
     if (pal_session_open(&organ.scene, &options, &diag, &session)) CHECK_FAIL("no session: %s", diag.text);
     list[0] = session;
     if (pal_server_open(&net, list, 1, &diag, &server)) CHECK_FAIL("no server: %s", diag.text);
@@ -57,7 +57,7 @@ static void turn(mem_client *a, mem_client *b)
     for (int i = 0; first || (running && a && a->n_tools == before && !a->mute && i < 5000); i++) {
         if (!first) nap();
         first = false;
-        pal_server_turn(server, now_ns);
+        pal_server_advance(server, now_ns);
         if (a) mem_pull(a, 1000);
         if (b) mem_pull(b, 1000);
     }
@@ -91,7 +91,7 @@ static void frames_decode_to_the_sessions_positions(void)
     float *x = malloc((size_t)n * 3 * sizeof *x);
     double worst[PAL_STREAM_TIER] = {0};
     for (int i = 0; i < 20000 && n_cycle < 40; i++) {
-        if (!pal_stream_turn(s, (uint64_t)i, used, tool)) {
+        if (!pal_stream_update(s, (uint64_t)i, used, tool)) {
             nap();
             continue;
         }
@@ -117,7 +117,7 @@ static void newcomer_gets_hello_members_frame_and_tools_in_this_order(void)
 {
     mem_client ada;
     begin(true, 0);
-    UNTIL(pal_session_alive(session), NULL, NULL);
+    UNTIL(pal_session_is_alive(session), NULL, NULL);
     turn(NULL, NULL);
     mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     CHECK_INT(mem_pull(&ada, 1), 1);
@@ -537,9 +537,9 @@ static void a_field_goes_only_to_those_who_ask_and_ends_with_them(void)
     UNTIL(ada.n_field > 0, &ada, &bob);
     CHECK(ada.field.field == PAL_WIRE_FIELD_DISPLACEMENT_M && ada.field.part == 0 && ada.field.epoch == 1);
     /* the plan says so while it lasts */
-    UNTIL(bob.last[PAL_CONTROL_STATUS].status.n_row_name > 0, &ada, &bob);
+    UNTIL(bob.last[PAL_CONTROL_STATUS].status.n_component_name > 0, &ada, &bob);
     const pal_wire_status *status = &bob.last[PAL_CONTROL_STATUS].status;
-    CHECK_INT(status->n_row_name, n_row + 1);
+    CHECK_INT(status->n_component_name, n_row + 1);
     CHECK_INT(status->n_row, n_row + 1);
     CHECK_TEXT(status->row[n_row], "field_output");
     /* about ten a second of this clock, and of the same motion as the frames */
@@ -562,7 +562,7 @@ static void a_field_goes_only_to_those_who_ask_and_ends_with_them(void)
     CHECK_INT(ada.n_field, ended);
     mem_end(&bob); /* it goes without a word */
     UNTIL(ada.last[PAL_CONTROL_STATUS].status.n_row == n_row, &ada, NULL);
-    CHECK_INT(ada.last[PAL_CONTROL_STATUS].status.n_row_name, 0);
+    CHECK_INT(ada.last[PAL_CONTROL_STATUS].status.n_component_name, 0);
     CHECK_INT(ada.n_bad, 0);
     mem_end(&ada);
     end();

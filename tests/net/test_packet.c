@@ -20,7 +20,7 @@ static void packet_lives_as_long_as_its_last_user(void)
     pal_packet_replace(&place, pal_packet_hold(p));
     pal_packet_drop(p);
     CHECK(place == p && memcmp(place->bytes, "abc", 3) == 0);
-    memset(p->bytes - PAL_PACKET_FRONT, 0xFF, PAL_PACKET_FRONT);
+    memset(p->bytes - PAL_PACKET_HEADROOM, 0xFF, PAL_PACKET_HEADROOM);
     CHECK(p->n_byte == 3 && p->text && p->n_user == 1);
     pal_packet_replace(&place, NULL);
     CHECK_INT(pal_packet_total(), before);
@@ -45,7 +45,7 @@ static void credit_follows_the_smallest_round_trip(void)
         pal_credit_sent(&c, i, now);
         CHECK(pal_credit_acknowledge(&c, i, now + 390 * MS));
     }
-    CHECK_INT(c.most, PAL_CREDIT_MOST);
+    CHECK_INT(c.most, PAL_CREDIT_MAX);
 }
 
 static void credit_runs_out_and_comes_back(void)
@@ -69,8 +69,8 @@ static void credit_runs_out_and_comes_back(void)
 static void credit_does_not_grow_from_its_own_queue(void)
 {
     pal_credit c;
-    uint64_t ready[PAL_CREDIT_MOST] = {0}, busy = 0; /* when the client acknowledges what is in flight */
-    uint32_t sent[PAL_CREDIT_MOST] = {0}, cycle = 0;
+    uint64_t ready[PAL_CREDIT_MAX] = {0}, busy = 0; /* when the client acknowledges what is in flight */
+    uint32_t sent[PAL_CREDIT_MAX] = {0}, cycle = 0;
     int n = 0, most = 0, n_acknowledged = 0;
     pal_credit_begin(&c, 120);
     for (uint64_t now = 1 * MS; now < 60000 * MS; now += MS) {
@@ -86,9 +86,9 @@ static void credit_does_not_grow_from_its_own_queue(void)
         busy = (now + 1 * MS > busy ? now + 1 * MS : busy) + (cycle == 1 ? 400 : 16) * MS;
         sent[n] = cycle;
         ready[n++] = busy;
-        REQUIRE(n < PAL_CREDIT_MOST || now < 3000 * MS);
+        REQUIRE(n < PAL_CREDIT_MAX || now < 3000 * MS);
     }
-    CHECK_INT(most, PAL_CREDIT_MOST); /* after the asset, for a second */
+    CHECK_INT(most, PAL_CREDIT_MAX); /* after the asset, for a second */
     CHECK_INT(c.most, 4);
     CHECK(n_acknowledged > 3600); /* of the 3750 that it could take in a minute */
 }

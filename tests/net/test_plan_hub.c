@@ -1,7 +1,7 @@
 /* Rows and bodies over mem://: what clients are told of the plan, who switches rows, who brings a stopped body back. */
 #include "server/estimate/estimate.h"
-#include "tests/net/served.h"
-#include "tests/net/small_scene.h"
+#include "tests/net/hub_scene.h"
+#include "tests/net/server_fixture.h"
 
 static small_scene organ;
 static void hurt(void *user, pal_world *next, const pal_world *before)
@@ -16,7 +16,7 @@ static void begin_hurt(void)
     pal_session *first = session;
     pal_diagnostic diag = {""};
     if (pal_session_open_after(first, &organ.scene, &diag, &session)) CHECK_FAIL("no session: %s", diag.text);
-    if (pal_session_follow(session, first, hurt, NULL, &diag)) CHECK_FAIL("does not follow: %s", diag.text);
+    if (pal_session_transfer(session, first, hurt, NULL, &diag)) CHECK_FAIL("does not follow: %s", diag.text);
     pal_session_close(first);
 }
 
@@ -50,22 +50,22 @@ static void rows_say_whose_they_are_and_what_called_for_them(void)
     mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
     UNTIL(ada.n_text[PAL_CONTROL_STATUS] > 2, &ada, NULL);
     const pal_wire_hello *h = &ada.last[PAL_CONTROL_HELLO].hello;
-    CHECK(h->n_row > 3 && h->n_row_part == h->n_row && h->n_row_why == h->n_row);
-    for (uint32_t r = 0; r < h->n_row; r++) CHECK(h->row_part[r] == 0 && h->row_why[r][0]);
+    CHECK(h->n_row > 3 && h->n_component_part == h->n_row && h->n_component_reason == h->n_row);
+    for (uint32_t r = 0; r < h->n_row; r++) CHECK(h->component_part[r] == 0 && h->component_reason[r][0]);
     /* what moves and shows the body stays, elastic rows may go while there is another */
     static const char *const stays[] = {"verlet", "skin_output"}, *const goes[] = {"tet_volume", "edge_distance",
                                                                                    "gravity"};
-    CHECK_INT(h->n_row_fixed, h->n_row);
+    CHECK_INT(h->n_component_required, h->n_row);
     for (int i = 0; i < 2; i++) {
         int r = find(h->n_row, (char(*)[PAL_WIRE_NAME_BYTES])h->row, stays[i]);
-        CHECK(r >= 0 && h->row_fixed[r] == 1);
+        CHECK(r >= 0 && h->component_required[r] == 1);
     }
     for (int i = 0; i < 3; i++) {
         int r = find(h->n_row, (char(*)[PAL_WIRE_NAME_BYTES])h->row, goes[i]);
-        CHECK(r < 0 || h->row_fixed[r] == 0);
+        CHECK(r < 0 || h->component_required[r] == 0);
     }
     const pal_wire_status *s = &ada.last[PAL_CONTROL_STATUS].status;
-    CHECK(s->n_row_name == 0 && s->n_off == 0 && s->n_state == 0);
+    CHECK(s->n_component_name == 0 && s->n_off == 0 && s->n_state == 0);
     CHECK_INT(s->n_row, h->n_row);
     mem_end(&ada);
     end();
@@ -87,14 +87,14 @@ static void an_instructor_switches_a_row_off_and_on_and_all_hear_of_it(void)
     CHECK_TEXT(a->off[0].row, "tet_volume");
     CHECK_INT(a->off[0].part, 0);
     CHECK_INT(a->n_row, h->n_row - 1);
-    CHECK_INT(a->n_row_name, h->n_row - 1);
-    CHECK_INT(a->n_row_part, a->n_row_name);
-    CHECK(find(a->n_row_name, (char(*)[PAL_WIRE_NAME_BYTES])a->row, "tet_volume") < 0);
+    CHECK_INT(a->n_component_name, h->n_row - 1);
+    CHECK_INT(a->n_component_part, a->n_component_name);
+    CHECK(find(a->n_component_name, (char(*)[PAL_WIRE_NAME_BYTES])a->row, "tet_volume") < 0);
 
     mem_text(&ada, ROW("tet_volume", 1));
     UNTIL(a->n_off == 0 && b->n_off == 0, &ada, &bo);
     CHECK_INT(a->n_row, h->n_row);
-    CHECK_INT(a->n_row_name, 0); /* the plan of hello again */
+    CHECK_INT(a->n_component_name, 0); /* the plan of hello again */
 
     /* what the world refuses changes nothing and is said in the status, and to who asked as an error */
     uint64_t n_refused = a->n_refused;
@@ -146,7 +146,7 @@ static void everybody_resets_what_was_stopped_and_a_viewer_nothing_else(void)
     mem_join(&cy, road, "Cy", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     const pal_wire_status *s = &cy.last[PAL_CONTROL_STATUS].status;
     UNTIL(s->frozen && s->n_state == 1, &cy, NULL);
-    CHECK(s->state[0].frozen && s->state[0].n_rescue == 1);
+    CHECK(s->state[0].frozen && s->state[0].n_safeguard == 1);
     CHECK(strstr(s->state[0].reason, "is no number"));
     mem_text(&cy, "{\"type\":\"command\",\"verb\":\"reset\",\"target\":\"organ\"}");
     UNTIL(!s->frozen && s->n_state == 0, &cy, NULL);
@@ -183,7 +183,7 @@ static void a_body_asleep_is_neither_stepped_nor_encoded(void)
     const pal_wire_status *s = &ada.last[PAL_CONTROL_STATUS].status;
     UNTIL(s->n_state == 1 && s->state[0].asleep && ada.n_frame > 0, &ada, NULL);
     UNTIL(s->n_row > 3, &ada, NULL);
-    double row_ms[PAL_WIRE_ROW_MAX];
+    double row_ms[PAL_WIRE_COMPONENT_MAX];
     memcpy(row_ms, s->row_ms, sizeof row_ms);
     double n_encode = counter("palpate_encodes_total");
     uint64_t tick = s->tick, made = pal_estimator_made();

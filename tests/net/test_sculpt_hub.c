@@ -1,7 +1,7 @@
 /* Sculpting over the wire: commands of clients on mem:// to a real session that runs, the topology that comes of them,
  * frames that fit it, answers, refusals, and who goes in the middle. */
-#include "tests/net/order_room.h"
-#include "tests/session/clay.h"
+#include "tests/net/command_room.h"
+#include "tests/session/sculpt_body.h"
 
 static clay_scene clay;
 
@@ -30,7 +30,7 @@ static void a_cell_grows_and_the_frames_are_of_the_new_epoch(void)
     begin();
     join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
     const pal_wire_part_info before = *part(&c);
-    CHECK(before.sculpts);
+    CHECK(before.is_sculptable);
     CHECK_INT(before.epoch, 1);
     CHECK(order(&c, "extrude", TOP ",\"distance_m\":0.03"));
     CHECK_TEXT(c.last[PAL_CONTROL_ANSWER].answer.verb, "extrude");

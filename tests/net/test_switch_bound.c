@@ -3,9 +3,9 @@
  * both settings allow, and the answer says so. Estimates of errors under a press hold what they promise. The carry is
  * made beside the loop, not by it. */
 #include "server/estimate/estimate_work.h"
-#include "server/session/switching.h"
-#include "tests/net/order_room.h"
-#include "tests/session/small_scene.h"
+#include "server/session/configuration_switch.h"
+#include "tests/net/command_room.h"
+#include "tests/session/session_scene.h"
 
 static const double press_m[3] = {0, 0, 0.055};
 enum { POINTS = 3, STEPS = 100, FINE = 11 };
@@ -130,7 +130,7 @@ static void every_pair_keeps_the_errors_shown(void)
         wait_steps(&c, 20, true);
     }
     /* the loop, which is this thread, has carried none of them */
-    CHECK_INT((int)pal_switch_carried_here(), 0);
+    CHECK_INT((int)pal_configuration_switch_transfer_count(), 0);
     mem_end(&c);
     end();
 }

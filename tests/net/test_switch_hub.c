@@ -1,8 +1,8 @@
 /* Other settings over the wire: points of a study and knobs, asked for by clients on mem:// of a real session that
  * runs; the topology that comes of them, answers, refusals, tools that stay with their holders; before and after
  * sculpting. */
-#include "tests/net/order_room.h"
-#include "tests/session/clay.h"
+#include "tests/net/command_room.h"
+#include "tests/session/sculpt_body.h"
 
 static clay_scene clay;
 enum { POINTS = 3 };
@@ -40,7 +40,7 @@ static void two_clients_see_a_point_of_the_study(void)
     CHECK_INT(part(&a)->epoch, 2);
     CHECK_TEXT(part(&b)->asset, part(&a)->asset);
     CHECK(strcmp(part(&a)->asset, before) != 0);
-    CHECK(!part(&a)->sculpts);
+    CHECK(!part(&a)->is_sculptable);
     CHECK_INT(b.n_text[PAL_CONTROL_ANSWER], 0);
     CHECK(strstr(a.last[PAL_CONTROL_ANSWER].answer.text, "fem hex8_bbar") != NULL);
     /* nothing has pushed it: what energy it has is rounding */
@@ -54,7 +54,7 @@ static void two_clients_see_a_point_of_the_study(void)
     CHECK(order(&a, "point", "\"index\":2"));
     for (int i = 0; i < 20000 && b.n_text[PAL_CONTROL_TOPOLOGY] < 3; i++) turn(&a, &b);
     until_frame(&a), until_frame(&b);
-    CHECK(part(&a)->sculpts);
+    CHECK(part(&a)->is_sculptable);
     CHECK_INT(part(&b)->epoch, 4);
     CHECK(order(&a, "divide", TOP));
     CHECK(told(&a, "cells") > 8);

@@ -3,8 +3,8 @@
 #include "protocol/control.h"
 #include "protocol/frame_codec.h"
 #include "server/net/server.h"
+#include "tests/net/hub_scene.h"
 #include "tests/net/raw_client.h"
-#include "tests/net/small_scene.h"
 
 #include <pthread.h>
 

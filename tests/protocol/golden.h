@@ -5,9 +5,9 @@
 #define TESTS_PROTOCOL_GOLDEN_H
 #include "protocol/control.h"
 #include "protocol/field_codec.h"
-#include "protocol/patch_codec.h"
+#include "protocol/topology_delta_codec.h"
 #include "protocol/wire.h"
-#include "tests/protocol/shapes.h"
+#include "tests/protocol/frame_shapes.h"
 
 #include <stdio.h>
 
@@ -37,7 +37,7 @@ static inline pal_wire_pose golden_pose(void)
                            .force_N = {-1, 2, -3.3f},
                            .torque_N_m = {0.001f, 0.002f, -0.004f},
                            .grip = 0.77f,
-                           .buttons = PAL_WIRE_GRAB,
+                           .buttons = PAL_WIRE_GRASP,
                            .model_seq = 99,
                            .model_age_us = 16667,
                            .model_stamp_us = 9007199254740991};
@@ -84,21 +84,21 @@ static inline pal_wire_haptic golden_haptic(void)
                          .grasp_x0_m = {0.01f, 0.02f, 0.03f},
                          .grasp_f0_N = {1, 2, 3},
                          .grasp_k_N_m = {100, 1, 2, 110, 3, 120},
-                         .grip_b_N_s_m = 1.5f};
+                         .grasp_b_N_s_m = 1.5f};
     for (uint32_t i = 0; i < h.n_patch; i++) {
         float k = (float)(i + 1);
-        h.patch[i] = (pal_wire_patch){.id = (uint16_t)(1000 + i),
-                                      .group = (uint16_t)(65535 - i),
-                                      .p_m = {0.001f * k, 0.002f, -0.003f},
-                                      .n = {0, 0.6f, 0.8f},
-                                      .v_m_s = {-0.01f, 0.02f * k, 0.03f},
-                                      .k1_N_m = 300 * k,
-                                      .k2_N_m2 = 5000,
-                                      .b_N_s_m = 2.5f,
-                                      .kt_N_m = 150,
-                                      .mu_s = 0.4f,
-                                      .mu_d = 0.3f,
-                                      .radius_m = 0.02f};
+        h.patch[i] = (pal_wire_contact_patch){.id = (uint16_t)(1000 + i),
+                                              .group = (uint16_t)(65535 - i),
+                                              .p_m = {0.001f * k, 0.002f, -0.003f},
+                                              .n = {0, 0.6f, 0.8f},
+                                              .v_m_s = {-0.01f, 0.02f * k, 0.03f},
+                                              .k1_N_m = 300 * k,
+                                              .k2_N_m2 = 5000,
+                                              .b_N_s_m = 2.5f,
+                                              .kt_N_m = 150,
+                                              .mu_s = 0.4f,
+                                              .mu_d = 0.3f,
+                                              .radius_m = 0.02f};
     }
     return h;
 }
@@ -167,9 +167,10 @@ static const uint32_t golden_place[GOLDEN_PATCH_PLACES] = {0, 1, 5, 6, 7, 50, 51
 static const uint32_t golden_corner[GOLDEN_PATCH_PLACES][3] = {{0, 0, 0},    {3, 2, 1},    {55, 54, 0},  {0, 0, 0},
                                                                {17, 40, 23}, {23, 40, 41}, {41, 17, 23}, {55, 1, 30}};
 
-static inline pal_patch_head golden_patch(void)
+static inline pal_topology_delta_head golden_patch(void)
 {
-    return (pal_patch_head){.part = 2, .epoch = 5, .n_place = GOLDEN_PATCH_PLACES, .revision = 4503599627370497};
+    return (pal_topology_delta_head){
+        .part = 2, .epoch = 5, .n_place = GOLDEN_PATCH_PLACES, .revision = 4503599627370497};
 }
 
 /* lines of control.jsonl behind one of each type: what servers and clients of before did not say */
@@ -185,8 +186,8 @@ static inline pal_control_type golden_line_type(int line)
 static inline void golden_study(pal_wire_study *s)
 {
     *s = (pal_wire_study){"liver", 50 / 3.0, NAN, 2, {{.index = 0}}};
-    s->point[0] = (pal_wire_point){3, "tet_springs", "tet_springs, 8 voxels", 1.0 / 3, 0.0021, false};
-    s->point[1] = (pal_wire_point){250, "fem hex8_bbar", "fem \"hex8_bbar\", 16 voxels", 16.7, 4.5e-4, true};
+    s->point[0] = (pal_wire_study_point){3, "tet_springs", "tet_springs, 8 voxels", 1.0 / 3, 0.0021, false};
+    s->point[1] = (pal_wire_study_point){250, "fem hex8_bbar", "fem \"hex8_bbar\", 16 voxels", 16.7, 4.5e-4, true};
 }
 
 static inline void golden_estimate(pal_wire_estimate *e)
@@ -198,14 +199,14 @@ static inline void golden_estimate(pal_wire_estimate *e)
                              .time_s = 1.5,
                              .age_s = 0.25,
                              .ms = 16.25,
-                             .own_ms = 81.5,
+                             .estimate_ms = 81.5,
                              .max_m = 0.0125,
                              .error_m = 1e-3,
                              .discretisation_m = 7e-4,
                              .algebraic_m = 1e-9,
                              .time_m = 2e-4,
                              .model_m = 1e-4,
-                             .zz_percent = 12.5,
+                             .energy_error_percent = 12.5,
                              .locking = true,
                              .diag = "nearly incompressible",
                              .n_neighbour = 2};
@@ -217,7 +218,8 @@ static inline void golden_estimate(pal_wire_estimate *e)
 static inline void golden_no_estimate(pal_wire_estimate *e)
 {
     *e = (pal_wire_estimate){.body = "liver", .setting = "tet_springs", .point = NAN, .ms = NAN, .max_m = NAN};
-    e->age_s = e->error_m = e->discretisation_m = e->algebraic_m = e->time_m = e->model_m = e->zz_percent = NAN;
+    e->age_s = e->error_m = e->discretisation_m = e->algebraic_m = e->time_m = e->model_m = e->energy_error_percent =
+        NAN;
 }
 
 static inline void golden_control(pal_control_type type, pal_control *c)
@@ -242,7 +244,7 @@ static inline void golden_control(pal_control_type type, pal_control *c)
                                       .step_ms = 0.41,
                                       .n_row = 3,
                                       .row_ms = {0.001, 1.0 / 3, 0.03},
-                                      .n_row_name = 3,
+                                      .n_component_name = 3,
                                       .row = {"gravity", "verlet", "field_output"},
                                       .n_member = 2,
                                       .bytes_s = 312000,
@@ -258,13 +260,13 @@ static inline void golden_control(pal_control_type type, pal_control *c)
         c->members.member[1] = (pal_wire_member){65535, PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE, 0x0080FF, "Bo"};
         break;
     case PAL_CONTROL_ERROR:
-        c->problem = (pal_wire_problem){"tool_taken", "tool 0 is held by Ada"};
+        c->problem = (pal_wire_error){"tool_taken", "tool 0 is held by Ada"};
         break;
     case PAL_CONTROL_JOIN:
         c->join = (pal_wire_join){"Grace", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY, false};
         break;
     case PAL_CONTROL_COMMAND:
-        c->order = (pal_wire_order){"material", "liver", 2, {{"young_Pa", 8000}, {"poisson", 0.45}}};
+        c->order = (pal_wire_command){"material", "liver", 2, {{"young_Pa", 8000}, {"poisson", 0.45}}};
         break;
     case PAL_CONTROL_ANSWER:
         c->answer = (pal_wire_answer){"extrude", "28 cells", 2, {{"cells", 28}, {"can_undo", 1}}};
@@ -280,7 +282,7 @@ static inline void golden_control(pal_control_type type, pal_control *c)
         c->tool = 2;
         break;
     case PAL_CONTROL_VIEW:
-        c->view = (pal_wire_view){1, "von_mises"};
+        c->view = (pal_wire_field_subscription){1, "von_mises"};
         break;
     case PAL_CONTROL_PING:
     case PAL_CONTROL_PONG:
@@ -293,48 +295,50 @@ static inline void golden_control(pal_control_type type, pal_control *c)
 
 /* what came with settings, rescues and switches of rows */
 static inline void golden_rows(uint32_t n, uint32_t *n_part, double *part, uint32_t *n_why,
-                               char (*reason)[PAL_WIRE_WHY_BYTES])
+                               char (*reason)[PAL_WIRE_REASON_BYTES])
 {
     *n_part = *n_why = n;
     for (uint32_t i = 0; i < n; i++) {
         part[i] = (double)i - 1;
-        snprintf(reason[i], PAL_WIRE_WHY_BYTES, "bodies[0].model \"fem\" %u", i);
+        snprintf(reason[i], PAL_WIRE_REASON_BYTES, "bodies[0].model \"fem\" %u", i);
     }
 }
 
 static inline void golden_status(pal_wire_status *s)
 {
-    s->n_row_part = 3;
-    s->row_part[0] = -1;
-    s->row_part[2] = 15;
+    s->n_component_part = 3;
+    s->component_part[0] = -1;
+    s->component_part[2] = 15;
     s->n_state = 2;
     s->state[0] = (pal_wire_part_state){0, true, false, "node 512 moves at 3,200 m/s", 17, 0.25};
     s->state[1] = (pal_wire_part_state){2, false, true, "", 0, 0};
     s->n_off = 1;
-    s->off[0] = (pal_wire_off){"gravity", 1};
-    s->n_unwatched = 123456789012;
+    s->off[0] = (pal_wire_disabled){"gravity", 1};
+    s->n_unobserved = 123456789012;
 }
 
 static inline void golden_line(int line, pal_control *c)
 {
     golden_control(golden_line_type(line), c);
     if (line == PAL_CONTROL_COUNT) golden_accuracy(&c->hello);
-    if (line == PAL_CONTROL_COUNT + 1) c->hello.part[1].adapts = true;
+    if (line == PAL_CONTROL_COUNT + 1) c->hello.part[1].is_adaptive = true;
     if (line == PAL_CONTROL_COUNT + 2) {
         c->status.n_active = 2;
         c->status.active[0] = (pal_wire_active){0, 133, 385, 450, 1344};
         c->status.active[1] = (pal_wire_active){3, 188, 558, 746, 2232};
     }
     if (line == PAL_CONTROL_COUNT + 3) c->join.patches = true;
-    if (line == PAL_CONTROL_COUNT + 4) c->hello.part[0].sculpts = true;
+    if (line == PAL_CONTROL_COUNT + 4) c->hello.part[0].is_sculptable = true;
     if (line == PAL_CONTROL_COUNT + 5) {
         c->hello.estimates = true;
-        golden_rows(3, &c->hello.n_row_part, c->hello.row_part, &c->hello.n_row_why, c->hello.row_why);
+        golden_rows(3, &c->hello.n_component_part, c->hello.component_part, &c->hello.n_component_reason,
+                    c->hello.component_reason);
     }
     if (line == PAL_CONTROL_COUNT + 6) {
         c->topology.n_row = 2;
         for (int i = 0; i < 2; i++) snprintf(c->topology.row[i], PAL_WIRE_NAME_BYTES, i ? "verlet" : "edge_distance");
-        golden_rows(2, &c->topology.n_row_part, c->topology.row_part, &c->topology.n_row_why, c->topology.row_why);
+        golden_rows(2, &c->topology.n_component_part, c->topology.component_part, &c->topology.n_component_reason,
+                    c->topology.component_reason);
     }
     if (line == PAL_CONTROL_COUNT + 7) golden_status(&c->status);
     if (line == PAL_CONTROL_COUNT + 8) golden_study(&c->study);

@@ -1,7 +1,7 @@
 /* Writes an asset and one frame of every motion at 0.05 mm for the measurement of the viewer's decoder:
  * make_frames FOLDER [FINENESS]; fineness 70 gives 29,402 vertices. See bench_decoder.mjs. */
 #include "protocol/frame_codec.h"
-#include "tests/protocol/shapes.h"
+#include "tests/protocol/frame_shapes.h"
 
 #include <stdio.h>
 
@@ -30,7 +30,7 @@ int main(int argc, char **argv)
                 !pal_asset_encode(s.rest_m, order, s.triangle, s.n_triangle, &bytes, &n_byte) &&
                 save(argv[1], "asset.bin", bytes, n_byte) && !pal_frame_encoder_create(s.rest_m, order, &e);
     for (int motion = 0; motion < MOTION_COUNT && good; motion++) {
-        const pal_frame_given given = {.error_m = 5e-5, .position_m = position};
+        const pal_frame_input given = {.error_m = 5e-5, .position_m = position};
         pal_frame_result result;
         shape_move(&s, (shape_motion)motion, 40, position);
         good = !pal_frame_put(e, &given, frame, pal_frame_bound(s.n_vertex), &result) &&

@@ -4,8 +4,8 @@
 #include "protocol/asset.h"
 #include "protocol/control.h"
 #include "protocol/frame_codec.h"
+#include "tests/protocol/frame_shapes.h"
 #include "tests/protocol/golden.h"
-#include "tests/protocol/shapes.h"
 
 #include <stdio.h>
 
@@ -106,9 +106,9 @@ static void make_haptic(void)
     floats("x0", h.grasp_x0_m, 3, ",");
     floats("f0", h.grasp_f0_N, 3, ",");
     floats("k", h.grasp_k_N_m, 6, ",");
-    fprintf(expected, "\"b\":%.9g},\"patches\":[\n", (double)h.grip_b_N_s_m);
+    fprintf(expected, "\"b\":%.9g},\"patches\":[\n", (double)h.grasp_b_N_s_m);
     for (uint32_t i = 0; i < h.n_patch; i++) {
-        const pal_wire_patch *p = &h.patch[i];
+        const pal_wire_contact_patch *p = &h.patch[i];
         fprintf(expected, "%s{\"id\":%u,\"group\":%u,", i ? ",\n" : "", p->id, p->group);
         floats("p", p->p_m, 3, ",");
         floats("n", p->n, 3, ",");
@@ -142,16 +142,17 @@ static void make_field(void)
 /* relative to the table of the golden asset, then that table as it results */
 static void make_patch(const pal_asset *asset)
 {
-    static uint8_t work[PAL_PATCH_WORK_BYTES(1024)], bytes[4096];
+    static uint8_t work[PAL_TOPOLOGY_DELTA_WORK_BYTES(1024)], bytes[4096];
     size_t n_corner = 3 * (size_t)asset->n_triangle, n = 0;
     uint32_t *table = malloc(n_corner * sizeof *table), *again = malloc(n_corner * sizeof *again);
     memcpy(table, asset->triangle, n_corner * sizeof *table);
     memcpy(again, asset->triangle, n_corner * sizeof *again);
     for (int i = 0; i < GOLDEN_PATCH_PLACES; i++)
         memcpy(table + 3 * (size_t)golden_place[i], golden_corner[i], sizeof golden_corner[i]);
-    pal_patch_head head = golden_patch();
-    need(!pal_patch_put(golden_place, table, &head, work, bytes, sizeof bytes, &n), "patch");
-    need(!pal_patch_get(bytes, n, asset->n_triangle, asset->order->n_vertex, work, &head, again), "patch back");
+    pal_topology_delta_head head = golden_patch();
+    need(!pal_topology_delta_put(golden_place, table, &head, work, bytes, sizeof bytes, &n), "patch");
+    need(!pal_topology_delta_get(bytes, n, asset->n_triangle, asset->order->n_vertex, work, &head, again),
+         "patch back");
     need(!memcmp(table, again, n_corner * sizeof *table), "patched table");
     save("patch.bin", bytes, n);
     fprintf(expected, "\"patch\":{\"part\":%u,\"epoch\":%u,\"revision\":%llu,\"n\":%u,\"places\":[", head.part,
@@ -183,7 +184,7 @@ static void make_frame(const pal_asset *asset, pal_frame_encoder *e, int index, 
         p[1] = 0.6f * x + 0.8f * y - 0.25f;
         p[2] += 0.125f;
     }
-    const pal_frame_given g = {2,
+    const pal_frame_input g = {2,
                                5,
                                100 + (uint32_t)index,
                                7000,

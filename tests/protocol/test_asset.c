@@ -2,7 +2,7 @@
 #include "protocol/asset.h"
 #include "protocol/frame_codec.h"
 #include "tests/check.h"
-#include "tests/protocol/shapes.h"
+#include "tests/protocol/frame_shapes.h"
 
 typedef struct packed {
     shape s;

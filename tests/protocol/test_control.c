@@ -135,15 +135,15 @@ static void reads_messages_of_before_fields(void)
         "\"skipped\":0,\"late\":0,\"refused\":0}";
     CHECK_INT(pal_control_get(hello, sizeof hello - 1, true, &c), 0);
     CHECK_INT(c.hello.part[0].n_field, 0);
-    CHECK(!c.hello.part[0].adapts);
+    CHECK(!c.hello.part[0].is_adaptive);
     CHECK_TEXT(c.hello.accuracy, "");
     CHECK_INT(pal_control_get(status, sizeof status - 1, true, &c), 0);
-    CHECK_INT(c.status.n_row_name, 0);
+    CHECK_INT(c.status.n_component_name, 0);
     CHECK_INT(c.status.n_active, 0);
     CHECK_INT(c.status.n_state, 0);
     CHECK_INT(c.status.n_off, 0);
-    CHECK_INT(c.status.n_row_part, 0);
-    CHECK(c.status.n_unwatched == 0);
+    CHECK_INT(c.status.n_component_part, 0);
+    CHECK(c.status.n_unobserved == 0);
     static const char topology[] = "{\"type\":\"topology\",\"parts\":[]}";
     CHECK_INT(pal_control_get(topology, sizeof topology - 1, true, &c), 0);
     CHECK_INT(c.topology.n_row, 0);
@@ -160,9 +160,9 @@ static void what_is_not_known_is_not_written(void)
     CHECK(!strstr(text, "error_m") && !strstr(text, "nan") && strstr(text, "\"own_ms\":0"));
     REQUIRE(pal_control_get(text, n, true, &c) == 0);
     CHECK(isnan(c.estimate.error_m) && isnan(c.estimate.model_m) && isnan(c.estimate.point));
-    estimate.estimate.own_ms = NAN;
+    estimate.estimate.estimate_ms = NAN;
     CHECK_INT(pal_control_put(text, sizeof text, &estimate, &n), PAL_REFUSAL_NAN);
-    estimate.estimate.own_ms = 0;
+    estimate.estimate.estimate_ms = 0;
     estimate.estimate.error_m = INFINITY;
     CHECK_INT(pal_control_put(text, sizeof text, &estimate, &n), PAL_REFUSAL_NAN);
     estimate.estimate.error_m = 0; /* known to be none: another thing than not known */
@@ -237,15 +237,17 @@ static void largest_messages_fit_their_limit(void)
     memset(full.hello.accuracy, '"', PAL_WIRE_TEXT_BYTES - 1);
     full.hello.n_part = PAL_WIRE_PART_MAX;
     full.hello.n_tool = PAL_WIRE_TOOL_MAX;
-    full.hello.n_row = PAL_WIRE_ROW_MAX;
+    full.hello.n_row = PAL_WIRE_COMPONENT_MAX;
     golden_parts(full.hello.part, PAL_WIRE_PART_MAX);
-    for (int i = 0; i < PAL_WIRE_ROW_MAX; i++) memset(full.hello.row[i], 'r', PAL_WIRE_NAME_BYTES - 1);
-    full.hello.n_row_part = full.hello.n_row_why = full.hello.n_row_fixed = PAL_WIRE_ROW_MAX;
-    for (int i = 0; i < PAL_WIRE_ROW_MAX; i++) memset(full.hello.row_why[i], '"', PAL_WIRE_WHY_BYTES - 1);
+    for (int i = 0; i < PAL_WIRE_COMPONENT_MAX; i++) memset(full.hello.row[i], 'r', PAL_WIRE_NAME_BYTES - 1);
+    full.hello.n_component_part = full.hello.n_component_reason = full.hello.n_component_required =
+        PAL_WIRE_COMPONENT_MAX;
+    for (int i = 0; i < PAL_WIRE_COMPONENT_MAX; i++)
+        memset(full.hello.component_reason[i], '"', PAL_WIRE_REASON_BYTES - 1);
     for (int i = 0; i < PAL_WIRE_TOOL_MAX; i++) memset(full.hello.tool[i].name, '\\', PAL_WIRE_NAME_BYTES - 1);
     CHECK_INT(pal_control_put(text, sizeof text, &full, &n), 0);
     CHECK_INT(pal_control_get(text, n, true, &again), 0);
-    CHECK_INT(again.hello.n_row, PAL_WIRE_ROW_MAX);
+    CHECK_INT(again.hello.n_row, PAL_WIRE_COMPONENT_MAX);
     CHECK_TEXT(again.hello.tool[31].name, full.hello.tool[31].name);
 
     memset(&full, 0, sizeof full);
@@ -253,23 +255,23 @@ static void largest_messages_fit_their_limit(void)
     full.status.n_active = PAL_WIRE_PART_MAX;
     for (uint32_t i = 0; i < PAL_WIRE_PART_MAX; i++)
         full.status.active[i] = (pal_wire_active){i, UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX};
-    full.status.n_row = full.status.n_row_name = PAL_WIRE_ROW_MAX;
-    for (int i = 0; i < PAL_WIRE_ROW_MAX; i++) {
+    full.status.n_row = full.status.n_component_name = PAL_WIRE_COMPONENT_MAX;
+    for (int i = 0; i < PAL_WIRE_COMPONENT_MAX; i++) {
         full.status.row_ms[i] = 1 / 3.0;
         memset(full.status.row[i], '"', PAL_WIRE_NAME_BYTES - 1);
         memset(full.status.off[i].row, '"', PAL_WIRE_NAME_BYTES - 1);
-        full.status.row_part[i] = -1;
+        full.status.component_part[i] = -1;
     }
-    full.status.n_row_part = full.status.n_off = PAL_WIRE_ROW_MAX;
+    full.status.n_component_part = full.status.n_off = PAL_WIRE_COMPONENT_MAX;
     full.status.n_state = PAL_WIRE_PART_MAX;
     for (uint32_t i = 0; i < PAL_WIRE_PART_MAX; i++) {
         full.status.state[i] = (pal_wire_part_state){i, true, true, "", 9007199254740991, 1 / 3.0};
-        memset(full.status.state[i].reason, '"', PAL_WIRE_WHY_BYTES - 1);
+        memset(full.status.state[i].reason, '"', PAL_WIRE_REASON_BYTES - 1);
     }
     CHECK_INT(pal_control_put(text, sizeof text, &full, &n), 0);
     CHECK_INT(pal_control_get(text, n, true, &again), 0);
     CHECK(again.status.n_active == PAL_WIRE_PART_MAX && again.status.active[15].n_finest_spring == UINT32_MAX);
-    CHECK(again.status.n_state == PAL_WIRE_PART_MAX && again.status.state[15].n_rescue == 9007199254740991);
+    CHECK(again.status.n_state == PAL_WIRE_PART_MAX && again.status.state[15].n_safeguard == 9007199254740991);
 }
 
 static void the_largest_study_fits_its_limit(void)
@@ -280,7 +282,7 @@ static void the_largest_study_fits_its_limit(void)
     full.type = PAL_CONTROL_STUDY;
     full.study.n_point = PAL_WIRE_POINT_MAX, full.study.reference_m = 1e-7 / 3;
     for (uint32_t i = 0; i < PAL_WIRE_POINT_MAX; i++) {
-        full.study.point[i] = (pal_wire_point){UINT32_MAX, "", "", 100 / 3.0, 1e-7 / 3, true};
+        full.study.point[i] = (pal_wire_study_point){UINT32_MAX, "", "", 100 / 3.0, 1e-7 / 3, true};
         memset(full.study.point[i].label, '"', PAL_WIRE_LABEL_BYTES - 1);
         memset(full.study.point[i].method, '"', PAL_WIRE_METHOD_BYTES - 1);
     }
@@ -300,7 +302,7 @@ static void writer_refuses_what_the_reader_would(void)
     c.status.rtt_ms = NAN;
     CHECK_INT(pal_control_put(text, sizeof text, &c, &n), PAL_REFUSAL_NAN);
     golden_control(PAL_CONTROL_STATUS, &c);
-    c.status.n_row = PAL_WIRE_ROW_MAX + 1;
+    c.status.n_row = PAL_WIRE_COMPONENT_MAX + 1;
     CHECK_INT(pal_control_put(text, sizeof text, &c, &n), PAL_REFUSAL_RANGE);
     golden_control(PAL_CONTROL_ERROR, &c);
     memset(c.problem.text, 'x', sizeof c.problem.text);

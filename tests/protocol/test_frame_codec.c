@@ -2,7 +2,7 @@
 #include "protocol/asset.h"
 #include "protocol/frame_codec.h"
 #include "tests/check.h"
-#include "tests/protocol/shapes.h"
+#include "tests/protocol/frame_shapes.h"
 
 typedef struct rig { /* a surface with encoder and decoder */
     shape s;
@@ -50,9 +50,9 @@ static double largest_error(const rig *r)
     return most;
 }
 
-static pal_frame_given given_of(const rig *r, double error_m)
+static pal_frame_input given_of(const rig *r, double error_m)
 {
-    return (pal_frame_given){.part = 1,
+    return (pal_frame_input){.part = 1,
                              .epoch = 3,
                              .seq = 7,
                              .cycle = 9,
@@ -67,7 +67,7 @@ static void error_stays_within_its_bound_in_every_frame(void)
     rig r;
     REQUIRE(rig_create(&r, 24));
     for (size_t b = 0; b < 3; b++) {
-        pal_frame_given given = given_of(&r, bound[b]);
+        pal_frame_input given = given_of(&r, bound[b]);
         for (int motion = 0; motion < MOTION_COUNT; motion++) {
             for (int k = 0; k < 25; k++) {
                 pal_frame_result result;
@@ -89,7 +89,7 @@ static void live_deformation_costs_less_than_half_a_byte_per_vertex(void)
     static const double most[MOTION_COUNT] = {0.01, 0.25, 0.3, 0.45, 0.1, 0, 0, 0};
     rig r;
     REQUIRE(rig_create(&r, 70));
-    pal_frame_given given = given_of(&r, 5e-5);
+    pal_frame_input given = given_of(&r, 5e-5);
     for (int motion = 0; motion < MOTION_TELEPORT; motion++) {
         double n_byte = 0;
         for (int k = 0; k < 10; k++) {
@@ -120,7 +120,7 @@ static void hidden_vertices_may_stand_anywhere_and_the_bound_holds_for_the_other
     uint64_t random = 3;
     REQUIRE(rig_create(&r, 16));
     uint8_t *hidden = malloc(r.s.n_vertex);
-    pal_frame_given given = given_of(&r, 5e-5);
+    pal_frame_input given = given_of(&r, 5e-5);
     given.hidden = hidden;
     for (int motion = 0; motion < MOTION_COUNT; motion++)
         for (int k = 0; k < 12; k++) {
@@ -157,7 +157,7 @@ static void a_move_of_hidden_vertices_alone_is_no_change(void)
     rig r;
     REQUIRE(rig_create(&r, 8));
     uint8_t *hidden = calloc(r.s.n_vertex, 1);
-    pal_frame_given given = given_of(&r, 5e-5);
+    pal_frame_input given = given_of(&r, 5e-5);
     pal_frame_result result;
     given.hidden = hidden;
     hidden[5] = hidden[77] = 1;
@@ -198,7 +198,7 @@ static void chains_of_hidden_extrapolations_stay_in_range(void)
     given_m[0] = -1;
     given_m[3] = 1;
     REQUIRE(bytes && !pal_frame_encoder_create(rest, &order, &e) && !pal_frame_decoder_create(&asset, &d));
-    const pal_frame_given given = {.error_m = 1e-6, .position_m = given_m, .hidden = hidden};
+    const pal_frame_input given = {.error_m = 1e-6, .position_m = given_m, .hidden = hidden};
     REQUIRE(pal_frame_put(e, &given, bytes, pal_frame_bound(N), &result) == 0);
     CHECK_INT(pal_frame_get(d, bytes, result.n_byte, &head, shown), 0);
     CHECK_NEAR((double)shown[3], 1, result.error_m);
@@ -222,7 +222,7 @@ static void families_predict_what_is_linear_on_coarse_triangles(void)
     pal_frame_head head;
     float *given_m = malloc(3 * (size_t)n * sizeof(float)), *shown = malloc(3 * (size_t)n * sizeof(float));
     uint8_t *bytes = malloc(pal_frame_bound(n)), *hidden = calloc(n, 1);
-    REQUIRE(!pal_frame_order_families(f.fine.rest_m, n, f.n_coarse, f.parent, s.triangle, s.n_triangle, &order));
+    REQUIRE(!pal_frame_order_hierarchy(f.fine.rest_m, n, f.n_coarse, f.parent, s.triangle, s.n_triangle, &order));
     const pal_asset asset = {0, f.fine.rest_m, NULL, order};
     REQUIRE(!pal_frame_encoder_create(f.fine.rest_m, order, &e) && !pal_frame_decoder_create(&asset, &d));
     shape_move(&s, MOTION_BEND, 30, given_m);
@@ -231,7 +231,7 @@ static void families_predict_what_is_linear_on_coarse_triangles(void)
         for (size_t c = 0; c < 3; c++)
             given_m[3 * (size_t)i + c] = 0.5f * (given_m[3 * (size_t)p[0] + c] + given_m[3 * (size_t)p[1] + c]);
     }
-    pal_frame_given given = {.error_m = 5e-5, .position_m = given_m};
+    pal_frame_input given = {.error_m = 5e-5, .position_m = given_m};
     REQUIRE(pal_frame_put(e, &given, bytes, pal_frame_bound(n), &seen) == 0);
     for (uint32_t i = f.n_coarse; i < n; i++) hidden[i] = 1;
     given.hidden = hidden;
@@ -259,7 +259,7 @@ static void any_frame_serves_a_client_that_joins(void)
 {
     rig r;
     REQUIRE(rig_create(&r, 12));
-    pal_frame_given given = given_of(&r, 5e-5);
+    pal_frame_input given = given_of(&r, 5e-5);
     for (int k = 0; k < 40; k++) {
         pal_frame_result result;
         pal_frame_head head;
@@ -279,7 +279,7 @@ static void part_at_rest_is_reported_unchanged(void)
     rig r;
     pal_frame_result result;
     REQUIRE(rig_create(&r, 12));
-    pal_frame_given given = given_of(&r, 5e-5);
+    pal_frame_input given = given_of(&r, 5e-5);
     static const struct {
         int frame;
         bool changed;
@@ -306,7 +306,7 @@ static void refuses_positions_that_are_none_and_goes_on(void)
     pal_frame_result result;
     pal_frame_head head;
     REQUIRE(rig_create(&r, 12));
-    pal_frame_given given = given_of(&r, 5e-5);
+    pal_frame_input given = given_of(&r, 5e-5);
     shape_move(&r.s, MOTION_BEND, 9, r.given);
     REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0);
     size_t n_byte = result.n_byte;
@@ -340,7 +340,7 @@ static void raises_the_step_for_far_jumps_and_says_so(void)
     pal_frame_result result;
     pal_frame_head head;
     REQUIRE(rig_create(&r, 12));
-    pal_frame_given given = given_of(&r, 1e-6);
+    pal_frame_input given = given_of(&r, 1e-6);
     for (double jump = 0.001; jump < 1e5; jump *= 7) {
         for (size_t i = 0; i < 3 * (size_t)r.s.n_vertex; i++)
             r.given[i] = r.s.rest_m[i] + (float)(i % 5 == 0 ? jump : -jump);
@@ -361,7 +361,7 @@ static void affine_map_carries_large_motion(void)
     pal_frame_result result;
     pal_frame_head head;
     REQUIRE(rig_create(&r, 24));
-    pal_frame_given given = given_of(&r, 5e-5);
+    pal_frame_input given = given_of(&r, 5e-5);
     shape_move(&r.s, MOTION_BUMP, 9, r.given);
     REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0);
     size_t still = result.n_byte;
@@ -402,7 +402,7 @@ static void tiny_and_loose_meshes_stay_within_the_bound(void)
             pal_frame_result result;
             pal_frame_head head;
             for (size_t i = 0; i < 3 * n; i++) given_m[i] = rest[i] + 0.05f * (float)shape_random(&random);
-            const pal_frame_given given = {.error_m = 5e-5, .position_m = given_m};
+            const pal_frame_input given = {.error_m = 5e-5, .position_m = given_m};
             REQUIRE(pal_frame_put(e, &given, bytes, sizeof bytes, &result) == 0);
             REQUIRE(pal_frame_get(d, bytes, result.n_byte, &head, shown) == 0);
             for (size_t i = 0; i < 3 * n; i++) CHECK_LE(fabs((double)given_m[i] - (double)shown[i]), 5e-5);
@@ -430,7 +430,7 @@ static void refuses_every_prefix_and_survives_every_changed_byte(void)
     rig r;
     REQUIRE(rig_create(&r, 5));
     for (int motion = MOTION_BUMP; motion < MOTION_COUNT; motion++) {
-        pal_frame_given given = given_of(&r, 5e-5);
+        pal_frame_input given = given_of(&r, 5e-5);
         pal_frame_result result;
         if (motion == MOTION_BEND) given.affine = turn;
         shape_move(&r.s, (shape_motion)motion, 11, r.given);
@@ -460,7 +460,7 @@ static void refuses_lying_heads(void)
     rig r;
     pal_frame_result result;
     REQUIRE(rig_create(&r, 5));
-    pal_frame_given given = given_of(&r, 5e-5);
+    pal_frame_input given = given_of(&r, 5e-5);
     shape_move(&r.s, MOTION_BEND, 11, r.given);
     static const struct {
         size_t at;
@@ -495,7 +495,7 @@ static void refuses_blocks_that_expand_to_another_length(void)
     uint8_t bytes[400] = {0};
     pal_frame_result result;
     REQUIRE(rig_create(&r, 5));
-    pal_frame_given given = given_of(&r, 5e-5);
+    pal_frame_input given = given_of(&r, 5e-5);
     shape_move(&r.s, MOTION_REST, 0, r.given);
     REQUIRE(pal_frame_put(r.e, &given, r.bytes, r.cap, &result) == 0);
     /* a match of 255 bytes for each byte of the block: far more than the stated length */

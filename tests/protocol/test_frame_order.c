@@ -1,7 +1,7 @@
 /* Vertex order and predictor: valid for any surface, exact where it should be, refused where it is not. */
 #include "protocol/frame_order.h"
 #include "tests/check.h"
-#include "tests/protocol/shapes.h"
+#include "tests/protocol/frame_shapes.h"
 
 /* what a decoder trusts, and that each vertex is in a level behind those of its neighbours */
 static pal_frame_order *checked(pal_frame_order *o, uint32_t n)
@@ -134,7 +134,7 @@ static void midpoints_follow_the_coarse_order_as_the_mean_of_their_parents(void)
     const uint32_t n = f.fine.n_vertex;
     pal_frame_order *coarse = made(s.rest_m, s.n_vertex, s.triangle, s.n_triangle), *o = NULL;
     REQUIRE(coarse && s.n_vertex == f.n_coarse);
-    REQUIRE(pal_frame_order_families(f.fine.rest_m, n, f.n_coarse, f.parent, s.triangle, s.n_triangle, &o) == 0);
+    REQUIRE(pal_frame_order_hierarchy(f.fine.rest_m, n, f.n_coarse, f.parent, s.triangle, s.n_triangle, &o) == 0);
     checked(o, n);
     CHECK_INT(o->n_level, coarse->n_level + 3);
     CHECK(memcmp(o->vertex_of, coarse->vertex_of, f.n_coarse * sizeof *o->vertex_of) == 0);
@@ -149,7 +149,7 @@ static void midpoints_follow_the_coarse_order_as_the_mean_of_their_parents(void)
     CHECK_INT(wrong, 0);
     pal_frame_order_destroy(o);
     /* nothing but coarse vertices is the ordinary order */
-    REQUIRE(pal_frame_order_families(s.rest_m, s.n_vertex, s.n_vertex, NULL, s.triangle, s.n_triangle, &o) == 0);
+    REQUIRE(pal_frame_order_hierarchy(s.rest_m, s.n_vertex, s.n_vertex, NULL, s.triangle, s.n_triangle, &o) == 0);
     checked(o, s.n_vertex);
     CHECK_INT(o->n_level, coarse->n_level);
     pal_frame_order_destroy(o);
@@ -157,14 +157,15 @@ static void midpoints_follow_the_coarse_order_as_the_mean_of_their_parents(void)
     /* what is no family */
     o = NULL;
     f.parent[1] = f.n_coarse;
-    CHECK_INT(pal_frame_order_families(f.fine.rest_m, n, f.n_coarse, f.parent, s.triangle, s.n_triangle, &o),
+    CHECK_INT(pal_frame_order_hierarchy(f.fine.rest_m, n, f.n_coarse, f.parent, s.triangle, s.n_triangle, &o),
               PAL_REFUSAL_RANGE);
-    CHECK_INT(pal_frame_order_families(f.fine.rest_m, n, n + 1, f.parent, s.triangle, s.n_triangle, &o),
+    CHECK_INT(pal_frame_order_hierarchy(f.fine.rest_m, n, n + 1, f.parent, s.triangle, s.n_triangle, &o),
               PAL_REFUSAL_COUNT);
-    CHECK_INT(pal_frame_order_families(f.fine.rest_m, n, 0, f.parent, s.triangle, s.n_triangle, &o), PAL_REFUSAL_COUNT);
+    CHECK_INT(pal_frame_order_hierarchy(f.fine.rest_m, n, 0, f.parent, s.triangle, s.n_triangle, &o),
+              PAL_REFUSAL_COUNT);
     f.parent[1] = 0;
     f.fine.rest_m[3 * (size_t)n - 1] = NAN;
-    CHECK_INT(pal_frame_order_families(f.fine.rest_m, n, f.n_coarse, f.parent, s.triangle, s.n_triangle, &o),
+    CHECK_INT(pal_frame_order_hierarchy(f.fine.rest_m, n, f.n_coarse, f.parent, s.triangle, s.n_triangle, &o),
               PAL_REFUSAL_NAN);
     CHECK(o == NULL);
     free(f.parent);

@@ -122,7 +122,7 @@ static void haptic_model_is_read_and_written_as_committed(void)
     CHECK_NEAR(h.frame_us, number(e, "frameUs"), 0);
     for (int c = 0; c < 3; c++) CHECK_NEAR(h.origin_m[c], element(e, "origin", c), 0);
     for (int c = 0; c < 6; c++) CHECK_NEAR((double)h.grasp_k_N_m[c], element(grip, "k", c), 1e-6);
-    CHECK_NEAR((double)h.grip_b_N_s_m, number(grip, "b"), 1e-8);
+    CHECK_NEAR((double)h.grasp_b_N_s_m, number(grip, "b"), 1e-8);
     for (int i = 0; i < (int)h.n_patch; i++) {
         const cJSON *patch = cJSON_GetArrayItem(cJSON_GetObjectItem(e, "patches"), i);
         CHECK_NEAR(h.patch[i].id, number(patch, "id"), 0);
@@ -165,13 +165,14 @@ static void field_is_read_and_written_as_committed(void)
 
 static void patch_is_read_and_written_as_committed(void)
 {
-    static uint8_t work[PAL_PATCH_WORK_BYTES(1024)], again[4096];
+    static uint8_t work[PAL_TOPOLOGY_DELTA_WORK_BYTES(1024)], again[4096];
     size_t n = 0, n_asset = 0, n_again = 0;
     uint8_t *bytes = load("patch.bin", &n), *file = load("asset.bin", &n_asset);
     pal_asset *asset = NULL;
-    pal_patch_head h, wanted = golden_patch();
+    pal_topology_delta_head h, wanted = golden_patch();
     REQUIRE(bytes && file && pal_asset_decode(file, n_asset, &asset) == 0);
-    REQUIRE(pal_patch_get(bytes, n, asset->n_triangle, asset->order->n_vertex, work, &h, asset->triangle) == 0);
+    REQUIRE(pal_topology_delta_get(bytes, n, asset->n_triangle, asset->order->n_vertex, work, &h, asset->triangle) ==
+            0);
     const cJSON *e = cJSON_GetObjectItem(expected, "patch");
     CHECK_NEAR(h.part, number(e, "part"), 0);
     CHECK_NEAR(h.epoch, number(e, "epoch"), 0);
@@ -179,7 +180,7 @@ static void patch_is_read_and_written_as_committed(void)
     CHECK_INT(h.n_place, number(e, "n"));
     for (int i = 0; i < GOLDEN_PATCH_PLACES; i++) CHECK_INT(golden_place[i], element(e, "places", i));
     for (int i = 0; i < 3 * (int)asset->n_triangle; i++) CHECK_INT(asset->triangle[i], element(e, "triangles", i));
-    CHECK_INT(pal_patch_put(golden_place, asset->triangle, &wanted, work, again, sizeof again, &n_again), 0);
+    CHECK_INT(pal_topology_delta_put(golden_place, asset->triangle, &wanted, work, again, sizeof again, &n_again), 0);
     CHECK_INT(n_again, n);
     CHECK(memcmp(again, bytes, n) == 0);
     pal_asset_destroy(asset);
@@ -250,14 +251,14 @@ static void control_lines_are_read_and_written_as_committed(void)
         CHECK_INT(pal_control_get(line, strlen(line), kind < PAL_CONTROL_JOIN, &c), 0);
         CHECK_INT(c.type, kind);
         if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.accuracy[0] != 0, at == PAL_CONTROL_COUNT);
-        if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.part[1].adapts, at == PAL_CONTROL_COUNT + 1);
-        if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.part[0].sculpts, at == PAL_CONTROL_COUNT + 4);
+        if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.part[1].is_adaptive, at == PAL_CONTROL_COUNT + 1);
+        if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.part[0].is_sculptable, at == PAL_CONTROL_COUNT + 4);
         if (kind == PAL_CONTROL_STATUS) CHECK_INT(c.status.n_active, at == PAL_CONTROL_COUNT + 2 ? 2 : 0);
         if (kind == PAL_CONTROL_JOIN) CHECK_INT(c.join.patches, at == PAL_CONTROL_COUNT + 3);
         if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.estimates, at == PAL_CONTROL_COUNT + 5);
-        if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.n_row_part, at == PAL_CONTROL_COUNT + 5 ? 3 : 0);
-        if (kind == PAL_CONTROL_TOPOLOGY) CHECK_INT(c.topology.n_row_why, at == PAL_CONTROL_COUNT + 6 ? 2 : 0);
-        if (kind == PAL_CONTROL_STATUS) CHECK_INT(c.status.state[0].n_rescue, at == PAL_CONTROL_COUNT + 7 ? 17 : 0);
+        if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.n_component_part, at == PAL_CONTROL_COUNT + 5 ? 3 : 0);
+        if (kind == PAL_CONTROL_TOPOLOGY) CHECK_INT(c.topology.n_component_reason, at == PAL_CONTROL_COUNT + 6 ? 2 : 0);
+        if (kind == PAL_CONTROL_STATUS) CHECK_INT(c.status.state[0].n_safeguard, at == PAL_CONTROL_COUNT + 7 ? 17 : 0);
         if (kind == PAL_CONTROL_STATUS) CHECK_INT(c.status.n_off, at == PAL_CONTROL_COUNT + 7);
         if (kind == PAL_CONTROL_STUDY) CHECK_INT(c.study.point[1].front, at == PAL_CONTROL_COUNT + 8);
         if (kind == PAL_CONTROL_ESTIMATE) CHECK_INT(isnan(c.estimate.error_m), at != PAL_CONTROL_COUNT + 9);

@@ -160,7 +160,7 @@ static void refuses_contact_patches_that_are_not_passive(void)
     uint8_t bytes[PAL_WIRE_HAPTIC_MAX];
     pal_wire_haptic h, out;
     float *const number[] = {&h.patch[1].k1_N_m, &h.patch[1].b_N_s_m, &h.patch[1].kt_N_m,   &h.patch[1].mu_s,
-                             &h.patch[1].mu_d,   &h.patch[1].n[1],    &h.patch[1].radius_m, &h.grip_b_N_s_m};
+                             &h.patch[1].mu_d,   &h.patch[1].n[1],    &h.patch[1].radius_m, &h.grasp_b_N_s_m};
     for (int i = 0; i < 8; i++) {
         h = golden_haptic();
         size_t n = pal_wire_put_haptic(bytes, sizeof bytes, &h);
@@ -197,7 +197,7 @@ static void refuses_lying_counts(void)
     CHECK_INT(read(bytes, n), PAL_REFUSAL_COUNT);
 
     static pal_wire_tools many = {.n_tool = PAL_WIRE_TOOL_MAX + 1};
-    pal_wire_haptic patches = {.n_patch = PAL_WIRE_PATCH_MAX + 1};
+    pal_wire_haptic patches = {.n_patch = PAL_WIRE_CONTACT_PATCH_MAX + 1};
     CHECK_INT(pal_wire_put_tools(bytes, sizeof bytes, &many), 0);
     CHECK_INT(pal_wire_put_haptic(bytes, sizeof bytes, &patches), 0);
 }

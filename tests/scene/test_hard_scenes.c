@@ -131,7 +131,7 @@ static void levels_do_not_flicker_at_the_threshold(void)
 {
     hard_scene s;
     REQUIRE(open_scene("threshold", &s));
-    const pal_adaptive_surface *adaptive = s.body->adaptive;
+    const pal_adaptive_surface *adaptive = s.body->model.adaptive;
     const int n = adaptive->levels.first_face[adaptive->levels.n_level];
     uint8_t *was = malloc((size_t)n);
     int *switched = calloc((size_t)n, sizeof *switched), most = 0, top = 0, nodes = 0;

@@ -1,6 +1,7 @@
 /* The problems of deploy/problems: every one can be read, its surface is closed, looks outward and holds the volume
  * that its geometry has on paper, and its loads meet as much of the surface as the file says. */
 #include "server/base/vec3.h"
+#include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/problem_file.h"
 #include "tests/check.h"

@@ -2,7 +2,7 @@
  * the sentence of every fault. */
 #include "server/scene/scene_file.h"
 #include "tests/check.h"
-#include "tests/session/small_scene.h"
+#include "tests/session/session_scene.h"
 
 static char folder[] = "/tmp/palpate_regions_XXXXXX";
 static pal_scene plain;

@@ -3,7 +3,7 @@
 #include "server/sim/core/effect.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
-#include "tests/session/small_scene.h"
+#include "tests/session/session_scene.h"
 
 #include <sys/stat.h>
 

@@ -226,7 +226,7 @@ static void a_stomach_is_held_at_both_ends_with_the_midpoints_between(void)
     pal_world *world = world_of(&loaded->scene);
     REQUIRE(world != NULL);
     const pal_body *body = pal_world_body(world, 0);
-    const pal_levels *levels = &body->adaptive->levels;
+    const pal_levels *levels = &body->model.adaptive->levels;
     CHECK_INT(n_held(body, PAL_STOMACH_VERTEX), 2 * (PAL_STOMACH_RING + 1));
     for (int k = 0; k < PAL_STOMACH_RING; k++) CHECK(body->fixed[s.oesophagus[k]] && body->fixed[s.duodenum[k]]);
     CHECK(body->fixed[s.oesophagus_cap] && body->fixed[s.duodenum_cap]);
@@ -343,7 +343,7 @@ static void every_key_of_the_model_arrives(void)
     REQUIRE(write_text("x.obj", tube));
     CHECK_TEXT(try_text(text, &loaded, &world), "");
     REQUIRE(world != NULL);
-    const pal_adaptive_surface *surface = pal_world_body(world, 0)->adaptive;
+    const pal_adaptive_surface *surface = pal_world_body(world, 0)->model.adaptive;
     CHECK_INT(surface->levels.n_level, 3);
     CHECK_INT(surface->options.start_level, 1);
     CHECK_NEAR(surface->options.mass_kg, 0.25, 0);

@@ -319,7 +319,7 @@ static void a_scene_of_cells_steps(void)
     for (int i = 0; i < body->n_dof; i++) n_held += body->fixed[i];
     CHECK_INT(body->n_dof, 36);
     CHECK_INT(n_held, 9);
-    CHECK_INT(pal_cell_elements_count(&body->solid->elements), 96);
+    CHECK_INT(pal_cell_elements_count(&body->model.solid->elements), 96);
     for (int k = 0; k < 10; k++) CHECK_INT(pal_world_step(world, 0.01), 0);
     CHECK(pal_body_finite(body));
     /* gravity is on by default */

@@ -74,20 +74,20 @@ static void a_tool_has_one_holder(void)
     pal_members_init(&list, 2);
     int ann = join(PAL_MEMBER_TRAINEE, "Ann"), bob = join(PAL_MEMBER_INSTRUCTOR, "Bob"),
         eve = join(PAL_MEMBER_TRAINEE, "Eve"), tool = -9;
-    CHECK_INT(pal_members_take(&list, ann, 1, &tool), PAL_ERR_OK);
+    CHECK_INT(pal_members_take_tool(&list, ann, 1, &tool), PAL_ERR_OK);
     CHECK_INT(tool, 1);
-    CHECK_INT(pal_members_take(&list, bob, 1, &tool), PAL_ERR_STATE);
-    CHECK_INT(pal_members_take(&list, bob, -1, &tool), PAL_ERR_OK);
+    CHECK_INT(pal_members_take_tool(&list, bob, 1, &tool), PAL_ERR_STATE);
+    CHECK_INT(pal_members_take_tool(&list, bob, -1, &tool), PAL_ERR_OK);
     CHECK_INT(tool, 0);
-    CHECK_INT(pal_members_take(&list, eve, -1, &tool), PAL_ERR_STATE);
-    CHECK_INT(pal_members_take(&list, ann, -1, &tool), PAL_ERR_OK); /* keeps the one held */
+    CHECK_INT(pal_members_take_tool(&list, eve, -1, &tool), PAL_ERR_STATE);
+    CHECK_INT(pal_members_take_tool(&list, ann, -1, &tool), PAL_ERR_OK); /* keeps the one held */
     CHECK_INT(tool, 1);
     pal_members_leave(&list, bob);
-    CHECK_INT(pal_members_take(&list, ann, 0, &tool), PAL_ERR_OK); /* gives back 1 */
+    CHECK_INT(pal_members_take_tool(&list, ann, 0, &tool), PAL_ERR_OK); /* gives back 1 */
     CHECK_INT(list.holder[0], ann);
     CHECK_INT(list.holder[1], 0);
-    pal_members_give_back(&list, ann);
-    pal_members_give_back(&list, ann);
+    pal_members_release_tool(&list, ann);
+    pal_members_release_tool(&list, ann);
     CHECK_INT(list.holder[0], 0);
     CHECK_INT(pal_members_find(&list, ann)->tool, -1);
 }
@@ -96,10 +96,10 @@ static void viewers_hold_nothing_and_command_nothing(void)
 {
     pal_members_init(&list, 2);
     int vic = join(PAL_MEMBER_VIEWER, "Vic"), ann = join(PAL_MEMBER_TRAINEE, "Ann"), tool = 4;
-    CHECK_INT(pal_members_take(&list, vic, -1, &tool), PAL_ERR_REFUSED);
-    CHECK_INT(pal_members_take(&list, ann, 2, &tool), PAL_ERR_REFUSED);
-    CHECK_INT(pal_members_take(&list, ann, -2, &tool), PAL_ERR_REFUSED);
-    CHECK_INT(pal_members_take(&list, 99, 0, &tool), PAL_ERR_REFUSED);
+    CHECK_INT(pal_members_take_tool(&list, vic, -1, &tool), PAL_ERR_REFUSED);
+    CHECK_INT(pal_members_take_tool(&list, ann, 2, &tool), PAL_ERR_REFUSED);
+    CHECK_INT(pal_members_take_tool(&list, ann, -2, &tool), PAL_ERR_REFUSED);
+    CHECK_INT(pal_members_take_tool(&list, 99, 0, &tool), PAL_ERR_REFUSED);
     CHECK_INT(tool, 4);
     CHECK(!pal_members_may_command(&list, vic));
     CHECK(!pal_members_may_command(&list, 0));

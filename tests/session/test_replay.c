@@ -4,7 +4,7 @@
 #include "server/session/input_log.h"
 #include "server/session/replay.h"
 #include "tests/check.h"
-#include "tests/session/small_scene.h"
+#include "tests/session/session_scene.h"
 
 #include <stddef.h>
 #include <sys/stat.h>
@@ -62,7 +62,8 @@ static bool record(void)
         if (seq == 96) pal_session_put_pose(s, 1, NULL);
         if (seq == 130) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_BRUSH, .slot = 1, .brush = lift});
         if (seq == 100 || seq == 120)
-            pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_ROW, .row = "gravity", .wanted = seq == 120});
+            pal_session_command(s,
+                                &(pal_command){.kind = PAL_COMMAND_COMPONENT, .row = "gravity", .wanted = seq == 120});
         if (seq == 140) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_BRUSH, .slot = 1});
         if (seq < 150) tick = 0;
     }
@@ -231,7 +232,7 @@ static void records_survive_the_round_trip_bit_by_bit(void)
          .index = 1,
          .step = 1ull << 40,
          .pose = {{0.1, -0.0, 5e-324}, {0.5, 0.5, -0.5, 0.5}, {1e300, -1, 3}, 0xdeadbeef, 77, 0}},
-        {.kind = PAL_INPUT_LET_GO, .step = 1ull << 40},
+        {.kind = PAL_INPUT_RELEASE, .step = 1ull << 40},
         {.kind = PAL_INPUT_RESET, .step = 1ull << 41},
         {.kind = PAL_INPUT_MATERIAL, .step = 1ull << 41, .material = {1234.5, 0.3, 999, 0.25}},
         {.kind = PAL_INPUT_BRUSH,
@@ -239,8 +240,8 @@ static void records_survive_the_round_trip_bit_by_bit(void)
          .step = 1ull << 42,
          .slot = 5,
          .brush = {PAL_BRUSH_CURVE, {1, 2, 3}, {4, 5, -0.0}, 0.1, 0.5, -7e200, {1e-300, 8, 9}, 10}},
-        {.kind = PAL_INPUT_ROW, .index = 2, .step = 1ull << 43, .wanted = true, .row = "tet_volume"},
-        {.kind = PAL_INPUT_ROW, .step = 1ull << 44, .row = "gravity"},
+        {.kind = PAL_INPUT_COMPONENT, .index = 2, .step = 1ull << 43, .wanted = true, .row = "tet_volume"},
+        {.kind = PAL_INPUT_COMPONENT, .step = 1ull << 44, .row = "gravity"},
         {.kind = PAL_INPUT_HASH, .step = 1ull << 63, .hash = 0xfedcba9876543210u}};
     const int n_in = sizeof in / sizeof in[0];
     for (int k = 0; k < n_in; k++) pal_input_log_put(log, &in[k]);

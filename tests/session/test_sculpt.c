@@ -3,7 +3,7 @@
 #include "server/num/random.h"
 #include "server/session/sculpt.h"
 #include "server/sim/subdivision/subdivision_solid.h"
-#include "tests/session/clay.h"
+#include "tests/session/sculpt_body.h"
 
 static clay_scene clay;
 static pal_diagnostic diag;
@@ -31,7 +31,7 @@ static uint64_t print_of(const pal_scene *scene, pal_world *world)
 /* the scene that runs, its world, and who made it */
 typedef struct studio {
     pal_sculptor *sculptor;
-    pal_sculpt_turn *turn; /* NULL: the scene of the start */
+    pal_sculpt_edit *turn; /* NULL: the scene of the start */
     const pal_scene *scene;
     pal_world *world;
 } studio;
@@ -48,26 +48,26 @@ static void studio_close(studio *s)
 {
     pal_world_destroy(s->world);
     pal_sculptor_destroy(s->sculptor);
-    pal_sculpt_free(s->turn);
+    pal_sculpt_edit_free(s->turn);
 }
 
 /* as the hub does it */
 static pal_err studio_do(studio *s, const pal_sculpt *command)
 {
-    pal_sculpt_turn *turn = NULL;
+    pal_sculpt_edit *turn = NULL;
     pal_world *next = NULL;
     diag.text[0] = 0;
     pal_err err = pal_sculptor_prepare(s->sculptor, s->scene, command, &diag, &turn);
-    if (!err) err = pal_world_create(pal_sculpt_scene(turn), &diag, &next);
+    if (!err) err = pal_world_create(pal_sculpt_edit_scene(turn), &diag, &next);
     if (err) {
-        pal_sculpt_free(turn);
+        pal_sculpt_edit_free(turn);
         return err;
     }
-    pal_sculpt_carry(turn, next, s->world);
-    pal_sculptor_accept(s->sculptor, turn);
+    pal_sculpt_transfer(turn, next, s->world);
+    pal_sculptor_commit(s->sculptor, turn);
     pal_world_destroy(s->world);
-    pal_sculpt_free(s->turn);
-    s->turn = turn, s->world = next, s->scene = pal_sculpt_scene(turn);
+    pal_sculpt_edit_free(s->turn);
+    s->turn = turn, s->world = next, s->scene = pal_sculpt_edit_scene(turn);
     return PAL_ERR_OK;
 }
 
@@ -168,7 +168,7 @@ static void lasting_loads_stay_by_place(void)
 static void a_material_set_while_an_edit_is_made_is_kept(void)
 {
     studio s;
-    pal_sculpt_turn *turn = NULL;
+    pal_sculpt_edit *turn = NULL;
     pal_world *next = NULL, *stiff = NULL;
     const pal_stroke stroke = {{0.05, 0.05, 0.05}, 0.04, 0.5, 2, 3};
     REQUIRE(studio_open(&s));
@@ -177,13 +177,13 @@ static void a_material_set_while_an_edit_is_made_is_kept(void)
     CHECK_INT(pal_sculptor_prepare(s.sculptor, s.scene, &(pal_sculpt){.kind = PAL_SCULPT_PAINT, .stroke = stroke},
                                    &diag, &turn),
               0);
-    CHECK_INT(pal_world_create(pal_sculpt_scene(turn), &diag, &next), 0);
+    CHECK_INT(pal_world_create(pal_sculpt_edit_scene(turn), &diag, &next), 0);
     /* now the slider moves */
-    *scene = *pal_sculpt_scene(turn);
+    *scene = *pal_sculpt_edit_scene(turn);
     scene->body[0].material.young_Pa *= 8, scene->body[0].material.density_kg_m3 *= 2;
     CHECK_INT(pal_world_material(s.world, 0, &scene->body[0].material, &diag), 0);
     CHECK_INT(pal_world_create(scene, &diag, &stiff), 0);
-    pal_sculpt_carry(turn, next, s.world);
+    pal_sculpt_transfer(turn, next, s.world);
     pal_body *a = pal_world_body(next, 0), *b = pal_world_body(stiff, 0);
     for (int i = 0; i < a->n_dof; i++) a->v[3 * i] = b->v[3 * i] = a->x_rest[3 * i + 2];
     for (int k = 0; k < 5; k++) {
@@ -199,7 +199,7 @@ static void a_material_set_while_an_edit_is_made_is_kept(void)
     CHECK_LE(off, 1e-6 * way);
     pal_world_destroy(next);
     pal_world_destroy(stiff);
-    pal_sculpt_free(turn);
+    pal_sculpt_edit_free(turn);
     free(scene);
     studio_close(&s);
 }
@@ -225,7 +225,7 @@ static void undo_and_redo_bring_back_every_bit(void)
     for (int k = 3; k >= 0; k--) {
         CHECK_INT(turn_back(&s, PAL_SCULPT_UNDO), 0);
         CHECK(print_of(s.scene, s.world) == print[k]);
-        CHECK_INT(pal_sculptor_past(s.sculptor), k);
+        CHECK_INT(pal_sculptor_undo_count(s.sculptor), k);
     }
     CHECK(pal_cells_equal(pal_sculptor_cells(s.sculptor), &clay.cells));
     CHECK_INT(turn_back(&s, PAL_SCULPT_UNDO), PAL_ERR_REFUSED);
@@ -238,7 +238,7 @@ static void undo_and_redo_bring_back_every_bit(void)
     /* another command makes another future */
     CHECK_INT(turn_back(&s, PAL_SCULPT_UNDO), 0);
     CHECK_INT(studio_do(&s, &(pal_sculpt){.kind = PAL_SCULPT_PAINT, .stroke = stroke}), 0);
-    CHECK_INT(pal_sculptor_future(s.sculptor), 0);
+    CHECK_INT(pal_sculptor_redo_count(s.sculptor), 0);
     studio_close(&s);
 }
 
@@ -254,8 +254,9 @@ static void a_shape_that_is_kept_rests_where_it_is(void)
     int n = body->n_dof;
     double *x = malloc(3 * sizeof *x * (size_t)n);
     memcpy(x, body->x, 3 * sizeof *x * (size_t)n);
-    CHECK_INT(studio_do(&s, &(pal_sculpt){.kind = PAL_SCULPT_KEEP, .point_m = x, .n_point = n - 1}), PAL_ERR_REFUSED);
-    CHECK_INT(studio_do(&s, &(pal_sculpt){.kind = PAL_SCULPT_KEEP, .point_m = x, .n_point = n}), 0);
+    CHECK_INT(studio_do(&s, &(pal_sculpt){.kind = PAL_SCULPT_SET_REST, .point_m = x, .n_point = n - 1}),
+              PAL_ERR_REFUSED);
+    CHECK_INT(studio_do(&s, &(pal_sculpt){.kind = PAL_SCULPT_SET_REST, .point_m = x, .n_point = n}), 0);
     body = pal_world_body(s.world, 0);
     CHECK(!memcmp(body->x_rest, x, 3 * sizeof *x * (size_t)n));
     CHECK_LE(pal_world_energy_J(s.world), 1e-16);
@@ -265,7 +266,7 @@ static void a_shape_that_is_kept_rests_where_it_is(void)
     CHECK_LE(most, 1e-12);
     /* and what is folded cannot be kept */
     for (int i = 0; i < n; i++) x[3 * i + 2] = -x[3 * i + 2];
-    CHECK_INT(studio_do(&s, &(pal_sculpt){.kind = PAL_SCULPT_KEEP, .point_m = x, .n_point = n}), PAL_ERR_REFUSED);
+    CHECK_INT(studio_do(&s, &(pal_sculpt){.kind = PAL_SCULPT_SET_REST, .point_m = x, .n_point = n}), PAL_ERR_REFUSED);
     CHECK(strstr(diag.text, "control cell 0"));
     free(x);
     studio_close(&s);
@@ -275,14 +276,14 @@ static void paint_makes_heavier_and_stiffer_where_it_is(void)
 {
     studio s;
     REQUIRE(studio_open(&s));
-    double kg = pal_subdivision_solid_mass_kg(pal_world_body(s.world, 0)->solid);
-    double litre = pal_subdivision_solid_volume_m3(pal_world_body(s.world, 0)->solid);
+    double kg = pal_subdivision_solid_mass_kg(pal_world_body(s.world, 0)->model.solid);
+    double litre = pal_subdivision_solid_volume_m3(pal_world_body(s.world, 0)->model.solid);
     CHECK_NEAR(kg, 1000 * litre, 1e-9 * kg);
     /* a hard brush over all of it */
     pal_stroke all = {{0, 0, 0}, 1, 0, 2, 5};
     CHECK_INT(studio_do(&s, &(pal_sculpt){.kind = PAL_SCULPT_PAINT, .stroke = all}), 0);
-    CHECK_NEAR(pal_subdivision_solid_mass_kg(pal_world_body(s.world, 0)->solid), 5 * kg, 1e-6 * kg);
-    CHECK_NEAR(pal_world_body(s.world, 0)->solid->samples[PAL_CELL_HEX].young_Pa[17], 10000, 1e-2);
+    CHECK_NEAR(pal_subdivision_solid_mass_kg(pal_world_body(s.world, 0)->model.solid), 5 * kg, 1e-6 * kg);
+    CHECK_NEAR(pal_world_body(s.world, 0)->model.solid->samples[PAL_CELL_HEX].young_Pa[17], 10000, 1e-2);
     static const struct {
         pal_stroke stroke;
         const char *says;
@@ -293,7 +294,7 @@ static void paint_makes_heavier_and_stiffer_where_it_is(void)
         CHECK_INT(studio_do(&s, &(pal_sculpt){.kind = PAL_SCULPT_PAINT, .stroke = bad[i].stroke}), PAL_ERR_REFUSED);
         if (!strstr(diag.text, bad[i].says)) CHECK_FAIL("\"%s\" does not name %s", diag.text, bad[i].says);
     }
-    CHECK_INT(pal_sculptor_past(s.sculptor), 1);
+    CHECK_INT(pal_sculptor_undo_count(s.sculptor), 1);
     studio_close(&s);
 }
 
@@ -345,7 +346,7 @@ static pal_sculpt any_command(const pal_sculptor *sculptor)
 /* what must hold after every command that was taken */
 static void check_solid(const studio *s)
 {
-    const pal_subdivision_solid *solid = pal_world_body(s->world, 0)->solid;
+    const pal_subdivision_solid *solid = pal_world_body(s->world, 0)->model.solid;
     const pal_body *body = pal_world_body(s->world, 0);
     if (pal_cells_check(pal_sculptor_cells(s->sculptor), NULL, &diag)) CHECK_FAIL("%s", diag.text);
     double kg = pal_subdivision_solid_mass_kg(solid), sum = 0;
@@ -371,10 +372,10 @@ static void five_thousand_commands_leave_a_solid_and_undo_the_start(void)
         steps(&s, 1 + n_round++ % 3);
         /* as many as can be undone, then all of them back */
         uint64_t start = print_of(s.scene, s.world);
-        int base = pal_sculptor_past(s.sculptor);
+        int base = pal_sculptor_undo_count(s.sculptor);
         for (int k = 0; k < 60 && !check_bad; k++) {
             pal_sculpt command = any_command(s.sculptor);
-            if (command.kind == PAL_SCULPT_UNDO && pal_sculptor_past(s.sculptor) <= base) continue;
+            if (command.kind == PAL_SCULPT_UNDO && pal_sculptor_undo_count(s.sculptor) <= base) continue;
             uint64_t before = print_of(s.scene, s.world);
             if (studio_do(&s, &command)) {
                 n_refused++;
@@ -385,7 +386,7 @@ static void five_thousand_commands_leave_a_solid_and_undo_the_start(void)
             n_done++;
             check_solid(&s);
         }
-        for (int guard = 0; pal_sculptor_past(s.sculptor) > base && guard < 70; guard++, n_done++) {
+        for (int guard = 0; pal_sculptor_undo_count(s.sculptor) > base && guard < 70; guard++, n_done++) {
             CHECK_INT(turn_back(&s, PAL_SCULPT_UNDO), 0);
             check_solid(&s);
         }

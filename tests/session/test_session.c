@@ -5,7 +5,7 @@
 #include "server/session/session.h"
 #include "tests/check.h"
 #include "tests/heap_calls.h"
-#include "tests/session/small_scene.h"
+#include "tests/session/session_scene.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
@@ -133,7 +133,7 @@ static void steps_follow_the_clock_and_time_is_ticks_times_step(void)
     CHECK(!f->paused);
     CHECK(f->n_substep >= 1);
     CHECK(f->slowdown > 0.5);
-    CHECK(pal_session_alive(s));
+    CHECK(pal_session_is_alive(s));
     pal_session_close(s);
 }
 
@@ -277,19 +277,19 @@ static void a_material_beyond_the_budget_is_refused_with_a_sentence(void)
     pal_diagnostic diag;
     pal_session *s = open_with((pal_session_options){0}, w);
     REQUIRE(s != NULL);
-    pal_session_last_note(s, &diag);
+    pal_session_last_diagnostic(s, &diag);
     CHECK_TEXT(diag.text, "");
     pal_command stiff = {.kind = PAL_COMMAND_MATERIAL, .material = {1e12, 0.45, 1000, 4}};
     CHECK_INT(pal_session_command(s, &stiff), 0);
     REQUIRE(frame_where(s, w, refused_at_least, 1) != NULL);
-    pal_session_last_note(s, &diag);
+    pal_session_last_diagnostic(s, &diag);
     CHECK(strstr(diag.text, "sub-steps") != NULL);
     pal_command softer = {.kind = PAL_COMMAND_MATERIAL, .material = {2500, 0.45, 1000, 4}};
     CHECK_INT(pal_session_command(s, &softer), 0);
     const pal_frame *f = next_frame(s, w);
     REQUIRE(f != NULL);
     REQUIRE(frame_where(s, w, tick_at_least, f->tick + 2) != NULL);
-    pal_session_last_note(s, &diag);
+    pal_session_last_diagnostic(s, &diag);
     CHECK_TEXT(diag.text, "");
     pal_session_close(s);
 }
@@ -394,8 +394,8 @@ static void *give_orders(void *user)
         pal_command command = {.kind = (pal_command_kind)(k % PAL_COMMAND_MATERIAL)};
         if (k % 32 == 0) command.kind = PAL_COMMAND_MATERIAL, command.material = scene.body[0].material;
         while (pal_session_command(c->session, &command) == PAL_ERR_FULL && !atomic_load(&c->stop)) usleep(500);
-        pal_session_last_note(c->session, &diag);
-        pal_session_alive(c->session);
+        pal_session_last_diagnostic(c->session, &diag);
+        pal_session_is_alive(c->session);
     }
     return NULL;
 }
@@ -447,7 +447,7 @@ static void another_session_goes_on_where_one_was(void)
     REQUIRE(f != NULL);
     uint64_t tick = f->tick;
     CHECK(pal_session_take_frame(next) == NULL);
-    CHECK_INT(pal_session_follow(next, before, carry_all, &hash, &diag), 0);
+    CHECK_INT(pal_session_transfer(next, before, carry_all, &hash, &diag), 0);
     CHECK(hash != 0);
     f = frame_where(next, w, used_seq, 7);
     REQUIRE(f != NULL);
@@ -486,16 +486,16 @@ static void rows_and_parts_are_known_to_every_thread(void)
     pal_component_info row;
     pal_shown shown;
     bool gravity = false;
-    for (int k = 0; k < pal_session_rows(s); k++) {
-        pal_session_row(s, k, &row);
+    for (int k = 0; k < pal_session_component_count(s); k++) {
+        pal_session_component_info(s, k, &row);
         gravity = gravity || !strcmp(row.name, "gravity");
         CHECK_INT(row.spent_ns, 0);
     }
     CHECK(gravity);
-    CHECK_INT(pal_session_parts(s), 1);
+    CHECK_INT(pal_session_part_count(s), 1);
     pal_session_shown(s, 0, &shown);
     CHECK_INT(shown.n_vertex, mesh.surface.n_vertex);
-    pal_session_row(s, 1000, &row);
+    pal_session_component_info(s, 1000, &row);
     CHECK_TEXT(row.name, "");
     pal_session_shown(s, -1, &shown);
     CHECK_INT(shown.n_vertex, 0);
@@ -518,9 +518,10 @@ static void a_field_is_there_while_anybody_looks(void)
     REQUIRE(f != NULL);
     int rows = f->n_row;
     CHECK(shows_displacement(f, 0));
-    CHECK_INT(rows, pal_session_rows(s));
-    CHECK(pal_session_gives(s, 0, PAL_FIELD_DISPLACEMENT_M) && !pal_session_gives(s, 0, PAL_FIELD_ENERGY_J_M3));
-    CHECK(!pal_session_gives(s, 1, PAL_FIELD_DISPLACEMENT_M) && !pal_session_gives(s, -1, PAL_FIELD_DISPLACEMENT_M));
+    CHECK_INT(rows, pal_session_component_count(s));
+    CHECK(pal_session_has_field(s, 0, PAL_FIELD_DISPLACEMENT_M) && !pal_session_has_field(s, 0, PAL_FIELD_ENERGY_J_M3));
+    CHECK(!pal_session_has_field(s, 1, PAL_FIELD_DISPLACEMENT_M) &&
+          !pal_session_has_field(s, -1, PAL_FIELD_DISPLACEMENT_M));
     CHECK_INT(look(s, PAL_FIELD_DISPLACEMENT_M, true), 0);
     f = frame_where(s, w, shows_displacement, 1);
     REQUIRE(f != NULL);
@@ -615,7 +616,7 @@ static void a_brush_that_cannot_be_is_refused_at_the_door_or_with_a_sentence(voi
     const pal_frame *f = next_frame(s, w);
     while (f && f->n_refused < 6) f = next_frame(s, w);
     pal_diagnostic diag;
-    pal_session_last_note(s, &diag);
+    pal_session_last_diagnostic(s, &diag);
     CHECK(strstr(diag.text, "has no brushes: it is shown by a skin") != NULL);
     pal_session_close(s);
 }

@@ -42,7 +42,7 @@ static inline void solid_kick(solid_scene *s, double speed_m_s, uint64_t seed)
 /* elements that are turned over or flat in their middle */
 static inline int solid_inverted(const solid_scene *s)
 {
-    const pal_subdivision_solid *solid = s->body->solid;
+    const pal_subdivision_solid *solid = s->body->model.solid;
     const double middle[3] = {0.5, 0.5, 0.5};
     int n = 0;
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {

@@ -2,7 +2,7 @@
  * press (sim/transfer.h). */
 #ifndef TESTS_STABILITY_SWITCH_PRESS_H
 #define TESTS_STABILITY_SWITCH_PRESS_H
-#include "tests/session/small_scene.h"
+#include "tests/session/session_scene.h"
 #include "tests/stability/switch_beam.h"
 
 static const pal_configuration list[] = {

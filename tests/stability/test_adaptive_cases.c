@@ -148,7 +148,7 @@ static void edges_without_length_open_again(void)
         shell_scene s;
         REQUIRE(take_sphere(&s, (run_kind)run));
         REQUIRE(shell_scene_start(&s));
-        const pal_adaptive_surface *adaptive = s.body->adaptive;
+        const pal_adaptive_surface *adaptive = s.body->model.adaptive;
         int n = 0;
         for (int k = 0; k < adaptive->n_spring; k += 5) {
             const int32_t *end = adaptive->levels.edge[adaptive->spring[k]].vertex;

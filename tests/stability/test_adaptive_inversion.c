@@ -54,7 +54,7 @@ static double not_rigid(const shell_scene *s)
 {
     pal_rigid_fit frame = {.quat = {1, 0, 0, 0}};
     double most = 0, at[3];
-    pal_adaptive_fit_rigid(s->body->adaptive, s->body, &frame);
+    pal_adaptive_fit_rigid(s->body->model.adaptive, s->body, &frame);
     for (int k = 0; k < s->body->n_active; k++) {
         const int i = pal_body_point(s->body, k);
         pal_sub3(at, s->body->x_rest + 3 * i, frame.rest_centre_m);
@@ -237,7 +237,7 @@ static int switch_support(shell_scene *s, const double low[3], const double high
         if (!in) continue;
         s->body->fixed[i] = on;
         if (on) pal_set3(s->body->v + 3 * i, 0, 0, 0);
-        n += pal_adaptive_has(s->body->adaptive, i);
+        n += pal_adaptive_has(s->body->model.adaptive, i);
     }
     pal_world_invalidate_limits(s->world, 0);
     return n;

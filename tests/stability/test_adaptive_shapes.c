@@ -221,7 +221,7 @@ static void whatever_can_be_split_is_borne(void)
             shell_scene s;
             take(&s, kind, other);
             REQUIRE(shell_scene_start(&s));
-            const double mass = s.body->adaptive->options.mass_kg;
+            const double mass = s.body->model.adaptive->options.mass_kg;
             seen a = handle(&s, mass);
             printf("  %s, %s: %d to %d nodes, mass off by %.1g\n", odd_of(kind).name,
                    other ? "paper's law" : "membrane", a.least, a.most, a.mass_off);

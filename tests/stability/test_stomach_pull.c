@@ -60,7 +60,7 @@ static double pull(shell_scene *s, uint64_t seed, double *way_m)
 {
     uint64_t count = 0;
     double dir[3], most = 0;
-    int v = 0, n = s->body->adaptive->levels.n_vertex[0];
+    int v = 0, n = s->body->model.adaptive->levels.n_vertex[0];
     do v = (int)(pal_random_unit(seed, count++) * n);
     while (s->body->fixed[v]);
     do

@@ -141,7 +141,7 @@ static void nothing_held_falls_and_statics_refuse(void)
         s.def->n_effect = 1;
         pal_entry_init(&s.def->effect[0], "effects[0]", "gravity");
         REQUIRE(solid_scene_open(&s));
-        const double whole = pal_subdivision_solid_mass_kg(s.body->solid);
+        const double whole = pal_subdivision_solid_mass_kg(s.body->model.solid);
         double p[3], l[3];
         REQUIRE(solid_scene_step(&s, 30, solid_step_s));
         solid_momentum(s.body, p, l);

@@ -2,7 +2,7 @@
  * elements on cut ones differ in mass, in how they are held and in where their nodes are. A ball under its weight that
  * a tool presses, at the first touch, while it moves and at rest: every pair of settings. --table prints what every
  * pair does. */
-#include "tests/session/small_scene.h"
+#include "tests/session/session_scene.h"
 #include "tests/stability/hard_case.h"
 #include "tests/stability/switch_beam.h"
 

@@ -219,10 +219,10 @@ static void how_much_is_refined_is_seen_of_other_levels(void)
     double ms;
     for (int i = 0; i < 5; i++)
         for (int told = 100; told < 5000; told += 2000) {
-            bool adapts = i == 1 || i == 3;
+            bool is_adaptive = i == 1 || i == 3;
             const pal_study_point *p = &s->point[i];
-            CHECK(pal_study_foresee_cost(s, &p->priced.setting, adapts ? told : p->n_node, 0,
-                                         adapts ? told / 100 : p->n_substep, 0, i, &ms));
+            CHECK(pal_study_foresee_cost(s, &p->priced.setting, is_adaptive ? told : p->n_node, 0,
+                                         is_adaptive ? told / 100 : p->n_substep, 0, i, &ms));
             CHECK_NEAR(ms / p->priced.ms, 1, 0.01);
         }
     s->point[3].err = PAL_ERR_FROZEN;

@@ -3,8 +3,14 @@
 import { lz4Decode } from "./lz4.js";
 import { VERTEX_MAX, WireError } from "./wire.js";
 
-const MAGIC = 0x314d4c50, VERSION = 1, HEAD_BYTES = 40, BYTES_MAX = 2 ** 28, TRIANGLE_MAX = 2 ** 24, LEVEL_MAX = 4096;
-const ONE = 4096, ABS_MAX = 8191;
+const MAGIC = 0x314d4c50,
+    VERSION = 1,
+    HEAD_BYTES = 40,
+    BYTES_MAX = 2 ** 28,
+    TRIANGLE_MAX = 2 ** 24,
+    LEVEL_MAX = 4096;
+const ONE = 4096,
+    ABS_MAX = 8191;
 
 /**
  * @typedef {{
@@ -16,14 +22,14 @@ const ONE = 4096, ABS_MAX = 8191;
 
 /** @param {boolean} good @param {string} code @param {string} text */
 function need(good, code, text) {
-  if (!good) throw new WireError(code, `asset: ${text}`);
+    if (!good) throw new WireError(code, `asset: ${text}`);
 }
 
 /** @param {Uint8Array} bytes */
 function fnv1a(bytes) {
-  let hash = 0x811c9dc5;
-  for (let i = 0; i < bytes.length; i++) hash = Math.imul(hash ^ bytes[i], 16777619);
-  return hash >>> 0;
+    let hash = 0x811c9dc5;
+    for (let i = 0; i < bytes.length; i++) hash = Math.imul(hash ^ bytes[i], 16777619);
+    return hash >>> 0;
 }
 
 /**
@@ -31,20 +37,26 @@ function fnv1a(bytes) {
  * @param {Uint8Array} bytes
  */
 function readHead(bytes) {
-  need(bytes.length >= HEAD_BYTES, "SHORT", "no header");
-  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-  const [magic, version, n, nTriangle, nLevel, nRaw, nLz4, sum, zero, zero2] = Array.from({ length: 10 }, (_, i) => view.getUint32(4 * i, true));
-  need(magic === MAGIC, "MAGIC", "does not begin with PLM1");
-  need(version === VERSION, "KIND", `version ${version}, this page reads ${VERSION}`);
-  need(zero === 0 && zero2 === 0, "FLAGS", "reserved fields");
-  need(n > 0 && n <= VERTEX_MAX && nTriangle <= TRIANGLE_MAX && nLevel > 0 && nLevel <= LEVEL_MAX && nLevel <= n, "COUNT", "counts");
-  need(40 * n + 12 * nTriangle + 4 * nLevel === nRaw && nRaw <= BYTES_MAX, "COUNT", "counts do not fit the length");
-  need(nLz4 <= bytes.length - HEAD_BYTES, "SHORT", "cut short");
-  need(nLz4 >= bytes.length - HEAD_BYTES, "LONG", "bytes behind the end");
-  need(Math.floor(nRaw / 255) <= nLz4, "COUNT", "states more than its bytes can hold");
-  const block = bytes.subarray(HEAD_BYTES);
-  need(fnv1a(block) === sum, "CHECKSUM", "checksum does not match");
-  return { n, nTriangle, nLevel, nRaw, block };
+    need(bytes.length >= HEAD_BYTES, "SHORT", "no header");
+    const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+    const [magic, version, n, nTriangle, nLevel, nRaw, nLz4, sum, zero, zero2] = Array.from({ length: 10 }, (_, i) =>
+        view.getUint32(4 * i, true),
+    );
+    need(magic === MAGIC, "MAGIC", "does not begin with PLM1");
+    need(version === VERSION, "KIND", `version ${version}, this page reads ${VERSION}`);
+    need(zero === 0 && zero2 === 0, "FLAGS", "reserved fields");
+    need(
+        n > 0 && n <= VERTEX_MAX && nTriangle <= TRIANGLE_MAX && nLevel > 0 && nLevel <= LEVEL_MAX && nLevel <= n,
+        "COUNT",
+        "counts",
+    );
+    need(40 * n + 12 * nTriangle + 4 * nLevel === nRaw && nRaw <= BYTES_MAX, "COUNT", "counts do not fit the length");
+    need(nLz4 <= bytes.length - HEAD_BYTES, "SHORT", "cut short");
+    need(nLz4 >= bytes.length - HEAD_BYTES, "LONG", "bytes behind the end");
+    need(Math.floor(nRaw / 255) <= nLz4, "COUNT", "states more than its bytes can hold");
+    const block = bytes.subarray(HEAD_BYTES);
+    need(fnv1a(block) === sum, "CHECKSUM", "checksum does not match");
+    return { n, nTriangle, nLevel, nRaw, block };
 }
 
 /**
@@ -52,9 +64,10 @@ function readHead(bytes) {
  * @param {Uint8Array} raw @param {number} at @param {number} n
  */
 export function planes(raw, at, n) {
-  const out = new Uint32Array(n);
-  for (let i = 0; i < n; i++) out[i] = raw[at + i] | (raw[at + n + i] << 8) | (raw[at + 2 * n + i] << 16) | (raw[at + 3 * n + i] << 24);
-  return out;
+    const out = new Uint32Array(n);
+    for (let i = 0; i < n; i++)
+        out[i] = raw[at + i] | (raw[at + n + i] << 8) | (raw[at + 2 * n + i] << 16) | (raw[at + 3 * n + i] << 24);
+    return out;
 }
 
 /** @param {number} v folded difference */
@@ -62,20 +75,26 @@ export const unfold = (v) => (v >>> 1) ^ -(v & 1);
 
 /** @param {Asset} asset @param {number} n */
 function check(asset, n) {
-  const { rest, triangles, vertexOf, neighbour, weight, levels } = asset;
-  need(rest.every(Number.isFinite), "NAN", "a rest position is not finite");
-  need(triangles.every((v) => v < n), "RANGE", "a triangle names no vertex");
-  need(levels[0] === 0 && levels.every((v, i) => (i === 0 || v > levels[i - 1]) && v < n), "ORDER", "levels");
-  const seen = new Uint8Array(n);
-  for (let i = 0; i < n; i++) {
-    let sum = 0, absolute = 0, good = vertexOf[i] < n && seen[vertexOf[i]]++ === 0;
-    for (let j = 4 * i; j < 4 * i + 4; j++) {
-      sum += weight[j];
-      absolute += Math.abs(weight[j]);
-      good &&= weight[j] ? neighbour[j] < i : neighbour[j] === 0;
+    const { rest, triangles, vertexOf, neighbour, weight, levels } = asset;
+    need(rest.every(Number.isFinite), "NAN", "a rest position is not finite");
+    need(
+        triangles.every((v) => v < n),
+        "RANGE",
+        "a triangle names no vertex",
+    );
+    need(levels[0] === 0 && levels.every((v, i) => (i === 0 || v > levels[i - 1]) && v < n), "ORDER", "levels");
+    const seen = new Uint8Array(n);
+    for (let i = 0; i < n; i++) {
+        let sum = 0,
+            absolute = 0,
+            good = vertexOf[i] < n && seen[vertexOf[i]]++ === 0;
+        for (let j = 4 * i; j < 4 * i + 4; j++) {
+            sum += weight[j];
+            absolute += Math.abs(weight[j]);
+            good &&= weight[j] ? neighbour[j] < i : neighbour[j] === 0;
+        }
+        need(good && (sum === ONE || absolute === 0) && absolute <= ABS_MAX, "ORDER", `vertex ${i} of the wire order`);
     }
-    need(good && (sum === ONE || absolute === 0) && absolute <= ABS_MAX, "ORDER", `vertex ${i} of the wire order`);
-  }
 }
 
 /**
@@ -83,25 +102,36 @@ function check(asset, n) {
  * @returns {Asset}
  */
 export function decodeAsset(bytes) {
-  const { n, nTriangle, nLevel, nRaw, block } = readHead(bytes);
-  const raw = new Uint8Array(nRaw);
-  lz4Decode(block, raw, 0, nRaw);
+    const { n, nTriangle, nLevel, nRaw, block } = readHead(bytes);
+    const raw = new Uint8Array(nRaw);
+    lz4Decode(block, raw, 0, nRaw);
 
-  const bits = new Uint32Array(3 * n), vertexOf = planes(raw, 12 * n, n), neighbour = new Uint32Array(4 * n), weight = new Int16Array(4 * n);
-  let at = 0;
-  for (let c = 0; c < 3; c++, at += 4 * n) planes(raw, at, n).forEach((v, i) => (bits[3 * i + c] = v));
-  for (let i = 0, before = 0; i < n; i++) before = vertexOf[i] = before + unfold(vertexOf[i]);
-  at += 4 * n;
-  for (let j = 0; j < 4; j++, at += 4 * n) {
-    const plane = planes(raw, at, n);
-    for (let i = 0; i < n; i++) neighbour[4 * i + j] = unfold(plane[i]) + (j ? neighbour[4 * i + j - 1] : i);
-  }
-  for (let j = 0; j < 4; j++, at += 2 * n) for (let i = 0; i < n; i++) weight[4 * i + j] = raw[at + i] | (raw[at + n + i] << 8);
-  const triangles = planes(raw, at, 3 * nTriangle);
-  for (let e = 0; e < 3 * nTriangle; e++) triangles[e] = unfold(triangles[e]) + (e < 3 ? 0 : triangles[e - 3]);
-  at += 12 * nTriangle;
+    const bits = new Uint32Array(3 * n),
+        vertexOf = planes(raw, 12 * n, n),
+        neighbour = new Uint32Array(4 * n),
+        weight = new Int16Array(4 * n);
+    let at = 0;
+    for (let c = 0; c < 3; c++, at += 4 * n) planes(raw, at, n).forEach((v, i) => (bits[3 * i + c] = v));
+    for (let i = 0, before = 0; i < n; i++) before = vertexOf[i] = before + unfold(vertexOf[i]);
+    at += 4 * n;
+    for (let j = 0; j < 4; j++, at += 4 * n) {
+        const plane = planes(raw, at, n);
+        for (let i = 0; i < n; i++) neighbour[4 * i + j] = unfold(plane[i]) + (j ? neighbour[4 * i + j - 1] : i);
+    }
+    for (let j = 0; j < 4; j++, at += 2 * n)
+        for (let i = 0; i < n; i++) weight[4 * i + j] = raw[at + i] | (raw[at + n + i] << 8);
+    const triangles = planes(raw, at, 3 * nTriangle);
+    for (let e = 0; e < 3 * nTriangle; e++) triangles[e] = unfold(triangles[e]) + (e < 3 ? 0 : triangles[e - 3]);
+    at += 12 * nTriangle;
 
-  const asset = { rest: new Float32Array(bits.buffer), triangles, vertexOf, neighbour, weight, levels: planes(raw, at, nLevel) };
-  check(asset, n);
-  return asset;
+    const asset = {
+        rest: new Float32Array(bits.buffer),
+        triangles,
+        vertexOf,
+        neighbour,
+        weight,
+        levels: planes(raw, at, nLevel),
+    };
+    check(asset, n);
+    return asset;
 }

@@ -4,11 +4,19 @@ import { KIND, PART_MAX, readHead, VERTEX_MAX, WireError } from "./wire.js";
 
 const HEAD_BYTES = 40;
 /** names by their number on the wire, as in `view` */
-export const FIELD_NAMES = Object.freeze(["none", "displacement", "von_mises", "energy", "stiffness", "strain", "distortion"]);
+export const FIELD_NAMES = Object.freeze([
+    "none",
+    "displacement",
+    "von_mises",
+    "energy",
+    "stiffness",
+    "strain",
+    "distortion",
+]);
 
 /** @param {boolean} good @param {string} code @param {string} text */
 function need(good, code, text) {
-  if (!good) throw new WireError(code, `field: ${text}`);
+    if (!good) throw new WireError(code, `field: ${text}`);
 }
 
 /**
@@ -21,19 +29,38 @@ function need(good, code, text) {
  * @returns {FieldHead}
  */
 export function readFieldHead(bytes) {
-  const head = readHead(bytes);
-  need(head.kind === KIND.FIELD, "KIND", `message kind ${head.kind}`);
-  need(head.flags === 0, "FLAGS", `flags ${head.flags}`);
-  need(bytes.length >= HEAD_BYTES, "SHORT", `${bytes.length} bytes`);
-  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-  const epoch = view.getUint32(8, true), field = view.getUint32(12, true), timeLow = view.getUint32(16, true), timeHigh = view.getUint32(20, true);
-  const low = view.getFloat32(24, true), high = view.getFloat32(28, true), n = view.getUint32(32, true), nLz4 = view.getUint32(36, true);
-  need(Number.isFinite(low) && Number.isFinite(high), "NAN", "range");
-  need(head.index < PART_MAX && field > 0 && field < FIELD_NAMES.length && timeHigh < 1 << 21 && low <= high, "RANGE", "part, kind, time or range");
-  need(n > 0 && n <= VERTEX_MAX, "COUNT", `${n} vertices`);
-  need(nLz4 <= bytes.length - HEAD_BYTES, "SHORT", "cut short");
-  need(nLz4 >= bytes.length - HEAD_BYTES, "LONG", "bytes behind the end");
-  return { part: head.index, epoch, field, name: FIELD_NAMES[field], simTimeUs: timeHigh * 4294967296 + timeLow, low, high, n };
+    const head = readHead(bytes);
+    need(head.kind === KIND.FIELD, "KIND", `message kind ${head.kind}`);
+    need(head.flags === 0, "FLAGS", `flags ${head.flags}`);
+    need(bytes.length >= HEAD_BYTES, "SHORT", `${bytes.length} bytes`);
+    const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+    const epoch = view.getUint32(8, true),
+        field = view.getUint32(12, true),
+        timeLow = view.getUint32(16, true),
+        timeHigh = view.getUint32(20, true);
+    const low = view.getFloat32(24, true),
+        high = view.getFloat32(28, true),
+        n = view.getUint32(32, true),
+        nLz4 = view.getUint32(36, true);
+    need(Number.isFinite(low) && Number.isFinite(high), "NAN", "range");
+    need(
+        head.index < PART_MAX && field > 0 && field < FIELD_NAMES.length && timeHigh < 1 << 21 && low <= high,
+        "RANGE",
+        "part, kind, time or range",
+    );
+    need(n > 0 && n <= VERTEX_MAX, "COUNT", `${n} vertices`);
+    need(nLz4 <= bytes.length - HEAD_BYTES, "SHORT", "cut short");
+    need(nLz4 >= bytes.length - HEAD_BYTES, "LONG", "bytes behind the end");
+    return {
+        part: head.index,
+        epoch,
+        field,
+        name: FIELD_NAMES[field],
+        simTimeUs: timeHigh * 4294967296 + timeLow,
+        low,
+        high,
+        n,
+    };
 }
 
 /**
@@ -41,8 +68,8 @@ export function readFieldHead(bytes) {
  * @returns {FieldHead}
  */
 export function decodeField(bytes, level) {
-  const head = readFieldHead(bytes);
-  need(head.n === level.length, "COUNT", `${head.n} vertices, the asset has ${level.length}`);
-  lz4Decode(bytes.subarray(HEAD_BYTES), level, 0, head.n);
-  return head;
+    const head = readFieldHead(bytes);
+    need(head.n === level.length, "COUNT", `${head.n} vertices, the asset has ${level.length}`);
+    lz4Decode(bytes.subarray(HEAD_BYTES), level, 0, head.n);
+    return head;
 }

@@ -1,255 +1,255 @@
-// The panel of sculpting: which tool a click uses, its settings, forces that follow their slider until they are released,
-// undo, the cut, saving. One order is under way at a time.
-import { boxAround, cutOrder, FORCES, orderOf, PAINTS, said, TOOLS } from "./sculpt_orders.js";
+// The panel of sculpting: the tool of a click and its settings, forces that follow their slider until they are released,
+// undo, the cut, files. One command is pending at a time.
+import { buttonById, chooseByArrows, htmlById, inputById, markRadio, selectById } from "./dom.js";
+import { answerText, boxAround, commandOf, cutCommand, FORCES, PAINTS, TOOLS } from "./sculpt_commands.js";
 
-/** @typedef {import("./sculpt_orders.js").Order} Order */
+/** @typedef {import("./sculpt_commands.js").Command} Command */
 
-const WAIT_MS = 20000; // an answer that does not come is not waited for any longer
-const FINEST = 200; // steps of a slider
-const STIFFNESS_N_M = 60; // of the spring that pulls a handle
+const WAIT_MS = 20000; // after this an answer counts as lost
+const SLIDER_STEPS = 200;
+const STIFFNESS_N_M = 60; // of the spring that pulls a curve
 
 export class SculptPanel {
-  /**
-   * @param {Document} page
-   * @param {(order: Order) => void} send
-   * @param {(ending: string) => void} save
-   */
-  constructor(page, send, save) {
-    this.page = page;
-    this.send = send;
-    this.offered = false;
-    this.tool = "extrude";
-    /** @type {number[][]} clicked so far */
-    this.places = [];
-    /** @type {Order | null} not answered yet */
-    this.underWay = null;
-    this.sentAt = 0;
-    /** @type {Order | null} the newest cut that waits for its turn */
-    this.wantsCut = null;
-    /** @type {import("./sculpt_orders.js").Box} */
-    this.box = { low: [0, 0, 0], high: [0, 0, 0] };
-    this.size = 0;
-    /** @type {{tool: string, places: number[][], settings: import("./sculpt_orders.js").Settings} | null} the force that acts */
-    this.force = null;
-    this.forceMoved = false; // its slider has moved since it was sent
-    this.say = /** @type {HTMLElement} */ (page.getElementById("sculpt-say"));
-    this.tools = this.fill("sculpt-tools", TOOLS, (name) => this.choose(name));
-    this.paints = this.fill("sculpt-paints", PAINTS, (name) => this.mark(this.paints, name));
-    this.mark(this.paints, "stiffer");
-    for (const verb of ["keep", "undo", "redo"]) this.button("sculpt-" + verb).onclick = () => this.give({ verb, args: {} });
-    for (const ending of ["obj", "stl", "ply"]) this.button("sculpt-" + ending).onclick = () => save(ending);
-    for (const id of ["distance", "radius", "sharp"]) this.range(id).oninput = () => this.showValues();
-    for (const id of ["pressure", "lift"]) this.range(id).oninput = () => this.moveForce();
-    this.button("sculpt-release").onclick = () => this.give({ verb: "release", args: {} });
-    this.axis = /** @type {HTMLSelectElement} */ (page.getElementById("sculpt-axis"));
-    this.axis.onchange = this.range("cut").oninput = () => this.cut();
-    this.choose(this.tool);
-  }
-
-  /** @param {string} id @returns {HTMLButtonElement} */
-  button(id) {
-    return /** @type {HTMLButtonElement} */ (this.page.getElementById(id));
-  }
-
-  /** @param {string} name @returns {HTMLInputElement} */
-  range(name) {
-    return /** @type {HTMLInputElement} */ (this.page.getElementById("sculpt-" + name));
-  }
-
-  /**
-   * buttons of which one is chosen
-   * @param {string} id @param {Record<string, {title: string}>} of @param {(name: string) => void} chosen
-   * @returns {Map<string, HTMLButtonElement>}
-   */
-  fill(id, of, chosen) {
-    const group = /** @type {HTMLElement} */ (this.page.getElementById(id)), buttons = new Map();
-    for (const [name, { title }] of Object.entries(of)) {
-      const button = this.page.createElement("button");
-      button.textContent = title;
-      button.dataset.name = name;
-      button.setAttribute("role", "radio");
-      button.onclick = () => chosen(name);
-      group.append(button);
-      buttons.set(name, button);
+    /**
+     * @param {Document} page
+     * @param {(command: Command) => void} send
+     * @param {(format: string) => void} save
+     */
+    constructor(page, send, save) {
+        this.page = page;
+        this.send = send;
+        this.offered = false;
+        this.tool = "extrude";
+        /** @type {number[][]} clicked so far, m */
+        this.points = [];
+        /** @type {Command | null} not answered yet */
+        this.pending = null;
+        this.sentAt = 0;
+        /** @type {Command | null} newest cut, sent when the pending command is answered */
+        this.nextCut = null;
+        /** @type {import("./sculpt_commands.js").Box} */
+        this.box = { low: [0, 0, 0], high: [0, 0, 0] };
+        this.size = 0;
+        /** @type {{tool: string, points: number[][], settings: import("./sculpt_commands.js").Settings} | null} acting force */
+        this.force = null;
+        this.forceChanged = false; // by its slider, since it was sent
+        this.message = htmlById("sculpt-message", page);
+        this.tools = this.fill("sculpt-tools", TOOLS, (name) => this.choose(name));
+        this.paints = this.fill("sculpt-paints", PAINTS, (name) => this.mark(this.paints, name));
+        this.mark(this.paints, "stiffer");
+        for (const verb of ["keep", "undo", "redo"]) this.button(verb).onclick = () => this.submit({ verb, args: {} });
+        for (const format of ["obj", "stl", "ply"]) this.button(format).onclick = () => save(format);
+        for (const id of ["distance", "radius", "sharp"]) this.slider(id).oninput = () => this.showValues();
+        for (const id of ["pressure", "lift"]) this.slider(id).oninput = () => this.changeForce();
+        this.button("release").onclick = () => this.submit({ verb: "release", args: {} });
+        this.axis = selectById("sculpt-axis", page);
+        this.axis.onchange = this.slider("cut").oninput = () => this.cut();
+        this.choose(this.tool);
     }
-    // within a radio group the arrow keys choose
-    group.addEventListener("keydown", (/** @type {KeyboardEvent} */ e) => {
-      if (!e.key.startsWith("Arrow")) return;
-      e.preventDefault();
-      e.stopPropagation();
-      const all = [...buttons.values()], now = all.findIndex((b) => b.tabIndex === 0), step = e.key === "ArrowRight" || e.key === "ArrowDown" ? 1 : -1;
-      const next = all[(now + step + all.length) % all.length];
-      next.click();
-      next.focus();
-    });
-    return buttons;
-  }
 
-  /** @param {Map<string, HTMLButtonElement>} buttons @param {string} name of the one that is chosen */
-  mark(buttons, name) {
-    for (const [key, button] of buttons) {
-      button.setAttribute("aria-checked", String(key === name));
-      button.tabIndex = key === name ? 0 : -1;
+    /** @param {string} name */
+    button(name) {
+        return buttonById("sculpt-" + name, this.page);
     }
-  }
 
-  /** @param {string} tool */
-  choose(tool) {
-    this.tool = tool;
-    this.places = [];
-    this.mark(this.tools, tool);
-    for (const row of this.page.querySelectorAll("#sculpt [data-for]")) {
-      /** @type {HTMLElement} */ (row).hidden = !/** @type {HTMLElement} */ (row).dataset.for?.split(" ").includes(tool);
+    /** @param {string} name */
+    slider(name) {
+        return inputById("sculpt-" + name, this.page);
     }
-    this.hint();
-  }
 
-  hint() {
-    this.say.textContent = TOOLS[this.tool].hints[this.places.length];
-  }
-
-  /** the scene's box, after hello @param {number[]} low @param {number[]} high */
-  begin(low, high) {
-    this.box = { low, high };
-    this.size = Math.hypot(...low.map((v, i) => high[i] - v));
-    this.underWay = this.wantsCut = null;
-    this.act(null);
-    this.busy();
-    this.showValues();
-  }
-
-  /** the box follows what is shown @param {Float32Array} rest [n][3] */
-  grow(rest) {
-    this.box = boxAround(this.box, rest);
-  }
-
-  /** @returns {import("./sculpt_orders.js").Settings} */
-  settings() {
-    const part = (/** @type {string} */ name) => Number(this.range(name).value) / FINEST;
-    const paint = [...this.paints].find(([, b]) => b.tabIndex === 0)?.[0] ?? "stiffer";
-    const what = /** @type {HTMLSelectElement} */ (this.page.getElementById("sculpt-what"));
-    return {
-      distance_m: part("distance") * 0.5 * this.size, scale: 1, radius_m: part("radius") * 0.5 * this.size, paint,
-      sharp: Math.round(part("sharp") * 10) / 2, sharpWhat: Number(what.value),
-      pressure_Pa: 10 ** (1 + 3 * part("pressure")), lift_m: part("lift") * 0.5 * this.size, stiffness_N_m: STIFFNESS_N_M,
-      middle: this.box.low.map((v, i) => (v + this.box.high[i]) / 2),
-    };
-  }
-
-  showValues() {
-    const { distance_m, radius_m, sharp, pressure_Pa, lift_m } = this.settings();
-    const mm = (/** @type {number} */ m) => (1000 * m).toFixed(1) + " mm";
-    /** @type {HTMLElement} */ (this.page.getElementById("sculpt-distance-value")).textContent = mm(distance_m);
-    /** @type {HTMLElement} */ (this.page.getElementById("sculpt-radius-value")).textContent = mm(radius_m);
-    /** @type {HTMLElement} */ (this.page.getElementById("sculpt-sharp-value")).textContent = String(sharp);
-    /** @type {HTMLElement} */ (this.page.getElementById("sculpt-pressure-value")).textContent = Math.round(pressure_Pa) + " Pa";
-    /** @type {HTMLElement} */ (this.page.getElementById("sculpt-lift-value")).textContent = mm(lift_m);
-  }
-
-  /** a place of the surface was clicked @param {number[]} at m */
-  click(at) {
-    if (this.waits()) return;
-    this.places.push(at);
-    const order = orderOf(this.tool, this.settings(), this.places);
-    if (!order) {
-      this.hint();
-      return;
+    /**
+     * Creates the buttons of a radio group.
+     * @param {string} id @param {Record<string, {title: string}>} choices @param {(name: string) => void} onChoice
+     * @returns {Map<string, HTMLButtonElement>}
+     */
+    fill(id, choices, onChoice) {
+        const group = htmlById(id, this.page);
+        const buttons = new Map();
+        for (const [name, { title }] of Object.entries(choices)) {
+            const button = this.page.createElement("button");
+            button.textContent = title;
+            button.dataset.name = name;
+            button.setAttribute("role", "radio");
+            button.onclick = () => onChoice(name);
+            group.append(button);
+            buttons.set(name, button);
+        }
+        chooseByArrows(group, () => [...buttons.values()]);
+        return buttons;
     }
-    if (FORCES.includes(this.tool)) this.act({ tool: this.tool, places: this.places, settings: this.settings() });
-    this.places = [];
-    this.give(order);
-  }
 
-  /** the force that acts from now on, null: none @param {SculptPanel["force"]} force */
-  act(force) {
-    this.force = force;
-    this.forceMoved = false;
-    this.button("sculpt-release").disabled = !force;
-  }
+    /** @param {Map<string, HTMLButtonElement>} buttons @param {string} chosen */
+    mark(buttons, chosen) {
+        for (const [name, button] of buttons) markRadio(button, name === chosen);
+    }
 
-  /** its slider moves the force that acts: the same places again are the same brush */
-  moveForce() {
-    this.showValues();
-    if (!this.force) return;
-    const { pressure_Pa, lift_m } = this.settings();
-    Object.assign(this.force.settings, { pressure_Pa, lift_m });
-    this.forceMoved = true;
-    this.sendForce();
-  }
+    /** @param {string} tool */
+    choose(tool) {
+        this.tool = tool;
+        this.points = [];
+        this.mark(this.tools, tool);
+        for (const row of this.page.querySelectorAll("#sculpt [data-for]"))
+            if (row instanceof HTMLElement) row.hidden = !row.dataset.for?.split(" ").includes(tool);
+        this.hint();
+    }
 
-  sendForce() {
-    if (!this.force || !this.forceMoved || this.waits()) return;
-    this.forceMoved = false;
-    const order = orderOf(this.force.tool, this.force.settings, this.force.places);
-    if (order) this.give(order);
-  }
+    hint() {
+        this.message.textContent = TOOLS[this.tool].hints[this.points.length];
+    }
 
-  /** is an order under way? */
-  waits() {
-    return this.underWay !== null && performance.now() - this.sentAt < WAIT_MS;
-  }
+    /** after `hello`, with the box of the scene @param {number[]} low @param {number[]} high */
+    begin(low, high) {
+        this.box = { low, high };
+        this.size = Math.hypot(...low.map((v, i) => high[i] - v));
+        this.pending = this.nextCut = null;
+        this.setForce(null);
+        this.showBusy();
+        this.showValues();
+    }
 
-  /** @param {Order} order */
-  give(order) {
-    if (this.waits()) return;
-    if (order.verb === "release") this.act(null);
-    this.underWay = order;
-    this.sentAt = performance.now();
-    this.send(order);
-    this.busy();
-  }
+    /** extends the box by a surface @param {Float32Array} rest [n][3] */
+    grow(rest) {
+        this.box = boxAround(this.box, rest);
+    }
 
-  cut() {
-    const order = cutOrder(/** @type {any} */ (this.axis.value), Number(this.range("cut").value) / FINEST, this.box);
-    this.range("cut").disabled = order.verb === "uncut";
-    if (this.waits()) this.wantsCut = order;
-    else this.give(order);
-  }
+    /** @returns {import("./sculpt_commands.js").Settings} */
+    settings() {
+        const share = (/** @type {string} */ name) => Number(this.slider(name).value) / SLIDER_STEPS;
+        const paint = [...this.paints].find(([, b]) => b.tabIndex === 0)?.[0] ?? "stiffer";
+        return {
+            distance_m: share("distance") * 0.5 * this.size,
+            scale: 1,
+            radius_m: share("radius") * 0.5 * this.size,
+            paint,
+            sharp: Math.round(share("sharp") * 10) / 2,
+            sharpWhat: Number(selectById("sculpt-what", this.page).value),
+            pressure_Pa: 10 ** (1 + 3 * share("pressure")),
+            lift_m: share("lift") * 0.5 * this.size,
+            stiffness_N_m: STIFFNESS_N_M,
+            middle: this.box.low.map((v, i) => (v + this.box.high[i]) / 2),
+        };
+    }
 
-  /** another topology came: whoever made it, there may be something to undo and redo, and what was clicked means another face */
-  changed() {
-    this.places = [];
-    this.act(null);
-    this.button("sculpt-undo").disabled = this.button("sculpt-redo").disabled = false;
-  }
+    showValues() {
+        const { distance_m, radius_m, sharp, pressure_Pa, lift_m } = this.settings();
+        const mm = (/** @type {number} */ m) => (1000 * m).toFixed(1) + " mm";
+        const show = (/** @type {string} */ name, /** @type {string} */ text) => {
+            htmlById(`sculpt-${name}-value`, this.page).textContent = text;
+        };
+        show("distance", mm(distance_m));
+        show("radius", mm(radius_m));
+        show("sharp", String(sharp));
+        show("pressure", Math.round(pressure_Pa) + " Pa");
+        show("lift", mm(lift_m));
+    }
 
-  /** @param {{verb: string, text: string, args: Record<string, number>}} answer */
-  answer(answer) {
-    this.done(said(answer));
-    if (answer.args?.can_undo === undefined) return;
-    this.button("sculpt-undo").disabled = answer.args.can_undo === 0;
-    this.button("sculpt-redo").disabled = answer.args.can_redo === 0;
-  }
+    /** @param {number[]} point of the surface, m */
+    click(point) {
+        if (this.isBusy()) return;
+        this.points.push(point);
+        const command = commandOf(this.tool, this.settings(), this.points);
+        if (!command) {
+            this.hint();
+            return;
+        }
+        if (FORCES.includes(this.tool))
+            this.setForce({ tool: this.tool, points: this.points, settings: this.settings() });
+        this.points = [];
+        this.submit(command);
+    }
 
-  /** an error of the server: was it about the order under way? @param {string} text */
-  refused(text) {
-    if (!this.underWay) return false;
-    if (FORCES.includes(this.underWay.verb)) this.act(null);
-    this.done(text);
-    return true;
-  }
+    /** @param {SculptPanel["force"]} force that acts from now on, null: none */
+    setForce(force) {
+        this.force = force;
+        this.forceChanged = false;
+        this.button("release").disabled = !force;
+    }
 
-  /** @param {string} text */
-  done(text) {
-    this.underWay = null;
-    this.busy();
-    this.say.textContent = text;
-    const cut = this.wantsCut;
-    this.wantsCut = null;
-    if (cut) this.give(cut);
-    else this.sendForce();
-  }
+    /** a slider changes the acting force: the server takes the same points again as the same brush */
+    changeForce() {
+        this.showValues();
+        if (!this.force) return;
+        const { pressure_Pa, lift_m } = this.settings();
+        Object.assign(this.force.settings, { pressure_Pa, lift_m });
+        this.forceChanged = true;
+        this.sendForce();
+    }
 
-  busy() {
-    /** @type {HTMLElement} */ (this.page.getElementById("sculpt")).setAttribute("aria-busy", String(this.underWay !== null));
-  }
+    sendForce() {
+        if (!this.force || !this.forceChanged || this.isBusy()) return;
+        this.forceChanged = false;
+        const command = commandOf(this.force.tool, this.force.settings, this.force.points);
+        if (command) this.submit(command);
+    }
 
-  /** Ctrl+Z, Ctrl+Shift+Z @param {KeyboardEvent} e @returns {boolean} it was one of them */
-  key(e) {
-    const target = /** @type {any} */ (e.target);
-    if (!this.offered || !(e.ctrlKey || e.metaKey) || e.altKey || e.repeat || e.key.toLowerCase() !== "z") return false;
-    if (target?.tagName === "INPUT" && target.type !== "range") return false;
-    this.give({ verb: e.shiftKey ? "redo" : "undo", args: {} });
-    return true;
-  }
+    /** is a command pending? */
+    isBusy() {
+        return this.pending !== null && performance.now() - this.sentAt < WAIT_MS;
+    }
+
+    /** @param {Command} command */
+    submit(command) {
+        if (this.isBusy()) return;
+        if (command.verb === "release") this.setForce(null);
+        this.pending = command;
+        this.sentAt = performance.now();
+        this.send(command);
+        this.showBusy();
+    }
+
+    cut() {
+        const axis = /** @type {"none" | "x" | "y" | "z"} */ (this.axis.value);
+        const command = cutCommand(axis, Number(this.slider("cut").value) / SLIDER_STEPS, this.box);
+        this.slider("cut").disabled = command.verb === "uncut";
+        if (this.isBusy()) this.nextCut = command;
+        else this.submit(command);
+    }
+
+    /** after `topology`, caused by any member: there may be something to undo, and clicked points mean other faces */
+    changed() {
+        this.points = [];
+        this.setForce(null);
+        this.button("undo").disabled = this.button("redo").disabled = false;
+    }
+
+    /** @param {import("./control_table.js").Answer} answer */
+    answer(answer) {
+        this.finish(answerText(answer));
+        if (answer.args?.can_undo === undefined) return;
+        this.button("undo").disabled = answer.args.can_undo === 0;
+        this.button("redo").disabled = answer.args.can_redo === 0;
+    }
+
+    /** @param {string} text of an error @returns {boolean} it belongs to this panel */
+    refused(text) {
+        if (!this.pending) return false;
+        if (FORCES.includes(this.pending.verb)) this.setForce(null);
+        this.finish(text);
+        return true;
+    }
+
+    /** @param {string} text */
+    finish(text) {
+        this.pending = null;
+        this.showBusy();
+        this.message.textContent = text;
+        const cut = this.nextCut;
+        this.nextCut = null;
+        if (cut) this.submit(cut);
+        else this.sendForce();
+    }
+
+    showBusy() {
+        htmlById("sculpt", this.page).setAttribute("aria-busy", String(this.pending !== null));
+    }
+
+    /** Ctrl+Z, Ctrl+Shift+Z @param {KeyboardEvent} e @returns {boolean} the key is one of them */
+    key(e) {
+        const typing = e.target instanceof HTMLInputElement && e.target.type !== "range";
+        if (!this.offered || !(e.ctrlKey || e.metaKey) || e.altKey || e.repeat || e.key.toLowerCase() !== "z")
+            return false;
+        if (typing) return false;
+        this.submit({ verb: e.shiftKey ? "redo" : "undo", args: {} });
+        return true;
+    }
 }

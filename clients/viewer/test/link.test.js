@@ -6,6 +6,7 @@ import { test } from "node:test";
 import { readFieldHead } from "../src/field_decoder.js";
 import { Link } from "../src/link.js";
 import { vertexNormals } from "../src/normals.js";
+import { hello, part as partInfo } from "./fixtures/messages.js";
 import { KIND, POSE_FLAG, readHead, readTools } from "../src/wire.js";
 
 /** @param {string} name */
@@ -13,268 +14,294 @@ const load = (name) => new Uint8Array(readFileSync(new URL(`../../../tests/data/
 const turn = () => new Promise((resolve) => setImmediate(resolve));
 
 class FakeSocket {
-  /** @param {string} url @param {string} protocol */
-  constructor(url, protocol) {
-    this.url = url;
-    this.protocol = protocol;
-    this.readyState = 0;
-    /** @type {any[]} */
-    this.sent = [];
-    this.closed = 0;
-  }
-  /** @param {any} data */
-  send(data) {
-    this.sent.push(data);
-  }
-  /** @param {number} code */
-  close(code) {
-    this.closed = code;
-    this.readyState = 3;
-  }
-  accept() {
-    this.readyState = 1;
-    this.onopen?.();
-  }
-  /** @param {any} data */
-  say(data) {
-    this.onmessage?.({ data: typeof data === "string" ? data : data.buffer ? data.slice().buffer : JSON.stringify(data) });
-  }
-  /** messages of one kind that were sent @param {number} kind */
-  binary(kind) {
-    return this.sent.filter((m) => typeof m !== "string" && readHead(m).kind === kind);
-  }
-  texts() {
-    return this.sent.filter((m) => typeof m === "string").map((m) => JSON.parse(m));
-  }
+    /** @param {string} url @param {string} protocol */
+    constructor(url, protocol) {
+        this.url = url;
+        this.protocol = protocol;
+        this.readyState = 0;
+        /** @type {any[]} */
+        this.sent = [];
+        this.closed = 0;
+    }
+    /** @param {any} data */
+    send(data) {
+        this.sent.push(data);
+    }
+    /** @param {number} code */
+    close(code) {
+        this.closed = code;
+        this.readyState = 3;
+    }
+    accept() {
+        this.readyState = 1;
+        this.onopen?.();
+    }
+    /** @param {any} data */
+    say(data) {
+        this.onmessage?.({
+            data: typeof data === "string" ? data : data.buffer ? data.slice().buffer : JSON.stringify(data),
+        });
+    }
+    /** messages of one kind that were sent @param {number} kind */
+    binary(kind) {
+        return this.sent.filter((m) => typeof m !== "string" && readHead(m).kind === kind);
+    }
+    texts() {
+        return this.sent.filter((m) => typeof m === "string").map((m) => JSON.parse(m));
+    }
 }
 
 function stand() {
-  const stand = {
-    time: 1000, /** @type {FakeSocket[]} */ sockets: [], /** @type {any[]} */ posted: [], /** @type {{call: () => void, ms: number}[]} */ waiting: [],
-    /** @type {(value: any) => void} */ giveAsset: () => {}, /** @type {string[]} */ asked: [],
-    of: (/** @type {string} */ type) => stand.posted.filter((m) => m.type === type),
-    /** @type {any} */ link: null,
-  };
-  stand.link = new Link({
-    open: (url, protocol) => {
-      const socket = new FakeSocket(url, protocol);
-      stand.sockets.push(socket);
-      return /** @type {any} */ (socket);
-    },
-    get: (url) => {
-      stand.asked.push(url);
-      return new Promise((resolve) => (stand.giveAsset = resolve));
-    },
-    post: (message) => stand.posted.push(message),
-    now: () => stand.time,
-    later: (call, ms) => stand.waiting.push({ call, ms }),
-  });
-  return stand;
+    const stand = {
+        time: 1000,
+        /** @type {FakeSocket[]} */ sockets: [],
+        /** @type {any[]} */ posted: [],
+        /** @type {{call: () => void, ms: number}[]} */ waiting: [],
+        /** @type {(value: any) => void} */ giveAsset: () => {},
+        /** @type {string[]} */ asked: [],
+        of: (/** @type {string} */ type) => stand.posted.filter((m) => m.type === type),
+        /** @type {any} */ link: null,
+    };
+    stand.link = new Link({
+        open: (url, protocol) => {
+            const socket = new FakeSocket(url, protocol);
+            stand.sockets.push(socket);
+            return /** @type {any} */ (socket);
+        },
+        get: (url) => {
+            stand.asked.push(url);
+            return new Promise((resolve) => (stand.giveAsset = resolve));
+        },
+        post: (message) => stand.posted.push(message),
+        now: () => stand.time,
+        later: (call, ms) => stand.waiting.push({ call, ms }),
+    });
+    return stand;
 }
-
-const HELLO = { type: "hello", session: "liver", parts: [{ epoch: 0, asset: "/asset/ab" }], you: { id: 1, tool: 0 } };
 
 /** a connection that has joined; the part's epoch is that of the golden frames */
 async function joined() {
-  const s = stand();
-  s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
-  s.sockets[0].accept();
-  const epoch = new DataView(load("frame_bend.bin").buffer).getUint32(8, true);
-  const part = new DataView(load("frame_bend.bin").buffer).getUint16(6, true);
-  const parts = Array.from({ length: part + 1 }, () => ({ epoch, asset: "/asset/ab" }));
-  s.sockets[0].say({ ...HELLO, parts });
-  return { s, part };
+    const s = stand();
+    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
+    s.sockets[0].accept();
+    const epoch = new DataView(load("frame_bend.bin").buffer).getUint32(8, true);
+    const part = new DataView(load("frame_bend.bin").buffer).getUint16(6, true);
+    const parts = Array.from({ length: part + 1 }, () => partInfo({ epoch }));
+    s.sockets[0].say(hello({ parts }));
+    return { s, part };
 }
 
 test("joins with the protocol's name, asks for any tool and for patches", () => {
-  const s = stand();
-  s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
-  assert.equal(s.sockets[0].protocol, "palpate.v1");
-  assert.equal(s.sockets[0].sent.length, 0);
-  s.sockets[0].accept();
-  assert.deepEqual(s.sockets[0].texts(), [{ type: "join", name: "Ada", role: "trainee", tool: -1, patches: true }]);
+    const s = stand();
+    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
+    assert.equal(s.sockets[0].protocol, "palpate.v1");
+    assert.equal(s.sockets[0].sent.length, 0);
+    s.sockets[0].accept();
+    assert.deepEqual(s.sockets[0].texts(), [{ type: "join", name: "Ada", role: "trainee", tool: -1, patches: true }]);
 });
 
 test("keeps the newest frame until its asset has come, then shows it", async () => {
-  const { s, part } = await joined();
-  assert.equal(s.asked.at(-1), "http://host:1/asset/ab");
-  s.sockets[0].say(load("frame_spike.bin"));
-  s.sockets[0].say(load("frame_bend.bin"));
-  assert.equal(s.of("frame").length, 0);
-  s.giveAsset(load("asset.bin").buffer);
-  await turn();
-  await turn();
-  const shown = s.of("frame").filter((m) => m.part === part);
-  assert.equal(shown.length, 1);
-  assert.equal(s.of("part").filter((m) => m.part === part).length, 1);
-  assert.ok(shown[0].positions.every(Number.isFinite));
-  // normals of a shown surface are of unit length or zero
-  for (let i = 0; i < shown[0].normals.length; i += 3) {
-    const length = Math.hypot(...shown[0].normals.subarray(i, i + 3));
-    assert.ok(length === 0 || Math.abs(length - 1) < 1e-5);
-  }
+    const { s, part } = await joined();
+    assert.equal(s.asked.at(-1), "http://host:1/asset/ab");
+    s.sockets[0].say(load("frame_spike.bin"));
+    s.sockets[0].say(load("frame_bend.bin"));
+    assert.equal(s.of("frame").length, 0);
+    s.giveAsset(load("asset.bin").buffer);
+    await turn();
+    await turn();
+    const shown = s.of("frame").filter((m) => m.part === part);
+    assert.equal(shown.length, 1);
+    assert.equal(s.of("part").filter((m) => m.part === part).length, 1);
+    assert.ok(shown[0].positions.every(Number.isFinite));
+    // normals of a shown surface are of unit length or zero
+    for (let i = 0; i < shown[0].normals.length; i += 3) {
+        const length = Math.hypot(...shown[0].normals.subarray(i, i + 3));
+        assert.ok(length === 0 || Math.abs(length - 1) < 1e-5);
+    }
 });
 
 test("keeps the newest field until its asset has come, drops one of an older epoch", async () => {
-  const s = stand(), field = load("field.bin"), head = readFieldHead(field), n = 301;
-  s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "viewer" });
-  s.sockets[0].accept();
-  s.sockets[0].say({ ...HELLO, parts: Array.from({ length: head.part + 1 }, () => ({ epoch: head.epoch, asset: "/asset/ab" })) });
-  s.sockets[0].say(field);
-  assert.equal(s.of("field").length, 0);
-  // as if an asset of as many vertices had come
-  s.link.parts.set(head.part, { epoch: head.epoch, n });
-  s.sockets[0].say(field);
-  const [shown] = s.of("field");
-  assert.deepEqual([shown.part, shown.name, shown.level.length], [head.part, "von_mises", n]);
-  assert.ok(shown.low < shown.high);
-  s.link.parts.set(head.part, { epoch: head.epoch + 1, n });
-  s.sockets[0].say(field);
-  assert.equal(s.of("field").length, 1);
-  assert.equal(s.sockets[0].closed, 0);
-  // of another number of vertices: the server's mistake
-  s.link.parts.set(head.part, { epoch: head.epoch, n: n + 1 });
-  s.sockets[0].say(field);
-  assert.equal(s.sockets[0].closed, 4900);
+    const s = stand(),
+        field = load("field.bin"),
+        head = readFieldHead(field),
+        n = 301;
+    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "viewer" });
+    s.sockets[0].accept();
+    const parts = Array.from({ length: head.part + 1 }, () => partInfo({ epoch: head.epoch }));
+    s.sockets[0].say(hello({ parts }));
+    s.sockets[0].say(field);
+    assert.equal(s.of("field").length, 0);
+    // as if an asset of as many vertices had come
+    s.link.parts.set(head.part, { epoch: head.epoch, n });
+    s.sockets[0].say(field);
+    const [shown] = s.of("field");
+    assert.deepEqual([shown.part, shown.name, shown.level.length], [head.part, "von_mises", n]);
+    assert.ok(shown.low < shown.high);
+    s.link.parts.set(head.part, { epoch: head.epoch + 1, n });
+    s.sockets[0].say(field);
+    assert.equal(s.of("field").length, 1);
+    assert.equal(s.sockets[0].closed, 0);
+    // of another number of vertices: the server's mistake
+    s.link.parts.set(head.part, { epoch: head.epoch, n: n + 1 });
+    s.sockets[0].say(field);
+    assert.equal(s.sockets[0].closed, 4900);
 });
 
 test("acknowledges every cycle, frames decoded or not", async () => {
-  const { s } = await joined();
-  s.sockets[0].say(load("tools.bin"));
-  s.sockets[0].say(load("tools.bin"));
-  const acks = s.sockets[0].binary(KIND.ACK), cycle = readTools(load("tools.bin")).cycle;
-  assert.equal(acks.length, 2);
-  assert.equal(new DataView(acks[0].buffer).getUint32(8, true), cycle);
+    const { s } = await joined();
+    s.sockets[0].say(load("tools.bin"));
+    s.sockets[0].say(load("tools.bin"));
+    const acks = s.sockets[0].binary(KIND.ACK),
+        cycle = readTools(load("tools.bin")).cycle;
+    assert.equal(acks.length, 2);
+    assert.equal(new DataView(acks[0].buffer).getUint32(8, true), cycle);
 });
 
 test("a pose carries tool, grab and clock, and lifting the tool keeps its last place", async () => {
-  const { s } = await joined();
-  s.time = 1234.5;
-  s.link.pose({ tool: 2, position: [0.1, 0.2, 0.3], grab: true, away: false });
-  s.link.pose({ tool: 2, position: null, grab: false, away: true });
-  const [first, second] = s.sockets[0].binary(KIND.POSE).map((m) => new DataView(m.buffer));
-  assert.equal(first.getUint16(6, true), 2);
-  assert.equal(Number(first.getBigUint64(16, true)), 1234500);
-  assert.equal(first.getFloat64(32, true), 0.2);
-  assert.equal(first.getUint32(132, true), 1);
-  assert.equal(second.getFloat64(40, true), 0.3);
-  assert.equal(second.getUint32(8, true), first.getUint32(8, true) + 1);
-  assert.ok(second.getUint32(12, true) & POSE_FLAG.AWAY);
+    const { s } = await joined();
+    s.time = 1234.5;
+    s.link.pose({ tool: 2, position: [0.1, 0.2, 0.3], grab: true, away: false });
+    s.link.pose({ tool: 2, position: null, grab: false, away: true });
+    const [first, second] = s.sockets[0].binary(KIND.POSE).map((m) => new DataView(m.buffer));
+    assert.equal(first.getUint16(6, true), 2);
+    assert.equal(Number(first.getBigUint64(16, true)), 1234500);
+    assert.equal(first.getFloat64(32, true), 0.2);
+    assert.equal(first.getUint32(132, true), 1);
+    assert.equal(second.getFloat64(40, true), 0.3);
+    assert.equal(second.getUint32(8, true), first.getUint32(8, true) + 1);
+    assert.ok(second.getUint32(12, true) & POSE_FLAG.AWAY);
 });
 
 test("a resting tool is said again until the page has been silent for 3 s", async () => {
-  const { s } = await joined();
-  s.link.pose({ tool: 0, position: [0, 0, 1], grab: true, away: false });
-  for (let k = 0; k < 58; k++) {
-    s.time += 50;
-    s.link.beat();
-  }
-  const poses = s.sockets[0].binary(KIND.POSE).map((m) => new DataView(m.buffer));
-  assert.equal(poses.length, 59);
-  assert.ok(poses.every((v) => v.getUint32(132, true) === 1));
-  for (let k = 0; k < 10; k++) {
-    s.time += 50;
-    s.link.beat();
-  }
-  const last = s.sockets[0].binary(KIND.POSE).map((m) => new DataView(m.buffer));
-  assert.equal(last.length, 61); // one more at 2950 ms, then one that lifts the tool
-  assert.ok(last[60].getUint32(12, true) & POSE_FLAG.AWAY);
+    const { s } = await joined();
+    s.link.pose({ tool: 0, position: [0, 0, 1], grab: true, away: false });
+    for (let k = 0; k < 58; k++) {
+        s.time += 50;
+        s.link.repeatPose();
+    }
+    const poses = s.sockets[0].binary(KIND.POSE).map((m) => new DataView(m.buffer));
+    assert.equal(poses.length, 59);
+    assert.ok(poses.every((v) => v.getUint32(132, true) === 1));
+    for (let k = 0; k < 10; k++) {
+        s.time += 50;
+        s.link.repeatPose();
+    }
+    const last = s.sockets[0].binary(KIND.POSE).map((m) => new DataView(m.buffer));
+    assert.equal(last.length, 61); // one more at 2950 ms, then one that lifts the tool
+    assert.ok(last[60].getUint32(12, true) & POSE_FLAG.AWAY);
 });
 
 test("reconnects with growing pauses after a lost connection", () => {
-  const s = stand();
-  s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
-  const pauses = [];
-  for (let i = 0; i < 6; i++) {
-    /** @type {any} */ (s.sockets[i]).onclose({ code: 1006, reason: "" });
-    const next = s.waiting.pop();
-    pauses.push(next?.ms);
-    next?.call();
-  }
-  assert.deepEqual(pauses, [500, 1000, 2000, 4000, 5000, 5000]);
-  assert.equal(s.sockets.length, 7);
-  assert.equal(s.of("state").at(-1).state, "connecting");
+    const s = stand();
+    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
+    const pauses = [];
+    for (let i = 0; i < 6; i++) {
+        /** @type {any} */ (s.sockets[i]).onclose({ code: 1006, reason: "" });
+        const next = s.waiting.pop();
+        pauses.push(next?.ms);
+        next?.call();
+    }
+    assert.deepEqual(pauses, [500, 1000, 2000, 4000, 5000, 5000]);
+    assert.equal(s.sockets.length, 7);
+    assert.equal(s.of("state").at(-1).state, "connecting");
 });
 
 test("a server whose asset cannot be read is asked again ever more slowly", async () => {
-  const s = stand();
-  s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
-  const pauses = [];
-  for (let i = 0; i < 4; i++) {
-    s.sockets[i].accept();
-    s.sockets[i].say(HELLO);
-    s.giveAsset(new Uint8Array([1, 2, 3]).buffer);
-    await turn();
-    assert.equal(s.sockets[i].closed, 4900);
-    s.waiting.length = 0;
-    /** @type {any} */ (s.sockets[i]).onclose({ code: 4900, reason: "" });
-    pauses.push(s.waiting[0].ms);
-    s.waiting[0].call();
-  }
-  assert.deepEqual(pauses, [500, 1000, 2000, 4000]);
+    const s = stand();
+    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
+    const pauses = [];
+    for (let i = 0; i < 4; i++) {
+        s.sockets[i].accept();
+        s.sockets[i].say(hello());
+        s.giveAsset(new Uint8Array([1, 2, 3]).buffer);
+        await turn();
+        assert.equal(s.sockets[i].closed, 4900);
+        s.waiting.length = 0;
+        /** @type {any} */ (s.sockets[i]).onclose({ code: 4900, reason: "" });
+        pauses.push(s.waiting[0].ms);
+        s.waiting[0].call();
+    }
+    assert.deepEqual(pauses, [500, 1000, 2000, 4000]);
 });
 
 test("another topology: the old part goes on until the new asset is here, then frames of the old epoch are dropped", async () => {
-  const { s, part } = await joined();
-  s.giveAsset(load("asset.bin").buffer);
-  await turn();
-  await turn();
-  const old = load("frame_bend.bin"), fresh = load("frame_bend.bin"), view = new DataView(fresh.buffer, fresh.byteOffset);
-  const epoch = view.getUint32(8, true) + 1, frames = () => s.of("frame").filter((m) => m.part === part).length;
-  view.setUint32(8, epoch, true);
-  s.sockets[0].say({ type: "topology", parts: Array.from({ length: part + 1 }, () => ({ epoch, asset: "/asset/cd" })) });
-  s.sockets[0].say(old); // was on its way
-  assert.equal(frames(), 1);
-  s.sockets[0].say(fresh);
-  assert.equal(frames(), 1); // waits for its asset
-  s.giveAsset(load("asset.bin").buffer);
-  await turn();
-  await turn();
-  assert.deepEqual(s.of("part").filter((m) => m.part === part).map((m) => m.epoch), [epoch - 1, epoch]);
-  assert.equal(frames(), 2);
-  s.sockets[0].say(old);
-  assert.equal(frames(), 2);
-  assert.equal(s.sockets[0].closed, 0);
+    const { s, part } = await joined();
+    s.giveAsset(load("asset.bin").buffer);
+    await turn();
+    await turn();
+    const old = load("frame_bend.bin"),
+        fresh = load("frame_bend.bin"),
+        view = new DataView(fresh.buffer, fresh.byteOffset);
+    const epoch = view.getUint32(8, true) + 1,
+        frames = () => s.of("frame").filter((m) => m.part === part).length;
+    view.setUint32(8, epoch, true);
+    s.sockets[0].say({
+        type: "topology",
+        parts: Array.from({ length: part + 1 }, () => partInfo({ epoch, asset: "/asset/cd" })),
+    });
+    s.sockets[0].say(old); // was on its way
+    assert.equal(frames(), 1);
+    s.sockets[0].say(fresh);
+    assert.equal(frames(), 1); // waits for its asset
+    s.giveAsset(load("asset.bin").buffer);
+    await turn();
+    await turn();
+    assert.deepEqual(
+        s
+            .of("part")
+            .filter((m) => m.part === part)
+            .map((m) => m.epoch),
+        [epoch - 1, epoch],
+    );
+    assert.equal(frames(), 2);
+    s.sockets[0].say(old);
+    assert.equal(frames(), 2);
+    assert.equal(s.sockets[0].closed, 0);
 });
 
 test("an asset that arrives after a newer one was asked for is not shown", async () => {
-  const { s, part } = await joined();
-  const first = s.giveAsset, epoch = s.link.wanted.get(part);
-  s.sockets[0].say({ type: "topology", parts: Array.from({ length: part + 1 }, () => ({ epoch: epoch + 1, asset: "/asset/cd" })) });
-  const second = s.giveAsset;
-  second(load("asset.bin").buffer);
-  await turn();
-  first(load("asset.bin").buffer);
-  await turn();
-  await turn();
-  assert.equal(s.link.parts.get(part).epoch, epoch + 1);
-  assert.equal(s.of("part").filter((m) => m.part === part).length, 1);
+    const { s, part } = await joined();
+    const first = s.giveAsset,
+        epoch = s.link.requested.get(part);
+    s.sockets[0].say({
+        type: "topology",
+        parts: Array.from({ length: part + 1 }, () => partInfo({ epoch: epoch + 1, asset: "/asset/cd" })),
+    });
+    const second = s.giveAsset;
+    second(load("asset.bin").buffer);
+    await turn();
+    first(load("asset.bin").buffer);
+    await turn();
+    await turn();
+    assert.equal(s.link.parts.get(part).epoch, epoch + 1);
+    assert.equal(s.of("part").filter((m) => m.part === part).length, 1);
 });
 
 test("says why and stays away after a refusal", () => {
-  const s = stand();
-  s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
-  /** @type {any} */ (s.sockets[0]).onclose({ code: 4003, reason: "" });
-  assert.equal(s.waiting.length, 0);
-  assert.match(s.of("state").at(-1).text, /full/);
+    const s = stand();
+    s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
+    /** @type {any} */ (s.sockets[0]).onclose({ code: 4003, reason: "" });
+    assert.equal(s.waiting.length, 0);
+    assert.match(s.of("state").at(-1).text, /full/);
 });
 
 test("a message that cannot be read closes the connection, an old connection is not heard", async () => {
-  const { s } = await joined();
-  s.sockets[0].say(new Uint8Array([1, 2, 3, 4, 5, 6, 7, 8, 9]));
-  assert.equal(s.sockets[0].closed, 4900);
-  s.link.connect({ url: "ws://host:1/ws", name: "Bea", role: "viewer" });
-  const n = s.posted.length;
-  s.sockets[0].say(HELLO);
-  assert.equal(s.posted.length, n);
+    const { s } = await joined();
+    s.sockets[0].say(new Uint8Array([1, 2, 3, 4, 5, 6, 7, 8, 9]));
+    assert.equal(s.sockets[0].closed, 4900);
+    s.link.connect({ url: "ws://host:1/ws", name: "Bea", role: "viewer" });
+    const n = s.posted.length;
+    s.sockets[0].say(hello());
+    assert.equal(s.posted.length, n);
 });
 
 test("normals of a tetrahedron point away from its middle", () => {
-  const x = new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]), n = new Float32Array(12);
-  vertexNormals(x, new Uint32Array([0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]), n);
-  for (let i = 0; i < 4; i++) {
-    let outward = 0;
-    for (let k = 0; k < 3; k++) outward += n[3 * i + k] * (x[3 * i + k] - 0.25);
-    assert.ok(outward > 0.3);
-  }
+    const x = new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]),
+        n = new Float32Array(12);
+    vertexNormals(x, new Uint32Array([0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]), n);
+    for (let i = 0; i < 4; i++) {
+        let outward = 0;
+        for (let k = 0; k < 3; k++) outward += n[3 * i + k] * (x[3 * i + k] - 0.25);
+        assert.ok(outward > 0.3);
+    }
 });

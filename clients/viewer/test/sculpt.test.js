@@ -1,110 +1,192 @@
-// Orders of sculpting as the panel builds them, and surfaces as files.
+// Commands of sculpting as the panel builds them, and surfaces as files.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { joined, toObj, toPly, toStl, WRITERS } from "../src/exporters.js";
-import { boxAround, cutOrder, FORCES, liftOf, orderOf, PAINTS, said, TOOLS } from "../src/sculpt_orders.js";
+import { joinSurfaces, toObj, toPly, toStl, WRITERS } from "../src/exporters.js";
+import { answerText, boxAround, commandOf, cutCommand, FORCES, liftOf, PAINTS, TOOLS } from "../src/sculpt_commands.js";
 
 const SET = {
-  distance_m: 0.02, scale: 1, radius_m: 0.03, paint: "stiffer", sharp: 2.5, sharpWhat: 1,
-  pressure_Pa: 200, lift_m: 0.05, stiffness_N_m: 60, middle: [0, 0, 0],
+    distance_m: 0.02,
+    scale: 1,
+    radius_m: 0.03,
+    paint: "stiffer",
+    sharp: 2.5,
+    sharpWhat: 1,
+    pressure_Pa: 200,
+    lift_m: 0.05,
+    stiffness_N_m: 60,
+    middle: [0, 0, 0],
 };
 
-test("a click becomes an order with the place and what the tool is set to", () => {
-  assert.deepEqual(orderOf("extrude", SET, [[1, 2, 3]]), { verb: "extrude", args: { x_m: 1, y_m: 2, z_m: 3, distance_m: 0.02, scale: 1 } });
-  assert.deepEqual(orderOf("delete", SET, [[1, 2, 3]]), { verb: "delete", args: { x_m: 1, y_m: 2, z_m: 3 } });
-  assert.deepEqual(orderOf("sharpen", SET, [[1, 2, 3]])?.args, { x_m: 1, y_m: 2, z_m: 3, sharp: 2.5, what: 1 });
-  assert.deepEqual(orderOf("paint", { ...SET, paint: "softer" }, [[0, 0, 0]])?.args, { x_m: 0, y_m: 0, z_m: 0, radius_m: 0.03, young_factor: 0.5, density_factor: 1 });
+test("a click becomes a command with the point and the settings of the tool", () => {
+    assert.deepEqual(commandOf("extrude", SET, [[1, 2, 3]]), {
+        verb: "extrude",
+        args: { x_m: 1, y_m: 2, z_m: 3, distance_m: 0.02, scale: 1 },
+    });
+    assert.deepEqual(commandOf("delete", SET, [[1, 2, 3]]), { verb: "delete", args: { x_m: 1, y_m: 2, z_m: 3 } });
+    assert.deepEqual(commandOf("sharpen", SET, [[1, 2, 3]])?.args, { x_m: 1, y_m: 2, z_m: 3, sharp: 2.5, what: 1 });
+    assert.deepEqual(commandOf("paint", { ...SET, paint: "softer" }, [[0, 0, 0]])?.args, {
+        x_m: 0,
+        y_m: 0,
+        z_m: 0,
+        radius_m: 0.03,
+        young_factor: 0.5,
+        density_factor: 1,
+    });
 });
 
-test("what joins two faces waits for the second click", () => {
-  for (const tool of ["merge", "bridge"]) {
-    assert.equal(orderOf(tool, SET, [[1, 2, 3]]), null);
-    assert.equal(TOOLS[tool].hints.length, 2);
-    assert.deepEqual(orderOf(tool, SET, [[1, 2, 3], [4, 5, 6]]), { verb: tool, args: { x_m: 1, y_m: 2, z_m: 3, x2_m: 4, y2_m: 5, z2_m: 6 } });
-  }
+test("a tool that joins two faces needs two clicks", () => {
+    for (const tool of ["merge", "bridge"]) {
+        assert.equal(commandOf(tool, SET, [[1, 2, 3]]), null);
+        assert.equal(TOOLS[tool].hints.length, 2);
+        assert.deepEqual(
+            commandOf(tool, SET, [
+                [1, 2, 3],
+                [4, 5, 6],
+            ]),
+            { verb: tool, args: { x_m: 1, y_m: 2, z_m: 3, x2_m: 4, y2_m: 5, z2_m: 6 } },
+        );
+    }
 });
 
-test("what sucks in is what blows up, with the other sign", () => {
-  const at = { x_m: 1, y_m: 2, z_m: 3, radius_m: 0.03 };
-  assert.deepEqual(orderOf("inflate", SET, [[1, 2, 3]]), { verb: "inflate", args: { ...at, pressure_Pa: 200 } });
-  assert.deepEqual(orderOf("deflate", SET, [[1, 2, 3]]), { verb: "inflate", args: { ...at, pressure_Pa: -200 } });
+test("deflate is inflate with negative pressure", () => {
+    const at = { x_m: 1, y_m: 2, z_m: 3, radius_m: 0.03 };
+    assert.deepEqual(commandOf("inflate", SET, [[1, 2, 3]]), { verb: "inflate", args: { ...at, pressure_Pa: 200 } });
+    assert.deepEqual(commandOf("deflate", SET, [[1, 2, 3]]), { verb: "inflate", args: { ...at, pressure_Pa: -200 } });
 });
 
-test("a handle wants two ends and goes outward across itself", () => {
-  assert.equal(orderOf("curve", SET, [[-1, 0, 2]]), null);
-  assert.deepEqual(orderOf("curve", SET, [[-1, 0, 2], [1, 0, 2]]), {
-    verb: "curve",
-    args: { x_m: -1, y_m: 0, z_m: 2, x2_m: 1, y2_m: 0, z2_m: 2, radius_m: 0.03, stiffness_N_m: 60, dx_m: 0, dy_m: 0, dz_m: 0.05 },
-  });
-  for (const lift of [0.05, -0.02]) {
-    const d = liftOf([1, 0, 2], [2, 3, 1], [0.2, 0.1, -0.4], lift);
-    assert.ok(Math.abs(Math.hypot(...d) - Math.abs(lift)) < 1e-12);
-    assert.ok(Math.abs(d[0] * 1 + d[1] * 3 + d[2] * -1) < 1e-12); // across the handle
-    assert.ok((d[0] * 1.3 + d[1] * 1.4 + d[2] * 1.9) * lift > 0); // outward, or inward
-  }
-  assert.deepEqual(liftOf([0, 0, 0], [2, 0, 0], [1, 0, 0], 0.1), [0, 0, 0.1]); // through the middle: any way will do
-  for (const tool of FORCES) assert.equal(TOOLS[tool].hints.length, TOOLS[tool].places);
+test("a curve needs two ends and is pulled outward, perpendicular to itself", () => {
+    assert.equal(commandOf("curve", SET, [[-1, 0, 2]]), null);
+    assert.deepEqual(
+        commandOf("curve", SET, [
+            [-1, 0, 2],
+            [1, 0, 2],
+        ]),
+        {
+            verb: "curve",
+            args: {
+                x_m: -1,
+                y_m: 0,
+                z_m: 2,
+                x2_m: 1,
+                y2_m: 0,
+                z2_m: 2,
+                radius_m: 0.03,
+                stiffness_N_m: 60,
+                dx_m: 0,
+                dy_m: 0,
+                dz_m: 0.05,
+            },
+        },
+    );
+    for (const lift of [0.05, -0.02]) {
+        const d = liftOf([1, 0, 2], [2, 3, 1], [0.2, 0.1, -0.4], lift);
+        assert.ok(Math.abs(Math.hypot(...d) - Math.abs(lift)) < 1e-12);
+        assert.ok(Math.abs(d[0] * 1 + d[1] * 3 + d[2] * -1) < 1e-12); // perpendicular to the curve
+        assert.ok((d[0] * 1.3 + d[1] * 1.4 + d[2] * 1.9) * lift > 0); // outward if lift > 0, else inward
+    }
+    assert.deepEqual(liftOf([0, 0, 0], [2, 0, 0], [1, 0, 0], 0.1), [0, 0, 0.1]); // through the middle: any direction
+    for (const tool of FORCES) assert.equal(TOOLS[tool].hints.length, TOOLS[tool].points);
 });
 
-test("a stroke and its opposite leave the material as it was", () => {
-  for (const key of /** @type {const} */ (["young_factor", "density_factor"])) {
-    const all = Object.values(PAINTS).reduce((product, paint) => product * paint[key], 1);
-    assert.ok(Math.abs(all - 1) < 1e-12);
-  }
+test("a stroke and its opposite restore the material", () => {
+    for (const key of /** @type {const} */ (["young_factor", "density_factor"])) {
+        const all = Object.values(PAINTS).reduce((product, paint) => product * paint[key], 1);
+        assert.ok(Math.abs(all - 1) < 1e-12);
+    }
 });
 
-test("a cut lies in the box across its axis", () => {
-  const box = { low: [-1, 0, 2], high: [1, 4, 3] };
-  assert.deepEqual(cutOrder("y", 0.25, box), { verb: "cut", args: { nx: 0, ny: 1, nz: 0, offset_m: 1 } });
-  assert.deepEqual(cutOrder("z", 1, box).args, { nx: 0, ny: 0, nz: 1, offset_m: 3 });
-  assert.deepEqual(cutOrder("none", 0.5, box), { verb: "uncut", args: {} });
-  assert.deepEqual(boxAround(box, Float32Array.of(-2, 1, 2.5, 0, 5, 2)), { low: [-2, 0, 2], high: [1, 5, 3] });
+test("a cut is a plane within the box, perpendicular to its axis", () => {
+    const box = { low: [-1, 0, 2], high: [1, 4, 3] };
+    assert.deepEqual(cutCommand("y", 0.25, box), { verb: "cut", args: { nx: 0, ny: 1, nz: 0, offset_m: 1 } });
+    assert.deepEqual(cutCommand("z", 1, box).args, { nx: 0, ny: 0, nz: 1, offset_m: 3 });
+    assert.deepEqual(cutCommand("none", 0.5, box), { verb: "uncut", args: {} });
+    assert.deepEqual(boxAround(box, Float32Array.of(-2, 1, 2.5, 0, 5, 2)), { low: [-2, 0, 2], high: [1, 5, 3] });
 });
 
-test("answers are said in short", () => {
-  assert.equal(said({ verb: "probe", text: "", args: { young_Pa: 15000, poisson: 0.4, density_kg_m3: 1234.56 } }), "15 kPa, 1230 kg/m³");
-  assert.equal(said({ verb: "extrude", text: "", args: { cells: 9, can_undo: 1, can_redo: 0, made_ms: 12.6 } }), "Extrude: 9 cells, 13 ms");
-  assert.equal(said({ verb: "undo", text: "", args: { cells: 8 } }), "Undo: 8 cells");
-  assert.equal(said({ verb: "other", text: "done", args: {} }), "done");
+test("answers are displayed in short", () => {
+    assert.equal(
+        answerText({ verb: "probe", text: "", args: { young_Pa: 15000, poisson: 0.4, density_kg_m3: 1234.56 } }),
+        "15 kPa, 1230 kg/m³",
+    );
+    assert.equal(
+        answerText({ verb: "extrude", text: "", args: { cells: 9, can_undo: 1, can_redo: 0, made_ms: 12.6 } }),
+        "Extrude: 9 cells, 13 ms",
+    );
+    assert.equal(answerText({ verb: "undo", text: "", args: { cells: 8 } }), "Undo: 8 cells");
+    assert.equal(answerText({ verb: "other", text: "done", args: {} }), "done");
 });
 
-/** a tetrahedron whose vertex 1 no triangle has */
-const PIECE = { positions: [0, 0, 0, 9, 9, 9, 1, 0, 0, 0, 1, 0, 0, 0, 1], triangles: [0, 3, 2, 0, 2, 4, 0, 4, 3, 2, 3, 4] };
+/** a tetrahedron whose vertex 1 is in no triangle */
+const SURFACE = {
+    positions: [0, 0, 0, 9, 9, 9, 1, 0, 0, 0, 1, 0, 0, 0, 1],
+    triangles: [0, 3, 2, 0, 2, 4, 0, 4, 3, 2, 3, 4],
+};
 
-test("only vertices of triangles are written, pieces one after the other", () => {
-  const one = joined([PIECE]), two = joined([PIECE, PIECE]);
-  assert.equal(one.positions.length, 12);
-  assert.ok(!one.positions.includes(9));
-  assert.equal(two.positions.length, 24);
-  assert.deepEqual([...two.triangles].slice(12), [...one.triangles].map((v) => v + 4));
-  for (let e = 0; e < 12; e++) for (let d = 0; d < 3; d++) assert.equal(one.positions[3 * one.triangles[e] + d], PIECE.positions[3 * PIECE.triangles[e] + d]);
+test("only vertices of triangles are written, surfaces one after the other", () => {
+    const one = joinSurfaces([SURFACE]),
+        two = joinSurfaces([SURFACE, SURFACE]);
+    assert.equal(one.positions.length, 12);
+    assert.ok(!one.positions.includes(9));
+    assert.equal(two.positions.length, 24);
+    assert.deepEqual(
+        [...two.triangles].slice(12),
+        [...one.triangles].map((v) => v + 4),
+    );
+    for (let e = 0; e < 12; e++)
+        for (let d = 0; d < 3; d++)
+            assert.equal(one.positions[3 * one.triangles[e] + d], SURFACE.positions[3 * SURFACE.triangles[e] + d]);
 });
 
 /** sixfold volume @param {number[][][]} triangles */
-const volume = (triangles) => triangles.reduce((sum, [a, b, c]) =>
-  sum + a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]), 0);
+const volume = (triangles) =>
+    triangles.reduce(
+        (sum, [a, b, c]) =>
+            sum +
+            a[0] * (b[1] * c[2] - b[2] * c[1]) +
+            a[1] * (b[2] * c[0] - b[0] * c[2]) +
+            a[2] * (b[0] * c[1] - b[1] * c[0]),
+        0,
+    );
 
 test("OBJ, STL and PLY hold the same surface", () => {
-  const tenth = { positions: PIECE.positions.map((v) => Math.fround(v / 10)), triangles: PIECE.triangles };
-  const lines = toObj([tenth]).split("\n"), v = lines.filter((l) => l.startsWith("v ")).map((l) => l.split(" ").slice(1).map(Number));
-  const obj = lines.filter((l) => l.startsWith("f ")).map((l) => l.split(" ").slice(1).map((i) => v[Number(i) - 1]));
-  const stl = new DataView(toStl([tenth]));
-  assert.equal(stl.byteLength, 84 + 4 * 50);
-  assert.equal(stl.getUint32(80, true), 4);
-  const stlTriangles = [0, 1, 2, 3].map((k) => [0, 1, 2].map((i) => [0, 1, 2].map((d) => stl.getFloat32(84 + 50 * k + 12 + 12 * i + 4 * d, true))));
-  const ply = toPly([tenth]), head = new TextDecoder().decode(ply), begin = head.indexOf("end_header\n") + 11, view = new DataView(ply);
-  assert.match(head, /element vertex 4\n/);
-  assert.match(head, /element face 4\n/);
-  assert.equal(ply.byteLength, begin + 48 + 52);
-  const plyTriangles = [0, 1, 2, 3].map((k) => [0, 1, 2].map((i) => {
-    const at = view.getInt32(begin + 48 + 13 * k + 1 + 4 * i, true);
-    return [0, 1, 2].map((d) => view.getFloat32(begin + 12 * at + 4 * d, true));
-  }));
-  const inFloats = obj.map((t) => t.map((p) => p.map(Math.fround)));
-  assert.deepEqual(stlTriangles, inFloats);
-  assert.deepEqual(plyTriangles, inFloats);
-  assert.ok(Math.abs(volume(stlTriangles) - 1e-3) < 1e-9);
-  // normals of the STL are unit, outward
-  assert.deepEqual([0, 1, 2].map((d) => Number(stl.getFloat32(84 + 50 * 3 + 4 * d, true).toFixed(6))), [0.57735, 0.57735, 0.57735]);
-  assert.deepEqual(Object.keys(WRITERS), ["obj", "stl", "ply"]);
+    const tenth = { positions: SURFACE.positions.map((v) => Math.fround(v / 10)), triangles: SURFACE.triangles };
+    const lines = toObj([tenth]).split("\n"),
+        v = lines.filter((l) => l.startsWith("v ")).map((l) => l.split(" ").slice(1).map(Number));
+    const obj = lines
+        .filter((l) => l.startsWith("f "))
+        .map((l) =>
+            l
+                .split(" ")
+                .slice(1)
+                .map((i) => v[Number(i) - 1]),
+        );
+    const stl = new DataView(toStl([tenth]));
+    assert.equal(stl.byteLength, 84 + 4 * 50);
+    assert.equal(stl.getUint32(80, true), 4);
+    const stlTriangles = [0, 1, 2, 3].map((k) =>
+        [0, 1, 2].map((i) => [0, 1, 2].map((d) => stl.getFloat32(84 + 50 * k + 12 + 12 * i + 4 * d, true))),
+    );
+    const ply = toPly([tenth]),
+        head = new TextDecoder().decode(ply),
+        begin = head.indexOf("end_header\n") + 11,
+        view = new DataView(ply);
+    assert.match(head, /element vertex 4\n/);
+    assert.match(head, /element face 4\n/);
+    assert.equal(ply.byteLength, begin + 48 + 52);
+    const plyTriangles = [0, 1, 2, 3].map((k) =>
+        [0, 1, 2].map((i) => {
+            const at = view.getInt32(begin + 48 + 13 * k + 1 + 4 * i, true);
+            return [0, 1, 2].map((d) => view.getFloat32(begin + 12 * at + 4 * d, true));
+        }),
+    );
+    const inFloats = obj.map((t) => t.map((p) => p.map(Math.fround)));
+    assert.deepEqual(stlTriangles, inFloats);
+    assert.deepEqual(plyTriangles, inFloats);
+    assert.ok(Math.abs(volume(stlTriangles) - 1e-3) < 1e-9);
+    // normals of the STL are unit, outward
+    assert.deepEqual(
+        [0, 1, 2].map((d) => Number(stl.getFloat32(84 + 50 * 3 + 4 * d, true).toFixed(6))),
+        [0.57735, 0.57735, 0.57735],
+    );
+    assert.deepEqual(Object.keys(WRITERS), ["obj", "stl", "ply"]);
 });

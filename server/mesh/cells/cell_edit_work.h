@@ -38,6 +38,8 @@ pal_err pal_edit_finish(pal_edit_work *w, pal_err err, pal_cells_edit *out, pal_
 
 /* "WHAT N, there are M" where it is out of range */
 pal_err pal_edit_check_number(const pal_edit_work *w, const char *what, int32_t i, int32_t n, pal_diagnostic *diag);
+/* REFUSED: a cell that folds and is new, or that did not fold before */
+pal_err pal_edit_check_folds(const pal_edit_work *w, const pal_cells *to, pal_diagnostic *diag);
 /* can all faces of a cell be seen from its centroid? positions x [n_vertex][3] */
 bool pal_edit_star_shaped(const pal_cells *c, const double *x, int32_t cell);
 #endif

@@ -3,7 +3,6 @@
 
 #include "server/mesh/cells/cell_reader.h"
 #include "server/mesh/files/file_bytes.h"
-#include "server/mesh/files/mesh_file.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,10 +1,9 @@
 /* Whole files in and out; names and places in messages. */
 #include "server/mesh/files/file_bytes.h"
 
-#include "server/mesh/files/mesh_file.h"
-
 #include <errno.h>
 #include <fcntl.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>

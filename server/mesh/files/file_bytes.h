@@ -1,6 +1,5 @@
-/* Files that appear whole or not at all: written under a temporary name beside the path, then renamed; and how readers
- * name a file and a place in it. Only for the readers and writers of this room; pal_file_read and pal_file_write are
- * declared in mesh_file.h. Thread: [load]. */
+/* Whole files in and out. A file appears whole or not at all: it is written under a temporary name beside the path and
+ * then renamed. Thread: [load]. */
 #ifndef PAL_MESH_FILES_FILE_BYTES_H
 #define PAL_MESH_FILES_FILE_BYTES_H
 #include "server/base/err.h"
@@ -9,6 +8,12 @@
 #include <stdint.h>
 #include <stdio.h>
 
+/* whole file into memory (caller frees), at most limit bytes; IO, BUDGET, MEMORY */
+pal_err pal_file_read(const char *path, size_t limit, uint8_t **bytes, size_t *n_byte, pal_diagnostic *diag);
+/* writes to a temporary name beside path and renames, so that a reader never sees half a file; IO */
+pal_err pal_file_write(const char *path, const void *bytes, size_t n_byte, pal_diagnostic *diag);
+
+/* a file in the making, for the writers of this room */
 typedef struct pal_file_out {
     FILE *file;
     char path[4096], temporary[4104];
@@ -20,7 +25,7 @@ pal_err pal_file_end(pal_file_out *out, pal_err err, pal_diagnostic *diag);
 
 /* the name as messages show it: printable, one line, its end when it is long */
 void pal_file_printable_name(char out[128], const char *name);
-/* REFUSED with "NAME: UNIT AT: sentence"; unit is "line" or "byte", note may be NULL */
+/* REFUSED with "NAME: UNIT AT: sentence"; unit is "line" or "byte", diag may be NULL */
 pal_err pal_file_refuse(pal_diagnostic *diag, const char *name, const char *unit, int64_t at, const char *format,
                         va_list list) __attribute__((format(printf, 5, 0)));
 #endif

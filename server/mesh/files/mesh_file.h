@@ -47,9 +47,4 @@ pal_err pal_mesh_file_write(const char *path, const pal_surface *surface, pal_di
 /* TetGen files STEM.node, STEM.ele, STEM.face: 1-based, positions in m with origin added, boundary marker 1 on surface
  * nodes and faces; IO */
 pal_err pal_mesh_file_write_tetgen(const char *stem, const pal_tets *tets, pal_diagnostic *diag);
-
-/* whole file into memory (caller frees), at most limit bytes; IO, BUDGET, MEMORY */
-pal_err pal_file_read(const char *path, size_t limit, uint8_t **bytes, size_t *n_byte, pal_diagnostic *diag);
-/* writes to a temporary name beside path and renames, so that a reader never sees half a file; IO */
-pal_err pal_file_write(const char *path, const void *bytes, size_t n_byte, pal_diagnostic *diag);
 #endif

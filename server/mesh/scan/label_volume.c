@@ -7,7 +7,6 @@
 
 #include "server/base/vec3.h"
 #include "server/mesh/files/file_bytes.h"
-#include "server/mesh/files/mesh_file.h"
 #include "server/mesh/files/scalar_bytes.h"
 #include "server/mesh/files/text_scan.h"
 

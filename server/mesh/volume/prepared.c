@@ -10,7 +10,7 @@
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
-#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/files/file_bytes.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -2,7 +2,7 @@
  *
  * Components join runs, not voxels: a run meets the runs of the row before and of the plane before that overlap it,
  * found by walking both rows side by side. */
-#include "server/mesh/voxel/voxel_scanline.h"
+#include "server/mesh/voxel/voxel_bits.h"
 
 #include "server/num/union_find.h"
 

@@ -6,11 +6,11 @@
  * empty. vote: open surface: every axis has its say where its row makes sense; two unopposed votes settle a voxel.
  * Where few voxels are left, the majority settles them. winding: where many are left (large openings), the winding
  * number settles those. flood: the paper's own, in voxel_flood.c, when asked for. */
-#include "server/mesh/voxel/voxel_scanline.h"
+#include "server/mesh/voxel/voxel_classify.h"
 
 #include "server/base/clock.h"
 #include "server/mesh/geometry/box_tree.h"
-#include "server/mesh/voxel/surface_parts.h"
+#include "server/mesh/voxel/surface_part.h"
 #include "server/mesh/voxel/voxel_flood.h"
 
 #include <math.h>

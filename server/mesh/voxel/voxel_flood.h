@@ -2,7 +2,8 @@
 #ifndef PAL_MESH_VOXEL_VOXEL_FLOOD_H
 #define PAL_MESH_VOXEL_VOXEL_FLOOD_H
 #include "server/mesh/geometry/box_tree.h"
-#include "server/mesh/voxel/voxel_scanline.h"
+#include "server/mesh/voxel/voxel_bits.h"
+#include "server/mesh/voxel/voxels.h"
 
 /* sets the voxels that a flood reaches from a seed behind every triangle without crossing the surface between
  * neighbouring centres; REFUSED when it reaches the grid's border (the surface leaks), MEMORY */

@@ -10,6 +10,7 @@
 #include "server/mesh/voxel/voxel_fraction.h"
 
 #include "server/mesh/geometry/polygon.h"
+#include "server/mesh/voxel/voxel_classify.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,7 +1,8 @@
 /* Private to the voxel files: which share of each voxel of a grid lies inside a surface. Thread: [load]. */
 #ifndef PAL_MESH_VOXEL_VOXEL_FRACTION_H
 #define PAL_MESH_VOXEL_VOXEL_FRACTION_H
-#include "server/mesh/voxel/voxel_scanline.h"
+#include "server/mesh/voxel/voxel_bits.h"
+#include "server/mesh/voxel/voxels.h"
 
 enum { PAL_FRACTION_SUBSAMPLES = 6 };
 

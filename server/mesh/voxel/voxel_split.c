@@ -3,7 +3,9 @@
  *
  * Departure: vertices are shared through two planes of node numbers that move up with the voxels, not through a hash.
  * A first pass counts, so every array is taken once at its size. */
-#include "server/mesh/voxel/voxel_scanline.h"
+#include "server/mesh/voxel/voxels.h"
+
+#include "server/mesh/voxel/voxel_bits.h"
 
 #include <stdlib.h>
 #include <string.h>

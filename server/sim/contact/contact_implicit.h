@@ -13,63 +13,49 @@
  * (pal_tangent.settle); tissue then moves less than before, so never past the proxy, which is itself clamped. So a
  * sub-step ends on the very forces that it was solved with, and the tool feels those, with what ties still pull.
  *
- * What a tool feels: pal_haptic_stiffness keeps, for each direction of contact, the tangent stiffness that the solver's
- * compliance gives (haptics.md 2.3 step 3 a). Thread: [sim], makes [load]. */
+ * Thread: [sim], makes [load]. */
 #ifndef PAL_SIM_CONTACT_CONTACT_IMPLICIT_H
 #define PAL_SIM_CONTACT_CONTACT_IMPLICIT_H
-#include "server/sim/contact/contact_patch.h"
 #include "server/sim/contact/contact_spring.h"
+#include "server/sim/contact/tool_force.h"
 
 enum {
     PAL_CONTACT_IMPLICIT_MAX = 512
 }; /* points of one tool; of more, every second, third ... stands for its neighbours */
 
 typedef struct pal_contact_implicit {
-    int first, n_contact; /* rows of the contacts in pal_contact_springs                                  */
-    int across;           /* first of the two rows of friction, -1: none                       */
-    double friction_N_m;  /* their stiffness while they stick                                  */
-    double *force_N;      /* of the loads now in body->load, by row from `first` [PAL_CONTACT_IMPLICIT_MAX + 2] */
-    double *share;        /* scratch [PAL_CONTACT_IMPLICIT_MAX]                                          */
-    double t[2][3];       /* unit directions across                                            */
-    bool constant;        /* the loads stay as they are whatever tissue does                   */
-    uint8_t *active;      /* contacts that act [PAL_CONTACT_IMPLICIT_MAX]                                */
-    int round;            /* solves of this sub-step that were settled, while ties give way    */
-    bool settled;         /* total_N is part of the tool's force                               */
-    bool staged;          /* the solver has several stages                                     */
-    double total_N[3];    /* on the tool                                                       */
-    double uncapped_N;    /* what it was before caps                                           */
-    double allowed_N;     /* what caps leave of it, or would                                   */
-    bool capped;          /* it was more                                                       */
+    int first, n_contact;   /* rows of the contacts in pal_contact_springs                                  */
+    int across;             /* first of the two rows of friction, -1: none                       */
+    double friction_N_m;    /* their stiffness while they stick                                  */
+    double *force_N;        /* of the loads now in body->load, by row from `first` [PAL_CONTACT_IMPLICIT_MAX + 2] */
+    double *share;          /* scratch [PAL_CONTACT_IMPLICIT_MAX]                                          */
+    double t[2][3];         /* unit directions across                                            */
+    bool constant;          /* the loads stay as they are whatever tissue does                   */
+    uint8_t *active;        /* contacts that act [PAL_CONTACT_IMPLICIT_MAX]                                */
+    int round;              /* solves of this sub-step that were settled, while ties give way    */
+    bool staged;            /* the solver has several stages                                     */
+    pal_solved_force force; /* on the tool */
+    double uncapped_N;      /* what it was before caps                                           */
+    double allowed_N;       /* what caps leave of it, or would                                   */
+    bool capped;            /* it was more                                                       */
     /* friction: how far its spring is stretched at the start and end of the sub-step, tool minus tissue, m */
     double slip_m[3], next_slip_m[3], tool_move_m[3], normal_N;
     bool slides, next_slides;
 } pal_contact_implicit;
 
 pal_err pal_contact_implicit_make(pal_arena *arena, pal_contact_implicit *out);
-void pal_contact_implicit_reset(pal_contact_implicit *press);
+void pal_contact_implicit_reset(pal_contact_implicit *solve);
 /* keeps at most PAL_CONTACT_IMPLICIT_MAX contacts, stiffer for those left out; returns how many */
 int pal_contact_implicit_thin(pal_contact *contact, int n);
-/* ties for n contacts with k_N_m and depth_m (below 0: only near), and the loads of those that touch into body->load;
+/* ties for n contacts with k_N_m and depth_m (below 0: only near), and the loads of those that points into body->load;
  * move_m: the tool's own way in this sub-step (friction only) */
-void pal_contact_implicit_begin(pal_contact_implicit *press, pal_contact_springs *contact_springs,
-                                pal_contact_points *touch, pal_body *body, const pal_contact *contact, int n,
-                                double friction, const double move_m[3]);
+void pal_contact_implicit_begin(pal_contact_implicit *solve, pal_contact_springs *springs, pal_contact_points *points,
+                                pal_body *body, const pal_contact *contact, int n, double friction,
+                                const double move_m[3]);
 /* after a stage that is not the last, ties->motion_m taken. True: beyond a cap, loads changed */
-bool pal_press_within(pal_contact_implicit *press, pal_contact_springs *contact_springs, pal_body *body, pal_tool *tool,
-                      pal_contact *contact);
+bool pal_contact_implicit_cap(pal_contact_implicit *solve, pal_contact_springs *springs, pal_body *body, pal_tool *tool,
+                              pal_contact *contact);
 /* after the last stage: force of every contact, total on the tool. True: loads changed */
-bool pal_contact_implicit_settle(pal_contact_implicit *press, pal_contact_springs *contact_springs, pal_body *body,
+bool pal_contact_implicit_settle(pal_contact_implicit *solve, pal_contact_springs *springs, pal_body *body,
                                  pal_tool *tool, pal_contact *contact, double friction);
-
-/* contacts within 75 degrees of a patch's direction belong to it */
-#define PAL_CONTACT_GROUP_COSINE 0.25
-/* the strongest contacts not yet grouped [n], about their mean direction; they are grouped then. False: there are none
- */
-bool pal_contact_group_next(const pal_contact *contact, int n, uint8_t *grouped, pal_contact_group *contact_group);
-
-/* the nearest tissue, of points x [n_point][3] within radius + near of a sphere's centre, not in the direction of an
- * earlier blob (beside a contact: only what faces it, since the tissue around a dent goes along with the tool);
- * directions of what is about as near are averaged. False: there is none */
-bool pal_contact_group_near(const double centre[3], double radius_m, double near_m, const double *x, int n_point,
-                            const pal_contact_group *earlier, int n_earlier, pal_contact_group *contact_group);
 #endif

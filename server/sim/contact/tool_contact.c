@@ -32,15 +32,15 @@ static void add_node(const pal_interpolation *place, int32_t node, double scale,
 }
 
 /* sum [body n_node][3] of the contacts' forces, and of what was held itself */
-static void sum_nodes(const pal_tool_contact *from, const pal_body *old, pal_contact_points *touch,
+static void sum_nodes(const pal_tool_contact *from, const pal_body *old, pal_contact_points *points,
                       const pal_interpolation *place, double *sum)
 {
-    pal_contact_points_force_begin(touch);
+    pal_contact_points_force_begin(points);
     for (int i = 0; i < from->n_contact; i++)
-        pal_contact_points_add_force(touch, old, from->contact[i].point, from->contact[i].force);
-    (void)pal_contact_points_assemble(touch, old);
-    for (int i = 0; i < touch->n_node; i++)
-        add_node(place, touch->node[i], 1, touch->force + 3 * (size_t)touch->node[i], sum);
+        pal_contact_points_add_force(points, old, from->contact[i].point, from->contact[i].force);
+    (void)pal_contact_points_assemble(points, old);
+    for (int i = 0; i < points->n_node; i++)
+        add_node(place, points->node[i], 1, points->force + 3 * (size_t)points->node[i], sum);
     for (int i = 0; i < from->hold.n_node && from->hold.acts; i++)
         add_node(place, from->hold.node[i], from->hold.part, from->hold.force_N + 3 * (size_t)i, sum);
 }
@@ -62,11 +62,11 @@ static bool keep_nodes(pal_contact_blend *hold, const double *sum, int n_node)
 }
 
 static void take_force(pal_tool_contact *to, const pal_body *body, const pal_tool_contact *from, const pal_body *old,
-                       pal_contact_points *touch, const pal_interpolation *place)
+                       pal_contact_points *points, const pal_interpolation *place)
 {
     double *sum = calloc(3 * (size_t)body->n_node + 1, sizeof *sum);
     if (sum && pal_finite3(from->total) && pal_norm3(from->total) > 0) {
-        sum_nodes(from, old, touch, place, sum);
+        sum_nodes(from, old, points, place, sum);
         to->hold.acts = keep_nodes(&to->hold, sum, body->n_node);
     }
     free(sum);
@@ -82,15 +82,15 @@ static void take_force(pal_tool_contact *to, const pal_body *body, const pal_too
 static void go_on(pal_tool_contact *to, const pal_tool_contact *from)
 {
     to->share = from->share;
-    if (!to->firm || !from->firm) return;
-    pal_copy3(to->firm->press.next_slip_m, from->firm->press.next_slip_m);
-    to->firm->press.next_slides = from->firm->press.next_slides;
-    to->firm->press.normal_N = from->firm->press.normal_N;
-    to->firm->haptic_stiffness = from->firm->haptic_stiffness;
+    if (!to->implicit || !from->implicit) return;
+    pal_copy3(to->implicit->solve.next_slip_m, from->implicit->solve.next_slip_m);
+    to->implicit->solve.next_slides = from->implicit->solve.next_slides;
+    to->implicit->solve.normal_N = from->implicit->solve.normal_N;
+    to->implicit->stiffness = from->implicit->stiffness;
 }
 
 void pal_tool_contact_transfer(pal_tool_contact *to, const pal_body *body, const pal_tool_contact *from,
-                               const pal_body *old, pal_contact_points *touch, const pal_interpolation *place,
+                               const pal_body *old, pal_contact_points *points, const pal_interpolation *place,
                                double k_N_m)
 {
     pal_tool_contact_free(to);
@@ -102,17 +102,17 @@ void pal_tool_contact_transfer(pal_tool_contact *to, const pal_body *body, const
     to->patches = from->patches;
     pal_copy3(to->slip, from->slip);
     if (!from->active) return;
-    if (to->firm) {
-        pal_copy3(to->firm->last_m, from->firm ? from->firm->last_m : from->limits.b);
-        to->firm->back_m = from->firm ? from->firm->back_m : 0;
+    if (to->implicit) {
+        pal_copy3(to->implicit->last_m, from->implicit ? from->implicit->last_m : from->limits.b);
+        to->implicit->back_m = from->implicit ? from->implicit->back_m : 0;
     }
     if (!place) {
         go_on(to, from);
         return;
     }
-    pal_copy3(to->hold.at_m, from->firm ? from->firm->last_m : from->limits.b);
+    pal_copy3(to->hold.at_m, from->implicit ? from->implicit->last_m : from->limits.b);
     to->hold.k_N_m = k_N_m;
-    take_force(to, body, from, old, touch, place);
+    take_force(to, body, from, old, points, place);
 }
 
 void pal_tool_contact_blend(pal_tool_contact *h, pal_step *step, pal_tool *tool, const double here_m[3])

@@ -13,15 +13,14 @@
 #define PAL_SIM_CONTACT_TOOL_CONTACT_H
 #include "server/sim/contact/contact_implicit.h"
 #include "server/sim/contact/contact_patch.h"
-#include "server/sim/contact/contact_points.h"
 #include "server/sim/contact/haptic_stiffness.h"
 #include "server/sim/contact/proxy.h"
 #include "server/sim/core/effect.h"
 
 /* what a tool needs beside with an implicit solver */
 typedef struct pal_tool_contact_implicit {
-    pal_contact_implicit press;
-    pal_haptic_stiffness haptic_stiffness;
+    pal_contact_implicit solve;
+    pal_haptic_stiffness stiffness;
     pal_contact_patches old_patches; /* published anew when the solver asks again */
     int n_old_patch;
     double old_side[3], old_back_m;
@@ -59,18 +58,18 @@ typedef struct pal_tool_contact {
     double slip[3];      /* sideways way of the tool over tissue that friction still holds, m */
     double uncapped_N;   /* normal force of the last sub-step before caps */
     bool retriangulated; /* other triangles are drawn since the step before */
-    double told;         /* the bound that `wanted` gave */
+    double wanted_1_s2;  /* interpolated: stiffness over mass that the solver made its sub-steps for */
     double share;        /* of the stiffness that is stable; falls at once, rises slowly; implicit: find_stiffening */
     double total[3];     /* on the tool, this sub-step, this body */
     pal_contact_patches patches;
     pal_contact_blend hold;
-    pal_tool_contact_implicit *firm; /* implicit solvers only */
+    pal_tool_contact_implicit *implicit; /* implicit solvers only */
 } pal_tool_contact;
 
-/* `to`, of `body`, goes on where `from`, of another body that stands in its place, is; touch: that body's, and place as
- * of pal_effect.hand; k_N_m as above, ramp of the tool. Without memory contact begins as it is. Both stand still */
+/* `to`, of `body`, goes on where `from`, of another body that stands in its place, is; points: that body's, and place
+ * as of pal_effect.hand; k_N_m as above, ramp of the tool. Without memory contact begins as it is. Both stand still */
 void pal_tool_contact_transfer(pal_tool_contact *to, const pal_body *body, const pal_tool_contact *from,
-                               const pal_body *old, pal_contact_points *touch, const pal_interpolation *place,
+                               const pal_body *old, pal_contact_points *points, const pal_interpolation *place,
                                double k_N_m);
 /* before contact in a sub-step: what is still held of the force of before, to body->load and the tool; share is then
  * what contact leaves to it. here_m: the tool, body frame */

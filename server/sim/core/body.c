@@ -117,9 +117,9 @@ void pal_body_add_display_offset(pal_body *body)
 {
     float part = (float)body->display_offset_part;
     /* of a body that adapts the points in use are written anew each time, the others stay */
-    int n = !body->display_offset_m ? 0 : body->adaptive ? body->n_active : body->n_shown;
+    int n = !body->display_offset_m ? 0 : body->active ? body->n_active : body->n_shown;
     for (int k = 0; k < n; k++) {
-        size_t i = 3 * (size_t)(body->adaptive ? body->active[k] : k);
+        size_t i = 3 * (size_t)(body->active ? body->active[k] : k);
         for (size_t c = i; c < i + 3; c++) body->shown[c] += part * body->display_offset_m[c];
     }
 }

@@ -7,8 +7,10 @@
 #include "server/mesh/volume/hexes.h"
 #include "server/mesh/volume/skin.h"
 #include "server/num/interpolation.h"
+#include "server/sim/core/dofs.h"
 #include "server/sim/core/safeguards.h"
 #include "server/sim/core/simd_blocks.h"
+#include "server/sim/core/tuning.h"
 
 /* The body's static answer to a load at its present shape, as far as the solver's factor knows it (haptics.md 2.3).
  * Published by an implicit solver that holds a static factor; rows stay apart, the body carries the door. */
@@ -72,13 +74,16 @@ typedef struct pal_body {
      * all is right and one over the active ones is fast: for (k < n_active) i = pal_body_point(body, k) */
     const int32_t *active; /* [n_active] */
     int n_active;
-    struct pal_adaptive_surface *adaptive; /* NULL: the body does not adapt */
-    struct pal_active_nodes *pack;         /* working arrays of rows and solver (active_nodes.h); NULL: none made */
-    struct pal_subdivision_solid
-        *solid;  /* model subdivision_fem (subdivision_solid.h); heap, freed with the world; NULL: another model */
-    bool frozen; /* set by finite_guard or the solver (pal_body_stop): it no longer moves  */
-    bool asleep; /* set by row sleep: at rest, so none of its rows is run until something comes near */
-    bool stale;  /* x has changed since its OUTPUT rows were run                                     */
+    struct pal_active_nodes *pack; /* working arrays of rows and solver (active_nodes.h); NULL: none made */
+    pal_dofs dofs;                 /* what else differs from model to model */
+    /* state of the model, for its own room and components; everybody else reads dofs. NULL: another model */
+    struct {
+        struct pal_adaptive_surface *adaptive;
+        struct pal_subdivision_solid *solid; /* heap, freed by dofs.destroy */
+    } model;
+    bool frozen;               /* set by finite_guard or the solver (pal_body_stop): it no longer moves  */
+    bool asleep;               /* set by row sleep: at rest, so none of its rows is run until something comes near */
+    bool stale;                /* x has changed since its OUTPUT rows were run                                     */
     uint64_t n_output;         /* times its OUTPUT rows were run since load: `shown` changed no more often        */
     double length_scale_m;     /* box diagonal at rest, S of numerics.md part 3                         */
     double edge_m;             /* typical element edge                                                  */
@@ -141,7 +146,8 @@ static inline int pal_body_nodes(const pal_body *body)
 /* load_cap_N of a body of this material: by what its edges are, where their constants are given */
 static inline double pal_body_load_cap_N(const pal_body *body, double young_Pa)
 {
-    return 10 * (body->spring_young_Pa > 0 ? body->spring_young_Pa : young_Pa) * body->edge_m * body->edge_m;
+    return PAL_LOAD_CAP_FACTOR * (body->spring_young_Pa > 0 ? body->spring_young_Pa : young_Pa) * body->edge_m *
+           body->edge_m;
 }
 /* most of a lasting load that a node bears (less of it beyond 2 S from its rest place, world_load.c): load_cap_N, and
  * of that the part that the node is of the corner of a full voxel, or of a solid's mean cell, as a sliver is as much
@@ -171,4 +177,11 @@ void pal_body_add_display_offset(pal_body *body);
 double pal_body_kinetic_J(const pal_body *body);
 void pal_body_momentum(const pal_body *body, double momentum_kg_m_s[3]);
 bool pal_body_finite(const pal_body *body);
+/* The body is frozen and body->why says so in one sentence; one that is frozen keeps its first reason. point: of the
+ * points the solver moves; -1: none to name. The sentence names the smallest element around it and its place at rest
+ * (scene frame, mm). No heap */
+void pal_body_stop(pal_body *body, int point, const char *format, ...) __attribute__((format(printf, 3, 4)));
+/* the same for a body with a position, velocity or force that is no number: names the first one; `otherwise` says what
+ * is wrong when there is none */
+void pal_body_stop_bad(pal_body *body, const char *otherwise);
 #endif

@@ -1,7 +1,7 @@
 /* Settings read from scenes and put into them. */
 #include "server/sim/core/configuration.h"
 
-#include "server/mesh/volume/loose_parts.h"
+#include "server/mesh/volume/loose_components.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -287,11 +287,11 @@ static double missing(const pal_prepared *mesh)
 /* what no support holds in voxels of this size is left out, as where a scene is made ready */
 static pal_err drop_loose(const pal_body_def *body, const double up[3], pal_prepared *mesh, pal_diagnostic *diag)
 {
-    pal_loose_parts parts;
+    pal_loose_components parts;
     uint8_t *fixed = calloc((size_t)mesh->tets.n_node, sizeof *fixed);
     if (!fixed) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory to find what is held");
     pal_body_def_hold(body, up, mesh->tets.x, mesh->tets.n_node, fixed);
-    pal_err err = pal_loose_parts_drop(body->name, fixed, false, mesh, &parts, diag);
+    pal_err err = pal_loose_components_drop(body->name, fixed, false, mesh, &parts, diag);
     free(fixed);
     return err;
 }

@@ -74,8 +74,9 @@ double pal_configuration_estimate_nodes(const pal_scene *from, int body, const p
 
 /* most nodes of a mesh that is made while sessions run, for the sake of their memory */
 enum { PAL_CONFIGURATION_LIVE_NODES = 100000 };
-/* What pal_switch_prepare refuses before it makes anything: pal_configuration_check, and a mesh of more than
- * PAL_CONFIGURATION_LIVE_NODES nodes (pal_configuration_estimate_nodes). Who offers a setting asks this first. [any] */
+/* What pal_configuration_switch_prepare refuses before it makes anything: pal_configuration_check, and a mesh of more
+ * than PAL_CONFIGURATION_LIVE_NODES nodes (pal_configuration_estimate_nodes). Who offers a setting asks this first.
+ * [any] */
 pal_err pal_configuration_check_live(const pal_scene *scene, int body, const pal_configuration *to,
                                      pal_diagnostic *diag);
 #endif

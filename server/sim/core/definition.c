@@ -61,17 +61,17 @@ pal_err pal_material_check(pal_material *material, pal_diagnostic *diag)
     const struct {
         const char *key;
         double value, low, high;
-    } range[] = {{"young_Pa", material->young_Pa, 1e-6, 1e15},
-                 {"poisson", material->poisson, -0.9999, 0.499999},
-                 {"density_kg_m3", material->density_kg_m3, 1e-24, 1e24},
-                 {"damping_1_s", material->damping_1_s, 0, 1e9}};
+    } range[] = {{"young_Pa", material->young_Pa, PAL_YOUNG_MIN_PA, PAL_YOUNG_MAX_PA},
+                 {"poisson", material->poisson, PAL_POISSON_MIN, PAL_POISSON_MAX},
+                 {"density_kg_m3", material->density_kg_m3, PAL_DENSITY_MIN_KG_M3, PAL_DENSITY_MAX_KG_M3},
+                 {"damping_1_s", material->damping_1_s, 0, PAL_DAMPING_MAX_1_S}};
     for (size_t i = 0; i < sizeof range / sizeof range[0]; i++)
         if (!(range[i].value >= range[i].low && range[i].value <= range[i].high))
             return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "material.%s: %g is outside [%g, %g]", range[i].key,
                                       range[i].value, range[i].low, range[i].high);
-    if (material->poisson > 0.4999) {
-        pal_diagnostic_set(diag, PAL_ERR_OK, "material.poisson: %g taken as 0.4999", material->poisson);
-        material->poisson = 0.4999;
+    if (material->poisson > PAL_POISSON_CLAMP) {
+        pal_diagnostic_set(diag, PAL_ERR_OK, "material.poisson: %g taken as %g", material->poisson, PAL_POISSON_CLAMP);
+        material->poisson = PAL_POISSON_CLAMP;
     }
     return PAL_ERR_OK;
 }
@@ -161,9 +161,9 @@ pal_err pal_spring_grid_check(const pal_body_def *def, pal_diagnostic *diag)
                                       g->low_m[c], c, g->high_m[c]);
         count *= g->n[c];
     }
-    if (count > 1 << 20)
+    if (count > PAL_SPRING_GRID_NODES_MAX)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" model.grid.n: %g nodes, at most %d", name, count,
-                                  1 << 20);
+                                  PAL_SPRING_GRID_NODES_MAX);
     if (!g->k_J[0] && !g->k_J[1] && !g->k_J[2])
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
                                   "body \"%s\" model.grid: gives neither k_distance_J, k_area_J nor k_volume_J", name);
@@ -261,7 +261,7 @@ pal_err pal_scene_check(const pal_scene *scene, pal_diagnostic *diag)
     for (int i = 0; i < scene->n_body; i++) PAL_TRY(check_body(scene, i, diag));
     for (int i = 0; i < scene->n_tool; i++) {
         const pal_tool_def *tool = &scene->tool[i];
-        if (!(tool->radius_m >= 0 && tool->radius_m <= 1e9))
+        if (!(tool->radius_m >= 0 && tool->radius_m <= PAL_LENGTH_MAX_M))
             return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "tools[%d].radius_m: %g is not a radius", i,
                                       tool->radius_m);
         if (!(tool->force_cap_N > 0 && tool->force_cap_N <= 1e9))

@@ -7,6 +7,7 @@
 #include "server/mesh/volume/prepared.h"
 #include "server/sim/core/config_entry.h"
 #include "server/sim/core/tools.h"
+#include "server/sim/core/tuning.h"
 
 enum { PAL_NAME = 48, PAL_BODY_MAX = 8, PAL_ENTRIES_MAX = 16, PAL_SUPPORT_MAX = 8, PAL_REGION_MAX = 32 };
 

@@ -46,7 +46,7 @@ void pal_material_overlay(const pal_body_def *def, const pal_material *base, con
         double poisson = grid && r->grid_poisson ? on_grid(r, r->grid_poisson, x) : r->poisson;
         double density = grid && r->grid_density_kg_m3 ? on_grid(r, r->grid_density_kg_m3, x) : r->density_kg_m3;
         if (!isnan(young_Pa)) out->young_Pa = young_Pa;
-        if (!isnan(poisson)) out->poisson = fmin(poisson, 0.4999);
+        if (!isnan(poisson)) out->poisson = fmin(poisson, PAL_POISSON_CLAMP);
         if (!isnan(density)) out->density_kg_m3 = density;
     }
 }
@@ -81,15 +81,15 @@ void pal_material_painted(const pal_body_def *def, const double x[3], pal_materi
 pal_err pal_stroke_check(const pal_stroke *s, pal_diagnostic *diag)
 {
     for (int c = 0; c < 3; c++)
-        if (!(fabs(s->at_m[c]) <= 1e9))
+        if (!(fabs(s->at_m[c]) <= PAL_LENGTH_MAX_M))
             return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "at_m[%d]: %g, wanted -1e9 to 1e9", c, s->at_m[c]);
-    if (!(s->radius_m > 0 && s->radius_m <= 1e9))
+    if (!(s->radius_m > 0 && s->radius_m <= PAL_LENGTH_MAX_M))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "radius_m: %g, wanted more than 0", s->radius_m);
     if (!(s->soft >= 0 && s->soft <= 1))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "soft: %g, wanted 0 to 1", s->soft);
-    if (!(s->young_factor >= 1e-6 && s->young_factor <= 1e6))
+    if (!(s->young_factor >= PAL_STROKE_FACTOR_MIN && s->young_factor <= PAL_STROKE_FACTOR_MAX))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "young_factor: %g, wanted 1e-6 to 1e6", s->young_factor);
-    if (!(s->density_factor >= 1e-6 && s->density_factor <= 1e6))
+    if (!(s->density_factor >= PAL_STROKE_FACTOR_MIN && s->density_factor <= PAL_STROKE_FACTOR_MAX))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "density_factor: %g, wanted 1e-6 to 1e6", s->density_factor);
     return PAL_ERR_OK;
 }
@@ -156,7 +156,8 @@ pal_err pal_region_check(const pal_body_def *def, int index, pal_diagnostic *dia
                                   "body \"%s\" regions[%d]: gives neither young_Pa, poisson nor "
                                   "density_kg_m3",
                                   def->name, index);
-    PAL_TRY(check_number(def, index, "young_Pa", r->young_Pa, young, 1e-6, 1e15, diag));
-    PAL_TRY(check_number(def, index, "poisson", r->poisson, poisson, -0.9999, 0.499999, diag));
-    return check_number(def, index, "density_kg_m3", r->density_kg_m3, density, 1e-24, 1e24, diag);
+    PAL_TRY(check_number(def, index, "young_Pa", r->young_Pa, young, PAL_YOUNG_MIN_PA, PAL_YOUNG_MAX_PA, diag));
+    PAL_TRY(check_number(def, index, "poisson", r->poisson, poisson, PAL_POISSON_MIN, PAL_POISSON_MAX, diag));
+    return check_number(def, index, "density_kg_m3", r->density_kg_m3, density, PAL_DENSITY_MIN_KG_M3,
+                        PAL_DENSITY_MAX_KG_M3, diag);
 }

@@ -21,14 +21,10 @@ typedef struct pal_safeguards {
     uint64_t ns;            /* time all of them took: forces on the split, searches, loads and moves shortened      */
 } pal_safeguards;
 
-uint64_t pal_safeguards_sum(const pal_safeguards *safeguards); /* how many in all, n_split left out [any] */
-
-struct pal_body;
-/* The body is frozen and body->why says so in one sentence; one that is frozen keeps its first reason. point: of the
- * points the solver moves; -1: none to name. The sentence names the smallest element around it and its place at rest
- * (scene frame, mm). No heap */
-void pal_body_stop(struct pal_body *body, int point, const char *format, ...) __attribute__((format(printf, 3, 4)));
-/* the same for a body with a position, velocity or force that is no number: names the first one; `otherwise` says what
- * is wrong when there is none */
-void pal_body_stop_bad(struct pal_body *body, const char *otherwise);
+/* how many in all; n_split is left out, since n_inversion covers it [any] */
+static inline uint64_t pal_safeguards_sum(const pal_safeguards *s)
+{
+    return s->n_capped + s->n_clamped + s->n_mass_scaled + s->n_inversion + s->n_search + s->n_tool_reset +
+           s->n_stopped;
+}
 #endif

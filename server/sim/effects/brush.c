@@ -166,11 +166,11 @@ static bool goes_on(const slot *s, const pal_brush *b)
 
 pal_err pal_brush_make(const pal_body *body, pal_arena *arena, pal_diagnostic *diag, void **self)
 {
-    if (body->adaptive || body->skin || !body->surface || !body->shown_node || body->n_shown == 0)
+    if (body->active || body->skin || !body->surface || !body->shown_node || body->n_shown == 0)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" has no brushes: %s", body->name,
-                                  body->adaptive ? "its surface adapts"
-                                  : body->skin   ? "it is shown by a skin; take output \"surface_output\""
-                                                 : "it shows nothing");
+                                  body->active ? "its surface adapts"
+                                  : body->skin ? "it is shown by a skin; take output \"surface_output\""
+                                               : "it shows nothing");
     brush_row *row = PAL_NEW(arena, brush_row, 1);
     if (!row) return PAL_ERR_MEMORY;
     row->body = body;

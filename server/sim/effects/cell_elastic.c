@@ -20,7 +20,7 @@
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    const pal_subdivision_solid *solid = build->body->solid;
+    const pal_subdivision_solid *solid = build->body->model.solid;
     const char *name = "polar";
     if (!solid)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model subdivision_fem",

@@ -93,7 +93,7 @@ static pal_err allocate(edge_spring *e, pal_arena *arena)
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    const pal_adaptive_surface *adaptive = build->body->adaptive;
+    const pal_adaptive_surface *adaptive = build->body->model.adaptive;
     if (!adaptive)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model adaptive_springs",
                                   item->path, item->name);

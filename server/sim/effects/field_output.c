@@ -70,9 +70,9 @@ static float finite_or_0(double value)
 static void displacement(const pal_body *body, float *value)
 {
     const double *rest = body->surface->x;
-    int n = body->adaptive ? body->n_active : body->n_shown;
+    int n = body->active ? body->n_active : body->n_shown;
     for (int k = 0; k < n; k++) {
-        int i = body->adaptive ? body->active[k] : k;
+        int i = body->active ? body->active[k] : k;
         double sum = 0;
         for (int c = 0; c < 3; c++) {
             double moved = (double)body->shown[3 * (size_t)i + (size_t)c] - rest[3 * (size_t)i + (size_t)c];

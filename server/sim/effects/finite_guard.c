@@ -11,7 +11,6 @@
 #include "server/base/vec3.h"
 #include "server/sim/core/effect.h"
 #include "server/sim/core/sums.h"
-#include "server/sim/surface/adaptive_surface.h"
 
 #include <math.h>
 #include <string.h>
@@ -65,7 +64,7 @@ static void put_back(finite_guard *guard, pal_body *body)
     size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
     for (int k = 0; k < body->n_active && guard->kept; k++) {
         int32_t i = body->active[k];
-        last_place(guard, &body->adaptive->levels, i, body->x + 3 * (size_t)i);
+        last_place(guard, body->dofs.levels, i, body->x + 3 * (size_t)i);
         pal_set3(body->v + 3 * (size_t)i, 0, 0, 0);
     }
     if (guard->kept) return;
@@ -92,8 +91,8 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     finite_guard *guard = PAL_NEW(build->arena, finite_guard, 1);
     if (!guard) return PAL_ERR_MEMORY;
     guard->x = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
-    if (body->adaptive) guard->kept = PAL_NEW(build->arena, uint32_t, body->n_dof);
-    if (!guard->x || (body->adaptive && !guard->kept)) return PAL_ERR_MEMORY;
+    if (body->active) guard->kept = PAL_NEW(build->arena, uint32_t, body->n_dof);
+    if (!guard->x || (body->active && !guard->kept)) return PAL_ERR_MEMORY;
     guard->body = body;
     guard->reach = reach;
     guard->gravity_m_s2 = fabs(build->scene->gravity_m_s2);

@@ -76,7 +76,7 @@ static double volume(const double *x, const int32_t *tri, int n_tri)
 
 static pal_err check_surface(inflate *row, const pal_config_entry *item, const pal_build *build)
 {
-    const pal_adaptive_surface *adaptive = build->body->adaptive;
+    const pal_adaptive_surface *adaptive = build->body->model.adaptive;
     if (!adaptive)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model adaptive_springs",
                                   item->path, item->name);
@@ -124,7 +124,7 @@ static void follow(inflate *row, const pal_adaptive_surface *adaptive)
  * exact gradient, and V is a third of the sum of x . dV/dx */
 static double measure_volume(inflate *row, const pal_body *body)
 {
-    const pal_adaptive_surface *adaptive = body->adaptive;
+    const pal_adaptive_surface *adaptive = body->model.adaptive;
     const double *from = body->d + 3 * (size_t)pal_body_point(body, 0);
     double sum = 0;
     for (int k = 0; k < body->n_active; k++)
@@ -176,7 +176,7 @@ static answer answer_to(const inflate *row, double s)
 /* p V_0/V_rest: the force is that times row->gradient; s and the gradient at the present positions */
 static double push(inflate *row, const pal_body *body, double *s)
 {
-    follow(row, body->adaptive);
+    follow(row, body->model.adaptive);
     *s = measure_volume(row, body) / row->rest_m3;
     double p = row->share * row->pressure_Pa + row->stiff_Pa * answer_to(row, *s).value;
     return p * fabs(row->fine_m3) / row->rest_m3;
@@ -211,7 +211,7 @@ static double energy(void *self, const pal_body *body)
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
     inflate *row = self;
-    const pal_adaptive_surface *adaptive = body->adaptive;
+    const pal_adaptive_surface *adaptive = body->model.adaptive;
     double s, sum = 0;
     (void)push(row, body, &s);
     const answer now = answer_to(row, s);

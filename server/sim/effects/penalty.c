@@ -55,7 +55,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     penalty *row = PAL_NEW(build->arena, penalty, 1);
     if (!row) return PAL_ERR_MEMORY;
     PAL_TRY(read_keys(row, item, build, &box, low, high, &lowest));
-    if (body->adaptive)
+    if (body->active)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
                                   "%s: penalty holds no body that adapts: give it supports", item->path);
     row->node = PAL_NEW(build->arena, int32_t, body->n_node);

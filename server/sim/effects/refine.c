@@ -128,7 +128,7 @@ static double mean_edge(const pal_levels *levels)
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    pal_adaptive_surface *adaptive = build->body->adaptive;
+    pal_adaptive_surface *adaptive = build->body->model.adaptive;
     if (!adaptive)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
                                   "%s: refine needs a surface of levels, model adaptive_springs", item->path);

@@ -62,7 +62,7 @@ static bool is_held(const pal_body *body)
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     const char *frame = is_held(build->body) ? "world" : "body";
-    if (!build->body->adaptive)
+    if (!build->body->model.adaptive)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model adaptive_springs",
                                   item->path, item->name);
     shape_spring *row = PAL_NEW(build->arena, shape_spring, 1);
@@ -98,14 +98,15 @@ static double damp_1_s(const shape_spring *row, const pal_adaptive_surface *adap
 /* frame: where the last fit ended, and the new one; packed: of body->pack */
 static hold find_hold(const shape_spring *row, const pal_body *body, pal_rigid_fit *frame, bool packed)
 {
-    hold h = {
-        .R = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .k = stiff_1_s2(row, body->adaptive), .c = damp_1_s(row, body->adaptive)};
+    hold h = {.R = {1, 0, 0, 0, 1, 0, 0, 0, 1},
+              .k = stiff_1_s2(row, body->model.adaptive),
+              .c = damp_1_s(row, body->model.adaptive)};
     if (row->world) return h;
     double at[3];
     if (packed)
-        pal_adaptive_fit_rigid_active(body->adaptive, body->pack, frame);
+        pal_adaptive_fit_rigid_active(body->model.adaptive, body->pack, frame);
     else
-        pal_adaptive_fit_rigid(body->adaptive, body, frame);
+        pal_adaptive_fit_rigid(body->model.adaptive, body, frame);
     memcpy(h.R, frame->R, sizeof h.R);
     pal_mul33(at, h.R, frame->rest_centre_m);
     pal_sub3(h.shift, frame->centre_m, at);
@@ -170,7 +171,7 @@ static double energy(void *self, const pal_body *body)
 /* the frame only takes motion away from what is stretched or damped, so the anchors alone bound both */
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
-    double k = stiff_1_s2(self, body->adaptive);
+    double k = stiff_1_s2(self, body->model.adaptive);
     for (int n = 0; n < body->n_active; n++) {
         int i = pal_body_point(body, n);
         bound_N_m[i] += k * body->mass_kg[i];
@@ -179,7 +180,7 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 
 static void damping(void *self, const pal_body *body, double *bound_Ns_m)
 {
-    double c = damp_1_s(self, body->adaptive);
+    double c = damp_1_s(self, body->model.adaptive);
     for (int n = 0; n < body->n_active; n++) {
         int i = pal_body_point(body, n);
         bound_Ns_m[i] += c * body->mass_kg[i];

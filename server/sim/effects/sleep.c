@@ -19,7 +19,6 @@
  * Keys: rest_time_s (0.5), speed_1_s (1e-4), rest_1_s2 (1e-4). */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect.h"
-#include "server/sim/surface/adaptive_surface.h"
 
 #include <math.h>
 #include <string.h>
@@ -67,15 +66,15 @@ static bool changes(const pal_component *row, int n, double time_s)
 
 static const float *shown_vertex(const pal_body *body, int k)
 {
-    return body->shown + 3 * (size_t)(body->adaptive ? body->active[k] : k);
+    return body->shown + 3 * (size_t)(body->active ? body->active[k] : k);
 }
 
 /* box of what is shown and its longest edge */
 static void measure(sleeper *row, const pal_body *body)
 {
-    const int32_t *tri = body->adaptive ? body->adaptive->tri : body->surface->tri;
-    int n_tri = body->adaptive ? body->adaptive->n_tri : body->surface->n_tri;
-    int n_shown = body->adaptive ? body->n_active : body->n_shown;
+    const int32_t *tri = body->surface->tri;
+    int n_tri = body->surface->n_tri;
+    int n_shown = body->active ? body->n_active : body->n_shown;
     double edge2 = 0;
     for (int c = 0; c < 3; c++) row->low[c] = INFINITY, row->high[c] = -INFINITY;
     for (int k = 0; k < n_shown; k++)
@@ -104,7 +103,7 @@ static bool passes_box(const sleeper *row, const double a[3], const double b[3],
 /* does it come within reach of a vertex? */
 static bool passes_vertex(const pal_body *body, const double a[3], const double b[3], double reach)
 {
-    int n_shown = body->adaptive ? body->n_active : body->n_shown;
+    int n_shown = body->active ? body->n_active : body->n_shown;
     double way[3], reach2 = reach * reach;
     pal_sub3(way, b, a);
     double way2 = pal_dot3(way, way);

@@ -5,7 +5,6 @@
  * triangles of its present leaves; a step costs what its active points do. Of a solid (sim/subdivision_solid.h) the
  * model has said what is its boundary and which node each vertex is. */
 #include "server/sim/core/effect.h"
-#include "server/sim/surface/adaptive_surface.h"
 
 #include <string.h>
 
@@ -57,7 +56,6 @@ static pal_err make_adaptive(pal_build *build, void **self)
     for (int i = 0; i < body->n_node; i++) node[i] = i;
     out->body = body;
     out->revision = body->revision;
-    body->surface = &body->adaptive->surface;
     body->n_shown = body->n_node;
     body->shown = shown;
     body->shown_node = node;
@@ -87,8 +85,8 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     pal_body *body = build->body;
-    if (body->adaptive) return make_adaptive(build, self);
-    if (body->solid) return make_solid(build, self);
+    if (body->active) return make_adaptive(build, self);
+    if (body->interpolation) return make_solid(build, self);
     const pal_tets *tets = body->tets;
     if (!tets || tets->n_face == 0 || tets->n_node > body->n_node)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: the body has no boundary faces to show",
@@ -132,7 +130,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 
 static pal_err run(void *self, pal_step *step)
 {
-    if (step->body->adaptive)
+    if (step->body->active)
         evaluate_active(self);
     else
         evaluate(step->body);
@@ -142,7 +140,7 @@ static pal_err run(void *self, pal_step *step)
 static void reset(void *self, const pal_body *body)
 {
     surface_output *out = self;
-    if (body->adaptive)
+    if (body->active)
         evaluate_active(out);
     else
         evaluate(out->body);

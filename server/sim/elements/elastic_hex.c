@@ -1,34 +1,12 @@
-/* Voxel hexahedra: layout, material, untangling. */
-#include "server/sim/elements/elastic_hex_simd.h"
+/* Voxel hexahedra: layout, material, assembly. */
+#include "server/sim/elements/elastic_hex.h"
 
-/* least share of material (numerics.md, border voxels), and the corner determinant below which cubes are tangled */
-static const double least_share = 0.02, least_corner = 0.05;
-/* and above which: blown up, where the neo-Hookean energy, which grows with the square, lets nothing else count, and
- * where nearly incompressible bodies take detours */
-static const double most_corner = 30;
-/* where a body on its split is whole again, at least and at most */
-static const double least_whole = 0.3, most_needed = 0.9, most_whole = 20;
-/* tangled again within so many looks, one a Newton iteration: in vain; then its corners have to be that much better */
-enum { SOON = 600 };
-static const double better = 0.05;
-/* of the split: turned over voxels have no volume to keep, and five tetrahedra each lock well below 0.5 */
+#include <math.h>
+
+/* least share of material of a border voxel, so that no node is left nearly without stiffness and mass */
+static const double least_share = 0.02;
+/* of the split: inverted voxels have no volume to keep, and five tetrahedra a voxel lock well below 0.5 */
 static const double max_poisson = 0.3;
-
-/* K for mu = 1 and for lambda = 1, times 16 / h, in pairs of corners */
-static void fill_reference(pal_elastic_hexes *row)
-{
-    for (int part = 0; part < 2; part++)
-        for (int d = 0; d < 8; d++)
-            for (int j = 0; j < 3; j++) {
-                pal_wide u[3][8] = {{{0}}};
-                u[j][d] = wide_of(1);
-                for (int i = 0; i < 3; i++) walsh(u[i]);
-                hex_stress(wide_of(part == 0), wide_of(part == 1), wide_of(row->beta[part]), u);
-                for (int i = 0; i < 3; i++) unwalsh(u[i]);
-                for (int c = 0; c <= d; c++)
-                    for (int i = 0; i < 3; i++) row->reference[pal_hex_pair(c, d)][part][3 * i + j] = u[i][c][0];
-            }
-}
 
 void pal_hex_material(pal_elastic_hexes *row, const pal_material *material)
 {
@@ -52,8 +30,7 @@ void pal_hex_reset(pal_elastic_hexes *row)
             for (int i = 0; i < 4; i++) row->q[(4 * b + i) * PAL_LANES + l] = i == 0;
             for (int i = 0; i < 9; i++) row->turn[(9 * b + i) * PAL_LANES + l] = i % 4 == 0;
         }
-    row->has_inversion = false;
-    row->n_whole = SOON, row->needed = row->tried = least_whole;
+    pal_hex_recovery_reset(row);
     pal_force_cache_invalidate(&row->kept);
     row->n_inversion = row->n_switch = 0;
     row->n_slow = 0;
@@ -146,82 +123,11 @@ pal_err pal_hex_make(const pal_hex_options *wish, pal_build *build, const char *
         out->hex[lane] = e;
         out->share[lane] = filled ? 1 : fmax(least_share, fmin(1, (double)out->hexes->fill[e]));
     }
-    fill_reference(out);
+    pal_hex_fill_reference(out);
     if (wish->recover && wish->law != PAL_LAW_LINEAR) PAL_TRY(make_split(out, build, path));
     pal_hex_material(out, &build->def->material);
     pal_hex_reset(out);
     return PAL_ERR_OK;
-}
-
-/* least and largest of the determinants of the three edges at each corner */
-PAL_WIDE_INLINE void range_of_corners(const hex_view *v, int l, pal_wide *low, pal_wide *high)
-{
-    pal_wide x[8][3], least = wide_of(INFINITY), most = wide_of(-INFINITY);
-    for (int c = 0; c < 8; c++)
-        for (int d = 0; d < 3; d++) x[c][d] = wide_load(v->x[c][d] + l);
-    for (int c = 0; c < 8; c++) {
-        pal_wide a[3], b[3], e[3];
-        for (int d = 0; d < 3; d++) {
-            a[d] = x[c | 1][d] - x[c & 6][d];
-            b[d] = x[c | 2][d] - x[c & 5][d];
-            e[d] = x[c | 4][d] - x[c & 3][d];
-        }
-        pal_wide det = a[0] * (b[1] * e[2] - b[2] * e[1]) + a[1] * (b[2] * e[0] - b[0] * e[2]) +
-                       a[2] * (b[0] * e[1] - b[1] * e[0]);
-        least = wide_pick(det < least, det, least);
-        most = wide_pick(det > most, det, most);
-    }
-    *low = least, *high = most;
-}
-
-/* over all voxels, h^3 */
-static void corner_range(const pal_elastic_hexes *row, const pal_body *body, double *low, double *high)
-{
-    const double volume = row->edge_m * row->edge_m * row->edge_m;
-    pal_wide least = wide_of(INFINITY), most = wide_of(-INFINITY);
-    pal_node_order_load(body->node_order, body->d);
-    for (int b = 0; b < row->n_block; b++) {
-        hex_view v;
-        hex_open(row, body->node_order, b, &v);
-        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
-            pal_wide small, large;
-            range_of_corners(&v, l, &small, &large);
-            pal_wide_mask live = wide_load(row->share + PAL_LANES * b + l) > 0;
-            least = wide_pick(live & (small < least), small, least);
-            most = wide_pick(live & (large > most), large, most);
-        }
-    }
-    *low = INFINITY, *high = -INFINITY;
-    for (int l = 0; l < PAL_WIDE; l++) *low = fmin(*low, least[l] / volume), *high = fmax(*high, most[l] / volume);
-}
-
-double pal_hex_min_corner(const pal_elastic_hexes *row, const pal_body *body)
-{
-    double low, high;
-    corner_range(row, body, &low, &high);
-    return low;
-}
-
-bool pal_hex_recover(pal_elastic_hexes *row, const pal_body *body)
-{
-    if (!row->split) return false;
-    double low, high;
-    corner_range(row, body, &low, &high);
-    const bool before = row->has_inversion;
-    if (before) {
-        row->has_inversion = low < row->needed || high > most_whole;
-        if (!row->has_inversion) row->n_whole = 0, row->tried = low;
-    } else {
-        row->has_inversion = low < least_corner || high > most_corner;
-        if (row->n_whole < SOON) row->n_whole++;
-    }
-    if (row->has_inversion && !before) {
-        row->needed = row->n_whole < SOON ? fmin(fmax(row->needed, row->tried) + better, most_needed) : least_whole;
-        pal_elastic_tets_reset(row->split);
-    }
-    row->n_inversion += row->has_inversion;
-    row->n_switch += row->has_inversion != before;
-    return row->has_inversion != before;
 }
 
 /* where each pair of corners stands in the pattern */

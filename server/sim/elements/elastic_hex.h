@@ -69,6 +69,8 @@ typedef struct pal_hex_options {
 pal_err pal_hex_make(const pal_hex_options *wish, pal_build *build, const char *path, pal_elastic_hexes *out);
 void pal_hex_material(pal_elastic_hexes *row, const pal_material *material);
 void pal_hex_reset(pal_elastic_hexes *row);
+/* no inversion, nothing tried yet */
+void pal_hex_recovery_reset(pal_elastic_hexes *row);
 /* looks at all corners and chooses between cubes and split; true: it changed */
 bool pal_hex_recover(pal_elastic_hexes *row, const pal_body *body);
 double pal_hex_min_corner(const pal_elastic_hexes *row, const pal_body *body); /* least corner determinant, h^3 */
@@ -86,6 +88,8 @@ void pal_hex_stress(pal_elastic_hexes *row, const pal_body *body, pal_stress_tak
 
 /* the laws: body->slots->x holds positions (or p), forces (or products) are added to body->slots->f */
 void pal_hex_corot_force(pal_elastic_hexes *row, pal_node_order *node_order);
+/* row->reference: K for mu = 1 and for lambda = 1 */
+void pal_hex_fill_reference(pal_elastic_hexes *row);
 /* with forces: added as by ..force too */
 double pal_hex_corot_energy(pal_elastic_hexes *row, pal_node_order *node_order, bool forces);
 void pal_hex_corot_linearise(pal_elastic_hexes *row, pal_node_order *node_order);

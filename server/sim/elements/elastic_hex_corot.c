@@ -9,10 +9,10 @@
 #include "server/sim/elements/elastic_hex_simd.h"
 
 /* coefficients of 8 lanes from l on */
-PAL_WIDE_INLINE void load_stiff(const pal_elastic_hexes *row, int block, int l, double k, pal_wide stiff[3])
+PAL_INLINE void load_stiff(const pal_elastic_hexes *row, int block, int l, double k, pal_wide stiff[3])
 {
-    stiff[0] = k * wide_load(row->mu + PAL_LANES * block + l);
-    stiff[1] = k * wide_load(row->lambda + PAL_LANES * block + l);
+    stiff[0] = k * pal_wide_load(row->mu + PAL_LANES * block + l);
+    stiff[1] = k * pal_wide_load(row->lambda + PAL_LANES * block + l);
     stiff[2] = row->beta[0] * stiff[0] + row->beta[1] * stiff[1];
 }
 
@@ -20,7 +20,7 @@ PAL_WIDE_INLINE void load_stiff(const pal_elastic_hexes *row, int block, int l, 
 static const int bent[4] = {3, 5, 6, 7};
 
 /* g += the forces of the rotation's own change; x: coordinates in the frame of the cube, all but translation */
-PAL_WIDE_INLINE void turn_force(pal_wide x[3][8], pal_wide g[3][8])
+PAL_INLINE void turn_force(pal_wide x[3][8], pal_wide g[3][8])
 {
     pal_wide tx = wide_of(0), ty = wide_of(0), tz = wide_of(0);
     for (int n = 0; n < 4; n++) {
@@ -36,7 +36,7 @@ PAL_WIDE_INLINE void turn_force(pal_wide x[3][8], pal_wide g[3][8])
     pal_wide det = xx * cxx + xy * cxy + xz * cxz, t = xx + yy + zz;
     /* left out where the rotation is hardly known: collapsed and turned over cubes */
     pal_wide_mask good = (det > 1e-3 * (t * t * t)) & (t > 0);
-    pal_wide inverse = wide_pick(good, wide_of(1), wide_of(0)) / wide_pick(good, det, wide_of(1));
+    pal_wide inverse = pal_wide_select(good, wide_of(1), wide_of(0)) / pal_wide_select(good, det, wide_of(1));
     pal_wide wx = inverse * (cxx * tx + cxy * ty + cxz * tz), wy = inverse * (cxy * tx + cyy * ty + cyz * tz);
     pal_wide wz = inverse * (cxz * tx + cyz * ty + czz * tz);
     g[2][2] += wx, g[1][4] -= wx;
@@ -47,7 +47,7 @@ PAL_WIDE_INLINE void turn_force(pal_wide x[3][8], pal_wide g[3][8])
 enum { FORCE = 1, ENERGY = 2 };
 
 /* forces are added, the energy is returned */
-PAL_WIDE_INLINE double all_blocks(pal_elastic_hexes *row, pal_node_order *node_order, bool turned, int what)
+PAL_INLINE double all_blocks(pal_elastic_hexes *row, pal_node_order *node_order, bool turned, int what)
 {
     pal_wide sum = {0};
     row->n_slow = 0;
@@ -70,7 +70,7 @@ PAL_WIDE_INLINE double all_blocks(pal_elastic_hexes *row, pal_node_order *node_o
                     e += m == 1 << i ? (x[i][m] - 4 * row->edge_m) * u[i][m] : x[i][m] * u[i][m];
             }
             /* what lanes without element read need not be finite */
-            if (what & ENERGY) sum += wide_pick(stiff[0] < 0, e, wide_of(0));
+            if (what & ENERGY) sum += pal_wide_select(stiff[0] < 0, e, wide_of(0));
             if (!(what & FORCE)) continue;
             if (turned) {
                 turn_force(x, u);
@@ -111,12 +111,12 @@ void pal_hex_corot_linearise(pal_elastic_hexes *row, pal_node_order *node_order)
             pal_wide u[3][8], r[9];
             hex_modes(&v, l, u);
             row->n_slow += hex_turn_block(row, b, l, u, r);
-            for (int i = 0; i < 9; i++) wide_store(row->turn + (9 * b + i) * PAL_LANES + l, r[i]);
+            for (int i = 0; i < 9; i++) pal_wide_store(row->turn + (9 * b + i) * PAL_LANES + l, r[i]);
         }
     }
 }
 
-PAL_WIDE_INLINE void multiply_all(const pal_elastic_hexes *row, pal_node_order *node_order, double k, bool turned)
+PAL_INLINE void multiply_all(const pal_elastic_hexes *row, pal_node_order *node_order, double k, bool turned)
 {
     for (int b = 0; b < row->n_block; b++) {
         hex_view v;
@@ -124,7 +124,7 @@ PAL_WIDE_INLINE void multiply_all(const pal_elastic_hexes *row, pal_node_order *
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             pal_wide u[3][8], r[9], stiff[3];
             hex_modes(&v, l, u);
-            for (int i = 0; i < 9 && turned; i++) r[i] = wide_load(row->turn + (9 * b + i) * PAL_LANES + l);
+            for (int i = 0; i < 9 && turned; i++) r[i] = pal_wide_load(row->turn + (9 * b + i) * PAL_LANES + l);
             if (turned) hex_unrotate(r, u);
             load_stiff(row, b, l, k, stiff);
             hex_stress(stiff[0], stiff[1], stiff[2], u);
@@ -148,7 +148,7 @@ void pal_hex_corot_blocks(const pal_elastic_hexes *row, int block, double k, dou
     for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
         pal_wide stiff[3], r[9];
         load_stiff(row, block, l, k, stiff);
-        for (int i = 0; i < 9; i++) r[i] = wide_load(row->turn + (9 * block + i) * PAL_LANES + l);
+        for (int i = 0; i < 9; i++) r[i] = pal_wide_load(row->turn + (9 * block + i) * PAL_LANES + l);
         for (int p = 0; p < 36; p++) {
             pal_wide a[9], t[9];
             for (int i = 0; i < 9; i++) a[i] = stiff[0] * row->reference[p][0][i] + stiff[1] * row->reference[p][1][i];
@@ -157,8 +157,24 @@ void pal_hex_corot_blocks(const pal_elastic_hexes *row, int block, double k, dou
                     t[3 * i + j] = r[3 * i] * a[j] + r[3 * i + 1] * a[3 + j] + r[3 * i + 2] * a[6 + j];
             for (int i = 0; i < 3; i++)
                 for (int j = 0; j < 3; j++)
-                    wide_store(to + (9 * p + 3 * i + j) * PAL_LANES + l,
-                               t[3 * i] * r[3 * j] + t[3 * i + 1] * r[3 * j + 1] + t[3 * i + 2] * r[3 * j + 2]);
+                    pal_wide_store(to + (9 * p + 3 * i + j) * PAL_LANES + l,
+                                   t[3 * i] * r[3 * j] + t[3 * i + 1] * r[3 * j + 1] + t[3 * i + 2] * r[3 * j + 2]);
         }
     }
+}
+
+/* K for mu = 1 and for lambda = 1, times 16 / h, in pairs of corners */
+void pal_hex_fill_reference(pal_elastic_hexes *row)
+{
+    for (int part = 0; part < 2; part++)
+        for (int d = 0; d < 8; d++)
+            for (int j = 0; j < 3; j++) {
+                pal_wide u[3][8] = {{{0}}};
+                u[j][d] = wide_of(1);
+                for (int i = 0; i < 3; i++) walsh(u[i]);
+                hex_stress(wide_of(part == 0), wide_of(part == 1), wide_of(row->beta[part]), u);
+                for (int i = 0; i < 3; i++) unwalsh(u[i]);
+                for (int c = 0; c <= d; c++)
+                    for (int i = 0; i < 3; i++) row->reference[pal_hex_pair(c, d)][part][3 * i + j] = u[i][c][0];
+            }
 }

@@ -16,11 +16,10 @@
 static const double gauss = 0.57735026918962576451;
 
 /* mu, k1 and kappa of the mean dilatation, times share and h / 16 */
-PAL_WIDE_INLINE void load_neo(const pal_elastic_hexes *row, int block, int l, pal_wide *mu, pal_wide *k1,
-                              pal_wide *kappa)
+PAL_INLINE void load_neo(const pal_elastic_hexes *row, int block, int l, pal_wide *mu, pal_wide *k1, pal_wide *kappa)
 {
-    pal_wide lambda = wide_load(row->lambda + PAL_LANES * block + l);
-    *mu = wide_load(row->mu + PAL_LANES * block + l);
+    pal_wide lambda = pal_wide_load(row->lambda + PAL_LANES * block + l);
+    *mu = pal_wide_load(row->mu + PAL_LANES * block + l);
     if (row->element == PAL_HEX_BBAR)
         *k1 = *mu * (1.0 / 3), *kappa = lambda + *mu * (2.0 / 3);
     else
@@ -28,7 +27,7 @@ PAL_WIDE_INLINE void load_neo(const pal_elastic_hexes *row, int block, int l, pa
 }
 
 /* F at the Gauss points from the modes; point p at the signs of its bits */
-PAL_WIDE_INLINE void gauss_gradients(double scale, pal_wide u[3][8], pal_wide f[8][9])
+PAL_INLINE void gauss_gradients(double scale, pal_wide u[3][8], pal_wide f[8][9])
 {
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
@@ -44,7 +43,7 @@ PAL_WIDE_INLINE void gauss_gradients(double scale, pal_wide u[3][8], pal_wide f[
 }
 
 /* the transposed: sums over the points of p_ij times the modes' gradients, modes 1..7 */
-PAL_WIDE_INLINE void gauss_sums(double scale, pal_wide p[8][9], pal_wide u[3][8])
+PAL_INLINE void gauss_sums(double scale, pal_wide p[8][9], pal_wide u[3][8])
 {
     for (int i = 0; i < 3; i++) {
         for (int m = 0; m < 8; m++) u[i][m] = wide_of(0);
@@ -62,7 +61,7 @@ PAL_WIDE_INLINE void gauss_sums(double scale, pal_wide p[8][9], pal_wide u[3][8]
 }
 
 /* cofactors c = dJ/dF; returns J */
-PAL_WIDE_INLINE pal_wide cofactors(const pal_wide f[9], pal_wide c[9])
+PAL_INLINE pal_wide cofactors(const pal_wide f[9], pal_wide c[9])
 {
     c[0] = f[4] * f[8] - f[5] * f[7], c[1] = f[5] * f[6] - f[3] * f[8], c[2] = f[3] * f[7] - f[4] * f[6];
     c[3] = f[2] * f[7] - f[1] * f[8], c[4] = f[0] * f[8] - f[2] * f[6], c[5] = f[1] * f[6] - f[0] * f[7];
@@ -71,7 +70,7 @@ PAL_WIDE_INLINE pal_wide cofactors(const pal_wide f[9], pal_wide c[9])
 }
 
 /* volume now over that at rest, - 1 */
-PAL_WIDE_INLINE pal_wide mean_dilatation(pal_wide f[8][9])
+PAL_INLINE pal_wide mean_dilatation(pal_wide f[8][9])
 {
     pal_wide sum = wide_of(-8), c[9];
     for (int p = 0; p < 8; p++) sum += cofactors(f[p], c);
@@ -81,7 +80,7 @@ PAL_WIDE_INLINE pal_wide mean_dilatation(pal_wide f[8][9])
 enum { FORCE = 1, ENERGY = 2 };
 
 /* forces are added, the energy is returned */
-PAL_WIDE_INLINE double all_blocks(const pal_elastic_hexes *row, pal_node_order *node_order, int what)
+PAL_INLINE double all_blocks(const pal_elastic_hexes *row, pal_node_order *node_order, int what)
 {
     pal_wide sum = {0};
     for (int b = 0; b < row->n_block; b++) {
@@ -100,7 +99,7 @@ PAL_WIDE_INLINE double all_blocks(const pal_elastic_hexes *row, pal_node_order *
                 for (int i = 0; i < 9 && (what & FORCE); i++) f[p][i] = mu * f[p][i] + t * c[i];
             }
             e = 0.125 * e + 0.5 * kappa * mean * mean;
-            if (what & ENERGY) sum += wide_pick(mu > 0, e, wide_of(0));
+            if (what & ENERGY) sum += pal_wide_select(mu > 0, e, wide_of(0));
             if (!(what & FORCE)) continue;
             gauss_sums(-0.5 * row->edge_m, f, u);
             hex_add(&v, l, u);
@@ -123,14 +122,14 @@ double pal_hex_neo_energy(pal_elastic_hexes *row, pal_node_order *node_order, bo
 }
 
 /* place of (r, s), r >= s, in the packed K; unknown 7 axis + mode - 1 */
-PAL_WIDE_INLINE int packed(int r, int s)
+PAL_INLINE int packed(int r, int s)
 {
     return r * (r + 1) / 2 + s;
 }
 
 /* K in modes from the transforms of the points' Hessians h [45][8] (packed over entries of F) and the mean's gradient
  */
-PAL_WIDE_INLINE void store_tangent(double *to, pal_wide h[45][8], pal_wide kappa, pal_wide mean[3][8])
+PAL_INLINE void store_tangent(double *to, pal_wide h[45][8], pal_wide kappa, pal_wide mean[3][8])
 {
     static const double power[5] = {0.125, 0.125 * 0.57735026918962576451, 0.125 / 3,
                                     0.125 / 3 * 0.57735026918962576451, 0.125 / 9};
@@ -148,20 +147,20 @@ PAL_WIDE_INLINE void store_tangent(double *to, pal_wide h[45][8], pal_wide kappa
                     const int j = axis_of[m][a], q = axis_of[n][b], x = 3 * i + j, y = 3 * k + q;
                     sum += h[x >= y ? packed(x, y) : packed(y, x)][m ^ 1 << j ^ n ^ 1 << q];
                 }
-            wide_store(to + packed(r, s) * PAL_LANES, power[size_of[m] + size_of[n] - 2] * sum + own * mean[k][n]);
+            pal_wide_store(to + packed(r, s) * PAL_LANES, power[size_of[m] + size_of[n] - 2] * sum + own * mean[k][n]);
         }
     }
 }
 
 /* one Jacobi rotation of the symmetric a (xx yy zz yz xz xy) in the plane p, q; columns of v turn along */
-PAL_WIDE_INLINE void jacobi_turn(pal_wide a[6], pal_wide v[9], int p, int q)
+PAL_INLINE void jacobi_turn(pal_wide a[6], pal_wide v[9], int p, int q)
 {
     const int o = 3 - p - q;
     pal_wide *app = a + p, *aqq = a + q, *apq = a + 3 + o, *apo = a + 3 + q, *aqo = a + 3 + p;
     pal_wide d = *aqq - *app, twice = 2 * *apq, sum = d * d + twice * twice;
     pal_wide_mask turned = sum > 1e-280, down = d < 0;
-    pal_wide root = wide_root(sum) + wide_pick(down, -d, d);
-    pal_wide t = wide_pick(down, -twice, twice) / wide_pick(turned, root, wide_of(1));
+    pal_wide root = wide_root(sum) + pal_wide_select(down, -d, d);
+    pal_wide t = pal_wide_select(down, -twice, twice) / pal_wide_select(turned, root, wide_of(1));
     pal_wide c = 1 / wide_root(1 + t * t), s = t * c;
     *app -= t * *apq, *aqq += t * *apq, *apq = wide_of(0);
     pal_wide x = *apo, y = *aqo;
@@ -173,7 +172,7 @@ PAL_WIDE_INLINE void jacobi_turn(pal_wide a[6], pal_wide v[9], int p, int q)
 }
 
 /* eigenvalues a[0..2] and eigenvectors, columns of v, of a symmetric matrix (xx yy zz yz xz xy) */
-PAL_WIDE_INLINE void jacobi(pal_wide a[6], pal_wide v[9])
+PAL_INLINE void jacobi(pal_wide a[6], pal_wide v[9])
 {
     for (int i = 0; i < 9; i++) v[i] = wide_of(i % 4 == 0);
     for (int sweep = 0; sweep < 6; sweep++) {
@@ -184,7 +183,7 @@ PAL_WIDE_INLINE void jacobi(pal_wide a[6], pal_wide v[9])
 }
 
 /* h += weight e e', packed */
-PAL_WIDE_INLINE void add_mode(pal_wide h[45], pal_wide weight, const pal_wide e[9])
+PAL_INLINE void add_mode(pal_wide h[45], pal_wide weight, const pal_wide e[9])
 {
     for (int i = 0; i < 9; i++) {
         pal_wide t = weight * e[i];
@@ -194,8 +193,8 @@ PAL_WIDE_INLINE void add_mode(pal_wide h[45], pal_wide weight, const pal_wide e[
 
 /* mu I + c d2J/dF2 + k1 g g', packed; g = dJ/dF. d2J/dF_ij dF_kl = +- F_mn for the rows i k m and the columns j l n in
  * cyclic order or not */
-PAL_WIDE_INLINE void plain_hessian(pal_wide mu, pal_wide c, pal_wide k1, const pal_wide f[9], const pal_wide g[9],
-                                   pal_wide h[45])
+PAL_INLINE void plain_hessian(pal_wide mu, pal_wide c, pal_wide k1, const pal_wide f[9], const pal_wide g[9],
+                              pal_wide h[45])
 {
     for (int x = 0; x < 9; x++) {
         pal_wide t = k1 * g[x];
@@ -233,15 +232,15 @@ static void raise_stretches(pal_wide mu, pal_wide c, pal_wide k1, const pal_wide
             e[i] = wide_of(0);
             for (int m = 0; m < 3; m++) e[i] += n[3 * m + k] * u[3 * (i / 3) + m] * v[3 * (i % 3) + m];
         }
-        add_mode(h, wide_pick(a[k] < 0, -a[k], wide_of(0)), e);
+        add_mode(h, pal_wide_select(a[k] < 0, -a[k], wide_of(0)), e);
     }
 }
 
 /* the Hessian of one point, projected to positive semi-definite as pal_neo_modes_compute does it: F = R S, S = v
  * diag(s) v', u = R v; the eigenvalues are those of the stretches and mu + c s_k (twist), mu - c s_k (flip) of the
  * pairs. r: in, a rotation that makes R'F symmetric */
-PAL_WIDE_INLINE void point_hessian(pal_wide mu, pal_wide c, pal_wide k1, const pal_wide f[9], const pal_wide g[9],
-                                   const pal_wide r[9], pal_wide h[45])
+PAL_INLINE void point_hessian(pal_wide mu, pal_wide c, pal_wide k1, const pal_wide f[9], const pal_wide g[9],
+                              const pal_wide r[9], pal_wide h[45])
 {
     static const int row_of[6] = {0, 1, 2, 1, 0, 0}, column_of[6] = {0, 1, 2, 2, 2, 1};
     pal_wide a[6], v[9], u[9], e[9];
@@ -263,7 +262,7 @@ PAL_WIDE_INLINE void point_hessian(pal_wide mu, pal_wide c, pal_wide k1, const p
             if (!wide_any(value < 0)) continue;
             for (int n = 0; n < 9; n++)
                 e[n] = u[n / 3 * 3 + i] * v[n % 3 * 3 + j] + sign * u[n / 3 * 3 + j] * v[n % 3 * 3 + i];
-            add_mode(h, wide_pick(value < 0, -0.5 * value, wide_of(0)), e);
+            add_mode(h, pal_wide_select(value < 0, -0.5 * value, wide_of(0)), e);
         }
     }
     raise_stretches(mu, c, k1, a, u, v, h);
@@ -299,12 +298,13 @@ void pal_hex_neo_linearise(pal_elastic_hexes *row, pal_node_order *node_order)
             pal_wide u[3][8], f[8][9], r[9], q[4], mu, k1, kappa, h[45][8];
             hex_modes(&v, l, u);
             row->n_slow += hex_turn_block(row, b, l, u, r);
-            for (int i = 0; i < 9; i++) wide_store(row->turn + (9 * b + i) * PAL_LANES + l, r[i]);
-            for (int i = 0; i < 4; i++) q[i] = wide_load(row->q + (4 * b + i) * PAL_LANES + l);
+            for (int i = 0; i < 9; i++) pal_wide_store(row->turn + (9 * b + i) * PAL_LANES + l, r[i]);
+            for (int i = 0; i < 4; i++) q[i] = pal_wide_load(row->q + (4 * b + i) * PAL_LANES + l);
             gauss_gradients(1 / (4 * row->edge_m), u, f);
             load_neo(row, b, l, &mu, &k1, &kappa);
             /* lanes without element read anything */
-            for (int i = 0; i < 72; i++) f[i / 9][i % 9] = wide_pick(mu > 0, f[i / 9][i % 9], wide_of(i % 9 % 4 == 0));
+            for (int i = 0; i < 72; i++)
+                f[i / 9][i % 9] = pal_wide_select(mu > 0, f[i / 9][i % 9], wide_of(i % 9 % 4 == 0));
             row->n_slow += all_hessians(row, b, l, q, f, h, u);
             for (int i = 0; i < 45; i++) walsh(h[i]);
             store_tangent(row->tangent + 231 * PAL_LANES * b + l, h, kappa, u);
@@ -323,9 +323,9 @@ void pal_hex_neo_multiply(const pal_elastic_hexes *row, pal_node_order *node_ord
             hex_modes(&v, l, u);
             for (int r = 0; r < 21; r++) x[r] = k * u[r / 7][r % 7 + 1];
             for (int r = 0; r < 21; r++) {
-                pal_wide sum = wide_load(a + packed(r, r) * PAL_LANES) * x[r];
+                pal_wide sum = pal_wide_load(a + packed(r, r) * PAL_LANES) * x[r];
                 for (int s = 0; s < r; s++) {
-                    pal_wide k_rs = wide_load(a + packed(r, s) * PAL_LANES);
+                    pal_wide k_rs = pal_wide_load(a + packed(r, s) * PAL_LANES);
                     sum += k_rs * x[s];
                     y[s] += k_rs * x[r];
                 }
@@ -348,7 +348,7 @@ void pal_hex_neo_blocks(const pal_elastic_hexes *row, int block, double k, doubl
                 for (int m = 1; m < 8; m++) {
                     for (int n = 1; n < 8; n++) {
                         int r = 7 * i + m - 1, s = 7 * j + n - 1;
-                        t[m][n] = k * wide_load(a + (r >= s ? packed(r, s) : packed(s, r)) * PAL_LANES);
+                        t[m][n] = k * pal_wide_load(a + (r >= s ? packed(r, s) : packed(s, r)) * PAL_LANES);
                     }
                     unwalsh(t[m]);
                 }
@@ -358,8 +358,8 @@ void pal_hex_neo_blocks(const pal_elastic_hexes *row, int block, double k, doubl
                     for (int c = 0; c < 8; c++) {
                         /* K_cd(i, j) here, and K_dc(j, i) is the same number */
                         int pair = c <= d ? pal_hex_pair(c, d) : pal_hex_pair(d, c);
-                        if (c <= d) wide_store(to + (9 * pair + 3 * i + j) * PAL_LANES + l, column[c]);
-                        if (c >= d) wide_store(to + (9 * pair + 3 * j + i) * PAL_LANES + l, column[c]);
+                        if (c <= d) pal_wide_store(to + (9 * pair + 3 * i + j) * PAL_LANES + l, column[c]);
+                        if (c >= d) pal_wide_store(to + (9 * pair + 3 * j + i) * PAL_LANES + l, column[c]);
                     }
                 }
             }

@@ -18,59 +18,29 @@
 #define PAL_SIM_ELEMENTS_ELASTIC_HEX_SIMD_H
 #include "server/num/polar.h"
 #include "server/num/shape_functions.h"
+#include "server/sim/core/simd_wide.h"
 #include "server/sim/elements/elastic_hex.h"
 
 #include <math.h>
 #include <string.h>
 
-#ifdef __AVX512F__
-enum { PAL_WIDE = 8 };
-typedef double pal_wide __attribute__((vector_size(64)));
-typedef int64_t pal_wide_mask __attribute__((vector_size(64)));
-typedef double pal_wide_at __attribute__((vector_size(64), aligned(8), may_alias));
-#else
-enum { PAL_WIDE = 4 };
-typedef double pal_wide __attribute__((vector_size(32)));
-typedef int64_t pal_wide_mask __attribute__((vector_size(32)));
-typedef double pal_wide_at __attribute__((vector_size(32), aligned(8), may_alias));
-#endif
-
-#define PAL_WIDE_INLINE static inline __attribute__((always_inline))
-
-PAL_WIDE_INLINE pal_wide wide_load(const double *at)
-{
-    return *(const pal_wide_at *)at;
-}
-PAL_WIDE_INLINE void wide_store(double *at, pal_wide a)
-{
-    *(pal_wide_at *)at = a;
-}
-PAL_WIDE_INLINE void wide_add(double *at, pal_wide a)
-{
-    *(pal_wide_at *)at += a;
-}
-PAL_WIDE_INLINE pal_wide wide_of(double a)
+PAL_INLINE pal_wide wide_of(double a)
 {
     return a - (pal_wide){0};
 }
-/* lane by lane: a where the mask is set, else b */
-PAL_WIDE_INLINE pal_wide wide_pick(pal_wide_mask mask, pal_wide a, pal_wide b)
-{
-    return (pal_wide)((mask & (pal_wide_mask)a) | (~mask & (pal_wide_mask)b));
-}
-PAL_WIDE_INLINE bool wide_any(pal_wide_mask mask)
+PAL_INLINE bool wide_any(pal_wide_mask mask)
 {
     int64_t any = 0;
     for (int l = 0; l < PAL_WIDE; l++) any |= mask[l];
     return any != 0;
 }
-PAL_WIDE_INLINE pal_wide wide_root(pal_wide q)
+PAL_INLINE pal_wide wide_root(pal_wide q)
 {
     for (int l = 0; l < PAL_WIDE; l++) q[l] = sqrt(q[l]);
     return q;
 }
 /* 1 / sqrt(q) of positive normal numbers, as pal_inverse_sqrt8 (simd.h) */
-PAL_WIDE_INLINE pal_wide wide_inverse_root(pal_wide q)
+PAL_INLINE pal_wide wide_inverse_root(pal_wide q)
 {
     pal_wide half = 0.5 * q, r = (pal_wide)(0x5fe6eb50c7b537a9 - ((pal_wide_mask)q >> 1));
     r = r * (1.5 - half * r * r);
@@ -87,7 +57,7 @@ typedef struct hex_view {
     double at[8][3][PAL_LANES], to[8][3][PAL_LANES];
 } hex_view;
 
-PAL_WIDE_INLINE void hex_open(const pal_elastic_hexes *row, const pal_node_order *node_order, int block, hex_view *v)
+PAL_INLINE void hex_open(const pal_elastic_hexes *row, const pal_node_order *node_order, int block, hex_view *v)
 {
     const int n_slot = node_order->n_slot, n_strip = row->simd_blocks.n_strip;
     if (block < n_strip) {
@@ -109,7 +79,7 @@ PAL_WIDE_INLINE void hex_open(const pal_elastic_hexes *row, const pal_node_order
         }
 }
 /* brings what was added to copies into the slots */
-PAL_WIDE_INLINE void hex_close(const pal_elastic_hexes *row, pal_node_order *node_order, int block, const hex_view *v)
+PAL_INLINE void hex_close(const pal_elastic_hexes *row, pal_node_order *node_order, int block, const hex_view *v)
 {
     if (block < row->simd_blocks.n_strip) return;
     for (int c = 0; c < 8; c++)
@@ -118,27 +88,27 @@ PAL_WIDE_INLINE void hex_close(const pal_elastic_hexes *row, pal_node_order *nod
                 node_order->f[d * node_order->n_slot + v->node[c * PAL_LANES + l]] += v->to[c][d][l];
 }
 
-PAL_WIDE_INLINE void walsh_pair(pal_wide *low, pal_wide *high)
+PAL_INLINE void walsh_pair(pal_wide *low, pal_wide *high)
 {
     pal_wide sum = *high + *low;
     *high = *high - *low;
     *low = sum;
 }
 /* corners to modes */
-PAL_WIDE_INLINE void walsh(pal_wide u[8])
+PAL_INLINE void walsh(pal_wide u[8])
 {
     walsh_pair(u + 0, u + 1), walsh_pair(u + 2, u + 3), walsh_pair(u + 4, u + 5), walsh_pair(u + 6, u + 7);
     walsh_pair(u + 0, u + 2), walsh_pair(u + 1, u + 3), walsh_pair(u + 4, u + 6), walsh_pair(u + 5, u + 7);
     walsh_pair(u + 0, u + 4), walsh_pair(u + 1, u + 5), walsh_pair(u + 2, u + 6), walsh_pair(u + 3, u + 7);
 }
-PAL_WIDE_INLINE void unwalsh_pair(pal_wide *low, pal_wide *high)
+PAL_INLINE void unwalsh_pair(pal_wide *low, pal_wide *high)
 {
     pal_wide sum = *low + *high;
     *low = *low - *high;
     *high = sum;
 }
 /* modes to corners, the transposed transform; mode 0 (a force on the whole) is none */
-PAL_WIDE_INLINE void unwalsh(pal_wide u[8])
+PAL_INLINE void unwalsh(pal_wide u[8])
 {
     u[0] = -u[1];
     unwalsh_pair(u + 2, u + 3), unwalsh_pair(u + 4, u + 5), unwalsh_pair(u + 6, u + 7);
@@ -147,23 +117,23 @@ PAL_WIDE_INLINE void unwalsh(pal_wide u[8])
 }
 
 /* modes 1..7 of the corners' coordinates */
-PAL_WIDE_INLINE void hex_modes(const hex_view *v, int l, pal_wide u[3][8])
+PAL_INLINE void hex_modes(const hex_view *v, int l, pal_wide u[3][8])
 {
     for (int d = 0; d < 3; d++) {
-        for (int c = 0; c < 8; c++) u[d][c] = wide_load(v->x[c][d] + l);
+        for (int c = 0; c < 8; c++) u[d][c] = pal_wide_load(v->x[c][d] + l);
         walsh(u[d]);
     }
 }
-PAL_WIDE_INLINE void hex_add(hex_view *v, int l, pal_wide u[3][8])
+PAL_INLINE void hex_add(hex_view *v, int l, pal_wide u[3][8])
 {
     for (int d = 0; d < 3; d++) {
         unwalsh(u[d]);
-        for (int c = 0; c < 8; c++) wide_add(v->f[c][d] + l, u[d][c]);
+        for (int c = 0; c < 8; c++) pal_wide_add(v->f[c][d] + l, u[d][c]);
     }
 }
 
 /* K in modes: u [3][8] becomes K u; mu, lambda, beta are the elements' times h / 16 */
-PAL_WIDE_INLINE void hex_stress(pal_wide mu, pal_wide lambda, pal_wide beta, pal_wide u[3][8])
+PAL_INLINE void hex_stress(pal_wide mu, pal_wide lambda, pal_wide beta, pal_wide u[3][8])
 {
     const pal_wide mu3 = mu * (1.0 / 3), beta3 = beta * (1.0 / 3), top = (4 * mu + beta) * (1.0 / 9);
     /* stretches */
@@ -185,7 +155,7 @@ PAL_WIDE_INLINE void hex_stress(pal_wide mu, pal_wide lambda, pal_wide beta, pal
 }
 
 /* u := R u or R' u, modes 1..7; r row-major */
-PAL_WIDE_INLINE void hex_rotate(const pal_wide r[9], pal_wide u[3][8])
+PAL_INLINE void hex_rotate(const pal_wide r[9], pal_wide u[3][8])
 {
     for (int m = 1; m < 8; m++) {
         pal_wide x = u[0][m], y = u[1][m], z = u[2][m];
@@ -194,7 +164,7 @@ PAL_WIDE_INLINE void hex_rotate(const pal_wide r[9], pal_wide u[3][8])
         u[2][m] = r[6] * x + r[7] * y + r[8] * z;
     }
 }
-PAL_WIDE_INLINE void hex_unrotate(const pal_wide r[9], pal_wide u[3][8])
+PAL_INLINE void hex_unrotate(const pal_wide r[9], pal_wide u[3][8])
 {
     for (int m = 1; m < 8; m++) {
         pal_wide x = u[0][m], y = u[1][m], z = u[2][m];
@@ -204,7 +174,7 @@ PAL_WIDE_INLINE void hex_unrotate(const pal_wide r[9], pal_wide u[3][8])
     }
 }
 
-PAL_WIDE_INLINE void wide_quat_matrix(const pal_wide q[4], pal_wide r[9])
+PAL_INLINE void wide_quat_matrix(const pal_wide q[4], pal_wide r[9])
 {
     pal_wide x2 = q[1] + q[1], y2 = q[2] + q[2], z2 = q[3] + q[3];
     pal_wide wx = q[0] * x2, wy = q[0] * y2, wz = q[0] * z2, xx = q[1] * x2, xy = q[1] * y2, xz = q[1] * z2;
@@ -218,7 +188,7 @@ PAL_WIDE_INLINE void wide_quat_matrix(const pal_wide q[4], pal_wide r[9])
  * frame of R) solves (tr M I - S) w = axial(M - M'); the matrix is positive definite at the maximum and near it. The
  * turn is Cayley's, q := q (1, w/2), which makes the iteration cubic. Lanes where the matrix is not safely positive
  * definite or the turn is large do not move and are set in `stuck`. Returns |w|^2. */
-PAL_WIDE_INLINE pal_wide hex_turn_step(const pal_wide f[9], const pal_wide r[9], pal_wide q[4], pal_wide_mask *stuck)
+PAL_INLINE pal_wide hex_turn_step(const pal_wide f[9], const pal_wide r[9], pal_wide q[4], pal_wide_mask *stuck)
 {
     pal_wide m[9];
     for (int i = 0; i < 3; i++)
@@ -230,30 +200,31 @@ PAL_WIDE_INLINE pal_wide hex_turn_step(const pal_wide f[9], const pal_wide r[9],
     pal_wide cxy = xz * yz - xy * zz, cxz = xy * yz - xz * yy, cyz = xy * xz - yz * xx;
     pal_wide det = xx * cxx + xy * cxy + xz * cxz, t = xx + yy + zz;
     pal_wide_mask good = (det > 1e-5 * (t * t * t)) & (t > 0) & (cxx + cyy + czz > 0) & (xx > 0) & (czz > 0);
-    pal_wide half = 0.5 / wide_pick(good, det, wide_of(1));
+    pal_wide half = 0.5 / pal_wide_select(good, det, wide_of(1));
     pal_wide wx = half * (cxx * ax + cxy * ay + cxz * az), wy = half * (cxy * ax + cyy * ay + cyz * az),
              wz = half * (cxz * ax + cyz * ay + czz * az);
     pal_wide w2 = wx * wx + wy * wy + wz * wz;
     good &= w2 < 0.25;
     *stuck |= ~good;
-    wx = wide_pick(good, wx, wide_of(0)), wy = wide_pick(good, wy, wide_of(0)), wz = wide_pick(good, wz, wide_of(0));
+    wx = pal_wide_select(good, wx, wide_of(0)), wy = pal_wide_select(good, wy, wide_of(0)),
+    wz = pal_wide_select(good, wz, wide_of(0));
     pal_wide a = q[0] - q[1] * wx - q[2] * wy - q[3] * wz, b = q[1] + q[0] * wx + q[2] * wz - q[3] * wy;
     pal_wide c = q[2] + q[0] * wy + q[3] * wx - q[1] * wz, d = q[3] + q[0] * wz + q[1] * wy - q[2] * wx;
     pal_wide n = wide_inverse_root(a * a + b * b + c * c + d * d);
     q[0] = a * n, q[1] = b * n, q[2] = c * n, q[3] = d * n;
-    return wide_pick(good, w2, wide_of(0));
+    return pal_wide_select(good, w2, wide_of(0));
 }
 
 /* the rotations of f from q (warm start, in and out) into r; lanes of which `live` is not set have r = I. Returns the
  * number of lanes that vectors could not settle, which pal_polar_rotation has turned instead */
-PAL_WIDE_INLINE int hex_turn(const pal_wide f[9], pal_wide_mask live, pal_wide q[4], pal_wide r[9])
+PAL_INLINE int hex_turn(const pal_wide f[9], pal_wide_mask live, pal_wide q[4], pal_wide r[9])
 {
     /* a step of 6e-5 rad leaves 2e-13 of error: 0.65 times its cube, measured */
     const double settled = 1e-9;
     pal_wide_mask stuck = live & ~live;
     pal_wide g[9], w2;
     int n_slow = 0;
-    for (int i = 0; i < 9; i++) g[i] = wide_pick(live, f[i], wide_of(i % 4 == 0));
+    for (int i = 0; i < 9; i++) g[i] = pal_wide_select(live, f[i], wide_of(i % 4 == 0));
     for (int n = 0; n < 8; n++) {
         wide_quat_matrix(q, r);
         w2 = hex_turn_step(g, r, q, &stuck);
@@ -275,17 +246,17 @@ PAL_WIDE_INLINE int hex_turn(const pal_wide f[9], pal_wide_mask live, pal_wide q
 }
 
 /* F at the centre from the modes, the rotations from it, kept in row->q */
-PAL_WIDE_INLINE int hex_turn_block(pal_elastic_hexes *row, int block, int l, pal_wide u[3][8], pal_wide r[9])
+PAL_INLINE int hex_turn_block(pal_elastic_hexes *row, int block, int l, pal_wide u[3][8], pal_wide r[9])
 {
     const double scale = 1 / (4 * row->edge_m);
     double *at = row->q + 4 * PAL_LANES * block + l;
     pal_wide f[9], q[4];
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) f[3 * i + j] = scale * u[i][1 << j];
-    for (int i = 0; i < 4; i++) q[i] = wide_load(at + i * PAL_LANES);
-    pal_wide_mask live = wide_load(row->share + PAL_LANES * block + l) > 0;
+    for (int i = 0; i < 4; i++) q[i] = pal_wide_load(at + i * PAL_LANES);
+    pal_wide_mask live = pal_wide_load(row->share + PAL_LANES * block + l) > 0;
     int n_slow = hex_turn(f, live, q, r);
-    for (int i = 0; i < 4; i++) wide_store(at + i * PAL_LANES, q[i]);
+    for (int i = 0; i < 4; i++) pal_wide_store(at + i * PAL_LANES, q[i]);
     return n_slow;
 }
 #endif

@@ -215,5 +215,5 @@ void pal_elastic_regions_lame(const pal_elastic_regions *parts, const pal_materi
     double young_Pa = material->young_Pa, poisson = material->poisson;
     if (parts->young_Pa && !isnan(parts->young_Pa[e])) young_Pa = parts->young_Pa[e];
     if (parts->poisson && !isnan(parts->poisson[e])) poisson = parts->poisson[e];
-    pal_lame(young_Pa, fmin(poisson, 0.4999), mu_Pa, lambda_Pa);
+    pal_lame(young_Pa, fmin(poisson, PAL_POISSON_CLAMP), mu_Pa, lambda_Pa);
 }

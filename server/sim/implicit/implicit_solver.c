@@ -105,7 +105,7 @@ static void probe_all(pal_implicit *core)
     const pal_body *body = core->system.body;
     double before = pal_clock_s();
     if (!core->system.interpolated_system) return;
-    core->sampled = body->solid ? body->solid->sampled : 0;
+    core->sampled = pal_dofs_material_revision(&body->dofs);
     core->probing = false;
     pal_interpolated_system_invalidate(core->system.interpolated_system);
     (void)pal_system_probe(&core->system, INT_MAX);
@@ -559,7 +559,7 @@ static void keep_probed(pal_implicit *core, pal_step *step)
 {
     pal_system *system = &core->system;
     const pal_body *body = system->body;
-    uint64_t sampled = body->solid ? body->solid->sampled : core->sampled;
+    uint64_t sampled = pal_dofs_material_revision(&body->dofs);
     if (sampled != core->sampled) {
         core->sampled = sampled;
         core->probing = true;

@@ -60,7 +60,7 @@ typedef struct pal_implicit {
     bool energy_rose;               /* ... and was not kept in this sub-step ... */
     double energy_rise_s, steady_s; /* ... nor in sub-steps of so much time (0 after half a second without); since */
     int max_cg;                     /* in one solve of this sub-step       */
-    uint64_t sampled;               /* of body->solid, at the factor       */
+    uint64_t sampled;               /* material revision of the body at the factor (dofs.h) */
     bool probing;                   /* an embedded body's matrices are being found anew */
     pal_solve_report report;
 } pal_implicit;

@@ -1,7 +1,7 @@
 /* The matrix of an embedded body in numbers. */
 #include "server/sim/implicit/interpolated_system.h"
 
-#include "server/sim/subdivision/subdivision_solid.h"
+#include "server/sim/implicit/system.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -63,13 +63,8 @@ static pal_err add_cliques(clique_list *l, const pal_interpolation *rows, const 
 
 static pal_err add_elements(clique_list *l, const pal_body *body)
 {
-    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
-        const pal_cell_elements *e = &body->solid->elements;
-        pal_cliques nodes = {.n_item = e->n[kind],
-                             .n_corner = pal_cell_kind_nodes(kind),
-                             .node = pal_subdivision_solid_nodes(body->solid, kind, 0)};
-        if (nodes.n_item > 0) PAL_TRY(add_cliques(l, body->interpolation, &nodes));
-    }
+    for (int k = 0; k < body->dofs.n_clique; k++)
+        if (body->dofs.clique[k].n_item > 0) PAL_TRY(add_cliques(l, body->interpolation, &body->dofs.clique[k]));
     return PAL_ERR_OK;
 }
 
@@ -85,7 +80,7 @@ static pal_err add_all(clique_list *l, int n)
 static pal_err list_cliques(const pal_body *body, const pal_component *force, int n_force, clique_list *l)
 {
     bool silent = false;
-    l->list = calloc((size_t)n_force + PAL_CELL_KINDS + 1, sizeof *l->list);
+    l->list = calloc((size_t)n_force + PAL_DOFS_CLIQUES + 1, sizeof *l->list);
     if (!l->list) return PAL_ERR_MEMORY;
     for (int i = 0; i < n_force; i++) {
         const pal_tangent *tangent = force[i].effect->tangent;
@@ -97,7 +92,7 @@ static pal_err list_cliques(const pal_body *body, const pal_component *force, in
             silent = true;
     }
     if (!silent) return PAL_ERR_OK;
-    return body->solid ? add_elements(l, body) : add_all(l, body->n_dof);
+    return body->dofs.n_clique ? add_elements(l, body) : add_all(l, body->n_dof);
 }
 
 /* ---- groups ---- */

@@ -25,7 +25,7 @@ typedef struct pal_interpolated_system {
 } pal_interpolated_system;
 
 /* work space, pattern and groups for the FORCE rows [n_force]. Points are coupled where a row couples nodes of both,
- * for rows that do not say so where an element of body->solid has both, or else everywhere. BUDGET: moves times nodes
+ * for rows that do not say so where an element (dofs.clique) has both, or else everywhere. BUDGET: moves times nodes
  * are more than 2e7, some ten seconds' work; MEMORY. [load] */
 pal_err pal_interpolated_system_make(const pal_body *body, const pal_component *force, int n_force, pal_arena *arena,
                                      pal_diagnostic *diag, pal_interpolated_system **out);

@@ -13,6 +13,7 @@
  * Rows: cell_elastic, viscous where the material has damping, solver central_cg. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
+#include "server/sim/subdivision/subdivision_body.h"
 #include "server/sim/subdivision/subdivision_mass.h"
 #include "server/sim/subdivision/subdivision_solid.h"
 
@@ -52,15 +53,16 @@ static pal_err make_solid(const keys *k, const pal_config_entry *item, pal_build
 {
     pal_diagnostic reason = {{0}};
     const pal_body_def *def = build->def;
-    pal_err err = pal_subdivision_solid_make(def, &k->subdivision, &build->body->solid, &reason);
+    pal_err err = pal_subdivision_solid_make(def, &k->subdivision, &build->body->model.solid, &reason);
     if (err && err != PAL_ERR_MEMORY)
         return pal_diagnostic_set(build->diag, err, "body \"%s\" %s: %s", def->name, item->path, reason.text);
     PAL_TRY(err);
-    double used_MB = (double)build->body->solid->n_byte / 1048576;
+    pal_subdivision_body_dofs(build->body);
+    double used_MB = (double)build->body->model.solid->n_byte / 1048576;
     if (used_MB > k->memory_MB)
         return pal_diagnostic_set(build->diag, PAL_ERR_BUDGET,
                                   "body \"%s\" %s: %d elements take %.0f MB, memory_MB allows %g: take fewer levels",
-                                  def->name, item->path, pal_cell_elements_count(&build->body->solid->elements),
+                                  def->name, item->path, pal_cell_elements_count(&build->body->model.solid->elements),
                                   used_MB, k->memory_MB);
     return PAL_ERR_OK;
 }
@@ -73,7 +75,7 @@ typedef struct boundary {
 
 static pal_err keep_boundary(const boundary *from, pal_build *build)
 {
-    const int32_t *origin = build->body->solid->subdivision.face_origin;
+    const int32_t *origin = build->body->model.solid->subdivision.face_origin;
     size_t n = (size_t)from->surface.n_vertex, m = (size_t)from->surface.n_tri;
     pal_surface *surface = PAL_NEW(build->arena, pal_surface, 1);
     double *x = PAL_NEW(build->arena, double, 3 * n);
@@ -157,7 +159,7 @@ static pal_err find_cut(const pal_cells *cells, const pal_body_def *def, boundar
 static pal_err show_boundary(const pal_config_entry *item, pal_build *build)
 {
     boundary b = {.node = NULL};
-    const pal_cells *cells = &build->body->solid->subdivision.cells;
+    const pal_cells *cells = &build->body->model.solid->subdivision.cells;
     pal_err err =
         build->def->cut ? find_cut(cells, build->def, &b) : pal_cells_boundary(cells, &b.surface, &b.node, &b.face);
     if (!err && b.surface.n_tri == 0)
@@ -173,7 +175,7 @@ static pal_err show_boundary(const pal_config_entry *item, pal_build *build)
 static pal_err make_body(const pal_config_entry *item, pal_build *build)
 {
     pal_body *body = build->body;
-    const pal_subdivision_solid *solid = body->solid;
+    const pal_subdivision_solid *solid = body->model.solid;
     PAL_TRY(pal_body_allocate_embedded(body, build->arena, &solid->rows));
     body->node_inverse_mass_1_kg = PAL_NEW(build->arena, double, body->n_node);
     body->mass_operator = PAL_NEW(build->arena, pal_mass_operator, 1);
@@ -184,7 +186,9 @@ static pal_err make_body(const pal_config_entry *item, pal_build *build)
     memcpy(body->x, body->x_rest, n_byte);
     memcpy(body->node_rest, solid->node_rest, 3 * sizeof(double) * (size_t)body->n_node);
     pal_body_update_nodes(body);
-    body->edge_m = cbrt(pal_subdivision_solid_volume_m3(solid) / solid->subdivision.cells.n_cell);
+    const double volume_m3 = pal_subdivision_solid_volume_m3(solid);
+    body->edge_m = cbrt(volume_m3 / solid->subdivision.cells.n_cell);
+    body->dofs.spacing_m = cbrt(volume_m3 / build->def->cells->n_cell);
     return show_boundary(item, build);
 }
 

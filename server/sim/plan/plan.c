@@ -5,7 +5,6 @@
 #include "server/sim/core/effect_list.h"
 #include "server/sim/plan/plan_requests.h"
 #include "server/sim/subdivision/subdivision_body.h"
-#include "server/sim/surface/adaptive_surface.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,11 +13,11 @@
 /* holds the vertices on open edges, on every level: the halves of an open edge are open edges too */
 static pal_err hold_rim(pal_body *body, int index, pal_diagnostic *diag)
 {
-    if (!body->adaptive)
+    if (!body->active)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
                                   "body \"%s\" supports[%d].rim: the model has no surface of its own", body->name,
                                   index);
-    const pal_levels *levels = &body->adaptive->levels;
+    const pal_levels *levels = body->dofs.levels;
     if (levels->closed)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" supports[%d].rim: the surface has no open edge",
                                   body->name, index);
@@ -70,10 +69,11 @@ static pal_err build_body(pal_plan_requests *s, const pal_scene *scene)
     *own = def->model;
     PAL_TRY(model->build(own, &s->build, &s->recipe));
     PAL_TRY(hold(body, def, scene->up, s->build.diag));
-    if (body->solid) pal_subdivision_solid_update_mass(body);
+    if (body->dofs.update_mass) body->dofs.update_mass(body);
     body->length_scale_m = box_diagonal(body);
     body->load_cap_N = pal_body_load_cap_N(body, def->material.young_Pa);
-    if (body->tets || body->solid) body->full_corner_kg = def->material.density_kg_m3 * pow(body->edge_m, 3) / 8;
+    if (body->tets || body->interpolation)
+        body->full_corner_kg = def->material.density_kg_m3 * pow(body->edge_m, 3) / 8;
     const double *origin = mesh_origin(def->mesh), *first = mesh_origin(scene->body[0].mesh);
     for (int c = 0; c < 3; c++) body->offset_m[c] = origin[c] - first[c];
 
@@ -155,11 +155,11 @@ static pal_err check_memory(const pal_plan_requests *s, size_t arena_byte)
     enum { WORLD_BYTE = 1 << 17 };
     const pal_body *body = s->build.body;
     pal_diagnostic reason = {{0}};
-    if (!body->adaptive) return PAL_ERR_OK;
+    if (!body->dofs.check_memory) return PAL_ERR_OK;
     size_t n = (size_t)body->n_node,
-           shown = n * (3 * sizeof(float) + 2 * sizeof(int32_t)) + (size_t)body->adaptive->n_slot * 3 * sizeof(int32_t);
+           shown = n * (3 * sizeof(float) + 2 * sizeof(int32_t)) + (size_t)body->dofs.n_slot * 3 * sizeof(int32_t);
     size_t n_byte = arena_byte + s->build.scratch_byte + shown + 3 * n * sizeof(double) + WORLD_BYTE;
-    pal_err err = pal_adaptive_check_bytes(body->adaptive, n_byte, &reason);
+    pal_err err = body->dofs.check_memory(body, n_byte, &reason);
     if (err) pal_diagnostic_set(s->build.diag, err, "body \"%s\" model: %s", body->name, reason.text);
     return err;
 }
@@ -198,12 +198,10 @@ static pal_err build_all(const pal_scene *scene, pal_arena *arena, pal_diagnosti
 }
 
 /* what bodies own beside the arena */
-static void free_solids(pal_plan *plan)
+static void free_models(pal_plan *plan)
 {
-    for (int b = 0; b < plan->n_body && plan->body; b++) {
-        pal_subdivision_solid_free(plan->body[b].solid);
-        plan->body[b].solid = NULL;
-    }
+    for (int b = 0; b < plan->n_body && plan->body; b++)
+        if (plan->body[b].dofs.destroy) plan->body[b].dofs.destroy(&plan->body[b]);
 }
 
 pal_err pal_plan_build(const pal_scene *scene, pal_arena *arena, pal_diagnostic *diag, pal_plan *out)
@@ -216,7 +214,7 @@ pal_err pal_plan_build(const pal_scene *scene, pal_arena *arena, pal_diagnostic 
     /* rows that were made before something was refused */
     for (int i = 0; err && i < out->n_row; i++) pal_plan_destroy_component(&made[i]);
     if (err) {
-        free_solids(out);
+        free_models(out);
         *out = (pal_plan){0};
     }
     free(s);
@@ -229,5 +227,5 @@ void pal_plan_free(pal_plan *plan)
     plan->n_row = 0;
     if (plan->row != plan->load_component) free(plan->row);
     plan->row = plan->load_component = NULL;
-    free_solids(plan);
+    free_models(plan);
 }

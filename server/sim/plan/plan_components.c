@@ -1,7 +1,6 @@
 /* The table of rows while a world runs: rows come and go between steps. */
 #include "server/sim/plan/plan.h"
 #include "server/sim/plan/plan_requests.h"
-#include "server/sim/subdivision/subdivision_solid.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -82,8 +81,7 @@ size_t pal_plan_bytes(const pal_plan *plan)
     size_t n_byte = plan->row == plan->load_component ? 0 : table_bytes(plan->n_row);
     for (int i = 0; i < plan->n_row; i++)
         if (plan->row[i].arena) n_byte += pal_arena_used(plan->row[i].arena);
-    for (int b = 0; b < plan->n_body; b++)
-        if (plan->body[b].solid) n_byte += plan->body[b].solid->n_byte;
+    for (int b = 0; b < plan->n_body; b++) n_byte += plan->body[b].dofs.n_byte;
     return n_byte;
 }
 

@@ -46,7 +46,7 @@ static pal_err add_named(pal_plan_requests *s, pal_config_entry *own, const pal_
  * them is not there */
 static void choose_output(const pal_body *body, pal_config_entry *output)
 {
-    if ((body->adaptive || body->solid) && !strcmp(output->name, "skin_output"))
+    if ((body->active || body->interpolation) && !strcmp(output->name, "skin_output"))
         snprintf(output->name, sizeof output->name, "surface_output");
 }
 

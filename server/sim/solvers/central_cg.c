@@ -39,7 +39,7 @@
 #include <string.h>
 
 typedef struct central {
-    const pal_subdivision_solid *solid;
+    const pal_interpolation *rows;
     const pal_mass_operator *mass;
     double safety, tolerance;
     double dt_s; /* of the sub-step before; 0: none, v is that at p */
@@ -51,7 +51,7 @@ typedef struct central {
     double *inverse;  /* 1 / diagonal of M~, 0 for fixed points                    [n_dof]    */
     double *change;   /* v+ - v                                                    [n_dof][3] */
     double *was;      /* v of the sub-step before                                  [n_dof][3] */
-    uint64_t sampled; /* of the solid, when the preconditioner was made; 0: never            */
+    uint64_t sampled; /* dofs.material_revision when the preconditioner was made; 0: never    */
     pal_solve_report report;
 
     /* ---- the limit ---- */
@@ -131,15 +131,15 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     if (!factor && strcmp(preconditioner, "diagonal"))
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s.preconditioner: \"%s\", known are factor, diagonal",
                                   item->path, preconditioner);
-    if (!body->solid || !body->mass_operator)
+    if (!body->interpolation || !body->mass_operator)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model subdivision_fem",
                                   item->path, item->name);
     central *row = PAL_NEW(build->arena, central, 1);
     if (!row) return PAL_ERR_MEMORY;
-    row->solid = body->solid, row->mass = body->mass_operator;
+    row->rows = body->interpolation, row->mass = body->mass_operator;
     row->n_unseen = UNSEEN;
     row->safety = safety, row->tolerance = tolerance, row->wild = 1;
-    row->cell_m = cbrt(pal_subdivision_solid_volume_m3(body->solid) / build->def->cells->n_cell);
+    row->cell_m = body->dofs.spacing_m;
     PAL_TRY(allocate(row, body, build->arena));
     if (factor) {
         pal_err err = pal_envelope_make(row->mass->n_point, row->mass->start, row->mass->point, MOST_ENTRY,
@@ -182,8 +182,10 @@ static void precondition(void *user, const double *r, double *out)
 static bool renew(central *row, const pal_body *body)
 {
     const pal_mass_operator *m = row->mass;
-    if (row->sampled == row->solid->sampled && !memcmp(row->fixed, body->fixed, (size_t)body->n_dof)) return false;
-    row->sampled = row->solid->sampled;
+    if (row->sampled == pal_dofs_material_revision(&body->dofs) &&
+        !memcmp(row->fixed, body->fixed, (size_t)body->n_dof))
+        return false;
+    row->sampled = pal_dofs_material_revision(&body->dofs);
     memcpy(row->fixed, body->fixed, (size_t)body->n_dof);
     for (int i = 0; i < m->n_point; i++) {
         int32_t k = m->start[i];
@@ -243,7 +245,7 @@ static bool multiply_stiffness(void *user, const double *v, double *out)
 static bool multiply_bound(void *user, const double *v, double *out)
 {
     central *row = user;
-    const pal_interpolation *rows = &row->solid->rows;
+    const pal_interpolation *rows = row->rows;
     pal_interpolation_apply(rows, v, row->f);
     for (int i = 0; i < rows->n_row; i++) pal_scale3(row->f + 3 * (size_t)i, row->bound[i], row->f + 3 * (size_t)i);
     memset(out, 0, sizeof *out * (size_t)row->cg.n);
@@ -296,7 +298,7 @@ static double find_bound(central *row)
     /* the Ritz vector of the FORCE rows is kept for later */
     double *z = row->lanczos.z, sum = 0;
     const int n_cg = row->report.n_cg;
-    for (int i = 0; i < row->solid->rows.n_row; i++) sum += row->bound[i];
+    for (int i = 0; i < row->rows->n_row; i++) sum += row->bound[i];
     if (sum == 0) return 0;
     row->lanczos.z = row->at;
     memset(row->at, 0, sizeof(double) * (size_t)row->cg.n);
@@ -312,7 +314,7 @@ static double find_bound(central *row)
 
 static void clear_bound(central *row)
 {
-    memset(row->bound, 0, sizeof(double) * (size_t)row->solid->rows.n_row);
+    memset(row->bound, 0, sizeof(double) * (size_t)row->rows->n_row);
 }
 
 /* contact comes and goes between steps without any point moving */

@@ -22,7 +22,6 @@
 #include "server/sim/core/effect_list.h"
 #include "server/sim/core/step_guard.h"
 #include "server/sim/surface/active_nodes.h"
-#include "server/sim/surface/adaptive_surface.h"
 
 #include <string.h>
 
@@ -93,7 +92,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     row->led = PAL_NEW(build->arena, uint8_t, body->n_dof);
     if (!row->stiff || !row->damp || !row->memory || !row->load || !row->inverse_kg || !row->led) return PAL_ERR_MEMORY;
     PAL_TRY(pal_active_nodes_make(build->body, build->body_arena ? build->body_arena : build->arena));
-    if (body->adaptive) {
+    if (body->active) {
         row->at = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
         row->still = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
         row->force = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
@@ -150,12 +149,11 @@ static pal_err find_forces(const rk4 *row, pal_step *step)
 static bool still_known(const rk4 *row, const pal_step *step)
 {
     const pal_body *body = step->body;
-    const pal_adaptive_surface *adaptive = body->adaptive;
     /* not finite is not known */
     if (!row->known || row->revision != body->revision || !(row->way_m <= PAL_GUARD_RECHECK * body->edge_m))
         return false;
-    if (adaptive && (row->ramp[0] != adaptive->spring_ramp || row->ramp[1] != adaptive->shape_ramp)) return false;
-    if (adaptive && !row->sharp_known && row->n_since >= PAUSE) return false;
+    if (body->active && (row->ramp[0] != *body->dofs.ramp[0] || row->ramp[1] != *body->dofs.ramp[1])) return false;
+    if (body->active && !row->sharp_known && row->n_since >= PAUSE) return false;
     return step->sub != 0 || !pal_guard_has_bounds(step->contact, step->n_contact);
 }
 
@@ -312,7 +310,7 @@ static void find_sharp(rk4 *row, pal_step *step, double most)
     row->over = more * fmax(1, sqrt(most / row->sharp2));
     step->drag_separate = apart;
     body->x = kept.x, body->d = kept.d, body->v = kept.v, body->dv = kept.dv, body->f = kept.f, body->g = kept.g;
-    row->sharp_ramp[0] = body->adaptive->spring_ramp, row->sharp_ramp[1] = body->adaptive->shape_ramp;
+    row->sharp_ramp[0] = *body->dofs.ramp[0], row->sharp_ramp[1] = *body->dofs.ramp[1];
     row->n_since = 0;
 }
 
@@ -328,9 +326,8 @@ static bool would_help(const rk4 *row, double most)
 static double bound_force(rk4 *row, pal_step *step, double most)
 {
     const pal_body *body = step->body;
-    const pal_adaptive_surface *adaptive = body->adaptive;
     /* looked at from outside, nothing moves: the world asks at rest with places that are no body's */
-    if (!adaptive || body->x == body->x_rest) return most;
+    if (!body->active || body->x == body->x_rest) return most;
     bool moved = row->revision != body->revision || !(row->way_m <= PAL_GUARD_RECHECK * body->edge_m);
     row->sharp_known &= !moved;
     if (!row->sharp_known && row->n_since >= PAUSE) {
@@ -340,7 +337,7 @@ static double bound_force(rk4 *row, pal_step *step, double most)
             row->n_since = 0;
     }
     if (!row->sharp_known) return most;
-    double grown = fmax(1, fmax(adaptive->spring_ramp / row->sharp_ramp[0], adaptive->shape_ramp / row->sharp_ramp[1]));
+    double grown = fmax(1, fmax(*body->dofs.ramp[0] / row->sharp_ramp[0], *body->dofs.ramp[1] / row->sharp_ramp[1]));
     return fmin(most, grown * row->sharp2);
 }
 
@@ -370,7 +367,7 @@ static double limit(void *self, pal_step *step)
     row->limit_s *= most > 0 ? row->reach / most : INFINITY;
     if (!row->sharp_known || row->n_since == 0) row->way_m = 0;
     row->revision = body->revision;
-    if (body->adaptive) row->ramp[0] = body->adaptive->spring_ramp, row->ramp[1] = body->adaptive->shape_ramp;
+    for (int k = 0; k < 2 && body->active; k++) row->ramp[k] = *body->dofs.ramp[k];
     row->known = true;
     return row->limit_s;
 }

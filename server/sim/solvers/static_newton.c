@@ -42,7 +42,6 @@
 #include "server/sim/core/step_guard.h"
 #include "server/sim/implicit/compliance.h"
 #include "server/sim/implicit/inertia_relief.h"
-#include "server/sim/subdivision/subdivision_solid.h"
 
 #include <limits.h>
 #include <string.h>
@@ -67,7 +66,7 @@ typedef struct static_newton {
     double *now, *low;           /* work space of the true stiffness [n_dof][3] */
     double *inertia;             /* what balances the loads; NULL: no relief              [n_dof][3] */
     double *node_displacement_m; /* the way of nodes carried by points; NULL: none        [n_node][3] */
-    uint64_t sampled;            /* of body->solid, at the factor                 */
+    uint64_t sampled;            /* pal_dofs_material_revision(&body->dofs) at the factor   */
     double shift_1_s2;           /* eps                                           */
     bool has_factor, stale;      /* a factor is there; it is not worth its while  */
     bool eager;                  /* nor was it in the iteration after its own: one is made in every iteration */
@@ -193,7 +192,7 @@ static void probe(static_newton *row)
 {
     const pal_body *body = row->system.body;
     double before = pal_clock_s();
-    row->sampled = body->solid ? body->solid->sampled : 0;
+    row->sampled = pal_dofs_material_revision(&body->dofs);
     pal_interpolated_system_invalidate(row->system.interpolated_system);
     (void)pal_system_probe(&row->system, INT_MAX);
     pal_system_linearise(&row->system);
@@ -581,7 +580,7 @@ static pal_err solve(static_newton *row, pal_step *step, bool *bad)
         row->report.converged = true;
         return PAL_ERR_OK;
     }
-    if (body->solid && row->sampled != body->solid->sampled) row->has_factor = false;
+    if (row->sampled != pal_dofs_material_revision(&body->dofs)) row->has_factor = false;
     if (row->part == 0) row->part = 1;
     PAL_TRY(find_rest(row, step));
     if (row->answer.door.solve) pal_warp_rotate(&row->answer.warp, &row->turns);

@@ -397,7 +397,7 @@ static void switch_rows(const pal_spring_recovery *t, rows *r)
     for (int kind = 0; kind < 3; kind++) {
         pal_spring_set *row = r->of[kind];
         if (!row) continue;
-        row->n_off = 0;
+        row->n_off = 0, row->fresh = false;
         for (int i = 0; i < row->n_item; i++) {
             const int lane = row->simd_blocks.place[i];
             const bool off = patch_of(t, row, i) >= 0;
@@ -466,6 +466,7 @@ unsigned pal_spring_recovery_update(pal_spring_recovery *t, pal_step *step)
     pal_body *body = step->body;
     rows r = find_rows(step);
     if (!r.of[PAL_SPRING_DISTANCE] || !r.of[PAL_SPRING_VOLUME]) pal_spring_recovery_reset(t);
+    for (int kind = 0; kind < 3; kind++) t->stale |= r.of[kind] && r.of[kind]->fresh;
     const bool stale = t->stale;
     if (stale) switch_rows(t, &r);
     t->stale = false;

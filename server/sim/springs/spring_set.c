@@ -2,7 +2,6 @@
 #include "server/sim/springs/spring_set.h"
 
 #include "server/base/vec3.h"
-#include "server/sim/springs/spring_recovery.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -99,13 +98,12 @@ static pal_err fill(pal_spring_set *row, const pal_build *build, double *weight)
     return take_regions(row, build, weight);
 }
 
-static pal_err keep_all(pal_spring_set *row, pal_spring_recovery *recovery, pal_arena *arena)
+static pal_err keep_all(pal_spring_set *row, pal_arena *arena)
 {
     row->all = PAL_NEW(arena, double, row->simd_blocks.n_lane);
     row->off = PAL_NEW(arena, int32_t, row->n_item);
     if (!row->all || !row->off) return PAL_ERR_MEMORY;
-    /* a row that is switched on again knows nothing of what is off */
-    recovery->stale = true;
+    row->fresh = true;
     memcpy(row->all, row->q, sizeof *row->q * (size_t)row->simd_blocks.n_lane);
     return PAL_ERR_OK;
 }
@@ -140,7 +138,7 @@ pal_err pal_spring_set_make(pal_spring_kind kind, pal_config_entry *entry, pal_b
     memcpy(out->item, item, n * sizeof *item);
     pal_err err = fill(out, build, weight);
     free(weight);
-    return err || !body->recovery ? err : keep_all(out, body->recovery, build->arena);
+    return err || !body->recovery ? err : keep_all(out, build->arena);
 }
 
 pal_err pal_spring_set_material(void *self, const pal_body *body, const pal_material *material, pal_diagnostic *diag)

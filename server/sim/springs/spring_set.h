@@ -30,6 +30,7 @@ typedef struct pal_spring_set {
     double *all;
     int32_t *off;
     int n_off;
+    bool fresh; /* made since recovery last chose what is off */
 } pal_spring_set;
 
 /* REFUSED: the body is not made of tetrahedra */

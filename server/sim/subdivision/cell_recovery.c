@@ -1,5 +1,4 @@
 /* Patches of elements that are turned over. */
-#include "server/sim/subdivision/cell_recovery.h"
 
 #include "server/base/vec3.h"
 #include "server/num/union_find.h"
@@ -81,7 +80,7 @@ static int edges(const pal_cell_recovery *t, const pal_subdivision_solid *solid,
     return k;
 }
 
-void pal_cell_recovery_refresh(pal_cell_recovery *t, const struct pal_cells_elastic *c)
+void pal_cell_recovery_refresh(pal_cell_recovery *t, const pal_cells_elastic *c)
 {
     const pal_subdivision_solid *solid = c->solid;
     for (int cell = 0; cell < t->n_cell; cell++) {
@@ -105,7 +104,7 @@ void pal_cell_recovery_refresh(pal_cell_recovery *t, const struct pal_cells_elas
     }
 }
 
-static void show(const pal_cell_recovery *t, struct pal_cells_elastic *c)
+static void show(const pal_cell_recovery *t, pal_cells_elastic *c)
 {
     for (int cell = 0; cell < t->n_cell; cell++) {
         int e;
@@ -114,7 +113,7 @@ static void show(const pal_cell_recovery *t, struct pal_cells_elastic *c)
     }
 }
 
-void pal_cell_recovery_reset(pal_cell_recovery *t, struct pal_cells_elastic *c)
+void pal_cell_recovery_reset(pal_cell_recovery *t, pal_cells_elastic *c)
 {
     for (int cell = 0; cell < t->n_cell; cell++) t->patch[cell] = -1;
     t->n_patch = t->n_away = 0;
@@ -202,7 +201,7 @@ static bool is_good(const pal_cell_recovery *t, int cell)
 }
 
 /* energies of the patches and of their elements as such at d */
-static void weigh(pal_cell_recovery *t, const struct pal_cells_elastic *c, const double *d)
+static void weigh(pal_cell_recovery *t, const pal_cells_elastic *c, const double *d)
 {
     for (int p = 0; p < t->n_patch; p++) {
         pal_cell_region *patch = &t->of[p];
@@ -283,7 +282,7 @@ static bool take_in(pal_cell_recovery *t, const pal_subdivision_solid *solid, bo
 }
 
 /* elements whose volume is that of their control cell go into a patch together */
-static void take_whole_cells(pal_cell_recovery *t, const struct pal_cells_elastic *c)
+static void take_whole_cells(pal_cell_recovery *t, const pal_cells_elastic *c)
 {
     /* sums and pushes are found anew before each use */
     double *mark = c->volume.push;
@@ -324,7 +323,7 @@ static void number(pal_cell_recovery *t, const pal_subdivision_solid *solid)
 }
 
 /* G held or not and s of patches anew */
-static void begin(pal_cell_recovery *t, struct pal_cells_elastic *c, const pal_body *body)
+static void begin(pal_cell_recovery *t, pal_cells_elastic *c, const pal_body *body)
 {
     double fixed[9];
     const bool led = pal_support_rotation(body, fixed);
@@ -364,7 +363,7 @@ static bool firm_up(pal_cell_recovery *t)
     return any;
 }
 
-bool pal_cell_recovery_update(pal_cell_recovery *t, struct pal_cells_elastic *c, const pal_body *body, bool loaded)
+bool pal_cell_recovery_update(pal_cell_recovery *t, pal_cells_elastic *c, const pal_body *body, bool loaded)
 {
     bool bad = t->n_patch > 0;
     t->stiffened_J = 0;

@@ -71,7 +71,7 @@ static double bound_of(const mobility *m, const pal_body *body, int node)
 {
     const pal_interpolation *rows = body->interpolation;
     const pal_mass_operator *mass = body->mass_operator;
-    double sum = 0, most = body->solid->subdivision.n_level > 0 ? most_cubic : most_hex;
+    double sum = 0, most = body->model.solid->subdivision.n_level > 0 ? most_cubic : most_hex;
     for (int32_t k = rows->start[node]; k < rows->start[node + 1]; k++) {
         int32_t i = rows->point[k], at = mass->start[i];
         if (m->place && m->place[i] < 0) continue;
@@ -81,7 +81,7 @@ static double bound_of(const mobility *m, const pal_body *body, int node)
     return most * sum;
 }
 
-static void find_ease(pal_body *body)
+static void find_mobility(pal_body *body)
 {
     mobility m = {.place = malloc(sizeof *m.place * (size_t)body->n_dof + 1)};
     for (int i = 0; i < body->n_dof && m.place; i++) m.place[i] = body->fixed[i] ? -1 : m.n_free++;
@@ -94,16 +94,39 @@ static void find_ease(pal_body *body)
     free(m.place), free(m.factor), free(m.y);
 }
 
-void pal_subdivision_solid_update_mass(pal_body *body)
+static void update_mass(pal_body *body)
 {
-    pal_subdivision_mass_fill(body->solid, body->mass_operator);
-    pal_subdivision_mass_lump(body->solid, body->mass_kg, body->node_mass_kg);
-    find_ease(body);
+    pal_subdivision_mass_fill(body->model.solid, body->mass_operator);
+    pal_subdivision_mass_lump(body->model.solid, body->mass_kg, body->node_mass_kg);
+    find_mobility(body);
 }
 
-void pal_subdivision_solid_set_material(pal_body *body, const pal_material *material)
+static void set_material(pal_body *body, const pal_material *material)
 {
-    body->solid->def.material = *material;
-    pal_subdivision_solid_sample(body->solid, &body->solid->def);
-    pal_subdivision_solid_update_mass(body);
+    body->model.solid->def.material = *material;
+    pal_subdivision_solid_sample(body->model.solid, &body->model.solid->def);
+    update_mass(body);
+}
+
+static void destroy(pal_body *body)
+{
+    pal_subdivision_solid_free(body->model.solid);
+    body->model.solid = NULL;
+    body->dofs.destroy = NULL;
+}
+
+void pal_subdivision_body_dofs(pal_body *body)
+{
+    const pal_subdivision_solid *solid = body->model.solid;
+    pal_dofs *dofs = &body->dofs;
+    *dofs = (pal_dofs){.n_clique = PAL_CELL_KINDS,
+                       .material_revision = &solid->sampled,
+                       .n_byte = solid->n_byte,
+                       .update_mass = update_mass,
+                       .set_material = set_material,
+                       .destroy = destroy};
+    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
+        dofs->clique[kind] = (pal_cliques){.n_item = solid->elements.n[kind],
+                                           .n_corner = pal_cell_kind_nodes(kind),
+                                           .node = pal_subdivision_solid_nodes(solid, kind, 0)};
 }

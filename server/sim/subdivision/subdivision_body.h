@@ -1,14 +1,12 @@
-/* A body on a solid (subdivision_solid.h): what follows from the solid's samples. body->solid, solid_mass and the
- * arrays of pal_body_allocate_embedded are there. Thread: [load], [sim] between steps. */
+/* A body on a subdivision solid: the model's side of pal_dofs (dofs.h). Thread: [load], [sim] between steps. */
 #ifndef PAL_SIM_SUBDIVISION_SUBDIVISION_BODY_H
 #define PAL_SIM_SUBDIVISION_SUBDIVISION_BODY_H
 #include "server/sim/core/body.h"
 #include "server/sim/subdivision/subdivision_solid.h"
 
-/* mass_kg, node_mass_kg, the values of solid_mass and node_inverse_mass_1_kg anew: once what is held is known, and
- * after every change of the samples. Ease is looked at only at shown nodes. */
-void pal_subdivision_solid_update_mass(pal_body *body);
-/* the samples anew with another material of the body, regions and strokes as they are, then
- * pal_subdivision_solid_update_mass */
-void pal_subdivision_solid_set_material(pal_body *body, const pal_material *material);
+/* Fills body->dofs. body->model.solid, mass_operator, node_inverse_mass_1_kg and the arrays of
+ * pal_body_allocate_embedded are there. update_mass sets mass_kg, node_mass_kg, the values of mass_operator and, at
+ * shown nodes, node_inverse_mass_1_kg; set_material takes the samples again with another material of the body, with the
+ * same regions and strokes, and then updates the masses */
+void pal_subdivision_body_dofs(pal_body *body);
 #endif

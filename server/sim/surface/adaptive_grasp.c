@@ -22,7 +22,7 @@ static uint16_t mean_of(const pal_adaptive_surface *s, const uint16_t *share, in
 
 void pal_adaptive_grasp_begin(pal_adaptive_grasp *l, const pal_body *body, const double quat[4], uint16_t *share)
 {
-    const pal_adaptive_surface *s = body->adaptive;
+    const pal_adaptive_surface *s = body->model.adaptive;
     const double back[4] = {quat[0], -quat[1], -quat[2], -quat[3]};
     pal_rigid_fit frame = {.quat = {1, 0, 0, 0}};
     for (int32_t i = 0; i < body->n_node; i++)
@@ -58,7 +58,7 @@ void pal_adaptive_grasp_weights(const pal_body *body, const uint16_t *share, dou
         any |= share[i] > 0;
     }
     for (int32_t i = 0; i < body->n_node && !any; i++)
-        if (share[i] > 0) give_up(body->adaptive, i, share[i], weight);
+        if (share[i] > 0) give_up(body->model.adaptive, i, share[i], weight);
 }
 
 /* the same of a vertex of a finer surface to those of one of n_node */
@@ -81,7 +81,7 @@ void pal_adaptive_grasp_transfer(pal_adaptive_grasp *l, const pal_body *body, ui
     *l = (pal_adaptive_grasp){.retriangulated = false};
     memcpy(l->axes, before->axes, sizeof l->axes);
     for (int32_t i = 0; i < body->n_node; i++) {
-        share[i] = i < n_finest ? all[i] : mean_of(body->adaptive, share, i);
+        share[i] = i < n_finest ? all[i] : mean_of(body->model.adaptive, share, i);
         any |= share[i] > 0;
     }
     if (n_finest > body->n_node && (l->known = malloc(sizeof *l->known * (size_t)n_finest))) {
@@ -90,7 +90,7 @@ void pal_adaptive_grasp_transfer(pal_adaptive_grasp *l, const pal_body *body, ui
     }
     /* all that it holds is finer */
     for (int32_t i = 0; i < from->n_node && !any; i++)
-        if (share_before[i] > 0) share_up(from->adaptive, i, share_before[i], body->n_node, share);
+        if (share_before[i] > 0) share_up(from->model.adaptive, i, share_before[i], body->n_node, share);
 }
 
 void pal_adaptive_grasp_renew(pal_adaptive_grasp *l, const double was[3], const double is[3], double offset[3])

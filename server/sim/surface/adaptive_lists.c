@@ -221,6 +221,7 @@ bool pal_adaptive_update(pal_adaptive_surface *s, pal_body *body)
     s->surface.n_tri = s->n_tri;
     share_mass(s, body->mass_kg);
     find_rest_centre(s, body);
+    pal_adaptive_fill_dofs(s, body);
     if (!w.changed && n_leaf == s->n_leaf) return false;
     s->revision++;
     body->revision++;

@@ -118,7 +118,7 @@ static pal_err make_body(pal_adaptive_surface *s, pal_body *body, pal_arena *are
     memcpy(body->x, l->x, 3 * n * sizeof *body->x);
     s->surface = (pal_surface){.n_vertex = (int)n, .x = s->levels.x, .tri = s->tri};
     pal_copy3(s->surface.origin_m, l->origin_m);
-    body->adaptive = s;
+    body->model.adaptive = s;
     body->surface = &s->surface;
     body->active = s->node;
     body->edge_m = mean_edge(l, s->options.start_level);
@@ -160,6 +160,7 @@ pal_err pal_adaptive_make(const pal_surface *surface, const pal_adaptive_options
     pal_adaptive_set_level(s, body, options->start_level);
     pal_adaptive_update(s, body);
     s->n_log = 0;
+    pal_adaptive_fill_dofs(s, body);
     *out = s;
     return PAL_ERR_OK;
 }

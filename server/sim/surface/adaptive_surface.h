@@ -129,6 +129,8 @@ static inline int32_t pal_adaptive_triangle_slot(const pal_adaptive_surface *s, 
     int level = s->levels.face_level[face];
     return (face - s->levels.first_face[level]) << 2 * (s->levels.n_level - 1 - level);
 }
+/* body->dofs as the lists are now; for adaptive*.c */
+void pal_adaptive_fill_dofs(pal_adaptive_surface *adaptive, pal_body *body);
 /* empties n places from first on and logs them: for shell*.c */
 void pal_adaptive_clear_slots(pal_adaptive_surface *adaptive, int32_t first, int32_t n);
 /* triangles of a leaf as they are drawn now, 1..4; returns how many */

@@ -5,24 +5,26 @@
 
 void pal_adaptive_copy_refinement(pal_body *to, const pal_body *from)
 {
-    const pal_levels *levels = &to->adaptive->levels;
-    int n_level = levels->n_level < from->adaptive->levels.n_level ? levels->n_level : from->adaptive->levels.n_level;
-    pal_adaptive_set_level(to->adaptive, to, 0);
-    (void)pal_adaptive_update(to->adaptive, to);
+    const pal_levels *levels = &to->model.adaptive->levels;
+    int n_level =
+        levels->n_level < from->model.adaptive->levels.n_level ? levels->n_level : from->model.adaptive->levels.n_level;
+    pal_adaptive_set_level(to->model.adaptive, to, 0);
+    (void)pal_adaptive_update(to->model.adaptive, to);
     for (int32_t f = 0; n_level > 1 && f < levels->first_face[n_level - 1]; f++)
-        if (from->adaptive->face_state[f] == PAL_FACE_SPLIT) (void)pal_adaptive_split(to->adaptive, to, f, 0);
-    (void)pal_adaptive_update(to->adaptive, to);
+        if (from->model.adaptive->face_state[f] == PAL_FACE_SPLIT)
+            (void)pal_adaptive_split(to->model.adaptive, to, f, 0);
+    (void)pal_adaptive_update(to->model.adaptive, to);
 }
 
 void pal_adaptive_transfer_state(const pal_body *to, const pal_body *from, double *x, double *v)
 {
-    const pal_levels *levels = &to->adaptive->levels;
+    const pal_levels *levels = &to->model.adaptive->levels;
     for (int32_t i = 0; i < to->n_dof; i++) {
         double *xi = x + 3 * (size_t)i, *vi = v + 3 * (size_t)i;
         pal_copy3(xi, to->x_rest + 3 * (size_t)i);
         pal_set3(vi, 0, 0, 0);
-        if (!pal_adaptive_has(to->adaptive, i)) continue;
-        if (pal_adaptive_uses(from->adaptive, i)) {
+        if (!pal_adaptive_has(to->model.adaptive, i)) continue;
+        if (pal_adaptive_uses(from->model.adaptive, i)) {
             pal_copy3(xi, from->x + 3 * (size_t)i);
             if (to->fixed[i] != 1) pal_copy3(vi, from->v + 3 * (size_t)i);
             continue;

@@ -2,11 +2,10 @@
 #include "server/sim/transfer/transfer.h"
 
 #include "server/base/vec3.h"
+#include "server/mesh/cells/cell_elements.h"
 #include "server/mesh/volume/locate.h"
 #include "server/num/shape_functions.h"
 #include "server/sim/core/effect_list.h"
-#include "server/sim/subdivision/subdivision_solid.h"
-#include "server/sim/surface/adaptive_surface.h"
 #include "server/sim/transfer/transfer_core.h"
 
 #include <stdlib.h>
@@ -27,7 +26,7 @@ static void free_bare(bare *b)
 {
     pal_locate_destroy(b->locate);
     free(b->tets.tet);
-    pal_subdivision_solid_free(b->body.solid);
+    if (b->body.dofs.destroy) b->body.dofs.destroy(&b->body);
     pal_arena_destroy(b->arena);
 }
 
@@ -78,15 +77,15 @@ static pal_err cut_solid(bare *b)
 {
     static const int hex[5][4] = {{0, 1, 2, 4}, {3, 1, 7, 2}, {5, 1, 4, 7}, {6, 2, 7, 4}, {1, 2, 4, 7}};
     static const int pyramid[2][4] = {{0, 1, 2, 4}, {0, 2, 3, 4}};
-    const pal_subdivision_solid *s = b->body.solid;
-    size_t most = 5 * ((size_t)s->elements.n[PAL_CELL_CUBIC] + (size_t)s->elements.n[PAL_CELL_HEX]) +
-                  2 * (size_t)s->elements.n[PAL_CELL_PYRAMID];
+    const pal_cliques *clique = b->body.dofs.clique;
+    size_t most =
+        5 * (clique[PAL_CELL_CUBIC].n_item + clique[PAL_CELL_HEX].n_item) + 2 * clique[PAL_CELL_PYRAMID].n_item;
     b->tets = (pal_tets){.n_node = b->body.n_node, .x = b->body.node_rest, .edge_m = b->body.edge_m};
     b->tets.tet = malloc(4 * sizeof(int32_t) * (most + 1));
     if (!b->tets.tet) return PAL_ERR_MEMORY;
     for (int kind = 0; kind < PAL_CELL_KINDS; kind++)
-        for (int e = 0; e < s->elements.n[kind]; e++) {
-            const int32_t *node = pal_subdivision_solid_nodes(s, (pal_cell_kind)kind, e);
+        for (int e = 0; e < (int)clique[kind].n_item; e++) {
+            const int32_t *node = clique[kind].node + (size_t)clique[kind].n_corner * (size_t)e;
             int32_t corner[8];
             for (int c = 0; c < 8 && kind == PAL_CELL_CUBIC; c++)
                 corner[c] = node[16 * (1 + (c & 1)) + 4 * (1 + (c >> 1 & 1)) + 1 + (c >> 2)];
@@ -101,7 +100,7 @@ static pal_err make_locate(bare *b, pal_diagnostic *diag)
 {
     const pal_body *body = &b->body;
     const pal_tets *tets = body->tets;
-    if (body->solid) {
+    if (body->interpolation) {
         PAL_TRY(cut_solid(b));
         tets = &b->tets;
     }
@@ -143,7 +142,7 @@ static void add_point(const bare *in, const double x[3], pal_interpolation_build
         pal_tet10_shape(local, weight, NULL);
     else
         memcpy(weight, local, sizeof local);
-    const int32_t *node = n == 4 ? (body->solid ? in->tets.tet : body->tets->tet) : body->element;
+    const int32_t *node = n == 4 ? (body->interpolation ? in->tets.tet : body->tets->tet) : body->element;
     for (int c = 0; c < n; c++)
         if (fabs(weight[c]) > 1e-12)
             pal_interpolation_builder_add(rows, node[(size_t)n * (size_t)e + (size_t)c], weight[c]);
@@ -196,10 +195,10 @@ static pal_err make(const pal_scene *from, const pal_scene *to, int body, pal_di
     PAL_TRY(make_bare(from, body, diag, a));
     PAL_TRY(make_bare(to, body, diag, b));
     t->body = body;
-    t->adaptive = a->body.adaptive != NULL;
-    t->same_control_points = a->body.solid && b->body.solid && same_cells(from, to, body);
+    t->adaptive = a->body.active != NULL;
+    t->same_control_points = a->body.interpolation && b->body.interpolation && same_cells(from, to, body);
     t->n_from = a->body.n_node, t->n_to = b->body.n_node, t->n_dof = b->body.n_dof;
-    if (!a->body.adaptive != !b->body.adaptive)
+    if (!a->body.active != !b->body.active)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
                                   "body \"%s\": a surface that adapts and a full body are no one thing",
                                   from->body[body].name);

@@ -3,7 +3,6 @@
 
 #include "server/base/vec3.h"
 #include "server/sim/core/blend.h"
-#include "server/sim/surface/adaptive_transfer.h"
 #include "server/sim/transfer/transfer_core.h"
 #include "server/sim/world/world_core.h"
 
@@ -27,7 +26,7 @@ double pal_transfer_body_move(const pal_transfer *t, const pal_body *from, const
     double most = 0;
     int n_common = from->n_node < to->n_node ? from->n_node : to->n_node;
     for (int i = 0; i < n_common && t->adaptive; i++)
-        if (pal_adaptive_uses(from->adaptive, i) && pal_adaptive_uses(to->adaptive, i))
+        if (pal_dofs_has(&from->dofs, i) && pal_dofs_has(&to->dofs, i))
             most = fmax(most, pal_dist3(from->x + 3 * i, to->x + 3 * i));
     for (int i = 0; i < from->n_node && !t->adaptive; i++) {
         double move[3] = {0, 0, 0};
@@ -55,13 +54,13 @@ bool pal_transfer_same_shown(const pal_world *next, const pal_world *before, int
 }
 
 /* where a vertex of surface `names` was shown: itself, or between the ends of its edge */
-static void add_shown(const pal_body *from, const pal_adaptive_surface *names, int32_t i, double weight, double out[3])
+static void add_shown(const pal_body *from, const pal_levels *names, int32_t i, double weight, double out[3])
 {
-    if (i < from->n_shown && pal_adaptive_uses(from->adaptive, i)) {
+    if (i < from->n_shown && pal_dofs_has(&from->dofs, i)) {
         for (int c = 0; c < 3; c++) out[c] += weight * (double)from->shown[3 * (size_t)i + (size_t)c];
         return;
     }
-    const int32_t *end = names->levels.edge[pal_levels_vertex_parent(&names->levels, i)].vertex;
+    const int32_t *end = names->edge[pal_levels_vertex_parent(names, i)].vertex;
     for (int k = 0; k < 2; k++) add_shown(from, names, end[k], 0.5 * weight, out);
 }
 
@@ -70,8 +69,8 @@ static void add_shown(const pal_body *from, const pal_adaptive_surface *names, i
 static void was_shown(const pal_transfer *t, const pal_body *from, const pal_body *to, bool same, int i, double out[3])
 {
     pal_set3(out, 0, 0, 0);
-    if (t->adaptive && pal_adaptive_uses(to->adaptive, i))
-        add_shown(from, to->adaptive, i, 1, out);
+    if (t->adaptive && pal_dofs_has(&to->dofs, i))
+        add_shown(from, to->dofs.levels, i, 1, out);
     else if (same || t->adaptive)
         for (int c = 0; c < 3; c++) out[c] = (double)(t->adaptive ? to : from)->shown[3 * (size_t)i + (size_t)c];
     else

@@ -4,7 +4,6 @@
 #include "server/base/vec3.h"
 #include "server/num/conjugate_gradient.h"
 #include "server/num/polar.h"
-#include "server/sim/surface/adaptive_transfer.h"
 #include "server/sim/transfer/transfer_core.h"
 #include "server/sim/world/world_core.h"
 
@@ -236,14 +235,14 @@ static void set_points(pal_transfer *t, const pal_body *from, const pal_body *to
 /* ---- adaptive surfaces ---- */
 
 /* an old vertex by new ones: itself, or the ends of its edge */
-static void add_vertex(pal_interpolation_builder *rows, const pal_adaptive_surface *from,
-                       const pal_adaptive_surface *to, int32_t i, double weight)
+static void add_vertex(pal_interpolation_builder *rows, const pal_dofs *from, const pal_dofs *to, int32_t i,
+                       double weight)
 {
-    if (pal_adaptive_uses(to, i)) {
+    if (pal_dofs_has(to, i)) {
         pal_interpolation_builder_add(rows, i, weight);
         return;
     }
-    const int32_t *end = from->levels.edge[pal_levels_vertex_parent(&from->levels, i)].vertex;
+    const int32_t *end = from->levels->edge[pal_levels_vertex_parent(from->levels, i)].vertex;
     for (int k = 0; k < 2; k++) add_vertex(rows, from, to, end[k], 0.5 * weight);
 }
 
@@ -254,7 +253,7 @@ static bool make_back(pal_transfer *t, const pal_body *from, const pal_body *to)
     pal_interpolation_free(&t->back);
     pal_interpolation_builder_begin(&rows, from->n_node, to->n_node, INT32_MAX);
     for (int32_t i = 0; i < from->n_node && !rows.err; i++) {
-        if (pal_adaptive_has(from->adaptive, i)) add_vertex(&rows, from->adaptive, to->adaptive, i, 1);
+        if (pal_dofs_has(&from->dofs, i)) add_vertex(&rows, &from->dofs, &to->dofs, i, 1);
         pal_interpolation_builder_end_row(&rows);
     }
     return pal_interpolation_builder_finish(&rows, &t->back) == PAL_ERR_OK;
@@ -469,8 +468,7 @@ static void place_points(pal_transfer *t, const pal_body *from, pal_world *next)
         set_points(t, from, to);
         return;
     }
-    if (refines(next, t->body)) pal_adaptive_copy_refinement(to, from);
-    pal_adaptive_transfer_state(to, from, t->x, t->v);
+    to->dofs.transfer(to, from, refines(next, t->body), t->x, t->v);
     (void)make_back(t, from, to);
 }
 

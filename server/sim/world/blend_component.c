@@ -3,7 +3,6 @@
 
 #include "server/base/vec3.h"
 #include "server/sim/core/blend.h"
-#include "server/sim/surface/adaptive_surface.h"
 
 typedef struct blend {
     double share; /* of both that is left: 1, falls to 0 */
@@ -28,7 +27,7 @@ static void add_load(const blend *row, double share, double *load)
     const pal_body *body = row->body;
     for (int k = 0; k < pal_body_nodes(body); k++) {
         size_t i = 3 * (size_t)pal_body_point(body, k);
-        pal_axpy3(load + i, body->adaptive ? share * body->mass_kg[i / 3] : share, row->force_N + i);
+        pal_axpy3(load + i, body->active ? share * body->mass_kg[i / 3] : share, row->force_N + i);
     }
 }
 
@@ -66,14 +65,14 @@ const pal_effect pal_effect_blend = {
 /* what is split later shall not leave all of a coarse vertex's load on the fine one that it becomes */
 static void per_mass(const pal_body *body, double *force)
 {
-    const pal_adaptive_surface *s = body->adaptive;
+    const pal_dofs *dofs = &body->dofs;
     for (int32_t i = 0; i < body->n_node; i++) {
         double *f = force + 3 * (size_t)i;
-        if (pal_adaptive_has(s, i)) {
+        if (pal_dofs_has(dofs, i)) {
             pal_scale3(f, body->mass_kg[i] > 0 ? 1 / body->mass_kg[i] : 0, f);
             continue;
         }
-        const int32_t *end = s->levels.edge[pal_levels_vertex_parent(&s->levels, i)].vertex;
+        const int32_t *end = dofs->levels->edge[pal_levels_vertex_parent(dofs->levels, i)].vertex;
         pal_set3(f, 0, 0, 0);
         for (int k = 0; k < 2; k++) pal_axpy3(f, 0.5, force + 3 * (size_t)end[k]);
     }
@@ -130,7 +129,7 @@ pal_err pal_blend_components_set(pal_blend_components *rows, pal_plan *plan, int
     const pal_body *b = &plan->body[body];
     PAL_TRY(change(rows, plan, body, force_N, b->display_offset_m, b->display_offset_part));
     blend *row = rows->self[body];
-    if (b->adaptive) per_mass(b, row->force_N);
+    if (b->active) per_mass(b, row->force_N);
     return PAL_ERR_OK;
 }
 

@@ -1,16 +1,16 @@
 /* Frames: memory for what a step shows. */
 #include "server/sim/world/frame.h"
 
-#include "server/sim/surface/adaptive_surface.h"
+#include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
 #include <stdlib.h>
 
 /* room for the triangles of a part that adapts; no table taken yet */
-static bool make_slots(pal_frame_part *part, const pal_adaptive_surface *adaptive)
+static bool make_slots(pal_frame_part *part, const pal_dofs *dofs)
 {
-    const pal_levels *levels = &adaptive->levels;
-    part->n_slot = adaptive->n_slot;
+    const pal_levels *levels = dofs->levels;
+    part->n_slot = dofs->n_slot;
     part->slot = calloc(3 * (size_t)part->n_slot + 1, sizeof *part->slot);
     part->slot_log = UINT64_MAX;
     part->n_finest = levels->n_vertex[levels->n_level - 1];
@@ -35,8 +35,8 @@ pal_frame *pal_frame_create(const pal_world *world)
         pal_frame_part *part = &frame->part[frame->n_part++];
         part->n_vertex = world->part[i].n_vertex;
         part->position_m = calloc(3 * (size_t)part->n_vertex + 1, sizeof(float));
-        bool adapts = body->adaptive && part->n_vertex > 0;
-        bool made = part->position_m && (!adapts || make_slots(part, body->adaptive)) &&
+        bool adapts = body->active && part->n_vertex > 0;
+        bool made = part->position_m && (!adapts || make_slots(part, &body->dofs)) &&
                     (!body->interpolation || make_points(part, body));
         if (!made) {
             pal_frame_destroy(frame);

@@ -6,7 +6,6 @@
 #include "server/sim/plan/plan.h"
 #include "server/sim/recovery/stiffening_damper.h"
 #include "server/sim/subdivision/subdivision_body.h"
-#include "server/sim/surface/adaptive_surface.h"
 #include "server/sim/world/field_components.h"
 #include "server/sim/world/world_core.h"
 
@@ -60,7 +59,7 @@ static int count_substeps(const pal_world *w, double time_s, double limit_s)
 
 static bool refines(const pal_world *w, int b)
 {
-    return w->plan.body[b].adaptive && w->plan.n_of[PAL_STAGE_ADAPT][b] > 0;
+    return w->plan.body[b].active && w->plan.n_of[PAL_STAGE_ADAPT][b] > 0;
 }
 
 /* what FORCE rows have kept of the last forces (turns of elements), so that a new world is as one that was reset */
@@ -91,9 +90,9 @@ static double find_rest_limit(pal_world *w)
         body->x = x, body->d = d;
         pal_body_update_nodes(body);
         /* refinement may bring the finest level, each level about half the step (C eq. 9) */
-        if (refines(w, b)) limit = ldexp(limit, body->adaptive->finest + 1 - body->adaptive->levels.n_level);
+        if (refines(w, b)) limit = ldexp(limit, body->dofs.finest + 1 - body->dofs.levels->n_level);
         if (solve->effect->reset) solve->effect->reset(solve->self, body);
-        if (body->solid) forget_forces(w, b);
+        if (body->interpolation) forget_forces(w, b);
         if (!(limit >= least)) least = limit;
     }
     w->limit_s = limit_s;
@@ -104,8 +103,8 @@ pal_err pal_world_check_budget(pal_world *w, pal_diagnostic *diag)
 {
     double limit = find_rest_limit(w);
     int n = count_substeps(w, w->step_s, limit);
-    bool adapts = false;
-    for (int b = 0; b < w->plan.n_body; b++) adapts |= refines(w, b);
+    bool is_adaptive = false;
+    for (int b = 0; b < w->plan.n_body; b++) is_adaptive |= refines(w, b);
     if (!(limit > 0) || n > w->max_substep) {
         char who[120];
         pal_world_describe_limit(w, who, sizeof who);
@@ -113,8 +112,8 @@ pal_err pal_world_check_budget(pal_world *w, pal_diagnostic *diag)
             diag, PAL_ERR_BUDGET,
             "a step of %g s needs %.0f sub-steps of %.3g s%s%s, most_substep allows %d: take a softer or "
             "denser material, larger elements%s or a shorter step",
-            w->step_s, ceil(w->step_s / limit), limit, adapts ? " on the finest level" : "", who, w->max_substep,
-            adapts ? ", fewer levels" : "");
+            w->step_s, ceil(w->step_s / limit), limit, is_adaptive ? " on the finest level" : "", who, w->max_substep,
+            is_adaptive ? ", fewer levels" : "");
     }
     w->rest_limit_s = limit;
     return PAL_ERR_OK;
@@ -139,9 +138,9 @@ static pal_err make_part(pal_world *w, int b)
     pal_world_part *p = &w->part[b];
     const double *x = body->skin ? body->surface->x : body->node_rest;
     if (body->n_shown == 0) return PAL_ERR_OK;
-    const int32_t *tri = body->adaptive ? body->adaptive->slot : body->surface->tri;
+    const int32_t *tri = body->active ? body->dofs.slot : body->surface->tri;
     p->n_vertex = body->n_shown;
-    p->n_tri = body->adaptive ? body->adaptive->n_slot : body->surface->n_tri;
+    p->n_tri = body->active ? body->dofs.n_slot : body->surface->n_tri;
     p->rest_m = PAL_NEW(w->arena, float, 3 * (size_t)p->n_vertex);
     p->tri = PAL_NEW(w->arena, int32_t, 3 * (size_t)p->n_tri);
     if (!p->rest_m || !p->tri) return PAL_ERR_MEMORY;
@@ -150,7 +149,7 @@ static pal_err make_part(pal_world *w, int b)
         for (int c = 0; c < 3; c++) p->rest_m[3 * i + c] = (float)(x[3 * from + c] + body->offset_m[c]);
     }
     memcpy(p->tri, tri, 3 * sizeof *tri * (size_t)p->n_tri);
-    return body->adaptive ? make_parents(w, &body->adaptive->levels, p) : PAL_ERR_OK;
+    return body->active ? make_parents(w, body->dofs.levels, p) : PAL_ERR_OK;
 }
 
 /* tools with the defaults that depend on bodies */

@@ -30,7 +30,7 @@ typedef struct pal_shown {
                           * ones (pal_frame_part.slot brings its changes)  [n_tri][3] */
     uint64_t revision;
     const int32_t *face; /* control face of each triangle, -1: none (body.shown_face); NULL: no solid [n_tri] */
-    bool adapts;         /* triangles change while it runs */
+    bool is_adaptive;    /* triangles change while it runs */
     /* how vertices hang together where they are more than `tri` shows: vertex i >= n_coarse is the midpoint of the
      * smaller vertices parent[2 (i - n_coarse)], parent[.. + 1]; NULL: it is no such body */
     int n_coarse;

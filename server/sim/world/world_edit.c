@@ -3,7 +3,6 @@
 #include "server/base/vec3.h"
 #include "server/sim/recovery/stiffening_damper.h"
 #include "server/sim/subdivision/subdivision_body.h"
-#include "server/sim/surface/adaptive_surface.h"
 #include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
@@ -71,18 +70,15 @@ void pal_world_reset(pal_world *world)
 static pal_err apply_material(pal_world *w, int b, const pal_material *to, pal_diagnostic *diag)
 {
     pal_body *body = &w->plan.body[b];
-    if (body->solid) pal_subdivision_solid_set_material(body, to);
+    if (body->dofs.set_material) body->dofs.set_material(body, to);
     for (int i = 0; i < w->plan.n_row; i++) {
         const pal_component *row = &w->plan.row[i];
         if (w->plan.component_body[i] != b || !row->effect->material) continue;
         PAL_TRY(row->effect->material(row->self, body, to, diag));
     }
     double ratio = to->density_kg_m3 / w->material[b].density_kg_m3;
-    for (int i = 0; i < body->n_dof && !body->solid; i++) body->mass_kg[i] *= ratio;
-    if (body->adaptive) {
-        body->adaptive->options.mass_kg *= ratio;
-        for (int l = 0; l < body->adaptive->levels.n_level; l++) body->adaptive->level_mass_kg[l] *= ratio;
-    }
+    for (int i = 0; i < body->n_dof && !body->dofs.set_material; i++) body->mass_kg[i] *= ratio;
+    if (body->dofs.scale_mass) body->dofs.scale_mass(body, ratio);
     body->load_cap_N = pal_body_load_cap_N(body, to->young_Pa);
     body->full_corner_kg *= ratio;
     w->material[b] = *to;

@@ -1,7 +1,6 @@
 /* Lasting loads on nodes, and how much of a load nodes bear. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
-#include "server/sim/surface/adaptive_surface.h"
 #include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
@@ -11,7 +10,7 @@ pal_err pal_world_load(pal_world *world, int body, int node, const double force_
 {
     if (body < 0 || body >= world->plan.n_body || !pal_finite3(force_N)) return PAL_ERR_REFUSED;
     pal_body *b = &world->plan.body[body];
-    if (node < 0 || node >= b->n_node || (b->adaptive && !pal_adaptive_has(b->adaptive, node))) return PAL_ERR_REFUSED;
+    if (node < 0 || node >= b->n_node || (b->active && !pal_dofs_has(&b->dofs, node))) return PAL_ERR_REFUSED;
     if (!b->external_force) b->external_force = PAL_NEW(world->arena, double, 3 * (size_t)b->n_node);
     if (!b->external_force) return PAL_ERR_MEMORY;
     pal_copy3(b->external_force + 3 * node, force_N);

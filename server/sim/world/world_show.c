@@ -2,7 +2,6 @@
 #include "server/sim/world/world.h"
 
 #include "server/base/vec3.h"
-#include "server/sim/surface/adaptive_surface.h"
 #include "server/sim/world/world_core.h"
 
 #include <stdio.h>
@@ -21,20 +20,21 @@ static void copy_fields(const pal_body *body, pal_frame_part *to)
 }
 
 /* what of the table of triangles has changed since this frame was filled last, or all of it */
-static void copy_slots(const pal_adaptive_surface *adaptive, pal_frame_part *to)
+static void copy_slots(const pal_body *body, pal_frame_part *to)
 {
+    const pal_dofs *dofs = &body->dofs;
     size_t one = 3 * sizeof *to->slot;
-    if (to->slot_log > adaptive->n_log || adaptive->n_log - to->slot_log > (uint64_t)adaptive->n_log_room) {
-        memcpy(to->slot, adaptive->slot, one * (size_t)adaptive->n_slot);
+    if (to->slot_log > dofs->n_log || dofs->n_log - to->slot_log > (uint64_t)dofs->n_log_room) {
+        memcpy(to->slot, dofs->slot, one * (size_t)dofs->n_slot);
     } else {
-        for (uint64_t i = to->slot_log; i < adaptive->n_log; i++) {
-            size_t place = 3 * (size_t)adaptive->log[i % (uint64_t)adaptive->n_log_room];
-            memcpy(to->slot + place, adaptive->slot + place, one);
+        for (uint64_t i = to->slot_log; i < dofs->n_log; i++) {
+            size_t place = 3 * (size_t)dofs->log[i % (uint64_t)dofs->n_log_room];
+            memcpy(to->slot + place, dofs->slot + place, one);
         }
     }
-    to->slot_log = adaptive->n_log;
-    to->n_active = adaptive->n_node;
-    to->n_spring = adaptive->n_spring;
+    to->slot_log = dofs->n_log;
+    to->n_active = body->n_active;
+    to->n_spring = dofs->n_spring;
 }
 
 static void copy_part(const pal_body *body, pal_frame_part *to)
@@ -45,14 +45,14 @@ static void copy_part(const pal_body *body, pal_frame_part *to)
     to->frozen = body->frozen;
     memcpy(to->reason, body->reason, sizeof to->reason);
     to->safeguards = body->safeguards;
-    to->n_rescue = pal_safeguards_sum(&body->safeguards);
+    to->n_safeguard = pal_safeguards_sum(&body->safeguards);
     to->rescue_ns = body->safeguards.ns;
     to->asleep = body->asleep;
     bool same = to->n_output == body->n_output; /* these are the positions that it has */
     to->n_output = body->n_output;
     if (to->n_point > 0) memcpy(to->point_m, body->x, 3 * sizeof(double) * (size_t)to->n_point);
     if (to->n_slot > 0) {
-        copy_slots(body->adaptive, to);
+        copy_slots(body, to);
         for (int k = 0; k < body->n_active && !same; k++) {
             size_t i = 3 * (size_t)body->active[k];
             for (size_t c = 0; c < 3; c++) to->position_m[i + c] = (float)((double)body->shown[i + c] + o[c]);
@@ -120,8 +120,8 @@ uint64_t pal_world_hash(const pal_world *world)
         const pal_body *body = &world->plan.body[b];
         hash = hash_bytes(hash, body->x, 3 * sizeof(double) * (size_t)body->n_dof);
         hash = hash_bytes(hash, body->v, 3 * sizeof(double) * (size_t)body->n_dof);
-        const pal_levels *levels = body->adaptive ? &body->adaptive->levels : NULL;
-        if (levels) hash = hash_bytes(hash, body->adaptive->face_state, (size_t)levels->first_face[levels->n_level]);
+        const pal_levels *levels = body->dofs.levels;
+        if (levels) hash = hash_bytes(hash, body->dofs.face_state, (size_t)levels->first_face[levels->n_level]);
     }
     return hash;
 }
@@ -211,9 +211,9 @@ void pal_world_shown(const pal_world *world, int index, pal_shown *out)
                        .tri = p->tri,
                        .face = body->shown_face,
                        .revision = body->revision};
-    if (!body->adaptive || p->n_vertex == 0) return;
-    const pal_levels *levels = &body->adaptive->levels;
-    out->adapts = true;
+    if (!body->active || p->n_vertex == 0) return;
+    const pal_levels *levels = body->dofs.levels;
+    out->is_adaptive = true;
     out->n_coarse = levels->n_vertex[0];
     out->parent = p->parent;
     out->n_coarse_tri = levels->first_face[1];

@@ -1,7 +1,6 @@
 /* A world that goes on where another is (pal_world_transfer). */
 #include "server/base/vec3.h"
 #include "server/sim/springs/spring_recovery.h"
-#include "server/sim/surface/adaptive_transfer.h"
 #include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
@@ -50,8 +49,8 @@ void pal_world_transfer_loads(pal_world *w, int b, const pal_world *before)
 
 static bool same_shell(const pal_body *a, const pal_body *b)
 {
-    return a->adaptive && b->adaptive && a->n_dof == b->n_dof &&
-           a->adaptive->levels.n_level == b->adaptive->levels.n_level && a->adaptive->n_slot == b->adaptive->n_slot;
+    return a->active && b->active && a->n_dof == b->n_dof && a->dofs.levels->n_level == b->dofs.levels->n_level &&
+           a->dofs.n_slot == b->dofs.n_slot;
 }
 
 /* a surface as it is refined and stands there */
@@ -59,10 +58,8 @@ static void follow_shell(pal_world *w, int b, const pal_world *before)
 {
     const pal_body *from = &before->plan.body[b];
     pal_body *to = &w->plan.body[b];
-    if (w->plan.n_of[PAL_STAGE_ADAPT][b] > 0) pal_adaptive_copy_refinement(to, from);
-    pal_adaptive_transfer_state(to, from, to->x, to->v);
-    to->adaptive->spring_ramp = from->adaptive->spring_ramp;
-    to->adaptive->shape_ramp = from->adaptive->shape_ramp;
+    to->dofs.transfer(to, from, w->plan.n_of[PAL_STAGE_ADAPT][b] > 0, to->x, to->v);
+    for (int k = 0; k < 2; k++) *to->dofs.ramp[k] = *from->dofs.ramp[k];
     for (int i = 0; i < w->plan.n_of[PAL_STAGE_ADAPT][b] && i < before->plan.n_of[PAL_STAGE_ADAPT][b]; i++) {
         const pal_component *row = &w->plan.row[w->plan.first[PAL_STAGE_ADAPT][b] + i];
         const pal_component *was = &before->plan.row[before->plan.first[PAL_STAGE_ADAPT][b] + i];
@@ -104,7 +101,7 @@ void pal_world_transfer(pal_world *world, const pal_world *before, int edited, c
         if (memcmp(&w->material[b], &before->material[b], sizeof w->material[b]) != 0)
             (void)pal_world_material(w, b, &before->material[b], NULL);
         bool other = b != edited, adaptive = other && same_shell(&w->plan.body[b], from),
-             same = other && !w->plan.body[b].adaptive && w->plan.body[b].n_dof == from->n_dof;
+             same = other && !w->plan.body[b].active && w->plan.body[b].n_dof == from->n_dof;
         if (adaptive) follow_shell(w, b, before);
         if (adaptive || same) copy_loads(w, &w->plan.body[b], from);
         follow_body(w, b, from, same ? from->x : other ? NULL : x, same ? from->v : other ? NULL : v);

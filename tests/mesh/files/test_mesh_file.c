@@ -1,5 +1,6 @@
 /* Surface files: every form the formats allow gives the same tetrahedron or cube, hostile files give one sentence with
  * name and place, and the shared models have the counts that are known of them. */
+#include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/mesh_file.h"
 #include "tests/check.h"
 

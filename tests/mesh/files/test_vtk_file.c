@@ -1,5 +1,5 @@
 /* VTK files read back as text: every count, index and number. */
-#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/vtk_file.h"
 #include "server/mesh/volume/hexes.h"
 #include "tests/check.h"

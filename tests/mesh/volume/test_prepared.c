@@ -1,5 +1,5 @@
 /* The prepared mesh: made, saved, loaded, refused when damaged. */
-#include "server/mesh/files/mesh_file.h"
+#include "server/mesh/files/file_bytes.h"
 #include "server/mesh/volume/prepared.h"
 #include "tests/check.h"
 #include "tests/fixtures/shapes.h"

@@ -286,7 +286,7 @@ static void what_a_far_tool_holds_or_presses_stays_awake(void)
         REQUIRE(model_scene_open(&m));
         REQUIRE(steps_to_sleep(&m, 1200) > 0);
         double *x = malloc(3 * sizeof(double) * (size_t)m.body->n_dof), held_m = 0, left_m = 0;
-        const int n_x = 3 * (m.body->adaptive ? m.body->adaptive->levels.n_vertex[0] : m.body->n_dof);
+        const int n_x = 3 * (m.body->model.adaptive ? m.body->model.adaptive->levels.n_vertex[0] : m.body->n_dof);
         const float *high = m.body->shown;
         REQUIRE(x);
         memcpy(x, m.body->x, 3 * sizeof(double) * (size_t)m.body->n_dof);

@@ -330,7 +330,7 @@ static void a_step_calls_no_heap(void)
     n_heap_call = 0;
     for (int i = 0; i < 20; i++) {
         /* columns are found anew on the way, the last ones are not: then a spare thread factors */
-        if (i == 5) t.body.solid->sampled++;
+        if (i == 5) t.body.model.solid->sampled++;
         counting = i < 12;
         bool went = go(&t);
         counting = false;
@@ -351,7 +351,7 @@ static void other_samples_bring_another_factor(void)
     t.dt_s = t.scene->step_s;
     int at[4] = {0};
     for (int i = 0; i < 80; i++) {
-        if (i == 10) t.springs->k_N_m *= 1000, t.body.solid->sampled++;
+        if (i == 10) t.springs->k_N_m *= 1000, t.body.model.solid->sampled++;
         REQUIRE(go(&t));
         if (i == 9) at[0] = report_of(&t).n_cg;
         if (i == 11) at[1] = report_of(&t).n_cg;
@@ -363,7 +363,7 @@ static void other_samples_bring_another_factor(void)
     CHECK(at[1] > 10);
     CHECK_LE(at[2], 8);
     /* a reset brings the factor of load back at once */
-    t.springs->k_N_m /= 1000, t.body.solid->sampled++;
+    t.springs->k_N_m /= 1000, t.body.model.solid->sampled++;
     t.solve.effect->reset(t.solve.self, &t.body);
     CHECK_INT(report_of(&t).n_factor, 3);
     free_thing(&t);

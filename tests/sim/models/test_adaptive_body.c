@@ -130,9 +130,9 @@ static void a_lasting_load_needs_a_node_in_use(void)
     int coarse = s.mesh.surface.n_vertex;
     CHECK_INT(pal_world_load(s.world, 0, coarse - 1, force), 0);
     CHECK_INT(pal_world_load(s.world, 0, coarse, force), PAL_ERR_REFUSED);
-    REQUIRE(pal_adaptive_split(s.body->adaptive, s.body, 0, 0) > 0);
-    pal_adaptive_update(s.body->adaptive, s.body);
-    int node = pal_levels_edge_midpoint(&s.body->adaptive->levels, s.body->adaptive->levels.face_edge[0]);
+    REQUIRE(pal_adaptive_split(s.body->model.adaptive, s.body, 0, 0) > 0);
+    pal_adaptive_update(s.body->model.adaptive, s.body);
+    int node = pal_levels_edge_midpoint(&s.body->model.adaptive->levels, s.body->model.adaptive->levels.face_edge[0]);
     CHECK_INT(pal_world_load(s.world, 0, node, force), 0);
     shell_scene_close(&s);
 }
@@ -140,7 +140,7 @@ static void a_lasting_load_needs_a_node_in_use(void)
 /* random splits and joins, several at once; false: nothing came of it */
 static bool change(shell_scene *s, unsigned *seed, int n)
 {
-    pal_adaptive_surface *adaptive = s->body->adaptive;
+    pal_adaptive_surface *adaptive = s->body->model.adaptive;
     for (int i = 0; i < n; i++) {
         *seed = *seed * 1664525u + 1013904223u;
         int32_t face = adaptive->leaf[(int)(*seed >> 8) % adaptive->n_leaf],
@@ -170,7 +170,7 @@ static void another_body_is_switched_and_this_one_goes_on(void)
     pal_body *first = s.body, *body = s.body = pal_world_body(s.world, 1);
     unsigned seed = 3;
     for (int i = 0; i < 20; i++) change(&s, &seed, 20);
-    REQUIRE(body->adaptive->finest == 2);
+    REQUIRE(body->model.adaptive->finest == 2);
     CHECK_INT(pal_world_load(s.world, 1, front(&s), (double[3]){0, 0, -0.02}), 0);
     for (int i = 0; i < 20; i++) CHECK_INT(pal_world_step(s.world, 1e-3), 0);
     body->safeguards.n_capped = 7, first->safeguards.n_mass_scaled = 5;
@@ -178,8 +178,9 @@ static void another_body_is_switched_and_this_one_goes_on(void)
     for (int round = 0; round < 2; round++) pal_world_transfer(next, s.world, 0, first->x, first->v);
     pal_body *to = pal_world_body(next, 1);
     size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
-    CHECK_INT(to->adaptive->n_leaf, body->adaptive->n_leaf);
-    CHECK(!memcmp(to->adaptive->face_state, body->adaptive->face_state, (size_t)body->adaptive->levels.first_face[3]));
+    CHECK_INT(to->model.adaptive->n_leaf, body->model.adaptive->n_leaf);
+    CHECK(!memcmp(to->model.adaptive->face_state, body->model.adaptive->face_state,
+                  (size_t)body->model.adaptive->levels.first_face[3]));
     CHECK(!memcmp(to->x, body->x, n_byte) && !memcmp(to->v, body->v, n_byte));
     CHECK(to->external_force && !memcmp(to->external_force, body->external_force, n_byte));
     CHECK_INT(to->safeguards.n_capped, 7);
@@ -210,12 +211,12 @@ static void frames_follow_the_table_of_triangles_whatever_they_skip(void)
 {
     shell_scene s;
     REQUIRE(stomach_make(&s, 4));
-    pal_adaptive_surface *adaptive = s.body->adaptive;
+    pal_adaptive_surface *adaptive = s.body->model.adaptive;
     pal_frame *each = pal_frame_create(s.world), *some = pal_frame_create(s.world);
     REQUIRE(each && some);
     pal_shown shown;
     pal_world_shown(s.world, 0, &shown);
-    CHECK(shown.adapts);
+    CHECK(shown.is_adaptive);
     CHECK_INT(shown.n_tri, adaptive->n_slot);
     CHECK_INT(each->part[0].n_slot, adaptive->n_slot);
     CHECK_INT(shown.n_vertex, s.body->n_node);
@@ -376,7 +377,7 @@ static void a_grip_on_a_fine_node_goes_on_when_that_is_gone(void)
 {
     shell_scene s;
     REQUIRE(stomach_make(&s, 3));
-    pal_adaptive_surface *adaptive = s.body->adaptive;
+    pal_adaptive_surface *adaptive = s.body->model.adaptive;
     int32_t face = 0, edge = adaptive->levels.face_edge[0];
     int node = pal_levels_edge_midpoint(&adaptive->levels, edge);
     REQUIRE(pal_adaptive_split(adaptive, s.body, face, 0) > 0);
@@ -415,7 +416,7 @@ static void a_body_that_diverges_stops_at_its_last_good_state(void)
     CHECK_NEAR(shell_scene_rms(&s), before, 0.2 * before);
     CHECK(pal_body_kinetic_J(s.body) == 0);
     for (int i = 0; i < s.body->n_node; i++)
-        if (!pal_adaptive_has(s.body->adaptive, i)) CHECK(!memcmp(s.body->x + 3 * i, s.body->x_rest + 3 * i, 24));
+        if (!pal_adaptive_has(s.body->model.adaptive, i)) CHECK(!memcmp(s.body->x + 3 * i, s.body->x_rest + 3 * i, 24));
     pal_world_reset(s.world);
     CHECK_INT(pal_world_step(s.world, 1.0 / STEP_HZ), 0);
     CHECK(!s.body->frozen);
@@ -437,7 +438,7 @@ static void displacement_in_colour_is_0_where_nothing_is_in_use(void)
         for (int k = 0; k < s.body->n_node; k++) {
             most = fmax(most, (double)value[k]);
             /* taken 10 times a second: the newest set may be of the table before */
-            if (i % 6 == 5 && !pal_adaptive_has(s.body->adaptive, k)) CHECK(value[k] == 0);
+            if (i % 6 == 5 && !pal_adaptive_has(s.body->model.adaptive, k)) CHECK(value[k] == 0);
         }
         if (i == 2 * STEP_HZ - 1) CHECK(most > 0.01);
     }

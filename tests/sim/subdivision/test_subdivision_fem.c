@@ -100,7 +100,7 @@ static void blocks_have_the_elements_of_the_paper(void)
         clay_block(&c, block[k].n, 0.1);
         clay_number(&c, "levels", block[k].level);
         REQUIRE(clay_plan(&c));
-        const pal_cell_elements *e = &c.body->solid->elements;
+        const pal_cell_elements *e = &c.body->model.solid->elements;
         CHECK_INT(pal_cell_elements_count(e), block[k].all);
         CHECK_INT(e->n[PAL_CELL_CUBIC], block[k].cubic);
         CHECK_INT(e->n[PAL_CELL_HEX], block[k].all - block[k].cubic);
@@ -108,7 +108,7 @@ static void blocks_have_the_elements_of_the_paper(void)
         CHECK_INT(c.body->n_dof, (block[k].n + 1) * (block[k].n + 1) * (block[k].n + 1));
         CHECK_INT(c.body->n_shown, block[k].shown);
         CHECK_INT(c.body->surface->n_tri, 2 * (block[k].shown - 2));
-        CHECK_NEAR(c.body->edge_m, cbrt(pal_subdivision_solid_volume_m3(c.body->solid) / block[k].all), 1e-15);
+        CHECK_NEAR(c.body->edge_m, cbrt(pal_subdivision_solid_volume_m3(c.body->model.solid) / block[k].all), 1e-15);
         clay_close(&c);
     }
 }
@@ -144,14 +144,14 @@ static void masses_of_points_and_of_nodes_sum_up_to_the_solids(void)
             clay_block(&c, 3, 0.1);
         c.def->material.density_kg_m3 = 1100;
         REQUIRE(clay_plan(&c));
-        double mass = pal_subdivision_solid_mass_kg(c.body->solid);
+        double mass = pal_subdivision_solid_mass_kg(c.body->model.solid);
         for (int i = 0; i < c.body->n_dof; i++) point += c.body->mass_kg[i];
         for (int i = 0; i < c.body->n_node; i++) node += c.body->node_mass_kg[i];
         for (int i = 0; i < c.body->mass_operator->n_entry; i++) entry += c.body->mass_operator->mass_kg[i];
         CHECK_NEAR(point / mass, 1, 1e-12);
         CHECK_NEAR(node / mass, 1, 1e-12);
         CHECK_NEAR(entry / mass, 1, 1e-12);
-        CHECK_NEAR(mass / (1100 * pal_subdivision_solid_volume_m3(c.body->solid)), 1, 1e-6);
+        CHECK_NEAR(mass / (1100 * pal_subdivision_solid_volume_m3(c.body->model.solid)), 1, 1e-6);
         clay_close(&c);
     }
 }
@@ -191,9 +191,9 @@ static void the_surface_is_the_boundary_of_the_subdivided_cells(void)
         const pal_body *b = c.body;
         CHECK(!pal_surface_check(b->surface, &facts));
         CHECK(facts.closed && facts.manifold && facts.oriented);
-        CHECK_NEAR(pal_surface_volume(b->surface) / pal_subdivision_solid_volume_m3(b->solid), 1, 0.01);
+        CHECK_NEAR(pal_surface_volume(b->surface) / pal_subdivision_solid_volume_m3(b->model.solid), 1, 0.01);
         for (int i = 0; i < b->n_shown; i++) {
-            CHECK(b->shown_node[i] < b->solid->elements.n_vertex);
+            CHECK(b->shown_node[i] < b->model.solid->elements.n_vertex);
             CHECK_NEAR(pal_dist3(b->surface->x + 3 * i, b->node_rest + 3 * b->shown_node[i]), 0, 1e-16);
             for (int a = 0; a < 3; a++) CHECK(b->shown[3 * i + a] == (float)b->d[3 * b->shown_node[i] + a]);
         }
@@ -224,7 +224,7 @@ static void a_cut_shows_what_it_hid(void)
     REQUIRE(clay_plan(&c));
     CHECK(!pal_surface_check(c.body->surface, &facts));
     CHECK(facts.closed && facts.manifold && facts.oriented);
-    CHECK_NEAR(pal_surface_volume(c.body->surface) / pal_subdivision_solid_volume_m3(c.body->solid), 0.5, 1e-3);
+    CHECK_NEAR(pal_surface_volume(c.body->surface) / pal_subdivision_solid_volume_m3(c.body->model.solid), 0.5, 1e-3);
     pal_surface_box(c.body->surface, low, high);
     CHECK_NEAR(high[0], 0, 1e-6);
     for (int t = 0; t < c.body->surface->n_tri; t++) n_inner += c.body->shown_face[t] < 0;
@@ -258,7 +258,7 @@ static void gravity_pulls_with_the_bodys_weight(void)
         CHECK(!pal_assemble_forces(&step));
         for (int i = 0; i < c.body->n_dof; i++) pal_add3(sum, sum, c.body->g + 3 * i);
         for (int i = 0; i < c.body->n_node; i++) pal_add3(nodes, nodes, c.body->f + 3 * i);
-        double weight = 9.81 * pal_subdivision_solid_mass_kg(c.body->solid);
+        double weight = 9.81 * pal_subdivision_solid_mass_kg(c.body->model.solid);
         CHECK_NEAR(sum[2] / weight, -1, 1e-12);
         CHECK_NEAR(nodes[2] / weight, -1, 1e-12);
         CHECK_NEAR(fabs(sum[0]) + fabs(sum[1]), 0, 1e-15 * weight);
@@ -304,7 +304,7 @@ static void ease_is_what_a_nodes_impulse_gives_it(void)
             ease += b->interpolation->weight[i] * v[b->interpolation->point[i]];
         CHECK_NEAR(b->node_inverse_mass_1_kg[node] / ease, 1, 1e-6);
         /* a node is never heavier than the body */
-        CHECK_LE(1 / pal_subdivision_solid_mass_kg(b->solid), ease * (1 + 1e-9));
+        CHECK_LE(1 / pal_subdivision_solid_mass_kg(b->model.solid), ease * (1 + 1e-9));
     }
     clay_close(&c);
 }
@@ -318,7 +318,7 @@ static void edits_of_material_reach_masses_and_samples(void)
     clay_block(&c, 2, 0.1);
     c.def->n_stroke = 1, c.def->stroke = &stroke;
     REQUIRE(clay_start(&c));
-    const pal_subdivision_solid *solid = c.body->solid;
+    const pal_subdivision_solid *solid = c.body->model.solid;
     double mass = pal_subdivision_solid_mass_kg(solid), ease = c.body->node_inverse_mass_1_kg[c.body->shown_node[0]];
     CHECK(mass > 1000 * pal_subdivision_solid_volume_m3(solid) * (1 + 1e-3));
     float young = 0;

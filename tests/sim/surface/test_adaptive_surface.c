@@ -480,7 +480,7 @@ static pal_err try_make(const pal_surface *s, pal_adaptive_options o, pal_diagno
     pal_adaptive_surface *adaptive = NULL;
     diag->text[0] = 0;
     pal_err err = pal_adaptive_make(s, &o, &body, arena, diag, &adaptive);
-    if (err && (adaptive || body.adaptive)) CHECK_FAIL("made although refused");
+    if (err && (adaptive || body.model.adaptive)) CHECK_FAIL("made although refused");
     pal_arena_destroy(arena);
     return err;
 }

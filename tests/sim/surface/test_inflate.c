@@ -293,7 +293,7 @@ static pal_config_entry *world_sphere(shell_scene *s, bool anchors)
 }
 static double world_volume(const shell_scene *s, const double *x)
 {
-    const pal_adaptive_surface *adaptive = s->body->adaptive;
+    const pal_adaptive_surface *adaptive = s->body->model.adaptive;
     double sum = 0, n[3];
     for (int t = 0; t < adaptive->n_tri; t++) {
         const int32_t *tri = adaptive->tri + 3 * t;

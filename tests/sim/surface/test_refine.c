@@ -86,7 +86,7 @@ static double farthest_new(const shell_scene *s, const double at[3])
     double most = 0;
     for (int k = 0; k < s->body->n_active; k++) {
         int i = pal_body_point(s->body, k);
-        if (i >= s->body->adaptive->levels.n_vertex[0]) most = fmax(most, pal_dist3(s->body->x_rest + 3 * i, at));
+        if (i >= s->body->model.adaptive->levels.n_vertex[0]) most = fmax(most, pal_dist3(s->body->x_rest + 3 * i, at));
     }
     return most;
 }
@@ -99,7 +99,7 @@ static void refines_where_pressed_and_only_there(void)
     take_sphere(&s);
     thresholds(&s, 0.02, 0, 0);
     REQUIRE(shell_scene_start(&s));
-    const pal_adaptive_surface *adaptive = s.body->adaptive;
+    const pal_adaptive_surface *adaptive = s.body->model.adaptive;
     for (int i = 0; i < 60; i++) {
         load_all(&s, pole, 0.03, (double[3]){0, 0, -0.3});
         steps(&s, 1.0 / 60);
@@ -222,7 +222,7 @@ static void a_bent_sheet_refines_by_curvature_alone(void)
     roll(&s, 8, 0.05);
     pal_world_invalidate_limits(s.world, 0);
     steps(&s, 1e-4);
-    const pal_adaptive_surface *adaptive = s.body->adaptive;
+    const pal_adaptive_surface *adaptive = s.body->model.adaptive;
     CHECK(adaptive->n_leaf_of[1] > 0 && adaptive->n_leaf_of[0] > 0);
     for (int f = 0; f < adaptive->levels.first_face[1]; f++) {
         const int32_t *c = adaptive->levels.face + 3 * f;
@@ -248,7 +248,7 @@ static void curvature_is_that_of_spheres_and_cylinders_and_no_rigid_motion_chang
     shell_scene s;
     take_sphere(&s);
     REQUIRE(shell_scene_start(&s));
-    const pal_adaptive_surface *adaptive = s.body->adaptive;
+    const pal_adaptive_surface *adaptive = s.body->model.adaptive;
     int n = s.body->n_node;
     pal_arena *arena = pal_arena_create(1 << 20, true);
     double *out = malloc((size_t)n * sizeof *out), *x = malloc(3 * (size_t)n * sizeof *x);
@@ -278,11 +278,12 @@ static void curvature_is_that_of_spheres_and_cylinders_and_no_rigid_motion_chang
     take_sheet(&s);
     REQUIRE(shell_scene_start(&s));
     arena = pal_arena_create(1 << 20, true);
-    REQUIRE(!pal_refine_measure_make(&measure, s.body->adaptive, arena));
+    REQUIRE(!pal_refine_measure_make(&measure, s.body->model.adaptive, arena));
     roll(&s, 2, 1);
-    pal_refine_curvature(&measure, s.body->adaptive, s.body->x, measure.rest_curvature);
+    pal_refine_curvature(&measure, s.body->model.adaptive, s.body->x, measure.rest_curvature);
     for (int i = 0; i < 169; i++)
-        if (!pal_levels_on_boundary(&s.body->adaptive->levels, i)) CHECK_NEAR(measure.rest_curvature[i], 1.0, 0.002);
+        if (!pal_levels_on_boundary(&s.body->model.adaptive->levels, i))
+            CHECK_NEAR(measure.rest_curvature[i], 1.0, 0.002);
     pal_arena_destroy(arena);
     shell_scene_close(&s);
 }
@@ -313,7 +314,7 @@ static void goes_back_to_the_coarse_mesh_and_repeats_bit_by_bit(void)
         hash[run] = press_and_release(&s, &most);
         CHECK(most > 150);
         CHECK_INT(s.body->n_active, 114);
-        CHECK_INT(s.body->adaptive->n_spring, 336);
+        CHECK_INT(s.body->model.adaptive->n_spring, 336);
         CHECK(s.body->mass_kg[0] == mass);
         CHECK_LE(shell_scene_rms(&s), 1e-3 * s.body->length_scale_m);
         if (run == 0) { /* the same world again */
@@ -336,7 +337,7 @@ static void reset_goes_back_to_the_start_level(void)
     CHECK_INT(s.body->n_active, 450);
     load_all(&s, pole, 0.03, (double[3]){0, 0, -0.3});
     steps(&s, 1);
-    CHECK(s.body->n_active != 450 && s.body->adaptive->finest == 2);
+    CHECK(s.body->n_active != 450 && s.body->model.adaptive->finest == 2);
     pal_world_reset(s.world);
     CHECK_INT(s.body->n_active, 450);
     CHECK_INT(report_of(&s)->n_switch, 0);
@@ -352,7 +353,7 @@ static int most_switches(double (*force)(int), int n_step, bool spread)
     take_sphere(&s);
     thresholds(&s, 0.05, 0, 0);
     if (!shell_scene_start(&s)) return 1000;
-    const pal_adaptive_surface *adaptive = s.body->adaptive;
+    const pal_adaptive_surface *adaptive = s.body->model.adaptive;
     int n = adaptive->levels.first_face[3], most = 0, top = shell_scene_nearest(&s, pole);
     uint8_t *was = malloc((size_t)n), (*switched)[WINDOW] = calloc((size_t)n, WINDOW);
     memcpy(was, adaptive->face_state, (size_t)n);
@@ -422,7 +423,7 @@ static void a_node_that_bears_a_lasting_load_is_not_taken_away(void)
     REQUIRE(shell_scene_start(&s));
     pal_world_load(s.world, 0, 200, (double[3]){0, 0, 1e-3});
     steps(&s, 1);
-    CHECK(pal_adaptive_has(s.body->adaptive, 200));
+    CHECK(pal_adaptive_has(s.body->model.adaptive, 200));
     CHECK(s.body->n_active > 114 && s.body->n_active < 140);
     pal_world_load(s.world, 0, 200, none);
     steps(&s, 0.5);
@@ -439,7 +440,7 @@ static void thresholds_follow_a_live_edit_of_the_material(void)
         pal_entry_put_number(item, "speed_m_s", 0, NULL);
         pal_entry_put_number(item, "curvature_1_m", 0, NULL);
         REQUIRE(shell_scene_start(&s));
-        const pal_adaptive_surface *adaptive = s.body->adaptive;
+        const pal_adaptive_surface *adaptive = s.body->model.adaptive;
         double h = 0, k = 0.5 * sqrt(3) * 5000 * 0.003;
         for (int e = 0; e < adaptive->levels.first_edge[1]; e++)
             h += pal_dist3(s.body->x_rest + 3 * adaptive->levels.edge[e].vertex[0],
@@ -528,7 +529,7 @@ static void watch(const shell_scene *s, uint64_t *seen, worst *w)
                r->time_s, s->body->n_active, total, b->kinetic_J, b->spring_J, b->shape_J,
                (raw->kinetic_J - b->kinetic_J) / total, (raw->spring_J - b->spring_J) / total,
                (raw->shape_J - b->shape_J) / total, pal_refine_balance_total_J(a) / total - 1,
-               s->body->adaptive->spring_ramp, s->body->adaptive->shape_ramp);
+               s->body->model.adaptive->spring_ramp, s->body->model.adaptive->shape_ramp);
 }
 
 static worst watch_press(bool stomach, double force_N)
@@ -550,7 +551,7 @@ static worst watch_press(bool stomach, double force_N)
         steps(&s, 1.0 / 60);
         watch(&s, &seen, &w);
     }
-    CHECK_INT(s.body->n_active, s.body->adaptive->levels.n_vertex[0]);
+    CHECK_INT(s.body->n_active, s.body->model.adaptive->levels.n_vertex[0]);
     printf("  %s, %g N: %d switches; worst jump of energy %.2g as it comes (motion %.2g, springs and anchors %.2g), "
            "%.2g as kept; mass %.1g, momentum %.1g, angular %.1g\n",
            stomach ? "stomach" : "sphere", force_N, (int)w.n, w.raw, w.kinetic_raw, w.elastic_raw, w.after, w.mass,

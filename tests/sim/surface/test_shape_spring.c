@@ -293,10 +293,10 @@ static void a_shifted_body_swings_with_its_analytic_period(void)
         shell_scene s;
         REQUIRE(open_world(&s, "world", kind == 1));
         pal_body *body = s.body;
-        for (int32_t face = 0; face < 40 && kind == 2; face++) pal_adaptive_split(body->adaptive, body, face, 0);
-        pal_adaptive_update(body->adaptive, body);
+        for (int32_t face = 0; face < 40 && kind == 2; face++) pal_adaptive_split(body->model.adaptive, body, face, 0);
+        pal_adaptive_update(body->model.adaptive, body);
         CHECK(kind == 0 ? body->n_active == 114 : kind == 1 ? body->n_active == 450 : body->n_active > 150);
-        double period = 2 * M_PI * sqrt(body->adaptive->level_mass_kg[0] / k_N_m);
+        double period = 2 * M_PI * sqrt(body->model.adaptive->level_mass_kg[0] / k_N_m);
         for (int k = 0; k < body->n_active; k++) body->x[3 * body->active[k]] += u;
         pal_world_invalidate_limits(s.world, 0);
         for (int quarter = 0; quarter < 4; quarter++) {
@@ -322,7 +322,7 @@ static void a_body_flies_and_spins_freely_on_its_own_frame(void)
         REQUIRE(open_world(&s, world ? "world" : "body", 0));
         pal_body *body = s.body;
         pal_rigid_fit frame = {.quat = {1}};
-        pal_adaptive_fit_rigid(body->adaptive, body, &frame);
+        pal_adaptive_fit_rigid(body->model.adaptive, body, &frame);
         for (int k = 0; k < body->n_active; k++) {
             size_t i = 3 * (size_t)body->active[k];
             pal_sub3(arm, body->x + i, frame.centre_m);
@@ -335,7 +335,7 @@ static void a_body_flies_and_spins_freely_on_its_own_frame(void)
         for (int turn = 0; turn < 2; turn++) {
             double *spin = turn == 0 ? first : last;
             for (int i = 0; i < 60 && turn == 1; i++) REQUIRE(!pal_world_step(s.world, 1.0 / 60));
-            pal_adaptive_fit_rigid(body->adaptive, body, &frame);
+            pal_adaptive_fit_rigid(body->model.adaptive, body, &frame);
             for (int k = 0; k < body->n_active; k++) {
                 size_t i = 3 * (size_t)body->active[k];
                 double part[3];
@@ -346,7 +346,7 @@ static void a_body_flies_and_spins_freely_on_its_own_frame(void)
         }
         pal_body_momentum(body, momentum);
         pal_sub3(way, frame.centre_m, way);
-        pal_axpy3(momentum, -body->adaptive->options.mass_kg, V);
+        pal_axpy3(momentum, -body->model.adaptive->options.mass_kg, V);
         pal_sub3(way, way, V); /* of one second */
         pal_sub3(last, last, first);
         double lost = pal_norm3(last) / pal_norm3(first);

@@ -1,0 +1,52 @@
+/* What link.c, link_loop.c and link_get.c share; nobody else includes it. Thread: [net]. */
+#ifndef PAL_LINK_LINK_CORE_H
+#define PAL_LINK_LINK_CORE_H
+#include "clients/link/link.h"
+
+#include <libwebsockets.h>
+#include <stdatomic.h>
+
+enum { LINK_RX_BYTES = 128 * 1024, LINK_HOST_BYTES = 256, LINK_PATH_BYTES = 256 };
+
+typedef struct link_get link_get;
+typedef struct link_watch link_watch;
+
+struct pal_link_timer {
+    lws_sorted_usec_list_t sul;
+    pal_link_loop *loop;
+    pal_link_timer *next;
+    uint64_t period_us;
+    void (*fn)(void *user);
+    void *user;
+};
+
+struct pal_link_loop {
+    struct lws_context *context;
+    struct lws_vhost *vhost;
+    atomic_bool stop;
+    void (*woken)(void *user);
+    void *woken_user;
+    pal_link *links; /* open and closing ones */
+    pal_link_timer *timers;
+    link_get *gets;
+    link_watch *watches;
+};
+
+/* parts of ws://host[:port][/path] or http:// */
+typedef struct link_address {
+    char host[LINK_HOST_BYTES], path[LINK_PATH_BYTES];
+    int port;
+} link_address;
+pal_err link_address_parse(const char *url, link_address *out, pal_diagnostic *diag);
+
+/* names of the local protocols; a connection's object is its opaque user data */
+#define LINK_LOCAL_GET   "pal-get"
+#define LINK_LOCAL_WATCH "pal-watch"
+int link_ws_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len);
+int link_get_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len);
+
+void link_close_all(pal_link_loop *loop);      /* says goodbye to every server  */
+bool link_any_open(const pal_link_loop *loop); /* a websocket is still up      */
+void link_free_all(pal_link_loop *loop);       /* after the context is gone    */
+void link_get_free_all(pal_link_loop *loop);
+#endif

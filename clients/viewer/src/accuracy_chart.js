@@ -1,0 +1,107 @@
+// Draws the plot of error against cost as SVG: axes, the study's points and its Pareto front, the running configuration.
+import { layOutPlot } from "./accuracy_plot.js";
+import { milliseconds, millimetres, plainLabel } from "./accuracy_text.js";
+
+const BOX = { left: 40, right: 302, top: 20, bottom: 172 };
+const SVG = "http://www.w3.org/2000/svg";
+
+/**
+ * @typedef {import("./accuracy_plot.js").Plot} Plot
+ * @typedef {{points: import("./control_table.js").StudyPoint[], estimate: import("./control_table.js").Estimate | null,
+ *   requested: import("./control_table.js").StudyPoint | null, stepMs: number, reference?: number}} Contents requested:
+ *   point under the slider or being prepared; stepMs: a step of real time; reference: error of the reference, m
+ */
+
+/** @param {string} name @param {Record<string, string | number>} attributes @param {string} text label or tooltip */
+function shape(name, attributes, text = "") {
+    const element = document.createElementNS(SVG, name);
+    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
+    if (text && name === "text") element.textContent = text;
+    else if (text) element.append(Object.assign(document.createElementNS(SVG, "title"), { textContent: text }));
+    return element;
+}
+
+/** @param {Plot} plot */
+function drawAxes(plot) {
+    const { left, right, top, bottom } = BOX;
+    return [
+        ...plot.xTicks.flatMap(({ at, text }) => [
+            shape("line", { x1: at, x2: at, y1: top, y2: bottom, class: "grid" }),
+            shape("text", { x: at, y: bottom + 13, class: "tick", "text-anchor": "middle" }, text),
+        ]),
+        ...plot.yTicks.flatMap(({ at, text }) => [
+            shape("line", { x1: left, x2: right, y1: at, y2: at, class: "grid" }),
+            shape("text", { x: left - 5, y: at + 3.5, class: "tick", "text-anchor": "end" }, text),
+        ]),
+        shape("text", { x: right, y: bottom + 26, class: "tick", "text-anchor": "end" }, "ms per step"),
+        shape("text", { x: 2, y: top - 9, class: "tick" }, "largest error, mm"),
+    ];
+}
+
+/** real time, and the error of the reference @param {Plot} plot @param {Contents} contents */
+function drawLimits(plot, { stepMs, reference }) {
+    const { left, right, top, bottom } = BOX;
+    const out = [];
+    if (stepMs > plot.msRange.low && stepMs < plot.msRange.high) {
+        const x = plot.x(stepMs);
+        const text = `${milliseconds(stepMs)} per step is real time: configurations to the right are slower`;
+        out.push(shape("line", { x1: x, x2: x, y1: top, y2: bottom, class: "limit" }, text));
+    }
+    if (reference !== undefined && 1e3 * reference > plot.errorRange.low && 1e3 * reference < plot.errorRange.high) {
+        const y = plot.y(reference);
+        const text = `${millimetres(reference)} is the error of the reference: smaller errors cannot be distinguished`;
+        out.push(shape("line", { x1: left, x2: right, y1: y, y2: y, class: "limit" }, text));
+    }
+    return out;
+}
+
+/** @param {Plot} plot @param {Contents} contents */
+function drawPoints(plot, { requested }) {
+    const out = [];
+    if (plot.front.length > 1) {
+        const points = plot.front.map((p) => `${p.x.toFixed(1)},${p.y.toFixed(1)}`).join(" ");
+        out.push(shape("polyline", { points, class: "front" }));
+    }
+    for (const { x, y, point, colour } of plot.marks) {
+        const text = `${plainLabel(point.label)}: ${milliseconds(point.ms)}, ${millimetres(point.error_m)}`;
+        const style = point.front ? { r: 4, class: "point on-front" } : { r: 2.8, class: "point" };
+        out.push(shape("circle", { cx: x, cy: y, fill: colour, ...style }, text));
+    }
+    if (requested)
+        out.push(
+            shape("circle", { cx: plot.x(requested.ms), cy: plot.y(requested.error_m), r: 8, class: "requested" }),
+        );
+    for (const { x, y, of } of plot.neighbours) {
+        const text = `${plainLabel(of.label)}, predicted: ${milliseconds(of.ms)}, ${millimetres(of.error_m)}`;
+        out.push(shape("path", { d: `M${x} ${y - 5}l5 5l-5 5l-5 -5z`, class: "neighbour" }, text));
+    }
+    return out;
+}
+
+/** the running configuration @param {Plot} plot */
+function drawLive({ live }) {
+    const { left, right, top, bottom } = BOX;
+    if (!live) return [];
+    if (live.y === null)
+        return [
+            shape("line", { x1: live.x, x2: live.x, y1: top, y2: bottom, class: "live-line" }),
+            shape("text", { x: live.x + 4, y: top + 9, class: "now" }, "now"),
+        ];
+    // the label stands above or below: neighbours in time step and tolerance lie to the left and right
+    const y = live.y + (live.y > top + 24 ? -13 : 22);
+    const x = Math.min(Math.max(live.x, left + 14), right - 14);
+    return [
+        shape("circle", { cx: live.x, cy: live.y, r: 9, class: "live-ring" }),
+        shape("circle", { cx: live.x, cy: live.y, r: 4.5, class: "live" }, "now"),
+        shape("text", { x, y, class: "now", "text-anchor": "middle" }, "now"),
+    ];
+}
+
+/** @param {Element} svg @param {Contents} contents @returns {Plot} */
+export function drawChart(svg, contents) {
+    const plot = layOutPlot(contents.points, contents.estimate, BOX);
+    svg.replaceChildren(
+        ...[...drawAxes(plot), ...drawLimits(plot, contents), ...drawPoints(plot, contents), ...drawLive(plot)],
+    );
+    return plot;
+}

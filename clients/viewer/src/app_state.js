@@ -1,0 +1,47 @@
+// What the page knows: the session as the server last described it, and the user's choices. Data only.
+
+/**
+ * @typedef {import("./control_table.js").Hello} Hello
+ * @typedef {import("./control_table.js").Status} Status
+ * @typedef {import("./control_table.js").Member} Member
+ * @typedef {{rows: string[], row_parts?: number[], row_whys?: string[], row_fixed?: number[]}} Plan
+ */
+
+export class AppState {
+    /** @type {Hello | null} null before the first connection */
+    hello = null;
+    /** @type {Status | null} null: the newest one describes an older plan */
+    status = null;
+    /** @type {Plan} components of `hello`, or of the last `topology` that had some */
+    plan = { rows: [] };
+    /** @type {string[]} names of the components that run */
+    components = [];
+    /** @type {Map<number, Member>} by id */
+    members = new Map();
+    /** @type {import("./wire.js").Tool[]} */
+    tools = [];
+    ownId = 0;
+    ownTool = -1; // -1: none
+    /** @type {import("./tool_input.js").ToolTarget} null: no drag moves the tool */
+    target = null;
+    /** @type {Map<number, import("./body_mesh.js").BodyMesh>} shown body of each part */
+    bodies = new Map();
+    field = "none"; // shown in colour
+    /** @type {{low: number, high: number} | null} of the colours; null: no values yet */
+    range = null;
+    wireframe = false;
+    figures = { fps: 0, latency_ms: 0, rtt_ms: 0, decode_ms: 0, bytes_s: 0, vertices: 0 };
+
+    get parts() {
+        return this.hello?.parts ?? [];
+    }
+
+    /** state of the own tool, as the server sent it last */
+    ownToolState() {
+        return this.ownTool < 0 ? undefined : this.tools[this.ownTool];
+    }
+
+    countVertices() {
+        this.figures.vertices = [...this.bodies.values()].reduce((n, body) => n + body.nVisible(), 0);
+    }
+}

@@ -1,0 +1,177 @@
+// The text messages of palpate.v1 as one table: protocol/control_table.c has the same one, and
+// test/control_table.test.js compares the two. The types of all messages follow from it. Pure.
+//
+// A field is a kind, a table (an object), or a list of one table (objects). A key that ends in "?" may be absent.
+// Kinds: u16, u32, u64 and f64 numbers; bool; text; role; tool (index, -1 any, null none); vector (three numbers);
+// numbers; texts; args (numbers by name).
+
+const part = /** @type {const} */ ({
+    name: "text",
+    epoch: "u32",
+    n_vertex: "u32",
+    n_triangle: "u32",
+    asset: "text",
+    error_m: "f64",
+    "fields?": "texts",
+    "adapts?": "bool",
+    "sculpts?": "bool",
+});
+
+const member = /** @type {const} */ ({ id: "u16", role: "role", name: "text", "tool?": "tool", colour: "u32" });
+
+export const SERVER_MESSAGES = Object.freeze(
+    /** @type {const} */ ({
+        hello: {
+            version: "u32",
+            session: "text",
+            title: "text",
+            organ: "text",
+            "accuracy?": "text",
+            step_rate_hz: "f64",
+            frame_rate_hz: "f64",
+            credit: "u32",
+            box_min_m: "vector",
+            box_max_m: "vector",
+            up: "vector",
+            parts: [part],
+            tools: [{ name: "text", radius_m: "f64" }],
+            rows: "texts",
+            "row_parts?": "numbers",
+            "row_whys?": "texts",
+            "row_fixed?": "numbers",
+            "estimates?": "bool",
+            you: { id: "u16", role: "role", name: "text", "tool?": "tool" },
+        },
+        topology: {
+            parts: [part],
+            "rows?": "texts",
+            "row_parts?": "numbers",
+            "row_whys?": "texts",
+            "row_fixed?": "numbers",
+        },
+        status: {
+            tick: "u64",
+            sim_time_s: "f64",
+            paused: "bool",
+            frozen: "bool",
+            step_rate_hz: "f64",
+            slowdown: "f64",
+            substeps: "u32",
+            step_ms: "f64",
+            row_ms: "numbers",
+            "rows?": "texts",
+            members: "u32",
+            bytes_s: "f64",
+            rtt_ms: "f64",
+            skipped: "u32",
+            late: "u64",
+            refused: "u64",
+            "note?": "text",
+            "active?": [{ part: "u32", nodes: "u32", springs: "u32", of_nodes: "u32", of_springs: "u32" }],
+            "row_parts?": "numbers",
+            "parts?": [
+                {
+                    part: "u32",
+                    "frozen?": "bool",
+                    "asleep?": "bool",
+                    "why?": "text",
+                    "rescues?": "u64",
+                    "rescue_ms?": "f64",
+                },
+            ],
+            "off?": [{ row: "text", part: "u32" }],
+            "unwatched?": "u64",
+        },
+        members: { members: [member] },
+        error: { code: "text", text: "text" },
+        pong: { stamp_ms: "f64" },
+        answer: { verb: "text", text: "text", "args?": "args" },
+        study: {
+            body: "text",
+            step_ms: "f64",
+            "reference_m?": "f64",
+            "points?": [{ index: "u32", method: "text", label: "text", ms: "f64", error_m: "f64", "front?": "bool" }],
+        },
+        estimate: {
+            body: "text",
+            setting: "text",
+            "point?": "f64",
+            tick: "u64",
+            time_s: "f64",
+            "age_s?": "f64",
+            "ms?": "f64",
+            own_ms: "f64",
+            "most_m?": "f64",
+            "error_m?": "f64",
+            "discretisation_m?": "f64",
+            "algebraic_m?": "f64",
+            "time_m?": "f64",
+            "model_m?": "f64",
+            "zz_percent?": "f64",
+            "locking?": "bool",
+            "note?": "text",
+            "neighbours?": [
+                {
+                    knob: "text",
+                    label: "text",
+                    "ms?": "f64",
+                    "error_m?": "f64",
+                    "size?": "u32",
+                    "step_ms?": "f64",
+                    "tolerance?": "f64",
+                },
+            ],
+        },
+    }),
+);
+
+export const CLIENT_MESSAGES = Object.freeze(
+    /** @type {const} */ ({
+        join: { name: "text", role: "role", "tool?": "tool", "patches?": "bool" },
+        command: { verb: "text", "target?": "text", "args?": "args" },
+        take: { tool: "tool" },
+        leave: {},
+        ping: { stamp_ms: "f64" },
+        view: { part: "u32", field: "text" },
+    }),
+);
+
+export const ROLES = Object.freeze(/** @type {const} */ (["viewer", "trainee", "instructor"]));
+
+/**
+ * @typedef {typeof ROLES[number]} Role
+ * @typedef {{u16: number, u32: number, u64: number, f64: number, bool: boolean, text: string, role: Role,
+ *   tool: number | null, vector: number[], numbers: number[], texts: string[], args: Record<string, number>}} Kinds
+ */
+/**
+ * Value of one field of the table.
+ * @template F
+ * @typedef {F extends keyof Kinds ? Kinds[F] : F extends readonly [infer T] ? Message<T>[] : Message<F>} Value
+ */
+/**
+ * Object that a table of fields describes.
+ * @template T
+ * @typedef {{-readonly [K in keyof T as K extends `${string}?` ? never : K]: Value<T[K]>} &
+ *   {-readonly [K in keyof T as K extends `${infer Key}?` ? Key : never]?: Value<T[K]>}} Message
+ */
+/**
+ * Union of the messages of one direction, told apart by `type`.
+ * @template T
+ * @typedef {{[K in keyof T]: {type: K} & Message<T[K]>}[keyof T]} MessageOf
+ */
+/**
+ * @typedef {MessageOf<typeof SERVER_MESSAGES>} ServerMessage
+ * @typedef {MessageOf<typeof CLIENT_MESSAGES>} ClientMessage
+ * @typedef {Message<typeof SERVER_MESSAGES.hello>} Hello
+ * @typedef {Message<typeof SERVER_MESSAGES.topology>} Topology
+ * @typedef {Message<typeof SERVER_MESSAGES.status>} Status
+ * @typedef {Message<typeof SERVER_MESSAGES.answer>} Answer
+ * @typedef {Message<typeof SERVER_MESSAGES.study>} Study
+ * @typedef {Message<typeof SERVER_MESSAGES.estimate>} Estimate
+ * @typedef {Message<typeof part>} Part
+ * @typedef {Message<typeof member>} Member
+ * @typedef {NonNullable<Study["points"]>[number]} StudyPoint
+ * @typedef {NonNullable<Estimate["neighbours"]>[number]} Neighbour
+ * @typedef {NonNullable<Status["active"]>[number]} Activity
+ * @typedef {NonNullable<Status["parts"]>[number]} PartState
+ */

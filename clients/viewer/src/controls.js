@@ -1,0 +1,129 @@
+// The buttons at the foot of the page and the keys that do the same.
+import { buttonById, chooseByArrows, htmlById, markRadio } from "./dom.js";
+import { keyMap } from "./keys.js";
+
+/** @typedef {"pull" | "press" | "sculpt"} Mode what a drag does */
+
+/**
+ * @typedef {{
+ *   state: import("./app_state.js").AppState, stage: import("./stage.js").Stage, layout: import("./layout.js").Layout,
+ *   input: import("./tool_input.js").ToolInput, fields: import("./field_display.js").FieldDisplay,
+ *   accuracy: import("./accuracy_panel.js").AccuracyPanel, sculpt: import("./sculpt_panel.js").SculptPanel,
+ *   send: (message: import("./control_table.js").ClientMessage) => void, showFigures: () => void
+ * }} Page the parts of the page that the controls act on
+ */
+
+export class Controls {
+    /** @param {Page} page */
+    constructor(page) {
+        this.page = page;
+        for (const mode of /** @type {const} */ (["pull", "press", "sculpt"]))
+            buttonById("mode-" + mode).onclick = () => this.setMode(mode);
+        chooseByArrows(htmlById("modes"), () => this.modes().map((mode) => buttonById("mode-" + mode)));
+        buttonById("pause").onclick = () => this.togglePause();
+        buttonById("step").onclick = () => this.command("step");
+        buttonById("reset").onclick = () => this.command("reset");
+        buttonById("mesh").onclick = () => this.toggleMesh();
+        buttonById("accuracy-toggle").onclick = () => this.openAccuracy(!page.accuracy.opened);
+        buttonById("panel-toggle").onclick = () => this.togglePanel();
+        this.addKeys();
+        window.addEventListener("resize", () => this.place());
+    }
+
+    addKeys() {
+        const { accuracy, fields, sculpt, stage } = this.page;
+        const actionOf = keyMap(
+            {
+                1: () => this.setMode("pull"),
+                2: () => this.setMode("press"),
+                3: () => this.setMode("sculpt"),
+                4: () => this.openAccuracy(!accuracy.opened),
+                " ": () => this.togglePause(),
+                r: () => this.command("reset"),
+                p: () => this.togglePanel(),
+                c: () => fields.chooseNext(),
+                m: () => this.toggleMesh(),
+            },
+            stage,
+        );
+        window.addEventListener("keydown", (e) => {
+            const action = sculpt.key(e) ? () => {} : actionOf(e);
+            if (!action) return;
+            e.preventDefault();
+            action();
+        });
+    }
+
+    /** @param {string} verb */
+    command(verb) {
+        this.page.send({ type: "command", verb });
+    }
+
+    place() {
+        this.page.layout.place(this.page.state.target !== null);
+    }
+
+    /** modes that the session offers @returns {Mode[]} */
+    modes() {
+        return this.page.sculpt.offered ? ["pull", "press", "sculpt"] : ["pull", "press"];
+    }
+
+    /** @param {Mode} mode */
+    setMode(mode) {
+        const { input, sculpt } = this.page;
+        if (mode === "sculpt" && !sculpt.offered) return;
+        input.mode = mode;
+        if (mode === "sculpt") this.openAccuracy(false);
+        input.release();
+        htmlById("sculpt").hidden = mode !== "sculpt";
+        this.place();
+        if (mode === "sculpt") htmlById("hint").classList.add("gone");
+        for (const name of ["pull", "press", "sculpt"]) markRadio(buttonById("mode-" + name), mode === name);
+    }
+
+    /** the mode of sculpting exists while a part can be sculpted */
+    offerSculpting() {
+        const { input, sculpt, state } = this.page;
+        sculpt.offered = state.parts.some((part) => part.sculpts);
+        buttonById("mode-sculpt").hidden = !sculpt.offered;
+        if (!sculpt.offered && input.mode === "sculpt") this.setMode("pull");
+    }
+
+    togglePause() {
+        this.command(this.page.state.status?.paused ? "resume" : "pause");
+    }
+
+    /** @param {boolean} paused */
+    showPaused(paused) {
+        buttonById("pause").textContent = paused ? "Resume" : "Pause";
+        buttonById("pause").setAttribute("aria-pressed", String(paused));
+        buttonById("step").hidden = !paused;
+    }
+
+    toggleMesh() {
+        const { stage, state } = this.page;
+        state.wireframe = !state.wireframe;
+        buttonById("mesh").setAttribute("aria-pressed", String(state.wireframe));
+        for (const body of state.bodies.values()) body.wireframe(state.wireframe);
+        stage.dirty = true;
+    }
+
+    togglePanel() {
+        const panel = htmlById("panel");
+        panel.hidden = !panel.hidden;
+        buttonById("panel-toggle").setAttribute("aria-expanded", String(!panel.hidden));
+        this.place();
+        this.page.showFigures();
+    }
+
+    /** @param {boolean} opened */
+    openAccuracy(opened) {
+        const { accuracy, input, state } = this.page;
+        if (opened && !state.hello?.estimates) return;
+        if (opened && input.mode === "sculpt") this.setMode("pull"); // both panels stand on the left
+        htmlById("accuracy-panel").hidden = !opened;
+        buttonById("accuracy-toggle").setAttribute("aria-expanded", String(opened));
+        accuracy.open(opened);
+        this.place();
+    }
+}

@@ -1,0 +1,54 @@
+// Where things stand on the page: the organ between the panels, notices, the state of the connection.
+import { htmlById } from "./dom.js";
+
+const WIDTH_MIN = 260; // pixels between panels that the organ needs
+const NARROW = 640; // pixels: on a narrower page the panels lie below the organ, as in style.css
+const MARGIN = 18; // pixels beside a panel
+
+export class Layout {
+    /** the stage is set when it exists @type {import("./stage.js").Stage | null} */
+    stage = null;
+    pending = false; // panels have moved while a drag held the organ in place
+    noticeTimer = 0; // 0: the notice stays
+
+    /**
+     * The organ and its labels stand between the panels if these leave enough room. During a drag they stay where they
+     * are: the tool's target would move.
+     * @param {boolean} dragging
+     */
+    place(dragging) {
+        this.pending = dragging;
+        if (dragging) return;
+        const covered = (/** @type {string[]} */ ids) =>
+            Math.max(0, ...ids.map((id) => htmlById(id).offsetWidth && htmlById(id).offsetWidth + MARGIN));
+        const widths = [covered(["accuracy-panel", "sculpt"]), covered(["panel"])];
+        const fits = innerWidth > NARROW && innerWidth - widths[0] - widths[1] >= WIDTH_MIN;
+        const [left, right] = fits ? widths : [0, 0];
+        const style = document.documentElement.style;
+        style.setProperty("--left", `${left}px`);
+        style.setProperty("--middle", `calc(50% + ${(left - right) / 2}px)`);
+        style.setProperty("--free", `calc(100vw - ${left + right}px)`);
+        this.stage?.setMargins(left, right);
+    }
+
+    /** @param {string} text empty hides it @param {number} ms the notice disappears after this time; 0: it stays */
+    notice(text, ms = 0) {
+        clearTimeout(this.noticeTimer);
+        this.noticeTimer = ms ? window.setTimeout(() => this.notice(""), ms) : 0;
+        const element = htmlById("notice");
+        // written only when it changes: screen readers read each change
+        if (element.textContent !== text) element.textContent = text;
+        element.hidden = !text;
+    }
+
+    /** hides a notice, but not one that disappears by itself */
+    clearNotice() {
+        if (!this.noticeTimer) this.notice("");
+    }
+
+    /** @param {import("./link.js").ConnectionState} state @param {string} text */
+    connection(state, text) {
+        htmlById("state").dataset.state = state;
+        htmlById("state-text").textContent = text;
+    }
+}

@@ -1,0 +1,230 @@
+// What each message of the worker changes on the page.
+import { UNSEEN } from "./body_set.js";
+import { buttonById, htmlById } from "./dom.js";
+import { componentsOf, idleText } from "./plan_list.js";
+import { sameTools } from "./tool_marks.js";
+
+/**
+ * @typedef {import("./control_table.js").ServerMessage} ServerMessage
+ * @typedef {import("./link.js").PageMessage} PageMessage
+ * @typedef {{
+ *   state: import("./app_state.js").AppState, stage: import("./stage.js").Stage, layout: import("./layout.js").Layout,
+ *   bodies: import("./body_set.js").BodySet, fields: import("./field_display.js").FieldDisplay,
+ *   input: import("./tool_input.js").ToolInput, marks: import("./tool_marks.js").ToolMarks,
+ *   panel: import("./plan_panel.js").PlanPanel, accuracy: import("./accuracy_panel.js").AccuracyPanel,
+ *   sculpt: import("./sculpt_panel.js").SculptPanel, controls: import("./controls.js").Controls,
+ *   send: (message: import("./control_table.js").ClientMessage) => void
+ * }} Page the parts of the page that messages act on
+ */
+/** @template {ServerMessage["type"]} T @typedef {Extract<ServerMessage, {type: T}>} Of message of one type */
+
+const NOTICE_MS = 4000;
+const RADIUS_SHARE = 0.02; // of the scene's size: tool radius if the server has none
+const REAL_TIME = 1.05; // slowdown that still counts as real time
+/** codes of `error` that answer a pending command of a panel */
+const COMMAND_ERRORS = ["refused", "args", "role", "busy", "target"];
+
+export class Messages {
+    /** @param {Page} page */
+    constructor(page) {
+        this.page = page;
+        this.listed = ""; // components as the panel shows them
+    }
+
+    /** @param {PageMessage} data */
+    take(data) {
+        const { bodies, fields, input, layout, marks, sculpt, stage, state } = this.page;
+        switch (data.type) {
+            case "state":
+                layout.connection(data.state, data.text);
+                if (data.state === "live") break;
+                // the server has to describe all tools again
+                input.release();
+                input.enabled = false;
+                state.tools = [];
+                stage.dirty = true;
+                break;
+            case "control":
+                this.control(data.message);
+                break;
+            case "part":
+                sculpt.grow(data.rest);
+                bodies.takePart(data);
+                break;
+            case "frame":
+                bodies.takeFrame(data);
+                break;
+            case "field":
+                fields.takeField(data);
+                break;
+            case "tools":
+                if (!sameTools(marks.drawn, data.tools, UNSEEN * stage.size)) stage.dirty = true;
+                state.tools = data.tools;
+                break;
+            case "figures":
+                Object.assign(state.figures, data.figures);
+                break;
+        }
+    }
+
+    /** @param {ServerMessage} message */
+    control(message) {
+        const { accuracy, sculpt } = this.page;
+        switch (message.type) {
+            case "hello":
+                return this.hello(message);
+            case "topology":
+                return this.topology(message);
+            case "status":
+                return this.status(message);
+            case "members":
+                return this.members(message);
+            case "error":
+                return this.error(message);
+            case "answer":
+                if (!accuracy.answer(message)) sculpt.answer(message);
+                return;
+            case "study":
+                return accuracy.takeStudy(message);
+            case "estimate":
+                return accuracy.takeEstimate(message);
+        }
+    }
+
+    /** @param {Of<"hello">} message */
+    hello(message) {
+        const { accuracy, bodies, controls, fields, input, sculpt, stage, state } = this.page;
+        const scene = (/** @type {import("./app_state.js").Hello | null} */ h) =>
+            [h?.session, h?.box_min_m, h?.box_max_m, h?.up].join();
+        const sameScene = scene(state.hello) === scene(message);
+        state.hello = message;
+        state.ownId = message.you.id;
+        state.ownTool = message.you.tool ?? -1;
+        if (!sameScene) stage.frameBox([message.box_min_m, message.box_max_m], message.up);
+        input.radius = message.tools[Math.max(0, state.ownTool)]?.radius_m ?? RADIUS_SHARE * stage.size;
+        bodies.truncate(message.parts.length);
+        state.plan = message;
+        state.status = null;
+        this.showComponents();
+        accuracy.begin(message.parts, message.estimates === true, 1000 / message.step_rate_hz);
+        buttonById("accuracy-toggle").hidden = !message.estimates;
+        sculpt.begin(message.box_min_m, message.box_max_m);
+        controls.offerSculpting();
+        fields.offer(true);
+        this.showTitle();
+        this.showHint();
+    }
+
+    /** @param {Of<"topology">} message */
+    topology(message) {
+        const { bodies, controls, fields, sculpt, state } = this.page;
+        if (!state.hello) return;
+        state.hello.parts = message.parts;
+        if (message.rows?.length) {
+            state.plan = { ...message, rows: message.rows };
+            state.status = null; // it describes the former plan
+            this.showComponents();
+            state.hello.accuracy = ""; // it describes the former method
+            this.showTitle();
+        }
+        sculpt.changed();
+        bodies.truncate(message.parts.length);
+        controls.offerSculpting();
+        fields.offer(false);
+    }
+
+    /** @param {Of<"status">} message */
+    status(message) {
+        const { controls, layout, state } = this.page;
+        state.status = message;
+        this.showComponents();
+        controls.showPaused(message.paused);
+        if (message.frozen) layout.notice(this.stoppedText(message));
+        else layout.clearNotice();
+        const slow = message.slowdown > REAL_TIME;
+        const text = message.paused
+            ? "paused"
+            : slow
+              ? `${message.slowdown.toFixed(1)}× slower than real time`
+              : "live";
+        layout.connection(message.frozen ? "lost" : "live", text);
+        this.showFigures();
+    }
+
+    /** @param {Of<"members">} message */
+    members({ members }) {
+        const { panel, send, stage, state } = this.page;
+        state.members = new Map(members.map((member) => [member.id, member]));
+        const own = state.members.get(state.ownId);
+        state.ownTool = own?.tool ?? -1;
+        const taken = new Set(members.map((member) => member.tool));
+        const free = (state.hello?.tools ?? []).some((_, i) => !taken.has(i));
+        if (own && state.ownTool < 0 && own.role !== "viewer" && free) send({ type: "take", tool: -1 });
+        panel.showMembers(members, state.ownId);
+        this.showHint();
+        stage.dirty = true; // names beside tools
+    }
+
+    /** @param {Of<"error">} message */
+    error({ code, text }) {
+        const { accuracy, fields, layout, sculpt, state } = this.page;
+        if (code === "tool_taken") return;
+        if (COMMAND_ERRORS.includes(code) && (sculpt.refused(text) || accuracy.refused(text))) return;
+        if (code === "field" && state.field !== "none") fields.choose("none");
+        layout.notice(text, NOTICE_MS);
+    }
+
+    /** @param {Of<"status">} status @returns {string} */
+    stoppedText(status) {
+        const stopped = status.parts?.filter((part) => part.frozen) ?? [];
+        const names = stopped.map(({ part }) => this.page.state.parts[part]?.name ?? String(part));
+        const reason = stopped[0]?.why ?? "The simulation diverged.";
+        return `${names.length ? `${names.join(", ")} stopped. ` : ""}${reason} Reset restores the rest shape.`;
+    }
+
+    showTitle() {
+        const { hello } = this.page.state;
+        if (!hello) return;
+        document.title = `${hello.title} · Palpate`;
+        htmlById("title").textContent = hello.title;
+        htmlById("source").textContent = hello.organ;
+        htmlById("accuracy").textContent = hello.accuracy ?? "";
+        htmlById("accuracy").hidden = !hello.accuracy;
+    }
+
+    /** the hint disappears for good with the first drag, but a user without a tool learns why nothing moves */
+    showHint() {
+        const { input, state } = this.page;
+        input.enabled = state.ownTool >= 0;
+        const hint = htmlById("hint");
+        if (state.ownTool < 0 && state.members.has(state.ownId)) {
+            hint.classList.remove("gone");
+            hint.textContent = "All tools are in use. You are watching; you get a tool as soon as one is free.";
+        } else if (!hint.classList.contains("gone"))
+            hint.textContent = "Drag the organ to pull it. Drag beside it to look around.";
+    }
+
+    /** components come and go with fields, switches and other methods */
+    showComponents() {
+        const { panel, state } = this.page;
+        const components = componentsOf(state.plan, state.status);
+        const switches = state.hello?.you.role === "instructor" && state.plan.row_parts !== undefined;
+        const key = JSON.stringify([components, switches]);
+        if (key === this.listed) return;
+        this.listed = key;
+        state.components = components.filter((component) => component.on).map((component) => component.name);
+        panel.showComponents(components, state.parts, switches);
+    }
+
+    showFigures() {
+        const { accuracy, panel, state } = this.page;
+        if (htmlById("panel").hidden || !state.status) return;
+        panel.showStatus(state.status, state.figures, state.parts);
+        htmlById("idle").textContent = idleText({
+            field: state.field !== "none",
+            estimate: accuracy.opened,
+            estimates: state.hello?.estimates === true,
+            unwatched: state.status.unwatched ?? 0,
+        });
+    }
+}

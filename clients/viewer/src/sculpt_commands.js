@@ -1,0 +1,122 @@
+// Commands of sculpting from the settings of the panel and the clicked points; the plane of a cut; answers in words. Pure.
+
+/**
+ * @typedef {{distance_m: number, scale: number, radius_m: number, paint: string, sharp: number, sharpWhat: number,
+ *            pressure_Pa: number, lift_m: number, stiffness_N_m: number, middle: number[]}} Settings
+ * @typedef {{verb: string, args: Record<string, number>}} Command
+ * @typedef {{low: number[], high: number[]}} Box
+ */
+
+/** @type {Record<string, {title: string, points: number, hints: string[]}>} points: clicks that the tool needs, with a hint before each */
+export const TOOLS = Object.freeze({
+    extrude: { title: "Extrude", points: 1, hints: ["Click a face to extrude a cell from it."] },
+    delete: { title: "Delete", points: 1, hints: ["Click a cell to delete it."] },
+    divide: { title: "Divide", points: 1, hints: ["Click a cell to divide it."] },
+    merge: { title: "Merge", points: 2, hints: ["Click the first of two faces to merge.", "Click the second face."] },
+    bridge: {
+        title: "Bridge",
+        points: 2,
+        hints: ["Click the first of two faces to join by a cell.", "Click the second face."],
+    },
+    sharpen: { title: "Sharpen", points: 1, hints: ["Click near the edge, vertex or face."] },
+    paint: { title: "Paint", points: 1, hints: ["Click the place to paint."] },
+    inflate: { title: "Inflate", points: 1, hints: ["Click the place to inflate."] },
+    deflate: { title: "Deflate", points: 1, hints: ["Click the place to deflate."] },
+    curve: {
+        title: "Curve",
+        points: 2,
+        hints: ["Click one end of the curve.", "Click the other end. The middle of the curve is pulled."],
+    },
+    probe: { title: "Probe", points: 1, hints: ["Click the place whose material to show."] },
+});
+
+/** tools that are forces: they act until they are released, and follow their slider */
+export const FORCES = Object.freeze(["inflate", "deflate", "curve"]);
+
+/** @type {Record<string, {title: string, young_factor: number, density_factor: number}>} factors of one stroke of the brush */
+export const PAINTS = Object.freeze({
+    stiffer: { title: "Stiffer", young_factor: 2, density_factor: 1 },
+    softer: { title: "Softer", young_factor: 0.5, density_factor: 1 },
+    heavier: { title: "Heavier", young_factor: 1, density_factor: 1.5 },
+    lighter: { title: "Lighter", young_factor: 1, density_factor: 1 / 1.5 },
+});
+
+/**
+ * Displacement of a curve's middle: perpendicular to the curve, away from the centre of the body; towards it if lift < 0.
+ * @param {number[]} a end, m @param {number[]} b other end, m @param {number[]} middle of the body, m @param {number} lift_m
+ */
+export function liftOf(a, b, middle, lift_m) {
+    const dot = (/** @type {number[]} */ u, /** @type {number[]} */ v) => u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+    const along = b.map((v, i) => v - a[i]),
+        out = a.map((v, i) => (v + b[i]) / 2 - middle[i]);
+    const share = dot(along, along) > 0 ? dot(out, along) / dot(along, along) : 0;
+    const across = out.map((v, i) => v - share * along[i]),
+        length = Math.hypot(...across);
+    return length > 1e-9 ? across.map((v) => (lift_m * v) / length) : [0, 0, lift_m];
+}
+
+/**
+ * Command of a tool at the clicked points; null: the tool needs more of them.
+ * @param {string} tool of TOOLS @param {Settings} settings @param {number[][]} points m
+ * @returns {Command | null}
+ */
+export function commandOf(tool, settings, points) {
+    if (points.length < TOOLS[tool].points) return null;
+    const [x_m, y_m, z_m] = points[0];
+    /** @type {Record<string, number>} */
+    const args = { x_m, y_m, z_m };
+    if (TOOLS[tool].points === 2) [args.x2_m, args.y2_m, args.z2_m] = points[1];
+    if (tool === "extrude") Object.assign(args, { distance_m: settings.distance_m, scale: settings.scale });
+    if (tool === "sharpen") Object.assign(args, { sharp: settings.sharp, what: settings.sharpWhat });
+    if (tool === "paint") {
+        const { young_factor, density_factor } = PAINTS[settings.paint];
+        Object.assign(args, { radius_m: settings.radius_m, young_factor, density_factor });
+    }
+    if (FORCES.includes(tool)) args.radius_m = settings.radius_m;
+    if (tool === "inflate" || tool === "deflate")
+        args.pressure_Pa = tool === "inflate" ? settings.pressure_Pa : -settings.pressure_Pa;
+    if (tool === "curve") {
+        args.stiffness_N_m = settings.stiffness_N_m;
+        [args.dx_m, args.dy_m, args.dz_m] = liftOf(points[0], points[1], settings.middle, settings.lift_m);
+    }
+    return { verb: tool === "deflate" ? "inflate" : tool, args };
+}
+
+/**
+ * A cut perpendicular to an axis, at a share of the box; the far side is hidden.
+ * @param {"none" | "x" | "y" | "z"} axis @param {number} share 0..1 @param {Box} box
+ * @returns {Command}
+ */
+export function cutCommand(axis, share, box) {
+    const k = ["x", "y", "z"].indexOf(axis);
+    if (k < 0) return { verb: "uncut", args: {} };
+    const args = { nx: 0, ny: 0, nz: 0, offset_m: box.low[k] + share * (box.high[k] - box.low[k]) };
+    args[/** @type {"nx" | "ny" | "nz"} */ ("n" + axis)] = 1;
+    return { verb: "cut", args };
+}
+
+/** box around a box and points @param {Box} box @param {Float32Array} x [n][3] @returns {Box} */
+export function boxAround(box, x) {
+    const low = [...box.low],
+        high = [...box.high];
+    for (let i = 0; i < x.length; i++) {
+        low[i % 3] = Math.min(low[i % 3], x[i]);
+        high[i % 3] = Math.max(high[i % 3], x[i]);
+    }
+    return { low, high };
+}
+
+/** three digits, in the unit that fits @param {number} pascal */
+function pressureText(pascal) {
+    const [unit, size] = pascal >= 1e6 ? ["MPa", 1e6] : pascal >= 1e3 ? ["kPa", 1e3] : ["Pa", 1];
+    return `${Number((pascal / Number(size)).toPrecision(3))} ${unit}`;
+}
+
+/** result of a command in short @param {import("./control_table.js").Answer} answer */
+export function answerText({ verb, text, args = {} }) {
+    if (verb === "probe" && args.young_Pa !== undefined)
+        return `${pressureText(args.young_Pa)}, ${Number(args.density_kg_m3.toPrecision(3))} kg/m³`;
+    if (args.cells === undefined) return text;
+    const title = TOOLS[verb]?.title ?? verb[0].toUpperCase() + verb.slice(1);
+    return `${title}: ${args.cells} cells${args.made_ms === undefined ? "" : `, ${Math.round(args.made_ms)} ms`}`;
+}

@@ -1,0 +1,231 @@
+/* Components that nothing holds: what stays is decided alike for tetrahedra and control cells. */
+#include "server/mesh/volume/loose_components.h"
+
+#include "server/base/vec3.h"
+#include "server/num/union_find.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* share of the largest component below which one is dropped unasked. A voxel of the default resolutions is 0.04 % of
+ * the body or less, a lobe that somebody sees as one is more than a hundredth */
+static const double small_share = 0.01;
+
+typedef struct component {
+    double volume_m3, moment[3]; /* moment: volume times middle, m^4 */
+    bool fixed, keep;
+} component;
+
+/* ---- what stays ---- */
+
+static pal_err refuse(const char *name, const component *part, const pal_loose_components *all, int n_bad, int bad,
+                      pal_diagnostic *diag)
+{
+    const component *p = &part[bad];
+    double middle[3];
+    pal_scale3(middle, 1 / p->volume_m3, p->moment);
+    return pal_diagnostic_set(
+        diag, PAL_ERR_REFUSED,
+        "body \"%.60s\": %d of %d components ha%s no support, the largest of %.3g ml (%.3g %% of the "
+        "body) around (%.4f, %.4f, %.4f) m: hold each component by a support",
+        name, n_bad, all->n_component, n_bad == 1 ? "s" : "ve", 1e6 * p->volume_m3, 100 * p->volume_m3 / all->volume_m3,
+        middle[0], middle[1], middle[2]);
+}
+
+static pal_err choose(const char *name, bool largest_only, component *part, int n, pal_loose_components *out,
+                      pal_diagnostic *diag)
+{
+    int best = 0, bad = -1, n_bad = 0;
+    bool any_held = false;
+    *out = (pal_loose_components){.n_component = n, .largest_only = largest_only};
+    for (int k = 0; k < n; k++) {
+        out->volume_m3 += part[k].volume_m3;
+        any_held |= part[k].fixed;
+        if (part[k].volume_m3 > part[best].volume_m3) best = k;
+    }
+    for (int k = 0; k < n; k++) {
+        bool small = part[k].volume_m3 < small_share * part[best].volume_m3;
+        part[k].keep = largest_only ? k == best : part[k].fixed || !small;
+        if (!largest_only && any_held && !part[k].fixed && !small) {
+            n_bad++;
+            if (bad < 0 || part[k].volume_m3 > part[bad].volume_m3) bad = k;
+        }
+        if (part[k].keep) continue;
+        out->n_dropped++;
+        out->dropped_m3 += part[k].volume_m3;
+        out->max_dropped_m3 = fmax(out->max_dropped_m3, part[k].volume_m3);
+    }
+    return bad < 0 ? PAL_ERR_OK : refuse(name, part, out, n_bad, bad, diag);
+}
+
+void pal_loose_components_describe(const pal_loose_components *parts, const char *name, pal_diagnostic *out)
+{
+    out->text[0] = 0;
+    if (parts->n_dropped == 0) return;
+    pal_diagnostic_set(out, PAL_ERR_OK, "body \"%.60s\": dropped %d of %d components, %.3g ml of %.3g ml (%.2g %%)%s",
+                       name, parts->n_dropped, parts->n_component, 1e6 * parts->dropped_m3, 1e6 * parts->volume_m3,
+                       100 * parts->dropped_m3 / parts->volume_m3,
+                       parts->largest_only ? ": only the largest is kept" : ": small and without support");
+}
+
+/* ---- tetrahedra ---- */
+
+static void add_tet(const pal_tets *tets, const uint8_t *fixed, const int32_t *corner, component *to)
+{
+    const double *x[4];
+    double e[3][3], cross[3];
+    for (int c = 0; c < 4; c++) x[c] = tets->x + 3 * (size_t)corner[c];
+    for (int k = 0; k < 3; k++) pal_sub3(e[k], x[k + 1], x[0]);
+    pal_cross3(cross, e[1], e[2]);
+    double volume = pal_dot3(e[0], cross) / 6;
+    to->volume_m3 += volume;
+    for (int c = 0; c < 4; c++) {
+        pal_axpy3(to->moment, volume / 4, x[c]);
+        to->fixed |= fixed[corner[c]] != 0;
+    }
+}
+
+/* what stays of the tetrahedra, in the same order; number [n_node] gets the new number of each node, -1: gone */
+static pal_err keep_tets(const pal_tets *from, const int32_t *label, const component *part, int32_t *number,
+                         pal_tets *to)
+{
+    *to = *from;
+    to->n_tet = to->n_node = to->n_face = 0;
+    to->face = NULL, to->on_surface = NULL;
+    to->x = malloc(3 * (size_t)from->n_node * sizeof *to->x);
+    to->tet = malloc(4 * (size_t)from->n_tet * sizeof *to->tet);
+    if (!to->x || !to->tet) return PAL_ERR_MEMORY;
+    for (int i = 0; i < from->n_node; i++) number[i] = -1;
+    for (size_t t = 0; t < (size_t)from->n_tet; t++)
+        for (size_t c = 0; part[label[t]].keep && c < 4; c++) number[from->tet[4 * t + c]] = 0;
+    for (int i = 0; i < from->n_node; i++) {
+        if (number[i] < 0) continue;
+        pal_copy3(to->x + 3 * (size_t)to->n_node, from->x + 3 * (size_t)i);
+        number[i] = to->n_node++;
+    }
+    for (size_t t = 0; t < (size_t)from->n_tet; t++) {
+        if (!part[label[t]].keep) continue;
+        for (size_t c = 0; c < 4; c++) to->tet[4 * (size_t)to->n_tet + c] = number[from->tet[4 * t + c]];
+        to->n_tet++;
+    }
+    return pal_tets_find_boundary(to);
+}
+
+/* hexahedron e is tetrahedra 5 e .. 5 e + 4, which are joined by faces */
+static pal_err keep_hexes(const pal_hexes *from, const int32_t *label, const component *part, const int32_t *number,
+                          pal_hexes *to)
+{
+    if (from->n_hex == 0) return PAL_ERR_OK;
+    to->measured = from->measured;
+    to->node = malloc(8 * (size_t)from->n_hex * sizeof *to->node);
+    to->fill = malloc((size_t)from->n_hex * sizeof *to->fill);
+    if (!to->node || !to->fill) return PAL_ERR_MEMORY;
+    for (size_t e = 0; e < (size_t)from->n_hex; e++) {
+        if (!part[label[5 * e]].keep) continue;
+        for (size_t c = 0; c < 8; c++) to->node[8 * (size_t)to->n_hex + c] = number[from->node[8 * e + c]];
+        to->fill[to->n_hex++] = from->fill[e];
+    }
+    return PAL_ERR_OK;
+}
+
+static pal_err keep_mesh(pal_prepared *mesh, const int32_t *label, const component *part)
+{
+    pal_prepared kept = {0};
+    const pal_surface *surface = &mesh->surface;
+    int32_t *number = malloc((size_t)mesh->tets.n_node * sizeof *number);
+    pal_err err = number ? keep_tets(&mesh->tets, label, part, number, &kept.tets) : PAL_ERR_MEMORY;
+    if (!err) err = keep_hexes(&mesh->hexes, label, part, number, &kept.hexes);
+    if (!err && mesh->skin.n_vertex > 0) err = pal_skin_bind(&kept.tets, surface->x, surface->n_vertex, &kept.skin);
+    free(number);
+    if (err) {
+        pal_prepared_free(&kept);
+        return err;
+    }
+    kept.surface = *surface;
+    memset(&mesh->surface, 0, sizeof mesh->surface);
+    pal_prepared_free(mesh);
+    *mesh = kept;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_loose_components_drop(const char *name, const uint8_t *fixed, bool largest_only, pal_prepared *mesh,
+                                  pal_loose_components *out, pal_diagnostic *diag)
+{
+    const pal_tets *tets = &mesh->tets;
+    int n = 0;
+    *out = (pal_loose_components){0};
+    if (tets->n_tet == 0) return PAL_ERR_OK;
+    int32_t *label = malloc((size_t)tets->n_tet * sizeof *label);
+    pal_err err = label ? pal_tets_components(tets, label, &n) : PAL_ERR_MEMORY;
+    component *part = err ? NULL : calloc((size_t)n, sizeof *part);
+    if (!err && !part) err = PAL_ERR_MEMORY;
+    for (int t = 0; !err && t < tets->n_tet; t++) add_tet(tets, fixed, tets->tet + 4 * (size_t)t, &part[label[t]]);
+    if (!err) err = choose(name, largest_only, part, n, out, diag);
+    if (!err && out->n_dropped > 0) err = keep_mesh(mesh, label, part);
+    if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "body \"%.60s\": no memory to find its components", name);
+    free(label);
+    free(part);
+    return err;
+}
+
+/* ---- control cells ---- */
+
+static int label_cells(const pal_cells *cells, int32_t *label)
+{
+    int n = 0;
+    pal_union_find_init(label, cells->n_cell);
+    for (int32_t f = 0; f < cells->n_face; f++)
+        if (!pal_cells_face_boundary(cells, f))
+            pal_union_find_join(label, cells->face_use[cells->face[f].use[0]].cell,
+                                cells->face_use[cells->face[f].use[1]].cell);
+    /* the root of a set is its least member, so that it has its label before the others ask for it */
+    for (int32_t c = 0; c < cells->n_cell; c++) {
+        int32_t root = pal_union_find_root(label, c);
+        label[c] = root;
+    }
+    for (int32_t c = 0; c < cells->n_cell; c++) label[c] = label[c] == c ? n++ : label[label[c]];
+    return n;
+}
+
+static pal_err keep_cells(pal_cells *cells, const int32_t *label, const component *part)
+{
+    pal_cell_loops loops = {0};
+    pal_cells kept = {0};
+    bool *keep = malloc((size_t)cells->n_cell * sizeof *keep);
+    for (int32_t c = 0; keep && c < cells->n_cell; c++) keep[c] = part[label[c]].keep;
+    pal_err err = keep ? pal_cells_loops(cells, &loops) : PAL_ERR_MEMORY;
+    if (!err) err = pal_cell_loops_keep(&loops, keep, NULL);
+    if (!err) err = pal_cells_make(&loops, &kept, NULL);
+    pal_cell_loops_free(&loops);
+    free(keep);
+    if (err) return err;
+    pal_cells_free(cells);
+    *cells = kept;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_loose_cells_drop(const char *name, const uint8_t *fixed, bool largest_only, pal_cells *cells,
+                             pal_loose_components *out, pal_diagnostic *diag)
+{
+    int32_t *label = malloc((size_t)cells->n_cell * sizeof *label);
+    int n = label ? label_cells(cells, label) : 0;
+    component *part = label ? calloc((size_t)n, sizeof *part) : NULL;
+    pal_err err = part ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    *out = (pal_loose_components){0};
+    for (int32_t c = 0; part && c < cells->n_cell; c++) {
+        component *to = &part[label[c]];
+        double volume = pal_cells_cell_volume(cells, NULL, c), middle[3];
+        pal_cells_cell_centre(cells, NULL, c, middle);
+        to->volume_m3 += volume;
+        pal_axpy3(to->moment, volume, middle);
+        for (int32_t k = cells->cell_vertex.start[c]; k < cells->cell_vertex.start[c + 1]; k++)
+            to->fixed |= fixed[cells->cell_vertex.item[k]] != 0;
+    }
+    if (!err) err = choose(name, largest_only, part, n, out, diag);
+    if (!err && out->n_dropped > 0) err = keep_cells(cells, label, part);
+    if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "body \"%.60s\": no memory to find its components", name);
+    free(label);
+    free(part);
+    return err;
+}

@@ -1,0 +1,183 @@
+/* Surface -> voxels (paper B 2.2): inside, one border layer, components.
+ *
+ * The grid begins one voxel outside the corner of the surface's box, so the first centre lies half a voxel inside it.
+ * Inside is kept as bits, where the border layer is a shift and two neighbouring rows. */
+#include "server/mesh/voxel/voxels.h"
+
+#include "server/base/clock.h"
+#include "server/mesh/voxel/voxel_classify.h"
+#include "server/mesh/voxel/voxel_fraction.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_RESOLUTION = 1024, MOST_VOXEL = 50000000 };
+
+void pal_voxels_free(pal_voxels *voxels)
+{
+    free(voxels->kind);
+    memset(voxels, 0, sizeof *voxels);
+}
+
+/* box of the finite corners of triangles (vertices of no triangle do not count); false when there is none */
+static bool find_box(const pal_surface *surface, const uint8_t *used, double low[3], double high[3])
+{
+    for (int k = 0; k < 3; k++) low[k] = INFINITY, high[k] = -INFINITY;
+    for (size_t v = 0; v < (size_t)surface->n_vertex; v++) {
+        const double *x = surface->x + 3 * v;
+        if (!used[v] || !isfinite(x[0]) || !isfinite(x[1]) || !isfinite(x[2])) continue;
+        for (int k = 0; k < 3; k++) {
+            low[k] = x[k] < low[k] ? x[k] : low[k];
+            high[k] = x[k] > high[k] ? x[k] : high[k];
+        }
+    }
+    return low[0] <= high[0];
+}
+
+static pal_err lay_grid(const pal_surface *surface, const pal_voxel_options *options, pal_voxels *grid,
+                        pal_diagnostic *diag)
+{
+    double low[3], high[3], longest = 0;
+    if (options->resolution < 1 || options->resolution > MOST_RESOLUTION)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "resolution %d is not within 1..%d", options->resolution,
+                                  MOST_RESOLUTION);
+    uint8_t *used = calloc(surface->n_vertex ? (size_t)surface->n_vertex : 1, 1);
+    if (!used) return PAL_ERR_MEMORY;
+    for (size_t i = 0; i < 3 * (size_t)surface->n_tri; i++) used[surface->tri[i]] = 1;
+    bool any = find_box(surface, used, low, high);
+    free(used);
+    if (!any)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "no volume (reason 1): none of %d triangles has finite corners", surface->n_tri);
+    for (int k = 0; k < 3; k++) longest = fmax(longest, high[k] - low[k]);
+    if (!(longest > 0) || !isfinite(longest) || !isnormal(longest / MOST_RESOLUTION / PAL_SCAN_ONE))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "no volume (reason 1): the box of %d triangles is %g x %g x %g m across",
+                                  surface->n_tri, high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+    grid->edge_m = longest / options->resolution;
+    for (int k = 0; k < 3; k++) {
+        double ahead = fmin(fmax(options->ahead[k], 0), 1);
+        int n = (int)ceil((high[k] - low[k]) / grid->edge_m + ahead - 1e-6);
+        grid->n[k] = (n < 1 ? 1 : n) + 2;
+        grid->low_m[k] = low[k] - (1 + ahead) * grid->edge_m;
+        grid->origin_m[k] = surface->origin_m[k];
+    }
+    return PAL_ERR_OK;
+}
+
+/* voxels beside an inside one that are not inside themselves */
+static void find_border(const pal_bits *inside, pal_bits *border)
+{
+    int n_word = inside->n_word;
+    for (int z = 1; z < inside->n[2] - 1; z++)
+        for (int y = 1; y < inside->n[1] - 1; y++) {
+            const uint64_t *row = pal_bits_row(inside, y, z);
+            bool any = false;
+            for (int w = 0; w < n_word; w++) any |= row[w] != 0;
+            if (!any) continue;
+            uint64_t *to = pal_bits_row(border, y, z), *south = pal_bits_row(border, y - 1, z),
+                     *north = pal_bits_row(border, y + 1, z), *below = pal_bits_row(border, y, z - 1),
+                     *above = pal_bits_row(border, y, z + 1);
+            for (int w = 0; w < n_word; w++) {
+                uint64_t b = row[w];
+                uint64_t left = w + 1 < n_word ? row[w + 1] << 63 : 0, right = w > 0 ? row[w - 1] >> 63 : 0;
+                to[w] |= b << 1 | right | b >> 1 | left;
+                south[w] |= b;
+                north[w] |= b;
+                below[w] |= b;
+                above[w] |= b;
+            }
+        }
+    size_t n = (size_t)n_word * (size_t)inside->n[1] * (size_t)inside->n[2];
+    for (size_t i = 0; i < n; i++) border->word[i] &= ~inside->word[i];
+}
+
+/* bits to bytes: 8 bits become 8 bytes by one table look-up */
+static void write_kind(const pal_bits *inside, const pal_bits *border, uint8_t *kind)
+{
+    uint64_t spread[256];
+    for (int b = 0; b < 256; b++) {
+        uint8_t byte[8];
+        for (int k = 0; k < 8; k++) byte[k] = b >> k & 1;
+        memcpy(&spread[b], byte, 8);
+    }
+    int n_x = inside->n[0];
+    size_t n_row = (size_t)inside->n[1] * (size_t)inside->n[2];
+    for (size_t row = 0; row < n_row; row++) {
+        const uint64_t *in = inside->word + (size_t)inside->n_word * row;
+        const uint64_t *out = border->word + (size_t)inside->n_word * row;
+        uint8_t *to = kind + (size_t)n_x * row;
+        for (int x = 0; x < n_x; x += 8) {
+            int w = x >> 6, s = x & 63;
+            uint64_t i = in[w] >> s & 255, b = out[w] >> s & 255;
+            if (!(i | b)) continue;
+            uint64_t bytes = 2 * spread[i] + spread[b];
+            memcpy(to + x, &bytes, n_x - x < 8 ? (size_t)(n_x - x) : 8);
+        }
+    }
+}
+
+/* pieces that hang together face by face, border voxels included; the border is left as it was */
+static pal_err count_pieces(const pal_bits *inside, pal_bits *border, int *n_component)
+{
+    size_t n = (size_t)inside->n_word * (size_t)inside->n[1] * (size_t)inside->n[2];
+    for (size_t i = 0; i < n; i++) border->word[i] |= inside->word[i];
+    pal_err err = pal_bits_components(border, false, n_component);
+    for (size_t i = 0; i < n; i++) border->word[i] &= ~inside->word[i];
+    return err;
+}
+
+/* border, what of it is dropped, pieces, counts, budget, bytes */
+static pal_err keep_voxels(const pal_surface *surface, const pal_bits *inside, const pal_voxel_options *options,
+                           pal_voxels *voxels, pal_voxel_report *report, pal_diagnostic *diag)
+{
+    pal_bits border;
+    pal_err err = PAL_ERR_OK;
+    PAL_TRY(pal_bits_create(inside->n, &border));
+    if (options->border) find_border(inside, &border);
+    if (options->border && options->min_fill > 0)
+        err = pal_voxels_drop(surface, options, voxels, inside, &border, report, diag);
+    if (!err) err = count_pieces(inside, &border, &report->n_component);
+    if (err) {
+        pal_bits_free(&border);
+        return err;
+    }
+    voxels->n_inside = pal_bits_count(inside);
+    voxels->n_border = pal_bits_count(&border);
+    int64_t most = options->max_voxel > 0 ? options->max_voxel : MOST_VOXEL;
+    if (voxels->n_inside + voxels->n_border > most) {
+        pal_bits_free(&border);
+        return pal_diagnostic_set(
+            diag, PAL_ERR_BUDGET, "resolution %d makes %lld voxels, the limit is %lld: ask for less",
+            options->resolution, (long long)(voxels->n_inside + voxels->n_border), (long long)most);
+    }
+    voxels->kind = calloc((size_t)voxels->n[0] * (size_t)voxels->n[1] * (size_t)voxels->n[2], 1);
+    if (voxels->kind) write_kind(inside, &border, voxels->kind);
+    pal_bits_free(&border);
+    return voxels->kind ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+pal_err pal_voxels_fill(const pal_surface *surface, const pal_voxel_options *options, pal_voxels *out,
+                        pal_voxel_report *report, pal_diagnostic *diag)
+{
+    double began = pal_clock_s();
+    pal_voxels voxels = {0};
+    pal_voxel_report told = {0};
+    pal_bits inside = {0};
+    PAL_TRY(lay_grid(surface, options, &voxels, diag));
+    pal_err err = pal_bits_create(voxels.n, &inside);
+    if (!err) err = pal_voxels_classify(surface, options, &voxels, &inside, &told, diag);
+    int n_before;
+    if (!err && options->largest_only) err = pal_bits_components(&inside, true, &n_before);
+    if (!err) err = keep_voxels(surface, &inside, options, &voxels, &told, diag);
+    pal_bits_free(&inside);
+    if (err == PAL_ERR_MEMORY)
+        pal_diagnostic_set(diag, err, "out of memory for %d x %d x %d voxels", voxels.n[0], voxels.n[1], voxels.n[2]);
+    if (err) return err;
+    told.inside_volume_m3 = (double)voxels.n_inside * voxels.edge_m * voxels.edge_m * voxels.edge_m;
+    told.fill_s = pal_clock_s() - began - told.tree_s;
+    *out = voxels;
+    if (report) *report = told;
+    return PAL_ERR_OK;
+}

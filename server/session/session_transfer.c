@@ -1,0 +1,119 @@
+/* A session that goes on where another one is (session.h). */
+#include "server/session/session_core.h"
+
+#include "server/base/clock.h"
+#include "server/base/log.h"
+
+#include <string.h>
+
+static uint64_t later(uint64_t ns, uint64_t by_ns, uint64_t most_ns)
+{
+    return ns + by_ns < most_ns ? ns + by_ns : most_ns;
+}
+
+/* Tools as they are held, and poses that had not been taken yet. Nobody could take one while neither thread ran, for
+ * away_ns: that time counts for no lease */
+static void hand_tools(pal_session *to, pal_session *from, uint64_t now_ns)
+{
+    uint64_t away_ns = now_ns - to->carried_ns;
+    for (int t = 0; t < to->scene->n_tool && t < from->scene->n_tool; t++) {
+        tool_place *a = &to->tool[t], *b = &from->tool[t];
+        const pose_slot *slot = pal_triple_buffer_take(&b->triple_buffer);
+        if (slot) {
+            pose_slot *kept = pal_triple_buffer_slot(&a->triple_buffer);
+            *kept = *slot;
+            kept->arrived_ns = later(slot->arrived_ns, away_ns, now_ns);
+            pal_triple_buffer_publish(&a->triple_buffer);
+        }
+        b->arrived_ns = later(b->arrived_ns, away_ns, now_ns);
+        a->pose = b->pose, a->arrived_ns = b->arrived_ns, a->present = b->present;
+    }
+}
+
+/* what the thread of `from` knew and that of `to` goes on with, before the carry */
+static void hand_over(pal_session *to, pal_session *from)
+{
+    to->paused = from->paused, to->single = from->single;
+    to->step = from->step, to->n_late = from->n_late, to->work_ns = from->work_ns;
+    pal_disabled_components_transfer(&to->off, &from->off, from->row, from->n_row, from->world, to->world, to->scene);
+    memcpy(to->n_look, from->n_look, sizeof to->n_look);
+    memcpy(to->material, from->material, sizeof to->material); /* neither thread runs */
+    for (int b = 0; b < to->scene->n_body; b++)
+        for (int k = 0; k < PAL_FIELD_COUNT; k++)
+            if (to->n_look[b][k] > 0) (void)pal_world_field(to->world, b, (pal_field)k, true, NULL);
+}
+
+/* what others may have changed meanwhile, and orders that nobody has taken yet */
+static void hand_orders(pal_session *to, pal_session *from)
+{
+    atomic_store_explicit(&to->n_refused, atomic_load_explicit(&from->n_refused, memory_order_relaxed),
+                          memory_order_relaxed);
+    atomic_store_explicit(&to->n_observer, atomic_load_explicit(&from->n_observer, memory_order_relaxed),
+                          memory_order_relaxed);
+    pal_watch_hand_over(&to->watch, &from->watch);
+    pal_command command;
+    for (int k = 0; k < N_COMMAND && pal_command_queue_get(from->command, &command); k++)
+        (void)pal_command_queue_put(to->command, &command);
+}
+
+static void stood(pal_session *next, uint64_t since_ns)
+{
+    uint64_t ns = pal_clock_ns() - since_ns;
+    if (ns > next->pause_ns) next->pause_ns = ns;
+}
+
+void pal_session_rehearse(pal_session *next, pal_session *before, pal_session_snapshot_fn *look,
+                          pal_session_rehearse_fn *rehearse, void *user)
+{
+    for (int k = 0; k < PAL_SESSION_REHEARSALS_MAX; k++) {
+        pal_session_stop(before);
+        uint64_t stopped_ns = pal_clock_ns();
+        bool wanted = look(user, before->world);
+        atomic_store_explicit(&before->stop, false, memory_order_release);
+        pal_err err = pal_session_start(before, NULL);
+        stood(next, stopped_ns);
+        /* without its thread it stands until the carry, which tells */
+        if (err || !wanted) return;
+        rehearse(user, next->world);
+        next->n_rehearsed++;
+    }
+}
+
+void pal_session_transfer_begin(pal_session *next, pal_session *before, pal_session_transfer_fn *carry, void *user)
+{
+    next->carried_ns = pal_clock_ns();
+    atomic_store_explicit(&before->replaced, true, memory_order_relaxed);
+    pal_session_stop(before);
+    next->stopped_ns = pal_clock_ns();
+    hand_over(next, before);
+    carry(user, next->world, before->world);
+}
+
+pal_err pal_session_transfer_end(pal_session *next, pal_session *before, pal_diagnostic *diag)
+{
+    hand_orders(next, before);
+    hand_tools(next, before, pal_clock_ns());
+    pal_err err = pal_session_start(next, diag);
+    stood(next, next->stopped_ns);
+    if (!err && before->log)
+        pal_log(PAL_LOG_WARN, "record", "%s: ends at step %llu: another session goes on with a changed scene",
+                before->options.record_path, (unsigned long long)before->step);
+    if (!err) return PAL_ERR_OK;
+    atomic_store_explicit(&before->stop, false, memory_order_release);
+    atomic_store_explicit(&before->replaced, false, memory_order_relaxed);
+    (void)pal_session_start(before, NULL);
+    return err;
+}
+
+pal_err pal_session_transfer(pal_session *next, pal_session *before, pal_session_transfer_fn *carry, void *user,
+                             pal_diagnostic *diag)
+{
+    pal_session_transfer_begin(next, before, carry, user);
+    return pal_session_transfer_end(next, before, diag);
+}
+
+double pal_session_pause_s(const pal_session *session, int *n_rehearsed)
+{
+    *n_rehearsed = session->n_rehearsed;
+    return (double)session->pause_ns / SECOND_NS;
+}

@@ -1,0 +1,353 @@
+/* A body that adapts, from a real session to clients on mem://: who is told of its triangles, when, and that what they
+ * have is the world's. */
+#include "server/net/credit.h"
+#include "server/net/stream.h"
+#include "tests/net/adaptive_scene.h"
+#include "tests/net/server_fixture.h"
+
+static adaptive_scene calm, storm, weightless;
+static void begin(const adaptive_scene *which)
+{
+    served_begin(&which->scene, (pal_session_options){.start_paused = true, .unpaced = true}, (pal_server_options){0});
+}
+
+static void nap(void)
+{
+    nanosleep(&(struct timespec){0, 100000}, NULL);
+}
+
+/* a frame time on; then the client, which keeps up, waits for its cycle, so that a slow machine changes nothing */
+static void next_cycle(mem_client *c)
+{
+    int before = c->n_tools;
+    now_ns += FRAME_NS;
+    for (int i = 0; i < 50000 && c->n_tools == before; i++) {
+        pal_server_advance(server, now_ns);
+        mem_pull(c, 1000);
+        if (c->n_tools == before) nap();
+    }
+    CHECK(c->n_tools > before);
+}
+
+/* one step of the paused session, seen by the client, who asks for it */
+static void step(mem_client *c)
+{
+    uint64_t before = c->tools.sim_time_us;
+    mem_text(c, "{\"type\":\"command\",\"verb\":\"step\"}");
+    for (int i = 0; i < 50 && c->tools.sim_time_us <= before; i++) next_cycle(c);
+    CHECK(c->tools.sim_time_us > before);
+}
+
+static void join(mem_client *c, const char *name, bool patches)
+{
+    mem_join_as(c, road, name, PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE, patches);
+    mem_pull(c, 1000);
+}
+
+/* vertices that the client draws */
+static int shown_vertices(const mem_client *c)
+{
+    uint8_t *used = calloc(c->asset->order->n_vertex, 1);
+    int n = 0;
+    for (size_t e = 0; e < 3 * (size_t)c->asset->n_triangle; e++) {
+        const uint32_t *t = c->tri + e - e % 3;
+        if ((t[0] | t[1] | t[2]) && !used[c->tri[e]]++) n++;
+    }
+    free(used);
+    return n;
+}
+
+static bool same_table(const mem_client *a, const mem_client *b)
+{
+    return a->tri && b->tri && !memcmp(a->tri, b->tri, (size_t)a->asset->n_triangle * 3 * sizeof *a->tri);
+}
+
+/* largest distance of the vertices that they both draw, per axis */
+static double apart(const mem_client *a, const mem_client *b)
+{
+    double most = 0;
+    for (size_t e = 0; e < 3 * (size_t)a->asset->n_triangle; e++)
+        for (size_t c = 0; c < 3; c++) {
+            size_t i = 3 * (size_t)a->tri[e] + c;
+            most = fmax(most, fabs((double)a->position_m[i] - (double)b->position_m[i]));
+        }
+    return most;
+}
+
+static void hello_tells_which_parts_adapt_and_the_asset_holds_the_finest_level(void)
+{
+    mem_client c;
+    begin(&calm);
+    join(&c, "Ada", true);
+    const pal_wire_part_info *part = &c.last[PAL_CONTROL_HELLO].hello.part[0];
+    CHECK(part->is_adaptive);
+    CHECK_INT(part->n_vertex, ADAPTIVE_VERTICES);
+    CHECK_INT(part->n_triangle, ADAPTIVE_PLACES);
+    REQUIRE(c.asset);
+    CHECK_INT(c.asset->order->n_vertex, ADAPTIVE_VERTICES);
+    CHECK_INT(c.asset->n_triangle, ADAPTIVE_PLACES);
+    CHECK_INT(shown_vertices(&c), ADAPTIVE_NODES); /* level 0 at load */
+    next_cycle(&c);
+    CHECK_INT(c.n_patch, 0); /* nothing has changed yet */
+    /* a status that was made before the first frame came from the session's thread has nothing to tell yet */
+    const pal_wire_status *s = &c.last[PAL_CONTROL_STATUS].status;
+    for (int i = 0; i < 2000 && !(c.n_text[PAL_CONTROL_STATUS] && s->n_active); i++) {
+        now_ns += FRAME_NS;
+        pal_server_advance(server, now_ns);
+        mem_pull(&c, 1000);
+        nap();
+    }
+    CHECK_INT(s->n_active, 1);
+    CHECK(s->active[0].part == 0 && s->active[0].n_node == ADAPTIVE_NODES && s->active[0].n_spring == 336);
+    CHECK(s->active[0].n_all_node == ADAPTIVE_VERTICES && s->active[0].n_finest_spring == ADAPTIVE_SPRINGS);
+    CHECK_INT(c.n_bad, 0);
+    mem_end(&c);
+    end();
+}
+
+/* the stream alone: its own copy and that of clients who look now and then are the frame's */
+static void tables_are_the_worlds_after_many_changes(void)
+{
+    enum { LOOKERS = 4 };
+    static uint32_t mine[LOOKERS][ADAPTIVE_PLACES][3];
+    static uint8_t work[PAL_TOPOLOGY_DELTA_WORK_BYTES(ADAPTIVE_PLACES)];
+    uint32_t has[LOOKERS] = {0};
+    pal_stream *s = NULL;
+    bool used[PAL_STREAM_TIER] = {true, true, false};
+    pal_stream_tool tool[PAL_TOOL_MAX] = {{0}};
+    pal_session_options options = {.unpaced = true};
+    REQUIRE(pal_session_open(&storm.scene, &options, NULL, &session) == PAL_ERR_OK);
+    REQUIRE(pal_stream_open(session, 0, NULL, &s) == PAL_ERR_OK);
+    pal_stream_part *part = &s->part[0];
+    pal_asset *asset = NULL;
+    pal_frame_decoder *decoder = NULL;
+    REQUIRE(part->places && !pal_asset_decode(part->asset->bytes, part->asset->n_byte, &asset));
+    REQUIRE(!pal_frame_decoder_create(asset, &decoder));
+    float *x = malloc(sizeof(float) * 3 * ADAPTIVE_VERTICES);
+    for (int k = 0; k < LOOKERS; k++) memcpy(mine[k], asset->triangle, sizeof mine[k]);
+    int n_cycle = 0, n_changed = 0;
+    for (int i = 0; i < 200000 && n_cycle < CHECK_REPEATS(120, 40); i++) {
+        uint32_t change = part->places->change;
+        if (!pal_stream_update(s, (uint64_t)i, used, tool)) {
+            nap();
+            continue;
+        }
+        n_cycle++;
+        n_changed += change != part->places->change;
+        const pal_frame_part *from = &s->frame->part[0];
+        CHECK_INT(from->n_slot, ADAPTIVE_PLACES);
+        CHECK(memcmp(part->places->tri, from->slot, sizeof mine[0]) == 0);
+        CHECK_INT(part->places->change == 0 ? 0 : part->frame_change[0], part->places->change);
+        for (int k = 0; k < LOOKERS; k++) {
+            pal_topology_delta_head head;
+            if (n_cycle % (3 * k + 1)) continue;
+            pal_packet *p = pal_triangle_slots_delta(part->places, has[k]);
+            CHECK_INT(p != NULL, has[k] != part->places->change);
+            if (p)
+                CHECK_INT(pal_topology_delta_get(p->bytes, p->n_byte, ADAPTIVE_PLACES, ADAPTIVE_VERTICES, work, &head,
+                                                 mine[k][0]),
+                          0);
+            pal_packet_drop(p);
+            has[k] = part->places->change;
+            CHECK(memcmp(mine[k], from->slot, sizeof mine[k]) == 0);
+        }
+        /* what is shown is where the world has it */
+        for (int t = 0; t < 2; t++) {
+            pal_frame_head head;
+            double worst = 0;
+            int n_shown = 0;
+            REQUIRE(!pal_frame_get(decoder, part->frame[t]->bytes, part->frame[t]->n_byte, &head, x));
+            for (int v = 0; v < ADAPTIVE_VERTICES; v++) {
+                n_shown += !part->places->hidden[v];
+                for (int c = 0; c < 3 && !part->places->hidden[v]; c++)
+                    worst = fmax(worst, fabs((double)x[3 * v + c] - (double)from->position_m[3 * v + c]));
+            }
+            CHECK_INT(n_shown, from->n_active);
+            CHECK_LE(worst, pal_stream_tier_error_m(s, t));
+        }
+    }
+    printf("  %d of %d frames brought other triangles\n", n_changed, n_cycle);
+    CHECK(n_changed > 4);
+    free(x);
+    pal_frame_decoder_destroy(decoder);
+    pal_asset_destroy(asset);
+    pal_stream_close(s);
+    pal_session_close(session);
+}
+
+static void who_skips_cycles_gets_one_patch_with_all_of_it(void)
+{
+    mem_client fast, slow;
+    begin(&storm);
+    join(&fast, "fast", true);
+    join(&slow, "slow", true);
+    next_cycle(&fast);
+    mem_pull(&slow, 1000);
+    for (int i = 0; i < 12; i++) step(&fast); /* the slow one reads nothing meanwhile */
+    REQUIRE(fast.n_patch > 3);
+    int before = slow.n_patch;
+    mem_pull(&slow, 1000);
+    printf("  %d patches to the fast one, %d to the slow one\n", fast.n_patch, slow.n_patch - before);
+    CHECK_LE(slow.n_patch - before, 2); /* one that waited to be read, and one for the rest */
+    CHECK(same_table(&fast, &slow));
+    CHECK_INT(shown_vertices(&slow), shown_vertices(&fast));
+    CHECK_LE(apart(&fast, &slow), 0);
+    /* the same for one that reads and acknowledges nothing: its credit ends, and one patch brings it back */
+    slow.mute = true;
+    before = slow.n_patch;
+    for (int i = 0; i < 16; i++) {
+        step(&fast);
+        mem_pull(&slow, 1000);
+    }
+    CHECK_LE(slow.n_patch - before, PAL_CREDIT_MIN + 2);
+    slow.mute = false;
+    uint8_t ack[PAL_WIRE_ACK_BYTES];
+    pal_wire_put_ack(ack, sizeof ack, &(pal_wire_ack){.cycle = slow.tools.cycle});
+    pal_mem_send(slow.peer, ack, sizeof ack, false);
+    before = slow.n_patch;
+    for (int i = 0; i < 3; i++) mem_pull(&slow, 1000);
+    CHECK_INT(slow.n_patch - before, 1);
+    CHECK(same_table(&fast, &slow));
+    CHECK_INT(fast.n_bad + slow.n_bad, 0);
+    mem_end(&fast);
+    mem_end(&slow);
+    end();
+}
+
+static void who_comes_late_gets_all_of_it_before_the_first_frame(void)
+{
+    mem_client early, late, old;
+    begin(&storm);
+    join(&early, "early", true);
+    join(&old, "old", false);
+    next_cycle(&early);
+    for (int i = 0; i < 10; i++) {
+        step(&early);
+        mem_pull(&old, 1000);
+    }
+    REQUIRE(early.n_patch > 2);
+    join(&late, "late", true);
+    CHECK_INT(late.n_patch, 1);
+    CHECK_INT(late.n_frame, 1);
+    CHECK(same_table(&early, &late));
+    CHECK_LE(apart(&early, &late), 0);
+    /* who does not take patches has none, and the triangles of load at the right place */
+    CHECK_INT(old.n_patch, 0);
+    CHECK(old.n_frame > 5);
+    CHECK_INT(shown_vertices(&old), ADAPTIVE_NODES);
+    CHECK_LE(apart(&old, &early), 0);
+    CHECK_INT(early.n_bad + late.n_bad + old.n_bad, 0);
+    /* a reset brings back the table of load, for all alike */
+    mem_text(&early, "{\"type\":\"command\",\"verb\":\"reset\"}");
+    for (int i = 0; i < 50 && early.tools.sim_time_us; i++) next_cycle(&early);
+    mem_pull(&late, 1000);
+    REQUIRE(early.asset);
+    CHECK(memcmp(early.tri, early.asset->triangle, (size_t)early.asset->n_triangle * 12) == 0);
+    CHECK(same_table(&early, &late));
+    CHECK_INT(early.n_bad + late.n_bad, 0);
+    mem_end(&early);
+    mem_end(&late);
+    mem_end(&old);
+    end();
+}
+
+static void a_change_of_accuracy_loses_no_triangle(void)
+{
+    mem_client fast, coarse;
+    begin(&storm);
+    join(&fast, "fast", true);
+    join(&coarse, "coarse", true);
+    next_cycle(&fast);
+    mem_pull(&coarse, 1000);
+    /* two clean seconds, then it takes one cycle in four, until it is given larger steps, then all of them again */
+    float q = fast.frame.q_m, most = 0;
+    for (int i = 0; i < 600; i++) {
+        if (i % 8 == 0)
+            step(&fast);
+        else {
+            mem_text(&fast, "{\"type\":\"command\",\"verb\":\"step\"}");
+            next_cycle(&fast);
+        }
+        if (i % 7 == 6) {
+            mem_pull(&coarse, 1000);
+            most = fmaxf(most, coarse.frame.q_m);
+        }
+        if (most > 1.5f * q) break;
+    }
+    CHECK(most > 1.5f * q);
+    for (int i = 0; i < 4; i++) {
+        step(&fast);
+        mem_pull(&coarse, 1000);
+        CHECK(same_table(&fast, &coarse));
+        CHECK_LE(apart(&fast, &coarse), 0.5 * ((double)q + (double)coarse.frame.q_m) * 1.1);
+    }
+    CHECK_INT(fast.n_bad + coarse.n_bad, 0);
+    mem_end(&fast);
+    mem_end(&coarse);
+    end();
+}
+
+static void triangles_that_change_while_nothing_moves_come_with_a_frame(void)
+{
+    mem_client c, late;
+    begin(&weightless);
+    join(&c, "Ada", true);
+    next_cycle(&c);
+    REQUIRE(c.asset);
+    CHECK_INT(shown_vertices(&c), ADAPTIVE_VERTICES);
+    for (int i = 0; i < 120 && shown_vertices(&c) > ADAPTIVE_NODES; i++) {
+        int n_frame = c.n_frame, n_patch = c.n_patch;
+        step(&c);
+        CHECK_INT(c.n_frame - n_frame, c.n_patch - n_patch);
+    }
+    CHECK_INT(shown_vertices(&c), ADAPTIVE_NODES);
+    CHECK(c.n_patch >= ADAPTIVE_LEVELS - 1);
+    for (size_t i = 0; i < 3 * (size_t)ADAPTIVE_VERTICES; i++)
+        CHECK_NEAR((double)c.position_m[i], (double)c.asset->rest_m[i], 1e-7);
+    join(&late, "late", true);
+    CHECK(late.n_patch == 1 && late.n_frame == 1 && same_table(&c, &late));
+    CHECK_INT(c.n_bad + late.n_bad, 0);
+    mem_end(&c);
+    mem_end(&late);
+    end();
+}
+
+static void at_rest_nothing_is_sent(void)
+{
+    mem_client c;
+    begin(&calm);
+    join(&c, "Ada", true);
+    next_cycle(&c);
+    mem_text(&c, "{\"type\":\"command\",\"verb\":\"resume\"}");
+    int quiet = 0, n_frame = 0, n_patch = 0;
+    for (int i = 0; i < 4000 && quiet < 60; i++) {
+        next_cycle(&c);
+        quiet = c.n_frame == n_frame && c.n_patch == n_patch ? quiet + 1 : 0;
+        n_frame = c.n_frame, n_patch = c.n_patch;
+    }
+    printf("  at rest after %.1f s with %d vertices shown, %d patches\n", (double)c.tools.sim_time_us * 1e-6,
+           shown_vertices(&c), c.n_patch);
+    CHECK_INT(quiet, 60);
+    CHECK(c.n_patch > 0);
+    CHECK_INT(c.n_bad, 0);
+    mem_end(&c);
+    end();
+}
+
+int main(void)
+{
+    if (!adaptive_scene_make(&calm, ADAPTIVE_CALM) || !adaptive_scene_make(&storm, ADAPTIVE_STORM) ||
+        !adaptive_scene_make(&weightless, ADAPTIVE_WEIGHTLESS))
+        return 1;
+    RUN(hello_tells_which_parts_adapt_and_the_asset_holds_the_finest_level);
+    RUN(tables_are_the_worlds_after_many_changes);
+    RUN_SERIAL(who_skips_cycles_gets_one_patch_with_all_of_it);
+    RUN(who_comes_late_gets_all_of_it_before_the_first_frame);
+    RUN_LONG(a_change_of_accuracy_loses_no_triangle);
+    RUN(triangles_that_change_while_nothing_moves_come_with_a_frame);
+    RUN_SERIAL(at_rest_nothing_is_sent);
+    adaptive_scene_free(&calm);
+    adaptive_scene_free(&storm);
+    adaptive_scene_free(&weightless);
+    return check_report();
+}
