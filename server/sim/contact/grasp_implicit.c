@@ -1,5 +1,5 @@
 /* Grasps with implicit solvers. Nothing limits k, c is 0 as the step itself damps, the solver takes the spring
- * implicitly, and the forces are those of the end of the sub-step. The spring stretches by at most GRASP_RISE_S more
+ * implicitly, and the forces are those of the end of the sub-step. The spring stretches by at most GRASP_STRETCH more
  * than at the end of the last sub-step (a tool that jumps) and by no more than brings the force to BELOW_CAP of the
  * caps once the tissue has followed, as far as its compliance is known, so that tissue follows a faster tool late.
  * Where caps leave less than the spring's force, it becomes a constant force and the solver solves once more. */
@@ -11,7 +11,7 @@ void pal_grasp_act_implicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *to
 {
     const pal_body *body = step->body;
     pal_grasp_implicit *implicit = g->implicit;
-    double y[3], goal[3], rise = GRASP_RISE_S * body->length_scale_m / step->n_sub;
+    double y[3], goal[3], rise = GRASP_STRETCH * body->length_scale_m * (step->dt_s / FRAME_S);
     double k = tool->ramp * pal_grasp_stiffness_N_m(grasps, pal_grasp_reach_m(grasps, tool));
     implicit->k_N_m = k;
     pal_grasp_mean(g, body->d, y);

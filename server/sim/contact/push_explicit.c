@@ -44,14 +44,13 @@ static void find_share(pal_push *push, pal_tool_contact *t, int n_tool, pal_step
     double max_rate =
         fmax(push->regime->stiffness_limit / (step->dt_s * step->dt_s), EIGENVALUE_SAFETY * n_share * t->wanted_1_s2);
     double share = rate > max_rate ? max_rate / rate : 1;
-    t->share = share < t->share ? share : fmin(share, t->share * SHARE_RISE);
+    t->share = share < t->share ? share : fmin(share, t->share * (1 + step->dt_s / SHARE_RISE_S));
 }
 
 /* forces of one tool to the nodes and back */
 static void press(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step *step)
 {
     pal_body *body = step->body;
-    if (body->active) t->ramp = fmin(1, t->ramp + step->dt_s / CONTACT_RAMP_S);
     double scale = tool->ramp * t->ramp * t->share * (1 - t->hold.share), sum[3] = {0}, stiffness = 0;
     double damping_s = step->dt_s * push->regime->damping_steps;
     if (t->n_contact == 0 || scale <= 0) {

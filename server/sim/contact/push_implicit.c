@@ -51,22 +51,22 @@ static void find_back(const pal_push *push, pal_tool_contact *t, const pal_tool 
 
 /* A proxy that cannot go deeper is moved by tissue in each step, which makes contact explicit again and trembles at 60
  * steps a second. Contact that is stiff enough lets the proxy reach its tool: share is how much stiffer than asked. */
-static void find_stiffening(pal_tool_contact *t, const pal_tool *tool, const pal_body *body)
+static void find_stiffening(pal_tool_contact *t, const pal_tool *tool, const pal_body *body, double dt_s)
 {
     double here[3], depth = 0, radius = tool->radius_m;
     pal_sub3(here, tool->here_m, body->offset_m);
     for (int i = 0; i < t->n_contact; i++) depth = fmax(depth, t->contact[i].depth_m);
     if (depth > 0.9 * t->limits.max_depth_m && pal_dist3(here, t->proxy.x) > REST_RADII * radius)
-        t->share = fmin(MAX_STIFFENING, t->share * STIFFEN);
+        t->share = fmin(MAX_STIFFENING, t->share * (1 + STIFFEN * (dt_s / FRAME_S)));
     else if (depth < SHALLOW_RADII * radius)
-        t->share = fmax(1, t->share * SOFTEN);
+        t->share = fmax(1, t->share * fmax(0, 1 - SOFTEN * (dt_s / FRAME_S)));
 }
 
 /* springs of one tool, and the loads they begin with */
 static void begin(pal_push *push, pal_tool_contact *t, const pal_tool *tool, pal_step *step)
 {
     pal_tool_contact_implicit *implicit = t->implicit;
-    find_stiffening(t, tool, step->body);
+    find_stiffening(t, tool, step->body, step->dt_s);
     double scale = tool->ramp * t->ramp * t->share * (1 - t->hold.share), move[3], stiffness = 0;
     pal_copy3(implicit->old_side, t->proxy.normal);
     implicit->old_back_m = implicit->back_m;

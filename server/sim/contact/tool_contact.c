@@ -2,6 +2,7 @@
 #include "server/sim/contact/tool_contact.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/core/blend.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -119,9 +120,9 @@ void pal_tool_contact_blend(pal_tool_contact *h, pal_step *step, pal_tool *tool,
     pal_contact_blend *hold = &h->hold;
     double back[3], size = pal_norm3(hold->total_N);
     if (!hold->acts) return;
-    if (step->sub == 0 && hold->n_done++ == 0) hold->ramp = tool->ramp;
-    hold->share = 1 - (hold->n_done - 1 + (step->sub + 1.0) / step->n_sub) / PAL_CONTACT_BLEND_STEPS;
-    if (hold->share < 1e-9) {
+    if (!hold->begun) hold->ramp = tool->ramp, hold->share = 1, hold->begun = true;
+    hold->share = pal_blend_toward(hold->share, 0, step->dt_s, PAL_BLEND_TRANSFER_S);
+    if (hold->share == 0) {
         pal_tool_contact_end_blend(h);
         return;
     }

@@ -3,7 +3,7 @@
  *
  * Handed over are the proxy, its side, what friction holds, and the force: tissue that takes over is pressed at first
  * by the very force of before, on the nodes that lie where those before it were, and that force is let go over
- * PAL_CONTACT_BLEND_STEPS steps while contact comes in by as much:
+ * PAL_BLEND_TRANSFER_S while contact comes in by as much:
  *     force = s F + (1 - s) contact,   s = 1 -> 0,
  * so that what is felt goes from the force of before to that of after and not by way of none (a proxy that is seated
  * anew has no depth), nor of one that belongs to the other body's contact stiffness. A tool that goes back meanwhile is
@@ -16,8 +16,6 @@
 #include "server/sim/contact/haptic_stiffness.h"
 #include "server/sim/contact/proxy.h"
 #include "server/sim/core/effect.h"
-
-enum { PAL_CONTACT_BLEND_STEPS = 10 };
 
 /* what a tool needs beside with an implicit solver */
 typedef struct pal_tool_contact_implicit {
@@ -33,7 +31,7 @@ typedef struct pal_tool_contact_implicit {
 /* the force of before */
 typedef struct pal_contact_blend {
     bool acts;
-    int n_done; /* steps begun */
+    bool begun; /* a sub-step has been */
     int n_node;
     int32_t *node;     /* heap [n_node]                        */
     double *force_N;   /* on them at the switch, heap [n_node][3] */

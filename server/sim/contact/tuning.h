@@ -18,9 +18,10 @@ enum { CONTACT_MAX = 2048, SAMPLE_MAX = 200000 };
 #define SIDE_STEPS 4
 /* m. A patch is published within a radius of the tool, at least within this: a hand at 0.5 m/s needs 20 ms */
 #define NEAR_M 0.010
-/* s. Forces rise over this after a proxy was set again, at 60 steps a second in so many steps */
-#define CONTACT_RAMP_S (1.0 / 6)
-enum { CONTACT_RAMP_STEPS = 10 };
+/* s. The time that the rates per frame refer to, and the keys clamp_S and GRASP_STRETCH: they held for a step of 60 Hz
+ * and hold for any other alike (test_step_length) */
+#define FRAME_S (1.0 / 60)
+/* least share of the force that contact with other triangles begins with (blend.h: PAL_BLEND_CONTACT_S) */
 #define MIN_RAMP 0.01
 
 /* ---- explicit contact ---- */
@@ -29,8 +30,9 @@ enum { CONTACT_RAMP_STEPS = 10 };
 #define EXPLICIT_PRESSURE 200
 /* over the eigenvalue that two power iterations find, which is low by up to a quarter */
 #define EIGENVALUE_SAFETY 1.3
-/* the share of the stiffness rises by no more than this factor a sub-step, so that it does not follow noise */
-#define SHARE_RISE 1.01
+/* s. The share of the stiffness rises at this rate at most: where the limit falls away for one sub-step only, contact
+ * does not follow (test_subdivision_fem: a pressed solid stays at rest; 0.04 does not) */
+#define SHARE_RISE_S 0.15
 /* radii. Points so near a proxy may come to touch before the solver asks again */
 #define WANTED_RADII 1.25
 
@@ -38,10 +40,10 @@ enum { CONTACT_RAMP_STEPS = 10 };
 
 /* contact over tissue stiffness: tissue gives way 15 times as much as contact */
 #define IMPLICIT_STIFFNESS 15.0
-/* factors on the stiffness in a step while the proxy is kept from its tool, and while contact is shallower than so many
- * radii; largest product */
-#define STIFFEN        1.3
-#define SOFTEN         0.95
+/* shares by which the stiffness rises in FRAME_S while the proxy is kept from its tool, and falls while contact is
+ * shallower than so many radii; largest product */
+#define STIFFEN        0.3
+#define SOFTEN         0.05
 #define MAX_STIFFENING 8.0
 #define SHALLOW_RADII  0.05
 /* of a cap: contact itself gives this much, the rest is for what one step adds */
@@ -57,8 +59,8 @@ enum { CONTACT_RAMP_STEPS = 10 };
 /* shares of m / dt^2 and m / dt that spring and damper of an explicit grasp take of a node's stability */
 #define GRASP_ALPHA 0.25
 #define GRASP_BETA  0.25
-/* box diagonals. An implicit grasp stretches by no more in a step, so that a tool that jumps does not strike */
-#define GRASP_RISE_S 0.02
+/* box diagonals. An implicit grasp stretches by no more in FRAME_S, so that a tool that jumps does not strike */
+#define GRASP_STRETCH 0.02
 
 /* ---- solves of implicit contact (test_contact_solved) ---- */
 

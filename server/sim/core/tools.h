@@ -36,10 +36,10 @@ typedef struct pal_contact_patch {
 /* one tool during a step. `here` moves linearly from `last` to `next` over the sub-steps, so that a fast tool sweeps */
 typedef struct pal_tool {
     double radius_m, force_cap_N;
-    bool present;        /* somebody holds it                                              */
-    double ramp;         /* 0..1: rises in 10 steps after a tool appears, falls when it is let go; scales its forces */
-    pal_pose next, last; /* pose asked for at the end of this step, pose at the end of the step before   */
-    double here_m[3];    /* position at the end of the current sub-step                                  */
+    bool present; /* somebody holds it                                              */
+    double ramp;  /* 0..1: rises in PAL_BLEND_TOOL_S after a tool appears, falls when it is let go; scales its forces */
+    pal_pose next, last;    /* pose asked for at the end of this step, pose at the end of the step before   */
+    double here_m[3];       /* position at the end of the current sub-step                                  */
     double velocity_m_s[3]; /* of `here`                                                                    */
     bool grasp;             /* bit 0 of next.buttons while present                                          */
     double force_N[3];      /* on the tool, this sub-step; CONTACT rows add                                 */
@@ -62,7 +62,7 @@ typedef struct pal_tools {
 bool pal_pose_ok(const pal_pose *pose, double limit_m);
 /* before a step: take over the pose asked for (NULL: let go), update ramp; the jump of a tool that appears is not swept
  */
-void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose);
+void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose, double dt_s);
 /* before sub-step `sub` of `n_sub`: here, velocity, zero force */
 void pal_tools_begin_substep(pal_tools *tools, int sub, int n_sub, double dt_s);
 /* after the step: mean force, last = next */

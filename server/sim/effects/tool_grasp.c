@@ -312,7 +312,6 @@ static void transfer(void *self, const pal_body *body, const void *before, const
             pal_copy3(h->hold, b->offset);
             h->k_N_m = b->implicit ? b->implicit->k_N_m : 0;
         }
-        h->evenly = g->adaptive != NULL;
         leave(g, b, h->force_N, by);
         g->closed = h->due = g->n_node > 0;
     }

@@ -18,8 +18,8 @@
  * A body that adapts (sim/adaptive_surface.h) has a solver that holds loads over a sub-step (rk4), so that they lag by
  * dt/2. With f = k (d - dt v_away), the nodes' own velocity and alpha 0.5, b = a is beyond a/2, which makes up for the
  * lag, and a + b <= 1: tissue that comes in is stopped and not thrown back. When other triangles are drawn, contact
- * changes at once, as a finer surface bulges where the coarse one was flat: `ease` then falls so far that the force
- * does not rise in that moment, and grows again in EASE_S.
+ * changes at once, as a finer surface bulges where the coarse one was flat: `ramp` then falls so far that the force
+ * does not rise in that moment, and grows again in PAL_BLEND_CONTACT_S.
  *
  * Where points carry the nodes (pal_body.embed) k is that of implicit solvers below, and central_cg is told in time
  * what the points near a tool want (pal_effect.wanted), so that its sub-steps allow it. Beyond that alpha is 0.3; the
@@ -35,6 +35,7 @@
 #include "server/base/vec3.h"
 #include "server/sim/contact/push.h"
 #include "server/sim/contact/tuning.h"
+#include "server/sim/core/blend.h"
 
 #include <math.h>
 #include <string.h>
@@ -175,7 +176,6 @@ static void begin_tool(pal_push *push, pal_tool_contact *h, const pal_tool *tool
         pal_tool_contact_end_blend(h);
         h->ramp = 0, body->safeguards.n_tool_reset++;
     }
-    if (!body->active) h->ramp = fmin(1, h->ramp + 1.0 / CONTACT_RAMP_STEPS);
     double reach = tool->radius_m + pal_push_near_m(push, tool->radius_m);
     pal_copy3(h->limits.a, h->proxy.x), pal_copy3(h->limits.b, next);
     h->limits.radius_m = tool->radius_m;
@@ -213,7 +213,8 @@ static void approach(pal_push *push, pal_tool_contact *h, pal_tool *tool, pal_st
     pal_sub3(here, tool->here_m, step->body->offset_m);
     pal_tool_contact_blend(h, step, tool, here);
     pal_copy3(h->total, h->hold.now_N);
-    h->limits.max_rise_m = push->clamp_S * step->body->length_scale_m / step->n_sub;
+    h->ramp = pal_blend_toward(h->ramp, 1, step->dt_s, PAL_BLEND_CONTACT_S);
+    h->limits.max_rise_m = push->clamp_S * step->body->length_scale_m * (step->dt_s / FRAME_S);
     h->limits.tool_move_length_m = pal_norm3(tool->velocity_m_s) * step->dt_s;
     if (push->regime->hold_back) push->regime->hold_back(h, here);
     size_t used = pal_arena_used(step->scratch);

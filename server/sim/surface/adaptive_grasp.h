@@ -8,17 +8,16 @@
  * in between the ends of the coarser one's edges go on holding. o goes by what the patch's place at rest does, turned
  * as the body was when the grip closed. The force is the same on both sides of a change of nodes, and of k, which goes
  * with the solver's sub-step (a jump at each would shake the tissue): F = k (tool + o + shift - y), and shift fades in
- * PAL_GRASP_SHIFT_S, after which the force is that of the new patch and k.
+ * PAL_BLEND_GRASP_NODES_S, after which the force is that of the new patch and k.
  * Memory: the caller's, but for `known`, which is heap. Thread: [sim]. */
 #ifndef PAL_SIM_SURFACE_ADAPTIVE_GRASP_H
 #define PAL_SIM_SURFACE_ADAPTIVE_GRASP_H
 #include "server/sim/core/body.h"
 
-#define PAL_GRASP_SHIFT_S 0.15
-
 typedef struct pal_adaptive_grasp {
     double axes[9]; /* from rest to the tool's axes, as the body was turned when the grip closed       */
     double y[3], shift[3], k_N_m, dt_s; /* patch and spring in the sub-step before */
+    double left_s;                      /* of the fade of shift                       */
     double moved[3];                    /* o since then, in the tool's axes        */
     bool retriangulated;                /* other nodes since then                  */
     /* of all vertices of a finer surface before, until its levels are back [n_known] */
