@@ -145,7 +145,7 @@ if [ -z "$fast" ]; then
         # ranks of MPI and the whole of torture are the release build's (lab has its code), and so are headers alone and
         # tables, of which a sanitizer sees nothing
         [ ! -e "$build/built_asan" ] ||
-            compute asan -LE 'waits|accuracy|bench' -E '^house/(test_calibrate_mpi|test_torture|test_study_records|headers|hard_cases|test_hard_table)$'
+            compute asan -LE 'waits|accuracy|bench' -E '^house/(test_calibrate_mpi|test_robustness|test_study_records|headers|hard_cases|test_hard_table)$'
         [ ! -e "$build/built_tsan" ] || compute tsan -LE 'waits|one_thread|same_threads' -R "^($(echo $threads | tr ' ' '|'))/"
     } &
     built asan && waits asan
