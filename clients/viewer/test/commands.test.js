@@ -7,16 +7,28 @@ import { commandOf, cutCommand, PAINTS, TOOLS } from "../src/sculpt_commands.js"
 
 const NET = new URL("../../../server/net/", import.meta.url);
 
-/** arguments by verb, from the tables {"verb", "required | optional"} of server/net */
-const verbs = new Map(
-    readdirSync(NET)
-        .filter((name) => name.endsWith(".c"))
-        .flatMap((name) => [...readFileSync(new URL(name, NET), "utf8").matchAll(/\{"([a-z_]+)", "([\w |]*)"/g)])
-        .map(([, verb, args]) => {
-            const [required, optional = ""] = args.split("|");
+/** arguments by verb, from the tables {"verb", "required | optional", …} of server/net @returns {Map<string, {required: string[], optional: string[]}>} */
+function parseVerbs() {
+    const sources = readdirSync(NET).filter((name) => name.endsWith(".c"));
+    const text = sources.map((name) => readFileSync(new URL(name, NET), "utf8")).join("\n");
+    // a list of arguments is a sequence of string literals and of macros that stand for some
+    const macros = new Map(
+        [...text.matchAll(/#define (\w+)\s+(.*"[\w |]*".*)/g)].map(([, name, value]) => [name, value]),
+    );
+    const expand = (/** @type {string} */ value) =>
+        [...value.matchAll(/"([\w |]*)"|(\w+)/g)]
+            .map(([, literal, macro]) => literal ?? expand(macros.get(macro) ?? ""))
+            .join("");
+    const rows = text.matchAll(/\{"([a-z_]+)",\s+((?:"[\w |]*"|[A-Z]+)(?:\s+"[\w |]*")*)[,}]/g);
+    return new Map(
+        [...rows].map(([, verb, args]) => {
+            const [required, optional = ""] = expand(args).split("|");
             return [verb, { required: required.match(/\w+/g) ?? [], optional: optional.match(/\w+/g) ?? [] }];
         }),
-);
+    );
+}
+
+const verbs = parseVerbs();
 
 /** @param {string} verb @param {Record<string, number>} args */
 function check(verb, args) {
@@ -61,4 +73,19 @@ test("the accuracy panel switches by a point of the study and by the arguments o
     check("study_point", { index: 3 });
     for (const near of [{ size: 24 }, { step_ms: 8.5 }, { tolerance: 1e-6 }])
         check("configure", neighbourArgs({ parameter: "resolution", label: "", ...near }) ?? {});
+});
+
+test("every verb in the sources of the page is one of the server", () => {
+    const read = (/** @type {URL} */ folder, /** @type {string} */ ending) =>
+        readdirSync(folder)
+            .filter((name) => name.endsWith(ending))
+            .map((name) => readFileSync(new URL(name, folder), "utf8"))
+            .join("\n");
+    const page = read(new URL("../src/", import.meta.url), ".js").replace(/verb: "text"/g, "");
+    const sent = [...page.matchAll(/verb: "([a-z_]+)"|this\.command\((.*)\)/g)].flatMap(([, verb, argument]) =>
+        verb ? [verb] : [...argument.matchAll(/"([a-z_]+)"/g)].map(([, word]) => word),
+    );
+    assert.ok(new Set(sent).size >= 11, `found ${[...new Set(sent)]}`);
+    const server = read(NET, ".c");
+    for (const verb of sent) assert.ok(server.includes(`"${verb}"`), `the server has no verb ${verb}`);
 });
