@@ -138,7 +138,7 @@ const names = new Map(),
     folders = new Map();
 for (const file of files) {
     const name = path.basename(file);
-    if (name === "main.c") continue;
+    if (name === "main.c" || name === "tuning.h") continue; // each program has one, each room may have one
     if (names.has(name)) fault(file, `the name stands more than once in the tree: ${names.get(name)}`);
     names.set(name, file);
     if (/_parts\.h$/.test(name))
