@@ -2,13 +2,14 @@
  * rotation leave alone, analytic values, shapes without a direction. */
 #include "server/sim/springs/spring_constraint.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 
 static const pal_spring_kind kinds[] = {PAL_SPRING_DISTANCE, PAL_SPRING_AREA, PAL_SPRING_VOLUME};
 static uint64_t seed = 3;
 
 static double uniform(void) /* in [-1, 1) */
 {
-    return check_random(&seed);
+    return random_signed(&seed);
 }
 
 typedef struct spring {

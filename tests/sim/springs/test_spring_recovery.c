@@ -6,6 +6,7 @@
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 #include "tests/fixtures/boxes.h"
+#include "tests/fixtures/random.h"
 
 static uint64_t seed;
 static pal_diagnostic diag;
@@ -32,7 +33,7 @@ static void fold(box_bench *b, double from_m)
         double *x = b->body->x + 3 * i;
         if (b->body->support[i] || b->body->x_rest[3 * i] < from_m) continue;
         x[0] = 2 * from_m - x[0];
-        for (int c = 0; c < 3; c++) x[c] += 0.002 * (check_random01(&seed) - 0.5);
+        for (int c = 0; c < 3; c++) x[c] += 0.002 * (random_unit(&seed) - 0.5);
     }
     pal_world_invalidate_limits(b->world, 0);
 }
@@ -66,7 +67,7 @@ static void forces_of_regions_are_the_gradient_of_their_energy(void)
     double worst = 0, most = 0;
     for (int i = 0; i < 3 * b.body->n_dof; i++) most = fmax(most, fabs(b.body->f[i]));
     for (int k = 0; k < 12; k++) {
-        int i = (int)(check_random01(&seed) * 3 * b.body->n_dof);
+        int i = (int)(random_unit(&seed) * 3 * b.body->n_dof);
         const double x = b.body->x[i], way = 1e-7;
         b.body->x[i] = x + way;
         double up = pal_spring_recovery_energy(t, edges_of(&b), b.body);
@@ -90,7 +91,7 @@ static void regions_have_no_net_force_or_torque_and_only_take_energy(void)
     double force[3] = {0, 0, 0}, moment[3] = {0, 0, 0}, size = 0, arm = 0, power = 0;
     forces(&b);
     for (int i = 0; i < b.body->n_dof; i++)
-        for (int c = 0; c < 3; c++) b.body->v[3 * i + c] = check_random01(&seed) - 0.5;
+        for (int c = 0; c < 3; c++) b.body->v[3 * i + c] = random_unit(&seed) - 0.5;
     for (int i = 0; i < b.body->n_dof; i++) power -= pal_dot3(b.body->f + 3 * i, b.body->v + 3 * i);
     forces(&b);
     for (int i = 0; i < b.body->n_dof; i++) {

@@ -7,6 +7,7 @@
 #include "tests/check.h"
 #include "tests/fixtures/boxes.h"
 #include "tests/fixtures/largest_frequency.h"
+#include "tests/fixtures/random.h"
 #include "tests/stability/hard_case.h"
 
 static pal_diagnostic diag;
@@ -14,7 +15,7 @@ static uint64_t seed;
 
 static double uniform(void) /* in [-1, 1) */
 {
-    return check_random(&seed);
+    return random_signed(&seed);
 }
 
 /* a free box with every FORCE effect there is, springs damped too, at rest */
