@@ -292,8 +292,8 @@ static void memory_of_the_world_keeps_to_its_bound(void)
             /* a hundredth less than it takes is refused, with what it takes and what it may */
             CHECK_INT(make_within(&s, levels, tools, 0.99 * whole), PAL_ERR_BUDGET);
             double needs = 0, may = 0;
-            const char *text = strstr(s.diag.text, "what is shown ");
-            CHECK(text && sscanf(text, "what is shown %lf MiB, the budget is %lf MiB", &needs, &may) == 2);
+            const char *text = strstr(s.diag.text, "tools and display ");
+            CHECK(text && sscanf(text, "tools and display %lf MiB, the budget is %lf MiB", &needs, &may) == 2);
             CHECK_NEAR(needs, whole + 0.0625, 0.0625 + 1e-3 * whole);
             CHECK_NEAR(may, 0.99 * whole, 1e-3 * whole);
             CHECK(!strncmp(s.diag.text, "body \"shell\" model: ", 20) && !s.world);
