@@ -3,7 +3,9 @@
  * slow. Thread: one at a time. */
 #ifndef PAL_ESTIMATE_REST_SOLUTION_H
 #define PAL_ESTIMATE_REST_SOLUTION_H
-#include "server/estimate/estimation.h"
+#include "server/estimate/estimate.h"
+
+#include <stdatomic.h>
 
 typedef struct pal_rest_solution {
     pal_scene *scene;

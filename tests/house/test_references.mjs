@@ -89,18 +89,18 @@ function faults_of(file, text) {
     const parts = split_source(file, text);
     const prose = pages(parts.comment),
         page = file.endsWith(".md");
-    const said = page ? prose : prose + "\n" + pages(parts.string); // strings: papers only
+    const text_of = page ? prose : prose + "\n" + pages(parts.string); // strings: papers only
     const place = (at) => (at > prose.length ? at - prose.length - 1 : at);
     // papers
-    for (const m of said.matchAll(/\bpaper ([A-Z])\b(?:'s)?(?:,? (\d[\d.]*\d|\d))?/g)) {
+    for (const m of text_of.matchAll(/\bpaper ([A-Z])\b(?:'s)?(?:,? (\d[\d.]*\d|\d))?/g)) {
         if (!papers[m[1]]) add(place(m.index), m[0], "there is no such paper");
         else if (m[2]) add(place(m.index), m[0], `say "paper ${m[1]} section ${m[2]}"`);
     }
-    for (const m of said.matchAll(new RegExp(`\\bpaper ([ABC])(?:'s)?,? \\(?${part.source}`, "g"))) {
+    for (const m of text_of.matchAll(new RegExp(`\\bpaper ([ABC])(?:'s)?,? \\(?${part.source}`, "g"))) {
         const why = paper_fault(m[1].toUpperCase(), m[2], m[3]);
         if (why) add(place(m.index), m[0], why);
     }
-    for (const m of said.matchAll(new RegExp(`${part.source} of paper ([ABC])\\b`, "g"))) {
+    for (const m of text_of.matchAll(new RegExp(`${part.source} of paper ([ABC])\\b`, "g"))) {
         const why = paper_fault(m[3], m[1], m[2]);
         if (why) add(place(m.index), m[0], why);
     }

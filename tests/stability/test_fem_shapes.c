@@ -193,7 +193,7 @@ static void a_pressed_body_is_not_straightened(void)
     REQUIRE(!pal_world_load(b.world, 0, node, (double[3]){-force_N, -force_N, -force_N}));
     for (int i = 0; i < 300; i++) {
         REQUIRE(!pal_world_step(b.world, 1.0 / 60));
-        REQUIRE(!hard_hex_row(&b)->split->straight);
+        REQUIRE(!hard_hex_row(&b)->split->single_rotation);
     }
     CHECK(hard_inverted(&b) > 0);
     CHECK(b.body->safeguards.n_inversion > 200);

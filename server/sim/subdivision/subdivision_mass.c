@@ -39,7 +39,7 @@ static void weigh(const pal_subdivision_solid *solid, pal_cell_kind kind, int el
 
 /* ---- the pattern ---- */
 
-/* points of an element's nodes, each once, into list; local [n_point] is -1 for all others and says where they are */
+/* points of an element's nodes, each once, into list; local [n_point] is -1 for all others else the place in it */
 static int gather_points(const pal_subdivision_solid *solid, pal_cell_kind kind, int element, int32_t *list,
                          int32_t *local)
 {

@@ -16,7 +16,7 @@ static double uniform(void) /* in [-1, 1) */
     return random_signed(&seed);
 }
 
-/* 4 x 3 x 2 voxels of 1 cm, held nowhere, with area springs unless without */
+/* 4 x 3 x 2 voxels of 1 cm, without supports, with area springs unless without */
 typedef struct bench {
     pal_prepared box;
     pal_scene *scene;
