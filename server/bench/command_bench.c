@@ -1,6 +1,6 @@
 /* `palpate bench NAME`: dispatch. */
 #include "server/bench/bench.h"
-#include "server/cli/report.h"
+#include "server/cli/flags.h"
 
 #include <stdio.h>
 #include <string.h>

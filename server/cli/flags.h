@@ -16,6 +16,7 @@
 #ifndef PAL_CLI_FLAGS_H
 #define PAL_CLI_FLAGS_H
 #include "server/cli/config.h"
+#include "server/cli/report.h"
 
 #include <stdbool.h>
 
@@ -35,11 +36,6 @@ typedef struct pal_flag {
     double low, high; /* range of a number; the refusal names it                  */
     const char *help; /* one or more lines (\n) of the manual                     */
 } pal_flag;
-
-typedef struct pal_flag_common {
-    bool json, quiet;
-    const char *command; /* for messages: argv[0] */
-} pal_flag_common;
 
 typedef struct pal_flag_table {
     const char *usage, *about; /* "prepare IN -o DIR [flags]"; paragraphs of the manual, each ends with \n */

@@ -7,7 +7,7 @@
 #include "server/base/team.h"
 #include "server/calibrate/calibrate_cases.h"
 #include "server/calibrate/calibrate_journal.h"
-#include "server/cli/report.h"
+#include "server/cli/flags.h"
 #include "server/num/anneal.h"
 #include "server/scene/scene_file.h"
 

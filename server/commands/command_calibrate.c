@@ -2,6 +2,7 @@
  * its error (paper B section 3). */
 #include "server/base/clock.h"
 #include "server/calibrate/calibrate_run.h"
+#include "server/cli/flags.h"
 #include "server/commands/commands.h"
 
 #include <errno.h>

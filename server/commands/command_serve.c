@@ -3,7 +3,7 @@
  * its own because two forged datagrams can crash any LCM subscriber. */
 #include "server/base/clock.h"
 #include "server/base/log.h"
-#include "server/cli/report.h"
+#include "server/cli/flags.h"
 #include "server/commands/commands.h"
 #include "server/commands/preflight_report.h"
 #include "server/mesh/files/mesh_file.h"

@@ -3,7 +3,7 @@
  * the most accurate in a time, is reported and written as a scene. */
 #include "server/base/clock.h"
 #include "server/base/machine.h"
-#include "server/cli/report.h"
+#include "server/cli/flags.h"
 #include "server/commands/commands.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/study/studied_scene.h"
