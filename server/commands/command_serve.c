@@ -8,6 +8,7 @@
 #include "server/commands/preflight_report.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/net/server.h"
+#include "server/net/verb_table.h"
 #include "server/scene/scene_arg.h"
 #include "server/study/studied_scene.h"
 
@@ -388,12 +389,21 @@ static const char about[] =
     "input\n"
     "a computed organ. Prints the address to open. Ends on SIGINT or SIGTERM, or after --seconds.\n";
 
+static int print_protocol(void)
+{
+    static char text[8192];
+    int n = pal_verb_describe(pal_verb_table, pal_verb_count, text, sizeof text);
+    if (n >= (int)sizeof text) return 1;
+    fputs(text, stdout);
+    return 0;
+}
+
 int command_serve(int argc, char **argv)
 {
     static serve_run run; /* too large for the stack */
     const char *input[MAX_SESSIONS], *unit = NULL;
     int n_input = 0, resolution = 0, label = -1;
-    bool largest_only = false;
+    bool largest_only = false, help_protocol = false;
     pal_diagnostic diag = {""};
     const pal_flag flag[] = {
         {"--units", "UNIT", PAL_FLAG_TEXT, &unit, 0, 0, "unit of surfaces: m, cm, mm, um, in (guessed from the size)"},
@@ -403,6 +413,8 @@ int command_serve(int argc, char **argv)
         {"--largest", NULL, PAL_FLAG_SWITCH, &largest_only, 0, 0,
          "keep the largest of several components of a surface or of cells only (see palpate prepare --help)"},
         {"--seconds", "S", PAL_FLAG_NUMBER, &run.seconds, 0.1, 1e9, "end after so long (a signal ends it)"},
+        {"--help-protocol", NULL, PAL_FLAG_SWITCH, &help_protocol, 0, 0,
+         "print the commands that clients may give: name, who, numbers, what it does"},
     };
     const pal_flag_table table = {.usage = "serve [SCENE.json | SURFACE | LABEL VOLUME | CELLS]... [flags]",
                                   .about = about,
@@ -418,6 +430,7 @@ int command_serve(int argc, char **argv)
                                   .config = &run.config};
     int code = pal_flags_parse(&table, argc, argv, &run.common, input, &n_input);
     if (code >= 0) return code;
+    if (help_protocol) return print_protocol();
     pal_log_set_level(run.common.quiet ? PAL_LOG_ERROR : pal_config_log_level(&run.config));
     run.surface = (pal_surface_scene){.resolution = resolution,
                                       .label = label,

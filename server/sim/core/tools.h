@@ -39,7 +39,8 @@ typedef struct pal_contact_patch {
 typedef struct pal_tool {
     double radius_m, force_cap_N;
     bool present; /* a member holds it                                              */
-    double ramp;  /* 0 to 1, scales its forces: rises in 10 steps after the tool appears, falls when it is released */
+    double ramp;  /* 0 to 1, scales its forces: rises over PAL_BLEND_TOOL_S once the tool appears, falls when it is
+                     released */
     pal_pose next, last;    /* requested pose at the end of this step, pose at the end of the last one      */
     double here_m[3];       /* position at the end of the current sub-step                                  */
     double velocity_m_s[3]; /* of `here`                                                                    */
@@ -62,8 +63,9 @@ typedef struct pal_tools {
 /* is every number finite, the position within reach of limit_m, the velocity at most 1000 limit_m a second, the
  * quaternion near unit? (poses are untrusted) */
 bool pal_pose_ok(const pal_pose *pose, double limit_m);
-/* before a step: takes the requested pose (NULL: released) and updates the ramp; a tool that appears does not sweep its path */
-void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose);
+/* before a step: takes the requested pose (NULL: released) and updates the ramp; a tool that appears does not sweep its
+ * path */
+void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose, double dt_s);
 /* before sub-step `sub` of `n_sub`: sets here_m and velocity, clears the force */
 void pal_tools_begin_substep(pal_tools *tools, int sub, int n_sub, double dt_s);
 /* after the step: mean force, last = next */

@@ -20,6 +20,7 @@
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
+#include "server/sim/core/step_guard.h"
 #include "server/sim/surface/active_nodes.h"
 
 #include <string.h>
@@ -64,7 +65,7 @@ typedef struct rk4 {
     double *at, *still, *force; /* the body's x, v and f while it looks [n_dof][3]; NULL: no shell */
 } rk4;
 
-static const double max_move_h = 0.2, max_move_S = 0.2, radius = 2.7;
+static const double radius = 2.7;
 /* row sums are hardly ever more than `most_over` times too high, nor `more` times more so than they were last */
 static const double most_over = 1.6, more = 1.05;
 /* sub-steps between Lanczos' bounds, and iterations for one, a gather each */
@@ -144,32 +145,16 @@ static pal_err find_forces(const rk4 *row, pal_step *step)
 
 /* ---- the limit ---- */
 
-static void add_bounds(rk4 *row, const pal_component *rows, int n, const pal_body *body)
-{
-    for (int i = 0; i < n; i++) {
-        const pal_effect *effect = rows[i].effect;
-        if (effect->stiffness) effect->stiffness(rows[i].self, body, row->stiff);
-        if (effect->damping && !effect->drag) effect->damping(rows[i].self, body, row->damp);
-    }
-}
-
-/* contact comes and goes between steps without any node moving */
-static bool has_bounds(const pal_component *rows, int n)
-{
-    for (int i = 0; i < n; i++)
-        if (rows[i].effect->stiffness || rows[i].effect->damping) return true;
-    return false;
-}
-
 /* does the bound taken last still hold? */
 static bool still_known(const rk4 *row, const pal_step *step)
 {
     const pal_body *body = step->body;
     /* not finite is not known */
-    if (!row->known || row->revision != body->revision || !(row->way_m <= max_move_h * body->edge_m)) return false;
+    if (!row->known || row->revision != body->revision || !(row->way_m <= PAL_GUARD_RECHECK * body->edge_m))
+        return false;
     if (body->active && (row->ramp[0] != *body->dofs.ramp[0] || row->ramp[1] != *body->dofs.ramp[1])) return false;
     if (body->active && !row->sharp_known && row->n_since >= PAUSE) return false;
-    return step->sub != 0 || !has_bounds(step->contact, step->n_contact);
+    return step->sub != 0 || !pal_guard_has_bounds(step->contact, step->n_contact);
 }
 
 /* row sums of stiffness over mass at free nodes, the most of them */
@@ -343,7 +328,7 @@ static double bound_force(rk4 *row, pal_step *step, double most)
     const pal_body *body = step->body;
     /* looked at from outside, nothing moves: the world asks at rest with places that are no body's */
     if (!body->active || body->x == body->x_rest) return most;
-    bool moved = row->revision != body->revision || !(row->way_m <= max_move_h * body->edge_m);
+    bool moved = row->revision != body->revision || !(row->way_m <= PAL_GUARD_RECHECK * body->edge_m);
     row->sharp_known &= !moved;
     if (!row->sharp_known && row->n_since >= PAUSE) {
         if (would_help(row, most))
@@ -356,28 +341,19 @@ static double bound_force(rk4 *row, pal_step *step, double most)
     return fmin(most, grown * row->sharp2);
 }
 
-/* true: something runs on what untangles it */
-static bool recover(pal_step *step)
-{
-    unsigned seen = 0;
-    for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->recover) seen |= step->force[i].effect->recover(step->force[i].self, step);
-    return seen & PAL_INVERTED;
-}
-
 static double limit(void *self, pal_step *step)
 {
     rk4 *row = self;
     const pal_body *body = step->body;
     if (!(step->sub == 0 && row->has_inversion) && still_known(row, step)) return row->limit_s;
-    row->has_inversion = recover(step);
+    row->has_inversion = pal_guard_recover(step) & PAL_INVERTED;
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         row->stiff[i] = row->damp[i] = 0;
     }
-    add_bounds(row, step->contact, step->n_contact, body);
+    pal_guard_add_bounds(step->contact, step->n_contact, body, row->stiff, row->damp);
     double contact2 = most_stiff(row, body);
-    add_bounds(row, step->force, step->n_force, body);
+    pal_guard_add_bounds(step->force, step->n_force, body, row->stiff, row->damp);
     /* the largest of omega^2 and c */
     double most2 = most_stiff(row, body), most = 0;
     row->limit_s = one_if_finite(row, body);
@@ -397,14 +373,6 @@ static double limit(void *self, pal_step *step)
 }
 
 /* ---- a sub-step ---- */
-
-static double drag_rate(const pal_step *step)
-{
-    double rate = 0;
-    for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->drag) rate += step->force[i].effect->drag(step->force[i].self);
-    return rate;
-}
 
 /* phi_1, phi_2, phi_3 of -z, z >= 0: phi_k = sum over n of (-z)^n / (n + k)!. Series and doubling instead of exp, for
  * the same bits with every library */
@@ -558,7 +526,7 @@ static pal_err run(void *self, pal_step *step)
 {
     rk4 *row = self;
     pal_body *body = step->body;
-    const rates r = find_rates(step->dt_s, drag_rate(step));
+    const rates r = find_rates(step->dt_s, pal_guard_drag_1_s(step->force, step->n_force));
     step->drag_separate = true;
     take_body(row, step);
     take_masses(row, body, &r, step->heavy);
@@ -569,7 +537,7 @@ static pal_err run(void *self, pal_step *step)
     PAL_TRY(find_forces(row, step));
     stage_third(row, body, &r);
     PAL_TRY(find_forces(row, step));
-    double way = sqrt(stage_last(row, body, &r)), most = max_move_S * body->length_scale_m;
+    double way = sqrt(stage_last(row, body, &r)), most = pal_guard_max_move_m(body);
     if (way > most) {
         uint64_t before = pal_clock_ns();
         clamp_moves(row, body, step->dt_s, most);

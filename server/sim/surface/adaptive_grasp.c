@@ -2,6 +2,7 @@
 #include "server/sim/surface/adaptive_grasp.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/core/blend.h"
 #include "server/sim/surface/adaptive_surface.h"
 
 #include <math.h>
@@ -106,8 +107,7 @@ void pal_adaptive_grasp_renew(pal_adaptive_grasp *l, const double was[3], const 
 void pal_adaptive_grasp_goal(pal_adaptive_grasp *l, const double quat[4], const double y[3], const double v[3],
                              double k_N_m, double dt_s, double goal[3])
 {
-    double fade = fmax(0, 1 - dt_s / PAL_GRASP_SHIFT_S);
-    pal_scale3(l->shift, fade, l->shift);
+    pal_scale3(l->shift, pal_blend_release(&l->left_s, dt_s), l->shift);
     if (k_N_m > 0 && l->k_N_m > 0 && (l->retriangulated || k_N_m != l->k_N_m)) {
         /* extension of the previous spring now */
         double was[3], moved[3];
@@ -118,6 +118,7 @@ void pal_adaptive_grasp_goal(pal_adaptive_grasp *l, const double quat[4], const 
             pal_sub3(was, was, l->y), pal_axpy3(was, -l->dt_s, v);
         }
         for (int c = 0; c < 3; c++) l->shift[c] = l->k_N_m / k_N_m * was[c] - (goal[c] - y[c]);
+        l->left_s = PAL_BLEND_GRASP_NODES_S;
     }
     if (!pal_finite3(l->shift)) pal_set3(l->shift, 0, 0, 0);
     pal_add3(goal, goal, l->shift);

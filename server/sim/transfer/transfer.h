@@ -53,7 +53,7 @@ typedef struct pal_transfer_report {
      */
     double max_move_m, body_move_m;
     /* farthest that a shown vertex goes from one frame to the next because of the switch: what is shown begins where it
-     * was and is let go over PAL_BLEND_STEPS steps (blend_component.h). Without memory for that: as far as the body
+     * was and is let go over PAL_BLEND_TRANSFER_S (blend_component.h). Without memory for that: as far as the body
      * moves */
     double frame_move_m;
     int n_smooth; /* rounds of smoothing that it took */
@@ -67,8 +67,8 @@ pal_err pal_transfer_make(const pal_scene *from, const pal_scene *to, int body, 
                           pal_transfer **out);
 void pal_transfer_free(pal_transfer *transfer); /* NULL is fine */
 /* `next`, a new world of `to`, goes on where `before`, one of `from`, is. Both stand still; the forces in before are
- * worked out anew, its state is as it was. Deterministic. Heap memory for row `ease`; where there is none, the forces
- * change at once. [sim] */
+ * worked out anew, its state is as it was. Deterministic. Heap memory for component `blend`; where there is none, the
+ * forces change at once. [sim] */
 void pal_transfer_apply(pal_transfer *transfer, pal_world *next, const pal_world *before, pal_transfer_report *out);
 
 /* Most of a carry's time goes into smoothing what was interpolated. That part can be rehearsed while the old world goes

@@ -172,7 +172,7 @@ static void pressure_comes_in_within_its_ramp_and_again_after_a_reset(void)
             shell_row_run(&r, times[i]);
             size[i] = shell_row_largest(&r);
         }
-        for (int i = 0; i < 5; i++) CHECK_NEAR(size[i] / size[5], 0.5 * (1 - cos(M_PI * times[i] / 0.5)), 1e-12);
+        for (int i = 0; i < 5; i++) CHECK_NEAR(size[i] / size[5], times[i] / 0.5, 1e-12);
         blow(&r, 1.1);
         CHECK(shell_row_energy(&r) < 0);
         r.effect->reset(r.self, &r.body);

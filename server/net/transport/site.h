@@ -3,10 +3,10 @@
  * A path is served only when every segment is made of [A-Za-z0-9@._-] and does not begin with a dot, when the file lies
  * inside the folder after all links are followed, and when its type is one of those declared. "/" is "/index.html". A
  * file that has changed on disk is read again. At most 16 MiB a file, 64 MiB in all. Thread: [net]. */
-#ifndef PAL_NET_SITE_H
-#define PAL_NET_SITE_H
+#ifndef PAL_NET_TRANSPORT_SITE_H
+#define PAL_NET_TRANSPORT_SITE_H
 #include "server/base/err.h"
-#include "server/net/packet.h"
+#include "server/net/transport/packet.h"
 
 typedef struct pal_site pal_site;
 

@@ -1,8 +1,8 @@
 /* The one loop of the network thread: sockets (one libwebsockets context), a due time, a regular tick, and the wake
  * from other threads. Without sockets the loop is driven by hand with a time of the caller's choosing: that is what
  * mem:// uses, so its tests are deterministic. Thread: [net] unless said otherwise. */
-#ifndef PAL_NET_LOOP_H
-#define PAL_NET_LOOP_H
+#ifndef PAL_NET_TRANSPORT_LOOP_H
+#define PAL_NET_TRANSPORT_LOOP_H
 #include "server/base/err.h"
 
 #include <stdbool.h>

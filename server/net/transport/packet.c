@@ -1,5 +1,5 @@
 /* Packets are one heap block each: head, room for a road's header, bytes. */
-#include "server/net/packet.h"
+#include "server/net/transport/packet.h"
 
 #include <stdlib.h>
 #include <string.h>

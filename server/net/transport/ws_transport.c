@@ -8,7 +8,7 @@
  * be a loopback name as well, so that no foreign name that resolves here reaches the server (DNS rebinding). */
 #include "protocol/control.h"
 #include "server/base/log.h"
-#include "server/net/transport.h"
+#include "server/net/transport/transport.h"
 
 #include <arpa/inet.h>
 #include <errno.h>

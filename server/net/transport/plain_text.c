@@ -1,5 +1,5 @@
 /* One walk over the bytes; the ranges are those of RFC 3629. */
-#include "server/net/plain_text.h"
+#include "server/net/transport/plain_text.h"
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -4,8 +4,8 @@
  * A round trip counts for K only when the cycle was sent with none before it in flight: a client slower than the
  * cycles lets them wait, and a K taken from that wait makes it longer still, up to the clamp. So that there is always
  * such a cycle, one is sent alone at intervals. */
-#ifndef PAL_NET_CREDIT_H
-#define PAL_NET_CREDIT_H
+#ifndef PAL_NET_TRANSPORT_CREDIT_H
+#define PAL_NET_TRANSPORT_CREDIT_H
 #include <stdbool.h>
 #include <stdint.h>
 

@@ -1,5 +1,5 @@
 /* Files are kept in a small table; stat decides whether to read again. */
-#include "server/net/site.h"
+#include "server/net/transport/site.h"
 
 #include "protocol/sha256.h"
 

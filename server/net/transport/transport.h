@@ -3,10 +3,10 @@
  * Sending is by pull: the hub says that something waits (ready), the road asks for one message (next) each time the
  * peer can take one. So nothing queues in a road, and what is sent is decided at the last moment: control first, then
  * the newest frame. Thread: [net]. */
-#ifndef PAL_NET_TRANSPORT_H
-#define PAL_NET_TRANSPORT_H
-#include "server/net/loop.h"
-#include "server/net/packet.h"
+#ifndef PAL_NET_TRANSPORT_TRANSPORT_H
+#define PAL_NET_TRANSPORT_TRANSPORT_H
+#include "server/net/transport/loop.h"
+#include "server/net/transport/packet.h"
 
 typedef struct pal_transport pal_transport;
 typedef struct pal_transport_ops pal_transport_ops;

@@ -1,7 +1,7 @@
 /* Credit and token bucket. The smallest round trip is kept over two windows of 10 s, so that one that has grown for
  * good (another network) is believed after at most 20 s. At the end of each window one cycle goes alone. The first
  * window is of 1 s, since a client is slow while it loads. */
-#include "server/net/credit.h"
+#include "server/net/transport/credit.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,8 +1,8 @@
 /* mem://: peers inside the process, for tests. Nothing moves by itself: the test sends, pulls and turns the loop, so a
  * run is the same every time. A peer that is not pulled is a stalled client. Thread: [net], the test's. */
-#ifndef PAL_NET_MEM_TRANSPORT_H
-#define PAL_NET_MEM_TRANSPORT_H
-#include "server/net/transport.h"
+#ifndef PAL_NET_TRANSPORT_MEM_TRANSPORT_H
+#define PAL_NET_TRANSPORT_MEM_TRANSPORT_H
+#include "server/net/transport/transport.h"
 
 typedef struct pal_mem_peer pal_mem_peer;
 

@@ -1,5 +1,5 @@
 /* What every road shares: how a peer is marked for closing. */
-#include "server/net/transport.h"
+#include "server/net/transport/transport.h"
 
 #include <stdarg.h>
 #include <stdio.h>

@@ -1,7 +1,7 @@
 /* The loop. libwebsockets 4.1.6 facts it rests on (measured): lws_service ignores its timeout and sleeps until a socket
  * or timer is ready; only lws_cancel_service may be called from other threads, it raises EVENT_WAIT_CANCELLED on every
  * protocol of every vhost; a timer callback runs before the sleep of the next lws_service call. */
-#include "server/net/loop.h"
+#include "server/net/transport/loop.h"
 
 #include "server/base/clock.h"
 #include "server/base/log.h"

@@ -1,5 +1,5 @@
 /* mem:// keeps its peers in a list; closing is done at once. */
-#include "server/net/mem_transport.h"
+#include "server/net/transport/mem_transport.h"
 
 #include "protocol/control.h"
 
