@@ -352,9 +352,9 @@ pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_sessi
         room->reference_m = NAN;
         pal_members_init(&room->members, scene->n_tool);
         for (int b = 0; b < scene->n_body; b++) room->material[b] = scene->body[b].material;
-        if (options->setting && options->n_setting[i] > 0) {
+        if (options->setting && options->n_configuration[i] > 0) {
             room->setting = options->setting[i];
-            room->n_setting = options->n_setting[i], room->setting_body = options->setting_body[i];
+            room->n_configuration = options->n_configuration[i], room->setting_body = options->setting_body[i];
             if (options->reference_m) room->reference_m = options->reference_m[i];
         }
         err = pal_stream_open(session[i], options->error_m, diag, &room->stream);

@@ -27,7 +27,7 @@ static void say_study(pal_hub *hub, pal_client *c, int body)
 {
     const pal_hub_room *room = c->room;
     pal_wire_study *study = &hub->control->study;
-    int n = room->setting_body == body ? room->n_setting : 0, n_front = 0;
+    int n = room->setting_body == body ? room->n_configuration : 0, n_front = 0;
     memset(hub->control, 0, sizeof *hub->control);
     hub->control->type = PAL_CONTROL_STUDY;
     pal_plain_text(study->body, sizeof study->body, room->stream->part[body].info.name);
@@ -81,7 +81,7 @@ static int likeness(const pal_configuration *of, const pal_configuration *now)
 static double point_of(const pal_hub_room *room, int body, const pal_configuration *now)
 {
     int best = -1, best_same = -1;
-    for (int i = 0; i < room->n_setting && room->setting_body == body; i++) {
+    for (int i = 0; i < room->n_configuration && room->setting_body == body; i++) {
         int n_same = likeness(&room->setting[i].setting, now);
         if (n_same > best_same) best = i, best_same = n_same;
     }

@@ -68,8 +68,8 @@ typedef struct pal_hub_room {
     bool estimate_requested[PAL_BODY_MAX]; /* the session knows that some do */
     double step_s;                         /* of the scene as it was opened: what all prices are for */
     const pal_measured_configuration
-        *setting; /* what a study found, for body setting_body [n_setting]; NULL: no study */
-    int n_setting, setting_body;
+        *setting; /* what a study found, for body setting_body [n_configuration]; NULL: no study */
+    int n_configuration, setting_body;
     double reference_m; /* the study's reference's own error; NaN: not known */
     bool told_far;      /* that an estimate is beyond what the scene asks for */
     int tier_users[PAL_STREAM_TIER];

@@ -21,8 +21,8 @@ static int read_point(pal_hub *hub, pal_client *c, int body, const pal_wire_comm
                            pal_session_scene(room->session)->body[body].name);
         return -1;
     }
-    if (!(index >= 0 && index < room->n_setting && index == floor(index))) {
-        pal_hub_send_error(hub, c, "args", "study_point: index %g, wanted 0 to %d", index, room->n_setting - 1);
+    if (!(index >= 0 && index < room->n_configuration && index == floor(index))) {
+        pal_hub_send_error(hub, c, "args", "study_point: index %g, wanted 0 to %d", index, room->n_configuration - 1);
         return -1;
     }
     return (int)index;

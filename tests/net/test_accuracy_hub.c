@@ -1,5 +1,5 @@
 /* What accuracy costs over mem://: the study and the estimates come to those who ask, and are there only for them. */
-#include "server/estimate/estimate.h"
+#include "server/estimate/estimator.h"
 #include "tests/net/hub_scene.h"
 #include "tests/net/server_fixture.h"
 
@@ -26,11 +26,13 @@ static void make_points(void)
 static void begin(bool with_study)
 {
     static const pal_measured_configuration *list[1];
-    static int n_setting[1] = {POINTS}, body[1] = {0};
+    static int n_configuration[1] = {POINTS}, body[1] = {0};
     static double reference_m[1] = {3e-4};
     list[0] = setting;
-    pal_server_options net = {
-        .setting = with_study ? list : NULL, .n_setting = n_setting, .setting_body = body, .reference_m = reference_m};
+    pal_server_options net = {.setting = with_study ? list : NULL,
+                              .n_configuration = n_configuration,
+                              .setting_body = body,
+                              .reference_m = reference_m};
     served_begin(&organ.scene, (pal_session_options){0}, net);
 }
 
@@ -45,14 +47,14 @@ static void turn(mem_client *a, mem_client *b)
 static void nothing_is_estimated_while_nobody_looks(void)
 {
     mem_client ada;
-    uint64_t made = pal_estimator_made();
+    uint64_t made = pal_estimator_count();
     begin(true);
     mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     UNTIL(ada.n_text[PAL_CONTROL_STATUS] > 3, &ada, NULL);
     CHECK(ada.last[PAL_CONTROL_HELLO].hello.estimates);
     CHECK_INT(ada.n_text[PAL_CONTROL_STUDY] + ada.n_text[PAL_CONTROL_ESTIMATE], 0);
     CHECK_INT(pal_estimator_threads(), 0);
-    CHECK(pal_estimator_made() == made);
+    CHECK(pal_estimator_count() == made);
     mem_end(&ada);
     end();
 }

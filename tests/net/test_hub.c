@@ -558,8 +558,8 @@ static void a_field_goes_only_to_those_who_ask_and_ends_with_them(void)
     UNTIL(bob.n_field > 0, &ada, &bob);
     mem_text(&ada, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"none\"}");
     for (int i = 0; i < 20; i++) turn(&ada, &bob);
-    int ended = ada.n_field, goes_on = bob.n_field;
-    UNTIL(bob.n_field > goes_on + 3, &ada, &bob);
+    int ended = ada.n_field, may_continue = bob.n_field;
+    UNTIL(bob.n_field > may_continue + 3, &ada, &bob);
     CHECK_INT(ada.n_field, ended);
     mem_end(&bob); /* it goes without a word */
     UNTIL(ada.last[PAL_CONTROL_STATUS].status.n_component == n_row, &ada, NULL);

@@ -1,5 +1,5 @@
 /* Rows and bodies over mem://: what clients are told of the plan, who switches rows, who brings a stopped body back. */
-#include "server/estimate/estimate.h"
+#include "server/estimate/estimator.h"
 #include "tests/net/hub_scene.h"
 #include "tests/net/server_fixture.h"
 
@@ -186,7 +186,7 @@ static void a_body_asleep_is_neither_stepped_nor_encoded(void)
     double component_ms[PAL_WIRE_COMPONENT_MAX];
     memcpy(component_ms, s->component_ms, sizeof component_ms);
     double n_encode = counter("palpate_encodes_total");
-    uint64_t tick = s->tick, made = pal_estimator_made();
+    uint64_t tick = s->tick, made = pal_estimator_count();
     int n_frame = ada.n_frame, n_tools = ada.n_tools;
     UNTIL(s->tick > tick + 80 && ada.n_tools > n_tools + 60, &ada, NULL);
     /* means of the last steps, each of which weighs a fifth: what took nothing for 60 steps is a millionth by now */
@@ -194,7 +194,7 @@ static void a_body_asleep_is_neither_stepped_nor_encoded(void)
     CHECK(s->state[0].asleep);
     CHECK_INT((int)counter("palpate_encodes_total"), (int)n_encode);
     CHECK_INT(ada.n_frame, n_frame);
-    CHECK(pal_estimator_threads() == 0 && pal_estimator_made() == made);
+    CHECK(pal_estimator_threads() == 0 && pal_estimator_count() == made);
     /* a tool comes through its middle */
     const pal_surface *surface = &organ.mesh.surface;
     double at[3] = {surface->x[0], surface->x[1], surface->x[2]};

@@ -2,7 +2,7 @@
  * study and along its knobs, the energy within 2 %, no shown vertex farther in all than the errors that were shown of
  * both settings allow, and the answer says so. Estimates of errors under a press hold what they promise. The carry is
  * made beside the loop, not by it. */
-#include "server/estimate/estimate_work.h"
+#include "server/estimate/estimation.h"
 #include "server/session/configuration_switch.h"
 #include "tests/net/command_room.h"
 #include "tests/session/session_scene.h"
@@ -19,11 +19,11 @@ static double estimate_m[POINTS];
 /* of a running session there */
 static double estimate_of(const pal_scene *at, const pal_world *w)
 {
-    pal_estimate_work *work = NULL;
+    pal_estimation *work = NULL;
     pal_estimate e = {.error_m = NAN};
-    CHECK(!pal_estimate_work_open(at, 0, NULL, NULL, &work));
-    if (work) CHECK(pal_estimate_copy(pal_estimate_work_state(work), w, 0) && pal_estimate_work_run(work, &e));
-    pal_estimate_work_close(work);
+    CHECK(!pal_estimation_open(at, 0, NULL, NULL, &work));
+    if (work) CHECK(pal_estimate_copy(pal_estimation_state(work), w, 0) && pal_estimation_run(work, &e));
+    pal_estimation_close(work);
     return e.error_m;
 }
 
@@ -210,7 +210,7 @@ static void an_old_estimate_bounds_nothing(void)
     send(&c, "estimate", "\"enabled\":1");
     const pal_wire_estimate *e = &c.last[PAL_CONTROL_ESTIMATE].estimate;
     for (int i = 0; i < 4000 && !(e->tick > 0 && e->error_m > 0); i++) wait_steps(&c, 2, true);
-    pal_estimator_hold(true);
+    pal_estimator_pause_all(true);
     /* what was under way at the hold is of a state before it */
     double held_s = c.last[PAL_CONTROL_STATUS].status.sim_time_s, now_s = held_s;
     for (int i = 0; i < 4000 && now_s - held_s < 1.3; i++) {
@@ -222,7 +222,7 @@ static void an_old_estimate_bounds_nothing(void)
     CHECK(e->age_s > 1 && e->error_m > 0);
     CHECK(order(&c, "configure", "\"step_ms\":4"));
     CHECK(isnan(told(&c, "bound_m")) && strstr(c.last[PAL_CONTROL_ANSWER].answer.text, "no bound") != NULL);
-    pal_estimator_hold(false);
+    pal_estimator_pause_all(false);
     mem_end(&c);
     end();
 }

@@ -58,7 +58,7 @@ static void make_pose(void)
     floats("omega", p.omega_rad_s, 3, ",");
     floats("force", p.force_N, 3, ",");
     floats("torque", p.torque_N_m, 3, ",");
-    fprintf(expected, "\"grip\":%.9g,\"buttons\":%u,\"modelSeq\":%u,\"modelAgeUs\":%u,\"modelStampUs\":%llu},\n",
+    fprintf(expected, "\"gripper\":%.9g,\"buttons\":%u,\"modelSeq\":%u,\"modelAgeUs\":%u,\"modelStampUs\":%llu},\n",
             (double)p.grip, p.buttons, p.model_seq, p.model_age_us, (unsigned long long)p.model_stamp_us);
 
     pal_wire_ack a = golden_ack();
@@ -102,7 +102,7 @@ static void make_haptic(void)
             h.tool, h.seq, h.flags, (unsigned long long)h.stamp_us, (unsigned long long)h.echo_stamp_us, h.echo_seq,
             h.hold_us, h.frame_us);
     doubles("origin", h.origin_m, 3, ",");
-    floats("fRef", h.f_ref_N, 3, ",\"grip\":{");
+    floats("fRef", h.f_ref_N, 3, ",\"grasp\":{");
     floats("x0", h.grasp_x0_m, 3, ",");
     floats("f0", h.grasp_f0_N, 3, ",");
     floats("k", h.grasp_k_N_m, 6, ",");

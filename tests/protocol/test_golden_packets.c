@@ -56,7 +56,7 @@ static void pose_and_ack_are_read_and_written_as_committed(void)
         CHECK_NEAR((double)p.torque_N_m[i], element(e, "torque", i), 1e-9);
     }
     for (int i = 0; i < 4; i++) CHECK_NEAR(p.quaternion[i], element(e, "quaternion", i), 0);
-    CHECK_NEAR((double)p.grip, number(e, "grip"), 1e-8);
+    CHECK_NEAR((double)p.grip, number(e, "gripper"), 1e-8);
     CHECK_NEAR(p.buttons, number(e, "buttons"), 0);
     CHECK_NEAR(p.model_seq, number(e, "modelSeq"), 0);
     CHECK_NEAR(p.model_age_us, number(e, "modelAgeUs"), 0);
@@ -113,7 +113,7 @@ static void haptic_model_is_read_and_written_as_committed(void)
     uint8_t *bytes = load("haptic.bin", &n);
     pal_wire_haptic h, wanted = golden_haptic();
     REQUIRE(bytes && pal_wire_get_haptic(bytes, n, &h) == 0);
-    const cJSON *e = cJSON_GetObjectItem(expected, "haptic"), *grip = cJSON_GetObjectItem(e, "grip");
+    const cJSON *e = cJSON_GetObjectItem(expected, "haptic"), *grasp = cJSON_GetObjectItem(e, "grasp");
     CHECK_NEAR(h.tool, number(e, "tool"), 0);
     CHECK_NEAR(h.seq, number(e, "seq"), 0);
     CHECK_NEAR(h.flags, number(e, "flags"), 0);
@@ -121,8 +121,8 @@ static void haptic_model_is_read_and_written_as_committed(void)
     CHECK_NEAR((double)h.echo_stamp_us, number(e, "echoStampUs"), 0);
     CHECK_NEAR(h.frame_us, number(e, "frameUs"), 0);
     for (int c = 0; c < 3; c++) CHECK_NEAR(h.origin_m[c], element(e, "origin", c), 0);
-    for (int c = 0; c < 6; c++) CHECK_NEAR((double)h.grasp_k_N_m[c], element(grip, "k", c), 1e-6);
-    CHECK_NEAR((double)h.grasp_b_N_s_m, number(grip, "b"), 1e-8);
+    for (int c = 0; c < 6; c++) CHECK_NEAR((double)h.grasp_k_N_m[c], element(grasp, "k", c), 1e-6);
+    CHECK_NEAR((double)h.grasp_b_N_s_m, number(grasp, "b"), 1e-8);
     for (int i = 0; i < (int)h.n_patch; i++) {
         const cJSON *patch = cJSON_GetArrayItem(cJSON_GetObjectItem(e, "contact_patches"), i);
         CHECK_NEAR(h.patch[i].id, number(patch, "id"), 0);

@@ -94,8 +94,8 @@ static void every_way_in_has_the_same_range(void)
     REQUIRE(pal_world_create(&plain, &diag, &world) == PAL_ERR_OK);
     for (int k = 0; k < LIMITS; k++)
         for (int side = -1; side <= 1; side += 2) {
-            const double limit = side < 0 ? limits[k].low : limits[k].high, in = beside(limit, -side),
-                         out = beside(limit, side);
+            const double edge = side < 0 ? limits[k].low : limits[k].high, in = beside(edge, -side),
+                         out = beside(edge, side);
             CHECK(is_material(k, in) && !is_material(k, out));
             CHECK(is_scene_key(k, in) && !is_scene_key(k, out));
             CHECK(is_region_key(k, in) && !is_region_key(k, out));

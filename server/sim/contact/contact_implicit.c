@@ -2,18 +2,9 @@
 #include "server/sim/contact/contact_implicit.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/contact/tuning.h"
 
 #include <string.h>
-
-/* passes of conjugate gradients for the stiffness of a contact, and steps from one answer to the next */
-enum { FELT_PASSES = 2, FELT_EVERY = 3 };
-/* solves of a sub-step after which ties may be chosen anew: contacts that act, friction that sticks or slides */
-enum { ROUNDS = 2 };
-#define FELT_FORCE_CHANGE 0.02
-/* share of the pushing forces that ties may pull, or points may come through, without another solve */
-#define WRONG 0.05
-/* friction may pass its limit, or fall short of it, by this share without another solve */
-#define OFF_LIMIT 0.02
 
 pal_err pal_contact_implicit_make(pal_arena *arena, pal_contact_implicit *out)
 {
@@ -35,7 +26,7 @@ int pal_contact_implicit_thin(pal_contact *contact, int n)
     int count[2] = {0, 0}, m = 0;
     for (int i = 0; i < n; i++) count[contact[i].depth_m > 0]++;
     if (n <= PAL_CONTACT_IMPLICIT_MAX) return n;
-    /* those that touch have room for three quarters, those that may come to touch have the rest */
+    /* those that points have room for three quarters, those that may come to points have the rest */
     int room[2], stride[2], seen[2] = {0, 0};
     room[1] = count[0] < PAL_CONTACT_IMPLICIT_MAX / 4 ? PAL_CONTACT_IMPLICIT_MAX - count[0]
                                                       : 3 * PAL_CONTACT_IMPLICIT_MAX / 4;
@@ -62,7 +53,7 @@ static void basis(const double n[3], double t[2][3])
 }
 
 /* the rows of friction: elastic while they stick, a constant force while they slide */
-static void add_across(pal_contact_implicit *press, pal_contact_springs *contact_springs, pal_contact_points *touch,
+static void add_across(pal_contact_implicit *press, pal_contact_springs *springs, pal_contact_points *points,
                        const pal_body *body, const pal_contact *contact, double friction)
 {
     double along[3] = {0}, stiffness = 0, sum = 0, stretch[3];
@@ -81,7 +72,7 @@ static void add_across(pal_contact_implicit *press, pal_contact_springs *contact
     press->slides = press->slides && size > 0;
     basis(along, press->t);
     for (int k = 0; k < 2; k++) {
-        int row = pal_contact_springs_add_mean(contact_springs, touch, body, contact, press->share, n, press->t[k],
+        int row = pal_contact_springs_add_mean(springs, points, body, contact, press->share, n, press->t[k],
                                                press->slides ? 0 : stiffness);
         if (row < 0) return;
         double part = pal_dot3(stretch, press->t[k]);
@@ -91,11 +82,11 @@ static void add_across(pal_contact_implicit *press, pal_contact_springs *contact
     press->friction_N_m = stiffness;
 }
 
-void pal_contact_implicit_begin(pal_contact_implicit *press, pal_contact_springs *contact_springs,
-                                pal_contact_points *touch, pal_body *body, const pal_contact *contact, int n,
-                                double friction, const double move_m[3])
+void pal_contact_implicit_begin(pal_contact_implicit *press, pal_contact_springs *springs, pal_contact_points *points,
+                                pal_body *body, const pal_contact *contact, int n, double friction,
+                                const double move_m[3])
 {
-    press->first = contact_springs->n_row;
+    press->first = springs->n_row;
     press->across = -1;
     press->constant = press->settled = press->staged = false;
     press->round = 0;
@@ -108,10 +99,10 @@ void pal_contact_implicit_begin(pal_contact_implicit *press, pal_contact_springs
     pal_copy3(press->tool_move_m, move_m);
     bool touches = false;
     int m = 0;
-    while (m < n && pal_contact_springs_add(contact_springs, touch, body, contact[m].point, contact[m].away,
-                                            contact[m].k_N_m) >= 0) {
+    while (m < n &&
+           pal_contact_springs_add(springs, points, body, contact[m].point, contact[m].away, contact[m].k_N_m) >= 0) {
         press->active[m] = contact[m].depth_m > 0;
-        if (!press->active[m]) contact_springs->k_N_m[press->first + m] = 0;
+        if (!press->active[m]) springs->k_N_m[press->first + m] = 0;
         press->force_N[m] = press->active[m] ? contact[m].k_N_m * contact[m].depth_m : 0;
         touches = touches || press->active[m];
         m++;
@@ -123,48 +114,47 @@ void pal_contact_implicit_begin(pal_contact_implicit *press, pal_contact_springs
         press->normal_N = 0;
     }
     if (m == 0) return;
-    if (touches && friction > 0) add_across(press, contact_springs, touch, body, contact, friction);
-    pal_contact_springs_load(contact_springs, 1, press->force_N, press->first, contact_springs->n_row - press->first,
-                             body->load);
+    if (touches && friction > 0) add_across(press, springs, points, body, contact, friction);
+    pal_contact_springs_load(springs, 1, press->force_N, press->first, springs->n_row - press->first, body->load);
 }
 
 /* k (d - m) of every contact, whether it acts or not; true: what acts is not what should have, by a noticeable part of
- * the forces, and is what should have now. After ROUNDS solves only a contact that pulls as a whole is changed: ties
- * that pull are let go and none is taken up, so that there is an end. In the last of several stages a pull may make up
- * for the push of an earlier one, and stays */
-static bool choose(pal_contact_implicit *press, pal_contact_springs *contact_springs, pal_body *body,
+ * the forces, and is what should have now. After CHOOSE_ROUNDS solves only a contact that pulls as a whole is changed:
+ * ties that pull are let go and none is taken up, so that there is an end. In the last of several stages a pull may
+ * make up for the push of an earlier one, and stays */
+static bool choose(pal_contact_implicit *press, pal_contact_springs *springs, pal_body *body,
                    const pal_contact *contact, double *force_N)
 {
     int n = press->n_contact;
     double wrong = 0, push = 0, pull = 0, *change = press->share;
     for (int i = 0; i < n; i++) {
-        force_N[i] = contact[i].k_N_m * (contact[i].depth_m - contact_springs->motion_m[press->first + i]);
+        force_N[i] = contact[i].k_N_m * (contact[i].depth_m - springs->motion_m[press->first + i]);
         if (press->active[i] == (force_N[i] > 0))
             push += press->active[i] ? force_N[i] : 0;
         else
             wrong += fabs(force_N[i]);
         if (press->active[i]) pull += fmax(0, -force_N[i]);
     }
-    const bool ends = press->round++ >= ROUNDS;
-    if (!(ends ? !press->staged && pull > push : wrong > WRONG * push)) return false;
+    const bool ends = press->round++ >= CHOOSE_ROUNDS;
+    if (!(ends ? !press->staged && pull > push : wrong > WRONG_SHARE * push)) return false;
     for (int i = 0; i < n; i++) {
         press->active[i] = force_N[i] > 0 && (!ends || press->active[i]);
         double load = press->active[i] ? contact[i].k_N_m * contact[i].depth_m : 0;
         change[i] = load - press->force_N[i];
         press->force_N[i] = load;
-        contact_springs->k_N_m[press->first + i] = press->active[i] ? contact[i].k_N_m : 0;
+        springs->k_N_m[press->first + i] = press->active[i] ? contact[i].k_N_m : 0;
     }
-    pal_contact_springs_load(contact_springs, 1, change, press->first, n, body->load);
+    pal_contact_springs_load(springs, 1, change, press->first, n, body->load);
     return true;
 }
 
 /* the two rows of friction as the solver had them: how far they are stretched now, and their forces */
-static double across_now(const pal_contact_implicit *press, const pal_contact_springs *contact_springs,
-                         double stretch_m[2], double force_N[2])
+static double across_now(const pal_contact_implicit *press, const pal_contact_springs *springs, double stretch_m[2],
+                         double force_N[2])
 {
     for (int k = 0; k < 2; k++) {
         double begin = pal_dot3(press->slip_m, press->t[k]) + pal_dot3(press->tool_move_m, press->t[k]);
-        stretch_m[k] = begin - contact_springs->motion_m[press->across + k];
+        stretch_m[k] = begin - springs->motion_m[press->across + k];
         force_N[k] = press->slides ? press->force_N[press->n_contact + k] : press->friction_N_m * stretch_m[k];
     }
     return hypot(stretch_m[0], stretch_m[1]);
@@ -172,41 +162,40 @@ static double across_now(const pal_contact_implicit *press, const pal_contact_sp
 
 /* friction after the solve, for a normal force; true: it slid although it was taken as sticking or the other way round,
  * and its two ties are changed. force_N: as the solver had it */
-static bool settle_across(pal_contact_implicit *press, pal_contact_springs *contact_springs, pal_body *body,
-                          double normal_N, double friction, double force_N[2])
+static bool settle_across(pal_contact_implicit *press, pal_contact_springs *springs, pal_body *body, double normal_N,
+                          double friction, double force_N[2])
 {
     double stretch[2], change[2], stiffness = press->friction_N_m, along = 0, had = 0;
     double free = friction * normal_N / stiffness, *load = press->force_N + press->n_contact;
-    double size = across_now(press, contact_springs, stretch, force_N), within = size > free ? free / size : 1;
+    double size = across_now(press, springs, stretch, force_N), within = size > free ? free / size : 1;
     for (int k = 0; k < 2; k++) along += stretch[k] * load[k], had += load[k] * load[k];
     /* while it slides its force drags tissue no farther than a spring stretched to the limit would */
-    bool sticks = press->slides && along < (1 - OFF_LIMIT) * free * sqrt(had);
-    bool slips = !press->slides && size > (1 + OFF_LIMIT) * free;
+    bool sticks = press->slides && along < (1 - FRICTION_SLACK) * free * sqrt(had);
+    bool slips = !press->slides && size > (1 + FRICTION_SLACK) * free;
     pal_set3(press->next_slip_m, 0, 0, 0);
     for (int k = 0; k < 2; k++) pal_axpy3(press->next_slip_m, within * stretch[k], press->t[k]);
     press->next_slides = size > free && !sticks;
     press->normal_N = normal_N;
-    if (press->round > ROUNDS || !(sticks || slips)) return false;
+    if (press->round > CHOOSE_ROUNDS || !(sticks || slips)) return false;
     press->slides = slips;
     for (int k = 0; k < 2; k++) {
-        double to =
-            slips ? within * force_N[k] : stiffness * (stretch[k] + contact_springs->motion_m[press->across + k]);
+        double to = slips ? within * force_N[k] : stiffness * (stretch[k] + springs->motion_m[press->across + k]);
         change[k] = to - load[k];
         load[k] = to;
-        contact_springs->k_N_m[press->across + k] = slips ? 0 : stiffness;
+        springs->k_N_m[press->across + k] = slips ? 0 : stiffness;
     }
-    pal_contact_springs_load(contact_springs, 1, change, press->across, 2, body->load);
+    pal_contact_springs_load(springs, 1, change, press->across, 2, body->load);
     return true;
 }
 
 /* other constant loads instead of the present ones; the ties give no stiffness any more */
-static void hold_constant(pal_contact_implicit *press, pal_contact_springs *contact_springs, pal_body *body,
+static void hold_constant(pal_contact_implicit *press, pal_contact_springs *springs, pal_body *body,
                           const double *force_N, int n)
 {
-    pal_contact_springs_load(contact_springs, -1, press->force_N, press->first, n, body->load);
+    pal_contact_springs_load(springs, -1, press->force_N, press->first, n, body->load);
     memcpy(press->force_N, force_N, sizeof(double) * (size_t)n);
-    pal_contact_springs_load(contact_springs, 1, press->force_N, press->first, n, body->load);
-    for (int i = 0; i < n; i++) contact_springs->k_N_m[press->first + i] = 0;
+    pal_contact_springs_load(springs, 1, press->force_N, press->first, n, body->load);
+    for (int i = 0; i < n; i++) springs->k_N_m[press->first + i] = 0;
     press->constant = true;
 }
 
@@ -229,30 +218,30 @@ static void sum_forces(const pal_contact_implicit *press, pal_contact *contact, 
 }
 
 /* forces as the solver had them; true: ties were chosen anew, the forces are a first guess of what comes next */
-static bool find_forces(pal_contact_implicit *press, pal_contact_springs *contact_springs, pal_body *body,
+static bool find_forces(pal_contact_implicit *press, pal_contact_springs *springs, pal_body *body,
                         const pal_contact *contact, double friction, double *force_N)
 {
     double normal[3] = {0};
     int n = press->n_contact;
-    bool chosen = choose(press, contact_springs, body, contact, force_N);
+    bool chosen = choose(press, springs, body, contact, force_N);
     for (int i = 0; i < n; i++) {
         if (!press->active[i]) force_N[i] = 0;
         pal_axpy3(normal, fmax(0, force_N[i]), contact[i].away);
     }
     force_N[n] = force_N[n + 1] = 0;
     if (press->across >= 0 && !chosen)
-        chosen = settle_across(press, contact_springs, body, pal_norm3(normal), friction, force_N + n);
+        chosen = settle_across(press, springs, body, pal_norm3(normal), friction, force_N + n);
     return chosen;
 }
 
 /* total and what caps leave of it; true: less than all, so that the forces are held from now on, shortened to the caps
  */
-static bool keep_caps(pal_contact_implicit *press, pal_contact_springs *contact_springs, pal_body *body,
-                      const pal_tool *tool, pal_contact *contact, double *force_N)
+static bool keep_caps(pal_contact_implicit *press, pal_contact_springs *springs, pal_body *body, const pal_tool *tool,
+                      pal_contact *contact, double *force_N)
 {
     int n_row = press->n_contact + (press->across >= 0 ? 2 : 0);
     press->uncapped_N = pal_norm3(press->total_N);
-    double largest = pal_contact_springs_max_force_N(contact_springs, force_N, press->first, n_row),
+    double largest = pal_contact_springs_max_force_N(springs, force_N, press->first, n_row),
            room = pal_tool_force_share(tool, press->total_N);
     if (body->load_cap_N > 0 && largest > body->load_cap_N) room = fmin(room, body->load_cap_N / largest);
     press->allowed_N = fmin(room * press->uncapped_N, tool->force_cap_N * tool->ramp);
@@ -263,7 +252,7 @@ static bool keep_caps(pal_contact_implicit *press, pal_contact_springs *contact_
     press->capped = room < 1;
     if (!press->capped) return false;
     for (int i = 0; i < n_row; i++) force_N[i] *= room;
-    hold_constant(press, contact_springs, body, force_N, n_row);
+    hold_constant(press, springs, body, force_N, n_row);
     sum_forces(press, contact, force_N, press->total_N);
     return true;
 }
@@ -280,7 +269,7 @@ static void give(pal_contact_implicit *press, pal_tool *tool)
     press->settled = true;
 }
 
-bool pal_press_within(pal_contact_implicit *press, pal_contact_springs *contact_springs, pal_body *body, pal_tool *tool,
+bool pal_press_within(pal_contact_implicit *press, pal_contact_springs *springs, pal_body *body, pal_tool *tool,
                       pal_contact *contact)
 {
     double force[PAL_CONTACT_IMPLICIT_MAX + 2], stretch[2];
@@ -289,19 +278,19 @@ bool pal_press_within(pal_contact_implicit *press, pal_contact_springs *contact_
     if (n == 0 || press->constant) return false;
     take_back(press, tool);
     for (int i = 0; i < n; i++) {
-        double depth = contact[i].depth_m - contact_springs->motion_m[press->first + i];
+        double depth = contact[i].depth_m - springs->motion_m[press->first + i];
         force[i] = press->active[i] ? contact[i].k_N_m * depth : 0;
     }
-    if (press->across >= 0) (void)across_now(press, contact_springs, stretch, force + n);
+    if (press->across >= 0) (void)across_now(press, springs, stretch, force + n);
     sum_forces(press, contact, force, press->total_N);
     const bool finite = pal_finite3(press->total_N);
     if (!finite) pal_set3(press->total_N, 0, 0, 0);
-    bool fixed = finite && keep_caps(press, contact_springs, body, tool, contact, force);
+    bool fixed = finite && keep_caps(press, springs, body, tool, contact, force);
     give(press, tool);
     return fixed;
 }
 
-bool pal_contact_implicit_settle(pal_contact_implicit *press, pal_contact_springs *contact_springs, pal_body *body,
+bool pal_contact_implicit_settle(pal_contact_implicit *press, pal_contact_springs *springs, pal_body *body,
                                  pal_tool *tool, pal_contact *contact, double friction)
 {
     double force[PAL_CONTACT_IMPLICIT_MAX + 2];
@@ -311,7 +300,7 @@ bool pal_contact_implicit_settle(pal_contact_implicit *press, pal_contact_spring
     if (press->constant)
         memcpy(force, press->force_N, sizeof force);
     else
-        chosen = find_forces(press, contact_springs, body, contact, friction, force);
+        chosen = find_forces(press, springs, body, contact, friction, force);
     sum_forces(press, contact, force, press->total_N);
     if (!pal_finite3(press->total_N)) {
         pal_set3(press->total_N, 0, 0, 0);
@@ -322,172 +311,8 @@ bool pal_contact_implicit_settle(pal_contact_implicit *press, pal_contact_spring
         press->uncapped_N = pal_norm3(press->total_N);
         pal_scale3(press->total_N, pal_tool_force_share(tool, press->total_N), press->total_N);
     } else if (!press->constant)
-        fixed = keep_caps(press, contact_springs, body, tool, contact, force);
+        fixed = keep_caps(press, springs, body, tool, contact, force);
     give(press, tool);
     tool->touching = tool->touching || pal_dot3(press->total_N, press->total_N) > 0;
     return chosen || fixed;
-}
-
-/* ---- felt stiffness ---- */
-
-static int find_entry(const pal_haptic_stiffness *haptic_stiffness, const pal_contact_group *contact_group)
-{
-    int best = -1;
-    double cosine = 0.70710678118654752;
-    for (int i = 0; i < PAL_CONTACT_PATCH_MAX; i++) {
-        const pal_haptic_stiffness_entry *e = &haptic_stiffness->entry[i];
-        if (!e->used || e->contact != (contact_group->force_N > 0)) continue;
-        double c = pal_dot3(e->normal, contact_group->normal);
-        if (c > cosine) cosine = c, best = i;
-    }
-    return best;
-}
-
-bool pal_contact_group_next(const pal_contact *contact, int n, uint8_t *grouped, pal_contact_group *contact_group)
-{
-    double axis[3], sum[3];
-    int seed = -1;
-    double most = 0;
-    for (int i = 0; i < n; i++) {
-        double f2 = pal_dot3(contact[i].force, contact[i].force);
-        if (!grouped[i] && f2 > most) most = f2, seed = i;
-    }
-    if (seed < 0) return false;
-    pal_copy3(axis, contact[seed].away);
-    for (int pass = 0; pass < 2; pass++) {
-        pal_set3(sum, 0, 0, 0);
-        for (int i = 0; i < n; i++)
-            if (!grouped[i] && pal_dot3(contact[i].away, axis) >= PAL_CONTACT_GROUP_COSINE)
-                pal_add3(sum, sum, contact[i].force);
-        if (pass == 0 && !pal_unit3(axis, sum, 0)) break;
-    }
-    for (int i = 0; i < n; i++)
-        if (pal_dot3(contact[i].away, axis) >= PAL_CONTACT_GROUP_COSINE) grouped[i] = 1;
-    grouped[seed] = 1;
-    contact_group->force_N = pal_norm3(sum);
-    contact_group->gap_m = contact_group->k_N_m = 0;
-    pal_scale3(sum, -1, sum);
-    return pal_unit3(contact_group->normal, sum, 0);
-}
-
-bool pal_contact_group_near(const double centre[3], double radius_m, double near_m, const double *x, int n_point,
-                            const pal_contact_group *earlier, int n_earlier, pal_contact_group *contact_group)
-{
-    double least = INFINITY, sum[3] = {0};
-    for (int pass = 0; pass < 2; pass++)
-        for (int i = 0; i < n_point; i++) {
-            double out[3];
-            pal_sub3(out, centre, x + 3 * i);
-            double distance = pal_norm3(out);
-            if (distance > radius_m + near_m || (pass == 1 && distance > least + 0.2 * radius_m)) continue;
-            if (!pal_unit3(out, out, 1e-9 * radius_m)) continue;
-            bool seen = false;
-            for (int b = 0; b < n_earlier && !seen; b++)
-                seen = pal_dot3(out, earlier[b].normal) >= (earlier[b].force_N > 0 ? 0 : PAL_CONTACT_GROUP_COSINE);
-            if (seen) continue;
-            if (pass == 0)
-                least = fmin(least, distance);
-            else
-                pal_axpy3(sum, least + 0.2 * radius_m - distance, out);
-        }
-    if (!(least < INFINITY)) return false;
-    *contact_group = (pal_contact_group){.gap_m = fmax(0, least - radius_m)};
-    return pal_unit3(contact_group->normal, sum, 0);
-}
-
-bool pal_haptic_stiffness_find(const pal_haptic_stiffness *haptic_stiffness, pal_contact_group *contact_group,
-                               const double at_m[3], double min_m)
-{
-    int i = find_entry(haptic_stiffness, contact_group);
-    contact_group->k_N_m = 0;
-    if (i < 0) return true;
-    const pal_haptic_stiffness_entry *e = &haptic_stiffness->entry[i];
-    contact_group->k_N_m = e->k_N_m;
-    if (haptic_stiffness->step - e->step < FELT_EVERY) return false;
-    return pal_dist3(e->at_m, at_m) > min_m ||
-           fabs(contact_group->force_N - e->force_N) > FELT_FORCE_CHANGE * e->force_N ||
-           fabs(contact_group->gap_m - e->gap_m) > min_m || pal_dot3(e->normal, contact_group->normal) < 0.995;
-}
-
-static void keep(pal_haptic_stiffness *haptic_stiffness, pal_contact_group *contact_group, const double at_m[3],
-                 double k_N_m)
-{
-    int i = find_entry(haptic_stiffness, contact_group);
-    for (int j = 0; j < PAL_CONTACT_PATCH_MAX && i < 0; j++)
-        if (!haptic_stiffness->entry[j].used) i = j;
-    if (i < 0) i = haptic_stiffness->turn++ % PAL_CONTACT_PATCH_MAX;
-    contact_group->k_N_m = k_N_m;
-    pal_haptic_stiffness_entry *e = &haptic_stiffness->entry[i];
-    *e = (pal_haptic_stiffness_entry){.used = true,
-                                      .step = haptic_stiffness->step,
-                                      .contact = contact_group->force_N > 0,
-                                      .force_N = contact_group->force_N,
-                                      .gap_m = contact_group->gap_m,
-                                      .k_N_m = k_N_m};
-    pal_copy3(e->normal, contact_group->normal);
-    pal_copy3(e->at_m, at_m);
-}
-
-/* what the normal force loses for each metre because contacts turn: tissue moves with `answer` for each metre that the
- * tool goes against the normal */
-static double turned_N_m(const pal_contact_points *touch, const pal_body *body, const pal_contact *contact,
-                         double radius_m, const double normal[3], const double *answer)
-{
-    int32_t slot[PAL_CONTACT_POINT_SLOTS];
-    double weight[PAL_CONTACT_POINT_SLOTS], arm[PAL_CONTACT_POINT_SLOTS][3], r[3];
-    int n = pal_contact_points_slots(touch, body, contact->point, slot, weight, arm);
-    pal_copy3(r, normal);
-    for (int k = 0; k < n; k++)
-        pal_axpy3(r, weight[k], answer + 3 * (size_t)pal_contact_points_slot_node(body, slot[k]));
-    pal_axpy3(r, -pal_dot3(r, contact->away), contact->away);
-    return pal_norm3(contact->force) * pal_dot3(r, normal) / (radius_m - contact->depth_m);
-}
-
-void pal_haptic_stiffness_contact(pal_haptic_stiffness *haptic_stiffness, pal_contact_group *contact_group,
-                                  const double at_m[3], pal_contact_implicit *press,
-                                  pal_contact_springs *contact_springs, const pal_contact_points *touch,
-                                  const pal_body *body, const pal_contact *contact, double radius_m, pal_arena *scratch)
-{
-    size_t used = pal_arena_used(scratch);
-    double *answer = PAL_NEW(scratch, double, 3 * (size_t)body->n_node), lost = 0;
-    int32_t row[PAL_CONTACT_IMPLICIT_MAX];
-    int n = 0;
-    for (int i = 0; i < press->n_contact; i++) {
-        double into = -pal_dot3(contact[i].away, contact_group->normal);
-        if (into < PAL_CONTACT_GROUP_COSINE || pal_dot3(contact[i].force, contact[i].force) == 0) continue;
-        if (contact_springs->k_N_m[press->first + i] <= 0) continue;
-        press->share[n] = into;
-        row[n++] = press->first + i;
-    }
-    double k = pal_contact_springs_stiffness(contact_springs, body, row, press->share, n, FELT_PASSES, answer, scratch);
-    for (int i = 0; i < n && answer && k > 0; i++)
-        lost += turned_N_m(touch, body, &contact[row[i] - press->first], radius_m, contact_group->normal, answer);
-    pal_arena_rewind(scratch, used);
-    keep(haptic_stiffness, contact_group, at_m, fmax(0.25 * k, k - lost));
-}
-
-void pal_haptic_stiffness_near(pal_haptic_stiffness *haptic_stiffness, pal_contact_group *contact_group,
-                               const double at_m[3], const pal_contact_points *touch, const pal_body *body,
-                               const int32_t *point, const double *weight, int n, double k_N_m, pal_arena *scratch)
-{
-    size_t used = pal_arena_used(scratch), n3 = 3 * (size_t)body->n_node;
-    double *load = PAL_NEW(scratch, double, n3), *move = PAL_NEW(scratch, double, n3), give = 1 / k_N_m;
-    int32_t slot[PAL_CONTACT_POINT_SLOTS];
-    double share[PAL_CONTACT_POINT_SLOTS], arm[PAL_CONTACT_POINT_SLOTS][3];
-    bool known = load && move && body->compliance && k_N_m > 0;
-    for (int i = 0; i < n && known; i++) {
-        int m = pal_contact_points_slots(touch, body, point[i], slot, share, arm);
-        for (int k = 0; k < m; k++)
-            pal_axpy3(load + 3 * (size_t)pal_contact_points_slot_node(body, slot[k]), -weight[i] * share[k],
-                      contact_group->normal);
-    }
-    known = known && body->compliance->solve(body->compliance->self, body, load, move);
-    for (size_t i = 0; i < n3 && known; i++) give += load[i] * move[i];
-    pal_arena_rewind(scratch, used);
-    keep(haptic_stiffness, contact_group, at_m, known && give > 0 && isfinite(give) ? 1 / give : 0);
-}
-
-size_t pal_haptic_stiffness_scratch(const pal_body *body)
-{
-    return 9 * sizeof(double) * (size_t)body->n_node + 3 * sizeof(double) * PAL_CONTACT_IMPLICIT_MAX + 1024;
 }

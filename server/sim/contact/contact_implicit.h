@@ -13,11 +13,9 @@
  * (pal_tangent.settle); tissue then moves less than before, so never past the proxy, which is itself clamped. So a
  * sub-step ends on the very forces that it was solved with, and the tool feels those, with what ties still pull.
  *
- * What a tool feels: pal_haptic_stiffness keeps, for each direction of contact, the tangent stiffness that the solver's
- * compliance gives (haptics.md 2.3 step 3 a). Thread: [sim], makes [load]. */
+ * Thread: [sim], makes [load]. */
 #ifndef PAL_SIM_CONTACT_CONTACT_IMPLICIT_H
 #define PAL_SIM_CONTACT_CONTACT_IMPLICIT_H
-#include "server/sim/contact/contact_patch.h"
 #include "server/sim/contact/contact_spring.h"
 
 enum {
@@ -49,57 +47,15 @@ pal_err pal_contact_implicit_make(pal_arena *arena, pal_contact_implicit *out);
 void pal_contact_implicit_reset(pal_contact_implicit *press);
 /* keeps at most PAL_CONTACT_IMPLICIT_MAX contacts, stiffer for those left out; returns how many */
 int pal_contact_implicit_thin(pal_contact *contact, int n);
-/* ties for n contacts with k_N_m and depth_m (below 0: only near), and the loads of those that touch into body->load;
+/* ties for n contacts with k_N_m and depth_m (below 0: only near), and the loads of those that points into body->load;
  * move_m: the tool's own way in this sub-step (friction only) */
-void pal_contact_implicit_begin(pal_contact_implicit *press, pal_contact_springs *contact_springs,
-                                pal_contact_points *touch, pal_body *body, const pal_contact *contact, int n,
-                                double friction, const double move_m[3]);
+void pal_contact_implicit_begin(pal_contact_implicit *press, pal_contact_springs *springs, pal_contact_points *points,
+                                pal_body *body, const pal_contact *contact, int n, double friction,
+                                const double move_m[3]);
 /* after a stage that is not the last, ties->motion_m taken. True: beyond a cap, loads changed */
-bool pal_press_within(pal_contact_implicit *press, pal_contact_springs *contact_springs, pal_body *body, pal_tool *tool,
+bool pal_press_within(pal_contact_implicit *press, pal_contact_springs *springs, pal_body *body, pal_tool *tool,
                       pal_contact *contact);
 /* after the last stage: force of every contact, total on the tool. True: loads changed */
-bool pal_contact_implicit_settle(pal_contact_implicit *press, pal_contact_springs *contact_springs, pal_body *body,
+bool pal_contact_implicit_settle(pal_contact_implicit *press, pal_contact_springs *springs, pal_body *body,
                                  pal_tool *tool, pal_contact *contact, double friction);
-
-/* tangent stiffness in a direction, found when it is asked for and has changed */
-typedef struct pal_haptic_stiffness_entry {
-    bool used, contact;
-    double normal[3], at_m[3], force_N, gap_m, k_N_m;
-    int step; /* when it was found */
-} pal_haptic_stiffness_entry;
-typedef struct pal_haptic_stiffness {
-    pal_haptic_stiffness_entry entry[PAL_CONTACT_PATCH_MAX];
-    int turn, step; /* entry to be replaced next; steps of the world */
-} pal_haptic_stiffness;
-
-/* contacts within 75 degrees of a patch's direction belong to it */
-#define PAL_CONTACT_GROUP_COSINE 0.25
-/* the strongest contacts not yet grouped [n], about their mean direction; they are grouped then. False: there are none
- */
-bool pal_contact_group_next(const pal_contact *contact, int n, uint8_t *grouped, pal_contact_group *contact_group);
-
-/* the nearest tissue, of points x [n_point][3] within radius + near of a sphere's centre, not in the direction of an
- * earlier blob (beside a contact: only what faces it, since the tissue around a dent goes along with the tool);
- * directions of what is about as near are averaged. False: there is none */
-bool pal_contact_group_near(const double centre[3], double radius_m, double near_m, const double *x, int n_point,
-                            const pal_contact_group *earlier, int n_earlier, pal_contact_group *contact_group);
-
-/* what is known for a blob: sets blob->k_N_m (0: nothing); returns whether it should be found again: the tool moved by
- * more than `min_m` or the force by 2 % since, and two steps have passed (an answer costs as much as some steps) */
-bool pal_haptic_stiffness_find(const pal_haptic_stiffness *haptic_stiffness, pal_contact_group *contact_group,
-                               const double at_m[3], double min_m);
-/* Finds it again. Ties do not know that the direction of a contact turns when tissue slips round the sphere: with r the
- * tool's motion relative to tissue across `away`, a contact of force f loses f r / distance of its part along the
- * normal, which is taken off. Rows are those of the press's contacts that bear force and belong to the blob, or, for a
- * blob without contact, points near with weights (sum 1) and the contact stiffness k_N_m behind them */
-void pal_haptic_stiffness_contact(pal_haptic_stiffness *haptic_stiffness, pal_contact_group *contact_group,
-                                  const double at_m[3], pal_contact_implicit *press,
-                                  pal_contact_springs *contact_springs, const pal_contact_points *touch,
-                                  const pal_body *body, const pal_contact *contact, double radius_m,
-                                  pal_arena *scratch);
-void pal_haptic_stiffness_near(pal_haptic_stiffness *haptic_stiffness, pal_contact_group *contact_group,
-                               const double at_m[3], const pal_contact_points *touch, const pal_body *body,
-                               const int32_t *point, const double *weight, int n, double k_N_m, pal_arena *scratch);
-/* scratch that these need in a sub-step */
-size_t pal_haptic_stiffness_scratch(const pal_body *body);
 #endif

@@ -1,32 +1,15 @@
-/* Haptic contact patches of one tool on one body (haptics.md 2.3, steps 1 to 5): a plane of zero force in the space of
- * the tool's centre and the tangent stiffness of the tissue under it, so that a haptic bridge can render contact at its
- * own rate between frames.
+/* Haptic contact patches of one tool on one body: a plane of zero force in the space of the tool's centre and the
+ * tangent stiffness of the tissue under it, so that a haptic bridge renders contact at its own rate between frames.
  *
- * Contacts are grouped by direction into blobs. Departure from 2.3: blobs span 75 degrees about their mean direction,
- * not 20: one sphere in one dent touches tissue over its whole cap, and that is one patch; two walls of a fold are two
- * patches in two groups, whose forces add. k1 = dF/dd comes from least squares with forgetting on (d, F), taken only
- * when d has moved by 0.05 mm, started at the stiffness of a flat punch, 2 E a / (1 - nu^2), and clamped. Forgetting is
- * 0.8, not 0.9, which would lag a millimetre behind where tissue stiffens. Where the solver knows the static compliance
- * (2.3 step 3 a) its answer is k1, and the start value when the next touch begins. k2 is 0.
- * Thread: [sim]. */
+ * Each group of contacts (contact_group.h) is a patch. k1 = dF/dd is the stiffness that the solver's compliance gives
+ * (haptic_stiffness.h), elsewhere the slope of (d, F) by least squares (stiffness_fit.h), started at the stiffness of a
+ * flat punch, 2 E a / (1 - nu^2), later at what the last contact taught; it is clamped. k2 is 0. The zero-force point
+ * is (F / k1) n above the tool's centre; the deformed surface is never sent, as it has no force at any depth. A patch
+ * near the tool has F = 0, so that the first touch needs no round trip. Thread: [sim]. */
 #ifndef PAL_SIM_CONTACT_CONTACT_PATCH_H
 #define PAL_SIM_CONTACT_CONTACT_PATCH_H
-#include "server/sim/core/tools.h"
-
-/* one direction of contact or near contact */
-typedef struct pal_contact_group {
-    double normal[3]; /* from tissue to tool, unit                        */
-    double force_N;   /* normal force, 0 when only near                   */
-    double gap_m;     /* way the tool has to go until it touches, >= 0; 0 in contact */
-    double k_N_m;     /* tangent stiffness as the solver's compliance tells it; 0: not known */
-} pal_contact_group;
-
-/* least squares of F over d with forgetting and a start value */
-typedef struct pal_slope_fit {
-    double n, d, f, dd, df; /* weighted sums                       */
-    double last_depth_m;    /* of the newest sample                */
-    double k_N_m;           /* current estimate                    */
-} pal_slope_fit;
+#include "server/sim/contact/contact_group.h"
+#include "server/sim/contact/stiffness_fit.h"
 
 typedef struct pal_contact_patch_options {
     double radius_m;
@@ -39,9 +22,8 @@ typedef struct pal_contact_patch_track {
     bool used, contact;
     int16_t id;
     double normal[3], depth_m; /* as measured; depth below 0 is a gap */
-    double k_prior_N_m;        /* start value, later what the last contact taught */
-    pal_slope_fit slope;
-    pal_contact_patch shown; /* after the low-pass                   */
+    pal_stiffness_fit fit;     /* its start value is later what the last contact taught */
+    pal_contact_patch shown;   /* after the low-pass                   */
 } pal_contact_patch_track;
 
 typedef struct pal_contact_patches {
@@ -51,20 +33,10 @@ typedef struct pal_contact_patches {
     double last_m[3];
 } pal_contact_patches;
 
-void pal_slope_fit_start(pal_slope_fit *slope, double k_N_m);
-/* a new sample; prior_m is the spread of d at which data weigh as much as the start value k_start_N_m */
-void pal_slope_fit_add(pal_slope_fit *slope, double d_m, double f_N, double prior_m, double k_start_N_m);
-
 /* forgets everything; ids go on from id_base, so that several bodies give different ids */
 void pal_contact_patches_reset(pal_contact_patches *patches, int id_base);
 /* once a step: matches blobs [n] (at most PAL_CONTACT_PATCH_MAX) with the patches of the step before and appends the
  * result to tool->patch. The tool's place is tool->here_m. */
 void pal_contact_patches_update(pal_contact_patches *patches, const pal_contact_patch_options *rules,
-                                const pal_contact_group *contact_group, int n, pal_tool *tool);
-/* K = (C + 1/k)^-1 as xx xy xz yy yz zz: tissue of compliance C, m/N, behind a spring k. give: columns of C, those from
- * n_give on are not known and taken isotropic. False: none is known, or C is no compliance */
-bool pal_contact_patch_series(double give[3][3], int n_give, double k_N_m, double K[6]);
-/* what the force rises by for each metre that the spring's end leads the tissue along way; unless all of C is known
- * k_guess_N_m */
-double pal_contact_patch_along(double give[3][3], int n_give, double k_N_m, double k_guess_N_m, const double way[3]);
+                                const pal_contact_group *group, int n, pal_tool *tool);
 #endif

@@ -6,24 +6,61 @@
 #include <math.h>
 #include <string.h>
 
-void pal_contact_points_begin(pal_contact_points *touch)
+static pal_err allocate(const pal_body *body, pal_arena *arena, pal_contact_points *t)
 {
-    touch->mark++;
-    touch->n_live = touch->n_frame = 0;
-    touch->n_point = touch->n_fixed;
+    size_t n_vertex = (size_t)body->n_shown, n_node = (size_t)body->n_node;
+    size_t n_frame = body->skin ? (size_t)body->skin->n_frame : 0, n_slot = body->skin ? n_frame : n_node;
+    t->live = PAL_NEW(arena, int32_t, n_vertex);
+    t->frame = PAL_NEW(arena, int32_t, n_frame);
+    t->live_mark = PAL_NEW(arena, uint32_t, n_vertex);
+    t->frame_mark = PAL_NEW(arena, uint32_t, n_frame);
+    t->seen = PAL_NEW(arena, uint32_t, n_vertex);
+    t->x = PAL_NEW(arena, double, 3 * n_vertex);
+    t->v = PAL_NEW(arena, double, 3 * n_vertex);
+    t->slot = PAL_NEW(arena, int32_t, n_slot);
+    t->node = PAL_NEW(arena, int32_t, n_node);
+    t->slot_mark = PAL_NEW(arena, uint32_t, n_slot);
+    t->node_mark = PAL_NEW(arena, uint32_t, n_node);
+    t->tool_mark = PAL_NEW(arena, uint32_t, n_slot);
+    t->turning = PAL_NEW(arena, pal_frame_spin, n_frame);
+    t->spin_mark = PAL_NEW(arena, uint32_t, n_frame);
+    t->slot_force = PAL_NEW(arena, double, 3 * n_slot);
+    t->slot_torque = PAL_NEW(arena, double, 3 * n_slot);
+    t->force = PAL_NEW(arena, double, 3 * n_node);
+    bool all = t->live && t->frame && t->live_mark && t->frame_mark && t->seen && t->x && t->v && t->slot && t->node &&
+               t->slot_mark && t->node_mark && t->tool_mark && t->turning && t->spin_mark && t->slot_force &&
+               t->slot_torque && t->force;
+    return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-static void make_live(pal_contact_points *touch, const pal_body *body, int vertex)
+pal_err pal_contact_points_make(const pal_body *body, double spacing_m, int max_sample, pal_arena *arena,
+                                pal_contact_points *out)
 {
-    if (touch->live_mark[vertex] == touch->mark) return;
-    touch->live_mark[vertex] = touch->mark;
-    touch->live[touch->n_live++] = vertex;
+    pal_contact_points t = {0};
+    PAL_TRY(pal_contact_samples_make(body, spacing_m, max_sample, arena, &t.sample));
+    PAL_TRY(allocate(body, arena, &t));
+    *out = t;
+    return PAL_ERR_OK;
+}
+
+void pal_contact_points_begin(pal_contact_points *points)
+{
+    points->mark++;
+    points->n_live = points->n_frame = 0;
+    pal_contact_samples_begin(&points->sample);
+}
+
+static void make_live(pal_contact_points *points, const pal_body *body, int vertex)
+{
+    if (points->live_mark[vertex] == points->mark) return;
+    points->live_mark[vertex] = points->mark;
+    points->live[points->n_live++] = vertex;
     if (!body->skin) return;
     const int32_t *near = body->skin->near + PAL_SKIN_NEIGHBOURS * (size_t)vertex;
     for (int k = 0; k < PAL_SKIN_NEIGHBOURS; k++)
-        if (touch->frame_mark[near[k]] != touch->mark) {
-            touch->frame_mark[near[k]] = touch->mark;
-            touch->frame[touch->n_frame++] = near[k];
+        if (points->frame_mark[near[k]] != points->mark) {
+            points->frame_mark[near[k]] = points->mark;
+            points->frame[points->n_frame++] = near[k];
         }
 }
 
@@ -39,11 +76,11 @@ static inline double distance2(const double p[3], const double a[3], const doubl
 
 /* the first run of fixed samples, from this one on, whose triangle meets the box: *point is its first point, or the
  * first passing one; returns the run behind it */
-static int next_run(const pal_contact_points *touch, const pal_body *body, const float low[3], const float high[3],
+static int next_run(const pal_contact_points *points, const pal_body *body, const float low[3], const float high[3],
                     int run, int *point)
 {
-    for (; run < touch->n_run; run++) {
-        const int32_t *corner = touch->corner + 3 * (size_t)touch->run[run];
+    for (; run < points->sample.n_run; run++) {
+        const int32_t *corner = points->sample.corner + 3 * (size_t)points->sample.run[run];
         const float *p = body->shown + 3 * (size_t)corner[0], *q = body->shown + 3 * (size_t)corner[1],
                     *r = body->shown + 3 * (size_t)corner[2];
         bool meets = true;
@@ -51,11 +88,11 @@ static int next_run(const pal_contact_points *touch, const pal_body *body, const
             meets &= fminf(p[c], fminf(q[c], r[c])) <= high[c] && fmaxf(p[c], fmaxf(q[c], r[c])) >= low[c];
         if (meets) break;
     }
-    *point = touch->n_vertex + touch->run[run];
-    return run < touch->n_run ? run + 1 : run;
+    *point = points->sample.n_vertex + points->sample.run[run];
+    return run < points->sample.n_run ? run + 1 : run;
 }
 
-int pal_contact_points_collect(pal_contact_points *touch, const pal_body *body, const double a[3], const double b[3],
+int pal_contact_points_collect(pal_contact_points *points, const pal_body *body, const double a[3], const double b[3],
                                double reach_m, int32_t *list, double *nearest_m)
 {
     double ab[3], nearest2 = reach_m * reach_m, reach2 = nearest2;
@@ -67,7 +104,7 @@ int pal_contact_points_collect(pal_contact_points *touch, const pal_body *body, 
         high[c] = (float)(fmax(a[c], b[c]) + reach_m);
     }
     int n = 0;
-    int n_vertex = body->active ? body->n_active : touch->n_vertex;
+    int n_vertex = body->active ? body->n_active : points->sample.n_vertex;
     for (int k = 0; k < n_vertex; k++) {
         int i = body->active ? body->active[k] : k;
         const float *s = body->shown + 3 * (size_t)i;
@@ -77,16 +114,16 @@ int pal_contact_points_collect(pal_contact_points *touch, const pal_body *body, 
         double p[3] = {(double)s[0], (double)s[1], (double)s[2]}, d2 = distance2(p, a, ab, per_ab2);
         if (!(d2 <= reach2)) continue;
         nearest2 = fmin(nearest2, d2);
-        make_live(touch, body, i);
+        make_live(points, body, i);
         list[n++] = i;
     }
-    pal_contact_points_sample_stretched(touch, body, list, n);
-    for (int i = touch->n_vertex, run = 0; i < touch->n_point; i++) {
-        if (run < touch->n_run && i == touch->n_vertex + touch->run[run])
-            run = next_run(touch, body, low, high, run, &i);
-        if (i == touch->n_point) break;
-        const int32_t *corner = touch->corner + 3 * (size_t)(i - touch->n_vertex);
-        const float *share = touch->share + 3 * (size_t)(i - touch->n_vertex);
+    pal_contact_samples_add_stretched(&points->sample, body, list, n);
+    for (int i = points->sample.n_vertex, run = 0; i < points->sample.n_point; i++) {
+        if (run < points->sample.n_run && i == points->sample.n_vertex + points->sample.run[run])
+            run = next_run(points, body, low, high, run, &i);
+        if (i == points->sample.n_point) break;
+        const int32_t *corner = points->sample.corner + 3 * (size_t)(i - points->sample.n_vertex);
+        const float *share = points->sample.share + 3 * (size_t)(i - points->sample.n_vertex);
         double p[3] = {0};
         for (int k = 0; k < 3; k++)
             for (int c = 0; c < 3; c++)
@@ -94,7 +131,7 @@ int pal_contact_points_collect(pal_contact_points *touch, const pal_body *body, 
         double d2 = distance2(p, a, ab, per_ab2);
         if (!(d2 <= reach2)) continue;
         nearest2 = fmin(nearest2, d2);
-        for (int k = 0; k < 3; k++) make_live(touch, body, corner[k]);
+        for (int k = 0; k < 3; k++) make_live(points, body, corner[k]);
         list[n++] = i;
     }
     *nearest_m = sqrt(nearest2);
@@ -120,9 +157,9 @@ int pal_contact_points_nodes(const pal_body *body, int vertex, int32_t *node, do
     return n;
 }
 
-void pal_contact_points_reset(pal_contact_points *touch)
+void pal_contact_points_reset(pal_contact_points *points)
 {
-    touch->sub_step += 2;
+    points->sub_step += 2;
 }
 
 /* what is shown, and so what is touched, while a switch is let in */
@@ -132,20 +169,20 @@ static void add_lag(const pal_body *body, int vertex, double x[3])
         x[c] += body->display_offset_part * (double)body->display_offset_m[3 * (size_t)vertex + c];
 }
 
-void pal_contact_points_update(pal_contact_points *touch, const pal_body *body, double dt_s)
+void pal_contact_points_update(pal_contact_points *points, const pal_body *body, double dt_s)
 {
-    uint32_t before = touch->sub_step++;
-    for (int i = 0; i < touch->n_live && body->active; i++) {
-        size_t at = 3 * (size_t)touch->live[i];
-        pal_copy3(touch->x + at, body->d + at);
-        pal_copy3(touch->v + at, body->dv + at);
-        add_lag(body, touch->live[i], touch->x + at);
+    uint32_t before = points->sub_step++;
+    for (int i = 0; i < points->n_live && body->active; i++) {
+        size_t at = 3 * (size_t)points->live[i];
+        pal_copy3(points->x + at, body->d + at);
+        pal_copy3(points->v + at, body->dv + at);
+        add_lag(body, points->live[i], points->x + at);
     }
     if (body->active) return;
-    if (body->skin) pal_skin_frames_of(body->skin, body->d, touch->frame, touch->n_frame, body->skin_axes);
-    for (int i = 0; i < touch->n_live; i++) {
-        int vertex = touch->live[i];
-        double *x = touch->x + 3 * (size_t)vertex, *v = touch->v + 3 * (size_t)vertex, was[3];
+    if (body->skin) pal_skin_frames_of(body->skin, body->d, points->frame, points->n_frame, body->skin_axes);
+    for (int i = 0; i < points->n_live; i++) {
+        int vertex = points->live[i];
+        double *x = points->x + 3 * (size_t)vertex, *v = points->v + 3 * (size_t)vertex, was[3];
         int32_t node[PAL_SKIN_NEIGHBOURS];
         double weight[PAL_SKIN_NEIGHBOURS];
         pal_copy3(was, x);
@@ -154,61 +191,44 @@ void pal_contact_points_update(pal_contact_points *touch, const pal_body *body, 
         else
             pal_copy3(x, body->d + 3 * (size_t)body->shown_node[vertex]);
         add_lag(body, vertex, x);
-        bool followed = touch->seen[vertex] == before && before > 0;
-        touch->seen[vertex] = touch->sub_step;
+        bool followed = points->seen[vertex] == before && before > 0;
+        points->seen[vertex] = points->sub_step;
         if (followed) {
-            for (int c = 0; c < 3; c++) v[c] = (x[c] - was[c]) / touch->dt_s;
+            for (int c = 0; c < 3; c++) v[c] = (x[c] - was[c]) / points->dt_s;
             continue;
         }
         pal_set3(v, 0, 0, 0);
         int n = pal_contact_points_nodes(body, vertex, node, weight);
         for (int k = 0; k < n; k++) pal_axpy3(v, weight[k], body->dv + 3 * (size_t)node[k]);
     }
-    touch->dt_s = dt_s;
+    points->dt_s = dt_s;
 }
 
-/* corners of a point and their shares; returns how many */
-static int corners(const pal_contact_points *touch, int point, int32_t *vertex, double *share)
-{
-    if (point < touch->n_vertex) {
-        vertex[0] = point;
-        share[0] = 1;
-        return 1;
-    }
-    size_t k = 3 * (size_t)(point - touch->n_vertex);
-    for (size_t c = 0; c < 3; c++) {
-        vertex[c] = touch->corner[k + c];
-        share[c] = (double)touch->share[k + c];
-    }
-    share[0] = 1 - share[1] - share[2];
-    return 3;
-}
-
-static void blend(const pal_contact_points *touch, int point, const double *from, double out[3])
+static void blend(const pal_contact_points *points, int point, const double *from, double out[3])
 {
     int32_t vertex[3];
     double share[3], sum[3] = {0};
-    int n = corners(touch, point, vertex, share);
+    int n = pal_contact_samples_corners(&points->sample, point, vertex, share);
     for (int k = 0; k < n; k++) pal_axpy3(sum, share[k], from + 3 * (size_t)vertex[k]);
     pal_copy3(out, sum);
 }
 
-void pal_contact_points_position(const pal_contact_points *touch, int point, double x[3])
+void pal_contact_points_position(const pal_contact_points *points, int point, double x[3])
 {
-    blend(touch, point, touch->x, x);
+    blend(points, point, points->x, x);
 }
 
-void pal_contact_points_velocity(const pal_contact_points *touch, int point, double v[3])
+void pal_contact_points_velocity(const pal_contact_points *points, int point, double v[3])
 {
-    blend(touch, point, touch->v, v);
+    blend(points, point, points->v, v);
 }
 
 /* a point of body->shown, vertex or sample */
-static void shown_point(const pal_contact_points *touch, const pal_body *body, int point, double p[3])
+static void shown_point(const pal_contact_points *points, const pal_body *body, int point, double p[3])
 {
     int32_t vertex[3];
     double share[3];
-    int n = corners(touch, point, vertex, share);
+    int n = pal_contact_samples_corners(&points->sample, point, vertex, share);
     pal_set3(p, 0, 0, 0);
     for (int k = 0; k < n; k++)
         for (int c = 0; c < 3; c++) p[c] += share[k] * (double)body->shown[3 * (size_t)vertex[k] + (size_t)c];
@@ -225,26 +245,26 @@ static void add_normal(const float *shown, const int32_t *corner, double sum[3])
     pal_add3(sum, sum, a[1]);
 }
 
-bool pal_contact_points_nearest(const pal_contact_points *touch, const pal_body *body, const double p[3],
+bool pal_contact_points_nearest(const pal_contact_points *points, const pal_body *body, const double p[3],
                                 double place[3], double normal[3])
 {
     double best = INFINITY, at[3], sum[3] = {0};
     int nearest = -1;
-    int n_vertex = body->active ? body->n_active : touch->n_vertex;
-    for (int k = 0; k < n_vertex + touch->n_fixed - touch->n_vertex; k++) {
-        int i = k >= n_vertex ? k - n_vertex + touch->n_vertex : body->active ? body->active[k] : k;
-        shown_point(touch, body, i, at);
+    int n_vertex = body->active ? body->n_active : points->sample.n_vertex;
+    for (int k = 0; k < n_vertex + points->sample.n_fixed - points->sample.n_vertex; k++) {
+        int i = k >= n_vertex ? k - n_vertex + points->sample.n_vertex : body->active ? body->active[k] : k;
+        shown_point(points, body, i, at);
         pal_sub3(at, at, p);
         double d2 = pal_dot3(at, at);
         if (d2 < best) best = d2, nearest = i;
     }
     if (nearest < 0) return false;
-    shown_point(touch, body, nearest, place);
-    if (nearest >= touch->n_vertex)
-        add_normal(body->shown, touch->corner + 3 * (size_t)(nearest - touch->n_vertex), sum);
+    shown_point(points, body, nearest, place);
+    if (nearest >= points->sample.n_vertex)
+        add_normal(body->shown, points->sample.corner + 3 * (size_t)(nearest - points->sample.n_vertex), sum);
     else
-        for (int k = touch->fan_start[nearest]; k < touch->fan_end[nearest]; k++)
-            add_normal(body->shown, body->surface->tri + 3 * (size_t)touch->fan[k], sum);
+        for (int k = points->sample.fan_start[nearest]; k < points->sample.fan_end[nearest]; k++)
+            add_normal(body->shown, body->surface->tri + 3 * (size_t)points->sample.fan[k], sum);
     return pal_unit3(normal, sum, 0);
 }
 
@@ -278,12 +298,12 @@ static void lever(const pal_body *body, int vertex, int k, double arm[3])
                  (double)coef[2] * (double)axes[8 + c];
 }
 
-int pal_contact_points_slots(const pal_contact_points *touch, const pal_body *body, int point, int32_t *slot,
+int pal_contact_points_slots(const pal_contact_points *points, const pal_body *body, int point, int32_t *slot,
                              double *weight, double (*arm)[3])
 {
     int32_t vertex[3];
     double share[3];
-    int n = corners(touch, point, vertex, share), m = 0;
+    int n = pal_contact_samples_corners(&points->sample, point, vertex, share), m = 0;
     for (int c = 0; c < n; c++) {
         int n_slot = node_order(body, vertex[c], slot + m, weight + m);
         for (int k = 0; k < n_slot; k++, m++) {
@@ -302,26 +322,26 @@ int pal_contact_points_slot_node(const pal_body *body, int slot)
     return slot_node(body, slot);
 }
 
-void pal_contact_points_force_begin(pal_contact_points *touch)
+void pal_contact_points_force_begin(pal_contact_points *points)
 {
-    touch->turn++;
-    touch->n_slot = touch->n_node = 0;
+    points->turn++;
+    points->n_slot = points->n_node = 0;
 }
 
-void pal_contact_points_add_force(pal_contact_points *touch, const pal_body *body, int point, const double force_N[3])
+void pal_contact_points_add_force(pal_contact_points *points, const pal_body *body, int point, const double force_N[3])
 {
     int32_t vertex[3], slot[PAL_SKIN_NEIGHBOURS];
     double share[3], weight[PAL_SKIN_NEIGHBOURS];
-    int n = corners(touch, point, vertex, share);
+    int n = pal_contact_samples_corners(&points->sample, point, vertex, share);
     for (int c = 0; c < n; c++) {
         int m = node_order(body, vertex[c], slot, weight);
         for (int k = 0; k < m; k++) {
-            double *f = touch->slot_force + 3 * (size_t)slot[k], *t = touch->slot_torque + 3 * (size_t)slot[k];
-            if (touch->slot_mark[slot[k]] != touch->turn) {
-                touch->slot_mark[slot[k]] = touch->turn;
+            double *f = points->slot_force + 3 * (size_t)slot[k], *t = points->slot_torque + 3 * (size_t)slot[k];
+            if (points->slot_mark[slot[k]] != points->turn) {
+                points->slot_mark[slot[k]] = points->turn;
                 pal_set3(f, 0, 0, 0);
                 pal_set3(t, 0, 0, 0);
-                touch->slot[touch->n_slot++] = slot[k];
+                points->slot[points->n_slot++] = slot[k];
             }
             pal_axpy3(f, share[c] * weight[k], force_N);
             if (!body->skin) continue;
@@ -333,22 +353,22 @@ void pal_contact_points_add_force(pal_contact_points *touch, const pal_body *bod
     }
 }
 
-static void add_force(pal_contact_points *touch, int node, double scale, const double force_N[3])
+static void add_force(pal_contact_points *points, int node, double scale, const double force_N[3])
 {
-    double *f = touch->force + 3 * (size_t)node;
-    if (touch->node_mark[node] != touch->turn) {
-        touch->node_mark[node] = touch->turn;
+    double *f = points->force + 3 * (size_t)node;
+    if (points->node_mark[node] != points->turn) {
+        points->node_mark[node] = points->turn;
         pal_set3(f, 0, 0, 0);
-        touch->node[touch->n_node++] = node;
+        points->node[points->n_node++] = node;
     }
     pal_axpy3(f, scale, force_N);
 }
 
-const pal_frame_spin *pal_contact_points_frame_spin(pal_contact_points *touch, const pal_body *body, int slot)
+const pal_frame_spin *pal_contact_points_frame_spin(pal_contact_points *points, const pal_body *body, int slot)
 {
-    pal_frame_spin *t = &touch->turning[slot];
-    if (touch->spin_mark[slot] == touch->sub_step) return t;
-    touch->spin_mark[slot] = touch->sub_step;
+    pal_frame_spin *t = &points->turning[slot];
+    if (points->spin_mark[slot] == points->sub_step) return t;
+    points->spin_mark[slot] = points->sub_step;
     pal_frame_spin_find(body, slot, t);
     return t;
 }
@@ -356,9 +376,9 @@ const pal_frame_spin *pal_contact_points_frame_spin(pal_contact_points *touch, c
 /* The torque on a frame as forces on the nodes around it: the transpose of its spin. With
  *     spin = X x X' + (Y'.Z) X,  X' = (1 - X X^T) N' / |N|,  Y'.Z = (Z.e' - (e.X) Z.X') / |e_t|
  * the torque's work is (t x X).X' + (t.X) Y'.Z. */
-static void turn_frame(pal_contact_points *touch, const pal_body *body, int slot, const double torque[3])
+static void turn_frame(pal_contact_points *points, const pal_body *body, int slot, const double torque[3])
 {
-    const pal_frame_spin *t = pal_contact_points_frame_spin(touch, body, slot);
+    const pal_frame_spin *t = pal_contact_points_frame_spin(points, body, slot);
     if (!t->turns) return;
     const pal_skin *skin = body->skin;
     int node = skin->frame[slot];
@@ -366,7 +386,7 @@ static void turn_frame(pal_contact_points *touch, const pal_body *body, int slot
     double twist = t->part * pal_dot3(torque, t->X), h[3], f[3], sum[3];
     /* the edge's own part of the twist about X */
     pal_scale3(sum, -twist * t->per_reach, t->Z);
-    add_force(touch, t->end, twist * t->per_reach, t->Z);
+    add_force(points, t->end, twist * t->per_reach, t->Z);
     /* the rest tilts the normal */
     pal_cross3(h, torque, t->X);
     pal_scale3(h, t->part, h);
@@ -378,19 +398,19 @@ static void turn_frame(pal_contact_points *touch, const pal_body *body, int slot
         pal_sub3(a, body->d + 3 * (size_t)skin->fan[2 * i], o);
         pal_sub3(b, body->d + 3 * (size_t)skin->fan[2 * i + 1], o);
         pal_cross3(f, b, h);
-        add_force(touch, skin->fan[2 * i], 1, f);
+        add_force(points, skin->fan[2 * i], 1, f);
         pal_sub3(sum, sum, f);
         pal_cross3(f, h, a);
-        add_force(touch, skin->fan[2 * i + 1], 1, f);
+        add_force(points, skin->fan[2 * i + 1], 1, f);
         pal_sub3(sum, sum, f);
     }
-    add_force(touch, node, 1, sum);
+    add_force(points, node, 1, sum);
 }
 
 /* spin of a frame when its nodes move with v = force / mass, held nodes not at all */
-static void spin_frame(pal_contact_points *touch, const pal_body *body, int slot, const double *v, double spin[3])
+static void spin_frame(pal_contact_points *points, const pal_body *body, int slot, const double *v, double spin[3])
 {
-    const pal_frame_spin *t = pal_contact_points_frame_spin(touch, body, slot);
+    const pal_frame_spin *t = pal_contact_points_frame_spin(points, body, slot);
     pal_set3(spin, 0, 0, 0);
     if (!t->turns) return;
     const pal_skin *skin = body->skin;
@@ -416,21 +436,21 @@ static void spin_frame(pal_contact_points *touch, const pal_body *body, int slot
     pal_scale3(spin, t->part, spin);
 }
 
-static void to_nodes(pal_contact_points *touch, const pal_body *body)
+static void to_nodes(pal_contact_points *points, const pal_body *body)
 {
-    for (int i = 0; i < touch->n_slot; i++) {
-        int slot = touch->slot[i];
-        add_force(touch, slot_node(body, slot), 1, touch->slot_force + 3 * (size_t)slot);
-        if (body->skin) turn_frame(touch, body, slot, touch->slot_torque + 3 * (size_t)slot);
+    for (int i = 0; i < points->n_slot; i++) {
+        int slot = points->slot[i];
+        add_force(points, slot_node(body, slot), 1, points->slot_force + 3 * (size_t)slot);
+        if (body->skin) turn_frame(points, body, slot, points->slot_torque + 3 * (size_t)slot);
     }
 }
 
-double pal_contact_points_assemble(pal_contact_points *touch, const pal_body *body)
+double pal_contact_points_assemble(pal_contact_points *points, const pal_body *body)
 {
     double largest2 = 0;
-    to_nodes(touch, body);
-    for (int i = 0; i < touch->n_node; i++) {
-        const double *f = touch->force + 3 * (size_t)touch->node[i];
+    to_nodes(points, body);
+    for (int i = 0; i < points->n_node; i++) {
+        const double *f = points->force + 3 * (size_t)points->node[i];
         largest2 = fmax(largest2, pal_dot3(f, f));
     }
     double cap = body->load_cap_N;
@@ -438,12 +458,12 @@ double pal_contact_points_assemble(pal_contact_points *touch, const pal_body *bo
 }
 
 /* motion of a point along `away` when the nodes move with v and the frames with the spins in slot_torque */
-static double point_motion(const pal_contact_points *touch, const pal_body *body, const pal_contact *contact,
+static double point_motion(const pal_contact_points *points, const pal_body *body, const pal_contact *contact,
                            const double *v)
 {
     int32_t vertex[3], slot[PAL_SKIN_NEIGHBOURS];
     double share[3], weight[PAL_SKIN_NEIGHBOURS], sum = 0;
-    int n = corners(touch, contact->point, vertex, share);
+    int n = pal_contact_samples_corners(&points->sample, contact->point, vertex, share);
     for (int c = 0; c < n; c++) {
         int m = node_order(body, vertex[c], slot, weight);
         for (int k = 0; k < m; k++) {
@@ -451,19 +471,19 @@ static double point_motion(const pal_contact_points *touch, const pal_body *body
             sum += share[c] * weight[k] * pal_dot3(contact->away, v + 3 * (size_t)slot_node(body, slot[k]));
             if (!body->skin) continue;
             lever(body, vertex[c], k, arm);
-            pal_cross3(turned, touch->slot_torque + 3 * (size_t)slot[k], arm);
+            pal_cross3(turned, points->slot_torque + 3 * (size_t)slot[k], arm);
             sum += share[c] * pal_dot3(contact->away, turned);
         }
     }
     return sum;
 }
 
-double pal_contact_points_bound(const pal_contact_points *touch, const pal_body *body, int point, double k_N_m,
+double pal_contact_points_bound(const pal_contact_points *points, const pal_body *body, int point, double k_N_m,
                                 double *bound_N_m)
 {
     int32_t vertex[3];
     double share[3], rate = 0;
-    int n = corners(touch, point, vertex, share);
+    int n = pal_contact_samples_corners(&points->sample, point, vertex, share);
     for (int c = 0; c < n; c++) {
         int32_t node = body->shown_node[vertex[c]];
         if (bound_N_m) bound_N_m[node] += k_N_m * share[c];
@@ -474,17 +494,18 @@ double pal_contact_points_bound(const pal_contact_points *touch, const pal_body 
 
 /* the same where points carry the nodes: the sum of the eigenvalues is no less than the largest, and what a point
  * between nodes moves is no more than their mean */
-static double sum_of_rates(const pal_contact_points *touch, const pal_body *body, const pal_contact *contact, int n)
+static double sum_of_rates(const pal_contact_points *points, const pal_body *body, const pal_contact *contact, int n)
 {
     double rate = 0;
-    for (int i = 0; i < n; i++) rate += pal_contact_points_bound(touch, body, contact[i].point, contact[i].k_N_m, NULL);
+    for (int i = 0; i < n; i++)
+        rate += pal_contact_points_bound(points, body, contact[i].point, contact[i].k_N_m, NULL);
     return rate;
 }
 
-double pal_contact_points_max_eigenvalue(pal_contact_points *touch, const pal_body *body, const pal_contact *contact,
+double pal_contact_points_max_eigenvalue(pal_contact_points *points, const pal_body *body, const pal_contact *contact,
                                          int n)
 {
-    if (body->interpolation) return sum_of_rates(touch, body, contact, n);
+    if (body->interpolation) return sum_of_rates(points, body, contact, n);
     enum { PASSES = 2, MOST = 256 };
     /* a patch of very many points is judged by a part of them, each standing for several */
     int stride = (n + MOST - 1) / MOST, m = 0;
@@ -493,26 +514,26 @@ double pal_contact_points_max_eigenvalue(pal_contact_points *touch, const pal_bo
     for (int pass = 0; pass < PASSES && m > 0; pass++) {
         double with = 0, before = 0, f[3];
         /* forces of the present motion, then accelerations */
-        pal_contact_points_force_begin(touch);
+        pal_contact_points_force_begin(points);
         for (int i = 0; i < m; i++) {
             const pal_contact *c = &contact[i * stride];
             pal_scale3(f, k_step * c->k_N_m * motion[i], c->away);
-            pal_contact_points_add_force(touch, body, c->point, f);
+            pal_contact_points_add_force(points, body, c->point, f);
         }
-        to_nodes(touch, body);
-        for (int i = 0; i < touch->n_node; i++) {
-            int node = touch->node[i];
-            pal_scale3(touch->force + 3 * (size_t)node, body->fixed[node] ? 0 : 1 / body->mass_kg[node],
-                       touch->force + 3 * (size_t)node);
+        to_nodes(points, body);
+        for (int i = 0; i < points->n_node; i++) {
+            int node = points->node[i];
+            pal_scale3(points->force + 3 * (size_t)node, body->support[node] ? 0 : 1 / body->mass_kg[node],
+                       points->force + 3 * (size_t)node);
         }
-        for (int i = 0; i < touch->n_slot && body->skin; i++) {
-            int slot = touch->slot[i];
-            spin_frame(touch, body, slot, touch->force, touch->slot_torque + 3 * (size_t)slot);
+        for (int i = 0; i < points->n_slot && body->skin; i++) {
+            int slot = points->slot[i];
+            spin_frame(points, body, slot, points->force, points->slot_torque + 3 * (size_t)slot);
         }
         /* what the points do then: a Rayleigh quotient in the norm of k */
         for (int i = 0; i < m; i++) {
             const pal_contact *c = &contact[i * stride];
-            double next = point_motion(touch, body, c, touch->force);
+            double next = point_motion(points, body, c, points->force);
             with += c->k_N_m * next * next;
             before += c->k_N_m * motion[i] * motion[i];
             motion[i] = next;
@@ -524,14 +545,14 @@ double pal_contact_points_max_eigenvalue(pal_contact_points *touch, const pal_bo
     return rate;
 }
 
-pal_err pal_contact_points_young(const pal_contact_points *touch, const pal_body *body, const pal_body_def *def,
+pal_err pal_contact_points_young(const pal_contact_points *points, const pal_body *body, const pal_body_def *def,
                                  pal_arena *arena, float **out)
 {
     *out = NULL;
     if (def->n_region == 0 && def->n_stroke == 0) return PAL_ERR_OK;
-    *out = PAL_NEW(arena, float, touch->n_vertex);
+    *out = PAL_NEW(arena, float, points->sample.n_vertex);
     if (!*out) return PAL_ERR_MEMORY;
-    for (int i = 0; i < touch->n_vertex; i++) {
+    for (int i = 0; i < points->sample.n_vertex; i++) {
         pal_material at;
         pal_material_painted(def, body->surface->x + 3 * (size_t)i, &at);
         if (at.young_Pa != def->material.young_Pa) (*out)[i] = (float)at.young_Pa;
@@ -539,32 +560,32 @@ pal_err pal_contact_points_young(const pal_contact_points *touch, const pal_body
     return PAL_ERR_OK;
 }
 
-bool pal_contact_points_overlap(pal_contact_points *touch, const pal_body *body, const pal_contact *a, int n_a,
+bool pal_contact_points_overlap(pal_contact_points *points, const pal_body *body, const pal_contact *a, int n_a,
                                 const pal_contact *b, int n_b)
 {
     int32_t vertex[3], slot[PAL_SKIN_NEIGHBOURS];
     double share[3], weight[PAL_SKIN_NEIGHBOURS];
-    touch->turn++;
+    points->turn++;
     for (int pass = 0; pass < 2; pass++)
         for (int i = 0; i < (pass ? n_b : n_a); i++) {
-            int n = corners(touch, (pass ? b : a)[i].point, vertex, share);
+            int n = pal_contact_samples_corners(&points->sample, (pass ? b : a)[i].point, vertex, share);
             for (int c = 0; c < n; c++) {
                 int m = node_order(body, vertex[c], slot, weight);
                 for (int k = 0; k < m; k++)
                     if (pass == 0)
-                        touch->tool_mark[slot[k]] = touch->turn;
-                    else if (touch->tool_mark[slot[k]] == touch->turn)
+                        points->tool_mark[slot[k]] = points->turn;
+                    else if (points->tool_mark[slot[k]] == points->turn)
                         return true;
             }
         }
     return false;
 }
 
-void pal_contact_points_apply(const pal_contact_points *touch, pal_body *body, double scale)
+void pal_contact_points_apply(const pal_contact_points *points, pal_body *body, double scale)
 {
-    for (int i = 0; i < touch->n_node; i++) {
-        int32_t node = touch->node[i];
-        pal_axpy3(body->load + 3 * (size_t)node, scale, touch->force + 3 * (size_t)node);
+    for (int i = 0; i < points->n_node; i++) {
+        int32_t node = points->node[i];
+        pal_axpy3(body->load + 3 * (size_t)node, scale, points->force + 3 * (size_t)node);
     }
 }
 

@@ -1,17 +1,11 @@
-/* The contact points themselves: fixed and passing samples of triangles, fans, areas.
- *
- * A body that adapts (sim/adaptive_surface.h) draws other triangles from time to time, and only its active vertices are
- * points then. Its fixed samples, fans and areas are made again when body->revision has changed, at the cost of what is
- * drawn now. */
-#include "server/sim/contact/contact_points.h"
+/* Fixed and passing samples of triangles, fans and areas (contact_samples.h). */
+#include "server/sim/contact/contact_samples.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/contact/tuning.h"
 
 #include <math.h>
 #include <string.h>
-
-/* passing samples of a step, and parts that an edge is cut into for them */
-enum { PASSING_MAX = 4096, PASSING_CUTS = 6 };
 
 static double longest_edge(const pal_surface *surface, int tri)
 {
@@ -93,12 +87,10 @@ static int sample(int32_t *corner_out, float *share_out, const int32_t *corner, 
     return k;
 }
 
-static pal_err allocate(const pal_body *body, pal_arena *arena, int n_sample, pal_contact_points *t)
+static pal_err allocate(const pal_body *body, pal_arena *arena, int n_sample, pal_contact_samples *t)
 {
-    size_t n_vertex = (size_t)body->n_shown, n_node = (size_t)body->n_node;
-    size_t n_frame = body->skin ? (size_t)body->skin->n_frame : 0;
-    size_t n_tri = (size_t)(body->active ? body->dofs.n_slot : body->surface->n_tri),
-           room = (size_t)n_sample + PASSING_MAX;
+    size_t n_vertex = (size_t)body->n_shown, room = (size_t)n_sample + PASSING_MAX;
+    size_t n_tri = (size_t)(body->active ? body->dofs.n_slot : body->surface->n_tri);
     t->corner = PAL_NEW(arena, int32_t, 3 * room);
     t->share = PAL_NEW(arena, float, 3 * room);
     t->area_m2 = PAL_NEW(arena, double, n_vertex + room);
@@ -107,32 +99,12 @@ static pal_err allocate(const pal_body *body, pal_arena *arena, int n_sample, pa
     if (body->active) t->run = PAL_NEW(arena, int32_t, n_tri + 1);
     t->fan = PAL_NEW(arena, int32_t, 3 * n_tri);
     t->tri_mark = PAL_NEW(arena, uint32_t, n_tri);
-    t->live = PAL_NEW(arena, int32_t, n_vertex);
-    t->frame = PAL_NEW(arena, int32_t, n_frame);
-    t->live_mark = PAL_NEW(arena, uint32_t, n_vertex);
-    t->frame_mark = PAL_NEW(arena, uint32_t, n_frame);
-    t->x = PAL_NEW(arena, double, 3 * n_vertex);
-    t->v = PAL_NEW(arena, double, 3 * n_vertex);
-    size_t n_slot = body->skin ? n_frame : n_node;
-    t->slot = PAL_NEW(arena, int32_t, n_slot);
-    t->node = PAL_NEW(arena, int32_t, n_node);
-    t->slot_mark = PAL_NEW(arena, uint32_t, n_slot);
-    t->node_mark = PAL_NEW(arena, uint32_t, n_node);
-    t->turning = PAL_NEW(arena, pal_frame_spin, n_frame);
-    t->spin_mark = PAL_NEW(arena, uint32_t, n_frame);
-    t->tool_mark = PAL_NEW(arena, uint32_t, n_slot);
-    t->seen = PAL_NEW(arena, uint32_t, n_vertex);
-    t->slot_force = PAL_NEW(arena, double, 3 * n_slot);
-    t->slot_torque = PAL_NEW(arena, double, 3 * n_slot);
-    t->force = PAL_NEW(arena, double, 3 * n_node);
-    bool all = t->fan_end && (t->run || !body->active) && t->corner && t->share && t->area_m2 && t->fan_start &&
-               t->fan && t->tri_mark && t->live && t->frame && t->live_mark && t->frame_mark && t->x && t->v &&
-               t->slot && t->node && t->slot_mark && t->node_mark && t->slot_force && t->slot_torque && t->force &&
-               t->turning && t->spin_mark && t->tool_mark && t->seen;
+    bool all = t->corner && t->share && t->area_m2 && t->fan_start && t->fan_end && (t->run || !body->active) &&
+               t->fan && t->tri_mark;
     return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-static void make_fans(const pal_surface *surface, pal_contact_points *t)
+static void make_fans(const pal_surface *surface, pal_contact_samples *t)
 {
     /* starts are built one place ahead, so that filling leaves them in place */
     for (size_t i = 0; i < 3 * (size_t)surface->n_tri; i++) t->fan_start[surface->tri[i] + 2]++;
@@ -143,7 +115,7 @@ static void make_fans(const pal_surface *surface, pal_contact_points *t)
 
 /* fixed samples, and the rest area of samples and vertices; returns how many samples. Those that have no room any more
  * are left to the vertices */
-static int make_samples(const pal_surface *surface, pal_contact_points *t)
+static int make_samples(const pal_surface *surface, pal_contact_samples *t)
 {
     int k = 0, room = t->max_point - PASSING_MAX - t->n_vertex;
     t->n_run = 0;
@@ -165,7 +137,7 @@ static int make_samples(const pal_surface *surface, pal_contact_points *t)
 }
 
 /* all of that for the triangles that a body that adapts draws now; what vertices out of use have is never looked at */
-static void make_active(const pal_body *body, pal_contact_points *t)
+static void make_active(const pal_body *body, pal_contact_samples *t)
 {
     const pal_surface *surface = body->surface;
     size_t n_corner = 3 * (size_t)surface->n_tri;
@@ -182,8 +154,8 @@ static void make_active(const pal_body *body, pal_contact_points *t)
     t->revision = body->revision;
 }
 
-pal_err pal_contact_points_make(const pal_body *body, double spacing_m, int max_sample, pal_arena *arena,
-                                pal_contact_points *out)
+pal_err pal_contact_samples_make(const pal_body *body, double spacing_m, int max_sample, pal_arena *arena,
+                                 pal_contact_samples *out)
 {
     const pal_surface *surface = body->surface;
     if (!surface || body->n_shown <= 0 || surface->n_vertex != body->n_shown || !(spacing_m > 0))
@@ -193,7 +165,7 @@ pal_err pal_contact_points_make(const pal_body *body, double spacing_m, int max_
         spacing_m *= 1.25;
         n_sample = count_samples(body, spacing_m);
     }
-    pal_contact_points t = {.n_vertex = body->n_shown, .spacing_m = spacing_m};
+    pal_contact_samples t = {.n_vertex = body->n_shown, .spacing_m = spacing_m};
     t.n_fixed = t.n_point = body->n_shown + (int)n_sample;
     t.max_point = t.n_fixed + PASSING_MAX;
     PAL_TRY(allocate(body, arena, (int)n_sample, &t));
@@ -207,22 +179,44 @@ pal_err pal_contact_points_make(const pal_body *body, double spacing_m, int max_
     return PAL_ERR_OK;
 }
 
-bool pal_contact_points_update_topology(pal_contact_points *touch, const pal_body *body)
+bool pal_contact_samples_update_topology(pal_contact_samples *t, const pal_body *body)
 {
-    if (!body->active || touch->revision == body->revision) return false;
-    make_active(body, touch);
+    if (!body->active || t->revision == body->revision) return false;
+    make_active(body, t);
     return true;
 }
 
-void pal_contact_points_sample_stretched(pal_contact_points *touch, const pal_body *body, const int32_t *list, int n)
+void pal_contact_samples_begin(pal_contact_samples *t)
 {
-    double spacing2 = touch->spacing_m * touch->spacing_m;
+    t->mark++;
+    t->n_point = t->n_fixed;
+}
+
+int pal_contact_samples_corners(const pal_contact_samples *t, int point, int32_t *vertex, double *share)
+{
+    if (point < t->n_vertex) {
+        vertex[0] = point;
+        share[0] = 1;
+        return 1;
+    }
+    size_t k = 3 * (size_t)(point - t->n_vertex);
+    for (size_t c = 0; c < 3; c++) {
+        vertex[c] = t->corner[k + c];
+        share[c] = (double)t->share[k + c];
+    }
+    share[0] = 1 - share[1] - share[2];
+    return 3;
+}
+
+void pal_contact_samples_add_stretched(pal_contact_samples *t, const pal_body *body, const int32_t *list, int n)
+{
+    double spacing2 = t->spacing_m * t->spacing_m;
     for (int i = 0; i < n; i++)
-        for (int k = touch->fan_start[list[i]]; k < touch->fan_end[list[i]]; k++) {
-            int32_t tri = touch->fan[k];
+        for (int k = t->fan_start[list[i]]; k < t->fan_end[list[i]]; k++) {
+            int32_t tri = t->fan[k];
             const int32_t *corner = body->surface->tri + 3 * (size_t)tri;
-            if (touch->tri_mark[tri] == touch->mark) continue;
-            touch->tri_mark[tri] = touch->mark;
+            if (t->tri_mark[tri] == t->mark) continue;
+            t->tri_mark[tri] = t->mark;
             double longest2 = 0;
             for (int c = 0; c < 3; c++) {
                 const float *p = body->shown + 3 * (size_t)corner[c],
@@ -231,12 +225,12 @@ void pal_contact_points_sample_stretched(pal_contact_points *touch, const pal_bo
                 double length2 = x * x + y * y + z * z;
                 if (length2 > longest2) longest2 = length2;
             }
-            if (!(longest2 > spacing2) || cuts(body->surface, tri, touch->spacing_m) > 1) continue;
+            if (!(longest2 > spacing2) || cuts(body->surface, tri, t->spacing_m) > 1) continue;
             int cut = (int)fmin(ceil(sqrt(longest2 / spacing2)), PASSING_CUTS);
-            if (touch->n_point + cut * cut > touch->max_point) return;
-            size_t at = (size_t)(touch->n_point - touch->n_vertex);
-            int made = sample(touch->corner + 3 * at, touch->share + 3 * at, corner, cut);
+            if (t->n_point + cut * cut > t->max_point) return;
+            size_t at = (size_t)(t->n_point - t->n_vertex);
+            int made = sample(t->corner + 3 * at, t->share + 3 * at, corner, cut);
             double area = tri_area(body->surface, tri) / made;
-            for (int j = 0; j < made; j++) touch->area_m2[touch->n_point++] = area;
+            for (int j = 0; j < made; j++) t->area_m2[t->n_point++] = area;
         }
 }

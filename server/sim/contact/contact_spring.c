@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-/* slots of one body that tools touch at a time, and boundary faces around them */
+/* slots of one body that tools points at a time, and boundary faces around them */
 enum { MOST_FRAME = 1024, MOST_FACE = 8 * MOST_FRAME };
 
 pal_err pal_contact_springs_make(const pal_body *body, int max_row, pal_arena *arena, pal_contact_springs *out)
@@ -34,29 +34,28 @@ pal_err pal_contact_springs_make(const pal_body *body, int max_row, pal_arena *a
     return PAL_ERR_OK;
 }
 
-void pal_contact_springs_begin(pal_contact_springs *contact_springs)
+void pal_contact_springs_begin(pal_contact_springs *springs)
 {
-    contact_springs->n_row = contact_springs->n_part = contact_springs->n_frame = contact_springs->n_face =
-        contact_springs->n_node = 0;
-    contact_springs->start[0] = 0;
-    contact_springs->turn++;
+    springs->n_row = springs->n_part = springs->n_frame = springs->n_face = springs->n_node = 0;
+    springs->start[0] = 0;
+    springs->turn++;
 }
 
-static void use_node(pal_contact_springs *contact_springs, int node)
+static void use_node(pal_contact_springs *springs, int node)
 {
-    if (contact_springs->node_mark[node] == contact_springs->turn) return;
-    contact_springs->node_mark[node] = contact_springs->turn;
-    contact_springs->node[contact_springs->n_node++] = node;
+    if (springs->node_mark[node] == springs->turn) return;
+    springs->node_mark[node] = springs->turn;
+    springs->node[springs->n_node++] = node;
 }
 
 /* spin = part/|N| ([X]x - rise X Z') N' + part/reach X (Z . e') (sim/frame_spin.h; X x X X' and Z . X are 0) */
-static void make_turn(pal_contact_springs *contact_springs, pal_contact_points *touch, const pal_body *body,
+static void make_turn(pal_contact_springs *springs, pal_contact_points *points, const pal_body *body,
                       pal_contact_spring_frame *f)
 {
     const pal_skin *skin = body->skin;
-    const pal_frame_spin *t = pal_contact_points_frame_spin(touch, body, f->slot);
+    const pal_frame_spin *t = pal_contact_points_frame_spin(points, body, f->slot);
     int first = skin->fan_start[f->slot], n = skin->fan_start[f->slot + 1] - first;
-    if (!t->turns || contact_springs->n_face + n > contact_springs->max_face) return;
+    if (!t->turns || springs->n_face + n > springs->max_face) return;
     const double *X = t->X, *Z = t->Z, *o = body->d + 3 * (size_t)f->node;
     double s = t->part * t->per_normal;
     const double cross[9] = {0, -X[2], X[1], X[2], 0, -X[0], -X[1], X[0], 0};
@@ -65,48 +64,48 @@ static void make_turn(pal_contact_springs *contact_springs, pal_contact_points *
     pal_scale3(f->twist, t->part * t->per_reach, X);
     pal_copy3(f->Z, Z);
     f->end = t->end;
-    use_node(contact_springs, t->end);
-    f->first_face = contact_springs->n_face;
+    use_node(springs, t->end);
+    f->first_face = springs->n_face;
     f->n_face = n;
     for (int i = first; i < first + n; i++) {
-        pal_contact_spring_face *face = &contact_springs->face[contact_springs->n_face++];
+        pal_contact_spring_face *face = &springs->face[springs->n_face++];
         face->a = skin->fan[2 * i], face->b = skin->fan[2 * i + 1];
         pal_sub3(face->to_a, body->d + 3 * (size_t)face->a, o);
         pal_sub3(face->to_b, body->d + 3 * (size_t)face->b, o);
-        use_node(contact_springs, face->a);
-        use_node(contact_springs, face->b);
+        use_node(springs, face->a);
+        use_node(springs, face->b);
     }
 }
 
 /* index of a slot among those in use; -1: no room */
-static int use_slot(pal_contact_springs *contact_springs, pal_contact_points *touch, const pal_body *body, int slot)
+static int use_slot(pal_contact_springs *springs, pal_contact_points *points, const pal_body *body, int slot)
 {
-    if (contact_springs->local_mark[slot] == contact_springs->turn) return contact_springs->local[slot];
-    if (contact_springs->n_frame == contact_springs->max_frame) return -1;
-    pal_contact_spring_frame *f = &contact_springs->frame[contact_springs->n_frame];
+    if (springs->local_mark[slot] == springs->turn) return springs->local[slot];
+    if (springs->n_frame == springs->max_frame) return -1;
+    pal_contact_spring_frame *f = &springs->frame[springs->n_frame];
     *f = (pal_contact_spring_frame){.slot = slot, .node = pal_contact_points_slot_node(body, slot), .end = -1};
-    use_node(contact_springs, f->node);
-    if (body->skin) make_turn(contact_springs, touch, body, f);
-    contact_springs->local_mark[slot] = contact_springs->turn;
-    return contact_springs->local[slot] = contact_springs->n_frame++;
+    use_node(springs, f->node);
+    if (body->skin) make_turn(springs, points, body, f);
+    springs->local_mark[slot] = springs->turn;
+    return springs->local[slot] = springs->n_frame++;
 }
 
 /* adds a point's parts to the row that is being made; false: no room */
-static bool add_point(pal_contact_springs *contact_springs, pal_contact_points *touch, const pal_body *body, int point,
+static bool add_point(pal_contact_springs *springs, pal_contact_points *points, const pal_body *body, int point,
                       double weight, const double direction[3], int first)
 {
     int32_t slot[PAL_CONTACT_POINT_SLOTS];
     double share[PAL_CONTACT_POINT_SLOTS], arm[PAL_CONTACT_POINT_SLOTS][3];
-    int n = pal_contact_points_slots(touch, body, point, slot, share, arm);
+    int n = pal_contact_points_slots(points, body, point, slot, share, arm);
     for (int k = 0; k < n; k++) {
-        int local = use_slot(contact_springs, touch, body, slot[k]), i = first;
+        int local = use_slot(springs, points, body, slot[k]), i = first;
         if (local < 0) return false;
-        while (i < contact_springs->n_part && contact_springs->part[i].slot != local) i++;
-        if (i == contact_springs->most_part) return false;
-        pal_contact_spring_part *part = &contact_springs->part[i];
-        if (i == contact_springs->n_part) {
+        while (i < springs->n_part && springs->part[i].slot != local) i++;
+        if (i == springs->most_part) return false;
+        pal_contact_spring_part *part = &springs->part[i];
+        if (i == springs->n_part) {
             *part = (pal_contact_spring_part){.slot = local};
-            contact_springs->n_part++;
+            springs->n_part++;
         }
         /* direction . (spin x arm) = (arm x direction) . spin */
         double turn[3];
@@ -117,48 +116,48 @@ static bool add_point(pal_contact_springs *contact_springs, pal_contact_points *
     return true;
 }
 
-static int end_row(pal_contact_springs *contact_springs, int first, bool all, double k_N_m)
+static int end_row(pal_contact_springs *springs, int first, bool all, double k_N_m)
 {
     if (!all) {
-        contact_springs->n_part = first;
+        springs->n_part = first;
         return -1;
     }
-    contact_springs->k_N_m[contact_springs->n_row] = k_N_m;
-    contact_springs->start[contact_springs->n_row + 1] = contact_springs->n_part;
-    return contact_springs->n_row++;
+    springs->k_N_m[springs->n_row] = k_N_m;
+    springs->start[springs->n_row + 1] = springs->n_part;
+    return springs->n_row++;
 }
 
-int pal_contact_springs_add(pal_contact_springs *contact_springs, pal_contact_points *touch, const pal_body *body,
-                            int point, const double direction[3], double k_N_m)
+int pal_contact_springs_add(pal_contact_springs *springs, pal_contact_points *points, const pal_body *body, int point,
+                            const double direction[3], double k_N_m)
 {
-    int first = contact_springs->n_part;
-    if (contact_springs->n_row == contact_springs->max_row) return -1;
-    return end_row(contact_springs, first, add_point(contact_springs, touch, body, point, 1, direction, first), k_N_m);
+    int first = springs->n_part;
+    if (springs->n_row == springs->max_row) return -1;
+    return end_row(springs, first, add_point(springs, points, body, point, 1, direction, first), k_N_m);
 }
 
-int pal_contact_springs_add_mean(pal_contact_springs *contact_springs, pal_contact_points *touch, const pal_body *body,
+int pal_contact_springs_add_mean(pal_contact_springs *springs, pal_contact_points *points, const pal_body *body,
                                  const pal_contact *contact, const double *weight, int n, const double direction[3],
                                  double k_N_m)
 {
-    int first = contact_springs->n_part;
-    bool all = contact_springs->n_row < contact_springs->max_row;
+    int first = springs->n_part;
+    bool all = springs->n_row < springs->max_row;
     for (int i = 0; i < n && all; i++)
-        all = add_point(contact_springs, touch, body, contact[i].point, weight[i], direction, first);
-    return end_row(contact_springs, first, all, k_N_m);
+        all = add_point(springs, points, body, contact[i].point, weight[i], direction, first);
+    return end_row(springs, first, all, k_N_m);
 }
 
 /* velocity and spin of every frame in use when the nodes move with u */
-static void to_frames(const pal_contact_springs *contact_springs, const double *u)
+static void to_frames(const pal_contact_springs *springs, const double *u)
 {
-    for (int i = 0; i < contact_springs->n_frame; i++) {
-        const pal_contact_spring_frame *f = &contact_springs->frame[i];
+    for (int i = 0; i < springs->n_frame; i++) {
+        const pal_contact_spring_frame *f = &springs->frame[i];
         const double *v = u + 3 * (size_t)f->node;
-        double *state = contact_springs->state + 6 * (size_t)i, normal[3] = {0}, va[3], vb[3], e[3];
+        double *state = springs->state + 6 * (size_t)i, normal[3] = {0}, va[3], vb[3], e[3];
         pal_copy3(state, v);
         pal_set3(state + 3, 0, 0, 0);
         if (f->end < 0) continue;
         for (int k = f->first_face; k < f->first_face + f->n_face; k++) {
-            const pal_contact_spring_face *face = &contact_springs->face[k];
+            const pal_contact_spring_face *face = &springs->face[k];
             pal_sub3(va, u + 3 * (size_t)face->a, v);
             pal_sub3(vb, u + 3 * (size_t)face->b, v);
             pal_cross3(va, va, face->to_b);
@@ -173,11 +172,11 @@ static void to_frames(const pal_contact_springs *contact_springs, const double *
 }
 
 /* the transpose: forces and torques in state to nodes */
-static void from_frames(const pal_contact_springs *contact_springs, double *out)
+static void from_frames(const pal_contact_springs *springs, double *out)
 {
-    for (int i = 0; i < contact_springs->n_frame; i++) {
-        const pal_contact_spring_frame *f = &contact_springs->frame[i];
-        const double *state = contact_springs->state + 6 * (size_t)i;
+    for (int i = 0; i < springs->n_frame; i++) {
+        const pal_contact_spring_frame *f = &springs->frame[i];
+        const double *state = springs->state + 6 * (size_t)i;
         double own[3], h[3], g[3];
         pal_copy3(own, state);
         if (f->end >= 0) {
@@ -186,7 +185,7 @@ static void from_frames(const pal_contact_springs *contact_springs, double *out)
             pal_axpy3(own, -twist, f->Z);
             pal_tmul33(h, f->tilt, state + 3);
             for (int k = f->first_face; k < f->first_face + f->n_face; k++) {
-                const pal_contact_spring_face *face = &contact_springs->face[k];
+                const pal_contact_spring_face *face = &springs->face[k];
                 pal_cross3(g, face->to_b, h);
                 pal_add3(out + 3 * (size_t)face->a, out + 3 * (size_t)face->a, g);
                 pal_sub3(own, own, g);
@@ -199,85 +198,83 @@ static void from_frames(const pal_contact_springs *contact_springs, double *out)
     }
 }
 
-static double row_motion(const pal_contact_springs *contact_springs, int row)
+static double row_motion(const pal_contact_springs *springs, int row)
 {
     double sum = 0;
-    for (int k = contact_springs->start[row]; k < contact_springs->start[row + 1]; k++) {
-        const pal_contact_spring_part *part = &contact_springs->part[k];
-        const double *state = contact_springs->state + 6 * (size_t)part->slot;
+    for (int k = springs->start[row]; k < springs->start[row + 1]; k++) {
+        const pal_contact_spring_part *part = &springs->part[k];
+        const double *state = springs->state + 6 * (size_t)part->slot;
         sum += pal_dot3(part->linear, state) + pal_dot3(part->angular, state + 3);
     }
     return sum;
 }
 
-static void row_load(const pal_contact_springs *contact_springs, int row, double force_N)
+static void row_load(const pal_contact_springs *springs, int row, double force_N)
 {
-    for (int k = contact_springs->start[row]; k < contact_springs->start[row + 1]; k++) {
-        const pal_contact_spring_part *part = &contact_springs->part[k];
-        double *state = contact_springs->state + 6 * (size_t)part->slot;
+    for (int k = springs->start[row]; k < springs->start[row + 1]; k++) {
+        const pal_contact_spring_part *part = &springs->part[k];
+        double *state = springs->state + 6 * (size_t)part->slot;
         pal_axpy3(state, force_N, part->linear);
         pal_axpy3(state + 3, force_N, part->angular);
     }
 }
 
-static void clear_state(const pal_contact_springs *contact_springs)
+static void clear_state(const pal_contact_springs *springs)
 {
-    memset(contact_springs->state, 0, 6 * sizeof(double) * (size_t)contact_springs->n_frame);
+    memset(springs->state, 0, 6 * sizeof(double) * (size_t)springs->n_frame);
 }
 
-void pal_contact_springs_motion(pal_contact_springs *contact_springs, const double *u)
+void pal_contact_springs_motion(pal_contact_springs *springs, const double *u)
 {
-    to_frames(contact_springs, u);
-    for (int i = 0; i < contact_springs->n_row; i++) contact_springs->motion_m[i] = row_motion(contact_springs, i);
+    to_frames(springs, u);
+    for (int i = 0; i < springs->n_row; i++) springs->motion_m[i] = row_motion(springs, i);
 }
 
-void pal_contact_springs_multiply(pal_contact_springs *contact_springs, double s, const double *u, double *out)
+void pal_contact_springs_multiply(pal_contact_springs *springs, double s, const double *u, double *out)
 {
-    if (contact_springs->n_row == 0) return;
-    pal_contact_springs_motion(contact_springs, u);
-    clear_state(contact_springs);
-    for (int i = 0; i < contact_springs->n_row; i++)
-        if (contact_springs->k_N_m[i] != 0)
-            row_load(contact_springs, i, s * contact_springs->k_N_m[i] * contact_springs->motion_m[i]);
-    from_frames(contact_springs, out);
+    if (springs->n_row == 0) return;
+    pal_contact_springs_motion(springs, u);
+    clear_state(springs);
+    for (int i = 0; i < springs->n_row; i++)
+        if (springs->k_N_m[i] != 0) row_load(springs, i, s * springs->k_N_m[i] * springs->motion_m[i]);
+    from_frames(springs, out);
 }
 
-void pal_contact_springs_load(pal_contact_springs *contact_springs, double s, const double *force_N, int first, int n,
+void pal_contact_springs_load(pal_contact_springs *springs, double s, const double *force_N, int first, int n,
                               double *to)
 {
-    clear_state(contact_springs);
-    for (int i = 0; i < n; i++) row_load(contact_springs, first + i, s * force_N[i]);
-    from_frames(contact_springs, to);
+    clear_state(springs);
+    for (int i = 0; i < n; i++) row_load(springs, first + i, s * force_N[i]);
+    from_frames(springs, to);
 }
 
-double pal_contact_springs_max_force_N(pal_contact_springs *contact_springs, const double *force_N, int first, int n)
+double pal_contact_springs_max_force_N(pal_contact_springs *springs, const double *force_N, int first, int n)
 {
     double largest2 = 0;
-    for (int i = 0; i < contact_springs->n_node; i++)
-        pal_set3(contact_springs->force + 3 * (size_t)contact_springs->node[i], 0, 0, 0);
-    pal_contact_springs_load(contact_springs, 1, force_N, first, n, contact_springs->force);
-    for (int i = 0; i < contact_springs->n_node; i++) {
-        const double *f = contact_springs->force + 3 * (size_t)contact_springs->node[i];
+    for (int i = 0; i < springs->n_node; i++) pal_set3(springs->force + 3 * (size_t)springs->node[i], 0, 0, 0);
+    pal_contact_springs_load(springs, 1, force_N, first, n, springs->force);
+    for (int i = 0; i < springs->n_node; i++) {
+        const double *f = springs->force + 3 * (size_t)springs->node[i];
         largest2 = fmax(largest2, pal_dot3(f, f));
     }
     return sqrt(largest2);
 }
 
 /* out_i = p_i / k_i + J_i W sum p_j J_j' */
-static bool yield(pal_contact_springs *contact_springs, const pal_body *body, const int32_t *rows, const double *p,
-                  int n, double *load, double *move, double *out)
+static bool yield(pal_contact_springs *springs, const pal_body *body, const int32_t *rows, const double *p, int n,
+                  double *load, double *move, double *out)
 {
     memset(load, 0, 3 * sizeof(double) * (size_t)body->n_node);
-    clear_state(contact_springs);
-    for (int i = 0; i < n; i++) row_load(contact_springs, rows[i], p[i]);
-    from_frames(contact_springs, load);
+    clear_state(springs);
+    for (int i = 0; i < n; i++) row_load(springs, rows[i], p[i]);
+    from_frames(springs, load);
     if (!body->compliance->solve(body->compliance->self, body, load, move)) return false;
-    to_frames(contact_springs, move);
-    for (int i = 0; i < n; i++) out[i] = p[i] / contact_springs->k_N_m[rows[i]] + row_motion(contact_springs, rows[i]);
+    to_frames(springs, move);
+    for (int i = 0; i < n; i++) out[i] = p[i] / springs->k_N_m[rows[i]] + row_motion(springs, rows[i]);
     return true;
 }
 
-double pal_contact_springs_stiffness(pal_contact_springs *contact_springs, const pal_body *body, const int32_t *rows,
+double pal_contact_springs_stiffness(pal_contact_springs *springs, const pal_body *body, const int32_t *rows,
                                      const double *share, int n, int passes, double *answer, pal_arena *scratch)
 {
     if (!body->compliance || n <= 0) return 0;
@@ -289,11 +286,11 @@ double pal_contact_springs_stiffness(pal_contact_springs *contact_springs, const
     if (answer) memset(answer, 0, n3 * sizeof *answer);
     for (int i = 0; i < n && known; i++) {
         r[i] = share[i];
-        p[i] = contact_springs->k_N_m[rows[i]] * r[i];
+        p[i] = springs->k_N_m[rows[i]] * r[i];
         rz += r[i] * p[i];
     }
     for (int pass = 0; pass < passes && known && rz > 0; pass++) {
-        known = yield(contact_springs, body, rows, p, n, load, move, w);
+        known = yield(springs, body, rows, p, n, load, move, w);
         double pw = 0, next = 0;
         for (int i = 0; i < n && known; i++) pw += p[i] * w[i];
         if (!known || !(pw > 0)) break;
@@ -302,9 +299,9 @@ double pal_contact_springs_stiffness(pal_contact_springs *contact_springs, const
         for (size_t i = 0; i < n3 && answer; i++) answer[i] += alpha * move[i];
         for (int i = 0; i < n; i++) {
             r[i] -= alpha * w[i];
-            next += r[i] * r[i] * contact_springs->k_N_m[rows[i]];
+            next += r[i] * r[i] * springs->k_N_m[rows[i]];
         }
-        for (int i = 0; i < n; i++) p[i] = contact_springs->k_N_m[rows[i]] * r[i] + next / rz * p[i];
+        for (int i = 0; i < n; i++) p[i] = springs->k_N_m[rows[i]] * r[i] + next / rz * p[i];
         rz = next;
     }
     pal_arena_rewind(scratch, used);

@@ -50,29 +50,29 @@ typedef struct pal_contact_springs {
 /* room for max_row ties in all; MEMORY */
 pal_err pal_contact_springs_make(const pal_body *body, int max_row, pal_arena *arena, pal_contact_springs *out);
 /* a new sub-step: no ties */
-void pal_contact_springs_begin(pal_contact_springs *contact_springs);
+void pal_contact_springs_begin(pal_contact_springs *springs);
 /* one point along a unit direction, at the state of the last pal_contact_points_update; its row, -1: no room */
-int pal_contact_springs_add(pal_contact_springs *contact_springs, pal_contact_points *touch, const pal_body *body,
-                            int point, const double direction[3], double k_N_m);
+int pal_contact_springs_add(pal_contact_springs *springs, pal_contact_points *points, const pal_body *body, int point,
+                            const double direction[3], double k_N_m);
 /* the mean of n contacts' points, weights [n] with sum 1 */
-int pal_contact_springs_add_mean(pal_contact_springs *contact_springs, pal_contact_points *touch, const pal_body *body,
+int pal_contact_springs_add_mean(pal_contact_springs *springs, pal_contact_points *points, const pal_body *body,
                                  const pal_contact *contact, const double *weight, int n, const double direction[3],
                                  double k_N_m);
 /* motion_m of every row for displacements u [n_node][3] */
-void pal_contact_springs_motion(pal_contact_springs *contact_springs, const double *u);
+void pal_contact_springs_motion(pal_contact_springs *springs, const double *u);
 /* out += s K u; u, out [n_node][3] */
-void pal_contact_springs_multiply(pal_contact_springs *contact_springs, double s, const double *u, double *out);
+void pal_contact_springs_multiply(pal_contact_springs *springs, double s, const double *u, double *out);
 /* to += s sum of force_N[i] J_(first+i)', i < n; to [n_node][3] */
-void pal_contact_springs_load(pal_contact_springs *contact_springs, double s, const double *force_N, int first, int n,
+void pal_contact_springs_load(pal_contact_springs *springs, double s, const double *force_N, int first, int n,
                               double *to);
 /* the largest node force of such a sum, N */
-double pal_contact_springs_max_force_N(pal_contact_springs *contact_springs, const double *force_N, int first, int n);
+double pal_contact_springs_max_force_N(pal_contact_springs *springs, const double *force_N, int first, int n);
 
 /* Tangent stiffness that a tool feels which moves rows[i] by share[i] for each metre it goes itself, the tissue behind
  * them answering statically: 1^T-form  share' (1/k + J W J')^-1 share,  W = body->compliance (haptics.md 2.3 step 3 a).
  * `passes` steps of conjugate gradients with k as preconditioner, one back-substitution each; every pass comes closer
  * from below (the first is the answer of an even pressure, 8 % low under a round contact). scratch: 2 [n_node][3] and 4
  * [n]. answer [n_node][3], may be NULL: how tissue moves for each metre. 0: not known */
-double pal_contact_springs_stiffness(pal_contact_springs *contact_springs, const pal_body *body, const int32_t *rows,
+double pal_contact_springs_stiffness(pal_contact_springs *springs, const pal_body *body, const int32_t *rows,
                                      const double *share, int n, int passes, double *answer, pal_arena *scratch);
 #endif

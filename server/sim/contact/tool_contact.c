@@ -31,15 +31,15 @@ static void add_node(const pal_interpolation *place, int32_t node, double scale,
 }
 
 /* sum [body n_node][3] of the contacts' forces, and of what was held itself */
-static void sum_nodes(const pal_tool_contact *from, const pal_body *old, pal_contact_points *touch,
+static void sum_nodes(const pal_tool_contact *from, const pal_body *old, pal_contact_points *points,
                       const pal_interpolation *place, double *sum)
 {
-    pal_contact_points_force_begin(touch);
+    pal_contact_points_force_begin(points);
     for (int i = 0; i < from->n_contact; i++)
-        pal_contact_points_add_force(touch, old, from->contact[i].point, from->contact[i].force);
-    (void)pal_contact_points_assemble(touch, old);
-    for (int i = 0; i < touch->n_node; i++)
-        add_node(place, touch->node[i], 1, touch->force + 3 * (size_t)touch->node[i], sum);
+        pal_contact_points_add_force(points, old, from->contact[i].point, from->contact[i].force);
+    (void)pal_contact_points_assemble(points, old);
+    for (int i = 0; i < points->n_node; i++)
+        add_node(place, points->node[i], 1, points->force + 3 * (size_t)points->node[i], sum);
     for (int i = 0; i < from->hold.n_node && from->hold.acts; i++)
         add_node(place, from->hold.node[i], from->hold.part, from->hold.force_N + 3 * (size_t)i, sum);
 }
@@ -61,11 +61,11 @@ static bool keep_nodes(pal_contact_blend *hold, const double *sum, int n_node)
 }
 
 static void take_force(pal_tool_contact *to, const pal_body *body, const pal_tool_contact *from, const pal_body *old,
-                       pal_contact_points *touch, const pal_interpolation *place)
+                       pal_contact_points *points, const pal_interpolation *place)
 {
     double *sum = calloc(3 * (size_t)body->n_node + 1, sizeof *sum);
     if (sum && pal_finite3(from->total) && pal_norm3(from->total) > 0) {
-        sum_nodes(from, old, touch, place, sum);
+        sum_nodes(from, old, points, place, sum);
         to->hold.acts = keep_nodes(&to->hold, sum, body->n_node);
     }
     free(sum);
@@ -89,7 +89,7 @@ static void go_on(pal_tool_contact *to, const pal_tool_contact *from)
 }
 
 void pal_tool_contact_transfer(pal_tool_contact *to, const pal_body *body, const pal_tool_contact *from,
-                               const pal_body *old, pal_contact_points *touch, const pal_interpolation *place,
+                               const pal_body *old, pal_contact_points *points, const pal_interpolation *place,
                                double k_N_m)
 {
     pal_tool_contact_free(to);
@@ -111,7 +111,7 @@ void pal_tool_contact_transfer(pal_tool_contact *to, const pal_body *body, const
     }
     pal_copy3(to->hold.at_m, from->firm ? from->firm->last_m : from->limits.b);
     to->hold.k_N_m = k_N_m;
-    take_force(to, body, from, old, touch, place);
+    take_force(to, body, from, old, points, place);
 }
 
 void pal_tool_contact_blend(pal_tool_contact *h, pal_step *step, pal_tool *tool, const double here_m[3])

@@ -13,7 +13,7 @@
 #define PAL_SIM_CONTACT_TOOL_CONTACT_H
 #include "server/sim/contact/contact_implicit.h"
 #include "server/sim/contact/contact_patch.h"
-#include "server/sim/contact/contact_points.h"
+#include "server/sim/contact/haptic_stiffness.h"
 #include "server/sim/contact/proxy.h"
 #include "server/sim/core/effect.h"
 
@@ -68,10 +68,10 @@ typedef struct pal_tool_contact {
     pal_tool_contact_implicit *firm; /* implicit solvers only */
 } pal_tool_contact;
 
-/* `to`, of `body`, goes on where `from`, of another body that stands in its place, is; touch: that body's, and place as
- * of pal_effect.hand; k_N_m as above, ramp of the tool. Without memory contact begins as it is. Both stand still */
+/* `to`, of `body`, goes on where `from`, of another body that stands in its place, is; points: that body's, and place
+ * as of pal_effect.hand; k_N_m as above, ramp of the tool. Without memory contact begins as it is. Both stand still */
 void pal_tool_contact_transfer(pal_tool_contact *to, const pal_body *body, const pal_tool_contact *from,
-                               const pal_body *old, pal_contact_points *touch, const pal_interpolation *place,
+                               const pal_body *old, pal_contact_points *points, const pal_interpolation *place,
                                double k_N_m);
 /* before contact in a sub-step: what is still held of the force of before, to body->load and the tool; share is then
  * what contact leaves to it. here_m: the tool, body frame */

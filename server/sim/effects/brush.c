@@ -156,7 +156,7 @@ static bool acts(const slot *s)
     return s->arena && !(s->ending && s->n_in == 0);
 }
 
-static bool goes_on(const slot *s, const pal_brush *b)
+static bool may_continue(const slot *s, const pal_brush *b)
 {
     if (!s->arena || s->ending || s->brush.kind != b->kind || !same3(s->brush.at_m, b->at_m)) return false;
     if (s->brush.radius_m != b->radius_m || s->brush.soft != b->soft) return false;
@@ -169,7 +169,7 @@ pal_err pal_brush_make(const pal_body *body, pal_arena *arena, pal_diagnostic *d
     if (body->active || body->skin || !body->surface || !body->shown_node || body->n_shown == 0)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" has no brushes: %s", body->name,
                                   body->active ? "its surface adapts"
-                                  : body->skin ? "it is shown by a skin; take output \"surface_out\""
+                                  : body->skin ? "it is shown by a skin; take output \"surface_output\""
                                                : "it shows nothing");
     brush_row *row = PAL_NEW(arena, brush_row, 1);
     if (!row) return PAL_ERR_MEMORY;
@@ -190,7 +190,7 @@ pal_err pal_brush_set(void *self, const pal_body *body, int slot_index, const pa
     if (b->kind == PAL_BRUSH_INFLATE && !(fabs(b->pressure_Pa) <= most_Pa))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: pressure_Pa %g, body \"%s\" takes up to %.3g",
                                   b->pressure_Pa, body->name, most_Pa);
-    if (goes_on(s, b)) {
+    if (may_continue(s, b)) {
         s->brush = *b;
         s->n_left = RAMP;
         return PAL_ERR_OK;

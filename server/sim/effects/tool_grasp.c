@@ -33,9 +33,10 @@
  *
  * Keys: stiffness_N_m (0: 16 E reach), damping_s (0.01: c over k), reach_m (0: 2 tool radii). */
 #include "server/base/vec3.h"
-#include "server/sim/contact/contact_patch.h"
-#include "server/sim/contact/contact_points.h"
 #include "server/sim/contact/grasp_transfer.h"
+#include "server/sim/contact/haptic_stiffness.h"
+#include "server/sim/contact/stiffness_fit.h"
+#include "server/sim/contact/tuning.h"
 #include "server/sim/core/effect.h"
 #include "server/sim/surface/adaptive_grasp.h"
 
@@ -43,24 +44,20 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define ALPHA        0.25
-#define BETA         0.25
-#define FORGET       0.9
-#define LEAST_MOVE_M 0.05e-3
-#define LEAST_K_N_M  10.0
-#define RISE_S       0.02
-#define BELOW_CAP    0.98
-#define WHOLE        65535.0
+#define ALPHA     0.25
+#define BETA      0.25
+#define RISE_S    0.02
+#define BELOW_CAP 0.98
+#define WHOLE     65535.0
 
 /* what a grip needs beside with an implicit solver */
 typedef struct firm_grip {
-    bool constant, settled;       /* the load stays as it is; force is part of the tool's */
-    bool found;                   /* compliance was looked for in this sub-step           */
-    double k_N_m, pull[3];        /* at the sub-step's begin: stiffness, force of the spring on tissue            */
-    double load[3];               /* force on tissue in body->load                                                */
-    double stretch_m;             /* at the end of the last sub-step                                              */
-    double give[3][3], give_m[3]; /* compliance of the patch, a column an axis, m/N; where the tool was then      */
-    int n_give, next_give;        /* columns known                                                                */
+    bool constant, settled; /* the load stays as it is; force is part of the tool's */
+    bool found;             /* compliance was looked for in this sub-step           */
+    double k_N_m, pull[3];  /* at the sub-step's begin: stiffness, force of the spring on tissue            */
+    double load[3];         /* force on tissue in body->load                                                */
+    double stretch_m;       /* at the end of the last sub-step                                              */
+    pal_grasp_compliance compliance;
 } firm_grip;
 
 typedef struct grip {
@@ -76,8 +73,7 @@ typedef struct grip {
     double k_max_N_m, c_most_Ns_m; /* explicit limits in this sub-step                    */
     double force[3];               /* on the tool, this sub-step                                       */
     pal_adaptive_grasp *live;      /* bodies that adapt only, else NULL */
-    /* felt stiffness */
-    double last_m[3], last_N[3], xx, xf, k_start_N_m, k_felt_N_m;
+    pal_stiffness_fit fit;
     bool pulls;      /* implicit solvers only: in this sub-step */
     firm_grip *firm; /* implicit solvers only, else NULL */
 } grip;
@@ -158,7 +154,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     PAL_TRY(pal_entry_read_number(item, "reach_m", 0, 10, &grasp->asked_reach_m, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     if (build->body->n_shown == 0)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: tool_grab needs a body that shows something",
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: tool_grasp needs a body that shows something",
                                   item->path);
     size_t n_node = (size_t)build->body->n_node, scratch = 6 * sizeof(double) * n_node + 256;
     if (build->body->implicit) {
@@ -271,13 +267,11 @@ static void take_hold(tool_grasp *grasp, grip *g, const pal_tool *tool, const pa
     g->fixed = true;
     double k = stiffness_N_m(grasp, reach),
            tissue = 2 * grasp->young_Pa * reach / (1 - grasp->poisson * grasp->poisson);
-    g->k_start_N_m = g->k_felt_N_m = fmax(LEAST_K_N_M, k * tissue / (k + tissue));
-    g->xx = g->xf = 0;
-    pal_copy3(g->last_m, tool->last.position_m);
-    pal_set3(g->last_N, 0, 0, 0);
+    pal_stiffness_fit_start(&g->fit, fmax(MIN_STIFFNESS_N_M, k * tissue / (k + tissue)));
+    pal_stiffness_fit_add(&g->fit, tool->last.position_m, (double[3]){0}, FIT_PRIOR_RADII * tool->radius_m);
     if (g->firm) {
         g->firm->stretch_m = 0;
-        g->firm->n_give = g->firm->next_give = 0;
+        g->firm->compliance = (pal_grasp_compliance){.n_known = 0};
     }
 }
 
@@ -340,7 +334,7 @@ static void leave(const grip *g, const grip *b, const double force_N[3], const p
     const pal_interpolation *place = by->place;
     if (!by->left_N || !place || !pal_finite3(force_N)) return;
     for (int i = 0; i < b->n_node; i++) {
-        if (!by->from->interpolation && by->from->fixed[b->node[i]]) continue;
+        if (!by->from->interpolation && by->from->support[b->node[i]]) continue;
         for (int32_t k = place->start[b->node[i]]; k < place->start[b->node[i] + 1]; k++)
             pal_axpy3(by->left_N + 3 * (size_t)place->point[k], b->weight[i] * place->weight[k], force_N);
     }
@@ -363,7 +357,7 @@ static void move_hold(grip *g, const pal_body *body, const grip *b, const pal_bo
     g->reach_m = b->reach_m;
 }
 
-static void hand(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
+static void transfer(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
 {
     tool_grasp *grasp = self;
     const tool_grasp *old = before;
@@ -378,8 +372,7 @@ static void hand(void *self, const pal_body *body, const void *before, const pal
         if (!b->fixed) continue;
         hand_nodes(grasp, g, body, b, by);
         move_hold(g, body, b, by->from);
-        pal_copy3(g->last_m, b->last_m), pal_copy3(g->last_N, b->last_N);
-        g->xx = b->xx, g->xf = b->xf, g->k_start_N_m = b->k_start_N_m, g->k_felt_N_m = b->k_felt_N_m;
+        g->fit = b->fit;
         *h = old->grasp_transfer ? old->grasp_transfer[t] : (pal_grasp_transfer){.due = false};
         if (!h->due) {
             double v[3];
@@ -434,7 +427,7 @@ static void find_limits(const tool_grasp *grasp, grip *g, const pal_body *body, 
     double least = INFINITY;
     if (body->interpolation) least = patch_mass(grasp, g, body);
     for (int i = 0; i < g->n_node && !body->interpolation; i++)
-        if (!body->fixed[g->node[i]]) least = fmin(least, body->mass_kg[g->node[i]] / grasp->sum_weight[g->node[i]]);
+        if (!body->support[g->node[i]]) least = fmin(least, body->mass_kg[g->node[i]] / grasp->sum_weight[g->node[i]]);
     g->k_max_N_m = ALPHA * least / (dt_s * dt_s);
     g->c_most_Ns_m = BETA * least / dt_s;
 }
@@ -490,7 +483,7 @@ static void tie(const tool_grasp *grasp, grip *g, const pal_tool *tool, pal_step
     for (int i = 0; i < g->n_node; i++) weight = fmax(weight, g->weight[i]);
     if (body->load_cap_N > 0) cap = fmin(cap, body->load_cap_N / weight);
     double kept = fmin(g->firm->stretch_m, BELOW_CAP * cap / k);
-    double lead = pal_contact_patch_along(g->firm->give, g->firm->n_give, k, fmin(k, g->k_felt_N_m), goal);
+    double lead = pal_grasp_compliance_along(&g->firm->compliance, k, fmin(k, g->fit.k_N_m), goal);
     double most = kept + fmin(rise, (BELOW_CAP * cap - k * kept) / lead);
     if (way > most) pal_scale3(goal, most / way, goal);
     g->pulls = pal_finite3(goal);
@@ -502,65 +495,24 @@ static void tie(const tool_grasp *grasp, grip *g, const pal_tool *tool, pal_step
     to_nodes(g, g->firm->load, body->load);
 }
 
-/* compliance of the patch, one column a step */
-static void find_give(grip *g, const pal_tool *tool, pal_step *step)
-{
-    const pal_body *body = step->body;
-    if (!body->compliance ||
-        (g->firm->n_give == 3 && g->firm->next_give == 0 && pal_dist3(g->firm->give_m, tool->here_m) < LEAST_MOVE_M))
-        return;
-    size_t used = pal_arena_used(step->scratch), n3 = 3 * (size_t)body->n_node;
-    double *load = PAL_NEW(step->scratch, double, n3), *move = PAL_NEW(step->scratch, double, n3);
-    double unit[3] = {0};
-    int axis = g->firm->next_give;
-    unit[axis] = 1;
-    bool known = load && move;
-    if (known) to_nodes(g, unit, load);
-    known = known && body->compliance->solve(body->compliance->self, body, load, move);
-    if (known) {
-        pal_set3(g->firm->give[axis], 0, 0, 0);
-        for (int i = 0; i < g->n_node; i++) pal_axpy3(g->firm->give[axis], g->weight[i], move + 3 * (size_t)g->node[i]);
-        if (axis == 0) pal_copy3(g->firm->give_m, tool->here_m);
-        if (g->firm->n_give == axis) g->firm->n_give++;
-        g->firm->next_give = (axis + 1) % 3;
-    }
-    pal_arena_rewind(step->scratch, used);
-}
-
-static bool haptic_stiffness(const grip *g, double k_N_m, double K[6])
-{
-    return g->firm && pal_contact_patch_series(g->firm->give, g->firm->n_give, k_N_m, K);
-}
-
 /* the bilateral part for a haptic bridge, in the last sub-step */
 static void publish(const tool_grasp *grasp, grip *g, pal_tool *tool, bool implicit)
 {
-    double move[3], change[3], k = implicit ? g->firm->k_N_m : spring_N_m(grasp, g, tool);
-    pal_sub3(move, tool->here_m, g->last_m);
-    pal_sub3(change, g->force, g->last_N);
-    double way2 = pal_dot3(move, move);
-    if (way2 > LEAST_MOVE_M * LEAST_MOVE_M) {
-        double prior2 = 1e-4 * tool->radius_m * tool->radius_m;
-        g->xx = FORGET * g->xx + way2;
-        g->xf = FORGET * g->xf - pal_dot3(move, change);
-        g->k_felt_N_m = (g->xf + prior2 * g->k_start_N_m) / (g->xx + prior2);
-        pal_copy3(g->last_m, tool->here_m);
-        pal_copy3(g->last_N, g->force);
-    }
-    g->k_felt_N_m = fmin(fmax(g->k_felt_N_m, LEAST_K_N_M), fmax(k, LEAST_K_N_M));
+    double on_tissue[3], k = implicit ? g->firm->k_N_m : spring_N_m(grasp, g, tool), *K = tool->grasp_k_N_m;
+    pal_scale3(on_tissue, -1, g->force);
+    pal_stiffness_fit_add(&g->fit, tool->here_m, on_tissue, FIT_PRIOR_RADII * tool->radius_m);
+    g->fit.k_N_m = fmin(fmax(g->fit.k_N_m, MIN_STIFFNESS_N_M), fmax(k, MIN_STIFFNESS_N_M));
     tool->has_grasp = true;
-    for (int c = 0; c < 3; c++) {
-        tool->grasp_x0_m[c] = tool->here_m[c];
-        tool->grasp_f0_N[c] = g->force[c];
-        tool->grasp_k_N_m[c] = tool->grasp_k_N_m[c + 3] = 0;
-    }
-    tool->grasp_k_N_m[0] = tool->grasp_k_N_m[3] = tool->grasp_k_N_m[5] = g->k_felt_N_m;
+    pal_copy3(tool->grasp_x0_m, tool->here_m);
+    pal_copy3(tool->grasp_f0_N, g->force);
+    K[1] = K[2] = K[4] = 0;
+    K[0] = K[3] = K[5] = g->fit.k_N_m;
     double damping = k * grasp->damping_s;
-    if (implicit && haptic_stiffness(g, k, tool->grasp_k_N_m))
-        g->k_felt_N_m = fmax(LEAST_K_N_M, (tool->grasp_k_N_m[0] + tool->grasp_k_N_m[3] + tool->grasp_k_N_m[5]) / 3);
+    if (implicit && pal_grasp_compliance_series(&g->firm->compliance, k, K))
+        g->fit.k_N_m = fmax(MIN_STIFFNESS_N_M, (K[0] + K[3] + K[5]) / 3);
     else if (!implicit)
         damping = fmin(damping, g->c_most_Ns_m);
-    tool->grasp_b_Ns_m = damping * g->k_felt_N_m / fmax(k, LEAST_K_N_M);
+    tool->grasp_b_Ns_m = damping * g->fit.k_N_m / fmax(k, MIN_STIFFNESS_N_M);
 }
 
 static pal_err run(void *self, pal_step *step)
@@ -658,10 +610,12 @@ static bool settle(void *self, pal_step *step, const double *moved, bool last)
         again |= settle_tool(g, &tools->tool[t], step->body, moved);
         if (!last || step->sub != step->n_sub - 1) continue;
         /* a grip that was handed over leads as the one before from its second step on */
-        const bool goes_on = grasp->grasp_transfer && grasp->grasp_transfer[t].left_s > 0;
-        int n_find = g->firm->found ? 0 : goes_on && g->firm->n_give < 3 ? 3 : 1;
+        const bool may_continue = grasp->grasp_transfer && grasp->grasp_transfer[t].left_s > 0;
+        int n_find = g->firm->found ? 0 : may_continue && g->firm->compliance.n_known < 3 ? 3 : 1;
         g->firm->found = true;
-        for (int k = 0; k < n_find; k++) find_give(g, &tools->tool[t], step);
+        for (int k = 0; k < n_find; k++)
+            pal_grasp_compliance_update(&g->firm->compliance, step->body, g->node, g->weight, g->n_node,
+                                        tools->tool[t].here_m, step->scratch);
         publish(grasp, g, &tools->tool[t], true);
     }
     return again;
@@ -684,7 +638,7 @@ const pal_effect pal_effect_tool_grasp = {.name = "tool_grasp",
                                           .run = run,
                                           .material = material,
                                           .reset = reset,
-                                          .hand = hand,
+                                          .transfer = transfer,
                                           .destroy = destroy,
                                           .reach_m = how_far_m,
                                           .tangent = &tangent};

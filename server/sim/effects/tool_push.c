@@ -34,6 +34,7 @@
  * (0.5). */
 #include "server/base/vec3.h"
 #include "server/sim/contact/tool_contact.h"
+#include "server/sim/contact/tuning.h"
 
 #include <math.h>
 #include <string.h>
@@ -51,7 +52,7 @@
 #define STIFFER     15.0
 #define NEAR_RADII  0.125
 #define STILL_RADII 0.01
-/* points so far from the sphere can come to touch in a sub-step, with an implicit and an explicit solver */
+/* points so far from the sphere can come to points in a sub-step, with an implicit and an explicit solver */
 #define COMING_RADII 1.0
 #define COMING_NEAR  0.25
 /* and it grows by STIFFEN a step while the proxy is kept from its tool, down again by SOFTEN while contact is shallow
@@ -68,14 +69,14 @@ typedef pal_tool_contact_implicit firm;
 typedef pal_tool_contact holder;
 
 typedef struct tool_push {
-    pal_contact_points touch;
+    pal_contact_points points;
     int n_tool, body_index;
     holder holder[PAL_TOOL_MAX];
     double asked_Pa_m, friction, clamp_S, asked_near_m, slip_S, slip_s;
     double young_Pa, poisson, damping_1_s, density_kg_m3;
-    pal_contact_springs *contact_springs; /* implicit solvers only */
-    float *point_Pa;    /* E at each shown vertex where a region gives it, else 0 [n_vertex]; NULL: nowhere */
-    int n_felt, n_step; /* stiffnesses found in this step; steps                             */
+    pal_contact_springs *springs; /* implicit solvers only */
+    float *point_Pa;              /* E at each shown vertex where a region gives it, else 0 [n_vertex]; NULL: nowhere */
+    int n_felt, n_step;           /* stiffnesses found in this step; steps                             */
 } tool_push;
 
 static void take_material(tool_push *push, const pal_material *material)
@@ -94,9 +95,9 @@ static double stiffness_Pa_m(const tool_push *push, double radius_m)
 /* of the tissue at a contact point */
 static double young_at(const tool_push *push, int point)
 {
-    const pal_contact_points *touch = &push->touch;
+    const pal_contact_points *points = &push->points;
     if (!push->point_Pa) return push->young_Pa;
-    if (point >= touch->n_vertex) point = touch->corner[3 * (size_t)(point - touch->n_vertex)];
+    if (point >= points->sample.n_vertex) point = points->sample.corner[3 * (size_t)(point - points->sample.n_vertex)];
     return push->point_Pa[point] > 0 ? (double)push->point_Pa[point] : push->young_Pa;
 }
 
@@ -125,7 +126,7 @@ static void reset(void *self, const pal_body *body)
 {
     tool_push *push = self;
     (void)body;
-    pal_contact_points_reset(&push->touch);
+    pal_contact_points_reset(&push->points);
     push->n_step = 0;
     for (int t = 0; t < push->n_tool; t++) {
         push->holder[t].active = false;
@@ -154,18 +155,17 @@ static pal_err read_keys(tool_push *push, pal_config_entry *item, pal_diagnostic
 static pal_err make_implicit(tool_push *push, pal_build *build)
 {
     pal_body *body = build->body;
-    push->contact_springs = PAL_NEW(build->arena, pal_contact_springs, 1);
-    if (!push->contact_springs) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_contact_springs_make(body, push->n_tool * (PAL_CONTACT_IMPLICIT_MAX + 2), build->arena,
-                                     push->contact_springs));
+    push->springs = PAL_NEW(build->arena, pal_contact_springs, 1);
+    if (!push->springs) return PAL_ERR_MEMORY;
+    PAL_TRY(pal_contact_springs_make(body, push->n_tool * (PAL_CONTACT_IMPLICIT_MAX + 2), build->arena, push->springs));
     for (int t = 0; t < push->n_tool; t++) {
         push->holder[t].firm = PAL_NEW(build->arena, firm, 1);
         if (!push->holder[t].firm) return PAL_ERR_MEMORY;
         PAL_TRY(pal_contact_implicit_make(build->arena, &push->holder[t].firm->press));
     }
     body->wants_compliance = true;
-    size_t scratch =
-        pal_haptic_stiffness_scratch(body) + (size_t)push->touch.max_point * 4 * sizeof(double) + CONTACT_MAX + 256;
+    size_t scratch = pal_haptic_stiffness_scratch(body) + (size_t)push->points.sample.max_point * 4 * sizeof(double) +
+                     CONTACT_MAX + 256;
     if (build->scratch_byte < scratch) build->scratch_byte = scratch;
     return PAL_ERR_OK;
 }
@@ -190,8 +190,8 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     }
     if (!(min_m > 0 && isfinite(min_m))) min_m = 0.04 * build->body->length_scale_m;
     /* the proxy keeps half a radius away from every point: points half a radius apart leave no hole for it */
-    PAL_TRY(pal_contact_points_make(build->body, DEEPEST_RADII * min_m, SAMPLE_MAX, build->arena, &push->touch));
-    size_t n_point = (size_t)push->touch.max_point;
+    PAL_TRY(pal_contact_points_make(build->body, DEEPEST_RADII * min_m, SAMPLE_MAX, build->arena, &push->points));
+    size_t n_point = (size_t)push->points.sample.max_point;
     for (int t = 0; t < push->n_tool; t++) {
         push->holder[t].list = PAL_NEW(build->arena, int32_t, n_point);
         push->holder[t].contact = PAL_NEW(build->arena, pal_contact, CONTACT_MAX);
@@ -201,7 +201,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     size_t scratch = n_point * 4 * sizeof(double) + 256;
     if (build->scratch_byte < scratch) build->scratch_byte = scratch;
     if (build->body->implicit || build->body->interpolation)
-        PAL_TRY(pal_contact_points_young(&push->touch, build->body, build->def, build->arena, &push->point_Pa));
+        PAL_TRY(pal_contact_points_young(&push->points, build->body, build->def, build->arena, &push->point_Pa));
     if (build->body->implicit) PAL_TRY(make_implicit(push, build));
     reset(push, build->body);
     *self = push;
@@ -209,14 +209,14 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 }
 
 /* the proxy's first place: the tool's own, or the nearest place outside when that is inside tissue */
-static void seat(tool_push *push, holder *h, const pal_body *body, const double at[3], double radius_m)
+static void workspace(tool_push *push, holder *h, const pal_body *body, const double at[3], double radius_m)
 {
     double p[3], out[3], normal[3];
     memset(&h->proxy, 0, sizeof h->proxy);
     pal_copy3(h->proxy.x, at);
     h->active = true, h->time_behind_s = 0;
     if (h->firm) h->firm->back_m = 0, pal_copy3(h->firm->last_m, at);
-    if (!pal_contact_points_nearest(&push->touch, body, at, p, normal)) return;
+    if (!pal_contact_points_nearest(&push->points, body, at, p, normal)) return;
     pal_sub3(out, at, p);
     if (pal_dot3(out, normal) > 0) {
         if (pal_norm3(out) >= DEEPEST_RADII * radius_m) return;
@@ -245,13 +245,13 @@ static void begin_tool(tool_push *push, holder *h, const pal_tool *tool, pal_ste
     if (!h->active) {
         double last[3];
         pal_sub3(last, tool->last.position_m, body->offset_m);
-        seat(push, h, body, last, tool->radius_m);
+        workspace(push, h, body, last, tool->radius_m);
         h->ease = 1;
         /* it has neither touched nor slipped before */
         h->retriangulated = false;
         pal_set3(h->slip, 0, 0, 0);
     } else if (h->time_behind_s > push->slip_s) {
-        seat(push, h, body, next, tool->radius_m);
+        workspace(push, h, body, next, tool->radius_m);
         pal_tool_contact_end_blend(h);
         h->ease = 0, body->safeguards.n_tool_reset++;
     }
@@ -261,10 +261,10 @@ static void begin_tool(tool_push *push, holder *h, const pal_tool *tool, pal_ste
     h->limits.radius_m = tool->radius_m;
     h->limits.max_depth_m = DEEPEST_RADII * tool->radius_m;
     h->limits.slack_m = 0.5 * (reach - tool->radius_m);
-    h->n_list = pal_contact_points_collect(&push->touch, body, h->proxy.x, next, reach, h->list, &h->nearest_m);
+    h->n_list = pal_contact_points_collect(&push->points, body, h->proxy.x, next, reach, h->list, &h->nearest_m);
 }
 
-/* contacts of the proxy where it now is, and with an implicit solver points that may come to touch in this sub-step; x
+/* contacts of the proxy where it now is, and with an implicit solver points that may come to points in this sub-step; x
  * [n_list][3] are the points */
 static void find_contacts(const tool_push *push, holder *h, const pal_body *body, const double *x)
 {
@@ -275,7 +275,7 @@ static void find_contacts(const tool_push *push, holder *h, const pal_body *body
         double w[3];
         pal_sub3(w, x + 3 * i, h->proxy.x);
         double d2 = pal_dot3(w, w);
-        if (!(d2 < reach * reach) || push->touch.area_m2[h->list[i]] <= 0) continue;
+        if (!(d2 < reach * reach) || push->points.sample.area_m2[h->list[i]] <= 0) continue;
         pal_contact *c = &h->contact[h->n_contact++];
         double distance = sqrt(d2);
         c->point = h->list[i];
@@ -283,7 +283,7 @@ static void find_contacts(const tool_push *push, holder *h, const pal_body *body
         if (!pal_unit3(c->away, w, 1e-9 * radius)) pal_scale3(c->away, -1, h->proxy.normal);
         c->depth_m = fmin(radius - distance, h->limits.max_depth_m);
         if (body->implicit || body->interpolation) k_area = implicit_Pa_m(push, c->point, radius, body->edge_m);
-        c->k_N_m = k_area * push->touch.area_m2[c->point];
+        c->k_N_m = k_area * push->points.sample.area_m2[c->point];
     }
 }
 
@@ -305,9 +305,7 @@ static void find_back(const tool_push *push, holder *h, const pal_tool *tool)
 {
     const pal_contact_implicit *press = &h->firm->press;
     double k = 2 * push->young_Pa * tool->radius_m / (1 - push->poisson * push->poisson);
-    for (int i = 0; i < PAL_CONTACT_PATCH_MAX; i++)
-        if (h->firm->haptic_stiffness.entry[i].used && h->firm->haptic_stiffness.entry[i].contact)
-            k = fmax(k, h->firm->haptic_stiffness.entry[i].k_N_m);
+    k = pal_haptic_stiffness_max(&h->firm->haptic_stiffness, k);
     h->firm->back_m = h->firm->old_back_m;
     if (press->capped || h->firm->back_m > 0)
         h->firm->back_m = fmax(0, h->firm->back_m + 0.5 * (press->uncapped_N - BELOW_CAP * press->allowed_N) / k);
@@ -330,7 +328,7 @@ static void approach(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
     double *x = PAL_NEW(step->scratch, double, 3 * (size_t)h->n_list),
            *core = PAL_NEW(step->scratch, double, h->n_list);
     if (x && core) {
-        for (int i = 0; i < h->n_list; i++) pal_contact_points_position(&push->touch, h->list[i], x + 3 * i);
+        for (int i = 0; i < h->n_list; i++) pal_contact_points_position(&push->points, h->list[i], x + 3 * i);
         pal_proxy_move(&h->proxy, here, x, h->n_list, &h->limits, step->dt_s, core);
         find_contacts(push, h, step->body, x);
     }
@@ -341,7 +339,7 @@ static void approach(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
 static void contact_force(const tool_push *push, pal_contact *c, double k, double damping_s)
 {
     double v[3];
-    pal_contact_points_velocity(&push->touch, c->point, v);
+    pal_contact_points_velocity(&push->points, c->point, v);
     double f = k * (c->depth_m - damping_s * pal_dot3(v, c->away));
     pal_scale3(c->force, f > 0 ? f : 0, c->away);
 }
@@ -356,7 +354,7 @@ static void add_friction(tool_push *push, holder *h, const double sum[3], double
     for (int i = 0; i < h->n_contact; i++) total += pal_norm3(h->contact[i].force);
     for (int i = 0; i < h->n_contact; i++) {
         double v[3];
-        pal_contact_points_velocity(&push->touch, h->contact[i].point, v);
+        pal_contact_points_velocity(&push->points, h->contact[i].point, v);
         pal_axpy3(drift, -pal_norm3(h->contact[i].force) / total, v);
     }
     if (!pal_tool_contact_friction(h, along, stiffness, h->slip)) pal_axpy3(h->slip, dt_s, drift);
@@ -378,11 +376,11 @@ static void find_share(tool_push *push, int tool, int n_tool, pal_step *step)
         if (t == tool || other->n_contact == 0 ||
             pal_dist3(other->proxy.x, h->proxy.x) > 0.5 * step->body->length_scale_m)
             continue;
-        n_share += pal_contact_points_overlap(&push->touch, step->body, h->contact, h->n_contact, other->contact,
+        n_share += pal_contact_points_overlap(&push->points, step->body, h->contact, h->n_contact, other->contact,
                                               other->n_contact);
     }
     double rate =
-        SAFETY * n_share * pal_contact_points_max_eigenvalue(&push->touch, step->body, h->contact, h->n_contact);
+        SAFETY * n_share * pal_contact_points_max_eigenvalue(&push->points, step->body, h->contact, h->n_contact);
     double alpha = step->body->active ? ALPHA_HELD : step->body->interpolation ? ALPHA_CARRIED : ALPHA;
     double most = fmax(alpha / (step->dt_s * step->dt_s), SAFETY * n_share * h->told),
            share = rate > most ? most / rate : 1;
@@ -399,10 +397,10 @@ static void wanted(void *self, const pal_body *body, double *bound_N_m)
         h->told = 0;
         for (int i = 0; i < h->n_list && h->active && !body->implicit; i++) {
             int point = h->list[i];
-            pal_contact_points_position(&push->touch, point, x);
+            pal_contact_points_position(&push->points, point, x);
             if (!(pal_dist3(x, h->proxy.x) < reach)) continue;
-            double k = implicit_Pa_m(push, point, radius, body->edge_m) * push->touch.area_m2[point];
-            h->told += 0.5 * pal_contact_points_bound(&push->touch, body, point, 2 * k, bound_N_m);
+            double k = implicit_Pa_m(push, point, radius, body->edge_m) * push->points.sample.area_m2[point];
+            h->told += 0.5 * pal_contact_points_bound(&push->points, body, point, 2 * k, bound_N_m);
         }
     }
 }
@@ -452,14 +450,14 @@ static void press(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
     if (!pal_finite3(sum) || pal_dot3(sum, sum) == 0) return;
     add_friction(push, h, sum, stiffness, step->dt_s);
     pal_set3(sum, 0, 0, 0);
-    pal_contact_points_force_begin(&push->touch);
+    pal_contact_points_force_begin(&push->points);
     for (int i = 0; i < h->n_contact; i++) {
-        pal_contact_points_add_force(&push->touch, body, h->contact[i].point, h->contact[i].force);
+        pal_contact_points_add_force(&push->points, body, h->contact[i].point, h->contact[i].force);
         pal_add3(sum, sum, h->contact[i].force);
     }
     pal_scale3(h->total, -1, sum);
-    double room = fmin(pal_tool_force_share(tool, h->total), pal_contact_points_assemble(&push->touch, body));
-    pal_contact_points_apply(&push->touch, body, room);
+    double room = fmin(pal_tool_force_share(tool, h->total), pal_contact_points_assemble(&push->points, body));
+    pal_contact_points_apply(&push->points, body, room);
     pal_scale3(h->total, room, h->total);
     for (int i = 0; i < h->n_contact; i++) pal_scale3(h->contact[i].force, room, h->contact[i].force);
     pal_add3(tool->force_N, tool->force_N, h->total);
@@ -497,28 +495,27 @@ static void tie(tool_push *push, holder *h, const pal_tool *tool, pal_step *step
     }
     (void)pal_tool_contact_friction(h, h->proxy.normal, stiffness, h->firm->press.next_slip_m);
     pal_scale3(move, step->dt_s, h->proxy.v);
-    pal_contact_implicit_begin(&h->firm->press, push->contact_springs, &push->touch, step->body, h->contact,
-                               h->n_contact, push->friction, move);
+    pal_contact_implicit_begin(&h->firm->press, push->springs, &push->points, step->body, h->contact, h->n_contact,
+                               push->friction, move);
     h->n_contact = h->firm->press.n_contact;
 }
 
 /* k1 of a blob from the solver's compliance: as it is known, found again when it has changed and the step's budget
  * allows; x [n_list][3] are the points */
 static void feel(tool_push *push, holder *h, const pal_tool *tool, pal_step *step, const double *x,
-                 pal_contact_group *contact_group)
+                 pal_contact_group *group)
 {
     double here[3], radius = tool->radius_m, least = INFINITY, sum = 0;
     pal_sub3(here, tool->here_m, step->body->offset_m);
     h->firm->haptic_stiffness.step = push->n_step;
-    if (!pal_haptic_stiffness_find(&h->firm->haptic_stiffness, contact_group, here, STILL_RADII * radius) ||
+    if (!pal_haptic_stiffness_find(&h->firm->haptic_stiffness, group, here, STILL_RADII * radius) ||
         push->n_felt >= FELT_A_STEP)
         return;
-    if (contact_group->force_N > 0 && h->firm->press.constant) return;
+    if (group->force_N > 0 && h->firm->press.constant) return;
     push->n_felt++;
-    if (contact_group->force_N > 0) {
-        pal_haptic_stiffness_contact(&h->firm->haptic_stiffness, contact_group, here, &h->firm->press,
-                                     push->contact_springs, &push->touch, step->body, h->contact, radius,
-                                     step->scratch);
+    if (group->force_N > 0) {
+        pal_haptic_stiffness_contact(&h->firm->haptic_stiffness, group, here, push->springs, h->firm->press.first,
+                                     &push->points, step->body, h->contact, h->n_contact, radius, step->scratch);
         return;
     }
     /* what the sphere would lie on, were it an eighth of a radius nearer */
@@ -527,9 +524,9 @@ static void feel(tool_push *push, holder *h, const pal_tool *tool, pal_step *ste
     int n = 0;
     for (int pass = 0; pass < 2; pass++)
         for (int i = 0; i < h->n_list && n < NEAR_MAX; i++) {
-            double out[3], area = push->touch.area_m2[h->list[i]];
+            double out[3], area = push->points.sample.area_m2[h->list[i]];
             pal_sub3(out, h->proxy.x, x + 3 * i);
-            double along = pal_dot3(out, contact_group->normal), distance = pal_norm3(out);
+            double along = pal_dot3(out, group->normal), distance = pal_norm3(out);
             if (along < 0.5 * distance || area <= 0) continue;
             if (pass == 0) least = fmin(least, distance);
             if (pass == 0 || distance > least + NEAR_RADII * radius) continue;
@@ -538,45 +535,43 @@ static void feel(tool_push *push, holder *h, const pal_tool *tool, pal_step *ste
             sum += weight[n++] = area;
         }
     for (int i = 0; i < n; i++) weight[i] /= sum;
-    pal_haptic_stiffness_near(&h->firm->haptic_stiffness, contact_group, here, &push->touch, step->body, point, weight,
-                              n, k, step->scratch);
+    pal_haptic_stiffness_near(&h->firm->haptic_stiffness, group, here, &push->points, step->body, point, weight, n, k,
+                              step->scratch);
 }
 
 /* what a haptic bridge needs to know, in the last sub-step */
 static void publish(tool_push *push, holder *h, pal_tool *tool, pal_step *step)
 {
     if (!h->active) return;
-    pal_contact_group contact_group[PAL_CONTACT_PATCH_MAX];
+    pal_contact_group group[PAL_CONTACT_PATCH_MAX];
     int n = 0;
     size_t used = pal_arena_used(step->scratch);
     double *x = PAL_NEW(step->scratch, double, 3 * (size_t)h->n_list);
     uint8_t *grouped = PAL_NEW(step->scratch, uint8_t, h->n_contact);
     if (x && grouped) {
-        while (n < PAL_CONTACT_PATCH_MAX &&
-               pal_contact_group_next(h->contact, h->n_contact, grouped, &contact_group[n]))
-            n++;
+        while (n < PAL_CONTACT_PATCH_MAX && pal_contact_group_next(h->contact, h->n_contact, grouped, &group[n])) n++;
         /* while the force of before is let go it is all of one patch */
-        if (h->hold.share > 0 && pal_unit3(contact_group[0].normal, h->total, 0)) {
-            contact_group[0].force_N = pal_norm3(h->total), contact_group[0].gap_m = 0;
+        if (h->hold.share > 0 && pal_unit3(group[0].normal, h->total, 0)) {
+            group[0].force_N = pal_norm3(h->total), group[0].gap_m = 0;
             n = 1;
         }
-        for (int i = 0; i < h->n_list; i++) pal_contact_points_position(&push->touch, h->list[i], x + 3 * i);
+        for (int i = 0; i < h->n_list; i++) pal_contact_points_position(&push->points, h->list[i], x + 3 * i);
         double near = near_m(push, tool->radius_m);
-        while (n < PAL_CONTACT_PATCH_MAX && pal_contact_group_near(h->proxy.x, tool->radius_m, near, x, h->n_list,
-                                                                   contact_group, n, &contact_group[n]))
+        while (n < PAL_CONTACT_PATCH_MAX &&
+               pal_contact_group_near(h->proxy.x, tool->radius_m, near, x, h->n_list, group, n, &group[n]))
             n++;
         for (int b = 0; b < n && step->body->compliance && h->hold.share == 0; b++)
-            feel(push, h, tool, step, x, &contact_group[b]);
+            feel(push, h, tool, step, x, &group[b]);
     }
     pal_arena_rewind(step->scratch, used);
     double radius = tool->radius_m;
     pal_contact_patch_options rules = {
-        .radius_m = radius, .k_min_N_m = 10, .k_max_N_m = 5000, .friction = push->friction};
+        .radius_m = radius, .k_min_N_m = MIN_STIFFNESS_N_M, .k_max_N_m = MAX_STIFFNESS_N_M, .friction = push->friction};
     rules.k_start_N_m = 2 * push->young_Pa * radius / (1 - push->poisson * push->poisson);
     rules.k_start_N_m = fmin(fmax(rules.k_start_N_m, rules.k_min_N_m), rules.k_max_N_m);
     /* drag of the tissue that moves along, about 4 radii cubed */
     rules.b_s = push->damping_1_s * 4 * push->density_kg_m3 * radius * radius * radius / rules.k_start_N_m;
-    pal_contact_patches_update(&h->patches, &rules, contact_group, n, tool);
+    pal_contact_patches_update(&h->patches, &rules, group, n, tool);
 }
 
 static pal_err run(void *self, pal_step *step)
@@ -586,16 +581,16 @@ static pal_err run(void *self, pal_step *step)
     int n_tool = tools->n_tool < push->n_tool ? tools->n_tool : push->n_tool;
     if (step->body->frozen) return PAL_ERR_OK;
     if (step->sub == 0) {
-        bool retriangulated = pal_contact_points_update_topology(&push->touch, step->body);
+        bool retriangulated = pal_contact_samples_update_topology(&push->points.sample, step->body);
         for (int t = 0; t < n_tool; t++) push->holder[t].retriangulated = retriangulated;
-        pal_contact_points_begin(&push->touch);
+        pal_contact_points_begin(&push->points);
         for (int t = 0; t < n_tool; t++) begin_tool(push, &push->holder[t], &tools->tool[t], step);
     }
-    pal_contact_points_update(&push->touch, step->body, step->dt_s);
+    pal_contact_points_update(&push->points, step->body, step->dt_s);
     for (int t = 0; t < n_tool; t++) approach(push, &push->holder[t], &tools->tool[t], step);
     if (step->body->implicit) {
         push->n_step += step->sub == 0, push->n_felt = 0;
-        pal_contact_springs_begin(push->contact_springs);
+        pal_contact_springs_begin(push->springs);
         for (int t = 0; t < n_tool; t++) tie(push, &push->holder[t], &tools->tool[t], step);
         return PAL_ERR_OK;
     }
@@ -613,7 +608,7 @@ static pal_err run(void *self, pal_step *step)
 static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
 {
     (void)body, (void)c;
-    pal_contact_springs_multiply(((tool_push *)self)->contact_springs, k, p, out);
+    pal_contact_springs_multiply(((tool_push *)self)->springs, k, p, out);
 }
 
 static bool settle(void *self, pal_step *step, const double *moved, bool last)
@@ -622,17 +617,17 @@ static bool settle(void *self, pal_step *step, const double *moved, bool last)
     pal_tools *tools = step->tools;
     int n_tool = tools->n_tool < push->n_tool ? tools->n_tool : push->n_tool;
     bool again = false;
-    pal_contact_springs_motion(push->contact_springs, moved);
+    pal_contact_springs_motion(push->springs, moved);
     for (int t = 0; t < n_tool; t++) {
         holder *h = &push->holder[t];
         pal_tool *tool = &tools->tool[t];
         if (!h->active) continue;
         if (!last) {
-            again |= pal_press_within(&h->firm->press, push->contact_springs, step->body, tool, h->contact);
+            again |= pal_press_within(&h->firm->press, push->springs, step->body, tool, h->contact);
             continue;
         }
-        again |= pal_contact_implicit_settle(&h->firm->press, push->contact_springs, step->body, tool, h->contact,
-                                             push->friction);
+        again |=
+            pal_contact_implicit_settle(&h->firm->press, push->springs, step->body, tool, h->contact, push->friction);
         pal_add3(h->total, h->firm->press.total_N, h->hold.now_N);
         follow_side(h, h->firm->old_side);
         find_back(push, h, tool);
@@ -653,12 +648,12 @@ static bool settle(void *self, pal_step *step, const double *moved, bool last)
     return again;
 }
 
-static void hand(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
+static void transfer(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
 {
-    tool_push *push = self, *old = (tool_push *)(uintptr_t)before; /* its touch gathers forces, which is work room */
+    tool_push *push = self, *old = (tool_push *)(uintptr_t)before; /* its points gathers forces, which is work room */
     for (int t = 0; t < push->n_tool && t < old->n_tool; t++) {
         double k_N_m = push->young_Pa * old->holder[t].limits.radius_m / (1 - push->poisson * push->poisson);
-        pal_tool_contact_transfer(&push->holder[t], body, &old->holder[t], by->from, &old->touch, by->place, k_N_m);
+        pal_tool_contact_transfer(&push->holder[t], body, &old->holder[t], by->from, &old->points, by->place, k_N_m);
     }
 }
 
@@ -685,7 +680,7 @@ const pal_effect pal_effect_tool_push = {.name = "tool_push",
                                          .run = run,
                                          .material = material,
                                          .reset = reset,
-                                         .hand = hand,
+                                         .transfer = transfer,
                                          .destroy = destroy,
                                          .wanted = wanted,
                                          .reach_m = how_far_m,

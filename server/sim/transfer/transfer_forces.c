@@ -105,7 +105,7 @@ static void lighten(pal_transfer *t, const pal_body *from, const pal_body *to)
     memset(mass, 0, sizeof *mass * (size_t)to->n_node);
     memset(moving, 0, 3 * sizeof *moving * (size_t)to->n_node);
     for (int i = 0; i < from->n_node; i++)
-        if (from->fixed[i]) pal_set3(t->moving + 3 * (size_t)i, 0, 0, 0);
+        if (from->support[i]) pal_set3(t->moving + 3 * (size_t)i, 0, 0, 0);
     pal_interpolation_apply_transpose(rows, t->moving, moving);
     for (int i = 0; i < from->n_node; i++)
         for (int32_t k = rows->start[i]; k < rows->start[i + 1]; k++)
@@ -125,13 +125,13 @@ void pal_transfer_forces(pal_transfer *t, const pal_body *from, const pal_body *
     if (from->interpolation) {
         double *a = from->g;
         for (int i = 0; i < from->n_dof; i++)
-            pal_scale3(a + 3 * i, from->fixed[i] ? 0 : 1 / from->mass_kg[i], a + 3 * i);
+            pal_scale3(a + 3 * i, from->support[i] ? 0 : 1 / from->mass_kg[i], a + 3 * i);
         pal_interpolation_apply(from->interpolation, a, t->old);
         for (int i = 0; i < from->n_node; i++) pal_scale3(t->old + 3 * i, from->node_mass_kg[i], t->old + 3 * i);
     } else {
         memcpy(t->old, from->f, n * sizeof *t->old);
         for (int i = 0; i < from->n_node; i++)
-            if (from->fixed[i]) pal_set3(t->old + 3 * i, 0, 0, 0);
+            if (from->support[i]) pal_set3(t->old + 3 * i, 0, 0, 0);
     }
     pal_interpolation_apply_transpose(pal_transfer_force_map(t), t->old, t->pull);
     lighten(t, from, to);

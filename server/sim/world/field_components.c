@@ -52,7 +52,7 @@ pal_err pal_field_components_add(pal_field_components *rows, pal_plan *plan, int
     if (!pal_field_components_given(plan, body, field)) return refuse(plan, body, field, diag);
     if (plan->body[body].field[field]) return PAL_ERR_OK;
     pal_component row = {.effect = pal_effect_find("field_output")};
-    if (!row.effect) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "this build has no effect \"field_out\"");
+    if (!row.effect) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "this build has no effect \"field_output\"");
     pal_arena *arena = pal_arena_create(4096, true);
     pal_err err = arena ? make_row(plan, body, field, arena, diag, &row) : PAL_ERR_MEMORY;
     if (err) {

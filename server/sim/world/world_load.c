@@ -46,7 +46,8 @@ static const double least_share = 0.01;
 static bool stays(const pal_body *body)
 {
     bool fixed = false, led = false;
-    for (int i = 0; i < body->n_dof; i++) fixed |= body->fixed[i] == 1, led |= body->fixed[i] == 2;
+    for (int i = 0; i < body->n_dof; i++)
+        fixed |= body->support[i] == PAL_FIXED, led |= body->support[i] == PAL_PRESCRIBED;
     return fixed && !led;
 }
 

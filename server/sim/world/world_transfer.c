@@ -63,8 +63,8 @@ static void follow_shell(pal_world *w, int b, const pal_world *before)
     for (int i = 0; i < w->plan.n_of[PAL_STAGE_ADAPT][b] && i < before->plan.n_of[PAL_STAGE_ADAPT][b]; i++) {
         const pal_component *row = &w->plan.row[w->plan.first[PAL_STAGE_ADAPT][b] + i];
         const pal_component *was = &before->plan.row[before->plan.first[PAL_STAGE_ADAPT][b] + i];
-        if (row->effect == was->effect && row->effect->hand)
-            row->effect->hand(row->self, to, was->self, &(pal_component_transfer){.from = from});
+        if (row->effect == was->effect && row->effect->transfer)
+            row->effect->transfer(row->self, to, was->self, &(pal_component_transfer){.from = from});
     }
 }
 
@@ -76,7 +76,7 @@ static void follow_body(pal_world *w, int b, const pal_body *from, const double 
     if (v) memcpy(to->v, v, n_byte);
     /* what is held from now on stands still */
     for (int i = 0; i < to->n_dof; i++)
-        if (to->fixed[i] == 1) pal_set3(to->v + 3 * (size_t)i, 0, 0, 0);
+        if (to->support[i] == PAL_FIXED) pal_set3(to->v + 3 * (size_t)i, 0, 0, 0);
     pal_body_update_nodes(to);
     to->frozen = from->frozen;
     memcpy(to->reason, from->reason, sizeof to->reason);

@@ -8,8 +8,8 @@ enum { MOST = 64 };
 typedef struct tie_scene {
     tool_scene s;
     pal_arena *arena;
-    pal_contact_points touch;
-    pal_contact_springs contact_springs;
+    pal_contact_points points;
+    pal_contact_springs springs;
     pal_contact contact[MOST];
     int n;
     double centre[3];
@@ -47,30 +47,29 @@ static bool open_ties(tie_scene *t, bool skinned)
     pal_step step = {.body = body};
     if (!out || out->effect->run(out->self, &step)) return false;
     t->arena = pal_arena_create(1 << 20, true);
-    if (!t->arena || pal_contact_points_make(body, 0.006, 10000, t->arena, &t->touch)) return false;
-    if (pal_contact_springs_make(body, MOST + 2, t->arena, &t->contact_springs)) return false;
+    if (!t->arena || pal_contact_points_make(body, 0.006, 10000, t->arena, &t->points)) return false;
+    if (pal_contact_springs_make(body, MOST + 2, t->arena, &t->springs)) return false;
     double top = -1;
     for (int i = 0; i < body->n_shown; i++)
         if ((double)body->shown[3 * i + 2] > top) {
             top = (double)body->shown[3 * i + 2];
             for (int c = 0; c < 3; c++) t->centre[c] = (double)body->shown[3 * i + c] + (c == 2 ? 0.008 : 0.001);
         }
-    int32_t *list = PAL_NEW(t->arena, int32_t, t->touch.max_point);
+    int32_t *list = PAL_NEW(t->arena, int32_t, t->points.sample.max_point);
     double nearest;
-    pal_contact_points_begin(&t->touch);
-    int n = pal_contact_points_collect(&t->touch, body, t->centre, t->centre, 0.02, list, &nearest);
-    pal_contact_points_update(&t->touch, body, 1);
-    pal_contact_springs_begin(&t->contact_springs);
+    pal_contact_points_begin(&t->points);
+    int n = pal_contact_points_collect(&t->points, body, t->centre, t->centre, 0.02, list, &nearest);
+    pal_contact_points_update(&t->points, body, 1);
+    pal_contact_springs_begin(&t->springs);
     for (int i = 0; i < n && t->n < MOST; i++) {
         pal_contact *c = &t->contact[t->n];
         c->point = list[i];
-        pal_contact_points_position(&t->touch, list[i], c->x);
+        pal_contact_points_position(&t->points, list[i], c->x);
         pal_sub3(c->away, c->x, t->centre);
         c->depth_m = 0.02 - pal_norm3(c->away);
         c->k_N_m = 10 + i;
         if (!pal_unit3(c->away, c->away, 1e-6)) continue;
-        if (pal_contact_springs_add(&t->contact_springs, &t->touch, body, c->point, c->away, c->k_N_m) != t->n)
-            return false;
+        if (pal_contact_springs_add(&t->springs, &t->points, body, c->point, c->away, c->k_N_m) != t->n) return false;
         t->n++;
     }
     return t->n > 5;
@@ -91,25 +90,25 @@ static void measures_what_points_do(void)
         double worst = 0, most = 0, *motion = calloc((size_t)t.n, sizeof(double));
         for (uint32_t seed = 1; seed < 6; seed++) {
             double step = 2e-4 * body->edge_m, *u = field(body, seed, 1), x[3];
-            pal_contact_springs_motion(&t.contact_springs, u);
+            pal_contact_springs_motion(&t.springs, u);
             for (int side = 0; side < 2; side++) {
                 for (int i = 0; i < 3 * body->n_node; i++) body->x[i] += (side ? -2 : 1) * step * u[i];
-                pal_contact_points_update(&t.touch, body, 1);
+                pal_contact_points_update(&t.points, body, 1);
                 for (int i = 0; i < t.n; i++) {
-                    pal_contact_points_position(&t.touch, t.contact[i].point, x);
+                    pal_contact_points_position(&t.points, t.contact[i].point, x);
                     pal_sub3(x, x, t.contact[i].x);
                     motion[i] = (side ? -0.5 : 0.5) * pal_dot3(x, t.contact[i].away) / step + (side ? motion[i] : 0);
                 }
             }
             for (int i = 0; i < 3 * body->n_node; i++) body->x[i] += step * u[i];
             for (int i = 0; i < t.n; i++) {
-                worst = fmax(worst, fabs(motion[i] - t.contact_springs.motion_m[i]));
+                worst = fmax(worst, fabs(motion[i] - t.springs.motion_m[i]));
                 most = fmax(most, fabs(motion[i]));
             }
             free(u);
         }
         printf("  %s: %d ties on %d slots, motion up to %.3g, off by %.2g\n", skinned ? "ball" : "slab", t.n,
-               t.contact_springs.n_frame, most, worst);
+               t.springs.n_frame, most, worst);
         /* a skin's axes are single precision */
         CHECK(most > 0.1);
         CHECK_LE(worst, (skinned ? 2e-3 : 1e-9) * most);
@@ -127,10 +126,9 @@ static void stiffness_is_symmetric_and_sums_squares(void)
     for (uint32_t seed = 1; seed < 4; seed++) {
         double *p = field(body, seed, 1), *q = field(body, 100 + seed, 1), *kp = calloc(n3, 8), *kq = calloc(n3, 8);
         double pkq = 0, qkp = 0, pkp = 0, wanted = 0;
-        pal_contact_springs_multiply(&t.contact_springs, 1, p, kp);
-        for (int i = 0; i < t.n; i++)
-            wanted += t.contact[i].k_N_m * t.contact_springs.motion_m[i] * t.contact_springs.motion_m[i];
-        pal_contact_springs_multiply(&t.contact_springs, 1, q, kq);
+        pal_contact_springs_multiply(&t.springs, 1, p, kp);
+        for (int i = 0; i < t.n; i++) wanted += t.contact[i].k_N_m * t.springs.motion_m[i] * t.springs.motion_m[i];
+        pal_contact_springs_multiply(&t.springs, 1, q, kq);
         for (size_t i = 0; i < n3; i++) pkq += p[i] * kq[i], qkp += q[i] * kp[i], pkp += p[i] * kp[i];
         CHECK(wanted > 0);
         CHECK_NEAR(pkq, qkp, 1e-12 * wanted);
@@ -149,7 +147,7 @@ static void loads_have_the_contacts_force_and_torque(void)
         double force[MOST], *load = calloc(3 * (size_t)body->n_node, sizeof(double)), sum[3] = {0}, torque[3] = {0};
         double m[3], size = 0, largest = 0;
         for (int i = 0; i < t.n; i++) force[i] = 0.1 + 0.01 * i;
-        pal_contact_springs_load(&t.contact_springs, 2, force, 0, t.n, load);
+        pal_contact_springs_load(&t.springs, 2, force, 0, t.n, load);
         for (size_t i = 0; i < (size_t)body->n_node; i++) {
             pal_add3(sum, sum, load + 3 * i);
             pal_cross3(m, body->x + 3 * i, load + 3 * i);
@@ -167,7 +165,7 @@ static void loads_have_the_contacts_force_and_torque(void)
         CHECK_LE(pal_norm3(sum), 1e-12 * size);
         /* a skin's places are single precision */
         CHECK_LE(pal_norm3(torque), (skinned ? 1e-5 : 1e-12) * size * 0.05);
-        CHECK_NEAR(pal_contact_springs_max_force_N(&t.contact_springs, force, 0, t.n), largest, 1e-12 * largest);
+        CHECK_NEAR(pal_contact_springs_max_force_N(&t.springs, force, 0, t.n), largest, 1e-12 * largest);
         free(load);
         close_ties(&t);
     }
@@ -179,31 +177,30 @@ static void mean_moves_as_its_points_do(void)
     REQUIRE(open_ties(&t, true));
     const pal_body *body = t.s.body;
     double weight[MOST], axis[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, *u = field(body, 7, 1);
-    int first = t.contact_springs.n_row;
+    int first = t.springs.n_row;
     for (int i = 0; i < t.n; i++) weight[i] = 1.0 / t.n;
     for (int c = 0; c < 2; c++)
-        CHECK_INT(pal_contact_springs_add_mean(&t.contact_springs, &t.touch, body, t.contact, weight, t.n, axis[c], 5),
+        CHECK_INT(pal_contact_springs_add_mean(&t.springs, &t.points, body, t.contact, weight, t.n, axis[c], 5),
                   first + c);
-    pal_contact_springs_motion(&t.contact_springs, u);
-    double mean[2] = {t.contact_springs.motion_m[first], t.contact_springs.motion_m[first + 1]}, wanted[2] = {0};
-    pal_contact_springs_begin(&t.contact_springs);
+    pal_contact_springs_motion(&t.springs, u);
+    double mean[2] = {t.springs.motion_m[first], t.springs.motion_m[first + 1]}, wanted[2] = {0};
+    pal_contact_springs_begin(&t.springs);
     for (int c = 0; c < 2; c++)
         for (int i = 0; i < t.n / 2; i++)
-            CHECK(pal_contact_springs_add(&t.contact_springs, &t.touch, body, t.contact[i].point, axis[c], 1) >= 0);
-    pal_contact_springs_motion(&t.contact_springs, u);
-    for (int i = 0; i < t.contact_springs.n_row; i++) wanted[i / (t.n / 2)] += t.contact_springs.motion_m[i] / t.n;
-    pal_contact_springs_begin(&t.contact_springs);
+            CHECK(pal_contact_springs_add(&t.springs, &t.points, body, t.contact[i].point, axis[c], 1) >= 0);
+    pal_contact_springs_motion(&t.springs, u);
+    for (int i = 0; i < t.springs.n_row; i++) wanted[i / (t.n / 2)] += t.springs.motion_m[i] / t.n;
+    pal_contact_springs_begin(&t.springs);
     for (int c = 0; c < 2; c++)
         for (int i = t.n / 2; i < t.n; i++)
-            CHECK(pal_contact_springs_add(&t.contact_springs, &t.touch, body, t.contact[i].point, axis[c], 1) >= 0);
-    pal_contact_springs_motion(&t.contact_springs, u);
-    for (int i = 0; i < t.contact_springs.n_row; i++)
-        wanted[i / (t.n - t.n / 2)] += t.contact_springs.motion_m[i] / t.n;
+            CHECK(pal_contact_springs_add(&t.springs, &t.points, body, t.contact[i].point, axis[c], 1) >= 0);
+    pal_contact_springs_motion(&t.springs, u);
+    for (int i = 0; i < t.springs.n_row; i++) wanted[i / (t.n - t.n / 2)] += t.springs.motion_m[i] / t.n;
     for (int c = 0; c < 2; c++) CHECK_NEAR(mean[c], wanted[c], 1e-12);
     /* and no row beyond the room there is */
-    while (t.contact_springs.n_row < t.contact_springs.max_row)
-        REQUIRE(pal_contact_springs_add(&t.contact_springs, &t.touch, body, t.contact[0].point, axis[0], 1) >= 0);
-    CHECK_INT(pal_contact_springs_add(&t.contact_springs, &t.touch, body, t.contact[0].point, axis[0], 1), -1);
+    while (t.springs.n_row < t.springs.max_row)
+        REQUIRE(pal_contact_springs_add(&t.springs, &t.points, body, t.contact[0].point, axis[0], 1) >= 0);
+    CHECK_INT(pal_contact_springs_add(&t.springs, &t.points, body, t.contact[0].point, axis[0], 1), -1);
     free(u);
     close_ties(&t);
 }
@@ -228,7 +225,7 @@ static void felt_stiffness_is_that_of_ties_in_series_with_tissue(void)
     int n = 0;
     /* shown nodes of the slab itself: each tie has a node of its own */
     for (int i = 0; i < t.n; i++) {
-        if (t.contact_springs.start[i + 1] - t.contact_springs.start[i] != 1) continue;
+        if (t.springs.start[i + 1] - t.springs.start[i] != 1) continue;
         double into = -t.contact[i].away[2];
         row[n] = i;
         share[n++] = into;
@@ -236,11 +233,11 @@ static void felt_stiffness_is_that_of_ties_in_series_with_tissue(void)
     }
     REQUIRE(n > 3);
     ground_N_m = 50;
-    CHECK(pal_contact_springs_stiffness(&t.contact_springs, t.s.body, row, share, n, 2, NULL, scratch) == 0);
+    CHECK(pal_contact_springs_stiffness(&t.springs, t.s.body, row, share, n, 2, NULL, scratch) == 0);
     t.s.body->compliance = &door;
-    double one = pal_contact_springs_stiffness(&t.contact_springs, t.s.body, row, share, n, 1, NULL, scratch);
-    double two = pal_contact_springs_stiffness(&t.contact_springs, t.s.body, row, share, n, 2, NULL, scratch);
-    double all = pal_contact_springs_stiffness(&t.contact_springs, t.s.body, row, share, n, 12, NULL, scratch);
+    double one = pal_contact_springs_stiffness(&t.springs, t.s.body, row, share, n, 1, NULL, scratch);
+    double two = pal_contact_springs_stiffness(&t.springs, t.s.body, row, share, n, 2, NULL, scratch);
+    double all = pal_contact_springs_stiffness(&t.springs, t.s.body, row, share, n, 12, NULL, scratch);
     printf("  %d ties: %.6g, %.6g, %.9g N/m with 1, 2, 12 passes, wanted %.9g\n", n, one, two, all, wanted);
     CHECK_LE(one, two);
     CHECK_NEAR(two, wanted, 0.01 * wanted);

@@ -27,20 +27,20 @@ static void rows_are_those_that_the_keys_ask_for(void)
     open_stomach(&s);
     s.scene->body[0].material.damping_1_s = 4;
     REQUIRE(shell_scene_start(&s));
-    CHECK_TEXT(row_names(s.world, text), "edge_spring shape_spring viscous rk4 refine surface_out");
+    CHECK_TEXT(row_names(s.world, text), "edge_spring shape_spring viscous rk4 refine surface_output");
     shell_scene_close(&s);
 
     open_stomach(&s);
     shell_scene_number(&s, "k_shape_N_m", 0);
     pal_entry_put_bool(shell_scene_model(&s), "refine", false, NULL);
     REQUIRE(shell_scene_start(&s));
-    CHECK_TEXT(row_names(s.world, text), "edge_spring rk4 surface_out");
+    CHECK_TEXT(row_names(s.world, text), "edge_spring rk4 surface_output");
     shell_scene_close(&s);
 
     open_stomach(&s);
     shell_scene_number(&s, "levels", 1);
     REQUIRE(shell_scene_start(&s));
-    CHECK_TEXT(row_names(s.world, text), "edge_spring shape_spring rk4 surface_out");
+    CHECK_TEXT(row_names(s.world, text), "edge_spring shape_spring rk4 surface_output");
     shell_scene_close(&s);
 
     /* the default output needs a skin, which a surface has not */
@@ -48,7 +48,7 @@ static void rows_are_those_that_the_keys_ask_for(void)
     shell_scene_number(&s, "levels", 1);
     pal_entry_init(&s.scene->body[0].output, "output", "skin_output");
     REQUIRE(shell_scene_start(&s));
-    CHECK_TEXT(row_names(s.world, text), "edge_spring shape_spring rk4 surface_out");
+    CHECK_TEXT(row_names(s.world, text), "edge_spring shape_spring rk4 surface_output");
     shell_scene_close(&s);
 }
 

@@ -1,0 +1,61 @@
+/* Contacts grouped by direction (contact_group.h). */
+#include "server/sim/contact/contact_group.h"
+
+#include "server/base/vec3.h"
+#include "server/sim/contact/tuning.h"
+
+bool pal_contact_group_has(const double axis[3], const double direction[3])
+{
+    return pal_dot3(direction, axis) >= GROUP_COSINE;
+}
+
+bool pal_contact_group_next(const pal_contact *contact, int n, uint8_t *grouped, pal_contact_group *group)
+{
+    double axis[3], sum[3];
+    int seed = -1;
+    double max2 = 0;
+    for (int i = 0; i < n; i++) {
+        double f2 = pal_dot3(contact[i].force, contact[i].force);
+        if (!grouped[i] && f2 > max2) max2 = f2, seed = i;
+    }
+    if (seed < 0) return false;
+    pal_copy3(axis, contact[seed].away);
+    for (int pass = 0; pass < 2; pass++) {
+        pal_set3(sum, 0, 0, 0);
+        for (int i = 0; i < n; i++)
+            if (!grouped[i] && pal_contact_group_has(axis, contact[i].away)) pal_add3(sum, sum, contact[i].force);
+        if (pass == 0 && !pal_unit3(axis, sum, 0)) break;
+    }
+    for (int i = 0; i < n; i++)
+        if (pal_contact_group_has(axis, contact[i].away)) grouped[i] = 1;
+    grouped[seed] = 1;
+    group->force_N = pal_norm3(sum);
+    group->gap_m = group->k_N_m = 0;
+    pal_scale3(sum, -1, sum);
+    return pal_unit3(group->normal, sum, 0);
+}
+
+bool pal_contact_group_near(const double centre[3], double radius_m, double near_m, const double *x, int n_point,
+                            const pal_contact_group *earlier, int n_earlier, pal_contact_group *group)
+{
+    double least = INFINITY, sum[3] = {0};
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = 0; i < n_point; i++) {
+            double out[3];
+            pal_sub3(out, centre, x + 3 * i);
+            double distance = pal_norm3(out);
+            if (distance > radius_m + near_m || (pass == 1 && distance > least + NEAREST_RADII * radius_m)) continue;
+            if (!pal_unit3(out, out, 1e-9 * radius_m)) continue;
+            bool seen = false;
+            for (int b = 0; b < n_earlier && !seen; b++)
+                seen = pal_dot3(out, earlier[b].normal) >= (earlier[b].force_N > 0 ? 0 : GROUP_COSINE);
+            if (seen) continue;
+            if (pass == 0)
+                least = fmin(least, distance);
+            else
+                pal_axpy3(sum, least + NEAREST_RADII * radius_m - distance, out);
+        }
+    if (!(least < INFINITY)) return false;
+    *group = (pal_contact_group){.gap_m = fmax(0, least - radius_m)};
+    return pal_unit3(group->normal, sum, 0);
+}
