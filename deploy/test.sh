@@ -134,9 +134,9 @@ if [ -z "$fast" ]; then
     step "two browsers share an organ" sh "$tree/tests/browser/run.sh" pull "$build"
     step "fields in colours" sh "$tree/tests/browser/run.sh" fields "$build"
     step "a calibrated scene in the browser" sh "$tree/tests/browser/run.sh" calibrated "$build"
-    step "a stomach refines in the browser" sh "$tree/tests/browser/run.sh" adaptive "$build"
-    step "a solid is sculpted in the browser" sh "$tree/tests/browser/run.sh" sculpt "$build"
-    step "what accuracy costs in the browser" sh "$tree/tests/browser/run.sh" accuracy "$build"
+    step "an adaptive surface in the browser" sh "$tree/tests/browser/run.sh" adaptive "$build"
+    step "sculpting in the browser" sh "$tree/tests/browser/run.sh" sculpt "$build"
+    step "error against cost in the browser" sh "$tree/tests/browser/run.sh" accuracy "$build"
     step "two browsers, a bridge and lcm-logger together" sh "$tree/tests/browser/run.sh" together "$build"
     say "building with sanitizers"
     wait
@@ -145,7 +145,7 @@ if [ -z "$fast" ]; then
         # ranks of MPI and the whole of torture are the release build's (lab has its code), and so are headers alone and
         # tables, of which a sanitizer sees nothing
         [ ! -e "$build/built_asan" ] ||
-            compute asan -LE 'waits|accuracy|bench' -E '^house/(test_calibrate_mpi|test_torture|test_study_records|headers|hard_cases|test_hard_table)$'
+            compute asan -LE 'waits|accuracy|bench' -E '^house/(test_calibrate_mpi|test_robustness|test_study_records|headers|hard_cases|test_hard_table)$'
         [ ! -e "$build/built_tsan" ] || compute tsan -LE 'waits|one_thread|same_threads' -R "^($(echo $threads | tr ' ' '|'))/"
     } &
     built asan && waits asan

@@ -1,4 +1,4 @@
-/* The text messages of palpate.v1: one JSON object each, `type` says which (README.md, "Control").
+/* The text messages of palpate.v2: one JSON object each, `type` says which (README.md, "Control").
  *
  * Structs on this side, JSON on the wire, no JSON type in between. pal_control_get reads untrusted text: size, nesting,
  * number of values, UTF-8 and every field are checked; unknown keys are ignored (that is how the protocol grows),
@@ -34,21 +34,21 @@
 
 /* X(NAME, "type in JSON", from server) */
 #define PAL_CONTROL_TABLE(X)                                                                                           \
-    X(HELLO, "hello", true)       /* first message of the server after join                          */                \
-    X(TOPOLOGY, "topology", true) /* parts changed: new epochs and assets                            */                \
-    X(STATUS, "status", true)     /* 2-4 Hz                                                          */                \
-    X(MEMBERS, "members", true)   /* on every change: who is here, who holds which tool              */                \
-    X(ERROR, "error", true)       /* a request was refused, the connection stays                     */                \
-    X(PONG, "pong", true)         /* answer to ping                                                  */                \
-    X(ANSWER, "answer", true)     /* a command of sculpting was done, or what was asked for          */                \
-    X(STUDY, "study", true)       /* what a body costs and errs in other settings; to who said `estimate` */           \
-    X(ESTIMATE, "estimate", true) /* 2-4 Hz to who said `estimate`: cost and error of a body now          */           \
-    X(JOIN, "join", false)        /* first message of a client                                       */                \
-    X(COMMAND, "command", false)  /* pause, resume, step, reset, material ...                        */                \
-    X(TAKE, "take", false)        /* take a tool                                                     */                \
-    X(LEAVE, "leave", false)      /* give the own tool back                                          */                \
-    X(PING, "ping", false)        /* round trip                                                      */                \
-    X(VIEW, "view", false)        /* which field of a part to be sent, instead of the last one asked */
+    X(HELLO, "hello", true)                /* first message of the server after join                          */       \
+    X(TOPOLOGY, "topology", true)          /* parts changed: new epochs and assets                            */       \
+    X(STATUS, "status", true)              /* 2-4 Hz                                                          */       \
+    X(MEMBERS, "members", true)            /* on every change: who is here, who holds which tool              */       \
+    X(ERROR, "error", true)                /* a request was refused, the connection stays                     */       \
+    X(PONG, "pong", true)                  /* answer to ping                                                  */       \
+    X(ANSWER, "answer", true)              /* a command of sculpting was done, or what was asked for          */       \
+    X(STUDY, "study", true)                /* what a body costs and errs in other settings; to who said `estimate` */  \
+    X(ESTIMATE, "estimate", true)          /* 2-4 Hz to who said `estimate`: cost and error of a body now          */  \
+    X(JOIN, "join", false)                 /* first message of a client                                       */       \
+    X(COMMAND, "command", false)           /* pause, resume, step, reset, material ...                        */       \
+    X(TAKE_TOOL, "take_tool", false)       /* take a tool                                                     */       \
+    X(RELEASE_TOOL, "release_tool", false) /* give the own tool back                                          */       \
+    X(PING, "ping", false)                 /* round trip                                                      */       \
+    X(SUBSCRIBE_FIELD, "subscribe_field", false) /* which field of a part to be sent, instead of the last one asked */
 
 typedef enum pal_control_type {
 #define X(name, text, from_server) PAL_CONTROL_##name,
@@ -85,8 +85,9 @@ typedef struct pal_wire_part_info {
 typedef struct pal_wire_topology {
     uint32_t n_part;
     pal_wire_part_info part[PAL_WIRE_PART_MAX];
-    uint32_t n_row, n_component_part, n_component_reason, n_component_required; /* n_row 0: the rows did not change */
-    char row[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_NAME_BYTES];
+    uint32_t n_component, n_component_part, n_component_reason,
+        n_component_required; /* n_component 0: the rows did not change */
+    char component[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_NAME_BYTES];
     double component_part[PAL_WIRE_COMPONENT_MAX];
     char component_reason[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_REASON_BYTES];
     double component_required[PAL_WIRE_COMPONENT_MAX];
@@ -107,10 +108,10 @@ typedef struct pal_wire_hello {
     uint32_t credit;                   /* unacknowledged cycles the server allows now                 */
     double box_min_m[3], box_max_m[3]; /* of the whole scene at rest                            */
     double up[3];                      /* unit, away from the ground                            */
-    uint32_t n_part, n_tool, n_row;
+    uint32_t n_part, n_tool, n_component;
     pal_wire_part_info part[PAL_WIRE_PART_MAX];
     pal_wire_tool_info tool[PAL_WIRE_TOOL_MAX];
-    char row[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_NAME_BYTES]; /* the plan, in order                                */
+    char component[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_NAME_BYTES]; /* the plan, in order                                */
     uint32_t n_component_part, n_component_reason, n_component_required;
     double component_part[PAL_WIRE_COMPONENT_MAX];
     char component_reason[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_REASON_BYTES];
@@ -125,8 +126,8 @@ typedef struct pal_wire_hello {
 /* how much of a part that adapts is in use */
 typedef struct pal_wire_active {
     uint32_t part;
-    uint32_t n_node, n_spring;            /* now                                      */
-    uint32_t n_all_node, n_finest_spring; /* and if all of it were of its finest level */
+    uint32_t n_node, n_spring;               /* now                                      */
+    uint32_t n_finest_node, n_finest_spring; /* and if all of it were of its finest level */
 } pal_wire_active;
 
 /* a part of which there is something to tell; what is false, empty or 0 is not on the wire */
@@ -140,7 +141,7 @@ typedef struct pal_wire_part_state {
 } pal_wire_part_state;
 /* a row that was switched off and could be switched on */
 typedef struct pal_wire_disabled {
-    char row[PAL_WIRE_NAME_BYTES];
+    char component[PAL_WIRE_NAME_BYTES];
     uint32_t part;
 } pal_wire_disabled;
 
@@ -152,10 +153,10 @@ typedef struct pal_wire_status {
     double slowdown;     /* wall time / simulated time while running; 1 = real time        */
     uint32_t substeps;
     double step_ms; /* mean time of one step                                          */
-    uint32_t n_row;
-    double row_ms[PAL_WIRE_COMPONENT_MAX];                 /* mean time of each row of the plan in one step           */
-    uint32_t n_component_name;                             /* 0: the rows are those of hello                          */
-    char row[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_NAME_BYTES]; /* the plan while fields are shown         */
+    uint32_t n_component;
+    double component_ms[PAL_WIRE_COMPONENT_MAX]; /* mean time of each row of the plan in one step           */
+    uint32_t n_component_name;                   /* 0: the rows are those of hello                          */
+    char component[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_NAME_BYTES]; /* the plan while fields are shown         */
     uint32_t n_member;
     double bytes_s;                 /* sent by the server to this member, bytes per second            */
     double rtt_ms;                  /* of this member as the server sees it; 0 unknown                */
@@ -169,8 +170,8 @@ typedef struct pal_wire_status {
     double component_part[PAL_WIRE_COMPONENT_MAX];
     uint32_t n_state; /* parts that are frozen or asleep or were rescued           */
     pal_wire_part_state state[PAL_WIRE_PART_MAX];
-    uint32_t n_off;
-    pal_wire_disabled off[PAL_WIRE_COMPONENT_MAX];
+    uint32_t n_disabled;
+    pal_wire_disabled disabled[PAL_WIRE_COMPONENT_MAX];
     uint64_t n_unobserved; /* steps of which nothing was shown because nobody looked     */
 } pal_wire_status;
 
@@ -194,8 +195,9 @@ typedef struct pal_wire_error {
 typedef struct pal_wire_join {
     char name[PAL_WIRE_MEMBER_NAME];
     pal_wire_role role;
-    int tool;     /* wanted: index, PAL_WIRE_TOOL_ANY or PAL_WIRE_TOOL_NONE   */
-    bool patches; /* takes PATCH; else it sees adapting parts with the triangles of load; false is not on the wire */
+    int tool;             /* wanted: index, PAL_WIRE_TOOL_ANY or PAL_WIRE_TOOL_NONE   */
+    bool topology_deltas; /* takes PATCH; else it sees adapting parts with the triangles of load; false is not on the
+                             wire */
 } pal_wire_join;
 
 typedef struct pal_wire_arg {
@@ -204,7 +206,7 @@ typedef struct pal_wire_arg {
 } pal_wire_arg;
 typedef struct pal_wire_command {     /* an order to the session */
     char verb[32];                    /* pause resume step reset material ...                     */
-    char target[PAL_WIRE_NAME_BYTES]; /* what it is about (a body, a row), or ""                 */
+    char target[PAL_WIRE_NAME_BYTES]; /* what it is about (a body, a component), or ""                 */
     uint32_t n_arg;
     pal_wire_arg arg[PAL_WIRE_ARG_MAX]; /* numbers by name, SI, e.g. young_Pa                       */
 } pal_wire_command;
@@ -222,8 +224,8 @@ typedef struct pal_wire_study_point {
     uint32_t index;                     /* in the server's list: arg of the order `point`        */
     char method[PAL_WIRE_METHOD_BYTES]; /* points of one method belong together                 */
     char label[PAL_WIRE_LABEL_BYTES];   /* for people                                           */
-    double ms, error_m;                 /* of a step, as the study measured it; largest error    */
-    bool front;                         /* nothing else is both cheaper and nearer              */
+    double cost_ms, error_m;            /* of a step, as the study measured it; largest error    */
+    bool pareto_optimal;                /* nothing else is both cheaper and nearer              */
 } pal_wire_study_point;
 typedef struct pal_wire_study {
     char body[PAL_WIRE_NAME_BYTES];
@@ -235,24 +237,24 @@ typedef struct pal_wire_study {
 
 /* a neighbour on a knob, as foreseen; NaN: not known, and not on the wire */
 typedef struct pal_wire_neighbour {
-    char knob[PAL_WIRE_METHOD_BYTES]; /* "resolution", "step", "tolerance", "method"                      */
+    char parameter[PAL_WIRE_METHOD_BYTES]; /* "resolution", "step", "tolerance", "method"                      */
     char label[PAL_WIRE_LABEL_BYTES];
-    double ms, error_m;
+    double cost_ms, error_m;
     uint32_t size; /* args of the order `knob`; 0: as it is, and not on the wire */
     double step_ms, tolerance;
 } pal_wire_neighbour;
 /* where a body stands now; NaN: not known, and not on the wire */
 typedef struct pal_wire_estimate {
     char body[PAL_WIRE_NAME_BYTES];
-    char setting[PAL_WIRE_LABEL_BYTES]; /* the present one, for people                           */
-    double point;                       /* its index in the study; NaN: it is none of those      */
-    uint64_t tick;                      /* of the state that was looked at; 0: there is none yet */
+    char configuration[PAL_WIRE_LABEL_BYTES]; /* the present one, for people                           */
+    double study_point;                       /* its index in the study; NaN: it is none of those      */
+    uint64_t tick;                            /* of the state that was looked at; 0: there is none yet */
     double time_s;
-    double age_s;       /* steps in which the body was awake since that state                     */
-    double ms;          /* of a live step, median of the last second                              */
-    double estimate_ms; /* processor time that the estimate took                                  */
-    double max_m;       /* largest displacement then                                              */
-    double error_m;     /* largest error of a displacement, of these parts together:              */
+    double age_s;              /* steps in which the body was awake since that state                     */
+    double cost_ms;            /* of a live step, median of the last second                              */
+    double estimate_ms;        /* processor time that the estimate took                                  */
+    double max_displacement_m; /* largest displacement then                                              */
+    double error_m;            /* largest error of a displacement, of these parts together:              */
     double discretisation_m, algebraic_m, time_m, model_m;
     double energy_error_percent;    /* error over solution, in energy                          */
     bool locking;                   /* the estimate is known to be too small                   */
@@ -273,12 +275,12 @@ typedef struct pal_control {
         pal_wire_topology topology;
         pal_wire_status status;
         pal_wire_members members;
-        pal_wire_error problem; /* error             */
+        pal_wire_error error; /* error             */
         pal_wire_join join;
-        pal_wire_command order; /* command               */
-        int tool;               /* take: index or PAL_WIRE_TOOL_ANY; leave: unused */
-        double stamp_ms;        /* ping, pong: the pinger's own clock         */
-        pal_wire_field_subscription view;
+        pal_wire_command command; /* command               */
+        int tool;                 /* take: index or PAL_WIRE_TOOL_ANY; leave: unused */
+        double stamp_ms;          /* ping, pong: the pinger's own clock         */
+        pal_wire_field_subscription field_subscription;
         pal_wire_answer answer;
         pal_wire_study study;
         pal_wire_estimate estimate;

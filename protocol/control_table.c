@@ -17,8 +17,8 @@ static const pal_control_field part_fields[] = {
     {"error_m", F64, true, AT(pal_wire_part_info, error_m), 0, 0, 0, NULL},
     {"fields", TEXTS, false, AT(pal_wire_part_info, field), PAL_WIRE_FIELD_BYTES, AT(pal_wire_part_info, n_field),
      PAL_WIRE_FIELDS_MAX, NULL},
-    {"adapts", BOOL, false, AT(pal_wire_part_info, is_adaptive), 0, 0, 0, NULL},
-    {"sculpts", BOOL, false, AT(pal_wire_part_info, is_sculptable), 0, 0, 0, NULL},
+    {"adaptive", BOOL, false, AT(pal_wire_part_info, is_adaptive), 0, 0, 0, NULL},
+    {"sculptable", BOOL, false, AT(pal_wire_part_info, is_sculptable), 0, 0, 0, NULL},
     END};
 static const pal_control_field tool_fields[] = {
     {"name", TEXT, true, AT(pal_wire_tool_info, name), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
@@ -46,46 +46,46 @@ static const pal_control_field hello_fields[] = {
      PAL_WIRE_PART_MAX, part_fields},
     {"tools", OBJECTS, true, AT(pal_wire_hello, tool), sizeof(pal_wire_tool_info), AT(pal_wire_hello, n_tool),
      PAL_WIRE_TOOL_MAX, tool_fields},
-    {"rows", TEXTS, true, AT(pal_wire_hello, row), PAL_WIRE_NAME_BYTES, AT(pal_wire_hello, n_row),
+    {"components", TEXTS, true, AT(pal_wire_hello, component), PAL_WIRE_NAME_BYTES, AT(pal_wire_hello, n_component),
      PAL_WIRE_COMPONENT_MAX, NULL},
-    {"row_parts", NUMBERS, false, AT(pal_wire_hello, component_part), 0, AT(pal_wire_hello, n_component_part),
+    {"component_parts", NUMBERS, false, AT(pal_wire_hello, component_part), 0, AT(pal_wire_hello, n_component_part),
      PAL_WIRE_COMPONENT_MAX, NULL},
-    {"row_whys", TEXTS_OR_EMPTY, false, AT(pal_wire_hello, component_reason), PAL_WIRE_REASON_BYTES,
+    {"component_reasons", TEXTS_OR_EMPTY, false, AT(pal_wire_hello, component_reason), PAL_WIRE_REASON_BYTES,
      AT(pal_wire_hello, n_component_reason), PAL_WIRE_COMPONENT_MAX, NULL},
-    {"row_fixed", NUMBERS, false, AT(pal_wire_hello, component_required), 0, AT(pal_wire_hello, n_component_required),
-     PAL_WIRE_COMPONENT_MAX, NULL},
+    {"component_required", NUMBERS, false, AT(pal_wire_hello, component_required), 0,
+     AT(pal_wire_hello, n_component_required), PAL_WIRE_COMPONENT_MAX, NULL},
     {"estimates", BOOL, false, AT(pal_wire_hello, estimates), 0, 0, 0, NULL},
     {"you", OBJECT, true, 0, 0, 0, 0, you_fields},
     END};
 static const pal_control_field topology_fields[] = {
     {"parts", OBJECTS, true, AT(pal_wire_topology, part), sizeof(pal_wire_part_info), AT(pal_wire_topology, n_part),
      PAL_WIRE_PART_MAX, part_fields},
-    {"rows", TEXTS_OR_EMPTY, false, AT(pal_wire_topology, row), PAL_WIRE_NAME_BYTES, AT(pal_wire_topology, n_row),
-     PAL_WIRE_COMPONENT_MAX, NULL},
-    {"row_parts", NUMBERS, false, AT(pal_wire_topology, component_part), 0, AT(pal_wire_topology, n_component_part),
-     PAL_WIRE_COMPONENT_MAX, NULL},
-    {"row_whys", TEXTS_OR_EMPTY, false, AT(pal_wire_topology, component_reason), PAL_WIRE_REASON_BYTES,
+    {"components", TEXTS_OR_EMPTY, false, AT(pal_wire_topology, component), PAL_WIRE_NAME_BYTES,
+     AT(pal_wire_topology, n_component), PAL_WIRE_COMPONENT_MAX, NULL},
+    {"component_parts", NUMBERS, false, AT(pal_wire_topology, component_part), 0,
+     AT(pal_wire_topology, n_component_part), PAL_WIRE_COMPONENT_MAX, NULL},
+    {"component_reasons", TEXTS_OR_EMPTY, false, AT(pal_wire_topology, component_reason), PAL_WIRE_REASON_BYTES,
      AT(pal_wire_topology, n_component_reason), PAL_WIRE_COMPONENT_MAX, NULL},
-    {"row_fixed", NUMBERS, false, AT(pal_wire_topology, component_required), 0,
+    {"component_required", NUMBERS, false, AT(pal_wire_topology, component_required), 0,
      AT(pal_wire_topology, n_component_required), PAL_WIRE_COMPONENT_MAX, NULL},
     END};
 static const pal_control_field active_fields[] = {
     {"part", U32, true, AT(pal_wire_active, part), 0, 0, 0, NULL},
     {"nodes", U32, true, AT(pal_wire_active, n_node), 0, 0, 0, NULL},
     {"springs", U32, true, AT(pal_wire_active, n_spring), 0, 0, 0, NULL},
-    {"of_nodes", U32, true, AT(pal_wire_active, n_all_node), 0, 0, 0, NULL},
-    {"of_springs", U32, true, AT(pal_wire_active, n_finest_spring), 0, 0, 0, NULL},
+    {"finest_nodes", U32, true, AT(pal_wire_active, n_finest_node), 0, 0, 0, NULL},
+    {"finest_springs", U32, true, AT(pal_wire_active, n_finest_spring), 0, 0, 0, NULL},
     END};
 static const pal_control_field state_fields[] = {
     {"part", U32, true, AT(pal_wire_part_state, part), 0, 0, 0, NULL},
     {"frozen", BOOL, false, AT(pal_wire_part_state, frozen), 0, 0, 0, NULL},
     {"asleep", BOOL, false, AT(pal_wire_part_state, asleep), 0, 0, 0, NULL},
-    {"why", TEXT_OR_EMPTY, false, AT(pal_wire_part_state, reason), PAL_WIRE_REASON_BYTES, 0, 0, NULL},
-    {"rescues", U64, false, AT(pal_wire_part_state, n_safeguard), 0, 0, 0, NULL},
-    {"rescue_ms", F64, false, AT(pal_wire_part_state, safeguard_ms), 0, 0, 0, NULL},
+    {"reason", TEXT_OR_EMPTY, false, AT(pal_wire_part_state, reason), PAL_WIRE_REASON_BYTES, 0, 0, NULL},
+    {"safeguards", U64, false, AT(pal_wire_part_state, n_safeguard), 0, 0, 0, NULL},
+    {"safeguard_ms", F64, false, AT(pal_wire_part_state, safeguard_ms), 0, 0, 0, NULL},
     END};
 static const pal_control_field off_fields[] = {
-    {"row", TEXT, true, AT(pal_wire_disabled, row), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
+    {"component", TEXT, true, AT(pal_wire_disabled, component), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
     {"part", U32, true, AT(pal_wire_disabled, part), 0, 0, 0, NULL},
     END};
 static const pal_control_field status_fields[] = {
@@ -97,25 +97,26 @@ static const pal_control_field status_fields[] = {
     {"slowdown", F64, true, AT(pal_wire_status, slowdown), 0, 0, 0, NULL},
     {"substeps", U32, true, AT(pal_wire_status, substeps), 0, 0, 0, NULL},
     {"step_ms", F64, true, AT(pal_wire_status, step_ms), 0, 0, 0, NULL},
-    {"row_ms", NUMBERS, true, AT(pal_wire_status, row_ms), 0, AT(pal_wire_status, n_row), PAL_WIRE_COMPONENT_MAX, NULL},
-    {"rows", TEXTS, false, AT(pal_wire_status, row), PAL_WIRE_NAME_BYTES, AT(pal_wire_status, n_component_name),
+    {"component_ms", NUMBERS, true, AT(pal_wire_status, component_ms), 0, AT(pal_wire_status, n_component),
      PAL_WIRE_COMPONENT_MAX, NULL},
+    {"components", TEXTS, false, AT(pal_wire_status, component), PAL_WIRE_NAME_BYTES,
+     AT(pal_wire_status, n_component_name), PAL_WIRE_COMPONENT_MAX, NULL},
     {"members", U32, true, AT(pal_wire_status, n_member), 0, 0, 0, NULL},
     {"bytes_s", F64, true, AT(pal_wire_status, bytes_s), 0, 0, 0, NULL},
     {"rtt_ms", F64, true, AT(pal_wire_status, rtt_ms), 0, 0, 0, NULL},
-    {"skipped", U32, true, AT(pal_wire_status, n_skipped), 0, 0, 0, NULL},
-    {"late", U64, true, AT(pal_wire_status, n_late), 0, 0, 0, NULL},
-    {"refused", U64, true, AT(pal_wire_status, n_refused), 0, 0, 0, NULL},
-    {"note", TEXT, false, AT(pal_wire_status, diag), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
+    {"skipped_cycles", U32, true, AT(pal_wire_status, n_skipped), 0, 0, 0, NULL},
+    {"late_steps", U64, true, AT(pal_wire_status, n_late), 0, 0, 0, NULL},
+    {"refused_inputs", U64, true, AT(pal_wire_status, n_refused), 0, 0, 0, NULL},
+    {"diagnostic", TEXT, false, AT(pal_wire_status, diag), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
     {"active", OBJECTS, false, AT(pal_wire_status, active), sizeof(pal_wire_active), AT(pal_wire_status, n_active),
      PAL_WIRE_PART_MAX, active_fields},
-    {"row_parts", NUMBERS, false, AT(pal_wire_status, component_part), 0, AT(pal_wire_status, n_component_part),
+    {"component_parts", NUMBERS, false, AT(pal_wire_status, component_part), 0, AT(pal_wire_status, n_component_part),
      PAL_WIRE_COMPONENT_MAX, NULL},
     {"parts", OBJECTS, false, AT(pal_wire_status, state), sizeof(pal_wire_part_state), AT(pal_wire_status, n_state),
      PAL_WIRE_PART_MAX, state_fields},
-    {"off", OBJECTS, false, AT(pal_wire_status, off), sizeof(pal_wire_disabled), AT(pal_wire_status, n_off),
-     PAL_WIRE_COMPONENT_MAX, off_fields},
-    {"unwatched", U64, false, AT(pal_wire_status, n_unobserved), 0, 0, 0, NULL},
+    {"disabled", OBJECTS, false, AT(pal_wire_status, disabled), sizeof(pal_wire_disabled),
+     AT(pal_wire_status, n_disabled), PAL_WIRE_COMPONENT_MAX, off_fields},
+    {"unobserved_steps", U64, false, AT(pal_wire_status, n_unobserved), 0, 0, 0, NULL},
     END};
 static const pal_control_field member_fields[] = {
     {"id", U16, true, AT(pal_wire_member, id), 0, 0, 0, NULL},
@@ -136,7 +137,7 @@ static const pal_control_field join_fields[] = {
     {"name", TEXT, true, AT(pal_wire_join, name), PAL_WIRE_MEMBER_NAME, 0, 0, NULL},
     {"role", ROLE, true, AT(pal_wire_join, role), 0, 0, 0, NULL},
     {"tool", TOOL, false, AT(pal_wire_join, tool), 0, 0, 0, NULL},
-    {"patches", BOOL, false, AT(pal_wire_join, patches), 0, 0, 0, NULL},
+    {"topology_deltas", BOOL, false, AT(pal_wire_join, topology_deltas), 0, 0, 0, NULL},
     END};
 static const pal_control_field command_fields[] = {
     {"verb", TEXT, true, AT(pal_wire_command, verb), LEN(pal_wire_command, verb), 0, 0, NULL},
@@ -158,9 +159,9 @@ static const pal_control_field point_fields[] = {
     {"index", U32, true, AT(pal_wire_study_point, index), 0, 0, 0, NULL},
     {"method", TEXT, true, AT(pal_wire_study_point, method), PAL_WIRE_METHOD_BYTES, 0, 0, NULL},
     {"label", TEXT, true, AT(pal_wire_study_point, label), PAL_WIRE_LABEL_BYTES, 0, 0, NULL},
-    {"ms", F64, true, AT(pal_wire_study_point, ms), 0, 0, 0, NULL},
+    {"cost_ms", F64, true, AT(pal_wire_study_point, cost_ms), 0, 0, 0, NULL},
     {"error_m", F64, true, AT(pal_wire_study_point, error_m), 0, 0, 0, NULL},
-    {"front", BOOL, false, AT(pal_wire_study_point, front), 0, 0, 0, NULL},
+    {"pareto_optimal", BOOL, false, AT(pal_wire_study_point, pareto_optimal), 0, 0, 0, NULL},
     END};
 static const pal_control_field study_fields[] = {
     {"body", TEXT, true, AT(pal_wire_study, body), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
@@ -170,9 +171,9 @@ static const pal_control_field study_fields[] = {
      PAL_WIRE_POINT_MAX, point_fields},
     END};
 static const pal_control_field neighbour_fields[] = {
-    {"knob", TEXT, true, AT(pal_wire_neighbour, knob), PAL_WIRE_METHOD_BYTES, 0, 0, NULL},
+    {"parameter", TEXT, true, AT(pal_wire_neighbour, parameter), PAL_WIRE_METHOD_BYTES, 0, 0, NULL},
     {"label", TEXT, true, AT(pal_wire_neighbour, label), PAL_WIRE_LABEL_BYTES, 0, 0, NULL},
-    {"ms", NUMBER_OR_NAN, false, AT(pal_wire_neighbour, ms), 0, 0, 0, NULL},
+    {"cost_ms", NUMBER_OR_NAN, false, AT(pal_wire_neighbour, cost_ms), 0, 0, 0, NULL},
     {"error_m", NUMBER_OR_NAN, false, AT(pal_wire_neighbour, error_m), 0, 0, 0, NULL},
     {"size", U32, false, AT(pal_wire_neighbour, size), 0, 0, 0, NULL},
     {"step_ms", F64, false, AT(pal_wire_neighbour, step_ms), 0, 0, 0, NULL},
@@ -180,22 +181,22 @@ static const pal_control_field neighbour_fields[] = {
     END};
 static const pal_control_field estimate_fields[] = {
     {"body", TEXT, true, AT(pal_wire_estimate, body), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
-    {"setting", TEXT, true, AT(pal_wire_estimate, setting), PAL_WIRE_LABEL_BYTES, 0, 0, NULL},
-    {"point", NUMBER_OR_NAN, false, AT(pal_wire_estimate, point), 0, 0, 0, NULL},
+    {"configuration", TEXT, true, AT(pal_wire_estimate, configuration), PAL_WIRE_LABEL_BYTES, 0, 0, NULL},
+    {"study_point", NUMBER_OR_NAN, false, AT(pal_wire_estimate, study_point), 0, 0, 0, NULL},
     {"tick", U64, true, AT(pal_wire_estimate, tick), 0, 0, 0, NULL},
     {"time_s", F64, true, AT(pal_wire_estimate, time_s), 0, 0, 0, NULL},
     {"age_s", NUMBER_OR_NAN, false, AT(pal_wire_estimate, age_s), 0, 0, 0, NULL},
-    {"ms", NUMBER_OR_NAN, false, AT(pal_wire_estimate, ms), 0, 0, 0, NULL},
-    {"own_ms", F64, true, AT(pal_wire_estimate, estimate_ms), 0, 0, 0, NULL},
-    {"most_m", NUMBER_OR_NAN, false, AT(pal_wire_estimate, max_m), 0, 0, 0, NULL},
+    {"cost_ms", NUMBER_OR_NAN, false, AT(pal_wire_estimate, cost_ms), 0, 0, 0, NULL},
+    {"estimate_ms", F64, true, AT(pal_wire_estimate, estimate_ms), 0, 0, 0, NULL},
+    {"max_displacement_m", NUMBER_OR_NAN, false, AT(pal_wire_estimate, max_displacement_m), 0, 0, 0, NULL},
     {"error_m", NUMBER_OR_NAN, false, AT(pal_wire_estimate, error_m), 0, 0, 0, NULL},
     {"discretisation_m", NUMBER_OR_NAN, false, AT(pal_wire_estimate, discretisation_m), 0, 0, 0, NULL},
     {"algebraic_m", NUMBER_OR_NAN, false, AT(pal_wire_estimate, algebraic_m), 0, 0, 0, NULL},
     {"time_m", NUMBER_OR_NAN, false, AT(pal_wire_estimate, time_m), 0, 0, 0, NULL},
     {"model_m", NUMBER_OR_NAN, false, AT(pal_wire_estimate, model_m), 0, 0, 0, NULL},
-    {"zz_percent", NUMBER_OR_NAN, false, AT(pal_wire_estimate, energy_error_percent), 0, 0, 0, NULL},
+    {"energy_error_percent", NUMBER_OR_NAN, false, AT(pal_wire_estimate, energy_error_percent), 0, 0, 0, NULL},
     {"locking", BOOL, false, AT(pal_wire_estimate, locking), 0, 0, 0, NULL},
-    {"note", TEXT_OR_EMPTY, false, AT(pal_wire_estimate, diag), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
+    {"diagnostic", TEXT_OR_EMPTY, false, AT(pal_wire_estimate, diag), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
     {"neighbours", OBJECTS, false, AT(pal_wire_estimate, neighbour), sizeof(pal_wire_neighbour),
      AT(pal_wire_estimate, n_neighbour), PAL_WIRE_NEIGHBOUR_MAX, neighbour_fields},
     END};
@@ -210,10 +211,10 @@ const pal_control_message pal_control_message_table[PAL_CONTROL_COUNT] = {
 #define FIELDS_PONG                stamp_fields
 #define FIELDS_JOIN                join_fields
 #define FIELDS_COMMAND             command_fields
-#define FIELDS_TAKE                take_fields
-#define FIELDS_LEAVE               leave_fields
+#define FIELDS_TAKE_TOOL           take_fields
+#define FIELDS_RELEASE_TOOL        leave_fields
 #define FIELDS_PING                stamp_fields
-#define FIELDS_VIEW                view_fields
+#define FIELDS_SUBSCRIBE_FIELD     view_fields
 #define FIELDS_ANSWER              answer_fields
 #define FIELDS_STUDY               study_fields
 #define FIELDS_ESTIMATE            estimate_fields

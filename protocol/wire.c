@@ -1,4 +1,4 @@
-/* The binary messages of palpate.v1 (README.md), written and read field by field so that any host agrees.
+/* The binary messages of palpate.v2 (README.md), written and read field by field so that any host agrees.
  *
  * A cursor walks each message; the lengths are checked once, before the walk, because every kind's length follows from
  * its kind and one count. */

@@ -1,4 +1,4 @@
-/* The binary messages of palpate.v1 except FRAME's body: packed little-endian structs behind an 8-byte head.
+/* The binary messages of palpate.v2 except FRAME's body: packed little-endian structs behind an 8-byte head.
  *
  * README.md is the specification (byte tables); this header is its C face. `put` functions return the bytes written,
  * or 0 when cap is too small (or a count is above its maximum); `get` functions return a pal_refusal code, check every
@@ -11,8 +11,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define PAL_PROTOCOL_NAME    "palpate.v1" /* websocket subprotocol; the number changes with any incompatible change */
-#define PAL_PROTOCOL_VERSION 1
+#define PAL_PROTOCOL_NAME    "palpate.v2" /* websocket subprotocol; the number changes with any incompatible change */
+#define PAL_PROTOCOL_VERSION 2
 #define PAL_WIRE_MAGIC       0x314C4150u /* the bytes P A L 1 */
 
 #define PAL_WIRE_HEAD_BYTES            8

@@ -17,8 +17,8 @@ static const pal_command_entry command[] = {
      command_calibrate},
     {"study", "what accuracy costs: settings of a body with error and milliseconds, and the one to serve",
      command_study},
-    {"torture", "insult a scene in every way that is known to break simulations, and say what happens",
-     command_torture},
+    {"robustness", "insult a scene in every way that is known to break simulations, and say what happens",
+     command_robustness},
     {"bench", "measure mesh preparation, springs, calibration and protocol on this machine", command_bench},
 };
 enum { N_COMMAND = sizeof command / sizeof command[0], USAGE = 2 };

@@ -107,7 +107,7 @@ static void ws_control(void *user, pal_link *link, const pal_control *c)
     if (c->type == PAL_CONTROL_MEMBERS && pal_link_hello(link))
         for (uint32_t i = 0; i < c->members.n_member; i++)
             if (c->members.member[i].id == pal_link_hello(link)->you_id) n->count.tool = c->members.member[i].tool;
-    if (c->type == PAL_CONTROL_ERROR) pal_log(PAL_LOG_WARN, "server", "%s", c->problem.text);
+    if (c->type == PAL_CONTROL_ERROR) pal_log(PAL_LOG_WARN, "server", "%s", c->error.text);
 }
 
 static void ws_message(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)

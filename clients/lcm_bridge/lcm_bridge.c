@@ -201,7 +201,7 @@ static void tool_control(void *user, pal_link *link, const pal_control *c)
     if (c->type == PAL_CONTROL_MEMBERS && hello)
         for (uint32_t i = 0; i < c->members.n_member; i++)
             if (c->members.member[i].id == hello->you_id) tool->fixed = c->members.member[i].tool;
-    if (c->type == PAL_CONTROL_ERROR) pal_log(PAL_LOG_WARN, "lcm_tool", "tool %d: %s", tool->index, c->problem.text);
+    if (c->type == PAL_CONTROL_ERROR) pal_log(PAL_LOG_WARN, "lcm_tool", "tool %d: %s", tool->index, c->error.text);
 }
 
 static void tool_state(void *user, pal_link *link, pal_link_state state, int code, const char *reason)
@@ -289,7 +289,7 @@ static void bridge_tidy(void *user)
             tool->link = NULL;
             b->count.n_tool--;
         } else if (pal_link_current_state(tool->link) == PAL_LINK_JOINED && tool->fixed != i) {
-            pal_link_send_control(tool->link, &(pal_control){.type = PAL_CONTROL_TAKE, .tool = i});
+            pal_link_send_control(tool->link, &(pal_control){.type = PAL_CONTROL_TAKE_TOOL, .tool = i});
         }
     }
     for (uint32_t i = 0; i < b->topology.n_part; i++)

@@ -1,4 +1,4 @@
-/* palpate.v1 on one side, LCM on the other: what palpate-lcm does.
+/* palpate.v2 on one side, LCM on the other: what palpate-lcm does.
  *
  * One watching member takes frames and status to LCM; each tool whose states come in on
  * PALPATE1/<session>/TOOL/<n> gets a trainee member of its own that takes tool n, passes the newest state on as POSE

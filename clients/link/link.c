@@ -23,7 +23,7 @@ struct pal_link {
     char name[PAL_WIRE_MEMBER_NAME];
     pal_wire_role role;
     int tool;
-    bool patches;
+    bool topology_deltas;
     bool once, closing, up, fixed, pause_reading;
     double read_bytes_s, read_budget;
     uint64_t read_ns;
@@ -144,7 +144,7 @@ pal_err pal_link_open(pal_link_loop *loop, const pal_link_options *options, pal_
     strncpy(link->name, options->name ? options->name : "client", sizeof link->name - 1);
     link->role = options->role;
     link->tool = options->tool;
-    link->patches = options->patches;
+    link->topology_deltas = options->topology_deltas;
     link->once = options->once;
     link->read_bytes_s = options->read_bytes_s;
     link->read_budget = options->read_bytes_s / 4;
@@ -379,7 +379,7 @@ static void link_established(pal_link *link, struct lws *wsi)
     memcpy(join.join.name, link->name, sizeof join.join.name);
     join.join.role = link->role;
     join.join.tool = link->tool;
-    join.join.patches = link->patches;
+    join.join.topology_deltas = link->topology_deltas;
     pal_link_send_control(link, &join);
     link_tell(link, PAL_LINK_OPEN, "");
     if (link->fixed) lws_rx_flow_control(wsi, 0);

@@ -1,4 +1,4 @@
-/* A client of palpate.v1 over libwebsockets, and the one event loop it runs on: shared by palpate-client,
+/* A client of palpate.v2 over libwebsockets, and the one event loop it runs on: shared by palpate-client,
  * palpate-lcm and palpate-bridge.
  *
  * A pal_link_loop is one libwebsockets context; all its links, gets, timers and watched descriptors call back on the
@@ -60,7 +60,7 @@ typedef struct pal_link_options {
     const char *name; /* of the member; copied                                             */
     pal_wire_role role;
     int tool;                      /* wanted: index, PAL_WIRE_TOOL_ANY or PAL_WIRE_TOOL_NONE                      */
-    bool patches;                  /* takes PATCH (triangle_table.h); else parts that adapt look as at load          */
+    bool topology_deltas;          /* takes PATCH (triangle_table.h); else parts that adapt look as at load          */
     bool once;                     /* do not connect again after the first loss                                   */
     double read_bytes_s;           /* > 0: take no more than this many bytes per second (a slow client)           */
     const pal_link_events *events; /* borrowed while the link lives                                               */

@@ -157,7 +157,7 @@ static void trainee_answered(pal_scripted_client *t, const pal_control *c)
     if (!t->asked || t->answered) return;
     t->refused = c->type == PAL_CONTROL_ERROR;
     if (!t->refused) t->answer = c->answer;
-    snprintf(t->text, sizeof t->text, "%s", t->refused ? c->problem.text : c->answer.text);
+    snprintf(t->text, sizeof t->text, "%s", t->refused ? c->error.text : c->answer.text);
     t->answered = true;
     t->answered_ns = pal_clock_ns();
     trainee_tell(t);
@@ -171,7 +171,7 @@ static void trainee_order(pal_scripted_client *t, uint64_t now)
     if (!orders || t->order >= orders->n_line || t->asked || !t->cycle_seen || !part->seen) return;
     if ((double)(now - t->first_cycle_ns) * 1e-9 < orders->line[t->order].t_s) return;
     pal_control c = {.type = PAL_CONTROL_COMMAND};
-    if (!pal_order_fill(&orders->line[t->order], part->now_m, part->n_vertex, &c.order)) return;
+    if (!pal_order_fill(&orders->line[t->order], part->now_m, part->n_vertex, &c.command)) return;
     if (pal_link_send_control(t->link, &c)) return;
     t->asked = true;
     t->answered = t->reshaped = t->refused = false;
@@ -354,10 +354,10 @@ static void trainee_look(pal_scripted_client *t, const pal_wire_part_info *info,
         for (uint32_t k = 0; k < info[i].n_field; k++)
             t->part[i].looks = t->part[i].looks || !strcmp(info[i].field[k], t->options.field);
         if (!t->part[i].looks) continue;
-        pal_control view = {.type = PAL_CONTROL_VIEW, .view = {.part = i}};
-        snprintf(view.view.field, sizeof view.view.field, "%s", t->options.field);
+        pal_control ask = {.type = PAL_CONTROL_SUBSCRIBE_FIELD, .field_subscription = {.part = i}};
+        snprintf(ask.field_subscription.field, sizeof ask.field_subscription.field, "%s", t->options.field);
         t->result.field_given = true;
-        if (pal_link_send_control(t->link, &view)) trainee_fault(t, PAL_FAULT_FIELD, "it cannot be asked for");
+        if (pal_link_send_control(t->link, &ask)) trainee_fault(t, PAL_FAULT_FIELD, "it cannot be asked for");
     }
 }
 
@@ -567,7 +567,7 @@ pal_err pal_scripted_client_open(pal_link_loop *loop, pal_asset_store *store,
                                    .name = options->name,
                                    .role = options->orders ? PAL_WIRE_ROLE_INSTRUCTOR : PAL_WIRE_ROLE_TRAINEE,
                                    .tool = t->script.idle ? PAL_WIRE_TOOL_NONE : options->tool,
-                                   .patches = true,
+                                   .topology_deltas = true,
                                    .read_bytes_s = options->read_bytes_s,
                                    .events = &events,
                                    .user = t};

@@ -1,6 +1,6 @@
-/* Arena memory: many allocations, one free. Two uses: the world's memory (grows at load, freed whole) and a step's
- * scratch (a fixed block, emptied after every step, so that a step never calls the heap).
- * Thread: an arena belongs to one thread at a time. */
+/* Arena memory: many allocations, one free. It has two uses: the memory of a world, which grows at load and is freed
+ * whole, and the scratch memory of a step, a fixed block that is emptied after every step, so that a step makes no heap
+ * call. Thread: an arena belongs to one thread at a time. */
 #ifndef PAL_BASE_ARENA_H
 #define PAL_BASE_ARENA_H
 #include "server/base/err.h"
@@ -9,8 +9,8 @@
 
 typedef struct pal_arena pal_arena;
 
-/* growing arena (grows = true: takes further blocks of at least n_byte from the heap) or fixed arena (one block of
- * n_byte, touched here, so that a step meets no page fault); NULL: out of memory. [load] */
+/* Creates a growing arena (grows = true: it takes further blocks of at least n_byte from the heap) or a fixed arena
+ * (one block of n_byte, touched here, so that a step causes no page fault). NULL: out of memory. [load] */
 pal_arena *pal_arena_create(size_t n_byte, bool grows);
 void pal_arena_destroy(pal_arena *arena); /* NULL is fine */
 
@@ -21,7 +21,7 @@ void *pal_arena_alloc(pal_arena *arena, size_t n_byte);
 void *pal_arena_array(pal_arena *arena, size_t n_item, size_t n_byte);
 #define PAL_NEW(arena, type, n) ((type *)pal_arena_array((arena), (size_t)(n), sizeof(type)))
 
-/* bytes handed out since the last reset, with padding; a fixed arena's mark and return for nested scratch */
+/* bytes allocated since the last reset, with padding; of a fixed arena also the mark to rewind to */
 size_t pal_arena_used(const pal_arena *arena);
 void pal_arena_reset(pal_arena *arena);               /* fixed arenas only: empty again */
 void pal_arena_rewind(pal_arena *arena, size_t used); /* fixed arenas only: back to an earlier pal_arena_used */

@@ -1,8 +1,8 @@
-/* The error table: one code per thing the caller may do about it.
+/* The error table: one code for each thing that the caller may do about it.
  *
- * Every fallible function returns pal_err, 0 is success, and writes its results only on success. A function that has
- * more to say than its code takes a pal_diagnostic, which may be NULL: one sentence that names the file, entry and
- * number. Thread: any. */
+ * Every fallible function returns pal_err, 0 is success, and writes its results only on success. A function with more
+ * to report than its code takes a pal_diagnostic, which may be NULL: one sentence that names the file, the entry and
+ * the number. Thread: any. */
 #ifndef PAL_BASE_ERR_H
 #define PAL_BASE_ERR_H
 #include <stddef.h>
@@ -18,7 +18,7 @@
     X(BUDGET, "asks for more than the stated budget, nothing changed")                                                 \
     X(NUMERIC, "no usable number came out, nothing changed")                                                           \
     X(FROZEN, "a body diverged and was frozen")                                                                        \
-    X(INTERNAL, "a mistake of ours")
+    X(INTERNAL, "an error of this program")
 
 typedef enum pal_err {
 #define X(code, text) PAL_ERR_##code,
@@ -31,7 +31,7 @@ typedef enum pal_err {
 const char *pal_err_name(pal_err err);
 const char *pal_err_text(pal_err err);
 
-/* one sentence for people, without a line end */
+/* one sentence, without a line end */
 typedef struct pal_diagnostic {
     char text[512];
 } pal_diagnostic;
@@ -47,7 +47,7 @@ pal_err pal_diagnostic_set(pal_diagnostic *diag, pal_err err, const char *format
         if (pal_try_err) return pal_try_err;                                                                           \
     } while (0)
 
-/* our own mistakes only, never bytes, files or flags; off in Release */
+/* checks the program itself, never bytes, files or flags; off in Release */
 #ifdef NDEBUG
 #define PAL_ASSERT(condition) ((void)0)
 #else

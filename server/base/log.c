@@ -4,13 +4,13 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-static pal_log_level most_detailed = PAL_LOG_INFO;
+static pal_log_level max_level = PAL_LOG_INFO;
 static pal_log_handler current_handler;
 static void *current_user;
 
-void pal_log_set_level(pal_log_level most)
+void pal_log_set_level(pal_log_level max)
 {
-    most_detailed = most;
+    max_level = max;
 }
 
 void pal_log_set_handler(pal_log_handler handler, void *user)
@@ -24,7 +24,7 @@ void pal_log(pal_log_level level, const char *event, const char *format, ...)
     static const char *const names[] = {"error", "warn", "info", "debug"};
     char text[1024];
     va_list args;
-    if (level > most_detailed) return;
+    if (level > max_level) return;
     va_start(args, format);
     vsnprintf(text, sizeof text, format, args);
     va_end(args);

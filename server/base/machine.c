@@ -10,10 +10,10 @@
 #include <sys/utsname.h>
 #include <unistd.h>
 
-enum { NAME = 96, LINE = 512, LANES = 16, READS = 3, MOST_READS = 400 };
-static const double least_byte = 1 << 16, most_byte = 32 << 20, read_for_ms = 2;
+enum { NAME = 96, LINE = 512, LANES = 16, READS = 3, MAX_READS = 400 };
+static const double min_byte = 1 << 16, max_byte = 32 << 20, read_for_ms = 2;
 
-/* shown characters, runs of blanks as one */
+/* printable characters, runs of blanks as one */
 static void take_name(const char *from, char out[NAME])
 {
     size_t n = 0;
@@ -53,21 +53,21 @@ const char *pal_machine_name(char text[PAL_MACHINE_TEXT])
 
 double pal_machine_read_ms(double n_byte)
 {
-    size_t n = (size_t)(fmin(fmax(n_byte, least_byte), most_byte) / sizeof(float)) / LANES * LANES;
+    size_t n = (size_t)(fmin(fmax(n_byte, min_byte), max_byte) / sizeof(float)) / LANES * LANES;
     float *value = malloc(n * sizeof *value), sum[LANES] = {0};
-    double least = INFINITY, all = 0;
+    double min = INFINITY, all = 0;
     if (!value) return 0;
     for (size_t i = 0; i < n; i++) value[i] = (float)(i & 7);
-    for (int k = 0; k < READS || (k < MOST_READS && all < read_for_ms); k++) {
+    for (int k = 0; k < READS || (k < MAX_READS && all < read_for_ms); k++) {
         uint64_t began = pal_clock_thread_ns();
         for (size_t i = 0; i < n; i += LANES)
             for (int l = 0; l < LANES; l++) sum[l] += value[i + (size_t)l];
         double ms = 1e-6 * (double)(pal_clock_thread_ns() - began);
         all += ms;
-        /* the first fetches it */
-        if (k > 0) least = fmin(least, ms);
+        /* the first pass fills the caches */
+        if (k > 0) min = fmin(min, ms);
     }
     free(value);
-    /* the sums are of use, so that they are made */
-    return sum[1] > 0 ? least / ((double)n * sizeof(float)) * n_byte : 0;
+    /* the sums are used, so that the compiler keeps the loop */
+    return sum[1] > 0 ? min / ((double)n * sizeof(float)) * n_byte : 0;
 }

@@ -1,5 +1,5 @@
-/* Workers take the next piece by counting. A run is open from its call until the caller finds no more pieces; a worker
- * that wakes later leaves it alone, so nobody waits for a thread that has no work. */
+/* Workers take the next piece from an atomic counter. A run is open from its call until the caller finds no more
+ * pieces; a worker that wakes later does not enter it, so nobody waits for a thread that has no work. */
 #include "server/base/team.h"
 
 #include <errno.h>
@@ -23,21 +23,21 @@ struct pal_team {
     pthread_cond_t begun, left; /* workers wait for begun, the caller for left            */
     bool open, quit;
     int n_inside;          /* workers at work on this run, without the caller        */
-    uint64_t run;          /* its number: a worker enters a run once                 */
-    _Atomic int64_t next;  /* piece to be taken; goes past n by one for each of them */
+    uint64_t run;          /* number of the run: a worker enters a run once */
+    _Atomic int64_t next;  /* next piece; each worker increments it once past n */
     int n, size, n_thread; /* size = n_thread + 1                                    */
     void (*piece)(void *user, int worker, int index);
     void *user;
     worker worker[];
 };
 
-/* cores that this process may use; the set grows until the system's fits */
+/* cores that this process may use; the set grows until it holds the mask of the system */
 static int count_cores(void)
 {
-    for (int most = 1024; most <= 1 << 20; most *= 4) {
-        cpu_set_t *set = CPU_ALLOC((size_t)most);
+    for (int max = 1024; max <= 1 << 20; max *= 4) {
+        cpu_set_t *set = CPU_ALLOC((size_t)max);
         if (!set) break;
-        size_t byte = CPU_ALLOC_SIZE((size_t)most);
+        size_t byte = CPU_ALLOC_SIZE((size_t)max);
         CPU_ZERO_S(byte, set);
         bool known = sched_getaffinity(0, byte, set) == 0, small = !known && errno == EINVAL;
         int n = known ? CPU_COUNT_S(byte, set) : 0;
@@ -87,7 +87,7 @@ pal_err pal_team_create(int n_worker, pal_team **out)
     pthread_mutex_init(&team->lock, NULL);
     pthread_cond_init(&team->begun, NULL);
     pthread_cond_init(&team->left, NULL);
-    /* signals are for the program's own threads */
+    /* signals are handled by the threads of the program */
     sigset_t all, old;
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &old);

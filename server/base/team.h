@@ -1,6 +1,6 @@
-/* A team of threads that works through equal pieces of work side by side. What piece i computes must depend on i alone,
- * never on the worker or on the order: then the result is the same whatever the number of cores. Thread: one caller at
- * a time. */
+/* A team of threads that works through independent pieces of work in parallel. What piece i computes must depend on i
+ * alone, never on the worker or on the order: then the result is the same for any number of cores. Thread: one caller
+ * at a time. */
 #ifndef PAL_BASE_TEAM_H
 #define PAL_BASE_TEAM_H
 #include "server/base/err.h"
@@ -9,14 +9,14 @@ enum { PAL_TEAM_MAX = 256 };
 
 typedef struct pal_team pal_team;
 
-/* n_worker <= 0: one per core that this process may use; 1: no thread is made and the caller works. At most
- * PAL_TEAM_MAX, and no more than the system gives: pal_team_size says how many. Between runs they sleep; they take no
- * signals. MEMORY: no memory, or no thread could be made. [load] */
+/* n_worker <= 0: one per core that this process may use; 1: no thread is created and the caller works. At most
+ * PAL_TEAM_MAX, and no more than the system grants: pal_team_size returns the number. Workers sleep between runs and
+ * block all signals. MEMORY: no memory, or no thread could be created. [load] */
 pal_err pal_team_create(int n_worker, pal_team **out);
 void pal_team_destroy(pal_team *team);   /* joins; NULL is fine */
 int pal_team_size(const pal_team *team); /* workers, the caller among them */
-/* calls piece(user, worker, i) once for every i in [0, n), 0 <= worker < size, and returns when all are done; the
- * caller works too, as worker 0. No two pieces run as one worker at once, so what belongs to a worker needs no lock.
- * What the pieces wrote is visible on return. A piece must not run the same team. n <= 0: nothing */
+/* Calls piece(user, worker, i) once for every i in [0, n), 0 <= worker < size, and returns when all are done; the
+ * caller is worker 0. A worker runs one piece at a time, so its own data need no lock. What the pieces wrote is visible
+ * on return. A piece must not run the same team. n <= 0: nothing */
 void pal_team_run(pal_team *team, int n, void (*piece)(void *user, int worker, int index), void *user);
 #endif

@@ -5,11 +5,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* bytes of the character at text[0..n_byte-1] (1..4) and its code point; 0: not well-formed (too long a form,
- * surrogate, beyond U+10FFFF, cut) or n_byte is 0 */
+/* bytes of the character at text[0..n_byte-1] (1..4) and its code point; 0: not well-formed (overlong, a surrogate,
+ * beyond U+10FFFF, truncated) or n_byte is 0 */
 static inline int pal_utf8_next(const char *text, size_t n_byte, uint32_t *code)
 {
-    static const uint32_t least[5] = {0, 0, 0x80, 0x800, 0x10000};
+    static const uint32_t min[5] = {0, 0, 0x80, 0x800, 0x10000};
     const uint8_t *b = (const uint8_t *)text;
     if (n_byte == 0) return 0;
     int n = b[0] < 0x80 ? 1 : (b[0] & 0xe0) == 0xc0 ? 2 : (b[0] & 0xf0) == 0xe0 ? 3 : (b[0] & 0xf8) == 0xf0 ? 4 : 0;
@@ -19,13 +19,13 @@ static inline int pal_utf8_next(const char *text, size_t n_byte, uint32_t *code)
         if ((b[k] & 0xc0) != 0x80) return 0;
         c = c << 6 | (b[k] & 0x3fu);
     }
-    if (c < least[n] || c > 0x10ffff || (c >= 0xd800 && c < 0xe000)) return 0;
+    if (c < min[n] || c > 0x10ffff || (c >= 0xd800 && c < 0xe000)) return 0;
     *code = c;
     return n;
 }
 
-/* may this character stand in a name or title? Not control characters, line and paragraph separators, direction marks
- * and overrides, zero-width ones, the byte order mark */
+/* May this character appear in a name or title? Control characters, line and paragraph separators, direction marks and
+ * overrides, zero-width characters and the byte order mark may not. */
 static inline bool pal_utf8_printable(uint32_t c)
 {
     return !(c < 0x20 || (c >= 0x7f && c < 0xa0) || (c >= 0x200b && c <= 0x200f) || (c >= 0x2028 && c <= 0x202e) ||

@@ -49,10 +49,10 @@ static inline double pal_dist3(const double a[3], const double b[3])
     return pal_norm3(d);
 }
 /* a / |a|; false and r untouched when |a| <= least or not finite */
-static inline bool pal_unit3(double r[3], const double a[3], double least)
+static inline bool pal_unit3(double r[3], const double a[3], double min)
 {
     double n = pal_norm3(a);
-    if (!(n > least) || !isfinite(n)) return false;
+    if (!(n > min) || !isfinite(n)) return false;
     pal_scale3(r, 1 / n, a);
     return true;
 }

@@ -64,7 +64,7 @@ typedef struct table_row {
     int n_sub[KINDS];                         /* sub-steps of a run    */
     double run_s[KINDS], moved_m[KINDS];      /* moved_m: the vertex pressed, at the end of the press */
     double way_m[KINDS][TABLE_STEPS];         /* the same after every step                            */
-    int n_way;
+    int n_trajectory;
     double off[KINDS]; /* from the refined one's, in parts of its largest       */
     double ratio;      /* adaptive over refined: of the paper 0.31 and 0.48 */
 } table_row;
@@ -165,7 +165,7 @@ static void load(pal_world *world, const pressed *p, double share)
             int i = pal_body_point(body, k);
             double r = pal_dist3(body->x_rest + 3 * i, p->at) / p->radius_m;
             double weight = (1 - r * r) * (1 - r * r) * body->mass_kg[i];
-            if (body->fixed[i] || r >= 1) continue;
+            if (body->support[i] || r >= 1) continue;
             f[p->axis] = turn ? -share * p->force_N * weight / sum : 0;
             if (turn)
                 (void)pal_world_load(world, 0, i, f);
@@ -196,7 +196,7 @@ static double go(pal_world *world, const pressed *p, double share, int n_step, d
         spent += pal_clock_thread_ns() - began;
         if (!told) continue;
         told->n_sub[kind] += pal_world_substeps(world);
-        if (told->n_way < TABLE_STEPS) told->way_m[kind][told->n_way++] = moved(body, p);
+        if (told->n_trajectory < TABLE_STEPS) told->way_m[kind][told->n_trajectory++] = moved(body, p);
         int *node = told->n_node[kind], *spring = told->n_spring[kind];
         node[0] = body->n_active < node[0] || !node[0] ? body->n_active : node[0];
         node[1] = body->n_active > node[1] ? body->n_active : node[1];
@@ -221,7 +221,7 @@ static pal_err run_table(const pressed *p, const double paper_s[KINDS], table_ro
     for (int round = 0; round < ROUNDS && !err; round++) {
         for (int kind = 0; kind < KINDS && !err; kind++) {
             pal_world_reset(world[kind]);
-            out->n_sub[kind] = out->n_way = 0;
+            out->n_sub[kind] = out->n_trajectory = 0;
             double looking = go(world[kind], p, 1, 1, look_s, NULL, 0);
             double pressing = go(world[kind], p, 1, (int)lround(press_s / frame_s), frame_s, out, kind);
             out->moved_m[kind] = moved(pal_world_body(world[kind], 0), p);
@@ -238,9 +238,9 @@ static pal_err run_table(const pressed *p, const double paper_s[KINDS], table_ro
     }
     if (!err) out->ratio = pal_median(ratio, ROUNDS);
     double most = 0;
-    for (int i = 0; i < out->n_way; i++) most = fmax(most, out->way_m[REFINED][i]);
+    for (int i = 0; i < out->n_trajectory; i++) most = fmax(most, out->way_m[REFINED][i]);
     for (int kind = 0; kind < KINDS; kind++)
-        for (int i = 0; i < out->n_way; i++)
+        for (int i = 0; i < out->n_trajectory; i++)
             out->off[kind] = fmax(out->off[kind], fabs(out->way_m[kind][i] - out->way_m[REFINED][i]) / most);
     return err;
 }
@@ -508,9 +508,13 @@ static pal_err draw_ways(const results *r, const char *path, pal_diagnostic *dia
         if (strcmp(row->source, "procedural") != 0) continue;
         for (int k = 0; k < KINDS; k++) {
             double *y = way_mm[plot.n_curve];
-            for (int i = 0; i < row->n_way; i++) y[i] = 1e3 * row->way_m[k][i];
-            plot.curve[plot.n_curve++] = (pal_curve){
-                .name = name[body][k], .n = row->n_way, .x = time_s, .y = y, .bare = true, .dashed = k == ADAPTIVE};
+            for (int i = 0; i < row->n_trajectory; i++) y[i] = 1e3 * row->way_m[k][i];
+            plot.curve[plot.n_curve++] = (pal_curve){.name = name[body][k],
+                                                     .n = row->n_trajectory,
+                                                     .x = time_s,
+                                                     .y = y,
+                                                     .bare = true,
+                                                     .dashed = k == ADAPTIVE};
         }
         body++;
     }

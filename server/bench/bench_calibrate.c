@@ -45,7 +45,7 @@ typedef struct result {
 } result;
 
 /* mean over the cases that are fitted, or over the others; NaN: none */
-static double mean_of(const pal_calibrate_set *set, const pal_calibration_value *v, bool fit)
+static double mean_of(const pal_calibrate_cases *set, const pal_calibration_value *v, bool fit)
 {
     double sum = 0;
     int n = 0;
@@ -54,26 +54,26 @@ static double mean_of(const pal_calibrate_set *set, const pal_calibration_value 
     return n > 0 ? sum / n : NAN;
 }
 
-/* enough_percent: where annealing may end */
-static pal_err search(const job *j, const pal_calibrate_set *set, const pal_calibration *c, double enough_percent,
+/* target_percent: where annealing may end */
+static pal_err search(const job *j, const pal_calibrate_cases *set, const pal_calibration *c, double target_percent,
                       result *out, pal_diagnostic *diag)
 {
     enum { ALL = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY };
     pal_calibration_info info;
-    pal_calibration_seat *seat = NULL;
+    pal_calibration_workspace *workspace = NULL;
     pal_calibration_value v = {0};
     pal_fit_result r = {0};
     double seconds[REPEATS];
     pal_calibration_info_of(c, &info);
     double *theta = malloc(sizeof *theta * (size_t)info.n_parameter);
-    pal_err err = theta ? pal_calibration_seat_create(c, &seat) : PAL_ERR_MEMORY;
-    if (!err) pal_calibration_by_hand(c, theta);
-    if (!err) err = pal_calibration_evaluate(c, seat, theta, ALL, &v, NULL, diag);
+    pal_err err = theta ? pal_calibration_workspace_create(c, &workspace) : PAL_ERR_MEMORY;
+    if (!err) pal_calibration_manual_start(c, theta);
+    if (!err) err = pal_calibration_evaluate(c, workspace, theta, ALL, &v, NULL, diag);
     out->hand_percent = mean_of(set, &v, true);
     while (!err && out->n_repeat < REPEATS) {
         memcpy(theta, info.start, sizeof *theta * (size_t)info.n_parameter);
         const pal_fit_options o = {.max_evaluation = j->annealing ? MOST_EVALUATION : 0,
-                                   .enough_percent = j->annealing ? enough_percent : 0,
+                                   .target_percent = j->annealing ? target_percent : 0,
                                    .seed = 1,
                                    .n_worker = 1};
         err = j->annealing ? pal_fit_anneal(c, &o, theta, &r, diag) : pal_fit_adjoint(c, &o, theta, &r, diag);
@@ -88,27 +88,27 @@ static pal_err search(const job *j, const pal_calibrate_set *set, const pal_cali
     out->ended = r.ended;
     out->n_node = info.n_node, out->n_parameter = info.n_parameter;
     out->make_s = info.prepare_s, out->truth_s = info.truth_s;
-    pal_calibration_seat_destroy(seat);
+    pal_calibration_workspace_destroy(workspace);
     free(theta);
     return err;
 }
 
-static pal_err run_job(const job *j, const char *folder, double enough_percent, result *out, pal_diagnostic *diag)
+static pal_err run_job(const job *j, const char *folder, double target_percent, result *out, pal_diagnostic *diag)
 {
     char path[1200];
     pal_calibrate_options o;
     pal_calibration *c = NULL;
-    pal_calibrate_set *set = calloc(1, sizeof *set);
+    pal_calibrate_cases *set = calloc(1, sizeof *set);
     *out = (result){.ended = ""};
     if (!set) return PAL_ERR_MEMORY;
     snprintf(path, sizeof path, "%s/%s", folder, j->problem);
-    const pal_calibrate_wish wish = {.problem = path, .fit = j->fit, .verify = j->verify};
+    const pal_calibrate_input wish = {.problem = path, .fit = j->fit, .verify = j->verify};
     pal_calibrate_default(&o);
     o.voxel.resolution = j->resolution;
     memcpy(o.grid, j->grid, sizeof o.grid);
     pal_err err = pal_calibrate_cases_read(&wish, set, diag);
     if (!err) err = pal_calibration_create(set->problem, &set->surface, set->list, set->n, &o, &c, diag);
-    if (!err) err = search(j, set, c, enough_percent, out, diag);
+    if (!err) err = search(j, set, c, target_percent, out, diag);
     pal_calibration_destroy(c);
     pal_calibrate_cases_free(set);
     free(set);

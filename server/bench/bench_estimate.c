@@ -9,7 +9,7 @@
 #include "server/base/vec3.h"
 #include "server/bench/bench.h"
 #include "server/cli/median.h"
-#include "server/estimate/estimate_work.h"
+#include "server/estimate/estimation.h"
 #include "server/scene/scene_file.h"
 #include "server/session/configuration_switch.h"
 
@@ -90,13 +90,13 @@ static pal_err timed(pal_world *world, double step_s, pal_estimate_cost *cost, i
 static pal_err estimate(const pal_scene *scene, pal_world *world, const pal_estimate_cost *cost, int n_cost,
                         pal_estimate *out, pal_diagnostic *diag)
 {
-    pal_estimate_work *work = NULL;
-    PAL_TRY(pal_estimate_work_open(scene, 0, NULL, diag, &work));
-    pal_estimate_state *state = pal_estimate_work_state(work);
+    pal_estimation *work = NULL;
+    PAL_TRY(pal_estimation_open(scene, 0, NULL, diag, &work));
+    pal_estimate_state *state = pal_estimation_state(work);
     bool good = pal_estimate_copy(state, world, 0);
     for (int i = 0; i < n_cost && i < PAL_ESTIMATE_STEPS; i++) state->cost[state->n_cost++] = cost[i];
-    good = good && pal_estimate_work_run(work, out);
-    pal_estimate_work_close(work);
+    good = good && pal_estimation_run(work, out);
+    pal_estimation_close(work);
     return good ? PAL_ERR_OK : pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "nothing is known of the state");
 }
 
@@ -213,7 +213,7 @@ static void print_json(const subject *s, const result *c)
         const row *r = &c->row[k];
         if (r->err) continue;
         printf("%s{\"setting\":\"%s\",\"nodes_foreseen\":%d,\"nodes\":%d,\"substeps_foreseen\":%d,\"substeps\":%d,"
-               "\"foreseen_ms\":%.5f,\"was_ms\":%.5f,\"ms\":%.5f,\"cost\":%.4f,\"foreseen_m\":%s,\"estimated_m\":%s}",
+               "\"predicted_ms\":%.5f,\"was_ms\":%.5f,\"ms\":%.5f,\"cost\":%.4f,\"predicted_m\":%s,\"estimated_m\":%s}",
                told++ ? "," : "", knob(r, text), c->estimate.neighbour_nodes[k], r->n_node,
                c->estimate.neighbour_substeps[k], r->n_substep, r->foreseen.ms, r->was_ms, r->ms, cost_off(c, r),
                number(r->foreseen.error_m, a), number(r->own_m, b));

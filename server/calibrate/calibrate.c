@@ -1,5 +1,5 @@
 /* Making a calibration: voxels, springs, loads, truths, parameters. */
-#include "server/calibrate/calibrate_parts.h"
+#include "server/calibrate/calibration_core.h"
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
@@ -37,7 +37,7 @@ static const pal_problem_material *material_at(const pal_problem *p, const doubl
 {
     const pal_problem_material *found = &p->material[0];
     for (int k = 0; k < p->n_material; k++)
-        if (pal_box_holds(&p->material[k].region, x, 0)) found = &p->material[k];
+        if (pal_box_contains(&p->material[k].region, x, 0)) found = &p->material[k];
     return found;
 }
 
@@ -87,7 +87,7 @@ static pal_err make_world(const job *j)
     scene->max_substep = 2000;
     if (!err) err = pal_world_create(scene, j->diag, &c->world);
     free(scene);
-    return err ? err : pal_lattice_take(c->world, 0, &c->lattice, j->diag);
+    return err ? err : pal_lattice_make(c->world, 0, &c->lattice, j->diag);
 }
 
 /* held nodes on one line let the body turn about it: neither truth nor springs have a rest then */
@@ -95,10 +95,10 @@ static pal_err check_hold(const job *j)
 {
     const pal_lattice *l = &j->c->lattice;
     double first[3] = {0}, along[3] = {0}, d[3], out[3], longest = 0, widest = 0;
-    int n_held = 0;
+    int n_fixed = 0;
     for (int i = 0; i < l->n_node; i++) {
         if (!l->fixed[i]) continue;
-        if (n_held++ == 0) pal_copy3(first, l->x_rest + 3 * i);
+        if (n_fixed++ == 0) pal_copy3(first, l->x_rest + 3 * i);
         pal_sub3(d, l->x_rest + 3 * i, first);
         if (pal_norm3(d) <= longest) continue;
         longest = pal_norm3(d);
@@ -113,7 +113,7 @@ static pal_err check_hold(const job *j)
     if (widest > 1e-6 * l->edge_m) return PAL_ERR_OK;
     return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED,
                               "supports: held nodes: %d, all on one line, so the body turns and comes to no rest",
-                              n_held);
+                              n_fixed);
 }
 
 static pal_err make_body(const job *j)
@@ -342,15 +342,15 @@ static pal_err make_parameters(const job *j)
     for (int k = 0; k < c->n_kind; k++) {
         const pal_springs *s = &c->lattice.kind[c->kind[k]];
         /* the derived law's weights are those of volume: as many joules in all when they are alike */
-        double f = factor[c->kind[k]], by_hand = hand[c->kind[k]] / mean_weight(s);
+        double f = factor[c->kind[k]], manual_theta = hand[c->kind[k]] / mean_weight(s);
         double start = log(scale * (c->options.equal ? hand[c->kind[k]] : f));
-        c->by_hand[k] = log(scale * by_hand);
+        c->manual_theta[k] = log(scale * manual_theta);
         for (int i = 0; i < c->n_used; i++) {
             c->theta[k * c->n_used + i] = start;
             c->low[k * c->n_used + i] = start - range * log(10);
             c->high[k * c->n_used + i] = start + range * log(10);
-            if (c->kind[k] == PAL_SPRING_VOLUME && c->options.least_volume > 0)
-                c->low[k * c->n_used + i] = fmax(c->low[k * c->n_used + i], start + log(c->options.least_volume));
+            if (c->kind[k] == PAL_SPRING_VOLUME && c->options.min_volume_ratio > 0)
+                c->low[k * c->n_used + i] = fmax(c->low[k * c->n_used + i], start + log(c->options.min_volume_ratio));
         }
     }
     return PAL_ERR_OK;
@@ -360,7 +360,7 @@ static pal_err make_parameters(const job *j)
 static pal_err make_starts(const job *j)
 {
     pal_calibration *c = j->c;
-    pal_calibration_seat *seat;
+    pal_calibration_workspace *workspace;
     pal_calibration_value value;
     size_t n = 3 * (size_t)c->lattice.n_node;
     for (int i = 0; i < c->n_case; i++) {
@@ -368,12 +368,12 @@ static pal_err make_starts(const job *j)
         if (!c->fit[i].x_start) return no_memory(j, "the start");
         memcpy(c->fit[i].x_start, c->lattice.x_rest, n * sizeof(double));
     }
-    if (pal_calibration_seat_create(c, &seat)) return no_memory(j, "the start");
-    pal_err err = pal_calibration_evaluate(c, seat, c->theta, PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY, &value,
+    if (pal_calibration_workspace_create(c, &workspace)) return no_memory(j, "the start");
+    pal_err err = pal_calibration_evaluate(c, workspace, c->theta, PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY, &value,
                                            NULL, j->diag);
     for (int i = 0; i < c->n_case && !err; i++)
-        if (seat->rests[i]) memcpy(c->fit[i].x_start, seat->x[i], n * sizeof(double));
-    pal_calibration_seat_destroy(seat);
+        if (workspace->rests[i]) memcpy(c->fit[i].x_start, workspace->x[i], n * sizeof(double));
+    pal_calibration_workspace_destroy(workspace);
     return err;
 }
 
@@ -475,9 +475,9 @@ void pal_calibration_info_of(const pal_calibration *c, pal_calibration_info *out
     }
 }
 
-void pal_calibration_by_hand(const pal_calibration *c, double *theta)
+void pal_calibration_manual_start(const pal_calibration *c, double *theta)
 {
-    for (int i = 0; i < c->n_parameter; i++) theta[i] = c->by_hand[i / c->n_used];
+    for (int i = 0; i < c->n_parameter; i++) theta[i] = c->manual_theta[i / c->n_used];
 }
 
 const double *pal_calibration_forces(const pal_calibration *c, int index)

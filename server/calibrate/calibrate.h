@@ -29,15 +29,15 @@ typedef struct pal_calibrate_case {
 } pal_calibrate_case;
 
 typedef struct pal_calibrate_options {
-    pal_voxel_wish voxel; /* of the springs: 20 voxels, fill, align                                    */
-    int split;            /* finite elements of the truth: every voxel as split^3; 2                   */
-    bool equal;           /* every spring of a kind has the same k_J (paper); false: weighted by V l^2 (spring_law.h) */
-    bool without_area;    /* edges and volumes only                                                    */
-    int grid[3];          /* nodes; 0 0 0: homogeneous                                                 */
-    double decades;       /* bounds: theta within this many decades of the start; 3                    */
-    double least_volume;  /* volume constants are at least this share of the start; 0: within the decades alone */
-    double smooth;        /* weight of differences of theta along the grid's edges: 0.1 (objective below) */
-    double pull;          /* weight of the distance from the start's ratios of constants, on a grid: 0.1 */
+    pal_case_voxel_options voxel; /* of the springs: 20 voxels, fill, align                                    */
+    int split;                    /* finite elements of the truth: every voxel as split^3; 2                   */
+    bool equal;        /* every spring of a kind has the same k_J (paper); false: weighted by V l^2 (spring_law.h) */
+    bool without_area; /* edges and volumes only                                                    */
+    int grid[3];       /* nodes; 0 0 0: homogeneous                                                 */
+    double decades;    /* bounds: theta within this many decades of the start; 3                    */
+    double min_volume_ratio; /* volume constants are at least this share of the start; 0: within the decades alone */
+    double smooth;           /* weight of differences of theta along the grid's edges: 0.1 (objective below) */
+    double pull;             /* weight of the distance from the start's ratios of constants, on a grid: 0.1 */
     bool (*progress)(const char *what, double fraction, void *user); /* while truths are solved; may be NULL */
     void *user;
 } pal_calibrate_options;
@@ -71,13 +71,14 @@ typedef struct pal_calibration_info {
 void pal_calibration_info_of(const pal_calibration *calibration, pal_calibration_info *out);
 /* theta of equal constants as a hand would set them first: 0.2, 0.4, 1 E h^3 on every spring (paper B 3.4; the factors
  * of numerics.md). They are divided by the mean weight of their kind where springs are weighted */
-void pal_calibration_by_hand(const pal_calibration *calibration, double *theta);
+void pal_calibration_manual_start(const pal_calibration *calibration, double *theta);
 /* k_J at the mesh's nodes for kind index k (of info.kind), before weights [n_node] */
 void pal_calibration_constants(const pal_calibration *calibration, const double *theta, int k, double *k_J);
 
-typedef struct pal_calibration_seat pal_calibration_seat;
-pal_err pal_calibration_seat_create(const pal_calibration *calibration, pal_calibration_seat **out); /* MEMORY */
-void pal_calibration_seat_destroy(pal_calibration_seat *seat);                                       /* NULL is fine */
+typedef struct pal_calibration_workspace pal_calibration_workspace;
+pal_err pal_calibration_workspace_create(const pal_calibration *calibration,
+                                         pal_calibration_workspace **out);    /* MEMORY */
+void pal_calibration_workspace_destroy(pal_calibration_workspace *workspace); /* NULL is fine */
 
 typedef struct pal_calibration_value {
     double error_percent;                     /* E over the fitted cases; DBL_MAX: a case has no stable rest   */
@@ -88,18 +89,20 @@ typedef struct pal_calibration_value {
     int n_newton;
 } pal_calibration_value;
 
-typedef enum pal_calibration_ask {
+typedef enum pal_calibration_request {
     PAL_CALIBRATION_FIT = 1,      /* cases that are fitted                                                  */
     PAL_CALIBRATION_VERIFY = 2,   /* the others                                                             */
     PAL_CALIBRATION_CONTINUE = 4, /* begin at the seat's last rest of each case: faster; depends on its past */
-} pal_calibration_ask;
+} pal_calibration_request;
 
 /* E and, unless slope is NULL, d objective / d theta [n_parameter] (0 where there is no value). No rest is no error: it
  * is DBL_MAX, never averaged. MEMORY; NUMERIC: theta is not finite */
-pal_err pal_calibration_evaluate(const pal_calibration *calibration, pal_calibration_seat *seat, const double *theta,
-                                 unsigned ask, pal_calibration_value *out, double *slope, pal_diagnostic *diag);
+pal_err pal_calibration_evaluate(const pal_calibration *calibration, pal_calibration_workspace *workspace,
+                                 const double *theta, unsigned ask, pal_calibration_value *out, double *slope,
+                                 pal_diagnostic *diag);
 /* displacement [n_node][3] of a case at the seat's last rest; false: it has none */
-bool pal_calibration_moved(const pal_calibration *calibration, const pal_calibration_seat *seat, int index, double *u);
+bool pal_calibration_displacement(const pal_calibration *calibration, const pal_calibration_workspace *workspace,
+                                  int index, double *u);
 /* the truth at the mesh's nodes [n_node][3]; false: it is given at other points */
 bool pal_calibration_truth(const pal_calibration *calibration, int index, double *u);
 /* nodal forces of a case, N [n_node][3], borrowed */
@@ -123,7 +126,7 @@ typedef struct pal_fit_options {
     int64_t max_evaluation; /* 0: adjoint 1000, annealing 4000                                          */
     uint64_t seed;          /* annealing                                                                */
     int n_worker;           /* annealing: threads; 0: one per core                                      */
-    double enough_percent;  /* ends when E is at most this; 0: goes on                                  */
+    double target_percent;  /* ends when E is at most this; 0: goes on                                  */
     /* annealing: evaluates points elsewhere in place of this process' own team (MPI ranks); NULL: own team */
     pal_err (*evaluate)(void *user, const double *theta, int n, double *error_percent);
     int n_batch; /* points that evaluate takes at once                                       */

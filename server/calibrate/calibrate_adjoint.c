@@ -3,7 +3,7 @@
  * A point that comes to no stable rest has no value and no slope. The line search is given a wall instead: the last
  * good objective plus a parabola around the last good point, whose slope leads back there; it then shortens its step.
  */
-#include "server/calibrate/calibrate_parts.h"
+#include "server/calibrate/calibration_core.h"
 
 #include "server/base/clock.h"
 
@@ -18,7 +18,7 @@ enum { MOST_EVALUATION = 1000, MEMORY_PAIRS = 30, MOST_ROUND = 4, FEW_PARAMETERS
 typedef struct fit {
     const pal_calibration *c;
     const pal_fit_options *o;
-    pal_calibration_seat *seat;
+    pal_calibration_workspace *workspace;
     pal_fit_result *out;
     double begin_s;
     double *best, *good, *slope; /* [n_parameter]: best so far; last point with a value, its slope    */
@@ -49,7 +49,7 @@ static void tell(fit *f, const double *theta, double error_percent, bool improve
     if (o->step && !o->step(o->user, &step)) stop(f, "stopped");
     if (o->budget_s > 0 && step.seconds >= o->budget_s) stop(f, "budget");
     if (f->out->n_evaluation >= f->most) stop(f, "evaluations");
-    if (o->enough_percent > 0 && f->best_percent <= o->enough_percent) stop(f, "enough");
+    if (o->target_percent > 0 && f->best_percent <= o->target_percent) stop(f, "enough");
 }
 
 /* objective and slope at a point; DBL_MAX: none */
@@ -57,8 +57,8 @@ static double evaluate(fit *f, const double *theta, double *slope)
 {
     size_t n = sizeof(double) * (size_t)f->c->n_parameter;
     pal_calibration_value v;
-    pal_err err = pal_calibration_evaluate(f->c, f->seat, theta, PAL_CALIBRATION_FIT | PAL_CALIBRATION_CONTINUE, &v,
-                                           slope, f->diag);
+    pal_err err = pal_calibration_evaluate(f->c, f->workspace, theta, PAL_CALIBRATION_FIT | PAL_CALIBRATION_CONTINUE,
+                                           &v, slope, f->diag);
     f->out->n_evaluation++;
     if (err == PAL_ERR_MEMORY) {
         f->err = err;
@@ -149,11 +149,11 @@ static pal_err close_up(fit *f, const double *start, double *theta)
     const unsigned all = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY;
     pal_fit_result *out = f->out;
     if (f->best_percent > out->start_percent) memcpy(theta, start, sizeof(double) * (size_t)f->c->n_parameter);
-    PAL_TRY(pal_calibration_evaluate(f->c, f->seat, theta, all, &out->value, NULL, f->diag));
+    PAL_TRY(pal_calibration_evaluate(f->c, f->workspace, theta, all, &out->value, NULL, f->diag));
     if (out->value.error_percent <= out->start_percent) return PAL_ERR_OK;
     /* none, or another, worse one: the rest is only reached from its neighbours, a live body may not find it either */
     memcpy(theta, start, sizeof(double) * (size_t)f->c->n_parameter);
-    return pal_calibration_evaluate(f->c, f->seat, theta, all, &out->value, NULL, f->diag);
+    return pal_calibration_evaluate(f->c, f->workspace, theta, all, &out->value, NULL, f->diag);
 }
 
 pal_err pal_fit_adjoint(const pal_calibration *calibration, const pal_fit_options *options, double *theta,
@@ -171,7 +171,7 @@ pal_err pal_fit_adjoint(const pal_calibration *calibration, const pal_fit_option
              .most = options->max_evaluation > 0 ? options->max_evaluation : MOST_EVALUATION,
              .diag = diag};
     f.best = calloc(4 * n, sizeof(double));
-    pal_err err = f.best ? pal_calibration_seat_create(c, &f.seat) : PAL_ERR_MEMORY;
+    pal_err err = f.best ? pal_calibration_workspace_create(c, &f.workspace) : PAL_ERR_MEMORY;
     if (err) {
         free(f.best);
         return pal_diagnostic_set(diag, err, "no memory to calibrate %d constants", c->n_parameter);
@@ -184,7 +184,7 @@ pal_err pal_fit_adjoint(const pal_calibration *calibration, const pal_fit_option
     if (!err) err = close_up(&f, start, theta);
     out->ended = f.ended ? f.ended : "converged";
     out->seconds = pal_clock_s() - f.begin_s;
-    pal_calibration_seat_destroy(f.seat);
+    pal_calibration_workspace_destroy(f.workspace);
     free(f.best);
     return err;
 }

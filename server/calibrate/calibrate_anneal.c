@@ -9,7 +9,7 @@
  * displacements depend on most is one coordinate then. Evaluations until within 1.2 times the adjoint's error, gear's
  * twist: linear, 10 voxels, ten seeds: three need more than 1500 along the constants, 600 at most along these; finite,
  * 16 voxels, seeds 1 to 5: 151 to 1328 (median 634), and 199 to 665 (median 262). */
-#include "server/calibrate/calibrate_parts.h"
+#include "server/calibrate/calibration_core.h"
 
 #include "server/base/clock.h"
 #include "server/base/team.h"
@@ -31,9 +31,9 @@ static const double shear[PAL_SPRING_KINDS] = {2.0 / 3, 4.0 / 9, 0};
 typedef struct fit {
     const pal_calibration *c;
     const pal_fit_options *o;
-    pal_team *team;              /* NULL: points are evaluated elsewhere */
-    pal_calibration_seat **seat; /* one for each worker [n_seat] */
-    pal_err *err;                /* what went wrong on a seat [n_seat] */
+    pal_team *team;                        /* NULL: points are evaluated elsewhere */
+    pal_calibration_workspace **workspace; /* one for each worker [n_seat] */
+    pal_err *err;                          /* what went wrong on a seat [n_seat] */
     int n_seat, n_batch;
     pal_fit_result *out;
     double begin_s;
@@ -98,7 +98,7 @@ static void evaluate_one(void *user, int worker, int index)
     fit *f = user;
     pal_calibration_value v;
     const double *theta = f->theta + (size_t)index * (size_t)f->c->n_parameter;
-    pal_err err = pal_calibration_evaluate(f->c, f->seat[worker], theta, PAL_CALIBRATION_FIT, &v, NULL, NULL);
+    pal_err err = pal_calibration_evaluate(f->c, f->workspace[worker], theta, PAL_CALIBRATION_FIT, &v, NULL, NULL);
     f->cost[index] = err ? DBL_MAX : v.error_percent;
     if (err == PAL_ERR_MEMORY) f->err[worker] = err;
 }
@@ -132,7 +132,7 @@ static bool tell(void *user, const pal_anneal_step *at)
                          .improved = at->improved};
     if (o->step && !o->step(o->user, &step))
         f->ended = "stopped";
-    else if (o->enough_percent > 0 && at->best <= o->enough_percent)
+    else if (o->target_percent > 0 && at->best <= o->target_percent)
         f->ended = "enough";
     else if (at->generation + 1 >= f->most)
         f->ended = "evaluations";
@@ -186,18 +186,18 @@ static pal_err make(fit *f)
     if (!f->first) return PAL_ERR_MEMORY;
     f->low = f->first + n, f->high = f->low + n, f->start = f->high + n, f->shown = f->start + n;
     f->theta = f->shown + n;
-    f->seat = calloc((size_t)f->n_seat, sizeof(pal_calibration_seat *));
+    f->workspace = calloc((size_t)f->n_seat, sizeof(pal_calibration_workspace *));
     f->err = calloc((size_t)f->n_seat, sizeof *f->err);
-    if (!f->seat || !f->err) return PAL_ERR_MEMORY;
-    for (int i = 0; i < f->n_seat; i++) PAL_TRY(pal_calibration_seat_create(f->c, &f->seat[i]));
+    if (!f->workspace || !f->err) return PAL_ERR_MEMORY;
+    for (int i = 0; i < f->n_seat; i++) PAL_TRY(pal_calibration_workspace_create(f->c, &f->workspace[i]));
     return PAL_ERR_OK;
 }
 
 static void clean_up(fit *f)
 {
     pal_team_destroy(f->team);
-    for (int i = 0; i < f->n_seat && f->seat; i++) pal_calibration_seat_destroy(f->seat[i]);
-    free(f->seat);
+    for (int i = 0; i < f->n_seat && f->workspace; i++) pal_calibration_workspace_destroy(f->workspace[i]);
+    free(f->workspace);
     free(f->err);
     free(f->first);
 }
@@ -219,7 +219,7 @@ pal_err pal_fit_anneal(const pal_calibration *calibration, const pal_fit_options
         pal_diagnostic_set(diag, err, "no memory to calibrate %d constants", c->n_parameter);
     else
         err = walk(&f, theta, diag);
-    if (!err) err = pal_calibration_evaluate(c, f.seat[0], theta, all, &out->value, NULL, diag);
+    if (!err) err = pal_calibration_evaluate(c, f.workspace[0], theta, all, &out->value, NULL, diag);
     out->seconds = pal_clock_s() - f.begin_s;
     clean_up(&f);
     return err;

@@ -17,8 +17,8 @@ enum { ENOUGH_NODES = 700, FINEST = 64 };
 
 /* what every function of one reading shares */
 typedef struct job {
-    const pal_calibrate_wish *wish;
-    pal_calibrate_set *set;
+    const pal_calibrate_input *wish;
+    pal_calibrate_cases *set;
     const pal_problem_reference *reference[PAL_CALIBRATE_CASES]; /* of each case; NULL: none   */
     bool named[PAL_CALIBRATE_CASES];                             /* it was named itself        */
     pal_diagnostic *diag;
@@ -46,7 +46,7 @@ static pal_err no_case(const job *j, const char *flag, const char *id)
 
 static pal_err add_case(job *j, const char *id, bool fit)
 {
-    pal_calibrate_set *s = j->set;
+    pal_calibrate_cases *s = j->set;
     const pal_problem *p = s->problem;
     const char *flag = fit ? "--case" : "--verify";
     for (int k = 0; k < s->n; k++)
@@ -104,7 +104,7 @@ static void material_of(const job *j, int index, double *young_Pa, double *poiss
 /* a reference may be of another material than the problem's: then that is the body's, in all of its cases */
 static pal_err settle_material(job *j)
 {
-    pal_calibrate_set *s = j->set;
+    pal_calibrate_cases *s = j->set;
     double young, poisson, other_young, other_poisson;
     material_of(j, 0, &young, &poisson);
     for (int k = 1; k < s->n; k++) {
@@ -134,7 +134,7 @@ static bool answers(const job *j, int index, const pal_problem_reference *r)
 /* which reference, or finite elements, a case is compared with; finite ones before linear ones, neo-Hookean first */
 static pal_err choose_reference(job *j, int index)
 {
-    pal_calibrate_set *s = j->set;
+    pal_calibrate_cases *s = j->set;
     pal_calibrate_case *c = &s->list[index];
     const pal_problem *p = s->problem;
     if (is(j->wish->truth, "fem")) j->reference[index] = NULL;
@@ -156,7 +156,7 @@ static pal_err choose_reference(job *j, int index)
 
 static pal_err read_truth(job *j, int index, const char *path, const char *name)
 {
-    pal_calibrate_set *s = j->set;
+    pal_calibrate_cases *s = j->set;
     PAL_TRY(pal_samples_read(path, &s->samples[index], j->diag));
     s->list[index].samples = &s->samples[index];
     snprintf(s->truth_name[index], PAL_NAME, "%s", name);
@@ -166,7 +166,7 @@ static pal_err read_truth(job *j, int index, const char *path, const char *name)
 
 static pal_err choose_truths(job *j)
 {
-    pal_calibrate_set *s = j->set;
+    pal_calibrate_cases *s = j->set;
     const char *truth = j->wish->truth;
     bool file = truth && !is(truth, "fem") && !is(truth, "reference");
     int n_fit = 0;
@@ -190,7 +190,7 @@ static pal_err choose_truths(job *j)
 /* points in the file's frame that are far outside of the surface's box */
 static pal_err check_box(const job *j, int index)
 {
-    const pal_calibrate_set *s = j->set;
+    const pal_calibrate_cases *s = j->set;
     const pal_samples *samples = &s->samples[index];
     double low[3], high[3];
     pal_surface_box(&s->surface, low, high);
@@ -209,10 +209,10 @@ static pal_err check_box(const job *j, int index)
     return PAL_ERR_OK;
 }
 
-pal_err pal_calibrate_cases_resolution(const pal_calibrate_set *set, const pal_voxel_wish *voxel, int *out,
+pal_err pal_calibrate_cases_resolution(const pal_calibrate_cases *set, const pal_case_voxel_options *voxel, int *out,
                                        pal_diagnostic *diag)
 {
-    pal_voxel_wish wish = *voxel;
+    pal_case_voxel_options wish = *voxel;
     for (wish.resolution = 4; wish.resolution < FINEST; wish.resolution += 2) {
         pal_prepared mesh = {0};
         pal_err err = pal_case_voxels(set->problem, &set->surface, &wish, &mesh, diag);
@@ -225,7 +225,7 @@ pal_err pal_calibrate_cases_resolution(const pal_calibrate_set *set, const pal_v
     return PAL_ERR_OK;
 }
 
-pal_err pal_calibrate_cases_check(const pal_calibrate_set *s, const pal_prepared *mesh, pal_diagnostic *diag)
+pal_err pal_calibrate_cases_check(const pal_calibrate_cases *s, const pal_prepared *mesh, pal_diagnostic *diag)
 {
     pal_locate *locate = NULL;
     pal_err err = PAL_ERR_OK;
@@ -266,9 +266,9 @@ static pal_err check_supports(const job *j)
     return PAL_ERR_OK;
 }
 
-pal_err pal_calibrate_cases_read(const pal_calibrate_wish *wish, pal_calibrate_set *out, pal_diagnostic *diag)
+pal_err pal_calibrate_cases_read(const pal_calibrate_input *wish, pal_calibrate_cases *out, pal_diagnostic *diag)
 {
-    *out = (pal_calibrate_set){0};
+    *out = (pal_calibrate_cases){0};
     job j = {.wish = wish, .set = out, .diag = diag};
     PAL_TRY(pal_problem_read(wish->problem, &out->problem, diag));
     PAL_TRY(check_supports(&j));
@@ -284,10 +284,10 @@ pal_err pal_calibrate_cases_read(const pal_calibrate_wish *wish, pal_calibrate_s
     return PAL_ERR_OK;
 }
 
-void pal_calibrate_cases_free(pal_calibrate_set *set)
+void pal_calibrate_cases_free(pal_calibrate_cases *set)
 {
     for (int k = 0; k < PAL_CALIBRATE_CASES; k++) pal_samples_free(&set->samples[k]);
     pal_surface_free(&set->surface);
     free(set->problem);
-    *set = (pal_calibrate_set){0};
+    *set = (pal_calibrate_cases){0};
 }

@@ -4,7 +4,7 @@
 #define PAL_CALIBRATE_CALIBRATE_CASES_H
 #include "server/calibrate/calibrate.h"
 
-typedef struct pal_calibrate_wish {
+typedef struct pal_calibrate_input {
     const char *problem;    /* PROBLEM.json                                                                     */
     const char *fit;        /* names with commas between; each is a load case or a reference                    */
     const char *verify;     /* the same, only reported; NULL: none                                              */
@@ -12,10 +12,10 @@ typedef struct pal_calibrate_wish {
                                the reference that answers it; else a CSV file for the one case that is fitted;
                                NULL: a reference's CSV, a load case by finite elements                           */
     const char *kinematics; /* "finite", "linear"; NULL: a reference's own, else finite                         */
-} pal_calibrate_wish;
+} pal_calibrate_input;
 
 /* owns all that its list borrows; its address stays while a calibration uses it */
-typedef struct pal_calibrate_set {
+typedef struct pal_calibrate_cases {
     pal_problem *problem;
     pal_surface surface;
     int n;
@@ -23,18 +23,18 @@ typedef struct pal_calibrate_set {
     char truth_name[PAL_CALIBRATE_CASES][PAL_NAME]; /* "twist_nh", a CSV's name; empty: finite elements */
     pal_samples samples[PAL_CALIBRATE_CASES];
     pal_calibrate_case list[PAL_CALIBRATE_CASES];
-} pal_calibrate_set;
+} pal_calibrate_cases;
 
 /* reads all files. REFUSED names the entry: an unknown name, one twice, a reference of other kinematics than asked for,
  * references of different materials, no reference that answers, supports that move, points that lie outside the body;
  * IO, MEMORY. *out is to be freed in any case */
-pal_err pal_calibrate_cases_read(const pal_calibrate_wish *wish, pal_calibrate_set *out, pal_diagnostic *diag);
+pal_err pal_calibrate_cases_read(const pal_calibrate_input *wish, pal_calibrate_cases *out, pal_diagnostic *diag);
 /* the least even number of voxels on the longest axis whose lattice has more than 700 nodes, as the paper's bodies
  * have; at most 64. Errors are those of pal_case_voxels */
-pal_err pal_calibrate_cases_resolution(const pal_calibrate_set *set, const pal_voxel_wish *voxel, int *out,
+pal_err pal_calibrate_cases_resolution(const pal_calibrate_cases *set, const pal_case_voxel_options *voxel, int *out,
                                        pal_diagnostic *diag);
 /* are the points of the truths in or near these voxels? REFUSED names the case: more than 1 % of them are farther than
  * a voxel from any (those of a body that does not fit its voxels stay within half of one) */
-pal_err pal_calibrate_cases_check(const pal_calibrate_set *set, const pal_prepared *mesh, pal_diagnostic *diag);
-void pal_calibrate_cases_free(pal_calibrate_set *set); /* a zeroed struct is fine */
+pal_err pal_calibrate_cases_check(const pal_calibrate_cases *set, const pal_prepared *mesh, pal_diagnostic *diag);
+void pal_calibrate_cases_free(pal_calibrate_cases *set); /* a zeroed struct is fine */
 #endif

@@ -99,8 +99,8 @@ static bool springs_at_nodes(const pal_calibrate_run *run, const double *theta, 
 {
     enum { ALL = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY };
     pal_calibration_value value;
-    bool good = !pal_calibration_evaluate(run->calibration, run->seat, theta, ALL, &value, NULL, NULL) &&
-                pal_calibration_moved(run->calibration, run->seat, index, u);
+    bool good = !pal_calibration_evaluate(run->calibration, run->workspace, theta, ALL, &value, NULL, NULL) &&
+                pal_calibration_displacement(run->calibration, run->workspace, index, u);
     if (!good) memset(u, 0, 3 * sizeof *u * (size_t)run->info.n_node);
     return good;
 }
@@ -197,7 +197,7 @@ static void take_vertices(drawing *d)
         pal_add3(x, at, t->origin_m);
         const pal_problem_material *m = &p->material[0];
         for (int k = 0; k < p->n_material; k++)
-            if (pal_box_holds(&p->material[k].region, x, 0)) m = &p->material[k];
+            if (pal_box_contains(&p->material[k].region, x, 0)) m = &p->material[k];
         d->young[v] = m->young_Pa;
         for (int k = 0; k < n_support; k++) {
             bool in = true;

@@ -234,8 +234,8 @@ static void add_live(const pal_calibrate_run *run, cJSON *o)
     for (int k = 0; k < PAL_SETTLE_STEPS; k++) {
         cJSON *step = cJSON_CreateObject();
         cJSON_AddItemToArray(ladder, step);
-        add_number(step, "damping_1_s", pal_settle_ladder_1_s[k]);
-        add_number(step, "steady_s", run->live.ladder_s[k]);
+        add_number(step, "damping_1_s", pal_settle_rates_1_s[k]);
+        add_number(step, "steady_s", run->live.rate_seconds[k]);
     }
 }
 

@@ -12,21 +12,21 @@ enum { PAL_CALIBRATE_PATH = 1200, PAL_CALIBRATE_FILES = 4 };
 typedef struct pal_calibrate_run {
     pal_flag_common common;
     /* asked */
-    pal_calibrate_wish wish;
+    pal_calibrate_input wish;
     pal_calibrate_options options;
     pal_fit_options fit;
     bool annealing;
     const char *scene, *trajectory, *picture, *vtk; /* paths; all but the first may be NULL */
     /* found */
-    pal_calibrate_set set;
+    pal_calibrate_cases set;
     pal_calibration *calibration;
     pal_calibration_info info;
-    pal_calibration_seat *seat;              /* at the constants found              */
+    pal_calibration_workspace *workspace;    /* at the constants found              */
     double *theta;                           /* [n_parameter]                       */
     pal_calibration_value start, hand, last; /* of all cases at the default start, at constants set by hand, found */
     pal_fit_result result;
     double *error, *best; /* of every evaluation, per cent, DBL_MAX: none [n_trail] */
-    int n_trail, most_trail;
+    int n_trail, max_trail;
     bool settled; /* live is known */
     pal_settle_report live;
     double damping_1_s; /* as it was written */

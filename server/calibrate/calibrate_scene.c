@@ -42,7 +42,7 @@ static void take_material(const pal_calibrate_run *run, pal_material *out)
         pal_copy3(x, t->origin_m);
         for (int k = 0; k < 4; k++) pal_axpy3(x, 0.25, t->x + 3 * t->tet[4 * e + k]);
         for (int k = 0; k < p->n_material; k++)
-            if (pal_box_holds(&p->material[k].region, x, 0)) m = &p->material[k];
+            if (pal_box_contains(&p->material[k].region, x, 0)) m = &p->material[k];
         /* what is the same in all materials stays what it is, to the bit */
         poisson += (m->poisson - p->material[0].poisson) / t->n_tet;
         density += (m->density_kg_m3 - p->material[0].density_kg_m3) / t->n_tet;

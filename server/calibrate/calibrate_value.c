@@ -1,5 +1,5 @@
 /* Error of a set of constants, and its slope. */
-#include "server/calibrate/calibrate_parts.h"
+#include "server/calibrate/calibration_core.h"
 
 #include "server/base/vec3.h"
 
@@ -13,11 +13,11 @@ static const double floor_percent2 = 1e-6;
 
 /* ---- seat ---- */
 
-static pal_err make_seat(const pal_calibration *c, pal_calibration_seat *s)
+static pal_err make_seat(const pal_calibration *c, pal_calibration_workspace *s)
 {
     size_t n = 3 * (size_t)c->lattice.n_node, most = n;
     s->calibration = c;
-    PAL_TRY(pal_seat_create(&c->lattice, &s->seat));
+    PAL_TRY(pal_equilibrium_workspace_create(&c->lattice, &s->workspace));
     for (int k = 0; k < PAL_SPRING_KINDS; k++) {
         size_t n_item = (size_t)c->lattice.kind[k].n_item;
         s->k[k] = calloc(n_item + 1, sizeof(double));
@@ -37,22 +37,22 @@ static pal_err make_seat(const pal_calibration *c, pal_calibration_seat *s)
     return s->value && s->node && s->dJ_du && s->u && s->gradient ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-pal_err pal_calibration_seat_create(const pal_calibration *calibration, pal_calibration_seat **out)
+pal_err pal_calibration_workspace_create(const pal_calibration *calibration, pal_calibration_workspace **out)
 {
-    pal_calibration_seat *s = calloc(1, sizeof *s);
+    pal_calibration_workspace *s = calloc(1, sizeof *s);
     if (!s) return PAL_ERR_MEMORY;
     pal_err err = make_seat(calibration, s);
     if (err)
-        pal_calibration_seat_destroy(s);
+        pal_calibration_workspace_destroy(s);
     else
         *out = s;
     return err;
 }
 
-void pal_calibration_seat_destroy(pal_calibration_seat *s)
+void pal_calibration_workspace_destroy(pal_calibration_workspace *s)
 {
     if (!s) return;
-    pal_seat_destroy(s->seat);
+    pal_equilibrium_workspace_destroy(s->workspace);
     for (int k = 0; k < PAL_SPRING_KINDS; k++) {
         free(s->k[k]);
         free(s->slope[k]);
@@ -79,7 +79,7 @@ void pal_calibration_constants(const pal_calibration *c, const double *theta, in
     }
 }
 
-static void spread_constants(pal_calibration_seat *s, const double *theta)
+static void spread_constants(pal_calibration_workspace *s, const double *theta)
 {
     const pal_calibration *c = s->calibration;
     for (int k = 0; k < c->n_kind; k++) {
@@ -94,7 +94,7 @@ static void spread_constants(pal_calibration_seat *s, const double *theta)
 }
 
 /* slope of the springs' constants -> += gradient [n_parameter] */
-static void gather_slopes(pal_calibration_seat *s, const double *theta)
+static void gather_slopes(pal_calibration_workspace *s, const double *theta)
 {
     const pal_calibration *c = s->calibration;
     for (int k = 0; k < c->n_kind; k++) {
@@ -141,7 +141,7 @@ static double compare(const pal_calibration *c, const pal_fit_case *fit, const d
 }
 
 /* the rest of a case: from where it is asked to begin, else from no deformation */
-static pal_err find_rest(pal_calibration_seat *s, int index, bool go_on, pal_equilibrium_options *o, int *n_newton)
+static pal_err find_rest(pal_calibration_workspace *s, int index, bool go_on, pal_equilibrium_options *o, int *n_newton)
 {
     const pal_calibration *c = s->calibration;
     const pal_fit_case *fit = &c->fit[index];
@@ -149,18 +149,18 @@ static pal_err find_rest(pal_calibration_seat *s, int index, bool go_on, pal_equ
     size_t n = 3 * sizeof(double) * (size_t)c->lattice.n_node;
     pal_equilibrium_report report;
     if (!(go_on && s->rests[index])) memcpy(s->x[index], fit->x_start, n);
-    pal_err err = pal_equilibrium(s->seat, k, fit->force_N, o, s->x[index], &report, NULL);
+    pal_err err = pal_equilibrium(s->workspace, k, fit->force_N, o, s->x[index], &report, NULL);
     *n_newton += report.n_newton;
     if (err == PAL_ERR_NUMERIC && !o->linear) {
         memcpy(s->x[index], c->lattice.x_rest, n);
-        err = pal_equilibrium(s->seat, k, fit->force_N, o, s->x[index], &report, NULL);
+        err = pal_equilibrium(s->workspace, k, fit->force_N, o, s->x[index], &report, NULL);
         *n_newton += report.n_newton;
     }
     s->rests[index] = err == PAL_ERR_OK;
     return err;
 }
 
-static pal_err evaluate_case(pal_calibration_seat *s, const double *theta, int index, unsigned ask,
+static pal_err evaluate_case(pal_calibration_workspace *s, const double *theta, int index, unsigned ask,
                              pal_calibration_value *out, bool want_slope)
 {
     const pal_calibration *c = s->calibration;
@@ -175,7 +175,7 @@ static pal_err evaluate_case(pal_calibration_seat *s, const double *theta, int i
     if (err) return err;
     out->case_percent[index] = compare(c, fit, s->x[index], slope ? s->dJ_du : NULL);
     if (!slope) return PAL_ERR_OK;
-    err = pal_equilibrium_adjoint(s->seat, k, s->x[index], &o, s->dJ_du, s->slope, NULL);
+    err = pal_equilibrium_adjoint(s->workspace, k, s->x[index], &o, s->dJ_du, s->slope, NULL);
     if (!err) gather_slopes(s, theta);
     return err;
 }
@@ -222,7 +222,7 @@ static bool add_up(const pal_calibration *c, pal_calibration_value *out, double 
     return true;
 }
 
-pal_err pal_calibration_evaluate(const pal_calibration *c, pal_calibration_seat *seat, const double *theta,
+pal_err pal_calibration_evaluate(const pal_calibration *c, pal_calibration_workspace *workspace, const double *theta,
                                  unsigned ask, pal_calibration_value *out, double *slope, pal_diagnostic *diag)
 {
     *out = (pal_calibration_value){.error_percent = DBL_MAX, .objective = DBL_MAX};
@@ -233,8 +233,8 @@ pal_err pal_calibration_evaluate(const pal_calibration *c, pal_calibration_seat 
         if (!isfinite(theta[i]) || fabs(theta[i]) > 600)
             return pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "parameter %d is %g, not the logarithm of a constant", i,
                                       theta[i]);
-    memset(seat->gradient, 0, n);
-    spread_constants(seat, theta);
+    memset(workspace->gradient, 0, n);
+    spread_constants(workspace, theta);
     bool lost = false;
     for (int i = 0; i < c->n_case; i++) {
         bool fit = c->cases[i].fit;
@@ -243,7 +243,7 @@ pal_err pal_calibration_evaluate(const pal_calibration *c, pal_calibration_seat 
             out->case_percent[i] = DBL_MAX;
             continue;
         }
-        pal_err err = evaluate_case(seat, theta, i, ask, out, slope && !lost);
+        pal_err err = evaluate_case(workspace, theta, i, ask, out, slope && !lost);
         if (err == PAL_ERR_MEMORY) return pal_diagnostic_set(diag, err, "no memory to evaluate load case %d", i);
         lost |= fit && err;
     }
@@ -255,15 +255,16 @@ pal_err pal_calibration_evaluate(const pal_calibration *c, pal_calibration_seat 
     }
     regularise(c, theta, out, slope);
     if (ask & PAL_CALIBRATION_FIT && !lost && add_up(c, out, &scale))
-        for (int i = 0; i < c->n_parameter; i++) slope[i] += scale * seat->gradient[i];
+        for (int i = 0; i < c->n_parameter; i++) slope[i] += scale * workspace->gradient[i];
     else
         memset(slope, 0, n);
     return PAL_ERR_OK;
 }
 
-bool pal_calibration_moved(const pal_calibration *c, const pal_calibration_seat *seat, int index, double *u)
+bool pal_calibration_displacement(const pal_calibration *c, const pal_calibration_workspace *workspace, int index,
+                                  double *u)
 {
-    for (int i = 0; i < 3 * c->lattice.n_node && seat->rests[index]; i++)
-        u[i] = seat->x[index][i] - c->lattice.x_rest[i];
-    return seat->rests[index];
+    for (int i = 0; i < 3 * c->lattice.n_node && workspace->rests[index]; i++)
+        u[i] = workspace->x[index][i] - c->lattice.x_rest[i];
+    return workspace->rests[index];
 }

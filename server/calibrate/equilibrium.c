@@ -18,7 +18,7 @@
 enum { MOST_HALVING = 30, MOST_SHIFT = 8 };
 static const double MOST_LINEAR = 1e-6; /* residual of a linear solve, relative */
 
-struct pal_seat {
+struct pal_equilibrium_workspace {
     const pal_lattice *lattice;
     pal_block_matrix matrix; /* pattern borrowed, values our own */
     pal_cholesky *factor;
@@ -85,7 +85,7 @@ static pal_err take(const pal_world *world, const pal_body *body, pal_lattice *o
     if (!out->x_rest || !out->fixed) return PAL_ERR_MEMORY;
     memcpy(out->x_rest, body->x_rest, 3 * n * sizeof(double));
     for (size_t i = 0; i < n; i++) {
-        out->fixed[i] = body->fixed[i] != 0;
+        out->fixed[i] = body->support[i] != PAL_FREE;
         out->n_free += !out->fixed[i];
     }
     for (int r = 0; r < pal_world_component_count(world); r++) {
@@ -98,7 +98,7 @@ static pal_err take(const pal_world *world, const pal_body *body, pal_lattice *o
     return out->kind[PAL_SPRING_DISTANCE].n_item > 0 ? make_pattern(out) : PAL_ERR_OK;
 }
 
-pal_err pal_lattice_take(const pal_world *world, int body, pal_lattice *out, pal_diagnostic *diag)
+pal_err pal_lattice_make(const pal_world *world, int body, pal_lattice *out, pal_diagnostic *diag)
 {
     /* a body is only read here */
     const pal_body *b = pal_world_body((pal_world *)(uintptr_t)world, body);
@@ -125,10 +125,10 @@ void pal_lattice_free(pal_lattice *lattice)
 
 /* ---- seat ---- */
 
-pal_err pal_seat_create(const pal_lattice *lattice, pal_seat **out)
+pal_err pal_equilibrium_workspace_create(const pal_lattice *lattice, pal_equilibrium_workspace **out)
 {
     size_t n = 3 * (size_t)lattice->n_node, n_block = (size_t)lattice->pattern.start[lattice->n_node];
-    pal_seat *s = calloc(1, sizeof *s);
+    pal_equilibrium_workspace *s = calloc(1, sizeof *s);
     if (!s) return PAL_ERR_MEMORY;
     s->lattice = lattice;
     s->matrix = lattice->pattern;
@@ -137,7 +137,7 @@ pal_err pal_seat_create(const pal_lattice *lattice, pal_seat **out)
     pal_err err =
         s->matrix.value && s->f ? pal_cholesky_create(&lattice->pattern, lattice->fixed, &s->factor) : PAL_ERR_MEMORY;
     if (err) {
-        pal_seat_destroy(s);
+        pal_equilibrium_workspace_destroy(s);
         return err;
     }
     s->p = s->f + n, s->r = s->p + n, s->trial = s->r + n;
@@ -145,18 +145,18 @@ pal_err pal_seat_create(const pal_lattice *lattice, pal_seat **out)
     return PAL_ERR_OK;
 }
 
-void pal_seat_destroy(pal_seat *seat)
+void pal_equilibrium_workspace_destroy(pal_equilibrium_workspace *workspace)
 {
-    if (!seat) return;
-    pal_cholesky_destroy(seat->factor);
-    free(seat->matrix.value);
-    free(seat->f);
-    free(seat);
+    if (!workspace) return;
+    pal_cholesky_destroy(workspace->factor);
+    free(workspace->matrix.value);
+    free(workspace->f);
+    free(workspace);
 }
 
 void pal_equilibrium_default(pal_equilibrium_options *options)
 {
-    *options = (pal_equilibrium_options){.most_iteration = 60, .tolerance = 1e-9, .most_stretch = 4};
+    *options = (pal_equilibrium_options){.max_iteration = 60, .tolerance = 1e-9, .max_stretch = 4};
 }
 
 /* ---- energy, force, Hessian ---- */
@@ -225,13 +225,15 @@ PAL_INLINE void stiffness_of(const pal_springs *s, pal_spring_kind kind, const d
     }
 }
 
-static void assemble(pal_seat *seat, const double *const k_J[PAL_SPRING_KINDS], const double *x, hessian which)
+static void assemble(pal_equilibrium_workspace *workspace, const double *const k_J[PAL_SPRING_KINDS], const double *x,
+                     hessian which)
 {
-    const pal_lattice *l = seat->lattice;
-    pal_block_matrix_zero(&seat->matrix);
-    stiffness_of(&l->kind[PAL_SPRING_DISTANCE], PAL_SPRING_DISTANCE, k_J[PAL_SPRING_DISTANCE], x, which, &seat->matrix);
-    stiffness_of(&l->kind[PAL_SPRING_AREA], PAL_SPRING_AREA, k_J[PAL_SPRING_AREA], x, which, &seat->matrix);
-    stiffness_of(&l->kind[PAL_SPRING_VOLUME], PAL_SPRING_VOLUME, k_J[PAL_SPRING_VOLUME], x, which, &seat->matrix);
+    const pal_lattice *l = workspace->lattice;
+    pal_block_matrix_zero(&workspace->matrix);
+    stiffness_of(&l->kind[PAL_SPRING_DISTANCE], PAL_SPRING_DISTANCE, k_J[PAL_SPRING_DISTANCE], x, which,
+                 &workspace->matrix);
+    stiffness_of(&l->kind[PAL_SPRING_AREA], PAL_SPRING_AREA, k_J[PAL_SPRING_AREA], x, which, &workspace->matrix);
+    stiffness_of(&l->kind[PAL_SPRING_VOLUME], PAL_SPRING_VOLUME, k_J[PAL_SPRING_VOLUME], x, which, &workspace->matrix);
 }
 
 /* diagonal += share of itself */
@@ -245,7 +247,7 @@ static void shift(pal_block_matrix *a, double share)
 
 /* all that a search reads */
 typedef struct search {
-    pal_seat *seat;
+    pal_equilibrium_workspace *workspace;
     const double *const *k_J;
     const double *force_N;
     const pal_equilibrium_options *o;
@@ -272,7 +274,7 @@ static double dot(const pal_lattice *l, const double *a, const double *b)
 /* r = f - grad W at the free nodes, 0 at held ones; returns W - f.(x - rest) */
 static double residual(const search *s, const double *x, double *r)
 {
-    const pal_lattice *l = s->seat->lattice;
+    const pal_lattice *l = s->workspace->lattice;
     double energy = pal_lattice_force(l, s->k_J, x, r);
     for (int i = 0; i < l->n_node; i++) {
         if (l->fixed[i]) {
@@ -289,19 +291,19 @@ static double residual(const search *s, const double *x, double *r)
 
 static pal_err factor_at(const search *s, const double *x)
 {
-    pal_seat *seat = s->seat;
+    pal_equilibrium_workspace *workspace = s->workspace;
     s->report->n_factor++;
-    assemble(seat, s->k_J, x, s->o->linear ? REST_STIFFNESS : TRUE_HESSIAN);
-    pal_err err = pal_cholesky_factor(seat->factor, &seat->matrix, false);
+    assemble(workspace, s->k_J, x, s->o->linear ? REST_STIFFNESS : TRUE_HESSIAN);
+    pal_err err = pal_cholesky_factor(workspace->factor, &workspace->matrix, false);
     if (err != PAL_ERR_NUMERIC || s->o->linear) return err;
     s->report->n_shift++;
     double share = 0;
     for (int k = 0; k < MOST_SHIFT && err == PAL_ERR_NUMERIC; k++) {
-        assemble(seat, s->k_J, x, SAFE_HESSIAN);
-        if (share > 0) shift(&seat->matrix, share);
+        assemble(workspace, s->k_J, x, SAFE_HESSIAN);
+        if (share > 0) shift(&workspace->matrix, share);
         share = share > 0 ? 10 * share : 1e-8;
         s->report->n_factor++;
-        err = pal_cholesky_factor(seat->factor, &seat->matrix, false);
+        err = pal_cholesky_factor(workspace->factor, &workspace->matrix, false);
     }
     return err;
 }
@@ -320,19 +322,19 @@ static double stretch_of(const pal_lattice *l, const double *x)
  * energy and r become those there. false: none does */
 static bool advance(const search *s, double *x, double *energy, double *size)
 {
-    pal_seat *seat = s->seat;
-    const pal_lattice *l = seat->lattice;
+    pal_equilibrium_workspace *workspace = s->workspace;
+    const pal_lattice *l = workspace->lattice;
     size_t n = 3 * (size_t)l->n_node;
-    double slope = -dot(l, seat->r, seat->p), scale = fabs(*energy) + s->report->energy_J, step = 1;
+    double slope = -dot(l, workspace->r, workspace->p), scale = fabs(*energy) + s->report->energy_J, step = 1;
     if (!(slope < 0)) return false;
     for (int k = 0; k < MOST_HALVING; k++, step *= 0.5) {
-        for (size_t i = 0; i < n; i++) seat->trial[i] = x[i] + step * seat->p[i];
-        double e = residual(s, seat->trial, seat->f), there = norm(l, seat->f);
+        for (size_t i = 0; i < n; i++) workspace->trial[i] = x[i] + step * workspace->p[i];
+        double e = residual(s, workspace->trial, workspace->f), there = norm(l, workspace->f);
         bool alike = fabs(step * slope) < 1e-11 * scale;
         bool lower = alike ? there < *size : e <= *energy + 1e-4 * step * slope;
         if (!isfinite(e) || !isfinite(there) || !lower) continue;
-        memcpy(x, seat->trial, n * sizeof(double));
-        memcpy(seat->r, seat->f, n * sizeof(double));
+        memcpy(x, workspace->trial, n * sizeof(double));
+        memcpy(workspace->r, workspace->f, n * sizeof(double));
         *energy = e;
         *size = there;
         return true;
@@ -343,26 +345,26 @@ static bool advance(const search *s, double *x, double *energy, double *size)
 /* what rounding leaves of the forces of springs at rest, N: the target of a body without load */
 static double rounding(const search *s)
 {
-    const pal_springs *edge = &s->seat->lattice->kind[PAL_SPRING_DISTANCE];
+    const pal_springs *edge = &s->workspace->lattice->kind[PAL_SPRING_DISTANCE];
     double most = 0;
     for (int i = 0; i < edge->n_item; i++)
         most = fmax(most, edge->q[i] * edge->w[i] * fabs(s->k_J[PAL_SPRING_DISTANCE][i]));
-    return 1e-14 * sqrt(s->seat->lattice->n_free) * most;
+    return 1e-14 * sqrt(s->workspace->lattice->n_free) * most;
 }
 
 static pal_err newton(const search *s, double *x)
 {
-    pal_seat *seat = s->seat;
-    const pal_lattice *l = seat->lattice;
+    pal_equilibrium_workspace *workspace = s->workspace;
+    const pal_lattice *l = workspace->lattice;
     double load = norm(l, s->force_N), target = load > 0 ? s->o->tolerance * load : rounding(s);
-    double energy = residual(s, x, seat->r), size = norm(l, seat->r);
+    double energy = residual(s, x, workspace->r), size = norm(l, workspace->r);
     bool stable = false;
     for (int k = 0;; k++) {
         s->report->residual = load > 0 ? size / load : size;
         if (!isfinite(size))
             return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "no rest: not finite at iteration %d", k);
         if (size <= target && stable) return PAL_ERR_OK;
-        if (k == s->o->most_iteration)
+        if (k == s->o->max_iteration)
             return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "no rest within %d iterations: residual %.2g", k,
                                       s->report->residual);
         int shifted = s->report->n_shift;
@@ -372,50 +374,50 @@ static pal_err newton(const search *s, double *x)
         if (size <= target)
             return stable ? PAL_ERR_OK
                           : pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "the rest found is not stable (a saddle)");
-        PAL_TRY(pal_cholesky_solve(seat->factor, seat->r, seat->p));
+        PAL_TRY(pal_cholesky_solve(workspace->factor, workspace->r, workspace->p));
         s->report->n_newton++;
         if (!advance(s, x, &energy, &size)) {
             if (size <= 1e3 * target && stable) return PAL_ERR_OK; /* rounding */
             return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC,
                                       "no rest: no step lowers the energy at a residual of %.2g", s->report->residual);
         }
-        if (stretch_of(l, x) > s->o->most_stretch)
+        if (stretch_of(l, x) > s->o->max_stretch)
             return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "no rest: an edge is stretched more than %g times",
-                                      s->o->most_stretch);
+                                      s->o->max_stretch);
     }
 }
 
 static pal_err linear(const search *s, double *x)
 {
-    pal_seat *seat = s->seat;
-    const pal_lattice *l = seat->lattice;
+    pal_equilibrium_workspace *workspace = s->workspace;
+    const pal_lattice *l = workspace->lattice;
     pal_err err = factor_at(s, l->x_rest);
-    if (!err) err = pal_cholesky_solve(seat->factor, s->force_N, seat->p);
+    if (!err) err = pal_cholesky_solve(workspace->factor, s->force_N, workspace->p);
     if (err) return pal_diagnostic_set(s->diag, err, "no rest: no factor at rest (%s)", pal_err_text(err));
-    if (!isfinite(norm(l, seat->p))) return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "no rest: not finite");
+    if (!isfinite(norm(l, workspace->p))) return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "no rest: not finite");
     /* constants too far apart for the factor leave a residual */
     double load = norm(l, s->force_N);
-    memcpy(seat->r, s->force_N, 3 * sizeof(double) * (size_t)l->n_node);
-    pal_block_matrix_multiply(&seat->matrix, -1, seat->p, seat->r);
-    s->report->residual = load > 0 ? norm(l, seat->r) / load : 0;
+    memcpy(workspace->r, s->force_N, 3 * sizeof(double) * (size_t)l->n_node);
+    pal_block_matrix_multiply(&workspace->matrix, -1, workspace->p, workspace->r);
+    s->report->residual = load > 0 ? norm(l, workspace->r) / load : 0;
     if (!(s->report->residual < MOST_LINEAR))
         return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "no rest: the linear system keeps a residual of %.2g",
                                   s->report->residual);
-    for (int i = 0; i < 3 * l->n_node; i++) x[i] = l->x_rest[i] + (l->fixed[i / 3] ? 0 : seat->p[i]);
-    s->report->energy_J = 0.5 * dot(l, s->force_N, seat->p);
+    for (int i = 0; i < 3 * l->n_node; i++) x[i] = l->x_rest[i] + (l->fixed[i / 3] ? 0 : workspace->p[i]);
+    s->report->energy_J = 0.5 * dot(l, s->force_N, workspace->p);
     return PAL_ERR_OK;
 }
 
-pal_err pal_equilibrium(pal_seat *seat, const double *const k_J[PAL_SPRING_KINDS], const double *force_N,
-                        const pal_equilibrium_options *options, double *x, pal_equilibrium_report *report,
-                        pal_diagnostic *diag)
+pal_err pal_equilibrium(pal_equilibrium_workspace *workspace, const double *const k_J[PAL_SPRING_KINDS],
+                        const double *force_N, const pal_equilibrium_options *options, double *x,
+                        pal_equilibrium_report *report, pal_diagnostic *diag)
 {
     pal_equilibrium_report own;
     if (!report) report = &own;
     *report = (pal_equilibrium_report){0};
-    const pal_lattice *l = seat->lattice;
+    const pal_lattice *l = workspace->lattice;
     size_t n = 3 * (size_t)l->n_node;
-    search s = {seat, k_J, force_N, options, report, diag};
+    search s = {workspace, k_J, force_N, options, report, diag};
     for (size_t i = 0; i < n; i++)
         if (!isfinite(force_N[i]) || (!options->linear && !isfinite(x[i])))
             return pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "node %zu: its load or position is not finite", i / 3);
@@ -457,21 +459,21 @@ PAL_INLINE void slopes_of(const pal_springs *s, pal_spring_kind kind, const doub
     }
 }
 
-pal_err pal_equilibrium_adjoint(pal_seat *seat, const double *const k_J[PAL_SPRING_KINDS], const double *x,
-                                const pal_equilibrium_options *options, const double *dJ_du,
+pal_err pal_equilibrium_adjoint(pal_equilibrium_workspace *workspace, const double *const k_J[PAL_SPRING_KINDS],
+                                const double *x, const pal_equilibrium_options *options, const double *dJ_du,
                                 double *const slope[PAL_SPRING_KINDS], pal_diagnostic *diag)
 {
-    const pal_lattice *l = seat->lattice;
+    const pal_lattice *l = workspace->lattice;
     pal_err err = PAL_ERR_OK;
     if (!options->linear) { /* the factor at hand is that of the iteration before */
-        assemble(seat, k_J, x, TRUE_HESSIAN);
-        err = pal_cholesky_factor(seat->factor, &seat->matrix, false);
+        assemble(workspace, k_J, x, TRUE_HESSIAN);
+        err = pal_cholesky_factor(workspace->factor, &workspace->matrix, false);
     }
-    if (!err) err = pal_cholesky_solve(seat->factor, dJ_du, seat->p);
+    if (!err) err = pal_cholesky_solve(workspace->factor, dJ_du, workspace->p);
     if (err) return pal_diagnostic_set(diag, err, "no gradient: no factor at the rest found (%s)", pal_err_text(err));
     for (int k = 0; k < PAL_SPRING_KINDS; k++) {
         pal_spring_kind kind = (pal_spring_kind)k;
-        slopes_of(&l->kind[k], kind, x, l->x_rest, seat->p, options->linear, slope[k]);
+        slopes_of(&l->kind[k], kind, x, l->x_rest, workspace->p, options->linear, slope[k]);
     }
     return PAL_ERR_OK;
 }

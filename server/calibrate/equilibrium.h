@@ -35,14 +35,14 @@ typedef struct pal_lattice {
 
 /* copies the springs of the rows edge_distance, face_area, tet_volume of a body. REFUSED: it has no edges; nothing
  * holds it, or everything; MEMORY. [load] */
-pal_err pal_lattice_take(const pal_world *world, int body, pal_lattice *out, pal_diagnostic *diag);
+pal_err pal_lattice_make(const pal_world *world, int body, pal_lattice *out, pal_diagnostic *diag);
 void pal_lattice_free(pal_lattice *lattice); /* a zeroed struct is fine */
 
 typedef struct pal_equilibrium_options {
-    bool linear;         /* linearised at rest                                                             */
-    int most_iteration;  /* 60                                                                             */
-    double tolerance;    /* 1e-9: of the residual's norm, relative to that of the loads                    */
-    double most_stretch; /* 4: a spring longer than this many rest lengths ends the search (NUMERIC)       */
+    bool linear;        /* linearised at rest                                                             */
+    int max_iteration;  /* 60                                                                             */
+    double tolerance;   /* 1e-9: of the residual's norm, relative to that of the loads                    */
+    double max_stretch; /* 4: a spring longer than this many rest lengths ends the search (NUMERIC)       */
 } pal_equilibrium_options;
 void pal_equilibrium_default(pal_equilibrium_options *options);
 
@@ -52,21 +52,22 @@ typedef struct pal_equilibrium_report {
     double energy_J;                 /* elastic                                                   */
 } pal_equilibrium_report;
 
-typedef struct pal_seat pal_seat;
+typedef struct pal_equilibrium_workspace pal_equilibrium_workspace;
 /* MEMORY */
-pal_err pal_seat_create(const pal_lattice *lattice, pal_seat **out); /* borrows the lattice */
-void pal_seat_destroy(pal_seat *seat);                               /* NULL is fine        */
+pal_err pal_equilibrium_workspace_create(const pal_lattice *lattice,
+                                         pal_equilibrium_workspace **out);    /* borrows the lattice */
+void pal_equilibrium_workspace_destroy(pal_equilibrium_workspace *workspace); /* NULL is fine        */
 
 /* k_J[kind] [n_item]: constants, before the weights q; force_N [n_node][3]; x [n_node][3] in: where to begin (linear:
  * not read), out: the rest under load, only on success. NUMERIC (note says why): not converged, a Hessian that is not
  * positive definite at the end (no stable rest), a number that is not finite; MEMORY */
-pal_err pal_equilibrium(pal_seat *seat, const double *const k_J[PAL_SPRING_KINDS], const double *force_N,
-                        const pal_equilibrium_options *options, double *x, pal_equilibrium_report *report,
-                        pal_diagnostic *diag);
+pal_err pal_equilibrium(pal_equilibrium_workspace *workspace, const double *const k_J[PAL_SPRING_KINDS],
+                        const double *force_N, const pal_equilibrium_options *options, double *x,
+                        pal_equilibrium_report *report, pal_diagnostic *diag);
 /* after pal_equilibrium on this seat, same arguments: slope[kind] [n_item] = dJ/dk for dJ_du [n_node][3] (not read at
  * held nodes). NUMERIC, MEMORY */
-pal_err pal_equilibrium_adjoint(pal_seat *seat, const double *const k_J[PAL_SPRING_KINDS], const double *x,
-                                const pal_equilibrium_options *options, const double *dJ_du,
+pal_err pal_equilibrium_adjoint(pal_equilibrium_workspace *workspace, const double *const k_J[PAL_SPRING_KINDS],
+                                const double *x, const pal_equilibrium_options *options, const double *dJ_du,
                                 double *const slope[PAL_SPRING_KINDS], pal_diagnostic *diag);
 /* -grad of the elastic energy [n_node][3] at x, held nodes too; returns the energy, J */
 double pal_lattice_force(const pal_lattice *lattice, const double *const k_J[PAL_SPRING_KINDS], const double *x,

@@ -10,12 +10,12 @@
 /* what "still" means, header */
 static const double most_v = 1e-4, mean_v = 3e-5, most_a = 1e-2, mean_a = 1e-3, hold_s = 0.25;
 
-const double pal_settle_ladder_1_s[PAL_SETTLE_STEPS] = {0.5, 1, 2, 4, 8, 16};
+const double pal_settle_rates_1_s[PAL_SETTLE_STEPS] = {0.5, 1, 2, 4, 8, 16};
 enum { USUAL = 3 };
 
 void pal_settle_default(pal_settle_options *options)
 {
-    *options = (pal_settle_options){.most_s = 60, .most_work = 1.5e9};
+    *options = (pal_settle_options){.max_simulated_s = 60, .max_work = 1.5e9};
 }
 
 static bool say(const pal_settle_options *options, const char *what, double fraction)
@@ -29,7 +29,7 @@ static double mean_gain(const pal_body *body, const double *force_N)
     double force = 0, mass = 0;
     for (int i = 0; i < body->n_dof; i++) {
         force += pal_norm3(force_N + 3 * i);
-        if (!body->fixed[i]) mass += body->mass_kg[i];
+        if (!body->support[i]) mass += body->mass_kg[i];
     }
     return force / mass;
 }
@@ -40,7 +40,7 @@ static bool is_still(const pal_body *body, double damping_1_s, double gain_m_s2)
     double v_most = 0, v_sum = 0, a_most = 0, a_sum = 0, u_most = 0;
     int n = 0;
     for (int i = 0; i < body->n_dof; i++) {
-        if (body->fixed[i]) continue;
+        if (body->support[i]) continue;
         const double *v = body->v + 3 * i, *f = body->f + 3 * i;
         double a[3], speed = pal_norm3(v);
         for (int c = 0; c < 3; c++) a[c] = f[c] / body->mass_kg[i] - damping_1_s * v[c];
@@ -96,8 +96,8 @@ pal_err pal_settle(pal_world *world, double step_s, const pal_settle_load *load,
             pal_err err = pal_world_load(world, 0, i, load->force_N + 3 * i);
             if (err) return pal_diagnostic_set(diag, err, "no memory for the loads of a live run");
         }
-    while (!out->steady && time<options->most_s && * work> 0) {
-        if (!say(options, "live body comes to rest", time / options->most_s))
+    while (!out->steady && time<options->max_simulated_s && * work> 0) {
+        if (!say(options, "live body comes to rest", time / options->max_simulated_s))
             return pal_diagnostic_set(diag, PAL_ERR_STATE, "stopped while the live body was coming to rest");
         if (pal_world_step(world, step_s) || body->frozen) break;
         time += step_s;
@@ -117,12 +117,12 @@ static pal_err try_rate(pal_world *world, double step_s, const pal_settle_load *
                         pal_settle_options *options, double *work, pal_settle_run *run, double *mean,
                         pal_diagnostic *diag)
 {
-    double left = most, longest = options->most_s;
+    double left = most, longest = options->max_simulated_s;
     *mean = NAN;
     for (int k = 0; k < n_load; k++) {
-        options->most_s = fmin(longest, left);
+        options->max_simulated_s = fmin(longest, left);
         pal_err err = pal_settle(world, step_s, &load[k], options, work, &run[k], diag);
-        options->most_s = longest;
+        options->max_simulated_s = longest;
         if (err) return err;
         left -= run[k].seconds;
         if (!run[k].steady) return PAL_ERR_OK;
@@ -149,11 +149,11 @@ static pal_err try_rung(climb *c, int rung, bool *better)
     pal_settle_report *out = c->out;
     pal_settle_run run[PAL_SETTLE_LOADS] = {0};
     pal_material material = c->scene->body[0].material;
-    double mean, most = c->n_load * (out->steady ? out->seconds : c->options.most_s);
-    material.damping_1_s = pal_settle_ladder_1_s[rung];
+    double mean, most = c->n_load * (out->steady ? out->seconds : c->options.max_simulated_s);
+    material.damping_1_s = pal_settle_rates_1_s[rung];
     PAL_TRY(pal_world_material(c->world, 0, &material, c->diag));
     PAL_TRY(try_rate(c->world, c->scene->step_s, c->load, c->n_load, most, &c->options, &c->work, run, &mean, c->diag));
-    out->ladder_s[rung] = mean;
+    out->rate_seconds[rung] = mean;
     *better = isfinite(mean) && (!out->steady || mean < out->seconds);
     /* of a body that never rests the first run is there to tell */
     for (int i = 0; i < c->n_load && (*better || (!out->steady && rung == c->first)); i++) out->load[i] = run[i];
@@ -177,7 +177,7 @@ static int first_rung(const climb *c)
         sum += log(2 * sqrt(gain / most)) / c->n_load;
     }
     for (int k = 0; k < PAL_SETTLE_STEPS; k++)
-        if (fabs(log(pal_settle_ladder_1_s[k]) - sum) < fabs(log(pal_settle_ladder_1_s[best]) - sum)) best = k;
+        if (fabs(log(pal_settle_rates_1_s[k]) - sum) < fabs(log(pal_settle_rates_1_s[best]) - sum)) best = k;
     return best;
 }
 
@@ -208,7 +208,7 @@ pal_err pal_settle_damping(const pal_scene *scene, const pal_settle_load *load, 
     if (scene->n_body != 1)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "a scene of %d bodies, wanted one", scene->n_body);
     *out = (pal_settle_report){.damping_1_s = scene->body[0].material.damping_1_s, .seconds = NAN};
-    for (int k = 0; k < PAL_SETTLE_STEPS; k++) out->ladder_s[k] = NAN;
+    for (int k = 0; k < PAL_SETTLE_STEPS; k++) out->rate_seconds[k] = NAN;
     for (int k = 0; k < PAL_SETTLE_LOADS; k++) out->load[k].difference_percent = NAN;
     pal_scene *own = malloc(sizeof *own);
     pal_world *world = NULL;
@@ -217,13 +217,13 @@ pal_err pal_settle_damping(const pal_scene *scene, const pal_settle_load *load, 
     /* nobody looks and nobody touches; the row viscous is there when there is a rate */
     own->body[0].output.name[0] = 0;
     own->body[0].n_effect = 0;
-    own->body[0].material.damping_1_s = pal_settle_ladder_1_s[USUAL];
+    own->body[0].material.damping_1_s = pal_settle_rates_1_s[USUAL];
     own->n_tool = 0;
     climb c = {.scene = own,
                .load = load,
                .n_load = n_load,
                .options = *options,
-               .work = options->most_work,
+               .work = options->max_work,
                .out = out,
                .diag = diag};
     pal_err err = pal_world_create(own, diag, &world);

@@ -15,7 +15,7 @@
 enum { PAL_SETTLE_LOADS = 8, PAL_SETTLE_STEPS = 6 };
 
 /* the rates that are tried, 1/s */
-extern const double pal_settle_ladder_1_s[PAL_SETTLE_STEPS]; /* 0.5, 1, 2, 4, 8, 16 */
+extern const double pal_settle_rates_1_s[PAL_SETTLE_STEPS]; /* 0.5, 1, 2, 4, 8, 16 */
 
 typedef struct pal_settle_load {
     const double *force_N; /* [n_node][3]                                           */
@@ -23,8 +23,8 @@ typedef struct pal_settle_load {
 } pal_settle_load;
 
 typedef struct pal_settle_options {
-    double most_s;    /* simulated, per load; 60                                                              */
-    double most_work; /* sub-steps times tetrahedra, of all runs together; 1.5e9 (20 s of one core)       */
+    double max_simulated_s; /* simulated, per load; 60                                                              */
+    double max_work;        /* sub-steps times tetrahedra, of all runs together; 1.5e9 (20 s of one core)       */
     bool (*progress)(const char *what, double fraction, void *user); /* false: stop; may be NULL */
     void *user;
 } pal_settle_options;
@@ -43,10 +43,11 @@ pal_err pal_settle(pal_world *world, double step_s, const pal_settle_load *load,
                    double *work, pal_settle_run *out, pal_diagnostic *diag);
 
 typedef struct pal_settle_report {
-    bool steady;                       /* some rate brings all loads to rest                                         */
-    double damping_1_s;                /* that one, or the scene's own                                               */
-    double seconds;                    /* mean over the loads                                                        */
-    double ladder_s[PAL_SETTLE_STEPS]; /* mean over the loads; NaN: not steady, or slower than the best; or not tried */
+    bool steady;        /* some rate brings all loads to rest                                         */
+    double damping_1_s; /* that one, or the scene's own                                               */
+    double seconds;     /* mean over the loads                                                        */
+    double rate_seconds[PAL_SETTLE_STEPS]; /* mean over the loads; NaN: not steady, or slower than the best; or not
+                                              tried */
     pal_settle_run load[PAL_SETTLE_LOADS]; /* at the rate that was taken */
 } pal_settle_report;
 

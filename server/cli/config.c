@@ -23,7 +23,7 @@ static const pal_config_key setting[] = {
     {"viewer", "FOLDER", PAL_CONFIG_KEY_TEXT, PLACE(viewer), 0, 0, "files of the page (those beside the program)"},
     {"error_m", "M", PAL_CONFIG_KEY_NUMBER, PLACE(error_m), 0, 0.01,
      "most error of streamed positions, m (1/3000 of the box, at most 0.00005)"},
-    {"most_clients", "N", PAL_CONFIG_KEY_INT, PLACE(max_clients), 1, 10000, "clients at once (200)"},
+    {"max_clients", "N", PAL_CONFIG_KEY_INT, PLACE(max_clients), 1, 10000, "clients at once (200)"},
     {"lcm", "URL", PAL_CONFIG_KEY_TEXT, PLACE(lcm), 0, 0, "also speak LCM there, in a process of its own (off)"},
     {"log", "LEVEL", PAL_CONFIG_KEY_TEXT, PLACE(log), 0, 0, "error, warn, info or debug (info)"},
     {"record", "FILE", PAL_CONFIG_KEY_TEXT, PLACE(record), 0, 0, "write the input log there, for palpate replay (off)"},
@@ -31,7 +31,7 @@ static const pal_config_key setting[] = {
 enum { N_SETTING = sizeof setting / sizeof setting[0] };
 static const char *const level_name[] = {"error", "warn", "info", "debug"};
 
-const pal_config_key *pal_config_settings(int *n)
+const pal_config_key *pal_config_keys(int *n)
 {
     *n = N_SETTING;
     return setting;

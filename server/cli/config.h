@@ -40,7 +40,7 @@ typedef struct pal_config_key {
     const char *help;
 } pal_config_key;
 
-const pal_config_key *pal_config_settings(int *n);
+const pal_config_key *pal_config_keys(int *n);
 void pal_config_default(pal_config *config);
 /* reads a file over what is there; REFUSED names file and key, IO. All or nothing. */
 pal_err pal_config_file(pal_config *config, const char *path, pal_diagnostic *diag);

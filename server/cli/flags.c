@@ -55,7 +55,7 @@ static int manual(const pal_flag_table *table)
     printf("usage: palpate %s\n\n%s\n", table->usage, table->about);
     for (int k = 0; k < table->n_flag; k++) manual_line(table->flag[k].name, table->flag[k].value, table->flag[k].help);
     if (table->config) {
-        const pal_config_key *setting = pal_config_settings(&n);
+        const pal_config_key *setting = pal_config_keys(&n);
         for (int k = 0; k < n; k++) {
             flag_name(setting[k].key, name);
             manual_line(name, setting[k].kind == PAL_CONFIG_KEY_BOOL ? NULL : setting[k].value, setting[k].help);
@@ -126,7 +126,7 @@ static const pal_config_key *setting_named(const pal_flag_table *table, const ch
 {
     char known[KEY];
     int n;
-    const pal_config_key *setting = pal_config_settings(&n);
+    const pal_config_key *setting = pal_config_keys(&n);
     for (int k = 0; table->config && k < n; k++) {
         flag_name(setting[k].key, known);
         if (!strcmp(known, name)) return &setting[k];

@@ -37,20 +37,20 @@ typedef struct job {
     pal_flag_common common;
     const char *problem[MOST_PROBLEM];
     int n_problem;
-    pal_calibrate_wish wish;
+    pal_calibrate_input wish;
     pal_calibrate_options options;
     const char *journal_path, *folder, *grid_text, *seed_text;
     int seed[MOST_SEED], n_seed;
     int n_worker, evaluations;
-    double budget_s, enough_percent;
+    double budget_s, target_percent;
     int rank, n_rank, n_batch; /* n_batch: points of a batch, of the largest team on every rank */
     pal_journal *journal;      /* rank 0 */
     pal_team *team;
     /* the problem at hand */
-    pal_calibrate_set *set;
+    pal_calibrate_cases *set;
     pal_calibration *c;
     pal_calibration_info info;
-    pal_calibration_seat *seat[PAL_TEAM_MAX];
+    pal_calibration_workspace *workspace[PAL_TEAM_MAX];
     uint64_t print; /* fingerprint of what is evaluated */
     /* evaluations of the batch at hand */
     double *theta, *cost; /* [batch][n_parameter], [batch] */
@@ -91,7 +91,7 @@ static void evaluate_one(void *user, int worker, int index)
     job *j = user;
     pal_calibration_value v;
     const double *theta = j->theta + (size_t)index * (size_t)j->info.n_parameter;
-    pal_err err = pal_calibration_evaluate(j->c, j->seat[worker], theta, PAL_CALIBRATION_FIT, &v, NULL, NULL);
+    pal_err err = pal_calibration_evaluate(j->c, j->workspace[worker], theta, PAL_CALIBRATION_FIT, &v, NULL, NULL);
     j->cost[index] = err == PAL_ERR_MEMORY ? NAN : err ? DBL_MAX : v.error_percent;
 }
 
@@ -230,9 +230,10 @@ static pal_err make(job *j, const char *problem)
     j->cost = malloc(batch * sizeof *j->cost);
     j->missing = malloc(batch * sizeof *j->missing);
     bool room = j->theta && j->cost && j->missing;
-    for (int w = 0; w < pal_team_size(j->team) && room; w++) room = !pal_calibration_seat_create(j->c, &j->seat[w]);
+    for (int w = 0; w < pal_team_size(j->team) && room; w++)
+        room = !pal_calibration_workspace_create(j->c, &j->workspace[w]);
     if (!room) return pal_diagnostic_set(&j->diag, PAL_ERR_MEMORY, "%s: no memory for its evaluations", problem);
-    PAL_TRY(pal_calibration_evaluate(j->c, j->seat[0], j->info.start, PAL_CALIBRATION_FIT, &v, NULL, &j->diag));
+    PAL_TRY(pal_calibration_evaluate(j->c, j->workspace[0], j->info.start, PAL_CALIBRATION_FIT, &v, NULL, &j->diag));
     j->print = fingerprint(j, v.error_percent);
     return PAL_ERR_OK;
 }
@@ -240,13 +241,13 @@ static pal_err make(job *j, const char *problem)
 static void unmake(job *j)
 {
     for (int w = 0; w < PAL_TEAM_MAX; w++) {
-        pal_calibration_seat_destroy(j->seat[w]);
-        j->seat[w] = NULL;
+        pal_calibration_workspace_destroy(j->workspace[w]);
+        j->workspace[w] = NULL;
     }
     pal_calibration_destroy(j->c);
     j->c = NULL;
     pal_calibrate_cases_free(j->set);
-    *j->set = (pal_calibrate_set){0};
+    *j->set = (pal_calibrate_cases){0};
     free(j->theta);
     free(j->cost);
     free(j->missing);
@@ -365,7 +366,7 @@ static pal_err fit(job *j, const char *problem, int seed, cJSON *results)
     pal_fit_options o = {.budget_s = j->budget_s,
                          .max_evaluation = j->evaluations,
                          .seed = (uint64_t)seed,
-                         .enough_percent = j->enough_percent,
+                         .target_percent = j->target_percent,
                          .evaluate = evaluate,
                          .n_batch = j->n_batch,
                          .step = show,
@@ -523,7 +524,7 @@ static int parse(job *j, int argc, char **argv)
          "a walk for each; the same gives the same result (0)"},
         {"--evaluations", "N", PAL_FLAG_COUNT, &j->evaluations, 1, 1e9, "ends a walk after so many (4000)"},
         {"--budget", "SECONDS", PAL_FLAG_NUMBER, &j->budget_s, 0.01, 1e7, "ends a walk after so long (no limit)"},
-        {"--enough", "PERCENT", PAL_FLAG_NUMBER, &j->enough_percent, 1e-9, 1e9, "ends a walk at this error"},
+        {"--enough", "PERCENT", PAL_FLAG_NUMBER, &j->target_percent, 1e-9, 1e9, "ends a walk at this error"},
         {"--resolution", "N", PAL_FLAG_COUNT, &j->options.voxel.resolution, 2, 200,
          "voxels on the longest axis (the least even number that gives more than 700 nodes)"},
         {"--split", "K", PAL_FLAG_COUNT, &j->options.split, 1, 8, "finite elements of the truth: voxels as K^3 (2)"},

@@ -86,15 +86,15 @@ static void show_fit(pal_calibrate_run *run, const pal_fit_step *step)
 static bool take_step(void *user, const pal_fit_step *step)
 {
     pal_calibrate_run *run = user;
-    if (run->n_trail == run->most_trail) {
-        int more = run->most_trail > 0 ? 2 * run->most_trail : 256;
+    if (run->n_trail == run->max_trail) {
+        int more = run->max_trail > 0 ? 2 * run->max_trail : 256;
         double *error = realloc(run->error, (size_t)more * sizeof *error);
         if (error) run->error = error;
         double *best = error ? realloc(run->best, (size_t)more * sizeof *best) : NULL;
         if (best) run->best = best;
-        if (best) run->most_trail = more;
+        if (best) run->max_trail = more;
     }
-    if (run->n_trail < run->most_trail) {
+    if (run->n_trail < run->max_trail) {
         run->error[run->n_trail] = step->error_percent;
         run->best[run->n_trail++] = step->best_percent;
     }
@@ -237,7 +237,7 @@ static pal_err check_sources(const pal_calibrate_run *run, pal_diagnostic *diag)
 static pal_err make(pal_calibrate_run *run, pal_diagnostic *diag)
 {
     pal_diagnostic reason = {""};
-    pal_voxel_wish *voxel = &run->options.voxel;
+    pal_case_voxel_options *voxel = &run->options.voxel;
     run->options.progress = show_making;
     run->options.user = &run->common;
     pal_err err = PAL_ERR_OK;
@@ -248,7 +248,7 @@ static pal_err make(pal_calibrate_run *run, pal_diagnostic *diag)
     if (err) return pal_diagnostic_set(diag, err, "%s: %s", run->wish.problem, reason.text);
     pal_calibration_info_of(run->calibration, &run->info);
     run->theta = malloc(sizeof *run->theta * (size_t)run->info.n_parameter);
-    if (!run->theta || pal_calibration_seat_create(run->calibration, &run->seat))
+    if (!run->theta || pal_calibration_workspace_create(run->calibration, &run->workspace))
         return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for %d constants", run->info.n_parameter);
     return pal_calibrate_cases_check(&run->set, run->info.mesh, diag);
 }
@@ -258,17 +258,17 @@ static pal_err search(pal_calibrate_run *run, pal_diagnostic *diag)
     enum { ALL = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY };
     const pal_calibration *c = run->calibration;
     size_t n = sizeof *run->theta * (size_t)run->info.n_parameter;
-    pal_calibration_by_hand(c, run->theta);
-    PAL_TRY(pal_calibration_evaluate(c, run->seat, run->theta, ALL, &run->hand, NULL, diag));
+    pal_calibration_manual_start(c, run->theta);
+    PAL_TRY(pal_calibration_evaluate(c, run->workspace, run->theta, ALL, &run->hand, NULL, diag));
     memcpy(run->theta, run->info.start, n);
-    PAL_TRY(pal_calibration_evaluate(c, run->seat, run->theta, ALL, &run->start, NULL, diag));
+    PAL_TRY(pal_calibration_evaluate(c, run->workspace, run->theta, ALL, &run->start, NULL, diag));
     run->fit.step = take_step;
     run->fit.user = run;
     pal_diagnostic reason = {""};
     pal_err err = run->annealing ? pal_fit_anneal(c, &run->fit, run->theta, &run->result, &reason)
                                  : pal_fit_adjoint(c, &run->fit, run->theta, &run->result, &reason);
     if (err) return pal_diagnostic_set(diag, err, "%s: %s", run->wish.problem, reason.text);
-    return pal_calibration_evaluate(c, run->seat, run->theta, ALL, &run->last, NULL, diag);
+    return pal_calibration_evaluate(c, run->workspace, run->theta, ALL, &run->last, NULL, diag);
 }
 
 /* how the springs move when they run */
@@ -282,10 +282,10 @@ static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_diagn
     options.progress = show_making;
     options.user = &run->common;
     /* a short search is not followed by a long run; a number of sub-steps, so that scenes do not depend on the clock */
-    if (run->fit.budget_s > 0) options.most_work = fmin(options.most_work, LIVE_WORK_1_S * fmax(run->fit.budget_s, 1));
+    if (run->fit.budget_s > 0) options.max_work = fmin(options.max_work, LIVE_WORK_1_S * fmax(run->fit.budget_s, 1));
     if (!u) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for %d loads", run->set.n);
     for (int k = 0; k < run->set.n; k++) {
-        bool rests = pal_calibration_moved(run->calibration, run->seat, k, u + n * (size_t)k);
+        bool rests = pal_calibration_displacement(run->calibration, run->workspace, k, u + n * (size_t)k);
         load[k] = (pal_settle_load){.force_N = pal_calibration_forces(run->calibration, k),
                                     .u = rests ? u + n * (size_t)k : NULL};
     }
@@ -341,7 +341,7 @@ static int start(pal_calibrate_run *run)
                : run->common.json ? pal_report_json(&run->common, pal_calibrate_json(run))
                                   : 0;
     if (!err && !run->common.json && !run->common.quiet) pal_calibrate_print(run);
-    pal_calibration_seat_destroy(run->seat);
+    pal_calibration_workspace_destroy(run->workspace);
     pal_calibration_destroy(run->calibration);
     pal_calibrate_cases_free(&run->set);
     free(run->theta);
@@ -369,7 +369,7 @@ int command_calibrate(int argc, char **argv)
          "ends the search after so long, and the live run behind it after about as long (no limit; 20 s)"},
         {"--evaluations", "N", PAL_FLAG_COUNT, &w.evaluations, 1, 1e9,
          "ends the search after so many (1000; annealing 4000)"},
-        {"--enough", "PERCENT", PAL_FLAG_NUMBER, &run.fit.enough_percent, 1e-9, 1e9,
+        {"--enough", "PERCENT", PAL_FLAG_NUMBER, &run.fit.target_percent, 1e-9, 1e9,
          "ends the search when the error is no more"},
         {"--seed", "S", PAL_FLAG_COUNT, &w.seed, 0, INT_MAX, "of annealing; the same gives the same result (0)"},
         {"--workers", "N", PAL_FLAG_COUNT, &run.fit.n_worker, 1, 256,

@@ -93,12 +93,12 @@ static void add_absent(cJSON *o, const pal_world *world)
 }
 
 /* the setting that was picked from the study, and what is to be known about that */
-static void add_setting(cJSON *o, const pal_studied *studied)
+static void add_setting(cJSON *o, const pal_studied_scene *studied)
 {
     char text[PAL_CONFIGURATION_TEXT];
     if (studied->warn[0]) cJSON_AddStringToObject(o, "study_warning", studied->warn);
     if (studied->picked < 0) return;
-    const pal_measured_configuration *p = &studied->file->study.point[studied->picked].priced;
+    const pal_measured_configuration *p = &studied->file->study.point[studied->picked].measured;
     cJSON *picked = cJSON_AddObjectToObject(o, "picked");
     cJSON_AddStringToObject(picked, "body", studied->scene->body[studied->body].name);
     cJSON_AddStringToObject(picked, "setting", pal_configuration_text(&p->setting, text));
@@ -106,7 +106,7 @@ static void add_setting(cJSON *o, const pal_studied *studied)
     cJSON_AddNumberToObject(picked, "error_m", p->error_m);
 }
 
-static cJSON *as_json(const pal_studied *studied, pal_world *world, cost *c)
+static cJSON *as_json(const pal_studied_scene *studied, pal_world *world, cost *c)
 {
     const pal_scene *scene = studied->scene;
     cJSON *o = cJSON_CreateObject();
@@ -185,7 +185,7 @@ static void print_absent(const pal_world *world)
             printf("  %-50s %s\n", pal_effects[i]->name, pal_effect_words(pal_effects[i]->name, words));
 }
 
-static void print(const pal_studied *studied, pal_world *world, cost *c)
+static void print(const pal_studied_scene *studied, pal_world *world, cost *c)
 {
     const pal_scene *scene = studied->scene;
     if (studied->said[0]) printf("%s\n", studied->said);
@@ -241,13 +241,13 @@ int command_plan(int argc, char **argv)
     pal_world *world = NULL;
     pal_diagnostic diag = {""}, reason = {""};
     static cost measured;
-    pal_studied studied = {0};
+    pal_studied_scene studied = {0};
     pal_err err = pal_scene_arg(word[0], NULL, &loaded, NULL, NULL, &diag);
-    if (!err) err = pal_studied_open(word[0], &loaded->scene, &studied, &diag);
+    if (!err) err = pal_studied_scene_open(word[0], &loaded->scene, &studied, &diag);
     if (!err && (err = pal_world_create(studied.scene, &reason, &world)))
         pal_diagnostic_set(&diag, err, "%s: %s", word[0], reason.text);
     pal_preflight preflight = {0};
-    if (!err && (err = pal_preflight_look(studied.scene, PAL_PREFLIGHT_FULL, &preflight, &reason)))
+    if (!err && (err = pal_preflight_run(studied.scene, PAL_PREFLIGHT_FULL, &preflight, &reason)))
         pal_diagnostic_set(&diag, err, "%s: %s", word[0], reason.text);
     pal_report_progress("measure", 0, &common);
     if (!err) err = measure(world, studied.scene->step_s, &measured);
@@ -263,7 +263,7 @@ int command_plan(int argc, char **argv)
         pal_preflight_print(&preflight, pal_median(measured.step_ms, measured.n_step));
     }
     pal_world_destroy(world);
-    pal_studied_close(&studied);
+    pal_studied_scene_close(&studied);
     pal_scene_free(loaded);
     return code;
 }

@@ -45,12 +45,12 @@ int command_replay(int argc, char **argv)
     pal_replay_report report;
     double start = pal_clock_s();
     pal_err err = pal_scene_arg(word[1], NULL, &loaded, NULL, NULL, &diag);
-    pal_studied studied = {0};
+    pal_studied_scene studied = {0};
     pal_report_progress("replay", 0, &common);
-    if (!err) err = pal_studied_open(word[1], &loaded->scene, &studied, &diag);
+    if (!err) err = pal_studied_scene_open(word[1], &loaded->scene, &studied, &diag);
     if (!err) err = pal_replay_run(word[0], studied.scene, &report, &diag);
     pal_report_progress(NULL, 0, &common);
-    pal_studied_close(&studied);
+    pal_studied_scene_close(&studied);
     pal_scene_free(loaded);
     if (err) return pal_report_refusal(&common, err, &diag);
     bool equal = report.n_hash == report.n_hash_equal;

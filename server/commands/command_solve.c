@@ -220,7 +220,7 @@ static cJSON *as_json(const study *s, const plan_requests *wish)
     cJSON_AddNumberToObject(o, "nodes", r->n_node);
     cJSON_AddNumberToObject(o, "elements", r->n_element);
     cJSON_AddNumberToObject(o, "dof", r->n_dof);
-    cJSON_AddNumberToObject(o, "held_nodes", r->n_held);
+    cJSON_AddNumberToObject(o, "held_nodes", r->n_fixed);
     cJSON_AddNumberToObject(o, "iterations", r->n_newton);
     cJSON_AddNumberToObject(o, "cg_iterations", r->n_cg);
     cJSON_AddNumberToObject(o, "residual", r->residual);
@@ -275,15 +275,15 @@ static bool is_many(const plan_requests *wish)
 
 static int run_many(const pal_flag_common *common, const study *s, const plan_requests *wish)
 {
-    const pal_study_case what = {.problem = s->problem,
-                                 .load_case = s->load_case,
-                                 .reference = s->reference,
-                                 .samples_file = s->samples_file,
-                                 .samples = s->samples_file ? &s->samples : NULL,
-                                 .surface = &s->surface,
-                                 .options = &wish->solve,
-                                 .plot = wish->plot};
-    return pal_study_run(common, &what, &wish->list);
+    const pal_solve_study what = {.problem = s->problem,
+                                  .load_case = s->load_case,
+                                  .reference = s->reference,
+                                  .samples_file = s->samples_file,
+                                  .samples = s->samples_file ? &s->samples : NULL,
+                                  .surface = &s->surface,
+                                  .options = &wish->solve,
+                                  .plot = wish->plot};
+    return pal_solve_study_run(common, &what, &wish->list);
 }
 
 static int run(pal_flag_common *common, plan_requests *wish)
@@ -388,7 +388,7 @@ int command_solve(int argc, char **argv)
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, &wish.problem, &n);
     if (code >= 0) return code;
     pal_diagnostic diag = {""};
-    if (!pal_study_parse(wish.element, wish.resolution, &wish.list, &diag)) return usage(&common, diag.text);
+    if (!pal_solve_study_parse(wish.element, wish.resolution, &wish.list, &diag)) return usage(&common, diag.text);
     const char *sentence = check_words(&wish);
     if (sentence) return usage(&common, sentence);
     o->element = wish.list.element[0];

@@ -44,8 +44,8 @@ enum { MOST_PATH = PAL_STUDY_PATH + 8, FILES = 5 };
 
 typedef struct study_run {
     pal_flag_common common;
-    pal_study_question question;
-    pal_setting_wish wish;
+    pal_study_request request;
+    pal_accuracy_target wish;
     const char *methods, *folder, *scene; /* scene: -o */
     char load_case[PAL_NAME];             /* of the study that is there */
     bool again;
@@ -110,7 +110,7 @@ static bool take_words(study_run *run, const char *within, const char *budget, c
     static const char *const span[] = {"ms", "us", "\xc2\xb5s", "s", NULL};
     static const double span_factor[] = {1, 1e3, 1e3, 1e-3};
     static const char *const model[] = {"fem", "tet_springs", "adaptive_springs", "subdivision_fem", NULL};
-    if (within && !read_amount(within, length, length_factor, &run->wish.within_m))
+    if (within && !read_amount(within, length, length_factor, &run->wish.max_error_m))
         return !snprintf(out, n_byte,
                          "--within: \"%.40s\" is not a length above 0 with its unit, mm, um, cm or m, as 1mm", within);
     if (budget && !read_amount(budget, span, span_factor, &run->wish.budget_ms))
@@ -210,8 +210,8 @@ static void join_methods(pal_study_file *now, const pal_study_file *old)
 static pal_err take_kept_loads(study_run *run, pal_diagnostic *diag)
 {
     pal_study_file *old = NULL;
-    pal_study_question *q = &run->question;
-    bool asks = run->row > 0 || run->wish.within_m > 0 || run->wish.budget_ms > 0;
+    pal_study_request *q = &run->request;
+    bool asks = run->row > 0 || run->wish.max_error_m > 0 || run->wish.budget_ms > 0;
     bool given = q->quick || q->seconds > 0 || q->load_case || q->samples;
     double seconds = 0;
     if (asks && !given && !run->again && !access(run->path, F_OK)) {
@@ -219,7 +219,7 @@ static pal_err take_kept_loads(study_run *run, pal_diagnostic *diag)
         pal_err err = pal_study_file_read(run->path, &old, &reason);
         if (err) return pal_diagnostic_set(diag, err, "%.400s: --again starts over", reason.text);
         pal_study_loads_read(old->loads, &seconds, &q->quick, run->load_case);
-        if (run->load_case[0]) q->load_case = run->load_case, q->kept_case = true;
+        if (run->load_case[0]) q->load_case = run->load_case, q->keeps_case = true;
         run->of_kept = true;
         q->seconds = seconds;
         free(old);
@@ -237,7 +237,7 @@ static pal_err look_before(study_run *run, bool *whole, pal_diagnostic *diag)
     bool is_there = !access(run->path, F_OK);
     if (run->row && !is_there)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--pick %d: there is no %.200s yet: run palpate study %.200s",
-                                  run->row, run->path, run->question.word);
+                                  run->row, run->path, run->request.word);
     if (run->again || !is_there) return PAL_ERR_OK;
     pal_err err = pal_study_file_read(run->path, &old, &reason);
     if (err) return pal_diagnostic_set(diag, err, "%.400s: --again starts over", reason.text);
@@ -248,7 +248,7 @@ static pal_err look_before(study_run *run, bool *whole, pal_diagnostic *diag)
         *whole = true;
         run->n_before = old->study.n_point;
         *run->file = *old;
-        pal_study_front(&run->file->study);
+        pal_study_mark_front(&run->file->study);
     } else if (!err) {
         join_methods(run->file, old);
         run->before = malloc(sizeof *run->before);
@@ -266,7 +266,8 @@ static bool has_point(const pal_study *study, const pal_study_point *point)
 {
     for (int k = 0; k < study->n_point; k++) {
         const pal_study_point *p = &study->point[k];
-        if (p->err == point->err && pal_configuration_equal(&p->priced.setting, &point->priced.setting)) return true;
+        if (p->err == point->err && pal_configuration_equal(&p->measured.setting, &point->measured.setting))
+            return true;
     }
     return false;
 }
@@ -282,7 +283,7 @@ static void take_study(study_run *run, const pal_study *study)
     pal_machine_name(to->machine);
     for (int k = 0; run->before && k < run->before->n_point && to->n_point < PAL_STUDY_POINTS; k++)
         if (!has_point(study, &run->before->point[k])) to->point[to->n_point++] = run->before->point[k];
-    pal_study_front(to);
+    pal_study_mark_front(to);
 }
 
 /* the file after every point: a kill loses the one that is under way */
@@ -337,7 +338,7 @@ static bool show(const char *what, double fraction, void *user)
     return !stop_asked;
 }
 
-static bool goes_on(void *user)
+static bool may_continue(void *user)
 {
     (void)user;
     return !stop_asked;
@@ -348,9 +349,9 @@ static pal_err open_journal(study_run *run, pal_diagnostic *diag)
 {
     const pal_study_file *f = run->file;
     char path[MOST_PATH + 4];
-    uint64_t of = pal_study_sum(0, f->shape, strlen(f->shape));
-    of = pal_study_sum(pal_study_sum(of, f->digest, strlen(f->digest)), f->loads, strlen(f->loads));
-    of = pal_study_sum(of, f->study.machine, strlen(f->study.machine));
+    uint64_t of = pal_study_digest(0, f->shape, strlen(f->shape));
+    of = pal_study_digest(pal_study_digest(of, f->digest, strlen(f->digest)), f->loads, strlen(f->loads));
+    of = pal_study_digest(of, f->study.machine, strlen(f->study.machine));
     snprintf(path, sizeof path, "%.*s.reference", PAL_STUDY_PATH, run->stem);
     return pal_study_journal_open(path, of, run->again, &run->journal, diag);
 }
@@ -361,15 +362,15 @@ static pal_err measure(study_run *run, pal_diagnostic *diag)
     char words[sizeof run->file->methods] = "", *save = NULL;
     pal_study *out = calloc(1, sizeof *out);
     pal_study_options o = {.body = run->input.body,
-                           .seconds = run->question.seconds,
-                           .quick = run->question.quick,
+                           .seconds = run->request.seconds,
+                           .quick = run->request.quick,
                            .samples = run->input.has_samples ? &run->input.samples : NULL,
                            .before = run->before,
                            .recall = recall,
                            .remember = remember,
                            .done = keep,
                            .progress = show,
-                           .goes_on = goes_on,
+                           .may_continue = may_continue,
                            .user = run};
     if (!out) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the study");
     pal_err opened = open_journal(run, diag);
@@ -390,7 +391,7 @@ static pal_err measure(study_run *run, pal_diagnostic *diag)
         err = run->kept;
         *diag = run->kept_note;
     } else if (err) {
-        pal_diagnostic_set(diag, err, "%s: %s", run->question.word, reason.text);
+        pal_diagnostic_set(diag, err, "%s: %s", run->request.word, reason.text);
     }
     run->file->n_finest = err ? run->file->n_finest : run->file->study.n_point;
     run->file->whole = !err;
@@ -413,12 +414,12 @@ static bool real_folder(const char *path, char out[PATH_MAX])
 static bool is_beside_source(const study_run *run, const char *path)
 {
     char own[PATH_MAX], other[PATH_MAX], source[MOST_PATH];
-    size_t n = strlen(run->question.word);
-    snprintf(source, sizeof source, "%s/scene.json", run->question.word);
+    size_t n = strlen(run->request.word);
+    snprintf(source, sizeof source, "%s/scene.json", run->request.word);
     bool folder = !access(source, F_OK);
-    bool json = n > 5 && !strcmp(run->question.word + n - 5, ".json");
+    bool json = n > 5 && !strcmp(run->request.word + n - 5, ".json");
     if (!folder && !json) return false;
-    return real_folder(path, own) && real_folder(folder ? source : run->question.word, other) && !strcmp(own, other);
+    return real_folder(path, own) && real_folder(folder ? source : run->request.word, other) && !strcmp(own, other);
 }
 
 /* "out.json" or a folder -> the file of the scene */
@@ -454,7 +455,7 @@ static pal_err copy_study(const study_run *run, const pal_scene *scene, pal_diag
 static pal_err write_scene(study_run *run, pal_diagnostic *diag)
 {
     const pal_study *study = &run->file->study;
-    const pal_measured_configuration *p = &study->point[run->picked].priced;
+    const pal_measured_configuration *p = &study->point[run->picked].measured;
     pal_configuration setting = p->setting;
     pal_configured_scene *set = NULL;
     pal_diagnostic reason = {""};
@@ -489,9 +490,9 @@ static pal_err pick_row(study_run *run, pal_diagnostic *diag)
                                   run->path, study->n_point);
     pal_study_order(study, order);
     const pal_study_point *p = &study->point[order[run->row - 1]];
-    if (p->err || !isfinite(p->priced.ms) || !isfinite(p->priced.error_m))
+    if (p->err || !isfinite(p->measured.ms) || !isfinite(p->measured.error_m))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--pick %d: %s was not measured: %s", run->row,
-                                  pal_configuration_text(&p->priced.setting, text),
+                                  pal_configuration_text(&p->measured.setting, text),
                                   p->reason[0] ? p->reason : pal_err_text(p->err));
     run->picked = order[run->row - 1];
     return run->scene ? write_scene(run, diag) : PAL_ERR_OK;
@@ -503,11 +504,11 @@ static pal_err answer(study_run *run, pal_diagnostic *diag)
     const pal_study *study = &run->file->study;
     const char *methods = run->methods ? run->methods : "";
     if (run->row) return pick_row(run, diag);
-    if (!(run->wish.within_m > 0) && !(run->wish.budget_ms > 0)) return PAL_ERR_OK;
-    run->picked = pal_study_serving(study, methods, &run->wish);
+    if (!(run->wish.max_error_m > 0) && !(run->wish.budget_ms > 0)) return PAL_ERR_OK;
+    run->picked = pal_study_pick_target(study, methods, &run->wish);
     if (run->picked >= 0) return run->scene ? write_scene(run, diag) : PAL_ERR_OK;
-    pal_study_none(study, methods, &run->wish, text, sizeof text);
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s", run->question.word, text);
+    pal_study_describe_miss(study, methods, &run->wish, text, sizeof text);
+    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s", run->request.word, text);
 }
 
 /* ---- saying ---- */
@@ -526,18 +527,18 @@ static int n_files(const study_run *run, char file[FILES][MOST_PATH])
 
 static void print(const study_run *run)
 {
-    char text[PAL_CONFIGURATION_TEXT], asked[80], off[PAL_STUDY_OFF], file[FILES][MOST_PATH];
+    char text[PAL_CONFIGURATION_TEXT], asked[80], off[PAL_STUDY_ERROR_TEXT], file[FILES][MOST_PATH];
     const pal_study *study = &run->file->study;
     if (run->n_before > 0) printf("%d of %d measured before\n", run->n_before, run->file->n_finest);
     /* of a study that is there already only the answer is news */
     if (run->picked < 0 || run->n_new > 0) pal_study_print(run->file, stdout);
     if (run->picked >= 0) {
         const pal_study_point *point = &study->point[run->picked];
-        const pal_measured_configuration *p = &point->priced;
-        pal_setting_wish_text(&run->wish, asked);
+        const pal_measured_configuration *p = &point->measured;
+        pal_accuracy_target_text(&run->wish, asked);
         if (run->row) snprintf(asked, sizeof asked, "row %d", run->row);
         printf("%s: %s, %s in %.3g ms%s%s\n", asked, pal_configuration_text(&p->setting, text),
-               pal_study_off_text(run->file, p->error_m, off), p->ms, point->reason[0] ? "; " : "", point->reason);
+               pal_study_error_text(run->file, p->error_m, off), p->ms, point->reason[0] ? "; " : "", point->reason);
     }
     int n = n_files(run, file);
     for (int k = 0; k < n; k++)
@@ -554,7 +555,7 @@ static cJSON *as_json(const study_run *run)
     cJSON_AddNumberToObject(o, "measured_before", run->n_before);
     cJSON_AddNumberToObject(o, "measured", run->n_new);
     if (run->picked >= 0) {
-        const pal_measured_configuration *p = &run->file->study.point[run->picked].priced;
+        const pal_measured_configuration *p = &run->file->study.point[run->picked].measured;
         cJSON *picked = cJSON_AddObjectToObject(o, "picked");
         cJSON_AddNumberToObject(picked, "point", run->picked);
         if (run->row) cJSON_AddNumberToObject(picked, "row", run->row);
@@ -582,11 +583,11 @@ static pal_err work(study_run *run, int argc, char **argv, pal_diagnostic *diag)
 {
     bool whole;
     if (run->scene) PAL_TRY(scene_path(run, diag));
-    PAL_TRY(pal_study_stem(run->question.word, run->folder, run->stem, diag));
+    PAL_TRY(pal_study_stem(run->request.word, run->folder, run->stem, diag));
     snprintf(run->path, sizeof run->path, "%s.json", run->stem);
     PAL_TRY(take_kept_loads(run, diag));
-    PAL_TRY(pal_study_input_open(&run->question, &run->input, diag));
-    pal_study_input_describe(&run->input, &run->question, run->file);
+    PAL_TRY(pal_study_input_open(&run->request, &run->input, diag));
+    pal_study_input_describe(&run->input, &run->request, run->file);
     snprintf(run->file->methods, sizeof run->file->methods, "%s", run->methods ? run->methods : "");
     pal_machine_name(run->file->study.machine);
     run->file->study.step_s = run->input.scene->step_s;
@@ -642,7 +643,7 @@ int command_study(int argc, char **argv)
     static study_run run;
     const char *within = NULL, *budget = NULL, *unit = NULL;
     pal_surface_scene surface = {.label = -1};
-    run = (study_run){.question = {.options = &surface}};
+    run = (study_run){.request = {.options = &surface}};
     const pal_flag flag[] = {
         {"--within", "LENGTH", PAL_FLAG_TEXT, &within, 0, 0,
          "names the cheapest setting whose error, with the reference's own, is no more: 1mm,\n300um"},
@@ -655,15 +656,15 @@ int command_study(int argc, char **argv)
          "writes that setting as a scene for palpate serve, a folder or FILE.json, and the\nstudy beside it"},
         {"--methods", "WORD[,WORD...]", PAL_FLAG_TEXT, &run.methods, 0, 0,
          "fem, tet_springs, adaptive_springs, subdivision_fem (all that fit the body)"},
-        {"--case", "ID", PAL_FLAG_TEXT, &run.question.load_case, 0, 0,
+        {"--case", "ID", PAL_FLAG_TEXT, &run.request.load_case, 0, 0,
          "load case of a problem, or one of its references, whose CSV is then the truth at\n"
          "rest (the first load case)"},
-        {"--body", "NAME", PAL_FLAG_TEXT, &run.question.body, 0, 0, "body of a scene (the first)"},
-        {"--reference", "FILE.csv", PAL_FLAG_TEXT, &run.question.samples, 0, 0,
+        {"--body", "NAME", PAL_FLAG_TEXT, &run.request.body, 0, 0, "body of a scene (the first)"},
+        {"--reference", "FILE.csv", PAL_FLAG_TEXT, &run.request.samples, 0, 0,
          "x,y,z,ux,uy,uz of the first load at rest, in place of finite elements of our own"},
-        {"--seconds", "S", PAL_FLAG_NUMBER, &run.question.seconds, 0.01, 60,
+        {"--seconds", "S", PAL_FLAG_NUMBER, &run.request.seconds, 0.01, 60,
          "how long the first load is followed (0.5)"},
-        {"--quick", NULL, PAL_FLAG_SWITCH, &run.question.quick, 0, 0,
+        {"--quick", NULL, PAL_FLAG_SWITCH, &run.request.quick, 0, 0,
          "few settings and a coarser reference, to see what comes out"},
         {"--out", "FOLDER", PAL_FLAG_TEXT, &run.folder, 0, 0, "where the study's files go (beside the scene)"},
         {"--again", NULL, PAL_FLAG_SWITCH, &run.again, 0, 0, "starts over in place of going on with what is there"},
@@ -675,7 +676,7 @@ int command_study(int argc, char **argv)
                                   .n_flag = sizeof flag / sizeof flag[0],
                                   .min_operand = 1,
                                   .max_operand = 1};
-    int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.question.word, &n);
+    int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.request.word, &n);
     if (code >= 0) return code;
     char sentence[240] = "";
     bool fine = take_words(&run, within, budget, sentence, sizeof sentence);

@@ -21,6 +21,6 @@ int command_replay(int argc, char **argv);
 int command_solve(int argc, char **argv);
 int command_calibrate(int argc, char **argv);
 int command_study(int argc, char **argv);
-int command_torture(int argc, char **argv);
+int command_robustness(int argc, char **argv);
 
 #endif

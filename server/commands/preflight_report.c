@@ -11,12 +11,12 @@ void pal_preflight_print(const pal_preflight *preflight, double measured_ms)
     printf("\npreflight\n");
     for (int b = 0; b < preflight->n_body; b++) {
         char line[PAL_PREFLIGHT_LINES][PAL_PREFLIGHT_LINE];
-        int n = pal_preflight_say(&preflight->body[b], line);
+        int n = pal_preflight_describe(&preflight->body[b], line);
         for (int k = 0; k < n; k++) printf("  %s: %s\n", preflight->body[b].name, line[k]);
     }
-    if (isfinite(preflight->foreseen_ms))
+    if (isfinite(preflight->predicted_ms))
         printf("  a step under load: %.3g ms foreseen from counts (README's machine), %.3g ms measured here at rest\n",
-               preflight->foreseen_ms, measured_ms);
+               preflight->predicted_ms, measured_ms);
 }
 
 static void add_number(cJSON *o, const char *key, double value)
@@ -24,7 +24,7 @@ static void add_number(cJSON *o, const char *key, double value)
     if (isfinite(value)) cJSON_AddNumberToObject(o, key, value);
 }
 
-static void add_weak(cJSON *o, const char *key, const pal_weak *weak)
+static void add_weak(cJSON *o, const char *key, const pal_weak_spot *weak)
 {
     cJSON *w = cJSON_AddObjectToObject(o, key);
     cJSON_AddNumberToObject(w, "count", weak->n);
@@ -37,7 +37,7 @@ static void add_weak(cJSON *o, const char *key, const pal_weak *weak)
 cJSON *pal_preflight_json(const pal_preflight *preflight)
 {
     cJSON *o = cJSON_CreateObject(), *list = cJSON_AddArrayToObject(o, "bodies");
-    add_number(o, "foreseen_ms", preflight->foreseen_ms);
+    add_number(o, "predicted_ms", preflight->predicted_ms);
     cJSON_AddNumberToObject(o, "world_bytes", (double)preflight->n_byte);
     for (int i = 0; i < preflight->n_body; i++) {
         const pal_preflight_body *b = &preflight->body[i];
@@ -46,7 +46,7 @@ cJSON *pal_preflight_json(const pal_preflight *preflight)
         cJSON_AddStringToObject(body, "name", b->name);
         cJSON_AddNumberToObject(body, "points", b->n_point);
         cJSON_AddNumberToObject(body, "elements", b->n_element);
-        cJSON_AddNumberToObject(body, "held", b->n_held);
+        cJSON_AddNumberToObject(body, "held", b->n_fixed);
         add_number(body, "limit_s", b->limit_s);
         cJSON_AddNumberToObject(body, "substeps", b->n_sub);
         if (b->limit_node >= 0) {
@@ -62,8 +62,8 @@ cJSON *pal_preflight_json(const pal_preflight *preflight)
         if (b->locks) cJSON_AddStringToObject(body, "locks", b->locks);
         if (b->locks) cJSON_AddStringToObject(body, "instead", b->instead);
         add_number(body, "condition", b->condition);
-        add_number(body, "slowest_s", b->slow_s);
-        add_number(body, "foreseen_ms", b->foreseen_ms);
+        add_number(body, "slowest_s", b->slowest_period_s);
+        add_number(body, "predicted_ms", b->predicted_ms);
     }
     return o;
 }

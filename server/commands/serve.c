@@ -41,12 +41,12 @@ typedef struct serve_run {
     pal_surface_scene surface; /* how bare surfaces are prepared */
     int n;
     pal_loaded_scene *scene[MOST_SESSIONS];
-    const char *word[MOST_SESSIONS];    /* as it was given; NULL: none                     */
-    pal_studied studied[MOST_SESSIONS]; /* in the setting that the scene asks for          */
+    const char *word[MOST_SESSIONS];          /* as it was given; NULL: none                     */
+    pal_studied_scene studied[MOST_SESSIONS]; /* in the setting that the scene asks for          */
     pal_preflight preflight[MOST_SESSIONS];
     pal_session *session[MOST_SESSIONS];
     const pal_measured_configuration *setting[MOST_SESSIONS]; /* what the server borrows of them */
-    int n_setting[MOST_SESSIONS], setting_body[MOST_SESSIONS];
+    int n_configuration[MOST_SESSIONS], setting_body[MOST_SESSIONS];
     double reference_m[MOST_SESSIONS];
     pal_server_gate *gate;
     pal_server *server;
@@ -125,11 +125,11 @@ static void make_unique(serve_run *run, int index)
 static pal_err open_studies(serve_run *run, pal_diagnostic *diag)
 {
     for (int i = 0; i < run->n; i++) {
-        pal_studied *s = &run->studied[i];
+        pal_studied_scene *s = &run->studied[i];
         const pal_scene *scene = &run->scene[i]->scene;
-        *s = (pal_studied){.scene = scene, .picked = -1};
+        *s = (pal_studied_scene){.scene = scene, .picked = -1};
         if (!run->word[i]) continue;
-        PAL_TRY(pal_studied_open(run->word[i], scene, s, diag));
+        PAL_TRY(pal_studied_scene_open(run->word[i], scene, s, diag));
         if (s->warn[0]) pal_log(PAL_LOG_WARN, "study", "%s", s->warn);
         if (s->said[0]) pal_log(PAL_LOG_INFO, "study", "%s", s->said);
     }
@@ -142,7 +142,7 @@ static pal_err open_sessions(serve_run *run, pal_diagnostic *diag)
     if (!(run->gate = pal_server_gate_create())) return PAL_ERR_MEMORY;
     for (int i = 0; i < run->n; i++) {
         const pal_scene *scene = run->studied[i].scene;
-        PAL_TRY(pal_preflight_look(scene, PAL_PREFLIGHT_QUICK, &run->preflight[i], diag));
+        PAL_TRY(pal_preflight_run(scene, PAL_PREFLIGHT_QUICK, &run->preflight[i], diag));
         pal_session_options options = {.wake = pal_server_gate_wake, .user = run->gate, .only_observed = true};
         snprintf(record, sizeof record, run->n > 1 ? "%s.%s" : "%s", run->config.record, scene->name);
         if (run->config.record[0]) options.record_path = record;
@@ -156,7 +156,7 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
     char folder[PATH_MAX + 32];
     for (int i = 0; i < run->n; i++) {
         run->setting[i] = run->studied[i].setting;
-        run->n_setting[i] = run->studied[i].n_setting;
+        run->n_configuration[i] = run->studied[i].n_configuration;
         run->setting_body[i] = run->studied[i].body;
         run->reference_m[i] = run->studied[i].file ? run->studied[i].file->study.reference_m : NAN;
     }
@@ -167,7 +167,7 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
                                   .error_m = run->config.error_m,
                                   .max_clients = run->config.max_clients,
                                   .setting = run->setting,
-                                  .n_setting = run->n_setting,
+                                  .n_configuration = run->n_configuration,
                                   .setting_body = run->setting_body,
                                   .reference_m = run->reference_m};
     PAL_TRY(pal_server_open(&options, run->session, run->n, diag, &run->server));
@@ -375,7 +375,7 @@ static void close_all(serve_run *run)
     pal_server_close(run->server);
     for (int i = 0; i < run->n; i++) pal_session_close(run->session[i]);
     pal_server_gate_destroy(run->gate);
-    for (int i = 0; i < run->n; i++) pal_studied_close(&run->studied[i]);
+    for (int i = 0; i < run->n; i++) pal_studied_scene_close(&run->studied[i]);
     for (int i = 0; i < run->n; i++) pal_scene_free(run->scene[i]);
 }
 

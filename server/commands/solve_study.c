@@ -12,11 +12,11 @@
 enum { PATH = 1200, WORDS = 400 };
 
 typedef struct series {
-    pal_convergence_point point[PAL_CONVERGENCE_MOST];
+    pal_convergence_point point[PAL_CONVERGENCE_MAX];
     int n;
 } series;
 
-static const char *const known[PAL_STUDY_ELEMENTS] = {"hex8_bbar", "hex8", "tet4", "tet10"};
+static const char *const known[PAL_SOLVE_STUDY_ELEMENTS] = {"hex8_bbar", "hex8", "tet4", "tet10"};
 
 static bool wrong(pal_diagnostic *diag, const char *flag, const char *word, const char *what)
 {
@@ -42,7 +42,7 @@ static bool add_element(char *word, pal_study_list *out, pal_diagnostic *diag)
     int limit = 1024;
     if (most) *most++ = 0;
     if (most && !read_resolution("--element", most, &limit, diag)) return false;
-    for (int k = 0; k < PAL_STUDY_ELEMENTS; k++) {
+    for (int k = 0; k < PAL_SOLVE_STUDY_ELEMENTS; k++) {
         if (strcmp(word, known[k])) continue;
         for (int j = 0; j < out->n_element; j++)
             if (out->element[j] == known[k]) return wrong(diag, "--element", word, "stands there twice");
@@ -58,7 +58,7 @@ static bool add_resolution(const char *word, pal_study_list *out, pal_diagnostic
     static const char flag[] = "--resolution";
     int n = 0, before = out->n_resolution > 0 ? out->resolution[out->n_resolution - 1] : 0;
     if (!read_resolution(flag, word, &n, diag)) return false;
-    if (out->n_resolution == PAL_CONVERGENCE_MOST) return wrong(diag, flag, word, "is the 17th, 16 is the most");
+    if (out->n_resolution == PAL_CONVERGENCE_MAX) return wrong(diag, flag, word, "is the 17th, 16 is the most");
     if (n <= before) return wrong(diag, flag, word, "does not come after a coarser one, wanted them ascending");
     out->resolution[out->n_resolution++] = n;
     return true;
@@ -73,7 +73,7 @@ static char *next_word(char **rest)
     return word;
 }
 
-bool pal_study_parse(const char *element, const char *resolution, pal_study_list *out, pal_diagnostic *diag)
+bool pal_solve_study_parse(const char *element, const char *resolution, pal_study_list *out, pal_diagnostic *diag)
 {
     char text[WORDS], *rest = text, *word;
     *out = (pal_study_list){0};
@@ -90,7 +90,7 @@ bool pal_study_parse(const char *element, const char *resolution, pal_study_list
 
 /* ---- work ---- */
 
-static pal_err solve_all(const pal_study_case *study, const pal_study_list *list, series *out, pal_diagnostic *diag)
+static pal_err solve_all(const pal_solve_study *study, const pal_study_list *list, series *out, pal_diagnostic *diag)
 {
     for (int e = 0; e < list->n_element; e++) {
         pal_solve_options options = *study->options;
@@ -109,7 +109,7 @@ static pal_err solve_all(const pal_study_case *study, const pal_study_list *list
 }
 
 /* the plotted error, per cent */
-static double error_of(const pal_study_case *study, const pal_convergence_point *p)
+static double error_of(const pal_solve_study *study, const pal_convergence_point *p)
 {
     return study->samples ? p->rms_percent : p->estimate_percent;
 }
@@ -122,11 +122,11 @@ static void seconds_path(const char *plot, char out[PATH])
 }
 
 /* over nodes, or over seconds */
-static pal_err draw(const pal_study_case *study, const pal_study_list *list, const series *all, bool seconds,
+static pal_err draw(const pal_solve_study *study, const pal_study_list *list, const series *all, bool seconds,
                     const char *path, pal_diagnostic *diag)
 {
-    enum { MOST = PAL_CONVERGENCE_MOST };
-    double x[PAL_STUDY_ELEMENTS][MOST], y[PAL_STUDY_ELEMENTS][MOST], guide_x[2] = {0}, guide_y[2] = {0};
+    enum { MOST = PAL_CONVERGENCE_MAX };
+    double x[PAL_SOLVE_STUDY_ELEMENTS][MOST], y[PAL_SOLVE_STUDY_ELEMENTS][MOST], guide_x[2] = {0}, guide_y[2] = {0};
     char title[220];
     const char *id = study->reference ? study->reference->id : study->load_case->id, *law = study->options->law;
     bool said = strstr(id, law) != NULL;
@@ -193,7 +193,7 @@ static void put_point(cJSON *table, const char *element, const pal_convergence_p
     cJSON_AddItemToArray(table, o);
 }
 
-static cJSON *as_json(const pal_study_case *study, const pal_study_list *list, const series *all,
+static cJSON *as_json(const pal_solve_study *study, const pal_study_list *list, const series *all,
                       const char *const file[2])
 {
     cJSON *o = cJSON_CreateObject();
@@ -221,7 +221,8 @@ static void print_cell(int width, const char *format, double number)
     printf(" %*s", width, text);
 }
 
-static void print(const pal_study_case *study, const pal_study_list *list, const series *all, const char *const file[2])
+static void print(const pal_solve_study *study, const pal_study_list *list, const series *all,
+                  const char *const file[2])
 {
     printf("%s, load case %s, %s", study->problem->name, study->load_case->id, study->options->law);
     if (study->samples)
@@ -248,9 +249,9 @@ static void print(const pal_study_case *study, const pal_study_list *list, const
     for (int k = 0; k < 2 && file[k]; k++) printf("wrote %s\n", file[k]);
 }
 
-int pal_study_run(const pal_flag_common *common, const pal_study_case *study, const pal_study_list *list)
+int pal_solve_study_run(const pal_flag_common *common, const pal_solve_study *study, const pal_study_list *list)
 {
-    series *all = calloc(PAL_STUDY_ELEMENTS, sizeof *all);
+    series *all = calloc(PAL_SOLVE_STUDY_ELEMENTS, sizeof *all);
     pal_diagnostic diag = {""};
     char second[PATH];
     const char *file[2] = {NULL, NULL};

@@ -5,17 +5,17 @@
 #include "server/cli/report.h"
 #include "server/solve/convergence.h"
 
-enum { PAL_STUDY_ELEMENTS = 4 };
+enum { PAL_SOLVE_STUDY_ELEMENTS = 4 };
 
 /* what the words of --element and --resolution name */
 typedef struct pal_study_list {
     int n_element, n_resolution;
-    const char *element[PAL_STUDY_ELEMENTS];
-    int most[PAL_STUDY_ELEMENTS]; /* of its resolutions */
-    int resolution[PAL_CONVERGENCE_MOST];
+    const char *element[PAL_SOLVE_STUDY_ELEMENTS];
+    int most[PAL_SOLVE_STUDY_ELEMENTS]; /* of its resolutions */
+    int resolution[PAL_CONVERGENCE_MAX];
 } pal_study_list;
 
-typedef struct pal_study_case {
+typedef struct pal_solve_study {
     const pal_problem *problem;
     const pal_problem_case *load_case;
     const pal_problem_reference *reference; /* NULL: none */
@@ -24,10 +24,10 @@ typedef struct pal_study_case {
     const pal_surface *surface;
     const pal_solve_options *options;
     const char *plot; /* NULL: none */
-} pal_study_case;
+} pal_solve_study;
 
 /* words like "hex8_bbar,tet10:8" and "8,16,32"; false: note says what is wrong with them */
-bool pal_study_parse(const char *element, const char *resolution, pal_study_list *out, pal_diagnostic *diag);
+bool pal_solve_study_parse(const char *element, const char *resolution, pal_study_list *out, pal_diagnostic *diag);
 /* solves all of it; what is said, in JSON or as a table; the result is the exit code */
-int pal_study_run(const pal_flag_common *common, const pal_study_case *study, const pal_study_list *list);
+int pal_solve_study_run(const pal_flag_common *common, const pal_solve_study *study, const pal_study_list *list);
 #endif

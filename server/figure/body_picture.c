@@ -543,7 +543,7 @@ static pal_err prepare(sheet *page)
         page->titled |= p->title && p->title[0];
         page->legend |= p->fixed || p->n_load > 0 || p->rest;
         PAL_TRY(copy_mesh(g));
-        PAL_TRY(pal_picture_mesh_settle(&g->mesh, &g->axes, PIECES_A_FILE / page->n));
+        PAL_TRY(pal_picture_mesh_prepare(&g->mesh, &g->axes, PIECES_A_FILE / page->n));
         PAL_TRY(pal_picture_pieces(&g->mesh, &g->axes, PIECES_A_FILE / page->n, &g->piece, &g->n_piece, &g->ghost,
                                    &g->n_ghost));
         page->legend |= g->grey && p->value;

@@ -178,7 +178,7 @@ static pal_err join_cells(pal_picture_mesh *m, const double low[3], double size)
     return PAL_ERR_OK;
 }
 
-pal_err pal_picture_mesh_settle(pal_picture_mesh *m, const pal_picture_axes *axes, int most)
+pal_err pal_picture_mesh_prepare(pal_picture_mesh *m, const pal_picture_axes *axes, int most)
 {
     PAL_TRY(find_closed(m));
     bool closed = m->closed;

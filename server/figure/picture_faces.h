@@ -33,7 +33,7 @@ typedef struct pal_picture_mesh {
 } pal_picture_mesh;
 void pal_picture_mesh_free(pal_picture_mesh *mesh);
 /* joins vertices within cells until at most `most` triangles can be seen; finds closed and turns what is inside out */
-pal_err pal_picture_mesh_settle(pal_picture_mesh *mesh, const pal_picture_axes *axes, int most);
+pal_err pal_picture_mesh_prepare(pal_picture_mesh *mesh, const pal_picture_axes *axes, int most);
 
 typedef struct pal_picture_piece { /* a part of a triangle, of one colour */
     double depth;                  /* along axes->eye, m                  */

@@ -335,7 +335,7 @@ pal_err pal_plot_text(const pal_plot *plot, char **text, size_t *n_byte, pal_dia
         draw_guides(to, plot, &x, &y, taken);
         for (int k = 0; k < plot->n_curve; k++) draw_curve(to, plot, k, &x, &y);
         draw_labels(to, plot, &x, &y, taken);
-        err = pal_svg_take(&svg, text, n_byte, diag);
+        err = pal_svg_end_text(&svg, text, n_byte, diag);
     }
     free(taken);
     return err;

@@ -21,7 +21,7 @@ pal_err pal_svg_begin(pal_svg *svg, double wide, double high, pal_diagnostic *di
     return PAL_ERR_OK;
 }
 
-pal_err pal_svg_take(pal_svg *svg, char **text, size_t *n_byte, pal_diagnostic *diag)
+pal_err pal_svg_end_text(pal_svg *svg, char **text, size_t *n_byte, pal_diagnostic *diag)
 {
     fputs("</svg>\n", svg->to);
     bool whole = !ferror(svg->to);
@@ -39,7 +39,7 @@ pal_err pal_svg_end(pal_svg *svg, const char *path, pal_diagnostic *diag)
     char *text = NULL;
     size_t n_byte = 0;
     pal_diagnostic reason = {""};
-    pal_err err = pal_svg_take(svg, &text, &n_byte, &reason);
+    pal_err err = pal_svg_end_text(svg, &text, &n_byte, &reason);
     if (err) return pal_diagnostic_set(diag, err, "%s: %s", path, reason.text);
     err = pal_file_write(path, text, n_byte, diag);
     free(text);

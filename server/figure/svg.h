@@ -17,7 +17,7 @@ typedef struct pal_svg {
 pal_err pal_svg_begin(pal_svg *svg, double wide, double high, pal_diagnostic *diag);
 pal_err pal_svg_end(pal_svg *svg, const char *path, pal_diagnostic *diag);
 /* ends it as text, which the caller frees; MEMORY */
-pal_err pal_svg_take(pal_svg *svg, char **text, size_t *n_byte, pal_diagnostic *diag);
+pal_err pal_svg_end_text(pal_svg *svg, char **text, size_t *n_byte, pal_diagnostic *diag);
 
 /* a text element; anchor: start, middle or end; more: further attributes, each after a blank; at most `most`
  * characters, then an ellipsis (0: all). NULL text is empty; bytes that are no shown UTF-8 become question marks */

@@ -104,8 +104,8 @@ void pal_hub_send_error(pal_hub *hub, pal_client *client, const char *code, cons
     va_end(args);
     memset(hub->control, 0, sizeof *hub->control);
     hub->control->type = PAL_CONTROL_ERROR;
-    pal_plain_text(hub->control->problem.code, sizeof hub->control->problem.code, code);
-    pal_plain_text(hub->control->problem.text, sizeof hub->control->problem.text, text);
+    pal_plain_text(hub->control->error.code, sizeof hub->control->error.code, code);
+    pal_plain_text(hub->control->error.text, sizeof hub->control->error.text, text);
     pal_hub_send(hub, client, hub->control);
 }
 
@@ -194,8 +194,8 @@ static pal_packet *status_message(pal_hub *hub, pal_client *c)
         w->paused = f->paused;
         if (isfinite(f->slowdown) && f->slowdown > 0) w->slowdown = f->slowdown;
         w->substeps = f->n_substep > 0 ? (uint32_t)f->n_substep : 0;
-        w->n_row = (uint32_t)f->n_row;
-        for (int r = 0; r < f->n_row; r++) w->row_ms[r] = s->row_ms[r];
+        w->n_component = (uint32_t)f->n_row;
+        for (int r = 0; r < f->n_row; r++) w->component_ms[r] = s->component_ms[r];
         pal_hub_status_plan(c->room, f, w);
         for (int p = 0; p < s->n_part; p++)
             if (s->part[p].places)
@@ -212,7 +212,7 @@ static pal_packet *status_message(pal_hub *hub, pal_client *c)
 static bool add_patch(pal_hub *hub, pal_client *c, int p)
 {
     const pal_stream_part *part = &c->room->stream->part[p];
-    if (!c->patches || !part->places || c->sent_change[p] == part->places->change) return true;
+    if (!c->topology_deltas || !part->places || c->sent_change[p] == part->places->change) return true;
     pal_packet *packet = part->frame_change[c->tier] == part->places->change
                              ? pal_triangle_slots_delta(part->places, c->sent_change[p])
                              : NULL;
@@ -450,9 +450,9 @@ pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_sessi
         room->reference_m = NAN;
         pal_members_init(&room->members, scene->n_tool);
         for (int b = 0; b < scene->n_body; b++) room->material[b] = scene->body[b].material;
-        if (options->setting && options->n_setting[i] > 0) {
+        if (options->setting && options->n_configuration[i] > 0) {
             room->setting = options->setting[i];
-            room->n_setting = options->n_setting[i], room->setting_body = options->setting_body[i];
+            room->n_configuration = options->n_configuration[i], room->setting_body = options->setting_body[i];
             if (options->reference_m) room->reference_m = options->reference_m[i];
         }
         err = pal_stream_open(session[i], options->error_m, diag, &room->stream);

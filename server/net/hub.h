@@ -19,7 +19,7 @@ typedef struct pal_hub_options {
     pal_site *site; /* borrowed; NULL: no files */
     /* settings of a study of each session's scene, as in pal_server_options; borrowed; NULL: none */
     const pal_measured_configuration *const *setting;
-    const int *n_setting, *setting_body;
+    const int *n_configuration, *setting_body;
     const double *reference_m; /* NULL: not known */
 } pal_hub_options;
 

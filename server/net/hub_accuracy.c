@@ -51,7 +51,7 @@ static void say_study(pal_hub *hub, pal_client *c, int body)
 {
     const pal_hub_room *room = c->room;
     pal_wire_study *study = &hub->control->study;
-    int n = room->setting_body == body ? room->n_setting : 0, n_front = 0;
+    int n = room->setting_body == body ? room->n_configuration : 0, n_front = 0;
     memset(hub->control, 0, sizeof *hub->control);
     hub->control->type = PAL_CONTROL_STUDY;
     pal_plain_text(study->body, sizeof study->body, room->stream->part[body].info.name);
@@ -66,7 +66,8 @@ static void say_study(pal_hub *hub, pal_client *c, int body)
         if (!isfinite(p->ms) || !isfinite(p->error_m) || (!p->front && room_left == 0)) continue;
         room_left -= !p->front;
         pal_wire_study_point *to = &study->point[study->n_point++];
-        *to = (pal_wire_study_point){.index = (uint32_t)i, .ms = p->ms, .error_m = p->error_m, .front = p->front};
+        *to = (pal_wire_study_point){
+            .index = (uint32_t)i, .cost_ms = p->ms, .error_m = p->error_m, .pareto_optimal = p->front};
         method_text(&p->setting, to->method);
         pal_plain_text(to->label, sizeof to->label, pal_configuration_text(&p->setting, text));
     }
@@ -104,7 +105,7 @@ static int likeness(const pal_configuration *of, const pal_configuration *now)
 static double point_of(const pal_hub_room *room, int body, const pal_configuration *now)
 {
     int best = -1, best_same = -1;
-    for (int i = 0; i < room->n_setting && room->setting_body == body; i++) {
+    for (int i = 0; i < room->n_configuration && room->setting_body == body; i++) {
         int n_same = likeness(&room->setting[i].setting, now);
         if (n_same > best_same) best = i, best_same = n_same;
     }
@@ -174,11 +175,11 @@ static void put_neighbour(const pal_hub_room *room, const pal_measured_configura
     bool step = s->step_s > 0 && fabs(s->step_s - now->step_s) > 1e-9;
     bool tolerance = s->tolerance > 0 && s->tolerance != now->tolerance;
     bool method = strcmp(s->model, now->model) || strcmp(s->element, now->element) || strcmp(s->law, now->law);
-    *to = (pal_wire_neighbour){.ms = price(room, from->ms, now->step_s), .error_m = known(from->error_m)};
+    *to = (pal_wire_neighbour){.cost_ms = price(room, from->ms, now->step_s), .error_m = known(from->error_m)};
     if (s->size > 0 && s->size != now->size) to->size = (uint32_t)s->size;
     if (step) to->step_ms = 1e3 * s->step_s;
     if (tolerance) to->tolerance = s->tolerance;
-    snprintf(to->knob, sizeof to->knob, "%s",
+    snprintf(to->parameter, sizeof to->parameter, "%s",
              method      ? "method"
              : to->size  ? "resolution"
              : step      ? "step"
@@ -193,8 +194,8 @@ static void put_estimate(const pal_hub_room *room, const pal_estimate *from, con
     to->tick = from->tick, to->age_s = from->age_s;
     to->time_s = isfinite(from->time_s) ? from->time_s : 0;
     to->estimate_ms = isfinite(from->estimate_ms) ? from->estimate_ms : 0;
-    if (isfinite(from->ms) && from->ms > 0) to->ms = price(room, from->ms, now->step_s);
-    to->max_m = known(from->max_m), to->error_m = known(from->error_m);
+    if (isfinite(from->ms) && from->ms > 0) to->cost_ms = price(room, from->ms, now->step_s);
+    to->max_displacement_m = known(from->max_m), to->error_m = known(from->error_m);
     to->discretisation_m = known(from->discretisation_m), to->algebraic_m = known(from->algebraic_m);
     to->time_m = known(from->time_m), to->model_m = known(from->model_m),
     to->energy_error_percent = known(from->energy_error_percent);
@@ -212,7 +213,7 @@ static void tell_far(pal_hub_room *room, const pal_wire_estimate *e)
     room->told_far = true;
     pal_log(PAL_LOG_WARN, "accuracy",
             "%s: the estimate is %.3g mm at %.3g mm moved, beyond the %.3g mm that the scene asks for", e->body,
-            1e3 * e->error_m, 1e3 * e->max_m, 1e3 * asked);
+            1e3 * e->error_m, 1e3 * e->max_displacement_m, 1e3 * asked);
 }
 
 pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *c)
@@ -229,15 +230,15 @@ pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *c)
     hub->control->type = PAL_CONTROL_ESTIMATE;
     pal_plain_text(out->body, sizeof out->body, c->room->stream->part[b].info.name);
     pal_configuration_of(pal_session_scene(c->room->session), b, &now);
-    pal_plain_text(out->setting, sizeof out->setting, pal_configuration_text(&now, text));
-    out->point = point_of(c->room, b, &now);
+    pal_plain_text(out->configuration, sizeof out->configuration, pal_configuration_text(&now, text));
+    out->study_point = point_of(c->room, b, &now);
     /* until there is an estimate; asleep a step costs nothing that a setting could be judged by */
     const pal_frame *f = c->room->stream->frame;
     bool awake = !f || b >= f->n_part || !f->part[b].asleep;
     bool known_ms = awake && c->room->stream->step_ms > 0;
-    out->ms = known_ms ? price(c->room, c->room->stream->step_ms, now.step_s) : NAN;
-    out->age_s = out->max_m = out->error_m = out->discretisation_m = out->algebraic_m = out->time_m = out->model_m =
-        out->energy_error_percent = NAN;
+    out->cost_ms = known_ms ? price(c->room, c->room->stream->step_ms, now.step_s) : NAN;
+    out->age_s = out->max_displacement_m = out->error_m = out->discretisation_m = out->algebraic_m = out->time_m =
+        out->model_m = out->energy_error_percent = NAN;
     if (pal_session_estimate(c->room->session, b, &estimate)) put_estimate(c->room, &estimate, &now, out);
     tell_far(c->room, out);
     return pal_hub_encode(hub, hub->control);
@@ -266,7 +267,7 @@ bool pal_hub_estimate_command(pal_hub *hub, pal_client *c, const pal_wire_comman
         pal_hub_send_error(hub, c, "target", "there is no body %s", order->target);
         return true;
     }
-    if (order->n_arg != 1 || strcmp(order->arg[0].key, "on")) {
+    if (order->n_arg != 1 || strcmp(order->arg[0].key, "enabled")) {
         pal_hub_send_error(hub, c, "args", "estimate takes on");
         return true;
     }

@@ -28,7 +28,7 @@ typedef struct pal_client {
     int n_out, out_begin;
     uint32_t out_cycle, sent_cycle;
     uint32_t sent_frame[PAL_BODY_MAX];  /* number of the frame of each part sent last */
-    bool patches;                       /* takes PATCH                                     */
+    bool topology_deltas;               /* takes PATCH                                     */
     uint32_t sent_change[PAL_BODY_MAX]; /* triangles that it has of each part, of pal_triangle_slots.change */
     uint8_t view[PAL_BODY_MAX];         /* pal_field looked at, of each part         */
     uint64_t sent_field[PAL_BODY_MAX];  /* number of the values sent last            */
@@ -65,8 +65,8 @@ typedef struct pal_hub_room {
     bool estimate_requested[PAL_BODY_MAX]; /* the session knows that some do */
     double step_s;                         /* of the scene as it was opened: what all prices are for */
     const pal_measured_configuration
-        *setting; /* what a study found, for body setting_body [n_setting]; NULL: no study */
-    int n_setting, setting_body;
+        *setting; /* what a study found, for body setting_body [n_configuration]; NULL: no study */
+    int n_configuration, setting_body;
     double reference_m; /* the study's reference's own error; NaN: not known */
     bool told_far;      /* that an estimate is beyond what the scene asks for */
     int tier_users[PAL_STREAM_TIER];

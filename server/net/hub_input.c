@@ -82,7 +82,7 @@ static void join(pal_hub *hub, pal_client *c, const pal_wire_join *wanted)
         return;
     }
     hub->count.n_joined++;
-    c->patches = wanted->patches;
+    c->topology_deltas = wanted->topology_deltas;
     pal_session_observe(room->session, true);
     if (room->tier_users[c->tier]++ == 0) pal_stream_begin_tier(room->stream, c->tier);
     /* hello says which tool was given; a refusal follows it */
@@ -186,17 +186,17 @@ static void control(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_
     case PAL_CONTROL_JOIN:
         join(hub, c, &in.join);
         break;
-    case PAL_CONTROL_TAKE:
+    case PAL_CONTROL_TAKE_TOOL:
         take(hub, c, in.tool);
         break;
-    case PAL_CONTROL_LEAVE:
+    case PAL_CONTROL_RELEASE_TOOL:
         leave(hub, c);
         break;
     case PAL_CONTROL_COMMAND:
-        command(hub, c, &in.order);
+        command(hub, c, &in.command);
         break;
-    case PAL_CONTROL_VIEW:
-        pal_hub_subscribe_field(hub, c, &in.view);
+    case PAL_CONTROL_SUBSCRIBE_FIELD:
+        pal_hub_subscribe_field(hub, c, &in.field_subscription);
         break;
     case PAL_CONTROL_PING:
         memset(hub->control, 0, sizeof *hub->control);

@@ -37,14 +37,14 @@ static uint32_t plan_rows(const pal_session *session, char (*name)[PAL_WIRE_NAME
 
 void pal_hub_hello_components(const pal_hub_room *room, pal_wire_hello *out)
 {
-    out->n_row = out->n_component_part = out->n_component_reason = out->n_component_required =
-        plan_rows(room->session, out->row, out->component_part, out->component_reason, out->component_required);
+    out->n_component = out->n_component_part = out->n_component_reason = out->n_component_required =
+        plan_rows(room->session, out->component, out->component_part, out->component_reason, out->component_required);
 }
 
 void pal_hub_topology_components(const pal_hub_room *room, pal_wire_topology *out)
 {
-    out->n_row = out->n_component_part = out->n_component_reason = out->n_component_required =
-        plan_rows(room->session, out->row, out->component_part, out->component_reason, out->component_required);
+    out->n_component = out->n_component_part = out->n_component_reason = out->n_component_required =
+        plan_rows(room->session, out->component, out->component_part, out->component_reason, out->component_required);
 }
 
 /* rows of the opened plan that are not in the running one have been switched off; others (fields, brushes) have come.
@@ -61,15 +61,15 @@ static void tell_rows(const pal_hub_room *room, const pal_frame *f, pal_wire_sta
         while (i < f->n_row && (strcmp(f->component_name[i], row.name) || f->component_body[i] != body)) i++;
         if (i < f->n_row) {
             at = i + 1, n_found++;
-        } else if (w->n_off < PAL_WIRE_COMPONENT_MAX) {
-            pal_plain_text(w->off[w->n_off].row, PAL_WIRE_NAME_BYTES, row.name);
-            w->off[w->n_off++].part = body < 0 ? 0 : (uint32_t)body;
+        } else if (w->n_disabled < PAL_WIRE_COMPONENT_MAX) {
+            pal_plain_text(w->disabled[w->n_disabled].component, PAL_WIRE_NAME_BYTES, row.name);
+            w->disabled[w->n_disabled++].part = body < 0 ? 0 : (uint32_t)body;
         }
     }
     /* as they are now, when that is not the plan of hello, or when hello spoke of a session that has been replaced */
     if (same && n_found == n) return;
     for (int r = 0; r < f->n_row; r++) {
-        pal_plain_text(w->row[w->n_component_name++], PAL_WIRE_NAME_BYTES, f->component_name[r]);
+        pal_plain_text(w->component[w->n_component_name++], PAL_WIRE_NAME_BYTES, f->component_name[r]);
         w->component_part[w->n_component_part++] = f->component_body[r];
     }
 }
@@ -149,7 +149,7 @@ void pal_hub_component_result(pal_hub *hub, pal_client *c)
     if (!c->component_until_ns || !f) return;
     bool refused = f->n_refused > c->component_refused;
     if (refused) pal_session_last_diagnostic(c->room->session, &diag);
-    if (diag.text[0]) pal_hub_send_error(hub, c, "refused", "row: %s", diag.text);
+    if (diag.text[0]) pal_hub_send_error(hub, c, "refused", "component: %s", diag.text);
     if (refused || pal_clock_ns() > c->component_until_ns) c->component_until_ns = 0;
 }
 
@@ -159,27 +159,27 @@ static void switch_row(pal_hub *hub, pal_client *c, const pal_wire_command *orde
     int on = -1;
     const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
     if (!m || m->role != PAL_MEMBER_INSTRUCTOR) {
-        pal_hub_send_error(hub, c, "role", "only an instructor switches rows");
+        pal_hub_send_error(hub, c, "role", "only an instructor enables and disables components");
         return;
     }
     for (uint32_t i = 0; i < order->n_arg; i++) {
         const pal_wire_arg *arg = &order->arg[i];
-        if (!strcmp(arg->key, "on")) on = arg->value != 0;
+        if (!strcmp(arg->key, "enabled")) on = arg->value != 0;
         if (!strcmp(arg->key, "part") && arg->value >= 0 && arg->value < c->room->stream->n_part)
             command.body = (int)arg->value;
     }
     if (order->n_arg != 2 || on < 0 || command.body < 0) {
-        pal_hub_send_error(hub, c, "args", "row takes part (0 to %d) and on", c->room->stream->n_part - 1);
+        pal_hub_send_error(hub, c, "args", "component takes part (0 to %d) and enabled", c->room->stream->n_part - 1);
         return;
     }
     if (strlen(order->target) >= sizeof command.row) {
-        pal_hub_send_error(hub, c, "target", "there is no row %s", order->target);
+        pal_hub_send_error(hub, c, "target", "there is no component %s", order->target);
         return;
     }
     command.wanted = on == 1;
     strcpy(command.row, order->target);
     note_asked(c);
-    give(hub, c, "row", &command);
+    give(hub, c, "component", &command);
 }
 
 bool pal_hub_plan_command(pal_hub *hub, pal_client *c, const pal_wire_command *order)
@@ -188,7 +188,7 @@ bool pal_hub_plan_command(pal_hub *hub, pal_client *c, const pal_wire_command *o
         reset_body(hub, c, order);
         return true;
     }
-    if (strcmp(order->verb, "row")) return false;
+    if (strcmp(order->verb, "component")) return false;
     switch_row(hub, c, order);
     return true;
 }

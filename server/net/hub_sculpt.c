@@ -21,16 +21,16 @@ static const struct verb {
              {"extrude", "x_m y_m z_m distance_m | scale", PAL_CELLS_EXTRUDE},
              {"merge", "x_m y_m z_m x2_m y2_m z2_m", PAL_CELLS_MERGE},
              {"bridge", "x_m y_m z_m x2_m y2_m z2_m", PAL_CELLS_BRIDGE},
-             {"sharpen", "x_m y_m z_m sharp what", PAL_CELLS_SHARPEN_VERTEX},
-             {"paint", "x_m y_m z_m radius_m | soft young_factor density_factor", -1},
-             {"keep", "", -1},
+             {"sharpen", "x_m y_m z_m sharpness entity", PAL_CELLS_SHARPEN_VERTEX},
+             {"paint", "x_m y_m z_m radius_m | softness young_factor density_factor", -1},
+             {"set_rest_shape", "", -1},
              {"cut", "nx ny nz offset_m", -1},
              {"uncut", "", -1},
              {"undo", "", -1},
              {"redo", "", -1},
              {"probe", "x_m y_m z_m", -1},
-             {"inflate", "x_m y_m z_m radius_m pressure_Pa | soft", -1},
-             {"curve", "x_m y_m z_m x2_m y2_m z2_m radius_m stiffness_N_m dx_m dy_m dz_m | soft", -1},
+             {"inflate", "x_m y_m z_m radius_m pressure_Pa | softness", -1},
+             {"curve", "x_m y_m z_m x2_m y2_m z2_m radius_m stiffness_N_m dx_m dy_m dz_m | softness", -1},
              {"release", "", -1},
              {NULL, NULL, -1}};
 
@@ -188,9 +188,9 @@ static bool read_edit(pal_hub *hub, pal_client *c, int body, const struct verb *
                                 .vertex = pal_sculptor_nearest_vertex(sculptor, a.face, a.rest_m),
                                 .distance_m = arg(order, "distance_m", 0),
                                 .scale = arg(order, "scale", 1),
-                                .sharp = (float)arg(order, "sharp", 0)};
+                                .sharp = (float)arg(order, "sharpness", 0)};
     if (v->kind != PAL_CELLS_SHARPEN_VERTEX) return true;
-    double what = arg(order, "what", 0);
+    double what = arg(order, "entity", 0);
     edit->kind = what == 0 ? PAL_CELLS_SHARPEN_VERTEX : what == 1 ? PAL_CELLS_SHARPEN_EDGE : PAL_CELLS_SHARPEN_FACE;
     if (what == 0 || what == 1 || what == 2) return true;
     pal_hub_send_error(hub, c, "args", "sharpen: what is %g, wanted 0 (vertex), 1 (edge) or 2 (face)", what);
@@ -212,7 +212,7 @@ static bool read_order(pal_hub *hub, pal_client *c, int body, const pal_wire_com
         pal_set3(to->cut_normal, arg(order, "nx", 0), arg(order, "ny", 0), arg(order, "nz", 0));
         to->cut_m = arg(order, "offset_m", 0) - frame_offset(c->room, body, to->cut_normal);
     }
-    if (!strcmp(v->name, "keep")) {
+    if (!strcmp(v->name, "set_rest_shape")) {
         to->kind = PAL_SCULPT_SET_REST;
         *point_m = points_now(c->room, body, &to->n_point);
         to->point_m = *point_m;
@@ -220,7 +220,7 @@ static bool read_order(pal_hub *hub, pal_client *c, int body, const pal_wire_com
     if (!strcmp(v->name, "paint")) {
         to->kind = PAL_SCULPT_PAINT;
         to->stroke = (pal_stroke){.radius_m = arg(order, "radius_m", 0),
-                                  .soft = arg(order, "soft", 0.5),
+                                  .soft = arg(order, "softness", 0.5),
                                   .young_factor = arg(order, "young_factor", 1),
                                   .density_factor = arg(order, "density_factor", 1)};
         if (!pick_first(hub, c, body, order, false, &a)) return false;
@@ -243,7 +243,7 @@ void pal_hub_sculpt_answer(pal_hub *hub, pal_client *c, const pal_job *work)
     pal_hub_answer_arg(a, "cells", n_cell);
     pal_hub_answer_arg(a, "can_undo", pal_sculptor_undo_count(sculptor));
     pal_hub_answer_arg(a, "can_redo", pal_sculptor_redo_count(sculptor));
-    pal_hub_answer_arg(a, "made_ms", 1e-6 * (double)(work->made_ns - work->asked_ns));
+    pal_hub_answer_arg(a, "prepare_ms", 1e-6 * (double)(work->made_ns - work->asked_ns));
     pal_hub_send(hub, c, hub->control);
 }
 
@@ -305,7 +305,7 @@ static void give_brush(pal_hub *hub, pal_client *c, int body, int tool, const pa
     pal_brush *b = &command.brush;
     const char *verb = order->verb;
     b->kind = verb[0] == 'i' ? PAL_BRUSH_INFLATE : verb[0] == 'c' ? PAL_BRUSH_CURVE : PAL_BRUSH_NONE;
-    b->radius_m = arg(order, "radius_m", 0), b->soft = arg(order, "soft", 0.5);
+    b->radius_m = arg(order, "radius_m", 0), b->soft = arg(order, "softness", 0.5);
     b->pressure_Pa = arg(order, "pressure_Pa", 0), b->stiffness_N_m = arg(order, "stiffness_N_m", 0);
     pal_set3(b->lift_m, arg(order, "dx_m", 0), arg(order, "dy_m", 0), arg(order, "dz_m", 0));
     if (b->kind != PAL_BRUSH_NONE && !place_brush(hub, c, body, order, &next, b)) return;

@@ -9,7 +9,7 @@
 
 static const struct verb {
     const char *name, *args;
-} verbs[] = {{"point", "index"}, {"knob", "| size step_ms tolerance"}, {NULL, NULL}};
+} verbs[] = {{"study_point", "index"}, {"configure", "| size step_ms tolerance"}, {NULL, NULL}};
 
 static const struct verb *find_verb(const char *name)
 {
@@ -35,12 +35,12 @@ static int read_point(pal_hub *hub, pal_client *c, int body, const pal_wire_comm
     const pal_hub_room *room = c->room;
     double index = pal_hub_arg(order, "index")->value;
     if (!room->setting || body != room->setting_body) {
-        pal_hub_send_error(hub, c, "refused", "point: there is no study of %s here",
+        pal_hub_send_error(hub, c, "refused", "study_point: there is no study of %s here",
                            pal_session_scene(room->session)->body[body].name);
         return -1;
     }
-    if (!(index >= 0 && index < room->n_setting && index == floor(index))) {
-        pal_hub_send_error(hub, c, "args", "point: index %g, wanted 0 to %d", index, room->n_setting - 1);
+    if (!(index >= 0 && index < room->n_configuration && index == floor(index))) {
+        pal_hub_send_error(hub, c, "args", "study_point: index %g, wanted 0 to %d", index, room->n_configuration - 1);
         return -1;
     }
     return (int)index;
@@ -53,14 +53,15 @@ static bool read_knob(pal_hub *hub, pal_client *c, int body, const pal_wire_comm
                        *tolerance = pal_hub_arg(order, "tolerance");
     pal_configuration_of(pal_session_scene(c->room->session), body, to);
     if (size && !(size->value >= -1 && size->value <= 10000 && size->value == floor(size->value))) {
-        pal_hub_send_error(hub, c, "args", "knob: size %g is no number of voxels or levels", size->value);
+        pal_hub_send_error(hub, c, "args", "configure: size %g is no number of voxels or levels", size->value);
         return false;
     }
     bool other = size && size->value != 0 && (int)size->value != to->size;
     if (other && to->k_distance_J > 0) {
-        pal_hub_send_error(hub, c, "refused",
-                           "knob: the springs are calibrated for %d voxels, and their constants hold for no other size",
-                           to->size);
+        pal_hub_send_error(
+            hub, c, "refused",
+            "configure: the springs are calibrated for %d voxels, and their constants hold for no other size",
+            to->size);
         return false;
     }
     if (other) to->size = (int)size->value;
@@ -72,7 +73,7 @@ static bool read_knob(pal_hub *hub, pal_client *c, int body, const pal_wire_comm
 bool pal_hub_switch_read(pal_hub *hub, pal_client *c, const pal_wire_command *order, pal_job *to, int *body)
 {
     const pal_scene *scene = pal_session_scene(c->room->session);
-    bool by_point = !strcmp(order->verb, "point");
+    bool by_point = !strcmp(order->verb, "study_point");
     *body = to->body = find_body(hub, c, order);
     if (*body < 0) return false;
     int point = by_point ? read_point(hub, c, *body, order) : -1;
@@ -105,9 +106,9 @@ static void put_jump(const pal_hub *hub, const pal_job *work, double change, pal
     pal_hub_answer_arg(a, "energy_before_J", r->energy_before_J);
     pal_hub_answer_arg(a, "energy_after_J", r->energy_after_J);
     pal_hub_answer_arg(a, "energy_percent", change);
-    pal_hub_answer_arg(a, "most_move_m", r->max_move_m);
-    pal_hub_answer_arg(a, "body_move_m", r->body_move_m);
-    pal_hub_answer_arg(a, "frame_move_m", r->frame_move_m);
+    pal_hub_answer_arg(a, "max_move_m", r->max_move_m);
+    pal_hub_answer_arg(a, "max_body_move_m", r->body_move_m);
+    pal_hub_answer_arg(a, "max_frame_move_m", r->frame_move_m);
     if (isnan(bound_m)) return;
     pal_hub_answer_arg(a, "error_before_m", work->now_m);
     pal_hub_answer_arg(a, "error_after_m", work->then_m);
@@ -135,9 +136,9 @@ void pal_hub_switch_answer(pal_hub *hub, pal_client *c, const pal_job *work)
         size_t n = strlen(a->text);
         snprintf(a->text + n, sizeof a->text - n, "; brushes that ended: %d", hub->jobs->n_brush_over);
     }
-    pal_hub_answer_arg(a, "brushes_over", hub->jobs->n_brush_over);
-    pal_hub_answer_arg(a, "made_ms", made_ms);
-    pal_hub_answer_arg(a, "stood_ms", stood_ms);
+    pal_hub_answer_arg(a, "brushes_ended", hub->jobs->n_brush_over);
+    pal_hub_answer_arg(a, "prepare_ms", made_ms);
+    pal_hub_answer_arg(a, "pause_ms", stood_ms);
     pal_hub_send(hub, c, hub->control);
 }
 

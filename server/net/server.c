@@ -105,7 +105,8 @@ static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_
     PAL_TRY(make_url(options, url, sizeof url, diag));
     if (options->viewer_folder) PAL_TRY(pal_site_open(options->viewer_folder, diag, &s->site));
     hub.site = s->site;
-    hub.setting = options->setting, hub.n_setting = options->n_setting, hub.setting_body = options->setting_body;
+    hub.setting = options->setting, hub.n_configuration = options->n_configuration,
+    hub.setting_body = options->setting_body;
     hub.reference_m = options->reference_m;
     /* besides the clients: page loads, and what lws needs itself */
     PAL_TRY(pal_loop_create(s->road == &pal_ws_transport, hub.max_clients + 128, diag, &s->loop));

@@ -16,9 +16,9 @@ typedef struct pal_server_options {
     int max_clients;           /* 0: 200                                                                    */
     const char *road;          /* "ws" (default) or "mem" (tests)                                           */
     /* what a study of each session's scene found, for those who pick a point of it live: lists by ascending ms and the
-     * body they are of, in the order of the sessions; borrowed until close. NULL, or n_setting 0: no study */
-    const pal_measured_configuration *const *setting; /* [n_session][n_setting] */
-    const int *n_setting, *setting_body;              /* [n_session]            */
+     * body they are of, in the order of the sessions; borrowed until close. NULL, or n_configuration 0: no study */
+    const pal_measured_configuration *const *setting; /* [n_session][n_configuration] */
+    const int *n_configuration, *setting_body;        /* [n_session]            */
     const double *reference_m; /* error of each study's own reference [n_session]; NULL: not known */
 } pal_server_options;
 

@@ -157,7 +157,7 @@ void pal_stream_transfer(pal_stream *stream, const pal_stream *before)
     struct pal_stream_coder *coder = stream->coder;
     stream->cycle = before->cycle, stream->cycle_ns = before->cycle_ns;
     stream->step_ms = before->step_ms, stream->step_rate_hz = before->step_rate_hz;
-    memcpy(stream->row_ms, before->row_ms, sizeof stream->row_ms);
+    memcpy(stream->component_ms, before->component_ms, sizeof stream->component_ms);
     stream->count = before->count;
     coder->haptic_seq = before->coder->haptic_seq, coder->field_seq = before->coder->field_seq;
     coder->rate_tick = before->coder->rate_tick, coder->rate_ns = before->coder->rate_ns;
@@ -357,12 +357,12 @@ bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_
     put_tools(stream, tool);
     for (int i = 0; i < frame->n_tool; i++) put_haptic(stream, i, &tool[i]);
     /* rows have come or gone, so the places mean others */
-    if (frame->n_row != stream->coder->n_row) memset(stream->row_ms, 0, sizeof stream->row_ms);
+    if (frame->n_row != stream->coder->n_row) memset(stream->component_ms, 0, sizeof stream->component_ms);
     stream->coder->n_row = frame->n_row;
     for (int r = 0; r < frame->n_row; r++) {
-        stream->row_ms[r] += 0.2 * (frame->component_ns[r] * 1e-6 - stream->row_ms[r]);
+        stream->component_ms[r] += 0.2 * (frame->component_ns[r] * 1e-6 - stream->component_ms[r]);
         /* less than the clock's tick is what is left of a mean of nothing */
-        if (stream->row_ms[r] < 1e-6) stream->row_ms[r] = 0;
+        if (stream->component_ms[r] < 1e-6) stream->component_ms[r] = 0;
     }
     stream->step_ms += 0.2 * ((double)frame->step_ns * 1e-6 - stream->step_ms);
     return true;

@@ -51,7 +51,7 @@ typedef struct pal_stream {
     double box_min_m[3], box_max_m[3];
     double error_m;
     /* smoothed figures for status */
-    double row_ms[PAL_FRAME_COMPONENT_MAX], step_ms, step_rate_hz;
+    double component_ms[PAL_FRAME_COMPONENT_MAX], step_ms, step_rate_hz;
     pal_stream_count count;
     struct pal_stream_coder *coder; /* encoders and their buffer */
 } pal_stream;

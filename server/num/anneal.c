@@ -1,5 +1,5 @@
-/* Adaptive simulated annealing. The walk is a sequence of evaluations numbered from 0; number g has a key of its own,
- * of which counter 0 decides whether the point is accepted and the others draw its values. */
+/* Adaptive simulated annealing. The walk is a sequence of evaluations numbered from 0. Number g has a random key of its
+ * own, of which counter 0 decides acceptance and the others draw the values. */
 #include "server/num/anneal.h"
 
 #include "server/num/random.h"
@@ -10,7 +10,7 @@
 #include <string.h>
 
 static const double COLDEST = 1e-18; /* least T/T0 of the acceptance */
-enum { MOST_DRAW = 100 };
+enum { MAX_DRAW = 100 };
 
 typedef struct walk {
     const pal_anneal_options *o;
@@ -85,7 +85,7 @@ static uint64_t key_of(const walk *w, int64_t number)
     return pal_random_bits(w->o->seed, (uint64_t)number);
 }
 
-static double anywhere(const walk *w, int i, double u)
+static double uniform_point(const walk *w, int i, double u)
 {
     double low = w->o->low[i], high = w->o->high[i];
     return fmin(high, fmax(low, low + u * (high - low)));
@@ -94,16 +94,16 @@ static double anywhere(const walk *w, int i, double u)
 static void draw_sample(const walk *w, int64_t number, double *p)
 {
     uint64_t key = key_of(w, number);
-    for (int i = 0; i < w->n; i++) p[i] = anywhere(w, i, pal_random_unit(key, (uint64_t)i + 1));
+    for (int i = 0; i < w->n; i++) p[i] = uniform_point(w, i, pal_random_unit(key, (uint64_t)i + 1));
 }
 
-/* the count of parameter i after the candidates so far and `ahead` others: one sum, the same for every batch */
+/* the count of parameter i after the candidates so far and `ahead` more: one sum, the same for every batch size */
 static double count_at(const walk *w, int i, int ahead)
 {
     return w->k[i] + (double)(w->since_generated + ahead);
 }
 
-/* a candidate from the last accepted point, when `ahead` others come before it */
+/* a candidate from the last accepted point, with `ahead` candidates before it */
 static void draw_candidate(const walk *w, int64_t number, int ahead, double *p)
 {
     const pal_anneal_options *o = w->o;
@@ -113,8 +113,8 @@ static void draw_candidate(const walk *w, int64_t number, int ahead, double *p)
         double t = cool(c, w->n, count_at(w, i, ahead), o->min_temperature_ratio), range = o->high[i] - o->low[i];
         int draw = 0;
         do p[i] = w->last[i] + range * pal_anneal_jump(t, pal_random_unit(key, counter++));
-        while (!(p[i] >= o->low[i] && p[i] <= o->high[i]) && ++draw < MOST_DRAW);
-        if (draw == MOST_DRAW) p[i] = anywhere(w, i, pal_random_unit(key, counter++));
+        while (!(p[i] >= o->low[i] && p[i] <= o->high[i]) && ++draw < MAX_DRAW);
+        if (draw == MAX_DRAW) p[i] = uniform_point(w, i, pal_random_unit(key, counter++));
     }
 }
 
@@ -129,7 +129,7 @@ static pal_err evaluate(walk *w, int m)
     return PAL_ERR_OK;
 }
 
-/* how many of m evaluations the limit still allows */
+/* number of m evaluations that the limit still allows */
 static int allowed(const walk *w, int64_t m)
 {
     int64_t left = w->o->max_evaluation > 0 ? w->o->max_evaluation - w->r->n_evaluation : INT64_MAX;
@@ -137,8 +137,8 @@ static int allowed(const walk *w, int64_t m)
     return (int)(m < left ? m : left);
 }
 
-/* enters point j of the batch into the walk: its best, its ends, and the caller's view */
-static void enter(walk *w, int j, pal_anneal_step step)
+/* records point j of the batch as an evaluation of the walk: the best point, the stopping criteria, the callback */
+static void record(walk *w, int j, pal_anneal_step step)
 {
     const pal_anneal_options *o = w->o;
     pal_anneal_result *r = w->r;
@@ -158,13 +158,13 @@ static void enter(walk *w, int j, pal_anneal_step step)
     if (o->step && !o->step(o->user, &step)) w->ended = true;
     if (o->max_evaluation > 0 && r->n_evaluation >= o->max_evaluation) w->ended = true;
     if (o->enough > -DBL_MAX && r->best <= o->enough) w->ended = true;
-    /* samples never stall the walk, unless none has a value */
+    /* samples never count as a stall, unless none has a value */
     bool sampling = step.start && (r->best < DBL_MAX || r->n_evaluation - (o->first != NULL) < o->n_start);
     if (o->stall > 0 && w->since_better >= o->stall && !sampling) w->ended = true;
 }
 
-/* takes cost j as the first point when it is the best so far, and into the mean of T0 when it is a sample's */
-static void enter_start(walk *w, int j, bool sample)
+/* takes cost j as the first point when it is the best so far, and into the mean of T0_acc when it is a sample */
+static void record_start(walk *w, int j, bool sample)
 {
     double cost = w->cost[j];
     if (sample && cost < DBL_MAX && w->sum_temper[1] < w->o->n_temperature_sample) {
@@ -175,7 +175,7 @@ static void enter_start(walk *w, int j, bool sample)
         w->last_cost = cost;
         memcpy(w->last, w->p + (size_t)j * (size_t)w->n, sizeof(double) * (size_t)w->n);
     }
-    enter(w, j, (pal_anneal_step){.start = true});
+    record(w, j, (pal_anneal_step){.start = true});
 }
 
 static pal_err start(walk *w)
@@ -184,14 +184,14 @@ static pal_err start(walk *w)
     if (o->first) {
         memcpy(w->p, w->best, sizeof(double) * (size_t)w->n);
         PAL_TRY(evaluate(w, 1));
-        enter_start(w, 0, false);
+        record_start(w, 0, false);
     }
     for (int64_t sample = 0; !w->ended && (sample < o->n_start || w->last_cost == DBL_MAX);) {
         int m = allowed(w, sample < o->n_start ? o->n_start - sample : w->n_batch);
         for (int j = 0; j < m; j++) draw_sample(w, w->r->n_evaluation + j, w->p + (size_t)j * (size_t)w->n);
         PAL_TRY(evaluate(w, m));
         for (int j = 0; j < m && !w->ended; j++) {
-            enter_start(w, j, true);
+            record_start(w, j, true);
             sample++;
             /* beyond n_start the first value ends the sampling */
             if (sample >= o->n_start && w->last_cost < DBL_MAX) break;
@@ -221,7 +221,7 @@ static pal_err probe(walk *w)
         for (int j = 0; j < m && !w->ended; j++) {
             double s = fabs(w->cost[j] - centre_cost);
             if (w->cost[j] < DBL_MAX && isfinite(s)) w->sensitivity[i + j] = s;
-            enter(w, j, (pal_anneal_step){.probe = true});
+            record(w, j, (pal_anneal_step){.probe = true});
         }
         i += m;
     }
@@ -231,15 +231,15 @@ static pal_err probe(walk *w)
 static pal_err reanneal(walk *w)
 {
     const double c = rate(w->o), min_temperature_ratio = w->o->min_temperature_ratio;
-    double t = acceptance_temperature(w), most = 0;
+    double t = acceptance_temperature(w), max = 0;
     for (int i = 0; i < w->n; i++) w->k[i] = count_at(w, i, 0);
     w->since_accepted = w->since_generated = 0;
     PAL_TRY(probe(w));
     if (w->ended) return PAL_ERR_OK;
-    for (int i = 0; i < w->n; i++) most = fmax(most, w->sensitivity[i]);
+    for (int i = 0; i < w->n; i++) max = fmax(max, w->sensitivity[i]);
     for (int i = 0; i < w->n; i++)
         if (w->sensitivity[i] > 0)
-            w->k[i] = count_of(c, w->n, cool(c, w->n, w->k[i], min_temperature_ratio) * (most / w->sensitivity[i]),
+            w->k[i] = count_of(c, w->n, cool(c, w->n, w->k[i], min_temperature_ratio) * (max / w->sensitivity[i]),
                                min_temperature_ratio);
     double last = w->last_cost, best = w->r->best, apart = fabs(last - best);
     w->t0 = fmin(w->t0, fmax(fmax(fabs(last), fabs(best)), apart));
@@ -275,7 +275,7 @@ static pal_err advance(walk *w)
             w->last_cost = w->cost[j];
             memcpy(w->last, w->p + (size_t)j * (size_t)w->n, sizeof(double) * (size_t)w->n);
         }
-        enter(w, j, (pal_anneal_step){.accepted = accepted});
+        record(w, j, (pal_anneal_step){.accepted = accepted});
     }
     bool due = (o->reanneal_accepted > 0 && w->since_accepted >= o->reanneal_accepted) ||
                (o->reanneal_generated > 0 && w->since_generated >= o->reanneal_generated);
@@ -329,7 +329,7 @@ static pal_err check_numbers(const pal_anneal_options *o, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
-static pal_err go(walk *w)
+static pal_err run_walk(walk *w)
 {
     PAL_TRY(start(w));
     if (w->r->best == DBL_MAX)
@@ -361,7 +361,7 @@ pal_err pal_anneal(const pal_anneal_options *options, double *best_p, pal_anneal
         w.sensitivity = memory + 3 * n;
         w.p = memory + 5 * n;
         for (int i = 0; i < w.n; i++) w.best[i] = o->first ? o->first[i] : 0.5 * o->low[i] + 0.5 * o->high[i];
-        err = go(&w);
+        err = run_walk(&w);
         memcpy(best_p, w.best, sizeof(double) * n);
         result->temperature = result->best < DBL_MAX ? acceptance_temperature(&w) : 0;
     }

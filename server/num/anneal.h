@@ -1,29 +1,30 @@
-/* Adaptive simulated annealing (Ingber 1989, 1995; paper B 3.2): minimises a cost over a box, with a temperature for
- * each parameter that sinks with its own count and is stretched anew by the cost's sensitivities (re-annealing).
+/* Adaptive simulated annealing (Ingber 1989, 1995; paper B section 3.2): minimises a cost over a box. Each parameter
+ * has a temperature, which falls with its own count of candidates and is rescaled by the sensitivities of the cost (re-
+ * annealing).
  *
- * Schedule (numerics.md 1 B): c = -ln(1e-5) exp(-ln(100)/D), T_i(k) = T0_i exp(-c k_i^(1/D)), T0_i = 1, new value
- * p_i + y (high_i - low_i) with y = sgn(u - 1/2) T_i ((1 + 1/T_i)^|2u - 1| - 1), drawn again until it lies in the box
- * (after 100 draws: anywhere in it); accepted when u < exp(-(E_new - E_last)/T_acc). Begins with n_start random
- * samples, of which the best is the first point, and goes on with samples until one has a value; T0_acc is the mean
- * |cost| of the first n_temperature_sample good samples, T_acc sinks by the same law with the count of accepted points.
- * Costs that are not finite or are DBL_MAX never enter a mean or a difference; they are never accepted.
+ * Schedule, for D parameters: c = -ln(1e-5) exp(-ln(100)/D), T_i(k) = T0_i exp(-c k_i^(1/D)), T0_i = 1. New value p_i +
+ * y (high_i - low_i) with y = sgn(u - 1/2) T_i ((1 + 1/T_i)^|2u - 1| - 1), drawn again until it lies in the box (after
+ * 100 draws: uniformly in the box); accepted when u < exp(-(E_new - E_last)/T_acc). The walk begins with n_start random
+ * samples, of which the best is the first point, and continues with samples until one has a value. T0_acc is the mean
+ * |cost| of the first n_temperature_sample samples with a value; T_acc falls by the same law with the count of accepted
+ * points. Costs that are not finite or are DBL_MAX never enter a mean or a difference and are never accepted.
  *
  * Re-annealing: s_i = |difference of the cost| for a step of parameter i, as a fraction of its range, from the best
- * point; T_i <- T_i s_max/s_i, at most T0_i, and k_i from it; a parameter whose s_i is 0 or has no value keeps its
+ * point; T_i <- T_i s_max/s_i, at most T0_i, and k_i from it. A parameter whose s_i is 0 or has no value keeps its
  * temperature. T0_acc <- min(T0_acc, max(|last|, |best|, |last - best|)), T_acc <- min(max(|last - best|, T_acc),
  * T0_acc), and its count from it.
  *
- * Departures: a parameter's temperature stays at `coldest`, where Ingber's program ends, for its law leaves T = 1e-5
- * after 100 candidates and soon draws steps of no size. 1e-10 finds the minima of Rastrigin and Corana as fast as none;
- * a smooth bent valley wants 1e-6 (Rosenbrock, 15,000 evaluations, the worst of 21 walks: 4e-3 with 1e-10, 6e-7 with
- * 1e-6, 4e-2 with 1e-18). Differences are evaluations of the walk and may be the best point. All is in fractions of
- * the ranges, so that a change of units changes nothing.
+ * Departures: the temperature of a parameter stays at min_temperature_ratio, where Ingber's program ends, because its
+ * law leaves T = 1e-5 after 100 candidates and soon draws steps of size zero. 1e-10 finds the minima of Rastrigin and
+ * Corana as fast as no bound; a smooth bent valley needs 1e-6 (Rosenbrock, 15,000 evaluations, the worst of 21 walks:
+ * 4e-3 with 1e-10, 6e-7 with 1e-6, 4e-2 with 1e-18). Differences are evaluations of the walk and may become the best
+ * point. All numbers are fractions of the ranges, so that a change of units changes nothing.
  *
- * Candidates are evaluated in batches, side by side. Candidate number g takes its random numbers from (seed, g) and the
- * last accepted point; when one of a batch is accepted, those after it are thrown away and drawn again from the new
- * point. The walk is therefore that of the serial method, number by number, whatever the size of a batch. A batch as
- * large as the team that evaluates it wastes no time; a larger one does while many points are accepted.
- * Heap while it runs; thread: [load]. */
+ * Candidates are evaluated in batches, in parallel. Candidate number g takes its random numbers from (seed, g) and the
+ * last accepted point; when one of a batch is accepted, those after it are discarded and drawn again from the new
+ * point. The walk is therefore that of the serial method, number by number, for any batch size. A batch as large as the
+ * team that evaluates it wastes no time; a larger one does while many points are accepted. Uses the heap while it runs;
+ * thread: [load]. */
 #ifndef PAL_NUM_ANNEAL_H
 #define PAL_NUM_ANNEAL_H
 #include "server/base/err.h"
@@ -38,7 +39,7 @@ typedef struct pal_anneal_step {
     int64_t generation; /* counted from 0: first, the samples, candidates and differences */
     double cost;        /* DBL_MAX: no value                                              */
     double best;        /* the least so far; DBL_MAX: none yet                            */
-    bool accepted;      /* a candidate from which the walk goes on                        */
+    bool accepted;      /* the walk continues from this candidate */
     bool improved;      /* better than all before                                         */
     bool start, probe;  /* start: first or a sample; probe: a difference of re-annealing  */
     const double *p;    /* [n_parameter], borrowed                                        */
@@ -51,17 +52,17 @@ typedef struct pal_anneal_options {
     uint64_t seed;
     int n_start;                  /* 100; may be 0                                                 */
     int n_temperature_sample;     /* 5                                                             */
-    int n_batch;                  /* candidates evaluated at once, to PAL_ANNEAL_MAX_BATCH: 8     */
+    int n_batch;                  /* candidates of a batch, to PAL_ANNEAL_MAX_BATCH: 8 */
     int64_t max_evaluation;       /* of the walk; <= 0: no limit                                   */
     double ratio_scale;           /* 1e-5: Temperature_Ratio_Scale, in (0, 1)                      */
     double anneal_scale;          /* 100: Temperature_Anneal_Scale, > 0                            */
     double cost_scale;            /* 1: Cost_Parameter_Scale_Ratio, > 0                            */
     int reanneal_accepted;        /* points accepted since the last re-annealing: 100; 0: never    */
     int reanneal_generated;       /* candidates since then: 10000; 0: never                        */
-    double min_temperature_ratio; /* 1e-10: least T/T0 of a parameter, in (0, 1)                   */
+    double min_temperature_ratio; /* 1e-10: minimum T/T0 of a parameter, in (0, 1) */
     double difference;            /* 1e-3 of the range, in (0, 0.5]: step of the sensitivities     */
     double enough;                /* ends when the best cost is at most this; -DBL_MAX: never      */
-    int64_t stall; /* ends after so many evaluations without a better one, counted from the last sample, or from the
+    int64_t stall; /* ends after this many evaluations without a better one, counted from the last sample, or from the
                       beginning while no point has a value; 0: never */
     /* cost[i] of point p + i n_parameter for n <= n_batch points at once; DBL_MAX, not finite or not written: no
      * value. An error ends the walk */
@@ -74,7 +75,7 @@ typedef struct pal_anneal_options {
 typedef struct pal_anneal_result {
     double best;          /* DBL_MAX: no sample had a value                    */
     int64_t n_evaluation; /* of the walk                                       */
-    int64_t n_spent;      /* those thrown away included                        */
+    int64_t n_spent;      /* discarded ones included */
     int64_t n_accepted;   /* candidates                                        */
     int64_t n_failed;     /* of the walk, without a value                      */
     int64_t n_reanneal;
@@ -82,14 +83,14 @@ typedef struct pal_anneal_result {
 } pal_anneal_result;
 
 void pal_anneal_default(pal_anneal_options *options); /* the numbers above; everything else zero */
-/* exp(-c k^(1/D)), not below coldest: T/T0 of a parameter after k candidates; thread: any */
+/* exp(-c k^(1/D)), not below min_temperature_ratio: T/T0 of a parameter after k candidates; thread: any */
 double pal_anneal_temperature_ratio(const pal_anneal_options *options, double k);
 /* y of the schedule for a uniform u in (0, 1) at temperature T in (0, 1]; thread: any */
 double pal_anneal_jump(double temperature, double u);
 
-/* best_p [n_parameter] and *result hold the best so far also after an error; without any value best_p is first or the
- * middle of the box. REFUSED, nothing evaluated, best_p as it was: a box that is none, a first point outside of it,
- * numbers outside of the ranges above, or a walk that nothing could end; NUMERIC: the walk ended before any point had
- * a value; MEMORY; what evaluate gives */
+/* best_p [n_parameter] and *result hold the best so far also after an error; without any value best_p is `first` or the
+ * middle of the box. REFUSED, nothing evaluated, best_p unchanged: an empty box, a first point outside of it, numbers
+ * outside of the ranges above, or a walk that nothing could end; NUMERIC: the walk ended before any point had a value;
+ * MEMORY; errors of evaluate */
 pal_err pal_anneal(const pal_anneal_options *options, double *best_p, pal_anneal_result *result, pal_diagnostic *diag);
 #endif

@@ -1,5 +1,5 @@
-/* Symmetric sparse matrices of 3x3 blocks: the lower triangle by block columns, as stiffness and mass of n points with
- * three unknowns each have it. The pattern is made once per topology, the values are rewritten. Memory: the caller's
+/* Symmetric sparse matrices of 3x3 blocks, such as stiffness and mass of n points with three unknowns each: the lower
+ * triangle by block columns. The pattern is made once per topology, the values are rewritten. Memory: the caller's
  * arena. Thread: [load] to make, then one thread at a time. */
 #ifndef PAL_NUM_BLOCK_MATRIX_H
 #define PAL_NUM_BLOCK_MATRIX_H
@@ -14,7 +14,7 @@ typedef struct pal_block_matrix {
     double *value;  /* A(3 row + r, 3 column + c) at [9 block + 3 r + c]     [start[n]][9]         */
 } pal_block_matrix;
 
-/* points that are coupled with one another, n_corner at a time (the elements of a row) */
+/* points that are coupled with one another, n_corner at a time (the elements of a component) */
 typedef struct pal_cliques {
     int n_item, n_corner;
     const int32_t *node; /* [n_item][n_corner], 0 <= node < n */

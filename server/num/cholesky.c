@@ -25,14 +25,14 @@
 #include <xmmintrin.h>
 #endif
 
-/* one thread's means of factoring */
-typedef struct bench {
+/* what one thread needs to factor */
+typedef struct work_area {
     cholmod_common common;
     cholmod_factor *pattern; /* the analysis, without values                      */
     double *value;           /* lower triangle of the scaled matrix               */
     double scale;            /* value = scale * a                                 */
     bool started, finite;
-} bench;
+} work_area;
 
 /* a factor in use or in the making */
 typedef struct factor {
@@ -44,16 +44,16 @@ typedef struct factor {
 typedef enum work { WORK_NONE, WORK_BEGUN, WORK_DONE } work;
 
 struct pal_cholesky {
-    int n, n_free;    /* points, points not held                     */
-    int32_t *place;   /* of each point in the factor, -1: held  [n]  */
+    int n, n_free;    /* points, free points */
+    int32_t *place;   /* position of each point in the factor, -1: fixed  [n] */
     int64_t n_entry;  /* of the lower triangle, numbers              */
-    int *start, *row; /* its columns, by unheld points in order      */
+    int *start, *row; /* its columns, by free points in order */
     pal_panels panels;
     double nonzeros, flops;
     void *y, *vector; /* working vectors of a solve */
-    bench own, spare;
+    work_area own, spare;
     factor now, next;
-    /* the spare thread: everything below, spare and next are its own while state is WORK_BEGUN */
+    /* the spare thread: all members below are its own while state is WORK_BEGUN, spare and next included */
     bool threaded, quit;
     pthread_t thread;
     pthread_mutex_t lock;
@@ -62,8 +62,8 @@ struct pal_cholesky {
     pal_err outcome;
 };
 
-/* BLAS libraries that bring threads of their own are told to use none; once in a process */
-static void silence_threads(void)
+/* BLAS libraries with threads of their own are limited to the calling thread; once per process */
+static void limit_blas_threads(void)
 {
     void (*set)(int);
     void *at = dlsym(RTLD_DEFAULT, "openblas_set_num_threads");
@@ -73,7 +73,7 @@ static void silence_threads(void)
 }
 
 /* for this thread: OpenMP regions inside CHOLMOD run on it alone */
-static void stay_on_this_thread(void)
+static void use_calling_thread(void)
 {
     void (*set)(int);
     void *at = dlsym(RTLD_DEFAULT, "omp_set_max_active_levels");
@@ -98,7 +98,7 @@ static pal_err error_of(const cholmod_common *common)
     }
 }
 
-static void start_bench(bench *b)
+static void begin_work_area(work_area *b)
 {
     cholmod_start(&b->common);
     b->common.print = 0;
@@ -110,7 +110,7 @@ static void start_bench(bench *b)
     b->started = true;
 }
 
-static void finish_bench(bench *b)
+static void end_work_area(work_area *b)
 {
     if (!b->started) return;
     cholmod_free_factor(&b->pattern, &b->common);
@@ -222,7 +222,7 @@ static pal_err make(pal_cholesky *c, const pal_block_matrix *a, const uint8_t *f
 {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
     static pthread_mutex_t one_at_a_time = PTHREAD_MUTEX_INITIALIZER;
-    pthread_once(&once, silence_threads);
+    pthread_once(&once, limit_blas_threads);
     c->place = malloc(sizeof *c->place * ((size_t)c->n + 1));
     if (!c->place) return PAL_ERR_MEMORY;
     int32_t *number = c->place;
@@ -252,7 +252,7 @@ pal_err pal_cholesky_create(const pal_block_matrix *a, const uint8_t *fixed, pal
     c->n = a->n;
     pthread_mutex_init(&c->lock, NULL);
     pthread_cond_init(&c->changed, NULL);
-    start_bench(&c->own);
+    begin_work_area(&c->own);
     pal_err err = make(c, a, fixed);
     if (err)
         pal_cholesky_destroy(c);
@@ -273,8 +273,8 @@ void pal_cholesky_destroy(pal_cholesky *c)
     }
     pthread_cond_destroy(&c->changed);
     pthread_mutex_destroy(&c->lock);
-    finish_bench(&c->own);
-    finish_bench(&c->spare);
+    end_work_area(&c->own);
+    end_work_area(&c->spare);
     pal_panels_free(&c->panels);
     free(c->place);
     free(c->start);
@@ -286,18 +286,18 @@ void pal_cholesky_destroy(pal_cholesky *c)
     free(c);
 }
 
-/* copies the scaled values of a's lower triangle without held points; finds out whether they are finite */
-static pal_err take_values(const pal_cholesky *c, const pal_block_matrix *a, bench *b)
+/* copies the scaled values of the lower triangle of a without fixed points; reports whether they are finite */
+static pal_err take_values(const pal_cholesky *c, const pal_block_matrix *a, work_area *b)
 {
     if (!b->value) b->value = malloc(sizeof *b->value * (size_t)c->n_entry);
     if (!b->value) return PAL_ERR_MEMORY;
-    double most = 0, sum = 0;
+    double max = 0, sum = 0;
     for (int j = 0; j < a->n; j++) {
         const double *v = a->value + 9 * (size_t)a->start[j];
-        if (c->place[j] >= 0) most = fmax(most, fmax(v[0], fmax(v[4], v[8])));
+        if (c->place[j] >= 0) max = fmax(max, fmax(v[0], fmax(v[4], v[8])));
     }
     int e = 0;
-    if (most > 0 && isfinite(most)) (void)frexp(most, &e);
+    if (max > 0 && isfinite(max)) (void)frexp(max, &e);
     b->scale = ldexp(1, e > 1000 ? -1000 : e < -1000 ? 1000 : -e);
     double *to = b->value;
     for (int j = 0; j < a->n; j++) {
@@ -317,7 +317,7 @@ static pal_err take_values(const pal_cholesky *c, const pal_block_matrix *a, ben
 }
 
 /* all pivots positive, finite and above rounding */
-static bool pivots_good(const pal_cholesky *c, const bench *b, const cholmod_factor *l)
+static bool pivots_good(const pal_cholesky *c, const work_area *b, const cholmod_factor *l)
 {
     const int *super = l->super, *pi = l->pi, *px = l->px, *perm = l->Perm;
     const double *x = l->x;
@@ -329,8 +329,9 @@ static bool pivots_good(const pal_cholesky *c, const bench *b, const cholmod_fac
     return true;
 }
 
-/* the factor and its copy fit into this machine; asked first, since memory that is promised and not there kills */
-static bool fits(const pal_cholesky *c, const bench *b, bool single)
+/* do the factor and its copy fit into this machine? Asked first, since overcommitted memory ends in the kernel killing
+ * the process */
+static bool fits(const pal_cholesky *c, const work_area *b, bool single)
 {
     double have = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
     double need = (double)b->pattern->xsize * sizeof(double) +
@@ -339,11 +340,11 @@ static bool fits(const pal_cholesky *c, const bench *b, bool single)
 }
 
 /* factors b's values into f, which keeps its old values unless all goes well */
-static pal_err factor_values(const pal_cholesky *c, bench *b, bool single, factor *f)
+static pal_err factor_values(const pal_cholesky *c, work_area *b, bool single, factor *f)
 {
     if (!b->finite) return PAL_ERR_NUMERIC;
     if (!fits(c, b, single)) return PAL_ERR_MEMORY;
-    stay_on_this_thread();
+    use_calling_thread();
     cholmod_sparse matrix = sparse_of(3 * c->n_free, c->n_entry, c->start, c->row, b->value);
     cholmod_factor *l = cholmod_copy_factor(b->pattern, &b->common);
     if (!l) return error_of(&b->common);
@@ -408,19 +409,19 @@ static void solve_panels(pal_cholesky *c, const double *b, double s, double *x)
 pal_err pal_cholesky_solve(pal_cholesky *c, const double *b, double *x)
 {
     if (!c->now.good) return PAL_ERR_STATE;
-    double most = 0, sum = 0;
+    double max = 0, sum = 0;
     for (int i = 0; i < c->n; i++)
         for (int k = 0; k < 3 && c->place[i] >= 0; k++) {
-            most = fmax(most, fabs(b[3 * i + k]));
+            max = fmax(max, fabs(b[3 * i + k]));
             sum += 0 * b[3 * i + k];
         }
     if (sum != 0) return PAL_ERR_NUMERIC;
-    if (most == 0) {
+    if (max == 0) {
         for (int i = 0; i < 3 * c->n; i++) x[i] = 0;
         return PAL_ERR_OK;
     }
     int e;
-    (void)frexp(most, &e);
+    (void)frexp(max, &e);
 #ifdef __SSE2__
     unsigned mode = _mm_getcsr();
     _mm_setcsr(mode | 0x8040); /* flush to zero, denormals are zero */
@@ -450,14 +451,14 @@ static void *spare_thread(void *self)
     return NULL;
 }
 
-/* the spare bench and its thread, made by the first refresh */
+/* the spare work area and its thread, made by the first refresh */
 static pal_err start_spare(pal_cholesky *c)
 {
-    if (!c->spare.started) start_bench(&c->spare);
+    if (!c->spare.started) begin_work_area(&c->spare);
     if (!c->spare.pattern) c->spare.pattern = cholmod_copy_factor(c->own.pattern, &c->spare.common);
     if (!c->spare.pattern) return error_of(&c->spare.common);
     if (c->threaded) return PAL_ERR_OK;
-    sigset_t all, old; /* signals are the main thread's */
+    sigset_t all, old; /* the main thread handles signals */
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &old);
     c->threaded = pthread_create(&c->thread, NULL, spare_thread, c) == 0;
@@ -526,7 +527,7 @@ size_t pal_cholesky_bytes(const pal_cholesky *c)
     bool single = c->now.single;
     size_t one = (size_t)c->panels.n_value[single] * (single ? sizeof(float) : sizeof(double));
     if (c->now.value) n_byte += one;
-    /* the next one has the same precision, and is the spare thread's to look at while that is at work */
+    /* the next factor has the same precision; the spare thread owns it while that is at work */
     if (c->spare.started) n_byte += one;
     return n_byte;
 }

@@ -1,11 +1,10 @@
-/* Sparse Cholesky factors of pal_block_matrix matrices by CHOLMOD: the pattern is analysed once, values are factored as
- * often as wanted, on the caller's thread or on a spare one. Solves are our own (supernodal, no BLAS, no heap, no
- * threads), in double precision or, for preconditioning, with a single precision copy of the factor at half the memory
- * traffic.
+/* Sparse Cholesky factors of pal_block_matrix by CHOLMOD: the pattern is analysed once, values are factored any number
+ * of times, on the caller's thread or on a spare one. Solves are our own (supernodal, no BLAS, no heap, no threads), in
+ * double precision or, for preconditioning, with a single precision copy of the factor at half the memory traffic.
  *
- * Held points (rows and columns) are left out of the factor; solves give 0 there. A matrix that is not positive
- * definite or does not fit into memory is an error code, never an abort; the factor of before stays in use.
- * Thread: one at a time, except the spare thread's own work. */
+ * Fixed points (rows and columns) are left out of the factor; solves give 0 there. A matrix that is not positive
+ * definite or does not fit into memory is an error code, never an abort; the previous factor stays in use. Thread: one
+ * at a time, except the work of the spare thread. */
 #ifndef PAL_NUM_CHOLESKY_H
 #define PAL_NUM_CHOLESKY_H
 #include "server/num/block_matrix.h"
@@ -14,8 +13,8 @@
 
 typedef struct pal_cholesky pal_cholesky;
 
-/* analyses the pattern of a (nested dissection or minimum degree, whichever gives less); held [n] may be NULL; the
- * pattern and held are copied. MEMORY. [load] */
+/* analyses the pattern of a (nested dissection or minimum degree, whichever gives the smaller factor); fixed [n] may be
+ * NULL; the pattern and fixed are copied. MEMORY. [load] */
 pal_err pal_cholesky_create(const pal_block_matrix *a, const uint8_t *fixed, pal_cholesky **out);
 void pal_cholesky_destroy(pal_cholesky *c); /* joins the spare thread; NULL is fine */
 
@@ -26,12 +25,12 @@ pal_err pal_cholesky_factor(pal_cholesky *c, const pal_block_matrix *a, bool sin
 pal_err pal_cholesky_solve(pal_cholesky *c, const double *b, double *x);
 /* a second factor on a spare thread: copies the values of a and returns at once. STATE: one is under way */
 pal_err pal_cholesky_refresh(pal_cholesky *c, const pal_block_matrix *a);
-/* takes the spare thread's factor into use. STATE: none was begun, or it is not ready and wait is false; NUMERIC,
- * MEMORY: it failed and the old one stays */
+/* Puts the factor of the spare thread into use. STATE: none was begun, or it is not ready and wait is false; NUMERIC,
+ * MEMORY: it failed and the previous factor stays */
 pal_err pal_cholesky_adopt(pal_cholesky *c, bool wait);
-bool pal_cholesky_refreshing(const pal_cholesky *c); /* one was begun and is not yet adopted, ready or not */
+bool pal_cholesky_refreshing(const pal_cholesky *c); /* a refresh was begun and its factor is not yet adopted */
 
 int64_t pal_cholesky_nonzeros(const pal_cholesky *c); /* of the factor */
-double pal_cholesky_flops(const pal_cholesky *c);     /* of one factorisation, from the analysis: the same everywhere */
-size_t pal_cholesky_bytes(const pal_cholesky *c);     /* of all factors held */
+double pal_cholesky_flops(const pal_cholesky *c); /* of one factorisation, from the analysis: equal on all machines */
+size_t pal_cholesky_bytes(const pal_cholesky *c); /* of all factors */
 #endif

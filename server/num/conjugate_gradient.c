@@ -24,12 +24,12 @@ static double go(int n, double alpha, const double *p, const double *q, double *
     return pal_dot_product(n, r, r);
 }
 
-int pal_conjugate_gradient_run(pal_conjugate_gradient *cg, double *x, double target, int least, int most)
+int pal_conjugate_gradient_run(pal_conjugate_gradient *cg, double *x, double target, int min, int max)
 {
     const int n = cg->n;
     double rr = pal_dot_product(n, cg->r, cg->r), rz_old = 0, alpha = 0;
     int done = 0;
-    while (done < most && rr > 0 && (done < least || rr > target * target)) {
+    while (done < max && rr > 0 && (done < min || rr > target * target)) {
         cg->precondition(cg->user, cg->r, cg->z);
         double rz = pal_dot_product(n, cg->r, cg->z);
         if (!(rz > 0) || !isfinite(rz)) break;

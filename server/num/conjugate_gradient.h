@@ -14,10 +14,10 @@ typedef struct pal_conjugate_gradient {
     double residual;   /* out: |r|, Euclidean                                     */
 } pal_conjugate_gradient;
 
-/* improves x until |r| <= target, with at least `least` iterations (unless r = 0) and at most `most`; stops where a
- * number is not finite or a direction has no positive curvature. Returns the iterations. */
-int pal_conjugate_gradient_run(pal_conjugate_gradient *cg, double *x, double target, int least, int most);
+/* Improves x until |r| <= target, with at least `min` (unless r = 0) and at most `max` iterations; stops where a number
+ * is not finite or a direction has no positive curvature. Returns the number of iterations. */
+int pal_conjugate_gradient_run(pal_conjugate_gradient *cg, double *x, double target, int min, int max);
 
-/* sums over n numbers in a fixed order, 8 at a time: the same bits everywhere */
+/* dot product of n numbers in a fixed order, 8 partial sums: the same bits on every machine */
 double pal_dot_product(int n, const double *a, const double *b);
 #endif

@@ -59,13 +59,13 @@ static void find_order(const graph *g, int32_t *seen, int32_t *order)
     }
 }
 
-static int64_t find_rows(const graph *g, const int32_t *order, const int32_t *place, int32_t *first, int64_t *start)
+static int64_t find_rows(const graph *g, const int32_t *order, const int32_t *position, int32_t *first, int64_t *start)
 {
     start[0] = 0;
     for (int32_t i = 0; i < g->n; i++) {
         first[i] = i;
         for (int32_t k = g->start[order[i]]; k < g->start[order[i] + 1]; k++)
-            if (place[g->point[k]] < first[i]) first[i] = place[g->point[k]];
+            if (position[g->point[k]] < first[i]) first[i] = position[g->point[k]];
         start[i + 1] = start[i] + i - first[i] + 1;
     }
     return start[g->n];
@@ -78,11 +78,11 @@ pal_err pal_envelope_make(int n, const int32_t *start, const int32_t *point, int
     int32_t *index = malloc(3 * sizeof *index * (size_t)n + 1);
     int64_t *row = malloc(sizeof *row * ((size_t)n + 1));
     pal_err err = index && row ? PAL_ERR_OK : PAL_ERR_MEMORY;
-    int32_t *order = index, *place = index + n, *first = index + 2 * (size_t)n;
+    int32_t *order = index, *position = index + n, *first = index + 2 * (size_t)n;
     if (!err) {
-        find_order(&g, place, order);
-        for (int32_t i = 0; i < n; i++) place[order[i]] = i;
-        if (find_rows(&g, order, place, first, row) > max_entry) err = PAL_ERR_BUDGET;
+        find_order(&g, position, order);
+        for (int32_t i = 0; i < n; i++) position[order[i]] = i;
+        if (find_rows(&g, order, position, first, row) > max_entry) err = PAL_ERR_BUDGET;
     }
     if (!err) {
         *out = (pal_envelope){.n = n, .order = PAL_NEW(arena, int32_t, 3 * (size_t)n)};
@@ -94,7 +94,7 @@ pal_err pal_envelope_make(int n, const int32_t *start, const int32_t *point, int
     if (!err) {
         memcpy(out->order, index, 3 * sizeof *index * (size_t)n);
         memcpy(out->start, row, sizeof *row * ((size_t)n + 1));
-        out->place = out->order + n, out->first = out->order + 2 * (size_t)n;
+        out->position = out->order + n, out->first = out->order + 2 * (size_t)n;
     }
     free(index), free(row);
     return err;
@@ -111,7 +111,7 @@ static void load_values(pal_envelope *e, const int32_t *start, const int32_t *po
         double *row = e->value + e->start[i];
         if (skip && skip[from]) row[i - e->first[i]] = 1;
         for (int32_t k = start[from]; k < start[from + 1]; k++) {
-            const int32_t j = e->place[point[k]];
+            const int32_t j = e->position[point[k]];
             if (j <= i && !(skip && (skip[from] || skip[point[k]]))) row[j - e->first[i]] = value[k];
         }
     }

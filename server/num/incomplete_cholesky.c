@@ -1,12 +1,12 @@
-/* Incomplete factors: column by column, what a column takes from the blocks to its right being kept only where the
- * pattern has a place for it. */
+/* Incomplete factors, column by column: updates from the columns to the right are kept only where the pattern has an
+ * entry. */
 #include "server/num/incomplete_cholesky.h"
 
 #include <math.h>
 #include <stdbool.h>
 #include <string.h>
 
-static const double first_shift = 1e-3, most_shift = 1e3, more_shift = 4, least_pivot = 1e-6;
+static const double first_shift = 1e-3, max_shift = 1e3, more_shift = 4, min_pivot = 1e-6;
 
 pal_err pal_incomplete_cholesky_make(const pal_block_matrix *pattern, const uint8_t *fixed, pal_arena *arena,
                                      pal_incomplete_cholesky *out)
@@ -17,38 +17,37 @@ pal_err pal_incomplete_cholesky_make(const pal_block_matrix *pattern, const uint
     return out->lower && out->inverse ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-static bool is_held(const pal_incomplete_cholesky *f, int i)
+static bool is_fixed(const pal_incomplete_cholesky *f, int i)
 {
     return f->fixed && f->fixed[i];
 }
 
-/* of a symmetric block by cofactors; false: it is not positive definite, or its pivots have lost all but `least_pivot`
+/* of a symmetric block by cofactors; false: it is not positive definite, or its pivots have lost all but `min_pivot`
  * of the diagonal */
 static bool invert(const double *m, const double *diagonal, double *out)
 {
     const double d0 = m[0], d1 = m[4] - m[3] * m[3] / d0;
     const double c00 = m[4] * m[8] - m[7] * m[7], c10 = m[6] * m[7] - m[3] * m[8], c20 = m[3] * m[7] - m[4] * m[6];
     const double det = m[0] * c00 + m[3] * c10 + m[6] * c20, d2 = det / (d0 * d1), by = 1 / det;
-    if (!(d0 > least_pivot * diagonal[0] && d1 > least_pivot * diagonal[4] && d2 > least_pivot * diagonal[8]))
-        return false;
+    if (!(d0 > min_pivot * diagonal[0] && d1 > min_pivot * diagonal[4] && d2 > min_pivot * diagonal[8])) return false;
     out[0] = by * c00, out[1] = out[3] = by * c10, out[2] = out[6] = by * c20;
     out[4] = by * (m[0] * m[8] - m[6] * m[6]), out[5] = out[7] = by * (m[6] * m[3] - m[0] * m[7]);
     out[8] = by * (m[0] * m[4] - m[3] * m[3]);
     return isfinite(by);
 }
 
-/* scaled values without held points; false: one is not finite */
+/* scaled values without fixed points; false: one is not finite */
 static bool take(pal_incomplete_cholesky *f, const pal_block_matrix *a)
 {
-    double most = 0, sum = 0;
+    double max = 0, sum = 0;
     int e = 0;
     for (int j = 0; j < a->n; j++)
-        for (int c = 0; c < 9 && !is_held(f, j); c += 4) most = fmax(most, a->value[9 * (size_t)a->start[j] + c]);
-    if (most > 0 && isfinite(most)) (void)frexp(most, &e);
+        for (int c = 0; c < 9 && !is_fixed(f, j); c += 4) max = fmax(max, a->value[9 * (size_t)a->start[j] + c]);
+    if (max > 0 && isfinite(max)) (void)frexp(max, &e);
     f->scale = ldexp(1, e > 1000 ? -1000 : e < -1000 ? 1000 : -e);
     for (int j = 0; j < a->n; j++)
         for (int k = a->start[j]; k < a->start[j + 1]; k++) {
-            const bool off = is_held(f, j) || is_held(f, a->row[k]);
+            const bool off = is_fixed(f, j) || is_fixed(f, a->row[k]);
             for (size_t c = 9 * (size_t)k; c < 9 * (size_t)k + 9; c++) {
                 f->lower[c] = off ? 0 : (float)(f->scale * a->value[c]);
                 sum += 0 * a->value[c];
@@ -65,8 +64,8 @@ static void take_product(float *to, const double *p, const double *q)
             to[3 * r + c] -= (float)(p[3 * r] * q[3 * c] + p[3 * r + 1] * q[3 * c + 1] + p[3 * r + 2] * q[3 * c + 2]);
 }
 
-/* what column j takes from those to its right: -= A_ij D^-1 A_kj' at (i, k), i >= k, where there is a place for it; its
- * own blocks become those of L */
+/* updates of column j from the columns to its right: -= A_ij D^-1 A_kj' at (i, k), i >= k, where the pattern has an
+ * entry; its own blocks become those of L */
 static void eliminate(pal_incomplete_cholesky *f, int j)
 {
     const int32_t *start = f->pattern->start, *row = f->pattern->row;
@@ -100,7 +99,7 @@ static bool factor(pal_incomplete_cholesky *f, const pal_block_matrix *a, double
 {
     for (int j = 0; j < a->n; j++) {
         double m[9], diagonal[9];
-        if (is_held(f, j)) continue;
+        if (is_fixed(f, j)) continue;
         for (int c = 0; c < 9; c++) {
             diagonal[c] = f->scale * a->value[9 * (size_t)a->start[j] + c];
             m[c] = (double)f->lower[9 * (size_t)a->start[j] + c] + (c % 4 == 0 ? shift * diagonal[c] : 0);
@@ -116,7 +115,7 @@ static bool factor(pal_incomplete_cholesky *f, const pal_block_matrix *a, double
 pal_err pal_incomplete_cholesky_factor(pal_incomplete_cholesky *f, const pal_block_matrix *a)
 {
     memset(f->inverse, 0, 9 * sizeof *f->inverse * (size_t)a->n);
-    for (double shift = 0; shift<most_shift; shift = shift> 0 ? more_shift * shift : first_shift) {
+    for (double shift = 0; shift<max_shift; shift = shift> 0 ? more_shift * shift : first_shift) {
         if (!take(f, a)) return PAL_ERR_NUMERIC;
         if (factor(f, a, shift)) return PAL_ERR_OK;
     }
@@ -127,7 +126,7 @@ void pal_incomplete_cholesky_solve(const pal_incomplete_cholesky *f, const doubl
 {
     const int n = f->pattern->n;
     const int32_t *start = f->pattern->start, *row = f->pattern->row;
-    for (int i = 0; i < 3 * n; i++) x[i] = is_held(f, i / 3) ? 0 : f->scale * b[i];
+    for (int i = 0; i < 3 * n; i++) x[i] = is_fixed(f, i / 3) ? 0 : f->scale * b[i];
     for (int j = 0; j < n; j++) {
         const double *y = x + 3 * (size_t)j;
         for (int p = start[j] + 1; p < start[j + 1]; p++) {

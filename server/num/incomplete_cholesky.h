@@ -1,9 +1,10 @@
-/* Incomplete Cholesky factor of a pal_block_matrix matrix without fill, L D L' by blocks of 3x3 on the matrix' own
- * pattern (IC(0); Meijerink & van der Vorst 1977), to precondition conjugate gradients where a whole factor is too
- * large: of a body of 16,000 nodes it takes a fiftieth of the memory. Stiffness is no M-matrix, so pivots may fail to
- * be positive definite: the diagonal is then shifted, A + s diag(A), by more until all are (Manteuffel 1980).
+/* Incomplete Cholesky factor of a pal_block_matrix without fill, L D L' by blocks of 3x3 on the pattern of the matrix
+ * (IC(0); Meijerink & van der Vorst 1977), to precondition conjugate gradients where a complete factor is too large:
+ * for a body of 16,000 nodes it takes a fiftieth of the memory. Stiffness is not an M-matrix, so pivots may fail to be
+ * positive definite: the diagonal is then shifted, A + s diag(A), with a growing s until all pivots are (Manteuffel
+ * 1980).
  *
- * Held points (rows and columns) are left out; solves give 0 there. Values are kept in single precision, inverses of
+ * Fixed points (rows and columns) are left out; solves give 0 there. Values are kept in single precision, inverses of
  * pivots in double. Memory: the caller's arena. Thread: [load] to make, then one thread at a time. */
 #ifndef PAL_NUM_INCOMPLETE_CHOLESKY_H
 #define PAL_NUM_INCOMPLETE_CHOLESKY_H

@@ -1,4 +1,4 @@
-/* Sparse rows of points: made row by row in a dense accumulator, multiplied, applied (A eq. 1). */
+/* Sparse interpolation matrices: built row by row in a dense accumulator, multiplied, applied (paper A eq. 1). */
 #include "server/num/interpolation.h"
 
 #include <math.h>
@@ -27,9 +27,9 @@ pal_err pal_interpolation_builder_begin(pal_interpolation_builder *b, int32_t n_
 {
     memset(b, 0, sizeof *b);
     b->rows.n_point = n_point, b->row_cap = n_row;
-    b->most = max_entry < INT32_MAX ? max_entry : INT32_MAX;
+    b->max = max_entry < INT32_MAX ? max_entry : INT32_MAX;
     b->cap = 8 * (int64_t)n_row + 16;
-    if (b->cap > b->most) b->cap = b->most;
+    if (b->cap > b->max) b->cap = b->max;
     b->rows.start = calloc((size_t)n_row + 1, sizeof *b->rows.start);
     b->rows.point = malloc((size_t)b->cap * sizeof *b->rows.point + 1);
     b->rows.weight = malloc((size_t)b->cap * sizeof *b->rows.weight + 1);
@@ -45,11 +45,11 @@ static void grow(pal_interpolation_builder *b, int64_t n)
 {
     int64_t need = b->rows.start[b->rows.n_row] + n;
     if (need <= b->cap) return;
-    if (need > b->most) {
+    if (need > b->max) {
         b->err = PAL_ERR_BUDGET;
         return;
     }
-    int64_t cap = need + need / 2 < b->most ? need + need / 2 : b->most;
+    int64_t cap = need + need / 2 < b->max ? need + need / 2 : b->max;
     int32_t *point = realloc(b->rows.point, (size_t)cap * sizeof *point);
     if (point) b->rows.point = point;
     double *weight = realloc(b->rows.weight, (size_t)cap * sizeof *weight);
@@ -122,17 +122,17 @@ pal_err pal_interpolation_identity(int32_t n, pal_interpolation *out)
     return pal_interpolation_builder_finish(&b, out);
 }
 
-pal_err pal_interpolation_product(const pal_interpolation *external_force, const pal_interpolation *inner,
-                                  int64_t max_entry, pal_interpolation *out)
+pal_err pal_interpolation_product(const pal_interpolation *outer, const pal_interpolation *inner, int64_t max_entry,
+                                  pal_interpolation *out)
 {
-    PAL_ASSERT(external_force->n_point == inner->n_row);
+    PAL_ASSERT(outer->n_point == inner->n_row);
     pal_interpolation_builder b;
-    pal_interpolation_builder_begin(&b, external_force->n_row, inner->n_point, max_entry);
-    for (int32_t i = 0; i < external_force->n_row && !b.err; i++) {
-        for (int32_t k = external_force->start[i]; k < external_force->start[i + 1]; k++) {
-            int32_t mid = external_force->point[k];
+    pal_interpolation_builder_begin(&b, outer->n_row, inner->n_point, max_entry);
+    for (int32_t i = 0; i < outer->n_row && !b.err; i++) {
+        for (int32_t k = outer->start[i]; k < outer->start[i + 1]; k++) {
+            int32_t mid = outer->point[k];
             for (int32_t m = inner->start[mid]; m < inner->start[mid + 1]; m++)
-                pal_interpolation_builder_add(&b, inner->point[m], external_force->weight[k] * inner->weight[m]);
+                pal_interpolation_builder_add(&b, inner->point[m], outer->weight[k] * inner->weight[m]);
         }
         pal_interpolation_builder_end_row(&b);
     }

@@ -1,6 +1,6 @@
-/* Sparse rows that place points as weighted sums of other points: d = A p (A eq. 1). Row i has the entries
- * start[i] .. start[i+1]-1, their points ascending and each once. The weights of a row sum to 1.
- * Owns its arrays (heap). Thread: [load] to make, [any] to read. */
+/* Sparse interpolation matrix A, whose rows give points as weighted sums of other points: d = A p (paper A eq. 1). Row
+ * i has the entries start[i] .. start[i+1]-1, their points ascending and each once. The weights of a row sum to 1. Owns
+ * its arrays (heap). Thread: [load] to make, [any] to read. */
 #ifndef PAL_NUM_INTERPOLATION_H
 #define PAL_NUM_INTERPOLATION_H
 #include "server/base/err.h"
@@ -16,24 +16,23 @@ typedef struct pal_interpolation {
 } pal_interpolation;
 
 void pal_interpolation_free(pal_interpolation *rows); /* and zeroes the struct; a zeroed struct is fine */
-/* n points, each itself; MEMORY */
+/* the identity of n points; MEMORY */
 pal_err pal_interpolation_identity(int32_t n, pal_interpolation *out);
-/* out = outer inner: rows of outer, points of inner (outer's points are inner's rows). BUDGET when it has more than
- * max_entry entries; MEMORY */
-pal_err pal_interpolation_product(const pal_interpolation *external_force, const pal_interpolation *inner,
-                                  int64_t max_entry, pal_interpolation *out);
-/* d = A p; p [n_point][3], d [n_row][3], apart */
+/* out = outer inner (the points of outer are the rows of inner). BUDGET: more than max_entry entries; MEMORY */
+pal_err pal_interpolation_product(const pal_interpolation *outer, const pal_interpolation *inner, int64_t max_entry,
+                                  pal_interpolation *out);
+/* d = A p; p [n_point][3] and d [n_row][3] do not overlap */
 void pal_interpolation_apply(const pal_interpolation *rows, const double *p, double *d);
-/* g += A' f: forces on the rows pulled back to the points; f [n_row][3], g [n_point][3], apart */
+/* g += A' f: forces on the rows applied to the points; f [n_row][3] and g [n_point][3] do not overlap */
 void pal_interpolation_apply_transpose(const pal_interpolation *rows, const double *f, double *g);
 /* memory of the arrays */
 size_t pal_interpolation_bytes(const pal_interpolation *rows);
 
-/* Rows as they are made, one after the other. Weights are added to the open row in any order, then it is ended. The
- * first failure is kept; adding after it does nothing. */
+/* A matrix that is built row by row. Weights are added to the open row in any order, then the row is ended. The first
+ * error is kept; later calls have no effect. */
 typedef struct pal_interpolation_builder {
     pal_interpolation rows;
-    int64_t cap, most;
+    int64_t cap, max;
     int32_t row_cap, n_open;
     int32_t *open; /* points of the open row                 [n_point] */
     double *sum;   /* their weights, 0 for all others        [n_point] */
@@ -41,7 +40,7 @@ typedef struct pal_interpolation_builder {
     pal_err err;
 } pal_interpolation_builder;
 
-/* room for n_row rows of n_point points; BUDGET once there are more than max_entry entries */
+/* reserves n_row rows of n_point points; BUDGET once there are more than max_entry entries */
 pal_err pal_interpolation_builder_begin(pal_interpolation_builder *b, int32_t n_row, int32_t n_point,
                                         int64_t max_entry);
 static inline void pal_interpolation_builder_add(pal_interpolation_builder *b, int32_t point, double weight)
@@ -49,8 +48,8 @@ static inline void pal_interpolation_builder_add(pal_interpolation_builder *b, i
     if (!b->in[point]) b->in[point] = 1, b->open[b->n_open++] = point;
     b->sum[point] += weight;
 }
-/* ends the open row; entries that have cancelled are left out */
+/* ends the open row; entries that have cancelled are dropped */
 void pal_interpolation_builder_end_row(pal_interpolation_builder *b);
-/* takes the rows out when all went well, frees the rest in any case */
+/* moves the matrix out if there was no error; frees everything else in any case */
 pal_err pal_interpolation_builder_finish(pal_interpolation_builder *b, pal_interpolation *out);
 #endif

@@ -48,7 +48,7 @@ static void combine(pal_lanczos *l, const double *s)
     }
 }
 
-double pal_lanczos_run(pal_lanczos *l, double tolerance, int least, int most)
+double pal_lanczos_run(pal_lanczos *l, double tolerance, int min, int max)
 {
     double a[PAL_LANCZOS_MAX], b[PAL_LANCZOS_MAX], s[PAL_LANCZOS_MAX] = {1}, beta = 0;
     const size_t n = (size_t)l->n;
@@ -56,7 +56,7 @@ double pal_lanczos_run(pal_lanczos *l, double tolerance, int least, int most)
     if (!l->solve(l->user, l->z, l->w)) return NAN;
     beta = sqrt(pal_dot_product(l->n, l->w, l->z));
     if (beta == 0) return 0;
-    while (l->done < most) {
+    while (l->done < max) {
         double *q = l->basis + (size_t)l->done * n;
         const double *before = l->done > 0 ? q - n : NULL;
         for (size_t i = 0; i < n; i++) q[i] = l->z[i] / beta, l->w[i] /= beta;
@@ -71,7 +71,7 @@ double pal_lanczos_run(pal_lanczos *l, double tolerance, int least, int most)
         l->ritz = find_largest(a, b, ++l->done, s);
         l->residual = beta * fabs(s[l->done - 1]);
         if (!(beta > 1e-12 * fabs(l->ritz))) break;
-        if (l->done >= least && l->residual <= tolerance * l->ritz) break;
+        if (l->done >= min && l->residual <= tolerance * l->ritz) break;
     }
     combine(l, s);
     return l->ritz + l->residual;

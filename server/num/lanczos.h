@@ -14,14 +14,14 @@ typedef struct pal_lanczos {
     bool (*multiply)(void *user, const double *v, double *out); /* out = K v; false: give up */
     bool (*solve)(void *user, const double *b, double *out);    /* out ~ M^-1 b; false: give up */
     void *user;
-    double *z;     /* in: M times the first vector, not 0; out: M times the Ritz vector, to begin with next time [n] */
+    double *z;     /* in: M times the first vector, not 0; out: M times the Ritz vector, to start the next call [n] */
     double *basis; /* work [most][n]                                                                               */
     double *w, *u; /* work [n]                                                                                     */
     int done;      /* out: iterations                                                                              */
-    double ritz, residual; /* out: the largest Ritz value, and how far from it an eigenvalue is at most             */
+    double ritz, residual; /* out: the largest Ritz value, and the maximum distance of an eigenvalue from it */
 } pal_lanczos;
 
-/* at least `least` and at most `most` (<= PAL_LANCZOS_MAX) iterations, until residual <= tolerance * ritz. Returns
+/* at least `min` and at most `max` (<= PAL_LANCZOS_MAX) iterations, until residual <= tolerance * ritz. Returns
  * ritz + residual; NaN: given up or not finite */
-double pal_lanczos_run(pal_lanczos *l, double tolerance, int least, int most);
+double pal_lanczos_run(pal_lanczos *l, double tolerance, int min, int max);
 #endif

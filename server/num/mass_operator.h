@@ -1,6 +1,6 @@
-/* A consistent mass matrix on the unknowns: one number per pair of points, the same for x, y and z, and damping in the
- * same pattern (paper A section 3.2.1). The model that owns the body makes the pattern and fills the values.
- * Memory is the maker's. Thread: [load] to make, [sim]. */
+/* Consistent mass matrix on the unknowns: one number per pair of points, equal for x, y and z, and damping in the same
+ * pattern (paper A section 3.2.1). The model that owns the body makes the pattern and fills the values. Memory belongs
+ * to that model. Thread: [load] to make, [sim]. */
 #ifndef PAL_NUM_MASS_OPERATOR_H
 #define PAL_NUM_MASS_OPERATOR_H
 #include <stddef.h>
@@ -13,8 +13,8 @@ typedef struct pal_mass_operator {
     double *damping_kg_s;   /* [n_entry]; NULL: damping is 0 everywhere, or damping_1_s is not NaN */
     double damping_1_s;     /* damping / mass where it is the same everywhere; else NaN */
     double damping_max_1_s; /* the largest damping / mass of all samples */
-    /* scratch of the model that fills the values: points of an element, at most n_most; where they stand among them,
-     * else -1; their shape functions at the Gauss points; room for damping_kg_s */
+    /* scratch of the model that fills the values: points of an element, at most n_max; their index among them, else -1;
+     * their shape functions at the Gauss points; space for damping_kg_s */
     int n_most;
     int32_t *of_element;  /* [n_most]      */
     int32_t *local;       /* [n_point]     */
@@ -22,7 +22,7 @@ typedef struct pal_mass_operator {
     double *scratch_kg_s; /* [n_entry]     */
 } pal_mass_operator;
 
-/* out = M p, p and out [n_point][3], apart */
+/* out = M p; p and out [n_point][3] do not overlap */
 void pal_mass_operator_multiply(const pal_mass_operator *mass, const double *p, double *out);
 /* v' M v / 2, J; v m/s [n_point][3] */
 double pal_mass_operator_kinetic_J(const pal_mass_operator *mass, const double *v);

@@ -1,5 +1,5 @@
-/* Storage of a supernodal Cholesky factor for fast triangular solves: its columns in panels of 3 to 12 columns, one
- * behind the other in the order in which the forward solve reads them.
+/* Storage of a supernodal Cholesky factor for fast triangular solves: its columns in panels of 3 to 12 columns, in the
+ * order in which the forward solve reads them.
  *
  * A panel of k columns holds the inverse of its k x k triangle by columns (forward solve), the same by rows (backward
  * solve), and the rectangle below in chunks of one vector of rows: [chunk][column][lane], so that both solves stream

@@ -12,7 +12,7 @@
 typedef REAL vec __attribute__((vector_size(32)));                          /* four doubles or eight floats */
 typedef REAL loose __attribute__((vector_size(32), aligned(sizeof(REAL)))); /* the same anywhere */
 
-enum { LANES = 32 / sizeof(REAL), MOST_COLUMNS = 12 };
+enum { LANES = 32 / sizeof(REAL), MAX_COLUMNS = 12 };
 
 static inline int chunks_of(int n)
 {
@@ -27,11 +27,11 @@ static inline vec splat(REAL a)
 static inline __attribute__((always_inline)) void forward(int k, int r, const vec *restrict l, REAL *restrict t)
 {
     int c = chunks_of(k), n = chunks_of(r);
-    vec y[MOST_COLUMNS * sizeof(REAL) / 32 + 1] = {{0}}, b[MOST_COLUMNS];
+    vec y[MAX_COLUMNS * sizeof(REAL) / 32 + 1] = {{0}}, b[MAX_COLUMNS];
     for (int j = 0; j < k; j++, l += c)
         for (int i = 0; i < c; i++) y[i] += l[i] * t[j];
     l += k * c; /* the rows of the triangle */
-    REAL head[MOST_COLUMNS + LANES];
+    REAL head[MAX_COLUMNS + LANES];
     memcpy(head, y, sizeof(vec) * (size_t)c);
     for (int j = 0; j < k; j++) t[j] = head[j], b[j] = splat(head[j]);
     t += k;
@@ -46,7 +46,7 @@ static inline __attribute__((always_inline)) void forward(int k, int r, const ve
 static inline __attribute__((always_inline)) void backward(int k, int r, const vec *restrict l, REAL *restrict t)
 {
     int c = chunks_of(k), n = chunks_of(r);
-    vec y[MOST_COLUMNS * sizeof(REAL) / 32 + 1] = {{0}}, b[MOST_COLUMNS];
+    vec y[MAX_COLUMNS * sizeof(REAL) / 32 + 1] = {{0}}, b[MAX_COLUMNS];
     const vec *rows = l + k * c, *below = rows + k * c;
     for (int j = 0; j < k; j++) b[j] = (vec){0};
     for (int i = 0; i < n; i++, below += k) {
@@ -164,7 +164,7 @@ static void invert(int k, const double *x, int64_t ld, double *inverse)
 
 static REAL *fill_panel(int k, int r, const double *x, int64_t ld, REAL *to)
 {
-    double inverse[MOST_COLUMNS * MOST_COLUMNS];
+    double inverse[MAX_COLUMNS * MAX_COLUMNS];
     int up = LANES * chunks_of(k), n = chunks_of(r);
     invert(k, x, ld, inverse);
     for (int j = 0; j < k; j++)

@@ -55,8 +55,8 @@ void pal_matrix_quat(const double r[9], double q[4])
     for (int i = 0; i < 4; i++) q[i] = n * d[i];
 }
 
-/* columns i and j, kept as rows, turned so that they are orthogonal; those of v follow. True where the turn was so
- * small that what it spoils elsewhere is below rounding: a sweep of such turns is the last one */
+/* Rotates columns i and j (kept as rows) so that they are orthogonal, and those of v with them. True where the angle
+ * was so small that its effect elsewhere is below rounding: a sweep of such rotations is the last one */
 static inline bool make_orthogonal(double *restrict bi, double *restrict bj, double *restrict vi, double *restrict vj)
 {
     double a = pal_dot3(bi, bi), b = pal_dot3(bj, bj), g = pal_dot3(bi, bj);
@@ -74,7 +74,7 @@ static inline bool make_orthogonal(double *restrict bi, double *restrict bj, dou
     return g * g <= 1e-18 * ab && fabs(h) <= 1e-7 * w;
 }
 
-/* rows i and j of both exchanged, the sense of v kept */
+/* exchanges rows i and j of both and keeps the orientation of v */
 static void exchange(double b[3][3], double v[3][3], int i, int j)
 {
     for (int k = 0; k < 3; k++) {
@@ -97,17 +97,17 @@ static void any_normal(const double u[3], double r[3])
 
 static double largest(const double f[9])
 {
-    double most = 0;
-    for (int i = 0; i < 9; i++) most = fmax(most, fabs(f[i]));
-    return most;
+    double max = 0;
+    for (int i = 0; i < 9; i++) max = fmax(max, fabs(f[i]));
+    return max;
 }
 
 void pal_svd3(const double f[9], double u[9], double s[3], double v[9])
 {
     double b[3][3], w[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, r[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    double most = largest(f), sum = 0;
+    double max = largest(f), sum = 0;
     for (int i = 0; i < 9; i++) sum += 0 * f[i];
-    if (!(most > 0) || sum != 0) { /* zero or not finite */
+    if (!(max > 0) || sum != 0) { /* zero or not finite */
         for (int i = 0; i < 9; i++) u[i] = v[i] = i % 4 == 0;
         for (int i = 0; i < 3; i++) s[i] = sum;
         return;
@@ -115,8 +115,8 @@ void pal_svd3(const double f[9], double u[9], double s[3], double v[9])
     /* scaled only where squares would leave the range, in two halves (1e308 fits in neither) and exactly */
     int e = 0;
     double up = 1, up2 = 1;
-    if (!(most > 1e-70 && most < 1e70)) {
-        (void)frexp(most, &e);
+    if (!(max > 1e-70 && max < 1e70)) {
+        (void)frexp(max, &e);
         up = ldexp(1, -e / 2), up2 = ldexp(1, -e - -e / 2);
     }
     for (int i = 0; i < 3; i++)
@@ -152,8 +152,8 @@ void pal_svd3(const double f[9], double u[9], double s[3], double v[9])
     }
 }
 
-/* one Jacobi turn of the symmetric a, entries about 1, in the plane p, q; rows p, q of v follow. True as above */
-static inline bool jacobi_turn(double a[3][3], double v[3][3], int p, int q)
+/* One Jacobi rotation of the symmetric a, entries about 1, in the plane p, q; rows p, q of v follow. True as above */
+static inline bool jacobi_rotation(double a[3][3], double v[3][3], int p, int q)
 {
     double g = a[p][q], d = a[q][q] - a[p][p], h = 2 * g;
     if (!(fabs(g) > 1e-17)) return true;
@@ -175,20 +175,20 @@ static inline bool jacobi_turn(double a[3][3], double v[3][3], int p, int q)
 void pal_eigen3(const double f[9], double w[3], double v[9])
 {
     double a[3][3], b[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    double most = largest(f), sum = 0;
+    double max = largest(f), sum = 0;
     for (int i = 0; i < 9; i++) sum += 0 * f[i];
-    if (!(most > 0) || sum != 0) {
+    if (!(max > 0) || sum != 0) {
         for (int i = 0; i < 9; i++) v[i] = i % 4 == 0;
         for (int i = 0; i < 3; i++) w[i] = sum;
         return;
     }
-    double up = most > 1e-300 ? 1 / most : 1e300;
+    double up = max > 1e-300 ? 1 / max : 1e300;
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) a[i][j] = up * 0.5 * (f[3 * i + j] + f[3 * j + i]);
     for (int sweep = 0; sweep < 12; sweep++) {
-        bool small = jacobi_turn(a, b, 0, 1);
-        small &= jacobi_turn(a, b, 0, 2);
-        small &= jacobi_turn(a, b, 1, 2);
+        bool small = jacobi_rotation(a, b, 0, 1);
+        small &= jacobi_rotation(a, b, 0, 2);
+        small &= jacobi_rotation(a, b, 1, 2);
         if (small) break;
     }
     int at[3] = {0, 1, 2};
@@ -208,13 +208,13 @@ void pal_eigen3(const double f[9], double w[3], double v[9])
 }
 
 /* the rotation that maximises R : F, from the singular values; the nearest to q where many do */
-static void turn_by_svd(const double f[9], double q[4])
+static void rotation_by_svd(const double f[9], double q[4])
 {
     double u[9], s[3], v[9], old[9], m[9], r[9], t[9];
     pal_svd3(f, u, s, v);
     double c = 1, z = 0;
     if (s[1] + s[2] <= 1e-12 * s[0]) {
-        /* any turn about the first axis is as good: M = U' R V, nearest to R */
+        /* any rotation about the first axis is optimal: M = U' R V, nearest to R */
         pal_quat_matrix(q, old);
         for (int i = 0; i < 3; i++)
             for (int j = 0; j < 3; j++)
@@ -224,7 +224,7 @@ static void turn_by_svd(const double f[9], double q[4])
         double x = m[4] + m[8], y = m[7] - m[5], n = sqrt(x * x + y * y);
         if (n > 1e-12) c = x / n, z = y / n;
     }
-    for (int i = 0; i < 3; i++) { /* t = U turn, turn = (1, (c -z), (z c)) */
+    for (int i = 0; i < 3; i++) { /* t = U rotation, rotation = (1, (c -z), (z c)) */
         t[3 * i] = u[3 * i];
         t[3 * i + 1] = c * u[3 * i + 1] + z * u[3 * i + 2];
         t[3 * i + 2] = c * u[3 * i + 2] - z * u[3 * i + 1];
@@ -238,9 +238,9 @@ static void turn_by_svd(const double f[9], double q[4])
 }
 
 /* w = A^-1 g, A = tr(S) I - sym(S); false where A is not clearly positive definite. |F| is about 1 */
-static bool newton_turn(const double f[9], const double q[4], double w[3])
+static bool newton_step(const double f[9], const double q[4], double w[3])
 {
-    const double least = 0.02;
+    const double min = 0.02;
     double r[9], s[9];
     pal_quat_matrix(q, r);
     for (int i = 0; i < 3; i++)
@@ -251,7 +251,7 @@ static bool newton_turn(const double f[9], const double q[4], double w[3])
     /* cofactors; by the signs of the leading minors (Sylvester) */
     double c00 = a11 * a22 - a21 * a21, c10 = a21 * a20 - a10 * a22, c20 = a10 * a21 - a11 * a20;
     double det = a00 * c00 + a10 * c10 + a20 * c20, minor = a00 * a11 - a10 * a10;
-    if (!(a00 > least && minor > least * a00 && det > least * minor)) return false;
+    if (!(a00 > min && minor > min * a00 && det > min * minor)) return false;
     double c11 = a00 * a22 - a20 * a20, c21 = a10 * a20 - a00 * a21, d = 1 / det;
     w[0] = d * (c00 * g[0] + c10 * g[1] + c20 * g[2]);
     w[1] = d * (c10 * g[0] + c11 * g[1] + c21 * g[2]);
@@ -259,8 +259,8 @@ static bool newton_turn(const double f[9], const double q[4], double w[3])
     return true;
 }
 
-/* q <- q * the turn by w in the body's own axes (Cayley: 2 atan |w|/2, so never beyond half a turn) */
-static void turn(double q[4], const double w[3])
+/* q <- q * the rotation by w in the body's own axes (Cayley: 2 atan |w|/2, so never beyond 180 degrees) */
+static void rotate(double q[4], const double w[3])
 {
     double x = 0.5 * w[0], y = 0.5 * w[1], z = 0.5 * w[2];
     double p[4] = {q[0] - q[1] * x - q[2] * y - q[3] * z, q[1] + q[0] * x + q[2] * z - q[3] * y,
@@ -269,7 +269,7 @@ static void turn(double q[4], const double w[3])
     for (int i = 0; i < 4; i++) q[i] = n * p[i];
 }
 
-int pal_polar_rotation(const double f[9], double q[4], int most)
+int pal_polar_rotation(const double f[9], double q[4], int max)
 {
     enum { PATIENCE = 10 };
     double h[9], w[3], square = 0;
@@ -282,14 +282,14 @@ int pal_polar_rotation(const double f[9], double q[4], int most)
         scale = 1 / top;
     }
     for (int i = 0; i < 9; i++) h[i] = scale * f[i];
-    for (int n = 1; n <= most; n++) {
-        if (n > PATIENCE || !newton_turn(h, q, w)) {
-            turn_by_svd(h, q);
+    for (int n = 1; n <= max; n++) {
+        if (n > PATIENCE || !newton_step(h, q, w)) {
+            rotation_by_svd(h, q);
             return n;
         }
-        turn(q, w);
-        /* the next turn would be about the square of this one */
+        rotate(q, w);
+        /* the next step would be about the square of this one */
         if (pal_dot3(w, w) < 1e-12) return n;
     }
-    return most;
+    return max;
 }

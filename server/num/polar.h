@@ -4,10 +4,10 @@
 #include <stdbool.h>
 
 /* The rotation R that maximises R : F (the polar rotation where det F > 0), by quaternion iteration (Mueller et al.
- * 2016) from q (w x y z, unit, in and out: warm start), until a turn is below 1e-10 rad or `most` turns are made. Never
- * fails on det F <= 0; where it stands still at a saddle (half a turn off) it restarts from another rotation. F = 0 or
- * F not finite leaves q as it is. Returns the number of turns. */
-int pal_polar_rotation(const double f[9], double q[4], int most);
+ * 2016) from q (w x y z, unit, in and out: warm start), until a step is below 1e-10 rad or `max` steps are made. It
+ * never fails on det F <= 0; at a saddle (180 degrees off) it restarts from another rotation. F = 0 or F not finite
+ * leaves q unchanged. Returns the number of steps. */
+int pal_polar_rotation(const double f[9], double q[4], int max);
 void pal_quat_matrix(const double q[4], double r[9]);
 void pal_matrix_quat(const double r[9], double q[4]);
 /* F = U diag(s) V', U and V rotations, s[0] >= s[1] >= |s[2]|, s[2] < 0 where det F < 0 */

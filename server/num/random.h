@@ -1,5 +1,5 @@
-/* Random numbers that are the same on every machine, drawn by a counter, so that work may be done out of order and
- * still have its own numbers. Thread: any. */
+/* Random numbers that are the same on every machine, drawn by a counter, so that work may be done out of order and each
+ * piece still has its own numbers. Thread: any. */
 #ifndef PAL_NUM_RANDOM_H
 #define PAL_NUM_RANDOM_H
 #include <stdint.h>

@@ -1,4 +1,4 @@
-/* Shape functions of subdivided solids on the unit cube (A 3.4): u, v, w in [0, 1]. By number of nodes:
+/* Shape functions of subdivided solids on the unit cube (paper A section 3.4): u, v, w in [0, 1]. By number of nodes:
  *   64  uniform tricubic B-splines: node m = 16 j + 4 k + l has B_j(u) B_k(v) B_l(w)
  *    8  trilinear: node c at bits 0, 1, 2 of u, v, w
  *    5  a pyramid: the same hexahedron with corners 0, 1, 3, 2 = nodes 0, 1, 2, 3 and corners 4 to 7 in node 4

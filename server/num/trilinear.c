@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* share of a cell below which a point stands on a plane of nodes: rounding must not make a node count that the body
+/* distance in cells below which a point lies on a plane of nodes: rounding must not make a node count that the body
  * does not reach */
 static const double ON_PLANE = 1e-10;
 
@@ -72,14 +72,14 @@ static void list_entries(const pal_grid *grid, const double *x, int64_t *entry, 
 
 pal_err pal_grid_weights_make(const pal_grid *grid, const double *x, int n_point, pal_grid_weights *out)
 {
-    size_t most = 8 * (size_t)n_point + 1;
+    size_t max = 8 * (size_t)n_point + 1;
     *out = (pal_grid_weights){.n_point = n_point};
-    if (most > INT32_MAX) return PAL_ERR_MEMORY;
-    int64_t *entry = malloc(most * sizeof *entry);
+    if (max > INT32_MAX) return PAL_ERR_MEMORY;
+    int64_t *entry = malloc(max * sizeof *entry);
     out->start = malloc(((size_t)n_point + 1) * sizeof *out->start);
-    out->node = malloc(most * sizeof *out->node);
-    out->weight = malloc(most * sizeof *out->weight);
-    out->used = malloc(most * sizeof *out->used);
+    out->node = malloc(max * sizeof *out->node);
+    out->weight = malloc(max * sizeof *out->weight);
+    out->used = malloc(max * sizeof *out->used);
     if (!entry || !out->start || !out->node || !out->weight || !out->used) {
         free(entry);
         pal_grid_weights_free(out);

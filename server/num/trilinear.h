@@ -1,6 +1,6 @@
-/* Trilinear interpolation on a regular grid of nodes (paper B 3.5): the eight weights of a point, and the sparse matrix
- * of many points with the nodes that touch none of them dropped. Beyond the grid the border's values hold (erratum
- * B12). Nodes are numbered x fastest. Thread: [load]. */
+/* Trilinear interpolation on a regular grid of nodes (paper B section 3.5): the eight weights of a point, and the
+ * sparse matrix of many points with the nodes that no point uses dropped. Beyond the grid the values of its border hold
+ * (erratum B12: server/mesh/README.md). Nodes are numbered x fastest. Thread: [load]. */
 #ifndef PAL_NUM_TRILINEAR_H
 #define PAL_NUM_TRILINEAR_H
 #include "server/base/err.h"

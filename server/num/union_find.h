@@ -1,6 +1,6 @@
-/* Disjoint sets of the numbers 0 to n - 1 (union-find, paths halved on the way). The least number of a set is its root,
- * whatever the order of joins, so that roots come before their members. root [n]: a forest of the caller's. No memory,
- * no errors. Thread: [any], one at a time. */
+/* Disjoint sets of the numbers 0 to n - 1 (union-find with path halving). The smallest number of a set is its root,
+ * whatever the order of joins, so that roots precede their members. root [n] is memory of the caller. No memory, no
+ * errors. Thread: [any], one at a time. */
 #ifndef PAL_NUM_UNION_FIND_H
 #define PAL_NUM_UNION_FIND_H
 #include <stdint.h>

@@ -45,9 +45,9 @@ static pal_err check_text(const pal_json *json, const char *text, size_t n_byte)
 
 pal_err pal_json_parse(const pal_json *json, const char *text, size_t n_byte, cJSON **out)
 {
-    if (n_byte > PAL_JSON_MOST)
+    if (n_byte > PAL_JSON_MAX_BYTES)
         return pal_diagnostic_set(json->diag, PAL_ERR_REFUSED, "%s: %zu bytes, more than %d", json->file, n_byte,
-                                  PAL_JSON_MOST);
+                                  PAL_JSON_MAX_BYTES);
     PAL_TRY(check_text(json, text, n_byte));
     const char *end = text;
     cJSON *root = n_byte ? cJSON_ParseWithLengthOpts(text, n_byte, &end, false) : NULL;
@@ -66,7 +66,7 @@ pal_err pal_json_parse(const pal_json *json, const char *text, size_t n_byte, cJ
     return PAL_ERR_OK;
 }
 
-pal_err pal_json_bad(const pal_json *json, const char *path, const char *format, ...)
+pal_err pal_json_refuse(const pal_json *json, const char *path, const char *format, ...)
 {
     char sentence[384];
     va_list args;
@@ -109,19 +109,20 @@ static void clean_key(const char *key, char out[64])
 pal_err pal_json_object(const pal_json *json, const cJSON *object, const char *path, const char *const *known)
 {
     char at[PAL_JSON_PATH], list[256], key[64];
-    if (!cJSON_IsObject(object)) return pal_json_bad(json, path, "is not an object {...}");
-    if (cJSON_GetArraySize(object) > PAL_JSON_KEYS) return pal_json_bad(json, path, "more than %d keys", PAL_JSON_KEYS);
+    if (!cJSON_IsObject(object)) return pal_json_refuse(json, path, "is not an object {...}");
+    if (cJSON_GetArraySize(object) > PAL_JSON_KEYS)
+        return pal_json_refuse(json, path, "more than %d keys", PAL_JSON_KEYS);
     for (const cJSON *child = object->child; child; child = child->next) {
         bool found = !known;
         for (int k = 0; known && known[k] && !found; k++) found = !strcmp(child->string, known[k]);
         clean_key(child->string, key);
         if (!found) {
             list_known(known, list, sizeof list);
-            return pal_json_bad(json, pal_json_key(at, path, key), "unknown key; known are %s", list);
+            return pal_json_refuse(json, pal_json_key(at, path, key), "unknown key; known are %s", list);
         }
         for (const cJSON *other = object->child; other != child; other = other->next)
             if (!strcmp(other->string, child->string))
-                return pal_json_bad(json, pal_json_key(at, path, key), "the key is there twice");
+                return pal_json_refuse(json, pal_json_key(at, path, key), "the key is there twice");
     }
     return PAL_ERR_OK;
 }
@@ -132,9 +133,10 @@ pal_err pal_json_number(const pal_json *json, const cJSON *object, const char *p
     char at[PAL_JSON_PATH];
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
     if (!item) return PAL_ERR_OK;
-    if (!cJSON_IsNumber(item)) return pal_json_bad(json, pal_json_key(at, path, key), "is not a number");
+    if (!cJSON_IsNumber(item)) return pal_json_refuse(json, pal_json_key(at, path, key), "is not a number");
     if (!(item->valuedouble >= low && item->valuedouble <= high))
-        return pal_json_bad(json, pal_json_key(at, path, key), "%g is outside %g .. %g", item->valuedouble, low, high);
+        return pal_json_refuse(json, pal_json_key(at, path, key), "%g is outside %g .. %g", item->valuedouble, low,
+                               high);
     *out = item->valuedouble;
     return PAL_ERR_OK;
 }
@@ -145,7 +147,7 @@ pal_err pal_json_count(const pal_json *json, const cJSON *object, const char *pa
     char at[PAL_JSON_PATH];
     double number = *out;
     PAL_TRY(pal_json_number(json, object, path, key, low, high, &number));
-    if (number != floor(number)) return pal_json_bad(json, pal_json_key(at, path, key), "%g is not whole", number);
+    if (number != floor(number)) return pal_json_refuse(json, pal_json_key(at, path, key), "%g is not whole", number);
     *out = (int)number;
     return PAL_ERR_OK;
 }
@@ -154,7 +156,7 @@ pal_err pal_json_bool(const pal_json *json, const cJSON *object, const char *pat
 {
     char at[PAL_JSON_PATH];
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
-    if (item && !cJSON_IsBool(item)) return pal_json_bad(json, pal_json_key(at, path, key), "is not true or false");
+    if (item && !cJSON_IsBool(item)) return pal_json_refuse(json, pal_json_key(at, path, key), "is not true or false");
     if (item) *out = cJSON_IsTrue(item);
     return PAL_ERR_OK;
 }
@@ -168,10 +170,10 @@ pal_err pal_json_vector(const pal_json *json, const cJSON *object, const char *p
     const cJSON *child = cJSON_IsArray(item) ? item->child : NULL;
     for (int k = 0; k < 3; k++, child = child->next) {
         if (!child || !cJSON_IsNumber(child) || !isfinite(child->valuedouble))
-            return pal_json_bad(json, pal_json_key(at, path, key), "is not a list of three numbers");
+            return pal_json_refuse(json, pal_json_key(at, path, key), "is not a list of three numbers");
         number[k] = child->valuedouble;
     }
-    if (child) return pal_json_bad(json, pal_json_key(at, path, key), "is not a list of three numbers");
+    if (child) return pal_json_refuse(json, pal_json_key(at, path, key), "is not a list of three numbers");
     memcpy(out, number, sizeof number);
     return PAL_ERR_OK;
 }
@@ -184,13 +186,13 @@ pal_err pal_json_text(const pal_json *json, const cJSON *object, const char *pat
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
     if (!item) return PAL_ERR_OK;
     pal_json_key(at, path, key);
-    if (!cJSON_IsString(item)) return pal_json_bad(json, at, "is not a text");
+    if (!cJSON_IsString(item)) return pal_json_refuse(json, at, "is not a text");
     size_t n = strlen(item->valuestring);
-    if (n >= n_byte) return pal_json_bad(json, at, "%zu bytes of text, more than %zu", n, n_byte - 1);
-    if (n == 0 && !may_be_empty) return pal_json_bad(json, at, "is empty");
+    if (n >= n_byte) return pal_json_refuse(json, at, "%zu bytes of text, more than %zu", n, n_byte - 1);
+    if (n == 0 && !may_be_empty) return pal_json_refuse(json, at, "is empty");
     for (size_t k = 0; k < n;) {
         int size = pal_utf8_next(item->valuestring + k, n - k, &code);
-        if (size == 0 || !pal_utf8_printable(code)) return pal_json_bad(json, at, "has a control character");
+        if (size == 0 || !pal_utf8_printable(code)) return pal_json_refuse(json, at, "has a control character");
         k += (size_t)size;
     }
     memcpy(out, item->valuestring, n + 1);
@@ -204,9 +206,9 @@ pal_err pal_json_list(const pal_json *json, const cJSON *object, const char *pat
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
     *out = NULL;
     if (!item) return PAL_ERR_OK;
-    if (!cJSON_IsArray(item)) return pal_json_bad(json, pal_json_key(at, path, key), "is not a list [...]");
+    if (!cJSON_IsArray(item)) return pal_json_refuse(json, pal_json_key(at, path, key), "is not a list [...]");
     int n = cJSON_GetArraySize(item);
-    if (n > most) return pal_json_bad(json, pal_json_key(at, path, key), "%d entries, more than %d", n, most);
+    if (n > most) return pal_json_refuse(json, pal_json_key(at, path, key), "%d entries, more than %d", n, most);
     *out = item;
     return PAL_ERR_OK;
 }

@@ -7,7 +7,7 @@
 #include <cjson/cJSON.h>
 #include <stdbool.h>
 
-enum { PAL_JSON_MOST = 1 << 20, PAL_JSON_DEPTH = 16, PAL_JSON_PATH = 96, PAL_JSON_KEYS = 64 };
+enum { PAL_JSON_MAX_BYTES = 1 << 20, PAL_JSON_DEPTH = 16, PAL_JSON_PATH = 96, PAL_JSON_KEYS = 64 };
 
 typedef struct pal_json {
     const char *file;     /* for messages */
@@ -19,7 +19,7 @@ typedef struct pal_json {
 pal_err pal_json_parse(const pal_json *json, const char *text, size_t n_byte, cJSON **out);
 
 /* "file: path: sentence", REFUSED */
-pal_err pal_json_bad(const pal_json *json, const char *path, const char *format, ...)
+pal_err pal_json_refuse(const pal_json *json, const char *path, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 /* path of a key in an object ("" is the root) or of an entry in a list; returns out */
 const char *pal_json_key(char out[PAL_JSON_PATH], const char *path, const char *key);

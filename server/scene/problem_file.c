@@ -33,7 +33,7 @@ static pal_err need(const reader *r, const cJSON *object, const char *path, cons
 {
     char at[PAL_JSON_PATH];
     for (; *keys; keys++)
-        if (!has(object, *keys)) return pal_json_bad(&r->json, pal_json_key(at, path, *keys), "is missing");
+        if (!has(object, *keys)) return pal_json_refuse(&r->json, pal_json_key(at, path, *keys), "is missing");
     return PAL_ERR_OK;
 }
 
@@ -42,12 +42,12 @@ static pal_err read_vector(const reader *r, const cJSON *object, const char *pat
                            double out[3])
 {
     char at[PAL_JSON_PATH];
-    if (!has(object, key)) return pal_json_bad(&r->json, pal_json_key(at, path, key), "is missing");
+    if (!has(object, key)) return pal_json_refuse(&r->json, pal_json_key(at, path, key), "is missing");
     PAL_TRY(pal_json_vector(&r->json, object, path, key, out));
     for (int c = 0; c < 3; c++)
         if (!(fabs(out[c]) <= most))
-            return pal_json_bad(&r->json, pal_json_key(at, path, key), "number %d, %g, is beyond %g", c + 1, out[c],
-                                most);
+            return pal_json_refuse(&r->json, pal_json_key(at, path, key), "number %d, %g, is beyond %g", c + 1, out[c],
+                                   most);
     return PAL_ERR_OK;
 }
 
@@ -76,7 +76,7 @@ static pal_err read_word(const reader *r, const cJSON *object, const char *path,
         if (!strcmp(words[k], out)) return PAL_ERR_OK;
         n += (size_t)snprintf(list + n, sizeof list - n, "%s\"%s\"", k ? ", " : "", words[k]);
     }
-    return pal_json_bad(&r->json, pal_json_key(at, path, key), "\"%s\" is not known; known are %s", out, list);
+    return pal_json_refuse(&r->json, pal_json_key(at, path, key), "\"%s\" is not known; known are %s", out, list);
 }
 
 /* a file's name: beside the problem unless it is absolute */
@@ -87,7 +87,8 @@ static pal_err read_file(const reader *r, const cJSON *object, const char *path,
     PAL_TRY(pal_json_text(&r->json, object, path, key, false, name, sizeof name));
     int n = name[0] == '/' ? snprintf(out, n_byte, "%s", name) : snprintf(out, n_byte, "%s/%s", r->folder, name);
     if (n < 0 || (size_t)n >= n_byte)
-        return pal_json_bad(&r->json, pal_json_key(at, path, key), "with its folder longer than %zu bytes", n_byte - 1);
+        return pal_json_refuse(&r->json, pal_json_key(at, path, key), "with its folder longer than %zu bytes",
+                               n_byte - 1);
     return PAL_ERR_OK;
 }
 
@@ -96,8 +97,8 @@ static pal_err read_young(const reader *r, const cJSON *object, const char *path
     char at[PAL_JSON_PATH];
     PAL_TRY(pal_json_number(&r->json, object, path, "E", -INFINITY, INFINITY, out));
     if (has(object, "E") && !(*out >= PAL_YOUNG_MIN_PA && *out <= PAL_YOUNG_MAX_PA))
-        return pal_json_bad(&r->json, pal_json_key(at, path, "E"), "%g Pa is not a stiffness: wanted %s, %g to %g",
-                            *out, *out > 0 ? "less extreme" : "more than 0", PAL_YOUNG_MIN_PA, PAL_YOUNG_MAX_PA);
+        return pal_json_refuse(&r->json, pal_json_key(at, path, "E"), "%g Pa is not a stiffness: wanted %s, %g to %g",
+                               *out, *out > 0 ? "less extreme" : "more than 0", PAL_YOUNG_MIN_PA, PAL_YOUNG_MAX_PA);
     return PAL_ERR_OK;
 }
 
@@ -106,11 +107,11 @@ static pal_err read_poisson(const reader *r, const cJSON *object, const char *pa
     char at[PAL_JSON_PATH];
     PAL_TRY(pal_json_number(&r->json, object, path, "nu", -INFINITY, INFINITY, out));
     if (has(object, "nu") && !(*out > -1 && *out < 0.5))
-        return pal_json_bad(&r->json, pal_json_key(at, path, "nu"),
-                            "%g is not a Poisson ratio: wanted more than -1 and less than 0.5", *out);
+        return pal_json_refuse(&r->json, pal_json_key(at, path, "nu"),
+                               "%g is not a Poisson ratio: wanted more than -1 and less than 0.5", *out);
     if (has(object, "nu") && *out < PAL_POISSON_MIN)
-        return pal_json_bad(&r->json, pal_json_key(at, path, "nu"), "%g is nearer to -1 than %g", *out,
-                            PAL_POISSON_MIN);
+        return pal_json_refuse(&r->json, pal_json_key(at, path, "nu"), "%g is nearer to -1 than %g", *out,
+                               PAL_POISSON_MIN);
     return PAL_ERR_OK;
 }
 
@@ -120,14 +121,14 @@ static pal_err read_region(const reader *r, const cJSON *parent, const char *abo
     char path[PAL_JSON_PATH], at[PAL_JSON_PATH], type[8] = "";
     const cJSON *object = cJSON_GetObjectItemCaseSensitive(parent, "region");
     pal_json_key(path, above, "region");
-    if (!object) return pal_json_bad(&r->json, path, "is missing");
+    if (!object) return pal_json_refuse(&r->json, path, "is missing");
     PAL_TRY(pal_json_object(&r->json, object, path, known));
     PAL_TRY(check_note(r, object, path));
     PAL_TRY(read_word(r, object, path, "type", types, type, sizeof type));
     *out = (pal_box){.all = !strcmp(type, "all")};
     if (out->all) {
         const char *extra = has(object, "min") ? "min" : has(object, "max") ? "max" : NULL;
-        if (extra) return pal_json_bad(&r->json, pal_json_key(at, path, extra), "only goes with type \"box\"");
+        if (extra) return pal_json_refuse(&r->json, pal_json_key(at, path, extra), "only goes with type \"box\"");
         for (int c = 0; c < 3; c++) out->low_m[c] = -length_most, out->high_m[c] = length_most;
         return PAL_ERR_OK;
     }
@@ -135,7 +136,8 @@ static pal_err read_region(const reader *r, const cJSON *parent, const char *abo
     PAL_TRY(read_vector(r, object, path, "max", length_most, out->high_m));
     for (int c = 0; c < 3; c++)
         if (out->low_m[c] > out->high_m[c])
-            return pal_json_bad(&r->json, path, "min[%d] %g is above max[%d] %g", c, out->low_m[c], c, out->high_m[c]);
+            return pal_json_refuse(&r->json, path, "min[%d] %g is above max[%d] %g", c, out->low_m[c], c,
+                                   out->high_m[c]);
     return PAL_ERR_OK;
 }
 
@@ -154,8 +156,8 @@ static pal_err read_material(const reader *r, const cJSON *object, int index)
     PAL_TRY(pal_json_text(&r->json, object, path, "id", false, m->id, sizeof m->id));
     for (int k = 0; k < index; k++)
         if (!strcmp(r->out->material[k].id, m->id))
-            return pal_json_bad(&r->json, pal_json_key(at, path, "id"), "\"%s\" is that of materials[%d] already",
-                                m->id, k);
+            return pal_json_refuse(&r->json, pal_json_key(at, path, "id"), "\"%s\" is that of materials[%d] already",
+                                   m->id, k);
     PAL_TRY(read_region(r, object, path, &m->region));
     PAL_TRY(read_young(r, object, path, &m->young_Pa));
     PAL_TRY(read_poisson(r, object, path, &m->poisson));
@@ -178,7 +180,7 @@ static pal_err read_support(const reader *r, const cJSON *object, int index)
     s->moved = !strcmp(type, "moved");
     if (s->moved) return read_vector(r, object, path, "move", length_most, s->move_m);
     if (has(object, "move"))
-        return pal_json_bad(&r->json, pal_json_key(at, path, "move"), "only goes with type \"moved\"");
+        return pal_json_refuse(&r->json, pal_json_key(at, path, "move"), "only goes with type \"moved\"");
     return PAL_ERR_OK;
 }
 
@@ -194,7 +196,7 @@ static pal_err check_total(const reader *r, const cJSON *object, const char *pat
         size = fmax(size, fabs(load->total_N[c]));
     }
     if (off > 1e-3 * size)
-        return pal_json_bad(&r->json, pal_json_key(at, path, "total_force"), "%g N off traction times area", off);
+        return pal_json_refuse(&r->json, pal_json_key(at, path, "total_force"), "%g N off traction times area", off);
     return PAL_ERR_OK;
 }
 
@@ -212,12 +214,12 @@ static pal_err read_traction(const reader *r, const cJSON *object, const char *p
         PAL_TRY(read_vector(r, object, path, "surface_normal", 1e9, load->normal));
         double length = pal_norm3(load->normal);
         if (!(length > 1e-9))
-            return pal_json_bad(&r->json, pal_json_key(at, path, "surface_normal"), "has no direction: length %g",
-                                length);
+            return pal_json_refuse(&r->json, pal_json_key(at, path, "surface_normal"), "has no direction: length %g",
+                                   length);
         pal_scale3(load->normal, 1 / length, load->normal);
     }
     if (!load->has_traction && !load->has_total)
-        return pal_json_bad(&r->json, path, "needs traction (Pa) or total_force (N)");
+        return pal_json_refuse(&r->json, path, "needs traction (Pa) or total_force (N)");
     if (load->has_traction) PAL_TRY(read_vector(r, object, path, "traction", 1e15, load->traction_Pa));
     if (load->has_total) PAL_TRY(read_vector(r, object, path, "total_force", 1e15, load->total_N));
     return check_total(r, object, path, load);
@@ -250,12 +252,12 @@ static pal_err read_id(const reader *r, const cJSON *object, const char *path, c
 {
     char at[PAL_JSON_PATH], id[PAL_NAME] = "";
     pal_json_key(at, path, "id");
-    if (!has(object, "id")) return pal_json_bad(&r->json, at, "is missing");
+    if (!has(object, "id")) return pal_json_refuse(&r->json, at, "is missing");
     PAL_TRY(pal_json_text(&r->json, object, path, "id", false, id, sizeof id));
     if (pal_problem_case_find(r->out, id))
-        return pal_json_bad(&r->json, at, "\"%s\" is that of a load case already", id);
+        return pal_json_refuse(&r->json, at, "\"%s\" is that of a load case already", id);
     if (pal_problem_reference_find(r->out, id))
-        return pal_json_bad(&r->json, at, "\"%s\" is that of a reference already", id);
+        return pal_json_refuse(&r->json, at, "\"%s\" is that of a reference already", id);
     memcpy(out, id, PAL_NAME);
     return PAL_ERR_OK;
 }
@@ -272,7 +274,7 @@ static pal_err read_case(const reader *r, const cJSON *object, int index)
     PAL_TRY(read_id(r, object, path, c->id));
     PAL_TRY(pal_json_list(&r->json, object, path, "loads", PAL_PROBLEM_LOADS, &list));
     pal_json_key(at, path, "loads");
-    if (!list || !list->child) return pal_json_bad(&r->json, at, "a load case needs at least one load");
+    if (!list || !list->child) return pal_json_refuse(&r->json, at, "a load case needs at least one load");
     for (const cJSON *child = list->child; child; child = child->next, c->n_load++)
         PAL_TRY(read_load(r, child, pal_json_entry(entry, at, c->n_load), &c->load[c->n_load]));
     return PAL_ERR_OK;
@@ -341,19 +343,19 @@ static pal_err read_reference(const reader *r, const cJSON *object, int index)
     PAL_TRY(read_file(r, object, path, "file", ref->file, sizeof ref->file));
     PAL_TRY(pal_json_text(&r->json, object, path, "load_case", false, ref->load_case, sizeof ref->load_case));
     if (!pal_problem_case_find(r->out, ref->load_case))
-        return pal_json_bad(&r->json, pal_json_key(at, path, "load_case"), "there is no load case \"%s\"",
-                            ref->load_case);
+        return pal_json_refuse(&r->json, pal_json_key(at, path, "load_case"), "there is no load case \"%s\"",
+                               ref->load_case);
     PAL_TRY(read_word(r, object, path, "kinematics", kinematics, word, sizeof word));
     PAL_TRY(read_word(r, object, path, "law", laws, ref->law, sizeof ref->law));
     ref->finite = !strcmp(word, "finite");
     if (ref->finite == !strcmp(ref->law, "hooke"))
-        return pal_json_bad(&r->json, pal_json_key(at, path, "law"), "\"%s\" does not go with %s kinematics", ref->law,
-                            word);
+        return pal_json_refuse(&r->json, pal_json_key(at, path, "law"), "\"%s\" does not go with %s kinematics",
+                               ref->law, word);
     ref->young_Pa = ref->poisson = ref->estimated_rms = ref->estimated_max = NAN;
     const char *own = has(object, "E") ? "E" : has(object, "nu") ? "nu" : NULL;
     if (own && r->out->n_material > 1)
-        return pal_json_bad(&r->json, pal_json_key(at, path, own), "the problem has %d materials: which one is meant?",
-                            r->out->n_material);
+        return pal_json_refuse(&r->json, pal_json_key(at, path, own),
+                               "the problem has %d materials: which one is meant?", r->out->n_material);
     PAL_TRY(read_young(r, object, path, &ref->young_Pa));
     PAL_TRY(read_poisson(r, object, path, &ref->poisson));
     PAL_TRY(read_error(r, object, path, "estimated_error", &ref->estimated_rms, &ref->estimated_max));
@@ -375,8 +377,8 @@ static pal_err check_units(const reader *r, const cJSON *root)
         snprintf(text, sizeof text, "%s", unit[k]);
         PAL_TRY(pal_json_text(&r->json, object, "units", known[k], false, text, sizeof text));
         if (strcmp(text, unit[k]))
-            return pal_json_bad(&r->json, pal_json_key(at, "units", known[k]), "\"%s\": only \"%s\" is taken%s", text,
-                                unit[k], k ? "" : " (surface_unit is for the surface file alone)");
+            return pal_json_refuse(&r->json, pal_json_key(at, "units", known[k]), "\"%s\": only \"%s\" is taken%s",
+                                   text, unit[k], k ? "" : " (surface_unit is for the surface file alone)");
     }
     return PAL_ERR_OK;
 }
@@ -397,7 +399,7 @@ static pal_err check_frequencies(const reader *r, const cJSON *root)
         PAL_TRY(pal_json_list(&r->json, child, path, "hz", 256, &hz));
         for (const cJSON *f = hz ? hz->child : NULL; f; f = f->next)
             if (!cJSON_IsNumber(f) || !(f->valuedouble >= 0))
-                return pal_json_bad(&r->json, pal_json_key(at, path, "hz"), "is not a list of frequencies");
+                return pal_json_refuse(&r->json, pal_json_key(at, path, "hz"), "is not a list of frequencies");
     }
     return PAL_ERR_OK;
 }
@@ -408,9 +410,9 @@ static pal_err read_list(const reader *r, const cJSON *root, const char *key, in
 {
     const cJSON *list;
     PAL_TRY(pal_json_list(&r->json, root, "", key, most, &list));
-    if (least >= 0 && !list) return pal_json_bad(&r->json, key, "is missing");
+    if (least >= 0 && !list) return pal_json_refuse(&r->json, key, "is missing");
     int n = list ? cJSON_GetArraySize(list) : 0;
-    if (n < least) return pal_json_bad(&r->json, key, "%d entries, wanted at least %d", n, least);
+    if (n < least) return pal_json_refuse(&r->json, key, "%d entries, wanted at least %d", n, least);
     for (const cJSON *child = list ? list->child : NULL; child; child = child->next, (*count)++)
         PAL_TRY(read(r, child, *count));
     return PAL_ERR_OK;
@@ -434,7 +436,7 @@ static pal_err read_problem(const reader *r, const cJSON *root)
     PAL_TRY(read_file(r, root, "", "surface", p->surface, sizeof p->surface));
     PAL_TRY(pal_json_text(&r->json, root, "", "surface_unit", false, unit, sizeof unit));
     if (!(p->unit_m = pal_mesh_unit_named(unit)))
-        return pal_json_bad(&r->json, "surface_unit", "\"%s\" is not m, cm, mm, um or in", unit);
+        return pal_json_refuse(&r->json, "surface_unit", "\"%s\" is not m, cm, mm, um or in", unit);
     const cJSON *geometry = cJSON_GetObjectItemCaseSensitive(root, "geometry");
     if (geometry) PAL_TRY(pal_json_object(&r->json, geometry, "geometry", NULL));
     PAL_TRY(check_frequencies(r, root));
@@ -480,7 +482,7 @@ pal_err pal_problem_read(const char *path, pal_problem **out, pal_diagnostic *di
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.100s...: the path is too long", path);
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, PAL_JSON_MOST, &bytes, &n_byte, diag));
+    PAL_TRY(pal_file_read(path, PAL_JSON_MAX_BYTES, &bytes, &n_byte, diag));
     pal_err err = pal_problem_parse(path, (const char *)bytes, n_byte, folder, out, diag);
     free(bytes);
     return err;

@@ -39,12 +39,12 @@ static pal_err read_box(const pal_json *json, const cJSON *object, const char *p
     char at[PAL_JSON_PATH];
     for (int k = 0; k < 2; k++)
         if (!cJSON_GetObjectItemCaseSensitive(object, needed[k]))
-            return pal_json_bad(json, pal_json_key(at, path, needed[k]), "is missing");
+            return pal_json_refuse(json, pal_json_key(at, path, needed[k]), "is missing");
     PAL_TRY(pal_json_vector(json, object, path, "low_m", low_m));
     PAL_TRY(pal_json_vector(json, object, path, "high_m", high_m));
     for (int c = 0; c < 3; c++)
         if (low_m[c] > high_m[c] || (!may_be_flat[c] && low_m[c] == high_m[c]))
-            return pal_json_bad(json, path, "low_m[%d] %g is not below high_m[%d] %g", c, low_m[c], c, high_m[c]);
+            return pal_json_refuse(json, path, "low_m[%d] %g is not below high_m[%d] %g", c, low_m[c], c, high_m[c]);
     return PAL_ERR_OK;
 }
 
@@ -54,18 +54,18 @@ static pal_err read_values(const pal_json *json, const cJSON *grid, const char *
 {
     char at[PAL_JSON_PATH];
     const cJSON *list;
-    PAL_TRY(pal_json_list(json, grid, path, key, PAL_GRID_MOST, &list));
+    PAL_TRY(pal_json_list(json, grid, path, key, PAL_GRID_NODES_MAX, &list));
     *out = list ? to : NULL;
     if (!list) return PAL_ERR_OK;
     pal_json_key(at, path, key);
     if (cJSON_GetArraySize(list) != n)
-        return pal_json_bad(json, at, "%d numbers, wanted %d (n[0] n[1] n[2])", cJSON_GetArraySize(list), n);
+        return pal_json_refuse(json, at, "%d numbers, wanted %d (n[0] n[1] n[2])", cJSON_GetArraySize(list), n);
     int k = 0;
     for (const cJSON *child = list->child; child; child = child->next, k++) {
-        if (!cJSON_IsNumber(child)) return pal_json_bad(json, at, "entry %d is not a number", k + 1);
+        if (!cJSON_IsNumber(child)) return pal_json_refuse(json, at, "entry %d is not a number", k + 1);
         to[k] = child->valuedouble;
         if (!(to[k] >= low && to[k] <= high))
-            return pal_json_bad(json, at, "number %d, %g, is outside %g .. %g", k + 1, to[k], low, high);
+            return pal_json_refuse(json, at, "number %d, %g, is outside %g .. %g", k + 1, to[k], low, high);
     }
     return PAL_ERR_OK;
 }
@@ -79,14 +79,15 @@ static pal_err read_nodes(const pal_json *json, const cJSON *grid, const char *p
     bool flat[3];
     PAL_TRY(pal_json_vector(json, grid, path, "n", n));
     for (int c = 0; c < 3; c++) {
-        if (!(n[c] >= 1 && n[c] <= PAL_GRID_MOST && n[c] == floor(n[c])))
-            return pal_json_bad(json, pal_json_key(at, path, "n"), "number %d, %g, is not a count from 1", c + 1, n[c]);
+        if (!(n[c] >= 1 && n[c] <= PAL_GRID_NODES_MAX && n[c] == floor(n[c])))
+            return pal_json_refuse(json, pal_json_key(at, path, "n"), "number %d, %g, is not a count from 1", c + 1,
+                                   n[c]);
         out_n[c] = (int)n[c];
         flat[c] = n[c] == 1;
     }
-    if (n[0] * n[1] * n[2] > PAL_GRID_MOST)
-        return pal_json_bad(json, pal_json_key(at, path, "n"), "%g values, more than %d", n[0] * n[1] * n[2],
-                            PAL_GRID_MOST);
+    if (n[0] * n[1] * n[2] > PAL_GRID_NODES_MAX)
+        return pal_json_refuse(json, pal_json_key(at, path, "n"), "%g values, more than %d", n[0] * n[1] * n[2],
+                               PAL_GRID_NODES_MAX);
     PAL_TRY(read_box(json, grid, path, flat, low_m, high_m));
     *own = malloc(3 * (size_t)(out_n[0] * out_n[1] * out_n[2]) * sizeof **own);
     if (!*own) return pal_diagnostic_set(json->diag, PAL_ERR_MEMORY, "%s: no memory for its grid", path);
@@ -107,7 +108,7 @@ static pal_err read_grid(const pal_json *json, const cJSON *region, const char *
         PAL_TRY(read_values(json, grid, path, value_key[k], value_low[k], value_high[k], count, *own + k * count,
                             value[k]));
     if (!out->grid_young_Pa && !out->grid_poisson && !out->grid_density_kg_m3)
-        return pal_json_bad(json, path, "needs young_Pa, poisson or density_kg_m3");
+        return pal_json_refuse(json, path, "needs young_Pa, poisson or density_kg_m3");
     return PAL_ERR_OK;
 }
 
@@ -160,11 +161,11 @@ static pal_err sample(const pal_json *json, const char *path, const pal_label_vo
     double from_m[9];
     int64_t found = 0;
     lay_grid(v, out);
-    if (!invert(v->to_m, from_m)) return pal_json_bad(json, path, "the voxels of the volume have no size");
+    if (!invert(v->to_m, from_m)) return pal_json_refuse(json, path, "the voxels of the volume have no size");
     double count = (double)out->n[0] * out->n[1] * out->n[2];
     for (int c = 0; c < 3; c++)
-        if (out->n[c] > 32767) return pal_json_bad(json, path, "%d voxels on an axis, more than 32767", out->n[c]);
-    if (count > voxels_most) return pal_json_bad(json, path, "%g voxels, more than %g", count, voxels_most);
+        if (out->n[c] > 32767) return pal_json_refuse(json, path, "%d voxels on an axis, more than 32767", out->n[c]);
+    if (count > voxels_most) return pal_json_refuse(json, path, "%g voxels, more than %g", count, voxels_most);
     *own = calloc((size_t)count, 1);
     if (!*own) return pal_diagnostic_set(json->diag, PAL_ERR_MEMORY, "%s: no memory for its voxels", path);
     for (int k = 0; k < out->n[2]; k++)
@@ -186,7 +187,7 @@ static pal_err sample(const pal_json *json, const char *path, const pal_label_vo
                 (*own)[((size_t)k * (size_t)out->n[1] + (size_t)j) * (size_t)out->n[0] + (size_t)i] = inside;
                 found += inside;
             }
-    if (found == 0) return pal_json_bad(json, path, "the volume has no voxel of label %d", is);
+    if (found == 0) return pal_json_refuse(json, path, "the volume has no voxel of label %d", is);
     out->label = *own;
     out->is = 1;
     pal_sub3(out->low_m, out->low_m, origin);
@@ -206,11 +207,11 @@ static pal_err read_label(const pal_json *json, const cJSON *region, const char 
     PAL_TRY(pal_json_object(json, label, path, known));
     PAL_TRY(pal_json_text(json, label, path, "volume", false, name, sizeof name));
     PAL_TRY(pal_json_count(json, label, path, "is", 1, 1 << 30, &is));
-    if (!*name) return pal_json_bad(json, pal_json_key(at, path, "volume"), "is missing");
-    if (!is) return pal_json_bad(json, pal_json_key(at, path, "is"), "is missing");
+    if (!*name) return pal_json_refuse(json, pal_json_key(at, path, "volume"), "is missing");
+    if (!is) return pal_json_refuse(json, pal_json_key(at, path, "is"), "is missing");
     int n =
         name[0] == '/' ? snprintf(file, sizeof file, "%s", name) : snprintf(file, sizeof file, "%s/%s", folder, name);
-    if (n < 0 || (size_t)n >= sizeof file) return pal_json_bad(json, path, "the path is too long");
+    if (n < 0 || (size_t)n >= sizeof file) return pal_json_refuse(json, path, "the path is too long");
     pal_err err = pal_label_volume_read(file, &volume, &reason);
     if (err)
         pal_diagnostic_set(json->diag, err, "%s: %s: %s", json->file, pal_json_key(at, path, "volume"), reason.text);
@@ -230,14 +231,14 @@ static pal_err read_region(const pal_json *json, const cJSON *object, const char
     *out = (pal_region){.young_Pa = NAN, .poisson = NAN, .density_kg_m3 = NAN};
     PAL_TRY(pal_json_object(json, object, path, known));
     for (int k = 0; k < 3; k++) has[k] = cJSON_GetObjectItemCaseSensitive(object, known[k]) != NULL;
-    if (has[0] + has[1] + has[2] != 1) return pal_json_bad(json, path, "needs one of box, label and grid");
+    if (has[0] + has[1] + has[2] != 1) return pal_json_refuse(json, path, "needs one of box, label and grid");
     double *const value[3] = {&out->young_Pa, &out->poisson, &out->density_kg_m3};
     bool given = has[2];
     for (int k = 0; k < 3; k++) {
         PAL_TRY(pal_json_number(json, object, path, value_key[k], value_low[k], value_high[k], value[k]));
         given = given || !isnan(*value[k]);
     }
-    if (!given) return pal_json_bad(json, path, "needs young_Pa, poisson or density_kg_m3");
+    if (!given) return pal_json_refuse(json, path, "needs young_Pa, poisson or density_kg_m3");
     if (has[0]) {
         const cJSON *box = cJSON_GetObjectItemCaseSensitive(object, "box");
         out->kind = PAL_REGION_BOX;
@@ -261,7 +262,7 @@ pal_err pal_region_read(const pal_json *json, const cJSON *body, const char *pat
     PAL_TRY(pal_json_list(json, body, path, "regions", PAL_REGION_MAX, &list));
     pal_json_key(at, path, "regions");
     if (list && list->child && strcmp(def->model.name, "fem") != 0 && strcmp(def->model.name, "subdivision_fem") != 0)
-        return pal_json_bad(json, at, "model \"%s\" has one material; model \"fem\" takes regions", def->model.name);
+        return pal_json_refuse(json, at, "model \"%s\" has one material; model \"fem\" takes regions", def->model.name);
     for (const cJSON *child = list ? list->child : NULL; child; child = child->next, def->n_region++)
         PAL_TRY(read_region(json, child, pal_json_entry(entry, at, def->n_region), folder, origin_of(def),
                             &def->region[def->n_region], &scene->region[index][def->n_region]));
@@ -288,8 +289,8 @@ pal_err pal_spring_grid_read(const pal_json *json, const cJSON *model, const cha
     if (!grid) return PAL_ERR_OK;
     pal_json_key(path, above, "grid");
     if (strcmp(def->model.name, "tet_springs") != 0)
-        return pal_json_bad(json, path, "model \"%s\" has no springs; model \"tet_springs\" takes a grid",
-                            def->model.name);
+        return pal_json_refuse(json, path, "model \"%s\" has no springs; model \"tet_springs\" takes a grid",
+                               def->model.name);
     PAL_TRY(pal_json_object(json, grid, path, known));
     PAL_TRY(read_nodes(json, grid, path, out->n, out->low_m, out->high_m, &scene->spring_grid[index]));
     int count = out->n[0] * out->n[1] * out->n[2];
@@ -297,11 +298,11 @@ pal_err pal_spring_grid_read(const pal_json *json, const cJSON *model, const cha
         PAL_TRY(read_values(json, grid, path, spring_key[k], spring_low, spring_high, count,
                             scene->spring_grid[index] + k * count, &out->k_J[k]));
         if (out->k_J[k] && pal_entry_has(&def->model, spring_key[k]))
-            return pal_json_bad(json, pal_json_key(at, above, spring_key[k]),
-                                "stands beside a grid that gives the same");
+            return pal_json_refuse(json, pal_json_key(at, above, spring_key[k]),
+                                   "stands beside a grid that gives the same");
     }
     if (!out->k_J[0] && !out->k_J[1] && !out->k_J[2])
-        return pal_json_bad(json, path, "needs k_distance_J, k_area_J or k_volume_J");
+        return pal_json_refuse(json, path, "needs k_distance_J, k_area_J or k_volume_J");
     return PAL_ERR_OK;
 }
 
@@ -339,12 +340,12 @@ static void add_grid(cJSON *object, const int n[3], const double low_m[3], const
         if (value[k]) cJSON_AddItemToObject(grid, key[k], pal_json_exact_list(value[k], n[0] * n[1] * n[2]));
 }
 
-void pal_spring_grid_add(cJSON *model, const pal_spring_grid *g)
+void pal_spring_grid_append(cJSON *model, const pal_spring_grid *g)
 {
     if (g->n[0] > 0) add_grid(model, g->n, g->low_m, g->high_m, spring_key, g->k_J);
 }
 
-void pal_region_add(cJSON *object, const pal_body_def *body, const char *stem)
+void pal_region_append(cJSON *object, const pal_body_def *body, const char *stem)
 {
     char name[128];
     if (body->n_region == 0) return;

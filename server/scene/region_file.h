@@ -5,7 +5,7 @@
 #include "server/scene/json_reader.h"
 #include "server/scene/scene_file.h"
 
-enum { PAL_GRID_MOST = 65536 }; /* nodes of a grid in a file */
+enum { PAL_GRID_NODES_MAX = 65536 }; /* nodes of a grid in a file */
 
 /* the list "regions" of a body whose mesh is read already; folder: where relative names of volumes are looked up */
 pal_err pal_region_read(const pal_json *json, const cJSON *body, const char *path, const char *folder,
@@ -13,7 +13,7 @@ pal_err pal_region_read(const pal_json *json, const cJSON *body, const char *pat
 /* frees what the regions of a body own */
 void pal_region_free(pal_loaded_scene *scene, int index);
 /* adds the list to a body's object unless it is empty; label volumes get the names of pal_region_volume */
-void pal_region_add(cJSON *object, const pal_body_def *body, const char *stem);
+void pal_region_append(cJSON *object, const pal_body_def *body, const char *stem);
 /* "STEM_region2.nii", and the file itself: NIfTI-1, one byte a voxel, in the frame of the mesh's file; IO */
 void pal_region_volume(const char *stem, int region, char *out, size_t n_byte);
 pal_err pal_region_write(const pal_body_def *body, int region, const char *path, pal_diagnostic *diag);
@@ -24,5 +24,5 @@ pal_err pal_spring_grid_read(const pal_json *json, const cJSON *model, const cha
                              int index);
 void pal_spring_grid_free(pal_loaded_scene *scene, int index);
 /* adds the key to a model's object unless there is no grid; every number comes back with the same bits */
-void pal_spring_grid_add(cJSON *model, const pal_spring_grid *grid);
+void pal_spring_grid_append(cJSON *model, const pal_spring_grid *grid);
 #endif

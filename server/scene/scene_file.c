@@ -6,8 +6,8 @@
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/json_reader.h"
 #include "server/scene/region_file.h"
-#include "server/scene/scene_make.h"
-#include "server/scene/solid_file.h"
+#include "server/scene/scene_import.h"
+#include "server/scene/subdivision_file.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -24,7 +24,7 @@ static pal_err read_item(const pal_json *json, const cJSON *object, const char *
     pal_diagnostic reason = {""};
     PAL_TRY(pal_json_object(json, object, path, NULL));
     PAL_TRY(pal_json_text(json, object, path, "name", false, name, sizeof name));
-    if (!*name) return pal_json_bad(json, path, "has no name");
+    if (!*name) return pal_json_refuse(json, path, "has no name");
     pal_entry_init(out, path, name);
     for (const cJSON *child = object->child; child; child = child->next) {
         double number[PAL_ENTRY_NUMBERS];
@@ -42,13 +42,13 @@ static pal_err read_item(const pal_json *json, const cJSON *object, const char *
         } else if (cJSON_IsArray(child)) {
             int n = 0;
             for (const cJSON *entry = child->child; entry; entry = entry->next) {
-                if (n == PAL_ENTRY_NUMBERS) return pal_json_bad(json, at, "more than %d numbers", PAL_ENTRY_NUMBERS);
-                if (!cJSON_IsNumber(entry)) return pal_json_bad(json, at, "is not a list of numbers");
+                if (n == PAL_ENTRY_NUMBERS) return pal_json_refuse(json, at, "more than %d numbers", PAL_ENTRY_NUMBERS);
+                if (!cJSON_IsNumber(entry)) return pal_json_refuse(json, at, "is not a list of numbers");
                 number[n++] = entry->valuedouble;
             }
             err = pal_entry_put_numbers(out, child->string, number, n, &reason);
         } else {
-            return pal_json_bad(json, at, "is not a number, text, true, false or list of numbers");
+            return pal_json_refuse(json, at, "is not a number, text, true, false or list of numbers");
         }
         if (err) return pal_diagnostic_set(json->diag, err, "%s: %s", json->file, reason.text);
     }
@@ -90,29 +90,31 @@ static pal_err read_material(const pal_json *json, const cJSON *body, const char
 
 static pal_err read_support(const pal_json *json, const cJSON *object, const char *path, pal_support_def *out)
 {
-    static const char *const known[] = {"lowest", "box", "rim", NULL}, *const corners[] = {"low_m", "high_m", NULL};
+    static const char *const known[] = {"lowest", "box", "boundary", NULL}, *const corners[] = {"low_m", "high_m",
+                                                                                                NULL};
     char at[PAL_JSON_PATH];
     *out = (pal_support_def){.fraction = 0.05};
     PAL_TRY(pal_json_object(json, object, path, known));
     const cJSON *box = cJSON_GetObjectItemCaseSensitive(object, "box");
     out->lowest = cJSON_GetObjectItemCaseSensitive(object, "lowest") != NULL;
-    out->rim = cJSON_GetObjectItemCaseSensitive(object, "rim") != NULL;
+    out->rim = cJSON_GetObjectItemCaseSensitive(object, "boundary") != NULL;
     if (out->lowest + out->rim + (box != NULL) != 1)
-        return pal_json_bad(json, path, "needs either lowest or box, or rim");
+        return pal_json_refuse(json, path, "needs either lowest, box or boundary");
     if (out->rim) {
-        PAL_TRY(pal_json_bool(json, object, path, "rim", &out->rim));
-        return out->rim ? PAL_ERR_OK : pal_json_bad(json, pal_json_key(at, path, "rim"), "can only be true");
+        PAL_TRY(pal_json_bool(json, object, path, "boundary", &out->rim));
+        return out->rim ? PAL_ERR_OK : pal_json_refuse(json, pal_json_key(at, path, "boundary"), "can only be true");
     }
     if (out->lowest) return pal_json_number(json, object, path, "lowest", 0, 1, &out->fraction);
     pal_json_key(at, path, "box");
     PAL_TRY(pal_json_object(json, box, at, corners));
     if (!cJSON_GetObjectItemCaseSensitive(box, "low_m") || !cJSON_GetObjectItemCaseSensitive(box, "high_m"))
-        return pal_json_bad(json, at, "needs low_m and high_m");
+        return pal_json_refuse(json, at, "needs low_m and high_m");
     PAL_TRY(pal_json_vector(json, box, at, "low_m", out->low_m));
     PAL_TRY(pal_json_vector(json, box, at, "high_m", out->high_m));
     for (int k = 0; k < 3; k++)
         if (out->low_m[k] > out->high_m[k])
-            return pal_json_bad(json, at, "low_m[%d] %g is above high_m[%d] %g", k, out->low_m[k], k, out->high_m[k]);
+            return pal_json_refuse(json, at, "low_m[%d] %g is above high_m[%d] %g", k, out->low_m[k], k,
+                                   out->high_m[k]);
     return PAL_ERR_OK;
 }
 
@@ -121,7 +123,7 @@ static pal_err place_of(const pal_json *json, const char *path, const char *fold
                         size_t n_byte)
 {
     int n = name[0] == '/' ? snprintf(out, n_byte, "%s", name) : snprintf(out, n_byte, "%s/%s", folder, name);
-    return n < 0 || (size_t)n >= n_byte ? pal_json_bad(json, path, "the path is too long") : PAL_ERR_OK;
+    return n < 0 || (size_t)n >= n_byte ? pal_json_refuse(json, path, "the path is too long") : PAL_ERR_OK;
 }
 
 static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *path, const char *folder,
@@ -131,7 +133,7 @@ static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *pa
     bool has_mesh = cJSON_GetObjectItemCaseSensitive(body, "mesh") != NULL;
     bool has_surface = cJSON_GetObjectItemCaseSensitive(body, "surface") != NULL;
     const char *key = has_mesh ? "mesh" : "surface";
-    if (has_mesh == has_surface) return pal_json_bad(json, path, "needs either mesh or surface, or cells");
+    if (has_mesh == has_surface) return pal_json_refuse(json, path, "needs either mesh or surface, or cells");
     PAL_TRY(pal_json_text(json, body, path, key, false, name, sizeof name));
     pal_json_key(at, path, key);
     PAL_TRY(place_of(json, at, folder, name, file, sizeof file));
@@ -143,14 +145,14 @@ static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *pa
         const int n = !strcmp(model->name, "adaptive_springs") ? 5 : 4;
         for (int k = 0; k < n; k++)
             if (cJSON_GetObjectItemCaseSensitive(body, only_surface[k]))
-                return pal_json_bad(json, pal_json_key(at, path, only_surface[k]), "only goes with surface");
+                return pal_json_refuse(json, pal_json_key(at, path, only_surface[k]), "only goes with surface");
         err = pal_prepared_load(file, out, &reason);
     } else {
         pal_surface_scene options = {
             .label = -1, .fem = !strcmp(model->name, "fem"), .adaptive = !strcmp(model->name, "adaptive_springs")};
         if (options.adaptive && cJSON_GetObjectItemCaseSensitive(body, "resolution"))
-            return pal_json_bad(json, pal_json_key(at, path, "resolution"),
-                                "model adaptive_springs has no voxels: it works on the surface");
+            return pal_json_refuse(json, pal_json_key(at, path, "resolution"),
+                                   "model adaptive_springs has no voxels: it works on the surface");
         PAL_TRY(pal_json_count(json, body, path, "resolution", 0, 1024, &options.resolution));
         PAL_TRY(pal_json_count(json, body, path, "label", -1, 1 << 30, &options.label));
         PAL_TRY(pal_json_count(json, body, path, "triangles", 0, 10000000, &options.target_tri));
@@ -158,7 +160,7 @@ static pal_err read_mesh(const pal_json *json, const cJSON *body, const char *pa
         PAL_TRY(pal_json_text(json, body, path, "units", false, units, sizeof units));
         options.unit_m = *units ? pal_mesh_unit_named(units) : 0;
         if (*units && options.unit_m == 0)
-            return pal_json_bad(json, pal_json_key(at, path, "units"), "is not m, cm, mm, um or in");
+            return pal_json_refuse(json, pal_json_key(at, path, "units"), "is not m, cm, mm, um or in");
         err = pal_scene_prepare_file(file, &options, out, NULL, &reason);
     }
     return err ? pal_diagnostic_set(json->diag, err, "%s: %s: %s", json->file, at, reason.text) : PAL_ERR_OK;
@@ -203,7 +205,7 @@ static pal_err read_body(const pal_json *json, const cJSON *object, int index, c
     else
         pal_body_default(body, name, &scene->mesh[index]);
     if (!solid && cJSON_GetObjectItemCaseSensitive(object, "origin_m"))
-        return pal_json_bad(json, path, "origin_m only goes with cells");
+        return pal_json_refuse(json, path, "origin_m only goes with cells");
     PAL_TRY(read_material(json, object, path, &body->material));
     PAL_TRY(read_model(json, object, path, scene, index));
     PAL_TRY(read_item_at(json, object, path, "solver", &body->solver));
@@ -212,7 +214,7 @@ static pal_err read_body(const pal_json *json, const cJSON *object, int index, c
     PAL_TRY(pal_strokes_read(json, object, path, scene, index));
     PAL_TRY(pal_cut_read(json, object, path, body));
     if (solid)
-        PAL_TRY(pal_solid_read(json, object, path, folder, scene, index));
+        PAL_TRY(pal_subdivision_read(json, object, path, folder, scene, index));
     else
         PAL_TRY(read_mesh(json, object, path, folder, &body->model, &scene->mesh[index]));
     scene->n_mesh = index + 1;
@@ -270,21 +272,21 @@ static pal_err read_wish(const pal_json *json, const cJSON *root, pal_scene *sce
         PAL_TRY(pal_json_object(json, accuracy, "accuracy", accuracy_keys));
         PAL_TRY(pal_json_text(json, accuracy, "accuracy", "text", true, scene->accuracy, sizeof scene->accuracy));
         PAL_TRY(pal_json_number(json, accuracy, "accuracy", "max_error_mm", 1e-6, 1e6, &most_mm));
-        if (most_mm == 0) return pal_json_bad(json, "accuracy", "has no max_error_mm");
+        if (most_mm == 0) return pal_json_refuse(json, "accuracy", "has no max_error_mm");
         /* divided: 0.1 mm is 1e-4 m and comes back as 0.1 */
         scene->max_error_m = most_mm / 1000;
     } else {
         PAL_TRY(pal_json_text(json, root, "", "accuracy", true, scene->accuracy, sizeof scene->accuracy));
         if (is_wish(scene->accuracy))
-            return pal_json_bad(json, "accuracy",
-                                "\"%.40s\" is no sentence on how far off the body is; an accuracy is asked for by "
-                                "{\"max_error_mm\": 1}",
-                                scene->accuracy);
+            return pal_json_refuse(json, "accuracy",
+                                   "\"%.40s\" is no sentence on how far off the body is; an accuracy is asked for by "
+                                   "{\"max_error_mm\": 1}",
+                                   scene->accuracy);
     }
     if (!budget) return PAL_ERR_OK;
     PAL_TRY(pal_json_object(json, budget, "budget", budget_keys));
     PAL_TRY(pal_json_number(json, budget, "budget", "step_ms", 1e-6, 1e6, &scene->budget_ms));
-    return scene->budget_ms > 0 ? PAL_ERR_OK : pal_json_bad(json, "budget", "has no step_ms");
+    return scene->budget_ms > 0 ? PAL_ERR_OK : pal_json_refuse(json, "budget", "has no step_ms");
 }
 
 static pal_err read_scene(const pal_json *json, const cJSON *root, const char *folder, pal_loaded_scene *loaded)
@@ -298,7 +300,7 @@ static pal_err read_scene(const pal_json *json, const cJSON *root, const char *f
     PAL_TRY(pal_json_object(json, root, "", known));
     PAL_TRY(pal_json_text(json, root, "", "name", false, scene->name, sizeof scene->name));
     pal_scene_plain_name(scene->name, plain);
-    if (strcmp(plain, scene->name)) return pal_json_bad(json, "name", "has other characters than a-z 0-9 _ -");
+    if (strcmp(plain, scene->name)) return pal_json_refuse(json, "name", "has other characters than a-z 0-9 _ -");
     PAL_TRY(pal_json_text(json, root, "", "title", true, scene->title, sizeof scene->title));
     PAL_TRY(pal_json_text(json, root, "", "source", true, scene->source, sizeof scene->source));
     PAL_TRY(read_wish(json, root, scene));
@@ -308,7 +310,7 @@ static pal_err read_scene(const pal_json *json, const cJSON *root, const char *f
     PAL_TRY(pal_json_vector(json, root, "", "up", scene->up));
     PAL_TRY(read_tools(json, root, scene));
     PAL_TRY(pal_json_list(json, root, "", "bodies", PAL_BODY_MAX, &list));
-    if (!list || !list->child) return pal_json_bad(json, "bodies", "a scene needs at least one body");
+    if (!list || !list->child) return pal_json_refuse(json, "bodies", "a scene needs at least one body");
     for (const cJSON *child = list->child; child; child = child->next, scene->n_body++)
         PAL_TRY(read_body(json, child, scene->n_body, folder, loaded));
     pal_diagnostic reason = {""};
@@ -345,7 +347,7 @@ pal_err pal_scene_load(const char *path, pal_loaded_scene **out, pal_diagnostic 
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.100s...: the path is too long", path);
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, PAL_JSON_MOST, &bytes, &n_byte, diag));
+    PAL_TRY(pal_file_read(path, PAL_JSON_MAX_BYTES, &bytes, &n_byte, diag));
     pal_err err = pal_scene_parse(path, (const char *)bytes, n_byte, folder, out, diag);
     free(bytes);
     return err;
@@ -357,7 +359,7 @@ void pal_scene_free(pal_loaded_scene *loaded)
     for (int k = 0; k < PAL_BODY_MAX; k++) {
         pal_region_free(loaded, k);
         pal_spring_grid_free(loaded, k);
-        pal_solid_unload(loaded, k);
+        pal_subdivision_unload(loaded, k);
         pal_prepared_free(&loaded->mesh[k]);
     }
     free(loaded);

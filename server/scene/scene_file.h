@@ -49,7 +49,7 @@
  *     "solver": {"name": "verlet"}, or {"name": "implicit_euler", ...} (the keys stand in sim/solvers, one file each)
  *     "output": {"name": "skin_output"},
  *     "supports": [{"lowest": 0.05}, {"box": {"low_m": [..], "high_m": [..]}},
- *                  {"rim": true}],                         the open edges of the surface (model adaptive_springs)
+ *                  {"boundary": true}],                    the open edges of the surface (model adaptive_springs)
  *     "effects": [{"name": "gravity"}, {"name": "tool_push", ...}, {"name": "tool_grasp"}, {"name": "finite_guard"}]
  *   }],
  *   "tools": [{"name": "probe 1", "radius_m": 0.008, "force_cap_N": 15}]

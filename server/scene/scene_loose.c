@@ -1,6 +1,6 @@
 /* What of a body's components nothing holds, left out once the scene says what is held. */
-#include "server/scene/scene_make.h"
-#include "server/scene/solid_file.h"
+#include "server/scene/scene_import.h"
+#include "server/scene/subdivision_file.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -28,6 +28,6 @@ pal_err pal_scene_drop_loose(pal_loaded_scene *loaded, int index, bool largest_o
                            reason.text);
     else if (err)
         pal_diagnostic_set(diag, err, "%s", reason.text);
-    if (!err && def->cells && parts->n_dropped > 0) err = pal_solid_show(loaded, index, diag);
+    if (!err && def->cells && parts->n_dropped > 0) err = pal_subdivision_update_surface(loaded, index, diag);
     return err;
 }

@@ -5,8 +5,8 @@
 #include "server/mesh/cells/cell_file.h"
 #include "server/mesh/files/file_bytes.h"
 #include "server/scene/region_file.h"
-#include "server/scene/scene_make.h"
-#include "server/scene/solid_file.h"
+#include "server/scene/scene_import.h"
+#include "server/scene/subdivision_file.h"
 
 #include <cjson/cJSON.h>
 #include <errno.h>
@@ -80,7 +80,7 @@ static void add_supports(cJSON *object, const pal_body_def *body)
         cJSON *entry = cJSON_CreateObject();
         cJSON_AddItemToArray(list, entry);
         if (s->rim) {
-            cJSON_AddBoolToObject(entry, "rim", true);
+            cJSON_AddBoolToObject(entry, "boundary", true);
             continue;
         }
         if (s->lowest) {
@@ -102,7 +102,7 @@ static void add_body(cJSON *list, const pal_scene *scene, int index)
     mesh_name(scene, index, name);
     cJSON_AddStringToObject(object, "name", body->name);
     if (body->cells)
-        pal_solid_add(object, body, name);
+        pal_subdivision_append(object, body, name);
     else
         cJSON_AddStringToObject(object, "mesh", name);
     cJSON *material = cJSON_AddObjectToObject(object, "material");
@@ -111,8 +111,8 @@ static void add_body(cJSON *list, const pal_scene *scene, int index)
     add_number(material, "density_kg_m3", body->material.density_kg_m3);
     add_number(material, "damping_1_s", body->material.damping_1_s);
     stem_of(scene, index, name);
-    pal_region_add(object, body, name);
-    pal_spring_grid_add(add_item(object, "model", &body->model), &body->spring_grid);
+    pal_region_append(object, body, name);
+    pal_spring_grid_append(add_item(object, "model", &body->model), &body->spring_grid);
     if (body->solver.name[0]) add_item(object, "solver", &body->solver);
     add_item(object, "output", &body->output);
     add_supports(object, body);
@@ -195,9 +195,9 @@ static pal_err save_body(const pal_scene *scene, int index, const char *folder, 
     const pal_body_def *body = &scene->body[index];
     const int *n = body->spring_grid.n;
     char name[MESH_NAME], volume[MESH_NAME + 32], path[PATH];
-    if ((double)n[0] * n[1] * n[2] > PAL_GRID_MOST)
+    if ((double)n[0] * n[1] * n[2] > PAL_GRID_NODES_MAX)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" model.grid.n: %g nodes, more than %d", body->name,
-                                  (double)n[0] * n[1] * n[2], PAL_GRID_MOST);
+                                  (double)n[0] * n[1] * n[2], PAL_GRID_NODES_MAX);
     mesh_name(scene, index, name);
     snprintf(path, sizeof path, "%s/%s", folder, name);
     if (body->cells)
@@ -245,9 +245,9 @@ static pal_err save_to(const pal_scene *scene, const char *folder, const char *p
     for (int b = 0; b < scene->n_body && !err; b++) err = save_body(scene, b, folder, &n_file, diag);
     char *text = err ? NULL : scene_text(scene);
     if (!err && !text) err = pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for its text", path);
-    if (!err && strlen(text) > PAL_JSON_MOST)
+    if (!err && strlen(text) > PAL_JSON_MAX_BYTES)
         err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: would have %zu bytes, more than %d", path, strlen(text),
-                                 PAL_JSON_MOST);
+                                 PAL_JSON_MAX_BYTES);
     if (!err) err = pal_file_write(path, text, strlen(text), diag);
     cJSON_free(text);
     if (err) remove_files(scene, folder, n_file);

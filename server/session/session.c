@@ -219,7 +219,7 @@ static void obey(pal_session *s, const pal_command *command)
         brush(s, command);
         break;
     case PAL_COMMAND_ESTIMATE:
-        pal_watch_ask(&s->watch, command->body, command->wanted);
+        pal_estimator_set_request(&s->watch, command->body, command->wanted);
         break;
     case PAL_COMMAND_COMPONENT:
         switch_row(s, command);
@@ -273,7 +273,7 @@ static void estimate(pal_session *s, bool stepped)
 {
     pal_diagnostic diag = {""};
     double step_ms = stepped ? 1e-6 * (double)s->work_ns : (double)NAN;
-    if (pal_watch_step(&s->watch, s->world, step_ms, &diag)) say(s, &diag);
+    if (pal_estimator_set_step(&s->watch, s->world, step_ms, &diag)) say(s, &diag);
 }
 
 /* waits for the step's time; a step that is a whole step late or more is due now and the missed ones are dropped */
@@ -379,7 +379,7 @@ static void release(pal_session *s)
     for (int k = 0; k < 3; k++) pal_frame_destroy(s->frame[k]);
     pal_command_queue_destroy(s->command);
     pal_world_destroy(s->world);
-    pal_watch_close(&s->watch);
+    pal_estimator_set_close(&s->watch);
     pthread_mutex_destroy(&s->note_lock);
     free((void *)(uintptr_t)s->options.record_path);
     free(s->row);
@@ -392,7 +392,7 @@ pal_err pal_session_open(const pal_scene *scene, const pal_session_options *opti
     pal_session *s = calloc(1, sizeof *s);
     if (!s) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a session");
     pthread_mutex_init(&s->note_lock, NULL);
-    pal_watch_init(&s->watch, scene);
+    pal_estimator_set_init(&s->watch, scene);
     s->scene = scene;
     if (options) s->options = *options;
     if (s->options.record_path) s->options.record_path = strdup(s->options.record_path);
@@ -519,7 +519,7 @@ pal_err pal_session_command(pal_session *s, const pal_command *command)
 
 bool pal_session_estimate(pal_session *s, int body, pal_estimate *out)
 {
-    return pal_watch_read(&s->watch, body, out);
+    return pal_estimator_set_read(&s->watch, body, out);
 }
 
 const pal_frame *pal_session_take_frame(pal_session *s)

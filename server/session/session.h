@@ -13,7 +13,7 @@
  * change no hash. Brushes are. */
 #ifndef PAL_SESSION_SESSION_H
 #define PAL_SESSION_SESSION_H
-#include "server/estimate/estimate.h"
+#include "server/estimate/estimator.h"
 #include "server/sim/core/effect.h"
 #include "server/sim/world/world.h"
 
@@ -28,8 +28,8 @@ typedef enum pal_command_kind {
     PAL_COMMAND_FIELD,    /* body, field, wanted: one more or one less who looks; the row is there while anybody does */
     PAL_COMMAND_BRUSH,    /* body, slot, brush: what the hand of tool `slot` does (world.h); letting the tool go or its
                              lease ends it, a reset as well, and a session that follows unless its carry hands it on */
-    PAL_COMMAND_ESTIMATE, /* body, wanted: one more or one less who looks at its estimate; the estimator (estimate.h), a
-                             thread and worlds of its own, is there while anybody does */
+    PAL_COMMAND_ESTIMATE, /* body, wanted: one more or one less who looks at its estimate; the estimator (estimator.h),
+                             a thread and worlds of its own, is there while anybody does */
     PAL_COMMAND_RESET_BODY, /* body: that one alone back to rest and unfrozen (pal_world_reset_body) */
     PAL_COMMAND_COMPONENT,  /* body, row, wanted: switches a row of the plan off and on (world.h); recorded, kept by a
                          session that follows; why not: pal_session_last_diagnostic */

@@ -3,7 +3,7 @@
 #define PAL_SESSION_SESSION_CORE_H
 #include "server/base/command_queue.h"
 #include "server/base/triple_buffer.h"
-#include "server/estimate/watch.h"
+#include "server/estimate/estimator_set.h"
 #include "server/session/disabled_components.h"
 #include "server/session/input_log.h"
 #include "server/session/session.h"
@@ -60,7 +60,7 @@ struct pal_session {
     pthread_mutex_t note_lock;
     pal_diagnostic diag;
     pal_material material[PAL_BODY_MAX]; /* guarded by note_lock */
-    pal_watch watch;                     /* who looks at estimates */
+    pal_estimator_set watch;             /* who looks at estimates */
 
     /* the simulation thread's own */
     pal_input_log *log;

@@ -50,7 +50,7 @@ static void hand_orders(pal_session *to, pal_session *from)
                           memory_order_relaxed);
     atomic_store_explicit(&to->n_observer, atomic_load_explicit(&from->n_observer, memory_order_relaxed),
                           memory_order_relaxed);
-    pal_watch_hand_over(&to->watch, &from->watch);
+    pal_estimator_set_transfer(&to->watch, &from->watch);
     pal_command command;
     for (int k = 0; k < N_COMMAND && pal_command_queue_get(from->command, &command); k++)
         (void)pal_command_queue_put(to->command, &command);

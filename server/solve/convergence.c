@@ -79,8 +79,8 @@ pal_err pal_convergence(const pal_problem *problem, const pal_problem_case *load
     double *x = NULL, *u[2] = {NULL, NULL};
     int n_point = 0, done = 0;
     if (n_done) *n_done = 0;
-    if (n < 1 || n > PAL_CONVERGENCE_MOST)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d resolutions, wanted 1 to %d", n, PAL_CONVERGENCE_MOST);
+    if (n < 1 || n > PAL_CONVERGENCE_MAX)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d resolutions, wanted 1 to %d", n, PAL_CONVERGENCE_MAX);
     for (int k = 1; k < n; k++)
         if (resolution[k] <= resolution[k - 1])
             return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "resolution %d comes after %d: wanted ascending ones",

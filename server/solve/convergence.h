@@ -5,7 +5,7 @@
 #define PAL_SOLVE_CONVERGENCE_H
 #include "server/solve/solve.h"
 
-enum { PAL_CONVERGENCE_MOST = 16 };
+enum { PAL_CONVERGENCE_MAX = 16 };
 
 /* one resolution; numbers that are not known are NaN */
 typedef struct pal_convergence_point {
@@ -18,7 +18,7 @@ typedef struct pal_convergence_point {
     pal_solve_result result;
 } pal_convergence_point;
 
-/* Resolutions ascend strictly (REFUSED names the number), at most PAL_CONVERGENCE_MOST; options->resolution is not
+/* Resolutions ascend strictly (REFUSED names the number), at most PAL_CONVERGENCE_MAX; options->resolution is not
  * read. samples NULL: changes are taken at the surface's vertices (4096 of them, evenly picked). *n_done (may be NULL):
  * points that are whole, also after an error. Errors as of pal_solve, and MEMORY */
 pal_err pal_convergence(const pal_problem *problem, const pal_problem_case *load_case, const pal_surface *surface,

@@ -22,7 +22,7 @@
 /* cut voxels with less are dropped; as long as no more of the volume goes than ...; else; and without fill */
 static const double drop_fill = 0.25, most_missing = 0.025, keep_fill = 0.02, whole_fill = 0.5;
 
-pal_box_text pal_box_show(const pal_box *box)
+pal_box_text pal_box_describe(const pal_box *box)
 {
     pal_box_text out;
     if (box->all)
@@ -33,14 +33,14 @@ pal_box_text pal_box_show(const pal_box *box)
     return out;
 }
 
-bool pal_box_holds(const pal_box *box, const double x[3], double slack)
+bool pal_box_contains(const pal_box *box, const double x[3], double slack)
 {
     for (int c = 0; c < 3; c++)
         if (x[c] < box->low_m[c] - slack || x[c] > box->high_m[c] + slack) return false;
     return true;
 }
 
-double pal_case_slack(const pal_tets *tets)
+double pal_case_tolerance_m(const pal_tets *tets)
 {
     return 1e-6 * tets->edge_m;
 }
@@ -89,14 +89,14 @@ static pal_err drop_loose(const pal_problem *p, pal_prepared *mesh, pal_diagnost
         double x[3];
         pal_add3(x, tets->x + 3 * (size_t)i, tets->origin_m);
         for (int k = 0; k < p->n_support && !fixed[i]; k++)
-            fixed[i] = pal_box_holds(&p->support[k].region, x, pal_case_slack(tets));
+            fixed[i] = pal_box_contains(&p->support[k].region, x, pal_case_tolerance_m(tets));
     }
     pal_err err = pal_loose_components_drop("problem", fixed, false, mesh, &parts, diag);
     free(fixed);
     return err;
 }
 
-pal_err pal_case_voxels(const pal_problem *problem, const pal_surface *surface, const pal_voxel_wish *wish,
+pal_err pal_case_voxels(const pal_problem *problem, const pal_surface *surface, const pal_case_voxel_options *wish,
                         pal_prepared *out, pal_diagnostic *diag)
 {
     pal_voxel_options voxel = {.resolution = wish->resolution, .border = true, .min_fill = wish->min_fill};
@@ -119,19 +119,19 @@ pal_err pal_case_voxels(const pal_problem *problem, const pal_surface *surface, 
 pal_err pal_case_supports(const pal_problem *problem, const pal_tets *tets, pal_support_def out[PAL_PROBLEM_REGIONS],
                           pal_diagnostic *diag)
 {
-    double slack = pal_case_slack(tets);
+    double slack = pal_case_tolerance_m(tets);
     for (int k = 0; k < problem->n_support; k++) {
         const pal_box *box = &problem->support[k].region;
         bool found = false;
         for (int i = 0; i < tets->n_node && !found; i++) {
             double x[3];
             pal_add3(x, tets->x + 3 * i, tets->origin_m);
-            found = pal_box_holds(box, x, slack);
+            found = pal_box_contains(box, x, slack);
         }
         if (!found)
             return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
                                       "supports[%d]: no node of the body lies in %s (voxels of %g m)", k,
-                                      pal_box_show(box).text, tets->edge_m);
+                                      pal_box_describe(box).text, tets->edge_m);
         out[k] = (pal_support_def){.lowest = false};
         pal_sub3(out[k].low_m, box->low_m, tets->origin_m);
         pal_sub3(out[k].high_m, box->high_m, tets->origin_m);
@@ -142,7 +142,8 @@ pal_err pal_case_supports(const pal_problem *problem, const pal_tets *tets, pal_
 
 /* ---- loads ---- */
 
-int pal_case_shape(const pal_body *body, int element, const double local[4], double shape[10], const int32_t **node)
+int pal_case_shape_functions(const pal_body *body, int element, const double local[4], double shape[10],
+                             const int32_t **node)
 {
     int n_corner = body->element ? body->n_corner : PAL_TET_CORNERS;
     *node = (body->element ? body->element : body->tets->tet) + (size_t)n_corner * (size_t)element;
@@ -171,7 +172,7 @@ static void spread(const job *j, int element, const double local[4], const doubl
 {
     double n[PAL_MAX_CORNERS];
     const int32_t *node;
-    int n_corner = pal_case_shape(j->body, element, local, n, &node);
+    int n_corner = pal_case_shape_functions(j->body, element, local, n, &node);
     for (int k = 0; k < n_corner; k++) pal_axpy3(j->f + 3 * node[k], n[k], force_N);
 }
 
@@ -209,7 +210,7 @@ static pal_err add_traction(const job *j, double *area_m2)
             snprintf(facing, sizeof facing, " that faces (%g, %g, %g)", load->normal[0], load->normal[1],
                      load->normal[2]);
         return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "%s: the region %s meets no surface%s", path_of(j).text,
-                                  pal_box_show(&load->region).text, facing);
+                                  pal_box_describe(&load->region).text, facing);
     }
     if (load->has_traction)
         pal_copy3(per_area, load->traction_Pa);

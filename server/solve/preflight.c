@@ -28,7 +28,7 @@ typedef struct probe {
 
 /* ---- places ---- */
 
-static void weak(pal_weak *w, int index, double value, const double at[3], const pal_body *body)
+static void weak(pal_weak_spot *w, int index, double value, const double at[3], const pal_body *body)
 {
     if (w->n++ > 0 && !(value < w->value)) return;
     w->worst = index, w->value = value;
@@ -105,8 +105,8 @@ static void look_at_masses(const pal_body *body, pal_preflight_body *out)
     for (int k = 0; k < body->n_active; k++) mass += body->mass_kg[pal_body_point(body, k)];
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        out->n_held += body->fixed[i] != 0;
-        if (!body->fixed[i] && body->mass_kg[i] < least_mass * mass / body->n_active)
+        out->n_fixed += body->support[i] != 0;
+        if (!body->support[i] && body->mass_kg[i] < least_mass * mass / body->n_active)
             weak(&out->light, i, body->mass_kg[i], body->x_rest + 3 * (size_t)i, body);
     }
 }
@@ -121,7 +121,7 @@ static bool find_limit_node(const probe *p, pal_preflight_body *out)
         if (p->force[i].effect->stiffness) p->force[i].effect->stiffness(p->force[i].self, body, bound);
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        if (body->fixed[i] || !(bound[i] > most * body->mass_kg[i])) continue;
+        if (body->support[i] || !(bound[i] > most * body->mass_kg[i])) continue;
         most = bound[i] / body->mass_kg[i];
         out->limit_node = i, out->limit_mass_kg = body->mass_kg[i];
         pal_add3(out->limit_at_m, body->x_rest + 3 * (size_t)i, body->offset_m);
@@ -160,7 +160,7 @@ static void apply(void *user, const double *v, double *out)
     force_at(p, v, -way, p->low);
     force_at(p, v, way, out);
     for (int i = 0; i < 3 * body->n_dof; i++) {
-        bool moves = body->mass_kg[i / 3] > 0 && !body->fixed[i / 3];
+        bool moves = body->mass_kg[i / 3] > 0 && !body->support[i / 3];
         out[i] = moves && way > 0 ? (p->low[i] - out[i]) / (2 * way) : 0;
     }
 }
@@ -175,7 +175,7 @@ static bool over_mass(void *user, const double *b, double *out)
 {
     const pal_body *body = ((const probe *)user)->body;
     for (int i = 0; i < 3 * body->n_dof; i++)
-        out[i] = body->mass_kg[i / 3] > 0 && !body->fixed[i / 3] ? b[i] / body->mass_kg[i / 3] : 0;
+        out[i] = body->mass_kg[i / 3] > 0 && !body->support[i / 3] ? b[i] / body->mass_kg[i / 3] : 0;
     return true;
 }
 
@@ -201,7 +201,7 @@ static double fast(probe *p, double *room)
     uint64_t seed = 7;
     for (int i = 0; i < n; i++) {
         seed = seed * 6364136223846793005u + 1442695040888963407u;
-        l.z[i] = body->fixed[i / 3] ? 0 : body->mass_kg[i / 3] * ((double)(seed >> 11) * 0x1p-53 - 0.5);
+        l.z[i] = body->support[i / 3] ? 0 : body->mass_kg[i / 3] * ((double)(seed >> 11) * 0x1p-53 - 0.5);
     }
     (void)pal_lanczos_run(&l, 0.02, 4, MOST_LANCZOS);
     free(basis);
@@ -226,7 +226,7 @@ static double slow(probe *p, double *room)
         double uf = 0, uu = 0;
         for (size_t i = 0; i < n; i++) {
             u[i] = 0;
-            b[i] = cg.r[i] = i % 3 == axis && !body->fixed[i / 3] ? body->mass_kg[i / 3] : 0;
+            b[i] = cg.r[i] = i % 3 == axis && !body->support[i / 3] ? body->mass_kg[i / 3] : 0;
         }
         (void)pal_conjugate_gradient_run(&cg, u, 0.03 * sqrt(pal_dot_product((int)n, b, b)), 1, p->max_cg);
         /* u'Ku = u'(b - r) */
@@ -245,11 +245,11 @@ static bool look_at_modes(probe *p, pal_preflight_body *out)
     p->x = room + 6 * n, p->low = room + 7 * n;
     p->way_m = 1e-5 * body->edge_m;
     memcpy(p->x, body->x, n * sizeof(double));
-    out->fast_1_s = out->n_held < body->n_active ? fast(p, room) : (double)NAN;
-    out->slow_1_s = out->n_held > 0 && out->n_held < body->n_active ? slow(p, room) : (double)NAN;
+    out->omega_max_1_s = out->n_fixed < body->n_active ? fast(p, room) : (double)NAN;
+    out->omega_min_1_s = out->n_fixed > 0 && out->n_fixed < body->n_active ? slow(p, room) : (double)NAN;
     /* anchors hold a body too, but its own weight says so only when it is there */
-    out->condition = out->fast_1_s * out->fast_1_s / (out->slow_1_s * out->slow_1_s);
-    out->slow_s = 2 * M_PI / out->slow_1_s;
+    out->condition = out->omega_max_1_s * out->omega_max_1_s / (out->omega_min_1_s * out->omega_min_1_s);
+    out->slowest_period_s = 2 * M_PI / out->omega_min_1_s;
     memcpy(body->x, p->x, n * sizeof(double));
     pal_body_update_nodes(body);
     free(room);
@@ -356,11 +356,11 @@ static pal_err look_at_body(pal_world *world, const pal_scene *scene, int b, int
     look_at_masses(body, out);
     look_for_locking(&scene->body[b], out);
     if (!look_at_modes(&p, out)) return PAL_ERR_MEMORY;
-    out->foreseen_ms = foresee_ms(&p, body, out->n_sub, b);
+    out->predicted_ms = foresee_ms(&p, body, out->n_sub, b);
     return PAL_ERR_OK;
 }
 
-pal_err pal_preflight_look(const pal_scene *scene, int max_cg, pal_preflight *out, pal_diagnostic *diag)
+pal_err pal_preflight_run(const pal_scene *scene, int max_cg, pal_preflight *out, pal_diagnostic *diag)
 {
     pal_world *world = NULL;
     *out = (pal_preflight){.n_body = scene->n_body};
@@ -369,7 +369,7 @@ pal_err pal_preflight_look(const pal_scene *scene, int max_cg, pal_preflight *ou
     pal_err err = PAL_ERR_OK;
     for (int b = 0; b < scene->n_body && !err; b++) {
         err = look_at_body(world, scene, b, max_cg, &out->body[b]);
-        out->foreseen_ms += out->body[b].foreseen_ms;
+        out->predicted_ms += out->body[b].predicted_ms;
     }
     pal_world_destroy(world);
     return err;
@@ -377,7 +377,7 @@ pal_err pal_preflight_look(const pal_scene *scene, int max_cg, pal_preflight *ou
 
 /* ---- sentences ---- */
 
-static void say_weak(const pal_weak *w, const char *what, double scale, const char *unit, int *n,
+static void say_weak(const pal_weak_spot *w, const char *what, double scale, const char *unit, int *n,
                      char line[PAL_PREFLIGHT_LINES][PAL_PREFLIGHT_LINE])
 {
     if (w->n == 0) return;
@@ -385,7 +385,7 @@ static void say_weak(const pal_weak *w, const char *what, double scale, const ch
              w->worst, 1e3 * w->at_m[0], 1e3 * w->at_m[1], 1e3 * w->at_m[2], scale * w->value, unit);
 }
 
-int pal_preflight_say(const pal_preflight_body *b, char line[PAL_PREFLIGHT_LINES][PAL_PREFLIGHT_LINE])
+int pal_preflight_describe(const pal_preflight_body *b, char line[PAL_PREFLIGHT_LINES][PAL_PREFLIGHT_LINE])
 {
     int n = 0;
     if (b->locks)
@@ -410,9 +410,9 @@ int pal_preflight_say(const pal_preflight_body *b, char line[PAL_PREFLIGHT_LINES
     say_weak(&b->light, "nodes are very light", 1e3, " g", &n, line);
     if (isfinite(b->condition))
         snprintf(line[n++], PAL_PREFLIGHT_LINE, "condition %.2g: its slowest motion takes %.3g s, its fastest %.3g ms",
-                 b->condition, b->slow_s, 2e3 * M_PI / b->fast_1_s);
-    else if (isfinite(b->fast_1_s) && b->n_held == 0)
+                 b->condition, b->slowest_period_s, 2e3 * M_PI / b->omega_max_1_s);
+    else if (isfinite(b->omega_max_1_s) && b->n_fixed == 0)
         snprintf(line[n++], PAL_PREFLIGHT_LINE, "no support holds it; its fastest motion takes %.3g ms",
-                 2e3 * M_PI / b->fast_1_s);
+                 2e3 * M_PI / b->omega_max_1_s);
     return n;
 }

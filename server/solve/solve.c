@@ -12,7 +12,7 @@
 #include "server/num/shape_functions.h"
 #include "server/sim/world/world.h"
 #include "server/solve/load_case.h"
-#include "server/solve/smaller_voxels.h"
+#include "server/solve/voxel_refinement.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -102,7 +102,7 @@ static pal_err check_covered(const job *j)
         double middle[3] = {t->origin_m[0], t->origin_m[1], t->origin_m[2]};
         bool found = false;
         for (int k = 0; k < 4; k++) pal_axpy3(middle, 0.25, t->x + 3 * t->tet[4 * e + k]);
-        for (int k = 0; k < p->n_material && !found; k++) found = pal_box_holds(&p->material[k].region, middle, 0);
+        for (int k = 0; k < p->n_material && !found; k++) found = pal_box_contains(&p->material[k].region, middle, 0);
         if (!found)
             return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "materials: none of the %d regions holds (%g, %g, %g)",
                                       p->n_material, middle[0], middle[1], middle[2]);
@@ -189,10 +189,10 @@ static void move_supports(const job *j, double share)
     pal_body *b = j->s->body;
     for (int i = 0; i < b->n_node; i++) {
         double x[3];
-        if (!b->fixed[i]) continue;
+        if (!b->support[i]) continue;
         pal_add3(x, b->x_rest + 3 * i, j->s->mesh.tets.origin_m);
         for (int k = 0; k < j->problem->n_support; k++)
-            if (pal_box_holds(&j->problem->support[k].region, x, pal_case_slack(&j->s->mesh.tets))) {
+            if (pal_box_contains(&j->problem->support[k].region, x, pal_case_tolerance_m(&j->s->mesh.tets))) {
                 pal_copy3(b->x + 3 * i, b->x_rest + 3 * i);
                 pal_axpy3(b->x + 3 * i, share, j->problem->support[k].move_m);
             }
@@ -211,7 +211,7 @@ static int count_ramp(const job *j)
 /* steps the world until its solver has met the tolerance */
 static pal_err converge(const job *j, double fraction)
 {
-    int most = j->options->most_newton > 0 ? j->options->most_newton : MOST_NEWTON;
+    int most = j->options->max_newton > 0 ? j->options->max_newton : MOST_NEWTON;
     for (;;) {
         char what[80];
         pal_solve_report report;
@@ -265,7 +265,7 @@ static void sum_up(const job *j)
         pal_sub3(u, b->x + 3 * i, b->x_rest + 3 * i);
         r->max_m = fmax(r->max_m, pal_norm3(u));
         r->work_J += b->external_force ? pal_dot3(b->external_force + 3 * i, u) : 0;
-        if (b->fixed[i]) pal_axpy3(r->reaction_N, -1, b->f + 3 * i);
+        if (b->support[i]) pal_axpy3(r->reaction_N, -1, b->f + 3 * i);
     }
     r->energy_J = pal_world_energy_J(j->s->world);
 }
@@ -291,7 +291,7 @@ static pal_err prepare(const job *j, const pal_surface *surface)
 {
     const pal_solve_options *o = j->options;
     pal_solution *s = j->s;
-    pal_voxel_wish wish = {o->resolution, o->fill, o->min_fill, o->align};
+    pal_case_voxel_options wish = {o->resolution, o->fill, o->min_fill, o->align};
     PAL_TRY(pal_case_voxels(j->problem, surface, &wish, &s->mesh, j->diag));
     if (o->split > 1) PAL_TRY(pal_refine_voxels(&s->mesh, o->split, j->diag));
     PAL_TRY(make_world(j));
@@ -302,8 +302,8 @@ static pal_err prepare(const job *j, const pal_surface *surface)
     j->result->n_element = b->n_element;
     j->result->edge_m = b->edge_m;
     j->result->volume_m3 = volume_of(s);
-    for (int i = 0; i < b->n_node; i++) j->result->n_held += b->fixed[i] != 0;
-    j->result->n_dof = 3 * (b->n_node - j->result->n_held);
+    for (int i = 0; i < b->n_node; i++) j->result->n_fixed += b->support[i] != 0;
+    j->result->n_dof = 3 * (b->n_node - j->result->n_fixed);
     pal_err err = pal_locate_create(&s->mesh.tets, s->hex ? &s->mesh.hexes : NULL, &s->locate);
     return err ? pal_diagnostic_set(j->diag, err, "no memory to find points in the mesh") : PAL_ERR_OK;
 }
@@ -355,7 +355,8 @@ void pal_solution_at(const pal_solution *s, const double x[3], double u[3])
     const pal_body *b = s->body;
     const int32_t *node;
     pal_sub3(at, x, s->mesh.tets.origin_m);
-    int element = pal_locate_point(s->locate, at, local, NULL), n_corner = pal_case_shape(b, element, local, n, &node);
+    int element = pal_locate_point(s->locate, at, local, NULL),
+        n_corner = pal_case_shape_functions(b, element, local, n, &node);
     pal_set3(u, 0, 0, 0);
     for (int k = 0; k < n_corner; k++) {
         pal_axpy3(u, n[k], b->x + 3 * node[k]);

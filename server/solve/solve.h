@@ -15,7 +15,7 @@ typedef struct pal_solve_options {
     bool align;          /* shift the voxels so that their faces lie on the border of a support that cuts the body */
     int split;           /* each voxel is solved as split^3 of its fill: the border's error apart; 0: 1          */
     double tolerance;    /* of the residual, relative to the loads; 0: 1e-8               */
-    int most_newton;     /* NUMERIC beyond this many Newton iterations; 0: 400            */
+    int max_newton;      /* NUMERIC beyond this many Newton iterations; 0: 400            */
     const char *linear;  /* "direct" | "pcg"; NULL: the solver chooses                      */
     bool inertia_relief; /* a body without supports: loads are balanced by its inertia; false: refused */
     double young_Pa, poisson; /* in place of the problem's only material; NaN: do not            */
@@ -26,7 +26,7 @@ typedef struct pal_solve_options {
 
 typedef struct pal_solve_result {
     int n_node, n_element, n_dof, n_newton, n_cg;
-    int n_held; /* nodes in supports                                         */
+    int n_fixed; /* nodes in supports                                         */
     double residual;
     double prepare_s, assemble_s, factor_s, solve_s, total_s; /* solve_s: Newton without assembling and factoring */
     double edge_m;                     /* voxel edge                                                */

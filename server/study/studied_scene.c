@@ -9,21 +9,21 @@
 #include <string.h>
 #include <unistd.h>
 
-const char *pal_setting_wish_text(const pal_setting_wish *wish, char out[80])
+const char *pal_accuracy_target_text(const pal_accuracy_target *wish, char out[80])
 {
-    bool within = wish->within_m > 0, budget = wish->budget_ms > 0;
-    int n = within ? snprintf(out, 80, "within %g mm", 1e3 * wish->within_m) : 0;
+    bool within = wish->max_error_m > 0, budget = wish->budget_ms > 0;
+    int n = within ? snprintf(out, 80, "within %g mm", 1e3 * wish->max_error_m) : 0;
     if (budget) snprintf(out + n, 80 - (size_t)n, "%sin at most %g ms", n ? " " : "", wish->budget_ms);
     if (!within && !budget) out[0] = 0;
     return out;
 }
 
-const char *pal_study_off_text(const pal_study_file *file, double error_m, char out[PAL_STUDY_OFF])
+const char *pal_study_error_text(const pal_study_file *file, double error_m, char out[PAL_STUDY_ERROR_TEXT])
 {
     const pal_study *s = &file->study;
     char own[64] = "";
     if (s->reference_m > 0) snprintf(own, sizeof own, ", +- %.2g mm of the reference,", 1e3 * s->reference_m);
-    snprintf(out, PAL_STUDY_OFF, "%.3g mm off%s under %s, that move it by up to %.3g mm", 1e3 * error_m, own,
+    snprintf(out, PAL_STUDY_ERROR_TEXT, "%.3g mm off%s under %s, that move it by up to %.3g mm", 1e3 * error_m, own,
              file->loads, 1e3 * s->max_m);
     return out;
 }
@@ -42,7 +42,7 @@ void pal_study_accuracy_text(const pal_study *study, double error_m, char *out, 
 
 static bool is_measured(const pal_study_point *p)
 {
-    return !p->err && isfinite(p->priced.ms) && isfinite(p->priced.error_m);
+    return !p->err && isfinite(p->measured.ms) && isfinite(p->measured.error_m);
 }
 
 /* the study with the points of other methods not measured; indices stay. NULL: no memory */
@@ -53,43 +53,44 @@ static pal_study *only(const pal_study *study, const char *methods)
     *out = *study;
     for (int k = 0; k < out->n_point; k++) {
         pal_study_point *p = &out->point[k];
-        if (is_measured(p) && pal_study_method_in(methods, p->priced.setting.model)) continue;
-        p->priced.ms = p->priced.error_m = NAN;
-        p->priced.front = false;
+        if (is_measured(p) && pal_study_method_in(methods, p->measured.setting.model)) continue;
+        p->measured.ms = p->measured.error_m = NAN;
+        p->measured.front = false;
     }
     return out;
 }
 
-int pal_study_serving(const pal_study *study, const char *methods, const pal_setting_wish *wish)
+int pal_study_pick_target(const pal_study *study, const char *methods, const pal_accuracy_target *wish)
 {
     pal_study *some = only(study, methods);
     if (!some) return -1;
-    int picked =
-        pal_study_pick(some, wish->within_m > 0 ? wish->within_m : NAN, wish->budget_ms > 0 ? wish->budget_ms : NAN);
-    if (picked >= 0 && isnan(some->point[picked].priced.ms)) picked = -1;
+    int picked = pal_study_pick(some, wish->max_error_m > 0 ? wish->max_error_m : NAN,
+                                wish->budget_ms > 0 ? wish->budget_ms : NAN);
+    if (picked >= 0 && isnan(some->point[picked].measured.ms)) picked = -1;
     free(some);
     return picked;
 }
 
 /* is a nearer to the wish than b? Within the budget by error, else by time */
-static bool is_nearer(const pal_study_point *a, const pal_study_point *b, const pal_setting_wish *wish)
+static bool is_nearer(const pal_study_point *a, const pal_study_point *b, const pal_accuracy_target *wish)
 {
-    if (wish->within_m > 0 && wish->budget_ms > 0) {
-        bool a_in = a->priced.ms <= wish->budget_ms, b_in = b->priced.ms <= wish->budget_ms;
+    if (wish->max_error_m > 0 && wish->budget_ms > 0) {
+        bool a_in = a->measured.ms <= wish->budget_ms, b_in = b->measured.ms <= wish->budget_ms;
         if (a_in != b_in) return a_in;
-        return a_in ? a->priced.error_m < b->priced.error_m : a->priced.ms < b->priced.ms;
+        return a_in ? a->measured.error_m < b->measured.error_m : a->measured.ms < b->measured.ms;
     }
-    return wish->within_m > 0 ? a->priced.error_m < b->priced.error_m : a->priced.ms < b->priced.ms;
+    return wish->max_error_m > 0 ? a->measured.error_m < b->measured.error_m : a->measured.ms < b->measured.ms;
 }
 
-void pal_study_none(const pal_study *study, const char *methods, const pal_setting_wish *wish, char *out, size_t n_byte)
+void pal_study_describe_miss(const pal_study *study, const char *methods, const pal_accuracy_target *wish, char *out,
+                             size_t n_byte)
 {
     char asked[80], text[PAL_CONFIGURATION_TEXT], own[48] = "";
     const pal_study_point *best = NULL;
     int n = 0;
     for (int k = 0; k < study->n_point; k++) {
         const pal_study_point *p = &study->point[k];
-        if (!is_measured(p) || !pal_study_method_in(methods, p->priced.setting.model)) continue;
+        if (!is_measured(p) || !pal_study_method_in(methods, p->measured.setting.model)) continue;
         n++;
         if (!best || is_nearer(p, best, wish)) best = p;
     }
@@ -100,14 +101,15 @@ void pal_study_none(const pal_study *study, const char *methods, const pal_setti
                  1e3 * study->reference_m, 1e3 * study->max_m);
         return;
     }
-    pal_setting_wish_text(wish, asked);
-    if (wish->within_m > 0 && study->reference_m > 0)
+    pal_accuracy_target_text(wish, asked);
+    if (wish->max_error_m > 0 && study->reference_m > 0)
         snprintf(own, sizeof own, " and %.2g of the reference's own", 1e3 * study->reference_m);
     if (!best)
         snprintf(out, n_byte, "none of the settings was measured, so none is %s", asked);
     else
         snprintf(out, n_byte, "none of the %d settings is %s: the nearest is %s, %.3g mm%s in %.3g ms", n, asked,
-                 pal_configuration_text(&best->priced.setting, text), 1e3 * best->priced.error_m, own, best->priced.ms);
+                 pal_configuration_text(&best->measured.setting, text), 1e3 * best->measured.error_m, own,
+                 best->measured.ms);
 }
 
 /* ---- a scene and its study ---- */
@@ -119,7 +121,7 @@ static pal_err find(const char *path, const pal_scene *scene, pal_study_file **o
     *out = NULL;
     if (access(path, F_OK)) return PAL_ERR_OK;
     PAL_TRY(pal_study_file_read(path, out, diag));
-    pal_study_front(&(*out)->study);
+    pal_study_mark_front(&(*out)->study);
     int body = (*out)->index;
     if (body < scene->n_body && !strcmp(pal_study_shape(&scene->body[body], shape), (*out)->shape)) return PAL_ERR_OK;
     free(*out);
@@ -128,19 +130,19 @@ static pal_err find(const char *path, const pal_scene *scene, pal_study_file **o
                               path);
 }
 
-static pal_err pick(const char *word, const char *path, const pal_scene *scene, const pal_setting_wish *wish,
-                    pal_studied *out, pal_diagnostic *diag)
+static pal_err pick(const char *word, const char *path, const pal_scene *scene, const pal_accuracy_target *wish,
+                    pal_studied_scene *out, pal_diagnostic *diag)
 {
-    char asked[80], text[PAL_CONFIGURATION_TEXT], none[360], off[PAL_STUDY_OFF];
+    char asked[80], text[PAL_CONFIGURATION_TEXT], none[360], off[PAL_STUDY_ERROR_TEXT];
     const pal_study *study = &out->file->study;
-    pal_setting_wish_text(wish, asked);
-    out->picked = pal_study_serving(study, "", wish);
+    pal_accuracy_target_text(wish, asked);
+    out->picked = pal_study_pick_target(study, "", wish);
     if (out->picked < 0) {
-        pal_study_none(study, "", wish, none, sizeof none);
+        pal_study_describe_miss(study, "", wish, none, sizeof none);
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s; more of them: palpate study %s --again", path, none,
                                   word);
     }
-    const pal_measured_configuration *p = &study->point[out->picked].priced;
+    const pal_measured_configuration *p = &study->point[out->picked].measured;
     pal_configuration setting = p->setting;
     pal_diagnostic reason = {""};
     if (setting.step_s == 0) setting.step_s = study->step_s;
@@ -151,24 +153,24 @@ static pal_err pick(const char *word, const char *path, const pal_scene *scene, 
     out->scene = &out->set->scene;
     snprintf(out->said, sizeof out->said, "%s: %s, %s in %.3g ms, picked of the %d settings of %.160s (%s)",
              scene->body[out->file->index].name, pal_configuration_text(&p->setting, text),
-             pal_study_off_text(out->file, p->error_m, off), p->ms, out->n_setting, path, asked);
+             pal_study_error_text(out->file, p->error_m, off), p->ms, out->n_configuration, path, asked);
     return PAL_ERR_OK;
 }
 
-pal_err pal_studied_open(const char *word, const pal_scene *scene, pal_studied *out, pal_diagnostic *diag)
+pal_err pal_studied_scene_open(const char *word, const pal_scene *scene, pal_studied_scene *out, pal_diagnostic *diag)
 {
     char stem[PAL_STUDY_PATH], path[PAL_STUDY_PATH + 8], machine[PAL_MACHINE_TEXT], asked[80];
-    const pal_setting_wish wish = {scene->max_error_m, scene->budget_ms};
-    bool wanted = wish.within_m > 0 || wish.budget_ms > 0;
+    const pal_accuracy_target wish = {scene->max_error_m, scene->budget_ms};
+    bool wanted = wish.max_error_m > 0 || wish.budget_ms > 0;
     pal_diagnostic reason = {""};
-    *out = (pal_studied){.scene = scene, .picked = -1};
+    *out = (pal_studied_scene){.scene = scene, .picked = -1};
     PAL_TRY(pal_study_stem(word, NULL, stem, diag));
     snprintf(path, sizeof path, "%s.json", stem);
     pal_err err = find(path, scene, &out->file, &reason);
     if (!out->file && wanted)
         return pal_diagnostic_set(diag, err ? err : PAL_ERR_REFUSED,
                                   "%s: asks for a setting %s, %s%s: run palpate study %s%s", word,
-                                  pal_setting_wish_text(&wish, asked), err ? "and " : "but there is no ",
+                                  pal_accuracy_target_text(&wish, asked), err ? "and " : "but there is no ",
                                   err ? reason.text : path, word, err ? " --again" : "");
     if (!out->file) {
         if (err) snprintf(out->warn, sizeof out->warn, "%.300s: not looked at", reason.text);
@@ -177,7 +179,7 @@ pal_err pal_studied_open(const char *word, const pal_scene *scene, pal_studied *
     out->body = out->file->index;
     out->setting = malloc(PAL_STUDY_POINTS * sizeof *out->setting);
     if (!out->setting) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory", path);
-    out->n_setting = pal_study_settings(&out->file->study, out->setting);
+    out->n_configuration = pal_study_configurations(&out->file->study, out->setting);
     if (strcmp(pal_machine_name(machine), out->file->study.machine) != 0)
         snprintf(out->warn, sizeof out->warn, "%.150s: its milliseconds are of %.100s, this is %.100s", path,
                  out->file->study.machine, machine);
@@ -187,10 +189,10 @@ pal_err pal_studied_open(const char *word, const pal_scene *scene, pal_studied *
     return wanted ? pick(word, path, scene, &wish, out, diag) : PAL_ERR_OK;
 }
 
-void pal_studied_close(pal_studied *studied)
+void pal_studied_scene_close(pal_studied_scene *studied)
 {
     pal_configured_scene_free(studied->set);
     free(studied->file);
     free(studied->setting);
-    *studied = (pal_studied){0};
+    *studied = (pal_studied_scene){0};
 }

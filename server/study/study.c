@@ -4,7 +4,7 @@
 #include "server/base/machine.h"
 #include "server/base/vec3.h"
 #include "server/solve/load_case.h"
-#include "server/study/study_parts.h"
+#include "server/study/study_job.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -22,9 +22,9 @@ static void free_job(pal_study_job *job)
     free(job->scene), free(job->problem);
 }
 
-bool pal_study_goes_on(const pal_study_job *job)
+bool pal_study_continues(const pal_study_job *job)
 {
-    return !job->options->goes_on || job->options->goes_on(job->options->user);
+    return !job->options->may_continue || job->options->may_continue(job->options->user);
 }
 
 /* ---- probes ---- */
@@ -40,8 +40,9 @@ static pal_err take_room(pal_study_job *job, int n_probe)
         made = made && job->still[k];
     }
     job->seconds = job->options->seconds > 0 ? job->options->seconds : usual_s;
-    job->n_way = (int)fmax(1, floor(job->seconds / PAL_STUDY_FRAME_S + 1e-9));
-    job->way = calloc((size_t)job->n_way, sizeof *job->way), job->own = calloc((size_t)job->n_way, sizeof *job->own);
+    job->n_trajectory = (int)fmax(1, floor(job->seconds / PAL_STUDY_FRAME_S + 1e-9));
+    job->way = calloc((size_t)job->n_trajectory, sizeof *job->way),
+    job->own = calloc((size_t)job->n_trajectory, sizeof *job->own);
     return made && job->way && job->own ? PAL_ERR_OK
                                         : pal_diagnostic_set(job->diag, PAL_ERR_MEMORY, "no memory for a study");
 }
@@ -73,19 +74,19 @@ static pal_err take_probes(pal_study_job *job)
 /* ---- the sweep ---- */
 
 /* was it measured before? */
-static const pal_study_point *known(const pal_study *before, const pal_study_wish *wish)
+static const pal_study_point *known(const pal_study *before, const pal_study_entry *wish)
 {
     for (int i = 0; before && i < before->n_point; i++) {
         const pal_study_point *p = &before->point[i];
-        bool fitted = p->priced.setting.k_distance_J > 0 || !strncmp(p->reason, "calibration:", 12);
-        pal_configuration bare = p->priced.setting;
+        bool fitted = p->measured.setting.k_distance_J > 0 || !strncmp(p->reason, "calibration:", 12);
+        pal_configuration bare = p->measured.setting;
         bare.k_distance_J = bare.k_area_J = bare.k_volume_J = 0;
         if (fitted == wish->calibrate && pal_configuration_equal(&bare, &wish->setting)) return p;
     }
     return NULL;
 }
 
-static pal_err sweep(pal_study_job *job, const pal_study_wish *wish, int n)
+static pal_err sweep(pal_study_job *job, const pal_study_entry *wish, int n)
 {
     const pal_study_options *o = job->options;
     for (int i = 0; i < n; i++) {
@@ -98,7 +99,7 @@ static pal_err sweep(pal_study_job *job, const pal_study_wish *wish, int n)
         else
             PAL_TRY(pal_study_measure(job, &wish[i], &job->out->point[i]));
         job->out->n_point = i + 1;
-        pal_study_front(job->out);
+        pal_study_mark_front(job->out);
         if (o->done && !o->done(job->out, n, o->user))
             return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped after %d of %d settings", i + 1, n);
     }
@@ -116,7 +117,7 @@ static pal_err check_methods(const pal_study_job *job)
 }
 
 /* the reference of a sweep that goes on is the one it began with: not made anew when nothing is left to measure */
-static bool all_known(const pal_study_job *job, const pal_study_wish *wish, int n)
+static bool all_known(const pal_study_job *job, const pal_study_entry *wish, int n)
 {
     for (int i = 0; i < n; i++)
         if (!known(job->options->before, &wish[i])) return false;
@@ -135,7 +136,7 @@ static pal_err press(pal_study_job *job)
     PAL_TRY(pal_study_presses(job));
     pal_err err = pal_study_reference(job);
     for (int k = 0; k < SOFTER && (err == PAL_ERR_NUMERIC || err == PAL_ERR_FROZEN); k++) {
-        pal_study_press_less(job);
+        pal_study_press_halve(job);
         err = pal_study_reference(job);
     }
     return err;
@@ -143,7 +144,7 @@ static pal_err press(pal_study_job *job)
 
 static pal_err study(pal_study_job *job)
 {
-    pal_study_wish *wish = calloc(PAL_STUDY_POINTS, sizeof *wish);
+    pal_study_entry *wish = calloc(PAL_STUDY_POINTS, sizeof *wish);
     if (!wish) return pal_diagnostic_set(job->diag, PAL_ERR_MEMORY, "no memory for a study");
     const pal_study *before = job->options->before;
     pal_err err = pal_study_reference_size(job);
@@ -156,9 +157,9 @@ static pal_err study(pal_study_job *job)
     if (!err && !whole) err = take_probes(job);
     if (!err && !whole) err = job->n_load == 0 ? press(job) : pal_study_reference(job);
     if (!err) err = sweep(job, wish, n);
-    if (!err && !whole) err = pal_study_time_again(job);
+    if (!err && !whole) err = pal_study_time_repeat(job);
     /* also where nothing was left to measure: the one that was broken off may have been there */
-    if (!err) err = pal_study_torture(job);
+    if (!err) err = pal_study_check_robustness(job);
     pal_study_predict(job->out);
     free(wish);
     return err;
@@ -254,7 +255,7 @@ static pal_err set_materials(const pal_problem *p, const double origin[3], pal_b
 
 static pal_err problem_voxels(const pal_problem *p, const pal_surface *surface, pal_prepared *out, pal_diagnostic *diag)
 {
-    pal_voxel_wish wish = {.resolution = SCENE_VOXELS, .fill = true, .align = true};
+    pal_case_voxel_options wish = {.resolution = SCENE_VOXELS, .fill = true, .align = true};
     pal_err err = pal_case_voxels(p, surface, &wish, out, diag);
     /* thinner than such voxels */
     while (err == PAL_ERR_REFUSED && wish.resolution < FINEST_SCENE) {

@@ -19,8 +19,8 @@
  * 1/1000 s. The milliseconds are the median over the steps of the way, which is gone again from rest until they have
  * taken 50 ms together (1,200 steps at most); when all is measured every way is gone twice more (quick: once), one
  * setting after the other, and the least median counts, as other work on the machine only adds to it. What is on the
- * front is tortured shortly (study_torture.c); what fails without its guard stopping it says so in its `why` and is not
- * named. Calibrated springs keep a tenth of the volume stiffness that the material gives, and are fitted to the
+ * front is tortured shortly (study_robustness.c); what fails without its guard stopping it says so in its `why` and is
+ * not named. Calibrated springs keep a tenth of the volume stiffness that the material gives, and are fitted to the
  * reference under all loads but the last (the pull), which judges them unseen; where there is one load only, the
  * point's `why` says that it is judged by what it was fitted to, and it is neither on the front nor picked. */
 #ifndef PAL_STUDY_STUDY_H
@@ -31,23 +31,24 @@
 
 #include <stdint.h>
 
-enum { PAL_STUDY_POINTS = 256, PAL_STUDY_LOADS = 4, PAL_STUDY_WAY = 512 };
+enum { PAL_STUDY_POINTS = 256, PAL_STUDY_LOADS = 4, PAL_STUDY_TRAJECTORY = 512 };
 
 typedef struct pal_study_point {
-    pal_measured_configuration priced; /* error_m: the larger of static_most_m and way_most_m; NaN: not measured */
-    pal_err err; /* not OK: it could not be measured, why says the reason ("needs 8,000 sub-steps") */
+    pal_measured_configuration
+        measured; /* error_m: the larger of static_max_m and trajectory_max_m; NaN: not measured */
+    pal_err err;  /* not OK: it could not be measured, why says the reason ("needs 8,000 sub-steps") */
     char reason[PAL_CONFIGURATION_TEXT]; /* or what is to be known of a measured one: "fitted to the load it is judged
                                             by" */
     int n_node, n_substep;               /* of a step at rest; both of a surface that adapts: as they are at the end */
     double ms_p95;
-    double static_rms_m, static_most_m; /* over all probes and loads; percent of the largest displacement: / max_m */
-    double way_rms_m, way_most_m;       /* of the point that the first load moves most, over time                  */
-    double prepare_s;                   /* mesh and world                                                           */
-    double n_element;                   /* finite elements; 0: it has none, or they were not kept */
+    double static_rms_m, static_max_m; /* over all probes and loads; percent of the largest displacement: / max_m */
+    double trajectory_rms_m, trajectory_max_m; /* of the point that the first load moves most, over time */
+    double prepare_s; /* mesh and world                                                           */
+    double n_element; /* finite elements; 0: it has none, or they were not kept */
     double read_ms; /* reading its solver's factor forwards and backwards, as fast as this machine reads as much as its
                        world holds: known before it runs; 0: there is none */
     double predicted_ms, predicted_m; /* by the models of cost and error fitted to the OTHER points of its method, once
-                                         all are there, and to what is counted before it runs (pal_study_foresee_cost);
+                                         all are there, and to what is counted before it runs (pal_study_predict_cost);
                                          NaN: too few of them */
 } pal_study_point;
 
@@ -88,7 +89,8 @@ typedef struct pal_study_options {
     /* [load] after every point: the study so far, to be kept; may be NULL. False stops with STATE */
     bool (*done)(const pal_study *study, int n_finest, void *user);
     bool (*progress)(const char *what, double fraction, void *user); /* may be NULL; false stops with STATE */
-    bool (*goes_on)(void *user); /* asked between the steps of whatever runs; may be NULL; false stops with STATE */
+    bool (*may_continue)(
+        void *user); /* asked between the steps of whatever runs; may be NULL; false stops with STATE */
     void *user;
 } pal_study_options;
 
@@ -109,16 +111,16 @@ pal_err pal_study_problem_scene(const pal_problem *problem, const pal_surface *s
 bool pal_study_trusted(const pal_study *study);
 /* marks the front anew: points that no other beats in both ms and error, where an error below the reference's own
  * counts as that; none when the reference is not to be trusted */
-void pal_study_front(pal_study *study);
-/* the cheapest point with error_m (plus the reference's own error) at most within_m, or the most accurate one with ms
- * at most budget_ms (of those nearer than the reference's own error the cheapest); the one that is not asked for is
+void pal_study_mark_front(pal_study *study);
+/* the cheapest point with error_m (plus the reference's own error) at most max_error_m, or the most accurate one with
+ * ms at most budget_ms (of those nearer than the reference's own error the cheapest); the one that is not asked for is
  * NaN; both: cheapest that keeps both. -1: none serves, or the reference is not to be trusted */
-int pal_study_pick(const pal_study *study, double within_m, double budget_ms);
+int pal_study_pick(const pal_study *study, double max_error_m, double budget_ms);
 /* cost and error foreseen for a setting between those measured, leave_out (-1: none) being no part of them: by ms = a +
  * b n^c and error = d size^-p along the sizes of settings that are the same but for them, or by what each knob of the
  * model adds to the logarithms; false: too few points of the model, or none with such an element, law, solver, step */
-bool pal_study_foresee(const pal_study *study, const pal_configuration *setting, int leave_out, double *ms,
-                       double *error_m);
+bool pal_study_predict_configuration(const pal_study *study, const pal_configuration *setting, int leave_out,
+                                     double *ms, double *error_m);
 /* Cost foreseen for a setting that is made and has not run: of n_node nodes, n_element elements and n_substep sub-steps
  * in a step of its own at rest (body.h, pal_world_substeps), and what reading its factor takes (pal_study_point). Known
  * for that: what the other points of its model took, leave_out (-1: none) being no part of them, with their knobs,
@@ -127,6 +129,6 @@ bool pal_study_foresee(const pal_study *study, const pal_configuration *setting,
  * refined is not known before it runs: the share is that of what the other levels refined, sub-steps are those of its
  * finest level. false: fewer than three points of the model, none with such an element, law or solver, or none that
  * adapts */
-bool pal_study_foresee_cost(const pal_study *study, const pal_configuration *setting, int n_node, double n_element,
+bool pal_study_predict_cost(const pal_study *study, const pal_configuration *setting, int n_node, double n_element,
                             int n_substep, double read_ms, int leave_out, double *ms);
 #endif

@@ -8,7 +8,7 @@
  * knob adds and of what grows with the nodes. Elements and not nodes, of which a slender body has twice as many to an
  * element; of bodies without elements of their own (springs) nodes. a, c, t and the sum are fitted to the others by
  * least squares of logarithms; what the sum misses at those that are near in knobs and nodes is taken off. */
-#include "server/study/study_parts.h"
+#include "server/study/study_job.h"
 
 #include <math.h>
 #include <string.h>
@@ -172,15 +172,15 @@ static bool is_adaptive(const pal_configuration *s)
 static bool counts(const pal_study *study, int i, int leave_out, const pal_configuration *s)
 {
     const pal_study_point *p = &study->point[i];
-    return i != leave_out && !p->err && p->priced.ms > 0 && isfinite(p->priced.ms) && p->n_node > 0 &&
-           p->n_substep > 0 && p->priced.setting.step_s > 0 && pal_study_is(p->priced.setting.model, s->model);
+    return i != leave_out && !p->err && p->measured.ms > 0 && isfinite(p->measured.ms) && p->n_node > 0 &&
+           p->n_substep > 0 && p->measured.setting.step_s > 0 && pal_study_is(p->measured.setting.model, s->model);
 }
 
 /* nodes of a body that adapts, wholly refined: as counted of that setting, else four times as many with each level */
 static double refined_nodes(const pal_study *study, int leave_out, const pal_configuration *s, double coarse)
 {
     for (int i = 0; i < study->n_point; i++) {
-        const pal_configuration *q = &study->point[i].priced.setting;
+        const pal_configuration *q = &study->point[i].measured.setting;
         if (counts(study, i, leave_out, s) && pal_study_is(q->element, "refined") && q->size == s->size)
             return study->point[i].n_node;
     }
@@ -194,7 +194,7 @@ static double finest_substeps(const pal_study *study, int leave_out, const pal_c
     double coarse = NAN;
     for (int i = 0; i < study->n_point; i++) {
         const pal_study_point *p = &study->point[i];
-        const pal_configuration *q = &p->priced.setting;
+        const pal_configuration *q = &p->measured.setting;
         if (!counts(study, i, leave_out, s)) continue;
         /* of steps of their own */
         double n = p->n_substep * s->step_s / q->step_s;
@@ -211,11 +211,12 @@ static double nodes_in_use(const pal_study *study, int leave_out, const pal_conf
     double coarse = NAN, share = 0;
     int n = 0;
     for (int i = 0; i < study->n_point; i++)
-        if (counts(study, i, leave_out, s) && study->point[i].priced.setting.size == 1) coarse = study->point[i].n_node;
+        if (counts(study, i, leave_out, s) && study->point[i].measured.setting.size == 1)
+            coarse = study->point[i].n_node;
     for (int i = 0; i < study->n_point; i++) {
         const pal_study_point *p = &study->point[i];
-        if (!counts(study, i, leave_out, s) || !is_adaptive(&p->priced.setting)) continue;
-        double full = refined_nodes(study, leave_out, &p->priced.setting, coarse);
+        if (!counts(study, i, leave_out, s) || !is_adaptive(&p->measured.setting)) continue;
+        double full = refined_nodes(study, leave_out, &p->measured.setting, coarse);
         share += (p->n_node - coarse) / (full - coarse);
         n++;
     }
@@ -252,7 +253,7 @@ static bool are_counted(const pal_study *study, int leave_out, const pal_configu
     return true;
 }
 
-bool pal_study_foresee_cost(const pal_study *study, const pal_configuration *s, int n_node, double n_element,
+bool pal_study_predict_cost(const pal_study *study, const pal_configuration *s, int n_node, double n_element,
                             int n_substep, double read_ms, int leave_out, double *ms)
 {
     seen p[PAL_STUDY_POINTS];
@@ -264,12 +265,12 @@ bool pal_study_foresee_cost(const pal_study *study, const pal_configuration *s, 
     for (int i = 0; i < study->n_point; i++) {
         const pal_study_point *q = &study->point[i];
         if (!counts(study, i, leave_out, s)) continue;
-        p[n] = (seen){.setting = &q->priced.setting,
+        p[n] = (seen){.setting = &q->measured.setting,
                       .n_node = q->n_node,
                       .n_element = by_element ? q->n_element : q->n_node,
                       .n_substep = q->n_substep,
                       .read_ms = q->read_ms};
-        p[n].ms = q->priced.ms * q->priced.setting.step_s / study->step_s;
+        p[n].ms = q->measured.ms * q->measured.setting.step_s / study->step_s;
         features(p[n].setting, p[n].n_node, p[n].f);
         n++;
     }

@@ -2,15 +2,15 @@
  * several loads the last one is not fitted to, so that the point is judged by a load it has never seen as well. */
 #include "server/base/vec3.h"
 #include "server/calibrate/calibrate.h"
-#include "server/study/study_parts.h"
+#include "server/study/study_job.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { MOST_EVALUATIONS = 60 };
-/* of the material's own: without their volume springs tetrahedra that were turned over stay so (palpate torture) */
-static const double least_volume = 0.1;
+/* of the material's own: without their volume springs tetrahedra that were turned over stay so (palpate robustness) */
+static const double min_volume_ratio = 0.1;
 
 /* the reference's rest under a load, in the problem's frame */
 static pal_err take_samples(const pal_study_job *job, int load, pal_samples *out)
@@ -27,7 +27,7 @@ static pal_err take_samples(const pal_study_job *job, int load, pal_samples *out
 static bool look(void *user, const pal_fit_step *step)
 {
     (void)step;
-    return pal_study_goes_on(user);
+    return pal_study_continues(user);
 }
 
 static pal_err fit(pal_study_job *job, const pal_calibration *calibration, pal_configuration *setting,
@@ -59,7 +59,7 @@ pal_err pal_study_fit(pal_study_job *job, pal_configuration *setting, pal_diagno
     pal_err err = PAL_ERR_OK;
     pal_calibrate_default(&options);
     options.voxel.resolution = setting->size;
-    options.without_area = true, options.least_volume = least_volume;
+    options.without_area = true, options.min_volume_ratio = min_volume_ratio;
     int n_fit = job->n_load > 1 ? job->n_load - 1 : 1;
     for (int k = 0; k < n_fit && !err; k++) {
         err = take_samples(job, k, &samples[k]);

@@ -18,7 +18,7 @@ static bool is_problem(const char *word)
     uint8_t *bytes;
     size_t n_byte, n = strlen(word);
     cJSON *root = NULL;
-    if (n <= 5 || strcmp(word + n - 5, ".json") != 0 || pal_file_read(word, PAL_JSON_MOST, &bytes, &n_byte, NULL))
+    if (n <= 5 || strcmp(word + n - 5, ".json") != 0 || pal_file_read(word, PAL_JSON_MAX_BYTES, &bytes, &n_byte, NULL))
         return false;
     const pal_json json = {word, NULL};
     bool found = !pal_json_parse(&json, (const char *)bytes, n_byte, &root) &&
@@ -40,7 +40,7 @@ static pal_err no_case(const pal_problem *p, const char *id, pal_diagnostic *dia
                               list);
 }
 
-static pal_err open_problem(const pal_study_question *q, pal_study_input *out, const char **samples,
+static pal_err open_problem(const pal_study_request *q, pal_study_input *out, const char **samples,
                             pal_diagnostic *diag)
 {
     pal_surface_report report = {0};
@@ -62,9 +62,9 @@ static pal_err open_problem(const pal_study_question *q, pal_study_input *out, c
     return PAL_ERR_OK;
 }
 
-static pal_err open_scene(const pal_study_question *q, pal_study_input *out, pal_diagnostic *diag)
+static pal_err open_scene(const pal_study_request *q, pal_study_input *out, pal_diagnostic *diag)
 {
-    if (q->load_case && !q->kept_case)
+    if (q->load_case && !q->keeps_case)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: --case: a scene has no load cases, a problem has",
                                   q->word);
     PAL_TRY(pal_scene_arg(q->word, q->options, &out->loaded, NULL, NULL, diag));
@@ -76,7 +76,7 @@ static pal_err open_scene(const pal_study_question *q, pal_study_input *out, pal
                               q->body, scene->body[0].name);
 }
 
-pal_err pal_study_input_open(const pal_study_question *q, pal_study_input *out, pal_diagnostic *diag)
+pal_err pal_study_input_open(const pal_study_request *q, pal_study_input *out, pal_diagnostic *diag)
 {
     const char *samples = q->samples;
     *out = (pal_study_input){0};
@@ -101,7 +101,7 @@ void pal_study_input_close(pal_study_input *input)
 
 static uint64_t add_numbers(uint64_t sum, const double *value, size_t n)
 {
-    return pal_study_sum(sum, value, n * sizeof *value);
+    return pal_study_digest(sum, value, n * sizeof *value);
 }
 
 static uint64_t add_load(uint64_t sum, const pal_problem_load *l)
@@ -128,14 +128,14 @@ void pal_study_loads_read(const char *loads, double *seconds, bool *quick, char 
         snprintf(load_case, PAL_NAME, "%.*s", (int)(comma - loads) - (int)(sizeof named - 1), loads + sizeof named - 1);
 }
 
-void pal_study_input_describe(const pal_study_input *in, const pal_study_question *q, pal_study_file *file)
+void pal_study_input_describe(const pal_study_input *in, const pal_study_request *q, pal_study_file *file)
 {
     const pal_scene *scene = in->scene;
     /* whatever the reference depends on beside the body itself */
     uint64_t sum = add_numbers(add_numbers(0, &scene->step_s, 1), scene->up, 3);
     pal_configuration now;
     pal_configuration_of(scene, in->body, &now);
-    sum = add_numbers(pal_study_sum(sum, now.law, strlen(now.law)), &scene->gravity_m_s2, 1);
+    sum = add_numbers(pal_study_digest(sum, now.law, strlen(now.law)), &scene->gravity_m_s2, 1);
     char loads[80] = "three presses and a pull";
     if (in->problem) snprintf(loads, sizeof loads, "load case %s", in->load_case->id);
     for (int k = 0; in->problem && k < in->load_case->n_load; k++) sum = add_load(sum, &in->load_case->load[k]);

@@ -51,7 +51,7 @@ static size_t whole_record(const unsigned char *at, size_t left)
     size_t size = sound ? size_of(head.n) : 0;
     if (size == 0 || size > left) return 0;
     memcpy(&sum, at + size - sizeof sum, sizeof sum);
-    return pal_study_sum(0, at, size - sizeof sum) == sum ? size : 0;
+    return pal_study_digest(0, at, size - sizeof sum) == sum ? size : 0;
 }
 
 static pal_err keep(pal_study_journal *j, const unsigned char *record, size_t size)
@@ -141,7 +141,7 @@ pal_err pal_study_journal_add(pal_study_journal *j, uint64_t key, const pal_stud
     }
     memcpy(record, &head, sizeof head);
     memcpy(record + sizeof head, value, (size_t)n * sizeof *value);
-    uint64_t sum = pal_study_sum(0, record, size - sizeof sum);
+    uint64_t sum = pal_study_digest(0, record, size - sizeof sum);
     memcpy(record + size - sizeof sum, &sum, sizeof sum);
     pal_err err = keep(j, record, size);
     if (!err && (fwrite(record, size, 1, j->file) != 1 || fflush(j->file) != 0)) err = PAL_ERR_IO;

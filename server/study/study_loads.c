@@ -1,6 +1,6 @@
 /* Presses and a pull for a scene that has no load cases: where they stand, how strong they are. */
 #include "server/base/vec3.h"
-#include "server/study/study_parts.h"
+#include "server/study/study_job.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -37,7 +37,7 @@ static pal_err choose_places(const pal_study_job *job, const pal_study_world *w,
     for (int i = 0; i < job->n_probe; i++) {
         far[i] = INFINITY;
         for (int k = 0; k < w->body->n_dof; k++)
-            if (w->body->fixed[k]) far[i] = fmin(far[i], pal_dist3(job->probe + 3 * i, w->body->x_rest + 3 * k));
+            if (w->body->support[k]) far[i] = fmin(far[i], pal_dist3(job->probe + 3 * i, w->body->x_rest + 3 * k));
     }
     for (int p = 0; p < PRESSES; p++) {
         out[p] = 0;
@@ -131,7 +131,7 @@ static pal_err scale_load(pal_study_job *job, int index, double length_scale_m)
     pal_scale3(total, guess, total);
     for (int round = 0; round < (job->adaptive ? 2 : 1); round++) {
         int n_node;
-        PAL_TRY(pal_study_kept_static(job, &s, job->load[index], job->now, &n_node, job->diag));
+        PAL_TRY(pal_study_cached_static(job, &s, job->load[index], job->now, &n_node, job->diag));
         double moved = 0;
         for (int i = 0; i < job->n_probe; i++) moved = fmax(moved, pal_norm3(job->now + 3 * i));
         if (!(moved > 0) || !isfinite(moved))
@@ -146,7 +146,7 @@ static pal_err scale_load(pal_study_job *job, int index, double length_scale_m)
     return PAL_ERR_OK;
 }
 
-bool pal_study_press_again(pal_study_job *job, int index, pal_err err)
+bool pal_study_press_adjust(pal_study_job *job, int index, pal_err err)
 {
     if (index >= job->n_press || job->round[index] >= ROUNDS) return false;
     double *total = job->problem->load_case[index].load[0].total_N, moved = 0, times = 1;
@@ -166,12 +166,12 @@ pal_err pal_study_presses(pal_study_job *job)
 {
     pal_study_world w;
     pal_configuration s = coarse(job);
-    int place[PRESSES], n_held = 0;
+    int place[PRESSES], n_fixed = 0;
     double low[3];
     PAL_TRY(pal_study_open(job, &s, true, &w, job->diag));
-    for (int i = 0; i < w.body->n_dof; i++) n_held += w.body->fixed[i] != 0;
+    for (int i = 0; i < w.body->n_dof; i++) n_fixed += w.body->support[i] != 0;
     pal_err err = PAL_ERR_OK;
-    if (n_held == 0 && !job->adaptive)
+    if (n_fixed == 0 && !job->adaptive)
         err = pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "body \"%s\": nothing holds it, so a press has no rest",
                                  job->scene->body[0].name);
     if (!err) err = choose_places(job, &w, place);
@@ -187,7 +187,7 @@ pal_err pal_study_presses(pal_study_job *job)
     return err;
 }
 
-void pal_study_press_less(pal_study_job *job)
+void pal_study_press_halve(pal_study_job *job)
 {
     for (int k = 0; k < job->n_load; k++) {
         double *total = job->problem->load_case[k].load[0].total_N;

@@ -20,17 +20,17 @@ const char *pal_study_method(const pal_configuration *setting, char out[PAL_CONF
 
 static bool is_measured(const pal_study_point *p)
 {
-    return !p->err && isfinite(p->priced.ms) && isfinite(p->priced.error_m);
+    return !p->err && isfinite(p->measured.ms) && isfinite(p->measured.error_m);
 }
 
 static double step_of(const pal_study *study, const pal_study_point *p)
 {
-    return p->priced.setting.step_s > 0 ? p->priced.setting.step_s : study->step_s;
+    return p->measured.setting.step_s > 0 ? p->measured.setting.step_s : study->step_s;
 }
 
 bool pal_study_is_live(const pal_study *study, const pal_study_point *p)
 {
-    return is_measured(p) && 1e-3 * p->priced.ms <= study->step_s;
+    return is_measured(p) && 1e-3 * p->measured.ms <= study->step_s;
 }
 
 /* as the command has written its loads (study_input.c) */
@@ -75,16 +75,16 @@ void pal_study_print(const pal_study_file *file, FILE *to)
             n_bad++;
             continue;
         }
-        fprintf(to, "%1s %3d", p->priced.front ? "*" : "", k + 1);
-        print_cell(to, 8, "%.3f", p->priced.ms);
+        fprintf(to, "%1s %3d", p->measured.front ? "*" : "", k + 1);
+        print_cell(to, 8, "%.3f", p->measured.ms);
         print_cell(to, 8, "%.3f", p->ms_p95);
         fprintf(to, " %5s", pal_study_is_live(s, p) ? "yes" : "no");
         print_cell(to, 9, "%.4f", 1e3 * p->static_rms_m);
-        print_cell(to, 9, "%.4f", 1e3 * p->static_most_m);
+        print_cell(to, 9, "%.4f", 1e3 * p->static_max_m);
         print_cell(to, 7, "%.2f", 1e2 * p->static_rms_m / s->max_m);
-        print_cell(to, 7, "%.2f", 1e2 * p->static_most_m / s->max_m);
-        print_cell(to, 9, "%.4f", 1e3 * p->way_most_m);
-        fprintf(to, " %8d %6d  %s%s%s\n", p->n_node, p->n_substep, pal_configuration_text(&p->priced.setting, text),
+        print_cell(to, 7, "%.2f", 1e2 * p->static_max_m / s->max_m);
+        print_cell(to, 9, "%.4f", 1e3 * p->trajectory_max_m);
+        fprintf(to, " %8d %6d  %s%s%s\n", p->n_node, p->n_substep, pal_configuration_text(&p->measured.setting, text),
                 p->reason[0] ? "; " : "", p->reason);
     }
     fprintf(to,
@@ -96,7 +96,7 @@ void pal_study_print(const pal_study_file *file, FILE *to)
     for (int k = 0; k < s->n_point && n_bad > 0; k++) {
         const pal_study_point *p = &s->point[order[k]];
         if (!is_measured(p))
-            fprintf(to, "not measured: %d, %s: %s\n", k + 1, pal_configuration_text(&p->priced.setting, text),
+            fprintf(to, "not measured: %d, %s: %s\n", k + 1, pal_configuration_text(&p->measured.setting, text),
                     p->reason[0] ? p->reason : pal_err_text(p->err));
     }
 }
@@ -106,7 +106,7 @@ void pal_study_print(const pal_study_file *file, FILE *to)
 /* the knobs of a point on the front, as short as its mark allows */
 static void knobs_of(const pal_study *study, const pal_study_point *p, double usual, char *out, size_t n_byte)
 {
-    const pal_configuration *s = &p->priced.setting;
+    const pal_configuration *s = &p->measured.setting;
     bool voxels = !strcmp(s->model, "fem") || !strcmp(s->model, "tet_springs");
     int n = s->size > 0 ? snprintf(out, n_byte, "%d %s", s->size,
                                    voxels         ? "voxels"
@@ -130,9 +130,9 @@ static double usual_tolerance(const pal_study *study)
     double usual = 0;
     int most = 0;
     for (int k = 0; k < study->n_point; k++) {
-        double t = study->point[k].priced.setting.tolerance;
+        double t = study->point[k].measured.setting.tolerance;
         int n = 0;
-        for (int i = 0; i < study->n_point; i++) n += study->point[i].priced.setting.tolerance == t;
+        for (int i = 0; i < study->n_point; i++) n += study->point[i].measured.setting.tolerance == t;
         if (t > 0 && n > most) most = n, usual = t;
     }
     return usual;
@@ -159,7 +159,7 @@ static void add_point(series *s, const pal_study *study, const pal_study_point *
     char name[PAL_CONFIGURATION_TEXT];
     int k = 0;
     bool apart = p->reason[0] != 0;
-    pal_study_method(&p->priced.setting, name);
+    pal_study_method(&p->measured.setting, name);
     while (k < s->n_method && (strcmp(s->name[k], name) != 0 || s->apart[k] != apart)) k++;
     if (k == s->n_method) {
         if (s->n_method == METHODS) return;
@@ -167,17 +167,17 @@ static void add_point(series *s, const pal_study *study, const pal_study_point *
         memcpy(s->name[s->n_method++], name, sizeof name);
     }
     char *tip = s->tip_text[s->n_tip++], text[PAL_CONFIGURATION_TEXT];
-    snprintf(tip, TIP, "%s: %.3g ms, %.3g mm%s%s", pal_configuration_text(&p->priced.setting, text), p->priced.ms,
-             1e3 * p->priced.error_m, apart ? "; " : "", p->reason);
+    snprintf(tip, TIP, "%s: %.3g ms, %.3g mm%s%s", pal_configuration_text(&p->measured.setting, text), p->measured.ms,
+             1e3 * p->measured.error_m, apart ? "; " : "", p->reason);
     s->tip[k][s->n[k]] = tip;
-    s->x[k][s->n[k]] = p->priced.ms;
-    s->y[k][s->n[k]++] = 1e3 * p->priced.error_m;
-    if (!p->priced.front) return;
-    s->front_x[s->n_front] = p->priced.ms;
-    s->front_y[s->n_front++] = 1e3 * p->priced.error_m;
+    s->x[k][s->n[k]] = p->measured.ms;
+    s->y[k][s->n[k]++] = 1e3 * p->measured.error_m;
+    if (!p->measured.front) return;
+    s->front_x[s->n_front] = p->measured.ms;
+    s->front_y[s->n_front++] = 1e3 * p->measured.error_m;
     if (s->n_label == FRONT_LABELS) return;
     knobs_of(study, p, s->usual, s->knobs[s->n_label], sizeof *s->knobs);
-    s->label[s->n_label] = (pal_plot_label){p->priced.ms, 1e3 * p->priced.error_m, s->knobs[s->n_label]};
+    s->label[s->n_label] = (pal_plot_label){p->measured.ms, 1e3 * p->measured.error_m, s->knobs[s->n_label]};
     s->n_label++;
 }
 
@@ -302,28 +302,28 @@ static void put_row(FILE *to, const pal_study_file *file, const pal_study_point 
     char text[PAL_CONFIGURATION_TEXT];
     bool measured = is_measured(p);
     fprintf(to, "<tr%s><td>%s</td><td class=\"n\">",
-            p->priced.front ? " class=\"front\""
-            : measured      ? ""
-                            : " class=\"bad\"",
-            p->priced.front ? "&#9733;" : "");
+            p->measured.front ? " class=\"front\""
+            : measured        ? ""
+                              : " class=\"bad\"",
+            p->measured.front ? "&#9733;" : "");
     fprintf(to, measured ? "<button>%d</button></td><td>" : "%d</td><td>", row);
-    put_text(to, pal_configuration_text(&p->priced.setting, text));
-    if (p->priced.front) put_order(to, file, row);
+    put_text(to, pal_configuration_text(&p->measured.setting, text));
+    if (p->measured.front) put_order(to, file, row);
     if (!measured || p->reason[0]) {
         fputs("<br>", to);
         put_text(to, p->reason[0] ? p->reason : pal_err_text(p->err));
     }
     fputs("</td>", to);
-    put_number(to, "%.3f", p->priced.ms);
+    put_number(to, "%.3f", p->measured.ms);
     put_number(to, "%.3f", p->ms_p95);
     fprintf(to, "<td>%s</td>", !measured ? "" : pal_study_is_live(s, p) ? "yes" : "no");
-    put_number(to, "%.4f", 1e3 * p->priced.error_m);
+    put_number(to, "%.4f", 1e3 * p->measured.error_m);
     put_number(to, "%.4f", 1e3 * p->static_rms_m);
-    put_number(to, "%.4f", 1e3 * p->static_most_m);
+    put_number(to, "%.4f", 1e3 * p->static_max_m);
     put_number(to, "%.2f", 1e2 * p->static_rms_m / s->max_m);
-    put_number(to, "%.2f", 1e2 * p->static_most_m / s->max_m);
-    put_number(to, "%.4f", 1e3 * p->way_rms_m);
-    put_number(to, "%.4f", 1e3 * p->way_most_m);
+    put_number(to, "%.2f", 1e2 * p->static_max_m / s->max_m);
+    put_number(to, "%.4f", 1e3 * p->trajectory_rms_m);
+    put_number(to, "%.4f", 1e3 * p->trajectory_max_m);
     fprintf(to, "<td class=\"n\">%d</td><td class=\"n\">%d</td>", p->n_node, p->n_substep);
     put_number(to, "%.2f", p->prepare_s);
     put_number(to, "%.3f", p->predicted_ms);

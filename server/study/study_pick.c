@@ -5,7 +5,7 @@
  * the logarithms of all points of the model are taken as sums of what each knob adds, and what that misses at the
  * nearest settings of the same size is taken off: how many nodes there are is no smooth function of the size. */
 #include "server/base/vec3.h"
-#include "server/study/study_parts.h"
+#include "server/study/study_job.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -19,8 +19,8 @@ static const double close_off = 0.05;
 
 static bool measured(const pal_study_point *p)
 {
-    return p->err == PAL_ERR_OK && p->priced.ms > 0 && p->priced.error_m >= 0 && isfinite(p->priced.ms) &&
-           isfinite(p->priced.error_m);
+    return p->err == PAL_ERR_OK && p->measured.ms > 0 && p->measured.error_m >= 0 && isfinite(p->measured.ms) &&
+           isfinite(p->measured.error_m);
 }
 
 /* what was fitted to the one load that judges it says nothing of any other */
@@ -40,13 +40,13 @@ static double far_of(const pal_study *study, const pal_measured_configuration *p
     return study->reference_m > p->error_m ? study->reference_m : p->error_m;
 }
 
-void pal_study_front(pal_study *study)
+void pal_study_mark_front(pal_study *study)
 {
     for (int i = 0; i < study->n_point; i++) {
-        pal_measured_configuration *p = &study->point[i].priced;
+        pal_measured_configuration *p = &study->point[i].measured;
         p->front = pal_study_trusted(study) && judged(&study->point[i]);
         for (int k = 0; k < study->n_point && p->front; k++) {
-            const pal_measured_configuration *q = &study->point[k].priced;
+            const pal_measured_configuration *q = &study->point[k].measured;
             if (!judged(&study->point[k]) || k == i) continue;
             double far = far_of(study, p), other = far_of(study, q);
             bool no_worse = q->ms <= p->ms && other <= far, better = q->ms < p->ms || other < far;
@@ -55,22 +55,22 @@ void pal_study_front(pal_study *study)
     }
 }
 
-int pal_study_pick(const pal_study *study, double within_m, double budget_ms)
+int pal_study_pick(const pal_study *study, double max_error_m, double budget_ms)
 {
     int best = -1;
     if (!pal_study_trusted(study)) return -1;
     double own = study->reference_m > 0 ? study->reference_m : 0;
     for (int i = 0; i < study->n_point; i++) {
-        const pal_measured_configuration *p = &study->point[i].priced;
+        const pal_measured_configuration *p = &study->point[i].measured;
         if (!judged(&study->point[i])) continue;
-        if (!isnan(within_m) && !(p->error_m + own <= within_m)) continue;
+        if (!isnan(max_error_m) && !(p->error_m + own <= max_error_m)) continue;
         if (!isnan(budget_ms) && !(p->ms <= budget_ms)) continue;
         if (best >= 0) {
-            const pal_measured_configuration *b = &study->point[best].priced;
+            const pal_measured_configuration *b = &study->point[best].measured;
             double far = far_of(study, p), least = far_of(study, b);
             bool cheaper = p->ms < b->ms || (p->ms == b->ms && p->error_m < b->error_m);
             bool nearer = far < least || (far == least && p->ms < b->ms);
-            if (!(isnan(within_m) ? nearer : cheaper)) continue;
+            if (!(isnan(max_error_m) ? nearer : cheaper)) continue;
         }
         best = i;
     }
@@ -211,10 +211,10 @@ static void look_along(const pal_study *study, const pal_configuration *s, int l
     int n = 0;
     for (int i = 0; i < study->n_point; i++) {
         const pal_study_point *p = &study->point[i];
-        if (i == leave_out || !measured(p) || !same_but_size(&p->priced.setting, s)) continue;
-        x[n] = log(edges(&p->priced.setting));
-        y[0][n] = log(p->priced.ms);
-        y[1][n++] = log(fmax(p->priced.error_m, min_m));
+        if (i == leave_out || !measured(p) || !same_but_size(&p->measured.setting, s)) continue;
+        x[n] = log(edges(&p->measured.setting));
+        y[0][n] = log(p->measured.ms);
+        y[1][n++] = log(fmax(p->measured.error_m, min_m));
     }
     for (int v = 0; v < 2; v++) out[v] = law_along(x, y[v], n, at, v == 0);
 }
@@ -265,7 +265,7 @@ static bool is_strange(const pal_study *study, const pal_configuration *s, int l
 {
     bool element = false, law = false, solver = false, fitted = false, step = false, tolerance = false;
     for (int i = 0; i < study->n_point; i++) {
-        const pal_configuration *q = &study->point[i].priced.setting;
+        const pal_configuration *q = &study->point[i].measured.setting;
         if (i == leave_out || !measured(&study->point[i]) || !pal_study_is(q->model, s->model)) continue;
         element |= pal_study_is(q->element, s->element), law |= pal_study_is(q->law, s->law);
         solver |= pal_study_is(q->solver, s->solver), fitted |= (q->k_distance_J > 0) == (s->k_distance_J > 0);
@@ -292,7 +292,7 @@ static int differences(const pal_configuration *a, const pal_configuration *b)
 static bool is_mate(const pal_study *study, int i, const pal_configuration *s, int leave_out)
 {
     const pal_study_point *p = &study->point[i];
-    return i != leave_out && measured(p) && pal_study_is(p->priced.setting.model, s->model);
+    return i != leave_out && measured(p) && pal_study_is(p->measured.setting.model, s->model);
 }
 
 /* logarithms of ms and error; *mates: other settings of the same size there are */
@@ -303,7 +303,7 @@ static bool look_at_knobs(const pal_study *study, const pal_configuration *s, in
     *mates = 0;
     if (is_strange(study, s, leave_out)) return false;
     for (int i = 0; i < study->n_point; i++) {
-        const pal_measured_configuration *p = &study->point[i].priced;
+        const pal_measured_configuration *p = &study->point[i].measured;
         if (!is_mate(study, i, s, leave_out)) continue;
         features(&p->setting, f);
         double y[2] = {log(p->ms), log(fmax(p->error_m, min_m))};
@@ -317,7 +317,7 @@ static bool look_at_knobs(const pal_study *study, const pal_configuration *s, in
     solve_knobs(A, w);
     features(s, f);
     for (int i = 0; i < study->n_point; i++) {
-        const pal_measured_configuration *p = &study->point[i].priced;
+        const pal_measured_configuration *p = &study->point[i].measured;
         if (!is_mate(study, i, s, leave_out) || p->setting.size != s->size) continue;
         double near = exp2(-2 * differences(&p->setting, s));
         features(&p->setting, g);
@@ -330,8 +330,8 @@ static bool look_at_knobs(const pal_study *study, const pal_configuration *s, in
     return true;
 }
 
-bool pal_study_foresee(const pal_study *study, const pal_configuration *setting, int leave_out, double *ms,
-                       double *error_m)
+bool pal_study_predict_configuration(const pal_study *study, const pal_configuration *setting, int leave_out,
+                                     double *ms, double *error_m)
 {
     along line_of[2];
     double knobs[2], *out[2] = {ms, error_m};
@@ -353,8 +353,8 @@ void pal_study_predict(pal_study *study)
         pal_study_point *p = &study->point[i];
         p->predicted_ms = p->predicted_m = NAN;
         if (!measured(p)) continue;
-        pal_study_foresee(study, &p->priced.setting, i, &p->predicted_ms, &p->predicted_m);
-        pal_study_foresee_cost(study, &p->priced.setting, p->n_node, p->n_element, p->n_substep, p->read_ms, i,
+        pal_study_predict_configuration(study, &p->measured.setting, i, &p->predicted_ms, &p->predicted_m);
+        pal_study_predict_cost(study, &p->measured.setting, p->n_node, p->n_element, p->n_substep, p->read_ms, i,
                                &p->predicted_ms);
     }
 }

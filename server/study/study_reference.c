@@ -2,7 +2,7 @@
  * changes, the way of the tip. */
 #include "server/base/vec3.h"
 #include "server/solve/convergence.h"
-#include "server/study/study_parts.h"
+#include "server/study/study_job.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -90,7 +90,7 @@ static pal_err estimate_load(pal_study_job *job, int load, const int size[3], do
     for (int k = 0; k < 2; k++) {
         int n_node;
         pal_configuration s = reference_setting(job, size[k]);
-        PAL_TRY(pal_study_kept_static(job, &s, job->load[load], u[k], &n_node, job->diag));
+        PAL_TRY(pal_study_cached_static(job, &s, job->load[load], u[k], &n_node, job->diag));
     }
     for (int k = 0; k < 3; k++) h[k] = job->adaptive ? exp2(-size[k]) : 1.0 / size[k];
     double first = most_between(u[0], u[1], job->n_probe), last = most_between(u[1], job->still[load], job->n_probe);
@@ -149,8 +149,8 @@ static pal_err made(pal_study_job *job)
         if (!say(job, "reference at rest", (double)k / (job->n_load + 2)))
             return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped at the reference");
         pal_err err;
-        do err = pal_study_kept_static(job, &s, job->load[k], job->still[k], &n_node, job->diag);
-        while (pal_study_press_again(job, k, err));
+        do err = pal_study_cached_static(job, &s, job->load[k], job->still[k], &n_node, job->diag);
+        while (pal_study_press_adjust(job, k, err));
         PAL_TRY(err);
     }
     job->n_reference = n_node;
@@ -185,5 +185,5 @@ pal_err pal_study_reference(pal_study_job *job)
     if (!say(job, "reference in motion", (double)(job->n_load + 1) / (job->n_load + 2)))
         return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped at the reference");
     pal_configuration s = reference_setting(job, job->reference);
-    return pal_study_kept_way(job, &s, job->way, job->diag);
+    return pal_study_cached_trajectory(job, &s, job->way, job->diag);
 }

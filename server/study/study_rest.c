@@ -3,7 +3,7 @@
  * Cundall 1976). */
 #include "server/base/vec3.h"
 #include "server/calibrate/equilibrium.h"
-#include "server/study/study_parts.h"
+#include "server/study/study_job.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -22,7 +22,7 @@ static pal_err converge(const pal_study_job *job, pal_study_world *w, pal_diagno
     int n_newton = 0;
     for (;;) {
         pal_solve_report report;
-        if (!pal_study_goes_on(job)) return pal_diagnostic_set(diag, PAL_ERR_STATE, "stopped");
+        if (!pal_study_continues(job)) return pal_diagnostic_set(diag, PAL_ERR_STATE, "stopped");
         pal_err err = pal_world_step(w->world, PAL_STUDY_FRAME_S);
         pal_world_solve_report(w->world, 0, &report);
         n_newton += report.n_newton;
@@ -45,17 +45,17 @@ static pal_err newton(pal_study_job *job, const pal_configuration *setting, cons
     still.tolerance = rest_tolerance, still.step_s = PAL_STUDY_FRAME_S;
     PAL_TRY(pal_study_open(job, &still, true, &w, diag));
     *n_node = w.body->n_node;
-    pal_err err = pal_study_put(job, &w, load, 1, diag);
+    pal_err err = pal_study_apply_load(job, &w, load, 1, diag);
     if (!err) err = converge(job, &w, diag);
     if (err == PAL_ERR_NUMERIC) {
         pal_world_reset(w.world);
         err = PAL_ERR_OK;
         for (int k = 1; k <= RAMPS && !err; k++) {
-            err = pal_study_put(job, &w, load, (double)k / RAMPS, diag);
+            err = pal_study_apply_load(job, &w, load, (double)k / RAMPS, diag);
             if (!err) err = converge(job, &w, diag);
         }
     }
-    if (!err) err = pal_study_moved(&w, job->probe, job->n_probe, u, diag);
+    if (!err) err = pal_study_displacement(&w, job->probe, job->n_probe, u, diag);
     pal_study_close(&w);
     return err;
 }
@@ -64,7 +64,7 @@ static pal_err newton(pal_study_job *job, const pal_configuration *setting, cons
 
 typedef struct springs {
     pal_lattice lattice;
-    pal_seat *seat;
+    pal_equilibrium_workspace *workspace;
     double *k[PAL_SPRING_KINDS];
     double *force, *part;
 } springs;
@@ -73,7 +73,7 @@ static void free_springs(springs *s)
 {
     for (int k = 0; k < PAL_SPRING_KINDS; k++) free(s->k[k]);
     free(s->force), free(s->part);
-    pal_seat_destroy(s->seat);
+    pal_equilibrium_workspace_destroy(s->workspace);
     pal_lattice_free(&s->lattice);
 }
 
@@ -95,7 +95,7 @@ static pal_err take_springs(const pal_configuration *setting, const pal_study_wo
                             pal_diagnostic *diag)
 {
     double constant[PAL_SPRING_KINDS];
-    PAL_TRY(pal_lattice_take(w->world, 0, &s->lattice, diag));
+    PAL_TRY(pal_lattice_make(w->world, 0, &s->lattice, diag));
     constants_of(setting, &w->set->scene.body[0], s->lattice.edge_m, constant);
     bool made = true;
     for (int k = 0; k < PAL_SPRING_KINDS; k++) {
@@ -105,7 +105,7 @@ static pal_err take_springs(const pal_configuration *setting, const pal_study_wo
     }
     size_t n = 3 * (size_t)s->lattice.n_node;
     s->force = calloc(n, sizeof(double)), s->part = calloc(n, sizeof(double));
-    if (!made || !s->force || !s->part || pal_seat_create(&s->lattice, &s->seat))
+    if (!made || !s->force || !s->part || pal_equilibrium_workspace_create(&s->lattice, &s->workspace))
         return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the rest of springs");
     return PAL_ERR_OK;
 }
@@ -128,13 +128,13 @@ static pal_err balance(springs *s, double *x, pal_diagnostic *diag)
     pal_equilibrium_default(&options);
     options.tolerance = rest_tolerance;
     memcpy(x, s->lattice.x_rest, n * sizeof *x);
-    pal_err err = pal_equilibrium(s->seat, k, s->force, &options, x, &report, diag);
+    pal_err err = pal_equilibrium(s->workspace, k, s->force, &options, x, &report, diag);
     if (err != PAL_ERR_NUMERIC) return err;
     err = PAL_ERR_OK;
     memcpy(x, s->lattice.x_rest, n * sizeof *x);
     for (int part = 1; part <= RAMPS && !err; part++) {
         for (size_t i = 0; i < n; i++) s->part[i] = s->force[i] * part / RAMPS;
-        err = pal_equilibrium(s->seat, k, s->part, &options, x, &report, diag);
+        err = pal_equilibrium(s->workspace, k, s->part, &options, x, &report, diag);
     }
     return err;
 }
@@ -143,7 +143,7 @@ static pal_err lattice(pal_study_job *job, const pal_configuration *setting, con
                        int *n_node, pal_diagnostic *diag)
 {
     pal_study_world w;
-    springs s = {.seat = NULL};
+    springs s = {.workspace = NULL};
     pal_configuration still = *setting;
     /* the shortest step: a body of stiff springs shall come to rest whatever it costs to run it */
     still.step_s = 1e-4, still.solver[0] = 0;
@@ -153,7 +153,7 @@ static pal_err lattice(pal_study_job *job, const pal_configuration *setting, con
     if (!err) err = pal_study_forces(job, &w, load, s.force, diag);
     if (!err) add_gravity(&w, s.force);
     if (!err) err = balance(&s, w.body->x, diag);
-    if (!err) err = pal_study_moved(&w, job->probe, job->n_probe, u, diag);
+    if (!err) err = pal_study_displacement(&w, job->probe, job->n_probe, u, diag);
     free_springs(&s);
     pal_study_close(&w);
     return err;
@@ -180,7 +180,7 @@ static pal_err relax_world(pal_study_job *job, pal_study_world *w, int most_step
     double last = 0, most = 0;
     int quiet = 0;
     for (int step = 1; step <= most_step; step++) {
-        if (!pal_study_goes_on(job)) return pal_diagnostic_set(diag, PAL_ERR_STATE, "stopped");
+        if (!pal_study_continues(job)) return pal_diagnostic_set(diag, PAL_ERR_STATE, "stopped");
         pal_err err = pal_world_step(w->world, w->set->scene.step_s);
         if (err || w->body->frozen)
             return pal_diagnostic_set(diag, err ? err : PAL_ERR_FROZEN, "%s after %d steps on its way to rest",
@@ -191,16 +191,16 @@ static pal_err relax_world(pal_study_job *job, pal_study_world *w, int most_step
         if (!peak) continue;
         memset(w->body->v, 0, 3 * sizeof(double) * (size_t)w->body->n_dof);
         last = 0;
-        PAL_TRY(pal_study_moved(w, job->probe, job->n_probe, u, diag));
+        PAL_TRY(pal_study_displacement(w, job->probe, job->n_probe, u, diag));
         quiet = change(before, u, job->n_probe, &most) <= relax_change * most ? quiet + 1 : 0;
         if (quiet == QUIET) return PAL_ERR_OK;
     }
     return pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "not at rest after %d steps", most_step);
 }
 
-/* most_work: steps times nodes; 0: any */
+/* max_work: steps times nodes; 0: any */
 static pal_err relax(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load, double *u,
-                     int *n_node, double most_work, pal_diagnostic *diag)
+                     int *n_node, double max_work, pal_diagnostic *diag)
 {
     pal_study_world w;
     pal_configuration still = *setting;
@@ -209,9 +209,9 @@ static pal_err relax(pal_study_job *job, const pal_configuration *setting, const
     PAL_TRY(pal_study_open(job, &still, true, &w, diag));
     *n_node = pal_body_nodes(w.body);
     double *before = calloc(3 * (size_t)job->n_probe, sizeof *before);
-    pal_err err = before ? pal_study_put(job, &w, load, 1, diag) : PAL_ERR_MEMORY;
+    pal_err err = before ? pal_study_apply_load(job, &w, load, 1, diag) : PAL_ERR_MEMORY;
     if (!err)
-        err = relax_world(job, &w, most_work > 0 ? (int)fmin(MOST_RELAX, most_work / *n_node) : MOST_RELAX, before, u,
+        err = relax_world(job, &w, max_work > 0 ? (int)fmin(MOST_RELAX, max_work / *n_node) : MOST_RELAX, before, u,
                           diag);
     if (!err) *n_node = pal_body_nodes(w.body);
     free(before);

@@ -2,7 +2,7 @@
 #include "server/base/clock.h"
 #include "server/base/machine.h"
 #include "server/base/vec3.h"
-#include "server/study/study_parts.h"
+#include "server/study/study_job.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -13,7 +13,7 @@ enum { MOST_TIMES = 1200, WARM = 3, LEAST_TIMES = 30, ROUNDS = 2 };
 /* the way is gone again until its steps have taken so long together: a median of some microseconds is of nothing */
 static const double least_ms = 50;
 /* sub-steps times nodes of a way: what is slower is not followed, only timed */
-static const double most_work = 1.5e9, timed_s = 2;
+static const double max_work = 1.5e9, timed_s = 2;
 /* of the first load: put on at once it swings about as far as the whole one moves the body at rest */
 static const double way_share = 0.5;
 
@@ -85,14 +85,14 @@ static pal_err follow(pal_study_job *job, pal_study_world *w, double (*way)[3], 
                       pal_diagnostic *diag)
 {
     double last[3] = {0}, now[3], time = 0, step_s = w->set->scene.step_s;
-    for (int frame = 0; frame < job->n_way;) {
-        if (!pal_study_goes_on(job)) return pal_diagnostic_set(diag, PAL_ERR_STATE, "stopped");
+    for (int frame = 0; frame < job->n_trajectory;) {
+        if (!pal_study_continues(job)) return pal_diagnostic_set(diag, PAL_ERR_STATE, "stopped");
         pal_err err = timed_step(w, ms, most, n_ms, diag);
         if (err == PAL_ERR_FROZEN) return pal_diagnostic_set(diag, err, "diverged and froze after %.2f s", time);
         PAL_TRY(err);
-        if (way) PAL_TRY(pal_study_moved(w, job->probe + 3 * job->tip, 1, now, diag));
+        if (way) PAL_TRY(pal_study_displacement(w, job->probe + 3 * job->tip, 1, now, diag));
         time += step_s;
-        for (; frame < job->n_way && (frame + 1) * PAL_STUDY_FRAME_S <= time + 1e-9; frame++) {
+        for (; frame < job->n_trajectory && (frame + 1) * PAL_STUDY_FRAME_S <= time + 1e-9; frame++) {
             double share = fmin(fmax(1 - (time - (frame + 1) * PAL_STUDY_FRAME_S) / step_s, 0), 1);
             for (int c = 0; c < 3 && way; c++) way[frame][c] = (1 - share) * last[c] + share * now[c];
         }
@@ -110,7 +110,7 @@ static pal_err repeat(pal_study_job *job, pal_study_world *w, double *ms, int mo
         for (int i = 0; i < *n_ms; i++) sum += ms[i];
         if (err || sum >= least_ms || *n_ms >= most) return err;
         pal_world_reset(w->world);
-        err = pal_study_put(job, w, job->load[0], way_share, diag);
+        err = pal_study_apply_load(job, w, job->load[0], way_share, diag);
         if (!err) err = follow(job, w, NULL, ms, most, n_ms, diag);
     }
 }
@@ -124,16 +124,16 @@ static double read_ms(const pal_world *world)
     return pal_machine_read_ms(all) * 2 * factor / all;
 }
 
-pal_err pal_study_way(pal_study_job *job, const pal_configuration *setting, double (*way)[3], double *ms, int most,
-                      int *n_ms, pal_study_point *facts, pal_diagnostic *diag)
+pal_err pal_study_trajectory(pal_study_job *job, const pal_configuration *setting, double (*way)[3], double *ms,
+                             int most, int *n_ms, pal_study_point *facts, pal_diagnostic *diag)
 {
     pal_study_world w;
     PAL_TRY(pal_study_open(job, setting, false, &w, diag));
     int n_substep = pal_world_substeps(w.world);
     double work = (double)n_substep * w.body->n_node * job->seconds / w.set->scene.step_s;
-    pal_err err = pal_study_put(job, &w, job->load[0], way_share, diag);
+    pal_err err = pal_study_apply_load(job, &w, job->load[0], way_share, diag);
     /* the reference is followed whatever it takes */
-    if (!err && facts && work > most_work) {
+    if (!err && facts && work > max_work) {
         err = only_time(&w, ms, most, n_ms, diag);
         if (!err) err = pal_diagnostic_set(diag, PAL_ERR_BUDGET, "way not followed: %d sub-steps a step", n_substep);
     } else if (!err) {
@@ -157,13 +157,13 @@ pal_err pal_study_way(pal_study_job *job, const pal_configuration *setting, doub
 static void compare_ways(const pal_study_job *job, pal_study_point *out)
 {
     double sum = 0;
-    out->way_most_m = 0;
-    for (int i = 0; i < job->n_way; i++) {
+    out->trajectory_max_m = 0;
+    for (int i = 0; i < job->n_trajectory; i++) {
         double off = pal_dist3(job->own[i], job->way[i]);
         sum += off * off;
-        out->way_most_m = fmax(out->way_most_m, off);
+        out->trajectory_max_m = fmax(out->trajectory_max_m, off);
     }
-    out->way_rms_m = sqrt(sum / job->n_way);
+    out->trajectory_rms_m = sqrt(sum / job->n_trajectory);
 }
 
 /* ---- both ---- */
@@ -174,8 +174,8 @@ static pal_err time_way(pal_study_job *job, pal_study_point *out, double (*way)[
     double *ms = calloc(MOST_TIMES, sizeof *ms);
     int n_ms = 0;
     pal_study_point facts = *out;
-    pal_err err =
-        !ms ? PAL_ERR_MEMORY : pal_study_way(job, &out->priced.setting, way, ms, MOST_TIMES, &n_ms, &facts, diag);
+    pal_err err = !ms ? PAL_ERR_MEMORY
+                      : pal_study_trajectory(job, &out->measured.setting, way, ms, MOST_TIMES, &n_ms, &facts, diag);
     /* how fast it reads is a matter of other work as well */
     double read = way ? facts.read_ms : fmin(out->read_ms, facts.read_ms);
     if (way) *out = facts;
@@ -183,10 +183,10 @@ static pal_err time_way(pal_study_job *job, pal_study_point *out, double (*way)[
     if (n_ms > 2 * WARM) {
         qsort(ms + WARM, (size_t)(n_ms - WARM), sizeof *ms, compare);
         /* shorter steps are more of them in the same time: what a step of the scene takes is what can be compared */
-        double share = job->out->step_s / out->priced.setting.step_s;
+        double share = job->out->step_s / out->measured.setting.step_s;
         double median = share * quantile(ms + WARM, n_ms - WARM, 0.5);
-        if (!(out->priced.ms <= median)) {
-            out->priced.ms = median;
+        if (!(out->measured.ms <= median)) {
+            out->measured.ms = median;
             out->ms_p95 = share * quantile(ms + WARM, n_ms - WARM, 0.95);
         }
     }
@@ -194,7 +194,7 @@ static pal_err time_way(pal_study_job *job, pal_study_point *out, double (*way)[
     return err;
 }
 
-pal_err pal_study_time_again(pal_study_job *job)
+pal_err pal_study_time_repeat(pal_study_job *job)
 {
     const pal_study_options *o = job->options;
     int n = job->out->n_point, n_round = o->quick ? 1 : ROUNDS;
@@ -202,13 +202,13 @@ pal_err pal_study_time_again(pal_study_job *job)
         pal_study_point *p = &job->out->point[i % n];
         bool go = !o->progress || o->progress("timed again", (double)i / (n * n_round), o->user);
         pal_diagnostic reason = {{0}};
-        if (go && !(p->priced.ms > 0)) continue;
+        if (go && !(p->measured.ms > 0)) continue;
         /* what went once goes again, or is stopped */
         if (go) (void)time_way(job, p, NULL, &reason);
-        if (!go || !pal_study_goes_on(job))
+        if (!go || !pal_study_continues(job))
             return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped while settings were timed again");
     }
-    pal_study_front(job->out);
+    pal_study_mark_front(job->out);
     return PAL_ERR_OK;
 }
 
@@ -226,32 +226,32 @@ static void run(pal_study_job *job, pal_study_point *out)
 static pal_err fit(pal_study_job *job, pal_study_point *out)
 {
     pal_diagnostic reason = {{0}};
-    pal_err err = pal_study_fit(job, &out->priced.setting, &reason);
+    pal_err err = pal_study_fit(job, &out->measured.setting, &reason);
     if (!err) return PAL_ERR_OK;
     out->err = err;
     snprintf(out->reason, sizeof out->reason, "calibration: %.*s", PAL_CONFIGURATION_TEXT - 16, reason.text);
     return err;
 }
 
-pal_err pal_study_measure(pal_study_job *job, const pal_study_wish *wish, pal_study_point *out)
+pal_err pal_study_measure(pal_study_job *job, const pal_study_entry *wish, pal_study_point *out)
 {
     int n_node = 0;
-    *out = (pal_study_point){.priced = {.setting = wish->setting, .ms = NAN, .error_m = NAN}};
-    out->ms_p95 = out->static_rms_m = out->static_most_m = out->way_rms_m = out->way_most_m = NAN;
+    *out = (pal_study_point){.measured = {.setting = wish->setting, .ms = NAN, .error_m = NAN}};
+    out->ms_p95 = out->static_rms_m = out->static_max_m = out->trajectory_rms_m = out->trajectory_max_m = NAN;
     out->predicted_ms = out->predicted_m = NAN;
-    if (wish->calibrate && fit(job, out) && pal_study_goes_on(job)) return PAL_ERR_OK;
+    if (wish->calibrate && fit(job, out) && pal_study_continues(job)) return PAL_ERR_OK;
     if (wish->calibrate && job->n_load == 1)
         snprintf(out->reason, sizeof out->reason, "fitted to the load it is judged by");
-    if (!job->rest.known || !same_rest(&job->rest.of, &out->priced.setting))
-        find_rest(job, &out->priced.setting, &n_node);
+    if (!job->rest.known || !same_rest(&job->rest.of, &out->measured.setting))
+        find_rest(job, &out->measured.setting, &n_node);
     out->n_node = n_node;
     out->err = job->rest.err;
     if (out->err)
         memcpy(out->reason, job->rest.reason, sizeof out->reason);
     else
-        out->static_rms_m = job->rest.rms_m, out->static_most_m = job->rest.max_m;
-    if (pal_study_goes_on(job)) run(job, out);
-    if (!pal_study_goes_on(job)) return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped in a setting");
-    if (!out->err) out->priced.error_m = fmax(out->static_most_m, out->way_most_m);
+        out->static_rms_m = job->rest.rms_m, out->static_max_m = job->rest.max_m;
+    if (pal_study_continues(job)) run(job, out);
+    if (!pal_study_continues(job)) return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped in a setting");
+    if (!out->err) out->measured.error_m = fmax(out->static_max_m, out->trajectory_max_m);
     return PAL_ERR_OK;
 }

@@ -24,18 +24,18 @@ typedef struct number_key {
 } number_key;
 #define AT(field) offsetof(pal_study_point, field)
 static const number_key number[] = {
-    {"step_s", AT(priced.setting.step_s), 0, 0.1, false, false},
-    {"tolerance", AT(priced.setting.tolerance), 0, 1, false, false},
-    {"k_distance_J", AT(priced.setting.k_distance_J), 0, 1e300, false, false},
-    {"k_area_J", AT(priced.setting.k_area_J), -1, 1e300, false, false},
-    {"k_volume_J", AT(priced.setting.k_volume_J), 0, 1e300, false, false},
-    {"ms", AT(priced.ms), 0, 1e12, true, false},
-    {"error_m", AT(priced.error_m), 0, 1e300, true, false},
+    {"step_s", AT(measured.setting.step_s), 0, 0.1, false, false},
+    {"tolerance", AT(measured.setting.tolerance), 0, 1, false, false},
+    {"k_distance_J", AT(measured.setting.k_distance_J), 0, 1e300, false, false},
+    {"k_area_J", AT(measured.setting.k_area_J), -1, 1e300, false, false},
+    {"k_volume_J", AT(measured.setting.k_volume_J), 0, 1e300, false, false},
+    {"ms", AT(measured.ms), 0, 1e12, true, false},
+    {"error_m", AT(measured.error_m), 0, 1e300, true, false},
     {"ms_p95", AT(ms_p95), 0, 1e12, true, false},
     {"static_rms_m", AT(static_rms_m), 0, 1e300, true, false},
-    {"static_most_m", AT(static_most_m), 0, 1e300, true, false},
-    {"way_rms_m", AT(way_rms_m), 0, 1e300, true, false},
-    {"way_most_m", AT(way_most_m), 0, 1e300, true, false},
+    {"static_max_m", AT(static_max_m), 0, 1e300, true, false},
+    {"trajectory_rms_m", AT(trajectory_rms_m), 0, 1e300, true, false},
+    {"trajectory_max_m", AT(trajectory_max_m), 0, 1e300, true, false},
     {"prepare_s", AT(prepare_s), 0, 1e12, true, false},
     {"elements", AT(n_element), 0, 1e12, false, true},
     {"read_ms", AT(read_ms), 0, 1e12, false, true},
@@ -48,11 +48,11 @@ typedef struct text_key {
     bool may_be_empty;
 } text_key;
 static const text_key text[] = {
-    {"model", AT(priced.setting.model), PAL_NAME, false},
-    {"element", AT(priced.setting.element), PAL_NAME, true},
-    {"law", AT(priced.setting.law), PAL_NAME, true},
-    {"solver", AT(priced.setting.solver), PAL_NAME, true},
-    {"why", AT(reason), sizeof((pal_study_point *)0)->reason, true},
+    {"model", AT(measured.setting.model), PAL_NAME, false},
+    {"element", AT(measured.setting.element), PAL_NAME, true},
+    {"law", AT(measured.setting.law), PAL_NAME, true},
+    {"solver", AT(measured.setting.solver), PAL_NAME, true},
+    {"reason", AT(reason), sizeof((pal_study_point *)0)->reason, true},
 };
 enum { N_NUMBER = sizeof number / sizeof *number, N_TEXT = sizeof text / sizeof *text };
 
@@ -68,7 +68,7 @@ static const char *text_at(const pal_study_point *p, int k)
 
 /* ---- what a study is of ---- */
 
-uint64_t pal_study_sum(uint64_t before, const void *bytes, size_t n_byte)
+uint64_t pal_study_digest(uint64_t before, const void *bytes, size_t n_byte)
 {
     const unsigned char *at = bytes;
     uint64_t sum = before ? before : 0xcbf29ce484222325u;
@@ -78,7 +78,7 @@ uint64_t pal_study_sum(uint64_t before, const void *bytes, size_t n_byte)
 
 static uint64_t add_numbers(uint64_t sum, const double *value, size_t n)
 {
-    return value ? pal_study_sum(sum, value, n * sizeof *value) : pal_study_sum(sum, "-", 1);
+    return value ? pal_study_digest(sum, value, n * sizeof *value) : pal_study_digest(sum, "-", 1);
 }
 
 static uint64_t add_region(uint64_t sum, const pal_region *r)
@@ -89,7 +89,7 @@ static uint64_t add_region(uint64_t sum, const pal_region *r)
     if (r->kind != PAL_REGION_LABEL) sum = add_numbers(add_numbers(sum, r->low_m, 3), r->high_m, 3);
     if (r->kind == PAL_REGION_LABEL) {
         sum = add_numbers(add_numbers(sum, r->low_m, 3), r->spacing_m, 3);
-        if (r->label) sum = pal_study_sum(sum, r->label, n);
+        if (r->label) sum = pal_study_digest(sum, r->label, n);
     }
     if (r->kind != PAL_REGION_GRID) return sum;
     sum = add_numbers(add_numbers(sum, r->grid_young_Pa, n), r->grid_poisson, n);
@@ -102,10 +102,10 @@ static uint64_t add_effect(uint64_t sum, const pal_config_entry *item)
     static const char *const quiet[] = {"tool_push", "tool_grasp", "finite_guard", "sleep"};
     for (size_t k = 0; k < sizeof quiet / sizeof *quiet; k++)
         if (!strcmp(item->name, quiet[k])) return sum;
-    sum = pal_study_sum(sum, item->name, strlen(item->name));
+    sum = pal_study_digest(sum, item->name, strlen(item->name));
     for (int k = 0; k < item->n_value; k++) {
         const pal_config_value *v = &item->value[k];
-        sum = pal_study_sum(pal_study_sum(sum, v->key, strlen(v->key)), v->text, strlen(v->text));
+        sum = pal_study_digest(pal_study_digest(sum, v->key, strlen(v->key)), v->text, strlen(v->text));
         sum = add_numbers(sum, v->number, (size_t)(v->kind == PAL_VALUE_NUMBER ? 1 : v->n_number));
         sum = add_numbers(sum, &(double){v->flag}, 1);
     }
@@ -120,8 +120,8 @@ const char *pal_study_shape(const pal_body_def *body, char out[PAL_STUDY_SHAPE])
                           body->n_region, body->n_support, body->n_stroke};
     const pal_surface *s = &body->mesh->surface;
     sum = add_numbers(sum, own, sizeof own / sizeof *own);
-    sum = pal_study_sum(sum, s->tri, 3 * (size_t)s->n_tri * sizeof *s->tri);
-    sum = pal_study_sum(sum, s->x, 3 * (size_t)s->n_vertex * sizeof *s->x);
+    sum = pal_study_digest(sum, s->tri, 3 * (size_t)s->n_tri * sizeof *s->tri);
+    sum = pal_study_digest(sum, s->x, 3 * (size_t)s->n_vertex * sizeof *s->x);
     if (body->cells) sum = add_numbers(sum, body->cells->x, 3 * (size_t)body->cells->n_vertex);
     for (int k = 0; k < body->n_region; k++) sum = add_region(sum, &body->region[k]);
     for (int k = 0; k < body->n_support; k++) {
@@ -173,10 +173,10 @@ static void put_point(cJSON *list, const pal_study_point *p)
     cJSON_AddItemToArray(list, o);
     for (int k = 0; k < N_TEXT; k++) cJSON_AddStringToObject(o, text[k].key, text_at(p, k));
     for (int k = 0; k < N_NUMBER; k++) put_number(o, number[k].key, *number_at(p, k));
-    put_number(o, "size", p->priced.setting.size);
+    put_number(o, "size", p->measured.setting.size);
     put_number(o, "nodes", p->n_node);
     put_number(o, "substeps", p->n_substep);
-    cJSON_AddBoolToObject(o, "front", p->priced.front);
+    cJSON_AddBoolToObject(o, "front", p->measured.front);
     cJSON_AddStringToObject(o, "err", pal_err_name(p->err));
 }
 
@@ -189,10 +189,10 @@ cJSON *pal_study_file_tree(const pal_study_file *file)
     cJSON_AddStringToObject(root, "machine", s->machine);
     cJSON_AddStringToObject(root, "reference", s->reference);
     put_number(root, "reference_m", s->reference_m);
-    put_number(root, "most_m", s->max_m);
-    put_number(root, "size_m", s->length_scale_m);
+    put_number(root, "max_m", s->max_m);
+    put_number(root, "length_scale_m", s->length_scale_m);
     put_number(root, "step_s", s->step_s);
-    of = cJSON_AddObjectToObject(root, "of");
+    of = cJSON_AddObjectToObject(root, "subject");
     cJSON_AddStringToObject(of, "body", file->body);
     put_number(of, "index", file->index);
     cJSON_AddStringToObject(of, "shape", file->shape);
@@ -200,8 +200,8 @@ cJSON *pal_study_file_tree(const pal_study_file *file)
     cJSON_AddStringToObject(of, "digest", file->digest);
     cJSON_AddStringToObject(of, "methods", file->methods);
     cJSON_AddStringToObject(root, "command", file->command);
-    put_number(root, "n_all", file->n_finest);
-    cJSON_AddBoolToObject(root, "whole", file->whole);
+    put_number(root, "n_finest", file->n_finest);
+    cJSON_AddBoolToObject(root, "complete", file->whole);
     cJSON *points = cJSON_AddArrayToObject(root, "points");
     for (int k = 0; k < s->n_point; k++) put_point(points, &s->point[k]);
     return root;
@@ -214,9 +214,9 @@ pal_err pal_study_file_write(const pal_study_file *file, const char *path, pal_d
     cJSON_Delete(root);
     if (!json) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for its text", path);
     size_t n = strlen(json);
-    pal_err err = n > PAL_JSON_MOST
+    pal_err err = n > PAL_JSON_MAX_BYTES
                       ? pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: would have %zu bytes, more than %d", path, n,
-                                           PAL_JSON_MOST)
+                                           PAL_JSON_MAX_BYTES)
                       : pal_file_write(path, json, n, diag);
     cJSON_free(json);
     return err;
@@ -239,8 +239,8 @@ static void put_row(FILE *to, const pal_study_point *p)
         put_cell(to, text_at(p, k));
         fputc(',', to);
     }
-    fprintf(to, "%s,%d,%d,%d,%d", pal_err_name(p->err), p->priced.setting.size, p->n_node, p->n_substep,
-            p->priced.front);
+    fprintf(to, "%s,%d,%d,%d,%d", pal_err_name(p->err), p->measured.setting.size, p->n_node, p->n_substep,
+            p->measured.front);
     for (int k = 0; k < N_NUMBER; k++) {
         double value = *number_at(p, k);
         if (isfinite(value))
@@ -278,7 +278,7 @@ static pal_err need(const pal_json *json, const cJSON *object, const char *path,
 {
     char at[PAL_JSON_PATH];
     if (cJSON_GetObjectItemCaseSensitive(object, key)) return PAL_ERR_OK;
-    return pal_json_bad(json, pal_json_key(at, path, key), "is not there");
+    return pal_json_refuse(json, pal_json_key(at, path, key), "is not there");
 }
 
 /* null is NaN where that may be */
@@ -321,7 +321,7 @@ static pal_err get_err(const pal_json *json, const cJSON *object, const char *pa
             *out = (pal_err)k;
             return PAL_ERR_OK;
         }
-    return pal_json_bad(json, pal_json_key(at, path, "err"), "\"%s\" is no error code", word);
+    return pal_json_refuse(json, pal_json_key(at, path, "err"), "\"%s\" is no error code", word);
 }
 
 static pal_err get_point(const pal_json *json, const cJSON *object, const char *path, pal_study_point *out)
@@ -335,29 +335,29 @@ static pal_err get_point(const pal_json *json, const cJSON *object, const char *
         PAL_TRY(
             get_text(json, object, path, text[k].key, text[k].may_be_empty, (char *)out + text[k].at, text[k].n_byte));
     for (int k = 0; k < N_NUMBER; k++) PAL_TRY(get_number(json, object, path, &number[k], (char *)out + number[k].at));
-    PAL_TRY(get_count(json, object, path, "size", -1, 1024, &out->priced.setting.size));
+    PAL_TRY(get_count(json, object, path, "size", -1, 1024, &out->measured.setting.size));
     PAL_TRY(get_count(json, object, path, "nodes", 0, 1 << 30, &out->n_node));
     PAL_TRY(get_count(json, object, path, "substeps", 0, 1 << 30, &out->n_substep));
-    PAL_TRY(get_bool(json, object, path, "front", &out->priced.front));
+    PAL_TRY(get_bool(json, object, path, "front", &out->measured.front));
     PAL_TRY(get_err(json, object, path, &out->err));
-    bool measured = isfinite(out->priced.ms) && isfinite(out->priced.error_m);
-    if (out->priced.front && !measured)
-        return pal_json_bad(json, pal_json_key(at, path, "front"), "is true of a setting that was not measured");
+    bool measured = isfinite(out->measured.ms) && isfinite(out->measured.error_m);
+    if (out->measured.front && !measured)
+        return pal_json_refuse(json, pal_json_key(at, path, "front"), "is true of a setting that was not measured");
     return PAL_ERR_OK;
 }
 
 static pal_err get_of(const pal_json *json, const cJSON *root, pal_study_file *file)
 {
     static const char *const known[] = {"body", "index", "shape", "loads", "digest", "methods", NULL};
-    PAL_TRY(need(json, root, "", "of"));
-    const cJSON *of = cJSON_GetObjectItemCaseSensitive(root, "of");
-    PAL_TRY(pal_json_object(json, of, "of", known));
-    PAL_TRY(get_text(json, of, "of", "body", true, file->body, sizeof file->body));
-    PAL_TRY(get_count(json, of, "of", "index", 0, PAL_BODY_MAX - 1, &file->index));
-    PAL_TRY(get_text(json, of, "of", "shape", false, file->shape, sizeof file->shape));
-    PAL_TRY(get_text(json, of, "of", "loads", true, file->loads, sizeof file->loads));
-    PAL_TRY(get_text(json, of, "of", "digest", true, file->digest, sizeof file->digest));
-    return get_text(json, of, "of", "methods", true, file->methods, sizeof file->methods);
+    PAL_TRY(need(json, root, "", "subject"));
+    const cJSON *of = cJSON_GetObjectItemCaseSensitive(root, "subject");
+    PAL_TRY(pal_json_object(json, of, "subject", known));
+    PAL_TRY(get_text(json, of, "subject", "body", true, file->body, sizeof file->body));
+    PAL_TRY(get_count(json, of, "subject", "index", 0, PAL_BODY_MAX - 1, &file->index));
+    PAL_TRY(get_text(json, of, "subject", "shape", false, file->shape, sizeof file->shape));
+    PAL_TRY(get_text(json, of, "subject", "loads", true, file->loads, sizeof file->loads));
+    PAL_TRY(get_text(json, of, "subject", "digest", true, file->digest, sizeof file->digest));
+    return get_text(json, of, "subject", "methods", true, file->methods, sizeof file->methods);
 }
 
 static pal_err get_points(const pal_json *json, const cJSON *root, pal_study *s)
@@ -373,17 +373,18 @@ static pal_err get_points(const pal_json *json, const cJSON *root, pal_study *s)
 
 static pal_err get_file(const pal_json *json, const cJSON *root, pal_study_file *file)
 {
-    static const char *const known[] = {"format", "name", "machine", "reference", "reference_m", "most_m", "size_m",
-                                        "step_s", "of",   "command", "n_all",     "whole",       "points", NULL};
+    static const char *const known[] = {"format",   "name",           "machine", "reference", "reference_m",
+                                        "max_m",    "length_scale_m", "step_s",  "subject",   "command",
+                                        "n_finest", "complete",       "points",  NULL};
     static const number_key own[] = {{"reference_m", offsetof(pal_study, reference_m), 0, 1e300, true, false},
-                                     {"most_m", offsetof(pal_study, max_m), 0, 1e300, true, false},
-                                     {"size_m", offsetof(pal_study, length_scale_m), 0, 1e300, true, false},
+                                     {"max_m", offsetof(pal_study, max_m), 0, 1e300, true, false},
+                                     {"length_scale_m", offsetof(pal_study, length_scale_m), 0, 1e300, true, false},
                                      {"step_s", offsetof(pal_study, step_s), 0, 0.1, false, false}};
     pal_study *s = &file->study;
     char word[32] = "";
     PAL_TRY(pal_json_object(json, root, "", known));
     PAL_TRY(get_text(json, root, "", "format", false, word, sizeof word));
-    if (strcmp(word, format) != 0) return pal_json_bad(json, "format", "is \"%s\", wanted \"%s\"", word, format);
+    if (strcmp(word, format) != 0) return pal_json_refuse(json, "format", "is \"%s\", wanted \"%s\"", word, format);
     PAL_TRY(get_text(json, root, "", "name", true, s->name, sizeof s->name));
     PAL_TRY(get_text(json, root, "", "machine", true, s->machine, sizeof s->machine));
     PAL_TRY(get_text(json, root, "", "reference", true, s->reference, sizeof s->reference));
@@ -391,8 +392,8 @@ static pal_err get_file(const pal_json *json, const cJSON *root, pal_study_file 
         PAL_TRY(get_number(json, root, "", &own[k], (char *)s + own[k].at));
     PAL_TRY(get_of(json, root, file));
     PAL_TRY(get_text(json, root, "", "command", true, file->command, sizeof file->command));
-    PAL_TRY(get_count(json, root, "", "n_all", 0, PAL_STUDY_POINTS, &file->n_finest));
-    PAL_TRY(get_bool(json, root, "", "whole", &file->whole));
+    PAL_TRY(get_count(json, root, "", "n_finest", 0, PAL_STUDY_POINTS, &file->n_finest));
+    PAL_TRY(get_bool(json, root, "", "complete", &file->whole));
     return get_points(json, root, s);
 }
 
@@ -416,7 +417,7 @@ pal_err pal_study_file_read(const char *path, pal_study_file **out, pal_diagnost
 {
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, PAL_JSON_MOST, &bytes, &n_byte, diag));
+    PAL_TRY(pal_file_read(path, PAL_JSON_MAX_BYTES, &bytes, &n_byte, diag));
     pal_err err = pal_study_file_parse(path, (const char *)bytes, n_byte, out, diag);
     free(bytes);
     return err;
@@ -426,8 +427,8 @@ pal_err pal_study_file_read(const char *path, pal_study_file **out, pal_diagnost
 
 static bool is_before(const pal_study_point *a, const pal_study_point *b)
 {
-    if (isnan(a->priced.ms) || isnan(b->priced.ms)) return !isnan(a->priced.ms) && isnan(b->priced.ms);
-    return a->priced.ms < b->priced.ms;
+    if (isnan(a->measured.ms) || isnan(b->measured.ms)) return !isnan(a->measured.ms) && isnan(b->measured.ms);
+    return a->measured.ms < b->measured.ms;
 }
 
 void pal_study_order(const pal_study *study, int *out)
@@ -440,14 +441,14 @@ void pal_study_order(const pal_study *study, int *out)
     }
 }
 
-int pal_study_settings(const pal_study *study, pal_measured_configuration *out)
+int pal_study_configurations(const pal_study *study, pal_measured_configuration *out)
 {
     int order[PAL_STUDY_POINTS], n = 0;
     pal_study_order(study, order);
     for (int k = 0; k < study->n_point; k++) {
         const pal_study_point *p = &study->point[order[k]];
-        if (p->err || !isfinite(p->priced.ms) || !isfinite(p->priced.error_m)) continue;
-        out[n] = p->priced;
+        if (p->err || !isfinite(p->measured.ms) || !isfinite(p->measured.error_m)) continue;
+        out[n] = p->measured;
         if (out[n].setting.step_s == 0) out[n].setting.step_s = study->step_s;
         n++;
     }

@@ -5,14 +5,15 @@
  *   "format": "palpate-study-1",
  *   "name": "liver", "machine": "...", "reference": "...", "reference_m": 1e-5, "max_m": .., "length_scale_m": ..,
  * "step_s":
- * .., "of": {"body": "liver", "index": 0, "shape": "16 hex digits", "loads": "three presses and a pull, 0.5 s",
+ * .., "subject": {"body": "liver", "index": 0, "shape": "16 hex digits", "loads": "three presses and a pull, 0.5 s",
  *     "digest": "16 hex digits", "methods": "fem"},
  *   "command": "palpate study liver/scene.json",
- *   "n_finest": 48, "whole": true,                    whole: every setting of these methods is there
+ *   "n_finest": 48, "complete": true,                    whole: every setting of these methods is there
  *   "points": [{"model": "fem", "element": .., "law": .., "solver": .., "size": 16, "step_s": .., "tolerance": ..,
  *     "k_distance_J": .., "k_area_J": .., "k_volume_J": .., "ms": .., "error_m": .., "front": true, "err": "OK",
- *     "why": "", "nodes": .., "substeps": .., "ms_p95": .., "static_rms_m": .., "static_most_m": .., "way_rms_m": ..,
- *     "way_most_m": .., "prepare_s": .., "elements": .., "read_ms": .., "predicted_ms": .., "predicted_m": ..}]
+ *     "reason": "", "nodes": .., "substeps": .., "ms_p95": .., "static_rms_m": .., "static_max_m": ..,
+ * "trajectory_rms_m":
+ * .., "trajectory_max_m": .., "prepare_s": .., "elements": .., "read_ms": .., "predicted_ms": .., "predicted_m": ..}]
  * }
  * Every key but elements and read_ms is required; numbers have as many digits as give the same bits; null stands for
  * what is not a number. Beside the file NAME.json of a scene it is NAME_study.json, beside scene.json study.json; a
@@ -45,7 +46,7 @@ typedef struct pal_study_file {
  * mesh and step. 16 hexadecimal digits; not meant to withstand forgery */
 const char *pal_study_shape(const pal_body_def *body, char out[PAL_STUDY_SHAPE]);
 /* the 16 digits of any bytes, going on from another sum (0: from the start) */
-uint64_t pal_study_sum(uint64_t before, const void *bytes, size_t n_byte);
+uint64_t pal_study_digest(uint64_t before, const void *bytes, size_t n_byte);
 /* "liver/scene.json", "liver" or "liver.stl" -> "liver/study", "liver_study": where the files of its study are, without
  * ending; folder not NULL: there, always "study". REFUSED: too long */
 pal_err pal_study_stem(const char *word, const char *folder, char out[PAL_STUDY_PATH], pal_diagnostic *diag);
@@ -65,7 +66,7 @@ pal_err pal_study_file_csv(const pal_study_file *file, const char *path, pal_dia
 /* indices of the points by ascending ms, those not measured (NaN) last; out [n_point] */
 void pal_study_order(const pal_study *study, int *out);
 /* the measured points by ascending ms, their step_s given; out [PAL_STUDY_POINTS]; returns how many */
-int pal_study_settings(const pal_study *study, pal_measured_configuration *out);
+int pal_study_configurations(const pal_study *study, pal_measured_configuration *out);
 /* is the method among words with commas ("": all)? */
 bool pal_study_method_in(const char *methods, const char *model);
 #endif

@@ -2,7 +2,7 @@
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/solve/load_case.h"
-#include "server/study/study_parts.h"
+#include "server/study/study_job.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -154,8 +154,8 @@ pal_err pal_study_forces(const pal_study_job *job, const pal_study_world *w, con
                            diag);
 }
 
-pal_err pal_study_put(const pal_study_job *job, const pal_study_world *w, const pal_problem_case *load, double share,
-                      pal_diagnostic *diag)
+pal_err pal_study_apply_load(const pal_study_job *job, const pal_study_world *w, const pal_problem_case *load,
+                             double share, pal_diagnostic *diag)
 {
     size_t n = (size_t)w->body->n_node;
     double *f = calloc(3 * n, sizeof *f);
@@ -219,7 +219,7 @@ static void surface_point(const pal_study_world *w, const double at[3], double u
     if (found < 0) node_displacement_m(w->body, node_of(w, nearest), 1, u);
 }
 
-pal_err pal_study_moved(const pal_study_world *w, const double *x, int n, double *u, pal_diagnostic *diag)
+pal_err pal_study_displacement(const pal_study_world *w, const double *x, int n, double *u, pal_diagnostic *diag)
 {
     if (!pal_body_finite(w->body)) return pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "numbers that are not finite");
     pal_body_update_nodes(w->body);
@@ -231,7 +231,7 @@ pal_err pal_study_moved(const pal_study_world *w, const double *x, int n, double
             continue;
         }
         int element = pal_locate_point(w->locate, x + 3 * (size_t)i, local, NULL);
-        int n_corner = pal_case_shape(w->body, element, local, shape, &node);
+        int n_corner = pal_case_shape_functions(w->body, element, local, shape, &node);
         pal_set3(to, 0, 0, 0);
         for (int k = 0; k < n_corner; k++) node_displacement_m(w->body, node[k], shape[k], to);
     }

@@ -143,7 +143,8 @@ static void medians(const experiment *e, double median[2], double *right)
         double x[3];
         bool in[2];
         for (int c = 0; c < 3; c++) x[c] = t->x[3 * i + (size_t)c] + t->origin_m[c];
-        for (int m = 0; m < 2; m++) in[m] = pal_box_holds(&e->problem->material[m].region, x, pal_case_slack(t));
+        for (int m = 0; m < 2; m++)
+            in[m] = pal_box_contains(&e->problem->material[m].region, x, pal_case_tolerance_m(t));
         if (in[0] != in[1]) list[in[1]][count[in[1]]++] = k[i];
     }
     for (int m = 0; m < 2; m++) {

@@ -3,11 +3,11 @@
  * is three times as fine; in energy that of Zienkiewicz and Zhu over the error of the work of the loads, which
  * for elements that fit together and the linear law is the square of the error in energy, and for B-bar, whose stress
  * is not that of its displacement, over the distance of its stress from that of a finer mesh. The estimate is the one
- * of a running session (session/estimate_work.h). Where elements lock the estimate is too small, and says so; where
+ * of a running session (session/estimation.h). Where elements lock the estimate is too small, and says so; where
  * many voxels are cut (the gear) it is within a factor of 2 as well, from meshes of other sizes
- * (session/estimate_family.h), and the display says that they are. With PALPATE_LONG=1 finer beams, a finer cube and a
- * finer gear too. */
-#include "server/estimate/estimate_work.h"
+ * (session/estimate_hierarchy.h), and the display says that they are. With PALPATE_LONG=1 finer beams, a finer cube and
+ * a finer gear too. */
+#include "server/estimate/estimation.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/num/shape_functions.h"
 #include "server/scene/problem_file.h"
@@ -91,7 +91,7 @@ static bool make_scene(const subject *s, solved *to, const char *solver)
 /* mesh, world and nodal loads; at rest without loads */
 static bool prepare(const subject *s, int resolution, const char *solver, solved *to)
 {
-    pal_voxel_wish wish = {resolution, true, 0, true};
+    pal_case_voxel_options wish = {resolution, true, 0, true};
     pal_diagnostic diag = {""};
     memset(to, 0, sizeof *to);
     bool good = !pal_case_voxels(s->problem, s->surface, &wish, &to->mesh, &diag) && make_scene(s, to, solver) &&
@@ -125,7 +125,7 @@ static void displacement(const solved *s, const double x[3], double u[3])
     double at[3], local[4], shape[10];
     const int32_t *node;
     for (int c = 0; c < 3; c++) at[c] = x[c] - s->mesh.tets.origin_m[c], u[c] = 0;
-    int e = pal_locate_point(s->locate, at, local, NULL), n = pal_case_shape(s->body, e, local, shape, &node);
+    int e = pal_locate_point(s->locate, at, local, NULL), n = pal_case_shape_functions(s->body, e, local, shape, &node);
     for (int k = 0; k < n; k++)
         for (int c = 0; c < 3; c++) u[c] += shape[k] * (s->body->x[3 * node[k] + c] - s->body->x_rest[3 * node[k] + c]);
 }
@@ -225,19 +225,19 @@ static double stress_off(const solved *coarse, const solved *fine)
 static bool estimate(const subject *s, const solved *rest, pal_estimate *out)
 {
     solved at;
-    pal_estimate_work *work = NULL;
+    pal_estimation *work = NULL;
     pal_diagnostic diag = {""};
-    bool good = prepare(s, s->row->resolution, "implicit_euler", &at) &&
-                !pal_estimate_work_open(at.scene, 0, NULL, &diag, &work);
+    bool good =
+        prepare(s, s->row->resolution, "implicit_euler", &at) && !pal_estimation_open(at.scene, 0, NULL, &diag, &work);
     if (good) {
-        pal_estimate_state *state = pal_estimate_work_state(work);
+        pal_estimate_state *state = pal_estimation_state(work);
         good = pal_estimate_copy(state, at.world, 0);
         memcpy(state->x, rest->body->x, 3 * sizeof *state->x * (size_t)state->n_dof);
         memcpy(state->load, at.load, 3 * sizeof *at.load * (size_t)at.body->n_node);
-        good = good && pal_estimate_work_run(work, out);
+        good = good && pal_estimation_run(work, out);
     }
     if (diag.text[0]) printf("  %s\n", diag.text);
-    pal_estimate_work_close(work);
+    pal_estimation_close(work);
     solved_free(&at);
     return good;
 }

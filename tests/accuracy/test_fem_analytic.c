@@ -176,7 +176,7 @@ static void check_led_patch(const char *element, const char *law, bool irregular
     int n_inner = 0;
     double far = 0;
     for (int i = 0; i < b.body->n_node && !err; i++)
-        if (b.body->fixed[i])
+        if (b.body->support[i])
             pal_mul33(b.body->x + 3 * i, g, b.body->x_rest + 3 * i);
         else
             n_inner++;
@@ -292,7 +292,7 @@ static double bending_error(const char *element, bool irregular)
     for (int i = 0; i < b.body->n_node; i++) {
         bend(b.body->x_rest + 3 * i, nu, u);
         most = fmax(most, pal_norm3(u));
-        if (b.body->fixed[i]) pal_add3(b.body->x + 3 * i, b.body->x_rest + 3 * i, u);
+        if (b.body->support[i]) pal_add3(b.body->x + 3 * i, b.body->x_rest + 3 * i, u);
     }
     pal_world_invalidate_limits(b.world, 0);
     if (!settle(&b)) return INFINITY;

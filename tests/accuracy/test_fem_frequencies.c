@@ -47,7 +47,7 @@ static double times_mass(const pal_body *b, const double *x, const double *y)
 {
     double sum = 0;
     for (int i = 0; i < b->n_node; i++)
-        if (!b->fixed[i]) sum += b->mass_kg[i] * pal_dot3(x + 3 * i, y + 3 * i);
+        if (!b->support[i]) sum += b->mass_kg[i] * pal_dot3(x + 3 * i, y + 3 * i);
     return sum;
 }
 
@@ -59,7 +59,7 @@ static void iterate_modes(const pal_body *b, pal_cholesky *factor, double *mode[
     for (int m = 0; m < MODES; m++) {
         old[m] = calloc(n3, sizeof(double));
         if (!old[m]) abort();
-        for (size_t i = 0; i < n3; i++) old[m][i] = b->fixed[i / 3] ? 0 : b->mass_kg[i / 3] * mode[m][i];
+        for (size_t i = 0; i < n3; i++) old[m][i] = b->support[i / 3] ? 0 : b->mass_kg[i / 3] * mode[m][i];
         CHECK_INT(pal_cholesky_solve(factor, old[m], mode[m]), 0);
         /* Gram and Schmidt, of the right sides K x too */
         for (int pass = 0; pass < 2; pass++)
@@ -109,13 +109,13 @@ static bool find_frequencies(const fem_beam *b, int n, double hz[])
     row->effect->tangent->linearise(row->self, body);
     pal_block_matrix_zero(&k);
     row->effect->tangent->assemble(row->self, body, 1, 0, &k);
-    good = !pal_cholesky_create(&k, body->fixed, &factor) && !pal_cholesky_factor(factor, &k, false);
+    good = !pal_cholesky_create(&k, body->support, &factor) && !pal_cholesky_factor(factor, &k, false);
     for (int m = 0; m < MODES; m++) {
         mode[m] = calloc(3 * (size_t)body->n_node, sizeof(double));
         if (!mode[m]) abort();
         for (int i = 0; i < 3 * body->n_node; i++) {
             seed = seed * 6364136223846793005u + 1442695040888963407u;
-            mode[m][i] = body->fixed[i / 3] ? 0 : (double)(int64_t)seed;
+            mode[m][i] = body->support[i / 3] ? 0 : (double)(int64_t)seed;
         }
     }
     for (int it = 0; it < 60 && good; it++) {

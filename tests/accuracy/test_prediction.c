@@ -1,10 +1,10 @@
-/* What the live estimate says of a body's error, and foresees of half and twice the size (session/estimate_foresee.h),
+/* What the live estimate says of a body's error, and foresees of half and twice the size (session/estimate_predict.h),
  * against what such meshes leave: the same body, made in those sizes as a switch makes it, at rest under the same load,
  * against a mesh that is finer still. That one is off as well, by the share that order 1.5 gives it, which is added.
- * Both are asked for within a factor of 2, of organs too, whose voxels are cut (session/estimate_family.h). With
+ * Both are asked for within a factor of 2, of organs too, whose voxels are cut (session/estimate_hierarchy.h). With
  * PALPATE_LONG=1 in more and finer sizes (about a minute). */
 #include "server/base/vec3.h"
-#include "server/estimate/estimate_work.h"
+#include "server/estimate/estimation.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/problem_file.h"
 #include "server/scene/scene_file.h"
@@ -83,7 +83,7 @@ static void moved(const body *of, const double x[3], double u[3])
     const pal_body *b = pal_world_view_body(of->world, 0);
     double local[4], shape[10];
     const int32_t *node;
-    int e = pal_locate_point(of->locate, x, local, NULL), n = pal_case_shape(b, e, local, shape, &node);
+    int e = pal_locate_point(of->locate, x, local, NULL), n = pal_case_shape_functions(b, e, local, shape, &node);
     pal_set3(u, 0, 0, 0);
     for (int k = 0; k < n; k++) {
         pal_axpy3(u, shape[k], b->d + 3 * (size_t)node[k]);
@@ -107,19 +107,19 @@ static double off(const body *a, const body *truth, const pal_surface *s)
 /* of the body where it rests */
 static bool estimate(const body *at, double pull, pal_estimate *out)
 {
-    pal_estimate_work *work = NULL;
+    pal_estimation *work = NULL;
     pal_world *world = NULL;
     pal_scene *live = alone(&at->set->scene);
     bool good = !pal_world_create(live, NULL, &world) && put_load(world, live, pull) &&
-                !pal_estimate_work_open(live, 0, NULL, NULL, &work);
+                !pal_estimation_open(live, 0, NULL, NULL, &work);
     if (good) {
-        pal_estimate_state *s = pal_estimate_work_state(work);
+        pal_estimate_state *s = pal_estimation_state(work);
         good = pal_estimate_copy(s, world, 0);
         memcpy(s->x, pal_world_view_body(at->world, 0)->x, 3 * sizeof *s->x * (size_t)s->n_dof);
         s->n_substep = 1, s->n_cost = 1, s->cost[0].ms = 1;
-        good = good && pal_estimate_work_run(work, out);
+        good = good && pal_estimation_run(work, out);
     }
-    pal_estimate_work_close(work);
+    pal_estimation_close(work);
     pal_world_destroy(world);
     free(live);
     return good;

@@ -18,7 +18,7 @@ static void every_error_has_name_and_text(void)
     CHECK_TEXT(pal_err_name((pal_err)999), "UNKNOWN");
 }
 
-static void note_is_cut_at_its_end(void)
+static void diagnostic_is_cut_at_the_end_of_its_buffer(void)
 {
     pal_diagnostic diag;
     char longer[2000];
@@ -68,28 +68,28 @@ typedef struct pair {
 } pair;
 enum { HANDED = 200000 };
 
-static void *write_trio(void *user)
+static void *write_pairs(void *user)
 {
-    pal_triple_buffer *triple_buffer = user;
+    pal_triple_buffer *buffer = user;
     for (uint64_t i = 1; i <= HANDED; i++) {
-        pair *slot = pal_triple_buffer_slot(triple_buffer);
+        pair *slot = pal_triple_buffer_slot(buffer);
         slot->a = slot->b = i;
-        pal_triple_buffer_publish(triple_buffer);
+        pal_triple_buffer_publish(buffer);
     }
     return NULL;
 }
 
-static void trio_hands_over_newest_untorn_in_order(void)
+static void triple_buffer_passes_the_newest_value_whole_and_in_order(void)
 {
-    pair node_order[3] = {{0}};
-    pal_triple_buffer triple_buffer;
+    pair value[3] = {{0}};
+    pal_triple_buffer buffer;
     pthread_t writer;
-    pal_triple_buffer_init(&triple_buffer, &node_order[0], &node_order[1], &node_order[2]);
-    CHECK(!pal_triple_buffer_take(&triple_buffer));
-    REQUIRE(pthread_create(&writer, NULL, write_trio, &triple_buffer) == 0);
+    pal_triple_buffer_init(&buffer, &value[0], &value[1], &value[2]);
+    CHECK(!pal_triple_buffer_take(&buffer));
+    REQUIRE(pthread_create(&writer, NULL, write_pairs, &buffer) == 0);
     uint64_t last = 0, torn = 0, back = 0;
     while (last < HANDED) {
-        pair *p = pal_triple_buffer_take(&triple_buffer);
+        pair *p = pal_triple_buffer_take(&buffer);
         if (!p) continue;
         torn += p->a != p->b;
         back += p->a <= last;
@@ -98,60 +98,60 @@ static void trio_hands_over_newest_untorn_in_order(void)
     pthread_join(writer, NULL);
     CHECK_INT(torn, 0);
     CHECK_INT(back, 0);
-    CHECK(!pal_triple_buffer_take(&triple_buffer));
+    CHECK(!pal_triple_buffer_take(&buffer));
 }
 
 typedef struct sender {
-    pal_command_queue *ring;
+    pal_command_queue *queue;
     uint32_t id;
 } sender;
 
-static void *fill_ring(void *user)
+static void *fill_queue(void *user)
 {
     sender *s = user;
     for (uint32_t i = 0; i < 20000; i++) {
         uint32_t item[2] = {s->id, i};
-        while (pal_command_queue_put(s->ring, item)) {
+        while (pal_command_queue_put(s->queue, item)) {
         }
     }
     return NULL;
 }
 
-static void ring_keeps_every_item_of_every_writer_in_order(void)
+static void command_queue_keeps_every_item_of_every_writer_in_order(void)
 {
-    pal_command_queue *ring = pal_command_queue_create(64, 8);
+    pal_command_queue *queue = pal_command_queue_create(64, 8);
     pthread_t thread[3];
     sender who[3];
-    REQUIRE(ring);
+    REQUIRE(queue);
     for (uint32_t i = 0; i < 3; i++) {
-        who[i] = (sender){ring, i};
-        REQUIRE(pthread_create(&thread[i], NULL, fill_ring, &who[i]) == 0);
+        who[i] = (sender){queue, i};
+        REQUIRE(pthread_create(&thread[i], NULL, fill_queue, &who[i]) == 0);
     }
     uint32_t next[3] = {0}, item[2], wrong = 0;
     for (int taken = 0; taken < 60000;) {
-        if (!pal_command_queue_get(ring, item)) continue;
+        if (!pal_command_queue_get(queue, item)) continue;
         wrong += item[0] > 2 || item[1] != next[item[0]]++;
         taken++;
     }
     for (int i = 0; i < 3; i++) pthread_join(thread[i], NULL);
     CHECK_INT(wrong, 0);
-    CHECK(!pal_command_queue_get(ring, item));
-    pal_command_queue_destroy(ring);
+    CHECK(!pal_command_queue_get(queue, item));
+    pal_command_queue_destroy(queue);
 }
 
-static void full_ring_refuses(void)
+static void full_command_queue_refuses(void)
 {
-    pal_command_queue *ring = pal_command_queue_create(4, 4);
+    pal_command_queue *queue = pal_command_queue_create(4, 4);
     uint32_t item = 7;
-    REQUIRE(ring);
-    for (int i = 0; i < 4; i++) CHECK_INT(pal_command_queue_put(ring, &item), PAL_ERR_OK);
-    CHECK_INT(pal_command_queue_put(ring, &item), PAL_ERR_FULL);
-    CHECK(pal_command_queue_get(ring, &item));
-    CHECK_INT(pal_command_queue_put(ring, &item), PAL_ERR_OK);
-    pal_command_queue_destroy(ring);
+    REQUIRE(queue);
+    for (int i = 0; i < 4; i++) CHECK_INT(pal_command_queue_put(queue, &item), PAL_ERR_OK);
+    CHECK_INT(pal_command_queue_put(queue, &item), PAL_ERR_FULL);
+    CHECK(pal_command_queue_get(queue, &item));
+    CHECK_INT(pal_command_queue_put(queue, &item), PAL_ERR_OK);
+    pal_command_queue_destroy(queue);
 }
 
-static void quaternion_turns_like_its_matrix(void)
+static void quaternion_rotates_as_its_matrix_does(void)
 {
     /* a quarter turn about z takes x to y */
     double q[4] = {sqrt(0.5), 0, 0, sqrt(0.5)}, r[3];
@@ -161,14 +161,14 @@ static void quaternion_turns_like_its_matrix(void)
     CHECK_NEAR(r[2], 0, 1e-15);
 }
 
-static void clock_sleeps_until_the_time_asked(void)
+static void clock_sleeps_until_the_requested_time(void)
 {
     uint64_t when = pal_clock_ns() + 3000000;
     pal_clock_sleep_until_ns(when);
     CHECK(pal_clock_ns() >= when);
 }
 
-static void the_machine_has_the_same_name_twice(void)
+static void machine_name_is_stable(void)
 {
     char a[PAL_MACHINE_TEXT], b[PAL_MACHINE_TEXT];
     CHECK_TEXT(pal_machine_name(a), pal_machine_name(b));
@@ -179,14 +179,14 @@ static void the_machine_has_the_same_name_twice(void)
 int main(void)
 {
     RUN(every_error_has_name_and_text);
-    RUN(note_is_cut_at_its_end);
+    RUN(diagnostic_is_cut_at_the_end_of_its_buffer);
     RUN(arena_gives_zeroed_aligned_bytes_and_refuses_overflow);
     RUN(fixed_arena_refuses_beyond_its_size_and_empties);
-    RUN(trio_hands_over_newest_untorn_in_order);
-    RUN(ring_keeps_every_item_of_every_writer_in_order);
-    RUN(full_ring_refuses);
-    RUN(quaternion_turns_like_its_matrix);
-    RUN(clock_sleeps_until_the_time_asked);
-    RUN(the_machine_has_the_same_name_twice);
+    RUN(triple_buffer_passes_the_newest_value_whole_and_in_order);
+    RUN(command_queue_keeps_every_item_of_every_writer_in_order);
+    RUN(full_command_queue_refuses);
+    RUN(quaternion_rotates_as_its_matrix_does);
+    RUN(clock_sleeps_until_the_requested_time);
+    RUN(machine_name_is_stable);
     return check_report();
 }

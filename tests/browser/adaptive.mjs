@@ -1,29 +1,42 @@
-// A surface that adapts in real Chromium pages: pressed, its mesh becomes finer under the tool and the panel's counts grow,
-// for one who comes late as well; let go, the mesh of the beginning is back.
+// An adaptive surface: pressed, its mesh is refined under the tool, for a browser that joins later as well; released, it
+// returns to the initial mesh.
 // usage: node adaptive.mjs BUILD PICTURES     ends with "N passed, N failed"
 import { execFileSync } from "node:child_process";
 import { join } from "node:path";
-import { check, finish, launch, moved, open, palpate, pictures, scratch, serve, troubles, until } from "./common.mjs";
+import {
+    check,
+    checkConsoles,
+    displacement,
+    launch,
+    open,
+    palpate,
+    pictures,
+    prepare,
+    run,
+    scratch,
+    serve,
+    until,
+} from "./common.mjs";
 
-/** what a page shows: counts of the panel, triangles and their vertices, edges that lie open, shortest and longest edge */
+/** what a page shows: counts of the panel, triangles and their vertices, open edges, shortest and longest edge */
 const shown = (page) =>
     page.evaluate(() => {
-        const { state } = window.palpate,
-            body = [...state.bodies.values()][0];
-        const x = body.position.array,
-            index = body.geometry.index.array.subarray(0, body.nCorner),
-            open = new Set();
-        let least = Infinity,
-            most = 0;
+        const { state } = window.palpate;
+        const body = [...state.bodies.values()][0];
+        const x = body.position.array;
+        const index = body.geometry.index.array.subarray(0, body.nCorner);
+        const open = new Set();
+        let min = Infinity;
+        let max = 0;
         for (let e = 0; e < index.length; e++) {
-            const a = index[e],
-                b = index[e % 3 === 2 ? e - 2 : e + 1],
-                back = `${b} ${a}`;
+            const a = index[e];
+            const b = index[e % 3 === 2 ? e - 2 : e + 1];
+            const back = `${b} ${a}`;
             if (!open.delete(back)) open.add(`${a} ${b}`);
             const length = Math.hypot(x[3 * a] - x[3 * b], x[3 * a + 1] - x[3 * b + 1], x[3 * a + 2] - x[3 * b + 2]);
-            least = Math.min(least, length);
-            most = Math.max(most, length);
-            if (!(length < 1)) most = Infinity;
+            min = Math.min(min, length);
+            max = Math.max(max, length);
+            if (!(length < 1)) max = Infinity;
         }
         const of = state.status.active?.[0] ?? null;
         return {
@@ -34,29 +47,30 @@ const shown = (page) =>
             visible: body.nVisible(),
             all: body.rest.length / 3,
             open: open.size,
-            least,
-            most,
+            min,
+            max,
             corners: [...index].join(),
         };
     });
-const told = (s) => `${s.of?.nodes} of ${s.of?.of_nodes} nodes, ${s.of?.springs} of ${s.of?.of_springs} springs`;
-const sayShort = (s) =>
-    `${s.text}; ${s.triangles} triangles, edges ${(1000 * s.least).toFixed(1)} to ${(1000 * s.most).toFixed(1)} mm`;
-/** counts of the server and what is drawn agree */
-const agrees = (s) => s.of && s.text === told(s) && s.vertices === s.of.nodes && s.visible === s.vertices;
+const countsOf = (s) =>
+    `${s.of?.nodes} of ${s.of?.finest_nodes} nodes, ${s.of?.springs} of ${s.of?.finest_springs} springs`;
+const summary = (s) =>
+    `${s.text}; ${s.triangles} triangles, edges ${(1000 * s.min).toFixed(1)} to ${(1000 * s.max).toFixed(1)} mm`;
+/** do the counts of the server agree with the drawn mesh? */
+const agrees = (s) => s.of && s.text === countsOf(s) && s.vertices === s.of.nodes && s.visible === s.vertices;
 
-/** a pixel with the organ all around it, towards the eye, free of the page's own boxes; and the nearer the middle the better */
+/** a pixel near the middle where the organ faces the camera, with the organ all around it and no panel in front */
 const middlePixel = (page) =>
     page.evaluate(() => {
-        const { stage, input } = window.palpate,
-            w = innerWidth,
-            h = innerHeight;
+        const { stage, input } = window.palpate;
+        const w = innerWidth;
+        const h = innerHeight;
         const seen = (x, y) => (document.elementFromPoint(x, y)?.id === "view" ? input.pick(stage.ray(x, y)) : null);
         for (let r = 0; r < 0.4; r += 0.03)
             for (let a = 0; a < 6.28; a += 0.5) {
-                const x = w * (0.5 + r * Math.cos(a)),
-                    y = h * (0.5 + r * Math.sin(a)),
-                    hit = seen(x, y);
+                const x = w * (0.5 + r * Math.cos(a));
+                const y = h * (0.5 + r * Math.sin(a));
+                const hit = seen(x, y);
                 if (
                     hit &&
                     hit.normal.dot(stage.ray(x, y).direction) < -0.8 &&
@@ -71,7 +85,7 @@ const middlePixel = (page) =>
             }
         return null;
     });
-/** pictures are drawn when something changes: waits for the one that shows it; while frames come it is never the last */
+/** waits until the picture is up to date, at most 3 s: while frames arrive it never is */
 const drawn = (page) =>
     until(
         () => page.evaluate(() => !window.palpate.stage.dirty && window.palpate.stage.ready()),
@@ -79,37 +93,32 @@ const drawn = (page) =>
         3000,
     );
 
-let server;
-const browsers = [];
-try {
+await run(async () => {
     const folder = join(scratch, "stomach");
     execFileSync(palpate, ["prepare", "--shape", "stomach", "-o", folder, "--quiet"]);
-    server = await serve(join(folder, "scene.json"), 0);
+    const server = await serve(join(folder, "scene.json"), 0);
     const address = `http://127.0.0.1:${server.info.port}/`;
-    browsers.push(await launch(), await launch());
+    const browsers = [await launch(), await launch()];
     const ada = await open(browsers[0], address, "Ada", { width: 760, height: 560 });
     await ada.keyboard.press("p");
     const rest = await until(() => shown(ada), agrees);
-    check("the panel says what is active, and that is what is drawn", agrees(rest), sayShort(rest));
+    check("the counts of the panel agree with the drawn mesh", agrees(rest), summary(rest));
     check(
-        "at rest it is coarse",
-        rest.of?.nodes < 0.5 * rest.of?.of_nodes && rest.all === rest.of?.of_nodes,
+        "at rest the mesh is coarse",
+        rest.of?.nodes < 0.5 * rest.of?.finest_nodes && rest.all === rest.of?.finest_nodes,
         `${rest.visible} of ${rest.all} vertices`,
     );
-    check("it is closed", rest.open === 0, `${rest.open} open edges`);
+    check("the mesh is closed", rest.open === 0, `${rest.open} open edges`);
     await ada.keyboard.press("m");
     const pressed = await ada.getAttribute("#mesh", "aria-pressed");
     const lines = await ada.evaluate(() => [...window.palpate.state.bodies.values()].every((b) => b.lines?.visible));
-    check("the key M shows the mesh over the body, and its button says so", pressed === "true" && lines);
+    check("key M shows the edges of the mesh and marks its button", pressed === "true" && lines);
     await drawn(ada);
     await ada.screenshot({ path: join(pictures, "adaptive_rest.png") });
 
-    // press where nothing but the organ is
+    // press at a pixel of the organ
     await ada.click("#mode-press");
-    const pixel = await until(
-        () => middlePixel(ada),
-        (p) => p,
-    );
+    const pixel = await until(() => middlePixel(ada));
     await ada.mouse.move(pixel.x, pixel.y);
     await ada.mouse.down();
     for (let i = 0; i < 10; i++) {
@@ -121,25 +130,22 @@ try {
         (s) => s.of?.nodes > rest.of?.nodes && agrees(s),
     );
     check(
-        "pressed, nodes and springs become more",
+        "under pressure the numbers of nodes and springs grow",
         fine.of?.nodes > rest.of?.nodes && fine.of?.springs > rest.of?.springs && agrees(fine),
-        sayShort(fine),
+        summary(fine),
     );
     check(
-        "not all of them: only where it is pressed",
-        fine.of?.nodes < 0.8 * fine.of?.of_nodes,
-        `${fine.of?.nodes} of ${fine.of?.of_nodes}`,
+        "the mesh is refined only locally",
+        fine.of?.nodes < 0.8 * fine.of?.finest_nodes,
+        `${fine.of?.nodes} of ${fine.of?.finest_nodes}`,
     );
     check(
-        "the mesh is finer, closed, and of no wild edge",
-        fine.triangles > rest.triangles &&
-            fine.least < 0.75 * rest.least &&
-            fine.open === 0 &&
-            fine.most < 3 * rest.most,
+        "the refined mesh is closed and has no degenerate edge",
+        fine.triangles > rest.triangles && fine.min < 0.75 * rest.min && fine.open === 0 && fine.max < 3 * rest.max,
         `${fine.triangles} triangles after ${rest.triangles}, ${fine.open} open edges`,
     );
-    const depth = await moved(ada);
-    check("it gives way", depth > 0.002 && depth < 0.2, `${(1000 * depth).toFixed(1)} mm`);
+    const depth = await displacement(ada);
+    check("the surface yields", depth > 0.002 && depth < 0.2, `${(1000 * depth).toFixed(1)} mm`);
     await ada.screenshot({ path: join(pictures, "adaptive_pressed.png") });
 
     const ben = await open(browsers[1], address, "Ben", { width: 480, height: 480 });
@@ -150,15 +156,15 @@ try {
         ([a, b]) => agrees(a) && agrees(b) && a.corners === b.corners && a.of.nodes > rest.of.nodes,
     );
     check(
-        "one who comes late sees the same triangles and counts",
+        "a browser that joins later shows the same triangles and counts",
         both[0].corners === both[1].corners && both[1].text === both[0].text,
-        sayShort(both[1]),
+        summary(both[1]),
     );
-    check("and not those of the beginning", both[1].triangles > rest.triangles);
-    // what is refined is hit where it is drawn
+    check("and not the initial ones", both[1].triangles > rest.triangles);
+    // picking uses the refined triangles
     const hit = await ada.evaluate(({ x, y }) => {
-        const { input, stage, state } = window.palpate,
-            found = input.pick(stage.ray(x, y));
+        const { input, stage, state } = window.palpate;
+        const found = input.pick(stage.ray(x, y));
         return found
             ? Math.hypot(...found.point.toArray().map((v, i) => v - state.tools[state.ownTool].position[i]))
             : null;
@@ -169,20 +175,20 @@ try {
         `${hit === null ? "-" : (1000 * hit).toFixed(1)} mm`,
     );
 
-    // colours: the legend's values are of what is drawn, whatever hidden vertices have
+    // the legend ignores values of hidden vertices
     await ada.selectOption("#field", "displacement");
     const field = await until(
         () =>
             ada.evaluate(() => {
                 const body = [...window.palpate.state.bodies.values()][0];
-                return { values: body.colours.values, most: body.maxDisplacement() };
+                return { values: body.colours.values, max: body.maxDisplacement() };
             }),
-        (f) => f.values && Math.abs(f.values.high - f.most) < 0.1 * f.most,
+        (f) => f.values && Math.abs(f.values.high - f.max) < 0.1 * f.max,
     );
     check(
-        "displacement in colours is that of the drawn vertices",
-        field.values && Math.abs(field.values.high - field.most) < 0.1 * field.most,
-        `${(1000 * field.values?.high).toFixed(1)} mm, moved ${(1000 * field.most).toFixed(1)} mm`,
+        "the displacement in colours is that of the visible vertices",
+        field.values && Math.abs(field.values.high - field.max) < 0.1 * field.max,
+        `${(1000 * field.values?.high).toFixed(1)} mm, moved ${(1000 * field.max).toFixed(1)} mm`,
     );
     await drawn(ada);
     await ada.screenshot({ path: join(pictures, "adaptive_field.png") });
@@ -194,19 +200,19 @@ try {
         (pair) => pair.every((s) => agrees(s) && s.corners === rest.corners),
     );
     for (const [i, name] of [
-        [0, "the one who pressed"],
-        [1, "the one who came late"],
+        [0, "the pressing browser"],
+        [1, "the later browser"],
     ])
         check(
-            `let go, the mesh of the beginning is back for ${name}`,
+            `released, the initial mesh returns in ${name}`,
             after[i].corners === rest.corners && after[i].text === rest.text,
-            sayShort(after[i]),
+            summary(after[i]),
         );
     const back = await until(
-        () => moved(ada),
+        () => displacement(ada),
         (m) => m < 0.001,
     );
-    check("and its shape", back < 0.001, `${(1000 * back).toFixed(2)} mm`);
+    check("and the initial shape", back < 0.001, `${(1000 * back).toFixed(2)} mm`);
     await ada.screenshot({ path: join(pictures, "adaptive_after.png") });
 
     await ada.click("#mode-pull");
@@ -217,13 +223,13 @@ try {
         await new Promise((r) => setTimeout(r, 60));
     }
     const pulled = await until(
-        async () => ({ ...(await shown(ada)), far: await moved(ada) }),
+        async () => ({ ...(await shown(ada)), far: await displacement(ada) }),
         (s) => s.far > 0.01 && s.triangles > rest.triangles && agrees(s),
     );
     check(
-        "pulled, it follows and refines",
+        "pulled, the surface follows and is refined",
         pulled.far > 0.01 && pulled.triangles > rest.triangles && pulled.open === 0,
-        `${(1000 * pulled.far).toFixed(1)} mm, ${sayShort(pulled)}`,
+        `${(1000 * pulled.far).toFixed(1)} mm, ${summary(pulled)}`,
     );
     await ada.screenshot({ path: join(pictures, "adaptive_pulled.png") });
     await ada.mouse.up();
@@ -231,16 +237,6 @@ try {
         () => shown(ada),
         (s) => s.corners === rest.corners,
     );
-    check("and is as at first when let go", again.corners === rest.corners, sayShort(again));
-    check(
-        "nothing was complained of in the browsers' consoles",
-        troubles.length === 0,
-        troubles.slice(0, 3).join(" | "),
-    );
-} catch (error) {
-    check("the test ran to its end", false, String(error.stack ?? error));
-} finally {
-    for (const browser of browsers) await browser.close().catch(() => {});
-    server?.child.kill("SIGTERM");
-}
-finish();
+    check("released, the initial mesh returns once more", again.corners === rest.corners, summary(again));
+    checkConsoles();
+});

@@ -1,4 +1,4 @@
-// Shared by the browser tests: arguments, a small scene, a server on it, real Chromium pages, conditions waited for.
+// Shared by the browser tests: arguments, a small scene, its server, real Chromium pages, waiting for conditions.
 import { execFileSync, spawn } from "node:child_process";
 import { existsSync, mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
@@ -13,26 +13,48 @@ export const scratch = mkdtempSync(join(tmpdir(), "palpate-browser-"));
 const { chromium } = createRequire(join(build, "viewer_packages", "package.json"))("playwright-core");
 mkdirSync(pictures, { recursive: true });
 
-let passed = 0,
-    failed = 0;
+let passed = 0;
+let failed = 0;
 export function check(what, good, figure = "") {
     console.log(`${good ? "ok  " : "FAIL"} ${what} ${figure}`);
     if (good) passed++;
     else failed++;
 }
-export function finish() {
+/** error messages in the consoles of all pages */
+export const consoleErrors = [];
+export function checkConsoles(errors = consoleErrors) {
+    check("the consoles of the pages have no errors", errors.length === 0, errors.slice(0, 3).join(" | "));
+}
+
+const browsers = [];
+const children = [];
+/** ends this child process with the test */
+export function endWithTest(child) {
+    children.push(child);
+    return child;
+}
+/** runs a test, closes what it has started, and ends the program with the count of checks */
+export async function run(test) {
+    try {
+        await test();
+    } catch (error) {
+        check("the test runs to its end", false, String(error.stack ?? error));
+    } finally {
+        for (const browser of browsers) await browser.close().catch(() => {});
+        for (const child of children) child.kill("SIGTERM");
+    }
     rmSync(scratch, { recursive: true, force: true });
     console.log(`${passed} passed, ${failed} failed`);
     process.exit(failed ? 1 : 0);
 }
 
-const SCAN = "/usr/share/doc/libcgal-dev/data.tar.gz",
-    LIVER = "data/images/liver.inr.gz";
+const SCAN = "/usr/share/doc/libcgal-dev/data.tar.gz";
+const LIVER = "data/images/liver.inr.gz";
 
-/** the CT's liver, else (said) our own organ; coarse, so that it steps quickly beside two software renderers */
+/** scene of the liver of the CT, else of the procedural organ; coarse, so that it is fast beside two software renderers */
 export function prepare() {
-    const folder = join(scratch, "organ"),
-        size = ["--resolution", "14", "--triangles", "12000", "-o", folder, "--quiet"];
+    const folder = join(scratch, "organ");
+    const size = ["--resolution", "14", "--triangles", "12000", "-o", folder, "--quiet"];
     if (existsSync(SCAN)) {
         execFileSync("tar", ["-xzf", SCAN, "-C", scratch, LIVER]);
         execFileSync(palpate, [
@@ -49,17 +71,19 @@ export function prepare() {
             ...size,
         ]);
     } else {
-        console.log("     the scan is not there: our own organ serves");
+        console.log("     the scan is missing: the procedural organ replaces it");
         execFileSync(palpate, ["prepare", "--procedural", ...size]);
     }
     return join(folder, "scene.json");
 }
 
-/** starts the server, resolves with its first JSON line */
+/** starts a server; info: its first JSON line */
 export function serve(scene, port, more = []) {
-    const child = spawn(palpate, ["serve", scene, "--port", String(port), "--json", ...more], {
-        stdio: ["ignore", "pipe", "inherit"],
-    });
+    const child = endWithTest(
+        spawn(palpate, ["serve", scene, "--port", String(port), "--json", ...more], {
+            stdio: ["ignore", "pipe", "inherit"],
+        }),
+    );
     return new Promise((resolve, reject) => {
         let text = "";
         child.stdout.on("data", (bytes) => {
@@ -83,43 +107,47 @@ const FLAGS = [
     "--disable-component-update",
     "--disable-sync",
 ];
-/** what the pages complained of in their consoles */
-export const troubles = [];
-export const launch = () =>
-    chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: FLAGS });
+export async function launch() {
+    const browser = await chromium.launch({
+        executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+        args: FLAGS,
+    });
+    browsers.push(browser);
+    return browser;
+}
 
 /** a page that shows the organ */
 export async function open(browser, address, name, viewport) {
     const page = await browser.newPage({ viewport });
     page.setDefaultTimeout(180000);
-    page.on("console", (m) => m.type() === "error" && troubles.push(`${name}: ${m.text()}`));
-    page.on("pageerror", (e) => troubles.push(`${name}: ${e.message}`));
+    page.on("console", (m) => m.type() === "error" && consoleErrors.push(`${name}: ${m.text()}`));
+    page.on("pageerror", (e) => consoleErrors.push(`${name}: ${e.message}`));
     await page.goto(`${address}?name=${name}`);
     await page.waitForFunction(() => window.palpate?.state.bodies.size > 0 && window.palpate.state.status);
     return page;
 }
 
-/** largest displacement of what a page shows, m */
-export const moved = (page) =>
+/** largest displacement that a page shows, m */
+export const displacement = (page) =>
     page.evaluate(() => Math.max(...[...window.palpate.state.bodies.values()].map((b) => b.maxDisplacement())));
 
 /** a pixel on the organ near the middle of the picture */
 export const organPixel = (page) =>
     page.evaluate(() => {
-        const { stage, input } = window.palpate,
-            w = innerWidth,
-            h = innerHeight;
+        const { stage, input } = window.palpate;
+        const w = innerWidth;
+        const h = innerHeight;
         for (let r = 0; r < 0.4; r += 0.04)
             for (let a = 0; a < 6.28; a += 0.5) {
-                const x = w * (0.5 + r * Math.cos(a)),
-                    y = h * (0.5 + r * Math.sin(a));
+                const x = w * (0.5 + r * Math.cos(a));
+                const y = h * (0.5 + r * Math.sin(a));
                 if (document.elementFromPoint(x, y)?.id === "view" && input.pick(stage.ray(x, y))) return { x, y };
             }
         return null;
     });
 
-/** waits until test(await read()) or the time is over, gives the last value; long, for machines whose cores others have too */
-export async function until(read, test, ms = 90000) {
+/** waits until test(await read()) holds or the time is over and returns the last value; long, for busy machines */
+export async function until(read, test = Boolean, ms = 90000) {
     const end = Date.now() + ms;
     for (;;) {
         const value = await read();

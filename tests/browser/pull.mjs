@@ -1,63 +1,63 @@
-// Real Chromium opens the page, grabs the organ at a pixel, and a second Chromium sees the vertices move.
+// One browser pulls the organ at a pixel, a second one shows the vertices move.
 // usage: node pull.mjs BUILD PICTURES     ends with "N passed, N failed"
 import { join } from "node:path";
 import {
     check,
-    finish,
+    checkConsoles,
+    consoleErrors,
+    displacement,
     launch,
-    moved,
     open,
     organPixel,
+    palpate,
     pictures,
     prepare,
+    run,
     serve,
-    troubles,
     until,
 } from "./common.mjs";
 
 const ended = (child) => new Promise((resolve) => child.on("exit", (code) => resolve(code)));
 
-let server;
-const browsers = [];
-try {
+await run(async () => {
     const scene = prepare();
-    server = await serve(scene, 0);
+    let server = await serve(scene, 0);
     const address = `http://127.0.0.1:${server.info.port}/`;
-    browsers.push(await launch(), await launch());
+    const browsers = [await launch(), await launch()];
     const ada = await open(browsers[0], address, "Ada", { width: 1100, height: 720 });
     const ben = await open(browsers[1], address, "Ben", { width: 390, height: 780 });
 
     const title = await ada.textContent("#title");
-    check("the page says which organ it shows", title.length > 3 && title !== "Palpate", title);
+    check("the title names the organ", title.length > 3 && title !== "Palpate", title);
     await until(
         () => ada.evaluate(() => window.palpate.state.members.size),
         (n) => n === 2,
     );
     const holders = await Promise.all([ada, ben].map((page) => page.evaluate(() => window.palpate.state.ownTool)));
     check(
-        "each of two browsers holds a tool of its own",
+        "each of two browsers holds its own tool",
         holders[0] >= 0 && holders[1] >= 0 && holders[0] !== holders[1],
         holders.join(" "),
     );
 
-    // the organ sinks a little under its own weight
+    // the organ settles under its weight
     let last = NaN;
     const before = await until(
         async () => {
-            last = await moved(ben);
+            last = await displacement(ben);
             await new Promise((r) => setTimeout(r, 1500));
-            return moved(ben);
+            return displacement(ben);
         },
         (m) => Math.abs(m - last) < 0.0005,
     );
     check(
-        "the organ rests quietly",
+        "the organ comes to rest",
         Math.abs(before - last) < 0.0005 && before < 0.03,
         `${(1000 * before).toFixed(2)} mm`,
     );
 
     const pixel = await organPixel(ada);
-    check("a pixel of the picture shows the organ", !!pixel);
+    check("the organ is visible", !!pixel);
     await ada.mouse.move(pixel.x, pixel.y);
     await ada.mouse.down();
     for (let i = 1; i <= 12; i++) {
@@ -65,11 +65,11 @@ try {
         await new Promise((r) => setTimeout(r, 40));
     }
     const pulled = await until(
-        () => moved(ben),
+        () => displacement(ben),
         (m) => m > before + 0.01,
     );
     check(
-        "the second browser sees the vertices move",
+        "the second browser shows the vertices move",
         pulled > before + 0.01,
         `${(1000 * before).toFixed(1)} -> ${(1000 * pulled).toFixed(1)} mm`,
     );
@@ -81,7 +81,7 @@ try {
             }),
         (f) => f > 0.05,
     );
-    check("the one who pulls sees the force", force > 0.05 && force < 50, `${force.toFixed(2)} N`);
+    check("the pulling browser shows the force", force > 0.05 && force < 50, `${force.toFixed(2)} N`);
     const label = await until(
         () =>
             ben.evaluate(() =>
@@ -89,17 +89,17 @@ try {
             ),
         (l) => l.includes("Ada"),
     );
-    check("the other's tool is shown with its name", label.includes("Ada"), label.join(" "));
-    await ada.keyboard.press("p"); // the panel, without letting go
+    check("the tool of the other member is shown with its name", label.includes("Ada"), label.join(" "));
+    await ada.keyboard.press("p"); // the panel, while the drag goes on
     await new Promise((r) => setTimeout(r, 1500));
     await ada.screenshot({ path: join(pictures, "pull_ada.png") });
     await ben.screenshot({ path: join(pictures, "pull_ben_phone.png") });
     await ada.mouse.up();
     const back = await until(
-        () => moved(ben),
+        () => displacement(ben),
         (m) => m < before + 0.004,
     );
-    check("let go, the organ returns", back < before + 0.004, `${(1000 * back).toFixed(2)} mm`);
+    check("after release the organ returns", back < before + 0.004, `${(1000 * back).toFixed(2)} mm`);
 
     const overflow = await ben.evaluate(() => {
         const out = [...document.querySelectorAll("button, #state, #head")].filter((e) => {
@@ -108,14 +108,11 @@ try {
         });
         return out.map((e) => e.id).concat(document.documentElement.scrollWidth > innerWidth ? ["page"] : []);
     });
-    check("at phone width everything is within the page", overflow.length === 0, overflow.join(" "));
+    check("at phone width all controls are within the page", overflow.length === 0, overflow.join(" "));
 
     await ben.click("#pause");
-    const paused = await until(
-        () => ada.evaluate(() => window.palpate.state.status.paused),
-        (p) => p,
-    );
-    check("pause by one is seen by all", paused === true);
+    const paused = await until(() => ada.evaluate(() => window.palpate.state.status.paused));
+    check("a pause by one member is shown to all", paused === true);
     await ben.click("#pause");
     await until(
         () => ada.evaluate(() => window.palpate.state.status.paused),
@@ -123,29 +120,21 @@ try {
     );
 
     const { port } = server.info;
-    const quiet = troubles.length;
+    const nBefore = consoleErrors.length;
     server.child.kill("SIGTERM");
     const code = await ended(server.child);
-    check("the server ends cleanly on SIGTERM", code === 0, String(code));
+    check("the server exits with 0 on SIGTERM", code === 0, String(code));
     const lost = await until(
         () => ada.getAttribute("#state", "data-state"),
         (s) => s !== "live",
     );
-    check("the page says that the connection is lost", lost !== "live", lost);
+    check("the page reports the lost connection", lost !== "live", lost);
     server = await serve(scene, port);
     const again = await until(
         () => ada.getAttribute("#state", "data-state"),
         (s) => s === "live",
     );
-    check("and comes back by itself", again === "live", again);
-    const said = troubles
-        .slice(0, quiet)
-        .concat(troubles.slice(quiet).filter((t) => !/WebSocket|ERR_CONNECTION/.test(t)));
-    check("nothing was complained of in the browsers' consoles", said.length === 0, said.slice(0, 3).join(" | "));
-} catch (error) {
-    check("the test ran to its end", false, String(error.stack ?? error));
-} finally {
-    for (const browser of browsers) await browser.close().catch(() => {});
-    server?.child.kill("SIGTERM");
-}
-finish();
+    check("the page reconnects by itself", again === "live", again);
+    // the browser itself logs failed connections
+    checkConsoles(consoleErrors.filter((text, i) => i < nBefore || !/WebSocket|ERR_CONNECTION/.test(text)));
+});

@@ -1,11 +1,11 @@
 #!/bin/sh
 # The browser tests: real Chromium on a real server. usage: run.sh pull|fields|calibrated|adaptive|sculpt|accuracy|together BUILD [PICTURES]
 #   pull      two browsers share an organ that one of them pulls
-#   fields    displacement, stress, energy and edge stiffness in colours, asked for and looked away from
-#   calibrated  a calibrated scene, its error beside its name
-#   adaptive  a surface that refines where it is pressed, seen by two browsers
-#   sculpt    a solid that is sculpted by clicks, seen by two browsers
-#   accuracy  what accuracy costs: a study's plot, a body switched along its front, rows off and on, seen by two browsers
+#   fields    displacement, stress, energy and edge stiffness in colours
+#   calibrated  a calibrated scene and its error
+#   adaptive  an adaptive surface that is refined under the tool
+#   sculpt    a subdivision solid that is sculpted by clicks
+#   accuracy  the plot of a study, switches along its Pareto front, components disabled and enabled
 #   together  two browsers, a haptic bridge and lcm-logger on one organ; in a network namespace of its own
 # BUILD is the folder of deploy/test.sh (release/bin/palpate, viewer_packages); PICTURES keeps the screenshots.
 set -u

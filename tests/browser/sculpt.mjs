@@ -1,63 +1,75 @@
-// A solid of control cells in real Chromium pages: sculpted by clicks on it, undone by keys, painted, probed, cut, saved;
-// who looks on sees the same. usage: node sculpt.mjs BUILD PICTURES     ends with "N passed, N failed"
+// A subdivision solid: sculpted by clicks, undone by keys, painted, probed, cut, saved; a second browser shows the same.
+// usage: node sculpt.mjs BUILD PICTURES     ends with "N passed, N failed"
 import { execFileSync } from "node:child_process";
 import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { check, finish, launch, moved, open, palpate, pictures, scratch, serve, troubles, until } from "./common.mjs";
+import {
+    check,
+    checkConsoles,
+    displacement,
+    launch,
+    open,
+    palpate,
+    pictures,
+    run,
+    scratch,
+    serve,
+    until,
+} from "./common.mjs";
 
 /** what a page shows */
 const shown = (page) =>
     page.evaluate(() => {
-        const { state } = window.palpate,
-            body = [...state.bodies.values()][0];
+        const { state } = window.palpate;
+        const body = [...state.bodies.values()][0];
         return {
             vertices: body.rest.length / 3,
             triangles: body.nCorner / 3,
             epoch: body.epoch,
             drawn: body.mesh.visible && body.shown,
-            said: document.querySelector("#sculpt-message").textContent,
+            message: document.querySelector("#sculpt-message").textContent,
             busy: document.querySelector("#sculpt").getAttribute("aria-busy"),
         };
     });
 const same = (a, b) => a.vertices === b.vertices && a.triangles === b.triangles;
-/** waits for what an order brings: the next epoch, drawn, answered */
+/** waits for the result of a command: answered, the next epoch drawn */
 const after = (page, epoch) =>
     until(
         () => shown(page),
         (s) => s.epoch > epoch && s.drawn && s.busy === "false",
     );
-/** what has moved, when it hardly moves any more */
+/** displacement, once it hardly changes */
 const settled = async (page) => {
     let before = -1;
     return until(
         async () => {
             await page.waitForTimeout(400);
-            return moved(page);
+            return displacement(page);
         },
         (m) => {
-            const still = Math.abs(m - before) < 0.02 * m;
+            const steady = Math.abs(m - before) < 0.02 * m;
             before = m;
-            return still;
+            return steady;
         },
     );
 };
-const say = (s) => `${s.vertices} vertices, ${s.triangles} triangles, epoch ${s.epoch}: ${s.said}`;
+const summary = (s) => `${s.vertices} vertices, ${s.triangles} triangles, epoch ${s.epoch}: ${s.message}`;
 
-/** a free pixel of the organ whose face looks most to a side, +z: 2 */
+/** a pixel of the organ whose normal is closest to an axis, 2: +z */
 const facePixel = (page, axis) =>
     page.evaluate((k) => {
-        const { stage, input } = window.palpate,
-            w = innerWidth,
-            h = innerHeight;
-        let best = null,
-            most = 0.9;
+        const { stage, input } = window.palpate;
+        const w = innerWidth;
+        const h = innerHeight;
+        let best = null;
+        let max = 0.9;
         for (let x = 0.05 * w; x < w; x += w / 40)
             for (let y = 0.05 * h; y < h; y += h / 30) {
                 if (document.elementFromPoint(x, y)?.id !== "view") continue;
                 const hit = input.pick(stage.ray(x, y));
                 if (!hit) continue;
                 const n = hit.normal.toArray();
-                if (n[k] > most) [best, most] = [{ x, y }, n[k]];
+                if (n[k] > max) [best, max] = [{ x, y }, n[k]];
             }
         return best;
     }, axis);
@@ -68,9 +80,7 @@ const drawn = async (page) =>
         (ready) => ready,
     );
 
-let server;
-const browsers = [];
-try {
+await run(async () => {
     execFileSync(palpate, ["cells", "chair", "-o", join(scratch, "chair.palcells"), "--quiet"]);
     writeFileSync(
         join(scratch, "chair.json"),
@@ -89,163 +99,144 @@ try {
             ],
         }),
     );
-    server = await serve(join(scratch, "chair.json"), 0);
+    const server = await serve(join(scratch, "chair.json"), 0);
     const address = `http://127.0.0.1:${server.info.port}/`;
-    browsers.push(await launch(), await launch());
+    const browsers = [await launch(), await launch()];
     const ada = await open(browsers[0], address, "Ada", { width: 1000, height: 700 });
     const ben = await open(browsers[1], address, "Ben", { width: 480, height: 480 });
     const begin = await until(
         () => shown(ada),
         (s) => s.drawn,
     );
-    check("a solid offers to be sculpted", await ada.isVisible("#mode-sculpt"), say(begin));
+    check("a subdivision solid offers sculpting", await ada.isVisible("#mode-sculpt"), summary(begin));
     await ada.click("#mode-sculpt");
-    check("its panel opens", await ada.isVisible("#sculpt"));
+    check("the panel opens", await ada.isVisible("#sculpt"));
     check(
-        "with the settings of the chosen tool alone",
+        "only the settings of the chosen tool are visible",
         (await ada.isVisible("#sculpt-distance")) &&
             !(await ada.isVisible("#sculpt-radius")) &&
-            !(await ada.isVisible("#sculpt-what")),
+            !(await ada.isVisible("#sculpt-entity")),
     );
     await drawn(ada);
     await ada.screenshot({ path: join(pictures, "sculpt_begin.png") });
 
-    // no picture without a body while the topology changes
+    // counts pictures without a body while the topology changes
     await ada.evaluate(() => {
         window.blank = 0;
-        const { state } = window.palpate,
-            look = () => {
-                if (![...state.bodies.values()].some((b) => b.mesh.visible && b.mesh.parent)) window.blank++;
-                requestAnimationFrame(look);
-            };
+        const { state } = window.palpate;
+        const look = () => {
+            if (![...state.bodies.values()].some((b) => b.mesh.visible && b.mesh.parent)) window.blank++;
+            requestAnimationFrame(look);
+        };
         look();
     });
-    const top = await until(
-        () => facePixel(ada, 2),
-        (p) => p,
-    );
+    const top = await until(() => facePixel(ada, 2));
     await ada.mouse.click(top.x, top.y);
     const grown = await after(ada, begin.epoch);
     check(
-        "a click on a face lets a cell grow",
+        "a click on a face extrudes a cell",
         grown.vertices > begin.vertices && grown.triangles > begin.triangles,
-        say(grown),
+        summary(grown),
     );
-    check("and says so", /^Extrude: 77 cells/.test(grown.said), grown.said);
+    check("the panel displays the result", /^Extrude: 77 cells/.test(grown.message), grown.message);
     const other = await until(
         () => shown(ben),
         (s) => s.epoch === grown.epoch && s.drawn,
     );
-    check("who looks on sees it", same(other, grown), say(other));
+    check("the second browser shows it", same(other, grown), summary(other));
     await drawn(ada);
     await ada.screenshot({ path: join(pictures, "sculpt_extruded.png") });
 
     await ada.keyboard.press("Control+z");
     const undone = await after(ada, grown.epoch);
-    check("Ctrl+Z brings back what was", same(undone, begin), say(undone));
+    check("Ctrl+Z undoes it", same(undone, begin), summary(undone));
     await ada.keyboard.press("Control+Shift+Z");
     const redone = await after(ada, undone.epoch);
-    check("Ctrl+Shift+Z does it again", same(redone, grown), say(redone));
-    check("no picture was without the body", (await ada.evaluate(() => window.blank)) === 0);
+    check("Ctrl+Shift+Z repeats it", same(redone, grown), summary(redone));
+    check("every picture shows the body", (await ada.evaluate(() => window.blank)) === 0);
 
-    const spot = await until(
-        () => facePixel(ada, 2),
-        (p) => p,
-    );
+    const spot = await until(() => facePixel(ada, 2));
     const probe = async () => {
         await tool(ada, "probe");
         await ada.mouse.click(spot.x, spot.y);
         return (
             await until(
                 () => shown(ada),
-                (s) => /Pa,/.test(s.said),
+                (s) => /Pa,/.test(s.message),
             )
-        ).said; // not "Paint"
+        ).message; // not "Paint"
     };
     const soft = await probe();
-    check("a probe tells the material", soft === "5 kPa, 1000 kg/m³", soft);
+    check("the probe displays the material", soft === "5 kPa, 1000 kg/m³", soft);
     await tool(ada, "paint");
     await ada.click("#sculpt-paints button[data-name=stiffer]");
     await ada.mouse.click(spot.x, spot.y);
     const painted = await after(ada, redone.epoch);
-    check("paint is answered", /^Paint: 77 cells/.test(painted.said), painted.said);
+    check("painting is answered", /^Paint: 77 cells/.test(painted.message), painted.message);
     const stiff = await probe();
-    check("and found by the probe", stiff === "10 kPa, 1000 kg/m³", stiff);
+    check("the probe displays the painted material", stiff === "10 kPa, 1000 kg/m³", stiff);
 
     // a force lasts until it is released, and follows its slider
     await tool(ada, "inflate");
-    check("nothing to release yet", await ada.isDisabled("#sculpt-release"));
-    const still = await moved(ada);
+    check("there is nothing to release", await ada.isDisabled("#sculpt-release"));
+    const atRest = await displacement(ada);
     await ada.mouse.click(spot.x, spot.y);
     await until(
-        () => moved(ada),
-        (m) => m > still + 2e-4,
+        () => displacement(ada),
+        (m) => m > atRest + 2e-4,
     );
     const blown = await settled(ada);
-    check("what is inflated moves", blown > still + 2e-4, `${(1e3 * blown).toFixed(2)} mm`);
+    check("inflation moves the surface", blown > atRest + 2e-4, `${(1e3 * blown).toFixed(2)} mm`);
     await ada.$eval("#sculpt-pressure", (e) => {
         e.value = String(Number(e.value) + 30);
         e.dispatchEvent(new Event("input"));
     });
     const more = await until(
-        () => moved(ada),
+        () => displacement(ada),
         (m) => m > 1.5 * blown,
     );
-    check("farther with more pressure", more > 1.5 * blown, `${(1e3 * more).toFixed(2)} mm`);
+    check("more pressure moves it farther", more > 1.5 * blown, `${(1e3 * more).toFixed(2)} mm`);
     await until(
         () => shown(ada),
         (s) => s.busy === "false",
     );
     await ada.click("#sculpt-release");
     const back = await until(
-        () => moved(ada),
+        () => displacement(ada),
         (m) => m < 0.3 * more,
     );
-    const released = await until(
-        () => ada.isDisabled("#sculpt-release"),
-        (d) => d,
-    );
-    check("and goes back when it is released", back < 0.3 * more && released, `${(1e3 * back).toFixed(2)} mm`);
+    const released = await until(() => ada.isDisabled("#sculpt-release"));
+    check("it returns after release", back < 0.3 * more && released, `${(1e3 * back).toFixed(2)} mm`);
 
     await ada.selectOption("#sculpt-axis", "x");
     const cut = await after(ada, painted.epoch);
-    check("a cut shows less of it", cut.triangles < painted.triangles, say(cut));
+    check("a cut hides a part", cut.triangles < painted.triangles, summary(cut));
     await drawn(ada);
     await ada.screenshot({ path: join(pictures, "sculpt_cut.png") });
     const [file] = await Promise.all([ada.waitForEvent("download"), ada.click("#sculpt-ply")]);
     const path = join(scratch, "saved.ply");
     await file.saveAs(path);
     check(
-        "what is shown is saved as PLY",
+        "the visible surface is saved as PLY",
         file.suggestedFilename() === "chair.ply" &&
             readFileSync(path, "latin1").includes(`element face ${cut.triangles}\n`),
         file.suggestedFilename(),
     );
     await ada.selectOption("#sculpt-axis", "none");
     const whole = await after(ada, cut.epoch);
-    check("and it is whole again", same(whole, painted), say(whole));
+    check("the whole is shown again", same(whole, painted), summary(whole));
 
-    // a refusal is a sentence where the panel speaks, and changes nothing
+    // a refusal is displayed in the panel and changes nothing
     await tool(ada, "merge");
     for (let i = 0; i < 2; i++) await ada.mouse.click(spot.x, spot.y);
     const refused = await until(
         () => shown(ada),
-        (s) => s.busy === "false" && /merge/.test(s.said),
+        (s) => s.busy === "false" && /merge/.test(s.message),
     );
     check(
-        "what cannot be done is refused with a sentence",
-        /merge/.test(refused.said) && refused.epoch === whole.epoch,
-        refused.said,
+        "an impossible command is refused with a sentence",
+        /merge/.test(refused.message) && refused.epoch === whole.epoch,
+        refused.message,
     );
-    check(
-        "nothing was complained of in the browsers' consoles",
-        troubles.length === 0,
-        troubles.slice(0, 3).join(" | "),
-    );
-} catch (error) {
-    check("the test ran to its end", false, String(error.stack ?? error));
-} finally {
-    for (const browser of browsers) await browser.close().catch(() => {});
-    server?.child.kill("SIGTERM");
-}
-finish();
+    checkConsoles();
+});

@@ -1,7 +1,7 @@
 /* Calibration: slopes against differences, what a grid's weights are, constants found again that were known, what is
  * refused, and annealing that walks the same way on any number of cores. */
-#include "server/calibrate/calibrate_parts.h"
-#include "server/study/study_parts.h"
+#include "server/calibrate/calibration_core.h"
+#include "server/study/study_job.h"
 
 #include "server/base/vec3.h"
 #include "server/num/random.h"
@@ -89,7 +89,7 @@ typedef struct bench {
     pal_calibrate_options options;
     pal_calibration *c;
     pal_calibration_info info;
-    pal_calibration_seat *seat;
+    pal_calibration_workspace *workspace;
     double theta[MOST];
 } bench;
 
@@ -117,7 +117,7 @@ static bool bench_make(bench *b)
 {
     pal_err err = bench_create(b);
     if (err) printf("  %s\n", diag.text);
-    if (err || pal_calibration_seat_create(b->c, &b->seat)) return false;
+    if (err || pal_calibration_workspace_create(b->c, &b->workspace)) return false;
     pal_calibration_info_of(b->c, &b->info);
     if (b->info.n_parameter > MOST) return false;
     memcpy(b->theta, b->info.start, sizeof(double) * (size_t)b->info.n_parameter);
@@ -126,7 +126,7 @@ static bool bench_make(bench *b)
 
 static void bench_close(bench *b)
 {
-    pal_calibration_seat_destroy(b->seat);
+    pal_calibration_workspace_destroy(b->workspace);
     pal_calibration_destroy(b->c);
     pal_surface_free(&b->surface);
 }
@@ -134,7 +134,7 @@ static void bench_close(bench *b)
 static pal_calibration_value value_at(bench *b, const double *theta, unsigned ask, double *slope)
 {
     pal_calibration_value v;
-    CHECK_INT(pal_calibration_evaluate(b->c, b->seat, theta, ask, &v, slope, &diag), 0);
+    CHECK_INT(pal_calibration_evaluate(b->c, b->workspace, theta, ask, &v, slope, &diag), 0);
     return v;
 }
 
@@ -146,7 +146,7 @@ static bool samples_of(bench *b, const double *theta, int index, pal_samples *ou
     *out = (pal_samples){n, malloc(3 * sizeof(double) * (size_t)n), malloc(3 * sizeof(double) * (size_t)n)};
     if (!out->x || !out->u || !(v.case_percent[index] < DBL_MAX)) return false;
     for (int i = 0; i < n; i++) pal_add3(out->x + 3 * i, b->info.mesh->tets.x + 3 * i, b->info.mesh->tets.origin_m);
-    return pal_calibration_moved(b->c, b->seat, index, out->u);
+    return pal_calibration_displacement(b->c, b->workspace, index, out->u);
 }
 
 static double uniform(uint64_t key, uint64_t counter) /* in (-1, 1) */
@@ -242,7 +242,7 @@ static void errors_are_averaged_and_regularisers_added_as_stated(void)
     CHECK_NEAR(v.objective, log(square) + 0.7 * smooth + 0.4 * pull, 1e-5);
     /* e_L from the displacements themselves */
     double *u = malloc(6 * sizeof(double) * (size_t)b.info.n_node), *truth = u + 3 * b.info.n_node, sum = 0;
-    REQUIRE(u && pal_calibration_moved(b.c, b.seat, 1, u) && pal_calibration_truth(b.c, 1, truth));
+    REQUIRE(u && pal_calibration_displacement(b.c, b.workspace, 1, u) && pal_calibration_truth(b.c, 1, truth));
     for (int i = 0; i < 3 * b.info.n_node; i++) sum += (u[i] - truth[i]) * (u[i] - truth[i]);
     CHECK_NEAR(v.case_percent[1], 100 * sqrt(sum / b.info.n_node) / b.info.max_m[1], 1e-10 * v.case_percent[1]);
     free(u);
@@ -299,7 +299,7 @@ static void a_spring_takes_the_mean_of_its_corners_and_those_the_grid(void)
         for (int i = 0; i < s->n_item; i++) {
             double mean = 0;
             for (int c = 0; c < s->n_corner; c++) mean += k_J[s->item[s->n_corner * i + c]] / s->n_corner;
-            worst = fmax(worst, fabs(b.seat->k[b.info.kind[k]][i] / mean - 1));
+            worst = fmax(worst, fabs(b.workspace->k[b.info.kind[k]][i] / mean - 1));
         }
         CHECK(s->n_item > 100);
         CHECK_LE(worst, 1e-12);
@@ -389,7 +389,7 @@ static void volume_stiffness_has_a_floor_where_one_is_asked_for(void)
         bench_begin(&b, 4, 3);
         b.options.without_area = true;
         b.options.smooth = b.options.pull = 0;
-        b.options.least_volume = floor ? 0.1 : 0;
+        b.options.min_volume_ratio = floor ? 0.1 : 0;
         for (int k = 0; k < 3; k++) b.cases[k].samples = &s[k];
         REQUIRE(bench_make(&b));
         CHECK_INT(pal_fit_adjoint(b.c, &o, b.theta, &r, &diag), 0);
@@ -512,7 +512,7 @@ static void annealing_ends_as_it_is_told(void)
         pal_fit_options o = {.n_worker = 1 + turn % 2, .max_evaluation = 2000, .seed = 3, .step = follow, .user = &t};
         pal_fit_result r;
         double theta[3];
-        if (turn == 0) o.enough_percent = 0.9 * start;
+        if (turn == 0) o.target_percent = 0.9 * start;
         if (turn == 2) o.max_evaluation = 1;
         if (turn == 3) o.budget_s = 1e-9;
         memcpy(theta, b.info.start, sizeof theta);
@@ -585,7 +585,7 @@ static void constants_without_a_rest_are_passed_over(void)
     for (int i = 0; i < 2; i++) CHECK_NEAR(v.case_percent[i], DBL_MAX, 0);
     CHECK_NEAR(v.objective, DBL_MAX, 0);
     for (int i = 0; i < 3; i++) CHECK_NEAR(slope[i], 0, 0);
-    CHECK(!pal_calibration_moved(b.c, b.seat, 0, NULL));
+    CHECK(!pal_calibration_displacement(b.c, b.workspace, 0, NULL));
     /* there is no slope to follow from here, but samples to take */
     CHECK_INT(pal_fit_adjoint(b.c, &o, b.theta, &r, &diag), PAL_ERR_NUMERIC);
     CHECK(strstr(diag.text, "the start has no stable rest"));
@@ -599,7 +599,8 @@ static void constants_without_a_rest_are_passed_over(void)
     HARD_CASE("calibration", "tet_springs", "evaluations", r.n_evaluation, o.max_evaluation, "");
     /* what is no constant at all */
     b.theta[1] = NAN;
-    CHECK_INT(pal_calibration_evaluate(b.c, b.seat, b.theta, PAL_CALIBRATION_FIT, &v, slope, &diag), PAL_ERR_NUMERIC);
+    CHECK_INT(pal_calibration_evaluate(b.c, b.workspace, b.theta, PAL_CALIBRATION_FIT, &v, slope, &diag),
+              PAL_ERR_NUMERIC);
     CHECK(strstr(diag.text, "parameter 1 is nan"));
     CHECK_NEAR(v.error_percent, DBL_MAX, 0);
     bench_close(&b);

@@ -18,7 +18,7 @@ typedef struct bench {
     pal_scene *scene;
     pal_world *world;
     pal_lattice lattice;
-    pal_seat *seat;
+    pal_equilibrium_workspace *workspace;
     double *k[PAL_SPRING_KINDS];
     double *f, *x;
 } bench;
@@ -53,7 +53,9 @@ static bool bench_world(bench *b, const double k_J[PAL_SPRING_KINDS], const char
 /* seat and constants: those of the scene */
 static bool bench_take(bench *b, const double k_J[PAL_SPRING_KINDS])
 {
-    if (pal_lattice_take(b->world, 0, &b->lattice, &diag) || pal_seat_create(&b->lattice, &b->seat)) return false;
+    if (pal_lattice_make(b->world, 0, &b->lattice, &diag) ||
+        pal_equilibrium_workspace_create(&b->lattice, &b->workspace))
+        return false;
     for (int k = 0; k < PAL_SPRING_KINDS; k++) {
         int n = b->lattice.kind[k].n_item;
         b->k[k] = calloc((size_t)n + 1, sizeof(double));
@@ -95,7 +97,7 @@ static void load_end(bench *b, double size)
 
 static void bench_close(bench *b)
 {
-    pal_seat_destroy(b->seat);
+    pal_equilibrium_workspace_destroy(b->workspace);
     pal_lattice_free(&b->lattice);
     for (int k = 0; k < PAL_SPRING_KINDS; k++) free(b->k[k]);
     free(b->f);
@@ -112,7 +114,7 @@ static pal_err rest(bench *b, bool linear, double tolerance, double *x, pal_equi
     o.linear = linear;
     if (tolerance > 0) o.tolerance = tolerance;
     diag.text[0] = 0;
-    return pal_equilibrium(b->seat, constants(b), b->f, &o, x, report, &diag);
+    return pal_equilibrium(b->workspace, constants(b), b->f, &o, x, report, &diag);
 }
 
 /* ---- against sums by hand ---- */
@@ -316,7 +318,7 @@ static void slopes_are_those_of_differences(void)
         for (int k = 0; k < PAL_SPRING_KINDS; k++)
             slope[k] = calloc((size_t)b.lattice.kind[k].n_item + 1, sizeof(double));
         REQUIRE(slope[0] && slope[1] && slope[2] && isfinite(functional(&b, o.linear, dJ_du)));
-        CHECK_INT(pal_equilibrium_adjoint(b.seat, constants(&b), b.x, &o, dJ_du, slope, &diag), 0);
+        CHECK_INT(pal_equilibrium_adjoint(b.workspace, constants(&b), b.x, &o, dJ_du, slope, &diag), 0);
         for (int k = 0; k < PAL_SPRING_KINDS; k++) {
             int n = b.lattice.kind[k].n_item;
             double most = 0, worst = 0;
@@ -344,12 +346,12 @@ static void the_same_bits_come_again_and_on_another_seat(void)
 {
     for (int linear = 0; linear < 2; linear++) {
         bench b;
-        pal_seat *other;
+        pal_equilibrium_workspace *other;
         REQUIRE(bench_bar(&b, "volume"));
         vary(&b);
         load_end(&b, 0.02);
         double *x = malloc(2 * bytes(&b));
-        REQUIRE(x && !pal_seat_create(&b.lattice, &other));
+        REQUIRE(x && !pal_equilibrium_workspace_create(&b.lattice, &other));
         REQUIRE(!rest(&b, linear, 0, b.x, NULL));
         /* a past that fails leaves no trace */
         load_end(&b, 1e9);
@@ -357,15 +359,15 @@ static void the_same_bits_come_again_and_on_another_seat(void)
         if (!linear) CHECK_INT(rest(&b, linear, 0, x, NULL), PAL_ERR_NUMERIC);
         load_end(&b, 0.02);
         for (int turn = 0; turn < 2; turn++) {
-            pal_seat *seat = b.seat;
+            pal_equilibrium_workspace *workspace = b.workspace;
             memcpy(x, b.lattice.x_rest, bytes(&b));
-            if (turn) b.seat = other;
+            if (turn) b.workspace = other;
             CHECK_INT(rest(&b, linear, 0, x, NULL), 0);
             CHECK(!memcmp(x, b.x, bytes(&b)));
-            b.seat = seat;
+            b.workspace = workspace;
         }
         free(x);
-        pal_seat_destroy(other);
+        pal_equilibrium_workspace_destroy(other);
         bench_close(&b);
     }
 }
@@ -483,7 +485,7 @@ static void bodies_that_nothing_holds_or_that_cannot_move_are_refused(void)
         b.scene = box_scene(&b.box, turn > 0, false);
         if (turn == 1) b.scene->body[0].support[0] = (pal_support_def){.low_m = {-1, -1, -1}, .high_m = {1, 1, 1}};
         REQUIRE(bench_world(&b, k_J, "equal"));
-        CHECK_INT(pal_lattice_take(b.world, 0, &b.lattice, &diag), PAL_ERR_REFUSED);
+        CHECK_INT(pal_lattice_make(b.world, 0, &b.lattice, &diag), PAL_ERR_REFUSED);
         CHECK(strstr(diag.text, sentence[turn]));
         CHECK(b.lattice.arena == NULL);
         bench_close(&b);

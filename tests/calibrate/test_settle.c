@@ -36,22 +36,22 @@ static bool make_mesh(pal_prepared *out)
 static bool find_rest(beam *b)
 {
     const double factor = young * h * h * h;
-    pal_seat *seat;
+    pal_equilibrium_workspace *workspace;
     pal_equilibrium_options o;
     double *k[PAL_SPRING_KINDS];
     pal_equilibrium_default(&o);
     memcpy(b->u, b->lattice.x_rest, 3 * sizeof(double) * (size_t)b->n);
-    if (pal_seat_create(&b->lattice, &seat)) return false;
+    if (pal_equilibrium_workspace_create(&b->lattice, &workspace)) return false;
     for (int s = 0; s < PAL_SPRING_KINDS; s++) {
         k[s] = malloc(sizeof(double) * (size_t)(b->lattice.kind[s].n_item + 1));
         for (int i = 0; i < b->lattice.kind[s].n_item; i++) k[s][i] = (s ? 1 : 0.5) * factor;
     }
     const double *const given[PAL_SPRING_KINDS] = {k[0], k[1], k[2]};
     pal_equilibrium_report report;
-    pal_err err = pal_equilibrium(seat, given, b->force, &o, b->u, &report, NULL);
+    pal_err err = pal_equilibrium(workspace, given, b->force, &o, b->u, &report, NULL);
     for (int i = 0; i < 3 * b->n; i++) b->u[i] -= b->lattice.x_rest[i];
     for (int s = 0; s < PAL_SPRING_KINDS; s++) free(k[s]);
-    pal_seat_destroy(seat);
+    pal_equilibrium_workspace_destroy(workspace);
     return !err;
 }
 
@@ -84,7 +84,7 @@ static bool open_beam(beam *b, double load_N)
     if (!err) err = pal_entry_put_number(&body->model, "k_area_J", young * h * h * h, &diag);
     if (!err) err = pal_entry_put_number(&body->model, "k_volume_J", young * h * h * h, &diag);
     if (!err) err = pal_world_create(&b->scene, &diag, &b->world);
-    if (!err) err = pal_lattice_take(b->world, 0, &b->lattice, &diag);
+    if (!err) err = pal_lattice_make(b->world, 0, &b->lattice, &diag);
     if (err) printf("  %s\n", diag.text);
     b->n = b->mesh.tets.n_node;
     b->force = calloc(3 * (size_t)b->n, sizeof(double));
@@ -113,14 +113,14 @@ static void comes_to_rest_where_newton_does(void)
     pal_settle_run run;
     REQUIRE(open_beam(&b, bend_N));
     pal_settle_default(&options);
-    double work = options.most_work;
+    double work = options.max_work;
     const pal_settle_load load = {.force_N = b.force, .u = b.u};
     CHECK(largest(&b) > 0.024);
     CHECK_INT(pal_settle(b.world, b.scene.step_s, &load, &options, &work, &run, NULL), PAL_ERR_OK);
     CHECK(run.steady);
     CHECK_LE(run.difference_percent, 0.1);
     CHECK_NEAR(run.max_m, largest(&b), 1e-3 * largest(&b));
-    CHECK(work < options.most_work);
+    CHECK(work < options.max_work);
     /* the same again from the state it was left in: nothing of the first run is left over */
     pal_settle_run again;
     CHECK_INT(pal_settle(b.world, b.scene.step_s, &load, &options, &work, &again, NULL), PAL_ERR_OK);
@@ -137,7 +137,7 @@ static void light_and_heavy_loads_take_as_long(void)
     REQUIRE(open_beam(&heavy, 1e-3));
     REQUIRE(open_beam(&light, 1e-6));
     pal_settle_default(&options);
-    double work = options.most_work;
+    double work = options.max_work;
     const pal_settle_load load[2] = {{heavy.force, heavy.u}, {light.force, light.u}};
     CHECK_INT(pal_settle(heavy.world, 1.0 / 60, &load[0], &options, &work, &a, NULL), PAL_ERR_OK);
     CHECK_INT(pal_settle(light.world, 1.0 / 60, &load[1], &options, &work, &b, NULL), PAL_ERR_OK);
@@ -160,18 +160,18 @@ static void ladder_takes_the_rate_that_is_still_soonest(void)
     CHECK_LE(report.load[0].difference_percent, 0.1);
     bool on_it = false;
     for (int k = 0; k < PAL_SETTLE_STEPS; k++) {
-        if (!isfinite(report.ladder_s[k])) continue;
-        CHECK(report.ladder_s[k] >= report.seconds);
-        on_it |= report.ladder_s[k] == report.seconds && pal_settle_ladder_1_s[k] == report.damping_1_s;
+        if (!isfinite(report.rate_seconds[k])) continue;
+        CHECK(report.rate_seconds[k] >= report.seconds);
+        on_it |= report.rate_seconds[k] == report.seconds && pal_settle_rates_1_s[k] == report.damping_1_s;
     }
     CHECK(on_it);
     /* none of the rates is sooner */
-    options.most_s = report.seconds;
+    options.max_simulated_s = report.seconds;
     pal_material material = b.scene.body[0].material;
     for (int k = 0; k < PAL_SETTLE_STEPS; k++) {
         pal_settle_run run;
-        double work = options.most_work;
-        material.damping_1_s = pal_settle_ladder_1_s[k];
+        double work = options.max_work;
+        material.damping_1_s = pal_settle_rates_1_s[k];
         REQUIRE(!pal_world_material(b.world, 0, &material, NULL));
         CHECK_INT(pal_settle(b.world, b.scene.step_s, &load, &options, &work, &run, NULL), PAL_ERR_OK);
         CHECK(!run.steady || run.seconds >= report.seconds - 1e-9);
@@ -214,14 +214,14 @@ static void what_finds_no_rest_says_so(void)
     REQUIRE(open_beam(&b, bend_N));
     const pal_settle_load load = {.force_N = b.force, .u = b.u};
     pal_settle_default(&options);
-    options.most_s = 0.1; /* less than the quarter of a second that still has to last */
+    options.max_simulated_s = 0.1; /* less than the quarter of a second that still has to last */
     CHECK_INT(pal_settle_damping(&b.scene, &load, 1, &options, &report, NULL), PAL_ERR_OK);
     CHECK(!report.steady && isnan(report.seconds));
     CHECK(report.damping_1_s == 4);
     CHECK(report.load[0].difference_percent > 1);
     /* a budget of work ends it as well */
     pal_settle_default(&options);
-    options.most_work = 1;
+    options.max_work = 1;
     CHECK_INT(pal_settle_damping(&b.scene, &load, 1, &options, &report, NULL), PAL_ERR_OK);
     CHECK(!report.steady);
     /* and so does whoever watches */
@@ -234,7 +234,7 @@ static void what_finds_no_rest_says_so(void)
     /* a load that tears the body apart: frozen or far away, but an answer */
     for (int i = 0; i < 3 * b.n; i++) b.force[i] *= 1e9;
     pal_settle_default(&options);
-    options.most_s = 2, options.most_work = 1e6;
+    options.max_simulated_s = 2, options.max_work = 1e6;
     CHECK_INT(pal_settle_damping(&b.scene, &load, 1, &options, &report, NULL), PAL_ERR_OK);
     CHECK(!report.steady || report.load[0].difference_percent > 1);
     close_beam(&b);

@@ -20,14 +20,14 @@ cat >"$work/orders" <<'ORDERS'
 1.0 extrude at=top distance_m=0.02 scale=0.8 target=block
 1.2 paint   at=front radius_m=0.04 young_factor=3 density_factor=2
 1.2 probe   at=front
-1.4 sharpen at=top sharp=2 what=1
+1.4 sharpen at=top sharpness=2 entity=1
 1.4 divide  at=left
 1.6 undo
 1.6 redo
 1.6 undo
 1.8 cut     nx=0 ny=1 nz=0 offset_m=0.001
 1.8 uncut
-2.0 keep
+2.0 set_rest_shape
 2.0 delete  at=right
 ? 2.0 extrude at=top distance_m=-1
 ? 2.0 delete x_m=9 y_m=0 z_m=0

@@ -6,7 +6,7 @@
 
 #define TICK_NS 1000000u
 
-typedef struct rig {
+typedef struct trial {
     void *device;
     pal_servo *servo;
     uint64_t now_ns;
@@ -15,12 +15,12 @@ typedef struct rig {
     bool serving; /* models come at 60 Hz */
     uint64_t next_model_ns;
     pal_servo_view view;
-} rig;
+} trial;
 
 /* tissue below z = 0 of the world; device and world have the same axes */
-static bool rig_open(rig *r, const char *id, double k1)
+static bool rig_open(trial *r, const char *id, double k1)
 {
-    *r = (rig){.now_ns = 1000000000, .generation = 1, .serving = true};
+    *r = (trial){.now_ns = 1000000000, .generation = 1, .serving = true};
     pal_servo_options o = {.backend = pal_device_virtual(), .rate_hz = 1000, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
     if (pal_device_virtual()->open(&r->device, id, &o.info)) return false;
     o.device = r->device;
@@ -29,13 +29,13 @@ static bool rig_open(rig *r, const char *id, double k1)
     r->model.patch[0] = (pal_wire_contact_patch){.id = 1, .group = 1, .n = {0, 0, 1}, .k1_N_m = (float)k1};
     return pal_servo_create(&o, &r->servo) == PAL_ERR_OK;
 }
-static void rig_close(rig *r)
+static void rig_close(trial *r)
 {
     pal_servo_destroy(r->servo);
     pal_device_virtual()->close(r->device);
 }
 
-static void rig_tick(rig *r)
+static void rig_tick(trial *r)
 {
     if (r->serving && r->now_ns >= r->next_model_ns) {
         r->model.seq = ++r->seq;
@@ -48,16 +48,16 @@ static void rig_tick(rig *r)
     pal_virtual_advance(r->device, 1e-3);
     r->now_ns += TICK_NS;
 }
-static void rig_run(rig *r, double seconds)
+static void rig_run(trial *r, double seconds)
 {
     for (int i = 0; i < (int)(seconds * 1000); i++) rig_tick(r);
 }
-static double rig_force(const rig *r)
+static double rig_force(const trial *r)
 {
     const double *f = r->view.force_N;
     return sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
 }
-static bool rig_event(rig *r, int kind)
+static bool rig_event(trial *r, int kind)
 {
     pal_servo_event event;
     bool found = false;
@@ -76,7 +76,7 @@ static void press_and_hold_on_a_plane_is_stable_and_feels_its_stiffness(void)
             char id[96];
             snprintf(id, sizeof id, "%s,hand=%s,script=press-hold,depth=%g,clock=virtual", devices[d], hands[h],
                      h == 2 ? 0.5 : 3.0);
-            rig r;
+            trial r;
             REQUIRE(rig_open(&r, id, 300));
             rig_run(&r, 5);
             double x[3], v[3], fastest = 0, f_sum = 0, d_sum = 0;
@@ -100,7 +100,7 @@ static void press_and_hold_on_a_plane_is_stable_and_feels_its_stiffness(void)
 
 static void stale_model_fades_out_in_100_and_500_ms_and_comes_back_slowly(void)
 {
-    rig r;
+    trial r;
     REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
     rig_run(&r, 4);
     const double before = rig_force(&r);
@@ -140,7 +140,7 @@ static void stale_model_fades_out_in_100_and_500_ms_and_comes_back_slowly(void)
 
 static void emergency_stop_takes_force_away_within_two_ticks_and_stays(void)
 {
-    rig r;
+    trial r;
     REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
     rig_run(&r, 4);
     CHECK(rig_force(&r) > 0.1);
@@ -169,7 +169,7 @@ static void emergency_stop_takes_force_away_within_two_ticks_and_stays(void)
 
 static void force_keeps_its_cap_and_rises_no_faster_than_the_cap_in_10_ms(void)
 {
-    rig r;
+    trial r;
     REQUIRE(rig_open(&r, "omega3,hand=firm,script=press-hold,depth=40,clock=virtual", 2000));
     double at = 0, worst = 0, most = 0;
     for (int i = 0; i < 6000; i++) {
@@ -187,7 +187,7 @@ static void force_keeps_its_cap_and_rises_no_faster_than_the_cap_in_10_ms(void)
 
 static void continuous_rating_scales_a_long_push_down(void)
 {
-    rig r;
+    trial r;
     REQUIRE(rig_open(&r, "touch,hand=firm,script=press-hold,depth=20,clock=virtual", 390));
     rig_run(&r, 12);
     CHECK(r.view.force_max_N > 1.2);
@@ -197,7 +197,7 @@ static void continuous_rating_scales_a_long_push_down(void)
 
 static void stiffness_above_the_device_is_rendered_at_its_clamp(void)
 {
-    rig r;
+    trial r;
     REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 3000));
     rig_run(&r, 4);
     CHECK_NEAR(r.view.rendered_stiffness_N_m, 800, 8);
@@ -215,7 +215,7 @@ static void stiffness_above_the_device_is_rendered_at_its_clamp(void)
 
 static void old_models_are_dropped_and_a_new_session_starts_afresh(void)
 {
-    rig r;
+    trial r;
     REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
     rig_run(&r, 4);
     const uint32_t seq = r.view.model_seq;
@@ -244,7 +244,7 @@ static void old_models_are_dropped_and_a_new_session_starts_afresh(void)
 
 static void numbers_that_are_not_finite_in_a_model_give_a_fault_not_a_force(void)
 {
-    rig r;
+    trial r;
     REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
     rig_run(&r, 4);
     r.model.patch[0].k1_N_m = NAN;
@@ -260,7 +260,7 @@ static void numbers_that_are_not_finite_in_a_model_give_a_fault_not_a_force(void
 
 static void device_that_stops_answering_is_a_fault_that_stays(void)
 {
-    rig r;
+    trial r;
     REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual,fail=4000", 300));
     rig_run(&r, 3.999);
     CHECK(rig_force(&r) > 0.1);
@@ -274,7 +274,7 @@ static void device_that_stops_answering_is_a_fault_that_stays(void)
 
 static void handle_driven_faster_than_two_metres_a_second_loses_force(void)
 {
-    rig r;
+    trial r;
     REQUIRE(rig_open(&r, "omega3,hand=off,clock=virtual", 300));
     const double none[3] = {0, 0, 0}, throw_N[3] = {0, 0, -20};
     pal_virtual_push(r.device, none);

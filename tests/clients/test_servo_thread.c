@@ -5,22 +5,22 @@
 #include "server/base/clock.h"
 #include "tests/check.h"
 
-typedef struct rig {
+typedef struct trial {
     void *device;
     pal_servo_options o;
     pal_servo *servo;
     pal_servo_thread *thread;
-} rig;
+} trial;
 
-static bool rig_start(rig *r, const char *id)
+static bool rig_start(trial *r, const char *id)
 {
-    *r = (rig){.o = {.backend = pal_device_virtual(), .rate_hz = 1000, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}}};
+    *r = (trial){.o = {.backend = pal_device_virtual(), .rate_hz = 1000, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}}};
     if (pal_device_virtual()->open(&r->device, id, &r->o.info)) return false;
     r->o.device = r->device;
     return !pal_servo_create(&r->o, &r->servo) && !pal_servo_thread_start(r->servo, &r->o, NULL, &r->thread);
 }
 
-static void rig_end(rig *r, pal_servo_timing *timing)
+static void rig_end(trial *r, pal_servo_timing *timing)
 {
     pal_servo_thread_stop(r->thread, timing);
     pal_servo_destroy(r->servo);
@@ -28,7 +28,7 @@ static void rig_end(rig *r, pal_servo_timing *timing)
 }
 
 /* the network side for one millisecond: a model in, views and events out */
-static void serve(rig *r, uint32_t seq, pal_servo_view *view)
+static void serve(trial *r, uint32_t seq, pal_servo_view *view)
 {
     pal_wire_haptic model = {.seq = seq, .n_patch = 1, .frame_us = 16667};
     model.patch[0] = (pal_wire_contact_patch){.id = 1, .group = 1, .n = {0, 0, 1}, .k1_N_m = 300};
@@ -43,7 +43,7 @@ static void serve(rig *r, uint32_t seq, pal_servo_view *view)
 
 static void models_views_and_events_cross_the_threads_whole(void)
 {
-    rig r;
+    trial r;
     REQUIRE(rig_start(&r, "premium,wait=0"));
     pal_servo_view view = {0};
     uint64_t last_tick = 0;
@@ -66,7 +66,7 @@ static void models_views_and_events_cross_the_threads_whole(void)
 
 static void emergency_stop_from_another_thread_is_latched(void)
 {
-    rig r;
+    trial r;
     REQUIRE(rig_start(&r, "premium,wait=0"));
     pal_servo_view view = {0};
     const uint64_t end = pal_clock_ns() + 20000000000u;

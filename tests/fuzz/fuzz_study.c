@@ -18,11 +18,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
     pal_study_order(s, order);
     for (int k = 0; k < s->n_point; k++) {
         const pal_study_point *p = &s->point[k];
-        if (p->priced.ms < 0 || isinf(p->priced.ms) || p->priced.error_m < 0 || isinf(p->priced.error_m)) abort();
-        if (!p->priced.setting.model[0] || p->priced.setting.size < -1) abort();
+        if (p->measured.ms < 0 || isinf(p->measured.ms) || p->measured.error_m < 0 || isinf(p->measured.error_m))
+            abort();
+        if (!p->measured.setting.model[0] || p->measured.setting.size < -1) abort();
         if (order[k] < 0 || order[k] >= s->n_point) abort();
     }
-    int n = pal_study_settings(s, list);
+    int n = pal_study_configurations(s, list);
     for (int k = 1; k < n; k++)
         if (!(list[k].ms >= list[k - 1].ms)) abort();
     free(f);

@@ -18,7 +18,15 @@ export const line_of = (text, at) => text.slice(0, at).split("\n").length;
 
 const whole_line = { sh: /(?<=^|\s)#.*$/gm, html: /<!--[\s\S]*?-->/g, md: /[\s\S]+/g };
 const kind_of = (file) =>
-    /\.(c|h|lcm|cpp|css)$/.test(file) ? "c" : /\.m?js$/.test(file) ? "js" : /\.md$/.test(file) ? "md" : /\.html$/.test(file) ? "html" : "sh";
+    /\.(c|h|lcm|cpp|css)$/.test(file)
+        ? "c"
+        : /\.m?js$/.test(file)
+          ? "js"
+          : /\.md$/.test(file)
+            ? "md"
+            : /\.html$/.test(file)
+              ? "html"
+              : "sh";
 const blank = (text) => text.replace(/[^\n]/g, " ");
 
 export function split_source(file, text) {
@@ -38,12 +46,14 @@ export function split_source(file, text) {
         return out;
     }
     // a regular expression stands where a value may begin; a template's ${} holds code again
-    const token = /\/\*[\s\S]*?\*\/|\/\/[^\n]*|"(?:[^"\\\n]|\\[\s\S])*"|'(?:[^'\\\n]|\\[\s\S])*'|`|[{}]|\/(?![*/])(?:[^/\\[\n]|\\.|\[(?:[^\]\\\n]|\\.)*\])+\/[a-z]*/g;
+    const token =
+        /\/\*[\s\S]*?\*\/|\/\/[^\n]*|"(?:[^"\\\n]|\\[\s\S])*"|'(?:[^'\\\n]|\\[\s\S])*'|`|[{}]|\/(?![*/])(?:[^/\\[\n]|\\.|\[(?:[^\]\\\n]|\\.)*\])+\/[a-z]*/g;
     const open = []; // of each brace whether it is a template's
     let at = 0;
     const template = (from) => {
         let i = from;
-        while (i < text.length && text[i] !== "`" && !(text[i] === "$" && text[i + 1] === "{")) i += text[i] === "\\" ? 2 : 1;
+        while (i < text.length && text[i] !== "`" && !(text[i] === "$" && text[i + 1] === "{"))
+            i += text[i] === "\\" ? 2 : 1;
         const end = Math.min(i + (text[i] === "$" ? 2 : 1), text.length);
         if (text[i] === "$") open.push(true);
         put("string", text.slice(from, end));
@@ -57,7 +67,11 @@ export function split_source(file, text) {
             put("comment", m[0]);
         } else if (first === '"' || first === "'") {
             put("string", m[0]);
-        } else if (first === "/" && kind === "js" && /(^|[=(,:[!&|?{};+\-*%<>~^]|return|typeof|=>)\s*$/.test(out.code.slice(-40))) {
+        } else if (
+            first === "/" &&
+            kind === "js" &&
+            /(^|[=(,:[!&|?{};+\-*%<>~^]|return|typeof|=>)\s*$/.test(out.code.slice(-40))
+        ) {
             put("string", m[0]);
         } else if (first === "/") {
             put("code", "/"); // a quotient: what follows is read again

@@ -41,10 +41,10 @@ static int run_command(const char *grid, const char *weights, const char *area)
 static double difference(const int grid[3], bool equal, bool without_area, pal_settle_report *report)
 {
     pal_calibrate_options o;
-    static pal_calibrate_set set;
+    static pal_calibrate_cases set;
     pal_calibration *c = NULL;
     pal_calibration_info info;
-    pal_calibration_seat *seat = NULL;
+    pal_calibration_workspace *workspace = NULL;
     pal_calibration_value v;
     pal_fit_result r;
     pal_loaded_scene *scene = NULL;
@@ -54,7 +54,7 @@ static double difference(const int grid[3], bool equal, bool without_area, pal_s
     pal_calibrate_default(&o);
     o.voxel.resolution = RESOLUTION, o.split = SPLIT, o.equal = equal, o.without_area = without_area;
     for (int a = 0; a < 3; a++) o.grid[a] = grid[a];
-    const pal_calibrate_wish wish = {.problem = problem, .fit = "bend"};
+    const pal_calibrate_input wish = {.problem = problem, .fit = "bend"};
     const pal_fit_options fit = {.max_evaluation = EVALUATIONS};
     pal_err err = pal_calibrate_cases_read(&wish, &set, &diag);
     if (!err) err = pal_calibration_create(set.problem, &set.surface, set.list, set.n, &o, &c, &diag);
@@ -62,10 +62,10 @@ static double difference(const int grid[3], bool equal, bool without_area, pal_s
     double *theta = err ? NULL : malloc(sizeof *theta * (size_t)info.n_parameter);
     double *u = err ? NULL : malloc(3 * sizeof *u * (size_t)info.n_node);
     for (int i = 0; !err && i < info.n_parameter; i++) theta[i] = info.start[i];
-    if (!err) err = pal_calibration_seat_create(c, &seat);
+    if (!err) err = pal_calibration_workspace_create(c, &workspace);
     if (!err) err = pal_fit_adjoint(c, &fit, theta, &r, &diag);
-    if (!err) err = pal_calibration_evaluate(c, seat, theta, PAL_CALIBRATION_FIT, &v, NULL, &diag);
-    if (!err && !pal_calibration_moved(c, seat, 0, u)) err = PAL_ERR_NUMERIC;
+    if (!err) err = pal_calibration_evaluate(c, workspace, theta, PAL_CALIBRATION_FIT, &v, NULL, &diag);
+    if (!err && !pal_calibration_displacement(c, workspace, 0, u)) err = PAL_ERR_NUMERIC;
     if (!err) err = pal_scene_load(scene_path, &scene, &diag);
     if (!err) {
         const pal_settle_load load = {.force_N = pal_calibration_forces(c, 0), .u = u};
@@ -78,7 +78,7 @@ static double difference(const int grid[3], bool equal, bool without_area, pal_s
     CHECK_TEXT(diag.text, "");
     CHECK_INT(err, PAL_ERR_OK);
     pal_scene_free(scene);
-    pal_calibration_seat_destroy(seat);
+    pal_calibration_workspace_destroy(workspace);
     pal_calibration_destroy(c);
     pal_calibrate_cases_free(&set);
     free(theta);

@@ -377,7 +377,7 @@ run prepare --shape sheet -o sheet --thickness-mm 1
 check "exit code $code" code_is 0
 check "not open along 64 edges" has out "open along 64 edges"
 check "40 g of 1 mm" has out "40.0 g"
-check "border not held" has sheet/scene.json '"rim":.*true'
+check "border not held" has sheet/scene.json '"boundary":.*true'
 run prepare --shape organ -o x --no-tetgen --triangles 4000 --json
 check "exit code $code of the organ" code_is 0
 check "the organ is no longer made of tetrahedra" has out '"tets":[1-9]'
@@ -435,7 +435,7 @@ refused 1 "open.obj: line 9: pressure is asked for, but the surface has 4 open e
 run prepare open.obj -o x --model adaptive
 check "exit code $code for an open surface" code_is 0
 check "open edges are not told" has out "open along 4 edges"
-check "open edges are not held" has x/scene.json '"rim":.*true'
+check "open edges are not held" has x/scene.json '"boundary":.*true'
 rm -rf x
 printf 'v 0 0 0\nv 100 0 0\nv 200 0 0\nf 1 2 3\n' >line.obj
 run prepare line.obj -o x --model adaptive
@@ -566,8 +566,8 @@ refused 1 "bad.json: port: is not a number"
 echo '{"port": 1,' >bad.json
 run serve box.obj --config bad.json
 refused 1 "bad.json: line"
-PALPATE_MOST_CLIENTS=none run serve box.obj
-refused 1 "PALPATE_MOST_CLIENTS"
+PALPATE_MAX_CLIENTS=none run serve box.obj
+refused 1 "PALPATE_MAX_CLIENTS"
 PALPATE_NOTHING=1 run serve box.obj
 refused 1 "PALPATE_NOTHING: unknown key"
 PALPATE_CONFIG=gone.json run serve box.obj

@@ -98,7 +98,7 @@ static void flags_win_over_environment_over_file_over_defaults(void)
 {
     char path[] = "/tmp/palpate_config_XXXXXX";
     int file = mkstemp(path);
-    static const char json[] = "{\"port\": 1111, \"most_clients\": 7, \"log\": \"debug\", \"allow_remote\": true}";
+    static const char json[] = "{\"port\": 1111, \"max_clients\": 7, \"log\": \"debug\", \"allow_remote\": true}";
     REQUIRE(file >= 0);
     REQUIRE(write(file, json, sizeof json - 1) == (ssize_t)(sizeof json - 1));
     close(file);
@@ -128,7 +128,7 @@ static void flags_win_over_environment_over_file_over_defaults(void)
     unsetenv("PALPATE_PORT");
     unsetenv("PALPATE_ALLOW_REMOTE");
     WRONG(CONFIGURE("--port", "1", "--port", "2"), "--port is there twice");
-    WRONG(CONFIGURE("--most-clients", "0"), "--most-clients: 0 is outside 1 .. 10000");
+    WRONG(CONFIGURE("--max-clients", "0"), "--max-clients: 0 is outside 1 .. 10000");
     WRONG(CONFIGURE("--log", "loud"), "--log: \"loud\" is not error, warn, info or debug");
     WRONG(CONFIGURE("--listen", ""), "--listen: is empty");
     CHECK_INT(CONFIGURE("--config", "/no/such.json"), 1);
@@ -146,7 +146,7 @@ static void a_bad_file_changes_nothing_and_names_file_and_key(void)
                {"{} x", "c.json: line 1: not JSON"},
                {"{\"prot\": 1}", "c.json: prot: unknown key"},
                {"{\"port\": 1, \"port\": 2}", "c.json: port: the key is there twice"},
-               {"{\"most_clients\": 3, \"port\": -1}", "c.json: port: -1 is outside 0 .. 65535"},
+               {"{\"max_clients\": 3, \"port\": -1}", "c.json: port: -1 is outside 0 .. 65535"},
                {"{\"port\": 80.5}", "c.json: port: 80.5 is not a whole number"},
                {"{\"port\": \"80\"}", "c.json: port: is not a number"},
                {"{\"allow_remote\": 1}", "c.json: allow_remote: is not true or false"},
@@ -161,7 +161,7 @@ static void a_bad_file_changes_nothing_and_names_file_and_key(void)
         CHECK_TEXT(diag.text, bad[k].sentence);
         CHECK(!memcmp(&before, &config, sizeof config));
     }
-    char *variable[] = {"HOME=/", "PALPATE_MOST_CLIENTS=5", "PALPATE_PORT=70000", NULL};
+    char *variable[] = {"HOME=/", "PALPATE_MAX_CLIENTS=5", "PALPATE_PORT=70000", NULL};
     pal_diagnostic diag = {""};
     CHECK_INT(pal_config_environment(&config, variable, &diag), PAL_ERR_REFUSED);
     CHECK_TEXT(diag.text, "PALPATE_PORT: 70000 is outside 0 .. 65535");

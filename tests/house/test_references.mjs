@@ -15,23 +15,41 @@ const tree = process.argv.slice(2).find((a) => !a.startsWith("--")) ?? path.join
 
 // what the papers of README.md's references have: sections, number of figures, tables, equations
 const papers = {
-    A: { sections: "1 2 2.1 2.2 3 3.1 3.2 3.2.1 3.2.2 3.3 3.4 3.4.1 3.4.2 3.4.3 3.4.4 3.4.5 4 4.1 4.2 5", figures: 14, tables: 1, equations: 20 },
-    B: { sections: "1 1.1 1.2 1.3 1.4 2 2.1 2.2 2.3 3 3.1 3.2 3.3 3.4 3.5 3.6 4 4.1 4.2 4.3 5 5.1 5.2 5.3", figures: 17, tables: 1, equations: 0 },
+    A: {
+        sections: "1 2 2.1 2.2 3 3.1 3.2 3.2.1 3.2.2 3.3 3.4 3.4.1 3.4.2 3.4.3 3.4.4 3.4.5 4 4.1 4.2 5",
+        figures: 14,
+        tables: 1,
+        equations: 20,
+    },
+    B: {
+        sections: "1 1.1 1.2 1.3 1.4 2 2.1 2.2 2.3 3 3.1 3.2 3.3 3.4 3.5 3.6 4 4.1 4.2 4.3 5 5.1 5.2 5.3",
+        figures: 17,
+        tables: 1,
+        equations: 0,
+    },
     C: { sections: "", figures: 13, tables: 1, equations: 10 },
 };
 // files that are made when the tree is built or served, or that belong to the system and to other programs
-const foreign = /^(palpate_\w+_t\.h|.*\.node|three(\.module)?(\.min)?\.js|OrbitControls\.js|cholmod\.h|lws?\.h|(sys|lcm|cjson|lz4|suitesparse|openblas)\/.*|\w*math\.h|std\w+\.h|string\.h|Node\.js|node\.js|three\.js|config\.h)$/;
+const foreign =
+    /^(palpate_\w+_t\.h|.*\.node|three(\.module)?(\.min)?\.js|OrbitControls\.js|cholmod\.h|lws?\.h|(sys|lcm|cjson|lz4|suitesparse|openblas)\/.*|\w*math\.h|std\w+\.h|string\.h|Node\.js|node\.js|three\.js|config\.h)$/;
 const errata_page = "server/sim/README.md";
 
 const pages = (text) => text.replace(/\n[ \t]*(\*|\/\/|#)?[ \t]*/g, (m) => " ".repeat(m.length)); // lines run on
-const numbers = (text) => [...text.matchAll(/(\d+)(?:[a-z]\b)?(?:\s*(?:-|–|to)\s*(\d+))?/g)].flatMap((m) => [Number(m[1]), Number(m[2] ?? m[1])]);
+const numbers = (text) =>
+    [...text.matchAll(/(\d+)(?:[a-z]\b)?(?:\s*(?:-|–|to)\s*(\d+))?/g)].flatMap((m) => [
+        Number(m[1]),
+        Number(m[2] ?? m[1]),
+    ]);
 const roman = (text) => text.replace(/\bI\b/g, "1");
-const part = /([Ss]ections?|[Ff]igures?|[Ff]igs?\.?|[Tt]ables?|[Ee]quations?|[Ee]qs?\.?)\s+((?:\d+(?:\.\d+)*[a-z]?|I\b)(?:\s*(?:,|-|–|to|and|or)\s*\d+(?:\.\d+)*[a-z]?\b)*)/;
+const part =
+    /([Ss]ections?|[Ff]igures?|[Ff]igs?\.?|[Tt]ables?|[Ee]quations?|[Ee]qs?\.?)\s+((?:\d+(?:\.\d+)*[a-z]?|I\b)(?:\s*(?:,|-|–|to|and|or)\s*\d+(?:\.\d+)*[a-z]?\b)*)/;
 
 function paper_fault(letter, word, list) {
     const paper = papers[letter];
     if (/^section/i.test(word)) {
-        const lost = list.split(/\s*(?:,|-|–|to|and|or)\s+|\s*[-–,]\s*/).filter((s) => s && !paper.sections.split(" ").includes(s));
+        const lost = list
+            .split(/\s*(?:,|-|–|to|and|or)\s+|\s*[-–,]\s*/)
+            .filter((s) => s && !paper.sections.split(" ").includes(s));
         return lost.length ? `paper ${letter} has no section ${lost[0]}` : null;
     }
     const what = /^fig/i.test(word) ? "figures" : /^tab/i.test(word) ? "tables" : "equations";
@@ -41,7 +59,9 @@ function paper_fault(letter, word, list) {
 
 function headings(page) {
     const text = readFileSync(path.join(tree, page), "utf8");
-    return [...text.matchAll(/^(?:#+\s+|\*\*)(.+?)(?:\*\*|$)/gm)].map((m) => m[1].toLowerCase().replace(/[`.:]/g, "").trim());
+    return [...text.matchAll(/^(?:#+\s+|\*\*)(.+?)(?:\*\*|$)/gm)].map((m) =>
+        m[1].toLowerCase().replace(/[`.:]/g, "").trim(),
+    );
 }
 
 const all = list_files(tree, [""], /./);
@@ -53,7 +73,13 @@ const folders = new Set(all.flatMap((file) => file.split("/").map((_, i, parts) 
 function resolve(name, from) {
     const clean = name.replace(/^\.\//, "");
     const beside = path.posix.normalize(path.posix.join(path.posix.dirname(from), clean));
-    if (known.has(clean) || known.has(beside) || folders.has(clean.replace(/\/$/, "")) || folders.has(beside.replace(/\/$/, ""))) return clean;
+    if (
+        known.has(clean) ||
+        known.has(beside) ||
+        folders.has(clean.replace(/\/$/, "")) ||
+        folders.has(beside.replace(/\/$/, ""))
+    )
+        return clean;
     return (ends.get(path.basename(clean)) ?? []).find((file) => file === clean || file.endsWith(`/${clean}`));
 }
 
@@ -61,7 +87,8 @@ function faults_of(file, text) {
     const faults = [];
     const add = (at, name, why) => faults.push({ file, line: line_of(text, at), name, why });
     const parts = split_source(file, text);
-    const prose = pages(parts.comment), page = file.endsWith(".md");
+    const prose = pages(parts.comment),
+        page = file.endsWith(".md");
     const said = page ? prose : prose + "\n" + pages(parts.string); // strings: papers only
     const place = (at) => (at > prose.length ? at - prose.length - 1 : at);
     // papers
@@ -77,30 +104,51 @@ function faults_of(file, text) {
         const why = paper_fault(m[3], m[1], m[2]);
         if (why) add(place(m.index), m[0], why);
     }
-    for (const m of prose.matchAll(/(?<![\w.'"(]|paper |\bpart )\(?([ABC]) (\d\.\d(?:\.\d)*|eqs?\.|figs?\.)(?=[\s,;:)–-]|$)/gi))
+    for (const m of prose.matchAll(
+        /(?<![\w.'"(]|paper |\bpart )\(?([ABC]) (\d\.\d(?:\.\d)*|eqs?\.|figs?\.)(?=[\s,;:)–-]|$)/gi,
+    ))
         if (/[ABC]/.test(m[1])) add(m.index, m[0], `say "paper ${m[1]} ..."`);
     for (const m of prose.matchAll(/\berrat(?:um|a) ([ABC]\d+(?:(?:,| and| to|-|–)\s*[ABC]\d+)*)/g))
         for (const id of m[1].match(/[ABC]\d+/g))
-            if (!known.has(errata_page) || !new RegExp(`\\b${id}\\b`).test(readFileSync(path.join(tree, errata_page), "utf8")))
+            if (
+                !known.has(errata_page) ||
+                !new RegExp(`\\b${id}\\b`).test(readFileSync(path.join(tree, errata_page), "utf8"))
+            )
                 add(m.index, `erratum ${id}`, `is not in ${errata_page}`);
     // files
-    const path_word = /(?<![\w/.$*{<%-])(?:\.\.?\/)*[A-Za-z_.][\w.-]*(?:\/[\w.-]+)*\.(?:c|h|md|mjs|js|sh|lcm|css|html)(?![\w*{/])/g;
+    const path_word =
+        /(?<![\w/.$*{<%-])(?:\.\.?\/)*[A-Za-z_.][\w.-]*(?:\/[\w.-]+)*\.(?:c|h|md|mjs|js|sh|lcm|css|html)(?![\w*{/])/g;
     const tree_word = /(?<![\w/.$*-])(?:server|protocol|clients|tests|deploy|lcmtypes|\.github)(?:\/[\w.-]+)+\/?/g;
     const words = new Map();
-    for (const re of [path_word, tree_word]) for (const m of prose.matchAll(re)) words.set(m.index, m[0].replace(/[.-]+$/, ""));
+    for (const re of [path_word, tree_word])
+        for (const m of prose.matchAll(re)) words.set(m.index, m[0].replace(/[.-]+$/, ""));
     for (const [at, word] of words) {
-        if (foreign.test(word) || /^(\.\.\/)+(shared|data)\//.test(word) || /^[A-Z]+\.\w+$/.test(word.replace("README.md", "x"))) continue;
+        if (
+            foreign.test(word) ||
+            /^(\.\.\/)+(shared|data)\//.test(word) ||
+            /^[A-Z]+\.\w+$/.test(word.replace("README.md", "x"))
+        )
+            continue;
         if (!resolve(word, file) && !ends.has(`${path.basename(word)}.c`)) add(at, word, "is not in the tree");
     }
     for (const m of prose.matchAll(/(?<![\w/.])(?:[a-z_]+\/)*test_[a-z_0-9]+(?![\w.*<{(/])/g))
-        if (!["c", "sh", "mjs"].some((end) => resolve(`${m[0]}.${end}`, file))) add(m.index, m[0], "is not a test of the tree");
+        if (!["c", "sh", "mjs"].some((end) => resolve(`${m[0]}.${end}`, file)))
+            add(m.index, m[0], "is not a test of the tree");
     if (page)
         for (const m of text.matchAll(/\]\((?!https?:|#|mailto:)([^)#\s]+)(?:#[^)]*)?\)/g))
             if (!existsSync(path.join(tree, path.dirname(file), m[1]))) add(m.index, m[1], "is a link to nothing");
     // sections of pages
-    for (const m of prose.matchAll(/([\w/.]*README\.md),? (?:section )?"([^"]+)"|([\w/.]*README\.md),? section ([A-Z][\w -]*)/g)) {
-        const target = resolve(m[1] ?? m[3], file), wanted = (m[2] ?? m[4]).toLowerCase().replace(/[`.:]/g, "").trim();
-        if (target && known.has(target) && !headings(target).some((h) => h.includes(wanted) || (m[4] && wanted.startsWith(h)))) add(m.index, m[0], "the page has no such heading");
+    for (const m of prose.matchAll(
+        /([\w/.]*README\.md),? (?:section )?"([^"]+)"|([\w/.]*README\.md),? section ([A-Z][\w -]*)/g,
+    )) {
+        const target = resolve(m[1] ?? m[3], file),
+            wanted = (m[2] ?? m[4]).toLowerCase().replace(/[`.:]/g, "").trim();
+        if (
+            target &&
+            known.has(target) &&
+            !headings(target).some((h) => h.includes(wanted) || (m[4] && wanted.startsWith(h)))
+        )
+            add(m.index, m[0], "the page has no such heading");
     }
     return faults;
 }
@@ -108,7 +156,11 @@ function faults_of(file, text) {
 // planted: what does not resolve, and what does
 const planted = [
     ["server/a.c", "/* paper B 2.2 */\n", ["1:paper B 2.2"]],
-    ["server/a.c", "/* Voxels (paper B section 2.2, Table 1 of paper B, paper C Figs. 10 and 12). */\nint x; /* paper A sections 3.1 and\n * 3.4.4 */", []],
+    [
+        "server/a.c",
+        "/* Voxels (paper B section 2.2, Table 1 of paper B, paper C Figs. 10 and 12). */\nint x; /* paper A sections 3.1 and\n * 3.4.4 */",
+        [],
+    ],
     ["server/a.c", "/* paper A section 3.9, and paper C Fig. 14 */", ["1:paper A section 3.9", "1:paper C Fig. 14"]],
     ["server/a.c", "int x;\n/* the law is in numerics.md part 3 */", ["2:numerics.md"]],
     ["server/a.c", "/* tests/house/test_words.mjs, house/test_words, server/sim/gone.c */", ["1:server/sim/gone.c"]],
@@ -122,7 +174,11 @@ for (const [file, text, wanted] of planted) {
     process.exit(2);
 }
 
-const read = all.filter((file) => /\.(c|h|lcm|m?js|sh|md|html|css|cmake)$|CMakeLists\.txt$/.test(file) && !/test_references\.mjs$|^tests\/data\/|package-lock/.test(file));
+const read = all.filter(
+    (file) =>
+        /\.(c|h|lcm|m?js|sh|md|html|css|cmake)$|CMakeLists\.txt$/.test(file) &&
+        !/test_references\.mjs$|^tests\/data\/|package-lock/.test(file),
+);
 const faults = read.flatMap((file) => faults_of(file, readFileSync(path.join(tree, file), "utf8")));
 if (count) {
     const uses = new Map();

@@ -70,7 +70,7 @@ check "exit code $code" code_is 1
 check "stderr does not say that it goes on" has err "the same command goes on"
 check "stdout has not one line" lines_are out 1
 check "stdout is no refusal" has out '"code":"STATE"'
-check "it says it is whole" has o/study.json '"whole":[[:space:]]*false'
+check "it says it is whole" has o/study.json '"complete":[[:space:]]*false'
 before=$(count '"model"' o/study.json)
 check "no point was kept" [ "$before" -ge 1 ]
 cp o/study.json broken_off.json
@@ -84,7 +84,7 @@ check "not one line" lines_are out 1
 check "$(number measured_before out) measured before, wanted $before" [ "$(number measured_before out)" = "$before" ]
 all=$(count '"model"' o/study.json)
 check "measured $(number measured out) of $all" [ "$(number measured out)" -eq "$((all - before))" ]
-check "it is not whole" has o/study.json '"whole":[[:space:]]*true'
+check "it is not whole" has o/study.json '"complete":[[:space:]]*true'
 for file in study.json study.csv study.svg study.html; do check "no $file" [ -s o/$file ]; done
 check "the table has not a row a setting" lines_are o/study.csv "$((all + 1))"
 check "the page has not a row a setting" [ "$(count '<tr' o/study.html)" -eq "$((all + 1))" ]
@@ -124,12 +124,12 @@ sed 's/"shape":.*/"shape": "0000000000000000",/' whole.json >o/study.json
 refuse 1 "another body" study "$beam" --quick --out o
 head -c 1000 whole.json >o/study.json
 refuse 1 "again starts over" study "$beam" --quick --out o
-sed 's/"whole":.*/"whole": 3,/' whole.json >o/study.json
-refuse 1 "whole: is not true or false" study "$beam" --quick --out o
+sed 's/"complete":.*/"complete": 3,/' whole.json >o/study.json
+refuse 1 "complete: is not true or false" study "$beam" --quick --out o
 cp whole.json o/study.json
 
 # ---- picking ----
-most=$(number most_m o/study.json)
+most=$(number max_m o/study.json)
 loose=$(awk "BEGIN { printf \"%.6gmm\", 1000 * $most }")
 begin "the cheapest within an error is written as a scene that plan takes"
 run study "$beam" --quick --out o --within "$loose" -o near --json
@@ -211,7 +211,7 @@ if long "killed at random moments, also while its reference is made, it ends wit
         sleep "$(awk "BEGIN { srand($try); printf \"%.3f\", (0.01 + 0.06 * rand()) * $try }" </dev/null)"
         if kill -KILL "$child" 2>/dev/null; then kills=$((kills + 1)); fi
         wait "$child" 2>/dev/null
-        if [ -s k/study.json ] && has k/study.json '"whole":[[:space:]]*true'; then break; fi
+        if [ -s k/study.json ] && has k/study.json '"complete":[[:space:]]*true'; then break; fi
     done
     run study "$beam" --quick --out k --json
     check "exit code $code" code_is 0

@@ -38,13 +38,13 @@ static void cost_and_error_are_foreseen_from_the_other_settings(void)
             double ms, error_m;
             if (p->err) continue;
             n++;
-            if (!pal_study_foresee(s, &p->priced.setting, i, &ms, &error_m)) continue;
-            CHECK(pal_study_foresee_cost(s, &p->priced.setting, p->n_node, p->n_element, p->n_substep, p->read_ms, i,
+            if (!pal_study_predict_configuration(s, &p->measured.setting, i, &ms, &error_m)) continue;
+            CHECK(pal_study_predict_cost(s, &p->measured.setting, p->n_node, p->n_element, p->n_substep, p->read_ms, i,
                                          &ms));
             /* as it stands in the record */
             CHECK_NEAR(p->predicted_ms, ms, 1e-6 * ms);
-            cost += ms <= 1.3 * p->priced.ms && ms >= p->priced.ms / 1.3;
-            error += error_m <= 2 * p->priced.error_m && error_m >= 0.5 * p->priced.error_m;
+            cost += ms <= 1.3 * p->measured.ms && ms >= p->measured.ms / 1.3;
+            error += error_m <= 2 * p->measured.error_m && error_m >= 0.5 * p->measured.error_m;
         }
         printf("  %s: of %d settings cost within 30 %%: %d, error within a factor of 2: %d\n", s->name, n, cost, error);
         CHECK_INT(n, records[k].n);
@@ -59,22 +59,22 @@ static void the_front_and_what_is_picked_are_of_these_numbers(void)
     REQUIRE(file);
     pal_study *s = &file->study;
     bool was[PAL_STUDY_POINTS];
-    for (int i = 0; i < s->n_point; i++) was[i] = s->point[i].priced.front;
-    pal_study_front(s);
+    for (int i = 0; i < s->n_point; i++) was[i] = s->point[i].measured.front;
+    pal_study_mark_front(s);
     for (int i = 0; i < s->n_point; i++) {
-        CHECK(was[i] == s->point[i].priced.front);
+        CHECK(was[i] == s->point[i].measured.front);
         /* fitted to the load that judges it */
-        if (s->point[i].priced.setting.k_distance_J > 0) CHECK(!was[i]);
+        if (s->point[i].measured.setting.k_distance_J > 0) CHECK(!was[i]);
     }
     int near = pal_study_pick(s, 1e-4, NAN), fast = pal_study_pick(s, NAN, 0.05);
     REQUIRE(near >= 0 && fast >= 0);
-    const pal_measured_configuration *p = &s->point[near].priced, *q = &s->point[fast].priced;
+    const pal_measured_configuration *p = &s->point[near].measured, *q = &s->point[fast].measured;
     CHECK(p->front && p->error_m + s->reference_m <= 1e-4 && q->ms <= 0.05);
     for (int i = 0; i < s->n_point; i++) {
         const pal_study_point *o = &s->point[i];
         if (o->err || o->reason[0]) continue;
-        CHECK(o->priced.error_m + s->reference_m > 1e-4 || o->priced.ms >= p->ms);
-        CHECK(o->priced.ms > 0.05 || o->priced.error_m >= q->error_m);
+        CHECK(o->measured.error_m + s->reference_m > 1e-4 || o->measured.ms >= p->ms);
+        CHECK(o->measured.ms > 0.05 || o->measured.error_m >= q->error_m);
     }
     CHECK_INT(pal_study_pick(s, 1e-6, NAN), -1);
     free(file);
@@ -92,8 +92,8 @@ static void elements_are_in_the_order_of_numerics(void)
         for (int i = 0; i < file->study.n_point; i++) {
             const pal_study_point *p = &file->study.point[i];
             for (int e = 0; e < 3; e++)
-                if (p->priced.setting.size == size[k] && !strcmp(p->priced.setting.element, element[e]) &&
-                    !strcmp(p->priced.setting.law, "corotational"))
+                if (p->measured.setting.size == size[k] && !strcmp(p->measured.setting.element, element[e]) &&
+                    !strcmp(p->measured.setting.law, "corotational"))
                     rms[e] = p->static_rms_m;
         }
         CHECK(4 * rms[0] < rms[1] && 2 * rms[1] < rms[2]);

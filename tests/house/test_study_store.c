@@ -42,23 +42,24 @@ static pal_study_file *random_file(int n)
     s->n_point = n;
     for (int k = 0; k < n; k++) {
         pal_study_point *p = &s->point[k];
-        snprintf(p->priced.setting.model, PAL_NAME, "%s", model[k % 3]);
-        if (k % 3 == 0) snprintf(p->priced.setting.element, PAL_NAME, "hex8_bbar");
-        if (k % 2) snprintf(p->priced.setting.solver, PAL_NAME, "sdirk2");
-        p->priced.setting.size = k;
-        p->priced.setting.step_s = k % 4 ? 0.1 * random01() : 0;
-        p->priced.setting.tolerance = random01();
-        p->priced.setting.k_distance_J = random_size(), p->priced.setting.k_area_J = random_size();
-        p->priced.setting.k_volume_J = random_size();
+        snprintf(p->measured.setting.model, PAL_NAME, "%s", model[k % 3]);
+        if (k % 3 == 0) snprintf(p->measured.setting.element, PAL_NAME, "hex8_bbar");
+        if (k % 2) snprintf(p->measured.setting.solver, PAL_NAME, "sdirk2");
+        p->measured.setting.size = k;
+        p->measured.setting.step_s = k % 4 ? 0.1 * random01() : 0;
+        p->measured.setting.tolerance = random01();
+        p->measured.setting.k_distance_J = random_size(), p->measured.setting.k_area_J = random_size();
+        p->measured.setting.k_volume_J = random_size();
         bool measured = k % 7 != 0;
-        p->priced.ms = measured ? 1e3 * random01() : NAN;
-        p->priced.error_m = measured ? random_size() : NAN;
-        p->priced.front = measured && k % 5 == 0;
+        p->measured.ms = measured ? 1e3 * random01() : NAN;
+        p->measured.error_m = measured ? random_size() : NAN;
+        p->measured.front = measured && k % 5 == 0;
         p->err = measured ? PAL_ERR_OK : PAL_ERR_BUDGET;
         if (!measured) snprintf(p->reason, sizeof p->reason, "needs 8,000 sub-steps, \"2,000\" are allowed");
         p->n_node = 100 * k, p->n_substep = k % 30;
-        p->ms_p95 = random_size() * 1e-12, p->static_rms_m = random_size(), p->static_most_m = random_size();
-        p->way_rms_m = random_size(), p->way_most_m = k % 11 ? random_size() : NAN, p->prepare_s = random01();
+        p->ms_p95 = random_size() * 1e-12, p->static_rms_m = random_size(), p->static_max_m = random_size();
+        p->trajectory_rms_m = random_size(), p->trajectory_max_m = k % 11 ? random_size() : NAN,
+        p->prepare_s = random01();
         p->predicted_ms = NAN, p->predicted_m = random_size();
     }
     return f;
@@ -125,12 +126,12 @@ static void what_is_no_study_is_refused_by_its_place(void)
     } bad[] = {
         {"palpate-study-1", "palpate-study-2", "s.json: format: is \"palpate-study-2\", wanted \"palpate-study-1\""},
         {"\"format\"", "\"formed\"", "s.json: formed: unknown key; known are format"},
-        {"\"n_all\":\t200,", "", "s.json: n_all: is not there"},
-        {"\"n_all\":\t200", "\"n_all\": 257", "n_all: 257 is outside 0 .. 256"},
-        {"\"n_all\":\t200", "\"n_all\": 1.5", "n_all: 1.5 is not whole"},
-        {"\"whole\":\tfalse", "\"whole\": 0", "whole: is not true or false"},
-        {"\"index\":\t3", "\"index\": 8", "of.index: 8 is outside 0 .. 7"},
-        {"0123456789abcdef", "0123456789abcdef0", "of.shape: 17 bytes of text, more than 16"},
+        {"\"n_finest\":\t200,", "", "s.json: n_finest: is not there"},
+        {"\"n_finest\":\t200", "\"n_finest\": 257", "n_finest: 257 is outside 0 .. 256"},
+        {"\"n_finest\":\t200", "\"n_finest\": 1.5", "n_finest: 1.5 is not whole"},
+        {"\"complete\":\tfalse", "\"complete\": 0", "complete: is not true or false"},
+        {"\"index\":\t3", "\"index\": 8", "subject.index: 8 is outside 0 .. 7"},
+        {"0123456789abcdef", "0123456789abcdef0", "subject.shape: 17 bytes of text, more than 16"},
         {"\"model\":\t\"fem\"", "\"model\": \"\"", "points[0].model: is empty"},
         {"\"model\":\t\"tet_springs\"", "\"model\": 4", "points[1].model: is not a text"},
         {"\"size\":\t1", "\"size\": -2", "points[1].size: -2 is outside"},
@@ -141,7 +142,7 @@ static void what_is_no_study_is_refused_by_its_place(void)
         {"\"front\":\tfalse", "\"front\": true", "points[0].front: is true of a setting that was not measured"},
         {"\"err\":\t\"BUDGET\"", "\"err\": \"FINE\"", "points[0].err: \"FINE\" is no error code"},
         {"\"nodes\":\t100,", "", "points[1].nodes: is not there"},
-        {"\"why\":\t\"\",", "\"why\": \"\", \"x\": 1,", "points[1].x: unknown key"},
+        {"\"reason\":\t\"\",", "\"reason\": \"\", \"x\": 1,", "points[1].x: unknown key"},
         {"\"points\":\t[", "\"points\": [4, ", "points[0]: is not an object"},
     };
     for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
@@ -176,12 +177,12 @@ static void points_are_listed_by_what_they_cost(void)
     for (int k = 0; k < 100; k++) seen[order[k]]++;
     for (int k = 0; k < 100; k++) CHECK_INT(seen[k], 1);
     for (int k = 0; k < 100; k++) measured += !f->study.point[k].err;
-    for (int k = 0; k < 100; k++) CHECK_INT(isnan(f->study.point[order[k]].priced.ms), k >= measured);
-    CHECK_INT(pal_study_settings(&f->study, list), measured);
+    for (int k = 0; k < 100; k++) CHECK_INT(isnan(f->study.point[order[k]].measured.ms), k >= measured);
+    CHECK_INT(pal_study_configurations(&f->study, list), measured);
     for (int k = 0; k < measured; k++) {
         CHECK(k == 0 || list[k].ms >= list[k - 1].ms);
         CHECK(list[k].setting.step_s > 0);
-        CHECK_NEAR(list[k].error_m, f->study.point[order[k]].priced.error_m, 0);
+        CHECK_NEAR(list[k].error_m, f->study.point[order[k]].measured.error_m, 0);
     }
     /* the table has a row each, in that order */
     CHECK_INT(pal_study_file_csv(f, path, &diag), 0);
@@ -190,12 +191,12 @@ static void points_are_listed_by_what_they_cost(void)
     REQUIRE(text);
     int row = -1;
     for (char *line = strtok_r(text, "\n", &save); line; line = strtok_r(NULL, "\n", &save), row++) {
-        if (row < 0) CHECK(!strncmp(line, "model,element,law,solver,why,err,size,nodes,substeps,front,step_s,", 66));
+        if (row < 0) CHECK(!strncmp(line, "model,element,law,solver,reason,err,size,nodes,substeps,front,step_s,", 69));
         if (row < 0) continue;
         char want[80];
         const pal_study_point *p = &f->study.point[order[row]];
-        snprintf(want, sizeof want, ",%s,%d,%d,%d,%d,", pal_err_name(p->err), p->priced.setting.size, p->n_node,
-                 p->n_substep, p->priced.front);
+        snprintf(want, sizeof want, ",%s,%d,%d,%d,%d,", pal_err_name(p->err), p->measured.setting.size, p->n_node,
+                 p->n_substep, p->measured.front);
         CHECK(strstr(line, want) != NULL);
     }
     CHECK_INT(row, 100);

@@ -12,7 +12,7 @@ const tree = process.argv.slice(2).find((a) => !a.startsWith("--")) ?? path.join
 // word or words_with_underscores -> the term of the field
 const terms = {
     "road roads": "transport",
-    "trio": "triple_buffer",
+    trio: "triple_buffer",
     "tangle tangled tangles untangle untangled": "inversion (a state), recovery (an action)",
     "torture tortured insult insults": "robustness, case",
     "trainee trainees": "client (trainee is a role)",
@@ -22,13 +22,13 @@ const terms = {
     "price priced prices": "cost, cost_model",
     "rescue rescues rescued": "safeguards",
     "brake brakes braked": "stiffening_damper",
-    "relief": "inertia_relief",
+    relief: "inertia_relief",
     "ease eased eases": "blend, inverse_mass or ramp",
     "handed lag lags take_over takes_over go_on goes_on": "transfer",
-    "strips": "simd_blocks",
+    strips: "simd_blocks",
     "grab grabs grabbed grip grips gripped": "grasp",
     "holder holders": "tool_contact",
-    "anew": "again",
+    anew: "again",
     "tell tells told": "report, log, notify",
     "say says said saying": "report, message",
     "obey obeys obeyed": "execute",
@@ -37,9 +37,9 @@ const terms = {
     "point_rows embed embeds embedded": "interpolation",
     "most least n_most n_least": "max, min",
     "patience wild calm": "backoff",
-    "zz": "zz_estimator",
+    zz: "zz_estimator",
     "felt firm": "haptic_stiffness, contact_stiffness",
-    "complaint": "error",
+    complaint: "error",
 };
 // uses that are right: the identifier, or the file, matches
 const right = {
@@ -51,14 +51,22 @@ const right = {
     most: /almost/i,
 };
 // words that are right in a sentence, which a name of five words or more is (tests are named so)
-const plain = new Set("most least say says said saying tell tells told ease eases calm wild felt firm waste go_on goes_on take_over takes_over anew".split(" "));
+const plain = new Set(
+    "most least say says said saying tell tells told ease eases calm wild felt firm waste go_on goes_on take_over takes_over anew".split(
+        " ",
+    ),
+);
 const keywords = new Set(Object.keys(terms).flatMap((words) => words.split(" ")));
 const term_of = new Map(Object.entries(terms).flatMap(([words, term]) => words.split(" ").map((word) => [word, term])));
 const longest = Math.max(...[...keywords].map((word) => word.split("_").length));
 
 // the private words of a name
 function private_words(name, file) {
-    const words = name.replace(/([a-z0-9])([A-Z])/g, "$1_$2").toLowerCase().split(/[^a-z]+/).filter(Boolean);
+    const words = name
+        .replace(/([a-z0-9])([A-Z])/g, "$1_$2")
+        .toLowerCase()
+        .split(/[^a-z]+/)
+        .filter(Boolean);
     const found = [];
     for (let i = 0; i < words.length; i++)
         for (let n = 1; n <= longest && i + n <= words.length; n++) {
@@ -73,7 +81,8 @@ function private_words(name, file) {
 function faults_of(file, text) {
     const faults = [];
     const add = (name, at) => {
-        for (const word of private_words(name, file)) faults.push({ file, line: at < 0 ? 1 : line_of(text, at), name, word });
+        for (const word of private_words(name, file))
+            faults.push({ file, line: at < 0 ? 1 : line_of(text, at), name, word });
     };
     add(path.basename(file).replace(/\.\w+$/, ""), -1);
     const code = split_source(file, text).code.replace(/^[ \t]*#[ \t]*include.*$/gm, "");
@@ -115,7 +124,8 @@ if (count) {
         console.log(`${String(sum(by)).padStart(6)} ${word} (${term_of.get(word)}): ${where.join(", ")}`);
     }
 } else {
-    for (const f of faults) console.log(`${f.file}:${f.line}: ${f.name}: "${f.word}" is a private word: ${term_of.get(f.word)}`);
+    for (const f of faults)
+        console.log(`${f.file}:${f.line}: ${f.name}: "${f.word}" is a private word: ${term_of.get(f.word)}`);
 }
 console.log(`words: ${files.length} files, ${faults.length} private words`);
 process.exit(files.length > 0 && faults.length === 0 ? 0 : 1);

@@ -11,7 +11,7 @@ static inline void order_begin(const pal_scene *scene, const pal_measured_config
     static int n[1], body[1];
     list[0] = point, n[0] = n_point, body[0] = 0;
     served_begin(scene, (pal_session_options){0},
-                 (pal_server_options){.setting = point ? list : NULL, .n_setting = n, .setting_body = body});
+                 (pal_server_options){.setting = point ? list : NULL, .n_configuration = n, .setting_body = body});
 }
 
 /* the loop goes on by a little; others read too, or their queues would fill */
@@ -57,7 +57,7 @@ static inline double told(const mem_client *c, const char *key)
 
 static inline const char *trouble(const mem_client *c)
 {
-    return c->last[PAL_CONTROL_ERROR].problem.text;
+    return c->last[PAL_CONTROL_ERROR].error.text;
 }
 
 /* waits for a frame of the epoch that the client has */

@@ -1,4 +1,4 @@
-/* A client of palpate.v1 on the mem road: what it has been told, and its copy of the tissue. */
+/* A client of palpate.v2 on the mem road: what it has been told, and its copy of the tissue. */
 #ifndef TESTS_NET_MEM_CLIENT_H
 #define TESTS_NET_MEM_CLIENT_H
 #include "protocol/asset.h"
@@ -54,7 +54,7 @@ static inline void mem_join_as(mem_client *c, pal_transport *road, const char *n
     c->peer = pal_mem_connect(road, "");
     join.join.role = role;
     join.join.tool = tool;
-    join.join.patches = patches;
+    join.join.topology_deltas = patches;
     snprintf(join.join.name, sizeof join.join.name, "%s", name);
     mem_say(c, &join);
 }

@@ -1,5 +1,5 @@
 /* What accuracy costs over mem://: the study and the estimates come to those who ask, and are there only for them. */
-#include "server/estimate/estimate.h"
+#include "server/estimate/estimator.h"
 #include "tests/net/hub_scene.h"
 #include "tests/net/server_fixture.h"
 
@@ -26,11 +26,13 @@ static void make_points(void)
 static void begin(bool with_study)
 {
     static const pal_measured_configuration *list[1];
-    static int n_setting[1] = {POINTS}, body[1] = {0};
+    static int n_configuration[1] = {POINTS}, body[1] = {0};
     static double reference_m[1] = {3e-4};
     list[0] = setting;
-    pal_server_options net = {
-        .setting = with_study ? list : NULL, .n_setting = n_setting, .setting_body = body, .reference_m = reference_m};
+    pal_server_options net = {.setting = with_study ? list : NULL,
+                              .n_configuration = n_configuration,
+                              .setting_body = body,
+                              .reference_m = reference_m};
     served_begin(&organ.scene, (pal_session_options){0}, net);
 }
 
@@ -40,19 +42,19 @@ static void turn(mem_client *a, mem_client *b)
     served_turn(500000000ull, a, b);
 }
 
-#define LOOK(on) "{\"type\":\"command\",\"verb\":\"estimate\",\"target\":\"organ\",\"args\":{\"on\":" #on "}}"
+#define LOOK(on) "{\"type\":\"command\",\"verb\":\"estimate\",\"target\":\"organ\",\"args\":{\"enabled\":" #on "}}"
 
 static void nothing_is_estimated_while_nobody_looks(void)
 {
     mem_client ada;
-    uint64_t made = pal_estimator_made();
+    uint64_t made = pal_estimator_count();
     begin(true);
     mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     UNTIL(ada.n_text[PAL_CONTROL_STATUS] > 3, &ada, NULL);
     CHECK(ada.last[PAL_CONTROL_HELLO].hello.estimates);
     CHECK_INT(ada.n_text[PAL_CONTROL_STUDY] + ada.n_text[PAL_CONTROL_ESTIMATE], 0);
     CHECK_INT(pal_estimator_threads(), 0);
-    CHECK(pal_estimator_made() == made);
+    CHECK(pal_estimator_count() == made);
     mem_end(&ada);
     end();
 }
@@ -76,12 +78,12 @@ static void who_asks_sees_study_and_estimate_until_the_last_has_gone(void)
     CHECK(study->reference_m == 3e-4);
     CHECK_INT(study->point[3].index, 4);
     CHECK_TEXT(study->point[3].method, "fem hex8_bbar");
-    CHECK(study->point[0].front && !study->point[1].front && study->point[3].error_m == 1e-4);
+    CHECK(study->point[0].pareto_optimal && !study->point[1].pareto_optimal && study->point[3].error_m == 1e-4);
     const pal_wire_estimate *e = &ada.last[PAL_CONTROL_ESTIMATE].estimate;
     CHECK_TEXT(e->body, "organ");
-    CHECK_INT(e->point, 2);
-    CHECK(strstr(e->setting, "tet_springs"));
-    UNTIL(e->ms > 0, &ada, &bo);
+    CHECK_INT(e->study_point, 2);
+    CHECK(strstr(e->configuration, "tet_springs"));
+    UNTIL(e->cost_ms > 0, &ada, &bo);
     UNTIL(pal_estimator_threads() == 1, &ada, &bo);
 
     /* who may do nothing else may look all the same; one estimator serves both */
@@ -110,7 +112,7 @@ static void without_a_study_there_is_the_estimate_alone(void)
     UNTIL(ada.n_text[PAL_CONTROL_ESTIMATE] > 0, &ada, NULL);
     CHECK_INT(ada.n_text[PAL_CONTROL_STUDY], 1);
     CHECK_INT(ada.last[PAL_CONTROL_STUDY].study.n_point, 0);
-    CHECK(isnan(ada.last[PAL_CONTROL_ESTIMATE].estimate.point));
+    CHECK(isnan(ada.last[PAL_CONTROL_ESTIMATE].estimate.study_point));
     mem_end(&ada);
     end();
 }
@@ -131,15 +133,15 @@ static void neighbours_are_priced_once(void)
     mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     mem_text(&ada, LOOK(1));
     const pal_wire_estimate *e = &ada.last[PAL_CONTROL_ESTIMATE].estimate;
-    UNTIL(e->n_neighbour >= 2 && e->ms > 0, &ada, NULL);
+    UNTIL(e->n_neighbour >= 2 && e->cost_ms > 0, &ada, NULL);
     double step_ms = 1e3 * organ.scene.step_s;
     pal_configuration_of(&organ.scene, 0, &now);
     for (uint32_t i = 0; i < e->n_neighbour; i++) {
         const pal_wire_neighbour *near = &e->neighbour[i];
-        bool step = !strcmp(near->knob, "step"), size = !strcmp(near->knob, "resolution");
+        bool step = !strcmp(near->parameter, "step"), size = !strcmp(near->parameter, "resolution");
         n_step += step, n_size += size;
-        if (step) CHECK_NEAR(near->ms * near->step_ms, e->ms * step_ms, 1e-9 * step_ms);
-        if (size) CHECK((near->ms > e->ms) == ((int)near->size > now.size));
+        if (step) CHECK_NEAR(near->cost_ms * near->step_ms, e->cost_ms * step_ms, 1e-9 * step_ms);
+        if (size) CHECK((near->cost_ms > e->cost_ms) == ((int)near->size > now.size));
     }
     CHECK_INT(n_step, 2);
     printf("  %u neighbours, %d in size\n", e->n_neighbour, n_size);
@@ -164,13 +166,14 @@ static void calibrated_springs_keep_their_size(void)
     mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
     turn(&ada, NULL);
     for (int k = 0; k < 2; k++) {
-        snprintf(text, sizeof text, "{\"type\":\"command\",\"verb\":\"knob\",\"args\":{\"size\":%d,\"step_ms\":%.9g}}",
+        snprintf(text, sizeof text,
+                 "{\"type\":\"command\",\"verb\":\"configure\",\"args\":{\"size\":%d,\"step_ms\":%.9g}}",
                  now.size + (k == 0), 1e3 * now.step_s);
         mem_text(&ada, text);
         UNTIL(ada.n_text[PAL_CONTROL_ERROR] + ada.n_text[PAL_CONTROL_ANSWER] == k + 1, &ada, NULL);
     }
     snprintf(said, sizeof said, "calibrated for %d voxels", now.size);
-    CHECK(strstr(ada.last[PAL_CONTROL_ERROR].problem.text, said) != NULL);
+    CHECK(strstr(ada.last[PAL_CONTROL_ERROR].error.text, said) != NULL);
     CHECK_INT(ada.n_text[PAL_CONTROL_ERROR], 1);
     CHECK_INT(ada.n_text[PAL_CONTROL_ANSWER], 1);
     mem_end(&ada);
@@ -181,9 +184,9 @@ static void calibrated_springs_keep_their_size(void)
 static void bad_orders_are_refused_with_a_sentence(void)
 {
     static const char *const bad[] = {
-        "{\"type\":\"command\",\"verb\":\"estimate\",\"target\":\"liver\",\"args\":{\"on\":1}}",
+        "{\"type\":\"command\",\"verb\":\"estimate\",\"target\":\"liver\",\"args\":{\"enabled\":1}}",
         "{\"type\":\"command\",\"verb\":\"estimate\"}",
-        "{\"type\":\"command\",\"verb\":\"estimate\",\"args\":{\"off\":1}}"};
+        "{\"type\":\"command\",\"verb\":\"estimate\",\"args\":{\"disabled\":1}}"};
     static const char *const said[] = {"there is no body liver", "estimate takes on", "estimate takes on"};
     mem_client ada;
     begin(true);
@@ -192,7 +195,7 @@ static void bad_orders_are_refused_with_a_sentence(void)
     for (int i = 0; i < 3; i++) {
         mem_text(&ada, bad[i]);
         UNTIL(ada.n_text[PAL_CONTROL_ERROR] == i + 1, &ada, NULL);
-        CHECK_TEXT(ada.last[PAL_CONTROL_ERROR].problem.text, said[i]);
+        CHECK_TEXT(ada.last[PAL_CONTROL_ERROR].error.text, said[i]);
     }
     CHECK_INT(ada.n_text[PAL_CONTROL_STUDY] + ada.n_text[PAL_CONTROL_ESTIMATE], 0);
     CHECK_INT(pal_estimator_threads(), 0);

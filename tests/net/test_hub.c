@@ -127,7 +127,8 @@ static void newcomer_gets_hello_members_frame_and_tools_in_this_order(void)
     CHECK_TEXT(hello->you_name, "Ada");
     CHECK_TEXT(hello->title, "Small \"organ\"");
     CHECK_TEXT(hello->accuracy, "2 % of \"truth\"");
-    CHECK(hello->you_id > 0 && hello->you_tool == 0 && hello->n_tool == 2 && hello->n_part == 1 && hello->n_row > 0);
+    CHECK(hello->you_id > 0 && hello->you_tool == 0 && hello->n_tool == 2 && hello->n_part == 1 &&
+          hello->n_component > 0);
     CHECK(hello->box_max_m[0] > hello->box_min_m[0] && hello->tool[0].radius_m > 0 && hello->credit >= 2);
     CHECK_INT(mem_pull(&ada, 1), 1);
     CHECK_INT(ada.n_text[PAL_CONTROL_MEMBERS], 1);
@@ -137,7 +138,7 @@ static void newcomer_gets_hello_members_frame_and_tools_in_this_order(void)
     CHECK_INT(ada.frame.epoch, 1);
     UNTIL(ada.n_text[PAL_CONTROL_STATUS] > 0, &ada, NULL);
     CHECK(ada.last[PAL_CONTROL_STATUS].status.paused);
-    CHECK_INT(ada.last[PAL_CONTROL_STATUS].status.n_row, hello->n_row);
+    CHECK_INT(ada.last[PAL_CONTROL_STATUS].status.n_component, hello->n_component);
     mem_end(&ada);
     end();
 }
@@ -276,24 +277,24 @@ static void a_tool_has_one_holder(void)
     mem_pull(&a, 1000), mem_pull(&b, 1000);
     CHECK_INT(a.last[PAL_CONTROL_HELLO].hello.you_tool, 1);
     CHECK_INT(b.last[PAL_CONTROL_HELLO].hello.you_tool, PAL_WIRE_TOOL_NONE);
-    CHECK_TEXT(b.last[PAL_CONTROL_ERROR].problem.code, "tool_taken");
+    CHECK_TEXT(b.last[PAL_CONTROL_ERROR].error.code, "tool_taken");
     CHECK(strcmp(b.last[PAL_CONTROL_HELLO].hello.you_name, "Ada") != 0); /* names are unique */
-    mem_text(&b, "{\"type\":\"take\",\"tool\":0}");
+    mem_text(&b, "{\"type\":\"take_tool\",\"tool\":0}");
     mem_join(&c, road, "Eve", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_ANY);
     mem_pull(&c, 1000);
     CHECK_INT(c.last[PAL_CONTROL_HELLO].hello.you_tool, PAL_WIRE_TOOL_NONE);
-    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].problem.code, "tool_taken");
-    mem_text(&c, "{\"type\":\"take\",\"tool\":7}");
+    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].error.code, "tool_taken");
+    mem_text(&c, "{\"type\":\"take_tool\",\"tool\":7}");
     mem_pull(&c, 1000);
-    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].problem.code, "tool");
+    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].error.code, "tool");
     /* one who goes leaves the tool to others */
     mem_end(&a);
-    mem_text(&c, "{\"type\":\"take\",\"tool\":1}");
+    mem_text(&c, "{\"type\":\"take_tool\",\"tool\":1}");
     mem_pull(&c, 1000);
     CHECK_INT(c.last[PAL_CONTROL_MEMBERS].members.n_member, 2);
     CHECK_INT(c.last[PAL_CONTROL_MEMBERS].members.member[1].tool >= 0, 1);
-    mem_text(&c, "{\"type\":\"leave\"}");
-    mem_text(&b, "{\"type\":\"take\",\"tool\":1}");
+    mem_text(&c, "{\"type\":\"release_tool\"}");
+    mem_text(&b, "{\"type\":\"take_tool\",\"tool\":1}");
     mem_pull(&b, 1000);
     bool fixed = false;
     for (int i = 0; i < 2; i++) {
@@ -328,7 +329,7 @@ static void pose_of_the_holder_moves_the_tool_and_is_echoed(void)
     CHECK_INT(a.haptic.tool, 0);
     /* the next holder has nothing to be echoed */
     mem_end(&a);
-    mem_text(&b, "{\"type\":\"take\",\"tool\":0}");
+    mem_text(&b, "{\"type\":\"take_tool\",\"tool\":0}");
     turn(&b, NULL);
     UNTIL(b.tools.tool[0].holder == b.last[PAL_CONTROL_HELLO].hello.you_id, &b, NULL);
     CHECK_INT(b.tools.tool[0].echo_seq, 0);
@@ -349,10 +350,10 @@ static void viewer_moves_no_tool_and_gives_no_command(void)
         mem_pose(&v, 0, i, at);
         turn(&v, &t);
     }
-    CHECK_TEXT(v.last[PAL_CONTROL_ERROR].problem.code, "role");
+    CHECK_TEXT(v.last[PAL_CONTROL_ERROR].error.code, "role");
     CHECK_INT(v.n_text[PAL_CONTROL_ERROR], 1); /* said once a second, not every time */
     CHECK(t.tools.tool[0].flags & PAL_WIRE_TOOL_AWAY);
-    mem_text(&v, "{\"type\":\"take\",\"tool\":0}");
+    mem_text(&v, "{\"type\":\"take_tool\",\"tool\":0}");
     mem_text(&v, "{\"type\":\"command\",\"verb\":\"pause\"}");
     for (int i = 0; i < 40; i++) turn(&v, &t);
     CHECK_INT(v.n_text[PAL_CONTROL_ERROR], 3);
@@ -377,7 +378,7 @@ static void commands_are_checked_and_carried_out(void)
         mem_text(&a, refused[i][0]);
         mem_pull(&a, 1000);
         CHECK_INT(a.n_text[PAL_CONTROL_ERROR], (int)i + 1);
-        CHECK_TEXT(a.last[PAL_CONTROL_ERROR].problem.code, refused[i][1]);
+        CHECK_TEXT(a.last[PAL_CONTROL_ERROR].error.code, refused[i][1]);
     }
     UNTIL(a.n_text[PAL_CONTROL_STATUS] > 0, &a, NULL);
     uint64_t tick = a.last[PAL_CONTROL_STATUS].status.tick;
@@ -416,7 +417,7 @@ static void hostile_messages_close_with_a_reason_and_nobody_else_notices(void)
             mem_text(&bad, "{\"type\":\"hello\"}");
             break; /* the server's own */
         case 2:
-            mem_text(&bad, "{\"type\":\"take\",\"tool\":\"x\"}");
+            mem_text(&bad, "{\"type\":\"take_tool\",\"tool\":\"x\"}");
             break;
         case 3:
             pal_mem_send(bad.peer, "\xFF\xFE\x00", 3, true);
@@ -440,7 +441,7 @@ static void hostile_messages_close_with_a_reason_and_nobody_else_notices(void)
             pal_mem_send(bad.peer, long_one, sizeof long_one, false), code = PAL_WIRE_CLOSE_TOO_BIG;
             break;
         default:
-            for (int i = 0; i < 400; i++) mem_text(&bad, "{\"type\":\"leave\"}");
+            for (int i = 0; i < 400; i++) mem_text(&bad, "{\"type\":\"release_tool\"}");
             code = PAL_WIRE_CLOSE_RATE;
         }
         if (pal_mem_code(bad.peer) != code)
@@ -532,16 +533,16 @@ static void a_field_goes_only_to_those_who_ask_and_ends_with_them(void)
     CHECK_INT(hello->part[0].n_field, 2);
     CHECK_TEXT(hello->part[0].field[0], "displacement");
     CHECK_TEXT(hello->part[0].field[1], "stiffness");
-    uint32_t n_row = hello->n_row;
-    mem_text(&ada, "{\"type\":\"view\",\"part\":0,\"field\":\"displacement\"}");
+    uint32_t n_row = hello->n_component;
+    mem_text(&ada, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}");
     UNTIL(ada.n_field > 0, &ada, &bob);
     CHECK(ada.field.field == PAL_WIRE_FIELD_DISPLACEMENT_M && ada.field.part == 0 && ada.field.epoch == 1);
     /* the plan says so while it lasts */
     UNTIL(bob.last[PAL_CONTROL_STATUS].status.n_component_name > 0, &ada, &bob);
     const pal_wire_status *status = &bob.last[PAL_CONTROL_STATUS].status;
     CHECK_INT(status->n_component_name, n_row + 1);
-    CHECK_INT(status->n_row, n_row + 1);
-    CHECK_TEXT(status->row[n_row], "field_output");
+    CHECK_INT(status->n_component, n_row + 1);
+    CHECK_TEXT(status->component[n_row], "field_output");
     /* about ten a second of this clock, and of the same motion as the frames */
     mem_text(&bob, "{\"type\":\"command\",\"verb\":\"reset\"}");
     for (int i = 0; i < 100; i++) turn(&ada, &bob);
@@ -553,15 +554,15 @@ static void a_field_goes_only_to_those_who_ask_and_ends_with_them(void)
     CHECK_LE(fabs(shown_most(&ada) - moved_most(&ada)), 0.3 * moved_most(&ada) + 2e-4);
     CHECK_INT(bob.n_field, 0);
     /* a second one who looks is served from what is there, the row stays until the last has gone */
-    mem_text(&bob, "{\"type\":\"view\",\"part\":0,\"field\":\"displacement\"}");
+    mem_text(&bob, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}");
     UNTIL(bob.n_field > 0, &ada, &bob);
-    mem_text(&ada, "{\"type\":\"view\",\"part\":0,\"field\":\"none\"}");
+    mem_text(&ada, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"none\"}");
     for (int i = 0; i < 20; i++) turn(&ada, &bob);
-    int ended = ada.n_field, goes_on = bob.n_field;
-    UNTIL(bob.n_field > goes_on + 3, &ada, &bob);
+    int ended = ada.n_field, may_continue = bob.n_field;
+    UNTIL(bob.n_field > may_continue + 3, &ada, &bob);
     CHECK_INT(ada.n_field, ended);
     mem_end(&bob); /* it goes without a word */
-    UNTIL(ada.last[PAL_CONTROL_STATUS].status.n_row == n_row, &ada, NULL);
+    UNTIL(ada.last[PAL_CONTROL_STATUS].status.n_component == n_row, &ada, NULL);
     CHECK_INT(ada.last[PAL_CONTROL_STATUS].status.n_component_name, 0);
     CHECK_INT(ada.n_bad, 0);
     mem_end(&ada);
@@ -574,7 +575,7 @@ static void a_field_comes_while_paused_and_is_not_sent_twice(void)
     begin(true, 0);
     mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     UNTIL(ada.n_tools > 0, &ada, NULL);
-    mem_text(&ada, "{\"type\":\"view\",\"part\":0,\"field\":\"displacement\"}");
+    mem_text(&ada, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}");
     UNTIL(ada.n_field > 0, &ada, NULL);
     for (int i = 0; i < 60; i++) turn(&ada, NULL);
     CHECK_INT(ada.n_field, 1);
@@ -590,8 +591,8 @@ static void a_client_that_acknowledges_nothing_gets_no_more_fields(void)
     mem_join(&deaf, road, "deaf", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     mem_join(&other, road, "other", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     UNTIL(deaf.n_tools > 2 && other.n_tools > 2, &other, &deaf);
-    mem_text(&deaf, "{\"type\":\"view\",\"part\":0,\"field\":\"displacement\"}");
-    mem_text(&other, "{\"type\":\"view\",\"part\":0,\"field\":\"displacement\"}");
+    mem_text(&deaf, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}");
+    mem_text(&other, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}");
     UNTIL(deaf.n_field > 1, &other, &deaf);
     deaf.mute = true;
     for (int i = 0; i < 60; i++) turn(&other, &deaf);
@@ -608,10 +609,10 @@ static void what_cannot_be_shown_is_answered_with_a_sentence(void)
 {
     static const struct {
         const char *text, *code, *named;
-    } bad[] = {{"{\"type\":\"view\",\"part\":0,\"field\":\"von_mises\"}", "field", "von Mises stress"},
-               {"{\"type\":\"view\",\"part\":0,\"field\":\"energy\"}", "field", "strain energy"},
-               {"{\"type\":\"view\",\"part\":0,\"field\":\"rainbow\"}", "field", "rainbow"},
-               {"{\"type\":\"view\",\"part\":7,\"field\":\"displacement\"}", "part", "7"}};
+    } bad[] = {{"{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"von_mises\"}", "field", "von Mises stress"},
+               {"{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"energy\"}", "field", "strain energy"},
+               {"{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"rainbow\"}", "field", "rainbow"},
+               {"{\"type\":\"subscribe_field\",\"part\":7,\"field\":\"displacement\"}", "part", "7"}};
     mem_client a;
     begin(true, 0);
     mem_join(&a, road, "a", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
@@ -619,10 +620,10 @@ static void what_cannot_be_shown_is_answered_with_a_sentence(void)
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         mem_text(&a, bad[i].text);
         UNTIL(a.n_text[PAL_CONTROL_ERROR] == (int)i + 1, &a, NULL);
-        CHECK_TEXT(a.last[PAL_CONTROL_ERROR].problem.code, bad[i].code);
-        CHECK(strstr(a.last[PAL_CONTROL_ERROR].problem.text, bad[i].named) != NULL);
+        CHECK_TEXT(a.last[PAL_CONTROL_ERROR].error.code, bad[i].code);
+        CHECK(strstr(a.last[PAL_CONTROL_ERROR].error.text, bad[i].named) != NULL);
     }
-    mem_text(&a, "{\"type\":\"view\",\"part\":0,\"field\":\"none\"}");
+    mem_text(&a, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"none\"}");
     for (int i = 0; i < 30; i++) turn(&a, NULL);
     CHECK_INT(a.n_text[PAL_CONTROL_ERROR], 4);
     CHECK_INT(a.n_field, 0);

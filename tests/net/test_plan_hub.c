@@ -1,5 +1,5 @@
 /* Rows and bodies over mem://: what clients are told of the plan, who switches rows, who brings a stopped body back. */
-#include "server/estimate/estimate.h"
+#include "server/estimate/estimator.h"
 #include "tests/net/hub_scene.h"
 #include "tests/net/server_fixture.h"
 
@@ -41,7 +41,7 @@ static int find(uint32_t n, char (*row)[PAL_WIRE_NAME_BYTES], const char *name)
 }
 
 #define ROW(name, on)                                                                                                  \
-    "{\"type\":\"command\",\"verb\":\"row\",\"target\":\"" name "\",\"args\":{\"part\":0,\"on\":" #on "}}"
+    "{\"type\":\"command\",\"verb\":\"component\",\"target\":\"" name "\",\"args\":{\"part\":0,\"enabled\":" #on "}}"
 
 static void rows_say_whose_they_are_and_what_called_for_them(void)
 {
@@ -50,23 +50,23 @@ static void rows_say_whose_they_are_and_what_called_for_them(void)
     mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
     UNTIL(ada.n_text[PAL_CONTROL_STATUS] > 2, &ada, NULL);
     const pal_wire_hello *h = &ada.last[PAL_CONTROL_HELLO].hello;
-    CHECK(h->n_row > 3 && h->n_component_part == h->n_row && h->n_component_reason == h->n_row);
-    for (uint32_t r = 0; r < h->n_row; r++) CHECK(h->component_part[r] == 0 && h->component_reason[r][0]);
+    CHECK(h->n_component > 3 && h->n_component_part == h->n_component && h->n_component_reason == h->n_component);
+    for (uint32_t r = 0; r < h->n_component; r++) CHECK(h->component_part[r] == 0 && h->component_reason[r][0]);
     /* what moves and shows the body stays, elastic rows may go while there is another */
     static const char *const stays[] = {"verlet", "skin_output"}, *const goes[] = {"tet_volume", "edge_distance",
                                                                                    "gravity"};
-    CHECK_INT(h->n_component_required, h->n_row);
+    CHECK_INT(h->n_component_required, h->n_component);
     for (int i = 0; i < 2; i++) {
-        int r = find(h->n_row, (char(*)[PAL_WIRE_NAME_BYTES])h->row, stays[i]);
+        int r = find(h->n_component, (char(*)[PAL_WIRE_NAME_BYTES])h->component, stays[i]);
         CHECK(r >= 0 && h->component_required[r] == 1);
     }
     for (int i = 0; i < 3; i++) {
-        int r = find(h->n_row, (char(*)[PAL_WIRE_NAME_BYTES])h->row, goes[i]);
+        int r = find(h->n_component, (char(*)[PAL_WIRE_NAME_BYTES])h->component, goes[i]);
         CHECK(r < 0 || h->component_required[r] == 0);
     }
     const pal_wire_status *s = &ada.last[PAL_CONTROL_STATUS].status;
-    CHECK(s->n_component_name == 0 && s->n_off == 0 && s->n_state == 0);
-    CHECK_INT(s->n_row, h->n_row);
+    CHECK(s->n_component_name == 0 && s->n_disabled == 0 && s->n_state == 0);
+    CHECK_INT(s->n_component, h->n_component);
     mem_end(&ada);
     end();
 }
@@ -80,20 +80,20 @@ static void an_instructor_switches_a_row_off_and_on_and_all_hear_of_it(void)
     UNTIL(ada.n_text[PAL_CONTROL_STATUS] > 2 && bo.n_text[PAL_CONTROL_STATUS] > 0, &ada, &bo);
     pal_wire_hello *h = &ada.last[PAL_CONTROL_HELLO].hello;
     const pal_wire_status *a = &ada.last[PAL_CONTROL_STATUS].status, *b = &bo.last[PAL_CONTROL_STATUS].status;
-    REQUIRE(find(h->n_row, h->row, "tet_volume") >= 0);
+    REQUIRE(find(h->n_component, h->component, "tet_volume") >= 0);
 
     mem_text(&ada, ROW("tet_volume", 0));
-    UNTIL(a->n_off == 1 && b->n_off == 1, &ada, &bo);
-    CHECK_TEXT(a->off[0].row, "tet_volume");
-    CHECK_INT(a->off[0].part, 0);
-    CHECK_INT(a->n_row, h->n_row - 1);
-    CHECK_INT(a->n_component_name, h->n_row - 1);
+    UNTIL(a->n_disabled == 1 && b->n_disabled == 1, &ada, &bo);
+    CHECK_TEXT(a->disabled[0].component, "tet_volume");
+    CHECK_INT(a->disabled[0].part, 0);
+    CHECK_INT(a->n_component, h->n_component - 1);
+    CHECK_INT(a->n_component_name, h->n_component - 1);
     CHECK_INT(a->n_component_part, a->n_component_name);
-    CHECK(find(a->n_component_name, (char(*)[PAL_WIRE_NAME_BYTES])a->row, "tet_volume") < 0);
+    CHECK(find(a->n_component_name, (char(*)[PAL_WIRE_NAME_BYTES])a->component, "tet_volume") < 0);
 
     mem_text(&ada, ROW("tet_volume", 1));
-    UNTIL(a->n_off == 0 && b->n_off == 0, &ada, &bo);
-    CHECK_INT(a->n_row, h->n_row);
+    UNTIL(a->n_disabled == 0 && b->n_disabled == 0, &ada, &bo);
+    CHECK_INT(a->n_component, h->n_component);
     CHECK_INT(a->n_component_name, 0); /* the plan of hello again */
 
     /* what the world refuses changes nothing and is said in the status, and to who asked as an error */
@@ -103,13 +103,13 @@ static void an_instructor_switches_a_row_off_and_on_and_all_hear_of_it(void)
     UNTIL(a->n_refused == n_refused + 1 && a->diag[0], &ada, &bo);
     CHECK(strstr(a->diag, "no_such_row"));
     UNTIL(ada.n_text[PAL_CONTROL_ERROR] == n_error + 1, &ada, &bo);
-    CHECK_TEXT(ada.last[PAL_CONTROL_ERROR].problem.code, "refused");
-    CHECK(strstr(ada.last[PAL_CONTROL_ERROR].problem.text, "no_such_row"));
+    CHECK_TEXT(ada.last[PAL_CONTROL_ERROR].error.code, "refused");
+    CHECK(strstr(ada.last[PAL_CONTROL_ERROR].error.text, "no_such_row"));
     mem_text(&ada, ROW("skin_output", 0));
     UNTIL(ada.n_text[PAL_CONTROL_ERROR] == n_error + 2, &ada, &bo);
-    CHECK(strstr(ada.last[PAL_CONTROL_ERROR].problem.text, "cannot be switched off"));
+    CHECK(strstr(ada.last[PAL_CONTROL_ERROR].error.text, "cannot be switched off"));
     CHECK_INT(bo.n_text[PAL_CONTROL_ERROR], n_other);
-    CHECK_INT(a->n_row, h->n_row);
+    CHECK_INT(a->n_component, h->n_component);
     mem_end(&ada), mem_end(&bo);
     end();
 }
@@ -117,11 +117,12 @@ static void an_instructor_switches_a_row_off_and_on_and_all_hear_of_it(void)
 static void others_do_not_and_bad_orders_are_refused(void)
 {
     static const char *const bad[] = {
-        ROW("tet_volume", 0), "{\"type\":\"command\",\"verb\":\"row\",\"target\":\"tet_volume\"}",
-        "{\"type\":\"command\",\"verb\":\"row\",\"target\":\"a\",\"args\":{\"part\":1,\"on\":0}}",
+        ROW("tet_volume", 0), "{\"type\":\"command\",\"verb\":\"component\",\"target\":\"tet_volume\"}",
+        "{\"type\":\"command\",\"verb\":\"component\",\"target\":\"a\",\"args\":{\"part\":1,\"enabled\":0}}",
         "{\"type\":\"command\",\"verb\":\"reset\",\"target\":\"liver\"}"};
-    static const char *const said[] = {"only an instructor switches rows", "row takes part (0 to 0) and on",
-                                       "row takes part (0 to 0) and on", "there is no body liver"};
+    static const char *const said[] = {"only an instructor enables and disables components",
+                                       "component takes part (0 to 0) and enabled",
+                                       "component takes part (0 to 0) and enabled", "there is no body liver"};
     static mem_client ada, bo;
     begin(false);
     mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
@@ -132,9 +133,9 @@ static void others_do_not_and_bad_orders_are_refused(void)
         int before = who->n_text[PAL_CONTROL_ERROR];
         mem_text(who, bad[i]);
         UNTIL(who->n_text[PAL_CONTROL_ERROR] > before, &ada, &bo);
-        CHECK_TEXT(who->last[PAL_CONTROL_ERROR].problem.text, said[i]);
+        CHECK_TEXT(who->last[PAL_CONTROL_ERROR].error.text, said[i]);
     }
-    CHECK_INT(ada.last[PAL_CONTROL_STATUS].status.n_off, 0);
+    CHECK_INT(ada.last[PAL_CONTROL_STATUS].status.n_disabled, 0);
     mem_end(&ada), mem_end(&bo);
     end();
 }
@@ -153,7 +154,7 @@ static void everybody_resets_what_was_stopped_and_a_viewer_nothing_else(void)
     CHECK_INT(cy.n_text[PAL_CONTROL_ERROR], 0);
     mem_text(&cy, "{\"type\":\"command\",\"verb\":\"reset\",\"target\":\"organ\"}");
     UNTIL(cy.n_text[PAL_CONTROL_ERROR] == 1, &cy, NULL);
-    CHECK_TEXT(cy.last[PAL_CONTROL_ERROR].problem.text, "a viewer resets nothing but a body that was stopped");
+    CHECK_TEXT(cy.last[PAL_CONTROL_ERROR].error.text, "a viewer resets nothing but a body that was stopped");
     mem_end(&cy);
     end();
 }
@@ -182,19 +183,19 @@ static void a_body_asleep_is_neither_stepped_nor_encoded(void)
     mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
     const pal_wire_status *s = &ada.last[PAL_CONTROL_STATUS].status;
     UNTIL(s->n_state == 1 && s->state[0].asleep && ada.n_frame > 0, &ada, NULL);
-    UNTIL(s->n_row > 3, &ada, NULL);
-    double row_ms[PAL_WIRE_COMPONENT_MAX];
-    memcpy(row_ms, s->row_ms, sizeof row_ms);
+    UNTIL(s->n_component > 3, &ada, NULL);
+    double component_ms[PAL_WIRE_COMPONENT_MAX];
+    memcpy(component_ms, s->component_ms, sizeof component_ms);
     double n_encode = counter("palpate_encodes_total");
-    uint64_t tick = s->tick, made = pal_estimator_made();
+    uint64_t tick = s->tick, made = pal_estimator_count();
     int n_frame = ada.n_frame, n_tools = ada.n_tools;
     UNTIL(s->tick > tick + 80 && ada.n_tools > n_tools + 60, &ada, NULL);
     /* means of the last steps, each of which weighs a fifth: what took nothing for 60 steps is a millionth by now */
-    for (uint32_t r = 0; r < s->n_row; r++) CHECK_LE(s->row_ms[r], 1e-3 * row_ms[r]);
+    for (uint32_t r = 0; r < s->n_component; r++) CHECK_LE(s->component_ms[r], 1e-3 * component_ms[r]);
     CHECK(s->state[0].asleep);
     CHECK_INT((int)counter("palpate_encodes_total"), (int)n_encode);
     CHECK_INT(ada.n_frame, n_frame);
-    CHECK(pal_estimator_threads() == 0 && pal_estimator_made() == made);
+    CHECK(pal_estimator_threads() == 0 && pal_estimator_count() == made);
     /* a tool comes through its middle */
     const pal_surface *surface = &organ.mesh.surface;
     double at[3] = {surface->x[0], surface->x[1], surface->x[2]};

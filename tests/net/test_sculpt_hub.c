@@ -144,7 +144,7 @@ static void a_cut_shows_the_inside_and_goes_again(void)
     CHECK_NEAR(told(&c, "can_undo"), 0, 0);
     CHECK(order(&c, "uncut", ""));
     CHECK_TEXT(part(&c)->asset, before.asset);
-    CHECK(order(&c, "keep", ""));
+    CHECK(order(&c, "set_rest_shape", ""));
     CHECK_NEAR(told(&c, "can_undo"), 1, 0);
     until_frame(&c);
     CHECK_LE(moved(&c), 1e-4);
@@ -165,8 +165,8 @@ static void what_cannot_be_done_is_refused_with_a_sentence_and_changes_nothing(v
                {"merge", TOP ",\"x2_m\":0.5,\"y2_m\":0,\"z2_m\":0", "refused", "nothing of clay"},
                {"merge", TOP ",\"x2_m\":-0.05,\"y2_m\":0.02,\"z2_m\":0.02", "refused", "merge "},
                {"bridge", TOP ",\"x2_m\":0.02,\"y2_m\":0.02,\"z2_m\":0.05", "refused", "bridge "},
-               {"sharpen", TOP ",\"sharp\":1,\"what\":7", "args", "what is 7"},
-               {"sharpen", TOP ",\"sharp\":-1,\"what\":0", "refused", "sharpness is -1"},
+               {"sharpen", TOP ",\"sharpness\":1,\"entity\":7", "args", "what is 7"},
+               {"sharpen", TOP ",\"sharpness\":-1,\"entity\":0", "refused", "sharpness is -1"},
                {"cut", "\"nx\":0,\"ny\":0,\"nz\":0,\"offset_m\":0", "refused", "direction"},
                {"cut", "\"nx\":0,\"ny\":0,\"nz\":1,\"offset_m\":-1", "refused", "the cut leaves nothing"},
                {"undo", "", "refused", "nothing to undo"},
@@ -181,11 +181,11 @@ static void what_cannot_be_done_is_refused_with_a_sentence_and_changes_nothing(v
         bool as_said = !done && strstr(trouble(&c), bad[i].word);
         CHECK(as_said);
         if (done || !as_said) printf("  %s %s: \"%s\"\n", bad[i].verb, bad[i].args, done ? "done" : trouble(&c));
-        CHECK_TEXT(c.last[PAL_CONTROL_ERROR].problem.code, bad[i].code);
+        CHECK_TEXT(c.last[PAL_CONTROL_ERROR].error.code, bad[i].code);
     }
     mem_text(&c, "{\"type\":\"command\",\"verb\":\"undo\",\"target\":\"liver\"}");
     until_answers(&c, NULL, n_answer(&c) + 1);
-    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].problem.code, "target");
+    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].error.code, "target");
     CHECK_INT(c.n_text[PAL_CONTROL_TOPOLOGY], 0);
     CHECK_INT(pal_mem_code(c.peer), 0);
     CHECK(order(&c, "extrude", TOP ",\"distance_m\":0.02"));
@@ -227,24 +227,24 @@ static void hands_blow_up_and_pull_until_they_let_go(void)
                 "\"stiffness_N_m\":100,\"dx_m\":0,\"dy_m\":0,\"dz_m\":0.02"));
     CHECK(until_height(&c, true, rest + 0.003));
     /* who lets the tool go lets go */
-    mem_text(&c, "{\"type\":\"leave\"}");
+    mem_text(&c, "{\"type\":\"release_tool\"}");
     CHECK(until_height(&c, false, rest + 0.001));
     CHECK(!order(&c, "inflate", TOP ",\"radius_m\":0.04,\"pressure_Pa\":600"));
-    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].problem.code, "role");
+    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].error.code, "role");
     CHECK_INT(c.n_bad, 0);
     mem_end(&c);
 
     join(&c, "Bob", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
     CHECK(!order(&c, "release", ""));
-    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].problem.code, "tool");
-    mem_text(&c, "{\"type\":\"take\",\"tool\":1}");
+    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].error.code, "tool");
+    mem_text(&c, "{\"type\":\"take_tool\",\"tool\":1}");
     for (int i = 0; i < 20; i++) turn(&c, NULL);
     CHECK(!order(&c, "inflate", TOP ",\"radius_m\":0,\"pressure_Pa\":600"));
     CHECK_TEXT(trouble(&c), "inflate: brush: radius_m 0, wanted 1e-9 to 1e9");
     CHECK(!order(&c, "inflate", FAR ",\"radius_m\":0.1,\"pressure_Pa\":600"));
     CHECK(strstr(trouble(&c), "inflate: nothing of ") != NULL);
     CHECK(!order(&c, "curve", TOP));
-    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].problem.code, "args");
+    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].error.code, "args");
     CHECK(order(&c, "release", ""));
     mem_end(&c);
     end();
@@ -258,9 +258,9 @@ static void who_holds_no_tool_and_teaches_nobody_sculpts_nothing(void)
     join(&bare, "Bob", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
     join(&holds, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
     CHECK(!order(&looks, "divide", TOP));
-    CHECK_TEXT(looks.last[PAL_CONTROL_ERROR].problem.code, "role");
+    CHECK_TEXT(looks.last[PAL_CONTROL_ERROR].error.code, "role");
     CHECK(!order(&bare, "divide", TOP));
-    CHECK_TEXT(bare.last[PAL_CONTROL_ERROR].problem.code, "role");
+    CHECK_TEXT(bare.last[PAL_CONTROL_ERROR].error.code, "role");
     CHECK(order(&bare, "probe", TOP)); /* that only asks */
     CHECK(order(&holds, "divide", TOP));
     mem_end(&looks);
@@ -279,7 +279,7 @@ static void sixteen_wait_and_the_next_one_is_told(void)
     for (int i = 0; i < ASKED; i++) send(&c, i % 2 ? "undo" : "extrude", i % 2 ? "" : TOP ",\"distance_m\":0.02");
     until_answers(&c, NULL, before + ASKED);
     CHECK_INT(c.n_text[PAL_CONTROL_ERROR], 2); /* one is under way, sixteen wait */
-    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].problem.code, "busy");
+    CHECK_TEXT(c.last[PAL_CONTROL_ERROR].error.code, "busy");
     CHECK_INT(c.n_text[PAL_CONTROL_ANSWER], 17);
     CHECK_INT(part(&c)->epoch, 18); /* in order: each undo had something to undo */
     CHECK_NEAR(told(&c, "cells"), 9, 0);
@@ -343,7 +343,7 @@ static void a_field_that_is_looked_at_goes_on_with_the_new_vertices(void)
     mem_client c;
     begin();
     join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
-    mem_text(&c, "{\"type\":\"view\",\"part\":0,\"field\":\"displacement\"}");
+    mem_text(&c, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}");
     for (int i = 0; i < 20000 && c.n_field == 0; i++) turn(&c, NULL);
     CHECK_INT(c.field.epoch, 1);
     CHECK(order(&c, "extrude", TOP ",\"distance_m\":0.02"));

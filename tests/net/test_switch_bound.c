@@ -2,7 +2,7 @@
  * study and along its knobs, the energy within 2 %, no shown vertex farther in all than the errors that were shown of
  * both settings allow, and the answer says so. Estimates of errors under a press hold what they promise. The carry is
  * made beside the loop, not by it. */
-#include "server/estimate/estimate_work.h"
+#include "server/estimate/estimation.h"
 #include "server/session/configuration_switch.h"
 #include "tests/net/command_room.h"
 #include "tests/session/session_scene.h"
@@ -19,11 +19,11 @@ static double estimate_m[POINTS];
 /* of a running session there */
 static double estimate_of(const pal_scene *at, const pal_world *w)
 {
-    pal_estimate_work *work = NULL;
+    pal_estimation *work = NULL;
     pal_estimate e = {.error_m = NAN};
-    CHECK(!pal_estimate_work_open(at, 0, NULL, NULL, &work));
-    if (work) CHECK(pal_estimate_copy(pal_estimate_work_state(work), w, 0) && pal_estimate_work_run(work, &e));
-    pal_estimate_work_close(work);
+    CHECK(!pal_estimation_open(at, 0, NULL, NULL, &work));
+    if (work) CHECK(pal_estimate_copy(pal_estimation_state(work), w, 0) && pal_estimation_run(work, &e));
+    pal_estimation_close(work);
     return e.error_m;
 }
 
@@ -105,9 +105,9 @@ static void check_jump(const mem_client *c)
     CHECK_NEAR(bound_m, told(c, "error_before_m") + told(c, "error_after_m"), 1e-12);
     CHECK_LE(fabs(told(c, "energy_percent")), 2);
     CHECK(told(c, "energy_before_J") > 1e-4);
-    CHECK(told(c, "most_move_m") > 0 && told(c, "body_move_m") > 0);
-    CHECK_LE(told(c, "most_move_m"), bound_m);
-    CHECK_NEAR(told(c, "frame_move_m"), told(c, "most_move_m") / 10, 1e-9);
+    CHECK(told(c, "max_move_m") > 0 && told(c, "max_body_move_m") > 0);
+    CHECK_LE(told(c, "max_move_m"), bound_m);
+    CHECK_NEAR(told(c, "max_frame_move_m"), told(c, "max_move_m") / 10, 1e-9);
     CHECK(strstr(text, "within the bound") != NULL);
     CHECK(!strstr(text, "beyond 2 %"));
 }
@@ -122,7 +122,7 @@ static void every_pair_keeps_the_errors_shown(void)
     wait_steps(&c, 60, true);
     for (int k = 0, at = 0; k < 6; at = way[k++]) {
         snprintf(args, sizeof args, "\"index\":%d", way[k]);
-        CHECK(order(&c, "point", args));
+        CHECK(order(&c, "study_point", args));
         check_jump(&c);
         CHECK_NEAR(told(&c, "error_before_m"), point[at].error_m, 1e-9);
         CHECK_NEAR(told(&c, "error_after_m"), point[way[k]].error_m, 1e-9);
@@ -150,10 +150,10 @@ static void a_knob_keeps_the_errors_foreseen(bool pressed)
     order_begin(&scene, point, POINTS);
     join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, 0);
     wait_steps(&c, 5, pressed);
-    CHECK(order(&c, "point", "\"index\":1"));
+    CHECK(order(&c, "study_point", "\"index\":1"));
     until_frame(&c);
     wait_steps(&c, 60, pressed);
-    send(&c, "estimate", "\"on\":1");
+    send(&c, "estimate", "\"enabled\":1");
     const pal_wire_estimate *e = &c.last[PAL_CONTROL_ESTIMATE].estimate;
     for (int i = 0; i < 4000 && !(e->tick > 0 && next_size(e)); i++) wait_steps(&c, 2, pressed);
     /* on a busy machine a newer one takes seconds: the body waits for it */
@@ -164,12 +164,12 @@ static void a_knob_keeps_the_errors_foreseen(bool pressed)
     REQUIRE(next);
     double now_m = e->error_m, then_m = next->error_m;
     snprintf(args, sizeof args, "\"size\":%u", next->size);
-    CHECK(order(&c, "knob", args));
+    CHECK(order(&c, "configure", args));
     check_jump(&c);
-    CHECK_LE(told(&c, "body_move_m"), told(&c, "bound_m"));
+    CHECK_LE(told(&c, "max_body_move_m"), told(&c, "bound_m"));
     printf("  %s: moves %.3f mm, %.3f mm a frame, a point of the body %.3f mm, bound %.3f mm\n",
-           pressed ? "pressed" : "under its weight", 1e3 * told(&c, "most_move_m"), 1e3 * told(&c, "frame_move_m"),
-           1e3 * told(&c, "body_move_m"), 1e3 * told(&c, "bound_m"));
+           pressed ? "pressed" : "under its weight", 1e3 * told(&c, "max_move_m"), 1e3 * told(&c, "max_frame_move_m"),
+           1e3 * told(&c, "max_body_move_m"), 1e3 * told(&c, "bound_m"));
     CHECK_NEAR(told(&c, "error_before_m"), now_m, 0.2 * now_m);
     CHECK_NEAR(told(&c, "error_after_m"), then_m, 0.2 * then_m);
     mem_end(&c);
@@ -193,8 +193,8 @@ static void without_errors_shown_there_is_no_bound(void)
     order_begin(&scene, NULL, 0);
     join(&c, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
     wait_steps(&c, 20, true);
-    CHECK(order(&c, "knob", "\"step_ms\":4"));
-    CHECK(isnan(told(&c, "bound_m")) && told(&c, "most_move_m") >= 0);
+    CHECK(order(&c, "configure", "\"step_ms\":4"));
+    CHECK(isnan(told(&c, "bound_m")) && told(&c, "max_move_m") >= 0);
     CHECK(strstr(c.last[PAL_CONTROL_ANSWER].answer.text, "no bound") != NULL);
     mem_end(&c);
     end();
@@ -206,11 +206,11 @@ static void an_old_estimate_bounds_nothing(void)
     mem_client c;
     order_begin(&scene, point, POINTS);
     join(&c, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
-    CHECK(order(&c, "point", "\"index\":1"));
-    send(&c, "estimate", "\"on\":1");
+    CHECK(order(&c, "study_point", "\"index\":1"));
+    send(&c, "estimate", "\"enabled\":1");
     const pal_wire_estimate *e = &c.last[PAL_CONTROL_ESTIMATE].estimate;
     for (int i = 0; i < 4000 && !(e->tick > 0 && e->error_m > 0); i++) wait_steps(&c, 2, true);
-    pal_estimator_hold(true);
+    pal_estimator_pause_all(true);
     /* what was under way at the hold is of a state before it */
     double held_s = c.last[PAL_CONTROL_STATUS].status.sim_time_s, now_s = held_s;
     for (int i = 0; i < 4000 && now_s - held_s < 1.3; i++) {
@@ -220,9 +220,9 @@ static void an_old_estimate_bounds_nothing(void)
     for (int i = 0, n = c.n_text[PAL_CONTROL_ESTIMATE]; i < 4000 && c.n_text[PAL_CONTROL_ESTIMATE] == n; i++)
         turn(&c, NULL);
     CHECK(e->age_s > 1 && e->error_m > 0);
-    CHECK(order(&c, "knob", "\"step_ms\":4"));
+    CHECK(order(&c, "configure", "\"step_ms\":4"));
     CHECK(isnan(told(&c, "bound_m")) && strstr(c.last[PAL_CONTROL_ANSWER].answer.text, "no bound") != NULL);
-    pal_estimator_hold(false);
+    pal_estimator_pause_all(false);
     mem_end(&c);
     end();
 }

@@ -31,7 +31,7 @@ static void two_clients_see_a_point_of_the_study(void)
     char before[64];
     snprintf(before, sizeof before, "%s", part(&a)->asset);
     /* finite elements on voxels: another surface is shown */
-    send(&a, "point", "\"index\":1");
+    send(&a, "study_point", "\"index\":1");
     until_answers(&a, &b, n_answer(&a) + 1);
     CHECK_INT(a.n_text[PAL_CONTROL_ANSWER], 1);
     if (a.n_text[PAL_CONTROL_ERROR]) printf("  %s\n", trouble(&a));
@@ -47,11 +47,11 @@ static void two_clients_see_a_point_of_the_study(void)
     CHECK_LE(told(&a, "energy_before_J"), 1e-9);
     CHECK_LE(fabs(told(&a, "energy_after_J") - told(&a, "energy_before_J")), 1e-9);
     CHECK(isfinite(told(&a, "energy_percent")));
-    CHECK_LE(told(&a, "most_move_m"), 0.005);
+    CHECK_LE(told(&a, "max_move_m"), 0.005);
     /* a knob of it, and back to the cells, which can be sculpted again */
-    CHECK(order(&a, "knob", "\"size\":10,\"tolerance\":0.001"));
+    CHECK(order(&a, "configure", "\"size\":10,\"tolerance\":0.001"));
     CHECK(strstr(a.last[PAL_CONTROL_ANSWER].answer.text, "10 voxels") != NULL);
-    CHECK(order(&a, "point", "\"index\":2"));
+    CHECK(order(&a, "study_point", "\"index\":2"));
     for (int i = 0; i < 20000 && b.n_text[PAL_CONTROL_TOPOLOGY] < 3; i++) turn(&a, &b);
     until_frame(&a), until_frame(&b);
     CHECK(part(&a)->is_sculptable);
@@ -60,10 +60,10 @@ static void two_clients_see_a_point_of_the_study(void)
     CHECK(told(&a, "cells") > 8);
     /* what was sculpted is switched as it is, and comes back as it was */
     double cells = told(&a, "cells");
-    CHECK(order(&a, "point", "\"index\":1"));
+    CHECK(order(&a, "study_point", "\"index\":1"));
     CHECK(!order(&a, "divide", TOP));
     CHECK(strstr(trouble(&a), "cannot be sculpted") || strstr(trouble(&a), "can be sculpted"));
-    CHECK(order(&a, "point", "\"index\":0"));
+    CHECK(order(&a, "study_point", "\"index\":0"));
     CHECK(order(&a, "undo", ""));
     CHECK(told(&a, "cells") < cells);
     mem_end(&a);
@@ -80,7 +80,7 @@ static void tools_stay_with_who_holds_them(void)
     for (int round = 0; round < 3; round++) {
         const double at[3] = {0, 0, 0.12 + 0.01 * round};
         mem_pose(&c, 0, ++seq, at);
-        if (round == 1) CHECK(order(&c, "knob", "\"step_ms\":20"));
+        if (round == 1) CHECK(order(&c, "configure", "\"step_ms\":20"));
         for (int i = 0; i < 20000 && c.tools.tool[0].echo_seq != seq; i++) turn(&c, NULL);
         CHECK_INT(c.tools.tool[0].echo_seq, seq);
         CHECK(c.tools.tool[0].flags & PAL_WIRE_TOOL_HELD);
@@ -119,13 +119,13 @@ static void a_pressure_goes_on(void)
     wait_frames(&c, 60);
     double lifted = highest(&c) - rest;
     CHECK(lifted > 0.001);
-    CHECK(order(&c, "point", "\"index\":2"));
-    CHECK_INT((int)told(&c, "brushes_over"), 0);
+    CHECK(order(&c, "study_point", "\"index\":2"));
+    CHECK_INT((int)told(&c, "brushes_ended"), 0);
     until_frame(&c);
     wait_frames(&c, 60);
     CHECK_NEAR(highest(&c) - rest, lifted, 0.5 * lifted);
-    CHECK(order(&c, "point", "\"index\":1"));
-    CHECK_INT((int)told(&c, "brushes_over"), 1);
+    CHECK(order(&c, "study_point", "\"index\":1"));
+    CHECK_INT((int)told(&c, "brushes_ended"), 1);
     CHECK(strstr(c.last[PAL_CONTROL_ANSWER].answer.text, "brushes that ended: 1") != NULL);
     mem_end(&c);
     end();
@@ -147,8 +147,8 @@ static void a_handle_goes_on(void)
     wait_frames(&c, 60);
     double lifted = highest(&c) - rest;
     CHECK(lifted > 0.001);
-    CHECK(order(&c, "point", "\"index\":2"));
-    CHECK_INT((int)told(&c, "brushes_over"), 0);
+    CHECK(order(&c, "study_point", "\"index\":2"));
+    CHECK_INT((int)told(&c, "brushes_ended"), 0);
     until_frame(&c);
     wait_frames(&c, 60);
     CHECK_NEAR(highest(&c) - rest, lifted, 0.3 * lifted);
@@ -163,15 +163,12 @@ static void what_cannot_be_is_refused_with_a_sentence(void)
 {
     static const struct {
         const char *verb, *args, *says;
-    } bad[] = {{"point", "", "index is missing"},
-               {"point", "\"index\":7", "wanted 0 to 2"},
-               {"point", "\"index\":0.5", "wanted 0 to 2"},
-               {"point", "\"index\":0,\"size\":3", "takes index"},
-               {"knob", "", "takes size step_ms tolerance"},
-               {"knob", "\"size\":3.5", "is no number of"},
-               {"knob", "\"size\":9", "levels, wanted"},
-               {"knob", "\"step_ms\":1000", "step_s"},
-               {"knob", "\"tolerance\":7", "tolerance"}};
+    } bad[] = {
+        {"study_point", "", "index is missing"},           {"study_point", "\"index\":7", "wanted 0 to 2"},
+        {"study_point", "\"index\":0.5", "wanted 0 to 2"}, {"study_point", "\"index\":0,\"size\":3", "takes index"},
+        {"configure", "", "takes size step_ms tolerance"}, {"configure", "\"size\":3.5", "is no number of"},
+        {"configure", "\"size\":9", "levels, wanted"},     {"configure", "\"step_ms\":1000", "step_s"},
+        {"configure", "\"tolerance\":7", "tolerance"}};
     mem_client c, d;
     begin();
     join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
@@ -181,12 +178,12 @@ static void what_cannot_be_is_refused_with_a_sentence(void)
         if (!strstr(trouble(&c), bad[i].says)) printf("  %s\n", trouble(&c));
     }
     CHECK_INT(c.n_text[PAL_CONTROL_TOPOLOGY], 0);
-    mem_text(&c, "{\"type\":\"command\",\"verb\":\"point\",\"target\":\"stone\",\"args\":{\"index\":1}}");
+    mem_text(&c, "{\"type\":\"command\",\"verb\":\"study_point\",\"target\":\"stone\",\"args\":{\"index\":1}}");
     until_answers(&c, NULL, n_answer(&c) + 1);
     CHECK(strstr(trouble(&c), "stone") != NULL);
     /* who teaches nobody and holds no tool */
     join(&d, "Ben", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
-    CHECK(!order(&d, "point", "\"index\":1"));
+    CHECK(!order(&d, "study_point", "\"index\":1"));
     CHECK(strstr(trouble(&d), "only an instructor or who holds a tool") != NULL);
     mem_end(&c);
     mem_end(&d);
@@ -199,8 +196,8 @@ static void a_server_that_ends_in_the_middle_ends(void)
     mem_client c;
     begin();
     join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
-    send(&c, "point", "\"index\":1");
-    send(&c, "knob", "\"size\":12");
+    send(&c, "study_point", "\"index\":1");
+    send(&c, "configure", "\"size\":12");
     for (int i = 0; i < 3; i++) turn(&c, NULL);
     mem_end(&c);
     for (int i = 0; i < 3; i++) turn(NULL, NULL);

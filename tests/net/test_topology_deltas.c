@@ -99,7 +99,7 @@ static void hello_tells_which_parts_adapt_and_the_asset_holds_the_finest_level(v
     }
     CHECK_INT(s->n_active, 1);
     CHECK(s->active[0].part == 0 && s->active[0].n_node == ADAPTIVE_NODES && s->active[0].n_spring == 336);
-    CHECK(s->active[0].n_all_node == ADAPTIVE_VERTICES && s->active[0].n_finest_spring == ADAPTIVE_SPRINGS);
+    CHECK(s->active[0].n_finest_node == ADAPTIVE_VERTICES && s->active[0].n_finest_spring == ADAPTIVE_SPRINGS);
     CHECK_INT(c.n_bad, 0);
     mem_end(&c);
     end();

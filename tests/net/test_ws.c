@@ -10,7 +10,7 @@
 
 #define JOIN    "{\"type\":\"join\",\"name\":\"Ada\",\"role\":\"trainee\",\"tool\":-1}"
 #define WATCH   "{\"type\":\"join\",\"name\":\"Vera\",\"role\":\"viewer\",\"tool\":null}"
-#define PALPATE "Sec-WebSocket-Protocol: palpate.v1\r\n"
+#define PALPATE "Sec-WebSocket-Protocol: palpate.v2\r\n"
 
 static small_scene organ;
 static pal_session *session;
@@ -87,9 +87,9 @@ static void upgrade_needs_the_subprotocol_the_path_and_the_own_origin(void)
     } kind[] = {{"/ws", PALPATE, 101},
                 {"/ws?session=small", PALPATE, 101},
                 {"/ws", own, 101},
-                {"/ws", "Sec-WebSocket-Protocol: chat, palpate.v1\r\n", 101},
+                {"/ws", "Sec-WebSocket-Protocol: chat, palpate.v2\r\n", 101},
                 {"/ws", "", 403},
-                {"/ws", "Sec-WebSocket-Protocol: palpate.v2\r\n", 0},
+                {"/ws", "Sec-WebSocket-Protocol: palpate.v1\r\n", 0},
                 {"/ws", "Sec-WebSocket-Protocol: http\r\n", 403},
                 {"/ws", "Sec-WebSocket-Protocol: palpate-listen\r\n", 403},
                 {"/", PALPATE, 403},
@@ -102,7 +102,7 @@ static void upgrade_needs_the_subprotocol_the_path_and_the_own_origin(void)
         check_count++;
         if (status != kind[i].status)
             CHECK_FAIL("%s with \"%.60s\": status %d, wanted %d", kind[i].path, kind[i].extra, status, kind[i].status);
-        if (status == 101) CHECK(strstr(head, "palpate.v1") && !strstr(head, "permessage-deflate"));
+        if (status == 101) CHECK(strstr(head, "palpate.v2") && !strstr(head, "permessage-deflate"));
         if (status != 101) CHECK(raw_ended(fd));
         close(fd);
     }
@@ -342,7 +342,7 @@ static void flood_closes_the_flooder_alone(void)
     static char body[32768];
     size_t n = 0;
     int good = joined(WATCH), fd = joined(JOIN);
-    for (int i = 0; i < 2000; i++) raw_text(fd, "{\"type\":\"leave\"}");
+    for (int i = 0; i < 2000; i++) raw_text(fd, "{\"type\":\"release_tool\"}");
     /* the code may be lost when the kernel resets a connection whose input nobody reads */
     int code = raw_close_code(fd);
     CHECK(code == PAL_WIRE_CLOSE_RATE || code == 0);

@@ -152,9 +152,9 @@ static void agrees_with_a_dense_solve_of_random_matrices(void)
     for (int t = 0; t < 30; t++) {
         int32_t pair[2 * R_PAIR];
         uint8_t fixed[R];
-        int n_pair = t < 5 ? 0 : 4 * t - 10, n_held = 0;
+        int n_pair = t < 5 ? 0 : 4 * t - 10, n_fixed = 0;
         for (int i = 0; i < 2 * n_pair; i++) pair[i] = (int)((draw() + 1) / 2 * R) % R;
-        for (int i = 0; i < R; i++) fixed[i] = draw() > 0.7, n_held += fixed[i];
+        for (int i = 0; i < R; i++) fixed[i] = draw() > 0.7, n_fixed += fixed[i];
         pal_arena *arena = pal_arena_create(1 << 16, true);
         pal_block_matrix a;
         pal_cholesky *c;
@@ -182,7 +182,7 @@ static void agrees_with_a_dense_solve_of_random_matrices(void)
         CHECK_LE(single, 1e-7);
         CHECK(single > 1e-12); /* it is the single precision factor that is used */
         for (int i = 0; i < 3 * R; i++) CHECK(!fixed[i / 3] || (x[i] == 0 && b[i] == 0));
-        CHECK(pal_cholesky_nonzeros(c) >= 6 * (R - n_held));
+        CHECK(pal_cholesky_nonzeros(c) >= 6 * (R - n_fixed));
         pal_cholesky_destroy(c);
         pal_arena_destroy(arena);
     }

@@ -97,7 +97,7 @@ static void the_order_keeps_the_envelope_small(void)
     CHECK_LE((double)e.start[N], 1.8 * 58 * N);
     uint8_t seen[N] = {0};
     for (int i = 0; i < N; i++) seen[e.order[i]]++;
-    for (int i = 0; i < N; i++) CHECK(seen[i] == 1 && e.place[e.order[i]] == i);
+    for (int i = 0; i < N; i++) CHECK(seen[i] == 1 && e.position[e.order[i]] == i);
     pal_arena_destroy(arena);
 }
 

@@ -77,23 +77,22 @@ static void what_cancels_leaves_no_entry(void)
 static void products_are_those_of_matrices(void)
 {
     double a[FINE * MIDDLE], b[MIDDLE * COARSE], want[FINE * COARSE] = {0};
-    pal_interpolation external_force = some(FINE, MIDDLE, 2, a), inner = some(MIDDLE, COARSE, 3, b), product = {0},
-                      none = {0};
+    pal_interpolation outer = some(FINE, MIDDLE, 2, a), inner = some(MIDDLE, COARSE, 3, b), product = {0}, none = {0};
     for (int i = 0; i < FINE; i++)
         for (int k = 0; k < MIDDLE; k++)
             for (int j = 0; j < COARSE; j++) want[i * COARSE + j] += a[i * MIDDLE + k] * b[k * COARSE + j];
-    REQUIRE(pal_interpolation_product(&external_force, &inner, INT32_MAX, &product) == PAL_ERR_OK);
+    REQUIRE(pal_interpolation_product(&outer, &inner, INT32_MAX, &product) == PAL_ERR_OK);
     CHECK_INT(product.n_row, FINE);
     CHECK_INT(product.n_point, COARSE);
     CHECK_LE(difference(&product, want), 1e-14);
     int32_t n = product.start[FINE];
-    CHECK_INT(pal_interpolation_product(&external_force, &inner, n / 2, &none), PAL_ERR_BUDGET);
+    CHECK_INT(pal_interpolation_product(&outer, &inner, n / 2, &none), PAL_ERR_BUDGET);
     CHECK(!none.start && !none.point);
     pal_interpolation same = {0}, one = {0};
     REQUIRE(pal_interpolation_identity(MIDDLE, &one) == PAL_ERR_OK);
-    CHECK(pal_interpolation_product(&external_force, &one, INT32_MAX, &same) == PAL_ERR_OK);
+    CHECK(pal_interpolation_product(&outer, &one, INT32_MAX, &same) == PAL_ERR_OK);
     CHECK_LE(difference(&same, a), 1e-15);
-    pal_interpolation_free(&external_force);
+    pal_interpolation_free(&outer);
     pal_interpolation_free(&inner);
     pal_interpolation_free(&product);
     pal_interpolation_free(&one);

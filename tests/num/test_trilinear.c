@@ -10,7 +10,7 @@ static double uniform(void) /* in [-1, 1) */
     return check_random(&seed);
 }
 
-/* paper B 3.5: the products of v_rel and 1 - v_rel, here (0.25, 0.5, 0.75) of one cell */
+/* paper B section 3.5: the products of v_rel and 1 - v_rel, here (0.25, 0.5, 0.75) of one cell */
 static void weights_are_those_of_the_paper(void)
 {
     const pal_grid grid = {{3, 3, 3}, {0, 0, 0}, {2, 4, 8}};

@@ -146,9 +146,9 @@ static inline void golden_hello(pal_wire_hello *h)
                           .up = {0, 0.6, 0.8},
                           .n_part = 2,
                           .n_tool = 1,
-                          .n_row = 3,
+                          .n_component = 3,
                           .tool = {{"probe", 0.01}},
-                          .row = {"gravity", "edge_distance", "verlet"},
+                          .component = {"gravity", "edge_distance", "verlet"},
                           .you_id = 7,
                           .you_role = PAL_WIRE_ROLE_TRAINEE,
                           .you_name = "Ada",
@@ -167,7 +167,7 @@ static const uint32_t golden_place[GOLDEN_PATCH_PLACES] = {0, 1, 5, 6, 7, 50, 51
 static const uint32_t golden_corner[GOLDEN_PATCH_PLACES][3] = {{0, 0, 0},    {3, 2, 1},    {55, 54, 0},  {0, 0, 0},
                                                                {17, 40, 23}, {23, 40, 41}, {41, 17, 23}, {55, 1, 30}};
 
-static inline pal_topology_delta_head golden_patch(void)
+static inline pal_topology_delta_head golden_topology_delta(void)
 {
     return (pal_topology_delta_head){
         .part = 2, .epoch = 5, .n_place = GOLDEN_PATCH_PLACES, .revision = 4503599627370497};
@@ -193,14 +193,14 @@ static inline void golden_study(pal_wire_study *s)
 static inline void golden_estimate(pal_wire_estimate *e)
 {
     *e = (pal_wire_estimate){.body = "liver",
-                             .setting = "fem hex8_bbar corotational, 16 voxels",
-                             .point = 250,
+                             .configuration = "fem hex8_bbar corotational, 16 voxels",
+                             .study_point = 250,
                              .tick = 1234567890123,
                              .time_s = 1.5,
                              .age_s = 0.25,
-                             .ms = 16.25,
+                             .cost_ms = 16.25,
                              .estimate_ms = 81.5,
-                             .max_m = 0.0125,
+                             .max_displacement_m = 0.0125,
                              .error_m = 1e-3,
                              .discretisation_m = 7e-4,
                              .algebraic_m = 1e-9,
@@ -217,7 +217,8 @@ static inline void golden_estimate(pal_wire_estimate *e)
 /* nothing is known yet: what is not a number is not on the wire */
 static inline void golden_no_estimate(pal_wire_estimate *e)
 {
-    *e = (pal_wire_estimate){.body = "liver", .setting = "tet_springs", .point = NAN, .ms = NAN, .max_m = NAN};
+    *e = (pal_wire_estimate){
+        .body = "liver", .configuration = "tet_springs", .study_point = NAN, .cost_ms = NAN, .max_displacement_m = NAN};
     e->age_s = e->error_m = e->discretisation_m = e->algebraic_m = e->time_m = e->model_m = e->energy_error_percent =
         NAN;
 }
@@ -242,10 +243,10 @@ static inline void golden_control(pal_control_type type, pal_control *c)
                                       .slowdown = 1.25,
                                       .substeps = 3,
                                       .step_ms = 0.41,
-                                      .n_row = 3,
-                                      .row_ms = {0.001, 1.0 / 3, 0.03},
+                                      .n_component = 3,
+                                      .component_ms = {0.001, 1.0 / 3, 0.03},
                                       .n_component_name = 3,
-                                      .row = {"gravity", "verlet", "field_output"},
+                                      .component = {"gravity", "verlet", "field_output"},
                                       .n_member = 2,
                                       .bytes_s = 312000,
                                       .rtt_ms = 0.4,
@@ -260,13 +261,13 @@ static inline void golden_control(pal_control_type type, pal_control *c)
         c->members.member[1] = (pal_wire_member){65535, PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE, 0x0080FF, "Bo"};
         break;
     case PAL_CONTROL_ERROR:
-        c->problem = (pal_wire_error){"tool_taken", "tool 0 is held by Ada"};
+        c->error = (pal_wire_error){"tool_taken", "tool 0 is held by Ada"};
         break;
     case PAL_CONTROL_JOIN:
         c->join = (pal_wire_join){"Grace", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY, false};
         break;
     case PAL_CONTROL_COMMAND:
-        c->order = (pal_wire_command){"material", "liver", 2, {{"young_Pa", 8000}, {"poisson", 0.45}}};
+        c->command = (pal_wire_command){"material", "liver", 2, {{"young_Pa", 8000}, {"poisson", 0.45}}};
         break;
     case PAL_CONTROL_ANSWER:
         c->answer = (pal_wire_answer){"extrude", "28 cells", 2, {{"cells", 28}, {"can_undo", 1}}};
@@ -278,11 +279,11 @@ static inline void golden_control(pal_control_type type, pal_control *c)
     case PAL_CONTROL_ESTIMATE:
         golden_no_estimate(&c->estimate);
         break;
-    case PAL_CONTROL_TAKE:
+    case PAL_CONTROL_TAKE_TOOL:
         c->tool = 2;
         break;
-    case PAL_CONTROL_VIEW:
-        c->view = (pal_wire_field_subscription){1, "von_mises"};
+    case PAL_CONTROL_SUBSCRIBE_FIELD:
+        c->field_subscription = (pal_wire_field_subscription){1, "von_mises"};
         break;
     case PAL_CONTROL_PING:
     case PAL_CONTROL_PONG:
@@ -312,8 +313,8 @@ static inline void golden_status(pal_wire_status *s)
     s->n_state = 2;
     s->state[0] = (pal_wire_part_state){0, true, false, "node 512 moves at 3,200 m/s", 17, 0.25};
     s->state[1] = (pal_wire_part_state){2, false, true, "", 0, 0};
-    s->n_off = 1;
-    s->off[0] = (pal_wire_disabled){"gravity", 1};
+    s->n_disabled = 1;
+    s->disabled[0] = (pal_wire_disabled){"gravity", 1};
     s->n_unobserved = 123456789012;
 }
 
@@ -327,7 +328,7 @@ static inline void golden_line(int line, pal_control *c)
         c->status.active[0] = (pal_wire_active){0, 133, 385, 450, 1344};
         c->status.active[1] = (pal_wire_active){3, 188, 558, 746, 2232};
     }
-    if (line == PAL_CONTROL_COUNT + 3) c->join.patches = true;
+    if (line == PAL_CONTROL_COUNT + 3) c->join.topology_deltas = true;
     if (line == PAL_CONTROL_COUNT + 4) c->hello.part[0].is_sculptable = true;
     if (line == PAL_CONTROL_COUNT + 5) {
         c->hello.estimates = true;
@@ -335,8 +336,9 @@ static inline void golden_line(int line, pal_control *c)
                     c->hello.component_reason);
     }
     if (line == PAL_CONTROL_COUNT + 6) {
-        c->topology.n_row = 2;
-        for (int i = 0; i < 2; i++) snprintf(c->topology.row[i], PAL_WIRE_NAME_BYTES, i ? "verlet" : "edge_distance");
+        c->topology.n_component = 2;
+        for (int i = 0; i < 2; i++)
+            snprintf(c->topology.component[i], PAL_WIRE_NAME_BYTES, i ? "verlet" : "edge_distance");
         golden_rows(2, &c->topology.n_component_part, c->topology.component_part, &c->topology.n_component_reason,
                     c->topology.component_reason);
     }

@@ -58,7 +58,7 @@ static void make_pose(void)
     floats("omega", p.omega_rad_s, 3, ",");
     floats("force", p.force_N, 3, ",");
     floats("torque", p.torque_N_m, 3, ",");
-    fprintf(expected, "\"grip\":%.9g,\"buttons\":%u,\"modelSeq\":%u,\"modelAgeUs\":%u,\"modelStampUs\":%llu},\n",
+    fprintf(expected, "\"gripper\":%.9g,\"buttons\":%u,\"modelSeq\":%u,\"modelAgeUs\":%u,\"modelStampUs\":%llu},\n",
             (double)p.grip, p.buttons, p.model_seq, p.model_age_us, (unsigned long long)p.model_stamp_us);
 
     pal_wire_ack a = golden_ack();
@@ -102,11 +102,11 @@ static void make_haptic(void)
             h.tool, h.seq, h.flags, (unsigned long long)h.stamp_us, (unsigned long long)h.echo_stamp_us, h.echo_seq,
             h.hold_us, h.frame_us);
     doubles("origin", h.origin_m, 3, ",");
-    floats("fRef", h.f_ref_N, 3, ",\"grip\":{");
+    floats("fRef", h.f_ref_N, 3, ",\"grasp\":{");
     floats("x0", h.grasp_x0_m, 3, ",");
     floats("f0", h.grasp_f0_N, 3, ",");
     floats("k", h.grasp_k_N_m, 6, ",");
-    fprintf(expected, "\"b\":%.9g},\"patches\":[\n", (double)h.grasp_b_N_s_m);
+    fprintf(expected, "\"b\":%.9g},\"contact_patches\":[\n", (double)h.grasp_b_N_s_m);
     for (uint32_t i = 0; i < h.n_patch; i++) {
         const pal_wire_contact_patch *p = &h.patch[i];
         fprintf(expected, "%s{\"id\":%u,\"group\":%u,", i ? ",\n" : "", p->id, p->group);
@@ -149,13 +149,13 @@ static void make_patch(const pal_asset *asset)
     memcpy(again, asset->triangle, n_corner * sizeof *again);
     for (int i = 0; i < GOLDEN_PATCH_PLACES; i++)
         memcpy(table + 3 * (size_t)golden_place[i], golden_corner[i], sizeof golden_corner[i]);
-    pal_topology_delta_head head = golden_patch();
+    pal_topology_delta_head head = golden_topology_delta();
     need(!pal_topology_delta_put(golden_place, table, &head, work, bytes, sizeof bytes, &n), "patch");
     need(!pal_topology_delta_get(bytes, n, asset->n_triangle, asset->order->n_vertex, work, &head, again),
          "patch back");
     need(!memcmp(table, again, n_corner * sizeof *table), "patched table");
-    save("patch.bin", bytes, n);
-    fprintf(expected, "\"patch\":{\"part\":%u,\"epoch\":%u,\"revision\":%llu,\"n\":%u,\"places\":[", head.part,
+    save("topology_delta.bin", bytes, n);
+    fprintf(expected, "\"topology_delta\":{\"part\":%u,\"epoch\":%u,\"revision\":%llu,\"n\":%u,\"places\":[", head.part,
             head.epoch, (unsigned long long)head.revision, head.n_place);
     for (int i = 0; i < GOLDEN_PATCH_PLACES; i++) fprintf(expected, "%s%u", i ? "," : "", golden_place[i]);
     fprintf(expected, "],\"corners\":[");

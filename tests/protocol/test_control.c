@@ -22,25 +22,25 @@ static void reads_what_a_client_says(void)
     CHECK_INT(c.join.tool, PAL_WIRE_TOOL_NONE);
     CHECK_INT(from_client("{\"type\":\"join\",\"name\":\"B\",\"role\":\"viewer\"}"), 0);
     CHECK_INT(c.join.tool, PAL_WIRE_TOOL_NONE);
-    CHECK(!c.join.patches);
-    CHECK_INT(from_client("{\"type\":\"join\",\"name\":\"B\",\"role\":\"viewer\",\"patches\":true}"), 0);
-    CHECK(c.join.patches);
+    CHECK(!c.join.topology_deltas);
+    CHECK_INT(from_client("{\"type\":\"join\",\"name\":\"B\",\"role\":\"viewer\",\"topology_deltas\":true}"), 0);
+    CHECK(c.join.topology_deltas);
     CHECK_INT(from_client("{\"type\":\"command\",\"verb\":\"pause\"}"), 0);
-    CHECK_TEXT(c.order.verb, "pause");
-    CHECK_INT(c.order.n_arg, 0);
+    CHECK_TEXT(c.command.verb, "pause");
+    CHECK_INT(c.command.n_arg, 0);
     CHECK_INT(from_client("{\"type\":\"command\",\"verb\":\"material\",\"args\":{\"young_Pa\":8e3,\"poisson\":0.45}}"),
               0);
-    CHECK_INT(c.order.n_arg, 2);
-    CHECK_TEXT(c.order.arg[0].key, "young_Pa");
-    CHECK_NEAR(c.order.arg[0].value, 8000, 0);
-    CHECK_INT(from_client("{\"type\":\"take\",\"tool\":3}"), 0);
+    CHECK_INT(c.command.n_arg, 2);
+    CHECK_TEXT(c.command.arg[0].key, "young_Pa");
+    CHECK_NEAR(c.command.arg[0].value, 8000, 0);
+    CHECK_INT(from_client("{\"type\":\"take_tool\",\"tool\":3}"), 0);
     CHECK_INT(c.tool, 3);
-    CHECK_INT(from_client("{\"type\":\"leave\"}"), 0);
+    CHECK_INT(from_client("{\"type\":\"release_tool\"}"), 0);
     CHECK_INT(from_client("{\"type\":\"ping\",\"stamp_ms\":-1.5}"), 0);
     CHECK_NEAR(c.stamp_ms, -1.5, 0);
-    CHECK_INT(from_client("{\"type\":\"view\",\"part\":2,\"field\":\"energy\",\"later\":1}"), 0);
-    CHECK_INT(c.view.part, 2);
-    CHECK_TEXT(c.view.field, "energy");
+    CHECK_INT(from_client("{\"type\":\"subscribe_field\",\"part\":2,\"field\":\"energy\",\"later\":1}"), 0);
+    CHECK_INT(c.field_subscription.part, 2);
+    CHECK_TEXT(c.field_subscription.field, "energy");
 }
 
 static void refuses_what_is_no_message(void)
@@ -57,8 +57,8 @@ static void refuses_what_is_no_message(void)
         {"{\"type\":1}", PAL_REFUSAL_FIELD},
         {"{\"type\":\"unknown\"}", PAL_REFUSAL_KIND},
         {"{\"type\":\"hello\"}", PAL_REFUSAL_KIND},
-        {"{\"type\":\"leave\"}{}", PAL_REFUSAL_JSON},
-        {"{\"type\":\"leave\"} x", PAL_REFUSAL_JSON},
+        {"{\"type\":\"release_tool\"}{}", PAL_REFUSAL_JSON},
+        {"{\"type\":\"release_tool\"} x", PAL_REFUSAL_JSON},
         {"{\"type\":\"join\"}", PAL_REFUSAL_FIELD},
         {"{\"type\":\"join\",\"name\":3,\"role\":\"viewer\"}", PAL_REFUSAL_FIELD},
         {"{\"type\":\"join\",\"name\":\"x\",\"role\":\"boss\"}", PAL_REFUSAL_FIELD},
@@ -67,20 +67,20 @@ static void refuses_what_is_no_message(void)
         {"{\"type\":\"join\",\"name\":\"\xC3\",\"role\":\"viewer\"}", PAL_REFUSAL_JSON},
         {"{\"type\":\"join\",\"name\":\"\xED\xA0\x80\",\"role\":\"viewer\"}", PAL_REFUSAL_JSON},
         {"{\"type\":\"join\",\"name\":\"\xC0\xAF\",\"role\":\"viewer\"}", PAL_REFUSAL_JSON},
-        {"{\"type\":\"join\",\"name\":\"x\",\"role\":\"viewer\",\"patches\":1}", PAL_REFUSAL_FIELD},
-        {"{\"type\":\"take\"}", PAL_REFUSAL_FIELD},
-        {"{\"type\":\"take\",\"tool\":null}", PAL_REFUSAL_FIELD},
-        {"{\"type\":\"take\",\"tool\":32}", PAL_REFUSAL_RANGE},
-        {"{\"type\":\"take\",\"tool\":0.5}", PAL_REFUSAL_RANGE},
-        {"{\"type\":\"take\",\"tool\":-2}", PAL_REFUSAL_RANGE},
-        {"{\"type\":\"take\",\"tool\":1e400}", PAL_REFUSAL_NAN},
+        {"{\"type\":\"join\",\"name\":\"x\",\"role\":\"viewer\",\"topology_deltas\":1}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"take_tool\"}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"take_tool\",\"tool\":null}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"take_tool\",\"tool\":32}", PAL_REFUSAL_RANGE},
+        {"{\"type\":\"take_tool\",\"tool\":0.5}", PAL_REFUSAL_RANGE},
+        {"{\"type\":\"take_tool\",\"tool\":-2}", PAL_REFUSAL_RANGE},
+        {"{\"type\":\"take_tool\",\"tool\":1e400}", PAL_REFUSAL_NAN},
         {"{\"type\":\"ping\",\"stamp_ms\":1e999}", PAL_REFUSAL_NAN},
         {"{\"type\":\"ping\",\"stamp_ms\":\"1\"}", PAL_REFUSAL_FIELD},
-        {"{\"type\":\"view\",\"field\":\"energy\"}", PAL_REFUSAL_FIELD},
-        {"{\"type\":\"view\",\"part\":0}", PAL_REFUSAL_FIELD},
-        {"{\"type\":\"view\",\"part\":-1,\"field\":\"none\"}", PAL_REFUSAL_RANGE},
-        {"{\"type\":\"view\",\"part\":0,\"field\":3}", PAL_REFUSAL_FIELD},
-        {"{\"type\":\"view\",\"part\":0,\"field\":\"a name that is longer than\"}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"subscribe_field\",\"field\":\"energy\"}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"subscribe_field\",\"part\":0}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"subscribe_field\",\"part\":-1,\"field\":\"none\"}", PAL_REFUSAL_RANGE},
+        {"{\"type\":\"subscribe_field\",\"part\":0,\"field\":3}", PAL_REFUSAL_FIELD},
+        {"{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"a name that is longer than\"}", PAL_REFUSAL_FIELD},
         {"{\"type\":\"command\",\"verb\":\"x\",\"args\":[1]}", PAL_REFUSAL_FIELD},
         {"{\"type\":\"command\",\"verb\":\"x\",\"args\":{\"a\":\"b\"}}", PAL_REFUSAL_FIELD},
         {"{\"type\":\"command\",\"verb\":\"x\",\"args\":{\"a\":1,\"b\":1,\"c\":1,\"d\":1,\"e\":1,\"f\":1,\"g\":1,"
@@ -93,14 +93,14 @@ static void refuses_what_is_no_message(void)
         CHECK_INT(refusal, bad[i].refusal);
     }
     CHECK_INT(c.type, PAL_CONTROL_COUNT); /* out is untouched by refusals */
-    CHECK_INT(pal_control_get("{\"type\":\"leave\"\0}", 17, false, &c), PAL_REFUSAL_JSON);
+    CHECK_INT(pal_control_get("{\"type\":\"release_tool\"\0}", 24, false, &c), PAL_REFUSAL_JSON);
 }
 
 static void refuses_text_beyond_the_limits_before_parsing_it(void)
 {
     static char text[PAL_CONTROL_OUT_MAX + 2];
     memset(text, ' ', sizeof text);
-    memcpy(text, "{\"type\":\"leave\"}", 16);
+    memcpy(text, "{\"type\":\"release_tool\"}", 23);
     CHECK_INT(pal_control_get(text, PAL_CONTROL_IN_MAX, false, &c), 0);
     CHECK_INT(pal_control_get(text, PAL_CONTROL_IN_MAX + 1, false, &c), PAL_REFUSAL_LONG);
     CHECK_INT(pal_control_get(text, PAL_CONTROL_OUT_MAX + 1, true, &c), PAL_REFUSAL_LONG);
@@ -108,14 +108,14 @@ static void refuses_text_beyond_the_limits_before_parsing_it(void)
     memset(text, '[', 4096);
     CHECK_INT(pal_control_get(text, 4096, false, &c), PAL_REFUSAL_JSON);
     for (int depth = 1; depth < 12; depth++) {
-        char deep[64] = "{\"type\":\"leave\",\"x\":";
+        char deep[64] = "{\"type\":\"release_tool\",\"x\":";
         size_t n = strlen(deep);
         for (int k = 0; k < depth; k++) deep[n++] = '[';
         for (int k = 0; k < depth; k++) deep[n++] = ']';
         deep[n++] = '}';
         CHECK_INT(pal_control_get(deep, n, false, &c), depth <= 7 ? PAL_REFUSAL_NONE : PAL_REFUSAL_JSON);
     }
-    size_t n = (size_t)snprintf(text, sizeof text, "{\"type\":\"leave\",\"x\":[0");
+    size_t n = (size_t)snprintf(text, sizeof text, "{\"type\":\"release_tool\",\"x\":[0");
     for (int k = 0; k < 1000; k++) n += (size_t)snprintf(text + n, sizeof text - n, ",0");
     n += (size_t)snprintf(text + n, sizeof text - n, "]}");
     CHECK_INT(pal_control_get(text, n, false, &c), PAL_REFUSAL_JSON);
@@ -128,11 +128,11 @@ static void reads_messages_of_before_fields(void)
         "{\"type\":\"hello\",\"version\":1,\"session\":\"main\",\"title\":\"\",\"organ\":\"\",\"step_rate_hz\":60,"
         "\"frame_rate_hz\":60,\"credit\":3,\"box_min_m\":[0,0,0],\"box_max_m\":[1,1,1],\"up\":[0,0,1],\"parts\":[{"
         "\"name\":\"liver\",\"epoch\":1,\"n_vertex\":4,\"n_triangle\":4,\"asset\":\"/asset/0\",\"error_m\":5e-5}],"
-        "\"tools\":[],\"rows\":[],\"you\":{\"id\":1,\"role\":\"viewer\",\"name\":\"A\",\"tool\":null}}";
+        "\"tools\":[],\"components\":[],\"you\":{\"id\":1,\"role\":\"viewer\",\"name\":\"A\",\"tool\":null}}";
     static const char status[] =
         "{\"type\":\"status\",\"tick\":1,\"sim_time_s\":0,\"paused\":false,\"frozen\":false,\"step_rate_hz\":60,"
-        "\"slowdown\":1,\"substeps\":1,\"step_ms\":1,\"row_ms\":[1],\"members\":1,\"bytes_s\":0,\"rtt_ms\":0,"
-        "\"skipped\":0,\"late\":0,\"refused\":0}";
+        "\"slowdown\":1,\"substeps\":1,\"step_ms\":1,\"component_ms\":[1],\"members\":1,\"bytes_s\":0,\"rtt_ms\":0,"
+        "\"skipped_cycles\":0,\"late_steps\":0,\"refused_inputs\":0}";
     CHECK_INT(pal_control_get(hello, sizeof hello - 1, true, &c), 0);
     CHECK_INT(c.hello.part[0].n_field, 0);
     CHECK(!c.hello.part[0].is_adaptive);
@@ -141,12 +141,12 @@ static void reads_messages_of_before_fields(void)
     CHECK_INT(c.status.n_component_name, 0);
     CHECK_INT(c.status.n_active, 0);
     CHECK_INT(c.status.n_state, 0);
-    CHECK_INT(c.status.n_off, 0);
+    CHECK_INT(c.status.n_disabled, 0);
     CHECK_INT(c.status.n_component_part, 0);
     CHECK(c.status.n_unobserved == 0);
     static const char topology[] = "{\"type\":\"topology\",\"parts\":[]}";
     CHECK_INT(pal_control_get(topology, sizeof topology - 1, true, &c), 0);
-    CHECK_INT(c.topology.n_row, 0);
+    CHECK_INT(c.topology.n_component, 0);
 }
 
 /* a number that nobody knows is NaN here and not there on the wire; what is required is never left out */
@@ -157,9 +157,9 @@ static void what_is_not_known_is_not_written(void)
     size_t n;
     golden_control(PAL_CONTROL_ESTIMATE, &estimate);
     REQUIRE(pal_control_put(text, sizeof text, &estimate, &n) == 0);
-    CHECK(!strstr(text, "error_m") && !strstr(text, "nan") && strstr(text, "\"own_ms\":0"));
+    CHECK(!strstr(text, "error_m") && !strstr(text, "nan") && strstr(text, "\"estimate_ms\":0"));
     REQUIRE(pal_control_get(text, n, true, &c) == 0);
-    CHECK(isnan(c.estimate.error_m) && isnan(c.estimate.model_m) && isnan(c.estimate.point));
+    CHECK(isnan(c.estimate.error_m) && isnan(c.estimate.model_m) && isnan(c.estimate.study_point));
     estimate.estimate.estimate_ms = NAN;
     CHECK_INT(pal_control_put(text, sizeof text, &estimate, &n), PAL_REFUSAL_NAN);
     estimate.estimate.estimate_ms = 0;
@@ -170,7 +170,7 @@ static void what_is_not_known_is_not_written(void)
     CHECK(strstr(text, "\"error_m\":0"));
     static const char bad[] =
         "{\"type\":\"study\",\"body\":\"a\",\"step_ms\":1,\"points\":[{\"index\":0,\"method\":\"fem\",\"label\":\"\","
-        "\"ms\":1}]}";
+        "\"cost_ms\":1}]}";
     CHECK_INT(pal_control_get(bad, sizeof bad - 1, true, &c), PAL_REFUSAL_FIELD);
 }
 
@@ -237,9 +237,9 @@ static void largest_messages_fit_their_limit(void)
     memset(full.hello.accuracy, '"', PAL_WIRE_TEXT_BYTES - 1);
     full.hello.n_part = PAL_WIRE_PART_MAX;
     full.hello.n_tool = PAL_WIRE_TOOL_MAX;
-    full.hello.n_row = PAL_WIRE_COMPONENT_MAX;
+    full.hello.n_component = PAL_WIRE_COMPONENT_MAX;
     golden_parts(full.hello.part, PAL_WIRE_PART_MAX);
-    for (int i = 0; i < PAL_WIRE_COMPONENT_MAX; i++) memset(full.hello.row[i], 'r', PAL_WIRE_NAME_BYTES - 1);
+    for (int i = 0; i < PAL_WIRE_COMPONENT_MAX; i++) memset(full.hello.component[i], 'r', PAL_WIRE_NAME_BYTES - 1);
     full.hello.n_component_part = full.hello.n_component_reason = full.hello.n_component_required =
         PAL_WIRE_COMPONENT_MAX;
     for (int i = 0; i < PAL_WIRE_COMPONENT_MAX; i++)
@@ -247,7 +247,7 @@ static void largest_messages_fit_their_limit(void)
     for (int i = 0; i < PAL_WIRE_TOOL_MAX; i++) memset(full.hello.tool[i].name, '\\', PAL_WIRE_NAME_BYTES - 1);
     CHECK_INT(pal_control_put(text, sizeof text, &full, &n), 0);
     CHECK_INT(pal_control_get(text, n, true, &again), 0);
-    CHECK_INT(again.hello.n_row, PAL_WIRE_COMPONENT_MAX);
+    CHECK_INT(again.hello.n_component, PAL_WIRE_COMPONENT_MAX);
     CHECK_TEXT(again.hello.tool[31].name, full.hello.tool[31].name);
 
     memset(&full, 0, sizeof full);
@@ -255,14 +255,14 @@ static void largest_messages_fit_their_limit(void)
     full.status.n_active = PAL_WIRE_PART_MAX;
     for (uint32_t i = 0; i < PAL_WIRE_PART_MAX; i++)
         full.status.active[i] = (pal_wire_active){i, UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX};
-    full.status.n_row = full.status.n_component_name = PAL_WIRE_COMPONENT_MAX;
+    full.status.n_component = full.status.n_component_name = PAL_WIRE_COMPONENT_MAX;
     for (int i = 0; i < PAL_WIRE_COMPONENT_MAX; i++) {
-        full.status.row_ms[i] = 1 / 3.0;
-        memset(full.status.row[i], '"', PAL_WIRE_NAME_BYTES - 1);
-        memset(full.status.off[i].row, '"', PAL_WIRE_NAME_BYTES - 1);
+        full.status.component_ms[i] = 1 / 3.0;
+        memset(full.status.component[i], '"', PAL_WIRE_NAME_BYTES - 1);
+        memset(full.status.disabled[i].component, '"', PAL_WIRE_NAME_BYTES - 1);
         full.status.component_part[i] = -1;
     }
-    full.status.n_component_part = full.status.n_off = PAL_WIRE_COMPONENT_MAX;
+    full.status.n_component_part = full.status.n_disabled = PAL_WIRE_COMPONENT_MAX;
     full.status.n_state = PAL_WIRE_PART_MAX;
     for (uint32_t i = 0; i < PAL_WIRE_PART_MAX; i++) {
         full.status.state[i] = (pal_wire_part_state){i, true, true, "", 9007199254740991, 1 / 3.0};
@@ -302,15 +302,15 @@ static void writer_refuses_what_the_reader_would(void)
     c.status.rtt_ms = NAN;
     CHECK_INT(pal_control_put(text, sizeof text, &c, &n), PAL_REFUSAL_NAN);
     golden_control(PAL_CONTROL_STATUS, &c);
-    c.status.n_row = PAL_WIRE_COMPONENT_MAX + 1;
+    c.status.n_component = PAL_WIRE_COMPONENT_MAX + 1;
     CHECK_INT(pal_control_put(text, sizeof text, &c, &n), PAL_REFUSAL_RANGE);
     golden_control(PAL_CONTROL_ERROR, &c);
-    memset(c.problem.text, 'x', sizeof c.problem.text);
+    memset(c.error.text, 'x', sizeof c.error.text);
     CHECK_INT(pal_control_put(text, sizeof text, &c, &n), PAL_REFUSAL_FIELD);
     golden_control(PAL_CONTROL_ERROR, &c);
-    snprintf(c.problem.text, sizeof c.problem.text, "two\nlines");
+    snprintf(c.error.text, sizeof c.error.text, "two\nlines");
     CHECK_INT(pal_control_put(text, sizeof text, &c, &n), PAL_REFUSAL_FIELD);
-    golden_control(PAL_CONTROL_TAKE, &c);
+    golden_control(PAL_CONTROL_TAKE_TOOL, &c);
     c.tool = 99;
     CHECK_INT(pal_control_put(text, sizeof text, &c, &n), PAL_REFUSAL_RANGE);
     c.type = PAL_CONTROL_COUNT;

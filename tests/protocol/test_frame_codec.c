@@ -4,7 +4,7 @@
 #include "tests/check.h"
 #include "tests/protocol/frame_shapes.h"
 
-typedef struct rig { /* a surface with encoder and decoder */
+typedef struct trial { /* a surface with encoder and decoder */
     shape s;
     pal_frame_order *order;
     pal_asset asset;
@@ -13,11 +13,11 @@ typedef struct rig { /* a surface with encoder and decoder */
     float *given, *shown;
     uint8_t *bytes;
     size_t cap;
-} rig;
+} trial;
 
-static bool rig_create(rig *r, int fineness)
+static bool rig_create(trial *r, int fineness)
 {
-    *r = (rig){.s = shape_create(fineness)};
+    *r = (trial){.s = shape_create(fineness)};
     if (pal_frame_order_create(r->s.rest_m, r->s.n_vertex, r->s.triangle, r->s.n_triangle, &r->order)) return false;
     r->asset = (pal_asset){r->s.n_triangle, r->s.rest_m, r->s.triangle, r->order};
     if (pal_frame_encoder_create(r->s.rest_m, r->order, &r->e)) return false;
@@ -29,7 +29,7 @@ static bool rig_create(rig *r, int fineness)
     return r->given && r->shown && r->bytes;
 }
 
-static void rig_release(rig *r)
+static void rig_release(trial *r)
 {
     pal_frame_encoder_destroy(r->e);
     pal_frame_decoder_destroy(r->d);
@@ -40,7 +40,7 @@ static void rig_release(rig *r)
     free(r->bytes);
 }
 
-static double largest_error(const rig *r)
+static double largest_error(const trial *r)
 {
     double most = 0;
     for (size_t i = 0; i < 3 * (size_t)r->s.n_vertex; i++) {
@@ -50,7 +50,7 @@ static double largest_error(const rig *r)
     return most;
 }
 
-static pal_frame_input given_of(const rig *r, double error_m)
+static pal_frame_input given_of(const trial *r, double error_m)
 {
     return (pal_frame_input){.part = 1,
                              .epoch = 3,
@@ -64,7 +64,7 @@ static pal_frame_input given_of(const rig *r, double error_m)
 static void error_stays_within_its_bound_in_every_frame(void)
 {
     static const double bound[] = {1e-5, 5e-5, 2.5e-4};
-    rig r;
+    trial r;
     REQUIRE(rig_create(&r, 24));
     for (size_t b = 0; b < 3; b++) {
         pal_frame_input given = given_of(&r, bound[b]);
@@ -87,7 +87,7 @@ static void error_stays_within_its_bound_in_every_frame(void)
 static void live_deformation_costs_less_than_half_a_byte_per_vertex(void)
 {
     static const double most[MOTION_COUNT] = {0.01, 0.25, 0.3, 0.45, 0.1, 0, 0, 0};
-    rig r;
+    trial r;
     REQUIRE(rig_create(&r, 70));
     pal_frame_input given = given_of(&r, 5e-5);
     for (int motion = 0; motion < MOTION_TELEPORT; motion++) {
@@ -105,7 +105,7 @@ static void live_deformation_costs_less_than_half_a_byte_per_vertex(void)
 }
 
 /* hides a share of the vertices and makes their positions nonsense */
-static void hide(rig *r, uint64_t *random, double share, uint8_t *hidden)
+static void hide(trial *r, uint64_t *random, double share, uint8_t *hidden)
 {
     for (uint32_t i = 0; i < r->s.n_vertex; i++) {
         hidden[i] = (shape_random(random) + 1) / 2 < share;
@@ -116,7 +116,7 @@ static void hide(rig *r, uint64_t *random, double share, uint8_t *hidden)
 static void hidden_vertices_may_stand_anywhere_and_the_bound_holds_for_the_others(void)
 {
     static const float turned[12] = {0, -1, 0, 0.5f, 1, 0, 0, 0, 0, 0, 1, 0.1f};
-    rig r;
+    trial r;
     uint64_t random = 3;
     REQUIRE(rig_create(&r, 16));
     uint8_t *hidden = malloc(r.s.n_vertex);
@@ -154,7 +154,7 @@ static void hidden_vertices_may_stand_anywhere_and_the_bound_holds_for_the_other
 
 static void a_move_of_hidden_vertices_alone_is_no_change(void)
 {
-    rig r;
+    trial r;
     REQUIRE(rig_create(&r, 8));
     uint8_t *hidden = calloc(r.s.n_vertex, 1);
     pal_frame_input given = given_of(&r, 5e-5);
@@ -257,7 +257,7 @@ static void families_predict_what_is_linear_on_coarse_triangles(void)
 /* encodes motion k and decodes it with a new decoder: frames need no history */
 static void any_frame_serves_a_client_that_joins(void)
 {
-    rig r;
+    trial r;
     REQUIRE(rig_create(&r, 12));
     pal_frame_input given = given_of(&r, 5e-5);
     for (int k = 0; k < 40; k++) {
@@ -276,7 +276,7 @@ static void any_frame_serves_a_client_that_joins(void)
 
 static void part_at_rest_is_reported_unchanged(void)
 {
-    rig r;
+    trial r;
     pal_frame_result result;
     REQUIRE(rig_create(&r, 12));
     pal_frame_input given = given_of(&r, 5e-5);
@@ -302,7 +302,7 @@ static void part_at_rest_is_reported_unchanged(void)
 static void refuses_positions_that_are_none_and_goes_on(void)
 {
     static const float bad[] = {NAN, INFINITY, -INFINITY};
-    rig r;
+    trial r;
     pal_frame_result result;
     pal_frame_head head;
     REQUIRE(rig_create(&r, 12));
@@ -336,7 +336,7 @@ static void refuses_positions_that_are_none_and_goes_on(void)
 
 static void raises_the_step_for_far_jumps_and_says_so(void)
 {
-    rig r;
+    trial r;
     pal_frame_result result;
     pal_frame_head head;
     REQUIRE(rig_create(&r, 12));
@@ -357,7 +357,7 @@ static void affine_map_carries_large_motion(void)
 {
     static const float turn[12] = {0.8f, -0.6f, 0, 0.3f, 0.6f, 0.8f, 0, -0.2f, 0, 0, 1, 0.1f};
     static const float flat[12] = {1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0};
-    rig r;
+    trial r;
     pal_frame_result result;
     pal_frame_head head;
     REQUIRE(rig_create(&r, 24));
@@ -414,7 +414,7 @@ static void tiny_and_loose_meshes_stay_within_the_bound(void)
 }
 
 /* decodes a heap copy of exactly the right size */
-static int decode_copy(rig *r, const uint8_t *bytes, size_t n_byte)
+static int decode_copy(trial *r, const uint8_t *bytes, size_t n_byte)
 {
     pal_frame_head head;
     uint8_t *exact = malloc(n_byte + 1);
@@ -427,7 +427,7 @@ static int decode_copy(rig *r, const uint8_t *bytes, size_t n_byte)
 static void refuses_every_prefix_and_survives_every_changed_byte(void)
 {
     static const float turn[12] = {0.8f, -0.6f, 0, 0.3f, 0.6f, 0.8f, 0, -0.2f, 0, 0, 1, 0.1f};
-    rig r;
+    trial r;
     REQUIRE(rig_create(&r, 5));
     for (int motion = MOTION_BUMP; motion < MOTION_COUNT; motion++) {
         pal_frame_input given = given_of(&r, 5e-5);
@@ -457,7 +457,7 @@ static void put32(uint8_t *at, uint32_t v)
 
 static void refuses_lying_heads(void)
 {
-    rig r;
+    trial r;
     pal_frame_result result;
     REQUIRE(rig_create(&r, 5));
     pal_frame_input given = given_of(&r, 5e-5);
@@ -491,7 +491,7 @@ static void refuses_lying_heads(void)
 
 static void refuses_blocks_that_expand_to_another_length(void)
 {
-    rig r;
+    trial r;
     uint8_t bytes[400] = {0};
     pal_frame_result result;
     REQUIRE(rig_create(&r, 5));

@@ -56,7 +56,7 @@ static void pose_and_ack_are_read_and_written_as_committed(void)
         CHECK_NEAR((double)p.torque_N_m[i], element(e, "torque", i), 1e-9);
     }
     for (int i = 0; i < 4; i++) CHECK_NEAR(p.quaternion[i], element(e, "quaternion", i), 0);
-    CHECK_NEAR((double)p.grip, number(e, "grip"), 1e-8);
+    CHECK_NEAR((double)p.grip, number(e, "gripper"), 1e-8);
     CHECK_NEAR(p.buttons, number(e, "buttons"), 0);
     CHECK_NEAR(p.model_seq, number(e, "modelSeq"), 0);
     CHECK_NEAR(p.model_age_us, number(e, "modelAgeUs"), 0);
@@ -113,7 +113,7 @@ static void haptic_model_is_read_and_written_as_committed(void)
     uint8_t *bytes = load("haptic.bin", &n);
     pal_wire_haptic h, wanted = golden_haptic();
     REQUIRE(bytes && pal_wire_get_haptic(bytes, n, &h) == 0);
-    const cJSON *e = cJSON_GetObjectItem(expected, "haptic"), *grip = cJSON_GetObjectItem(e, "grip");
+    const cJSON *e = cJSON_GetObjectItem(expected, "haptic"), *grasp = cJSON_GetObjectItem(e, "grasp");
     CHECK_NEAR(h.tool, number(e, "tool"), 0);
     CHECK_NEAR(h.seq, number(e, "seq"), 0);
     CHECK_NEAR(h.flags, number(e, "flags"), 0);
@@ -121,10 +121,10 @@ static void haptic_model_is_read_and_written_as_committed(void)
     CHECK_NEAR((double)h.echo_stamp_us, number(e, "echoStampUs"), 0);
     CHECK_NEAR(h.frame_us, number(e, "frameUs"), 0);
     for (int c = 0; c < 3; c++) CHECK_NEAR(h.origin_m[c], element(e, "origin", c), 0);
-    for (int c = 0; c < 6; c++) CHECK_NEAR((double)h.grasp_k_N_m[c], element(grip, "k", c), 1e-6);
-    CHECK_NEAR((double)h.grasp_b_N_s_m, number(grip, "b"), 1e-8);
+    for (int c = 0; c < 6; c++) CHECK_NEAR((double)h.grasp_k_N_m[c], element(grasp, "k", c), 1e-6);
+    CHECK_NEAR((double)h.grasp_b_N_s_m, number(grasp, "b"), 1e-8);
     for (int i = 0; i < (int)h.n_patch; i++) {
-        const cJSON *patch = cJSON_GetArrayItem(cJSON_GetObjectItem(e, "patches"), i);
+        const cJSON *patch = cJSON_GetArrayItem(cJSON_GetObjectItem(e, "contact_patches"), i);
         CHECK_NEAR(h.patch[i].id, number(patch, "id"), 0);
         CHECK_NEAR(h.patch[i].group, number(patch, "group"), 0);
         for (int c = 0; c < 3; c++) {
@@ -163,17 +163,17 @@ static void field_is_read_and_written_as_committed(void)
     free(bytes);
 }
 
-static void patch_is_read_and_written_as_committed(void)
+static void topology_delta_is_read_and_written_as_committed(void)
 {
     static uint8_t work[PAL_TOPOLOGY_DELTA_WORK_BYTES(1024)], again[4096];
     size_t n = 0, n_asset = 0, n_again = 0;
-    uint8_t *bytes = load("patch.bin", &n), *file = load("asset.bin", &n_asset);
+    uint8_t *bytes = load("topology_delta.bin", &n), *file = load("asset.bin", &n_asset);
     pal_asset *asset = NULL;
-    pal_topology_delta_head h, wanted = golden_patch();
+    pal_topology_delta_head h, wanted = golden_topology_delta();
     REQUIRE(bytes && file && pal_asset_decode(file, n_asset, &asset) == 0);
     REQUIRE(pal_topology_delta_get(bytes, n, asset->n_triangle, asset->order->n_vertex, work, &h, asset->triangle) ==
             0);
-    const cJSON *e = cJSON_GetObjectItem(expected, "patch");
+    const cJSON *e = cJSON_GetObjectItem(expected, "topology_delta");
     CHECK_NEAR(h.part, number(e, "part"), 0);
     CHECK_NEAR(h.epoch, number(e, "epoch"), 0);
     CHECK_NEAR((double)h.revision, number(e, "revision"), 0);
@@ -254,13 +254,13 @@ static void control_lines_are_read_and_written_as_committed(void)
         if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.part[1].is_adaptive, at == PAL_CONTROL_COUNT + 1);
         if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.part[0].is_sculptable, at == PAL_CONTROL_COUNT + 4);
         if (kind == PAL_CONTROL_STATUS) CHECK_INT(c.status.n_active, at == PAL_CONTROL_COUNT + 2 ? 2 : 0);
-        if (kind == PAL_CONTROL_JOIN) CHECK_INT(c.join.patches, at == PAL_CONTROL_COUNT + 3);
+        if (kind == PAL_CONTROL_JOIN) CHECK_INT(c.join.topology_deltas, at == PAL_CONTROL_COUNT + 3);
         if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.estimates, at == PAL_CONTROL_COUNT + 5);
         if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.n_component_part, at == PAL_CONTROL_COUNT + 5 ? 3 : 0);
         if (kind == PAL_CONTROL_TOPOLOGY) CHECK_INT(c.topology.n_component_reason, at == PAL_CONTROL_COUNT + 6 ? 2 : 0);
         if (kind == PAL_CONTROL_STATUS) CHECK_INT(c.status.state[0].n_safeguard, at == PAL_CONTROL_COUNT + 7 ? 17 : 0);
-        if (kind == PAL_CONTROL_STATUS) CHECK_INT(c.status.n_off, at == PAL_CONTROL_COUNT + 7);
-        if (kind == PAL_CONTROL_STUDY) CHECK_INT(c.study.point[1].front, at == PAL_CONTROL_COUNT + 8);
+        if (kind == PAL_CONTROL_STATUS) CHECK_INT(c.status.n_disabled, at == PAL_CONTROL_COUNT + 7);
+        if (kind == PAL_CONTROL_STUDY) CHECK_INT(c.study.point[1].pareto_optimal, at == PAL_CONTROL_COUNT + 8);
         if (kind == PAL_CONTROL_ESTIMATE) CHECK_INT(isnan(c.estimate.error_m), at != PAL_CONTROL_COUNT + 9);
         /* what was read writes the same text, and so does the content itself */
         REQUIRE(pal_control_put(again, sizeof again, &c, &n_again) == 0);
@@ -282,7 +282,7 @@ int main(void)
     RUN(tools_are_read_and_written_as_committed);
     RUN(haptic_model_is_read_and_written_as_committed);
     RUN(field_is_read_and_written_as_committed);
-    RUN(patch_is_read_and_written_as_committed);
+    RUN(topology_delta_is_read_and_written_as_committed);
     RUN(asset_and_frames_are_read_to_the_committed_numbers);
     RUN(control_lines_are_read_and_written_as_committed);
     cJSON_Delete(expected);

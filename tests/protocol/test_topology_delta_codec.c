@@ -124,7 +124,7 @@ static uint32_t golden_table[GOLDEN_SLOTS][3];
 
 static size_t golden_bytes(uint8_t *dst)
 {
-    pal_topology_delta_head head = golden_patch();
+    pal_topology_delta_head head = golden_topology_delta();
     size_t n = 0;
     memset(golden_table, 0, sizeof golden_table);
     for (int i = 0; i < GOLDEN_PATCH_PLACES; i++)

@@ -54,7 +54,7 @@ static void collapse(pal_world *world, int tick)
     if (tick > 0) return;
     pal_body *body = pal_world_body(world, 0), *other = pal_world_body(world, 1);
     for (int i = 0; i < body->n_dof; i++)
-        for (int c = 0; c < 3 && !body->fixed[i]; c++) body->x[3 * i + c] = 0.0625;
+        for (int c = 0; c < 3 && !body->support[i]; c++) body->x[3 * i + c] = 0.0625;
     for (int i = 0; i < other->n_dof; i++) {
         other->v[3 * i] = 0.125 + 16 * other->x[3 * i + 1];
         other->v[3 * i + 1] = -16 * other->x[3 * i];

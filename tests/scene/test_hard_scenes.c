@@ -1,5 +1,6 @@
 /* Known failures of other programs as scenes of our own (tests/data/hard): each is loaded as any scene is and runs
- * without a step refused, a body frozen or a number that is none; `palpate plan` and `palpate torture` take them too.
+ * without a step refused, a body frozen or a number that is none; `palpate plan` and `palpate robustness` take them
+ * too.
  */
 #include "server/base/vec3.h"
 #include "server/scene/scene_file.h"

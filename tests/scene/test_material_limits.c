@@ -4,7 +4,7 @@
 #include "server/scene/scene_file.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
-#include "tests/session/small_scene.h"
+#include "tests/session/session_scene.h"
 
 static char folder[] = "/tmp/palpate_limits_XXXXXX";
 static pal_scene plain;
@@ -94,8 +94,8 @@ static void every_way_in_has_the_same_range(void)
     REQUIRE(pal_world_create(&plain, &diag, &world) == PAL_ERR_OK);
     for (int k = 0; k < LIMITS; k++)
         for (int side = -1; side <= 1; side += 2) {
-            const double limit = side < 0 ? limits[k].low : limits[k].high, in = beside(limit, -side),
-                         out = beside(limit, side);
+            const double edge = side < 0 ? limits[k].low : limits[k].high, in = beside(edge, -side),
+                         out = beside(edge, side);
             CHECK(is_material(k, in) && !is_material(k, out));
             CHECK(is_scene_key(k, in) && !is_scene_key(k, out));
             CHECK(is_region_key(k, in) && !is_region_key(k, out));

@@ -103,7 +103,7 @@ static inline void hard_insult(fem_beam *b, int insult, uint64_t seed)
     for (int i = 0; i < 10; i++) hard_random(&seed);
     for (int i = body->n_node - 1; i >= 0; i--) {
         double *x = body->x + 3 * i;
-        if (body->fixed[i]) continue;
+        if (body->support[i]) continue;
         if (insult == HARD_PLANE) x[2] = 0.3 * high[2];
         if (insult == HARD_POINT) pal_set3(x, 0.3 * high[0], 0.3 * high[1], 0.3 * high[2]);
         if (insult == HARD_MIRROR) x[0] = high[0] - x[0];
@@ -112,7 +112,7 @@ static inline void hard_insult(fem_beam *b, int insult, uint64_t seed)
             for (int c = 0; c < 3; c++) x[c] = low[c] + hard_random(&seed) * (high[c] - low[c]);
         if (insult == HARD_SWAP) {
             int j = (int)(hard_random(&seed) * (i + 1));
-            if (body->fixed[j]) continue;
+            if (body->support[j]) continue;
             double keep[3];
             pal_copy3(keep, x);
             pal_copy3(x, body->x + 3 * j);
@@ -125,9 +125,9 @@ static inline void hard_insult(fem_beam *b, int insult, uint64_t seed)
 /* what a run of steps saw */
 typedef struct hard_run {
     bool finite;
-    double most;   /* energy less the work of lasting loads, over that at the begin */
-    double rise;   /* largest rise of it in one step in which cubes and split did not change, over that at the begin */
-    double back_s; /* when it was within 0.1 % S of rest for good with no element inverted; INFINITY: was not */
+    double most; /* energy less the work of lasting loads, over that at the begin */
+    double rise; /* largest rise of it in one step in which cubes and split did not change, over that at the begin */
+    double return_s; /* when it was within 0.1 % S of rest for good with no element inverted; INFINITY: was not */
 } hard_run;
 
 static inline void hard_steps(fem_beam *b, double seconds, double dt_s, hard_run *out)
@@ -136,7 +136,7 @@ static inline void hard_steps(fem_beam *b, double seconds, double dt_s, hard_run
     before -= hard_work_J(b->body);
     int n = (int)lround(seconds / dt_s);
     const double size = fabs(first) > 0 ? fabs(first) : 1;
-    *out = (hard_run){.finite = true, .most = 0, .back_s = INFINITY};
+    *out = (hard_run){.finite = true, .most = 0, .return_s = INFINITY};
     for (int i = 0; i < n; i++) {
         uint64_t split = b->body->safeguards.n_split;
         pal_err err = pal_world_step(b->world, dt_s);
@@ -147,11 +147,11 @@ static inline void hard_steps(fem_beam *b, double seconds, double dt_s, hard_run
         if (b->body->safeguards.n_split == split) out->rise = fmax(out->rise, (now - before) / size);
         before = now;
         if (hard_rms(b->body) > 1e-3 * b->body->length_scale_m || hard_inverted(b) > 0)
-            out->back_s = INFINITY;
-        else if (isinf(out->back_s))
-            out->back_s = (i + 1) * dt_s;
+            out->return_s = INFINITY;
+        else if (isinf(out->return_s))
+            out->return_s = (i + 1) * dt_s;
         /* all that is left is too little to take it away again */
-        if (out->back_s < (i + 1) * dt_s - 0.5 && pal_world_energy_J(b->world) < 1e-4 * size) return;
+        if (out->return_s < (i + 1) * dt_s - 0.5 && pal_world_energy_J(b->world) < 1e-4 * size) return;
     }
 }
 #endif

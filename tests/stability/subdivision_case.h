@@ -36,7 +36,7 @@ static inline void solid_make(solid_scene *s, const solid_kind *kind, int nx, in
 static inline void solid_kick(solid_scene *s, double speed_m_s, uint64_t seed)
 {
     for (int i = 0; i < 3 * s->body->n_dof; i++)
-        if (!s->body->fixed[i / 3]) s->body->v[i] = speed_m_s * (2 * solid_random(&seed) - 1);
+        if (!s->body->support[i / 3]) s->body->v[i] = speed_m_s * (2 * solid_random(&seed) - 1);
 }
 
 /* elements that are turned over or flat in their middle */
@@ -105,7 +105,7 @@ static inline void solid_insult(solid_scene *s, int insult, uint64_t seed)
     for (int i = 0; i < 10; i++) solid_random(&seed);
     for (int i = body->n_dof - 1; i >= 0; i--) {
         double *x = body->x + 3 * i;
-        if (body->fixed[i]) continue;
+        if (body->support[i]) continue;
         if (insult == SOLID_PLANE) x[2] = 0.3 * high[2];
         if (insult == SOLID_POINT) pal_set3(x, 0.3 * high[0], 0.3 * high[1], 0.3 * high[2]);
         if (insult == SOLID_MIRROR) x[0] = high[0] - x[0];
@@ -115,7 +115,7 @@ static inline void solid_insult(solid_scene *s, int insult, uint64_t seed)
         if (insult == SOLID_SWAP) {
             int j = (int)(solid_random(&seed) * (i + 1));
             double keep[3];
-            if (body->fixed[j]) continue;
+            if (body->support[j]) continue;
             pal_copy3(keep, x);
             pal_copy3(x, body->x + 3 * j);
             pal_copy3(body->x + 3 * j, keep);
@@ -128,9 +128,9 @@ static inline void solid_insult(solid_scene *s, int insult, uint64_t seed)
 /* what a run of steps saw */
 typedef struct solid_run {
     bool finite;
-    double most;   /* energy less the work of lasting loads, over that at the begin */
-    double rise;   /* largest rise of it in one step, over that at the begin */
-    double back_s; /* when it was within 0.1 % S of rest for good with no element inverted; INFINITY: was not */
+    double most;     /* energy less the work of lasting loads, over that at the begin */
+    double rise;     /* largest rise of it in one step, over that at the begin */
+    double return_s; /* when it was within 0.1 % S of rest for good with no element inverted; INFINITY: was not */
 } solid_run;
 
 static inline void solid_steps(solid_scene *s, double seconds, double dt_s, solid_run *out)
@@ -138,7 +138,7 @@ static inline void solid_steps(solid_scene *s, double seconds, double dt_s, soli
     double first = pal_world_energy_J(s->world) - solid_work_J(s->body), before = first;
     int n = (int)lround(seconds / dt_s);
     const double size = fabs(first) > 0 ? fabs(first) : 1;
-    *out = (solid_run){.finite = true, .most = 0, .back_s = INFINITY};
+    *out = (solid_run){.finite = true, .most = 0, .return_s = INFINITY};
     for (int i = 0; i < n; i++) {
         pal_err err = pal_world_step(s->world, dt_s);
         out->finite = out->finite && !err && pal_body_finite(s->body) && !s->body->frozen;
@@ -147,11 +147,11 @@ static inline void solid_steps(solid_scene *s, double seconds, double dt_s, soli
         out->most = fmax(out->most, now / size), out->rise = fmax(out->rise, (now - before) / size);
         before = now;
         if (solid_rms(s->body) > 1e-3 * s->body->length_scale_m || solid_inverted(s) > 0)
-            out->back_s = INFINITY;
-        else if (isinf(out->back_s))
-            out->back_s = (i + 1) * dt_s;
+            out->return_s = INFINITY;
+        else if (isinf(out->return_s))
+            out->return_s = (i + 1) * dt_s;
         /* all that is left is too little to take it away again */
-        if (out->back_s < (i + 1) * dt_s - 0.3 && pal_world_energy_J(s->world) < 1e-4 * size) return;
+        if (out->return_s < (i + 1) * dt_s - 0.3 && pal_world_energy_J(s->world) < 1e-4 * size) return;
     }
 }
 #endif

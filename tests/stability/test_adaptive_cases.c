@@ -100,7 +100,7 @@ static void insulted(insult kind, double seconds, double back)
         REQUIRE(shell_scene_start(&s));
         for (int k = 0; k < s.body->n_active; k++) {
             int i = pal_body_point(s.body, k);
-            if (!s.body->fixed[i]) insult_node(s.body->x_rest + 3 * i, kind, s.body->x + 3 * i);
+            if (!s.body->support[i]) insult_node(s.body->x_rest + 3 * i, kind, s.body->x + 3 * i);
         }
         pal_world_invalidate_limits(s.world, 0);
         double left = run_bounded(&s, seconds);
@@ -152,7 +152,7 @@ static void edges_without_length_open_again(void)
         int n = 0;
         for (int k = 0; k < adaptive->n_spring; k += 5) {
             const int32_t *end = adaptive->levels.edge[adaptive->spring[k]].vertex;
-            if (s.body->fixed[end[0]] || s.body->fixed[end[1]]) continue;
+            if (s.body->support[end[0]] || s.body->support[end[1]]) continue;
             pal_copy3(s.body->x + 3 * end[1], s.body->x + 3 * end[0]);
             n++;
         }

@@ -235,7 +235,7 @@ static int switch_support(shell_scene *s, const double low[3], const double high
         bool in = true;
         for (int c = 0; c < 3; c++) in = in && x[c] >= low[c] && x[c] <= high[c];
         if (!in) continue;
-        s->body->fixed[i] = on;
+        s->body->support[i] = on;
         if (on) pal_set3(s->body->v + 3 * i, 0, 0, 0);
         n += pal_adaptive_has(s->body->model.adaptive, i);
     }

@@ -221,7 +221,7 @@ static void a_contrast_of_a_million_is_too_much_for_explicit_steps_and_said_so(v
         const pal_err err = pal_world_create(s.scene, &s.diag, &none);
         printf("  %s: %s\n", four_name[m], s.diag.text);
         HARD_CASE_ALL("contrast", four_name[m], "refused with the number of sub-steps",
-                      err == PAL_ERR_BUDGET && strstr(s.diag.text, "most_substep allows 2000"), 1);
+                      err == PAL_ERR_BUDGET && strstr(s.diag.text, "max_substep allows 2000"), 1);
         four_close(&s);
     }
 }

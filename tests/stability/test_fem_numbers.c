@@ -146,7 +146,7 @@ static bool scaled(const hard_kind *kind, double h, double young, double x[3])
     bool ok = !beam_open(&b, &diag);
     uint64_t seed = 5;
     for (int i = 0; ok && i < 3 * b.body->n_dof; i++)
-        if (!b.body->fixed[i / 3]) b.body->x[i] += 0.2 * h * (hard_random(&seed) - 0.3);
+        if (!b.body->support[i / 3]) b.body->x[i] += 0.2 * h * (hard_random(&seed) - 0.3);
     if (ok) pal_world_invalidate_limits(b.world, 0);
     for (int i = 0; ok && i < 6; i++) {
         /* the same push in units of E h^2 */

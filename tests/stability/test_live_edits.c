@@ -157,7 +157,7 @@ static void bodies_on_a_moving_anchor_come_to_rest_on_it(void)
             REQUIRE(four_open(b));
         }
         for (int i = 0; i < s.body->n_dof; i++)
-            if (s.body->fixed[i] == 2) pal_add3(middle, middle, s.body->x_rest + 3 * i), n++;
+            if (s.body->support[i] == PAL_PRESCRIBED) pal_add3(middle, middle, s.body->x_rest + 3 * i), n++;
         REQUIRE(n > 0);
         pal_scale3(middle, 1.0 / n, middle);
         for (int i = 0; i < 600; i++) {

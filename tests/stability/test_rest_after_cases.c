@@ -124,7 +124,7 @@ static double energy_in_phase_J(four *s)
     }
     for (int i = 0; i < 3 * body->n_dof; i++) {
         const double m = body->mass_kg[i / 3], v = body->v[i] + 0.5 * dt_s * body->f[i] / m;
-        if (!body->fixed[i / 3]) sum += 0.5 * m * v * v;
+        if (!body->support[i / 3]) sum += 0.5 * m * v * v;
     }
     return sum;
 }
@@ -149,7 +149,7 @@ static void springs_at_any_poisson_ratio_stay_bounded(void)
         }
         s.body = pal_world_body(s.world, 0);
         for (int i = 0; i < 3 * s.body->n_dof; i++)
-            if (!s.body->fixed[i / 3]) s.body->x[i] += 1e-3 * uniform();
+            if (!s.body->support[i / 3]) s.body->x[i] += 1e-3 * uniform();
         pal_world_invalidate_limits(s.world, 0);
         const double first = pal_world_energy_J(s.world);
         for (int i = 0; i < 60; i++) {
@@ -175,7 +175,7 @@ static void long_steps_of_springs_are_cut_up_or_refused(void)
     four_take(&s, FOUR_SPRINGS, true);
     REQUIRE(four_open(&s));
     for (int i = 0; i < s.body->n_dof; i++)
-        if (!s.body->fixed[i]) s.body->v[3 * i] = 0.1;
+        if (!s.body->support[i]) s.body->v[3 * i] = 0.1;
     const uint64_t hash = pal_world_hash(s.world);
     const double first = pal_world_energy_J(s.world);
     HARD_CASE_ALL("long_step", "tet_springs", "x 100: refused beyond 2000 sub-steps, nothing moved",
@@ -194,7 +194,7 @@ static void edges_without_length_open_again(void)
         if (m == FOUR_SOLID) pal_entry_put_text(&s.def->model, "operator", "edges", NULL);
         REQUIRE(four_open(&s));
         for (int i = 3; i + 1 < s.body->n_dof; i += 3) {
-            if (s.body->fixed[i] || s.body->fixed[i + 1]) continue;
+            if (s.body->support[i] || s.body->support[i + 1]) continue;
             pal_copy3(s.body->x + 3 * i, s.body->x + 3 * (i + 1));
             n++;
         }
@@ -216,7 +216,7 @@ static void a_shell_in_syrup_creeps(void)
     REQUIRE(four_open(&s));
     for (int k = 0; k < s.body->n_active; k++) {
         double *x = s.body->x + 3 * pal_body_point(s.body, k);
-        if (!s.body->fixed[pal_body_point(s.body, k)]) x[0] += 0.2 * (x[2] + 0.03);
+        if (!s.body->support[pal_body_point(s.body, k)]) x[0] += 0.2 * (x[2] + 0.03);
     }
     pal_world_invalidate_limits(s.world, 0);
     const double first = pal_world_energy_J(s.world);

@@ -110,7 +110,7 @@ static void insult(box_bench *b, int kind)
 {
     double *x = b->body->x;
     for (int i = 0; i < b->body->n_dof; i++, x += 3) {
-        if (b->body->fixed[i]) continue;
+        if (b->body->support[i]) continue;
         switch (kind) {
         case 0:
             x[2] = 0;
@@ -250,7 +250,7 @@ static void a_material_beyond_the_budget_is_refused_and_changes_nothing(void)
     double limit = pal_world_limit_s(b.world);
     hard.young_Pa = 1e12;
     CHECK_INT(pal_world_material(b.world, 0, &hard, &diag), PAL_ERR_BUDGET);
-    CHECK(strstr(diag.text, "most_substep allows 2000"));
+    CHECK(strstr(diag.text, "max_substep allows 2000"));
     CHECK_NEAR(pal_world_limit_s(b.world), limit, 0);
     hard.young_Pa = NAN;
     CHECK_INT(pal_world_material(b.world, 0, &hard, &diag), PAL_ERR_REFUSED);
@@ -278,7 +278,7 @@ static bool scaled(double h, double young, double x[3])
     for (int i = 0; i < 3; i++) x[i] = NAN;
     if (!box_bench_start(&b)) return false;
     for (int i = 0; i < 3 * b.body->n_dof; i++)
-        if (!b.body->fixed[i / 3]) b.body->x[i] += 0.2 * h * (uniform() - 0.5);
+        if (!b.body->support[i / 3]) b.body->x[i] += 0.2 * h * (uniform() - 0.5);
     pal_world_invalidate_limits(b.world, 0);
     bool ok = true;
     for (int i = 0; i < 20; i++) ok = ok && !pal_world_step(b.world, 1.0 / 60);
@@ -330,7 +330,7 @@ static void constraint_damping_far_beyond_critical_stays_stable(void)
     pal_entry_put_number(&b.scene->body[0].model, "c_volume_Js", 1e-5, NULL);
     REQUIRE(box_bench_start(&b));
     for (int i = 0; i < 3 * b.body->n_dof; i++)
-        if (!b.body->fixed[i / 3]) b.body->x[i] += 0.005 * (uniform() - 0.5);
+        if (!b.body->support[i / 3]) b.body->x[i] += 0.005 * (uniform() - 0.5);
     pal_world_invalidate_limits(b.world, 0);
     run_bounded(&b, CHECK_REPEATS(2, 1));
     box_bench_close(&b);

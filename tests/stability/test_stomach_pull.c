@@ -62,7 +62,7 @@ static double pull(shell_scene *s, uint64_t seed, double *way_m)
     double dir[3], most = 0;
     int v = 0, n = s->body->model.adaptive->levels.n_vertex[0];
     do v = (int)(pal_random_unit(seed, count++) * n);
-    while (s->body->fixed[v]);
+    while (s->body->support[v]);
     do
         for (int c = 0; c < 3; c++) dir[c] = 2 * pal_random_unit(seed, count++) - 1;
     while (pal_norm3(dir) > 1 || !pal_unit3(dir, dir, 0.1));

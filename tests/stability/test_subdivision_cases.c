@@ -50,7 +50,7 @@ static void a_meganewton_on_a_node_is_capped_and_forgotten(void)
             /* v of the explicit solver is half a sub-step before x: a ripple where it moves fast */
             CHECK_LE(run.most, solid_kinds[k].explicit ? 1.3 : 1.01);
             HARD_CASE("meganewton", "subdivision_fem", "turned over 2 s after", solid_inverted(&s), 0, "");
-            HARD_CASE("meganewton", "subdivision_fem", "within 0.1 % S of rest after", run.back_s, 10, "s");
+            HARD_CASE("meganewton", "subdivision_fem", "within 0.1 % S of rest after", run.return_s, 10, "s");
         }
         printf("  %s: pulled %.2g S away\n", solid_kinds[k].shown, far / s.body->length_scale_m);
         solid_scene_close(&s);
@@ -130,7 +130,7 @@ static void tools_that_jump_or_appear_inside_give_no_more_than_cap_times_clamp(v
             CHECK(pal_body_finite(s.body) && !s.body->frozen);
             CHECK_INT(pal_world_pose(s.world, 0, NULL), PAL_ERR_OK);
             solid_steps(&s, 5, solid_step_s, &run);
-            CHECK_LE(run.back_s, 5);
+            CHECK_LE(run.return_s, 5);
             solid_scene_close(&s);
         }
 }
@@ -198,7 +198,7 @@ static void deleting_a_cell_leaves_the_others_where_they_were(void)
         solid_steps(&b, 5, solid_step_s, &run);
         CHECK(run.finite);
         CHECK_LE(run.most, 1.01);
-        CHECK_LE(run.back_s, 5);
+        CHECK_LE(run.return_s, 5);
         free(x), free(v);
         pal_cells_edit_free(&edit);
         solid_scene_close(&a), solid_scene_close(&b);

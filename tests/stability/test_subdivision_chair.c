@@ -36,7 +36,7 @@ static void insult(solid_scene *s, int how, uint64_t seed)
         low[i % 3] = fmin(low[i % 3], body->x_rest[i]), high[i % 3] = fmax(high[i % 3], body->x_rest[i]);
     for (int i = 0; i < 3 * body->n_dof; i++) {
         const double l = low[i % 3], h = high[i % 3];
-        if (body->fixed[i / 3]) continue;
+        if (body->support[i / 3]) continue;
         if (how == CHAIR_POINT) body->x[i] = l + 0.3 * (h - l);
         if (how == CHAIR_MIRROR && i % 3 == 0) body->x[i] = l + h - body->x[i];
         if (how == CHAIR_SHUFFLE) body->x[i] = l + (h - l) * solid_random(&seed);
@@ -62,9 +62,10 @@ static void a_chair_comes_back_from_any_shape(void)
                 const double before = pal_world_energy_J(s.world);
                 solid_steps(&s, 10, solid_step_s, &run);
                 printf("  %s, %s: back after %.2f s, energy up to %.3f of %.3g J, %d looks found it turned over\n",
-                       solvers[k], chair_words[how], run.back_s, run.most, before, (int)s.body->safeguards.n_inversion);
+                       solvers[k], chair_words[how], run.return_s, run.most, before,
+                       (int)s.body->safeguards.n_inversion);
                 CHECK(run.finite && s.body->safeguards.n_inversion > 0 && s.body->safeguards.n_split >= 2);
-                HARD_CASE(chair_cases[how], "subdivision_fem", chair_words[how], run.back_s, 10, "s");
+                HARD_CASE(chair_cases[how], "subdivision_fem", chair_words[how], run.return_s, 10, "s");
                 HARD_CASE(chair_cases[how], "subdivision_fem", "chair: energy over the insult's", run.most, 1.01, "");
             }
         solid_scene_close(&s);

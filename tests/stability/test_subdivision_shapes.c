@@ -40,11 +40,11 @@ static void a_corner_that_is_turned_over_turns_back(void)
         pal_world_invalidate_limits(s.world, 0);
         REQUIRE(solid_inverted(&s) > 0);
         solid_steps(&s, 2, solid_step_s, &run);
-        printf("  %s, nu %.3f: back after %.2f s, energy up to %.3f\n", solid_kinds[k].shown, poisson[q], run.back_s,
+        printf("  %s, nu %.3f: back after %.2f s, energy up to %.3f\n", solid_kinds[k].shown, poisson[q], run.return_s,
                run.most);
         CHECK(run.finite);
         HARD_CASE("inverted", "subdivision_fem", "energy over the insult's", run.most, 1.01, "");
-        HARD_CASE("inverted", "subdivision_fem", "within 0.1 % S of rest after", run.back_s, 2, "s");
+        HARD_CASE("inverted", "subdivision_fem", "within 0.1 % S of rest after", run.return_s, 2, "s");
         CHECK(s.body->safeguards.n_inversion > 0);
         solid_scene_close(&s);
     }
@@ -68,8 +68,8 @@ static double insult_all(int kind, double poisson, int n_seed, double *most)
             solid_insult(&s, insult, (uint64_t)seed);
             solid_steps(&s, 10, solid_step_s, &run);
             CHECK(run.finite);
-            back += run.back_s <= 10;
-            late = fmax(late, run.back_s), *most = fmax(*most, run.most);
+            back += run.return_s <= 10;
+            late = fmax(late, run.return_s), *most = fmax(*most, run.most);
         }
         const char *id = solid_cases[insult];
         if (n > 1) HARD_CASE_ALL(id, "subdivision_fem", "shuffled or exchanged: back within 10 s", back, n);

@@ -24,10 +24,10 @@ static double noise(unsigned *state)
 static pal_study_point *put(pal_study *s, const char *element, int size, double ms, double error_m)
 {
     pal_study_point *p = &s->point[s->n_point++];
-    p->priced =
+    p->measured =
         (pal_measured_configuration){.setting = {.size = size, .step_s = 1.0 / 60}, .ms = ms, .error_m = error_m};
-    snprintf(p->priced.setting.model, PAL_NAME, "fem");
-    snprintf(p->priced.setting.element, PAL_NAME, "%s", element);
+    snprintf(p->measured.setting.model, PAL_NAME, "fem");
+    snprintf(p->measured.setting.element, PAL_NAME, "%s", element);
     return p;
 }
 
@@ -38,19 +38,19 @@ static void the_front_is_what_nothing_beats(void)
     for (int i = 0; i < 120; i++) {
         pal_study_point *p = put(s, "hex8_bbar", i + 2, exp(4 * noise(&state)), 1e-3 * exp(-4 * noise(&state)));
         if (i % 10 == 3) p->err = PAL_ERR_FROZEN;
-        if (i % 10 == 7) p->priced.error_m = NAN;
+        if (i % 10 == 7) p->measured.error_m = NAN;
     }
-    pal_study_front(s);
+    pal_study_mark_front(s);
     int n_front = 0;
     for (int i = 0; i < s->n_point; i++) {
         const pal_study_point *p = &s->point[i];
-        bool usable = !p->err && !isnan(p->priced.error_m), beaten = false;
+        bool usable = !p->err && !isnan(p->measured.error_m), beaten = false;
         for (int k = 0; k < s->n_point; k++) {
             const pal_study_point *q = &s->point[k];
-            beaten |= !q->err && q->priced.ms < p->priced.ms && q->priced.error_m < p->priced.error_m;
+            beaten |= !q->err && q->measured.ms < p->measured.ms && q->measured.error_m < p->measured.error_m;
         }
-        CHECK(p->priced.front == (usable && !beaten));
-        n_front += p->priced.front;
+        CHECK(p->measured.front == (usable && !beaten));
+        n_front += p->measured.front;
     }
     CHECK(n_front > 2 && n_front < 40);
     free(s);
@@ -60,7 +60,7 @@ static int brute(const pal_study *s, double within, double budget)
 {
     int best = -1;
     for (int i = 0; i < s->n_point; i++) {
-        const pal_measured_configuration *p = &s->point[i].priced, *b = best < 0 ? NULL : &s->point[best].priced;
+        const pal_measured_configuration *p = &s->point[i].measured, *b = best < 0 ? NULL : &s->point[best].measured;
         if (s->point[i].err || isnan(p->error_m)) continue;
         if (!isnan(within) && p->error_m + s->reference_m > within) continue;
         if (!isnan(budget) && p->ms > budget) continue;
@@ -78,7 +78,7 @@ static void a_pick_is_the_best_of_all(void)
     unsigned state = 11;
     s->reference_m = 6e-5;
     for (int i = 0; i < 60; i++) put(s, "tet4", i + 2, exp(4 * noise(&state)), 1e-3 * exp(-4 * noise(&state)));
-    s->point[5].err = PAL_ERR_BUDGET, s->point[5].priced.ms = 1e-6;
+    s->point[5].err = PAL_ERR_BUDGET, s->point[5].measured.ms = 1e-6;
     for (int i = 0; i < 40; i++) {
         double within = 1e-3 * exp(-5 * noise(&state)), budget = exp(5 * noise(&state) - 0.5);
         CHECK_INT(pal_study_pick(s, within, NAN), brute(s, within, NAN));
@@ -97,16 +97,16 @@ static void the_reference_bounds_what_is_named(void)
     const double ms[] = {1, 2, 4, 8}, error_m[] = {5e-4, 1.5e-4, 1e-4, 2e-5};
     for (int i = 0; i < 4; i++) put(s, "hex8_bbar", i + 6, ms[i], error_m[i]);
     s->max_m = 1e-2, s->reference_m = 2e-4;
-    pal_study_front(s);
-    CHECK(s->point[0].priced.front && s->point[1].priced.front);
-    CHECK(!s->point[2].priced.front && !s->point[3].priced.front);
+    pal_study_mark_front(s);
+    CHECK(s->point[0].measured.front && s->point[1].measured.front);
+    CHECK(!s->point[2].measured.front && !s->point[3].measured.front);
     CHECK_INT(pal_study_pick(s, NAN, 10), 1);
     CHECK_INT(pal_study_pick(s, 3.2e-4, NAN), 2);
     s->reference_m = 2.9e-3;
     CHECK(pal_study_trusted(s) && pal_study_pick(s, NAN, 10) == 0);
     s->reference_m = 3.1e-3;
-    pal_study_front(s);
-    CHECK(!pal_study_trusted(s) && !s->point[0].priced.front);
+    pal_study_mark_front(s);
+    CHECK(!pal_study_trusted(s) && !s->point[0].measured.front);
     CHECK_INT(pal_study_pick(s, NAN, 10), -1);
     CHECK_INT(pal_study_pick(s, 1, NAN), -1);
     free(s);
@@ -124,23 +124,23 @@ static void power_laws_are_foreseen_exactly(void)
         }
         double ms, error_m;
         for (int n = 6; n <= 48; n += 7) {
-            pal_configuration at = s->point[0].priced.setting;
+            pal_configuration at = s->point[0].measured.setting;
             at.size = n;
-            CHECK(pal_study_foresee(s, &at, -1, &ms, &error_m));
+            CHECK(pal_study_predict_configuration(s, &at, -1, &ms, &error_m));
             double should = overhead[k] + 2e-4 * pow(n, 2.7);
             CHECK_NEAR(ms / should, 1, 1e-6);
             CHECK_NEAR(error_m / (0.3 * pow(n, -1.8)), 1, 1e-6);
         }
         /* a point that is left out is not looked at */
-        s->point[4].priced.ms *= 3;
-        CHECK(pal_study_foresee(s, &s->point[4].priced.setting, 4, &ms, &error_m));
+        s->point[4].measured.ms *= 3;
+        CHECK(pal_study_predict_configuration(s, &s->point[4].measured.setting, 4, &ms, &error_m));
         CHECK_NEAR(ms / (overhead[k] + 2e-4 * pow(16, 2.7)), 1, 1e-6);
-        pal_configuration other = s->point[0].priced.setting;
+        pal_configuration other = s->point[0].measured.setting;
         snprintf(other.model, PAL_NAME, "tet_springs");
-        CHECK(!pal_study_foresee(s, &other, -1, &ms, &error_m));
-        other = s->point[0].priced.setting;
+        CHECK(!pal_study_predict_configuration(s, &other, -1, &ms, &error_m));
+        other = s->point[0].measured.setting;
         snprintf(other.element, PAL_NAME, "tet10");
-        CHECK(!pal_study_foresee(s, &other, -1, &ms, &error_m));
+        CHECK(!pal_study_predict_configuration(s, &other, -1, &ms, &error_m));
         free(s);
     }
 }
@@ -155,27 +155,27 @@ static void costs_that_go_with_what_is_counted_are_foreseen_exactly(void)
     unsigned state = 5;
     for (int i = 0; i < 40; i++) {
         pal_study_point *p = put(s, "", 8 + i % 9, 0, 1e-3);
-        snprintf(p->priced.setting.model, PAL_NAME, "tet_springs");
-        p->priced.setting.step_s = own_s[i % 2];
+        snprintf(p->measured.setting.model, PAL_NAME, "tet_springs");
+        p->measured.setting.step_s = own_s[i % 2];
         p->n_node = 100 + (int)(3000 * noise(&state)), p->n_substep = 1 + (int)(60 * noise(&state));
-        p->priced.ms = (overhead + node * p->n_node * p->n_substep) * s->step_s / own_s[i % 2];
+        p->measured.ms = (overhead + node * p->n_node * p->n_substep) * s->step_s / own_s[i % 2];
     }
     double ms;
-    s->point[7].priced.ms *= 5;
+    s->point[7].measured.ms *= 5;
     for (int k = 0; k < 20; k++) {
         int nodes = 50 + 400 * k, substeps = 1 + 7 * k;
-        pal_configuration at = s->point[k % 2].priced.setting;
+        pal_configuration at = s->point[k % 2].measured.setting;
         s->point[8].err = PAL_ERR_FROZEN;
-        CHECK(pal_study_foresee_cost(s, &at, nodes, 0, substeps, 0, 7, &ms));
+        CHECK(pal_study_predict_cost(s, &at, nodes, 0, substeps, 0, 7, &ms));
         CHECK_NEAR(ms / ((overhead + node * nodes * substeps) * s->step_s / at.step_s), 1, 1e-4);
     }
-    pal_configuration at = s->point[0].priced.setting;
-    CHECK(!pal_study_foresee_cost(s, &at, 0, 0, 3, 0, -1, &ms) &&
-          !pal_study_foresee_cost(s, &at, 300, 0, 0, 0, -1, &ms));
+    pal_configuration at = s->point[0].measured.setting;
+    CHECK(!pal_study_predict_cost(s, &at, 0, 0, 3, 0, -1, &ms) &&
+          !pal_study_predict_cost(s, &at, 300, 0, 0, 0, -1, &ms));
     snprintf(at.element, PAL_NAME, "tet10");
-    CHECK(!pal_study_foresee_cost(s, &at, 300, 0, 3, 0, -1, &ms));
+    CHECK(!pal_study_predict_cost(s, &at, 300, 0, 3, 0, -1, &ms));
     snprintf(at.model, PAL_NAME, "fem");
-    CHECK(!pal_study_foresee_cost(s, &at, 300, 0, 3, 0, -1, &ms));
+    CHECK(!pal_study_predict_cost(s, &at, 300, 0, 3, 0, -1, &ms));
     free(s);
 }
 
@@ -189,16 +189,16 @@ static void steps_go_with_elements_where_they_are_counted(void)
         int k = i / 2 % 5;
         bool neo = i % 2;
         pal_study_point *p = put(s, "hex8_bbar", 16 + i / 10 + 8 * k, 0, 1e-3);
-        snprintf(p->priced.setting.law, PAL_NAME, neo ? "neo_hookean" : "corotational");
+        snprintf(p->measured.setting.law, PAL_NAME, neo ? "neo_hookean" : "corotational");
         p->n_node = 150 << k, p->n_substep = 1, p->n_element = to_a_node[k] * p->n_node;
-        p->priced.ms = (element + (neo ? tangent : 0)) * p->n_element;
+        p->measured.ms = (element + (neo ? tangent : 0)) * p->n_element;
     }
     for (int left_out = 0; left_out < 20; left_out++) {
         const pal_study_point *p = &s->point[left_out];
         double ms, twice;
-        CHECK(pal_study_foresee_cost(s, &p->priced.setting, p->n_node, p->n_element, 1, 0, left_out, &ms));
-        CHECK_NEAR(ms / p->priced.ms, 1, 0.02);
-        CHECK(pal_study_foresee_cost(s, &p->priced.setting, p->n_node, 2 * p->n_element, 1, 0, left_out, &twice));
+        CHECK(pal_study_predict_cost(s, &p->measured.setting, p->n_node, p->n_element, 1, 0, left_out, &ms));
+        CHECK_NEAR(ms / p->measured.ms, 1, 0.02);
+        CHECK(pal_study_predict_cost(s, &p->measured.setting, p->n_node, 2 * p->n_element, 1, 0, left_out, &twice));
         CHECK_NEAR(twice / ms, 2, 0.1);
     }
     free(s);
@@ -213,7 +213,7 @@ static void how_much_is_refined_is_seen_of_other_levels(void)
     const int size[] = {1, 2, 2, 3, 3}, nodes[] = {190, 248, 766, 478, 3070};
     for (int i = 0; i < 5; i++) {
         pal_study_point *p = put(s, i == 2 || i == 4 ? "refined" : "", size[i], 1e-4 * nodes[i] * (6 << size[i]), 1e-3);
-        snprintf(p->priced.setting.model, PAL_NAME, "adaptive_springs");
+        snprintf(p->measured.setting.model, PAL_NAME, "adaptive_springs");
         p->n_node = nodes[i], p->n_substep = 6 << size[i];
     }
     double ms;
@@ -221,12 +221,12 @@ static void how_much_is_refined_is_seen_of_other_levels(void)
         for (int told = 100; told < 5000; told += 2000) {
             bool is_adaptive = i == 1 || i == 3;
             const pal_study_point *p = &s->point[i];
-            CHECK(pal_study_foresee_cost(s, &p->priced.setting, is_adaptive ? told : p->n_node, 0,
+            CHECK(pal_study_predict_cost(s, &p->measured.setting, is_adaptive ? told : p->n_node, 0,
                                          is_adaptive ? told / 100 : p->n_substep, 0, i, &ms));
-            CHECK_NEAR(ms / p->priced.ms, 1, 0.01);
+            CHECK_NEAR(ms / p->measured.ms, 1, 0.01);
         }
     s->point[3].err = PAL_ERR_FROZEN;
-    CHECK(!pal_study_foresee_cost(s, &s->point[1].priced.setting, 248, 0, 24, 0, 1, &ms));
+    CHECK(!pal_study_predict_cost(s, &s->point[1].measured.setting, 248, 0, 24, 0, 1, &ms));
     free(s);
 }
 
@@ -287,11 +287,11 @@ static void check_errors(const pal_study *s, const pal_problem *p, const pal_sur
     if (at) reference = (int)strtol(at + 2, NULL, 10);
     CHECK_INT(reference, 40);
     for (int i = 0; i < s->n_point; i++) {
-        const pal_configuration *q = &s->point[i].priced.setting;
+        const pal_configuration *q = &s->point[i].measured.setting;
         bool base = !strcmp(q->element, "hex8_bbar") && !strcmp(q->solver, "implicit_euler") && q->step_s > 0.016;
         if (!base) continue;
         double solved = between(p, beam, q->size, reference);
-        CHECK_NEAR(s->point[i].static_most_m, solved, 0.01 * solved);
+        CHECK_NEAR(s->point[i].static_max_m, solved, 0.01 * solved);
         n_found++;
     }
     CHECK_INT(n_found, 2);
@@ -302,10 +302,10 @@ static void check_points(const pal_study *s)
     double best[2] = {INFINITY, INFINITY};
     for (int i = 0; i < s->n_point; i++) {
         const pal_study_point *p = &s->point[i];
-        CHECK(!p->err && p->priced.ms > 0 && p->ms_p95 >= p->priced.ms && p->n_node > 0 && p->prepare_s > 0);
-        CHECK(p->priced.error_m == fmax(p->static_most_m, p->way_most_m) && p->static_rms_m <= p->static_most_m);
-        bool fitted = p->priced.setting.k_distance_J > 0;
-        if (!strcmp(p->priced.setting.model, "tet_springs")) best[fitted] = fmin(best[fitted], p->static_most_m);
+        CHECK(!p->err && p->measured.ms > 0 && p->ms_p95 >= p->measured.ms && p->n_node > 0 && p->prepare_s > 0);
+        CHECK(p->measured.error_m == fmax(p->static_max_m, p->trajectory_max_m) && p->static_rms_m <= p->static_max_m);
+        bool fitted = p->measured.setting.k_distance_J > 0;
+        if (!strcmp(p->measured.setting.model, "tet_springs")) best[fitted] = fmin(best[fitted], p->static_max_m);
     }
     /* calibration is what springs are worth something by: at rest from 18 % to a per mille of the tip's way */
     CHECK(best[0] > 0.1 * s->max_m && best[1] < 0.005 * s->max_m);
@@ -321,23 +321,23 @@ static void check_foreseen(const pal_study *s)
     for (int i = 0; i < s->n_point; i++) {
         const pal_study_point *p = &s->point[i];
         n_cost += isfinite(p->predicted_ms);
-        CHECK(isnan(p->predicted_ms) || (p->predicted_ms < 4 * p->priced.ms && p->predicted_ms > p->priced.ms / 4));
+        CHECK(isnan(p->predicted_ms) || (p->predicted_ms < 4 * p->measured.ms && p->predicted_ms > p->measured.ms / 4));
         /* a step that none other is near: what it costs is told by what is counted, what it leaves is not known */
         if (!isfinite(p->predicted_m)) continue;
-        CHECK(p->predicted_m < 5 * p->priced.error_m && p->predicted_m > p->priced.error_m / 5);
+        CHECK(p->predicted_m < 5 * p->measured.error_m && p->predicted_m > p->measured.error_m / 5);
         n++;
     }
     CHECK(n >= 2 && n_cost > n);
     /* between the two sizes that were measured: errors between theirs, within a third */
-    pal_configuration between = s->point[0].priced.setting, last = between;
-    double ms, error_m, low = s->point[0].priced.error_m, high = low;
+    pal_configuration between = s->point[0].measured.setting, last = between;
+    double ms, error_m, low = s->point[0].measured.error_m, high = low;
     for (int i = 0; i < s->n_point; i++) {
-        last.size = s->point[i].priced.setting.size;
-        if (!pal_configuration_equal(&last, &s->point[i].priced.setting)) continue;
-        low = fmin(low, s->point[i].priced.error_m), high = fmax(high, s->point[i].priced.error_m);
+        last.size = s->point[i].measured.setting.size;
+        if (!pal_configuration_equal(&last, &s->point[i].measured.setting)) continue;
+        low = fmin(low, s->point[i].measured.error_m), high = fmax(high, s->point[i].measured.error_m);
     }
     between.size = 20;
-    CHECK(pal_study_foresee(s, &between, -1, &ms, &error_m));
+    CHECK(pal_study_predict_configuration(s, &between, -1, &ms, &error_m));
     CHECK(ms > 0 && error_m > low / 1.33 && error_m < high * 1.33);
 }
 
@@ -359,7 +359,7 @@ static void check_resumed(const pal_study *s, const pal_problem *p, const pal_su
     CHECK_INT(part->n_point, 2);
     CHECK_INT(c.n_done, 2);
     for (int i = 0; i < 2; i++) {
-        CHECK_NEAR(part->point[i].priced.error_m, s->point[i].priced.error_m, 1e-12);
+        CHECK_NEAR(part->point[i].measured.error_m, s->point[i].measured.error_m, 1e-12);
         CHECK_INT(part->point[i].n_substep, s->point[i].n_substep);
     }
     free(again);
@@ -416,9 +416,9 @@ static void nearly_incompressible_and_against_samples(void)
     CHECK(s->n_point > 3 && s->reference_m == 0 && strstr(s->reference, "given"));
     for (int i = 0; i < s->n_point; i++) {
         const pal_study_point *q = &s->point[i];
-        bool locks = !strcmp(q->priced.setting.element, "tet4");
+        bool locks = !strcmp(q->measured.setting.element, "tet4");
         CHECK(!q->err);
-        CHECK(locks ? q->static_most_m > 0.2 * s->max_m : q->static_most_m < 0.05 * s->max_m);
+        CHECK(locks ? q->static_max_m > 0.2 * s->max_m : q->static_max_m < 0.05 * s->max_m);
     }
     pal_solution_free(solution);
     pal_surface_free(&beam);

@@ -53,7 +53,7 @@ static bool done(const pal_study *study, int n_finest, void *user)
     return true;
 }
 
-static bool goes_on(void *user)
+static bool may_continue(void *user)
 {
     run *r = user;
     r->n_looks++;
@@ -76,7 +76,7 @@ static pal_err go(run *r, const pal_problem *p, const pal_surface *beam, int lef
                            .recall = recall,
                            .remember = remember,
                            .done = done,
-                           .goes_on = goes_on,
+                           .may_continue = may_continue,
                            .user = r};
     r->left = left, r->n_looks = 0;
     pal_err err = pal_study_problem(p, &p->load_case[0], beam, &o, out, &diag);
@@ -92,11 +92,11 @@ static void check_same(const pal_study *a, const pal_study *b)
     CHECK(a->reference_m == b->reference_m && a->max_m == b->max_m && a->length_scale_m == b->length_scale_m);
     for (int i = 0; i < a->n_point; i++) {
         const pal_study_point *p = &a->point[i], *q = &b->point[i];
-        CHECK(pal_configuration_equal(&p->priced.setting, &q->priced.setting) && p->err == q->err);
-        CHECK(p->priced.error_m == q->priced.error_m && p->static_rms_m == q->static_rms_m);
-        CHECK(p->way_most_m == q->way_most_m && p->way_rms_m == q->way_rms_m);
+        CHECK(pal_configuration_equal(&p->measured.setting, &q->measured.setting) && p->err == q->err);
+        CHECK(p->measured.error_m == q->measured.error_m && p->static_rms_m == q->static_rms_m);
+        CHECK(p->trajectory_max_m == q->trajectory_max_m && p->trajectory_rms_m == q->trajectory_rms_m);
         CHECK(p->n_node == q->n_node && p->n_substep == q->n_substep);
-        CHECK(p->priced.setting.k_distance_J == q->priced.setting.k_distance_J);
+        CHECK(p->measured.setting.k_distance_J == q->measured.setting.k_distance_J);
     }
 }
 

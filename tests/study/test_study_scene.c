@@ -4,8 +4,8 @@
 
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/stomach.h"
-#include "server/robustness/torture.h"
-#include "server/study/study_parts.h"
+#include "server/robustness/robustness.h"
+#include "server/study/study_job.h"
 #include "tests/check.h"
 #include "tests/fixtures/subdivision_scene.h"
 
@@ -55,9 +55,9 @@ static void show(const pal_study *s)
     char name[PAL_CONFIGURATION_TEXT];
     printf("  %s: most %.3g mm, own error %.3g mm\n", s->reference, 1e3 * s->max_m, 1e3 * s->reference_m);
     for (int i = 0; i < s->n_point; i++)
-        printf("  %c %s: %d nodes, %.3f ms, rest %.3g mm, way %.3g mm %s\n", s->point[i].priced.front ? '*' : ' ',
-               pal_configuration_text(&s->point[i].priced.setting, name), s->point[i].n_node, s->point[i].priced.ms,
-               1e3 * s->point[i].static_most_m, 1e3 * s->point[i].way_most_m, s->point[i].reason);
+        printf("  %c %s: %d nodes, %.3f ms, rest %.3g mm, way %.3g mm %s\n", s->point[i].measured.front ? '*' : ' ',
+               pal_configuration_text(&s->point[i].measured.setting, name), s->point[i].n_node, s->point[i].measured.ms,
+               1e3 * s->point[i].static_max_m, 1e3 * s->point[i].trajectory_max_m, s->point[i].reason);
 }
 
 /* what is named has to come back from being mistreated: fitted springs keep some of their volume stiffness, as without
@@ -67,13 +67,13 @@ static void check_survives(const organ *o, const pal_configuration *setting)
     static const char *const insult[] = {"flat"};
     pal_configured_scene *set = NULL;
     pal_diagnostic diag = {{0}};
-    pal_torture_report *r = calloc(1, sizeof *r);
+    pal_robustness_report *r = calloc(1, sizeof *r);
     REQUIRE(r && !pal_configuration_make(o->scene, 0, setting, &diag, &set));
     for (int k = 0; k < 1; k++) {
-        pal_torture_options options;
-        pal_torture_default(&options);
-        options.only = insult[k], options.most_s = 2;
-        CHECK(!pal_torture(&set->scene, &options, r, &diag));
+        pal_robustness_options options;
+        pal_robustness_default(&options);
+        options.only = insult[k], options.max_cpu_s = 2;
+        CHECK(!pal_robustness_run(&set->scene, &options, r, &diag));
         CHECK_INT(r->n_failed, 0);
         if (r->n_failed) printf("  %s: %s\n", insult[k], r->result[0].diag);
     }
@@ -98,8 +98,8 @@ static void a_full_organ_is_pressed(void)
     double coarse = NAN, fine = NAN, fitted = NAN, plain = NAN;
     for (int i = 0; i < s->n_point; i++) {
         const pal_study_point *p = &s->point[i];
-        const pal_configuration *q = &p->priced.setting;
-        CHECK(!p->err && p->priced.ms > 0 && p->priced.error_m > 0 && p->priced.error_m < 0.6 * s->max_m);
+        const pal_configuration *q = &p->measured.setting;
+        CHECK(!p->err && p->measured.ms > 0 && p->measured.error_m > 0 && p->measured.error_m < 0.6 * s->max_m);
         if (!strcmp(q->element, "hex8_bbar")) coarse = isnan(coarse) ? p->static_rms_m : coarse, fine = p->static_rms_m;
         if (!strcmp(q->model, "tet_springs") && q->k_distance_J > 0) fitted = p->static_rms_m;
         if (!strcmp(q->model, "tet_springs") && !(q->k_distance_J > 0)) plain = p->static_rms_m;
@@ -108,7 +108,7 @@ static void a_full_organ_is_pressed(void)
     int n_sprung = 0;
     CHECK(pal_study_pick(s, NAN, 1e9) >= 0);
     for (int i = 0; i < s->n_point; i++) {
-        const pal_configuration *q = &s->point[i].priced.setting;
+        const pal_configuration *q = &s->point[i].measured.setting;
         if (!(q->k_distance_J > 0)) continue;
         n_sprung++;
         CHECK(q->k_volume_J > 0.3 * q->k_distance_J);
@@ -172,10 +172,10 @@ static void a_hollow_organ_is_pressed_and_pulled(void)
     CHECK_INT(o.study->n_point, 3);
     for (int i = 0; i < o.study->n_point; i++) {
         const pal_study_point *p = &o.study->point[i];
-        CHECK(!p->err && !strcmp(p->priced.setting.model, "adaptive_springs") && p->priced.ms > 0);
+        CHECK(!p->err && !strcmp(p->measured.setting.model, "adaptive_springs") && p->measured.ms > 0);
     }
     /* the finest that is swept, wholly refined, is nearer than the coarse surface */
-    CHECK(o.study->point[2].static_most_m < o.study->point[0].static_most_m);
+    CHECK(o.study->point[2].static_max_m < o.study->point[0].static_max_m);
     check_loads(found, o.study->length_scale_m);
     free(found);
     organ_free(&o);
@@ -197,7 +197,7 @@ static void cells_are_pressed(void)
     show(study);
     CHECK_INT(study->n_point, 4);
     for (int i = 0; i < study->n_point; i++)
-        CHECK(!study->point[i].err && study->point[i].static_most_m < 0.7 * study->max_m);
+        CHECK(!study->point[i].err && study->point[i].static_max_m < 0.7 * study->max_m);
     solid_scene_close(&s);
     free(study);
 }
@@ -206,7 +206,7 @@ static void cells_are_pressed(void)
 static void the_step_of_the_scene_is_the_one_that_is_swept(void)
 {
     static const double own_s[] = {1.0 / 30, 1.0 / 60, 1.0 / 120, 1.0 / 250, 1.0 / 1000};
-    pal_study_wish *wish = calloc(PAL_STUDY_POINTS, sizeof *wish);
+    pal_study_entry *wish = calloc(PAL_STUDY_POINTS, sizeof *wish);
     REQUIRE(wish);
     for (int full = 0; full < 2; full++) {
         organ o;

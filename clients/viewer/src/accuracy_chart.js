@@ -63,16 +63,16 @@ function drawPoints(plot, { requested }) {
         out.push(shape("polyline", { points, class: "front" }));
     }
     for (const { x, y, point, colour } of plot.marks) {
-        const text = `${plainLabel(point.label)}: ${milliseconds(point.ms)}, ${millimetres(point.error_m)}`;
-        const style = point.front ? { r: 4, class: "point on-front" } : { r: 2.8, class: "point" };
+        const text = `${plainLabel(point.label)}: ${milliseconds(point.cost_ms)}, ${millimetres(point.error_m)}`;
+        const style = point.pareto_optimal ? { r: 4, class: "point on-front" } : { r: 2.8, class: "point" };
         out.push(shape("circle", { cx: x, cy: y, fill: colour, ...style }, text));
     }
     if (requested)
         out.push(
-            shape("circle", { cx: plot.x(requested.ms), cy: plot.y(requested.error_m), r: 8, class: "requested" }),
+            shape("circle", { cx: plot.x(requested.cost_ms), cy: plot.y(requested.error_m), r: 8, class: "requested" }),
         );
     for (const { x, y, of } of plot.neighbours) {
-        const text = `${plainLabel(of.label)}, predicted: ${milliseconds(of.ms)}, ${millimetres(of.error_m)}`;
+        const text = `${plainLabel(of.label)}, predicted: ${milliseconds(of.cost_ms)}, ${millimetres(of.error_m)}`;
         out.push(shape("path", { d: `M${x} ${y - 5}l5 5l-5 5l-5 -5z`, class: "neighbour" }, text));
     }
     return out;

@@ -91,11 +91,11 @@ export class AccuracyPanel {
     subscribe() {
         const wanted = this.opened ? this.body : "";
         if (wanted === this.subscribed) return;
-        if (this.subscribed) this.send({ verb: "estimate", target: this.subscribed, args: { on: 0 } });
+        if (this.subscribed) this.send({ verb: "estimate", target: this.subscribed, args: { enabled: 0 } });
         this.subscribed = wanted;
         this.points = this.front = [];
         this.estimate = null;
-        if (wanted) this.send({ verb: "estimate", target: wanted, args: { on: 1 } });
+        if (wanted) this.send({ verb: "estimate", target: wanted, args: { enabled: 1 } });
         this.show();
     }
 
@@ -122,7 +122,7 @@ export class AccuracyPanel {
 
     /** @param {import("./control_table.js").Answer} answer @returns {boolean} it belongs to this panel */
     answer(answer) {
-        if (answer.verb !== "point" && answer.verb !== "knob") return false;
+        if (answer.verb !== "study_point" && answer.verb !== "configure") return false;
         this.pending = null;
         this.report(switchText(answer));
         this.show();
@@ -156,13 +156,13 @@ export class AccuracyPanel {
     releaseSlider() {
         const point = this.front[Number(this.slider.value)];
         this.dragging = false;
-        if (point && point.index !== this.estimate?.point) this.submit(this.pointCommand(point), point.label);
+        if (point && point.index !== this.estimate?.study_point) this.submit(this.pointCommand(point), point.label);
         this.show();
     }
 
     /** @param {StudyPoint} point @returns {Command} */
     pointCommand(point) {
-        return { verb: "point", target: this.body, args: { index: point.index } };
+        return { verb: "study_point", target: this.body, args: { index: point.index } };
     }
 
     show() {
@@ -171,7 +171,7 @@ export class AccuracyPanel {
         this.at("methods").replaceChildren(
             ...plot.methods.map(({ name, colour }) => this.legendItem(colour, plainLabel(name))),
         );
-        this.at("configuration").textContent = plainLabel(this.estimate?.setting ?? "");
+        this.at("configuration").textContent = plainLabel(this.estimate?.configuration ?? "");
         this.showError(this.estimate);
         this.showSlider();
         this.showNeighbours(this.estimate);
@@ -179,7 +179,7 @@ export class AccuracyPanel {
     }
 
     drawPlot() {
-        const moving = this.dragging || this.pending?.command.verb === "point";
+        const moving = this.dragging || this.pending?.command.verb === "study_point";
         const requested = moving ? (this.front[Number(this.slider.value)] ?? null) : null;
         const { estimate, points, reference, stepMs } = this;
         return drawChart(this.plot, { estimate, points, reference, requested, stepMs });
@@ -198,7 +198,7 @@ export class AccuracyPanel {
     showError(estimate) {
         const text = errorText(estimate);
         const parts = estimate && text.known ? partsOf(estimate) : [];
-        this.at("ms").textContent = estimate ? milliseconds(estimate.ms) : "–";
+        this.at("ms").textContent = estimate ? milliseconds(estimate.cost_ms) : "–";
         this.at("error").textContent = text.error;
         this.at("age").textContent = text.age;
         this.at("note").textContent = text.note;
@@ -216,14 +216,14 @@ export class AccuracyPanel {
     }
 
     showSlider() {
-        if (!this.dragging && this.pending?.command.verb !== "point") {
+        if (!this.dragging && this.pending?.command.verb !== "study_point") {
             const position = positionOn(this.front, this.estimate);
             if (position >= 0) this.slider.value = String(position);
         }
         this.slider.disabled = this.pending !== null;
         const point = this.front[Number(this.slider.value)];
         const text = point
-            ? `${plainLabel(point.label)}: ${milliseconds(point.ms)}, ${millimetres(point.error_m)}`
+            ? `${plainLabel(point.label)}: ${milliseconds(point.cost_ms)}, ${millimetres(point.error_m)}`
             : "";
         this.at("choice").textContent = text;
         if (point) this.slider.setAttribute("aria-valuetext", text);
@@ -234,7 +234,7 @@ export class AccuracyPanel {
         const neighbours = estimate?.neighbours ?? [];
         this.at("neighbours").hidden = neighbours.length === 0;
         const list = this.at("neighbour-list");
-        const figures = [estimate?.ms?.toPrecision(2), estimate?.error_m?.toPrecision(2)];
+        const figures = [estimate?.cost_ms?.toPrecision(2), estimate?.error_m?.toPrecision(2)];
         const key = JSON.stringify([neighbours, this.pending !== null, figures]);
         // a button stays in place while it is pressed
         if (list.dataset.key === key || (neighbours.length && list.matches(":active"))) return;
@@ -246,10 +246,10 @@ export class AccuracyPanel {
     neighbourButton(estimate, near) {
         const command = this.neighbourCommand(near);
         const button = this.page.createElement("button");
-        const title = Object.assign(this.page.createElement("b"), { textContent: near.knob });
+        const title = Object.assign(this.page.createElement("b"), { textContent: near.parameter });
         const text = Object.assign(this.page.createElement("span"), { textContent: neighbourText(estimate, near) });
         button.append(title, text);
-        button.title = `${plainLabel(near.label)}, predicted: ${milliseconds(near.ms)}, ${millimetres(near.error_m)}`;
+        button.title = `${plainLabel(near.label)}, predicted: ${milliseconds(near.cost_ms)}, ${millimetres(near.error_m)}`;
         button.disabled = this.pending !== null || !command;
         if (command) button.onclick = () => this.submit(command, near.label);
         return button;
@@ -258,7 +258,7 @@ export class AccuracyPanel {
     /** the command that switches to a neighbour; null: none does @param {Neighbour} near @returns {Command | null} */
     neighbourCommand(near) {
         const args = neighbourArgs(near);
-        if (args) return { verb: "knob", target: this.body, args };
+        if (args) return { verb: "configure", target: this.body, args };
         const point = this.points.find((p) => p.label === near.label);
         return point ? this.pointCommand(point) : null;
     }

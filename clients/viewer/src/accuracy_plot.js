@@ -23,14 +23,14 @@ export function logRange(values, span = 10) {
     const good = values.filter(positive);
     if (good.length === 0) return { low: 1, high: span };
     const step = (/** @type {number} */ v, /** @type {boolean} */ up) => {
-        const ten = 10 ** Math.floor(Math.log10(v) + 1e-9),
-            all = [1, 2, 5, 10].map((s) => s * ten);
+        const ten = 10 ** Math.floor(Math.log10(v) + 1e-9);
+        const all = [1, 2, 5, 10].map((s) => s * ten);
         return up
             ? (all.find((s) => s >= v * (1 - 1e-9)) ?? 10 * ten)
             : (all.filter((s) => s <= v * (1 + 1e-9)).at(-1) ?? ten);
     };
-    let low = step(Math.min(...good) / 1.15, false),
-        high = step(Math.max(...good) * 1.15, true);
+    let low = step(Math.min(...good) / 1.15, false);
+    let high = step(Math.max(...good) * 1.15, true);
     while (high / low < span * (1 - 1e-9)) {
         high = step(high * 1.01, true);
         if (high / low < span * (1 - 1e-9)) low = step(low / 1.01, false);
@@ -67,8 +67,8 @@ export function logTicks(range, max = 6) {
 /** the Pareto front in the order of cost: the positions of the slider @param {StudyPoint[]} points @returns {StudyPoint[]} */
 export function frontOf(points) {
     return points
-        .filter((p) => p.front && positive(p.ms) && positive(p.error_m))
-        .sort((a, b) => a.ms - b.ms || b.error_m - a.error_m);
+        .filter((p) => p.pareto_optimal && positive(p.cost_ms) && positive(p.error_m))
+        .sort((a, b) => a.cost_ms - b.cost_ms || b.error_m - a.error_m);
 }
 
 /**
@@ -77,10 +77,10 @@ export function frontOf(points) {
  */
 export function positionOn(front, estimate) {
     if (front.length === 0 || !estimate) return -1;
-    const own = front.findIndex((p) => p.index === estimate.point);
+    const own = front.findIndex((p) => p.index === estimate.study_point);
     if (own >= 0) return own;
-    if (!positive(estimate.ms)) return -1;
-    const distances = front.map((p) => Math.abs(Math.log(p.ms / /** @type {number} */ (estimate.ms))));
+    if (!positive(estimate.cost_ms)) return -1;
+    const distances = front.map((p) => Math.abs(Math.log(p.cost_ms / /** @type {number} */ (estimate.cost_ms))));
     return distances.indexOf(Math.min(...distances));
 }
 
@@ -89,14 +89,14 @@ export function positionOn(front, estimate) {
  * @param {StudyPoint[]} points @param {Estimate | null} estimate @param {{left: number, right: number, top: number, bottom: number}} box
  */
 export function layOutPlot(points, estimate, box) {
-    const good = points.filter((p) => positive(p.ms) && positive(p.error_m)),
-        near = estimate?.neighbours ?? [];
-    const both = (/** @type {{ms?: number, error_m?: number} | null} */ p) =>
-        p !== null && positive(p.ms) && positive(p.error_m);
+    const good = points.filter((p) => positive(p.cost_ms) && positive(p.error_m));
+    const near = estimate?.neighbours ?? [];
+    const both = (/** @type {{cost_ms?: number, error_m?: number} | null} */ p) =>
+        p !== null && positive(p.cost_ms) && positive(p.error_m);
     const shown = [...good, ...near.filter(both), ...(both(estimate) ? [estimate] : [])];
     const msRange = logRange([
-        ...shown.map((p) => /** @type {number} */ (p?.ms)),
-        ...(positive(estimate?.ms) ? [estimate.ms] : []),
+        ...shown.map((p) => /** @type {number} */ (p?.cost_ms)),
+        ...(positive(estimate?.cost_ms) ? [estimate.cost_ms] : []),
     ]);
     // the error of a body at rest is far below the studied ones: it is drawn at the foot of the plot
     const min = Math.max(ERROR_MIN_M, ...(good.length ? [0.1 * Math.min(...good.map((p) => p.error_m))] : []));
@@ -112,18 +112,18 @@ export function layOutPlot(points, estimate, box) {
             text: short(v),
         })),
         marks: good.map((p) => ({
-            x: x(p.ms),
+            x: x(p.cost_ms),
             y: y(p.error_m),
             point: p,
             colour: METHOD_COLOURS[methods.indexOf(p.method) % METHOD_COLOURS.length],
         })),
-        front: frontOf(good).map((p) => ({ x: x(p.ms), y: y(p.error_m) })),
+        front: frontOf(good).map((p) => ({ x: x(p.cost_ms), y: y(p.error_m) })),
         neighbours: near.flatMap((n) =>
-            positive(n.ms) && positive(n.error_m) ? [{ x: x(n.ms), y: y(n.error_m), of: n }] : [],
+            positive(n.cost_ms) && positive(n.error_m) ? [{ x: x(n.cost_ms), y: y(n.error_m), of: n }] : [],
         ),
         // without an error estimate the body is a vertical line at its cost
-        live: positive(estimate?.ms)
-            ? { x: x(estimate.ms), y: positive(estimate.error_m) ? y(estimate.error_m) : null }
+        live: positive(estimate?.cost_ms)
+            ? { x: x(estimate.cost_ms), y: positive(estimate.error_m) ? y(estimate.error_m) : null }
             : null,
         x,
         y,
@@ -142,5 +142,5 @@ export function neighbourArgs(near) {
     if (near.size) args.size = near.size;
     if (near.step_ms) args.step_ms = near.step_ms;
     if (near.tolerance) args.tolerance = near.tolerance;
-    return near.knob === "method" || Object.keys(args).length === 0 ? null : args;
+    return near.parameter === "method" || Object.keys(args).length === 0 ? null : args;
 }

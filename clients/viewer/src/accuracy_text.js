@@ -15,7 +15,7 @@ export const PARTS = Object.freeze(
     /** @type {const} */ ([
         { key: "discretisation_m", title: "mesh", colour: "#5cb8ff" },
         { key: "algebraic_m", title: "solver", colour: "#62d39a" },
-        { key: "time_m", title: "time step", colour: "#ffb45c" },
+        { key: "time_m", title: "step", colour: "#ffb45c" },
         { key: "model_m", title: "model", colour: "#e08bd8" },
     ]),
 );
@@ -54,13 +54,14 @@ export const milliseconds = (ms) => (ms === undefined ? "unknown" : `${short(ms)
  */
 export function errorText(estimate) {
     if (!estimate) return { error: "being estimated", age: "", note: "", known: false };
-    const { age_s = 0, error_m, locking, note = "", tick, zz_percent } = estimate;
-    if (tick === 0) return { error: note ? "not estimated" : "being estimated", age: "", note, known: false };
+    const { age_s = 0, error_m, locking, diagnostic = "", tick, energy_error_percent } = estimate;
+    if (tick === 0)
+        return { error: diagnostic ? "not estimated" : "being estimated", age: "", note: diagnostic, known: false };
     const notes = [
-        note.replace(/([^.])$/, "$1."),
+        diagnostic.replace(/([^.])$/, "$1."),
         locking ? "Volumetric locking: the true error is larger." : "",
-        zz_percent !== undefined && error_m !== undefined && error_m >= RESOLUTION_M
-            ? `Relative error in the energy norm: ${zz_percent.toPrecision(2)} %.`
+        energy_error_percent !== undefined && error_m !== undefined && error_m >= RESOLUTION_M
+            ? `Relative error in the energy norm: ${energy_error_percent.toPrecision(2)} %.`
             : "",
     ];
     const age = age_s > OLD_S ? `${short(Math.round(age_s))} s ago` : "";
@@ -91,7 +92,7 @@ function gainText(ratio) {
  * @param {Estimate} now @param {Neighbour} to
  */
 export function neighbourText(now, to) {
-    const cost = positive(now.ms) && positive(to.ms) ? to.ms - now.ms : null;
+    const cost = positive(now.cost_ms) && positive(to.cost_ms) ? to.cost_ms - now.cost_ms : null;
     const difference = cost === null ? "" : `${cost > 0 ? "+" : "−"}${short(Math.abs(cost))} ms`;
     const costText = cost === null ? "" : Math.abs(cost) < SAME_MS ? ": same cost" : `: ${difference}`;
     if (!known(now.error_m) || !known(to.error_m)) return plainLabel(to.label) + costText;
@@ -100,22 +101,24 @@ export function neighbourText(now, to) {
 }
 
 /** the errors of both configurations bound the displacement of a switch @param {Record<string, number>} args */
-function boundText({ most_move_m, bound_m }) {
+function boundText({ max_move_m, bound_m }) {
     if (typeof bound_m !== "number") return "";
-    return most_move_m <= Math.max(bound_m, RESOLUTION_M)
+    return max_move_m <= Math.max(bound_m, RESOLUTION_M)
         ? ` (bound ${millimetres(bound_m)})`
         : ` (beyond the bound of ${millimetres(bound_m)})`;
 }
 
 /** what a switch of the configuration did @param {import("./control_table.js").Answer} answer */
 export function switchText({ text, args = {} }) {
-    const { energy_percent, frame_move_m, made_ms, most_move_m } = args;
+    const { energy_percent, max_frame_move_m, prepare_ms, max_move_m } = args;
     const facts = [];
     if (energy_percent !== undefined)
         facts.push(`energy ${energy_percent >= 0 ? "+" : "−"}${Math.abs(energy_percent).toFixed(2)} %`);
-    if (most_move_m !== undefined) facts.push(`surface moves ${millimetres(most_move_m)}${boundText(args)}`);
-    if (frame_move_m !== undefined) facts.push(`${millimetres(frame_move_m)} per frame`);
-    if (made_ms !== undefined)
-        facts.push(`prepared in ${made_ms < 1000 ? `${made_ms.toFixed(0)} ms` : `${(made_ms / 1000).toFixed(1)} s`}`);
+    if (max_move_m !== undefined) facts.push(`surface moves ${millimetres(max_move_m)}${boundText(args)}`);
+    if (max_frame_move_m !== undefined) facts.push(`${millimetres(max_frame_move_m)} per frame`);
+    if (prepare_ms !== undefined)
+        facts.push(
+            `prepared in ${prepare_ms < 1000 ? `${prepare_ms.toFixed(0)} ms` : `${(prepare_ms / 1000).toFixed(1)} s`}`,
+        );
     return facts.length ? `Switched: ${facts.join(", ")}.` : text;
 }

@@ -4,7 +4,8 @@
  * @typedef {import("./control_table.js").Hello} Hello
  * @typedef {import("./control_table.js").Status} Status
  * @typedef {import("./control_table.js").Member} Member
- * @typedef {{rows: string[], row_parts?: number[], row_whys?: string[], row_fixed?: number[]}} Plan
+ * @typedef {{components: string[], component_parts?: number[], component_reasons?: string[],
+ *   component_required?: number[]}} Plan
  */
 
 export class AppState {
@@ -13,9 +14,9 @@ export class AppState {
     /** @type {Status | null} null: the newest one describes an older plan */
     status = null;
     /** @type {Plan} components of `hello`, or of the last `topology` that had some */
-    plan = { rows: [] };
+    plan = { components: [] };
     /** @type {string[]} names of the components that run */
-    components = [];
+    running = [];
     /** @type {Map<number, Member>} by id */
     members = new Map();
     /** @type {import("./wire.js").Tool[]} */

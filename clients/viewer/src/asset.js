@@ -1,16 +1,16 @@
 // Assets: rest pose, triangles, wire order and predictor of one part (protocol/README.md, "Assets"; protocol/asset.c).
 // Validates everything that frame_decoder.js and a renderer trust.
 import { lz4Decode } from "./lz4.js";
-import { VERTEX_MAX, WireError } from "./wire.js";
+import { checkOf, VERTEX_MAX } from "./wire.js";
 
-const MAGIC = 0x314d4c50,
-    VERSION = 1,
-    HEAD_BYTES = 40,
-    BYTES_MAX = 2 ** 28,
-    TRIANGLE_MAX = 2 ** 24,
-    LEVEL_MAX = 4096;
-const ONE = 4096,
-    ABS_MAX = 8191;
+const MAGIC = 0x314d4c50;
+const VERSION = 1;
+const HEAD_BYTES = 40;
+const BYTES_MAX = 2 ** 28;
+const TRIANGLE_MAX = 2 ** 24;
+const LEVEL_MAX = 4096;
+const ONE = 4096;
+const ABS_MAX = 8191;
 
 /**
  * @typedef {{
@@ -20,10 +20,7 @@ const ONE = 4096,
  *   [n][4] in wire order; levels: first wire index of each level
  */
 
-/** @param {boolean} good @param {string} code @param {string} text */
-function need(good, code, text) {
-    if (!good) throw new WireError(code, `asset: ${text}`);
-}
+const need = checkOf("asset");
 
 /** @param {Uint8Array} bytes */
 function fnv1a(bytes) {
@@ -85,9 +82,9 @@ function check(asset, n) {
     need(levels[0] === 0 && levels.every((v, i) => (i === 0 || v > levels[i - 1]) && v < n), "ORDER", "levels");
     const seen = new Uint8Array(n);
     for (let i = 0; i < n; i++) {
-        let sum = 0,
-            absolute = 0,
-            good = vertexOf[i] < n && seen[vertexOf[i]]++ === 0;
+        let sum = 0;
+        let absolute = 0;
+        let good = vertexOf[i] < n && seen[vertexOf[i]]++ === 0;
         for (let j = 4 * i; j < 4 * i + 4; j++) {
             sum += weight[j];
             absolute += Math.abs(weight[j]);
@@ -106,10 +103,10 @@ export function decodeAsset(bytes) {
     const raw = new Uint8Array(nRaw);
     lz4Decode(block, raw, 0, nRaw);
 
-    const bits = new Uint32Array(3 * n),
-        vertexOf = planes(raw, 12 * n, n),
-        neighbour = new Uint32Array(4 * n),
-        weight = new Int16Array(4 * n);
+    const bits = new Uint32Array(3 * n);
+    const vertexOf = planes(raw, 12 * n, n);
+    const neighbour = new Uint32Array(4 * n);
+    const weight = new Int16Array(4 * n);
     let at = 0;
     for (let c = 0; c < 3; c++, at += 4 * n) planes(raw, at, n).forEach((v, i) => (bits[3 * i + c] = v));
     for (let i = 0, before = 0; i < n; i++) before = vertexOf[i] = before + unfold(vertexOf[i]);

@@ -12,16 +12,16 @@ const LINES = { color: 0xf2dccb, opacity: 0.36 };
  * @param {Float32Array} x [n][3] @param {Uint32Array} triangles [m][3]
  */
 function isClosed(x, triangles) {
-    const n = x.length / 3,
-        edges = new Set();
+    const n = x.length / 3;
+    const edges = new Set();
     let volume = 0; // sixfold
     for (let t = 0; t < triangles.length; t += 3) {
-        const a = triangles[t],
-            b = triangles[t + 1],
-            c = triangles[t + 2],
-            i = 3 * a,
-            j = 3 * b,
-            k = 3 * c;
+        const a = triangles[t];
+        const b = triangles[t + 1];
+        const c = triangles[t + 2];
+        const i = 3 * a;
+        const j = 3 * b;
+        const k = 3 * c;
         volume +=
             x[i] * (x[j + 1] * x[k + 2] - x[j + 2] * x[k + 1]) +
             x[i + 1] * (x[j + 2] * x[k] - x[j] * x[k + 2]) +
@@ -75,9 +75,9 @@ export class BodyMesh {
 
     /** does a frame differ by at most `limit` m in every coordinate? @param {Float32Array} positions @param {number} limit */
     near(positions, limit) {
-        const x = this.position.array,
-            visible = this.visible,
-            n = this.nVisible();
+        const x = this.position.array;
+        const visible = this.visible;
+        const n = this.nVisible();
         for (let k = 0; k < n; k++) {
             const i = 3 * (visible ? visible[k] : k);
             if (
@@ -172,14 +172,14 @@ export class BodyMesh {
 
     /** largest displacement of the shown frame, m */
     maxDisplacement() {
-        const x = this.position.array,
-            r = this.rest,
-            visible = this.visible,
-            n = this.nVisible();
+        const x = this.position.array;
+        const r = this.rest;
+        const visible = this.visible;
+        const n = this.nVisible();
         let max = 0;
         for (let k = 0; k < n; k++) {
-            const i = 3 * (visible ? visible[k] : k),
-                d = (x[i] - r[i]) ** 2 + (x[i + 1] - r[i + 1]) ** 2 + (x[i + 2] - r[i + 2]) ** 2;
+            const i = 3 * (visible ? visible[k] : k);
+            const d = (x[i] - r[i]) ** 2 + (x[i + 1] - r[i + 1]) ** 2 + (x[i + 2] - r[i + 2]) ** 2;
             if (d > max) max = d;
         }
         return Math.sqrt(max);

@@ -20,7 +20,7 @@ export class BodySet {
         this.pending = new Map();
         /** @type {BodyMesh[]} replaced, until the next picture: what they share with the renderer is kept */
         this.retired = [];
-        /** @type {Map<number, FrameArrays & {shown: import("./patch_decoder.js").Shown | null}>} newest frame of each part
+        /** @type {Map<number, FrameArrays & {shown: import("./topology_delta.js").Shown | null}>} newest frame of each part
          * that is not drawn yet, with the newest triangles since the last drawn one */
         this.frames = new Map();
     }

@@ -50,8 +50,8 @@ function readFields(table, value, path) {
     /** @type {Record<string, unknown>} */
     const out = {};
     for (const [name, kind] of Object.entries(table)) {
-        const optional = name.endsWith("?"),
-            key = optional ? name.slice(0, -1) : name;
+        const optional = name.endsWith("?");
+        const key = optional ? name.slice(0, -1) : name;
         if (value[key] !== undefined) out[key] = readField(kind, value[key], `${path}.${key}`);
         else if (!optional) throw new WireError("FIELD", `${path} has no ${key}`);
     }

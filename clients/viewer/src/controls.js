@@ -84,7 +84,7 @@ export class Controls {
     /** the mode of sculpting exists while a part can be sculpted */
     offerSculpting() {
         const { input, sculpt, state } = this.page;
-        sculpt.offered = state.parts.some((part) => part.sculpts);
+        sculpt.offered = state.parts.some((part) => part.sculptable);
         buttonById("mode-sculpt").hidden = !sculpt.offered;
         if (!sculpt.offered && input.mode === "sculpt") this.setMode("pull");
     }

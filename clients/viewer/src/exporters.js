@@ -34,8 +34,8 @@ const digits = (value) => String(Number(value.toPrecision(9)));
 
 /** @param {Surface[]} surfaces @returns {string} */
 export function toObj(surfaces) {
-    const { positions: x, triangles: t } = joinSurfaces(surfaces),
-        lines = [`# ${x.length / 3} vertices in metres, ${t.length / 3} triangles`];
+    const { positions: x, triangles: t } = joinSurfaces(surfaces);
+    const lines = [`# ${x.length / 3} vertices in metres, ${t.length / 3} triangles`];
     for (let i = 0; i < x.length; i += 3) lines.push(`v ${digits(x[i])} ${digits(x[i + 1])} ${digits(x[i + 2])}`);
     for (let i = 0; i < t.length; i += 3) lines.push(`f ${t[i] + 1} ${t[i + 1] + 1} ${t[i + 2] + 1}`);
     return lines.join("\n") + "\n";
@@ -43,16 +43,16 @@ export function toObj(surfaces) {
 
 /** @param {Surface[]} surfaces @returns {ArrayBuffer} */
 export function toStl(surfaces) {
-    const { positions: x, triangles: t } = joinSurfaces(surfaces),
-        n = t.length / 3,
-        bytes = new ArrayBuffer(84 + 50 * n),
-        view = new DataView(bytes);
+    const { positions: x, triangles: t } = joinSurfaces(surfaces);
+    const n = t.length / 3;
+    const bytes = new ArrayBuffer(84 + 50 * n);
+    const view = new DataView(bytes);
     new Uint8Array(bytes).set(new TextEncoder().encode("Palpate, metres"));
     view.setUint32(80, n, true);
     for (let k = 0; k < n; k++) {
         const [a, b, c] = [0, 1, 2].map((i) => [0, 1, 2].map((d) => x[3 * t[3 * k + i] + d]));
-        const u = b.map((v, d) => v - a[d]),
-            w = c.map((v, d) => v - a[d]);
+        const u = b.map((v, d) => v - a[d]);
+        const w = c.map((v, d) => v - a[d]);
         const normal = [u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]];
         const length = Math.hypot(...normal) || 1;
         [...normal.map((v) => v / length), ...a, ...b, ...c].forEach((v, i) =>
@@ -64,9 +64,9 @@ export function toStl(surfaces) {
 
 /** @param {Surface[]} surfaces @returns {ArrayBuffer} binary, little endian */
 export function toPly(surfaces) {
-    const { positions: x, triangles: t } = joinSurfaces(surfaces),
-        n = x.length / 3,
-        m = t.length / 3;
+    const { positions: x, triangles: t } = joinSurfaces(surfaces);
+    const n = x.length / 3;
+    const m = t.length / 3;
     const head = new TextEncoder().encode(`ply
 format binary_little_endian 1.0
 comment metres
@@ -78,8 +78,8 @@ element face ${m}
 property list uchar int vertex_indices
 end_header
 `);
-    const bytes = new ArrayBuffer(head.length + 12 * n + 13 * m),
-        view = new DataView(bytes);
+    const bytes = new ArrayBuffer(head.length + 12 * n + 13 * m);
+    const view = new DataView(bytes);
     new Uint8Array(bytes).set(head);
     let at = head.length;
     for (const v of x) {

@@ -1,9 +1,9 @@
 // FIELD messages (protocol/README.md, "FIELD"; protocol/field_codec.c): one byte per vertex between low and high.
 import { lz4Decode } from "./lz4.js";
-import { KIND, PART_MAX, readHead, VERTEX_MAX, WireError } from "./wire.js";
+import { checkOf, KIND, PART_MAX, readHead, VERTEX_MAX } from "./wire.js";
 
 const HEAD_BYTES = 40;
-/** names by their number on the wire, as in `view` */
+/** names by their number on the wire, as in `subscribe_field` */
 export const FIELD_NAMES = Object.freeze([
     "none",
     "displacement",
@@ -14,10 +14,7 @@ export const FIELD_NAMES = Object.freeze([
     "distortion",
 ]);
 
-/** @param {boolean} good @param {string} code @param {string} text */
-function need(good, code, text) {
-    if (!good) throw new WireError(code, `field: ${text}`);
-}
+const need = checkOf("field");
 
 /**
  * @typedef {{part: number, epoch: number, field: number, name: string, simTimeUs: number, low: number, high: number, n: number}} FieldHead
@@ -34,14 +31,14 @@ export function readFieldHead(bytes) {
     need(head.flags === 0, "FLAGS", `flags ${head.flags}`);
     need(bytes.length >= HEAD_BYTES, "SHORT", `${bytes.length} bytes`);
     const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-    const epoch = view.getUint32(8, true),
-        field = view.getUint32(12, true),
-        timeLow = view.getUint32(16, true),
-        timeHigh = view.getUint32(20, true);
-    const low = view.getFloat32(24, true),
-        high = view.getFloat32(28, true),
-        n = view.getUint32(32, true),
-        nLz4 = view.getUint32(36, true);
+    const epoch = view.getUint32(8, true);
+    const field = view.getUint32(12, true);
+    const timeLow = view.getUint32(16, true);
+    const timeHigh = view.getUint32(20, true);
+    const low = view.getFloat32(24, true);
+    const high = view.getFloat32(28, true);
+    const n = view.getUint32(32, true);
+    const nLz4 = view.getUint32(36, true);
     need(Number.isFinite(low) && Number.isFinite(high), "NAN", "range");
     need(
         head.index < PART_MAX && field > 0 && field < FIELD_NAMES.length && timeHigh < 1 << 21 && low <= high,

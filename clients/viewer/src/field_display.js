@@ -25,7 +25,7 @@ export class FieldDisplay {
         this.state.parts.forEach((part, i) => {
             if (!part.fields) return;
             this.send({
-                type: "view",
+                type: "subscribe_field",
                 part: i,
                 field: part.fields.includes(this.state.field) ? this.state.field : "none",
             });

@@ -1,26 +1,23 @@
 // FRAME decoder (protocol/README.md, "FRAME"; the same arithmetic as protocol/frame_codec.c, bit for bit): Rice codes to
 // residuals, closed-loop prediction in integers, positions in vertex order. One decoder per part and asset.
 import { lz4Decode } from "./lz4.js";
-import { KIND, PART_MAX, readHead, VERTEX_MAX, WireError } from "./wire.js";
+import { checkOf, KIND, PART_MAX, readHead, VERTEX_MAX } from "./wire.js";
 
-const HEAD_BYTES = 44,
-    AFFINE_BYTES = 48,
-    GROUP = 16,
-    QUOTIENT_MAX = 12,
-    ESCAPE_BITS = 24,
-    ESCAPE_LENGTH = 37;
-const MODE_MASK = 7,
-    MODE_WIDE = 14,
-    MODE_ZERO = 15,
-    TAIL = 8,
-    X_MOST = 2 ** 18 - 1,
-    SLACK = 256;
+const HEAD_BYTES = 44;
+const AFFINE_BYTES = 48;
+const GROUP = 16;
+const QUOTIENT_MAX = 12;
+const ESCAPE_BITS = 24;
+const ESCAPE_LENGTH = 37;
+const MODE_MASK = 7;
+const MODE_WIDE = 14;
+const MODE_ZERO = 15;
+const TAIL = 8;
+const X_MAX = 2 ** 18 - 1;
+const SLACK = 256;
 const LITTLE_ENDIAN = new Uint8Array(new Uint32Array([1]).buffer)[0] === 1;
 
-/** @param {boolean} good @param {string} code @param {string} text */
-function need(good, code, text) {
-    if (!good) throw new WireError(code, `frame: ${text}`);
-}
+const need = checkOf("frame");
 
 /** @param {number} n vertices */
 const modeBytes = (n) => Math.ceil(Math.ceil(n / GROUP) / 2);
@@ -47,11 +44,11 @@ export function readFrameHead(bytes) {
     const at = HEAD_BYTES + (flags ? AFFINE_BYTES : 0);
     need(bytes.length >= at, "SHORT", "no room for its head");
     const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-    const n = view.getUint32(32, true),
-        nRaw = view.getUint32(36, true),
-        nLz4 = view.getUint32(40, true);
-    const q = view.getFloat32(28, true),
-        high = view.getUint32(20, true);
+    const n = view.getUint32(32, true);
+    const nRaw = view.getUint32(36, true);
+    const nLz4 = view.getUint32(40, true);
+    const q = view.getFloat32(28, true);
+    const high = view.getUint32(20, true);
     need(nLz4 <= bytes.length - at, "SHORT", "block cut short");
     need(nLz4 >= bytes.length - at, "LONG", "bytes behind the block");
     need(index < PART_MAX && high < 1 << 21, "RANGE", "part or time");
@@ -87,7 +84,7 @@ export class FrameDecoder {
         this.words = new Int32Array(buffer);
         this.x = new Int32Array(3 * n);
         this.residual = new Int32Array(3 * GROUP);
-        this.place = asset.vertexOf.map((v) => 3 * v);
+        this.target = asset.vertexOf.map((v) => 3 * v);
         this.neighbour = asset.neighbour.map((i) => 3 * i);
         this.weight = Int32Array.from(asset.weight);
         this.rest = new Float32Array(3 * n);
@@ -101,8 +98,8 @@ export class FrameDecoder {
      * @returns {FrameHead}
      */
     decode(bytes, positions) {
-        const head = readFrameHead(bytes),
-            { n, nRaw, q } = head;
+        const head = readFrameHead(bytes);
+        const { n, nRaw, q } = head;
         need(n === this.n, "COUNT", `${n} vertices, the asset has ${this.n}`);
         need(positions.length === 3 * n, "SPACE", "positions of another size");
         const end = this.rawBegin + nRaw;
@@ -117,11 +114,11 @@ export class FrameDecoder {
     /** @param {number} nBit bits of codes @param {number} step @param {Float32Array} positions */
     body(nBit, step, positions) {
         const { n, raw, rawBegin } = this;
-        let bit = 0,
-            outside = 0;
+        let bit = 0;
+        let outside = 0;
         for (let first = 0, group = 0; first < n; first += GROUP, group++) {
-            const here = Math.min(GROUP, n - first),
-                mode = (raw[rawBegin + (group >> 1)] >> (4 * (group & 1))) & 15;
+            const here = Math.min(GROUP, n - first);
+            const mode = (raw[rawBegin + (group >> 1)] >> (4 * (group & 1))) & 15;
             if (mode !== MODE_ZERO) {
                 bit = this.codes(bit, mode, here);
                 need(bit >= 0 && bit <= nBit, "COUNT", "codes do not fit the body");
@@ -133,18 +130,18 @@ export class FrameDecoder {
     }
 
     /**
-     * Residuals of one group into this.residual; returns the bit behind its codes, -1 for a code that is none.
+     * Residuals of one group into this.residual; returns the bit behind its codes, -1 for an invalid code.
      * @param {number} bit @param {number} mode @param {number} here
      */
     codes(bit, mode, here) {
-        const { words, residual } = this,
-            base = (this.rawBegin + this.modeBytes) >> 2;
-        let k = mode,
-            coded = (1 << here) - 1;
+        const { words, residual } = this;
+        const base = (this.rawBegin + this.modeBytes) >> 2;
+        let k = mode;
+        let coded = (1 << here) - 1;
         if (mode >= MODE_MASK) {
-            const w = base + (bit >>> 5),
-                s = bit & 31,
-                low = (words[w] >>> s) | ((words[w + 1] << 1) << (31 - s));
+            const w = base + (bit >>> 5);
+            const s = bit & 31;
+            const low = (words[w] >>> s) | ((words[w + 1] << 1) << (31 - s));
             if (mode === MODE_WIDE) k = low & 15;
             else {
                 k = mode - MODE_MASK;
@@ -160,8 +157,8 @@ export class FrameDecoder {
                 continue;
             }
             for (const stop = i + 3; i < stop; i++) {
-                const w = base + (bit >>> 5),
-                    s = bit & 31;
+                const w = base + (bit >>> 5);
+                const s = bit & 31;
                 const low = (words[w] >>> s) | ((words[w + 1] << 1) << (31 - s));
                 const quotient = 31 - Math.clz32(low & -low);
                 let v = 0;
@@ -170,8 +167,8 @@ export class FrameDecoder {
                     bit += quotient + 1 + k;
                 } else {
                     if (quotient !== QUOTIENT_MAX) return -1;
-                    const w2 = base + ((bit + QUOTIENT_MAX + 1) >>> 5),
-                        s2 = (bit + QUOTIENT_MAX + 1) & 31;
+                    const w2 = base + ((bit + QUOTIENT_MAX + 1) >>> 5);
+                    const s2 = (bit + QUOTIENT_MAX + 1) & 31;
                     v = ((words[w2] >>> s2) | ((words[w2 + 1] << 1) << (31 - s2))) & ((1 << ESCAPE_BITS) - 1);
                     bit += ESCAPE_LENGTH;
                 }
@@ -182,24 +179,24 @@ export class FrameDecoder {
     }
 
     /**
-     * X and positions of one group; negative when an X left its range.
+     * X and positions of one group; negative if an X is out of range.
      * @param {number} first @param {number} here @param {boolean} moved @param {number} step @param {Float32Array} positions
      */
     predict(first, here, moved, step, positions) {
-        const { x, rest, neighbour, weight, place, residual } = this;
+        const { x, rest, neighbour, weight, target, residual } = this;
         let outside = 0;
         for (let i = 0; i < here; i++) {
-            const j = 4 * (first + i),
-                to = 3 * (first + i),
-                p = place[first + i];
-            const n0 = neighbour[j],
-                n1 = neighbour[j + 1],
-                n2 = neighbour[j + 2],
-                n3 = neighbour[j + 3];
-            const w0 = weight[j],
-                w1 = weight[j + 1],
-                w2 = weight[j + 2],
-                w3 = weight[j + 3];
+            const j = 4 * (first + i);
+            const to = 3 * (first + i);
+            const p = target[first + i];
+            const n0 = neighbour[j];
+            const n1 = neighbour[j + 1];
+            const n2 = neighbour[j + 2];
+            const n3 = neighbour[j + 3];
+            const w0 = weight[j];
+            const w1 = weight[j + 1];
+            const w2 = weight[j + 2];
+            const w3 = weight[j + 3];
             let a =
                 (Math.imul(w0, x[n0]) + Math.imul(w1, x[n1]) + Math.imul(w2, x[n2]) + Math.imul(w3, x[n3]) + 2048) >>
                 12;
@@ -222,7 +219,7 @@ export class FrameDecoder {
                 b = (b + (residual[3 * i + 1] << 4)) | 0;
                 c = (c + (residual[3 * i + 2] << 4)) | 0;
             }
-            outside |= (a + X_MOST) | (X_MOST - a) | (b + X_MOST) | (X_MOST - b) | (c + X_MOST) | (X_MOST - c);
+            outside |= (a + X_MAX) | (X_MAX - a) | (b + X_MAX) | (X_MAX - b) | (c + X_MAX) | (X_MAX - c);
             x[to] = a;
             x[to + 1] = b;
             x[to + 2] = c;
@@ -238,13 +235,13 @@ export class FrameDecoder {
      * @param {number[]} a @param {number} step @param {Float32Array} positions
      */
     move(a, step, positions) {
-        const { x, rest, place } = this;
+        const { x, rest, target } = this;
         for (let i = 0; i < this.n; i++) {
-            const u = rest[3 * i] + x[3 * i] * step,
-                v = rest[3 * i + 1] + x[3 * i + 1] * step,
-                w = rest[3 * i + 2] + x[3 * i + 2] * step;
+            const u = rest[3 * i] + x[3 * i] * step;
+            const v = rest[3 * i + 1] + x[3 * i + 1] * step;
+            const w = rest[3 * i + 2] + x[3 * i + 2] * step;
             for (let r = 0; r < 3; r++)
-                positions[place[i] + r] = a[4 * r] * u + a[4 * r + 1] * v + a[4 * r + 2] * w + a[4 * r + 3];
+                positions[target[i] + r] = a[4 * r] * u + a[4 * r + 1] * v + a[4 * r + 2] * w + a[4 * r + 3];
         }
     }
 }

@@ -1,7 +1,7 @@
 // The keyboard: the page's buttons, and the camera for users without a pointer.
 
-const TURN_PX = 40,
-    ZOOM_STEP = 0.85;
+const TURN_PX = 40;
+const ZOOM_STEP = 0.85;
 
 /**
  * @typedef {{orbit: (dx: number, dy: number) => void, zoom: (factor: number) => void, home: () => void}} View

@@ -90,8 +90,8 @@ export function roundDown(v) {
  * @returns {{low: number, high: number}}
  */
 export function rangeOf(field, low, high, before) {
-    const min = FIELDS[field]?.min ?? 1e-9,
-        signed = FIELDS[field]?.signed ?? false;
+    const min = FIELDS[field]?.min ?? 1e-9;
+    const signed = FIELDS[field]?.signed ?? false;
     const top = Math.max(high, signed ? -low : high, min);
     const holds = before && top <= before.high && (top >= KEEP * before.high || before.high <= roundUp(min));
     const to = holds ? before.high : roundUp(top);

@@ -5,12 +5,12 @@ import { readControl } from "./control_reader.js";
 import { decodeField, readFieldHead } from "./field_decoder.js";
 import { FrameDecoder, readFrameHead } from "./frame_decoder.js";
 import { vertexNormals } from "./normals.js";
-import { applyPatch, readPatchHead, shownOf } from "./patch_decoder.js";
+import { applyTopologyDelta, readTopologyDeltaHead, shownOf } from "./topology_delta.js";
 import { KIND, POSE_FLAG, PROTOCOL, readHead, readTools, writeAck, writePose } from "./wire.js";
 
 export const REPEAT_MS = 50; // period of repeated poses of a resting tool: the server releases a silent one
-const RETRY_MS = 500, // pause before the first reconnection, doubled with each failure
-    RETRY_MAX_MS = 5000;
+const RETRY_MS = 500; // pause before the first reconnection, doubled with each failure
+const RETRY_MAX_MS = 5000;
 const PAGE_SILENCE_MS = 3000; // a page that has been silent for longer no longer holds its tool
 const PING_MS = 1000;
 const FIGURES_MS = 500;
@@ -31,9 +31,9 @@ const FINAL = new Map([
 /**
  * @typedef {import("./control_table.js").ServerMessage} ServerMessage
  * @typedef {import("./control_table.js").ClientMessage} ClientMessage
- * @typedef {import("./patch_decoder.js").Shown} Shown
+ * @typedef {import("./topology_delta.js").Shown} Shown
  * @typedef {"connecting" | "live" | "lost" | "refused"} ConnectionState
- * @typedef {{tool: number, position: number[] | null, grab: boolean, away: boolean}} ToolPose position m; away: the
+ * @typedef {{tool: number, position: number[] | null, grasp: boolean, away: boolean}} ToolPose position m; away: the
  *   tool is lifted out of the scene
  * @typedef {{positions: Float32Array<ArrayBuffer>, normals: Float32Array<ArrayBuffer>}} FrameArrays [n][3] each
  * @typedef {{latency_ms: number, rtt_ms: number, decode_ms: number, bytes_s: number}} LinkFigures
@@ -63,8 +63,8 @@ const FINAL = new Map([
  *   now: () => number,
  *   later: (call: () => void, ms: number) => void,
  * }} Environment
- * @typedef {{decoder: FrameDecoder, table: Uint32Array, shown: Shown, patched: boolean, epoch: number, n: number,
- *   spare: FrameArrays[]}} Part table: of triangles, up to date; shown: of the table at the last frame; patched: the
+ * @typedef {{decoder: FrameDecoder, table: Uint32Array, shown: Shown, changed: boolean, epoch: number, n: number,
+ *   spare: FrameArrays[]}} Part table: of triangles, up to date; shown: of the table at the last frame; changed: the
  *   table has changed since
  */
 
@@ -97,8 +97,8 @@ export class Link {
     earlyFrames = new Map();
     /** @type {Map<number, Uint8Array>} newest field of such a part */
     earlyFields = new Map();
-    /** @type {Map<number, Uint8Array[]>} all patches of such a part: each is relative to the one before */
-    earlyPatches = new Map();
+    /** @type {Map<number, Uint8Array[]>} all topology deltas of such a part, in order */
+    earlyDeltas = new Map();
     decodeUs = 0;
     nDecoded = 0;
     decodeSum = 0;
@@ -120,7 +120,7 @@ export class Link {
         this.requested.clear();
         this.earlyFrames.clear();
         this.earlyFields.clear();
-        this.earlyPatches.clear();
+        this.earlyDeltas.clear();
         this.decodeUs = this.nDecoded = this.decodeSum = this.bytes = 0;
         this.latency = this.rtt = this.echo = 0;
         this.ownTool = -1;
@@ -151,7 +151,7 @@ export class Link {
                 name: this.options.name,
                 role: this.options.role,
                 tool: this.options.role === "viewer" ? null : -1,
-                patches: true,
+                topology_deltas: true,
             });
         };
         socket.onmessage = (event) => {
@@ -201,7 +201,7 @@ export class Link {
         const now = this.env.now();
         if (!this.lastPose || now - this.poseSentAt < 0.8 * REPEAT_MS) return;
         if (now - this.poseFromPageAt < PAGE_SILENCE_MS) this.sendPose(this.lastPose);
-        else this.pose({ ...this.lastPose, position: null, grab: false, away: true });
+        else this.pose({ ...this.lastPose, position: null, grasp: false, away: true });
     }
 
     /** @param {ToolPose} pose */
@@ -216,7 +216,7 @@ export class Link {
                 flags: POSE_FLAG.POSE_ONLY | (pose.away ? POSE_FLAG.AWAY : 0),
                 stampUs: Math.round(this.env.now() * 1000),
                 position: this.lastPosition,
-                buttons: pose.grab ? 1 : 0,
+                buttons: pose.grasp ? 1 : 0,
             }),
         );
     }
@@ -234,7 +234,7 @@ export class Link {
         if (head.kind === KIND.FRAME) this.frame(head.index, bytes);
         else if (head.kind === KIND.TOOLS) this.tools(bytes);
         else if (head.kind === KIND.FIELD) this.field(head.index, bytes);
-        else if (head.kind === KIND.PATCH) this.patch(head.index, bytes);
+        else if (head.kind === KIND.TOPOLOGY_DELTA) this.topologyDelta(head.index, bytes);
     }
 
     /** @param {ServerMessage} message */
@@ -267,13 +267,13 @@ export class Link {
             if (generation !== this.generation || this.requested.get(index) !== info.epoch) return;
             // only a readable asset resets the pause: a server with unreadable assets is asked ever more slowly
             this.tries = 0;
-            const n = asset.rest.length / 3,
-                shown = shownOf(asset.triangles, n);
+            const n = asset.rest.length / 3;
+            const shown = shownOf(asset.triangles, n);
             this.parts.set(index, {
                 decoder: new FrameDecoder(asset),
                 table: asset.triangles,
                 shown,
-                patched: false,
+                changed: false,
                 epoch: info.epoch,
                 n,
                 spare: [],
@@ -288,28 +288,28 @@ export class Link {
 
     /** messages that arrived before the asset @param {number} index of the part */
     decodeEarly(index) {
-        const kept = this.earlyFrames.get(index),
-            patches = this.earlyPatches.get(index) ?? [];
+        const frame = this.earlyFrames.get(index);
+        const deltas = this.earlyDeltas.get(index) ?? [];
         this.earlyFrames.delete(index);
-        this.earlyPatches.delete(index);
-        for (const patch of patches) this.patch(index, patch);
-        if (kept) this.frame(index, kept);
-        const keptField = this.earlyFields.get(index);
+        this.earlyDeltas.delete(index);
+        for (const delta of deltas) this.topologyDelta(index, delta);
+        if (frame) this.frame(index, frame);
+        const field = this.earlyFields.get(index);
         this.earlyFields.delete(index);
-        if (keptField) this.field(index, keptField);
+        if (field) this.field(index, field);
     }
 
     /** @param {number} index @param {Uint8Array} bytes */
     field(index, bytes) {
-        const part = this.parts.get(index),
-            { epoch } = readFieldHead(bytes);
+        const part = this.parts.get(index);
+        const { epoch } = readFieldHead(bytes);
         if (!part || epoch > part.epoch) {
             this.earlyFields.set(index, bytes.slice());
             return;
         }
         if (epoch < part.epoch) return;
-        const level = new Uint8Array(part.n),
-            head = decodeField(bytes, level);
+        const level = new Uint8Array(part.n);
+        const head = decodeField(bytes, level);
         this.env.post({ type: "field", part: index, name: head.name, low: head.low, high: head.high, level }, [
             level.buffer,
         ]);
@@ -319,13 +319,13 @@ export class Link {
      * Applied to the table at once, shown together with the next frame.
      * @param {number} index @param {Uint8Array} bytes
      */
-    patch(index, bytes) {
-        const part = this.parts.get(index),
-            { epoch } = readPatchHead(bytes);
+    topologyDelta(index, bytes) {
+        const part = this.parts.get(index);
+        const { epoch } = readTopologyDeltaHead(bytes);
         if (!part || epoch > part.epoch) {
-            const before = this.earlyPatches.get(index) ?? [];
-            this.earlyPatches.set(index, [
-                ...before.filter((older) => readPatchHead(older).epoch === epoch),
+            const before = this.earlyDeltas.get(index) ?? [];
+            this.earlyDeltas.set(index, [
+                ...before.filter((older) => readTopologyDeltaHead(older).epoch === epoch),
                 bytes.slice(),
             ]);
             // an earlier frame lacks the new vertices
@@ -333,14 +333,14 @@ export class Link {
             return;
         }
         if (epoch < part.epoch) return;
-        applyPatch(bytes, part.table, part.n);
-        part.patched = true;
+        applyTopologyDelta(bytes, part.table, part.n);
+        part.changed = true;
     }
 
     /** @param {number} index @param {Uint8Array} bytes */
     frame(index, bytes) {
-        const part = this.parts.get(index),
-            { epoch } = readFrameHead(bytes);
+        const part = this.parts.get(index);
+        const { epoch } = readFrameHead(bytes);
         if (!part || epoch > part.epoch) {
             this.earlyFrames.set(index, bytes.slice());
             return;
@@ -352,10 +352,10 @@ export class Link {
             normals: new Float32Array(3 * part.n),
         };
         part.decoder.decode(bytes, positions);
-        const ms = this.env.now() - begin,
-            shown = part.patched ? shownOf(part.table, part.n) : null;
+        const ms = this.env.now() - begin;
+        const shown = part.changed ? shownOf(part.table, part.n) : null;
         if (shown) part.shown = shown;
-        part.patched = false;
+        part.changed = false;
         vertexNormals(positions, part.shown.triangles, normals, part.shown.visible);
         this.decodeUs += Math.round(1000 * ms);
         this.decodeSum += ms;

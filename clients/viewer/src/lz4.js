@@ -12,15 +12,15 @@ function damaged() {
  */
 export function lz4Decode(src, dst, begin, end) {
     const n = src.length;
-    let from = 0,
-        to = begin;
+    let from = 0;
+    let to = begin;
     if (n === 0) damaged();
     for (;;) {
         // literals: length in the token's high bits, continued while bytes are 255
         if (from >= n) damaged();
         const token = src[from++];
-        let length = token >> 4,
-            byte = 255;
+        let length = token >> 4;
+        let byte = 255;
         if (length === 15)
             do {
                 if (from >= n) damaged();

@@ -120,8 +120,8 @@ export class Messages {
         const { bodies, controls, fields, sculpt, state } = this.page;
         if (!state.hello) return;
         state.hello.parts = message.parts;
-        if (message.rows?.length) {
-            state.plan = { ...message, rows: message.rows };
+        if (message.components?.length) {
+            state.plan = { ...message, components: message.components };
             state.status = null; // it describes the former plan
             this.showComponents();
             state.hello.accuracy = ""; // it describes the former method
@@ -159,7 +159,7 @@ export class Messages {
         state.ownTool = own?.tool ?? -1;
         const taken = new Set(members.map((member) => member.tool));
         const free = (state.hello?.tools ?? []).some((_, i) => !taken.has(i));
-        if (own && state.ownTool < 0 && own.role !== "viewer" && free) send({ type: "take", tool: -1 });
+        if (own && state.ownTool < 0 && own.role !== "viewer" && free) send({ type: "take_tool", tool: -1 });
         panel.showMembers(members, state.ownId);
         this.showHint();
         stage.dirty = true; // names beside tools
@@ -178,7 +178,7 @@ export class Messages {
     stoppedText(status) {
         const stopped = status.parts?.filter((part) => part.frozen) ?? [];
         const names = stopped.map(({ part }) => this.page.state.parts[part]?.name ?? String(part));
-        const reason = stopped[0]?.why ?? "The simulation diverged.";
+        const reason = stopped[0]?.reason ?? "The simulation diverged.";
         return `${names.length ? `${names.join(", ")} stopped. ` : ""}${reason} Reset restores the rest shape.`;
     }
 
@@ -208,11 +208,11 @@ export class Messages {
     showComponents() {
         const { panel, state } = this.page;
         const components = componentsOf(state.plan, state.status);
-        const switches = state.hello?.you.role === "instructor" && state.plan.row_parts !== undefined;
+        const switches = state.hello?.you.role === "instructor" && state.plan.component_parts !== undefined;
         const key = JSON.stringify([components, switches]);
         if (key === this.listed) return;
         this.listed = key;
-        state.components = components.filter((component) => component.on).map((component) => component.name);
+        state.running = components.filter((component) => component.on).map((component) => component.name);
         panel.showComponents(components, state.parts, switches);
     }
 
@@ -224,7 +224,7 @@ export class Messages {
             field: state.field !== "none",
             estimate: accuracy.opened,
             estimates: state.hello?.estimates === true,
-            unwatched: state.status.unwatched ?? 0,
+            unobserved: state.status.unobserved_steps ?? 0,
         });
     }
 }

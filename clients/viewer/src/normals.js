@@ -8,18 +8,18 @@ export function vertexNormals(x, triangles, out, visible = null) {
     if (visible) for (const v of visible) out[3 * v] = out[3 * v + 1] = out[3 * v + 2] = 0;
     else out.fill(0);
     for (let t = 0; t < triangles.length; t += 3) {
-        const a = 3 * triangles[t],
-            b = 3 * triangles[t + 1],
-            c = 3 * triangles[t + 2];
-        const ux = x[b] - x[a],
-            uy = x[b + 1] - x[a + 1],
-            uz = x[b + 2] - x[a + 2];
-        const vx = x[c] - x[a],
-            vy = x[c + 1] - x[a + 1],
-            vz = x[c + 2] - x[a + 2];
-        const nx = uy * vz - uz * vy,
-            ny = uz * vx - ux * vz,
-            nz = ux * vy - uy * vx;
+        const a = 3 * triangles[t];
+        const b = 3 * triangles[t + 1];
+        const c = 3 * triangles[t + 2];
+        const ux = x[b] - x[a];
+        const uy = x[b + 1] - x[a + 1];
+        const uz = x[b + 2] - x[a + 2];
+        const vx = x[c] - x[a];
+        const vy = x[c + 1] - x[a + 1];
+        const vz = x[c + 2] - x[a + 2];
+        const nx = uy * vz - uz * vy;
+        const ny = uz * vx - ux * vz;
+        const nz = ux * vy - uy * vx;
         ((out[a] += nx), (out[a + 1] += ny), (out[a + 2] += nz));
         ((out[b] += nx), (out[b + 1] += ny), (out[b + 2] += nz));
         ((out[c] += nx), (out[c + 1] += ny), (out[c + 2] += nz));

@@ -2,8 +2,8 @@
 
 const FAST_MS = 10; // a picture that costs no more needs no pause: 60 per second leave enough time
 const SLOW_MS = 28; // pictures that cost more are drawn at a lower resolution
-const SLOW_RUN = 3,
-    FAST_RUN = 90; // pictures in a row before a change: a single slow one compiles a shader
+const SLOW_RUN = 3;
+const FAST_RUN = 90; // pictures in a row before a change: a single slow one compiles a shader
 const PAUSE_MAX_MS = 700; // after a picture that took seconds, as the first one
 const LOST_MS = 3000; // a picture without a signal of its end counts as finished after this
 

@@ -28,31 +28,42 @@ export function rateText(bytes) {
 export function activeText(active, parts) {
     return active.map((a) => {
         const name = parts.length > 1 ? `${parts[a.part]?.name ?? a.part}: ` : "";
-        return `${name}${count(a.nodes)} of ${count(a.of_nodes)} nodes, ${count(a.springs)} of ${count(a.of_springs)} springs`;
+        return `${name}${count(a.nodes)} of ${count(a.finest_nodes)} nodes, ${count(a.springs)} of ${count(a.finest_springs)} springs`;
     });
 }
 
 /**
  * The components to list: those that run, in their order, then the disabled ones.
- * @param {Plan} plan of `hello` or `topology` @param {Pick<Status, "rows" | "row_parts" | "off"> | null} status
+ * @param {Plan} plan of `hello` or `topology` @param {Pick<Status, "components" | "component_parts" | "disabled"> | null} status
  * @returns {Component[]}
  */
 export function componentsOf(plan, status) {
     const key = (/** @type {string} */ name, /** @type {number} */ part) => `${name} ${part}`;
-    const planned = new Map(plan.rows.map((name, i) => [key(name, plan.row_parts?.[i] ?? 0), i]));
+    const planned = new Map(plan.components.map((name, i) => [key(name, plan.component_parts?.[i] ?? 0), i]));
     const component = (/** @type {string} */ name, /** @type {number} */ part) => {
         const i = planned.get(key(name, part));
         // a component that the scene does not plan exists while something needs it, and cannot be disabled
-        if (i === undefined) return { name, part, reason: "", fixed: plan.row_fixed !== undefined, planned: false };
-        return { name, part, reason: plan.row_whys?.[i] ?? "", fixed: plan.row_fixed?.[i] === 1, planned: true };
+        if (i === undefined)
+            return { name, part, reason: "", fixed: plan.component_required !== undefined, planned: false };
+        return {
+            name,
+            part,
+            reason: plan.component_reasons?.[i] ?? "",
+            fixed: plan.component_required?.[i] === 1,
+            planned: true,
+        };
     };
-    const now = status?.rows?.length ? status : plan;
-    const on = (now.rows ?? []).map((name, i) => ({
-        ...component(name, now.row_parts?.[i] ?? 0),
+    const now = status?.components?.length ? status : plan;
+    const on = (now.components ?? []).map((name, i) => ({
+        ...component(name, now.component_parts?.[i] ?? 0),
         on: true,
         index: i,
     }));
-    const off = (status?.off ?? []).map(({ row, part }) => ({ ...component(row, part), on: false, index: null }));
+    const off = (status?.disabled ?? []).map(({ component: name, part }) => ({
+        ...component(name, part),
+        on: false,
+        index: null,
+    }));
     return [...on, ...off];
 }
 
@@ -62,12 +73,12 @@ export function componentsOf(plan, status) {
  * @returns {BodyRemark[]}
  */
 export function bodyRemarks(states, parts) {
-    return states.map(({ part, frozen = false, asleep, why, rescues = 0, rescue_ms = 0 }) => {
-        const text = frozen ? [why || "It left its bounds."] : [];
-        if (rescues) {
-            const ms = rescue_ms.toFixed(rescue_ms < 1 ? 3 : 1);
+    return states.map(({ part, frozen = false, asleep, reason, safeguards = 0, safeguard_ms = 0 }) => {
+        const text = frozen ? [reason || "It left its bounds."] : [];
+        if (safeguards) {
+            const ms = safeguard_ms.toFixed(safeguard_ms < 1 ? 3 : 1);
             text.push(
-                `${count(rescues)} ${rescues === 1 ? "step" : "steps"} corrected by a safeguard, ${ms} ms in total.`,
+                `${count(safeguards)} ${safeguards === 1 ? "step" : "steps"} corrected by a safeguard, ${ms} ms in total.`,
             );
         }
         const state = frozen ? "stopped" : asleep ? "asleep" : "";
@@ -77,12 +88,12 @@ export function bodyRemarks(states, parts) {
 
 /**
  * What is not computed because no client displays it; empty if everything is.
- * @param {{field: boolean, estimate: boolean, estimates: boolean, unwatched: number}} shown
+ * @param {{field: boolean, estimate: boolean, estimates: boolean, unobserved: number}} shown
  */
-export function idleText({ field, estimate, estimates, unwatched }) {
+export function idleText({ field, estimate, estimates, unobserved }) {
     const idle = [...(field ? [] : ["field values"]), ...(estimate || !estimates ? [] : ["error estimates"])];
     const now = idle.length ? `Not displayed, therefore not computed: ${idle.join(", ")}.` : "";
-    const before = unwatched > 0 ? `${count(unwatched)} steps were simulated without any viewer.` : "";
+    const before = unobserved > 0 ? `${count(unobserved)} steps were simulated without any viewer.` : "";
     return [now, before].filter(Boolean).join(" ");
 }
 

@@ -77,7 +77,7 @@ export class PlanPanel {
         box.disabled = fixed;
         cell.title = box.title = fixed ? fixedReason(component) : action;
         box.onchange = () => {
-            this.send({ verb: "row", target: name, args: { part, on: box.checked ? 1 : 0 } });
+            this.send({ verb: "component", target: name, args: { part, enabled: box.checked ? 1 : 0 } });
             // the box shows the state of the server, which may refuse
             box.checked = on;
             box.disabled = true;
@@ -134,12 +134,12 @@ export class PlanPanel {
         this.figure("visible vertices", figures.vertices.toLocaleString("en"));
         this.showActivity(activeText(status.active ?? [], parts));
         this.showBodies(bodyRemarks(status.parts ?? [], parts));
-        const lengths = barLengths(status.row_ms);
+        const lengths = barLengths(status.component_ms);
         for (const { bar, value, index } of this.bars) {
             if (index === null) continue;
             bar.style.width = 100 * (lengths[index] ?? 0) + "%";
             bar.hidden = !lengths[index];
-            value.textContent = (status.row_ms[index] ?? 0).toFixed(3);
+            value.textContent = (status.component_ms[index] ?? 0).toFixed(3);
         }
     }
 

@@ -23,14 +23,14 @@ export class PoseSender {
     /**
      * Position to send: the target, but a grasp stays where it began until the server holds the tissue there. Only the
      * newest pose counts, so a fast drag would otherwise close the tool beside the organ.
-     * @param {{position: number[], grab: boolean}} target @param {number} now ms
+     * @param {{position: number[], grasp: boolean}} target @param {number} now ms
      */
     position(target, now) {
-        if (!target.grab) this.anchor = null;
+        if (!target.grasp) this.anchor = null;
         else if (!this.anchor) this.anchor = { position: target.position, since: now };
         if (!this.anchor) return target.position;
         const tool = this.state.ownToolState();
-        const waits = now - this.anchor.since < GRASP_WAIT_MS && !(tool?.held && tool.grabs);
+        const waits = now - this.anchor.since < GRASP_WAIT_MS && !(tool?.held && tool.grasps);
         if (!waits) this.anchor.since = -Infinity;
         return waits ? this.anchor.position : target.position;
     }
@@ -44,11 +44,11 @@ export class PoseSender {
             if (!moved && now - this.sentAt < REST_MS) return;
             if (moved && now - this.sentAt < POSE_MS / 2 && !this.away) return;
             const position = this.position(target, now);
-            this.post({ type: "pose", tool: ownTool, position, grab: target.grab, away: false });
+            this.post({ type: "pose", tool: ownTool, position, grasp: target.grasp, away: false });
             this.away = false;
             this.sentAt = now;
         } else if (!this.away) {
-            this.post({ type: "pose", tool: ownTool, position: null, grab: false, away: true });
+            this.post({ type: "pose", tool: ownTool, position: null, grasp: false, away: true });
             this.away = true;
             this.anchor = null;
         }

@@ -1,7 +1,7 @@
 // Commands of sculpting from the settings of the panel and the clicked points; the plane of a cut; answers in words. Pure.
 
 /**
- * @typedef {{distance_m: number, scale: number, radius_m: number, paint: string, sharp: number, sharpWhat: number,
+ * @typedef {{distance_m: number, scale: number, radius_m: number, paint: string, sharpness: number, entity: number,
  *            pressure_Pa: number, lift_m: number, stiffness_N_m: number, middle: number[]}} Settings
  * @typedef {{verb: string, args: Record<string, number>}} Command
  * @typedef {{low: number[], high: number[]}} Box
@@ -47,11 +47,11 @@ export const PAINTS = Object.freeze({
  */
 export function liftOf(a, b, middle, lift_m) {
     const dot = (/** @type {number[]} */ u, /** @type {number[]} */ v) => u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
-    const along = b.map((v, i) => v - a[i]),
-        out = a.map((v, i) => (v + b[i]) / 2 - middle[i]);
+    const along = b.map((v, i) => v - a[i]);
+    const out = a.map((v, i) => (v + b[i]) / 2 - middle[i]);
     const share = dot(along, along) > 0 ? dot(out, along) / dot(along, along) : 0;
-    const across = out.map((v, i) => v - share * along[i]),
-        length = Math.hypot(...across);
+    const across = out.map((v, i) => v - share * along[i]);
+    const length = Math.hypot(...across);
     return length > 1e-9 ? across.map((v) => (lift_m * v) / length) : [0, 0, lift_m];
 }
 
@@ -67,7 +67,7 @@ export function commandOf(tool, settings, points) {
     const args = { x_m, y_m, z_m };
     if (TOOLS[tool].points === 2) [args.x2_m, args.y2_m, args.z2_m] = points[1];
     if (tool === "extrude") Object.assign(args, { distance_m: settings.distance_m, scale: settings.scale });
-    if (tool === "sharpen") Object.assign(args, { sharp: settings.sharp, what: settings.sharpWhat });
+    if (tool === "sharpen") Object.assign(args, { sharpness: settings.sharpness, entity: settings.entity });
     if (tool === "paint") {
         const { young_factor, density_factor } = PAINTS[settings.paint];
         Object.assign(args, { radius_m: settings.radius_m, young_factor, density_factor });
@@ -97,8 +97,8 @@ export function cutCommand(axis, share, box) {
 
 /** box around a box and points @param {Box} box @param {Float32Array} x [n][3] @returns {Box} */
 export function boxAround(box, x) {
-    const low = [...box.low],
-        high = [...box.high];
+    const low = [...box.low];
+    const high = [...box.high];
     for (let i = 0; i < x.length; i++) {
         low[i % 3] = Math.min(low[i % 3], x[i]);
         high[i % 3] = Math.max(high[i % 3], x[i]);
@@ -118,5 +118,5 @@ export function answerText({ verb, text, args = {} }) {
         return `${pressureText(args.young_Pa)}, ${Number(args.density_kg_m3.toPrecision(3))} kg/m³`;
     if (args.cells === undefined) return text;
     const title = TOOLS[verb]?.title ?? verb[0].toUpperCase() + verb.slice(1);
-    return `${title}: ${args.cells} cells${args.made_ms === undefined ? "" : `, ${Math.round(args.made_ms)} ms`}`;
+    return `${title}: ${args.cells} cells${args.prepare_ms === undefined ? "" : `, ${Math.round(args.prepare_ms)} ms`}`;
 }

@@ -37,9 +37,10 @@ export class SculptPanel {
         this.tools = this.fill("sculpt-tools", TOOLS, (name) => this.choose(name));
         this.paints = this.fill("sculpt-paints", PAINTS, (name) => this.mark(this.paints, name));
         this.mark(this.paints, "stiffer");
-        for (const verb of ["keep", "undo", "redo"]) this.button(verb).onclick = () => this.submit({ verb, args: {} });
+        for (const verb of ["set_rest_shape", "undo", "redo"])
+            this.button(verb).onclick = () => this.submit({ verb, args: {} });
         for (const format of ["obj", "stl", "ply"]) this.button(format).onclick = () => save(format);
-        for (const id of ["distance", "radius", "sharp"]) this.slider(id).oninput = () => this.showValues();
+        for (const id of ["distance", "radius", "sharpness"]) this.slider(id).oninput = () => this.showValues();
         for (const id of ["pressure", "lift"]) this.slider(id).oninput = () => this.changeForce();
         this.button("release").onclick = () => this.submit({ verb: "release", args: {} });
         this.axis = selectById("sculpt-axis", page);
@@ -121,8 +122,8 @@ export class SculptPanel {
             scale: 1,
             radius_m: share("radius") * 0.5 * this.size,
             paint,
-            sharp: Math.round(share("sharp") * 10) / 2,
-            sharpWhat: Number(selectById("sculpt-what", this.page).value),
+            sharpness: Math.round(share("sharpness") * 10) / 2,
+            entity: Number(selectById("sculpt-entity", this.page).value),
             pressure_Pa: 10 ** (1 + 3 * share("pressure")),
             lift_m: share("lift") * 0.5 * this.size,
             stiffness_N_m: STIFFNESS_N_M,
@@ -131,14 +132,14 @@ export class SculptPanel {
     }
 
     showValues() {
-        const { distance_m, radius_m, sharp, pressure_Pa, lift_m } = this.settings();
+        const { distance_m, radius_m, sharpness, pressure_Pa, lift_m } = this.settings();
         const mm = (/** @type {number} */ m) => (1000 * m).toFixed(1) + " mm";
         const show = (/** @type {string} */ name, /** @type {string} */ text) => {
             htmlById(`sculpt-${name}-value`, this.page).textContent = text;
         };
         show("distance", mm(distance_m));
         show("radius", mm(radius_m));
-        show("sharp", String(sharp));
+        show("sharpness", String(sharpness));
         show("pressure", Math.round(pressure_Pa) + " Pa");
         show("lift", mm(lift_m));
     }

@@ -3,7 +3,7 @@ import { Pace } from "./pace.js";
 import * as THREE from "./three.js";
 
 const RATIO_MIN = 0.4; // drawn pixels per page pixel, where drawing is slow
-const HOME_SHARE = 0.94; // of the picture's height: initial size of the scene's diagonal
+const HOME_SHARE = 0.88; // of the picture's height: initial size of the scene's diagonal
 const ZOOM_MIN = 0.45; // beside panels
 const POLL_MS = 2; // between checks whether a picture is finished
 
@@ -122,8 +122,8 @@ export class Stage {
     }
 
     resize() {
-        const width = this.canvas.clientWidth || 1,
-            height = this.canvas.clientHeight || 1;
+        const width = this.canvas.clientWidth || 1;
+        const height = this.canvas.clientHeight || 1;
         this.renderer.setPixelRatio(this.pixelRatio());
         this.renderer.setSize(width, height, false);
         const before = this.homeDistance();
@@ -144,9 +144,9 @@ export class Stage {
     }
 
     updateProjection() {
-        const width = this.canvas.clientWidth || 1,
-            height = this.canvas.clientHeight || 1,
-            covered = this.left + this.right;
+        const width = this.canvas.clientWidth || 1;
+        const height = this.canvas.clientHeight || 1;
+        const covered = this.left + this.right;
         this.camera.zoom = covered
             ? Math.max(ZOOM_MIN, Math.min(1, (width - covered) / Math.min(width, HOME_SHARE * height)))
             : 1;

@@ -3,7 +3,7 @@ import * as THREE from "./three.js";
 
 /**
  * What a drag asks of the tool: position in m and grasp; null: lifted away.
- * @typedef {{position: number[], grab: boolean} | null} ToolTarget
+ * @typedef {{position: number[], grasp: boolean} | null} ToolTarget
  */
 
 const CLICK_PX = 6; // a longer motion is not a click but turns the view
@@ -29,7 +29,7 @@ export class ToolInput {
         this.radius = 0.01;
         /** @type {Map<number, {x: number, y: number}>} */
         this.pointers = new Map();
-        /** @type {{id: number, grab: boolean, plane: THREE.Plane, into: THREE.Vector3, start: number, depth: number, deeper: number, x: number, y: number} | null} */
+        /** @type {{id: number, grasp: boolean, plane: THREE.Plane, into: THREE.Vector3, start: number, depth: number, deeper: number, x: number, y: number} | null} */
         this.drag = null;
         this.onFirstDrag = () => {};
         const c = stage.canvas;
@@ -69,7 +69,7 @@ export class ToolInput {
         const into = hit.point.clone().sub(this.stage.camera.position).normalize();
         this.drag = {
             id: e.pointerId,
-            grab: !press,
+            grasp: !press,
             into,
             start: performance.now(),
             depth: press ? 1.3 * this.radius : 0,
@@ -90,8 +90,8 @@ export class ToolInput {
                 this.stage.canvas.classList.toggle("over", (this.enabled || this.mode === "sculpt") && this.hover(e));
             return;
         }
-        const dx = e.clientX - last.x,
-            dy = e.clientY - last.y;
+        const dx = e.clientX - last.x;
+        const dy = e.clientY - last.y;
         if (this.pointers.size === 1 && this.drag) {
             this.drag.x = e.clientX;
             this.drag.y = e.clientY;
@@ -103,8 +103,8 @@ export class ToolInput {
             const other = /** @type {{x: number, y: number}} */ (
                 [...this.pointers].find(([id]) => id !== e.pointerId)?.[1]
             );
-            const before = Math.hypot(last.x - other.x, last.y - other.y),
-                after = Math.hypot(e.clientX - other.x, e.clientY - other.y);
+            const before = Math.hypot(last.x - other.x, last.y - other.y);
+            const after = Math.hypot(e.clientX - other.x, e.clientY - other.y);
             if (before > 1 && after > 1) this.stage.zoom(before / after);
             this.stage.pan(dx / 2, dy / 2);
         }
@@ -160,10 +160,10 @@ export class ToolInput {
         if (!point) return;
         const t = Math.min(1, (performance.now() - drag.start) / (1000 * PRESS_S));
         // a press begins with the ball outside and moves in along the view; a pull begins on the surface
-        const depth = drag.grab
+        const depth = drag.grasp
             ? drag.deeper
             : -1.2 * this.radius + (drag.depth + 0.6 * this.radius) * t * t * (3 - 2 * t) + drag.deeper;
         point.addScaledVector(drag.into, depth);
-        this.onTarget({ position: point.toArray(), grab: drag.grab });
+        this.onTarget({ position: point.toArray(), grasp: drag.grasp });
     }
 }

@@ -1,10 +1,10 @@
-// The binary messages of palpate.v1 except FRAME's body: protocol/README.md, mirrored by protocol/wire.c. Pure: bytes in,
-// plain objects out; anything that is not exactly one known message throws WireError.
+// The binary messages of palpate.v2 except the bodies of FRAME, FIELD and TOPOLOGY_DELTA (protocol/README.md;
+// protocol/wire.c). Pure: bytes in, plain objects out; anything that is not exactly one known message throws WireError.
 
-export const PROTOCOL = "palpate.v1";
-export const VERSION = 1;
+export const PROTOCOL = "palpate.v2";
+export const VERSION = 2;
 export const MAGIC = 0x314c4150;
-export const KIND = Object.freeze({ FRAME: 1, TOOLS: 2, HAPTIC: 3, FIELD: 4, PATCH: 5, POSE: 16, ACK: 17 });
+export const KIND = Object.freeze({ FRAME: 1, TOOLS: 2, HAPTIC: 3, FIELD: 4, TOPOLOGY_DELTA: 5, POSE: 16, ACK: 17 });
 export const POSE_FLAG = Object.freeze({
     CONTACT: 1,
     CLUTCHED: 2,
@@ -16,13 +16,13 @@ export const POSE_FLAG = Object.freeze({
     POSE_ONLY: 128,
     AWAY: 256,
 });
-export const TOOL_FLAG = Object.freeze({ HELD: 1, TOUCHES: 2, GRABS: 4, STALE: 8, AWAY: 16 });
+export const TOOL_FLAG = Object.freeze({ HELD: 1, CONTACT: 2, GRASPS: 4, STALE: 8, AWAY: 16 });
 export const TOOL_MAX = 32;
 export const PART_MAX = 16;
-export const PATCH_MAX = 8;
+export const CONTACT_PATCH_MAX = 8;
 export const VERTEX_MAX = 1 << 22;
 
-/** Why a message was refused; `code` is the name of the same refusal in C (protocol/refusal.h). */
+/** A refused message; `code` is the name of the same refusal in C (protocol/refusal.h). */
 export class WireError extends Error {
     /** @param {string} code @param {string} text */
     constructor(code, text) {
@@ -32,7 +32,7 @@ export class WireError extends Error {
 }
 
 /**
- * Walks the fields of one message. Numbers must be finite; u64 must fit a double exactly.
+ * Reads the fields of one message in order. Numbers must be finite; a u64 must be exact as a double.
  */
 class Reader {
     /** @param {Uint8Array} bytes @param {number} at */
@@ -52,8 +52,8 @@ class Reader {
     }
 
     u64() {
-        const low = this.u32(),
-            high = this.u32();
+        const low = this.u32();
+        const high = this.u32();
         if (high >= 1 << 21) throw new WireError("RANGE", "u64 above 2^53");
         return high * 4294967296 + low;
     }
@@ -85,10 +85,15 @@ function finite(value) {
     return value;
 }
 
-/** @param {boolean} good @param {string} code @param {string} text */
-function need(good, code, text) {
-    if (!good) throw new WireError(code, text);
-}
+/**
+ * A check that throws WireError unless its first argument is true.
+ * @param {string} subject of its sentences
+ * @returns {(good: boolean, code: string, text: string) => void}
+ */
+export const checkOf = (subject) => (good, code, text) => {
+    if (!good) throw new WireError(code, `${subject}: ${text}`);
+};
+const need = checkOf("message");
 
 /** @param {Uint8Array} bytes @param {number} length */
 function exactly(bytes, length) {
@@ -115,7 +120,7 @@ export function readHead(bytes) {
 }
 
 /**
- * Head of a message of this kind that has no flags; returns its index.
+ * Index in the head of a message of this kind, which has no flags.
  * @param {Uint8Array} bytes @param {number} kind
  */
 function indexOf(bytes, kind) {
@@ -127,7 +132,7 @@ function indexOf(bytes, kind) {
 
 /**
  * @typedef {{
- *   holder: number, flags: number, held: boolean, touches: boolean, grabs: boolean, stale: boolean, away: boolean,
+ *   holder: number, flags: number, held: boolean, contact: boolean, grasps: boolean, stale: boolean, away: boolean,
  *   colour: number, radius: number, position: number[], quaternion: number[], force: number[],
  *   echoSeq: number, holdUs: number, echoStampUs: number
  * }} Tool one tool: SI, world frame, quaternion w x y z, force of the tissue on the tool
@@ -136,16 +141,16 @@ function indexOf(bytes, kind) {
 
 /** @param {Reader} r @returns {Tool} */
 function readTool(r) {
-    const holder = r.u16(),
-        flags = r.u16(),
-        colour = r.u32(),
-        radius = r.f32();
-    const position = r.floats(3),
-        quaternion = r.floats(4),
-        force = r.floats(3);
-    const echoSeq = r.u32(),
-        holdUs = r.u32(),
-        echoStampUs = r.u64();
+    const holder = r.u16();
+    const flags = r.u16();
+    const colour = r.u32();
+    const radius = r.f32();
+    const position = r.floats(3);
+    const quaternion = r.floats(4);
+    const force = r.floats(3);
+    const echoSeq = r.u32();
+    const holdUs = r.u32();
+    const echoStampUs = r.u64();
     need(flags < 32, "FLAGS", `tool flags ${flags}`);
     need(radius >= 0 && colour <= 0xffffff, "RANGE", "tool radius or colour");
     return {
@@ -160,8 +165,8 @@ function readTool(r) {
         holdUs,
         echoStampUs,
         held: (flags & TOOL_FLAG.HELD) !== 0,
-        touches: (flags & TOOL_FLAG.TOUCHES) !== 0,
-        grabs: (flags & TOOL_FLAG.GRABS) !== 0,
+        contact: (flags & TOOL_FLAG.CONTACT) !== 0,
+        grasps: (flags & TOOL_FLAG.GRASPS) !== 0,
         stale: (flags & TOOL_FLAG.STALE) !== 0,
         away: (flags & TOOL_FLAG.AWAY) !== 0,
     };
@@ -177,28 +182,28 @@ export function readTools(bytes) {
     need(n <= TOOL_MAX, "COUNT", `${n} tools`);
     exactly(bytes, 24 + 68 * n);
     const r = new Reader(bytes, 8);
-    const cycle = r.u32(),
-        zero = r.u32(),
-        simTimeUs = r.u64();
+    const cycle = r.u32();
+    const zero = r.u32();
+    const simTimeUs = r.u64();
     need(zero === 0, "RANGE", "reserved field");
     return { cycle, simTimeUs, tools: Array.from({ length: n }, () => readTool(r)) };
 }
 
 /**
  * @typedef {{id: number, group: number, p: number[], n: number[], v: number[], k1: number, k2: number, b: number,
- *   kt: number, muS: number, muD: number, radius: number}} Patch
+ *   kt: number, muS: number, muD: number, radius: number}} ContactPatch
  * @typedef {{tool: number, seq: number, flags: number, stampUs: number, echoStampUs: number, echoSeq: number,
  *   holdUs: number, frameUs: number, origin: number[], fRef: number[],
- *   grip: {x0: number[], f0: number[], k: number[], b: number} | null, patches: Patch[]}} Haptic
+ *   grasp: {x0: number[], f0: number[], k: number[], b: number} | null, contactPatches: ContactPatch[]}} Haptic
  */
 
-/** @param {Reader} r @returns {Patch} */
-function readPatch(r) {
-    const id = r.u16(),
-        group = r.u16(),
-        p = r.floats(3),
-        n = r.floats(3),
-        v = r.floats(3);
+/** @param {Reader} r @returns {ContactPatch} */
+function readContactPatch(r) {
+    const id = r.u16();
+    const group = r.u16();
+    const p = r.floats(3);
+    const n = r.floats(3);
+    const v = r.floats(3);
     const [k1, k2, b, kt, muS, muD, radius] = r.floats(7);
     const passive = Math.min(k1, b, kt, muS, muD, radius) >= 0;
     need(passive && Math.abs(n[0] ** 2 + n[1] ** 2 + n[2] ** 2 - 1) <= 1e-3, "RANGE", "contact patch");
@@ -214,23 +219,23 @@ export function readHaptic(bytes) {
     const tool = indexOf(bytes, KIND.HAPTIC);
     need(bytes.length >= 140, "SHORT", `${bytes.length} bytes of 140`);
     const r = new Reader(bytes, 8);
-    const seq = r.u32(),
-        flags = r.u32(),
-        stampUs = r.u64(),
-        echoStampUs = r.u64(),
-        echoSeq = r.u32();
-    const holdUs = r.u32(),
-        frameUs = r.u32(),
-        nPatch = r.u32();
-    need(nPatch <= PATCH_MAX, "COUNT", `${nPatch} patches`);
+    const seq = r.u32();
+    const flags = r.u32();
+    const stampUs = r.u64();
+    const echoStampUs = r.u64();
+    const echoSeq = r.u32();
+    const holdUs = r.u32();
+    const frameUs = r.u32();
+    const nPatch = r.u32();
+    need(nPatch <= CONTACT_PATCH_MAX, "COUNT", `${nPatch} patches`);
     exactly(bytes, 140 + 68 * nPatch);
-    const origin = r.doubles(3),
-        fRef = r.floats(3),
-        hasGrip = r.u32();
-    const grip = { x0: r.floats(3), f0: r.floats(3), k: r.floats(6), b: r.f32() };
+    const origin = r.doubles(3);
+    const fRef = r.floats(3);
+    const hasGrasp = r.u32();
+    const grasp = { x0: r.floats(3), f0: r.floats(3), k: r.floats(6), b: r.f32() };
     need(flags < 8, "FLAGS", `haptic flags ${flags}`);
-    need(tool < TOOL_MAX && hasGrip <= 1 && grip.b >= 0, "RANGE", "tool or grip");
-    const patches = Array.from({ length: nPatch }, () => readPatch(r));
+    need(tool < TOOL_MAX && hasGrasp <= 1 && grasp.b >= 0, "RANGE", "tool or grasp");
+    const contactPatches = Array.from({ length: nPatch }, () => readContactPatch(r));
     return {
         tool,
         seq,
@@ -242,8 +247,8 @@ export function readHaptic(bytes) {
         frameUs,
         origin,
         fRef,
-        grip: hasGrip ? grip : null,
-        patches,
+        grasp: hasGrasp ? grasp : null,
+        contactPatches,
     };
 }
 
@@ -252,8 +257,8 @@ export function readHaptic(bytes) {
  * @returns {{bytes: Uint8Array<ArrayBuffer>, view: DataView}}
  */
 function begin(kind, index, length) {
-    const bytes = new Uint8Array(length),
-        view = new DataView(bytes.buffer);
+    const bytes = new Uint8Array(length);
+    const view = new DataView(bytes.buffer);
     view.setUint32(0, MAGIC, true);
     view.setUint8(4, kind);
     view.setUint16(6, index, true);
@@ -269,13 +274,13 @@ function setU64(view, at, value) {
 /**
  * @typedef {{
  *   tool: number, seq: number, stampUs: number, position: number[], flags?: number, quaternion?: number[],
- *   velocity?: number[], omega?: number[], force?: number[], torque?: number[], grip?: number, buttons?: number,
+ *   velocity?: number[], omega?: number[], force?: number[], torque?: number[], gripper?: number, buttons?: number,
  *   modelSeq?: number, modelAgeUs?: number, modelStampUs?: number
- * }} Pose what is left out is 0, the quaternion 1 0 0 0
+ * }} Pose missing fields are 0, the quaternion is 1 0 0 0
  */
 
 /**
- * POSE of the tool this client holds.
+ * POSE of the own tool.
  * @param {Pose} pose
  * @returns {Uint8Array<ArrayBuffer>}
  */
@@ -289,7 +294,7 @@ export function writePose(pose) {
     [pose.velocity, pose.omega, pose.force, pose.torque].forEach((vector, k) =>
         vector?.forEach((v, i) => view.setFloat32(80 + 12 * k + 4 * i, v, true)),
     );
-    view.setFloat32(128, pose.grip ?? 0, true);
+    view.setFloat32(128, pose.gripper ?? 0, true);
     view.setUint32(132, pose.buttons ?? 0, true);
     view.setUint32(136, pose.modelSeq ?? 0, true);
     view.setUint32(140, pose.modelAgeUs ?? 0, true);

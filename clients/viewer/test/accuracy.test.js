@@ -17,9 +17,9 @@ const point = (index, ms, error_m, front, method = "fem") => ({
     index,
     method,
     label: `${method} ${index}`,
-    ms,
+    cost_ms: ms,
     error_m,
-    front,
+    pareto_optimal: front,
 });
 const POINTS = [
     point(0, 0.5, 4e-3, true, "tet_springs"),
@@ -28,7 +28,15 @@ const POINTS = [
     point(5, 30, 1e-4, true),
 ];
 /** @param {object} more */
-const estimate = (more) => ({ body: "liver", setting: "fem", tick: 9, own_ms: 80, ms: 4.4, error_m: 9e-4, ...more });
+const estimate = (more) => ({
+    body: "liver",
+    configuration: "fem",
+    tick: 9,
+    estimate_ms: 80,
+    cost_ms: 4.4,
+    error_m: 9e-4,
+    ...more,
+});
 const BOX = { left: 40, right: 300, top: 10, bottom: 200 };
 
 test("an axis contains all values and ends at round numbers", () => {
@@ -79,10 +87,10 @@ test("the slider moves along the Pareto front in the order of cost", () => {
     );
     assert.deepEqual(frontOf([point(0, NaN, 1, true), point(1, 1, 0, true)]), []);
     const front = frontOf(POINTS);
-    assert.equal(positionOn(front, estimate({ point: 5 })), 2, "its own point");
-    assert.equal(positionOn(front, estimate({ point: 1, ms: 2 })), 1, "off the front: the nearest cost");
-    assert.equal(positionOn(front, estimate({ ms: 0.4 })), 0);
-    assert.equal(positionOn(front, estimate({ ms: undefined })), -1);
+    assert.equal(positionOn(front, estimate({ study_point: 5 })), 2, "its own point");
+    assert.equal(positionOn(front, estimate({ study_point: 1, cost_ms: 2 })), 1, "off the front: the nearest cost");
+    assert.equal(positionOn(front, estimate({ cost_ms: 0.4 })), 0);
+    assert.equal(positionOn(front, estimate({ cost_ms: undefined })), -1);
     assert.equal(positionOn([], estimate({})), -1);
     assert.equal(positionOn(front, null), -1);
 });
@@ -92,8 +100,8 @@ test("every point of the plot lies at its cost and error", () => {
         POINTS,
         estimate({
             neighbours: [
-                { knob: "resolution", label: "finer", ms: 9, error_m: 4e-4, size: 20 },
-                { knob: "step", label: "?", ms: 9 },
+                { parameter: "resolution", label: "finer", cost_ms: 9, error_m: 4e-4, size: 20 },
+                { parameter: "step", label: "?", cost_ms: 9 },
             ],
         }),
         BOX,
@@ -147,23 +155,23 @@ test("parts of the error are shares of their sum, unknown ones are left out", ()
 });
 
 test("a neighbour is described by its gain and cost", () => {
-    const now = estimate({}),
-        to = { knob: "resolution", label: "24 voxels", size: 24 };
-    assert.equal(neighbourText(now, { ...to, ms: 8.5, error_m: 4.5e-4 }), "half the error: +4.1 ms");
-    assert.equal(neighbourText(now, { ...to, ms: 2, error_m: 1.8e-3 }), "twice the error: −2.4 ms");
-    assert.equal(neighbourText(now, { ...to, ms: 4.4, error_m: 6.3e-4 }), "30 % less error: same cost");
-    assert.equal(neighbourText(now, { ...to, ms: 1, error_m: 9e-3 }), "10 times the error: −3.4 ms");
+    const now = estimate({});
+    const to = { parameter: "resolution", label: "24 voxels", size: 24 };
+    assert.equal(neighbourText(now, { ...to, cost_ms: 8.5, error_m: 4.5e-4 }), "half the error: +4.1 ms");
+    assert.equal(neighbourText(now, { ...to, cost_ms: 2, error_m: 1.8e-3 }), "twice the error: −2.4 ms");
+    assert.equal(neighbourText(now, { ...to, cost_ms: 4.4, error_m: 6.3e-4 }), "30 % less error: same cost");
+    assert.equal(neighbourText(now, { ...to, cost_ms: 1, error_m: 9e-3 }), "10 times the error: −3.4 ms");
     assert.equal(neighbourText(now, to), "24 voxels");
-    assert.equal(neighbourText(estimate({ error_m: undefined }), { ...to, ms: 8.5 }), "24 voxels: +4.1 ms");
+    assert.equal(neighbourText(estimate({ error_m: undefined }), { ...to, cost_ms: 8.5 }), "24 voxels: +4.1 ms");
 });
 
 test("errors that are displayed alike are the same", () => {
     const at = (/** @type {number} */ now, /** @type {number} */ then) =>
         neighbourText(estimate({ error_m: now }), {
-            knob: "resolution",
+            parameter: "resolution",
             label: "8 voxels",
             size: 8,
-            ms: 4.4,
+            cost_ms: 4.4,
             error_m: then,
         });
     assert.equal(at(6e-7, 9.5e-7), "same error: same cost", "58 % of less than 0.001 mm");
@@ -177,20 +185,20 @@ test("errors that are displayed alike are the same", () => {
 test("an error that is pending, unavailable or old is described so", () => {
     const none = { error: "being estimated", age: "", note: "", known: false };
     assert.deepEqual(errorText(null), none);
-    assert.deepEqual(errorText(estimate({ tick: 0, note: "" })), none);
-    assert.deepEqual(errorText(estimate({ tick: 0, error_m: undefined, note: "it is refined while it runs" })), {
+    assert.deepEqual(errorText(estimate({ tick: 0, diagnostic: "" })), none);
+    assert.deepEqual(errorText(estimate({ tick: 0, error_m: undefined, diagnostic: "it is refined while it runs" })), {
         error: "not estimated",
         age: "",
         note: "it is refined while it runs",
         known: false,
     });
-    assert.deepEqual(errorText(estimate({ age_s: 0.4, note: "n" })), {
+    assert.deepEqual(errorText(estimate({ age_s: 0.4, diagnostic: "n" })), {
         error: "0.9 mm",
         age: "",
         note: "n.",
         known: true,
     });
-    assert.deepEqual(errorText(estimate({ age_s: 12.3, zz_percent: 5, locking: true })), {
+    assert.deepEqual(errorText(estimate({ age_s: 12.3, energy_error_percent: 5, locking: true })), {
         error: "0.9 mm",
         age: "12 s ago",
         note: "Volumetric locking: the true error is larger. Relative error in the energy norm: 5.0 %.",
@@ -200,55 +208,55 @@ test("an error that is pending, unavailable or old is described so", () => {
 });
 
 test("a neighbour is reached by its own arguments, another method only as a point of the study", () => {
-    const near = (/** @type {object} */ fields) => ({ knob: "resolution", label: "", ...fields });
+    const near = (/** @type {object} */ fields) => ({ parameter: "resolution", label: "", ...fields });
     assert.deepEqual(neighbourArgs(near({ size: 24, step_ms: 0, tolerance: 0 })), { size: 24 });
-    assert.deepEqual(neighbourArgs(near({ knob: "step", step_ms: 8.5 })), { step_ms: 8.5 });
-    assert.equal(neighbourArgs(near({ knob: "method", size: 24 })), null);
-    assert.equal(neighbourArgs(near({ knob: "solver" })), null);
+    assert.deepEqual(neighbourArgs(near({ parameter: "step", step_ms: 8.5 })), { step_ms: 8.5 });
+    assert.equal(neighbourArgs(near({ parameter: "method", size: 24 })), null);
+    assert.equal(neighbourArgs(near({ parameter: "solver" })), null);
 });
 
 test("a switch is described by its effects", () => {
     assert.equal(
         switchText({
             type: "answer",
-            verb: "point",
+            verb: "study_point",
             text: "x",
-            args: { energy_percent: -0.31, most_move_m: 4e-5, made_ms: 812 },
+            args: { energy_percent: -0.31, max_move_m: 4e-5, prepare_ms: 812 },
         }),
         "Switched: energy −0.31 %, surface moves 0.04 mm, prepared in 812 ms.",
     );
     assert.equal(
-        switchText({ type: "answer", verb: "point", text: "x", args: { most_move_m: 4e-5, bound_m: 1.2e-3 } }),
+        switchText({ type: "answer", verb: "study_point", text: "x", args: { max_move_m: 4e-5, bound_m: 1.2e-3 } }),
         "Switched: surface moves 0.04 mm (bound 1.2 mm).",
     );
     assert.equal(
-        switchText({ type: "answer", verb: "point", text: "x", args: { most_move_m: 4e-3, bound_m: 1.2e-3 } }),
+        switchText({ type: "answer", verb: "study_point", text: "x", args: { max_move_m: 4e-3, bound_m: 1.2e-3 } }),
         "Switched: surface moves 4 mm (beyond the bound of 1.2 mm).",
     );
     assert.equal(
-        switchText({ type: "answer", verb: "point", text: "x", args: { most_move_m: 2e-8, bound_m: 1e-9 } }),
+        switchText({ type: "answer", verb: "study_point", text: "x", args: { max_move_m: 2e-8, bound_m: 1e-9 } }),
         "Switched: surface moves < 0.001 mm (bound < 0.001 mm).",
         "at rest",
     );
     assert.equal(
         switchText({
             type: "answer",
-            verb: "point",
+            verb: "study_point",
             text: "x",
-            args: { most_move_m: 3e-4, frame_move_m: 3e-5, bound_m: 2e-4 },
+            args: { max_move_m: 3e-4, max_frame_move_m: 3e-5, bound_m: 2e-4 },
         }),
         "Switched: surface moves 0.3 mm (beyond the bound of 0.2 mm), 0.03 mm per frame.",
     );
     assert.equal(
         switchText({
             type: "answer",
-            verb: "point",
+            verb: "study_point",
             text: "x",
-            args: { most_move_m: 1.5e-4, frame_move_m: 1.5e-5, bound_m: 2e-4 },
+            args: { max_move_m: 1.5e-4, max_frame_move_m: 1.5e-5, bound_m: 2e-4 },
         }),
         "Switched: surface moves 0.15 mm (bound 0.2 mm), 0.015 mm per frame.",
     );
-    assert.equal(switchText({ type: "answer", verb: "point", text: "fem, 16 voxels" }), "fem, 16 voxels");
+    assert.equal(switchText({ type: "answer", verb: "study_point", text: "fem, 16 voxels" }), "fem, 16 voxels");
 });
 
 test("numbers are short", () => {

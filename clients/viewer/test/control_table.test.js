@@ -16,15 +16,15 @@ const KINDS = {
     U32: "u32",
     U64: "u64",
     F64: "f64",
-    KNOWN: "f64",
+    NUMBER_OR_NAN: "f64",
     BOOL: "bool",
     TEXT: "text",
-    SAID: "text",
+    TEXT_OR_EMPTY: "text",
     ROLE: "role",
     TOOL: "tool",
     NUMBERS: "numbers",
     TEXTS: "texts",
-    TEXTS_SAID: "texts",
+    TEXTS_OR_EMPTY: "texts",
     ARGS: "args",
 };
 

@@ -6,7 +6,7 @@ import { test } from "node:test";
 import { decodeAsset } from "../src/asset.js";
 import { decodeField, readFieldHead } from "../src/field_decoder.js";
 import { FrameDecoder, readFrameHead } from "../src/frame_decoder.js";
-import { applyPatch } from "../src/patch_decoder.js";
+import { applyTopologyDelta } from "../src/topology_delta.js";
 import {
     KIND,
     POSE_FLAG,
@@ -38,7 +38,7 @@ test("writes the golden pose and ack byte for byte", () => {
     assert.deepEqual(writeAck(expected.ack), load("ack.bin"));
     assert.deepEqual(readHead(load("pose.bin")), { kind: KIND.POSE, flags: 0, index: 3 });
     assert.equal(POSE_FLAG.CONTACT | POSE_FLAG.POSE_ONLY | POSE_FLAG.AWAY, expected.pose.flags);
-    assert.equal(PROTOCOL, "palpate.v1");
+    assert.equal(PROTOCOL, "palpate.v2");
 });
 
 test("reads the golden tools", () => {
@@ -51,11 +51,14 @@ test("reads the golden tools", () => {
     );
 });
 
-test("reads the golden haptic model", () => same(readHaptic(load("haptic.bin")), expected.haptic));
+test("reads the golden haptic model", () => {
+    const { contact_patches: contactPatches, ...rest } = expected.haptic;
+    same(readHaptic(load("haptic.bin")), { ...rest, contactPatches });
+});
 
 test("reads the golden field", () => {
-    const level = new Uint8Array(expected.field.n),
-        head = decodeField(load("field.bin"), level);
+    const level = new Uint8Array(expected.field.n);
+    const head = decodeField(load("field.bin"), level);
     same({ ...head, level }, expected.field, "field");
     assert.equal(head.name, "von_mises");
 });
@@ -89,12 +92,12 @@ test("refuses fields of bad kinds, ranges, counts and blocks", () => {
     assert.throws(() => decodeField(changed(40, 255), level), WireError);
 });
 
-test("reads the golden patch into the golden asset's table", () => {
-    const { triangles, rest } = decodeAsset(load("asset.bin")),
-        wanted = expected.patch,
-        before = triangles.slice();
-    const head = applyPatch(load("patch.bin"), triangles, rest.length / 3);
-    same(head, { part: wanted.part, epoch: wanted.epoch, revision: wanted.revision, n: wanted.n }, "patch");
+test("applies the golden topology delta to the table of the golden asset", () => {
+    const { triangles, rest } = decodeAsset(load("asset.bin"));
+    const wanted = expected.topology_delta;
+    const before = triangles.slice();
+    const head = applyTopologyDelta(load("topology_delta.bin"), triangles, rest.length / 3);
+    same(head, { part: wanted.part, epoch: wanted.epoch, revision: wanted.revision, n: wanted.n }, "topology_delta");
     assert.deepEqual([...triangles], wanted.triangles);
     wanted.places.forEach((/** @type {number} */ place, /** @type {number} */ i) =>
         before.set(wanted.corners.slice(3 * i, 3 * i + 3), 3 * place),
@@ -103,8 +106,8 @@ test("reads the golden patch into the golden asset's table", () => {
 });
 
 test("reads the golden asset, whose hash is its name", () => {
-    const bytes = load("asset.bin"),
-        asset = decodeAsset(bytes);
+    const bytes = load("asset.bin");
+    const asset = decodeAsset(bytes);
     same(
         asset,
         { ...expected.asset, levels: {}, hash: undefined, rest: Object.assign({}, expected.asset.rest) },
@@ -115,8 +118,8 @@ test("reads the golden asset, whose hash is its name", () => {
 });
 
 test("reads the golden frames to the same bits", () => {
-    const asset = decodeAsset(load("asset.bin")),
-        decoder = new FrameDecoder(asset);
+    const asset = decodeAsset(load("asset.bin"));
+    const decoder = new FrameDecoder(asset);
     const positions = new Float32Array(asset.rest.length);
     for (const frame of expected.frames) {
         const head = decoder.decode(load(`frame_${frame.name}.bin`), positions);
@@ -125,9 +128,9 @@ test("reads the golden frames to the same bits", () => {
 });
 
 test("decodes frames in any order to the same positions", () => {
-    const asset = decodeAsset(load("asset.bin")),
-        once = new FrameDecoder(asset),
-        positions = new Float32Array(asset.rest.length);
+    const asset = decodeAsset(load("asset.bin"));
+    const once = new FrameDecoder(asset);
+    const positions = new Float32Array(asset.rest.length);
     for (const frame of [...expected.frames].reverse()) {
         once.decode(load(`frame_${frame.name}.bin`), positions);
         same(positions, { ...frame.positions }, frame.name);
@@ -135,16 +138,16 @@ test("decodes frames in any order to the same positions", () => {
 });
 
 test("refuses every message cut anywhere, and with a byte too many", () => {
-    const asset = decodeAsset(load("asset.bin")),
-        decoder = new FrameDecoder(asset),
-        positions = new Float32Array(asset.rest.length);
+    const asset = decodeAsset(load("asset.bin"));
+    const decoder = new FrameDecoder(asset);
+    const positions = new Float32Array(asset.rest.length);
     /** @type {[string, (bytes: Uint8Array) => any][]} */
     const readers = [
         ["tools.bin", readTools],
         ["haptic.bin", readHaptic],
         ["asset.bin", decodeAsset],
         ["field.bin", (bytes) => decodeField(bytes, new Uint8Array(expected.field.n))],
-        ["patch.bin", (bytes) => applyPatch(bytes, asset.triangles.slice(), asset.rest.length / 3)],
+        ["topology_delta.bin", (bytes) => applyTopologyDelta(bytes, asset.triangles.slice(), asset.rest.length / 3)],
         ["frame_bend.bin", (bytes) => decoder.decode(bytes, positions)],
         ["frame_affine.bin", (bytes) => decoder.decode(bytes, positions)],
     ];
@@ -157,9 +160,9 @@ test("refuses every message cut anywhere, and with a byte too many", () => {
 });
 
 test("changed bytes give a refusal or a frame, never another error", () => {
-    const asset = decodeAsset(load("asset.bin")),
-        decoder = new FrameDecoder(asset),
-        positions = new Float32Array(asset.rest.length);
+    const asset = decodeAsset(load("asset.bin"));
+    const decoder = new FrameDecoder(asset);
+    const positions = new Float32Array(asset.rest.length);
     for (const frame of expected.frames) {
         const bytes = load(`frame_${frame.name}.bin`);
         for (let at = 0; at < bytes.length; at++)

@@ -6,13 +6,13 @@ import { keyMap } from "../src/keys.js";
 function stand() {
     /** @type {string[]} */
     const did = [];
-    const say = (/** @type {string} */ what) => () => did.push(what);
+    const record = (/** @type {string} */ what) => () => did.push(what);
     const view = {
         orbit: (/** @type {number} */ x, /** @type {number} */ y) => did.push(`orbit ${x} ${y}`),
         zoom: (/** @type {number} */ f) => did.push(f < 1 ? "nearer" : "away"),
-        home: say("home"),
+        home: record("home"),
     };
-    const find = keyMap({ " ": say("pause"), r: say("reset") }, view);
+    const find = keyMap({ " ": record("pause"), r: record("reset") }, view);
     const press = (/** @type {string} */ key, /** @type {any} */ more = {}) =>
         find({
             key,

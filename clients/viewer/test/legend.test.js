@@ -22,8 +22,8 @@ test("rounds up to a number not below the value and down to one not above", () =
 });
 
 test("the range of a long pull contains every value", () => {
-    let range = null,
-        changes = 0;
+    let range = null;
+    let changes = 0;
     for (let mm = 0; mm <= 120; mm += 0.5) {
         const next = rangeOf("displacement", 0, mm / 1000, range);
         assert.ok(next.high >= (mm / 1000) * (1 - 1e-9) && next.low === 0, `${mm} mm`);
@@ -86,9 +86,9 @@ test("both ends have the unit of the larger one", () => {
 });
 
 test("only fields of the session are offered, with the reason why others are missing", () => {
-    const springs = { fields: ["displacement", "stiffness"] },
-        plain = { fields: ["displacement"] },
-        fem = { fields: ["displacement", "von_mises", "energy", "later_one"] };
+    const springs = { fields: ["displacement", "stiffness"] };
+    const plain = { fields: ["displacement"] };
+    const fem = { fields: ["displacement", "von_mises", "energy", "later_one"] };
     assert.deepEqual(offered([fem]), ["displacement", "von_mises", "energy"]);
     assert.deepEqual(offered([springs]), ["displacement", "stiffness"]);
     assert.deepEqual(offered([plain]), ["displacement"]);

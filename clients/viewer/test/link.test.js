@@ -37,7 +37,7 @@ class FakeSocket {
         this.onopen?.();
     }
     /** @param {any} data */
-    say(data) {
+    receive(data) {
         this.onmessage?.({
             data: typeof data === "string" ? data : data.buffer ? data.slice().buffer : JSON.stringify(data),
         });
@@ -87,24 +87,26 @@ async function joined() {
     const epoch = new DataView(load("frame_bend.bin").buffer).getUint32(8, true);
     const part = new DataView(load("frame_bend.bin").buffer).getUint16(6, true);
     const parts = Array.from({ length: part + 1 }, () => partInfo({ epoch }));
-    s.sockets[0].say(hello({ parts }));
+    s.sockets[0].receive(hello({ parts }));
     return { s, part };
 }
 
 test("joins with the protocol's name, asks for any tool and for patches", () => {
     const s = stand();
     s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "trainee" });
-    assert.equal(s.sockets[0].protocol, "palpate.v1");
+    assert.equal(s.sockets[0].protocol, "palpate.v2");
     assert.equal(s.sockets[0].sent.length, 0);
     s.sockets[0].accept();
-    assert.deepEqual(s.sockets[0].texts(), [{ type: "join", name: "Ada", role: "trainee", tool: -1, patches: true }]);
+    assert.deepEqual(s.sockets[0].texts(), [
+        { type: "join", name: "Ada", role: "trainee", tool: -1, topology_deltas: true },
+    ]);
 });
 
 test("keeps the newest frame until its asset has come, then shows it", async () => {
     const { s, part } = await joined();
     assert.equal(s.asked.at(-1), "http://host:1/asset/ab");
-    s.sockets[0].say(load("frame_spike.bin"));
-    s.sockets[0].say(load("frame_bend.bin"));
+    s.sockets[0].receive(load("frame_spike.bin"));
+    s.sockets[0].receive(load("frame_bend.bin"));
     assert.equal(s.of("frame").length, 0);
     s.giveAsset(load("asset.bin").buffer);
     await turn();
@@ -121,47 +123,47 @@ test("keeps the newest frame until its asset has come, then shows it", async () 
 });
 
 test("keeps the newest field until its asset has come, drops one of an older epoch", async () => {
-    const s = stand(),
-        field = load("field.bin"),
-        head = readFieldHead(field),
-        n = 301;
+    const s = stand();
+    const field = load("field.bin");
+    const head = readFieldHead(field);
+    const n = 301;
     s.link.connect({ url: "ws://host:1/ws", name: "Ada", role: "viewer" });
     s.sockets[0].accept();
     const parts = Array.from({ length: head.part + 1 }, () => partInfo({ epoch: head.epoch }));
-    s.sockets[0].say(hello({ parts }));
-    s.sockets[0].say(field);
+    s.sockets[0].receive(hello({ parts }));
+    s.sockets[0].receive(field);
     assert.equal(s.of("field").length, 0);
     // as if an asset of as many vertices had come
     s.link.parts.set(head.part, { epoch: head.epoch, n });
-    s.sockets[0].say(field);
+    s.sockets[0].receive(field);
     const [shown] = s.of("field");
     assert.deepEqual([shown.part, shown.name, shown.level.length], [head.part, "von_mises", n]);
     assert.ok(shown.low < shown.high);
     s.link.parts.set(head.part, { epoch: head.epoch + 1, n });
-    s.sockets[0].say(field);
+    s.sockets[0].receive(field);
     assert.equal(s.of("field").length, 1);
     assert.equal(s.sockets[0].closed, 0);
     // of another number of vertices: the server's mistake
     s.link.parts.set(head.part, { epoch: head.epoch, n: n + 1 });
-    s.sockets[0].say(field);
+    s.sockets[0].receive(field);
     assert.equal(s.sockets[0].closed, 4900);
 });
 
 test("acknowledges every cycle, frames decoded or not", async () => {
     const { s } = await joined();
-    s.sockets[0].say(load("tools.bin"));
-    s.sockets[0].say(load("tools.bin"));
-    const acks = s.sockets[0].binary(KIND.ACK),
-        cycle = readTools(load("tools.bin")).cycle;
+    s.sockets[0].receive(load("tools.bin"));
+    s.sockets[0].receive(load("tools.bin"));
+    const acks = s.sockets[0].binary(KIND.ACK);
+    const cycle = readTools(load("tools.bin")).cycle;
     assert.equal(acks.length, 2);
     assert.equal(new DataView(acks[0].buffer).getUint32(8, true), cycle);
 });
 
-test("a pose carries tool, grab and clock, and lifting the tool keeps its last place", async () => {
+test("a pose carries tool, grasp and clock, and lifting the tool keeps its last place", async () => {
     const { s } = await joined();
     s.time = 1234.5;
-    s.link.pose({ tool: 2, position: [0.1, 0.2, 0.3], grab: true, away: false });
-    s.link.pose({ tool: 2, position: null, grab: false, away: true });
+    s.link.pose({ tool: 2, position: [0.1, 0.2, 0.3], grasp: true, away: false });
+    s.link.pose({ tool: 2, position: null, grasp: false, away: true });
     const [first, second] = s.sockets[0].binary(KIND.POSE).map((m) => new DataView(m.buffer));
     assert.equal(first.getUint16(6, true), 2);
     assert.equal(Number(first.getBigUint64(16, true)), 1234500);
@@ -174,7 +176,7 @@ test("a pose carries tool, grab and clock, and lifting the tool keeps its last p
 
 test("a resting tool is said again until the page has been silent for 3 s", async () => {
     const { s } = await joined();
-    s.link.pose({ tool: 0, position: [0, 0, 1], grab: true, away: false });
+    s.link.pose({ tool: 0, position: [0, 0, 1], grasp: true, away: false });
     for (let k = 0; k < 58; k++) {
         s.time += 50;
         s.link.repeatPose();
@@ -212,7 +214,7 @@ test("a server whose asset cannot be read is asked again ever more slowly", asyn
     const pauses = [];
     for (let i = 0; i < 4; i++) {
         s.sockets[i].accept();
-        s.sockets[i].say(hello());
+        s.sockets[i].receive(hello());
         s.giveAsset(new Uint8Array([1, 2, 3]).buffer);
         await turn();
         assert.equal(s.sockets[i].closed, 4900);
@@ -229,19 +231,19 @@ test("another topology: the old part goes on until the new asset is here, then f
     s.giveAsset(load("asset.bin").buffer);
     await turn();
     await turn();
-    const old = load("frame_bend.bin"),
-        fresh = load("frame_bend.bin"),
-        view = new DataView(fresh.buffer, fresh.byteOffset);
-    const epoch = view.getUint32(8, true) + 1,
-        frames = () => s.of("frame").filter((m) => m.part === part).length;
+    const old = load("frame_bend.bin");
+    const fresh = load("frame_bend.bin");
+    const view = new DataView(fresh.buffer, fresh.byteOffset);
+    const epoch = view.getUint32(8, true) + 1;
+    const frames = () => s.of("frame").filter((m) => m.part === part).length;
     view.setUint32(8, epoch, true);
-    s.sockets[0].say({
+    s.sockets[0].receive({
         type: "topology",
         parts: Array.from({ length: part + 1 }, () => partInfo({ epoch, asset: "/asset/cd" })),
     });
-    s.sockets[0].say(old); // was on its way
+    s.sockets[0].receive(old); // was on its way
     assert.equal(frames(), 1);
-    s.sockets[0].say(fresh);
+    s.sockets[0].receive(fresh);
     assert.equal(frames(), 1); // waits for its asset
     s.giveAsset(load("asset.bin").buffer);
     await turn();
@@ -254,16 +256,16 @@ test("another topology: the old part goes on until the new asset is here, then f
         [epoch - 1, epoch],
     );
     assert.equal(frames(), 2);
-    s.sockets[0].say(old);
+    s.sockets[0].receive(old);
     assert.equal(frames(), 2);
     assert.equal(s.sockets[0].closed, 0);
 });
 
 test("an asset that arrives after a newer one was asked for is not shown", async () => {
     const { s, part } = await joined();
-    const first = s.giveAsset,
-        epoch = s.link.requested.get(part);
-    s.sockets[0].say({
+    const first = s.giveAsset;
+    const epoch = s.link.requested.get(part);
+    s.sockets[0].receive({
         type: "topology",
         parts: Array.from({ length: part + 1 }, () => partInfo({ epoch: epoch + 1, asset: "/asset/cd" })),
     });
@@ -287,17 +289,17 @@ test("says why and stays away after a refusal", () => {
 
 test("a message that cannot be read closes the connection, an old connection is not heard", async () => {
     const { s } = await joined();
-    s.sockets[0].say(new Uint8Array([1, 2, 3, 4, 5, 6, 7, 8, 9]));
+    s.sockets[0].receive(new Uint8Array([1, 2, 3, 4, 5, 6, 7, 8, 9]));
     assert.equal(s.sockets[0].closed, 4900);
     s.link.connect({ url: "ws://host:1/ws", name: "Bea", role: "viewer" });
     const n = s.posted.length;
-    s.sockets[0].say(hello());
+    s.sockets[0].receive(hello());
     assert.equal(s.posted.length, n);
 });
 
 test("normals of a tetrahedron point away from its middle", () => {
-    const x = new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]),
-        n = new Float32Array(12);
+    const x = new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]);
+    const n = new Float32Array(12);
     vertexNormals(x, new Uint32Array([0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]), n);
     for (let i = 0; i < 4; i++) {
         let outward = 0;

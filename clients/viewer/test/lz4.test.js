@@ -28,11 +28,9 @@ test("literals of every length", () => {
 test("matches that overlap what they write, near, far and long", () => {
     for (const distance of [1, 2, 3, 7, 16, 30])
         for (const length of [4, 18, 19, 24, 25, 60, 273, 274, 600]) {
-            const seed = count(30, 5),
-                extra =
-                    length - 4 < 15
-                        ? []
-                        : [...new Array(Math.floor((length - 19) / 255)).fill(255), (length - 19) % 255];
+            const seed = count(30, 5);
+            const extra =
+                length - 4 < 15 ? [] : [...new Array(Math.floor((length - 19) / 255)).fill(255), (length - 19) % 255];
             const block = [(15 << 4) | Math.min(15, length - 4), 15, ...seed, distance, 0, ...extra, 1 << 4, 77];
             const wanted = [...seed];
             for (let i = 0; i < length; i++) wanted.push(wanted[wanted.length - distance]);

@@ -6,9 +6,9 @@ import { Pace } from "../src/pace.js";
 /** draws for `ms` at 60 turns per second, each picture costs cost(resolution); returns their number and share of time */
 function run(pace, ms, cost) {
     const begin = pace.restUntil;
-    let n = 0,
-        spent = 0,
-        done = Infinity;
+    let n = 0;
+    let spent = 0;
+    let done = Infinity;
     for (let t = begin; t < begin + ms; t += 1) {
         if (t >= done) {
             pace.done(t);
@@ -25,8 +25,8 @@ function run(pace, ms, cost) {
 }
 
 test("fast drawing uses every turn and all pixels", () => {
-    const pace = new Pace(0.3),
-        { n } = run(pace, 1700, () => 4);
+    const pace = new Pace(0.3);
+    const { n } = run(pace, 1700, () => 4);
     assert.equal(n, 100);
     assert.equal(pace.resolution, 1);
 });

@@ -5,9 +5,9 @@ import { barLengths, bodyRemarks, componentsOf, fixedReason, idleText } from "..
 
 test("disabled components stay on the list, with their body and reason", () => {
     const plan = {
-        rows: ["gravity", "hex_elastic", "hex_elastic"],
-        row_parts: [0, 0, 1],
-        row_whys: ["gravity_m_s2", "bodies[0].model", "bodies[1].model"],
+        components: ["gravity", "hex_elastic", "hex_elastic"],
+        component_parts: [0, 0, 1],
+        component_reasons: ["gravity_m_s2", "bodies[0].model", "bodies[1].model"],
     };
     assert.deepEqual(
         componentsOf(plan, null).map((r) => [r.name, r.part, r.on, r.index, r.reason]),
@@ -18,9 +18,9 @@ test("disabled components stay on the list, with their body and reason", () => {
         ],
     );
     const off = componentsOf(plan, {
-        rows: ["hex_elastic", "hex_elastic", "field_output"],
-        row_parts: [0, 1, 1],
-        off: [{ row: "gravity", part: 0 }],
+        components: ["hex_elastic", "hex_elastic", "field_output"],
+        component_parts: [0, 1, 1],
+        disabled: [{ component: "gravity", part: 0 }],
     });
     assert.deepEqual(
         off.map((r) => [r.name, r.part, r.on, r.index, r.reason]),
@@ -32,11 +32,11 @@ test("disabled components stay on the list, with their body and reason", () => {
         ],
     );
     const fixed = componentsOf(
-        { ...plan, row_fixed: [0, 1, 1] },
+        { ...plan, component_required: [0, 1, 1] },
         {
-            rows: ["hex_elastic", "hex_elastic", "field_output"],
-            row_parts: [0, 1, 1],
-            off: [{ row: "gravity", part: 0 }],
+            components: ["hex_elastic", "hex_elastic", "field_output"],
+            component_parts: [0, 1, 1],
+            disabled: [{ component: "gravity", part: 0 }],
         },
     );
     assert.deepEqual(
@@ -52,19 +52,19 @@ test("disabled components stay on the list, with their body and reason", () => {
     assert.deepEqual(
         off.map((r) => r.fixed),
         [false, false, false, false],
-        "without row_fixed",
+        "without component_required",
     );
     assert.deepEqual(
-        componentsOf({ rows: ["a"] }, { rows: [] }).map((r) => [r.name, r.part, r.reason]),
+        componentsOf({ components: ["a"] }, { components: [] }).map((r) => [r.name, r.part, r.reason]),
         [["a", 0, ""]],
-        "without row_parts",
+        "without component_parts",
     );
 });
 
 test("a fixed component has a reason, and a bar is proportional to its time", () => {
     const components = componentsOf(
-        { rows: ["verlet"], row_parts: [0], row_fixed: [1] },
-        { rows: ["verlet", "field_output"], row_parts: [0, 0] },
+        { components: ["verlet"], component_parts: [0], component_required: [1] },
+        { components: ["verlet", "field_output"], component_parts: [0, 0] },
     );
     assert.deepEqual(
         components.map((c) => [c.fixed, c.planned]),
@@ -89,7 +89,7 @@ test("a stopped body has its reason, a corrected one the number and time of corr
     assert.deepEqual(
         bodyRemarks(
             [
-                { part: 1, frozen: true, why: "node 512 moves at 3,200 m/s", rescues: 1, rescue_ms: 0.25 },
+                { part: 1, frozen: true, reason: "node 512 moves at 3,200 m/s", safeguards: 1, safeguard_ms: 0.25 },
                 { part: 0, asleep: true },
             ],
             parts,
@@ -104,7 +104,7 @@ test("a stopped body has its reason, a corrected one the number and time of corr
             { name: "liver", frozen: false, state: "asleep", text: [] },
         ],
     );
-    assert.deepEqual(bodyRemarks([{ part: 0, rescues: 1234567, rescue_ms: 88.44 }], parts)[0].text, [
+    assert.deepEqual(bodyRemarks([{ part: 0, safeguards: 1234567, safeguard_ms: 88.44 }], parts)[0].text, [
         "1,234,567 steps corrected by a safeguard, 88.4 ms in total.",
     ]);
     assert.deepEqual(bodyRemarks([], parts), []);
@@ -112,12 +112,12 @@ test("a stopped body has its reason, a corrected one the number and time of corr
 
 test("what no client displays is not computed", () => {
     assert.equal(
-        idleText({ field: false, estimate: false, estimates: true, unwatched: 0 }),
+        idleText({ field: false, estimate: false, estimates: true, unobserved: 0 }),
         "Not displayed, therefore not computed: field values, error estimates.",
     );
     assert.equal(
-        idleText({ field: true, estimate: false, estimates: false, unwatched: 12345 }),
+        idleText({ field: true, estimate: false, estimates: false, unobserved: 12345 }),
         "12,345 steps were simulated without any viewer.",
     );
-    assert.equal(idleText({ field: true, estimate: true, estimates: true, unwatched: 0 }), "");
+    assert.equal(idleText({ field: true, estimate: true, estimates: true, unobserved: 0 }), "");
 });

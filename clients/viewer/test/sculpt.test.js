@@ -9,8 +9,8 @@ const SET = {
     scale: 1,
     radius_m: 0.03,
     paint: "stiffer",
-    sharp: 2.5,
-    sharpWhat: 1,
+    sharpness: 2.5,
+    entity: 1,
     pressure_Pa: 200,
     lift_m: 0.05,
     stiffness_N_m: 60,
@@ -23,7 +23,13 @@ test("a click becomes a command with the point and the settings of the tool", ()
         args: { x_m: 1, y_m: 2, z_m: 3, distance_m: 0.02, scale: 1 },
     });
     assert.deepEqual(commandOf("delete", SET, [[1, 2, 3]]), { verb: "delete", args: { x_m: 1, y_m: 2, z_m: 3 } });
-    assert.deepEqual(commandOf("sharpen", SET, [[1, 2, 3]])?.args, { x_m: 1, y_m: 2, z_m: 3, sharp: 2.5, what: 1 });
+    assert.deepEqual(commandOf("sharpen", SET, [[1, 2, 3]])?.args, {
+        x_m: 1,
+        y_m: 2,
+        z_m: 3,
+        sharpness: 2.5,
+        entity: 1,
+    });
     assert.deepEqual(commandOf("paint", { ...SET, paint: "softer" }, [[0, 0, 0]])?.args, {
         x_m: 0,
         y_m: 0,
@@ -109,7 +115,7 @@ test("answers are displayed in short", () => {
         "15 kPa, 1230 kg/m³",
     );
     assert.equal(
-        answerText({ verb: "extrude", text: "", args: { cells: 9, can_undo: 1, can_redo: 0, made_ms: 12.6 } }),
+        answerText({ verb: "extrude", text: "", args: { cells: 9, can_undo: 1, can_redo: 0, prepare_ms: 12.6 } }),
         "Extrude: 9 cells, 13 ms",
     );
     assert.equal(answerText({ verb: "undo", text: "", args: { cells: 8 } }), "Undo: 8 cells");
@@ -123,8 +129,8 @@ const SURFACE = {
 };
 
 test("only vertices of triangles are written, surfaces one after the other", () => {
-    const one = joinSurfaces([SURFACE]),
-        two = joinSurfaces([SURFACE, SURFACE]);
+    const one = joinSurfaces([SURFACE]);
+    const two = joinSurfaces([SURFACE, SURFACE]);
     assert.equal(one.positions.length, 12);
     assert.ok(!one.positions.includes(9));
     assert.equal(two.positions.length, 24);
@@ -150,8 +156,8 @@ const volume = (triangles) =>
 
 test("OBJ, STL and PLY hold the same surface", () => {
     const tenth = { positions: SURFACE.positions.map((v) => Math.fround(v / 10)), triangles: SURFACE.triangles };
-    const lines = toObj([tenth]).split("\n"),
-        v = lines.filter((l) => l.startsWith("v ")).map((l) => l.split(" ").slice(1).map(Number));
+    const lines = toObj([tenth]).split("\n");
+    const v = lines.filter((l) => l.startsWith("v ")).map((l) => l.split(" ").slice(1).map(Number));
     const obj = lines
         .filter((l) => l.startsWith("f "))
         .map((l) =>
@@ -166,10 +172,10 @@ test("OBJ, STL and PLY hold the same surface", () => {
     const stlTriangles = [0, 1, 2, 3].map((k) =>
         [0, 1, 2].map((i) => [0, 1, 2].map((d) => stl.getFloat32(84 + 50 * k + 12 + 12 * i + 4 * d, true))),
     );
-    const ply = toPly([tenth]),
-        head = new TextDecoder().decode(ply),
-        begin = head.indexOf("end_header\n") + 11,
-        view = new DataView(ply);
+    const ply = toPly([tenth]);
+    const head = new TextDecoder().decode(ply);
+    const begin = head.indexOf("end_header\n") + 11;
+    const view = new DataView(ply);
     assert.match(head, /element vertex 4\n/);
     assert.match(head, /element face 4\n/);
     assert.equal(ply.byteLength, begin + 48 + 52);

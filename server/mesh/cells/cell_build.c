@@ -1,9 +1,9 @@
-/* Builds the radial-edge complex from loops (A 3.4.4; Weiler 1988): faces and edges are found by hashing, each in the
- * order of its first use; then mates, radials, rows, boundary. Linear time.
+/* Builds the radial-edge complex from loops (paper A section 3.4.4; Weiler 1988): faces and edges are found by hashing,
+ * each in the order of its first use; then mates, radials, incidence lists, boundary. Linear time.
  *
- * A cell is a ball when its surface is in one piece, closed, oriented and V - E + F = 2. Cells fill the neighbourhood
- * of a vertex when its edges, faces and cells satisfy V - E + F = 2 (inside) or 1 (boundary) as points, arcs and
- * patches of a small sphere about it; vertices where sheets of the boundary touch are only marked. */
+ * A cell is a ball when its surface is connected, closed, oriented and V - E + F = 2. Cells fill the neighbourhood of a
+ * vertex when its edges, faces and cells satisfy V - E + F = 2 (inside) or 1 (boundary) as points, arcs and patches of
+ * a small sphere about it; vertices where sheets of the boundary touch are only marked. */
 #include "server/mesh/cells/cells.h"
 
 #include "server/base/vec3.h"
@@ -13,8 +13,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define MOST_ITEMS (INT32_MAX / 4)
-#define FARTHEST_M 1e9
+#define MAX_ITEMS        (INT32_MAX / 4)
+#define MAX_COORDINATE_M 1e9
 
 typedef struct builder {
     const pal_cell_loops *in;
@@ -42,8 +42,8 @@ static int32_t cell_of_loop(const pal_cell_loops *in, int32_t loop)
     return low;
 }
 
-/* what messages call number n */
-static int shown(const builder *b, int32_t n)
+/* number n as messages show it */
+static int file_number(const builder *b, int32_t n)
 {
     return n + b->in->count_from;
 }
@@ -71,7 +71,7 @@ refuse_loop(const builder *b, int32_t loop, const char *format, ...)
     va_end(list);
     int32_t cell = cell_of_loop(b->in, loop);
     return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: cell %d, face %d: %s", place_of(b->in->line, loop).text,
-                              shown(b, cell), shown(b, loop - b->in->cell[cell]), sentence);
+                              file_number(b, cell), file_number(b, loop - b->in->cell[cell]), sentence);
 }
 
 static pal_err __attribute__((format(printf, 3, 4)))
@@ -84,24 +84,24 @@ refuse_cell(const builder *b, int32_t cell, const char *format, ...)
     vsnprintf(sentence, sizeof sentence, format, list);
     va_end(list);
     return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: cell %d %s", place_of(b->in->line, b->in->cell[cell]).text,
-                              shown(b, cell), sentence);
+                              file_number(b, cell), sentence);
 }
 
-/* ---- what is given ---- */
+/* ---- checks of the input ---- */
 
 static pal_err check_counts(const builder *b)
 {
     const pal_cell_loops *in = b->in;
     pal_diagnostic *diag = b->diag;
-    if (in->n_vertex < 1 || in->n_cell < 1 || in->n_vertex > MOST_ITEMS || in->n_cell > MOST_ITEMS)
+    if (in->n_vertex < 1 || in->n_cell < 1 || in->n_vertex > MAX_ITEMS || in->n_cell > MAX_ITEMS)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "cells: %d vertices and %d cells, each must be 1 to %d",
-                                  in->n_vertex, in->n_cell, MOST_ITEMS);
+                                  in->n_vertex, in->n_cell, MAX_ITEMS);
     for (int32_t c = 0; c < in->n_cell; c++)
-        if (in->cell[0] != 0 || in->cell[c + 1] <= in->cell[c] || in->cell[c + 1] > MOST_ITEMS)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "cells: cell %d has no faces", shown(b, c));
+        if (in->cell[0] != 0 || in->cell[c + 1] <= in->cell[c] || in->cell[c + 1] > MAX_ITEMS)
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "cells: cell %d has no faces", file_number(b, c));
     for (int32_t l = 0; l < in->cell[in->n_cell]; l++) {
         int64_t n = (int64_t)in->loop[l + 1] - in->loop[l];
-        if (in->loop[0] != 0 || n < 3 || n > PAL_CELL_LOOP_MAX || in->loop[l + 1] > MOST_ITEMS)
+        if (in->loop[0] != 0 || n < 3 || n > PAL_CELL_LOOP_MAX || in->loop[l + 1] > MAX_ITEMS)
             return refuse_loop(b, l, "%lld corners, must be 3 to %d", (long long)n, PAL_CELL_LOOP_MAX);
     }
     return PAL_ERR_OK;
@@ -109,7 +109,7 @@ static pal_err check_counts(const builder *b)
 
 static bool in_reach(const double x[3])
 {
-    return fabs(x[0]) <= FARTHEST_M && fabs(x[1]) <= FARTHEST_M && fabs(x[2]) <= FARTHEST_M;
+    return fabs(x[0]) <= MAX_COORDINATE_M && fabs(x[1]) <= MAX_COORDINATE_M && fabs(x[2]) <= MAX_COORDINATE_M;
 }
 
 /* corners in range and once in a loop, every vertex used, positions finite */
@@ -119,9 +119,9 @@ static pal_err check_corners(const builder *b)
     for (int32_t v = 0; v < in->n_vertex; v++) {
         const double *x = in->x + 3 * (size_t)v;
         if (!in_reach(x))
-            return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED,
-                                      "%s: vertex %d is at %g %g %g m, must be within %g m of the origin",
-                                      place_of(in->vertex_line, v).text, shown(b, v), x[0], x[1], x[2], FARTHEST_M);
+            return pal_diagnostic_set(
+                b->diag, PAL_ERR_REFUSED, "%s: vertex %d is at %g %g %g m, must be within %g m of the origin",
+                place_of(in->vertex_line, v).text, file_number(b, v), x[0], x[1], x[2], MAX_COORDINATE_M);
         b->stamp[v] = -1;
     }
     for (int32_t l = 0; l < in->cell[in->n_cell]; l++)
@@ -129,17 +129,17 @@ static pal_err check_corners(const builder *b)
             int32_t v = in->corner[k];
             if (v < 0 || v >= in->n_vertex)
                 return refuse_loop(b, l, "vertex %lld, there are %d", (long long)v + in->count_from, in->n_vertex);
-            if (b->stamp[v] == l) return refuse_loop(b, l, "has vertex %d twice", shown(b, v));
+            if (b->stamp[v] == l) return refuse_loop(b, l, "has vertex %d twice", file_number(b, v));
             b->stamp[v] = l;
         }
     for (int32_t v = 0; v < in->n_vertex; v++)
         if (b->stamp[v] < 0)
             return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: vertex %d belongs to no cell",
-                                      place_of(in->vertex_line, v).text, shown(b, v));
+                                      place_of(in->vertex_line, v).text, file_number(b, v));
     return PAL_ERR_OK;
 }
 
-static bool sharp_fits(float s)
+static bool sharpness_valid(float s)
 {
     return s >= 0 && s <= PAL_SHARPNESS_MAX;
 }
@@ -189,17 +189,17 @@ static void copy_loops(builder *b)
 
 /* ---- faces and edges ---- */
 
-static uint64_t mixed(uint64_t z)
+static uint64_t mix_bits(uint64_t z)
 {
     z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
     z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
     return z ^ (z >> 31);
 }
 
-typedef enum likeness { OTHER, OPPOSITE, EQUAL, SHUFFLED } likeness;
+typedef enum loop_relation { OTHER, OPPOSITE, EQUAL, SHUFFLED } loop_relation;
 
-/* how two loops of the same complex compare */
-static likeness compare_loops(const pal_cell_loops *in, int32_t a, int32_t b)
+/* relation of two loops of the same complex */
+static loop_relation compare_loops(const pal_cell_loops *in, int32_t a, int32_t b)
 {
     const int32_t *p = in->corner + in->loop[a], *q = in->corner + in->loop[b];
     int n = in->loop[a + 1] - in->loop[a], at = 0;
@@ -221,20 +221,21 @@ static likeness compare_loops(const pal_cell_loops *in, int32_t a, int32_t b)
 }
 
 /* loop l has the corners of face f */
-static pal_err join_face(builder *b, int32_t l, int32_t f, likeness like)
+static pal_err join_face(builder *b, int32_t l, int32_t f, loop_relation like)
 {
     pal_cell_face *face = &b->c->face[f];
     pal_face_use *use = b->c->face_use;
     int32_t cell = use[face->use[0]].cell, vertex = b->in->corner[b->in->loop[l]];
     if (like == SHUFFLED)
-        return refuse_loop(b, l, "has the corners of a face of cell %d in another order", shown(b, cell));
+        return refuse_loop(b, l, "has the corners of a face of cell %d in another order", file_number(b, cell));
     if (cell == use[l].cell || (face->use[1] >= 0 && use[face->use[1]].cell == use[l].cell))
-        return refuse_loop(b, l, "is a face of the same cell already, from vertex %d on", shown(b, vertex));
+        return refuse_loop(b, l, "is a face of the same cell already, from vertex %d on", file_number(b, vertex));
     if (face->use[1] >= 0)
-        return refuse_loop(b, l, "is a face of cells %d and %d already, a face has two cells at most", shown(b, cell),
-                           shown(b, use[face->use[1]].cell));
+        return refuse_loop(b, l, "is a face of cells %d and %d already, a face has two cells at most",
+                           file_number(b, cell), file_number(b, use[face->use[1]].cell));
     if (like == EQUAL)
-        return refuse_loop(b, l, "runs the same way round in cell %d: one of the two is inside out", shown(b, cell));
+        return refuse_loop(b, l, "runs the same way round in cell %d: one of the two is inside out",
+                           file_number(b, cell));
     face->use[1] = l;
     use[l].face = f, use[l].sign = -1, use[l].mate = face->use[0];
     use[face->use[0]].mate = l;
@@ -248,9 +249,9 @@ static pal_err find_faces(builder *b)
     memset(b->table, 0, (b->mask + 1) * sizeof *b->table);
     for (int32_t l = 0; l < c->n_face_use; l++) {
         uint64_t key = 0;
-        for (int32_t k = in->loop[l]; k < in->loop[l + 1]; k++) key += mixed((uint64_t)in->corner[k] + 1);
-        size_t at = mixed(key) & b->mask;
-        likeness like = OTHER;
+        for (int32_t k = in->loop[l]; k < in->loop[l + 1]; k++) key += mix_bits((uint64_t)in->corner[k] + 1);
+        size_t at = mix_bits(key) & b->mask;
+        loop_relation like = OTHER;
         for (; b->table[at]; at = (at + 1) & b->mask) {
             like = compare_loops(in, c->face[b->table[at] - 1].use[0], l);
             if (like != OTHER) break;
@@ -266,12 +267,12 @@ static pal_err find_faces(builder *b)
     return PAL_ERR_OK;
 }
 
-/* place in the table of the edge between two vertices: taken by it, or free */
+/* table slot of the edge between two vertices: taken by it, or free */
 static size_t edge_place(const builder *b, int32_t v, int32_t w)
 {
     const pal_cell_edge *edge = b->c->edge;
     uint32_t low = (uint32_t)(v < w ? v : w), high = (uint32_t)(v < w ? w : v);
-    size_t at = mixed(((uint64_t)high << 32 | low) + 1) & b->mask;
+    size_t at = mix_bits(((uint64_t)high << 32 | low) + 1) & b->mask;
     for (; b->table[at]; at = (at + 1) & b->mask) {
         const pal_cell_edge *e = &edge[b->table[at] - 1];
         if ((e->vertex[0] == v && e->vertex[1] == w) || (e->vertex[0] == w && e->vertex[1] == v)) break;
@@ -324,24 +325,24 @@ static pal_err join_radials(builder *b, int32_t cell)
             continue;
         }
         pal_edge_use *o = &c->edge_use[other];
-        int32_t v = shown(b, use->vertex), w = shown(b, pal_cells_end_vertex(c, u));
+        int32_t v = file_number(b, use->vertex), w = file_number(b, pal_cells_end_vertex(c, u));
         if (o->radial >= 0)
             return refuse_loop(b, use->face_use, "the cell's third face at the edge of vertices %d and %d", v, w);
         if (o->vertex == use->vertex)
             return refuse_loop(b, use->face_use,
                                "runs from vertex %d to %d as face %d of the cell does: one of the two is inside out", v,
-                               w, shown(b, o->face_use - c->cell_use[cell]));
+                               w, file_number(b, o->face_use - c->cell_use[cell]));
         o->radial = u, use->radial = other;
     }
     for (int32_t u = first; u < end; u++)
         if (c->edge_use[u].radial < 0)
             return refuse_loop(b, c->edge_use[u].face_use,
                                "no other face of the cell at the edge of vertices %d and %d: it is not closed",
-                               shown(b, c->edge_use[u].vertex), shown(b, pal_cells_end_vertex(c, u)));
+                               file_number(b, c->edge_use[u].vertex), file_number(b, pal_cells_end_vertex(c, u)));
     return PAL_ERR_OK;
 }
 
-/* faces that are reached from a cell's first one over its edges */
+/* number of faces reached from the first face of a cell over its edges */
 static int32_t count_reached(const builder *b, int32_t cell)
 {
     const pal_cells *c = b->c;
@@ -413,10 +414,10 @@ static pal_err find_cells(builder *b)
     return PAL_ERR_OK;
 }
 
-/* ---- rows ---- */
+/* ---- incidence lists ---- */
 
-/* turns rows over: to[b] lists the a with b in from[a], ascending */
-static pal_err turn_rows(const pal_cell_rows *from, int32_t n_from, int32_t n_to, pal_cell_rows *to)
+/* transposes lists: to[b] lists the a with b in from[a], ascending */
+static pal_err transpose_lists(const pal_cell_rows *from, int32_t n_from, int32_t n_to, pal_cell_rows *to)
 {
     int32_t n = from->start[n_from];
     to->start = calloc((size_t)n_to + 2, sizeof *to->start);
@@ -429,20 +430,19 @@ static pal_err turn_rows(const pal_cell_rows *from, int32_t n_from, int32_t n_to
     return PAL_ERR_OK;
 }
 
-/* rows to vertices and edges from what runs along them: vertices of edges, vertices and edges of faces, edges of cells
- */
-static pal_err find_rows(builder *b)
+/* transposes of: vertices of edges, vertices and edges of faces, edges of cells */
+static pal_err find_incidence(builder *b)
 {
     pal_cells *c = b->c;
-    int32_t most = c->n_edge > c->n_face ? c->n_edge : c->n_face;
-    if (c->n_cell > most) most = c->n_cell;
+    int32_t max = c->n_edge > c->n_face ? c->n_edge : c->n_face;
+    if (c->n_cell > max) max = c->n_cell;
     int32_t n_item = c->n_edge_use > 2 * c->n_edge ? c->n_edge_use : 2 * c->n_edge, n = 0;
-    pal_cell_rows rows = {malloc(((size_t)most + 1) * sizeof(int32_t)), malloc((size_t)n_item * sizeof(int32_t))};
+    pal_cell_rows rows = {malloc(((size_t)max + 1) * sizeof(int32_t)), malloc((size_t)n_item * sizeof(int32_t))};
     pal_err err = rows.start && rows.item ? PAL_ERR_OK : PAL_ERR_MEMORY;
     if (!err) {
         for (int32_t e = 0; e <= c->n_edge; e++) rows.start[e] = 2 * e;
         for (int32_t e = 0; e < 2 * c->n_edge; e++) rows.item[e] = c->edge[e / 2].vertex[e % 2];
-        err = turn_rows(&rows, c->n_edge, c->n_vertex, &c->vertex_edge);
+        err = transpose_lists(&rows, c->n_edge, c->n_vertex, &c->vertex_edge);
     }
     for (int edges = 0; edges < 2 && !err; edges++) {
         n = 0;
@@ -453,7 +453,8 @@ static pal_err find_rows(builder *b)
                 rows.item[n++] = edges ? c->edge_use[u].edge : c->edge_use[u].vertex;
         }
         rows.start[c->n_face] = n;
-        err = turn_rows(&rows, c->n_face, edges ? c->n_edge : c->n_vertex, edges ? &c->edge_face : &c->vertex_face);
+        err =
+            transpose_lists(&rows, c->n_face, edges ? c->n_edge : c->n_vertex, edges ? &c->edge_face : &c->vertex_face);
     }
     if (!err) {
         n = 0;
@@ -464,9 +465,9 @@ static pal_err find_rows(builder *b)
                 if (u < c->edge_use[u].radial) rows.item[n++] = c->edge_use[u].edge;
         }
         rows.start[c->n_cell] = n;
-        err = turn_rows(&rows, c->n_cell, c->n_edge, &c->edge_cell);
+        err = transpose_lists(&rows, c->n_cell, c->n_edge, &c->edge_cell);
     }
-    if (!err) err = turn_rows(&c->cell_vertex, c->n_cell, c->n_vertex, &c->vertex_cell);
+    if (!err) err = transpose_lists(&c->cell_vertex, c->n_cell, c->n_vertex, &c->vertex_cell);
     free(rows.start);
     free(rows.item);
     return err;
@@ -514,8 +515,8 @@ static void find_pinched(builder *b)
     for (int32_t v = 0; v < c->n_vertex; v++) c->n_pinched_vertex += c->vertex_pinched[v];
 }
 
-/* cells on the walks round an edge: the ring of an inner edge, all fans of one of the boundary */
-static int32_t count_round(const pal_cells *c, int32_t e, int32_t first)
+/* cells on the walks round an edge: the cycle of an inner edge, all fans of a boundary edge */
+static int32_t count_around(const pal_cells *c, int32_t e, int32_t first)
 {
     int32_t n = 0, u = first;
     if (!c->edge[e].boundary) {
@@ -545,10 +546,10 @@ static pal_err check_neighbourhoods(builder *b)
     for (int32_t u = c->n_edge_use - 1; u >= 0; u--) b->last[c->edge_use[u].edge] = u;
     for (int32_t e = 0; e < c->n_edge; e++) {
         int32_t n = c->edge_cell.start[e + 1] - c->edge_cell.start[e], first = b->last[e];
-        if (count_round(c, e, first) != n)
+        if (count_around(c, e, first) != n)
             return refuse_loop(b, c->edge_use[first].face_use,
                                "cells go more than once round the edge of vertices %d and %d",
-                               shown(b, c->edge[e].vertex[0]), shown(b, c->edge[e].vertex[1]));
+                               file_number(b, c->edge[e].vertex[0]), file_number(b, c->edge[e].vertex[1]));
     }
     for (int32_t v = 0; v < c->n_vertex; v++) {
         if (c->vertex_pinched[v]) continue;
@@ -558,7 +559,7 @@ static pal_err check_neighbourhoods(builder *b)
         if (n_edge - n_face + n_cell != (c->vertex_boundary[v] ? 1 : 2))
             return refuse_cell(b, c->vertex_cell.item[first],
                                "and others go round vertex %d more than once: %d edges - %d faces + %d cells there",
-                               shown(b, v), n_edge, n_face, n_cell);
+                               file_number(b, v), n_edge, n_face, n_cell);
     }
     return PAL_ERR_OK;
 }
@@ -571,10 +572,10 @@ static pal_err set_sharpness(builder *b)
     pal_cells *c = b->c;
     for (int32_t v = 0; in->vertex_sharpness && v < c->n_vertex; v++) {
         c->vertex_sharpness[v] = in->vertex_sharpness[v];
-        if (!sharp_fits(in->vertex_sharpness[v]))
+        if (!sharpness_valid(in->vertex_sharpness[v]))
             return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: vertex %d has sharpness %g, must be 0 to %g",
-                                      place_of(in->vertex_line, v).text, shown(b, v), (double)in->vertex_sharpness[v],
-                                      (double)PAL_SHARPNESS_MAX);
+                                      place_of(in->vertex_line, v).text, file_number(b, v),
+                                      (double)in->vertex_sharpness[v], (double)PAL_SHARPNESS_MAX);
     }
     memset(b->table, 0, (b->mask + 1) * sizeof *b->table);
     for (int32_t e = 0; in->n_edge_tag > 0 && e < c->n_edge; e++)
@@ -582,7 +583,7 @@ static pal_err set_sharpness(builder *b)
     for (int32_t k = 0; k < in->n_edge_tag; k++) {
         const pal_cell_tag *tag = &in->edge_tag[k];
         int32_t e = b->table[edge_place(b, tag->a, tag->b)] - 1;
-        if (e < 0 || !sharp_fits(tag->sharp))
+        if (e < 0 || !sharpness_valid(tag->sharp))
             return pal_diagnostic_set(
                 b->diag, PAL_ERR_REFUSED, "%s: sharpness %g of an edge of vertices %lld and %lld: %s",
                 place_of(in->tag_line, k).text, (double)tag->sharp, (long long)tag->a + in->count_from,
@@ -594,7 +595,7 @@ static pal_err set_sharpness(builder *b)
         if (tag->a < 0 || tag->a >= c->n_face_use)
             return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "cells: sharpness of loop %lld, there are %d",
                                       (long long)tag->a, c->n_face_use);
-        if (!sharp_fits(tag->sharp))
+        if (!sharpness_valid(tag->sharp))
             return refuse_loop(b, tag->a, "has sharpness %g, must be 0 to %g", (double)tag->sharp,
                                (double)PAL_SHARPNESS_MAX);
         pal_cell_face *face = &c->face[c->face_use[tag->a].face];
@@ -603,7 +604,7 @@ static pal_err set_sharpness(builder *b)
     return PAL_ERR_OK;
 }
 
-/* ---- all of it ---- */
+/* ---- the whole ---- */
 
 static void trim(pal_cells *c)
 {
@@ -630,14 +631,14 @@ static pal_err build(builder *b)
     trim(c);
     join_mates(c);
     PAL_TRY(find_cells(b));
-    PAL_TRY(find_rows(b));
+    PAL_TRY(find_incidence(b));
     find_boundary(c);
     find_pinched(b);
     PAL_TRY(check_neighbourhoods(b));
     return set_sharpness(b);
 }
 
-/* faces with area and cells with volume, named as the loops are */
+/* faces must have area and cells volume; messages use the numbers of the loops */
 static pal_err check_shape(const builder *b)
 {
     pal_cells_fault fault;

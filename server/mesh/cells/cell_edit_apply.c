@@ -7,11 +7,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define FARTHEST_M 1e9
+#define MAX_COORDINATE_M 1e9
 
 /* ---- delete ---- */
 
-static pal_err put_kept(pal_edit_work *w, int32_t cell, bool *keep, int32_t *kept)
+static pal_err add_kept(pal_edit_work *w, int32_t cell, bool *keep, int32_t *kept)
 {
     const pal_cells *c = w->from;
     memset(keep, 1, (size_t)c->n_cell);
@@ -36,7 +36,7 @@ pal_err pal_cells_delete(const pal_cells *from, int32_t cell, pal_cells_edit *ou
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: it is the last one, a solid needs a cell", w.what);
     bool *keep = malloc((size_t)from->n_cell);
     int32_t *kept = malloc((size_t)from->n_vertex * sizeof *kept);
-    pal_err err = keep && kept ? put_kept(&w, cell, keep, kept) : PAL_ERR_MEMORY;
+    pal_err err = keep && kept ? add_kept(&w, cell, keep, kept) : PAL_ERR_MEMORY;
     free(keep);
     free(kept);
     return pal_edit_finish(&w, err, out, diag);
@@ -89,7 +89,7 @@ pal_err pal_cells_sharpen(const pal_cells *from, pal_cells_command_kind kind, in
     return PAL_ERR_OK;
 }
 
-/* numbers in range, each once, positions within reach; seen [n_vertex] is all false */
+/* numbers in range, each once, positions within MAX_COORDINATE_M; seen [n_vertex] is all false */
 static pal_err check_moves(const pal_edit_work *w, int32_t n, const int32_t *vertex, const double *x, bool *seen,
                            pal_diagnostic *diag)
 {
@@ -99,15 +99,15 @@ static pal_err check_moves(const pal_edit_work *w, int32_t n, const int32_t *ver
         if (seen[vertex[i]])
             return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: vertex %d is given twice", w->what, vertex[i]);
         seen[vertex[i]] = true;
-        if (!(fabs(to[0]) <= FARTHEST_M && fabs(to[1]) <= FARTHEST_M && fabs(to[2]) <= FARTHEST_M))
+        if (!(fabs(to[0]) <= MAX_COORDINATE_M && fabs(to[1]) <= MAX_COORDINATE_M && fabs(to[2]) <= MAX_COORDINATE_M))
             return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
                                       "%s: vertex %d to %g %g %g m, must be within %g m of the origin", w->what,
-                                      vertex[i], to[0], to[1], to[2], FARTHEST_M);
+                                      vertex[i], to[0], to[1], to[2], MAX_COORDINATE_M);
     }
     return PAL_ERR_OK;
 }
 
-/* moves them, and judges faces and cells */
+/* moves the vertices and checks faces and cells */
 static pal_err move_all(pal_edit_work *w, int32_t n, const int32_t *vertex, const double *x, pal_cells_edit *edit,
                         pal_diagnostic *diag)
 {
@@ -203,8 +203,8 @@ pal_err pal_cells_apply(const pal_cells *from, const pal_cells_command *command,
 
 /* ---- deformed states ---- */
 
-/* rotation of a face from its rest to positions x, of its corners and its normal; the identity where x has no area */
-static void face_turn(const pal_cells *from, int32_t face, const double *x, double r[9])
+/* rotation of the corners and normal of a face from rest to positions x; the identity where x has no area */
+static void face_rotation(const pal_cells *from, int32_t face, const double *x, double r[9])
 {
     double o[3], p[3], n[3], m[3], a[3], b[3], f[9] = {0}, q[4] = {1, 0, 0, 0}, size = 0;
     int32_t first, n_corner = pal_cells_face_loop(from, face, &first);
@@ -229,7 +229,7 @@ void pal_cells_edit_positions(const pal_cells_edit *edit, const pal_cells *from,
 {
     double r[9], d[3];
     pal_interpolation_apply(&edit->rows, x, to);
-    if (edit->rotated_face >= 0) face_turn(from, edit->rotated_face, x, r);
+    if (edit->rotated_face >= 0) face_rotation(from, edit->rotated_face, x, r);
     for (size_t i = 0; i < 3 * (size_t)edit->cells.n_vertex; i += 3) {
         pal_copy3(d, edit->offset + i);
         if (edit->rotated_face >= 0) pal_mul33(d, r, d);

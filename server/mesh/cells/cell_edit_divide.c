@@ -1,10 +1,10 @@
-/* Local subdivision of control cells (A 4.1, Fig. 7d): a cell becomes one cell for each of its corners.
+/* Local subdivision of control cells (paper A section 4.1, Fig. 7d): a cell becomes one cell for each of its corners.
  *
- * A cell whose neighbour has been divided has faces and edges that are cut already. They are known again by where their
- * vertices lie, exactly in the middle: a centre is the mean of the far corners of the quads round it, the vertices
- * between at midpoints; a hanging vertex is the midpoint of the only two vertices that its cell joins it to. Such a
- * cell is divided as if it had not been cut, with the vertices that are there, so that dividing all cells one after the
- * other makes the same complex as a level of subdivision. One that is cut twice is divided as it stands. */
+ * A cell whose neighbour has been divided has faces and edges that are cut already. Their vertices are recognised by
+ * position, exactly in the middle: a face centre is the mean of the opposite corners of the quads round it, the
+ * vertices between lie at midpoints; a hanging vertex is the midpoint of the only two vertices that its cell joins it
+ * to. Such a cell is divided as if it had not been cut, with the existing vertices, so that dividing all cells one
+ * after the other gives the same complex as a level of subdivision. A cell that is cut twice is divided as it is. */
 #include "server/base/vec3.h"
 #include "server/mesh/cells/cell_edit_work.h"
 
@@ -16,11 +16,11 @@
 
 enum role { CORNER, HANGING, CENTRE };
 
-/* The cell that is divided, as it was before its neighbours were. Of all vertices, edges and faces, by old number: */
-typedef struct adaptive {
+/* The cell to be divided, as it was before its neighbours were. Of all vertices, edges and faces, by old number: */
+typedef struct division {
     const pal_cells *c;
     int32_t cell, n_vertex;
-    int32_t *edge;   /* new vertex in the middle of an edge that is cut; -1: it is not             [n_edge]   */
+    int32_t *edge;   /* new vertex in the middle of an edge that is cut; -1: not cut             [n_edge] */
     int32_t *face;   /* the same of a face                                                         [n_face]   */
     int32_t *role;   /* of the cell's vertices                                                     [n_vertex] */
     int32_t *order;  /* the cell's vertices, latest first                                          [n_vertex] */
@@ -31,9 +31,9 @@ typedef struct adaptive {
     int32_t *mid;
     int32_t *centre; /* vertex in the middle of each side, new or old */
     float *sharp;    /* of the face at each corner                    */
-} adaptive;
+} division;
 
-static void shell_free(adaptive *s)
+static void division_free(division *s)
 {
     free(s->edge);
     free(s->face);
@@ -46,10 +46,10 @@ static void shell_free(adaptive *s)
     free(s->sharp);
 }
 
-static pal_err shell_room(const pal_cells *c, int32_t cell, adaptive *s)
+static pal_err division_reserve(const pal_cells *c, int32_t cell, division *s)
 {
     size_t n_use = (size_t)(c->face_use[c->cell_use[cell + 1]].first_use - c->face_use[c->cell_use[cell]].first_use);
-    *s = (adaptive){.c = c, .cell = cell, .n_vertex = c->cell_vertex.start[cell + 1] - c->cell_vertex.start[cell]};
+    *s = (division){.c = c, .cell = cell, .n_vertex = c->cell_vertex.start[cell + 1] - c->cell_vertex.start[cell]};
     s->edge = malloc((size_t)c->n_edge * sizeof *s->edge);
     s->face = malloc((size_t)c->n_face * sizeof *s->face);
     s->role = calloc((size_t)c->n_vertex, sizeof *s->role);
@@ -64,7 +64,7 @@ static pal_err shell_room(const pal_cells *c, int32_t cell, adaptive *s)
                : PAL_ERR_MEMORY;
 }
 
-/* ---- what is cut already ---- */
+/* ---- existing cuts ---- */
 
 static const double *at(const pal_cells *c, int32_t vertex)
 {
@@ -79,13 +79,13 @@ static bool is_midpoint(const pal_cells *c, int32_t v, int32_t a, int32_t b)
     return pal_dist3(d, at(c, v)) <= NEAR_MIDDLE * pal_dist3(at(c, a), at(c, b));
 }
 
-static int32_t quad_far(const pal_cells *c, int32_t use)
+static int32_t opposite_corner(const pal_cells *c, int32_t use)
 {
     return pal_cells_end_vertex(c, pal_cells_next(c, use));
 }
 
-/* quads of the cell round the vertex where use starts, none yet of another centre, with it in their middle? */
-static bool is_centre(const adaptive *s, int32_t use)
+/* do quads of the cell, none with another centre, surround the vertex where use starts, with it in their middle? */
+static bool is_centre(const division *s, int32_t use)
 {
     const pal_cells *c = s->c;
     double mean[3] = {0}, size = 0;
@@ -96,27 +96,29 @@ static bool is_centre(const adaptive *s, int32_t use)
         if (f[1].first_use - f->first_use != 4 || s->face[f->face] >= 0) return false;
         const pal_face_use *g = &c->face_use[c->edge_use[turned].face_use];
         if (g[1].first_use - g->first_use != 4) return false;
-        /* quad_far is the corner beyond; the vertex between this quad and the next is where the turned use ends */
-        if (!is_midpoint(c, pal_cells_end_vertex(c, turned), quad_far(c, u), quad_far(c, turned))) return false;
-        pal_add3(mean, mean, at(c, quad_far(c, u)));
+        /* opposite_corner is the corner beyond; the vertex between this quad and the next is where the next use starts
+         */
+        if (!is_midpoint(c, pal_cells_end_vertex(c, turned), opposite_corner(c, u), opposite_corner(c, turned)))
+            return false;
+        pal_add3(mean, mean, at(c, opposite_corner(c, u)));
         n++, u = turned;
     } while (u != use);
     pal_scale3(mean, 1.0 / n, mean);
     const double *x = at(c, c->edge_use[use].vertex);
-    size = pal_dist3(x, at(c, quad_far(c, use)));
+    size = pal_dist3(x, at(c, opposite_corner(c, use)));
     return n >= 3 && pal_dist3(mean, x) <= NEAR_MIDDLE * size;
 }
 
 /* the edge use of the cell that starts at one of its vertices */
-static int32_t corner_use(const adaptive *s, int32_t vertex)
+static int32_t corner_use(const division *s, int32_t vertex)
 {
     int32_t k = s->c->cell_vertex.start[s->cell];
     while (s->c->cell_vertex.item[k] != vertex) k++;
     return s->c->corner_use[k];
 }
 
-/* gives the faces round a vertex to it as their centre, or takes them back (-1) */
-static void claim_faces(adaptive *s, int32_t use, int32_t centre)
+/* assigns the faces round a vertex to it as their centre, or revokes that (-1) */
+static void claim_faces(division *s, int32_t use, int32_t centre)
 {
     int32_t u = use;
     s->role[s->c->edge_use[use].vertex] = centre < 0 ? CORNER : CENTRE;
@@ -126,8 +128,8 @@ static void claim_faces(adaptive *s, int32_t use, int32_t centre)
     } while (u != use);
 }
 
-/* joined, but for centres, to two vertices only that do not hang themselves, and in their middle? */
-static bool hangs(const adaptive *s, int32_t use)
+/* joined, except to centres, to two vertices only that do not hang themselves, and in their middle? */
+static bool is_hanging(const division *s, int32_t use)
 {
     const pal_cells *c = s->c;
     int32_t u = use, end[2], n = 0;
@@ -142,14 +144,14 @@ static bool hangs(const adaptive *s, int32_t use)
     return n == 2 && is_midpoint(c, c->edge_use[use].vertex, end[0], end[1]);
 }
 
-/* marks what hangs; false with the role taken back where a centre's neighbour does not */
-static bool settle_roles(adaptive *s)
+/* marks hanging vertices; false with the role revoked where the neighbour of a centre does not hang */
+static bool remove_conflicting_roles(division *s)
 {
     const pal_cells *c = s->c;
     for (int32_t i = 0; i < s->n_vertex; i++)
         if (s->role[s->order[i]] == HANGING) s->role[s->order[i]] = CORNER;
     for (int32_t i = 0; i < s->n_vertex; i++)
-        if (s->role[s->order[i]] == CORNER && hangs(s, corner_use(s, s->order[i]))) s->role[s->order[i]] = HANGING;
+        if (s->role[s->order[i]] == CORNER && is_hanging(s, corner_use(s, s->order[i]))) s->role[s->order[i]] = HANGING;
     for (int32_t i = 0; i < s->n_vertex; i++) {
         if (s->role[s->order[i]] != CENTRE) continue;
         int32_t use = corner_use(s, s->order[i]), u = use;
@@ -170,8 +172,8 @@ static int descending(const void *a, const void *b)
     return i > j ? -1 : i < j;
 }
 
-/* roles of the vertices, later ones first: of two cuts, the finer */
-static void find_roles(adaptive *s)
+/* roles of the vertices, later ones first: of two cuts, the finer one */
+static void find_roles(division *s)
 {
     const pal_cells *c = s->c;
     memset(s->edge, -1, (size_t)c->n_edge * sizeof *s->edge);
@@ -182,18 +184,18 @@ static void find_roles(adaptive *s)
         int32_t use = corner_use(s, s->order[i]);
         if (is_centre(s, use)) claim_faces(s, use, s->order[i]);
     }
-    while (!settle_roles(s)) {
+    while (!remove_conflicting_roles(s)) {
     }
 }
 
 /* ---- sides, and the numbers and rows of new vertices ---- */
 
 /* a vertex of the open side, in order; hanging ones go between */
-static void put_side_vertex(adaptive *s, int32_t vertex, float sharp)
+static void add_side_vertex(division *s, int32_t vertex, float sharp)
 {
     int32_t *end = &s->start[s->n_side + 1];
     if (s->role[vertex] == HANGING) {
-        /* before the first corner: kept until the side is closed, in the place of a middle that is not there yet */
+        /* before the first corner: kept until the side is closed, in the slot of a missing midpoint */
         if (*end == s->start[s->n_side])
             s->centre[s->n_side] = vertex;
         else
@@ -204,7 +206,7 @@ static void put_side_vertex(adaptive *s, int32_t vertex, float sharp)
     (*end)++;
 }
 
-static void end_side(adaptive *s, int32_t centre)
+static void end_side(division *s, int32_t centre)
 {
     if (s->centre[s->n_side] >= 0) s->mid[s->start[s->n_side + 1] - 1] = s->centre[s->n_side];
     s->centre[s->n_side] = centre;
@@ -213,8 +215,8 @@ static void end_side(adaptive *s, int32_t centre)
     s->centre[s->n_side] = -1;
 }
 
-/* sides of the cell: faces that are whole, then those round centres; face is -1 for all after that */
-static void list_sides(adaptive *s)
+/* sides of the cell: whole faces, then those round centres; face is -1 for the latter */
+static void list_sides(division *s)
 {
     const pal_cells *c = s->c;
     s->start[0] = s->start[1] = 0, s->centre[0] = -1;
@@ -222,16 +224,16 @@ static void list_sides(adaptive *s)
         int32_t face = c->face_use[f].face;
         if (s->face[face] >= 0) continue;
         for (int32_t u = c->face_use[f].first_use; u < c->face_use[f + 1].first_use; u++)
-            put_side_vertex(s, c->edge_use[u].vertex, c->face[face].sharp);
+            add_side_vertex(s, c->edge_use[u].vertex, c->face[face].sharp);
         end_side(s, -2 - face);
     }
     for (int32_t i = 0; i < s->n_vertex; i++) {
         if (s->role[s->order[i]] != CENTRE) continue;
         int32_t use = corner_use(s, s->order[i]), u = use;
         do {
-            put_side_vertex(s, quad_far(c, u), c->face[pal_cells_face_of(c, u)].sharp);
+            add_side_vertex(s, opposite_corner(c, u), c->face[pal_cells_face_of(c, u)].sharp);
             u = pal_cells_next_around(c, u);
-            put_side_vertex(s, pal_cells_end_vertex(c, u), 0);
+            add_side_vertex(s, pal_cells_end_vertex(c, u), 0);
         } while (u != use);
         end_side(s, s->order[i]);
     }
@@ -239,7 +241,7 @@ static void list_sides(adaptive *s)
 }
 
 /* the edge of the cell between two of its vertices */
-static int32_t edge_between(const adaptive *s, int32_t a, int32_t b)
+static int32_t edge_between(const division *s, int32_t a, int32_t b)
 {
     int32_t u = corner_use(s, a);
     while (pal_cells_end_vertex(s->c, u) != b) u = pal_cells_next_around(s->c, u);
@@ -247,7 +249,7 @@ static int32_t edge_between(const adaptive *s, int32_t a, int32_t b)
 }
 
 /* new vertices after the old: edges, faces, the middle, each with its row, the mean of its corners */
-static void put_middles(pal_edit_work *w, adaptive *s)
+static void add_midpoints(pal_edit_work *w, division *s)
 {
     const pal_cells *c = s->c;
     int32_t n = c->n_vertex, n_corner = 0;
@@ -283,22 +285,22 @@ static void put_middles(pal_edit_work *w, adaptive *s)
 
 /* ---- the new cells ---- */
 
-static void put_quad(pal_edit_work *w, const int32_t vertex[4], float sharp)
+static void add_quad(pal_edit_work *w, const int32_t vertex[4], float sharp)
 {
     for (int k = 0; k < 4; k++) pal_edit_corner(w, vertex[k]);
     pal_edit_end_loop(w, sharp);
 }
 
 /* the quad of a side at its corner i; reversed: as the neighbour sees it */
-static void put_outer(pal_edit_work *w, const adaptive *s, int32_t side, int32_t i, bool reversed)
+static void add_outer_vertices(pal_edit_work *w, const division *s, int32_t side, int32_t i, bool reversed)
 {
     int32_t before = s->mid[i > s->start[side] ? i - 1 : s->start[side + 1] - 1], after = s->mid[i];
     const int32_t quad[4] = {s->corner[i], reversed ? before : after, s->centre[side], reversed ? after : before};
-    put_quad(w, quad, s->sharp[i]);
+    add_quad(w, quad, s->sharp[i]);
 }
 
 /* middle of the side that runs to a corner over the edge of vertex mid */
-static int32_t centre_over(const adaptive *s, int32_t corner, int32_t mid)
+static int32_t centre_across(const division *s, int32_t corner, int32_t mid)
 {
     for (int32_t side = 0; side < s->n_side; side++)
         for (int32_t i = s->start[side]; i < s->start[side + 1]; i++)
@@ -307,27 +309,27 @@ static int32_t centre_over(const adaptive *s, int32_t corner, int32_t mid)
 }
 
 /* the part at a corner: outer quads lie in the sides, inner ones cross the edges from it */
-static void put_part(pal_edit_work *w, const adaptive *s, int32_t corner)
+static void add_part(pal_edit_work *w, const division *s, int32_t corner)
 {
     for (int32_t side = 0; side < s->n_side; side++)
         for (int32_t i = s->start[side]; i < s->start[side + 1]; i++) {
             if (s->corner[i] != corner) continue;
-            const int32_t inner[4] = {s->mid[i], centre_over(s, corner, s->mid[i]), s->middle, s->centre[side]};
-            put_outer(w, s, side, i, false);
-            put_quad(w, inner, 0);
+            const int32_t inner[4] = {s->mid[i], centre_across(s, corner, s->mid[i]), s->middle, s->centre[side]};
+            add_outer_vertices(w, s, side, i, false);
+            add_quad(w, inner, 0);
         }
     pal_edit_end_cell(w, s->cell);
 }
 
-/* a cell that stays, with the parts of its faces and edges that are cut */
-static void put_neighbour(pal_edit_work *w, const adaptive *s, int32_t cell)
+/* a cell that is not divided, with the parts of its faces and edges that are cut */
+static void add_neighbour(pal_edit_work *w, const division *s, int32_t cell)
 {
     const pal_cells *c = w->from;
     for (int32_t f = c->cell_use[cell]; f < c->cell_use[cell + 1]; f++) {
         int32_t centre = s->face[c->face_use[f].face], side = 0;
         if (centre >= 0) {
             while (s->centre[side] != centre) side++;
-            for (int32_t i = s->start[side]; i < s->start[side + 1]; i++) put_outer(w, s, side, i, true);
+            for (int32_t i = s->start[side]; i < s->start[side + 1]; i++) add_outer_vertices(w, s, side, i, true);
             continue;
         }
         for (int32_t u = c->face_use[f].first_use; u < c->face_use[f + 1].first_use; u++) {
@@ -339,7 +341,7 @@ static void put_neighbour(pal_edit_work *w, const adaptive *s, int32_t cell)
     pal_edit_end_cell(w, cell);
 }
 
-static void put_divided(pal_edit_work *w, const adaptive *s)
+static void add_divided(pal_edit_work *w, const division *s)
 {
     const pal_cells *c = w->from;
     const int32_t *vertex = c->cell_vertex.item + c->cell_vertex.start[s->cell];
@@ -347,12 +349,12 @@ static void put_divided(pal_edit_work *w, const adaptive *s)
     while (s->role[vertex[first]] != CORNER) first++;
     for (int32_t i = 0; i < c->n_cell; i++) {
         if (i == s->cell)
-            put_part(w, s, vertex[first]);
+            add_part(w, s, vertex[first]);
         else
-            put_neighbour(w, s, i);
+            add_neighbour(w, s, i);
     }
     for (int32_t i = first + 1; i < s->n_vertex; i++)
-        if (s->role[vertex[i]] == CORNER) put_part(w, s, vertex[i]);
+        if (s->role[vertex[i]] == CORNER) add_part(w, s, vertex[i]);
     for (int32_t e = 0; e < c->n_edge; e++) {
         const int32_t *end = c->edge[e].vertex, mid = s->edge[e];
         pal_edit_tag(w, end[0], mid < 0 ? end[1] : mid, c->edge[e].sharp);
@@ -361,15 +363,16 @@ static void put_divided(pal_edit_work *w, const adaptive *s)
     memcpy(w->to.vertex_sharpness, c->vertex_sharpness, (size_t)c->n_vertex * sizeof *c->vertex_sharpness);
 }
 
-static int32_t count_corners(const adaptive *s)
+static int32_t count_corners(const division *s)
 {
     int32_t n = 0;
     for (int32_t i = 0; i < s->n_vertex; i++) n += s->role[s->order[i]] == CORNER;
     return n;
 }
 
-/* room for the result: a quad in each side and one inside for every use, and what the neighbours' loops get more */
-static pal_err room_for_cut(pal_edit_work *w, const adaptive *s, pal_diagnostic *diag)
+/* space for the result: a quad in each side and one inside for every use, and the extra vertices of the neighbours'
+ * loops */
+static pal_err reserve_division(pal_edit_work *w, const division *s, pal_diagnostic *diag)
 {
     const pal_cells *c = w->from;
     int64_t n_use = s->start[s->n_side], n_more = 0, n_new = 1;
@@ -389,33 +392,33 @@ static pal_err room_for_cut(pal_edit_work *w, const adaptive *s, pal_diagnostic 
 static pal_err divide_one(const pal_cells *from, int32_t cell, pal_cells_edit *out, pal_diagnostic *diag)
 {
     pal_edit_work w = pal_edit_begin(from, "divide cell %d", cell);
-    adaptive s = {0};
+    division s = {0};
     PAL_TRY(pal_edit_check_number(&w, "cell", cell, from->n_cell, diag));
     int32_t n = from->cell_vertex.start[cell + 1] - from->cell_vertex.start[cell];
     if (n > PAL_DIVIDE_CORNERS_MAX)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: it has %d corners, %d is the most", w.what, n,
                                   PAL_DIVIDE_CORNERS_MAX);
-    pal_err err = shell_room(from, cell, &s);
+    pal_err err = division_reserve(from, cell, &s);
     if (!err) {
         find_roles(&s);
         list_sides(&s);
-        err = room_for_cut(&w, &s, diag);
+        err = reserve_division(&w, &s, diag);
     }
     if (!err) {
         for (int32_t v = 0; v < from->n_vertex; v++) {
             pal_interpolation_builder_add(&w.rows, v, 1);
             pal_interpolation_builder_end_row(&w.rows);
         }
-        put_middles(&w, &s);
-        put_divided(&w, &s);
+        add_midpoints(&w, &s);
+        add_divided(&w, &s);
     }
-    shell_free(&s);
+    division_free(&s);
     return pal_edit_finish(&w, err, out, diag);
 }
 
 /* ---- many cells ---- */
 
-/* edit becomes what it does and then next does, both divisions; takes next. Both are freed when it fails */
+/* edit becomes the division `edit` followed by `next`; takes next. Both are freed on failure */
 static pal_err join_edits(pal_cells_edit *edit, pal_cells_edit *next)
 {
     pal_interpolation rows = {0};
@@ -435,9 +438,8 @@ static pal_err join_edits(pal_cells_edit *edit, pal_cells_edit *next)
 static pal_err check_list(const pal_cells *from, int32_t n, const int32_t *cell, bool *listed, pal_diagnostic *diag)
 {
     pal_edit_work w = pal_edit_begin(from, "divide");
-    int32_t most = from->n_cell < PAL_DIVIDE_CELLS_MAX ? from->n_cell : PAL_DIVIDE_CELLS_MAX;
-    if (n < 1 || n > most)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "divide: %d cells, must be 1 to %d", n, most);
+    int32_t max = from->n_cell < PAL_DIVIDE_CELLS_MAX ? from->n_cell : PAL_DIVIDE_CELLS_MAX;
+    if (n < 1 || n > max) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "divide: %d cells, must be 1 to %d", n, max);
     for (int32_t i = 0; i < n; i++) {
         PAL_TRY(pal_edit_check_number(&w, "cell", cell[i], from->n_cell, diag));
         if (listed[cell[i]])
@@ -456,7 +458,7 @@ pal_err pal_cells_divide(const pal_cells *from, int32_t n, const int32_t *cell, 
     pal_err err = listed ? check_list(from, n, cell, listed, diag) : PAL_ERR_MEMORY;
     free(listed);
     if (!err) err = divide_one(from, cell[0], &edit, diag);
-    /* the cells that are still to come keep their numbers */
+    /* the cells that are still to be divided keep their numbers */
     for (int32_t i = 1; i < n && !err; i++) {
         err = divide_one(&edit.cells, cell[i], &next, diag);
         if (err)

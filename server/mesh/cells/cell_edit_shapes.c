@@ -1,4 +1,4 @@
-/* Edits of control cells that make new ones or join old ones (A 4.1, Fig. 7): extrude, merge, bridge. */
+/* Edits of control cells that add or join cells (paper A section 4.1, Fig. 7): extrude, merge, bridge. */
 #include "server/base/vec3.h"
 #include "server/mesh/cells/cell_edit_work.h"
 
@@ -7,7 +7,7 @@
 #include <string.h>
 
 /* rows of the old vertices, each itself */
-static void put_own_rows(pal_edit_work *w)
+static void add_identity_rows(pal_edit_work *w)
 {
     for (int32_t v = 0; v < w->from->n_vertex; v++) {
         pal_interpolation_builder_add(&w->rows, v, 1);
@@ -24,9 +24,9 @@ static pal_err check_boundary_face(const pal_edit_work *w, int32_t face, pal_dia
                               w->from->face_use[w->from->face[face].use[1]].cell);
 }
 
-/* A prism on n corners: base runs as the boundary face it stands on, tip [n] as the base, side by side. Its loops: base
- * turned over, tip, sides. */
-static void put_prism(pal_edit_work *w, int32_t n, const int32_t *base, const int32_t *tip, int32_t cell_from)
+/* A prism on n corners: base runs as the boundary face it stands on, tip [n] as the base. Its loops: base reversed,
+ * tip, sides. */
+static void add_prism(pal_edit_work *w, int32_t n, const int32_t *base, const int32_t *tip, int32_t cell_from)
 {
     for (int32_t k = n - 1; k >= 0; k--) pal_edit_corner(w, base[k]);
     pal_edit_end_loop(w, 0);
@@ -44,7 +44,7 @@ static void put_prism(pal_edit_work *w, int32_t n, const int32_t *base, const in
 }
 
 /* room for one prism of n corners and more vertices */
-static pal_err room_for_prism(pal_edit_work *w, int32_t n, int32_t more, pal_diagnostic *diag)
+static pal_err reserve_prism(pal_edit_work *w, int32_t n, int32_t more, pal_diagnostic *diag)
 {
     const pal_cells *c = w->from;
     return pal_edit_reserve(w, (int64_t)c->n_vertex + more, (int64_t)c->n_cell + 1, (int64_t)c->n_face_use + n + 2,
@@ -60,7 +60,7 @@ static int32_t list_corners(const pal_cells *c, int32_t face, int32_t corner[PAL
 
 /* ---- extrude ---- */
 
-static void put_extruded(pal_edit_work *w, int32_t face, double distance_m, double scale)
+static void add_extruded(pal_edit_work *w, int32_t face, double distance_m, double scale)
 {
     const pal_cells *c = w->from;
     int32_t base[PAL_CELL_LOOP_MAX], tip[PAL_CELL_LOOP_MAX], n = list_corners(c, face, base);
@@ -68,7 +68,7 @@ static void put_extruded(pal_edit_work *w, int32_t face, double distance_m, doub
     pal_cells_face_centre(c, NULL, face, centre);
     pal_cells_face_area(c, NULL, face, along);
     pal_scale3(out, distance_m / pal_norm3(along), along);
-    put_own_rows(w);
+    add_identity_rows(w);
     for (int32_t k = 0; k < n; k++) {
         tip[k] = c->n_vertex + k;
         double *to = w->offset + 3 * (size_t)tip[k];
@@ -81,7 +81,7 @@ static void put_extruded(pal_edit_work *w, int32_t face, double distance_m, doub
     pal_edit_copy_old(w, NULL);
     w->first_new = c->n_cell, w->rotated_face = face;
     w->face_loop = c->n_face_use + 1;
-    put_prism(w, n, base, tip, c->face_use[c->face[face].use[0]].cell);
+    add_prism(w, n, base, tip, c->face_use[c->face[face].use[0]].cell);
 }
 
 pal_err pal_cells_extrude(const pal_cells *from, int32_t face, double distance_m, double scale, pal_cells_edit *out,
@@ -98,14 +98,15 @@ pal_err pal_cells_extrude(const pal_cells *from, int32_t face, double distance_m
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: scale is %g, must be above 0 and at most %g", w.what,
                                   scale, PAL_EXTRUDE_SCALE_MAX);
     int32_t n = pal_cells_face_loop(from, face, &first);
-    pal_err err = room_for_prism(&w, n, n, diag);
-    if (!err) put_extruded(&w, face, distance_m, scale);
+    pal_err err = reserve_prism(&w, n, n, diag);
+    if (!err) add_extruded(&w, face, distance_m, scale);
     return pal_edit_finish(&w, err, out, diag);
 }
 
 /* ---- merge, bridge ---- */
 
-/* Corners of two faces: b[k] goes with a[k]. The loops run opposite ways, of the n turns the nearest is taken. */
+/* Corners of two faces: b[k] is paired with a[k]. The loops run opposite ways; of the n cyclic shifts the nearest is
+ * taken. */
 typedef struct pairs {
     int32_t n, a[PAL_CELL_LOOP_MAX], b[PAL_CELL_LOOP_MAX];
 } pairs;
@@ -160,8 +161,8 @@ static pal_err check_apart(const pal_edit_work *w, const pairs *p, pal_diagnosti
     return PAL_ERR_OK;
 }
 
-/* each pair gets the place of its lower number, later ones move up */
-static void put_merged(pal_edit_work *w, const pairs *p)
+/* each pair takes the lower number, later ones move up */
+static void add_merged(pal_edit_work *w, const pairs *p)
 {
     const pal_cells *c = w->from;
     int32_t *map = w->map, n = 0;
@@ -195,7 +196,7 @@ pal_err pal_cells_merge(const pal_cells *from, int32_t face, int32_t other_face,
     PAL_TRY(check_apart(&w, &p, diag));
     pal_err err = pal_edit_reserve(&w, from->n_vertex - p.n, from->n_cell, from->n_face_use, from->n_edge_use, diag);
     if (!err) {
-        put_merged(&w, &p);
+        add_merged(&w, &p);
         w.face_loop = from->face[face].use[0];
     }
     return pal_edit_finish(&w, err, out, diag);
@@ -208,12 +209,12 @@ pal_err pal_cells_bridge(const pal_cells *from, int32_t face, int32_t other_face
     pairs p;
     memset(out, 0, sizeof *out);
     PAL_TRY(find_pairs(&w, face, other_face, &p, diag));
-    pal_err err = room_for_prism(&w, p.n, 0, diag);
+    pal_err err = reserve_prism(&w, p.n, 0, diag);
     if (!err) {
-        put_own_rows(&w);
+        add_identity_rows(&w);
         pal_edit_copy_old(&w, NULL);
         w.first_new = from->n_cell;
-        put_prism(&w, p.n, p.a, p.b, from->face_use[from->face[face].use[0]].cell);
+        add_prism(&w, p.n, p.a, p.b, from->face_use[from->face[face].use[0]].cell);
     }
     return pal_edit_finish(&w, err, out, diag);
 }

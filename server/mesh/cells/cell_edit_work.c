@@ -130,7 +130,7 @@ static void use_centre(const pal_cells *c, const double *x, int32_t face_use, do
 
 bool pal_edit_star_shaped(const pal_cells *c, const double *x, int32_t cell)
 {
-    double mean[3], o[3] = {0}, volume = 0, most = 0, centre[3];
+    double mean[3], o[3] = {0}, volume = 0, max = 0, centre[3];
     pal_cells_cell_centre(c, x, cell, mean);
     pal_copy3(o, mean);
     /* first from the vertices' mean, to find the centroid, then from that */
@@ -142,8 +142,8 @@ bool pal_edit_star_shaped(const pal_cells *c, const double *x, int32_t cell)
                 const double *p = x + 3 * (size_t)c->edge_use[u].vertex;
                 const double *q = x + 3 * (size_t)c->edge_use[pal_cells_next(c, u)].vertex;
                 double v = wedge(o, centre, p, q);
-                if (pass && !(v > MIN_SHAPE * most * most * most)) return false;
-                most = fmax(most, 2 * pal_dist3(p, mean));
+                if (pass && !(v > MIN_SHAPE * max * max * max)) return false;
+                max = fmax(max, 2 * pal_dist3(p, mean));
                 volume += pass ? 0 : v;
                 for (int a = 0; a < 3; a++) sum[a] += v * (p[a] + q[a] + centre[a] - 3 * o[a]) / 4;
             }

@@ -1,5 +1,5 @@
-/* Private to the mesh room: an edit as it is made. Loops are written cell by cell, corner by corner, into room taken
- * before; rows are added through rows; finish makes the complex and judges it. Thread: [load]. */
+/* Private to the mesh room: an edit in the making. Loops are written cell by cell, corner by corner, into space
+ * reserved before; vertices are defined through rows; finish makes the complex and checks it. Thread: [load]. */
 #ifndef PAL_MESH_CELLS_CELL_EDIT_WORK_H
 #define PAL_MESH_CELLS_CELL_EDIT_WORK_H
 #include "server/mesh/cells/cell_edits.h"
@@ -7,22 +7,22 @@
 typedef struct pal_edit_work {
     const pal_cells *from;
     char what[64];                  /* "divide cell 7", for messages                               */
-    pal_cell_loops to;              /* x is set in the end, by rows and offset                     */
+    pal_cell_loops to;              /* x is set by finish, from rows and offset */
     int32_t n_loop, n_corner;       /* written so far */
     pal_interpolation_builder rows; /* of the new vertices, in order                               */
     double *offset;                 /* m                                             [n_vertex][3] */
     int32_t *cell_from;             /*                                                    [n_cell] */
     int32_t *map;                   /* scratch                                [old n_vertex] */
     int32_t first_new;              /* cells from here on have no old shape                        */
-    int32_t face_loop;              /* loop of the face to go on with; -1: none                    */
+    int32_t face_loop;              /* loop of the face to continue with; -1: none */
     int32_t rotated_face;           /* as in pal_cells_edit                                        */
 } pal_edit_work;
 
-/* a work without memory */
+/* an edit without memory */
 pal_edit_work pal_edit_begin(const pal_cells *from, const char *format, ...) __attribute__((format(printf, 2, 3)));
-/* rows, offset and cell_from for so many new vertices and cells; MEMORY */
+/* rows, offset and cell_from for n new vertices and cells; MEMORY */
 pal_err pal_edit_reserve_rows(pal_edit_work *w, int32_t n_vertex, int32_t n_cell);
-/* the same and arrays for at most so many loops and corners, none written yet; REFUSED when too many, MEMORY */
+/* the same and arrays for at most these numbers of loops and corners; REFUSED when too many, MEMORY */
 pal_err pal_edit_reserve(pal_edit_work *w, int64_t n_vertex, int64_t n_cell, int64_t n_loop, int64_t n_corner,
                          pal_diagnostic *diag);
 
@@ -30,10 +30,10 @@ void pal_edit_corner(pal_edit_work *w, int32_t vertex);
 void pal_edit_end_loop(pal_edit_work *w, float sharp); /* sharpness of the face */
 void pal_edit_end_cell(pal_edit_work *w, int32_t cell_from);
 void pal_edit_tag(pal_edit_work *w, int32_t a, int32_t b, float sharp); /* of an edge */
-/* writes all old cells, then tags of the edges, by the new number map [n_vertex] of each vertex (NULL: its own) */
+/* writes all old cells, then tags of the edges, with vertices renumbered by map [n_vertex] (NULL: unchanged) */
 void pal_edit_copy_old(pal_edit_work *w, const int32_t *map);
 
-/* makes the result of a work that stands at err so far, and frees the work in any case */
+/* makes the result unless err is set, and frees the work in any case */
 pal_err pal_edit_finish(pal_edit_work *w, pal_err err, pal_cells_edit *out, pal_diagnostic *diag);
 
 /* "WHAT N, there are M" where it is out of range */

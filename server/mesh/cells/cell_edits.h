@@ -1,14 +1,14 @@
-/* Sculpting edits of control cells (A 4.1, Fig. 7; McDonnell, Qin, Wlodarczyk 2001): delete, extrude, merge, bridge,
- * divide, sharpen, move. An edit never changes what it is given: it makes a new complex, or refuses. Keeping the old
- * complex is how it is undone.
+/* Sculpting edits of control cells (paper A section 4.1, Fig. 7; McDonnell, Qin, Wlodarczyk 2001): delete, extrude,
+ * merge, bridge, divide, sharpen, move. An edit never changes its input: it makes a new complex, or refuses. Undo keeps
+ * the old complex.
  *
- * Positions are rest positions, m. A deformed state is carried over by the edit's rows: velocities by the rows alone,
- * positions by pal_cells_edit_positions.
+ * Positions are rest positions, m. A deformed state is transferred by the interpolation of the edit: velocities by its
+ * rows alone, positions by pal_cells_edit_positions.
  *
- * Numbers after an edit: old vertices and cells keep theirs, new ones come after them; where some go, those after move
- * up. Edges and faces are numbered anew. Sharpness stays with what had it, halves and parts of a divided edge or face
- * have that of the whole, all that is new is smooth.
- * Whether a new part runs into a far part of the solid is not looked at. Thread: [load]. */
+ * Numbers after an edit: old vertices and cells keep theirs, new ones follow them; where some are removed, later ones
+ * move up. Edges and faces are numbered again. Sharpness stays with its vertex, edge or face; parts of a divided edge
+ * or face inherit it; all new features are smooth. Collisions of a new part with distant parts of the solid are not
+ * checked. Thread: [load]. */
 #ifndef PAL_MESH_CELLS_CELL_EDITS_H
 #define PAL_MESH_CELLS_CELL_EDITS_H
 #include "server/mesh/cells/cells.h"
@@ -17,7 +17,7 @@
 #define PAL_EXTRUDE_SCALE_MAX 1000.0
 enum { PAL_DIVIDE_CORNERS_MAX = 1024, PAL_DIVIDE_RINGS_MAX = 1000, PAL_DIVIDE_CELLS_MAX = 512 };
 
-/* name of each kind and the numbers it reads */
+/* name of each kind and the numbers that it reads */
 #define PAL_CELLS_COMMAND_TABLE(X)                                                                                     \
     X(DELETE, "delete")                 /* cell                      */                                                \
     X(EXTRUDE, "extrude")               /* face, distance_m, scale   */                                                \
@@ -36,7 +36,7 @@ typedef enum pal_cells_command_kind {
         PAL_CELLS_COMMAND_KINDS
 } pal_cells_command_kind;
 
-/* an edit as plain numbers: what a file, a log or a message keeps; numbers its kind does not read are not looked at */
+/* an edit as plain numbers, for files, logs and messages; numbers that its kind does not read are ignored */
 typedef struct pal_cells_command {
     pal_cells_command_kind kind;
     int32_t cell, face, other_face, edge, vertex, rings;
@@ -47,62 +47,65 @@ typedef struct pal_cells_command {
 
 typedef struct pal_cells_edit {
     pal_cells cells;
-    pal_interpolation rows; /* where each new vertex comes from: itself, the base it was extruded from, the mean of what
-                             * was merged or divided                       [cells.n_vertex rows of the old vertices] */
-    double *offset;         /* new rest position less rows times the old ones, m                 [cells.n_vertex][3] */
-    int32_t *cell_from;     /* old cell that each cell is, is part of or grew from                    [cells.n_cell] */
-    int32_t face;           /* to go on with: the outer face of an extrusion, the joined one of a merge; else -1 */
-    int32_t rotated_face;   /* old face with which an extrusion's offsets turn; -1: they do not turn             */
+    pal_interpolation
+        rows; /* each new vertex from the old ones: itself, the base it was extruded from, the mean of what was merged
+                 or divided                       [cells.n_vertex rows of the old vertices] */
+    double *offset; /* new rest position minus the interpolated one, m                           [cells.n_vertex][3] */
+    int32_t *cell_from;   /* old cell that each cell is, is part of or grew from                    [cells.n_cell] */
+    int32_t face;         /* where to continue: the outer face of an extrusion, the joined one of a merge; else -1 */
+    int32_t rotated_face; /* old face whose rotation the offsets of an extrusion follow; -1: none */
 } pal_cells_edit;
 
-/* All edits. REFUSED with one sentence that names the kind and the number: an item out of range, a number that is NaN
- * or out of range, a result that is no complex (pal_cells_make), a face without area, a cell without volume, or folded:
- * a cell that was, or is, one whose faces can all be seen from its centroid must stay, or be, one. MEMORY. Then *from
- * is as it was and *out zero. */
+/* All edits. REFUSED with one sentence that names the kind and the number: a number that is out of range or NaN, a
+ * result that is no complex (pal_cells_make), a face without area, a cell without volume, or a fold: a cell whose faces
+ * can all be seen from its centroid must remain one, and a new cell must be one. MEMORY. After an error *from is
+ * unchanged and *out zero. */
 
-/* Takes a cell away. Refused for the last one. Pieces that hang in an edge or vertex, or not at all, may remain. */
+/* Removes a cell. Refused for the last one. Pieces that are joined by an edge or vertex only, or not at all, may
+ * remain. */
 pal_err pal_cells_delete(const pal_cells *from, int32_t cell, pal_cells_edit *out, pal_diagnostic *diag);
-/* A new cell on a boundary face, as far out along the face's vector area; its outer face is the face scaled about its
- * corners' mean. distance_m above 0, scale above 0 up to PAL_EXTRUDE_SCALE_MAX. */
+/* Adds a cell on a boundary face, along the vector area of the face; its outer face is the face scaled about the mean
+ * of its corners. distance_m above 0, scale above 0 up to PAL_EXTRUDE_SCALE_MAX. */
 pal_err pal_cells_extrude(const pal_cells *from, int32_t face, double distance_m, double scale, pal_cells_edit *out,
                           pal_diagnostic *diag);
-/* Makes two boundary faces one inner face, corners at the means of pairs. The faces have equally many corners, none in
- * common, and no edge between; corners are paired as the loops run, so that squared distances sum least. */
+/* Joins two boundary faces to one inner face, corners at the means of pairs. The faces have equally many corners, none
+ * in common, and no edge between them; corners are paired in loop order so that the sum of squared distances is
+ * smallest. */
 pal_err pal_cells_merge(const pal_cells *from, int32_t face, int32_t other_face, pal_cells_edit *out,
                         pal_diagnostic *diag);
-/* The same pairs, but nothing moves and a new cell, a prism, goes between; it fills a hollow that it fits. */
+/* The same pairs, but nothing moves and a new cell, a prism, fills the space between. */
 pal_err pal_cells_bridge(const pal_cells *from, int32_t face, int32_t other_face, pal_cells_edit *out,
                          pal_diagnostic *diag);
-/* Cuts each of n cells as a level of subdivision would, into one for each of its corners, where it lies: nothing moves.
- * The first part keeps the cell's number. Neighbours are not cut, their faces and edges are: they become polyhedra of
- * more corners. What is in the middle of an edge or face already because a neighbour was divided is used, so that the
- * order does not matter but for numbers, and dividing all cells is a level of subdivision. Keeps the volume where faces
- * are flat. Subdivided, cells that have a vertex in the middle of a bent edge may become turned elements (least det J
- * below 0): a solid is to be asked for that before it is taken. Refused for a cell of more than
- * PAL_DIVIDE_CORNERS_MAX corners, the same cell twice, more than PAL_DIVIDE_CELLS_MAX cells (each takes time linear
- * in the size of all). */
+/* Cuts each of n cells in place as a level of subdivision would, into one for each of its corners; nothing moves. The
+ * first part keeps the number of the cell. Neighbours are not cut, but their faces and edges are: they become polyhedra
+ * of more corners. Vertices that a divided neighbour has already put on an edge or face are reused, so that the order
+ * affects numbers only, and dividing all cells is a level of subdivision. Keeps the volume where faces are flat. After
+ * subdivision, cells with a vertex in the middle of a bent edge may give inverted elements (det J below 0), so the
+ * caller must check the solid. Refused for a cell of more than PAL_DIVIDE_CORNERS_MAX corners, the same cell twice,
+ * more than PAL_DIVIDE_CELLS_MAX cells (each takes time linear in the size of all). */
 pal_err pal_cells_divide(const pal_cells *from, int32_t n, const int32_t *cell, pal_cells_edit *out,
                          pal_diagnostic *diag);
-/* the same for a cell and those round it that it has a vertex in common with, and again, rings times */
+/* the same for a cell and those that share a vertex with it, repeated `rings` times */
 pal_err pal_cells_divide_near(const pal_cells *from, int32_t cell, int32_t rings, pal_cells_edit *out,
                               pal_diagnostic *diag);
 /* Sets a sharpness (kind PAL_CELLS_SHARPEN_*), 0 to PAL_SHARPNESS_MAX; nothing else changes. */
 pal_err pal_cells_sharpen(const pal_cells *from, pal_cells_command_kind kind, int32_t item, float sharp,
                           pal_cells_edit *out, pal_diagnostic *diag);
 /* Sets the rest positions x [n][3] of vertices [n], each at most once. To take a deformed shape as the rest shape,
- * carry x by the rows alone. */
+ * transfer x by the interpolation alone. */
 pal_err pal_cells_move(const pal_cells *from, int32_t n, const int32_t *vertex, const double *x, pal_cells_edit *out,
                        pal_diagnostic *diag);
 
-/* one of the above; a kind that is none is REFUSED */
+/* dispatches a command to one of the above; an unknown kind is REFUSED */
 pal_err pal_cells_apply(const pal_cells *from, const pal_cells_command *command, pal_cells_edit *out,
                         pal_diagnostic *diag);
 /* name of a kind; NULL: none. And back: PAL_CELLS_COMMAND_KINDS: no such name */
 const char *pal_cells_command_name(pal_cells_command_kind kind);
 pal_cells_command_kind pal_cells_command_find(const char *name);
 
-/* Positions of the new vertices, to [cells.n_vertex][3], from those of the old ones, x [n of from][3], apart: rows x +
- * offset, offsets of an extrusion turned as its face is turned against its rest. */
+/* Positions to [cells.n_vertex][3] of the new vertices from positions x [n of from][3] of the old ones, which do not
+ * overlap: interpolation of x + offset, offsets of an extrusion rotated as its face is rotated against its rest shape.
+ */
 void pal_cells_edit_positions(const pal_cells_edit *edit, const pal_cells *from, const double *x, double *to);
 /* frees the arrays and zeroes the struct; a zeroed struct is fine */
 void pal_cells_edit_free(pal_cells_edit *edit);

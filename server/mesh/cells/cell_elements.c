@@ -1,13 +1,13 @@
-/* Choice of finite elements by walking the radial-edge structure (A 3.4.4, Fig. 6).
+/* Choice of finite elements by walking the radial-edge structure (paper A section 3.4.4, Fig. 6).
  *
- * A hexahedron is held by one edge use h: from the origin along u; turn of h runs along w, turn of that along v
- * (counter- clockwise seen from outside, and three turns come round). A step to the cell across a face carries h along,
- * so that the axes of the 27 cells of a regular neighbourhood run alike. The eight cells that meet the own one in a
- * corner only have two vertices along each axis, and together exactly the 64.
+ * A hexahedron is represented by one edge use h from the origin along u; the next edge use around the origin runs along
+ * w, the one after along v (counter-clockwise seen from outside; three steps return to h). A step to the cell across a
+ * face transfers h, so that the axes of the 27 cells of a regular neighbourhood agree. The eight cells that touch the
+ * cell in a corner only have two vertices along each axis, and together exactly the 64.
  *
- * Errata: A12, 56 other vertices, not 58. A13: a vertex is regular with 8 cells and 6 edges, both, and an edge of the
- * cell with 4 cells. With that the 26 neighbours are those of a lattice; that they are hexahedra is asked of the cells
- * at the eight corners. Departure: the 64 nodes must differ, which three cells in a ring do not give. */
+ * Errata: A12, 56 other vertices, not 58. A13: a vertex is regular with 8 cells and 6 edges, and an edge of the cell
+ * with 4 cells. With that the 26 neighbours are those of a lattice; that they are hexahedra is checked for the cells at
+ * the eight corners. Departure: the 64 nodes must differ, which excludes three cells in a ring. */
 #include "server/mesh/cells/cell_elements.h"
 
 #include <stdlib.h>
@@ -17,19 +17,19 @@
 
 enum { U, V, W };
 
-static int32_t turn2(const pal_cells *c, int32_t h)
+static int32_t next_twice(const pal_cells *c, int32_t h)
 {
     return pal_cells_next_around(c, pal_cells_next_around(c, h));
 }
 
-/* the same cell with the axes changed round, so that the given one comes first */
+/* the same cell with the axes permuted cyclically, so that the given one comes first */
 static int32_t first_axis(const pal_cells *c, int32_t h, int axis)
 {
-    return axis == U ? h : axis == W ? pal_cells_next_around(c, h) : turn2(c, h);
+    return axis == U ? h : axis == W ? pal_cells_next_around(c, h) : next_twice(c, h);
 }
 static int32_t back_axis(const pal_cells *c, int32_t h, int axis)
 {
-    return axis == U ? h : axis == W ? turn2(c, h) : pal_cells_next_around(c, h);
+    return axis == U ? h : axis == W ? next_twice(c, h) : pal_cells_next_around(c, h);
 }
 
 /* the cell across the face at the far (ahead) or near end of an axis */
@@ -39,7 +39,7 @@ static int32_t step(const pal_cells *c, int32_t h, int axis, bool ahead)
     if (ahead) {
         /* the far face runs from uw to u, its mate from the next origin along w */
         int32_t far = c->edge_use[pal_cells_next(c, h)].radial;
-        h = turn2(c, c->edge_use[far].mate);
+        h = next_twice(c, c->edge_use[far].mate);
     } else {
         int32_t far = c->edge_use[pal_cells_next_around(c, h)].mate;
         h = pal_cells_prev(c, c->edge_use[far].radial);
@@ -64,9 +64,9 @@ static void corners(const pal_cells *c, int32_t h, int32_t out[8])
     out[2] = c->edge_use[pal_cells_next(c, use)].vertex;
 }
 
-/* ---- what kind ---- */
+/* ---- the kind of a cell ---- */
 
-/* six quads, and three of them at every vertex: a cube but for its shape */
+/* six quads, three at every vertex: combinatorially a cube */
 static bool is_hex(const pal_cells *c, int32_t cell)
 {
     if (c->cell_use[cell + 1] - c->cell_use[cell] != 6) return false;
@@ -74,7 +74,7 @@ static bool is_hex(const pal_cells *c, int32_t cell)
         if (c->face_use[u + 1].first_use - c->face_use[u].first_use != 4) return false;
     for (int32_t k = c->cell_vertex.start[cell]; k < c->cell_vertex.start[cell + 1]; k++) {
         int32_t h = c->corner_use[k];
-        if (pal_cells_next_around(c, turn2(c, h)) != h) return false;
+        if (pal_cells_next_around(c, next_twice(c, h)) != h) return false;
     }
     return true;
 }
@@ -102,7 +102,7 @@ static bool is_cubic(const pal_cells *c, const bool *hex, int32_t cell)
     return true;
 }
 
-/* the 64 nodes of a cell in a regular neighbourhood; false: some are the same. stamp [n_vertex] is below mark */
+/* the 64 nodes of a cell in a regular neighbourhood; false: some coincide. stamp [n_vertex] is below mark */
 static bool label_nodes(const pal_cells *c, int32_t cell, int32_t *stamp, int32_t mark, int32_t node[64])
 {
     const int32_t own = c->corner_use[c->cell_vertex.start[cell]];
@@ -151,7 +151,7 @@ static void add_pyramids(const pal_cells *c, int32_t cell, pal_cell_elements *e)
 }
 
 /* mean of the vertices of each cell that has a virtual node */
-static pal_err place_virtual(const pal_cells *c, pal_cell_elements *e)
+static pal_err add_virtual_node(const pal_cells *c, pal_cell_elements *e)
 {
     const pal_cell_rows *r = &c->cell_vertex;
     pal_interpolation_builder b;
@@ -165,15 +165,15 @@ static pal_err place_virtual(const pal_cells *c, pal_cell_elements *e)
 }
 
 /* room for n elements of a kind */
-static pal_err take(pal_cell_elements *e, pal_cell_kind kind, int32_t n)
+static pal_err allocate(pal_cell_elements *e, pal_cell_kind kind, int32_t n)
 {
     e->node[kind] = malloc((size_t)n * (size_t)pal_cell_kind_nodes(kind) * sizeof *e->node[kind] + 1);
     e->cell[kind] = malloc((size_t)n * sizeof *e->cell[kind] + 1);
     return e->node[kind] && e->cell[kind] ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-/* room for as many of each as there can be, a pyramid for each face of the cells that are no hexahedra */
-static pal_err take_room(const pal_cells *c, const bool *hex, pal_cell_elements *e, pal_diagnostic *diag)
+/* space for the largest possible number of each kind, a pyramid for each face of the cells that are no hexahedra */
+static pal_err allocate_all(const pal_cells *c, const bool *hex, pal_cell_elements *e, pal_diagnostic *diag)
 {
     int32_t n_hex = 0, n_cubic = 0, n_pyramid = 0;
     for (int32_t i = 0; i < c->n_cell; i++) {
@@ -181,9 +181,9 @@ static pal_err take_room(const pal_cells *c, const bool *hex, pal_cell_elements 
         n_hex += hex[i], n_cubic += is_cubic(c, hex, i);
         n_pyramid += hex[i] ? 0 : c->cell_use[i + 1] - c->cell_use[i];
     }
-    PAL_TRY(take(e, PAL_CELL_CUBIC, n_cubic));
-    PAL_TRY(take(e, PAL_CELL_HEX, n_hex));
-    PAL_TRY(take(e, PAL_CELL_PYRAMID, n_pyramid));
+    PAL_TRY(allocate(e, PAL_CELL_CUBIC, n_cubic));
+    PAL_TRY(allocate(e, PAL_CELL_HEX, n_hex));
+    PAL_TRY(allocate(e, PAL_CELL_PYRAMID, n_pyramid));
     e->virtual_cell = malloc((size_t)(c->n_cell - n_hex) * sizeof *e->virtual_cell + 1);
     return e->virtual_cell ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
@@ -213,10 +213,10 @@ pal_err pal_cell_elements_make(const pal_cells *cells, pal_cell_elements *out, p
     int32_t *stamp = calloc((size_t)cells->n_vertex + 1, sizeof *stamp);
     pal_err err = hex && stamp ? PAL_ERR_OK : PAL_ERR_MEMORY;
     for (int32_t i = 0; i < cells->n_cell && !err; i++) hex[i] = is_hex(cells, i);
-    if (!err) err = take_room(cells, hex, &e, diag);
+    if (!err) err = allocate_all(cells, hex, &e, diag);
     if (!err) {
         fill(cells, hex, stamp, &e);
-        err = place_virtual(cells, &e);
+        err = add_virtual_node(cells, &e);
     }
     free(hex);
     free(stamp);

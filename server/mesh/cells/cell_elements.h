@@ -1,6 +1,6 @@
-/* Which finite element each cell of a subdivided solid gets, and its nodes (A 3.4).
+/* Finite elements of a subdivision solid and their nodes (paper A section 3.4).
  *
- *   cubic    64 nodes, uniform tricubic B-spline (A 3.4.1, 3.4.4): a hexahedron away from the boundary in a regular
+ *   cubic    64 nodes, uniform tricubic B-spline (3.4.1, 3.4.4): a hexahedron away from the boundary in a regular
  *            neighbourhood. Node m = 16 j + 4 k + l has the shape function B_j(u) B_k(v) B_l(w); the cell's own corners
  *            have j, k, l in {1, 2}.
  *   hex      8 nodes, trilinear (3.4.2): all other hexahedra. Corner c at bits 0, 1, 2 for u, v, w, as in
@@ -36,7 +36,7 @@ pal_err pal_cell_elements_make(const pal_cells *cells, pal_cell_elements *out, p
 /* frees the arrays and zeroes the struct; a zeroed struct is fine */
 void pal_cell_elements_free(pal_cell_elements *e);
 
-/* rows of all nodes, virtual ones last, from the rows of the vertices (pal_subdivision's A); MEMORY */
+/* interpolation of all nodes, virtual ones last, from that of the vertices (matrix A of pal_subdivision); MEMORY */
 pal_err pal_cell_elements_interpolation(const pal_cell_elements *e, const pal_interpolation *vertices,
                                         pal_interpolation *out);
 
@@ -44,7 +44,7 @@ static inline int pal_cell_kind_nodes(pal_cell_kind kind)
 {
     return kind == PAL_CELL_CUBIC ? PAL_CUBIC_NODES : kind == PAL_CELL_HEX ? 8 : PAL_PYRAMID_NODES;
 }
-/* all elements, #FE of Table 1 */
+/* all elements, #FE of Table 1 of paper A */
 static inline int32_t pal_cell_elements_count(const pal_cell_elements *e)
 {
     return e->n[PAL_CELL_CUBIC] + e->n[PAL_CELL_HEX] + e->n[PAL_CELL_PYRAMID];

@@ -1,4 +1,5 @@
-/* Cells in and out of files: which format it is, our own text, and what both share. The format is in cell_file.h. */
+/* Cells in files: choice of the format, the palcells text format, and code that both formats share. The format is
+ * specified in cell_file.h. */
 #include "server/mesh/cells/cell_file.h"
 
 #include "server/mesh/cells/cell_reader.h"
@@ -7,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define MOST_BYTES ((size_t)256 << 20)
-#define MOST_ITEMS ((size_t)1 << 29)
+#define MAX_BYTES ((size_t)256 << 20)
+#define MAX_ITEMS ((size_t)1 << 29)
 
 /* ---- growing arrays ---- */
 
@@ -24,9 +25,9 @@ pal_err pal_cell_reader_refuse(const pal_cell_reader *reader, const char *format
 pal_err pal_cell_reader_grow(const pal_cell_reader *reader, void **array, size_t n, size_t *cap, size_t size)
 {
     if (n < *cap) return PAL_ERR_OK;
-    if (n >= MOST_ITEMS)
+    if (n >= MAX_ITEMS)
         return pal_diagnostic_set(reader->diag, PAL_ERR_BUDGET, "%s: line %lld: more than %zu items", reader->name,
-                                  (long long)reader->scan.line, MOST_ITEMS);
+                                  (long long)reader->scan.line, MAX_ITEMS);
     size_t more = *cap ? 2 * *cap : 16;
     void *bigger = realloc(*array, more * size);
     if (!bigger)
@@ -50,7 +51,7 @@ pal_err pal_cell_reader_vertex(pal_cell_reader *reader, const double x[3])
     return PAL_ERR_OK;
 }
 
-/* starts keep one more place than they use, for the end */
+/* starts reserve one entry more than they use, for the end */
 pal_err pal_cell_reader_cell(pal_cell_reader *reader)
 {
     pal_cell_reader *r = reader;
@@ -77,7 +78,7 @@ pal_err pal_cell_reader_corner(pal_cell_reader *reader, int32_t vertex)
     return PAL_ERR_OK;
 }
 
-/* ---- our own text ---- */
+/* ---- palcells ---- */
 
 static pal_err end_line(pal_cell_reader *r)
 {
@@ -97,14 +98,14 @@ static pal_err read_vertex(pal_cell_reader *r)
 }
 
 /* a number from 1 to most, as one from 0 */
-static pal_err read_number(pal_cell_reader *r, const char *what, int64_t most, int32_t *out)
+static pal_err read_number(pal_cell_reader *r, const char *what, int64_t max, int32_t *out)
 {
     int64_t i;
     if (!pal_text_int(&r->scan, &i))
         return pal_cell_reader_refuse(r, "%s must be a number, found %s", what, pal_text_excerpt_at(&r->scan).text);
-    if (i < 1 || i > most)
+    if (i < 1 || i > max)
         return pal_cell_reader_refuse(r, "%s %lld, there are %lld before this line", what, (long long)i,
-                                      (long long)most);
+                                      (long long)max);
     *out = (int32_t)(i - 1);
     return PAL_ERR_OK;
 }
@@ -193,7 +194,7 @@ static pal_err read_line(pal_cell_reader *r, size_t *cap_sharp)
                                   pal_text_excerpt_at(scan).text);
 }
 
-static pal_err read_ours(pal_cell_reader *r)
+static pal_err read_palcells(pal_cell_reader *r)
 {
     size_t cap_sharp = 0;
     int64_t version;
@@ -213,15 +214,15 @@ static pal_err read_ours(pal_cell_reader *r)
     return PAL_ERR_OK;
 }
 
-/* ---- in ---- */
+/* ---- reading ---- */
 
-static bool begins(const uint8_t *bytes, size_t n_byte, const char *text)
+static bool starts_with(const uint8_t *bytes, size_t n_byte, const char *text)
 {
     size_t n = strlen(text);
     return n_byte >= n && !memcmp(bytes, text, n);
 }
 
-/* loops with their ends -> complex; the builder's sentence after the file's name */
+/* completes the loops and builds the complex; the builder's message follows the file's name */
 static pal_err finish(pal_cell_reader *r, bool vtk, pal_cells *out)
 {
     if (r->l.n_vertex == 0 || r->l.n_cell == 0)
@@ -233,7 +234,7 @@ static pal_err finish(pal_cell_reader *r, bool vtk, pal_cells *out)
     if (vtk) PAL_TRY(pal_cell_loops_keep(&r->l, NULL, NULL));
     pal_diagnostic inner = {""};
     pal_err err = pal_cells_make(&r->l, out, &inner);
-    const char *text = inner.text + (begins((const uint8_t *)inner.text, strlen(inner.text), "cells: ") ? 7 : 0);
+    const char *text = inner.text + (starts_with((const uint8_t *)inner.text, strlen(inner.text), "cells: ") ? 7 : 0);
     return err ? pal_diagnostic_set(r->diag, err, "%s: %.360s", r->name, text) : PAL_ERR_OK;
 }
 
@@ -243,15 +244,14 @@ pal_err pal_cell_file_parse(const char *name, const uint8_t *bytes, size_t n_byt
     pal_file_printable_name(shown, name);
     pal_cell_reader r = {
         .name = shown, .diag = diag, .scan = {.at = bytes, .end = bytes + n_byte, .line = 1}, .l = {.count_from = 0}};
-    bool vtk = begins(bytes, n_byte, "# vtk");
+    bool vtk = starts_with(bytes, n_byte, "# vtk");
     pal_err err = PAL_ERR_OK;
-    if (n_byte > MOST_BYTES)
-        err =
-            pal_diagnostic_set(diag, PAL_ERR_BUDGET, "%s: %zu bytes, at most %zu are read", shown, n_byte, MOST_BYTES);
+    if (n_byte > MAX_BYTES)
+        err = pal_diagnostic_set(diag, PAL_ERR_BUDGET, "%s: %zu bytes, at most %zu are read", shown, n_byte, MAX_BYTES);
     else if (vtk)
         err = pal_cell_vtk_read(&r);
     else
-        err = read_ours(&r);
+        err = read_palcells(&r);
     if (!err) err = finish(&r, vtk, out);
     pal_cell_loops_free(&r.l);
     return err;
@@ -261,24 +261,24 @@ pal_err pal_cell_file_load(const char *path, pal_cells *out, pal_diagnostic *dia
 {
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, MOST_BYTES, &bytes, &n_byte, diag));
+    PAL_TRY(pal_file_read(path, MAX_BYTES, &bytes, &n_byte, diag));
     pal_err err = pal_cell_file_parse(path, bytes, n_byte, out, diag);
     free(bytes);
     return err;
 }
 
-/* ---- out ---- */
+/* ---- writing ---- */
 
 void pal_cell_write_number(FILE *file, double value)
 {
     char text[40];
     snprintf(text, sizeof text, "%.17g", value);
     for (char *c = text; *c; c++)
-        if (*c == ',') *c = '.'; /* the locale's point */
+        if (*c == ',') *c = '.'; /* the decimal point of the locale */
     fputs(text, file);
 }
 
-static void write_ours(const pal_cells *c, FILE *file)
+static void write_palcells(const pal_cells *c, FILE *file)
 {
     fputs("palcells 1\n", file);
     for (int32_t v = 0; v < c->n_vertex; v++) {
@@ -326,7 +326,7 @@ pal_err pal_cell_file_bytes(const pal_cells *cells, bool vtk, uint8_t **bytes, s
     if (vtk)
         pal_cell_vtk_write(cells, file);
     else
-        write_ours(cells, file);
+        write_palcells(cells, file);
     bool bad = ferror(file) != 0;
     bad |= fclose(file) != 0;
     if (bad) {

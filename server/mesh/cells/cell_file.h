@@ -18,14 +18,14 @@
 #define PAL_MESH_CELLS_CELL_FILE_H
 #include "server/mesh/cells/cells.h"
 
-/* By the first line of the file. The bytes are untrusted; memory stays below a fixed multiple of their number.
+/* Reads by the first line of the file. The bytes are untrusted; memory stays below a fixed multiple of their number.
  * REFUSED with "NAME: line N: sentence", BUDGET (over 256 MiB), IO, MEMORY. */
 pal_err pal_cell_file_load(const char *path, pal_cells *out, pal_diagnostic *diag);
 /* the same from memory; name is used in messages only */
 pal_err pal_cell_file_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_cells *out,
                             pal_diagnostic *diag);
-/* by the end of the path, .vtk or ours; whole file written or none; REFUSED (another ending), IO */
+/* Writes by the ending of the path, .vtk or palcells; whole file written or none; REFUSED (another ending), IO */
 pal_err pal_cell_file_save(const pal_cells *cells, const char *path, pal_diagnostic *diag);
-/* what save writes, vtk or ours; the caller frees *bytes; MEMORY */
+/* the bytes that save writes, VTK or palcells; the caller frees *bytes; MEMORY */
 pal_err pal_cell_file_bytes(const pal_cells *cells, bool vtk, uint8_t **bytes, size_t *n_byte);
 #endif

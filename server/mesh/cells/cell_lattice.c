@@ -1,10 +1,10 @@
-/* Solids kept from a lattice: bricks, pyramids and wedges are all cut from the loops of one hexahedron. */
+/* Solids from a lattice: bricks, pyramids and wedges are cut from the loops of one hexahedron. */
 #include "server/mesh/cells/cell_lattice.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-enum { CELLS = 6, LOOPS = 30, CORNERS = 96 }; /* most of one place, which has one apex at most */
+enum { CELLS = 6, LOOPS = 30, CORNERS = 96 }; /* maximum of one lattice place, which has one apex at most */
 
 /* loops of a brick with corner c at bits 0, 1, 2 for x, y, z; loop 2 a + s is its side s of axis a */
 static const int32_t BRICK[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
@@ -12,7 +12,7 @@ static const int32_t BRICK[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2
 typedef struct builder {
     const pal_cell_lattice *lattice;
     pal_cell_loops l;
-    int32_t *vertex_at; /* of a corner of the lattice, -1: not yet */
+    int32_t *vertex_at; /* vertex of a corner of the lattice, -1: none yet */
     int32_t n_loop, n_corner;
     int32_t place[3]; /* of the present brick */
 } builder;
@@ -34,7 +34,7 @@ static int32_t corner_vertex(builder *b, int32_t c)
     return *known;
 }
 
-static void put_corner(builder *b, int32_t vertex)
+static void add_corner(builder *b, int32_t vertex)
 {
     b->l.corner[b->n_corner++] = vertex;
 }
@@ -49,32 +49,32 @@ static void end_cell(builder *b)
     b->l.cell[++b->l.n_cell] = b->n_loop;
 }
 
-static void put_brick(builder *b)
+static void add_brick(builder *b)
 {
     for (int f = 0; f < 6; f++) {
-        for (int k = 0; k < 4; k++) put_corner(b, corner_vertex(b, BRICK[f][k]));
+        for (int k = 0; k < 4; k++) add_corner(b, corner_vertex(b, BRICK[f][k]));
         end_loop(b);
     }
     end_cell(b);
 }
 
 /* side f of the brick is the base */
-static void put_pyramid(builder *b, int f, int32_t apex)
+static void add_pyramid(builder *b, int f, int32_t apex)
 {
-    for (int k = 0; k < 4; k++) put_corner(b, corner_vertex(b, BRICK[f][k]));
+    for (int k = 0; k < 4; k++) add_corner(b, corner_vertex(b, BRICK[f][k]));
     end_loop(b);
     for (int k = 0; k < 4; k++) {
-        put_corner(b, corner_vertex(b, BRICK[f][(k + 1) % 4]));
-        put_corner(b, corner_vertex(b, BRICK[f][k]));
-        put_corner(b, apex);
+        add_corner(b, corner_vertex(b, BRICK[f][(k + 1) % 4]));
+        add_corner(b, corner_vertex(b, BRICK[f][k]));
+        add_corner(b, apex);
         end_loop(b);
     }
     end_cell(b);
 }
 
-/* Without corners gone[0] and gone[1]: sides that lose one are triangles; what is left of the two that lose both are
- * opposite edges of the cut, which runs along them as those sides did. */
-static void put_wedge(builder *b, const int gone[2])
+/* Without corners gone[0] and gone[1]: sides that lose one corner become triangles; the remaining edges of the two
+ * sides that lose both are opposite edges of the cut, which runs along them as those sides did. */
+static void add_wedge(builder *b, const int gone[2])
 {
     int32_t cut[4];
     int n_cut = 0;
@@ -83,7 +83,7 @@ static void put_wedge(builder *b, const int gone[2])
         int n = 0, first = 0;
         for (int k = 0; k < 4; k++)
             if (BRICK[f][k] == gone[0] || BRICK[f][k] == gone[1]) first = k;
-        /* from behind the last one gone; the two of an edge may stand at the loop's end and begin */
+        /* starts after the last removed corner; the two of an edge may stand at the end and beginning of the loop */
         for (int k = 0; k < 4; k++) {
             int32_t c = BRICK[f][(first + 1 + k) % 4];
             if (c != gone[0] && c != gone[1]) left[n++] = c;
@@ -92,49 +92,49 @@ static void put_wedge(builder *b, const int gone[2])
             cut[n_cut++] = left[0], cut[n_cut++] = left[1];
             continue;
         }
-        for (int k = 0; k < n; k++) put_corner(b, corner_vertex(b, left[k]));
+        for (int k = 0; k < n; k++) add_corner(b, corner_vertex(b, left[k]));
         end_loop(b);
     }
-    for (int k = 0; k < 4; k++) put_corner(b, corner_vertex(b, cut[k]));
+    for (int k = 0; k < 4; k++) add_corner(b, corner_vertex(b, cut[k]));
     end_loop(b);
     end_cell(b);
 }
 
-static pal_err put_place(builder *b, char what, pal_diagnostic *diag)
+static pal_err add_place(builder *b, char what, pal_diagnostic *diag)
 {
     static const char apex_side[] = "WESNDU"; /* side of the brick, as loops */
     double middle[3] = {b->place[0] + 0.5, b->place[1] + 0.5, b->place[2] + 0.5};
     const char *side = strchr(apex_side, what);
     if (what == '#') {
-        put_brick(b);
+        add_brick(b);
     } else if (what == 'X') {
         int32_t apex = new_vertex(b, middle);
-        for (int f = 0; f < 6; f++) put_pyramid(b, f, apex);
+        for (int f = 0; f < 6; f++) add_pyramid(b, f, apex);
     } else if (side) {
         int f = (int)(side - apex_side);
         middle[f / 2] += f % 2 ? 0.5 : -0.5;
-        put_pyramid(b, f ^ 1, new_vertex(b, middle));
+        add_pyramid(b, f ^ 1, new_vertex(b, middle));
     } else if (what >= 'a' && what <= 'l') {
         int axis = (what - 'a') / 4, bit = (what - 'a') % 4;
         int low = (bit & 1) << (axis + 1) % 3 | (bit >> 1) << (axis + 2) % 3;
-        put_wedge(b, (const int[2]){low, low | 1 << axis});
+        add_wedge(b, (const int[2]){low, low | 1 << axis});
     } else {
         return pal_diagnostic_set(diag, PAL_ERR_INTERNAL, "cells: a lattice has the letter \"%c\"", what);
     }
     return PAL_ERR_OK;
 }
 
-static pal_err put_all(builder *b, pal_diagnostic *diag)
+static pal_err add_all(builder *b, pal_diagnostic *diag)
 {
     const int32_t *n = b->lattice->n;
     int32_t *at = b->place;
     for (at[2] = 0; at[2] < n[2]; at[2]++)
         for (at[1] = 0; at[1] < n[1]; at[1]++) {
             const char *row = b->lattice->row[at[2] * n[1] + at[1]];
-            int32_t most = (int32_t)strlen(row) - 1;
+            int32_t max = (int32_t)strlen(row) - 1;
             for (at[0] = 0; at[0] < n[0]; at[0]++) {
-                char what = row[at[0] < most ? at[0] : most];
-                if (what != '.') PAL_TRY(put_place(b, what, diag));
+                char what = row[at[0] < max ? at[0] : max];
+                if (what != '.') PAL_TRY(add_place(b, what, diag));
             }
         }
     return PAL_ERR_OK;
@@ -155,7 +155,7 @@ pal_err pal_cell_lattice_make(const pal_cell_lattice *lattice, pal_cells *out, p
     if (b.vertex_at && b.l.x && b.l.cell && b.l.loop && b.l.corner) {
         for (size_t i = 0; i < n_corner; i++) b.vertex_at[i] = -1;
         b.l.cell[0] = b.l.loop[0] = 0;
-        err = put_all(&b, diag);
+        err = add_all(&b, diag);
         if (!err) err = pal_cells_make(&b.l, out, diag);
     }
     free(b.vertex_at);

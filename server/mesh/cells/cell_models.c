@@ -1,5 +1,5 @@
-/* Control cells of named solids: what is kept of a lattice, and the map that gives it its shape. Lines of a lattice
- * stand at lengths of a table where the steps are not equal; all lengths in metres. */
+/* Control cells of named solids: the kept cells of a lattice, and the map that gives it its shape. Lattice lines have a
+ * table of lengths where the steps are not equal; all lengths in metres. */
 #include "server/mesh/cells/cell_models.h"
 
 #include "server/mesh/cells/cell_lattice.h"
@@ -18,7 +18,7 @@ static double line_at(const double *line, int n_line, double t)
 }
 #define LINE(table, t) line_at(table, (int)(sizeof table / sizeof table[0]), t)
 
-/* turns x about the axis through the centre, counter-clockwise seen from where the axis points to */
+/* rotates x about the axis through the centre, counter-clockwise seen from the tip of the axis */
 static void turn(double x[3], int axis, const double centre[3], double angle)
 {
     int a = (axis + 1) % 3, b = (axis + 2) % 3;
@@ -39,12 +39,12 @@ static double ramp(double t, double from, double to)
     return t * t * (3 - 2 * t);
 }
 
-/* Swells the cube |u| <= 1 towards the ball of its inscribed sphere; all of it at share 1, where edges get flat. */
+/* Inflates the cube |u| <= 1 towards its inscribed ball; completely at share 1, where edges become flat. */
 static void swell(double u[3], double share)
 {
-    double most = fmax(fabs(u[0]), fmax(fabs(u[1]), fabs(u[2])));
+    double max = fmax(fabs(u[0]), fmax(fabs(u[1]), fabs(u[2])));
     double size = sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
-    double s = size > 0 ? pow(most / size, share) : 1;
+    double s = size > 0 ? pow(max / size, share) : 1;
     for (int a = 0; a < 3; a++) u[a] *= s;
 }
 

@@ -1,4 +1,4 @@
-/* Private to the mesh room: loops of cells as a file is read, in arrays that grow with it. Thread: [load]. */
+/* Private to the mesh room: loops of cells that grow as a file is read. Thread: [load]. */
 #ifndef PAL_MESH_CELLS_CELL_READER_H
 #define PAL_MESH_CELLS_CELL_READER_H
 #include "server/mesh/cells/cells.h"

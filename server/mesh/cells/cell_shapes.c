@@ -1,5 +1,4 @@
-/* Control cells of plain solids: numbered hexahedra whose loops are one table, so that all shapes are oriented alike.
- */
+/* Control cells of plain solids: numbered hexahedra that share one table of loops and so one orientation. */
 #include "server/mesh/cells/cell_shapes.h"
 
 #include <math.h>
@@ -12,7 +11,7 @@
 static const int32_t HEX_LOOP[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
                                        {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
 
-static pal_err get_room(int64_t n_vertex, int64_t n_cell, pal_cell_loops *l, pal_diagnostic *diag)
+static pal_err reserve(int64_t n_vertex, int64_t n_cell, pal_cell_loops *l, pal_diagnostic *diag)
 {
     if (n_cell > PAL_CELL_SHAPE_MAX)
         return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "cells: a shape of %lld cells, at most %d are made",
@@ -31,20 +30,20 @@ static pal_err get_room(int64_t n_vertex, int64_t n_cell, pal_cell_loops *l, pal
     return PAL_ERR_OK;
 }
 
-static void put_hex(pal_cell_loops *l, int32_t cell, const int32_t vertex[8])
+static void add_hex(pal_cell_loops *l, int32_t cell, const int32_t vertex[8])
 {
     for (int f = 0; f < 6; f++)
         for (int k = 0; k < 4; k++) l->corner[24 * (size_t)cell + (size_t)(4 * f + k)] = vertex[HEX_LOOP[f][k]];
 }
 
-static void put_vertex(pal_cell_loops *l, int64_t v, double x, double y, double z)
+static void add_vertex(pal_cell_loops *l, int64_t v, double x, double y, double z)
 {
     double *to = l->x + 3 * (size_t)v;
     to[0] = x, to[1] = y, to[2] = z;
 }
 
 /* a cylinder's grid is one of bricks whose first direction may close in itself */
-static void put_grid(pal_cell_loops *l, const int32_t n[3], bool closed)
+static void add_grid(pal_cell_loops *l, const int32_t n[3], bool closed)
 {
     int32_t row = closed ? n[0] : n[0] + 1, cell = 0;
     for (int32_t k = 0; k < n[2]; k++)
@@ -53,7 +52,7 @@ static void put_grid(pal_cell_loops *l, const int32_t n[3], bool closed)
                 int32_t vertex[8];
                 for (int c = 0; c < 8; c++)
                     vertex[c] = (i + (c & 1)) % row + row * (j + (c >> 1 & 1) + (n[1] + 1) * (k + (c >> 2)));
-                put_hex(l, cell++, vertex);
+                add_hex(l, cell++, vertex);
             }
 }
 
@@ -64,11 +63,11 @@ static pal_err finish(pal_cell_loops *l, pal_cells *out, pal_diagnostic *diag)
     return err;
 }
 
-static pal_err check_count(const char *name, int32_t n, int32_t least, pal_diagnostic *diag)
+static pal_err check_count(const char *name, int32_t n, int32_t min, pal_diagnostic *diag)
 {
-    if (n >= least && n <= PAL_CELL_SHAPE_MAX) return PAL_ERR_OK;
-    return pal_diagnostic_set(diag, n < least ? PAL_ERR_REFUSED : PAL_ERR_BUDGET, "cells: %s is %d, must be %d to %d",
-                              name, n, least, PAL_CELL_SHAPE_MAX);
+    if (n >= min && n <= PAL_CELL_SHAPE_MAX) return PAL_ERR_OK;
+    return pal_diagnostic_set(diag, n < min ? PAL_ERR_REFUSED : PAL_ERR_BUDGET, "cells: %s is %d, must be %d to %d",
+                              name, n, min, PAL_CELL_SHAPE_MAX);
 }
 
 /* above is excluded */
@@ -103,15 +102,14 @@ pal_err pal_cells_block(const int32_t n[3], const double length_scale_m[3], pal_
         PAL_TRY(check_length(size[a], length_scale_m[a], 0, diag));
     }
     int64_t v = 0, n_cell = count_cells(n);
-    PAL_TRY(
-        get_room((int64_t)(n[0] + 1) * (n[1] + 1) * (n_cell > PAL_CELL_SHAPE_MAX ? 1 : n[2] + 1), n_cell, &l, diag));
+    PAL_TRY(reserve((int64_t)(n[0] + 1) * (n[1] + 1) * (n_cell > PAL_CELL_SHAPE_MAX ? 1 : n[2] + 1), n_cell, &l, diag));
     for (int32_t k = 0; k <= n[2]; k++)
         for (int32_t j = 0; j <= n[1]; j++)
             for (int32_t i = 0; i <= n[0]; i++)
-                put_vertex(&l, v++, step_at(i, n[0], -length_scale_m[0] / 2, length_scale_m[0] / 2),
+                add_vertex(&l, v++, step_at(i, n[0], -length_scale_m[0] / 2, length_scale_m[0] / 2),
                            step_at(j, n[1], -length_scale_m[1] / 2, length_scale_m[1] / 2),
                            step_at(k, n[2], -length_scale_m[2] / 2, length_scale_m[2] / 2));
-    put_grid(&l, n, false);
+    add_grid(&l, n, false);
     return finish(&l, out, diag);
 }
 
@@ -126,15 +124,15 @@ pal_err pal_cells_tube(const int32_t n[3], double inner_m, double outer_m, doubl
     PAL_TRY(check_length("outer radius", outer_m, inner_m, diag));
     PAL_TRY(check_length("length", length_m, 0, diag));
     int64_t v = 0, n_cell = count_cells(n);
-    PAL_TRY(get_room((int64_t)n[0] * (n[1] + 1) * (n_cell > PAL_CELL_SHAPE_MAX ? 1 : n[2] + 1), n_cell, &l, diag));
+    PAL_TRY(reserve((int64_t)n[0] * (n[1] + 1) * (n_cell > PAL_CELL_SHAPE_MAX ? 1 : n[2] + 1), n_cell, &l, diag));
     /* around, outward, along is a left-handed set of directions when around is counter-clockwise */
     for (int32_t k = 0; k <= n[2]; k++)
         for (int32_t j = 0; j <= n[1]; j++)
             for (int32_t i = 0; i < n[0]; i++) {
                 double a = -TWO_PI * i / n[0], r = step_at(j, n[1], inner_m, outer_m);
-                put_vertex(&l, v++, r * cos(a), r * sin(a), step_at(k, n[2], -length_m / 2, length_m / 2));
+                add_vertex(&l, v++, r * cos(a), r * sin(a), step_at(k, n[2], -length_m / 2, length_m / 2));
             }
-    put_grid(&l, n, true);
+    add_grid(&l, n, true);
     return finish(&l, out, diag);
 }
 
@@ -148,7 +146,7 @@ pal_err pal_cells_ring(int32_t n, double radius_m, double thick_m, pal_cells *ou
 
 /* Section of the torus: a square of (m + 1)^2 vertices, then m rings of 4 m vertices, each ring in the order of the
  * square's rim, which is ring 0. */
-static int32_t rim_vertex(int32_t m, int32_t i)
+static int32_t outer_vertex(int32_t m, int32_t i)
 {
     int32_t side = i / m, k = i % m, row = m + 1;
     return side == 0 ? k : side == 1 ? m + k * row : side == 2 ? m * row + m - k : (m - k) * row;
@@ -157,11 +155,11 @@ static int32_t rim_vertex(int32_t m, int32_t i)
 static int32_t ring_vertex(int32_t m, int32_t ring, int32_t i)
 {
     i %= 4 * m;
-    return ring == 0 ? rim_vertex(m, i) : (m + 1) * (m + 1) + (ring - 1) * 4 * m + i;
+    return ring == 0 ? outer_vertex(m, i) : (m + 1) * (m + 1) + (ring - 1) * 4 * m + i;
 }
 
-/* where a vertex of the section stands, in units of the tube's radius: the square reaches half of it, the rings go over
- * into the circle */
+/* position of a vertex of the section in units of the tube's radius: the square reaches half of it, the rings change
+ * gradually into the circle */
 static void section_place(int32_t m, int32_t ring, int32_t i, double out[2])
 {
     static const int turn[4][4] = {{1, 0, 0, 1}, {0, -1, 1, 0}, {-1, 0, 0, -1}, {0, 1, -1, 0}};
@@ -173,7 +171,7 @@ static void section_place(int32_t m, int32_t ring, int32_t i, double out[2])
 }
 
 /* place of each vertex of a section [][2] */
-static void put_section(int32_t m, double *place)
+static void add_section(int32_t m, double *place)
 {
     double h = 0.5 * sqrt(0.5);
     for (int32_t j = 0; j <= m; j++)
@@ -208,26 +206,26 @@ pal_err pal_cells_torus(int32_t n, int32_t m, double radius_m, double tube_m, pa
     PAL_TRY(check_length("radius", radius_m, tube_m, diag));
     const int32_t count[3] = {n, m, m};
     int64_t n_cell = 5 * count_cells(count), n_place = (int64_t)(m + 1) * (m + 1) + 4LL * m * m;
-    PAL_TRY(get_room(n_cell > PAL_CELL_SHAPE_MAX ? 1 : n_place * n, n_cell, &l, diag));
+    PAL_TRY(reserve(n_cell > PAL_CELL_SHAPE_MAX ? 1 : n_place * n, n_cell, &l, diag));
     double *place = malloc((size_t)n_place * 2 * sizeof *place);
     if (!place) {
         pal_cell_loops_free(&l);
         return PAL_ERR_MEMORY;
     }
-    put_section(m, place);
+    add_section(m, place);
     /* the section lies in the plane of the radius and z; going round clockwise is its third direction */
     for (int32_t s = 0; s < n; s++) {
         double a = -TWO_PI * s / n;
         int32_t here = (int32_t)n_place * s, there = (int32_t)n_place * ((s + 1) % n);
         for (int32_t v = 0; v < n_place; v++) {
             double r = radius_m + tube_m * place[2 * v];
-            put_vertex(&l, here + v, r * cos(a), r * sin(a), tube_m * place[2 * v + 1]);
+            add_vertex(&l, here + v, r * cos(a), r * sin(a), tube_m * place[2 * v + 1]);
         }
         for (int32_t k = 0; k < 5 * m * m; k++) {
             int32_t corner[4], vertex[8];
             section_cell(m, k, corner);
             for (int c = 0; c < 8; c++) vertex[c] = corner[c & 3] + (c & 4 ? there : here);
-            put_hex(&l, s * 5 * m * m + k, vertex);
+            add_hex(&l, s * 5 * m * m + k, vertex);
         }
     }
     free(place);

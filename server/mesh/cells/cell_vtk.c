@@ -1,7 +1,8 @@
 /* Cells in legacy VTK files, ASCII, up to version 4.2 (VTK User's Guide, "VTK File Formats").
  *
- * The corner orders are VTK's; a wedge's first triangle faces outward there, and writers disagree, so every cell with
- * negative volume is turned over. What is no tetrahedron, hexahedron, wedge or pyramid is written as a polyhedron. */
+ * The corner orders are those of VTK. There the first triangle of a wedge faces outward, but writers disagree, so every
+ * cell with negative volume is reversed. Cells that are no tetrahedron, hexahedron, wedge or pyramid are written as
+ * polyhedra. */
 #include "server/base/vec3.h"
 #include "server/mesh/cells/cell_reader.h"
 
@@ -33,7 +34,7 @@ static const kind *find_kind(int64_t type)
     return NULL;
 }
 
-/* ---- in ---- */
+/* ---- reading ---- */
 
 /* the numbers of CELLS, cell after cell, and where each cell's begin */
 typedef struct lists {
@@ -43,14 +44,14 @@ typedef struct lists {
 } lists;
 
 /* a number from least to most, on this line or a later one */
-static pal_err take_int(pal_cell_reader *r, const char *what, int64_t least, int64_t most, int64_t *out)
+static pal_err take_int(pal_cell_reader *r, const char *what, int64_t min, int64_t max, int64_t *out)
 {
     if (!pal_text_seek(&r->scan)) return pal_cell_reader_refuse(r, "the file ends where %s should be", what);
     if (!pal_text_int(&r->scan, out))
         return pal_cell_reader_refuse(r, "%s must be a number, found %s", what, pal_text_excerpt_at(&r->scan).text);
-    if (*out < least || *out > most)
-        return pal_cell_reader_refuse(r, "%s is %lld, must be %lld to %lld", what, (long long)*out, (long long)least,
-                                      (long long)most);
+    if (*out < min || *out > max)
+        return pal_cell_reader_refuse(r, "%s is %lld, must be %lld to %lld", what, (long long)*out, (long long)min,
+                                      (long long)max);
     return PAL_ERR_OK;
 }
 
@@ -69,7 +70,7 @@ static pal_err take_word(pal_cell_reader *r, const char *word)
 }
 
 /* every number takes two bytes at least, so counts beyond that lie */
-static int64_t most_numbers(const pal_cell_reader *r)
+static int64_t max_numbers(const pal_cell_reader *r)
 {
     return (r->scan.end - r->scan.at) / 2 + 1;
 }
@@ -96,7 +97,7 @@ static pal_err read_points(pal_cell_reader *r)
 {
     int64_t n;
     PAL_TRY(take_word(r, "POINTS"));
-    PAL_TRY(take_int(r, "the number of points", 1, most_numbers(r), &n));
+    PAL_TRY(take_int(r, "the number of points", 1, max_numbers(r), &n));
     if (pal_text_word(&r->scan) == 0) return pal_cell_reader_refuse(r, "POINTS must say float or double");
     for (int64_t i = 0; i < n; i++) {
         double x[3];
@@ -110,8 +111,8 @@ static pal_err read_lists(pal_cell_reader *r, lists *at)
 {
     int64_t n, n_number, value, left;
     PAL_TRY(take_word(r, "CELLS"));
-    PAL_TRY(take_int(r, "the number of cells", 1, most_numbers(r), &n));
-    PAL_TRY(take_int(r, "the count of numbers", n, most_numbers(r), &n_number));
+    PAL_TRY(take_int(r, "the number of cells", 1, max_numbers(r), &n));
+    PAL_TRY(take_int(r, "the count of numbers", n, max_numbers(r), &n_number));
     for (int64_t i = 0; i < n; i++) {
         PAL_TRY(take_int(r, "the length of a cell", 1, n_number, &left));
         PAL_TRY(pal_cell_reader_grow(r, (void **)&at->start, at->n_cell + 1, &at->cap_start, sizeof *at->start));
@@ -169,8 +170,8 @@ static pal_err add_cell(pal_cell_reader *r, const lists *at, size_t i, int64_t t
     return PAL_ERR_OK;
 }
 
-/* turns the last cell's loops over when its volume is negative; corners out of range are left to the builder */
-static void turn_over(pal_cell_reader *r)
+/* reverses the loops of the last cell when its volume is negative; the builder checks the range of corners */
+static void reverse_cell(pal_cell_reader *r)
 {
     size_t first = (size_t)r->l.cell[r->l.n_cell - 1];
     double sum = 0;
@@ -223,7 +224,7 @@ static pal_err read_types(pal_cell_reader *r, const lists *at)
         PAL_TRY(take_int(r, "a cell type", 0, 255, &type));
         PAL_TRY(add_cell(r, at, i, type));
         PAL_TRY(check_corners(r, at, i, first));
-        turn_over(r);
+        reverse_cell(r);
     }
     return PAL_ERR_OK;
 }
@@ -271,10 +272,10 @@ pal_err pal_cell_vtk_read(pal_cell_reader *reader)
     return err ? err : read_sharp(reader);
 }
 
-/* ---- out ---- */
+/* ---- writing ---- */
 
 /* VTK's corners of a cell that is one of KINDS, from the loop of its first face with as many corners as the base; the
- * vertex over a corner is at the third edge there. NULL: a polyhedron */
+ * vertex opposite a corner is at the third edge there. NULL: a polyhedron */
 static const kind *list_corners(const pal_cells *c, int32_t cell, int32_t corner[8])
 {
     int32_t base = -1, n_quad = 0, n_face = c->cell_use[cell + 1] - c->cell_use[cell];

@@ -1,4 +1,4 @@
-/* Walks over a polyhedral complex: its pieces, sheets and holes, its boundary as triangles. */
+/* Walks over a polyhedral complex: its pieces, boundary sheets and holes, and its boundary as triangles. */
 #include "server/mesh/cells/cells.h"
 
 #include "server/base/vec3.h"
@@ -80,7 +80,7 @@ pal_err pal_cells_find_topology(const pal_cells *cells, pal_cells_topology *out)
 /* ---- the boundary as triangles ---- */
 
 /* area of the triangle of three corners of a loop along the direction of the face's area */
-static double along(const pal_cells *c, int32_t first, int i, int j, int k, const double area[3])
+static double next_boundary_edge(const pal_cells *c, int32_t first, int i, int j, int k, const double area[3])
 {
     const double *a = c->x + 3 * (size_t)c->edge_use[first + i].vertex;
     double p[3], q[3], n[3];
@@ -100,9 +100,10 @@ static int fan_corner(const pal_cells *c, int32_t face)
     pal_cells_face_area(c, NULL, face, area);
     for (int i = 0; i < n; i++) {
         double worst = INFINITY;
-        for (int k = 1; k + 1 < n; k++) worst = fmin(worst, along(c, first, i, (i + k) % n, (i + k + 1) % n, area));
+        for (int k = 1; k + 1 < n; k++)
+            worst = fmin(worst, next_boundary_edge(c, first, i, (i + k) % n, (i + k + 1) % n, area));
         if (n == 4 && worst > 0) {
-            /* of the two good ways to cut a quad, the shorter diagonal */
+            /* of the two best cuts of a quad, the shorter diagonal */
             const double *x = c->x;
             worst = 1 / pal_dist3(x + 3 * (size_t)c->edge_use[first + i].vertex,
                                   x + 3 * (size_t)c->edge_use[first + (i + 2) % 4].vertex);
@@ -112,7 +113,7 @@ static int fan_corner(const pal_cells *c, int32_t face)
     return corner;
 }
 
-static void put_triangles(const pal_cells *c, const int32_t *number, pal_surface *s, int32_t *face)
+static void write_triangles(const pal_cells *c, const int32_t *number, pal_surface *s, int32_t *face)
 {
     int32_t at = 0;
     for (int32_t f = 0; f < c->n_face; f++) {
@@ -150,7 +151,7 @@ pal_err pal_cells_boundary(const pal_cells *cells, pal_surface *out, int32_t **v
             pal_copy3(s.x + 3 * (size_t)n, c->x + 3 * (size_t)v);
             old[n++] = v;
         }
-        put_triangles(c, number, &s, of);
+        write_triangles(c, number, &s, of);
         *out = s;
         if (vertex) *vertex = old, old = NULL;
         if (face) *face = of, of = NULL;

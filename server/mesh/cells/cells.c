@@ -1,4 +1,4 @@
-/* Polyhedral complexes: memory, loops out of them, measures, and the check that all of it fits together (A 3.4.4). */
+/* Polyhedral complexes: memory, conversion to loops, measures (paper A section 3.4.4). */
 #include "server/mesh/cells/cells.h"
 
 #include "server/base/vec3.h"
@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define LEAST_SHAPE 1e-12
+#define MIN_SHAPE 1e-12
 
 /* ---- arrays ---- */
 
@@ -107,7 +107,7 @@ bool pal_cells_equal(const pal_cells *a, const pal_cells *b)
         a->n_edge_use != b->n_edge_use || a->n_edge != b->n_edge || a->n_face != b->n_face)
         return false;
     if (a->n_cell == 0) return true;
-    /* all else follows from the loops */
+    /* everything else follows from the loops */
     for (int32_t i = 0; i <= a->n_cell; i++)
         if (a->cell_use[i] != b->cell_use[i]) return false;
     for (int32_t l = 0; l <= a->n_face_use; l++)
@@ -199,7 +199,7 @@ static void keep_edge_tags(pal_cell_loops *l, side *sides)
     l->n_edge_tag = n_kept;
 }
 
-/* moves the kept cells, their loops, corners, lines and face tags together; number [loops + 1] is scratch */
+/* compacts the kept cells, their loops, corners, lines and face tags; number [loops + 1] is scratch */
 static void keep_cells(pal_cell_loops *l, const bool *keep, int32_t *number)
 {
     int32_t n_cell = 0, n_loop = 0, n_corner = 0, n_tag = 0;
@@ -360,12 +360,12 @@ bool pal_cells_shape_valid(const pal_cells *cells, const double *x, pal_cells_fa
     for (int32_t k = 0; k < c->n_face && f.cell < 0; k++) {
         int32_t use = c->face[k].use[0];
         double area[3], longest = use_area(c, p, use, area);
-        if (pal_norm3(area) > LEAST_SHAPE * longest) continue; /* NaN does not pass */
+        if (pal_norm3(area) > MIN_SHAPE * longest) continue; /* NaN does not pass */
         f = (pal_cells_fault){c->face_use[use].cell, use, pal_norm3(area), sqrt(longest)};
     }
     for (int32_t i = 0; i < c->n_cell && f.cell < 0; i++) {
         double volume = pal_cells_cell_volume(c, p, i), d = cell_diagonal(c, p, i);
-        if (volume > LEAST_SHAPE * d * d * d) continue;
+        if (volume > MIN_SHAPE * d * d * d) continue;
         f = (pal_cells_fault){i, -1, volume, d};
     }
     if (fault) *fault = f;

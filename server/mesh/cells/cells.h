@@ -1,4 +1,4 @@
-/* Solids cut into polyhedral cells, with radial-edge adjacency (A 3.4.4; Weiler 1988) in index arrays.
+/* Solids cut into polyhedral cells, with radial-edge adjacency (paper A section 3.4.4; Weiler 1988) in index arrays.
  *
  * A cell is a ball bounded by faces; a face is a loop of three or more vertices that one cell (boundary) or two cells
  * have; an edge joins two vertices. Each appearance is a use of its own:
@@ -24,7 +24,7 @@
 #include <stddef.h>
 
 enum { PAL_CELL_LOOP_MAX = 256 }; /* corners of a face */
-#define PAL_SHARPNESS_MAX 1e6f    /* most sharp: so many levels of subdivision */
+#define PAL_SHARPNESS_MAX 1e6f    /* maximum sharpness: as many levels of subdivision */
 
 /* sharpness of an edge by its two vertices in any order, or of a face by its loop's number */
 typedef struct pal_cell_tag {
@@ -32,7 +32,7 @@ typedef struct pal_cell_tag {
     float sharp;  /* 0..PAL_SHARPNESS_MAX             */
 } pal_cell_tag;
 
-/* Cells as lists of oriented loops: what a file, a shape or an edit gives. A face between two cells is given by both,
+/* Cells as lists of oriented loops: what a file, a shape or an edit provides. A face between two cells appears in both,
  * in opposite directions. Owns its arrays (heap). */
 typedef struct pal_cell_loops {
     int32_t n_vertex, n_cell, n_edge_tag, n_face_tag;
@@ -85,7 +85,7 @@ typedef struct pal_cells {
     double *x;               /* position, m                                       [n_vertex][3]     */
     float *vertex_sharpness; /* as edges' sharp                                   [n_vertex]        */
     bool *vertex_boundary;   /* of a boundary face                                [n_vertex]        */
-    bool *vertex_pinched;    /* sheets of the boundary touch here (numerics: a corner) [n_vertex]   */
+    bool *vertex_pinched;    /* sheets of the boundary touch here: treated as a corner [n_vertex] */
     pal_cell_edge *edge;     /* [n_edge]                                                            */
     pal_cell_face *face;     /* [n_face]                                                            */
     int32_t *cell_use;       /* first face use of each cell                       [n_cell+1]        */
@@ -112,12 +112,12 @@ pal_err pal_cells_copy(const pal_cells *from, pal_cells *to);
 /* equal numbers everywhere; -0 equals 0 */
 bool pal_cells_equal(const pal_cells *a, const pal_cells *b);
 
-/* the complex as loops again, loop l being face use l, tags of all that is not smooth (a face's for both its loops, so
- * that one may go), lines NULL; MEMORY */
+/* the complex as loops again, loop l being face use l, with tags of everything that is not smooth (a face has one for
+ * each of its loops, so that a loop may be removed), lines NULL; MEMORY */
 pal_err pal_cells_loops(const pal_cells *cells, pal_cell_loops *out);
 void pal_cell_loops_free(pal_cell_loops *loops);
-/* Drops the cells with keep [n_cell] false (NULL: none), then vertices of no loop and tags of what is gone; in place.
- * kept [n_vertex before] (may be NULL) gets the old number of each vertex that stays. MEMORY */
+/* Removes the cells with keep [n_cell] false (NULL: none), then unused vertices and tags; in place. kept [n_vertex
+ * before] (may be NULL) receives the old number of each vertex that stays. MEMORY */
 pal_err pal_cell_loops_keep(pal_cell_loops *loops, const bool *keep, int32_t *kept);
 
 /* the first face without area (its vector area is below 1e-12 of its longest edge squared) or cell without positive
@@ -129,8 +129,8 @@ typedef struct pal_cells_fault {
 /* false with the first fault at positions x [n_vertex][3] (NULL: its own); fault may be NULL */
 bool pal_cells_shape_valid(const pal_cells *cells, const double *x, pal_cells_fault *fault);
 
-/* Is the complex whole? Every index, every pair of mates and radials, every row and mark, then the shape at x
- * [n_vertex] [3] (NULL: its own): for after an edit. REFUSED names the first fault, MEMORY. */
+/* Checks the complex: every index, every pair of mates and radials, every list and mark, then the shape at x
+ * [n_vertex][3] (NULL: its own). For use after an edit. REFUSED names the first fault, MEMORY. */
 pal_err pal_cells_check(const pal_cells *cells, const double *x, pal_diagnostic *diag);
 
 /* Measures with positions x [n_vertex][3] (NULL: its own). A face that is not flat counts as the fan of triangles about
@@ -142,7 +142,7 @@ void pal_cells_face_area(const pal_cells *cells, const double *x, int32_t face, 
 double pal_cells_cell_volume(const pal_cells *cells, const double *x, int32_t cell); /* m^3 */
 double pal_cells_volume(const pal_cells *cells, const double *x);
 
-/* Pieces and holes. Sheets that touch in a pinched vertex or edge count as apart. */
+/* Pieces and holes. Sheets that touch in a pinched vertex or edge count as separate. */
 typedef struct pal_cells_topology {
     int32_t n_piece;     /* cells joined by faces                                        */
     int32_t n_sheet;     /* closed surfaces that make up the boundary                    */

@@ -1,6 +1,6 @@
-/* MacCracken-Joy subdivision (A 3.1), after MacCracken, Joy, "Free-form deformations with lattices of arbitrary
- * topology" (SIGGRAPH 1996). All weights are on the old vertices; C = mean of a cell's vertices, F = mean of a face's
- * corners, M = midpoint of an edge, P = the vertex, (..) = mean over all those at the place:
+/* MacCracken-Joy subdivision (paper A section 3.1), after MacCracken, Joy, "Free-form deformations with lattices of
+ * arbitrary topology" (SIGGRAPH 1996). All weights are on the old vertices; C = mean of a cell's vertices, F = mean of
+ * a face's corners, M = midpoint of an edge, P = the vertex, (..) = mean over all those at the place:
  *
  *            inside                                  boundary (Catmull, Clark 1978)         sharp
  *   cell     C
@@ -24,7 +24,7 @@
 
 #define BUDGET ((size_t)512 << 20)
 
-/* one level being made: the old cells, the rows, and where each new kind of vertex begins */
+/* one level in the making: the old cells, the rows, and where each new kind of vertex begins */
 typedef struct level {
     const pal_cells *c;
     pal_interpolation_builder *row;
@@ -62,7 +62,8 @@ static void add_cell(const level *l, int32_t cell, double s)
         pal_interpolation_builder_add(l->row, r->item[k], s / n);
 }
 
-/* centroid of the new cell of entry k of cell_vertex, as it is cut: the vertex, its edges' midpoints, its faces, C */
+/* centroid of the new cell of entry k of cell_vertex before anything moves: the vertex, its edges' midpoints, its
+ * faces, C */
 static void add_part(const level *l, int32_t cell, int32_t k, double s)
 {
     const pal_cells *c = l->c;
@@ -106,7 +107,7 @@ static int32_t face_corner(const pal_cells *c, int32_t face, int32_t vertex)
     return use;
 }
 
-/* ---- the four rules; s is what the row's other rules have left ---- */
+/* ---- the four rules; s is the weight that the row's other rules leave ---- */
 
 static void cell_rule(const level *l, int32_t cell)
 {
@@ -281,7 +282,7 @@ static pal_err make_rows(const pal_cells *c, bool averaging, int64_t max_entry, 
 
 /* ---- the new cells ---- */
 
-/* what is left of a sharpness a level later */
+/* sharpness that remains a level later */
 static float after(float s)
 {
     return s >= PAL_SHARPNESS_MAX ? PAL_SHARPNESS_MAX : s > 1 ? s - 1 : 0;
@@ -308,7 +309,7 @@ static void fill_loops(const pal_cells *c, pal_cell_loops *to, const int32_t *ce
                 to->loop[n_loop++] = n_corner, n_corner += 4;
                 use = pal_cells_next_around(c, use);
             } while (use != first);
-            /* the inner quads cross the edges: over from the face on their left to the one on their right */
+            /* the inner quads cross the edges: from the face on their left to the one on their right */
             do {
                 int32_t right = pal_cells_face_of(c, c->edge_use[use].radial), f = pal_cells_face_of(c, use);
                 loop = to->corner + n_corner;
@@ -446,7 +447,7 @@ static pal_err name_faces(const pal_cells *c, const int32_t *loop_origin, int32_
     return PAL_ERR_OK;
 }
 
-/* the next level of s in place; s stays as it is when it fails */
+/* replaces s by its next level; s is unchanged on failure */
 static pal_err refine(pal_subdivision *s, const pal_subdivision_options *o, double budget, pal_diagnostic *diag)
 {
     pal_subdivision next = {.n_level = s->n_level + 1};
@@ -455,7 +456,7 @@ static pal_err refine(pal_subdivision *s, const pal_subdivision_options *o, doub
     int32_t *loop_origin = NULL;
     pal_diagnostic reason = {""};
     sizes now = sizes_of(&s->cells), then = sizes_after(&now);
-    /* the rows of a level have at least one entry each; how many more is seen as they are made */
+    /* a lower bound: the rows of a level have at least one entry each; the rest is counted as they are made */
     double byte = bytes_of(&now) + making_bytes_of(&then), rows = rows_bytes(s->rows.start[s->rows.n_row]);
     if (byte + rows + 2 * rows_bytes(then.vertex) > budget || then.edge_use > INT32_MAX || then.edge > INT32_MAX / 4)
         return refuse(byte + rows + 2 * rows_bytes(then.vertex), budget, next.n_level, o, diag);

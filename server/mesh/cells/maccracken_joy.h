@@ -1,14 +1,14 @@
-/* MacCracken-Joy subdivision of solids (A 3.1; MacCracken, Joy 1996): from control cells to many small ones.
+/* MacCracken-Joy subdivision of solids (paper A section 3.1; MacCracken, Joy 1996): from control cells to many small
+ * ones.
  *
  * A level cuts every cell into one new cell for each of its vertices: where k of the cell's faces meet in the vertex,
- * the new cell has 2 k quads, so that it is a hexahedron where k = 3. New vertices, in this order: one for each old
- * vertex, edge, face and cell. New cell i stands for entry i of the old complex's cell_vertex, its first vertex being
- * the old one.
+ * the new cell has 2 k quads, so it is a hexahedron where k = 3. New vertices, in this order: one for each old vertex,
+ * edge, face and cell. New cell i corresponds to entry i of the old complex's cell_vertex, its first vertex being the
+ * old one.
  *
  * The new vertices are weighted sums of the old ones, d = A p over all levels. On the boundary and on creases the
- * weights do not look inside: boundary surfaces are Catmull-Clark surfaces (with averaging, only where four faces
- * meet), creases cubic B-splines.
- * Thread: [load] to make, [any] to read. */
+ * weights use no interior vertex: boundary surfaces are Catmull-Clark surfaces (with averaging, only where four faces
+ * meet), creases cubic B-splines. server/mesh/README.md gives the rules. Thread: [load] to make, [any] to read. */
 #ifndef PAL_MESH_CELLS_MACCRACKEN_JOY_H
 #define PAL_MESH_CELLS_MACCRACKEN_JOY_H
 #include "server/mesh/cells/cells.h"
@@ -29,11 +29,11 @@ typedef struct pal_subdivision_options {
 } pal_subdivision_options;
 
 /* Sharp features. An edge becomes its midpoint, a face its centroid, a vertex stays, for as many levels as the
- * sharpness says; what is left below 1 blends with the smooth rule for one level more (DeRose, Kass, Truong 1998).
- * A vertex with two sharp edges lies on a crease, with three or more it is a corner; at the boundary, only edges of the
- * boundary count. A sharp face does not sharpen its edges: tag them too where a flat face with crisp sides is meant.
- * Pinched edges become their midpoints, pinched vertices stay. Features inside a thin or strongly bent solid may fold
- * cells over, as all that is round them moves and they do not; on the boundary they do not as a rule. */
+ * sharpness says; a remainder below 1 blends with the smooth rule for one level more (DeRose, Kass, Truong 1998). A
+ * vertex with two sharp edges lies on a crease, with three or more it is a corner; at the boundary, only edges of the
+ * boundary count. A sharp face does not sharpen its edges: tag them too for a flat face with crisp sides. Pinched edges
+ * become their midpoints, pinched vertices stay. Features inside a thin or strongly bent solid may fold cells, because
+ * their surroundings move and they do not; on the boundary they usually do not. */
 typedef struct pal_subdivision {
     int n_level;
     pal_cells cells;        /* after the last level; x = A p to the bit                                   */
@@ -43,8 +43,8 @@ typedef struct pal_subdivision {
     size_t n_byte;          /* memory of all arrays, about                                                */
 } pal_subdivision;
 
-/* The control cells are copied. REFUSED: number of levels out of range, or a level's cells fold over, with level, cell
- * and number. BUDGET, with both numbers, before the memory is taken; MEMORY. */
+/* The control cells are copied. REFUSED: number of levels out of range, or the cells of a level fold, with level, cell
+ * and number. BUDGET, with both numbers, before the memory is allocated; MEMORY. */
 pal_err pal_subdivision_make(const pal_cells *control, const pal_subdivision_options *options, pal_subdivision *out,
                              pal_diagnostic *diag);
 /* frees the arrays and zeroes the struct; a zeroed struct is fine */

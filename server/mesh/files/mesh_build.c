@@ -8,7 +8,7 @@
 #include <string.h>
 
 /* three corners of this many triangles still count in an int32 */
-static const size_t most_piece = 700000000;
+static const size_t max_piece = 700000000;
 
 pal_err pal_mesh_refuse(pal_mesh_build *build, int64_t at, const char *format, ...)
 {
@@ -23,8 +23,8 @@ pal_err pal_mesh_refuse(pal_mesh_build *build, int64_t at, const char *format, .
 static pal_err grow(pal_mesh_build *build, void **array, size_t *cap, size_t n, size_t more, size_t size)
 {
     if (more <= *cap - n) return PAL_ERR_OK;
-    if (more > most_piece || n + more > most_piece)
-        return pal_diagnostic_set(build->diag, PAL_ERR_BUDGET, "%s: more than %zu pieces", build->name, most_piece);
+    if (more > max_piece || n + more > max_piece)
+        return pal_diagnostic_set(build->diag, PAL_ERR_BUDGET, "%s: more than %zu pieces", build->name, max_piece);
     size_t wanted = n + more > *cap + *cap / 2 ? n + more : *cap + *cap / 2;
     if (wanted < 64) wanted = 64;
     void *moved = realloc(*array, wanted * size);

@@ -11,7 +11,7 @@
 #include <strings.h>
 
 /* no file is read beyond this */
-static const size_t most_byte = (size_t)4 << 30;
+static const size_t max_byte = (size_t)4 << 30;
 
 typedef pal_err reader(pal_mesh_build *build);
 
@@ -104,7 +104,7 @@ pal_err pal_mesh_file_read(const char *path, const pal_mesh_file_options *option
 {
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, most_byte, &bytes, &n_byte, diag));
+    PAL_TRY(pal_file_read(path, max_byte, &bytes, &n_byte, diag));
     pal_err err = pal_mesh_file_parse(path, bytes, n_byte, options, out, report, unit_m, unit_name, diag);
     free(bytes);
     return err;

@@ -36,8 +36,8 @@ static pal_err read_counts(pal_mesh_build *build, pal_text_scan *scan, int64_t n
             return pal_mesh_refuse(build, scan->line, "the number of %s is %s", what[k],
                                    pal_text_excerpt_at(scan).text);
         /* a vertex takes at least six bytes, a face at least two */
-        int64_t most = (scan->end - scan->at) / (k == 0 ? 6 : 2) + 1;
-        if (n[k] > most)
+        int64_t max = (scan->end - scan->at) / (k == 0 ? 6 : 2) + 1;
+        if (n[k] > max)
             return pal_mesh_refuse(build, scan->line, "claims %lld %s, but only %lld bytes follow", (long long)n[k],
                                    what[k], (long long)(scan->end - scan->at));
     }

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_ELEMENT = 32, MOST_PROPERTY = 128 };
+enum { MAX_ELEMENT = 32, MAX_PROPERTY = 128 };
 
 /* what a property means to us */
 typedef enum role { OTHER, X, Y, Z, INDICES } role;
@@ -25,7 +25,7 @@ typedef struct element {
     enum { UNKNOWN, VERTEX, FACE, STRIP } what;
     int64_t n_row, line; /* line: where it is declared                  */
     int first, n;        /* its properties                              */
-    int64_t least;       /* bytes that a row takes at least, in binary  */
+    int64_t min;         /* bytes that a row takes at least, in binary  */
 } element;
 
 typedef struct ply {
@@ -33,8 +33,8 @@ typedef struct ply {
     pal_text_scan scan; /* header and ascii body                        */
     bool ascii, big;
     int n_element, n_property;
-    element elements[MOST_ELEMENT];
-    property properties[MOST_PROPERTY];
+    element elements[MAX_ELEMENT];
+    property properties[MAX_PROPERTY];
     const uint8_t *at; /* binary body                                   */
 } ply;
 
@@ -76,7 +76,7 @@ static pal_err read_format(ply *p)
 
 static pal_err read_element(ply *p)
 {
-    if (p->n_element == MOST_ELEMENT) return refuse_header(p, "more than 32 elements");
+    if (p->n_element == MAX_ELEMENT) return refuse_header(p, "more than 32 elements");
     element *e = &p->elements[p->n_element++];
     *e = (element){.what = UNKNOWN, .first = p->n_property, .line = p->scan.line};
     if (pal_text_is(&p->scan, "vertex"))
@@ -95,7 +95,7 @@ static pal_err read_element(ply *p)
 static pal_err read_property(ply *p)
 {
     if (p->n_element == 0) return refuse_header(p, "a property before any element");
-    if (p->n_property == MOST_PROPERTY) return refuse_header(p, "more than 128 properties");
+    if (p->n_property == MAX_PROPERTY) return refuse_header(p, "more than 128 properties");
     element *e = &p->elements[p->n_element - 1];
     property *q = &p->properties[p->n_property++];
     *q = (property){.list = pal_text_is(&p->scan, "list"), .use = OTHER};
@@ -111,7 +111,7 @@ static pal_err read_property(ply *p)
         q->use = Z;
     else if (face && q->list && (pal_text_is(&p->scan, "vertex_indices") || pal_text_is(&p->scan, "vertex_index")))
         q->use = INDICES;
-    e->least += pal_scalar_size(q->list ? q->count_type : q->type);
+    e->min += pal_scalar_size(q->list ? q->count_type : q->type);
     e->n++;
     return PAL_ERR_OK;
 }
@@ -253,10 +253,10 @@ static pal_err read_rows(ply *p, const element *e)
     if (e->n == 0) return PAL_ERR_OK;
     const uint8_t *end = p->build->bytes + p->build->n_byte, *at = p->ascii ? p->scan.at : p->at;
     /* in text a value takes at least two bytes, its blank included (the very last one may lack it) */
-    int64_t most = p->ascii ? (end - at + 1) / 2 / e->n : (end - at) / e->least;
-    if (e->n_row > most)
+    int64_t max = p->ascii ? (end - at + 1) / 2 / e->n : (end - at) / e->min;
+    if (e->n_row > max)
         return pal_mesh_refuse(p->build, place(p), "the header claims %lld rows, but at most %lld fit in the rest",
-                               (long long)e->n_row, (long long)most);
+                               (long long)e->n_row, (long long)max);
     if (e->what == VERTEX) PAL_TRY(pal_mesh_reserve(p->build, (size_t)e->n_row, 0));
     if (e->what == FACE) PAL_TRY(pal_mesh_reserve(p->build, 0, (size_t)e->n_row));
     for (int64_t row = 0; row < e->n_row; row++) PAL_TRY(read_row(p, e));

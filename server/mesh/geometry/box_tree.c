@@ -1,5 +1,5 @@
-/* AABB tree over the triangles of a surface (paper B 2.2), with a dipole per box for the winding number (Barill et al.
- * 2018, first order).
+/* AABB tree over the triangles of a surface (paper B section 2.2), with a dipole per box for the winding number (Barill
+ * et al. 2018, first order).
  *
  * Triangles are split at the middle of the centroids along the longest side, so the depth is log2 n whatever the input.
  * Nodes stand in depth-first order: the left child follows its parent. Triangles with a non-finite corner are left out.
@@ -204,9 +204,9 @@ void pal_box_tree_destroy(pal_box_tree *tree)
 }
 
 /* parameter range 0..most of a + t d within the box, widened by rounding; false when empty */
-static bool meets_box(const node *n, const double a[3], const double inverse[3], double most)
+static bool meets_box(const node *n, const double a[3], const double inverse[3], double max)
 {
-    double from = 0, to = most;
+    double from = 0, to = max;
     for (int k = 0; k < 3; k++) {
         double t0 = (n->low[k] - a[k]) * inverse[k], t1 = (n->high[k] - a[k]) * inverse[k];
         /* 0 times infinity: the start lies on the slab's plane and stays there */
@@ -241,10 +241,10 @@ static double meet_triangle(const double *corner[3], const double a[3], const do
 }
 
 /* smallest t in 0 < t < most where a + t d meets a triangle, or a negative number; any: the first found will do */
-static double cast(const pal_box_tree *tree, const double a[3], const double d[3], double most, bool any, int *tri)
+static double cast(const pal_box_tree *tree, const double a[3], const double d[3], double max, bool any, int *tri)
 {
     int stack[STACK], n_stack = 0, best_tri = -1;
-    double inverse[3] = {1 / d[0], 1 / d[1], 1 / d[2]}, best = most;
+    double inverse[3] = {1 / d[0], 1 / d[1], 1 / d[2]}, best = max;
     if (tree->n_node) stack[n_stack++] = 0;
     while (n_stack) {
         const node *n = &tree->nodes[stack[--n_stack]];

@@ -88,7 +88,7 @@ typedef struct entries {
     double *weight;
 } entries;
 
-static void put(entries *to, int32_t index, double weight)
+static void set_entry(entries *to, int32_t index, double weight)
 {
     if (weight == 0) return;
     to->index[to->n] = index;
@@ -101,7 +101,7 @@ static void add(entries *to, int32_t index, double weight)
     int k = 0;
     while (k < to->n && to->index[k] != index) k++;
     if (k == to->n)
-        put(to, index, weight);
+        set_entry(to, index, weight);
     else
         to->weight[k] += weight;
 }
@@ -122,14 +122,14 @@ static void regular_rule(const pal_winged_mesh *w, int32_t e, entries *to)
         add(to, start, 0.5);
         add(to, top, 0.125);
         for (int k = 0; k < 2; k++) {
-            int32_t external_force = k == 0 ? edge[e].next[side] : edge[e].prev[side], from = k == 0 ? end : top;
-            int outside = 1 - pal_wing_side(edge, external_force, from);
-            if (edge[external_force].face[outside] >= 0) {
-                add(to, opposite(w, external_force, outside), -0.0625);
+            int32_t outer = k == 0 ? edge[e].next[side] : edge[e].prev[side], from = k == 0 ? end : top;
+            int outside = 1 - pal_wing_side(edge, outer, from);
+            if (edge[outer].face[outside] >= 0) {
+                add(to, opposite(w, outer, outside), -0.0625);
                 continue;
             }
-            add(to, edge[external_force].vertex[0], -0.0625);
-            add(to, edge[external_force].vertex[1], -0.0625);
+            add(to, edge[outer].vertex[0], -0.0625);
+            add(to, edge[outer].vertex[1], -0.0625);
             add(to, k == 0 ? start : end, 0.0625);
         }
     }
@@ -140,19 +140,19 @@ static void end_rule(const pal_winged_mesh *w, int32_t e, int32_t v, double shar
 {
     fan f = fan_of(w, e, v);
     if (!f.rim) {
-        put(to, v, 0.75 * share);
+        set_entry(to, v, 0.75 * share);
         int32_t at = e;
         for (int i = 0; i < f.n_edge; i++, at = pal_wing_next_around(w->edge, at, v))
-            put(to, pal_wing_other_end(w->edge, at, v), share * pal_butterfly_ring(f.n_edge, i));
+            set_entry(to, pal_wing_other_end(w->edge, at, v), share * pal_butterfly_ring(f.n_edge, i));
         return;
     }
     int k = f.n_edge - 1, place = 0;
     int32_t at = f.first;
     while (at != e) at = pal_wing_next_around(w->edge, at, v), place++;
-    put(to, v, share * pal_butterfly_boundary(k, place, -1));
+    set_entry(to, v, share * pal_butterfly_boundary(k, place, -1));
     at = f.first;
     for (int j = 0; j <= k; j++, at = pal_wing_next_around(w->edge, at, v))
-        put(to, pal_wing_other_end(w->edge, at, v), share * pal_butterfly_boundary(k, place, j));
+        set_entry(to, pal_wing_other_end(w->edge, at, v), share * pal_butterfly_boundary(k, place, j));
 }
 
 /* the four-point rule; the boundary ends at its corners */
@@ -226,8 +226,8 @@ int pal_butterfly_stencil(const pal_winged_mesh *wings, int32_t e, int32_t *inde
     if (at->face[1] < 0)
         boundary_rule(wings, e, &to);
     else if (is_corner(wings, a) || is_corner(wings, b)) {
-        put(&to, a, 0.5);
-        put(&to, b, 0.5);
+        set_entry(&to, a, 0.5);
+        set_entry(&to, b, 0.5);
     } else {
         fan left = fan_of(wings, e, a), right = fan_of(wings, e, b);
         bool odd_a = !is_regular(&left), odd_b = !is_regular(&right);

@@ -1,10 +1,10 @@
-/* Modified butterfly subdivision (C eq. 3-5): the stencil of an edge's midpoint on a triangle surface.
+/* Modified butterfly subdivision (paper C eq. 3-5): the stencil of an edge's midpoint on a triangle surface.
  *
- * Surfaces are seen through winged edges (C, implementation). An edge runs from vertex[0] to vertex[1]; side 0 is the
- * face on its left, walked along the edge, side 1 the face on its right, walked against it; prev and next are the edges
- * before and after it on that walk. A hole counts as a face with number -1 whose walk follows the boundary, so that
- * prev and next exist everywhere and undo each other. A boundary edge has its hole on side 1.
- * Every vertex has one fan of faces. Thread: [any], nothing is kept. */
+ * Surfaces are seen through winged edges (paper C, implementation). An edge runs from vertex[0] to vertex[1]; side 0 is
+ * the face on its left, walked along the edge, side 1 the face on its right, walked against it; prev and next are the
+ * edges before and after it on that walk. A hole counts as a face with number -1 whose walk follows the boundary, so
+ * that prev and next exist everywhere and undo each other. A boundary edge has its hole on side 1. Every vertex has one
+ * fan of faces. Thread: [any], nothing is kept. */
 #ifndef PAL_MESH_GEOMETRY_BUTTERFLY_H
 #define PAL_MESH_GEOMETRY_BUTTERFLY_H
 #include <stdbool.h>

@@ -76,7 +76,7 @@ static void sample(lattice *l, pal_contour_field *field, const void *self, bool 
             }
 }
 
-static bool room(void **array, size_t *cap, size_t n, size_t size)
+static bool reserve(void **array, size_t *cap, size_t n, size_t size)
 {
     if (n < *cap) return true;
     size_t wanted = *cap ? 2 * *cap : 4096;
@@ -121,7 +121,7 @@ static bool rehash(lattice *l)
 }
 
 /* vertex on the crossed edge a-b, -1: no memory */
-static int32_t vertex_on(lattice *l, int64_t a, int64_t b)
+static int32_t edge_vertex(lattice *l, int64_t a, int64_t b)
 {
     if (2 * l->n_vertex >= l->n_slot && !rehash(l)) return -1;
     int64_t low = a < b ? a : b, high = a < b ? b : a;
@@ -129,7 +129,7 @@ static int32_t vertex_on(lattice *l, int64_t a, int64_t b)
     size_t slot = slot_of(l, key);
     if (l->key[slot]) return l->crossing[slot];
     void *x = l->x;
-    bool fits = room(&x, &l->cap_vertex, l->n_vertex, 3 * sizeof(double));
+    bool fits = reserve(&x, &l->cap_vertex, l->n_vertex, 3 * sizeof(double));
     l->x = x;
     if (!fits) return -1;
     double p[3], q[3], fp = (double)l->value[low], fq = (double)l->value[high], t = fp / (fp - fq);
@@ -146,7 +146,7 @@ static int32_t vertex_on(lattice *l, int64_t a, int64_t b)
 static bool add_triangle(lattice *l, int32_t a, int32_t b, int32_t c)
 {
     void *tri = l->tri;
-    bool fits = room(&tri, &l->cap_tri, l->n_tri, 3 * sizeof(int32_t));
+    bool fits = reserve(&tri, &l->cap_tri, l->n_tri, 3 * sizeof(int32_t));
     l->tri = tri;
     if (!fits || a < 0 || b < 0 || c < 0) return false;
     int32_t *t = l->tri + 3 * l->n_tri++;
@@ -171,8 +171,8 @@ static bool march(lattice *l, const int64_t id[4], int mask)
     int n_inside = __builtin_popcount((unsigned)mask);
     if (n_inside == 2) {
         const uint8_t *o = pair[mask];
-        int32_t ac = vertex_on(l, id[o[0]], id[o[2]]), ad = vertex_on(l, id[o[0]], id[o[3]]),
-                bd = vertex_on(l, id[o[1]], id[o[3]]), bc = vertex_on(l, id[o[1]], id[o[2]]);
+        int32_t ac = edge_vertex(l, id[o[0]], id[o[2]]), ad = edge_vertex(l, id[o[0]], id[o[3]]),
+                bd = edge_vertex(l, id[o[1]], id[o[3]]), bc = edge_vertex(l, id[o[1]], id[o[2]]);
         if (ac < 0 || ad < 0 || bd < 0 || bc < 0) return false;
         if (distance2(l, ac, bd) <= distance2(l, ad, bc))
             return add_triangle(l, ac, ad, bd) && add_triangle(l, ac, bd, bc);
@@ -180,8 +180,8 @@ static bool march(lattice *l, const int64_t id[4], int mask)
     }
     int single = n_inside == 1 ? mask : 15 - mask;
     const uint8_t *o = lone[__builtin_ctz((unsigned)single)];
-    int32_t b = vertex_on(l, id[o[0]], id[o[1]]), c = vertex_on(l, id[o[0]], id[o[2]]),
-            d = vertex_on(l, id[o[0]], id[o[3]]);
+    int32_t b = edge_vertex(l, id[o[0]], id[o[1]]), c = edge_vertex(l, id[o[0]], id[o[2]]),
+            d = edge_vertex(l, id[o[0]], id[o[3]]);
     return n_inside == 1 ? add_triangle(l, b, c, d) : add_triangle(l, b, d, c);
 }
 

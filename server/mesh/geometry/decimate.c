@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_RING = 24, MOST_DEGREE = 12 };
+enum { MAX_RING = 24, MAX_DEGREE = 12 };
 /* pull to the edge's middle, as part of the quadric's area: spreads vertices evenly where the surface is flat */
 static const double pull = 1e-3;
 /* triangles below this shape (0 flat, 0.577 equilateral) are thin */
@@ -57,7 +57,7 @@ static double quadric_at(const quadric *q, const double x[3])
 }
 
 /* where the quadric is least; false when that is not well defined */
-static bool quadric_least(const quadric *q, double x[3])
+static bool quadric_minimum(const quadric *q, double x[3])
 {
     const double *a = q->a;
     double c0 = a[3] * a[5] - a[4] * a[4], c1 = a[2] * a[4] - a[1] * a[5], c2 = a[1] * a[4] - a[2] * a[3];
@@ -109,13 +109,13 @@ static double collapse_place(const pass *p, int32_t u, int32_t v, double x[3])
     q.a[0] += w, q.a[3] += w, q.a[5] += w;
     for (int k = 0; k < 3; k++) q.b[k] -= w * middle[k];
     q.c += w * pal_dot3(middle, middle);
-    if (!quadric_least(&q, x) || pal_dist3(x, middle) > pal_dist3(xu, xv)) pal_copy3(x, middle);
+    if (!quadric_minimum(&q, x) || pal_dist3(x, middle) > pal_dist3(xu, xv)) pal_copy3(x, middle);
     return quadric_at(&q, x);
 }
 
 /* the ring around an unlocked vertex now: the corners after u of each live triangle. -1: not one closed fan, or large
  */
-static int ring_of(const pass *p, int32_t u, int32_t ring[MOST_RING][2])
+static int ring_of(const pass *p, int32_t u, int32_t ring[MAX_RING][2])
 {
     int n = 0;
     for (int k = p->start[u]; k < p->start[u + 1]; k++) {
@@ -123,7 +123,7 @@ static int ring_of(const pass *p, int32_t u, int32_t ring[MOST_RING][2])
         int i = c[0] == u ? 0 : c[1] == u ? 1 : 2;
         int32_t a = p->remap[c[(i + 1) % 3]], b = p->remap[c[(i + 2) % 3]];
         if (a == b) continue;
-        if (n == MOST_RING) return -1;
+        if (n == MAX_RING) return -1;
         ring[n][0] = a;
         ring[n++][1] = b;
     }
@@ -131,7 +131,7 @@ static int ring_of(const pass *p, int32_t u, int32_t ring[MOST_RING][2])
 }
 
 /* is the ring one closed cycle? sorts it into the cycle's order */
-static bool ring_closed(int32_t ring[MOST_RING][2], int n)
+static bool ring_closed(int32_t ring[MAX_RING][2], int n)
 {
     for (int k = 0; k + 1 < n; k++) {
         int next = k + 1;
@@ -149,7 +149,7 @@ static bool ring_closed(int32_t ring[MOST_RING][2], int n)
 }
 
 /* link condition: the two rings meet in the two apexes only, and these are not joined in both rings */
-static bool link_allows(int32_t ru[MOST_RING][2], int nu, int32_t rv[MOST_RING][2], int nv)
+static bool link_condition(int32_t ru[MAX_RING][2], int nu, int32_t rv[MAX_RING][2], int nv)
 {
     int n_common = 0, n_joined = 0;
     for (int i = 0; i < nu; i++)
@@ -179,10 +179,10 @@ typedef struct thin_sum {
 
 /* do the triangles of one end stay upright when it moves to x? other: the end that vanishes with it. The normal of a
  * thin or tiny triangle says nothing, so such a one is compared with the whole ring's. */
-static bool stays_upright(const pass *p, int32_t u, int32_t other, int32_t ring[MOST_RING][2], int n, const double x[3],
-                          thin_sum *sum)
+static bool keeps_orientation(const pass *p, int32_t u, int32_t other, int32_t ring[MAX_RING][2], int n,
+                              const double x[3], thin_sum *sum)
 {
-    double largest = 0, shape[MOST_RING], normal[MOST_RING][3], mean[3] = {0, 0, 0};
+    double largest = 0, shape[MAX_RING], normal[MAX_RING][3], mean[3] = {0, 0, 0};
     const double *xs = p->s->x, *xu = xs + 3 * (size_t)u;
     for (int k = 0; k < n; k++) {
         shape[k] = thinness(xu, xs + 3 * (size_t)ring[k][0], xs + 3 * (size_t)ring[k][1], normal[k]);
@@ -203,14 +203,14 @@ static bool stays_upright(const pass *p, int32_t u, int32_t other, int32_t ring[
 /* collapses u into v if that is allowed */
 static bool collapse(pass *p, int32_t u, int32_t v)
 {
-    int32_t ru[MOST_RING][2], rv[MOST_RING][2];
+    int32_t ru[MAX_RING][2], rv[MAX_RING][2];
     int nu = ring_of(p, u, ru), nv = ring_of(p, v, rv);
-    if (nu < 3 || nv < 3 || nu + nv - 4 > MOST_DEGREE) return false;
-    if (!ring_closed(ru, nu) || !ring_closed(rv, nv) || !link_allows(ru, nu, rv, nv)) return false;
+    if (nu < 3 || nv < 3 || nu + nv - 4 > MAX_DEGREE) return false;
+    if (!ring_closed(ru, nu) || !ring_closed(rv, nv) || !link_condition(ru, nu, rv, nv)) return false;
     double x[3];
     collapse_place(p, u, v, x);
     thin_sum sum = {0, 0};
-    if (!stays_upright(p, u, v, ru, nu, x, &sum) || !stays_upright(p, v, u, rv, nv, x, &sum)) return false;
+    if (!keeps_orientation(p, u, v, ru, nu, x, &sum) || !keeps_orientation(p, v, u, rv, nv, x, &sum)) return false;
     if (sum.after > sum.before + thin_room) return false;
     pal_copy3(p->s->x + 3 * (size_t)v, x);
     quadric_add(&p->q[v], &p->q[u]);
@@ -275,7 +275,7 @@ static int32_t triangle_at(const pass *p, int32_t a, int32_t b, int *count)
 }
 
 /* would the two triangles beside the edge a-b, with apexes o (left) and d (right), be better shaped beside o-d? */
-static bool flip_helps(const double *a, const double *b, const double *o, const double *d)
+static bool flip_improves(const double *a, const double *b, const double *o, const double *d)
 {
     double n[4][3], sum[3];
     double before = fmin(thinness(a, b, o, n[0]), thinness(b, a, d, n[1]));
@@ -308,7 +308,7 @@ static bool flip(pass *p, int32_t t)
     triangle_at(p, o, d, &n_across);
     bool few = p->start[a + 1] - p->start[a] < 4 || p->start[b + 1] - p->start[b] < 4;
     if (few || n_across > 0 || o == d || p->locked[a] || p->locked[b] || p->locked[o] || p->locked[d]) return false;
-    if (!flip_helps(xs + 3 * (size_t)a, xs + 3 * (size_t)b, xs + 3 * (size_t)o, xs + 3 * (size_t)d)) return false;
+    if (!flip_improves(xs + 3 * (size_t)a, xs + 3 * (size_t)b, xs + 3 * (size_t)o, xs + 3 * (size_t)d)) return false;
     p->locked[a] = p->locked[b] = p->locked[o] = p->locked[d] = 1;
     c[0] = o, c[1] = a, c[2] = d;
     e[0] = d, e[1] = b, e[2] = o;

@@ -60,18 +60,18 @@ static void select_middle(pal_kd_tree *tree, int low, int high, int middle, int 
 static void build(pal_kd_tree *tree, int low, int high)
 {
     if (high - low < LEAF) return;
-    double least[3], most[3];
-    memcpy(least, tree->x + 3 * (size_t)low, sizeof least);
-    memcpy(most, least, sizeof most);
+    double min[3], max[3];
+    memcpy(min, tree->x + 3 * (size_t)low, sizeof min);
+    memcpy(max, min, sizeof max);
     for (int i = low + 1; i <= high; i++)
         for (int k = 0; k < 3; k++) {
             double v = tree->x[3 * (size_t)i + k];
-            if (v < least[k]) least[k] = v;
-            if (v > most[k]) most[k] = v;
+            if (v < min[k]) min[k] = v;
+            if (v > max[k]) max[k] = v;
         }
     int axis = 0, middle = low + (high - low) / 2;
     for (int k = 1; k < 3; k++)
-        if (most[k] - least[k] > most[axis] - least[axis]) axis = k;
+        if (max[k] - min[k] > max[axis] - min[axis]) axis = k;
     select_middle(tree, low, high, middle, axis);
     tree->axis[middle] = (uint8_t)axis;
     build(tree, low, middle - 1);
@@ -113,7 +113,7 @@ typedef struct query {
 } query;
 
 /* keeps the k best, ascending by distance, then index */
-static void offer(query *q, int i)
+static void consider(query *q, int i)
 {
     const double *x = q->tree->x + 3 * (size_t)i;
     double a = x[0] - q->p[0], b = x[1] - q->p[1], c = x[2] - q->p[2], d = a * a + b * b + c * c;
@@ -134,12 +134,12 @@ static void offer(query *q, int i)
 static void descend(query *q, int low, int high)
 {
     if (high - low < LEAF) {
-        for (int i = low; i <= high; i++) offer(q, i);
+        for (int i = low; i <= high; i++) consider(q, i);
         return;
     }
     int middle = low + (high - low) / 2, axis = q->tree->axis[middle];
     double to_plane = q->p[axis] - q->tree->x[3 * (size_t)middle + axis];
-    offer(q, middle);
+    consider(q, middle);
     bool first_low = to_plane < 0;
     for (int side = 0; side < 2; side++) {
         bool far_side = side == 1;

@@ -1,4 +1,4 @@
-/* Detail levels: checks, edges of the coarse surface, then split by split (C, pre-processing phase).
+/* Detail levels: checks, edges of the coarse surface, then split by split (paper C, pre-processing phase).
  *
  * Departures: the paper stores pointers to parents and children; here they follow from the order of the numbers. It
  * takes any mesh; here what has no winged edges or no stencil is refused by name, and the boundary's corners, which the

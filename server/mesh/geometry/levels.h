@@ -1,4 +1,4 @@
-/* All detail levels of a triangle surface, made once before a session (C, spatial adaptation).
+/* All detail levels of a triangle surface, made once before a session (paper C, spatial adaptation).
  *
  * Each level splits every face of the level before into four (1 to 4), with the midpoint of each edge placed by
  * modified butterfly subdivision (butterfly.h). The scheme interpolates: vertices of a level stay vertices of every

@@ -56,12 +56,12 @@ static inline void pal_polygon_cut_axis(const pal_polygon *p, int axis, double a
     }
 }
 
-static inline void pal_polygon_range(const pal_polygon *p, int axis, double *least, double *most)
+static inline void pal_polygon_range(const pal_polygon *p, int axis, double *min, double *max)
 {
-    *least = *most = p->x[0][axis];
+    *min = *max = p->x[0][axis];
     for (int i = 1; i < p->n; i++) {
-        if (p->x[i][axis] < *least) *least = p->x[i][axis];
-        if (p->x[i][axis] > *most) *most = p->x[i][axis];
+        if (p->x[i][axis] < *min) *min = p->x[i][axis];
+        if (p->x[i][axis] > *max) *max = p->x[i][axis];
     }
 }
 #endif

@@ -28,7 +28,7 @@ static void step(pal_surface *s, double factor, double *sum, const int32_t *degr
 }
 
 /* a vertex is held when its outgoing neighbours are not its incoming ones: it lies on an open or flipped edge */
-static void find_held(const pal_surface *s, int32_t *degree, int64_t *balance, uint8_t *fixed)
+static void find_fixed(const pal_surface *s, int32_t *degree, int64_t *balance, uint8_t *fixed)
 {
     for (int i = 0; i < s->n_vertex; i++) degree[i] = 0, balance[i] = 0;
     for (size_t t = 0; t < (size_t)s->n_tri; t++) {
@@ -43,17 +43,17 @@ static void find_held(const pal_surface *s, int32_t *degree, int64_t *balance, u
 
 /* pulls every vertex back to within its reach of its start, measured along its normal there, and to within twice that
  * across it: sliding along the surface does not change the shape */
-static void hold_back(pal_surface *s, const double *start, const double *normal, const double *reach_m)
+static void limit_displacement(pal_surface *s, const double *start, const double *normal, const double *reach_m)
 {
     for (size_t i = 0; i < (size_t)s->n_vertex; i++) {
         const double *n = normal + 3 * i;
-        double d[3], most = reach_m[i];
+        double d[3], max = reach_m[i];
         pal_sub3(d, s->x + 3 * i, start + 3 * i);
         double along = pal_dot3(d, n);
         pal_axpy3(d, -along, n);
-        double across = pal_norm3(d), part = across > 2 * most ? 2 * most / across : 1;
+        double across = pal_norm3(d), part = across > 2 * max ? 2 * max / across : 1;
         pal_copy3(s->x + 3 * i, start + 3 * i);
-        pal_axpy3(s->x + 3 * i, fmin(fmax(along, -most), most), n);
+        pal_axpy3(s->x + 3 * i, fmin(fmax(along, -max), max), n);
         pal_axpy3(s->x + 3 * i, part, d);
     }
 }
@@ -71,11 +71,11 @@ static pal_err run(pal_surface *surface, int rounds, const double *reach_m)
     if (!err) {
         memcpy(start, surface->x, 3 * (size_t)surface->n_vertex * sizeof *start);
         pal_surface_normals(surface, normal);
-        find_held(surface, degree, balance, fixed);
+        find_fixed(surface, degree, balance, fixed);
         for (int k = 0; k < rounds; k++) {
             step(surface, there, sum, degree, fixed);
             if (reach_m)
-                hold_back(surface, start, normal, reach_m);
+                limit_displacement(surface, start, normal, reach_m);
             else
                 step(surface, back, sum, degree, fixed);
         }

@@ -25,7 +25,7 @@ typedef struct node {
     double x[3], r; /* m */
 } node;
 
-typedef struct adaptive {
+typedef struct hollow {
     pal_surface *s;
     shape inside;
     int32_t *owner;   /* face that runs from a to b, or -1          [n_vertex][n_vertex] */
@@ -33,7 +33,7 @@ typedef struct adaptive {
     uint8_t *fixed;   /* [n_vertex] */
     double *move;     /* [n_vertex][4] */
     double reach;     /* longest way in a step, m */
-} adaptive;
+} hollow;
 
 /* ---- rings ---- */
 
@@ -85,11 +85,11 @@ static int zip(int n_a, int32_t a, int n_b, int32_t b, int32_t *tri)
 }
 
 /* all rings along the spine as one closed surface */
-static pal_err make_tube(const ring *rings, int n_ring, const node *spine, int n_node, adaptive *sh)
+static pal_err make_tube(const ring *rings, int n_ring, const node *spine, int n_node, hollow *body)
 {
     int n_vertex = 0, first = 0;
     for (int k = 0; k < n_ring; k++) n_vertex += rings[k].n;
-    pal_surface *s = sh->s;
+    pal_surface *s = body->s;
     *s = (pal_surface){.n_vertex = n_vertex};
     s->x = malloc((size_t)n_vertex * 3 * sizeof *s->x);
     s->tri = malloc((size_t)n_vertex * 6 * sizeof *s->tri);
@@ -99,7 +99,7 @@ static pal_err make_tube(const ring *rings, int n_ring, const node *spine, int n
         double axis[3];
         spine_at(spine, n_node, rings[k].along, &at, axis);
         ring_vertices(&rings[k], &at, axis, s->x + 3 * first);
-        memset(sh->fixed + first, rings[k].fixed, (size_t)rings[k].n);
+        memset(body->fixed + first, rings[k].fixed, (size_t)rings[k].n);
         if (k > 0) s->n_tri += zip(rings[k - 1].n, first - rings[k - 1].n, rings[k].n, first, s->tri + 3 * s->n_tri);
         first += rings[k].n;
     }
@@ -121,16 +121,16 @@ static void gradient(shape inside, const double p[3], double g[3])
     }
 }
 
-static void count_around(adaptive *sh)
+static void count_around(hollow *body)
 {
-    const pal_surface *s = sh->s;
+    const pal_surface *s = body->s;
     size_t n = (size_t)s->n_vertex;
-    memset(sh->owner, -1, n * n * sizeof *sh->owner);
-    memset(sh->valence, 0, n);
+    memset(body->owner, -1, n * n * sizeof *body->owner);
+    memset(body->valence, 0, n);
     for (int c = 0; c < 3 * s->n_tri; c++) {
         int32_t a = s->tri[c], b = s->tri[c % 3 == 2 ? c - 2 : c + 1];
-        sh->owner[(size_t)a * n + (size_t)b] = c / 3;
-        sh->valence[a]++;
+        body->owner[(size_t)a * n + (size_t)b] = c / 3;
+        body->valence[a]++;
     }
 }
 
@@ -171,69 +171,69 @@ static bool stays_flat(const double *x, int32_t a, int32_t b, int32_t c, int32_t
 }
 
 /* turns the edge a b of two faces into c d when its opposite angles are more than a half circle together */
-static void turn_edge(adaptive *sh, int32_t a, int32_t b)
+static void flip_edge(hollow *body, int32_t a, int32_t b)
 {
-    const pal_surface *s = sh->s;
+    const pal_surface *s = body->s;
     size_t n = (size_t)s->n_vertex;
-    int32_t left = sh->owner[(size_t)a * n + (size_t)b], right = sh->owner[(size_t)b * n + (size_t)a];
+    int32_t left = body->owner[(size_t)a * n + (size_t)b], right = body->owner[(size_t)b * n + (size_t)a];
     int32_t *tl = s->tri + 3 * left, *tr = s->tri + 3 * right, c = third(tl, a, b), d = third(tr, a, b);
     const double *x = s->x;
-    if (sh->fixed[a] && sh->fixed[b]) return;
-    if (sh->valence[a] < 5 || sh->valence[b] < 5 || sh->valence[c] > 6 || sh->valence[d] > 6) return;
-    if (sh->owner[(size_t)c * n + (size_t)d] >= 0 || sh->owner[(size_t)d * n + (size_t)c] >= 0) return;
+    if (body->fixed[a] && body->fixed[b]) return;
+    if (body->valence[a] < 5 || body->valence[b] < 5 || body->valence[c] > 6 || body->valence[d] > 6) return;
+    if (body->owner[(size_t)c * n + (size_t)d] >= 0 || body->owner[(size_t)d * n + (size_t)c] >= 0) return;
     if (cotangent(x + 3 * c, x + 3 * a, x + 3 * b) + cotangent(x + 3 * d, x + 3 * a, x + 3 * b) > -1e-3) return;
     if (!stays_flat(x, a, b, c, d)) return;
     int32_t one[3] = {c, d, b}, two[3] = {d, c, a};
     memcpy(tl, one, sizeof one);
     memcpy(tr, two, sizeof two);
-    sh->owner[(size_t)a * n + (size_t)b] = sh->owner[(size_t)b * n + (size_t)a] = -1;
-    sh->owner[(size_t)c * n + (size_t)d] = sh->owner[(size_t)d * n + (size_t)b] = sh->owner[(size_t)b * n + (size_t)c] =
-        left;
-    sh->owner[(size_t)d * n + (size_t)c] = sh->owner[(size_t)c * n + (size_t)a] = sh->owner[(size_t)a * n + (size_t)d] =
-        right;
-    sh->valence[a]--, sh->valence[b]--, sh->valence[c]++, sh->valence[d]++;
+    body->owner[(size_t)a * n + (size_t)b] = body->owner[(size_t)b * n + (size_t)a] = -1;
+    body->owner[(size_t)c * n + (size_t)d] = body->owner[(size_t)d * n + (size_t)b] =
+        body->owner[(size_t)b * n + (size_t)c] = left;
+    body->owner[(size_t)d * n + (size_t)c] = body->owner[(size_t)c * n + (size_t)a] =
+        body->owner[(size_t)a * n + (size_t)d] = right;
+    body->valence[a]--, body->valence[b]--, body->valence[c]++, body->valence[d]++;
 }
 
-static void to_surface(const adaptive *sh, double x[3])
+static void to_surface(const hollow *body, double x[3])
 {
     for (int k = 0; k < 3; k++) {
-        double g[3], depth = sh->inside(x);
-        if (fabs(depth) < 1e-6 * sh->reach) return;
-        gradient(sh->inside, x, g);
-        double gg = fmax(pal_dot3(g, g), 1e-6), most = sh->reach / sqrt(gg);
-        pal_axpy3(x, fmax(fmin(-depth / gg, most), -most), g);
+        double g[3], depth = body->inside(x);
+        if (fabs(depth) < 1e-6 * body->reach) return;
+        gradient(body->inside, x, g);
+        double gg = fmax(pal_dot3(g, g), 1e-6), max = body->reach / sqrt(gg);
+        pal_axpy3(x, fmax(fmin(-depth / gg, max), -max), g);
     }
 }
 
 /* along the surface a share of the way to the middle of the faces around, and onto the zero set; the middle is weighted
  * by area, or the vertices would slip off together as a rubber band slips off a ball */
-static void spread(adaptive *sh, double share)
+static void smooth_tangentially(hollow *body, double share)
 {
-    pal_surface *s = sh->s;
-    memset(sh->move, 0, 4 * (size_t)s->n_vertex * sizeof *sh->move);
+    pal_surface *s = body->s;
+    memset(body->move, 0, 4 * (size_t)s->n_vertex * sizeof *body->move);
     for (int t = 0; t < s->n_tri; t++) {
         const int32_t *c = s->tri + 3 * t;
         double n[3];
         face_normal(s->x, c[0], c[1], c[2], n);
         double area = pal_norm3(n);
-        for (int k = 0; k < 9; k++) pal_axpy3(sh->move + 4 * c[k / 3], area / 3, s->x + 3 * c[k % 3]);
-        for (int k = 0; k < 3; k++) sh->move[4 * c[k] + 3] += area;
+        for (int k = 0; k < 9; k++) pal_axpy3(body->move + 4 * c[k / 3], area / 3, s->x + 3 * c[k % 3]);
+        for (int k = 0; k < 3; k++) body->move[4 * c[k] + 3] += area;
     }
     for (int v = 0; v < s->n_vertex; v++) {
-        if (sh->fixed[v]) continue;
-        double *x = s->x + 3 * v, *to = sh->move + 4 * v, g[3];
+        if (body->fixed[v]) continue;
+        double *x = s->x + 3 * v, *to = body->move + 4 * v, g[3];
         pal_scale3(to, 1 / to[3], to);
         pal_sub3(to, to, x);
-        gradient(sh->inside, x, g);
+        gradient(body->inside, x, g);
         double gg = fmax(pal_dot3(g, g), 1e-6);
         pal_axpy3(to, -pal_dot3(to, g) / gg, g);
         pal_axpy3(x, share, to);
-        to_surface(sh, x);
+        to_surface(body, x);
     }
 }
 
 /* cosine of the least angle of the faces of a vertex at x and the n sides across from it */
-static double worst_cosine(const double *all, const double x[3], int32_t side[][2], int n)
+static double min_cosine(const double *all, const double x[3], int32_t side[][2], int n)
 {
     double worst = -1;
     for (int i = 0; i < n; i++) {
@@ -249,10 +249,10 @@ static double worst_cosine(const double *all, const double x[3], int32_t side[][
 }
 
 /* small steps along the surface that widen the least angle around a vertex */
-static void widen(adaptive *sh, int32_t v, double step)
+static void widen(hollow *body, int32_t v, double step)
 {
     enum { WAYS = 8 };
-    pal_surface *s = sh->s;
+    pal_surface *s = body->s;
     double *x = s->x + 3 * v, g[3], up[3] = {0, 0, 1}, side[3];
     int32_t around[16][2];
     int n = 0;
@@ -260,21 +260,21 @@ static void widen(adaptive *sh, int32_t v, double step)
         const int32_t *t = s->tri + 3 * (c / 3);
         if (s->tri[c] == v) around[n][0] = t[(c + 1) % 3], around[n++][1] = t[(c + 2) % 3];
     }
-    gradient(sh->inside, x, g);
+    gradient(body->inside, x, g);
     if (!pal_unit3(g, g, 0)) return;
     if (fabs(g[2]) > 0.7) pal_set3(up, 1, 0, 0);
     pal_cross3(side, g, up);
     pal_unit3(side, side, 0);
     pal_cross3(up, side, g);
-    double best = worst_cosine(s->x, x, around, n), from[3];
+    double best = min_cosine(s->x, x, around, n), from[3];
     pal_copy3(from, x);
     for (int k = 0; k < WAYS && best > WIDE_COS; k++) {
         double to[3];
         pal_copy3(to, from);
         pal_axpy3(to, step * cos(2 * PI * k / WAYS), side);
         pal_axpy3(to, step * sin(2 * PI * k / WAYS), up);
-        to_surface(sh, to);
-        double now = worst_cosine(s->x, to, around, n);
+        to_surface(body, to);
+        double now = min_cosine(s->x, to, around, n);
         if (now < best) best = now, pal_copy3(x, to);
     }
 }
@@ -286,21 +286,21 @@ static pal_err make_shell(const ring *rings, int n_ring, const node *spine, int 
     enum { MOST = 256, STEPS = 500, WIDENINGS = 40 };
     uint8_t valence[MOST], fixed[MOST];
     pal_surface s;
-    adaptive sh = {
+    hollow body = {
         &s, inside, malloc(MOST * MOST * sizeof(int32_t)), valence, fixed, malloc(MOST * 4 * sizeof(double)), reach};
-    pal_err err = sh.owner && sh.move ? make_tube(rings, n_ring, spine, n_node, &sh) : PAL_ERR_MEMORY;
+    pal_err err = body.owner && body.move ? make_tube(rings, n_ring, spine, n_node, &body) : PAL_ERR_MEMORY;
     for (int step = 0; !err && step < STEPS; step++) {
-        count_around(&sh);
+        count_around(&body);
         for (int32_t a = 0; a < s.n_vertex; a++)
             for (int32_t b = 0; b < a; b++)
-                if (sh.owner[a * s.n_vertex + b] >= 0) turn_edge(&sh, a, b);
-        spread(&sh, step < STEPS / 4 ? 0.05 : 0.5);
+                if (body.owner[a * s.n_vertex + b] >= 0) flip_edge(&body, a, b);
+        smooth_tangentially(&body, step < STEPS / 4 ? 0.05 : 0.5);
     }
     for (int step = 0; !err && step < WIDENINGS; step++)
         for (int32_t v = 0; v < s.n_vertex; v++)
-            if (!sh.fixed[v]) widen(&sh, v, reach / (2 + step));
-    free(sh.owner);
-    free(sh.move);
+            if (!body.fixed[v]) widen(&body, v, reach / (2 + step));
+    free(body.owner);
+    free(body.move);
     if (err)
         pal_surface_free(&s);
     else

@@ -1,4 +1,4 @@
-/* Procedural hollow bodies of our own for the adaptive surface springs (C, Table I): a sphere of 114 vertices, a
+/* Procedural hollow bodies of our own for the adaptive surface springs (paper C, Table I): a sphere of 114 vertices, a
  * stomach of 188, a sheet of fabric. The same surface every time; each is taken from the heap (pal_surface_free).
  * Thread: [load]. */
 #ifndef PAL_MESH_GEOMETRY_STOMACH_H

@@ -13,7 +13,7 @@
 /* a triangle whose height is below this part of its longest side has no area */
 #define HEIGHT_LIMIT 1e-12
 /* flat triangles at a vertex of more triangles than this are dropped, not mended, so that the time stays linear */
-enum { MOST_FAN = 64 };
+enum { MAX_FAN = 64 };
 
 typedef struct cleaner {
     pal_surface *surface;
@@ -162,7 +162,7 @@ static int32_t neighbour(const pal_surface *s, const int32_t *start, const int32
                          int32_t b)
 {
     int32_t found = -1, n = 0;
-    if (start[a + 1] - start[a] > MOST_FAN) return -1;
+    if (start[a + 1] - start[a] > MAX_FAN) return -1;
     for (int k = start[a]; k < start[a + 1]; k++) {
         const int32_t *c = s->tri + 3 * (size_t)item[k];
         if (item[k] == t || (c[0] != b && c[1] != b && c[2] != b)) continue;
@@ -174,7 +174,7 @@ static int32_t neighbour(const pal_surface *s, const int32_t *start, const int32
 
 /* a flat triangle with three corners lies along its longest edge a-c with b in between: the triangle a-c-d on the
  * other side is split at b, which keeps the surface closed where dropping the flat one would leave a slit */
-static bool mend(cleaner *k, const int32_t *start, const int32_t *item, int32_t t)
+static bool split_neighbour(cleaner *k, const int32_t *start, const int32_t *item, int32_t t)
 {
     pal_surface *s = k->surface;
     int32_t *c = s->tri + 3 * (size_t)t;
@@ -193,7 +193,7 @@ static bool mend(cleaner *k, const int32_t *start, const int32_t *item, int32_t 
     if (i == 3) return false;
     int32_t d = e[(i + 2) % 3];
     const int32_t one[3] = {from, b, d}, two[3] = {b, to, d};
-    bool busy = start[b + 1] - start[b] > MOST_FAN || k->next[to] || k->next[from] || k->next[b] || k->next[d];
+    bool busy = start[b + 1] - start[b] > MAX_FAN || k->next[to] || k->next[from] || k->next[b] || k->next[d];
     if (busy || !has_area(s, one) || !has_area(s, two)) return false;
     for (int m = start[b]; m < start[b + 1]; m++)
         for (int a = 0; a < 3; a++)
@@ -206,7 +206,7 @@ static bool mend(cleaner *k, const int32_t *start, const int32_t *item, int32_t 
 }
 
 /* mends flat triangles in rounds; a vertex takes part once in a round, so that its fan is still the one at hand */
-static pal_err mend_flat(cleaner *k)
+static pal_err repair_flat(cleaner *k)
 {
     pal_surface *s = k->surface;
     for (int round = 0, n = 1; round < 16 && n > 0; round++) {
@@ -222,7 +222,7 @@ static pal_err mend_flat(cleaner *k)
         n = 0;
         for (int t = 0; t < s->n_tri; t++) {
             const int32_t *c = s->tri + 3 * (size_t)t;
-            if (!repeats_corner(c) && !has_area(s, c)) n += mend(k, start, item, t);
+            if (!repeats_corner(c) && !has_area(s, c)) n += split_neighbour(k, start, item, t);
         }
         free(start);
         free(item);
@@ -239,7 +239,7 @@ static void sort_corners(int32_t r[3], const int32_t c[3])
 }
 
 /* 1 or -1 by the sense in which the corners run through their sorted order */
-static int sense(const int32_t c[3])
+static int orientation(const int32_t c[3])
 {
     return (c[0] < c[1]) + (c[1] < c[2]) + (c[2] < c[0]) == 2 ? 1 : -1;
 }
@@ -285,7 +285,7 @@ static pal_err drop_duplicate(cleaner *k)
         }
         int32_t first = k->bucket[b];
         if (first >= 0) {
-            bool same = sense(c) == sense(s->tri + 3 * (size_t)first);
+            bool same = orientation(c) == orientation(s->tri + 3 * (size_t)first);
             if (balance[first] < 100 && balance[first] > -100) balance[first] += same ? 1 : -1;
             continue;
         }
@@ -339,10 +339,10 @@ static void measure(cleaner *k, double tolerance)
 
 pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_report *report, pal_diagnostic *diag)
 {
-    size_t n_vertex = (size_t)surface->n_vertex, most = n_vertex;
-    if ((size_t)surface->n_tri > most) most = (size_t)surface->n_tri;
+    size_t n_vertex = (size_t)surface->n_vertex, max = n_vertex;
+    if ((size_t)surface->n_tri > max) max = (size_t)surface->n_tri;
     cleaner k = {.surface = surface, .n_bucket = 16};
-    while (k.n_bucket < 2 * most) k.n_bucket *= 2;
+    while (k.n_bucket < 2 * max) k.n_bucket *= 2;
     k.map = malloc((n_vertex + 1) * sizeof *k.map);
     k.next = malloc((n_vertex + 1) * sizeof *k.next);
     k.bucket = malloc(k.n_bucket * sizeof *k.bucket);
@@ -353,7 +353,7 @@ pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_re
         drop_nonfinite(&k);
         measure(&k, tolerance);
         weld(&k);
-        err = mend_flat(&k);
+        err = repair_flat(&k);
         drop_degenerate(&k);
         if (!err) err = drop_duplicate(&k);
         compact(&k);

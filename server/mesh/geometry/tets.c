@@ -106,13 +106,13 @@ static void sort_face(const int32_t *corner, int opposite, int32_t node[3])
 }
 
 /* turns counts at start[i + 1] into starts */
-static void add_up(int64_t *start, int n)
+static void prefix_sum(int64_t *start, int n)
 {
     for (int i = 0; i < n; i++) start[i + 1] += start[i];
 }
 
 /* undoes the filling pass, which moved every start to its bucket's end */
-static void step_back(int64_t *start, int n)
+static void restore_starts(int64_t *start, int n)
 {
     memmove(start + 1, start, sizeof *start * (size_t)n);
     start[0] = 0;
@@ -140,13 +140,13 @@ static pal_err sides_make(const pal_tets *tets, sides *out)
             sort_face(tets->tet + 4 * t, k, node);
             start[node[0] + 1]++;
         }
-    add_up(start, tets->n_node);
+    prefix_sum(start, tets->n_node);
     for (size_t t = 0; t < n_tet; t++)
         for (int k = 0; k < 4; k++) {
             sort_face(tets->tet + 4 * t, k, node);
             item[start[node[0]]++] = (side){node[1], node[2], (uint32_t)(4 * t) + (uint32_t)k};
         }
-    step_back(start, tets->n_node);
+    restore_starts(start, tets->n_node);
 
     for (size_t i = 0; i < n_node; i++) sort_sides(item + start[i], start[i + 1] - start[i]);
     *out = (sides){start, item};
@@ -223,9 +223,9 @@ pal_err pal_tets_edges(const pal_tets *tets, int32_t **out, int *n_edge)
                 else
                     end[start[low]++] = a < b ? b : a;
             }
-        if (pass == 0) add_up(start, tets->n_node);
+        if (pass == 0) prefix_sum(start, tets->n_node);
     }
-    step_back(start, tets->n_node);
+    restore_starts(start, tets->n_node);
 
     /* sort each bucket and keep the different ends, packed to the front of the same array */
     int64_t n_kept = 0;

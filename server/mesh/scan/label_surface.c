@@ -4,10 +4,9 @@
  * encloses the label's voxel volume; smooth; decimate; move all vertices along their normals by the small distance that
  * makes the volume exact.
  *
- * No staircase: a surface that is nearly parallel to the slices is a flight of terraces one voxel high and many wide,
- * which no small blur removes. Smoothing here is therefore long, and held back only by what the voxels say: no vertex
- * moves farther than three quarters of a voxel's extent along its normal (after Gibson's constrained elastic nets,
- * 1998). */
+ * A surface that is nearly parallel to the slices is a staircase of terraces one voxel high and many wide, which no
+ * small blur removes. Smoothing here is therefore long, and bounded only by the voxels: no vertex moves farther than
+ * three quarters of a voxel's extent along its normal (after Gibson's constrained elastic nets, 1998). */
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/contour.h"
 #include "server/mesh/geometry/decimate.h"
@@ -18,11 +17,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { DEFAULT_ROUNDS = 60, LAST_ROUNDS = 5, N_BIN = 1 << 16, MOST_RADIUS = 64 };
-/* triangles of the contour for each one wanted in the end, and of the lattice for each squared spacing */
+enum { DEFAULT_ROUNDS = 60, LAST_ROUNDS = 5, N_BIN = 1 << 16, MAX_RADIUS = 64 };
+/* triangles of the contour for each requested one, and of the lattice for each squared spacing */
 static const double surplus = 3, per_spacing2 = 9;
-/* how far smoothing may move a vertex along its normal, as part of a voxel: half a voxel that the scan leaves open, and
- * what the blur has moved */
+/* maximum displacement of a vertex along its normal by smoothing, as a fraction of a voxel: half a voxel of uncertainty
+ * of the scan, and the displacement by the blur */
 static const double voxel_reach = 0.75;
 /* the blur's margin may not cost more than 16 times the label's box and this many voxels */
 static const size_t spare_voxel = (size_t)1 << 24;
@@ -157,7 +156,7 @@ static pal_err crop_label(const pal_label_volume *volume, int32_t label, crop *c
     return PAL_ERR_OK;
 }
 
-/* turns the 6-connected part of value `from` at seed into `to`; stack [n_voxel] of indices; number of voxels */
+/* relabels the 6-connected part of value `from` at seed as `to`; stack [n_voxel] of indices; number of voxels */
 static int64_t flood(const crop *c, int32_t seed, uint8_t from, uint8_t to, int32_t *stack)
 {
     int32_t step[3] = {1, c->n[0], c->n[0] * c->n[1]};
@@ -185,11 +184,11 @@ static pal_err keep_largest(crop *c, pal_diagnostic *diag)
 {
     int32_t *stack = malloc(c->n_voxel * sizeof *stack), best = -1;
     if (!stack) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory to sort %zu voxels", c->n_voxel);
-    int64_t most = 0;
+    int64_t max = 0;
     for (size_t i = 0; i < c->n_voxel; i++) {
         if (c->mask[i] != 1) continue;
         int64_t n = flood(c, (int32_t)i, 1, 2, stack);
-        if (n > most) most = n, best = (int32_t)i;
+        if (n > max) max = n, best = (int32_t)i;
     }
     flood(c, best, 2, 3, stack);
     for (size_t i = 0; i < c->n_voxel; i++) c->mask[i] = c->mask[i] == 3;
@@ -223,10 +222,10 @@ static double face_area(const crop *c, const double m[12])
  * whole rows are added at once, or, along x, whole shifted blocks */
 static void blur_axis(const int n[3], int axis, const float *kernel, int radius, const float *from, float *to)
 {
-    ptrdiff_t step = 1, n_row = n[axis], n_finest = (ptrdiff_t)n[0] * n[1] * n[2];
+    ptrdiff_t step = 1, n_row = n[axis], n_all = (ptrdiff_t)n[0] * n[1] * n[2];
     for (int a = 0; a < axis; a++) step *= n[a];
-    memset(to, 0, (size_t)n_finest * sizeof *to);
-    for (ptrdiff_t block = 0; block < n_finest; block += step * n_row) {
+    memset(to, 0, (size_t)n_all * sizeof *to);
+    for (ptrdiff_t block = 0; block < n_all; block += step * n_row) {
         const float *f = from + block;
         float *t = to + block;
         for (ptrdiff_t k = -radius; step == 1 && k <= radius; k++) {
@@ -245,9 +244,9 @@ static void blur_axis(const int n[3], int axis, const float *kernel, int radius,
 }
 
 /* sampled Gaussian of standard deviation sigma (in voxels) with sum 1; its radius */
-static int make_kernel(double sigma, float kernel[2 * MOST_RADIUS + 1])
+static int make_kernel(double sigma, float kernel[2 * MAX_RADIUS + 1])
 {
-    int radius = (int)fmin(ceil(3 * sigma), MOST_RADIUS);
+    int radius = (int)fmin(ceil(3 * sigma), MAX_RADIUS);
     double sum = 0;
     for (int k = -radius; k <= radius; k++) sum += sigma > 0 ? exp(-k * k / (2 * sigma * sigma)) : k == 0;
     for (int k = -radius; k <= radius; k++)
@@ -260,17 +259,17 @@ static double level_of(const float *value, size_t n, int64_t n_label)
 {
     int64_t *bin = calloc(N_BIN + 1, sizeof *bin), above = 0;
     if (!bin) return 0.5;
-    float most = 0;
+    float max = 0;
     for (size_t i = 0; i < n; i++) {
         bin[(int)(fminf(fmaxf(value[i], 0), 1) * N_BIN)]++;
-        most = fmaxf(most, value[i]);
+        max = fmaxf(max, value[i]);
     }
     int k = N_BIN;
     while (k > 1 && above + bin[k] < n_label) above += bin[k--];
     double part = bin[k] ? (double)(n_label - above) / (double)bin[k] : 0;
     free(bin);
     double level = (k + 1 - part) / N_BIN;
-    return fmin(level, (double)most / 2);
+    return fmin(level, (double)max / 2);
 }
 
 /* metres -> voxel index, the inverse of to_m with index zero at voxel `low` */
@@ -295,7 +294,7 @@ static double axis_length(const double m[12], int axis)
 /* the mask as a blurred field with a margin in which it falls to zero */
 static pal_err blur_mask(const crop *c, const double to_m[12], double sigma_m, blurred *b, pal_diagnostic *diag)
 {
-    float kernel[3][2 * MOST_RADIUS + 1];
+    float kernel[3][2 * MAX_RADIUS + 1];
     int radius[3], low[3];
     size_t n = 1;
     for (int a = 0; a < 3; a++) {
@@ -340,10 +339,10 @@ static double field_at(const void *self, const double p[3])
     double t[3];
     for (int a = 0; a < 3; a++) {
         const double *m = b->from_m + 4 * a;
-        double x = m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3], most = b->n[a] - 1;
+        double x = m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3], max = b->n[a] - 1;
         x = x > 0 ? x : 0;
-        x = x < most ? x : most;
-        at[a] = x < most ? (size_t)x : (size_t)most - 1;
+        x = x < max ? x : max;
+        at[a] = x < max ? (size_t)x : (size_t)max - 1;
         t[a] = x - (double)at[a];
     }
     step[1] = (size_t)b->n[0];
@@ -436,7 +435,7 @@ static pal_err set_volume(pal_surface *s, double wanted_m3)
 static pal_err shape_surface(pal_surface *s, const double m[12], const pal_label_surface_options *o, double wanted_m3)
 {
     if (!o->all_components) PAL_TRY(keep_largest_component(s));
-    /* long smoothing costs less on fewer, larger triangles */
+    /* smoothing takes less time on fewer, larger triangles */
     if (o->target_tri > 0) PAL_TRY(pal_surface_decimate(s, 2 * o->target_tri));
     PAL_TRY(smooth_within_voxels(s, m, o->smooth_rounds < 0 ? DEFAULT_ROUNDS : o->smooth_rounds));
     PAL_TRY(pal_surface_decimate(s, o->target_tri > 0 ? o->target_tri : s->n_tri));
@@ -461,7 +460,7 @@ pal_err pal_label_volume_surface(const pal_label_volume *volume, int32_t label,
     if (!err) {
         pal_contour_box box = box_of(&c, m, o->target_tri);
         err = pal_contour(field_at, &b, &box, &s, diag);
-        /* a speck may fall between the lattice points */
+        /* a few voxels may fall between the lattice points */
         for (int k = 0; k < 4 && err == PAL_ERR_REFUSED; k++) {
             box.spacing_m /= 2;
             err = pal_contour(field_at, &b, &box, &s, diag);

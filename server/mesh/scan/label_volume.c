@@ -19,11 +19,11 @@
 #include <zlib.h>
 
 static const int64_t max_voxel = (int64_t)1 << 29;
-static const size_t most_file = (size_t)4 << 30;
+static const size_t max_file = (size_t)4 << 30;
 /* a piece holds whole voxels of any type */
 enum { HEADER_MOST = 1 << 16, PIECE = 1 << 16, NIFTI_HEAD = 348 };
 
-/* what both headers say */
+/* fields of both headers */
 typedef struct header {
     int64_t n[3];
     double to_m[12], slope, shift; /* value = slope stored + shift */
@@ -63,7 +63,7 @@ static bool is_gzip(const uint8_t *bytes, size_t n_byte)
     return n_byte >= 2 && bytes[0] == 0x1F && bytes[1] == 0x8B;
 }
 
-/* unpacks a file from its beginning on; a plain one is handed out as it is */
+/* unpacks a file from its beginning; a plain file is passed through */
 typedef struct unpacker {
     const source *s;
     z_stream z;
@@ -83,26 +83,26 @@ static void unpack_end(unpacker *u)
     if (u->s->packed) inflateEnd(&u->z);
 }
 
-static pal_err inflate_next(unpacker *u, uint8_t *to, size_t most, size_t *n_out)
+static pal_err inflate_next(unpacker *u, uint8_t *to, size_t max, size_t *n_out)
 {
     const source *s = u->s;
     size_t n = 0;
-    while (n < most && !u->ended) {
+    while (n < max && !u->ended) {
         size_t in = s->n_byte - u->n_in < 1u << 30 ? s->n_byte - u->n_in : 1u << 30;
         u->z.next_in = (Bytef *)(uintptr_t)(s->bytes + u->n_in);
         u->z.avail_in = (uInt)in;
         u->z.next_out = to + n;
-        u->z.avail_out = (uInt)(most - n);
+        u->z.avail_out = (uInt)(max - n);
         int state = inflate(&u->z, Z_NO_FLUSH);
         u->n_in += in - u->z.avail_in;
-        n = most - u->z.avail_out;
+        n = max - u->z.avail_out;
         if (state == Z_STREAM_END) {
             /* members may follow one another */
             u->ended = !is_gzip(s->bytes + u->n_in, s->n_byte - u->n_in);
             state = u->ended ? Z_OK : inflateReset(&u->z);
         }
         if (state == Z_BUF_ERROR) u->ended = true;
-        if (state == Z_MEM_ERROR) return no_memory(s, most);
+        if (state == Z_MEM_ERROR) return no_memory(s, max);
         if (state != Z_OK && state != Z_BUF_ERROR)
             return refuse(s, "byte", (int64_t)u->n_in, "the compressed data are damaged");
     }
@@ -110,14 +110,14 @@ static pal_err inflate_next(unpacker *u, uint8_t *to, size_t most, size_t *n_out
     return PAL_ERR_OK;
 }
 
-/* the next bytes, at most `most`, fewer only at the end: in the file itself or in `room` */
-static pal_err unpack_next(unpacker *u, uint8_t *room, size_t most, const uint8_t **bytes, size_t *n_out)
+/* the next bytes, at most `max`, fewer only at the end: in the file itself or in `room` */
+static pal_err unpack_next(unpacker *u, uint8_t *room, size_t max, const uint8_t **bytes, size_t *n_out)
 {
     const source *s = u->s;
     *bytes = room;
-    if (s->packed) return inflate_next(u, room, most, n_out);
+    if (s->packed) return inflate_next(u, room, max, n_out);
     *bytes = s->bytes + u->n_in;
-    *n_out = s->n_byte - u->n_in < most ? s->n_byte - u->n_in : most;
+    *n_out = s->n_byte - u->n_in < max ? s->n_byte - u->n_in : max;
     u->n_in += *n_out;
     return PAL_ERR_OK;
 }
@@ -321,14 +321,14 @@ static void convert(const header *h, const uint8_t *p, int64_t n, int32_t *label
 }
 
 /* converts voxels as their bytes come; need: bytes up to the last one */
-static pal_err take_voxels(const source *s, const header *h, unpacker *u, size_t n, size_t need, int32_t **label)
+static pal_err copy_voxels(const source *s, const header *h, unpacker *u, size_t n, size_t need, int32_t **label)
 {
     uint8_t room[PIECE];
     const uint8_t *bytes;
     size_t at = 0, done = 0, cap = 0, size = (size_t)pal_scalar_size(h->type);
     while (at < need) {
-        size_t most = at < h->offset ? h->offset - at : need - at, got;
-        PAL_TRY(unpack_next(u, room, most < PIECE ? most : PIECE, &bytes, &got));
+        size_t max = at < h->offset ? h->offset - at : need - at, got;
+        PAL_TRY(unpack_next(u, room, max < PIECE ? max : PIECE, &bytes, &got));
         if (got == 0 || (at >= h->offset && got % size))
             return refuse(s, "byte", (int64_t)(at + got),
                           "the %sfile ends, but %lld x %lld x %lld voxels need %zu bytes", s->packed ? "unpacked " : "",
@@ -345,7 +345,7 @@ static pal_err take_voxels(const source *s, const header *h, unpacker *u, size_t
         convert(h, bytes, (int64_t)more, *label + done);
         done += more;
     }
-    /* one byte more makes the unpacker look at the checksum if nothing else follows */
+    /* one byte more makes the unpacker check the checksum if nothing else follows */
     return unpack_next(u, room, 1, &bytes, &at);
 }
 
@@ -360,7 +360,7 @@ static pal_err read_voxels(const source *s, const header *h, pal_label_volume *o
     int32_t *label = NULL;
     PAL_TRY(unpack_begin(&u, s));
     size_t need = h->offset + (size_t)n * (size_t)pal_scalar_size(h->type);
-    pal_err err = take_voxels(s, h, &u, (size_t)n, need, &label);
+    pal_err err = copy_voxels(s, h, &u, (size_t)n, need, &label);
     unpack_end(&u);
     if (err) {
         free(label);
@@ -373,12 +373,12 @@ static pal_err read_voxels(const source *s, const header *h, pal_label_volume *o
     return PAL_ERR_OK;
 }
 
-/* the beginning of the volume, at most `most` bytes, in the file itself or in `room` */
-static pal_err view_head(const source *s, uint8_t *room, size_t most, const uint8_t **head, size_t *n_head)
+/* the beginning of the volume, at most `max` bytes, in the file itself or in `room` */
+static pal_err view_head(const source *s, uint8_t *room, size_t max, const uint8_t **head, size_t *n_head)
 {
     unpacker u;
     PAL_TRY(unpack_begin(&u, s));
-    pal_err err = unpack_next(&u, room, most, head, n_head);
+    pal_err err = unpack_next(&u, room, max, head, n_head);
     unpack_end(&u);
     return err;
 }
@@ -408,7 +408,7 @@ pal_err pal_label_volume_read(const char *path, pal_label_volume *out, pal_diagn
 {
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, most_file, &bytes, &n_byte, diag));
+    PAL_TRY(pal_file_read(path, max_file, &bytes, &n_byte, diag));
     pal_err err = pal_label_volume_parse(path, bytes, n_byte, out, diag);
     free(bytes);
     return err;

@@ -20,7 +20,7 @@ pal_err pal_label_volume_read(const char *path, pal_label_volume *out, pal_diagn
 pal_err pal_label_volume_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_label_volume *out,
                                pal_diagnostic *diag);
 void pal_label_volume_free(pal_label_volume *volume);
-/* does this file name or content look like a label volume? (for choosing the reader) */
+/* does the name or content of this file look like a label volume? (to choose the reader) */
 bool pal_label_volume_is(const char *path);
 
 /* voxels and millilitres of each label, most frequent first, at most cap entries, 0 left out; number of entries */

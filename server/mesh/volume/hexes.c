@@ -1,8 +1,8 @@
 /* Voxel hexahedra found in a tetrahedral mesh, and their fill.
  *
- * The splitter's two patterns give the corners away; whatever else has five tetrahedra to a cube is read by position:
- * five consecutive tetrahedra are a cube when they have eight nodes between them, which lie at the corners of a cube of
- * edge edge_m along the axes, and when their volumes, each positive, sum to the cube's. */
+ * Tetrahedra in the order of the splitter are recognised by its two patterns. Any other order is recognised by
+ * position: five consecutive tetrahedra are a cube when they have eight nodes in all, which lie at the corners of a
+ * cube of edge edge_m along the axes, and when their volumes, each positive, sum to that of the cube. */
 #include "server/mesh/volume/hexes.h"
 
 #include "server/base/vec3.h"
@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* relative to edge_m: what single precision in a file may have moved a node by, at some hundred voxels across */
+/* relative to edge_m: error of node positions from single precision in a file, at some hundred voxels across */
 #define AWAY 1e-4
 
 void pal_hexes_free(pal_hexes *hexes)
@@ -30,11 +30,11 @@ static double six_volumes(const pal_tets *tets, const int32_t *c)
     return pal_dot3(e[0], cross);
 }
 
-/* the corners when the five are in the splitter's order and its voxel is a cube: then their volumes are as they must
- * be. The last tetrahedron tells the two patterns apart. */
+/* The corners when the five are in the order of the splitter and the voxel is a cube: then their volumes are right. The
+ * last tetrahedron distinguishes the two patterns. */
 static bool read_pattern(const pal_tets *tets, const int32_t *five, int32_t node[8])
 {
-    /* where the corners stand among the twenty */
+    /* positions of the corners among the twenty */
     static const uint8_t FIRST[2][8] = {{0, 1, 2, 4, 3, 8, 12, 7}, {2, 0, 4, 1, 8, 3, 7, 12}};
     int parity = five[16] == five[2];
     const uint8_t *corner = pal_voxel_tets[parity][0];
@@ -53,7 +53,7 @@ static bool read_pattern(const pal_tets *tets, const int32_t *five, int32_t node
     return n_away == 0;
 }
 
-/* corner bits of each node from its place in the box of the twenty corners; false when one is at no corner */
+/* corner bits of each node from its position in the box of the twenty corners; false when one is at no corner */
 static bool find_corners(const pal_tets *tets, const int32_t *five, int32_t node[8])
 {
     double low[3] = {INFINITY, INFINITY, INFINITY}, h = tets->edge_m;
@@ -127,19 +127,19 @@ static pal_err find_grid(const pal_hexes *hexes, const pal_tets *tets, const pal
 
 typedef struct filler {
     const pal_voxels *grid;
-    int64_t *place; /* hexahedra by layer: place in the layer, and number [n_hex][2] */
+    int64_t *place; /* hexahedra by layer: index in the layer, and number [n_hex][2] */
     int *start;     /* of each layer [n2+2]                                          */
     float *fill;
 } filler;
 
-static void take_layer(void *self, int z, const double *share)
+static void set_layer(void *self, int z, const double *share)
 {
     filler *f = self;
     for (int i = f->start[z]; i < f->start[z + 1]; i++)
         f->fill[f->place[2 * (size_t)i + 1]] = (float)share[f->place[2 * (size_t)i]];
 }
 
-/* deals the hexahedra to the layers of the grid */
+/* distributes the hexahedra to the layers of the grid */
 static void deal_layers(filler *f, const pal_hexes *hexes, const pal_tets *tets, const double shift[3])
 {
     const pal_voxels *g = f->grid;
@@ -175,7 +175,7 @@ pal_err pal_hexes_fill(pal_hexes *hexes, const pal_tets *tets, const pal_surface
         double shift[3];
         pal_sub3(shift, tets->origin_m, surface->origin_m);
         deal_layers(&f, hexes, tets, shift);
-        err = pal_voxels_fraction(surface, &grid, NULL, n_sub, take_layer, &f, NULL, diag);
+        err = pal_voxels_fraction(surface, &grid, NULL, n_sub, set_layer, &f, NULL, diag);
     }
     if (!err) hexes->measured = true;
     free(f.place);

@@ -1,4 +1,4 @@
-/* Voxel hexahedra on the nodes of a tetrahedral mesh: the same body, one cube per voxel instead of five tetrahedra.
+/* Voxel hexahedra on the nodes of a tetrahedral mesh: the same body with one cube per voxel instead of five tetrahedra.
  * Hexahedron e is the voxel of tetrahedra 5 e .. 5 e + 4. A pal_hexes owns its arrays (heap). Thread: [load]. */
 #ifndef PAL_MESH_VOLUME_HEXES_H
 #define PAL_MESH_VOLUME_HEXES_H
@@ -10,16 +10,16 @@ typedef struct pal_hexes {
     int n_hex;
     bool measured; /* fill was measured; false: it is 1 everywhere            */
     int32_t *node; /* corners x = 1, y = 2, z = 4, nodes of the tets [n_hex][8] */
-    float *fill;   /* share of the voxel inside the surface, 0..1    [n_hex]    */
+    float *fill;   /* fraction of the voxel inside the surface, 0..1    [n_hex] */
 } pal_hexes;
 
 void pal_hexes_free(pal_hexes *hexes);
-/* finds the cubes of edge tets->edge_m that the tetrahedra of a voxel split fill (five each, consecutive, in any order
+/* Finds the cubes of edge tets->edge_m that the tetrahedra of a voxel split fill (five each, consecutive, in any order
  * within the five); fill 1; REFUSED when the mesh is no such split; MEMORY */
 pal_err pal_hexes_find(const pal_tets *tets, pal_hexes *out, pal_diagnostic *diag);
-/* fill of every voxel, 0..1: to rounding for a closed surface that does not overlap itself, else by n_sub^3 samples a
- * voxel (0: 6, fewer where the grid would grow too large). Exactly 1 wholly inside, exactly 0 where it only touches.
- * REFUSED: nothing is inside, or not the surface of this mesh; BUDGET, MEMORY */
+/* Fill of every voxel, 0..1: exact to rounding for a closed surface that does not overlap itself, else by n_sub^3
+ * samples a voxel (0: 6, fewer where the grid would grow too large). Exactly 1 for voxels wholly inside, exactly 0 for
+ * voxels that the surface only touches. REFUSED: nothing is inside, or not the surface of this mesh; BUDGET, MEMORY */
 pal_err pal_hexes_fill(pal_hexes *hexes, const pal_tets *tets, const pal_surface *surface, int n_sub,
                        pal_diagnostic *diag);
 #endif

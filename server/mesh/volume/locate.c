@@ -1,9 +1,9 @@
 /* Points in the elements of a mesh at rest.
  *
- * Cells hold the elements whose boxes, made smaller by a hair, overlap them; a point looks into all cells within that
- * hair, so that points on faces are found without listing every element in its neighbours' cells too. Outside, shells
- * of cells grow around the point's projection q on the grid's box until none farther out can be nearer: for y in the
- * box |p - y|^2 >= |p - q|^2 + |q - y|^2. */
+ * Cells list the elements whose boxes, shrunk by a small margin, overlap them; a point searches all cells within that
+ * margin, so that points on faces are found without listing every element in the cells of its neighbours too. Outside,
+ * layers of cells grow around the projection q of the point p on the box of the grid until none farther out can be
+ * nearer: for y in the box |p - y|^2 >= |p - q|^2 + |q - y|^2. */
 #include "server/mesh/volume/locate.h"
 
 #include "server/base/vec3.h"
@@ -11,10 +11,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* the hair, in cells; what counts as inside, in edges; cells per element */
+/* the margin, in cells; tolerance of inside, in edges; cells per element */
 #define HAIR   1e-6
 #define INSIDE 1e-9
-enum { MOST_CELL_PER_ELEMENT = 16, MOST_CELL_MORE = 4096 };
+enum { MAX_CELL_PER_ELEMENT = 16, MAX_CELL_MORE = 4096 };
 
 struct pal_locate {
     const pal_tets *tets;
@@ -65,7 +65,7 @@ static int cell_along(const pal_locate *l, int k, double x)
     return !(at > 0) ? 0 : at > l->n[k] - 1 ? l->n[k] - 1 : (int)at;
 }
 
-/* cells that a box overlaps once it is smaller by a hair, or a point's once it is larger */
+/* cells that a box overlaps when shrunk by the margin, or a point's box when enlarged by it */
 static void cell_range(const pal_locate *l, const double low[3], const double high[3], double hair, int from[3],
                        int to[3])
 {
@@ -81,8 +81,8 @@ static size_t cell_number(const pal_locate *l, int x, int y, int z)
     return (size_t)x + (size_t)l->n[0] * ((size_t)y + (size_t)l->n[1] * (size_t)z);
 }
 
-/* counts into start[cell + 2] (element NULL), then deals */
-static void deal(pal_locate *l, int64_t *start)
+/* counts into start[cell + 2] (element NULL), then fills */
+static void fill_cells(pal_locate *l, int64_t *start)
 {
     for (int e = 0; e < l->n_element; e++) {
         double low[3], high[3];
@@ -102,10 +102,10 @@ static void deal(pal_locate *l, int64_t *start)
 }
 
 /* grid over all corners; cells of one voxel edge, larger where the body fills little of its box */
-static void lay_cells(pal_locate *l)
+static void make_cells(pal_locate *l)
 {
     double high[3] = {-INFINITY, -INFINITY, -INFINITY},
-           most = (double)MOST_CELL_PER_ELEMENT * l->n_element + MOST_CELL_MORE;
+           max = (double)MAX_CELL_PER_ELEMENT * l->n_element + MAX_CELL_MORE;
     for (int k = 0; k < 3; k++) l->low[k] = INFINITY;
     for (int e = 0; e < l->n_element; e++) {
         double a[3], b[3];
@@ -116,7 +116,7 @@ static void lay_cells(pal_locate *l)
     for (;; l->cell_m *= 1.25) {
         double n[3];
         for (int k = 0; k < 3; k++) n[k] = fmax(1, ceil((high[k] - l->low[k]) / l->cell_m - HAIR));
-        if (!(n[0] * n[1] * n[2] <= most)) continue;
+        if (!(n[0] * n[1] * n[2] <= max)) continue;
         for (int k = 0; k < 3; k++) l->n[k] = (int)n[k];
         return;
     }
@@ -129,11 +129,11 @@ pal_err pal_locate_create(const pal_tets *tets, const pal_hexes *hexes, pal_loca
     pal_locate *l = calloc(1, sizeof *l);
     if (!l) return PAL_ERR_MEMORY;
     l->tets = tets, l->hexes = hexes, l->n_element = n_element;
-    lay_cells(l);
+    make_cells(l);
     size_t n_cell = (size_t)l->n[0] * (size_t)l->n[1] * (size_t)l->n[2];
     l->start = calloc(n_cell + 2, sizeof *l->start);
     if (l->start) {
-        deal(l, l->start);
+        fill_cells(l, l->start);
         for (size_t c = 0; c < n_cell; c++) l->start[c + 2] += l->start[c + 1];
         l->element = malloc((size_t)(l->start[n_cell + 1] + 1) * sizeof *l->element);
     }
@@ -141,7 +141,7 @@ pal_err pal_locate_create(const pal_tets *tets, const pal_hexes *hexes, pal_loca
         pal_locate_destroy(l);
         return PAL_ERR_MEMORY;
     }
-    deal(l, l->start);
+    fill_cells(l, l->start);
     *out = l;
     return PAL_ERR_OK;
 }
@@ -231,7 +231,7 @@ typedef struct nearest {
 } nearest;
 
 /* the first of the elements within rounding of the point, else the nearest, the first of equals */
-static void look_into(const pal_locate *l, size_t cell, const double x[3], nearest *best)
+static void search_cell(const pal_locate *l, size_t cell, const double x[3], nearest *best)
 {
     for (int64_t i = l->start[cell]; i < l->start[cell + 1]; i++) {
         int e = l->element[i];
@@ -242,14 +242,14 @@ static void look_into(const pal_locate *l, size_t cell, const double x[3], neare
 }
 
 /* cells at most r cells from c along every axis and r along one */
-static void look_around(const pal_locate *l, const int c[3], int r, const double x[3], nearest *best)
+static void search_outward(const pal_locate *l, const int c[3], int r, const double x[3], nearest *best)
 {
     for (int z = c[2] - r; z <= c[2] + r; z++)
         for (int y = c[1] - r; y <= c[1] + r; y++) {
             if (z < 0 || y < 0 || z >= l->n[2] || y >= l->n[1]) continue;
             bool rim = abs(z - c[2]) == r || abs(y - c[1]) == r;
             for (int at = c[0] - r; at <= c[0] + r; at += rim || r == 0 ? 1 : 2 * r)
-                if (at >= 0 && at < l->n[0]) look_into(l, cell_number(l, at, y, z), x, best);
+                if (at >= 0 && at < l->n[0]) search_cell(l, cell_number(l, at, y, z), x, best);
         }
 }
 
@@ -257,20 +257,20 @@ int pal_locate_point(const pal_locate *locate, const double x[3], double local[4
 {
     const pal_locate *l = locate;
     nearest best = {0, INFINITY};
-    int from[3], to[3], most = 0;
+    int from[3], to[3], max = 0;
     cell_range(l, x, x, -2 * HAIR * l->cell_m, from, to);
     for (int cz = from[2]; cz <= to[2]; cz++)
         for (int cy = from[1]; cy <= to[1]; cy++)
-            for (int cx = from[0]; cx <= to[0]; cx++) look_into(l, cell_number(l, cx, cy, cz), x, &best);
+            for (int cx = from[0]; cx <= to[0]; cx++) search_cell(l, cell_number(l, cx, cy, cz), x, &best);
     if (best.away > 0) {
         double off[3];
         for (int k = 0; k < 3; k++) {
             double high = l->low[k] + l->cell_m * l->n[k];
             off[k] = fmax(0, fmax(l->low[k] - x[k], x[k] - high));
-            most = l->n[k] > most ? l->n[k] : most;
+            max = l->n[k] > max ? l->n[k] : max;
         }
-        for (int r = 0; r <= most; r++) {
-            look_around(l, from, r, x, &best);
+        for (int r = 0; r <= max; r++) {
+            search_outward(l, from, r, x, &best);
             double reach = (r - HAIR * 4) * l->cell_m;
             if (r > 0 && best.away * best.away <= pal_dot3(off, off) + reach * reach) break;
         }

@@ -1,8 +1,8 @@
-/* A part of a surface as quadrature points in the elements of a mesh.
+/* Part of a surface as quadrature points in the elements of a mesh.
  *
  * Triangles are cut by the box, then by the planes of the voxel lattice, whose pieces lie in one hexahedron each. In
- * tetrahedra a piece is peeled: the element around its middle takes what its four planes leave of the piece, and the
- * rest, in convex pieces, is dealt with likewise. Areas are of polygons cut without loss, so they sum exactly. */
+ * tetrahedra a piece is peeled: the element around its centre takes the part within its four planes, and the rest, in
+ * convex pieces, is treated likewise. Cuts lose no area, so areas sum exactly. */
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/polygon.h"
 #include "server/mesh/volume/locate.h"
@@ -11,12 +11,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* cosine of the angle that a triangle's normal may be off; pieces smaller than this share of their triangle are
- * rounding; barycentric coordinates within this of 0 lie on the face */
+/* cosine of the largest angle to the given normal; pieces smaller than this fraction of their triangle are rounding;
+ * barycentric coordinates within this of 0 lie on the face */
 #define COS_OFF 0.90630778703664996324
 #define CRUMB   1e-15
 #define ON_FACE 1e-12
-enum { MOST_PEEL = 24 };
+enum { MAX_PEEL = 24 };
 
 typedef struct cutter {
     const pal_locate *locate;
@@ -108,7 +108,7 @@ static void peel(cutter *c, pal_polygon *p, int depth)
     double outside, height[PAL_POLYGON_MAX];
     if (p->n < 3 || area_of(c, p) <= c->crumb_m2) return;
     int element = element_at_middle(c, p, &outside);
-    for (int f = 0; f < 4 && depth < MOST_PEEL && outside == 0; f++) {
+    for (int f = 0; f < 4 && depth < MAX_PEEL && outside == 0; f++) {
         pal_polygon off, on;
         if (!find_heights(c, p, element, f, height)) continue;
         pal_polygon_cut(p, height, &off, &on);
@@ -129,12 +129,12 @@ static void cut_lattice(cutter *c, pal_polygon *p, int axis)
             peel(c, p, 0);
         return;
     }
-    double least, most;
-    pal_polygon_range(p, axis, &least, &most);
-    for (double i = floor((least - c->low[axis]) / c->h); !c->full; i++) {
+    double min, max;
+    pal_polygon_range(p, axis, &min, &max);
+    for (double i = floor((min - c->low[axis]) / c->h); !c->full; i++) {
         double at = c->low[axis] + i * c->h;
-        if (at >= most) break;
-        if (at <= least) continue;
+        if (at >= max) break;
+        if (at <= min) continue;
         pal_polygon low, high;
         pal_polygon_cut_axis(p, axis, at, &low, &high);
         cut_lattice(c, &low, axis + 1);
@@ -165,7 +165,7 @@ static void add_triangle(cutter *c, const pal_surface *surface, size_t t, const 
     cut_lattice(c, &p, 0);
 }
 
-/* lowest corner of the mesh: where the lattice of a voxel split begins */
+/* lowest corner of the mesh, where the lattice of a voxel split begins */
 static void find_low(cutter *c)
 {
     for (int k = 0; k < 3; k++) {

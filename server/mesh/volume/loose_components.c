@@ -1,4 +1,4 @@
-/* Components that nothing holds: what stays is decided alike for tetrahedra and control cells. */
+/* Components that nothing holds: one rule for tetrahedra and control cells. */
 #include "server/mesh/volume/loose_components.h"
 
 #include "server/base/vec3.h"
@@ -8,16 +8,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* share of the largest component below which one is dropped unasked. A voxel of the default resolutions is 0.04 % of
- * the body or less, a lobe that somebody sees as one is more than a hundredth */
+/* fraction of the largest component below which one is dropped silently. A voxel at the default resolutions is 0.04 %
+ * of the body or less, a visible lobe is more than a hundredth (tests/mesh/volume/test_loose_components.c) */
 static const double small_share = 0.01;
 
 typedef struct component {
-    double volume_m3, moment[3]; /* moment: volume times middle, m^4 */
+    double volume_m3, moment[3]; /* moment: volume times centre, m^4 */
     bool fixed, keep;
 } component;
 
-/* ---- what stays ---- */
+/* ---- the rule ---- */
 
 static pal_err refuse(const char *name, const component *part, const pal_loose_components *all, int n_bad, int bad,
                       pal_diagnostic *diag)
@@ -37,17 +37,17 @@ static pal_err choose(const char *name, bool largest_only, component *part, int 
                       pal_diagnostic *diag)
 {
     int best = 0, bad = -1, n_bad = 0;
-    bool any_held = false;
+    bool any_fixed = false;
     *out = (pal_loose_components){.n_component = n, .largest_only = largest_only};
     for (int k = 0; k < n; k++) {
         out->volume_m3 += part[k].volume_m3;
-        any_held |= part[k].fixed;
+        any_fixed |= part[k].fixed;
         if (part[k].volume_m3 > part[best].volume_m3) best = k;
     }
     for (int k = 0; k < n; k++) {
         bool small = part[k].volume_m3 < small_share * part[best].volume_m3;
         part[k].keep = largest_only ? k == best : part[k].fixed || !small;
-        if (!largest_only && any_held && !part[k].fixed && !small) {
+        if (!largest_only && any_fixed && !part[k].fixed && !small) {
             n_bad++;
             if (bad < 0 || part[k].volume_m3 > part[bad].volume_m3) bad = k;
         }
@@ -86,7 +86,7 @@ static void add_tet(const pal_tets *tets, const uint8_t *fixed, const int32_t *c
     }
 }
 
-/* what stays of the tetrahedra, in the same order; number [n_node] gets the new number of each node, -1: gone */
+/* the kept tetrahedra, in the same order; number [n_node] gets the new number of each node, -1: dropped */
 static pal_err keep_tets(const pal_tets *from, const int32_t *label, const component *part, int32_t *number,
                          pal_tets *to)
 {
@@ -179,7 +179,7 @@ static int label_cells(const pal_cells *cells, int32_t *label)
         if (!pal_cells_face_boundary(cells, f))
             pal_union_find_join(label, cells->face_use[cells->face[f].use[0]].cell,
                                 cells->face_use[cells->face[f].use[1]].cell);
-    /* the root of a set is its least member, so that it has its label before the others ask for it */
+    /* the root of a set is its smallest member, so that it has its label before the others need it */
     for (int32_t c = 0; c < cells->n_cell; c++) {
         int32_t root = pal_union_find_root(label, c);
         label[c] = root;

@@ -1,26 +1,26 @@
 /* Components of a body that nothing holds.
  *
- * A component is what is joined by faces: tetrahedra, voxels or control cells that share only an edge or a corner are
- * of two components. A component without a held point has six rigid motions that no force restores: it is not part of
- * what the scene means, and all that moves it, moves it without end. So, with the share of a component being its volume
- * over that of the largest one:
+ * A component is connected through faces: tetrahedra, voxels or control cells that share only an edge or a corner are
+ * of two components. A component without a fixed point has six rigid motions that no force restores, so any load moves
+ * it without bound; it is not part of what the scene describes. With the fraction of a component being its volume over
+ * that of the largest one:
  *
  *   - with `largest_only` the largest component stays and the others are dropped;
- *   - a component with a held point stays;
- *   - one without is dropped when its share is below 1 %: voxels of a thin tip whose neighbours are not in the grid;
- *   - a larger one without is refused when another one is held: the scene says that the body is held, and whether this
- *     component is to be held or left out is not ours to guess;
- *   - with no held point at all the body is free, which is a scene of its own: what is not below 1 % stays.
+ *   - a component with a fixed point stays;
+ *   - one without is dropped when its fraction is below 1 %: voxels of a thin tip whose neighbours are not in the grid;
+ *   - a larger one without is refused when another one is fixed: the scene says that the body is held, and whether this
+ *     component is to be held or left out cannot be guessed;
+ *   - with no fixed point at all the body is free, which is a scene of its own: components of at least 1 % stay.
  *
- * A component that is to move freely beside a held one is a body of its own. The rule is applied where scenes are made
- * ready; a world simulates every component of the mesh it is given. Pieces of an adaptive surface have anchors, which
- * leave them no rigid motion: they all stay. Thread: [load]. */
+ * A component that is to move freely beside a fixed one is a body of its own. The rule applies where scenes are
+ * prepared; a world simulates every component of its mesh. Components of an adaptive surface have anchors, which leave
+ * no rigid motion: they all stay. Thread: [load]. */
 #ifndef PAL_MESH_VOLUME_LOOSE_COMPONENTS_H
 #define PAL_MESH_VOLUME_LOOSE_COMPONENTS_H
 #include "server/mesh/cells/cells.h"
 #include "server/mesh/volume/prepared.h"
 
-/* what was found and dropped */
+/* components found and dropped */
 typedef struct pal_loose_components {
     int n_component, n_dropped;        /* components before, and of them dropped     */
     double volume_m3;                  /* of all components                          */
@@ -28,12 +28,12 @@ typedef struct pal_loose_components {
     bool largest_only;                 /* dropped because only the largest was wanted */
 } pal_loose_components;
 
-/* Drops components of a mesh of tetrahedra with its hexahedra; the skin is bound anew, the surface stays. held
- * [n_node]: not 0 where a node is held. name stands in the sentence. REFUSED, with the number of components at fault
- * and volume, share and place of the largest of them, or MEMORY, and then the mesh is as it was */
+/* Drops components of a mesh of tetrahedra with its hexahedra; the skin is bound again, the surface stays. fixed
+ * [n_node]: not 0 where a node is fixed. name appears in the message. REFUSED, with the number of components at fault
+ * and volume, fraction and position of the largest of them, or MEMORY; the mesh is unchanged then */
 pal_err pal_loose_components_drop(const char *name, const uint8_t *fixed, bool largest_only, pal_prepared *mesh,
                                   pal_loose_components *out, pal_diagnostic *diag);
-/* the same with control cells; held [n_vertex] */
+/* the same with control cells; fixed [n_vertex] */
 pal_err pal_loose_cells_drop(const char *name, const uint8_t *fixed, bool largest_only, pal_cells *cells,
                              pal_loose_components *out, pal_diagnostic *diag);
 /* "body "x": 2 of 3 components dropped, ..." or an empty text when none is */

@@ -27,7 +27,7 @@ static const char MAGIC[8] = "PALPREP1";
 /* what differs between versions */
 typedef struct layout {
     int n_count, n_section;
-    size_t table; /* where the table of sections begins, behind the counts and four doubles */
+    size_t table; /* where the section table begins, after the counts and four doubles */
 } layout;
 
 static layout layout_of(uint32_t version)
@@ -114,34 +114,35 @@ pal_err pal_prepared_make(const pal_surface *surface, const pal_voxel_options *o
                           pal_prepare_report *report, pal_diagnostic *diag)
 {
     pal_prepared p = {0};
-    pal_prepare_report told = {0};
+    pal_prepare_report result = {0};
     pal_voxels voxels = {0};
-    PAL_TRY(pal_voxels_fill(surface, options, &voxels, &told.voxel, diag));
-    told.n_voxel = voxels.n_inside + voxels.n_border;
+    PAL_TRY(pal_voxels_fill(surface, options, &voxels, &result.voxel, diag));
+    result.n_voxel = voxels.n_inside + voxels.n_border;
     double began = pal_clock_s();
     pal_err err = pal_voxels_split(&voxels, &p.tets);
     pal_voxels_free(&voxels);
-    if (err) return pal_diagnostic_set(diag, err, "cannot split %lld voxels into tetrahedra", (long long)told.n_voxel);
+    if (err)
+        return pal_diagnostic_set(diag, err, "cannot split %lld voxels into tetrahedra", (long long)result.n_voxel);
     double split = pal_clock_s();
-    told.split_s = split - began;
+    result.split_s = split - began;
     if ((err = make_hexes(surface, options, &p, diag))) {
         pal_prepared_free(&p);
         return err;
     }
-    told.hexes_s = pal_clock_s() - split;
-    split += told.hexes_s;
+    result.hexes_s = pal_clock_s() - split;
+    split += result.hexes_s;
     err = pal_skin_bind(&p.tets, surface->x, surface->n_vertex, &p.skin);
-    told.skin_s = pal_clock_s() - split;
+    result.skin_s = pal_clock_s() - split;
     if (!err) err = pal_surface_copy(surface, &p.surface);
     if (err) {
         pal_prepared_free(&p);
         return pal_diagnostic_set(diag, err, "cannot bind %d vertices to the mesh", surface->n_vertex);
     }
-    told.volume_m3 = pal_tets_volume(&p.tets);
-    if (told.voxel.surface_volume_m3 > 0)
-        told.volume_error = told.voxel.inside_volume_m3 / told.voxel.surface_volume_m3 - 1;
+    result.volume_m3 = pal_tets_volume(&p.tets);
+    if (result.voxel.surface_volume_m3 > 0)
+        result.volume_error = result.voxel.inside_volume_m3 / result.voxel.surface_volume_m3 - 1;
     *out = p;
-    if (report) *report = told;
+    if (report) *report = result;
     return PAL_ERR_OK;
 }
 
@@ -271,12 +272,12 @@ pal_err pal_prepared_load(const char *path, pal_prepared *out, pal_diagnostic *d
 
 static bool all_within(const int32_t *item, uint64_t n, int32_t low, uint64_t end)
 {
-    int32_t least = 0, most = -1;
+    int32_t min = 0, max = -1;
     for (uint64_t i = 0; i < n; i++) {
-        least = item[i] < least ? item[i] : least;
-        most = item[i] > most ? item[i] : most;
+        min = item[i] < min ? item[i] : min;
+        max = item[i] > max ? item[i] : max;
     }
-    return least >= low && (int64_t)most < (int64_t)end;
+    return min >= low && (int64_t)max < (int64_t)end;
 }
 
 static bool all_finite(const double *item, uint64_t n)
@@ -302,7 +303,7 @@ static bool fans_are_rows(const pal_skin *skin, uint64_t n_fan)
     return true;
 }
 
-/* what of a mesh is out of order, or NULL; every index is checked before it is used */
+/* the first fault of a mesh, or NULL; every index is checked before it is used */
 static const char *find_fault(const pal_prepared *p, const uint64_t count[N_COUNT])
 {
     const pal_surface *surface = &p->surface;

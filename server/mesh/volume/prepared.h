@@ -1,7 +1,6 @@
-/* The prepared mesh: everything about a body that is computed once from its surface and read at every start. Of a body
- * that is simulated on the surface itself (model adaptive_springs) it is the surface alone.
- * One file, little-endian, sections with counts and a checksum; loading never trusts a count or an index.
- * Thread: [load]. */
+/* The prepared mesh: everything about a body that is computed once from its surface and read at every start. For a body
+ * that is simulated on the surface itself (model adaptive_springs) it is the surface alone. One file, little-endian,
+ * sections with counts and a checksum; loading never trusts a count or an index. Thread: [load]. */
 #ifndef PAL_MESH_VOLUME_PREPARED_H
 #define PAL_MESH_VOLUME_PREPARED_H
 #include "server/mesh/geometry/surface.h"
@@ -11,8 +10,8 @@
 #include "server/mesh/voxel/voxels.h"
 
 typedef struct pal_prepared {
-    pal_surface surface; /* what is shown                                    */
-    pal_tets tets;       /* what is simulated, same origin_m as the surface; none: n_node 0, edge_m its mean edge */
+    pal_surface surface; /* the displayed surface */
+    pal_tets tets;       /* the simulated mesh, same origin_m as the surface; none: n_node 0, edge_m its mean edge */
     pal_skin skin;       /* surface on tets; none: n_vertex 0                */
     pal_hexes hexes;     /* the same body as cubes; n_hex 0: it is no voxels */
 } pal_prepared;
@@ -25,8 +24,8 @@ typedef struct pal_prepare_report {
     double split_s, hexes_s, skin_s; /* hexes_s: hexahedra and their fill, if it was measured */
 } pal_prepare_report;
 
-/* surface -> voxels -> tets, hexes -> skin; copies the surface; one error names the step; the fill of the hexes is
- * measured when options->fill or options->min_fill asks for it, else it is 1 */
+/* From a surface to voxels, tetrahedra, hexahedra and skin; copies the surface; one error names the step; the fill of
+ * the hexahedra is measured when options->fill or options->min_fill asks for it, else it is 1 */
 pal_err pal_prepared_make(const pal_surface *surface, const pal_voxel_options *options, pal_prepared *out,
                           pal_prepare_report *report, pal_diagnostic *diag);
 /* the surface alone, copied, without tetrahedra, hexahedra and skin; MEMORY */
@@ -40,6 +39,6 @@ pal_err pal_prepared_parse(const char *name, const uint8_t *bytes, size_t n_byte
                            pal_diagnostic *diag);
 /* the file's bytes, which the caller frees; MEMORY */
 pal_err pal_prepared_bytes(const pal_prepared *prepared, uint8_t **bytes, size_t *n_byte);
-/* what the checksum at byte 24 must be; 0 when there are fewer than 32 bytes */
+/* the checksum that byte 24 must hold; 0 when there are fewer than 32 bytes */
 uint64_t pal_prepared_checksum(const uint8_t *bytes, size_t n_byte);
 #endif

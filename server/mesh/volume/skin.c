@@ -1,7 +1,7 @@
-/* Skinning of a shown surface to a tetrahedral mesh (paper B 4.2, errata B6-B8 and B15 in skin.h).
+/* Skinning of a displayed surface to a tetrahedral mesh (paper B section 4.2, errata B6-B8 and B15 in skin.h).
  *
- * Departures: face normals are summed with their areas, so that a collapsed face has no say and no root is taken per
- * face; nodes whose normals nearly cancel at rest (two voxels that touch along an edge) carry no frame. Offsets are
+ * Departures: face normals are summed with their areas, so that a collapsed face has no weight and no root is needed
+ * per face; nodes whose normals nearly cancel at rest (two voxels that touch along an edge) carry no frame. Offsets are
  * stored times their weight, so a vertex is the sum of 5 x 4 scaled columns of 4 floats. */
 #include "server/mesh/volume/skin.h"
 
@@ -11,10 +11,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* |sum of normals| over the root of the sum of squares: below this a node has no normal to speak of at rest and is not
- * used */
-#define LEAST_NORMAL 0.5
-/* share of its rest length below which an axis shrinks */
+/* |sum of normals| over the root of the sum of squares: below this a node has no defined normal at rest and is not used
+ */
+#define MIN_NORMAL 0.5
+/* fraction of its rest length below which an axis shrinks */
 #define COLLAPSED 0.5
 /* distance to a node, in voxel edges, at which a vertex lies on it */
 #define ON_NODE 1e-7
@@ -58,17 +58,17 @@ static void tangential(const double a[3], const double b[3], const double X[3], 
     pal_axpy3(out, -pal_dot3(out, X), X);
 }
 
-/* a over its length, or over COLLAPSED times its rest length when that is more; the share of the latter it has, at most
- * 1. An axis without a rest length is 0. */
+/* a over its length, or over COLLAPSED times its rest length when that is more; returns the fraction of the latter, at
+ * most 1. An axis without a rest length is 0. */
 static double unit_or_less(double a[3], double rest)
 {
-    double length = pal_norm3(a), least = COLLAPSED * rest;
-    if (!(least > 0)) {
+    double length = pal_norm3(a), min = COLLAPSED * rest;
+    if (!(min > 0)) {
         pal_set3(a, 0, 0, 0);
         return 0;
     }
-    pal_scale3(a, 1 / (length > least ? length : least), a);
-    return length > least ? 1 : length / least;
+    pal_scale3(a, 1 / (length > min ? length : min), a);
+    return length > min ? 1 : length / min;
 }
 
 /* boundary faces around every node, as sparse rows of their other two corners; MEMORY */
@@ -82,7 +82,7 @@ static pal_err node_fans(const pal_tets *tets, int32_t **start_out, int32_t **fa
         free(fan);
         return PAL_ERR_MEMORY;
     }
-    /* starts are built one place ahead, so that filling leaves them in place */
+    /* starts are shifted by one while filling, which leaves them in place */
     for (size_t i = 0; i < n_corner; i++) start[tets->face[i] + 2]++;
     for (int i = 0; i < tets->n_node; i++) start[i + 2] += start[i + 1];
     for (size_t f = 0; f < (size_t)tets->n_face; f++)
@@ -97,7 +97,7 @@ static pal_err node_fans(const pal_tets *tets, int32_t **start_out, int32_t **fa
     return PAL_ERR_OK;
 }
 
-/* nodes that can carry a frame: on the surface, with a normal worth the name; all surface nodes if there are none */
+/* nodes that can carry a frame: on the surface, with a defined normal; all surface nodes if there are none */
 static int find_candidates(const pal_tets *tets, const int32_t *start, const int32_t *fan, int32_t *candidate)
 {
     int n = 0;
@@ -107,7 +107,7 @@ static int find_candidates(const pal_tets *tets, const int32_t *start, const int
             int n_fan = start[i + 1] - start[i];
             if (n_fan == 0) continue;
             double squares = fan_normal(tets->x, i, fan + 2 * (size_t)start[i], n_fan, normal);
-            if (pass == 1 || pal_dot3(normal, normal) > LEAST_NORMAL * LEAST_NORMAL * squares) candidate[n++] = i;
+            if (pass == 1 || pal_dot3(normal, normal) > MIN_NORMAL * MIN_NORMAL * squares) candidate[n++] = i;
         }
     return n;
 }
@@ -141,7 +141,7 @@ static pal_err find_near(const pal_tets *tets, const int32_t *candidate, int n_c
     return PAL_ERR_OK;
 }
 
-/* the two edges of a frame, the turn between them (B15) and the rest lengths */
+/* the two edges of a frame, the angle between them (B15) and the rest lengths */
 static void choose_edges(const double *x, int node, const int32_t *fan, int n_fan, int32_t edge[2], float turn[2],
                          float rest[3])
 {
@@ -161,7 +161,7 @@ static void choose_edges(const double *x, int node, const int32_t *fan, int n_fa
                 best = part, edge[0] = fan[i];
                 pal_scale3(first_tangent, 1 / part, t);
             }
-            /* the fallback must not run along the first edge, which may have turned along X */
+            /* the fallback must not be parallel to the first edge, which may have rotated onto X */
             if (pass == 1 && part > second * (1 + 1e-9) && fabs(pal_dot3(t, first_tangent)) < 0.9 * part) {
                 second = part, edge[1] = fan[i];
                 pal_scale3(second_tangent, 1 / part, t);

@@ -1,16 +1,16 @@
-/* Skinning of a shown surface to the surface nodes of a tetrahedral mesh (paper B 4.2 with errata B6-B8, B15).
+/* Skinning: binds a displayed surface to the surface nodes of a tetrahedral mesh (paper B section 4.2 with errata
+ * B6-B8, B15, server/mesh/README.md).
  *
- * Each used surface node has a frame: X = unit sum of its boundary faces' normals, Y = a chosen surface edge made
- * normal to X, Z = X x Y. Each shown vertex stores, for its 5 nearest surface nodes, the offset in their frames and
- * inverse squared distance weights (sum 1; a vertex that lies on a node belongs to it alone). Errata: the node's
- * position is added to the rotated offset (B6); weights sum over the neighbours (B7); the third row is Z (B8); the edge
+ * Each used surface node has a frame: X = unit sum of the normals of its boundary faces, Y = a chosen surface edge made
+ * normal to X, Z = X x Y. Each displayed vertex stores, for its 5 nearest surface nodes, the offset in their frames and
+ * inverse squared distance weights (sum 1; a vertex that lies on a node belongs to it alone). Errata: the position of
+ * the node is added to the rotated offset (B6); weights sum over the neighbours (B7); the third row is Z (B8); the edge
  * is the one with the largest tangential part at rest, with another as fallback (B15), whose angle to the first is
  * stored, so that the fallback gives the same axes.
  *
- * Frames depend on the present positions only. Where a neighbourhood has collapsed (its normal sum or its edge is less
- * than half of its length at rest) the axes shrink in proportion instead of turning about at once, so the surface
- * closes in on the nodes, passes smoothly through flat and inverted states and stays finite. Elsewhere the axes are
- * unit vectors.
+ * Frames depend on the current positions only. Where a neighbourhood has collapsed (its normal sum or its edge is less
+ * than half of its rest length) the axes shrink in proportion instead of flipping, so the surface closes in on the
+ * nodes, passes smoothly through flat and inverted states and stays finite. Elsewhere the axes are unit vectors.
  *
  * Binding is [load]; evaluation is [sim], without heap use. One pal_skin may serve several threads; each needs its own
  * frames buffer. */
@@ -44,7 +44,8 @@ pal_err pal_skin_bind(const pal_tets *tets, const double *x, int n_vertex, pal_s
 void pal_skin_free(pal_skin *skin);
 
 /* The frames buffer: 64 bytes a frame, 16 floats X Y Z P each padded to 4 (an array of 9 doubles a frame is large
- * enough). Caller's memory, zeroed before the first use, best at a multiple of 64; its content is this room's own. */
+ * enough). Memory of the caller, zeroed before the first use, best at a multiple of 64; its layout is private to this
+ * room. */
 static inline size_t pal_skin_frames_bytes(const pal_skin *skin)
 {
     return (size_t)skin->n_frame * 64;

@@ -1,11 +1,11 @@
-/* Voxels of twice the edge, by way of the grid that they lie on. */
+/* Voxels of twice the edge, by way of a grid. */
 #include "server/mesh/volume/voxel_coarsening.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const double most_missing = 0.025;
+static const double max_missing = 0.025;
 
 typedef struct grid {
     int n[3];
@@ -28,7 +28,7 @@ static void middle(const pal_tets *tets, const pal_hexes *hexes, int e, double x
     for (int c = 0; c < 3; c++) x[c] = corner[c] + 0.5 * tets->edge_m;
 }
 
-static pal_err lay(const pal_tets *tets, const pal_hexes *hexes, const int shift[3], grid *g)
+static pal_err make_grid(const pal_tets *tets, const pal_hexes *hexes, const int shift[3], grid *g)
 {
     double high[3], h = tets->edge_m;
     for (int c = 0; c < 3; c++) g->low[c] = INFINITY, high[c] = -INFINITY;
@@ -59,7 +59,7 @@ static void drop(grid *g, double min_fill)
         all += (double)g->fill[i];
         if ((double)g->fill[i] < min_fill) gone += (double)g->fill[i];
     }
-    for (size_t i = 0; i < n_cell && gone <= most_missing * all; i++)
+    for (size_t i = 0; i < n_cell && gone <= max_missing * all; i++)
         if ((double)g->fill[i] < min_fill) g->fill[i] = 0;
 }
 
@@ -86,7 +86,7 @@ pal_err pal_voxels_coarsen(const pal_tets *tets, const pal_hexes *hexes, const i
     grid g = {.fill = NULL};
     pal_prepared p = {0};
     if (hexes->n_hex == 0) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there are no voxels to make larger");
-    pal_err err = lay(tets, hexes, shift, &g);
+    pal_err err = make_grid(tets, hexes, shift, &g);
     if (!err) drop(&g, min_fill);
     if (!err) err = split(&g, tets, &p, diag);
     for (int e = 0; e < p.hexes.n_hex && !err; e++) {

@@ -1,8 +1,8 @@
-/* Parts of a surface: components over edges found by position, a common orientation, cavities.
+/* Parts of a surface: components over edges that are matched by position, a common orientation, cavities.
  *
- * One hash table over edges joins triangles into parts (any shared edge) and into patches that must face alike (edges
- * of exactly two triangles, union-find with a parity bit). A part that is a closed chain as it stands keeps its
- * orientation; others take the patches'. */
+ * One hash table over edges joins triangles into parts (any shared edge) and into patches of one orientation (edges of
+ * exactly two triangles, union-find with a parity bit). A part that is a closed chain keeps its orientation; others
+ * take that of the patches. */
 #include "server/mesh/voxel/surface_part.h"
 
 #include "server/base/vec3.h"
@@ -22,10 +22,10 @@ typedef struct finder {
     const pal_scan_surface *scan;
     size_t mask;
     edge_entry *table;
-    int32_t *joined; /* union-find of parts   [n_tri]                                     */
-    int32_t *patch;  /* union-find of patches [n_tri]                                     */
-    uint8_t *turned; /* triangle against its patch parent; in the end against the root    */
-    uint8_t *torn;   /* at a patch root: the patch has no common orientation (Moebius)    */
+    int32_t *joined;       /* union-find of parts   [n_tri]                                     */
+    int32_t *patch;        /* union-find of patches [n_tri]                                     */
+    uint8_t *reversed_of;  /* orientation against the patch parent; finally against the root */
+    uint8_t *inconsistent; /* at a patch root: the patch has no common orientation (Moebius)    */
 } finder;
 
 static int32_t find_joined(int32_t *parent, int32_t i)
@@ -34,18 +34,18 @@ static int32_t find_joined(int32_t *parent, int32_t i)
     return i;
 }
 
-/* root of a patch and the triangle's turn against it; the path is pressed flat */
-static int32_t find_patch(finder *f, int32_t i, uint8_t *turn)
+/* root of a patch and the orientation of the triangle against it; compresses the path */
+static int32_t find_patch(finder *f, int32_t i, uint8_t *reversed)
 {
     int32_t root = i;
     uint8_t total = 0;
-    for (; f->patch[root] != root; root = f->patch[root]) total ^= f->turned[root];
-    *turn = total;
+    for (; f->patch[root] != root; root = f->patch[root]) total ^= f->reversed_of[root];
+    *reversed = total;
     while (f->patch[i] != root && i != root) {
         int32_t next = f->patch[i];
-        uint8_t own = f->turned[i];
+        uint8_t own = f->reversed_of[i];
         f->patch[i] = root;
-        f->turned[i] = total;
+        f->reversed_of[i] = total;
         total ^= own;
         i = next;
     }
@@ -57,7 +57,7 @@ static const int32_t *corner(const pal_scan_surface *scan, int32_t tri, int k)
     return scan->point + 3 * (size_t)scan->tri[3 * (size_t)tri + (size_t)(k == 3 ? 0 : k)];
 }
 
-static void enter_edge(finder *f, int32_t tri, uint64_t key, int sign)
+static void add_edge(finder *f, int32_t tri, uint64_t key, int sign)
 {
     size_t at = key & f->mask;
     while (f->table[at].key && f->table[at].key != key) at = (at + 1) & f->mask;
@@ -76,16 +76,16 @@ static void enter_edge(finder *f, int32_t tri, uint64_t key, int sign)
         f->joined[a] = b;
 }
 
-/* edges of exactly two triangles bind their orientations */
-static void bind_patches(finder *f)
+/* edges of exactly two triangles relate the orientations of these */
+static void join_patches(finder *f)
 {
     for (size_t i = 0; i <= f->mask; i++) {
         const edge_entry *e = &f->table[i];
         if (e->n != 2) continue;
-        uint8_t turn_a, turn_b, differ = e->sign[0] == e->sign[1];
-        int32_t a = find_patch(f, e->tri[0], &turn_a), b = find_patch(f, e->tri[1], &turn_b);
+        uint8_t reversed_a, reversed_b, differ = e->sign[0] == e->sign[1];
+        int32_t a = find_patch(f, e->tri[0], &reversed_a), b = find_patch(f, e->tri[1], &reversed_b);
         if (a == b) {
-            if ((turn_a ^ turn_b) != differ) f->torn[a] = 1;
+            if ((reversed_a ^ reversed_b) != differ) f->inconsistent[a] = 1;
             continue;
         }
         if (b < a) {
@@ -93,8 +93,8 @@ static void bind_patches(finder *f)
             a = b, b = swap;
         }
         f->patch[b] = a;
-        f->turned[b] = turn_a ^ turn_b ^ differ;
-        f->torn[a] |= f->torn[b];
+        f->reversed_of[b] = reversed_a ^ reversed_b ^ differ;
+        f->inconsistent[a] |= f->inconsistent[b];
     }
 }
 
@@ -103,8 +103,8 @@ static void finder_free(finder *f)
     free(f->table);
     free(f->joined);
     free(f->patch);
-    free(f->turned);
-    free(f->torn);
+    free(f->reversed_of);
+    free(f->inconsistent);
 }
 
 static pal_err find_edges(finder *f)
@@ -115,41 +115,41 @@ static pal_err find_edges(finder *f)
     f->table = calloc(cap, sizeof *f->table);
     f->joined = malloc(room * sizeof *f->joined);
     f->patch = malloc(room * sizeof *f->patch);
-    f->turned = calloc(room, 1);
-    f->torn = calloc(room, 1);
-    if (!f->table || !f->joined || !f->patch || !f->turned || !f->torn) return PAL_ERR_MEMORY;
+    f->reversed_of = calloc(room, 1);
+    f->inconsistent = calloc(room, 1);
+    if (!f->table || !f->joined || !f->patch || !f->reversed_of || !f->inconsistent) return PAL_ERR_MEMORY;
     for (int32_t t = 0; t < f->scan->n_tri; t++) f->joined[t] = f->patch[t] = t;
     for (int32_t t = 0; t < f->scan->n_tri; t++)
         for (int k = 0; k < 3; k++) {
             int sign;
             uint64_t key = pal_scan_edge(corner(f->scan, t, k), corner(f->scan, t, k + 1), &sign);
-            if (key) enter_edge(f, t, key, sign);
+            if (key) add_edge(f, t, key, sign);
         }
-    bind_patches(f);
+    join_patches(f);
     return PAL_ERR_OK;
 }
 
-/* boundary of each part as sums of edge hashes, as it stands and as its patches would have it */
+/* boundary of each part as sums of edge hashes, as given and as oriented by its patches */
 typedef struct chain {
     uint64_t sum, repaired, odd;
     double centre[3], volume;
-    bool torn;
+    bool inconsistent;
 } chain;
 
-static void add_edges(const pal_scan_surface *scan, int32_t tri, bool turned, chain *c)
+static void add_edges(const pal_scan_surface *scan, int32_t tri, bool reversed_of, chain *c)
 {
     for (int k = 0; k < 3; k++) {
         int sign;
         uint64_t h = pal_scan_edge(corner(scan, tri, k), corner(scan, tri, k + 1), &sign);
         c->sum += sign > 0 ? h : 0 - h;
-        c->repaired += (sign > 0) != turned ? h : 0 - h;
+        c->repaired += (sign > 0) != reversed_of ? h : 0 - h;
         c->odd ^= h;
     }
     for (int d = 0; d < 3; d++)
         for (int k = 0; k < 3; k++) c->centre[d] += corner(scan, tri, k)[d];
 }
 
-static void turn_triangle(int32_t *tri)
+static void reverse_triangle(int32_t *tri)
 {
     int32_t swap = tri[1];
     tri[1] = tri[2];
@@ -157,7 +157,7 @@ static void turn_triangle(int32_t *tri)
 }
 
 /* a . (b x c) */
-static double triple(const double a[3], const double b[3], const double c[3])
+static double triple_product(const double a[3], const double b[3], const double c[3])
 {
     double cross[3];
     pal_cross3(cross, b, c);
@@ -170,36 +170,37 @@ static double fan_volume(const pal_scan_surface *scan, int32_t tri, const double
     double p[3][3];
     for (int k = 0; k < 3; k++)
         for (int d = 0; d < 3; d++) p[k][d] = corner(scan, tri, k)[d] - o[d];
-    return triple(p[0], p[1], p[2]);
+    return triple_product(p[0], p[1], p[2]);
 }
 
 /* an open edge, from a to b in its triangle's sense */
-typedef struct rim_edge {
-    int32_t tri, a, b; /* vertices by number: holes of unwelded triangles do not join, and stay as they are */
-} rim_edge;
+typedef struct open_edge {
+    int32_t tri, a, b; /* vertices by number: holes of unwelded triangles do not join, and stay open */
+} open_edge;
 
 /* corners that belong to the same hole: union-find, and the sum of its corners at the root */
-typedef struct rim_corner {
+typedef struct hole_corner {
     int32_t up, n;
     double sum[3];
-} rim_corner;
+} hole_corner;
 
-static int32_t find_rim(rim_corner *corner_of, int32_t i)
+static int32_t find_hole(hole_corner *corner_of, int32_t i)
 {
     while (corner_of[i].up != i) i = corner_of[i].up = corner_of[corner_of[i].up].up;
     return i;
 }
 
-/* the open edge of a table entry as its triangle stands now */
-static rim_edge rim_of(const pal_scan_surface *scan, const edge_entry *e)
+/* the open edge of a table entry in the current orientation of its triangle */
+static open_edge open_edge_of(const pal_scan_surface *scan, const edge_entry *e)
 {
     const int32_t *c = scan->tri + 3 * (size_t)e->tri[0];
     int k = 0, sign;
     while (k < 2 && pal_scan_edge(corner(scan, e->tri[0], k), corner(scan, e->tri[0], k + 1), &sign) != e->key) k++;
-    return (rim_edge){e->tri[0], c[k], c[(k + 1) % 3]};
+    return (open_edge){e->tri[0], c[k], c[(k + 1) % 3]};
 }
 
-/* adds what the holes' fans enclose with each part's centre to the parts' volumes; MEMORY */
+/* adds the volumes between the fans that close the holes and the centre of each part to the volumes of the parts;
+ * MEMORY */
 static pal_err close_holes(const finder *f, chain *chains)
 {
     const pal_scan_surface *scan = f->scan;
@@ -208,26 +209,26 @@ static pal_err close_holes(const finder *f, chain *chains)
         if ((size_t)scan->tri[i] >= n_vertex) n_vertex = (size_t)scan->tri[i] + 1;
     for (size_t i = 0; i <= f->mask; i++) n_open += f->table[i].n == 1;
     if (n_open == 0) return PAL_ERR_OK;
-    rim_corner *rim = calloc(n_vertex, sizeof *rim);
-    if (!rim) return PAL_ERR_MEMORY;
-    for (size_t v = 0; v < n_vertex; v++) rim[v].up = (int32_t)v;
+    hole_corner *hole = calloc(n_vertex, sizeof *hole);
+    if (!hole) return PAL_ERR_MEMORY;
+    for (size_t v = 0; v < n_vertex; v++) hole[v].up = (int32_t)v;
     for (size_t i = 0; i <= f->mask; i++) {
         if (f->table[i].n != 1) continue;
-        rim_edge e = rim_of(scan, &f->table[i]);
-        rim[find_rim(rim, e.a)].up = find_rim(rim, e.b);
+        open_edge e = open_edge_of(scan, &f->table[i]);
+        hole[find_hole(hole, e.a)].up = find_hole(hole, e.b);
     }
     for (size_t i = 0; i <= f->mask; i++) {
         if (f->table[i].n != 1) continue;
-        rim_edge e = rim_of(scan, &f->table[i]);
-        rim_corner *root = &rim[find_rim(rim, e.a)];
+        open_edge e = open_edge_of(scan, &f->table[i]);
+        hole_corner *root = &hole[find_hole(hole, e.a)];
         root->n += 2;
         for (int d = 0; d < 3; d++)
             root->sum[d] += (double)scan->point[3 * (size_t)e.a + (size_t)d] + scan->point[3 * (size_t)e.b + (size_t)d];
     }
     for (size_t i = 0; i <= f->mask; i++) {
         if (f->table[i].n != 1) continue;
-        rim_edge e = rim_of(scan, &f->table[i]);
-        const rim_corner *root = &rim[find_rim(rim, e.a)];
+        open_edge e = open_edge_of(scan, &f->table[i]);
+        const hole_corner *root = &hole[find_hole(hole, e.a)];
         chain *c = &chains[scan->part[e.tri]];
         double p[3][3];
         for (int d = 0; d < 3; d++) {
@@ -235,38 +236,38 @@ static pal_err close_holes(const finder *f, chain *chains)
             p[1][d] = scan->point[3 * (size_t)e.a + (size_t)d] - c->centre[d];
             p[2][d] = root->sum[d] / root->n - c->centre[d];
         }
-        c->volume += triple(p[0], p[1], p[2]) / 6;
+        c->volume += triple_product(p[0], p[1], p[2]) / 6;
     }
-    free(rim);
+    free(hole);
     return PAL_ERR_OK;
 }
 
-/* decides each part's kind, turns its triangles alike, then outward; MEMORY */
+/* determines the kind of each part and orients its triangles consistently, then outward; MEMORY */
 static pal_err orient(pal_scan_surface *scan, finder *f, pal_parts *parts, chain *chains)
 {
-    uint8_t turn;
+    uint8_t reversed;
     for (int32_t t = 0; t < scan->n_tri; t++) {
         chain *c = &chains[scan->part[t]];
-        c->torn |= f->torn[find_patch(f, t, &turn)];
-        add_edges(scan, t, turn, c);
+        c->inconsistent |= f->inconsistent[find_patch(f, t, &reversed)];
+        add_edges(scan, t, reversed, c);
         parts->part[scan->part[t]].n_tri++;
     }
     for (int i = 0; i < parts->n; i++) {
         pal_part *p = &parts->part[i];
-        bool closed = chains[i].sum == 0 || (chains[i].repaired == 0 && !chains[i].torn);
+        bool closed = chains[i].sum == 0 || (chains[i].repaired == 0 && !chains[i].inconsistent);
         p->kind = closed ? PAL_PART_CLOSED : chains[i].odd == 0 ? PAL_PART_EVEN : PAL_PART_OPEN;
-        p->coherent = !chains[i].torn;
+        p->coherent = !chains[i].inconsistent;
         for (int d = 0; d < 3; d++) chains[i].centre[d] /= 3.0 * p->n_tri;
     }
     for (int32_t t = 0; t < scan->n_tri; t++) {
         chain *c = &chains[scan->part[t]];
-        find_patch(f, t, &turn);
-        if (turn && c->sum != 0 && !c->torn) turn_triangle(scan->tri + 3 * (size_t)t);
+        find_patch(f, t, &reversed);
+        if (reversed && c->sum != 0 && !c->inconsistent) reverse_triangle(scan->tri + 3 * (size_t)t);
         c->volume += fan_volume(scan, t, c->centre) / 6;
     }
     PAL_TRY(close_holes(f, chains));
     for (int32_t t = 0; t < scan->n_tri; t++)
-        if (chains[scan->part[t]].volume < 0) turn_triangle(scan->tri + 3 * (size_t)t);
+        if (chains[scan->part[t]].volume < 0) reverse_triangle(scan->tri + 3 * (size_t)t);
     for (int i = 0; i < parts->n; i++) {
         parts->part[i].inward = chains[i].volume < 0;
         parts->part[i].volume = fabs(chains[i].volume);
@@ -312,10 +313,10 @@ void pal_parts_free(pal_parts *parts)
     memset(parts, 0, sizeof *parts);
 }
 
-/* state of each part along a row; only the parts that the row meets are touched, and left zero behind it */
+/* state of each part along a row; only the parts that the row meets are changed, and left zero afterwards */
 struct pal_parts_work {
     int32_t *winding, *count; /* so far along the row, first their totals [n] */
-    int32_t *entered;         /* depth at which the row went in           [n] */
+    int32_t *entered;         /* depth at which the row entered           [n] */
     int32_t *open;            /* parts the row is inside of now, a stack  [n] */
     int n_open;
 };
@@ -344,8 +345,8 @@ void pal_parts_work_destroy(pal_parts_work *work)
     free(work);
 }
 
-/* does the row's crossings with a part make sense by themselves? */
-static bool is_clean(const pal_part *part, int32_t winding, int32_t count)
+/* are the row's crossings with a part consistent? */
+static bool is_consistent(const pal_part *part, int32_t winding, int32_t count)
 {
     if (count & 1) return false;
     return winding == 0 || part->kind == PAL_PART_EVEN || (part->kind == PAL_PART_OPEN && !part->coherent);
@@ -356,9 +357,9 @@ static bool by_parity(const pal_part *part)
     return part->kind == PAL_PART_EVEN || (part->kind == PAL_PART_OPEN && !part->coherent);
 }
 
-enum { UNCLEAN = INT32_MIN };
+enum { INCONSISTENT = INT32_MIN };
 
-/* totals of every part in the row; parts that are not clean get UNCLEAN as their count and are passed over */
+/* totals of every part in the row; inconsistent parts get INCONSISTENT as their count and are skipped */
 static bool begin_row(const pal_parts *parts, pal_parts_work *w, const pal_crossing *item, int64_t n)
 {
     bool clean = true;
@@ -369,8 +370,8 @@ static bool begin_row(const pal_parts *parts, pal_parts_work *w, const pal_cross
     for (int64_t i = 0; i < n; i++) {
         int32_t part = item[i].part;
         if (w->count[part] <= 0) continue;
-        bool good = is_clean(&parts->part[part], w->winding[part], w->count[part]);
-        w->count[part] = good ? 0 : UNCLEAN;
+        bool good = is_consistent(&parts->part[part], w->winding[part], w->count[part]);
+        w->count[part] = good ? 0 : INCONSISTENT;
         w->winding[part] = 0;
         clean &= good;
     }
@@ -383,11 +384,11 @@ static void end_row(pal_parts_work *w, const pal_crossing *item, int64_t n)
     for (int64_t i = 0; i < n; i++) w->winding[item[i].part] = w->count[item[i].part] = 0;
 }
 
-/* takes one crossing; the stack of open parts follows */
+/* processes one crossing and updates the stack of parts that the row is inside of */
 static void cross(const pal_parts *parts, pal_parts_work *w, const pal_crossing *c)
 {
     int32_t part = c->part;
-    if (w->count[part] == UNCLEAN) return;
+    if (w->count[part] == INCONSISTENT) return;
     bool parity = by_parity(&parts->part[part]);
     bool was = parity ? w->count[part] & 1 : w->winding[part] != 0;
     w->count[part]++;
@@ -405,14 +406,14 @@ static void cross(const pal_parts *parts, pal_parts_work *w, const pal_crossing 
     }
 }
 
-/* the smallest part around decides */
+/* the smallest surrounding part decides */
 static bool is_inside(const pal_parts *parts, const pal_parts_work *w)
 {
     if (w->n_open == 0) return false;
-    const pal_part *least = &parts->part[w->open[0]];
+    const pal_part *min = &parts->part[w->open[0]];
     for (int k = 1; k < w->n_open; k++)
-        if (parts->part[w->open[k]].volume < least->volume) least = &parts->part[w->open[k]];
-    return !least->cavity;
+        if (parts->part[w->open[k]].volume < min->volume) min = &parts->part[w->open[k]];
+    return !min->cavity;
 }
 
 bool pal_parts_row(const pal_parts *parts, pal_parts_work *work, const pal_crossing *item, int64_t n,
@@ -437,22 +438,22 @@ bool pal_parts_row(const pal_parts *parts, pal_parts_work *work, const pal_cross
 enum { COINCIDENT = PAL_SCAN_ONE / 16 };
 
 /* does the row cross the part once more within a sixteenth of a voxel? */
-static bool crosses_soon(const pal_crossing *c, const pal_crossing *end, int32_t part)
+static bool crosses_again(const pal_crossing *c, const pal_crossing *end, int32_t part)
 {
     for (const pal_crossing *k = c + 1; k < end && k->depth < c->depth + COINCIDENT; k++)
         if (k->part == part) return true;
     return false;
 }
 
-/* the largest part other than its own that the row is within at a crossing, a sixteenth of a voxel and more before and
- * behind it; -1: none. end: of the row */
+/* The largest part other than its own that surrounds a crossing by more than a sixteenth of a voxel along the row on
+ * both sides; -1: none. end: of the row */
 static int32_t outermost(const pal_parts *parts, const pal_parts_work *w, const pal_crossing *c,
                          const pal_crossing *end)
 {
     int32_t best = -1;
     for (int k = 0; k < w->n_open; k++) {
         int32_t part = w->open[k];
-        if (part == c->part || w->entered[part] > c->depth - COINCIDENT || crosses_soon(c, end, part)) continue;
+        if (part == c->part || w->entered[part] > c->depth - COINCIDENT || crosses_again(c, end, part)) continue;
         if (best < 0 || parts->part[part].volume > parts->part[best].volume) best = part;
     }
     return best;
@@ -468,7 +469,7 @@ pal_err pal_parts_nest(pal_parts *parts, const pal_crossings *rows)
             int64_t n = rows->start[row + 1] - rows->start[row];
             begin_row(parts, w, item, n);
             for (int64_t i = 0; i < n; i++) {
-                if (w->count[item[i].part] == UNCLEAN) continue;
+                if (w->count[item[i].part] == INCONSISTENT) continue;
                 int32_t around = outermost(parts, w, &item[i], item + n);
                 bool opposed = around >= 0 && parts->part[around].inward != parts->part[item[i].part].inward;
                 votes[item[i].part] += opposed ? 1 : -1;

@@ -1,5 +1,5 @@
-/* Private to the voxel files: the edge-connected parts of a surface in grid units, whether each is closed, which way
- * each faces, and which of them bound a cavity. Thread: [load]. */
+/* Private to the voxel files: the edge-connected parts of a surface in grid units, whether each is closed, its
+ * orientation, and which of them bound a cavity. Thread: [load]. */
 #ifndef PAL_MESH_VOXEL_SURFACE_PART_H
 #define PAL_MESH_VOXEL_SURFACE_PART_H
 #include "server/mesh/voxel/voxel_scanline.h"
@@ -13,9 +13,9 @@ typedef enum pal_part_kind {
 typedef struct pal_part {
     int n_tri;
     pal_part_kind kind;
-    bool coherent; /* every edge of two triangles runs both ways                                                     */
-    bool inward;   /* faced inward in the file; now it faces outward like all others                                 */
-    bool cavity;   /* lies inside another part that faces the other way in the file                                  */
+    bool coherent; /* every edge of two triangles is run through in both directions */
+    bool inward;   /* oriented inward in the file; here all parts are oriented outward */
+    bool cavity;   /* lies inside another part of opposite orientation in the file */
     double volume; /* enclosed, in cubic grid units, never negative; holes count as closed by fans from their middle */
 } pal_part;
 
@@ -24,18 +24,18 @@ typedef struct pal_parts {
     pal_part *part;
 } pal_parts;
 
-/* finds the parts by position (unwelded corners join), numbers the triangles' parts in scan->part, makes each part's
- * orientation common where it can be and outward; cavity is left false; MEMORY */
+/* Finds the parts by position (unwelded corners join), numbers the parts of the triangles in scan->part, makes the
+ * orientation of each part consistent where possible, and outward; cavity stays false; MEMORY */
 pal_err pal_parts_find(pal_scan_surface *scan, pal_parts *out);
 void pal_parts_free(pal_parts *parts);
 
-/* sets cavity from the rows along one axis: a part most of whose crossings lie inside another one that faced the other
- * way in the file. A nearly coincident copy lies inside nothing. MEMORY */
+/* Sets cavity from the rows along one axis: a part most of whose crossings lie inside another one of opposite
+ * orientation in the file. A nearly coincident copy lies inside nothing. MEMORY */
 pal_err pal_parts_nest(pal_parts *parts, const pal_crossings *rows);
 
-/* Inside along one row by the parts: where the smallest part around a centre is no cavity. Calls run(from, to) for each
- * run of inside voxels. Returns false when an open part leaves the row undecided outside those runs. work is from
- * pal_parts_work. */
+/* Inside voxels of one row: those whose smallest surrounding part is no cavity. Calls run(from, to) for each run of
+ * inside voxels. Returns false when an open part leaves the row undecided outside those runs. work is from
+ * pal_parts_work_create. */
 typedef struct pal_parts_work pal_parts_work;
 pal_parts_work *pal_parts_work_create(const pal_parts *parts); /* NULL: out of memory */
 void pal_parts_work_destroy(pal_parts_work *work);

@@ -1,7 +1,7 @@
 /* Rows of voxels as bits: runs, counts, face-connected components.
  *
- * Components join runs, not voxels: a run meets the runs of the row before and of the plane before that overlap it,
- * found by walking both rows side by side. */
+ * Components join runs, not voxels: a run meets the overlapping runs of the previous row and of the previous plane,
+ * which are found by walking both rows in parallel. */
 #include "server/mesh/voxel/voxel_bits.h"
 
 #include "server/num/union_find.h"
@@ -89,7 +89,7 @@ static bool runs_push(runs *r, int from, int to)
     return true;
 }
 
-/* runs of ones in a row; a run that reaches a word's end goes on in the next */
+/* runs of ones in a row; a run that reaches the end of a word continues in the next */
 static bool runs_of_row(runs *r, const uint64_t *row, int n_word)
 {
     int open = -1;

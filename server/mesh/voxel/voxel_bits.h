@@ -28,7 +28,7 @@ int64_t pal_bits_count(const pal_bits *bits);
 /* face-connected components; with largest_only the smaller ones are cleared; MEMORY */
 pal_err pal_bits_components(pal_bits *bits, bool largest_only, int *n_component);
 
-/* corners of the five tetrahedra of a voxel, by the parity of its place; corner bits x = 1, y = 2, z = 4 */
+/* corners of the five tetrahedra of a voxel, by the parity of its index; corner bits x = 1, y = 2, z = 4 */
 extern const uint8_t pal_voxel_tets[2][5][4];
 
 /* heap, in large pages where the kernel gives them: first touch is most of the cost of writing large arrays */

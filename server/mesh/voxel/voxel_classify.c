@@ -1,11 +1,11 @@
-/* Which voxels are inside, and by which method.
+/* Classification of voxels as inside or outside.
  *
- * scanline: the surface is closed (or every edge is shared evenly): one axis suffices, since crossings are exact and
- * all axes agree. Rows that go in and out in turn need no more; otherwise the parts of the surface are told apart: a
- * part counts as inside where its own winding number is not 0, copies and overlaps join, inward shells within are
- * empty. vote: open surface: every axis has its say where its row makes sense; two unopposed votes settle a voxel.
- * Where few voxels are left, the majority settles them. winding: where many are left (large openings), the winding
- * number settles those. flood: the paper's own, in voxel_flood.c, when asked for. */
+ * scanline: for a closed surface (or one whose edges all have an even number of triangles). One axis suffices, since
+ * crossings are exact and all axes agree. If some row does not enter and leave alternately, the connected parts of the
+ * surface are classified: a voxel is inside a part where the winding number of that part is not 0; copies and overlaps
+ * merge, inward shells within are cavities. vote: for an open surface. Each axis votes where its row is consistent; two
+ * unopposed votes decide a voxel. Where few voxels remain, the majority decides. winding: where many remain (large
+ * openings), the winding number decides them. flood: the method of the paper, in voxel_flood.c, on request. */
 #include "server/mesh/voxel/voxel_classify.h"
 
 #include "server/base/clock.h"
@@ -17,14 +17,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* the majority settles up to this share of the voxels that are settled already */
+/* the majority decides up to this fraction of the voxels that are already decided */
 #define FEW_DISPUTED 0.05
-/* an open surface must enclose beyond doubt (by two axes or this winding number) at least this share of its inside
+/* an open surface must enclose beyond doubt (by two axes or this winding number) at least this fraction of its inside
  * voxels, and of those that two axes claim */
 #define SURE_SHARE   0.5
 #define SURE_WINDING 0.75
 /* length of the sum of area normals over the area: 0 closed, 1 flat */
-#define MOST_ONE_SIDED 0.8
+#define MAX_ONE_SIDED 0.8
 
 bool pal_scan_plain(const pal_crossings *crossings, pal_bits *inside)
 {
@@ -44,7 +44,7 @@ bool pal_scan_plain(const pal_crossings *crossings, pal_bits *inside)
             n_pair++;
         }
     }
-    /* a copy turned inside out pairs up with its twin instead of with the far wall */
+    /* a copy with reversed orientation pairs up with its twin instead of with the far wall */
     return 2 * n_flat <= n_pair;
 }
 
@@ -59,7 +59,7 @@ typedef struct decision {
     pal_parts parts;
     pal_surface facing; /* the surface with its parts outward and cavities inward; shares x */
     pal_box_tree *tree; /* of facing */
-    double most_winding;
+    double max_winding;
     int64_t n_sure, n_claimed; /* see SURE_SHARE */
 } decision;
 
@@ -113,8 +113,8 @@ static void vote_run(void *self, int from, int to)
     for (int k = from; k < to; k++) b->vote[b->first + b->step * (size_t)k] += b->amount;
 }
 
-/* a row that does not make sense abstains on every voxel that its sound parts do not claim: it abstains on all, and
- * the claim takes that back */
+/* An inconsistent row abstains on every voxel that its consistent parts do not claim: it abstains on all, then the
+ * claim revokes that */
 static void vote_row(const pal_parts *parts, pal_parts_work *work, const pal_crossing *item, int64_t n, ballot *b)
 {
     b->amount = 1;
@@ -145,8 +145,8 @@ static pal_err vote_axis(decision *d, int axis, uint8_t *vote)
     return err;
 }
 
-/* the surface as the parts are faced now, and its tree; parts that cannot be faced (Moebius) have no winding number */
-static pal_err plant_tree(decision *d)
+/* the surface with its parts oriented, and its tree; parts that have no orientation (Moebius) have no winding number */
+static pal_err build_tree(decision *d)
 {
     if (d->tree) return PAL_ERR_OK;
     double began = pal_clock_s();
@@ -174,7 +174,7 @@ static double winding_at(decision *d, int x, int y, int z)
     double p[3] = {g->low_m[0] + g->edge_m * (x + 0.5), g->low_m[1] + g->edge_m * (y + 0.5),
                    g->low_m[2] + g->edge_m * (z + 0.5)};
     double w = pal_box_tree_winding(d->tree, p);
-    if (w > d->most_winding) d->most_winding = w;
+    if (w > d->max_winding) d->max_winding = w;
     return w;
 }
 
@@ -183,7 +183,7 @@ static void set_inside(decision *d, int x, int y, int z)
     pal_bits_row(d->inside, y, z)[x >> 6] |= (uint64_t)1 << (x & 63);
 }
 
-/* what the three axes say together */
+/* joint verdict of the three axes */
 typedef enum verdict { OUTSIDE, INSIDE, DISPUTED } verdict;
 
 static verdict judge(uint8_t vote)
@@ -194,7 +194,7 @@ static verdict judge(uint8_t vote)
     return DISPUTED;
 }
 
-/* one voxel that two axes do not settle */
+/* one voxel that two axes do not decide */
 static void settle(decision *d, uint8_t vote, bool by_winding, int x, int y, int z)
 {
     int in = vote & 15, out = 3 - in - (vote >> 4);
@@ -224,7 +224,7 @@ static pal_err count_votes(decision *d, const uint8_t *vote)
     strcpy(d->report->method, by_winding ? "winding" : "vote");
     d->report->n_disagree = n_disputed;
     d->n_sure = n_inside;
-    if (n_tie || (by_winding && n_disputed)) PAL_TRY(plant_tree(d));
+    if (n_tie || (by_winding && n_disputed)) PAL_TRY(build_tree(d));
     const uint8_t *at = vote;
     for (int z = 0; z < n[2]; z++)
         for (int y = 0; y < n[1]; y++)
@@ -254,7 +254,7 @@ static pal_err by_winding(decision *d)
     pal_crossings rows;
     PAL_TRY(scan_parts(d, 0, &rows));
     pal_crossings_free(&rows);
-    PAL_TRY(plant_tree(d));
+    PAL_TRY(build_tree(d));
     for (int z = 1; z < d->grid->n[2] - 1; z++)
         for (int y = 1; y < d->grid->n[1] - 1; y++)
             for (int x = 1; x < d->grid->n[0] - 1; x++) {
@@ -277,7 +277,7 @@ static pal_err by_flood(decision *d)
 }
 
 /* |sum of area normals| over the area */
-static double one_sided(const decision *d, double *area_out)
+static double one_sidedness(const decision *d, double *area_out)
 {
     double sum[3] = {0}, area = 0;
     for (size_t t = 0; t < (size_t)d->scan->n_tri; t++) {
@@ -306,14 +306,14 @@ static double parts_volume(const decision *d)
     return sum * unit * unit * unit;
 }
 
-/* is a volume meant? Three reasons why not: 1 no extent (voxels.c), 2 closed but thinner than the voxels, 3 open and
- * enclosing nothing */
-static pal_err check_meant(decision *d, bool open, int resolution)
+/* Does the surface enclose a volume? Reasons against it: 1 no extent (voxel_fill.c), 2 closed but thinner than the
+ * voxels, 3 open and enclosing nothing */
+static pal_err check_encloses(decision *d, bool open, int resolution)
 {
     int64_t n_inside = pal_bits_count(d->inside);
-    double area, sided = one_sided(d, &area);
+    double area, sided = one_sidedness(d, &area);
     if (open) {
-        if (n_inside > 0 && sided <= MOST_ONE_SIDED && (double)d->n_sure >= SURE_SHARE * (double)n_inside &&
+        if (n_inside > 0 && sided <= MAX_ONE_SIDED && (double)d->n_sure >= SURE_SHARE * (double)n_inside &&
             (double)d->n_sure >= SURE_SHARE * (double)d->n_claimed)
             return PAL_ERR_OK;
         return pal_diagnostic_set(
@@ -321,7 +321,7 @@ static pal_err check_meant(decision *d, bool open, int resolution)
             "no volume (reason 3): the surface of %d triangles is open and encloses nothing: %.2f of its "
             "area faces one way (limit %.2f), the largest winding number is %.2f, %lld of %lld voxels "
             "are inside beyond doubt, two axes claim %lld",
-            d->scan->n_tri, sided, MOST_ONE_SIDED, d->most_winding, (long long)d->n_sure, (long long)n_inside,
+            d->scan->n_tri, sided, MAX_ONE_SIDED, d->max_winding, (long long)d->n_sure, (long long)n_inside,
             (long long)d->n_claimed);
     }
     if (n_inside > 0) return PAL_ERR_OK;
@@ -339,7 +339,7 @@ static pal_err check_meant(decision *d, bool open, int resolution)
         d->grid->edge_m, thick, (int)needed);
 }
 
-/* the method asked for, or the first that serves */
+/* the requested method, or the first that applies */
 static pal_err run_method(decision *d, const char *method, bool *open)
 {
     bool any = !method;
@@ -365,7 +365,7 @@ static pal_err run_method(decision *d, const char *method, bool *open)
         err = by_winding(d);
     else
         err = by_vote(d);
-    /* a scanline that was asked for is taken at its word */
+    /* a requested scanline is trusted even for an open surface */
     *open = !even && strcmp(d->report->method, "scanline") != 0;
     d->report->surface_volume_m3 = parts_volume(d);
     d->report->open = !even;
@@ -395,7 +395,7 @@ pal_err pal_voxels_classify(const pal_surface *surface, const pal_voxel_options 
         pal_diagnostic_set(diag, err,
                            "the surface of %d triangles crosses the rows of the %d x %d x %d grid too often: noise?",
                            scan.n_tri, grid->n[0], grid->n[1], grid->n[2]);
-    if (!err) err = check_meant(&d, open, options->resolution);
+    if (!err) err = check_encloses(&d, open, options->resolution);
     pal_box_tree_destroy(d.tree);
     free(d.facing.tri);
     pal_parts_free(&d.parts);

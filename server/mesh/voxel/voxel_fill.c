@@ -1,7 +1,7 @@
-/* Surface -> voxels (paper B 2.2): inside, one border layer, components.
+/* From a surface to voxels (paper B section 2.2): inside, one border layer, components.
  *
- * The grid begins one voxel outside the corner of the surface's box, so the first centre lies half a voxel inside it.
- * Inside is kept as bits, where the border layer is a shift and two neighbouring rows. */
+ * The grid begins one voxel outside the corner of the box of the surface, so the first centre lies half a voxel inside
+ * it. Inside voxels are bits, so that the border layer is a shift and two neighbouring rows. */
 #include "server/mesh/voxel/voxels.h"
 
 #include "server/base/clock.h"
@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_RESOLUTION = 1024, MOST_VOXEL = 50000000 };
+enum { MAX_RESOLUTION = 1024, MAX_VOXEL = 50000000 };
 
 void pal_voxels_free(pal_voxels *voxels)
 {
@@ -35,13 +35,13 @@ static bool find_box(const pal_surface *surface, const uint8_t *used, double low
     return low[0] <= high[0];
 }
 
-static pal_err lay_grid(const pal_surface *surface, const pal_voxel_options *options, pal_voxels *grid,
-                        pal_diagnostic *diag)
+static pal_err make_grid(const pal_surface *surface, const pal_voxel_options *options, pal_voxels *grid,
+                         pal_diagnostic *diag)
 {
     double low[3], high[3], longest = 0;
-    if (options->resolution < 1 || options->resolution > MOST_RESOLUTION)
+    if (options->resolution < 1 || options->resolution > MAX_RESOLUTION)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "resolution %d is not within 1..%d", options->resolution,
-                                  MOST_RESOLUTION);
+                                  MAX_RESOLUTION);
     uint8_t *used = calloc(surface->n_vertex ? (size_t)surface->n_vertex : 1, 1);
     if (!used) return PAL_ERR_MEMORY;
     for (size_t i = 0; i < 3 * (size_t)surface->n_tri; i++) used[surface->tri[i]] = 1;
@@ -51,7 +51,7 @@ static pal_err lay_grid(const pal_surface *surface, const pal_voxel_options *opt
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
                                   "no volume (reason 1): none of %d triangles has finite corners", surface->n_tri);
     for (int k = 0; k < 3; k++) longest = fmax(longest, high[k] - low[k]);
-    if (!(longest > 0) || !isfinite(longest) || !isnormal(longest / MOST_RESOLUTION / PAL_SCAN_ONE))
+    if (!(longest > 0) || !isfinite(longest) || !isnormal(longest / MAX_RESOLUTION / PAL_SCAN_ONE))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
                                   "no volume (reason 1): the box of %d triangles is %g x %g x %g m across",
                                   surface->n_tri, high[0] - low[0], high[1] - low[1], high[2] - low[2]);
@@ -66,7 +66,7 @@ static pal_err lay_grid(const pal_surface *surface, const pal_voxel_options *opt
     return PAL_ERR_OK;
 }
 
-/* voxels beside an inside one that are not inside themselves */
+/* face neighbours of inside voxels that are not inside themselves */
 static void find_border(const pal_bits *inside, pal_bits *border)
 {
     int n_word = inside->n_word;
@@ -93,7 +93,7 @@ static void find_border(const pal_bits *inside, pal_bits *border)
     for (size_t i = 0; i < n; i++) border->word[i] &= ~inside->word[i];
 }
 
-/* bits to bytes: 8 bits become 8 bytes by one table look-up */
+/* bits to bytes: one table look-up turns 8 bits into 8 bytes */
 static void write_kind(const pal_bits *inside, const pal_bits *border, uint8_t *kind)
 {
     uint64_t spread[256];
@@ -118,7 +118,7 @@ static void write_kind(const pal_bits *inside, const pal_bits *border, uint8_t *
     }
 }
 
-/* pieces that hang together face by face, border voxels included; the border is left as it was */
+/* number of face-connected components, border voxels included; the border is unchanged */
 static pal_err count_pieces(const pal_bits *inside, pal_bits *border, int *n_component)
 {
     size_t n = (size_t)inside->n_word * (size_t)inside->n[1] * (size_t)inside->n[2];
@@ -128,7 +128,7 @@ static pal_err count_pieces(const pal_bits *inside, pal_bits *border, int *n_com
     return err;
 }
 
-/* border, what of it is dropped, pieces, counts, budget, bytes */
+/* border, dropped border voxels, components, counts, budget, bytes */
 static pal_err keep_voxels(const pal_surface *surface, const pal_bits *inside, const pal_voxel_options *options,
                            pal_voxels *voxels, pal_voxel_report *report, pal_diagnostic *diag)
 {
@@ -145,12 +145,12 @@ static pal_err keep_voxels(const pal_surface *surface, const pal_bits *inside, c
     }
     voxels->n_inside = pal_bits_count(inside);
     voxels->n_border = pal_bits_count(&border);
-    int64_t most = options->max_voxel > 0 ? options->max_voxel : MOST_VOXEL;
-    if (voxels->n_inside + voxels->n_border > most) {
+    int64_t max = options->max_voxel > 0 ? options->max_voxel : MAX_VOXEL;
+    if (voxels->n_inside + voxels->n_border > max) {
         pal_bits_free(&border);
         return pal_diagnostic_set(
             diag, PAL_ERR_BUDGET, "resolution %d makes %lld voxels, the limit is %lld: ask for less",
-            options->resolution, (long long)(voxels->n_inside + voxels->n_border), (long long)most);
+            options->resolution, (long long)(voxels->n_inside + voxels->n_border), (long long)max);
     }
     voxels->kind = calloc((size_t)voxels->n[0] * (size_t)voxels->n[1] * (size_t)voxels->n[2], 1);
     if (voxels->kind) write_kind(inside, &border, voxels->kind);
@@ -163,21 +163,21 @@ pal_err pal_voxels_fill(const pal_surface *surface, const pal_voxel_options *opt
 {
     double began = pal_clock_s();
     pal_voxels voxels = {0};
-    pal_voxel_report told = {0};
+    pal_voxel_report measured = {0};
     pal_bits inside = {0};
-    PAL_TRY(lay_grid(surface, options, &voxels, diag));
+    PAL_TRY(make_grid(surface, options, &voxels, diag));
     pal_err err = pal_bits_create(voxels.n, &inside);
-    if (!err) err = pal_voxels_classify(surface, options, &voxels, &inside, &told, diag);
+    if (!err) err = pal_voxels_classify(surface, options, &voxels, &inside, &measured, diag);
     int n_before;
     if (!err && options->largest_only) err = pal_bits_components(&inside, true, &n_before);
-    if (!err) err = keep_voxels(surface, &inside, options, &voxels, &told, diag);
+    if (!err) err = keep_voxels(surface, &inside, options, &voxels, &measured, diag);
     pal_bits_free(&inside);
     if (err == PAL_ERR_MEMORY)
         pal_diagnostic_set(diag, err, "out of memory for %d x %d x %d voxels", voxels.n[0], voxels.n[1], voxels.n[2]);
     if (err) return err;
-    told.inside_volume_m3 = (double)voxels.n_inside * voxels.edge_m * voxels.edge_m * voxels.edge_m;
-    told.fill_s = pal_clock_s() - began - told.tree_s;
+    measured.inside_volume_m3 = (double)voxels.n_inside * voxels.edge_m * voxels.edge_m * voxels.edge_m;
+    measured.fill_s = pal_clock_s() - began - measured.tree_s;
     *out = voxels;
-    if (report) *report = told;
+    if (report) *report = measured;
     return PAL_ERR_OK;
 }

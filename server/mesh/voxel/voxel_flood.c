@@ -1,8 +1,8 @@
-/* Flood fill with a segment to each of six neighbours (paper B 2.2, erratum B15).
+/* Flood fill that casts a segment to each of six neighbours (paper B section 2.2).
  *
- * Departure: seeds behind every triangle, not one, so every component and every chamber of the grid is found. The
- * paper's method as it is: it leaks through one missing triangle, and a wall that a segment crosses twice is taken for
- * a border; kept for comparison with the scanline, which has neither fault. */
+ * Departure (erratum B15): seeds behind every triangle, not one, so every component and every cavity is found. The
+ * method of the paper leaks through one missing triangle and takes a wall that a segment crosses twice for a border. It
+ * is kept for comparison with the scanline, which has neither fault. */
 #include "server/mesh/voxel/voxel_flood.h"
 
 #include "server/base/vec3.h"
@@ -14,7 +14,7 @@ typedef struct flood {
     const pal_box_tree *tree;
     const pal_voxels *grid;
     pal_bits *inside;
-    int32_t *stack; /* voxels x, y, z whose neighbours are not looked at yet */
+    int32_t *stack; /* voxels x, y, z whose neighbours are still to be visited */
     size_t n, cap;
     bool leaked;
 } flood;

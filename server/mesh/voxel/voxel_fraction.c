@@ -1,12 +1,13 @@
-/* Which share of a voxel lies inside a surface.
+/* The fraction of a voxel that lies inside a surface.
  *
- * A point lies inside a closed outward surface when a ray from it along +x goes out once more often than in. Summed
- * over a voxel: every piece of a triangle, cut by the voxel planes, adds its projected area times its distance from the
- * voxel's low side, and its projected area to each voxel before it in the row. That is the divergence theorem voxel by
- * voxel, and exact for triangles: a sampled share would be off by up to half a sample layer at every flat face.
+ * A point lies inside a closed outward surface when a ray from it along +x leaves once more often than it enters.
+ * Integrated over a voxel: every piece of a triangle, cut by the voxel planes, adds its projected area times its
+ * distance from the low side of the voxel, and its projected area to each voxel before it in the row. This is the
+ * divergence theorem for each voxel, and exact for triangles; samples would err by up to half a sample layer at every
+ * flat face.
  *
- * Where the winding number may be other than 0 and 1 (overlapping or doubled parts) or has no meaning (open surfaces),
- * samples on a finer grid are decided in the way the voxels themselves are, and counted. */
+ * Where the winding number may differ from 0 and 1 (overlapping or doubled parts) or has no meaning (open surfaces),
+ * samples on a finer grid are classified as the voxels are, and counted. */
 #include "server/mesh/voxel/voxel_fraction.h"
 
 #include "server/mesh/geometry/polygon.h"
@@ -16,12 +17,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* shares this near to 0 or 1 are rounding */
+/* fractions within this of 0 or 1 are rounding */
 #define ROUNDING 1e-6
-/* samples per axis and in all that the fallback may lay out */
-enum { MOST_SAMPLE_AXIS = 2040, MOST_SAMPLE = 1 << 28 };
-/* farthest corner that exact crossings allow, grid units (voxel_scanline.c) */
-enum { MOST_PLACE = 1 << 27 };
+/* limits of the samples per axis and in total */
+enum { MAX_SAMPLE_AXIS = 2040, MAX_SAMPLE = 1 << 28 };
+/* largest coordinate that exact crossings allow, grid units (voxel_scanline.c) */
+enum { MAX_PLACE = 1 << 27 };
 
 typedef struct sweep {
     const pal_scan_surface *scan;
@@ -31,10 +32,10 @@ typedef struct sweep {
     int32_t *from; /* where a layer's triangles begin             [n2+2]       */
     int32_t *live; /* triangles that reach into the layer         [n_tri]      */
     double *own;   /* of pieces in the voxel itself               [n1][n0]     */
-    double *pass;  /* of pieces behind: for all voxels before it  [n1][n0+1]   */
+    double *pass;  /* of pieces behind: for all voxels before them  [n1][n0+1] */
 } sweep;
 
-static double place(int32_t p)
+static double grid_units(int32_t p)
 {
     return (double)p / PAL_SCAN_ONE;
 }
@@ -59,19 +60,19 @@ static void add_piece(const sweep *s, const pal_polygon *p, int x, int y)
     s->pass[row + (size_t)y + (size_t)x] += area;
 }
 
-/* a polygon within one layer and one row of voxels, cut along x; what lies before the row counts for nothing */
+/* a polygon within one layer and one row of voxels, cut along x; what lies before the row adds nothing */
 static void add_row(const sweep *s, pal_polygon *p, int y)
 {
-    double least, most;
+    double min, max;
     if (p->n < 3) return;
-    pal_polygon_range(p, 0, &least, &most);
-    if (most <= 0) return;
+    pal_polygon_range(p, 0, &min, &max);
+    if (max <= 0) return;
     pal_polygon low, high;
-    if (least < 0) {
+    if (min < 0) {
         pal_polygon_cut_axis(p, 0, 0, NULL, &high);
         *p = high;
     }
-    int from = clamp_int(floor(least), 0, s->n[0]), to = clamp_int(ceil(most) - 1, from, s->n[0]);
+    int from = clamp_int(floor(min), 0, s->n[0]), to = clamp_int(ceil(max) - 1, from, s->n[0]);
     for (int x = from; x < to; x++) {
         pal_polygon_cut_axis(p, 0, x + 1, &low, &high);
         if (low.n >= 3) add_piece(s, &low, x, y);
@@ -86,22 +87,22 @@ static void add_triangle(const sweep *s, size_t t, int z)
     pal_polygon p = {.n = 3}, low, high;
     for (int c = 0; c < 3; c++)
         for (int k = 0; k < 3; k++)
-            p.x[c][k] = place(s->scan->point[3 * (size_t)s->scan->tri[3 * t + (size_t)c] + (size_t)k]);
-    double least, most;
-    pal_polygon_range(&p, 2, &least, &most);
-    if (least < z) {
+            p.x[c][k] = grid_units(s->scan->point[3 * (size_t)s->scan->tri[3 * t + (size_t)c] + (size_t)k]);
+    double min, max;
+    pal_polygon_range(&p, 2, &min, &max);
+    if (min < z) {
         pal_polygon_cut_axis(&p, 2, z, NULL, &high);
         p = high;
     }
-    if (most > z + 1 && p.n >= 3) {
+    if (max > z + 1 && p.n >= 3) {
         pal_polygon_cut_axis(&p, 2, z + 1, &low, NULL);
         p = low;
     }
     if (p.n < 3) return;
-    pal_polygon_range(&p, 1, &least, &most);
-    if (most <= 0 || least >= s->n[1]) return;
-    int from = clamp_int(floor(least), 0, s->n[1] - 1), to = clamp_int(ceil(most) - 1, from, s->n[1] - 1);
-    if (least < 0) {
+    pal_polygon_range(&p, 1, &min, &max);
+    if (max <= 0 || min >= s->n[1]) return;
+    int from = clamp_int(floor(min), 0, s->n[1] - 1), to = clamp_int(ceil(max) - 1, from, s->n[1] - 1);
+    if (min < 0) {
         pal_polygon_cut_axis(&p, 1, 0, NULL, &high);
         p = high;
     }
@@ -112,24 +113,24 @@ static void add_triangle(const sweep *s, size_t t, int z)
     }
 }
 
-/* first and last layer a triangle reaches into; false when it is seen edge-on from the rows or beside the grid */
+/* first and last layer of a triangle; false when it is parallel to the rows or outside the grid */
 static bool find_layers(const sweep *s, size_t t, int *from, int *to)
 {
     const int32_t *c = s->scan->tri + 3 * t, *a = s->scan->point + 3 * (size_t)c[0],
                   *b = s->scan->point + 3 * (size_t)c[1], *e = s->scan->point + 3 * (size_t)c[2];
     if (((int64_t)b[1] - a[1]) * ((int64_t)e[2] - a[2]) == ((int64_t)b[2] - a[2]) * ((int64_t)e[1] - a[1]))
         return false;
-    int32_t least = a[2] < b[2] ? a[2] : b[2], most = a[2] < b[2] ? b[2] : a[2];
-    least = e[2] < least ? e[2] : least;
-    most = e[2] > most ? e[2] : most;
-    if (most <= 0 || least >= s->n[2] * (int64_t)PAL_SCAN_ONE) return false;
-    *from = clamp_int(floor(place(least)), 0, s->n[2] - 1);
-    *to = clamp_int(ceil(place(most)) - 1, *from, s->n[2] - 1);
+    int32_t min = a[2] < b[2] ? a[2] : b[2], max = a[2] < b[2] ? b[2] : a[2];
+    min = e[2] < min ? e[2] : min;
+    max = e[2] > max ? e[2] : max;
+    if (max <= 0 || min >= s->n[2] * (int64_t)PAL_SCAN_ONE) return false;
+    *from = clamp_int(floor(grid_units(min)), 0, s->n[2] - 1);
+    *to = clamp_int(ceil(grid_units(max)) - 1, *from, s->n[2] - 1);
     return true;
 }
 
-/* deals the triangles to their first layers */
-static void deal_triangles(const sweep *s)
+/* distributes the triangles to their first layers */
+static void sort_triangles(const sweep *s)
 {
     int from, to;
     for (size_t t = 0; t < (size_t)s->scan->n_tri; t++)
@@ -139,16 +140,16 @@ static void deal_triangles(const sweep *s)
         if (find_layers(s, t, &from, &to)) s->tri[s->from[from + 1]++] = (int32_t)t;
 }
 
-/* sums the pieces to shares, in place of own */
+/* sums the pieces to fractions, in place of own */
 static void close_layer(const sweep *s)
 {
     size_t n_x = (size_t)s->n[0];
     for (size_t y = 0; y < (size_t)s->n[1]; y++) {
         double *own = s->own + n_x * y, *pass = s->pass + (n_x + 1) * y, behind = pass[n_x];
         for (size_t x = n_x; x-- > 0;) {
-            double share = s->sign * (own[x] + behind);
+            double fraction = s->sign * (own[x] + behind);
             behind += pass[x];
-            own[x] = share < ROUNDING ? 0 : share > 1 - ROUNDING ? 1 : share;
+            own[x] = fraction < ROUNDING ? 0 : fraction > 1 - ROUNDING ? 1 : fraction;
         }
     }
 }
@@ -157,7 +158,7 @@ static void sweep_layers(const sweep *s, pal_fraction_layer take, void *self)
 {
     size_t n_plane = (size_t)s->n[0] * (size_t)s->n[1];
     int n_live = 0;
-    deal_triangles(s);
+    sort_triangles(s);
     for (int z = 0; z < s->n[2]; z++) {
         memset(s->own, 0, n_plane * sizeof *s->own);
         memset(s->pass, 0, (n_plane + (size_t)s->n[1]) * sizeof *s->pass);
@@ -175,8 +176,8 @@ static void sweep_layers(const sweep *s, pal_fraction_layer take, void *self)
     }
 }
 
-static pal_err share_exactly(const pal_scan_surface *scan, const pal_voxels *grid, double sign, pal_fraction_layer take,
-                             void *self)
+static pal_err fractions_exactly(const pal_scan_surface *scan, const pal_voxels *grid, double sign,
+                                 pal_fraction_layer take, void *self)
 {
     size_t n_plane = (size_t)grid->n[0] * (size_t)grid->n[1], n_tri = scan->n_tri ? (size_t)scan->n_tri : 1;
     sweep s = {.scan = scan, .n = grid->n, .sign = sign};
@@ -203,14 +204,14 @@ static double closed_volume(const pal_scan_surface *scan)
         double x[3][3];
         for (int c = 0; c < 3; c++)
             for (int k = 0; k < 3; k++)
-                x[c][k] = place(scan->point[3 * (size_t)scan->tri[3 * t + (size_t)c] + (size_t)k]);
+                x[c][k] = grid_units(scan->point[3 * (size_t)scan->tri[3 * t + (size_t)c] + (size_t)k]);
         sum += (x[0][0] + x[1][0] + x[2][0]) *
                ((x[1][1] - x[0][1]) * (x[2][2] - x[0][2]) - (x[1][2] - x[0][2]) * (x[2][1] - x[0][1])) / 6;
     }
     return sum;
 }
 
-/* is the winding number 0 and 1 (or 0 and -1) throughout, as far as the rows of centres see? */
+/* is the winding number 0 or 1 (or 0 or -1) along all rows of centres? */
 static pal_err find_plain(const pal_scan_surface *scan, const pal_voxels *grid, bool *plain)
 {
     *plain = false;
@@ -228,7 +229,7 @@ static pal_err find_plain(const pal_scan_surface *scan, const pal_voxels *grid, 
 }
 
 /* counts the set samples of every voxel of layer z */
-static void count_samples(const pal_bits *sample, const int n[3], int n_sub, int z, double *share)
+static void count_samples(const pal_bits *sample, const int n[3], int n_sub, int z, double *fraction)
 {
     double one = 1.0 / ((double)n_sub * n_sub * n_sub);
     for (int y = 0; y < n[1]; y++)
@@ -238,21 +239,21 @@ static void count_samples(const pal_bits *sample, const int n[3], int n_sub, int
                 for (int j = 0; j < n_sub; j++)
                     for (int i = 0; i < n_sub; i++)
                         count += pal_bits_get(sample, n_sub * x + i, n_sub * y + j, n_sub * z + k);
-            share[(size_t)y * (size_t)n[0] + (size_t)x] = one * count;
+            fraction[(size_t)y * (size_t)n[0] + (size_t)x] = one * count;
         }
 }
 
-/* a finer grid that the surface refuses (a sheet that encloses a few samples only) gives way to a coarser one */
-static pal_err share_by_samples(const pal_surface *surface, const pal_voxels *grid, const char *method, int n_sub,
-                                pal_fraction_layer take, void *self, pal_diagnostic *diag)
+/* a grid on which the surface is refused (a sheet that encloses few samples) is replaced by a coarser one */
+static pal_err fractions_by_samples(const pal_surface *surface, const pal_voxels *grid, const char *method, int n_sub,
+                                    pal_fraction_layer take, void *self, pal_diagnostic *diag)
 {
     const int *n = grid->n;
     double n_cell = (double)n[0] * n[1] * n[2];
     int longest = n[0] > n[1] ? n[0] : n[1];
     longest = n[2] > longest ? n[2] : longest;
-    while (n_sub > 1 && (n_sub * longest > MOST_SAMPLE_AXIS || n_cell * pow(n_sub, 3) > MOST_SAMPLE)) n_sub--;
-    double *share = malloc((size_t)n[0] * (size_t)n[1] * sizeof *share);
-    pal_err err = share ? PAL_ERR_REFUSED : PAL_ERR_MEMORY;
+    while (n_sub > 1 && (n_sub * longest > MAX_SAMPLE_AXIS || n_cell * pow(n_sub, 3) > MAX_SAMPLE)) n_sub--;
+    double *fraction = malloc((size_t)n[0] * (size_t)n[1] * sizeof *fraction);
+    pal_err err = fraction ? PAL_ERR_REFUSED : PAL_ERR_MEMORY;
     for (; err == PAL_ERR_REFUSED && n_sub > 0; n_sub--) {
         pal_voxel_options options = {.resolution = n_sub * longest, .method = method};
         pal_voxel_report report = {0};
@@ -263,23 +264,23 @@ static pal_err share_by_samples(const pal_surface *surface, const pal_voxels *gr
         if (err) break;
         err = pal_voxels_classify(surface, &options, &fine, &sample, &report, diag);
         for (int z = 0; !err && z < n[2]; z++) {
-            count_samples(&sample, n, n_sub, z, share);
-            take(self, z, share);
+            count_samples(&sample, n, n_sub, z, fraction);
+            take(self, z, fraction);
         }
         pal_bits_free(&sample);
     }
-    free(share);
+    free(fraction);
     return err;
 }
 
-/* every finite corner lies where crossings are exact */
+/* does every finite corner lie where crossings are exact? */
 static bool fits(const pal_surface *surface, const pal_voxels *grid)
 {
-    double most = MOST_PLACE / PAL_SCAN_ONE * grid->edge_m;
+    double max = MAX_PLACE / PAL_SCAN_ONE * grid->edge_m;
     for (size_t i = 0; i < 3 * (size_t)surface->n_tri; i++)
         for (size_t k = 0; k < 3; k++) {
             double away = fabs(surface->x[3 * (size_t)surface->tri[i] + k] - grid->low_m[k]);
-            if (away > most && isfinite(away)) return false;
+            if (away > max && isfinite(away)) return false;
         }
     return true;
 }
@@ -291,23 +292,23 @@ pal_err pal_voxels_fraction(const pal_surface *surface, const pal_voxels *grid, 
     bool plain = false;
     if (!fits(surface, grid))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "the surface reaches %d voxels of %g m beyond the mesh",
-                                  MOST_PLACE / PAL_SCAN_ONE, grid->edge_m);
+                                  MAX_PLACE / PAL_SCAN_ONE, grid->edge_m);
     PAL_TRY(pal_scan_snap(surface, grid->low_m, grid->edge_m, &scan));
     pal_err err = find_plain(&scan, grid, &plain);
-    if (!err && plain) err = share_exactly(&scan, grid, closed_volume(&scan) < 0 ? -1 : 1, take, self);
+    if (!err && plain) err = fractions_exactly(&scan, grid, closed_volume(&scan) < 0 ? -1 : 1, take, self);
     pal_scan_surface_free(&scan);
     if (exact) *exact = plain;
     if (err || plain) return err;
-    return share_by_samples(surface, grid, method, n_sub > 0 ? n_sub : PAL_FRACTION_SUBSAMPLES, take, self, diag);
+    return fractions_by_samples(surface, grid, method, n_sub > 0 ? n_sub : PAL_FRACTION_SUBSAMPLES, take, self, diag);
 }
 
 typedef struct dropper {
     pal_bits *border;
-    double least;
+    double min;
     int64_t n_dropped;
 } dropper;
 
-static void drop_layer(void *self, int z, const double *share)
+static void drop_layer(void *self, int z, const double *fraction)
 {
     dropper *d = self;
     for (int y = 0; y < d->border->n[1]; y++) {
@@ -315,14 +316,14 @@ static void drop_layer(void *self, int z, const double *share)
         for (int w = 0; w < d->border->n_word; w++)
             for (uint64_t left = row[w]; left; left &= left - 1) {
                 int x = 64 * w + __builtin_ctzll(left);
-                if (share[(size_t)y * (size_t)d->border->n[0] + (size_t)x] >= d->least) continue;
+                if (fraction[(size_t)y * (size_t)d->border->n[0] + (size_t)x] >= d->min) continue;
                 row[w] &= ~((uint64_t)1 << (x & 63));
                 d->n_dropped++;
             }
     }
 }
 
-/* lattice edges around which two kept voxels lie across from one another and the other two are not kept */
+/* lattice edges with two diagonally opposite kept voxels and no other */
 static int64_t count_edge_only(const pal_bits *inside, const pal_bits *border)
 {
     int64_t count = 0;
@@ -350,7 +351,7 @@ static int64_t count_edge_only(const pal_bits *inside, const pal_bits *border)
 pal_err pal_voxels_drop(const pal_surface *surface, const pal_voxel_options *options, const pal_voxels *grid,
                         const pal_bits *inside, pal_bits *border, pal_voxel_report *report, pal_diagnostic *diag)
 {
-    dropper d = {.border = border, .least = options->min_fill};
+    dropper d = {.border = border, .min = options->min_fill};
     PAL_TRY(pal_voxels_fraction(surface, grid, options->method, 0, drop_layer, &d, NULL, diag));
     report->n_dropped = d.n_dropped;
     report->n_edge_only = count_edge_only(inside, border);

@@ -11,10 +11,10 @@
 
 __extension__ typedef __int128 wide;
 
-/* a surface that means a body crosses a row a few times; noise whose triangles span the box would cross without bound
+/* budget of crossings: a body crosses a row a few times, noise whose triangles span the box would do so without bound
  */
 enum { CROSSINGS_PER_ROW = 64, CROSSINGS_PER_TRI = 16 };
-/* rows of at least this many centres are narrowed to the triangle by division before they are walked */
+/* rows of at least this many centres are first clipped to the triangle by division */
 enum { WIDE_ROW = 8 };
 
 /* the axes across a row, in ascending order: the first is shifted more by the symbolic shift */
@@ -162,7 +162,7 @@ pal_err pal_scan_snap(const pal_surface *surface, const double low[3], double h,
 /* crossings in the order they are found, with their rows */
 typedef struct scanner {
     int n_p, n_q, n_place, axis; /* n_place: voxels along the axis */
-    int64_t n, cap, most;        /* crossings, room, budget */
+    int64_t n, cap, max;         /* crossings, room, budget */
     pal_crossing *item;
     int32_t *row;
 } scanner;
@@ -170,7 +170,7 @@ typedef struct scanner {
 static bool scanner_grow(scanner *s)
 {
     int64_t cap = s->cap ? 2 * s->cap : 4096;
-    if (cap > s->most) cap = s->most;
+    if (cap > s->max) cap = s->max;
     if (cap <= s->n) return false;
     pal_crossing *item = realloc(s->item, (size_t)cap * sizeof *item);
     if (!item) return false;
@@ -207,7 +207,7 @@ static bool tie_is_behind(const int32_t *a, const int32_t *b, const int32_t *c, 
 }
 
 /* first voxel whose centre is behind the crossing, and the crossing's depth; weights of b and c over area */
-static int32_t find_place(const int32_t *a, const int32_t *b, const int32_t *c, int axis, int64_t weight_b,
+static int32_t find_index(const int32_t *a, const int32_t *b, const int32_t *c, int axis, int64_t weight_b,
                           int64_t weight_c, int64_t area, int32_t *depth)
 {
     int64_t to_b = (int64_t)b[axis] - a[axis], to_c = (int64_t)c[axis] - a[axis];
@@ -237,7 +237,8 @@ static edge_rule edge_make(const int32_t *u, const int32_t *v, int p, int q, int
     return e;
 }
 
-/* narrows from..to, counted from the edge's place, to the centres of a row on the edge's inner side */
+/* clips from..to, counted from the position of the edge function, to the centres of a row on the inner side of the edge
+ */
 static void narrow(const edge_rule *e, int64_t *from, int64_t *to)
 {
     int64_t value = e->at + e->bias, step = e->dq * PAL_SCAN_ONE;
@@ -252,13 +253,13 @@ static void narrow(const edge_rule *e, int64_t *from, int64_t *to)
     }
 }
 
-static int32_t least3(int32_t a, int32_t b, int32_t c)
+static int32_t min3(int32_t a, int32_t b, int32_t c)
 {
     int32_t m = a < b ? a : b;
     return m < c ? m : c;
 }
 
-static int32_t most3(int32_t a, int32_t b, int32_t c)
+static int32_t max3(int32_t a, int32_t b, int32_t c)
 {
     int32_t m = a > b ? a : b;
     return m > c ? m : c;
@@ -277,13 +278,13 @@ static bool centre_range(int32_t low, int32_t high, int n, int *from, int *to)
 static bool scan_triangle(scanner *s, const int32_t *a, const int32_t *b, const int32_t *c, int32_t part)
 {
     int p = ACROSS[s->axis][0], q = ACROSS[s->axis][1], p0, p1, q0, q1;
-    if (!centre_range(least3(a[p], b[p], c[p]), most3(a[p], b[p], c[p]), s->n_p, &p0, &p1)) return true;
-    if (!centre_range(least3(a[q], b[q], c[q]), most3(a[q], b[q], c[q]), s->n_q, &q0, &q1)) return true;
+    if (!centre_range(min3(a[p], b[p], c[p]), max3(a[p], b[p], c[p]), s->n_p, &p0, &p1)) return true;
+    if (!centre_range(min3(a[q], b[q], c[q]), max3(a[q], b[q], c[q]), s->n_q, &q0, &q1)) return true;
     int64_t area = ((int64_t)b[p] - a[p]) * ((int64_t)c[q] - a[q]) - ((int64_t)b[q] - a[q]) * ((int64_t)c[p] - a[p]);
     if (area == 0) return true;
 
-    /* seen along the axis the projected area is the normal's component for axes 0 and 2, its opposite for axis 1; the
-     * row goes in where the outward normal points against it */
+    /* seen along the axis the projected area is the component of the normal for axes 0 and 2, its negative for axis 1;
+     * the row enters where the outward normal points against it */
     int32_t sign = (area < 0) == (s->axis != 1) ? 1 : -1;
     if (area < 0) {
         const int32_t *swap = b;
@@ -306,7 +307,7 @@ static bool scan_triangle(scanner *s, const int32_t *a, const int32_t *b, const 
             if (((value_ab + ab.bias) | (value_bc + bc.bias) | (value_ca + ca.bias)) >= 0) {
                 pal_crossing *c_out = scanner_next(s, (int32_t)(j * (int64_t)s->n_p + i));
                 if (!c_out) return false;
-                int32_t place = find_place(a, b, c, s->axis, value_ca, value_ab, area, &c_out->depth);
+                int32_t place = find_index(a, b, c, s->axis, value_ca, value_ab, area, &c_out->depth);
                 c_out->place = place < 0 ? 0 : place > s->n_place ? s->n_place : place;
                 c_out->part = part;
                 c_out->sign = sign;
@@ -349,8 +350,8 @@ static void sort_row(pal_crossing *item, int64_t n)
     }
 }
 
-/* deals the crossings to their rows and sorts each row */
-static pal_err deal_rows(const scanner *s, pal_crossings *out)
+/* distributes the crossings to their rows and sorts each row */
+static pal_err sort_rows(const scanner *s, pal_crossings *out)
 {
     int n_row = s->n_p * s->n_q;
     int64_t *start = calloc((size_t)n_row + 2, sizeof *start);
@@ -371,14 +372,14 @@ static pal_err deal_rows(const scanner *s, pal_crossings *out)
 pal_err pal_scan_axis(const pal_scan_surface *scan, const int n[3], int axis, pal_crossings *out)
 {
     scanner s = {.n_p = n[ACROSS[axis][0]], .n_q = n[ACROSS[axis][1]], .n_place = n[axis], .axis = axis};
-    s.most = (int64_t)CROSSINGS_PER_ROW * s.n_p * s.n_q + (int64_t)CROSSINGS_PER_TRI * scan->n_tri + 4096;
+    s.max = (int64_t)CROSSINGS_PER_ROW * s.n_p * s.n_q + (int64_t)CROSSINGS_PER_TRI * scan->n_tri + 4096;
     bool ok = true;
     for (size_t t = 0; ok && t < (size_t)scan->n_tri; t++) {
         const int32_t *c = scan->tri + 3 * t;
         ok = scan_triangle(&s, scan->point + 3 * (size_t)c[0], scan->point + 3 * (size_t)c[1],
                            scan->point + 3 * (size_t)c[2], scan->part ? scan->part[t] : 0);
     }
-    pal_err err = ok ? deal_rows(&s, out) : s.n == s.most ? PAL_ERR_BUDGET : PAL_ERR_MEMORY;
+    pal_err err = ok ? sort_rows(&s, out) : s.n == s.max ? PAL_ERR_BUDGET : PAL_ERR_MEMORY;
     free(s.item);
     free(s.row);
     return err;

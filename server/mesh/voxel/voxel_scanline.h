@@ -1,5 +1,4 @@
-/* Private to voxels.c and its helpers: rows of voxels as bits, and exact crossings of a surface with the rows of one
- * axis. Thread: [load]. */
+/* Private to the voxel files: exact crossings of a surface with the rows of one axis. Thread: [load]. */
 #ifndef PAL_MESH_VOXEL_VOXEL_SCANLINE_H
 #define PAL_MESH_VOXEL_VOXEL_SCANLINE_H
 #include "server/mesh/geometry/surface.h"
@@ -20,19 +19,18 @@ typedef struct pal_scan_surface {
 
 pal_err pal_scan_snap(const pal_surface *surface, const double low[3], double h, pal_scan_surface *out); /* MEMORY */
 void pal_scan_surface_free(pal_scan_surface *scan);
-/* keeps one of each set of triangles with the same three places, whichever way they face, unless the surface is even
- * with them and not without (two copies that close a fin); sets closed and even anew; MEMORY */
+/* Keeps one of each set of triangles with the same three corner positions, in either orientation, unless the surface is
+ * even with them and not without (two copies that close a fin); updates closed and even; MEMORY */
 pal_err pal_scan_drop_copies(pal_scan_surface *scan, int n_vertex);
 
 /* hash of the edge between two points; *sign is +1 or -1 by its direction; collapsed edges give 0 */
 uint64_t pal_scan_edge(const int32_t a[3], const int32_t b[3], int *sign);
 
 typedef struct pal_crossing {
-    int32_t
-        place; /* first voxel of the row whose centre lies behind the crossing, 0 .. n: a surface may reach beyond */
+    int32_t place; /* first voxel of the row whose centre lies behind the crossing */
     int32_t depth; /* of the crossing, grid units                                  */
     int32_t part;
-    int32_t sign; /* +1: the row goes in, -1: it comes out                        */
+    int32_t sign; /* +1: the row enters, -1: it leaves */
 } pal_crossing;
 
 /* crossings of every row along axis, sorted by place, depth: rows are numbered q n[p] + p, p < q the other axes */
@@ -42,9 +40,9 @@ typedef struct pal_crossings {
     pal_crossing *item;
 } pal_crossings;
 
-/* Which triangles a row of voxel centres crosses, as if the centre (x, y, z) were (x + e, y + e^2, z + e^3): a row that
- * meets an edge or a vertex crosses exactly one of the triangles there, and the three axes agree about every voxel of
- * a closed surface. BUDGET when there are more than 64 crossings a row and 16 a triangle, MEMORY */
+/* Finds the triangles that each row of voxel centres crosses, as if the centre (x, y, z) were (x + e, y + e^2, z +
+ * e^3): a row that meets an edge or a vertex crosses exactly one of the triangles there, and the three axes agree about
+ * every voxel of a closed surface. BUDGET: more than 64 crossings a row and 16 a triangle; MEMORY */
 pal_err pal_scan_axis(const pal_scan_surface *scan, const int n[3], int axis, pal_crossings *out);
 void pal_crossings_free(pal_crossings *crossings);
 #endif

@@ -1,8 +1,8 @@
-/* Voxels -> tetrahedra (paper B 2.2): five per voxel, two mirrored patterns by the parity of i + j + k, so that the
- * diagonals of neighbours match (the paper does not say so).
+/* From voxels to tetrahedra (paper B section 2.2): five per voxel, in two mirrored patterns by the parity of i + j + k,
+ * so that the diagonals of neighbours match (the paper does not mention it).
  *
- * Departure: vertices are shared through two planes of node numbers that move up with the voxels, not through a hash.
- * A first pass counts, so every array is taken once at its size. */
+ * Departure: vertices are shared through two planes of node numbers that move up with the voxels, not through a hash. A
+ * first pass counts, so every array is allocated once at its size. */
 #include "server/mesh/voxel/voxels.h"
 
 #include "server/mesh/voxel/voxel_bits.h"
@@ -86,7 +86,7 @@ typedef struct splitter {
     int32_t *plane[2]; /* node numbers below and above the voxels   [n1+1][n0+1] */
     side_table sides;
     pal_tets *tets;
-    int64_t n_node, n_tet, n_face; /* counted, then written so far */
+    int64_t n_node, n_tet, n_face; /* counted first, then written so far */
 } splitter;
 
 /* row of kept voxels, empty beyond the grid */
@@ -110,7 +110,7 @@ static void rows_around(const splitter *s, int y, int z, const uint64_t *row[4])
 }
 
 /* kept voxels of a word whose neighbour on a side is not kept */
-static inline uint64_t bare_word(const splitter *s, int y, int z, int w, int side)
+static inline uint64_t exposed_word(const splitter *s, int y, int z, int w, int side)
 {
     const uint64_t *row = kept_row(s, y, z);
     switch (side) {
@@ -140,7 +140,8 @@ static void count_all(splitter *s)
             for (int w = 0; w < n_word; w++) {
                 s->n_node += __builtin_popcountll(node_word(row, w));
                 if (!kept_row(s, y, z)[w]) continue;
-                for (int side = 0; side < 6; side++) s->n_face += 2 * __builtin_popcountll(bare_word(s, y, z, w, side));
+                for (int side = 0; side < 6; side++)
+                    s->n_face += 2 * __builtin_popcountll(exposed_word(s, y, z, w, side));
             }
         }
 }
@@ -196,7 +197,7 @@ static void write_faces(splitter *s, int y, int z)
     for (int w = 0; w < s->kept.n_word; w++) {
         if (!kept_row(s, y, z)[w]) continue;
         for (int side = 0; side < 6; side++)
-            for (uint64_t left = bare_word(s, y, z, w, side); left; left &= left - 1) {
+            for (uint64_t left = exposed_word(s, y, z, w, side); left; left &= left - 1) {
                 int x = 64 * w + __builtin_ctzll(left);
                 const uint8_t *corner = s->sides.corner[(x + y + z) & 1][side];
                 int32_t *to = s->tets->face + 3 * (size_t)s->n_face;

@@ -1,14 +1,16 @@
-/* Surface -> voxels -> tetrahedra (paper B 2.2): flood fill of the voxels whose centres lie inside, one layer of border
- * voxels kept outside, five tetrahedra per voxel with mirrored parity.
+/* From a surface to voxels and tetrahedra (paper B section 2.2): flood fill of the voxels whose centres lie inside, one
+ * layer of border voxels outside, five tetrahedra per voxel with mirrored parity. server/mesh/README.md gives the
+ * theory.
  *
- * Departures from the paper: seeds in every component, not one; closed input is filled by scanline with exact crossings
- * (the same voxels as ray flood fill, found sooner); the parts of a surface are told apart, so that inside-out, doubled
- * and overlapping parts count once and inward shells within others stay empty; open input is decided by a vote of the
- * three axes and, where they leave too much undecided, by the winding number.
+ * Departures from the paper: seeds in every component, not one. A closed surface is filled by scanlines with exact
+ * crossings, which find the voxels of a flood fill in less time. The connected parts of a surface are classified
+ * separately, so that inside-out, doubled and overlapping parts count once and inward shells within others are
+ * cavities. An open surface is decided by a vote of the three axes and, where they leave too much undecided, by the
+ * winding number.
  *
- * Refusals for want of a volume carry a number: reason 1, the surface has no extent; reason 2, it is closed but no
- * voxel centre lies inside (the message says which resolution may do); reason 3, it is open and encloses nothing beyond
- * doubt. Thread: [load]. */
+ * A refusal for want of a volume carries a number: reason 1, the surface has no extent; reason 2, it is closed but no
+ * voxel centre lies inside (the message names a resolution that may do); reason 3, it is open and encloses nothing
+ * beyond doubt. Thread: [load]. */
 #ifndef PAL_MESH_VOXEL_VOXELS_H
 #define PAL_MESH_VOXEL_VOXELS_H
 #include "server/mesh/geometry/surface.h"
@@ -19,10 +21,11 @@ typedef struct pal_voxel_options {
     bool border;       /* keep the one layer of border voxels outside (paper B); false: inside only      */
     bool largest_only; /* keep only the largest face-connected component of inside voxels, and its border */
     int64_t max_voxel; /* BUDGET beyond this many kept voxels; 0: 50 million                             */
-    double min_fill;   /* border voxels with a smaller share inside the surface are dropped; 0: none, as in the paper */
-    bool fill;         /* pal_prepared_make only: measure the share of every voxel (min_fill > 0 does so too) */
-    double ahead[3];   /* 0..1 per axis: the grid begins this share of a voxel before the box of the surface, so that
-                        * its planes go through a place that matters (a support's border); 0: at the box */
+    double
+        min_fill; /* border voxels with a smaller fraction inside the surface are dropped; 0: none, as in the paper */
+    bool fill;    /* pal_prepared_make only: measure the fill of every voxel (min_fill > 0 does so too) */
+    double ahead[3]; /* 0..1 per axis: the grid begins this fraction of a voxel before the box of the surface, so that
+                        its planes pass through a chosen place (the border of a support); 0: at the box */
     const char *method; /* NULL: choose; "flood" | "scanline" | "vote" | "winding" force one (tests, bench) */
 } pal_voxel_options;
 
@@ -38,22 +41,23 @@ typedef struct pal_voxels {
 typedef struct pal_voxel_report {
     char method[16];          /* how inside was decided: "scanline" | "flood" | "vote" | "winding" */
     int n_component;          /* face-connected components of the kept voxels, the border included */
-    int64_t n_disagree;       /* voxels that no two axes settle unopposed                          */
+    int64_t n_disagree;       /* voxels that no two axes settle unopposed */
     int64_t n_dropped;        /* border voxels that min_fill dropped                          */
     int64_t n_edge_only;      /* with min_fill: voxel edges where two kept voxels meet and no third joins them */
     bool open;                /* some edge has an odd number of triangles                           */
-    double surface_volume_m3; /* by the divergence theorem, cavities off, holes closed by fans from the middle of
-                               * their rims; 0: not known (open, and flood was asked for)           */
+    double surface_volume_m3; /* by the divergence theorem, cavities subtracted, holes closed by fans from the centre of
+                                 their boundary; 0: unknown (open, and flood was asked for) */
     double inside_volume_m3;  /* inside voxels                                                     */
     double tree_s, fill_s;    /* time for the box tree (0: not built) and for the fill             */
 } pal_voxel_report;
 
-/* REFUSED with numbers when no volume is meant (flat sheet, single triangle, nothing inside), BUDGET, MEMORY */
+/* REFUSED with numbers when the surface encloses no volume (flat sheet, single triangle, nothing inside), BUDGET,
+ * MEMORY */
 pal_err pal_voxels_fill(const pal_surface *surface, const pal_voxel_options *options, pal_voxels *out,
                         pal_voxel_report *report, pal_diagnostic *diag);
 void pal_voxels_free(pal_voxels *voxels);
 
 /* five tetrahedra per kept voxel, vertices shared, nodes ordered so that neighbours in space are near in memory,
- * boundary faces oriented and surface nodes tagged. Peak memory <= 120 bytes per tetrahedron. MEMORY */
+ * boundary faces oriented and surface nodes marked. Peak memory <= 120 bytes per tetrahedron. MEMORY */
 pal_err pal_voxels_split(const pal_voxels *voxels, pal_tets *out);
 #endif

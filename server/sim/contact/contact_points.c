@@ -511,7 +511,7 @@ double pal_contact_points_max_eigenvalue(pal_contact_points *points, const pal_b
         to_nodes(points, body);
         for (int i = 0; i < points->n_node; i++) {
             int node = points->node[i];
-            pal_scale3(points->force + 3 * (size_t)node, body->fixed[node] ? 0 : 1 / body->mass_kg[node],
+            pal_scale3(points->force + 3 * (size_t)node, body->support[node] ? 0 : 1 / body->mass_kg[node],
                        points->force + 3 * (size_t)node);
         }
         for (int i = 0; i < points->n_slot && body->skin; i++) {

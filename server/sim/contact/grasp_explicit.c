@@ -13,7 +13,7 @@ static double min_mass_kg(const pal_grasps *grasps, const pal_grasp *g, const pa
         const int node = g->node[i];
         if (body->interpolation)
             mobility += grasps->sum_weight[node] * pal_body_inverse_mass_1_kg(body, node);
-        else if (!body->fixed[node])
+        else if (!body->support[node])
             mass = fmin(mass, body->mass_kg[node] / grasps->sum_weight[node]);
     }
     return mobility > 0 ? 1 / mobility : mass;

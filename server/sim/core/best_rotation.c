@@ -24,14 +24,14 @@ bool pal_support_rotation(const pal_body *body, double turn[9])
     double from[3] = {0, 0, 0}, to[3] = {0, 0, 0}, s[9] = {0}, rest[9] = {0}, width[3], axes[9];
     int n = 0;
     for (int i = 0; i < body->n_dof; i++) {
-        if (!body->fixed[i]) continue;
+        if (!body->support[i]) continue;
         pal_add3(from, from, body->x_rest + 3 * (size_t)i), pal_add3(to, to, body->x + 3 * (size_t)i), n++;
     }
     if (n < 3) return false;
     pal_scale3(from, 1.0 / n, from), pal_scale3(to, 1.0 / n, to);
     for (int i = 0; i < body->n_dof; i++) {
         double x[3], y[3];
-        if (!body->fixed[i]) continue;
+        if (!body->support[i]) continue;
         pal_sub3(x, body->x + 3 * (size_t)i, to), pal_sub3(y, body->x_rest + 3 * (size_t)i, from);
         pal_add_outer(s, 1, x, y), pal_add_outer(rest, 1, y, y);
     }

@@ -46,7 +46,7 @@ pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node)
     body->x_rest = rest;
     body->mass_kg = body->node_mass_kg = mass;
     body->node_rest = rest;
-    body->fixed = fixed;
+    body->support = fixed;
     return PAL_ERR_OK;
 }
 

@@ -1,6 +1,6 @@
-/* One scene entry as the simulation sees it: a name and typed keys, without any file format. The scene room fills it
- * from JSON; effects, solvers and models read their keys and then call pal_entry_check_unused, which refuses unknown
- * keys. Every refusal names the entry's path, the key and the number. Thread: [load]. */
+/* One entry of a scene: a name and typed keys, independent of any file format. The room scene fills it from JSON;
+ * effects, solvers and models read their keys and then call pal_entry_check_unused, which refuses unknown keys. Every
+ * refusal names the entry's path, the key and the number. Thread: [load]. */
 #ifndef PAL_SIM_CORE_CONFIG_ENTRY_H
 #define PAL_SIM_CORE_CONFIG_ENTRY_H
 #include "server/base/err.h"

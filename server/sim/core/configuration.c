@@ -442,8 +442,8 @@ static bool keeps_mesh(const pal_body_def *body, const pal_configuration *now, c
     if (body->cells || body->mesh->tets.n_node < 1) return false;
     if (to->size == 0 || pal_configuration_equal(now, to)) return true;
     bool by_fill = is(to->model, "fem") || to->k_distance_J > 0,
-         goes_on = is(now->model, "fem") && is(to->model, "fem");
-    return to->size == voxels_of(body->mesh) && (!by_fill || goes_on || body->mesh->hexes.measured);
+         may_continue = is(now->model, "fem") && is(to->model, "fem");
+    return to->size == voxels_of(body->mesh) && (!by_fill || may_continue || body->mesh->hexes.measured);
 }
 
 static pal_err change(const pal_scene *from, const pal_configuration *now, const pal_configuration *to,

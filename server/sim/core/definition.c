@@ -127,9 +127,10 @@ static pal_err check_support(const pal_body_def *body, int index, pal_diagnostic
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" supports[%d]: both lowest and rim", body->name,
                                   index);
     if (s->rim && strcmp(body->model.name, "adaptive_springs") != 0)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "body \"%s\" supports[%d].rim: only goes with model \"adaptive_springs\", not \"%s\"",
-                                  body->name, index, body->model.name);
+        return pal_diagnostic_set(
+            diag, PAL_ERR_REFUSED,
+            "body \"%s\" supports[%d].boundary: only goes with model \"adaptive_springs\", not \"%s\"", body->name,
+            index, body->model.name);
     if (s->lowest && !(s->fraction >= 0 && s->fraction <= 1))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" supports[%d]: fraction %g is outside [0, 1]",
                                   body->name, index, s->fraction);
@@ -252,7 +253,7 @@ pal_err pal_scene_check(const pal_scene *scene, pal_diagnostic *diag)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "gravity_m_s2: %g is outside [-1e4, 1e4]",
                                   scene->gravity_m_s2);
     if (scene->max_substep < 1 || scene->max_substep > 1000000)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "most_substep: %d is outside [1, 1000000]",
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "max_substep: %d is outside [1, 1000000]",
                                   scene->max_substep);
     if (scene->n_body < 1 || scene->n_body > PAL_BODY_MAX)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "bodies: %d, wanted 1 to %d", scene->n_body, PAL_BODY_MAX);

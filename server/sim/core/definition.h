@@ -1,6 +1,6 @@
-/* A scene as plain structs: what the world is built from. pal_scene_default gives the defaults; the scene room fills
- * it from a file, tests fill it by hand. All SI. The scene borrows its prepared meshes: they must live as long as every
- * world made from it. Thread: [load]. */
+/* A scene as plain structs, from which a world is built. pal_scene_default gives the defaults; the room scene fills
+ * them from a file, tests by hand. All SI. A scene borrows its prepared meshes, which outlive every world made from it.
+ * Thread: [load]. */
 #ifndef PAL_SIM_CORE_DEFINITION_H
 #define PAL_SIM_CORE_DEFINITION_H
 #include "server/mesh/cells/maccracken_joy.h"
@@ -14,36 +14,37 @@ enum { PAL_NAME = 48, PAL_BODY_MAX = 8, PAL_ENTRIES_MAX = 16, PAL_SUPPORT_MAX = 
 /* isotropic material of a body; defaults: soft abdominal tissue */
 typedef struct pal_material {
     double young_Pa;      /* 5000           */
-    double poisson;       /* 0.45; above 0.4999 is clamped with a message */
+    double poisson;       /* 0.45; above PAL_POISSON_CLAMP it is taken as that */
     double density_kg_m3; /* 1000           */
-    double damping_1_s;   /* 4: viscous damping rate c/m of the row `viscous`; 0: no such row */
+    double damping_1_s;   /* 4: viscous damping rate c/m of the effect `viscous`; 0: no such component */
 } pal_material;
 
-/* another material in a part of the body; later regions win. Numbers that are NaN keep the body's */
+/* another material in a part of the body; the last region that contains a point wins. Numbers that are NaN keep the
+ * body's */
 typedef enum pal_region_kind { PAL_REGION_BOX, PAL_REGION_LABEL, PAL_REGION_GRID } pal_region_kind;
 typedef struct pal_region {
     pal_region_kind kind;
-    double young_Pa, poisson, density_kg_m3; /* GRID: NaN where the grid gives it                              */
+    double young_Pa, poisson, density_kg_m3; /* GRID: NaN where the grid gives them                            */
     double low_m[3], high_m[3];              /* BOX, and the extent of GRID; body frame                        */
     /* LABEL: voxels of a label volume, GRID: values at nodes, trilinear between; x fastest; borrowed           */
     int n[3];
     double spacing_m[3];  /* LABEL: of its voxels; low_m: centre of the first             */
-    const uint8_t *label; /* [n2][n1][n0], material where it equals `is`                  */
+    const uint8_t *label; /* [n2][n1][n0]; the region is where it equals `is`               */
     int is;
     const double *grid_young_Pa, *grid_poisson, *grid_density_kg_m3; /* NULL: not given                          */
 } pal_region;
 
-/* constants of springs that vary over the body (model tet_springs, paper B 3.5): values at the nodes of a grid,
- * trilinear between them, the border's values beyond; a spring takes the mean over its corners at rest. At most 2^20
- * nodes. Numbers are borrowed, x fastest */
+/* Constants of springs that vary over the body (model tet_springs, paper B 3.5): values at the nodes of a grid,
+ * trilinear between them, the border's values beyond. A spring takes the mean over its corners at rest. At most
+ * PAL_SPRING_GRID_NODES_MAX nodes. Numbers are borrowed, x fastest */
 typedef struct pal_spring_grid {
     int n[3];                   /* nodes; n[0] 0: no grid                               */
     double low_m[3], high_m[3]; /* body frame                                          */
-    const double *k_J[3];       /* of edges, faces, tetrahedra; NULL: not given, faces: no such row */
+    const double *k_J[3];       /* of edges, faces, tetrahedra; NULL: not given, faces: no such component */
 } pal_spring_grid;
 
-/* nodes held in place: those inside a box (body frame of the prepared mesh, i.e. relative to origin_m), the lowest
- * fraction of the body's height along `up`, or those on open edges of the surface (model adaptive_springs) */
+/* fixed nodes: those inside a box (body frame, relative to the mesh's origin_m), in the lowest fraction of the body's
+ * height along `up`, or on open edges of the surface (model adaptive_springs) */
 typedef struct pal_support_def {
     bool lowest;     /* true: `fraction`                 */
     bool rim;        /* true: the open edges; both false: the box */
@@ -51,9 +52,9 @@ typedef struct pal_support_def {
     double low_m[3], high_m[3];
 } pal_support_def;
 
-/* A stroke of a soft brush over the material at rest (A 4.1, painting; model subdivision_fem). Within radius_m of at_m
- * Young's modulus and density are multiplied by factor^w, w 1 up to (1 - soft) radius_m and from there falling smoothly
- * to 0 at radius_m. Strokes add up in their order. Ranges: factors 1e-6..1e6, soft 0..1, radius_m > 0 */
+/* A stroke of a soft brush over the material at rest (painting, paper A 4.1; model subdivision_fem). Within radius_m of
+ * at_m, Young's modulus and density are multiplied by factor^w; w is 1 up to (1 - soft) radius_m and falls smoothly to
+ * 0 at radius_m. Strokes multiply. Ranges: factors PAL_STROKE_FACTOR_MIN to _MAX, soft 0 to 1, radius_m above 0 */
 typedef struct pal_stroke {
     double at_m[3], radius_m, soft; /* body frame, rest shape */
     double young_factor, density_factor;
@@ -68,7 +69,7 @@ typedef struct pal_body_def {
     const pal_cells *cells;
     int n_stroke;
     const pal_stroke *stroke; /* painted so far, borrowed [n_stroke] */
-    /* cut away: cells whose middle at rest x has cut_normal . x > cut_m are not shown, what they hid is */
+    /* cut: cells with cut_normal . x > cut_m at their middle at rest are not shown, and what they hid is */
     bool cut;
     double cut_normal[3], cut_m; /* unit; body frame */
     pal_material material;
@@ -78,7 +79,7 @@ typedef struct pal_body_def {
     pal_config_entry model;      /* name: "tet_springs" ...; keys: the model's own (k_distance_J ...) */
     pal_config_entry solver;     /* name: "verlet"; empty name: the model's own choice               */
     pal_config_entry
-        output; /* "skin_output" (default) or "surface_output"; a body that adapts has the latter either way */
+        output; /* "skin_output" (default) or "surface_output"; a body without skin has the latter either way */
     int n_support;
     pal_support_def support[PAL_SUPPORT_MAX];
     int n_effect; /* gravity, tool_push, tool_grasp, finite_guard, viscous ...         */
@@ -88,21 +89,22 @@ typedef struct pal_body_def {
 typedef struct pal_tool_def {
     char name[PAL_NAME]; /* "probe 1"                                      */
     double radius_m;     /* 0: 4 % of the first body's box diagonal         */
-    double force_cap_N;  /* most force the tool may exert or feel; 15       */
+    double force_cap_N;  /* largest force that the tool exerts or feels; 15 */
 } pal_tool_def;
 
 typedef struct pal_scene {
     char name[PAL_NAME]; /* session name, [a-z0-9_-]                                  */
     char title[128];     /* shown to people: "Liver, abdominal CT"                    */
     char source[256];    /* where the organ comes from and its licence, shown as well */
-    char accuracy[128];  /* how far from its reference, shown beside the title: "2.1 % RMS of finite elements"; may be
+    char accuracy[128];  /* distance from its reference, shown beside the title: "2.1 % RMS of finite elements"; may be
                             empty */
-    double max_error_m;  /* setting asked for: the cheapest that a study found within this of its reference; 0: none */
-    double budget_ms;    /* or the most accurate whose step takes at most this; both: the cheapest that keeps both;
-                            0: none. The world itself does not look at either */
+    /* configuration asked for, of those that a study has measured: the cheapest within max_error_m of the reference, or
+     * the most accurate with a step of at most budget_ms, or the cheapest that meets both; 0: none. The world reads
+     * neither */
+    double max_error_m, budget_ms;
     double step_s;       /* one step of the world; sub-steps are the solver's own: 1/60 */
     double up[3];        /* unit, against gravity: (0, 0, 1)                          */
-    double gravity_m_s2; /* 9.81 times the item `gravity`'s presence                  */
+    double gravity_m_s2; /* 9.81; acts on bodies with the effect `gravity`            */
     int max_substep;     /* budget of sub-steps per step, refused beyond: 2000        */
     int n_body;
     pal_body_def body[PAL_BODY_MAX];
@@ -111,21 +113,21 @@ typedef struct pal_scene {
 } pal_scene;
 
 /* an empty scene with defaults, and a body with defaults: material above, model tet_springs, output skin_output, lowest
- * 5 % held, effects gravity, tool_push, tool_grasp, finite_guard */
+ * 5 % fixed, effects gravity, tool_push, tool_grasp, finite_guard */
 void pal_scene_default(pal_scene *scene);
 void pal_body_default(pal_body_def *body, const char *name, const pal_prepared *mesh);
 /* the same with control cells: model subdivision_fem, output surface_output; mesh: the triangles of their boundary */
 void pal_body_default_cells(pal_body_def *body, const char *name, const pal_prepared *mesh, const pal_cells *cells);
 /* the three tools of a scene that names none */
 void pal_tools_default(pal_scene *scene, int n_tool);
-/* held [n] = 1 for the points x [n][3] (body frame) in the support's box or lowest part; rim: none */
+/* fixed [n] = 1 for the points x [n][3] (body frame) in the box or lowest part of the support; rim: none */
 void pal_support_hold(const pal_support_def *support, const double up[3], const double *x, int n, uint8_t *fixed);
-/* what of the body the effect holds: that of moving_support and penalty; false: the effect holds nothing */
+/* the part of the body that an effect supports (moving_support, penalty); false: it supports nothing */
 bool pal_support_of_effect(const pal_config_entry *effect, pal_support_def *out);
-/* held [n] = 1 for all points that the body's supports but rims and its effects hold */
+/* fixed [n] = 1 for all points that the body's supports, rims excepted, and its effects support */
 void pal_body_def_hold(const pal_body_def *def, const double up[3], const double *x, int n, uint8_t *fixed);
-/* REFUSED names the key: not finite, out of range; a Poisson ratio above 0.4999 and below 0.5 is taken as 0.4999 and
- * note says so */
+/* REFUSED names the key of a number that is not finite or out of range (tuning.h). A Poisson ratio above
+ * PAL_POISSON_CLAMP is taken as that, and diag reports it */
 pal_err pal_material_check(pal_material *material, pal_diagnostic *diag);
 /* the material at x (body frame): the body's, overridden by its regions in order */
 void pal_material_at(const pal_body_def *def, const double x[3], pal_material *out);
@@ -137,12 +139,11 @@ double pal_stroke_weight(const pal_stroke *stroke, const double x[3]);
 void pal_material_painted(const pal_body_def *def, const double x[3], pal_material *out);
 /* REFUSED names the number out of range */
 pal_err pal_stroke_check(const pal_stroke *stroke, pal_diagnostic *diag);
-/* REFUSED names body, regions[index], key and number: a box or grid that is none, numbers out of range or not given.
- * Poisson ratios above 0.4999 and below 0.5 are taken as 0.4999 */
+/* REFUSED names body, regions[index], key and number: an empty box or grid, numbers out of range or not given */
 pal_err pal_region_check(const pal_body_def *def, int index, pal_diagnostic *diag);
-/* REFUSED names body, axis or list, index and number: a grid of springs that is none, constants that are not above 0,
- * a model that takes none. A body without one is fine */
+/* REFUSED names body, axis or list, index and number: an empty grid, constants that are not above 0, a model without
+ * such a grid. A body without a grid passes */
 pal_err pal_spring_grid_check(const pal_body_def *def, pal_diagnostic *diag);
-/* REFUSED names the entry: no body, bad numbers, two bodies of one name, tool radius, step outside [1e-4, 0.1] s */
+/* REFUSED names the entry: no body, numbers out of range, two bodies of one name, a step outside [1e-4, 0.1] s */
 pal_err pal_scene_check(const pal_scene *scene, pal_diagnostic *diag);
 #endif

@@ -1,11 +1,11 @@
-/* Forces kept from one step to the next. */
+/* Forces cache from one step to the next. */
 #include "server/sim/core/force_cache.h"
 
 #include <string.h>
 
-static size_t size(const pal_force_cache *kept)
+static size_t size(const pal_force_cache *cache)
 {
-    return 3 * sizeof(double) * (size_t)kept->n_node;
+    return 3 * sizeof(double) * (size_t)cache->n_node;
 }
 
 pal_err pal_force_cache_make(int n_node, pal_arena *arena, pal_force_cache *out)
@@ -16,28 +16,28 @@ pal_err pal_force_cache_make(int n_node, pal_arena *arena, pal_force_cache *out)
     return out->d && out->f ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-bool pal_force_cache_matches(const pal_force_cache *kept, const double *d)
+bool pal_force_cache_matches(const pal_force_cache *cache, const double *d)
 {
-    return kept->valid && memcmp(kept->d, d, size(kept)) == 0;
+    return cache->valid && memcmp(cache->d, d, size(cache)) == 0;
 }
 
-double *pal_force_cache_begin(pal_force_cache *kept, const double *d)
+double *pal_force_cache_begin(pal_force_cache *cache, const double *d)
 {
-    if (kept->n_node == 0) return NULL;
-    kept->valid = false;
-    memcpy(kept->d, d, size(kept));
-    memset(kept->f, 0, size(kept));
-    return kept->f;
+    if (cache->n_node == 0) return NULL;
+    cache->valid = false;
+    memcpy(cache->d, d, size(cache));
+    memset(cache->f, 0, size(cache));
+    return cache->f;
 }
 
-double pal_force_cache_commit(pal_force_cache *kept, double energy_J)
+double pal_force_cache_commit(pal_force_cache *cache, double energy_J)
 {
-    kept->valid = kept->n_node > 0;
-    return kept->energy_J = energy_J;
+    cache->valid = cache->n_node > 0;
+    return cache->energy_J = energy_J;
 }
 
-void pal_force_cache_add(pal_force_cache *kept, double *f)
+void pal_force_cache_add(pal_force_cache *cache, double *f)
 {
-    kept->n_add++;
-    for (int i = 0; i < 3 * kept->n_node; i++) f[i] += kept->f[i];
+    cache->n_add++;
+    for (int i = 0; i < 3 * cache->n_node; i++) f[i] += cache->f[i];
 }

@@ -1,21 +1,21 @@
-/* A model is a recipe: mesh and material in, body and rows out; it exists only at load. */
+/* A model: a function of mesh and material that makes a body and lists its components. It acts at load only. */
 #ifndef PAL_SIM_CORE_MODEL_H
 #define PAL_SIM_CORE_MODEL_H
 #include "server/sim/core/effect.h"
 
 typedef struct pal_model pal_model;
-/* the rows a model asks for, in order, with a solver where the scene names none; items are filled with derived
- * constants that the scene did not give */
+/* the components of a model, in order, with a solver where the scene names none; their keys include constants that the
+ * scene does not give */
 typedef struct pal_recipe {
     int n_row;
-    pal_config_entry row[PAL_ENTRIES_MAX]; /* FORCE, SOLVE and extra rows by effect name */
+    pal_config_entry row[PAL_ENTRIES_MAX]; /* FORCE, SOLVE and others by effect name */
 } pal_recipe;
 
 struct pal_model {
     const char *name; /* tet_springs | subdivision_fem | adaptive_springs | fem */
-    /* allocates body arrays (pal_body_allocate), masses, rest; lists the rows. [load] */
+    /* fills the body: arrays (pal_body_allocate), masses, rest, dofs; lists the components. [load] */
     pal_err (*build)(pal_config_entry *item, pal_build *build, pal_recipe *out);
-    /* the rows alone, of a body that was built: the same list. [sim] */
+    /* the same list, for a body that was built. [sim] */
     pal_err (*list)(pal_config_entry *item, pal_build *build, pal_recipe *out);
 };
 #endif

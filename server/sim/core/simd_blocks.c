@@ -117,7 +117,7 @@ static int strip_length(const entry *e, const entry *end)
 static void place_all(const entry *first, int n_item, pal_simd_blocks *out)
 {
     const entry *end = first + n_item;
-    int n_strip = 0, n_unsupported = 0;
+    int n_strip = 0, n_loose = 0;
     for (const entry *e = first; e < end;) {
         int n = strip_length(e, end);
         bool strip = n >= LEAST_LANES;
@@ -126,8 +126,8 @@ static void place_all(const entry *first, int n_item, pal_simd_blocks *out)
                 out->place[e[i].item] = PAL_LANES * n_strip + e[i].slot[0] - e->slot[0];
                 continue;
             }
-            int lane = n_unsupported % PAL_LANES, block = n_unsupported / PAL_LANES;
-            out->place[e[i].item] = PAL_LANES * out->n_strip + n_unsupported++;
+            int lane = n_loose % PAL_LANES, block = n_loose / PAL_LANES;
+            out->place[e[i].item] = PAL_LANES * out->n_strip + n_loose++;
             for (int c = 0; c < out->n_corner && out->node; c++)
                 out->node[(block * out->n_corner + c) * PAL_LANES + lane] = e[i].slot[c];
         }
@@ -137,8 +137,8 @@ static void place_all(const entry *first, int n_item, pal_simd_blocks *out)
         e += n;
     }
     out->n_strip = n_strip;
-    out->n_unsupported = (n_unsupported + PAL_LANES - 1) / PAL_LANES;
-    out->n_lane = PAL_LANES * (out->n_strip + out->n_unsupported);
+    out->n_loose = (n_loose + PAL_LANES - 1) / PAL_LANES;
+    out->n_lane = PAL_LANES * (out->n_strip + out->n_loose);
 }
 
 /* insertion sort of a few nodes by slot */
@@ -171,7 +171,7 @@ pal_err pal_simd_blocks_make_ordered(const pal_node_order *node_order, const int
     /* once to count, once to fill */
     place_all(e, n_item, out);
     out->base = PAL_NEW(arena, int32_t, out->n_strip * n_corner);
-    out->node = PAL_NEW(arena, int32_t, out->n_unsupported * n_corner * PAL_LANES);
+    out->node = PAL_NEW(arena, int32_t, out->n_loose * n_corner * PAL_LANES);
     if (out->base && out->node) place_all(e, n_item, out);
     free(e);
     return out->base && out->node ? PAL_ERR_OK : PAL_ERR_MEMORY;

@@ -1,13 +1,11 @@
-/* Strips: constraints in blocks of 8 whose corners lie side by side in memory, so that a kernel loads, computes and
- * adds whole vectors instead of gathering and scattering one node at a time.
+/* Elements in blocks of 8 whose corners lie side by side in memory, so that a kernel loads, computes and adds whole
+ * vectors instead of gathering and scattering node by node (`palpate bench springs` measures both).
  *
- * Nodes of a voxel mesh get a slot each: rows along the longest axis, the even nodes of a row before the odd ones,
- * because the five-tetrahedra split repeats every second voxel. Constraints of one shape (equal slot differences
- * between their corners) at successive slots then form a strip. What is left over, or a mesh that is no lattice, goes
- * into loose blocks: 8 constraints each with its own nodes. Lanes without a constraint have zero constants.
- *
- * Measured against gather and scatter per constraint: see `palpate bench springs`. Thread: [load] to build, then [sim].
- * All memory from the arena. */
+ * Each node of a voxel mesh has a slot: rows along the longest axis, the even nodes of a row before the odd ones,
+ * because the five-tetrahedra split repeats every second voxel. Elements of one shape (equal slot differences between
+ * their corners) at successive slots form a strip. The others, and meshes that are no lattice, go into loose blocks of
+ * 8 elements with nodes of their own. Lanes without an element have zero constants. Memory from the arena. Thread:
+ * [load] to build, then [sim]. */
 #ifndef PAL_SIM_CORE_SIMD_BLOCKS_H
 #define PAL_SIM_CORE_SIMD_BLOCKS_H
 #include "server/base/arena.h"
@@ -17,7 +15,7 @@
 
 enum { PAL_LANES = 8, PAL_CORNERS = 4, PAL_SIMD_CORNERS_MAX = 8 };
 
-/* slots of a body's nodes and working arrays that its rows share, one after the other */
+/* slots of a body's nodes, and working arrays that its components use in turn */
 typedef struct pal_node_order {
     int n_node, n_slot;
     int32_t *slot; /* of each node                                        [n_node]    */
@@ -25,25 +23,25 @@ typedef struct pal_node_order {
     double *f;     /* forces by slot, zero between runs                    [3][n_slot] */
 } pal_node_order;
 
-/* the blocks of one row */
+/* the blocks of one component */
 typedef struct pal_simd_blocks {
     int n_corner;
-    int n_strip, n_unsupported;
+    int n_strip, n_loose;
     int32_t *base;  /* first slot of each corner of a strip                 [n_strip][n_corner]        */
-    int32_t *node;  /* slots of a loose block, lane by lane                 [n_unsupported][n_corner][8]     */
+    int32_t *node;  /* slots of a loose block, lane by lane                 [n_loose][n_corner][8]     */
     int32_t *place; /* lane (8 * block + lane, strips first) of each constraint [n_item]               */
-    int n_lane;     /* 8 * (n_strip + n_unsupported)                                                         */
+    int n_lane;     /* 8 * (n_strip + n_loose)                                                         */
 } pal_simd_blocks;
 
 pal_err pal_node_order_make(const double *x_rest, int n_node, double edge_m, pal_arena *arena, pal_node_order **out);
-/* item [n_item][n_corner] nodes, each item's corners are put in ascending order of their slots here; MEMORY */
+/* item [n_item][n_corner] nodes, sorts the corners of each item by their slots; MEMORY */
 pal_err pal_simd_blocks_make(const pal_node_order *node_order, int32_t *item, int n_item, int n_corner,
                              pal_arena *arena, pal_simd_blocks *out);
 /* the same for up to PAL_SIMD_CORNERS_MAX corners, which keep their order */
 pal_err pal_simd_blocks_make_ordered(const pal_node_order *node_order, const int32_t *item, int n_item, int n_corner,
                                      pal_arena *arena, pal_simd_blocks *out);
-/* positions [n_node][3] into slots->x */
+/* node_order->x = positions x [n_node][3] */
 void pal_node_order_load(pal_node_order *node_order, const double *x);
-/* force [n_node][3] += slots->f, which is zero afterwards */
+/* force [n_node][3] += node_order->f, which is zero afterwards */
 void pal_node_order_add(pal_node_order *node_order, double *force);
 #endif

@@ -1,5 +1,5 @@
-/* Sums over a body's points, 8 at a time: what is watched in every step costs little more than reading the arrays. A
- * number that is none makes every sum NaN. The order of additions is the same on every machine. Thread: [sim]. */
+/* Sums over a body's dofs, 8 at a time, so that a check of every step costs little more than reading the arrays. A
+ * number that is not finite makes every sum NaN. The order of additions is the same on every machine. Thread: [sim]. */
 #ifndef PAL_SIM_CORE_SUMS_H
 #define PAL_SIM_CORE_SUMS_H
 #include <stdbool.h>

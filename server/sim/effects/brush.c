@@ -156,7 +156,7 @@ static bool acts(const slot *s)
     return s->arena && !(s->ending && s->share == 0);
 }
 
-static bool goes_on(const slot *s, const pal_brush *b)
+static bool may_continue(const slot *s, const pal_brush *b)
 {
     if (!s->arena || s->ending || s->brush.kind != b->kind || !same3(s->brush.at_m, b->at_m)) return false;
     if (s->brush.radius_m != b->radius_m || s->brush.soft != b->soft) return false;
@@ -190,7 +190,7 @@ pal_err pal_brush_set(void *self, const pal_body *body, int slot_index, const pa
     if (b->kind == PAL_BRUSH_INFLATE && !(fabs(b->pressure_Pa) <= most_Pa))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: pressure_Pa %g, body \"%s\" takes up to %.3g",
                                   b->pressure_Pa, body->name, most_Pa);
-    if (goes_on(s, b)) {
+    if (may_continue(s, b)) {
         s->brush = *b;
         s->left_s = PAL_BLEND_BRUSH_S;
         return PAL_ERR_OK;

@@ -43,7 +43,7 @@ static pal_err run(void *self, pal_step *step)
 {
     pal_cells_elastic *row = self;
     pal_body *body = step->body;
-    const bool has_inversion = row->recovery.n_patch > 0;
+    const bool has_inversion = row->recovery.n_region > 0;
     pal_cells_elastic_refresh(row);
     body->safeguards.n_inversion += row->recovery.n_inversion, body->safeguards.n_split += row->recovery.n_change;
     row->recovery.n_inversion = row->recovery.n_change = 0;
@@ -98,10 +98,10 @@ static unsigned recover(void *self, pal_step *step)
     if (changed) pal_force_cache_invalidate(&row->kept);
     if (row->recovery.stiffened_J > 0) pal_stiffening_damper_hold(step->body, row->recovery.stiffened_J);
     const unsigned now = row->recovery.still ? PAL_INVERTED | PAL_INVERSION_AT_REST : PAL_INVERTED;
-    return (row->recovery.n_patch > 0 ? now : 0) | (changed ? PAL_INVERSION_CHANGED : 0);
+    return (row->recovery.n_region > 0 ? now : 0) | (changed ? PAL_INVERSION_CHANGED : 0);
 }
 
-/* at rest, which solvers ask for between steps, there are no patches */
+/* at rest, which solvers ask for between steps, there are no regions */
 static void linearise(void *self, const pal_body *body)
 {
     pal_cells_elastic *row = self;

@@ -242,7 +242,7 @@ static void reopen(const edge_spring *e, const pal_active_nodes *pack, double k)
     }
 }
 
-static pal_err pull(void *self, pal_step *step)
+static pal_err compute_forces(void *self, pal_step *step)
 {
     edge_spring *e = self;
     take_springs(e);
@@ -253,7 +253,7 @@ static pal_err pull(void *self, pal_step *step)
 
 static pal_err run(void *self, pal_step *step)
 {
-    return pal_active_nodes_run(self, step, pull);
+    return pal_active_nodes_run(self, step, compute_forces);
 }
 
 static double energy(void *self, const pal_body *body)
@@ -308,7 +308,7 @@ const pal_effect pal_effect_edge_spring = {.name = "edge_spring",
                                            .internal = true,
                                            .make = make,
                                            .run = run,
-                                           .pull = pull,
+                                           .compute_forces = compute_forces,
                                            .energy = energy,
                                            .stiffness = stiffness,
                                            .damping = damping,

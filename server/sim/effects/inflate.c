@@ -221,7 +221,7 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
     for (int n = 0; n < body->n_active; n++) {
         int i = pal_body_point(body, n);
         const double *g = row->gradient + 3 * (size_t)i;
-        if (!body->fixed[i]) sum += pal_dot3(g, g) / body->mass_kg[i];
+        if (!body->support[i]) sum += pal_dot3(g, g) / body->mass_kg[i];
     }
     for (int n = 0; n < body->n_active; n++) {
         int i = pal_body_point(body, n);

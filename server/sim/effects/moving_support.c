@@ -73,7 +73,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     for (int i = 0; i < body->n_dof; i++) {
         const double *x = body->x_rest + 3 * (size_t)i;
         if (isnan(lowest) ? !inside(x, low, high) : pal_dot3(x, up) > top) continue;
-        body->fixed[i] = 2;
+        body->support[i] = PAL_PRESCRIBED;
         pal_add3(row->centre, row->centre, x);
         row->node[row->n_node++] = i;
     }

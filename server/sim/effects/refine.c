@@ -312,7 +312,7 @@ static bool let_down_once(refine *row, pal_step *step)
     body->v = v, body->dv = dv;
     for (int k = 0; k < body->n_active && done; k++) {
         const size_t i = (size_t)pal_body_point(body, k);
-        if (row->seen[i] == row->report.n_switch || body->fixed[i] || !(row->bound_N_m[i] > 0)) continue;
+        if (row->seen[i] == row->report.n_switch || body->support[i] || !(row->bound_N_m[i] > 0)) continue;
         double move[3];
         for (int c = 0; c < 3; c++)
             move[c] = (body->f[3 * i + (size_t)c] - body->load[3 * i + (size_t)c]) / row->bound_N_m[i];
@@ -339,7 +339,7 @@ static void let_down(refine *row, pal_step *step)
 /* free, and of the changed region, where that is not all of the body */
 static bool in_region(const refine *row, const pal_body *body, bool whole, int i)
 {
-    if (body->fixed[i]) return false;
+    if (body->support[i]) return false;
     if (whole || row->seen[i] != row->report.n_switch) return true;
     return fabs(body->mass_kg[i] - row->mass_was[i]) > mass_changed * row->mass_was[i];
 }
@@ -560,7 +560,7 @@ static void reset(void *self, const pal_body *body)
 }
 
 /* clocks, patience and factors of the same surface in another world; of another number of levels they begin anew */
-static void hand(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
+static void transfer(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
 {
     refine *row = self;
     const refine *was = before;
@@ -587,5 +587,5 @@ const pal_effect pal_effect_refine = {.name = "refine",
                                       .run = run,
                                       .material = material,
                                       .reset = reset,
-                                      .hand = hand,
+                                      .transfer = transfer,
                                       .settled_s = settled_s};

@@ -55,7 +55,7 @@ static void turn_back(shape_spring *row)
 static bool is_held(const pal_body *body)
 {
     for (int i = 0; i < body->n_dof; i++)
-        if (body->fixed[i]) return true;
+        if (body->support[i]) return true;
     return false;
 }
 
@@ -124,7 +124,7 @@ static inline void strain(const hold *h, const double x[3], const double rest[3]
     pal_sub3(out, x, at);
 }
 
-static pal_err pull(void *self, pal_step *step)
+static pal_err compute_forces(void *self, pal_step *step)
 {
     shape_spring *row = self;
     const pal_body *body = step->body;
@@ -151,7 +151,7 @@ static pal_err pull(void *self, pal_step *step)
 
 static pal_err run(void *self, pal_step *step)
 {
-    return pal_active_nodes_run(self, step, pull);
+    return pal_active_nodes_run(self, step, compute_forces);
 }
 
 static double energy(void *self, const pal_body *body)
@@ -205,7 +205,7 @@ const pal_effect pal_effect_shape_spring = {.name = "shape_spring",
                                             .stage = PAL_STAGE_FORCE,
                                             .make = make,
                                             .run = run,
-                                            .pull = pull,
+                                            .compute_forces = compute_forces,
                                             .energy = energy,
                                             .stiffness = stiffness,
                                             .damping = damping,

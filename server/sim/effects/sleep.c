@@ -151,7 +151,7 @@ static bool balanced(const sleeper *row, pal_step *step)
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         mass += body->mass_kg[i];
-        if (!body->fixed[i]) force += pal_norm3(body->g + 3 * (size_t)i);
+        if (!body->support[i]) force += pal_norm3(body->g + 3 * (size_t)i);
     }
     return force <= row->rest_1_s2 * body->length_scale_m * mass;
 }

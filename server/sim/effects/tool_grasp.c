@@ -96,7 +96,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     PAL_TRY(pal_entry_read_number(item, "reach_m", 0, 10, &grasp->asked_reach_m, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     if (build->body->n_shown == 0)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: tool_grab needs a body that shows something",
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: tool_grasp needs a body that shows something",
                                   item->path);
     size_t n_node = (size_t)build->body->n_node, scratch = 6 * sizeof(double) * n_node + 256;
     if (build->body->implicit) {
@@ -266,7 +266,7 @@ static void leave(const pal_grasp *g, const pal_grasp *b, const double force_N[3
     const pal_interpolation *place = by->place;
     if (!by->left_N || !place || !pal_finite3(force_N)) return;
     for (int i = 0; i < b->n_node; i++) {
-        if (!by->from->interpolation && by->from->fixed[b->node[i]]) continue;
+        if (!by->from->interpolation && by->from->support[b->node[i]]) continue;
         for (int32_t k = place->start[b->node[i]]; k < place->start[b->node[i] + 1]; k++)
             pal_axpy3(by->left_N + 3 * (size_t)place->point[k], b->weight[i] * place->weight[k], force_N);
     }
@@ -289,7 +289,7 @@ static void move_hold(pal_grasp *g, const pal_body *body, const pal_grasp *b, co
     g->reach_m = b->reach_m;
 }
 
-static void hand(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
+static void transfer(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
 {
     pal_grasps *grasp = self;
     const pal_grasps *old = before;
@@ -349,7 +349,7 @@ const pal_effect pal_effect_tool_grasp = {.name = "tool_grasp",
                                           .run = run,
                                           .material = material,
                                           .reset = reset,
-                                          .hand = hand,
+                                          .transfer = transfer,
                                           .destroy = destroy,
                                           .reach_m = how_far_m,
                                           .tangent = &tangent};

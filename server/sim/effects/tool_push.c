@@ -130,7 +130,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 }
 
 /* the proxy's first place: the tool's own, or the nearest place outside when that is inside tissue */
-static void seat(pal_push *push, pal_tool_contact *h, const pal_body *body, const double at[3], double radius_m)
+static void place_proxy(pal_push *push, pal_tool_contact *h, const pal_body *body, const double at[3], double radius_m)
 {
     double p[3], out[3], normal[3];
     memset(&h->proxy, 0, sizeof h->proxy);
@@ -166,13 +166,13 @@ static void begin_tool(pal_push *push, pal_tool_contact *h, const pal_tool *tool
     if (!h->active) {
         double last[3];
         pal_sub3(last, tool->last.position_m, body->offset_m);
-        seat(push, h, body, last, tool->radius_m);
+        place_proxy(push, h, body, last, tool->radius_m);
         h->ramp = 1;
         /* it has neither touched nor slipped before */
         h->retriangulated = false;
         pal_set3(h->slip, 0, 0, 0);
     } else if (h->time_behind_s > push->slip_s) {
-        seat(push, h, body, next, tool->radius_m);
+        place_proxy(push, h, body, next, tool->radius_m);
         pal_tool_contact_end_blend(h);
         h->ramp = 0, body->safeguards.n_tool_reset++;
     }
@@ -266,7 +266,7 @@ static bool settle(void *self, pal_step *step, const double *moved, bool last)
     return pal_push_settle(self, step, moved, last);
 }
 
-static void hand(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
+static void transfer(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
 {
     pal_push *push = self, *old = (pal_push *)(uintptr_t)before; /* its points gathers forces, which is work room */
     for (int t = 0; t < push->n_tool && t < old->n_tool; t++) {
@@ -298,7 +298,7 @@ const pal_effect pal_effect_tool_push = {.name = "tool_push",
                                          .run = run,
                                          .material = material,
                                          .reset = reset,
-                                         .hand = hand,
+                                         .transfer = transfer,
                                          .destroy = destroy,
                                          .wanted = wanted,
                                          .reach_m = how_far_m,

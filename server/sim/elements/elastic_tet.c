@@ -48,7 +48,7 @@ static pal_err make_lanes(pal_elastic_tets *t, pal_build *build)
         t->node_order = body->node_order;
         PAL_TRY(pal_simd_blocks_make(t->node_order, t->corner, n_tet, 4, build->arena, &t->simd_blocks));
         t->place = t->simd_blocks.place;
-        t->n_block = t->simd_blocks.n_strip + t->simd_blocks.n_unsupported;
+        t->n_block = t->simd_blocks.n_strip + t->simd_blocks.n_loose;
     } else {
         t->place = PAL_NEW(build->arena, int32_t, n_tet);
         if (!t->place) return PAL_ERR_MEMORY;
@@ -80,7 +80,7 @@ static void take_rest(pal_elastic_tets *t, double edge_m)
 pal_err pal_elastic_tets_make(const pal_elastic_tets_options *wish, pal_build *build, pal_elastic_tets *out)
 {
     const pal_body *body = build->body;
-    *out = (pal_elastic_tets){.wish = *wish, .n_node = body->n_node, .x_rest = body->x_rest, .fixed = body->fixed};
+    *out = (pal_elastic_tets){.wish = *wish, .n_node = body->n_node, .x_rest = body->x_rest, .fixed = body->support};
     out->n_point = wish->n_corner == 4 ? 1 : 4;
     make_shape(out);
     PAL_TRY(make_lanes(out, build));

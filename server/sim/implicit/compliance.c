@@ -52,7 +52,7 @@ static bool solve_points(pal_compliance_solver *answer, const pal_body *body, do
     int n = answer->cg.n;
     double *r = answer->cg.r, share;
     for (int i = 0; i < n; i++)
-        if (body->fixed[i / 3]) r[i] = 0;
+        if (body->support[i / 3]) r[i] = 0;
     memset(move_m, 0, bytes3(body));
     double size2 = pal_dot_product(n, r, r);
     if (!(size2 > 0)) return size2 == 0;
@@ -64,7 +64,7 @@ static bool solve_points(pal_compliance_solver *answer, const pal_body *body, do
     if (share != 0) {
         for (int i = 0; i < n; i++) move_m[i] = share * known->move[i];
         multiply(answer, move_m, answer->cg.q);
-        for (int i = 0; i < n; i++) r[i] = body->fixed[i / 3] ? 0 : r[i] - answer->cg.q[i];
+        for (int i = 0; i < n; i++) r[i] = body->support[i / 3] ? 0 : r[i] - answer->cg.q[i];
     }
     (void)pal_conjugate_gradient_run(&answer->cg, move_m, enough * sqrt(size2), share == 0, MOST);
     memcpy(known->move, move_m, bytes3(body));

@@ -165,7 +165,7 @@ void pal_implicit_destroy(void *self)
 static void clear_held(const pal_body *body, double *r)
 {
     for (int i = 0; i < body->n_dof; i++)
-        if (body->fixed[i]) pal_set3(r + 3 * i, 0, 0, 0);
+        if (body->support[i]) pal_set3(r + 3 * i, 0, 0, 0);
 }
 
 static double norm(const pal_implicit *core, const double *r)
@@ -229,7 +229,7 @@ static double potential(pal_implicit *core, double tau, const double *velocity)
     if (body->interpolation) sum += embedded_potential(core, velocity);
     for (int i = 0; i < body->n_dof && !body->interpolation; i++) {
         double m = 0.5 * body->mass_kg[i];
-        if (body->fixed[i]) continue;
+        if (body->support[i]) continue;
         for (int c = 3 * i; c < 3 * i + 3; c++) {
             double slip = velocity[c] - core->vs[c];
             sum += m * (slip * slip + keep * velocity[c] * velocity[c]) - body->load[c] * (body->x[c] - core->x0[c]);
@@ -253,7 +253,7 @@ static void solve_linear(pal_implicit *core, double target)
     double *v = body->v, *r = core->cg.r, *q = core->cg.q, *p = core->cg.p;
     bool led = false;
     for (int i = 0; i < core->cg.n; i++) p[i] = v[i] - core->start[i];
-    for (int i = 0; i < body->n_dof; i++) led = led || (body->fixed[i] && pal_dot3(p + 3 * i, p + 3 * i) > 0);
+    for (int i = 0; i < body->n_dof; i++) led = led || (body->support[i] && pal_dot3(p + 3 * i, p + 3 * i) > 0);
     double before = norm(core, r);
     pal_system_multiply(&core->system, p, q);
     for (int i = 0; i < core->cg.n; i++) r[i] -= q[i];
@@ -309,14 +309,14 @@ static void clamp_moves(pal_implicit *core, double tau)
         double way[3];
         pal_sub3(way, body->v + 3 * i, core->start + 3 * i);
         double far = pal_norm3(way), own = fmin(far, pal_dist3(way, mean));
-        if (body->fixed[i]) continue;
+        if (body->support[i]) continue;
         longest = fmax(longest, own);
         body->safeguards.n_clamped += own > most;
     }
     if (!(longest > most)) return;
     uint64_t before = pal_clock_ns();
     for (int i = 0; i < core->cg.n; i++) {
-        if (body->fixed[i / 3]) continue;
+        if (body->support[i / 3]) continue;
         double way = body->v[i] - core->start[i] - mean[i % 3];
         body->v[i] = core->start[i] + mean[i % 3] + most / longest * way;
     }
@@ -341,7 +341,7 @@ static void search(pal_implicit *core, double tau)
         pal_sub3(way + 3 * i, v + 3 * i, core->start + 3 * i);
         slope -= pal_dot3(core->moved + 3 * i, way + 3 * i);
         /* where led nodes move on, the potential before and after are not of one problem */
-        if (body->fixed[i] && pal_dot3(way + 3 * i, way + 3 * i) > 0) return;
+        if (body->support[i] && pal_dot3(way + 3 * i, way + 3 * i) > 0) return;
     }
     if (!(slope < 0)) return;
     go(core, tau, core->start);
@@ -408,10 +408,10 @@ static bool is_led(const pal_body *body)
     for (int i = 0; i < body->n_dof; i++) {
         uint64_t next = 0;
         /* most nodes are free: eight at a glance */
-        if (i + 8 <= body->n_dof) memcpy(&next, body->fixed + i, 8);
+        if (i + 8 <= body->n_dof) memcpy(&next, body->support + i, 8);
         if (i + 8 <= body->n_dof && next == 0)
             i += 7;
-        else if (body->fixed[i] && pal_dot3(body->v + 3 * i, body->v + 3 * i) > 0)
+        else if (body->support[i] && pal_dot3(body->v + 3 * i, body->v + 3 * i) > 0)
             return true;
     }
     return false;

@@ -7,7 +7,7 @@
 #include <string.h>
 
 /* moves times nodes */
-static const double most_work = 2e7;
+static const double max_work = 2e7;
 
 /* ---- pattern ---- */
 
@@ -133,7 +133,7 @@ static int choose_groups(const pal_body *body, const near_list *near, int32_t *g
     for (int i = 0; i < body->n_dof; i++) group[i] = -1;
     for (int i = 0; i <= body->n_dof; i++) mark[i] = -1;
     for (int32_t j = 0; j < body->n_dof; j++) {
-        if (body->fixed[j]) continue;
+        if (body->support[j]) continue;
         for (int32_t a = near->start[j]; a < near->start[j + 1]; a++) {
             int32_t i = near->point[a];
             for (int32_t b = near->start[i]; b < near->start[i + 1]; b++)
@@ -194,7 +194,7 @@ static pal_err make_arrays(pal_interpolated_system *e, const pal_body *body, boo
 static pal_err check_work(const pal_body *body, int n_group, bool damped, pal_diagnostic *diag)
 {
     double moves = 3.0 * n_group * (damped ? 2 : 1);
-    if (moves * body->n_node <= most_work) return PAL_ERR_OK;
+    if (moves * body->n_node <= max_work) return PAL_ERR_OK;
     return pal_diagnostic_set(
         diag, PAL_ERR_BUDGET,
         "body \"%s\": an implicit solver finds the matrix of its %d control points by %.0f or more "

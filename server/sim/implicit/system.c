@@ -23,7 +23,7 @@ pal_err pal_system_make(const pal_build *build, pal_system *out)
         if (!row->effect->drag && !row->effect->energy) out->has_energy = false;
         if (row->effect->tangent && row->effect->tangent->rotate) out->has_rotation = true;
     }
-    for (int i = 0; i < body->n_dof; i++) out->n_free += !body->fixed[i];
+    for (int i = 0; i < body->n_dof; i++) out->n_free += !body->support[i];
     if (!body->interpolation) return PAL_ERR_OK;
     return pal_interpolated_system_make(body, out->force, out->n_force, build->arena, build->diag,
                                         &out->interpolated_system);
@@ -205,7 +205,7 @@ void pal_system_multiply(const pal_system *system, const double *p, double *out)
     pal_system_multiply_stiffness(system, system->stiff, system->damp, p, out);
     pal_system_multiply_contact(system, system->stiff, system->damp, p, out);
     for (int i = 0; i < body->n_dof; i++)
-        if (body->fixed[i]) pal_set3(out + 3 * i, 0, 0, 0);
+        if (body->support[i]) pal_set3(out + 3 * i, 0, 0, 0);
 }
 
 double pal_system_work(const pal_system *system, const double *p)
@@ -244,7 +244,7 @@ void pal_system_true_stiffness(const pal_system *system, const double *x, double
     }
     for (int i = 0; i < n; i++) {
         body->x[i] = x[i];
-        out[i] = body->fixed[i / 3] || part == 0 ? 0 : (low[i] - body->g[i]) / (2 * part);
+        out[i] = body->support[i / 3] || part == 0 ? 0 : (low[i] - body->g[i]) / (2 * part);
     }
     pal_system_interpolate(system);
 }
@@ -343,14 +343,14 @@ static void count_parts(const pal_body *body, int32_t *parent, span *s, pal_supp
     *out = (pal_support_report){.unsupported_node = -1};
     for (int i = 0; i < n; i++) s[i] = (span){.first = -1, .far = -1};
     for (int i = 0; i < n; i++)
-        if (body->fixed[i]) take_far(body, &s[pal_union_find_root(parent, i)], i);
+        if (body->support[i]) take_far(body, &s[pal_union_find_root(parent, i)], i);
     for (int i = 0; i < n; i++)
-        if (body->fixed[i]) take_off(body, &s[pal_union_find_root(parent, i)], i);
+        if (body->support[i]) take_off(body, &s[pal_union_find_root(parent, i)], i);
     for (int i = 0; i < n; i++) {
         if (parent[i] != i) continue;
         out->n_part++;
         /* a part of one node is held as soon as that node is */
-        if (s[i].off_m > 1e-9 * body->length_scale_m || (body->fixed[i] && s[i].far < 0)) continue;
+        if (s[i].off_m > 1e-9 * body->length_scale_m || (body->support[i] && s[i].far < 0)) continue;
         out->n_unsupported++;
         if (out->unsupported_node < 0) out->unsupported_node = i;
     }

@@ -45,7 +45,7 @@ pal_err pal_warp_make(const pal_block_matrix *pattern, const pal_body *body, con
     out->work = PAL_NEW(arena, double, 3 * n);
     if (!out->base || !out->next || !out->w || !out->work) return PAL_ERR_MEMORY;
     double before = pal_clock_s();
-    pal_err err = pal_cholesky_create(pattern, body->fixed, &out->factor);
+    pal_err err = pal_cholesky_create(pattern, body->support, &out->factor);
     out->analyse_s = pal_clock_s() - before;
     return err;
 }

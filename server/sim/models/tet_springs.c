@@ -126,7 +126,7 @@ static pal_err build(pal_config_entry *item, pal_build *build, pal_recipe *out)
     PAL_TRY(pal_entry_read_bool(item, "recover", &recover, build->diag));
     if (recover && !can)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
-                                  "%s.untangle: goes with solver verlet or rk4 and without gravity only", item->path);
+                                  "%s.recover: goes with solver verlet or rk4 and without gravity only", item->path);
     PAL_TRY(pal_entry_check_unused(item, build->diag));
 
     PAL_TRY(pal_body_allocate(body, build->arena, mesh->tets.n_node));

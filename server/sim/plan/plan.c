@@ -15,14 +15,14 @@ static pal_err hold_rim(pal_body *body, int index, pal_diagnostic *diag)
 {
     if (!body->active)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "body \"%s\" supports[%d].rim: the model has no surface of its own", body->name,
+                                  "body \"%s\" supports[%d].boundary: the model has no surface of its own", body->name,
                                   index);
     const pal_levels *levels = body->dofs.levels;
     if (levels->closed)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" supports[%d].rim: the surface has no open edge",
-                                  body->name, index);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
+                                  "body \"%s\" supports[%d].boundary: the surface has no open edge", body->name, index);
     for (int i = 0; i < body->n_dof; i++)
-        if (pal_levels_on_boundary(levels, i)) body->fixed[i] = 1;
+        if (pal_levels_on_boundary(levels, i)) body->support[i] = PAL_FIXED;
     return PAL_ERR_OK;
 }
 
@@ -30,7 +30,7 @@ static pal_err hold(pal_body *body, const pal_body_def *def, const double up[3],
 {
     for (int s = 0; s < def->n_support; s++) {
         if (def->support[s].rim) PAL_TRY(hold_rim(body, s, diag));
-        pal_support_hold(&def->support[s], up, body->x_rest, body->n_dof, body->fixed);
+        pal_support_hold(&def->support[s], up, body->x_rest, body->n_dof, body->support);
     }
     return PAL_ERR_OK;
 }

@@ -14,7 +14,7 @@ static double way_kg_m2(const pal_body *body, double *mass_kg)
     *mass_kg = 0;
     for (int k = 0; k < body->n_active; k++) {
         size_t i = (size_t)pal_body_point(body, k);
-        if (body->fixed[i]) continue;
+        if (body->support[i]) continue;
         pal_sub3(u, body->x + 3 * i, body->x_rest + 3 * i);
         *mass_kg += body->mass_kg[i];
         way += body->mass_kg[i] * pal_dot3(u, u);

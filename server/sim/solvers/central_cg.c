@@ -183,10 +183,10 @@ static bool renew(central *row, const pal_body *body)
 {
     const pal_mass_operator *m = row->mass;
     if (row->sampled == pal_dofs_material_revision(&body->dofs) &&
-        !memcmp(row->fixed, body->fixed, (size_t)body->n_dof))
+        !memcmp(row->fixed, body->support, (size_t)body->n_dof))
         return false;
     row->sampled = pal_dofs_material_revision(&body->dofs);
-    memcpy(row->fixed, body->fixed, (size_t)body->n_dof);
+    memcpy(row->fixed, body->support, (size_t)body->n_dof);
     for (int i = 0; i < m->n_point; i++) {
         int32_t k = m->start[i];
         while (m->point[k] != i) k++;
@@ -390,11 +390,11 @@ static bool begin_change(central *row, const pal_body *body)
     for (int i = 0; i < body->n_dof; i++) {
         double *was = row->was + 3 * (size_t)i, *change = row->change + 3 * (size_t)i;
         const double *v = body->v + 3 * (size_t)i;
-        if (body->fixed[i] == 2 && row->dt_s > 0)
+        if (body->support[i] == PAL_PRESCRIBED && row->dt_s > 0)
             pal_sub3(change, v, was);
         else
             pal_copy3(was, v);
-        if (body->fixed[i] == 1) pal_scale3(change, -1, v);
+        if (body->support[i] == PAL_FIXED) pal_scale3(change, -1, v);
         any |= change[0] != 0 || change[1] != 0 || change[2] != 0;
     }
     return any;
@@ -445,8 +445,8 @@ static double move(central *row, pal_body *body, double dt)
     for (int i = 0; i < body->n_dof; i++) {
         double *v = body->v + 3 * (size_t)i;
         /* led points have theirs */
-        if (body->fixed[i] == 1) pal_set3(v, 0, 0, 0);
-        if (!body->fixed[i]) pal_add3(v, v, row->change + 3 * (size_t)i);
+        if (body->support[i] == PAL_FIXED) pal_set3(v, 0, 0, 0);
+        if (!body->support[i]) pal_add3(v, v, row->change + 3 * (size_t)i);
         const double way = pal_norm3(v) * dt;
         poison += 0 * way;
         if (way > max_m) {

@@ -164,7 +164,7 @@ static double most_stiff(const rk4 *row, const pal_body *body)
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         double omega2 = row->stiff[i] / body->mass_kg[i];
-        if (!body->fixed[i] && omega2 > most) most = omega2;
+        if (!body->support[i] && omega2 > most) most = omega2;
     }
     return most;
 }
@@ -193,8 +193,8 @@ static void begin_lanczos(rk4 *row, const pal_body *body)
         double weight = row->stiff[i] / body->mass_kg[i];
         uint64_t bits = ((uint64_t)(uint32_t)i + 1) * 0x9e3779b97f4a7c15u;
         pal_quad q = {0};
-        row->inverse_kg[k] = body->fixed[i] ? 0 : 1 / sqrt(body->mass_kg[i]);
-        for (int c = 0; c < 3 && !body->fixed[i]; c++) {
+        row->inverse_kg[k] = body->support[i] ? 0 : 1 / sqrt(body->mass_kg[i]);
+        for (int c = 0; c < 3 && !body->support[i]; c++) {
             bits ^= bits >> 29, bits *= 0xbf58476d1ce4e5b9u;
             q[c] = weight * ((double)(bits >> 11) * 0x1p-52 - 1);
         }
@@ -361,7 +361,7 @@ static double limit(void *self, pal_step *step)
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         double c = row->damp[i] / body->mass_kg[i];
-        if (!body->fixed[i] && c > most) most = c;
+        if (!body->support[i] && c > most) most = c;
     }
     most = fmax(sqrt(most2), most);
     row->limit_s *= most > 0 ? row->reach / most : INFINITY;
@@ -430,9 +430,10 @@ static void take_masses(rk4 *row, const pal_body *body, const rates *r, bool hea
         int i = pal_body_point(body, k);
         double mass = body->mass_kg[i];
         if (heavy) mass = fmax(mass, fmax(t * t * row->stiff[i], t * row->damp[i]));
-        row->inverse_kg[k] = body->fixed[i] ? 0 : 1 / mass;
-        row->led[k] = body->fixed[i] == 2;
-        if (body->fixed[i] == 1) body->pack->xv[k] = pal_v8_join(pal_v8_low(body->pack->xv[k]), (pal_quad){0});
+        row->inverse_kg[k] = body->support[i] ? 0 : 1 / mass;
+        row->led[k] = body->support[i] == PAL_PRESCRIBED;
+        if (body->support[i] == PAL_FIXED)
+            body->pack->xv[k] = pal_v8_join(pal_v8_low(body->pack->xv[k]), (pal_quad){0});
     }
 }
 

@@ -147,7 +147,7 @@ static void multiply_true(void *user, const double *p, double *out)
     pal_system_true_stiffness(&row->system, row->now, row->low, p, out);
     if (row->system.has_contact) pal_system_multiply_contact(&row->system, 1, 0, p, out);
     for (int i = 0; i < row->cg.n; i++)
-        out[i] = body->fixed[i / 3] ? 0 : out[i] + row->system.mass * body->mass_kg[i / 3] * p[i];
+        out[i] = body->support[i / 3] ? 0 : out[i] + row->system.mass * body->mass_kg[i / 3] * p[i];
 }
 
 static void precondition(void *user, const double *r, double *z)
@@ -269,7 +269,7 @@ static pal_err make_factors(static_newton *row, pal_build *build)
     PAL_TRY(pal_system_pattern(&row->system, build->arena, &row->blocks));
     PAL_TRY(pal_node_rotations_make(&row->system, build->arena, &row->turns));
     if (row->linear == LINEAR_INCOMPLETE)
-        PAL_TRY(pal_incomplete_cholesky_make(&row->blocks, body->fixed, build->arena, &row->incomplete));
+        PAL_TRY(pal_incomplete_cholesky_make(&row->blocks, body->support, build->arena, &row->incomplete));
     else
         PAL_TRY(pal_warp_make(&row->blocks, body, &row->turns, false, build->arena, &row->warp));
     pal_system_linearise(&row->system);
@@ -357,7 +357,7 @@ static pal_err find_residual(static_newton *row, pal_step *step, double *size)
     }
     for (int i = 0; i < body->n_dof; i++) {
         loads += pal_norm3(row->external_force + 3 * i);
-        if (!body->fixed[i]) continue;
+        if (!body->support[i]) continue;
         reactions += pal_norm3(r + 3 * i);
         pal_set3(r + 3 * i, 0, 0, 0);
     }
@@ -597,7 +597,7 @@ static pal_err run(void *self, pal_step *step)
     if (!pal_guard_check_finite(body)) return PAL_ERR_OK;
     memcpy(row->x0, body->x, bytes3(row));
     for (int i = 0; i < body->n_dof; i++) {
-        if (body->fixed[i])
+        if (body->support[i])
             pal_axpy3(body->x + 3 * i, step->dt_s, body->v + 3 * i);
         else
             pal_set3(body->v + 3 * i, 0, 0, 0);

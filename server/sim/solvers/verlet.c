@@ -66,7 +66,7 @@ static double limit(void *self, pal_step *step)
     for (int i = 0; i < body->n_dof; i++) {
         double k = row->stiff[i], c = row->damp[i], m = body->mass_kg[i];
         sum += 0 * k + 0 * c;
-        if (body->fixed[i] || k + c == 0) continue;
+        if (body->support[i] || k + c == 0) continue;
         double dt = row->safety * 4 * m / (c + sqrt(c * c + 4 * k * m));
         if (dt < least) least = dt;
     }
@@ -91,8 +91,8 @@ static pal_err run(void *self, pal_step *step)
     for (int i = 0; i < body->n_dof; i++) {
         double *v = body->v + 3 * i, m = body->mass_kg[i];
         const double *g = body->g + 3 * i;
-        double s = body->fixed[i] ? 0 : dt / m, k = !body->fixed[i] ? keep : body->fixed[i] == 2 ? 1 : 0;
-        if (step->heavy && !body->fixed[i]) {
+        double s = body->support[i] ? 0 : dt / m, k = !body->support[i] ? keep : body->support[i] == 2 ? 1 : 0;
+        if (step->heavy && !body->support[i]) {
             double heavy = fmax(m, root * (root * row->stiff[i] + row->damp[i]));
             s = dt / heavy, k *= 1 - heavy_loss * (1 - m / heavy);
         }

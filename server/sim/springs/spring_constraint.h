@@ -1,7 +1,7 @@
-/* The constraints of paper B's springs between 2, 3 or 4 nodes: edge C = l w - 1 with w = 1/l0, face C = 2A w - 1 with
- * w = 1/(2 A0), tetrahedron C = 6V w - 1 with w = 1/(6 V0), V signed by the order of the corners. Their gradients and
- * second derivatives, one spring at a time: the rows take energies and damping from here, an equilibrium by Newton its
- * tangent. A spring's force is -k C grad C and its stiffness k (grad C grad C' + C H). Thread: any. */
+/* Constraints of paper B's springs between 2, 3 or 4 nodes: edge C = l w - 1 with w = 1/l0, face C = 2A w - 1 with w =
+ * 1/(2 A0), tetrahedron C = 6V w - 1 with w = 1/(6 V0), V signed by the order of the corners; their gradients and
+ * second derivatives, one spring at a time. Energies and damping of the components and the tangent of a static
+ * equilibrium use them. A spring's force is -k C grad C, its stiffness k (grad C grad C' + C H). Thread: any. */
 #ifndef PAL_SIM_SPRINGS_SPRING_CONSTRAINT_H
 #define PAL_SIM_SPRINGS_SPRING_CONSTRAINT_H
 #include "server/base/vec3.h"
@@ -33,7 +33,7 @@ PAL_INLINE void pal_spring_tet_edges(const double *const x[PAL_CORNERS], double 
     for (int c = 0; c < 3; c++) pal_sub3(e[c], x[c + 1], x[0]);
 }
 
-/* what w is the inverse of at rest: l m, 2A m2, 6V m3 (signed) */
+/* the measure whose inverse at rest is w: l m, 2A m^2, 6V m^3 (signed) */
 PAL_INLINE double pal_spring_measure(pal_spring_kind kind, const double *const x[PAL_CORNERS])
 {
     double e[3][3], n[3];
@@ -47,9 +47,10 @@ PAL_INLINE double pal_spring_measure(pal_spring_kind kind, const double *const x
     return pal_dot3(e[0], n);
 }
 
-/* quality below which springs leave the volume of a tetrahedron alone (effects/tet_volume.c) */
+/* quality below which a tetrahedron has no volume spring: its gradients are so long that they would set the sub-step
+ * (effects/tet_volume.c, tests/sim/springs/test_springs.c) */
 #define PAL_SPRING_SLIVER 0.01
-/* of a tetrahedron: 1 for a regular one, 0 for a flat one */
+/* quality of a tetrahedron: 1 for a regular one, 0 for a flat one */
 PAL_INLINE double pal_spring_tet_quality(const double *const x[PAL_CORNERS])
 {
     double mean2 = 0;
@@ -58,7 +59,8 @@ PAL_INLINE double pal_spring_tet_quality(const double *const x[PAL_CORNERS])
     return mean2 > 0 ? sqrt(2) * fabs(pal_spring_measure(PAL_SPRING_VOLUME, x)) / (mean2 * sqrt(mean2)) : 0;
 }
 
-/* An edge below 1e-9 of its rest length, a face below 1e-12 of its rest area has no direction: zero gradient */
+/* C and its gradient. An edge below 1e-9 of its length at rest, or a face below 1e-12 of its area, has no direction:
+ * zero gradient */
 PAL_INLINE void pal_spring_constraint(pal_spring_kind kind, const double *const x[PAL_CORNERS], double w,
                                       pal_constraint *out)
 {
@@ -97,7 +99,7 @@ PAL_INLINE void pal_spring_add_cross(double m[9], double s, const double a[3])
 }
 
 /* Second derivative of C, 1/m2: h[a][b] is the 3x3 block of corners a, b, row-major; blocks beyond the kind's corners
- * stay untouched, edges and faces without direction (above) get zeros. With the unit direction u of an edge, the unit
+ * are left as they are, edges and faces without direction get zeros. With the unit direction u of an edge, the unit
  * normal n of a face and its edges e_a opposite the corners, in turn:
  *   edge  H = +-w/l (I - u u')     face  H_ab = w (e_a.e_b/|2A| n n' +- [n]x)     tet  H_ab = +-w [edge from 0]x */
 PAL_INLINE void pal_spring_constraint_hessian(pal_spring_kind kind, const double *const x[PAL_CORNERS], double w,

@@ -1,4 +1,4 @@
-/* Patches of springs that are turned over. */
+/* Regions of inverted springs. */
 #include "server/sim/springs/spring_recovery.h"
 
 #include "server/base/clock.h"
@@ -8,84 +8,83 @@
 
 #include <math.h>
 
-/* volume over that at rest: from where on a tetrahedron is turned over or blown up, and until when it stays in a patch
- */
+/* volume over volume at rest: thresholds for entering a region and for leaving it */
 static const double least_in = 0.01, least_out = 0.2, most_in = 30, most_out = 20;
-/* of s, so that a patch never is too soft to move */
+/* smallest s: a region never becomes too soft to move */
 static const double least_scale = 0.02;
-/* kinetic energy of a patch that stands still, of what all of them store */
+/* kinetic energy of a region at rest, as a part of what all regions store */
 static const double still_share = 1e-3;
-/* of the sum of constants: springs that store more would fly apart when they take over */
+/* largest energy of springs that return, as a part of the sum of their constants: with more they would fly apart */
 static const double calm_share = 0.02;
-/* of the time that edges give to an explicit step */
+/* tau, as a part of the time that edges permit an explicit step */
 static const double damp_share = 0.25;
-/* of what is stored, that letting go a body that stands still may add */
+/* energy that the return of a body at rest may add, as a part of what is stored */
 static const double little_share = 2e-3;
-/* a patch that stands still is let go after, one that does not come loose grows every; of what is short of that by
- * rounding */
+/* time at rest after which a region is released; period of growth of one that does not recover; tolerance for rounding
+ * of both */
 static const double loose_after_s = 2, grow_every_s = 0.5, nearly = 1 - 1e-9;
 
-/* a body's rows of springs; NULL: it has no such row */
-typedef struct rows {
+/* a body's sets of springs by kind; NULL: none */
+typedef struct sets {
     pal_spring_set *of[3];
-} rows;
+} sets;
 
 pal_err pal_spring_recovery_make(int n_node, pal_arena *arena, pal_spring_recovery **out)
 {
     pal_spring_recovery *t = PAL_NEW(arena, pal_spring_recovery, 1);
     if (!t) return PAL_ERR_MEMORY;
     t->n_node = n_node;
-    t->patch = PAL_NEW(arena, int32_t, n_node);
+    t->region = PAL_NEW(arena, int32_t, n_node);
     t->root = PAL_NEW(arena, int32_t, n_node);
     t->room = PAL_NEW(arena, double, n_node);
-    if (!t->patch || !t->root || !t->room) return PAL_ERR_MEMORY;
-    for (int i = 0; i < n_node; i++) t->patch[i] = -1;
+    if (!t->region || !t->root || !t->room) return PAL_ERR_MEMORY;
+    for (int i = 0; i < n_node; i++) t->region[i] = -1;
     *out = t;
     return PAL_ERR_OK;
 }
 
 void pal_spring_recovery_reset(pal_spring_recovery *t)
 {
-    for (int i = 0; i < t->n_node && t->n_patch > 0; i++) t->patch[i] = -1;
-    t->stale = t->stale || t->n_patch > 0;
-    t->n_patch = 0;
+    for (int i = 0; i < t->n_node && t->n_region > 0; i++) t->region[i] = -1;
+    t->stale = t->stale || t->n_region > 0;
+    t->n_region = 0;
 }
 
 void pal_spring_recovery_transfer(pal_spring_recovery *t, const pal_spring_recovery *from)
 {
-    memcpy(t->patch, from->patch, sizeof *t->patch * (size_t)t->n_node);
+    memcpy(t->region, from->region, sizeof *t->region * (size_t)t->n_node);
     memcpy(t->of, from->of, sizeof t->of);
-    t->n_patch = from->n_patch, t->damp_s = from->damp_s, t->first_J = from->first_J;
+    t->n_region = from->n_region, t->damp_s = from->damp_s, t->first_J = from->first_J;
     t->k_J = from->k_J, t->seen_s = from->seen_s;
     t->stale = true;
 }
 
-static rows find_rows(const pal_step *step)
+static sets find_sets(const pal_step *step)
 {
-    rows r = {{NULL, NULL, NULL}};
+    sets r = {{NULL, NULL, NULL}};
     for (int i = 0; i < step->n_force; i++) {
         const pal_effect *effect = step->force[i].effect;
-        pal_spring_set *row = effect->springs ? effect->springs(step->force[i].self) : NULL;
-        if (row && row->all) r.of[row->spring.kind] = row;
+        pal_spring_set *set = effect->springs ? effect->springs(step->force[i].self) : NULL;
+        if (set && set->all) r.of[set->spring.kind] = set;
     }
     return r;
 }
 
-static const int32_t *corners(const pal_spring_set *row, int i)
+static const int32_t *corners(const pal_spring_set *set, int i)
 {
-    return row->item + (size_t)row->n_corner * (size_t)i;
+    return set->item + (size_t)set->n_corner * (size_t)i;
 }
 
-/* the patch of a spring, -1: none; its nodes that are in one are in the same, as edges join them */
-static int patch_of(const pal_spring_recovery *t, const pal_spring_set *row, int i)
+/* the region of a spring, -1: none; edges join its nodes, so at most one region has any of them */
+static int region_of(const pal_spring_recovery *t, const pal_spring_set *set, int i)
 {
-    const int32_t *node = corners(row, i);
-    for (int c = 0; c < row->n_corner; c++)
-        if (t->patch[node[c]] >= 0) return t->patch[node[c]];
+    const int32_t *node = corners(set, i);
+    for (int c = 0; c < set->n_corner; c++)
+        if (t->region[node[c]] >= 0) return t->region[node[c]];
     return -1;
 }
 
-/* ---- patches ---- */
+/* ---- regions ---- */
 
 static void edge_vectors(const int32_t *node, const pal_body *body, double x[3], double y[3])
 {
@@ -94,59 +93,59 @@ static void edge_vectors(const int32_t *node, const pal_body *body, double x[3],
     pal_sub3(y, body->x_rest + b, body->x_rest + a);
 }
 
-/* relative velocity of the ends, less what the spin gives */
-static void edge_rate(const pal_spring_region *patch, const int32_t *node, const pal_body *body, const double x[3],
+/* relative velocity of the ends without the spin */
+static void edge_rate(const pal_spring_region *region, const int32_t *node, const pal_body *body, const double x[3],
                       double out[3])
 {
     double turn[3];
     pal_sub3(out, body->dv + 3 * (size_t)node[1], body->dv + 3 * (size_t)node[0]);
-    pal_cross3(turn, patch->spin_1_s, x);
+    pal_cross3(turn, region->spin_1_s, x);
     pal_sub3(out, out, turn);
 }
 
-static double edge_N_m(const pal_spring_set *row, int i)
+static double edge_N_m(const pal_spring_set *set, int i)
 {
-    const int lane = row->simd_blocks.place[i];
-    return row->spring.k_J * row->all[lane] * row->w[lane] * row->w[lane];
+    const int lane = set->simd_blocks.place[i];
+    return set->spring.k_J * set->all[lane] * set->w[lane] * set->w[lane];
 }
 
-/* rotations of those patches that have their own */
-static void find_turns(pal_spring_recovery *t, const pal_spring_set *row, const pal_body *body)
+/* best-fit rotations of the regions that have one of their own */
+static void find_turns(pal_spring_recovery *t, const pal_spring_set *set, const pal_body *body)
 {
-    for (int p = 0; p < t->n_patch; p++) memset(t->of[p].sum, 0, sizeof t->of[p].sum);
-    for (int k = 0; k < row->n_off; k++) {
-        const int i = row->off[k];
+    for (int p = 0; p < t->n_region; p++) memset(t->of[p].sum, 0, sizeof t->of[p].sum);
+    for (int k = 0; k < set->n_off; k++) {
+        const int i = set->off[k];
         double x[3], y[3];
-        pal_spring_region *patch = &t->of[patch_of(t, row, i)];
-        if (patch->fixed) continue;
-        edge_vectors(corners(row, i), body, x, y);
-        pal_add_outer(patch->sum, edge_N_m(row, i), x, y);
+        pal_spring_region *region = &t->of[region_of(t, set, i)];
+        if (region->fixed) continue;
+        edge_vectors(corners(set, i), body, x, y);
+        pal_add_outer(region->sum, edge_N_m(set, i), x, y);
     }
-    for (int p = 0; p < t->n_patch; p++)
+    for (int p = 0; p < t->n_region; p++)
         if (!t->of[p].fixed) pal_best_rotation(t->of[p].sum, t->of[p].turn);
 }
 
-/* w = A^-1 sum k x x v, A = sum k (x.x I - x x'); about an axis along which all lies there is nothing to find */
-static void find_spins(pal_spring_recovery *t, const pal_spring_set *row, const pal_body *body)
+/* w = A^-1 sum k x x v, A = sum k (x.x I - x x'); about an axis on which all nodes lie, w is zero */
+static void find_spins(pal_spring_recovery *t, const pal_spring_set *set, const pal_body *body)
 {
-    for (int p = 0; p < t->n_patch; p++) {
+    for (int p = 0; p < t->n_region; p++) {
         memset(t->of[p].sum, 0, sizeof t->of[p].sum);
         pal_set3(t->of[p].spin_1_s, 0, 0, 0);
     }
-    for (int k = 0; k < row->n_off; k++) {
-        const int i = row->off[k];
-        pal_spring_region *patch = &t->of[patch_of(t, row, i)];
-        const int32_t *node = corners(row, i);
-        const double stiff = edge_N_m(row, i);
+    for (int k = 0; k < set->n_off; k++) {
+        const int i = set->off[k];
+        pal_spring_region *region = &t->of[region_of(t, set, i)];
+        const int32_t *node = corners(set, i);
+        const double stiff = edge_N_m(set, i);
         double x[3], v[3], moment[3];
         pal_sub3(x, body->d + 3 * (size_t)node[1], body->d + 3 * (size_t)node[0]);
         pal_sub3(v, body->dv + 3 * (size_t)node[1], body->dv + 3 * (size_t)node[0]);
-        pal_add_outer(patch->sum, -stiff, x, x);
-        for (int a = 0; a < 3; a++) patch->sum[4 * a] += stiff * pal_dot3(x, x);
+        pal_add_outer(region->sum, -stiff, x, x);
+        for (int a = 0; a < 3; a++) region->sum[4 * a] += stiff * pal_dot3(x, x);
         pal_cross3(moment, x, v);
-        pal_axpy3(patch->spin_1_s, stiff, moment);
+        pal_axpy3(region->spin_1_s, stiff, moment);
     }
-    for (int p = 0; p < t->n_patch; p++) {
+    for (int p = 0; p < t->n_region; p++) {
         double size[3], axis[9], spin[3] = {0, 0, 0};
         pal_eigen3(t->of[p].sum, size, axis);
         for (int a = 0; a < 3; a++)
@@ -156,63 +155,63 @@ static void find_spins(pal_spring_recovery *t, const pal_spring_set *row, const 
     }
 }
 
-/* energy of an edge without s; f: s times its force is added */
-static double edge_energy(const pal_spring_recovery *t, const pal_spring_set *row, int i, const pal_body *body,
+/* energy of an edge without s; f += s times its force */
+static double edge_energy(const pal_spring_recovery *t, const pal_spring_set *set, int i, const pal_body *body,
                           double *f)
 {
-    const int32_t *node = corners(row, i);
-    const pal_spring_region *patch = &t->of[patch_of(t, row, i)];
-    const double k = edge_N_m(row, i);
+    const int32_t *node = corners(set, i);
+    const pal_spring_region *region = &t->of[region_of(t, set, i)];
+    const double k = edge_N_m(set, i);
     double x[3], y[3], u[3];
     edge_vectors(node, body, x, y);
-    pal_mul33(u, patch->turn, y);
+    pal_mul33(u, region->turn, y);
     pal_sub3(u, x, u);
     const double energy = 0.5 * k * pal_dot3(u, u);
     if (f) {
         double rate[3];
-        edge_rate(patch, node, body, x, rate);
+        edge_rate(region, node, body, x, rate);
         pal_axpy3(u, t->damp_s, rate);
-        pal_axpy3(f + 3 * (size_t)node[0], patch->scale * k, u);
-        pal_axpy3(f + 3 * (size_t)node[1], -patch->scale * k, u);
+        pal_axpy3(f + 3 * (size_t)node[0], region->scale * k, u);
+        pal_axpy3(f + 3 * (size_t)node[1], -region->scale * k, u);
     }
     return energy;
 }
 
-void pal_spring_recovery_force(pal_spring_recovery *t, const pal_spring_set *row, pal_body *body)
+void pal_spring_recovery_force(pal_spring_recovery *t, const pal_spring_set *set, pal_body *body)
 {
     const uint64_t before = pal_clock_ns();
-    find_turns(t, row, body);
-    find_spins(t, row, body);
-    for (int k = 0; k < row->n_off; k++) (void)edge_energy(t, row, row->off[k], body, body->f);
+    find_turns(t, set, body);
+    find_spins(t, set, body);
+    for (int k = 0; k < set->n_off; k++) (void)edge_energy(t, set, set->off[k], body, body->f);
     body->safeguards.ns += pal_clock_ns() - before;
 }
 
-double pal_spring_recovery_energy(pal_spring_recovery *t, const pal_spring_set *row, const pal_body *body)
+double pal_spring_recovery_energy(pal_spring_recovery *t, const pal_spring_set *set, const pal_body *body)
 {
     double sum = 0;
-    find_turns(t, row, body);
-    for (int k = 0; k < row->n_off; k++)
-        sum += t->of[patch_of(t, row, row->off[k])].scale * edge_energy(t, row, row->off[k], body, NULL);
+    find_turns(t, set, body);
+    for (int k = 0; k < set->n_off; k++)
+        sum += t->of[region_of(t, set, set->off[k])].scale * edge_energy(t, set, set->off[k], body, NULL);
     return sum;
 }
 
-/* ---- looking ---- */
+/* ---- detection ---- */
 
-static double volume_ratio(const pal_spring_set *row, int i, const double *d)
+static double volume_ratio(const pal_spring_set *set, int i, const double *d)
 {
     const double *x[PAL_CORNERS];
-    pal_spring_corners(row, d, i, x);
-    return row->w[row->simd_blocks.place[i]] * pal_spring_measure(PAL_SPRING_VOLUME, x);
+    pal_spring_corners(set, d, i, x);
+    return set->w[set->simd_blocks.place[i]] * pal_spring_measure(PAL_SPRING_VOLUME, x);
 }
 
-static double spring_J(const pal_spring_set *row, int i, const pal_body *body)
+static double spring_J(const pal_spring_set *set, int i, const pal_body *body)
 {
     const double *x[PAL_CORNERS];
     pal_constraint s;
-    const int lane = row->simd_blocks.place[i];
-    pal_spring_corners(row, body->d, i, x);
-    pal_spring_constraint(row->spring.kind, x, row->w[lane], &s);
-    return 0.5 * row->all[lane] * row->spring.k_J * s.c * s.c;
+    const int lane = set->simd_blocks.place[i];
+    pal_spring_corners(set, body->d, i, x);
+    pal_spring_constraint(set->spring.kind, x, set->w[lane], &s);
+    return 0.5 * set->all[lane] * set->spring.k_J * s.c * s.c;
 }
 
 static bool loaded(const pal_body *body, int node)
@@ -221,49 +220,49 @@ static bool loaded(const pal_body *body, int node)
     return load[0] != 0 || load[1] != 0 || load[2] != 0;
 }
 
-/* energies of the patches and of their springs as such, what is turned over and what is pressed */
-static void weigh(pal_spring_recovery *t, const rows *r, const pal_body *body)
+/* energies of the regions and of their springs; which are inverted and which are loaded */
+static void weigh(pal_spring_recovery *t, const sets *r, const pal_body *body)
 {
     const pal_spring_set *edges = r->of[PAL_SPRING_DISTANCE], *tets = r->of[PAL_SPRING_VOLUME];
-    for (int p = 0; p < t->n_patch; p++) {
-        pal_spring_region *patch = &t->of[p];
-        patch->patch_J = patch->spring_J = patch->size_J = patch->kinetic_J = 0;
-        patch->bad = patch->pressed = false, patch->n = 0;
+    for (int p = 0; p < t->n_region; p++) {
+        pal_spring_region *region = &t->of[p];
+        region->region_J = region->spring_J = region->size_J = region->kinetic_J = 0;
+        region->bad = region->pressed = false, region->n = 0;
     }
     find_turns(t, edges, body);
     for (int k = 0; k < edges->n_off; k++) {
         const int i = edges->off[k];
-        pal_spring_region *patch = &t->of[patch_of(t, edges, i)];
-        patch->patch_J += patch->scale * edge_energy(t, edges, i, body, NULL);
-        patch->size_J += edges->spring.k_J * edges->all[edges->simd_blocks.place[i]];
+        pal_spring_region *region = &t->of[region_of(t, edges, i)];
+        region->region_J += region->scale * edge_energy(t, edges, i, body, NULL);
+        region->size_J += edges->spring.k_J * edges->all[edges->simd_blocks.place[i]];
     }
     for (int kind = 0; kind < 3; kind++)
         for (int k = 0; r->of[kind] && k < r->of[kind]->n_off; k++) {
             const int i = r->of[kind]->off[k];
-            t->of[patch_of(t, r->of[kind], i)].spring_J += spring_J(r->of[kind], i, body);
+            t->of[region_of(t, r->of[kind], i)].spring_J += spring_J(r->of[kind], i, body);
         }
     for (int k = 0; k < tets->n_off; k++) {
         const double ratio = volume_ratio(tets, tets->off[k], body->d);
-        t->of[patch_of(t, tets, tets->off[k])].bad |= !(ratio > least_out && ratio < most_out);
+        t->of[region_of(t, tets, tets->off[k])].bad |= !(ratio > least_out && ratio < most_out);
     }
     for (int i = 0; i < t->n_node; i++) {
-        if (t->patch[i] < 0) continue;
-        pal_spring_region *patch = &t->of[t->patch[i]];
+        if (t->region[i] < 0) continue;
+        pal_spring_region *region = &t->of[t->region[i]];
         const double *v = body->dv + 3 * (size_t)i;
-        patch->n++;
-        patch->pressed |= loaded(body, i);
-        patch->kinetic_J += 0.5 * body->mass_kg[i] * pal_dot3(v, v);
+        region->n++;
+        region->pressed |= loaded(body, i);
+        region->kinetic_J += 0.5 * body->mass_kg[i] * pal_dot3(v, v);
     }
 }
 
-static double patches(const pal_spring_recovery *t)
+static double regions(const pal_spring_recovery *t)
 {
     double sum = 0;
-    for (int p = 0; p < t->n_patch; p++) sum += t->of[p].patch_J;
+    for (int p = 0; p < t->n_region; p++) sum += t->of[p].region_J;
     return sum;
 }
 
-static double springs(const rows *r, const pal_body *body)
+static double springs(const sets *r, const pal_body *body)
 {
     double sum = 0;
     for (int kind = 0; kind < 3; kind++)
@@ -271,51 +270,51 @@ static double springs(const rows *r, const pal_body *body)
     return sum;
 }
 
-/* which patches become springs again; true: some do */
+/* chooses the regions that become springs again; true: any */
 static bool let_go(pal_spring_recovery *t, double spare_J, double little_J, double still_J, double passed_s)
 {
     bool any = false;
-    for (int p = 0; p < t->n_patch; p++) {
-        pal_spring_region *patch = &t->of[p];
-        const double rise = patch->spring_J - patch->patch_J;
-        patch->grow_s += passed_s;
-        patch->loose_s = patch->bad || !(patch->kinetic_J < still_J) ? 0 : patch->loose_s + passed_s;
-        const bool fits = rise <= spare_J && patch->spring_J <= calm_share * patch->size_J;
-        if (patch->bad || (!fits && (patch->loose_s < nearly * loose_after_s || rise > little_J))) continue;
+    for (int p = 0; p < t->n_region; p++) {
+        pal_spring_region *region = &t->of[p];
+        const double rise = region->spring_J - region->region_J;
+        region->grow_s += passed_s;
+        region->loose_s = region->bad || !(region->kinetic_J < still_J) ? 0 : region->loose_s + passed_s;
+        const bool fits = rise <= spare_J && region->spring_J <= calm_share * region->size_J;
+        if (region->bad || (!fits && (region->loose_s < nearly * loose_after_s || rise > little_J))) continue;
         spare_J -= rise;
-        patch->n = 0;
+        region->n = 0;
         any = true;
     }
     for (int i = 0; i < t->n_node && any; i++)
-        if (t->patch[i] >= 0 && t->of[t->patch[i]].n == 0) t->patch[i] = -1;
+        if (t->region[i] >= 0 && t->of[t->region[i]].n == 0) t->region[i] = -1;
     return any;
 }
 
 enum { NOT = -1, NEW = -2 };
 
-/* roots of all nodes that are in patches, as edges join them: the least node of each */
+/* connected components by edges of the nodes in regions; the root is the smallest node */
 static void join(pal_spring_recovery *t, const pal_spring_set *edges)
 {
     pal_union_find_init(t->root, t->n_node);
     for (int i = 0; i < edges->n_item; i++) {
         const int32_t *node = corners(edges, i);
-        if (t->patch[node[0]] != NOT && t->patch[node[1]] != NOT) pal_union_find_join(t->root, node[0], node[1]);
+        if (t->region[node[0]] != NOT && t->region[node[1]] != NOT) pal_union_find_join(t->root, node[0], node[1]);
     }
 }
 
-/* nothing new while anything presses or pulls the body: patches are softer than springs, so that a load would draw them
- * out, and a tool that turns tetrahedra over goes on to feel springs. True: what is new stays in */
+/* no new region while a load acts: regions are softer than springs, so that a load would draw them out, and a tool that
+ * inverts tetrahedra must feel springs. True: new nodes stay in */
 static bool leave_pressed(pal_spring_recovery *t, const pal_body *body)
 {
     bool pressed = false;
     for (int i = 0; i < t->n_node && !pressed; i++) pressed = loaded(body, i);
     for (int i = 0; i < t->n_node && pressed; i++)
-        if (t->patch[i] == NEW) t->patch[i] = NOT;
+        if (t->region[i] == NEW) t->region[i] = NOT;
     return !pressed;
 }
 
-/* nodes of what is turned over join, and those beside patches that do not come loose; true: some do */
-static bool take_in(pal_spring_recovery *t, const rows *r, const pal_body *body)
+/* nodes of inverted tetrahedra enter, and those beside regions that do not recover; true: any */
+static bool take_in(pal_spring_recovery *t, const sets *r, const pal_body *body)
 {
     const pal_spring_set *edges = r->of[PAL_SPRING_DISTANCE], *tets = r->of[PAL_SPRING_VOLUME];
     bool any = false, grows = false;
@@ -323,57 +322,56 @@ static bool take_in(pal_spring_recovery *t, const rows *r, const pal_body *body)
         const double ratio = volume_ratio(tets, i, body->d);
         if (!(ratio < least_in || ratio > most_in)) continue;
         for (int c = 0; c < 4; c++) {
-            int32_t *to = &t->patch[corners(tets, i)[c]];
+            int32_t *to = &t->region[corners(tets, i)[c]];
             any |= *to == NOT;
             if (*to == NOT) *to = NEW;
         }
     }
-    for (int p = 0; p < t->n_patch; p++) {
-        pal_spring_region *patch = &t->of[p];
-        const bool due = patch->grow_s >= nearly * grow_every_s;
-        if (due) patch->grow_s = fmax(0, fmin(patch->grow_s - grow_every_s, grow_every_s));
-        patch->bad = due && patch->n > 0 && patch->bad && !patch->pressed;
-        grows |= patch->bad;
+    for (int p = 0; p < t->n_region; p++) {
+        pal_spring_region *region = &t->of[p];
+        const bool due = region->grow_s >= nearly * grow_every_s;
+        if (due) region->grow_s = fmax(0, fmin(region->grow_s - grow_every_s, grow_every_s));
+        region->bad = due && region->n > 0 && region->bad && !region->pressed;
+        grows |= region->bad;
     }
     for (int i = 0; i < edges->n_item && grows; i++)
         for (int c = 0; c < 2; c++) {
             const int32_t *node = corners(edges, i);
-            if (t->patch[node[c]] < 0 || !t->of[t->patch[node[c]]].bad || t->patch[node[1 - c]] != NOT) continue;
-            t->patch[node[1 - c]] = NEW;
+            if (t->region[node[c]] < 0 || !t->of[t->region[node[c]]].bad || t->region[node[1 - c]] != NOT) continue;
+            t->region[node[1 - c]] = NEW;
             any = true;
         }
     return any && leave_pressed(t, body);
 }
 
-/* patches anew of all nodes that are in one, connected by edges. What has changed elsewhere sets back neither the
- * times nor s of those that stay as they are */
+/* numbers the connected regions. A region that has not changed keeps its clocks and s */
 static void number(pal_spring_recovery *t, const pal_spring_set *edges)
 {
     pal_spring_region old[PAL_SPRING_REGIONS_MAX];
-    int home[PAL_SPRING_REGIONS_MAX]; /* the old patch of all of its nodes; NOT: they are of several, or new */
-    memcpy(old, t->of, sizeof *old * (size_t)t->n_patch);
+    int home[PAL_SPRING_REGIONS_MAX]; /* the old region of all of its nodes; NOT: they are of several, or new */
+    memcpy(old, t->of, sizeof *old * (size_t)t->n_region);
     join(t, edges);
-    t->n_patch = 0;
+    t->n_region = 0;
     for (int i = 0; i < t->n_node; i++) {
-        const int was = t->patch[i];
+        const int was = t->region[i];
         if (was == NOT) continue;
         const int root = pal_union_find_root(t->root, i);
         if (root != i)
-            t->patch[i] = t->patch[root];
+            t->region[i] = t->region[root];
         else {
-            if (t->n_patch < PAL_SPRING_REGIONS_MAX)
-                home[t->n_patch] = was,
-                t->of[t->n_patch++] =
+            if (t->n_region < PAL_SPRING_REGIONS_MAX)
+                home[t->n_region] = was,
+                t->of[t->n_region++] =
                     (pal_spring_region){.turn = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .scale = 1, .loose_s = INFINITY};
-            t->patch[i] = t->n_patch - 1;
+            t->region[i] = t->n_region - 1;
         }
-        pal_spring_region *patch = &t->of[t->patch[i]];
-        patch->n++;
-        if (home[t->patch[i]] != was) home[t->patch[i]] = NOT;
-        patch->grow_s = fmax(patch->grow_s, was >= 0 ? old[was].grow_s : 0);
-        patch->loose_s = fmin(patch->loose_s, was >= 0 ? old[was].loose_s : 0);
+        pal_spring_region *region = &t->of[t->region[i]];
+        region->n++;
+        if (home[t->region[i]] != was) home[t->region[i]] = NOT;
+        region->grow_s = fmax(region->grow_s, was >= 0 ? old[was].grow_s : 0);
+        region->loose_s = fmin(region->loose_s, was >= 0 ? old[was].loose_s : 0);
     }
-    for (int p = 0; p < t->n_patch; p++) {
+    for (int p = 0; p < t->n_region; p++) {
         t->of[p].stays = home[p] >= 0 && old[home[p]].n == t->of[p].n;
         if (t->of[p].stays) t->of[p].scale = old[home[p]].scale;
     }
@@ -387,34 +385,34 @@ static double edge_time_s(pal_spring_recovery *t, const pal_spring_set *edges, c
     for (int i = 0; i < edges->n_item; i++)
         for (int c = 0; c < 2; c++) sum[corners(edges, i)[c]] += 2 * edge_N_m(edges, i);
     for (int i = 0; i < t->n_node; i++)
-        if (!body->fixed[i] && sum[i] > 0 && body->mass_kg[i] < least * sum[i]) least = body->mass_kg[i] / sum[i];
+        if (!body->support[i] && sum[i] > 0 && body->mass_kg[i] < least * sum[i]) least = body->mass_kg[i] / sum[i];
     return isfinite(least) ? sqrt(least) : 0;
 }
 
-/* springs at the nodes of patches off, all others on */
-static void switch_rows(const pal_spring_recovery *t, rows *r)
+/* switches the springs at nodes of regions off, all others on */
+static void switch_sets(const pal_spring_recovery *t, sets *r)
 {
     for (int kind = 0; kind < 3; kind++) {
-        pal_spring_set *row = r->of[kind];
-        if (!row) continue;
-        row->n_off = 0, row->fresh = false;
-        for (int i = 0; i < row->n_item; i++) {
-            const int lane = row->simd_blocks.place[i];
-            const bool off = patch_of(t, row, i) >= 0;
-            row->q[lane] = off ? 0 : row->all[lane];
-            if (off) row->off[row->n_off++] = i;
+        pal_spring_set *set = r->of[kind];
+        if (!set) continue;
+        set->n_off = 0, set->fresh = false;
+        for (int i = 0; i < set->n_item; i++) {
+            const int lane = set->simd_blocks.place[i];
+            const bool off = region_of(t, set, i) >= 0;
+            set->q[lane] = off ? 0 : set->all[lane];
+            if (off) set->off[set->n_off++] = i;
         }
     }
 }
 
-/* G held or not, and s of patches that are others than before such that there is no more energy than before_J */
-static void begin(pal_spring_recovery *t, const rows *r, const pal_body *body, double before_J)
+/* chooses G of each region, and s of changed ones such that there is no more energy than before_J */
+static void begin(pal_spring_recovery *t, const sets *r, const pal_body *body, double before_J)
 {
     double fixed[9];
     int n_free = 0;
     const bool led = pal_support_rotation(body, fixed);
-    for (int i = 0; i < t->n_node; i++) n_free += !body->fixed[i];
-    for (int p = 0; p < t->n_patch; p++) {
+    for (int i = 0; i < t->n_node; i++) n_free += !body->support[i];
+    for (int p = 0; p < t->n_region; p++) {
         t->of[p].fixed = led && 2 * t->of[p].n > n_free;
         if (t->of[p].fixed) memcpy(t->of[p].turn, fixed, sizeof fixed);
     }
@@ -422,22 +420,22 @@ static void begin(pal_spring_recovery *t, const rows *r, const pal_body *body, d
     t->damp_s = damp_share * edge_time_s(t, r->of[PAL_SPRING_DISTANCE], body);
     weigh(t, r, body);
     double new_J = 0, left_J = before_J - springs(r, body), scale = 1;
-    for (int p = 0; p < t->n_patch; p++)
-        *(t->of[p].stays ? &left_J : &new_J) += (t->of[p].stays ? -1 : 1) * t->of[p].patch_J;
+    for (int p = 0; p < t->n_region; p++)
+        *(t->of[p].stays ? &left_J : &new_J) += (t->of[p].stays ? -1 : 1) * t->of[p].region_J;
     if (new_J > left_J) scale = left_J > least_scale * new_J ? left_J / new_J : least_scale;
-    for (int p = 0; p < t->n_patch; p++) {
+    for (int p = 0; p < t->n_region; p++) {
         if (t->of[p].stays) continue;
         t->of[p].scale = scale;
-        t->of[p].patch_J *= scale;
+        t->of[p].region_J *= scale;
     }
 }
 
-/* supports may turn or be taken off, and constants may be others than when patches began */
+/* supports may have moved or gone, and constants may have changed since regions began */
 static void keep_up(pal_spring_recovery *t, const pal_spring_set *edges, const pal_body *body)
 {
     double fixed[9];
     const bool led = pal_support_rotation(body, fixed);
-    for (int p = 0; p < t->n_patch; p++) {
+    for (int p = 0; p < t->n_region; p++) {
         t->of[p].fixed = t->of[p].fixed && led;
         if (t->of[p].fixed) memcpy(t->of[p].turn, fixed, sizeof fixed);
     }
@@ -447,54 +445,54 @@ static void keep_up(pal_spring_recovery *t, const pal_spring_set *edges, const p
     t->damp_s = damp_share * edge_time_s(t, edges, body);
 }
 
-/* what is in patches has changed; before_J: of the springs and the patches that were */
-static void change(pal_spring_recovery *t, rows *r, const pal_body *body, double before_J)
+/* the regions have changed; before_J: energy of springs and regions before */
+static void change(pal_spring_recovery *t, sets *r, const pal_body *body, double before_J)
 {
     number(t, r->of[PAL_SPRING_DISTANCE]);
-    switch_rows(t, r);
-    if (t->n_patch > 0) begin(t, r, body, before_J);
+    switch_sets(t, r);
+    if (t->n_region > 0) begin(t, r, body, before_J);
 }
 
-/* what solvers are told; stale: rows were, too */
+/* the answer of `recover` */
 static unsigned seen(const pal_spring_recovery *t, bool changed)
 {
-    return (t->n_patch > 0 ? PAL_INVERTED : 0) | (changed ? PAL_INVERSION_CHANGED : 0);
+    return (t->n_region > 0 ? PAL_INVERTED : 0) | (changed ? PAL_INVERSION_CHANGED : 0);
 }
 
 unsigned pal_spring_recovery_update(pal_spring_recovery *t, pal_step *step)
 {
     pal_body *body = step->body;
-    rows r = find_rows(step);
+    sets r = find_sets(step);
     if (!r.of[PAL_SPRING_DISTANCE] || !r.of[PAL_SPRING_VOLUME]) pal_spring_recovery_reset(t);
     for (int kind = 0; kind < 3; kind++) t->stale |= r.of[kind] && r.of[kind]->fresh;
     const bool stale = t->stale;
-    if (stale) switch_rows(t, &r);
+    if (stale) switch_sets(t, &r);
     t->stale = false;
-    /* asked for the limit at rest, and of a state that is no number, it says nothing */
+    /* at rest, and for a state that is not finite, nothing is examined */
     if (!r.of[PAL_SPRING_DISTANCE] || !r.of[PAL_SPRING_VOLUME] || body->d == body->x_rest) return seen(t, stale);
     double ratio[2] = {1, 1};
-    if (t->n_patch == 0) pal_spring_volume_range(r.of[PAL_SPRING_VOLUME], body->node_order, body->d, ratio);
-    if (t->n_patch == 0 && !(ratio[0] < least_in || ratio[1] > most_in)) return seen(t, stale);
+    if (t->n_region == 0) pal_spring_volume_range(r.of[PAL_SPRING_VOLUME], body->node_order, body->d, ratio);
+    if (t->n_region == 0 && !(ratio[0] < least_in || ratio[1] > most_in)) return seen(t, stale);
     if (!pal_body_finite(body)) return seen(t, stale);
     const uint64_t began = pal_clock_ns();
-    const bool first = t->n_patch == 0;
+    const bool first = t->n_region == 0;
     bool changed = false;
     double before_J = 0;
     if (!first) {
         keep_up(t, r.of[PAL_SPRING_DISTANCE], body);
         weigh(t, &r, body);
         const double kinetic_J = pal_body_kinetic_J(body);
-        before_J = springs(&r, body) + patches(t);
-        changed = let_go(t, t->first_J - kinetic_J - before_J, little_share * before_J, still_share * patches(t),
+        before_J = springs(&r, body) + regions(t);
+        changed = let_go(t, t->first_J - kinetic_J - before_J, little_share * before_J, still_share * regions(t),
                          fmax(0, step->time_s - t->seen_s));
     }
     t->seen_s = step->time_s;
     changed |= take_in(t, &r, body);
     if (first && changed) before_J = springs(&r, body);
     if (changed) change(t, &r, body, before_J);
-    if (first && changed) t->first_J = pal_body_kinetic_J(body) + springs(&r, body) + patches(t);
+    if (first && changed) t->first_J = pal_body_kinetic_J(body) + springs(&r, body) + regions(t);
     body->safeguards.n_split += changed;
-    body->safeguards.n_inversion += changed || t->n_patch > 0;
+    body->safeguards.n_inversion += changed || t->n_region > 0;
     body->safeguards.ns += pal_clock_ns() - began;
     return seen(t, changed || stale);
 }

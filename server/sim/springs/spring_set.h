@@ -1,32 +1,31 @@
-/* What the three spring rows have in common: constraints between 2, 3 or 4 nodes, each with a rest measure w and a
- * weight q, E = q k/2 C^2 (spring_law.h). The constraint stands in spring_constraint.h, plain, one at a time; an effect
- * gives it as a `kernel`, 8 lanes at a time. The loops below are inlined with them. Thread: [load] to make, then [sim].
- */
+/* A set of springs of one kind: constraints between 2, 3 or 4 nodes, each with an inverse rest measure w and a weight
+ * q, energy E = q k/2 C^2 (spring_law.h). spring_constraint.h has the constraint for one spring; an effect gives it as
+ * a kernel for 8 springs, which the loops below inline. Thread: [load] to make, then [sim]. */
 #ifndef PAL_SIM_SPRINGS_SPRING_SET_H
 #define PAL_SIM_SPRINGS_SPRING_SET_H
 #include "server/sim/core/simd.h"
 #include "server/sim/springs/spring_constraint.h"
 
-/* 8 springs with constants k q: p [n_corner][3] where the corners' coordinates stand, 8 lanes each; f [n_corner - 1][3]
- * forces on corners 1, 2, 3, the first gets minus their sum; least may be lowered to anything the effect wants to know
- * the least of */
+/* 8 springs with constants k q: p [n_corner][3] points to the coordinates of the corners, 8 lanes each; f [n_corner -
+ * 1][3] receives the forces on corners 1, 2, 3 (corner 0 gets minus their sum); the kernel may lower `least` to the
+ * minimum of a quantity of its own */
 typedef void (*pal_spring_kernel)(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *least);
 
-/* Gershgorin row sums of 8 springs, one per corner: k q |g_a| sum |g_b|, and with `bend` what the second derivative of
- * C adds where it stiffens */
+/* Gershgorin row sums of 8 springs at each corner: k q |g_a| sum |g_b|, and with `bend` those of the second derivative
+ * of C where it stiffens */
 typedef void (*pal_bound_kernel)(const double *p[][3], pal_v8 w, pal_v8 kq, bool bend, pal_v8 bound[]);
 
 typedef struct pal_spring_set {
     pal_spring spring;
     int n_item, n_corner;
-    int32_t *item; /* nodes                      [n_item][n_corner] */
+    int32_t *item; /* nodes                                          [n_item][n_corner] */
     pal_simd_blocks simd_blocks;
-    double *w, *q; /* by lane; 0: no constraint  [strips.n_lane]    */
-    /* with regions of other materials q = part[0] + part[1]/E + part[2]/factor + part[3]/(E factor) of the body's E and
-     * factor, and what it would be without them; NULL: there are none [strips.n_lane] */
+    double *w, *q; /* by lane; 0: no spring                          [n_lane]           */
+    /* with regions of other materials, q = part[0] + part[1]/E + part[2]/factor + part[3]/(E factor) of the body's E
+     * and factor; whole is q without regions; NULL: no regions [n_lane] */
     double *part[4], *whole;
-    /* q as it is where nothing is turned over, and the springs that are off since something is (spring_recovery.h);
-     * NULL: the body never untangles [n_lane], [n_item] */
+    /* q where nothing is inverted, and the springs that recovery has switched off (spring_recovery.h); NULL: the body
+     * has no recovery [n_lane], [n_item] */
     double *all;
     int32_t *off;
     int n_off;
@@ -35,69 +34,69 @@ typedef struct pal_spring_set {
 
 /* REFUSED: the body is not made of tetrahedra */
 pal_err pal_spring_set_check(const pal_config_entry *entry, const pal_build *build);
-/* reads the row's keys (pal_spring_read), takes what is useful of item [n_item][corners of the kind] (kept: measure >
- * least; its corners reordered), with w = 1 / measure */
+/* Reads the keys (pal_spring_read) and keeps the springs of item [n_item][corners of the kind] with a measure above
+ * `least`, w = 1 / measure; item is reordered */
 pal_err pal_spring_set_make(pal_spring_kind kind, pal_config_entry *entry, pal_build *build, int32_t *item, int n_item,
                             double least, pal_spring_set *out);
-/* least and most of the volumes of a row of these over those at rest, and 1, whatever springs are off; d [n_node][3] */
-void pal_spring_volume_range(const pal_spring_set *row, pal_node_order *node_order, const double *d, double out[2]);
-/* Young's modulus that a row of edges stands for, Pa: of a material whose derived constants (spring_law.h) have the
- * same sum of stiffness over all edges, sum k q/l0^2 = 6 f_d E V/h^2; of derived ones without regions the material's */
-double pal_spring_young_Pa(const pal_spring_set *row, const pal_body *body, double poisson);
+/* smallest and largest of 1 and the ratios of volume to volume at rest, whichever springs are off; d [n_node][3] */
+void pal_spring_volume_range(const pal_spring_set *set, pal_node_order *node_order, const double *d, double out[2]);
+/* Young's modulus, Pa, for which a set of edges stands: that of a material whose derived constants have the same sum of
+ * stiffness over all edges, sum k q/l0^2 = 6 f_d E V/h^2 */
+double pal_spring_young_Pa(const pal_spring_set *set, const pal_body *body, double poisson);
 /* a live edit: k_J, and with regions q too */
 pal_err pal_spring_set_material(void *self, const pal_body *body, const pal_material *material, pal_diagnostic *diag);
 
-PAL_INLINE void pal_spring_corners(const pal_spring_set *row, const double *x, int i, const double *to[PAL_CORNERS])
+PAL_INLINE void pal_spring_corners(const pal_spring_set *set, const double *x, int i, const double *to[PAL_CORNERS])
 {
-    for (int c = 0; c < PAL_CORNERS; c++) to[c] = x + 3 * row->item[row->n_corner * i + (c < row->n_corner ? c : 0)];
+    for (int c = 0; c < PAL_CORNERS; c++) to[c] = x + 3 * set->item[set->n_corner * i + (c < set->n_corner ? c : 0)];
 }
 
-PAL_INLINE double pal_spring_energy(const pal_spring_set *row, const pal_body *body, pal_spring_kind kind)
+PAL_INLINE double pal_spring_energy(const pal_spring_set *set, const pal_body *body, pal_spring_kind kind)
 {
     double sum = 0;
-    for (int i = 0; i < row->n_item; i++) {
+    for (int i = 0; i < set->n_item; i++) {
         const double *x[PAL_CORNERS];
         pal_constraint s;
-        int lane = row->simd_blocks.place[i];
-        pal_spring_corners(row, body->d, i, x);
-        pal_spring_constraint(kind, x, row->w[lane], &s);
-        sum += 0.5 * row->q[lane] * row->spring.k_J * s.c * s.c;
+        int lane = set->simd_blocks.place[i];
+        pal_spring_corners(set, body->d, i, x);
+        pal_spring_constraint(kind, x, set->w[lane], &s);
+        sum += 0.5 * set->q[lane] * set->spring.k_J * s.c * s.c;
     }
     return sum;
 }
 
 /* f -= c q (sum of g.v) g */
-PAL_INLINE void pal_spring_damp(const pal_spring_set *row, const pal_body *body, pal_spring_kind kind)
+PAL_INLINE void pal_spring_damp(const pal_spring_set *set, const pal_body *body, pal_spring_kind kind)
 {
     const int n_corner = pal_spring_corner_count(kind);
-    for (int i = 0; i < row->n_item; i++) {
+    for (int i = 0; i < set->n_item; i++) {
         const double *x[PAL_CORNERS];
         pal_constraint s;
-        int lane = row->simd_blocks.place[i];
-        const int32_t *node = row->item + n_corner * i;
-        pal_spring_corners(row, body->d, i, x);
-        pal_spring_constraint(kind, x, row->w[lane], &s);
+        int lane = set->simd_blocks.place[i];
+        const int32_t *node = set->item + n_corner * i;
+        pal_spring_corners(set, body->d, i, x);
+        pal_spring_constraint(kind, x, set->w[lane], &s);
         double rate = 0;
         for (int c = 0; c < n_corner; c++) rate += pal_dot3(s.g[c], body->dv + 3 * node[c]);
         for (int c = 0; c < n_corner; c++)
-            pal_axpy3(body->f + 3 * node[c], -row->spring.c_Js * row->q[lane] * rate, s.g[c]);
+            pal_axpy3(body->f + 3 * node[c], -set->spring.c_Js * set->q[lane] * rate, s.g[c]);
     }
 }
 
-/* all springs, strips first; returns the least value the kernel told of, at most 1 */
-PAL_INLINE double pal_spring_run(const pal_spring_set *row, pal_node_order *node_order, pal_spring_kernel kernel,
+/* forces of all springs, strips first; returns the minimum that the kernel reports, at most 1 */
+PAL_INLINE double pal_spring_run(const pal_spring_set *set, pal_node_order *node_order, pal_spring_kernel kernel,
                                  int n_corner)
 {
-    const int n_strip = row->simd_blocks.n_strip;
-    const double k = row->spring.k_J;
+    const int n_strip = set->simd_blocks.n_strip;
+    const double k = set->spring.k_J;
     double *const fx = node_order->f, *const fy = fx + node_order->n_slot, *const fz = fy + node_order->n_slot;
     const double *const x = node_order->x, *const y = x + node_order->n_slot, *const z = y + node_order->n_slot;
     pal_v8 f[PAL_CORNERS - 1][3], least = {1, 1, 1, 1, 1, 1, 1, 1};
     const double *p[PAL_CORNERS][3];
     for (int b = 0; b < n_strip; b++) {
-        const int32_t *base = row->simd_blocks.base + n_corner * b;
+        const int32_t *base = set->simd_blocks.base + n_corner * b;
         for (int c = 0; c < n_corner; c++) p[c][0] = x + base[c], p[c][1] = y + base[c], p[c][2] = z + base[c];
-        kernel(p, pal_load8(row->w + PAL_LANES * b), k * pal_load8(row->q + PAL_LANES * b), f, &least);
+        kernel(p, pal_load8(set->w + PAL_LANES * b), k * pal_load8(set->q + PAL_LANES * b), f, &least);
         pal_v8 sum[3] = {f[0][0], f[0][1], f[0][2]};
         for (int c = 2; c < n_corner; c++)
             for (int d = 0; d < 3; d++) sum[d] += f[c - 1][d];
@@ -108,14 +107,14 @@ PAL_INLINE double pal_spring_run(const pal_spring_set *row, pal_node_order *node
             pal_add8(fz + base[c], f[c - 1][2]);
         }
     }
-    for (int b = 0; b < row->simd_blocks.n_unsupported; b++) {
-        const int32_t *node = row->simd_blocks.node + n_corner * PAL_LANES * b;
+    for (int b = 0; b < set->simd_blocks.n_loose; b++) {
+        const int32_t *node = set->simd_blocks.node + n_corner * PAL_LANES * b;
         double at[PAL_CORNERS][3][PAL_LANES];
         pal_loose_load(node_order, node, n_corner, at);
         for (int c = 0; c < n_corner; c++)
             for (int d = 0; d < 3; d++) p[c][d] = at[c][d];
         int lane = PAL_LANES * (n_strip + b);
-        kernel(p, pal_load8(row->w + lane), k * pal_load8(row->q + lane), f, &least);
+        kernel(p, pal_load8(set->w + lane), k * pal_load8(set->q + lane), f, &least);
         pal_loose_add(node_order, node, n_corner, f);
     }
     for (int l = 1; l < PAL_LANES; l++) least[0] = least[l] < least[0] ? least[l] : least[0];
@@ -123,22 +122,22 @@ PAL_INLINE double pal_spring_run(const pal_spring_set *row, pal_node_order *node
 }
 
 /* bound [n_node] += the row sums at positions x [n_node][3] */
-PAL_INLINE void pal_spring_bound(const pal_spring_set *row, pal_node_order *node_order, const double *at,
+PAL_INLINE void pal_spring_bound(const pal_spring_set *set, pal_node_order *node_order, const double *at,
                                  pal_bound_kernel kernel, int n_corner, double k, bool bend, double *bound)
 {
-    const int n_strip = row->simd_blocks.n_strip, n_slot = node_order->n_slot;
+    const int n_strip = set->simd_blocks.n_strip, n_slot = node_order->n_slot;
     const double *p[PAL_CORNERS][3];
     pal_v8 b8[PAL_CORNERS];
     pal_node_order_load(node_order, at);
-    for (int b = 0; b < n_strip + row->simd_blocks.n_unsupported; b++) {
+    for (int b = 0; b < n_strip + set->simd_blocks.n_loose; b++) {
         bool loose = b >= n_strip;
-        const int32_t *base = row->simd_blocks.base + n_corner * b;
-        const int32_t *node = row->simd_blocks.node + n_corner * PAL_LANES * (b - n_strip);
+        const int32_t *base = set->simd_blocks.base + n_corner * b;
+        const int32_t *node = set->simd_blocks.node + n_corner * PAL_LANES * (b - n_strip);
         double x[PAL_CORNERS][3][PAL_LANES];
         if (loose) pal_loose_load(node_order, node, n_corner, x);
         for (int c = 0; c < n_corner; c++)
             for (int d = 0; d < 3; d++) p[c][d] = loose ? x[c][d] : node_order->x + d * n_slot + base[c];
-        kernel(p, pal_load8(row->w + PAL_LANES * b), k * pal_load8(row->q + PAL_LANES * b), bend, b8);
+        kernel(p, pal_load8(set->w + PAL_LANES * b), k * pal_load8(set->q + PAL_LANES * b), bend, b8);
         for (int c = 0; c < n_corner; c++) {
             if (!loose) pal_add8(node_order->f + base[c], b8[c]);
             for (int l = 0; l < PAL_LANES && loose; l++) node_order->f[node[c * PAL_LANES + l]] += b8[c][l];

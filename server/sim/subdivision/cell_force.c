@@ -66,7 +66,7 @@ PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_
     const int n_live = cell_live(group, block, lane);
     const int32_t *node = group->node + (size_t)block * (size_t)n_node * PAL_LANES + lane;
     pal_wide y[3][PAL_CELL_MAX_NODES], u[3][PAL_CELL_MAX_NODES], r[9], s[9], energy = {0};
-    if (n_live == 0 || (!(what & LINEARISE) && cell_away(c, group, block, lane, n_live))) return 0;
+    if (n_live == 0 || (!(what & LINEARISE) && cell_recovering(c, group, block, lane, n_live))) return 0;
     cell_gather(node, n_node, d, y);
     cell_rotation(group, block, lane, y, n_node, r, s);
     if (what & LINEARISE)
@@ -86,7 +86,7 @@ PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_
     cell_stiffness(&c->line, group, block, lane, n_node, u, what & ENERGY ? &energy : NULL);
     if (apart) add_swelling(swell, n_node, push, u);
     if (what & ENERGY) pal_wide_store(group->energy_J + block * PAL_LANES + lane, energy);
-    if (c->recovery.n_away > 0) {
+    if (c->recovery.n_recovering > 0) {
         const pal_wide here = pal_wide_load(group->here + block * PAL_LANES + lane);
         energy *= here;
         for (int m = 0; m < n_node; m++) u[0][m] *= here, u[1][m] *= here, u[2][m] *= here;
@@ -125,7 +125,7 @@ static void swell_all(pal_cells_elastic *c, const double *d)
 void pal_cells_elastic_force(pal_cells_elastic *c, const double *d, double *f)
 {
     swell_all(c, d);
-    if (c->recovery.n_away > 0) (void)pal_cell_recovery_force(&c->recovery, c->solid, d, f);
+    if (c->recovery.n_recovering > 0) (void)pal_cell_recovery_force(&c->recovery, c->solid, d, f);
     if (c->op == PAL_CELL_EDGES) {
         pal_cells_edges_force(c, d, f);
         return;
@@ -144,10 +144,10 @@ PAL_INLINE double all_kinds(pal_cells_elastic *c, int what, const double *d, dou
 double pal_cells_elastic_energy(pal_cells_elastic *c, const double *d, double *f)
 {
     swell_all(c, d);
-    double patches =
-        c->recovery.n_away > 0 && !c->recovery.weighs ? pal_cell_recovery_force(&c->recovery, c->solid, d, f) : 0;
-    if (c->op == PAL_CELL_EDGES) return patches + pal_cells_edges_energy(c, d);
-    return patches + (f ? all_kinds(c, FORCE | ENERGY, d, f) : all_kinds(c, ENERGY, d, NULL));
+    double regions =
+        c->recovery.n_recovering > 0 && !c->recovery.weighs ? pal_cell_recovery_force(&c->recovery, c->solid, d, f) : 0;
+    if (c->op == PAL_CELL_EDGES) return regions + pal_cells_edges_energy(c, d);
+    return regions + (f ? all_kinds(c, FORCE | ENERGY, d, f) : all_kinds(c, ENERGY, d, NULL));
 }
 
 void pal_cells_elastic_linearise(pal_cells_elastic *c, const double *d)
@@ -167,7 +167,7 @@ PAL_INLINE void multiply_all(const pal_cells_elastic *c, pal_cell_kind kind, int
             const int n_live = cell_live(group, b, l);
             const int32_t *node = group->node + (size_t)b * (size_t)n_node * PAL_LANES + l;
             pal_wide u[3][PAL_CELL_MAX_NODES], r[9];
-            if (n_live == 0 || (!c->recovery.off && cell_away(c, group, b, l, n_live))) continue;
+            if (n_live == 0 || (!c->recovery.off && cell_recovering(c, group, b, l, n_live))) continue;
             cell_gather(node, n_node, p, u);
             cell_load(group->turn + (size_t)b * 9 * PAL_LANES + l, 9, r);
             cell_unturn(r, n_node, u, u);
@@ -175,7 +175,7 @@ PAL_INLINE void multiply_all(const pal_cells_elastic *c, pal_cell_kind kind, int
             if (c->volume.n > 0)
                 add_swelling(swell_at(group, n_node, b, l), n_node, give_swelling(c, group->home + b * PAL_LANES + l),
                              u);
-            const pal_wide by = c->recovery.n_away > 0 && !c->recovery.off
+            const pal_wide by = c->recovery.n_recovering > 0 && !c->recovery.off
                                     ? k * pal_wide_load(group->here + b * PAL_LANES + l)
                                     : k + zero;
             for (int i = 0; i < 9; i++) r[i] *= by;
@@ -191,7 +191,7 @@ PAL_INLINE void swell_kind(const pal_cells_elastic *c, pal_cell_kind kind, int n
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             const int n_live = cell_live(group, b, l);
             pal_wide u[3][PAL_CELL_MAX_NODES], r[9];
-            if (n_live == 0 || (!c->recovery.off && cell_away(c, group, b, l, n_live))) continue;
+            if (n_live == 0 || (!c->recovery.off && cell_recovering(c, group, b, l, n_live))) continue;
             cell_gather(group->node + (size_t)b * (size_t)n_node * PAL_LANES + l, n_node, p, u);
             cell_load(group->turn + (size_t)b * 9 * PAL_LANES + l, 9, r);
             cell_unturn(r, n_node, u, u);
@@ -217,7 +217,7 @@ void pal_cells_elastic_multiply(const pal_cells_elastic *c, double k, const doub
     multiply_all(c, PAL_CELL_CUBIC, 64, k, p, out);
     multiply_all(c, PAL_CELL_HEX, 8, k, p, out);
     multiply_all(c, PAL_CELL_PYRAMID, 5, k, p, out);
-    if (c->recovery.n_away > 0 && !c->recovery.off) pal_cell_recovery_multiply(&c->recovery, c->solid, k, p, out);
+    if (c->recovery.n_recovering > 0 && !c->recovery.off) pal_cell_recovery_multiply(&c->recovery, c->solid, k, p, out);
 }
 
 void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *turn)
@@ -230,8 +230,8 @@ void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *turn)
             const int b = e / PAL_LANES, l = e % PAL_LANES;
             const int32_t *node = group->node + (size_t)b * (size_t)group->n_node * PAL_LANES + l;
             for (int i = 0; i < 9; i++) r[i] = group->turn[((size_t)b * 9 + i) * PAL_LANES + l];
-            const int patch = c->recovery.patch[c->recovery.first[kind] + e];
-            if (patch >= 0 && !c->recovery.off) memcpy(r, c->recovery.of[patch].turn, sizeof r);
+            const int region = c->recovery.region[c->recovery.first[kind] + e];
+            if (region >= 0 && !c->recovery.off) memcpy(r, c->recovery.of[region].turn, sizeof r);
             for (int m = 0; m < group->n_node; m++) {
                 double share = n[m] * c->recovery.shear_J[c->recovery.first[kind] + e];
                 for (int i = 0; i < 9; i++) turn[9 * (size_t)node[m * PAL_LANES] + i] += share * r[i];

@@ -196,13 +196,13 @@ PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_
     const int32_t *node = group->node + (size_t)block * (size_t)n_node * PAL_LANES + lane;
     const double *rest = group->rest + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane;
     pal_wide y[3][PAL_CELL_MAX_NODES], u[3][PAL_CELL_MAX_NODES], r[9], s[9], energy = {0};
-    if (n_live == 0 || cell_away(c, group, block, lane, n_live)) return 0;
+    if (n_live == 0 || cell_recovering(c, group, block, lane, n_live)) return 0;
     cell_gather(node, n_node, d, y);
     cell_rotation(group, block, lane, y, n_node, r, s);
     displaced(rest, n_node, r, y, u);
     cell_stiffness(&c->line, group, block, lane, n_node, u, f ? NULL : &energy);
     if (!f) pal_wide_store(group->energy_J + block * PAL_LANES + lane, energy);
-    if (c->recovery.n_away > 0) {
+    if (c->recovery.n_recovering > 0) {
         const pal_wide here = pal_wide_load(group->here + block * PAL_LANES + lane);
         energy *= here;
         for (int m = 0; m < n_node; m++) u[0][m] *= here, u[1][m] *= here, u[2][m] *= here;

@@ -9,17 +9,17 @@
 #include <math.h>
 #include <string.h>
 
-/* volume over that at rest: from where on an element is turned over or blown up, and until when it stays in a patch */
+/* volume over that at rest: from where on an element is turned over or blown up, and until when it stays in a region */
 static const double least_in = 0.05, least_out = 0.3, most_in = 30, most_out = 20;
-/* of s, so that a patch never is too soft to move */
+/* of s, so that a region never is too soft to move */
 static const double least_scale = 0.02;
-/* kinetic energy of a body that stands still, of what its patches store */
+/* kinetic energy of a body that stands still, of what its regions store */
 static const double still_share = 1e-3;
 /* of mu V: elements that store more would fly apart when they take over; operator edges, whose forces have no energy,
  * feeds what moves more than a little */
 static const double calm_share[] = {[PAL_CELL_POLAR] = 0.1, [PAL_CELL_EDGES] = 1e-3};
 enum { LOOSE_LOOKS = 120, GROW_LOOKS = 30, FIRM_LOOKS = 4, EDGES_MOST = 12 };
-/* s of a patch under a lasting load, every FIRM_LOOKS looks */
+/* s of a region under a lasting load, every FIRM_LOOKS looks */
 static const double firmer = 1.25;
 
 /* ---- load ---- */
@@ -35,12 +35,12 @@ pal_err pal_cell_recovery_make(const pal_subdivision_solid *solid, pal_arena *ar
     out->ratio[0] = PAL_NEW(arena, double, n);
     out->ratio[1] = PAL_NEW(arena, double, n);
     out->element_J = PAL_NEW(arena, double, n);
-    out->patch = PAL_NEW(arena, int32_t, n);
+    out->region = PAL_NEW(arena, int32_t, n);
     out->before = PAL_NEW(arena, int32_t, n);
     out->root = PAL_NEW(arena, int32_t, out->n_node);
     out->of = PAL_NEW(arena, pal_cell_region, n);
     out->old = PAL_NEW(arena, pal_cell_region, n);
-    bool all = out->k_N_m && out->shear_J && out->ratio[0] && out->ratio[1] && out->element_J && out->patch &&
+    bool all = out->k_N_m && out->shear_J && out->ratio[0] && out->ratio[1] && out->element_J && out->region &&
                out->before && out->root && out->of && out->old;
     return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
@@ -109,39 +109,39 @@ static void show(const pal_cell_recovery *t, pal_cells_elastic *c)
     for (int cell = 0; cell < t->n_cell; cell++) {
         int e;
         const pal_cell_kind kind = kind_of(t, cell, &e);
-        c->group[kind].here[e] = t->patch[cell] < 0;
+        c->group[kind].here[e] = t->region[cell] < 0;
     }
 }
 
 void pal_cell_recovery_reset(pal_cell_recovery *t, pal_cells_elastic *c)
 {
-    for (int cell = 0; cell < t->n_cell; cell++) t->patch[cell] = -1;
-    t->n_patch = t->n_away = 0;
+    for (int cell = 0; cell < t->n_cell; cell++) t->region[cell] = -1;
+    t->n_region = t->n_recovering = 0;
     t->n_inversion = t->n_change = 0;
     show(t, c);
 }
 
-/* ---- patches ---- */
+/* ---- regions ---- */
 
 static inline void edge_vector(const double *d, const int32_t edge[2], double out[3])
 {
     pal_sub3(out, d + 3 * (size_t)edge[1], d + 3 * (size_t)edge[0]);
 }
 
-/* rotations at d of those patches that have their own */
+/* rotations at d of those regions that have their own */
 static void find_turns(pal_cell_recovery *t, const pal_subdivision_solid *solid, const double *d)
 {
-    for (int p = 0; p < t->n_patch; p++) memset(t->of[p].sum, 0, sizeof t->of[p].sum);
+    for (int p = 0; p < t->n_region; p++) memset(t->of[p].sum, 0, sizeof t->of[p].sum);
     for (int cell = 0; cell < t->n_cell; cell++) {
         int32_t edge[EDGES_MOST][2];
-        if (t->patch[cell] < 0 || t->of[t->patch[cell]].fixed) continue;
+        if (t->region[cell] < 0 || t->of[t->region[cell]].fixed) continue;
         for (int i = edges(t, solid, cell, edge) - 1; i >= 0; i--) {
             double x[3], y[3];
             edge_vector(d, edge[i], x), edge_vector(solid->node_rest, edge[i], y);
-            pal_add_outer(t->of[t->patch[cell]].sum, t->k_N_m[cell], x, y);
+            pal_add_outer(t->of[t->region[cell]].sum, t->k_N_m[cell], x, y);
         }
     }
-    for (int p = 0; p < t->n_patch; p++)
+    for (int p = 0; p < t->n_region; p++)
         if (!t->of[p].fixed) pal_best_rotation(t->of[p].sum, t->of[p].turn);
 }
 
@@ -149,14 +149,14 @@ static void find_turns(pal_cell_recovery *t, const pal_subdivision_solid *solid,
 static double cell_edges(const pal_cell_recovery *t, const pal_subdivision_solid *solid, int cell, const double *d,
                          double *f)
 {
-    const pal_cell_region *patch = &t->of[t->patch[cell]];
-    const double k = t->k_N_m[cell], force = patch->scale * k;
+    const pal_cell_region *region = &t->of[t->region[cell]];
+    const double k = t->k_N_m[cell], force = region->scale * k;
     int32_t edge[EDGES_MOST][2];
     double sum = 0;
     for (int i = edges(t, solid, cell, edge) - 1; i >= 0; i--) {
         double x[3], y[3], u[3];
         edge_vector(d, edge[i], x), edge_vector(solid->node_rest, edge[i], y);
-        pal_mul33(u, patch->turn, y);
+        pal_mul33(u, region->turn, y);
         pal_sub3(u, x, u);
         sum += 0.5 * k * pal_dot3(u, u);
         if (!f) continue;
@@ -170,7 +170,7 @@ double pal_cell_recovery_force(pal_cell_recovery *t, const pal_subdivision_solid
     double sum = 0;
     find_turns(t, solid, d);
     for (int cell = 0; cell < t->n_cell; cell++)
-        if (t->patch[cell] >= 0) sum += t->of[t->patch[cell]].scale * cell_edges(t, solid, cell, d, f);
+        if (t->region[cell] >= 0) sum += t->of[t->region[cell]].scale * cell_edges(t, solid, cell, d, f);
     return sum;
 }
 
@@ -179,8 +179,8 @@ void pal_cell_recovery_multiply(const pal_cell_recovery *t, const pal_subdivisio
 {
     for (int cell = 0; cell < t->n_cell; cell++) {
         int32_t edge[EDGES_MOST][2];
-        if (t->patch[cell] < 0) continue;
-        const double by = k * t->of[t->patch[cell]].scale * t->k_N_m[cell];
+        if (t->region[cell] < 0) continue;
+        const double by = k * t->of[t->region[cell]].scale * t->k_N_m[cell];
         for (int i = edges(t, solid, cell, edge) - 1; i >= 0; i--) {
             double x[3];
             edge_vector(p, edge[i], x);
@@ -200,88 +200,89 @@ static bool is_good(const pal_cell_recovery *t, int cell)
     return t->ratio[0][cell] > least_out && t->ratio[1][cell] < most_out;
 }
 
-/* energies of the patches and of their elements as such at d */
+/* energies of the regions and of their elements as such at d */
 static void weigh(pal_cell_recovery *t, const pal_cells_elastic *c, const double *d)
 {
-    for (int p = 0; p < t->n_patch; p++) {
-        pal_cell_region *patch = &t->of[p];
-        patch->patch_J = patch->element_J = patch->shear_J = 0, patch->bad = false, patch->n = 0;
+    for (int p = 0; p < t->n_region; p++) {
+        pal_cell_region *region = &t->of[p];
+        region->region_J = region->element_J = region->shear_J = 0, region->bad = false, region->n = 0;
     }
     find_turns(t, c->solid, d);
     for (int cell = 0; cell < t->n_cell; cell++) {
-        if (t->patch[cell] < 0) continue;
-        pal_cell_region *patch = &t->of[t->patch[cell]];
-        patch->patch_J += patch->scale * cell_edges(t, c->solid, cell, d, NULL);
-        patch->element_J += t->element_J[cell];
-        patch->shear_J += t->shear_J[cell];
-        patch->bad |= !is_good(t, cell);
-        patch->n++;
+        if (t->region[cell] < 0) continue;
+        pal_cell_region *region = &t->of[t->region[cell]];
+        region->region_J += region->scale * cell_edges(t, c->solid, cell, d, NULL);
+        region->element_J += t->element_J[cell];
+        region->shear_J += t->shear_J[cell];
+        region->bad |= !is_good(t, cell);
+        region->n++;
     }
 }
 
-static double patches(const pal_cell_recovery *t)
+static double regions(const pal_cell_recovery *t)
 {
     double sum = 0;
-    for (int p = 0; p < t->n_patch; p++) sum += t->of[p].patch_J;
+    for (int p = 0; p < t->n_region; p++) sum += t->of[p].region_J;
     return sum;
 }
 
-/* energy of the body's motion and of this row; the patches are weighed */
+/* energy of the body's motion and of this row; the regions are weighed */
 static double whole(const pal_cell_recovery *t, double kinetic_J)
 {
-    double sum = kinetic_J + patches(t);
+    double sum = kinetic_J + regions(t);
     for (int cell = 0; cell < t->n_cell; cell++)
-        if (t->patch[cell] < 0) sum += t->element_J[cell];
+        if (t->region[cell] < 0) sum += t->element_J[cell];
     return sum;
 }
 
-/* which patches become elements again; true: some do */
+/* which regions become elements again; true: some do */
 static bool let_go(pal_cell_recovery *t, double spare_J, double calm, bool still)
 {
     bool any = false;
-    for (int p = 0; p < t->n_patch; p++) {
-        pal_cell_region *patch = &t->of[p];
-        const double rise = patch->element_J - patch->patch_J;
-        patch->age++;
-        patch->loose = patch->bad || !still ? 0 : patch->loose + 1;
-        const bool fits = rise <= spare_J && patch->element_J <= calm * patch->shear_J;
-        if (patch->bad || (!fits && patch->loose < LOOSE_LOOKS)) continue;
+    for (int p = 0; p < t->n_region; p++) {
+        pal_cell_region *region = &t->of[p];
+        const double rise = region->element_J - region->region_J;
+        region->age++;
+        region->loose = region->bad || !still ? 0 : region->loose + 1;
+        const bool fits = rise <= spare_J && region->element_J <= calm * region->shear_J;
+        if (region->bad || (!fits && region->loose < LOOSE_LOOKS)) continue;
         spare_J -= rise;
-        patch->n = 0;
+        region->n = 0;
         any = true;
     }
     for (int cell = 0; cell < t->n_cell && any; cell++)
-        if (t->patch[cell] >= 0 && t->of[t->patch[cell]].n == 0) t->patch[cell] = -1;
+        if (t->region[cell] >= 0 && t->of[t->region[cell]].n == 0) t->region[cell] = -1;
     return any;
 }
 
 enum { NOT = -1, NEW = -2 };
 
-/* what is turned over joins, with its neighbours; so do those of patches that do not come loose, but not while a
- * lasting load pulls at the body: it is that which turns them over, and larger patches are softer. True: some do */
+/* what is turned over joins, with its neighbours; so do those of regions that do not come loose, but not while a
+ * lasting load pulls at the body: it is that which turns them over, and larger regions are softer. True: some do */
 static bool take_in(pal_cell_recovery *t, const pal_subdivision_solid *solid, bool loaded)
 {
     bool any = false;
     memset(t->root, 0, sizeof *t->root * (size_t)t->n_node);
     for (int cell = 0; cell < t->n_cell; cell++) {
         int32_t node[8];
-        const pal_cell_region *patch = t->patch[cell] >= 0 ? &t->of[t->patch[cell]] : NULL;
-        const bool grows = patch && patch->bad && !loaded && patch->age >= GROW_LOOKS && patch->age % GROW_LOOKS == 0;
-        if (patch ? !grows : !is_bad(t, cell)) continue;
+        const pal_cell_region *region = t->region[cell] >= 0 ? &t->of[t->region[cell]] : NULL;
+        const bool grows =
+            region && region->bad && !loaded && region->age >= GROW_LOOKS && region->age % GROW_LOOKS == 0;
+        if (region ? !grows : !is_bad(t, cell)) continue;
         for (int k = corners(t, solid, cell, node) - 1; k >= 0; k--) t->root[node[k]] = 1;
     }
     for (int cell = 0; cell < t->n_cell; cell++) {
         int32_t node[8];
         bool beside = false;
-        if (t->patch[cell] >= 0) continue;
+        if (t->region[cell] >= 0) continue;
         for (int k = corners(t, solid, cell, node) - 1; k >= 0; k--) beside |= t->root[node[k]];
-        if (beside) t->patch[cell] = NEW;
+        if (beside) t->region[cell] = NEW;
         any |= beside;
     }
     return any;
 }
 
-/* elements whose volume is that of their control cell go into a patch together */
+/* elements whose volume is that of their control cell go into a region together */
 static void take_whole_cells(pal_cell_recovery *t, const pal_cells_elastic *c)
 {
     /* sums and pushes are found anew before each use */
@@ -292,72 +293,73 @@ static void take_whole_cells(pal_cell_recovery *t, const pal_cells_elastic *c)
             int e;
             const pal_cell_kind kind = kind_of(t, cell, &e);
             const int32_t home = c->group[kind].home[e];
-            if (turn == 0 && t->patch[cell] != NOT) mark[home] = 1;
-            if (turn == 1 && t->patch[cell] == NOT && mark[home] > 0) t->patch[cell] = NEW;
+            if (turn == 0 && t->region[cell] != NOT) mark[home] = 1;
+            if (turn == 1 && t->region[cell] == NOT && mark[home] > 0) t->region[cell] = NEW;
         }
 }
 
-/* patches anew of all elements that are in one, connected by their nodes */
+/* regions anew of all elements that are in one, connected by their nodes */
 static void number(pal_cell_recovery *t, const pal_subdivision_solid *solid)
 {
     int32_t node[8];
     pal_union_find_init(t->root, t->n_node);
     for (int cell = 0; cell < t->n_cell; cell++) {
-        if (t->patch[cell] == NOT) continue;
+        if (t->region[cell] == NOT) continue;
         for (int k = corners(t, solid, cell, node) - 1; k > 0; k--) pal_union_find_join(t->root, node[0], node[k]);
     }
     for (int i = 0; i < t->n_node; i++) t->root[i] = pal_union_find_root(t->root, i);
-    t->n_patch = t->n_away = 0;
-    /* roots are the least nodes of their patches: -1 - number once they have one */
+    t->n_region = t->n_recovering = 0;
+    /* roots are the least nodes of their regions: -1 - number once they have one */
     for (int cell = 0; cell < t->n_cell; cell++) {
-        if (t->patch[cell] == NOT) continue;
+        if (t->region[cell] == NOT) continue;
         corners(t, solid, cell, node);
         int at = t->root[node[0]] >= 0 ? t->root[node[0]] : node[0];
         if (t->root[at] >= 0) {
-            t->of[t->n_patch] = (pal_cell_region){.scale = 1};
-            t->root[at] = -1 - t->n_patch++;
+            t->of[t->n_region] = (pal_cell_region){.scale = 1};
+            t->root[at] = -1 - t->n_region++;
         }
-        t->patch[cell] = -1 - t->root[at];
-        t->n_away++;
+        t->region[cell] = -1 - t->root[at];
+        t->n_recovering++;
     }
 }
 
-/* G held or not and s of patches anew */
+/* G held or not and s of regions anew */
 static void begin(pal_cell_recovery *t, pal_cells_elastic *c, const pal_body *body)
 {
     double fixed[9];
     const bool led = pal_support_rotation(body, fixed);
     for (int cell = 0; cell < t->n_cell; cell++)
-        if (t->patch[cell] >= 0) t->of[t->patch[cell]].n++;
-    for (int p = 0; p < t->n_patch; p++) {
+        if (t->region[cell] >= 0) t->of[t->region[cell]].n++;
+    for (int p = 0; p < t->n_region; p++) {
         t->of[p].fixed = led && 2 * t->of[p].n > t->n_cell;
         if (t->of[p].fixed) memcpy(t->of[p].turn, fixed, sizeof fixed);
     }
     weigh(t, c, body->d);
-    for (int p = 0; p < t->n_patch; p++) t->of[p].element_J = 0;
+    for (int p = 0; p < t->n_region; p++) t->of[p].element_J = 0;
     for (int cell = 0; cell < t->n_cell; cell++) {
-        if (t->patch[cell] < 0) continue;
+        if (t->region[cell] < 0) continue;
         const int was = t->before[cell];
-        /* an old patch's share by its elements' number: only the sum matters, and an old patch never parts */
-        t->of[t->patch[cell]].element_J += was >= 0 ? t->old[was].patch_J / t->old[was].n : t->element_J[cell];
+        /* an old region's share by its elements' number: only the sum matters, and an old region never parts */
+        t->of[t->region[cell]].element_J += was >= 0 ? t->old[was].region_J / t->old[was].n : t->element_J[cell];
     }
-    for (int p = 0; p < t->n_patch; p++) {
-        pal_cell_region *patch = &t->of[p];
-        if (patch->patch_J > patch->element_J) patch->scale = fmax(least_scale, patch->element_J / patch->patch_J);
-        patch->patch_J *= patch->scale;
+    for (int p = 0; p < t->n_region; p++) {
+        pal_cell_region *region = &t->of[p];
+        if (region->region_J > region->element_J)
+            region->scale = fmax(least_scale, region->element_J / region->region_J);
+        region->region_J *= region->scale;
     }
 }
 
-/* what a lasting load turns over would hang by a patch that began soft, and be let out by 1 / s of what the elements
+/* what a lasting load turns over would hang by a region that began soft, and be let out by 1 / s of what the elements
  * give: s goes back to 1. True: one has changed */
 static bool firm_up(pal_cell_recovery *t)
 {
     bool any = false;
-    for (int p = 0; p < t->n_patch; p++) {
-        pal_cell_region *patch = &t->of[p];
-        if (patch->scale >= 1 || patch->age == 0 || patch->age % FIRM_LOOKS != 0) continue;
-        patch->scale = fmin(1, firmer * patch->scale);
-        t->stiffened_J += firmer * patch->patch_J;
+    for (int p = 0; p < t->n_region; p++) {
+        pal_cell_region *region = &t->of[p];
+        if (region->scale >= 1 || region->age == 0 || region->age % FIRM_LOOKS != 0) continue;
+        region->scale = fmin(1, firmer * region->scale);
+        t->stiffened_J += firmer * region->region_J;
         any = true;
     }
     return any;
@@ -365,7 +367,7 @@ static bool firm_up(pal_cell_recovery *t)
 
 bool pal_cell_recovery_update(pal_cell_recovery *t, pal_cells_elastic *c, const pal_body *body, bool loaded)
 {
-    bool bad = t->n_patch > 0;
+    bool bad = t->n_region > 0;
     t->stiffened_J = 0;
     pal_cells_elastic_ratios(c, body->d);
     for (int cell = 0; cell < t->n_cell; cell++) bad |= is_bad(t, cell);
@@ -380,12 +382,12 @@ bool pal_cell_recovery_update(pal_cell_recovery *t, pal_cells_elastic *c, const 
         t->element_J[cell] = c->group[kind].energy_J[e];
     }
     weigh(t, c, body->d);
-    memcpy(t->old, t->of, sizeof *t->of * (size_t)t->n_patch);
-    const bool first = t->n_patch == 0;
+    memcpy(t->old, t->of, sizeof *t->of * (size_t)t->n_region);
+    const bool first = t->n_region == 0;
     const double kinetic_J = pal_body_kinetic_J(body);
-    t->still = kinetic_J < still_share * patches(t);
+    t->still = kinetic_J < still_share * regions(t);
     bool changed = let_go(t, first ? 0 : t->first_J - whole(t, kinetic_J), calm_share[c->op], t->still);
-    memcpy(t->before, t->patch, sizeof *t->patch * (size_t)t->n_cell);
+    memcpy(t->before, t->region, sizeof *t->region * (size_t)t->n_cell);
     changed |= take_in(t, c->solid, loaded);
     if (changed && c->volume.n > 0) take_whole_cells(t, c);
     if (!changed) return loaded && firm_up(t);

@@ -298,11 +298,12 @@ PAL_INLINE int cell_live(const pal_cell_group *group, int block, int lane)
     int n = group->n - block * PAL_LANES - lane;
     return n < 0 ? 0 : n < PAL_WIDE ? n : PAL_WIDE;
 }
-/* all of half a block are in patches, and nobody asks for their own energies */
-PAL_INLINE bool cell_away(const pal_cells_elastic *c, const pal_cell_group *group, int block, int lane, int n_live)
+/* all of half a block are in regions, and nobody asks for their own energies */
+PAL_INLINE bool cell_recovering(const pal_cells_elastic *c, const pal_cell_group *group, int block, int lane,
+                                int n_live)
 {
     double here = 0;
-    if (c->recovery.n_away == 0 || c->recovery.weighs) return false;
+    if (c->recovery.n_recovering == 0 || c->recovery.weighs) return false;
     for (int l = 0; l < n_live; l++) here += group->here[block * PAL_LANES + lane + l];
     return here == 0;
 }

@@ -84,7 +84,7 @@ static double bound_of(const mobility *m, const pal_body *body, int node)
 static void find_mobility(pal_body *body)
 {
     mobility m = {.place = malloc(sizeof *m.place * (size_t)body->n_dof + 1)};
-    for (int i = 0; i < body->n_dof && m.place; i++) m.place[i] = body->fixed[i] ? -1 : m.n_free++;
+    for (int i = 0; i < body->n_dof && m.place; i++) m.place[i] = body->support[i] ? -1 : m.n_free++;
     m.y = malloc(sizeof *m.y * (size_t)m.n_free + 1);
     bool found = m.place && m.y && factorise(body->mass_operator, &m);
     for (int i = 0; i < body->surface->n_vertex; i++) {

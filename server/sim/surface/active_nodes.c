@@ -32,7 +32,7 @@ bool pal_active_nodes_complete(const pal_step *step)
 {
     for (int i = 0; i < step->n_force; i++) {
         const pal_effect *effect = step->force[i].effect;
-        if (!effect->pull && !(step->drag_separate && effect->drag)) return false;
+        if (!effect->compute_forces && !(step->drag_separate && effect->drag)) return false;
     }
     return !step->body->interpolation;
 }
@@ -44,7 +44,7 @@ pal_err pal_active_nodes_assemble(pal_step *step)
         pal_component *row = &step->force[i];
         if (step->drag_separate && row->effect->drag) continue;
         row->n_run++;
-        PAL_TRY(row->effect->pull(row->self, step));
+        PAL_TRY(row->effect->compute_forces(row->self, step));
         uint64_t now = pal_clock_ns();
         row->spent_ns += now - before;
         before = now;

@@ -302,7 +302,7 @@ static void place(const pal_adaptive_surface *s, pal_body *body, int32_t e)
     const double *ra = body->x_rest + 3 * (size_t)end[0], *rb = body->x_rest + 3 * (size_t)end[1];
     const double *va = body->v + 3 * (size_t)end[0], *vb = body->v + 3 * (size_t)end[1];
     double *x = body->x + 3 * (size_t)v, *rest = body->x_rest + 3 * (size_t)v;
-    bool stands = body->fixed[v] == 1, firm[2] = {body->fixed[end[0]] > 0, body->fixed[end[1]] > 0};
+    bool stands = body->support[v] == PAL_FIXED, firm[2] = {body->support[end[0]] > 0, body->support[end[1]] > 0};
     for (int c = 0; c < 3; c++) body->v[3 * (size_t)v + (size_t)c] = stands ? 0 : 0.5 * va[c] + 0.5 * vb[c];
     /* an edge at rest keeps every bit; a held midpoint goes with its edge only when that is held too, else with the end
      * that is: at rest, or where that was when it was taken hold of */

@@ -26,10 +26,10 @@ void pal_adaptive_transfer_state(const pal_body *to, const pal_body *from, doubl
         if (!pal_adaptive_has(to->model.adaptive, i)) continue;
         if (pal_adaptive_uses(from->model.adaptive, i)) {
             pal_copy3(xi, from->x + 3 * (size_t)i);
-            if (to->fixed[i] != 1) pal_copy3(vi, from->v + 3 * (size_t)i);
+            if (to->support[i] != PAL_FIXED) pal_copy3(vi, from->v + 3 * (size_t)i);
             continue;
         }
-        if (to->fixed[i] == 1) continue;
+        if (to->support[i] == PAL_FIXED) continue;
         const int32_t *end = levels->edge[pal_levels_vertex_parent(levels, i)].vertex;
         for (int k = 0; k < 2; k++) {
             pal_axpy3(xi, 0.5, x + 3 * (size_t)end[k]);

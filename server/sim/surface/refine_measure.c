@@ -140,7 +140,7 @@ void pal_refine_balance_compute(pal_refine_balance *side, const pal_step *step)
         const double m = body->mass_kg[i], *v = body->v + 3 * (size_t)i;
         side->mass_kg += m;
         side->kinetic_J += 0.5 * m * pal_dot3(v, v);
-        if (body->fixed[i]) continue;
+        if (body->support[i]) continue;
         double turn[3];
         pal_cross3(turn, body->x + 3 * (size_t)i, v);
         pal_axpy3(side->momentum_kg_m_s, m, v);

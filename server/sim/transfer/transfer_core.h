@@ -34,10 +34,12 @@ struct pal_transfer {
 void pal_transfer_make_force_map(pal_transfer *t, const pal_body *from, const pal_body *to);
 const pal_interpolation *pal_transfer_force_map(const pal_transfer *t); /* those; without memory for them t->back */
 /* lasting loads, in memory of the new body's arena where it has none; without memory they are gone */
-void pal_transfer_loads(const pal_transfer *t, const pal_body *from, pal_body *to, pal_arena *arena);
+void pal_transfer_loads(const pal_transfer *t, const pal_body *from, pal_world *next);
 /* t->pull: what shall pull on the new nodes for them to be as fast in a moment as the old ones would be, by f and g of
  * before as it stands, whose g goes, and t->moving. Takes t->old, t->rate, t->bound */
 void pal_transfer_forces(pal_transfer *t, const pal_body *from, const pal_body *to);
+/* t->place: nodes of the new body by those of the old one as they stand */
+void pal_transfer_place_nodes(pal_transfer *t, const pal_body *from, const pal_body *to);
 /* farthest that a node of before within the new elements is from where it was; of surfaces that adapt a vertex of both
  */
 double pal_transfer_body_move(const pal_transfer *t, const pal_body *from, const pal_body *to);

@@ -77,14 +77,6 @@ static void was_shown(const pal_transfer *t, const pal_body *from, const pal_bod
         pal_copy3(out, t->place + 3 * (size_t)to->shown_node[i]);
 }
 
-/* nodes of the new body by those of the old one as they stand, in t->place */
-static void place_nodes(pal_transfer *t, const pal_body *from, const pal_body *to)
-{
-    for (int i = 0; i < 3 * from->n_node; i++) t->old[i] = from->d[i] - from->node_rest[i];
-    pal_interpolation_apply(&t->in, t->old, t->place);
-    for (int i = 0; i < 3 * to->n_node; i++) t->place[i] += to->node_rest[i];
-}
-
 /* the other bodies of the world, where a switch of theirs is still being let in */
 static void go_on_others(const pal_transfer *t, pal_world *next, const pal_world *before)
 {
@@ -109,7 +101,7 @@ void pal_transfer_display(pal_transfer *t, pal_world *next, const pal_world *bef
     if (to->n_shown == 0 || from->n_shown == 0 || (!same && !t->adaptive && to->skin)) return;
     float *lag = malloc(3 * sizeof *lag * (size_t)to->n_shown);
     double most = 0;
-    if (!same && !t->adaptive) place_nodes(t, from, to);
+    if (!same && !t->adaptive) pal_transfer_place_nodes(t, from, to);
     for (int i = 0; i < to->n_shown && lag; i++) {
         double was[3];
         was_shown(t, from, to, same, i, was);

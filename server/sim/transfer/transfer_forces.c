@@ -2,6 +2,7 @@
 #include "server/sim/transfer/transfer_core.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/world/world_core.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -105,7 +106,7 @@ static void lighten(pal_transfer *t, const pal_body *from, const pal_body *to)
     memset(mass, 0, sizeof *mass * (size_t)to->n_node);
     memset(moving, 0, 3 * sizeof *moving * (size_t)to->n_node);
     for (int i = 0; i < from->n_node; i++)
-        if (from->fixed[i]) pal_set3(t->moving + 3 * (size_t)i, 0, 0, 0);
+        if (from->support[i]) pal_set3(t->moving + 3 * (size_t)i, 0, 0, 0);
     pal_interpolation_apply_transpose(rows, t->moving, moving);
     for (int i = 0; i < from->n_node; i++)
         for (int32_t k = rows->start[i]; k < rows->start[i + 1]; k++)
@@ -125,24 +126,22 @@ void pal_transfer_forces(pal_transfer *t, const pal_body *from, const pal_body *
     if (from->interpolation) {
         double *a = from->g;
         for (int i = 0; i < from->n_dof; i++)
-            pal_scale3(a + 3 * i, from->fixed[i] ? 0 : 1 / from->mass_kg[i], a + 3 * i);
+            pal_scale3(a + 3 * i, from->support[i] ? 0 : 1 / from->mass_kg[i], a + 3 * i);
         pal_interpolation_apply(from->interpolation, a, t->old);
         for (int i = 0; i < from->n_node; i++) pal_scale3(t->old + 3 * i, from->node_mass_kg[i], t->old + 3 * i);
     } else {
         memcpy(t->old, from->f, n * sizeof *t->old);
         for (int i = 0; i < from->n_node; i++)
-            if (from->fixed[i]) pal_set3(t->old + 3 * i, 0, 0, 0);
+            if (from->support[i]) pal_set3(t->old + 3 * i, 0, 0, 0);
     }
     pal_interpolation_apply_transpose(pal_transfer_force_map(t), t->old, t->pull);
     lighten(t, from, to);
 }
 
-/* lasting loads */
-void pal_transfer_loads(const pal_transfer *t, const pal_body *from, pal_body *to, pal_arena *arena)
+void pal_transfer_loads(const pal_transfer *t, const pal_body *from, pal_world *next)
 {
-    if (!from->external_force) return;
-    if (!to->external_force) to->external_force = PAL_NEW(arena, double, 3 * (size_t)to->n_node);
-    if (!to->external_force) return;
-    memset(to->external_force, 0, 3 * sizeof(double) * (size_t)to->n_node);
-    pal_interpolation_apply_transpose(&t->back, from->external_force, to->external_force);
+    double *to = from->external_force ? pal_world_external_force(next, t->body) : NULL;
+    if (!to) return;
+    memset(to, 0, 3 * sizeof *to * (size_t)t->n_to);
+    pal_interpolation_apply_transpose(&t->back, from->external_force, to);
 }

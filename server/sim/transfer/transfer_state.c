@@ -5,6 +5,7 @@
 #include "server/num/conjugate_gradient.h"
 #include "server/num/polar.h"
 #include "server/sim/transfer/transfer_core.h"
+#include "server/sim/transfer/transfer_world.h"
 #include "server/sim/world/world_core.h"
 
 #include <stdlib.h>
@@ -140,18 +141,16 @@ static void rigid_at(const rigid *r, const double x[3], double v[3])
 static bool is_free(const pal_body *body)
 {
     for (int i = 0; i < body->n_dof; i++)
-        if (body->fixed[i]) return false;
+        if (body->support[i]) return false;
     return true;
 }
 
 /* ---- places and velocities ---- */
 
-/* nodes by interpolated displacement and velocity */
-static void interpolate(pal_transfer *t, const pal_body *from, const pal_body *to)
+void pal_transfer_place_nodes(pal_transfer *t, const pal_body *from, const pal_body *to)
 {
     for (int i = 0; i < 3 * from->n_node; i++) t->old[i] = from->d[i] - from->node_rest[i];
     pal_interpolation_apply(&t->in, t->old, t->place);
-    pal_interpolation_apply(&t->in, from->dv, t->rate);
     for (int i = 0; i < 3 * to->n_node; i++) t->place[i] += to->node_rest[i];
 }
 
@@ -169,7 +168,7 @@ static void multiply(void *user, const double *p, double *out)
     for (int i = 0; i < 3 * b->n_dof; i++) out[i] = s->pull * p[i];
     pal_interpolation_apply_transpose(b->interpolation, s->node, out);
     for (int i = 0; i < b->n_dof; i++)
-        if (b->fixed[i]) pal_set3(out + 3 * i, 0, 0, 0);
+        if (b->support[i]) pal_set3(out + 3 * i, 0, 0, 0);
 }
 
 static void no_change(void *user, const double *r, double *out)
@@ -192,7 +191,7 @@ static void least_squares(pal_transfer *t, const pal_body *to, const double *wan
         t->work[1][to->interpolation->point[k]] += to->interpolation->weight[k] * to->interpolation->weight[k];
     for (int i = 0; i < to->n_dof; i++) {
         most = fmax(most, t->work[1][i]);
-        if (to->fixed[i]) pal_set3(r + 3 * i, 0, 0, 0);
+        if (to->support[i]) pal_set3(r + 3 * i, 0, 0, 0);
     }
     s.pull = PULL * most;
     pal_conjugate_gradient cg = {.n = 3 * to->n_dof,
@@ -226,7 +225,7 @@ static void set_points(pal_transfer *t, const pal_body *from, const pal_body *to
     memcpy(t->x, t->place, n_byte);
     memcpy(t->v, t->rate, n_byte);
     for (int i = 0; i < to->n_dof; i++) {
-        if (to->fixed[i] != 1) continue;
+        if (to->support[i] != PAL_FIXED) continue;
         pal_copy3(t->x + 3 * i, to->x_rest + 3 * i);
         pal_set3(t->v + 3 * i, 0, 0, 0);
     }
@@ -275,7 +274,7 @@ static void blend_forces(pal_transfer *t, pal_world *next)
     if (pal_world_assemble_forces(next, t->body)) return;
     for (int i = 0; i < to->n_node; i++) {
         pal_sub3(t->pull + 3 * i, t->pull + 3 * i, to->f + 3 * i);
-        if (!to->interpolation && to->fixed[i]) pal_set3(t->pull + 3 * i, 0, 0, 0);
+        if (!to->interpolation && to->support[i]) pal_set3(t->pull + 3 * i, 0, 0, 0);
     }
     if (is_free(to)) {
         (void)centre_of(to->n_node, to->node_mass_kg, to->d, c);
@@ -317,7 +316,7 @@ static int smooth(pal_transfer *t, pal_world *next, double want_J)
     for (; n < n_most && now_J > (1 + SAME) * want_J && now_J < most_J; n++) {
         for (int k = 0; k < to->n_active; k++) {
             int i = pal_body_point(to, k);
-            if (to->fixed[i] || !(t->bound[i] > 0)) continue;
+            if (to->support[i] || !(t->bound[i] > 0)) continue;
             for (int c = 3 * i; c < 3 * i + 3; c++) {
                 way[c] = INERTIA * way[c] + (to->f[c] - t->pull[c]) / t->bound[i];
                 to->x[c] += way[c];
@@ -373,7 +372,7 @@ static double scale_displacement(pal_transfer *t, pal_world *next, double want_J
         s = within(s * pow(want_J / now_J, 1 / power), MOST_SCALE);
         for (int k = 0; k < to->n_active; k++) {
             size_t i = (size_t)pal_body_point(to, k);
-            if (to->fixed[i]) continue;
+            if (to->support[i]) continue;
             for (size_t c = 3 * i; c < 3 * i + 3; c++) to->x[c] = ref[c] + s * (base[c] - ref[c]);
         }
         pal_body_update_nodes(to);
@@ -448,15 +447,15 @@ static void hand_over(pal_transfer *t, pal_world *next, const pal_world *before)
     for (int i = 0; i < next->plan.n_row; i++) {
         const pal_component *row = &next->plan.row[i];
         int b = next->plan.component_body[i];
-        const pal_component *from = row->effect->hand ? find_row(before, b, row->effect) : NULL;
+        const pal_component *from = row->effect->transfer ? find_row(before, b, row->effect) : NULL;
         bool known = b == t->body ? t->back.n_row > 0 : next->plan.body[b].n_node == before->plan.body[b].n_node;
         if (from && known)
-            row->effect->hand(row->self, &next->plan.body[b], from->self,
-                              &(pal_component_transfer){.from = &before->plan.body[b],
-                                                        .place = b == t->body ? pal_transfer_force_map(t) : NULL,
-                                                        .rest_m = next->part[b].rest_m,
-                                                        .same_shown = pal_transfer_same_shown(next, before, b),
-                                                        .left_N = b == t->body ? t->pull : NULL});
+            row->effect->transfer(row->self, &next->plan.body[b], from->self,
+                                  &(pal_component_transfer){.from = &before->plan.body[b],
+                                                            .place = b == t->body ? pal_transfer_force_map(t) : NULL,
+                                                            .rest_m = next->part[b].rest_m,
+                                                            .same_shown = pal_transfer_same_shown(next, before, b),
+                                                            .left_N = b == t->body ? t->pull : NULL});
     }
 }
 
@@ -464,24 +463,13 @@ static void place_points(pal_transfer *t, const pal_body *from, pal_world *next)
 {
     pal_body *to = &next->plan.body[t->body];
     if (!t->adaptive) {
-        interpolate(t, from, to);
+        pal_transfer_place_nodes(t, from, to);
+        pal_interpolation_apply(&t->in, from->dv, t->rate);
         set_points(t, from, to);
         return;
     }
     to->dofs.transfer(to, from, refines(next, t->body), t->x, t->v);
     (void)make_back(t, from, to);
-}
-
-/* the new body at t->x, t->v as pal_world_transfer would have it */
-static void put(const pal_transfer *t, pal_world *next)
-{
-    pal_body *to = &next->plan.body[t->body];
-    size_t n_byte = 3 * sizeof(double) * (size_t)to->n_dof;
-    memcpy(to->x, t->x, n_byte);
-    memcpy(to->v, t->v, n_byte);
-    for (int i = 0; i < to->n_dof; i++)
-        if (to->fixed[i] == 1) pal_set3(to->v + 3 * (size_t)i, 0, 0, 0);
-    pal_body_update_nodes(to);
 }
 
 /* from places by interpolation, with what a rehearsal added to them, to smooth ones; from->f and g are known. Rounds */
@@ -492,7 +480,7 @@ static int approach(pal_transfer *t, pal_world *next, const pal_body *from, doub
     if (t->has_rehearsed) pal_body_update_nodes(to);
     if (t->back.n_row == 0) return 0;
     pal_transfer_make_force_map(t, from, to);
-    pal_transfer_loads(t, from, to, next->arena);
+    pal_transfer_loads(t, from, next);
     pal_transfer_forces(t, from, to);
     return smooth(t, next, want_J);
 }
@@ -562,8 +550,8 @@ bool pal_transfer_snapshot(pal_transfer *t, const pal_world *before)
     t->seen.mass_kg = keep(&room, from->mass_kg, (size_t)from->n_dof);
     t->seen.node_mass_kg = keep(&room, from->node_mass_kg, (size_t)from->n_node);
     if (from->external_force) t->seen.external_force = keep(&room, from->external_force, node);
-    t->seen.fixed = (uint8_t *)(t->snapshot_room + 3 * dof + 4 * node + (size_t)from->n_dof + (size_t)from->n_node);
-    memcpy(t->seen.fixed, from->fixed, (size_t)from->n_dof);
+    t->seen.support = (uint8_t *)(t->snapshot_room + 3 * dof + 4 * node + (size_t)from->n_dof + (size_t)from->n_node);
+    memcpy(t->seen.support, from->support, (size_t)from->n_dof);
     return isfinite(t->snapshot_energy_J);
 }
 
@@ -574,7 +562,7 @@ void pal_transfer_rehearse(pal_transfer *t, pal_world *next)
     if (!t->fix) t->fix = calloc(n + 1, sizeof *t->fix);
     if (!t->fix) return;
     place_points(t, &t->seen, next);
-    put(t, next);
+    pal_transfer_set_state(to, t->x, t->v);
     (void)approach(t, next, &t->seen, t->snapshot_energy_J);
     for (size_t i = 0; i < n; i++) t->fix[i] = to->x[i] - t->x[i];
     t->has_rehearsed = true;

@@ -110,16 +110,6 @@ void pal_world_wake(pal_world *world);
  * shown up to date at once. [sim] */
 void pal_world_watch(pal_world *world, bool watched);
 
-/* A world made from an edited scene goes on where another is: its time, tools and poses, materials as they are by now
- * (but one that the edited body is too stiff or too light for), rescue counts, and of all other bodies that have as
- * many points x, v, lasting loads and, of those that adapt, the levels. x, v [n_dof][3] are the state of body `edited`
- * in their place (v NULL: at rest; edited -1: none). Rows begin anew: what a tool held it holds no more, brushes are
- * over. Both stand still. Heap memory when a material has changed. [sim] */
-void pal_world_transfer(pal_world *world, const pal_world *before, int edited, const double *x, const double *v);
-/* after it, of the edited body: each lasting load goes to the node that is nearest at rest to the one that bore it;
- * their sum stays. Without memory it bears none. [sim] */
-void pal_world_transfer_loads(pal_world *world, int body, const pal_world *before);
-
 void pal_world_frame(const pal_world *world, pal_frame *out); /* [sim] copies */
 uint64_t
 pal_world_hash(const pal_world *world); /* [sim] of tick, x, v and levels of every body (FNV-1a over the bits) */

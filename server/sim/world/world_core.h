@@ -50,6 +50,9 @@ void pal_body_begin_loads(pal_body *body);
  * else presses the nodes is not there yet, and nodes that stray from their rest places bear less */
 void pal_body_cap_loads(pal_body *body, bool body_arena);
 
+/* lasting loads of a body [n_node][3], N, which take memory the first time; NULL: there is none */
+double *pal_world_external_force(pal_world *w, int body);
+
 /* OUTPUT rows of one body, of all bodies, so that what is shown is where they are */
 void pal_world_show(pal_world *world, int b);
 void pal_world_show_all(pal_world *world);

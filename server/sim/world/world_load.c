@@ -6,13 +6,19 @@
 
 #include <string.h>
 
+double *pal_world_external_force(pal_world *w, int body)
+{
+    pal_body *b = &w->plan.body[body];
+    if (!b->external_force) b->external_force = PAL_NEW(w->arena, double, 3 * (size_t)b->n_node);
+    return b->external_force;
+}
+
 pal_err pal_world_load(pal_world *world, int body, int node, const double force_N[3])
 {
     if (body < 0 || body >= world->plan.n_body || !pal_finite3(force_N)) return PAL_ERR_REFUSED;
     pal_body *b = &world->plan.body[body];
     if (node < 0 || node >= b->n_node || (b->active && !pal_dofs_has(&b->dofs, node))) return PAL_ERR_REFUSED;
-    if (!b->external_force) b->external_force = PAL_NEW(world->arena, double, 3 * (size_t)b->n_node);
-    if (!b->external_force) return PAL_ERR_MEMORY;
+    if (!pal_world_external_force(world, body)) return PAL_ERR_MEMORY;
     pal_copy3(b->external_force + 3 * node, force_N);
     b->asleep = false;
     return PAL_ERR_OK;
@@ -46,7 +52,8 @@ static const double least_share = 0.01;
 static bool stays(const pal_body *body)
 {
     bool fixed = false, led = false;
-    for (int i = 0; i < body->n_dof; i++) fixed |= body->fixed[i] == 1, led |= body->fixed[i] == 2;
+    for (int i = 0; i < body->n_dof; i++)
+        fixed |= body->support[i] == PAL_FIXED, led |= body->support[i] == PAL_PRESCRIBED;
     return fixed && !led;
 }
 

@@ -163,7 +163,7 @@ void pal_world_describe_limit(const pal_world *world, char *text, size_t n_byte)
         for (int k = 0; k < body->n_active; k++) {
             int i = pal_body_point(body, k);
             const double *x = body->x_rest + 3 * (size_t)i, *o = body->offset_m;
-            if (body->fixed[i] || !(body->g[i] > most * body->mass_kg[i])) continue;
+            if (body->support[i] || !(body->g[i] > most * body->mass_kg[i])) continue;
             most = body->g[i] / body->mass_kg[i];
             snprintf(text, n_byte, ", node %d at (%.4g, %.4g, %.4g) mm sets it", i, 1e3 * (x[0] + o[0]),
                      1e3 * (x[1] + o[1]), 1e3 * (x[2] + o[2]));

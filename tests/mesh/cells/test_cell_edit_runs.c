@@ -1,5 +1,5 @@
-/* Local subdivision (A 4.1), and thousands of edits one after the other: results are whole, and subdivide into elements
- * or are refused. */
+/* Local subdivision (paper A section 4.1), and thousands of edits one after the other: results are whole, and subdivide
+ * into elements or are refused. */
 #include "tests/fixtures/edits.h"
 
 /* ---- divide ---- */

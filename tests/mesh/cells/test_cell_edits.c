@@ -1,4 +1,5 @@
-/* Sculpting edits (A 4.1) but division: counts, volumes and holes of each, what carries a state over, refusals. */
+/* Sculpting edits (paper A section 4.1) but division: counts, volumes and holes of each, what carries a state over,
+ * refusals. */
 #include "tests/fixtures/edits.h"
 
 /* ---- one edit each ---- */

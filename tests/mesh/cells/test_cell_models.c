@@ -1,4 +1,5 @@
-/* Named solids: the control cells of Table 1 of A, their topology, and elements that are sound at every Gauss point. */
+/* Named solids: the control cells of Table 1 of paper A, their topology, and elements that are sound at every Gauss
+ * point. */
 #include "server/mesh/cells/cell_elements.h"
 #include "server/mesh/cells/cell_lattice.h"
 #include "server/mesh/cells/cell_models.h"

@@ -409,8 +409,8 @@ static void normals_converge_at_every_kind_of_vertex(void)
             for (int v = 0; v < s.n_vertex; v++) s.x[3 * v + 2] = 0.2 * shape_uniform(&seed);
             pal_levels l = levels_of(s, 7);
             double early = normal_spread(&l, 2, 0), late = normal_spread(&l, 6, 0);
-            printf("  %s of %d faces: normals within %.3f, four levels on %.4f rad\n", half ? "rim" : "inner", K, early,
-                   late);
+            printf("  %s of %d faces: normals within %.3f, four levels on %.4f rad\n", half ? "boundary" : "inner", K,
+                   early, late);
             CHECK_LE(late, 0.35 * early);
             CHECK_LE(late, 0.1);
             pal_levels_free(&l);

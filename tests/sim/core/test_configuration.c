@@ -58,12 +58,12 @@ static void check_runs(const pal_scene *from, const pal_configuration *to)
     CHECK(!err);
     if (err) printf("  %s\n", diag.text);
     if (!err) {
-        int n_held = 0;
+        int n_fixed = 0;
         const pal_body *body = pal_world_body(world, 0);
         for (int k = 0; k < 3; k++) CHECK(!pal_world_step(world, set->scene.step_s));
         CHECK(pal_body_finite(body) && !body->frozen);
-        for (int i = 0; i < body->n_dof; i++) n_held += body->fixed[i];
-        CHECK(n_held > 3 && n_held < body->n_dof / 2);
+        for (int i = 0; i < body->n_dof; i++) n_fixed += body->support[i];
+        CHECK(n_fixed > 3 && n_fixed < body->n_dof / 2);
         pal_configuration_of(&set->scene, 0, &now);
         CHECK(pal_configuration_equal(&now, to));
     }
@@ -246,9 +246,10 @@ static void the_lowest_part_of_whole_voxels_is_held_on_every_mesh(void)
         if (k > 2) snprintf(to.model, sizeof to.model, "tet_springs");
         CHECK(!pal_configuration_make(o.scene, 0, &to, &o.diag, &set));
         CHECK(set && !pal_world_create(&set->scene, &o.diag, &world));
-        int n_held = 0;
-        for (int i = 0; world && i < pal_world_body(world, 0)->n_dof; i++) n_held += pal_world_body(world, 0)->fixed[i];
-        CHECK(n_held >= 4);
+        int n_fixed = 0;
+        for (int i = 0; world && i < pal_world_body(world, 0)->n_dof; i++)
+            n_fixed += pal_world_body(world, 0)->support[i];
+        CHECK(n_fixed >= 4);
         pal_world_destroy(world);
         pal_configured_scene_free(set);
     }

@@ -74,7 +74,7 @@ static void swing(fem_beam *b, const char *element, const char *law, double kick
     beam_element(b, element, law);
     if (beam_open(b, &diag)) abort();
     for (int i = 0; i < b->body->n_dof; i++)
-        if (!b->body->fixed[i]) b->body->v[3 * i + 2] = kick_m_s * b->body->x[3 * i] / b->length_m;
+        if (!b->body->support[i]) b->body->v[3 * i + 2] = kick_m_s * b->body->x[3 * i] / b->length_m;
 }
 
 static void what_is_kept_is_what_a_fresh_pass_gives(void)

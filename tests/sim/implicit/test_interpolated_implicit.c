@@ -38,7 +38,7 @@ static void make_dense(dense *m, const thing *t, double mass, double stiff)
     }
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++)
-            if (body->fixed[i / 3] || body->fixed[j / 3]) m->a[i * n + j] = i == j;
+            if (body->support[i / 3] || body->support[j / 3]) m->a[i * n + j] = i == j;
     free(unit), free(column);
 }
 
@@ -75,7 +75,7 @@ static void find_forces(thing *t, double *out)
     memset(out, 0, 3 * sizeof(double) * (size_t)body->n_dof);
     pal_interpolation_apply_transpose(body->interpolation, body->f, out);
     for (int i = 0; i < 3 * body->n_dof; i++)
-        if (body->fixed[i / 3]) out[i] = 0;
+        if (body->support[i / 3]) out[i] = 0;
 }
 
 static double most_difference(const double *a, const double *b, int n)
@@ -93,7 +93,7 @@ static void solve_stage(thing *t, double tau, double rate, const double *vs, dou
     double *f = malloc(sizeof(double) * (size_t)m.n), *q = malloc(sizeof(double) * (size_t)m.n);
     find_forces(t, f);
     multiply_mass(t, vs, q);
-    for (int i = 0; i < m.n; i++) m.b[i] = t->body.fixed[i / 3] ? 0 : q[i] + tau * f[i];
+    for (int i = 0; i < m.n; i++) m.b[i] = t->body.support[i / 3] ? 0 : q[i] + tau * f[i];
     solve_dense(&m);
     memcpy(out, m.b, sizeof(double) * (size_t)m.n);
     free(f), free(q);
@@ -300,19 +300,19 @@ static void held_points_stay_and_led_ones_go_their_way(void)
     REQUIRE(make_thing(&t, 2, 2, 2, false, true));
     int n = hold_floor(&t), n_right = 0, n_led = 0;
     for (int i = 0; i < t.body.n_dof; i++)
-        if (t.body.x_rest[3 * i + 2] > 0.049) t.body.fixed[i] = 2, n_led++;
+        if (t.body.x_rest[3 * i + 2] > 0.049) t.body.support[i] = PAL_PRESCRIBED, n_led++;
     load_top(&t, 3);
     REQUIRE(add_solver(&t, &pal_effect_implicit_euler, NULL, 0));
     for (int k = 0; k < 30; k++) {
         for (int i = 0; i < t.body.n_dof; i++)
-            if (t.body.fixed[i] == 2) pal_set3(t.body.v + 3 * i, 0.01, 0, 0.02);
+            if (t.body.support[i] == PAL_PRESCRIBED) pal_set3(t.body.v + 3 * i, 0.01, 0, 0.02);
         REQUIRE(go(&t));
     }
     for (int i = 0; i < t.body.n_dof; i++) {
         double way[3], wanted[3] = {0.01 * 30 * t.dt_s, 0, 0.02 * 30 * t.dt_s};
         pal_sub3(way, t.body.x + 3 * i, t.body.x_rest + 3 * i);
-        if (t.body.fixed[i] == 1) n_right += way[0] == 0 && way[1] == 0 && way[2] == 0;
-        if (t.body.fixed[i] == 2) n_right += pal_dist3(way, wanted) < 1e-12;
+        if (t.body.support[i] == PAL_FIXED) n_right += way[0] == 0 && way[1] == 0 && way[2] == 0;
+        if (t.body.support[i] == PAL_PRESCRIBED) n_right += pal_dist3(way, wanted) < 1e-12;
     }
     CHECK_INT(n_right, n + n_led);
     CHECK_INT(n_led, 9);
@@ -427,7 +427,7 @@ static void all_held_is_no_work(void)
 {
     thing t;
     REQUIRE(make_thing(&t, 1, 1, 1, false, true));
-    for (int i = 0; i < t.body.n_dof; i++) t.body.fixed[i] = 1;
+    for (int i = 0; i < t.body.n_dof; i++) t.body.support[i] = PAL_FIXED;
     REQUIRE(add_solver(&t, &pal_effect_implicit_euler, NULL, 0));
     load_top(&t, 3);
     CHECK(go(&t));

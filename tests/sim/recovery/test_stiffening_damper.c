@@ -127,7 +127,7 @@ static void it_is_critical_for_the_motion_of_the_work(void)
 {
     double x[6] = {0, 0, 0, 1.5, 0, 0}, rest[6] = {0, 0, 0, 1, 0, 0}, mass[2] = {7, 4};
     uint8_t fixed[2] = {1, 0};
-    pal_body body = {.n_dof = 2, .n_active = 2, .n_node = 2, .x = x, .x_rest = rest, .mass_kg = mass, .fixed = fixed};
+    pal_body body = {.n_dof = 2, .n_active = 2, .n_node = 2, .x = x, .x_rest = rest, .mass_kg = mass, .support = fixed};
     body.length_scale_m = 1;
     pal_stiffening_damper_begin(&body, 0, 1.9); /* 2 * 1.9 J over 4 kg: below (1 S/s)^2 */
     CHECK_NEAR(body.stiffening_damping_1_s, 0, 0);
@@ -152,7 +152,7 @@ static void what_grows_is_braked_as_it_grows(void)
 {
     double x[6] = {0, 0, 0, 1.5, 0, 0}, rest[6] = {0, 0, 0, 1, 0, 0}, mass[2] = {7, 4};
     uint8_t fixed[2] = {1, 0};
-    pal_body body = {.n_dof = 2, .n_active = 2, .n_node = 2, .x = x, .x_rest = rest, .mass_kg = mass, .fixed = fixed};
+    pal_body body = {.n_dof = 2, .n_active = 2, .n_node = 2, .x = x, .x_rest = rest, .mass_kg = mass, .support = fixed};
     body.length_scale_m = 1;
     pal_stiffening_damper_hold(&body, 50); /* w^2 = 100 / (4 * 0.25) */
     CHECK_NEAR(body.stiffening_damping_1_s, 20, 1e-12);

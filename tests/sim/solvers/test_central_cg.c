@@ -187,17 +187,17 @@ static double fastest(solid_world *w, int n_round)
     double *x = malloc(sizeof *x * (size_t)n), *v = calloc((size_t)n, sizeof *v), *u = calloc((size_t)n, sizeof *u),
            *g = malloc(sizeof *g * (size_t)n), omega2 = 0;
     if (pal_envelope_make(m->n_point, m->start, m->point, 1 << 20, w->t.arena, &e)) abort();
-    if (pal_envelope_factor(&e, m->start, m->point, m->mass_kg, b->fixed)) abort();
+    if (pal_envelope_factor(&e, m->start, m->point, m->mass_kg, b->support)) abort();
     memcpy(x, b->x, sizeof *x * (size_t)n);
     solid_forces(w);
     memcpy(g, b->g, sizeof *g * (size_t)n);
-    for (int i = 0; i < n; i++) v[i] = b->fixed[i / 3] ? 0 : solid_uniform(&w->t);
+    for (int i = 0; i < n; i++) v[i] = b->support[i / 3] ? 0 : solid_uniform(&w->t);
     for (int round = 0; round < n_round; round++) {
         double most = 0, along = 0, norm2 = 0;
         for (int i = 0; i < n; i++) most = fmax(most, fabs(v[i]));
         for (int i = 0; i < n; i++) v[i] /= most, b->x[i] = x[i] + b->edge_m * v[i];
         solid_forces(w);
-        for (int i = 0; i < n; i++) u[i] = b->fixed[i / 3] ? 0 : (g[i] - b->g[i]) / b->edge_m;
+        for (int i = 0; i < n; i++) u[i] = b->support[i / 3] ? 0 : (g[i] - b->g[i]) / b->edge_m;
         for (int i = 0; i < n; i++) along += u[i] * v[i];
         pal_mass_operator_multiply(m, v, b->g);
         for (int i = 0; i < n; i++) norm2 += v[i] * b->g[i];
@@ -215,7 +215,7 @@ static void limit_is_the_true_one_within_two_percent(void)
         for (int fixed = 0; fixed < 2; fixed++) {
             solid_world w;
             REQUIRE(open_kind(&w, kind, true));
-            for (int i = 0; i < 3 * fixed; i++) w.t.body.fixed[i] = 1;
+            for (int i = 0; i < 3 * fixed; i++) w.t.body.support[i] = PAL_FIXED;
             double want = 0.9 * 2 / fastest(&w, 500), limit = solid_limit(&w);
             CHECK_LE(limit, want * 1.002);
             CHECK_LE(0.97 * want, limit);
@@ -237,7 +237,7 @@ static void just_below_the_true_limit_is_stable_and_just_above_is_not(void)
         for (int above = 0; above < 2; above++) {
             solid_world w;
             REQUIRE(open_kind(&w, kind, true));
-            w.t.body.fixed[0] = w.t.body.fixed[1] = w.t.body.fixed[2] = 1;
+            w.t.body.support[0] = w.t.body.support[1] = w.t.body.support[2] = PAL_FIXED;
             double dt = (above ? 1.05 : 0.99) * 2 / fastest(&w, 500);
             solid_shake(&w, 1e-6);
             solid_run(&w, above ? 200 : CHECK_REPEATS(10000, 1000), dt);
@@ -305,9 +305,9 @@ static void limit_follows_mass_and_supports(void)
     CHECK_NEAR(solid_limit(&w) / before, 2, 1e-6);
     w.solve.effect->material(w.solve.self, &w.t.body, &w.t.def.material, NULL);
     CHECK_NEAR(solid_limit(&w) / before, 1, 1e-3);
-    memset(w.t.body.fixed, 1, (size_t)w.t.body.n_dof);
+    memset(w.t.body.support, 1, (size_t)w.t.body.n_dof);
     CHECK(isinf(solid_limit(&w)));
-    w.t.body.fixed[4] = 0;
+    w.t.body.support[4] = PAL_FREE;
     CHECK_LE(before, solid_limit(&w));
     solid_world_close(&w);
 }

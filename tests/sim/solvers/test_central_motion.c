@@ -38,7 +38,7 @@ static void undamped_energy_stays_over_many_steps(void)
 {
     solid_world w;
     REQUIRE(open_block(&w, 1, 0, true));
-    w.t.body.fixed[0] = w.t.body.fixed[1] = 1;
+    w.t.body.support[0] = w.t.body.support[1] = PAL_FIXED;
     const double dt = 0.5 * solid_limit(&w) / 0.9;
     solid_shake(&w, 0.1);
     const double before = kept_energy(&w, dt);
@@ -76,8 +76,8 @@ static void energy_of_a_bending_body_stays_within_a_percent(void)
     solid_world w;
     REQUIRE(open_block(&w, 2, 0, true));
     for (int i = 0; i < w.t.body.n_dof; i++) {
-        w.t.body.fixed[i] = w.t.body.x_rest[3 * i + 2] < -0.03;
-        w.t.body.x[3 * i] += w.t.body.fixed[i] ? 0 : 0.1 * (w.t.body.x_rest[3 * i + 2] + 0.05);
+        w.t.body.support[i] = w.t.body.x_rest[3 * i + 2] < -0.03;
+        w.t.body.x[3 * i] += w.t.body.support[i] ? 0 : 0.1 * (w.t.body.x_rest[3 * i + 2] + 0.05);
     }
     const double dt = 0.5 * solid_limit(&w) / 0.9;
     solid_run(&w, 1, dt);
@@ -140,7 +140,7 @@ static void rest_stays_rest_to_the_bit(void)
         solid_world w;
         REQUIRE(open_block(&w, 2, 2, false));
         if (drag) add_drag(&w, 4);
-        w.t.body.fixed[3] = drag ? 1 : 0;
+        w.t.body.support[3] = drag ? PAL_FIXED : PAL_FREE;
         double dt = solid_limit(&w);
         for (int i = 0; i < 50; i++) solid_run(&w, 1, dt * (1 + 0.5 * (i % 2)));
         CHECK(!memcmp(w.t.body.x, w.t.body.x_rest, 3 * sizeof(double) * (size_t)w.t.body.n_dof));
@@ -172,7 +172,7 @@ static void held_points_stand_and_led_ones_keep_their_velocity(void)
     solid_world w;
     REQUIRE(open_block(&w, 2, 1, false));
     pal_body *b = &w.t.body;
-    b->fixed[5] = 1, b->fixed[9] = 2;
+    b->support[5] = PAL_FIXED, b->support[9] = PAL_PRESCRIBED;
     for (int c = 0; c < 3; c++) b->v[15 + c] = 1, b->v[27 + c] = 0.01 * (c - 1);
     const double dt = 0.5 * solid_limit(&w);
     solid_run(&w, 50, dt);
@@ -194,7 +194,7 @@ static void led_points_pull_their_neighbours_by_the_mass_between_them(void)
     pal_body *b = &w.t.body;
     const pal_mass_operator *m = &w.t.mass;
     double want[8] = {0};
-    for (int i = 0; i < 4; i++) b->fixed[i] = 2, want[i] = 0.3;
+    for (int i = 0; i < 4; i++) b->support[i] = PAL_PRESCRIBED, want[i] = 0.3;
     solid_run(&w, 2, 1e-3);
     for (int i = 0; i < 4; i++) b->v[3 * i] = 0.3;
     solid_run(&w, 1, 1e-3);
@@ -214,7 +214,7 @@ static void all_points_held_is_fine(void)
 {
     solid_world w;
     REQUIRE(open_block(&w, 2, 1, false));
-    memset(w.t.body.fixed, 1, (size_t)w.t.body.n_dof);
+    memset(w.t.body.support, 1, (size_t)w.t.body.n_dof);
     CHECK(isinf(solid_limit(&w)));
     w.t.body.load[7] = 1e3;
     solid_run(&w, 10, 0.01);

@@ -217,7 +217,7 @@ static void a_body_at_rest_without_loads_takes_one_iteration_a_solve(void)
         b.def->material.damping_1_s = 8;
         beam_solver(&b, solver[k]);
         REQUIRE(!beam_open(&b, &diag));
-        for (int i = 0; i < b.body->n_dof; i++) b.body->v[3 * i + 2] = b.body->fixed[i] ? 0 : b.body->x[3 * i];
+        for (int i = 0; i < b.body->n_dof; i++) b.body->v[3 * i + 2] = b.body->support[i] ? 0 : b.body->x[3 * i];
         pal_world_invalidate_limits(b.world, 0);
         for (int i = 0; i < 600; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
         int n_cg = 0;

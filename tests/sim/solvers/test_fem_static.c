@@ -23,7 +23,7 @@ static void sum_forces(const fem_beam *b, double load[3], double reaction[3])
     for (int i = 0; i < b->body->n_node; i++)
         for (int c = 0; c < 3; c++) {
             load[c] += b->body->external_force ? b->body->external_force[3 * i + c] : 0;
-            if (b->body->fixed[i])
+            if (b->body->support[i])
                 reaction[c] +=
                     b->body->f[3 * i + c] - (b->body->external_force ? b->body->external_force[3 * i + c] : 0);
         }

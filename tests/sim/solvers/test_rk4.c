@@ -173,7 +173,7 @@ static double fastest(shell_plan *p, int n_round, double shift)
     pal_assemble_forces(&step);
     memcpy(f, body->f, n * sizeof *f);
     for (size_t i = 0; i < n; i++)
-        mode[i] = body->mass_kg[i / 3] > 0 && !body->fixed[i / 3] ? shell_plan_uniform(p) : 0;
+        mode[i] = body->mass_kg[i / 3] > 0 && !body->support[i / 3] ? shell_plan_uniform(p) : 0;
     for (int round = 0; round < n_round; round++) {
         double most = 0, along = 0, norm2 = 0;
         for (size_t i = 0; i < n; i++) most = fmax(most, fabs(mode[i]));
@@ -183,7 +183,7 @@ static double fastest(shell_plan *p, int n_round, double shift)
         for (size_t i = 0; i < n; i++) {
             double m = body->mass_kg[i / 3], force = (f[i] - body->f[i]) / small;
             along += force * mode[i], norm2 += m * mode[i] * mode[i];
-            mode[i] = m > 0 && !body->fixed[i / 3] ? force / m + shift * mode[i] : 0;
+            mode[i] = m > 0 && !body->support[i / 3] ? force / m + shift * mode[i] : 0;
         }
         omega2 = along / norm2;
     }
@@ -338,7 +338,7 @@ static void held_nodes_stand_and_led_ones_keep_their_velocity(void)
 {
     shell_plan p;
     REQUIRE(open_swing(&p, 4));
-    p.body->fixed[5] = 1, p.body->fixed[9] = 2;
+    p.body->support[5] = PAL_FIXED, p.body->support[9] = PAL_PRESCRIBED;
     pal_set3(p.body->v + 15, 1, 1, 1);
     pal_set3(p.body->v + 27, 0.01, 0.02, -0.03);
     shell_plan_run(&p, 50, 1e-4);

@@ -1,8 +1,9 @@
-/* Untangling of springs: patches push by the gradient of their energy, take no momentum, let go what is whole, leave
+/* Untangling of springs: regions push by the gradient of their energy, take no momentum, let go what is whole, leave
  * alone what a tool presses, and are not there for a body that is never turned over. */
 #include "server/sim/springs/spring_recovery.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/transfer/transfer_world.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 #include "tests/fixtures/boxes.h"
@@ -30,7 +31,7 @@ static void fold(box_bench *b, double from_m)
 {
     for (int i = 0; i < b->body->n_dof; i++) {
         double *x = b->body->x + 3 * i;
-        if (b->body->fixed[i] || b->body->x_rest[3 * i] < from_m) continue;
+        if (b->body->support[i] || b->body->x_rest[3 * i] < from_m) continue;
         x[0] = 2 * from_m - x[0];
         for (int c = 0; c < 3; c++) x[c] += 0.002 * (check_random01(&seed) - 0.5);
     }
@@ -47,7 +48,7 @@ static const pal_spring_set *edges_of(const box_bench *b)
     return NULL;
 }
 
-/* forces of patches at the nodes as they are */
+/* forces of regions at the nodes as they are */
 static void forces(box_bench *b)
 {
     memset(b->body->f, 0, 3 * sizeof(double) * (size_t)b->body->n_node);
@@ -60,7 +61,7 @@ static void patches_push_by_the_gradient_of_their_energy(void)
     REQUIRE(bench_open(&b, false, true, 0));
     fold(&b, 0.02);
     pal_spring_recovery *t = b.body->recovery;
-    CHECK_INT(t->n_patch, 1);
+    CHECK_INT(t->n_region, 1);
     CHECK(t->of[0].n >= 32 && t->of[0].scale > 0 && t->of[0].scale <= 1);
     forces(&b);
     double worst = 0, most = 0;
@@ -86,7 +87,7 @@ static void patches_have_no_net_force_or_torque_and_only_take_energy(void)
     box_bench b;
     REQUIRE(bench_open(&b, false, true, 0));
     fold(&b, 0.02);
-    REQUIRE(b.body->recovery->n_patch > 0 && b.body->recovery->damp_s > 0);
+    REQUIRE(b.body->recovery->n_region > 0 && b.body->recovery->damp_s > 0);
     double force[3] = {0, 0, 0}, moment[3] = {0, 0, 0}, size = 0, arm = 0, power = 0;
     forces(&b);
     for (int i = 0; i < b.body->n_dof; i++)
@@ -131,14 +132,14 @@ static void untangling_keeps_momentum_and_angular_momentum(void)
     energy[0] = pal_world_energy_J(b.world);
     pal_body_momentum(b.body, p[0]), spin(b.body, l[0]);
     int steps = 0;
-    for (; steps < 240 && (b.body->recovery->n_patch > 0 || steps < 60); steps++)
+    for (; steps < 240 && (b.body->recovery->n_region > 0 || steps < 60); steps++)
         REQUIRE(!pal_world_step(b.world, 1.0 / 60));
     pal_body_momentum(b.body, p[1]), spin(b.body, l[1]);
     energy[1] = pal_world_energy_J(b.world);
     printf("  %d steps, momentum off by %.2g, angular by %.2g, energy %.3g of the first, %llu changes\n", steps,
            pal_dist3(p[1], p[0]) / pal_norm3(p[0]), pal_dist3(l[1], l[0]) / pal_norm3(l[0]), energy[1] / energy[0],
            (unsigned long long)b.body->safeguards.n_split);
-    CHECK(b.body->recovery->n_patch == 0 && b.body->safeguards.n_split > 1);
+    CHECK(b.body->recovery->n_region == 0 && b.body->safeguards.n_split > 1);
     CHECK_LE(pal_dist3(p[1], p[0]), 1e-12 * pal_norm3(p[0]));
     CHECK_LE(pal_dist3(l[1], l[0]), 1e-10 * pal_norm3(l[0]));
     CHECK_LE(energy[1], 1.01 * energy[0]);
@@ -157,9 +158,9 @@ static void springs_are_what_they_were_once_it_is_back(void)
     pal_material to = b.scene->body[0].material;
     to.young_Pa *= 1.5;
     REQUIRE(!pal_world_material(b.world, 0, &to, &diag));
-    CHECK(edges->n_off > 0 && b.body->recovery->n_patch > 0);
+    CHECK(edges->n_off > 0 && b.body->recovery->n_region > 0);
     for (int i = 0; i < 240; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
-    CHECK_INT(b.body->recovery->n_patch, 0);
+    CHECK_INT(b.body->recovery->n_region, 0);
     CHECK(edges->n_off == 0 && !memcmp(edges->q, edges->all, n_byte));
     double sum = 0;
     for (int i = 0; i < b.body->n_dof; i++) sum += pow(pal_dist3(b.body->x + 3 * i, b.body->x_rest + 3 * i), 2);
@@ -184,7 +185,7 @@ static void what_may_not_untangle_has_nothing_for_it(void)
     box_bench_close(&b);
 }
 
-/* patches would be drawn out by a weight: soft as it is the cube hangs where its springs hold it, and stays there */
+/* regions would be drawn out by a weight: soft as it is the cube hangs where its springs hold it, and stays there */
 static void what_hangs_by_its_weight_is_left_to_its_springs(void)
 {
     pal_prepared box;
@@ -210,13 +211,13 @@ static void what_hangs_by_its_weight_is_left_to_its_springs(void)
     pal_world_destroy(world);
     REQUIRE(!pal_entry_put_bool(&scene->body[0].model, "recover", true, &diag));
     CHECK_INT(pal_world_create(scene, &diag, &world), PAL_ERR_REFUSED);
-    CHECK(strstr(diag.text, "untangle: goes with solver verlet or rk4 and without gravity only") != NULL);
+    CHECK(strstr(diag.text, "recover: goes with solver verlet or rk4 and without gravity only") != NULL);
     free(scene);
     box_free(&box);
 }
 
-/* a support that is put through its element: what hangs on it stays turned over, and its patch takes in a ring of nodes
- * every half second, whatever the length of a step */
+/* a support that is put through its element: what hangs on it stays turned over, and its region takes in a ring of
+ * nodes every half second, whatever the length of a step */
 static bool open_bent(box_bench *b)
 {
     if (!open_box(b, (const int[3]){8, 2, 2}, true, true, 8)) return false;
@@ -226,7 +227,7 @@ static bool open_bent(box_bench *b)
     return true;
 }
 
-/* the same body in another world: patches, energy and the way back are those of the first, to the bit */
+/* the same body in another world: regions, energy and the way back are those of the first, to the bit */
 static void a_world_that_follows_goes_on_untangling(void)
 {
     for (int stays = 0; stays < 2; stays++) {
@@ -234,21 +235,21 @@ static void a_world_that_follows_goes_on_untangling(void)
         REQUIRE(stays ? open_bent(&b) : bench_open(&b, true, true, 8));
         if (!stays) fold(&b, 0.015);
         for (int i = 0; i < (stays ? 20 : 1); i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
-        REQUIRE(b.body->recovery->n_patch > 0);
+        REQUIRE(b.body->recovery->n_region > 0);
         pal_world *next;
         REQUIRE(!pal_world_create(b.scene, &diag, &next));
         pal_world_transfer(next, b.world, -1, NULL, NULL);
         const pal_body *body = pal_world_body(next, 0);
-        CHECK_INT(body->recovery->n_patch, b.body->recovery->n_patch);
+        CHECK_INT(body->recovery->n_region, b.body->recovery->n_region);
         CHECK_NEAR(pal_world_energy_J(next) / pal_world_energy_J(b.world), 1, 1e-12);
         CHECK_NEAR(body->recovery->first_J, b.body->recovery->first_J, 0);
         int n_inversion = 0, n_same = 0;
         for (int i = 0; i < 60; i++) {
             REQUIRE(!pal_world_step(b.world, 1.0 / 60) && !pal_world_step(next, 1.0 / 60));
-            n_inversion += b.body->recovery->n_patch > 0;
+            n_inversion += b.body->recovery->n_region > 0;
             n_same += pal_world_hash(next) == pal_world_hash(b.world);
         }
-        printf("  %d steps with patches after it, the same bits after %d of 60, %d nodes of %d\n", n_inversion, n_same,
+        printf("  %d steps with regions after it, the same bits after %d of 60, %d nodes of %d\n", n_inversion, n_same,
                stays ? body->recovery->of[0].n : 0, stays ? b.body->recovery->of[0].n : 0);
         CHECK(stays ? n_inversion == 60 : n_inversion > 0 && n_inversion < 60);
         CHECK_INT(n_same, 60);
@@ -269,7 +270,7 @@ static void patches_grow_by_seconds_not_by_steps(void)
             if (4 * i == (2 * seen + 1) * per_s[k]) n[k][seen++] = b.body->recovery->of[0].n;
             REQUIRE(!pal_world_step(b.world, 1.0 / per_s[k]));
         }
-        CHECK_INT(b.body->recovery->n_patch, 1);
+        CHECK_INT(b.body->recovery->n_region, 1);
         printf("  %d steps a second: %d, %d, %d, %d nodes\n", per_s[k], n[k][0], n[k][1], n[k][2], n[k][3]);
         for (int i = 0; i < 4; i++) CHECK_INT(n[k][i], n[0][i]);
         for (int i = 1; i < 4; i++) CHECK(n[k][i] > n[k][i - 1]);
@@ -277,7 +278,7 @@ static void patches_grow_by_seconds_not_by_steps(void)
     }
 }
 
-/* what happens at the other end leaves a patch its times: it grows when it would have grown */
+/* what happens at the other end leaves a region its times: it grows when it would have grown */
 static void a_patch_keeps_its_times_while_another_changes(void)
 {
     const int n[3] = {8, 2, 2};
@@ -285,14 +286,14 @@ static void a_patch_keeps_its_times_while_another_changes(void)
     REQUIRE(open_bent(&b));
     for (int i = 0; i < 12; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
     const pal_spring_recovery *t = b.body->recovery;
-    REQUIRE(t->n_patch == 1);
+    REQUIRE(t->n_region == 1);
     const int n_node = t->of[0].n;
     const uint64_t n_split = b.body->safeguards.n_split;
     for (int turn = 0; turn < 5; turn++) {
         double *x = b.body->x + 3 * box_node(n, 8, 2 * (turn % 2), 2);
         x[0] -= 0.015, x[2] -= 0.015;
         pal_world_invalidate_limits(b.world, 0);
-        CHECK_INT(t->n_patch, 2);
+        CHECK_INT(t->n_region, 2);
         CHECK_NEAR(t->of[0].grow_s, (12 + 3 * turn) / 60.0, 1e-9);
         CHECK_INT(t->of[0].n, n_node);
         CHECK_LE(t->of[1].loose_s, 0);
@@ -304,7 +305,7 @@ static void a_patch_keeps_its_times_while_another_changes(void)
     box_bench_close(&b);
 }
 
-/* A support turns one end over and then draws it out, which springs would not be calm about: its patch is let go when
+/* A support turns one end over and then draws it out, which springs would not be calm about: its region is let go when
  * it has stood still for 2 s, also where the other end is turned over again and again and never stands still */
 static void a_patch_is_let_go_while_another_never_is(void)
 {
@@ -319,7 +320,7 @@ static void a_patch_is_let_go_while_another_never_is(void)
         const pal_spring_recovery *t = b.body->recovery;
         for (int c = 0; c < 3; c++) b.body->x[3 * first + c] += 0.05;
         pal_world_invalidate_limits(b.world, 0);
-        REQUIRE(t->n_patch == 1 && t->patch[first] == 0);
+        REQUIRE(t->n_region == 1 && t->region[first] == 0);
         pal_copy3(b.body->x + 3 * first, (const double[3]){-0.022, 0, 0});
         int n_in = 0, n_other = 0;
         for (int i = 0; i < 360; i++) {
@@ -329,16 +330,16 @@ static void a_patch_is_let_go_while_another_never_is(void)
             }
             pal_world_invalidate_limits(b.world, 0);
             REQUIRE(!pal_world_step(b.world, 1.0 / 60));
-            n_in += t->patch[first] >= 0;
-            n_other += t->patch[other] >= 0;
+            n_in += t->region[first] >= 0;
+            n_other += t->region[other] >= 0;
         }
-        printf("  let go after %d steps of 360, the other end in a patch after %d\n", n_in, n_other);
+        printf("  let go after %d steps of 360, the other end in a region after %d\n", n_in, n_other);
         CHECK(n_in >= 118 && n_in < 150 && (n_other > 60) == turns);
         box_bench_close(&b);
     }
 }
 
-/* rows that are switched off while there are patches leave none behind, and come back as they were */
+/* rows that are switched off while there are regions leave none behind, and come back as they were */
 static void rows_that_go_take_their_patches_with_them(void)
 {
     static const char *const row[] = {"edge_distance", "tet_volume"};
@@ -346,16 +347,16 @@ static void rows_that_go_take_their_patches_with_them(void)
         box_bench b;
         REQUIRE(bench_open(&b, true, true, 8));
         fold(&b, 0.015);
-        REQUIRE(b.body->recovery->n_patch > 0);
+        REQUIRE(b.body->recovery->n_region > 0);
         REQUIRE(!pal_world_switch_component(b.world, b.scene, 0, row[k], false, &diag));
-        CHECK_INT(b.body->recovery->n_patch, 0);
+        CHECK_INT(b.body->recovery->n_region, 0);
         for (int i = 0; i < pal_world_component_count(b.world); i++) {
             const pal_component *r = pal_world_component(b.world, i);
             const pal_spring_set *springs = r->effect->springs ? r->effect->springs(r->self) : NULL;
             if (springs) CHECK_INT(springs->n_off, 0);
         }
         REQUIRE(!pal_world_switch_component(b.world, b.scene, 0, row[k], true, &diag));
-        CHECK(b.body->recovery->n_patch > 0 && edges_of(&b)->n_off > 0);
+        CHECK(b.body->recovery->n_region > 0 && edges_of(&b)->n_off > 0);
         box_bench_close(&b);
     }
 }
@@ -370,7 +371,7 @@ static void rk4_untangles_too(void)
     REQUIRE(box_bench_start(&b));
     seed = 3;
     fold(&b, 0.015);
-    REQUIRE(b.body->recovery && b.body->recovery->n_patch > 0);
+    REQUIRE(b.body->recovery && b.body->recovery->n_region > 0);
     const double first_J = pal_world_energy_J(b.world);
     double most_J = 0;
     for (int i = 0; i < 240; i++) {
@@ -381,7 +382,7 @@ static void rk4_untangles_too(void)
     for (int i = 0; i < b.body->n_dof; i++) sum += pow(pal_dist3(b.body->x + 3 * i, b.body->x_rest + 3 * i), 2);
     printf("  rk4: energy %.3g of the first at most, %.2g of its size off rest\n", most_J / first_J,
            sqrt(sum / b.body->n_dof) / b.body->length_scale_m);
-    CHECK_INT(b.body->recovery->n_patch, 0);
+    CHECK_INT(b.body->recovery->n_region, 0);
     CHECK_LE(most_J, 1.01 * first_J);
     CHECK_LE(sqrt(sum / b.body->n_dof), 1e-3 * b.body->length_scale_m);
     box_bench_close(&b);
@@ -396,7 +397,7 @@ static void what_is_pressed_is_left_alone_until_it_is_let_go(void)
     REQUIRE(!pal_world_load(b.world, 0, node, (const double[3]){0, 0, 1e-4}));
     REQUIRE(!pal_world_step(b.world, 1.0 / 60));
     fold(&b, 0.035);
-    CHECK(b.body->recovery->n_patch == 0 && b.body->safeguards.n_inversion == 0);
+    CHECK(b.body->recovery->n_region == 0 && b.body->safeguards.n_inversion == 0);
     REQUIRE(!pal_world_load(b.world, 0, node, (const double[3]){0, 0, 0}));
     for (int i = 0; i < 2; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
     CHECK(b.body->safeguards.n_inversion > 0);

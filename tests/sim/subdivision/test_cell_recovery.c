@@ -33,7 +33,7 @@ static void elements_that_are_not_turned_over_stay_what_they_are(void)
         cell_map(&b, turn, 0.3);
         cell_shake(&b, 0.05 * edge_m(&b), 4);
         CHECK(!look(&b) && !look(&b));
-        CHECK_INT(b.row->recovery.n_patch, 0);
+        CHECK_INT(b.row->recovery.n_region, 0);
         CHECK(b.row->recovery.n_inversion == 0);
         /* the volume that was seen is that of the map */
         for (int e = 0; e < b.row->recovery.n_cell; e++) {
@@ -46,20 +46,20 @@ static void elements_that_are_not_turned_over_stay_what_they_are(void)
 
 static void a_patch_begins_with_no_more_energy_than_its_elements(void)
 {
-    int n_patch = 0;
+    int n_region = 0;
     for (int i = 0; i < CELL_BODIES; i++)
         for (uint64_t seed = 1; seed <= 5; seed++) {
             cell_body b;
             recovery(&b, i, seed);
             const double before = cell_energy(&b);
             if (look(&b)) CHECK_LE(cell_energy(&b), before * (1 + 1e-12));
-            n_patch += b.row->recovery.n_patch;
-            CHECK((b.row->recovery.n_patch > 0) == (b.row->recovery.n_away > 0));
+            n_region += b.row->recovery.n_region;
+            CHECK((b.row->recovery.n_region > 0) == (b.row->recovery.n_recovering > 0));
             /* what is there: the same again */
             CHECK(!look(&b));
             cell_free(&b);
         }
-    CHECK(n_patch >= 15);
+    CHECK(n_region >= 15);
 }
 
 /* along random directions, by central differences */
@@ -84,7 +84,7 @@ static double worst_gradient(cell_body *b, int n_try)
     return worst;
 }
 
-/* patches beside elements: the exact gradient, no net force, no net torque */
+/* regions beside elements: the exact gradient, no net force, no net torque */
 static void forces_of_patches_are_a_gradient_and_sum_up_to_nothing(void)
 {
     for (int i = 0; i < CELL_BODIES; i++) {
@@ -139,7 +139,7 @@ static void elements_come_back_when_nothing_is_turned_over(void)
                 cell_effect->reset(b.row, &b.body);
             else
                 CHECK(look(&b));
-            CHECK_INT(b.row->recovery.n_away, 0);
+            CHECK_INT(b.row->recovery.n_recovering, 0);
             cell_nth(&same, i);
             cell_map(&same, turn, 0.3);
             cell_shake(&b, 0.05, 6), cell_shake(&same, 0.05, 6);
@@ -152,7 +152,7 @@ static void elements_come_back_when_nothing_is_turned_over(void)
         }
 }
 
-/* down the slope of their energy, patches have no rest but the shape at rest, turned: mirrored, flat, on one point */
+/* down the slope of their energy, regions have no rest but the shape at rest, turned: mirrored, flat, on one point */
 static void patches_have_no_other_rest(void)
 {
     static const double map[][9] = {{-1, 0, 0, 0, 1, 0, 0, 0, 1}, {1, 0, 0, 0, 1, 0, 0, 0, 0}, {0}};
@@ -163,13 +163,13 @@ static void patches_have_no_other_rest(void)
             const int n = b.body.n_node;
             cell_map(&b, map[k], 0);
             CHECK(look(&b));
-            CHECK_INT(b.row->recovery.n_away, b.row->recovery.n_cell);
-            CHECK_INT(b.row->recovery.n_patch, 1);
-            /* at G X with the G of the patch there is no force */
-            const pal_cell_region *patch = &b.row->recovery.of[0];
-            CHECK_NEAR(fabs(patch->turn[0] * (patch->turn[4] * patch->turn[8] - patch->turn[5] * patch->turn[7]) -
-                            patch->turn[1] * (patch->turn[3] * patch->turn[8] - patch->turn[5] * patch->turn[6]) +
-                            patch->turn[2] * (patch->turn[3] * patch->turn[7] - patch->turn[4] * patch->turn[6])),
+            CHECK_INT(b.row->recovery.n_recovering, b.row->recovery.n_cell);
+            CHECK_INT(b.row->recovery.n_region, 1);
+            /* at G X with the G of the region there is no force */
+            const pal_cell_region *region = &b.row->recovery.of[0];
+            CHECK_NEAR(fabs(region->turn[0] * (region->turn[4] * region->turn[8] - region->turn[5] * region->turn[7]) -
+                            region->turn[1] * (region->turn[3] * region->turn[8] - region->turn[5] * region->turn[6]) +
+                            region->turn[2] * (region->turn[3] * region->turn[7] - region->turn[4] * region->turn[6])),
                        1, 1e-9);
             const double *f = cell_force(&b), first = cell_energy(&b);
             CHECK(k < 2 || first > 0);
@@ -178,13 +178,13 @@ static void patches_have_no_other_rest(void)
             for (int m = 0; m < n; m++)
                 for (int c = 0; c < 3; c++)
                     b.body.d[3 * m + c] =
-                        0.5 * (b.body.d[3 * m + c] + pal_dot3(patch->turn + 3 * c, b.body.node_rest + 3 * m));
+                        0.5 * (b.body.d[3 * m + c] + pal_dot3(region->turn + 3 * c, b.body.node_rest + 3 * m));
             CHECK_NEAR(cell_energy(&b) / first, 0.25, 1e-9);
             cell_free(&b);
         }
 }
 
-/* half blocks of nothing but patches are not run: of numbers that are none there is nothing in the forces. A look asks
+/* half blocks of nothing but regions are not run: of numbers that are none there is nothing in the forces. A look asks
  * for all */
 static void elements_in_patches_cost_nothing(void)
 {
@@ -194,7 +194,7 @@ static void elements_in_patches_cost_nothing(void)
         const size_t n = 3 * (size_t)b.body.n_node;
         cell_map(&b, (double[9]){-1, 0, 0, 0, 1, 0, 0, 0, 0}, 0);
         CHECK(look(&b));
-        CHECK_INT(b.row->recovery.n_away, b.row->recovery.n_cell);
+        CHECK_INT(b.row->recovery.n_recovering, b.row->recovery.n_cell);
         double *f = malloc(sizeof *f * n), *p = calloc(2 * n, sizeof *p), *kp = p + n;
         for (size_t k = 0; k < n; k++) p[k] = pal_random_unit(7, k) - 0.5;
         memcpy(f, cell_force(&b), sizeof *f * n);
@@ -228,11 +228,11 @@ static void held_parts_say_where_a_whole_body_turns_to(void)
     for (int i = 0; i < body->n_dof; i++) {
         pal_copy3(body->x_rest + 3 * i, b.cells.x + 3 * i);
         for (int c = 0; c < 3; c++) body->x[3 * i + c] = pal_dot3(turn + 3 * c, b.cells.x + 3 * i);
-        body->fixed[i] = b.cells.x[3 * i] < 0.5;
+        body->support[i] = b.cells.x[3 * i] < 0.5;
     }
     cell_map(&b, (double[9]){0}, 0);
     CHECK(look(&b));
-    CHECK_INT(b.row->recovery.n_patch, 1);
+    CHECK_INT(b.row->recovery.n_region, 1);
     CHECK(b.row->recovery.of[0].fixed);
     for (int i = 0; i < 9; i++) CHECK_NEAR(b.row->recovery.of[0].turn[i], turn[i], 1e-9);
     cell_free(&b);

@@ -146,7 +146,7 @@ static void patches_take_whole_control_cells(void)
     for (int e = 0; e < b.row->recovery.n_cell; e++) {
         int kind = e >= b.row->recovery.first[PAL_CELL_HEX] ? PAL_CELL_HEX : PAL_CELL_CUBIC;
         int home = b.row->group[kind].home[e - b.row->recovery.first[kind]];
-        all[home]++, of[home] += b.row->recovery.patch[e] >= 0;
+        all[home]++, of[home] += b.row->recovery.region[e] >= 0;
     }
     CHECK_INT(all[0] + all[1], 128);
     for (int h = 0; h < 2; h++) CHECK(of[h] == 0 || of[h] == all[h]);

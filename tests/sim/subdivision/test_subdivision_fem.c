@@ -159,22 +159,22 @@ static void masses_of_points_and_of_nodes_sum_up_to_the_solids(void)
 static void supports_hold_control_points(void)
 {
     clay c;
-    int n_held = 0;
+    int n_fixed = 0;
     clay_block(&c, 3, 0.1);
     REQUIRE(clay_plan(&c));
     for (int i = 0; i < c.body->n_dof; i++) {
-        n_held += c.body->fixed[i];
-        CHECK_INT(c.body->fixed[i], c.body->x_rest[3 * i + 2] < -0.049);
+        n_fixed += c.body->support[i];
+        CHECK_INT(c.body->support[i], c.body->x_rest[3 * i + 2] < -0.049);
     }
-    CHECK_INT(n_held, 16);
+    CHECK_INT(n_fixed, 16);
     clay_close(&c);
 
     clay_block(&c, 3, 0.1);
     c.def->support[0] = (pal_support_def){.low_m = {-1, -1, -1}, .high_m = {-0.04, -0.04, 1}};
     REQUIRE(clay_plan(&c));
-    n_held = 0;
-    for (int i = 0; i < c.body->n_dof; i++) n_held += c.body->fixed[i];
-    CHECK_INT(n_held, 4);
+    n_fixed = 0;
+    for (int i = 0; i < c.body->n_dof; i++) n_fixed += c.body->support[i];
+    CHECK_INT(n_fixed, 4);
     clay_close(&c);
 }
 

@@ -169,15 +169,15 @@ static void collapsed_bodies_split_to_finite_places(void)
 /* with both ends held, with one, with none */
 static void held_midpoints_stand_as_far_from_rest_as_the_ends_that_are_held(void)
 {
-    for (int n_held = 0; n_held <= 2; n_held++) {
+    for (int n_fixed = 0; n_fixed <= 2; n_fixed++) {
         thing t = make(SHEET, (pal_adaptive_options){.n_level = 2});
         const pal_levels *l = &t.adaptive->levels;
         const int32_t e = l->face_edge[3 * 20], mid = pal_levels_edge_midpoint(l, e);
-        t.body.fixed[mid] = 1;
-        for (int k = 0; k < n_held; k++) t.body.fixed[l->edge[e].vertex[k]] = 1;
+        t.body.support[mid] = 1;
+        for (int k = 0; k < n_fixed; k++) t.body.support[l->edge[e].vertex[k]] = 1;
         for (int i = 0; i < 35; i++) t.body.x[3 * i] += 0.01, t.body.v[3 * i] = 1;
         CHECK_INT(pal_adaptive_split(t.adaptive, &t.body, 20, 0), 1);
-        CHECK_NEAR(t.body.x[3 * mid] - t.body.x_rest[3 * mid], n_held > 0 ? 0.01 : 0, 1e-15);
+        CHECK_NEAR(t.body.x[3 * mid] - t.body.x_rest[3 * mid], n_fixed > 0 ? 0.01 : 0, 1e-15);
         CHECK_NEAR(t.body.v[3 * mid], 0, 0);
         give_back(&t);
     }

@@ -294,7 +294,7 @@ static record record_of(const thing *t)
     record r = {0};
     size_t n = (size_t)b->n_node;
     put(&r, b->x, 24 * n), put(&r, b->v, 24 * n), put(&r, b->f, 24 * n), put(&r, b->load, 24 * n);
-    put(&r, b->mass_kg, 8 * n), put(&r, b->fixed, n);
+    put(&r, b->mass_kg, 8 * n), put(&r, b->support, n);
     put(&r, s->face_state, (size_t)s->levels.first_face[s->levels.n_level]);
     put(&r, s->edge_split, (size_t)s->levels.first_edge[s->levels.n_level]);
     put(&r, s->leaf, 4 * (size_t)s->n_leaf), put(&r, s->spring, 4 * (size_t)s->n_spring);

@@ -2,6 +2,7 @@
  * surroundings nor touches the heap. */
 #include "server/sim/plan/plan.h"
 #include "server/sim/springs/spring_law.h"
+#include "server/sim/transfer/transfer_world.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 #include "tests/fixtures/boxes.h"
@@ -425,7 +426,7 @@ static void a_sliver_bears_less_of_a_lasting_load(void)
     pal_body *body = pal_world_body(world, 0);
     int thin = -1, full = -1;
     for (int i = 0; i < body->n_dof; i++) {
-        if (body->fixed[i]) continue;
+        if (body->support[i]) continue;
         if (thin < 0 || body->mass_kg[i] < body->mass_kg[thin]) thin = i;
         if (full < 0 || body->mass_kg[i] > body->mass_kg[full]) full = i;
     }
@@ -508,7 +509,7 @@ static void a_node_that_strays_bears_less_of_a_lasting_load(void)
     pal_body *body = pal_world_body(world, 0);
     int full = 0;
     for (int i = 0; i < body->n_dof; i++)
-        if (!body->fixed[i] && body->mass_kg[i] >= body->full_corner_kg) full = i;
+        if (!body->support[i] && body->mass_kg[i] >= body->full_corner_kg) full = i;
     REQUIRE(!pal_world_load(world, 0, full, (const double[3]){1e6, 0, 0}));
     CHECK_NEAR(borne_at(world, full, 1.99), 1, 1e-9);
     CHECK_NEAR(borne_at(world, full, 2.5), 0.75, 1e-9);
@@ -516,12 +517,12 @@ static void a_node_that_strays_bears_less_of_a_lasting_load(void)
     CHECK_NEAR(borne_at(world, full, 6), 0.01, 1e-9);
     /* one that is led, or held by nothing, may be anywhere */
     int fixed = 0;
-    while (!body->fixed[fixed]) fixed++;
-    body->fixed[fixed] = 2;
+    while (!body->support[fixed]) fixed++;
+    body->support[fixed] = PAL_PRESCRIBED;
     CHECK_NEAR(borne_at(world, full, 3), 1, 1e-9);
-    for (int i = 0; i < body->n_dof; i++) body->fixed[i] = 0;
+    for (int i = 0; i < body->n_dof; i++) body->support[i] = PAL_FREE;
     CHECK_NEAR(borne_at(world, full, 3), 1, 1e-9);
-    body->fixed[fixed] = 1;
+    body->support[fixed] = PAL_FIXED;
     CHECK_NEAR(borne_at(world, full, 3), 0.5, 1e-9);
     /* what is little is borne wherever it is */
     REQUIRE(!pal_world_load(world, 0, full, (const double[3]){0.009 * body->load_cap_N, 0, 0}));

@@ -1,0 +1,96 @@
+/* The probe: some steps of two worlds in turn, a look at their factors, the machine's rate of reading. */
+#include "server/estimate/estimate_cost_model.h"
+
+#include "server/base/clock.h"
+#include "server/base/machine.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { TIMED = 15 };
+/* of a step's time with fewer nodes; of the factor's entries with more */
+static const double least_growth = 0.6, most_growth = 2.2, min_fill = 1.1, most_fill = 1.6;
+/* the factor's share of a sub-step at most; power of iterations with nodes */
+static const double most_factor = 0.7, most_more = 0.15;
+/* an entry is a float, read forwards and backwards */
+static const double entry_byte = 4, entry_reads = 2;
+
+static int rising(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static void rest(pal_world *world)
+{
+    pal_body *body = pal_world_body(world, 0);
+    memcpy(body->x, body->x_rest, 3 * sizeof(double) * (size_t)body->n_dof);
+    memset(body->v, 0, 3 * sizeof(double) * (size_t)body->n_dof);
+    pal_world_invalidate_limits(world, 0);
+}
+
+/* a few steps of both from rest under the loads they have; what a sub-step took, medians, ms, and iterations of a step
+ */
+static bool time_steps(pal_world *const world[2], double step_s, double out[2], double n_cg[2])
+{
+    pal_solve_report report;
+    double ms[2][TIMED];
+    rest(world[0]), rest(world[1]);
+    for (int k = 0; k < TIMED; k++)
+        for (int v = 0; v < 2; v++) {
+            uint64_t began = pal_clock_thread_ns();
+            if (pal_world_step(world[v], step_s)) return false;
+            if (pal_world_solve_report(world[v], 0, &report)) n_cg[v] += (double)report.n_cg / TIMED;
+            ms[v][k] = 1e-6 * (double)(pal_clock_thread_ns() - began) / pal_world_substeps(world[v]);
+        }
+    for (int v = 0; v < 2; v++) {
+        qsort(ms[v], TIMED, sizeof **ms, rising);
+        out[v] = ms[v][TIMED / 2];
+    }
+    return out[0] > 0 && out[1] > 0;
+}
+
+static void count(const pal_scene *scene, double limit_s, pal_prediction *out)
+{
+    pal_configuration at = out->setting;
+    double now = out->n_node, whole = out->rest_substeps, limit_times = scene->step_s / limit_s;
+    for (int k = 0; k < 2; k++) {
+        at.size = k ? 2 * out->setting.size : out->setting.size / 2;
+        double n = at.size > 0 ? pal_configuration_estimate_nodes(scene, 0, &at) : 0;
+        out->nodes[k] = n > 0 ? n / now : k ? 8 : 0.125;
+        /* the limit of explicit solvers goes with the edge of a voxel */
+        out->substeps[k] = out->implicit ? 1 : fmax(ceil(limit_times * (k ? 2 : 0.5) - 1e-9), 1) / whole;
+    }
+}
+
+/* a sub-step's time on more nodes over that on this mesh */
+static double grown(const pal_solve_report report[2], const double n_cg[2], double along, double nodes, double fine_ms)
+{
+    double entries = (double)report[1].factor_nonzeros, fill = log(entries / (double)report[0].factor_nonzeros) / along;
+    fill = fmin(fmax(fill, min_fill), most_fill);
+    double times = pow(nodes, fill), now = pal_machine_read_ms(entry_byte * entries),
+           then = pal_machine_read_ms(entry_byte * entries * times);
+    double factor_ms = fmin(n_cg[1] * entry_reads * now, most_factor * fine_ms);
+    /* finer meshes need a few more iterations */
+    double more = n_cg[0] > 0 ? fmin(fmax(log(n_cg[1] / n_cg[0]) / along, 0), most_more) : 0;
+    if (!(now > 0 && then > 0)) return nodes;
+    return pow(nodes, more) * ((fine_ms - factor_ms) * nodes + factor_ms * fmax(then / now, times)) / fine_ms;
+}
+
+void pal_estimate_cost_model(const pal_scene *scene, pal_world *live, pal_world *small, pal_prediction *out)
+{
+    pal_world *const world[2] = {small, live};
+    double ms[2], n_cg[2] = {0, 0},
+                  along = log((double)pal_world_view_body(live, 0)->n_node / pal_world_view_body(small, 0)->n_node);
+    pal_solve_report report[2] = {{.n_cg = 0}};
+    rest(live);
+    const double limit_s = pal_world_limit_s(live);
+    if (!(along > 0) || !time_steps(world, scene->step_s, ms, n_cg)) return;
+    bool known = pal_world_solve_report(small, 0, &report[0]) && pal_world_solve_report(live, 0, &report[1]) &&
+                 report[0].factor_nonzeros > 0 && report[1].factor_nonzeros > 0;
+    count(scene, limit_s, out);
+    double growth = fmin(fmax(log(ms[1] / ms[0]) / along, least_growth), most_growth);
+    out->work[0] = pow(out->nodes[0], growth);
+    out->work[1] = known ? grown(report, n_cg, along, out->nodes[1], ms[1]) : out->nodes[1];
+}

@@ -1,0 +1,94 @@
+/* Neighbours on the knobs. */
+#include "server/estimate/estimate_predict.h"
+
+#include "server/sim/core/configuration.h"
+
+#include <math.h>
+
+enum { LEAST_SIZE = 4, MOST_SIZE = 400 };
+static const double least_step_s = 1e-4, most_step_s = 0.1, least_tolerance = 1e-12, most_tolerance = 0.5;
+
+/* nodes and sub-steps over what they are now */
+static void add(const pal_prediction *from, pal_estimate *out, const pal_configuration *setting, double ms,
+                double change_m, double nodes, double substeps)
+{
+    int n = out->n_neighbour;
+    double error_m = out->error_m + change_m;
+    if (!(ms > 0) || isnan(change_m) || error_m < 0 || out->n_neighbour == PAL_ESTIMATE_NEIGHBOURS) return;
+    out->neighbour_nodes[n] = (int)lround(from->n_node * nodes);
+    out->neighbour_substeps[n] = (int)lround(from->rest_substeps * substeps);
+    out->neighbour[out->n_neighbour++] =
+        (pal_measured_configuration){.setting = *setting, .ms = ms, .error_m = error_m};
+}
+
+/* would a switch take it? With `more` times the sub-steps in a step */
+static bool taken(const pal_prediction *from, const pal_configuration *to, double more)
+{
+    if (!from->scene) return true;
+    bool known = from->n_substep > 1, fits = !known || more * from->n_substep <= from->scene->max_substep;
+    return fits && !pal_configuration_check_live(from->scene, from->body, to, NULL);
+}
+
+/* sub-steps of all bodies over what they are now */
+static double substeps(const pal_prediction *from, int side)
+{
+    double own = from->rest_substeps, beside = from->other_substeps;
+    if (!(beside > 0)) return from->substeps[side];
+    return fmax(own * from->substeps[side], beside) / fmax(own, beside);
+}
+
+/* a step's time over what it is now */
+static double times(const pal_prediction *from, int side)
+{
+    double own = fmax(1 - from->once - from->beside, 0);
+    return from->once + substeps(from, side) * (from->beside + own * from->work[side]);
+}
+
+static void sizes(const pal_prediction *from, pal_estimate *out)
+{
+    double left[2] = {from->left[0] > 0 ? from->left[0] : exp2(from->order),
+                      from->left[1] > 0 ? from->left[1] : exp2(-from->order)};
+    pal_configuration to = from->setting;
+    /* calibrated constants hold for the size that they were found for */
+    if (!(from->setting.size > 0) || from->setting.k_distance_J > 0) return;
+    to.size = from->setting.size / 2;
+    if (to.size >= LEAST_SIZE && taken(from, &to, 1))
+        add(from, out, &to, out->ms * times(from, 0), out->discretisation_m * (left[0] - 1), from->nodes[0],
+            from->substeps[0]);
+    to.size = from->setting.size * 2;
+    if (to.size <= MOST_SIZE && taken(from, &to, from->implicit ? 1 : 2))
+        add(from, out, &to, out->ms * times(from, 1), out->discretisation_m * (left[1] - 1), from->nodes[1],
+            from->substeps[1]);
+}
+
+static void steps(const pal_prediction *from, pal_estimate *out)
+{
+    double shrink = exp2(-from->solver_order);
+    pal_configuration to = from->setting;
+    to.step_s = from->setting.step_s * 2;
+    if (to.step_s <= most_step_s && taken(from, &to, 2))
+        add(from, out, &to, out->ms / 2, out->time_m * (1 / shrink - 1), 1, 1);
+    to.step_s = from->setting.step_s / 2;
+    if (to.step_s >= least_step_s && taken(from, &to, 1))
+        add(from, out, &to, out->ms * 2, out->time_m * (shrink - 1), 1, 1);
+}
+
+static void tolerances(const pal_prediction *from, pal_estimate *out)
+{
+    pal_configuration to = from->setting;
+    to.tolerance = from->tolerance * 10;
+    if (to.tolerance <= most_tolerance && taken(from, &to, 1))
+        add(from, out, &to, out->ms / from->decade, out->algebraic_m * 9, 1, 1);
+    to.tolerance = from->tolerance / 10;
+    if (to.tolerance >= least_tolerance && taken(from, &to, 1))
+        add(from, out, &to, out->ms * from->decade, out->algebraic_m * -0.9, 1, 1);
+}
+
+void pal_estimate_predict(const pal_prediction *from, pal_estimate *out)
+{
+    out->n_neighbour = 0;
+    sizes(from, out);
+    if (!from->implicit) return;
+    steps(from, out);
+    tolerances(from, out);
+}

@@ -1,0 +1,332 @@
+/* The parts of the error of one body: the steps ahead (time and algebraic parts), the rests (the other parts). */
+#include "server/estimate/estimate_core.h"
+
+#include "server/base/clock.h"
+#include "server/base/vec3.h"
+#include "server/sim/world/zz_estimator.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_AHEAD = 12, TIMED = 7 };
+static const double ahead_s = 0.1, ahead_ms = 400;
+/* a body moved by less of its size has no error but rounding */
+static const double unmoved = 1e-9;
+
+/* ---- one estimate ---- */
+
+static int rising(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+static float ms_of(const pal_estimate_cost *c)
+{
+    return c->ms;
+}
+
+static float once_of(const pal_estimate_cost *c)
+{
+    return c->once;
+}
+
+static float beside_of(const pal_estimate_cost *c)
+{
+    return c->beside;
+}
+
+/* in the middle of the steps, as one that was interrupted says too much */
+static double middle(const pal_estimate_state *s, float (*of)(const pal_estimate_cost *))
+{
+    float value[PAL_ESTIMATE_STEPS];
+    if (s->n_cost == 0) return NAN;
+    for (int i = 0; i < s->n_cost; i++) value[i] = of(&s->cost[i]);
+    qsort(value, (size_t)s->n_cost, sizeof *value, rising);
+    return (double)value[s->n_cost / 2];
+}
+
+/* the state into a world of the same mesh, under its loads */
+static pal_err set_state(const pal_estimation *w, pal_world *world)
+{
+    const pal_estimate_state *s = &w->state;
+    pal_body *body = pal_world_body(world, 0);
+    pal_material now;
+    PAL_TRY(pal_estimate_match_components(s, world, world == w->exact ? w->exact_scene : w->scene, true));
+    pal_world_current_material(world, 0, &now);
+    if (memcmp(&now, &s->material, sizeof now)) {
+        PAL_TRY(pal_world_material(world, 0, &s->material, NULL));
+        body->load_cap_N = INFINITY;
+    }
+    for (int i = 0; i < body->n_node; i++) PAL_TRY(pal_world_load(world, 0, i, s->load + 3 * (size_t)i));
+    memcpy(body->x, s->x, 3 * sizeof(double) * (size_t)body->n_dof);
+    memcpy(body->v, s->v, 3 * sizeof(double) * (size_t)body->n_dof);
+    for (int i = 0; i < body->n_dof; i++)
+        if (body->support[i]) pal_set3(body->v + 3 * i, 0, 0, 0);
+    body->frozen = false;
+    pal_world_invalidate_limits(world, 0);
+    return PAL_ERR_OK;
+}
+
+/* n steps of dt_s from the state -> x, and what one took; false: stopped or not possible */
+static bool go_ahead(const pal_estimation *w, pal_world *world, int n, double dt_s, double *x, double *ms)
+{
+    const pal_body *body = pal_world_body(world, 0);
+    bool good = !set_state(w, world);
+    uint64_t began = pal_clock_thread_ns();
+    for (int i = 0; i < n && good; i++) good = !pal_estimate_stopped(w) && !pal_world_step(world, dt_s);
+    *ms = 1e-6 * (double)(pal_clock_thread_ns() - began) / n;
+    memcpy(x, body->x, 3 * sizeof(double) * (size_t)body->n_dof);
+    return good && pal_body_finite(body);
+}
+
+static double most_between(const double *a, const double *b, int n)
+{
+    double most = 0;
+    for (int i = 0; i < n; i++) most = fmax(most, pal_dist3(a + 3 * (size_t)i, b + 3 * (size_t)i));
+    return most;
+}
+
+/* algebraic and time parts of the steps ahead */
+static void look_ahead(pal_estimation *w, pal_estimate *out)
+{
+    double step_s = w->scene->step_s, ms = isnan(out->ms) ? 1 : out->ms;
+    int n_sub = w->state.n_substep > 0 ? w->state.n_substep : 1, n_dof = w->state.n_dof;
+    int n = (int)fmin(fmin(MOST_AHEAD, ceil(ahead_s / step_s)), fmax(1, ahead_ms / (4 * ms)));
+    pal_world *exact = w->exact ? w->exact : w->live;
+    double live_ms = NAN, exact_ms = NAN, half_ms;
+    out->algebraic_m = w->exact ? NAN : 0;
+    if (w->exact && !go_ahead(w, w->live, n, step_s, w->first, &live_ms)) return;
+    if (!go_ahead(w, exact, n * n_sub, step_s / n_sub, w->second, &exact_ms)) return;
+    if (w->exact) out->algebraic_m = most_between(w->first, w->second, n_dof);
+    if (!go_ahead(w, exact, 2 * n * n_sub, 0.5 * step_s / n_sub, w->first, &half_ms)) return;
+    if (w->exact && n_sub == 1)
+        w->prediction.decade =
+            pow(fmax(exact_ms / live_ms, 1), 1 / log10(w->prediction.tolerance / pal_estimate_tight));
+    out->time_m = most_between(w->first, w->second, n_dof) / (1 - ldexp(1, -w->prediction.solver_order));
+}
+
+/* the body's own method on the coarse mesh and on this one, under the same loads, once */
+static void price_size(pal_estimation *w)
+{
+    pal_world *small = NULL;
+    if (w->measured || !w->coarse.world) return;
+    w->measured = true;
+    pal_scene *scene = malloc(sizeof *scene);
+    if (!scene) return;
+    *scene = *w->coarse.scene;
+    scene->body[0].model = w->scene->body[0].model;
+    scene->body[0].solver = w->scene->body[0].solver;
+    if (!pal_world_create(scene, NULL, &small)) {
+        const pal_body *loaded = pal_world_view_body(w->coarse.world, 0);
+        pal_body *body = pal_world_body(small, 0);
+        (void)pal_estimate_match_components(&w->state, small, scene, true);
+        body->load_cap_N = INFINITY;
+        for (int i = 0; loaded->external_force && i < body->n_node && body->n_node == loaded->n_node; i++)
+            (void)pal_world_load(small, 0, i, loaded->external_force + 3 * (size_t)i);
+        pal_estimate_cost_model(w->scene, w->live, small, &w->prediction);
+    }
+    pal_world_destroy(small);
+    free(scene);
+}
+
+/* ---- the rests ---- */
+
+static void tell(pal_estimate *out, const char *text)
+{
+    size_t n = strlen(out->diag);
+    snprintf(out->diag + n, sizeof out->diag - n, "%s%s", n > 0 ? "; " : "", text);
+}
+
+/* The loads under which the body would rest where it is now: those that act less what is left over, which accelerates
+ * it and is taken by drag (d'Alembert). At rest they are those that act. Supports bear what is left over at theirs */
+static bool find_borne(pal_estimation *w)
+{
+    pal_estimate_state *s = &w->state;
+    pal_body *body = pal_world_body(w->live, 0);
+    if (set_state(w, w->live)) return false;
+    memset(body->v, 0, 3 * sizeof(double) * (size_t)body->n_dof);
+    if (pal_world_assemble_forces(w->live, 0)) return false;
+    memcpy(s->borne, s->load, 3 * sizeof(double) * (size_t)s->n_node);
+    for (int i = 0; i < s->n_node; i++)
+        if (!body->support[i]) pal_axpy3(s->borne + 3 * (size_t)i, -1, body->f + 3 * (size_t)i);
+    return true;
+}
+
+static double known(double part)
+{
+    return isnan(part) ? 0 : part;
+}
+
+/* the largest distance between a rest and a coarser one, at nodes of the running body that the coarser one has */
+static double change(const pal_rest_solution *rest, const pal_rest_solution *coarser)
+{
+    double most = 0;
+    for (int k = 0; k < coarser->n_common; k++) {
+        size_t i = 3 * (size_t)coarser->common[k];
+        most = fmax(most, pal_dist3(rest->x + i, coarser->x + i));
+    }
+    return most;
+}
+
+/* is the last change no smaller than the one before it? */
+static bool changes_grow(pal_estimation *w, const pal_body *body, double last)
+{
+    if (!w->coarsest.world || !pal_rest_solution_find(&w->coarsest, &w->state, body, NULL, w->stop)) return false;
+    double first = w->shown.n > 0 ? pal_display_error_change(&w->shown, PAL_DISPLAY_COARSE, PAL_DISPLAY_COARSEST)
+                                  : change(&w->coarse, &w->coarsest);
+    return first > 0 && last >= first;
+}
+
+/* how the skin hangs off its elements; how that of springs does is in how far they are from elements */
+static double skin_off(pal_estimation *w)
+{
+    return w->shown.n > 0 && !w->springs ? pal_display_error_skin(&w->shown, w->fine.x, 0) : 0;
+}
+
+static void discretise(pal_estimation *w, const pal_body *body, pal_estimate *out)
+{
+    pal_zz_error zz;
+    bool fresh = false;
+    if (!pal_zz_estimate(w->fine.world, 0, NULL, &zz, NULL)) out->energy_error_percent = zz.percent;
+    if (!pal_rest_solution_find(&w->coarse, &w->state, body, NULL, w->stop)) {
+        if (w->coarse.world) tell(out, "discretisation: the coarser mesh finds no rest under these loads");
+        return;
+    }
+    double last = w->shown.n > 0 ? pal_display_error_change(&w->shown, PAL_DISPLAY_FINE, PAL_DISPLAY_COARSE)
+                                 : change(&w->fine, &w->coarse);
+    if ((w->cut || w->thin) && !w->springs)
+        fresh = pal_estimate_hierarchy_refresh(w->scene, body, &w->prediction.setting, &w->state, w->shown.n > 0,
+                                               !w->cut, w->stop, &w->family);
+    const pal_estimate_hierarchy *f = &w->family;
+    w->prediction.left[0] = f->known ? known(f->half) : 0, w->prediction.left[1] = f->known ? known(f->twice) : 0;
+    if (w->cut) {
+        char text[80];
+        pal_estimate_hierarchy_describe(f, fresh, text, sizeof text);
+        tell(out, text);
+    }
+    if (f->known) {
+        w->prediction.order = pal_usual_order;
+        out->discretisation_m = last * f->times + skin_off(w);
+        return;
+    }
+    bool early = changes_grow(w, body, last);
+    w->prediction.order = early ? pal_early_order : pal_usual_order;
+    if (early) tell(out, "discretisation: still grows from mesh to mesh, so more may be left");
+    out->discretisation_m = last / (exp2(w->prediction.order) - 1) + skin_off(w);
+}
+
+/* Springs whose constants were fitted to converged finite elements stand nearer to these than to those of their own
+ * voxels: how far they are from where Richardson carries the two meshes' rests. That has the mesh's part in it */
+static void compare_fitted(pal_estimation *w, pal_estimate *out)
+{
+    double most = 0, more = 1 / (exp2(w->prediction.order) - 1);
+    if (w->shown.n > 0) most = pal_display_error_skin(&w->shown, w->state.x, more);
+    for (int k = 0; k < w->coarse.n_common && w->shown.n == 0; k++) {
+        size_t i = 3 * (size_t)w->coarse.common[k];
+        double limit[3];
+        for (size_t c = 0; c < 3; c++) limit[c] = w->fine.x[i + c] + more * (w->fine.x[i + c] - w->coarse.x[i + c]);
+        most = fmax(most, pal_dist3(w->state.x + i, limit));
+    }
+    out->model_m = most, out->discretisation_m = 0;
+    tell(out, "fitted: the mesh's part is in the model's");
+}
+
+static void compare_models(pal_estimation *w, const pal_body *body, pal_estimate *out)
+{
+    int n = w->state.n_node;
+    if (w->springs && w->prediction.setting.k_distance_J > 0 && out->discretisation_m > 0)
+        compare_fitted(w, out);
+    else if (w->springs) /* where they are is where they rest under what they bear */
+        out->model_m =
+            w->shown.n > 0 ? pal_display_error_skin(&w->shown, w->state.x, 0) : most_between(w->state.x, w->fine.x, n);
+    else if (!w->model.world)
+        out->model_m = !strcmp(pal_estimate_model_text(&w->scene->body[0], "law", ""), "neo_hookean") ? 0 : (double)NAN;
+    else if (pal_rest_solution_find(&w->model, &w->state, body, w->fine.x, w->stop))
+        out->model_m = most_between(w->model.x, w->fine.x, n);
+}
+
+static bool has_moved(const pal_estimation *w, const pal_estimate *out)
+{
+    return out->max_m > unmoved * pal_world_view_body(w->live, 0)->length_scale_m;
+}
+
+static void find_rests(pal_estimation *w, pal_estimate *out)
+{
+    const pal_body *body = pal_world_body(w->live, 0);
+    if (!w->fine.world) return;
+    out->locking = w->locks;
+    if (!has_moved(w, out)) {
+        if (w->coarse.world) out->discretisation_m = 0;
+        out->model_m = out->energy_error_percent = 0;
+        return;
+    }
+    if (!find_borne(w) || !pal_rest_solution_find(&w->fine, &w->state, body, w->state.x, w->stop)) {
+        out->locking = false;
+        tell(out, "no rest was found under these loads");
+        return;
+    }
+    discretise(w, body, out);
+    if (!pal_estimate_stopped(w)) compare_models(w, body, out);
+}
+
+static double largest_move(const pal_estimation *w)
+{
+    const pal_body *body = pal_world_body(w->live, 0);
+    return most_between(w->state.x, body->x_rest, w->state.n_dof);
+}
+
+/* without the large parts a sum would pass for the whole, beside those of a study that are whole */
+static void sum_up(const pal_estimation *w, pal_estimate *out)
+{
+    bool whole = !isnan(out->discretisation_m) && !(w->springs && isnan(out->model_m));
+    out->error_m = whole ? out->discretisation_m + known(out->algebraic_m) + known(out->time_m) + known(out->model_m)
+                         : (double)NAN;
+}
+
+/* asleep a step costs next to nothing: what counts is what it takes to be awake */
+static void price_sleep(pal_estimation *w, pal_estimate *out)
+{
+    if (!w->state.asleep) return;
+    if (isnan(out->ms) && !w->awake_ms) (void)go_ahead(w, w->live, TIMED, w->scene->step_s, w->first, &w->awake_ms);
+    if (isnan(out->ms)) out->ms = w->awake_ms;
+    out->asleep = true;
+    tell(out, PAL_ESTIMATE_ASLEEP);
+}
+
+/* the steps ahead of a body that stands where it was made leave rounding alone */
+static void drop_rounding(const pal_estimation *w, pal_estimate *out)
+{
+    double min_m = unmoved * pal_world_view_body(w->live, 0)->length_scale_m;
+    if (has_moved(w, out)) return;
+    if (out->time_m < min_m) out->time_m = 0;
+    if (out->algebraic_m < min_m) out->algebraic_m = 0;
+}
+
+bool pal_estimation_run(pal_estimation *w, pal_estimate *out)
+{
+    *out = (pal_estimate){.tick = w->state.tick,
+                          .time_s = w->state.time_s,
+                          .max_m = largest_move(w),
+                          .discretisation_m = NAN,
+                          .algebraic_m = NAN,
+                          .time_m = NAN,
+                          .model_m = NAN,
+                          .energy_error_percent = NAN,
+                          .ms = middle(&w->state, ms_of)};
+    memcpy(out->diag, w->diag, sizeof out->diag);
+    price_sleep(w, out);
+    look_ahead(w, out);
+    drop_rounding(w, out);
+    if (!pal_estimate_stopped(w)) find_rests(w, out);
+    sum_up(w, out);
+    if (!pal_estimate_stopped(w)) price_size(w);
+    w->prediction.n_substep = w->state.n_substep;
+    w->prediction.other_substeps = ceil(w->scene->step_s / w->state.other_limit_s * (1 - 1e-12));
+    w->prediction.once = w->state.n_cost ? middle(&w->state, once_of) : 0;
+    w->prediction.beside = w->state.n_cost ? middle(&w->state, beside_of) : 0;
+    pal_estimate_predict(&w->prediction, out);
+    return !pal_estimate_stopped(w);
+}

@@ -1,0 +1,367 @@
+/* What an estimator works with: its own scene, worlds as they run and nearly exact, meshes for the rests; and states
+ * that it is given. */
+#include "server/estimate/estimate_core.h"
+
+#include "server/base/vec3.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double usual_tolerance = 1e-2; /* of implicit solvers */
+/* voxels with less than that are cut; of the volume in them (tests/accuracy/test_effectivity.c, the gear) */
+static const double whole_fill = 0.98, much_cut = 0.1, few_across = 2.5;
+/* hexahedra with all points and tetrahedra of four nodes lock above */
+static const double locks_above = 0.47;
+
+/* ---- own scene ---- */
+
+/* a moving support stands where it is: its nodes are held, and put in place with the state */
+static void hold_led(pal_body_def *def, const pal_config_entry *item)
+{
+    if (def->n_support == PAL_SUPPORT_MAX) return;
+    if (pal_support_of_effect(item, &def->support[def->n_support])) def->n_support++;
+}
+
+/* what bears on the body but for contact, which the state's loads stand for */
+static void keep_forces(pal_body_def *def)
+{
+    static const char *const kept[] = {"gravity", "viscous", "penalty", "inflate"};
+    int n = 0;
+    for (int i = 0; i < def->n_effect; i++) {
+        bool keep = false;
+        if (!strcmp(def->effect[i].name, "moving_support")) hold_led(def, &def->effect[i]);
+        for (int k = 0; k < 4; k++) keep = keep || !strcmp(def->effect[i].name, kept[k]);
+        if (keep) def->effect[n++] = def->effect[i];
+    }
+    def->n_effect = n;
+}
+
+static pal_err make_scene(pal_estimation *w, const pal_scene *scene, int body, pal_diagnostic *diag)
+{
+    if (body < 0 || body >= scene->n_body)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body %d does not exist: the scene has %d", body,
+                                  scene->n_body);
+    w->scene = malloc(sizeof *w->scene);
+    if (!w->scene) return PAL_ERR_MEMORY;
+    *w->scene = *scene;
+    w->scene->n_body = 1;
+    w->scene->n_tool = 0;
+    pal_body_def *def = &w->scene->body[0];
+    if (body > 0) *def = scene->body[body];
+    w->skinned = !strcmp(def->output.name, "skin_output");
+    def->output.name[0] = 0;
+    keep_forces(def);
+    return PAL_ERR_OK;
+}
+
+/* ---- worlds ---- */
+
+static const pal_component *solver_of(const pal_world *world)
+{
+    for (int i = 0; i < pal_world_component_count(world); i++)
+        if (pal_world_component(world, i)->effect->stage == PAL_STAGE_SOLVE) return pal_world_component(world, i);
+    return NULL;
+}
+
+static void put_number(pal_config_entry *item, const char *key, double number)
+{
+    for (int i = 0; i < item->n_value; i++)
+        if (!strcmp(item->value[i].key, key)) {
+            item->value[i].number[0] = number;
+            return;
+        }
+    (void)pal_entry_put_number(item, key, number, NULL);
+}
+
+static pal_err make_live(pal_estimation *w, pal_diagnostic *diag)
+{
+    PAL_TRY(pal_world_create(w->scene, diag, &w->live));
+    pal_world_body(w->live, 0)->load_cap_N = INFINITY;
+    const char *solver = solver_of(w->live)->effect->name;
+    bool implicit = !strcmp(solver, "implicit_euler") || !strcmp(solver, "sdirk2"), cg = !strcmp(solver, "central_cg");
+    pal_prediction *f = &w->prediction;
+    f->implicit = implicit;
+    f->solver_order = !strcmp(solver, "implicit_euler") ? 1 : !strcmp(solver, "rk4") ? 4 : 2;
+    f->work[0] = f->work[1] = f->decade = NAN;
+    f->n_node = pal_world_body(w->live, 0)->n_node, f->rest_substeps = pal_world_substeps(w->live);
+    f->order = pal_usual_order;
+    f->tolerance = f->setting.tolerance > 0 ? f->setting.tolerance : usual_tolerance;
+    if (!implicit && !cg) return PAL_ERR_OK;
+    w->exact_scene = malloc(sizeof *w->exact_scene);
+    if (!w->exact_scene) return PAL_ERR_MEMORY;
+    *w->exact_scene = *w->scene;
+    pal_config_entry *item = &w->exact_scene->body[0].solver;
+    if (!item->name[0]) pal_entry_init(item, "solver", solver);
+    put_number(item, "tolerance", pal_estimate_tight);
+    if (implicit) put_number(item, "iterations", 400);
+    PAL_TRY(pal_world_create(w->exact_scene, diag, &w->exact));
+    pal_world_body(w->exact, 0)->load_cap_N = INFINITY;
+    return PAL_ERR_OK;
+}
+
+/* ---- bodies at rest ---- */
+
+static void say(pal_estimation *w, const char *text)
+{
+    size_t n = strlen(w->diag);
+    snprintf(w->diag + n, sizeof w->diag - n, "%s%s", n > 0 ? "; " : "", text);
+}
+
+const char *pal_estimate_model_text(const pal_body_def *def, const char *key, const char *otherwise)
+{
+    for (int i = 0; i < def->model.n_value; i++)
+        if (!strcmp(def->model.value[i].key, key)) return def->model.value[i].text;
+    return otherwise;
+}
+
+static bool nearly_incompressible(const pal_body_def *def)
+{
+    bool found = def->material.poisson > locks_above;
+    for (int k = 0; k < def->n_region; k++) {
+        const pal_region *r = &def->region[k];
+        found = found || r->poisson > locks_above;
+        for (int i = 0; r->kind == PAL_REGION_GRID && r->grid_poisson && i < r->n[0] * r->n[1] * r->n[2]; i++)
+            found = found || r->grid_poisson[i] > locks_above;
+    }
+    return found;
+}
+
+/* the hexahedra that a body of springs does not have; nothing where it is of no voxels */
+static void find_voxels(pal_estimation *w)
+{
+    pal_body_def *def = &w->scene->body[0];
+    w->voxels = *def->mesh;
+    memset(&w->voxels.hexes, 0, sizeof w->voxels.hexes);
+    if (def->mesh->hexes.n_hex == 0 && !pal_hexes_find(&def->mesh->tets, &w->voxels.hexes, NULL))
+        def->mesh = &w->voxels;
+}
+
+/* share of the volume in voxels that the surface cuts, whose part changes from mesh to mesh in no order */
+static double cut_share(const pal_hexes *hexes)
+{
+    double cut = 0, all = 0;
+    for (int e = 0; e < hexes->n_hex; e++) {
+        all += (double)hexes->fill[e];
+        if ((double)hexes->fill[e] < whole_fill) cut += (double)hexes->fill[e];
+    }
+    return all > 0 ? cut / all : 0;
+}
+
+static bool is_thin(const pal_tets *tets)
+{
+    double least = INFINITY;
+    for (int c = 0; c < 3; c++) {
+        double low = INFINITY, high = -INFINITY;
+        for (int i = 0; i < tets->n_node; i++)
+            low = fmin(low, tets->x[3 * i + c]), high = fmax(high, tets->x[3 * i + c]);
+        least = fmin(least, high - low);
+    }
+    return least < few_across * tets->edge_m;
+}
+
+/* a mesh or law that cannot be had leaves its part unknown */
+static pal_err make_rests(pal_estimation *w)
+{
+    const pal_body *body = pal_world_body(w->live, 0);
+    pal_body_def *def = &w->scene->body[0];
+    const char *element = NULL, *law = NULL;
+    pal_diagnostic diag = {""};
+    w->springs = !strcmp(def->model.name, "tet_springs");
+    if (!w->springs && strcmp(def->model.name, "fem")) {
+        say(w, "discretisation and model: not known of control cells");
+        return PAL_ERR_OK;
+    }
+    if (w->springs) find_voxels(w);
+    bool hexes = def->mesh->hexes.n_hex > 0;
+    if (w->springs) element = hexes ? "hex8_bbar" : "tet4", law = "corotational";
+    const char *is = element ? element : pal_estimate_model_text(def, "element", hexes ? "hex8_bbar" : "tet4");
+    w->locks = (!strcmp(is, "tet4") || !strcmp(is, "hex8")) && nearly_incompressible(def);
+    pal_err err = pal_rest_solution_make(w->scene, body, element, law, &diag, &w->fine);
+    if (err) {
+        say(w, diag.text);
+        return err == PAL_ERR_MEMORY ? err : PAL_ERR_OK;
+    }
+    if (pal_estimate_stopped(w)) return PAL_ERR_STATE;
+    err = pal_rest_solution_coarser(w->scene, body, element, law, &diag, &w->coarse);
+    if (err) say(w, diag.text);
+    if (pal_estimate_stopped(w)) return PAL_ERR_STATE;
+    w->cut = !err && cut_share(&def->mesh->hexes) > much_cut;
+    w->thin = !err && hexes && is_thin(&def->mesh->tets);
+    /* one that cannot be had tells nothing of the order */
+    if (!err) (void)pal_rest_solution_coarser(w->coarse.scene, body, NULL, NULL, NULL, &w->coarsest);
+    if (pal_estimate_stopped(w)) return PAL_ERR_STATE;
+    if (w->skinned) PAL_TRY(pal_display_error_make(&w->fine, &w->coarse, &w->coarsest, &w->shown));
+    bool neo = !strcmp(pal_estimate_model_text(def, "law", ""), "neo_hookean");
+    if (!w->springs && !neo && pal_rest_solution_make(w->scene, body, NULL, "neo_hookean", &diag, &w->model))
+        say(w, diag.text);
+    return PAL_ERR_OK;
+}
+
+static pal_err take_state(pal_estimation *w)
+{
+    const pal_body *body = pal_world_body(w->live, 0);
+    size_t n = 3 * (size_t)body->n_dof;
+    pal_estimate_state *s = &w->state;
+    *s = (pal_estimate_state){.n_dof = body->n_dof, .n_node = body->n_node};
+    s->x = malloc(n * sizeof(double)), s->v = malloc(n * sizeof(double));
+    s->load = malloc(3 * sizeof(double) * (size_t)body->n_node);
+    s->borne = malloc(3 * sizeof(double) * (size_t)body->n_node);
+    s->external_force = calloc(3 * (size_t)body->n_node, sizeof(double));
+    w->first = malloc(n * sizeof(double)), w->second = malloc(n * sizeof(double));
+    for (int i = 0; i < pal_world_component_count(w->live); i++) {
+        const pal_effect *effect = pal_world_component(w->live, i)->effect;
+        if (effect->stage != PAL_STAGE_FORCE || s->n_row == PAL_ESTIMATE_COMPONENTS) continue;
+        s->row[s->n_row] = effect->name;
+        s->component_enabled[s->n_row++] = true;
+    }
+    return s->x && s->v && s->load && s->external_force && s->borne && w->first && w->second ? PAL_ERR_OK
+                                                                                             : PAL_ERR_MEMORY;
+}
+
+static pal_err open_work(pal_estimation *w, const pal_scene *scene, int body, pal_diagnostic *diag)
+{
+    PAL_TRY(make_scene(w, scene, body, diag));
+    pal_configuration_of(scene, body, &w->prediction.setting);
+    w->prediction.scene = w->scene, w->prediction.body = 0;
+    PAL_TRY(make_live(w, diag));
+    if (pal_world_body(w->live, 0)->active)
+        return pal_diagnostic_set(
+            diag, PAL_ERR_REFUSED,
+            "body \"%s\" is refined while it runs: its error is not estimated (`palpate study` measures "
+            "it against its finest level)",
+            w->scene->body[0].name);
+    PAL_TRY(take_state(w));
+    PAL_TRY(make_rests(w));
+    return pal_estimate_stopped(w) ? PAL_ERR_STATE : PAL_ERR_OK;
+}
+
+pal_err pal_estimation_open(const pal_scene *scene, int body, const _Atomic bool *stop, pal_diagnostic *diag,
+                            pal_estimation **out)
+{
+    pal_estimation *w = calloc(1, sizeof *w);
+    if (!w) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for an estimator");
+    w->stop = stop;
+    pal_err err = open_work(w, scene, body, diag);
+    if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "no memory for the worlds of an estimator");
+    if (err)
+        pal_estimation_close(w);
+    else
+        *out = w;
+    return err;
+}
+
+void pal_estimation_close(pal_estimation *w)
+{
+    if (!w) return;
+    pal_world_destroy(w->live);
+    pal_world_destroy(w->exact);
+    pal_rest_solution_free(&w->fine), pal_rest_solution_free(&w->coarse), pal_rest_solution_free(&w->coarsest);
+    pal_rest_solution_free(&w->model);
+    pal_display_error_free(&w->shown);
+    pal_hexes_free(&w->voxels.hexes);
+    free(w->scene), free(w->exact_scene);
+    free(w->state.x), free(w->state.v), free(w->state.load), free(w->state.external_force), free(w->state.borne);
+    free(w->first), free(w->second);
+    pal_estimate_hierarchy_free(&w->family);
+    free(w);
+}
+
+pal_estimate_state *pal_estimation_state(pal_estimation *work)
+{
+    return &work->state;
+}
+
+static bool has_row(const pal_world *world, int body, const char *name)
+{
+    const char *of = pal_world_view_body(world, body)->name;
+    for (int i = 0; i < pal_world_component_count(world); i++) {
+        pal_component_info row;
+        pal_world_component_info(world, i, &row);
+        if (row.body == of && !strcmp(row.name, name)) return true;
+    }
+    return false;
+}
+
+pal_err pal_estimate_match_components(const pal_estimate_state *state, pal_world *world, const pal_scene *scene,
+                                      bool recipe)
+{
+    const pal_body_def *def = &scene->body[0];
+    for (int k = 0; k < state->n_row; k++) {
+        bool has = has_row(world, 0, state->row[k]), may = recipe || has;
+        for (int i = 0; i < def->n_effect; i++) may = may || !strcmp(def->effect[i].name, state->row[k]);
+        if (has == state->component_enabled[k] || !may) continue;
+        PAL_TRY(pal_world_switch_component(world, scene, 0, state->row[k], state->component_enabled[k], NULL));
+        pal_world_body(world, 0)->load_cap_N = INFINITY;
+    }
+    return PAL_ERR_OK;
+}
+
+pal_estimate_cost pal_estimate_cost_of(const pal_world *world, int body, double step_ms)
+{
+    const char *of = pal_world_view_body(world, body)->name;
+    double once_ns = 0, beside_ns = 0, own_ns = 0;
+    for (int i = 0; i < pal_world_component_count(world); i++) {
+        const pal_component *row = pal_world_component(world, i);
+        const pal_stage stage = row->effect->stage;
+        const bool inner = stage == PAL_STAGE_FORCE || stage == PAL_STAGE_SOLVE;
+        pal_component_info info;
+        pal_world_component_info(world, i, &info);
+        double *sum_ns = inner && info.body == of              ? &own_ns
+                         : inner || stage == PAL_STAGE_CONTACT ? &beside_ns
+                                                               : &once_ns;
+        *sum_ns += (double)row->spent_ns;
+    }
+    /* of the rows alone: they are on another clock than the step */
+    double all_ns = once_ns + beside_ns + own_ns;
+    pal_estimate_cost cost = {.ms = (float)step_ms};
+    if (all_ns > 0) cost.once = (float)(once_ns / all_ns), cost.beside = (float)(beside_ns / all_ns);
+    return cost;
+}
+
+/* some tool is felt, and this body bears something that nobody set: tools on another body are not this one's */
+static bool is_touched(const pal_world *world, const pal_body *body)
+{
+    const pal_tools *tools = pal_world_tools(world);
+    bool any = false, borne = false;
+    for (int t = 0; t < tools->n_tool; t++)
+        any = any || pal_dot3(tools->tool[t].mean_force_N, tools->tool[t].mean_force_N) > 0;
+    for (int i = 0; i < 3 * body->n_node && any && !borne; i++)
+        borne = body->load[i] != (body->external_force ? body->external_force[i] : 0);
+    return borne;
+}
+
+static double other_limit_s(const pal_world *world, int body)
+{
+    double least = INFINITY;
+    for (int b = 0; b < pal_world_body_count(world); b++) {
+        const pal_body *other = pal_world_view_body(world, b);
+        if (b != body && !other->asleep && !other->frozen) least = fmin(least, other->dt_limit_s);
+    }
+    return least;
+}
+
+bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int body)
+{
+    const pal_body *from = pal_world_view_body(world, body);
+    size_t n_byte = 3 * sizeof(double) * (size_t)from->n_dof;
+    if (from->n_dof != state->n_dof || from->n_node != state->n_node || from->frozen || !pal_body_finite(from))
+        return false;
+    memcpy(state->x, from->x, n_byte);
+    memcpy(state->v, from->v, n_byte);
+    memcpy(state->load, from->load, 3 * sizeof(double) * (size_t)from->n_node);
+    state->touched = is_touched(world, from);
+    if (from->external_force)
+        memcpy(state->external_force, from->external_force, 3 * sizeof(double) * (size_t)from->n_node);
+    else
+        memset(state->external_force, 0, 3 * sizeof(double) * (size_t)from->n_node);
+    state->tick = pal_world_tick(world);
+    state->time_s = pal_world_time_s(world);
+    state->n_substep = pal_world_substeps(world);
+    state->other_limit_s = other_limit_s(world, body);
+    state->asleep = from->asleep;
+    pal_world_current_material(world, body, &state->material);
+    for (int k = 0; k < state->n_row; k++) state->component_enabled[k] = has_row(world, body, state->row[k]);
+    return true;
+}

@@ -1,0 +1,466 @@
+/* Rests in other meshes: voxels merged by eights, loads and displacements handed over by shape functions.
+ *
+ * A support that ends between two coarse planes would hold another part of the body, whose error is that of a support
+ * moved by a voxel. So the coarse planes of each axis go where the coarse nodes, being held where they are, say best
+ * which fine nodes are. */
+#include "server/estimate/rest_solution.h"
+
+#include "server/base/vec3.h"
+#include "server/mesh/volume/locate.h"
+#include "server/mesh/volume/voxel_coarsening.h"
+#include "server/num/shape_functions.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    NEWTON_A_STEP = 3,
+    MOST_STEPS = 30,
+    LEAST_HEXES = 4,
+    MORE_PRESSES = 2,
+    MANY_NODES = 4000,
+    MOST_GRADIENTS = 3000
+};
+/* near enough in the work of contact; times that its loads are taken more or less at most, in one go */
+#define SAME_PRESS 0.05
+#define MOST_PART  5.0
+static const double rest_tolerance = 1e-6, drop_fill = 0.25, slack_h = 1e-6;
+/* of E h^2: what is left on a node of a body without loads is the rounding of its places, which no tolerance of loads
+ * that are 0 is met by */
+static const double nothing_left = 1e-11;
+
+/* ---- scene ---- */
+
+static pal_err put_text(pal_config_entry *item, const char *key, const char *text, pal_diagnostic *diag)
+{
+    for (int i = 0; i < item->n_value; i++)
+        if (!strcmp(item->value[i].key, key)) {
+            snprintf(item->value[i].text, sizeof item->value[i].text, "%s", text);
+            return PAL_ERR_OK;
+        }
+    return pal_entry_put_text(item, key, text, diag);
+}
+
+static pal_err make_scene(const pal_scene *scene, const char *element, const char *law, pal_diagnostic *diag,
+                          pal_rest_solution *out)
+{
+    out->scene = malloc(sizeof *out->scene);
+    if (!out->scene) return PAL_ERR_MEMORY;
+    *out->scene = *scene;
+    pal_body_def *def = &out->scene->body[0];
+    if (strcmp(def->model.name, "fem") && (element || law)) pal_entry_init(&def->model, "model", "fem");
+    if (element) PAL_TRY(put_text(&def->model, "element", element, diag));
+    if (law) PAL_TRY(put_text(&def->model, "law", law, diag));
+    pal_entry_init(&def->solver, "solver", "static_newton");
+    PAL_TRY(pal_entry_put_number(&def->solver, "tolerance", rest_tolerance, diag));
+    return pal_entry_put_number(&def->solver, "newton", NEWTON_A_STEP, diag);
+}
+
+/* a factor of many nodes takes hundreds of megabytes, and as long as conjugate gradients without one */
+static pal_err spare_memory(pal_scene *scene)
+{
+    pal_config_entry *solver = &scene->body[0].solver;
+    PAL_TRY(pal_entry_put_text(solver, "linear", "incomplete", NULL));
+    return pal_entry_put_number(solver, "iterations", MOST_GRADIENTS, NULL);
+}
+
+/* the lowest part as a box where `up` is an axis, so that it is the same part of every mesh */
+static void fix_lowest(pal_scene *scene, const pal_body *body)
+{
+    pal_body_def *def = &scene->body[0];
+    double h = body->edge_m;
+    int axis = 0;
+    for (int c = 1; c < 3; c++)
+        if (fabs(scene->up[c]) > fabs(scene->up[axis])) axis = c;
+    for (int k = 0; k < def->n_support; k++) {
+        pal_support_def *s = &def->support[k];
+        if (s->lowest && fabs(scene->up[axis]) > 1 - 1e-9) {
+            double low = INFINITY, high = -INFINITY, sign = scene->up[axis] > 0 ? 1 : -1;
+            for (int i = 0; i < body->n_node; i++) {
+                low = fmin(low, sign * body->node_rest[3 * i + axis]);
+                high = fmax(high, sign * body->node_rest[3 * i + axis]);
+            }
+            double top = sign * (low + s->fraction * (high - low));
+            *s = (pal_support_def){.lowest = false};
+            for (int c = 0; c < 3; c++) s->low_m[c] = -1e9, s->high_m[c] = 1e9;
+            *(sign > 0 ? &s->high_m[axis] : &s->low_m[axis]) = top;
+        }
+        for (int c = 0; c < 3 && !s->lowest; c++) s->low_m[c] -= slack_h * h, s->high_m[c] += slack_h * h;
+    }
+}
+
+/* ---- coarse meshes ---- */
+
+/* nodes of a voxel mesh by their place on the lattice */
+typedef struct lattice {
+    int n[3];
+    double low[3], edge_m;
+    int32_t *node; /* -1: none */
+} lattice;
+
+static size_t place(const lattice *l, const int at[3])
+{
+    return (size_t)at[0] + (size_t)l->n[0] * ((size_t)at[1] + (size_t)l->n[1] * (size_t)at[2]);
+}
+
+static pal_err make_lattice(const pal_tets *tets, lattice *l)
+{
+    double high[3];
+    size_t n = 1;
+    l->edge_m = tets->edge_m;
+    for (int c = 0; c < 3; c++) l->low[c] = INFINITY, high[c] = -INFINITY;
+    for (int i = 0; i < 3 * tets->n_node; i++)
+        l->low[i % 3] = fmin(l->low[i % 3], tets->x[i]), high[i % 3] = fmax(high[i % 3], tets->x[i]);
+    for (int c = 0; c < 3; c++) n *= (size_t)(l->n[c] = (int)floor((high[c] - l->low[c]) / l->edge_m + 1.5));
+    l->node = malloc(n * sizeof *l->node);
+    if (!l->node) return PAL_ERR_MEMORY;
+    memset(l->node, 0xff, n * sizeof *l->node);
+    for (int i = 0; i < tets->n_node; i++) {
+        int at[3];
+        for (int c = 0; c < 3; c++) at[c] = (int)floor((tets->x[3 * i + c] - l->low[c]) / l->edge_m + 0.5);
+        l->node[place(l, at)] = i;
+    }
+    return PAL_ERR_OK;
+}
+
+/* how wrong the planes of `shift` are about which nodes are held */
+static double misheld(const lattice *l, const uint8_t *fixed, int axis, int shift)
+{
+    double sum = 0;
+    int at[3];
+    for (at[2] = 0; at[2] < l->n[2]; at[2]++)
+        for (at[1] = 0; at[1] < l->n[1]; at[1]++)
+            for (at[0] = 0; at[0] < l->n[0]; at[0]++) {
+                int32_t i = l->node[place(l, at)];
+                if (i < 0 || (at[axis] + shift) % 2 == 0) continue;
+                double beside = 0;
+                int n = 0;
+                for (int side = -1; side <= 1; side += 2) {
+                    int next[3] = {at[0], at[1], at[2]};
+                    next[axis] += side;
+                    if (next[axis] < 0 || next[axis] >= l->n[axis]) continue;
+                    int32_t j = l->node[place(l, next)];
+                    if (j >= 0) beside += fixed[j] != 0, n++;
+                }
+                sum += fabs((fixed[i] != 0) - (n > 0 ? beside / n : 0));
+            }
+    return sum;
+}
+
+/* held: of the fine nodes, by supports alone */
+static pal_err choose_shift(const pal_tets *tets, const uint8_t *fixed, int shift[3])
+{
+    lattice l = {.node = NULL};
+    PAL_TRY(make_lattice(tets, &l));
+    for (int c = 0; c < 3; c++) shift[c] = misheld(&l, fixed, c, 1) < misheld(&l, fixed, c, 0);
+    free(l.node);
+    return PAL_ERR_OK;
+}
+
+/* which nodes of a mesh the boxes hold */
+static void find_held(const pal_body_def *def, const pal_tets *tets, uint8_t *fixed)
+{
+    for (int i = 0; i < tets->n_node; i++) {
+        fixed[i] = 0;
+        for (int k = 0; k < def->n_support; k++) {
+            bool in = !def->support[k].lowest && !def->support[k].rim;
+            for (int c = 0; c < 3; c++)
+                in = in && tets->x[3 * i + c] >= def->support[k].low_m[c] &&
+                     tets->x[3 * i + c] <= def->support[k].high_m[c];
+            fixed[i] |= in;
+        }
+    }
+}
+
+static pal_err merge_once(const pal_body_def *def, const pal_tets *tets, const pal_hexes *hexes, pal_prepared *out,
+                          pal_diagnostic *diag)
+{
+    int shift[3];
+    uint8_t *fixed = malloc((size_t)tets->n_node);
+    if (!fixed) return PAL_ERR_MEMORY;
+    find_held(def, tets, fixed);
+    pal_err err = choose_shift(tets, fixed, shift);
+    free(fixed);
+    if (!err) err = pal_voxels_coarsen(tets, hexes, shift, drop_fill, out, diag);
+    if (!err && out->hexes.n_hex < LEAST_HEXES) {
+        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d voxels are too few for a coarser mesh", hexes->n_hex);
+        pal_prepared_free(out);
+    }
+    return err;
+}
+
+static pal_err merge(pal_rest_solution *r, const pal_prepared *mesh, pal_diagnostic *diag)
+{
+    pal_hexes own = {0};
+    const pal_hexes *hexes = &mesh->hexes;
+    if (hexes->n_hex == 0) {
+        PAL_TRY(pal_hexes_find(&mesh->tets, &own, diag));
+        hexes = &own;
+    }
+    pal_err err = merge_once(&r->scene->body[0], &mesh->tets, hexes, &r->mesh, diag);
+    pal_hexes_free(&own);
+    return err;
+}
+
+/* ---- where the running body's nodes lie ---- */
+
+void pal_element_shape_functions(const pal_body *b, const double local[4], double *shape)
+{
+    if (b->n_corner == PAL_HEX_CORNERS)
+        pal_hex_shape(local, shape, NULL);
+    else if (b->n_corner == PAL_TET10_CORNERS)
+        pal_tet10_shape(local, shape, NULL);
+    else
+        memcpy(shape, local, 4 * sizeof *shape);
+}
+
+/* what lies outside is taken where it is nearest: extrapolated, a load would become a pair of large ones */
+static void take_inside(const pal_body *b, double local[4])
+{
+    double sum = 0;
+    bool hex = b->n_corner == PAL_HEX_CORNERS;
+    for (int c = 0; c < (hex ? 3 : 4); c++) {
+        local[c] = hex ? fmin(fmax(local[c], -1), 1) : fmax(local[c], 0);
+        sum += local[c];
+    }
+    for (int c = 0; c < 4 && !hex; c++) local[c] /= sum;
+}
+
+static pal_err find_near(pal_rest_solution *r, const pal_body *body)
+{
+    const pal_body *own = pal_world_view_body(r->world, 0);
+    pal_locate *locate = NULL;
+    int n = own->n_corner;
+    r->n_near = n;
+    r->near = malloc((size_t)r->n_node * (size_t)n * sizeof *r->near);
+    r->weight = malloc((size_t)r->n_node * (size_t)n * sizeof *r->weight);
+    r->common = malloc((size_t)r->n_node * sizeof *r->common);
+    if (!r->near || !r->weight || !r->common) return PAL_ERR_MEMORY;
+    PAL_TRY(pal_locate_create(&r->mesh.tets, n == PAL_HEX_CORNERS ? &r->mesh.hexes : NULL, &locate));
+    for (int i = 0; i < r->n_node; i++) {
+        double local[4];
+        int e = pal_locate_point(locate, body->node_rest + 3 * i, local, NULL);
+        double *weight = r->weight + (size_t)n * (size_t)i, most = 0;
+        if (r->sized) take_inside(own, local);
+        pal_element_shape_functions(own, local, weight);
+        for (int k = 0; k < n; k++) most = fmax(most, weight[k]);
+        if (most > 1 - 1e-9) r->common[r->n_common++] = i;
+        memcpy(r->near + (size_t)n * (size_t)i, own->element + (size_t)n * (size_t)e, (size_t)n * sizeof *r->near);
+    }
+    pal_locate_destroy(locate);
+    return PAL_ERR_OK;
+}
+
+/* ---- doors ---- */
+
+static pal_err open_world(pal_rest_solution *r, pal_diagnostic *diag)
+{
+    PAL_TRY(pal_world_create(r->scene, diag, &r->world));
+    pal_world_body(r->world, 0)->load_cap_N = INFINITY;
+    r->x = malloc(3 * sizeof *r->x * (size_t)r->n_node);
+    return r->x ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+pal_err pal_rest_solution_make(const pal_scene *scene, const pal_body *body, const char *element, const char *law,
+                               pal_diagnostic *diag, pal_rest_solution *out)
+{
+    *out = (pal_rest_solution){.n_node = body->n_node};
+    pal_err err = make_scene(scene, element, law, diag, out);
+    if (!err) err = open_world(out, diag);
+    if (!err && pal_world_view_body(out->world, 0)->n_node != body->n_node)
+        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "the nodes of the body at rest are others");
+    if (err) pal_rest_solution_free(out);
+    return err;
+}
+
+pal_err pal_rest_solution_coarser(const pal_scene *scene, const pal_body *body, const char *element, const char *law,
+                                  pal_diagnostic *diag, pal_rest_solution *out)
+{
+    *out = (pal_rest_solution){.n_node = body->n_node};
+    pal_err err = make_scene(scene, element, law, diag, out);
+    if (!err) fix_lowest(out->scene, body);
+    if (!err) err = merge(out, scene->body[0].mesh, diag);
+    if (!err) out->scene->body[0].mesh = &out->mesh;
+    if (!err) err = open_world(out, diag);
+    if (!err) err = find_near(out, body);
+    if (err) pal_rest_solution_free(out);
+    return err;
+}
+
+pal_err pal_rest_solution_sized(const pal_scene *scene, const pal_body *body, const pal_configuration *setting,
+                                int size, const char *law, pal_rest_solution *out)
+{
+    pal_configured_scene *set = NULL;
+    pal_configuration to = *setting;
+    *out = (pal_rest_solution){.n_node = body->n_node, .sized = true};
+    to.size = size;
+    PAL_TRY(pal_configuration_make(scene, 0, &to, NULL, &set));
+    pal_err err = make_scene(&set->scene, NULL, law, NULL, out);
+    if (!err && set->mesh.tets.n_node == 0) err = PAL_ERR_REFUSED;
+    if (!err && set->mesh.tets.n_node > MANY_NODES) err = spare_memory(out->scene);
+    if (!err) {
+        out->mesh = set->mesh;
+        memset(&set->mesh, 0, sizeof set->mesh);
+        out->scene->body[0].mesh = &out->mesh;
+        err = open_world(out, NULL);
+    }
+    pal_configured_scene_free(set);
+    if (!err) err = find_near(out, body);
+    if (err) pal_rest_solution_free(out);
+    return err;
+}
+
+void pal_rest_solution_free(pal_rest_solution *r)
+{
+    pal_world_destroy(r->world);
+    pal_prepared_free(&r->mesh);
+    free(r->scene);
+    free(r->near), free(r->weight), free(r->common), free(r->x);
+    memset(r, 0, sizeof *r);
+}
+
+/* ---- rest ---- */
+
+/* of what the state bears the loads of tools, with what of them accelerates the body */
+static void touch_at(const pal_estimate_state *s, int i, double out[3])
+{
+    pal_sub3(out, s->borne + 3 * (size_t)i, s->external_force + 3 * (size_t)i);
+}
+
+/* what the state bears, with `part` times the loads of tools in it */
+static void load_at(const pal_estimate_state *s, double part, int i, double out[3])
+{
+    double touch[3];
+    touch_at(s, i, touch);
+    pal_copy3(out, s->borne + 3 * (size_t)i);
+    pal_axpy3(out, part - 1, touch);
+}
+
+static pal_err put_loads(pal_rest_solution *r, const pal_estimate_state *state, double part)
+{
+    double load[3];
+    const pal_body *own = pal_world_view_body(r->world, 0);
+    if (r->n_near == 0) {
+        for (int i = 0; i < own->n_node; i++) {
+            load_at(state, part, i, load);
+            PAL_TRY(pal_world_load(r->world, 0, i, load));
+        }
+        return PAL_ERR_OK;
+    }
+    double *f = calloc(3 * (size_t)own->n_node, sizeof *f);
+    if (!f) return PAL_ERR_MEMORY;
+    for (int i = 0; i < r->n_node; i++) {
+        load_at(state, part, i, load);
+        for (int k = 0; k < r->n_near; k++) {
+            size_t at = (size_t)r->n_near * (size_t)i + (size_t)k;
+            pal_axpy3(f + 3 * (size_t)r->near[at], r->weight[at], load);
+        }
+    }
+    pal_err err = PAL_ERR_OK;
+    for (int i = 0; i < own->n_node && !err; i++) err = pal_world_load(r->world, 0, i, f + 3 * i);
+    free(f);
+    return err;
+}
+
+static pal_err put_state(pal_rest_solution *r, const pal_estimate_state *state, const double *from, double part)
+{
+    pal_body *own = pal_world_body(r->world, 0);
+    pal_material now;
+    PAL_TRY(pal_estimate_match_components(state, r->world, r->scene, false));
+    pal_world_current_material(r->world, 0, &now);
+    if (memcmp(&now, &state->material, sizeof now)) {
+        PAL_TRY(pal_world_material(r->world, 0, &state->material, NULL));
+        own->load_cap_N = INFINITY;
+    }
+    own->frozen = false;
+    /* from scratch after a failure, else from where it was */
+    if (!r->known) memcpy(own->x, own->x_rest, 3 * sizeof *own->x * (size_t)own->n_dof);
+    for (int i = 0; i < own->n_node && r->n_near == 0; i++)
+        if (from || own->support[i])
+            pal_copy3(own->x + 3 * i, from && !own->support[i] ? from + 3 * i : state->x + 3 * i);
+    memset(own->v, 0, 3 * sizeof *own->v * (size_t)own->n_dof);
+    pal_world_invalidate_limits(r->world, 0);
+    return put_loads(r, state, part);
+}
+
+static bool nothing_acts(const pal_rest_solution *r, double young_Pa)
+{
+    const pal_body *own = pal_world_view_body(r->world, 0);
+    double sum = 0, most = nothing_left * young_Pa * own->edge_m * own->edge_m;
+    for (int i = 0; i < own->n_dof; i++)
+        if (!own->support[i]) sum += pal_dot3(own->g + 3 * (size_t)i, own->g + 3 * (size_t)i);
+    return sum <= most * most * own->n_dof;
+}
+
+static bool converge(pal_rest_solution *r, double young_Pa, const _Atomic bool *stop)
+{
+    for (int k = 0; k < MOST_STEPS; k++) {
+        pal_solve_report report;
+        if (stop && atomic_load_explicit(stop, memory_order_acquire)) return false;
+        if (pal_world_step(r->world, r->scene->step_s) || pal_world_view_body(r->world, 0)->frozen) return false;
+        pal_world_solve_report(r->world, 0, &report);
+        if (report.converged || nothing_acts(r, young_Pa)) return true;
+        if (report.n_newton == 0) return false;
+    }
+    return false;
+}
+
+static void take_places(pal_rest_solution *r, const pal_body *body)
+{
+    const pal_body *own = pal_world_view_body(r->world, 0);
+    if (r->n_near == 0) {
+        memcpy(r->x, own->d, 3 * sizeof *r->x * (size_t)r->n_node);
+        return;
+    }
+    for (int i = 0; i < r->n_node; i++) {
+        pal_copy3(r->x + 3 * i, body->node_rest + 3 * i);
+        for (int k = 0; k < r->n_near; k++) {
+            size_t at = (size_t)r->n_near * (size_t)i + (size_t)k;
+            const double *x = own->d + 3 * (size_t)r->near[at], *rest = own->node_rest + 3 * (size_t)r->near[at];
+            pal_axpy3(r->x + 3 * i, r->weight[at], x);
+            pal_axpy3(r->x + 3 * i, -r->weight[at], rest);
+        }
+    }
+}
+
+static bool find(pal_rest_solution *r, const pal_estimate_state *state, const pal_body *body, const double *from,
+                 double part, const _Atomic bool *stop)
+{
+    bool good = !put_state(r, state, from, part) && converge(r, state->material.young_Pa, stop);
+    r->known = good;
+    if (good) take_places(r, body);
+    return good;
+}
+
+/* work of the loads of tools on the way from rest to x */
+static double pressed_J(const pal_estimate_state *s, const pal_body *body, const double *x)
+{
+    double sum = 0;
+    for (int i = 0; i < s->n_node && s->touched; i++) {
+        double u[3], touch[3];
+        pal_sub3(u, x + 3 * (size_t)i, body->node_rest + 3 * (size_t)i);
+        touch_at(s, i, touch);
+        if (!body->support[i]) sum += pal_dot3(touch, u);
+    }
+    return sum;
+}
+
+bool pal_rest_solution_find(pal_rest_solution *r, const pal_estimate_state *state, const pal_body *body,
+                            const double *from, const _Atomic bool *stop)
+{
+    if (!r->world || !find(r, state, body, from, 1, stop)) return false;
+    double want_J = pressed_J(state, body, state->x), got_J = pressed_J(state, body, r->x), part = 1, last = 0,
+           last_J = 0;
+    for (int k = 0; k < MORE_PRESSES && want_J > 0 && got_J > 0 && fabs(got_J / want_J - 1) > SAME_PRESS; k++) {
+        /* without contact what rests under other loads counts for little: the first guess is a line from nothing */
+        double slope = (got_J - last_J) / (part - last), next = part + (want_J - got_J) / slope;
+        if (!(next > part / MOST_PART && next < part * MOST_PART)) break;
+        last = part, last_J = got_J, part = next;
+        if (!find(r, state, body, r->n_near > 0 ? NULL : r->x, part, stop)) return find(r, state, body, from, 1, stop);
+        got_J = pressed_J(state, body, r->x);
+        if (!(fabs(got_J - want_J) < fabs(last_J - want_J))) return find(r, state, body, from, 1, stop);
+    }
+    return true;
+}

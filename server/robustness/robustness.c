@@ -1,0 +1,676 @@
+/* The rig that insults run on: rest, watched steps, coming back, verdicts. */
+#include "server/robustness/robustness.h"
+
+#include "server/base/clock.h"
+#include "server/base/vec3.h"
+#include "server/num/polar.h"
+#include "server/num/random.h"
+#include "server/robustness/trial.h"
+#include "server/sim/elements/elastic_hex.h"
+#include "server/sim/surface/adaptive_surface.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double back_S = 1e-3, slack = 0.01, central_slack = 0.3, verlet_slack = 0.05;
+static const double still_S_s = 1e-5; /* speed, RMS, that is rest */
+static const double least_s = 60,
+                    typical_s = 500; /* --seconds by itself: at least, and simulated time it has to reach for */
+/* energy that is nothing to be judged: of what a body weighs (or its node cap) over S */
+static const double nothing_share = 1e-9;
+
+#define ENERGY_RULE "+ 1 % (verlet 5 %, central_cg 30 %)"
+#define PATIENCE    "10 s or ten of its slowest periods (at most 120 s)"
+static const char rule_back[] =
+    "finite, not stopped, energy no more than put in " ENERGY_RULE ", rest within 0.1 % S in " PATIENCE;
+static const char rule_shape[] =
+    "finite, energy never above the insult's " ENERGY_RULE ", rest within 0.1 % S in " PATIENCE "; "
+    "springs: bounded, that rest after a reset";
+static const char rule_blown[] =
+    "the same in 25 s, or stopped by finite_guard beyond its reach and at rest after a reset";
+static const char rule_long[] = "finite, not stopped, energy no more than put in " ENERGY_RULE
+                                ", rest within 0.1 % S; explicit: or refused beyond the budget, nothing moved";
+static const char rule_refused[] = "refused, not a bit of the state changed";
+
+static const pal_robustness_case insults[] = {
+    {"teleport", "a tool jumps by S through the body in one step and back", rule_back, pal_robustness_teleport},
+    {"inside", "a tool appears in the middle of the body", rule_back, pal_robustness_inside},
+    {"pressed", "two tools press the body against each other", rule_back, pal_robustness_pressed},
+    {"meganewton", "1e6 N on one vertex for 1 s, then gone", rule_back, pal_robustness_meganewton},
+    {"flat", "all free nodes in one plane", rule_shape, pal_robustness_flat},
+    {"point", "all free nodes on one point", rule_shape, pal_robustness_point},
+    {"mirrored", "all free nodes mirrored", rule_shape, pal_robustness_mirrored},
+    {"shuffled", "all free nodes anywhere in the box", rule_shape, pal_robustness_shuffled},
+    {"blown_up", "all free nodes a hundred times as far apart", rule_blown, pal_robustness_blown_up},
+    {"stretched", "all free nodes eight times as far apart", rule_shape, pal_robustness_stretched},
+    {"dt_x10", "steps ten times as long after a blow", rule_long, pal_robustness_long_step},
+    {"dt_x100", "steps a hundred times as long after a blow", rule_long, pal_robustness_longer_step},
+    {"numbers", "poses, loads, materials and steps of NaN, Inf and 1e300", rule_refused, pal_robustness_numbers},
+    {"poisoned", "a NaN in the state of one body", "that body alone stops, says which node, and is reset alone",
+     pal_robustness_poisoned},
+    {"supports", "what is held is let go and held elsewhere while deformed, then back",
+     "energy rises by at most 1 % at a switch, stands still within " PATIENCE, pal_robustness_supports},
+    {"stiffer", "stiffness times a thousand while loaded, then back", "finite, not stopped, rest within 0.1 % S",
+     pal_robustness_stiffer},
+    {"random", "300 steps of random poses, grabs, loads, materials and brushes, good and bad",
+     "finite, not stopped, rest within 0.1 % S", pal_robustness_random},
+    {"hour", "an hour at rest under load",
+     "all 3,600 s watched, drift below 1e-6 S, kinetic energy below 1e-9 of what is stored", pal_robustness_hour},
+};
+enum { N_INSULT = sizeof insults / sizeof insults[0] };
+
+int pal_robustness_case_count(void)
+{
+    return N_INSULT;
+}
+
+const char *pal_robustness_case_name(int insult)
+{
+    return insults[insult].name;
+}
+
+const char *pal_robustness_case_about(int insult)
+{
+    return insults[insult].what;
+}
+
+const char *pal_verdict_name(pal_verdict verdict)
+{
+    static const char *const name[] = {"passed", "FAILED", "undecided", "does not apply", "collapsed"};
+    return name[verdict];
+}
+
+void pal_robustness_default(pal_robustness_options *options)
+{
+    *options = (pal_robustness_options){.seed = 1};
+}
+
+/* ---- what insults say ---- */
+
+void pal_trial_report(pal_trial *trial, const char *format, ...)
+{
+    char *text = trial->out->diag;
+    size_t used = strlen(text), room = sizeof trial->out->diag;
+    va_list list;
+    va_start(list, format);
+    if (used > 0 && used + 2 < room) used += (size_t)snprintf(text + used, room - used, "; ");
+    if (used < room) vsnprintf(text + used, room - used, format, list);
+    va_end(list);
+}
+
+void pal_trial_skip(pal_trial *trial, const char *format, ...)
+{
+    va_list list;
+    va_start(list, format);
+    vsnprintf(trial->out->diag, sizeof trial->out->diag, format, list);
+    va_end(list);
+    trial->out->verdict = PAL_VERDICT_SKIPPED;
+}
+
+void pal_trial_fail(pal_trial *trial, const char *format, ...)
+{
+    char text[200];
+    va_list list;
+    va_start(list, format);
+    vsnprintf(text, sizeof text, format, list);
+    va_end(list);
+    pal_trial_report(trial, "%s", text);
+    trial->out->verdict = PAL_VERDICT_FAILED;
+}
+
+void pal_trial_undecided(pal_trial *trial, const char *format, ...)
+{
+    char text[200];
+    va_list list;
+    va_start(list, format);
+    vsnprintf(text, sizeof text, format, list);
+    va_end(list);
+    pal_trial_report(trial, "%s", text);
+    if (trial->out->verdict == PAL_VERDICT_PASSED) trial->out->verdict = PAL_VERDICT_UNDECIDED;
+}
+
+double pal_trial_random(pal_trial *trial)
+{
+    return pal_random_unit(trial->options->seed, trial->count++);
+}
+
+/* ---- measures ---- */
+
+/* points that are there in every state of a body: of one that adapts those of its coarsest level */
+static int common_points(const pal_body *body)
+{
+    return body->active ? body->dofs.levels->n_vertex[0] : body->n_dof;
+}
+
+static bool is_free(const pal_body *body)
+{
+    for (int i = 0; i < body->n_dof; i++)
+        if (body->support[i]) return false;
+    return true;
+}
+
+static double held_rms(const pal_body *body, const double *rest)
+{
+    int n = common_points(body);
+    double sum = 0;
+    for (int i = 0; i < 3 * n; i++) sum += (body->x[i] - rest[i]) * (body->x[i] - rest[i]);
+    return sqrt(sum / n);
+}
+
+/* after the best rigid motion */
+static double free_rms(const pal_body *body, const double *rest)
+{
+    int n = common_points(body);
+    double c[3] = {0, 0, 0}, o[3] = {0, 0, 0}, f[9] = {0}, q[4] = {1, 0, 0, 0}, r[9], sum = 0;
+    for (int i = 0; i < n; i++) {
+        pal_axpy3(c, 1.0 / n, body->x + 3 * (size_t)i);
+        pal_axpy3(o, 1.0 / n, rest + 3 * (size_t)i);
+    }
+    for (int i = 0; i < n; i++)
+        for (int a = 0; a < 3; a++)
+            for (int b = 0; b < 3; b++)
+                f[3 * a + b] += (body->x[3 * (size_t)i + (size_t)a] - c[a]) * (rest[3 * (size_t)i + (size_t)b] - o[b]);
+    pal_polar_rotation(f, q, 100);
+    pal_quat_matrix(q, r);
+    for (int i = 0; i < n; i++) {
+        double from[3], to[3];
+        pal_sub3(from, rest + 3 * (size_t)i, o);
+        pal_mul33(to, r, from);
+        pal_add3(to, to, c);
+        sum += pow(pal_dist3(to, body->x + 3 * (size_t)i), 2);
+    }
+    return sqrt(sum / n);
+}
+
+/* springs whose shape was taken away, and what its guard has stopped where it may, need not come back by themselves */
+static bool excused(const pal_trial *trial, int b)
+{
+    return trial->may_stay[b] || (trial->may_stop[b] && trial->stopped[b]);
+}
+
+static double body_left(const pal_trial *trial, int b)
+{
+    const pal_body *body = pal_world_body(trial->world, b);
+    return (is_free(body) ? free_rms(body, trial->rest[b]) : held_rms(body, trial->rest[b])) / body->length_scale_m;
+}
+
+double pal_trial_deviation_S(const pal_trial *trial)
+{
+    double most = 0;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        double left = body_left(trial, b);
+        if (!(left <= most)) most = left;
+    }
+    return most;
+}
+
+/* of the bodies that have to come back */
+static double asked_left(const pal_trial *trial)
+{
+    double most = 0;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        double left = excused(trial, b) ? 0 : body_left(trial, b);
+        if (!(left <= most)) most = left;
+    }
+    return most;
+}
+
+/* of lasting loads since rest, as they act: shortened to the cap */
+static double work_J(const pal_body *body)
+{
+    double sum = 0;
+    for (int k = 0; k < pal_body_nodes(body) && body->external_force; k++) {
+        size_t i = 3 * (size_t)pal_body_point(body, k);
+        double size = pal_norm3(body->external_force + i), way[3];
+        if (!(size > 0)) continue;
+        pal_sub3(way, body->d + i, body->node_rest + i);
+        sum += fmin(1, pal_body_node_load_cap_N(body, (int)(i / 3)) / size) * pal_dot3(body->external_force + i, way);
+    }
+    return sum;
+}
+
+double pal_trial_energy(const pal_trial *trial)
+{
+    double sum = pal_world_energy_J(trial->world);
+    for (int b = 0; b < trial->scene->n_body; b++) sum -= work_J(pal_world_body(trial->world, b));
+    return sum;
+}
+
+/* cubes and their split store other energies in the same shape: the larger one */
+static double shape_energy(const pal_trial *trial)
+{
+    double now = pal_trial_energy(trial);
+    for (int i = 0; i < pal_world_component_count(trial->world); i++) {
+        const pal_component *row = pal_world_component(trial->world, i);
+        pal_elastic_hexes *hex = strcmp(row->effect->name, "hex_elastic") ? NULL : row->self;
+        if (!hex || !hex->split) continue;
+        hex->has_inversion = !hex->has_inversion;
+        now = fmax(now, pal_trial_energy(trial));
+        hex->has_inversion = !hex->has_inversion;
+    }
+    return now;
+}
+
+static uint64_t count_splits(const pal_trial *trial)
+{
+    uint64_t n = 0;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(trial->world, b);
+        /* patches of springs begin and end with no more than there was */
+        if (!body->recovery) n += body->safeguards.n_split;
+    }
+    return n;
+}
+
+void pal_trial_rebase(pal_trial *trial)
+{
+    trial->base_J = shape_energy(trial);
+    trial->n_split = count_splits(trial); /* of a world that was made or reset it begins anew */
+    trial->allowed_J = 0;
+    trial->scale_J = fmax(trial->scale_J, fabs(pal_world_energy_J(trial->world) - trial->rest_J));
+}
+
+void pal_trial_positions_set(pal_trial *trial)
+{
+    for (int b = 0; b < trial->scene->n_body; b++) pal_world_invalidate_limits(trial->world, b);
+    pal_trial_rebase(trial);
+}
+
+void pal_trial_exclude_rise(pal_trial *trial, double energy_J)
+{
+    if (!(energy_J > trial->base_J)) return;
+    trial->excluded_rise_J += energy_J - trial->base_J;
+    trial->base_J = energy_J;
+}
+
+bool pal_trial_has_springs(const pal_trial *trial, int b)
+{
+    return !strcmp(trial->scene->body[b].model.name, "tet_springs");
+}
+
+double pal_trial_load_cap_N(const pal_trial *trial, int b)
+{
+    const pal_body *body = pal_world_body(trial->world, b);
+    double mass = 0;
+    for (int i = 0; i < body->n_node; i++) mass += body->node_mass_kg[i];
+    return fmin(body->load_cap_N, 9.81 * mass);
+}
+
+int pal_trial_far_node(const pal_trial *trial, int b)
+{
+    const pal_body *body = pal_world_body(trial->world, b);
+    double from[3] = {0, 0, 0}, most = -1;
+    int n = 0, far = pal_body_point(body, 0);
+    for (int i = 0; i < body->n_dof; i++)
+        if (body->support[i]) pal_add3(from, from, body->x_rest + 3 * (size_t)i), n++;
+    for (int k = 0; k < pal_body_nodes(body) && n == 0; k++)
+        pal_axpy3(from, 1.0 / pal_body_nodes(body), body->node_rest + 3 * (size_t)pal_body_point(body, k));
+    if (n > 0) pal_scale3(from, 1.0 / n, from);
+    for (int k = 0; k < pal_body_nodes(body); k++) {
+        int i = pal_body_point(body, k);
+        double way = pal_dist3(body->node_rest + 3 * (size_t)i, from);
+        if (way > most) most = way, far = i;
+    }
+    return far;
+}
+
+void pal_trial_box(const pal_trial *trial, int b, double low_m[3], double high_m[3])
+{
+    const pal_body *body = pal_world_body(trial->world, b);
+    for (int c = 0; c < 3; c++) low_m[c] = INFINITY, high_m[c] = -INFINITY;
+    for (int k = 0; k < pal_body_nodes(body); k++)
+        for (int c = 0; c < 3; c++) {
+            double at = body->d[3 * (size_t)pal_body_point(body, k) + (size_t)c] + body->offset_m[c];
+            low_m[c] = fmin(low_m[c], at), high_m[c] = fmax(high_m[c], at);
+        }
+}
+
+/* ---- watched steps ---- */
+
+/* every n-th step; when the room is full every second sample goes */
+static void sample(pal_trial *trial)
+{
+    pal_robustness_result *out = trial->out;
+    if (++trial->since < trial->n_skip) return;
+    trial->since = 0;
+    if (out->n_sample == PAL_ROBUSTNESS_SAMPLES) {
+        for (int i = 0; i < PAL_ROBUSTNESS_SAMPLES / 2; i++)
+            out->time_s[i] = out->time_s[2 * i], out->energy_J[i] = out->energy_J[2 * i];
+        out->n_sample /= 2;
+        trial->n_skip *= 2;
+    }
+    out->time_s[out->n_sample] = out->simulated_s;
+    out->energy_J[out->n_sample++] = pal_world_energy_J(trial->world) - trial->rest_J;
+}
+
+static void look(pal_trial *trial)
+{
+    pal_robustness_result *out = trial->out;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(trial->world, b);
+        out->finite &= pal_body_finite(body);
+        if (body->frozen && !out->frozen) pal_trial_report(trial, "%s stopped: %s", body->name, body->reason);
+        out->frozen |= body->frozen, trial->stopped[b] |= body->frozen;
+    }
+    double energy = pal_world_energy_J(trial->world);
+    trial->scale_J = fmax(trial->scale_J, fabs(energy - trial->rest_J));
+    /* cubes and their split store other energies in one shape */
+    uint64_t n_split = count_splits(trial);
+    if (n_split != trial->n_split) pal_trial_exclude_rise(trial, pal_trial_energy(trial));
+    trial->n_split = n_split;
+    trial->excess_J = fmax(trial->excess_J, pal_trial_energy(trial) - trial->base_J - trial->allowed_J);
+    sample(trial);
+}
+
+/* a body stopped that may not, or all of them: no use in going on */
+static bool halted(const pal_trial *trial)
+{
+    int n = 0;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        if (trial->stopped[b] && !trial->may_stop[b]) return true;
+        n += trial->stopped[b];
+    }
+    return n == trial->scene->n_body;
+}
+
+bool pal_trial_step(pal_trial *trial, double dt_s)
+{
+    pal_err err = pal_world_step(trial->world, dt_s);
+    pal_world_remove_idle(trial->world);
+    trial->err = err;
+    if (err == PAL_ERR_BUDGET || err == PAL_ERR_REFUSED) return false;
+    trial->out->simulated_s += dt_s;
+    if (!pal_trial_step_twin(trial, dt_s)) trial->rests = false;
+    look(trial);
+    trial->late = 1e-9 * (double)pal_clock_thread_ns() > trial->deadline_s;
+    return trial->out->finite && !halted(trial) && !trial->late;
+}
+
+bool pal_trial_run(pal_trial *trial, double seconds)
+{
+    int n = (int)ceil(seconds / trial->scene->step_s);
+    for (int i = 0; i < n; i++)
+        if (!pal_trial_step(trial, trial->scene->step_s)) return false;
+    return true;
+}
+
+void pal_trial_relax(pal_trial *trial, double seconds)
+{
+    pal_robustness_result *out = trial->out;
+    double begin = out->simulated_s, hold_s = 0.25, rest_time_s = 0;
+    int n = (int)ceil((seconds < 10 ? seconds : fmax(seconds, trial->return_time_s)) / trial->scene->step_s);
+    out->return_s = INFINITY;
+    trial->needs_rest = true, trial->has_returned = false;
+    for (int i = 0; i < n && out->finite && !halted(trial) && !trial->late; i++) {
+        if (!pal_trial_step(trial, trial->scene->step_s)) break;
+        double left = pal_trial_deviation_S(trial), now = out->simulated_s - begin;
+        if (!(left <= back_S))
+            out->return_s = INFINITY;
+        else if (isinf(out->return_s))
+            out->return_s = now;
+        if (now - out->return_s >= hold_s) break;
+        /* what does not move any more will not come back either */
+        rest_time_s = pal_trial_speed_S_s(trial) <= still_S_s ? rest_time_s + trial->scene->step_s : 0;
+        if (rest_time_s > 2 * hold_s) break;
+    }
+    out->deviation_S = pal_trial_deviation_S(trial);
+    trial->has_returned = out->return_s < INFINITY || asked_left(trial) <= back_S;
+}
+
+/* ---- verdicts ---- */
+
+static void sum_rescues(pal_trial *trial)
+{
+    pal_safeguards *to = &trial->out->safeguards;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        const pal_safeguards *from = &pal_world_body(trial->world, b)->safeguards;
+        to->n_capped += from->n_capped, to->n_clamped += from->n_clamped, to->n_mass_scaled += from->n_mass_scaled;
+        to->n_inversion += from->n_inversion, to->n_split += from->n_split, to->n_search += from->n_search;
+        to->n_tool_reset += from->n_tool_reset, to->n_stopped += from->n_stopped, to->ns += from->ns;
+    }
+}
+
+static double energy_limit(const pal_trial *trial)
+{
+    double limit = slack;
+    for (int i = 0; i < pal_world_component_count(trial->world); i++) {
+        const char *name = pal_world_component(trial->world, i)->effect->name;
+        if (!strcmp(name, "verlet")) limit = fmax(limit, verlet_slack);
+        if (!strcmp(name, "central_cg")) limit = central_slack;
+    }
+    return limit;
+}
+
+/* what was put in less than this is rounding, and a share of it says nothing */
+static double nothing_J(const pal_trial *trial, int b)
+{
+    return nothing_share * pal_trial_load_cap_N(trial, b) * pal_world_body(trial->world, b)->length_scale_m;
+}
+
+static void judge(pal_trial *trial)
+{
+    pal_robustness_result *out = trial->out;
+    bool judged = !isnan(out->energy) && trial->scale_J > 0 && !trial->twin; /* who leads it does work all the time */
+    for (int b = 0; b < trial->scene->n_body; b++) trial->scale_J = fmax(trial->scale_J, nothing_J(trial, b));
+    out->limit = energy_limit(trial);
+    out->energy = judged ? trial->excess_J / trial->scale_J : (double)NAN;
+    out->excluded_rise = judged ? trial->excluded_rise_J / trial->scale_J : (double)NAN;
+    if (out->verdict == PAL_VERDICT_SKIPPED) return;
+    if (!out->finite) pal_trial_fail(trial, "a number was none");
+    for (int b = 0; b < trial->scene->n_body; b++)
+        if (trial->stopped[b] && !trial->may_stop[b])
+            pal_trial_fail(trial, "%s was stopped", trial->scene->body[b].name);
+    if (out->finite && !out->frozen && judged && !(out->energy <= out->limit))
+        pal_trial_fail(trial, "energy rose by %.2g of what was put in, allowed %.2g", out->energy, out->limit);
+    if (out->verdict == PAL_VERDICT_FAILED || out->verdict == PAL_VERDICT_UNDECIDED) return;
+    bool all_excused = true;
+    for (int b = 0; b < trial->scene->n_body; b++) all_excused = all_excused && excused(trial, b);
+    if (trial->late && !all_excused && !(trial->needs_rest && trial->has_returned))
+        pal_trial_undecided(trial, "not judged, the time was over after %.1f simulated s: give more --seconds",
+                            out->simulated_s);
+    else if (trial->needs_rest && !trial->rests && !trial->twin)
+        pal_trial_undecided(trial, "not judged, the scene does not come to rest by itself");
+    else if (trial->needs_rest && !trial->has_returned)
+        pal_trial_fail(trial, "%.2g %% S from rest at the end", 100 * asked_left(trial));
+}
+
+/* what was stopped, or stayed where it was, has to come to rest after a reset; the figures of the insult are kept */
+static void check_reset(pal_trial *trial, double seconds)
+{
+    const double max_cpu_s = 10;
+    pal_robustness_result *out = trial->out, was = *out;
+    const double now = 1e-9 * (double)pal_clock_thread_ns();
+    pal_world_reset(trial->world);
+    if (trial->twin) pal_world_reset(trial->twin);
+    out->frozen = false, out->n_sample = 0, trial->late = false;
+    memset(trial->stopped, 0, sizeof trial->stopped);
+    memset(trial->may_stay, 0, sizeof trial->may_stay);
+    trial->deadline_s = fmax(trial->deadline_s, now + 0.5 * seconds);
+    pal_trial_relax(trial, max_cpu_s);
+    const double left = out->deviation_S;
+    const bool stopped = out->frozen || !out->finite, back = trial->has_returned;
+    memcpy(was.diag, out->diag, sizeof was.diag);
+    *out = was;
+    if (stopped)
+        pal_trial_fail(trial, "a reset did not bring it back");
+    else if (trial->rests && !back && trial->late)
+        pal_trial_undecided(trial, "not judged after its reset: give more --seconds");
+    else if (trial->rests && !back)
+        pal_trial_fail(trial, "%.2g %% S from rest %.0f s after a reset", 100 * left, max_cpu_s);
+}
+
+/* a solid of control cells that was folded has other rests, as elements of one rotation each do: what helps */
+static bool is_folded(const pal_trial *trial)
+{
+    bool away = trial->out->verdict == PAL_VERDICT_FAILED && trial->needs_rest && !trial->has_returned && !trial->late;
+    for (int b = 0; b < trial->scene->n_body && away; b++)
+        if (pal_world_body(trial->world, b)->interpolation && !(body_left(trial, b) <= back_S)) return true;
+    return false;
+}
+
+static void advise(pal_trial *trial)
+{
+    bool central = energy_limit(trial) == central_slack;
+    pal_trial_report(trial, "a reset brings it back%s", central ? ", solver implicit_euler comes back from more" : "");
+}
+
+/* springs whose shape was taken away and that did not find it again by themselves */
+static bool has_collapsed(const pal_trial *trial)
+{
+    for (int b = 0; b < trial->scene->n_body; b++)
+        if (trial->may_stay[b] && (trial->stopped[b] || !(body_left(trial, b) <= back_S))) return true;
+    return false;
+}
+
+static void run_one(pal_trial *trial, const pal_robustness_case *insult, double seconds)
+{
+    pal_robustness_result *out = trial->out;
+    double begin = 1e-9 * (double)pal_clock_thread_ns();
+    *out = (pal_robustness_result){.name = insult->name,
+                                   .what = insult->what,
+                                   .criterion = insult->criterion,
+                                   .finite = true,
+                                   .deviation_S = NAN,
+                                   .return_s = NAN};
+    trial->deadline_s = begin + seconds;
+    trial->base_J = trial->scale_J = trial->excess_J = trial->allowed_J = trial->excluded_rise_J = 0;
+    trial->n_skip = 1, trial->since = 0, trial->count = 0;
+    trial->late = trial->needs_rest = trial->has_returned = false;
+    memset(trial->stopped, 0, sizeof trial->stopped);
+    memset(trial->may_stop, 0, sizeof trial->may_stop);
+    memset(trial->may_stay, 0, sizeof trial->may_stay);
+    if (!pal_trial_back_to_rest(trial)) {
+        pal_trial_undecided(trial, "not judged, the scene did not come to rest before it");
+        return;
+    }
+    pal_trial_rebase(trial);
+    sample(trial);
+    insult->run(trial);
+    sum_rescues(trial);
+    judge(trial);
+    const bool folded = is_folded(trial), collapsed = has_collapsed(trial);
+    bool reset = out->frozen || folded;
+    for (int b = 0; b < trial->scene->n_body; b++) reset = reset || (trial->may_stay[b] && !(out->return_s < INFINITY));
+    if (out->verdict != PAL_VERDICT_SKIPPED && reset) check_reset(trial, seconds);
+    if (folded && trial->has_returned) advise(trial);
+    if (collapsed && out->verdict == PAL_VERDICT_PASSED) {
+        out->verdict = PAL_VERDICT_COLLAPSED;
+        pal_trial_report(trial, "a reset brings it back");
+    }
+    out->took_s = 1e-9 * (double)pal_clock_thread_ns() - begin;
+}
+
+/* ---- all of them ---- */
+
+static void look_at_rows(pal_trial *trial)
+{
+    bool first = true;
+    for (int i = 0; i < pal_world_component_count(trial->world); i++) {
+        const char *name = pal_world_component(trial->world, i)->effect->name;
+        trial->anew |= !strcmp(name, "moving_support") || !strcmp(name, "inflate");
+        if (strcmp(name, "tool_push")) continue;
+        pal_component_info info;
+        pal_world_component_info(trial->world, i, &info);
+        for (int b = 0; b < trial->scene->n_body && first; b++)
+            if (info.body == pal_world_body(trial->world, b)->name) trial->body = b, first = false;
+        trial->touches = true;
+    }
+    for (int b = 0; b < trial->scene->n_body; b++) trial->anew |= pal_world_body(trial->world, b)->active != NULL;
+}
+
+static pal_err open_rig(pal_trial *trial, const pal_scene *scene)
+{
+    trial->scene = malloc(sizeof *trial->scene);
+    if (!trial->scene) return PAL_ERR_MEMORY;
+    *trial->scene = *scene;
+    if (scene->n_tool < 2) {
+        pal_tool_def own = scene->tool[0];
+        pal_tools_default(trial->scene, 2);
+        if (scene->n_tool == 1) trial->scene->tool[0] = own;
+    }
+    PAL_TRY(pal_world_create(trial->scene, trial->diag, &trial->world));
+    for (int b = 0; b < scene->n_body; b++) {
+        size_t n3 = 3 * (size_t)pal_world_body(trial->world, b)->n_dof;
+        trial->rest[b] = calloc(n3 + 1, sizeof(double));
+        trial->start[b] = calloc(n3 + 1, sizeof(double));
+        if (!trial->rest[b] || !trial->start[b]) return PAL_ERR_MEMORY;
+    }
+    look_at_rows(trial);
+    return PAL_ERR_OK;
+}
+
+static void close_rig(pal_trial *trial)
+{
+    pal_world_destroy(trial->world);
+    pal_world_destroy(trial->twin);
+    for (int b = 0; b < PAL_BODY_MAX; b++) free(trial->rest[b]), free(trial->start[b]);
+    free(trial->scene);
+}
+
+static void count(pal_robustness_report *out)
+{
+    for (int i = 0; i < out->n; i++) {
+        pal_verdict verdict = out->result[i].verdict;
+        out->n_passed += verdict == PAL_VERDICT_PASSED, out->n_failed += verdict == PAL_VERDICT_FAILED;
+        out->n_collapsed += verdict == PAL_VERDICT_COLLAPSED;
+        out->n_undecided += verdict == PAL_VERDICT_UNDECIDED, out->n_skipped += verdict == PAL_VERDICT_SKIPPED;
+    }
+}
+
+/* processor time for everything: by what a step costs from the pose that was found */
+static double enough_s(pal_trial *trial)
+{
+    enum { PROBE = 10 };
+    double before = 1e-9 * (double)pal_clock_thread_ns();
+    for (int i = 0; i < PROBE; i++) {
+        for (int b = 0; b < trial->scene->n_body; b++) (void)pal_world_invalidate_limits(trial->world, b);
+        (void)pal_world_step(trial->world, trial->scene->step_s);
+    }
+    double step_s = (1e-9 * (double)pal_clock_thread_ns() - before) / PROBE;
+    return fmin(1800, fmax(least_s, typical_s / trial->scene->step_s * step_s));
+}
+
+static pal_err run_all(pal_trial *trial, pal_robustness_report *out)
+{
+    const pal_robustness_options *o = trial->options;
+    double begin = 1e-9 * (double)pal_clock_thread_ns();
+    trial->deadline_s = begin + (o->max_cpu_s > 0 ? 0.5 * o->max_cpu_s : least_s);
+    if (o->progress && !o->progress("rest", 0, o->user)) return PAL_ERR_STATE;
+    out->rests = trial->rests = pal_trial_settle(trial, &out->settle_s);
+    if (!trial->rests && !trial->late) out->led = pal_trial_make_twin(trial);
+    pal_trial_save(trial, trial->rest);
+    trial->return_time_s = pal_trial_return_time_s(trial);
+    const double max_cpu_s = o->max_cpu_s > 0 ? o->max_cpu_s : enough_s(trial);
+    for (int k = 0; k < N_INSULT; k++) {
+        if (o->only && strcmp(o->only, insults[k].name)) continue;
+        if (o->progress && !o->progress(insults[k].name, (double)k / N_INSULT, o->user))
+            return pal_diagnostic_set(trial->diag, PAL_ERR_STATE, "stopped before the insult %s", insults[k].name);
+        double left = begin + max_cpu_s - 1e-9 * (double)pal_clock_thread_ns();
+        /* what is short leaves its time to the others; none takes more than a third of what is left */
+        int n_left = o->only ? 1 : N_INSULT - k;
+        trial->out = &out->result[out->n++];
+        run_one(trial, &insults[k], fmax(0.2, n_left > 3 ? fmin(left / 3, 3 * left / n_left) : left / n_left));
+    }
+    count(out);
+    out->took_s = 1e-9 * (double)pal_clock_thread_ns() - begin;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_robustness_run(const pal_scene *scene, const pal_robustness_options *options, pal_robustness_report *out,
+                           pal_diagnostic *diag)
+{
+    bool known = !options->only;
+    for (int k = 0; k < N_INSULT && !known; k++) known = !strcmp(options->only, insults[k].name);
+    if (!known) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is no case \"%.60s\"", options->only);
+    pal_trial trial = {.options = options, .diag = diag};
+    pal_robustness_report *report = calloc(1, sizeof *report);
+    pal_err err = report ? open_rig(&trial, scene) : PAL_ERR_MEMORY;
+    if (!err) err = run_all(&trial, report);
+    if (!err) *out = *report;
+    close_rig(&trial);
+    free(report);
+    return err;
+}

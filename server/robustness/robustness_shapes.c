@@ -1,0 +1,389 @@
+/* Insults to the shape of bodies, to their stiffness and to the step; loads. */
+#include "server/base/clock.h"
+#include "server/base/vec3.h"
+#include "server/robustness/trial.h"
+
+#include <math.h>
+#include <string.h>
+
+typedef enum shape { FLAT, POINT, MIRRORED, SHUFFLED, STRETCHED, BLOWN_UP } shape;
+
+static const double return_s = 10, blown_s = 25, springs_s = 4;
+
+/* one free point from where it is */
+static void insult_point(pal_trial *trial, shape how, const double low[3], const double high[3], int flat, double x[3])
+{
+    for (int c = 0; c < 3; c++) {
+        double middle = 0.5 * (low[c] + high[c]);
+        if (how == FLAT && c == flat) x[c] = middle;
+        if (how == POINT) x[c] = low[c] + 0.3 * (high[c] - low[c]);
+        if (how == MIRRORED && c == flat) x[c] = low[c] + high[c] - x[c];
+        if (how == SHUFFLED) x[c] = low[c] + (high[c] - low[c]) * pal_trial_random(trial);
+        if (how == STRETCHED) x[c] = middle + 8 * (x[c] - middle);
+        if (how == BLOWN_UP) x[c] = middle + 100 * (x[c] - middle);
+    }
+}
+
+/* the axis along which the body is thinnest */
+static int thinnest(const double low[3], const double high[3])
+{
+    int axis = 0;
+    for (int c = 1; c < 3; c++)
+        if (high[c] - low[c] < high[axis] - low[axis]) axis = c;
+    return axis;
+}
+
+static void spoil(pal_trial *trial, int b, shape how)
+{
+    pal_body *body = pal_world_body(trial->world, b);
+    double low[3], high[3];
+    for (int c = 0; c < 3; c++) low[c] = INFINITY, high[c] = -INFINITY;
+    for (int k = 0; k < body->n_active; k++)
+        for (int c = 0; c < 3; c++) {
+            double at = body->x[3 * (size_t)pal_body_point(body, k) + (size_t)c];
+            low[c] = fmin(low[c], at), high[c] = fmax(high[c], at);
+        }
+    int flat = thinnest(low, high);
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        if (!body->support[i]) insult_point(trial, how, low, high, flat, body->x + 3 * (size_t)i);
+    }
+}
+
+/* tetrahedra turned over; of bodies that have some and whose points are their nodes */
+static int turned_over(const pal_trial *trial)
+{
+    int n = 0;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(trial->world, b);
+        for (int t = 0; body->tets && !body->interpolation && t < body->tets->n_tet; t++) {
+            const int32_t *c = body->tets->tet + 4 * (size_t)t;
+            double e[3][3], g[3];
+            for (int k = 0; k < 3; k++) pal_sub3(e[k], body->x + 3 * (size_t)c[k + 1], body->x + 3 * (size_t)c[0]);
+            pal_cross3(g, e[1], e[2]);
+            n += !(pal_dot3(e[0], g) > 0);
+        }
+    }
+    return n;
+}
+
+static double extent(const pal_trial *trial)
+{
+    double most = 0;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        double low[3], high[3];
+        pal_trial_box(trial, b, low, high);
+        most = fmax(most, pal_dist3(low, high) / pal_world_body(trial->world, b)->length_scale_m);
+    }
+    return most;
+}
+
+static bool guarded(const pal_trial *trial, int b)
+{
+    for (int i = 0; i < pal_world_component_count(trial->world); i++) {
+        pal_component_info info;
+        pal_world_component_info(trial->world, i, &info);
+        if (info.body == pal_world_body(trial->world, b)->name && !strcmp(info.name, "finite_guard")) return true;
+    }
+    return false;
+}
+
+static void shaped(pal_trial *trial, shape how)
+{
+    bool springs = true;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        spoil(trial, b, how);
+        /* what untangles and has a guard is judged as all others when it is beyond the guard's reach */
+        const bool untangles = pal_world_body(trial->world, b)->recovery != NULL,
+                   far = how == BLOWN_UP && guarded(trial, b);
+        trial->may_stay[b] = pal_trial_has_springs(trial, b) && !(untangles && far);
+        trial->may_stop[b] = trial->may_stay[b] || far;
+        springs = springs && trial->may_stay[b] && !untangles;
+    }
+    double before = extent(trial);
+    pal_trial_positions_set(trial);
+    /* springs that do not untangle need not come back: long enough to see that they are bounded */
+    pal_trial_relax(trial, springs ? springs_s : how == BLOWN_UP ? blown_s : return_s);
+    int n = turned_over(trial);
+    double after = extent(trial);
+    if (!trial->out->finite || trial->out->frozen) return;
+    if (!(after <= 1.5 * fmax(before, 1))) pal_trial_fail(trial, "grew to %.2g S", after);
+    if (trial->out->return_s < INFINITY)
+        pal_trial_report(trial, "back after %.2g s", trial->out->return_s);
+    else
+        pal_trial_report(trial, "%.2g %% S away after %.1f s, %d elements turned over", 100 * trial->out->deviation_S,
+                         trial->out->simulated_s, n);
+}
+
+void pal_robustness_flat(pal_trial *trial)
+{
+    shaped(trial, FLAT);
+}
+void pal_robustness_point(pal_trial *trial)
+{
+    shaped(trial, POINT);
+}
+void pal_robustness_mirrored(pal_trial *trial)
+{
+    shaped(trial, MIRRORED);
+}
+void pal_robustness_shuffled(pal_trial *trial)
+{
+    shaped(trial, SHUFFLED);
+}
+void pal_robustness_stretched(pal_trial *trial)
+{
+    shaped(trial, STRETCHED);
+}
+void pal_robustness_blown_up(pal_trial *trial)
+{
+    shaped(trial, BLOWN_UP);
+}
+
+/* a NaN in the first body: it alone stops, and comes back alone */
+void pal_robustness_poisoned(pal_trial *trial)
+{
+    pal_robustness_result *out = trial->out;
+    pal_body *body = pal_world_body(trial->world, 0);
+    int at = pal_body_point(body, body->n_active / 2);
+    body->x[3 * (size_t)at] = NAN;
+    out->energy = NAN;
+    (void)pal_world_step(trial->world, trial->scene->step_s);
+    if (!body->frozen) pal_trial_fail(trial, "the body was not stopped");
+    if (body->frozen) pal_trial_report(trial, "%s stopped: %s", body->name, body->reason);
+    if (body->frozen && !body->reason[0]) pal_trial_fail(trial, "no reason is given");
+    for (int b = 1; b < trial->scene->n_body; b++) {
+        const pal_body *other = pal_world_body(trial->world, b);
+        if (other->frozen || !pal_body_finite(other)) pal_trial_fail(trial, "%s was stopped with it", other->name);
+    }
+    if (trial->twin) pal_world_reset(trial->twin), pal_world_reset(trial->world); /* led alike again */
+    if (pal_world_reset_body(trial->world, 0) || body->frozen || !pal_body_finite(body)) {
+        pal_trial_fail(trial, "a reset did not bring it back");
+        return;
+    }
+    pal_trial_relax(trial, return_s);
+    if (out->return_s < INFINITY) pal_trial_report(trial, "at rest %.2g s after its reset", out->return_s);
+}
+
+/* ---- loads ---- */
+
+/* the same load on the far node of every body, off the supports; 0: none */
+static void load_all(pal_trial *trial, double force_N, bool of_cap)
+{
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        const double size = of_cap ? force_N * pal_trial_load_cap_N(trial, b) : force_N, *up = trial->scene->up;
+        const double force[3] = {size * up[0], size * up[1], size * up[2]};
+        trial->err = pal_world_load(trial->world, b, pal_trial_far_node(trial, b), force);
+    }
+    pal_trial_rebase(trial);
+}
+
+/* of one that adapts the node may go out of use meanwhile: all loads are taken away where they are */
+static void unload_all(pal_trial *trial)
+{
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        pal_body *body = pal_world_body(trial->world, b);
+        if (body->external_force) memset(body->external_force, 0, 3 * sizeof(double) * (size_t)body->n_node);
+    }
+    pal_world_wake(trial->world);
+    pal_trial_rebase(trial);
+}
+
+void pal_robustness_meganewton(pal_trial *trial)
+{
+    load_all(trial, 1e6, false);
+    bool good = pal_trial_run(trial, 1);
+    double away = pal_trial_deviation_S(trial);
+    unload_all(trial);
+    if (good) pal_trial_relax(trial, return_s);
+    pal_trial_report(trial, "pulled %.2g S away in RMS", away);
+    if (isfinite(trial->out->return_s)) pal_trial_report(trial, "back after %.2g s", trial->out->return_s);
+    if (isinf(trial->out->return_s)) pal_trial_report(trial, "not back");
+}
+
+/* ---- steps that are too long ---- */
+
+static void long_steps(pal_trial *trial, double times, int n)
+{
+    const double *up = trial->scene->up;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        pal_body *body = pal_world_body(trial->world, b);
+        double low[3], high[3];
+        pal_trial_box(trial, b, low, high);
+        for (int k = 0; k < body->n_active; k++) {
+            size_t i = (size_t)pal_body_point(body, k);
+            if (body->support[i]) continue;
+            /* a blow that grows with the height */
+            double height = 0, all = 1e-300;
+            for (int c = 0; c < 3; c++) {
+                height += up[c] * (body->x[3 * i + (size_t)c] + body->offset_m[c] - low[c]);
+                all += fabs(up[c]) * (high[c] - low[c]);
+            }
+            body->v[3 * i + (fabs(up[0]) < 0.7 ? 0 : 1)] += 0.5 * body->length_scale_m * fabs(height) / all;
+        }
+        pal_body_update_nodes(body);
+    }
+    pal_trial_rebase(trial);
+    uint64_t hash = pal_world_hash(trial->world);
+    for (int i = 0; i < n; i++) {
+        bool good = pal_trial_step(trial, times * trial->scene->step_s);
+        if (trial->err == PAL_ERR_BUDGET) {
+            if (hash != pal_world_hash(trial->world)) pal_trial_fail(trial, "refused, but something moved");
+            pal_trial_report(trial, "refused: more sub-steps than the budget of %d", trial->scene->max_substep);
+            break;
+        }
+        if (!good) return;
+    }
+    pal_trial_relax(trial, return_s);
+    if (trial->out->return_s < INFINITY) pal_trial_report(trial, "at rest after %.2g s", trial->out->return_s);
+}
+
+void pal_robustness_long_step(pal_trial *trial)
+{
+    long_steps(trial, 10, 18);
+}
+
+void pal_robustness_longer_step(pal_trial *trial)
+{
+    long_steps(trial, 100, 3);
+}
+
+/* ---- stiffness ---- */
+
+void pal_robustness_stiffer(pal_trial *trial)
+{
+    pal_diagnostic reason = {""};
+    trial->out->energy = NAN; /* changing stiffness is work */
+    load_all(trial, 0.3, true);
+    bool good = pal_trial_run(trial, 0.25);
+    for (int b = 0; b < trial->scene->n_body && good; b++) {
+        pal_material to = trial->scene->body[b].material;
+        to.young_Pa *= 1000;
+        uint64_t hash = pal_world_hash(trial->world);
+        pal_err err = pal_world_material(trial->world, b, &to, &reason);
+        if (err && hash != pal_world_hash(trial->world)) pal_trial_fail(trial, "refused, but something moved");
+        if (err) pal_trial_report(trial, "refused (%.90s)", reason.text);
+    }
+    good = good && pal_trial_run(trial, 0.25);
+    for (int b = 0; b < trial->scene->n_body; b++)
+        if (pal_world_material(trial->world, b, &trial->scene->body[b].material, &reason))
+            pal_trial_fail(trial, "the old material was refused (%.90s)", reason.text);
+    unload_all(trial);
+    if (good) pal_trial_relax(trial, return_s);
+    if (trial->out->return_s < INFINITY) pal_trial_report(trial, "back after %.2g s", trial->out->return_s);
+}
+
+/* ---- an hour ---- */
+
+static double drift_S(const pal_trial *trial)
+{
+    double most = 0;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(trial->world, b);
+        for (int i = 0; i < 3 * body->n_dof; i++)
+            most = fmax(most, fabs(body->x[i] - trial->start[b][i]) / body->length_scale_m);
+    }
+    return most;
+}
+
+static void take_start(pal_trial *trial)
+{
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(trial->world, b);
+        memcpy(trial->start[b], body->x, 3 * sizeof(double) * (size_t)body->n_dof);
+    }
+}
+
+static double kinetic_J(const pal_trial *trial)
+{
+    double sum = 0;
+    for (int b = 0; b < trial->scene->n_body; b++) sum += pal_body_kinetic_J(pal_world_body(trial->world, b));
+    return sum;
+}
+
+static bool asleep(const pal_trial *trial)
+{
+    for (int b = 0; b < trial->scene->n_body; b++)
+        if (pal_world_body(trial->world, b)->asleep) return true;
+    return false;
+}
+
+static bool all_asleep(const pal_trial *trial)
+{
+    for (int b = 0; b < trial->scene->n_body; b++)
+        if (!pal_world_body(trial->world, b)->asleep) return false;
+    return true;
+}
+
+static bool implicit(const pal_trial *trial)
+{
+    for (int b = 0; b < trial->scene->n_body; b++)
+        if (!pal_world_body(trial->world, b)->implicit) return false;
+    return true;
+}
+
+/* until a quarter of a second moves nothing by more than 1e-8 S, or a minute */
+static bool settle_loaded(pal_trial *trial, double *ms)
+{
+    const double step = trial->scene->step_s, begin = trial->out->simulated_s;
+    int n = (int)ceil(0.25 / step), all = 0;
+    double before = 1e-9 * (double)pal_clock_thread_ns(), late = before + 0.5 * (trial->deadline_s - before);
+    for (;;) {
+        take_start(trial);
+        for (int i = 0; i < n; i++, all++)
+            if (!pal_trial_step(trial, step)) return false;
+        double now = 1e-9 * (double)pal_clock_thread_ns();
+        *ms = 1e3 * (now - before) / all;
+        if (drift_S(trial) <= 1e-8 || trial->out->simulated_s - begin > 60) return true;
+        trial->late = now > late;
+        if (trial->late) return false;
+    }
+}
+
+/* Steps while all are asleep, up to ten seconds: looking at energies of thousands of springs that do not move costs a
+ * hundred times what such a step does. false: a step was refused */
+static bool doze(pal_trial *trial, double until_s)
+{
+    const double step = trial->scene->step_s, end = fmin(trial->out->simulated_s + 10, until_s - 2 * step);
+    while (all_asleep(trial) && trial->out->simulated_s < end) {
+        if (pal_world_step(trial->world, step)) return false;
+        pal_world_remove_idle(trial->world);
+        trial->out->simulated_s += step;
+    }
+    return true;
+}
+
+void pal_robustness_hour(pal_trial *trial)
+{
+    enum { HOUR_S = 3600 };
+    const double most_drift = 1e-6, most_kinetic = 1e-9, most_plan_s = 8, step = trial->scene->step_s;
+    double ms = 1, drift = 0, kinetic = 0, slept_s = NAN;
+    if (trial->twin) {
+        pal_trial_skip(trial, "a moving support leads it: it never rests");
+        return;
+    }
+    load_all(trial, 0.1, true);
+    if (!settle_loaded(trial, &ms)) return;
+    take_start(trial);
+    pal_trial_rebase(trial);
+    double room_s = trial->deadline_s - 1e-9 * (double)pal_clock_thread_ns(), begin = trial->out->simulated_s;
+    /* implicit steps may be long: as many as there is time for, of at most ten seconds */
+    double n = fmax(1, 0.8e3 * fmin(most_plan_s, room_s) / ms),
+           dt = implicit(trial) ? fmin(10, fmax(step, HOUR_S / n)) : step;
+    double late_s = 1e-9 * (double)pal_clock_thread_ns() + 0.9 * room_s;
+    while (trial->out->simulated_s - begin < HOUR_S) {
+        if (1e-9 * (double)pal_clock_thread_ns() > late_s) break;
+        if (!pal_trial_step(trial, dt) || !doze(trial, begin + HOUR_S)) break;
+        kinetic = fmax(kinetic, kinetic_J(trial));
+        drift = fmax(drift, drift_S(trial));
+        if (isnan(slept_s) && asleep(trial)) slept_s = trial->out->simulated_s - begin;
+    }
+    double watched = trial->out->simulated_s - begin, stored = fmax(trial->scale_J, 1e-300);
+    pal_trial_report(trial, "%.0f s watched in steps of %.3g s: drift %.2g S, kinetic %.2g of what is stored", watched,
+                     dt, drift, kinetic / stored);
+    if (!isnan(slept_s)) pal_trial_report(trial, "asleep from %.3g s on", slept_s);
+    if (watched < HOUR_S * (1 - 1e-9))
+        pal_trial_undecided(trial, "the time did not reach for the hour: give more --seconds");
+    if (!(drift <= most_drift)) pal_trial_fail(trial, "it drifts");
+    if (!(kinetic <= most_kinetic * stored)) pal_trial_fail(trial, "it does not stand still");
+}

@@ -1,0 +1,404 @@
+/* Insults by tools, by numbers that are none, by supports, and by all of it at random. */
+#include "server/base/vec3.h"
+#include "server/robustness/trial.h"
+#include "server/sim/elements/elastic_hex.h"
+#include "server/sim/transfer/transfer_world.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double return_s = 10, clamp_S = 0.02;
+/* RMS speed that counts as standing still after supports were switched */
+static const double still_S_s = 1e-3;
+/* of a node's cap (or the weight): bends a body, and crushes no element as a tenth of the cap, E h^2, does (in a liver
+ * of 6 voxels; a beam and one of 8 bear a fifth) */
+static const double bend_share = 0.05;
+
+/* ---- tools ---- */
+
+static bool has_tools(pal_trial *trial)
+{
+    if (!trial->touches) pal_trial_skip(trial, "no body has the row tool_push: tools touch nothing");
+    return trial->touches;
+}
+
+static void move(pal_trial *trial, int tool, const double at_m[3], bool grasp)
+{
+    pal_pose pose = {.quat = {1, 0, 0, 0}, .buttons = grasp};
+    pal_copy3(pose.position_m, at_m);
+    (void)pal_world_pose(trial->world, tool, &pose);
+}
+
+/* A step in which each of n tools may put in its cap times the clamp of the contact's correction and times its way; a
+ * jump is no way: there is only the correction of one step. What was put in may not grow afterwards */
+static bool tool_step(pal_trial *trial, int n, double way_m)
+{
+    double size = pal_world_body(trial->world, trial->body)->length_scale_m, before = pal_trial_energy(trial), cap = 0;
+    for (int t = 0; t < n; t++) cap += trial->scene->tool[t].force_cap_N;
+    trial->allowed_J = cap * (clamp_S * size + way_m);
+    bool good = pal_trial_step(trial, trial->scene->step_s);
+    double rise = fmin(pal_trial_energy(trial) - before, trial->allowed_J);
+    if (rise > 0) trial->base_J += rise;
+    trial->allowed_J = 0;
+    return good;
+}
+
+static void let_go(pal_trial *trial)
+{
+    for (int t = 0; t < trial->scene->n_tool; t++) (void)pal_world_pose(trial->world, t, NULL);
+}
+
+/* a horizontal axis through the middle of the body that tools touch, its middle and half extents */
+static int middle(const pal_trial *trial, double centre[3], double half[3])
+{
+    double low[3], high[3];
+    int axis = 0;
+    pal_trial_box(trial, trial->body, low, high);
+    for (int c = 0; c < 3; c++) {
+        centre[c] = 0.5 * (low[c] + high[c]), half[c] = 0.5 * (high[c] - low[c]);
+        if (fabs(trial->scene->up[c]) < fabs(trial->scene->up[axis]) - 1e-9) axis = c;
+    }
+    return axis;
+}
+
+static void release(pal_trial *trial, bool good)
+{
+    let_go(trial);
+    for (int i = 0; i < 12 && good; i++) good = tool_step(trial, 2, 0);
+    /* what the contacts' last steps gave, or took, is the begin of coming back */
+    pal_trial_exclude_rise(trial, pal_trial_energy(trial));
+    trial->base_J = pal_trial_energy(trial);
+    if (good) pal_trial_relax(trial, return_s);
+    if (trial->out->return_s < INFINITY) pal_trial_report(trial, "back after %.2g s", trial->out->return_s);
+}
+
+static void say_force(pal_trial *trial, double most_N)
+{
+    double cap = trial->scene->tool[0].force_cap_N;
+    pal_trial_report(trial, "force up to %.3g N", most_N);
+    if (most_N > cap * (1 + 1e-9)) pal_trial_fail(trial, "beyond the cap of %.3g N", cap);
+}
+
+static double force_N(const pal_trial *trial, int tool)
+{
+    return pal_norm3(pal_world_tools(trial->world)->tool[tool].mean_force_N);
+}
+
+void pal_robustness_teleport(pal_trial *trial)
+{
+    double centre[3], half[3], at[3], most = 0;
+    if (!has_tools(trial)) return;
+    int axis = middle(trial, centre, half);
+    const pal_body *body = pal_world_body(trial->world, trial->body);
+    double radius = pal_world_tools(trial->world)->tool[0].radius_m;
+    bool good = true;
+    for (int i = 0; i < 48 && good; i++) {
+        double side = i < 12 || i >= 30 ? 1 : 0;
+        pal_copy3(at, centre);
+        /* beside, then by S into and beyond, then back */
+        at[axis] += side > 0 ? half[axis] + 2 * radius : half[axis] + 2 * radius - body->length_scale_m;
+        move(trial, 0, at, false);
+        good = tool_step(trial, 1, 0);
+        most = fmax(most, force_N(trial, 0));
+    }
+    say_force(trial, most);
+    release(trial, good);
+}
+
+void pal_robustness_inside(pal_trial *trial)
+{
+    double centre[3], half[3], most = 0;
+    if (!has_tools(trial)) return;
+    (void)middle(trial, centre, half);
+    bool good = true;
+    for (int i = 0; i < 60 && good; i++) {
+        move(trial, 0, centre, false);
+        good = tool_step(trial, 1, 0);
+        most = fmax(most, force_N(trial, 0));
+    }
+    say_force(trial, most);
+    release(trial, good);
+}
+
+void pal_robustness_pressed(pal_trial *trial)
+{
+    enum { IN = 30, HOLD = 30 };
+    double centre[3], half[3], most = 0;
+    if (!has_tools(trial)) return;
+    int axis = middle(trial, centre, half);
+    bool good = true;
+    const double way_m = (0.7 * half[axis] + 2 * pal_world_tools(trial->world)->tool[0].radius_m) / IN;
+    for (int i = 0; i < IN + HOLD && good; i++) {
+        double way = i < IN ? (double)i / IN : 1;
+        for (int t = 0; t < 2; t++) {
+            double at[3], radius = pal_world_tools(trial->world)->tool[t].radius_m;
+            double far = half[axis] + 2 * radius, near = 0.3 * half[axis];
+            pal_copy3(at, centre);
+            at[axis] += (t ? -1 : 1) * (far + way * (near - far));
+            move(trial, t, at, false);
+        }
+        good = tool_step(trial, 2, way_m);
+        most = fmax(most, fmax(force_N(trial, 0), force_N(trial, 1)));
+    }
+    say_force(trial, most);
+    release(trial, good);
+}
+
+/* ---- numbers that are none ---- */
+
+static int bad_pose(pal_trial *trial, double number)
+{
+    int n_taken = 0;
+    for (int at = 0; at < 3; at++) {
+        pal_pose pose = {.quat = {1, 0, 0, 0}};
+        double *to[3] = {&pose.position_m[1], &pose.quat[2], &pose.velocity_m_s[0]};
+        *to[at] = number;
+        n_taken += !pal_world_pose(trial->world, 0, &pose);
+    }
+    return n_taken;
+}
+
+static int bad_material(pal_trial *trial, double number)
+{
+    int n_taken = 0;
+    for (int at = 0; at < 4; at++) {
+        pal_material to = trial->scene->body[0].material;
+        double *number_of[4] = {&to.young_Pa, &to.poisson, &to.density_kg_m3, &to.damping_1_s};
+        *number_of[at] = number;
+        /* what is huge may be taken where it is no more than heavy or damped: it is put back */
+        if (pal_world_material(trial->world, 0, &to, NULL)) continue;
+        n_taken += !isfinite(number);
+        (void)pal_world_material(trial->world, 0, &trial->scene->body[0].material, NULL);
+    }
+    return n_taken;
+}
+
+void pal_robustness_numbers(pal_trial *trial)
+{
+    static const double bad[] = {NAN, INFINITY, -INFINITY, 1e300, -1e300};
+    int n_taken = 0, node = pal_trial_far_node(trial, 0);
+    trial->out->energy = NAN;
+    uint64_t hash = pal_world_hash(trial->world);
+    for (int k = 0; k < 5; k++) {
+        const double force[3] = {0, bad[k], 0};
+        n_taken += bad_pose(trial, bad[k]) + bad_material(trial, bad[k]);
+        if (!isfinite(bad[k])) n_taken += !pal_world_load(trial->world, 0, node, force);
+        if (bad[k] != 1e300) n_taken += !pal_world_step(trial->world, bad[k]);
+    }
+    n_taken +=
+        !pal_world_pose(trial->world, PAL_TOOL_MAX, NULL) + !pal_world_load(trial->world, 0, -1, (double[3]){0, 0, 0});
+    n_taken += !pal_world_step(trial->world, 0) + !pal_world_reset_body(trial->world, PAL_BODY_MAX);
+    if (n_taken > 0) pal_trial_fail(trial, "%d of them were taken", n_taken);
+    if (hash != pal_world_hash(trial->world)) pal_trial_fail(trial, "the state changed");
+    if (n_taken == 0) pal_trial_report(trial, "all refused");
+    /* 1e300 N is a number: it is shortened */
+    if (!pal_world_load(trial->world, 0, node, (const double[3]){0, 1e300, 0})) {
+        bool good = true;
+        for (int i = 0; i < 6 && good; i++) good = pal_trial_step(trial, trial->scene->step_s);
+        (void)pal_world_load(trial->world, 0, node, (const double[3]){0, 0, 0});
+        if (good) pal_trial_relax(trial, return_s);
+        if (good) pal_trial_report(trial, "1e300 N on a node is shortened");
+    }
+}
+
+/* ---- supports ---- */
+
+/* everything in the upper fifth of each body is held instead of what was */
+static void support_top(const pal_trial *trial, pal_scene *scene)
+{
+    for (int b = 0; b < scene->n_body; b++) {
+        const pal_body *body = pal_world_body(trial->world, b);
+        double least = INFINITY, most = -INFINITY;
+        for (int i = 0; i < body->n_dof; i++) {
+            double at = pal_dot3(scene->up, body->x_rest + 3 * (size_t)i);
+            least = fmin(least, at), most = fmax(most, at);
+        }
+        pal_support_def s = {.low_m = {INFINITY, INFINITY, INFINITY}, .high_m = {-INFINITY, -INFINITY, -INFINITY}};
+        for (int i = 0; i < body->n_dof; i++) {
+            const double *x = body->x_rest + 3 * (size_t)i;
+            if (pal_dot3(scene->up, x) < least + 0.8 * (most - least)) continue;
+            for (int c = 0; c < 3; c++) {
+                s.low_m[c] = fmin(s.low_m[c], x[c] - 1e-9 * body->length_scale_m);
+                s.high_m[c] = fmax(s.high_m[c], x[c] + 1e-9 * body->length_scale_m);
+            }
+        }
+        scene->body[b].n_support = 1;
+        scene->body[b].support[0] = s;
+    }
+}
+
+/* Energy of a world that has just followed another. Cubes and their split store other energies in one shape: those that
+ * ran on their split are looked at on it here too, though only the next step will decide that */
+static double followed_J(pal_world *next, const pal_world *before)
+{
+    double energy = 0;
+    for (int turn = 0; turn < 2; turn++) {
+        for (int i = 0; i < pal_world_component_count(next) && i < pal_world_component_count(before); i++) {
+            const pal_component *row = pal_world_component(next, i), *was = pal_world_component(before, i);
+            if (row->effect != was->effect || strcmp(row->effect->name, "hex_elastic")) continue;
+            pal_elastic_hexes *to = row->self;
+            const pal_elastic_hexes *from = was->self;
+            to->has_inversion = turn == 0 && from->has_inversion && to->split;
+        }
+        if (turn == 0) energy = pal_world_energy_J(next);
+    }
+    return energy;
+}
+
+/* a world made from another scene goes on where this one is */
+static bool go_over(pal_trial *trial, const pal_scene *scene, double *jump)
+{
+    pal_world *next = NULL;
+    pal_diagnostic reason = {""};
+    if (pal_world_create(scene, &reason, &next)) {
+        pal_trial_skip(trial, "the scene with other supports is refused: %.150s", reason.text);
+        return false;
+    }
+    double before = pal_world_energy_J(trial->world);
+    pal_world_transfer(next, trial->world, -1, NULL, NULL);
+    *jump = fmax(*jump, followed_J(next, trial->world) - before);
+    pal_world_destroy(trial->world);
+    trial->world = next;
+    pal_trial_rebase(trial);
+    return true;
+}
+
+static double speed_S_s(const pal_trial *trial)
+{
+    double most = 0;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(trial->world, b);
+        double mass = 0;
+        for (int i = 0; i < body->n_dof; i++) mass += body->mass_kg[i];
+        most = fmax(most, sqrt(2 * pal_body_kinetic_J(body) / mass) / body->length_scale_m);
+    }
+    return most;
+}
+
+void pal_robustness_supports(pal_trial *trial)
+{
+    if (trial->twin) {
+        pal_trial_skip(trial, "a moving support leads it: the insult asks for rest elsewhere");
+        return;
+    }
+    for (int b = 0; b < trial->scene->n_body; b++)
+        if (pal_world_body(trial->world, b)->active) {
+            pal_trial_skip(trial, "a surface that adapts begins at rest when its scene changes");
+            return;
+        }
+    pal_scene *other = malloc(sizeof *other);
+    if (!other) {
+        pal_trial_undecided(trial, "not judged, there is no memory for the scene with other supports");
+        return;
+    }
+    *other = *trial->scene;
+    support_top(trial, other);
+    double jump = 0;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        double size = bend_share * pal_trial_load_cap_N(trial, b);
+        (void)pal_world_load(trial->world, b, pal_trial_far_node(trial, b), (const double[3]){size, size, 0});
+    }
+    pal_trial_rebase(trial);
+    bool good = pal_trial_run(trial, 0.3) && go_over(trial, other, &jump) && pal_trial_run(trial, 0.5);
+    good = good && go_over(trial, trial->scene, &jump) && pal_trial_run(trial, 0.1);
+    free(other);
+    if (trial->out->verdict == PAL_VERDICT_SKIPPED) return;
+    /* where it is held is another place now: it has to come to rest, not to come back */
+    const double begin = trial->out->simulated_s, hold_s = 0.25;
+    double since_s = 0;
+    while (good && since_s < hold_s && trial->out->simulated_s - begin < trial->return_time_s) {
+        good = pal_trial_step(trial, trial->scene->step_s);
+        since_s = speed_S_s(trial) <= still_S_s ? since_s + trial->scene->step_s : 0;
+    }
+    const double left = speed_S_s(trial);
+    double share = trial->scale_J > 0 ? jump / trial->scale_J : 0;
+    pal_trial_report(trial, "energy rises by %.2g of what is stored at a switch, still after %.2g s", share,
+                     trial->out->simulated_s - begin);
+    if (!(share <= 0.01)) pal_trial_fail(trial, "more than 1 %%");
+    if (good && since_s < hold_s) pal_trial_fail(trial, "it still moves, at the end by %.2g S a second", left);
+}
+
+/* ---- all of it at random ---- */
+
+static double draw(pal_trial *trial, double low, double high)
+{
+    return low + (high - low) * pal_trial_random(trial);
+}
+
+static void random_pose(pal_trial *trial, const double centre[3], double size)
+{
+    static const double bad[] = {NAN, INFINITY, 1e300, -1e300};
+    int tool = (int)draw(trial, 0, trial->scene->n_tool);
+    pal_pose pose = {.quat = {1, 0, 0, 0}, .buttons = pal_trial_random(trial) < 0.4};
+    for (int c = 0; c < 3; c++) pose.position_m[c] = centre[c] + draw(trial, -size, size);
+    if (pal_trial_random(trial) < 0.1) pose.position_m[0] = bad[(int)draw(trial, 0, 4)];
+    if (pal_trial_random(trial) < 0.1) pose.velocity_m_s[1] = bad[(int)draw(trial, 0, 4)];
+    (void)pal_world_pose(trial->world, tool, pal_trial_random(trial) < 0.1 ? NULL : &pose);
+}
+
+static void random_brush(pal_trial *trial, int b)
+{
+    const pal_body *body = pal_world_body(trial->world, b);
+    int node = pal_body_point(body, (int)draw(trial, 0, pal_body_nodes(body)));
+    pal_brush brush = {.kind = pal_trial_random(trial) < 0.5 ? PAL_BRUSH_INFLATE : PAL_BRUSH_NONE,
+                       .radius_m = draw(trial, 0, 0.2) * body->length_scale_m,
+                       .soft = draw(trial, -0.1, 1.1),
+                       .pressure_Pa = draw(trial, -1, 1) * trial->scene->body[b].material.young_Pa};
+    pal_copy3(brush.at_m, body->node_rest + 3 * (size_t)node);
+    (void)pal_world_brush(trial->world, b, (int)draw(trial, 0, trial->scene->n_tool), &brush, NULL);
+}
+
+static void random_order(pal_trial *trial, const double centre[3], double size)
+{
+    int b = (int)draw(trial, 0, trial->scene->n_body);
+    const pal_body *body = pal_world_body(trial->world, b);
+    double kind = pal_trial_random(trial);
+    if (kind < 0.6) {
+        random_pose(trial, centre, size);
+    } else if (kind < 0.8) {
+        int node = pal_body_point(body, (int)draw(trial, 0, pal_body_nodes(body)));
+        double force[3], most = pal_trial_load_cap_N(trial, b);
+        for (int c = 0; c < 3; c++) force[c] = draw(trial, -most, most);
+        if (pal_trial_random(trial) < 0.1) force[2] = 1e9;
+        (void)pal_world_load(trial->world, b, node, force);
+    } else if (kind < 0.9) {
+        pal_material to = trial->scene->body[b].material;
+        to.young_Pa *= exp(draw(trial, -1.5, 1.5));
+        to.density_kg_m3 *= exp(draw(trial, -0.5, 0.5));
+        to.damping_1_s = draw(trial, -1, 10);
+        (void)pal_world_material(trial->world, b, &to, NULL);
+    } else {
+        random_brush(trial, b);
+    }
+}
+
+/* as it was: nobody holds anything, loads, brushes and materials are those of the scene */
+static void calm(pal_trial *trial)
+{
+    let_go(trial);
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        pal_body *body = pal_world_body(trial->world, b);
+        for (int t = 0; t < PAL_TOOL_MAX; t++) (void)pal_world_brush(trial->world, b, t, NULL, NULL);
+        (void)pal_world_material(trial->world, b, &trial->scene->body[b].material, NULL);
+        if (body->external_force) memset(body->external_force, 0, 3 * sizeof(double) * (size_t)body->n_node);
+    }
+}
+
+void pal_robustness_random(pal_trial *trial)
+{
+    enum { STEPS = 300 };
+    double centre[3], half[3];
+    (void)middle(trial, centre, half);
+    double size = pal_world_body(trial->world, trial->body)->length_scale_m;
+    bool good = true;
+    trial->out->energy = NAN; /* orders are work */
+    for (int i = 0; i < STEPS && good; i++) {
+        if (pal_trial_random(trial) < 0.5) random_order(trial, centre, size);
+        good = pal_trial_step(trial, trial->scene->step_s);
+    }
+    calm(trial);
+    if (good) good = pal_trial_run(trial, 0.3);
+    if (good) pal_trial_relax(trial, return_s);
+    if (trial->out->return_s < INFINITY) pal_trial_report(trial, "back after %.2g s", trial->out->return_s);
+}

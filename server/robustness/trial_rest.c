@@ -1,0 +1,128 @@
+/* Where the rig's scene rests, and where it would be untouched when it never does. */
+#include "server/base/clock.h"
+#include "server/base/vec3.h"
+#include "server/robustness/trial.h"
+#include "server/solve/preflight.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double still_S_s = 1e-5; /* speed, RMS, that is rest */
+static const double settle_most_s = 30;
+static const double return_s = 10, longest_s = 120, n_period = 10;
+static const double lead_s = 0.5; /* that a led scene is on its way before an insult */
+
+/* RMS speed of the fastest body over its S, 1/s */
+double pal_trial_speed_S_s(const pal_trial *trial)
+{
+    double most = 0;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(trial->world, b);
+        double sum = 0;
+        for (int k = 0; k < body->n_active; k++) {
+            const double *v = body->v + 3 * (size_t)pal_body_point(body, k);
+            sum += pal_dot3(v, v);
+        }
+        double speed = sqrt(sum / (body->n_active > 0 ? body->n_active : 1)) / body->length_scale_m;
+        if (!(speed <= most)) most = speed;
+    }
+    return most;
+}
+
+/* ---- rest ---- */
+
+/* how long bodies have to come back, s: ten of the slowest periods (numerics.md part 3), no less than 10 s, no more
+ * than two minutes */
+double pal_trial_return_time_s(const pal_trial *trial)
+{
+    double most = 0;
+    pal_preflight *look = malloc(sizeof *look);
+    if (look && !pal_preflight_run(trial->scene, PAL_PREFLIGHT_FULL, look, NULL))
+        for (int b = 0; b < look->n_body; b++) most = fmax(most, look->body[b].slowest_period_s); /* of NaN the other */
+    free(look);
+    return fmax(return_s, fmin(longest_s, n_period * most));
+}
+
+/* runs until nothing moves; false: it still does */
+bool pal_trial_settle(pal_trial *trial, double *took_s)
+{
+    const double step = trial->scene->step_s;
+    double rest_time_s = 0, t = 0;
+    for (; t < settle_most_s && rest_time_s < 0.25; t += step) {
+        if (pal_world_step(trial->world, step) || 1e-9 * (double)pal_clock_thread_ns() > trial->deadline_s)
+            return false;
+        rest_time_s = pal_trial_speed_S_s(trial) <= still_S_s ? rest_time_s + step : 0;
+    }
+    *took_s = t;
+    return rest_time_s >= 0.25;
+}
+
+void pal_trial_save(pal_trial *trial, double **to)
+{
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(trial->world, b);
+        memcpy(to[b], body->x, 3 * sizeof(double) * (size_t)body->n_dof);
+    }
+    trial->rest_J = pal_world_energy_J(trial->world);
+}
+
+/* ---- a scene that is led for ever ---- */
+
+/* one step of the untouched run; false: it cannot follow, and nothing can be said any more */
+bool pal_trial_step_twin(pal_trial *trial, double dt_s)
+{
+    if (!trial->twin) return true;
+    if (pal_world_step(trial->twin, dt_s)) return false;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        const pal_body *body = pal_world_body(trial->twin, b);
+        if (body->frozen) return false;
+        memcpy(trial->rest[b], body->x, 3 * sizeof(double) * (size_t)body->n_dof);
+    }
+    trial->rest_J = pal_world_energy_J(trial->twin);
+    return true;
+}
+
+/* both worlds anew, and both on their way for a while */
+static bool begin_twin(pal_trial *trial)
+{
+    pal_world *twin = NULL;
+    if (pal_world_create(trial->scene, NULL, &twin)) return false;
+    pal_world_destroy(trial->twin);
+    trial->twin = twin;
+    for (double t = 0; t < lead_s; t += trial->scene->step_s)
+        if (pal_world_step(trial->world, trial->scene->step_s) || !pal_trial_step_twin(trial, trial->scene->step_s))
+            return false;
+    return true;
+}
+
+/* it did not come to rest: is it because something leads it? Then an untouched run beside it says where it should be */
+bool pal_trial_make_twin(pal_trial *trial)
+{
+    bool led = false;
+    for (int i = 0; i < pal_world_component_count(trial->world); i++)
+        led |= !strcmp(pal_world_component(trial->world, i)->effect->name, "moving_support");
+    return led && !pal_world_create(trial->scene, NULL, &trial->twin);
+}
+
+/* the scene at rest, as if nothing had been: a new world, as solvers keep factors of what they have seen */
+bool pal_trial_back_to_rest(pal_trial *trial)
+{
+    double took_s;
+    pal_world *fresh = NULL;
+    if (pal_world_create(trial->scene, NULL, &fresh)) return false;
+    pal_world_destroy(trial->world);
+    trial->world = fresh;
+    if (trial->twin) return begin_twin(trial);
+    if (trial->anew) {
+        bool still = pal_trial_settle(trial, &took_s);
+        if (still) pal_trial_save(trial, trial->rest);
+        return still;
+    }
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        pal_body *body = pal_world_body(trial->world, b);
+        memcpy(body->x, trial->rest[b], 3 * sizeof(double) * (size_t)body->n_dof);
+        pal_world_invalidate_limits(trial->world, b);
+    }
+    return true;
+}

@@ -1,0 +1,200 @@
+/* Bodies of control cells, what is painted on them and how they are cut away. A saved scene has the cells about the
+ * body's origin and the origin beside them, so that every number comes back with the same bits and boxes, strokes and
+ * tools stay where they are, whatever has been cut off or added in between. */
+#include "server/scene/subdivision_file.h"
+
+#include "server/base/vec3.h"
+#include "server/mesh/cells/cell_file.h"
+#include "server/mesh/files/mesh_file.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { PATH = 1600 };
+
+/* ---- cells ---- */
+
+/* the middle of the vertices' box */
+static void middle_of(const pal_cells *cells, double out[3])
+{
+    for (int c = 0; c < 3; c++) {
+        double low = INFINITY, high = -INFINITY;
+        for (int32_t i = 0; i < cells->n_vertex; i++) {
+            low = fmin(low, cells->x[3 * (size_t)i + (size_t)c]);
+            high = fmax(high, cells->x[3 * (size_t)i + (size_t)c]);
+        }
+        out[c] = 0.5 * (low + high);
+    }
+}
+
+/* the boundary's triangles as the body's mesh */
+static pal_err make_mesh(const pal_cells *cells, const double origin_m[3], pal_prepared *out)
+{
+    pal_surface surface = {0};
+    pal_err err = pal_cells_boundary(cells, &surface, NULL, NULL);
+    if (!err) pal_copy3(surface.origin_m, origin_m);
+    if (!err) err = pal_prepared_surface(&surface, out);
+    pal_surface_free(&surface);
+    return err;
+}
+
+pal_err pal_subdivision_load(const char *file, double unit_m, const double *origin_m, pal_loaded_scene *scene,
+                             int index, pal_diagnostic *diag)
+{
+    pal_cells *cells = &scene->cells[index];
+    double origin[3];
+    pal_cells_fault fault;
+    PAL_TRY(pal_cell_file_load(file, cells, diag));
+    for (size_t i = 0; i < 3 * (size_t)cells->n_vertex && unit_m != 1; i++) cells->x[i] *= unit_m;
+    if (origin_m)
+        pal_copy3(origin, origin_m);
+    else
+        middle_of(cells, origin);
+    for (int32_t i = 0; i < cells->n_vertex && !origin_m; i++)
+        pal_sub3(cells->x + 3 * (size_t)i, cells->x + 3 * (size_t)i, origin);
+    /* far from its origin a solid may have lost its shape to rounding */
+    if (!pal_cells_shape_valid(cells, NULL, &fault))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: cell %d has no volume left about (%g, %g, %g) m", file,
+                                  fault.cell + 1, origin[0], origin[1], origin[2]);
+    scene->scene.body[index].cells = cells;
+    pal_err err = make_mesh(cells, origin, &scene->mesh[index]);
+    return err ? pal_diagnostic_set(diag, err, "%s: no memory for its boundary", file) : PAL_ERR_OK;
+}
+
+pal_err pal_subdivision_update_surface(pal_loaded_scene *scene, int index, pal_diagnostic *diag)
+{
+    pal_prepared mesh = {0};
+    if (make_mesh(&scene->cells[index], scene->mesh[index].surface.origin_m, &mesh))
+        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "body \"%s\": no memory for its boundary",
+                                  scene->scene.body[index].name);
+    pal_prepared_free(&scene->mesh[index]);
+    scene->mesh[index] = mesh;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_subdivision_read(const pal_json *json, const cJSON *body, const char *path, const char *folder,
+                             pal_loaded_scene *scene, int index)
+{
+    static const char *const others[] = {"mesh", "surface", "resolution", "label", "triangles"};
+    const pal_body_def *def = &scene->scene.body[index];
+    char at[PAL_JSON_PATH], name[512] = "", units[16] = "", file[PATH];
+    double origin_m[3] = {0}, unit_m = 1;
+    bool about = cJSON_GetObjectItemCaseSensitive(body, "origin_m") != NULL;
+    for (size_t k = 0; k < sizeof others / sizeof others[0]; k++)
+        if (cJSON_GetObjectItemCaseSensitive(body, others[k]))
+            return pal_json_refuse(json, pal_json_key(at, path, others[k]), "does not go with cells");
+    PAL_TRY(pal_json_text(json, body, path, "cells", false, name, sizeof name));
+    if (strcmp(def->model.name, "subdivision_fem") != 0)
+        return pal_json_refuse(json, pal_json_key(at, path, "cells"),
+                               "model \"%s\" does not take control cells; \"subdivision_fem\" does", def->model.name);
+    PAL_TRY(pal_json_text(json, body, path, "units", false, units, sizeof units));
+    if (*units && !((unit_m = pal_mesh_unit_named(units)) > 0))
+        return pal_json_refuse(json, pal_json_key(at, path, "units"), "is not m, cm, mm, um or in");
+    PAL_TRY(pal_json_vector(json, body, path, "origin_m", origin_m));
+    pal_json_key(at, path, "cells");
+    int n =
+        name[0] == '/' ? snprintf(file, sizeof file, "%s", name) : snprintf(file, sizeof file, "%s/%s", folder, name);
+    if (n < 0 || (size_t)n >= sizeof file) return pal_json_refuse(json, at, "the path is too long");
+    pal_diagnostic reason = {""};
+    pal_err err = pal_subdivision_load(file, unit_m, about ? origin_m : NULL, scene, index, &reason);
+    return err ? pal_diagnostic_set(json->diag, err, "%s: %s: %s", json->file, at, reason.text) : PAL_ERR_OK;
+}
+
+void pal_subdivision_unload(pal_loaded_scene *scene, int index)
+{
+    pal_cells_free(&scene->cells[index]);
+    free(scene->stroke[index]);
+    scene->stroke[index] = NULL;
+}
+
+/* ---- strokes ---- */
+
+static pal_err read_stroke(const pal_json *json, const cJSON *object, const char *path, pal_stroke *out)
+{
+    static const char *const known[] = {"at_m", "radius_m", "soft", "young_factor", "density_factor", NULL};
+    char at[PAL_JSON_PATH];
+    pal_diagnostic reason = {""};
+    *out = (pal_stroke){.soft = 0.5, .young_factor = 1, .density_factor = 1};
+    PAL_TRY(pal_json_object(json, object, path, known));
+    for (int k = 0; k < 2; k++)
+        if (!cJSON_GetObjectItemCaseSensitive(object, known[k]))
+            return pal_json_refuse(json, pal_json_key(at, path, known[k]), "is missing");
+    PAL_TRY(pal_json_vector(json, object, path, "at_m", out->at_m));
+    /* ranges are pal_stroke_check's: any number will do here */
+    PAL_TRY(pal_json_number(json, object, path, "radius_m", -INFINITY, INFINITY, &out->radius_m));
+    PAL_TRY(pal_json_number(json, object, path, "soft", -INFINITY, INFINITY, &out->soft));
+    PAL_TRY(pal_json_number(json, object, path, "young_factor", -INFINITY, INFINITY, &out->young_factor));
+    PAL_TRY(pal_json_number(json, object, path, "density_factor", -INFINITY, INFINITY, &out->density_factor));
+    if (!pal_stroke_check(out, &reason)) return PAL_ERR_OK;
+    return pal_diagnostic_set(json->diag, PAL_ERR_REFUSED, "%s: %s.%s", json->file, path, reason.text);
+}
+
+pal_err pal_strokes_read(const pal_json *json, const cJSON *body, const char *path, pal_loaded_scene *scene, int index)
+{
+    char at[PAL_JSON_PATH], entry[PAL_JSON_PATH];
+    pal_body_def *def = &scene->scene.body[index];
+    const cJSON *list;
+    PAL_TRY(pal_json_list(json, body, path, "strokes", PAL_STROKE_MAX, &list));
+    if (!list || !list->child) return PAL_ERR_OK;
+    pal_json_key(at, path, "strokes");
+    if (!cJSON_GetObjectItemCaseSensitive(body, "cells"))
+        return pal_json_refuse(json, at, "model \"%s\" cannot be painted; \"subdivision_fem\" can", def->model.name);
+    pal_stroke *stroke = calloc((size_t)cJSON_GetArraySize(list), sizeof *stroke);
+    if (!stroke) return pal_diagnostic_set(json->diag, PAL_ERR_MEMORY, "%s: no memory for %s", json->file, at);
+    scene->stroke[index] = stroke;
+    def->stroke = stroke;
+    for (const cJSON *child = list->child; child; child = child->next, def->n_stroke++)
+        PAL_TRY(read_stroke(json, child, pal_json_entry(entry, at, def->n_stroke), &stroke[def->n_stroke]));
+    return PAL_ERR_OK;
+}
+
+/* ---- the cut ---- */
+
+pal_err pal_cut_read(const pal_json *json, const cJSON *body, const char *path, pal_body_def *def)
+{
+    static const char *const known[] = {"normal", "offset_m", NULL};
+    char at[PAL_JSON_PATH], inner[PAL_JSON_PATH];
+    const cJSON *cut = cJSON_GetObjectItemCaseSensitive(body, "cut");
+    if (!cut) return PAL_ERR_OK;
+    pal_json_key(at, path, "cut");
+    if (!cJSON_GetObjectItemCaseSensitive(body, "cells"))
+        return pal_json_refuse(json, at, "model \"%s\" cannot be cut away; \"subdivision_fem\" can", def->model.name);
+    PAL_TRY(pal_json_object(json, cut, at, known));
+    pal_json_key(inner, at, known[0]);
+    if (!cJSON_GetObjectItemCaseSensitive(cut, known[0])) return pal_json_refuse(json, inner, "is missing");
+    PAL_TRY(pal_json_vector(json, cut, at, known[0], def->cut_normal));
+    PAL_TRY(pal_json_number(json, cut, at, known[1], -1e9, 1e9, &def->cut_m));
+    double length = sqrt(pal_dot3(def->cut_normal, def->cut_normal));
+    if (!(length > 1e-12 && length < 1e12)) return pal_json_refuse(json, inner, "has no direction");
+    /* what was saved keeps its bits */
+    if (fabs(length - 1) > 1e-15) pal_scale3(def->cut_normal, 1 / length, def->cut_normal);
+    def->cut = true;
+    return PAL_ERR_OK;
+}
+
+/* ---- writing ---- */
+
+void pal_subdivision_append(cJSON *object, const pal_body_def *body, const char *file)
+{
+    cJSON_AddStringToObject(object, "cells", file);
+    cJSON_AddItemToObject(object, "origin_m", pal_json_exact_list(body->mesh->surface.origin_m, 3));
+    if (body->cut) {
+        cJSON *cut = cJSON_AddObjectToObject(object, "cut");
+        cJSON_AddItemToObject(cut, "normal", pal_json_exact_list(body->cut_normal, 3));
+        cJSON_AddItemToObject(cut, "offset_m", pal_json_exact(body->cut_m));
+    }
+    if (body->n_stroke == 0) return;
+    cJSON *list = cJSON_AddArrayToObject(object, "strokes");
+    for (int k = 0; k < body->n_stroke; k++) {
+        const pal_stroke *s = &body->stroke[k];
+        cJSON *entry = cJSON_CreateObject();
+        cJSON_AddItemToArray(list, entry);
+        cJSON_AddItemToObject(entry, "at_m", pal_json_exact_list(s->at_m, 3));
+        cJSON_AddItemToObject(entry, "radius_m", pal_json_exact(s->radius_m));
+        cJSON_AddItemToObject(entry, "soft", pal_json_exact(s->soft));
+        cJSON_AddItemToObject(entry, "young_factor", pal_json_exact(s->young_factor));
+        cJSON_AddItemToObject(entry, "density_factor", pal_json_exact(s->density_factor));
+    }
+}

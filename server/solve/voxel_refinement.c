@@ -1,0 +1,103 @@
+/* Voxels split into equal parts, by way of the grid that they came from. */
+#include "server/solve/voxel_refinement.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST = 20 * 1000 * 1000 };
+
+/* lowest corner of hexahedron e, counted in voxels from low */
+static void place_of(const pal_tets *tets, const pal_hexes *hexes, int e, const double low[3], double h, int at[3])
+{
+    const double *x = tets->x + 3 * (size_t)hexes->node[8 * (size_t)e];
+    for (int c = 0; c < 3; c++) at[c] = (int)floor((x[c] - low[c]) / h + 0.5);
+}
+
+static size_t cell(const int n[3], int x, int y, int z)
+{
+    return (size_t)x + (size_t)n[0] * ((size_t)y + (size_t)n[1] * (size_t)z);
+}
+
+/* the lattice of the voxels, with an empty layer around; fill [n2][n1][n0], 0 where there is none */
+static pal_err lay_coarse(const pal_prepared *mesh, double low[3], int n[3], float **fill)
+{
+    const pal_tets *t = &mesh->tets;
+    double high[3];
+    for (int c = 0; c < 3; c++) low[c] = INFINITY, high[c] = -INFINITY;
+    for (int i = 0; i < 3 * t->n_node; i++)
+        low[i % 3] = fmin(low[i % 3], t->x[i]), high[i % 3] = fmax(high[i % 3], t->x[i]);
+    for (int c = 0; c < 3; c++) {
+        n[c] = (int)floor((high[c] - low[c]) / t->edge_m + 0.5) + 2;
+        low[c] -= t->edge_m;
+    }
+    *fill = calloc((size_t)n[0] * (size_t)n[1] * (size_t)n[2], sizeof **fill);
+    if (!*fill) return PAL_ERR_MEMORY;
+    for (int e = 0; e < mesh->hexes.n_hex; e++) {
+        int at[3];
+        place_of(t, &mesh->hexes, e, low, t->edge_m, at);
+        (*fill)[cell(n, at[0], at[1], at[2])] = fmaxf(mesh->hexes.fill[e], 1e-6f);
+    }
+    return PAL_ERR_OK;
+}
+
+/* the fine grid, kept where the coarse one is */
+static pal_err lay_fine(const pal_prepared *mesh, const double low[3], const int n[3], const float *fill, int split,
+                        pal_voxels *out)
+{
+    size_t n_cell = 1;
+    *out = (pal_voxels){.edge_m = mesh->tets.edge_m / split,
+                        .n_inside = (int64_t)mesh->hexes.n_hex * split * split * split};
+    for (int c = 0; c < 3; c++) {
+        out->n[c] = n[c] * split;
+        out->low_m[c] = low[c];
+        out->origin_m[c] = mesh->tets.origin_m[c];
+        n_cell *= (size_t)out->n[c];
+    }
+    out->kind = calloc(n_cell, 1);
+    if (!out->kind) return PAL_ERR_MEMORY;
+    for (int z = 0; z < out->n[2]; z++)
+        for (int y = 0; y < out->n[1]; y++)
+            for (int x = 0; x < out->n[0]; x++)
+                if (fill[cell(n, x / split, y / split, z / split)] > 0) out->kind[cell(out->n, x, y, z)] = 2;
+    return PAL_ERR_OK;
+}
+
+pal_err pal_refine_voxels(pal_prepared *mesh, int split, pal_diagnostic *diag)
+{
+    double low[3];
+    int n[3], n_hex = mesh->hexes.n_hex;
+    float *fill = NULL;
+    pal_voxels fine = {0};
+    pal_tets tets = {0};
+    pal_hexes hexes = {0};
+    if (n_hex == 0 || split < 1)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there are no voxels to split by %d", split);
+    if ((double)n_hex * split * split * split > MOST)
+        return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "%d voxels split by %d on each axis are more than %d", n_hex,
+                                  split, MOST);
+    pal_err err = lay_coarse(mesh, low, n, &fill);
+    if (!err) err = lay_fine(mesh, low, n, fill, split, &fine);
+    if (!err) err = pal_voxels_split(&fine, &tets);
+    if (!err) err = pal_hexes_find(&tets, &hexes, diag);
+    for (int e = 0; e < hexes.n_hex && !err; e++) {
+        int at[3];
+        place_of(&tets, &hexes, e, low, fine.edge_m, at);
+        hexes.fill[e] = fill[cell(n, at[0] / split, at[1] / split, at[2] / split)];
+    }
+    free(fill);
+    pal_voxels_free(&fine);
+    if (err) {
+        pal_tets_free(&tets);
+        pal_hexes_free(&hexes);
+        return pal_diagnostic_set(diag, err, "no memory to split %d voxels by %d", n_hex, split);
+    }
+    hexes.measured = mesh->hexes.measured;
+    pal_tets_free(&mesh->tets);
+    pal_hexes_free(&mesh->hexes);
+    pal_skin_free(&mesh->skin);
+    mesh->tets = tets;
+    mesh->hexes = hexes;
+    memset(&mesh->skin, 0, sizeof mesh->skin);
+    return PAL_ERR_OK;
+}

@@ -1,0 +1,175 @@
+/* Which settings a study sweeps: one knob at a time turned from a base, at several sizes, so that what each knob adds
+ * is seen at each of them. The base has the step of the scene. */
+#include "server/study/study_job.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { BASE_LEVELS = 3 };
+static const double base_tolerance = 1e-2, frame_s = 1.0 / 60, haptic_s = 1.0 / 1000;
+/* the finest that is swept is this much coarser than the reference */
+static const double below_reference = 1.4;
+
+typedef struct list {
+    const pal_study_job *job;
+    pal_study_entry *out;
+    int n;
+} list;
+
+static void put(char to[PAL_NAME], const char *word)
+{
+    snprintf(to, PAL_NAME, "%s", word);
+}
+
+static void add(list *l, const pal_configuration *setting, bool calibrate)
+{
+    if (l->n < PAL_STUDY_POINTS) l->out[l->n++] = (pal_study_entry){*setting, calibrate};
+}
+
+static bool wants(const list *l, const char *model)
+{
+    const pal_study_options *o = l->job->options;
+    bool named = o->n_method == 0;
+    for (int i = 0; i < o->n_method; i++) named |= pal_study_is(o->method[i], model);
+    return named && !pal_configuration_check_model(&l->job->scene->body[0], model, NULL);
+}
+
+int pal_study_fit_size(const pal_study_job *job, double wanted)
+{
+    double longest = fmax(job->box_m[0], fmax(job->box_m[1], job->box_m[2])), least = INFINITY;
+    int best = (int)lround(wanted);
+    for (int n = (int)ceil(wanted / 1.35); n <= wanted * 1.35 && longest > 0; n++) {
+        double off = fabs(log(n / wanted));
+        for (int c = 0; c < 3; c++) {
+            double voxels = job->box_m[c] * n / longest;
+            off += 4 * fmax(ceil(voxels - 1e-6) - voxels, 0);
+        }
+        if (off < least) least = off, best = n;
+    }
+    return best;
+}
+
+int pal_study_size(const pal_study_job *job, int compact)
+{
+    return pal_study_fit_size(job, compact * job->slender);
+}
+
+int pal_study_sizes(const pal_study_job *job, int out[16])
+{
+    static const int whole[] = {8, 11, 16, 22, 30, 40}, quick[] = {6, 8, 12};
+    const int *size = job->options->quick ? quick : whole;
+    int n = 0, n_finest = job->options->quick ? 3 : 6;
+    for (int i = 0; i < n_finest; i++) {
+        int fitted = pal_study_size(job, size[i]);
+        if (fitted * below_reference <= job->reference && (n == 0 || fitted > out[n - 1])) out[n++] = fitted;
+    }
+    return n;
+}
+
+static pal_configuration fem_base(const pal_study_job *job, int size)
+{
+    pal_configuration s = {.size = size, .step_s = job->scene->step_s, .tolerance = base_tolerance};
+    put(s.model, "fem"), put(s.element, "hex8_bbar"), put(s.law, job->law), put(s.solver, "implicit_euler");
+    return s;
+}
+
+/* a quarter and a half of the scene's step, that of a haptic device where it is another one, and twice as long up to
+ * that of frames; returns how many */
+static int other_steps(double own_s, double out[4])
+{
+    int n = 0;
+    out[n++] = own_s / 4, out[n++] = own_s / 2;
+    if (own_s / 4 > 1.5 * haptic_s) out[n++] = haptic_s;
+    if (2 * own_s <= frame_s * (1 + 1e-9)) out[n++] = 2 * own_s;
+    return n;
+}
+
+/* solver, step and tolerance turned at one size: the rest is the base's */
+static void add_times(list *l, const pal_configuration *base, bool whole)
+{
+    static const double tolerance[] = {1e-1, 1e-4};
+    double step_s[4];
+    int n_step = other_steps(base->step_s, step_s);
+    pal_configuration s = *base;
+    put(s.solver, "sdirk2");
+    add(l, &s, false);
+    for (int k = 0; k < (whole ? n_step : 1); k++) {
+        s = *base, s.step_s = step_s[k];
+        add(l, &s, false);
+    }
+    for (int k = 0; k < 2 && whole; k++) {
+        s = *base, s.tolerance = tolerance[k];
+        add(l, &s, false);
+    }
+}
+
+static void add_fem(list *l)
+{
+    static const char *const element[] = {"tet4", "hex8", "tet10"};
+    static const char *const law[] = {"corotational", "neo_hookean", "linear"};
+    int size[16], n = pal_study_sizes(l->job, size);
+    for (int i = 0; i < n; i++) {
+        bool quick = l->job->options->quick, star = quick ? i == n - 2 || n == 1 : i < 4;
+        pal_configuration base = fem_base(l->job, size[i]), s;
+        add(l, &base, false);
+        if (star || !quick) add_times(l, &base, star && !quick);
+        for (int k = 0; k < (star ? (quick ? 1 : 3) : quick ? 0 : 1); k++) {
+            s = base, put(s.element, element[k]);
+            add(l, &s, false);
+        }
+        for (int k = 0; k < 3 && star && !quick; k++) {
+            if (pal_study_is(law[k], l->job->law)) continue;
+            s = base, put(s.law, law[k]);
+            add(l, &s, false);
+        }
+    }
+}
+
+static void add_springs(list *l)
+{
+    int size[16], n = pal_study_sizes(l->job, size);
+    bool quick = l->job->options->quick;
+    for (int i = quick && n > 1 ? n - 2 : 0; i < n && i < (quick ? (n > 1 ? n - 1 : 1) : 4); i++)
+        for (int calibrate = 0; calibrate < 2; calibrate++) {
+            pal_configuration s = {.size = size[i], .step_s = l->job->scene->step_s};
+            put(s.model, "tet_springs"), put(s.solver, "verlet");
+            add(l, &s, calibrate);
+            s.step_s /= 4;
+            if (!quick) add(l, &s, calibrate);
+        }
+}
+
+static void add_shells(list *l)
+{
+    int finest = l->job->options->quick ? BASE_LEVELS - 1 : BASE_LEVELS;
+    for (int levels = 1; levels <= finest && levels < l->job->reference; levels++)
+        for (int refined = 0; refined < (levels > 1 ? 2 : 1); refined++) {
+            pal_configuration s = {.size = levels, .step_s = l->job->scene->step_s};
+            put(s.model, "adaptive_springs"), put(s.solver, "rk4"), put(s.element, refined ? "refined" : "");
+            add(l, &s, false);
+        }
+}
+
+static void add_solids(list *l)
+{
+    static const int levels[] = {-1, 1, 2};
+    static const char *const solver[] = {"central_cg", "implicit_euler"};
+    for (int i = 0; i < (l->job->options->quick ? 2 : 3); i++)
+        for (int k = 0; k < 2; k++) {
+            pal_configuration s = {.size = levels[i], .step_s = l->job->scene->step_s};
+            put(s.model, "subdivision_fem"), put(s.solver, solver[k]);
+            if (k == 1) s.tolerance = base_tolerance;
+            add(l, &s, false);
+        }
+}
+
+int pal_study_list(const pal_study_job *job, pal_study_entry out[PAL_STUDY_POINTS])
+{
+    list l = {job, out, 0};
+    if (wants(&l, "fem")) add_fem(&l);
+    if (wants(&l, "tet_springs")) add_springs(&l);
+    if (wants(&l, "subdivision_fem")) add_solids(&l);
+    if (wants(&l, "adaptive_springs")) add_shells(&l);
+    return l.n;
+}

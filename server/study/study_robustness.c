@@ -1,0 +1,65 @@
+/* What may stand on the front has to bear being mistreated: the cheapest two insults of the torture that springs fitted
+ * to gentle presses were seen not to come back from. What they leave undecided in their time excludes nothing, nor does
+ * a body that its guard has stopped: it is safe, says so and is reset, while one that stays elsewhere says nothing. */
+#include "server/robustness/robustness.h"
+#include "server/study/study_job.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+/* processor time of one insult on one setting */
+static const double max_cpu_s = 1;
+
+static bool keeps_on(const char *what, double fraction, void *user)
+{
+    (void)what, (void)fraction;
+    return pal_study_continues(user);
+}
+
+/* the first insult that it fails; NULL: none that was decided */
+static const char *failed(pal_study_job *job, const pal_configuration *setting)
+{
+    static const char *const insult[] = {"meganewton", "flat"};
+    pal_configured_scene *set = NULL;
+    pal_diagnostic reason = {{0}};
+    const char *found = NULL;
+    pal_robustness_report *report = malloc(sizeof *report);
+    if (!report || pal_configuration_make(job->scene, 0, setting, &reason, &set)) {
+        free(report);
+        return NULL;
+    }
+    for (size_t k = 0; k < sizeof insult / sizeof *insult && !found; k++) {
+        pal_robustness_options o;
+        pal_robustness_default(&o);
+        o.only = insult[k], o.max_cpu_s = max_cpu_s, o.progress = keeps_on, o.user = job;
+        if (!pal_robustness_run(&set->scene, &o, report, &reason) && report->n_failed > 0 && !report->result[0].frozen)
+            found = insult[k];
+    }
+    pal_configured_scene_free(set);
+    free(report);
+    return found;
+}
+
+pal_err pal_study_check_robustness(pal_study_job *job)
+{
+    bool looked[PAL_STUDY_POINTS] = {false};
+    const pal_study_options *o = job->options;
+    for (int i = 0; i < job->out->n_point;) {
+        pal_study_point *p = &job->out->point[i];
+        if (!p->measured.front || looked[i]) {
+            i++;
+            continue;
+        }
+        bool go = !o->progress || o->progress("what is on the front, tortured", (double)i / job->out->n_point, o->user);
+        if (!go || !pal_study_continues(job))
+            return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped at the front");
+        looked[i] = true;
+        const char *insult = failed(job, &p->measured.setting);
+        if (!insult) continue;
+        snprintf(p->reason, sizeof p->reason, "fails %s of palpate robustness: not named", insult);
+        /* what it stood before may be on the front now, also cheaper ones */
+        pal_study_mark_front(job->out);
+        i = 0;
+    }
+    return PAL_ERR_OK;
+}
