@@ -22,7 +22,7 @@ static const double gain_share = 0.01;
 /* s. Sub-steps of this much time in all may gain energy in spite of all iterations before the body has to stand still
  * in such: an inverted body needs a few of them to recover. After as much time without one they are forgotten */
 static const double rise_s = 0.5;
-/* columns of an embedded body's matrices found anew in a step, each the work of one of conjugate gradients' */
+/* columns of an embedded body's matrices found again in a step, each the work of one of conjugate gradients' */
 enum { PROBES_A_STEP = 4 };
 
 static size_t bytes3(const pal_implicit *core)
@@ -208,7 +208,7 @@ static double residual(pal_implicit *core, double tau, const double *velocity, d
     return norm(core, b);
 }
 
-/* of an embedded body: what is neither of rows nor of contact. Held points count too, with what they have in common at
+/* of an embedded body: what is neither of rows nor of contact. Fixed points count too, with what they have in common at
  * any V of the same stage */
 static double embedded_potential(pal_implicit *core, const double *velocity)
 {
@@ -340,7 +340,7 @@ static void search(pal_implicit *core, double tau)
     for (int i = 0; i < body->n_dof; i++) {
         pal_sub3(way + 3 * i, v + 3 * i, core->start + 3 * i);
         slope -= pal_dot3(core->moved + 3 * i, way + 3 * i);
-        /* where led nodes move on, the potential before and after are not of one problem */
+        /* where prescribed nodes move on, the potential before and after are not of one problem */
         if (body->support[i] && pal_dot3(way + 3 * i, way + 3 * i) > 0) return;
     }
     if (!(slope < 0)) return;
@@ -402,7 +402,7 @@ static double total_energy(pal_implicit *core, bool moved, double *slack)
     return kinetic + rows - work;
 }
 
-/* led nodes put in work that nobody counts */
+/* prescribed nodes put in work that nobody counts */
 static bool is_led(const pal_body *body)
 {
     for (int i = 0; i < body->n_dof; i++) {
@@ -579,7 +579,7 @@ static void keep_probed(pal_implicit *core, pal_step *step)
     (void)pal_warp_refresh(&core->answer.warp, &core->blocks, true, step->dt_s);
 }
 
-/* Is it time to stand still? Forces that no energy has, as those of elements turned over, which borrow rotations, may
+/* Is it time to stand still? Forces that no energy has, as those of elements inverted, which borrow rotations, may
  * lead in a circle: there is more energy than at the sub-step's begin after all iterations, now and then for ever. A
  * tangled body needs such steps to get out, no more than a few. */
 static bool circles(pal_implicit *core, double dt_s)

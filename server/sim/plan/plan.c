@@ -115,8 +115,8 @@ static pal_err make_rows(pal_plan_requests *s, pal_component *row, int *n_row)
                                       "body \"%s\": row \"%s\" has no tangent, which its implicit solver needs", name,
                                       effect->name);
     }
-    /* the OUTPUT row first: its make says what the body shows, which is what tools touch; the SOLVE row last: the
-     * others have said what they want of it */
+    /* the OUTPUT component first: its make says what the body shows, which is what tools touch; the SOLVE component
+     * last: the others have said what they want of it */
     for (int pass = 0; pass < 3; pass++)
         for (int i = 0; i < s->n_request; i++) {
             pal_stage stage = s->wish[i].effect->stage;
@@ -148,7 +148,7 @@ static void sort_rows(pal_plan *plan, const pal_component *made, const int *made
         }
 }
 
-/* what a body that adapts takes in all: its arena, scratch, what the world keeps of what is shown (rest places, table
+/* what an adaptive body takes in all: its arena, scratch, what the world keeps of what is shown (rest places, table
  * of triangles, parents) and lasting loads, and the world's own */
 static pal_err check_memory(const pal_plan_requests *s, size_t arena_byte)
 {

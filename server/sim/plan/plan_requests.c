@@ -42,7 +42,7 @@ static pal_err add_named(pal_plan_requests *s, pal_config_entry *own, const pal_
     return PAL_ERR_OK;
 }
 
-/* a body that adapts is its own surface, a solid shows its boundary: what skin_output, the default, would put between
+/* an adaptive body is its own surface, a solid shows its boundary: what skin_output, the default, would put between
  * them is not there */
 static void choose_output(const pal_body *body, pal_config_entry *output)
 {
@@ -56,7 +56,7 @@ pal_err pal_plan_requests_collect(pal_plan_requests *s)
     pal_config_entry *own = s->own;
     s->n_request = 0;
     for (int i = 0; i < s->recipe.n_row; i++) PAL_TRY(add_wish(s, &s->recipe.row[i], false));
-    /* what is shown comes before the entries, so that a row field_output finds it */
+    /* what is shown comes before the entries, so that a component field_output finds it */
     pal_config_entry output = def->output;
     choose_output(s->build.body, &output);
     PAL_TRY(add_named(s, ++own, &output, PAL_STAGE_OUTPUT));

@@ -1,4 +1,4 @@
-/* Rows that are switched off and on while a world runs. Off, a row is destroyed with its memory; on, it is made anew
+/* Rows that are switched off and on while a world runs. Off, a row is destroyed with its memory; on, it is made again
  * from its entry. make functions expect a body at rest, so its state is put aside meanwhile. */
 #include "server/sim/plan/plan.h"
 #include "server/sim/plan/plan_requests.h"

@@ -1,4 +1,4 @@
-/* What the files transfer*.c share. Private to these. */
+/* The record of a transfer, for the files of this room only. */
 #ifndef PAL_SIM_TRANSFER_TRANSFER_CORE_H
 #define PAL_SIM_TRANSFER_TRANSFER_CORE_H
 #include "server/sim/world/world.h"
@@ -40,12 +40,12 @@ void pal_transfer_loads(const pal_transfer *t, const pal_body *from, pal_world *
 void pal_transfer_forces(pal_transfer *t, const pal_body *from, const pal_body *to);
 /* t->place: nodes of the new body by those of the old one as they stand */
 void pal_transfer_place_nodes(pal_transfer *t, const pal_body *from, const pal_body *to);
-/* farthest that a node of before within the new elements is from where it was; of surfaces that adapt a vertex of both
+/* farthest that a node of before within the new elements is from where it was; of adaptive surfaces a vertex of both
  */
 double pal_transfer_body_move(const pal_transfer *t, const pal_body *from, const pal_body *to);
 /* do shown vertices of body b of the same number mean the same place in both worlds? */
 bool pal_transfer_same_shown(const pal_world *next, const pal_world *before, int b);
 struct pal_transfer_report;
-/* the new body is shown where the old one was, and how far it is to be let go from there; body_move_m is known */
+/* the new body is shown where the old one was, and how far it is to be released from there; body_move_m is known */
 void pal_transfer_display(pal_transfer *t, pal_world *next, const pal_world *before, struct pal_transfer_report *out);
 #endif

@@ -19,7 +19,7 @@ static bool is_inside(const pal_interpolation *rows, int i)
     return true;
 }
 
-/* farthest that a node of before within the new elements is from where it was; of surfaces that adapt a vertex of both
+/* farthest that a node of before within the new elements is from where it was; of adaptive surfaces a vertex of both
  */
 double pal_transfer_body_move(const pal_transfer *t, const pal_body *from, const pal_body *to)
 {

@@ -245,7 +245,7 @@ static void add_vertex(pal_interpolation_builder *rows, const pal_dofs *from, co
     for (int k = 0; k < 2; k++) add_vertex(rows, from, to, end[k], 0.5 * weight);
 }
 
-/* rows of the old vertices; false: no memory, forces and grips are not carried then */
+/* rows of the old vertices; false: no memory, forces and grasps are not carried then */
 static bool make_back(pal_transfer *t, const pal_body *from, const pal_body *to)
 {
     pal_interpolation_builder rows;
@@ -441,7 +441,7 @@ static const pal_component *find_row(const pal_world *w, int body, const pal_eff
     return NULL;
 }
 
-/* rows that can go on where those of before are; forces that they put on other nodes now are to be let go as well */
+/* rows that can go on where those of before are; forces that they put on other nodes now are to be released as well */
 static void hand_over(pal_transfer *t, pal_world *next, const pal_world *before)
 {
     for (int i = 0; i < next->plan.n_row; i++) {
@@ -498,7 +498,7 @@ void pal_transfer_apply(pal_transfer *transfer, pal_world *next, const pal_world
     pal_world_transfer(next, before, t->body, t->x, t->v);
     out->interpolated_J = world_J(next);
     out->n_smooth = approach(t, next, from, elastic_before_J);
-    pal_world_invalidate_limits(next, t->body); /* rows look anew at what is smooth now, as they will at the end */
+    pal_world_invalidate_limits(next, t->body); /* rows look again at what is smooth now, as they will at the end */
     out->scale = scale_displacement(t, next, elastic_before_J);
     if (is_free(to)) keep_momentum(from, to);
     /* the velocity makes up for what the displacement could not */

@@ -7,7 +7,7 @@
 typedef struct blend {
     double share; /* of both that is left: 1, falls to 0 */
     bool begun;   /* a sub-step has been */
-    /* [n_node][3]; of a body that adapts N/kg, that of a vertex not in use the mean of its edge's ends */
+    /* [n_node][3]; of an adaptive body N/kg, that of a vertex not in use the mean of its edge's ends */
     double *force_N;
     float *display_offset_m; /* [n_shown][3]; NULL: none */
     pal_body *body;

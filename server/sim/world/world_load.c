@@ -24,7 +24,7 @@ pal_err pal_world_load(pal_world *world, int body, int node, const double force_
     return PAL_ERR_OK;
 }
 
-/* loads anew: the lasting ones. Nodes out of use have none (adaptive_surface.h) and keep theirs in `outer` until they
+/* loads again: the lasting ones. Nodes out of use have none (adaptive_surface.h) and keep theirs in `outer` until they
  * return */
 void pal_body_begin_loads(pal_body *body)
 {
