@@ -2,6 +2,7 @@
  * tools that jump and appear inside, numbers that are none, elements deleted; and Fig. 10 of paper A, where the same
  * force moves what is painted heavy otherwise. */
 #include "server/mesh/cells/cell_edits.h"
+#include "server/sim/transfer/transfer_world.h"
 #include "tests/stability/hard_case.h"
 #include "tests/stability/subdivision_case.h"
 

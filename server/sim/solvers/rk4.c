@@ -124,8 +124,8 @@ static void give_motion(const pal_body *body)
 {
     for (int k = 0; k < body->n_active; k++) {
         size_t i = 3 * (size_t)pal_body_point(body, k);
-        pal_quad_store(body->x + i, pal_v8_low(body->pack->xv[k]));
-        pal_quad_store(body->v + i, pal_v8_high(body->pack->xv[k]));
+        pal_quad_store(body->x + i, pal_v8_low(body->active_nodes->xv[k]));
+        pal_quad_store(body->v + i, pal_v8_high(body->active_nodes->xv[k]));
     }
 }
 
@@ -134,13 +134,13 @@ static pal_err find_forces(const rk4 *row, pal_step *step)
 {
     pal_body *body = step->body;
     if (row->pulls) {
-        memcpy(body->pack->f, row->load, sizeof *row->load * (size_t)body->n_active);
+        memcpy(body->active_nodes->f, row->load, sizeof *row->load * (size_t)body->n_active);
         return pal_active_nodes_assemble(step);
     }
     give_motion(body);
     PAL_TRY(pal_assemble_forces(step));
     for (int k = 0; k < body->n_active; k++)
-        body->pack->f[k] = pal_quad_load(body->g + 3 * (size_t)pal_body_point(body, k));
+        body->active_nodes->f[k] = pal_quad_load(body->g + 3 * (size_t)pal_body_point(body, k));
     return PAL_ERR_OK;
 }
 
@@ -200,8 +200,8 @@ static void begin_lanczos(rk4 *row, const pal_body *body)
             q[c] = weight * ((double)(bits >> 11) * 0x1p-52 - 1);
         }
         norm2 += pal_quad_dot(q, q);
-        row->memory[k].from = pal_v8_join(pal_v8_low(body->pack->xv[k]), q);
-        row->memory[k].sum = pal_v8_join(body->pack->f[k], (pal_quad){0});
+        row->memory[k].from = pal_v8_join(pal_v8_low(body->active_nodes->xv[k]), q);
+        row->memory[k].sum = pal_v8_join(body->active_nodes->f[k], (pal_quad){0});
     }
     const pal_quad one = {1, 1, 1, 1};
     const pal_v8 scale = pal_v8_join(one, norm2 > 0 ? one / sqrt(norm2) : 0 * one);
@@ -212,7 +212,7 @@ static void begin_lanczos(rk4 *row, const pal_body *body)
 static pal_err apply_stiffness(rk4 *row, pal_step *step, double *along)
 {
     pal_body *body = step->body;
-    pal_active_nodes *pack = body->pack;
+    pal_active_nodes *pack = body->active_nodes;
     double most2 = 0;
     for (int k = 0; k < body->n_active; k++) {
         pal_quad q = row->inverse_kg[k] * pal_v8_high(row->memory[k].from);
@@ -239,7 +239,7 @@ static double next_lanczos(rk4 *row, const pal_body *body, double alpha, double 
     double norm2 = 0;
     for (int k = 0; k < body->n_active; k++) {
         memory *m = &row->memory[k];
-        pal_quad q = pal_v8_high(m->from), next = body->pack->f[k] - (alpha * q + beta * pal_v8_high(m->sum));
+        pal_quad q = pal_v8_high(m->from), next = body->active_nodes->f[k] - (alpha * q + beta * pal_v8_high(m->sum));
         norm2 += pal_quad_dot(next, next);
         m->sum = pal_v8_join(pal_v8_low(m->sum), q);
         m->from = pal_v8_join(pal_v8_low(m->from), next);
@@ -434,7 +434,7 @@ static void take_masses(rk4 *row, const pal_body *body, const rates *r, bool hea
         row->inverse_kg[k] = body->support[i] ? 0 : 1 / mass;
         row->led[k] = body->support[i] == PAL_PRESCRIBED;
         if (body->support[i] == PAL_FIXED)
-            body->pack->xv[k] = pal_v8_join(pal_v8_low(body->pack->xv[k]), (pal_quad){0});
+            body->active_nodes->xv[k] = pal_v8_join(pal_v8_low(body->active_nodes->xv[k]), (pal_quad){0});
     }
 }
 
@@ -447,7 +447,7 @@ PAL_INLINE pal_v8 rate_of(const rk4 *row, const pal_active_nodes *pack, int k)
 /* the state at the start, and the second stage's */
 static void stage_first(rk4 *row, const pal_body *body, const rates *r)
 {
-    pal_active_nodes *pack = body->pack;
+    pal_active_nodes *pack = body->active_nodes;
     for (int k = 0; k < body->n_active; k++) {
         memory *m = &row->memory[k];
         const pal_v8 y = pack->xv[k], rate = rate_of(row, pack, k);
@@ -461,7 +461,7 @@ static void stage_first(rk4 *row, const pal_body *body, const rates *r)
  * the drag leaves of it, less what the first acceleration gave that */
 static void stage_second(rk4 *row, const pal_body *body, const rates *r)
 {
-    pal_active_nodes *pack = body->pack;
+    pal_active_nodes *pack = body->active_nodes;
     for (int k = 0; k < body->n_active; k++) {
         memory *m = &row->memory[k];
         const pal_v8 y = pack->xv[k], rate = rate_of(row, pack, k), half = r->half[row->led[k]];
@@ -475,7 +475,7 @@ static void stage_second(rk4 *row, const pal_body *body, const rates *r)
 /* from the third stage's forces the fourth stage's state */
 static void stage_third(rk4 *row, const pal_body *body, const rates *r)
 {
-    pal_active_nodes *pack = body->pack;
+    pal_active_nodes *pack = body->active_nodes;
     for (int k = 0; k < body->n_active; k++) {
         memory *m = &row->memory[k];
         const pal_v8 rate = rate_of(row, pack, k);
@@ -487,7 +487,7 @@ static void stage_third(rk4 *row, const pal_body *body, const rates *r)
 /* from the fourth stage's forces the state at the end; returns the square of the longest way, NaN where one is none */
 static double stage_last(rk4 *row, const pal_body *body, const rates *r)
 {
-    pal_active_nodes *pack = body->pack;
+    pal_active_nodes *pack = body->active_nodes;
     const double dt2 = r->dt * r->dt;
     double most2 = 0, poison = 0;
     for (int k = 0; k < body->n_active; k++) {
@@ -506,7 +506,7 @@ static double stage_last(rk4 *row, const pal_body *body, const rates *r)
 static void clamp_moves(const rk4 *row, pal_body *body, double dt_s, double max_m)
 {
     for (int k = 0; k < body->n_active; k++) {
-        pal_v8 *to = &body->pack->xv[k];
+        pal_v8 *to = &body->active_nodes->xv[k];
         pal_quad from = pal_v8_low(row->memory[k].from), move = pal_v8_low(*to) - from, v = pal_v8_high(*to);
         double way = sqrt(pal_quad_dot(move, move)), speed = sqrt(pal_quad_dot(v, v)) * dt_s;
         if (way > max_m) move *= max_m / way;
@@ -520,7 +520,7 @@ static void clamp_moves(const rk4 *row, pal_body *body, double dt_s, double max_
 static void give_forces(const rk4 *row, const pal_body *body)
 {
     for (int k = 0; k < body->n_active && row->pulls; k++)
-        pal_quad_store(body->f + 3 * (size_t)pal_body_point(body, k), body->pack->f[k]);
+        pal_quad_store(body->f + 3 * (size_t)pal_body_point(body, k), body->active_nodes->f[k]);
 }
 
 static pal_err run(void *self, pal_step *step)
