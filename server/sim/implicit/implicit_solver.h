@@ -38,7 +38,7 @@ typedef struct pal_implicit_options {
 } pal_implicit_options;
 
 typedef struct pal_implicit {
-    pal_implicit_options wish;
+    pal_implicit_options options;
     pal_system system;
     pal_block_matrix blocks; /* pattern of K; values are work space */
     pal_node_rotations turns;
@@ -67,7 +67,7 @@ typedef struct pal_implicit {
 /* reads the keys; substep_s 0 becomes the scene's step. [load] */
 pal_err pal_implicit_read(pal_config_entry *item, const pal_build *build, pal_implicit_options *out);
 /* share: tau over the sub-step. REFUSED: no positive definite matrix at rest; MEMORY. [load] */
-pal_err pal_implicit_make(const pal_implicit_options *wish, pal_build *build, double share, pal_implicit **out);
+pal_err pal_implicit_make(const pal_implicit_options *options, pal_build *build, double share, pal_implicit **out);
 void pal_implicit_destroy(void *self);
 
 /* false: nothing to solve (all held: prescribed nodes have moved) or the state is not finite (body->frozen is set) */

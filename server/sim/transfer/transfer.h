@@ -22,7 +22,7 @@
  *
  * Display. Nodes at the same places carry a skin elsewhere: the offset from what the new body would show to what the
  * old one did is released with the forces (pal_world_blend_display), so that nothing jumps and tools touch what is
- * seen.
+ * snapshot.
  *
  * Also transferred: time, tools, poses, materials, other bodies (transfer_world.h), lasting loads, what a tool holds
  * (pal_effect.transfer) or presses, with friction (tool_contact.h), and brushes. Thread: one at a time. */

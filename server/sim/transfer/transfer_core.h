@@ -25,7 +25,7 @@ struct pal_transfer {
     /* while the old world goes on */
     bool has_rehearsed;
     double *fix;              /* what smoothing added to places by interpolation, NULL: none yet [n_dof][3] */
-    pal_body seen;            /* the old body as it was looked at; what changes of it is in snapshot_room */
+    pal_body snapshot;        /* the old body as it was looked at; what changes of it is in snapshot_room */
     double *snapshot_room;    /* NULL: it never was */
     double snapshot_energy_J; /* its elastic energy then */
 };
