@@ -1,19 +1,21 @@
-/* What the component refine decides on: external force, speed and change of curvature at the active nodes of an adaptive surface, and what
- * a change of level conserves (paper C, criterion for refinement and simplification). Thread: [sim], make [load]; no heap in [sim]. */
+/* What the component refine decides on: external force, speed and change of curvature at the active nodes of an
+ * adaptive surface, and what a change of level conserves (paper C, criterion for refinement and simplification).
+ * Thread: [sim], make [load]; no heap in [sim]. */
 #ifndef PAL_SIM_SURFACE_REFINE_MEASURE_H
 #define PAL_SIM_SURFACE_REFINE_MEASURE_H
 #include "server/sim/core/effect.h"
 #include "server/sim/surface/adaptive_surface.h"
 
-/* thresholds at a node of level 0; 0: the criterion is off. A node asks for finer faces beyond a threshold, and is quiet below half of the
- * threshold on the next coarser level */
+/* thresholds at a node of level 0; 0: the criterion is off. A node asks for finer faces beyond a threshold, and is
+ * quiet below half of the threshold on the next coarser level */
 typedef struct pal_refine_limits {
-    double force_N; /* external force; force_N m/m_0 at a node of mass m, so that nodes that share a load after a split stay on the same
-                     * side of the threshold */
+    double force_N; /* external force; force_N m/m_0 at a node of mass m, so that nodes that share a load after a split
+                     * stay on the same side of the threshold */
     double speed_m_s;     /* relative to the body's best-fit rigid motion; the same on all levels               */
-    double curvature_1_m; /* change from rest of the mean over a node's springs of 2 n.d/d.d, n the normal of its triangles, d the
-                           * vector along the spring: the mean normal curvature, 1/radius. curvature_1_m sqrt(m_0/m) at a node of
-                           * mass m, in proportion to 1/edge: the angle between the normals of neighbouring nodes decides */
+    double curvature_1_m; /* change from rest of the mean over a node's springs of 2 n.d/d.d, n the normal of its
+                           * triangles, d the vector along the spring: the mean normal curvature, 1/radius.
+                           * curvature_1_m sqrt(m_0/m) at a node of mass m, in proportion to 1/edge: the angle between
+                           * the normals of neighbouring nodes decides */
 } pal_refine_limits;
 
 /* a node with a number that is not finite is BETWEEN: it is neither refined nor coarsened */
