@@ -30,18 +30,18 @@ typedef struct subject {
     bool two; /* a second, equal body keeps its configuration */
 } subject;
 
-typedef struct row {
+typedef struct neighbour {
     pal_measured_configuration predicted;
     int n_node, n_substep;
     double was_ms, ms; /* of a step before and after the switch */
     double own_m;      /* estimated error of the new configuration */
     pal_err err;
-} row;
+} neighbour;
 
 typedef struct result {
-    int n_node, n_substep, n_row;
+    int n_node, n_substep, n_neighbour;
     pal_estimate estimate;
-    row row[PAL_ESTIMATE_NEIGHBOURS];
+    neighbour neighbour[PAL_ESTIMATE_NEIGHBOURS];
 } result;
 
 static void put_other(pal_scene *scene)
@@ -108,7 +108,7 @@ static double median_ms(const pal_estimate_cost *cost, int n)
 }
 
 /* both worlds step alternately from the transferred state */
-static pal_err step_alternately(pal_world *was, double was_s, pal_world *now, double now_s, row *r)
+static pal_err step_alternately(pal_world *was, double was_s, pal_world *now, double now_s, neighbour *r)
 {
     pal_estimate_cost *cost = malloc(2 * MAX_SAMPLE * sizeof *cost);
     int n[2] = {0, 0};
@@ -123,7 +123,7 @@ static pal_err step_alternately(pal_world *was, double was_s, pal_world *now, do
     return err;
 }
 
-static pal_err try_neighbour(const pal_scene *scene, pal_world *world, row *r, pal_diagnostic *diag)
+static pal_err try_neighbour(const pal_scene *scene, pal_world *world, neighbour *r, pal_diagnostic *diag)
 {
     pal_configuration_switch *change = NULL;
     pal_world *next = NULL;
@@ -165,9 +165,9 @@ static pal_err measure(const subject *s, result *out, pal_diagnostic *diag)
     if (!err) err = estimate(scene, world, cost, n, &out->estimate, diag);
     if (!err) {
         out->n_node = pal_world_view_body(world, 0)->n_node, out->n_substep = pal_world_substeps(world);
-        out->n_row = out->estimate.n_neighbour;
-        for (int k = 0; k < out->n_row; k++) {
-            row *r = &out->row[k];
+        out->n_neighbour = out->estimate.n_neighbour;
+        for (int k = 0; k < out->n_neighbour; k++) {
+            neighbour *r = &out->neighbour[k];
             r->predicted = out->estimate.neighbour[k];
             pal_diagnostic reason = {""};
             r->err = try_neighbour(scene, world, r, &reason);
@@ -178,12 +178,12 @@ static pal_err measure(const subject *s, result *out, pal_diagnostic *diag)
     return err;
 }
 
-static double cost_ratio(const result *c, const row *r)
+static double cost_ratio(const result *c, const neighbour *r)
 {
     return r->predicted.ms / c->estimate.ms / (r->ms / r->was_ms);
 }
 
-static const char *configuration_text(const row *r, char text[64])
+static const char *configuration_text(const neighbour *r, char text[64])
 {
     const pal_configuration *s = &r->predicted.setting;
     char tolerance[24] = "";
@@ -200,7 +200,7 @@ static bool is_within(double off)
 static void add_neighbour(bench_report *report, const subject *s, const result *c, int k)
 {
     char text[64];
-    const row *r = &c->row[k];
+    const neighbour *r = &c->neighbour[k];
     bench_record(report);
     bench_text(report, "body", "body", -30, s->name);
     bench_text(report, "configuration", "configuration", -34, configuration_text(r, text));
@@ -240,9 +240,9 @@ int bench_estimate(bool json)
     for (int k = 0; k < N_CASE && !err; k++) {
         result *c = calloc(1, sizeof *c);
         err = c ? measure(&subjects[k], c, &diag) : PAL_ERR_MEMORY;
-        for (int i = 0; !err && i < c->n_row; i++) {
-            if (c->row[i].err) continue;
-            n++, within += is_within(cost_ratio(c, &c->row[i]));
+        for (int i = 0; !err && i < c->n_neighbour; i++) {
+            if (c->neighbour[i].err) continue;
+            n++, within += is_within(cost_ratio(c, &c->neighbour[i]));
             add_neighbour(&r, &subjects[k], c, i);
         }
         free(c);

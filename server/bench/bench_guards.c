@@ -1,6 +1,6 @@
 /* `palpate bench guards`: the cost of the guards while nothing goes wrong, as a share of a step, for every model. Two
  * worlds of one scene step alternately under the same load; one has the component finite_guard and an implicit solver
- * that checks its energy, the other neither. The worlds are made anew several times in alternating order, because the
+ * that checks its energy, the other neither. The worlds are created several times in alternating order, because the
  * place in memory alone makes two worlds of one scene differ by several percent. A step repeats the same work each
  * round, so its least processor time counts; the result is the mean of these over the steps. (Medians over all rounds
  * gave 0.9 and 5.8 % on a busy machine where least times gave 3.4 and 3.6.) The checks that every solver makes (are all

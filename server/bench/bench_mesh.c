@@ -1,6 +1,6 @@
 /* `palpate bench mesh`: milliseconds of fill and split against paper B, Table 1 (bunny of 70,000 triangles, 1.5 GHz
  * Pentium 4), and the peak of resident memory. The time to read the file is printed but not included. Every run
- * allocates anew, so the figures include the page clearing of the kernel. */
+ * allocates its memory again, so the figures include the page clearing of the kernel. */
 #include "server/bench/bench.h"
 #include "server/bench/bench_report.h"
 

@@ -220,8 +220,8 @@ int bench_protocol(bool json)
     pal_err err = refusal ? pal_diagnostic_set(&diag, PAL_ERR_INTERNAL, "%s", pal_refusal_text(refusal)) : PAL_ERR_OK;
     bench_report r;
     bench_begin(&r, "protocol", json);
-    double n = err ? 1 : b->s.n_vertex;
-    if (!err) {
+    double n = b && !err ? b->s.n_vertex : 1;
+    if (b && !err) {
         bench_number(&r, "vertices", NULL, 0, 0, n);
         bench_number(&r, "triangles", NULL, 0, 0, b->s.n_triangle);
         bench_number(&r, "order_s", NULL, 0, 0, b->order_s);

@@ -1,6 +1,6 @@
 #include "server/bench/bench_report.h"
 
-#include "server/cli/report.h"
+#include "server/cli/flags.h"
 
 #include <math.h>
 #include <stdarg.h>

@@ -19,7 +19,7 @@ typedef struct parse {
     bool seen[FLAGS];
     const char *config_file;
     struct {
-        const pal_config_key *setting;
+        const pal_config_key *key;
         const char *text;
     } given[FLAGS];
     int n_given;
@@ -58,10 +58,10 @@ static int manual(const pal_flag_table *table)
     printf("%sFLAGS\n", table->example ? "\n" : "");
     for (int k = 0; k < table->n_flag; k++) manual_line(table->flag[k].name, table->flag[k].value, table->flag[k].help);
     if (table->config) {
-        const pal_config_key *setting = pal_config_keys(&n);
+        const pal_config_key *key = pal_config_keys(&n);
         for (int k = 0; k < n; k++) {
-            flag_name(setting[k].key, name);
-            manual_line(name, setting[k].kind == PAL_CONFIG_KEY_BOOL ? NULL : setting[k].value, setting[k].help);
+            flag_name(key[k].key, name);
+            manual_line(name, key[k].kind == PAL_CONFIG_KEY_BOOL ? NULL : key[k].value, key[k].help);
         }
         manual_line("--config", "FILE", "JSON file of these keys (PALPATE_CONFIG, or none)");
     }
@@ -147,14 +147,14 @@ static int set_flag(parse *p, const pal_flag *flag, const char *text)
 }
 
 /* a flag of the configuration, "--allow-remote" -> allow_remote; NULL: none */
-static const pal_config_key *setting_named(const pal_flag_table *table, const char *name)
+static const pal_config_key *key_named(const pal_flag_table *table, const char *name)
 {
     char known[KEY];
     int n;
-    const pal_config_key *setting = pal_config_keys(&n);
+    const pal_config_key *key = pal_config_keys(&n);
     for (int k = 0; table->config && k < n; k++) {
-        flag_name(setting[k].key, known);
-        if (!strcmp(known, name)) return &setting[k];
+        flag_name(key[k].key, known);
+        if (!strcmp(known, name)) return &key[k];
     }
     return NULL;
 }
@@ -168,13 +168,13 @@ static int take(parse *p, int argc, char **argv, int *at)
     int found = -1;
     for (int k = 0; k < p->table->n_flag; k++)
         if (!strcmp(p->table->flag[k].name, name)) found = k;
-    const pal_config_key *setting = found < 0 ? setting_named(p->table, name) : NULL;
+    const pal_config_key *key = found < 0 ? key_named(p->table, name) : NULL;
     bool config_file = p->table->config && !strcmp(name, "--config");
     bool json = !strcmp(name, "--json"), quiet = !strcmp(name, "--quiet");
-    if (found < 0 && !setting && !config_file && !json && !quiet)
+    if (found < 0 && !key && !config_file && !json && !quiet)
         return pal_flags_wrong(p->common, "unknown flag %.60s", word);
     bool is_switch = json || quiet || (found >= 0 && p->table->flag[found].kind == PAL_FLAG_SWITCH) ||
-                     (setting && setting->kind == PAL_CONFIG_KEY_BOOL);
+                     (key && key->kind == PAL_CONFIG_KEY_BOOL);
     if (is_switch && equal) return pal_flags_wrong(p->common, "%s takes no value", name);
     if (!is_switch && !equal && *at + 1 >= argc) return pal_flags_wrong(p->common, "%s needs a value", name);
     const char *text = is_switch ? "true" : equal ? equal + 1 : argv[++*at];
@@ -183,12 +183,12 @@ static int take(parse *p, int argc, char **argv, int *at)
     if (json || quiet) return -1;
     if (config_file ? p->config_file != NULL : found >= 0 && p->seen[found])
         return pal_flags_wrong(p->common, "%s is given twice", name);
-    for (int k = 0; setting && k < p->n_given; k++)
-        if (p->given[k].setting == setting) return pal_flags_wrong(p->common, "%s is given twice", name);
+    for (int k = 0; key && k < p->n_given; k++)
+        if (p->given[k].key == key) return pal_flags_wrong(p->common, "%s is given twice", name);
     if (config_file) {
         p->config_file = text;
-    } else if (setting) {
-        p->given[p->n_given].setting = setting;
+    } else if (key) {
+        p->given[p->n_given].key = key;
         p->given[p->n_given++].text = text;
     } else {
         p->seen[found] = true;
@@ -209,8 +209,8 @@ static int configure(parse *p)
     if (err) return pal_report_refusal(p->common, err, &diag);
     for (int k = 0; k < p->n_given; k++) {
         char name[KEY];
-        flag_name(p->given[k].setting->key, name);
-        if (pal_config_set(config, p->given[k].setting->key, p->given[k].text, name, &diag))
+        flag_name(p->given[k].key->key, name);
+        if (pal_config_set(config, p->given[k].key->key, p->given[k].text, name, &diag))
             return pal_flags_wrong(p->common, "%s", diag.text);
     }
     return -1;

@@ -2,7 +2,7 @@
  * Thread: [load]. */
 #ifndef PAL_COMMANDS_CONVERGENCE_REPORT_H
 #define PAL_COMMANDS_CONVERGENCE_REPORT_H
-#include "server/cli/report.h"
+#include "server/cli/flags.h"
 #include "server/solve/convergence.h"
 
 enum { PAL_SOLVE_STUDY_ELEMENTS = 4 };

@@ -125,7 +125,7 @@ function faults_of(file, text) {
         if (
             foreign.test(word) ||
             /^(\.\.\/)+(shared|data)\//.test(word) ||
-            /^[A-Z]+\.\w+$/.test(word.replace("README.md", "x"))
+            /[A-Z]{3,}/.test(word.replace("README.md", ""))
         )
             continue;
         if (!resolve(word, file) && !ends.has(`${path.basename(word)}.c`)) add(at, word, "is not in the tree");

@@ -1,7 +1,7 @@
 #!/bin/sh
 # palpate study as a person runs it: what it says and writes, that it goes on after Ctrl-C and measures nothing twice,
 # that what it names is a scene which plan and serve take, that a scene which asks for an accuracy gets it, and that bad
-# input is refused in one line. Quick studies of a small body: figures are in tests/lab and tests/accuracy. Prints
+# input is refused in one line. Quick studies of a small body: figures are in tests/study and tests/accuracy. Prints
 # "N passed, N failed"; exit 1 when a check failed.
 # usage: test_study.sh PALPATE
 set -u
