@@ -23,10 +23,10 @@ static const double gamma_share = 0.29289321881345248;
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    pal_implicit_options wish;
+    pal_implicit_options options;
     pal_implicit *core = NULL;
-    PAL_TRY(pal_implicit_read(item, build, &wish));
-    pal_err err = pal_implicit_make(&wish, build, gamma_share, &core);
+    PAL_TRY(pal_implicit_read(item, build, &options));
+    pal_err err = pal_implicit_make(&options, build, gamma_share, &core);
     *self = core;
     return err;
 }
