@@ -1,4 +1,4 @@
-/* A grip on a body that adapts (adaptive_grasp.h). */
+/* Grasps on adaptive surfaces (adaptive_grasp.h). */
 #include "server/sim/surface/adaptive_grasp.h"
 
 #include "server/base/vec3.h"
@@ -39,7 +39,7 @@ void pal_adaptive_grasp_begin(pal_adaptive_grasp *l, const pal_body *body, const
     l->retriangulated = false;
 }
 
-/* what a vertex holds: to itself where it is in use, else by halves to the ends of its edge */
+/* adds the share of a vertex: to itself when it is a node, else in halves to the ends of its edge */
 static void give_up(const pal_adaptive_surface *s, int32_t vertex, double share, double *weight)
 {
     if (pal_adaptive_has(s, vertex)) {
@@ -88,7 +88,7 @@ void pal_adaptive_grasp_transfer(pal_adaptive_grasp *l, const pal_body *body, ui
         memcpy(l->known, all, sizeof *l->known * (size_t)n_finest);
         l->n_known = n_finest;
     }
-    /* all that it holds is finer */
+    /* all held tissue is finer */
     for (int32_t i = 0; i < from->n_node && !any; i++)
         if (share_before[i] > 0) share_up(from->model.adaptive, i, share_before[i], body->n_node, share);
 }
@@ -109,7 +109,7 @@ void pal_adaptive_grasp_goal(pal_adaptive_grasp *l, const double quat[4], const 
 {
     pal_scale3(l->shift, pal_blend_release(&l->left_s, dt_s), l->shift);
     if (k_N_m > 0 && l->k_N_m > 0 && (l->retriangulated || k_N_m != l->k_N_m)) {
-        /* what the spring of before would be stretched by now */
+        /* extension of the previous spring now */
         double was[3], moved[3];
         pal_add3(was, goal, l->shift), pal_sub3(was, was, y);
         if (l->retriangulated) {

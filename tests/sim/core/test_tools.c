@@ -24,7 +24,7 @@ static void moves_in_equal_parts_and_ends_on_the_pose(void)
     CHECK_NEAR(tools.tool[0].last.position_m[0], 0.3, 0);
 }
 
-static void still_ends_on_the_pose_when_substeps_are_added_on_the_way(void)
+static void ends_on_the_pose_when_substeps_are_added_on_the_way(void)
 {
     pal_tools tools = {.n_tool = 1};
     pal_pose a = pose_at(0), b = pose_at(1);
@@ -51,7 +51,7 @@ static void a_tool_that_appears_is_not_swept_from_elsewhere(void)
     CHECK(tools.tool[0].present);
 }
 
-static void a_tool_that_comes_back_elsewhere_while_fading_begins_anew(void)
+static void a_tool_that_returns_elsewhere_while_fading_starts_again(void)
 {
     pal_tools tools = {.n_tool = 1};
     pal_pose a = pose_at(0), b = pose_at(1);
@@ -65,7 +65,7 @@ static void a_tool_that_comes_back_elsewhere_while_fading_begins_anew(void)
     CHECK_NEAR(tools.tool[0].velocity_m_s[0], 0, 0);
 }
 
-static void forces_ramp_up_over_a_sixth_of_a_second_and_down_when_let_go(void)
+static void forces_ramp_up_over_a_sixth_of_a_second_and_down_when_released(void)
 {
     pal_tools tools = {.n_tool = 1};
     pal_pose a = pose_at(0.1);
@@ -124,10 +124,10 @@ static void passes_only_poses_that_are_numbers_within_reach(void)
 int main(void)
 {
     RUN(moves_in_equal_parts_and_ends_on_the_pose);
-    RUN(still_ends_on_the_pose_when_substeps_are_added_on_the_way);
+    RUN(ends_on_the_pose_when_substeps_are_added_on_the_way);
     RUN(a_tool_that_appears_is_not_swept_from_elsewhere);
-    RUN(a_tool_that_comes_back_elsewhere_while_fading_begins_anew);
-    RUN(forces_ramp_up_over_a_sixth_of_a_second_and_down_when_let_go);
+    RUN(a_tool_that_returns_elsewhere_while_fading_starts_again);
+    RUN(forces_ramp_up_over_a_sixth_of_a_second_and_down_when_released);
     RUN(reports_the_mean_force_of_its_substeps);
     RUN(passes_only_poses_that_are_numbers_within_reach);
     return check_report();

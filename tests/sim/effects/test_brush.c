@@ -1,6 +1,7 @@
 /* Brushes: pressure without net force on closed surfaces, handles as springs, slow in and out, rows that come and go,
  * what is refused; on springs, elements and solids. */
 #include "server/sim/core/effect_list.h"
+#include "tests/fixtures/random.h"
 #include "tests/fixtures/solids.h"
 #include "tests/fixtures/tool_scene.h"
 #include "tests/heap_calls.h"
@@ -86,7 +87,7 @@ static void crumple(tool_scene *s, double far_m)
 {
     uint64_t seed = 5;
     for (int i = 0; i < 3 * s->body->n_dof; i++) {
-        s->body->x[i] = s->body->x_rest[i] + far_m * check_random(&seed);
+        s->body->x[i] = s->body->x_rest[i] + far_m * random_signed(&seed);
     }
     pal_world_invalidate_limits(s->world, 0);
 }

@@ -1,0 +1,50 @@
+/* A calibration's insides (private to calibrate*.c). */
+#ifndef PAL_CALIBRATE_CALIBRATION_H
+#define PAL_CALIBRATE_CALIBRATION_H
+#include "server/calibrate/calibrate.h"
+
+/* one load with its truth */
+typedef struct pal_fit_case {
+    double *force_N; /* [n_node][3]                                                                  */
+    /* points of the truth as sums over nodes: start NULL: point i is node i */
+    int n_point;
+    int32_t *start, *node;
+    double *weight;
+    double *u; /* truth [n_point][3], m                                                              */
+    double max_m;
+    bool linear;
+    double *x_start; /* rest at the start's constants; at rest where there is none [n_node][3]      */
+} pal_fit_case;
+
+struct pal_calibration {
+    pal_calibrate_options options;
+    const pal_problem *problem;
+    const pal_calibrate_case *cases;
+    int n_case, n_fit;
+    pal_prepared mesh;
+    pal_world *world;
+    pal_lattice lattice;
+    pal_support_def support[PAL_PROBLEM_REGIONS];
+    pal_grid grid;
+    pal_grid_weights weights;
+    bool has_grid;
+    int32_t *edge; /* used nodes that are neighbours on the grid [n_edge][2] */
+    int n_edge;
+    int n_kind, kind[PAL_SPRING_KINDS], n_used, n_parameter;
+    double *theta, *low, *high;            /* start and bounds [n_parameter] */
+    double manual_theta[PAL_SPRING_KINDS]; /* theta of each kind index       */
+    double mean_young_Pa, mean_poisson, mean_density, truth_s, prepare_s;
+    bool clamped;
+    pal_fit_case fit[PAL_CALIBRATE_CASES];
+};
+
+struct pal_calibration_workspace {
+    const pal_calibration *calibration;
+    pal_equilibrium_workspace *workspace;
+    double *k[PAL_SPRING_KINDS], *slope[PAL_SPRING_KINDS]; /* by pal_spring_kind [n_item] */
+    double *value, *node;           /* exp theta and its slope [n_used]; values at nodes [n_node]  */
+    double *x[PAL_CALIBRATE_CASES]; /* last rest [n_node][3]       */
+    bool rests[PAL_CALIBRATE_CASES];
+    double *dJ_du, *u, *gradient; /* [n_node][3], [most points][3], [n_parameter]         */
+};
+#endif
