@@ -38,24 +38,25 @@ bool pal_contact_group_next(const pal_contact *contact, int n, uint8_t *grouped,
 bool pal_contact_group_near(const double centre[3], double radius_m, double near_m, const double *x, int n_point,
                             const pal_contact_group *earlier, int n_earlier, pal_contact_group *group)
 {
-    double least = INFINITY, sum[3] = {0};
+    double nearest_m = INFINITY, sum[3] = {0};
     for (int pass = 0; pass < 2; pass++)
         for (int i = 0; i < n_point; i++) {
             double out[3];
             pal_sub3(out, centre, x + 3 * i);
             double distance = pal_norm3(out);
-            if (distance > radius_m + near_m || (pass == 1 && distance > least + NEAREST_RADII * radius_m)) continue;
+            if (distance > radius_m + near_m || (pass == 1 && distance > nearest_m + NEAREST_RADII * radius_m))
+                continue;
             if (!pal_unit3(out, out, 1e-9 * radius_m)) continue;
             bool seen = false;
             for (int b = 0; b < n_earlier && !seen; b++)
                 seen = pal_dot3(out, earlier[b].normal) >= (earlier[b].force_N > 0 ? 0 : GROUP_COSINE);
             if (seen) continue;
             if (pass == 0)
-                least = fmin(least, distance);
+                nearest_m = fmin(nearest_m, distance);
             else
-                pal_axpy3(sum, least + NEAREST_RADII * radius_m - distance, out);
+                pal_axpy3(sum, nearest_m + NEAREST_RADII * radius_m - distance, out);
         }
-    if (!(least < INFINITY)) return false;
-    *group = (pal_contact_group){.gap_m = fmax(0, least - radius_m)};
+    if (!(nearest_m < INFINITY)) return false;
+    *group = (pal_contact_group){.gap_m = fmax(0, nearest_m - radius_m)};
     return pal_unit3(group->normal, sum, 0);
 }

@@ -1,4 +1,4 @@
-/* Contact of one tool with an implicit solver: ties, settled forces, caps, felt stiffness. */
+/* Contact of one tool with an implicit solver (contact_implicit.h). */
 #include "server/sim/contact/contact_implicit.h"
 
 #include "server/base/vec3.h"
@@ -44,9 +44,9 @@ int pal_contact_implicit_thin(pal_contact *contact, int n)
 /* two unit directions across n */
 static void basis(const double n[3], double t[2][3])
 {
-    int least = fabs(n[0]) < fabs(n[1]) ? 0 : 1;
-    if (fabs(n[2]) < fabs(n[least])) least = 2;
-    double e[3] = {least == 0, least == 1, least == 2};
+    int axis = fabs(n[0]) < fabs(n[1]) ? 0 : 1;
+    if (fabs(n[2]) < fabs(n[axis])) axis = 2;
+    double e[3] = {axis == 0, axis == 1, axis == 2};
     pal_cross3(t[0], n, e);
     pal_unit3(t[0], t[0], 0);
     pal_cross3(t[1], n, t[0]);
@@ -68,7 +68,7 @@ static void add_across(pal_contact_implicit *solve, pal_contact_springs *springs
     pal_axpy3(solve->slip_m, -pal_dot3(solve->slip_m, along), along);
     pal_add3(stretch, solve->slip_m, solve->tool_move_m);
     pal_axpy3(stretch, -pal_dot3(stretch, along), along);
-    double size = pal_norm3(stretch), most = friction * solve->normal_N;
+    double size = pal_norm3(stretch), limit_N = friction * solve->normal_N;
     solve->slides = solve->slides && size > 0;
     basis(along, solve->t);
     for (int k = 0; k < 2; k++) {
@@ -76,7 +76,7 @@ static void add_across(pal_contact_implicit *solve, pal_contact_springs *springs
                                                solve->slides ? 0 : stiffness);
         if (row < 0) return;
         double part = pal_dot3(stretch, solve->t[k]);
-        solve->force_N[n + k] = solve->slides ? most * part / size : stiffness * part;
+        solve->force_N[n + k] = solve->slides ? limit_N * part / size : stiffness * part;
     }
     solve->across = solve->first + n;
     solve->friction_N_m = stiffness;
@@ -118,10 +118,10 @@ void pal_contact_implicit_begin(pal_contact_implicit *solve, pal_contact_springs
     pal_contact_springs_load(springs, 1, solve->force_N, solve->first, springs->n_row - solve->first, body->load);
 }
 
-/* k (d - m) of every contact, whether it acts or not; true: what acts is not what should have, by a noticeable part of
- * the forces, and is what should have now. After CHOOSE_ROUNDS solves only a contact that pulls as a whole is changed:
- * ties that pull are let go and none is taken up, so that there is an end. In the last of several stages a pull may
- * make up for the push of an earlier one, and stays */
+/* k (d - m) of every contact, active or not; true: other contacts should have been active, by a noticeable part of the
+ * forces, and are now. After CHOOSE_ROUNDS solves only a contact that pulls as a whole is changed: springs that pull
+ * are removed and none is added, so that this ends. In the last of several stages a pull may make up for the push of an
+ * earlier one, and stays */
 static bool choose(pal_contact_implicit *solve, pal_contact_springs *springs, pal_body *body,
                    const pal_contact *contact, double *force_N)
 {
@@ -161,7 +161,7 @@ static double across_now(const pal_contact_implicit *solve, const pal_contact_sp
 }
 
 /* friction after the solve, for a normal force; true: it slid although it was taken as sticking or the other way round,
- * and its two ties are changed. force_N: as the solver had it */
+ * and its two springs are changed. force_N: as the solver had it */
 static bool settle_across(pal_contact_implicit *solve, pal_contact_springs *springs, pal_body *body, double normal_N,
                           double friction, double force_N[2])
 {
@@ -188,7 +188,7 @@ static bool settle_across(pal_contact_implicit *solve, pal_contact_springs *spri
     return true;
 }
 
-/* other constant loads instead of the present ones; the ties give no stiffness any more */
+/* constant loads instead of the present ones; the springs give no stiffness any more */
 static void hold_constant(pal_contact_implicit *solve, pal_contact_springs *springs, pal_body *body,
                           const double *force_N, int n)
 {
@@ -217,7 +217,7 @@ static void sum_forces(const pal_contact_implicit *solve, pal_contact *contact, 
     }
 }
 
-/* forces as the solver had them; true: ties were chosen anew, the forces are a first guess of what comes next */
+/* forces as the solver had them; true: springs were chosen again, the forces are a first guess of what comes next */
 static bool find_forces(pal_contact_implicit *solve, pal_contact_springs *springs, pal_body *body,
                         const pal_contact *contact, double friction, double *force_N)
 {

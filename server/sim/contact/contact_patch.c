@@ -12,7 +12,7 @@ void pal_contact_patches_reset(pal_contact_patches *patches, int id_base)
     patches->id_base = (int16_t)id_base;
 }
 
-/* the free or matching track of a blob */
+/* the matching or a free track of a group */
 static pal_contact_patch_track *find_track(pal_contact_patches *patches, const bool *taken,
                                            const pal_contact_group *group)
 {
@@ -49,7 +49,7 @@ static void follow(pal_contact_patch_track *track, const pal_contact_patch_optio
         if (k > 0) track->fit.k_N_m = fmin(fmax(k, MIN_STIFFNESS_N_M), MAX_STIFFNESS_N_M);
         if (track->contact || k > 0) track->fit.k_start_N_m = track->fit.k_N_m;
     } else if (!track->contact) {
-        /* first touch: the way since the gap was measured, or what the start stiffness makes of the force */
+        /* first touch: the displacement since the gap was measured, or what the start stiffness makes of the force */
         double depth = moved && track->depth_m < 0 ? track->depth_m - pal_dot3(move, group->normal) : 0;
         if (!(depth > 0)) depth = group->force_N / track->fit.k_start_N_m;
         pal_stiffness_fit_start(&track->fit, track->fit.k_start_N_m);

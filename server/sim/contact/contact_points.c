@@ -2,6 +2,7 @@
 #include "server/sim/contact/contact_points.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/contact/tuning.h"
 
 #include <math.h>
 #include <string.h>
@@ -93,9 +94,9 @@ static int next_run(const pal_contact_points *points, const pal_body *body, cons
 }
 
 int pal_contact_points_collect(pal_contact_points *points, const pal_body *body, const double a[3], const double b[3],
-                               double reach_m, int32_t *list, double *nearest_m)
+                               double reach_m, int32_t *list)
 {
-    double ab[3], nearest2 = reach_m * reach_m, reach2 = nearest2;
+    double ab[3], reach2 = reach_m * reach_m;
     pal_sub3(ab, b, a);
     double ab2 = pal_dot3(ab, ab), per_ab2 = ab2 > 0 ? 1 / ab2 : 0;
     float low[3], high[3];
@@ -113,7 +114,6 @@ int pal_contact_points_collect(pal_contact_points *points, const pal_body *body,
             continue;
         double p[3] = {(double)s[0], (double)s[1], (double)s[2]}, d2 = distance2(p, a, ab, per_ab2);
         if (!(d2 <= reach2)) continue;
-        nearest2 = fmin(nearest2, d2);
         make_live(points, body, i);
         list[n++] = i;
     }
@@ -130,11 +130,9 @@ int pal_contact_points_collect(pal_contact_points *points, const pal_body *body,
                 p[c] += (double)share[k] * (double)body->shown[3 * (size_t)corner[k] + (size_t)c];
         double d2 = distance2(p, a, ab, per_ab2);
         if (!(d2 <= reach2)) continue;
-        nearest2 = fmin(nearest2, d2);
         for (int k = 0; k < 3; k++) make_live(points, body, corner[k]);
         list[n++] = i;
     }
-    *nearest_m = sqrt(nearest2);
     return n;
 }
 
@@ -162,8 +160,8 @@ void pal_contact_points_reset(pal_contact_points *points)
     points->sub_step += 2;
 }
 
-/* what is shown, and so what is touched, while a switch is let in */
-static void add_lag(const pal_body *body, int vertex, double x[3])
+/* what is shown is touched, also while a change of method is blended in */
+static void add_display_offset(const pal_body *body, int vertex, double x[3])
 {
     for (size_t c = 0; c < 3 && body->display_offset_m; c++)
         x[c] += body->display_offset_part * (double)body->display_offset_m[3 * (size_t)vertex + c];
@@ -176,7 +174,7 @@ void pal_contact_points_update(pal_contact_points *points, const pal_body *body,
         size_t at = 3 * (size_t)points->live[i];
         pal_copy3(points->x + at, body->d + at);
         pal_copy3(points->v + at, body->dv + at);
-        add_lag(body, points->live[i], points->x + at);
+        add_display_offset(body, points->live[i], points->x + at);
     }
     if (body->active) return;
     if (body->skin) pal_skin_frames_of(body->skin, body->d, points->frame, points->n_frame, body->skin_axes);
@@ -190,7 +188,7 @@ void pal_contact_points_update(pal_contact_points *points, const pal_body *body,
             pal_skin_vertex(body->skin, body->d, body->skin_axes, vertex, x);
         else
             pal_copy3(x, body->d + 3 * (size_t)body->shown_node[vertex]);
-        add_lag(body, vertex, x);
+        add_display_offset(body, vertex, x);
         bool followed = points->seen[vertex] == before && before > 0;
         points->seen[vertex] = points->sub_step;
         if (followed) {
@@ -269,7 +267,7 @@ bool pal_contact_points_nearest(const pal_contact_points *points, const pal_body
 }
 
 /* slots that bear a shown vertex and their weights, sum 1; returns how many */
-static int node_order(const pal_body *body, int vertex, int32_t *slot, double *weight)
+static int slots_of(const pal_body *body, int vertex, int32_t *slot, double *weight)
 {
     if (!body->skin) return pal_contact_points_nodes(body, vertex, slot, weight);
     const float *coef = body->skin->coef + 4 * PAL_SKIN_NEIGHBOURS * (size_t)vertex;
@@ -282,7 +280,7 @@ static int node_order(const pal_body *body, int vertex, int32_t *slot, double *w
     return PAL_SKIN_NEIGHBOURS;
 }
 
-static int slot_node(const pal_body *body, int slot)
+int pal_contact_points_slot_node(const pal_body *body, int slot)
 {
     return body->skin ? body->skin->frame[slot] : slot;
 }
@@ -305,7 +303,7 @@ int pal_contact_points_slots(const pal_contact_points *points, const pal_body *b
     double share[3];
     int n = pal_contact_samples_corners(&points->sample, point, vertex, share), m = 0;
     for (int c = 0; c < n; c++) {
-        int n_slot = node_order(body, vertex[c], slot + m, weight + m);
+        int n_slot = slots_of(body, vertex[c], slot + m, weight + m);
         for (int k = 0; k < n_slot; k++, m++) {
             weight[m] *= share[c];
             pal_set3(arm[m], 0, 0, 0);
@@ -315,11 +313,6 @@ int pal_contact_points_slots(const pal_contact_points *points, const pal_body *b
         }
     }
     return m;
-}
-
-int pal_contact_points_slot_node(const pal_body *body, int slot)
-{
-    return slot_node(body, slot);
 }
 
 void pal_contact_points_force_begin(pal_contact_points *points)
@@ -334,7 +327,7 @@ void pal_contact_points_add_force(pal_contact_points *points, const pal_body *bo
     double share[3], weight[PAL_SKIN_NEIGHBOURS];
     int n = pal_contact_samples_corners(&points->sample, point, vertex, share);
     for (int c = 0; c < n; c++) {
-        int m = node_order(body, vertex[c], slot, weight);
+        int m = slots_of(body, vertex[c], slot, weight);
         for (int k = 0; k < m; k++) {
             double *f = points->slot_force + 3 * (size_t)slot[k], *t = points->slot_torque + 3 * (size_t)slot[k];
             if (points->slot_mark[slot[k]] != points->turn) {
@@ -440,7 +433,7 @@ static void to_nodes(pal_contact_points *points, const pal_body *body)
 {
     for (int i = 0; i < points->n_slot; i++) {
         int slot = points->slot[i];
-        add_force(points, slot_node(body, slot), 1, points->slot_force + 3 * (size_t)slot);
+        add_force(points, pal_contact_points_slot_node(body, slot), 1, points->slot_force + 3 * (size_t)slot);
         if (body->skin) turn_frame(points, body, slot, points->slot_torque + 3 * (size_t)slot);
     }
 }
@@ -464,10 +457,11 @@ static double point_motion(const pal_contact_points *points, const pal_body *bod
     double share[3], weight[PAL_SKIN_NEIGHBOURS], sum = 0;
     int n = pal_contact_samples_corners(&points->sample, contact->point, vertex, share);
     for (int c = 0; c < n; c++) {
-        int m = node_order(body, vertex[c], slot, weight);
+        int m = slots_of(body, vertex[c], slot, weight);
         for (int k = 0; k < m; k++) {
             double arm[3], turned[3];
-            sum += share[c] * weight[k] * pal_dot3(contact->away, v + 3 * (size_t)slot_node(body, slot[k]));
+            sum += share[c] * weight[k] *
+                   pal_dot3(contact->away, v + 3 * (size_t)pal_contact_points_slot_node(body, slot[k]));
             if (!body->skin) continue;
             lever(body, vertex[c], k, arm);
             pal_cross3(turned, points->slot_torque + 3 * (size_t)slot[k], arm);
@@ -494,12 +488,11 @@ double pal_contact_points_bound(const pal_contact_points *points, const pal_body
 double pal_contact_points_max_eigenvalue(pal_contact_points *points, const pal_body *body, const pal_contact *contact,
                                          int n)
 {
-    enum { PASSES = 2, MOST = 256 };
     /* a patch of very many points is judged by a part of them, each standing for several */
-    int stride = (n + MOST - 1) / MOST, m = 0;
-    double motion[MOST], rate = 0, k_step = stride;
+    int stride = (n + EIGENVALUE_POINTS - 1) / EIGENVALUE_POINTS, m = 0;
+    double motion[EIGENVALUE_POINTS], rate = 0, k_step = stride;
     for (int i = 0; i < n; i += stride) motion[m++] = 1;
-    for (int pass = 0; pass < PASSES && m > 0; pass++) {
+    for (int pass = 0; pass < EIGENVALUE_PASSES && m > 0; pass++) {
         double with = 0, before = 0, f[3];
         /* forces of the present motion, then accelerations */
         pal_contact_points_force_begin(points);
@@ -558,7 +551,7 @@ bool pal_contact_points_overlap(pal_contact_points *points, const pal_body *body
         for (int i = 0; i < (pass ? n_b : n_a); i++) {
             int n = pal_contact_samples_corners(&points->sample, (pass ? b : a)[i].point, vertex, share);
             for (int c = 0; c < n; c++) {
-                int m = node_order(body, vertex[c], slot, weight);
+                int m = slots_of(body, vertex[c], slot, weight);
                 for (int k = 0; k < m; k++)
                     if (pass == 0)
                         points->tool_mark[slot[k]] = points->turn;

@@ -53,17 +53,16 @@ pal_err pal_contact_points_make(const pal_body *body, double spacing_m, int max_
 
 /* a new step: nothing is live */
 void pal_contact_points_begin(pal_contact_points *points);
-/* the body jumped (reset): velocities start anew */
+/* the body jumped (reset): velocities start again */
 void pal_contact_points_reset(pal_contact_points *points);
 /* adds the points of body->shown within reach_m of the segment a..b (body frame) to the live part and writes them to
- * list [max_point], vertices in ascending or the body's active order, then samples; returns how many; *nearest_m is
- * the least distance found (reach_m when none) */
+ * list [max_point], vertices in ascending or the body's active order, then samples; returns how many */
 int pal_contact_points_collect(pal_contact_points *points, const pal_body *body, const double a[3], const double b[3],
-                               double reach_m, int32_t *list, double *nearest_m);
+                               double reach_m, int32_t *list);
 /* positions and velocities of the live vertices at the body's current state, in a sub-step of dt_s; frames of a skin
- * are brought up to date where live. A velocity is the way since the sub-step before over its time, which for a
- * symplectic step is exactly that of the nodes, turning of frames included; of a body that adapts it is the nodes' own
- * (tool_push says why). */
+ * are brought up to date where live. A velocity is the displacement since the sub-step before over its time,
+ * which for a symplectic step is exactly that of the nodes, rotation of frames included; of an adaptive body it is the
+ * nodes' own (push_held_load.c). */
 void pal_contact_points_update(pal_contact_points *points, const pal_body *body, double dt_s);
 void pal_contact_points_position(const pal_contact_points *points, int point, double x[3]);
 void pal_contact_points_velocity(const pal_contact_points *points, int point, double v[3]);
@@ -78,7 +77,7 @@ bool pal_contact_points_nearest(const pal_contact_points *points, const pal_body
  * looked for, since all points are pushed the same way */
 double pal_contact_points_max_eigenvalue(pal_contact_points *points, const pal_body *body, const pal_contact *contact,
                                          int n);
-/* where points carry the nodes: bound [n_node] += row sums of the stiffness k of a point; returns k over its effective
+/* where nodes are interpolated: bound [n_node] += row sums of the stiffness k of a point; returns k over its effective
  * mass, 1/s^2 */
 double pal_contact_points_bound(const pal_contact_points *points, const pal_body *body, int point, double k_N_m,
                                 double *bound_N_m);

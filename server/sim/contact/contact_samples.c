@@ -29,9 +29,9 @@ static int cuts(const pal_surface *surface, int tri, double spacing_m)
     return cuts_of(longest_edge(surface, tri), spacing_m);
 }
 
-/* most samples that a mixture of levels can have: of every face those of its own or of its children, whichever are
- * more. A face beside a finer one is drawn in up to 3 triangles as long as itself */
-static int64_t most_of_family(const pal_levels *levels, double spacing_m, int32_t face)
+/* the largest number of samples that a mixture of levels can have: of every face those of its own or of its children,
+ * whichever are more. A face beside a finer one is drawn in up to 3 triangles as long as itself */
+static int64_t max_samples_of(const pal_levels *levels, double spacing_m, int32_t face)
 {
     enum { PIECES = 3 };
     double longest = 0;
@@ -43,7 +43,7 @@ static int64_t most_of_family(const pal_levels *levels, double spacing_m, int32_
     n = n > 1 ? PIECES * n * n : 0;
     /* children are about half as long: below this there are no more of them */
     if (pal_levels_face_child(levels, face, 0) < 0 || n == 0) return n;
-    for (int k = 0; k < 4; k++) below += most_of_family(levels, spacing_m, pal_levels_face_child(levels, face, k));
+    for (int k = 0; k < 4; k++) below += max_samples_of(levels, spacing_m, pal_levels_face_child(levels, face, k));
     return n > below ? n : below;
 }
 
@@ -52,7 +52,7 @@ static int64_t count_samples(const pal_body *body, double spacing_m)
     const pal_surface *surface = body->surface;
     int64_t n = 0;
     const pal_levels *levels = body->dofs.levels;
-    for (int32_t f = 0; levels && f < levels->first_face[1]; f++) n += most_of_family(levels, spacing_m, f);
+    for (int32_t f = 0; levels && f < levels->first_face[1]; f++) n += max_samples_of(levels, spacing_m, f);
     if (levels) return n;
     for (int t = 0; t < surface->n_tri; t++) {
         int64_t c = cuts(surface, t, spacing_m);

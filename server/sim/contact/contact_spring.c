@@ -1,24 +1,22 @@
-/* Ties between tools and tissue: rows of contact for implicit solvers. */
+/* Springs between tools and tissue (contact_spring.h). */
 #include "server/sim/contact/contact_spring.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/contact/tuning.h"
 
 #include <string.h>
-
-/* slots of one body that tools points at a time, and boundary faces around them */
-enum { MOST_FRAME = 1024, MOST_FACE = 8 * MOST_FRAME };
 
 pal_err pal_contact_springs_make(const pal_body *body, int max_row, pal_arena *arena, pal_contact_springs *out)
 {
     int n_slot = body->skin ? body->skin->n_frame : body->n_node;
-    pal_contact_springs t = {.max_row = max_row, .most_part = max_row * PAL_CONTACT_POINT_SLOTS};
-    t.max_frame = n_slot < MOST_FRAME ? n_slot : MOST_FRAME;
+    pal_contact_springs t = {.max_row = max_row, .max_part = max_row * PAL_CONTACT_POINT_SLOTS};
+    t.max_frame = n_slot < SPRING_FRAMES ? n_slot : SPRING_FRAMES;
     t.max_face = body->skin ? body->skin->fan_start[n_slot] : 0;
-    if (t.max_face > MOST_FACE) t.max_face = MOST_FACE;
+    if (t.max_face > SPRING_FACES) t.max_face = SPRING_FACES;
     t.start = PAL_NEW(arena, int32_t, max_row + 1);
     t.k_N_m = PAL_NEW(arena, double, max_row);
     t.motion_m = PAL_NEW(arena, double, max_row);
-    t.part = PAL_NEW(arena, pal_contact_spring_part, t.most_part);
+    t.part = PAL_NEW(arena, pal_contact_spring_part, t.max_part);
     t.frame = PAL_NEW(arena, pal_contact_spring_frame, t.max_frame);
     t.face = PAL_NEW(arena, pal_contact_spring_face, t.max_face);
     t.state = PAL_NEW(arena, double, 6 * (size_t)t.max_frame);
@@ -48,7 +46,7 @@ static void use_node(pal_contact_springs *springs, int node)
     springs->node[springs->n_node++] = node;
 }
 
-/* spin = part/|N| ([X]x - rise X Z') N' + part/reach X (Z . e') (sim/frame_spin.h; X x X X' and Z . X are 0) */
+/* spin = part/|N| ([X]x - rise X Z') N' + part/reach X (Z . e') (frame_spin.h; X x X X' and Z . X are 0) */
 static void make_turn(pal_contact_springs *springs, pal_contact_points *points, const pal_body *body,
                       pal_contact_spring_frame *f)
 {
@@ -101,7 +99,7 @@ static bool add_point(pal_contact_springs *springs, pal_contact_points *points, 
         int local = use_slot(springs, points, body, slot[k]), i = first;
         if (local < 0) return false;
         while (i < springs->n_part && springs->part[i].slot != local) i++;
-        if (i == springs->most_part) return false;
+        if (i == springs->max_part) return false;
         pal_contact_spring_part *part = &springs->part[i];
         if (i == springs->n_part) {
             *part = (pal_contact_spring_part){.slot = local};
@@ -250,19 +248,19 @@ void pal_contact_springs_load(pal_contact_springs *springs, double s, const doub
 
 double pal_contact_springs_max_force_N(pal_contact_springs *springs, const double *force_N, int first, int n)
 {
-    double largest2 = 0;
+    double max2 = 0;
     for (int i = 0; i < springs->n_node; i++) pal_set3(springs->force + 3 * (size_t)springs->node[i], 0, 0, 0);
     pal_contact_springs_load(springs, 1, force_N, first, n, springs->force);
     for (int i = 0; i < springs->n_node; i++) {
         const double *f = springs->force + 3 * (size_t)springs->node[i];
-        largest2 = fmax(largest2, pal_dot3(f, f));
+        max2 = fmax(max2, pal_dot3(f, f));
     }
-    return sqrt(largest2);
+    return sqrt(max2);
 }
 
 /* out_i = p_i / k_i + J_i W sum p_j J_j' */
-static bool yield(pal_contact_springs *springs, const pal_body *body, const int32_t *rows, const double *p, int n,
-                  double *load, double *move, double *out)
+static bool apply_compliance(pal_contact_springs *springs, const pal_body *body, const int32_t *rows, const double *p,
+                             int n, double *load, double *move, double *out)
 {
     memset(load, 0, 3 * sizeof(double) * (size_t)body->n_node);
     clear_state(springs);
@@ -290,7 +288,7 @@ double pal_contact_springs_stiffness(pal_contact_springs *springs, const pal_bod
         rz += r[i] * p[i];
     }
     for (int pass = 0; pass < passes && known && rz > 0; pass++) {
-        known = yield(springs, body, rows, p, n, load, move, w);
+        known = apply_compliance(springs, body, rows, p, n, load, move, w);
         double pw = 0, next = 0;
         for (int i = 0; i < n && known; i++) pw += p[i] * w[i];
         if (!known || !(pw > 0)) break;

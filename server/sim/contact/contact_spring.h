@@ -1,20 +1,20 @@
-/* Ties: springs between tools and tissue as an implicit solver takes them. One tie measures the motion of a contact
- * point (or of the mean of several) along a direction, linear in the nodes' displacement since the sub-step began:
- *     m_i = J_i u,   K = sum k_i J_i' J_i,   loads sum f_i J_i' .
+/* Springs between tools and tissue as an implicit solver takes them. One spring, a row, measures the motion of a
+ * contact point (or of the mean of several) along a direction, linear in the nodes' displacement u since the sub-step
+ * began: m_i = J_i u,   K = sum k_i J_i' J_i,   loads sum f_i J_i' .
  *
- * J_i is the exact derivative of the skinned point at the start of the sub-step, turning of its frames included
- * (sim/contact_points.h, sim/frame_spin.h), so loads, stiffness and the motion that settles a force belong together:
- * total force and torque are those of the contact and K is symmetric and positive semi-definite whatever is left out.
- * It is applied in two halves, nodes -> velocity and spin of each slot in use -> points, which costs 6 products a slot
- * and point instead of 3 for each of the 20 to 60 nodes around.
+ * J_i is the exact derivative of the skinned point at the start of the sub-step, rotation of its frames included
+ * (contact_points.h, frame_spin.h), so loads, stiffness and the motion that settles a force belong together: total
+ * force and torque are those of the contact, and K is symmetric and positive semi-definite whatever is left out. It is
+ * applied in two halves, nodes -> velocity and spin of each slot in use -> points, which costs 6 products a slot and
+ * point instead of 3 for each of the 20 to 60 nodes around.
  *
- * Fixed room: max_row ties; a slot beyond `most_slot` or a frame beyond max_face faces is left out (the tie is
- * refused, the frame does not turn). Memory: the world's arena. Thread: [sim], pal_contact_springs_make [load]. */
+ * Fixed room: max_row rows; beyond max_frame slots a row is refused, beyond max_face faces a frame does not rotate.
+ * Memory: the world's arena. Thread: [sim], pal_contact_springs_make [load]. */
 #ifndef PAL_SIM_CONTACT_CONTACT_SPRING_H
 #define PAL_SIM_CONTACT_CONTACT_SPRING_H
 #include "server/sim/contact/contact_points.h"
 
-/* a slot's part in a tie: motion += linear . v_slot + angular . spin_slot */
+/* a slot's part in a row: motion += linear . v_slot + angular . spin_slot */
 typedef struct pal_contact_spring_part {
     int32_t slot; /* index into pal_contact_springs.frame */
     double linear[3], angular[3];
@@ -33,7 +33,7 @@ typedef struct pal_contact_spring_face {
 
 typedef struct pal_contact_springs {
     int n_row, n_part, n_frame, n_face, n_node;
-    int max_row, most_part, max_frame, max_face;
+    int max_row, max_part, max_frame, max_face;
     int32_t *start;   /* first part of each row [max_row + 1]             */
     double *k_N_m;    /* [max_row]                                        */
     double *motion_m; /* J u of the last pal_contact_springs_motion [max_row]        */
@@ -47,9 +47,9 @@ typedef struct pal_contact_springs {
     double *force;                          /* scratch of pal_contact_springs_max_force_N, by node [body n_node][3]  */
 } pal_contact_springs;
 
-/* room for max_row ties in all; MEMORY */
+/* room for max_row rows in all; MEMORY */
 pal_err pal_contact_springs_make(const pal_body *body, int max_row, pal_arena *arena, pal_contact_springs *out);
-/* a new sub-step: no ties */
+/* a new sub-step: no rows */
 void pal_contact_springs_begin(pal_contact_springs *springs);
 /* one point along a unit direction, at the state of the last pal_contact_points_update; its row, -1: no room */
 int pal_contact_springs_add(pal_contact_springs *springs, pal_contact_points *points, const pal_body *body, int point,
@@ -69,7 +69,7 @@ void pal_contact_springs_load(pal_contact_springs *springs, double s, const doub
 double pal_contact_springs_max_force_N(pal_contact_springs *springs, const double *force_N, int first, int n);
 
 /* Tangent stiffness that a tool feels which moves rows[i] by share[i] for each metre it goes itself, the tissue behind
- * them answering statically: 1^T-form  share' (1/k + J W J')^-1 share,  W = body->compliance (haptics.md 2.3 step 3 a).
+ * them answering statically: share' (1/k + J W J')^-1 share,  W = body->compliance.
  * `passes` steps of conjugate gradients with k as preconditioner, one back-substitution each; every pass comes closer
  * from below (the first is the answer of an even pressure, 8 % low under a round contact). scratch: 2 [n_node][3] and 4
  * [n]. answer [n_node][3], may be NULL: how tissue moves for each metre. 0: not known */

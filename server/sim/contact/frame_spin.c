@@ -2,14 +2,7 @@
 #include "server/sim/contact/frame_spin.h"
 
 #include "server/base/vec3.h"
-
-/* |sum of normals| over the sum of their lengths (1 when flat, 0.58 at the corner of a voxel): a frame's turning counts
- * in full above the second and not at all below the first, where the fan is folded and turning would be a matter of
- * chance */
-#define FOLDED 0.2
-#define OPEN   0.4
-/* tangential part of a frame's edge over its length */
-#define LEAST_TANGENT 0.3
+#include "server/sim/contact/tuning.h"
 
 void pal_frame_spin_find(const pal_body *body, int slot, pal_frame_spin *t)
 {
@@ -26,7 +19,7 @@ void pal_frame_spin_find(const pal_body *body, int slot, pal_frame_spin *t)
         sum += pal_norm3(a);
     }
     double length = pal_norm3(N);
-    t->part = fmin(1, (length / sum - FOLDED) / (OPEN - FOLDED));
+    t->part = fmin(1, (length / sum - FAN_FOLDED) / (FAN_OPEN - FAN_FOLDED));
     if (!(t->part > 0) || !pal_unit3(t->X, N, 0)) return;
     t->per_normal = 1 / length;
     for (int k = 0; k < 2 && !t->turns; k++) {
@@ -38,7 +31,7 @@ void pal_frame_spin_find(const pal_body *body, int slot, pal_frame_spin *t)
         pal_copy3(tangent, edge);
         pal_axpy3(tangent, -up, t->X);
         double reach = pal_norm3(tangent);
-        if (!(reach > LEAST_TANGENT * pal_norm3(edge))) continue;
+        if (!(reach > MIN_TANGENT * pal_norm3(edge))) continue;
         pal_cross3(t->Z, t->X, tangent);
         pal_scale3(t->Z, 1 / reach, t->Z);
         t->per_reach = 1 / reach;

@@ -27,15 +27,15 @@ void pal_grasp_add_force(const pal_grasp *g, const double force_N[3], double *to
 
 double pal_grasp_max_weight(const pal_grasp *g)
 {
-    double most = 0;
-    for (int i = 0; i < g->n_node; i++) most = fmax(most, g->weight[i]);
-    return most;
+    double max = 0;
+    for (int i = 0; i < g->n_node; i++) max = fmax(max, g->weight[i]);
+    return max;
 }
 
 static void begin_transfer(pal_grasp *g, const pal_tool *tool, const pal_body *body, double k_N_m,
                            const double damper_N[3])
 {
-    pal_grasp_spring s = {.k_N_m = k_N_m, .firm = g->implicit != NULL};
+    pal_grasp_spring s = {.k_N_m = k_N_m, .implicit = g->implicit != NULL};
     pal_grasp_mean(g, body->d, s.y);
     pal_copy3(s.damper_N, damper_N);
     pal_sub3(s.at_m, tool->last.position_m, body->offset_m);

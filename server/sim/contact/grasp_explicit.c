@@ -1,11 +1,11 @@
 /* Grasps with explicit solvers. k and c are kept below the limits alpha m_i / dt^2 and beta m_i / dt of every free
- * node, m_i being shared by the tools that hold it; where points carry the nodes, alpha and beta times what the tissue
+ * node, m_i being shared by the tools that hold it; where nodes are interpolated, alpha and beta times what the tissue
  * held weighs at least. */
 #include "server/base/vec3.h"
 #include "server/sim/contact/grasp.h"
 #include "server/sim/contact/tuning.h"
 
-/* least mass that the spring moves. Of nodes that points carry: W' C W <= sum W_i C_ii, C their mobility */
+/* least mass that the spring moves. Of interpolated nodes: W' C W <= sum W_i C_ii, C their mobility */
 static double min_mass_kg(const pal_grasps *grasps, const pal_grasp *g, const pal_body *body)
 {
     double mass = INFINITY, mobility = 0;
@@ -22,15 +22,15 @@ static double min_mass_kg(const pal_grasps *grasps, const pal_grasp *g, const pa
 void pal_grasp_act_explicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *tool, pal_step *step)
 {
     pal_body *body = step->body;
-    double y[3], v[3], goal[3], damper[3], felt[3], mass = min_mass_kg(grasps, g, body);
+    double y[3], v[3], goal[3], damper[3], scaled[3], mass = min_mass_kg(grasps, g, body);
     g->k_max_N_m = GRASP_ALPHA * mass / (step->dt_s * step->dt_s);
     g->c_max_Ns_m = GRASP_BETA * mass / step->dt_s;
     pal_grasp_mean(g, body->d, y);
     pal_grasp_mean(g, body->dv, v);
     double k = fmin(pal_grasp_stiffness_N_m(grasps, pal_grasp_reach_m(grasps, tool)), g->k_max_N_m);
     double c = fmin(k * grasps->damping_s, g->c_max_Ns_m);
-    for (int d = 0; d < 3; d++) damper[d] = c * (tool->velocity_m_s[d] - v[d]), felt[d] = tool->ramp * damper[d];
-    pal_grasp_find_goal(g, tool, step, tool->ramp * k, felt, goal);
+    for (int d = 0; d < 3; d++) damper[d] = c * (tool->velocity_m_s[d] - v[d]), scaled[d] = tool->ramp * damper[d];
+    pal_grasp_find_goal(g, tool, step, tool->ramp * k, scaled, goal);
     if (g->adaptive) pal_adaptive_grasp_goal(g->adaptive, tool->next.quat, y, v, k, step->dt_s, goal);
     for (int d = 0; d < 3; d++) g->force[d] = -tool->ramp * (k * (goal[d] - y[d]) + damper[d]);
     if (!pal_finite3(g->force)) {

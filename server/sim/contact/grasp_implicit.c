@@ -17,12 +17,12 @@ void pal_grasp_act_implicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *to
     pal_grasp_mean(g, body->d, y);
     pal_grasp_find_goal(g, tool, step, k, (double[3]){0}, goal);
     pal_sub3(goal, goal, y);
-    double cap = tool->force_cap_N * tool->ramp, way = pal_norm3(goal);
+    double cap = tool->force_cap_N * tool->ramp, stretch = pal_norm3(goal);
     if (body->load_cap_N > 0) cap = fmin(cap, body->load_cap_N / pal_grasp_max_weight(g));
     double kept = fmin(implicit->stretch_m, BELOW_CAP * cap / k);
     double lead = pal_grasp_compliance_along(&implicit->compliance, k, fmin(k, g->fit.k_N_m), goal);
     double max_m = kept + fmin(rise, (BELOW_CAP * cap - k * kept) / lead);
-    if (way > max_m) pal_scale3(goal, max_m / way, goal);
+    if (stretch > max_m) pal_scale3(goal, max_m / stretch, goal);
     implicit->pulls = pal_finite3(goal);
     implicit->constant = implicit->found = false;
     implicit->force = (pal_solved_force){.counted = false};
@@ -95,8 +95,8 @@ bool pal_grasp_settle(void *self, pal_step *step, const double *moved, bool last
         if (!last || step->sub != step->n_sub - 1) continue;
         pal_grasp_implicit *implicit = g->implicit;
         /* a grasp that was transferred leads as the one before from its second step on */
-        const bool goes_on = g->transfer && g->transfer->left_s > 0;
-        int n_find = implicit->found ? 0 : goes_on && implicit->compliance.n_known < 3 ? 3 : 1;
+        const bool transferred = g->transfer && g->transfer->left_s > 0;
+        int n_find = implicit->found ? 0 : transferred && implicit->compliance.n_known < 3 ? 3 : 1;
         implicit->found = true;
         for (int k = 0; k < n_find; k++)
             pal_grasp_compliance_update(&implicit->compliance, step->body, g->node, g->weight, g->n_node, tool->here_m,

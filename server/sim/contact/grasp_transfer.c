@@ -1,4 +1,4 @@
-/* A grip on another body (grasp_transfer.h). */
+/* A grasp on another body (grasp_transfer.h). */
 #include "server/sim/contact/grasp_transfer.h"
 
 #include "server/base/vec3.h"
@@ -9,8 +9,8 @@ void pal_grasp_transfer_begin(pal_grasp_transfer *h, const pal_grasp_spring *s)
     double shift[3];
     h->due = false;
     h->left_s = PAL_BLEND_GRASP_S;
-    if (s->firm && h->k_N_m > 0) {
-        /* what caps and haste held back still is, where that is no jump */
+    if (s->implicit && h->k_N_m > 0) {
+        /* what caps and the limit of the stretch kept back stays so, where that is no jump */
         pal_sub3(shift, s->old_hold_m, s->hold);
         pal_add3(shift, shift, h->shift);
         pal_sub3(shift, shift, h->y);

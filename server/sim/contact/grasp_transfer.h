@@ -8,19 +8,19 @@
 #include <stdbool.h>
 
 typedef struct pal_grasp_transfer {
-    bool due; /* handed over, and nothing was felt since */
-    /* on the body of before: patch, force on it, hold in the tool's axes; k of an implicit solver's spring, else 0 */
+    bool due; /* transferred, and no force was given since */
+    /* on the body before: place of the tissue, force on it, o in the tool's axes; k of an implicit spring, else 0 */
     double y[3], force_N[3], hold[3], k_N_m;
-    double shift[3], left_s; /* of the hold, axes of the world; until it is gone */
+    double shift[3], left_s; /* of o, axes of the world; until it is gone */
 } pal_grasp_transfer;
 
 /* the spring as it stands when the new body begins, in the body's frame */
 typedef struct pal_grasp_spring {
-    double y[3], damper_N[3];      /* patch; force on it of the damper          */
+    double y[3], damper_N[3];      /* place of the tissue; force of the damper   */
     double at_m[3];                /* tool                                      */
     double hold[3], old_hold_m[3]; /* o and that of before, turned with the tool */
     double k_N_m;                  /* above 0                                   */
-    bool firm;                     /* an implicit solver's                      */
+    bool implicit;                 /* of an implicit solver                     */
 } pal_grasp_spring;
 
 /* sets shift, so that the spring pulls as it did; nothing is due then */

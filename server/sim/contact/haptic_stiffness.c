@@ -177,11 +177,13 @@ bool pal_grasp_compliance_series(const pal_grasp_compliance *w, double k_N_m, do
     return isfinite(det);
 }
 
-double pal_grasp_compliance_along(const pal_grasp_compliance *w, double k_N_m, double k_guess_N_m, const double way[3])
+double pal_grasp_compliance_along(const pal_grasp_compliance *w, double k_N_m, double k_guess_N_m,
+                                  const double direction[3])
 {
     double give_m_N = 0;
     if (w->n_known < 3) return k_guess_N_m;
-    for (int c = 0; c < 3; c++) give_m_N += way[c] * pal_dot3(w->column_m_N[c], way) / pal_dot3(way, way);
+    for (int c = 0; c < 3; c++)
+        give_m_N += direction[c] * pal_dot3(w->column_m_N[c], direction) / pal_dot3(direction, direction);
     return k_N_m / (1 + k_N_m * fmax(0, give_m_N));
 }
 

@@ -51,9 +51,10 @@ void pal_grasp_compliance_update(pal_grasp_compliance *w, const pal_body *body, 
                                  const double *weight, int n, const double at_m[3], pal_arena *scratch);
 /* K of tissue in series with a spring k, as xx xy xz yy yz zz; false: W_g is not known, or is no compliance */
 bool pal_grasp_compliance_series(const pal_grasp_compliance *w, double k_N_m, double K[6]);
-/* what the force rises by for each metre that the spring's end leads the tissue along way; k_guess_N_m until all of W_g
- * is known */
-double pal_grasp_compliance_along(const pal_grasp_compliance *w, double k_N_m, double k_guess_N_m, const double way[3]);
+/* what the force rises by for each metre that the spring's end leads the tissue along a direction; k_guess_N_m until
+ * all of W_g is known */
+double pal_grasp_compliance_along(const pal_grasp_compliance *w, double k_N_m, double k_guess_N_m,
+                                  const double direction[3]);
 
 /* bytes of scratch that these need in a sub-step */
 size_t pal_haptic_stiffness_scratch(const pal_body *body);

@@ -4,7 +4,7 @@
  * proxy (god-object of Zilles & Salisbury) stays on the side it came from: it moves to the tool along the straight
  * line, stops where a contact point would come closer than allowed, and slides along. Every contact point allows a
  * depth of at most `deepest`, and in one sub-step at most `rise` more than it has now: that is the clamp on penetration
- * correction of numerics.md part 3, and because points block a swept sphere no speed passes through.
+ * correction, and because points block a swept sphere no tool passes through at any speed.
  * Thread: [sim]. */
 #ifndef PAL_SIM_CONTACT_PROXY_H
 #define PAL_SIM_CONTACT_PROXY_H
@@ -18,7 +18,7 @@ typedef struct pal_proxy {
 
 typedef struct pal_proxy_limits {
     double radius_m, max_depth_m, max_rise_m;
-    double tool_move_length_m;  /* way of the tool itself in this sub-step */
+    double tool_move_length_m;  /* of the tool itself in this sub-step */
     double a[3], b[3], slack_m; /* where contact points are known: the proxy stays within slack of segment a..b */
 } pal_proxy_limits;
 

@@ -2,7 +2,7 @@
  * chosen at load by the solver (effects/tool_push.c):
  *     explicit       contact forces at every sub-step                               push_explicit.c
  *     held load      the solver holds loads over a sub-step (rk4, adaptive bodies)  push_held_load.c
- *     interpolated   points carry the nodes (central_cg)                            push_interpolated.c
+ *     interpolated   nodes are interpolated from dofs (central_cg)                 push_interpolated.c
  *     implicit       the solver takes contact springs implicitly                    push_implicit.c
  * Memory: the world's arena, but for what a transfer leaves (tool_contact.h). Thread: [sim]. */
 #ifndef PAL_SIM_CONTACT_PUSH_H

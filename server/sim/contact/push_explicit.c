@@ -8,7 +8,7 @@
 #include "server/sim/contact/push.h"
 #include "server/sim/contact/tuning.h"
 
-/* Coulomb friction: the tool's way sideways over the tissue it presses stretches a spring as stiff as the contact,
+/* Coulomb friction: the tool's displacement across the tissue it presses stretches a spring as stiff as the contact,
  * which slips at friction times the normal force; shared out like the normal force */
 static void add_friction(pal_push *push, pal_tool_contact *t, const double sum[3], double stiffness, double dt_s)
 {
@@ -36,7 +36,7 @@ static void find_share(pal_push *push, pal_tool_contact *t, int n_tool, pal_step
     if (t->n_contact == 0) return;
     for (const pal_tool_contact *other = push->tool; other < push->tool + n_tool; other++)
         if (other != t && other->n_contact > 0 &&
-            pal_dist3(other->proxy.x, t->proxy.x) <= 0.5 * step->body->length_scale_m)
+            pal_dist3(other->proxy.x, t->proxy.x) <= SHARE_DISTANCE * step->body->length_scale_m)
             n_share += pal_contact_points_overlap(&push->points, step->body, t->contact, t->n_contact, other->contact,
                                                   other->n_contact);
     double rate = EIGENVALUE_SAFETY * n_share *
@@ -96,6 +96,6 @@ void pal_push_act_explicit(pal_push *push, int n_tool, pal_step *step)
 const pal_push_regime pal_push_explicit = {.reach_radii = 1,
                                            .pressure_Pa_m = pal_push_pressure_of_radius,
                                            .act = pal_push_act_explicit,
-                                           .stiffness_limit = 1.2,
-                                           .damping_steps = 0.5,
+                                           .stiffness_limit = EXPLICIT_ALPHA,
+                                           .damping_steps = EXPLICIT_GAMMA,
                                            .eigenvalue_1_s2 = pal_contact_points_max_eigenvalue};

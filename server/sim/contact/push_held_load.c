@@ -25,7 +25,7 @@ static double limit_rise(pal_tool_contact *t, double sum[3])
 const pal_push_regime pal_push_held_load = {.reach_radii = 1,
                                             .pressure_Pa_m = pal_push_pressure_of_radius,
                                             .act = pal_push_act_explicit,
-                                            .stiffness_limit = 0.5,
-                                            .damping_steps = 1,
+                                            .stiffness_limit = HELD_LOAD_ALPHA,
+                                            .damping_steps = HELD_LOAD_GAMMA,
                                             .eigenvalue_1_s2 = pal_contact_points_max_eigenvalue,
                                             .limit_rise = limit_rise};

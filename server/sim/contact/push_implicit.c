@@ -46,7 +46,8 @@ static void find_back(const pal_push *push, pal_tool_contact *t, const pal_tool 
     double k = pal_haptic_stiffness_max(&implicit->stiffness, pal_push_punch_N_m(push, tool->radius_m));
     implicit->back_m = implicit->old_back_m;
     if (solve->capped || implicit->back_m > 0)
-        implicit->back_m = fmax(0, implicit->back_m + 0.5 * (solve->uncapped_N - BELOW_CAP * solve->allowed_N) / k);
+        implicit->back_m =
+            fmax(0, implicit->back_m + BACK_GAIN * (solve->uncapped_N - BELOW_CAP * solve->allowed_N) / k);
 }
 
 /* A proxy that cannot go deeper is moved by tissue in each step, which makes contact explicit again and trembles at 60
@@ -56,7 +57,7 @@ static void find_stiffening(pal_tool_contact *t, const pal_tool *tool, const pal
     double here[3], depth = 0, radius = tool->radius_m;
     pal_sub3(here, tool->here_m, body->offset_m);
     for (int i = 0; i < t->n_contact; i++) depth = fmax(depth, t->contact[i].depth_m);
-    if (depth > 0.9 * t->limits.max_depth_m && pal_dist3(here, t->proxy.x) > REST_RADII * radius)
+    if (depth > KEPT_DEPTH * t->limits.max_depth_m && pal_dist3(here, t->proxy.x) > REST_RADII * radius)
         t->share = fmin(MAX_STIFFENING, t->share * (1 + STIFFEN * (dt_s / FRAME_S)));
     else if (depth < SHALLOW_RADII * radius)
         t->share = fmax(1, t->share * fmax(0, 1 - SOFTEN * (dt_s / FRAME_S)));

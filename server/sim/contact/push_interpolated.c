@@ -1,6 +1,6 @@
-/* Explicit contact where points carry the nodes (central_cg): contact is as stiff as with implicit solvers, and the
- * solver hears before its sub-steps begin what the points near a tool will want, so that they are short enough. Beyond
- * that alpha is 0.3; the eigenvalue is bounded by the sum of the points' own. */
+/* Explicit contact where nodes are interpolated from dofs (central_cg): contact is as stiff as with implicit solvers,
+ * and the solver hears before its sub-steps begin what the points near a tool will want, so that they are short enough.
+ * Beyond that alpha is 0.3; the eigenvalue is bounded by the sum of the points' own. */
 #include "server/base/vec3.h"
 #include "server/sim/contact/push.h"
 #include "server/sim/contact/tuning.h"
@@ -34,6 +34,6 @@ static double eigenvalue_1_s2(pal_contact_points *points, const pal_body *body, 
 const pal_push_regime pal_push_interpolated = {.reach_radii = 1,
                                                .pressure_Pa_m = pal_push_pressure_of_tissue,
                                                .act = pal_push_act_explicit,
-                                               .stiffness_limit = 0.3,
-                                               .damping_steps = 0.5,
+                                               .stiffness_limit = INTERPOLATED_ALPHA,
+                                               .damping_steps = EXPLICIT_GAMMA,
                                                .eigenvalue_1_s2 = eigenvalue_1_s2};

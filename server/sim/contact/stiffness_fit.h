@@ -1,8 +1,7 @@
 /* Tangent stiffness by least squares, where the solver knows no compliance: the slope of force over displacement,
  *     k = (cov(x, f) + p^2 k_start) / (var(x) + p^2),
  * with older samples forgotten and a start value that weighs as much as data of spread p. A sample counts only when the
- * tool has moved, so a tool at rest keeps its stiffness. The samples are of 0.8 forgetting: 0.9 lags a millimetre
- * behind where tissue stiffens. Thread: [sim]. */
+ * tool has moved, so a tool at rest keeps its stiffness. Thread: [sim]. */
 #ifndef PAL_SIM_CONTACT_STIFFNESS_FIT_H
 #define PAL_SIM_CONTACT_STIFFNESS_FIT_H
 

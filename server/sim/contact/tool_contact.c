@@ -1,4 +1,4 @@
-/* A tool's contact handed over from body to body (tool_contact.h). */
+/* Transfer of a tool's contact (tool_contact.h). */
 #include "server/sim/contact/tool_contact.h"
 
 #include "server/base/vec3.h"
@@ -79,7 +79,7 @@ static void take_force(pal_tool_contact *to, const pal_body *body, const pal_too
 }
 
 /* the same body in another world: nothing to be let go */
-static void go_on(pal_tool_contact *to, const pal_tool_contact *from)
+static void keep_state(pal_tool_contact *to, const pal_tool_contact *from)
 {
     to->share = from->share;
     if (!to->implicit || !from->implicit) return;
@@ -107,7 +107,7 @@ void pal_tool_contact_transfer(pal_tool_contact *to, const pal_body *body, const
         to->implicit->back_m = from->implicit ? from->implicit->back_m : 0;
     }
     if (!place) {
-        go_on(to, from);
+        keep_state(to, from);
         return;
     }
     pal_copy3(to->hold.at_m, from->implicit ? from->implicit->last_m : from->limits.b);

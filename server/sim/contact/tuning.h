@@ -7,6 +7,14 @@
 /* passing samples of a step, and parts that an edge is cut into for them. 6: a triangle stretched 3 times beyond the
  * spacing, as far as tissue goes under a tool, has no hole as wide as half a radius (test_tool_cases) */
 enum { PASSING_MAX = 4096, PASSING_CUTS = 6 };
+/* |sum of normals| of a fan over the sum of their lengths, 1 when flat, 0.58 at the corner of a voxel. A frame's
+ * rotation counts in full above the second and not at all below the first, where the fan is folded and the rotation is
+ * rounding; tangential part of a frame's edge over its length, below which it gives no axis (test_contact_spring) */
+#define FAN_FOLDED  0.2
+#define FAN_OPEN    0.4
+#define MIN_TANGENT 0.3
+/* passes of a proxy's move: pushes out of points, and slides along planes (test_tool_push: at any speed) */
+enum { PROXY_PUSHES = 4, PROXY_SLIDES = 8 };
 
 /* ---- contact of a tool that pushes (test_tool_push, test_tool_cases) ---- */
 
@@ -28,6 +36,17 @@ enum { CONTACT_MAX = 2048, SAMPLE_MAX = 200000 };
 
 /* contact stiffness per area in E over radius: depth is then 0.5 % of a radius at a mean pressure of E */
 #define EXPLICIT_PRESSURE 200
+/* contact stiffness over m / dt^2 and damping time over dt: see push_explicit.c, push_held_load.c and, for dofs that
+ * carry several nodes, push_interpolated.c (test_tool_push, test_adaptive_body, test_central_cg) */
+#define EXPLICIT_ALPHA     1.2
+#define EXPLICIT_GAMMA     0.5
+#define HELD_LOAD_ALPHA    0.5
+#define HELD_LOAD_GAMMA    1.0
+#define INTERPOLATED_ALPHA 0.3
+/* box diagonals. Tools that are farther apart do not press on the same nodes */
+#define SHARE_DISTANCE 0.5
+/* power iterations, and points that stand for all of a contact in them */
+enum { EIGENVALUE_PASSES = 2, EIGENVALUE_POINTS = 256 };
 /* over the eigenvalue that two power iterations find, which is low by up to a quarter */
 #define EIGENVALUE_SAFETY 1.3
 /* s. The share of the stiffness rises at this rate at most: where the limit falls away for one sub-step only, contact
@@ -46,6 +65,12 @@ enum { CONTACT_MAX = 2048, SAMPLE_MAX = 200000 };
 #define SOFTEN         0.05
 #define MAX_STIFFENING 8.0
 #define SHALLOW_RADII  0.05
+/* share of its largest depth at which a proxy counts as kept from its tool */
+#define KEPT_DEPTH 0.9
+/* slots of one body that tools touch at a time, and faces around them */
+enum { SPRING_FRAMES = 1024, SPRING_FACES = 8 * SPRING_FRAMES };
+/* share of an excess over a cap that a proxy is taken back by in a sub-step: half, as tissue follows late */
+#define BACK_GAIN 0.5
 /* of a cap: contact itself gives this much, the rest is for what one step adds */
 #define BELOW_CAP 0.98
 /* radii. A tool that moved by less rests */
@@ -75,7 +100,7 @@ enum { CHOOSE_ROUNDS = 2 };
 
 /* m. Smaller moves of a tool teach no slope: rounding and a hand's tremor would */
 #define MIN_MOVE_M 0.05e-3
-/* weight of a sample over that of the next one; with moves of 0.05 mm the fit forgets in 0.25 mm */
+/* weight of a sample over that of the next one; 0.9 lags a millimetre behind where tissue stiffens */
 #define FIT_FORGET 0.8
 /* radii. Spread of displacements at which data weigh as much as the start value */
 #define FIT_PRIOR_RADII 0.01
@@ -112,4 +137,10 @@ enum { STIFFNESS_BUDGET = 2, STIFFNESS_POINTS = 256 };
 enum { STIFFNESS_PASSES = 2 };
 /* least share that turning of contacts leaves of a stiffness: the linear estimate of it ends there */
 #define MIN_TURNED 0.25
+
+/* ---- supports ---- */
+
+/* stiffness of a penalty in E times the box diagonal: a body's weight moves it by less than 0.1 % of its size
+ * (test_penalty) */
+#define PENALTY_STIFFNESS 100
 #endif

@@ -1,15 +1,16 @@
-/* Component penalty: nodes held where they rest by strong springs instead of being no unknowns (A 3.3: "constraints via
- * the penalty method", the other way being supports, whose points are dropped).
+/* Component penalty: nodes held near their rest position by springs (paper A section 3.3: "constraints via the penalty
+ * method"), where supports remove the dofs.
  *
- *     f_i = -k w_i (x_i - X_i),  w_i the node's share of the row's mass, so that refinement changes nothing
+ *     f_i = -k w_i (x_i - X_i),  w_i the node's share of the mass of all, so that refinement changes nothing
  *
- * k is the stiffness of the whole row against being moved as one. What it holds gives way by f / k. Nodes are those of
- * the body in a box or the lowest part at rest. Explicit solvers find their step by it: a stiffer row asks for more
- * sub-steps.
+ * k is the stiffness against moving all nodes as one: under a force f they give way by f / k. Explicit solvers take
+ * their step from it: a stiffer component asks for more sub-steps.
  *
- * Keys: low_m and high_m (a box, body frame) or lowest (0.05: share of the body's height along `up`), k_N_m (100 E S, S
- * the body's size). What is not given follows a live material edit. */
+ * Keys: those of rest_region.h, k_N_m (100 E S, S the box diagonal). A k that is not given follows a live edit of the
+ * material. */
 #include "server/base/vec3.h"
+#include "server/sim/contact/rest_region.h"
+#include "server/sim/contact/tuning.h"
 #include "server/sim/core/effect_list.h"
 
 typedef struct penalty {
@@ -19,107 +20,77 @@ typedef struct penalty {
     double k_N_m, per_young;
 } penalty;
 
-static const double sizes = 100;
-
-static bool chosen(const double x[3], bool box, const double low[3], const double high[3], const double up[3],
-                   double top)
-{
-    if (!box) return pal_dot3(x, up) <= top;
-    for (int c = 0; c < 3; c++)
-        if (!(x[c] >= low[c] && x[c] <= high[c])) return false;
-    return true;
-}
-
-static pal_err read_keys(penalty *row, pal_config_entry *item, const pal_build *build, bool *box, double low[3],
-                         double high[3], double *lowest)
-{
-    *box = pal_entry_has(item, "low_m") || pal_entry_has(item, "high_m");
-    if (*box && pal_entry_has(item, "lowest"))
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: either low_m and high_m or lowest", item->path);
-    if (*box && !(pal_entry_has(item, "low_m") && pal_entry_has(item, "high_m")))
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: low_m and high_m belong together", item->path);
-    PAL_TRY(pal_entry_read_numbers(item, "low_m", 3, low, build->diag));
-    PAL_TRY(pal_entry_read_numbers(item, "high_m", 3, high, build->diag));
-    PAL_TRY(pal_entry_read_number(item, "lowest", 0, 1, lowest, build->diag));
-    row->per_young = pal_entry_has(item, "k_N_m") ? 0 : sizes * build->body->length_scale_m;
-    row->k_N_m = row->per_young * build->def->material.young_Pa;
-    PAL_TRY(pal_entry_read_number(item, "k_N_m", 1e-12, 1e60, &row->k_N_m, build->diag));
-    return pal_entry_check_unused(item, build->diag);
-}
-
-static pal_err make(pal_config_entry *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
 {
     const pal_body *body = build->body;
-    double low[3] = {0}, high[3] = {0}, lowest = 0.05, least = INFINITY, most = -INFINITY, mass = 0;
-    bool box;
-    penalty *row = PAL_NEW(build->arena, penalty, 1);
-    if (!row) return PAL_ERR_MEMORY;
-    PAL_TRY(read_keys(row, item, build, &box, low, high, &lowest));
+    double mass = 0;
+    pal_rest_region region;
+    penalty *p = PAL_NEW(build->arena, penalty, 1);
+    if (!p) return PAL_ERR_MEMORY;
+    PAL_TRY(pal_rest_region_read(entry, body->node_rest, body->n_node, build->scene->up, &region, build->diag));
+    p->per_young = pal_entry_has(entry, "k_N_m") ? 0 : PENALTY_STIFFNESS * body->length_scale_m;
+    p->k_N_m = p->per_young * build->def->material.young_Pa;
+    PAL_TRY(pal_entry_read_number(entry, "k_N_m", 1e-12, 1e60, &p->k_N_m, build->diag));
+    PAL_TRY(pal_entry_check_unused(entry, build->diag));
     if (body->active)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
-                                  "%s: penalty holds no body that adapts: give it supports", item->path);
-    row->node = PAL_NEW(build->arena, int32_t, body->n_node);
-    row->share = PAL_NEW(build->arena, double, body->n_node);
-    if (!row->node || !row->share) return PAL_ERR_MEMORY;
+                                  "%s: penalty holds no body that adapts: give it supports", entry->path);
+    p->node = PAL_NEW(build->arena, int32_t, body->n_node);
+    p->share = PAL_NEW(build->arena, double, body->n_node);
+    if (!p->node || !p->share) return PAL_ERR_MEMORY;
     for (int i = 0; i < body->n_node; i++) {
-        double z = pal_dot3(body->node_rest + 3 * (size_t)i, build->scene->up);
-        least = fmin(least, z), most = fmax(most, z);
-    }
-    /* a hair above, so that rounding does not part nodes of one height */
-    double top = least + (lowest + 1e-9) * (most - least);
-    for (int i = 0; i < body->n_node; i++) {
-        if (!(body->node_mass_kg[i] > 0)) continue; /* virtual nodes */
-        if (!chosen(body->node_rest + 3 * (size_t)i, box, low, high, build->scene->up, top)) continue;
-        row->node[row->n_node] = i;
-        row->share[row->n_node++] = body->node_mass_kg[i];
+        /* virtual nodes have no mass */
+        if (!(body->node_mass_kg[i] > 0) || !pal_rest_region_has(&region, body->node_rest + 3 * (size_t)i)) continue;
+        p->node[p->n_node] = i;
+        p->share[p->n_node++] = body->node_mass_kg[i];
         mass += body->node_mass_kg[i];
     }
-    if (row->n_node == 0)
+    if (p->n_node == 0)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: penalty holds none of the body's %d nodes",
-                                  item->path, body->n_node);
-    for (int n = 0; n < row->n_node; n++) row->share[n] /= mass;
-    *self = row;
+                                  entry->path, body->n_node);
+    for (int n = 0; n < p->n_node; n++) p->share[n] /= mass;
+    *self = p;
     return PAL_ERR_OK;
 }
 
-static void add(const penalty *row, double k, const double *p, const double *from, double *out)
+static void add(const penalty *p, double k, const double *u, const double *from, double *out)
 {
-    for (int n = 0; n < row->n_node; n++) {
-        size_t i = 3 * (size_t)row->node[n];
-        for (size_t c = 0; c < 3; c++) out[i + c] += k * row->share[n] * (p[i + c] - (from ? from[i + c] : 0));
+    for (int n = 0; n < p->n_node; n++) {
+        size_t i = 3 * (size_t)p->node[n];
+        for (size_t c = 0; c < 3; c++) out[i + c] += k * p->share[n] * (u[i + c] - (from ? from[i + c] : 0));
     }
 }
 
 static pal_err run(void *self, pal_step *step)
 {
-    const penalty *row = self;
-    add(row, -row->k_N_m, step->body->d, step->body->node_rest, step->body->f);
+    const penalty *p = self;
+    add(p, -p->k_N_m, step->body->d, step->body->node_rest, step->body->f);
     return PAL_ERR_OK;
 }
 
 static double energy(void *self, const pal_body *body)
 {
-    const penalty *row = self;
+    const penalty *p = self;
     double sum = 0;
-    for (int n = 0; n < row->n_node; n++) {
-        double off = pal_dist3(body->d + 3 * (size_t)row->node[n], body->node_rest + 3 * (size_t)row->node[n]);
-        sum += row->share[n] * off * off;
+    for (int n = 0; n < p->n_node; n++) {
+        double off = pal_dist3(body->d + 3 * (size_t)p->node[n], body->node_rest + 3 * (size_t)p->node[n]);
+        sum += p->share[n] * off * off;
     }
-    return 0.5 * row->k_N_m * sum;
+    return 0.5 * p->k_N_m * sum;
 }
 
-/* of nodes that are points themselves; solvers of carried nodes look at the forces */
+/* of nodes that are dofs; solvers of interpolated nodes look at the forces */
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
-    const penalty *row = self;
-    for (int n = 0; n < row->n_node && !body->interpolation; n++) bound_N_m[row->node[n]] += row->k_N_m * row->share[n];
+    const penalty *p = self;
+    for (int n = 0; n < p->n_node && !body->interpolation; n++) bound_N_m[p->node[n]] += p->k_N_m * p->share[n];
 }
 
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
 {
-    penalty *row = self;
+    penalty *p = self;
     (void)body, (void)diag;
-    if (row->per_young > 0) row->k_N_m = row->per_young * to->young_Pa;
+    if (p->per_young > 0) p->k_N_m = p->per_young * to->young_Pa;
     return PAL_ERR_OK;
 }
 
@@ -128,11 +99,11 @@ static void linearise(void *self, const pal_body *body)
     (void)self, (void)body;
 }
 
-static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
+static void multiply(void *self, const pal_body *body, double k, double c, const double *u, double *out)
 {
-    const penalty *row = self;
+    const penalty *p = self;
     (void)body, (void)c;
-    add(row, k * row->k_N_m, p, NULL, out);
+    add(p, k * p->k_N_m, u, NULL, out);
 }
 
 static const pal_tangent tangent = {.linearise = linearise, .multiply = multiply};

@@ -1,35 +1,16 @@
-/* A sphere presses tissue: penalty contact between each tool and the shown surface, in every sub-step.
+/* Component tool_push: penalty contact between the sphere of each tool and the shown surface, in every sub-step.
  *
- * The surface that is touched is the one that is seen (skinned), not the staircase of voxels below it
- * (sim/contact_points.h). A proxy of the tool stays on the side it came from (sim/proxy.h). A contact point within the
- * proxy's sphere, at depth d, is pushed straight away from the proxy's centre with f = k (d - dt/2 v_away),   k =
- * stiffness_Pa_m * area, v_away being the tissue's own speed away from the proxy. The largest eigenvalue of contact
- * stiffness over mass is kept below alpha / dt^2, alpha 1.2, by a common factor on k (contact_points.h). With a and b
- * the ratios of stiffness and damping to m / dt^2 and m / dt, symplectic steps are stable for a + 2 b < 4; the solver's
- * own limit leaves a <= 1 to the tissue, contact adds a <= 1.2 and b <= 0.6. The sum of all forces is shortened to the
- * tool's cap, and in its first and last 10 steps by its ramp. The opposite force acts on the tool.
+ * Tools touch the surface that is shown, not the voxels below it (contact_points.h). A proxy of the tool stays on the
+ * side it came from (proxy.h). A contact point at depth d within the proxy's sphere is pushed straight away from the
+ * proxy's centre with f = k d, k = stiffness_Pa_m * area, and the opposite force acts on the tool; what k is, and how a
+ * solver takes it, is the regime's (push.h). The sum is shortened to the caps (tool_force.h) and scaled by the tool's
+ * ramp.
  *
- * With an implicit solver (pal_body.implicit) a sub-step is the whole step and nothing limits k but the number of its
- * iterations: k is 15 times as stiff as the tissue behind half a radius, spread over that area, with E of the tissue at
- * each point; the solver takes it implicitly, there is no damping term, and the forces are those of the end of the
- * sub-step (sim/contact_implicit.h, which also says how caps are kept). Patches are then published after the solve,
- * their k1 from the solver's compliance where it has one, at most two of them a step.
+ * A tool that holds tissue (tool_grasp) does not push it as well: its ball would work against its own grasp. A tool
+ * that appears inside tissue starts at the nearest place outside. A proxy that stays farther than slip_S box diagonals
+ * behind its tool for slip_s starts again where the tool is.
  *
- * A body that adapts (sim/adaptive_surface.h) has a solver that holds loads over a sub-step (rk4), so that they lag by
- * dt/2. With f = k (d - dt v_away), the nodes' own velocity and alpha 0.5, b = a is beyond a/2, which makes up for the
- * lag, and a + b <= 1: tissue that comes in is stopped and not thrown back. When other triangles are drawn, contact
- * changes at once, as a finer surface bulges where the coarse one was flat: `ramp` then falls so far that the force
- * does not rise in that moment, and grows again in PAL_BLEND_CONTACT_S.
- *
- * Where points carry the nodes (pal_body.embed) k is that of implicit solvers below, and central_cg is told in time
- * what the points near a tool want (pal_effect.wanted), so that its sub-steps allow it. Beyond that alpha is 0.3; the
- * bound is the sum of the points' own, which is above their eigenvalue.
- *
- * A tool that holds tissue (tool_grasp) does not push it as well: its ball would work against its own grip.
- * A tool that appears inside tissue starts at the nearest place outside. A proxy that stays farther than slip_S box
- * diagonals behind its tool for slip_s gives up and starts anew where the tool is.
- *
- * Keys: stiffness_Pa_m (0: 200 E / radius, or as above), friction (Coulomb, 0), clamp_S (0.02: correction a step, in
+ * Keys: stiffness_Pa_m (0: the regime's), friction (Coulomb, 0), clamp_S (0.02: correction of penetration in 1/60 s, in
  * box diagonals), near_m (0: the larger of a radius and 10 mm; a patch is published within), slip_S (0.25), slip_s
  * (0.5). */
 #include "server/base/vec3.h"
@@ -71,16 +52,16 @@ static void reset(void *self, const pal_body *body)
     }
 }
 
-static pal_err read_keys(pal_push *push, pal_config_entry *item, pal_diagnostic *diag)
+static pal_err read_keys(pal_push *push, pal_config_entry *entry, pal_diagnostic *diag)
 {
     push->clamp_S = 0.02, push->slip_S = 0.25, push->slip_s = 0.5;
-    PAL_TRY(pal_entry_read_number(item, "stiffness_Pa_m", 0, 1e15, &push->asked_Pa_m, diag));
-    PAL_TRY(pal_entry_read_number(item, "friction", 0, 2, &push->friction, diag));
-    PAL_TRY(pal_entry_read_number(item, "clamp_S", 1e-4, 0.1, &push->clamp_S, diag));
-    PAL_TRY(pal_entry_read_number(item, "near_m", 0, 1, &push->asked_near_m, diag));
-    PAL_TRY(pal_entry_read_number(item, "slip_S", 0.05, 100, &push->slip_S, diag));
-    PAL_TRY(pal_entry_read_number(item, "slip_s", 0, 1e9, &push->slip_s, diag));
-    return pal_entry_check_unused(item, diag);
+    PAL_TRY(pal_entry_read_number(entry, "stiffness_Pa_m", 0, 1e15, &push->asked_Pa_m, diag));
+    PAL_TRY(pal_entry_read_number(entry, "friction", 0, 2, &push->friction, diag));
+    PAL_TRY(pal_entry_read_number(entry, "clamp_S", 1e-4, 0.1, &push->clamp_S, diag));
+    PAL_TRY(pal_entry_read_number(entry, "near_m", 0, 1, &push->asked_near_m, diag));
+    PAL_TRY(pal_entry_read_number(entry, "slip_S", 0.05, 100, &push->slip_S, diag));
+    PAL_TRY(pal_entry_read_number(entry, "slip_s", 0, 1e9, &push->slip_s, diag));
+    return pal_entry_check_unused(entry, diag);
 }
 
 static const pal_push_regime *regime_of(const pal_body *body)
@@ -90,15 +71,15 @@ static const pal_push_regime *regime_of(const pal_body *body)
     return body->interpolation ? &pal_push_interpolated : &pal_push_explicit;
 }
 
-static pal_err make(pal_config_entry *item, pal_build *build, void **self)
+static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
 {
     const pal_scene *scene = build->scene;
     pal_push *push = PAL_NEW(build->arena, pal_push, 1);
     if (!push) return PAL_ERR_MEMORY;
-    PAL_TRY(read_keys(push, item, build->diag));
+    PAL_TRY(read_keys(push, entry, build->diag));
     if (build->body->n_shown == 0)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: tool_push needs a body that shows something",
-                                  item->path);
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: tool_push needs a body with a shown surface",
+                                  entry->path);
     take_material(push, &build->def->material);
     push->n_tool = scene->n_tool;
     push->body_index = (int)(build->def - scene->body);
@@ -153,7 +134,6 @@ static void begin_tool(pal_push *push, pal_tool_contact *h, const pal_tool *tool
     pal_body *body = step->body;
     double next[3], step_s = step->dt_s * step->n_sub;
     h->n_list = 0;
-    h->nearest_m = INFINITY;
     if ((!tool->present && tool->ramp <= 0) || tool->grasped_before) {
         h->active = false;
         pal_tool_contact_end_blend(h);
@@ -181,7 +161,7 @@ static void begin_tool(pal_push *push, pal_tool_contact *h, const pal_tool *tool
     h->limits.radius_m = tool->radius_m;
     h->limits.max_depth_m = MAX_DEPTH_RADII * tool->radius_m;
     h->limits.slack_m = 0.5 * (reach - tool->radius_m);
-    h->n_list = pal_contact_points_collect(&push->points, body, h->proxy.x, next, reach, h->list, &h->nearest_m);
+    h->n_list = pal_contact_points_collect(&push->points, body, h->proxy.x, next, reach, h->list);
 }
 
 /* contacts of the proxy where it is now; x [n_list][3] are the points */
@@ -252,9 +232,6 @@ static void wanted(void *self, const pal_body *body, double *bound_N_m)
     if (push->regime == &pal_push_interpolated) pal_push_want(push, body, bound_N_m);
 }
 
-/* ---- implicit solvers ---- */
-
-/* the ties of a sub-step are made by run, so there is nothing to linearise */
 static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
 {
     (void)body, (void)c;
@@ -268,7 +245,7 @@ static bool settle(void *self, pal_step *step, const double *moved, bool last)
 
 static void transfer(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
 {
-    pal_push *push = self, *old = (pal_push *)(uintptr_t)before; /* its points gathers forces, which is work room */
+    pal_push *push = self, *old = (pal_push *)(uintptr_t)before; /* its points are scratch for forces */
     for (int t = 0; t < push->n_tool && t < old->n_tool; t++) {
         double k_N_m = 0.5 * pal_push_punch_N_m(push, old->tool[t].limits.radius_m);
         pal_tool_contact_transfer(&push->tool[t], body, &old->tool[t], by->from, &old->points, by->place, k_N_m);
@@ -281,8 +258,8 @@ static void destroy(void *self)
     for (int t = 0; t < push->n_tool; t++) pal_tool_contact_free(&push->tool[t]);
 }
 
-/* what is pressed stays so, however far the tool goes beyond */
-static double how_far_m(const void *self, const pal_tool *tool)
+/* a tool in contact acts from however far */
+static double reach_m(const void *self, const pal_tool *tool)
 {
     const pal_push *push = self;
     for (int t = 0; t < push->n_tool; t++)
@@ -301,5 +278,5 @@ const pal_effect pal_effect_tool_push = {.name = "tool_push",
                                          .transfer = transfer,
                                          .destroy = destroy,
                                          .wanted = wanted,
-                                         .reach_m = how_far_m,
+                                         .reach_m = reach_m,
                                          .tangent = &tangent};

@@ -1,10 +1,10 @@
-/* Contact forces as bodies are solved with them, in every sub-step of every insult by tools: never beyond a cap, and
+/* Contact forces as bodies are solved with them, in every sub-step of every tool_case by tools: never beyond a cap, and
  * what the tools feel is their opposite. A tap stands before the first row of contact and before the solver. */
 #include "server/base/vec3.h"
 #include "tests/fixtures/model_scenes.h"
 
-typedef enum insult { INSIDE, PRESSED, JUMPING, DRAGGED, PINCHED, INSULTS } insult;
-static const char *const insult_name[INSULTS] = {"inside", "pressed", "jumping", "dragged", "pinched"};
+typedef enum tool_case { INSIDE, PRESSED, JUMPING, DRAGGED, PINCHED, TOOL_CASES } tool_case;
+static const char *const tool_case_name[TOOL_CASES] = {"inside", "pressed", "jumping", "dragged", "pinched"};
 
 typedef struct body_case {
     model_kind kind;
@@ -27,39 +27,39 @@ static struct {
     bool staged;
     /* of all sub-steps: the largest sum or force on a tool, the same over the caps of tools that act, the largest
      * difference between sum and what tools feel */
-    double most_N, most_off_N, most_share;
-    double most_node_share; /* the largest force on a node over its cap */
-    int n_settle, most_settle, n_substep;
+    double max_N, max_off_N, max_share;
+    double max_node_share; /* the largest force on a node over its cap */
+    int n_settle, max_settle, n_substep;
 } tap;
 
-/* forces on the body's nodes, loads less what ties took back (NULL: nothing): their sum, the largest over its cap */
-static double take_forces(const pal_body *body, const double *tie)
+/* forces on the body's nodes, loads less what springs took back (NULL: nothing): their sum, the largest over its cap */
+static double take_forces(const pal_body *body, const double *spring)
 {
     double largest = 0;
     pal_set3(tap.solved_N, 0, 0, 0);
     for (int i = 0; i < body->n_node; i++) {
         double force[3];
         pal_copy3(force, body->load + 3 * i);
-        if (tie) pal_sub3(force, force, tie + 3 * i);
+        if (spring) pal_sub3(force, force, spring + 3 * i);
         pal_add3(tap.solved_N, tap.solved_N, force);
         largest = fmax(largest, pal_norm3(force));
     }
     return largest / body->load_cap_N;
 }
 
-/* what the loads and ties that the body was solved with gave on it, when it moved by `moved` */
+/* what the loads and springs that the body was solved with gave on it, when it moved by `moved` */
 static bool settle_tapped(void *self, pal_step *step, const double *moved, bool last)
 {
     const pal_body *body = step->body;
     size_t n3 = 3 * (size_t)body->n_node;
-    double *tie = calloc(n3, sizeof *tie);
-    if (!tie) abort();
+    double *spring = calloc(n3, sizeof *spring);
+    if (!spring) abort();
     for (int i = 0; i < step->n_contact; i++) {
         const pal_component *row = &step->contact[i];
-        if (row->effect->tangent) row->effect->tangent->multiply(row->self, body, 1, 0, moved, tie);
+        if (row->effect->tangent) row->effect->tangent->multiply(row->self, body, 1, 0, moved, spring);
     }
-    tap.node_share = take_forces(body, tie);
-    free(tie);
+    tap.node_share = take_forces(body, spring);
+    free(spring);
     tap.n_settle++;
     if (!last) tap.staged = true, pal_copy3(tap.first_N, tap.solved_N);
     return tap.contact->tangent->settle(self, step, moved, last);
@@ -76,17 +76,17 @@ static pal_err solve_tapped(void *self, pal_step *step)
     pal_copy3(off, tap.solved_N);
     for (int c = 0; c < 3 && tap.staged; c++) off[c] += M_SQRT1_2 * (tap.first_N[c] - tap.solved_N[c]);
     for (int t = 0; t < tools->n_tool; t++) {
-        double force = pal_norm3(tools->tool[t].force_N), most = tools->tool[t].ramp * tools->tool[t].force_cap_N;
+        double force = pal_norm3(tools->tool[t].force_N), limit_N = tools->tool[t].ramp * tools->tool[t].force_cap_N;
         pal_add3(off, off, tools->tool[t].force_N);
-        tap.most_N = fmax(tap.most_N, force);
-        if (force > 0) tap.most_share = fmax(tap.most_share, force / most), cap += most;
+        tap.max_N = fmax(tap.max_N, force);
+        if (force > 0) tap.max_share = fmax(tap.max_share, force / limit_N), cap += limit_N;
     }
     double size = pal_norm3(tap.solved_N);
-    tap.most_N = fmax(tap.most_N, size);
-    tap.most_node_share = fmax(tap.most_node_share, tap.node_share);
-    tap.most_off_N = fmax(tap.most_off_N, pal_norm3(off));
-    if (size > 1e-12 * cap_N) tap.most_share = fmax(tap.most_share, size / cap);
-    tap.most_settle = tap.n_settle > tap.most_settle ? tap.n_settle : tap.most_settle;
+    tap.max_N = fmax(tap.max_N, size);
+    tap.max_node_share = fmax(tap.max_node_share, tap.node_share);
+    tap.max_off_N = fmax(tap.max_off_N, pal_norm3(off));
+    if (size > 1e-12 * cap_N) tap.max_share = fmax(tap.max_share, size / cap);
+    tap.max_settle = tap.n_settle > tap.max_settle ? tap.n_settle : tap.max_settle;
     tap.n_substep++;
     return err;
 }
@@ -113,7 +113,7 @@ static bool tap_rows(pal_world *world)
 
 /* ---- insults ---- */
 
-static bool open_case(model_scene *m, const body_case *c, double most_N, double friction, bool fixed)
+static bool open_case(model_scene *m, const body_case *c, double max_N, double friction, bool fixed)
 {
     model_scene_make(m, c->kind);
     pal_config_entry *push = model_scene_effect(m, "tool_push");
@@ -121,7 +121,7 @@ static bool open_case(model_scene *m, const body_case *c, double most_N, double 
     if (c->solver[0]) pal_entry_init(&m->def->solver, "bodies[0].solver", c->solver);
     pal_entry_put_number(push, "friction", friction, NULL);
     if (!fixed) m->def->n_support = 0;
-    for (int t = 0; t < 2; t++) m->scene->tool[t].force_cap_N = most_N;
+    for (int t = 0; t < 2; t++) m->scene->tool[t].force_cap_N = max_N;
     return true;
 }
 
@@ -143,7 +143,7 @@ static double wander(int step, int axis)
     return sin(12.9898 * step + 78.233 * axis);
 }
 
-static void place_tool(const pal_body *body, insult what, int step, int tool, pal_pose *pose)
+static void place_tool(const pal_body *body, tool_case what, int step, int tool, pal_pose *pose)
 {
     double centre[3], half[3], radius = 0.008, *at = pose->position_m;
     middle(body, centre, half);
@@ -162,7 +162,7 @@ static void place_tool(const pal_body *body, insult what, int step, int tool, pa
     if (what == PINCHED) at[1] += (tool ? 1 : -1) * (half[1] + 2 * radius - 0.003 * fmin(step, 20));
 }
 
-static bool insult_body(model_scene *m, insult what, int step)
+static bool move_tools(model_scene *m, tool_case what, int step)
 {
     for (int t = 0; t < (what == PINCHED ? 2 : 1); t++) {
         pal_pose pose;
@@ -175,19 +175,19 @@ static bool insult_body(model_scene *m, insult what, int step)
 static void tools_feel_what_the_body_was_solved_with(void)
 {
     for (int i = 0; i < CASES; i++)
-        for (insult what = 0; what < INSULTS; what++)
+        for (tool_case what = 0; what < TOOL_CASES; what++)
             for (int rough = 0; rough < 2; rough++) {
                 model_scene m;
                 REQUIRE(open_case(&m, &cases[i], cap_N, 0.5 * rough, true) && model_scene_open(&m) &&
                         tap_rows(m.world));
-                for (int k = 0; k < STEPS; k++) REQUIRE(insult_body(&m, what, k));
+                for (int k = 0; k < STEPS; k++) REQUIRE(move_tools(&m, what, k));
                 printf("  %s %s, %s, friction %g: up to %.6g N, %.6g of the caps, off by %.2g N, settled %d times\n",
-                       model_kind_name[cases[i].kind], cases[i].solver, insult_name[what], 0.5 * rough, tap.most_N,
-                       tap.most_share, tap.most_off_N, tap.most_settle);
-                CHECK(tap.most_N > 0.02 * cap_N);
+                       model_kind_name[cases[i].kind], cases[i].solver, tool_case_name[what], 0.5 * rough, tap.max_N,
+                       tap.max_share, tap.max_off_N, tap.max_settle);
+                CHECK(tap.max_N > 0.02 * cap_N);
                 CHECK(tap.n_substep >= STEPS);
-                CHECK_LE(tap.most_share, 1 + 1e-9);
-                CHECK_LE(tap.most_off_N, 1e-9 * cap_N);
+                CHECK_LE(tap.max_share, 1 + 1e-9);
+                CHECK_LE(tap.max_off_N, 1e-9 * cap_N);
                 model_scene_close(&m);
             }
 }
@@ -196,16 +196,16 @@ static void tools_feel_what_the_body_was_solved_with(void)
 static void no_node_bears_more_than_its_cap(void)
 {
     for (int i = 0; i < CASES; i++)
-        for (insult what = PRESSED; what < PINCHED; what++) {
+        for (tool_case what = PRESSED; what < PINCHED; what++) {
             model_scene m;
             REQUIRE(open_case(&m, &cases[i], 1e6, 0.3, true) && model_scene_open(&m) && tap_rows(m.world));
-            for (int k = 0; k < STEPS; k++) REQUIRE(insult_body(&m, what, k));
+            for (int k = 0; k < STEPS; k++) REQUIRE(move_tools(&m, what, k));
             printf("  %s %s, %s: up to %.6g N, on a node %.6g of its cap, off by %.2g of the sum, settled %d times\n",
-                   model_kind_name[cases[i].kind], cases[i].solver, insult_name[what], tap.most_N, tap.most_node_share,
-                   tap.most_off_N / tap.most_N, tap.most_settle);
-            CHECK(tap.most_N > cap_N);
-            CHECK_LE(tap.most_node_share, 1 + 1e-9);
-            CHECK_LE(tap.most_off_N, 1e-9 * tap.most_N);
+                   model_kind_name[cases[i].kind], cases[i].solver, tool_case_name[what], tap.max_N, tap.max_node_share,
+                   tap.max_off_N / tap.max_N, tap.max_settle);
+            CHECK(tap.max_N > cap_N);
+            CHECK_LE(tap.max_node_share, 1 + 1e-9);
+            CHECK_LE(tap.max_off_N, 1e-9 * tap.max_N);
             model_scene_close(&m);
         }
 }
@@ -214,17 +214,17 @@ static void no_node_bears_more_than_its_cap(void)
 static void contact_does_not_pull_as_a_whole(void)
 {
     model_scene m;
-    double most_N = 0, pull_N = 0;
+    double max_N = 0, pull_N = 0;
     REQUIRE(open_case(&m, &cases[0], 15, 0, true) && model_scene_open(&m));
     for (int k = 0; k < STEPS; k++) {
-        REQUIRE(insult_body(&m, PINCHED, k));
+        REQUIRE(move_tools(&m, PINCHED, k));
         for (int t = 0; t < 2; t++) {
             double out_N = (t ? 1 : -1) * pal_world_tools(m.world)->tool[t].force_N[1];
-            most_N = fmax(most_N, out_N), pull_N = fmax(pull_N, -out_N);
+            max_N = fmax(max_N, out_N), pull_N = fmax(pull_N, -out_N);
         }
     }
-    printf("  up to %.4g N out, %.4g N in\n", most_N, pull_N);
-    CHECK(most_N > 10);
+    printf("  up to %.4g N out, %.4g N in\n", max_N, pull_N);
+    CHECK(max_N > 10);
     CHECK_LE(pull_N, 0);
     model_scene_close(&m);
 }
@@ -242,9 +242,9 @@ static void find_momentum(const pal_body *body, double sum[3])
 static void a_step_gives_no_more_momentum_than_the_cap(void)
 {
     for (int i = 0; i < 2; i++)
-        for (insult what = INSIDE; what < PINCHED; what++) {
+        for (tool_case what = INSIDE; what < PINCHED; what++) {
             model_scene m;
-            double before[3], after[3], most_N = 0, most_off_N = 0;
+            double before[3], after[3], max_N = 0, max_off_N = 0;
             REQUIRE(open_case(&m, &cases[i], cap_N, 0, false));
             m.def->material.damping_1_s = 0;
             pal_entry_put_number(&m.def->solver, "tolerance", 1e-12, NULL);
@@ -252,18 +252,18 @@ static void a_step_gives_no_more_momentum_than_the_cap(void)
             REQUIRE(model_scene_open(&m));
             for (int k = 0; k < STEPS; k++) {
                 find_momentum(m.body, before);
-                REQUIRE(insult_body(&m, what, k));
+                REQUIRE(move_tools(&m, what, k));
                 find_momentum(m.body, after);
                 pal_sub3(after, after, before);
                 pal_scale3(after, 1 / m.scene->step_s, after);
-                most_N = fmax(most_N, pal_norm3(after));
+                max_N = fmax(max_N, pal_norm3(after));
                 pal_add3(after, after, pal_world_tools(m.world)->tool[0].force_N);
-                most_off_N = fmax(most_off_N, pal_norm3(after));
+                max_off_N = fmax(max_off_N, pal_norm3(after));
             }
-            printf("  %s, %s: up to %.9g N, off by %.2g N\n", cases[i].solver, insult_name[what], most_N, most_off_N);
-            CHECK(most_N > 0.02 * cap_N);
-            CHECK_LE(most_N, cap_N * (1 + 1e-6));
-            CHECK_LE(most_off_N, 1e-6 * cap_N);
+            printf("  %s, %s: up to %.9g N, off by %.2g N\n", cases[i].solver, tool_case_name[what], max_N, max_off_N);
+            CHECK(max_N > 0.02 * cap_N);
+            CHECK_LE(max_N, cap_N * (1 + 1e-6));
+            CHECK_LE(max_off_N, 1e-6 * cap_N);
             model_scene_close(&m);
         }
 }

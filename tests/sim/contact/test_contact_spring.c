@@ -1,20 +1,20 @@
-/* Ties between tools and tissue: rows of contact as an implicit solver takes them. */
+/* Springs between tools and tissue, as an implicit solver takes them. */
 #include "server/base/arena.h"
 #include "server/sim/contact/contact_spring.h"
 #include "tests/fixtures/random.h"
 #include "tests/fixtures/tool_scene.h"
 
-enum { MOST = 64 };
+enum { MAX_CONTACTS = 64 };
 
-typedef struct tie_scene {
+typedef struct spring_scene {
     tool_scene s;
     pal_arena *arena;
     pal_contact_points points;
     pal_contact_springs springs;
-    pal_contact contact[MOST];
+    pal_contact contact[MAX_CONTACTS];
     int n;
     double centre[3];
-} tie_scene;
+} spring_scene;
 
 static double *field(const pal_body *body, uint64_t seed, double size)
 {
@@ -24,8 +24,8 @@ static double *field(const pal_body *body, uint64_t seed, double size)
     return u;
 }
 
-/* a ball or slab, a little deformed, and ties for what a sphere at its top would meet */
-static bool open_ties(tie_scene *t, bool skinned)
+/* a ball or slab, a little deformed, and springs for what a sphere at its top would meet */
+static bool open_springs(spring_scene *t, bool skinned)
 {
     memset(t, 0, sizeof *t);
     bool made = skinned ? ball_scene(&t->s, 8, true, 1, 0.012, 15) : slab_scene(&t->s, 8, 8, 4, 0.01, 1, 0.02, 15);
@@ -43,7 +43,7 @@ static bool open_ties(tie_scene *t, bool skinned)
     if (!out || out->effect->run(out->self, &step)) return false;
     t->arena = pal_arena_create(1 << 20, true);
     if (!t->arena || pal_contact_points_make(body, 0.006, 10000, t->arena, &t->points)) return false;
-    if (pal_contact_springs_make(body, MOST + 2, t->arena, &t->springs)) return false;
+    if (pal_contact_springs_make(body, MAX_CONTACTS + 2, t->arena, &t->springs)) return false;
     double top = -1;
     for (int i = 0; i < body->n_shown; i++)
         if ((double)body->shown[3 * i + 2] > top) {
@@ -51,12 +51,11 @@ static bool open_ties(tie_scene *t, bool skinned)
             for (int c = 0; c < 3; c++) t->centre[c] = (double)body->shown[3 * i + c] + (c == 2 ? 0.008 : 0.001);
         }
     int32_t *list = PAL_NEW(t->arena, int32_t, t->points.sample.max_point);
-    double nearest;
     pal_contact_points_begin(&t->points);
-    int n = pal_contact_points_collect(&t->points, body, t->centre, t->centre, 0.02, list, &nearest);
+    int n = pal_contact_points_collect(&t->points, body, t->centre, t->centre, 0.02, list);
     pal_contact_points_update(&t->points, body, 1);
     pal_contact_springs_begin(&t->springs);
-    for (int i = 0; i < n && t->n < MOST; i++) {
+    for (int i = 0; i < n && t->n < MAX_CONTACTS; i++) {
         pal_contact *c = &t->contact[t->n];
         c->point = list[i];
         pal_contact_points_position(&t->points, list[i], c->x);
@@ -70,7 +69,7 @@ static bool open_ties(tie_scene *t, bool skinned)
     return t->n > 5;
 }
 
-static void close_ties(tie_scene *t)
+static void close_springs(spring_scene *t)
 {
     pal_arena_destroy(t->arena);
     tool_scene_close(&t->s);
@@ -79,10 +78,10 @@ static void close_ties(tie_scene *t)
 static void measures_what_points_do(void)
 {
     for (int skinned = 0; skinned < 2; skinned++) {
-        tie_scene t;
-        REQUIRE(open_ties(&t, skinned));
+        spring_scene t;
+        REQUIRE(open_springs(&t, skinned));
         pal_body *body = t.s.body;
-        double worst = 0, most = 0, *motion = calloc((size_t)t.n, sizeof(double));
+        double worst = 0, largest = 0, *motion = calloc((size_t)t.n, sizeof(double));
         for (uint64_t seed = 1; seed < 6; seed++) {
             double step = 2e-4 * body->edge_m, *u = field(body, seed, 1), x[3];
             pal_contact_springs_motion(&t.springs, u);
@@ -98,24 +97,24 @@ static void measures_what_points_do(void)
             for (int i = 0; i < 3 * body->n_node; i++) body->x[i] += step * u[i];
             for (int i = 0; i < t.n; i++) {
                 worst = fmax(worst, fabs(motion[i] - t.springs.motion_m[i]));
-                most = fmax(most, fabs(motion[i]));
+                largest = fmax(largest, fabs(motion[i]));
             }
             free(u);
         }
-        printf("  %s: %d ties on %d slots, motion up to %.3g, off by %.2g\n", skinned ? "ball" : "slab", t.n,
-               t.springs.n_frame, most, worst);
+        printf("  %s: %d springs on %d slots, motion up to %.3g, off by %.2g\n", skinned ? "ball" : "slab", t.n,
+               t.springs.n_frame, largest, worst);
         /* a skin's axes are single precision */
-        CHECK(most > 0.1);
-        CHECK_LE(worst, (skinned ? 2e-3 : 1e-9) * most);
+        CHECK(largest > 0.1);
+        CHECK_LE(worst, (skinned ? 2e-3 : 1e-9) * largest);
         free(motion);
-        close_ties(&t);
+        close_springs(&t);
     }
 }
 
 static void stiffness_is_symmetric_and_sums_squares(void)
 {
-    tie_scene t;
-    REQUIRE(open_ties(&t, true));
+    spring_scene t;
+    REQUIRE(open_springs(&t, true));
     const pal_body *body = t.s.body;
     size_t n3 = 3 * (size_t)body->n_node;
     for (uint64_t seed = 1; seed < 4; seed++) {
@@ -130,16 +129,17 @@ static void stiffness_is_symmetric_and_sums_squares(void)
         CHECK_NEAR(pkp, wanted, 1e-12 * wanted);
         free(p), free(q), free(kp), free(kq);
     }
-    close_ties(&t);
+    close_springs(&t);
 }
 
 static void loads_have_the_contacts_force_and_torque(void)
 {
     for (int skinned = 0; skinned < 2; skinned++) {
-        tie_scene t;
-        REQUIRE(open_ties(&t, skinned));
+        spring_scene t;
+        REQUIRE(open_springs(&t, skinned));
         const pal_body *body = t.s.body;
-        double force[MOST], *load = calloc(3 * (size_t)body->n_node, sizeof(double)), sum[3] = {0}, torque[3] = {0};
+        double force[MAX_CONTACTS], *load = calloc(3 * (size_t)body->n_node, sizeof(double)), sum[3] = {0},
+                                    torque[3] = {0};
         double m[3], size = 0, largest = 0;
         for (int i = 0; i < t.n; i++) force[i] = 0.1 + 0.01 * i;
         pal_contact_springs_load(&t.springs, 2, force, 0, t.n, load);
@@ -162,16 +162,16 @@ static void loads_have_the_contacts_force_and_torque(void)
         CHECK_LE(pal_norm3(torque), (skinned ? 1e-5 : 1e-12) * size * 0.05);
         CHECK_NEAR(pal_contact_springs_max_force_N(&t.springs, force, 0, t.n), largest, 1e-12 * largest);
         free(load);
-        close_ties(&t);
+        close_springs(&t);
     }
 }
 
 static void mean_moves_as_its_points_do(void)
 {
-    tie_scene t;
-    REQUIRE(open_ties(&t, true));
+    spring_scene t;
+    REQUIRE(open_springs(&t, true));
     const pal_body *body = t.s.body;
-    double weight[MOST], axis[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, *u = field(body, 7, 1);
+    double weight[MAX_CONTACTS], axis[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, *u = field(body, 7, 1);
     int first = t.springs.n_row;
     for (int i = 0; i < t.n; i++) weight[i] = 1.0 / t.n;
     for (int c = 0; c < 2; c++)
@@ -197,7 +197,7 @@ static void mean_moves_as_its_points_do(void)
         REQUIRE(pal_contact_springs_add(&t.springs, &t.points, body, t.contact[0].point, axis[0], 1) >= 0);
     CHECK_INT(pal_contact_springs_add(&t.springs, &t.points, body, t.contact[0].point, axis[0], 1), -1);
     free(u);
-    close_ties(&t);
+    close_springs(&t);
 }
 
 /* springs to the ground instead of a body: the answer is known */
@@ -209,16 +209,16 @@ static bool ground(void *self, const pal_body *body, const double *force, double
     return true;
 }
 
-static void felt_stiffness_is_that_of_ties_in_series_with_tissue(void)
+static void stiffness_is_that_of_springs_in_series_with_tissue(void)
 {
-    tie_scene t;
-    REQUIRE(open_ties(&t, false));
+    spring_scene t;
+    REQUIRE(open_springs(&t, false));
     static const pal_compliance door = {.solve = ground};
     pal_arena *scratch = pal_arena_create(1 << 20, false);
-    int32_t row[MOST];
-    double share[MOST], wanted = 0;
+    int32_t row[MAX_CONTACTS];
+    double share[MAX_CONTACTS], wanted = 0;
     int n = 0;
-    /* shown nodes of the slab itself: each tie has a node of its own */
+    /* shown nodes of the slab itself: each spring has a node of its own */
     for (int i = 0; i < t.n; i++) {
         if (t.springs.start[i + 1] - t.springs.start[i] != 1) continue;
         double into = -t.contact[i].away[2];
@@ -233,12 +233,12 @@ static void felt_stiffness_is_that_of_ties_in_series_with_tissue(void)
     double one = pal_contact_springs_stiffness(&t.springs, t.s.body, row, share, n, 1, NULL, scratch);
     double two = pal_contact_springs_stiffness(&t.springs, t.s.body, row, share, n, 2, NULL, scratch);
     double all = pal_contact_springs_stiffness(&t.springs, t.s.body, row, share, n, 12, NULL, scratch);
-    printf("  %d ties: %.6g, %.6g, %.9g N/m with 1, 2, 12 passes, wanted %.9g\n", n, one, two, all, wanted);
+    printf("  %d springs: %.6g, %.6g, %.9g N/m with 1, 2, 12 passes, wanted %.9g\n", n, one, two, all, wanted);
     CHECK_LE(one, two);
     CHECK_NEAR(two, wanted, 0.01 * wanted);
     CHECK_NEAR(all, wanted, 1e-9 * wanted);
     pal_arena_destroy(scratch);
-    close_ties(&t);
+    close_springs(&t);
 }
 
 int main(void)
@@ -247,6 +247,6 @@ int main(void)
     RUN(stiffness_is_symmetric_and_sums_squares);
     RUN(loads_have_the_contacts_force_and_torque);
     RUN(mean_moves_as_its_points_do);
-    RUN(felt_stiffness_is_that_of_ties_in_series_with_tissue);
+    RUN(stiffness_is_that_of_springs_in_series_with_tissue);
     return check_report();
 }

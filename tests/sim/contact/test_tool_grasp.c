@@ -1,7 +1,7 @@
 /* tool_grasp: holding, pulling and letting go of tissue. */
 #include "tests/fixtures/tool_scene.h"
 
-static bool grab_ball(tool_scene *s, int n_tool, bool fixed, double cap_N)
+static bool grasp_ball(tool_scene *s, int n_tool, bool fixed, double cap_N)
 {
     if (!ball_scene(s, 8, fixed, n_tool, 0.008, cap_N)) return false;
     return tool_scene_open(s);
@@ -10,7 +10,7 @@ static bool grab_ball(tool_scene *s, int n_tool, bool fixed, double cap_N)
 static void begins_without_a_jump_and_pulls_tissue_along(void)
 {
     tool_scene s;
-    REQUIRE(grab_ball(&s, 1, true, 15));
+    REQUIRE(grasp_ball(&s, 1, true, 15));
     move_tool(&s, 0, 0, 0, 0.059, false);
     REQUIRE(step_world(&s, 12));
     int top = 0;
@@ -77,7 +77,7 @@ static void moves_a_free_body_as_a_mass_on_a_spring(void)
 static void lets_go_when_the_button_goes_up(void)
 {
     tool_scene s;
-    REQUIRE(grab_ball(&s, 1, true, 15));
+    REQUIRE(grasp_ball(&s, 1, true, 15));
     for (int i = 0; i < 40; i++) {
         move_tool(&s, 0, 0, 0, 0.059 + (i > 14 ? 0.0003 * (i - 14) : 0), i >= 13);
         REQUIRE(step_world(&s, 1));
@@ -96,7 +96,7 @@ static void lets_go_when_the_button_goes_up(void)
 static void a_tool_that_holds_does_not_push_as_well(void)
 {
     tool_scene s;
-    REQUIRE(grab_ball(&s, 1, true, 15));
+    REQUIRE(grasp_ball(&s, 1, true, 15));
     move_tool(&s, 0, 0, 0, 0.052, false);
     REQUIRE(step_world(&s, 12));
     move_tool(&s, 0, 0, 0, 0.052, true);
@@ -113,10 +113,10 @@ static void a_tool_that_holds_does_not_push_as_well(void)
     tool_scene_close(&s);
 }
 
-static void fades_when_its_holder_is_gone(void)
+static void fades_when_its_user_is_gone(void)
 {
     tool_scene s;
-    REQUIRE(grab_ball(&s, 1, true, 15));
+    REQUIRE(grasp_ball(&s, 1, true, 15));
     for (int i = 0; i < 40; i++) {
         move_tool(&s, 0, 0, 0, 0.059 + (i > 14 ? 0.0003 * (i - 14) : 0), i >= 13);
         REQUIRE(step_world(&s, 1));
@@ -138,7 +138,7 @@ static void fades_when_its_holder_is_gone(void)
 static void takes_nothing_out_of_reach_and_the_nearest_just_beyond(void)
 {
     tool_scene s;
-    REQUIRE(grab_ball(&s, 1, true, 15));
+    REQUIRE(grasp_ball(&s, 1, true, 15));
     move_tool(&s, 0, 0, 0, 0.05 + 0.025, false);
     REQUIRE(step_world(&s, 1));
     move_tool(&s, 0, 0, 0, 0.05 + 0.025, true);
@@ -156,22 +156,22 @@ static void takes_nothing_out_of_reach_and_the_nearest_just_beyond(void)
 static void never_exceeds_its_cap(void)
 {
     tool_scene s;
-    REQUIRE(grab_ball(&s, 1, true, 0.5));
-    double most = 0;
+    REQUIRE(grasp_ball(&s, 1, true, 0.5));
+    double max_N = 0;
     for (int i = 0; i < 60; i++) {
         move_tool(&s, 0, 0, 0, 0.059 + (i > 14 ? 0.002 * (i - 14) : 0), i >= 13);
         REQUIRE(step_world(&s, 1));
-        most = fmax(most, pal_norm3(tool_of(&s, 0)->force_N));
+        max_N = fmax(max_N, pal_norm3(tool_of(&s, 0)->force_N));
     }
-    CHECK(most > 0.499);
-    CHECK_LE(most, 0.5 + 1e-12);
+    CHECK(max_N > 0.499);
+    CHECK_LE(max_N, 0.5 + 1e-12);
     tool_scene_close(&s);
 }
 
 static void tells_the_bridge_a_force_and_a_stiffness_that_agree(void)
 {
     tool_scene s;
-    REQUIRE(grab_ball(&s, 1, true, 15));
+    REQUIRE(grasp_ball(&s, 1, true, 15));
     double force[90];
     for (int i = 0; i < 90; i++) {
         move_tool(&s, 0, 0, 0, 0.059 + (i > 14 ? 0.0001 * (i - 14) : 0), i >= 13);
@@ -194,7 +194,7 @@ static void tells_the_bridge_a_force_and_a_stiffness_that_agree(void)
 static void shares_tissue_between_tools(void)
 {
     tool_scene s;
-    REQUIRE(grab_ball(&s, 2, true, 15));
+    REQUIRE(grasp_ball(&s, 2, true, 15));
     for (int i = 0; i < 120; i++) {
         double side = 0.001 + (i > 14 ? fmin(0.01, 0.0002 * (i - 14)) : 0);
         move_tool(&s, 0, side, 0, 0.059, i >= 13);
@@ -215,7 +215,7 @@ int main(void)
     RUN(moves_a_free_body_as_a_mass_on_a_spring);
     RUN(lets_go_when_the_button_goes_up);
     RUN(a_tool_that_holds_does_not_push_as_well);
-    RUN(fades_when_its_holder_is_gone);
+    RUN(fades_when_its_user_is_gone);
     RUN(takes_nothing_out_of_reach_and_the_nearest_just_beyond);
     RUN(never_exceeds_its_cap);
     RUN(tells_the_bridge_a_force_and_a_stiffness_that_agree);

@@ -62,7 +62,7 @@ static void follows_its_path_exactly(void)
         for (int i = 0; i < f.s.body->n_node; i++)
             if (f.s.body->x_rest[3 * i] < 1e-4)
                 left = fmax(left, pal_dist3(f.s.body->x + 3 * (size_t)i, f.s.body->x_rest + 3 * (size_t)i));
-        printf("  %s: off by %.2g m at most\n", way == 0 ? "verlet" : way == 1 ? "implicit_euler" : "sdirk2", worst);
+        printf("  %s: off by %.2g m at max\n", way == 0 ? "verlet" : way == 1 ? "implicit_euler" : "sdirk2", worst);
         CHECK_LE(worst, 1e-12);
         CHECK(left == 0);
         /* it stays there, and all comes to rest */
@@ -101,21 +101,21 @@ static void breathes_there_and_back(void)
     for (int implicit = 0; implicit < 2; implicit++) {
         fem_scene f;
         REQUIRE(open_bar(&f, implicit, "implicit_euler", 0, 0.006, 0, 1, 0));
-        double worst = 0, most = 0;
+        double worst = 0, max = 0;
         for (int i = 1; i <= 180; i++) {
             REQUIRE(step_world(&f.s, 1));
             double s = 0.5 * (1 - cos(2 * M_PI * i / 60.0)) * smooth(i);
             worst = fmax(worst, off_path(f.s.body, 0, 0.006, 0, s));
-            most = fmax(most, pal_world_energy_J(f.s.world));
+            max = fmax(max, pal_world_energy_J(f.s.world));
         }
         /* bending it at once takes 0.006 m of k = 12 E I / L^3 at most, shear makes it softer */
         double I = NY * NZ * NZ * NZ * pow(edge_m, 4) / 12, L = NX * edge_m;
         double bound = 0.5 * 12 * 5000 * I / (L * L * L) * 0.006 * 0.006;
         printf("  %s: off by %.2g m, energy up to %.3g of the beam's\n", implicit ? "implicit" : "verlet", worst,
-               most / bound);
+               max / bound);
         CHECK_LE(worst, 1e-12);
-        if (implicit) CHECK_LE(most, 2 * bound);
-        CHECK(most > 0.1 * bound);
+        if (implicit) CHECK_LE(max, 2 * bound);
+        CHECK(max > 0.1 * bound);
         /* three periods on it is where it began; a reset begins anew */
         CHECK_LE(off_path(f.s.body, 0, 0, 0, 0), 1e-9);
         REQUIRE(step_world(&f.s, 30));
@@ -135,15 +135,15 @@ static void goes_at_once_and_keeps_its_head(void)
         REQUIRE(open_bar(&f, implicit, "implicit_euler", 0, 0.02, 0, 0, 0));
         REQUIRE(step_world(&f.s, 1));
         CHECK_LE(off_path(f.s.body, 0, 0.02, 0, 1), 1e-12);
-        double first = pal_world_energy_J(f.s.world), most = 0;
+        double first = pal_world_energy_J(f.s.world), max = 0;
         for (int i = 0; i < 120; i++) {
             REQUIRE(step_world(&f.s, 1));
-            most = fmax(most, pal_world_energy_J(f.s.world));
+            max = fmax(max, pal_world_energy_J(f.s.world));
         }
         printf("  %s: %.3g J after the jump, never more than %.3g of that afterwards\n",
-               implicit ? "implicit" : "verlet", first, most / first);
+               implicit ? "implicit" : "verlet", first, max / first);
         CHECK(!f.s.body->frozen);
-        CHECK_LE(most, 1.01 * first);
+        CHECK_LE(max, 1.01 * first);
         fem_close(&f);
     }
 }
