@@ -4,7 +4,7 @@
 #include "server/base/vec3.h"
 #include "server/net/hub_jobs.h"
 #include "server/net/hub_peers.h"
-#include "server/net/net_tuning.h"
+#include "server/net/tuning.h"
 #include "server/sim/world/pick.h"
 
 #include <math.h>

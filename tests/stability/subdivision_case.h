@@ -1,4 +1,4 @@
-/* What the hard cases of numerics.md part 3 for model subdivision_fem share: the solvers and operators they run with,
+/* What the hard cases (catalogue.txt) for model subdivision_fem share: the solvers and operators they run with,
  * insults to the control points, and runs that watch energy and finiteness after every step. */
 #ifndef TESTS_STABILITY_SOLID_HARD_H
 #define TESTS_STABILITY_SOLID_HARD_H

@@ -1,4 +1,4 @@
-/* Hard cases of numerics.md part 3 for adaptive surface springs and their refinement: whatever is done to a surface,
+/* Hard cases (catalogue.txt) for adaptive surface springs and their refinement: whatever is done to a surface,
  * its state stays finite, its energy does not grow, its mass stays, and with anchors it comes back. Bodies run coarse,
  * refined and adapting: refinement must not make any of it worse. */
 #include "tests/fixtures/adaptive_worlds.h"

@@ -1,4 +1,4 @@
-/* Hard cases of numerics.md part 3 for model fem: numbers. Materials at their limits, contrasts, scales, damping, edits
+/* Hard cases (catalogue.txt) for model fem: numbers. Materials at their limits, contrasts, scales, damping, edits
  * of a running body, bodies of odd topology, elements of next to no volume. */
 #include "tests/fixtures/random.h"
 #include "tests/stability/fem_case.h"

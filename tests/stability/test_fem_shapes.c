@@ -1,4 +1,4 @@
-/* Hard cases of numerics.md part 3 for model fem: shapes. Whatever a body's nodes are put to (one element turned over,
+/* Hard cases (catalogue.txt) for model fem: shapes. Whatever a body's nodes are put to (one element turned over,
  * all in a plane, on a point, mirrored, shuffled, blown up), it comes back to rest with no element turned over, its
  * state stays finite and its energy does not rise above what the insult put in. */
 #include "tests/fixtures/random.h"

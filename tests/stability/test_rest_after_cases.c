@@ -1,4 +1,4 @@
-/* Hard cases of numerics.md part 3 that are missing from the tests of single models: inner forces of all four, springs
+/* Hard cases (catalogue.txt) that are missing from the tests of single models: inner forces of all four, springs
  * that turn, fly and lose their edges, surfaces in syrup, pieces of which one is held, and why some cases cannot be put
  * to some models. */
 #include "server/mesh/cells/cell_edits.h"

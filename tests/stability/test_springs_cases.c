@@ -1,4 +1,4 @@
-/* Hard cases of numerics.md part 3 for the explicit springs: whatever happens to a body or is asked of it, its state
+/* Hard cases (catalogue.txt) for the explicit springs: whatever happens to a body or is asked of it, its state
  * stays finite, its energy does not rise, and it comes back where the springs determine the way. */
 #include "server/base/vec3.h"
 #include "server/sim/core/best_rotation.h"

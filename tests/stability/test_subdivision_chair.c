@@ -1,4 +1,4 @@
-/* Hard cases of numerics.md part 3 for model subdivision_fem: the demo chair, thin cells of which none is cubic, three
+/* Hard cases (catalogue.txt) for model subdivision_fem: the demo chair, thin cells of which none is cubic, three
  * in ten elements pyramids, 16 sub-steps in a step of central_cg. On one point, mirrored, shuffled, drawn out
  * eightfold: elements with one rotation each rested folded there (cell_recovery.h). */
 #include "server/mesh/cells/cell_models.h"

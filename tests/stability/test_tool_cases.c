@@ -1,4 +1,4 @@
-/* Hard cases of numerics.md part 3 that come through tools: teleports, tools inside, many tools on one spot, tools that
+/* Hard cases (catalogue.txt) that come through tools: teleports, tools inside, many tools on one spot, tools that
  * vanish, wild hands. Whatever happens, all stays finite, nothing freezes, caps hold, and the body comes back. */
 #include "tests/fixtures/random.h"
 #include "tests/fixtures/tool_scene.h"

@@ -5,7 +5,7 @@
  * @typedef {import("./control_table.js").Neighbour} Neighbour
  */
 
-/** smallest length that is distinguished, m: half the last digit of "0.001 mm" is invisible on any screen */
+/** smallest length that is displayed, m: shorter ones are "< 0.001 mm" */
 export const RESOLUTION_M = 1e-6;
 const OLD_S = 1; // an older estimate is displayed with its age; a switch does not use it either
 const SAME_MS = 0.005; // half the last digit of a displayed time

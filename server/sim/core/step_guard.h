@@ -7,8 +7,8 @@
 #include "server/sim/core/effect.h"
 
 /* box diagonals. The longest move of a node in a sub-step or a Newton iteration: beyond it elements are passed over and
- * a linearisation means nothing; a tool that jumps by a body's size is followed in five sub-steps. Bounded by the cases
- * of tests/stability that blow a body up a hundredfold */
+ * a linearisation means nothing; a tool that jumps by a body's size is followed in five sub-steps. Exercised by the
+ * cases of tests/stability that blow a body up a hundredfold */
 #define PAL_GUARD_MOVE 0.2
 /* element edges (control cells of a subdivision solid). Bounds of stiffness hold until a node may have moved so far */
 #define PAL_GUARD_RECHECK 0.2

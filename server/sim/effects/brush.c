@@ -1,4 +1,4 @@
-/* Row brush (brush.h): what sculpting hands do to a body, at its shown nodes.
+/* Component brush (brush.h): what sculpting hands do to a body, at its shown nodes.
  *
  * INFLATE: a triangle with corners x and weight w gives each corner p w / 6 (x1 - x0) x (x2 - x0). With w = 1 over a
  * closed surface that is p times the gradient of its volume: no net force, no net moment. A triangle is pushed by two

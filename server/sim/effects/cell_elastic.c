@@ -1,14 +1,14 @@
-/* Row cell_elastic: the elements of a subdivided solid in their own moving frames (A 3.2-3.4; cell_kernel.h).
+/* Component cell_elastic: elements of a subdivision solid in their own moving frames (paper A 3.2-3.4; cell_kernel.h).
  *
- * Key: operator ("polar": displacements from the rest shape turned by the element's polar rotation, the default |
- * "edges": changes of edge lengths and angles as the paper has them, corrected; its forces have no energy, and
+ * Key: operator ("polar": displacements from the rest shape rotated by the element's polar rotation, the default |
+ * "edges": changes of edge lengths and angles as in the paper, corrected; its forces have no energy, and
  * `energy` gives 1/2 d^' K d^ of them).
  *
- * Acts on nodes: body->d from solid->node_rest, forces to body->f. Moduli are those of solid->samples; when the model
- * has taken others (painting, a live edit of the material), the constants are made anew before they are used next.
- * Elements that are turned over run on the edges of their cells (cell_recovery.h), which body->rescue counts and times.
- * There is no bound of stiffness: nodes are no degrees of freedom, and solvers that need a limit find it by differences
- * of forces. For the same reason the tangent is given by products only. */
+ * Acts on nodes: body->d from solid->node_rest, forces to body->f. Moduli are those of solid->samples; when these
+ * change (painting, a live edit of the material), the constants are computed again before their next use. Inverted
+ * elements run on the edges of their cells (cell_recovery.h), counted and timed in
+ * body->safeguards. There is no bound of stiffness: nodes are no degrees of freedom, and solvers that need a limit find
+ * it by differences of forces. For the same reason the tangent is given by products only. */
 #include "server/base/clock.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/elements/elastic_law.h"

@@ -1,9 +1,9 @@
-/* Row edge_spring: the springs of an adaptive surface, f = -[k (l - l0) + c (dv.dx)/l] dx/l on the first end and the
- * opposite on the second (C eq. 2). Keys: k_N_m, c_Ns_m, of a spring of level 0.
+/* Component edge_spring: the springs of an adaptive surface, f = -[k (l - l0) + c (dv.dx)/l] dx/l on the first end and
+ * the opposite on the second (C eq. 2). Keys: k_N_m, c_Ns_m, of a spring of level 0.
  *
  * Every spring has k times its share (adaptive_surface.h: the law of the body) and c in the same proportion (C eq. 8:
  * KD_l = KD_0 KS_l / KS_0); with material regions k times E at its middle at rest over the body's E besides. Constants
- * that are not given follow the material: k = sqrt(3)/2 E thickness, c = 0.02 sqrt(k m_0). shell->spring_ramp
+ * that are not given follow the material: k = sqrt(3)/2 E thickness, c = 0.02 sqrt(k m_0). spring_ramp
  * multiplies k.
  *
  * Departures: a spring shorter than 1e-9 of its rest length has no direction. It takes that from rest, without damping,

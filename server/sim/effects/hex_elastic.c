@@ -1,12 +1,12 @@
-/* Row hex_elastic: elastic voxel hexahedra, one per voxel of the body (elastic_hex.h).
+/* Component hex_elastic: elastic voxel hexahedra, one per voxel of the body (elastic_hex.h).
  *
  * Keys: element ("hex8_bbar": mean dilatation, the default | "hex8": full integration), law ("corotational" | "linear"
  * | "neo_hookean"), fill (true: a voxel counts with the share of it that lies inside the surface, at least 0.02),
- * untangle (true: the body runs on its five-tetrahedra split while a corner is turned over, and is straightened when it
+ * recover (true: the body runs on its five-tetrahedra split while a corner is inverted, and is straightened when it
  * stays so, elastic_tet.h; not for linear).
  *
- * The tangent is taken at linearise, and with it the decision on untangling; without an implicit solver the decision is
- * taken whenever forces are. */
+ * The tangent is taken at linearise, and with it the decision on inversion recovery; without an implicit solver the
+ * decision is taken whenever forces are. */
 #include "server/base/clock.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/elements/elastic_hex.h"

@@ -1,6 +1,6 @@
-/* Row inflate: what a closed hollow body is filled with pushes its walls. f_i = p dV/dx_i, V the volume within the
- * drawn triangles (watertight on every mixture of levels), dV/dx_i a third of the area normals of the triangles at i.
- * Without net force and moment, whatever the shape.
+/* Component inflate: what a closed hollow body is filled with pushes its walls. f_i = p dV/dx_i, V the volume within
+ * the drawn triangles (watertight on every mixture of levels), dV/dx_i a third of the area normals of the triangles at
+ * i. Without net force and moment, whatever the shape.
  *
  * With s = V/V_rest, both of the triangles drawn now, so that a switch of level does not change s:
  *   kind "pressure"  p = pressure_Pa

@@ -1,5 +1,5 @@
-/* Row refine: splits the faces of a shell where it is pressed, moves or bends, and joins them where it is quiet (C,
- * criterion for refinement and simplification, fig. 2). Once in every_s of simulated time
+/* Component refine: splits the faces of a shell where it is pressed, moves or bends, and joins them where it is quiet
+ * (C, criterion for refinement and simplification, fig. 2). Once in every_s of simulated time
  *
  *   split   every leaf that has a node beyond a threshold, as a corner or hanging on a side, by one level
  *   join    every face whose children are leaves when all their corners are below half of every threshold, and the
@@ -23,7 +23,7 @@
  * Keys: force_N (absent: 0.005 k_0 h_0; k_0 the spring constant and h_0 the mean edge of level 0), speed_m_s (absent:
  * 0.05 h_0 sqrt(k_0/m_0)), curvature_1_m (absent: 0.3/h_0); 0 switches a criterion off, and with all three off nothing
  * ever changes. What stands as it was looked at last is looked at again after dwell_s only; until that has found
- * nothing to do, now or later, the body does not sleep (row sleep). dwell_s (0.2), every_s
+ * nothing to do, now or later, the body does not sleep (component sleep). dwell_s (0.2), every_s
  * (1/120), max_node (0: any number of nodes), ramp_s (0.15; 0: no factors). */
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
@@ -292,7 +292,7 @@ static bool grant_wishes(refine *row, pal_body *body)
     return n_split + n_join > 0;
 }
 
-/* of all FORCE rows */
+/* of all FORCE components */
 static double elastic_J(const pal_step *step)
 {
     double sum = 0;
@@ -301,7 +301,8 @@ static double elastic_J(const pal_step *step)
     return sum;
 }
 
-/* one step of Jacobi's for the new nodes alone, to the balance of the rows' forces at rest; f is left as it comes */
+/* one step of Jacobi's for the new nodes alone, to the balance of the components' forces at rest; f is left as it comes
+ */
 static bool let_down_once(refine *row, pal_step *step)
 {
     pal_body *body = step->body;
@@ -472,7 +473,7 @@ static void change(refine *row, pal_step *step)
     pal_refine_history *report = &row->report;
     pal_refine_balance before;
     pal_refine_balance_compute(&before, step);
-    /* a state that is no number is left to the guard */
+    /* a state that is not finite is left to the guard */
     if (!isfinite(pal_refine_balance_total_J(&before))) return;
     region whole;
     double Omega[3];
@@ -559,7 +560,7 @@ static void reset(void *self, const pal_body *body)
     clear(row);
 }
 
-/* clocks, patience and factors of the same surface in another world; of another number of levels they begin anew */
+/* clocks, patience and factors of the same surface in another world; of another number of levels they start again */
 static void transfer(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
 {
     refine *row = self;

@@ -1,11 +1,11 @@
-/* Row tet_elastic: elastic tetrahedra of four or ten nodes; the machinery is in elastic_tet.h.
+/* Component tet_elastic: elastic tetrahedra of four or ten nodes; the machinery is in elastic_tet.h.
  *
  * Keys: element ("tet4" or "tet10"; default by the body's elements), law ("corotational", "linear", "neo_hookean"),
- * fill (true: stiffness by the share of material in each element where the body has it), untangle (true).
+ * fill (true: stiffness by the share of material in each element where the body has it), recover (true).
  *
- * Untangling (numerics.md part 3) goes farther here than the rule of elastic_tet.h, which alone left bodies of ten
+ * Inversion recovery goes farther here than the rule of elastic_tet.h, which alone left bodies of ten
  * nodes an element and of the neo-Hookean law tangled for good. Under an implicit solver the whole body runs, while any
- * piece is turned over, on its split: tetrahedra of four nodes (eight in one of ten), corotational, with the rule,
+ * piece is inverted, on its split: tetrahedra of four nodes (eight in one of ten), corotational, with the rule,
  * Poisson ratios above 0.3 taken as 0.3. Pieces are looked at when the tangent is taken. corotational tet4 is tangled
  * once det F <= 0 in a piece, tet10 and neo_hookean below 0.05, neo_hookean above 30 too, where its energy, which grows
  * with the square of that, lets nothing else count. All are whole again when every piece is above 0.5 (neo_hookean: and

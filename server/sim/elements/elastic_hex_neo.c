@@ -212,7 +212,7 @@ PAL_INLINE void plain_hessian(pal_wide mu, pal_wide c, pal_wide k1, const pal_wi
         }
 }
 
-/* what the negative eigenvalues of the 3x3 matrix on the stretches are raised by; s: singular values */
+/* the matrix that raises negative eigenvalues of the 3x3 matrix on the stretches to 0; s: singular values */
 static void raise_stretches(pal_wide mu, pal_wide c, pal_wide k1, const pal_wide s[3], const pal_wide u[9],
                             const pal_wide v[9], pal_wide h[45])
 {
@@ -302,7 +302,7 @@ void pal_hex_neo_linearise(pal_elastic_hexes *cubes, pal_node_order *node_order)
             for (int i = 0; i < 4; i++) q[i] = pal_wide_load(cubes->q + (4 * b + i) * PAL_LANES + l);
             gauss_gradients(1 / (4 * cubes->edge_m), u, f);
             load_neo(cubes, b, l, &mu, &k1, &kappa);
-            /* lanes without element read anything */
+            /* lanes without an element may read anything */
             for (int i = 0; i < 72; i++)
                 f[i / 9][i % 9] = pal_wide_select(mu > 0, f[i / 9][i % 9], wide_of(i % 9 % 4 == 0));
             cubes->n_slow += all_hessians(cubes, b, l, q, f, h, u);

@@ -33,7 +33,7 @@ static void make_shape(pal_elastic_tets *t)
     }
 }
 
-/* lanes: tet4 in strips, tet10 as they come */
+/* lanes: tet4 in strips, tet10 in their order */
 static pal_err make_lanes(pal_elastic_tets *t, pal_build *build)
 {
     int n_tet = t->options.n_tet, n_corner = t->options.n_corner;
@@ -62,7 +62,7 @@ static pal_err make_lanes(pal_elastic_tets *t, pal_build *build)
     return PAL_ERR_OK;
 }
 
-/* inverse of the edges at rest and volume; 0 where there is next to none */
+/* inverse of the edges at rest, and volume; 0 for a degenerate element */
 static void take_rest(pal_elastic_tets *t, double edge_m)
 {
     for (int e = 0; e < t->options.n_tet; e++) {
@@ -199,7 +199,7 @@ void pal_elastic_tets_bound(pal_elastic_tets *t, const double *d, double *bound_
         for (int i = 0; i < t->n_node; i++) bound_N_m[i] += t->bound[i];
 }
 
-/* where the pairs of corners of every element stand in the pattern, once per pattern */
+/* index in the pattern of the pairs of corners of every element, once for each pattern */
 static void find_entries(pal_elastic_tets *t, const pal_block_matrix *to)
 {
     int n = t->options.n_corner;

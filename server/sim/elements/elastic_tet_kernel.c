@@ -23,7 +23,7 @@ PAL_INLINE void stress(pal_wide mu, pal_wide lambda, const pal_wide a[9], pal_wi
     s[5] = s[7] = mu * (a[5] + a[7]);
 }
 
-/* lanes that vectors left to pal_polar_rotation */
+/* lanes that need pal_polar_rotation */
 static __attribute__((noinline)) void settle_slowly(const pal_wide f[9], unsigned left, double *q)
 {
     for (int l = 0; l < PAL_WIDE; l++) {
@@ -67,7 +67,7 @@ PAL_INLINE pal_wide_mask take_gradient(const pal_elastic_tets *t, int n_corner, 
     return inverted;
 }
 
-/* inverted elements are noted; those whose rotation the rule gives get no force yet: lanes of `live` are taken out */
+/* records inverted elements; those with an averaged rotation receive no force yet: their lanes leave `live` */
 PAL_INLINE pal_wide_mask note_inverted(pal_elastic_tets *t, int first_lane, pal_wide_mask inverted, pal_wide_mask live)
 {
     inverted &= live;
@@ -90,7 +90,7 @@ PAL_INLINE void turn_stress(const pal_wide r[9], const pal_wide m[9], const pal_
     pal_wide cxx = ayy * azz - ayz * ayz, cxy = axz * ayz - axy * azz, cxz = axy * ayz - axz * ayy;
     pal_wide cyy = axx * azz - axz * axz, cyz = axy * axz - axx * ayz, czz = axx * ayy - axy * axy;
     pal_wide det = axx * cxx + axy * cxy + axz * cxz, sum = axx + ayy + azz;
-    /* left out where the rotation is hardly known */
+    /* omitted where the rotation is nearly undefined */
     pal_wide_mask good = (axx > 0) & (czz > 0) & (det > 1e-3 * sum * sum * sum);
     pal_wide one = pal_wide_select(good, 1 + zero, zero) / pal_wide_select(good, det, 1 + zero);
     pal_wide x = one * (cxx * t[0] + cxy * t[1] + cxz * t[2]), y = one * (cxy * t[0] + cyy * t[1] + cyz * t[2]),
@@ -300,7 +300,7 @@ void pal_elastic_tets_gradient(const pal_elastic_tets *t, int e, int point, cons
         }
 }
 
-/* force, its torque about the origin, and energy of a corotational element with the rotation it holds */
+/* force, its torque about the origin, and energy of a corotational element with its present rotation */
 double pal_tet_add_element(const pal_elastic_tets *t, int e, const double *d, double *force, double *torque)
 {
     double r[9], f[9], p[9], sum = 0;
@@ -368,7 +368,7 @@ static void recover(pal_elastic_tets *t)
         double sum[9] = {0}, q[4], most = 0;
         t->flag[e] = 0;
         for (int c = 0; c < 4; c++) {
-            /* a node counts by its rotation, not by the volume around it */
+            /* a node is weighted by its rotation, not by the volume around it */
             const double *a = t->around + 9 * t->corner[t->options.n_corner * e + c];
             double length = 0;
             for (int i = 0; i < 9; i++) length += a[i] * a[i];

@@ -314,7 +314,7 @@ static void join_parts(const pal_cliques *list, int n_list, int32_t *parent)
         }
 }
 
-/* the held nodes of one part span a plane: three of them off a line. first, far: -1 as long as there is none */
+/* the fixed nodes of one part span a plane: three of them off a line. first, far: -1 as long as there is none */
 typedef struct span {
     int32_t first, far;
     double far_m, off_m; /* from first; from the line through first and far */

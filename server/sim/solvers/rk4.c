@@ -1,22 +1,22 @@
 /* Solver rk4: the classical fourth-order Runge-Kutta method over the body's active nodes (C, equations of motion).
- * Loads of CONTACT rows are constant within a sub-step.
+ * Loads of CONTACT components are constant within a sub-step.
  *
  * The sub-step is `safety` (key, 0.9) of 2.7 / max(omega, c) over the free nodes; c = C/m with the Gershgorin row sums
  * C of explicit damping, omega^2 bounds the stiffness over mass. The method is stable where |lambda dt| <= 2.61 in the
  * left half plane, and no eigenvalue is larger than max(omega, c). Row sums K/m put omega up to 1.4 times too high on a
- * surface; there Lanczos' iteration says more, on M^-1 K through differences of forces, K of all FORCE rows at the
- * present state: the largest Ritz value plus its residual (Zhou and Li, Bounding the spectrum of large Hermitian
+ * surface; there Lanczos' iteration says more, on M^-1 K through differences of forces, K of all FORCE components at
+ * the present state: the largest Ritz value plus its residual (Zhou and Li, Bounding the spectrum of large Hermitian
  * matrices, 2011), at most 2 % below the true one where it was measured, never above the row sums, to which those of
- * CONTACT rows come. With the membrane law it halves with every level, as eq. 9 asks. The bounds are taken again when a
- * node may have moved a fifth of an element or when the active part is another, Lanczos' at most once in 12 sub-steps
- * and only where it saves one, between with the row sums alone; common factors that change scale it.
+ * CONTACT components come. With the membrane law it halves with every level, as eq. 9 asks. The bounds are taken again
+ * when a node may have moved a fifth of an element or when the active part is another, Lanczos' at most once in 12
+ * sub-steps and only where it saves one, between with the row sums alone; common factors that change scale it.
  *
  * Departures. Drag of the rows (hook `drag`, rate r, v' = -r v) is taken exactly: the exponential Runge-Kutta method of
  * Cox and Matthews (2002, eq. 26-29), which is the classical one for r = 0, of order 4 for every r, stable for all r
- * where the classical one is stable without drag, and creeps as v = f/(m r) when r is huge. Held nodes stand, led ones
- * (held 2) keep their velocity. A node moves at most 0.2 S in a sub-step (numerics.md part 3). Where the world cannot
- * afford the sub-steps (step->heavy), nodes that break the limit get the mass that meets it. Where the bounds are
- * taken, rows look for what is turned over, and in every step while something is. */
+ * where the classical one is stable without drag, and creeps as v = f/(m r) when r is huge. Fixed nodes stand,
+ * prescribed ones keep their velocity. Moves are limited by step_guard.h. Where the world cannot afford the sub-steps
+ * (step->heavy), nodes that break the limit get the mass that meets it. Where the bounds are taken, components look for
+ * inverted elements, and in every step while there are any. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
@@ -32,8 +32,8 @@ typedef struct memory {
 } memory;
 
 /* of a sub-step dt with drag r, z = r dt, for place and velocity. What is kept of the start after half a sub-step and a
- * whole one (exp(-z/2), exp(-z)), of free and of led nodes; what rates count for at half (dt/2, dt/2 phi1(z/2)), in the
- * fourth stage, and in the sum in stages 1, 2 and 3, 4 */
+ * whole one (exp(-z/2), exp(-z)), of free and of prescribed nodes; what rates count for at half (dt/2, dt/2 phi1(z/2)),
+ * in the fourth stage, and in the sum in stages 1, 2 and 3, 4 */
 typedef struct rates {
     double dt;
     pal_v8 half[2], whole[2], grow, last, weight[3];
@@ -46,7 +46,7 @@ typedef struct rk4 {
     pal_quad *load;
     double *inverse_kg;
     uint8_t *led;
-    bool pulls;           /* all FORCE rows can work on the pack */
+    bool pulls;           /* all FORCE components can work on the pack */
     double safety, reach; /* of the stability limit; safety times the radius 2.7 */
     double limit_s;
     double way_m; /* no node has moved farther since the bounds were taken */
@@ -56,7 +56,8 @@ typedef struct rk4 {
     bool known;         /* limit_s holds */
     bool has_inversion; /* rows are to be asked again in the coming step */
 
-    /* Lanczos' bound on omega^2 of the FORCE rows, 1/s^2, at which common factors it was taken, and sub-steps since */
+    /* Lanczos' bound on omega^2 of the FORCE components, 1/s^2, at which common factors it was taken, and sub-steps
+     * since */
     double sharp2, sharp_ramp[2];
     int n_since;
     bool sharp_known;
@@ -273,7 +274,7 @@ static double largest_of(const double *a, const double *b, int n, double most)
     return high + fabs(b[n - 1] * s) / sqrt(sum);
 }
 
-/* Lanczos' bound on omega^2 of the FORCE rows; above `most`: it knows nothing better */
+/* Lanczos' bound on omega^2 of the FORCE components; above `most`: it knows nothing better */
 static pal_err run_lanczos(rk4 *row, pal_step *step, double most, double *out)
 {
     double a[LANCZOS], b[LANCZOS];
@@ -321,8 +322,8 @@ static bool would_help(const rk4 *row, double most)
     return !(row->step_s > 0) || ceil(n / row->over) < ceil(n);
 }
 
-/* omega^2 of the FORCE rows: `most` of the row sums or less. Stiffness that the common factors have not grown for is
- * less than the same with all of it grown */
+/* omega^2 of the FORCE components: `most` of the row sums or less. Stiffness that the common factors have not grown for
+ * is less than the same with all of it grown */
 static double bound_force(rk4 *row, pal_step *step, double most)
 {
     const pal_body *body = step->body;
@@ -422,7 +423,7 @@ static rates find_rates(double dt_s, double rate)
                    .weight = {both(dt_s / 6, weight[0]), both(dt_s / 3, weight[1]), both(dt_s / 6, weight[2])}};
 }
 
-/* inverse masses: held nodes have no acceleration, and standing ones no velocity */
+/* inverse masses: fixed nodes have no acceleration, and standing ones no velocity */
 static void take_masses(rk4 *row, const pal_body *body, const rates *r, bool heavy)
 {
     double t = r->dt / row->reach;

@@ -1,16 +1,17 @@
-/* Solver sdirk2: the two-stage singly diagonally implicit Runge-Kutta method of order 2 that is stiffly accurate and
- * L-stable (Alexander 1977), g = 1 - 1/sqrt 2:
+/* Solver sdirk2: the two-stage singly diagonally implicit Runge-Kutta method of order 2, stiffly accurate and L-stable
+ * (Alexander 1977), g = 1 - 1/sqrt 2:
  *     V1 = v0 + g dt a1,                    x1 = x0 + g dt V1
  *     V2 = v0 + (1 - g) dt a1 + g dt a2,    x2 = x0 + (1 - g) dt V1 + g dt V2,     v = V2, x = x2,
- * a1, a2 the accelerations at the stages. Both stages have the matrix of a backward Euler step of g dt, so one factor
- * serves both; the second is linearised where the first ended. Order 2 shows with newton > 1 (a single iteration drops
- * what the rotations' derivative adds to the tangent).
+ * a1, a2 being the accelerations of the stages. Both stages have the matrix of a backward Euler step of g dt, so one
+ * factor serves both; the second is linearised where the first ends. Order 2 shows with newton > 1: a single iteration
+ * drops the derivative of the rotations from the tangent.
  * A tool feels the mean force of the sub-step, (1 - g) f1 + g f2, which is what gives the body its momentum; its
  * patches are those of the end, f2.
  *
- * The second stage goes 2.4 times as far as the first one's acceleration led, which is stable where forces are smooth.
- * Elements that turn over and back are not: the energy rose in one sub-step of thirty, for ever. After a sub-step that
- * gained energy in spite of all iterations the body goes on by backward Euler until half a second of peace.
+ * The second stage extrapolates the acceleration of the first by a factor of 2.4, which is stable where forces are
+ * smooth. Elements that invert and recover are not: energy rose in one sub-step of thirty without end. After a sub-step
+ * that gained energy in spite of all iterations the solver continues by backward Euler until half a second passes
+ * without one.
  *
  * Keys: as implicit_euler. */
 #include "server/base/vec3.h"
@@ -23,10 +24,10 @@ static const double gamma_share = 0.29289321881345248;
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    pal_implicit_options wish;
+    pal_implicit_options options;
     pal_implicit *core = NULL;
-    PAL_TRY(pal_implicit_read(item, build, &wish));
-    pal_err err = pal_implicit_make(&wish, build, gamma_share, &core);
+    PAL_TRY(pal_implicit_read(item, build, &options));
+    pal_err err = pal_implicit_make(&options, build, gamma_share, &core);
     *self = core;
     return err;
 }

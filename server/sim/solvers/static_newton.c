@@ -3,7 +3,7 @@
  * Each world step goes on from the present shape with all speeds 0 and makes at most `newton` iterations, so that a
  * caller may follow the way with few per step. The linear systems K d = r (K as the rows hold it: for the corotational
  * law without the rotations' derivative, which costs iterations but keeps the energy falling at full steps) are solved
- *   direct: by a factor of the present K, made anew in every iteration (once for the linear law),
+ *   direct: by a factor of the present K, made again in every iteration (once for the linear law),
  *   pcg:    by conjugate gradients with the warped factor of K at rest (warp.h),
  *   auto:   as pcg, but when a solve took more iterations than a factor is worth by its operation count, the factor is
  *           made of the present K before the next; where that happens again at once, before every one until an
@@ -179,7 +179,7 @@ static pal_err make_arrays(static_newton *row, pal_arena *arena)
     return PAL_ERR_OK;
 }
 
-/* of the rows' present linearisation */
+/* of the components' present linearisation */
 static void assemble(static_newton *row)
 {
     double before = pal_clock_s();
@@ -187,7 +187,7 @@ static void assemble(static_newton *row)
     row->report.assemble_s += pal_clock_s() - before;
 }
 
-/* of an embedded body: at rest, after a change of its samples found anew; the present linearisation is taken again */
+/* of an embedded body: at rest, after a change of its samples found again; the present linearisation is taken again */
 static void probe(static_newton *row)
 {
     const pal_body *body = row->system.body;
@@ -570,7 +570,7 @@ static bool settle(static_newton *row, pal_step *step)
     return again;
 }
 
-/* the body at rest under its loads as they are now; *bad: it is no number, and went back to where it was */
+/* the body at rest under its loads as they are now; *bad: it is not finite, and went back to where it was */
 static pal_err solve(static_newton *row, pal_step *step, bool *bad)
 {
     pal_body *body = row->system.body;

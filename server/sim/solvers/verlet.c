@@ -1,14 +1,13 @@
-/* Solver verlet: v += dt f/m, x += dt v (paper B 4.1's Verlet in its velocity form, numerics.md 1 B).
+/* Solver verlet: v += dt f/m, x += dt v (the velocity form of paper B 4.1).
  *
- * Departures. Drag is implicit: v <- (v + dt f/m) / (1 + dt rate), the rate being the sum of the rows' drag hooks
- * and of the body's brake (stiffening_damper.h). The sub-step is `safety` (key, 0.5) of the stability limit that
- * Gershgorin's bound gives: with K and C the row sums of stiffness and explicit damping, dt = safety * 2 t where t is
- * the largest with t^2 K + t C <= m at every free node. The bound is taken again at the current state whenever a node
- * may have moved a fifth of an element since the last time. Held nodes keep the velocity they are led with. A node
- * moves at most 0.2 S in a sub-step (numerics.md part 3). Where the world cannot afford the sub-steps (step->heavy),
- * the same inequality is met by adding mass to the nodes that break it; as it comes and goes it would bring energy with
- * it, so these nodes lose up to a hundredth of their velocity in a sub-step. Where the bound is taken, rows look for
- * what is turned over, and in every step while something is. */
+ * Departures. Drag is implicit: v <- (v + dt f/m) / (1 + dt rate), the rate being the sum of the components' drag rates
+ * and of the stiffening damper (stiffening_damper.h), so that no rate makes it unstable. The sub-step is `safety` (key,
+ * 0.5) of the stability limit by Gershgorin's bound: with K and C the row sums of stiffness and explicit damping, dt =
+ * safety * 2 t where t is the largest with t^2 K + t C <= m at every free node. The bound is found again when a node
+ * may have moved a fifth of an element. Prescribed nodes keep their velocity. Moves are limited by step_guard.h. Where
+ * the budget of sub-steps is used up (step->heavy), the same inequality is met by adding mass to the nodes that break
+ * it. Added mass comes and goes, which would bring energy, so such a node loses up to a hundredth of its velocity in a
+ * sub-step. Where the bound is found, components look for inverted elements, and in every step while there are any. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
@@ -110,7 +109,7 @@ static pal_err run(void *self, pal_step *step)
         }
         body->safeguards.ns += pal_clock_ns() - before;
     }
-    /* a velocity that is no number makes the way one too, and so the next limit */
+    /* a velocity that is not finite makes the way one too, and so the next limit */
     row->way_m += (way < most ? way : most) + poison;
 
     /* positions */

@@ -453,7 +453,7 @@ static unsigned seen(const pal_spring_recovery *t, bool changed)
     return (t->n_region > 0 ? PAL_INVERTED : 0) | (changed ? PAL_INVERSION_CHANGED : 0);
 }
 
-unsigned pal_spring_recovery_update(pal_spring_recovery *t, pal_step *step)
+static unsigned update(pal_spring_recovery *t, pal_step *step)
 {
     pal_body *body = step->body;
     sets r = find_sets(step);
@@ -495,7 +495,6 @@ unsigned pal_spring_recovery_update(pal_spring_recovery *t, pal_step *step)
 unsigned pal_spring_recover(void *self, pal_step *step)
 {
     for (int i = 0; i < step->n_force && step->body->recovery; i++)
-        if (step->force[i].effect->springs)
-            return step->force[i].self == self ? pal_spring_recovery_update(step->body->recovery, step) : 0;
+        if (step->force[i].effect->springs) return step->force[i].self == self ? update(step->body->recovery, step) : 0;
     return 0;
 }

@@ -1,4 +1,4 @@
-/* Elements of subdivided solids in their own frames: forces, energy, and products with the tangent Q K Q'. */
+/* Elements of subdivision solids in their own frames: forces, energy, and products with the tangent Q K Q'. */
 #include "server/sim/subdivision/cell_simd.h"
 
 #include <math.h>
@@ -111,7 +111,7 @@ PAL_INLINE double all_blocks(pal_cells_elastic *c, pal_cell_kind kind, int n_nod
     return sum;
 }
 
-/* how much each control cell's volume has changed */
+/* change of volume of each control cell */
 static void swell_all(pal_cells_elastic *c, const double *d)
 {
     if (c->volume.n == 0) return;

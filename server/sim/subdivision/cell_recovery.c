@@ -122,7 +122,7 @@ static inline void edge_vector(const double *d, const int32_t edge[2], double ou
     pal_sub3(out, d + 3 * (size_t)edge[1], d + 3 * (size_t)edge[0]);
 }
 
-/* rotations at d of those regions that have their own */
+/* best-fit rotations at d of the regions that have one of their own */
 static void find_turns(pal_cell_recovery *t, const pal_subdivision_solid *solid, const double *d)
 {
     for (int p = 0; p < t->n_region; p++) memset(t->of[p].sum, 0, sizeof t->of[p].sum);
@@ -139,7 +139,7 @@ static void find_turns(pal_cell_recovery *t, const pal_subdivision_solid *solid,
         if (!t->of[p].fixed) pal_best_rotation(t->of[p].sum, t->of[p].turn);
 }
 
-/* energy of a cell's edges, J, without s; f: forces are added with it */
+/* energy of a cell's edges, J, without s; f += forces with s */
 static double cell_edges(const pal_cell_recovery *t, const pal_subdivision_solid *solid, int cell, const double *d,
                          double *f)
 {
@@ -183,7 +183,7 @@ void pal_cell_recovery_multiply(const pal_cell_recovery *t, const pal_subdivisio
     }
 }
 
-/* ---- looking ---- */
+/* ---- detection ---- */
 
 static bool is_bad(const pal_cell_recovery *t, int cell)
 {
@@ -194,7 +194,7 @@ static bool is_good(const pal_cell_recovery *t, int cell)
     return t->ratio[0][cell] > PAL_CELL_LEAVE_LOW && t->ratio[1][cell] < PAL_CELL_LEAVE_HIGH;
 }
 
-/* energies of the regions and of their elements as such at d */
+/* energies of the regions and of their elements at d */
 static void weigh(pal_cell_recovery *t, const pal_cells_elastic *c, const double *d)
 {
     for (int p = 0; p < t->n_region; p++) {
@@ -229,7 +229,7 @@ static double whole(const pal_cell_recovery *t, double kinetic_J)
     return sum;
 }
 
-/* which regions become elements again; true: some do */
+/* chooses the regions that become elements again; true: any */
 static bool leave(pal_cell_recovery *t, double spare_J, double calm, bool at_rest)
 {
     bool any = false;
@@ -276,7 +276,7 @@ static bool enter(pal_cell_recovery *t, const pal_subdivision_solid *solid, bool
     return any;
 }
 
-/* elements whose volume is that of their control cell go into a region together */
+/* the elements that share the volume of a control cell enter a region together */
 static void enter_whole_cells(pal_cell_recovery *t, const pal_cells_elastic *c)
 {
     /* sums and pushes are computed before each use */

@@ -1,4 +1,4 @@
-/* Elements of subdivided solids in their own frames: arrays, rest shapes and constants. */
+/* Elements of subdivision solids in their own frames: arrays, rest shapes and constants. */
 #include "server/sim/subdivision/cell_kernel.h"
 
 #include "server/num/polar.h"

@@ -1,4 +1,4 @@
-/* A grip on a body that adapts (adaptive_grasp.h). */
+/* Grasps on adaptive surfaces (adaptive_grasp.h). */
 #include "server/sim/surface/adaptive_grasp.h"
 
 #include "server/base/vec3.h"
@@ -88,7 +88,7 @@ void pal_adaptive_grasp_transfer(pal_adaptive_grasp *l, const pal_body *body, ui
         memcpy(l->known, all, sizeof *l->known * (size_t)n_finest);
         l->n_known = n_finest;
     }
-    /* all that it holds is finer */
+    /* all held tissue is finer */
     for (int32_t i = 0; i < from->n_node && !any; i++)
         if (share_before[i] > 0) share_up(from->model.adaptive, i, share_before[i], body->n_node, share);
 }

@@ -1,4 +1,4 @@
-/* Adaptive surfaces: making one, and its changes of state (C, spatial adaptation).
+/* Adaptive surfaces: making one, and its changes of state (paper C, spatial adaptation).
  *
  * The state is one byte a face (absent, leaf, split) and one an edge (split faces beside it). Splitting a face may ask
  * for coarser neighbours first, and those again; all of that chain is marked, then counted, and only then placed, so
@@ -224,13 +224,13 @@ static bool edge_normal(const pal_levels *l, int32_t e, const double *x, double 
     return pal_unit3(n, n, 0);
 }
 
-/* r = a turned by the least turn that brings unit vector `from` to unit vector `to` */
+/* r = a rotated by the smallest rotation from unit vector `from` to unit vector `to` */
 static void least_turn(double r[3], const double from[3], const double to[3], const double a[3])
 {
     double q[4] = {1 + pal_dot3(from, to)};
     pal_cross3(q + 1, from, to);
     double n = sqrt(q[0] * q[0] + pal_dot3(q + 1, q + 1));
-    if (!(n > 1e-8)) { /* half a turn: about which axis is open, the offset stays on its side */
+    if (!(n > 1e-8)) { /* half a turn has no unique axis: the offset stays on its side */
         double along = 2 * pal_dot3(a, from);
         for (int c = 0; c < 3; c++) r[c] = a[c] - along * from[c];
         return;
@@ -264,7 +264,7 @@ static void turn_offset(const pal_levels *l, int32_t e, const double *x, double 
         least_turn(offset, n0, n, offset);
 }
 
-/* where the stencil of v puts it now; vertices of it that are no nodes are put by their own, and so on */
+/* position of v by its stencil; vertices of it that are no nodes take theirs recursively */
 static void by_stencil(const pal_adaptive_surface *s, const double *x, int32_t v, double out[3])
 {
     const pal_levels *l = &s->levels;

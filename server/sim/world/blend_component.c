@@ -7,7 +7,7 @@
 typedef struct blend {
     double share; /* of both that is left: 1, falls to 0 */
     bool begun;   /* a sub-step has been */
-    /* [n_node][3]; of a body that adapts N/kg, that of a vertex not in use the mean of its edge's ends */
+    /* [n_node][3]; of an adaptive body N/kg, that of a vertex not in use the mean of its edge's ends */
     double *force_N;
     float *display_offset_m; /* [n_shown][3]; NULL: none */
     pal_body *body;
@@ -97,7 +97,7 @@ static pal_err insert(pal_plan *plan, int b, pal_arena *arena, const double *for
                            &(pal_component){.effect = &pal_effect_blend, .self = row, .n_byte = pal_arena_used(arena)});
 }
 
-static void take_away(pal_blend_components *rows, pal_plan *plan, int b)
+static void remove_component(pal_blend_components *rows, pal_plan *plan, int b)
 {
     set_display(rows->self[b], 0);
     pal_plan_remove(plan, rows->self[b]);
@@ -117,7 +117,7 @@ static pal_err change(pal_blend_components *rows, pal_plan *plan, int body, cons
         pal_arena_destroy(arena);
         return err;
     }
-    if (rows->self[body]) take_away(rows, plan, body);
+    if (rows->self[body]) remove_component(rows, plan, body);
     rows->arena[body] = arena;
     rows->self[body] = self;
     set_display(self, 1);
@@ -149,7 +149,7 @@ void pal_blend_components_add(const pal_blend_components *rows, int body, double
 void pal_blend_components_remove_idle(pal_blend_components *rows, pal_plan *plan)
 {
     for (int b = 0; b < PAL_BODY_MAX; b++)
-        if (rows->self[b] && ((const blend *)rows->self[b])->share == 0) take_away(rows, plan, b);
+        if (rows->self[b] && ((const blend *)rows->self[b])->share == 0) remove_component(rows, plan, b);
 }
 
 void pal_blend_components_free(pal_blend_components *rows)

@@ -14,14 +14,14 @@ extern const pal_effect pal_effect_blend;
 
 /* rows that come and go, by body; zeroed: none */
 typedef struct pal_blend_components {
-    pal_arena *arena[PAL_BODY_MAX]; /* each row's memory, NULL: no such row */
+    pal_arena *arena[PAL_BODY_MAX]; /* each row's memory, NULL: no such component */
     void *self[PAL_BODY_MAX];
 } pal_blend_components;
 
 /* The load [n_node][3], N, body axes, is copied and replaces one that still acts; numbers that are not finite count as
  * 0. A display offset that is left is released again over the whole duration. MEMORY: unchanged */
 pal_err pal_blend_components_set(pal_blend_components *rows, pal_plan *plan, int body, const double *force_N);
-/* the way of what is shown [n_shown][3], m, copied; replaces one that is still being let go, begins together with the
+/* the way of what is shown [n_shown][3], m, copied; replaces one that is still being released, begins together with the
  * load where that was set since the last step, else without one. MEMORY: what is shown jumps */
 pal_err pal_blend_components_set_display(pal_blend_components *rows, pal_plan *plan, int body,
                                          const float *display_offset_m);

@@ -1,4 +1,5 @@
 /* A body that adapts in the world: steps without the heap, tools on the surface as it is now, frames, reset, guard. */
+#include "server/sim/transfer/transfer_world.h"
 #include "tests/fixtures/adaptive_worlds.h"
 #include "tests/fixtures/random.h"
 #include "tests/heap_calls.h"

@@ -3,6 +3,7 @@
 #include "server/sim/springs/spring_recovery.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/transfer/transfer_world.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 #include "tests/fixtures/boxes.h"

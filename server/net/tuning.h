@@ -1,7 +1,7 @@
 /* Constants of policy on the wire: limits, rates, pauses. Each has its unit, its reason, and the test that bounds it.
  */
-#ifndef PAL_NET_NET_TUNING_H
-#define PAL_NET_NET_TUNING_H
+#ifndef PAL_NET_TUNING_H
+#define PAL_NET_TUNING_H
 
 /* part of the scene box's diagonal: a place farther from the surface than this names nothing. Wide enough for a pointer
  * that sees an older frame (test_sculpt_hub) */
