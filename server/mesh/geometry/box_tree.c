@@ -7,15 +7,14 @@
 #include "server/mesh/geometry/box_tree.h"
 
 #include "server/base/vec3.h"
+#include "server/mesh/geometry/tuning.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { LEAF = 4, STACK = 128 };
-/* a box is far when its distance exceeds this number of its radii */
-#define FAR_RADII 2.3
-#define PI        3.14159265358979323846
+#define PI 3.14159265358979323846
 
 typedef struct node {
     double low[3], high[3];

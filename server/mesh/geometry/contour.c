@@ -6,11 +6,11 @@
 #include "server/mesh/geometry/contour.h"
 
 #include "server/base/vec3.h"
+#include "server/mesh/geometry/tuning.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-static const double max_point = 2e8;
 static const double end_gap = 1e-4;
 
 typedef struct lattice {
@@ -232,9 +232,9 @@ pal_err pal_contour(pal_contour_field *field, const void *self, const pal_contou
         double n = ceil((box->high_m[a] - box->low_m[a]) / l.h) + 1;
         n_point *= n + 1;
         l.low[a] = box->low_m[a];
-        if (!(n >= 2) || !(n_point <= max_point))
+        if (!(n >= 2) || !(n_point <= CONTOUR_MAX_POINT))
             return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "contour of %.3g lattice points, at most %.3g", n_point,
-                                      max_point);
+                                      CONTOUR_MAX_POINT);
         l.n[a] = (int64_t)n;
     }
     l.n_corner = (l.n[0] + 1) * (l.n[1] + 1) * (l.n[2] + 1);

@@ -9,19 +9,12 @@
 #include "server/mesh/geometry/decimate.h"
 
 #include "server/base/vec3.h"
+#include "server/mesh/geometry/tuning.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 enum { MAX_RING = 24, MAX_DEGREE = 12 };
-/* weight of the edge's midpoint, as part of the quadric's area: spreads vertices evenly where the surface is flat */
-static const double pull = 1e-3;
-/* triangles below this shape (0 flat, 0.577 equilateral) are thin */
-static const double thin = 0.12;
-/* triangles below this shape are candidates for a flip */
-static const double bad_shape = 0.3;
-/* a collapse may make triangles thinner by this sum: flips repair one thin triangle, but not a cluster of them */
-static const double thin_room = 0.1;
 
 /* x'Ax + 2b'x + c with A symmetric (xx xy xz yy yz zz), and the area it stands for */
 typedef struct quadric {
@@ -105,7 +98,7 @@ static double collapse_place(const pass *p, int32_t u, int32_t v, double x[3])
     for (int k = 0; k < 3; k++) middle[k] = (xu[k] + xv[k]) / 2;
     quadric q = p->q[u];
     quadric_add(&q, &p->q[v]);
-    double w = pull * q.area;
+    double w = MIDPOINT_WEIGHT * q.area;
     q.a[0] += w, q.a[3] += w, q.a[5] += w;
     for (int k = 0; k < 3; k++) q.b[k] -= w * middle[k];
     q.c += w * pal_dot3(middle, middle);
@@ -186,15 +179,16 @@ static bool keeps_orientation(const pass *p, int32_t u, int32_t other, int32_t r
     const double *xs = p->s->x, *xu = xs + 3 * (size_t)u;
     for (int k = 0; k < n; k++) {
         shape[k] = thinness(xu, xs + 3 * (size_t)ring[k][0], xs + 3 * (size_t)ring[k][1], normal[k]);
-        sum->before += ring[k][0] == other ? 0 : fmax(0, thin - shape[k]);
+        sum->before += ring[k][0] == other ? 0 : fmax(0, THIN_SHAPE - shape[k]);
         largest = fmax(largest, pal_norm3(normal[k]));
         pal_add3(mean, mean, normal[k]);
     }
     for (int k = 0; k < n; k++) {
         if (ring[k][0] == other || ring[k][1] == other) continue;
-        bool vague = shape[k] < thin || pal_norm3(normal[k]) < largest / 20;
+        bool vague = shape[k] < THIN_SHAPE || pal_norm3(normal[k]) < largest / 20;
         double after[3], *before = vague ? mean : normal[k];
-        sum->after += fmax(0, thin - thinness(x, xs + 3 * (size_t)ring[k][0], xs + 3 * (size_t)ring[k][1], after));
+        sum->after +=
+            fmax(0, THIN_SHAPE - thinness(x, xs + 3 * (size_t)ring[k][0], xs + 3 * (size_t)ring[k][1], after));
         if (!(pal_dot3(before, after) > 0.25 * pal_norm3(before) * pal_norm3(after))) return false;
     }
     return true;
@@ -211,7 +205,7 @@ static bool collapse(pass *p, int32_t u, int32_t v)
     collapse_place(p, u, v, x);
     thin_sum sum = {0, 0};
     if (!keeps_orientation(p, u, v, ru, nu, x, &sum) || !keeps_orientation(p, v, u, rv, nv, x, &sum)) return false;
-    if (sum.after > sum.before + thin_room) return false;
+    if (sum.after > sum.before + THIN_INCREASE) return false;
     pal_copy3(p->s->x + 3 * (size_t)v, x);
     quadric_add(&p->q[v], &p->q[u]);
     p->remap[u] = v;
@@ -294,7 +288,7 @@ static bool flip(pass *p, int32_t t)
     int32_t *c = p->s->tri + 3 * (size_t)t;
     double n[3];
     const double *xs = p->s->x;
-    if (thinness(xs + 3 * (size_t)c[0], xs + 3 * (size_t)c[1], xs + 3 * (size_t)c[2], n) > bad_shape) return false;
+    if (thinness(xs + 3 * (size_t)c[0], xs + 3 * (size_t)c[1], xs + 3 * (size_t)c[2], n) > FLIP_SHAPE) return false;
     int k = 0, n_edge, n_across;
     double length[3];
     for (int i = 0; i < 3; i++) {

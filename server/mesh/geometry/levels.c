@@ -6,15 +6,12 @@
 #include "server/mesh/geometry/levels.h"
 
 #include "server/base/vec3.h"
+#include "server/mesh/geometry/tuning.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#define FLAT       1e-9 /* minimum height of a face, of its longest edge; minimum edge, of the diagonal of the surface */
-#define FAR_M      1e9
-#define CORNER_COS 0.25881904510252074 /* cos 75 degrees */
-#define BUDGET     ((size_t)512 << 20)
-#define OFFER      "prepare it as voxels: palpate prepare"
+#define OFFER "prepare it as voxels: palpate prepare"
 
 void pal_levels_free(pal_levels *l)
 {
@@ -42,7 +39,7 @@ static pal_err check_face(const pal_surface *s, int t, pal_diagnostic *diag)
     pal_sub3(u, s->x + 3 * (size_t)c[1], s->x + 3 * (size_t)c[0]);
     pal_sub3(v, s->x + 3 * (size_t)c[2], s->x + 3 * (size_t)c[0]);
     pal_cross3(n, u, v);
-    if (pal_norm3(n) > FLAT * longest * longest) return PAL_ERR_OK;
+    if (pal_norm3(n) > LEVEL_FLAT * longest * longest) return PAL_ERR_OK;
     return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
                               "levels: triangle %d (vertices %d, %d, %d) has no area: clean the surface", t, c[0], c[1],
                               c[2]);
@@ -62,7 +59,7 @@ static pal_err check_input(const pal_surface *s, const pal_levels_options *o, pa
     for (int v = 0; v < s->n_vertex; v++) {
         const double *x = s->x + 3 * (size_t)v;
         for (int a = 0; a < 3; a++)
-            if (!(fabs(x[a]) <= FAR_M))
+            if (!(fabs(x[a]) <= MAX_COORDINATE_M))
                 return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: vertex %d stands at (%g, %g, %g) m", v, x[0],
                                           x[1], x[2]);
     }
@@ -371,7 +368,7 @@ static pal_err check_edges(const pal_levels *l, double diagonal, pal_diagnostic 
     for (int32_t e = 0; e < l->first_edge[l->n_level]; e++) {
         const int32_t *end = l->edge[e].vertex;
         double length = pal_dist3(l->x + 3 * (size_t)end[0], l->x + 3 * (size_t)end[1]);
-        if (!(length > FLAT * diagonal))
+        if (!(length > LEVEL_FLAT * diagonal))
             return pal_diagnostic_set(
                 diag, PAL_ERR_REFUSED,
                 "levels: the edge of vertices %d and %d of level %d is %.3g m long in a surface of %.3g "
@@ -406,7 +403,7 @@ static pal_err take_coarse(const pal_surface *s, pal_levels *l, const pal_winged
 static pal_err make_levels(const pal_surface *s, const pal_levels_options *o, pal_levels *l, pal_winged_edge *edge,
                            int32_t *face_edge, pal_diagnostic *diag)
 {
-    size_t budget = o->budget_byte ? o->budget_byte : BUDGET;
+    size_t budget = o->budget_byte ? o->budget_byte : HIERARCHY_BUDGET_BYTE;
     int32_t n_edge;
     int64_t irregular = 0;
     PAL_TRY(find_edges(s, edge, face_edge, &n_edge, diag));

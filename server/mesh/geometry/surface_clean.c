@@ -4,16 +4,10 @@
  * the tolerance, so a cell of four tolerances holds a bounded number of them for any file. */
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/surface.h"
+#include "server/mesh/geometry/tuning.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-/* a coordinate beyond this cannot be cubed and summed, and counts as infinite */
-#define COORDINATE_LIMIT 1e30
-/* a triangle whose height is below this fraction of its longest side has no area */
-#define HEIGHT_LIMIT 1e-12
-/* flat triangles at a vertex of more triangles than this are dropped, not repaired, so that the time stays linear */
-enum { MAX_FAN = 64 };
 
 typedef struct cleaner {
     pal_surface *surface;

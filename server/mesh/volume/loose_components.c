@@ -2,15 +2,12 @@
 #include "server/mesh/volume/loose_components.h"
 
 #include "server/base/vec3.h"
+#include "server/mesh/geometry/tuning.h"
 #include "server/num/union_find.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* fraction of the largest component below which one is dropped silently. A voxel at the default resolutions is 0.04 %
- * of the body or less, a visible lobe is more than a hundredth (tests/mesh/volume/test_loose_components.c) */
-static const double small_share = 0.01;
 
 typedef struct component {
     double volume_m3, moment[3]; /* moment: volume times centre, m^4 */
@@ -45,7 +42,7 @@ static pal_err choose(const char *name, bool largest_only, component *part, int 
         if (part[k].volume_m3 > part[best].volume_m3) best = k;
     }
     for (int k = 0; k < n; k++) {
-        bool small = part[k].volume_m3 < small_share * part[best].volume_m3;
+        bool small = part[k].volume_m3 < LOOSE_FRACTION * part[best].volume_m3;
         part[k].keep = largest_only ? k == best : part[k].fixed || !small;
         if (!largest_only && any_fixed && !part[k].fixed && !small) {
             n_bad++;

@@ -1,5 +1,6 @@
 /* Local subdivision (paper A section 4.1), and thousands of edits one after the other: results are whole, and subdivide
  * into elements or are refused. */
+#include "tests/fixtures/cell_check.h"
 #include "tests/fixtures/edits.h"
 
 /* ---- divide ---- */
@@ -55,7 +56,7 @@ static void parts_of_any_polyhedron_fill_it(void)
         for (int32_t i = c.n_cell; i > 0; i -= (c.n_cell + 2) / 3) {
             c = edited(c, (pal_cells_command){.kind = PAL_CELLS_DIVIDE, .cell = i - 1});
             CHECK_NEAR(pal_cells_volume(&c, NULL), volume, 1e-12 * volume);
-            CHECK_INT(pal_cells_check(&c, NULL, &diag), PAL_ERR_OK);
+            CHECK_INT(cells_check(&c, NULL, &diag), PAL_ERR_OK);
         }
         pal_cells_free(&c);
     }
@@ -277,7 +278,7 @@ static void thousands_of_edits_leave_whole_solids(void)
             continue;
         }
         taken[k.kind]++;
-        if (pal_cells_check(&e.cells, NULL, &diag)) CHECK_FAIL("edit %d: %s", i, diag.text);
+        if (cells_check(&e.cells, NULL, &diag)) CHECK_FAIL("edit %d: %s", i, diag.text);
         if (!(pal_cells_volume(&e.cells, NULL) > 0)) CHECK_FAIL("edit %d: no volume", i);
         if (n_taken % 7 == 0) check_carrying(&e, &c);
         pal_cells_free(&c);

@@ -7,6 +7,7 @@
 #include "server/mesh/files/mesh_file.h"
 #include "server/num/spline.h"
 #include "tests/check.h"
+#include "tests/fixtures/cell_check.h"
 
 #include <float.h>
 
@@ -50,7 +51,7 @@ static void control_cells_are_as_many_as_in_table_1(void)
         CHECK_INT(c.n_cell, pal_cell_model_list[k].n_cell);
         CHECK_TEXT(pal_cell_model_list[k].name, list[k].name);
         if (k < 8) CHECK_INT(c.n_cell, table[k]);
-        if (pal_cells_check(&c, NULL, &diag)) CHECK_FAIL("%s: %s", list[k].name, diag.text);
+        if (cells_check(&c, NULL, &diag)) CHECK_FAIL("%s: %s", list[k].name, diag.text);
         CHECK_INT(c.n_pinched_edge + c.n_pinched_vertex, 0);
         pal_cells_free(&c);
     }

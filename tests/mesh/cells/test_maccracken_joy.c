@@ -2,6 +2,7 @@
  * creases, refusals. */
 #include "server/mesh/cells/maccracken_joy.h"
 #include "tests/check.h"
+#include "tests/fixtures/cell_check.h"
 #include "tests/fixtures/solids.h"
 
 #include <float.h>
@@ -204,7 +205,7 @@ static void rows_sum_to_one_whatever_is_subdivided(void)
                 CHECK_INT(s.rows.n_row, s.cells.n_vertex);
                 CHECK_LE(worst_row(&s.rows), 1e-12);
                 pal_diagnostic diag = {"no note"};
-                if (pal_cells_check(&s.cells, NULL, &diag)) CHECK_FAIL("%s", diag.text);
+                if (cells_check(&s.cells, NULL, &diag)) CHECK_FAIL("%s", diag.text);
                 pal_subdivision_free(&s);
                 pal_cells_free(&c);
             }
@@ -423,7 +424,7 @@ static void no_level_gives_the_control_cells(void)
 {
     pal_cells c = sort(3);
     pal_subdivision s = of(&c, 0, PAL_SUBDIVISION_MACCRACKEN_JOY);
-    CHECK(pal_cells_equal(&s.cells, &c));
+    CHECK(cells_equal(&s.cells, &c));
     CHECK_INT(s.rows.start[s.rows.n_row], c.n_vertex);
     CHECK_INT(s.face_origin[c.n_face - 1], c.n_face - 1);
     pal_subdivision_free(&s);
@@ -437,7 +438,7 @@ static void twice_the_same_is_the_same_to_the_bit(void)
     pal_subdivision s = of(&c, 2, PAL_SUBDIVISION_MACCRACKEN_JOY), t = of(&c, 2, PAL_SUBDIVISION_MACCRACKEN_JOY);
     REQUIRE(s.n_level == 2 && t.n_level == 2);
     int32_t n = s.rows.start[s.rows.n_row];
-    CHECK(pal_cells_equal(&s.cells, &t.cells));
+    CHECK(cells_equal(&s.cells, &t.cells));
     REQUIRE(n == t.rows.start[t.rows.n_row]);
     CHECK(memcmp(s.rows.weight, t.rows.weight, (size_t)n * sizeof *s.rows.weight) == 0);
     CHECK(memcmp(s.rows.point, t.rows.point, (size_t)n * sizeof *s.rows.point) == 0);

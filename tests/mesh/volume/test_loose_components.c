@@ -3,6 +3,7 @@
 #include "server/mesh/cells/cell_lattice.h"
 #include "server/mesh/volume/loose_components.h"
 #include "tests/check.h"
+#include "tests/fixtures/cell_check.h"
 #include "tests/fixtures/shapes.h"
 
 static pal_diagnostic diag;
@@ -230,7 +231,7 @@ static void control_cells_are_kept_by_the_same_rule(void)
         }
         CHECK_INT(pal_loose_cells_drop("c", fixed, turn[k].largest_only, &cells, &parts, &diag), turn[k].err);
         CHECK_INT(cells.n_cell, turn[k].n_cell);
-        CHECK_INT(pal_cells_check(&cells, NULL, &diag), PAL_ERR_OK);
+        CHECK_INT(cells_check(&cells, NULL, &diag), PAL_ERR_OK);
         pal_cells_topology facts;
         REQUIRE(!pal_cells_find_topology(&cells, &facts));
         CHECK_INT(facts.n_piece, turn[k].n_cell == 2 ? 1 : 2);
