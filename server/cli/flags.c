@@ -30,9 +30,11 @@ typedef struct parse {
 static void manual_line(const char *name, const char *value, const char *help)
 {
     char left[80];
-    snprintf(left, sizeof left, "%s %s", name, value ? value : "");
-    printf("  %-22s ", left);
-    if (strlen(left) > 22) printf("\n%25s", "");
+    snprintf(left, sizeof left, "%s%s%s", name, value ? " " : "", value ? value : "");
+    if (strlen(left) > 22)
+        printf("  %s\n%25s", left, "");
+    else
+        printf("  %-22s ", left);
     for (; *help; help++) {
         putchar(*help);
         if (*help == '\n') printf("%25s", "");

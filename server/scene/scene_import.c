@@ -7,7 +7,6 @@
  * implicit_euler steps 60 times a second on one core, and leaves out border voxels that hold less than a tenth
  * of material: they would add unknowns and next to no stiffness. */
 #include "server/scene/scene_import.h"
-#include "server/base/vec3.h"
 
 #include "server/base/clock.h"
 #include "server/base/utf8.h"

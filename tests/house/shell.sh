@@ -1,5 +1,5 @@
-# Shared by the shell tests of commands: a folder of their own, named checks, what a run said. Sourced; the test then
-# defines `run ARGS...`, which leaves out, err (files) and code.
+# Shared by the shell tests of commands: a temporary folder, named checks, output of a run. Sourced; the test defines
+# `run ARGS...`, which leaves the files out and err and the variable code.
 passed=0 failed=0 skipped=0 bad=0
 problems=$(realpath "$(dirname "$0")/../../deploy/problems")
 dir=$(mktemp -d) || exit 2
@@ -7,7 +7,7 @@ trap 'rm -rf "$dir"' EXIT
 cd "$dir" || exit 2
 
 begin() { name=$1 bad=0; }
-# `if long SENTENCE; then begin "$name" ...`: a test that only looks longer at the same code is left to release
+# `if long SENTENCE; then begin "$name" ...`: a test that only runs the same code longer is left to the release build
 long() {
     name=$1
     [ -n "${PAL_SANITIZED-}" ] || return 0
@@ -31,11 +31,11 @@ end() {
         tail -n 30 err | sed 's/^/    err: /'
     fi
 }
-skip() { # NAME REASON: data or a program that the test needs is not there
+skip() { # NAME REASON: data or a program that the test needs is missing
     skipped=$((skipped + 1))
     echo "SKIP $1: $2"
 }
-finish() { # the last line of a test, and its exit code: 77 when a part was skipped
+finish() { # prints the last line of a test; the result is its exit code, 77 when a part was skipped
     echo "$passed passed, $failed failed, $skipped skipped"
     [ "$failed" -eq 0 ] || return 1
     [ "$skipped" -eq 0 ] || return 77

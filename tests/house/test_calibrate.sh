@@ -141,8 +141,8 @@ refuse 1 "is fitted" "$bar" --case bend --verify bend -o no.json
 refuse 1 "stands there twice" "$bar" --case bend,bend -o no.json
 refuse 1 "there is no folder nowhere" "$bar" --case bend -o nowhere/no.json
 refuse 2 "--budget: 0 is outside" "$bar" --case bend --budget 0 -o no.json
-refuse 2 "--method: is not adjoint or annealing" "$bar" --case bend --method foo -o no.json
-refuse 2 "--kinematics: is not finite or linear" "$bar" --case bend --kinematics foo -o no.json
+refuse 2 "--method: \"foo\" is not adjoint or annealing" "$bar" --case bend --method foo -o no.json
+refuse 2 "--kinematics: \"foo\" is not finite or linear" "$bar" --case bend --kinematics foo -o no.json
 refuse 1 "no reference answers" "$bar" --case bend --truth reference -o no.json
 refuse 1 "is linear, --kinematics says finite" "$beam" --case timoshenko --kinematics finite -o no.json
 refuse 1 "outside of the body: is it of another one?" "$problems/cube.json" --case push --resolution 8 \
@@ -167,11 +167,11 @@ check "the surface changed" same bar.obj "$problems/bar.obj"
 mkfifo pipe
 run calibrate read.json --case bend -o x.json --vtk pipe
 check "exit code $code" code_is 1
-check "says something else" has err "pipe is there and not a file"
+check "says something else" has err "pipe exists and is not a file"
 check "the pipe is gone" [ -p pipe ]
 run calibrate read.json --case bend -o x.json --vtk ./x.json
 check "exit code $code" code_is 1
-check "says something else" has err "is that of -o as well"
+check "says something else" has err "is the file of -o as well"
 end
 
 problem() { # problem SUPPORTS LOADS: problem.json, a beam

@@ -1,5 +1,5 @@
 #!/bin/sh
-# `palpate cells` as a person runs it: figures beside those of Table 1, files that come back to the bit, boundaries that
+# `palpate cells` as a user runs it: figures beside those of Table 1, files that come back to the bit, boundaries that
 # are closed, one line for a refusal. Prints "N passed, N failed"; exit 1 when a check failed.
 # usage: test_cells.sh PALPATE [MAX_KB]     MAX_KB: address space a command may take (0: no limit, for sanitizers)
 set -u

@@ -1,5 +1,5 @@
 #!/bin/sh
-# The commands as a person runs them: exit codes, one line for a refusal, one JSON object, nothing half written, and
+# The commands as a user runs them: exit codes, one line for a refusal, one JSON object, complete files or none, and
 # hostile files. Prints "N passed, N failed"; exit 1 when a check failed.
 # usage: test_commands.sh PALPATE [MAX_KB]     MAX_KB: address space a command may take (0: no limit, for sanitizers)
 set -u
@@ -42,7 +42,7 @@ f 1 5 7 3
 f 2 4 8 6
 END
 
-begin "prepare writes a scene, says so on stdout and nothing on stderr"
+begin "prepare writes a scene, reports it on stdout and prints nothing on stderr"
 run prepare box.obj -o scene
 check "exit code $code" code_is 0
 check "stderr is not empty" is_empty err
@@ -94,7 +94,7 @@ else
     skip "$name" "the program tetgen is not there"
 fi
 
-begin "the unit is said, guessed or not"
+begin "the unit is reported, guessed or not"
 scaled_by() { awk -v k="$1" '$1 == "v" { $2 *= k; $3 *= k; $4 *= k } { print }' box.obj; }
 scaled_by 1e8 >far.obj
 run prepare box.obj -o scene4 --no-tetgen
@@ -108,7 +108,7 @@ run prepare huge.obj -o scene5 --no-tetgen --units m
 refused 1 "huge.obj: line 9: tools"
 end
 
-begin "--quiet says nothing"
+begin "--quiet prints nothing"
 run prepare box.obj -o scene3 --quiet
 check "exit code $code" code_is 0
 check "stdout is not empty" is_empty out
@@ -129,7 +129,7 @@ above() { # above SCALE MM
                                $1 == "f" { print "f", $2 + 8, $3 + 8, $4 + 8, $5 + 8 }' box.obj
 }
 
-begin "a component that nothing holds is dropped when small and told, in words and in JSON"
+begin "a small component without a support is dropped and reported, as text and in JSON"
 above 0.1 90 >dust.obj
 run prepare dust.obj -o dust --no-tetgen --units mm --model fem --resolution 10
 check "exit code $code" code_is 0
@@ -165,7 +165,7 @@ run prepare box.obj -o again
 for file in scene.json box.palmesh box.node box.ele box.face; do check "$file differs" cmp -s "scene/$file" "again/$file"; done
 end
 
-begin "plan shows rows and JSON, for a scene, a folder and a surface"
+begin "plan prints components and JSON, for a scene, a folder and a surface"
 run plan scene/scene.json
 check "exit code $code" code_is 0
 check "no row of springs" has out "edge_distance"
@@ -395,7 +395,7 @@ check "not one JSON object" is_json out
 check "levels" has out '"nodes":188,"springs":558,"levels":\[{"nodes":188,"springs":558},{"nodes":746,"springs":2232}\]'
 end
 
-begin "prepare --model adaptive takes a surface as it is, and says so"
+begin "prepare --model adaptive keeps a surface as it is, and reports it"
 run prepare box.obj -o hollow --model adaptive --units mm --levels 3 --inflate 200
 check "exit code $code" code_is 0
 check "box" has out "level 0: 8 nodes, 18 springs"
@@ -408,7 +408,7 @@ run prepare box.obj -o again_hollow --model adaptive --units mm --levels 3 --inf
 check "not the same files" cmp -s hollow/box.palmesh again_hollow/box.palmesh
 end
 
-begin "a surface that adapts is made as coarse as asked, and refines as far as real time allows"
+begin "an adaptive surface is made as coarse as asked, and refines as far as real time allows"
 run prepare --shape stomach -o coarse --triangles 200 --json
 check "exit code $code" code_is 0
 check "not 200 triangles" has out '"triangles":200,'

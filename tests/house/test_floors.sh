@@ -1,5 +1,5 @@
 #!/bin/sh
-# The floor check itself can fail: in a copy of the tree's skeleton each kind of fault is planted and must be found.
+# The floor check can fail: each kind of fault is planted in a small tree and must be found.
 set -u
 here=$(cd "$(dirname "$0")" && pwd)
 passed=0 failed=0

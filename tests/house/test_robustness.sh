@@ -4,7 +4,7 @@
 # usage: test_robustness.sh PALPATE
 set -u
 palpate=$(realpath "$1")
-. "$(dirname "$0")/adaptive_surface.sh"
+. "$(dirname "$0")/shell.sh"
 run() {
     timeout 600 "$palpate" robustness "$@" >out 2>err </dev/null
     code=$?
@@ -101,7 +101,7 @@ end
 begin "a mirrored subdivision solid recovers with either solver"
 "$palpate" cells chair -o chair.palcells --quiet || exit 2
 cp "$problems/../demos/chair.json" folded.json
-sed 's/"model": {/"solver": {"name": "implicit_euler"}, &/' folded.json >implicit_solver.json
+sed 's/"model": {/"solver": {"name": "implicit_euler"}, &/' folded.json >implicit.json
 for scene in folded implicit; do
     gives 0 $scene.json --only mirrored --seconds 12
     check "it was inverted and has recovered" has out "mirrored *passed "
