@@ -5,18 +5,10 @@
 #include <stdio.h>
 
 static pal_log_level max_level = PAL_LOG_INFO;
-static pal_log_handler current_handler;
-static void *current_user;
 
 void pal_log_set_level(pal_log_level max)
 {
     max_level = max;
-}
-
-void pal_log_set_handler(pal_log_handler handler, void *user)
-{
-    current_handler = handler;
-    current_user = user;
 }
 
 void pal_log(pal_log_level level, const char *event, const char *format, ...)
@@ -28,8 +20,5 @@ void pal_log(pal_log_level level, const char *event, const char *format, ...)
     va_start(args, format);
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
-    if (current_handler)
-        current_handler(level, event, text, current_user);
-    else
-        fprintf(stderr, "%s %s: %s\n", names[level], event, text);
+    fprintf(stderr, "%s %s: %s\n", names[level], event, text);
 }

@@ -1,12 +1,10 @@
-/* One-line log with levels. Lines go to stderr as "level event: text" unless a handler is set. Not for use inside a
- * step: it formats text. Thread: any for pal_log; set level and handler before threads start. */
+/* One-line log with levels. Lines go to stderr as "level event: text". Not for use inside a step: it formats text.
+ * Thread: any for pal_log; set the level before threads start. */
 #ifndef PAL_BASE_LOG_H
 #define PAL_BASE_LOG_H
 
 typedef enum pal_log_level { PAL_LOG_ERROR, PAL_LOG_WARN, PAL_LOG_INFO, PAL_LOG_DEBUG } pal_log_level;
-typedef void (*pal_log_handler)(pal_log_level level, const char *event, const char *text, void *user);
 
 void pal_log_set_level(pal_log_level max); /* default PAL_LOG_INFO */
-void pal_log_set_handler(pal_log_handler handler, void *user);
 void pal_log(pal_log_level level, const char *event, const char *format, ...) __attribute__((format(printf, 3, 4)));
 #endif

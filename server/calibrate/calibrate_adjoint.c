@@ -3,7 +3,7 @@
  * A point that comes to no stable rest has no value and no slope. The line search is given a wall instead: the last
  * good objective plus a parabola around the last good point, whose slope leads back there; it then shortens its step.
  */
-#include "server/calibrate/calibration_core.h"
+#include "server/calibrate/calibration.h"
 
 #include "server/base/clock.h"
 

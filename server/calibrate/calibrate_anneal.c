@@ -9,7 +9,7 @@
  * displacements depend on most is one coordinate then. Evaluations until within 1.2 times the adjoint's error, gear's
  * twist: linear, 10 voxels, ten seeds: three need more than 1500 along the constants, 600 at most along these; finite,
  * 16 voxels, seeds 1 to 5: 151 to 1328 (median 634), and 199 to 665 (median 262). */
-#include "server/calibrate/calibration_core.h"
+#include "server/calibrate/calibration.h"
 
 #include "server/base/clock.h"
 #include "server/base/team.h"

@@ -1,5 +1,5 @@
 /* Error of a set of constants, and its slope. */
-#include "server/calibrate/calibration_core.h"
+#include "server/calibrate/calibration.h"
 
 #include "server/base/vec3.h"
 

@@ -1,4 +1,4 @@
-/* One table of settings serves the file, the environment, the flags and the manual. */
+/* One table of keys serves the file, the environment, the flags and the manual. */
 #include "server/cli/config.h"
 
 #include "server/base/utf8.h"
@@ -12,10 +12,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FILE_MOST = 1 << 16, VARIABLE = 64 };
+enum { FILE_MAX = 1 << 16, VARIABLE = 64 };
 #define PLACE(field) offsetof(pal_config, field), sizeof(((pal_config *)0)->field)
 
-static const pal_config_key setting[] = {
+static const pal_config_key keys[] = {
     {"listen", "ADDRESS", PAL_CONFIG_KEY_TEXT, PLACE(listen), 0, 0, "address to listen on (127.0.0.1)"},
     {"port", "N", PAL_CONFIG_KEY_INT, PLACE(port), 0, 65535, "port; 0 takes any free one (8090)"},
     {"allow_remote", "BOOL", PAL_CONFIG_KEY_BOOL, PLACE(allow_remote), 0, 1,
@@ -28,13 +28,13 @@ static const pal_config_key setting[] = {
     {"log", "LEVEL", PAL_CONFIG_KEY_TEXT, PLACE(log), 0, 0, "error, warn, info or debug (info)"},
     {"record", "FILE", PAL_CONFIG_KEY_TEXT, PLACE(record), 0, 0, "write the input log there, for palpate replay (off)"},
 };
-enum { N_SETTING = sizeof setting / sizeof setting[0] };
+enum { N_KEY = sizeof keys / sizeof keys[0] };
 static const char *const level_name[] = {"error", "warn", "info", "debug"};
 
 const pal_config_key *pal_config_keys(int *n)
 {
-    *n = N_SETTING;
-    return setting;
+    *n = N_KEY;
+    return keys;
 }
 
 void pal_config_default(pal_config *config)
@@ -51,8 +51,8 @@ pal_log_level pal_config_log_level(const pal_config *config)
 
 static const pal_config_key *find(const char *key)
 {
-    for (int k = 0; k < N_SETTING; k++)
-        if (!strcmp(setting[k].key, key)) return &setting[k];
+    for (int k = 0; k < N_KEY; k++)
+        if (!strcmp(keys[k].key, key)) return &keys[k];
     return NULL;
 }
 
@@ -145,7 +145,7 @@ static pal_err read_keys(pal_config *config, const char *name, const cJSON *root
         snprintf(where, sizeof where, "%.180s: %.60s", name, item->string);
         if (!s) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: unknown key", where);
         if (cJSON_GetObjectItemCaseSensitive(root, item->string) != item)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: the key is there twice", where);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: the key is given twice", where);
         PAL_TRY(set_json(config, s, item, where, diag));
     }
     return PAL_ERR_OK;
@@ -155,8 +155,8 @@ pal_err pal_config_parse(pal_config *config, const char *name, const char *json,
 {
     const char *end = json;
     int line = 1;
-    if (n_byte > FILE_MOST)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %zu bytes, more than %d", name, n_byte, FILE_MOST);
+    if (n_byte > FILE_MAX)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %zu bytes, more than %d", name, n_byte, FILE_MAX);
     cJSON *root = n_byte ? cJSON_ParseWithLengthOpts(json, n_byte, &end, false) : NULL;
     size_t at = end >= json ? (size_t)(end - json) : 0;
     while (root && at < n_byte && strchr(" \t\r\n", json[at])) at++;
@@ -176,7 +176,7 @@ pal_err pal_config_file(pal_config *config, const char *path, pal_diagnostic *di
 {
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, FILE_MOST, &bytes, &n_byte, diag));
+    PAL_TRY(pal_file_read(path, FILE_MAX, &bytes, &n_byte, diag));
     pal_err err = pal_config_parse(config, path, (const char *)bytes, n_byte, diag);
     free(bytes);
     return err;

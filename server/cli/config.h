@@ -1,6 +1,6 @@
 /* Configuration of a server: defaults < file < environment < flags.
  *
- * The file is one JSON object with the keys below (deploy/palpate.json is an example); the environment variable of a
+ * The file is one JSON object with the keys below; the environment variable of a
  * key is PALPATE_ and the key in capitals (PALPATE_ALLOW_REMOTE=true); the flag is the key with dashes
  * (--allow-remote). An unknown key, an unknown PALPATE_ variable and a value out of range are errors that name where
  * they stand. Thread: [load]. */

@@ -13,7 +13,7 @@
  * longer). */
 #ifndef PAL_ESTIMATE_ESTIMATE_PREDICT_H
 #define PAL_ESTIMATE_ESTIMATE_PREDICT_H
-#include "server/estimate/estimator.h"
+#include "server/estimate/estimate.h"
 
 typedef struct pal_prediction {
     const pal_scene *scene; /* of the body, as it is; NULL: all is taken */

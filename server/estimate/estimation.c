@@ -1,5 +1,5 @@
 /* The parts of the error of one body: the steps ahead (time and algebraic parts), the rests (the other parts). */
-#include "server/estimate/estimate_core.h"
+#include "server/estimate/estimation.h"
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"

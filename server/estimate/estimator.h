@@ -36,32 +36,7 @@
  * Nothing of it exists while nobody looks: no thread, no world, no copy. Thread: as said at each function. */
 #ifndef PAL_ESTIMATE_ESTIMATOR_H
 #define PAL_ESTIMATE_ESTIMATOR_H
-#include "server/sim/core/configuration.h"
-#include "server/sim/world/world.h"
-
-enum { PAL_ESTIMATE_NEIGHBOURS = 6 };
-
-typedef struct pal_estimate {
-    uint64_t tick; /* of the state that was looked at; 0: there is none yet */
-    double time_s;
-    double age_s; /* steps in which the body was awake since then, as it is read: 0 while it sleeps as it did   */
-    bool asleep;  /* it slept then; with age_s 0 it still does                */
-    double max_m; /* largest displacement then                              */
-    /* largest displacement errors, m; NaN: not known for this body (note says why) */
-    double error_m; /* of all parts together: their sum; NaN: a large one is not known (above) */
-    double discretisation_m, algebraic_m, time_m, model_m;
-    double energy_error_percent; /* energy norm of the error over that of the solution    */
-    bool locking;       /* nearly incompressible in elements that lock: the estimate is too small (numerics.md) */
-    double ms;          /* of a live step, median of the last second awake; never awake: of steps beside it */
-    double estimate_ms; /* processor time that this estimate took                 */
-    /* next lower and higher choice on each knob, with what they are foreseen to cost and to leave */
-    int n_neighbour;
-    pal_measured_configuration neighbour[PAL_ESTIMATE_NEIGHBOURS];
-    /* nodes that each is thought to have (within 25 %, pal_configuration_estimate_nodes; as many as now where the mesh
-     * stays), and sub-steps in a step of its own at rest [n_neighbour] */
-    int neighbour_nodes[PAL_ESTIMATE_NEIGHBOURS], neighbour_substeps[PAL_ESTIMATE_NEIGHBOURS];
-    char diag[160];
-} pal_estimate;
+#include "server/estimate/estimate.h"
 
 typedef struct pal_estimator pal_estimator;
 /* Starts the thread of one body of a scene, which is borrowed until close, and returns; meshes and worlds are made on

@@ -2,6 +2,7 @@
 #include "server/base/vec3.h"
 #include "server/robustness/trial.h"
 #include "server/sim/elements/elastic_hex.h"
+#include "server/sim/transfer/transfer_world.h"
 
 #include <math.h>
 #include <stdlib.h>

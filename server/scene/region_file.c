@@ -8,6 +8,7 @@
 #include "server/base/vec3.h"
 #include "server/mesh/files/file_bytes.h"
 #include "server/mesh/scan/label_volume.h"
+#include "server/scene/scene_keys.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -96,12 +97,11 @@ static pal_err read_nodes(const pal_json *json, const cJSON *grid, const char *p
 
 static pal_err read_grid(const pal_json *json, const cJSON *region, const char *above, pal_region *out, double **own)
 {
-    static const char *const known[] = {"n", "low_m", "high_m", "young_Pa", "poisson", "density_kg_m3", NULL};
     char path[PAL_JSON_PATH];
     const cJSON *grid = cJSON_GetObjectItemCaseSensitive(region, "grid");
     const double **const value[3] = {&out->grid_young_Pa, &out->grid_poisson, &out->grid_density_kg_m3};
     pal_json_key(path, above, "grid");
-    PAL_TRY(pal_json_object(json, grid, path, known));
+    PAL_TRY(pal_json_object(json, grid, path, pal_scene_keys(PAL_KEYS_REGION_GRID, NULL)));
     PAL_TRY(read_nodes(json, grid, path, out->n, out->low_m, out->high_m, own));
     int count = out->n[0] * out->n[1] * out->n[2];
     for (int k = 0; k < 3; k++)
@@ -197,18 +197,17 @@ static pal_err sample(const pal_json *json, const char *path, const pal_label_vo
 static pal_err read_label(const pal_json *json, const cJSON *region, const char *above, const char *folder,
                           const double origin[3], pal_region *out, uint8_t **own)
 {
-    static const char *const known[] = {"volume", "is", NULL};
     char path[PAL_JSON_PATH], at[PAL_JSON_PATH], name[512] = "", file[PATH];
     int is = 0;
     const cJSON *label = cJSON_GetObjectItemCaseSensitive(region, "label");
     pal_label_volume volume = {0};
     pal_diagnostic reason = {""};
     pal_json_key(path, above, "label");
-    PAL_TRY(pal_json_object(json, label, path, known));
+    PAL_TRY(pal_json_object(json, label, path, pal_scene_keys(PAL_KEYS_LABEL, NULL)));
     PAL_TRY(pal_json_text(json, label, path, "volume", false, name, sizeof name));
-    PAL_TRY(pal_json_count(json, label, path, "is", 1, 1 << 30, &is));
+    PAL_TRY(pal_json_count(json, label, path, "value", 1, 1 << 30, &is));
     if (!*name) return pal_json_refuse(json, pal_json_key(at, path, "volume"), "is missing");
-    if (!is) return pal_json_refuse(json, pal_json_key(at, path, "is"), "is missing");
+    if (!is) return pal_json_refuse(json, pal_json_key(at, path, "value"), "is missing");
     int n =
         name[0] == '/' ? snprintf(file, sizeof file, "%s", name) : snprintf(file, sizeof file, "%s/%s", folder, name);
     if (n < 0 || (size_t)n >= sizeof file) return pal_json_refuse(json, path, "the path is too long");
@@ -224,8 +223,7 @@ static pal_err read_label(const pal_json *json, const cJSON *region, const char 
 static pal_err read_region(const pal_json *json, const cJSON *object, const char *path, const char *folder,
                            const double origin[3], pal_region *out, pal_loaded_region *own)
 {
-    static const char *const known[] = {"box", "label", "grid", "young_Pa", "poisson", "density_kg_m3", NULL};
-    static const char *const corners[] = {"low_m", "high_m", NULL};
+    const char *const *known = pal_scene_keys(PAL_KEYS_REGION, NULL);
     char at[PAL_JSON_PATH];
     bool has[3];
     *out = (pal_region){.young_Pa = NAN, .poisson = NAN, .density_kg_m3 = NAN};
@@ -242,7 +240,7 @@ static pal_err read_region(const pal_json *json, const cJSON *object, const char
     if (has[0]) {
         const cJSON *box = cJSON_GetObjectItemCaseSensitive(object, "box");
         out->kind = PAL_REGION_BOX;
-        PAL_TRY(pal_json_object(json, box, pal_json_key(at, path, "box"), corners));
+        PAL_TRY(pal_json_object(json, box, pal_json_key(at, path, "box"), pal_scene_keys(PAL_KEYS_REGION_BOX, NULL)));
         return read_box(json, box, at, (const bool[3]){true, true, true}, out->low_m, out->high_m);
     }
     if (has[1]) {
@@ -281,7 +279,6 @@ void pal_region_free(pal_loaded_scene *scene, int index)
 pal_err pal_spring_grid_read(const pal_json *json, const cJSON *model, const char *above, pal_loaded_scene *scene,
                              int index)
 {
-    static const char *const known[] = {"n", "low_m", "high_m", "k_distance_J", "k_area_J", "k_volume_J", NULL};
     char path[PAL_JSON_PATH], at[PAL_JSON_PATH];
     pal_body_def *def = &scene->scene.body[index];
     pal_spring_grid *out = &def->spring_grid;
@@ -291,7 +288,7 @@ pal_err pal_spring_grid_read(const pal_json *json, const cJSON *model, const cha
     if (strcmp(def->model.name, "tet_springs") != 0)
         return pal_json_refuse(json, path, "model \"%s\" has no springs; model \"tet_springs\" takes a grid",
                                def->model.name);
-    PAL_TRY(pal_json_object(json, grid, path, known));
+    PAL_TRY(pal_json_object(json, grid, path, pal_scene_keys(PAL_KEYS_SPRING_GRID, NULL)));
     PAL_TRY(read_nodes(json, grid, path, out->n, out->low_m, out->high_m, &scene->spring_grid[index]));
     int count = out->n[0] * out->n[1] * out->n[2];
     for (int k = 0; k < 3; k++) {
@@ -361,7 +358,7 @@ void pal_region_append(cJSON *object, const pal_body_def *body, const char *stem
             cJSON *label = cJSON_AddObjectToObject(entry, "label");
             pal_region_volume(stem, k, name, sizeof name);
             cJSON_AddStringToObject(label, "volume", name);
-            cJSON_AddNumberToObject(label, "is", 1);
+            cJSON_AddNumberToObject(label, "value", 1);
         } else {
             const double *const value[3] = {r->grid_young_Pa, r->grid_poisson, r->grid_density_kg_m3};
             add_grid(entry, r->n, r->low_m, r->high_m, value_key, value);

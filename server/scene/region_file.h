@@ -3,7 +3,7 @@
 #ifndef PAL_SCENE_REGION_FILE_H
 #define PAL_SCENE_REGION_FILE_H
 #include "server/scene/json_reader.h"
-#include "server/scene/scene_file.h"
+#include "server/scene/loaded_scene.h"
 
 enum { PAL_GRID_NODES_MAX = 65536 }; /* nodes of a grid in a file */
 

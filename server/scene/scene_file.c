@@ -7,6 +7,7 @@
 #include "server/scene/json_reader.h"
 #include "server/scene/region_file.h"
 #include "server/scene/scene_import.h"
+#include "server/scene/scene_keys.h"
 #include "server/scene/subdivision_file.h"
 
 #include <math.h>
@@ -69,18 +70,17 @@ static pal_err read_model(const pal_json *json, const cJSON *body, const char *p
     const cJSON *model = cJSON_GetObjectItemCaseSensitive(body, "model");
     if (!model) return PAL_ERR_OK;
     pal_json_key(at, path, "model");
-    PAL_TRY(read_item(json, model, at, "grid", &scene->scene.body[index].model));
+    PAL_TRY(read_item(json, model, at, *pal_scene_keys(PAL_KEYS_MODEL, NULL), &scene->scene.body[index].model));
     return pal_spring_grid_read(json, model, at, scene, index);
 }
 
 static pal_err read_material(const pal_json *json, const cJSON *body, const char *path, pal_material *m)
 {
-    static const char *const known[] = {"young_Pa", "poisson", "density_kg_m3", "damping_1_s", NULL};
     char at[PAL_JSON_PATH];
     const cJSON *object = cJSON_GetObjectItemCaseSensitive(body, "material");
     if (!object) return PAL_ERR_OK;
     pal_json_key(at, path, "material");
-    PAL_TRY(pal_json_object(json, object, at, known));
+    PAL_TRY(pal_json_object(json, object, at, pal_scene_keys(PAL_KEYS_MATERIAL, NULL)));
     PAL_TRY(pal_json_number(json, object, at, "young_Pa", PAL_YOUNG_MIN_PA, PAL_YOUNG_MAX_PA, &m->young_Pa));
     PAL_TRY(pal_json_number(json, object, at, "poisson", PAL_POISSON_MIN, PAL_POISSON_MAX, &m->poisson));
     PAL_TRY(pal_json_number(json, object, at, "density_kg_m3", PAL_DENSITY_MIN_KG_M3, PAL_DENSITY_MAX_KG_M3,
@@ -90,11 +90,9 @@ static pal_err read_material(const pal_json *json, const cJSON *body, const char
 
 static pal_err read_support(const pal_json *json, const cJSON *object, const char *path, pal_support_def *out)
 {
-    static const char *const known[] = {"lowest", "box", "boundary", NULL}, *const corners[] = {"low_m", "high_m",
-                                                                                                NULL};
     char at[PAL_JSON_PATH];
     *out = (pal_support_def){.fraction = 0.05};
-    PAL_TRY(pal_json_object(json, object, path, known));
+    PAL_TRY(pal_json_object(json, object, path, pal_scene_keys(PAL_KEYS_SUPPORT, NULL)));
     const cJSON *box = cJSON_GetObjectItemCaseSensitive(object, "box");
     out->lowest = cJSON_GetObjectItemCaseSensitive(object, "lowest") != NULL;
     out->rim = cJSON_GetObjectItemCaseSensitive(object, "boundary") != NULL;
@@ -106,7 +104,7 @@ static pal_err read_support(const pal_json *json, const cJSON *object, const cha
     }
     if (out->lowest) return pal_json_number(json, object, path, "lowest", 0, 1, &out->fraction);
     pal_json_key(at, path, "box");
-    PAL_TRY(pal_json_object(json, box, at, corners));
+    PAL_TRY(pal_json_object(json, box, at, pal_scene_keys(PAL_KEYS_SUPPORT_BOX, NULL)));
     if (!cJSON_GetObjectItemCaseSensitive(box, "low_m") || !cJSON_GetObjectItemCaseSensitive(box, "high_m"))
         return pal_json_refuse(json, at, "needs low_m and high_m");
     PAL_TRY(pal_json_vector(json, box, at, "low_m", out->low_m));
@@ -189,13 +187,9 @@ static pal_err read_lists(const pal_json *json, const cJSON *object, const char 
 static pal_err read_body(const pal_json *json, const cJSON *object, int index, const char *folder,
                          pal_loaded_scene *scene)
 {
-    static const char *const known[] = {"name",       "largest", "mesh",      "surface",  "units",
-                                        "resolution", "label",   "triangles", "material", "model",
-                                        "solver",     "output",  "supports",  "effects",  "regions",
-                                        "cells",      "strokes", "origin_m",  "cut",      NULL};
     char path[PAL_JSON_PATH], name[PAL_NAME];
     pal_json_entry(path, "bodies", index);
-    PAL_TRY(pal_json_object(json, object, path, known));
+    PAL_TRY(pal_json_object(json, object, path, pal_scene_keys(PAL_KEYS_BODY, NULL)));
     snprintf(name, sizeof name, "body %d", index + 1);
     PAL_TRY(pal_json_text(json, object, path, "name", false, name, sizeof name));
     pal_body_def *body = &scene->scene.body[index];
@@ -227,7 +221,6 @@ static pal_err read_body(const pal_json *json, const cJSON *object, int index, c
 
 static pal_err read_tools(const pal_json *json, const cJSON *root, pal_scene *scene)
 {
-    static const char *const known[] = {"name", "radius_m", "force_cap_N", NULL};
     char path[PAL_JSON_PATH];
     const cJSON *list;
     PAL_TRY(pal_json_list(json, root, "", "tools", PAL_TOOL_MAX, &list));
@@ -240,7 +233,7 @@ static pal_err read_tools(const pal_json *json, const cJSON *root, pal_scene *sc
     for (const cJSON *child = list->child; child; child = child->next, t++) {
         pal_tool_def *tool = &scene->tool[t];
         pal_json_entry(path, "tools", t);
-        PAL_TRY(pal_json_object(json, child, path, known));
+        PAL_TRY(pal_json_object(json, child, path, pal_scene_keys(PAL_KEYS_TOOL, NULL)));
         PAL_TRY(pal_json_text(json, child, path, "name", false, tool->name, sizeof tool->name));
         PAL_TRY(pal_json_number(json, child, path, "radius_m", 0, 1, &tool->radius_m));
         PAL_TRY(pal_json_number(json, child, path, "force_cap_N", 1e-3, 1000, &tool->force_cap_N));
@@ -264,12 +257,11 @@ static bool is_wish(const char *text)
 /* what the scene asks of its study: "accuracy" as text or {max_error_mm, text}, "budget" {step_ms} */
 static pal_err read_wish(const pal_json *json, const cJSON *root, pal_scene *scene)
 {
-    static const char *const accuracy_keys[] = {"max_error_mm", "text", NULL}, *const budget_keys[] = {"step_ms", NULL};
     const cJSON *accuracy = cJSON_GetObjectItemCaseSensitive(root, "accuracy");
     const cJSON *budget = cJSON_GetObjectItemCaseSensitive(root, "budget");
     if (cJSON_IsObject(accuracy)) {
         double most_mm = 0;
-        PAL_TRY(pal_json_object(json, accuracy, "accuracy", accuracy_keys));
+        PAL_TRY(pal_json_object(json, accuracy, "accuracy", pal_scene_keys(PAL_KEYS_ACCURACY, NULL)));
         PAL_TRY(pal_json_text(json, accuracy, "accuracy", "text", true, scene->accuracy, sizeof scene->accuracy));
         PAL_TRY(pal_json_number(json, accuracy, "accuracy", "max_error_mm", 1e-6, 1e6, &most_mm));
         if (most_mm == 0) return pal_json_refuse(json, "accuracy", "has no max_error_mm");
@@ -284,20 +276,18 @@ static pal_err read_wish(const pal_json *json, const cJSON *root, pal_scene *sce
                                    scene->accuracy);
     }
     if (!budget) return PAL_ERR_OK;
-    PAL_TRY(pal_json_object(json, budget, "budget", budget_keys));
+    PAL_TRY(pal_json_object(json, budget, "budget", pal_scene_keys(PAL_KEYS_BUDGET, NULL)));
     PAL_TRY(pal_json_number(json, budget, "budget", "step_ms", 1e-6, 1e6, &scene->budget_ms));
     return scene->budget_ms > 0 ? PAL_ERR_OK : pal_json_refuse(json, "budget", "has no step_ms");
 }
 
 static pal_err read_scene(const pal_json *json, const cJSON *root, const char *folder, pal_loaded_scene *loaded)
 {
-    static const char *const known[] = {"name", "title",        "source",      "accuracy", "budget", "step_s",
-                                        "up",   "gravity_m_s2", "max_substep", "bodies",   "tools",  NULL};
     pal_scene *scene = &loaded->scene;
     char plain[PAL_NAME];
     const cJSON *list;
     pal_scene_default(scene);
-    PAL_TRY(pal_json_object(json, root, "", known));
+    PAL_TRY(pal_json_object(json, root, "", pal_scene_keys(PAL_KEYS_SCENE, NULL)));
     PAL_TRY(pal_json_text(json, root, "", "name", false, scene->name, sizeof scene->name));
     pal_scene_plain_name(scene->name, plain);
     if (strcmp(plain, scene->name)) return pal_json_refuse(json, "name", "has other characters than a-z 0-9 _ -");

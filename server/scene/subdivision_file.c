@@ -6,6 +6,7 @@
 #include "server/base/vec3.h"
 #include "server/mesh/cells/cell_file.h"
 #include "server/mesh/files/mesh_file.h"
+#include "server/scene/scene_keys.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -113,7 +114,7 @@ void pal_subdivision_unload(pal_loaded_scene *scene, int index)
 
 static pal_err read_stroke(const pal_json *json, const cJSON *object, const char *path, pal_stroke *out)
 {
-    static const char *const known[] = {"at_m", "radius_m", "soft", "young_factor", "density_factor", NULL};
+    const char *const *known = pal_scene_keys(PAL_KEYS_STROKE, NULL);
     char at[PAL_JSON_PATH];
     pal_diagnostic reason = {""};
     *out = (pal_stroke){.soft = 0.5, .young_factor = 1, .density_factor = 1};
@@ -154,7 +155,7 @@ pal_err pal_strokes_read(const pal_json *json, const cJSON *body, const char *pa
 
 pal_err pal_cut_read(const pal_json *json, const cJSON *body, const char *path, pal_body_def *def)
 {
-    static const char *const known[] = {"normal", "offset_m", NULL};
+    const char *const *known = pal_scene_keys(PAL_KEYS_CUT, NULL);
     char at[PAL_JSON_PATH], inner[PAL_JSON_PATH];
     const cJSON *cut = cJSON_GetObjectItemCaseSensitive(body, "cut");
     if (!cut) return PAL_ERR_OK;

@@ -3,7 +3,7 @@
 #ifndef PAL_SCENE_SUBDIVISION_FILE_H
 #define PAL_SCENE_SUBDIVISION_FILE_H
 #include "server/scene/json_reader.h"
-#include "server/scene/scene_file.h"
+#include "server/scene/loaded_scene.h"
 
 /* Cells of a file as body `index`: in metres about the body's origin, and mesh [index] from their boundary. The origin
  * is *origin_m where it is given (NULL: not), and the file's positions are about it already; else the middle of their

@@ -3,6 +3,7 @@
 #include "server/session/sculpt.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/transfer/transfer_world.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 /* The finite elements against ../shared/reference (CalculiX, quadratic elements, refined): the whole path of `palpate
  * solve`, from the problem's file to RMS error over its sample points. First the rows that must hold, then what the
- * other elements reach (numerics.md part 2), as bounds close above, so that a loss of accuracy is seen. */
+ * other elements reach, as bounds close above, so that a loss of accuracy is seen. */
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/problem_file.h"
 #include "server/solve/solve.h"

@@ -1,6 +1,6 @@
 /* Calibration: slopes against differences, what a grid's weights are, constants found again that were known, what is
  * refused, and annealing that walks the same way on any number of cores. */
-#include "server/calibrate/calibration_core.h"
+#include "server/calibrate/calibration.h"
 #include "server/study/study_job.h"
 
 #include "server/base/vec3.h"

@@ -2,6 +2,7 @@
  * session to the next that follows it. What they say: test_estimate_parts. */
 #include "server/base/clock.h"
 #include "server/session/session.h"
+#include "server/sim/transfer/transfer_world.h"
 #include "tests/check.h"
 #include "tests/fixtures/estimate_scene.h"
 

@@ -3,13 +3,14 @@
 #include "server/mesh/cells/cell_edits.h"
 #include "server/mesh/cells/cell_shapes.h"
 #include "server/mesh/cells/maccracken_joy.h"
+#include "tests/fixtures/cell_check.h"
 
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_COMMANDS = 24, MOST_CELLS = 40 };
+enum { MAX_COMMANDS = 24, MAX_CELLS = 40 };
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte);
 
@@ -52,7 +53,7 @@ static void check_edit(const pal_cells_edit *e, const pal_cells *from)
 {
     double *x = malloc(3 * (size_t)e->cells.n_vertex * sizeof *x);
     if (!x) return;
-    if (pal_cells_check(&e->cells, NULL, NULL) == PAL_ERR_REFUSED) __builtin_trap();
+    if (cells_check(&e->cells, NULL, NULL) == PAL_ERR_REFUSED) __builtin_trap();
     pal_cells_edit_positions(e, from, from->x, x);
     for (int32_t i = 0; i < 3 * e->cells.n_vertex; i++)
         if (!(fabs(x[i] - e->cells.x[i]) <= 1e-6)) __builtin_trap();
@@ -68,13 +69,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
     pal_subdivision s;
     pal_diagnostic diag;
     if (n_byte < 1 || start(bytes[0], &c)) return 0;
-    for (size_t i = 0; i < MOST_COMMANDS && 1 + 8 * (i + 1) <= n_byte && c.n_cell <= MOST_CELLS; i++) {
+    for (size_t i = 0; i < MAX_COMMANDS && 1 + 8 * (i + 1) <= n_byte && c.n_cell <= MAX_CELLS; i++) {
         pal_cells_edit e;
         pal_cells_command k = command_of(bytes + 1 + 8 * i, &c);
         if (pal_cells_copy(&c, &same)) break;
         diag.text[0] = 0;
         pal_err err = pal_cells_apply(&c, &k, &e, &diag);
-        if (!pal_cells_equal(&c, &same)) __builtin_trap();
+        if (!cells_equal(&c, &same)) __builtin_trap();
         pal_cells_free(&same);
         if (err) {
             if (!diag.text[0] || e.cells.x || e.rows.start || e.offset || e.cell_from) __builtin_trap();

@@ -38,7 +38,15 @@ const narrow = {
     "clients/link": ["protocol", "server/base", "lcmtypes"],
     "clients/*": ["clients/link", "protocol", "server/base", "lcmtypes"],
     "server/net/transport": ["protocol", "server/base"],
-    "server/net": ["server/net/transport", "server/session", "server/sim/", "server/mesh/", "server/num", "protocol", "server/base"],
+    "server/net": [
+        "server/net/transport",
+        "server/session",
+        "server/sim/",
+        "server/mesh/",
+        "server/num",
+        "protocol",
+        "server/base",
+    ],
 };
 // files that may read the state of a model (body.h, model): its room, its recipe, its own components, and what prints or measures it
 const own_state =
@@ -102,6 +110,14 @@ for (const file of files) {
     if (!own_state.test(file))
         for (const [read] of text.matchAll(/(?:->|\.)model\.(?:adaptive|solid)\b/g))
             fault(file, `reads ${read}: others than the model read body->dofs`);
+    // a room reports by its results and by log; only commands print and exit (err.c: a failed assertion)
+    const quiet =
+        room.startsWith("server/") &&
+        !/^server\/(commands|bench|cli)$/.test(room) &&
+        !/^server\/base\/(err|log)\.c$/.test(file);
+    const prints = text.match(/(?<!\w)(?:printf|puts|putchar|perror|_?exit|abort)\(|fprintf\(std(?:out|err)\b/);
+    if (quiet && prints && file !== "server/calibrate/calibrate_report.c")
+        fault(file, `${prints[0]}: a room below commands neither prints nor exits`);
     const lines = text.split("\n").length - 1;
     if (lines > 700) fault(file, `${lines} lines, more than 700`);
 }

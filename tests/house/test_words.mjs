@@ -46,6 +46,7 @@ const right = {
     trainee: /^(.*role.*|PAL_ROLE_TRAINEE|trainee)$/i,
     trainees: /role/i,
     relief: /inertia_?relief/i,
+    zz: /zz_?(estimator|energy)/i,
     holder: /^(clients|server\/(session|net)|tests\/(session|net|clients|browser))\//,
     holders: /^(clients|server\/(session|net)|tests\/(session|net|clients|browser))\//,
     most: /almost/i,

@@ -13,7 +13,8 @@ const verbs = new Map(
         .map((line) => line.split("\t"))
         .map(([name, , args]) => [name, args.split(" ").filter((key) => key && key !== "|")]),
 );
-let sent = 0, faults = 0;
+let sent = 0,
+    faults = 0;
 for (const file of readdirSync(folder).filter((name) => name.endsWith(".js") && name !== "control_table.js")) {
     const text = readFileSync(path.join(folder, file), "utf8");
     for (const [, verb, args] of text.matchAll(/\bverb: "(\w+)"(?:,[^{}]*args: \{([^}]*)\})?/g)) {

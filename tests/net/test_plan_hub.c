@@ -147,7 +147,7 @@ static void everybody_resets_what_was_stopped_and_a_viewer_nothing_else(void)
     const pal_wire_status *s = &cy.last[PAL_CONTROL_STATUS].status;
     UNTIL(s->frozen && s->n_state == 1, &cy, NULL);
     CHECK(s->state[0].frozen && s->state[0].n_safeguard == 1);
-    CHECK(strstr(s->state[0].reason, "is no number"));
+    CHECK(strstr(s->state[0].reason, "is not finite"));
     mem_text(&cy, "{\"type\":\"command\",\"verb\":\"reset\",\"target\":\"organ\"}");
     UNTIL(!s->frozen && s->n_state == 0, &cy, NULL);
     CHECK_INT(cy.n_text[PAL_CONTROL_ERROR], 0);

@@ -93,7 +93,7 @@ static void a_label_holds_in_its_voxels_however_the_scan_lies(void)
         char text[512];
         pal_diagnostic diag = {""};
         REQUIRE(write_scan(lie[l].name, lie[l].axes, lie[l].first, corner_label));
-        snprintf(text, sizeof text, BODY("[{\"label\": {\"volume\": \"%s\", \"is\": 2}, \"young_Pa\": 90000}]"),
+        snprintf(text, sizeof text, BODY("[{\"label\": {\"volume\": \"%s\", \"value\": 2}, \"young_Pa\": 90000}]"),
                  lie[l].name);
         pal_loaded_scene *s = parse(text, &diag);
         if (!s) CHECK_FAIL("%s", diag.text);
@@ -122,7 +122,7 @@ static void a_saved_scene_has_the_same_material_everywhere(void)
     REQUIRE(write_scan("mirrored.nii", axes, first, corner_label));
     pal_loaded_scene *in =
         parse(BODY("[{\"box\": {\"low_m\": [-1, -1, -1], \"high_m\": [0.01, 1, 1]}, \"young_Pa\": 70000.1},"
-                   "{\"label\": {\"volume\": \"mirrored.nii\", \"is\": 2}, \"poisson\": 0.31},"
+                   "{\"label\": {\"volume\": \"mirrored.nii\", \"value\": 2}, \"poisson\": 0.31},"
                    "{\"grid\": {\"n\": [2, 2, 2], \"low_m\": [-0.04, -0.03, -0.02], \"high_m\": [0.03, 0.02, 0.04], "
                    "\"density_kg_m3\": [900, 950, 1000, 1050, 1100, 1111.1, 1200, 1300]}}]"),
               &diag);
@@ -178,10 +178,10 @@ static void every_bad_region_has_its_sentence(void)
          "grid.young_Pa: 1 numbers, wanted 2"},
         {BODY("[{\"grid\": {\"n\": [2, 1, 1], \"low_m\": [0,0,0], \"high_m\": [1,1,1], \"young_Pa\": [1, -2]}}]"),
          "grid.young_Pa: number 2, -2, is outside"},
-        {BODY("[{\"label\": {\"volume\": \"none.nii\", \"is\": 1}, \"young_Pa\": 1}]"), "regions[0].label.volume: "},
-        {BODY("[{\"label\": {\"volume\": \"none.nii\"}, \"young_Pa\": 1}]"), "regions[0].label.is: is missing"},
-        {BODY("[{\"label\": {\"is\": 1}, \"young_Pa\": 1}]"), "regions[0].label.volume: is missing"},
-        {BODY("[{\"label\": {\"volume\": \"plain.nii\", \"is\": 7}, \"young_Pa\": 1}]"), "has no voxel of label 7"},
+        {BODY("[{\"label\": {\"volume\": \"none.nii\", \"value\": 1}, \"young_Pa\": 1}]"), "regions[0].label.volume: "},
+        {BODY("[{\"label\": {\"volume\": \"none.nii\"}, \"young_Pa\": 1}]"), "regions[0].label.value: is missing"},
+        {BODY("[{\"label\": {\"value\": 1}, \"young_Pa\": 1}]"), "regions[0].label.volume: is missing"},
+        {BODY("[{\"label\": {\"volume\": \"plain.nii\", \"value\": 7}, \"young_Pa\": 1}]"), "has no voxel of label 7"},
         {"{\"bodies\": [{\"mesh\": \"ball.palmesh\", \"regions\": [{\"box\": {\"low_m\": [0,0,0], \"high_m\": "
          "[1,1,1]}, "
          "\"young_Pa\": 1}]}]}",

@@ -5,6 +5,7 @@
 #include "server/scene/scene_file.h"
 #include "server/sim/subdivision/subdivision_solid.h"
 #include "server/sim/world/world.h"
+#include "tests/fixtures/cell_check.h"
 #include "tests/fixtures/solids.h"
 
 #include <sys/stat.h>
@@ -134,9 +135,9 @@ static void what_is_saved_loads_to_the_same_bits(void)
     REQUIRE(!pal_scene_save(b, in_folder("again"), &diag));
     if (pal_scene_load(in_folder("again/scene.json"), &c, &diag)) CHECK_FAIL("%s", diag.text);
     REQUIRE(c != NULL);
-    CHECK(pal_cells_equal(&b->cells[0], &c->cells[0]));
+    CHECK(cells_equal(&b->cells[0], &c->cells[0]));
     for (int32_t i = 0; i < b->cells[0].n_vertex; i++) b->cells[0].x[3 * i] = a->cells[0].x[3 * i];
-    CHECK(pal_cells_equal(&a->cells[0], &b->cells[0]));
+    CHECK(cells_equal(&a->cells[0], &b->cells[0]));
     CHECK(!memcmp(a->cells[0].x, b->cells[0].x, sizeof(double) * 3 * (size_t)a->cells[0].n_vertex));
     pal_loaded_scene *all[2] = {b, c};
     for (int k = 0; k < 2; k++) {

@@ -2,6 +2,7 @@
  * while it runs and while it is paused; the last who goes ends it. */
 #include "server/base/clock.h"
 #include "server/session/session.h"
+#include "server/sim/transfer/transfer_world.h"
 #include "tests/check.h"
 #include "tests/session/session_scene.h"
 

@@ -3,6 +3,7 @@
 #include "server/num/random.h"
 #include "server/session/sculpt.h"
 #include "server/sim/subdivision/subdivision_solid.h"
+#include "tests/fixtures/cell_check.h"
 #include "tests/session/sculpt_body.h"
 
 static clay_scene clay;
@@ -227,7 +228,7 @@ static void undo_and_redo_bring_back_every_bit(void)
         CHECK(print_of(s.scene, s.world) == print[k]);
         CHECK_INT(pal_sculptor_undo_count(s.sculptor), k);
     }
-    CHECK(pal_cells_equal(pal_sculptor_cells(s.sculptor), &clay.cells));
+    CHECK(cells_equal(pal_sculptor_cells(s.sculptor), &clay.cells));
     CHECK_INT(turn_back(&s, PAL_SCULPT_UNDO), PAL_ERR_REFUSED);
     CHECK_TEXT(diag.text, "there is nothing to undo");
     for (int k = 1; k < 5; k++) {
@@ -348,7 +349,7 @@ static void check_solid(const studio *s)
 {
     const pal_subdivision_solid *solid = pal_world_body(s->world, 0)->model.solid;
     const pal_body *body = pal_world_body(s->world, 0);
-    if (pal_cells_check(pal_sculptor_cells(s->sculptor), NULL, &diag)) CHECK_FAIL("%s", diag.text);
+    if (cells_check(pal_sculptor_cells(s->sculptor), NULL, &diag)) CHECK_FAIL("%s", diag.text);
     double kg = pal_subdivision_solid_mass_kg(solid), sum = 0;
     CHECK(pal_subdivision_solid_volume_m3(solid) > 0);
     for (int i = 0; i < body->n_node; i++) sum += body->node_mass_kg[i];

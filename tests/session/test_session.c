@@ -3,6 +3,7 @@
  * how fast this machine is. */
 #include "server/base/clock.h"
 #include "server/session/session.h"
+#include "server/sim/transfer/transfer_world.h"
 #include "tests/check.h"
 #include "tests/heap_calls.h"
 #include "tests/session/session_scene.h"

@@ -3,7 +3,7 @@
  *
  *     HARD_CASE("plane", "fem", "off rest after 10 s", 100 * rms / size, 0.1, "% S");
  *
- * Cases are those of catalogue.txt, in the order of numerics.md part 3; models are one or several of tet_springs,
+ * Cases are those of catalogue.txt; models are one or several of tet_springs,
  * adaptive_springs, fem, subdivision_fem, separated by a blank. Of figures with the same case, model and words the
  * worst is kept, counts are added up. When the environment names a folder in PAL_HARD_CASES (ctest does), what was
  * recorded is written there at the end, one file for each test; make_table.sh makes tables of them. Builds with

@@ -1,4 +1,4 @@
-/* Hard cases of numerics.md part 3 for adaptive surface springs that last: rigid turns up to ten thousand of them, an
+/* Hard cases (catalogue.txt) for adaptive surface springs that last: rigid turns up to ten thousand of them, an
  * hour at rest under a load, supports put on and taken off while the body is bent. */
 #include "tests/fixtures/adaptive_worlds.h"
 #include "tests/stability/hard_case.h"

@@ -1,4 +1,4 @@
-/* Hard cases of numerics.md part 3 that every model meets at load or at its door: materials, densities, poses and loads
+/* Hard cases (catalogue.txt) that every model meets at load or at its door: materials, densities, poses and loads
  * that are no numbers, elements in the wrong order, of no volume or none at all, a contrast of a million, statics of
  * what nothing holds. */
 #include "tests/stability/four_models.h"

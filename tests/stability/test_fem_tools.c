@@ -1,4 +1,4 @@
-/* Hard cases of numerics.md part 3 for model fem: tools that jump, appear inside, press against one another, and poses
+/* Hard cases (catalogue.txt) for model fem: tools that jump, appear inside, press against one another, and poses
  * and loads that are no numbers. */
 #include "tests/fixtures/fem_tools.h"
 #include "tests/stability/fem_case.h"

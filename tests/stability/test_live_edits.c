@@ -1,6 +1,7 @@
-/* Hard cases of numerics.md part 3 that every model meets while it runs: plausible stiffness at the steps that
+/* Hard cases (catalogue.txt) that every model meets while it runs: plausible stiffness at the steps that
  * documents name, stiffness that jumps, supports put on and taken off, supports that move, two hands, a hand that is
  * gone, an hour at rest. */
+#include "server/sim/transfer/transfer_world.h"
 #include "tests/stability/four_models.h"
 
 static const double step_s = 1.0 / 60;

@@ -1,10 +1,11 @@
-/* Hard cases of numerics.md part 3 for the explicit springs: whatever happens to a body or is asked of it, its state
+/* Hard cases (catalogue.txt) for the explicit springs: whatever happens to a body or is asked of it, its state
  * stays finite, its energy does not rise, and it comes back where the springs determine the way. */
 #include "server/base/vec3.h"
 #include "server/sim/core/best_rotation.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 #include "tests/fixtures/boxes.h"
+#include "tests/fixtures/random.h"
 #include "tests/stability/hard_case.h"
 
 static pal_diagnostic diag;
@@ -13,7 +14,7 @@ static uint64_t seed;
 
 static double uniform(void) /* in [0, 1) */
 {
-    return check_random01(&seed);
+    return random_unit(&seed);
 }
 
 static bool bench_make(box_bench *b, bool fixed)

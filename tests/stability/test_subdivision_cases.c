@@ -1,7 +1,8 @@
-/* Hard cases of numerics.md part 3 for model subdivision_fem: insults from outside. A meganewton, resting for long,
+/* Hard cases (catalogue.txt) for model subdivision_fem: insults from outside. A meganewton, resting for long,
  * tools that jump and appear inside, numbers that are none, elements deleted; and Fig. 10 of paper A, where the same
  * force moves what is painted heavy otherwise. */
 #include "server/mesh/cells/cell_edits.h"
+#include "server/sim/transfer/transfer_world.h"
 #include "tests/stability/hard_case.h"
 #include "tests/stability/subdivision_case.h"
 

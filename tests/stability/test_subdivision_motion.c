@@ -1,4 +1,4 @@
-/* Hard cases of numerics.md part 3 for model subdivision_fem: motion. Drag without end or none, momentum and energy,
+/* Hard cases (catalogue.txt) for model subdivision_fem: motion. Drag without end or none, momentum and energy,
  * nothing held. */
 #include "tests/stability/hard_case.h"
 #include "tests/stability/subdivision_case.h"

@@ -1,4 +1,4 @@
-/* Hard cases of numerics.md part 3 for model subdivision_fem: numbers. Poisson's ratio close to a half, stiffness of
+/* Hard cases (catalogue.txt) for model subdivision_fem: numbers. Poisson's ratio close to a half, stiffness of
  * very different sizes side by side, steps that are too long, lengths and moduli of any size, one element, all held. */
 #include "tests/fixtures/fem_beam.h"
 #include "tests/stability/hard_case.h"

@@ -1,4 +1,4 @@
-/* Hard cases of numerics.md part 3 for model subdivision_fem: shapes. Whatever the control points are put to (a corner
+/* Hard cases (catalogue.txt) for model subdivision_fem: shapes. Whatever the control points are put to (a corner
  * through its cell, all in a plane, on a point, mirrored, blown up, shuffled, swapped), the solid comes back to rest
  * with no element turned over, and its energy does not rise above what the insult put in. No point moves more than 0.2
  * S in a step of the implicit solver, so that the way back from x 100 alone takes 8 s. Operator edges is no gradient of

@@ -5,7 +5,7 @@
  * @typedef {import("./control_table.js").Neighbour} Neighbour
  */
 
-/** smallest length that is distinguished, m: half the last digit of "0.001 mm" is invisible on any screen */
+/** smallest length that is displayed, m: shorter ones are "< 0.001 mm" */
 export const RESOLUTION_M = 1e-6;
 const OLD_S = 1; // an older estimate is displayed with its age; a switch does not use it either
 const SAME_MS = 0.005; // half the last digit of a displayed time
@@ -113,7 +113,7 @@ export function switchText({ text, args = {} }) {
     const { energy_percent, max_frame_move_m, prepare_ms, max_move_m } = args;
     const facts = [];
     if (energy_percent !== undefined)
-        facts.push(`energy ${energy_percent >= 0 ? "+" : "−"}${Math.abs(energy_percent).toFixed(2)} %`);
+        facts.push(`energy ${energy_percent > -0.005 ? "+" : "−"}${Math.abs(energy_percent).toFixed(2)} %`);
     if (max_move_m !== undefined) facts.push(`surface moves ${millimetres(max_move_m)}${boundText(args)}`);
     if (max_frame_move_m !== undefined) facts.push(`${millimetres(max_frame_move_m)} per frame`);
     if (prepare_ms !== undefined)

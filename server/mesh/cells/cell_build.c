@@ -7,14 +7,14 @@
 #include "server/mesh/cells/cells.h"
 
 #include "server/base/vec3.h"
+#include "server/mesh/geometry/tuning.h"
 
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define MAX_ITEMS        (INT32_MAX / 4)
-#define MAX_COORDINATE_M 1e9
+#define MAX_ITEMS (INT32_MAX / 4)
 
 typedef struct builder {
     const pal_cell_loops *in;

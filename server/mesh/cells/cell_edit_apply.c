@@ -2,12 +2,11 @@
 #include "server/mesh/cells/cell_edit_work.h"
 
 #include "server/base/vec3.h"
+#include "server/mesh/geometry/tuning.h"
 #include "server/num/polar.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-#define MAX_COORDINATE_M 1e9
 
 /* ---- delete ---- */
 

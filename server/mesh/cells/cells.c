@@ -83,40 +83,6 @@ pal_err pal_cells_copy(const pal_cells *from, pal_cells *to)
     return PAL_ERR_MEMORY;
 }
 
-static bool same_doubles(const double *a, const double *b, size_t n)
-{
-    for (size_t i = 0; i < n; i++)
-        if (!(a[i] == b[i])) return false;
-    return true;
-}
-
-static bool same_sharpness(const pal_cells *a, const pal_cells *b)
-{
-    for (int32_t v = 0; v < a->n_vertex; v++)
-        if (!(a->vertex_sharpness[v] == b->vertex_sharpness[v])) return false;
-    for (int32_t e = 0; e < a->n_edge; e++)
-        if (!(a->edge[e].sharp == b->edge[e].sharp)) return false;
-    for (int32_t f = 0; f < a->n_face; f++)
-        if (!(a->face[f].sharp == b->face[f].sharp)) return false;
-    return true;
-}
-
-bool pal_cells_equal(const pal_cells *a, const pal_cells *b)
-{
-    if (a->n_vertex != b->n_vertex || a->n_cell != b->n_cell || a->n_face_use != b->n_face_use ||
-        a->n_edge_use != b->n_edge_use || a->n_edge != b->n_edge || a->n_face != b->n_face)
-        return false;
-    if (a->n_cell == 0) return true;
-    /* everything else follows from the loops */
-    for (int32_t i = 0; i <= a->n_cell; i++)
-        if (a->cell_use[i] != b->cell_use[i]) return false;
-    for (int32_t l = 0; l <= a->n_face_use; l++)
-        if (a->face_use[l].first_use != b->face_use[l].first_use) return false;
-    for (int32_t u = 0; u < a->n_edge_use; u++)
-        if (a->edge_use[u].vertex != b->edge_use[u].vertex) return false;
-    return same_sharpness(a, b) && same_doubles(a->x, b->x, 3 * (size_t)a->n_vertex);
-}
-
 /* ---- loops ---- */
 
 void pal_cell_loops_free(pal_cell_loops *loops)

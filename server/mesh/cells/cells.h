@@ -109,8 +109,6 @@ pal_err pal_cells_make(const pal_cell_loops *loops, pal_cells *out, pal_diagnost
 void pal_cells_free(pal_cells *cells);
 /* deep copy; MEMORY */
 pal_err pal_cells_copy(const pal_cells *from, pal_cells *to);
-/* equal numbers everywhere; -0 equals 0 */
-bool pal_cells_equal(const pal_cells *a, const pal_cells *b);
 
 /* the complex as loops again, loop l being face use l, with tags of everything that is not smooth (a face has one for
  * each of its loops, so that a loop may be removed), lines NULL; MEMORY */
@@ -128,10 +126,6 @@ typedef struct pal_cells_fault {
 } pal_cells_fault;
 /* false with the first fault at positions x [n_vertex][3] (NULL: its own); fault may be NULL */
 bool pal_cells_shape_valid(const pal_cells *cells, const double *x, pal_cells_fault *fault);
-
-/* Checks the complex: every index, every pair of mates and radials, every list and mark, then the shape at x
- * [n_vertex][3] (NULL: its own). For use after an edit. REFUSED names the first fault, MEMORY. */
-pal_err pal_cells_check(const pal_cells *cells, const double *x, pal_diagnostic *diag);
 
 /* Measures with positions x [n_vertex][3] (NULL: its own). A face that is not flat counts as the fan of triangles about
  * its corners' mean, so that cells fill the solid exactly. */

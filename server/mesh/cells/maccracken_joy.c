@@ -18,11 +18,11 @@
  * sharpness, so that nothing jumps when an edge begins to be sharpened. Equal sharpnesses give the same. */
 #include "server/mesh/cells/maccracken_joy.h"
 
+#include "server/mesh/geometry/tuning.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define BUDGET ((size_t)512 << 20)
 
 /* one level in the making: the old cells, the rows, and where each new kind of vertex begins */
 typedef struct level {
@@ -509,7 +509,7 @@ pal_err pal_subdivision_make(const pal_cells *control, const pal_subdivision_opt
                              pal_diagnostic *diag)
 {
     pal_subdivision s = {0};
-    double budget = (double)(options->budget_byte ? options->budget_byte : BUDGET);
+    double budget = (double)(options->budget_byte ? options->budget_byte : HIERARCHY_BUDGET_BYTE);
     if (options->n_level < 0 || options->n_level > PAL_SUBDIVISION_MAX)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "subdivision: %d levels asked for, 0 to %d are made",
                                   options->n_level, PAL_SUBDIVISION_MAX);

@@ -1,16 +1,16 @@
 /* Marching tetrahedra on a body-centred cubic lattice.
  *
- * Lattice points are the corners and centres of cubic cells. Two centres on either side of a face make a tetrahedron
- * with each of the face's four edges; all tetrahedra are alike, so the triangles have no preferred direction. A
- * crossing stays 1e-4 of its edge away from both ends, which keeps corners apart and moves no topology. */
+ * Lattice points are the corners and centres of cubic cells. Two centres on either side of a face form a tetrahedron
+ * with each of the face's four edges; all tetrahedra are congruent, so the triangles have no preferred direction. A
+ * crossing stays 1e-4 of its edge away from both ends, which keeps vertices apart and does not change the topology. */
 #include "server/mesh/geometry/contour.h"
 
 #include "server/base/vec3.h"
+#include "server/mesh/geometry/tuning.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-static const double max_point = 2e8;
 static const double end_gap = 1e-4;
 
 typedef struct lattice {
@@ -56,7 +56,7 @@ static void position(const lattice *l, int64_t id, double p[3])
     }
 }
 
-/* samples corners (shift 0) or centres (shift 1/2); border points are outside, whatever the field says */
+/* samples corners (shift 0) or centres (shift 1/2); border points are outside whatever the field */
 static void sample(lattice *l, pal_contour_field *field, const void *self, bool centre)
 {
     int64_t n[3], c[3];
@@ -232,9 +232,9 @@ pal_err pal_contour(pal_contour_field *field, const void *self, const pal_contou
         double n = ceil((box->high_m[a] - box->low_m[a]) / l.h) + 1;
         n_point *= n + 1;
         l.low[a] = box->low_m[a];
-        if (!(n >= 2) || !(n_point <= max_point))
+        if (!(n >= 2) || !(n_point <= CONTOUR_MAX_POINT))
             return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "contour of %.3g lattice points, at most %.3g", n_point,
-                                      max_point);
+                                      CONTOUR_MAX_POINT);
         l.n[a] = (int64_t)n;
     }
     l.n_corner = (l.n[0] + 1) * (l.n[1] + 1) * (l.n[2] + 1);

@@ -1,27 +1,20 @@
 /* Quadric edge collapse in passes: every pass sorts all edges by the error of their collapse and takes the cheapest
  * whose two ends have not been part of a collapse in this pass.
  *
- * A collapse u -> v locks u and v only. The triangles around an unlocked vertex are then still those of the pass's
- * start, less the ones that shrank to an edge, with corners renamed by `remap`; so its ring is known without keeping
- * the adjacency up to date. A collapse is allowed when it keeps the topology (link condition), turns no triangle by
- * more than about 75 degrees and adds at most one thin one. Before each pass badly shaped pairs of triangles flip their
- * common edge. */
+ * A collapse u -> v locks u and v only. The triangles around an unlocked vertex are then those of the start of the
+ * pass, without the ones that shrank to an edge, with corners renamed by `remap`; so its ring is known without updating
+ * the adjacency. A collapse is allowed when it keeps the topology (link condition), rotates no triangle by more than
+ * about 75 degrees and adds at most one thin one. Before each pass badly shaped pairs of triangles flip their common
+ * edge. */
 #include "server/mesh/geometry/decimate.h"
 
 #include "server/base/vec3.h"
+#include "server/mesh/geometry/tuning.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 enum { MAX_RING = 24, MAX_DEGREE = 12 };
-/* pull to the edge's middle, as part of the quadric's area: spreads vertices evenly where the surface is flat */
-static const double pull = 1e-3;
-/* triangles below this shape (0 flat, 0.577 equilateral) are thin */
-static const double thin = 0.12;
-/* triangles below this shape are offered a flip */
-static const double bad_shape = 0.3;
-/* a collapse may make triangles thinner by this in sum: flips mend one thin triangle, but not a cluster of them */
-static const double thin_room = 0.1;
 
 /* x'Ax + 2b'x + c with A symmetric (xx xy xz yy yz zz), and the area it stands for */
 typedef struct quadric {
@@ -56,7 +49,7 @@ static double quadric_at(const quadric *q, const double x[3])
     return ax * x[0] + ay * x[1] + az * x[2] + 2 * pal_dot3(q->b, x) + q->c;
 }
 
-/* where the quadric is least; false when that is not well defined */
+/* minimum of the quadric; false when it is not well defined */
 static bool quadric_minimum(const quadric *q, double x[3])
 {
     const double *a = q->a;
@@ -97,7 +90,7 @@ static void find_quadrics(const pal_surface *s, quadric *all)
     }
 }
 
-/* best place for the collapse of an edge and its error */
+/* best position for the collapse of an edge and its error */
 static double collapse_place(const pass *p, int32_t u, int32_t v, double x[3])
 {
     const double *xu = p->s->x + 3 * (size_t)u, *xv = p->s->x + 3 * (size_t)v;
@@ -105,7 +98,7 @@ static double collapse_place(const pass *p, int32_t u, int32_t v, double x[3])
     for (int k = 0; k < 3; k++) middle[k] = (xu[k] + xv[k]) / 2;
     quadric q = p->q[u];
     quadric_add(&q, &p->q[v]);
-    double w = pull * q.area;
+    double w = MIDPOINT_WEIGHT * q.area;
     q.a[0] += w, q.a[3] += w, q.a[5] += w;
     for (int k = 0; k < 3; k++) q.b[k] -= w * middle[k];
     q.c += w * pal_dot3(middle, middle);
@@ -172,13 +165,13 @@ static double thinness(const double a[3], const double b[3], const double c[3], 
     return sum > 0 ? 2 * pal_norm3(n) / sum : 0;
 }
 
-/* by how much the thin triangles around both ends of an edge are too thin, in sum, before and after its collapse */
+/* sum of the shape deficits of the thin triangles around both ends of an edge, before and after its collapse */
 typedef struct thin_sum {
     double before, after;
 } thin_sum;
 
-/* do the triangles of one end stay upright when it moves to x? other: the end that vanishes with it. The normal of a
- * thin or tiny triangle says nothing, so such a one is compared with the whole ring's. */
+/* Do the triangles of one end keep their orientation when it moves to x? other: the end that vanishes with it. The
+ * normal of a thin or tiny triangle is not defined well, so such a triangle is compared with the whole ring. */
 static bool keeps_orientation(const pass *p, int32_t u, int32_t other, int32_t ring[MAX_RING][2], int n,
                               const double x[3], thin_sum *sum)
 {
@@ -186,15 +179,16 @@ static bool keeps_orientation(const pass *p, int32_t u, int32_t other, int32_t r
     const double *xs = p->s->x, *xu = xs + 3 * (size_t)u;
     for (int k = 0; k < n; k++) {
         shape[k] = thinness(xu, xs + 3 * (size_t)ring[k][0], xs + 3 * (size_t)ring[k][1], normal[k]);
-        sum->before += ring[k][0] == other ? 0 : fmax(0, thin - shape[k]);
+        sum->before += ring[k][0] == other ? 0 : fmax(0, THIN_SHAPE - shape[k]);
         largest = fmax(largest, pal_norm3(normal[k]));
         pal_add3(mean, mean, normal[k]);
     }
     for (int k = 0; k < n; k++) {
         if (ring[k][0] == other || ring[k][1] == other) continue;
-        bool vague = shape[k] < thin || pal_norm3(normal[k]) < largest / 20;
+        bool vague = shape[k] < THIN_SHAPE || pal_norm3(normal[k]) < largest / 20;
         double after[3], *before = vague ? mean : normal[k];
-        sum->after += fmax(0, thin - thinness(x, xs + 3 * (size_t)ring[k][0], xs + 3 * (size_t)ring[k][1], after));
+        sum->after +=
+            fmax(0, THIN_SHAPE - thinness(x, xs + 3 * (size_t)ring[k][0], xs + 3 * (size_t)ring[k][1], after));
         if (!(pal_dot3(before, after) > 0.25 * pal_norm3(before) * pal_norm3(after))) return false;
     }
     return true;
@@ -211,7 +205,7 @@ static bool collapse(pass *p, int32_t u, int32_t v)
     collapse_place(p, u, v, x);
     thin_sum sum = {0, 0};
     if (!keeps_orientation(p, u, v, ru, nu, x, &sum) || !keeps_orientation(p, v, u, rv, nv, x, &sum)) return false;
-    if (sum.after > sum.before + thin_room) return false;
+    if (sum.after > sum.before + THIN_INCREASE) return false;
     pal_copy3(p->s->x + 3 * (size_t)v, x);
     quadric_add(&p->q[v], &p->q[u]);
     p->remap[u] = v;
@@ -287,14 +281,14 @@ static bool flip_improves(const double *a, const double *b, const double *o, con
     return true;
 }
 
-/* turns the longest edge of a badly shaped triangle if that helps; collapses alone cannot mend caps, which have no
- * short edge. Every vertex takes part in one flip at most, so that the fans stay good enough */
+/* flips the longest edge of a badly shaped triangle if that improves it; collapses alone cannot repair caps, which have
+ * no short edge. Every vertex takes part in one flip at most, so that the fans stay valid enough */
 static bool flip(pass *p, int32_t t)
 {
     int32_t *c = p->s->tri + 3 * (size_t)t;
     double n[3];
     const double *xs = p->s->x;
-    if (thinness(xs + 3 * (size_t)c[0], xs + 3 * (size_t)c[1], xs + 3 * (size_t)c[2], n) > bad_shape) return false;
+    if (thinness(xs + 3 * (size_t)c[0], xs + 3 * (size_t)c[1], xs + 3 * (size_t)c[2], n) > FLIP_SHAPE) return false;
     int k = 0, n_edge, n_across;
     double length[3];
     for (int i = 0; i < 3; i++) {

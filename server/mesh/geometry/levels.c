@@ -1,20 +1,17 @@
 /* Detail levels: checks, edges of the coarse surface, then split by split (paper C, pre-processing phase).
  *
- * Departures: the paper stores pointers to parents and children; here they follow from the order of the numbers. It
- * takes any mesh; here what has no winged edges or no stencil is refused by name, and the boundary's corners, which the
- * four-point rule would round off, are found by their angle at rest. */
+ * Departures: the paper stores pointers to parents and children; here they follow from the numbering. It takes any
+ * mesh; here meshes without winged edges or stencils are refused with the reason, and the corners of the boundary,
+ * which the four-point rule would round off, are found by their angle at rest. */
 #include "server/mesh/geometry/levels.h"
 
 #include "server/base/vec3.h"
+#include "server/mesh/geometry/tuning.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#define FLAT       1e-9 /* least height of a face, of its longest edge; least edge, of the surface's diagonal */
-#define FAR_M      1e9
-#define CORNER_COS 0.25881904510252074 /* cos 75 degrees */
-#define BUDGET     ((size_t)512 << 20)
-#define OFFER      "prepare it as voxels: palpate prepare"
+#define OFFER "prepare it as voxels: palpate prepare"
 
 void pal_levels_free(pal_levels *l)
 {
@@ -24,7 +21,7 @@ void pal_levels_free(pal_levels *l)
     memset(l, 0, sizeof *l);
 }
 
-/* ---- what is refused before any edge is known ---- */
+/* ---- checks before any edge is known ---- */
 
 static pal_err check_face(const pal_surface *s, int t, pal_diagnostic *diag)
 {
@@ -42,7 +39,7 @@ static pal_err check_face(const pal_surface *s, int t, pal_diagnostic *diag)
     pal_sub3(u, s->x + 3 * (size_t)c[1], s->x + 3 * (size_t)c[0]);
     pal_sub3(v, s->x + 3 * (size_t)c[2], s->x + 3 * (size_t)c[0]);
     pal_cross3(n, u, v);
-    if (pal_norm3(n) > FLAT * longest * longest) return PAL_ERR_OK;
+    if (pal_norm3(n) > LEVEL_FLAT * longest * longest) return PAL_ERR_OK;
     return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
                               "levels: triangle %d (vertices %d, %d, %d) has no area: clean the surface", t, c[0], c[1],
                               c[2]);
@@ -62,7 +59,7 @@ static pal_err check_input(const pal_surface *s, const pal_levels_options *o, pa
     for (int v = 0; v < s->n_vertex; v++) {
         const double *x = s->x + 3 * (size_t)v;
         for (int a = 0; a < 3; a++)
-            if (!(fabs(x[a]) <= FAR_M))
+            if (!(fabs(x[a]) <= MAX_COORDINATE_M))
                 return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: vertex %d stands at (%g, %g, %g) m", v, x[0],
                                           x[1], x[2]);
     }
@@ -306,7 +303,7 @@ static pal_err get_entries(pal_levels *l, int64_t irregular, size_t budget, pal_
     return l->stencil_vertex && l->stencil_weight ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-/* gives back what the stencils did not need */
+/* returns the memory that the stencils did not need */
 static void trim_entries(pal_levels *l)
 {
     size_t n = (size_t)l->stencil_start[l->n_vertex[l->n_level - 1] - l->n_vertex[0]];
@@ -371,7 +368,7 @@ static pal_err check_edges(const pal_levels *l, double diagonal, pal_diagnostic 
     for (int32_t e = 0; e < l->first_edge[l->n_level]; e++) {
         const int32_t *end = l->edge[e].vertex;
         double length = pal_dist3(l->x + 3 * (size_t)end[0], l->x + 3 * (size_t)end[1]);
-        if (!(length > FLAT * diagonal))
+        if (!(length > LEVEL_FLAT * diagonal))
             return pal_diagnostic_set(
                 diag, PAL_ERR_REFUSED,
                 "levels: the edge of vertices %d and %d of level %d is %.3g m long in a surface of %.3g "
@@ -406,7 +403,7 @@ static pal_err take_coarse(const pal_surface *s, pal_levels *l, const pal_winged
 static pal_err make_levels(const pal_surface *s, const pal_levels_options *o, pal_levels *l, pal_winged_edge *edge,
                            int32_t *face_edge, pal_diagnostic *diag)
 {
-    size_t budget = o->budget_byte ? o->budget_byte : BUDGET;
+    size_t budget = o->budget_byte ? o->budget_byte : HIERARCHY_BUDGET_BYTE;
     int32_t n_edge;
     int64_t irregular = 0;
     PAL_TRY(find_edges(s, edge, face_edge, &n_edge, diag));

@@ -11,6 +11,7 @@
 #include "server/mesh/geometry/contour.h"
 #include "server/mesh/geometry/decimate.h"
 #include "server/mesh/geometry/smooth.h"
+#include "server/mesh/geometry/tuning.h"
 #include "server/mesh/scan/label_volume.h"
 
 #include <stdio.h>
@@ -20,9 +21,6 @@
 enum { DEFAULT_ROUNDS = 60, LAST_ROUNDS = 5, N_BIN = 1 << 16, MAX_RADIUS = 64 };
 /* triangles of the contour for each requested one, and of the lattice for each squared spacing */
 static const double surplus = 3, per_spacing2 = 9;
-/* maximum displacement of a vertex along its normal by smoothing, as a fraction of a voxel: half a voxel of uncertainty
- * of the scan, and the displacement by the blur */
-static const double voxel_reach = 0.75;
 /* the blur's margin may not cost more than 16 times the label's box and this many voxels */
 static const size_t spare_voxel = (size_t)1 << 24;
 
@@ -398,7 +396,7 @@ static pal_err keep_largest_component(pal_surface *s)
     return err;
 }
 
-/* relaxes every vertex within voxel_reach of a voxel's extent along its normal */
+/* relaxes every vertex within SMOOTH_MAX_VOXEL of a voxel's extent along its normal */
 static pal_err smooth_within_voxels(pal_surface *s, const double m[12], int rounds)
 {
     double *normal = malloc((4 * (size_t)s->n_vertex + 4) * sizeof *normal);
@@ -409,7 +407,7 @@ static pal_err smooth_within_voxels(pal_surface *s, const double m[12], int roun
         reach[i] = 0;
         for (int a = 0; a < 3; a++) {
             const double e[3] = {m[a], m[4 + a], m[8 + a]};
-            reach[i] = fmax(reach[i], voxel_reach * fabs(pal_dot3(normal + 3 * i, e)));
+            reach[i] = fmax(reach[i], SMOOTH_MAX_VOXEL * fabs(pal_dot3(normal + 3 * i, e)));
         }
     }
     pal_err err = pal_surface_relax(s, rounds, reach);

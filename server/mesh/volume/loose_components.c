@@ -2,15 +2,12 @@
 #include "server/mesh/volume/loose_components.h"
 
 #include "server/base/vec3.h"
+#include "server/mesh/geometry/tuning.h"
 #include "server/num/union_find.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* fraction of the largest component below which one is dropped silently. A voxel at the default resolutions is 0.04 %
- * of the body or less, a visible lobe is more than a hundredth (tests/mesh/volume/test_loose_components.c) */
-static const double small_share = 0.01;
 
 typedef struct component {
     double volume_m3, moment[3]; /* moment: volume times centre, m^4 */
@@ -45,7 +42,7 @@ static pal_err choose(const char *name, bool largest_only, component *part, int 
         if (part[k].volume_m3 > part[best].volume_m3) best = k;
     }
     for (int k = 0; k < n; k++) {
-        bool small = part[k].volume_m3 < small_share * part[best].volume_m3;
+        bool small = part[k].volume_m3 < LOOSE_FRACTION * part[best].volume_m3;
         part[k].keep = largest_only ? k == best : part[k].fixed || !small;
         if (!largest_only && any_fixed && !part[k].fixed && !small) {
             n_bad++;
@@ -173,19 +170,12 @@ pal_err pal_loose_components_drop(const char *name, const uint8_t *fixed, bool l
 
 static int label_cells(const pal_cells *cells, int32_t *label)
 {
-    int n = 0;
     pal_union_find_init(label, cells->n_cell);
     for (int32_t f = 0; f < cells->n_face; f++)
         if (!pal_cells_face_boundary(cells, f))
             pal_union_find_join(label, cells->face_use[cells->face[f].use[0]].cell,
                                 cells->face_use[cells->face[f].use[1]].cell);
-    /* the root of a set is its smallest member, so that it has its label before the others need it */
-    for (int32_t c = 0; c < cells->n_cell; c++) {
-        int32_t root = pal_union_find_root(label, c);
-        label[c] = root;
-    }
-    for (int32_t c = 0; c < cells->n_cell; c++) label[c] = label[c] == c ? n++ : label[label[c]];
-    return n;
+    return pal_union_find_label(label, cells->n_cell);
 }
 
 static pal_err keep_cells(pal_cells *cells, const int32_t *label, const component *part)

@@ -7,15 +7,11 @@
 
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/kd_tree.h"
+#include "server/mesh/geometry/tuning.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/* |sum of normals| over the root of the sum of squares: below this a node has no defined normal at rest and is not used
- */
-#define MIN_NORMAL 0.5
-/* fraction of its rest length below which an axis shrinks */
-#define COLLAPSED 0.5
 /* distance to a node, in voxel edges, at which a vertex lies on it */
 #define ON_NODE 1e-7
 
@@ -58,11 +54,11 @@ static void tangential(const double a[3], const double b[3], const double X[3], 
     pal_axpy3(out, -pal_dot3(out, X), X);
 }
 
-/* a over its length, or over COLLAPSED times its rest length when that is more; returns the fraction of the latter, at
- * most 1. An axis without a rest length is 0. */
+/* a over its length, or over SKIN_COLLAPSED times its rest length when that is more; returns the fraction of the
+ * latter, at most 1. An axis without a rest length is 0. */
 static double unit_or_less(double a[3], double rest)
 {
-    double length = pal_norm3(a), min = COLLAPSED * rest;
+    double length = pal_norm3(a), min = SKIN_COLLAPSED * rest;
     if (!(min > 0)) {
         pal_set3(a, 0, 0, 0);
         return 0;
@@ -107,7 +103,7 @@ static int find_candidates(const pal_tets *tets, const int32_t *start, const int
             int n_fan = start[i + 1] - start[i];
             if (n_fan == 0) continue;
             double squares = fan_normal(tets->x, i, fan + 2 * (size_t)start[i], n_fan, normal);
-            if (pass == 1 || pal_dot3(normal, normal) > MIN_NORMAL * MIN_NORMAL * squares) candidate[n++] = i;
+            if (pass == 1 || pal_dot3(normal, normal) > SKIN_MIN_NORMAL * SKIN_MIN_NORMAL * squares) candidate[n++] = i;
         }
     return n;
 }

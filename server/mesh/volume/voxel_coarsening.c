@@ -1,11 +1,11 @@
 /* Voxels of twice the edge, by way of a grid. */
 #include "server/mesh/volume/voxel_coarsening.h"
 
+#include "server/mesh/geometry/tuning.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-static const double max_missing = 0.025;
 
 typedef struct grid {
     int n[3];
@@ -59,7 +59,7 @@ static void drop(grid *g, double min_fill)
         all += (double)g->fill[i];
         if ((double)g->fill[i] < min_fill) gone += (double)g->fill[i];
     }
-    for (size_t i = 0; i < n_cell && gone <= max_missing * all; i++)
+    for (size_t i = 0; i < n_cell && gone <= COARSE_MAX_LOSS * all; i++)
         if ((double)g->fill[i] < min_fill) g->fill[i] = 0;
 }
 

@@ -10,21 +10,13 @@
 
 #include "server/base/clock.h"
 #include "server/mesh/geometry/box_tree.h"
+#include "server/mesh/geometry/tuning.h"
 #include "server/mesh/voxel/surface_part.h"
 #include "server/mesh/voxel/voxel_flood.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* the majority decides up to this fraction of the voxels that are already decided */
-#define FEW_DISPUTED 0.05
-/* an open surface must enclose beyond doubt (by two axes or this winding number) at least this fraction of its inside
- * voxels, and of those that two axes claim */
-#define SURE_SHARE   0.5
-#define SURE_WINDING 0.75
-/* length of the sum of area normals over the area: 0 closed, 1 flat */
-#define MAX_ONE_SIDED 0.8
 
 bool pal_scan_plain(const pal_crossings *crossings, pal_bits *inside)
 {
@@ -60,7 +52,7 @@ typedef struct decision {
     pal_surface facing; /* the surface with its parts outward and cavities inward; shares x */
     pal_box_tree *tree; /* of facing */
     double max_winding;
-    int64_t n_sure, n_claimed; /* see SURE_SHARE */
+    int64_t n_sure, n_claimed; /* see SURE_FRACTION */
 } decision;
 
 static void clear_inside(decision *d)
@@ -313,8 +305,8 @@ static pal_err check_encloses(decision *d, bool open, int resolution)
     int64_t n_inside = pal_bits_count(d->inside);
     double area, sided = one_sidedness(d, &area);
     if (open) {
-        if (n_inside > 0 && sided <= MAX_ONE_SIDED && (double)d->n_sure >= SURE_SHARE * (double)n_inside &&
-            (double)d->n_sure >= SURE_SHARE * (double)d->n_claimed)
+        if (n_inside > 0 && sided <= MAX_ONE_SIDED && (double)d->n_sure >= SURE_FRACTION * (double)n_inside &&
+            (double)d->n_sure >= SURE_FRACTION * (double)d->n_claimed)
             return PAL_ERR_OK;
         return pal_diagnostic_set(
             d->diag, PAL_ERR_REFUSED,

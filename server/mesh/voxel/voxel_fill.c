@@ -5,14 +5,13 @@
 #include "server/mesh/voxel/voxels.h"
 
 #include "server/base/clock.h"
+#include "server/mesh/geometry/tuning.h"
 #include "server/mesh/voxel/voxel_classify.h"
 #include "server/mesh/voxel/voxel_fraction.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { MAX_RESOLUTION = 1024, MAX_VOXEL = 50000000 };
 
 void pal_voxels_free(pal_voxels *voxels)
 {

@@ -5,15 +5,14 @@
  * edge rule in the plane of the row's ends and its continuation along the row. */
 #include "server/mesh/voxel/voxel_scanline.h"
 
+#include "server/mesh/geometry/tuning.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 __extension__ typedef __int128 wide;
 
-/* budget of crossings: a body crosses a row a few times, noise whose triangles span the box would do so without bound
- */
-enum { CROSSINGS_PER_ROW = 64, CROSSINGS_PER_TRI = 16 };
 /* rows of at least this many centres are first clipped to the triangle by division */
 enum { WIDE_ROW = 8 };
 

@@ -1,4 +1,4 @@
-/* Settings read from scenes and put into them. */
+/* Configurations read from scenes and applied to them. */
 #include "server/sim/core/configuration.h"
 
 #include "server/mesh/volume/loose_components.h"
@@ -8,12 +8,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LEAST_VOXELS = 2, MOST_VOXELS = 400, MOST_LEVELS = 10, MOST_CUTS = 8, MOST_KEPT = 4000000 };
-enum {
-    FINE_LEVELS = 3
-}; /* subdivisions of the cells whose boundary is filled with voxels: as it is shown, and finer */
+enum { MIN_VOXELS = 2, MAX_VOXELS = 400, MAX_LEVELS = 10, MAX_CUTS = 8, MAX_KEPT_VOXELS = 4000000 };
+/* subdivisions of control cells whose boundary is filled with voxels: as shown, or finer */
+enum { FINE_LEVELS = 3 };
 
-/* cut voxels with less inside are dropped, as long as no more of the volume goes than ...; else (lab/load_case.c) */
+/* cut voxels with less inside are dropped, unless more than most_missing of the volume would go; then those below
+ * keep_fill (solve/load_case.c has the same numbers) */
 static const double drop_fill = 0.25, most_missing = 0.025, keep_fill = 0.02;
 
 static bool is(const char *a, const char *b)
@@ -137,7 +137,7 @@ bool pal_configuration_equal(const pal_configuration *a, const pal_configuration
            near(a->k_volume_J, b->k_volume_J);
 }
 
-/* ---- what goes together ---- */
+/* ---- models that fit ---- */
 
 pal_err pal_configuration_check_model(const pal_body_def *body, const char *model, pal_diagnostic *diag)
 {
@@ -183,7 +183,7 @@ static const char *solver_of(const pal_configuration *s)
 static pal_err check_numbers(const pal_configuration *s, pal_diagnostic *diag)
 {
     bool voxels = is_voxels(s->model), solid = is(s->model, "subdivision_fem");
-    int least = voxels ? LEAST_VOXELS : solid ? -1 : 1, most = voxels ? MOST_VOXELS : solid ? MOST_CUTS : MOST_LEVELS;
+    int least = voxels ? MIN_VOXELS : solid ? -1 : 1, most = voxels ? MAX_VOXELS : solid ? MAX_CUTS : MAX_LEVELS;
     if (s->size != 0 && (s->size < least || s->size > most))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "size: %d %s, wanted %d to %d", s->size,
                                   voxels ? "voxels" : "levels", least, most);
@@ -210,7 +210,7 @@ bool pal_configuration_support_box(const pal_scene *scene, int body, int support
 {
     const pal_body_def *def = &scene->body[body];
     const pal_support_def *from = &def->support[support];
-    /* of the shape that every mesh is made from: nodes of a mesh of whole voxels stand up to one of them beyond it */
+    /* of the shape from which every mesh is made; nodes of a mesh of whole voxels are up to one voxel outside */
     const double *x = def->cells ? def->cells->x : def->mesh->surface.x;
     int n = def->cells ? def->cells->n_vertex : def->mesh->surface.n_vertex;
     int axis = 0;
@@ -244,15 +244,15 @@ static void box_supports(const pal_scene *from, int body, pal_body_def *to)
 
 /* ---- voxels ---- */
 
-/* Planes of the grid go through the border of the first box that cuts the body on an axis, a hair within the box, so
- * that rounding does not put the nodes outside. */
+/* Moves the grid so that its planes pass through the border of the first box that cuts the body on an axis, just within
+ * the box, so that rounding does not put nodes outside. */
 static double ahead_of(double low, double high, double h, double box_low, double box_high)
 {
     const double hair = 1e-6, plane[2] = {(box_low - low) / h + hair, (box_high - low) / h - hair};
     for (int side = 0; side < 2; side++) {
         double t = plane[side], lattice = round(t), within = side == 0 ? lattice - t : t - lattice;
         if (!(t > 0.01 && t < (high - low) / h - 0.01)) continue;
-        /* where a plane of the box's own grid is as good, the grid stays */
+        /* the grid stays where one of its planes is as good */
         return within > -0.5 * hair && within < 1e-4 ? 0 : ceil(t) - t;
     }
     return -1;
@@ -276,7 +276,7 @@ static void align(const pal_body_def *body, const pal_surface *surface, int size
     }
 }
 
-/* share of the surface's volume that the filled voxels miss */
+/* part of the surface's volume outside the filled voxels */
 static double missing(const pal_prepared *mesh)
 {
     double sum = 0, cube = mesh->tets.edge_m * mesh->tets.edge_m * mesh->tets.edge_m;
@@ -284,13 +284,13 @@ static double missing(const pal_prepared *mesh)
     return 1 - sum / fabs(pal_surface_volume(&mesh->surface));
 }
 
-/* what no support holds in voxels of this size is left out, as where a scene is made ready */
+/* drops components without support in voxels of this size, as preparation does */
 static pal_err drop_loose(const pal_body_def *body, const double up[3], pal_prepared *mesh, pal_diagnostic *diag)
 {
     pal_loose_components parts;
     uint8_t *fixed = calloc((size_t)mesh->tets.n_node, sizeof *fixed);
-    if (!fixed) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory to find what is held");
-    pal_body_def_hold(body, up, mesh->tets.x, mesh->tets.n_node, fixed);
+    if (!fixed) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory to find the fixed nodes");
+    pal_body_def_mark_fixed(body, up, mesh->tets.x, mesh->tets.n_node, fixed);
     pal_err err = pal_loose_components_drop(body->name, fixed, false, mesh, &parts, diag);
     free(fixed);
     return err;
@@ -302,7 +302,7 @@ static pal_err fill_voxels(const pal_body_def *body, const double up[3], const p
     pal_prepare_report report;
     pal_diagnostic reason = {{0}};
     pal_voxel_options voxel = {
-        .resolution = size, .border = true, .min_fill = drop_fill, .fill = true, .max_voxel = MOST_KEPT};
+        .resolution = size, .border = true, .min_fill = drop_fill, .fill = true, .max_voxel = MAX_KEPT_VOXELS};
     align(body, surface, size, voxel.ahead);
     pal_err err = pal_prepared_make(surface, &voxel, out, &report, &reason);
     if (!err && missing(out) > most_missing) {
@@ -323,7 +323,7 @@ static pal_err cells_surface(const pal_body_def *body, pal_surface *out, pal_dia
     pal_diagnostic reason = {{0}};
     int32_t *vertex = NULL, *face = NULL;
     pal_err err = pal_subdivision_make(body->cells, &options, &fine, &reason);
-    /* many cells: what is shown of them is fine enough */
+    /* many cells: their shown surface is fine enough */
     if (err == PAL_ERR_BUDGET) {
         options.n_level = 1;
         err = pal_subdivision_make(body->cells, &options, &fine, &reason);
@@ -336,7 +336,7 @@ static pal_err cells_surface(const pal_body_def *body, pal_surface *out, pal_dia
                : PAL_ERR_OK;
 }
 
-/* voxels for a body that has none of that size */
+/* prepares voxels of that size */
 static pal_err make_mesh(const pal_body_def *body, const double up[3], int size, pal_prepared *out,
                          pal_diagnostic *diag)
 {
@@ -435,7 +435,7 @@ static pal_err put_solver(const pal_configuration *now, const pal_configuration 
     return to->tolerance > 0 ? pal_entry_put_number(item, "tolerance", to->tolerance, diag) : PAL_ERR_OK;
 }
 
-/* the voxels that are there serve: nothing was asked for that they do not have */
+/* can the present voxels be used? */
 static bool keeps_mesh(const pal_body_def *body, const pal_configuration *now, const pal_configuration *to)
 {
     if (!is_voxels(to->model)) return true;
@@ -460,13 +460,13 @@ static pal_err change(const pal_scene *from, const pal_configuration *now, const
     if (!is(to->model, "tet_springs") || to->k_distance_J > 0) body->spring_grid = (pal_spring_grid){.n = {0}};
     PAL_TRY(put_model(now, to, &body->model, diag));
     PAL_TRY(put_solver(now, to, &body->solver, diag));
-    /* voxels are not cut open; painted cells are refused before */
+    /* voxels have no cut; painted cells are refused before */
     if (is_voxels(to->model)) body->cells = NULL, body->cut = false;
     if (to->step_s > 0) set->scene.step_s = to->step_s;
     return pal_scene_check(&set->scene, diag);
 }
 
-pal_err pal_configuration_check(const pal_scene *from, int body, const pal_configuration *to, pal_diagnostic *diag)
+static pal_err check(const pal_scene *from, int body, const pal_configuration *to, pal_diagnostic *diag)
 {
     if (body < 0 || body >= from->n_body)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body %d: the scene has %d", body, from->n_body);
@@ -486,7 +486,7 @@ pal_err pal_configuration_make(const pal_scene *from, int body, const pal_config
 {
     pal_configuration now;
     *out = NULL;
-    PAL_TRY(pal_configuration_check(from, body, to, diag));
+    PAL_TRY(check(from, body, to, diag));
     pal_configured_scene *set = calloc(1, sizeof *set);
     if (!set) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a scene");
     set->scene = *from;
@@ -530,7 +530,7 @@ void pal_configured_scene_free(pal_configured_scene *set)
 pal_err pal_configuration_check_live(const pal_scene *scene, int body, const pal_configuration *to,
                                      pal_diagnostic *diag)
 {
-    PAL_TRY(pal_configuration_check(scene, body, to, diag));
+    PAL_TRY(check(scene, body, to, diag));
     double n_node = pal_configuration_estimate_nodes(scene, body, to);
     if (n_node <= PAL_CONFIGURATION_LIVE_NODES) return PAL_ERR_OK;
     return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "size: %d makes about %.2g nodes, a live switch takes %d at most",

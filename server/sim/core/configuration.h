@@ -51,16 +51,14 @@ typedef struct pal_configured_scene {
 /* The part that a support of the kind `lowest` fixes, as a box, so that another mesh fixes the same part; false:
  * another kind, or `up` is along no axis */
 bool pal_configuration_support_box(const pal_scene *scene, int body, int support, pal_support_def *out);
-/* The checks of pal_configuration_make that need no mesh: the model does not fit, an unknown word, a size or number out
- * of range. [any] */
-pal_err pal_configuration_check(const pal_scene *from, int body, const pal_configuration *to, pal_diagnostic *diag);
 /* Makes the scene of a configuration. It keeps material, supports, regions, effects, tools and the keys of model and
  * solver that a configuration does not have. Voxels are prepared again from the body's shown surface when the size
  * differs, or when finite elements replace another model and there is no measured fill: cut voxels count by their
  * filled share, those less than a quarter full are dropped unless more than 2.5 % of the volume would go with them, and
  * the planes of the voxels pass through the border of the first support or region that cuts the body
  * (solve/load_case.h). A support of the lowest part becomes a box. *out: heap, pal_configured_scene_free; borrows from
- * `from`, which outlives it. REFUSED as pal_configuration_check; BUDGET, MEMORY */
+ * `from`, which outlives it. REFUSED: a model that does not fit the body, an unknown word, a size or number out of
+ * range; BUDGET, MEMORY */
 pal_err pal_configuration_make(const pal_scene *from, int body, const pal_configuration *to, pal_diagnostic *diag,
                                pal_configured_scene **out);
 void pal_configured_scene_free(pal_configured_scene *scene); /* NULL is fine */
@@ -71,8 +69,8 @@ double pal_configuration_estimate_nodes(const pal_scene *from, int body, const p
 
 /* largest mesh that is made while sessions run, nodes: it keeps their memory bounded (tests/session) */
 enum { PAL_CONFIGURATION_LIVE_NODES = 100000 };
-/* pal_configuration_check, and REFUSED for a mesh of more than PAL_CONFIGURATION_LIVE_NODES nodes. Asked before a
- * configuration is offered to a running session. [any] */
+/* The checks of pal_configuration_make that need no mesh, and REFUSED for a mesh of more than
+ * PAL_CONFIGURATION_LIVE_NODES nodes. Asked before a configuration is offered to a running session. [any] */
 pal_err pal_configuration_check_live(const pal_scene *scene, int body, const pal_configuration *to,
                                      pal_diagnostic *diag);
 #endif

@@ -1,11 +1,11 @@
-/* Slots and strips. */
+/* Order of nodes, strips and loose blocks. */
 #include "server/sim/core/simd_blocks.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* a strip with fewer constraints than this costs more than its lanes are worth */
+/* a strip with fewer elements costs more than a loose block */
 enum { LEAST_LANES = 2, TILE = 128 };
 
 typedef struct lattice {
@@ -14,7 +14,7 @@ typedef struct lattice {
     int half[3], n_class; /* half of the nodes along each sorted axis; their product  */
 } lattice;
 
-/* false: the nodes stand on no lattice of edge h, or on one that is nearly empty */
+/* false: the nodes form no lattice of edge h, or a nearly empty one */
 static bool find_lattice(const double *x, int n_node, double edge_m, lattice *to)
 {
     double high[3];

@@ -1,9 +1,9 @@
-/* Row edge_distance: every edge keeps its length. C = (l - l0)/l0, E = k/2 C^2, f_i = +(k C + c C') (d/l)/l0 and the
- * opposite on j, d from i to j (paper B 4.1, F_D).
+/* Component edge_distance: every edge keeps its length. C = (l - l0)/l0, E = k/2 C^2, f_i = +(k C + c C') (d/l)/l0 and
+ * the opposite on j, d from i to j (paper B 4.1, F_D).
  *
  * Departures: erratum B1 (the paper's force lacks 1/l0^2). An edge shorter than 1e-9 of its rest length has no
  * direction and takes its rest direction, so that a body collapsed to a plane or a point opens again. Where tetrahedra
- * are turned over its edges keep vectors (spring_recovery.h), whose forces and energy are this row's. */
+ * are inverted its edges keep vectors (spring_recovery.h), whose forces and energy are this row's. */
 #include "server/sim/core/effect_list.h"
 #include "server/sim/springs/spring_recovery.h"
 

@@ -1,4 +1,4 @@
-/* Row face_area: every triangle of the mesh, inner ones too, keeps its area. C = (A - A0)/A0, E = k/2 C^2,
+/* Component face_area: every triangle of the mesh, inner ones too, keeps its area. C = (A - A0)/A0, E = k/2 C^2,
  * f_a = -(k C + c C') n x (x_c - x_b)/(2 A0) and cyclic, n the unit normal (paper B 4.1, F_A).
  *
  * Departures: errata B2, B3, B5 (true gradients: the paper's sign pushes away from A0 and its equal magnitudes create

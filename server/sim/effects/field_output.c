@@ -2,16 +2,16 @@
  * or volume distortion at the shown vertices. The row is there while somebody looks: pal_world_field adds it to a
  * running world, or the scene has an entry for it. It takes no part in the simulation: nothing that moves reads it.
  *
- * All but displacement: every FORCE row that can measure adds its value times volume to the nodes of its elements, and
- * the volume; a node shows the quotient, the mean of its elements weighted by volume. A shown vertex takes the mean of
- * the nodes that it is skinned to, with the skin's own weights (mesh/skin.h), or is a node itself. Displacement is the
- * distance of a shown vertex from where it is at rest. A number that is not finite shows as 0: that such a body
- * diverged is for its guard to say.
+ * All but displacement: every FORCE component that can measure adds its value times volume to the nodes of its
+ * elements, and the volume; a node shows the quotient, the mean of its elements weighted by volume. A shown vertex
+ * takes the mean of the nodes that it is skinned to, with the skin's own weights (mesh/volume/skin.h), or is a node
+ * itself. Displacement is the distance of a shown vertex from where it is at rest. A number that is not finite shows as
+ * 0: that such a body diverged is for its guard to say.
  *
- * A body that adapts (sim/adaptive_surface.h) shows 0 at vertices out of use.
+ * An adaptive body (adaptive_surface.h) shows 0 at vertices out of use.
  *
  * Keys: field ("displacement" | "von_mises" | "energy" | "stiffness" | "strain" | "distortion"), rate_hz (10): so often
- * in simulated time it is taken anew. */
+ * in simulated time it is taken again. */
 #include "server/sim/core/effect_list.h"
 
 #include <math.h>

@@ -1,13 +1,12 @@
-/* Freezes a body that diverges, so that one bad body never takes the session with it (numerics.md part 3).
+/* Freezes a body that diverges, so that one bad body never takes the session with it.
  *
  * Diverged means: a position or velocity is not finite, a node is farther than `reach` box diagonals from its rest
  * place, or the root mean square speed is beyond `speed_m_s`. The last good positions (a copy of every step) come back,
  * standing still, and the body stays as it is until reset: body->frozen is what says so (the world's step reports it),
- * body->why names the point, the element and the number.
- * Of a body whose points carry nodes (pal_body.embed) the points are looked at and put back, the speed is that of the
- * nodes.
- * Of a body that adapts (sim/adaptive_surface.h) the active points are looked at and copied. Which are active is not
- * taken back: one that came into use since the last good state is put between the ends of its edge. */
+ * body->reason names the point, the element and the number.
+ * Of a body whose points carry nodes (body.interpolation) the points are looked at and put back, the speed is that of
+ * the nodes. Of an adaptive body (adaptive_surface.h) the active points are looked at and copied. Which are active is
+ * not taken back: one that came into use since the last good state is put between the ends of its edge. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect.h"
 #include "server/sim/core/sums.h"
@@ -18,7 +17,7 @@
 typedef struct finite_guard {
     pal_body *body;
     double *x;      /* last good positions [n_dof][3] */
-    uint32_t *kept; /* turn in which a point was copied last, of a body that adapts; else NULL [n_dof] */
+    uint32_t *kept; /* turn in which a point was copied last, of an adaptive body; else NULL [n_dof] */
     uint32_t turn;
     double reach;
     double speed_m_s, asked_speed_m_s; /* in use; as the scene gave it, 0: from the material */
@@ -45,7 +44,7 @@ static void keep(finite_guard *guard, const pal_body *body)
     memcpy(guard->x, body->x, 3 * sizeof(double) * (size_t)body->n_dof);
 }
 
-/* where a point of a body that adapts was in the last good state, or would have been */
+/* where a point of an adaptive body was in the last good state, or would have been */
 static void last_place(const finite_guard *guard, const pal_levels *levels, int32_t i, double x[3])
 {
     int32_t edge = pal_levels_vertex_parent(levels, i);
@@ -155,7 +154,7 @@ static pal_err run(void *self, pal_step *step)
 {
     finite_guard *guard = self;
     pal_body *body = step->body;
-    /* a body that the solver froze for a state that is no number comes here frozen and gets its last good state too */
+    /* a body that the solver froze for a state that is not finite comes here frozen and gets its last good state too */
     if (sound(guard, body)) {
         if (!body->frozen) keep(guard, body);
         return PAL_ERR_OK;

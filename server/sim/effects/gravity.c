@@ -1,4 +1,4 @@
-/* Row gravity: f = -m g up, energy m g (up . x). Key: acceleration_m_s2 (the scene's gravity_m_s2). */
+/* Component gravity: f = -m g up, energy m g (up . x). Key: acceleration_m_s2 (the scene's gravity_m_s2). */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 

@@ -3,7 +3,7 @@
  * A node at X at rest is at  c + R(s angle) (X - c) + s shift  at time t, c being the centroid of the row's nodes at
  * rest and R the turn about `turn_axis`. s goes smoothly from 0 to 1 in rise_s, (1 - cos(pi t / rise)) / 2, at least
  * within one step of the scene, and stays; with period_s it is multiplied by (1 - cos(2 pi t / period)) / 2. In each
- * sub-step the nodes get the velocity that brings them to their place at its end; solvers keep it (pal_body.held 2).
+ * sub-step the nodes get the velocity that brings them to their place at its end; solvers keep it (PAL_PRESCRIBED).
  * The path depends on time alone, so a restart or another sub-step gives the same places.
  *
  * Keys: low_m and high_m (a box, body frame) or lowest (0.05: share of the body's height along `up`), shift_m (0 0 0),

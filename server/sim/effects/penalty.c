@@ -1,5 +1,5 @@
-/* Row penalty: nodes held where they rest by strong springs instead of being no unknowns (A 3.3: "constraints via the
- * penalty method", the other way being supports, whose points are dropped).
+/* Component penalty: nodes held where they rest by strong springs instead of being no unknowns (A 3.3: "constraints via
+ * the penalty method", the other way being supports, whose points are dropped).
  *
  *     f_i = -k w_i (x_i - X_i),  w_i the node's share of the row's mass, so that refinement changes nothing
  *

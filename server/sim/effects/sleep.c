@@ -1,19 +1,18 @@
-/* Row sleep: a body at rest costs next to nothing until something comes near (numerics.md part 3: "sleep below
- * threshold").
+/* Component sleep: a body at rest costs next to nothing until something comes near .
  *
  * It falls asleep when for `rest_time_s` of simulated time no point was faster than speed_1_s S, the triangles were the
  * same, no tool was near, no row's force changed by itself with time and refinement had nothing left to do, and when
  * after that the forces left over would move it by less than rest_1_s2 S in s^2, on average over its mass (S: the
  * body's box diagonal). Velocities are then 0, positions stay as they are to the bit, and none of the body's rows is
- * run. What CONTACT rows knew of tools is forgotten, as after a reset.
+ * run. What CONTACT components knew of tools is forgotten, as after a reset.
  *
- * It wakes in the step in which a tool comes as near as the CONTACT rows reach (their hook reach_m), swept along the
- * tool's way and before contact; and by what the world does to it: a load, a material, a brush, a switched row, a
+ * It wakes in the step in which a tool comes as near as the CONTACT components reach (their hook reach_m), swept along
+ * the tool's way and before contact; and by what the world does to it: a load, a material, a brush, a switched row, a
  * reset. A tool that is near where the shown surface is farther away than one triangle's edge keeps it awake, so that
  * nearness is a matter of vertices alone; so does one that holds or presses the body, wherever it is by now: tissue
- * follows no farther than the tool's cap pulls, and has to come back when it is let go.
+ * follows no farther than the tool's cap pulls, and has to come back when it is released.
  *
- * Departure: numerics.md asks for a threshold of speed alone; a body that creeps against a drag of 1e6 times the
+ * A threshold of speed alone is not enough: a body that creeps against a drag of 1e6 times the
  * critical one is slow and not at rest, hence the forces.
  *
  * Keys: rest_time_s (0.5), speed_1_s (1e-4), rest_1_s2 (1e-4). */
@@ -44,7 +43,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     return PAL_ERR_OK;
 }
 
-/* no point moves; a speed that is no number is not slow */
+/* no point moves; a speed that is not finite is not slow */
 static bool slow(const sleeper *row, const pal_body *body)
 {
     double most = row->speed_1_s * body->length_scale_m, most2 = most * most;

@@ -1,8 +1,8 @@
 /* Shown vertices are the surface nodes of the simulated mesh themselves: no skin, the boundary faces are what is
  * shown.
  *
- * A body that adapts (sim/adaptive_surface.h) shows all its points, those out of use where they are at rest, and the
- * triangles of its present leaves; a step costs what its active points do. Of a solid (sim/subdivision_solid.h) the
+ * An adaptive body (adaptive_surface.h) shows all its points, those out of use where they are at rest, and the
+ * triangles of its present leaves; a step costs what its active points do. Of a solid (subdivision_solid.h) the
  * model has said what is its boundary and which node each vertex is. */
 #include "server/sim/core/effect.h"
 
@@ -11,7 +11,7 @@
 typedef struct surface_output {
     pal_body *body;
     pal_surface surface; /* boundary faces on shown vertices; arena memory, never freed on its own */
-    /* bodies that adapt: points shown at the last revision */
+    /* adaptive bodies: points shown at the last revision */
     uint64_t revision;
     int n_was;
     int32_t *was; /* [n_was] */

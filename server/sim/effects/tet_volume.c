@@ -1,4 +1,4 @@
-/* Row tet_volume: every tetrahedron keeps its signed volume, so that an inverted one turns back. C = (V - V0)/V0,
+/* Component tet_volume: every tetrahedron keeps its signed volume, so that an inverted one turns back. C = (V - V0)/V0,
  * E = k/2 C^2, f_a = -(k C + c C') dV/dx_a / V0 (paper B 4.1, F_V).
  *
  * Departures: errata B3, B4 (true gradients, area/3 each, not unit directions; 1/V0^2; V0 is the rest volume, signed by

@@ -1,7 +1,8 @@
-/* Row viscous: f = -k_damp v with k_damp = rate m, paper B 4.1's drag. Key: rate_1_s (the material's damping_1_s).
+/* Component viscous: f = -k_damp v with k_damp = rate m, paper B 4.1's drag. Key: rate_1_s (the material's
+ * damping_1_s).
  *
  * Departure: the paper applies it explicitly; a solver that knows the hook `drag` divides by 1 + dt rate instead, which
- * no rate can upset (numerics.md 1 B). */
+ * no rate can upset. */
 #include "server/sim/core/effect_list.h"
 
 typedef struct viscous {

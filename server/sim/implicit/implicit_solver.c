@@ -3,13 +3,13 @@
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
+#include "server/sim/core/step_guard.h"
 #include "server/sim/core/sums.h"
 #include "server/sim/subdivision/subdivision_mass.h"
 
 #include <limits.h>
 #include <string.h>
 
-static const double max_move_S = 0.2;
 /* of a step's loads: residuals below are not worth an iteration, so that a body at rest costs none */
 static const double floor_share = 1e-7;
 /* of 10 E h^2 (load_cap_N), the same for a body without loads: forces that move a node by less of an element are the
@@ -19,10 +19,10 @@ static const double still_share = 1e-11;
 enum { rescue_newton = 8 };
 /* a stage whose equations are solved may gain a little by its own error of time; more than this share counts */
 static const double gain_share = 0.01;
-/* sub-steps that may gain energy in spite of all iterations before the body has to stand still in such; so many without
- * one in between and they are counted anew */
-enum { patience = 30, calm_steps = 30 };
-/* columns of an embedded body's matrices found anew in a step, each the work of one of conjugate gradients' */
+/* s. Sub-steps of this much time in all may gain energy in spite of all iterations before the body has to stand still
+ * in such: an inverted body needs a few of them to recover. After as much time without one they are forgotten */
+static const double rise_s = 0.5;
+/* columns of an embedded body's matrices found again in a step, each the work of one of conjugate gradients' */
 enum { PROBES_A_STEP = 4 };
 
 static size_t bytes3(const pal_implicit *core)
@@ -126,22 +126,22 @@ static pal_err factor_at_rest(pal_implicit *core)
     return err;
 }
 
-pal_err pal_implicit_make(const pal_implicit_options *wish, pal_build *build, double share, pal_implicit **out)
+pal_err pal_implicit_make(const pal_implicit_options *options, pal_build *build, double share, pal_implicit **out)
 {
     pal_body *body = build->body;
     pal_implicit *core = PAL_NEW(build->arena, pal_implicit, 1);
     if (!core) return PAL_ERR_MEMORY;
     /* from here on the row's destroy takes care of what was made */
     *out = core;
-    core->wish = *wish;
-    core->tau_rest_s = share * fmin(build->scene->step_s, wish->substep_s);
+    core->options = *options;
+    core->tau_rest_s = share * fmin(build->scene->step_s, options->substep_s);
     core->density = build->def->material.density_kg_m3;
     PAL_TRY(pal_system_make(build, &core->system));
     PAL_TRY(make_arrays(core, build->arena));
     if (core->system.n_free == 0) return PAL_ERR_OK;
     PAL_TRY(pal_system_pattern(&core->system, build->arena, &core->blocks));
     PAL_TRY(pal_node_rotations_make(&core->system, build->arena, &core->turns));
-    core->turns.any &= wish->warp;
+    core->turns.any &= options->warp;
     PAL_TRY(pal_warp_make(&core->blocks, body, &core->turns, true, build->arena, &core->warp));
     pal_err err = factor_at_rest(core);
     if (!err) err = pal_compliance_solver_make(&core->system, &core->turns, &core->blocks, build->arena, &core->answer);
@@ -208,7 +208,7 @@ static double residual(pal_implicit *core, double tau, const double *velocity, d
     return norm(core, b);
 }
 
-/* of an embedded body: what is neither of rows nor of contact. Held points count too, with what they have in common at
+/* of an embedded body: what is neither of rows nor of contact. Fixed points count too, with what they have in common at
  * any V of the same stage */
 static double embedded_potential(pal_implicit *core, const double *velocity)
 {
@@ -262,7 +262,7 @@ static void solve_linear(pal_implicit *core, double target)
         memcpy(v, core->start, bytes3(core));
         for (int i = 0; i < core->cg.n; i++) r[i] += q[i];
     }
-    int n = pal_conjugate_gradient_run(&core->cg, v, target, 1, core->wish.iterations);
+    int n = pal_conjugate_gradient_run(&core->cg, v, target, 1, core->options.iterations);
     core->report.n_cg += n;
     if (n > core->max_cg) core->max_cg = n;
 }
@@ -298,7 +298,7 @@ static void keep_momentum(pal_implicit *core)
 static void clamp_moves(pal_implicit *core, double tau)
 {
     pal_body *body = core->system.body;
-    double most = max_move_S * body->length_scale_m / tau, longest = 0, mean[3] = {0, 0, 0}, mass = 0;
+    double most = pal_guard_max_move_m(body) / tau, longest = 0, mean[3] = {0, 0, 0}, mass = 0;
     for (int i = 0; i < body->n_dof && core->system.n_free == body->n_dof; i++) {
         pal_axpy3(mean, body->mass_kg[i], core->vs + 3 * i);
         pal_axpy3(mean, -body->mass_kg[i], core->start + 3 * i);
@@ -340,7 +340,7 @@ static void search(pal_implicit *core, double tau)
     for (int i = 0; i < body->n_dof; i++) {
         pal_sub3(way + 3 * i, v + 3 * i, core->start + 3 * i);
         slope -= pal_dot3(core->moved + 3 * i, way + 3 * i);
-        /* where led nodes move on, the potential before and after are not of one problem */
+        /* where prescribed nodes move on, the potential before and after are not of one problem */
         if (body->support[i] && pal_dot3(way + 3 * i, way + 3 * i) > 0) return;
     }
     if (!(slope < 0)) return;
@@ -402,7 +402,7 @@ static double total_energy(pal_implicit *core, bool moved, double *slack)
     return kinetic + rows - work;
 }
 
-/* led nodes put in work that nobody counts */
+/* prescribed nodes put in work that nobody counts */
 static bool is_led(const pal_body *body)
 {
     for (int i = 0; i < body->n_dof; i++) {
@@ -453,7 +453,7 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
 {
     pal_body *body = core->system.body;
     pal_solve_report *to = &core->report;
-    int most = core->wish.newton;
+    int most = core->options.newton;
     uint64_t again_ns = 0;
     open_stage(core, tau);
     for (int k = 0;; k++) {
@@ -464,7 +464,7 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
             core->reference = fmax(size, floor_share * fmax(tau * load_size(core), left));
             core->reference = fmax(core->reference, tau * still_N(body) * sqrt(body->n_dof));
         }
-        double best = core->wish.tolerance * core->reference;
+        double best = core->options.tolerance * core->reference;
         to->residual = core->reference > 0 ? left / core->reference : 0;
         to->converged = k > 0 && left <= best;
         if (to->converged || k == most || !isfinite(left)) {
@@ -473,15 +473,15 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
             return PAL_ERR_OK;
         }
         /* an iteration of several need not be solved better than the next one starts */
-        iterate(core, tau, core->wish.newton > 1 ? fmax(0.3 * best, 1e-2 * left) : best);
-        if (core->wish.newton > 1) {
+        iterate(core, tau, core->options.newton > 1 ? fmax(0.3 * best, 1e-2 * left) : best);
+        if (core->options.newton > 1) {
             if (core->system.has_energy) search(core, tau);
             continue;
         }
         to->residual = core->reference > 0 ? core->cg.residual / core->reference : 0;
         to->converged = core->cg.residual <= best;
         /* from here on all is a rescue: the search, and the iterations that follow it */
-        if (most > core->wish.newton) body->safeguards.ns += pal_clock_ns() - again_ns;
+        if (most > core->options.newton) body->safeguards.ns += pal_clock_ns() - again_ns;
         if (!rises(core, 0)) return PAL_ERR_OK;
         core->energy_rose = most == rescue_newton;
         if (core->energy_rose) return PAL_ERR_OK;
@@ -522,15 +522,14 @@ bool pal_implicit_begin(pal_implicit *core, pal_step *step)
         return false;
     }
     pal_system_interpolate(&core->system);
-    for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->recover) (void)step->force[i].effect->recover(step->force[i].self, step);
+    (void)pal_guard_recover(step);
     core->report.n_newton = core->report.n_cg = core->max_cg = 0;
     core->energy_rose = false;
     pal_system_linearise_contact(&core->system, step);
     if (core->system.has_contact) core->system.has_contact = contact_acts(core);
     step->drag_separate = true;
     double slack;
-    core->guarded = core->wish.watch && core->wish.newton == 1 && core->system.has_energy && !is_led(body);
+    core->guarded = core->options.watch && core->options.newton == 1 && core->system.has_energy && !is_led(body);
     if (core->guarded) core->start_energy_J = total_energy(core, false, &slack);
     return true;
 }
@@ -580,16 +579,16 @@ static void keep_probed(pal_implicit *core, pal_step *step)
     (void)pal_warp_refresh(&core->answer.warp, &core->blocks, true, step->dt_s);
 }
 
-/* Is it time to stand still? Forces that no energy has, as those of elements turned over, which borrow rotations, may
+/* Is it time to stand still? Forces that no energy has, as those of elements inverted, which borrow rotations, may
  * lead in a circle: there is more energy than at the sub-step's begin after all iterations, now and then for ever. A
  * tangled body needs such steps to get out, no more than a few. */
-static bool circles(pal_implicit *core)
+static bool circles(pal_implicit *core, double dt_s)
 {
-    if (core->energy_rose)
-        core->n_energy_rise++, core->n_steady = 0;
-    else if (core->n_steady++ >= calm_steps)
-        core->n_energy_rise = 0;
-    return core->energy_rose && core->n_energy_rise > patience;
+    const double limit_s = rise_s * (1 + 1e-9);
+    core->steady_s = core->energy_rose ? 0 : core->steady_s + dt_s;
+    if (core->energy_rose) core->energy_rise_s += dt_s;
+    if (core->steady_s > limit_s) core->energy_rise_s = 0;
+    return core->energy_rose && core->energy_rise_s > limit_s;
 }
 
 /* the body goes back and stands there; what nothing holds goes on as a whole, with its momentum */
@@ -611,14 +610,13 @@ static void stand_still(pal_implicit *core, double dt_s)
 void pal_implicit_end(pal_implicit *core, pal_step *step)
 {
     pal_body *body = core->system.body;
-    if (!core->sound && !pal_body_finite(body)) {
-        pal_body_stop_bad(body, "");
+    if (!core->sound && !pal_guard_check_finite(body)) {
         memcpy(body->x, core->x0, bytes3(core));
         memset(body->v, 0, bytes3(core));
         pal_body_update_nodes(body);
         return;
     }
-    if (!body->mass_operator && circles(core)) stand_still(core, step->dt_s);
+    if (!body->mass_operator && circles(core, step->dt_s)) stand_still(core, step->dt_s);
     pal_body_update_nodes(body);
     pal_warp_step(&core->warp);
     pal_warp_step(&core->answer.warp);
@@ -627,7 +625,7 @@ void pal_implicit_end(pal_implicit *core, pal_step *step)
         keep_probed(core, step);
         return;
     }
-    if (!core->wish.refresh || core->max_cg <= core->wish.refresh_iterations) return;
+    if (!core->options.refresh || core->max_cg <= core->options.refresh_iterations) return;
     if (core->warp.wait > 0 || core->warp.pause > 0) return;
     pal_system_assemble(&core->system, &core->blocks);
     (void)pal_warp_refresh(&core->warp, &core->blocks, false, step->dt_s);
@@ -638,7 +636,7 @@ void pal_implicit_end(pal_implicit *core, pal_step *step)
 double pal_implicit_limit(void *self, pal_step *step)
 {
     const pal_implicit *core = self;
-    return pal_body_finite(step->body) ? core->wish.substep_s : (double)NAN;
+    return pal_body_finite(step->body) ? core->options.substep_s : (double)NAN;
 }
 
 pal_err pal_implicit_material(void *self, const pal_body *body, const pal_material *material, pal_diagnostic *diag)
@@ -670,7 +668,7 @@ void pal_implicit_reset(void *self, const pal_body *body)
 {
     pal_implicit *core = self;
     (void)body;
-    core->n_energy_rise = core->n_steady = 0;
+    core->energy_rise_s = core->steady_s = 0;
     if (core->system.n_free == 0) return;
     pal_node_rotations_reset(&core->turns);
     pal_compliance_solver_reset(&core->answer);

@@ -1,6 +1,6 @@
-/* Inertia relief: the loads of a body without supports are balanced by the inertia of the rigid acceleration they
- * cause, and what a rigid motion is, is taken out of displacements. Positions are those about which the body's internal
- * forces have no moment. Thread: [sim]. */
+/* Inertia relief: the loads of a body without supports are balanced by the inertia of the rigid acceleration that they
+ * cause, and the rigid part is removed from displacements. Positions are those about which internal forces have no
+ * moment. Thread: [sim]. */
 #ifndef PAL_SIM_IMPLICIT_INERTIA_RELIEF_H
 #define PAL_SIM_IMPLICIT_INERTIA_RELIEF_H
 #include "server/sim/core/body.h"

@@ -1,7 +1,7 @@
-/* A Cholesky factor of the body at some reference state, turned with the body: z = W A0^-1 W' r, W the rotation of each
- * point since that state (numerics.md part 2, "warped by nodal rotations"; after Mueller et al. 2002 and Courtecuisse
- * et al. 2010). One factor serves a body however far it has turned and bent; when it serves too badly, another one is
- * made of the present state on a spare thread.
+/* A Cholesky factor of the body at a reference state, rotated with the body: z = W A0^-1 W' r, W being the rotation of
+ * each dof since that state (warped stiffness: Mueller et al. 2002; Courtecuisse et al. 2010). One factor serves a body
+ * however far it turns and bends; when solves with it need too many iterations, another is made of the present state on
+ * a spare thread.
  *
  * Deterministic: a refreshed factor comes into use a number of steps after its begin that follows from its operation
  * count, never from the clock. Thread: [load] to make, then [sim]. */
@@ -18,8 +18,9 @@ typedef struct pal_node_rotations {
     double *quat; /* w x y z                    [n_dof][4] */
 } pal_node_rotations;
 pal_err pal_node_rotations_make(const pal_system *system, pal_arena *arena, pal_node_rotations *out);
-void pal_node_rotations_reset(pal_node_rotations *turns);                            /* all 1 */
-void pal_node_rotations_update(pal_node_rotations *turns, const pal_system *system); /* at the rows' last linearise */
+void pal_node_rotations_reset(pal_node_rotations *turns); /* all 1 */
+void pal_node_rotations_update(pal_node_rotations *turns,
+                               const pal_system *system); /* at the components' last linearise */
 
 typedef struct pal_warp {
     int n_dof;
@@ -37,7 +38,7 @@ typedef struct pal_warp {
     double analyse_s, factor_s;
 } pal_warp;
 
-/* analyses the pattern, held nodes left out; there is no factor yet. MEMORY. [load] */
+/* analyses the pattern, fixed nodes left out; there is no factor yet. MEMORY. [load] */
 pal_err pal_warp_make(const pal_block_matrix *pattern, const pal_body *body, const pal_node_rotations *turns,
                       bool single, pal_arena *arena, pal_warp *out);
 void pal_warp_destroy(pal_warp *warp);

@@ -5,11 +5,11 @@
  * area of the coarse triangles, the density of regions at their middles), k_spring_N_m (of a spring of level 0; absent:
  * sqrt(3)/2 E thickness), c_spring_Ns_m (absent: 0.02 sqrt(k_0 m_0); 0: none), law ("membrane" | "paper"), mass
  * ("faces" | "nodes"), place
- * ("linear" | "butterfly"), k_shape_N_m (anchor of a node of level 0; absent: 0.3 k_0; 0: no such row), c_shape_Ns_m
- * (absent: 0.6 sqrt(k'_0 m_0), a damping ratio of 0.3), frame ("body": anchors hang on the best-fit rigid frame,
- * "world": on the rest place as in the paper; absent: world where something is held, else body), refine (true; false:
- * no such row), memory_MB (512; MiB that the body may take on its finest level with its rows, tools and what is shown
- * of it). m_0 is the mass of a node of level 0.
+ * ("linear" | "butterfly"), k_shape_N_m (anchor of a node of level 0; absent: 0.3 k_0; 0: no such component),
+ * c_shape_Ns_m (absent: 0.6 sqrt(k'_0 m_0), a damping ratio of 0.3), frame ("body": anchors hang on the best-fit rigid
+ * frame, "world": on the rest place as in the paper; absent: world where something is held, else body), refine (true;
+ * false: no such component), memory_MB (512; MiB that the body may take on its finest level with its rows, tools and
+ * what is shown of it). m_0 is the mass of a node of level 0.
  *
  * Departure: the paper gives spring constants as numbers. A triangular lattice of springs k has Young's modulus 2 k /
  * sqrt(3) in its plane (per length, Poisson ratio 1/3), so that a sheet of that thickness stretches as its material. */

@@ -2,14 +2,14 @@
  *
  * Keys: element ("hex8_bbar" | "hex8" | "tet4" | "tet10"; hex8_bbar where the prepared mesh has hexahedra, tet4 where
  * it has none), law (the row's: "corotational" | "linear" | "neo_hookean"), fill (true: mass and stiffness of a voxel
- * that the surface cuts are scaled by its filled share, at least 0.02 of it, numerics.md part 2 and Meshing).
+ * that the surface cuts are scaled by its filled share, at least 0.02 of it).
  *
- * Rows: hex_elastic or tet_elastic with the same keys, viscous where the material has damping, solver implicit_euler.
- * Under static_newton a neo_hookean body never untangles on its split, which is another material (corotational, nu 0.3
- * at most): a corner turned over at a clamped edge is part of the discrete rest state, and the law is sound there.
- * Masses are lumped: equal shares to the corners; tet10 by Hinton, Rock and Zienkiewicz (1976), 1/36 of an element to a
- * corner and 4/27 to a middle node, which are all positive. tet10 puts the middle nodes behind the mesh's own nodes, so
- * that what speaks of the mesh's nodes (skin, slots, supports) stays true. */
+ * Components: hex_elastic or tet_elastic with the same keys, viscous where the material has damping, solver
+ * implicit_euler. Under static_newton a neo_hookean body never recovers on its split, which is another material
+ * (corotational, nu 0.3 at most): a corner inverted at a clamped edge is part of the discrete rest state, and the law
+ * is sound there. Masses are lumped: equal shares to the corners; tet10 by Hinton, Rock and Zienkiewicz (1976), 1/36 of
+ * an element to a corner and 4/27 to a middle node, which are all positive. tet10 puts the middle nodes behind the
+ * mesh's own nodes, so that what speaks of the mesh's nodes (skin, slots, supports) stays true. */
 #include "server/base/vec3.h"
 #include "server/num/shape_functions.h"
 #include "server/sim/core/effect_list.h"

@@ -5,12 +5,12 @@
  * box or of the lowest part of the control cells, and what they hold is no unknown (A 3.3). What is shown and touched
  * is the boundary of the subdivided cells; without the cells behind a cut where the body is cut.
  *
- * Elements that are turned over become patches until they are not (cell_recovery.h). Above nu 0.3, of what there is at
+ * Elements that are inverted become patches until they are not (cell_recovery.h). Above nu 0.3, of what there is at
  * load, whole control cells keep a part of the volume instead of each element (cell_volume.c).
  *
  * Keys: levels (2; 0 to 8) of subdivision, rule ("maccracken_joy" | "averaging"), operator ("polar" | "edges", of the
  * row cell_elastic), memory_MB (512; of the solid).
- * Rows: cell_elastic, viscous where the material has damping, solver central_cg. */
+ * Components: cell_elastic, viscous where the material has damping, solver central_cg. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/subdivision/subdivision_body.h"
@@ -176,7 +176,7 @@ static pal_err make_body(const pal_config_entry *item, pal_build *build)
 {
     pal_body *body = build->body;
     const pal_subdivision_solid *solid = body->model.solid;
-    PAL_TRY(pal_body_allocate_embedded(body, build->arena, &solid->rows));
+    PAL_TRY(pal_body_allocate_interpolated(body, build->arena, &solid->rows));
     body->node_inverse_mass_1_kg = PAL_NEW(build->arena, double, body->n_node);
     body->mass_operator = PAL_NEW(build->arena, pal_mass_operator, 1);
     if (!body->node_inverse_mass_1_kg || !body->mass_operator) return PAL_ERR_MEMORY;

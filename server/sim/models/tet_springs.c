@@ -1,11 +1,11 @@
 /* Model tet_springs: a tetrahedral mesh as mass points with springs that keep edge lengths, face areas and tetrahedron
- * volumes (paper B section 4.1, in the corrected form of numerics.md 1 B).
+ * volumes (paper B section 4.1, corrected: README of sim).
  *
- * Keys: k_distance_J, k_area_J, k_volume_J (absent: derived from E, nu and h; 0: no such row), c_distance_Js,
+ * Keys: k_distance_J, k_area_J, k_volume_J (absent: derived from E, nu and h; 0: no such component), c_distance_Js,
  * c_area_Js, c_volume_Js (damping of the constraint, default 0), weights ("equal": every spring of a row has its
  * constant, "volume": in proportion to the volume and size it stands for, spring_law.h; absent: equal where constants
  * are given, volume where they are derived), fill (true: where the surface cuts voxels and the mesh knows their filled
- * shares, weights by volume and masses count only what is inside, as model fem has it), untangle (true: what is turned
+ * shares, weights by volume and masses count only what is inside, as model fem has it), recover (true: what is turned
  * over comes back, spring_recovery.h; false: it may rest so).
  *
  * Regions of the body: what follows from the material, derived constants and masses, is of each tetrahedron's own

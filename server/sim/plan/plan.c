@@ -11,7 +11,7 @@
 #include <string.h>
 
 /* holds the vertices on open edges, on every level: the halves of an open edge are open edges too */
-static pal_err hold_rim(pal_body *body, int index, pal_diagnostic *diag)
+static pal_err fix_rim(pal_body *body, int index, pal_diagnostic *diag)
 {
     if (!body->active)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
@@ -29,8 +29,8 @@ static pal_err hold_rim(pal_body *body, int index, pal_diagnostic *diag)
 static pal_err hold(pal_body *body, const pal_body_def *def, const double up[3], pal_diagnostic *diag)
 {
     for (int s = 0; s < def->n_support; s++) {
-        if (def->support[s].rim) PAL_TRY(hold_rim(body, s, diag));
-        pal_support_hold(&def->support[s], up, body->x_rest, body->n_dof, body->support);
+        if (def->support[s].rim) PAL_TRY(fix_rim(body, s, diag));
+        pal_support_mark_fixed(&def->support[s], up, body->x_rest, body->n_dof, body->support);
     }
     return PAL_ERR_OK;
 }
@@ -52,7 +52,7 @@ static const double *mesh_origin(const pal_prepared *mesh)
     return mesh->tets.n_node > 0 ? mesh->tets.origin_m : mesh->surface.origin_m;
 }
 
-/* arrays, supports and the ordered wishes of one body */
+/* arrays, supports and the ordered requests of one body */
 static pal_err build_body(pal_plan_requests *s, const pal_scene *scene)
 {
     const pal_body_def *def = s->build.def;
@@ -84,47 +84,47 @@ static pal_err build_body(pal_plan_requests *s, const pal_scene *scene)
 static pal_err explain(const pal_plan_requests *s, pal_component *row, int n_row, const char **reason)
 {
     size_t n_byte = 0, used = 0;
-    for (int i = 0; i < s->n_request; i++) n_byte += pal_plan_request_reason(s, &s->wish[i], NULL, 0) + 1;
+    for (int i = 0; i < s->n_request; i++) n_byte += pal_plan_request_reason(s, &s->request[i], NULL, 0) + 1;
     char *text = pal_arena_alloc(s->build.arena, n_byte);
     if (!text) return PAL_ERR_MEMORY;
     *reason = text;
     for (int i = 0; i < s->n_request; i++) {
-        size_t n = pal_plan_request_reason(s, &s->wish[i], text + used, n_byte - used);
+        size_t n = pal_plan_request_reason(s, &s->request[i], text + used, n_byte - used);
         for (int k = 0; k < n_row; k++)
-            if (row[k].effect == s->wish[i].effect) row[k].reason = text + used;
+            if (row[k].effect == s->request[i].effect) row[k].reason = text + used;
         used += n + 1;
     }
     return PAL_ERR_OK;
 }
 
 /* does the row say what the body shows? */
-static bool shows(const pal_plan_request *wish)
+static bool shows(const pal_plan_request *request)
 {
-    return wish->effect->stage == PAL_STAGE_OUTPUT && strcmp(wish->effect->name, "field_output") != 0;
+    return request->effect->stage == PAL_STAGE_OUTPUT && strcmp(request->effect->name, "field_output") != 0;
 }
 
 static pal_err make_rows(pal_plan_requests *s, pal_component *row, int *n_row)
 {
     int n_solve = 0, first = *n_row;
     const char *name = s->build.body->name;
-    for (int i = 0; i < s->n_request; i++) s->build.body->implicit |= s->wish[i].effect->implicit;
+    for (int i = 0; i < s->n_request; i++) s->build.body->implicit |= s->request[i].effect->implicit;
     for (int i = 0; i < s->n_request; i++) {
-        const pal_effect *effect = s->wish[i].effect;
+        const pal_effect *effect = s->request[i].effect;
         if (s->build.body->implicit && effect->internal && !effect->tangent)
             return pal_diagnostic_set(s->build.diag, PAL_ERR_REFUSED,
                                       "body \"%s\": row \"%s\" has no tangent, which its implicit solver needs", name,
                                       effect->name);
     }
-    /* the OUTPUT row first: its make says what the body shows, which is what tools touch; the SOLVE row last: the
-     * others have said what they want of it */
+    /* the OUTPUT component first: its make says what the body shows, which is what tools touch; the SOLVE component
+     * last: the others have said what they want of it */
     for (int pass = 0; pass < 3; pass++)
         for (int i = 0; i < s->n_request; i++) {
-            pal_stage stage = s->wish[i].effect->stage;
+            pal_stage stage = s->request[i].effect->stage;
             if (pass != (stage == PAL_STAGE_OUTPUT ? 0 : stage == PAL_STAGE_SOLVE ? 2 : 1)) continue;
             s->build.made = row + first, s->build.n_made = *n_row - first;
             pal_component *r = &row[(*n_row)++];
             /* what a body shows stays with it, its other rows may be switched off */
-            PAL_TRY(pal_plan_requests_make(s, &s->wish[i], shows(&s->wish[i]), r));
+            PAL_TRY(pal_plan_requests_make(s, &s->request[i], shows(&s->request[i]), r));
             n_solve += r->effect->stage == PAL_STAGE_SOLVE;
         }
     if (n_solve != 1)
@@ -148,7 +148,7 @@ static void sort_rows(pal_plan *plan, const pal_component *made, const int *made
         }
 }
 
-/* what a body that adapts takes in all: its arena, scratch, what the world keeps of what is shown (rest places, table
+/* what an adaptive body takes in all: its arena, scratch, what the world keeps of what is shown (rest places, table
  * of triangles, parents) and lasting loads, and the world's own */
 static pal_err check_memory(const pal_plan_requests *s, size_t arena_byte)
 {

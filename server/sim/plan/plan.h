@@ -1,8 +1,7 @@
-/* The plan: the ordered rows of a scene. A scene entry becomes one row; what no entry and no model asks for does not
- * exist. Rows stand by stage, within a stage by body, within that in the order of the model and then the scene.
- * An entry of the scene replaces the model's row of the same effect. Thread: [load] to build, then rows belong to
- * [sim].
- */
+/* The plan: the ordered components of a scene. An entry of a scene becomes one component; what neither an entry nor a
+ * model asks for does not exist. Components are ordered by stage, within a stage by body, within that as the model and
+ * then the scene list them. An entry of the scene replaces the model's component of the same effect. Thread: [load] to
+ * build, then components belong to [sim]. */
 #ifndef PAL_SIM_PLAN_PLAN_H
 #define PAL_SIM_PLAN_PLAN_H
 #include "server/sim/core/effect.h"

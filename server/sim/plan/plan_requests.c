@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static pal_err add_wish(pal_plan_requests *s, pal_config_entry *item, bool replaces)
+static pal_err add_request(pal_plan_requests *s, pal_config_entry *item, bool replaces)
 {
     const pal_effect *effect = pal_effect_find(item->name);
     const char *body = s->build.body->name;
@@ -14,19 +14,19 @@ static pal_err add_wish(pal_plan_requests *s, pal_config_entry *item, bool repla
         return pal_diagnostic_set(s->build.diag, PAL_ERR_REFUSED, "body \"%s\" %s: there is no effect \"%s\"", body,
                                   item->path, item->name);
     for (int i = 0; i < s->n_request; i++) {
-        bool solver = effect->stage == PAL_STAGE_SOLVE && s->wish[i].effect->stage == PAL_STAGE_SOLVE;
-        if (s->wish[i].effect != effect && !solver) continue;
-        bool models = s->wish[i].item >= s->recipe.row && s->wish[i].item < s->recipe.row + PAL_ENTRIES_MAX;
+        bool solver = effect->stage == PAL_STAGE_SOLVE && s->request[i].effect->stage == PAL_STAGE_SOLVE;
+        if (s->request[i].effect != effect && !solver) continue;
+        bool models = s->request[i].item >= s->recipe.row && s->request[i].item < s->recipe.row + PAL_ENTRIES_MAX;
         if (!replaces || !models)
             return pal_diagnostic_set(s->build.diag, PAL_ERR_REFUSED, "body \"%s\" %s: a second row of \"%s\"", body,
                                       item->path, item->name);
-        s->wish[i] = (pal_plan_request){effect, item};
+        s->request[i] = (pal_plan_request){effect, item};
         return PAL_ERR_OK;
     }
     if (s->n_request == PAL_PLAN_REQUEST_MAX)
         return pal_diagnostic_set(s->build.diag, PAL_ERR_REFUSED, "body \"%s\": more than %d rows", body,
                                   PAL_PLAN_REQUEST_MAX);
-    s->wish[s->n_request++] = (pal_plan_request){effect, item};
+    s->request[s->n_request++] = (pal_plan_request){effect, item};
     return PAL_ERR_OK;
 }
 
@@ -35,14 +35,14 @@ static pal_err add_named(pal_plan_requests *s, pal_config_entry *own, const pal_
 {
     if (!item->name[0]) return PAL_ERR_OK;
     *own = *item;
-    PAL_TRY(add_wish(s, own, true));
+    PAL_TRY(add_request(s, own, true));
     if (pal_effect_find(own->name)->stage != stage)
         return pal_diagnostic_set(s->build.diag, PAL_ERR_REFUSED, "body \"%s\" %s: \"%s\" is not of stage %s",
                                   s->build.body->name, own->path, own->name, pal_stage_name(stage));
     return PAL_ERR_OK;
 }
 
-/* a body that adapts is its own surface, a solid shows its boundary: what skin_output, the default, would put between
+/* an adaptive body is its own surface, a solid shows its boundary: what skin_output, the default, would put between
  * them is not there */
 static void choose_output(const pal_body *body, pal_config_entry *output)
 {
@@ -55,14 +55,14 @@ pal_err pal_plan_requests_collect(pal_plan_requests *s)
     const pal_body_def *def = s->build.def;
     pal_config_entry *own = s->own;
     s->n_request = 0;
-    for (int i = 0; i < s->recipe.n_row; i++) PAL_TRY(add_wish(s, &s->recipe.row[i], false));
-    /* what is shown comes before the entries, so that a row field_output finds it */
+    for (int i = 0; i < s->recipe.n_row; i++) PAL_TRY(add_request(s, &s->recipe.row[i], false));
+    /* what is shown comes before the entries, so that a component field_output finds it */
     pal_config_entry output = def->output;
     choose_output(s->build.body, &output);
     PAL_TRY(add_named(s, ++own, &output, PAL_STAGE_OUTPUT));
     for (int i = 0; i < def->n_effect; i++) {
         *++own = def->effect[i];
-        PAL_TRY(add_wish(s, own, true));
+        PAL_TRY(add_request(s, own, true));
     }
     return add_named(s, ++own, &def->solver, PAL_STAGE_SOLVE);
 }
@@ -70,16 +70,16 @@ pal_err pal_plan_requests_collect(pal_plan_requests *s)
 /* a row's own memory begins with a block of this size and grows by such */
 enum { ROW_BLOCK = 4096 };
 
-pal_err pal_plan_requests_make(pal_plan_requests *s, const pal_plan_request *wish, bool shared, pal_component *row)
+pal_err pal_plan_requests_make(pal_plan_requests *s, const pal_plan_request *request, bool shared, pal_component *row)
 {
     pal_arena *body_arena = s->build.arena;
     pal_arena *own = shared ? NULL : pal_arena_create(ROW_BLOCK, true);
     if (!shared && !own) return PAL_ERR_MEMORY;
     size_t before = shared ? pal_arena_used(body_arena) : 0;
-    *row = (pal_component){.effect = wish->effect, .arena = own, .reason = ""};
+    *row = (pal_component){.effect = request->effect, .arena = own, .reason = ""};
     s->build.body_arena = body_arena;
     s->build.arena = own ? own : body_arena;
-    pal_err err = wish->effect->make(wish->item, &s->build, &row->self);
+    pal_err err = request->effect->make(request->item, &s->build, &row->self);
     row->n_byte = pal_arena_used(s->build.arena) - before;
     s->build.arena = body_arena;
     return err;
@@ -92,13 +92,13 @@ void pal_plan_destroy_component(pal_component *row)
     row->self = NULL, row->arena = NULL;
 }
 
-/* where a wish comes from: the model's recipe, the solver or output of the scene, or an effect of it */
-size_t pal_plan_request_reason(const pal_plan_requests *s, const pal_plan_request *wish, char *text, size_t n_byte)
+/* where a request comes from: the model's recipe, the solver or output of the scene, or an effect of it */
+size_t pal_plan_request_reason(const pal_plan_requests *s, const pal_plan_request *request, char *text, size_t n_byte)
 {
-    const pal_config_entry *model = &s->own[0], *item = wish->item;
+    const pal_config_entry *model = &s->own[0], *item = request->item;
     const pal_body_def *def = s->build.def;
     bool recipe = item >= s->recipe.row && item < s->recipe.row + PAL_ENTRIES_MAX;
-    if (recipe && wish->effect->drag)
+    if (recipe && request->effect->drag)
         return (size_t)snprintf(text, n_byte, "material.damping_1_s %g of body \"%s\"", def->material.damping_1_s,
                                 def->name);
     if (recipe) return (size_t)snprintf(text, n_byte, "%s \"%s\"", model->path, model->name);

@@ -1,4 +1,4 @@
-/* Rows that are switched off and on while a world runs. Off, a row is destroyed with its memory; on, it is made anew
+/* Rows that are switched off and on while a world runs. Off, a row is destroyed with its memory; on, it is made again
  * from its entry. make functions expect a body at rest, so its state is put aside meanwhile. */
 #include "server/sim/plan/plan.h"
 #include "server/sim/plan/plan_requests.h"
@@ -53,7 +53,7 @@ static pal_err collect(pal_plan *plan, const pal_scene *scene, int b, pal_diagno
 static int find_wish(const pal_plan_requests *s, const char *name)
 {
     for (int i = 0; i < s->n_request; i++)
-        if (!strcmp(s->wish[i].effect->name, name)) return i;
+        if (!strcmp(s->request[i].effect->name, name)) return i;
     return -1;
 }
 
@@ -133,7 +133,7 @@ static pal_err remake_solver(pal_plan *plan, pal_plan_requests *s, int b, int wi
     for (int i = 0; i < s->build.n_made; i++)
         body->wants_compliance |= list[i].effect->tangent && list[i].effect->tangent->settle;
     body->compliance = NULL;
-    pal_err err = pal_plan_requests_make(s, &s->wish[find_wish(s, old->effect->name)], false, out);
+    pal_err err = pal_plan_requests_make(s, &s->request[find_wish(s, old->effect->name)], false, out);
     out->reason = old->reason, out->n_run = old->n_run;
     free(list);
     if (err) {
@@ -162,24 +162,24 @@ static pal_err switch_off(pal_plan *plan, pal_plan_requests *s, int b, int at)
     return PAL_ERR_OK;
 }
 
-/* where in the plan a row of this wish stands */
-static int place_of(const pal_plan *plan, const pal_plan_requests *s, int b, int wish)
+/* where in the plan a row of this request stands */
+static int place_of(const pal_plan *plan, const pal_plan_requests *s, int b, int request)
 {
-    int stage = s->wish[wish].effect->stage, at = plan->first[stage][b], end = at + plan->n_of[stage][b];
-    while (at < end && rank(s, &plan->row[at]) < wish) at++;
+    int stage = s->request[request].effect->stage, at = plan->first[stage][b], end = at + plan->n_of[stage][b];
+    while (at < end && rank(s, &plan->row[at]) < request) at++;
     return at;
 }
 
-static pal_err switch_on(pal_plan *plan, pal_plan_requests *s, int b, int wish)
+static pal_err switch_on(pal_plan *plan, pal_plan_requests *s, int b, int request)
 {
-    const pal_effect *effect = s->wish[wish].effect, *solver = plan->row[plan->first[PAL_STAGE_SOLVE][b]].effect;
+    const pal_effect *effect = s->request[request].effect, *solver = plan->row[plan->first[PAL_STAGE_SOLVE][b]].effect;
     pal_component row, fresh = {.effect = solver};
     bool keeps = solver->keeps_components && effect->stage <= PAL_STAGE_FORCE;
-    pal_err err = pal_plan_requests_make(s, &s->wish[wish], false, &row);
+    pal_err err = pal_plan_requests_make(s, &s->request[request], false, &row);
     row.reason = plan->reason[b];
-    for (int i = 0; i < wish; i++) row.reason += strlen(row.reason) + 1;
+    for (int i = 0; i < request; i++) row.reason += strlen(row.reason) + 1;
     if (!err && keeps) err = remake_solver(plan, s, b, -1, &row, &fresh);
-    if (!err) err = pal_plan_insert_at(plan, place_of(plan, s, b, wish), b, &row);
+    if (!err) err = pal_plan_insert_at(plan, place_of(plan, s, b, request), b, &row);
     if (err) {
         pal_plan_destroy_component(&row);
         if (fresh.self) pal_plan_destroy_component(&fresh);
@@ -190,13 +190,13 @@ static pal_err switch_on(pal_plan *plan, pal_plan_requests *s, int b, int wish)
 }
 
 /* the row goes or comes, the body being at rest meanwhile */
-static pal_err change(pal_plan *plan, pal_plan_requests *s, int b, int wish, int at, bool on)
+static pal_err change(pal_plan *plan, pal_plan_requests *s, int b, int request, int at, bool on)
 {
     pal_body *body = &plan->body[b];
-    const pal_effect *effect = s->wish[wish].effect;
+    const pal_effect *effect = s->request[request].effect;
     state kept;
     PAL_TRY(put_to_rest(body, &kept));
-    pal_err err = on ? switch_on(plan, s, b, wish) : switch_off(plan, s, b, at);
+    pal_err err = on ? switch_on(plan, s, b, request) : switch_off(plan, s, b, at);
     PAL_ASSERT(s->build.scratch_byte <= plan->scratch_byte);
     put_back(body, &kept);
     /* a guard knows the state of now as its last good one */
@@ -216,15 +216,15 @@ pal_err pal_plan_switch(pal_plan *plan, const pal_scene *scene, int b, const cha
     pal_err err = s && now ? PAL_ERR_OK : PAL_ERR_MEMORY;
     if (!err) *now = *scene;
     if (!err) err = collect(plan, now, b, diag, s);
-    int wish = err ? -1 : find_wish(s, name), at = find_row(plan, b, name);
-    if (!err && wish < 0)
+    int request = err ? -1 : find_wish(s, name), at = find_row(plan, b, name);
+    if (!err && request < 0)
         err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": nothing in the scene calls for a row \"%s\"",
                                  plan->body[b].name, name);
-    if (!err && !on) err = may_go(plan, b, s->wish[wish].effect, diag);
+    if (!err && !on) err = may_go(plan, b, s->request[request].effect, diag);
     if (!err && on != (at >= 0)) {
         /* the entries as at load, the material as it is by now */
         now->body[b].material = *material;
-        err = change(plan, s, b, wish, at, on);
+        err = change(plan, s, b, request, at, on);
         *changed = !err;
     }
     free(s);

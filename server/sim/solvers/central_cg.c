@@ -8,7 +8,7 @@
  * dt-) / 2 and theta dt- / (dt + dt-): D~ acts on the velocity at p, by interpolation. At the start and whenever the
  * body was put somewhere else v is that at p and dt- = 0, which is the start p- = p - dt v + dt^2 a / 2.
  *
- * D~ is the rows' drag (hook `drag`) and the body's brake (stiffening_damper.h) times M~, and where the samples'
+ * D~ is the components' drag (hook `drag`) and the body's brake (stiffening_damper.h) times M~, and where the samples'
  * gamma/mu varies their matrix as well. Departure: theta is at least 1 - 1/(k gamma/mu), so that drag that would turn
  * the motion round within a sub-step lets it creep. Conjugate gradients begin with v+ = v, that is p+ = p + (p - p-),
  * and end when |r|
@@ -19,13 +19,13 @@
  * The sub-step is `safety` (key, 0.9) of 2 / omega_max of (M~, K~) by Lanczos' iteration with K~ from differences of
  * forces at the present state (num/lanczos.h): at load, after edits, and again, from the last Ritz vector, when points
  * have moved a fifth of a control cell against one another, but at most once in 12 sub-steps, and once in up to 96 as
- * long as that changes it by less than 2 %. Stiffness and damping that CONTACT rows say or want at nodes add their own
- * largest eigenvalues at the begin of every step. Held points' rows are dropped, led ones (held 2) keep their velocity
- * and pull their neighbours by its change. A point moves at most 0.2 S in a sub-step (numerics.md part 3); where
- * one would have moved farther, the stiffness is not that which the limit knows, and sub-steps are halved up to three
- * times and grow again by 2 % of what was halved a sub-step. While elements are turned over sub-steps are 0.6 times as
- * long, unless the body stands still. Where the world cannot afford the sub-steps (step->heavy) all masses are
- * multiplied so that the limit is met.
+ * long as that changes it by less than 2 %. Stiffness and damping that CONTACT components say or want at nodes add
+ * their own largest eigenvalues at the begin of every step. Fixed points' rows are dropped, prescribed ones keep their
+ * velocity and pull their neighbours by its change. Moves are limited by step_guard.h; where one would have moved
+ * farther, the stiffness is not that which the limit knows, and sub-steps are halved up to three times and grow again
+ * by 2 % of what was halved a sub-step. While elements are inverted sub-steps are 0.6 times as long, unless the body
+ * stands still. Where the world cannot afford the sub-steps (step->heavy) all masses are multiplied so that the limit
+ * is met.
  */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
@@ -33,6 +33,7 @@
 #include "server/num/envelope.h"
 #include "server/num/lanczos.h"
 #include "server/sim/core/effect_list.h"
+#include "server/sim/core/step_guard.h"
 #include "server/sim/subdivision/subdivision_mass.h"
 
 #include <string.h>
@@ -55,11 +56,11 @@ typedef struct central {
 
     /* ---- the limit ---- */
     pal_lanczos lanczos;
-    double limit_s, rows2;        /* omega^2 of the FORCE rows, at most, 1/s^2                      */
+    double limit_s, rows2;        /* omega^2 of the FORCE components, at most, 1/s^2                      */
     double cell_m;                /* edge of a control cell, about */
     double way_m;                 /* no point has moved farther against the others since it was taken */
-    bool has_inversion;           /* elements run on something else since they are turned over      */
-    int n_unseen;                 /* sub-steps since turned over elements were looked for */
+    bool has_inversion;           /* elements run on something else since they are inverted      */
+    int n_unseen;                 /* sub-steps since inverted elements were looked for */
     int n_since, pause;           /* sub-steps since, and how many at least between two */
     bool known;                   /* rows2 holds, but for what has moved                             */
     double wild;                  /* divides the limit: 1, more after points were clamped */
@@ -68,19 +69,18 @@ typedef struct central {
     const double *x;              /* the body's own                                                       */
     double *at, *still, *g, *g0;  /* the body's x, v, g while it looks; g at the state itself  [n_dof][3]  */
     double *d, *dv, *f;           /* its d, dv, f                                              [n_node][3] */
-    double *bound;                /* of CONTACT rows                                           [n_node]    */
+    double *bound;                /* of CONTACT components                                           [n_node]    */
 } central;
 
-static const double most_way = 0.2, max_move_S = 0.2;
 /* of wild, and what is left of it after a sub-step without clamps */
 static const double most_wild = 8, calm = 0.98;
-/* of omega^2 while elements are turned over: what throws a corner about is the fastest motion, which near its limit is
+/* of omega^2 while elements are inverted: what throws a corner about is the fastest motion, which near its limit is
  * seen with up to twice its energy, velocities being those of half a sub-step before */
 static const double tangled2 = 3;
 /* of a move in elements, as forces may be of single precision; of omega^2 and of its solves */
 static const double small_h = 1e-4, near = 0.02, exact = 1e-6;
 enum { PAUSE = 12, MOST_PAUSE = 96 };
-/* sub-steps between looks for elements that are turned over, about */
+/* sub-steps between looks for elements that are inverted, about */
 enum { UNSEEN = 16 };
 /* iterations for a sub-step; Lanczos' first and later ones; entries of a factor */
 enum { MOST = 300, FIRST = 24, AGAIN = 6, MOST_ENTRY = 1 << 22 };
@@ -227,7 +227,7 @@ static bool gather(central *row)
     return good;
 }
 
-/* out = K~ v of the FORCE rows, by the difference of forces over a small move along v */
+/* out = K~ v of the FORCE components, by the difference of forces over a small move along v */
 static bool multiply_stiffness(void *user, const double *v, double *out)
 {
     central *row = user;
@@ -265,7 +265,8 @@ static void add_any(const central *row, double share, double *z)
     }
 }
 
-/* omega^2 of the FORCE rows on a body that stands still at its present place, all of whose arrays stay as they are */
+/* omega^2 of the FORCE components on a body that stands still at its present place, all of whose arrays stay as they
+ * are */
 static double find_rows2(central *row, pal_step *step)
 {
     pal_body *body = step->body;
@@ -295,7 +296,7 @@ static double find_rows2(central *row, pal_step *step)
 /* the largest eigenvalue of row->bound over mass */
 static double find_bound(central *row)
 {
-    /* the Ritz vector of the FORCE rows is kept for later */
+    /* the Ritz vector of the FORCE components is kept for later */
     double *z = row->lanczos.z, sum = 0;
     const int n_cg = row->report.n_cg;
     for (int i = 0; i < row->rows->n_row; i++) sum += row->bound[i];
@@ -336,13 +337,6 @@ static void find_contact(central *row, const pal_step *step)
     row->contact_1_s = find_bound(row);
 }
 
-static bool finite_state(const pal_body *body)
-{
-    double sum = 0;
-    for (int i = 0; i < 3 * body->n_dof; i++) sum += 0 * body->x[i] + 0 * body->v[i];
-    return sum == 0;
-}
-
 static void look(central *row, pal_step *step)
 {
     const double before = row->known ? row->rows2 : 0;
@@ -359,13 +353,11 @@ static bool recover(central *row, pal_step *step)
 {
     pal_body *body = step->body;
     double *d = body->d;
-    unsigned seen = 0;
     if (row->n_unseen < (step->sub == 0 ? UNSEEN / 2 : UNSEEN)) return false;
     row->n_unseen = 0;
     pal_interpolation_apply(body->interpolation, body->x, row->d);
     body->d = row->d;
-    for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->recover) seen |= step->force[i].effect->recover(step->force[i].self, step);
+    const unsigned seen = pal_guard_recover(step);
     body->d = d;
     /* forces of another law times half of a sub-step that was as long as the old one allowed would be a blow */
     if (seen & PAL_INVERSION_CHANGED) row->dt_s = 0;
@@ -378,9 +370,10 @@ static double limit(void *self, pal_step *step)
 {
     central *row = self;
     const pal_body *body = step->body;
-    if (!finite_state(body)) return NAN;
+    if (!pal_body_finite(body)) return NAN;
     if (renew(row, body) || recover(row, step)) row->known = false;
-    if (!row->known || (row->n_since >= row->pause && !(row->way_m <= most_way * row->cell_m))) look(row, step);
+    if (!row->known || (row->n_since >= row->pause && !(row->way_m <= PAL_GUARD_RECHECK * row->cell_m)))
+        look(row, step);
     if (step->sub == 0) find_contact(row, step);
     const double rows2 = row->has_inversion ? tangled2 * row->rows2 : row->rows2, lambda = rows2 + row->contact2,
                  c = row->contact_1_s;
@@ -389,14 +382,6 @@ static double limit(void *self, pal_step *step)
 }
 
 /* ---- a sub-step ---- */
-
-static double drag_rate(const pal_step *step)
-{
-    double rate = step->body->stiffening_damping_1_s;
-    for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->drag) rate += step->force[i].effect->drag(step->force[i].self);
-    return rate;
-}
 
 /* what the velocities of fixed points change by is known; `was` is v before the change everywhere. True: it is not 0 */
 static bool begin_change(central *row, const pal_body *body)
@@ -428,7 +413,8 @@ static void take_away(central *row, double a, double b, double s, double t)
 static void find_change(central *row, const pal_step *step)
 {
     const pal_body *body = step->body;
-    const double dt = step->dt_s, k = 0.5 * (dt + row->dt_s), rate = drag_rate(step),
+    const double dt = step->dt_s, k = 0.5 * (dt + row->dt_s),
+                 rate = body->stiffening_damping_1_s + pal_guard_drag_1_s(step->force, step->n_force),
                  over = row->limit_s > 0 ? dt / row->limit_s : 0;
     const double scale = step->heavy && over > 1 ? over * over : 1;
     const bool varies = row->mass->damping_kg_s != NULL, moves = begin_change(row, body);
@@ -445,34 +431,30 @@ static void find_change(central *row, const pal_step *step)
     const double norm = sqrt(pal_dot_product(row->cg.n, row->cg.r, row->cg.r));
     if (step->sub == 0) row->report.n_cg = 0;
     solve(row, row->change, row->tolerance * norm);
-    /* forces that are no numbers give velocities that are none */
+    /* forces that are not finite give velocities that are not */
     for (int i = 0; i < row->cg.n && !isfinite(norm); i++) row->change[i] = NAN;
     row->report.residual = norm > 0 ? row->cg.residual / norm : 0;
     row->report.converged = row->cg.residual <= row->tolerance * norm;
 }
 
-static void shorten(pal_body *body, double *v, double to)
-{
-    uint64_t before = pal_clock_ns();
-    pal_scale3(v, to, v);
-    body->safeguards.n_clamped++;
-    body->safeguards.ns += pal_clock_ns() - before;
-}
-
-/* v+ and p+; the longest way of a point against the others, which is no number when a velocity is none */
+/* v+ and p+; the longest way of a point against the others, which is not finite when a velocity is none */
 static double move(central *row, pal_body *body, double dt)
 {
-    const double max_m = max_move_S * body->length_scale_m;
+    const double max_m = pal_guard_max_move_m(body);
     const uint64_t n_clamped = body->safeguards.n_clamped;
     double mean[3] = {0, 0, 0}, most2 = 0, poison = 0;
     for (int i = 0; i < body->n_dof; i++) {
         double *v = body->v + 3 * (size_t)i;
-        /* led points have theirs */
+        /* prescribed points have theirs */
         if (body->support[i] == PAL_FIXED) pal_set3(v, 0, 0, 0);
         if (!body->support[i]) pal_add3(v, v, row->change + 3 * (size_t)i);
         const double way = pal_norm3(v) * dt;
         poison += 0 * way;
-        if (way > max_m) shorten(body, v, max_m / way);
+        if (way > max_m) {
+            uint64_t before = pal_clock_ns();
+            pal_scale3(v, pal_guard_shorten(body, way, max_m), v);
+            body->safeguards.ns += pal_clock_ns() - before;
+        }
         pal_axpy3(body->x + 3 * (size_t)i, dt, v);
         pal_copy3(row->was + 3 * (size_t)i, v);
         pal_axpy3(mean, 1.0 / body->n_dof, v);

@@ -10,10 +10,10 @@
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    pal_implicit_options wish;
+    pal_implicit_options options;
     pal_implicit *core = NULL;
-    PAL_TRY(pal_implicit_read(item, build, &wish));
-    pal_err err = pal_implicit_make(&wish, build, 1, &core);
+    PAL_TRY(pal_implicit_read(item, build, &options));
+    pal_err err = pal_implicit_make(&options, build, 1, &core);
     *self = core;
     return err;
 }

@@ -1,25 +1,26 @@
 /* Solver rk4: the classical fourth-order Runge-Kutta method over the body's active nodes (C, equations of motion).
- * Loads of CONTACT rows are constant within a sub-step.
+ * Loads of CONTACT components are constant within a sub-step.
  *
  * The sub-step is `safety` (key, 0.9) of 2.7 / max(omega, c) over the free nodes; c = C/m with the Gershgorin row sums
  * C of explicit damping, omega^2 bounds the stiffness over mass. The method is stable where |lambda dt| <= 2.61 in the
  * left half plane, and no eigenvalue is larger than max(omega, c). Row sums K/m put omega up to 1.4 times too high on a
- * surface; there Lanczos' iteration says more, on M^-1 K through differences of forces, K of all FORCE rows at the
- * present state: the largest Ritz value plus its residual (Zhou and Li, Bounding the spectrum of large Hermitian
+ * surface; there Lanczos' iteration says more, on M^-1 K through differences of forces, K of all FORCE components at
+ * the present state: the largest Ritz value plus its residual (Zhou and Li, Bounding the spectrum of large Hermitian
  * matrices, 2011), at most 2 % below the true one where it was measured, never above the row sums, to which those of
- * CONTACT rows come. With the membrane law it halves with every level, as eq. 9 asks. The bounds are taken again when a
- * node may have moved a fifth of an element or when the active part is another, Lanczos' at most once in 12 sub-steps
- * and only where it saves one, between with the row sums alone; common factors that change scale it.
+ * CONTACT components come. With the membrane law it halves with every level, as eq. 9 asks. The bounds are taken again
+ * when a node may have moved a fifth of an element or when the active part is another, Lanczos' at most once in 12
+ * sub-steps and only where it saves one, between with the row sums alone; common factors that change scale it.
  *
  * Departures. Drag of the rows (hook `drag`, rate r, v' = -r v) is taken exactly: the exponential Runge-Kutta method of
  * Cox and Matthews (2002, eq. 26-29), which is the classical one for r = 0, of order 4 for every r, stable for all r
- * where the classical one is stable without drag, and creeps as v = f/(m r) when r is huge. Held nodes stand, led ones
- * (held 2) keep their velocity. A node moves at most 0.2 S in a sub-step (numerics.md part 3). Where the world cannot
- * afford the sub-steps (step->heavy), nodes that break the limit get the mass that meets it. Where the bounds are
- * taken, rows look for what is turned over, and in every step while something is. */
+ * where the classical one is stable without drag, and creeps as v = f/(m r) when r is huge. Fixed nodes stand,
+ * prescribed ones keep their velocity. Moves are limited by step_guard.h. Where the world cannot afford the sub-steps
+ * (step->heavy), nodes that break the limit get the mass that meets it. Where the bounds are taken, components look for
+ * inverted elements, and in every step while there are any. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
+#include "server/sim/core/step_guard.h"
 #include "server/sim/surface/active_nodes.h"
 
 #include <string.h>
@@ -31,8 +32,8 @@ typedef struct memory {
 } memory;
 
 /* of a sub-step dt with drag r, z = r dt, for place and velocity. What is kept of the start after half a sub-step and a
- * whole one (exp(-z/2), exp(-z)), of free and of led nodes; what rates count for at half (dt/2, dt/2 phi1(z/2)), in the
- * fourth stage, and in the sum in stages 1, 2 and 3, 4 */
+ * whole one (exp(-z/2), exp(-z)), of free and of prescribed nodes; what rates count for at half (dt/2, dt/2 phi1(z/2)),
+ * in the fourth stage, and in the sum in stages 1, 2 and 3, 4 */
 typedef struct rates {
     double dt;
     pal_v8 half[2], whole[2], grow, last, weight[3];
@@ -45,7 +46,7 @@ typedef struct rk4 {
     pal_quad *load;
     double *inverse_kg;
     uint8_t *led;
-    bool pulls;           /* all FORCE rows can work on the pack */
+    bool pulls;           /* all FORCE components can work on the pack */
     double safety, reach; /* of the stability limit; safety times the radius 2.7 */
     double limit_s;
     double way_m; /* no node has moved farther since the bounds were taken */
@@ -55,7 +56,8 @@ typedef struct rk4 {
     bool known;         /* limit_s holds */
     bool has_inversion; /* rows are to be asked again in the coming step */
 
-    /* Lanczos' bound on omega^2 of the FORCE rows, 1/s^2, at which common factors it was taken, and sub-steps since */
+    /* Lanczos' bound on omega^2 of the FORCE components, 1/s^2, at which common factors it was taken, and sub-steps
+     * since */
     double sharp2, sharp_ramp[2];
     int n_since;
     bool sharp_known;
@@ -64,7 +66,7 @@ typedef struct rk4 {
     double *at, *still, *force; /* the body's x, v and f while it looks [n_dof][3]; NULL: no shell */
 } rk4;
 
-static const double max_move_h = 0.2, max_move_S = 0.2, radius = 2.7;
+static const double radius = 2.7;
 /* row sums are hardly ever more than `most_over` times too high, nor `more` times more so than they were last */
 static const double most_over = 1.6, more = 1.05;
 /* sub-steps between Lanczos' bounds, and iterations for one, a gather each */
@@ -122,8 +124,8 @@ static void give_motion(const pal_body *body)
 {
     for (int k = 0; k < body->n_active; k++) {
         size_t i = 3 * (size_t)pal_body_point(body, k);
-        pal_quad_store(body->x + i, pal_v8_low(body->pack->xv[k]));
-        pal_quad_store(body->v + i, pal_v8_high(body->pack->xv[k]));
+        pal_quad_store(body->x + i, pal_v8_low(body->active_nodes->xv[k]));
+        pal_quad_store(body->v + i, pal_v8_high(body->active_nodes->xv[k]));
     }
 }
 
@@ -132,44 +134,28 @@ static pal_err find_forces(const rk4 *row, pal_step *step)
 {
     pal_body *body = step->body;
     if (row->pulls) {
-        memcpy(body->pack->f, row->load, sizeof *row->load * (size_t)body->n_active);
+        memcpy(body->active_nodes->f, row->load, sizeof *row->load * (size_t)body->n_active);
         return pal_active_nodes_assemble(step);
     }
     give_motion(body);
     PAL_TRY(pal_assemble_forces(step));
     for (int k = 0; k < body->n_active; k++)
-        body->pack->f[k] = pal_quad_load(body->g + 3 * (size_t)pal_body_point(body, k));
+        body->active_nodes->f[k] = pal_quad_load(body->g + 3 * (size_t)pal_body_point(body, k));
     return PAL_ERR_OK;
 }
 
 /* ---- the limit ---- */
-
-static void add_bounds(rk4 *row, const pal_component *rows, int n, const pal_body *body)
-{
-    for (int i = 0; i < n; i++) {
-        const pal_effect *effect = rows[i].effect;
-        if (effect->stiffness) effect->stiffness(rows[i].self, body, row->stiff);
-        if (effect->damping && !effect->drag) effect->damping(rows[i].self, body, row->damp);
-    }
-}
-
-/* contact comes and goes between steps without any node moving */
-static bool has_bounds(const pal_component *rows, int n)
-{
-    for (int i = 0; i < n; i++)
-        if (rows[i].effect->stiffness || rows[i].effect->damping) return true;
-    return false;
-}
 
 /* does the bound taken last still hold? */
 static bool still_known(const rk4 *row, const pal_step *step)
 {
     const pal_body *body = step->body;
     /* not finite is not known */
-    if (!row->known || row->revision != body->revision || !(row->way_m <= max_move_h * body->edge_m)) return false;
+    if (!row->known || row->revision != body->revision || !(row->way_m <= PAL_GUARD_RECHECK * body->edge_m))
+        return false;
     if (body->active && (row->ramp[0] != *body->dofs.ramp[0] || row->ramp[1] != *body->dofs.ramp[1])) return false;
     if (body->active && !row->sharp_known && row->n_since >= PAUSE) return false;
-    return step->sub != 0 || !has_bounds(step->contact, step->n_contact);
+    return step->sub != 0 || !pal_guard_has_bounds(step->contact, step->n_contact);
 }
 
 /* row sums of stiffness over mass at free nodes, the most of them */
@@ -214,8 +200,8 @@ static void begin_lanczos(rk4 *row, const pal_body *body)
             q[c] = weight * ((double)(bits >> 11) * 0x1p-52 - 1);
         }
         norm2 += pal_quad_dot(q, q);
-        row->memory[k].from = pal_v8_join(pal_v8_low(body->pack->xv[k]), q);
-        row->memory[k].sum = pal_v8_join(body->pack->f[k], (pal_quad){0});
+        row->memory[k].from = pal_v8_join(pal_v8_low(body->active_nodes->xv[k]), q);
+        row->memory[k].sum = pal_v8_join(body->active_nodes->f[k], (pal_quad){0});
     }
     const pal_quad one = {1, 1, 1, 1};
     const pal_v8 scale = pal_v8_join(one, norm2 > 0 ? one / sqrt(norm2) : 0 * one);
@@ -226,7 +212,7 @@ static void begin_lanczos(rk4 *row, const pal_body *body)
 static pal_err apply_stiffness(rk4 *row, pal_step *step, double *along)
 {
     pal_body *body = step->body;
-    pal_active_nodes *pack = body->pack;
+    pal_active_nodes *pack = body->active_nodes;
     double most2 = 0;
     for (int k = 0; k < body->n_active; k++) {
         pal_quad q = row->inverse_kg[k] * pal_v8_high(row->memory[k].from);
@@ -253,7 +239,7 @@ static double next_lanczos(rk4 *row, const pal_body *body, double alpha, double 
     double norm2 = 0;
     for (int k = 0; k < body->n_active; k++) {
         memory *m = &row->memory[k];
-        pal_quad q = pal_v8_high(m->from), next = body->pack->f[k] - (alpha * q + beta * pal_v8_high(m->sum));
+        pal_quad q = pal_v8_high(m->from), next = body->active_nodes->f[k] - (alpha * q + beta * pal_v8_high(m->sum));
         norm2 += pal_quad_dot(next, next);
         m->sum = pal_v8_join(pal_v8_low(m->sum), q);
         m->from = pal_v8_join(pal_v8_low(m->from), next);
@@ -288,7 +274,7 @@ static double largest_of(const double *a, const double *b, int n, double most)
     return high + fabs(b[n - 1] * s) / sqrt(sum);
 }
 
-/* Lanczos' bound on omega^2 of the FORCE rows; above `most`: it knows nothing better */
+/* Lanczos' bound on omega^2 of the FORCE components; above `most`: it knows nothing better */
 static pal_err run_lanczos(rk4 *row, pal_step *step, double most, double *out)
 {
     double a[LANCZOS], b[LANCZOS];
@@ -336,14 +322,14 @@ static bool would_help(const rk4 *row, double most)
     return !(row->step_s > 0) || ceil(n / row->over) < ceil(n);
 }
 
-/* omega^2 of the FORCE rows: `most` of the row sums or less. Stiffness that the common factors have not grown for is
- * less than the same with all of it grown */
+/* omega^2 of the FORCE components: `most` of the row sums or less. Stiffness that the common factors have not grown for
+ * is less than the same with all of it grown */
 static double bound_force(rk4 *row, pal_step *step, double most)
 {
     const pal_body *body = step->body;
     /* looked at from outside, nothing moves: the world asks at rest with places that are no body's */
     if (!body->active || body->x == body->x_rest) return most;
-    bool moved = row->revision != body->revision || !(row->way_m <= max_move_h * body->edge_m);
+    bool moved = row->revision != body->revision || !(row->way_m <= PAL_GUARD_RECHECK * body->edge_m);
     row->sharp_known &= !moved;
     if (!row->sharp_known && row->n_since >= PAUSE) {
         if (would_help(row, most))
@@ -356,28 +342,19 @@ static double bound_force(rk4 *row, pal_step *step, double most)
     return fmin(most, grown * row->sharp2);
 }
 
-/* true: something runs on what untangles it */
-static bool recover(pal_step *step)
-{
-    unsigned seen = 0;
-    for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->recover) seen |= step->force[i].effect->recover(step->force[i].self, step);
-    return seen & PAL_INVERTED;
-}
-
 static double limit(void *self, pal_step *step)
 {
     rk4 *row = self;
     const pal_body *body = step->body;
     if (!(step->sub == 0 && row->has_inversion) && still_known(row, step)) return row->limit_s;
-    row->has_inversion = recover(step);
+    row->has_inversion = pal_guard_recover(step) & PAL_INVERTED;
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         row->stiff[i] = row->damp[i] = 0;
     }
-    add_bounds(row, step->contact, step->n_contact, body);
+    pal_guard_add_bounds(step->contact, step->n_contact, body, row->stiff, row->damp);
     double contact2 = most_stiff(row, body);
-    add_bounds(row, step->force, step->n_force, body);
+    pal_guard_add_bounds(step->force, step->n_force, body, row->stiff, row->damp);
     /* the largest of omega^2 and c */
     double most2 = most_stiff(row, body), most = 0;
     row->limit_s = one_if_finite(row, body);
@@ -397,14 +374,6 @@ static double limit(void *self, pal_step *step)
 }
 
 /* ---- a sub-step ---- */
-
-static double drag_rate(const pal_step *step)
-{
-    double rate = 0;
-    for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->drag) rate += step->force[i].effect->drag(step->force[i].self);
-    return rate;
-}
 
 /* phi_1, phi_2, phi_3 of -z, z >= 0: phi_k = sum over n of (-z)^n / (n + k)!. Series and doubling instead of exp, for
  * the same bits with every library */
@@ -454,7 +423,7 @@ static rates find_rates(double dt_s, double rate)
                    .weight = {both(dt_s / 6, weight[0]), both(dt_s / 3, weight[1]), both(dt_s / 6, weight[2])}};
 }
 
-/* inverse masses: held nodes have no acceleration, and standing ones no velocity */
+/* inverse masses: fixed nodes have no acceleration, and standing ones no velocity */
 static void take_masses(rk4 *row, const pal_body *body, const rates *r, bool heavy)
 {
     double t = r->dt / row->reach;
@@ -465,7 +434,7 @@ static void take_masses(rk4 *row, const pal_body *body, const rates *r, bool hea
         row->inverse_kg[k] = body->support[i] ? 0 : 1 / mass;
         row->led[k] = body->support[i] == PAL_PRESCRIBED;
         if (body->support[i] == PAL_FIXED)
-            body->pack->xv[k] = pal_v8_join(pal_v8_low(body->pack->xv[k]), (pal_quad){0});
+            body->active_nodes->xv[k] = pal_v8_join(pal_v8_low(body->active_nodes->xv[k]), (pal_quad){0});
     }
 }
 
@@ -478,7 +447,7 @@ PAL_INLINE pal_v8 rate_of(const rk4 *row, const pal_active_nodes *pack, int k)
 /* the state at the start, and the second stage's */
 static void stage_first(rk4 *row, const pal_body *body, const rates *r)
 {
-    pal_active_nodes *pack = body->pack;
+    pal_active_nodes *pack = body->active_nodes;
     for (int k = 0; k < body->n_active; k++) {
         memory *m = &row->memory[k];
         const pal_v8 y = pack->xv[k], rate = rate_of(row, pack, k);
@@ -492,7 +461,7 @@ static void stage_first(rk4 *row, const pal_body *body, const rates *r)
  * the drag leaves of it, less what the first acceleration gave that */
 static void stage_second(rk4 *row, const pal_body *body, const rates *r)
 {
-    pal_active_nodes *pack = body->pack;
+    pal_active_nodes *pack = body->active_nodes;
     for (int k = 0; k < body->n_active; k++) {
         memory *m = &row->memory[k];
         const pal_v8 y = pack->xv[k], rate = rate_of(row, pack, k), half = r->half[row->led[k]];
@@ -506,7 +475,7 @@ static void stage_second(rk4 *row, const pal_body *body, const rates *r)
 /* from the third stage's forces the fourth stage's state */
 static void stage_third(rk4 *row, const pal_body *body, const rates *r)
 {
-    pal_active_nodes *pack = body->pack;
+    pal_active_nodes *pack = body->active_nodes;
     for (int k = 0; k < body->n_active; k++) {
         memory *m = &row->memory[k];
         const pal_v8 rate = rate_of(row, pack, k);
@@ -518,7 +487,7 @@ static void stage_third(rk4 *row, const pal_body *body, const rates *r)
 /* from the fourth stage's forces the state at the end; returns the square of the longest way, NaN where one is none */
 static double stage_last(rk4 *row, const pal_body *body, const rates *r)
 {
-    pal_active_nodes *pack = body->pack;
+    pal_active_nodes *pack = body->active_nodes;
     const double dt2 = r->dt * r->dt;
     double most2 = 0, poison = 0;
     for (int k = 0; k < body->n_active; k++) {
@@ -537,7 +506,7 @@ static double stage_last(rk4 *row, const pal_body *body, const rates *r)
 static void clamp_moves(const rk4 *row, pal_body *body, double dt_s, double max_m)
 {
     for (int k = 0; k < body->n_active; k++) {
-        pal_v8 *to = &body->pack->xv[k];
+        pal_v8 *to = &body->active_nodes->xv[k];
         pal_quad from = pal_v8_low(row->memory[k].from), move = pal_v8_low(*to) - from, v = pal_v8_high(*to);
         double way = sqrt(pal_quad_dot(move, move)), speed = sqrt(pal_quad_dot(v, v)) * dt_s;
         if (way > max_m) move *= max_m / way;
@@ -551,14 +520,14 @@ static void clamp_moves(const rk4 *row, pal_body *body, double dt_s, double max_
 static void give_forces(const rk4 *row, const pal_body *body)
 {
     for (int k = 0; k < body->n_active && row->pulls; k++)
-        pal_quad_store(body->f + 3 * (size_t)pal_body_point(body, k), body->pack->f[k]);
+        pal_quad_store(body->f + 3 * (size_t)pal_body_point(body, k), body->active_nodes->f[k]);
 }
 
 static pal_err run(void *self, pal_step *step)
 {
     rk4 *row = self;
     pal_body *body = step->body;
-    const rates r = find_rates(step->dt_s, drag_rate(step));
+    const rates r = find_rates(step->dt_s, pal_guard_drag_1_s(step->force, step->n_force));
     step->drag_separate = true;
     take_body(row, step);
     take_masses(row, body, &r, step->heavy);
@@ -569,7 +538,7 @@ static pal_err run(void *self, pal_step *step)
     PAL_TRY(find_forces(row, step));
     stage_third(row, body, &r);
     PAL_TRY(find_forces(row, step));
-    double way = sqrt(stage_last(row, body, &r)), most = max_move_S * body->length_scale_m;
+    double way = sqrt(stage_last(row, body, &r)), most = pal_guard_max_move_m(body);
     if (way > most) {
         uint64_t before = pal_clock_ns();
         clamp_moves(row, body, step->dt_s, most);

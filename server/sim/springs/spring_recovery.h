@@ -68,11 +68,9 @@ pal_err pal_spring_recovery_make(int n_node, pal_arena *arena, pal_spring_recove
 void pal_spring_recovery_reset(pal_spring_recovery *t);
 /* takes over the regions of the same body, with the same nodes, in another world */
 void pal_spring_recovery_transfer(pal_spring_recovery *t, const pal_spring_recovery *from);
-/* Examines the tetrahedra and chooses the springs that are off from now on; step->time_s is the time of the present
- * state. Counts in body->safeguards. Returns the answer of `recover` (effect.h). No heap */
-unsigned pal_spring_recovery_update(pal_spring_recovery *t, pal_step *step);
-/* the member `recover` of the three kinds of springs (self: a pal_spring_set): the first one of a body updates for all
- */
+/* The member `recover` of the three kinds of springs (effect.h; self: a pal_spring_set). The first one of a body
+ * examines the tetrahedra and chooses the springs that are off from now on; step->time_s is the time of the present
+ * state. Counts in body->safeguards. No heap */
 unsigned pal_spring_recover(void *self, pal_step *step);
 /* adds the forces of the regions to body->f; edges: the body's edge springs. Timed in body->safeguards */
 void pal_spring_recovery_force(pal_spring_recovery *t, const pal_spring_set *edges, pal_body *body);

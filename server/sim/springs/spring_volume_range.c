@@ -1,4 +1,4 @@
-/* The one pass over the volumes of a body of springs that looking for what is turned over takes where nothing is. */
+/* The pass over the volumes of a body of springs in which inversion is detected. */
 #include "server/sim/springs/spring_set.h"
 
 void pal_spring_volume_range(const pal_spring_set *set, pal_node_order *node_order, const double *d, double out[2])

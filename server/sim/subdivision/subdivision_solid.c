@@ -1,4 +1,4 @@
-/* Subdivided solids as finite elements. */
+/* Subdivision solids as finite elements. */
 #include "server/sim/subdivision/subdivision_solid.h"
 
 #include "server/base/vec3.h"
@@ -44,7 +44,7 @@ static void put_sample(pal_material_samples *to, size_t i, const pal_material *m
     to->damping_1_s[i] = (float)m->damping_1_s;
 }
 
-/* the same everywhere, or by the place of every point */
+/* constant material, or by the position of every point */
 static void sample_kind(pal_subdivision_solid *s, pal_cell_kind kind, const pal_body_def *def)
 {
     const int n_node = pal_cell_kind_nodes(kind);

@@ -1,4 +1,4 @@
-/* What follows from the state of an adaptive surface: leaves, springs, nodes, masses, triangles (C, adjustment of
+/* Lists that follow from the state of an adaptive surface: leaves, springs, nodes, masses, triangles (C, adjustment of
  * physical properties, eq. 6-8; figs. 3 and 4).
  *
  * One walk from the faces of level 0 down through split ones, so the cost follows the active part. Faces of a level are
@@ -159,7 +159,7 @@ static void mass_of_faces(const pal_adaptive_surface *s, double *mass_kg)
     }
 }
 
-/* C eq. 7 */
+/* paper C eq. 7 */
 static void mass_of_nodes(const pal_adaptive_surface *s, double *mass_kg)
 {
     const pal_levels *l = &s->levels;
@@ -187,7 +187,7 @@ static void share_mass(pal_adaptive_surface *s, double *mass_kg)
     for (int k = 0; k < s->n_node; k++) mass_kg[s->node[k]] *= s->mass_scale;
 }
 
-/* where the frame's rotation is measured from */
+/* origin of the rigid fit */
 static void find_rest_centre(pal_adaptive_surface *s, const pal_body *body)
 {
     double c[3] = {0, 0, 0}, square = 0;

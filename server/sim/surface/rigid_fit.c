@@ -37,7 +37,7 @@ PAL_INLINE void add_node(sums *t, const double from[3], const double c[3], doubl
     t->turn[0] += my * v[2] - mz * v[1], t->turn[1] += mz * v[0] - mx * v[2], t->turn[2] += mx * v[1] - my * v[0];
 }
 
-/* I^-1 L; an axis about which the body has no inertia (a line, a point) does not turn */
+/* I^-1 L; zero about an axis without inertia (a line, a point) */
 static void spin(const double inertia[9], const double moment[3], double least_kg_m2, double omega[3])
 {
     double w[3], axis[9];
@@ -53,7 +53,7 @@ static void fit(const pal_adaptive_surface *s, const double from[3], sums t, pal
     double *q = frame->quat, length = 0, c[3], moment[3], arm[3], size = 0;
     for (int k = 0; k < 4; k++) length += q[k] * q[k];
     if (!(length > 0.5 && length < 2)) q[0] = 1, q[1] = q[2] = q[3] = 0;
-    /* a body shrunk to a point has neither rotation nor spin of its own */
+    /* a body in a point has neither rotation nor spin */
     for (int k = 0; k < 9; k++) size += t.a[k] * t.a[k];
     if (size > SMALL * SMALL * s->rest_kg_m2 * s->rest_kg_m2) pal_polar_rotation(t.a, q, 40);
     pal_quat_matrix(q, frame->R);

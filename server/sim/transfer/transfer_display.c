@@ -1,7 +1,8 @@
-/* What of a carry is seen (transfer.h): how far points go, and a surface that does not jump. */
+/* What of a carry is snapshot (transfer.h): how far points go, and a surface that does not jump. */
 #include "server/sim/transfer/transfer.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/core/blend.h"
 #include "server/sim/transfer/transfer_core.h"
 #include "server/sim/world/world_core.h"
 
@@ -18,7 +19,7 @@ static bool is_inside(const pal_interpolation *rows, int i)
     return true;
 }
 
-/* farthest that a node of before within the new elements is from where it was; of surfaces that adapt a vertex of both
+/* farthest that a node of before within the new elements is from where it was; of adaptive surfaces a vertex of both
  */
 double pal_transfer_body_move(const pal_transfer *t, const pal_body *from, const pal_body *to)
 {
@@ -65,7 +66,8 @@ static void add_shown(const pal_body *from, const pal_levels *names, int32_t i, 
 
 /* where the new body's shown vertex i was shown, for a body whose vertices are nodes: within the old elements at rest
  * as the old nodes carry it; t->place has the new nodes so */
-static void was_shown(const pal_transfer *t, const pal_body *from, const pal_body *to, bool same, int i, double out[3])
+static void old_position(const pal_transfer *t, const pal_body *from, const pal_body *to, bool same, int i,
+                         double out[3])
 {
     pal_set3(out, 0, 0, 0);
     if (t->adaptive && pal_dofs_has(&to->dofs, i))
@@ -76,26 +78,18 @@ static void was_shown(const pal_transfer *t, const pal_body *from, const pal_bod
         pal_copy3(out, t->place + 3 * (size_t)to->shown_node[i]);
 }
 
-/* nodes of the new body by those of the old one as they stand, in t->place */
-static void place_nodes(pal_transfer *t, const pal_body *from, const pal_body *to)
-{
-    for (int i = 0; i < 3 * from->n_node; i++) t->old[i] = from->d[i] - from->node_rest[i];
-    pal_interpolation_apply(&t->in, t->old, t->place);
-    for (int i = 0; i < 3 * to->n_node; i++) t->place[i] += to->node_rest[i];
-}
-
 /* the other bodies of the world, where a switch of theirs is still being let in */
-static void go_on_others(const pal_transfer *t, pal_world *next, const pal_world *before)
+static void transfer_other_offsets(const pal_transfer *t, pal_world *next, const pal_world *before)
 {
     for (int b = 0; b < next->plan.n_body && b < before->plan.n_body; b++) {
         const pal_body *from = &before->plan.body[b];
         if (b == t->body || !from->display_offset_m || from->n_shown != next->plan.body[b].n_shown) continue;
         size_t n = 3 * (size_t)from->n_shown;
-        float *lag = malloc(sizeof *lag * n);
-        for (size_t i = 0; i < n && lag; i++)
-            lag[i] = (float)(from->display_offset_part * (double)from->display_offset_m[i]);
-        if (lag) (void)pal_world_blend_display(next, b, lag);
-        free(lag);
+        float *offset_m = malloc(sizeof *offset_m * n);
+        for (size_t i = 0; i < n && offset_m; i++)
+            offset_m[i] = (float)(from->display_offset_part * (double)from->display_offset_m[i]);
+        if (offset_m) (void)pal_world_blend_display(next, b, offset_m);
+        free(offset_m);
     }
 }
 
@@ -104,23 +98,23 @@ void pal_transfer_display(pal_transfer *t, pal_world *next, const pal_world *bef
     const pal_body *from = &before->plan.body[t->body], *to = &next->plan.body[t->body];
     bool same = pal_transfer_same_shown(next, before, t->body) && !t->adaptive;
     out->max_move_m = out->frame_move_m = out->body_move_m;
-    go_on_others(t, next, before);
+    transfer_other_offsets(t, next, before);
     if (to->n_shown == 0 || from->n_shown == 0 || (!same && !t->adaptive && to->skin)) return;
-    float *lag = malloc(3 * sizeof *lag * (size_t)to->n_shown);
+    float *offset_m = malloc(3 * sizeof *offset_m * (size_t)to->n_shown);
     double most = 0;
-    if (!same && !t->adaptive) place_nodes(t, from, to);
-    for (int i = 0; i < to->n_shown && lag; i++) {
+    if (!same && !t->adaptive) pal_transfer_place_nodes(t, from, to);
+    for (int i = 0; i < to->n_shown && offset_m; i++) {
         double was[3];
-        was_shown(t, from, to, same, i, was);
+        old_position(t, from, to, same, i, was);
         for (int c = 0; c < 3; c++) {
             was[c] -= (double)to->shown[3 * (size_t)i + (size_t)c];
-            lag[3 * (size_t)i + (size_t)c] = (float)was[c];
+            offset_m[3 * (size_t)i + (size_t)c] = (float)was[c];
         }
         most = fmax(most, pal_norm3(was));
     }
-    bool lags = lag && pal_world_blend_display(next, t->body, lag) == PAL_ERR_OK;
-    free(lag);
+    bool offset_set = offset_m && pal_world_blend_display(next, t->body, offset_m) == PAL_ERR_OK;
+    free(offset_m);
     /* other vertices are shown: what the body itself moves says more */
     if (same) out->max_move_m = most;
-    if (lags) out->frame_move_m = most / PAL_BLEND_STEPS;
+    if (offset_set) out->frame_move_m = most * fmin(1, next->step_s / PAL_BLEND_TRANSFER_S);
 }

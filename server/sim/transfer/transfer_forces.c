@@ -1,23 +1,24 @@
-/* Forces of a carry (transfer.h): from the nodes of the old body to those of the new one. */
+/* Forces of a transfer (transfer.h): from the nodes of the old body to those of the new one. */
 #include "server/sim/transfer/transfer_core.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/world/world_core.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/* of an old node's mass: new nodes that look to it with less take as much less of its force */
+/* of an old node's mass: new nodes that depend on it with less take as much less of its force */
 #define LEAST_SHARE 0.25
 /* times a new node's mass that old ones may weigh which accelerate it by their whole force */
 #define HEAVIER 2.0
 
-/* entries of t->in by old nodes: new nodes that look to old node i and by how much, who[first[i]..first[i+1]-1] */
-typedef struct lookers {
+/* entries of t->in by old nodes: new nodes that depend on old node i and by how much, who[first[i]..first[i+1]-1] */
+typedef struct dependents {
     int32_t *first, *who;
     double *weight;
-} lookers;
+} dependents;
 
-static bool find_lookers(const pal_interpolation *in, int n_from, lookers *out)
+static bool find_dependents(const pal_interpolation *in, int n_from, dependents *out)
 {
     int32_t n = in->start[in->n_row];
     out->first = calloc((size_t)n_from + 2, sizeof *out->first);
@@ -35,9 +36,9 @@ static bool find_lookers(const pal_interpolation *in, int n_from, lookers *out)
     return true;
 }
 
-/* old node i's force goes to the new nodes that look to it, over their masses as they do; the remainder (of nodes that
- * no new one, or next to none, looks to) by place */
-static void add_spread(const pal_transfer *t, const pal_body *from, const pal_body *to, const lookers *l, int i,
+/* old node i's force goes to the new nodes that depend on it, over their masses as they do; the remainder (of nodes
+ * that hardly any new one depends on) by place */
+static void add_spread(const pal_transfer *t, const pal_body *from, const pal_body *to, const dependents *l, int i,
                        pal_interpolation_builder *rows)
 {
     double sum = 0, least = LEAST_SHARE * from->node_mass_kg[i];
@@ -67,14 +68,14 @@ static void add_by_mass(const pal_transfer *t, const pal_body *to, int i, pal_in
 
 /* t->spread: forces at old nodes -> at new ones, no net force is lost, by masses. To those around; where points carry
  * the nodes (forces between them are no forces on the body) or the new mesh is the finer one, to all new nodes that
- * look to the old one, so that they do not gather in few: of equal meshes' masses that is as accelerations */
+ * depend on the old one, so that they do not gather in few: of equal meshes' masses that is as accelerations */
 void pal_transfer_make_force_map(pal_transfer *t, const pal_body *from, const pal_body *to)
 {
     bool lumped = !from->interpolation && from->n_node >= to->n_node;
-    lookers l = {0};
+    dependents l = {0};
     pal_interpolation_builder rows;
     if (t->adaptive || t->spread.n_row > 0) return;
-    if (lumped || find_lookers(&t->in, from->n_node, &l)) {
+    if (lumped || find_dependents(&t->in, from->n_node, &l)) {
         pal_interpolation_builder_begin(&rows, from->n_node, to->n_node, INT32_MAX);
         for (int i = 0; i < from->n_node && !rows.err; i++) {
             if (lumped)
@@ -137,12 +138,10 @@ void pal_transfer_forces(pal_transfer *t, const pal_body *from, const pal_body *
     lighten(t, from, to);
 }
 
-/* lasting loads */
-void pal_transfer_loads(const pal_transfer *t, const pal_body *from, pal_body *to, pal_arena *arena)
+void pal_transfer_loads(const pal_transfer *t, const pal_body *from, pal_world *next)
 {
-    if (!from->external_force) return;
-    if (!to->external_force) to->external_force = PAL_NEW(arena, double, 3 * (size_t)to->n_node);
-    if (!to->external_force) return;
-    memset(to->external_force, 0, 3 * sizeof(double) * (size_t)to->n_node);
-    pal_interpolation_apply_transpose(&t->back, from->external_force, to->external_force);
+    double *to = from->external_force ? pal_world_external_force(next, t->body) : NULL;
+    if (!to) return;
+    memset(to, 0, 3 * sizeof *to * (size_t)t->n_to);
+    pal_interpolation_apply_transpose(&t->back, from->external_force, to);
 }

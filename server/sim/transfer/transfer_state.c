@@ -1,26 +1,28 @@
-/* The carry (transfer.h). Reading order: pal_transfer_apply at the end. */
+/* Transfer of places, velocities and energy (transfer.h). Read pal_transfer_apply, at the end, first. */
 #include "server/sim/transfer/transfer.h"
 
 #include "server/base/vec3.h"
 #include "server/num/conjugate_gradient.h"
 #include "server/num/polar.h"
 #include "server/sim/transfer/transfer_core.h"
+#include "server/sim/transfer/transfer_world.h"
 #include "server/sim/world/world_core.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/* rounds of smoothing (AGAIN: where a rehearsal has done most of it), near enough in energy, most that a displacement
- * or velocity is lengthened or shortened, pull to rest of the least squares in parts of their largest weight */
-enum { N_SMOOTH = 40, N_SMOOTH_AGAIN = 10, N_SMOOTH_FAR = 200, N_SCALE = 8 };
-#define FAR        1.5 /* times the energy wanted: more rounds than usual */
-#define SAME       1e-4
-#define MOST_SCALE PAL_TRANSFER_MAX_SCALE
-#define MOST_RATE  PAL_TRANSFER_MAX_VELOCITY_SCALE
-#define INERTIA    0.8
-/* velocities stay as they are while the kinetic energy is off by less than this part of all */
-#define SPARE 0.01
-#define PULL  1e-6
+/* rounds of smoothing: usually, after a rehearsal has done most of them, and where the energy is FAR times that of
+ * before. A round is one evaluation of forces */
+enum { SMOOTH_ROUNDS = 40, SMOOTH_AGAIN_ROUNDS = 10, SMOOTH_FAR_ROUNDS = 200, SCALE_ROUNDS = 8 };
+#define FAR 1.5
+/* relative difference of energies that counts as none: far below the 2 % that a switch may change (test_switch) */
+#define SAME_ENERGY 1e-4
+/* of the last move that goes on in Polyak's heavy ball: stable, as forces over bounds have no eigenvalue above 1 */
+#define INERTIA 0.8
+/* share of all energy that the kinetic one may be off by before velocities are scaled */
+#define SPARE_ENERGY 0.01
+/* pull to rest of the least squares, over their largest weight: decides only what nodes leave open */
+#define REST_PULL 1e-6
 
 /* ---- sums ---- */
 
@@ -29,8 +31,8 @@ static bool elastic(const pal_effect *e)
     return e->stage == PAL_STAGE_FORCE && e->energy && (e->internal || e->stiffness);
 }
 
-/* of a body's rows that spring back, where it stands: some know their energy as of the last forces */
-static double elastic_J(pal_world *w, int body)
+/* of a body's elastic components where it is; some know their energy as of the last forces */
+static double elastic_energy_J(pal_world *w, int body)
 {
     double sum = 0;
     if (pal_world_assemble_forces(w, body)) return NAN;
@@ -44,42 +46,43 @@ static double elastic_J(pal_world *w, int body)
 
 /* the same, and f and g are then those of all that pulls but tools: of what an earlier switch still lets go as well, so
  * that one switch after the other takes nothing away at once */
-static double pulled_J(pal_world *w, int body)
+static double blended_elastic_J(pal_world *w, int body)
 {
-    double sum = elastic_J(w, body);
+    double sum = elastic_energy_J(w, body);
     pal_body *b = &w->plan.body[body];
     if (!b->interpolation) {
         pal_blend_components_add(&w->blends, body, 1, b->f);
         return sum;
     }
-    double *eased = calloc(3 * (size_t)b->n_node + 1, sizeof *eased);
-    if (!eased) return sum;
-    pal_blend_components_add(&w->blends, body, 1, eased);
-    pal_interpolation_apply_transpose(b->interpolation, eased, b->g);
-    free(eased);
+    double *blended = calloc(3 * (size_t)b->n_node + 1, sizeof *blended);
+    if (!blended) return sum;
+    pal_blend_components_add(&w->blends, body, 1, blended);
+    pal_interpolation_apply_transpose(b->interpolation, blended, b->g);
+    free(blended);
     return sum;
 }
 
-static double world_J(pal_world *w)
+static double world_energy_J(pal_world *w)
 {
     double sum = 0;
-    for (int b = 0; b < w->plan.n_body; b++) sum += elastic_J(w, b) + pal_body_kinetic_J(&w->plan.body[b]);
+    for (int b = 0; b < w->plan.n_body; b++) sum += elastic_energy_J(w, b) + pal_body_kinetic_J(&w->plan.body[b]);
     return sum;
 }
 
-/* pulled_J of the old body, t->moving, and the energy of its world unless NULL; its loads stay those of its last step
+/* blended_elastic_J of the old body, t->moving, and the energy of its world unless NULL; its loads stay those of its
+ * last step
  */
-static double look_at(pal_transfer *t, pal_world *old, double *all_J)
+static double evaluate_old(pal_transfer *t, pal_world *old, double *all_J)
 {
     pal_body *from = &old->plan.body[t->body];
     size_t n = 3 * (size_t)from->n_node;
     memcpy(t->load, from->load, n * sizeof *t->load);
     if (all_J)
-        *all_J = world_J(old);
+        *all_J = world_energy_J(old);
     else
-        (void)elastic_J(old, t->body);
+        (void)elastic_energy_J(old, t->body);
     for (size_t i = 0; i < n; i++) t->moving[i] = t->load[i] + from->f[i] - from->load[i];
-    double sum = pulled_J(old, t->body);
+    double sum = blended_elastic_J(old, t->body);
     memcpy(from->load, t->load, n * sizeof *t->load);
     return sum;
 }
@@ -146,12 +149,10 @@ static bool is_free(const pal_body *body)
 
 /* ---- places and velocities ---- */
 
-/* nodes by interpolated displacement and velocity */
-static void interpolate(pal_transfer *t, const pal_body *from, const pal_body *to)
+void pal_transfer_place_nodes(pal_transfer *t, const pal_body *from, const pal_body *to)
 {
     for (int i = 0; i < 3 * from->n_node; i++) t->old[i] = from->d[i] - from->node_rest[i];
     pal_interpolation_apply(&t->in, t->old, t->place);
-    pal_interpolation_apply(&t->in, from->dv, t->rate);
     for (int i = 0; i < 3 * to->n_node; i++) t->place[i] += to->node_rest[i];
 }
 
@@ -194,7 +195,7 @@ static void least_squares(pal_transfer *t, const pal_body *to, const double *wan
         most = fmax(most, t->work[1][i]);
         if (to->support[i]) pal_set3(r + 3 * i, 0, 0, 0);
     }
-    s.pull = PULL * most;
+    s.pull = REST_PULL * most;
     pal_conjugate_gradient cg = {.n = 3 * to->n_dof,
                                  .multiply = multiply,
                                  .precondition = no_change,
@@ -246,7 +247,7 @@ static void add_vertex(pal_interpolation_builder *rows, const pal_dofs *from, co
     for (int k = 0; k < 2; k++) add_vertex(rows, from, to, end[k], 0.5 * weight);
 }
 
-/* rows of the old vertices; false: no memory, forces and grips are not carried then */
+/* rows of the old vertices; false: no memory, forces and grasps are not carried then */
 static bool make_back(pal_transfer *t, const pal_body *from, const pal_body *to)
 {
     pal_interpolation_builder rows;
@@ -267,7 +268,7 @@ static bool refines(const pal_world *w, int b)
 /* ---- forces ---- */
 
 /* the difference of forces goes out in steps; of a body that nothing holds it moves and turns nothing */
-static void ease(pal_transfer *t, pal_world *next)
+static void blend_forces(pal_transfer *t, pal_world *next)
 {
     pal_body *to = &next->plan.body[t->body];
     double c[3], p[3], l[3], a[3];
@@ -309,12 +310,12 @@ static bool find_bound(const pal_world *w, int body, double *bound)
 static int smooth(pal_transfer *t, pal_world *next, double want_J)
 {
     pal_body *to = &next->plan.body[t->body];
-    double *way = t->work[0], now_J = elastic_J(next, t->body), most_J = 1.5 * now_J;
+    double *way = t->work[0], now_J = elastic_energy_J(next, t->body), most_J = 1.5 * now_J;
     int n = 0;
     if (to->interpolation || !find_bound(next, t->body, t->bound)) return 0;
     memset(way, 0, 3 * sizeof *way * (size_t)to->n_dof);
-    int n_most = now_J > FAR * want_J ? N_SMOOTH_FAR : t->has_rehearsed ? N_SMOOTH_AGAIN : N_SMOOTH;
-    for (; n < n_most && now_J > (1 + SAME) * want_J && now_J < most_J; n++) {
+    int n_most = now_J > FAR * want_J ? SMOOTH_FAR_ROUNDS : t->has_rehearsed ? SMOOTH_AGAIN_ROUNDS : SMOOTH_ROUNDS;
+    for (; n < n_most && now_J > (1 + SAME_ENERGY) * want_J && now_J < most_J; n++) {
         for (int k = 0; k < to->n_active; k++) {
             int i = pal_body_point(to, k);
             if (to->support[i] || !(t->bound[i] > 0)) continue;
@@ -324,7 +325,7 @@ static int smooth(pal_transfer *t, pal_world *next, double want_J)
             }
         }
         pal_body_update_nodes(to);
-        now_J = elastic_J(next, t->body); /* and f */
+        now_J = elastic_energy_J(next, t->body); /* and f */
     }
     return n;
 }
@@ -363,14 +364,14 @@ static double scale_displacement(pal_transfer *t, pal_world *next, double want_J
     double *ref = t->work[0], *base = t->work[1], s = 1, power = 2, last_J = NAN, last_s = 1;
     find_reference(to, ref);
     memcpy(base, to->x, 3 * sizeof *base * (size_t)to->n_dof);
-    for (int round = 0; round < N_SCALE; round++) {
-        double now_J = elastic_J(next, t->body);
-        if (!(now_J > 0) || !(want_J > 0) || fabs(now_J / want_J - 1) <= SAME) break;
+    for (int round = 0; round < SCALE_ROUNDS; round++) {
+        double now_J = elastic_energy_J(next, t->body);
+        if (!(now_J > 0) || !(want_J > 0) || fabs(now_J / want_J - 1) <= SAME_ENERGY) break;
         /* the energy goes with a power of the length: 2 where little is bent, more beyond */
         if (last_J > 0 && s != last_s && now_J != last_J) power = log(now_J / last_J) / log(s / last_s);
         power = fmin(fmax(power, 1), 8);
         last_J = now_J, last_s = s;
-        s = within(s * pow(want_J / now_J, 1 / power), MOST_SCALE);
+        s = within(s * pow(want_J / now_J, 1 / power), PAL_TRANSFER_MAX_SCALE);
         for (int k = 0; k < to->n_active; k++) {
             size_t i = (size_t)pal_body_point(to, k);
             if (to->support[i]) continue;
@@ -404,7 +405,8 @@ static void scale_velocity(pal_transfer *t, pal_body *to, double want_J)
         memcpy(to->v, t->work[1], n_byte);
     }
     double s = 1;
-    if (all_J > rigid_J * (1 + 1e-9)) s = within(sqrt(fmax(want_J - rigid_J, 0) / (all_J - rigid_J)), MOST_RATE);
+    if (all_J > rigid_J * (1 + 1e-9))
+        s = within(sqrt(fmax(want_J - rigid_J, 0) / (all_J - rigid_J)), PAL_TRANSFER_MAX_VELOCITY_SCALE);
     for (int i = 0; i < 3 * to->n_dof; i++) to->v[i] = v[i] + s * (to->v[i] - v[i]);
     pal_body_update_nodes(to);
 }
@@ -442,7 +444,7 @@ static const pal_component *find_row(const pal_world *w, int body, const pal_eff
     return NULL;
 }
 
-/* rows that can go on where those of before are; forces that they put on other nodes now are to be let go as well */
+/* rows that can go on where those of before are; forces that they put on other nodes now are to be released as well */
 static void hand_over(pal_transfer *t, pal_world *next, const pal_world *before)
 {
     for (int i = 0; i < next->plan.n_row; i++) {
@@ -464,24 +466,13 @@ static void place_points(pal_transfer *t, const pal_body *from, pal_world *next)
 {
     pal_body *to = &next->plan.body[t->body];
     if (!t->adaptive) {
-        interpolate(t, from, to);
+        pal_transfer_place_nodes(t, from, to);
+        pal_interpolation_apply(&t->in, from->dv, t->rate);
         set_points(t, from, to);
         return;
     }
     to->dofs.transfer(to, from, refines(next, t->body), t->x, t->v);
     (void)make_back(t, from, to);
-}
-
-/* the new body at t->x, t->v as pal_world_transfer would have it */
-static void put(const pal_transfer *t, pal_world *next)
-{
-    pal_body *to = &next->plan.body[t->body];
-    size_t n_byte = 3 * sizeof(double) * (size_t)to->n_dof;
-    memcpy(to->x, t->x, n_byte);
-    memcpy(to->v, t->v, n_byte);
-    for (int i = 0; i < to->n_dof; i++)
-        if (to->support[i] == PAL_FIXED) pal_set3(to->v + 3 * (size_t)i, 0, 0, 0);
-    pal_body_update_nodes(to);
 }
 
 /* from places by interpolation, with what a rehearsal added to them, to smooth ones; from->f and g are known. Rounds */
@@ -492,7 +483,7 @@ static int approach(pal_transfer *t, pal_world *next, const pal_body *from, doub
     if (t->has_rehearsed) pal_body_update_nodes(to);
     if (t->back.n_row == 0) return 0;
     pal_transfer_make_force_map(t, from, to);
-    pal_transfer_loads(t, from, to, next->arena);
+    pal_transfer_loads(t, from, next);
     pal_transfer_forces(t, from, to);
     return smooth(t, next, want_J);
 }
@@ -504,25 +495,25 @@ void pal_transfer_apply(pal_transfer *transfer, pal_world *next, const pal_world
     pal_body *from = &old->plan.body[t->body], *to = &next->plan.body[t->body];
     size_t n_byte = 3 * sizeof(double) * (size_t)to->n_dof;
     *out = (pal_transfer_report){.scale = 1};
-    double elastic_before_J = look_at(t, old, &out->energy_before_J), kinetic_J = pal_body_kinetic_J(from);
-    double spare_J = SPARE * (elastic_before_J + kinetic_J);
+    double elastic_before_J = evaluate_old(t, old, &out->energy_before_J), kinetic_J = pal_body_kinetic_J(from);
+    double spare_J = SPARE_ENERGY * (elastic_before_J + kinetic_J);
     place_points(t, from, next);
     pal_world_transfer(next, before, t->body, t->x, t->v);
-    out->interpolated_J = world_J(next);
+    out->interpolated_J = world_energy_J(next);
     out->n_smooth = approach(t, next, from, elastic_before_J);
-    pal_world_invalidate_limits(next, t->body); /* rows look anew at what is smooth now, as they will at the end */
+    pal_world_invalidate_limits(next, t->body); /* rows look again at what is smooth now, as they will at the end */
     out->scale = scale_displacement(t, next, elastic_before_J);
     if (is_free(to)) keep_momentum(from, to);
     /* the velocity makes up for what the displacement could not */
-    double now_J = pal_body_kinetic_J(to), left_J = elastic_before_J + kinetic_J - elastic_J(next, t->body);
+    double now_J = pal_body_kinetic_J(to), left_J = elastic_before_J + kinetic_J - elastic_energy_J(next, t->body);
     scale_velocity(t, to, fmin(fmax(now_J, left_J - spare_J), left_J + spare_J));
     memcpy(t->x, to->x, n_byte);
     memcpy(t->v, to->v, n_byte);
     pal_world_transfer(next, before, t->body, t->x, t->v);
     hand_over(t, next, before);
-    if (t->back.n_row > 0) ease(t, next);
+    if (t->back.n_row > 0) blend_forces(t, next);
     pal_brush_components_transfer(&next->brushes, &next->plan, &before->brushes, &before->plan);
-    out->energy_after_J = world_J(next);
+    out->energy_after_J = world_energy_J(next);
     out->body_move_m = pal_transfer_body_move(t, from, to);
     pal_transfer_display(t, next, before, out);
 }
@@ -530,7 +521,7 @@ void pal_transfer_apply(pal_transfer *transfer, pal_world *next, const pal_world
 /* ---- while the old world goes on ---- */
 
 /* room for what of a body changes while it runs: x, v, g, masses, what is held; d, dv, f, outer, masses of nodes */
-static bool make_seen(pal_transfer *t, const pal_body *from)
+static bool make_snapshot(pal_transfer *t, const pal_body *from)
 {
     size_t dof = 3 * (size_t)from->n_dof, node = 3 * (size_t)from->n_node;
     if (t->snapshot_room) return true;
@@ -551,19 +542,20 @@ bool pal_transfer_snapshot(pal_transfer *t, const pal_world *before)
 {
     pal_world *old = (pal_world *)(uintptr_t)before; /* its forces are worked out again */
     const pal_body *from = &old->plan.body[t->body];
-    if (t->adaptive || from->frozen || !make_seen(t, from)) return false;
+    if (t->adaptive || from->frozen || !make_snapshot(t, from)) return false;
     size_t dof = 3 * (size_t)from->n_dof, node = 3 * (size_t)from->n_node;
     double *room = t->snapshot_room;
-    t->snapshot_energy_J = look_at(t, old, NULL);
-    t->seen = *from;
-    t->seen.x = keep(&room, from->x, dof), t->seen.v = keep(&room, from->v, dof);
-    t->seen.g = keep(&room, from->g, dof), t->seen.f = keep(&room, from->f, node);
-    t->seen.d = keep(&room, from->d, node), t->seen.dv = keep(&room, from->dv, node);
-    t->seen.mass_kg = keep(&room, from->mass_kg, (size_t)from->n_dof);
-    t->seen.node_mass_kg = keep(&room, from->node_mass_kg, (size_t)from->n_node);
-    if (from->external_force) t->seen.external_force = keep(&room, from->external_force, node);
-    t->seen.support = (uint8_t *)(t->snapshot_room + 3 * dof + 4 * node + (size_t)from->n_dof + (size_t)from->n_node);
-    memcpy(t->seen.support, from->support, (size_t)from->n_dof);
+    t->snapshot_energy_J = evaluate_old(t, old, NULL);
+    t->snapshot = *from;
+    t->snapshot.x = keep(&room, from->x, dof), t->snapshot.v = keep(&room, from->v, dof);
+    t->snapshot.g = keep(&room, from->g, dof), t->snapshot.f = keep(&room, from->f, node);
+    t->snapshot.d = keep(&room, from->d, node), t->snapshot.dv = keep(&room, from->dv, node);
+    t->snapshot.mass_kg = keep(&room, from->mass_kg, (size_t)from->n_dof);
+    t->snapshot.node_mass_kg = keep(&room, from->node_mass_kg, (size_t)from->n_node);
+    if (from->external_force) t->snapshot.external_force = keep(&room, from->external_force, node);
+    t->snapshot.support =
+        (uint8_t *)(t->snapshot_room + 3 * dof + 4 * node + (size_t)from->n_dof + (size_t)from->n_node);
+    memcpy(t->snapshot.support, from->support, (size_t)from->n_dof);
     return isfinite(t->snapshot_energy_J);
 }
 
@@ -573,9 +565,9 @@ void pal_transfer_rehearse(pal_transfer *t, pal_world *next)
     size_t n = 3 * (size_t)to->n_dof;
     if (!t->fix) t->fix = calloc(n + 1, sizeof *t->fix);
     if (!t->fix) return;
-    place_points(t, &t->seen, next);
-    put(t, next);
-    (void)approach(t, next, &t->seen, t->snapshot_energy_J);
+    place_points(t, &t->snapshot, next);
+    pal_transfer_set_state(to, t->x, t->v);
+    (void)approach(t, next, &t->snapshot, t->snapshot_energy_J);
     for (size_t i = 0; i < n; i++) t->fix[i] = to->x[i] - t->x[i];
     t->has_rehearsed = true;
 }
@@ -585,6 +577,6 @@ double pal_transfer_drift_m(const pal_transfer *t, const pal_world *before)
     const pal_body *from = &before->plan.body[t->body];
     double most = 0;
     for (int i = 0; i < from->n_node; i++)
-        most = fmax(most, pal_dist3(from->d + 3 * (size_t)i, t->seen.d + 3 * (size_t)i));
+        most = fmax(most, pal_dist3(from->d + 3 * (size_t)i, t->snapshot.d + 3 * (size_t)i));
     return most;
 }

@@ -1,5 +1,5 @@
-/* Brushes while a world runs: rows put into its plan with the first brush of a body and taken out after the last
- * (world.h, pal_world_brush). Between steps. [sim] */
+/* Brushes in a running world: the component `brush` is inserted into the plan with the first brush of a body and
+ * removed after the last (world.h, pal_world_brush). Between steps. [sim] */
 #ifndef PAL_SIM_WORLD_BRUSH_COMPONENTS_H
 #define PAL_SIM_WORLD_BRUSH_COMPONENTS_H
 #include "server/sim/core/brush.h"
@@ -7,7 +7,7 @@
 
 /* by body; zeroed: none */
 typedef struct pal_brush_components {
-    pal_arena *arena[PAL_BODY_MAX]; /* each row's memory, NULL: no such row */
+    pal_arena *arena[PAL_BODY_MAX]; /* each row's memory, NULL: no such component */
     void *self[PAL_BODY_MAX];
 } pal_brush_components;
 

@@ -1,16 +1,16 @@
-/* Fields in colour while a world runs: rows field_output put into its plan with memory of their own, and taken out
- * again (world.h, pal_world_field). Between steps. [sim] */
+/* Fields shown in colour: components field_output are inserted into a running plan with memory of their own, and
+ * removed again (world.h, pal_world_field). Between steps. [sim] */
 #ifndef PAL_SIM_WORLD_FIELD_COMPONENTS_H
 #define PAL_SIM_WORLD_FIELD_COMPONENTS_H
 #include "server/sim/plan/plan.h"
 
 /* rows that were put in, by body and field; zeroed: none */
 typedef struct pal_field_components {
-    pal_arena *arena[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* each row's memory, NULL: no such row */
+    pal_arena *arena[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* each row's memory, NULL: no such component */
     void *self[PAL_BODY_MAX][PAL_FIELD_COUNT];
 } pal_field_components;
 
-/* displacement of what is shown; the others where a FORCE row can measure them */
+/* displacement of what is shown; the others where a FORCE component can measure them */
 bool pal_field_components_given(const pal_plan *plan, int body, pal_field field);
 /* REFUSED: an entry of the scene asks for what the body's model does not give */
 pal_err pal_field_components_check(const pal_plan *plan, pal_diagnostic *diag);

@@ -27,17 +27,17 @@ typedef struct pal_frame_part {
     /* since the body's reset: what kept it within its bounds (safeguards.h), how many in all, and their time */
     pal_safeguards safeguards;
     uint64_t n_safeguard, rescue_ns;
-    bool asleep;       /* at rest: its rows are not run until something comes near (row sleep)      */
+    bool asleep;       /* at rest: its rows are not run until something comes near (component sleep)      */
     uint64_t n_output; /* OUTPUT runs of the body so far: while it stays, nothing here was computed */
     pal_frame_field field[PAL_FIELD_COUNT]; /* by pal_field */
-    /* bodies that adapt (sim/adaptive_surface.h): the table of drawn triangles at this revision, 0 0 0 in empty places.
+    /* adaptive bodies (adaptive_surface.h): the table of drawn triangles at this revision, 0 0 0 in empty places.
      * Vertices of no triangle are hidden and their positions mean nothing. n_slot 0: the triangles never change */
     int n_slot;
     int32_t *slot;                 /* [n_slot][3]                                      */
     uint64_t slot_log;             /* changes taken in so far, of pal_adaptive_surface.n_log      */
     int n_active, n_spring;        /* nodes and springs now                            */
     int n_finest, n_finest_spring; /* and if all of the body were of its finest level  */
-    /* bodies whose nodes are carried by control points (body.embed): those, body frame, for sculpting */
+    /* bodies whose nodes are carried by control points (body.interpolation): those, body frame, for sculpting */
     int n_point;     /* 0: another body */
     double *point_m; /* [n_point][3]    */
 } pal_frame_part;

@@ -1,4 +1,5 @@
-/* The point of a shown surface that is nearest to a place, for commands that point at a body. Thread: [any]; no heap. */
+/* The point of a shown surface that is nearest to a place, for commands that point at a body. Thread: [any]; no heap.
+ */
 #ifndef PAL_SIM_WORLD_PICK_H
 #define PAL_SIM_WORLD_PICK_H
 #include "server/sim/world/world.h"

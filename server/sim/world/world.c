@@ -30,7 +30,7 @@ pal_step pal_world_body_step(pal_world *w, int b)
                       .time_s = w->time_s};
 }
 
-/* the least limit of all bodies that move, infinite when nothing limits; a body whose limit is no number is frozen */
+/* the least limit of all bodies that move, infinite when nothing limits; a body whose limit is not finite is frozen */
 double pal_world_find_limit(pal_world *w, int sub)
 {
     double least = INFINITY;
@@ -62,7 +62,8 @@ static bool refines(const pal_world *w, int b)
     return w->plan.body[b].active && w->plan.n_of[PAL_STAGE_ADAPT][b] > 0;
 }
 
-/* what FORCE rows have kept of the last forces (turns of elements), so that a new world is as one that was reset */
+/* what FORCE components have kept of the last forces (turns of elements), so that a new world is as one that was reset
+ */
 static void forget_forces(pal_world *w, int b)
 {
     for (int i = 0; i < w->plan.n_of[PAL_STAGE_FORCE][b]; i++) {
@@ -309,7 +310,7 @@ static void run_substep(pal_world *w, pal_step *shared)
     }
 }
 
-/* ADAPT, GUARD and OUTPUT rows, once a step */
+/* ADAPT, GUARD and OUTPUT components, once a step */
 static void run_stage(pal_world *w, pal_stage stage, double dt_s)
 {
     for (int b = 0; b < w->plan.n_body; b++) {
@@ -398,7 +399,7 @@ pal_err pal_world_step(pal_world *world, double dt_s)
     int frozen = count_frozen(w);
     for (int i = 0; i < w->plan.n_row; i++) w->plan.row[i].spent_ns = 0;
     for (int t = 0; t < w->tools.n_tool; t++)
-        pal_tool_begin_step(&w->tools.tool[t], w->has_requested_pose[t] ? &w->asked[t] : NULL);
+        pal_tool_begin_step(&w->tools.tool[t], w->has_requested_pose[t] ? &w->asked[t] : NULL, dt_s);
     w->component_err = PAL_ERR_OK;
     begin_step(w, dt_s);
     run_substeps(w, dt_s);

@@ -1,7 +1,7 @@
-/* The world: bodies and plan, one step function. No threads, no heap in a step, no files. Deterministic: the same
+/* The world: bodies and plan, one step function. No threads, no heap call in a step, no files. Deterministic: the same
  * scene, poses and commands at the same ticks give the same hash on any machine with IEEE doubles.
  *
- * Scene frame: metres, origin at the first body's mesh origin; the others are offset by the difference of their
+ * Scene frame: metres, origin at the first body's mesh origin; other bodies are offset by the difference of their
  * meshes' origin_m. Poses and frames use it. */
 #ifndef PAL_SIM_WORLD_WORLD_H
 #define PAL_SIM_WORLD_WORLD_H
@@ -26,7 +26,7 @@ typedef struct pal_shown {
     const char *name;
     int n_vertex, n_tri;
     const float *rest_m; /* scene frame             [n_vertex][3] */
-    const int32_t *tri;  /* counter-clockwise, as at load; of a body that adapts the table of places, 0 0 0 in empty
+    const int32_t *tri;  /* counter-clockwise, as at load; of an adaptive body the table of places, 0 0 0 in empty
                           * ones (pal_frame_part.slot brings its changes)  [n_tri][3] */
     uint64_t revision;
     const int32_t *face; /* control face of each triangle, -1: none (body.shown_face); NULL: no solid [n_tri] */
@@ -61,15 +61,15 @@ pal_err pal_world_reset_body(pal_world *world, int body);
 /* live material edit; sub-steps are chosen again; BUDGET or REFUSED leave all as it was. [sim] */
 pal_err pal_world_material(pal_world *world, int body, const pal_material *material, pal_diagnostic *diag);
 /* a lasting load on a node, N, body axes; replaces the node's earlier one, gone after reset. The first load on a body
- * takes memory. Of a body that adapts a node out of use is no such node, and the load of one that goes out of use waits
+ * takes memory. Of an adaptive body a node out of use is no such node, and the load of one that goes out of use waits
  * until it is in use again. A node bears pal_body_node_load_cap_N of it, and of a body that is held still less and less
  * from 2 S off its rest place on, a hundredth of that from 4 S (rescue.n_capped). REFUSED: not finite, no such node;
  * MEMORY. [load] */
 pal_err pal_world_load(pal_world *world, int body, int node, const double force_N[3]);
 
-/* A field of a body in colour (row field_output, 10 times a simulated second): wanted, the row is put into the running
- * plan with memory of its own and its values are there at once; not wanted, row and memory are gone again. What the
- * scene asks for itself stays either way. Poses, motion and hash know nothing of it. REFUSED: no such body, or its
+/* A field of a body in colour (component field_output, 10 times a simulated second): wanted, the row is put into the
+ * running plan with memory of its own and its values are there at once; not wanted, row and memory are gone again. What
+ * the scene asks for itself stays either way. Poses, motion and hash know nothing of it. REFUSED: no such body, or its
  * model does not give the field (one sentence); MEMORY. Between steps; takes and frees heap memory. [sim] */
 pal_err pal_world_field(pal_world *world, int body, pal_field field, bool wanted, pal_diagnostic *diag);
 bool pal_world_has_field(const pal_world *world, int body, pal_field field); /* would it be refused? */
@@ -79,7 +79,7 @@ bool pal_world_has_field(const pal_world *world, int body, pal_field field); /* 
  * brushes of its slot, a reset ends all at once. REFUSED (one sentence): no such body or slot, a body without brushes,
  * a bad number, nothing within reach; MEMORY; both change nothing. Between steps; takes heap memory. [sim] */
 pal_err pal_world_brush(pal_world *world, int body, int slot, const pal_brush *brush, pal_diagnostic *diag);
-/* A load on the nodes of a body, N, body axes [n_node][3], that is let go over PAL_BLEND_STEPS steps
+/* A load on the nodes of a body, N, body axes [n_node][3], that is released over PAL_BLEND_TRANSFER_S
  * (blend_component.h): what makes up for a change between two steps. Replaces one that still acts; reset ends it.
  * REFUSED: no such body; MEMORY. Between steps; takes heap memory. [sim] */
 pal_err pal_world_blend_force(pal_world *world, int body, const double *force_N);
@@ -94,31 +94,21 @@ void pal_world_remove_idle(pal_world *world);
 
 /* Switches a row off, or on again, in the running world. Off: the row is gone from the plan with its memory, as if the
  * scene had no such entry; what it did goes on from where it is (x, v and all else stay, the row's energy leaves the
- * sum: gravity off is work done). On: made anew from the scene's or the model's entry, with the material of now, in
+ * sum: gravity off is work done). On: made again from the scene's or the model's entry, with the material of now, in
  * its old place of the plan; springs have their rest lengths. A solver that keeps patterns of the rows (implicit ones)
- * is made anew with that, which takes as long as at load. A reset leaves switched rows as they are.
+ * is made again with that, which takes as long as at load. A reset leaves switched rows as they are.
  * scene: the one that the world was made from. Nothing and OK when it is so already. REFUSED (one sentence, nothing
  * changed): no such body, no entry asks for such a row, the body's solver, what it shows, its last elastic row, a
  * support that moves; BUDGET: too stiff for the step; MEMORY. Between steps; takes and frees heap memory. [sim] */
 pal_err pal_world_switch_component(pal_world *world, const pal_scene *scene, int body, const char *row, bool on,
                                    pal_diagnostic *diag);
 
-/* Bodies that sleep (row sleep) are awake in the next step: for measuring what a step costs. [sim] */
+/* Bodies that sleep (component sleep) are awake in the next step: for measuring what a step costs. [sim] */
 void pal_world_wake(pal_world *world);
-/* Nobody looks at the world (false) or somebody does (true, as after create): while nobody does, OUTPUT rows are run
- * only for bodies that a tool may touch in the coming step. Motion and hash know nothing of it. true brings what is
+/* Nobody looks at the world (false) or somebody does (true, as after create): while nobody does, OUTPUT components are
+ * run only for bodies that a tool may touch in the coming step. Motion and hash know nothing of it. true brings what is
  * shown up to date at once. [sim] */
 void pal_world_watch(pal_world *world, bool watched);
-
-/* A world made from an edited scene goes on where another is: its time, tools and poses, materials as they are by now
- * (but one that the edited body is too stiff or too light for), rescue counts, and of all other bodies that have as
- * many points x, v, lasting loads and, of those that adapt, the levels. x, v [n_dof][3] are the state of body `edited`
- * in their place (v NULL: at rest; edited -1: none). Rows begin anew: what a tool held it holds no more, brushes are
- * over. Both stand still. Heap memory when a material has changed. [sim] */
-void pal_world_transfer(pal_world *world, const pal_world *before, int edited, const double *x, const double *v);
-/* after it, of the edited body: each lasting load goes to the node that is nearest at rest to the one that bore it;
- * their sum stays. Without memory it bears none. [sim] */
-void pal_world_transfer_loads(pal_world *world, int body, const pal_world *before);
 
 void pal_world_frame(const pal_world *world, pal_frame *out); /* [sim] copies */
 uint64_t
@@ -135,15 +125,16 @@ double pal_world_limit_s(const pal_world *world);  /* largest stable sub-step at
 int pal_world_substeps(const pal_world *world);    /* of the last step; before it: of the scene's step at rest */
 double pal_world_energy_J(const pal_world *world); /* kinetic and of every row that has one */
 size_t pal_world_bytes(const pal_world *world);    /* memory of the world's arenas           */
-/* for tests, tools and the lab: the bodies themselves [sim] */
+/* for tests, tools and studies: the bodies themselves [sim] */
 int pal_world_body_count(const pal_world *world);
 pal_body *pal_world_body(pal_world *world, int body);
 const pal_body *pal_world_view_body(const pal_world *world, int body); /* the same to read */
-/* f and g of a body where it stands, of its FORCE rows and lasting loads, without contact; what a row failed with [sim]
+/* f and g of a body where it stands, of its FORCE components and lasting loads, without contact; what a row failed with
+ * [sim]
  */
 pal_err pal_world_assemble_forces(pal_world *world, int body);
 void pal_world_invalidate_limits(pal_world *world,
-                                 int body); /* after its x was set from outside: limits are taken anew */
+                                 int body); /* after its x was set from outside: limits are taken again */
 const pal_component *pal_world_component(const pal_world *world, int row); /* the row itself, in the plan's order */
 const pal_tools *pal_world_tools(const pal_world *world);
 /* what the solver of a body says of itself; false: it says nothing */

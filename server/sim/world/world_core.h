@@ -1,5 +1,4 @@
-/* What world.c, world_edit.c, world_load.c, world_show.c, world_transfer.c and transfer_state.c share: the world's
- * record. Private to these. */
+/* The record of a world, for the files of world and transfer only. */
 #ifndef PAL_SIM_WORLD_WORLD_CORE_H
 #define PAL_SIM_WORLD_WORLD_CORE_H
 #include "server/sim/plan/plan.h"
@@ -12,7 +11,7 @@ typedef struct pal_world_part {
     int n_vertex, n_tri;
     float *rest_m;
     int32_t *tri;
-    int32_t *parent; /* of midpoints, of a body that adapts; else NULL */
+    int32_t *parent; /* of midpoints, of an adaptive body; else NULL */
 } pal_world_part;
 
 struct pal_world {
@@ -26,7 +25,7 @@ struct pal_world {
     pal_world_part part[PAL_BODY_MAX];
     double step_s, time_s, limit_s, rest_limit_s;
     int max_substep, n_substep;
-    bool unobserved; /* nobody looks: OUTPUT rows are run only where tools need them */
+    bool unobserved; /* nobody looks: OUTPUT components are run only where tools need them */
     uint64_t tick, step_ns, end_ns;
     pal_err component_err;       /* of the first row that failed in this step */
     pal_field_components fields; /* put in while the world runs */
@@ -44,13 +43,16 @@ pal_err pal_world_check_budget(pal_world *world, pal_diagnostic *diag);
 /* stored in the rows of a body, J */
 double pal_world_component_energy_J(const pal_world *world, int b);
 
-/* load [n_node][3] anew: the lasting ones (`outer`) */
+/* load [n_node][3] again: the lasting ones (`outer`) */
 void pal_body_begin_loads(pal_body *body);
 /* shortens what is beyond what nodes bear (pal_body_node_load_cap_N, load_cap_N), counted as rescues; lasting: what
  * else presses the nodes is not there yet, and nodes that stray from their rest places bear less */
 void pal_body_cap_loads(pal_body *body, bool body_arena);
 
-/* OUTPUT rows of one body, of all bodies, so that what is shown is where they are */
+/* lasting loads of a body [n_node][3], N, which take memory the first time; NULL: there is none */
+double *pal_world_external_force(pal_world *w, int body);
+
+/* OUTPUT components of one body, of all bodies, so that what is shown is where they are */
 void pal_world_show(pal_world *world, int b);
 void pal_world_show_all(pal_world *world);
 

@@ -6,19 +6,25 @@
 
 #include <string.h>
 
+double *pal_world_external_force(pal_world *w, int body)
+{
+    pal_body *b = &w->plan.body[body];
+    if (!b->external_force) b->external_force = PAL_NEW(w->arena, double, 3 * (size_t)b->n_node);
+    return b->external_force;
+}
+
 pal_err pal_world_load(pal_world *world, int body, int node, const double force_N[3])
 {
     if (body < 0 || body >= world->plan.n_body || !pal_finite3(force_N)) return PAL_ERR_REFUSED;
     pal_body *b = &world->plan.body[body];
     if (node < 0 || node >= b->n_node || (b->active && !pal_dofs_has(&b->dofs, node))) return PAL_ERR_REFUSED;
-    if (!b->external_force) b->external_force = PAL_NEW(world->arena, double, 3 * (size_t)b->n_node);
-    if (!b->external_force) return PAL_ERR_MEMORY;
+    if (!pal_world_external_force(world, body)) return PAL_ERR_MEMORY;
     pal_copy3(b->external_force + 3 * node, force_N);
     b->asleep = false;
     return PAL_ERR_OK;
 }
 
-/* loads anew: the lasting ones. Nodes out of use have none (adaptive_surface.h) and keep theirs in `outer` until they
+/* loads again: the lasting ones. Nodes out of use have none (adaptive_surface.h) and keep theirs in `outer` until they
  * return */
 void pal_body_begin_loads(pal_body *body)
 {

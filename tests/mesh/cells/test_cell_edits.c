@@ -1,5 +1,6 @@
 /* Sculpting edits (paper A section 4.1) but division: counts, volumes and holes of each, what carries a state over,
  * refusals. */
+#include "tests/fixtures/cell_check.h"
 #include "tests/fixtures/edits.h"
 
 /* ---- one edit each ---- */
@@ -187,7 +188,7 @@ static void two_pieces_become_one_and_a_hollow_is_filled(void)
     check_holes(&c, 1, 0, 0);
     check_counts(&c, 64, 144, 108, 27);
     CHECK_NEAR(pal_cells_volume(&c, NULL), 27, 1e-12);
-    CHECK_INT(pal_cells_check(&c, NULL, &diag), PAL_ERR_OK);
+    CHECK_INT(cells_check(&c, NULL, &diag), PAL_ERR_OK);
     pal_cells_free(&c);
 }
 
@@ -200,17 +201,17 @@ static void sharpening_sets_one_number_and_nothing_else(void)
     CHECK(e.cells.vertex_sharpness[17] == 1.5f);
     check_carrying(&e, &c);
     e.cells.vertex_sharpness[17] = 0;
-    CHECK(pal_cells_equal(&e.cells, &same));
+    CHECK(cells_equal(&e.cells, &same));
     pal_cells_edit_free(&e);
     REQUIRE(!pal_cells_sharpen(&c, PAL_CELLS_SHARPEN_EDGE, 3, PAL_SHARPNESS_MAX, &e, &diag));
     CHECK(e.cells.edge[3].sharp == PAL_SHARPNESS_MAX);
     e.cells.edge[3].sharp = 0;
-    CHECK(pal_cells_equal(&e.cells, &same));
+    CHECK(cells_equal(&e.cells, &same));
     pal_cells_edit_free(&e);
     REQUIRE(!pal_cells_sharpen(&c, PAL_CELLS_SHARPEN_FACE, 5, .25f, &e, &diag));
     CHECK(e.cells.face[5].sharp == .25f);
     e.cells.face[5].sharp = 0;
-    CHECK(pal_cells_equal(&e.cells, &same) && pal_cells_equal(&c, &same));
+    CHECK(cells_equal(&e.cells, &same) && cells_equal(&c, &same));
     pal_cells_edit_free(&e);
     pal_cells_free(&same);
     pal_cells_free(&c);
@@ -227,7 +228,7 @@ static void moving_vertices_moves_them_and_a_fold_is_refused(void)
     CHECK(!memcmp(e.cells.x + 39, x, 24) && !memcmp(e.cells.x, x + 3, 24));
     CHECK_NEAR(e.offset[0], -.5, 1e-15);
     /* moving the middle changes no volume; the corner, by 1/2 along x, takes 1/4 of each cut: a pyramid's share */
-    CHECK_INT(pal_cells_check(&e.cells, NULL, &diag), PAL_ERR_OK);
+    CHECK_INT(cells_check(&e.cells, NULL, &diag), PAL_ERR_OK);
     pal_cells_edit_free(&e);
     /* the middle beyond a face: cells behind it still have volume, but not all their faces are seen from inside */
     x[0] = .95, x[1] = .95, x[2] = .95;
@@ -250,7 +251,7 @@ static void refused(const pal_cells *c, pal_cells_command k, const char *words)
     CHECK_INT(pal_cells_apply(c, &k, &e, &diag), PAL_ERR_REFUSED);
     if (!strstr(diag.text, words)) CHECK_TEXT(diag.text, words);
     CHECK(!memcmp(&e, &zero, sizeof e));
-    CHECK(pal_cells_equal(c, &same) && !memcmp(c->x, same.x, 24 * (size_t)c->n_vertex));
+    CHECK(cells_equal(c, &same) && !memcmp(c->x, same.x, 24 * (size_t)c->n_vertex));
     CHECK_INT(pal_cells_apply(c, &k, &e, NULL), PAL_ERR_REFUSED);
     pal_cells_free(&same);
 }

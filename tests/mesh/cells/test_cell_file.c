@@ -4,6 +4,8 @@
 #include "server/mesh/cells/cell_shapes.h"
 #include "server/mesh/files/mesh_file.h"
 #include "tests/check.h"
+#include "tests/fixtures/cell_check.h"
+#include "tests/fixtures/random.h"
 
 #include <locale.h>
 
@@ -19,11 +21,10 @@ static pal_err parse(const char *text, pal_cells *c)
 static pal_cells odd_torus(void)
 {
     pal_cells c;
-    uint32_t state = 3;
+    uint64_t state = 3;
     if (pal_cells_torus(7, 2, 1, .4, &c, &diag)) abort();
     for (int i = 0; i < 3 * c.n_vertex; i++) {
-        state = state * 1664525u + 1013904223u;
-        c.x[i] += (double)state * 1e-12 + (i % 5 == 0) * 5e-324;
+        c.x[i] += (double)(random_bits(&state) >> 32) * 1e-12 + (i % 5 == 0) * 5e-324;
     }
     c.x[1] = -0.0;
     for (int v = 0; v < c.n_vertex; v += 3) c.vertex_sharpness[v] = (float)v / 7;
@@ -41,11 +42,11 @@ static void our_text_gives_every_bit_back(void)
     REQUIRE(!pal_cell_file_save(&c, path, &diag));
     REQUIRE(!pal_cell_file_load(path, &back, &diag));
     setlocale(LC_NUMERIC, "C");
-    CHECK(pal_cells_equal(&c, &back));
+    CHECK(cells_equal(&c, &back));
     CHECK(!memcmp(c.x, back.x, (size_t)c.n_vertex * 24));
     CHECK(!memcmp(c.edge_use, back.edge_use, (size_t)c.n_edge_use * sizeof *c.edge_use));
     CHECK(back.face[0].sharp == 1e-45f && back.edge[0].sharp == PAL_SHARPNESS_MAX);
-    CHECK_INT(pal_cells_check(&back, NULL, &diag), PAL_ERR_OK);
+    CHECK_INT(cells_check(&back, NULL, &diag), PAL_ERR_OK);
     pal_cells_free(&c);
     pal_cells_free(&back);
 }
@@ -120,7 +121,7 @@ static void vtk_gives_the_same_cells_back(void)
     free(bytes);
     REQUIRE(!pal_cell_file_bytes(&back, false, &bytes, &n));
     REQUIRE(!pal_cell_file_parse("t", bytes, n, &ours, &diag));
-    CHECK(pal_cells_equal(&back, &ours));
+    CHECK(cells_equal(&back, &ours));
     free(bytes);
     pal_cells_free(&c);
     pal_cells_free(&back);
@@ -234,7 +235,7 @@ static void every_file_cut_short_is_refused_or_good(void)
     size_t n = strlen(zoo);
     for (size_t cut = 0; cut < n; cut += (size_t)CHECK_REPEATS(1, 7))
         if (!pal_cell_file_parse("a", (const uint8_t *)zoo, cut, &c, &diag)) {
-            CHECK_INT(pal_cells_check(&c, NULL, &diag), PAL_ERR_OK);
+            CHECK_INT(cells_check(&c, NULL, &diag), PAL_ERR_OK);
             pal_cells_free(&c);
         } else {
             CHECK(!strncmp(diag.text, "a: ", 3));

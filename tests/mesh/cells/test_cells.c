@@ -3,6 +3,8 @@
 
 #include "server/mesh/cells/cell_shapes.h"
 #include "tests/check.h"
+#include "tests/fixtures/cell_check.h"
+#include "tests/fixtures/random.h"
 #include "tests/stability/hard_case.h"
 
 static pal_diagnostic diag;
@@ -40,7 +42,7 @@ static void a_block_has_the_counts_of_a_grid(void)
     CHECK_INT(c.n_boundary_face, 2 * (6 + 8 + 12));
     CHECK_INT(c.cell_vertex.start[24], 8 * 24);
     CHECK_NEAR(pal_cells_volume(&c, NULL), 24, 1e-12);
-    CHECK_INT(pal_cells_check(&c, NULL, &diag), PAL_ERR_OK);
+    CHECK_INT(cells_check(&c, NULL, &diag), PAL_ERR_OK);
     int inner = 0;
     for (int v = 0; v < c.n_vertex; v++) {
         if (c.vertex_boundary[v]) continue;
@@ -190,7 +192,7 @@ static void cells_that_touch_in_an_edge_or_a_corner_are_marked(void)
     REQUIRE(!err);
     CHECK_INT(c.n_pinched_edge, 1);
     CHECK_INT(c.n_pinched_vertex, 2);
-    CHECK_INT(pal_cells_check(&c, NULL, &diag), PAL_ERR_OK);
+    CHECK_INT(cells_check(&c, NULL, &diag), PAL_ERR_OK);
     check_genus(&c, 2, 2, 0);
     pal_cells_free(&c);
     c = cubes(2, two_by_a_corner, &err);
@@ -278,15 +280,15 @@ static void loops_give_the_same_complex_again(void)
     c.x[4] = nextafter(c.x[4], 9);
     REQUIRE(!pal_cells_loops(&c, &loops));
     REQUIRE(!pal_cells_make(&loops, &again, &diag));
-    CHECK(pal_cells_equal(&c, &again));
+    CHECK(cells_equal(&c, &again));
     CHECK(again.edge[5].sharp == .5f && again.face[7].sharp == PAL_SHARPNESS_MAX && again.vertex_sharpness[3] == 2);
     REQUIRE(!pal_cells_copy(&again, &copy));
-    CHECK(pal_cells_equal(&copy, &again));
-    CHECK_INT(pal_cells_check(&copy, NULL, &diag), PAL_ERR_OK);
+    CHECK(cells_equal(&copy, &again));
+    CHECK_INT(cells_check(&copy, NULL, &diag), PAL_ERR_OK);
     copy.x[0] = nextafter(copy.x[0], 9);
-    CHECK(!pal_cells_equal(&copy, &again));
+    CHECK(!cells_equal(&copy, &again));
     again.edge[1].sharp = .25f;
-    CHECK(!pal_cells_equal(&c, &again));
+    CHECK(!cells_equal(&c, &again));
     pal_cell_loops_free(&loops);
     pal_cells_free(&c);
     pal_cells_free(&again);
@@ -365,7 +367,7 @@ static void any_polyhedra_go_together(void)
     CHECK_NEAR(pal_cells_volume(&c, NULL), area * (1 + 1. / 3), 1e-12);
     CHECK_INT(c.n_face, 2 * N + 2);
     CHECK_INT(c.n_boundary_face, 2 * N + 1);
-    CHECK_INT(pal_cells_check(&c, NULL, &diag), PAL_ERR_OK);
+    CHECK_INT(cells_check(&c, NULL, &diag), PAL_ERR_OK);
     check_genus(&c, 1, 1, 0);
     pal_surface s;
     REQUIRE(!pal_cells_boundary(&c, &s, NULL, NULL));
@@ -515,7 +517,7 @@ static void faces_of_three_cells_and_cells_twice_round_are_refused(void)
 static void every_broken_index_is_found_by_the_check(void)
 {
     pal_cells c = block(2, 2, 2);
-    uint32_t state = 5;
+    uint64_t state = 5;
     int n_found = 0, n_try = 0;
     struct {
         int32_t *at;
@@ -531,26 +533,26 @@ static void every_broken_index_is_found_by_the_check(void)
                 {c.cell_vertex.item, 8 * c.n_cell},
                 {c.vertex_face.start, c.n_vertex + 1}};
     for (size_t k = 0; k < sizeof list / sizeof *list; k++)
-        for (int i = 0; i < list[k].n; i += 1 + (int)(state >> 29)) {
-            int32_t was = list[k].at[i], step = (int32_t)((state = state * 1664525u + 1013904223u) >> 28) + 1;
+        for (int i = 0; i < list[k].n; i += 1 + (int)(state >> 61)) {
+            int32_t was = list[k].at[i], step = (int32_t)random_below(&state, 16) + 1;
             list[k].at[i] = was + step;
             n_try++;
-            n_found += pal_cells_check(&c, NULL, &diag) == PAL_ERR_REFUSED;
+            n_found += cells_check(&c, NULL, &diag) == PAL_ERR_REFUSED;
             /* another edge use of the same corner is as good */
-            if (list[k].at == c.corner_use && pal_cells_check(&c, NULL, &diag) == PAL_ERR_OK) n_found++;
+            if (list[k].at == c.corner_use && cells_check(&c, NULL, &diag) == PAL_ERR_OK) n_found++;
             list[k].at[i] = was;
         }
     CHECK(n_try > 300);
     CHECK_INT(n_found, n_try);
-    CHECK_INT(pal_cells_check(&c, NULL, &diag), PAL_ERR_OK);
+    CHECK_INT(cells_check(&c, NULL, &diag), PAL_ERR_OK);
     c.edge[3].boundary = !c.edge[3].boundary;
-    CHECK_INT(pal_cells_check(&c, NULL, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(cells_check(&c, NULL, &diag), PAL_ERR_REFUSED);
     c.edge[3].boundary = !c.edge[3].boundary;
     double *x = malloc((size_t)c.n_vertex * 24);
     REQUIRE(x);
     memcpy(x, c.x, (size_t)c.n_vertex * 24);
     x[3 * 13] += 5; /* the inner vertex */
-    CHECK_INT(pal_cells_check(&c, x, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(cells_check(&c, x, &diag), PAL_ERR_REFUSED);
     CHECK(strstr(diag.text, "has no positive volume"));
     free(x);
     pal_cells_free(&c);

@@ -150,7 +150,7 @@ static void lets_the_body_go_back_to_rest(void)
     }
     CHECK(rms_displacement(s.body) > 1e-3 * s.body->length_scale_m);
     pal_world_pose(s.world, 0, NULL);
-    /* 5 s are allowed (numerics.md part 3) */
+    /* 5 s are allowed */
     REQUIRE(step_world(&s, 300));
     printf("  off by %.3g %% of S\n", 1e2 * rms_displacement(s.body) / s.body->length_scale_m);
     CHECK_LE(rms_displacement(s.body), 1e-3 * s.body->length_scale_m);

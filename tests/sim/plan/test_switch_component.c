@@ -3,6 +3,7 @@
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/plan/plan.h"
+#include "server/sim/transfer/transfer_world.h"
 #include "tests/fixtures/model_scenes.h"
 #include "tests/heap_calls.h"
 

@@ -2,6 +2,7 @@
  * surroundings nor touches the heap. */
 #include "server/sim/plan/plan.h"
 #include "server/sim/springs/spring_law.h"
+#include "server/sim/transfer/transfer_world.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 #include "tests/fixtures/boxes.h"

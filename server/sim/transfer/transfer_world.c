@@ -1,18 +1,17 @@
-/* A world that goes on where another is (pal_world_transfer). */
+/* Transfer of a world (transfer_world.h). */
+#include "server/sim/transfer/transfer_world.h"
+
 #include "server/base/vec3.h"
 #include "server/sim/springs/spring_recovery.h"
-#include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
 #include <string.h>
 
-/* lasting loads of a body that is the same one in both worlds; without memory it has none */
-static void copy_loads(pal_world *w, pal_body *to, const pal_body *from)
+/* lasting loads of the same body in both worlds; without memory it has none */
+static void copy_loads(pal_world *w, int b, const pal_body *from)
 {
-    size_t n = 3 * (size_t)to->n_node;
-    if (!from->external_force || to->n_node != from->n_node) return;
-    if (!to->external_force) to->external_force = PAL_NEW(w->arena, double, n);
-    if (to->external_force) memcpy(to->external_force, from->external_force, n * sizeof *to->external_force);
+    double *to = from->external_force ? pal_world_external_force(w, b) : NULL;
+    if (to) memcpy(to, from->external_force, 3 * sizeof *to * (size_t)from->n_node);
 }
 
 /* the node nearest to a place at rest, scene frame */
@@ -31,30 +30,28 @@ static int nearest_node(const pal_body *body, const double at_m[3])
 void pal_world_transfer_loads(pal_world *w, int b, const pal_world *before)
 {
     const pal_body *from = &before->plan.body[b];
-    pal_body *to = &w->plan.body[b];
-    size_t n = 3 * (size_t)to->n_node;
-    if (!from->external_force || n == 0) return;
-    if (!to->external_force) to->external_force = PAL_NEW(w->arena, double, n);
-    if (!to->external_force) return;
-    memset(to->external_force, 0, n * sizeof *to->external_force);
+    const pal_body *to = &w->plan.body[b];
+    double *load = from->external_force && to->n_node > 0 ? pal_world_external_force(w, b) : NULL;
+    if (!load) return;
+    memset(load, 0, 3 * sizeof *load * (size_t)to->n_node);
     for (int i = 0; i < from->n_node; i++) {
         const double *force = from->external_force + 3 * (size_t)i;
         double at[3];
         if (pal_dot3(force, force) == 0) continue;
         pal_add3(at, from->node_rest + 3 * (size_t)i, from->offset_m);
-        double *sum = to->external_force + 3 * (size_t)nearest_node(to, at);
+        double *sum = load + 3 * (size_t)nearest_node(to, at);
         pal_add3(sum, sum, force);
     }
 }
 
-static bool same_shell(const pal_body *a, const pal_body *b)
+static bool same_surface(const pal_body *a, const pal_body *b)
 {
     return a->active && b->active && a->n_dof == b->n_dof && a->dofs.levels->n_level == b->dofs.levels->n_level &&
            a->dofs.n_slot == b->dofs.n_slot;
 }
 
-/* a surface as it is refined and stands there */
-static void follow_shell(pal_world *w, int b, const pal_world *before)
+/* an adaptive surface takes over refinement, state and what its ADAPT components know */
+static void transfer_surface(pal_world *w, int b, const pal_world *before)
 {
     const pal_body *from = &before->plan.body[b];
     pal_body *to = &w->plan.body[b];
@@ -68,16 +65,21 @@ static void follow_shell(pal_world *w, int b, const pal_world *before)
     }
 }
 
-static void follow_body(pal_world *w, int b, const pal_body *from, const double *x, const double *v)
+void pal_transfer_set_state(pal_body *body, const double *x, const double *v)
+{
+    size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
+    if (x) memcpy(body->x, x, n_byte);
+    if (v) memcpy(body->v, v, n_byte);
+    for (int i = 0; i < body->n_dof; i++)
+        if (body->support[i] == PAL_FIXED) pal_set3(body->v + 3 * (size_t)i, 0, 0, 0);
+    pal_body_update_nodes(body);
+}
+
+static void transfer_body(pal_world *w, int b, const pal_body *from, const double *x, const double *v)
 {
     pal_body *to = &w->plan.body[b];
     size_t n_byte = 3 * sizeof(double) * (size_t)to->n_dof;
-    if (x) memcpy(to->x, x, n_byte);
-    if (v) memcpy(to->v, v, n_byte);
-    /* what is held from now on stands still */
-    for (int i = 0; i < to->n_dof; i++)
-        if (to->support[i] == PAL_FIXED) pal_set3(to->v + 3 * (size_t)i, 0, 0, 0);
-    pal_body_update_nodes(to);
+    pal_transfer_set_state(to, x, v);
     to->frozen = from->frozen;
     memcpy(to->reason, from->reason, sizeof to->reason);
     to->safeguards = from->safeguards;
@@ -100,11 +102,11 @@ void pal_world_transfer(pal_world *world, const pal_world *before, int edited, c
         /* changed while this world was made */
         if (memcmp(&w->material[b], &before->material[b], sizeof w->material[b]) != 0)
             (void)pal_world_material(w, b, &before->material[b], NULL);
-        bool other = b != edited, adaptive = other && same_shell(&w->plan.body[b], from),
+        bool other = b != edited, adaptive = other && same_surface(&w->plan.body[b], from),
              same = other && !w->plan.body[b].active && w->plan.body[b].n_dof == from->n_dof;
-        if (adaptive) follow_shell(w, b, before);
-        if (adaptive || same) copy_loads(w, &w->plan.body[b], from);
-        follow_body(w, b, from, same ? from->x : other ? NULL : x, same ? from->v : other ? NULL : v);
+        if (adaptive) transfer_surface(w, b, before);
+        if (adaptive || same) copy_loads(w, b, from);
+        transfer_body(w, b, from, same ? from->x : other ? NULL : x, same ? from->v : other ? NULL : v);
     }
     pal_world_show_all(w);
 }

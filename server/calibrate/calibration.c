@@ -1,5 +1,5 @@
 /* Making a calibration: voxels, springs, loads, truths, parameters. */
-#include "server/calibrate/calibration_core.h"
+#include "server/calibrate/calibration.h"
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"

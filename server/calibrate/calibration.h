@@ -1,6 +1,6 @@
 /* A calibration's insides (private to calibrate*.c). */
-#ifndef PAL_CALIBRATE_CALIBRATION_CORE_H
-#define PAL_CALIBRATE_CALIBRATION_CORE_H
+#ifndef PAL_CALIBRATE_CALIBRATION_H
+#define PAL_CALIBRATE_CALIBRATION_H
 #include "server/calibrate/calibrate.h"
 
 /* one load with its truth */

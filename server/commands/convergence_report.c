@@ -1,6 +1,6 @@
-/* One convergence series per element (lab/convergence.h). Plots: error over nodes, and beside it, in a second file,
- * over seconds; the error is that against the reference, or Richardson's estimate where there is none. */
-#include "server/commands/solve_study.h"
+/* One convergence series per element (solve/convergence.h). Plots: error over nodes, and in a second file over
+ * seconds; the error is against the reference, or the Richardson estimate where there is none. */
+#include "server/commands/convergence_report.h"
 
 #include "server/figure/plot.h"
 
@@ -38,16 +38,16 @@ static bool read_resolution(const char *flag, const char *word, int *out, pal_di
 
 static bool add_element(char *word, pal_study_list *out, pal_diagnostic *diag)
 {
-    char *most = strchr(word, ':');
+    char *limit_text = strchr(word, ':');
     int limit = 1024;
-    if (most) *most++ = 0;
-    if (most && !read_resolution("--element", most, &limit, diag)) return false;
+    if (limit_text) *limit_text++ = 0;
+    if (limit_text && !read_resolution("--element", limit_text, &limit, diag)) return false;
     for (int k = 0; k < PAL_SOLVE_STUDY_ELEMENTS; k++) {
         if (strcmp(word, known[k])) continue;
         for (int j = 0; j < out->n_element; j++)
-            if (out->element[j] == known[k]) return wrong(diag, "--element", word, "stands there twice");
+            if (out->element[j] == known[k]) return wrong(diag, "--element", word, "is given twice");
         out->element[out->n_element] = known[k];
-        out->most[out->n_element++] = limit;
+        out->max_resolution[out->n_element++] = limit;
         return true;
     }
     return wrong(diag, "--element", word, "is not hex8_bbar, hex8, tet4 or tet10");
@@ -58,8 +58,8 @@ static bool add_resolution(const char *word, pal_study_list *out, pal_diagnostic
     static const char flag[] = "--resolution";
     int n = 0, before = out->n_resolution > 0 ? out->resolution[out->n_resolution - 1] : 0;
     if (!read_resolution(flag, word, &n, diag)) return false;
-    if (out->n_resolution == PAL_CONVERGENCE_MAX) return wrong(diag, flag, word, "is the 17th, 16 is the most");
-    if (n <= before) return wrong(diag, flag, word, "does not come after a coarser one, wanted them ascending");
+    if (out->n_resolution == PAL_CONVERGENCE_MAX) return wrong(diag, flag, word, "is the 17th, at most 16 are allowed");
+    if (n <= before) return wrong(diag, flag, word, "is not above the one before, they must ascend");
     out->resolution[out->n_resolution++] = n;
     return true;
 }
@@ -96,7 +96,7 @@ static pal_err solve_all(const pal_solve_study *study, const pal_study_list *lis
         pal_solve_options options = *study->options;
         int n = 0;
         options.element = list->element[e];
-        while (n < list->n_resolution && list->resolution[n] <= list->most[e]) n++;
+        while (n < list->n_resolution && list->resolution[n] <= list->max_resolution[e]) n++;
         if (n == 0) continue;
         pal_diagnostic reason = {""};
         pal_err err = pal_convergence(study->problem, study->load_case, study->surface, &options, study->samples,
@@ -125,12 +125,12 @@ static void seconds_path(const char *plot, char out[PATH])
 static pal_err draw(const pal_solve_study *study, const pal_study_list *list, const series *all, bool seconds,
                     const char *path, pal_diagnostic *diag)
 {
-    enum { MOST = PAL_CONVERGENCE_MAX };
-    double x[PAL_SOLVE_STUDY_ELEMENTS][MOST], y[PAL_SOLVE_STUDY_ELEMENTS][MOST], guide_x[2] = {0}, guide_y[2] = {0};
+    double x[PAL_SOLVE_STUDY_ELEMENTS][PAL_CONVERGENCE_MAX], y[PAL_SOLVE_STUDY_ELEMENTS][PAL_CONVERGENCE_MAX],
+        guide_x[2] = {0}, guide_y[2] = {0};
     char title[220];
     const char *id = study->reference ? study->reference->id : study->load_case->id, *law = study->options->law;
-    bool said = strstr(id, law) != NULL;
-    snprintf(title, sizeof title, "%s: %s%s%s", study->problem->name, id, said ? "" : ", ", said ? "" : law);
+    bool named = strstr(id, law) != NULL; /* the reference names the law */
+    snprintf(title, sizeof title, "%s: %s%s%s", study->problem->name, id, named ? "" : ", ", named ? "" : law);
     pal_plot plot = {.title = title,
                      .x_label = seconds ? "seconds, from surface to displacements" : "nodes",
                      .y_label = study->samples ? "RMS error, % of the largest displacement" : "estimated RMS error, %",
@@ -156,15 +156,7 @@ static pal_err draw(const pal_solve_study *study, const pal_study_list *list, co
     return pal_plot_write(&plot, path, diag);
 }
 
-/* ---- saying ---- */
-
-static void put_number(cJSON *object, const char *key, double number)
-{
-    if (isfinite(number))
-        cJSON_AddNumberToObject(object, key, number);
-    else
-        cJSON_AddNullToObject(object, key);
-}
+/* ---- report ---- */
 
 static void put_point(cJSON *table, const char *element, const pal_convergence_point *p)
 {
@@ -176,12 +168,12 @@ static void put_point(cJSON *table, const char *element, const pal_convergence_p
     cJSON_AddNumberToObject(o, "nodes", r->n_node);
     cJSON_AddNumberToObject(o, "elements", r->n_element);
     cJSON_AddNumberToObject(o, "dof", r->n_dof);
-    put_number(o, "rms_percent", p->rms_percent);
-    put_number(o, "max_percent", p->max_percent);
-    put_number(o, "order", p->order);
-    put_number(o, "change_percent", p->change_percent);
-    put_number(o, "change_order", p->change_order);
-    put_number(o, "estimate_percent", p->estimate_percent);
+    pal_json_add_or_null(o, "rms_percent", p->rms_percent);
+    pal_json_add_or_null(o, "max_percent", p->max_percent);
+    pal_json_add_or_null(o, "order", p->order);
+    pal_json_add_or_null(o, "change_percent", p->change_percent);
+    pal_json_add_or_null(o, "change_order", p->change_order);
+    pal_json_add_or_null(o, "estimate_percent", p->estimate_percent);
     cJSON_AddNumberToObject(o, "iterations", r->n_newton);
     cJSON_AddNumberToObject(o, "cg_iterations", r->n_cg);
     seconds = cJSON_AddObjectToObject(o, "seconds");

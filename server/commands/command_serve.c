@@ -1,9 +1,9 @@
-/* `palpate serve`: scenes, surfaces and label volumes become sessions, the network thread serves them, and this thread
- * waits for signals: SIGINT and SIGTERM end everything in order, SIGCHLD is a palpate-lcm that has died and is started
- * again (it speaks LCM in a process of its own because two forged datagrams can crash any LCM subscriber). */
+/* `palpate serve`: every input becomes a session, the network thread serves them, this thread waits for signals. SIGINT
+ * and SIGTERM shut down in order; SIGCHLD reports a palpate-lcm that has died and is restarted. LCM has a process of
+ * its own because two forged datagrams can crash any LCM subscriber. */
 #include "server/base/clock.h"
 #include "server/base/log.h"
-#include "server/cli/report.h"
+#include "server/cli/flags.h"
 #include "server/commands/commands.h"
 #include "server/commands/preflight_report.h"
 #include "server/mesh/files/mesh_file.h"
@@ -26,12 +26,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-enum { MOST_SESSIONS = 8, MOST_URL = 400 };
-#define RESTART_NS 1000000000u /* a palpate-lcm that dies at once is started again after this */
-#define LEAVE_NS   1000000000u /* and is given this to end */
+enum { MAX_SESSIONS = 8, MAX_URL = 400 };
+#define RESTART_NS 1000000000u /* least time between two starts of a palpate-lcm */
+#define LEAVE_NS   1000000000u /* time for it to end after SIGTERM */
 
 typedef struct lcm_child {
-    char server[MOST_URL];
+    char server[MAX_URL];
     pid_t pid; /* 0: not running */
     uint64_t start_ns;
 } lcm_child;
@@ -41,23 +41,24 @@ typedef struct serve_run {
     pal_config config;
     pal_surface_scene surface; /* how bare surfaces are prepared */
     int n;
-    pal_loaded_scene *scene[MOST_SESSIONS];
-    const char *word[MOST_SESSIONS];          /* as it was given; NULL: none                     */
-    pal_studied_scene studied[MOST_SESSIONS]; /* in the setting that the scene asks for          */
-    pal_preflight preflight[MOST_SESSIONS];
-    pal_session *session[MOST_SESSIONS];
-    const pal_measured_configuration *setting[MOST_SESSIONS]; /* what the server borrows of them */
-    int n_configuration[MOST_SESSIONS], setting_body[MOST_SESSIONS];
-    double reference_m[MOST_SESSIONS];
+    pal_loaded_scene *scene[MAX_SESSIONS];
+    const char *word[MAX_SESSIONS];          /* the operand; NULL: none                        */
+    pal_studied_scene studied[MAX_SESSIONS]; /* in the configuration that the scene asks for   */
+    pal_preflight preflight[MAX_SESSIONS];
+    pal_session *session[MAX_SESSIONS];
+    const pal_measured_configuration *setting[MAX_SESSIONS]; /* borrowed by the server */
+    int n_configuration[MAX_SESSIONS], setting_body[MAX_SESSIONS];
+    double reference_m[MAX_SESSIONS];
     pal_server_gate *gate;
     pal_server *server;
-    lcm_child lcm[MOST_SESSIONS];
+    lcm_child lcm[MAX_SESSIONS];
     char lcm_program[PATH_MAX];
     pthread_t net_thread, main_thread;
     pal_err net_err;
+    double seconds; /* serve for so long; 0: until a signal */
 } serve_run;
 
-/* ---- where things are ---- */
+/* ---- paths ---- */
 
 /* folder of this program; false: unknown */
 static bool program_folder(char *folder, size_t cap)
@@ -88,12 +89,12 @@ static const char *viewer_folder(const pal_config *config, char *folder, size_t 
 
 /* ---- scenes and sessions ---- */
 
-static void tell_surface(const serve_run *run, const char *path, const pal_surface_scene_report *report)
+static void report_surface(const serve_run *run, const char *path, const pal_surface_scene_report *report)
 {
     if (run->common.quiet || run->common.json) return;
     printf("palpate: %s: %lld triangles, resolution %d, unit %s (%g m)%s\n", path,
            (long long)report->surface.n_tri_read, report->resolution, report->unit_name, report->unit_m,
-           report->unit_guessed ? ", guessed from its size: --units says otherwise" : "");
+           report->unit_guessed ? ", guessed from its size (--units overrides)" : "");
 }
 
 static pal_err load_input(serve_run *run, const char *path, pal_diagnostic *diag)
@@ -105,12 +106,12 @@ static pal_err load_input(serve_run *run, const char *path, pal_diagnostic *diag
         PAL_TRY(pal_scene_arg(path, &run->surface, out, &is_surface, &report, diag));
     else
         PAL_TRY(pal_scene_procedural(&run->surface, out, &report, diag));
-    if (is_surface) tell_surface(run, path, &report);
+    if (is_surface) report_surface(run, path, &report);
     run->word[run->n++] = path;
     return PAL_ERR_OK;
 }
 
-/* two scenes of one name: the second becomes name-2 */
+/* the second scene of one name becomes name-2 */
 static void make_unique(serve_run *run, int index)
 {
     char *name = run->scene[index]->scene.name, base[PAL_NAME];
@@ -122,7 +123,7 @@ static void make_unique(serve_run *run, int index)
         }
 }
 
-/* the settings that scenes ask for, and what their sessions may switch to */
+/* the configurations that scenes ask for, and those that their sessions may switch to */
 static pal_err open_studies(serve_run *run, pal_diagnostic *diag)
 {
     for (int i = 0; i < run->n; i++) {
@@ -173,14 +174,14 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
                                   .reference_m = run->reference_m};
     PAL_TRY(pal_server_open(&options, run->session, run->n, diag, &run->server));
     if (!options.viewer_folder)
-        pal_log(PAL_LOG_WARN, "viewer", "no page to serve: neither beside the program nor given with --viewer");
+        pal_log(PAL_LOG_WARN, "viewer", "no viewer to serve: neither beside the program nor given with --viewer");
     pal_server_connect(run->server, run->gate);
-    /* only now: who is refused is told that and nothing else */
+    /* last: a refusal prints nothing else */
     for (int i = 0; i < run->n; i++) pal_preflight_log(&run->preflight[i], run->studied[i].scene->name);
     return PAL_ERR_OK;
 }
 
-/* address to open in a browser here: listening on every address includes this machine */
+/* address to open in a browser on this machine */
 static void make_address(const serve_run *run, char *out, size_t cap)
 {
     const char *listen = run->config.listen;
@@ -191,7 +192,7 @@ static void make_address(const serve_run *run, char *out, size_t cap)
 
 static int announce(const serve_run *run)
 {
-    char address[MOST_URL], url[MOST_URL + 16];
+    char address[MAX_URL], url[MAX_URL + 16];
     make_address(run, address, sizeof address);
     snprintf(url, sizeof url, "http://%s/", address);
     if (run->common.json) {
@@ -214,23 +215,23 @@ static int announce(const serve_run *run)
 
 /* ---- palpate-lcm ---- */
 
-/* one per session, so that each has its own tools and channels */
+/* one process for each session, with tools and channels of its own */
 static pal_err find_lcm(serve_run *run, pal_diagnostic *diag)
 {
-    char folder[PATH_MAX - 16], address[MOST_URL / 2];
+    char folder[PATH_MAX - 16], address[MAX_URL / 2];
     if (!run->config.lcm[0]) return PAL_ERR_OK;
     if (!program_folder(folder, sizeof folder))
-        return pal_diagnostic_set(diag, PAL_ERR_IO, "where am I? (/proc/self/exe)");
+        return pal_diagnostic_set(diag, PAL_ERR_IO, "/proc/self/exe cannot be read, so palpate-lcm is not found");
     snprintf(run->lcm_program, sizeof run->lcm_program, "%s/palpate-lcm", folder);
     if (access(run->lcm_program, X_OK))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--lcm needs %s, which is not there", run->lcm_program);
     make_address(run, address, sizeof address);
     for (int i = 0; i < run->n; i++)
-        snprintf(run->lcm[i].server, MOST_URL, "ws://%s/ws?session=%s", address, run->scene[i]->scene.name);
+        snprintf(run->lcm[i].server, MAX_URL, "ws://%s/ws?session=%s", address, run->scene[i]->scene.name);
     return PAL_ERR_OK;
 }
 
-/* in the child, between fork and exec: only what is safe there */
+/* runs in the child between fork and exec: only async-signal-safe calls */
 static void become_lcm(const serve_run *run, const lcm_child *child)
 {
     sigset_t none;
@@ -245,7 +246,7 @@ static void become_lcm(const serve_run *run, const lcm_child *child)
     sigemptyset(&none);
     sigprocmask(SIG_SETMASK, &none, NULL);
     signal(SIGPIPE, SIG_DFL);
-    /* stdout is the parent's announcement; sockets are not his */
+    /* stdout belongs to the parent's announcement, sockets to the parent */
     dup2(STDERR_FILENO, STDOUT_FILENO);
     close_range(3, ~0u, 0);
     execv(run->lcm_program, argv);
@@ -259,7 +260,7 @@ static void start_lcm(serve_run *run, lcm_child *child)
     if (pid == 0) become_lcm(run, child);
     if (pid > 0) child->pid = pid;
     if (pid < 0)
-        pal_log(PAL_LOG_WARN, "lcm", "palpate-lcm does not start: %s", strerror(errno));
+        pal_log(PAL_LOG_WARN, "lcm", "palpate-lcm cannot be started: %s", strerror(errno));
     else
         pal_log(PAL_LOG_INFO, "lcm", "palpate-lcm runs as %d", (int)pid);
 }
@@ -278,9 +279,8 @@ static void reap_lcm(serve_run *run, pal_log_level level)
     }
 }
 
-/* starts what does not run, one that has lived at least RESTART_NS at once; the result is how long to wait for the
- * next */
-static uint64_t tend_lcm(serve_run *run)
+/* starts every palpate-lcm that does not run; the result is the time until the next start is due */
+static uint64_t restart_lcm(serve_run *run)
 {
     uint64_t wait_ns = UINT64_MAX;
     for (int i = 0; i < run->n; i++) {
@@ -325,12 +325,12 @@ static void *net_main(void *user)
 {
     serve_run *run = user;
     run->net_err = pal_server_run(run->server);
-    /* tells the waiting thread, also when the loop failed by itself */
+    /* wakes the waiting thread, also when the loop failed by itself */
     pthread_kill(run->main_thread, SIGUSR1);
     return NULL;
 }
 
-/* SIGINT, SIGTERM, SIGCHLD and SIGUSR1 are taken by wait_for_end alone; threads inherit the mask */
+/* wait_for_end alone receives these signals; threads inherit the mask */
 static void block_signals(sigset_t *signals)
 {
     sigemptyset(signals);
@@ -344,10 +344,13 @@ static void block_signals(sigset_t *signals)
 
 static void wait_for_end(serve_run *run, const sigset_t *signals)
 {
+    uint64_t end_ns = run->seconds > 0 ? pal_clock_ns() + (uint64_t)(1e9 * run->seconds) : UINT64_MAX;
     for (;;) {
-        uint64_t wait_ns = tend_lcm(run);
+        uint64_t wait_ns = restart_lcm(run), now = pal_clock_ns();
+        if (now >= end_ns) return;
+        if (end_ns - now < wait_ns) wait_ns = end_ns - now;
         struct timespec wait = {(time_t)(wait_ns / 1000000000u), (long)(wait_ns % 1000000000u)};
-        int signal_number = sigtimedwait(signals, NULL, wait_ns == UINT64_MAX ? NULL : &wait);
+        int signal_number = sigtimedwait(signals, NULL, &wait);
         if (signal_number == SIGCHLD) reap_lcm(run, PAL_LOG_WARN);
         if (signal_number == SIGINT || signal_number == SIGTERM || signal_number == SIGUSR1) return;
     }
@@ -381,10 +384,10 @@ static void close_all(serve_run *run)
 }
 
 static const char about[] =
-    "Runs every scene (.json), surface (.obj .stl .ply .off), label volume (.nii .nii.gz .inr .inr.gz) or solid of\n"
-    "control cells (.palcells) as a session that browsers, haptic bridges and headless clients share. Without any:\n"
-    "an organ of our own.\n"
-    "Ends on SIGINT or SIGTERM.\n";
+    "Serves every scene (.json), surface (.obj .stl .ply .off), label volume (.nii .nii.gz .inr .inr.gz) or solid of\n"
+    "control cells (.palcells) as a session that browsers, haptic bridges and scripted clients share; without an "
+    "input\n"
+    "a computed organ. Prints the address to open. Ends on SIGINT or SIGTERM, or after --seconds.\n";
 
 static int print_protocol(void)
 {
@@ -397,8 +400,8 @@ static int print_protocol(void)
 
 int command_serve(int argc, char **argv)
 {
-    static serve_run run; /* large, and there is one */
-    const char *input[MOST_SESSIONS], *unit = NULL;
+    static serve_run run; /* too large for the stack */
+    const char *input[MAX_SESSIONS], *unit = NULL;
     int n_input = 0, resolution = 0, label = -1;
     bool largest_only = false, help_protocol = false;
     pal_diagnostic diag = {""};
@@ -406,17 +409,24 @@ int command_serve(int argc, char **argv)
         {"--units", "UNIT", PAL_FLAG_TEXT, &unit, 0, 0, "unit of surfaces: m, cm, mm, um, in (guessed from the size)"},
         {"--label", "N", PAL_FLAG_COUNT, &label, 0, INT_MAX, "label of a label volume (the most frequent)"},
         {"--resolution", "N", PAL_FLAG_COUNT, &resolution, 1, 1024,
-         "voxels on the longest axis of a surface (about 13,000 tetrahedra)"},
+         "voxels along the longest axis of a surface (about 13,000 tetrahedra)"},
         {"--largest", NULL, PAL_FLAG_SWITCH, &largest_only, 0, 0,
-         "keep only the largest of several components of a surface or of cells (see palpate prepare --help)"},
+         "keep the largest of several components of a surface or of cells only (see palpate prepare --help)"},
+        {"--seconds", "S", PAL_FLAG_NUMBER, &run.seconds, 0.1, 1e9, "end after so long (a signal ends it)"},
         {"--help-protocol", NULL, PAL_FLAG_SWITCH, &help_protocol, 0, 0,
          "print the commands that clients may give: name, who, numbers, what it does"},
     };
     const pal_flag_table table = {.usage = "serve [SCENE.json | SURFACE | LABEL VOLUME | CELLS]... [flags]",
                                   .about = about,
+                                  .example = "palpate serve --port 0 --seconds 2\n"
+                                             "palpate prepare --shape stomach -o stomach\n"
+                                             "palpate serve stomach/scene.json deploy/problems/gear.obj --port 0 "
+                                             "--seconds 2\n"
+                                             "palpate cells chair -o chair.palcells\n"
+                                             "palpate serve chair.palcells --port 0 --seconds 2\n",
                                   .flag = flag,
                                   .n_flag = sizeof flag / sizeof *flag,
-                                  .max_operand = MOST_SESSIONS,
+                                  .max_operand = MAX_SESSIONS,
                                   .config = &run.config};
     int code = pal_flags_parse(&table, argc, argv, &run.common, input, &n_input);
     if (code >= 0) return code;

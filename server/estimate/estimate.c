@@ -1,0 +1,100 @@
+/* The state of a body, copied from a running world and put on another one. */
+#include "server/estimate/estimate.h"
+
+#include "server/base/vec3.h"
+
+#include <math.h>
+#include <string.h>
+
+static bool has_row(const pal_world *world, int body, const char *name)
+{
+    const char *of = pal_world_view_body(world, body)->name;
+    for (int i = 0; i < pal_world_component_count(world); i++) {
+        pal_component_info row;
+        pal_world_component_info(world, i, &row);
+        if (row.body == of && !strcmp(row.name, name)) return true;
+    }
+    return false;
+}
+
+pal_err pal_estimate_match_components(const pal_estimate_state *state, pal_world *world, const pal_scene *scene,
+                                      bool recipe)
+{
+    const pal_body_def *def = &scene->body[0];
+    for (int k = 0; k < state->n_row; k++) {
+        bool has = has_row(world, 0, state->row[k]), may = recipe || has;
+        for (int i = 0; i < def->n_effect; i++) may = may || !strcmp(def->effect[i].name, state->row[k]);
+        if (has == state->component_enabled[k] || !may) continue;
+        PAL_TRY(pal_world_switch_component(world, scene, 0, state->row[k], state->component_enabled[k], NULL));
+        pal_world_body(world, 0)->load_cap_N = INFINITY;
+    }
+    return PAL_ERR_OK;
+}
+
+pal_estimate_cost pal_estimate_cost_of(const pal_world *world, int body, double step_ms)
+{
+    const char *of = pal_world_view_body(world, body)->name;
+    double once_ns = 0, beside_ns = 0, own_ns = 0;
+    for (int i = 0; i < pal_world_component_count(world); i++) {
+        const pal_component *row = pal_world_component(world, i);
+        const pal_stage stage = row->effect->stage;
+        const bool inner = stage == PAL_STAGE_FORCE || stage == PAL_STAGE_SOLVE;
+        pal_component_info info;
+        pal_world_component_info(world, i, &info);
+        double *sum_ns = inner && info.body == of              ? &own_ns
+                         : inner || stage == PAL_STAGE_CONTACT ? &beside_ns
+                                                               : &once_ns;
+        *sum_ns += (double)row->spent_ns;
+    }
+    /* of the rows alone: they are on another clock than the step */
+    double all_ns = once_ns + beside_ns + own_ns;
+    pal_estimate_cost cost = {.ms = (float)step_ms};
+    if (all_ns > 0) cost.once = (float)(once_ns / all_ns), cost.beside = (float)(beside_ns / all_ns);
+    return cost;
+}
+
+/* some tool is felt, and this body bears something that nobody set: tools on another body are not this one's */
+static bool is_touched(const pal_world *world, const pal_body *body)
+{
+    const pal_tools *tools = pal_world_tools(world);
+    bool any = false, borne = false;
+    for (int t = 0; t < tools->n_tool; t++)
+        any = any || pal_dot3(tools->tool[t].mean_force_N, tools->tool[t].mean_force_N) > 0;
+    for (int i = 0; i < 3 * body->n_node && any && !borne; i++)
+        borne = body->load[i] != (body->external_force ? body->external_force[i] : 0);
+    return borne;
+}
+
+static double other_limit_s(const pal_world *world, int body)
+{
+    double least = INFINITY;
+    for (int b = 0; b < pal_world_body_count(world); b++) {
+        const pal_body *other = pal_world_view_body(world, b);
+        if (b != body && !other->asleep && !other->frozen) least = fmin(least, other->dt_limit_s);
+    }
+    return least;
+}
+
+bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int body)
+{
+    const pal_body *from = pal_world_view_body(world, body);
+    size_t n_byte = 3 * sizeof(double) * (size_t)from->n_dof;
+    if (from->n_dof != state->n_dof || from->n_node != state->n_node || from->frozen || !pal_body_finite(from))
+        return false;
+    memcpy(state->x, from->x, n_byte);
+    memcpy(state->v, from->v, n_byte);
+    memcpy(state->load, from->load, 3 * sizeof(double) * (size_t)from->n_node);
+    state->touched = is_touched(world, from);
+    if (from->external_force)
+        memcpy(state->external_force, from->external_force, 3 * sizeof(double) * (size_t)from->n_node);
+    else
+        memset(state->external_force, 0, 3 * sizeof(double) * (size_t)from->n_node);
+    state->tick = pal_world_tick(world);
+    state->time_s = pal_world_time_s(world);
+    state->n_substep = pal_world_substeps(world);
+    state->other_limit_s = other_limit_s(world, body);
+    state->asleep = from->asleep;
+    pal_world_current_material(world, body, &state->material);
+    for (int k = 0; k < state->n_row; k++) state->component_enabled[k] = has_row(world, body, state->row[k]);
+    return true;
+}
