@@ -72,11 +72,11 @@ typedef struct pal_wire_part_info {
     uint32_t n_vertex, n_triangle;
     char asset[PAL_WIRE_NAME_BYTES]; /* path on the same server: "/asset/<hash>"   */
     double error_m;                  /* bound per axis of its frames in normal use */
-    uint32_t n_field;                /* what `view` may ask for; 0 also from servers that know no fields */
+    uint32_t n_field;                /* what `subscribe_field` may ask for; 0 also from servers that know no fields */
     char field[PAL_WIRE_FIELDS_MAX][PAL_WIRE_FIELD_BYTES]; /* "displacement", "von_mises" ...           */
     bool is_sculptable; /* its control cells and material can be changed by commands; false is not on the wire */
-    bool is_adaptive;   /* its triangles change while it runs: PATCH goes to clients that take it; n_triangle counts
-                           places */
+    bool is_adaptive;   /* its triangles change while it runs: TOPOLOGY_DELTA goes to clients that take it; n_triangle
+                           counts   places */
 } pal_wire_part_info;   /* its place in the array is its part index   */
 /* rows of a plan in order, of hello, topology and status: each with the part whose body it works on, -1 the whole
  * scene, why it is there (which key of the scene called for it), and whether it can be switched off (1: it cannot).
@@ -196,8 +196,8 @@ typedef struct pal_wire_join {
     char name[PAL_WIRE_MEMBER_NAME];
     pal_wire_role role;
     int tool;             /* wanted: index, PAL_WIRE_TOOL_ANY or PAL_WIRE_TOOL_NONE   */
-    bool topology_deltas; /* takes PATCH; else it sees adapting parts with the triangles of load; false is not on the
-                             wire */
+    bool topology_deltas; /* takes TOPOLOGY_DELTA; else it sees adapting parts with the triangles of load; false is not
+                             on the wire */
 } pal_wire_join;
 
 typedef struct pal_wire_arg {
@@ -221,7 +221,7 @@ typedef struct pal_wire_answer {
 
 /* one setting of a study: what it costs and how far off it is (README.md, "What accuracy costs") */
 typedef struct pal_wire_study_point {
-    uint32_t index;                     /* in the server's list: arg of the order `point`        */
+    uint32_t index;                     /* in the server's list: arg of the order `study_point`        */
     char method[PAL_WIRE_METHOD_BYTES]; /* points of one method belong together                 */
     char label[PAL_WIRE_LABEL_BYTES];   /* for people                                           */
     double cost_ms, error_m;            /* of a step, as the study measured it; largest error    */
@@ -235,12 +235,12 @@ typedef struct pal_wire_study {
     pal_wire_study_point point[PAL_WIRE_POINT_MAX];
 } pal_wire_study;
 
-/* a neighbour on a knob, as foreseen; NaN: not known, and not on the wire */
+/* a neighbour on a parameter, as foreseen; NaN: not known, and not on the wire */
 typedef struct pal_wire_neighbour {
     char parameter[PAL_WIRE_METHOD_BYTES]; /* "resolution", "step", "tolerance", "method"                      */
     char label[PAL_WIRE_LABEL_BYTES];
     double cost_ms, error_m;
-    uint32_t size; /* args of the order `knob`; 0: as it is, and not on the wire */
+    uint32_t size; /* args of the order `parameter`; 0: as it is, and not on the wire */
     double step_ms, tolerance;
 } pal_wire_neighbour;
 /* where a body stands now; NaN: not known, and not on the wire */

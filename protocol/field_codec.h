@@ -1,8 +1,8 @@
 /* FIELD: one number per shown vertex of one part, for colouring: displacement, stress ... (README.md, "FIELD").
  *
  * Values are quantised to one byte between the least and the largest of them and packed in one LZ4 block. A message
- * stands alone and is sent only to clients that asked with `view`. Error of a decoded value: half of (high - low) / 255
- * and float rounding. */
+ * stands alone and is sent only to clients that asked with `subscribe_field`. Error of a decoded value: half of (high -
+ * low) / 255 and float rounding. */
 #ifndef PAL_PROTOCOL_FIELD_CODEC_H
 #define PAL_PROTOCOL_FIELD_CODEC_H
 #include "protocol/wire.h"
@@ -23,8 +23,8 @@ typedef enum pal_wire_field {
     PAL_WIRE_FIELD_DISTORTION,
     PAL_WIRE_FIELD_COUNT
 } pal_wire_field;
-/* as in `view` and in parts: "none", "displacement", "von_mises", "energy", "stiffness", "strain", "distortion"; never
- * NULL. find: COUNT when unknown */
+/* as in `subscribe_field` and in parts: "none", "displacement", "von_mises", "energy", "stiffness", "strain",
+ * "distortion"; never NULL. find: COUNT when unknown */
 const char *pal_wire_field_name(pal_wire_field field);
 pal_wire_field pal_wire_field_find(const char *name);
 

@@ -1,5 +1,5 @@
 /* Coarse-to-fine order: peel independent sets of low-degree vertices, collapse each into its nearest neighbour, rebuild
- * the graph, until few vertices are left (streaming.md 1.4).
+ * the graph, until few vertices are left.
  *
  * A peeled vertex x is predicted from four of its neighbours at that level, X = their rest positions: the four (of at
  * most seven nearest) and the weights w minimise |X w - x|^2 + lambda s^2 |w|^2 with sum w = 1, s^2 the mean squared

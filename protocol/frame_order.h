@@ -1,4 +1,4 @@
-/* Coarse-to-fine vertex order and predictor table of a surface (streaming.md 1.4), built once per topology.
+/* Coarse-to-fine vertex order and predictor table of a surface, built once per topology.
  *
  * The wire index of a vertex is its place in this order. Each vertex is predicted from up to four vertices of coarser
  * levels, all of smaller wire index, with weights that reproduce affine displacement fields of the rest pose as far as

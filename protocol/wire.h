@@ -56,12 +56,12 @@ typedef enum pal_wire_close {
 typedef struct pal_wire_head {
     uint8_t kind;   /* pal_wire_kind              */
     uint8_t flags;  /* FRAME only, else 0         */
-    uint16_t index; /* FRAME, FIELD, PATCH: part; POSE, HAPTIC: tool; TOOLS: n_tool; ACK: 0 */
+    uint16_t index; /* FRAME, FIELD, TOPOLOGY_DELTA: part; POSE, HAPTIC: tool; TOOLS: n_tool; ACK: 0 */
 } pal_wire_head;
 /* head of any message, e.g. to dispatch on kind: SHORT, MAGIC or KIND refused */
 int pal_wire_get_head(const uint8_t *bytes, size_t n_byte, pal_wire_head *out);
 
-/* pal_wire_pose.flags: those of tool_state_t (haptics.md 5) and AWAY */
+/* pal_wire_pose.flags: those of tool_state_t (lcmtypes) and AWAY */
 enum {
     PAL_WIRE_POSE_CONTACT = 1,
     PAL_WIRE_POSE_CLUTCHED = 2,
@@ -138,7 +138,7 @@ typedef struct pal_wire_tools {
 size_t pal_wire_put_tools(uint8_t *dst, size_t cap, const pal_wire_tools *t);
 int pal_wire_get_tools(const uint8_t *bytes, size_t n_byte, pal_wire_tools *out);
 
-/* one tangent contact patch, contact_patch_t of haptics.md 5 */
+/* one tangent contact patch, contact_patch_t of lcmtypes */
 typedef struct pal_wire_contact_patch {
     uint16_t id, group;
     float p_m[3]; /* point of the zero-force surface, relative to the model's origin */
@@ -152,7 +152,7 @@ enum {
     PAL_WIRE_HAPTIC_TOPOLOGY_CHANGED = 4,
     PAL_WIRE_HAPTIC_FLAGS = 7
 };
-/* HAPTIC, server to the holder of the tool: haptic_model_t of haptics.md 5 */
+/* HAPTIC, server to the holder of the tool: haptic_model_t of lcmtypes */
 typedef struct pal_wire_haptic {
     uint16_t tool;
     uint32_t seq;

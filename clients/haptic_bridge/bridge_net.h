@@ -1,5 +1,5 @@
 /* The network side of a bridge: poses and forces out at 250 Hz, haptic models in, by websocket or LCM. It sees the
- * servo only through its trios, ring and flags. Thread: [net]. */
+ * servo only through its triple buffers, ring and flags. Thread: [net]. */
 #ifndef PAL_HAPTIC_BRIDGE_BRIDGE_NET_H
 #define PAL_HAPTIC_BRIDGE_BRIDGE_NET_H
 #include "clients/haptic_bridge/servo_thread.h"

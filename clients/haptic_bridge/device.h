@@ -1,4 +1,4 @@
-/* The back-end interface of the bridge, and at the same time the C ABI of a plug-in (haptics.md 1.5): a plug-in is a
+/* The back-end interface of the bridge, and at the same time the C ABI of a plug-in: a plug-in is a
  * shared object that exports `const pal_haptic_v1 *pal_haptic_entry(void)`. Every back end implements this table.
  *
  * Units m, m/s, N, N m, s; axes of the device: x to the user, y right, z up; origin in the middle of its workspace.

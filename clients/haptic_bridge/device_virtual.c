@@ -1,9 +1,9 @@
-/* Virtual device and hand, haptics.md 3.
+/* Virtual device and hand (README.md, "Devices").
  *   plant     m v' = Fa + k1 (xh - x) + b1 (vh - v) - b v - Coulomb(fc, stick)
  *   hand      M vh' = -(k1 (xh - x) + b1 (vh - v)) + k2 (xd - xh) - b2 vh
  *   actuator  Fa' = (F - Fa) / tau, F applied one tick after it was written, clamped to the peak
  *   encoder   floor(x / q) q
- * three axes alike, semi-implicit Euler at 50 us. Departure: the table of haptics.md gives no viscous term b of the
+ * three axes alike, semi-implicit Euler at 50 us. Departure: README.md's table gives no viscous term b of the
  * plant; 0.05 N s/m is taken for all devices (a guess, as most of the column of apparent mass). */
 #include "clients/haptic_bridge/device_virtual.h"
 #include "server/base/clock.h"

@@ -1,5 +1,5 @@
 /* palpate-bridge: a haptic device, real or virtual, in a session: servo thread (servo_thread.h), network thread (this
- * one), trio between them. Ends with zero force. SIGUSR1 is the emergency stop, SIGUSR2 re-arms. */
+ * one), triple buffer between them. Ends with zero force. SIGUSR1 is the emergency stop, SIGUSR2 re-arms. */
 #include "clients/haptic_bridge/bridge_net.h"
 #include "clients/link/client_flags.h"
 #include "server/base/log.h"

@@ -1,8 +1,8 @@
-/* One tick of the bridge (haptics.md 2.4 to 2.7): device pose in, local patch force out, states, limits.
+/* One tick of the bridge (README.md): device pose in, local contact force out, states, limits.
  *
  * The servo owns no thread: servo_thread.h calls pal_servo_tick from a real-time loop, tests call it in virtual time.
  * A tick takes no lock, calls no heap and does no input or output but the device's. Models come in and views go out by
- * trio, events by ring; e-stop and re-arm are atomic flags.
+ * triple buffer, events by ring; e-stop and re-arm are atomic flags.
  *
  * States: ARMING until the dead man's switch is held and the handle rests (< 0.05 m/s) for 0.5 s, then force fades in
  * over 1 s; FREE and CONTACT render; STALE when the newest model is older than max(100 ms, 4 frame times, twice the

@@ -7,8 +7,8 @@
  * so that a late listener sees a part at rest; longer than 65,000 bytes: dropped, counted, one warning STATUS
  * session_status_t with every status message of the server, 1 Hz without a server HMODEL/<n>    haptic_model_t in
  * TOOL/<n>      tool_state_t: length walk, then version, range and finite numbers, seq growing Thread: [net].
- * A part that adapts is shown on LCM with the triangles of its asset: PATCH needs every one before it, datagrams may be
- * lost and listeners come late. */
+ * A part that adapts is shown on LCM with the triangles of its asset: TOPOLOGY_DELTA needs every one before it,
+ * datagrams may be lost and listeners come late. */
 #ifndef PAL_LCM_BRIDGE_LCM_BRIDGE_H
 #define PAL_LCM_BRIDGE_LCM_BRIDGE_H
 #include "clients/link/lcm_link.h"

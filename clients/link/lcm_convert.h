@@ -1,4 +1,4 @@
-/* palpate.v2 structs to LCM messages of haptics.md 5 and back. The messages decoded here have passed the length walk;
+/* palpate.v2 structs to the LCM messages of lcmtypes and back. The messages decoded here have passed the length walk;
  * what a message may not say (version, tool, counts, ranges) is refused here. Thread: any. */
 #ifndef PAL_LINK_LCM_CONVERT_H
 #define PAL_LINK_LCM_CONVERT_H

@@ -59,10 +59,10 @@ typedef struct pal_link_options {
     const char *url;  /* ws://host[:port][/path]; http:// is the same; path "/ws" by default; copied   */
     const char *name; /* of the member; copied                                             */
     pal_wire_role role;
-    int tool;                      /* wanted: index, PAL_WIRE_TOOL_ANY or PAL_WIRE_TOOL_NONE                      */
-    bool topology_deltas;          /* takes PATCH (triangle_table.h); else parts that adapt look as at load          */
-    bool once;                     /* do not connect again after the first loss                                   */
-    double read_bytes_s;           /* > 0: take no more than this many bytes per second (a slow client)           */
+    int tool;             /* wanted: index, PAL_WIRE_TOOL_ANY or PAL_WIRE_TOOL_NONE                      */
+    bool topology_deltas; /* takes TOPOLOGY_DELTA (triangle_table.h); else parts that adapt look as at load          */
+    bool once;            /* do not connect again after the first loss                                   */
+    double read_bytes_s;  /* > 0: take no more than this many bytes per second (a slow client)           */
     const pal_link_events *events; /* borrowed while the link lives                                               */
     void *user;
 } pal_link_options;

@@ -1,5 +1,5 @@
-/* A client's table of triangles of a part that adapts: the asset's, brought on by every PATCH. Patches may come before
- * the asset does. Thread: [net]. */
+/* A client's table of triangles of a part that adapts: the asset's, brought on by every TOPOLOGY_DELTA. Patches may
+ * come before the asset does. Thread: [net]. */
 #ifndef PAL_LINK_TRIANGLE_TABLE_H
 #define PAL_LINK_TRIANGLE_TABLE_H
 #include "protocol/asset.h"
@@ -22,7 +22,7 @@ pal_err pal_triangle_table_init(pal_triangle_table *table, uint32_t n_place, uin
 void pal_triangle_table_free(pal_triangle_table *table); /* and zeroes it */
 /* places that no patch has named yet get the asset's triangle; REFUSED: another number of places or vertices */
 pal_err pal_triangle_table_set_base(pal_triangle_table *table, const pal_asset *asset);
-/* takes an untrusted PATCH of this part; a refusal leaves the table as it was. Refusals are those of
+/* takes an untrusted TOPOLOGY_DELTA of this part; a refusal leaves the table as it was. Refusals are those of
  * pal_topology_delta_get; ORDER: its revision is not above the last one's */
 int pal_triangle_table_apply(pal_triangle_table *table, const uint8_t *bytes, size_t n_byte,
                              pal_topology_delta_head *head);

@@ -35,7 +35,7 @@ struct pal_scripted_client {
     double box_low[3], box_high[3], error_m[PAL_WIRE_PART_MAX];
     uint32_t n_part, cycle, frame_cycle, echo_seq, pose_seq;
     bool cycle_seen;
-    int patched; /* part whose PATCH came last and whose frame has not; -1: none */
+    int patched; /* part whose TOPOLOGY_DELTA came last and whose frame has not; -1: none */
     uint64_t start_ns, hello_ns, first_cycle_ns, stall_ns, last_cycle_ns, first_field_ns;
     double decode_s;
     trainee_part part[PAL_WIRE_PART_MAX];

@@ -4,11 +4,11 @@
  * the scene's box grown by its own size, its quantisation keeps the stated error (coarser steps for a client that does
  * not keep up are counted); cycles never go back, no frame comes before its cycle; assets have the hash of their name;
  * nothing malformed. A field that was asked for is of a known part, of its number of vertices, of the kind asked for,
- * in a range of no negative numbers, and no other field comes. A PATCH is of a known part that adapts, its revision
- * grows, it fits the table of triangles that the asset and the patches before it gave, and a frame of the part follows
- * in the same cycle, before any other part's. What is of an older epoch is nobody's until the first frame of the newer
- * one has come. A wish broken is counted under its name. Measured: pose
- * to frame = own clock now minus the own stamp echoed in TOOLS, once per new pose. Thread: [net]. */
+ * in a range of no negative numbers, and no other field comes. A TOPOLOGY_DELTA is of a known part that adapts, its
+ * revision grows, it fits the table of triangles that the asset and the patches before it gave, and a frame of the part
+ * follows in the same cycle, before any other part's. What is of an older epoch is nobody's until the first frame of
+ * the newer one has come. A wish broken is counted under its name. Measured: pose to frame = own clock now minus the
+ * own stamp echoed in TOOLS, once per new pose. Thread: [net]. */
 #ifndef PAL_SCRIPTED_CLIENT_SCRIPTED_CLIENT_H
 #define PAL_SCRIPTED_CLIENT_SCRIPTED_CLIENT_H
 #include "clients/link/asset_store.h"

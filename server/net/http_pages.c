@@ -1,5 +1,5 @@
 /* What the hub answers to GET besides the viewer's files: assets, health, readiness, sessions, metrics
- * (streaming.md 6; labels stay few: never session names or members). */
+ * Labels stay few: never names of sessions or members. */
 #include "server/net/http_pages.h"
 
 #include "server/net/transport/plain_text.h"

@@ -1,4 +1,4 @@
-/* The hub's peers: coming, going, and what each is sent next (streaming.md 1.6, 2.3). */
+/* The hub's peers: coming, going, and what each is sent next (protocol/README.md, "Cycles and credit"). */
 #include "server/net/hub.h"
 
 #include "server/net/http_pages.h"

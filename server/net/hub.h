@@ -2,7 +2,7 @@
  *
  * Sending, in this order: control (hello, errors, pongs, members, status), contact models, then fields and cycles as
  * far as credit goes. Per client there wait at most 32 queued control messages, one contact model and the cycle that is
- * being sent; all else is made when the road asks for it from the newest that the session's stream holds. Thread:
+ * being sent; all else is made when the transport asks for it from the newest that the session's stream holds. Thread:
  * [net]. */
 #ifndef PAL_NET_HUB_H
 #define PAL_NET_HUB_H
@@ -31,7 +31,7 @@ typedef struct pal_hub_options {
  * destroyed. [load] */
 pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_session **session, int n_session,
                        pal_diagnostic *diag, pal_hub **out);
-void pal_hub_destroy(pal_hub *hub);                      /* after its roads; NULL is fine. [load] */
+void pal_hub_destroy(pal_hub *hub);                      /* after its transports; NULL is fine. [load] */
 void pal_hub_events(pal_hub *hub, pal_peer_events *out); /* for pal_transport_ops.open */
 void pal_hub_goodbye(pal_hub *hub);                      /* drops every peer with 1001; no new ones */
 int pal_hub_clients(const pal_hub *hub);

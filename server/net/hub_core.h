@@ -31,7 +31,7 @@ typedef struct pal_client {
     int n_out, out_begin;
     uint32_t out_cycle, sent_cycle;
     uint32_t sent_frame[PAL_BODY_MAX];  /* number of the frame of each part sent last */
-    bool topology_deltas;               /* takes PATCH                                     */
+    bool topology_deltas;               /* takes TOPOLOGY_DELTA                                     */
     uint32_t sent_change[PAL_BODY_MAX]; /* triangles that it has of each part, of pal_triangle_slots.change */
     uint8_t view[PAL_BODY_MAX];         /* pal_field looked at, of each part         */
     uint64_t sent_field[PAL_BODY_MAX];  /* number of the values sent last            */

@@ -1,4 +1,4 @@
-/* The server puts loop, hub and road together. */
+/* The server puts loop, hub and transport together. */
 #include "server/net/server.h"
 
 #include "server/base/clock.h"

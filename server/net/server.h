@@ -1,5 +1,5 @@
-/* The network side of a server: one loop, one hub, the websocket road with the viewer's files, the mem road for tests.
- * All of it runs on the one [net] thread that calls pal_server_run. */
+/* The network side of a server: one loop, one hub, the websocket transport with the viewer's files, the mem transport
+ * for tests. All of it runs on the one [net] thread that calls pal_server_run. */
 #ifndef PAL_NET_SERVER_H
 #define PAL_NET_SERVER_H
 #include "server/session/session.h"
@@ -19,7 +19,7 @@ typedef struct pal_server_options {
     /* what a study of each session's scene found, for those who pick a point of it live: lists by ascending ms and the
      * body they are of, in the order of the sessions; borrowed until close. NULL, or n_configuration 0: no study */
     const pal_measured_configuration *const *setting; /* [n_session][n_configuration] */
-    const int *n_configuration, *setting_body;              /* [n_session]            */
+    const int *n_configuration, *setting_body;        /* [n_session]            */
     const struct pal_verb *verb; /* commands that clients may give [n_verb], borrowed; NULL: pal_verb_table */
     int n_verb;
     const double *reference_m; /* error of each study's own reference [n_session]; NULL: not known */
@@ -42,7 +42,7 @@ void pal_server_stop(pal_server *server);   /* [any], also from a signal handler
 int pal_server_port(const pal_server *server);
 void pal_server_close(pal_server *server); /* [load] */
 
-/* road "mem" only: the transport for pal_mem_connect, and one turn of the loop at a time of the caller's choosing
+/* transport "mem" only: the transport for pal_mem_connect, and one turn of the loop at a time of the caller's choosing
  * (instead of pal_server_run). This thread is [net]. */
 struct pal_transport *pal_server_transport(pal_server *server);
 void pal_server_advance(pal_server *server, uint64_t now_ns);

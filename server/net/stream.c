@@ -1,4 +1,5 @@
-/* Streams: streaming.md 1.4 and 1.6. Encoding is done here on the network thread (0.4 ms per part and cycle). */
+/* Streams (protocol/README.md, "Cycles and credit"). Encoding is done here on the network thread (0.4 ms per part and
+ * cycle). */
 #include "server/net/stream.h"
 
 #include "protocol/asset.h"
@@ -299,7 +300,8 @@ static void copy_patch(pal_wire_contact_patch *to, const pal_contact_patch *from
     to->radius_m = (float)from->radius_m;
 }
 
-/* contact model of a held tool (haptics.md 2.3, 5); its origin is the tool's own position, so floats suffice */
+/* contact model of a held tool (protocol/README.md, "HAPTIC"); its origin is the tool's own position, so floats suffice
+ */
 static void put_haptic(pal_stream *s, int i, const pal_stream_tool *tool)
 {
     const pal_frame_tool *f = &s->frame->tool[i];

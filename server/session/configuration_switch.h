@@ -1,6 +1,6 @@
 /* A live switch of method, resolution, step or tolerance of one body: another world is made beside the running one
  * (pal_configuration_switch_prepare, slow), and takes over between two steps with pal_session_transfer and
- * pal_configuration_switch_transfer, without a jump (numerics.md part 3, last row): displacement and velocity by
+ * pal_configuration_switch_transfer, without a jump: displacement and velocity by
  * interpolation in the old body's elements, energy within 2 % of what it was as far as displacements and velocities
  * PAL_TRANSFER_MAX_SCALE and _RATE times as long or short can make it so (the report tells), the mismatch of forces,
  * and of what is shown, let go over 10 steps (sim/transfer.h). What tools hold or press they go on holding and

@@ -6,11 +6,11 @@
  * newest pose wins, and at most 64 commands are taken before a step.
  * While paused a frame is published when a command or pose came in; tools are then shown where they are held.
  * A tool whose holder has sent no pose for lease_s is let go (its force ramps out in 10 steps).
- * Crossing points between threads are trio (poses, frames), ring (commands) and the wake callback; a lock guards only
- * the sentence of pal_session_last_diagnostic. No heap or file call after open until close, but when somebody begins or
- * ends to look at a field or an estimate, or a brush begins or has gone out: then its row (and a field's place in
- * frames) comes and goes, between two steps. Fields and estimates are no input: they are not in the input log and
- * change no hash. Brushes are. */
+ * Crossing points between threads are triple buffer (poses, frames), ring (commands) and the wake callback; a lock
+ * guards only the sentence of pal_session_last_diagnostic. No heap or file call after open until close, but when
+ * somebody begins or ends to look at a field or an estimate, or a brush begins or has gone out: then its row (and a
+ * field's place in frames) comes and goes, between two steps. Fields and estimates are no input: they are not in the
+ * input log and change no hash. Brushes are. */
 #ifndef PAL_SESSION_SESSION_H
 #define PAL_SESSION_SESSION_H
 #include "server/estimate/estimator.h"

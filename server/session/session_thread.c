@@ -1,7 +1,7 @@
 /* The simulation thread: take commands and newest poses, step the world, publish a frame, sleep until the next absolute
- * time. Nothing here waits for another thread: poses and frames go through trios, commands through a ring, and the only
- * lock guards the one sentence of pal_session_last_diagnostic, which the thread touches when a command was refused or a
- * body frozen, never in an ordinary step.
+ * time. Nothing here waits for another thread: poses and frames go through triple buffers, commands through a ring, and
+ * the only lock guards the one sentence of pal_session_last_diagnostic, which the thread touches when a command was
+ * refused or a body frozen, never in an ordinary step.
  *
  * Slowdown is real over simulated time since a mark that is between 1 and 1 + 1/16 s old. */
 #include "server/session/session_core.h"

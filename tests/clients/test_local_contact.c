@@ -1,4 +1,4 @@
-/* The local contact model against its formulas (haptics.md 2.4). */
+/* The local contact model against its formulas (clients/haptic_bridge/README.md, "One tick"). */
 #include "clients/haptic_bridge/local_contact.h"
 #include "tests/check.h"
 

@@ -1,5 +1,5 @@
-/* The servo's own threads beside a network thread: everything that crosses does so by trio, ring and flag (the race
- * detector's preset runs this). Nothing here depends on how punctual the machine is. */
+/* The servo's own threads beside a network thread: everything that crosses does so by triple buffer, ring and flag (the
+ * race detector's preset runs this). Nothing here depends on how punctual the machine is. */
 #include "clients/haptic_bridge/device_virtual.h"
 #include "clients/haptic_bridge/servo_thread.h"
 #include "server/base/clock.h"

@@ -1,4 +1,4 @@
-/* A client of palpate.v2 on the mem road: what it has been told, and its copy of the tissue. */
+/* A client of palpate.v2 on the mem transport: what it has been told, and its copy of the tissue. */
 #ifndef TESTS_NET_MEM_CLIENT_H
 #define TESTS_NET_MEM_CLIENT_H
 #include "protocol/asset.h"

@@ -1,7 +1,7 @@
 /* What a switch promises, over the wire: a ball under its weight that a client presses goes from point to point of its
- * study and along its knobs, the energy within 2 %, no shown vertex farther in all than the errors that were shown of
- * both settings allow, and the answer says so. Estimates of errors under a press hold what they promise. The carry is
- * made beside the loop, not by it. */
+ * study and along its parameters, the energy within 2 %, no shown vertex farther in all than the errors that were shown
+ * of both settings allow, and the answer says so. Estimates of errors under a press hold what they promise. The carry
+ * is made beside the loop, not by it. */
 #include "server/estimate/estimation.h"
 #include "server/session/configuration_switch.h"
 #include "tests/net/command_room.h"
@@ -142,7 +142,7 @@ static const pal_wire_neighbour *next_size(const pal_wire_estimate *e)
     return NULL;
 }
 
-/* while somebody looks the bound is that of the estimate and of the neighbour on the knob */
+/* while somebody looks the bound is that of the estimate and of the neighbour on the parameter */
 static void a_knob_keeps_the_errors_foreseen(bool pressed)
 {
     mem_client c;

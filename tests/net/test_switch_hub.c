@@ -1,4 +1,4 @@
-/* Other settings over the wire: points of a study and knobs, asked for by clients on mem:// of a real session that
+/* Other settings over the wire: points of a study and parameters, asked for by clients on mem:// of a real session that
  * runs; the topology that comes of them, answers, refusals, tools that stay with their holders; before and after
  * sculpting. */
 #include "tests/net/command_room.h"
@@ -48,7 +48,7 @@ static void two_clients_see_a_point_of_the_study(void)
     CHECK_LE(fabs(told(&a, "energy_after_J") - told(&a, "energy_before_J")), 1e-9);
     CHECK(isfinite(told(&a, "energy_percent")));
     CHECK_LE(told(&a, "max_move_m"), 0.005);
-    /* a knob of it, and back to the cells, which can be sculpted again */
+    /* a parameter of it, and back to the cells, which can be sculpted again */
     CHECK(order(&a, "configure", "\"size\":10,\"tolerance\":0.001"));
     CHECK(strstr(a.last[PAL_CONTROL_ANSWER].answer.text, "10 voxels") != NULL);
     CHECK(order(&a, "study_point", "\"index\":2"));

@@ -1,4 +1,4 @@
-/* The websocket road over real sockets: who may upgrade, what HTTP serves, and hostile, slow and silent peers. */
+/* The websocket transport over real sockets: who may upgrade, what HTTP serves, and hostile, slow and silent peers. */
 #include "protocol/asset.h"
 #include "protocol/control.h"
 #include "protocol/frame_codec.h"

@@ -1,5 +1,5 @@
-/* PATCH: tables follow their changes exactly, everything that is not exactly one message is refused and changes
- * nothing. */
+/* TOPOLOGY_DELTA: tables follow their changes exactly, everything that is not exactly one message is refused and
+ * changes nothing. */
 #include "protocol/bytes.h"
 #include "protocol/planes.h"
 #include "protocol/topology_delta_codec.h"

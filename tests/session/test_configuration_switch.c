@@ -35,7 +35,7 @@ static pal_session *begin(bool paused)
     return s;
 }
 
-/* the session that takes over, *change kept; NULL: complained */
+/* the session that takes over, *change kept; NULL: an error was sent */
 static pal_session *change_to(pal_session *s, const pal_configuration *to, pal_configuration_switch **change)
 {
     pal_diagnostic diag = {""};

@@ -1,4 +1,4 @@
-/* Credit: how many cycles a client may have unacknowledged (streaming.md 2.3; protocol/README.md, "Cycles and credit"),
+/* Credit: how many cycles a client may have unacknowledged (protocol/README.md, "Cycles and credit"),
  * and the rate limit of what it says. Plain structs without a clock of their own. Thread: [net].
  *
  * A round trip counts for K only when the cycle was sent with none before it in flight: a client slower than the

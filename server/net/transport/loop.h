@@ -20,9 +20,9 @@ typedef struct pal_loop_events {
 
 /* sockets: false makes a loop driven by pal_loop_advance; max_socket bounds the descriptors of the context. [load] */
 pal_err pal_loop_create(bool sockets, int max_socket, pal_diagnostic *diag, pal_loop **out);
-/* closes every socket; roads then hear of their peers for the last time, and may be closed. [load] */
+/* closes every socket; transports then hear of their peers for the last time, and may be closed. [load] */
 void pal_loop_shut(pal_loop *loop);
-void pal_loop_destroy(pal_loop *loop);                               /* after its roads; NULL is fine. [load] */
+void pal_loop_destroy(pal_loop *loop);                               /* after its transports; NULL is fine. [load] */
 void pal_loop_listen(pal_loop *loop, const pal_loop_events *events); /* copies; one listener */
 
 uint64_t pal_loop_now_ns(const pal_loop *loop);           /* pal_clock_ns, or the time of the last turn */
@@ -32,5 +32,5 @@ void pal_loop_stop(pal_loop *loop);                       /* [any] */
 pal_err pal_loop_run(pal_loop *loop);                     /* until stop; sockets only */
 pal_err pal_loop_step(pal_loop *loop, uint64_t until_ns); /* one service, at the latest at until_ns; sockets only */
 void pal_loop_advance(pal_loop *loop, uint64_t now_ns);   /* what is due by now_ns, without waiting; no sockets */
-struct lws_context *pal_loop_context(pal_loop *loop);     /* for roads; NULL without sockets */
+struct lws_context *pal_loop_context(pal_loop *loop);     /* for transports; NULL without sockets */
 #endif

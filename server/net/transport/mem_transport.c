@@ -6,7 +6,7 @@
 #include <stdlib.h>
 
 struct pal_mem_peer {
-    pal_peer peer; /* first: the road's record is found from it */
+    pal_peer peer; /* first: the transport's record is found from it */
     pal_transport *road;
     pal_packet *fixed; /* what receive returned last */
     bool told, closed;

@@ -6,7 +6,7 @@
 
 typedef struct pal_mem_peer pal_mem_peer;
 
-/* opened is called within; session "": the first. NULL: out of memory. Freed by pal_mem_leave or with the road. */
+/* opened is called within; session "": the first. NULL: out of memory. Freed by pal_mem_leave or with the transport. */
 pal_mem_peer *pal_mem_connect(pal_transport *transport, const char *session);
 void pal_mem_leave(pal_mem_peer *peer);
 /* one message to the hub; longer ones than 4096 bytes drop the peer as ws does. A dropped peer says nothing. */

@@ -1,4 +1,4 @@
-/* Packets are one heap block each: head, room for a road's header, bytes. */
+/* Packets are one heap block each: head, room for a transport's header, bytes. */
 #include "server/net/transport/packet.h"
 
 #include <stdlib.h>

@@ -1,8 +1,8 @@
 /* Counted encoded bytes: one message, encoded once, held by everybody who still has to send it.
  *
- * A packet is constant once it has been handed on. Before its bytes lies room that a road may use for its own header
- * (websocket framing), hence only one network thread sends a packet. Any thread may create, hold and drop: the last one
- * frees. Thread: [any]. */
+ * A packet is constant once it has been handed on. Before its bytes lies room that a transport may use for its own
+ * header (websocket framing), hence only one network thread sends a packet. Any thread may create, hold and drop: the
+ * last one frees. Thread: [any]. */
 #ifndef PAL_NET_TRANSPORT_PACKET_H
 #define PAL_NET_TRANSPORT_PACKET_H
 #include <stdatomic.h>

@@ -1,4 +1,4 @@
-/* What every road shares: how a peer is marked for closing. */
+/* What every transport shares: how a peer is marked for closing. */
 #include "server/net/transport/transport.h"
 
 #include <stdarg.h>

@@ -1,8 +1,9 @@
-/* The road interface: a road carries whole messages between a peer and the hub, and knows nothing of what they mean.
+/* The transport interface: a transport carries whole messages between a peer and the hub, and knows nothing of what
+ * they mean.
  *
- * Sending is by pull: the hub says that something waits (ready), the road asks for one message (next) each time the
- * peer can take one. So nothing queues in a road, and what is sent is decided at the last moment: control first, then
- * the newest frame. Thread: [net]. */
+ * Sending is by pull: the hub says that something waits (ready), the transport asks for one message (next) each time
+ * the peer can take one. So nothing queues in a transport, and what is sent is decided at the last moment: control
+ * first, then the newest frame. Thread: [net]. */
 #ifndef PAL_NET_TRANSPORT_TRANSPORT_H
 #define PAL_NET_TRANSPORT_TRANSPORT_H
 #include "server/net/transport/loop.h"
@@ -13,7 +14,7 @@ typedef struct pal_transport_ops pal_transport_ops;
 
 enum { PAL_PEER_REASON = 124 }; /* a websocket close reason fits 123 bytes */
 
-/* one connection; a road embeds it in its own record */
+/* one connection; a transport embeds it in its own record */
 typedef struct pal_peer {
     const pal_transport_ops *ops;
     void *client;  /* the hub's side; NULL after closed or when refused */
@@ -21,23 +22,23 @@ typedef struct pal_peer {
     char drop_reason[PAL_PEER_REASON];
 } pal_peer;
 
-/* a resource asked for by path (roads that speak HTTP) */
+/* a resource asked for by path (transports that speak HTTP) */
 typedef struct pal_reply {
     int status;
     const char *type;    /* content type */
     const char *caching; /* cache-control */
     char etag[48];       /* quoted; "": none */
-    pal_packet *body;    /* the road drops it; NULL: none */
+    pal_packet *body;    /* the transport drops it; NULL: none */
 } pal_reply;
 
-/* what the hub does for roads */
+/* what the hub does for transports */
 typedef struct pal_peer_events {
     /* a peer has come for a session ("": the first); may drop it at once */
     void (*opened)(void *user, pal_peer *peer, const char *session);
-    /* one whole message; n_byte is never above 4096 (the road drops longer ones with 1009) */
+    /* one whole message; n_byte is never above 4096 (the transport drops longer ones with 1009) */
     void (*received)(void *user, pal_peer *peer, const uint8_t *bytes, size_t n_byte, bool text);
     bool (*waiting)(void *user, const pal_peer *peer); /* would next give a message? */
-    pal_packet *(*next)(void *user, pal_peer *peer);   /* message to send now, the road drops it; NULL: none */
+    pal_packet *(*next)(void *user, pal_peer *peer);   /* message to send now, the transport drops it; NULL: none */
     void (*closed)(void *user, pal_peer *peer);        /* once for every opened */
     /* GET path: fills *reply; user data of other members never comes this way */
     void (*get)(void *user, const char *path, pal_reply *reply);

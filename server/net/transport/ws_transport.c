@@ -1,6 +1,6 @@
 /* ws://: websockets and HTTP on one port, by libwebsockets 4.1.6 (Debian).
  *
- * Measured facts it keeps to (streaming.md 2): tx_packet_size 1 MiB; no extensions, ever (permessage-deflate can abort
+ * Measured facts it keeps to: tx_packet_size 1 MiB; no extensions, ever (permessage-deflate can abort
  * the process); one lws_write per writable callback; protocols[0] takes connections without a subprotocol unchecked, so
  * they are denied there; HTTP_CONFIRM_UPGRADE is not handled. The listening socket is our own and every accepted socket
  * is adopted: so a port in use has a clear sentence, and socket options are set before the first byte.
@@ -40,7 +40,7 @@ typedef struct request {
     size_t at;
 } request;
 typedef struct connection {
-    pal_peer peer; /* first: the road's record is found from it */
+    pal_peer peer; /* first: the transport's record is found from it */
     struct lws *wsi;
     bool text, open;
     size_t n;
@@ -214,7 +214,7 @@ static int http_callback(struct lws *wsi, enum lws_callback_reasons reason, void
 
 /* ---- websocket ---- */
 
-/* ends the callback: closes when the hub or the road has marked the peer */
+/* ends the callback: closes when the hub or the transport has marked the peer */
 static int finish(connection *c)
 {
     if (!c->peer.drop_code) return 0;
