@@ -3,14 +3,13 @@
 #include "server/base/clock.h"
 #include "server/calibrate/calibrate_run.h"
 #include "server/cli/flags.h"
+#include "server/cli/interrupt.h"
 #include "server/commands/commands.h"
 
 #include <errno.h>
 #include <float.h>
 #include <limits.h>
 #include <math.h>
-#include <signal.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -38,32 +37,12 @@ typedef struct words {
     int evaluations, seed;
 } words;
 
-/* ---- Ctrl-C ---- */
-
-/* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
-static atomic_int stop_asked;
-
-static void on_stop(int number)
-{
-    (void)number;
-    stop_asked = 1;
-}
-
-/* the first is a wish, the next one ends the process */
-static void watch_stop(void)
-{
-    struct sigaction action = {.sa_handler = on_stop, .sa_flags = (int)SA_RESETHAND};
-    sigemptyset(&action.sa_mask);
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
-}
-
 /* ---- progress ---- */
 
 static bool show_making(const char *what, double fraction, void *user)
 {
     pal_report_progress(what, fraction, user);
-    return !stop_asked;
+    return !pal_interrupt_requested();
 }
 
 static void show_fit(pal_calibrate_run *run, const pal_fit_step *step)
@@ -100,7 +79,7 @@ static bool take_step(void *user, const pal_fit_step *step)
         run->best[run->n_trail++] = step->best_percent;
     }
     show_fit(run, step);
-    return !stop_asked;
+    return !pal_interrupt_requested();
 }
 
 /* "5x3x5"; false: it is none */
@@ -290,8 +269,9 @@ static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_diagn
         load[k] = (pal_settle_load){.force_N = pal_calibration_forces(run->calibration, k),
                                     .u = rests ? u + n * (size_t)k : NULL};
     }
-    pal_err err =
-        stop_asked ? PAL_ERR_STATE : pal_settle_damping(&scene->scene, load, run->set.n, &options, &run->live, diag);
+    pal_err err = pal_interrupt_requested()
+                      ? PAL_ERR_STATE
+                      : pal_settle_damping(&scene->scene, load, run->set.n, &options, &run->live, diag);
     run->settled = !err;
     run->settle_s = pal_clock_s() - begin;
     free(u);
@@ -334,7 +314,7 @@ static int start(pal_calibrate_run *run)
 {
     pal_diagnostic diag = {""};
     double begin = pal_clock_s();
-    watch_stop();
+    pal_interrupt_watch();
     pal_err err = work(run, &diag);
     run->total_s = pal_clock_s() - begin;
     pal_report_progress(NULL, 0, &run->common);

@@ -4,6 +4,7 @@
 #include "server/base/clock.h"
 #include "server/base/machine.h"
 #include "server/cli/flags.h"
+#include "server/cli/interrupt.h"
 #include "server/commands/commands.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/study/studied_scene.h"
@@ -13,8 +14,6 @@
 
 #include <limits.h>
 #include <math.h>
-#include <signal.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -64,26 +63,6 @@ typedef struct study_run {
     int picked; /* -1: none was asked for */
     char written[MOST_PATH];
 } study_run;
-
-/* ---- Ctrl-C ---- */
-
-/* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
-static atomic_int stop_asked;
-
-static void on_stop(int number)
-{
-    (void)number;
-    stop_asked = 1;
-}
-
-/* the first is a wish, the next one ends the process */
-static void watch_stop(void)
-{
-    struct sigaction action = {.sa_handler = on_stop, .sa_flags = (int)SA_RESETHAND};
-    sigemptyset(&action.sa_mask);
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
-}
 
 /* ---- words ---- */
 
@@ -297,7 +276,7 @@ static bool keep(const pal_study *study, int n_finest, void *user)
     run->file->whole = false;
     run->kept = pal_study_file_write(run->file, run->path, &run->kept_note);
     /* the last one ends it anyway */
-    return !run->kept && (!stop_asked || study->n_point == n_finest);
+    return !run->kept && (!pal_interrupt_requested() || study->n_point == n_finest);
 }
 
 static bool recall(uint64_t key, pal_study_answer *answer, double *value, int n, void *user)
@@ -335,13 +314,13 @@ static bool show(const char *what, double fraction, void *user)
     else
         snprintf(text, sizeof text, "%s%s%s", what, share, left);
     pal_report_progress(text, 0, &run->common);
-    return !stop_asked;
+    return !pal_interrupt_requested();
 }
 
 static bool may_continue(void *user)
 {
     (void)user;
-    return !stop_asked;
+    return !pal_interrupt_requested();
 }
 
 /* of the same body, loads and machine */
@@ -601,13 +580,13 @@ static pal_err work(study_run *run, int argc, char **argv, pal_diagnostic *diag)
         pal_err kept = run->file->study.n_point > 0 || !err ? pal_study_file_write(run->file, run->path, &reason) : 0;
         if (!kept && run->file->study.n_point > 0) kept = pal_study_publish(run->file, run->stem, &reason);
         int n = run->file->study.n_point > run->n_before ? run->file->study.n_point : run->n_before;
-        if (err && stop_asked && n == 0)
+        if (err && pal_interrupt_requested() && n == 0)
             return pal_diagnostic_set(
                 diag, PAL_ERR_STATE,
                 "stopped before the first setting was measured; %d answers of the reference are kept "
                 "in %.200s.reference; the same command goes on",
                 run->journal ? pal_study_journal_count(run->journal, NULL) : 0, run->stem);
-        if (err && stop_asked)
+        if (err && pal_interrupt_requested())
             return pal_diagnostic_set(diag, PAL_ERR_STATE,
                                       "stopped with %d settings of %d kept in %.200s; the same command goes on", n,
                                       run->file->n_finest > n ? run->file->n_finest : n, run->path);
@@ -624,7 +603,7 @@ static int start(study_run *run, int argc, char **argv)
     pal_diagnostic diag = {""};
     run->file = calloc(1, sizeof *run->file);
     run->picked = -1;
-    watch_stop();
+    pal_interrupt_watch();
     pal_err err = run->file ? work(run, argc, argv, &diag) : PAL_ERR_MEMORY;
     pal_report_progress(NULL, 0, &run->common);
     int code = err                ? pal_report_refusal(&run->common, err, &diag)

@@ -90,46 +90,17 @@ void pal_robustness_default(pal_robustness_options *options)
 
 /* ---- what insults say ---- */
 
-void pal_trial_report(pal_trial *trial, const char *format, ...)
+void pal_trial_report(pal_trial *trial, pal_verdict verdict, const char *format, ...)
 {
     char *text = trial->out->diag;
+    pal_verdict *now = &trial->out->verdict;
     size_t used = strlen(text), room = sizeof trial->out->diag;
     va_list list;
     va_start(list, format);
     if (used > 0 && used + 2 < room) used += (size_t)snprintf(text + used, room - used, "; ");
     if (used < room) vsnprintf(text + used, room - used, format, list);
     va_end(list);
-}
-
-void pal_trial_skip(pal_trial *trial, const char *format, ...)
-{
-    va_list list;
-    va_start(list, format);
-    vsnprintf(trial->out->diag, sizeof trial->out->diag, format, list);
-    va_end(list);
-    trial->out->verdict = PAL_VERDICT_SKIPPED;
-}
-
-void pal_trial_fail(pal_trial *trial, const char *format, ...)
-{
-    char text[200];
-    va_list list;
-    va_start(list, format);
-    vsnprintf(text, sizeof text, format, list);
-    va_end(list);
-    pal_trial_report(trial, "%s", text);
-    trial->out->verdict = PAL_VERDICT_FAILED;
-}
-
-void pal_trial_undecided(pal_trial *trial, const char *format, ...)
-{
-    char text[200];
-    va_list list;
-    va_start(list, format);
-    vsnprintf(text, sizeof text, format, list);
-    va_end(list);
-    pal_trial_report(trial, "%s", text);
-    if (trial->out->verdict == PAL_VERDICT_PASSED) trial->out->verdict = PAL_VERDICT_UNDECIDED;
+    if (verdict == PAL_VERDICT_FAILED || verdict == PAL_VERDICT_SKIPPED || *now == PAL_VERDICT_PASSED) *now = verdict;
 }
 
 double pal_trial_random(pal_trial *trial)
@@ -352,7 +323,8 @@ static void look(pal_trial *trial)
     for (int b = 0; b < trial->scene->n_body; b++) {
         const pal_body *body = pal_world_body(trial->world, b);
         out->finite &= pal_body_finite(body);
-        if (body->frozen && !out->frozen) pal_trial_report(trial, "%s stopped: %s", body->name, body->reason);
+        if (body->frozen && !out->frozen)
+            pal_trial_report(trial, PAL_VERDICT_PASSED, "%s stopped: %s", body->name, body->reason);
         out->frozen |= body->frozen, trial->stopped[b] |= body->frozen;
     }
     double energy = pal_world_energy_J(trial->world);
@@ -459,22 +431,23 @@ static void judge(pal_trial *trial)
     out->energy = judged ? trial->excess_J / trial->scale_J : (double)NAN;
     out->excluded_rise = judged ? trial->excluded_rise_J / trial->scale_J : (double)NAN;
     if (out->verdict == PAL_VERDICT_SKIPPED) return;
-    if (!out->finite) pal_trial_fail(trial, "a number was none");
+    if (!out->finite) pal_trial_report(trial, PAL_VERDICT_FAILED, "a number was none");
     for (int b = 0; b < trial->scene->n_body; b++)
         if (trial->stopped[b] && !trial->may_stop[b])
-            pal_trial_fail(trial, "%s was stopped", trial->scene->body[b].name);
+            pal_trial_report(trial, PAL_VERDICT_FAILED, "%s was stopped", trial->scene->body[b].name);
     if (out->finite && !out->frozen && judged && !(out->energy <= out->limit))
-        pal_trial_fail(trial, "energy rose by %.2g of what was put in, allowed %.2g", out->energy, out->limit);
+        pal_trial_report(trial, PAL_VERDICT_FAILED, "energy rose by %.2g of what was put in, allowed %.2g", out->energy,
+                         out->limit);
     if (out->verdict == PAL_VERDICT_FAILED || out->verdict == PAL_VERDICT_UNDECIDED) return;
     bool all_excused = true;
     for (int b = 0; b < trial->scene->n_body; b++) all_excused = all_excused && excused(trial, b);
     if (trial->late && !all_excused && !(trial->needs_rest && trial->has_returned))
-        pal_trial_undecided(trial, "not judged, the time was over after %.1f simulated s: give more --seconds",
-                            out->simulated_s);
+        pal_trial_report(trial, PAL_VERDICT_UNDECIDED,
+                         "not judged, the time was over after %.1f simulated s: give more --seconds", out->simulated_s);
     else if (trial->needs_rest && !trial->rests && !trial->twin)
-        pal_trial_undecided(trial, "not judged, the scene does not come to rest by itself");
+        pal_trial_report(trial, PAL_VERDICT_UNDECIDED, "not judged, the scene does not come to rest by itself");
     else if (trial->needs_rest && !trial->has_returned)
-        pal_trial_fail(trial, "%.2g %% S from rest at the end", 100 * asked_left(trial));
+        pal_trial_report(trial, PAL_VERDICT_FAILED, "%.2g %% S from rest at the end", 100 * asked_left(trial));
 }
 
 /* what was stopped, or stayed where it was, has to come to rest after a reset; the figures of the insult are kept */
@@ -495,11 +468,11 @@ static void check_reset(pal_trial *trial, double seconds)
     memcpy(was.diag, out->diag, sizeof was.diag);
     *out = was;
     if (stopped)
-        pal_trial_fail(trial, "a reset did not bring it back");
+        pal_trial_report(trial, PAL_VERDICT_FAILED, "a reset did not bring it back");
     else if (trial->rests && !back && trial->late)
-        pal_trial_undecided(trial, "not judged after its reset: give more --seconds");
+        pal_trial_report(trial, PAL_VERDICT_UNDECIDED, "not judged after its reset: give more --seconds");
     else if (trial->rests && !back)
-        pal_trial_fail(trial, "%.2g %% S from rest %.0f s after a reset", 100 * left, max_cpu_s);
+        pal_trial_report(trial, PAL_VERDICT_FAILED, "%.2g %% S from rest %.0f s after a reset", 100 * left, max_cpu_s);
 }
 
 /* a solid of control cells that was folded has other rests, as elements of one rotation each do: what helps */
@@ -514,7 +487,8 @@ static bool is_folded(const pal_trial *trial)
 static void advise(pal_trial *trial)
 {
     bool central = energy_limit(trial) == central_slack;
-    pal_trial_report(trial, "a reset brings it back%s", central ? ", solver implicit_euler comes back from more" : "");
+    pal_trial_report(trial, PAL_VERDICT_PASSED, "a reset brings it back%s",
+                     central ? ", solver implicit_euler comes back from more" : "");
 }
 
 /* springs whose shape was taken away and that did not find it again by themselves */
@@ -543,7 +517,7 @@ static void run_one(pal_trial *trial, const pal_robustness_case *insult, double 
     memset(trial->may_stop, 0, sizeof trial->may_stop);
     memset(trial->may_stay, 0, sizeof trial->may_stay);
     if (!pal_trial_back_to_rest(trial)) {
-        pal_trial_undecided(trial, "not judged, the scene did not come to rest before it");
+        pal_trial_report(trial, PAL_VERDICT_UNDECIDED, "not judged, the scene did not come to rest before it");
         return;
     }
     pal_trial_rebase(trial);
@@ -558,7 +532,7 @@ static void run_one(pal_trial *trial, const pal_robustness_case *insult, double 
     if (folded && trial->has_returned) advise(trial);
     if (collapsed && out->verdict == PAL_VERDICT_PASSED) {
         out->verdict = PAL_VERDICT_COLLAPSED;
-        pal_trial_report(trial, "a reset brings it back");
+        pal_trial_report(trial, PAL_VERDICT_PASSED, "a reset brings it back");
     }
     out->took_s = 1e-9 * (double)pal_clock_thread_ns() - begin;
 }

@@ -49,11 +49,9 @@ double pal_trial_energy(const pal_trial *trial);      /* energy less the work of
 /* loads or shapes have changed from outside: what is there now is what may not grow */
 void pal_trial_rebase(pal_trial *trial);
 void pal_trial_positions_set(pal_trial *trial); /* the same after positions were set */
-void pal_trial_report(pal_trial *trial, const char *format, ...) __attribute__((format(printf, 2, 3)));
-void pal_trial_skip(pal_trial *trial, const char *format, ...) __attribute__((format(printf, 2, 3)));
-void pal_trial_fail(pal_trial *trial, const char *format, ...) __attribute__((format(printf, 2, 3)));
-void pal_trial_undecided(pal_trial *trial, const char *format, ...)
-    __attribute__((format(printf, 2, 3))); /* unless failed */
+/* adds a sentence to what happened. A case that fails or does not apply keeps that verdict; PASSED changes none */
+void pal_trial_report(pal_trial *trial, pal_verdict verdict, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
 /* a rise to this energy is not judged, but summed up */
 void pal_trial_exclude_rise(pal_trial *trial, double energy_J);
 double pal_trial_random(pal_trial *trial);                /* in (0, 1) */
