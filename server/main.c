@@ -17,7 +17,7 @@ static const pal_command_entry command[] = {
      command_calibrate},
     {"study", "what accuracy costs: settings of a body with error and milliseconds, and the one to serve",
      command_study},
-    {"robustness", "insult a scene in every way that is known to break simulations, and say what happens",
+    {"robustness", "disturb a scene in every way that is known to break simulations and judge the response",
      command_robustness},
     {"bench", "measure mesh preparation, springs, calibration and protocol on this machine", command_bench},
 };

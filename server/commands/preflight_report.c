@@ -15,7 +15,7 @@ void pal_preflight_print(const pal_preflight *preflight, double measured_ms)
         for (int k = 0; k < n; k++) printf("  %s: %s\n", preflight->body[b].name, line[k]);
     }
     if (isfinite(preflight->predicted_ms))
-        printf("  a step under load: %.3g ms foreseen from counts (README's machine), %.3g ms measured here at rest\n",
+        printf("  a step under load: %.3g ms predicted from counts (README's machine), %.3g ms measured here at rest\n",
                preflight->predicted_ms, measured_ms);
 }
 

@@ -1,4 +1,4 @@
-/* The energy of every insult over time, one small plot each, as one SVG. Thread: [load]. */
+/* The energy of every case over time, one small plot each, as one SVG. Thread: [load]. */
 #ifndef PAL_COMMANDS_ROBUSTNESS_PICTURE_H
 #define PAL_COMMANDS_ROBUSTNESS_PICTURE_H
 #include "server/robustness/robustness.h"

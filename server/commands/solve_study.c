@@ -1,4 +1,4 @@
-/* One convergence series per element (lab/convergence.h). Plots: error over nodes, and beside it, in a second file,
+/* One convergence series per element (convergence.h). Plots: error over nodes, and beside it, in a second file,
  * over seconds; the error is that against the reference, or Richardson's estimate where there is none. */
 #include "server/commands/solve_study.h"
 

@@ -11,7 +11,7 @@ typedef enum shape { FLAT, POINT, MIRRORED, SHUFFLED, STRETCHED, BLOWN_UP } shap
 static const double return_s = 10, blown_s = 25, springs_s = 4;
 
 /* one free point from where it is */
-static void insult_point(pal_trial *trial, shape how, const double low[3], const double high[3], int flat, double x[3])
+static void disturb_point(pal_trial *trial, shape how, const double low[3], const double high[3], int flat, double x[3])
 {
     for (int c = 0; c < 3; c++) {
         double middle = 0.5 * (low[c] + high[c]);
@@ -46,7 +46,7 @@ static void spoil(pal_trial *trial, int b, shape how)
     int flat = thinnest(low, high);
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        if (!body->support[i]) insult_point(trial, how, low, high, flat, body->x + 3 * (size_t)i);
+        if (!body->support[i]) disturb_point(trial, how, low, high, flat, body->x + 3 * (size_t)i);
     }
 }
 
@@ -93,16 +93,16 @@ static void shaped(pal_trial *trial, shape how)
     bool springs = true;
     for (int b = 0; b < trial->scene->n_body; b++) {
         spoil(trial, b, how);
-        /* what untangles and has a guard is judged as all others when it is beyond the guard's reach */
-        const bool untangles = pal_world_body(trial->world, b)->recovery != NULL,
+        /* what recovers and has a guard is judged as all others when it is beyond the guard's reach */
+        const bool recovers = pal_world_body(trial->world, b)->recovery != NULL,
                    far = how == BLOWN_UP && guarded(trial, b);
-        trial->may_stay[b] = pal_trial_has_springs(trial, b) && !(untangles && far);
+        trial->may_stay[b] = pal_trial_has_springs(trial, b) && !(recovers && far);
         trial->may_stop[b] = trial->may_stay[b] || far;
-        springs = springs && trial->may_stay[b] && !untangles;
+        springs = springs && trial->may_stay[b] && !recovers;
     }
     double before = extent(trial);
     pal_trial_positions_set(trial);
-    /* springs that do not untangle need not come back: long enough to see that they are bounded */
+    /* springs that do not recover from inversion need not come back: long enough to see that they are bounded */
     pal_trial_relax(trial, springs ? springs_s : how == BLOWN_UP ? blown_s : return_s);
     int n = turned_over(trial);
     double after = extent(trial);

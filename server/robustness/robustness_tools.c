@@ -280,7 +280,7 @@ static double speed_S_s(const pal_trial *trial)
 void pal_robustness_supports(pal_trial *trial)
 {
     if (trial->twin) {
-        pal_trial_report(trial, PAL_VERDICT_SKIPPED, "a moving support leads it: the insult asks for rest elsewhere");
+        pal_trial_report(trial, PAL_VERDICT_SKIPPED, "a moving support leads it: the case asks for rest elsewhere");
         return;
     }
     for (int b = 0; b < trial->scene->n_body; b++)

@@ -64,7 +64,7 @@ static void show(const pal_study *s)
  * it being laid flat leaves them elsewhere for good */
 static void check_survives(const organ *o, const pal_configuration *setting)
 {
-    static const char *const insult[] = {"flat"};
+    static const char *const name[] = {"flat"};
     pal_configured_scene *set = NULL;
     pal_diagnostic diag = {{0}};
     pal_robustness_report *r = calloc(1, sizeof *r);
@@ -72,10 +72,10 @@ static void check_survives(const organ *o, const pal_configuration *setting)
     for (int k = 0; k < 1; k++) {
         pal_robustness_options options;
         pal_robustness_default(&options);
-        options.only = insult[k], options.max_cpu_s = 2;
+        options.only = name[k], options.max_cpu_s = 2;
         CHECK(!pal_robustness_run(&set->scene, &options, r, &diag));
         CHECK_INT(r->n_failed, 0);
-        if (r->n_failed) printf("  %s: %s\n", insult[k], r->result[0].diag);
+        if (r->n_failed) printf("  %s: %s\n", name[k], r->result[0].diag);
     }
     pal_configured_scene_free(set);
     free(r);
