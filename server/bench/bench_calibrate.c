@@ -102,11 +102,11 @@ static pal_err run_job(const job *j, const char *folder, double target_percent, 
     *out = (result){.ended = ""};
     if (!set) return PAL_ERR_MEMORY;
     snprintf(path, sizeof path, "%s/%s", folder, j->problem);
-    const pal_calibrate_input wish = {.problem = path, .fit = j->fit, .verify = j->verify};
+    const pal_calibrate_input input = {.problem = path, .fit = j->fit, .verify = j->verify};
     pal_calibrate_default(&o);
     o.voxel.resolution = j->resolution;
     memcpy(o.grid, j->grid, sizeof o.grid);
-    pal_err err = pal_calibrate_cases_read(&wish, set, diag);
+    pal_err err = pal_calibrate_cases_read(&input, set, diag);
     if (!err) err = pal_calibration_create(set->problem, &set->surface, set->list, set->n, &o, &c, diag);
     if (!err) err = search(j, set, c, target_percent, out, diag);
     pal_calibration_destroy(c);

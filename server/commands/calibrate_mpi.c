@@ -37,7 +37,7 @@ typedef struct job {
     pal_flag_common common;
     const char *problem[MOST_PROBLEM];
     int n_problem;
-    pal_calibrate_input wish;
+    pal_calibrate_input input;
     pal_calibrate_options options;
     const char *journal_path, *folder, *grid_text, *seed_text;
     int seed[MOST_SEED], n_seed;
@@ -216,8 +216,8 @@ static pal_err make(job *j, const char *problem)
     pal_diagnostic reason = {""};
     pal_calibration_value v;
     pal_calibrate_options o = j->options;
-    j->wish.problem = problem;
-    PAL_TRY(pal_calibrate_cases_read(&j->wish, j->set, &j->diag));
+    j->input.problem = problem;
+    PAL_TRY(pal_calibrate_cases_read(&j->input, j->set, &j->diag));
     pal_err err = PAL_ERR_OK;
     if (o.voxel.resolution == 0) err = pal_calibrate_cases_resolution(j->set, &o.voxel, &o.voxel.resolution, &reason);
     if (!err)
@@ -515,9 +515,9 @@ static const char *read_grid(job *j)
 static int parse(job *j, int argc, char **argv)
 {
     const pal_flag flag[] = {
-        {"--case", "ID[,ID...]", PAL_FLAG_TEXT, &j->wish.fit, 0, 0, "load cases or references to fit"},
-        {"--verify", "ID[,ID...]", PAL_FLAG_TEXT, &j->wish.verify, 0, 0, "others, whose error is only reported"},
-        {"--kinematics", "WORD", PAL_FLAG_TEXT, &j->wish.kinematics, 0, 0,
+        {"--case", "ID[,ID...]", PAL_FLAG_TEXT, &j->input.fit, 0, 0, "load cases or references to fit"},
+        {"--verify", "ID[,ID...]", PAL_FLAG_TEXT, &j->input.verify, 0, 0, "others, whose error is only reported"},
+        {"--kinematics", "WORD", PAL_FLAG_TEXT, &j->input.kinematics, 0, 0,
          "finite or linear (a reference's, or finite)"},
         {"--grid", "NXxNYxNZ", PAL_FLAG_TEXT, &j->grid_text, 0, 0, "constants at the nodes of a grid (homogeneous)"},
         {"--seed", "S[,S...]", PAL_FLAG_TEXT, &j->seed_text, 0, 0,
@@ -543,7 +543,7 @@ static int parse(job *j, int argc, char **argv)
     j->n_worker = 1;
     int code = pal_flags_parse(&table, argc, argv, &j->common, j->problem, &j->n_problem);
     if (code >= 0) return code;
-    const char *wrong = j->wish.fit ? read_seeds(j) : "--case ID is missing: what shall be fitted?";
+    const char *wrong = j->input.fit ? read_seeds(j) : "--case ID is missing: what shall be fitted?";
     if (!wrong) wrong = read_grid(j);
     if (!wrong) return -1;
     fprintf(stderr, "palpate %s: %s (see --help)\n", j->common.command, wrong);

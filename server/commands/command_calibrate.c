@@ -105,10 +105,10 @@ static bool is_one(const char *word, const char *a, const char *b)
 /* what the words say; NULL: fine, else the sentence */
 static const char *take_words(pal_calibrate_run *run, const words *w)
 {
-    if (!run->wish.fit || !*run->wish.fit) return "--case ID is missing: what shall be fitted?";
+    if (!run->input.fit || !*run->input.fit) return "--case ID is missing: what shall be fitted?";
     if (!run->scene || !*run->scene) return "-o SCENE.json is missing";
     if (!is_one(w->method, "adjoint", "annealing")) return "--method: is not adjoint or annealing";
-    if (!is_one(run->wish.kinematics, "finite", "linear")) return "--kinematics: is not finite or linear";
+    if (!is_one(run->input.kinematics, "finite", "linear")) return "--kinematics: is not finite or linear";
     if (!is_one(w->weights, "volume", "equal")) return "--weights: is not volume or equal";
     if (!is_one(w->area, "on", "off")) return "--area-springs: is not on or off";
     if (w->grid && !read_grid(w->grid, run->options.grid))
@@ -189,8 +189,8 @@ static pal_err check_targets(const pal_calibrate_run *run, pal_diagnostic *diag)
     const char *const path[PAL_CALIBRATE_FILES] = {run->scene, run->trajectory, run->picture, run->vtk};
     for (int a = 0; a < PAL_CALIBRATE_FILES; a++) {
         PAL_TRY(check_target(target_flag[a], path[a], diag));
-        PAL_TRY(check_source(target_flag[a], path[a], run->wish.problem, "problem", diag));
-        PAL_TRY(check_source(target_flag[a], path[a], run->wish.truth, "truth", diag));
+        PAL_TRY(check_source(target_flag[a], path[a], run->input.problem, "problem", diag));
+        PAL_TRY(check_source(target_flag[a], path[a], run->input.truth, "truth", diag));
         for (int b = 0; b < a && path[a]; b++)
             if (path[b] && is_same_file(path[a], path[b]))
                 return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s is that of %s as well", target_flag[a],
@@ -225,7 +225,7 @@ static pal_err make(pal_calibrate_run *run, pal_diagnostic *diag)
     if (!err)
         err = pal_calibration_create(run->set.problem, &run->set.surface, run->set.list, run->set.n, &run->options,
                                      &run->calibration, &reason);
-    if (err) return pal_diagnostic_set(diag, err, "%s: %s", run->wish.problem, reason.text);
+    if (err) return pal_diagnostic_set(diag, err, "%s: %s", run->input.problem, reason.text);
     pal_calibration_info_of(run->calibration, &run->info);
     run->theta = malloc(sizeof *run->theta * (size_t)run->info.n_parameter);
     if (!run->theta || pal_calibration_workspace_create(run->calibration, &run->workspace))
@@ -247,7 +247,7 @@ static pal_err search(pal_calibrate_run *run, pal_diagnostic *diag)
     pal_diagnostic reason = {""};
     pal_err err = run->annealing ? pal_fit_anneal(c, &run->fit, run->theta, &run->result, &reason)
                                  : pal_fit_adjoint(c, &run->fit, run->theta, &run->result, &reason);
-    if (err) return pal_diagnostic_set(diag, err, "%s: %s", run->wish.problem, reason.text);
+    if (err) return pal_diagnostic_set(diag, err, "%s: %s", run->input.problem, reason.text);
     return pal_calibration_evaluate(c, run->workspace, run->theta, ALL, &run->last, NULL, diag);
 }
 
@@ -296,7 +296,7 @@ static pal_err work(pal_calibrate_run *run, pal_diagnostic *diag)
 {
     pal_loaded_scene *scene = NULL;
     PAL_TRY(check_targets(run, diag));
-    PAL_TRY(pal_calibrate_cases_read(&run->wish, &run->set, diag));
+    PAL_TRY(pal_calibrate_cases_read(&run->input, &run->set, diag));
     PAL_TRY(check_sources(run, diag));
     PAL_TRY(make(run, diag));
     PAL_TRY(search(run, diag));
@@ -340,8 +340,8 @@ int command_calibrate(int argc, char **argv)
     pal_calibrate_default(o);
     o->voxel.resolution = 0;
     const pal_flag flag[] = {
-        {"--case", "ID[,ID...]", PAL_FLAG_TEXT, &run.wish.fit, 0, 0, "load cases or references to fit"},
-        {"--verify", "ID[,ID...]", PAL_FLAG_TEXT, &run.wish.verify, 0, 0, "others, whose error is only reported"},
+        {"--case", "ID[,ID...]", PAL_FLAG_TEXT, &run.input.fit, 0, 0, "load cases or references to fit"},
+        {"--verify", "ID[,ID...]", PAL_FLAG_TEXT, &run.input.verify, 0, 0, "others, whose error is only reported"},
         {"--grid", "NXxNYxNZ", PAL_FLAG_TEXT, &w.grid, 0, 0,
          "constants at the nodes of a grid over the body, trilinear between (one of each kind for the whole body)"},
         {"--method", "WORD", PAL_FLAG_TEXT, &w.method, 0, 0,
@@ -359,9 +359,9 @@ int command_calibrate(int argc, char **argv)
          "voxels on the longest axis (the least even number that gives more than 700 nodes)"},
         {"--split", "K", PAL_FLAG_COUNT, &o->split, 1, 8,
          "finite elements of the truth: every voxel as K x K x K of them (2)"},
-        {"--kinematics", "WORD", PAL_FLAG_TEXT, &run.wish.kinematics, 0, 0,
+        {"--kinematics", "WORD", PAL_FLAG_TEXT, &run.input.kinematics, 0, 0,
          "finite: neo-Hookean truth, springs as they move; linear: both linearised (a reference's, or finite)"},
-        {"--truth", "WORD", PAL_FLAG_TEXT, &run.wish.truth, 0, 0,
+        {"--truth", "WORD", PAL_FLAG_TEXT, &run.input.truth, 0, 0,
          "fem, reference (the CSV of the reference that answers a load case), or a file U.csv of x,y,z,ux,uy,uz for\n"
          "the one case that is fitted"},
         {"--weights", "WORD", PAL_FLAG_TEXT, &w.weights, 0, 0,
@@ -387,7 +387,7 @@ int command_calibrate(int argc, char **argv)
                                   .n_flag = sizeof flag / sizeof flag[0],
                                   .min_operand = 1,
                                   .max_operand = 1};
-    int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.wish.problem, &n);
+    int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.input.problem, &n);
     if (code >= 0) return code;
     const char *sentence = take_words(&run, &w);
     if (sentence) {

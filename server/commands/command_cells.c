@@ -271,27 +271,27 @@ static pal_err write_file(const outcome *o, const char *path, pal_diagnostic *di
     return err;
 }
 
-static int run(const pal_flag_common *common, outcome *o, const plan_requests *wish, pal_subdivision_rule rule)
+static int run(const pal_flag_common *common, outcome *o, const plan_requests *request, pal_subdivision_rule rule)
 {
     pal_diagnostic diag = {""};
-    pal_err err = subdivide(o, wish->n_level, rule, &diag);
-    if (!err && wish->file) err = write_file(o, wish->file, &diag);
+    pal_err err = subdivide(o, request->n_level, rule, &diag);
+    if (!err && request->file) err = write_file(o, request->file, &diag);
     if (err) return pal_report_refusal(common, err, &diag);
     if (common->json) {
-        cJSON *object = as_json(o, wish->rule);
-        if (wish->file) cJSON_AddStringToObject(object, "file", wish->file);
+        cJSON *object = as_json(o, request->rule);
+        if (request->file) cJSON_AddStringToObject(object, "file", request->file);
         return pal_report_json(common, object);
     }
     if (common->quiet) return 0;
-    print(o, wish->rule);
-    if (wish->file && ends_in(wish->file, cell_end)) printf("wrote the cells to %s\n", wish->file);
-    if (wish->file && ends_in(wish->file, surface_end))
-        printf("wrote the boundary, %d triangles, to %s\n", o->n_triangle, wish->file);
+    print(o, request->rule);
+    if (request->file && ends_in(request->file, cell_end)) printf("wrote the cells to %s\n", request->file);
+    if (request->file && ends_in(request->file, surface_end))
+        printf("wrote the boundary, %d triangles, to %s\n", o->n_triangle, request->file);
     return 0;
 }
 
 /* -1: the control cells are there, else the exit code */
-static int make_control(const pal_flag_common *common, const char *shape, const plan_requests *wish, outcome *o)
+static int make_control(const pal_flag_common *common, const char *shape, const plan_requests *request, outcome *o)
 {
     const primitive *p = find_primitive(shape);
     char sentence[200];
@@ -303,20 +303,20 @@ static int make_control(const pal_flag_common *common, const char *shape, const 
         double count[3], length_scale_m[3];
         memcpy(count, p->count, sizeof count);
         memcpy(length_scale_m, p->length_scale_m, sizeof length_scale_m);
-        if (wish->cells && !read_list(wish->cells, p->n_count, true, count)) {
+        if (request->cells && !read_list(request->cells, p->n_count, true, count)) {
             snprintf(sentence, sizeof sentence, "--cells: \"%.40s\" is not %d whole number%s with commas between (%s)",
-                     wish->cells, p->n_count, plural(p->n_count), p->cells_are);
+                     request->cells, p->n_count, plural(p->n_count), p->cells_are);
             return usage(common, sentence);
         }
-        if (wish->size && !read_list(wish->size, p->n_size, false, length_scale_m)) {
+        if (request->size && !read_list(request->size, p->n_size, false, length_scale_m)) {
             snprintf(sentence, sizeof sentence, "--size-m: \"%.40s\" is not %d numbers with commas between (%s)",
-                     wish->size, p->n_size, p->sizes_are);
+                     request->size, p->n_size, p->sizes_are);
             return usage(common, sentence);
         }
         err = make_primitive(p, count, length_scale_m, &o->control, &diag);
-    } else if (wish->cells || wish->size) {
-        return usage(common, wish->cells ? "--cells: only goes with block, ring, tube and torus"
-                                         : "--size-m: only goes with block, ring, tube and torus");
+    } else if (request->cells || request->size) {
+        return usage(common, request->cells ? "--cells: only goes with block, ring, tube and torus"
+                                            : "--size-m: only goes with block, ring, tube and torus");
     } else if (o->model) {
         err = pal_cell_model_make(o->model, &o->control, &diag);
     } else if (ends_in(shape, cell_end) || strchr(shape, '/')) {
@@ -328,20 +328,20 @@ static int make_control(const pal_flag_common *common, const char *shape, const 
     return err ? pal_report_refusal(common, err, &diag) : -1;
 }
 
-static plan_requests wish = {.rule = "maccracken_joy"};
+static plan_requests request = {.rule = "maccracken_joy"};
 static const pal_flag flag[] = {
-    {"-o", "FILE", PAL_FLAG_TEXT, &wish.file, 0, 0, "file to write to, .palcells, .vtk, .ply, .obj or .stl"},
-    {"--levels", "N", PAL_FLAG_COUNT, &wish.n_level, 0, PAL_SUBDIVISION_MAX,
+    {"-o", "FILE", PAL_FLAG_TEXT, &request.file, 0, 0, "file to write to, .palcells, .vtk, .ply, .obj or .stl"},
+    {"--levels", "N", PAL_FLAG_COUNT, &request.n_level, 0, PAL_SUBDIVISION_MAX,
      "levels of subdivision, each with eight times the cells (0)"},
-    {"--rule", "WORD", PAL_FLAG_TEXT, &wish.rule, 0, 0, "maccracken_joy or averaging (maccracken_joy)"},
-    {"--cells", "N,...", PAL_FLAG_TEXT, &wish.cells, 0, 0,
+    {"--rule", "WORD", PAL_FLAG_TEXT, &request.rule, 0, 0, "maccracken_joy or averaging (maccracken_joy)"},
+    {"--cells", "N,...", PAL_FLAG_TEXT, &request.cells, 0, 0,
      "numbers of cells: of block along x, y, z (3,3,3); of ring around (8); of tube around,\nthrough the wall, along "
      "(8,1,4); of torus around, across the middle (8,1)"},
-    {"--size-m", "M,...", PAL_FLAG_TEXT, &wish.size, 0, 0,
+    {"--size-m", "M,...", PAL_FLAG_TEXT, &request.size, 0, 0,
      "of block along x, y, z (0.1,0.1,0.1); of ring radius, thickness (0.05,0.02); of tube\ninner radius, outer "
      "radius, "
      "length (0.02,0.03,0.1); of torus radius, tube's radius (0.05,0.02)"},
-    {"--list", NULL, PAL_FLAG_SWITCH, &wish.list, 0, 0,
+    {"--list", NULL, PAL_FLAG_SWITCH, &request.list, 0, 0,
      "no SHAPE: the named solids at the levels of Table 1 of paper A, beside its figures"},
 };
 
@@ -357,21 +357,21 @@ int command_cells(int argc, char **argv)
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
     if (code >= 0) return code;
     pal_subdivision_rule rule = PAL_SUBDIVISION_MACCRACKEN_JOY;
-    if (!strcmp(wish.rule, "averaging"))
+    if (!strcmp(request.rule, "averaging"))
         rule = PAL_SUBDIVISION_AVERAGING;
-    else if (strcmp(wish.rule, "maccracken_joy") != 0)
+    else if (strcmp(request.rule, "maccracken_joy") != 0)
         return usage(&common, "--rule: is not maccracken_joy or averaging");
-    if (wish.list == (n > 0)) return usage(&common, "needs either a SHAPE or --list");
-    if (wish.list) {
-        if (wish.file || wish.cells || wish.size || wish.n_level)
+    if (request.list == (n > 0)) return usage(&common, "needs either a SHAPE or --list");
+    if (request.list) {
+        if (request.file || request.cells || request.size || request.n_level)
             return usage(&common, "--list goes with --rule, --json and --quiet only");
-        return list_models(&common, rule, wish.rule);
+        return list_models(&common, rule, request.rule);
     }
-    if (wish.file && !ends_in(wish.file, cell_end) && !ends_in(wish.file, surface_end))
+    if (request.file && !ends_in(request.file, cell_end) && !ends_in(request.file, surface_end))
         return usage(&common, "-o: is not a .palcells, .vtk, .ply, .obj or .stl file");
     outcome o = {.model = NULL};
-    code = make_control(&common, word[0], &wish, &o);
-    if (code < 0) code = run(&common, &o, &wish, rule);
+    code = make_control(&common, word[0], &request, &o);
+    if (code < 0) code = run(&common, &o, &request, rule);
     free_outcome(&o);
     return code;
 }

@@ -133,15 +133,15 @@ static pal_err write_files(const pal_loaded_scene *loaded, const char *stage, bo
     return pal_mesh_file_write_tetgen(stem, &loaded->mesh[0].tets, diag);
 }
 
-static pal_err save(const pal_loaded_scene *loaded, const plan_requests *wish, outcome *out, pal_diagnostic *diag)
+static pal_err save(const pal_loaded_scene *loaded, const plan_requests *request, outcome *out, pal_diagnostic *diag)
 {
     char stage[PATH];
-    bool was_there = access(wish->folder, F_OK) == 0;
+    bool was_there = access(request->folder, F_OK) == 0;
     int n_tet = loaded->mesh[0].tets.n_tet;
-    bool tetgen = wish->tetgen || (!wish->no_tetgen && n_tet > 0 && n_tet <= TETGEN_MOST);
-    int n = snprintf(stage, sizeof stage, "%s/.palpate-%ld", wish->folder, (long)getpid());
+    bool tetgen = request->tetgen || (!request->no_tetgen && n_tet > 0 && n_tet <= TETGEN_MOST);
+    int n = snprintf(stage, sizeof stage, "%s/.palpate-%ld", request->folder, (long)getpid());
     if (n < 0 || (size_t)n >= sizeof stage)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.80s...: the path is too long", wish->folder);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.80s...: the path is too long", request->folder);
     /* an interrupt waits until the files are there or gone */
     sigset_t asked, old;
     sigemptyset(&asked);
@@ -149,11 +149,11 @@ static pal_err save(const pal_loaded_scene *loaded, const plan_requests *wish, o
     sigaddset(&asked, SIGTERM);
     sigaddset(&asked, SIGHUP);
     sigprocmask(SIG_BLOCK, &asked, &old);
-    pal_err err = pal_scene_make_folder(wish->folder, diag);
+    pal_err err = pal_scene_make_folder(request->folder, diag);
     if (!err) err = write_files(loaded, stage, tetgen, diag);
-    if (!err) err = move_up(stage, wish->folder, out, diag);
+    if (!err) err = move_up(stage, request->folder, out, diag);
     remove_folder(stage);
-    if (err && !was_there) rmdir(wish->folder);
+    if (err && !was_there) rmdir(request->folder);
     sigprocmask(SIG_SETMASK, &old, NULL);
     return err;
 }
@@ -203,13 +203,13 @@ static void add_levels(cJSON *o, const outcome *out)
     cJSON_AddNumberToObject(o, "share_of_real_time", out->busy);
 }
 
-static cJSON *as_json(const pal_loaded_scene *loaded, const plan_requests *wish, const outcome *out)
+static cJSON *as_json(const pal_loaded_scene *loaded, const plan_requests *request, const outcome *out)
 {
     const pal_surface_scene_report *r = &out->report;
     const pal_prepared *mesh = &loaded->mesh[0];
     char path[PATH + 16];
     cJSON *o = cJSON_CreateObject();
-    snprintf(path, sizeof path, "%s/scene.json", wish->folder);
+    snprintf(path, sizeof path, "%s/scene.json", request->folder);
     cJSON_AddBoolToObject(o, "ok", true);
     cJSON_AddStringToObject(o, "scene", path);
     cJSON_AddStringToObject(o, "name", loaded->scene.name);
@@ -218,7 +218,7 @@ static cJSON *as_json(const pal_loaded_scene *loaded, const plan_requests *wish,
     for (int k = 0; k < out->n_file; k++) cJSON_AddItemToArray(files, cJSON_CreateString(out->file[k]));
     cJSON_AddStringToObject(o, "format", r->surface.format);
     cJSON *units = cJSON_AddObjectToObject(o, "units");
-    cJSON_AddStringToObject(units, "name", wish->units ? wish->units : r->unit_name);
+    cJSON_AddStringToObject(units, "name", request->units ? request->units : r->unit_name);
     cJSON_AddNumberToObject(units, "m", r->unit_m);
     cJSON_AddBoolToObject(units, "guessed", r->unit_guessed);
     if (r->label >= 0) cJSON_AddNumberToObject(o, "label", r->label);
@@ -278,7 +278,7 @@ static void print_solid(const pal_prepared *mesh, const pal_surface_scene_report
            whole.text);
 }
 
-static void print_levels(const pal_prepared *mesh, const plan_requests *wish, const outcome *out)
+static void print_levels(const pal_prepared *mesh, const plan_requests *request, const outcome *out)
 {
     const pal_surface_scene_report *r = &out->report;
     for (int l = 0; l < r->n_level; l++) printf("level %d: %d nodes, %d springs\n", l, r->n_node[l], r->n_spring[l]);
@@ -290,7 +290,7 @@ static void print_levels(const pal_prepared *mesh, const plan_requests *wish, co
     printf(", wall of %.1f cm2 and %.1f g\n", 1e4 * r->area_m2, 1e3 * r->mass_kg);
     printf("memory %.1f MB, of it %.1f for the levels; %d sub-step%s a step at rest\n", 1e-6 * (double)out->world_byte,
            1e-6 * (double)r->level_byte, out->n_substep, out->n_substep == 1 ? "" : "s");
-    if (!wish->scene.target_tri && r->surface.n_tri_read > 2 * mesh->surface.n_tri)
+    if (!request->scene.target_tri && r->surface.n_tri_read > 2 * mesh->surface.n_tri)
         printf("made coarser from %lld triangles, so that it keeps real time (--triangles says otherwise)\n",
                (long long)r->surface.n_tri_read);
     if (out->max_node > 0)
@@ -303,7 +303,7 @@ static void print_levels(const pal_prepared *mesh, const plan_requests *wish, co
                out->busy);
 }
 
-static void print(const pal_loaded_scene *loaded, const plan_requests *wish, const outcome *out)
+static void print(const pal_loaded_scene *loaded, const plan_requests *request, const outcome *out)
 {
     const pal_surface_scene_report *r = &out->report;
     const pal_surface_report *d = &r->surface;
@@ -318,11 +318,11 @@ static void print(const pal_loaded_scene *loaded, const plan_requests *wish, con
         printf(", no unit fits the size in the file: scaled to an organ's (--units says otherwise)");
     else if (r->unit_guessed)
         printf(", unit %s guessed from the size (--units says otherwise)", r->unit_name);
-    if (r->n_label > 1 && wish->scene.label < 0)
+    if (r->n_label > 1 && request->scene.label < 0)
         printf(", the most frequent of %d labels (--list-labels shows them)", r->n_label);
     printf("\n");
     if (r->n_level > 0)
-        print_levels(mesh, wish, out);
+        print_levels(mesh, request, out);
     else
         print_solid(mesh, r);
     if (n_component > 1) printf("the components do not hang together, each is held by itself (--largest keeps one)\n");
@@ -334,7 +334,7 @@ static void print(const pal_loaded_scene *loaded, const plan_requests *wish, con
                (long long)d->n_folded);
     printf("wrote");
     for (int k = 0; k < out->n_file; k++) printf(" %s", out->file[k]);
-    printf(" to %s in %.2f s; now: palpate serve %s/scene.json\n", wish->folder, out->total_s, wish->folder);
+    printf(" to %s in %.2f s; now: palpate serve %s/scene.json\n", request->folder, out->total_s, request->folder);
 }
 
 /* ---- the command ---- */
@@ -383,30 +383,30 @@ static pal_err keep_up(pal_loaded_scene *loaded, outcome *out, pal_diagnostic *d
     return pal_entry_put_number(refine, "most_node", out->max_node, diag);
 }
 
-static int run(pal_flag_common *common, const char *in, plan_requests *wish)
+static int run(pal_flag_common *common, const char *in, plan_requests *request)
 {
     pal_loaded_scene *loaded = NULL;
     static outcome out;
     pal_diagnostic diag = {""};
     double start = pal_clock_s();
-    wish->scene.progress = pal_report_progress;
-    wish->scene.user = common;
-    pal_err err = !in ? pal_scene_procedural(&wish->scene, &loaded, &out.report, &diag)
-                      : pal_scene_from_surface(in, &wish->scene, &loaded, &out.report, &diag);
+    request->scene.progress = pal_report_progress;
+    request->scene.user = common;
+    pal_err err = !in ? pal_scene_procedural(&request->scene, &loaded, &out.report, &diag)
+                      : pal_scene_from_surface(in, &request->scene, &loaded, &out.report, &diag);
     if (err) return pal_report_refusal(common, err, &diag);
-    err = pal_scene_rename(loaded, wish->name, wish->title, wish->source, &diag);
-    if (!err && wish->scene.adaptive) err = try_world(loaded, in ? in : "procedural", &out, &diag);
-    if (!err && wish->scene.adaptive) err = keep_up(loaded, &out, &diag);
+    err = pal_scene_rename(loaded, request->name, request->title, request->source, &diag);
+    if (!err && request->scene.adaptive) err = try_world(loaded, in ? in : "procedural", &out, &diag);
+    if (!err && request->scene.adaptive) err = keep_up(loaded, &out, &diag);
     double before = pal_clock_s();
     pal_report_progress("write", 0, common);
-    if (!err) err = save(loaded, wish, &out, &diag);
+    if (!err) err = save(loaded, request, &out, &diag);
     out.write_s = pal_clock_s() - before;
     out.total_s = pal_clock_s() - start;
     pal_report_progress(NULL, 0, common);
     int code = err            ? pal_report_refusal(common, err, &diag)
-               : common->json ? pal_report_json(common, as_json(loaded, wish, &out))
+               : common->json ? pal_report_json(common, as_json(loaded, request, &out))
                               : 0;
-    if (!err && !common->json && !common->quiet) print(loaded, wish, &out);
+    if (!err && !common->json && !common->quiet) print(loaded, request, &out);
     pal_scene_free(loaded);
     return code;
 }
@@ -420,31 +420,31 @@ static bool is_one(const char *word, const char *const *list)
 }
 
 /* what only goes with other models; NULL: all fine, else the sentence */
-static const char *check_adaptive(const plan_requests *wish)
+static const char *check_adaptive(const plan_requests *request)
 {
-    const pal_surface_scene *s = &wish->scene;
+    const pal_surface_scene *s = &request->scene;
     if (!s->adaptive) {
         if (s->n_level) return "--levels: only goes with --model adaptive";
-        if (wish->thickness_mm > 0) return "--thickness-mm: only goes with --model adaptive";
+        if (request->thickness_mm > 0) return "--thickness-mm: only goes with --model adaptive";
         if (s->inflate_Pa != 0) return "--inflate: only goes with --model adaptive";
         return NULL;
     }
     if (s->resolution) return "--resolution: model adaptive has no voxels";
     if (s->area_springs) return "--area-springs: model adaptive has springs along edges only";
-    if (wish->tetgen) return "--tetgen: model adaptive has no tetrahedra";
+    if (request->tetgen) return "--tetgen: model adaptive has no tetrahedra";
     return NULL;
 }
 
 /* shape, model, element, law and solver; NULL: all fine, else the sentence */
-static const char *check_model(plan_requests *wish)
+static const char *check_model(plan_requests *request)
 {
-    pal_surface_scene *s = &wish->scene;
+    pal_surface_scene *s = &request->scene;
     if (!is_one(s->shape, (const char *const[]){"organ", "stomach", "sphere", "sheet", NULL}))
         return "--shape: is not organ, stomach, sphere or sheet";
-    if (!is_one(wish->model, (const char *const[]){"springs", "fem", "adaptive", NULL}))
+    if (!is_one(request->model, (const char *const[]){"springs", "fem", "adaptive", NULL}))
         return "--model: is not springs or fem or adaptive";
-    s->fem = wish->model && !strcmp(wish->model, "fem");
-    s->adaptive = wish->model ? !strcmp(wish->model, "adaptive") : s->shape && strcmp(s->shape, "organ") != 0;
+    s->fem = request->model && !strcmp(request->model, "fem");
+    s->adaptive = request->model ? !strcmp(request->model, "adaptive") : s->shape && strcmp(s->shape, "organ") != 0;
     if (s->fem && s->area_springs) return "--area-springs: model fem has no springs";
     if (!s->fem && s->element) return "--element: only goes with --model fem";
     if (!s->fem && s->law) return "--law: only goes with --model fem";
@@ -455,7 +455,7 @@ static const char *check_model(plan_requests *wish)
         return "--law: is not corotational, neo_hookean or linear";
     if (!is_one(s->solver, (const char *const[]){"implicit_euler", "sdirk2", "static_newton", NULL}))
         return "--solver: is not implicit_euler, sdirk2 or static_newton";
-    return check_adaptive(wish);
+    return check_adaptive(request);
 }
 
 /* "-y" -> (0, -1, 0) */
@@ -473,59 +473,60 @@ static bool read_axis(const char *word, double axis[3])
 #define SOLID_YOUNG_PA 5000
 #define WALL_YOUNG_PA  50000
 
-static plan_requests wish = {.scene = {.label = -1, .material = {0, 0.45, 1000, 4}}};
+static plan_requests request = {.scene = {.label = -1, .material = {0, 0.45, 1000, 4}}};
 static const pal_flag flag[] = {
-    {"-o", "DIR", PAL_FLAG_TEXT, &wish.folder, 0, 0, "folder to write to; made when it is not there"},
-    {"--resolution", "N", PAL_FLAG_COUNT, &wish.scene.resolution, 1, 1024,
+    {"-o", "DIR", PAL_FLAG_TEXT, &request.folder, 0, 0, "folder to write to; made when it is not there"},
+    {"--resolution", "N", PAL_FLAG_COUNT, &request.scene.resolution, 1, 1024,
      "voxels on the longest axis (as many as give about 13,000 tetrahedra, or 2,500 nodes for fem)"},
-    {"--model", "WORD", PAL_FLAG_TEXT, &wish.model, 0, 0,
+    {"--model", "WORD", PAL_FLAG_TEXT, &request.model, 0, 0,
      "springs (paper B); fem: finite elements that are accurate and implicit;\nor adaptive: a hollow organ, springs on "
      "its surface that refine where it is touched (springs)"},
-    {"--element", "WORD", PAL_FLAG_TEXT, &wish.scene.element, 0, 0,
+    {"--element", "WORD", PAL_FLAG_TEXT, &request.scene.element, 0, 0,
      "of fem: hex8_bbar, hex8, tet4 or tet10 (hex8_bbar)"},
-    {"--law", "WORD", PAL_FLAG_TEXT, &wish.scene.law, 0, 0,
+    {"--law", "WORD", PAL_FLAG_TEXT, &request.scene.law, 0, 0,
      "of fem: corotational, neo_hookean or linear (corotational)"},
-    {"--solver", "WORD", PAL_FLAG_TEXT, &wish.scene.solver, 0, 0,
+    {"--solver", "WORD", PAL_FLAG_TEXT, &request.scene.solver, 0, 0,
      "of fem: implicit_euler, sdirk2 or static_newton (implicit_euler)"},
-    {"--levels", "N", PAL_FLAG_COUNT, &wish.scene.n_level, 1, PAL_LEVELS_MAX,
+    {"--levels", "N", PAL_FLAG_COUNT, &request.scene.n_level, 1, PAL_LEVELS_MAX,
      "of adaptive: levels of detail; the surface itself is the coarsest, each has four times the springs of the one "
      "before (2)"},
-    {"--thickness-mm", "T", PAL_FLAG_NUMBER, &wish.thickness_mm, 1e-3, 1000, "of adaptive: thickness of the wall (3)"},
-    {"--inflate", "PA", PAL_FLAG_NUMBER, &wish.scene.inflate_Pa, -1e6, 1e6,
+    {"--thickness-mm", "T", PAL_FLAG_NUMBER, &request.thickness_mm, 1e-3, 1000,
+     "of adaptive: thickness of the wall (3)"},
+    {"--inflate", "PA", PAL_FLAG_NUMBER, &request.scene.inflate_Pa, -1e6, 1e6,
      "of adaptive: pressure inside beyond that outside; closed surfaces only (0)"},
-    {"--label", "N", PAL_FLAG_COUNT, &wish.scene.label, 1, INT32_MAX,
+    {"--label", "N", PAL_FLAG_COUNT, &request.scene.label, 1, INT32_MAX,
      "label of a segmented scan (the most frequent one)"},
-    {"--list-labels", NULL, PAL_FLAG_SWITCH, &wish.list_labels, 0, 0, "only list the labels of a segmented scan"},
-    {"--units", "WORD", PAL_FLAG_TEXT, &wish.units, 0, 0,
+    {"--list-labels", NULL, PAL_FLAG_SWITCH, &request.list_labels, 0, 0, "only list the labels of a segmented scan"},
+    {"--units", "WORD", PAL_FLAG_TEXT, &request.units, 0, 0,
      "unit of a surface file: m, cm, mm, um or in (guessed from the size)"},
-    {"--triangles", "N", PAL_FLAG_COUNT, &wish.scene.target_tri, 100, 10000000,
+    {"--triangles", "N", PAL_FLAG_COUNT, &request.scene.target_tri, 100, 10000000,
      "shown triangles of a scan's surface or of the procedural organ (50,000); of adaptive the coarsest level\nof a "
      "scan (1,500) or a surface file (as many as it has, 1,500 when it has more than 3,000)"},
-    {"--largest", NULL, PAL_FLAG_SWITCH, &wish.scene.largest_only, 0, 0,
+    {"--largest", NULL, PAL_FLAG_SWITCH, &request.scene.largest_only, 0, 0,
      "keep only the largest of several components (of adaptive: pieces)"},
-    {"--young-Pa", "E", PAL_FLAG_NUMBER, &wish.scene.material.young_Pa, PAL_YOUNG_MIN_PA, PAL_YOUNG_MAX_PA,
+    {"--young-Pa", "E", PAL_FLAG_NUMBER, &request.scene.material.young_Pa, PAL_YOUNG_MIN_PA, PAL_YOUNG_MAX_PA,
      "stiffness of the tissue (5000; adaptive: 50,000)"},
-    {"--poisson", "NU", PAL_FLAG_NUMBER, &wish.scene.material.poisson, PAL_POISSON_MIN, PAL_POISSON_MAX,
+    {"--poisson", "NU", PAL_FLAG_NUMBER, &request.scene.material.poisson, PAL_POISSON_MIN, PAL_POISSON_MAX,
      "its Poisson ratio (0.45)"},
-    {"--density-kg-m3", "RHO", PAL_FLAG_NUMBER, &wish.scene.material.density_kg_m3, PAL_DENSITY_MIN_KG_M3,
+    {"--density-kg-m3", "RHO", PAL_FLAG_NUMBER, &request.scene.material.density_kg_m3, PAL_DENSITY_MIN_KG_M3,
      PAL_DENSITY_MAX_KG_M3, "its density (1000)"},
-    {"--damping-1-s", "C", PAL_FLAG_NUMBER, &wish.scene.material.damping_1_s, 0, PAL_DAMPING_MAX_1_S,
+    {"--damping-1-s", "C", PAL_FLAG_NUMBER, &request.scene.material.damping_1_s, 0, PAL_DAMPING_MAX_1_S,
      "its damping rate (4)"},
-    {"--up", "AXIS", PAL_FLAG_TEXT, &wish.up, 0, 0, "x, y, z, -x, -y or -z points away from the ground (z)"},
-    {"--hold", "PERCENT", PAL_FLAG_NUMBER, &wish.hold_percent, 0.1, 100,
+    {"--up", "AXIS", PAL_FLAG_TEXT, &request.up, 0, 0, "x, y, z, -x, -y or -z points away from the ground (z)"},
+    {"--hold", "PERCENT", PAL_FLAG_NUMBER, &request.hold_percent, 0.1, 100,
      "lowest part of the height that is held in place (5; an open surface of adaptive: its open edges)"},
-    {"--gravity", NULL, PAL_FLAG_SWITCH, &wish.scene.gravity, 0, 0,
+    {"--gravity", NULL, PAL_FLAG_SWITCH, &request.scene.gravity, 0, 0,
      "let it hang (a scanned shape carries its weight already)"},
-    {"--area-springs", NULL, PAL_FLAG_SWITCH, &wish.scene.area_springs, 0, 0,
+    {"--area-springs", NULL, PAL_FLAG_SWITCH, &request.scene.area_springs, 0, 0,
      "springs that keep face areas too (edges and volumes alone have the same moduli and cost half)"},
-    {"--name", "NAME", PAL_FLAG_TEXT, &wish.name, 0, 0, "name of the scene, a-z 0-9 _ - (from the file's name)"},
-    {"--title", "TEXT", PAL_FLAG_TEXT, &wish.title, 0, 0, "title on the page (from the file's name)"},
-    {"--source", "TEXT", PAL_FLAG_TEXT, &wish.source, 0, 0, "where the organ comes from, shown as well"},
-    {"--procedural", NULL, PAL_FLAG_SWITCH, &wish.procedural, 0, 0, "no IN: an organ that is computed"},
-    {"--shape", "WORD", PAL_FLAG_TEXT, &wish.scene.shape, 0, 0,
+    {"--name", "NAME", PAL_FLAG_TEXT, &request.name, 0, 0, "name of the scene, a-z 0-9 _ - (from the file's name)"},
+    {"--title", "TEXT", PAL_FLAG_TEXT, &request.title, 0, 0, "title on the page (from the file's name)"},
+    {"--source", "TEXT", PAL_FLAG_TEXT, &request.source, 0, 0, "where the organ comes from, shown as well"},
+    {"--procedural", NULL, PAL_FLAG_SWITCH, &request.procedural, 0, 0, "no IN: an organ that is computed"},
+    {"--shape", "WORD", PAL_FLAG_TEXT, &request.scene.shape, 0, 0,
      "no IN: a computed organ, stomach, sphere or sheet; all but the first are adaptive"},
-    {"--tetgen", NULL, PAL_FLAG_SWITCH, &wish.tetgen, 0, 0, "write TetGen files for any size"},
-    {"--no-tetgen", NULL, PAL_FLAG_SWITCH, &wish.no_tetgen, 0, 0, "write no TetGen files"},
+    {"--tetgen", NULL, PAL_FLAG_SWITCH, &request.tetgen, 0, 0, "write TetGen files for any size"},
+    {"--no-tetgen", NULL, PAL_FLAG_SWITCH, &request.no_tetgen, 0, 0, "write no TetGen files"},
 };
 
 int command_prepare(int argc, char **argv)
@@ -539,20 +540,21 @@ int command_prepare(int argc, char **argv)
     const char *in[1] = {NULL};
     int n_in = 0, code = pal_flags_parse(&table, argc, argv, &common, in, &n_in);
     if (code >= 0) return code;
-    if (wish.procedural && wish.scene.shape) return usage(&common, "--procedural and --shape exclude each other");
-    if ((wish.procedural || wish.scene.shape) == (n_in > 0))
+    if (request.procedural && request.scene.shape) return usage(&common, "--procedural and --shape exclude each other");
+    if ((request.procedural || request.scene.shape) == (n_in > 0))
         return usage(&common, "needs either a file or --procedural or --shape");
-    if (wish.list_labels) return n_in ? list_labels(&common, in[0]) : usage(&common, "--list-labels needs a file");
-    if (!wish.folder || !*wish.folder) return usage(&common, "needs -o DIR");
-    const char *sentence = check_model(&wish);
+    if (request.list_labels) return n_in ? list_labels(&common, in[0]) : usage(&common, "--list-labels needs a file");
+    if (!request.folder || !*request.folder) return usage(&common, "needs -o DIR");
+    const char *sentence = check_model(&request);
     if (sentence) return usage(&common, sentence);
-    if (wish.tetgen && wish.no_tetgen) return usage(&common, "--tetgen and --no-tetgen exclude each other");
-    if (wish.up && !read_axis(wish.up, wish.scene.up)) return usage(&common, "--up: is not x, y, z, -x, -y or -z");
-    pal_material *m = &wish.scene.material;
-    if (m->young_Pa == 0) m->young_Pa = wish.scene.adaptive ? WALL_YOUNG_PA : SOLID_YOUNG_PA;
-    wish.scene.hold = wish.hold_percent / 100;
-    wish.scene.thickness_m = wish.thickness_mm / 1000;
-    if (wish.units && !(wish.scene.unit_m = pal_mesh_unit_named(wish.units)))
+    if (request.tetgen && request.no_tetgen) return usage(&common, "--tetgen and --no-tetgen exclude each other");
+    if (request.up && !read_axis(request.up, request.scene.up))
+        return usage(&common, "--up: is not x, y, z, -x, -y or -z");
+    pal_material *m = &request.scene.material;
+    if (m->young_Pa == 0) m->young_Pa = request.scene.adaptive ? WALL_YOUNG_PA : SOLID_YOUNG_PA;
+    request.scene.hold = request.hold_percent / 100;
+    request.scene.thickness_m = request.thickness_mm / 1000;
+    if (request.units && !(request.scene.unit_m = pal_mesh_unit_named(request.units)))
         return usage(&common, "--units: is not m, cm, mm, um or in");
-    return run(&common, in[0], &wish);
+    return run(&common, in[0], &request);
 }

@@ -70,10 +70,10 @@ static pal_err no_case(const study *s, const char *id, pal_diagnostic *diag)
 }
 
 /* the law: --law, or what --kinematics, or the reference, asks for */
-static const char *law_of(const plan_requests *wish, const pal_problem_reference *reference)
+static const char *law_of(const plan_requests *request, const pal_problem_reference *reference)
 {
-    bool finite = wish->kinematics ? !strcmp(wish->kinematics, "finite") : reference && reference->finite;
-    if (wish->law) return wish->law;
+    bool finite = request->kinematics ? !strcmp(request->kinematics, "finite") : reference && reference->finite;
+    if (request->law) return request->law;
     if (!finite) return "linear";
     bool neo = !reference || !reference->finite || !strcmp(reference->law, "neo-hookean");
     return neo ? "neo_hookean" : "corotational";
@@ -85,33 +85,33 @@ static bool same(double a, double b)
 }
 
 /* does the reference answer what is asked? */
-static bool answers(const study *s, const plan_requests *wish, const pal_problem_reference *r)
+static bool answers(const study *s, const plan_requests *request, const pal_problem_reference *r)
 {
     const pal_problem_material *m = &s->problem->material[0];
     double young = isnan(r->young_Pa) ? m->young_Pa : r->young_Pa;
     double poisson = isnan(r->poisson) ? m->poisson : r->poisson;
-    return !strcmp(r->load_case, s->load_case->id) && r->finite == (strcmp(wish->solve.law, "linear") != 0) &&
-           same(isnan(wish->solve.young_Pa) ? m->young_Pa : wish->solve.young_Pa, young) &&
-           same(isnan(wish->solve.poisson) ? m->poisson : wish->solve.poisson, poisson);
+    return !strcmp(r->load_case, s->load_case->id) && r->finite == (strcmp(request->solve.law, "linear") != 0) &&
+           same(isnan(request->solve.young_Pa) ? m->young_Pa : request->solve.young_Pa, young) &&
+           same(isnan(request->solve.poisson) ? m->poisson : request->solve.poisson, poisson);
 }
 
 /* --case -> load case, law, E, nu and what to compare with */
-static pal_err choose(study *s, plan_requests *wish, pal_diagnostic *diag)
+static pal_err choose(study *s, plan_requests *request, pal_diagnostic *diag)
 {
     const pal_problem *p = s->problem;
-    const char *id = wish->load_case ? wish->load_case : p->n_case == 1 ? p->load_case[0].id : NULL;
+    const char *id = request->load_case ? request->load_case : p->n_case == 1 ? p->load_case[0].id : NULL;
     const pal_problem_reference *named = id ? pal_problem_reference_find(p, id) : NULL;
     s->load_case = named ? pal_problem_case_find(p, named->load_case) : id ? pal_problem_case_find(p, id) : NULL;
     if (!s->load_case) return no_case(s, id, diag);
-    wish->solve.law = law_of(wish, named);
-    if (named && isnan(wish->solve.young_Pa)) wish->solve.young_Pa = named->young_Pa;
-    if (named && isnan(wish->solve.poisson)) wish->solve.poisson = named->poisson;
-    s->samples_file = wish->samples;
-    if (wish->samples) return PAL_ERR_OK;
+    request->solve.law = law_of(request, named);
+    if (named && isnan(request->solve.young_Pa)) request->solve.young_Pa = named->young_Pa;
+    if (named && isnan(request->solve.poisson)) request->solve.poisson = named->poisson;
+    s->samples_file = request->samples;
+    if (request->samples) return PAL_ERR_OK;
     s->reference = named;
     for (int k = 0; k < p->n_reference && !named; k++) {
         const pal_problem_reference *r = &p->reference[k];
-        if (!answers(s, wish, r)) continue;
+        if (!answers(s, request, r)) continue;
         if (!s->reference || !strcmp(r->law, "neo-hookean")) s->reference = r;
     }
     if (s->reference) s->samples_file = s->reference->file;
@@ -138,37 +138,37 @@ static pal_err write_one(study *s, const char *path, bool vtk, pal_diagnostic *d
     return PAL_ERR_OK;
 }
 
-static pal_err write_files(study *s, const plan_requests *wish, pal_diagnostic *diag)
+static pal_err write_files(study *s, const plan_requests *request, pal_diagnostic *diag)
 {
     char csv[PATH], vtk[PATH];
-    if (wish->folder) {
-        PAL_TRY(pal_scene_make_folder(wish->folder, diag));
-        snprintf(csv, sizeof csv, "%s/solution.csv", wish->folder);
-        snprintf(vtk, sizeof vtk, "%s/solution.vtk", wish->folder);
-        PAL_TRY(write_one(s, wish->csv ? wish->csv : csv, false, diag));
-        return write_one(s, wish->vtk ? wish->vtk : vtk, true, diag);
+    if (request->folder) {
+        PAL_TRY(pal_scene_make_folder(request->folder, diag));
+        snprintf(csv, sizeof csv, "%s/solution.csv", request->folder);
+        snprintf(vtk, sizeof vtk, "%s/solution.vtk", request->folder);
+        PAL_TRY(write_one(s, request->csv ? request->csv : csv, false, diag));
+        return write_one(s, request->vtk ? request->vtk : vtk, true, diag);
     }
-    if (wish->csv) PAL_TRY(write_one(s, wish->csv, false, diag));
-    return wish->vtk ? write_one(s, wish->vtk, true, diag) : PAL_ERR_OK;
+    if (request->csv) PAL_TRY(write_one(s, request->csv, false, diag));
+    return request->vtk ? write_one(s, request->vtk, true, diag) : PAL_ERR_OK;
 }
 
-static pal_err read_all(study *s, plan_requests *wish, pal_diagnostic *diag)
+static pal_err read_all(study *s, plan_requests *request, pal_diagnostic *diag)
 {
-    PAL_TRY(pal_problem_read(wish->problem, &s->problem, diag));
-    PAL_TRY(choose(s, wish, diag));
+    PAL_TRY(pal_problem_read(request->problem, &s->problem, diag));
+    PAL_TRY(choose(s, request, diag));
     if (s->samples_file) PAL_TRY(pal_samples_read(s->samples_file, &s->samples, diag));
     pal_mesh_file_options file = {.unit_m = s->problem->unit_m, .weld = PAL_MESH_WELD};
     pal_surface_report report = {0};
     return pal_mesh_file_read(s->problem->surface, &file, &s->surface, &report, NULL, NULL, diag);
 }
 
-static pal_err work(study *s, const plan_requests *wish, pal_diagnostic *diag)
+static pal_err work(study *s, const plan_requests *request, pal_diagnostic *diag)
 {
     pal_diagnostic reason = {""};
-    pal_err err = pal_solve(s->problem, s->load_case, &s->surface, &wish->solve, &s->solution, &s->result, &reason);
-    if (err) return pal_diagnostic_set(diag, err, "%s: %s", wish->problem, reason.text);
+    pal_err err = pal_solve(s->problem, s->load_case, &s->surface, &request->solve, &s->solution, &s->result, &reason);
+    if (err) return pal_diagnostic_set(diag, err, "%s: %s", request->problem, reason.text);
     PAL_TRY(compare(s, diag));
-    return write_files(s, wish, diag);
+    return write_files(s, request, diag);
 }
 
 /* ---- saying ---- */
@@ -197,7 +197,7 @@ static void add_seconds(cJSON *object, const study *s)
     cJSON_AddNumberToObject(seconds, "total", s->total_s);
 }
 
-static cJSON *as_json(const study *s, const plan_requests *wish)
+static cJSON *as_json(const study *s, const plan_requests *request)
 {
     const pal_solve_result *r = &s->result;
     cJSON *o = cJSON_CreateObject();
@@ -209,10 +209,10 @@ static cJSON *as_json(const study *s, const plan_requests *wish)
         cJSON_AddStringToObject(o, "reference", s->reference->id);
     else
         cJSON_AddNullToObject(o, "reference");
-    cJSON_AddStringToObject(o, "element", wish->solve.element);
-    cJSON_AddStringToObject(o, "law", wish->solve.law);
-    cJSON_AddNumberToObject(o, "resolution", wish->solve.resolution);
-    cJSON_AddBoolToObject(o, "fill", wish->solve.fill);
+    cJSON_AddStringToObject(o, "element", request->solve.element);
+    cJSON_AddStringToObject(o, "law", request->solve.law);
+    cJSON_AddNumberToObject(o, "resolution", request->solve.resolution);
+    cJSON_AddBoolToObject(o, "fill", request->solve.fill);
     add_or_null(o, "rms_percent", compared, s->rms_percent);
     add_or_null(o, "max_percent", compared, s->max_percent);
     add_or_null(o, "reference_rms_percent", s->reference != NULL, s->reference ? 100 * s->reference->estimated_rms : 0);
@@ -239,11 +239,11 @@ static cJSON *as_json(const study *s, const plan_requests *wish)
     return o;
 }
 
-static void print(const study *s, const plan_requests *wish)
+static void print(const study *s, const plan_requests *request)
 {
     const pal_solve_result *r = &s->result;
     printf("%s, load case %s: %s, %s, %d nodes, %d elements of %g m, %d unknowns\n", s->problem->name, s->load_case->id,
-           wish->solve.element, wish->solve.law, r->n_node, r->n_element, r->edge_m, r->n_dof);
+           request->solve.element, request->solve.law, r->n_node, r->n_element, r->edge_m, r->n_dof);
     if (r->clamped) printf("a Poisson ratio above 0.4999 was taken as 0.4999\n");
     printf("%d Newton iteration%s", r->n_newton, r->n_newton == 1 ? "" : "s");
     if (r->n_cg > 0) printf(" with %d conjugate gradients", r->n_cg);
@@ -268,12 +268,12 @@ static bool show_progress(const char *what, double fraction, void *user)
 }
 
 /* several elements or resolutions, or a plot of them */
-static bool is_many(const plan_requests *wish)
+static bool is_many(const plan_requests *request)
 {
-    return wish->list.n_element * wish->list.n_resolution > 1 || wish->plot;
+    return request->list.n_element * request->list.n_resolution > 1 || request->plot;
 }
 
-static int run_many(const pal_flag_common *common, const study *s, const plan_requests *wish)
+static int run_many(const pal_flag_common *common, const study *s, const plan_requests *request)
 {
     const pal_solve_study what = {.problem = s->problem,
                                   .load_case = s->load_case,
@@ -281,28 +281,28 @@ static int run_many(const pal_flag_common *common, const study *s, const plan_re
                                   .samples_file = s->samples_file,
                                   .samples = s->samples_file ? &s->samples : NULL,
                                   .surface = &s->surface,
-                                  .options = &wish->solve,
-                                  .plot = wish->plot};
-    return pal_solve_study_run(common, &what, &wish->list);
+                                  .options = &request->solve,
+                                  .plot = request->plot};
+    return pal_solve_study_run(common, &what, &request->list);
 }
 
-static int run(pal_flag_common *common, plan_requests *wish)
+static int run(pal_flag_common *common, plan_requests *request)
 {
     study s = {0};
     pal_diagnostic diag = {""};
     double start = pal_clock_s();
-    wish->solve.progress = show_progress;
-    wish->solve.user = common;
-    pal_err err = read_all(&s, wish, &diag);
-    bool many = !err && is_many(wish);
-    if (!err && !many) err = work(&s, wish, &diag);
+    request->solve.progress = show_progress;
+    request->solve.user = common;
+    pal_err err = read_all(&s, request, &diag);
+    bool many = !err && is_many(request);
+    if (!err && !many) err = work(&s, request, &diag);
     s.total_s = pal_clock_s() - start;
     pal_report_progress(NULL, 0, common);
     int code = err            ? pal_report_refusal(common, err, &diag)
-               : many         ? run_many(common, &s, wish)
-               : common->json ? pal_report_json(common, as_json(&s, wish))
+               : many         ? run_many(common, &s, request)
+               : common->json ? pal_report_json(common, as_json(&s, request))
                               : 0;
-    if (!err && !many && !common->json && !common->quiet) print(&s, wish);
+    if (!err && !many && !common->json && !common->quiet) print(&s, request);
     pal_solution_free(s.solution);
     pal_surface_free(&s.surface);
     pal_samples_free(&s.samples);
@@ -319,63 +319,64 @@ static bool is_one(const char *word, const char *const *list)
 }
 
 /* the words of flags; NULL: all fine, else the sentence */
-static const char *check_words(const plan_requests *wish)
+static const char *check_words(const plan_requests *request)
 {
-    if (!is_one(wish->kinematics, (const char *const[]){"linear", "finite", NULL}))
+    if (!is_one(request->kinematics, (const char *const[]){"linear", "finite", NULL}))
         return "--kinematics: is not linear or finite";
-    if (!is_one(wish->law, (const char *const[]){"linear", "corotational", "neo_hookean", NULL}))
+    if (!is_one(request->law, (const char *const[]){"linear", "corotational", "neo_hookean", NULL}))
         return "--law: is not linear, corotational or neo_hookean";
-    if (!is_one(wish->fill, (const char *const[]){"on", "off", NULL})) return "--fill: is not on or off";
-    if (!is_one(wish->align, (const char *const[]){"on", "off", NULL})) return "--align: is not on or off";
-    if (!is_one(wish->linear, (const char *const[]){"direct", "pcg", NULL})) return "--linear: is not direct or pcg";
-    if (!is_one(wish->free, (const char *const[]){"refuse", "inertia_relief", NULL}))
+    if (!is_one(request->fill, (const char *const[]){"on", "off", NULL})) return "--fill: is not on or off";
+    if (!is_one(request->align, (const char *const[]){"on", "off", NULL})) return "--align: is not on or off";
+    if (!is_one(request->linear, (const char *const[]){"direct", "pcg", NULL})) return "--linear: is not direct or pcg";
+    if (!is_one(request->free, (const char *const[]){"refuse", "inertia_relief", NULL}))
         return "--free: is not refuse or inertia_relief";
-    if (wish->kinematics && wish->law && !strcmp(wish->kinematics, "linear") != !strcmp(wish->law, "linear"))
+    if (request->kinematics && request->law &&
+        !strcmp(request->kinematics, "linear") != !strcmp(request->law, "linear"))
         return "--kinematics and --law: linear goes with linear only";
-    if (is_many(wish) && (wish->folder || wish->csv || wish->vtk))
+    if (is_many(request) && (request->folder || request->csv || request->vtk))
         return "-o, --csv and --vtk: are for one element and one resolution";
     return NULL;
 }
 
 int command_solve(int argc, char **argv)
 {
-    plan_requests wish = {.element = "hex8_bbar", .resolution = "32", .solve = {.young_Pa = NAN, .poisson = NAN}};
-    pal_solve_options *o = &wish.solve;
+    plan_requests request = {.element = "hex8_bbar", .resolution = "32", .solve = {.young_Pa = NAN, .poisson = NAN}};
+    pal_solve_options *o = &request.solve;
     const pal_flag flag[] = {
-        {"--case", "ID", PAL_FLAG_TEXT, &wish.load_case, 0, 0, "load case or reference (the only load case)"},
-        {"--kinematics", "WORD", PAL_FLAG_TEXT, &wish.kinematics, 0, 0,
+        {"--case", "ID", PAL_FLAG_TEXT, &request.load_case, 0, 0, "load case or reference (the only load case)"},
+        {"--kinematics", "WORD", PAL_FLAG_TEXT, &request.kinematics, 0, 0,
          "linear or finite (the reference's, or linear)"},
-        {"--law", "WORD", PAL_FLAG_TEXT, &wish.law, 0, 0,
+        {"--law", "WORD", PAL_FLAG_TEXT, &request.law, 0, 0,
          "linear, corotational or neo_hookean (linear, or neo_hookean when finite)"},
-        {"--element", "LIST", PAL_FLAG_TEXT, &wish.element, 0, 0,
+        {"--element", "LIST", PAL_FLAG_TEXT, &request.element, 0, 0,
          "hex8_bbar, hex8, tet4 or tet10, or several with commas between; tet10:16 is not solved beyond resolution 16\n"
          "(hex8_bbar)"},
-        {"--resolution", "LIST", PAL_FLAG_TEXT, &wish.resolution, 0, 0,
+        {"--resolution", "LIST", PAL_FLAG_TEXT, &request.resolution, 0, 0,
          "voxels on the longest axis, 1 to 1024, or several with commas between, ascending (32)"},
-        {"--fill", "WORD", PAL_FLAG_TEXT, &wish.fill, 0, 0,
+        {"--fill", "WORD", PAL_FLAG_TEXT, &request.fill, 0, 0,
          "on: voxels that the surface cuts count by their filled share; off: those at least half filled, whole (on)"},
         {"--least-fill", "SHARE", PAL_FLAG_NUMBER, &o->min_fill, 1e-6, 1,
          "cut voxels with a smaller share inside are dropped (0.25 with fill, or 0.02 where that would lose 2.5 %\n"
          "of the volume; 0.5 without)"},
-        {"--align", "WORD", PAL_FLAG_TEXT, &wish.align, 0, 0,
+        {"--align", "WORD", PAL_FLAG_TEXT, &request.align, 0, 0,
          "on: voxels are shifted so that faces lie where a support, or else a material, ends inside the body; off: "
          "they\n"
          "begin at the box of the surface (on)"},
         {"--split", "K", PAL_FLAG_COUNT, &o->split, 1, 16,
          "every voxel is solved as K x K x K of its fill: what is left of the error is that of the jagged border (1)"},
-        {"--samples", "U.csv", PAL_FLAG_TEXT, &wish.samples, 0, 0,
+        {"--samples", "U.csv", PAL_FLAG_TEXT, &request.samples, 0, 0,
          "compare at these points: CSV x,y,z,ux,uy,uz (the reference's)"},
         {"--nu", "NU", PAL_FLAG_NUMBER, &o->poisson, -1e300, 1e300, "Poisson ratio (the problem's)"},
         {"--young", "PA", PAL_FLAG_NUMBER, &o->young_Pa, -1e300, 1e300, "stiffness (the problem's)"},
         {"--tolerance", "T", PAL_FLAG_NUMBER, &o->tolerance, 1e-14, 0.1, "residual relative to the loads (1e-8)"},
-        {"--linear", "WORD", PAL_FLAG_TEXT, &wish.linear, 0, 0,
+        {"--linear", "WORD", PAL_FLAG_TEXT, &request.linear, 0, 0,
          "direct or pcg: how the linear systems are solved (whichever suits the size)"},
-        {"--free", "WORD", PAL_FLAG_TEXT, &wish.free, 0, 0,
+        {"--free", "WORD", PAL_FLAG_TEXT, &request.free, 0, 0,
          "a body without supports: refuse, or inertia_relief: its inertia balances the loads (refuse)"},
-        {"-o", "DIR", PAL_FLAG_TEXT, &wish.folder, 0, 0, "writes DIR/solution.csv and DIR/solution.vtk"},
-        {"--csv", "FILE", PAL_FLAG_TEXT, &wish.csv, 0, 0, "writes x,y,z,ux,uy,uz of all nodes, m"},
-        {"--vtk", "FILE", PAL_FLAG_TEXT, &wish.vtk, 0, 0, "writes a legacy VTK file with displacement and stress"},
-        {"--plot", "FILE.svg", PAL_FLAG_TEXT, &wish.plot, 0, 0,
+        {"-o", "DIR", PAL_FLAG_TEXT, &request.folder, 0, 0, "writes DIR/solution.csv and DIR/solution.vtk"},
+        {"--csv", "FILE", PAL_FLAG_TEXT, &request.csv, 0, 0, "writes x,y,z,ux,uy,uz of all nodes, m"},
+        {"--vtk", "FILE", PAL_FLAG_TEXT, &request.vtk, 0, 0, "writes a legacy VTK file with displacement and stress"},
+        {"--plot", "FILE.svg", PAL_FLAG_TEXT, &request.plot, 0, 0,
          "draws error over nodes, and in FILE_seconds.svg error over seconds"},
     };
     const pal_flag_table table = {.usage = "solve PROBLEM.json --case ID [flags]",
@@ -385,17 +386,18 @@ int command_solve(int argc, char **argv)
                                   .min_operand = 1,
                                   .max_operand = 1};
     pal_flag_common common;
-    int n = 0, code = pal_flags_parse(&table, argc, argv, &common, &wish.problem, &n);
+    int n = 0, code = pal_flags_parse(&table, argc, argv, &common, &request.problem, &n);
     if (code >= 0) return code;
     pal_diagnostic diag = {""};
-    if (!pal_solve_study_parse(wish.element, wish.resolution, &wish.list, &diag)) return usage(&common, diag.text);
-    const char *sentence = check_words(&wish);
+    if (!pal_solve_study_parse(request.element, request.resolution, &request.list, &diag))
+        return usage(&common, diag.text);
+    const char *sentence = check_words(&request);
     if (sentence) return usage(&common, sentence);
-    o->element = wish.list.element[0];
-    o->resolution = wish.list.resolution[0];
-    o->fill = !wish.fill || !strcmp(wish.fill, "on");
-    o->align = !wish.align || !strcmp(wish.align, "on");
-    o->linear = wish.linear;
-    o->inertia_relief = wish.free && !strcmp(wish.free, "inertia_relief");
-    return run(&common, &wish);
+    o->element = request.list.element[0];
+    o->resolution = request.list.resolution[0];
+    o->fill = !request.fill || !strcmp(request.fill, "on");
+    o->align = !request.align || !strcmp(request.align, "on");
+    o->linear = request.linear;
+    o->inertia_relief = request.free && !strcmp(request.free, "inertia_relief");
+    return run(&common, &request);
 }

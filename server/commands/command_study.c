@@ -44,7 +44,7 @@ enum { MOST_PATH = PAL_STUDY_PATH + 8, FILES = 5 };
 typedef struct study_run {
     pal_flag_common common;
     pal_study_request request;
-    pal_accuracy_target wish;
+    pal_accuracy_target target;
     const char *methods, *folder, *scene; /* scene: -o */
     char load_case[PAL_NAME];             /* of the study that is there */
     bool again;
@@ -89,10 +89,10 @@ static bool take_words(study_run *run, const char *within, const char *budget, c
     static const char *const span[] = {"ms", "us", "\xc2\xb5s", "s", NULL};
     static const double span_factor[] = {1, 1e3, 1e3, 1e-3};
     static const char *const model[] = {"fem", "tet_springs", "adaptive_springs", "subdivision_fem", NULL};
-    if (within && !read_amount(within, length, length_factor, &run->wish.max_error_m))
+    if (within && !read_amount(within, length, length_factor, &run->target.max_error_m))
         return !snprintf(out, n_byte,
                          "--within: \"%.40s\" is not a length above 0 with its unit, mm, um, cm or m, as 1mm", within);
-    if (budget && !read_amount(budget, span, span_factor, &run->wish.budget_ms))
+    if (budget && !read_amount(budget, span, span_factor, &run->target.budget_ms))
         return !snprintf(out, n_byte, "--budget: \"%.40s\" is not a time above 0 with its unit, ms, us or s, as 4ms",
                          budget);
     if (run->scene && !within && !budget && !run->row)
@@ -190,7 +190,7 @@ static pal_err take_kept_loads(study_run *run, pal_diagnostic *diag)
 {
     pal_study_file *old = NULL;
     pal_study_request *q = &run->request;
-    bool asks = run->row > 0 || run->wish.max_error_m > 0 || run->wish.budget_ms > 0;
+    bool asks = run->row > 0 || run->target.max_error_m > 0 || run->target.budget_ms > 0;
     bool given = q->quick || q->seconds > 0 || q->load_case || q->samples;
     double seconds = 0;
     if (asks && !given && !run->again && !access(run->path, F_OK)) {
@@ -483,10 +483,10 @@ static pal_err answer(study_run *run, pal_diagnostic *diag)
     const pal_study *study = &run->file->study;
     const char *methods = run->methods ? run->methods : "";
     if (run->row) return pick_row(run, diag);
-    if (!(run->wish.max_error_m > 0) && !(run->wish.budget_ms > 0)) return PAL_ERR_OK;
-    run->picked = pal_study_pick_target(study, methods, &run->wish);
+    if (!(run->target.max_error_m > 0) && !(run->target.budget_ms > 0)) return PAL_ERR_OK;
+    run->picked = pal_study_pick_target(study, methods, &run->target);
     if (run->picked >= 0) return run->scene ? write_scene(run, diag) : PAL_ERR_OK;
-    pal_study_describe_miss(study, methods, &run->wish, text, sizeof text);
+    pal_study_describe_miss(study, methods, &run->target, text, sizeof text);
     return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s", run->request.word, text);
 }
 
@@ -514,7 +514,7 @@ static void print(const study_run *run)
     if (run->picked >= 0) {
         const pal_study_point *point = &study->point[run->picked];
         const pal_measured_configuration *p = &point->measured;
-        pal_accuracy_target_text(&run->wish, asked);
+        pal_accuracy_target_text(&run->target, asked);
         if (run->row) snprintf(asked, sizeof asked, "row %d", run->row);
         printf("%s: %s, %s in %.3g ms%s%s\n", asked, pal_configuration_text(&p->setting, text),
                pal_study_error_text(run->file, p->error_m, off), p->ms, point->reason[0] ? "; " : "", point->reason);
