@@ -1,16 +1,16 @@
-# Shared by run.sh and test.sh: where things are, what is missing, how to build. Sourced, not run.
+# Shared by run.sh and test.sh: folders, packages, build. Sourced, not run.
 tree=$(cd "$(dirname "$0")/.." && pwd) || exit 1
 build=${PALPATE_BUILD:-$tree/build}
 tests=${PALPATE_TESTS:-OFF}
 unset PALPATE_BUILD PALPATE_TESTS # the server takes PALPATE_* for its configuration
 
-say() { echo "palpate: $*" >&2; }
+message() { echo "palpate: $*" >&2; }
 fail() {
     echo "palpate: $*" >&2
     exit 1
 }
 
-# is the thing of a packages.txt line there?
+# PACKAGE HOW: is the package of a line of packages.txt installed?
 have() {
     case $2 in
     cmd:*) command -v "${2#cmd:}" >/dev/null 2>&1 ;;
@@ -19,7 +19,7 @@ have() {
     esac
 }
 
-missing() { # WHO...: packages that are not there
+missing() { # WHO...: packages that are not installed
     while read -r package who how; do
         case $package in '' | '#'*) continue ;; esac
         for wanted in "$@"; do
@@ -29,31 +29,31 @@ missing() { # WHO...: packages that are not there
     return 0
 }
 
-install_missing() { # WHO...: installs; when that cannot be done, says why in one line and returns 1
+install_missing() { # WHO...: on failure one line with the reason, and 1
     list=$(missing "$@" | tr '\n' ' ')
     [ -z "$list" ] && return 0
     if ! command -v apt-get >/dev/null 2>&1; then
-        say "missing: ${list}- install them with your system's package manager (this script knows apt-get)"
+        message "missing: ${list}- install them with the package manager of your system (this script uses apt-get)"
         return 1
     fi
     as_root=
     if [ "$(id -u)" -ne 0 ]; then
         if ! command -v sudo >/dev/null 2>&1; then
-            say "missing: ${list}- run as root: apt-get install $list"
+            message "missing: ${list}- run as root: apt-get install $list"
             return 1
         fi
         as_root=sudo
     fi
-    say "installing: $list"
+    message "installing: $list"
     mkdir -p "$build"
     if ! { $as_root apt-get update -q && $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends $list; } >"$build/install.log" 2>&1 ||
         [ -n "$(missing "$@")" ]; then
-        say "could not install: $(missing "$@" | tr '\n' ' ')- see $build/install.log"
+        message "could not install: $(missing "$@" | tr '\n' ' ')- see $build/install.log"
         return 1
     fi
 }
 
-build_release() { # [cmake options]: quiet unless it fails
+build_release() { # [cmake options]: prints the log only when it fails
     mkdir -p "$build"
     log=$build/build.log
     if ! cmake -S "$tree" -B "$build/release" -G Ninja -D PAL_PRESET=release -D PAL_VIEWER_PACKAGES="$build/viewer_packages" "$@" >"$log" 2>&1 ||
@@ -63,13 +63,13 @@ build_release() { # [cmake options]: quiet unless it fails
     fi
 }
 
-# three.js for the viewer, from the lock file, into the build folder; nothing when it is there already
+# three.js for the viewer, by the lock file, into the build folder; no download when it is up to date
 fetch_viewer() {
     from=$tree/clients/viewer to=$build/viewer_packages
     if [ -e "$to/node_modules/three/build/three.module.js" ] && cmp -s "$from/package-lock.json" "$to/package-lock.json"; then
         return 0
     fi
-    say "getting the viewer's packages"
+    message "downloading the packages of the viewer"
     mkdir -p "$to"
     cp "$from/package.json" "$from/package-lock.json" "$to/" || return 1
     (cd "$to" && npm ci --no-audit --no-fund --loglevel=error --fetch-retries=2 --fetch-timeout=60000) >"$build/npm.log" 2>&1

@@ -2,10 +2,10 @@
 # Installs what is missing, builds, prepares the default scene, starts the server and prints the address to open.
 # usage: deploy/run.sh [INPUT] [palpate serve options...]
 #   INPUT  a scene (.json), a surface (.obj .stl .ply .off) or a label volume (.nii .nii.gz .inr .inr.gz);
-#          stomach, sphere or sheet: a hollow body that refines where it is touched;
-#          soccer, monster, block3, chair, block4, head, bridge, nozzle or kidney: a solid to sculpt (or a .palcells file);
-#          without it: the liver of an abdominal CT, or our own organ when that cannot be had
-# PALPATE_BUILD names another build folder. A rerun starts in seconds.
+#          stomach, sphere or sheet: an adaptive surface that refines where it is touched;
+#          soccer, monster, block3, chair, block4, head, bridge, nozzle or kidney: a subdivision solid to sculpt (or a .palcells file);
+#          none: the liver of an abdominal CT, or a computed organ when the scan is not available
+# PALPATE_BUILD names another build folder. The second run starts in seconds.
 set -u
 . "$(dirname "$0")/common.sh"
 case ${1-} in -h | --help)
@@ -34,19 +34,19 @@ soccer | monster | block3 | chair | block4 | head | bridge | nozzle | kidney)
 esac
 
 install_missing run || exit 1
-fetch_viewer || fail "could not get the viewer's packages, see $build/npm.log"
-say "building (the first time takes a minute)"
+fetch_viewer || fail "could not download the packages of the viewer, see $build/npm.log"
+message "building (the first time takes a minute)"
 build_release -D PAL_BUILD_TESTS="$tests"
 palpate=$build/release/bin/palpate
 
-# the scan: a labelled abdominal CT that a Debian package carries (CC0-1.0)
+# a labelled abdominal CT from a Debian package (CC0-1.0)
 find_scan() {
     scan=$build/scan/data/images/liver.inr.gz
     [ -e "$scan" ] && return 0
     mkdir -p "$build/scan"
     install_missing scan
     archive=/usr/share/doc/libcgal-dev/data.tar.gz
-    if [ ! -e "$archive" ]; then # slim systems leave documentation out: unpack the package itself
+    if [ ! -e "$archive" ]; then # slim systems install no documentation: unpack the package
         (cd "$build/scan" && apt-get download -q libcgal-demo && dpkg-deb -x libcgal-demo_*.deb .) >>"$build/install.log" 2>&1
         archive=$build/scan/usr/share/doc/libcgal-dev/data.tar.gz
     fi
@@ -54,7 +54,7 @@ find_scan() {
     [ -e "$scan" ]
 }
 
-# a scene is prepared again (a second) when the program that reads it is newer
+# a scene is prepared again (one second) when the program is newer
 stale() { [ ! -e "$1" ] || [ "$palpate" -nt "$1" ]; }
 
 if [ -n "$shape" ]; then
@@ -73,16 +73,16 @@ fi
 if [ -z "$input" ]; then
     input=$build/scene/liver/scene.json
     if stale "$input"; then
-        # the patient lay on the back: up is -y, and the organ is held where it grows on, at the back
+        # the patient lies on the back: up is -y, and the organ is fixed at its back, where it is attached
         if find_scan; then
-            say "preparing the liver of an abdominal CT"
+            message "preparing the liver of an abdominal CT"
             "$palpate" prepare "$scan" --label 255 --name liver --up -y --hold 12 --title "Liver, from an abdominal CT" \
                 --source "labelled CT of the Debian package libcgal-demo, CC0-1.0" -o "$build/scene/liver" \
                 --quiet || fail "the scene could not be prepared"
         else
             input=$build/scene/organ/scene.json
             if stale "$input"; then
-                say "the scan cannot be had here, preparing our own organ"
+                message "the scan is not available, preparing a computed organ"
                 "$palpate" prepare --procedural -o "$build/scene/organ" --quiet || fail "the scene could not be prepared"
             fi
         fi

@@ -1,7 +1,7 @@
 #!/bin/sh
-# Installs what is missing, builds, runs every test and ends with a line "N passed, N failed, N skipped". What failed is shown where
-# it failed, whole, and once more in short right before that line.
-# usage: deploy/test.sh [--fast]     --fast: the release build's tests only, no sanitizers, fuzzers or browser
+# Installs what is missing, builds, runs every test and ends with a line "N passed, N failed, N skipped". The output of a failed
+# test is printed in full where it failed, and in short before the last line.
+# usage: deploy/test.sh [--fast]     --fast: the tests of the release build only, no sanitizers, fuzzers or browser
 # PALPATE_BUILD names another build folder.
 set -u
 . "$(dirname "$0")/common.sh"
@@ -17,39 +17,39 @@ case ${1-} in
 esac
 
 install_missing run test || exit 1
-install_missing scan || say "tests of the scan are skipped: it cannot be had"
-install_missing mpi || say "calibration over MPI is not built and its test is skipped"
-fetch_viewer || fail "could not get the viewer's packages, see $build/npm.log"
+install_missing scan || message "tests of the scan are skipped: it is not available"
+install_missing mpi || message "calibration over MPI is not built and its test is skipped"
+fetch_viewer || fail "could not download the packages of the viewer, see $build/npm.log"
 
 passed=0 failed=0 skipped=0
 digest=$build/digest.log
 : >"$digest"
 
-brief() { # NAME: the lines of standard input that say what failed, at most 15, into the digest
+brief() { # NAME: copies the lines of standard input that name a failure, at most 15, into the digest
     echo "FAILED $1" >>"$digest"
     cat >"$build/brief.log"
-    # shell tests say FAIL, tests in C the file and line, node "not ok", compilers and sanitizers error
+    # shell tests print FAIL, tests in C file and line, node "not ok", compilers and sanitizers error
     grep -E '^ *(FAIL|not ok|palpate:)|^ *[^ :]+\.[a-z]+:[0-9]+: |(^|[ :])[Ee]rror: |Sanitizer|\*\*\*' "$build/brief.log" |
         cut -c 1-240 | head -n 15 >"$build/brief_lines.log"
-    # of one that only stopped, how far it came
+    # of a test that was stopped, its last lines
     grep -qv '\*\*\*' "$build/brief_lines.log" ||
         grep -v '\*\*\*' "$build/brief.log" | grep . | tail -n 5 | cut -c 1-240 >>"$build/brief_lines.log"
     sed 's/^/    /' "$build/brief_lines.log" >>"$digest"
 }
-step() { # NAME COMMAND...: one test that is a command; its output is shown when it fails
+step() { # NAME COMMAND...: one test that is a command; its output is printed when it fails
     name=$1
     shift
     if "$@" >"$build/step.log" 2>&1; then
         passed=$((passed + 1))
-        say "ok    $name"
+        message "ok    $name"
     else
         failed=$((failed + 1))
         cat "$build/step.log"
         brief "$name" <"$build/step.log"
-        say "FAIL  $name"
+        message "FAIL  $name"
     fi
 }
-# a test's result in ctest's log; what it printed stands below
+# the result line of a test in the log of ctest; its output follows
 result='^ *[0-9]+/[0-9]+ Test +#[0-9]+: '
 output_of() { # LOG TEST: that test's result and output
     awk -v result="$result" -v test="$2" '
@@ -57,8 +57,8 @@ output_of() { # LOG TEST: that test's result and output
         /^ +Start +[0-9]+: / || /^[0-9]+% tests passed/ || /^The following tests/ { on = 0 }
         on' "$1"
 }
-idle= # what stands before commands that take only what others leave of the machine
-build_preset() { # PRESET "TARGET..." [cmake options]: built() says how it went, as this may run beside other things
+idle= # prefix of commands with low priority
+build_preset() { # PRESET "TARGET..." [cmake options]: may run in the background; built() reports the result
     preset=$1 target=$2
     shift 2
     # shellcheck disable=SC2086
@@ -69,12 +69,12 @@ built() { # PRESET
     [ ! -e "$build/built_$1" ] || return 0
     tail -n 40 "$build/build_$1.log"
     brief "build of $1" <"$build/build_$1.log"
-    say "FAIL  build of $1"
+    message "FAIL  build of $1"
     failed=$((failed + 1))
     return 1
 }
-# the tests of one build, PRESET [ctest options]: what computes, and what mostly waits (tests/clients/CMakeLists.txt), side by
-# side; one more of the former than cores, as some sleep now and then
+# the tests of one build, PRESET [ctest options]: those that compute and those that mostly wait (tests/clients/CMakeLists.txt)
+# run side by side; one more of the former than cores, because some sleep at times
 compute() {
     (cd "$build/$1" && shift && $idle ctest --output-on-failure -j 3 "$@") >"$build/ctest_$1.log" 2>&1
 }
@@ -88,7 +88,7 @@ count() { # PRESET: its tests, once both have run
     grep -E "$result" "$log"
     n_pass=$(grep -cE "$result.* Passed " "$log")
     n_skip=$(grep -cE "$result.*\*\*\*Skipped" "$log")
-    # "7/9 Test #3: room/test_name ....***Failed": the words before the dots are the name
+    # "7/9 Test #3: ROOM/NAME ....***Failed"
     bad=$(grep -E "$result.*(\*\*\*|Not Run)" "$log" | grep -v '\*\*\*Skipped' | sed -E "s|$result([^ ]+) .*|\1|")
     n_fail=$(echo "$bad" | grep -c .)
     for test in $bad; do
@@ -103,24 +103,24 @@ count() { # PRESET: its tests, once both have run
     passed=$((passed + n_pass))
     failed=$((failed + n_fail))
     skipped=$((skipped + n_skip))
-    say "$preset: $n_pass passed, $n_fail failed, $n_skip skipped"
+    message "$preset: $n_pass passed, $n_fail failed, $n_skip skipped"
 }
-say "building release"
+message "building release"
 build_release -D PAL_BUILD_TESTS=ON
-say "tests of release"
+message "tests of release"
 compute release -LE waits
 if [ -z "$fast" ]; then
     rm -f "$build"/built_* "$build"/fuzz_*.code
-    # all rooms but what is left out below; for the thread sanitizer those that have threads
+    # all rooms but those excluded below; for the thread sanitizer the rooms with threads
     rooms=$(cd "$tree/tests" && ls -d */CMakeLists.txt | sed 's,/.*,,' | grep -vE '^(accuracy|bench)$')
     threads="base num session net clients"
-    # browsers and what waits leave much of the machine
+    # browsers and waiting tests leave much of the machine idle
     idle="nice -n 10"
     trap 'kill 0' INT # of what runs beside, too
     {
         build_preset asan "server/all clients/all $(printf 'tests/%s/all ' $rooms)"
         build_preset tsan "server/all clients/all $(printf 'tests/%s/all ' $threads)"
-        # without this machine's wide registers: the compiler takes minutes over them
+        # without wide registers, for which the compiler takes minutes
         build_preset fuzz fuzzers -D CMAKE_C_COMPILER=clang -D PAL_NATIVE=OFF
     } &
 fi
@@ -138,12 +138,12 @@ if [ -z "$fast" ]; then
     step "sculpting in the browser" sh "$tree/tests/browser/run.sh" sculpt "$build"
     step "error against cost in the browser" sh "$tree/tests/browser/run.sh" accuracy "$build"
     step "two browsers, a bridge and lcm-logger together" sh "$tree/tests/browser/run.sh" together "$build"
-    say "building with sanitizers"
+    message "building with sanitizers"
     wait
-    say "tests with sanitizers"
+    message "tests with sanitizers"
     {
-        # ranks of MPI and the whole of torture are the release build's (lab has its code), and so are headers alone and
-        # tables, of which a sanitizer sees nothing
+        # release only: MPI ranks, the whole robustness suite (tests/robustness covers its code), headers and tables, in
+        # which a sanitizer sees nothing
         [ ! -e "$build/built_asan" ] ||
             compute asan -LE 'waits|accuracy|bench' -E '^house/(test_calibrate_mpi|test_robustness|test_study_records|headers|hard_cases|test_hard_table)$'
         [ ! -e "$build/built_tsan" ] || compute tsan -LE 'waits|one_thread|same_threads' -R "^($(echo $threads | tr ' ' '|'))/"
@@ -164,7 +164,7 @@ if [ -z "$fast" ]; then
         done
     fi
 fi
-[ "$skipped" -eq 0 ] || say "$skipped skipped (each says why in $build/ctest_*.log)"
+[ "$skipped" -eq 0 ] || message "$skipped skipped (the reasons are in $build/ctest_*.log)"
 cat "$digest"
 echo "$passed passed, $failed failed, $skipped skipped"
 [ "$failed" -eq 0 ]

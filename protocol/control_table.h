@@ -1,4 +1,4 @@
-/* The fields of every control message, as tables: what control.c reads and writes by. Private to control.c and
+/* The fields of every control message, as tables: what control_codec.c reads and writes by. Private to it and
  * control_table.c. Thread: any. */
 #ifndef PAL_PROTOCOL_CONTROL_TABLE_H
 #define PAL_PROTOCOL_CONTROL_TABLE_H

@@ -1,5 +1,4 @@
-/* `palpate COMMAND ...`: finds the command and runs it. Nothing else happens here: signals belong to serve, which is
- * the one command that waits. */
+/* `palpate COMMAND ...`: finds the command and runs it. */
 #include "server/bench/bench.h"
 #include "server/commands/commands.h"
 
@@ -7,27 +6,25 @@
 #include <string.h>
 
 static const pal_command_entry command[] = {
-    {"serve", "run scenes and let browsers and devices touch them", command_serve},
-    {"prepare", "turn a surface or a segmented scan into a scene that serve can run", command_prepare},
-    {"cells", "make and subdivide solids of control cells, named ones, primitives or files", command_cells},
-    {"plan", "the rows a scene calls for, their memory and their measured cost here", command_plan},
-    {"replay", "run a recorded input log again and compare the world's hashes", command_replay},
+    {"serve", "serve scenes, surfaces or label volumes as sessions, with the viewer", command_serve},
+    {"prepare", "make a scene from a surface or a segmented scan", command_prepare},
+    {"cells", "make the control cells of a subdivision solid", command_cells},
+    {"plan", "list the components that a scene calls for, with their memory and time", command_plan},
     {"solve", "solve a load case with finite elements and compare it with a reference", command_solve},
-    {"calibrate", "fit springs to finite elements or measured displacements, and write a scene of them",
-     command_calibrate},
-    {"study", "what accuracy costs: settings of a body with error and milliseconds, and the one to serve",
-     command_study},
-    {"robustness", "disturb a scene in every way that is known to break simulations and judge the response",
-     command_robustness},
-    {"bench", "measure mesh preparation, springs, calibration and protocol on this machine", command_bench},
+    {"calibrate", "fit spring constants to finite elements or to measured displacements", command_calibrate},
+    {"study", "measure what accuracy costs and pick the configuration to serve", command_study},
+    {"robustness", "run the extreme cases that break simulations on a scene", command_robustness},
+    {"replay", "run a recorded session again and compare its state hashes", command_replay},
+    {"bench", "measure the speed of this machine on the parts of a simulation", command_bench},
 };
 enum { N_COMMAND = sizeof command / sizeof command[0], USAGE = 2 };
 
 static void manual(FILE *to)
 {
     fprintf(to, "usage: palpate COMMAND [...]\n\n");
-    for (int k = 0; k < N_COMMAND; k++) fprintf(to, "  %-9s %s\n", command[k].name, command[k].about);
-    fprintf(to, "\n`palpate COMMAND --help` says more about one of them, `palpate --version` says which this is.\n");
+    for (int k = 0; k < N_COMMAND; k++) fprintf(to, "  %-10s %s\n", command[k].name, command[k].about);
+    fprintf(to,
+            "\n`palpate COMMAND --help` describes a command, with examples. `palpate --version` prints the version.\n");
 }
 
 int main(int argc, char **argv)

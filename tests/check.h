@@ -7,8 +7,7 @@
  * "N passed, N failed, N skipped" (tests, not checks) and gives the exit code: 0, 1 when one failed, 77 when one was
  * skipped. A test that ran no check counts as failed. What each took of the processor is printed and never checked.
  * check_shared(path) gives the path of a file of ../shared (environment PAL_SHARED, default ../shared) or NULL when it
- * is not there; the test then counts as skipped, whatever else it checked.
- * check_random(&seed) draws the same numbers everywhere, in [-1, 1); check_random01 in [0, 1). */
+ * is not there; the test then counts as skipped, whatever else it checked. */
 #ifndef TESTS_CHECK_H
 #define TESTS_CHECK_H
 #include <math.h>
@@ -34,17 +33,6 @@ static inline double check_farthest(const float *a, const float *b, int n)
         most = fmax(most, sqrt(far));
     }
     return most;
-}
-
-static inline double check_random01(uint64_t *seed)
-{
-    *seed = *seed * 6364136223846793005u + 1442695040888963407u;
-    return (double)(*seed >> 11) * 0x1p-53;
-}
-
-static inline double check_random(uint64_t *seed)
-{
-    return 2 * check_random01(seed) - 1;
 }
 
 #define CHECK_FAIL(...)                                                                                                \

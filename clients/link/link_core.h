@@ -1,4 +1,4 @@
-/* What link.c, link_loop.c and link_get.c share; nobody else includes it. Thread: [net]. */
+/* What link_peer.c, link_loop.c and link_get.c share; nobody else includes it. Thread: [net]. */
 #ifndef PAL_LINK_LINK_CORE_H
 #define PAL_LINK_LINK_CORE_H
 #include "clients/link/link.h"

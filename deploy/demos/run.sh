@@ -1,11 +1,11 @@
 #!/bin/sh
-# Plays a demo: serves its scene on a free port, lets palpate-client give its orders, ends what it started.
+# Plays a demo: serves its scene on a free port, sends its commands with palpate-client, stops what it started.
 # usage: deploy/demos/run.sh NAME [--wait S] [--stay] [--json] [palpate serve options...]
-#   NAME     head, chair, paint, mass, nozzle or bridge; README.md tells what each shows
-#   --wait   seconds before it plays, to open the printed address
-#   --stay   serve on when it has been played, until Ctrl-C
-#   --json   what the trainees report, as JSON lines, each file's after its name
-# PALPATE_BIN names the folder of the programs (build/release/bin). Exit code 1 when an order was refused or a check failed.
+#   NAME     head, chair, paint, mass, nozzle or bridge; deploy/demos/README.md describes each
+#   --wait   seconds before it starts, to open the printed address
+#   --stay   keep serving after the demo, until Ctrl-C
+#   --json   results of the clients as JSON lines, each after the name of its file
+# PALPATE_BIN names the folder of the programs (build/release/bin). Exit code 1 when a command was refused or a check failed.
 set -u
 here=$(cd "$(dirname "$0")" && pwd) || exit 1
 bin=${PALPATE_BIN:-$here/../../build/release/bin}
@@ -50,7 +50,7 @@ cleanup() {
 trap cleanup EXIT
 trap 'exit 1' INT TERM
 
-# the cells are made now, the scene names them
+# the control cells that the scene names
 if [ $cells = block ]; then
     "$bin/palpate" cells block --cells 3,2,2 --size-m 0.12,0.06,0.06 -o "$work/block.palcells" --quiet || exit 1
 else
@@ -67,19 +67,19 @@ done
 echo "palpate: $name: http://127.0.0.1:$port/" >&2
 sleep "$pause"
 
-# one trainee, with a tool of its own, for each file of orders
+# one client with a tool of its own for each file of commands
 players='' code=0
 for orders in "$here/$name".orders "$here/$name"_*.orders; do
     [ -e "$orders" ] || continue
     file=$(basename "$orders" .orders)
-    "$bin/palpate-client" "ws://127.0.0.1:$port/ws" --name "$file" $flags --sculpt "$orders" $json >"$work/$file.told" &
+    "$bin/palpate-client" "ws://127.0.0.1:$port/ws" --name "$file" $flags --sculpt "$orders" $json >"$work/$file.report" &
     players="$players $!"
     pids="$pids $!"
 done
 for player in $players; do wait "$player" || code=1; done
-for told in "$work"/*.told; do
-    echo "$(basename "$told" .told):"
-    cat "$told"
+for report in "$work"/*.report; do
+    echo "$(basename "$report" .report):"
+    cat "$report"
 done
 [ -z "$stay" ] || wait $server
 exit $code

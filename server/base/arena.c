@@ -13,7 +13,7 @@ typedef struct block {
 
 struct pal_arena {
     block *newest;
-    size_t block_size, handed_out;
+    size_t block_size, allocated;
     bool grows;
 };
 
@@ -73,7 +73,7 @@ void *pal_arena_alloc(pal_arena *arena, size_t n_byte)
     }
     void *bytes = b->bytes + b->used;
     b->used += size;
-    arena->handed_out += size;
+    arena->allocated += size;
     memset(bytes, 0, size);
     return bytes;
 }
@@ -87,14 +87,14 @@ void *pal_arena_array(pal_arena *arena, size_t n_item, size_t n_byte)
 
 size_t pal_arena_used(const pal_arena *arena)
 {
-    return arena->handed_out;
+    return arena->allocated;
 }
 
 void pal_arena_rewind(pal_arena *arena, size_t used)
 {
-    PAL_ASSERT(!arena->grows && used <= arena->handed_out);
+    PAL_ASSERT(!arena->grows && used <= arena->allocated);
     arena->newest->used = used;
-    arena->handed_out = used;
+    arena->allocated = used;
 }
 
 void pal_arena_reset(pal_arena *arena)

@@ -1,20 +1,22 @@
-/* palpate bench adaptive: surfaces whose level of detail follows what happens (model adaptive_springs), on one core, in
- * processor time; medians of several rounds, ratios within a round.
+/* `palpate bench adaptive`: surfaces whose level of detail follows the deformation (model adaptive_springs), on one
+ * core, in processor time; medians of several rounds, ratios within a round.
  *
- * (a) Table I of paper C: a sphere of 114 and a stomach of 188 vertices, our own and, when they are there, those of
- *     ../shared (PAL_SHARED names another folder), coarse, wholly refined (450, 746) and
- *     adaptive, pressed at one place for 2 s and then free for 0.3 s: the 2.3 s after which the paper shows its bodies
- *     (Fig. 11). The paper does not give its constants; ours: E 5 kPa, a wall of 3 mm that bears the mass of what it
- *     encloses, 1000 kg/m^3, anchors fixed in space, thresholds from size and stiffness. Every body has a look at the
- *     press for 0.1 ms before the run, so that what adapts is there when it begins. `off` is how far the pressed vertex
- *     strays from its way in the wholly refined body, at most, in parts of that way (Fig. 12). A picture shows those
- * ways over time, of our own two surfaces (Figs. 10 and 12). (b) a hollow ball of 0.2 m with four levels, the finest of
- * 28,674 vertices, on which a palm of 7 cm rests: once its place is refined, against all of it refined. (c) the same
- * with a finest level of 114,690 vertices, at most 2,000 of them active, in steps of 1 ms. (d) there, what one switch
- * costs: a face split or joined, and what the rows have to do anew in the step after it.
+ * (a) Paper C, Table I: a sphere of 114 and a stomach of 188 vertices, our own and, where they exist, those of
+ * ../shared (PAL_SHARED names another folder), coarse, fully refined (450, 746) and adaptive, pressed at one place for
+ * 2 s and then free for 0.3 s: the 2.3 s of paper C, Fig. 11. The paper does not give its constants; ours: E 5 kPa, a
+ * wall of 3 mm with the mass of what it encloses, 1000 kg/m^3, anchors fixed in space, thresholds from size and
+ * stiffness. Every body is pressed for 0.1 ms before the run, so that the adaptive one starts refined. `off` is the
+ * largest distance of the pressed vertex from its trajectory in the fully refined body, as a share of the largest
+ *     displacement there (paper C, Fig. 12). --picture draws these trajectories of our two surfaces (paper C, Figs. 10
+ *     and 12).
+ * (b) A hollow ball of 0.2 m with four levels, the finest of 28,674 vertices, on which a palm of 7 cm rests: its place
+ *     refined, against all of it refined.
+ * (c) The same with a finest level of 114,690 vertices, at most 2,000 of them active, in steps of 1 ms.
+ * (d) There, the cost of one switch: a face split or joined, and the additional time of the step after it.
  *
- * The press is spread over the nodes of a patch by their masses and a smooth bump: the same pressure on every level. */
+ * The press is distributed over the nodes of a patch by mass and a smooth bump: the same pressure on every level. */
 #include "server/bench/bench.h"
+#include "server/bench/bench_report.h"
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
@@ -38,14 +40,14 @@ enum {
     TABLES = 4,
     KINDS = 3,
     SWITCHES = 61,
-    MOST_NODE = 2000,
-    ROWS = 12
+    MAX_NODE = 2000,
+    COMPONENTS = 12
 };
 enum { COARSE, REFINED, ADAPTIVE };
 static const char *const kind_name[KINDS] = {"coarse", "refined", "adaptive"};
 static const double frame_s = 1.0 / 60, press_s = 2, free_s = 0.3, look_s = 1e-4;
 
-/* a body with its scene, and the patch that is pressed */
+/* a body with its scene, and the pressed patch */
 typedef struct pressed {
     const char *name;
     char source[40]; /* the surface's file, or "procedural" */
@@ -60,11 +62,11 @@ typedef struct table_row {
     const char *name;
     char source[40];
     double paper_s[KINDS];
-    int n_node[KINDS][2], n_spring[KINDS][2]; /* least and most active */
-    int n_sub[KINDS];                         /* sub-steps of a run    */
-    double run_s[KINDS], moved_m[KINDS];      /* moved_m: the vertex pressed, at the end of the press */
-    double way_m[KINDS][TABLE_STEPS];         /* the same after every step                            */
-    int n_trajectory;
+    int n_node[KINDS][2], n_spring[KINDS][2];  /* least and most active */
+    int n_sub[KINDS];                          /* sub-steps of a run    */
+    double run_s[KINDS], moved_m[KINDS];       /* moved_m: the vertex pressed, at the end of the press */
+    double displacement_m[KINDS][TABLE_STEPS]; /* the same after every step                            */
+    int n_sample;
     double off[KINDS]; /* from the refined one's, in parts of its largest       */
     double ratio;      /* adaptive over refined: of the paper 0.31 and 0.48 */
 } table_row;
@@ -77,9 +79,9 @@ typedef struct palm_row {
 typedef struct live_row {
     int n_finest, n_node, n_spring, n_sub;
     double p50_ms, p95_ms;
-    int n_row;
-    char row[ROWS][24];
-    double row_ms[ROWS];
+    int n_component;
+    char component[COMPONENTS][24];
+    double component_ms[COMPONENTS];
     double split_us, join_us, after_us; /* of one switch; after: what the next step takes longer */
 } live_row;
 
@@ -153,9 +155,9 @@ static pal_err start(const pressed *p, int kind, int n_level, int max_node, doub
     return err;
 }
 
-/* ---- the press ---- */
+/* ---- the load ---- */
 
-/* the press, or with share 0 none, on the nodes that are there now */
+/* share 1: the press, 0: none; on the nodes that are active now */
 static void load(pal_world *world, const pressed *p, double share)
 {
     const pal_body *body = pal_world_body(world, 0);
@@ -182,8 +184,9 @@ static double moved(const pal_body *body, const pressed *p)
     return pal_dist3(body->x + 3 * best, body->x_rest + 3 * best);
 }
 
-/* steps on, the press following the nodes; returns seconds of processor time of the steps alone, < 0: it froze */
-static double go(pal_world *world, const pressed *p, double share, int n_step, double step_s, table_row *told, int kind)
+/* runs steps, the load follows the active nodes; the result is the processor time of the steps, s; < 0: frozen */
+static double run_steps(pal_world *world, const pressed *p, double share, int n_step, double step_s, table_row *out,
+                        int kind)
 {
     const pal_body *body = pal_world_body(world, 0);
     uint64_t spent = 0, seen = body->revision - 1;
@@ -194,10 +197,10 @@ static double go(pal_world *world, const pressed *p, double share, int n_step, d
         uint64_t began = pal_clock_thread_ns();
         if (pal_world_step(world, step_s)) return -1;
         spent += pal_clock_thread_ns() - began;
-        if (!told) continue;
-        told->n_sub[kind] += pal_world_substeps(world);
-        if (told->n_trajectory < TABLE_STEPS) told->way_m[kind][told->n_trajectory++] = moved(body, p);
-        int *node = told->n_node[kind], *spring = told->n_spring[kind];
+        if (!out) continue;
+        out->n_sub[kind] += pal_world_substeps(world);
+        if (out->n_sample < TABLE_STEPS) out->displacement_m[kind][out->n_sample++] = moved(body, p);
+        int *node = out->n_node[kind], *spring = out->n_spring[kind];
         node[0] = body->n_active < node[0] || !node[0] ? body->n_active : node[0];
         node[1] = body->n_active > node[1] ? body->n_active : node[1];
         spring[0] =
@@ -221,11 +224,11 @@ static pal_err run_table(const pressed *p, const double paper_s[KINDS], table_ro
     for (int round = 0; round < ROUNDS && !err; round++) {
         for (int kind = 0; kind < KINDS && !err; kind++) {
             pal_world_reset(world[kind]);
-            out->n_sub[kind] = out->n_trajectory = 0;
-            double looking = go(world[kind], p, 1, 1, look_s, NULL, 0);
-            double pressing = go(world[kind], p, 1, (int)lround(press_s / frame_s), frame_s, out, kind);
+            out->n_sub[kind] = out->n_sample = 0;
+            double looking = run_steps(world[kind], p, 1, 1, look_s, NULL, 0);
+            double pressing = run_steps(world[kind], p, 1, (int)lround(press_s / frame_s), frame_s, out, kind);
             out->moved_m[kind] = moved(pal_world_body(world[kind], 0), p);
-            double after = go(world[kind], p, 0, (int)lround(free_s / frame_s), frame_s, out, kind);
+            double after = run_steps(world[kind], p, 0, (int)lround(free_s / frame_s), frame_s, out, kind);
             run_s[kind][round] = looking + pressing + after;
             if (looking < 0 || pressing < 0 || after < 0)
                 err = pal_diagnostic_set(diag, PAL_ERR_FROZEN, "%s: it diverged", p->name);
@@ -237,11 +240,12 @@ static pal_err run_table(const pressed *p, const double paper_s[KINDS], table_ro
         pal_world_destroy(world[kind]);
     }
     if (!err) out->ratio = pal_median(ratio, ROUNDS);
-    double most = 0;
-    for (int i = 0; i < out->n_trajectory; i++) most = fmax(most, out->way_m[REFINED][i]);
+    double max = 0;
+    for (int i = 0; i < out->n_sample; i++) max = fmax(max, out->displacement_m[REFINED][i]);
     for (int kind = 0; kind < KINDS; kind++)
-        for (int i = 0; i < out->n_trajectory; i++)
-            out->off[kind] = fmax(out->off[kind], fabs(out->way_m[kind][i] - out->way_m[REFINED][i]) / most);
+        for (int i = 0; i < out->n_sample; i++)
+            out->off[kind] =
+                fmax(out->off[kind], fabs(out->displacement_m[kind][i] - out->displacement_m[REFINED][i]) / max);
     return err;
 }
 
@@ -281,10 +285,10 @@ static pal_err run_palm(const pressed *p, palm_row *out, pal_diagnostic *diag)
     for (int k = 0; k < 2 && !err; k++)
         err = start(p, k ? ADAPTIVE : REFINED, PALM_LEVELS, 0, frame_s, &world[k], diag);
     /* only what adapts has to come to its state */
-    if (!err && go(world[1], p, 1, (int)lround(settle_s / frame_s), frame_s, NULL, 0) < 0) err = PAL_ERR_FROZEN;
+    if (!err && run_steps(world[1], p, 1, (int)lround(settle_s / frame_s), frame_s, NULL, 0) < 0) err = PAL_ERR_FROZEN;
     for (int round = 0; round < PALM_ROUNDS && !err; round++) {
         for (int k = 0; k < 2; k++) {
-            run_s[k][round] = go(world[k], p, 1, (int)lround(palm_s / frame_s), frame_s, NULL, 0) / palm_s;
+            run_s[k][round] = run_steps(world[k], p, 1, (int)lround(palm_s / frame_s), frame_s, NULL, 0) / palm_s;
             if (run_s[k][round] < 0) err = PAL_ERR_FROZEN;
         }
         ratio[round] = run_s[1][round] / run_s[0][round];
@@ -307,15 +311,15 @@ static pal_err run_palm(const pressed *p, palm_row *out, pal_diagnostic *diag)
 static const double live_s = 1e-3;
 enum { BALL_LEVELS = 4, LIVE_STEPS = 301 };
 
-/* milliseconds of the rows that took the most, under their names */
-static void tell_rows(pal_world *world, double *ms, int n_step, live_row *out)
+/* median milliseconds of the components, with their names */
+static void store_component_times(pal_world *world, double *ms, int n_step, live_row *out)
 {
-    out->n_row = pal_world_component_count(world) < ROWS ? pal_world_component_count(world) : ROWS;
-    for (int r = 0; r < out->n_row; r++) {
+    out->n_component = pal_world_component_count(world) < COMPONENTS ? pal_world_component_count(world) : COMPONENTS;
+    for (int r = 0; r < out->n_component; r++) {
         pal_component_info info;
         pal_world_component_info(world, r, &info);
-        snprintf(out->row[r], sizeof out->row[r], "%s", info.name);
-        out->row_ms[r] = pal_median(ms + (size_t)r * LIVE_STEPS, n_step);
+        snprintf(out->component[r], sizeof out->component[r], "%s", info.name);
+        out->component_ms[r] = pal_median(ms + (size_t)r * LIVE_STEPS, n_step);
     }
 }
 
@@ -370,18 +374,19 @@ static pal_err run_switches(pal_world *world, live_row *out, pal_diagnostic *dia
 
 static pal_err run_live(const pressed *p, live_row *out, pal_diagnostic *diag)
 {
-    static double step_ms[LIVE_STEPS], row_ms[ROWS][LIVE_STEPS];
+    static double step_ms[LIVE_STEPS], component_ms[COMPONENTS][LIVE_STEPS];
     pal_world *world = NULL;
-    PAL_TRY(start(p, ADAPTIVE, BALL_LEVELS, MOST_NODE, live_s, &world, diag));
+    PAL_TRY(start(p, ADAPTIVE, BALL_LEVELS, MAX_NODE, live_s, &world, diag));
     const pal_body *body = pal_world_body(world, 0);
     pal_err err = PAL_ERR_OK;
-    if (go(world, p, 1, 700, live_s, NULL, 0) < 0) err = pal_diagnostic_set(diag, PAL_ERR_FROZEN, "ball: it diverged");
+    if (run_steps(world, p, 1, 700, live_s, NULL, 0) < 0)
+        err = pal_diagnostic_set(diag, PAL_ERR_FROZEN, "ball: it diverged");
     for (int step = 0; step < LIVE_STEPS && !err; step++) {
         step_ms[step] = timed_step(world);
-        for (int r = 0; r < pal_world_component_count(world) && r < ROWS; r++) {
+        for (int r = 0; r < pal_world_component_count(world) && r < COMPONENTS; r++) {
             pal_component_info info;
             pal_world_component_info(world, r, &info);
-            row_ms[r][step] = 1e-6 * (double)info.spent_ns;
+            component_ms[r][step] = 1e-6 * (double)info.spent_ns;
         }
     }
     if (!err) {
@@ -390,80 +395,89 @@ static pal_err run_live(const pressed *p, live_row *out, pal_diagnostic *diag)
                           .n_spring = body->model.adaptive->n_spring,
                           .n_sub = pal_world_substeps(world)};
         out->p50_ms = pal_median(step_ms, LIVE_STEPS), out->p95_ms = step_ms[LIVE_STEPS * 95 / 100];
-        tell_rows(world, row_ms[0], LIVE_STEPS, out);
+        store_component_times(world, component_ms[0], LIVE_STEPS, out);
         err = run_switches(world, out, diag);
     }
     pal_world_destroy(world);
     return err;
 }
 
-/* ---- saying ---- */
+/* ---- report ---- */
 
-static void print_table(const results *r)
+static void range_text(const int n[2], char text[32])
 {
-    printf("Table I of paper C, %.1f simulated seconds: pressed for %.0f s, then free; medians of %d, one core\n",
-           press_s + free_s, press_s, ROUNDS);
-    printf("%-8s %-9s %-17s %9s %11s %10s %7s %10s %9s %9s %8s\n", "body", "run", "surface", "nodes", "springs",
-           "moved mm", "off %", "sub-steps", "run s", "paper s", "faster");
-    for (int t = 0; t < r->n_table; t++) {
-        const table_row *a = &r->table[t];
-        for (int k = 0; k < KINDS; k++) {
-            char node[32], spring[32];
-            bool one = a->n_node[k][0] == a->n_node[k][1];
-            snprintf(node, sizeof node, one ? "%d" : "%d-%d", a->n_node[k][0], a->n_node[k][1]);
-            snprintf(spring, sizeof spring, one ? "%d" : "%d-%d", a->n_spring[k][0], a->n_spring[k][1]);
-            printf("%-8s %-9s %-17s %9s %11s %10.2f %7.2f %10d %9.4f %9.3f %7.0fx\n", a->name, kind_name[k], a->source,
-                   node, spring, 1e3 * a->moved_m[k], 100 * a->off[k], a->n_sub[k], a->run_s[k], a->paper_s[k],
-                   a->paper_s[k] / a->run_s[k]);
-        }
-        printf(
-            "%-8s adaptive / refined %.2f (at most 0.30 is asked for; the paper's %.2f); against the paper's refined "
-            "run %.0fx and %.0fx (at least 500x refined and 1000x adaptive are asked of the stomach)\n",
-            a->name, a->ratio, a->paper_s[ADAPTIVE] / a->paper_s[REFINED], a->paper_s[REFINED] / a->run_s[REFINED],
-            a->paper_s[REFINED] / a->run_s[ADAPTIVE]);
-    }
-    const palm_row *p = &r->palm;
-    printf("\nfour levels, a palm refined: %d of %d nodes, %d of %d springs, %.3f s of %.3f s for a simulated second: "
-           "%.3f (at most 0.08 is asked for)\n",
-           p->n_node[1], p->n_node[0], p->n_spring[1], p->n_spring[0], p->second_s[1], p->second_s[0], p->ratio);
-    const live_row *l = &r->live;
-    printf("\nfinest level of %d nodes, %d active (%d springs), steps of 1 ms in %d sub-steps: %.3f ms, 95 %% below "
-           "%.3f (less than 1 is asked for)\n",
-           l->n_finest, l->n_node, l->n_spring, l->n_sub, l->p50_ms, l->p95_ms);
-    for (int k = 0; k < l->n_row; k++) printf("  %-16s %.4f ms\n", l->row[k], l->row_ms[k]);
-    printf("there, one switch of a face: split %.1f us, joined %.1f us, and %.1f us in the step after it\n",
-           l->split_us, l->join_us, l->after_us);
+    snprintf(text, 32, n[0] == n[1] ? "%d" : "%d-%d", n[0], n[1]);
 }
 
-static void print_json(const results *r)
+static void add_run(bench_report *r, const table_row *a, int k)
 {
-    printf("{\"bench\":\"adaptive\",\"rounds\":%d,\"simulated_s\":%.2f,\"table\":[", ROUNDS, press_s + free_s);
-    for (int t = 0; t < r->n_table; t++) {
-        const table_row *a = &r->table[t];
-        printf("%s{\"body\":\"%s\",\"surface\":\"%s\",\"ratio\":%.4f,\"runs\":[", t ? "," : "", a->name, a->source,
-               a->ratio);
-        for (int k = 0; k < KINDS; k++)
-            printf("%s{\"run\":\"%s\",\"nodes\":[%d,%d],\"springs\":[%d,%d],\"moved_m\":%.6f,\"off\":%.5f,\"substeps\":"
-                   "%d,\"run_s\":"
-                   "%.6f,"
-                   "\"paper_s\":%.3f}",
-                   k ? "," : "", kind_name[k], a->n_node[k][0], a->n_node[k][1], a->n_spring[k][0], a->n_spring[k][1],
-                   a->moved_m[k], a->off[k], a->n_sub[k], a->run_s[k], a->paper_s[k]);
-        printf("]}");
-    }
-    const palm_row *p = &r->palm;
-    const live_row *l = &r->live;
-    printf("],\"palm\":{\"nodes\":[%d,%d],\"springs\":[%d,%d],\"second_s\":[%.6f,%.6f],\"ratio\":%.4f},", p->n_node[0],
-           p->n_node[1], p->n_spring[0], p->n_spring[1], p->second_s[0], p->second_s[1], p->ratio);
-    printf("\"live\":{\"finest_nodes\":%d,\"nodes\":%d,\"springs\":%d,\"substeps\":%d,\"step_ms\":1,\"p50_ms\":%.4f,"
-           "\"p95_ms\":%.4f,\"rows_ms\":{",
-           l->n_finest, l->n_node, l->n_spring, l->n_sub, l->p50_ms, l->p95_ms);
-    for (int k = 0; k < l->n_row; k++) printf("%s\"%s\":%.5f", k ? "," : "", l->row[k], l->row_ms[k]);
-    printf("}},\"switch\":{\"split_us\":%.2f,\"join_us\":%.2f,\"after_us\":%.2f}}\n", l->split_us, l->join_us,
-           l->after_us);
+    char nodes[32], springs[32];
+    range_text(a->n_node[k], nodes);
+    range_text(a->n_spring[k], springs);
+    bench_record(r);
+    bench_text(r, "body", "body", -8, a->name);
+    bench_text(r, "run", "run", -9, kind_name[k]);
+    bench_text(r, "surface", "surface", -17, a->source);
+    bench_text(r, "nodes", "nodes", 9, nodes);
+    bench_text(r, "springs", "springs", 11, springs);
+    bench_number(r, "moved_m", "moved m", 9, 5, a->moved_m[k]);
+    bench_number(r, "off", "off", 7, 4, a->off[k]);
+    bench_number(r, "substeps", "sub-steps", 10, 0, a->n_sub[k]);
+    bench_number(r, "run_s", "run s", 9, 4, a->run_s[k]);
+    bench_number(r, "paper_s", "paper s", 9, 3, a->paper_s[k]);
+    bench_number(r, "ratio", "of refined", 10, 2, a->run_s[k] / a->run_s[REFINED]);
+    bench_number(r, NULL, "of paper", 8, 2, a->paper_s[k] / a->paper_s[REFINED]);
+    bench_number(r, NULL, "times as fast", 13, 0, a->paper_s[k] / a->run_s[k]);
 }
 
-/* as heavy as what it encloses, pressed on a patch of a twelfth of its size */
+static int print(const results *all, bool json, pal_err err, const pal_diagnostic *diag)
+{
+    bench_report r;
+    const palm_row *p = &all->palm;
+    const live_row *l = &all->live;
+    bench_begin(&r, "adaptive", json);
+    bench_number(&r, "rounds", NULL, 0, 0, ROUNDS);
+    bench_number(&r, "simulated_s", NULL, 0, 0, press_s + free_s);
+    bench_note(&r,
+               "paper C, Table I, %.1f simulated seconds: pressed for %.0f s, then free; medians of %d, one core\n"
+               "wanted: adaptive at most 0.30 of refined; stomach 500 times as fast refined, 1000 times adaptive",
+               press_s + free_s, press_s, ROUNDS);
+    bench_list(&r, "table");
+    for (int t = 0; t < all->n_table && !err; t++)
+        for (int k = 0; k < KINDS; k++) add_run(&r, &all->table[t], k);
+    bench_note(
+        &r, "\nfour levels, a palm refined, processor seconds of a simulated second; wanted: at most 0.08 of refined");
+    bench_list(&r, "palm");
+    for (int k = 0; k < 2 && !err; k++) {
+        bench_record(&r);
+        bench_text(&r, "run", "run", -9, kind_name[REFINED + k]);
+        bench_number(&r, "nodes", "nodes", 7, 0, p->n_node[k]);
+        bench_number(&r, "springs", "springs", 7, 0, p->n_spring[k]);
+        bench_number(&r, "second_s", "s", 8, 3, p->second_s[k]);
+        bench_number(&r, "ratio", "of refined", 10, 3, k ? p->ratio : 1);
+    }
+    bench_note(&r, "\nfinest level of %d nodes, steps of 1 ms; wanted: less than 1 ms", l->n_finest);
+    bench_list(&r, "live");
+    bench_record(&r);
+    bench_number(&r, "finest_nodes", NULL, 0, 0, l->n_finest);
+    bench_number(&r, "nodes", "nodes", 7, 0, l->n_node);
+    bench_number(&r, "springs", "springs", 7, 0, l->n_spring);
+    bench_number(&r, "substeps", "sub-steps", 9, 0, l->n_sub);
+    bench_number(&r, "p50_ms", "ms p50", 7, 3, l->p50_ms);
+    bench_number(&r, "p95_ms", "ms p95", 7, 3, l->p95_ms);
+    bench_number(&r, "split_us", "split us", 9, 1, l->split_us);
+    bench_number(&r, "join_us", "join us", 9, 1, l->join_us);
+    bench_number(&r, "after_us", "next step us", 12, 1, l->after_us);
+    bench_list(&r, "components");
+    for (int k = 0; k < l->n_component && !err; k++) {
+        bench_record(&r);
+        bench_text(&r, "name", "component", -16, l->component[k]);
+        bench_number(&r, "ms", "ms", 7, 4, l->component_ms[k]);
+    }
+    return bench_end(&r, err, diag);
+}
+
+/* the mass of what it encloses; pressed on a patch of a twelfth of its size */
 static void fill(pressed *body, double force_N)
 {
     const pal_surface *surface = &body->loaded->mesh[0].surface;
@@ -473,7 +487,7 @@ static void fill(pressed *body, double force_N)
     body->radius_m = pal_dist3(low, high) / 12, body->force_N = force_N;
 }
 
-/* the sphere is pressed at its equator, which has no pole of many faces */
+/* the sphere is pressed at its equator, where every vertex is regular */
 static pal_err run_tables(results *out, pal_diagnostic *diag)
 {
     static const double paper_s[2][KINDS] = {{2.334, 10.078, 3.136}, {3.328, 14.422, 6.906}};
@@ -493,13 +507,13 @@ static pal_err run_tables(results *out, pal_diagnostic *diag)
     return err;
 }
 
-/* the way of the pressed vertex over time, of what was made here */
-static pal_err draw_ways(const results *r, const char *path, pal_diagnostic *diag)
+/* the trajectory of the pressed vertex of our own surfaces */
+static pal_err draw_trajectories(const results *r, const char *path, pal_diagnostic *diag)
 {
     static const char *const name[2][KINDS] = {{"sphere, coarse", "sphere, refined", "sphere, adaptive"},
                                                {"stomach, coarse", "stomach, refined", "stomach, adaptive"}};
-    static double time_s[TABLE_STEPS], way_mm[2 * KINDS][TABLE_STEPS];
-    pal_plot plot = {.title = "The vertex that is pressed for 2 s and then let go",
+    static double time_s[TABLE_STEPS], displacement_mm[2 * KINDS][TABLE_STEPS];
+    pal_plot plot = {.title = "The vertex that is pressed for 2 s and then released",
                      .x_label = "time, s",
                      .y_label = "displacement, mm"};
     for (int i = 0; i < TABLE_STEPS; i++) time_s[i] = (i + 1) * frame_s;
@@ -507,14 +521,10 @@ static pal_err draw_ways(const results *r, const char *path, pal_diagnostic *dia
         const table_row *row = &r->table[t];
         if (strcmp(row->source, "procedural") != 0) continue;
         for (int k = 0; k < KINDS; k++) {
-            double *y = way_mm[plot.n_curve];
-            for (int i = 0; i < row->n_trajectory; i++) y[i] = 1e3 * row->way_m[k][i];
-            plot.curve[plot.n_curve++] = (pal_curve){.name = name[body][k],
-                                                     .n = row->n_trajectory,
-                                                     .x = time_s,
-                                                     .y = y,
-                                                     .bare = true,
-                                                     .dashed = k == ADAPTIVE};
+            double *y = displacement_mm[plot.n_curve];
+            for (int i = 0; i < row->n_sample; i++) y[i] = 1e3 * row->displacement_m[k][i];
+            plot.curve[plot.n_curve++] = (pal_curve){
+                .name = name[body][k], .n = row->n_sample, .x = time_s, .y = y, .bare = true, .dashed = k == ADAPTIVE};
         }
         body++;
     }
@@ -527,19 +537,11 @@ int bench_adaptive(bool json, const char *picture)
     pressed ball[2] = {{.name = NULL}};
     pal_diagnostic diag = {""};
     pal_err err = run_tables(&r, &diag);
-    if (!err && picture) err = draw_ways(&r, picture, &diag);
+    if (!err && picture) err = draw_trajectories(&r, picture, &diag);
     if (!err) err = make_ball(1, 0.035, 0.12, &ball[0], &diag);
     if (!err) err = run_palm(&ball[0], &r.palm, &diag);
     if (!err) err = make_ball(2, 0.016, 0.3, &ball[1], &diag);
     if (!err) err = run_live(&ball[1], &r.live, &diag);
     for (int k = 0; k < 2; k++) pal_scene_free(ball[k].loaded);
-    if (err) {
-        fprintf(stderr, "palpate bench: adaptive: %s\n", diag.text[0] ? diag.text : pal_err_text(err));
-        return err == PAL_ERR_MEMORY ? 3 : 1;
-    }
-    if (json)
-        print_json(&r);
-    else
-        print_table(&r);
-    return 0;
+    return print(&r, json, err, &diag);
 }

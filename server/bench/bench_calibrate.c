@@ -1,9 +1,10 @@
-/* palpate bench calibrate: the calibrations of paper B section 3 on our own gear, cube and bar (deploy/problems), one
- * thread: the gear's twist by gradient and by annealing, which goes on until its error is within 1.2 times the
- * gradient's or 2000 evaluations are spent, and one constant of each kind against a grid of them on all three bodies.
- * Truths are finite elements, neo-Hookean; everything starts at the default constants. Searches below a few seconds are
+/* `palpate bench calibrate`: the calibrations of paper B section 3 on our own gear, cube and bar (deploy/problems), one
+ * thread: the twist of the gear by gradient, and by annealing until its error is within 1.2 times that of the gradient
+ * or 2000 evaluations are spent; and one constant of each kind against a grid of constants on all three bodies. Truths
+ * are finite elements, neo-Hookean; every search starts at the default constants. Searches below a few seconds are
  * repeated, the median counts. */
 #include "server/bench/bench.h"
+#include "server/bench/bench_report.h"
 
 #include "server/base/clock.h"
 #include "server/calibrate/calibrate_cases.h"
@@ -15,13 +16,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { REPEATS = 3, MOST_EVALUATION = 2000 };
+enum { REPEATS = 3, MAX_EVALUATION = 2000 };
 static const double near_enough = 1.2, short_s = 5;
 
 typedef struct job {
     const char *name, *problem, *fit, *verify;
     int resolution, grid[3];
-    bool annealing; /* until it is near the job before it */
+    bool annealing; /* until its error is near that of the job before it */
 } job;
 
 static const job jobs[] = {
@@ -44,7 +45,7 @@ typedef struct result {
     const char *ended;
 } result;
 
-/* mean over the cases that are fitted, or over the others; NaN: none */
+/* mean over the fitted load cases, or over the others; NaN: none */
 static double mean_of(const pal_calibrate_cases *set, const pal_calibration_value *v, bool fit)
 {
     double sum = 0;
@@ -54,7 +55,7 @@ static double mean_of(const pal_calibrate_cases *set, const pal_calibration_valu
     return n > 0 ? sum / n : NAN;
 }
 
-/* target_percent: where annealing may end */
+/* target_percent: annealing ends at this error */
 static pal_err search(const job *j, const pal_calibrate_cases *set, const pal_calibration *c, double target_percent,
                       result *out, pal_diagnostic *diag)
 {
@@ -72,7 +73,7 @@ static pal_err search(const job *j, const pal_calibrate_cases *set, const pal_ca
     out->hand_percent = mean_of(set, &v, true);
     while (!err && out->n_repeat < REPEATS) {
         memcpy(theta, info.start, sizeof *theta * (size_t)info.n_parameter);
-        const pal_fit_options o = {.max_evaluation = j->annealing ? MOST_EVALUATION : 0,
+        const pal_fit_options o = {.max_evaluation = j->annealing ? MAX_EVALUATION : 0,
                                    .target_percent = j->annealing ? target_percent : 0,
                                    .seed = 1,
                                    .n_worker = 1};
@@ -125,78 +126,58 @@ static const char *grid_text(const job *j, char out[32])
     return out;
 }
 
-static void print_table(const result *r)
+static void add_job(bench_report *r, const job *j, const result *c)
 {
     char grid[32];
-    printf("calibration of springs on finite elements, RMS in %% of the largest displacement, one thread\n");
-    printf("body  fitted           constants        method     nodes  start %%   hand %%  found %%  unseen %%  "
-           "evaluations  truth s  search s\n");
-    for (int k = 0; k < N_JOB; k++) {
-        const job *j = &jobs[k];
-        char unseen[16] = "";
-        if (!isnan(r[k].verify_percent)) snprintf(unseen, sizeof unseen, "%.2f", r[k].verify_percent);
-        printf("%-5s %-16s %-9s %6d  %-9s %6d %8.2f %8.2f %8.3f %9s %12lld %8.2f %9.2f\n", j->name, j->fit,
-               grid_text(j, grid), r[k].n_parameter, j->annealing ? "annealing" : "adjoint", r[k].n_node,
-               r[k].start_percent, r[k].hand_percent, r[k].percent, unseen, r[k].n_evaluation, r[k].truth_s,
-               r[k].fit_s);
-    }
-    printf("annealing ended by %s at %.2f times the error of adjoint, after %.1f times its seconds\n", r[1].ended,
-           r[1].percent / r[0].percent, r[1].fit_s / r[0].fit_s);
-    printf("error of the grid over that of one constant of each kind: gear %.2f, cube %.2f, bar %.2f\n",
-           r[3].percent / r[2].percent, r[5].percent / r[4].percent, r[7].percent / r[6].percent);
-}
-
-static void print_number(const char *key, double number)
-{
-    if (isfinite(number))
-        printf(",\"%s\":%.6g", key, number);
-    else
-        printf(",\"%s\":null", key);
-}
-
-static void print_json(const result *r)
-{
-    printf("{\"bench\":\"calibrate\",\"cases\":[");
-    for (int k = 0; k < N_JOB; k++) {
-        const job *j = &jobs[k];
-        printf("%s{\"body\":\"%s\",\"fitted\":\"%s\",\"grid\":[%d,%d,%d],\"method\":\"%s\",\"nodes\":%d,"
-               "\"parameters\":%d,\"runs\":%d,\"evaluations\":%lld,\"rejected\":%lld,\"ended\":\"%s\"",
-               k ? "," : "", j->name, j->fit, j->grid[0], j->grid[1], j->grid[2],
-               j->annealing ? "annealing" : "adjoint", r[k].n_node, r[k].n_parameter, r[k].n_repeat, r[k].n_evaluation,
-               r[k].n_rejected, r[k].ended);
-        print_number("start_percent", r[k].start_percent);
-        print_number("hand_percent", r[k].hand_percent);
-        print_number("percent", r[k].percent);
-        print_number("unseen_percent", r[k].verify_percent);
-        print_number("prepare_s", r[k].make_s);
-        print_number("truth_s", r[k].truth_s);
-        print_number("search_s", r[k].fit_s);
-        printf("}");
-    }
-    printf("]");
-    print_number("annealing_over_adjoint", r[1].percent / r[0].percent);
-    print_number("gear_grid_over_one", r[3].percent / r[2].percent);
-    print_number("cube_grid_over_one", r[5].percent / r[4].percent);
-    print_number("bar_grid_over_one", r[7].percent / r[6].percent);
-    printf("}\n");
+    bench_record(r);
+    bench_text(r, "body", "body", -5, j->name);
+    bench_text(r, "fitted", "fitted", -16, j->fit);
+    bench_text(r, "grid", "constants", -9, grid_text(j, grid));
+    bench_number(r, "parameters", "", 6, 0, c->n_parameter);
+    bench_text(r, "method", "method", -9, j->annealing ? "annealing" : "adjoint");
+    bench_number(r, "nodes", "nodes", 6, 0, c->n_node);
+    bench_number(r, "start_percent", "start %", 8, 2, c->start_percent);
+    bench_number(r, "manual_percent", "manual %", 8, 2, c->hand_percent);
+    bench_number(r, "percent", "found %", 8, 3, c->percent);
+    bench_number(r, "verify_percent", "verify %", 9, 2, c->verify_percent);
+    bench_number(r, "evaluations", "evaluations", 12, 0, (double)c->n_evaluation);
+    bench_number(r, "rejected", NULL, 0, 0, (double)c->n_rejected);
+    bench_text(r, "ended", NULL, 0, c->ended);
+    bench_number(r, "runs", NULL, 0, 0, c->n_repeat);
+    bench_number(r, "prepare_s", NULL, 0, 0, c->make_s);
+    bench_number(r, "truth_s", "truth s", 8, 2, c->truth_s);
+    bench_number(r, "search_s", "search s", 9, 2, c->fit_s);
 }
 
 int bench_calibrate(const char *folder_or_null, bool json)
 {
-    result r[N_JOB];
-    pal_diagnostic diag = {{0}};
-    for (int k = 0; k < N_JOB; k++) {
-        double enough = k > 0 ? near_enough * r[k - 1].percent : 0;
-        pal_err err = run_job(&jobs[k], folder_or_null ? folder_or_null : "deploy/problems", enough, &r[k], &diag);
-        if (!err) continue;
-        fprintf(stderr, "palpate bench: calibrate: %s%s\n", diag.text[0] ? diag.text : pal_err_text(err),
-                err == PAL_ERR_IO && !folder_or_null ? " (palpate bench calibrate FOLDER says where the problems are)"
-                                                     : "");
-        return err == PAL_ERR_MEMORY ? 3 : 1;
+    result all[N_JOB];
+    pal_diagnostic diag = {""};
+    pal_err err = PAL_ERR_OK;
+    for (int k = 0; k < N_JOB && !err; k++) {
+        double enough = k > 0 ? near_enough * all[k - 1].percent : 0;
+        err = run_job(&jobs[k], folder_or_null ? folder_or_null : "deploy/problems", enough, &all[k], &diag);
     }
-    if (json)
-        print_json(r);
-    else
-        print_table(r);
-    return 0;
+    if (err == PAL_ERR_IO && !folder_or_null) {
+        pal_diagnostic reason = diag;
+        pal_diagnostic_set(&diag, err, "%.300s (palpate bench calibrate FOLDER names the folder of the problems)",
+                           reason.text);
+    }
+    bench_report r;
+    bench_begin(&r, "calibrate", json);
+    bench_note(&r, "springs calibrated on finite elements, RMS in %% of the largest displacement, one thread");
+    bench_list(&r, "cases");
+    for (int k = 0; k < N_JOB && !err; k++) add_job(&r, &jobs[k], &all[k]);
+    if (!err) {
+        bench_list(&r, NULL);
+        bench_number(&r, "annealing_over_adjoint", NULL, 0, 0, all[1].percent / all[0].percent);
+        bench_number(&r, "gear_grid_over_one", NULL, 0, 0, all[3].percent / all[2].percent);
+        bench_number(&r, "cube_grid_over_one", NULL, 0, 0, all[5].percent / all[4].percent);
+        bench_number(&r, "bar_grid_over_one", NULL, 0, 0, all[7].percent / all[6].percent);
+        bench_note(&r, "annealing ended by %s at %.2f times the error of adjoint, after %.1f times its seconds",
+                   all[1].ended, all[1].percent / all[0].percent, all[1].fit_s / all[0].fit_s);
+        bench_note(&r, "error of the grid over that of one constant of each kind: gear %.2f, cube %.2f, bar %.2f",
+                   all[3].percent / all[2].percent, all[5].percent / all[4].percent, all[7].percent / all[6].percent);
+    }
+    return bench_end(&r, err, &diag);
 }

@@ -1,13 +1,14 @@
-/* palpate bench estimate: what the live estimate foresees of the neighbours of a running body's setting, against what
- * they take and leave once the body is switched to them. The procedural organ as finite elements and as springs, pulled
- * aside by a load on all of its nodes: the estimate is made while it swings, then for each neighbour the same swing is
- * switched to it as a session does, and both worlds step in turn. Cost: a step of the scene in the new setting over one
- * in the old, medians of processor time of both, foreseen over measured. Twice: two such bodies, one of them switched.
- * Error: the new setting's own estimate of the state that it took over, foreseen over estimated. Asked: cost within 30
- * %. */
+/* `palpate bench estimate`: what the live estimator predicts for the neighbours of the configuration of a running body,
+ * against what they take and leave after a switch. The procedural organ as finite elements and as springs, pulled aside
+ * by a load on all nodes: the estimate is made while it swings; then for each neighbour the same swing is switched to
+ * it as a session does, and both worlds step alternately. Cost: a step of the scene in the new configuration over one
+ * in the old, medians of processor time, predicted over measured; once alone and once with a second body that keeps its
+ * configuration. Error: the estimate of the new configuration for the state that it received, predicted over estimated.
+ * Wanted: cost within 30 %. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/bench/bench.h"
+#include "server/bench/bench_report.h"
 #include "server/cli/median.h"
 #include "server/estimate/estimation.h"
 #include "server/scene/scene_file.h"
@@ -18,22 +19,22 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { N_CASE = 8, WARM = 12, ROUNDS = 6, MOST = 1024, MOST_NODE = 30000 };
-static const double most_off = 1.3, round_s = 0.1;
-/* of E S^2, on all nodes together: bends it by some per cent */
-static const double pull = 0.001;
+enum { N_CASE = 8, WARM = 12, ROUNDS = 6, MAX_SAMPLE = 1024, MAX_NODE = 30000 };
+static const double max_ratio = 1.3, round_s = 0.1;
+/* total load as a share of E S^2, S the box diagonal: bends the organ by a few per cent */
+static const double load_share = 0.001;
 
 typedef struct subject {
     const char *name;
     pal_surface_scene options;
-    bool two; /* another one like it stands beside it and keeps its setting */
+    bool two; /* a second, equal body keeps its configuration */
 } subject;
 
 typedef struct row {
-    pal_measured_configuration foreseen;
+    pal_measured_configuration predicted;
     int n_node, n_substep;
-    double was_ms, ms; /* of the settings before and after, of a step of the scene */
-    double own_m;      /* what the new setting's estimate says */
+    double was_ms, ms; /* of a step before and after the switch */
+    double own_m;      /* estimated error of the new configuration */
     pal_err err;
 } row;
 
@@ -50,13 +51,13 @@ static void put_other(pal_scene *scene)
     snprintf(other->name, sizeof other->name, "other");
 }
 
-/* aside, in proportion to the nodes' masses: the same on every mesh */
+/* sideways, proportional to the masses of the nodes: the same on every mesh */
 static pal_err put_load(pal_world *world, const pal_scene *scene)
 {
     pal_body *body = pal_world_body(world, 0);
     const double aside[3] = {scene->up[1], scene->up[2], scene->up[0]};
-    double sum_kg = 0, total = pull * scene->body[0].material.young_Pa * body->length_scale_m * body->length_scale_m,
-           f[3];
+    double sum_kg = 0,
+           total = load_share * scene->body[0].material.young_Pa * body->length_scale_m * body->length_scale_m, f[3];
     for (int i = 0; i < body->n_node; i++) sum_kg += body->node_mass_kg[i];
     for (int i = 0; i < body->n_node; i++) {
         pal_scale3(f, total * body->node_mass_kg[i] / sum_kg, aside);
@@ -65,7 +66,7 @@ static pal_err put_load(pal_world *world, const pal_scene *scene)
     return PAL_ERR_OK;
 }
 
-/* from rest, under the load, a few steps on */
+/* a few steps from rest under the load */
 static pal_err swing(pal_world *world, const pal_scene *scene)
 {
     pal_world_reset(world);
@@ -74,10 +75,10 @@ static pal_err swing(pal_world *world, const pal_scene *scene)
     return PAL_ERR_OK;
 }
 
-/* a round of steps, each on the clock */
+/* a round of timed steps */
 static pal_err timed(pal_world *world, double step_s, pal_estimate_cost *cost, int *n)
 {
-    for (double time = 0; time < round_s - 1e-9 && *n < MOST; time += step_s) {
+    for (double time = 0; time < round_s - 1e-9 && *n < MAX_SAMPLE; time += step_s) {
         pal_world_wake(world);
         uint64_t began = pal_clock_thread_ns();
         PAL_TRY(pal_world_step(world, step_s));
@@ -86,39 +87,38 @@ static pal_err timed(pal_world *world, double step_s, pal_estimate_cost *cost, i
     return PAL_ERR_OK;
 }
 
-/* cost: of steps so far */
 static pal_err estimate(const pal_scene *scene, pal_world *world, const pal_estimate_cost *cost, int n_cost,
                         pal_estimate *out, pal_diagnostic *diag)
 {
     pal_estimation *work = NULL;
     PAL_TRY(pal_estimation_open(scene, 0, NULL, diag, &work));
     pal_estimate_state *state = pal_estimation_state(work);
-    bool good = pal_estimate_copy(state, world, 0);
+    bool ok = pal_estimate_copy(state, world, 0);
     for (int i = 0; i < n_cost && i < PAL_ESTIMATE_STEPS; i++) state->cost[state->n_cost++] = cost[i];
-    good = good && pal_estimation_run(work, out);
+    ok = ok && pal_estimation_run(work, out);
     pal_estimation_close(work);
-    return good ? PAL_ERR_OK : pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "nothing is known of the state");
+    return ok ? PAL_ERR_OK : pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "the state has no estimate");
 }
 
 static double median_ms(const pal_estimate_cost *cost, int n)
 {
-    double ms[MOST];
+    double ms[MAX_SAMPLE];
     for (int i = 0; i < n; i++) ms[i] = (double)cost[i].ms;
     return pal_median(ms, n);
 }
 
-/* both step in turn from the state that is handed over */
-static pal_err in_turn(pal_world *was, double was_s, pal_world *now, double now_s, row *r)
+/* both worlds step alternately from the transferred state */
+static pal_err step_alternately(pal_world *was, double was_s, pal_world *now, double now_s, row *r)
 {
-    pal_estimate_cost *cost = malloc(2 * MOST * sizeof *cost);
+    pal_estimate_cost *cost = malloc(2 * MAX_SAMPLE * sizeof *cost);
     int n[2] = {0, 0};
     pal_err err = cost ? PAL_ERR_OK : PAL_ERR_MEMORY;
     for (int k = 0; k < ROUNDS && !err; k++) {
         err = timed(was, was_s, cost, &n[0]);
-        if (!err) err = timed(now, now_s, cost + MOST, &n[1]);
+        if (!err) err = timed(now, now_s, cost + MAX_SAMPLE, &n[1]);
     }
     r->n_substep = pal_world_substeps(now);
-    if (!err) r->was_ms = median_ms(cost, n[0]), r->ms = median_ms(cost + MOST, n[1]) * was_s / now_s;
+    if (!err) r->was_ms = median_ms(cost, n[0]), r->ms = median_ms(cost + MAX_SAMPLE, n[1]) * was_s / now_s;
     free(cost);
     return err;
 }
@@ -128,10 +128,10 @@ static pal_err try_neighbour(const pal_scene *scene, pal_world *world, row *r, p
     pal_configuration_switch *change = NULL;
     pal_world *next = NULL;
     pal_estimate own = {.error_m = NAN};
-    if (pal_configuration_estimate_nodes(scene, 0, &r->foreseen.setting) > MOST_NODE)
-        return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "more than %d nodes", MOST_NODE);
+    if (pal_configuration_estimate_nodes(scene, 0, &r->predicted.setting) > MAX_NODE)
+        return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "more than %d nodes", MAX_NODE);
     pal_err err = swing(world, scene);
-    if (!err) err = pal_configuration_switch_prepare(scene, NULL, 0, &r->foreseen.setting, diag, &change);
+    if (!err) err = pal_configuration_switch_prepare(scene, NULL, 0, &r->predicted.setting, diag, &change);
     if (!err) err = pal_world_create(pal_configuration_switch_scene(change), diag, &next);
     if (!err) {
         pal_configuration_switch_transfer(change, next, world);
@@ -142,7 +142,7 @@ static pal_err try_neighbour(const pal_scene *scene, pal_world *world, row *r, p
         const pal_scene *to = pal_configuration_switch_scene(change);
         err = estimate(to, next, NULL, 0, &own, diag);
         r->own_m = own.error_m;
-        if (!err) err = in_turn(world, scene->step_s, next, to->step_s, r);
+        if (!err) err = step_alternately(world, scene->step_s, next, to->step_s, r);
     }
     pal_world_destroy(next);
     pal_configuration_switch_free(change);
@@ -153,7 +153,7 @@ static pal_err measure(const subject *s, result *out, pal_diagnostic *diag)
 {
     pal_loaded_scene *loaded = NULL;
     pal_world *world = NULL;
-    pal_estimate_cost cost[MOST];
+    pal_estimate_cost cost[MAX_SAMPLE];
     int n = 0;
     PAL_TRY(pal_scene_procedural(&s->options, &loaded, NULL, diag));
     if (s->two) put_other(&loaded->scene);
@@ -168,7 +168,7 @@ static pal_err measure(const subject *s, result *out, pal_diagnostic *diag)
         out->n_row = out->estimate.n_neighbour;
         for (int k = 0; k < out->n_row; k++) {
             row *r = &out->row[k];
-            r->foreseen = out->estimate.neighbour[k];
+            r->predicted = out->estimate.neighbour[k];
             pal_diagnostic reason = {""};
             r->err = try_neighbour(scene, world, r, &reason);
         }
@@ -178,68 +178,42 @@ static pal_err measure(const subject *s, result *out, pal_diagnostic *diag)
     return err;
 }
 
-static double cost_off(const result *c, const row *r)
+static double cost_ratio(const result *c, const row *r)
 {
-    return r->foreseen.ms / c->estimate.ms / (r->ms / r->was_ms);
+    return r->predicted.ms / c->estimate.ms / (r->ms / r->was_ms);
 }
 
-static const char *knob(const row *r, char text[64])
+static const char *configuration_text(const row *r, char text[64])
 {
-    const pal_configuration *s = &r->foreseen.setting;
+    const pal_configuration *s = &r->predicted.setting;
     char tolerance[24] = "";
     if (s->tolerance > 0) snprintf(tolerance, sizeof tolerance, ", tolerance %.0e", s->tolerance);
     snprintf(text, 64, "%d voxels, %.3g ms%s", s->size, 1e3 * s->step_s, tolerance);
     return text;
 }
 
-/* a number or, where it is not known, null */
-static const char *number(double value, char text[32])
+static bool is_within(double off)
 {
-    snprintf(text, 32, isfinite(value) ? "%.6g" : "null", value);
-    return text;
+    return off <= max_ratio && off >= 1 / max_ratio;
 }
 
-static bool is_good(double off)
-{
-    return off <= most_off && off >= 1 / most_off;
-}
-
-static void print_json(const subject *s, const result *c)
-{
-    char text[64], a[32], b[32];
-    printf("{\"name\":\"%s\",\"nodes\":%d,\"substeps\":%d,\"ms\":%.5f,\"error_m\":%s,\"neighbours\":[", s->name,
-           c->n_node, c->n_substep, c->estimate.ms, number(c->estimate.error_m, a));
-    for (int k = 0, told = 0; k < c->n_row; k++) {
-        const row *r = &c->row[k];
-        if (r->err) continue;
-        printf("%s{\"setting\":\"%s\",\"nodes_foreseen\":%d,\"nodes\":%d,\"substeps_foreseen\":%d,\"substeps\":%d,"
-               "\"predicted_ms\":%.5f,\"was_ms\":%.5f,\"ms\":%.5f,\"cost\":%.4f,\"predicted_m\":%s,\"estimated_m\":%s}",
-               told++ ? "," : "", knob(r, text), c->estimate.neighbour_nodes[k], r->n_node,
-               c->estimate.neighbour_substeps[k], r->n_substep, r->foreseen.ms, r->was_ms, r->ms, cost_off(c, r),
-               number(r->foreseen.error_m, a), number(r->own_m, b));
-    }
-    printf("]}");
-}
-
-static void print_table(const subject *s, const result *c)
+static void add_neighbour(bench_report *report, const subject *s, const result *c, int k)
 {
     char text[64];
-    printf("%s: %d nodes, %.3f ms", s->name, c->n_node, c->estimate.ms);
-    if (isfinite(c->estimate.error_m)) printf(", error %.3g mm", 1e3 * c->estimate.error_m);
-    if (c->estimate.diag[0]) printf(" (%s)", c->estimate.diag);
-    printf("\n");
-    for (int k = 0; k < c->n_row; k++) {
-        const row *r = &c->row[k];
-        if (r->err) continue;
-        double off = cost_off(c, r);
-        printf("  %-34s %6d nodes (%d) %8.3f ms, foreseen %8.3f: %.2f%s", knob(r, text), r->n_node,
-               c->estimate.neighbour_nodes[k], r->ms * c->estimate.ms / r->was_ms, r->foreseen.ms, off,
-               is_good(off) ? "" : " (!)");
-        if (isfinite(r->own_m) && isfinite(r->foreseen.error_m))
-            printf("; error %.3g mm, foreseen %.3g: %.2f", 1e3 * r->own_m, 1e3 * r->foreseen.error_m,
-                   r->foreseen.error_m / r->own_m);
-        printf("\n");
-    }
+    const row *r = &c->row[k];
+    bench_record(report);
+    bench_text(report, "body", "body", -30, s->name);
+    bench_text(report, "configuration", "configuration", -34, configuration_text(r, text));
+    bench_number(report, "nodes", "nodes", 6, 0, r->n_node);
+    bench_number(report, "nodes_predicted", "predicted", 9, 0, c->estimate.neighbour_nodes[k]);
+    bench_number(report, "substeps", NULL, 0, 0, r->n_substep);
+    bench_number(report, "substeps_predicted", NULL, 0, 0, c->estimate.neighbour_substeps[k]);
+    bench_number(report, "ms", "ms", 8, 3, r->ms * c->estimate.ms / r->was_ms);
+    bench_number(report, "predicted_ms", "predicted", 9, 3, r->predicted.ms);
+    bench_number(report, "cost_ratio", "ratio", 6, 2, cost_ratio(c, r));
+    bench_text(report, NULL, "", 3, is_within(cost_ratio(c, r)) ? "" : "(!)");
+    bench_number(report, "error_m", "error m", 10, 7, r->own_m);
+    bench_number(report, "predicted_error_m", "predicted", 10, 7, r->predicted.error_m);
 }
 
 int bench_estimate(bool json)
@@ -258,27 +232,24 @@ int bench_estimate(bool json)
          .two = true},
         {.name = "springs, 12 voxels, twice", .options = {.label = -1, .hold = 0.3, .resolution = 12}, .two = true}};
     int n = 0, within = 0;
-    if (json) printf("{\"bench\":\"estimate\",\"cases\":[");
-    for (int k = 0; k < N_CASE; k++) {
-        pal_diagnostic diag = {""};
+    pal_diagnostic diag = {""};
+    pal_err err = PAL_ERR_OK;
+    bench_report r;
+    bench_begin(&r, "estimate", json);
+    bench_list(&r, "neighbours");
+    for (int k = 0; k < N_CASE && !err; k++) {
         result *c = calloc(1, sizeof *c);
-        pal_err err = c ? measure(&subjects[k], c, &diag) : PAL_ERR_MEMORY;
+        err = c ? measure(&subjects[k], c, &diag) : PAL_ERR_MEMORY;
         for (int i = 0; !err && i < c->n_row; i++) {
             if (c->row[i].err) continue;
-            n++, within += is_good(cost_off(c, &c->row[i]));
+            n++, within += is_within(cost_ratio(c, &c->row[i]));
+            add_neighbour(&r, &subjects[k], c, i);
         }
-        if (json && k) printf(",");
-        if (!err && json) print_json(&subjects[k], c);
-        if (!err && !json) print_table(&subjects[k], c);
         free(c);
-        if (!err) continue;
-        fprintf(stderr, "palpate bench: estimate: %s: %s\n", subjects[k].name,
-                diag.text[0] ? diag.text : pal_err_text(err));
-        return err == PAL_ERR_MEMORY ? 3 : 1;
     }
-    if (json)
-        printf("],\"neighbours\":%d,\"within\":%d}\n", n, within);
-    else
-        printf("cost within 30 %% for %d of %d neighbours\n", within, n);
-    return 0;
+    bench_list(&r, NULL);
+    bench_number(&r, "n", NULL, 0, 0, n);
+    bench_number(&r, "within", NULL, 0, 0, within);
+    bench_note(&r, "cost within 30 %% for %d of %d neighbours", within, n);
+    return bench_end(&r, err, &diag);
 }

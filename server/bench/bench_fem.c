@@ -1,11 +1,13 @@
-/* palpate bench fem: live steps of finite-element bodies that bend under a load that comes and goes, conjugate gradient
- * iterations with and without the warp of the preconditioner, and a static solve. One thread but for the spare one that
- * refreshes factors; medians over steps; every body is made here, from boxes of voxels.
+/* `palpate bench fem`: live steps of finite-element bodies that bend under a load that is switched on and off,
+ * conjugate gradient iterations with and without the warped preconditioner, and a static solve. One thread besides the
+ * one that refactors; medians over steps; every body is a box of voxels.
  *
  * The beam is that of the reference solutions: 0.2 x 0.05 x 0.05 m, E 100 kPa, nu 0.45, clamped at one end, 2 N on the
  * other, which moves its tip by nearly half of its length. The load is on for half a second and off for half a second.
  */
 #include "server/bench/bench.h"
+#include "server/bench/bench_body.h"
+#include "server/bench/bench_report.h"
 
 #include "server/base/clock.h"
 #include "server/cli/median.h"
@@ -29,20 +31,6 @@ typedef struct result {
     int n_node, n_element;
     double p50_ms, p95_ms, force_ms, mean_cg, max_cg, tip_m;
 } result;
-
-static pal_err make_box(const int n[3], double edge_m, pal_prepared *out, pal_diagnostic *diag)
-{
-    size_t n_voxel = (size_t)n[0] * (size_t)n[1] * (size_t)n[2];
-    pal_voxels voxels = {.n = {n[0], n[1], n[2]}, .edge_m = edge_m, .n_inside = (int64_t)n_voxel};
-    memset(out, 0, sizeof *out);
-    voxels.kind = malloc(n_voxel);
-    if (!voxels.kind) return PAL_ERR_MEMORY;
-    memset(voxels.kind, 2, n_voxel);
-    pal_err err = pal_voxels_split(&voxels, &out->tets);
-    if (!err) err = pal_hexes_find(&out->tets, &out->hexes, diag);
-    pal_voxels_free(&voxels);
-    return err;
-}
 
 /* the scene of one body clamped at its lowest face along `axis`, without output and tools */
 static pal_err make_scene(const job *j, const pal_prepared *mesh, int axis, const char *solver, pal_scene *scene,
@@ -98,24 +86,13 @@ static pal_err load_face(pal_world *world, int axis, double low, double high, co
     return err;
 }
 
-static double row_ms(const pal_world *world, const char *stage)
-{
-    double ms = 0;
-    for (int i = 0; i < pal_world_component_count(world); i++) {
-        pal_component_info info;
-        pal_world_component_info(world, i, &info);
-        if (!strcmp(info.stage, stage)) ms += 1e-6 * (double)info.spent_ns;
-    }
-    return ms;
-}
-
 static pal_err run_live(const job *j, result *out, pal_diagnostic *diag)
 {
     static double ms[N_STEP], force[N_STEP];
     pal_prepared mesh = {0};
     pal_scene *scene = calloc(1, sizeof *scene);
     pal_world *world = NULL;
-    pal_err err = scene ? make_box(j->n, j->edge_m, &mesh, diag) : PAL_ERR_MEMORY;
+    pal_err err = scene ? bench_box(j->n, j->edge_m, &mesh, diag) : PAL_ERR_MEMORY;
     if (!err) err = make_scene(j, &mesh, 0, "implicit_euler", scene, diag);
     if (!err) err = pal_world_create(scene, diag, &world);
     *out = (result){0};
@@ -129,7 +106,7 @@ static pal_err run_live(const job *j, result *out, pal_diagnostic *diag)
         pal_solve_report report;
         if (err || i < 0) continue;
         pal_world_solve_report(world, 0, &report);
-        ms[i] = 1e3 * (pal_clock_s() - began), force[i] = row_ms(world, "force");
+        ms[i] = 1e3 * (pal_clock_s() - began), force[i] = bench_component_ms(world, "force", NULL);
         out->mean_cg += (double)report.n_cg / N_STEP;
         out->max_cg = fmax(out->max_cg, report.n_cg);
         const pal_body *body = pal_world_body(world, 0);
@@ -154,7 +131,7 @@ typedef struct static_result {
     bool converged;
 } static_result;
 
-/* the reference cube: 0.1 m, nu 0.499, soft over stiff, a patch of its top pushed down and sideways */
+/* the reference cube: 0.1 m, nu 0.499, soft above stiff, a patch of its top loaded down and sideways */
 static pal_err run_static(int n, static_result *out, pal_diagnostic *diag)
 {
     const job j = {.element = "hex8_bbar",
@@ -166,7 +143,7 @@ static pal_err run_static(int n, static_result *out, pal_diagnostic *diag)
     pal_prepared mesh = {0};
     pal_scene *scene = calloc(1, sizeof *scene);
     pal_world *world = NULL;
-    pal_err err = scene ? make_box(j.n, j.edge_m, &mesh, diag) : PAL_ERR_MEMORY;
+    pal_err err = scene ? bench_box(j.n, j.edge_m, &mesh, diag) : PAL_ERR_MEMORY;
     if (!err) err = make_scene(&j, &mesh, 2, "static_newton", scene, diag);
     if (!err) {
         pal_region *soft = &scene->body[0].region[scene->body[0].n_region++];
@@ -205,59 +182,47 @@ static const job jobs[] = {
 };
 enum { N_JOB = sizeof jobs / sizeof jobs[0] };
 
-static void print_table(const result *r, const static_result *s)
+static void add_job(bench_report *r, const job *j, const result *c)
 {
-    printf("live steps, medians of %d, one thread\n", N_STEP);
-    printf("body              element    law           nodes  elements  step ms  ms p50  ms p95   limit  forces ms  "
-           "CG mean  CG most  tip m\n");
-    for (int k = 0; k < N_JOB; k++) {
-        const job *j = &jobs[k];
-        printf("%-17s %-10s %-13s %5d %9d %8.2f %7.3f %7.3f ", j->name, j->element, j->law, r[k].n_node, r[k].n_element,
-               1e3 * j->step_s, r[k].p50_ms, r[k].p95_ms);
-        if (isfinite(j->limit_ms))
-            printf("%7.1f ", j->limit_ms);
-        else
-            printf("%7s ", "");
-        printf("%10.3f %8.1f %8.0f %6.3f\n", r[k].force_ms, r[k].mean_cg, r[k].max_cg, r[k].tip_m);
-    }
-    printf("static cube, nu 0.499, %d nodes: made in %.0f ms, solved in %.0f ms (%.0f of it factors), %d Newton "
-           "iterations, residual %.1e, limit 1500 ms\n",
-           s->n_node, s->create_ms, s->solve_ms, s->factor_ms, s->n_newton, s->residual);
-}
-
-static void print_json(const result *r, const static_result *s)
-{
-    printf("{\"bench\":\"fem\",\"runs\":%d,\"cases\":[", N_STEP);
-    for (int k = 0; k < N_JOB; k++) {
-        const job *j = &jobs[k];
-        printf("%s{\"name\":\"%s\",\"element\":\"%s\",\"law\":\"%s\",\"nodes\":%d,\"elements\":%d,\"step_s\":%.6f,"
-               "\"warp\":%s,\"p50_ms\":%.4f,\"p95_ms\":%.4f,\"force_ms\":%.4f,\"cg_mean\":%.2f,\"cg_most\":%.0f,"
-               "\"tip_m\":%.4f}",
-               k ? "," : "", j->name, j->element, j->law, r[k].n_node, r[k].n_element, j->step_s,
-               j->warp ? "true" : "false", r[k].p50_ms, r[k].p95_ms, r[k].force_ms, r[k].mean_cg, r[k].max_cg,
-               r[k].tip_m);
-    }
-    printf("],\"static\":{\"nodes\":%d,\"make_ms\":%.2f,\"solve_ms\":%.2f,\"factor_ms\":%.2f,\"newton\":%d,"
-           "\"residual\":%.3e,\"converged\":%s}}\n",
-           s->n_node, s->create_ms, s->solve_ms, s->factor_ms, s->n_newton, s->residual,
-           s->converged ? "true" : "false");
+    bench_record(r);
+    bench_text(r, "name", "body", -17, j->name);
+    bench_text(r, "element", "element", -10, j->element);
+    bench_text(r, "law", "law", -13, j->law);
+    bench_number(r, "nodes", "nodes", 5, 0, c->n_node);
+    bench_number(r, "elements", "elements", 8, 0, c->n_element);
+    bench_number(r, "step_ms", "step ms", 8, 2, 1e3 * j->step_s);
+    bench_number(r, "p50_ms", "ms p50", 7, 3, c->p50_ms);
+    bench_number(r, "p95_ms", "ms p95", 7, 3, c->p95_ms);
+    bench_number(r, "limit_ms", "limit", 6, 1, j->limit_ms);
+    bench_number(r, "force_ms", "forces ms", 9, 3, c->force_ms);
+    bench_number(r, "cg_mean", "CG mean", 7, 1, c->mean_cg);
+    bench_number(r, "cg_max", "CG max", 6, 0, c->max_cg);
+    bench_number(r, "tip_m", "tip m", 6, 3, c->tip_m);
 }
 
 int bench_fem(bool json)
 {
-    result r[N_JOB];
+    result all[N_JOB];
     static_result s = {0};
-    pal_diagnostic diag = {{0}};
+    pal_diagnostic diag = {""};
     pal_err err = PAL_ERR_OK;
-    for (int k = 0; k < N_JOB && !err; k++) err = run_live(&jobs[k], &r[k], &diag);
+    for (int k = 0; k < N_JOB && !err; k++) err = run_live(&jobs[k], &all[k], &diag);
     if (!err) err = run_static(16, &s, &diag);
-    if (err) {
-        fprintf(stderr, "palpate bench: fem: %s\n", diag.text[0] ? diag.text : pal_err_text(err));
-        return err == PAL_ERR_MEMORY ? 3 : 1;
-    }
-    if (json)
-        print_json(r, &s);
-    else
-        print_table(r, &s);
-    return 0;
+    bench_report r;
+    bench_begin(&r, "fem", json);
+    bench_note(&r, "live steps, medians of %d, one thread", N_STEP);
+    bench_list(&r, "cases");
+    for (int k = 0; k < N_JOB && !err; k++) add_job(&r, &jobs[k], &all[k]);
+    bench_note(&r, "static cube, nu 0.499:");
+    bench_list(&r, "static");
+    bench_record(&r);
+    bench_number(&r, "nodes", "nodes", 6, 0, s.n_node);
+    bench_number(&r, "make_ms", "make ms", 8, 0, s.create_ms);
+    bench_number(&r, "solve_ms", "solve ms", 8, 0, s.solve_ms);
+    bench_number(&r, "factor_ms", "factor ms", 9, 0, s.factor_ms);
+    bench_number(&r, NULL, "limit ms", 8, 0, 1500);
+    bench_number(&r, "newton", "Newton", 6, 0, s.n_newton);
+    bench_number(&r, "residual", "residual", 12, 10, s.residual);
+    bench_text(&r, "converged", "converged", 9, s.converged ? "yes" : "no");
+    return bench_end(&r, err, &diag);
 }

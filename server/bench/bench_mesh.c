@@ -1,8 +1,8 @@
-/* palpate bench mesh: milliseconds of fill and split against paper B, Table 1 (bunny of 70k triangles, 1.5 GHz
- * Pentium 4), and the peak of resident memory. Reading the file is stated, not counted.
- *
- * Every run takes its memory afresh, so the kernel's page clearing is in the figures. */
+/* `palpate bench mesh`: milliseconds of fill and split against paper B, Table 1 (bunny of 70,000 triangles, 1.5 GHz
+ * Pentium 4), and the peak of resident memory. The time to read the file is printed but not included. Every run
+ * allocates anew, so the figures include the page clearing of the kernel. */
 #include "server/bench/bench.h"
+#include "server/bench/bench_report.h"
 
 #include "server/base/clock.h"
 #include "server/cli/median.h"
@@ -25,11 +25,11 @@ static const struct bench_case {
 
 typedef struct result {
     long long n_tet;
-    double fill_ms, split_ms, total_ms, peak_bytes; /* medians; peak over what was resident before */
+    double fill_ms, split_ms, total_ms, peak_bytes; /* medians; peak above the resident size before */
     char method[16];
 } result;
 
-/* bumpy ellipsoid, as full in its box as the bunny (0.27), 69,696 triangles */
+/* bumpy ellipsoid that fills its box as the bunny does (0.27), 69,696 triangles */
 static pal_err make_body(pal_surface *out)
 {
     enum { RING = 264, BAND = 133, INNER = BAND - 1, SOUTH = RING * INNER, NORTH = SOUTH + 1 };
@@ -60,7 +60,7 @@ static pal_err make_body(pal_surface *out)
     return PAL_ERR_OK;
 }
 
-/* VmRSS or VmHWM in bytes; 0 where there is no such file */
+/* VmRSS or VmHWM in bytes; 0 without /proc */
 static double memory_of(const char *name)
 {
     char line[256];
@@ -73,8 +73,8 @@ static double memory_of(const char *name)
     return 1024 * kb;
 }
 
-/* lets VmHWM begin at what is resident now */
-static void forget_peak(void)
+/* resets VmHWM to the resident size */
+static void reset_peak(void)
 {
     malloc_trim(0);
     FILE *file = fopen("/proc/self/clear_refs", "w");
@@ -87,7 +87,7 @@ static pal_err run_case(const pal_surface *surface, int resolution, result *out,
 {
     double fill[N_RUN], split[N_RUN], total[N_RUN];
     pal_voxel_options options = {.resolution = resolution, .border = true};
-    forget_peak();
+    reset_peak();
     double resident = memory_of("VmRSS");
     for (int k = 0; k < N_RUN; k++) {
         pal_voxels voxels;
@@ -112,36 +112,12 @@ static pal_err run_case(const pal_surface *surface, int resolution, result *out,
     return PAL_ERR_OK;
 }
 
-static void print_table(const pal_surface *surface, double read_ms, const result *r)
-{
-    printf("mesh: %d triangles", surface->n_tri);
-    if (read_ms >= 0) printf(", read in %.1f ms (not counted below)", read_ms);
-    printf(", one thread, medians of %d\n", N_RUN);
-    printf("resolution      tets  method      fill ms  split ms  total ms  limit ms  ns/tet  bytes/tet  paper ms\n");
-    for (int k = 0; k < N_CASE; k++)
-        printf("%10d %9lld  %-8s %10.2f %9.2f %9.2f %9.0f %7.1f %10.0f %9.0f\n", CASE[k].resolution, r[k].n_tet,
-               r[k].method, r[k].fill_ms, r[k].split_ms, r[k].total_ms, CASE[k].limit_ms,
-               1e6 * r[k].total_ms / (double)r[k].n_tet, r[k].peak_bytes / (double)r[k].n_tet, CASE[k].paper_ms);
-}
-
-static void print_json(const pal_surface *surface, double read_ms, const result *r)
-{
-    printf("{\"bench\":\"mesh\",\"triangles\":%d,\"read_ms\":%.3f,\"runs\":%d,\"cases\":[", surface->n_tri,
-           read_ms < 0 ? 0 : read_ms, N_RUN);
-    for (int k = 0; k < N_CASE; k++)
-        printf("%s{\"resolution\":%d,\"tets\":%lld,\"method\":\"%s\",\"fill_ms\":%.3f,\"split_ms\":%.3f,"
-               "\"total_ms\":%.3f,\"limit_ms\":%.0f,\"paper_ms\":%.0f,\"peak_bytes_per_tet\":%.1f}",
-               k ? "," : "", CASE[k].resolution, r[k].n_tet, r[k].method, r[k].fill_ms, r[k].split_ms, r[k].total_ms,
-               CASE[k].limit_ms, CASE[k].paper_ms, r[k].peak_bytes / (double)r[k].n_tet);
-    printf("]}\n");
-}
-
 int bench_mesh(const char *ply_path_or_null, bool json)
 {
     pal_surface surface = {0};
-    pal_diagnostic diag = {.text = "out of memory"};
-    result r[N_CASE];
-    double read_ms = -1, began = pal_clock_s();
+    pal_diagnostic diag = {""};
+    result all[N_CASE];
+    double read_ms = NAN, began = pal_clock_s();
     pal_err err;
     if (ply_path_or_null) {
         pal_mesh_file_options options = {.weld = 0};
@@ -150,13 +126,28 @@ int bench_mesh(const char *ply_path_or_null, bool json)
     } else {
         err = make_body(&surface);
     }
-    for (int k = 0; !err && k < N_CASE; k++) err = run_case(&surface, CASE[k].resolution, &r[k], &diag);
-    if (err)
-        fprintf(stderr, "bench mesh: %s\n", diag.text);
-    else if (json)
-        print_json(&surface, read_ms, r);
-    else
-        print_table(&surface, read_ms, r);
+    for (int k = 0; !err && k < N_CASE; k++) err = run_case(&surface, CASE[k].resolution, &all[k], &diag);
+    bench_report r;
+    bench_begin(&r, "mesh", json);
+    bench_number(&r, "triangles", NULL, 0, 0, surface.n_tri);
+    bench_number(&r, "read_ms", NULL, 0, 0, read_ms);
+    bench_number(&r, "runs", NULL, 0, 0, N_RUN);
+    bench_note(&r, "%d triangles, one thread, medians of %d; read in %.1f ms", surface.n_tri, N_RUN, fmax(read_ms, 0));
+    bench_list(&r, "cases");
+    for (int k = 0; !err && k < N_CASE; k++) {
+        const result *c = &all[k];
+        bench_record(&r);
+        bench_number(&r, "resolution", "resolution", 10, 0, CASE[k].resolution);
+        bench_number(&r, "tets", "tets", 9, 0, (double)c->n_tet);
+        bench_text(&r, "method", "method", -8, c->method);
+        bench_number(&r, "fill_ms", "fill ms", 8, 2, c->fill_ms);
+        bench_number(&r, "split_ms", "split ms", 8, 2, c->split_ms);
+        bench_number(&r, "total_ms", "total ms", 8, 2, c->total_ms);
+        bench_number(&r, "limit_ms", "limit ms", 8, 0, CASE[k].limit_ms);
+        bench_number(&r, NULL, "ns/tet", 7, 1, 1e6 * c->total_ms / (double)c->n_tet);
+        bench_number(&r, "peak_bytes_per_tet", "bytes/tet", 9, 0, c->peak_bytes / (double)c->n_tet);
+        bench_number(&r, "paper_ms", "paper ms", 8, 0, CASE[k].paper_ms);
+    }
     pal_surface_free(&surface);
-    return err != 0;
+    return bench_end(&r, err, &diag);
 }

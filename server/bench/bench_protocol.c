@@ -1,25 +1,23 @@
-/* `palpate bench protocol`: what a frame costs, on a closed surface of 29,402 vertices in a box of 0.18 m at 60 frames
- * a second. The motions are those of the design study: `all` (a dent that wanders, a bend, a wave), `noise` (all and
- * 0.02 mm of white noise), `sim` (a damped surface of springs hit by a ball), `local` (about 5 % of the vertices),
- * `rest`. Times are medians over the frames, thread time of one core; the largest error of every frame is checked
- * against the bound. */
+/* `palpate bench protocol`: the cost of a frame, on a closed surface of 29,402 vertices in a box of 0.18 m at 60 frames
+ * a second. Motions: `all` (a moving dent, a bend, a wave), `noise` (all and 0.02 mm of white noise), `sim` (a damped
+ * surface of springs hit by a ball), `local` (about 5 % of the vertices), `rest`. Medians over the frames, thread time
+ * of one core; the largest error of every frame is checked against the bound. */
 #include "protocol/asset.h"
 #include "protocol/frame_codec.h"
+#include "server/base/clock.h"
 #include "server/bench/bench.h"
+#include "server/bench/bench_report.h"
 #include "server/cli/median.h"
-#include "server/cli/report.h"
 
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 enum { FINENESS = 70, FRAMES = 60, MOTIONS = 5, BOUNDS = 6 };
 static const char *const motion_name[MOTIONS] = {"all", "noise", "sim", "local", "rest"};
 static const double bound_m[BOUNDS] = {1e-5, 2.5e-5, 5e-5, 1e-4, 2.5e-4, 5e-4};
-enum { DEFAULT_BOUND = 2 };
 
 typedef struct surface_model { /* surface, its springs, and the state of the `sim` motion */
     uint32_t n_vertex, n_triangle;
@@ -43,9 +41,7 @@ typedef struct bench {
 
 static double thread_s(void)
 {
-    struct timespec t;
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+    return 1e-9 * (double)pal_clock_thread_ns();
 }
 
 /* vertex at a point of the cube's lattice, pushed out to a bumpy sphere */
@@ -215,62 +211,37 @@ static void release(bench *b)
     free(b);
 }
 
-static void print_tables(const bench *b)
-{
-    double n = b->s.n_vertex;
-    printf("%u vertices, %u triangles; order %.0f ms, asset %.0f ms, %.0f kB (%.1f bytes a vertex)\n", b->s.n_vertex,
-           b->s.n_triangle, 1e3 * b->order_s, 1e3 * b->asset_s, b->asset_bytes / 1e3, b->asset_bytes / n);
-    printf("\nat %.2f mm: %8s %12s %10s %10s %12s\n", 1e3 * bound_m[DEFAULT_BOUND], "bytes", "bytes/vertex",
-           "encode ms", "decode ms", "largest mm");
-    for (int m = 0; m < MOTIONS; m++)
-        printf("%-10s %8.0f %12.3f %10.3f %10.3f %12.4f\n", motion_name[m], b->byte_count[m][DEFAULT_BOUND],
-               b->byte_count[m][DEFAULT_BOUND] / n, 1e3 * b->encode_s[m][DEFAULT_BOUND],
-               1e3 * b->decode_s[m][DEFAULT_BOUND], 1e3 * b->error_m[m][DEFAULT_BOUND]);
-    printf("\nbytes/vertex at mm");
-    for (int e = 0; e < BOUNDS; e++) printf(" %8.3f", 1e3 * bound_m[e]);
-    for (int m = 0; m < MOTIONS; m++) {
-        printf("\n%-18s", motion_name[m]);
-        for (int e = 0; e < BOUNDS; e++) printf(" %8.3f", b->byte_count[m][e] / n);
-    }
-    printf("\n");
-}
-
-static int print_json(const bench *b)
-{
-    const pal_flag_common common = {.json = true, .command = "bench"};
-    cJSON *root = cJSON_CreateObject(), *motions = cJSON_AddArrayToObject(root, "motions");
-    cJSON_AddNumberToObject(root, "vertices", b->s.n_vertex);
-    cJSON_AddNumberToObject(root, "triangles", b->s.n_triangle);
-    cJSON_AddNumberToObject(root, "order_s", b->order_s);
-    cJSON_AddNumberToObject(root, "asset_s", b->asset_s);
-    cJSON_AddNumberToObject(root, "asset_bytes", b->asset_bytes);
-    for (int m = 0; m < MOTIONS; m++)
-        for (int e = 0; e < BOUNDS; e++) {
-            cJSON *row = cJSON_CreateObject();
-            cJSON_AddItemToArray(motions, row);
-            cJSON_AddStringToObject(row, "motion", motion_name[m]);
-            cJSON_AddNumberToObject(row, "bound_m", bound_m[e]);
-            cJSON_AddNumberToObject(row, "bytes", b->byte_count[m][e]);
-            cJSON_AddNumberToObject(row, "encode_s", b->encode_s[m][e]);
-            cJSON_AddNumberToObject(row, "decode_s", b->decode_s[m][e]);
-            cJSON_AddNumberToObject(row, "largest_error_m", b->error_m[m][e]);
-        }
-    return pal_report_json(&common, root);
-}
-
 int bench_protocol(bool json)
 {
     bench *b = calloc(1, sizeof *b);
-    int refusal = b ? prepare(b) : PAL_REFUSAL_MEMORY, code = 0;
+    int refusal = b ? prepare(b) : PAL_REFUSAL_MEMORY;
     for (int m = 0; m < MOTIONS && !refusal; m++) refusal = measure_motion(b, m);
-    if (refusal) {
-        fprintf(stderr, "palpate bench: protocol: %s\n", pal_refusal_text(refusal));
-        code = 3;
-    } else if (json) {
-        code = print_json(b);
-    } else {
-        print_tables(b);
+    pal_diagnostic diag = {""};
+    pal_err err = refusal ? pal_diagnostic_set(&diag, PAL_ERR_INTERNAL, "%s", pal_refusal_text(refusal)) : PAL_ERR_OK;
+    bench_report r;
+    bench_begin(&r, "protocol", json);
+    double n = err ? 1 : b->s.n_vertex;
+    if (!err) {
+        bench_number(&r, "vertices", NULL, 0, 0, n);
+        bench_number(&r, "triangles", NULL, 0, 0, b->s.n_triangle);
+        bench_number(&r, "order_s", NULL, 0, 0, b->order_s);
+        bench_number(&r, "asset_s", NULL, 0, 0, b->asset_s);
+        bench_number(&r, "asset_bytes", NULL, 0, 0, b->asset_bytes);
+        bench_note(&r, "%.0f vertices, %u triangles; order %.0f ms, asset %.0f ms, %.0f kB (%.1f bytes a vertex)", n,
+                   b->s.n_triangle, 1e3 * b->order_s, 1e3 * b->asset_s, b->asset_bytes / 1e3, b->asset_bytes / n);
     }
+    bench_list(&r, "motions");
+    for (int m = 0; m < MOTIONS && !err; m++)
+        for (int e = 0; e < BOUNDS; e++) {
+            bench_record(&r);
+            bench_text(&r, "motion", "motion", -8, motion_name[m]);
+            bench_number(&r, "bound_m", "bound m", 10, 6, bound_m[e]);
+            bench_number(&r, "bytes", "bytes", 8, 0, b->byte_count[m][e]);
+            bench_number(&r, NULL, "bytes/vertex", 12, 3, b->byte_count[m][e] / n);
+            bench_number(&r, "encode_ms", "encode ms", 10, 3, 1e3 * b->encode_s[m][e]);
+            bench_number(&r, "decode_ms", "decode ms", 10, 3, 1e3 * b->decode_s[m][e]);
+            bench_number(&r, "max_error_m", "max error m", 12, 7, b->error_m[m][e]);
+        }
     if (b) release(b);
-    return code;
+    return bench_end(&r, err, &diag);
 }

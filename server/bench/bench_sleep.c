@@ -1,7 +1,9 @@
-/* palpate bench sleep: what a body costs that rests: awake and watched, awake and watched by nobody, asleep with a tool
- * in the room. Median over steps of the procedural organ as springs and as finite elements, the stomach as an adaptive
- * surface, a subdivided cube of 3 x 3 x 3 cells. Asked: asleep below 5 % of awake. */
+/* `palpate bench sleep`: the cost of a body at rest: awake and observed, awake and not observed, asleep with a tool in
+ * the room. Medians over steps of the procedural organ as springs and as finite elements, the stomach as an adaptive
+ * surface, a subdivision solid of 3 x 3 x 3 cells. Wanted: asleep below 5 % of awake. */
 #include "server/bench/bench.h"
+#include "server/bench/bench_body.h"
+#include "server/bench/bench_report.h"
 
 #include "server/base/clock.h"
 #include "server/cli/median.h"
@@ -13,14 +15,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* reading the clock takes as long as a step asleep: many of those at once */
-enum { N_STEP = 61, MANY = 64, MOST_STEP = 6000, CASES = 4 };
-static const double most_share = 0.05;
+/* a step asleep is as short as a reading of the clock: MANY are timed together */
+enum { N_STEP = 61, MANY = 64, MAX_STEP = 6000, CASES = 4 };
+static const double max_share = 0.05;
 
 typedef struct result {
     const char *name;
     int n_node;
-    double awake_ms, unseen_ms, asleep_ms, asleep_s; /* asleep_s: simulated, until it sleeps */
+    double awake_ms, unobserved_ms, asleep_ms, asleep_s; /* asleep_s: simulated, until it sleeps */
 } result;
 
 static pal_err timed(pal_world *world, double step_s, bool awake, double *median_ms)
@@ -45,7 +47,7 @@ static pal_err measure_world(const pal_scene *scene, result *out, pal_diagnostic
     pal_err err = PAL_ERR_OK;
     out->n_node = body->n_node;
     int n = 0;
-    for (; n < MOST_STEP && !body->asleep && !err; n++) err = pal_world_step(world, scene->step_s);
+    for (; n < MAX_STEP && !body->asleep && !err; n++) err = pal_world_step(world, scene->step_s);
     out->asleep_s = n * scene->step_s;
     if (body->frozen) err = pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "%s stopped: %s", out->name, body->reason);
     if (!err && !body->asleep)
@@ -58,7 +60,7 @@ static pal_err measure_world(const pal_scene *scene, result *out, pal_diagnostic
     if (!err) err = timed(world, scene->step_s, true, &out->awake_ms);
     if (!err) err = pal_world_pose(world, 0, NULL);
     if (!err) pal_world_watch(world, false);
-    if (!err) err = timed(world, scene->step_s, true, &out->unseen_ms);
+    if (!err) err = timed(world, scene->step_s, true, &out->unobserved_ms);
     pal_world_destroy(world);
     return err;
 }
@@ -76,13 +78,9 @@ static pal_err measure_solid(const pal_cell_model *model, result *out, pal_diagn
 {
     pal_cells cells = {0};
     pal_prepared mesh = {0};
-    pal_surface surface = {0};
     pal_scene *scene = calloc(1, sizeof *scene);
     if (!scene) return PAL_ERR_MEMORY;
-    pal_err err = pal_cell_model_make(model, &cells, diag);
-    if (!err) err = pal_cells_boundary(&cells, &surface, NULL, NULL);
-    if (!err) err = pal_prepared_surface(&surface, &mesh);
-    pal_surface_free(&surface);
+    pal_err err = bench_solid(model, &cells, &mesh, diag);
     if (!err) {
         pal_scene_default(scene);
         pal_body_default_cells(&scene->body[0], model->name, &mesh, &cells);
@@ -98,42 +96,31 @@ static pal_err measure_solid(const pal_cell_model *model, result *out, pal_diagn
     return err;
 }
 
-static void print(const result *r, bool json)
-{
-    if (json) printf("{\"bench\":\"sleep\",\"steps\":%d,\"cases\":[", N_STEP);
-    if (!json)
-        printf("a body at rest, median ms of %d steps; asked: asleep at most %.0f %% of awake\n%-18s %8s %10s %12s "
-               "%10s %9s %14s\n",
-               N_STEP, 100 * most_share, "model", "nodes", "awake", "unwatched", "asleep", "%", "asleep after s");
-    for (int k = 0; k < CASES; k++) {
-        const double share = r[k].asleep_ms / r[k].awake_ms;
-        if (json)
-            printf("%s{\"name\":\"%s\",\"nodes\":%d,\"awake_ms\":%.5f,\"unwatched_ms\":%.5f,\"asleep_ms\":%.6f,"
-                   "\"share\":%.5f,\"asleep_after_s\":%.3f}",
-                   k ? "," : "", r[k].name, r[k].n_node, r[k].awake_ms, r[k].unseen_ms, r[k].asleep_ms, share,
-                   r[k].asleep_s);
-        else
-            printf("%-18s %8d %10.4f %12.4f %10.5f %8.2f%% %14.2f%s\n", r[k].name, r[k].n_node, r[k].awake_ms,
-                   r[k].unseen_ms, r[k].asleep_ms, 100 * share, r[k].asleep_s, share <= most_share ? "" : "  too much");
-    }
-    if (json) printf("]}\n");
-}
-
 int bench_sleep(bool json)
 {
-    result r[CASES] = {{.name = "tet_springs"}, {.name = "fem"}, {.name = "adaptive_springs"}};
-    const pal_surface_scene springs = {.label = -1}, fem = {.label = -1, .fem = true},
-                            adaptive = {.label = -1, .adaptive = true, .shape = "stomach"};
+    result all[CASES] = {
+        {.name = "tet_springs"}, {.name = "fem"}, {.name = "adaptive_springs"}, {.name = "subdivision_fem"}};
+    const pal_surface_scene organ[3] = {
+        {.label = -1}, {.label = -1, .fem = true}, {.label = -1, .adaptive = true, .shape = "stomach"}};
     pal_diagnostic diag = {""};
-    pal_err err = measure_organ(&springs, &r[0], &diag);
-    if (!err) err = measure_organ(&fem, &r[1], &diag);
-    if (!err) err = measure_organ(&adaptive, &r[2], &diag);
-    r[3].name = "subdivision_fem";
-    if (!err) err = measure_solid(pal_cell_model_find("block3"), &r[3], &diag);
-    if (err) {
-        fprintf(stderr, "palpate bench: sleep: %s\n", diag.text[0] ? diag.text : pal_err_text(err));
-        return err == PAL_ERR_MEMORY ? 3 : 1;
+    pal_err err = PAL_ERR_OK;
+    for (int k = 0; k < 3 && !err; k++) err = measure_organ(&organ[k], &all[k], &diag);
+    if (!err) err = measure_solid(pal_cell_model_find("block3"), &all[3], &diag);
+    bench_report r;
+    bench_begin(&r, "sleep", json);
+    bench_note(&r, "a body at rest, medians of %d steps; wanted: asleep at most %.2f of awake", N_STEP, max_share);
+    bench_list(&r, "cases");
+    for (int k = 0; k < CASES && !err; k++) {
+        const result *c = &all[k];
+        bench_record(&r);
+        bench_text(&r, "name", "model", -18, c->name);
+        bench_number(&r, "nodes", "nodes", 8, 0, c->n_node);
+        bench_number(&r, "awake_ms", "awake ms", 10, 4, c->awake_ms);
+        bench_number(&r, "unobserved_ms", "unobserved ms", 13, 4, c->unobserved_ms);
+        bench_number(&r, "asleep_ms", "asleep ms", 10, 5, c->asleep_ms);
+        bench_number(&r, "share", "share", 8, 4, c->asleep_ms / c->awake_ms);
+        bench_number(&r, "asleep_after_s", "asleep after s", 14, 2, c->asleep_s);
+        bench_text(&r, NULL, "", 8, c->asleep_ms <= max_share * c->awake_ms ? "" : "too much");
     }
-    print(r, json);
-    return 0;
+    return bench_end(&r, err, &diag);
 }

@@ -1,13 +1,15 @@
-/* palpate bench solids: subdivided solids as finite elements against Table 1 of paper A, on one core.
+/* `palpate bench solids`: subdivision solids as finite elements against paper A, Table 1, on one core.
  *
- * Our own stand-ins for its eight solids, with as many control cells and its levels of subdivision (A does not print
- * their cells; the two blocks are the same), and a kidney. One iteration is one explicit step of central_cg as A 3.3
- * has it: elastic forces of all elements, gravity, drag, and the mass matrix by conjugate gradients to 1e-4, for both
- * operators of the row cell_elastic; median over steps of the motion from rest. Those of the paper ran on a Pentium 4
+ * Our own versions of its eight solids, with as many control cells and the same levels of subdivision (the paper does
+ * not print their cells; the two blocks are the same), and a kidney. One iteration is one explicit step of central_cg
+ * (paper A section 3.3): elastic forces of all elements, gravity, drag, and the mass matrix by conjugate gradients to
+ * 1e-4, for both operators of cell_elastic; median over steps of the motion from rest. The paper used a Pentium 4
  * of 2.8 GHz. A frame is 1/60 s of the default tissue (E 5 kPa, nu 0.45): so many sub-steps of central_cg, or one step
- * of implicit_euler, which bends under gravity while it is measured. Speed: seconds simulated in one of processor time.
+ * of implicit_euler, which bends under gravity while it is measured. Speed: simulated seconds in one of processor time.
  */
 #include "server/bench/bench.h"
+#include "server/bench/bench_body.h"
+#include "server/bench/bench_report.h"
 
 #include "server/base/clock.h"
 #include "server/cli/median.h"
@@ -30,7 +32,7 @@ static const struct {
     double ms;
 } paper[] = {{"soccer", 135}, {"monster", 47}, {"block3", 310}, {"chair", 90},
              {"block4", 84},  {"head", 110},   {"bridge", 213}, {"nozzle", 75}};
-static const double least_ratio = 100;
+static const double min_ratio = 100;
 
 typedef struct result {
     const pal_cell_model *model;
@@ -53,20 +55,14 @@ typedef struct body {
     pal_world *world;
 } body;
 
-static pal_err take(const pal_cell_model *model, body *b, pal_diagnostic *diag)
+static pal_err make_body(const pal_cell_model *model, body *b, pal_diagnostic *diag)
 {
-    pal_surface surface = {0};
     memset(b, 0, sizeof *b);
     b->scene = calloc(1, sizeof *b->scene);
-    if (!b->scene) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_cell_model_make(model, &b->cells, diag));
-    pal_err err = pal_cells_boundary(&b->cells, &surface, NULL, NULL);
-    if (!err) err = pal_prepared_surface(&surface, &b->mesh);
-    pal_surface_free(&surface);
-    return err;
+    return b->scene ? bench_solid(model, &b->cells, &b->mesh, diag) : PAL_ERR_MEMORY;
 }
 
-static void leave(body *b)
+static void free_body(body *b)
 {
     pal_world_destroy(b->world);
     pal_prepared_free(&b->mesh);
@@ -74,7 +70,7 @@ static void leave(body *b)
     free(b->scene);
 }
 
-/* a world of the solid under gravity, the lowest part held */
+/* a world of the solid under gravity, its lowest part fixed */
 static pal_err start(const pal_cell_model *model, const char *operator, const char * solver, const char *preconditioner,
                      body *b, pal_diagnostic *diag)
 {
@@ -102,21 +98,21 @@ static int iterations(const body *b)
     return report.n_cg;
 }
 
-/* n explicit steps of one sub-step each, after as many as it takes to begin; ms of each, iterations */
+/* n explicit steps of one sub-step each, after a tenth as many that are not timed */
 static pal_err run_steps(body *b, int n, double *ms, double *mean_cg, double *max_cg, pal_diagnostic *diag)
 {
-    double sum = 0, most = 0;
+    double sum = 0, max = 0;
     for (int i = -n / 10; i < n; i++) {
-        /* drag and motion change the limit by little */
+        /* 0.9: drag and motion change the limit a little */
         uint64_t began = pal_clock_thread_ns();
         if (pal_world_step(b->world, 0.9 * pal_world_limit_s(b->world)))
             return pal_diagnostic_set(diag, PAL_ERR_FROZEN, "an explicit step failed");
         if (i < 0) continue;
         ms[i] = 1e-6 * (double)(pal_clock_thread_ns() - began) / pal_world_substeps(b->world);
-        sum += iterations(b), most = fmax(most, iterations(b));
+        sum += iterations(b), max = fmax(max, iterations(b));
     }
     if (mean_cg) *mean_cg = sum / n;
-    if (max_cg) *max_cg = most;
+    if (max_cg) *max_cg = max;
     return PAL_ERR_OK;
 }
 
@@ -153,7 +149,7 @@ static pal_err measure(const pal_cell_model *model, result *out, pal_diagnostic 
     static double ms[N_STEP];
     body b;
     *out = (result){0};
-    pal_err err = take(model, &b, diag);
+    pal_err err = make_body(model, &b, diag);
     for (int op = 0; op < OPERATORS && !err; op++) {
         err = start(model, operator_name[op], "central_cg", NULL, &b, diag);
         if (!err && op == 0) describe(model, &b, out);
@@ -171,74 +167,60 @@ static pal_err measure(const pal_cell_model *model, result *out, pal_diagnostic 
     if (!err) err = run_frames(&b, N_FRAME, ms, NULL, &out->implicit_cg, diag);
     if (!err) out->implicit_ms = pal_median(ms, N_FRAME);
     if (!err && out->paper_ms > 0) out->ratio = out->paper_ms / out->step_ms[0];
-    leave(&b);
+    free_body(&b);
     return err;
 }
 
-/* ---- out ---- */
-
-static void print_paper(double ms)
+static void add_case(bench_report *r, const result *c)
 {
-    if (ms > 0)
-        printf("%8.0f ", ms);
-    else
-        printf("%8s ", "");
-}
-
-static void print_table(const result *r)
-{
-    printf("Table 1 of paper A, one core; medians of %d iterations, of %d frames; CG: iterations an iteration, with a "
-           "factor and (the paper's way) without\n",
-           N_STEP, N_FRAME);
-    printf("solid    levels  #CC  #FE here paper  %%cubic  %%linear  %%pyramid  paper ms  ms here  ms edges   ratio  "
-           "CG mean  most  diagonal  frame: sub-steps        ms    speed  implicit ms   speed    CG  made ms\n");
-    for (int k = 0; k < PAL_CELL_MODELS; k++) {
-        const pal_cell_model *m = r[k].model;
-        printf("%-8s %6d %4d %9d %5d %7.0f %8.0f %9.0f  ", m->name, m->n_level, r[k].n_cell, r[k].n_element,
-               m->n_element, r[k].percent[0], r[k].percent[1], r[k].percent[2]);
-        print_paper(r[k].paper_ms);
-        printf("%8.3f %9.3f ", r[k].step_ms[0], r[k].step_ms[1]);
-        print_paper(r[k].ratio);
-        printf("%7.2f %5.0f %9.1f %17d %9.2f %8.2f %12.3f %7.1f %5.1f %8.0f\n", r[k].mean_cg, r[k].max_cg,
-               r[k].diagonal_cg, r[k].n_sub, r[k].explicit_ms, 1e3 * frame_s / r[k].explicit_ms, r[k].implicit_ms,
-               1e3 * frame_s / r[k].implicit_ms, r[k].implicit_cg, r[k].make_ms);
-    }
-    for (int k = 0; k < PAL_CELL_MODELS; k++)
-        if (r[k].paper_ms > 0 && r[k].ratio < least_ratio)
-            printf("%s: %.0f times the paper's speed, wanted %.0f\n", r[k].model->name, r[k].ratio, least_ratio);
-}
-
-static void print_json(const result *r)
-{
-    printf("{\"bench\":\"solids\",\"steps\":%d,\"frames\":%d,\"frame_s\":%.9f,\"cases\":[", N_STEP, N_FRAME, frame_s);
-    for (int k = 0; k < PAL_CELL_MODELS; k++) {
-        const pal_cell_model *m = r[k].model;
-        printf("%s{\"name\":\"%s\",\"levels\":%d,\"cells\":%d,\"points\":%d,\"elements\":%d,\"paper_elements\":%d,"
-               "\"cubic_percent\":%.1f,\"linear_percent\":%.1f,\"pyramid_percent\":%.1f,\"paper_ms\":%.0f,"
-               "\"polar_ms\":%.4f,\"edges_ms\":%.4f,\"ratio\":%.1f,\"cg_mean\":%.2f,\"cg_most\":%.0f,"
-               "\"cg_diagonal\":%.2f,\"substeps\":%d,\"explicit_frame_ms\":%.3f,\"implicit_frame_ms\":%.4f,"
-               "\"implicit_cg\":%.2f,\"implicit_make_ms\":%.1f}",
-               k ? "," : "", m->name, m->n_level, r[k].n_cell, r[k].n_point, r[k].n_element, m->n_element,
-               r[k].percent[0], r[k].percent[1], r[k].percent[2], r[k].paper_ms, r[k].step_ms[0], r[k].step_ms[1],
-               r[k].ratio, r[k].mean_cg, r[k].max_cg, r[k].diagonal_cg, r[k].n_sub, r[k].explicit_ms, r[k].implicit_ms,
-               r[k].implicit_cg, r[k].make_ms);
-    }
-    printf("]}\n");
+    const pal_cell_model *m = c->model;
+    bool paper_has = c->paper_ms > 0;
+    bench_record(r);
+    bench_text(r, "name", "solid", -8, m->name);
+    bench_number(r, "levels", "levels", 6, 0, m->n_level);
+    bench_number(r, "cells", "#CC", 4, 0, c->n_cell);
+    bench_number(r, "control_points", NULL, 0, 0, c->n_point);
+    bench_number(r, "elements", "#FE", 5, 0, c->n_element);
+    bench_number(r, "paper_elements", "paper", 5, 0, m->n_element);
+    bench_number(r, "cubic_percent", "%cubic", 6, 0, c->percent[0]);
+    bench_number(r, "linear_percent", "%linear", 7, 0, c->percent[1]);
+    bench_number(r, "pyramid_percent", "%pyramid", 8, 0, c->percent[2]);
+    bench_number(r, "paper_ms", "paper ms", 8, 0, paper_has ? c->paper_ms : NAN);
+    bench_number(r, "polar_ms", "polar ms", 8, 3, c->step_ms[0]);
+    bench_number(r, "edges_ms", "edges ms", 8, 3, c->step_ms[1]);
+    bench_number(r, "ratio", "ratio", 6, 0, paper_has ? c->ratio : NAN);
+    bench_number(r, "cg_mean", "CG mean", 7, 2, c->mean_cg);
+    bench_number(r, "cg_max", "max", 4, 0, c->max_cg);
+    bench_number(r, "cg_diagonal", "diagonal", 8, 1, c->diagonal_cg);
+    bench_number(r, "substeps", "sub-steps", 9, 0, c->n_sub);
+    bench_number(r, "explicit_frame_ms", "explicit ms", 11, 2, c->explicit_ms);
+    bench_number(r, NULL, "speed", 6, 2, 1e3 * frame_s / c->explicit_ms);
+    bench_number(r, "implicit_frame_ms", "implicit ms", 11, 3, c->implicit_ms);
+    bench_number(r, NULL, "speed", 6, 1, 1e3 * frame_s / c->implicit_ms);
+    bench_number(r, "implicit_cg", "CG", 5, 1, c->implicit_cg);
+    bench_number(r, "implicit_make_ms", "make ms", 7, 0, c->make_ms);
 }
 
 int bench_solids(bool json)
 {
-    result r[PAL_CELL_MODELS];
-    pal_diagnostic diag = {{0}};
+    static result all[PAL_CELL_MODELS];
+    pal_diagnostic diag = {""};
     pal_err err = PAL_ERR_OK;
-    for (int k = 0; k < PAL_CELL_MODELS && !err; k++) err = measure(&pal_cell_model_list[k], &r[k], &diag);
-    if (err) {
-        fprintf(stderr, "palpate bench: solids: %s\n", diag.text[0] ? diag.text : pal_err_text(err));
-        return err == PAL_ERR_MEMORY ? 3 : 1;
-    }
-    if (json)
-        print_json(r);
-    else
-        print_table(r);
-    return 0;
+    for (int k = 0; k < PAL_CELL_MODELS && !err; k++) err = measure(&pal_cell_model_list[k], &all[k], &diag);
+    bench_report r;
+    bench_begin(&r, "solids", json);
+    bench_number(&r, "steps", NULL, 0, 0, N_STEP);
+    bench_number(&r, "frames", NULL, 0, 0, N_FRAME);
+    bench_number(&r, "frame_s", NULL, 0, 0, frame_s);
+    bench_note(&r,
+               "paper A, Table 1, one core; medians of %d iterations, of %d frames; CG: conjugate gradients in one "
+               "iteration, with a factor and (as in the paper) with the diagonal",
+               N_STEP, N_FRAME);
+    bench_list(&r, "cases");
+    for (int k = 0; k < PAL_CELL_MODELS && !err; k++) add_case(&r, &all[k]);
+    for (int k = 0; k < PAL_CELL_MODELS && !err; k++)
+        if (all[k].paper_ms > 0 && all[k].ratio < min_ratio)
+            bench_note(&r, "%s: %.0f times the speed of the paper, wanted %.0f", all[k].model->name, all[k].ratio,
+                       min_ratio);
+    return bench_end(&r, err, &diag);
 }

@@ -1,11 +1,13 @@
-/* palpate bench springs: milliseconds of a sub-step (forces and integration) and of skinning, against this machine's
- * own limits: memory triad and fused multiply-add. Medians over steps; the limits are the best of some runs.
+/* `palpate bench springs`: milliseconds of a sub-step (forces and integration) and of skinning, against the limits of
+ * this machine: memory triad and fused multiply-add. Medians over steps; a limit is the best of several runs.
  *
- * Floating point operations are counted from the kernels (one root is 17: a guess and four Newton steps); bytes are
- * what must stream past once a sub-step: constants, first slots and the nodes' positions and forces. The kernels add
- * and multiply apart, so that the answer is the same everywhere: half of the multiply-add limit is all they can reach.
- */
+ * Floating point operations are counted from the kernels (a root counts 17: a guess and four Newton steps); bytes are
+ * those that a sub-step must stream: constants, first slots, positions and forces of the nodes. The kernels add and
+ * multiply in separate instructions, so that results are the same on every machine: they reach half of the
+ * multiply-add limit at most. */
 #include "server/bench/bench.h"
+#include "server/bench/bench_body.h"
+#include "server/bench/bench_report.h"
 
 #include "server/base/clock.h"
 #include "server/cli/median.h"
@@ -22,7 +24,7 @@ enum { N_CASE = 3, N_STEP = 31, TRIAD = 4 << 20, CHAINS = 128, LINKS = 16 };
 typedef struct result {
     char name[48];
     int n_tet, n_node, n_tri, n_sub;
-    double step_ms, row_ms[3], solve_ms, skin_ms; /* a sub-step; its three spring rows; verlet; a frame */
+    double step_ms, spring_ms[3], solve_ms, skin_ms; /* sub-step; its three spring components; verlet; a frame */
     double limit_ms, flop, byte;
 } result;
 
@@ -34,7 +36,7 @@ static double measure_triad(void)
         double began = pal_clock_s();
         for (int i = 0; i < TRIAD; i++) a[i] = b[i] + 3.0 * c[i];
         best = fmin(best, pal_clock_s() - began);
-        /* the next run needs this one's sum, so that none is left out */
+        /* each run depends on the one before, so that the compiler keeps all */
         b[run] = a[run] + 1;
     }
     free(a), free(b), free(c);
@@ -67,21 +69,7 @@ static double measure_fma(void)
     return value[0] == value[CHAINS - 1] ? 2e-9 * CHAINS * LINKS * n / best : 0;
 }
 
-/* a box of voxels, shown by its own boundary */
-static pal_err make_box(const int n[3], pal_prepared *out)
-{
-    size_t n_voxel = (size_t)n[0] * (size_t)n[1] * (size_t)n[2];
-    pal_voxels voxels = {.n = {n[0], n[1], n[2]}, .edge_m = 0.006, .n_inside = (int64_t)n_voxel};
-    memset(out, 0, sizeof *out);
-    voxels.kind = malloc(n_voxel);
-    if (!voxels.kind) return PAL_ERR_MEMORY;
-    memset(voxels.kind, 2, n_voxel);
-    pal_err err = pal_voxels_split(&voxels, &out->tets);
-    pal_voxels_free(&voxels);
-    return err;
-}
-
-/* an organ shown with 50,000 triangles, at the resolution whose mesh comes nearest to 13,000 tetrahedra */
+/* an organ with a surface of 50,000 triangles, at the resolution that gives nearest to 13,000 tetrahedra */
 static pal_err make_organ(pal_prepared *out, pal_diagnostic *diag)
 {
     pal_surface surface = {0};
@@ -106,7 +94,7 @@ static pal_err make_organ(pal_prepared *out, pal_diagnostic *diag)
     return err;
 }
 
-/* constraints, their operations and bytes, from the rows' own meshes */
+/* floating point operations and bytes of one sub-step */
 static pal_err count_work(const pal_tets *tets, result *out)
 {
     int32_t *edge = NULL, *face = NULL;
@@ -120,25 +108,18 @@ static pal_err count_work(const pal_tets *tets, result *out)
     return err;
 }
 
-static void sum_rows(const pal_world *world, result *r, double *skin_ns)
+static void read_times(const pal_world *world, result *r)
 {
-    static const char *const springs[3] = {"edge_distance", "face_area", "tet_volume"};
-    *skin_ns = r->step_ms = r->solve_ms = 0;
-    for (int i = 0; i < pal_world_component_count(world); i++) {
-        pal_component_info info;
-        pal_world_component_info(world, i, &info);
-        double ms = 1e-6 * (double)info.spent_ns / r->n_sub;
-        if (!strcmp(info.stage, "output")) *skin_ns = (double)info.spent_ns;
-        if (!strcmp(info.stage, "solve")) r->solve_ms = ms;
-        if (!strcmp(info.stage, "force") || !strcmp(info.stage, "solve")) r->step_ms += ms;
-        for (int k = 0; k < 3; k++)
-            if (!strcmp(info.name, springs[k])) r->row_ms[k] = ms;
-    }
+    static const char *const spring[3] = {"edge_distance", "face_area", "tet_volume"};
+    r->skin_ms = bench_component_ms(world, "output", NULL);
+    r->solve_ms = bench_component_ms(world, "solve", NULL) / r->n_sub;
+    r->step_ms = bench_component_ms(world, "force", NULL) / r->n_sub + r->solve_ms;
+    for (int k = 0; k < 3; k++) r->spring_ms[k] = bench_component_ms(world, NULL, spring[k]) / r->n_sub;
 }
 
 static pal_err run_world(const pal_scene *scene, result *out, pal_diagnostic *diag)
 {
-    double step[N_STEP], row[3][N_STEP], solve[N_STEP], skin[N_STEP];
+    double step[N_STEP], spring[3][N_STEP], solve[N_STEP], skin[N_STEP];
     pal_world *world;
     PAL_TRY(pal_world_create(scene, diag, &world));
     pal_err err = PAL_ERR_OK;
@@ -147,15 +128,15 @@ static pal_err run_world(const pal_scene *scene, result *out, pal_diagnostic *di
         err = pal_world_step(world, scene->step_s);
         out->n_sub = pal_world_substeps(world);
         if (i < 0) continue;
-        sum_rows(world, out, &skin[i]);
-        step[i] = out->step_ms, solve[i] = out->solve_ms;
-        for (int k = 0; k < 3; k++) row[k][i] = out->row_ms[k];
+        read_times(world, out);
+        step[i] = out->step_ms, solve[i] = out->solve_ms, skin[i] = out->skin_ms;
+        for (int k = 0; k < 3; k++) spring[k][i] = out->spring_ms[k];
     }
     pal_world_destroy(world);
     if (err) return pal_diagnostic_set(diag, err, "the step failed: %s", pal_err_text(err));
     out->step_ms = pal_median(step, N_STEP), out->solve_ms = pal_median(solve, N_STEP);
-    out->skin_ms = 1e-6 * pal_median(skin, N_STEP);
-    for (int k = 0; k < 3; k++) out->row_ms[k] = pal_median(row[k], N_STEP);
+    out->skin_ms = pal_median(skin, N_STEP);
+    for (int k = 0; k < 3; k++) out->spring_ms[k] = pal_median(spring[k], N_STEP);
     return PAL_ERR_OK;
 }
 
@@ -179,36 +160,26 @@ static pal_err run_case(const char *name, const pal_prepared *mesh, double limit
     return err;
 }
 
-static void print_table(const result *r, double triad, double fma_limit)
+static void add_case(bench_report *r, const result *c, double triad, double fma_limit)
 {
-    printf("one thread, medians of %d steps; this machine: triad %.1f GB/s, multiply-add %.1f GFLOP/s\n", N_STEP, triad,
-           fma_limit);
-    printf("body            tets   nodes  ms/sub-step  edges  faces   tets  verlet  limit  GFLOP/s  of limit   GB/s  "
-           "of triad  sub-steps  triangles  skin ms\n");
-    for (int k = 0; k < N_CASE; k++) {
-        double gflops = 1e-6 * r[k].flop / r[k].step_ms, gbs = 1e-6 * r[k].byte / r[k].step_ms;
-        printf("%-12s %7d %7d %12.3f %6.3f %6.3f %6.3f %7.3f %6.2f %8.1f %8.0f%% %6.1f %8.0f%% %10d", r[k].name,
-               r[k].n_tet, r[k].n_node, r[k].step_ms, r[k].row_ms[0], r[k].row_ms[1], r[k].row_ms[2], r[k].solve_ms,
-               r[k].limit_ms, gflops, 100 * gflops / fma_limit, gbs, 100 * gbs / triad, r[k].n_sub);
-        if (r[k].n_tri > 0) printf(" %10d %8.3f", r[k].n_tri, r[k].skin_ms);
-        printf("\n");
-    }
-}
-
-static void print_json(const result *r, double triad, double fma_limit)
-{
-    printf("{\"bench\":\"springs\",\"runs\":%d,\"triad_GB_s\":%.2f,\"fma_GFLOP_s\":%.2f,\"cases\":[", N_STEP, triad,
-           fma_limit);
-    for (int k = 0; k < N_CASE; k++) {
-        double gflops = 1e-6 * r[k].flop / r[k].step_ms, gbs = 1e-6 * r[k].byte / r[k].step_ms;
-        printf("%s{\"name\":\"%s\",\"tets\":%d,\"nodes\":%d,\"substep_ms\":%.4f,\"edge_distance_ms\":%.4f,"
-               "\"face_area_ms\":%.4f,\"tet_volume_ms\":%.4f,\"verlet_ms\":%.4f,\"limit_ms\":%.2f,\"GFLOP_s\":%.2f,"
-               "\"of_fma\":%.3f,\"GB_s\":%.2f,\"of_triad\":%.3f,\"substeps\":%d,\"triangles\":%d,\"skin_ms\":%.4f}",
-               k ? "," : "", r[k].name, r[k].n_tet, r[k].n_node, r[k].step_ms, r[k].row_ms[0], r[k].row_ms[1],
-               r[k].row_ms[2], r[k].solve_ms, r[k].limit_ms, gflops, gflops / fma_limit, gbs, gbs / triad, r[k].n_sub,
-               r[k].n_tri, r[k].skin_ms);
-    }
-    printf("]}\n");
+    double gflops = 1e-6 * c->flop / c->step_ms, gbs = 1e-6 * c->byte / c->step_ms;
+    bench_record(r);
+    bench_text(r, "name", "body", -10, c->name);
+    bench_number(r, "tets", "tets", 7, 0, c->n_tet);
+    bench_number(r, "nodes", "nodes", 7, 0, c->n_node);
+    bench_number(r, "substep_ms", "ms/sub-step", 11, 3, c->step_ms);
+    bench_number(r, "edge_distance_ms", "edges", 6, 3, c->spring_ms[0]);
+    bench_number(r, "face_area_ms", "faces", 6, 3, c->spring_ms[1]);
+    bench_number(r, "tet_volume_ms", "tets", 6, 3, c->spring_ms[2]);
+    bench_number(r, "verlet_ms", "verlet", 7, 3, c->solve_ms);
+    bench_number(r, "limit_ms", "limit", 6, 2, c->limit_ms);
+    bench_number(r, "GFLOP_s", "GFLOP/s", 8, 1, gflops);
+    bench_number(r, "of_fma", "of limit", 8, 2, gflops / fma_limit);
+    bench_number(r, "GB_s", "GB/s", 6, 1, gbs);
+    bench_number(r, "of_triad", "of triad", 8, 2, gbs / triad);
+    bench_number(r, "substeps", "sub-steps", 9, 0, c->n_sub);
+    bench_number(r, "triangles", "triangles", 9, 0, c->n_tri);
+    bench_number(r, "skin_ms", "skin ms", 8, 3, c->n_tri > 0 ? c->skin_ms : NAN);
 }
 
 int bench_springs(bool json)
@@ -216,22 +187,24 @@ int bench_springs(bool json)
     static const int box[2][3] = {{20, 13, 10}, {40, 26, 25}};
     static const char *const name[N_CASE] = {"box 13k", "box 130k", "organ 13k"};
     static const double limit_ms[N_CASE] = {0.25, 3, 0.25};
-    result r[N_CASE];
-    pal_diagnostic diag = {{0}};
-    for (int k = 0; k < N_CASE; k++) {
+    result all[N_CASE];
+    pal_diagnostic diag = {""};
+    pal_err err = PAL_ERR_OK;
+    for (int k = 0; k < N_CASE && !err; k++) {
         pal_prepared mesh = {0};
-        pal_err err = k < 2 ? make_box(box[k], &mesh) : make_organ(&mesh, &diag);
-        if (!err) err = run_case(name[k], &mesh, limit_ms[k], &r[k], &diag);
+        err = k < 2 ? bench_box(box[k], 0.006, &mesh, &diag) : make_organ(&mesh, &diag);
+        if (!err) err = run_case(name[k], &mesh, limit_ms[k], &all[k], &diag);
         pal_prepared_free(&mesh);
-        if (err) {
-            fprintf(stderr, "palpate bench: springs: %s\n", diag.text[0] ? diag.text : pal_err_text(err));
-            return err == PAL_ERR_MEMORY ? 3 : 1;
-        }
     }
     double triad = measure_triad(), fma_limit = measure_fma();
-    if (json)
-        print_json(r, triad, fma_limit);
-    else
-        print_table(r, triad, fma_limit);
-    return 0;
+    bench_report r;
+    bench_begin(&r, "springs", json);
+    bench_number(&r, "steps", NULL, 0, 0, N_STEP);
+    bench_number(&r, "triad_GB_s", NULL, 0, 0, triad);
+    bench_number(&r, "fma_GFLOP_s", NULL, 0, 0, fma_limit);
+    bench_note(&r, "one thread, medians of %d steps; this machine: triad %.1f GB/s, multiply-add %.1f GFLOP/s", N_STEP,
+               triad, fma_limit);
+    bench_list(&r, "cases");
+    for (int k = 0; k < N_CASE && !err; k++) add_case(&r, &all[k], triad, fma_limit);
+    return bench_end(&r, err, &diag);
 }

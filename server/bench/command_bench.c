@@ -7,27 +7,31 @@
 
 int command_bench(int argc, char **argv)
 {
+    static const struct {
+        const char *name;
+        int (*run)(bool json);
+    } bench[] = {{"springs", bench_springs},   {"fem", bench_fem},           {"solids", bench_solids},
+                 {"guards", bench_guards},     {"protocol", bench_protocol}, {"sleep", bench_sleep},
+                 {"estimate", bench_estimate}, {"latency", bench_latency}};
     const char *picture = NULL;
     const pal_flag flag[] = {{"--picture", "FILE.svg", PAL_FLAG_TEXT, &picture, 0, 0,
-                              "adaptive: where the pressed vertex is over time (paper C Figs. 10 and 12)"}};
+                              "adaptive: plot the displacement of the pressed vertex (paper C, Figs. 10 and 12)"}};
     const pal_flag_table table = {
-        .usage =
-            "bench mesh [SURFACE.ply] | springs | adaptive | fem | solids | guards | calibrate [FOLDER] | protocol | "
-            "sleep | estimate | latency [flags]",
-        .about = "Measures this machine, medians of several runs:\n"
-                 "  mesh      preparation of tetrahedra at several resolutions (of a "
-                 "procedural organ without SURFACE)\n"
-                 "  springs   forces, integration and skinning against the machine's limits\n"
-                 "  adaptive  surfaces that refine where they are touched: coarse, refined, adaptive\n"
-                 "  fem       live steps and static solves of finite elements\n"
-                 "  solids    subdivided solids as finite elements (paper A Table 1)\n"
-                 "  calibrate springs fitted to finite elements, by gradient and by "
-                 "annealing (FOLDER: deploy/problems)\n"
-                 "  guards    what being on guard costs while nothing goes wrong, as a share of a step\n"
-                 "  protocol  encoding and decoding of frames\n"
-                 "  sleep     bodies at rest: awake, watched by nobody, asleep\n"
-                 "  estimate  what is foreseen of a live setting's neighbours against what they take and leave\n"
-                 "  latency   from a pose put into a session to the frame that shows it\n",
+        .usage = "bench NAME [flags]",
+        .about = "Measures this machine, medians of several runs. NAME is one of\n"
+                 "  mesh [SURFACE.ply]  tetrahedra of a surface, or of a computed organ, at several resolutions\n"
+                 "  springs             forces, integration and skinning against the limits of the machine\n"
+                 "  adaptive            surfaces that refine where they are touched: coarse, refined, adaptive\n"
+                 "  fem                 live steps and static solves of finite elements\n"
+                 "  solids              subdivision solids as finite elements (paper A, Table 1)\n"
+                 "  calibrate [FOLDER]  springs fitted to finite elements, by gradient and by annealing\n"
+                 "                      (FOLDER: deploy/problems)\n"
+                 "  guards              cost of the guards while nothing goes wrong, as a share of a step\n"
+                 "  protocol            encoding and decoding of frames\n"
+                 "  sleep               bodies at rest: awake, not observed, asleep\n"
+                 "  estimate            predicted cost and error of other configurations against measured ones\n"
+                 "  latency             from a pose put into a session to the frame that shows it\n",
+        .example = "palpate bench protocol\n",
         .flag = flag,
         .n_flag = sizeof flag / sizeof flag[0],
         .min_operand = 1,
@@ -37,27 +41,14 @@ int command_bench(int argc, char **argv)
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
     if (code >= 0) return code;
     bool mesh = !strcmp(word[0], "mesh"), calibrate = !strcmp(word[0], "calibrate");
-    if (n == 2 && !mesh && !calibrate) {
-        fprintf(stderr, "palpate bench: \"%.60s\" is one word too many (see palpate bench --help)\n", word[1]);
-        return 2;
-    }
-    if (picture && strcmp(word[0], "adaptive") != 0) {
-        fprintf(stderr, "palpate bench: --picture belongs to adaptive (see palpate bench --help)\n");
-        return 2;
-    }
-    /* a quiet bench is one that only has to run */
+    if (n == 2 && !mesh && !calibrate) return pal_flags_wrong(&common, "\"%.60s\" is one operand too many", word[1]);
+    if (picture && strcmp(word[0], "adaptive") != 0) return pal_flags_wrong(&common, "--picture belongs to adaptive");
+    /* a quiet bench only has to run */
     if (common.quiet && !common.json && !freopen("/dev/null", "w", stdout)) return 3;
     if (mesh) return bench_mesh(word[1], common.json);
     if (calibrate) return bench_calibrate(word[1], common.json);
-    if (!strcmp(word[0], "springs")) return bench_springs(common.json);
     if (!strcmp(word[0], "adaptive")) return bench_adaptive(common.json, picture);
-    if (!strcmp(word[0], "fem")) return bench_fem(common.json);
-    if (!strcmp(word[0], "solids")) return bench_solids(common.json);
-    if (!strcmp(word[0], "guards")) return bench_guards(common.json);
-    if (!strcmp(word[0], "protocol")) return bench_protocol(common.json);
-    if (!strcmp(word[0], "sleep")) return bench_sleep(common.json);
-    if (!strcmp(word[0], "estimate")) return bench_estimate(common.json);
-    if (!strcmp(word[0], "latency")) return bench_latency(common.json);
-    fprintf(stderr, "palpate bench: there is no bench \"%.60s\" (see palpate bench --help)\n", word[0]);
-    return 2;
+    for (size_t k = 0; k < sizeof bench / sizeof bench[0]; k++)
+        if (!strcmp(word[0], bench[k].name)) return bench[k].run(common.json);
+    return pal_flags_wrong(&common, "there is no bench \"%.60s\"", word[0]);
 }

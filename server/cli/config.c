@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FILE_MOST = 1 << 16, VARIABLE = 64 };
+enum { FILE_MAX = 1 << 16, VARIABLE = 64 };
 #define PLACE(field) offsetof(pal_config, field), sizeof(((pal_config *)0)->field)
 
 static const pal_config_key setting[] = {
@@ -145,7 +145,7 @@ static pal_err read_keys(pal_config *config, const char *name, const cJSON *root
         snprintf(where, sizeof where, "%.180s: %.60s", name, item->string);
         if (!s) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: unknown key", where);
         if (cJSON_GetObjectItemCaseSensitive(root, item->string) != item)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: the key is there twice", where);
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: the key is given twice", where);
         PAL_TRY(set_json(config, s, item, where, diag));
     }
     return PAL_ERR_OK;
@@ -155,8 +155,8 @@ pal_err pal_config_parse(pal_config *config, const char *name, const char *json,
 {
     const char *end = json;
     int line = 1;
-    if (n_byte > FILE_MOST)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %zu bytes, more than %d", name, n_byte, FILE_MOST);
+    if (n_byte > FILE_MAX)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %zu bytes, more than %d", name, n_byte, FILE_MAX);
     cJSON *root = n_byte ? cJSON_ParseWithLengthOpts(json, n_byte, &end, false) : NULL;
     size_t at = end >= json ? (size_t)(end - json) : 0;
     while (root && at < n_byte && strchr(" \t\r\n", json[at])) at++;
@@ -176,7 +176,7 @@ pal_err pal_config_file(pal_config *config, const char *path, pal_diagnostic *di
 {
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, FILE_MOST, &bytes, &n_byte, diag));
+    PAL_TRY(pal_file_read(path, FILE_MAX, &bytes, &n_byte, diag));
     pal_err err = pal_config_parse(config, path, (const char *)bytes, n_byte, diag);
     free(bytes);
     return err;

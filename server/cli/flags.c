@@ -1,5 +1,4 @@
-/* The flag parser. Configuration flags are first only remembered, because the file and the environment come before
- * them. */
+/* The flag parser. Configuration flags are stored first and applied last, after the file and the environment. */
 #include "server/cli/flags.h"
 
 #include "server/cli/report.h"
@@ -53,6 +52,10 @@ static int manual(const pal_flag_table *table)
     char name[KEY];
     int n;
     printf("usage: palpate %s\n\n%s\n", table->usage, table->about);
+    if (table->example) printf("EXAMPLES (from the top folder of the tree, with build/release/bin in PATH)\n");
+    for (const char *line = table->example; line && *line; line = strchr(line, '\n') + 1)
+        printf("  %.*s\n", (int)strcspn(line, "\n"), line);
+    printf("%sFLAGS\n", table->example ? "\n" : "");
     for (int k = 0; k < table->n_flag; k++) manual_line(table->flag[k].name, table->flag[k].value, table->flag[k].help);
     if (table->config) {
         const pal_config_key *setting = pal_config_keys(&n);
@@ -60,22 +63,22 @@ static int manual(const pal_flag_table *table)
             flag_name(setting[k].key, name);
             manual_line(name, setting[k].kind == PAL_CONFIG_KEY_BOOL ? NULL : setting[k].value, setting[k].help);
         }
-        manual_line("--config", "FILE", "JSON file of these settings (PALPATE_CONFIG, or none)");
+        manual_line("--config", "FILE", "JSON file of these keys (PALPATE_CONFIG, or none)");
     }
     manual_line("--json", NULL, "one JSON object on stdout and nothing else");
-    manual_line("--quiet", NULL, "say nothing but a refusal");
+    manual_line("--quiet", NULL, "print nothing but a refusal");
     manual_line("--help", NULL, "this text");
     if (table->config)
-        printf("\nA setting may also stand in the file under its key (allow_remote) or in the environment\n"
-               "(PALPATE_ALLOW_REMOTE); flags win over the environment, that over the file.\n");
-    printf("\nexit code: 0 ok, 1 input refused, 2 wrong usage, 3 internal\n");
+        printf("\nThe file and the environment take the same keys (allow_remote, PALPATE_ALLOW_REMOTE). Flags override "
+               "the\n"
+               "environment, the environment overrides the file.\n");
+    printf("\nExit code: 0 ok, 1 input refused, 2 wrong usage, 3 internal error\n");
     return 0;
 }
 
 /* ---- parsing ---- */
 
-static int wrong(const parse *p, const char *format, ...) __attribute__((format(printf, 2, 3)));
-static int wrong(const parse *p, const char *format, ...)
+int pal_flags_wrong(const pal_flag_common *common, const char *format, ...)
 {
     char text[400];
     va_list args;
@@ -84,8 +87,27 @@ static int wrong(const parse *p, const char *format, ...)
     va_end(args);
     for (char *c = text; *c; c++)
         if ((unsigned char)*c < 0x20) *c = ' ';
-    fprintf(stderr, "palpate %s: %s (see palpate %s --help)\n", p->common->command, text, p->common->command);
+    fprintf(stderr, "palpate %s: %s (see palpate %s --help)\n", common->command, text, common->command);
     return USAGE;
+}
+
+/* text is one of the words of value, "linear|corotational|neo_hookean" */
+static int set_word(const parse *p, const pal_flag *flag, const char *text)
+{
+    char list[200] = "";
+    size_t n = strlen(text), used = 0;
+    for (const char *word = flag->value; *word;) {
+        size_t length = strcspn(word, "|");
+        if (length == n && !strncmp(word, text, n)) {
+            *(const char **)flag->out = text;
+            return -1;
+        }
+        const char *next = word + length + (word[length] == '|');
+        const char *link = !used ? "" : *next ? ", " : " or ";
+        used += (size_t)snprintf(list + used, sizeof list - used, "%s%.*s", link, (int)length, word);
+        word = next;
+    }
+    return pal_flags_wrong(p->common, "%s: \"%.60s\" is not %s", flag->name, text, list);
 }
 
 static int set_number(const parse *p, const pal_flag *flag, const char *text)
@@ -93,11 +115,12 @@ static int set_number(const parse *p, const pal_flag *flag, const char *text)
     char *end;
     double number = strtod(text, &end);
     if (end == text || *end || isspace((unsigned char)*text) || !isfinite(number))
-        return wrong(p, "%s: \"%.60s\" is not a number", flag->name, text);
+        return pal_flags_wrong(p->common, "%s: \"%.60s\" is not a number", flag->name, text);
     if (!(number >= flag->low && number <= flag->high))
-        return wrong(p, "%s: %.15g is outside %.10g .. %.10g", flag->name, number, flag->low, flag->high);
+        return pal_flags_wrong(p->common, "%s: %.15g is outside %.10g .. %.10g", flag->name, number, flag->low,
+                               flag->high);
     if (flag->kind == PAL_FLAG_COUNT && number != floor(number))
-        return wrong(p, "%s: %.15g is not a whole number", flag->name, number);
+        return pal_flags_wrong(p->common, "%s: %.15g is not a whole number", flag->name, number);
     if (flag->kind == PAL_FLAG_COUNT)
         *(int *)flag->out = (int)number;
     else
@@ -114,6 +137,8 @@ static int set_flag(parse *p, const pal_flag *flag, const char *text)
     case PAL_FLAG_TEXT:
         *(const char **)flag->out = text;
         return -1;
+    case PAL_FLAG_WORD:
+        return set_word(p, flag, text);
     case PAL_FLAG_NUMBER:
     case PAL_FLAG_COUNT:
         break;
@@ -134,7 +159,7 @@ static const pal_config_key *setting_named(const pal_flag_table *table, const ch
     return NULL;
 }
 
-/* the flag argv[*at], moving *at over a value that stands on its own */
+/* the flag argv[*at]; moves *at over a value that is an argument of its own */
 static int take(parse *p, int argc, char **argv, int *at)
 {
     char name[KEY];
@@ -146,18 +171,20 @@ static int take(parse *p, int argc, char **argv, int *at)
     const pal_config_key *setting = found < 0 ? setting_named(p->table, name) : NULL;
     bool config_file = p->table->config && !strcmp(name, "--config");
     bool json = !strcmp(name, "--json"), quiet = !strcmp(name, "--quiet");
-    if (found < 0 && !setting && !config_file && !json && !quiet) return wrong(p, "unknown flag %.60s", word);
+    if (found < 0 && !setting && !config_file && !json && !quiet)
+        return pal_flags_wrong(p->common, "unknown flag %.60s", word);
     bool is_switch = json || quiet || (found >= 0 && p->table->flag[found].kind == PAL_FLAG_SWITCH) ||
                      (setting && setting->kind == PAL_CONFIG_KEY_BOOL);
-    if (is_switch && equal) return wrong(p, "%s takes no value", name);
-    if (!is_switch && !equal && *at + 1 >= argc) return wrong(p, "%s needs a value", name);
+    if (is_switch && equal) return pal_flags_wrong(p->common, "%s takes no value", name);
+    if (!is_switch && !equal && *at + 1 >= argc) return pal_flags_wrong(p->common, "%s needs a value", name);
     const char *text = is_switch ? "true" : equal ? equal + 1 : argv[++*at];
     if (json) p->common->json = true;
     if (quiet) p->common->quiet = true;
     if (json || quiet) return -1;
-    if (config_file ? p->config_file != NULL : found >= 0 && p->seen[found]) return wrong(p, "%s is there twice", name);
+    if (config_file ? p->config_file != NULL : found >= 0 && p->seen[found])
+        return pal_flags_wrong(p->common, "%s is given twice", name);
     for (int k = 0; setting && k < p->n_given; k++)
-        if (p->given[k].setting == setting) return wrong(p, "%s is there twice", name);
+        if (p->given[k].setting == setting) return pal_flags_wrong(p->common, "%s is given twice", name);
     if (config_file) {
         p->config_file = text;
     } else if (setting) {
@@ -170,7 +197,7 @@ static int take(parse *p, int argc, char **argv, int *at)
     return -1;
 }
 
-/* defaults < file < environment < flags; a bad flag is wrong usage, the rest refused input */
+/* defaults < file < environment < flags; a bad flag is wrong usage, a bad file or variable is refused input */
 static int configure(parse *p)
 {
     pal_config *config = p->table->config;
@@ -184,7 +211,7 @@ static int configure(parse *p)
         char name[KEY];
         flag_name(p->given[k].setting->key, name);
         if (pal_config_set(config, p->given[k].setting->key, p->given[k].text, name, &diag))
-            return wrong(p, "%s", diag.text);
+            return pal_flags_wrong(p->common, "%s", diag.text);
     }
     return -1;
 }
@@ -209,11 +236,12 @@ int pal_flags_parse(const pal_flag_table *table, int argc, char **argv, pal_flag
             int code = take(&p, argc, argv, &k);
             if (code >= 0) return code;
         } else {
-            if (n == table->max_operand) return wrong(&p, "\"%.60s\" is one word too many", word);
+            if (n == table->max_operand) return pal_flags_wrong(p.common, "\"%.60s\" is one operand too many", word);
             operand[n++] = word;
         }
     }
-    if (n < table->min_operand) return wrong(&p, "%s", n ? "a word is missing" : "nothing to work on was named");
+    if (n < table->min_operand)
+        return pal_flags_wrong(p.common, "%s", n ? "an operand is missing" : "no operand is given");
     if (n_operand) *n_operand = n;
     return table->config ? configure(&p) : -1;
 }

@@ -1,6 +1,8 @@
-/* Refusals, progress, JSON. */
 #include "server/cli/report.h"
 
+#include <math.h>
+#include <signal.h>
+#include <stdatomic.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <string.h>
@@ -62,4 +64,42 @@ void pal_report_progress(const char *what, double fraction, void *user)
         fprintf(stderr, "\r\033[K%s", what);
     fflush(stderr);
     shown = what != NULL;
+}
+
+void pal_json_add_finite(cJSON *object, const char *key, double value)
+{
+    if (isfinite(value)) cJSON_AddNumberToObject(object, key, value);
+}
+
+void pal_json_add_or_null(cJSON *object, const char *key, double value)
+{
+    cJSON_AddItemToObject(object, key, isfinite(value) ? cJSON_CreateNumber(value) : cJSON_CreateNull());
+}
+
+/* a handler may run on any thread: a lock-free atomic is safe in it and between threads */
+static atomic_int stop_asked;
+
+static void on_stop(int number)
+{
+    (void)number;
+    stop_asked = 1;
+}
+
+void pal_stop_watch(void)
+{
+    struct sigaction action = {.sa_handler = on_stop, .sa_flags = (int)SA_RESETHAND};
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+}
+
+bool pal_stop_asked(void)
+{
+    return stop_asked;
+}
+
+bool pal_report_continue(const char *what, double fraction, void *user)
+{
+    pal_report_progress(what, fraction, user);
+    return !stop_asked;
 }

@@ -14,13 +14,22 @@ typedef struct pal_flag_common {
 
 /* exit code of an error: 0 ok, 3 for INTERNAL and MEMORY, else 1 */
 int pal_report_code(pal_err err);
-/* one line on stderr, "palpate COMMAND: sentence" (line ends in the sentence become blanks), with --json also
+/* one line on stderr, "palpate COMMAND: sentence" (line breaks in the sentence become blanks), with --json also
  * {"ok": false, "error": {"code": "REFUSED", "text": "..."}} on stdout; the result is the exit code */
 int pal_report_refusal(const pal_flag_common *common, pal_err err, const pal_diagnostic *diag);
-/* prints the object on stdout (one line) and deletes it; the result is 0, or 3 when it could not be made or written */
+/* prints the object on stdout (one line) and takes it; the result is 0, or 3 when it could not be made or written */
 int pal_report_json(const pal_flag_common *common, cJSON *object);
+/* a number that is not finite is left out, or becomes null */
+void pal_json_add_finite(cJSON *object, const char *key, double value);
+void pal_json_add_or_null(cJSON *object, const char *key, double value);
 
-/* progress for people: "fill 42 %" on one line of stderr that is rewritten; only on a terminal and neither quiet nor
- * json. user is the pal_flag_common, so that it fits the callbacks of the scene room; what NULL clears the line */
+/* progress on one line of stderr that is rewritten, "fill 42 %"; only on a terminal, without --quiet and --json. user
+ * is the pal_flag_common, so that it fits callbacks; what NULL clears the line */
 void pal_report_progress(const char *what, double fraction, void *user);
+/* the same for callbacks that may end the work: false once a stop is asked for */
+bool pal_report_continue(const char *what, double fraction, void *user);
+
+/* SIGINT and SIGTERM ask for a stop; the second one ends the process */
+void pal_stop_watch(void);
+bool pal_stop_asked(void);
 #endif

@@ -1,8 +1,8 @@
-/* `palpate-calibrate-mpi`: calibration by annealing whose evaluations run on many processes (MPI ranks), for studies
- * over many organs, cases and seeds. Rank 0 walks; every rank makes the same calibration from the same files and
- * evaluates what it is sent; points go round robin. E depends on theta alone and the walk on the seed alone, so that
- * the answer is the same to the bit for any number of ranks, and after an interruption: what was gathered stands in the
- * journal and is taken from there. */
+/* `palpate-calibrate-mpi`: calibration by annealing whose evaluations run on many processes (MPI ranks), for studies of
+ * many organs, load cases and seeds. Rank 0 anneals; every rank makes the same calibration from the same files and
+ * evaluates what rank 0 sends, points in turn. The cost depends on theta alone and the annealing on the seed alone, so
+ * the result is the same to the bit for any number of ranks and after an interruption: evaluations in the journal are
+ * read instead of computed. */
 #include "server/base/clock.h"
 #include "server/base/team.h"
 #include "server/calibrate/calibrate_cases.h"
@@ -21,48 +21,47 @@
 #include <string.h>
 #include <time.h>
 
-enum { MOST_PROBLEM = 256, MOST_SEED = 64, TAG_COUNT = 1, TAG_THETA, TAG_COST, COUNT_END = -1 };
+enum { MAX_PROBLEM = 256, MAX_SEED = 64, TAG_COUNT = 1, TAG_THETA, TAG_COST, COUNT_END = -1 };
 
 static const char about[] =
-    "Calibrates springs as `palpate calibrate --method annealing` does, with evaluations spread over MPI ranks, for\n"
-    "many problems and seeds one after another. Every evaluation that is gathered is written to the journal; a run "
-    "that\n"
-    "was broken off and is begun again with the same journal takes them from there and ends with the same answer.\n"
-    "A problem that is refused is named, and the next one begun. -o DIR: DIR/NAME.json with the constants of each\n"
-    "(NAME_S.json with several seeds S).\n"
-    "Example: mpirun -n 4 palpate-calibrate-mpi liver.json kidney.json --case push --journal study.txt -o study\n";
+    "Calibrates springs as `palpate calibrate --method annealing` does, with evaluations distributed over MPI ranks, "
+    "for\n"
+    "many problems and seeds one after another. Every evaluation is written to the journal; a run that is started "
+    "again\n"
+    "with the same journal reads them from there and ends with the same result. A problem that is refused is reported\n"
+    "and the next one started. -o DIR: DIR/NAME.json with the constants of each (NAME_S.json with several seeds S).\n";
 
-/* one process' view of the whole job */
+/* the state of one process */
 typedef struct job {
     pal_flag_common common;
-    const char *problem[MOST_PROBLEM];
+    const char *problem[MAX_PROBLEM];
     int n_problem;
     pal_calibrate_input input;
     pal_calibrate_options options;
     const char *journal_path, *folder, *grid_text, *seed_text;
-    int seed[MOST_SEED], n_seed;
+    int seed[MAX_SEED], n_seed;
     int n_worker, evaluations;
     double budget_s, target_percent;
     int rank, n_rank, n_batch; /* n_batch: points of a batch, of the largest team on every rank */
     pal_journal *journal;      /* rank 0 */
     pal_team *team;
-    /* the problem at hand */
+    /* the current problem */
     pal_calibrate_cases *set;
     pal_calibration *c;
     pal_calibration_info info;
     pal_calibration_workspace *workspace[PAL_TEAM_MAX];
-    uint64_t print; /* fingerprint of what is evaluated */
-    /* evaluations of the batch at hand */
+    uint64_t fingerprint; /* of the cost function */
+    /* the current batch */
     double *theta, *cost; /* [batch][n_parameter], [batch] */
     bool no_memory;       /* in one of them */
-    int *missing;         /* points of the batch that the journal has not [batch] */
+    int *missing;         /* points of the batch that are not in the journal [batch] */
     int64_t n_computed, n_taken;
     pal_diagnostic diag;
 } job;
 
 /* ---- messages ---- */
 
-/* waits for a message without burning the core that another rank may need */
+/* waits for a message without keeping a core busy that another rank may need */
 static void wait_for(int from, int tag, MPI_Status *status)
 {
     int there = 0;
@@ -73,7 +72,7 @@ static void wait_for(int from, int tag, MPI_Status *status)
     }
 }
 
-/* one answer for all: the lowest rank's that has an error, with its sentence */
+/* the same result on every rank: the error of the lowest rank that has one, with its diagnostic */
 static pal_err agree(job *j, pal_err err)
 {
     int mine = err ? j->rank : j->n_rank, first, code = (int)err;
@@ -95,7 +94,7 @@ static void evaluate_one(void *user, int worker, int index)
     j->cost[index] = err == PAL_ERR_MEMORY ? NAN : err ? DBL_MAX : v.error_percent;
 }
 
-/* ranks but 0: evaluate what is sent until told to end */
+/* every rank but 0: evaluates what rank 0 sends, until COUNT_END */
 static void serve(job *j)
 {
     for (;;) {
@@ -234,7 +233,7 @@ static pal_err make(job *j, const char *problem)
         room = !pal_calibration_workspace_create(j->c, &j->workspace[w]);
     if (!room) return pal_diagnostic_set(&j->diag, PAL_ERR_MEMORY, "%s: no memory for its evaluations", problem);
     PAL_TRY(pal_calibration_evaluate(j->c, j->workspace[0], j->info.start, PAL_CALIBRATION_FIT, &v, NULL, &j->diag));
-    j->print = fingerprint(j, v.error_percent);
+    j->fingerprint = fingerprint(j, v.error_percent);
     return PAL_ERR_OK;
 }
 
@@ -255,12 +254,12 @@ static void unmake(job *j)
     j->missing = NULL;
 }
 
-/* is it the same on every rank? */
+/* is the calibration the same on every rank? */
 static pal_err same_everywhere(job *j, const char *problem)
 {
-    uint64_t root = j->print;
+    uint64_t root = j->fingerprint;
     MPI_Bcast(&root, 1, MPI_UINT64_T, 0, MPI_COMM_WORLD);
-    if (root == j->print) return PAL_ERR_OK;
+    if (root == j->fingerprint) return PAL_ERR_OK;
     return pal_diagnostic_set(
         &j->diag, PAL_ERR_REFUSED,
         "%s: rank %d makes another calibration of it than rank 0: the files or the machines differ", problem, j->rank);
@@ -276,7 +275,7 @@ static void add_percent(cJSON *to, const char *key, double percent)
         cJSON_AddNullToObject(to, key);
 }
 
-/* nothing in it depends on ranks or time */
+/* independent of ranks and time */
 static cJSON *as_json(const job *j, int seed, const double *theta, const pal_fit_result *r)
 {
     static const char *const name[PAL_SPRING_KINDS] = {"k_distance_J", "k_area_J", "k_volume_J"};
@@ -305,7 +304,7 @@ static cJSON *as_json(const job *j, int seed, const double *theta, const pal_fit
         for (int i = 0; i < j->info.n_used; i++)
             cJSON_AddItemToArray(list, cJSON_CreateNumber(exp(theta[k * j->info.n_used + i])));
     }
-    /* the same as logarithms, to the bit */
+    /* logarithms, exact to the bit */
     cJSON *exact = cJSON_AddArrayToObject(o, "ln_constants");
     for (int i = 0; i < j->info.n_parameter; i++) {
         char text[40];
@@ -315,7 +314,7 @@ static cJSON *as_json(const job *j, int seed, const double *theta, const pal_fit
     return o;
 }
 
-/* DIR/NAME.json, whole or not at all */
+/* writes DIR/NAME.json whole or not at all */
 static pal_err write_result(job *j, const char *problem, int seed, const cJSON *result)
 {
     char path[1200], temporary[1220], tail[32] = "";
@@ -357,7 +356,7 @@ static bool show(void *user, const pal_fit_step *step)
     return true;
 }
 
-/* ---- the walk of one seed, on rank 0 ---- */
+/* ---- one annealing run, on rank 0 ---- */
 
 static pal_err fit(job *j, const char *problem, int seed, cJSON *results)
 {
@@ -395,8 +394,8 @@ static pal_err run_one(job *j, const char *problem, cJSON *results)
     pal_err err = agree(j, make(j, problem));
     if (!err) err = agree(j, same_everywhere(j, problem));
     if (!err)
-        err =
-            agree(j, j->journal ? pal_journal_begin(j->journal, j->print, j->info.n_parameter, &j->diag) : PAL_ERR_OK);
+        err = agree(j, j->journal ? pal_journal_begin(j->journal, j->fingerprint, j->info.n_parameter, &j->diag)
+                                  : PAL_ERR_OK);
     if (!err && j->rank > 0) serve(j);
     if (!err && j->rank == 0) {
         for (int s = 0; s < j->n_seed && !err; s++) err = fit(j, problem, j->seed[s], results);
@@ -418,7 +417,7 @@ static void add_refusal(cJSON *results, const char *problem, pal_err err, const 
     cJSON_AddItemToArray(results, one);
 }
 
-/* what differs from run to run */
+/* depends on ranks and time */
 static cJSON *add_run(const job *j, cJSON *object, double seconds)
 {
     cJSON *run = cJSON_AddObjectToObject(object, "run");
@@ -449,9 +448,9 @@ static int run(job *j)
     cJSON_AddBoolToObject(object, "ok", true);
     cJSON *results = cJSON_AddArrayToObject(object, "results");
     pal_err err = agree(j, prepare(j));
-    int mine = err ? 1 : pal_team_size(j->team), most;
-    MPI_Allreduce(&mine, &most, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
-    j->n_batch = j->n_rank * most < PAL_ANNEAL_MAX_BATCH ? j->n_rank * most : PAL_ANNEAL_MAX_BATCH;
+    int mine = err ? 1 : pal_team_size(j->team), max_team;
+    MPI_Allreduce(&mine, &max_team, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
+    j->n_batch = j->n_rank * max_team < PAL_ANNEAL_MAX_BATCH ? j->n_rank * max_team : PAL_ANNEAL_MAX_BATCH;
     for (int p = 0; p < j->n_problem && !err; p++) {
         pal_err one = run_one(j, j->problem[p], results);
         if (!one || j->rank > 0) continue;
@@ -489,7 +488,7 @@ static int run(job *j)
 static const char *read_seeds(job *j)
 {
     const char *at = j->seed_text ? j->seed_text : "0";
-    for (; j->n_seed < MOST_SEED; at++) {
+    for (; j->n_seed < MAX_SEED; at++) {
         char *end;
         errno = 0;
         long n = strtol(at, &end, 10);
@@ -519,35 +518,39 @@ static int parse(job *j, int argc, char **argv)
         {"--verify", "ID[,ID...]", PAL_FLAG_TEXT, &j->input.verify, 0, 0, "others, whose error is only reported"},
         {"--kinematics", "WORD", PAL_FLAG_TEXT, &j->input.kinematics, 0, 0,
          "finite or linear (a reference's, or finite)"},
-        {"--grid", "NXxNYxNZ", PAL_FLAG_TEXT, &j->grid_text, 0, 0, "constants at the nodes of a grid (homogeneous)"},
+        {"--grid", "NXxNYxNZ", PAL_FLAG_TEXT, &j->grid_text, 0, 0,
+         "constants at the nodes of a grid (one of each kind for the whole body)"},
         {"--seed", "S[,S...]", PAL_FLAG_TEXT, &j->seed_text, 0, 0,
-         "a walk for each; the same gives the same result (0)"},
-        {"--evaluations", "N", PAL_FLAG_COUNT, &j->evaluations, 1, 1e9, "ends a walk after so many (4000)"},
-        {"--budget", "SECONDS", PAL_FLAG_NUMBER, &j->budget_s, 0.01, 1e7, "ends a walk after so long (no limit)"},
-        {"--enough", "PERCENT", PAL_FLAG_NUMBER, &j->target_percent, 1e-9, 1e9, "ends a walk at this error"},
+         "one run for each; the same seed gives the same result (0)"},
+        {"--evaluations", "N", PAL_FLAG_COUNT, &j->evaluations, 1, 1e9, "limit of evaluations of a run (4000)"},
+        {"--budget", "SECONDS", PAL_FLAG_NUMBER, &j->budget_s, 0.01, 1e7, "time limit of a run (no limit)"},
+        {"--enough", "PERCENT", PAL_FLAG_NUMBER, &j->target_percent, 1e-9, 1e9, "end a run at this error"},
         {"--resolution", "N", PAL_FLAG_COUNT, &j->options.voxel.resolution, 2, 200,
-         "voxels on the longest axis (the least even number that gives more than 700 nodes)"},
-        {"--split", "K", PAL_FLAG_COUNT, &j->options.split, 1, 8, "finite elements of the truth: voxels as K^3 (2)"},
-        {"--workers", "N", PAL_FLAG_COUNT, &j->n_worker, 1, PAL_TEAM_MAX, "threads of each rank (1)"},
-        {"--journal", "FILE", PAL_FLAG_TEXT, &j->journal_path, 0, 0, "evaluations are kept there and taken from there"},
-        {"-o", "DIR", PAL_FLAG_TEXT, &j->folder, 0, 0, "writes DIR/NAME.json for each problem"},
+         "voxels along the longest axis (the least even number that gives more than 700 nodes)"},
+        {"--split", "K", PAL_FLAG_COUNT, &j->options.split, 1, 8,
+         "the finite elements of the truth are K x K x K to a voxel (2)"},
+        {"--workers", "N", PAL_FLAG_COUNT, &j->n_worker, 1, PAL_TEAM_MAX, "threads of a rank (1)"},
+        {"--journal", "FILE", PAL_FLAG_TEXT, &j->journal_path, 0, 0, "file of evaluations, read and appended"},
+        {"-o", "DIR", PAL_FLAG_TEXT, &j->folder, 0, 0, "write DIR/NAME.json for each problem"},
     };
-    const pal_flag_table table = {.usage = "calibrate-mpi PROBLEM.json [PROBLEM.json ...] --case ID --journal FILE",
+    const pal_flag_table table = {.usage = "calibrate-mpi PROBLEM.json... --case ID --journal FILE",
                                   .about = about,
+                                  .example =
+                                      "mpirun --oversubscribe -n 2 palpate-calibrate-mpi deploy/problems/gear.json "
+                                      "--case twist --resolution 8 --evaluations 40 --journal gear.txt -o fits\n",
                                   .flag = flag,
                                   .n_flag = sizeof flag / sizeof flag[0],
                                   .min_operand = 1,
-                                  .max_operand = MOST_PROBLEM};
+                                  .max_operand = MAX_PROBLEM};
     pal_calibrate_default(&j->options);
     j->options.voxel.resolution = 0;
     j->n_worker = 1;
     int code = pal_flags_parse(&table, argc, argv, &j->common, j->problem, &j->n_problem);
     if (code >= 0) return code;
-    const char *wrong = j->input.fit ? read_seeds(j) : "--case ID is missing: what shall be fitted?";
+    const char *wrong = j->input.fit ? read_seeds(j) : "--case ID is missing";
     if (!wrong) wrong = read_grid(j);
     if (!wrong) return -1;
-    fprintf(stderr, "palpate %s: %s (see --help)\n", j->common.command, wrong);
-    return 2;
+    return pal_flags_wrong(&j->common, "%s", wrong);
 }
 
 int main(int argc, char **argv)
@@ -559,7 +562,7 @@ int main(int argc, char **argv)
     MPI_Comm_rank(MPI_COMM_WORLD, &j.rank);
     MPI_Comm_size(MPI_COMM_WORLD, &j.n_rank);
     argv[0] = name;
-    /* rank 0 says what is wrong with the flags, for all */
+    /* rank 0 reports wrong flags for all */
     if (j.rank == 0) code = parse(&j, argc, argv);
     MPI_Bcast(&code, 1, MPI_INT, 0, MPI_COMM_WORLD);
     if (code < 0) {

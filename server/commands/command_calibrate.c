@@ -1,15 +1,16 @@
-/* `palpate calibrate`: springs that come to rest where finite elements do -> a scene that serve runs, with its error
- * stated (paper B 3). */
+/* `palpate calibrate`: spring constants whose equilibrium is that of finite elements -> a scene for serve that states
+ * its error (paper B section 3). */
 #include "server/base/clock.h"
 #include "server/calibrate/calibrate_run.h"
 #include "server/cli/flags.h"
-#include "server/cli/interrupt.h"
 #include "server/commands/commands.h"
 
 #include <errno.h>
 #include <float.h>
 #include <limits.h>
 #include <math.h>
+#include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,33 +18,23 @@
 #include <unistd.h>
 
 static const char about[] =
-    "Finds constants of springs (edges, faces, volumes) that make a body come to rest where finite elements, or "
-    "measured\n"
-    "displacements, say it does, and writes a scene that palpate serve runs. PROBLEM.json is that of palpate solve.\n"
-    "A name of --case is a load case, whose truth is found by finite elements, or a reference, whose CSV is the "
-    "truth.\n"
-    "The error is the RMS distance in per cent of the truth's largest displacement, the mean over the fitted cases.\n"
-    "Ctrl-C ends the search and writes the best so far; once more ends at once.\n"
-    "Example: palpate calibrate deploy/problems/gear.json --case twist --verify push -o gear/scene.json\n"
-    "Example: palpate calibrate deploy/problems/cube.json --case push --grid 5x5x5 --picture cube.svg -o cube.json\n";
+    "Finds spring constants (edges, faces, volumes) whose equilibrium matches finite elements or measured\n"
+    "displacements, and writes a scene for palpate serve. PROBLEM.json is that of palpate solve. A name of --case is\n"
+    "a load case, whose truth is computed by finite elements, or a reference, whose CSV is the truth. The error is "
+    "the\n"
+    "RMS distance in per cent of the largest displacement of the truth, averaged over the fitted cases.\n"
+    "Ctrl-C ends the search and writes the best result; a second Ctrl-C ends the process.\n";
 
-static const double LIVE_WORK_1_S = 7.5e7; /* sub-steps times tetrahedra that a core does in a second */
-enum { MOST_GRID = 16000 };                /* three numbers of 20 characters each within a scene file's 1 MiB */
+static const double LIVE_WORK_1_S = 7.5e7; /* sub-steps times tetrahedra per second of one core of a 2020s server */
+enum { MAX_GRID = 16000 };                 /* three numbers of 20 characters each fit into the 1 MiB of a scene file */
 
-/* words as they were given */
-typedef struct words {
+typedef struct arguments {
     const char *problem, *grid, *method, *weights, *area;
     double budget_s;
     int evaluations, seed;
-} words;
+} arguments;
 
 /* ---- progress ---- */
-
-static bool show_making(const char *what, double fraction, void *user)
-{
-    pal_report_progress(what, fraction, user);
-    return !pal_interrupt_requested();
-}
 
 static void show_fit(pal_calibrate_run *run, const pal_fit_step *step)
 {
@@ -62,8 +53,8 @@ static void show_fit(pal_calibrate_run *run, const pal_fit_step *step)
     pal_report_progress(text, 0, &run->common);
 }
 
-/* keeps the trail; without memory for it the search goes on */
-static bool take_step(void *user, const pal_fit_step *step)
+/* keeps the errors for the plot; without memory for them the search continues */
+static bool record_step(void *user, const pal_fit_step *step)
 {
     pal_calibrate_run *run = user;
     if (run->n_trail == run->max_trail) {
@@ -79,10 +70,10 @@ static bool take_step(void *user, const pal_fit_step *step)
         run->best[run->n_trail++] = step->best_percent;
     }
     show_fit(run, step);
-    return !pal_interrupt_requested();
+    return !pal_stop_asked();
 }
 
-/* "5x3x5"; false: it is none */
+/* "5x3x5"; false: text is not that */
 static bool read_grid(const char *text, int grid[3])
 {
     const char *at = text;
@@ -97,36 +88,27 @@ static bool read_grid(const char *text, int grid[3])
     return true;
 }
 
-static bool is_one(const char *word, const char *a, const char *b)
+/* NULL: the flags fit together, else the sentence */
+static const char *read_arguments(pal_calibrate_run *run, const arguments *args)
 {
-    return !word || !strcmp(word, a) || !strcmp(word, b);
-}
-
-/* what the words say; NULL: fine, else the sentence */
-static const char *take_words(pal_calibrate_run *run, const words *w)
-{
-    if (!run->input.fit || !*run->input.fit) return "--case ID is missing: what shall be fitted?";
+    if (!run->input.fit || !*run->input.fit) return "--case ID is missing";
     if (!run->scene || !*run->scene) return "-o SCENE.json is missing";
-    if (!is_one(w->method, "adjoint", "annealing")) return "--method: is not adjoint or annealing";
-    if (!is_one(run->input.kinematics, "finite", "linear")) return "--kinematics: is not finite or linear";
-    if (!is_one(w->weights, "volume", "equal")) return "--weights: is not volume or equal";
-    if (!is_one(w->area, "on", "off")) return "--area-springs: is not on or off";
-    if (w->grid && !read_grid(w->grid, run->options.grid))
+    if (args->grid && !read_grid(args->grid, run->options.grid))
         return "--grid: is not NXxNYxNZ, three numbers of nodes from 1 to 1024, as 5x3x5";
-    run->annealing = w->method && !strcmp(w->method, "annealing");
-    run->options.equal = w->weights && !strcmp(w->weights, "equal");
-    if (w->area) run->options.without_area = !strcmp(w->area, "off");
-    run->fit.budget_s = w->budget_s;
-    run->fit.max_evaluation = w->evaluations;
-    run->fit.seed = (uint64_t)w->seed;
+    run->annealing = args->method && !strcmp(args->method, "annealing");
+    run->options.equal = args->weights && !strcmp(args->weights, "equal");
+    if (args->area) run->options.without_area = !strcmp(args->area, "off");
+    run->fit.budget_s = args->budget_s;
+    run->fit.max_evaluation = args->evaluations;
+    run->fit.seed = (uint64_t)args->seed;
     return NULL;
 }
 
-/* ---- files that will be written ---- */
+/* ---- output files ---- */
 
 static const char *const target_flag[PAL_CALIBRATE_FILES] = {"-o", "--trajectory", "--picture", "--vtk"};
 
-/* the same file by another spelling, whether it exists or not */
+/* do two paths name one file, whether it exists or not? */
 static bool is_same_file(const char *a, const char *b)
 {
     char real[2][PATH_MAX], folder[PATH_MAX];
@@ -142,7 +124,7 @@ static bool is_same_file(const char *a, const char *b)
     return !strcmp(real[0], real[1]) && !strcmp(name[0], name[1]);
 }
 
-/* can a file of this name be written? Said before the work, not after it */
+/* can a file of this name be written? Refused before the search, not after it */
 static pal_err check_target(const char *flag, const char *path, pal_diagnostic *diag)
 {
     char folder[PAL_CALIBRATE_PATH];
@@ -165,11 +147,11 @@ static pal_err check_target(const char *flag, const char *path, pal_diagnostic *
     if (!stat(path, &facts) && S_ISDIR(facts.st_mode))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s is a folder, wanted a file in it", flag, path);
     if (!stat(path, &facts) && !S_ISREG(facts.st_mode))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s is there and not a file", flag, path);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s exists and is not a file", flag, path);
     return PAL_ERR_OK;
 }
 
-/* is it none of those that are read? */
+/* refuses an output that is also an input */
 static pal_err check_source(const char *flag, const char *path, const char *source, const char *what,
                             pal_diagnostic *diag)
 {
@@ -182,10 +164,10 @@ static pal_err check_source(const char *flag, const char *path, const char *sour
 static pal_err check_targets(const pal_calibrate_run *run, pal_diagnostic *diag)
 {
     const int *grid = run->options.grid;
-    if ((int64_t)grid[0] * grid[1] * grid[2] > MOST_GRID)
+    if ((int64_t)grid[0] * grid[1] * grid[2] > MAX_GRID)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
                                   "--grid: %d x %d x %d nodes, more than the %d that a scene file holds", grid[0],
-                                  grid[1], grid[2], MOST_GRID);
+                                  grid[1], grid[2], MAX_GRID);
     const char *const path[PAL_CALIBRATE_FILES] = {run->scene, run->trajectory, run->picture, run->vtk};
     for (int a = 0; a < PAL_CALIBRATE_FILES; a++) {
         PAL_TRY(check_target(target_flag[a], path[a], diag));
@@ -193,13 +175,13 @@ static pal_err check_targets(const pal_calibrate_run *run, pal_diagnostic *diag)
         PAL_TRY(check_source(target_flag[a], path[a], run->input.truth, "truth", diag));
         for (int b = 0; b < a && path[a]; b++)
             if (path[b] && is_same_file(path[a], path[b]))
-                return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s is that of %s as well", target_flag[a],
+                return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s is the file of %s as well", target_flag[a],
                                           path[a], target_flag[b]);
     }
     return PAL_ERR_OK;
 }
 
-/* files that the problem names */
+/* the same for the files that the problem names */
 static pal_err check_sources(const pal_calibrate_run *run, pal_diagnostic *diag)
 {
     const char *const path[PAL_CALIBRATE_FILES] = {run->scene, run->trajectory, run->picture, run->vtk};
@@ -218,7 +200,7 @@ static pal_err make(pal_calibrate_run *run, pal_diagnostic *diag)
 {
     pal_diagnostic reason = {""};
     pal_case_voxel_options *voxel = &run->options.voxel;
-    run->options.progress = show_making;
+    run->options.progress = pal_report_continue;
     run->options.user = &run->common;
     pal_err err = PAL_ERR_OK;
     if (voxel->resolution == 0) err = pal_calibrate_cases_resolution(&run->set, voxel, &voxel->resolution, &reason);
@@ -242,7 +224,7 @@ static pal_err search(pal_calibrate_run *run, pal_diagnostic *diag)
     PAL_TRY(pal_calibration_evaluate(c, run->workspace, run->theta, ALL, &run->hand, NULL, diag));
     memcpy(run->theta, run->info.start, n);
     PAL_TRY(pal_calibration_evaluate(c, run->workspace, run->theta, ALL, &run->start, NULL, diag));
-    run->fit.step = take_step;
+    run->fit.step = record_step;
     run->fit.user = run;
     pal_diagnostic reason = {""};
     pal_err err = run->annealing ? pal_fit_anneal(c, &run->fit, run->theta, &run->result, &reason)
@@ -251,7 +233,7 @@ static pal_err search(pal_calibrate_run *run, pal_diagnostic *diag)
     return pal_calibration_evaluate(c, run->workspace, run->theta, ALL, &run->last, NULL, diag);
 }
 
-/* how the springs move when they run */
+/* runs the springs live: does the body come to rest where the search says, with which damping? */
 static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_diagnostic *diag)
 {
     pal_settle_load load[PAL_CALIBRATE_CASES];
@@ -259,9 +241,9 @@ static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_diagn
     double begin = pal_clock_s(), *u = malloc(n * (size_t)run->set.n * sizeof *u);
     pal_settle_options options;
     pal_settle_default(&options);
-    options.progress = show_making;
+    options.progress = pal_report_continue;
     options.user = &run->common;
-    /* a short search is not followed by a long run; a number of sub-steps, so that scenes do not depend on the clock */
+    /* as long as the search at most; counted in sub-steps, so that the scene does not depend on the clock */
     if (run->fit.budget_s > 0) options.max_work = fmin(options.max_work, LIVE_WORK_1_S * fmax(run->fit.budget_s, 1));
     if (!u) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for %d loads", run->set.n);
     for (int k = 0; k < run->set.n; k++) {
@@ -269,15 +251,14 @@ static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_diagn
         load[k] = (pal_settle_load){.force_N = pal_calibration_forces(run->calibration, k),
                                     .u = rests ? u + n * (size_t)k : NULL};
     }
-    pal_err err = pal_interrupt_requested()
-                      ? PAL_ERR_STATE
-                      : pal_settle_damping(&scene->scene, load, run->set.n, &options, &run->live, diag);
+    pal_err err = pal_stop_asked() ? PAL_ERR_STATE
+                                   : pal_settle_damping(&scene->scene, load, run->set.n, &options, &run->live, diag);
     run->settled = !err;
     run->settle_s = pal_clock_s() - begin;
     free(u);
     if (run->settled) scene->scene.body[0].material.damping_1_s = run->live.damping_1_s;
     run->damping_1_s = scene->scene.body[0].material.damping_1_s;
-    return err == PAL_ERR_STATE ? PAL_ERR_OK : err; /* stopped: the scene's own damping has to do */
+    return err == PAL_ERR_STATE ? PAL_ERR_OK : err; /* stopped: the scene keeps its own damping */
 }
 
 static pal_err write_files(pal_calibrate_run *run, const pal_loaded_scene *scene, pal_diagnostic *diag)
@@ -314,7 +295,7 @@ static int start(pal_calibrate_run *run)
 {
     pal_diagnostic diag = {""};
     double begin = pal_clock_s();
-    pal_interrupt_watch();
+    pal_stop_watch();
     pal_err err = work(run, &diag);
     run->total_s = pal_clock_s() - begin;
     pal_report_progress(NULL, 0, &run->common);
@@ -334,7 +315,7 @@ static int start(pal_calibrate_run *run)
 int command_calibrate(int argc, char **argv)
 {
     static pal_calibrate_run run;
-    words w = {0};
+    arguments args = {0};
     run = (pal_calibrate_run){0};
     pal_calibrate_options *o = &run.options;
     pal_calibrate_default(o);
@@ -342,57 +323,57 @@ int command_calibrate(int argc, char **argv)
     const pal_flag flag[] = {
         {"--case", "ID[,ID...]", PAL_FLAG_TEXT, &run.input.fit, 0, 0, "load cases or references to fit"},
         {"--verify", "ID[,ID...]", PAL_FLAG_TEXT, &run.input.verify, 0, 0, "others, whose error is only reported"},
-        {"--grid", "NXxNYxNZ", PAL_FLAG_TEXT, &w.grid, 0, 0,
+        {"-o", "SCENE.json", PAL_FLAG_TEXT, &run.scene, 0, 0, "scene to write; its mesh is written beside it"},
+        {"--grid", "NXxNYxNZ", PAL_FLAG_TEXT, &args.grid, 0, 0,
          "constants at the nodes of a grid over the body, trilinear between (one of each kind for the whole body)"},
-        {"--method", "WORD", PAL_FLAG_TEXT, &w.method, 0, 0,
-         "adjoint (L-BFGS with exact slopes) or annealing (adaptive simulated annealing) (adjoint)"},
-        {"--budget", "SECONDS", PAL_FLAG_NUMBER, &w.budget_s, 0.01, 1e7,
-         "ends the search after so long, and the live run behind it after about as long (no limit; 20 s)"},
-        {"--evaluations", "N", PAL_FLAG_COUNT, &w.evaluations, 1, 1e9,
-         "ends the search after so many (1000; annealing 4000)"},
-        {"--enough", "PERCENT", PAL_FLAG_NUMBER, &run.fit.target_percent, 1e-9, 1e9,
-         "ends the search when the error is no more"},
-        {"--seed", "S", PAL_FLAG_COUNT, &w.seed, 0, INT_MAX, "of annealing; the same gives the same result (0)"},
+        {"--method", "adjoint|annealing", PAL_FLAG_WORD, &args.method, 0, 0,
+         "L-BFGS with exact gradients, or adaptive simulated annealing (adjoint)"},
+        {"--budget", "SECONDS", PAL_FLAG_NUMBER, &args.budget_s, 0.01, 1e7,
+         "time limit of the search; the live run after it takes about as long (no limit; 20 s)"},
+        {"--evaluations", "N", PAL_FLAG_COUNT, &args.evaluations, 1, 1e9,
+         "limit of evaluations (1000; annealing 4000)"},
+        {"--enough", "PERCENT", PAL_FLAG_NUMBER, &run.fit.target_percent, 1e-9, 1e9, "end the search at this error"},
+        {"--seed", "S", PAL_FLAG_COUNT, &args.seed, 0, INT_MAX, "annealing: the same seed gives the same result (0)"},
         {"--workers", "N", PAL_FLAG_COUNT, &run.fit.n_worker, 1, 256,
-         "threads of annealing; the result is the same for any number (one per core)"},
+         "annealing: threads; the result is the same for any number (one per core)"},
         {"--resolution", "N", PAL_FLAG_COUNT, &o->voxel.resolution, 2, 200,
-         "voxels on the longest axis (the least even number that gives more than 700 nodes)"},
+         "voxels along the longest axis (the least even number that gives more than 700 nodes)"},
         {"--split", "K", PAL_FLAG_COUNT, &o->split, 1, 8,
-         "finite elements of the truth: every voxel as K x K x K of them (2)"},
-        {"--kinematics", "WORD", PAL_FLAG_TEXT, &run.input.kinematics, 0, 0,
-         "finite: neo-Hookean truth, springs as they move; linear: both linearised (a reference's, or finite)"},
+         "the finite elements of the truth are K x K x K to a voxel (2)"},
+        {"--kinematics", "finite|linear", PAL_FLAG_WORD, &run.input.kinematics, 0, 0,
+         "neo-Hookean truth and springs as they move; or both linearised (a reference's, or finite)"},
         {"--truth", "WORD", PAL_FLAG_TEXT, &run.input.truth, 0, 0,
-         "fem, reference (the CSV of the reference that answers a load case), or a file U.csv of x,y,z,ux,uy,uz for\n"
-         "the one case that is fitted"},
-        {"--weights", "WORD", PAL_FLAG_TEXT, &w.weights, 0, 0,
-         "volume: springs count for the volume around them; equal: all of a kind are the same, as in the paper "
-         "(volume)"},
-        {"--area-springs", "WORD", PAL_FLAG_TEXT, &w.area, 0, 0, "on, or off: edges and volumes alone (on)"},
+         "fem, reference (the CSV of the reference that belongs to a load case), or a file U.csv of x,y,z,ux,uy,uz\n"
+         "for the one case that is fitted"},
+        {"--weights", "volume|equal", PAL_FLAG_WORD, &args.weights, 0, 0,
+         "springs weighted by the volume around them, or all of a kind equal as in paper B (volume)"},
+        {"--area-springs", "on|off", PAL_FLAG_WORD, &args.area, 0, 0,
+         "off: springs along edges and in volumes only (on)"},
         {"--decades", "D", PAL_FLAG_NUMBER, &o->decades, 0.01, 20,
-         "how far a constant may go from its start either way, powers of ten (3)"},
+         "range of a constant around its start, powers of ten either way (3)"},
         {"--smooth", "W", PAL_FLAG_NUMBER, &o->smooth, 0, 1e9,
-         "weight of differences between neighbours on the grid, for a map without specks (0.1)"},
+         "grid: weight of differences between neighbours, which smooths the map (0.1)"},
         {"--pull", "W", PAL_FLAG_NUMBER, &o->pull, 0, 1e9,
-         "weight of the distance from the start's ratios of edges, faces and volumes, on a grid (0.1)"},
-        {"--trajectory", "FILE.svg", PAL_FLAG_TEXT, &run.trajectory, 0, 0, "draws the error of every evaluation"},
+         "grid: weight of the deviation from the ratios of edges, faces and volumes at the start (0.1)"},
+        {"--trajectory", "FILE.svg", PAL_FLAG_TEXT, &run.trajectory, 0, 0, "plot the error of every evaluation"},
         {"--picture", "FILE.svg", PAL_FLAG_TEXT, &run.picture, 0, 0,
-         "draws the body at rest, its truth, and how far start and result are from it; constants on a grid"},
+         "draw the body at rest, its truth, and the distance of start and result from it; constants on a grid"},
         {"--vtk", "FILE", PAL_FLAG_TEXT, &run.vtk, 0, 0,
-         "writes a legacy VTK file with constants, and displacements of truth and springs"},
-        {"-o", "SCENE.json", PAL_FLAG_TEXT, &run.scene, 0, 0, "the scene to write; its mesh goes beside it"},
+         "write a legacy VTK file with constants and the displacements of truth and springs"},
     };
     const pal_flag_table table = {.usage = "calibrate PROBLEM.json --case ID -o SCENE.json [flags]",
                                   .about = about,
+                                  .example = "palpate calibrate deploy/problems/gear.json --case twist --verify push "
+                                             "--resolution 10 --budget 5 -o gear.json\n"
+                                             "palpate calibrate deploy/problems/cube.json --case push --grid 3x3x3 "
+                                             "--resolution 6 --budget 5 --picture cube.svg -o cube.json\n",
                                   .flag = flag,
                                   .n_flag = sizeof flag / sizeof flag[0],
                                   .min_operand = 1,
                                   .max_operand = 1};
     int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.input.problem, &n);
     if (code >= 0) return code;
-    const char *sentence = take_words(&run, &w);
-    if (sentence) {
-        fprintf(stderr, "palpate %s: %s (see palpate %s --help)\n", argv[0], sentence, argv[0]);
-        return 2;
-    }
+    const char *sentence = read_arguments(&run, &args);
+    if (sentence) return pal_flags_wrong(&run.common, "%s", sentence);
     return start(&run);
 }

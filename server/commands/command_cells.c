@@ -1,5 +1,5 @@
 /* `palpate cells`: control cells of a primitive, of a named solid or of a file, subdivided and written as cells or as
- * their boundary, with the figures of Table 1 of paper A. */
+ * their boundary, with the figures of paper A, Table 1. */
 #include "server/cli/flags.h"
 #include "server/commands/commands.h"
 #include "server/mesh/cells/cell_elements.h"
@@ -15,27 +15,27 @@
 #include <string.h>
 
 static const char about[] =
-    "Makes the cells of a solid for model subdivision (paper A), subdivides them and writes them to a file.\n"
-    "SHAPE is block, ring, tube or torus; or soccer, monster, block3, chair, block4, head, bridge, nozzle or kidney;\n"
-    "or a file of cells, .palcells or .vtk. FILE.palcells and FILE.vtk get the cells, FILE.ply, .obj and .stl the\n"
-    "boundary. Without -o only the figures are shown; --list shows those of all named solids beside the paper's.\n";
+    "Makes the control cells of a subdivision solid (paper A), subdivides them and writes them to a file.\n"
+    "SHAPE is a primitive: block, ring, tube or torus; a named solid: soccer, monster, block3, chair, block4, head,\n"
+    "bridge, nozzle or kidney; or a file of cells, .palcells or .vtk. FILE.palcells and FILE.vtk receive the cells,\n"
+    "FILE.ply, .obj and .stl the boundary. Without -o only the figures are printed.\n";
 
-typedef struct plan_requests {
+typedef struct arguments {
     const char *file, *rule, *cells, *size;
     int n_level;
     bool list;
-} plan_requests;
+} arguments;
 
-/* a solid, its control cells and what is known of them */
+/* a solid: control cells, subdivided cells, figures */
 typedef struct outcome {
     char name[128];
     const pal_cell_model *model; /* NULL: another shape */
     pal_cells control;
     pal_subdivision made;
-    bool has_elements; /* cells that are no hexahedra have none before the first level */
+    bool has_elements; /* false: cells that are no hexahedra, before the first level */
     pal_cell_elements elements;
     pal_cells_topology topology;
-    double control_m3, volume_m3, length_scale_m[3];
+    double control_m3, volume_m3, size_m[3];
     int n_boundary_vertex, n_triangle;
 } outcome;
 
@@ -48,11 +48,11 @@ static void free_outcome(outcome *o)
 
 /* ---- shapes ---- */
 
-/* a primitive: its numbers of cells and sizes, with what they are when not given */
+/* a primitive: what its numbers of cells and its sizes mean, and their defaults */
 typedef struct primitive {
     const char *name, *cells_are, *sizes_are;
     int n_count, n_size;
-    double count[3], length_scale_m[3];
+    double count[3], size_m[3];
 } primitive;
 
 static const primitive primitive_list[] = {
@@ -76,7 +76,7 @@ static const primitive *find_primitive(const char *name)
     return NULL;
 }
 
-/* exactly n numbers with commas between, whole if asked; false: text is not that */
+/* exactly n numbers separated by commas; whole: integers; false: text is not that */
 static bool read_list(const char *text, int n, bool whole, double *out)
 {
     for (int k = 0; k < n; k++) {
@@ -89,19 +89,19 @@ static bool read_list(const char *text, int n, bool whole, double *out)
     return true;
 }
 
-static pal_err make_primitive(const primitive *p, const double count[3], const double length_scale_m[3], pal_cells *out,
+static pal_err make_primitive(const primitive *p, const double count[3], const double size_m[3], pal_cells *out,
                               pal_diagnostic *diag)
 {
     const int32_t n[3] = {(int32_t)count[0], (int32_t)count[1], (int32_t)count[2]};
     switch (p - primitive_list) {
     case 0:
-        return pal_cells_block(n, length_scale_m, out, diag);
+        return pal_cells_block(n, size_m, out, diag);
     case 1:
-        return pal_cells_ring(n[0], length_scale_m[0], length_scale_m[1], out, diag);
+        return pal_cells_ring(n[0], size_m[0], size_m[1], out, diag);
     case 2:
-        return pal_cells_tube(n, length_scale_m[0], length_scale_m[1], length_scale_m[2], out, diag);
+        return pal_cells_tube(n, size_m[0], size_m[1], size_m[2], out, diag);
     default:
-        return pal_cells_torus(n[0], n[1], length_scale_m[0], length_scale_m[1], out, diag);
+        return pal_cells_torus(n[0], n[1], size_m[0], size_m[1], out, diag);
     }
 }
 
@@ -117,7 +117,7 @@ static pal_err measure(outcome *o, pal_diagnostic *diag)
     PAL_TRY(pal_cells_boundary(c, &surface, NULL, NULL));
     double low[3], high[3];
     pal_surface_box(&surface, low, high);
-    for (int a = 0; a < 3; a++) o->length_scale_m[a] = high[a] - low[a];
+    for (int a = 0; a < 3; a++) o->size_m[a] = high[a] - low[a];
     o->n_triangle = surface.n_tri;
     o->n_boundary_vertex = surface.n_vertex;
     pal_surface_free(&surface);
@@ -166,7 +166,7 @@ static cJSON *as_json(const outcome *o, const char *rule)
     cJSON_AddNumberToObject(to, "cavities", o->topology.n_cavity);
     cJSON_AddNumberToObject(to, "pinched_edges", c->n_pinched_edge);
     cJSON_AddNumberToObject(to, "pinched_vertices", c->n_pinched_vertex);
-    cJSON_AddItemToObject(to, "size_m", cJSON_CreateDoubleArray(o->length_scale_m, 3));
+    cJSON_AddItemToObject(to, "size_m", cJSON_CreateDoubleArray(o->size_m, 3));
     cJSON_AddNumberToObject(to, "control_volume_m3", o->control_m3);
     cJSON_AddNumberToObject(to, "volume_m3", o->volume_m3);
     cJSON_AddNumberToObject(to, "boundary_vertices", o->n_boundary_vertex);
@@ -184,7 +184,7 @@ static void print(const outcome *o, const char *rule)
 {
     const pal_cells *c = &o->made.cells;
     printf("%s: %d control cell%s, %.0f x %.0f x %.0f mm\n", o->name, o->control.n_cell, plural(o->control.n_cell),
-           1e3 * o->length_scale_m[0], 1e3 * o->length_scale_m[1], 1e3 * o->length_scale_m[2]);
+           1e3 * o->size_m[0], 1e3 * o->size_m[1], 1e3 * o->size_m[2]);
     printf("%d level%s of %s: %d cell%s, %d vertices\n", o->made.n_level, plural(o->made.n_level), rule, c->n_cell,
            plural(c->n_cell), c->n_vertex);
     if (o->has_elements)
@@ -194,7 +194,7 @@ static void print(const outcome *o, const char *rule)
                pal_cell_elements_percent(&o->elements, PAL_CELL_HEX),
                pal_cell_elements_percent(&o->elements, PAL_CELL_PYRAMID));
     else
-        printf("no finite elements yet: some cells are no hexahedra, a level of subdivision makes them so\n");
+        printf("no finite elements yet: some cells are no hexahedra; one level of subdivision makes them hexahedra\n");
     printf("%d piece%s, genus %d, %d cavit%s", o->topology.n_piece, plural(o->topology.n_piece), o->topology.genus,
            o->topology.n_cavity, o->topology.n_cavity == 1 ? "y" : "ies");
     if (c->n_pinched_edge + c->n_pinched_vertex > 0)
@@ -205,7 +205,7 @@ static void print(const outcome *o, const char *rule)
 
 /* ---- --list ---- */
 
-/* a row of Table 1: ours, then the paper's in brackets */
+/* a row of paper A, Table 1: our figures, then those of the paper */
 static void print_row(const outcome *o)
 {
     const pal_cell_model *m = o->model;
@@ -228,7 +228,7 @@ static int list_models(const pal_flag_common *common, pal_subdivision_rule rule,
     list = cJSON_AddArrayToObject(all, "models");
     if (!common->json && !common->quiet)
         printf("%-8s %6s %6s %6s %5s %5s %5s   %-16s %5s %10s %7s\n", "name", "levels", "#CC", "#FE", "%BE", "%LE",
-               "%PE", "Table 1 of A", "genus", "volume ml", "MB");
+               "%PE", "paper A", "genus", "volume ml", "MB");
     for (int k = 0; k < PAL_CELL_MODELS && !err; k++) {
         outcome o = {.model = &pal_cell_model_list[k]};
         snprintf(o.name, sizeof o.name, "%s", o.model->name);
@@ -244,12 +244,6 @@ static int list_models(const pal_flag_common *common, pal_subdivision_rule rule,
 }
 
 /* ---- the command ---- */
-
-static int usage(const pal_flag_common *common, const char *sentence)
-{
-    fprintf(stderr, "palpate %s: %s (see palpate %s --help)\n", common->command, sentence, common->command);
-    return 2;
-}
 
 static bool ends_in(const char *path, const char *const *end)
 {
@@ -271,84 +265,83 @@ static pal_err write_file(const outcome *o, const char *path, pal_diagnostic *di
     return err;
 }
 
-static int run(const pal_flag_common *common, outcome *o, const plan_requests *request, pal_subdivision_rule rule)
+static int run(const pal_flag_common *common, outcome *o, const arguments *args, pal_subdivision_rule rule)
 {
     pal_diagnostic diag = {""};
-    pal_err err = subdivide(o, request->n_level, rule, &diag);
-    if (!err && request->file) err = write_file(o, request->file, &diag);
+    pal_err err = subdivide(o, args->n_level, rule, &diag);
+    if (!err && args->file) err = write_file(o, args->file, &diag);
     if (err) return pal_report_refusal(common, err, &diag);
     if (common->json) {
-        cJSON *object = as_json(o, request->rule);
-        if (request->file) cJSON_AddStringToObject(object, "file", request->file);
+        cJSON *object = as_json(o, args->rule);
+        if (args->file) cJSON_AddStringToObject(object, "file", args->file);
         return pal_report_json(common, object);
     }
     if (common->quiet) return 0;
-    print(o, request->rule);
-    if (request->file && ends_in(request->file, cell_end)) printf("wrote the cells to %s\n", request->file);
-    if (request->file && ends_in(request->file, surface_end))
-        printf("wrote the boundary, %d triangles, to %s\n", o->n_triangle, request->file);
+    print(o, args->rule);
+    if (args->file && ends_in(args->file, cell_end)) printf("wrote the cells to %s\n", args->file);
+    if (args->file && ends_in(args->file, surface_end))
+        printf("wrote the boundary, %d triangles, to %s\n", o->n_triangle, args->file);
     return 0;
 }
 
-/* -1: the control cells are there, else the exit code */
-static int make_control(const pal_flag_common *common, const char *shape, const plan_requests *request, outcome *o)
+/* -1: the control cells are made, else the exit code */
+static int make_control(const pal_flag_common *common, const char *shape, const arguments *args, outcome *o)
 {
     const primitive *p = find_primitive(shape);
-    char sentence[200];
     pal_diagnostic diag = {""};
     pal_err err;
     snprintf(o->name, sizeof o->name, "%.100s", shape);
     o->model = pal_cell_model_find(shape);
     if (p) {
-        double count[3], length_scale_m[3];
+        double count[3], size_m[3];
         memcpy(count, p->count, sizeof count);
-        memcpy(length_scale_m, p->length_scale_m, sizeof length_scale_m);
-        if (request->cells && !read_list(request->cells, p->n_count, true, count)) {
-            snprintf(sentence, sizeof sentence, "--cells: \"%.40s\" is not %d whole number%s with commas between (%s)",
-                     request->cells, p->n_count, plural(p->n_count), p->cells_are);
-            return usage(common, sentence);
+        memcpy(size_m, p->size_m, sizeof size_m);
+        if (args->cells && !read_list(args->cells, p->n_count, true, count)) {
+            return pal_flags_wrong(common, "--cells: \"%.40s\" is not %d whole number%s separated by commas (%s)",
+                                   args->cells, p->n_count, plural(p->n_count), p->cells_are);
         }
-        if (request->size && !read_list(request->size, p->n_size, false, length_scale_m)) {
-            snprintf(sentence, sizeof sentence, "--size-m: \"%.40s\" is not %d numbers with commas between (%s)",
-                     request->size, p->n_size, p->sizes_are);
-            return usage(common, sentence);
+        if (args->size && !read_list(args->size, p->n_size, false, size_m)) {
+            return pal_flags_wrong(common, "--size-m: \"%.40s\" is not %d numbers separated by commas (%s)", args->size,
+                                   p->n_size, p->sizes_are);
         }
-        err = make_primitive(p, count, length_scale_m, &o->control, &diag);
-    } else if (request->cells || request->size) {
-        return usage(common, request->cells ? "--cells: only goes with block, ring, tube and torus"
-                                            : "--size-m: only goes with block, ring, tube and torus");
+        err = make_primitive(p, count, size_m, &o->control, &diag);
+    } else if (args->cells || args->size) {
+        return pal_flags_wrong(common, "%s: only goes with block, ring, tube and torus",
+                               args->cells ? "--cells" : "--size-m");
     } else if (o->model) {
         err = pal_cell_model_make(o->model, &o->control, &diag);
     } else if (ends_in(shape, cell_end) || strchr(shape, '/')) {
         err = pal_cell_file_load(shape, &o->control, &diag);
     } else {
-        snprintf(sentence, sizeof sentence, "there is no shape \"%.60s\"", shape);
-        return usage(common, sentence);
+        return pal_flags_wrong(common, "there is no shape \"%.60s\"", shape);
     }
     return err ? pal_report_refusal(common, err, &diag) : -1;
 }
 
-static plan_requests request = {.rule = "maccracken_joy"};
+static arguments args = {.rule = "maccracken_joy"};
 static const pal_flag flag[] = {
-    {"-o", "FILE", PAL_FLAG_TEXT, &request.file, 0, 0, "file to write to, .palcells, .vtk, .ply, .obj or .stl"},
-    {"--levels", "N", PAL_FLAG_COUNT, &request.n_level, 0, PAL_SUBDIVISION_MAX,
-     "levels of subdivision, each with eight times the cells (0)"},
-    {"--rule", "WORD", PAL_FLAG_TEXT, &request.rule, 0, 0, "maccracken_joy or averaging (maccracken_joy)"},
-    {"--cells", "N,...", PAL_FLAG_TEXT, &request.cells, 0, 0,
-     "numbers of cells: of block along x, y, z (3,3,3); of ring around (8); of tube around,\nthrough the wall, along "
-     "(8,1,4); of torus around, across the middle (8,1)"},
-    {"--size-m", "M,...", PAL_FLAG_TEXT, &request.size, 0, 0,
-     "of block along x, y, z (0.1,0.1,0.1); of ring radius, thickness (0.05,0.02); of tube\ninner radius, outer "
-     "radius, "
-     "length (0.02,0.03,0.1); of torus radius, tube's radius (0.05,0.02)"},
-    {"--list", NULL, PAL_FLAG_SWITCH, &request.list, 0, 0,
-     "no SHAPE: the named solids at the levels of Table 1 of paper A, beside its figures"},
+    {"-o", "FILE", PAL_FLAG_TEXT, &args.file, 0, 0, "file to write: .palcells, .vtk, .ply, .obj or .stl"},
+    {"--levels", "N", PAL_FLAG_COUNT, &args.n_level, 0, PAL_SUBDIVISION_MAX,
+     "levels of subdivision; each multiplies the cells by eight (0)"},
+    {"--rule", "maccracken_joy|averaging", PAL_FLAG_WORD, &args.rule, 0, 0, "rule of subdivision (maccracken_joy)"},
+    {"--cells", "N,...", PAL_FLAG_TEXT, &args.cells, 0, 0,
+     "numbers of cells: block along x, y, z (3,3,3); ring around (8); tube around, through the\nwall, along (8,1,4); "
+     "torus around, across the middle (8,1)"},
+    {"--size-m", "M,...", PAL_FLAG_TEXT, &args.size, 0, 0,
+     "sizes: block along x, y, z (0.1,0.1,0.1); ring radius, thickness (0.05,0.02); tube inner\nradius, outer radius, "
+     "length (0.02,0.03,0.1); torus radius, radius of the tube (0.05,0.02)"},
+    {"--list", NULL, PAL_FLAG_SWITCH, &args.list, 0, 0,
+     "without SHAPE: figures of the named solids beside those of paper A, Table 1"},
 };
 
 int command_cells(int argc, char **argv)
 {
     const pal_flag_table table = {.usage = "cells SHAPE [-o FILE] [flags]",
                                   .about = about,
+                                  .example = "palpate cells --list\n"
+                                             "palpate cells chair --levels 1 -o chair.ply\n"
+                                             "palpate cells block --cells 3,2,2 --size-m 0.12,0.06,0.06 -o "
+                                             "block.palcells\n",
                                   .flag = flag,
                                   .n_flag = sizeof flag / sizeof flag[0],
                                   .max_operand = 1};
@@ -356,22 +349,19 @@ int command_cells(int argc, char **argv)
     const char *word[1] = {NULL};
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
     if (code >= 0) return code;
-    pal_subdivision_rule rule = PAL_SUBDIVISION_MACCRACKEN_JOY;
-    if (!strcmp(request.rule, "averaging"))
-        rule = PAL_SUBDIVISION_AVERAGING;
-    else if (strcmp(request.rule, "maccracken_joy") != 0)
-        return usage(&common, "--rule: is not maccracken_joy or averaging");
-    if (request.list == (n > 0)) return usage(&common, "needs either a SHAPE or --list");
-    if (request.list) {
-        if (request.file || request.cells || request.size || request.n_level)
-            return usage(&common, "--list goes with --rule, --json and --quiet only");
-        return list_models(&common, rule, request.rule);
+    bool averaging = !strcmp(args.rule, "averaging");
+    pal_subdivision_rule rule = averaging ? PAL_SUBDIVISION_AVERAGING : PAL_SUBDIVISION_MACCRACKEN_JOY;
+    if (args.list == (n > 0)) return pal_flags_wrong(&common, "needs either a SHAPE or --list");
+    if (args.list) {
+        if (args.file || args.cells || args.size || args.n_level)
+            return pal_flags_wrong(&common, "--list goes with --rule, --json and --quiet only");
+        return list_models(&common, rule, args.rule);
     }
-    if (request.file && !ends_in(request.file, cell_end) && !ends_in(request.file, surface_end))
-        return usage(&common, "-o: is not a .palcells, .vtk, .ply, .obj or .stl file");
+    if (args.file && !ends_in(args.file, cell_end) && !ends_in(args.file, surface_end))
+        return pal_flags_wrong(&common, "-o: is not a .palcells, .vtk, .ply, .obj or .stl file");
     outcome o = {.model = NULL};
-    code = make_control(&common, word[0], &request, &o);
-    if (code < 0) code = run(&common, &o, &request, rule);
+    code = make_control(&common, word[0], &args, &o);
+    if (code < 0) code = run(&common, &o, &args, rule);
     free_outcome(&o);
     return code;
 }

@@ -1,53 +1,56 @@
-/* `palpate plan`: the rows of a scene, their memory, and what they cost on this machine: the median over up to 60 steps
- * at rest (kept from sleeping), or as many as fit into two seconds; which entry called for each row, and what is not
- * there, with the words that would call for it. Of a body that adapts all its levels, and what of them is active now;
- * of a subdivided solid its elements as in Table 1 of paper A. */
+/* `palpate plan`: the components of a scene, the entry that calls for each, their memory and their time on this
+ * machine; the effects that are absent and what would call for them. The time is the median over up to 60 steps, or as
+ * many as fit into two seconds, of a body at rest that is kept awake. */
 #include "server/base/clock.h"
 #include "server/cli/flags.h"
 #include "server/cli/median.h"
 #include "server/commands/commands.h"
 #include "server/commands/plan_reasons.h"
 #include "server/commands/preflight_report.h"
-#include "server/scene/scene_arg.h"
+#include "server/commands/scene_input.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/subdivision/subdivision_solid.h"
 #include "server/sim/surface/adaptive_surface.h"
 #include "server/sim/world/world.h"
-#include "server/study/studied_scene.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { STEPS = 60, MOST_S = 2 };
+enum { STEPS = 60, MAX_S = 2 };
 
 typedef struct cost {
     int n_step;
-    double row_ms[PAL_FRAME_COMPONENT_MAX][STEPS], step_ms[STEPS];
+    double component_ms[PAL_FRAME_COMPONENT_MAX][STEPS], step_ms[STEPS];
 } cost;
 
 static pal_err measure(pal_world *world, double step_s, cost *out)
 {
     double start = pal_clock_s();
-    int n_row = pal_world_component_count(world);
-    for (int k = 0; k < STEPS && (k < 2 || pal_clock_s() - start < MOST_S); k++, out->n_step++) {
+    for (int k = 0; k < STEPS && (k < 2 || pal_clock_s() - start < MAX_S); k++, out->n_step++) {
         pal_world_wake(world);
         uint64_t before = pal_clock_thread_ns(), began = pal_clock_ns();
         PAL_TRY(pal_world_step(world, step_s));
         out->step_ms[k] = 1e-6 * (double)(pal_clock_thread_ns() - before);
-        /* rows are timed by the wall's clock, which goes on while others have the processor: its share is ours */
-        double wall_ms = 1e-6 * (double)(pal_clock_ns() - began), ours = fmin(out->step_ms[k] / fmax(wall_ms, 1e-6), 1);
-        for (int r = 0; r < n_row && r < PAL_FRAME_COMPONENT_MAX; r++) {
-            pal_component_info row;
-            pal_world_component_info(world, r, &row);
-            out->row_ms[r][k] = ours * 1e-6 * (double)row.spent_ns;
+        /* the world times components by wall clock, which includes other processes: scale to processor time */
+        double wall_ms = 1e-6 * (double)(pal_clock_ns() - began),
+               share = fmin(out->step_ms[k] / fmax(wall_ms, 1e-6), 1);
+        for (int c = 0; c < pal_world_component_count(world) && c < PAL_FRAME_COMPONENT_MAX; c++) {
+            pal_component_info info;
+            pal_world_component_info(world, c, &info);
+            out->component_ms[c][k] = share * 1e-6 * (double)info.spent_ns;
         }
     }
     return PAL_ERR_OK;
 }
 
-/* nodes and springs of every level, and of the present mixture */
+static double component_ms(cost *c, int component)
+{
+    return component < PAL_FRAME_COMPONENT_MAX ? pal_median(c->component_ms[component], c->n_step) : 0;
+}
+
+/* nodes and springs that are active, and of every level */
 static void add_levels(cJSON *body, const pal_adaptive_surface *adaptive)
 {
     const pal_levels *levels = &adaptive->levels;
@@ -62,7 +65,6 @@ static void add_levels(cJSON *body, const pal_adaptive_surface *adaptive)
     }
 }
 
-/* elements of each kind, what moves them and what that takes */
 static void add_solid(cJSON *body, const pal_body_def *def, const pal_body *b)
 {
     const pal_subdivision_solid *solid = b->model.solid;
@@ -77,7 +79,7 @@ static void add_solid(cJSON *body, const pal_body_def *def, const pal_body *b)
     cJSON_AddNumberToObject(body, "solid_bytes", (double)solid->n_byte);
 }
 
-/* the effects that this scene has no row of */
+/* the effects that no component of this scene is of */
 static void add_absent(cJSON *o, const pal_world *world)
 {
     cJSON *absent = cJSON_AddArrayToObject(o, "absent");
@@ -88,12 +90,12 @@ static void add_absent(cJSON *o, const pal_world *world)
         cJSON *entry = cJSON_CreateObject();
         cJSON_AddItemToArray(absent, entry);
         cJSON_AddStringToObject(entry, "name", name);
-        cJSON_AddStringToObject(entry, "wants", pal_effect_words(name, words));
+        cJSON_AddStringToObject(entry, "called_by", pal_effect_words(name, words));
     }
 }
 
-/* the setting that was picked from the study, and what is to be known about that */
-static void add_setting(cJSON *o, const pal_studied_scene *studied)
+/* the configuration that was picked from the study */
+static void add_configuration(cJSON *o, const pal_studied_scene *studied)
 {
     char text[PAL_CONFIGURATION_TEXT];
     if (studied->warn[0]) cJSON_AddStringToObject(o, "study_warning", studied->warn);
@@ -101,7 +103,7 @@ static void add_setting(cJSON *o, const pal_studied_scene *studied)
     const pal_measured_configuration *p = &studied->file->study.point[studied->picked].measured;
     cJSON *picked = cJSON_AddObjectToObject(o, "picked");
     cJSON_AddStringToObject(picked, "body", studied->scene->body[studied->body].name);
-    cJSON_AddStringToObject(picked, "setting", pal_configuration_text(&p->setting, text));
+    cJSON_AddStringToObject(picked, "configuration", pal_configuration_text(&p->setting, text));
     cJSON_AddNumberToObject(picked, "ms", p->ms);
     cJSON_AddNumberToObject(picked, "error_m", p->error_m);
 }
@@ -113,7 +115,7 @@ static cJSON *as_json(const pal_studied_scene *studied, pal_world *world, cost *
     double step_ms = pal_median(c->step_ms, c->n_step);
     cJSON_AddBoolToObject(o, "ok", true);
     cJSON_AddStringToObject(o, "name", scene->name);
-    add_setting(o, studied);
+    add_configuration(o, studied);
     cJSON_AddNumberToObject(o, "step_s", scene->step_s);
     cJSON_AddNumberToObject(o, "substeps", pal_world_substeps(world));
     cJSON_AddNumberToObject(o, "limit_s", pal_world_limit_s(world));
@@ -138,18 +140,18 @@ static cJSON *as_json(const pal_studied_scene *studied, pal_world *world, cost *
         cJSON_AddNumberToObject(body, "triangles",
                                 moving->model.solid ? moving->surface->n_tri : scene->body[b].mesh->surface.n_tri);
     }
-    cJSON *rows = cJSON_AddArrayToObject(o, "rows");
-    for (int r = 0; r < pal_world_component_count(world); r++) {
-        pal_component_info row;
+    cJSON *list = cJSON_AddArrayToObject(o, "components");
+    for (int k = 0; k < pal_world_component_count(world); k++) {
+        pal_component_info info;
         cJSON *entry = cJSON_CreateObject();
-        pal_world_component_info(world, r, &row);
-        cJSON_AddItemToArray(rows, entry);
-        cJSON_AddStringToObject(entry, "name", row.name);
-        cJSON_AddStringToObject(entry, "body", row.body);
-        cJSON_AddStringToObject(entry, "stage", row.stage);
-        cJSON_AddNumberToObject(entry, "bytes", (double)row.n_byte);
-        cJSON_AddNumberToObject(entry, "ms", r < PAL_FRAME_COMPONENT_MAX ? pal_median(c->row_ms[r], c->n_step) : 0);
-        cJSON_AddStringToObject(entry, "why", row.reason);
+        pal_world_component_info(world, k, &info);
+        cJSON_AddItemToArray(list, entry);
+        cJSON_AddStringToObject(entry, "name", info.name);
+        cJSON_AddStringToObject(entry, "body", info.body);
+        cJSON_AddStringToObject(entry, "stage", info.stage);
+        cJSON_AddNumberToObject(entry, "bytes", (double)info.n_byte);
+        cJSON_AddNumberToObject(entry, "ms", component_ms(c, k));
+        cJSON_AddStringToObject(entry, "reason", info.reason);
     }
     add_absent(o, world);
     return o;
@@ -158,7 +160,7 @@ static cJSON *as_json(const pal_studied_scene *studied, pal_world *world, cost *
 static void print_shell(const char *name, const pal_adaptive_surface *adaptive)
 {
     const pal_levels *levels = &adaptive->levels;
-    printf("%s: a surface that adapts, %d nodes and %d springs of\n", name, adaptive->n_node, adaptive->n_spring);
+    printf("%s: an adaptive surface, %d nodes and %d springs active of\n", name, adaptive->n_node, adaptive->n_spring);
     for (int l = 0; l < levels->n_level; l++)
         printf("  level %d: %d nodes, %d springs\n", l, levels->n_vertex[l], pal_levels_n_edge(levels, l));
 }
@@ -172,14 +174,14 @@ static void print_solid(const pal_body_def *def, const pal_body *b)
            b->model.solid->subdivision.n_level == 1 ? "" : "s", pal_cell_elements_count(e),
            pal_cell_elements_percent(e, PAL_CELL_CUBIC), pal_cell_elements_percent(e, PAL_CELL_HEX),
            pal_cell_elements_percent(e, PAL_CELL_PYRAMID));
-    printf("  %d control points carry %d nodes, %d shown triangles; the solid has %.1f MB\n", b->n_dof, b->n_node,
+    printf("  %d control points carry %d nodes, %d surface triangles; the solid takes %.1f MB\n", b->n_dof, b->n_node,
            b->surface->n_tri, 1e-6 * (double)b->model.solid->n_byte);
 }
 
 static void print_absent(const pal_world *world)
 {
     char words[128];
-    printf("\n%-52s %s\n", "not there: no row, no memory, no time", "would be called for by");
+    printf("\n%-52s %s\n", "absent: no component, no memory, no time", "called for by");
     for (int i = 0; i < PAL_EFFECT_COUNT; i++)
         if (!pal_plan_has(world, pal_effects[i]->name))
             printf("  %-50s %s\n", pal_effects[i]->name, pal_effect_words(pal_effects[i]->name, words));
@@ -200,15 +202,15 @@ static void print(const pal_studied_scene *studied, pal_world *world, cost *c)
             print_solid(&scene->body[b], pal_world_body(world, b));
             continue;
         }
-        printf("%s: %d tetrahedra, %d nodes, %d shown triangles\n", scene->body[b].name,
+        printf("%s: %d tetrahedra, %d nodes, %d surface triangles\n", scene->body[b].name,
                scene->body[b].mesh->tets.n_tet, scene->body[b].mesh->tets.n_node, scene->body[b].mesh->surface.n_tri);
     }
-    printf("\n%-9s %-16s %-16s %10s %10s  %s\n", "stage", "row", "body", "kB", "ms a step", "because of");
-    for (int r = 0; r < pal_world_component_count(world); r++) {
-        pal_component_info row;
-        pal_world_component_info(world, r, &row);
-        printf("%-9s %-16s %-16s %10.1f %10.4f  %s\n", row.stage, row.name, row.body, 1e-3 * (double)row.n_byte,
-               r < PAL_FRAME_COMPONENT_MAX ? pal_median(c->row_ms[r], c->n_step) : 0, row.reason);
+    printf("\n%-9s %-16s %-16s %10s %10s  %s\n", "stage", "component", "body", "kB", "ms a step", "called for by");
+    for (int k = 0; k < pal_world_component_count(world); k++) {
+        pal_component_info info;
+        pal_world_component_info(world, k, &info);
+        printf("%-9s %-16s %-16s %10.1f %10.4f  %s\n", info.stage, info.name, info.body, 1e-3 * (double)info.n_byte,
+               component_ms(c, k), info.reason);
     }
     print_absent(world);
     double step_ms = pal_median(c->step_ms, c->n_step), limit_s = pal_world_limit_s(world);
@@ -219,51 +221,50 @@ static void print(const pal_studied_scene *studied, pal_world *world, cost *c)
            1e-1 * step_ms / scene->step_s, 1e-6 * (double)pal_world_bytes(world));
 }
 
-static cJSON *with_preflight(cJSON *plan, const pal_preflight *preflight)
-{
-    cJSON_AddItemToObject(plan, "preflight", pal_preflight_json(preflight));
-    return plan;
-}
-
 int command_plan(int argc, char **argv)
 {
-    const pal_flag_table table = {.usage = "plan SCENE [flags]",
-                                  .about = "Shows the rows that a scene calls for, in the order of a step, with their "
-                                           "memory and their measured cost here.\nSCENE is a scene.json, its folder, "
-                                           "control cells (.palcells), or any surface or scan.\n",
-                                  .min_operand = 1,
-                                  .max_operand = 1};
+    const pal_flag_table table = {
+        .usage = "plan SCENE [flags]",
+        .about =
+            "Lists the components that a scene calls for, in the order of a step, with the entry that calls for each, "
+            "their\n"
+            "memory and their time on this machine; the effects that are absent; and weak elements, nodes and limits.\n"
+            "SCENE is a scene.json, its folder, control cells (.palcells), a surface or a scan.\n",
+        .example = "palpate prepare --procedural -o organ\n"
+                   "palpate plan organ/scene.json\n",
+        .min_operand = 1,
+        .max_operand = 1};
     pal_flag_common common;
     const char *word[1];
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
     if (code >= 0) return code;
-    pal_loaded_scene *loaded = NULL;
+    pal_scene_input input = {0};
     pal_world *world = NULL;
     pal_diagnostic diag = {""}, reason = {""};
     static cost measured;
-    pal_studied_scene studied = {0};
-    pal_err err = pal_scene_arg(word[0], NULL, &loaded, NULL, NULL, &diag);
-    if (!err) err = pal_studied_scene_open(word[0], &loaded->scene, &studied, &diag);
-    if (!err && (err = pal_world_create(studied.scene, &reason, &world)))
-        pal_diagnostic_set(&diag, err, "%s: %s", word[0], reason.text);
+    pal_err err = pal_scene_input_open(word[0], &input, &diag);
+    const pal_scene *scene = input.studied.scene;
     pal_preflight preflight = {0};
-    if (!err && (err = pal_preflight_run(studied.scene, PAL_PREFLIGHT_FULL, &preflight, &reason)))
-        pal_diagnostic_set(&diag, err, "%s: %s", word[0], reason.text);
+    if (!err) {
+        err = pal_world_create(scene, &reason, &world);
+        if (!err) err = pal_preflight_run(scene, PAL_PREFLIGHT_FULL, &preflight, &reason);
+        if (err) pal_diagnostic_set(&diag, err, "%s: %s", word[0], reason.text);
+    }
     pal_report_progress("measure", 0, &common);
-    if (!err) err = measure(world, studied.scene->step_s, &measured);
+    if (!err) err = measure(world, scene->step_s, &measured);
     pal_report_progress(NULL, 0, &common);
-    if (err)
+    if (err) {
         code = pal_report_refusal(&common, err, &diag);
-    else if (common.json)
-        code = pal_report_json(&common, with_preflight(as_json(&studied, world, &measured), &preflight));
-    else
+    } else if (common.json) {
+        cJSON *plan = as_json(&input.studied, world, &measured);
+        cJSON_AddItemToObject(plan, "preflight", pal_preflight_json(&preflight));
+        code = pal_report_json(&common, plan);
+    } else {
         code = 0;
-    if (!err && !common.json && !common.quiet) {
-        print(&studied, world, &measured);
-        pal_preflight_print(&preflight, pal_median(measured.step_ms, measured.n_step));
+        if (!common.quiet) print(&input.studied, world, &measured);
+        if (!common.quiet) pal_preflight_print(&preflight, pal_median(measured.step_ms, measured.n_step));
     }
     pal_world_destroy(world);
-    pal_studied_scene_close(&studied);
-    pal_scene_free(loaded);
+    pal_scene_input_close(&input);
     return code;
 }

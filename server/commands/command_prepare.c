@@ -1,6 +1,6 @@
 /* `palpate prepare`: surface file, label volume or procedural shape -> DIR/scene.json, the prepared mesh and TetGen
- * files. All files are written into a hidden folder inside DIR first and then moved, scene.json last, so that DIR never
- * holds half a scene. */
+ * files. All files are written into a hidden folder inside DIR and then moved, scene.json last, so that DIR never holds
+ * a part of a scene. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/cli/flags.h"
@@ -20,35 +20,40 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { PATH = 1200, TETGEN_MOST = 1000000, LABELS = 256, FILES = 64 };
+enum { PATH = 1200, TETGEN_MAX = 1000000, LABELS = 256, FILES = 64 };
 
 static const char about[] =
-    "Turns a surface (OBJ, STL, PLY, OFF) or a segmented scan (NIfTI .nii .nii.gz, INRIMAGE .inr .inr.gz) into a "
-    "scene\n"
-    "that `palpate serve DIR/scene.json` runs: tetrahedra (paper B 2.2), skin, tissue, supports, tools.\n"
-    "With --model adaptive a hollow organ: springs on the surface as it is, refined where it is touched (paper C).\n"
-    "Voxels are joined by faces. A component of them without support is dropped, and told, when it is below 1 % of\n"
-    "the largest one. A larger one is refused: --largest keeps only the largest, --hold may reach the others, finer\n"
-    "voxels may join them. In a scene.json each may have a support, or the body none at all: then it is free.\n"
-    "Files written: DIR/scene.json, DIR/NAME.palmesh, and DIR/NAME.node .ele .face for TetGen when the mesh has at "
-    "most\n"
-    "1,000,000 tetrahedra (--tetgen writes them for any mesh, --no-tetgen for none). Either all of them or none.\n";
+    "Makes a scene from a surface (OBJ, STL, PLY, OFF) or a segmented scan (NIfTI .nii .nii.gz, INRIMAGE .inr "
+    ".inr.gz):\n"
+    "tetrahedra (paper B section 2.2), skin, tissue, supports and tools. `palpate serve DIR/scene.json` serves it.\n"
+    "With --model adaptive the surface of a hollow organ carries springs and refines where it is touched (paper C).\n"
+    "\n"
+    "Voxels connect through faces. A component without a support is dropped, with a message, when it is below 1 % of\n"
+    "the largest one. A larger one is refused: --largest keeps the largest component only, --hold may reach the "
+    "others,\n"
+    "a finer --resolution may connect them. In scene.json each component may have its own support, or the body none:\n"
+    "then it is free.\n"
+    "\n"
+    "Writes DIR/scene.json, DIR/NAME.palmesh, and DIR/NAME.node .ele .face for TetGen when the mesh has at most\n"
+    "1,000,000 tetrahedra (--tetgen: always, --no-tetgen: never). Either all files are written or none.\n";
 
-typedef struct plan_requests {
+typedef struct arguments {
     pal_surface_scene scene;
     const char *folder, *units, *up, *name, *title, *source, *model;
     double hold_percent, thickness_mm;
     bool procedural, list_labels, tetgen, no_tetgen;
-} plan_requests;
+} arguments;
 
 typedef struct outcome {
     pal_surface_scene_report report;
     double write_s, total_s;
-    size_t world_byte; /* of model adaptive_springs, whose world is made once to see that it can be */
+    /* model adaptive_springs only */
+    size_t world_byte;
     double limit_s;
-    int n_substep, fine_substep; /* a step at rest; with a leaf of the finest level, as each level halves the bound */
-    int max_node;                /* put into the row refine; 0: no limit is needed */
-    double busy;                 /* of real time, by node_s, with as many nodes as there may be */
+    int n_substep,
+        fine_substep; /* of a step at rest; with a face of the finest level, as each level halves the bound */
+    int max_node;     /* limit of the component refine; 0: none is needed                                  */
+    double busy;      /* predicted share of real time with as many nodes as the limit allows               */
     char file[FILES][80];
     int n_file;
 } outcome;
@@ -133,34 +138,34 @@ static pal_err write_files(const pal_loaded_scene *loaded, const char *stage, bo
     return pal_mesh_file_write_tetgen(stem, &loaded->mesh[0].tets, diag);
 }
 
-static pal_err save(const pal_loaded_scene *loaded, const plan_requests *request, outcome *out, pal_diagnostic *diag)
+static pal_err save(const pal_loaded_scene *loaded, const arguments *args, outcome *out, pal_diagnostic *diag)
 {
     char stage[PATH];
-    bool was_there = access(request->folder, F_OK) == 0;
+    bool was_there = access(args->folder, F_OK) == 0;
     int n_tet = loaded->mesh[0].tets.n_tet;
-    bool tetgen = request->tetgen || (!request->no_tetgen && n_tet > 0 && n_tet <= TETGEN_MOST);
-    int n = snprintf(stage, sizeof stage, "%s/.palpate-%ld", request->folder, (long)getpid());
+    bool tetgen = args->tetgen || (!args->no_tetgen && n_tet > 0 && n_tet <= TETGEN_MAX);
+    int n = snprintf(stage, sizeof stage, "%s/.palpate-%ld", args->folder, (long)getpid());
     if (n < 0 || (size_t)n >= sizeof stage)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.80s...: the path is too long", request->folder);
-    /* an interrupt waits until the files are there or gone */
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.80s...: the path is too long", args->folder);
+    /* a signal waits until all files are written or removed */
     sigset_t asked, old;
     sigemptyset(&asked);
     sigaddset(&asked, SIGINT);
     sigaddset(&asked, SIGTERM);
     sigaddset(&asked, SIGHUP);
     sigprocmask(SIG_BLOCK, &asked, &old);
-    pal_err err = pal_scene_make_folder(request->folder, diag);
+    pal_err err = pal_scene_make_folder(args->folder, diag);
     if (!err) err = write_files(loaded, stage, tetgen, diag);
-    if (!err) err = move_up(stage, request->folder, out, diag);
+    if (!err) err = move_up(stage, args->folder, out, diag);
     remove_folder(stage);
-    if (err && !was_there) rmdir(request->folder);
+    if (err && !was_there) rmdir(args->folder);
     sigprocmask(SIG_SETMASK, &old, NULL);
     return err;
 }
 
-/* ---- saying ---- */
+/* ---- report ---- */
 
-/* what voxels and tetrahedra have to say */
+/* figures of voxels and tetrahedra */
 static void add_solid(cJSON *o, const pal_prepared *mesh, const pal_surface_scene_report *r)
 {
     cJSON_AddNumberToObject(o, "resolution", r->resolution);
@@ -177,7 +182,7 @@ static void add_solid(cJSON *o, const pal_prepared *mesh, const pal_surface_scen
     cJSON_AddNumberToObject(o, "volume_error", r->prepare.volume_error);
 }
 
-/* what the levels of a surface have to say */
+/* figures of the levels of an adaptive surface */
 static void add_levels(cJSON *o, const outcome *out)
 {
     const pal_surface_scene_report *r = &out->report;
@@ -203,13 +208,13 @@ static void add_levels(cJSON *o, const outcome *out)
     cJSON_AddNumberToObject(o, "share_of_real_time", out->busy);
 }
 
-static cJSON *as_json(const pal_loaded_scene *loaded, const plan_requests *request, const outcome *out)
+static cJSON *as_json(const pal_loaded_scene *loaded, const arguments *args, const outcome *out)
 {
     const pal_surface_scene_report *r = &out->report;
     const pal_prepared *mesh = &loaded->mesh[0];
     char path[PATH + 16];
     cJSON *o = cJSON_CreateObject();
-    snprintf(path, sizeof path, "%s/scene.json", request->folder);
+    snprintf(path, sizeof path, "%s/scene.json", args->folder);
     cJSON_AddBoolToObject(o, "ok", true);
     cJSON_AddStringToObject(o, "scene", path);
     cJSON_AddStringToObject(o, "name", loaded->scene.name);
@@ -218,7 +223,7 @@ static cJSON *as_json(const pal_loaded_scene *loaded, const plan_requests *reque
     for (int k = 0; k < out->n_file; k++) cJSON_AddItemToArray(files, cJSON_CreateString(out->file[k]));
     cJSON_AddStringToObject(o, "format", r->surface.format);
     cJSON *units = cJSON_AddObjectToObject(o, "units");
-    cJSON_AddStringToObject(units, "name", request->units ? request->units : r->unit_name);
+    cJSON_AddStringToObject(units, "name", args->units ? args->units : r->unit_name);
     cJSON_AddNumberToObject(units, "m", r->unit_m);
     cJSON_AddBoolToObject(units, "guessed", r->unit_guessed);
     if (r->label >= 0) cJSON_AddNumberToObject(o, "label", r->label);
@@ -252,8 +257,8 @@ typedef struct volume_text {
     char text[32];
 } volume_text;
 
-/* in the unit that leaves one to four digits before the point */
-static volume_text say_volume(double volume_m3)
+/* in the unit that gives one to four digits before the decimal point */
+static volume_text format_volume(double volume_m3)
 {
     static const struct {
         double m3;
@@ -272,13 +277,13 @@ static void print_solid(const pal_prepared *mesh, const pal_surface_scene_report
     printf("%d tetrahedra, %d nodes from %lld voxels at resolution %d, %d component%s, inside by %s\n",
            mesh->tets.n_tet, mesh->tets.n_node, (long long)r->prepare.n_voxel, r->resolution, n_component,
            n_component == 1 ? "" : "s", r->prepare.voxel.method);
-    volume_text known = say_volume(r->prepare.voxel.surface_volume_m3), whole = say_volume(r->prepare.volume_m3);
+    volume_text known = format_volume(r->prepare.voxel.surface_volume_m3), whole = format_volume(r->prepare.volume_m3);
     printf("volume %s by the surface%s, %+.1f %% by the voxels inside, %s with the border layer\n", known.text,
            r->prepare.voxel.open ? " (open: its holes count as closed)" : "", 100 * r->prepare.volume_error,
            whole.text);
 }
 
-static void print_levels(const pal_prepared *mesh, const plan_requests *request, const outcome *out)
+static void print_levels(const pal_prepared *mesh, const arguments *args, const outcome *out)
 {
     const pal_surface_scene_report *r = &out->report;
     for (int l = 0; l < r->n_level; l++) printf("level %d: %d nodes, %d springs\n", l, r->n_node[l], r->n_spring[l]);
@@ -286,66 +291,60 @@ static void print_levels(const pal_prepared *mesh, const plan_requests *request,
     if (r->n_open_edge > 0)
         printf("open along %d edges", r->n_open_edge);
     else
-        printf("closed around %s", say_volume(r->volume_m3).text);
+        printf("closed around %s", format_volume(r->volume_m3).text);
     printf(", wall of %.1f cm2 and %.1f g\n", 1e4 * r->area_m2, 1e3 * r->mass_kg);
     printf("memory %.1f MB, of it %.1f for the levels; %d sub-step%s a step at rest\n", 1e-6 * (double)out->world_byte,
            1e-6 * (double)r->level_byte, out->n_substep, out->n_substep == 1 ? "" : "s");
-    if (!request->scene.target_tri && r->surface.n_tri_read > 2 * mesh->surface.n_tri)
-        printf("made coarser from %lld triangles, so that it keeps real time (--triangles says otherwise)\n",
+    if (!args->scene.target_tri && r->surface.n_tri_read > 2 * mesh->surface.n_tri)
+        printf("decimated from %lld triangles, so that it runs in real time (--triangles overrides)\n",
                (long long)r->surface.n_tri_read);
     if (out->max_node > 0)
         printf(
             "refined to at most %d nodes at a time (most_node of refine); the finest level needs %d sub-steps a step\n",
             out->max_node, out->fine_substep);
     if (out->busy > 1)
-        printf("too much for real time, about %.1f times: --triangles makes the surface coarser; fewer --levels or a "
+        printf("about %.1f times too slow for real time: --triangles makes the surface coarser; fewer --levels or a "
                "smaller --young-Pa need fewer sub-steps\n",
                out->busy);
 }
 
-static void print(const pal_loaded_scene *loaded, const plan_requests *request, const outcome *out)
+static void print(const pal_loaded_scene *loaded, const arguments *args, const outcome *out)
 {
     const pal_surface_scene_report *r = &out->report;
     const pal_surface_report *d = &r->surface;
     const pal_prepared *mesh = &loaded->mesh[0];
     int n_component = r->n_level > 0 ? r->n_piece : r->prepare.voxel.n_component;
     double low[3], high[3];
-    pal_diagnostic told;
+    pal_diagnostic dropped;
     pal_surface_box(&mesh->surface, low, high);
     printf("%s (%s): %d triangles, %.0f x %.0f x %.0f mm", loaded->scene.title, r->surface.format, mesh->surface.n_tri,
            1e3 * (high[0] - low[0]), 1e3 * (high[1] - low[1]), 1e3 * (high[2] - low[2]));
     if (r->unit_guessed && !strcmp(r->unit_name, "scaled"))
-        printf(", no unit fits the size in the file: scaled to an organ's (--units says otherwise)");
+        printf(", no unit fits the size in the file: scaled to an organ (--units overrides)");
     else if (r->unit_guessed)
-        printf(", unit %s guessed from the size (--units says otherwise)", r->unit_name);
-    if (r->n_label > 1 && request->scene.label < 0)
-        printf(", the most frequent of %d labels (--list-labels shows them)", r->n_label);
+        printf(", unit %s guessed from the size (--units overrides)", r->unit_name);
+    if (r->n_label > 1 && args->scene.label < 0)
+        printf(", the most frequent of %d labels (--list-labels lists them)", r->n_label);
     printf("\n");
     if (r->n_level > 0)
-        print_levels(mesh, request, out);
+        print_levels(mesh, args, out);
     else
         print_solid(mesh, r);
-    if (n_component > 1) printf("the components do not hang together, each is held by itself (--largest keeps one)\n");
-    pal_loose_components_describe(&loaded->loose[0], loaded->scene.body[0].name, &told);
-    if (told.text[0]) printf("%s\n", told.text);
+    if (n_component > 1) printf("the components are not connected, each has its own support (--largest keeps one)\n");
+    pal_loose_components_describe(&loaded->loose[0], loaded->scene.body[0].name, &dropped);
+    if (dropped.text[0]) printf("%s\n", dropped.text);
     if (d->n_degenerate + d->n_duplicate + d->n_nonfinite + d->n_folded > 0)
         printf("dropped triangles: %lld degenerate, %lld duplicate, %lld not finite, %lld folded\n",
                (long long)d->n_degenerate, (long long)d->n_duplicate, (long long)d->n_nonfinite,
                (long long)d->n_folded);
     printf("wrote");
     for (int k = 0; k < out->n_file; k++) printf(" %s", out->file[k]);
-    printf(" to %s in %.2f s; now: palpate serve %s/scene.json\n", request->folder, out->total_s, request->folder);
+    printf(" to %s in %.2f s; now: palpate serve %s/scene.json\n", args->folder, out->total_s, args->folder);
 }
 
 /* ---- the command ---- */
 
-static int usage(const pal_flag_common *common, const char *sentence)
-{
-    fprintf(stderr, "palpate %s: %s (see palpate %s --help)\n", common->command, sentence, common->command);
-    return 2;
-}
-
-/* a body that adapts is made once: what its model and rows refuse is said now and not when it is served */
+/* makes the world of an adaptive surface once, so that a scene that cannot be served is refused now */
 static pal_err try_world(const pal_loaded_scene *loaded, const char *name, outcome *out, pal_diagnostic *diag)
 {
     pal_world *world;
@@ -359,23 +358,23 @@ static pal_err try_world(const pal_loaded_scene *loaded, const char *name, outco
     return PAL_ERR_OK;
 }
 
-/* what a node costs in a sub-step of rk4 with its springs and anchor, on a core of today with some time to spare; half
- * of a step is for that. A live session whose finest level is too dear for all of its places refines fewer of them,
- * though always an eighth more nodes than the coarsest level has and some hundreds */
-static const double node_s = 120e-9, most_busy = 0.5;
-enum { LEAST_MORE = 400 };
+/* Cost model of an adaptive surface: node_s, processor time of a node with its springs and anchor in one sub-step of
+ * rk4 on a 2020s server core. Half of a step is allowed for it. Where the finest level of the whole surface would take
+ * more, refinement is limited, to no fewer than an eighth more nodes than the coarsest level has, plus 400. */
+static const double node_s = 120e-9, max_busy = 0.5;
+enum { MIN_EXTRA = 400 };
 
-static pal_err keep_up(pal_loaded_scene *loaded, outcome *out, pal_diagnostic *diag)
+static pal_err limit_nodes(pal_loaded_scene *loaded, outcome *out, pal_diagnostic *diag)
 {
     pal_scene *scene = &loaded->scene;
     const pal_surface_scene_report *r = &out->report;
     int finest = r->n_level - 1, n = r->n_node[finest];
-    double most = n, pace = scene->step_s / node_s;
+    double limit = n, pace = scene->step_s / node_s;
     out->fine_substep = (int)fmax(1, ceil(ldexp(scene->step_s / out->limit_s, finest)));
-    if (finest > 0) most = fmax(most_busy * pace / out->fine_substep, 1.125 * r->n_node[0] + LEAST_MORE);
-    out->busy = fmin(most, n) * out->fine_substep / pace;
-    if (most >= n) return PAL_ERR_OK;
-    out->max_node = (int)most;
+    if (finest > 0) limit = fmax(max_busy * pace / out->fine_substep, 1.125 * r->n_node[0] + MIN_EXTRA);
+    out->busy = fmin(limit, n) * out->fine_substep / pace;
+    if (limit >= n) return PAL_ERR_OK;
+    out->max_node = (int)limit;
     pal_body_def *body = &scene->body[0];
     pal_config_entry *refine = &body->effect[body->n_effect];
     pal_entry_init(refine, "", "refine");
@@ -383,79 +382,61 @@ static pal_err keep_up(pal_loaded_scene *loaded, outcome *out, pal_diagnostic *d
     return pal_entry_put_number(refine, "most_node", out->max_node, diag);
 }
 
-static int run(pal_flag_common *common, const char *in, plan_requests *request)
+static int run(pal_flag_common *common, const char *in, arguments *args)
 {
     pal_loaded_scene *loaded = NULL;
     static outcome out;
     pal_diagnostic diag = {""};
     double start = pal_clock_s();
-    request->scene.progress = pal_report_progress;
-    request->scene.user = common;
-    pal_err err = !in ? pal_scene_procedural(&request->scene, &loaded, &out.report, &diag)
-                      : pal_scene_from_surface(in, &request->scene, &loaded, &out.report, &diag);
+    args->scene.progress = pal_report_progress;
+    args->scene.user = common;
+    pal_err err = !in ? pal_scene_procedural(&args->scene, &loaded, &out.report, &diag)
+                      : pal_scene_from_surface(in, &args->scene, &loaded, &out.report, &diag);
     if (err) return pal_report_refusal(common, err, &diag);
-    err = pal_scene_rename(loaded, request->name, request->title, request->source, &diag);
-    if (!err && request->scene.adaptive) err = try_world(loaded, in ? in : "procedural", &out, &diag);
-    if (!err && request->scene.adaptive) err = keep_up(loaded, &out, &diag);
+    err = pal_scene_rename(loaded, args->name, args->title, args->source, &diag);
+    if (!err && args->scene.adaptive) err = try_world(loaded, in ? in : "procedural", &out, &diag);
+    if (!err && args->scene.adaptive) err = limit_nodes(loaded, &out, &diag);
     double before = pal_clock_s();
     pal_report_progress("write", 0, common);
-    if (!err) err = save(loaded, request, &out, &diag);
+    if (!err) err = save(loaded, args, &out, &diag);
     out.write_s = pal_clock_s() - before;
     out.total_s = pal_clock_s() - start;
     pal_report_progress(NULL, 0, common);
     int code = err            ? pal_report_refusal(common, err, &diag)
-               : common->json ? pal_report_json(common, as_json(loaded, request, &out))
+               : common->json ? pal_report_json(common, as_json(loaded, args, &out))
                               : 0;
-    if (!err && !common->json && !common->quiet) print(loaded, request, &out);
+    if (!err && !common->json && !common->quiet) print(loaded, args, &out);
     pal_scene_free(loaded);
     return code;
 }
 
-/* is a word one of a NULL-terminated list, or not given? */
-static bool is_one(const char *word, const char *const *list)
+/* flags that the model refuses; NULL: none, else the sentence */
+static const char *check_adaptive(const arguments *args)
 {
-    for (int k = 0; word && list[k]; k++)
-        if (!strcmp(word, list[k])) return true;
-    return !word;
-}
-
-/* what only goes with other models; NULL: all fine, else the sentence */
-static const char *check_adaptive(const plan_requests *request)
-{
-    const pal_surface_scene *s = &request->scene;
+    const pal_surface_scene *s = &args->scene;
     if (!s->adaptive) {
         if (s->n_level) return "--levels: only goes with --model adaptive";
-        if (request->thickness_mm > 0) return "--thickness-mm: only goes with --model adaptive";
+        if (args->thickness_mm > 0) return "--thickness-mm: only goes with --model adaptive";
         if (s->inflate_Pa != 0) return "--inflate: only goes with --model adaptive";
         return NULL;
     }
     if (s->resolution) return "--resolution: model adaptive has no voxels";
     if (s->area_springs) return "--area-springs: model adaptive has springs along edges only";
-    if (request->tetgen) return "--tetgen: model adaptive has no tetrahedra";
+    if (args->tetgen) return "--tetgen: model adaptive has no tetrahedra";
     return NULL;
 }
 
-/* shape, model, element, law and solver; NULL: all fine, else the sentence */
-static const char *check_model(plan_requests *request)
+/* NULL: the flags fit together, else the sentence */
+static const char *check_model(arguments *args)
 {
-    pal_surface_scene *s = &request->scene;
-    if (!is_one(s->shape, (const char *const[]){"organ", "stomach", "sphere", "sheet", NULL}))
-        return "--shape: is not organ, stomach, sphere or sheet";
-    if (!is_one(request->model, (const char *const[]){"springs", "fem", "adaptive", NULL}))
-        return "--model: is not springs or fem or adaptive";
-    s->fem = request->model && !strcmp(request->model, "fem");
-    s->adaptive = request->model ? !strcmp(request->model, "adaptive") : s->shape && strcmp(s->shape, "organ") != 0;
+    pal_surface_scene *s = &args->scene;
+    s->fem = args->model && !strcmp(args->model, "fem");
+    s->adaptive = args->model ? !strcmp(args->model, "adaptive") : s->shape && strcmp(s->shape, "organ") != 0;
     if (s->fem && s->area_springs) return "--area-springs: model fem has no springs";
     if (!s->fem && s->element) return "--element: only goes with --model fem";
     if (!s->fem && s->law) return "--law: only goes with --model fem";
     if (!s->fem && s->solver) return "--solver: only goes with --model fem";
-    if (!is_one(s->element, (const char *const[]){"hex8_bbar", "hex8", "tet4", "tet10", NULL}))
-        return "--element: is not hex8_bbar, hex8, tet4 or tet10";
-    if (!is_one(s->law, (const char *const[]){"corotational", "neo_hookean", "linear", NULL}))
-        return "--law: is not corotational, neo_hookean or linear";
-    if (!is_one(s->solver, (const char *const[]){"implicit_euler", "sdirk2", "static_newton", NULL}))
-        return "--solver: is not implicit_euler, sdirk2 or static_newton";
-    return check_adaptive(request);
+    return check_adaptive(args);
 }
 
 /* "-y" -> (0, -1, 0) */
@@ -469,70 +450,70 @@ static bool read_axis(const char *word, double axis[3])
     return true;
 }
 
-/* tissue of an organ, and the wall of a hollow one, which is muscle */
+/* soft tissue, and the wall of a hollow organ, which is muscle */
 #define SOLID_YOUNG_PA 5000
 #define WALL_YOUNG_PA  50000
 
-static plan_requests request = {.scene = {.label = -1, .material = {0, 0.45, 1000, 4}}};
+static arguments args = {.scene = {.label = -1, .material = {0, 0.45, 1000, 4}}};
 static const pal_flag flag[] = {
-    {"-o", "DIR", PAL_FLAG_TEXT, &request.folder, 0, 0, "folder to write to; made when it is not there"},
-    {"--resolution", "N", PAL_FLAG_COUNT, &request.scene.resolution, 1, 1024,
-     "voxels on the longest axis (as many as give about 13,000 tetrahedra, or 2,500 nodes for fem)"},
-    {"--model", "WORD", PAL_FLAG_TEXT, &request.model, 0, 0,
-     "springs (paper B); fem: finite elements that are accurate and implicit;\nor adaptive: a hollow organ, springs on "
-     "its surface that refine where it is touched (springs)"},
-    {"--element", "WORD", PAL_FLAG_TEXT, &request.scene.element, 0, 0,
-     "of fem: hex8_bbar, hex8, tet4 or tet10 (hex8_bbar)"},
-    {"--law", "WORD", PAL_FLAG_TEXT, &request.scene.law, 0, 0,
-     "of fem: corotational, neo_hookean or linear (corotational)"},
-    {"--solver", "WORD", PAL_FLAG_TEXT, &request.scene.solver, 0, 0,
-     "of fem: implicit_euler, sdirk2 or static_newton (implicit_euler)"},
-    {"--levels", "N", PAL_FLAG_COUNT, &request.scene.n_level, 1, PAL_LEVELS_MAX,
-     "of adaptive: levels of detail; the surface itself is the coarsest, each has four times the springs of the one "
-     "before (2)"},
-    {"--thickness-mm", "T", PAL_FLAG_NUMBER, &request.thickness_mm, 1e-3, 1000,
-     "of adaptive: thickness of the wall (3)"},
-    {"--inflate", "PA", PAL_FLAG_NUMBER, &request.scene.inflate_Pa, -1e6, 1e6,
-     "of adaptive: pressure inside beyond that outside; closed surfaces only (0)"},
-    {"--label", "N", PAL_FLAG_COUNT, &request.scene.label, 1, INT32_MAX,
-     "label of a segmented scan (the most frequent one)"},
-    {"--list-labels", NULL, PAL_FLAG_SWITCH, &request.list_labels, 0, 0, "only list the labels of a segmented scan"},
-    {"--units", "WORD", PAL_FLAG_TEXT, &request.units, 0, 0,
+    {"-o", "DIR", PAL_FLAG_TEXT, &args.folder, 0, 0, "folder to write; made when it does not exist"},
+    {"--procedural", NULL, PAL_FLAG_SWITCH, &args.procedural, 0, 0, "without IN: a computed organ"},
+    {"--shape", "organ|stomach|sphere|sheet", PAL_FLAG_WORD, &args.scene.shape, 0, 0,
+     "without IN: a computed shape; all but organ are adaptive"},
+    {"--model", "springs|fem|adaptive", PAL_FLAG_WORD, &args.model, 0, 0,
+     "mass-spring tetrahedra (paper B); finite elements, implicit; or a surface of springs that\nrefines where it is "
+     "touched (paper C) (springs)"},
+    {"--resolution", "N", PAL_FLAG_COUNT, &args.scene.resolution, 1, 1024,
+     "voxels along the longest axis (the number that gives 13,000 tetrahedra, or 2,500 nodes for fem)"},
+    {"--element", "hex8_bbar|hex8|tet4|tet10", PAL_FLAG_WORD, &args.scene.element, 0, 0, "fem: element (hex8_bbar)"},
+    {"--law", "corotational|neo_hookean|linear", PAL_FLAG_WORD, &args.scene.law, 0, 0,
+     "fem: material law (corotational)"},
+    {"--solver", "implicit_euler|sdirk2|static_newton", PAL_FLAG_WORD, &args.scene.solver, 0, 0,
+     "fem: time integration (implicit_euler)"},
+    {"--levels", "N", PAL_FLAG_COUNT, &args.scene.n_level, 1, PAL_LEVELS_MAX,
+     "adaptive: levels of detail; the surface is the coarsest, each level has four times the springs\nof the one "
+     "before "
+     "(2)"},
+    {"--thickness-mm", "T", PAL_FLAG_NUMBER, &args.thickness_mm, 1e-3, 1000, "adaptive: thickness of the wall (3)"},
+    {"--inflate", "PA", PAL_FLAG_NUMBER, &args.scene.inflate_Pa, -1e6, 1e6,
+     "adaptive: pressure inside above that outside; closed surfaces only (0)"},
+    {"--area-springs", NULL, PAL_FLAG_SWITCH, &args.scene.area_springs, 0, 0,
+     "springs: preserve face areas too (edges and volumes alone have the same moduli at half the cost)"},
+    {"--label", "N", PAL_FLAG_COUNT, &args.scene.label, 1, INT32_MAX, "label of a segmented scan (the most frequent)"},
+    {"--list-labels", NULL, PAL_FLAG_SWITCH, &args.list_labels, 0, 0, "only list the labels of a segmented scan"},
+    {"--units", "UNIT", PAL_FLAG_TEXT, &args.units, 0, 0,
      "unit of a surface file: m, cm, mm, um or in (guessed from the size)"},
-    {"--triangles", "N", PAL_FLAG_COUNT, &request.scene.target_tri, 100, 10000000,
-     "shown triangles of a scan's surface or of the procedural organ (50,000); of adaptive the coarsest level\nof a "
-     "scan (1,500) or a surface file (as many as it has, 1,500 when it has more than 3,000)"},
-    {"--largest", NULL, PAL_FLAG_SWITCH, &request.scene.largest_only, 0, 0,
-     "keep only the largest of several components (of adaptive: pieces)"},
-    {"--young-Pa", "E", PAL_FLAG_NUMBER, &request.scene.material.young_Pa, PAL_YOUNG_MIN_PA, PAL_YOUNG_MAX_PA,
-     "stiffness of the tissue (5000; adaptive: 50,000)"},
-    {"--poisson", "NU", PAL_FLAG_NUMBER, &request.scene.material.poisson, PAL_POISSON_MIN, PAL_POISSON_MAX,
-     "its Poisson ratio (0.45)"},
-    {"--density-kg-m3", "RHO", PAL_FLAG_NUMBER, &request.scene.material.density_kg_m3, PAL_DENSITY_MIN_KG_M3,
-     PAL_DENSITY_MAX_KG_M3, "its density (1000)"},
-    {"--damping-1-s", "C", PAL_FLAG_NUMBER, &request.scene.material.damping_1_s, 0, PAL_DAMPING_MAX_1_S,
-     "its damping rate (4)"},
-    {"--up", "AXIS", PAL_FLAG_TEXT, &request.up, 0, 0, "x, y, z, -x, -y or -z points away from the ground (z)"},
-    {"--hold", "PERCENT", PAL_FLAG_NUMBER, &request.hold_percent, 0.1, 100,
-     "lowest part of the height that is held in place (5; an open surface of adaptive: its open edges)"},
-    {"--gravity", NULL, PAL_FLAG_SWITCH, &request.scene.gravity, 0, 0,
-     "let it hang (a scanned shape carries its weight already)"},
-    {"--area-springs", NULL, PAL_FLAG_SWITCH, &request.scene.area_springs, 0, 0,
-     "springs that keep face areas too (edges and volumes alone have the same moduli and cost half)"},
-    {"--name", "NAME", PAL_FLAG_TEXT, &request.name, 0, 0, "name of the scene, a-z 0-9 _ - (from the file's name)"},
-    {"--title", "TEXT", PAL_FLAG_TEXT, &request.title, 0, 0, "title on the page (from the file's name)"},
-    {"--source", "TEXT", PAL_FLAG_TEXT, &request.source, 0, 0, "where the organ comes from, shown as well"},
-    {"--procedural", NULL, PAL_FLAG_SWITCH, &request.procedural, 0, 0, "no IN: an organ that is computed"},
-    {"--shape", "WORD", PAL_FLAG_TEXT, &request.scene.shape, 0, 0,
-     "no IN: a computed organ, stomach, sphere or sheet; all but the first are adaptive"},
-    {"--tetgen", NULL, PAL_FLAG_SWITCH, &request.tetgen, 0, 0, "write TetGen files for any size"},
-    {"--no-tetgen", NULL, PAL_FLAG_SWITCH, &request.no_tetgen, 0, 0, "write no TetGen files"},
+    {"--triangles", "N", PAL_FLAG_COUNT, &args.scene.target_tri, 100, 10000000,
+     "triangles of the surface of a scan or of the computed organ (50,000); adaptive: of the coarsest\nlevel of a scan "
+     "(1,500) or of a file (as many as it has, 1,500 when it has more than 3,000)"},
+    {"--largest", NULL, PAL_FLAG_SWITCH, &args.scene.largest_only, 0, 0, "keep the largest of several components only"},
+    {"--young-Pa", "E", PAL_FLAG_NUMBER, &args.scene.material.young_Pa, PAL_YOUNG_MIN_PA, PAL_YOUNG_MAX_PA,
+     "Young's modulus (5000; adaptive: 50,000)"},
+    {"--poisson", "NU", PAL_FLAG_NUMBER, &args.scene.material.poisson, PAL_POISSON_MIN, PAL_POISSON_MAX,
+     "Poisson's ratio (0.45)"},
+    {"--density-kg-m3", "RHO", PAL_FLAG_NUMBER, &args.scene.material.density_kg_m3, PAL_DENSITY_MIN_KG_M3,
+     PAL_DENSITY_MAX_KG_M3, "density (1000)"},
+    {"--damping-1-s", "C", PAL_FLAG_NUMBER, &args.scene.material.damping_1_s, 0, PAL_DAMPING_MAX_1_S,
+     "damping rate (4)"},
+    {"--up", "AXIS", PAL_FLAG_TEXT, &args.up, 0, 0, "x, y, z, -x, -y or -z: the direction against gravity (z)"},
+    {"--hold", "PERCENT", PAL_FLAG_NUMBER, &args.hold_percent, 0.1, 100,
+     "lowest part of the height that is fixed (5; an open adaptive surface: its open edges)"},
+    {"--gravity", NULL, PAL_FLAG_SWITCH, &args.scene.gravity, 0, 0,
+     "add gravity (a scanned shape is already in balance with its weight)"},
+    {"--name", "NAME", PAL_FLAG_TEXT, &args.name, 0, 0, "name of the scene, a-z 0-9 _ - (from the file name)"},
+    {"--title", "TEXT", PAL_FLAG_TEXT, &args.title, 0, 0, "title in the viewer (from the file name)"},
+    {"--source", "TEXT", PAL_FLAG_TEXT, &args.source, 0, 0, "origin of the data, shown in the viewer"},
+    {"--tetgen", NULL, PAL_FLAG_SWITCH, &args.tetgen, 0, 0, "write TetGen files for any size"},
+    {"--no-tetgen", NULL, PAL_FLAG_SWITCH, &args.no_tetgen, 0, 0, "write no TetGen files"},
 };
 
 int command_prepare(int argc, char **argv)
 {
     const pal_flag_table table = {.usage = "prepare IN -o DIR [flags]",
                                   .about = about,
+                                  .example = "palpate prepare --procedural -o organ\n"
+                                             "palpate prepare deploy/problems/gear.obj --model fem --hold 12 -o gear\n"
+                                             "palpate prepare --shape stomach -o stomach\n",
                                   .flag = flag,
                                   .n_flag = sizeof flag / sizeof flag[0],
                                   .max_operand = 1};
@@ -540,21 +521,23 @@ int command_prepare(int argc, char **argv)
     const char *in[1] = {NULL};
     int n_in = 0, code = pal_flags_parse(&table, argc, argv, &common, in, &n_in);
     if (code >= 0) return code;
-    if (request.procedural && request.scene.shape) return usage(&common, "--procedural and --shape exclude each other");
-    if ((request.procedural || request.scene.shape) == (n_in > 0))
-        return usage(&common, "needs either a file or --procedural or --shape");
-    if (request.list_labels) return n_in ? list_labels(&common, in[0]) : usage(&common, "--list-labels needs a file");
-    if (!request.folder || !*request.folder) return usage(&common, "needs -o DIR");
-    const char *sentence = check_model(&request);
-    if (sentence) return usage(&common, sentence);
-    if (request.tetgen && request.no_tetgen) return usage(&common, "--tetgen and --no-tetgen exclude each other");
-    if (request.up && !read_axis(request.up, request.scene.up))
-        return usage(&common, "--up: is not x, y, z, -x, -y or -z");
-    pal_material *m = &request.scene.material;
-    if (m->young_Pa == 0) m->young_Pa = request.scene.adaptive ? WALL_YOUNG_PA : SOLID_YOUNG_PA;
-    request.scene.hold = request.hold_percent / 100;
-    request.scene.thickness_m = request.thickness_mm / 1000;
-    if (request.units && !(request.scene.unit_m = pal_mesh_unit_named(request.units)))
-        return usage(&common, "--units: is not m, cm, mm, um or in");
-    return run(&common, in[0], &request);
+    if (args.procedural && args.scene.shape)
+        return pal_flags_wrong(&common, "--procedural and --shape exclude each other");
+    if ((args.procedural || args.scene.shape) == (n_in > 0))
+        return pal_flags_wrong(&common, "needs either a file or --procedural or --shape");
+    if (args.list_labels)
+        return n_in ? list_labels(&common, in[0]) : pal_flags_wrong(&common, "--list-labels needs a file");
+    if (!args.folder || !*args.folder) return pal_flags_wrong(&common, "needs -o DIR");
+    const char *sentence = check_model(&args);
+    if (sentence) return pal_flags_wrong(&common, "%s", sentence);
+    if (args.tetgen && args.no_tetgen) return pal_flags_wrong(&common, "--tetgen and --no-tetgen exclude each other");
+    if (args.up && !read_axis(args.up, args.scene.up))
+        return pal_flags_wrong(&common, "--up: is not x, y, z, -x, -y or -z");
+    pal_material *m = &args.scene.material;
+    if (m->young_Pa == 0) m->young_Pa = args.scene.adaptive ? WALL_YOUNG_PA : SOLID_YOUNG_PA;
+    args.scene.hold = args.hold_percent / 100;
+    args.scene.thickness_m = args.thickness_mm / 1000;
+    if (args.units && !(args.scene.unit_m = pal_mesh_unit_named(args.units)))
+        return pal_flags_wrong(&common, "--units: is not m, cm, mm, um or in");
+    return run(&common, in[0], &args);
 }

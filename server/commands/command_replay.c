@@ -1,10 +1,9 @@
-/* `palpate replay`: runs an input log against its scene and compares the hashes. */
+/* `palpate replay`: runs an input log against its scene and compares the state hashes. */
 #include "server/base/clock.h"
 #include "server/cli/flags.h"
 #include "server/commands/commands.h"
-#include "server/scene/scene_arg.h"
+#include "server/commands/scene_input.h"
 #include "server/session/replay.h"
-#include "server/study/studied_scene.h"
 
 #include <stdio.h>
 
@@ -30,28 +29,29 @@ static cJSON *as_json(const pal_replay_report *r, double seconds)
 
 int command_replay(int argc, char **argv)
 {
-    const pal_flag_table table = {.usage = "replay LOG SCENE [flags]",
-                                  .about = "Runs an input log (palpate serve --record LOG) again and compares the hash "
-                                           "of the world now and then.\nSCENE is the scene that was served.\n"
-                                           "Exit code 1 when a hash differs.\n",
-                                  .min_operand = 2,
-                                  .max_operand = 2};
+    const pal_flag_table table = {
+        .usage = "replay LOG SCENE [flags]",
+        .about =
+            "Runs an input log (palpate serve --record LOG) again and compares the hash of the state after each step.\n"
+            "SCENE is the scene that was served. Exit code 1 when a hash differs.\n",
+        .example = "palpate prepare --procedural -o organ\n"
+                   "palpate serve organ/scene.json --record organ.log --port 0 --seconds 2\n"
+                   "palpate replay organ.log organ/scene.json\n",
+        .min_operand = 2,
+        .max_operand = 2};
     pal_flag_common common;
     const char *word[2];
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
     if (code >= 0) return code;
-    pal_loaded_scene *loaded = NULL;
+    pal_scene_input input = {0};
     pal_diagnostic diag = {""};
     pal_replay_report report;
     double start = pal_clock_s();
-    pal_err err = pal_scene_arg(word[1], NULL, &loaded, NULL, NULL, &diag);
-    pal_studied_scene studied = {0};
     pal_report_progress("replay", 0, &common);
-    if (!err) err = pal_studied_scene_open(word[1], &loaded->scene, &studied, &diag);
-    if (!err) err = pal_replay_run(word[0], studied.scene, &report, &diag);
+    pal_err err = pal_scene_input_open(word[1], &input, &diag);
+    if (!err) err = pal_replay_run(word[0], input.studied.scene, &report, &diag);
     pal_report_progress(NULL, 0, &common);
-    pal_studied_scene_close(&studied);
-    pal_scene_free(loaded);
+    pal_scene_input_close(&input);
     if (err) return pal_report_refusal(&common, err, &diag);
     bool equal = report.n_hash == report.n_hash_equal;
     if (!equal)

@@ -1,21 +1,14 @@
-/* `palpate robustness SCENE`: the cases of robustness.h on a user's own scene, what happened and whether that is
- * within the criterion. Exit code 1 when something failed or could not be judged. */
+/* `palpate robustness SCENE`: the cases of server/robustness on a scene, what happened and whether that meets the
+ * criterion. Exit code 1 when a case failed or could not be judged. */
 #include "server/cli/flags.h"
 #include "server/commands/commands.h"
 #include "server/commands/robustness_picture.h"
-#include "server/scene/scene_arg.h"
-#include "server/study/studied_scene.h"
+#include "server/commands/scene_input.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* a number that JSON has; others are left out */
-static void add_number(cJSON *o, const char *key, double value)
-{
-    if (isfinite(value)) cJSON_AddNumberToObject(o, key, value);
-}
 
 static cJSON *result_json(const pal_robustness_result *r)
 {
@@ -35,13 +28,13 @@ static cJSON *result_json(const pal_robustness_result *r)
     cJSON_AddStringToObject(o, "happened", r->diag);
     cJSON_AddBoolToObject(o, "finite", r->finite);
     cJSON_AddBoolToObject(o, "stopped", r->frozen);
-    add_number(o, "energy_excess", r->energy);
-    add_number(o, "energy_limit", r->limit);
-    add_number(o, "energy_excluded", r->excluded_rise);
-    add_number(o, "deviation_S", r->deviation_S);
-    add_number(o, "return_s", r->return_s);
-    add_number(o, "simulated_s", r->simulated_s);
-    add_number(o, "cpu_s", r->took_s);
+    pal_json_add_finite(o, "energy_excess", r->energy);
+    pal_json_add_finite(o, "energy_limit", r->limit);
+    pal_json_add_finite(o, "energy_excluded", r->excluded_rise);
+    pal_json_add_finite(o, "deviation_S", r->deviation_S);
+    pal_json_add_finite(o, "return_s", r->return_s);
+    pal_json_add_finite(o, "simulated_s", r->simulated_s);
+    pal_json_add_finite(o, "cpu_s", r->took_s);
     for (size_t k = 0; k < sizeof count / sizeof count[0]; k++)
         cJSON_AddNumberToObject(safeguards, count[k].key, (double)count[k].n);
     return o;
@@ -55,8 +48,8 @@ static cJSON *as_json(const pal_scene *scene, const pal_robustness_options *opti
     cJSON_AddStringToObject(o, "name", scene->name);
     cJSON_AddNumberToObject(o, "seed", (double)options->seed);
     cJSON_AddBoolToObject(o, "rests", report->rests);
-    add_number(o, "settle_s", report->settle_s);
-    add_number(o, "cpu_s", report->took_s);
+    pal_json_add_finite(o, "settle_s", report->settle_s);
+    pal_json_add_finite(o, "cpu_s", report->took_s);
     cJSON_AddNumberToObject(o, "passed", report->n_passed);
     cJSON_AddNumberToObject(o, "collapsed", report->n_collapsed);
     cJSON_AddNumberToObject(o, "failed", report->n_failed);
@@ -69,39 +62,33 @@ static cJSON *as_json(const pal_scene *scene, const pal_robustness_options *opti
 
 static void print_result(const pal_robustness_result *r)
 {
-    char energy[24] = "-", excluded_rise[24] = "-", left[24] = "-", safeguards[64] = "";
-    if (isfinite(r->excluded_rise)) snprintf(excluded_rise, sizeof excluded_rise, "%.1g", r->excluded_rise);
+    char energy[24] = "-", excluded[24] = "-", left[24] = "-", safeguards[64] = "";
+    if (isfinite(r->excluded_rise)) snprintf(excluded, sizeof excluded, "%.1g", r->excluded_rise);
     if (isfinite(r->energy)) snprintf(energy, sizeof energy, "%.1g", r->energy);
     if (isfinite(r->deviation_S)) snprintf(left, sizeof left, "%.2g", 100 * r->deviation_S);
     uint64_t n = pal_safeguards_sum(&r->safeguards);
     if (n > 0)
         snprintf(safeguards, sizeof safeguards, " (%llu safeguards, %.3g ms)", (unsigned long long)n,
                  1e-6 * (double)r->safeguards.ns);
-    printf("%-11s %-14s %9s %9s %9s %8.1f %7.2f  %s%s\n", r->name, pal_verdict_name(r->verdict), energy, excluded_rise,
-           left, r->simulated_s, r->took_s, r->diag, safeguards);
+    printf("%-11s %-14s %9s %9s %9s %8.1f %7.2f  %s%s\n", r->name, pal_verdict_name(r->verdict), energy, excluded, left,
+           r->simulated_s, r->took_s, r->diag, safeguards);
     if (r->verdict != PAL_VERDICT_FAILED) return;
-    printf("%26s%s\n%26sasked: %s\n", "", r->what, "", r->criterion);
+    printf("%26s%s\n%26scriterion: %s\n", "", r->what, "", r->criterion);
 }
 
 static void print(const pal_scene *scene, const pal_robustness_report *report)
 {
     printf("%s: %s\n\n", scene->title,
            report->rests ? "comes to rest by itself"
-           : report->led ? "is led for ever: compared with an untouched run"
+           : report->led ? "has a prescribed motion without end: compared with an unloaded run"
                          : "DOES NOT COME TO REST by itself");
-    printf("%-11s %-14s %9s %9s %9s %8s %7s  %s\n", "case", "verdict", "energy +", "forgiven", "% S left", "sim s",
+    printf("%-11s %-14s %9s %9s %9s %8s %7s  %s\n", "case", "verdict", "energy +", "excluded", "% S left", "sim s",
            "cpu s", "what happened");
     for (int k = 0; k < report->n; k++) print_result(&report->result[k]);
     char collapsed[40] = "";
     if (report->n_collapsed > 0) snprintf(collapsed, sizeof collapsed, " %d collapsed,", report->n_collapsed);
     printf("\n%d passed,%s %d failed, %d undecided, %d do not apply; %.1f s of processor time\n", report->n_passed,
            collapsed, report->n_failed, report->n_undecided, report->n_skipped, report->took_s);
-}
-
-static bool show(const char *what, double fraction, void *user)
-{
-    pal_report_progress(what, fraction, user);
-    return true;
 }
 
 static void list_cases(char *text, size_t n_byte)
@@ -118,18 +105,21 @@ int command_robustness(int argc, char **argv)
     const char *picture = NULL, *only = NULL;
     double seed = 1, seconds = 0;
     const pal_flag flag[] = {
-        {"--seed", "N", PAL_FLAG_NUMBER, &seed, 0, 1e15, "of what is drawn at random (1)"},
-        {"--only", "NAME", PAL_FLAG_TEXT, &only, 0, 0, "one case alone"},
+        {"--only", "NAME", PAL_FLAG_TEXT, &only, 0, 0, "run this case alone"},
+        {"--seed", "N", PAL_FLAG_NUMBER, &seed, 0, 1e15, "seed of the random numbers (1)"},
         {"--seconds", "S", PAL_FLAG_NUMBER, &seconds, 0.1, 1e6,
-         "processor time that all of them may take (60, more where steps are dear)"},
-        {"--picture", "FILE.svg", PAL_FLAG_TEXT, &picture, 0, 0, "energy over time, a plot for each"}};
-    int head = snprintf(about, sizeof about,
-                        "Does to a scene what is known to break simulations, one after another, "
-                        "and says what happened.\nExit code 1 when something fails its criterion "
-                        "or cannot be judged in the time.\n\n");
+         "processor time of all cases together (60, more where a step is expensive)"},
+        {"--picture", "FILE.svg", PAL_FLAG_TEXT, &picture, 0, 0, "plot the energy over time, one plot for each case"}};
+    int head =
+        snprintf(about, sizeof about,
+                 "Runs the cases that are known to break simulations on a scene, one after another, and reports what\n"
+                 "happened. Each case has a criterion: finite numbers, bounded energy, return to rest after release.\n"
+                 "Exit code 1 when a case fails its criterion or cannot be judged in the time.\n\nCASES\n");
     list_cases(about + head, sizeof about - (size_t)head);
     const pal_flag_table table = {.usage = "robustness SCENE [flags]",
                                   .about = about,
+                                  .example = "palpate prepare --shape sphere --resolution 6 --model fem -o ball\n"
+                                             "palpate robustness ball/scene.json --only meganewton --seconds 20\n",
                                   .flag = flag,
                                   .n_flag = sizeof flag / sizeof flag[0],
                                   .min_operand = 1,
@@ -140,22 +130,16 @@ int command_robustness(int argc, char **argv)
     if (code >= 0) return code;
     bool known = !only;
     for (int k = 0; k < pal_robustness_case_count() && !known; k++) known = !strcmp(only, pal_robustness_case_name(k));
-    if (!known) {
-        fprintf(stderr, "palpate robustness: there is no case \"%.60s\" (see palpate robustness --help)\n", only);
-        return 2;
-    }
+    if (!known) return pal_flags_wrong(&common, "there is no case \"%.60s\"", only);
     pal_robustness_options options;
     pal_robustness_default(&options);
     options.seed = (uint64_t)seed, options.max_cpu_s = seconds, options.only = only;
-    options.progress = show, options.user = &common;
-    pal_loaded_scene *loaded = NULL;
-    pal_studied_scene studied = {0};
+    options.progress = pal_report_continue, options.user = &common;
+    pal_scene_input input = {0};
     pal_diagnostic diag = {""}, reason = {""};
     pal_robustness_report *report = calloc(1, sizeof *report);
-    pal_err err = report ? pal_scene_arg(word[0], NULL, &loaded, NULL, NULL, &diag) : PAL_ERR_MEMORY;
-    /* what serve would run: the setting that the scene asks for */
-    if (!err) err = pal_studied_scene_open(word[0], &loaded->scene, &studied, &diag);
-    const pal_scene *scene = studied.scene;
+    pal_err err = report ? pal_scene_input_open(word[0], &input, &diag) : PAL_ERR_MEMORY;
+    const pal_scene *scene = input.studied.scene;
     if (!err && (err = pal_robustness_run(scene, &options, report, &reason)))
         pal_diagnostic_set(&diag, err, "%s: %s", word[0], reason.text);
     pal_report_progress(NULL, 0, &common);
@@ -164,12 +148,11 @@ int command_robustness(int argc, char **argv)
         code = pal_report_refusal(&common, err, &diag);
     } else {
         code = common.json ? pal_report_json(&common, as_json(scene, &options, report)) : 0;
-        if (!common.json && !common.quiet && studied.said[0]) printf("%s\n", studied.said);
+        if (!common.json && !common.quiet && input.studied.said[0]) printf("%s\n", input.studied.said);
         if (!common.json && !common.quiet) print(scene, report);
         if (code == 0 && report->n_failed + report->n_undecided > 0) code = 1;
     }
-    pal_studied_scene_close(&studied);
-    pal_scene_free(loaded);
+    pal_scene_input_close(&input);
     free(report);
     return code;
 }

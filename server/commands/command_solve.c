@@ -1,8 +1,8 @@
-/* `palpate solve`: a load-case problem -> displacements, the error against a reference, files for other tools. */
+/* `palpate solve`: a load case of a problem -> displacements, the error against a reference, files for other tools. */
 #include "server/base/clock.h"
 #include "server/cli/flags.h"
 #include "server/commands/commands.h"
-#include "server/commands/solve_study.h"
+#include "server/commands/convergence_report.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/problem_file.h"
 #include "server/scene/scene_file.h"
@@ -16,24 +16,25 @@
 enum { PATH = 1200 };
 
 static const char about[] =
-    "Solves a load case with finite elements on the voxels of a surface, and compares displacements with a reference.\n"
-    "PROBLEM.json is of format palpate-reference-1: surface, materials, supports, load cases, references\n"
-    "(server/scene/problem_file.h says every key). --case takes a load case, which is compared with the reference of\n"
-    "the same kinematics, E and nu if there is one, or a reference, whose load case, law, E and nu are then taken.\n"
-    "Example: palpate solve deploy/problems/beam.json --case tip --resolution 32 --vtk tip.vtk\n"
-    "Several resolutions or elements, with commas between, give a table: error, observed order of convergence from "
+    "Solves a load case with finite elements on the voxels of a surface and compares displacements with a reference.\n"
+    "PROBLEM.json has the format palpate-reference-1: surface, materials, supports, load cases, references (every "
+    "key:\n"
+    "server/scene/problem_file.h). --case names a load case, which is compared with the reference of the same\n"
+    "kinematics, E and nu if there is one; or a reference, which determines load case, law, E and nu.\n"
+    "\n"
+    "Several resolutions or elements, separated by commas, give a table: error, observed order of convergence from "
     "one\n"
-    "resolution to the next, the change of displacement between them, the order and the error that the changes speak\n"
-    "for (Richardson), seconds. Example: --resolution 8,16,32 --element hex8_bbar,tet4,tet10:16 --plot error.svg\n";
+    "resolution to the next, change of displacement between them, order and error estimated from the changes\n"
+    "(Richardson extrapolation), seconds.\n";
 
-typedef struct plan_requests {
+typedef struct arguments {
     const char *problem, *load_case, *kinematics, *law, *element, *resolution, *samples, *fill, *align, *linear, *free,
         *folder, *vtk, *csv, *plot;
     pal_study_list list;
     pal_solve_options solve;
-} plan_requests;
+} arguments;
 
-/* what is solved and what it is compared with */
+/* what is solved, and what it is compared with */
 typedef struct study {
     pal_problem *problem;
     const pal_problem_case *load_case;
@@ -48,13 +49,7 @@ typedef struct study {
     int n_file;
 } study;
 
-static int usage(const pal_flag_common *common, const char *sentence)
-{
-    fprintf(stderr, "palpate %s: %s (see palpate %s --help)\n", common->command, sentence, common->command);
-    return 2;
-}
-
-/* ---- what is meant ---- */
+/* ---- choice of the load case ---- */
 
 static pal_err no_case(const study *s, const char *id, pal_diagnostic *diag)
 {
@@ -69,11 +64,11 @@ static pal_err no_case(const study *s, const char *id, pal_diagnostic *diag)
                               p->path, id, list);
 }
 
-/* the law: --law, or what --kinematics, or the reference, asks for */
-static const char *law_of(const plan_requests *request, const pal_problem_reference *reference)
+/* --law, or the law that --kinematics or the reference implies */
+static const char *law_of(const arguments *args, const pal_problem_reference *reference)
 {
-    bool finite = request->kinematics ? !strcmp(request->kinematics, "finite") : reference && reference->finite;
-    if (request->law) return request->law;
+    bool finite = args->kinematics ? !strcmp(args->kinematics, "finite") : reference && reference->finite;
+    if (args->law) return args->law;
     if (!finite) return "linear";
     bool neo = !reference || !reference->finite || !strcmp(reference->law, "neo-hookean");
     return neo ? "neo_hookean" : "corotational";
@@ -84,34 +79,34 @@ static bool same(double a, double b)
     return fabs(a - b) <= 1e-9 * fabs(b);
 }
 
-/* does the reference answer what is asked? */
-static bool answers(const study *s, const plan_requests *request, const pal_problem_reference *r)
+/* is the reference of this load case, kinematics, E and nu? */
+static bool matches(const study *s, const arguments *args, const pal_problem_reference *r)
 {
     const pal_problem_material *m = &s->problem->material[0];
     double young = isnan(r->young_Pa) ? m->young_Pa : r->young_Pa;
     double poisson = isnan(r->poisson) ? m->poisson : r->poisson;
-    return !strcmp(r->load_case, s->load_case->id) && r->finite == (strcmp(request->solve.law, "linear") != 0) &&
-           same(isnan(request->solve.young_Pa) ? m->young_Pa : request->solve.young_Pa, young) &&
-           same(isnan(request->solve.poisson) ? m->poisson : request->solve.poisson, poisson);
+    return !strcmp(r->load_case, s->load_case->id) && r->finite == (strcmp(args->solve.law, "linear") != 0) &&
+           same(isnan(args->solve.young_Pa) ? m->young_Pa : args->solve.young_Pa, young) &&
+           same(isnan(args->solve.poisson) ? m->poisson : args->solve.poisson, poisson);
 }
 
-/* --case -> load case, law, E, nu and what to compare with */
-static pal_err choose(study *s, plan_requests *request, pal_diagnostic *diag)
+/* --case -> load case, law, E, nu and reference */
+static pal_err choose(study *s, arguments *args, pal_diagnostic *diag)
 {
     const pal_problem *p = s->problem;
-    const char *id = request->load_case ? request->load_case : p->n_case == 1 ? p->load_case[0].id : NULL;
+    const char *id = args->load_case ? args->load_case : p->n_case == 1 ? p->load_case[0].id : NULL;
     const pal_problem_reference *named = id ? pal_problem_reference_find(p, id) : NULL;
     s->load_case = named ? pal_problem_case_find(p, named->load_case) : id ? pal_problem_case_find(p, id) : NULL;
     if (!s->load_case) return no_case(s, id, diag);
-    request->solve.law = law_of(request, named);
-    if (named && isnan(request->solve.young_Pa)) request->solve.young_Pa = named->young_Pa;
-    if (named && isnan(request->solve.poisson)) request->solve.poisson = named->poisson;
-    s->samples_file = request->samples;
-    if (request->samples) return PAL_ERR_OK;
+    args->solve.law = law_of(args, named);
+    if (named && isnan(args->solve.young_Pa)) args->solve.young_Pa = named->young_Pa;
+    if (named && isnan(args->solve.poisson)) args->solve.poisson = named->poisson;
+    s->samples_file = args->samples;
+    if (args->samples) return PAL_ERR_OK;
     s->reference = named;
     for (int k = 0; k < p->n_reference && !named; k++) {
         const pal_problem_reference *r = &p->reference[k];
-        if (!answers(s, request, r)) continue;
+        if (!matches(s, args, r)) continue;
         if (!s->reference || !strcmp(r->law, "neo-hookean")) s->reference = r;
     }
     if (s->reference) s->samples_file = s->reference->file;
@@ -138,53 +133,40 @@ static pal_err write_one(study *s, const char *path, bool vtk, pal_diagnostic *d
     return PAL_ERR_OK;
 }
 
-static pal_err write_files(study *s, const plan_requests *request, pal_diagnostic *diag)
+static pal_err write_files(study *s, const arguments *args, pal_diagnostic *diag)
 {
     char csv[PATH], vtk[PATH];
-    if (request->folder) {
-        PAL_TRY(pal_scene_make_folder(request->folder, diag));
-        snprintf(csv, sizeof csv, "%s/solution.csv", request->folder);
-        snprintf(vtk, sizeof vtk, "%s/solution.vtk", request->folder);
-        PAL_TRY(write_one(s, request->csv ? request->csv : csv, false, diag));
-        return write_one(s, request->vtk ? request->vtk : vtk, true, diag);
+    if (args->folder) {
+        PAL_TRY(pal_scene_make_folder(args->folder, diag));
+        snprintf(csv, sizeof csv, "%s/solution.csv", args->folder);
+        snprintf(vtk, sizeof vtk, "%s/solution.vtk", args->folder);
+        PAL_TRY(write_one(s, args->csv ? args->csv : csv, false, diag));
+        return write_one(s, args->vtk ? args->vtk : vtk, true, diag);
     }
-    if (request->csv) PAL_TRY(write_one(s, request->csv, false, diag));
-    return request->vtk ? write_one(s, request->vtk, true, diag) : PAL_ERR_OK;
+    if (args->csv) PAL_TRY(write_one(s, args->csv, false, diag));
+    return args->vtk ? write_one(s, args->vtk, true, diag) : PAL_ERR_OK;
 }
 
-static pal_err read_all(study *s, plan_requests *request, pal_diagnostic *diag)
+static pal_err read_all(study *s, arguments *args, pal_diagnostic *diag)
 {
-    PAL_TRY(pal_problem_read(request->problem, &s->problem, diag));
-    PAL_TRY(choose(s, request, diag));
+    PAL_TRY(pal_problem_read(args->problem, &s->problem, diag));
+    PAL_TRY(choose(s, args, diag));
     if (s->samples_file) PAL_TRY(pal_samples_read(s->samples_file, &s->samples, diag));
     pal_mesh_file_options file = {.unit_m = s->problem->unit_m, .weld = PAL_MESH_WELD};
     pal_surface_report report = {0};
     return pal_mesh_file_read(s->problem->surface, &file, &s->surface, &report, NULL, NULL, diag);
 }
 
-static pal_err work(study *s, const plan_requests *request, pal_diagnostic *diag)
+static pal_err work(study *s, const arguments *args, pal_diagnostic *diag)
 {
     pal_diagnostic reason = {""};
-    pal_err err = pal_solve(s->problem, s->load_case, &s->surface, &request->solve, &s->solution, &s->result, &reason);
-    if (err) return pal_diagnostic_set(diag, err, "%s: %s", request->problem, reason.text);
+    pal_err err = pal_solve(s->problem, s->load_case, &s->surface, &args->solve, &s->solution, &s->result, &reason);
+    if (err) return pal_diagnostic_set(diag, err, "%s: %s", args->problem, reason.text);
     PAL_TRY(compare(s, diag));
-    return write_files(s, request, diag);
+    return write_files(s, args, diag);
 }
 
-/* ---- saying ---- */
-
-static void add_vector(cJSON *object, const char *key, const double v[3])
-{
-    cJSON_AddItemToObject(object, key, cJSON_CreateDoubleArray(v, 3));
-}
-
-static void add_or_null(cJSON *object, const char *key, bool known, double number)
-{
-    if (known && isfinite(number))
-        cJSON_AddNumberToObject(object, key, number);
-    else
-        cJSON_AddNullToObject(object, key);
-}
+/* ---- report ---- */
 
 static void add_seconds(cJSON *object, const study *s)
 {
@@ -197,7 +179,7 @@ static void add_seconds(cJSON *object, const study *s)
     cJSON_AddNumberToObject(seconds, "total", s->total_s);
 }
 
-static cJSON *as_json(const study *s, const plan_requests *request)
+static cJSON *as_json(const study *s, const arguments *args)
 {
     const pal_solve_result *r = &s->result;
     cJSON *o = cJSON_CreateObject();
@@ -209,13 +191,13 @@ static cJSON *as_json(const study *s, const plan_requests *request)
         cJSON_AddStringToObject(o, "reference", s->reference->id);
     else
         cJSON_AddNullToObject(o, "reference");
-    cJSON_AddStringToObject(o, "element", request->solve.element);
-    cJSON_AddStringToObject(o, "law", request->solve.law);
-    cJSON_AddNumberToObject(o, "resolution", request->solve.resolution);
-    cJSON_AddBoolToObject(o, "fill", request->solve.fill);
-    add_or_null(o, "rms_percent", compared, s->rms_percent);
-    add_or_null(o, "max_percent", compared, s->max_percent);
-    add_or_null(o, "reference_rms_percent", s->reference != NULL, s->reference ? 100 * s->reference->estimated_rms : 0);
+    cJSON_AddStringToObject(o, "element", args->solve.element);
+    cJSON_AddStringToObject(o, "law", args->solve.law);
+    cJSON_AddNumberToObject(o, "resolution", args->solve.resolution);
+    cJSON_AddBoolToObject(o, "fill", args->solve.fill);
+    pal_json_add_or_null(o, "rms_percent", compared ? s->rms_percent : NAN);
+    pal_json_add_or_null(o, "max_percent", compared ? s->max_percent : NAN);
+    pal_json_add_or_null(o, "reference_rms_percent", s->reference ? 100 * s->reference->estimated_rms : NAN);
     cJSON_AddNumberToObject(o, "samples", s->samples.n);
     cJSON_AddNumberToObject(o, "nodes", r->n_node);
     cJSON_AddNumberToObject(o, "elements", r->n_element);
@@ -227,8 +209,8 @@ static cJSON *as_json(const study *s, const plan_requests *request)
     cJSON_AddNumberToObject(o, "voxel_m", r->edge_m);
     cJSON_AddNumberToObject(o, "volume_m3", r->volume_m3);
     cJSON_AddItemToObject(o, "load_area_m2", cJSON_CreateDoubleArray(r->area_m2, s->load_case->n_load));
-    add_vector(o, "load_N", r->load_N);
-    add_vector(o, "reaction_N", r->reaction_N);
+    cJSON_AddItemToObject(o, "load_N", cJSON_CreateDoubleArray(r->load_N, 3));
+    cJSON_AddItemToObject(o, "reaction_N", cJSON_CreateDoubleArray(r->reaction_N, 3));
     cJSON_AddNumberToObject(o, "work_J", r->work_J);
     cJSON_AddNumberToObject(o, "energy_J", r->energy_J);
     cJSON_AddNumberToObject(o, "max_displacement_m", r->max_m);
@@ -239,11 +221,11 @@ static cJSON *as_json(const study *s, const plan_requests *request)
     return o;
 }
 
-static void print(const study *s, const plan_requests *request)
+static void print(const study *s, const arguments *args)
 {
     const pal_solve_result *r = &s->result;
     printf("%s, load case %s: %s, %s, %d nodes, %d elements of %g m, %d unknowns\n", s->problem->name, s->load_case->id,
-           request->solve.element, request->solve.law, r->n_node, r->n_element, r->edge_m, r->n_dof);
+           args->solve.element, args->solve.law, r->n_node, r->n_element, r->edge_m, r->n_dof);
     if (r->clamped) printf("a Poisson ratio above 0.4999 was taken as 0.4999\n");
     printf("%d Newton iteration%s", r->n_newton, r->n_newton == 1 ? "" : "s");
     if (r->n_cg > 0) printf(" with %d conjugate gradients", r->n_cg);
@@ -261,19 +243,13 @@ static void print(const study *s, const plan_requests *request)
 
 /* ---- the command ---- */
 
-static bool show_progress(const char *what, double fraction, void *user)
+/* a table: several elements or resolutions, or a plot of them */
+static bool is_table(const arguments *args)
 {
-    pal_report_progress(what, fraction, user);
-    return true;
+    return args->list.n_element * args->list.n_resolution > 1 || args->plot;
 }
 
-/* several elements or resolutions, or a plot of them */
-static bool is_many(const plan_requests *request)
-{
-    return request->list.n_element * request->list.n_resolution > 1 || request->plot;
-}
-
-static int run_many(const pal_flag_common *common, const study *s, const plan_requests *request)
+static int run_table(const pal_flag_common *common, const study *s, const arguments *args)
 {
     const pal_solve_study what = {.problem = s->problem,
                                   .load_case = s->load_case,
@@ -281,28 +257,28 @@ static int run_many(const pal_flag_common *common, const study *s, const plan_re
                                   .samples_file = s->samples_file,
                                   .samples = s->samples_file ? &s->samples : NULL,
                                   .surface = &s->surface,
-                                  .options = &request->solve,
-                                  .plot = request->plot};
-    return pal_solve_study_run(common, &what, &request->list);
+                                  .options = &args->solve,
+                                  .plot = args->plot};
+    return pal_solve_study_run(common, &what, &args->list);
 }
 
-static int run(pal_flag_common *common, plan_requests *request)
+static int run(pal_flag_common *common, arguments *args)
 {
     study s = {0};
     pal_diagnostic diag = {""};
     double start = pal_clock_s();
-    request->solve.progress = show_progress;
-    request->solve.user = common;
-    pal_err err = read_all(&s, request, &diag);
-    bool many = !err && is_many(request);
-    if (!err && !many) err = work(&s, request, &diag);
+    args->solve.progress = pal_report_continue;
+    args->solve.user = common;
+    pal_err err = read_all(&s, args, &diag);
+    bool table = !err && is_table(args);
+    if (!err && !table) err = work(&s, args, &diag);
     s.total_s = pal_clock_s() - start;
     pal_report_progress(NULL, 0, common);
     int code = err            ? pal_report_refusal(common, err, &diag)
-               : many         ? run_many(common, &s, request)
-               : common->json ? pal_report_json(common, as_json(&s, request))
+               : table        ? run_table(common, &s, args)
+               : common->json ? pal_report_json(common, as_json(&s, args))
                               : 0;
-    if (!err && !many && !common->json && !common->quiet) print(&s, request);
+    if (!err && !table && !common->json && !common->quiet) print(&s, args);
     pal_solution_free(s.solution);
     pal_surface_free(&s.surface);
     pal_samples_free(&s.samples);
@@ -310,94 +286,78 @@ static int run(pal_flag_common *common, plan_requests *request)
     return code;
 }
 
-/* is a word one of a NULL-terminated list, or not given? */
-static bool is_one(const char *word, const char *const *list)
+/* flags that exclude each other; NULL: none */
+static const char *check_flags(const arguments *args)
 {
-    for (int k = 0; word && list[k]; k++)
-        if (!strcmp(word, list[k])) return true;
-    return !word;
-}
-
-/* the words of flags; NULL: all fine, else the sentence */
-static const char *check_words(const plan_requests *request)
-{
-    if (!is_one(request->kinematics, (const char *const[]){"linear", "finite", NULL}))
-        return "--kinematics: is not linear or finite";
-    if (!is_one(request->law, (const char *const[]){"linear", "corotational", "neo_hookean", NULL}))
-        return "--law: is not linear, corotational or neo_hookean";
-    if (!is_one(request->fill, (const char *const[]){"on", "off", NULL})) return "--fill: is not on or off";
-    if (!is_one(request->align, (const char *const[]){"on", "off", NULL})) return "--align: is not on or off";
-    if (!is_one(request->linear, (const char *const[]){"direct", "pcg", NULL})) return "--linear: is not direct or pcg";
-    if (!is_one(request->free, (const char *const[]){"refuse", "inertia_relief", NULL}))
-        return "--free: is not refuse or inertia_relief";
-    if (request->kinematics && request->law &&
-        !strcmp(request->kinematics, "linear") != !strcmp(request->law, "linear"))
+    if (args->kinematics && args->law && !strcmp(args->kinematics, "linear") != !strcmp(args->law, "linear"))
         return "--kinematics and --law: linear goes with linear only";
-    if (is_many(request) && (request->folder || request->csv || request->vtk))
+    if (is_table(args) && (args->folder || args->csv || args->vtk))
         return "-o, --csv and --vtk: are for one element and one resolution";
     return NULL;
 }
 
 int command_solve(int argc, char **argv)
 {
-    plan_requests request = {.element = "hex8_bbar", .resolution = "32", .solve = {.young_Pa = NAN, .poisson = NAN}};
-    pal_solve_options *o = &request.solve;
+    arguments args = {.element = "hex8_bbar", .resolution = "32", .solve = {.young_Pa = NAN, .poisson = NAN}};
+    pal_solve_options *o = &args.solve;
     const pal_flag flag[] = {
-        {"--case", "ID", PAL_FLAG_TEXT, &request.load_case, 0, 0, "load case or reference (the only load case)"},
-        {"--kinematics", "WORD", PAL_FLAG_TEXT, &request.kinematics, 0, 0,
-         "linear or finite (the reference's, or linear)"},
-        {"--law", "WORD", PAL_FLAG_TEXT, &request.law, 0, 0,
-         "linear, corotational or neo_hookean (linear, or neo_hookean when finite)"},
-        {"--element", "LIST", PAL_FLAG_TEXT, &request.element, 0, 0,
-         "hex8_bbar, hex8, tet4 or tet10, or several with commas between; tet10:16 is not solved beyond resolution 16\n"
-         "(hex8_bbar)"},
-        {"--resolution", "LIST", PAL_FLAG_TEXT, &request.resolution, 0, 0,
-         "voxels on the longest axis, 1 to 1024, or several with commas between, ascending (32)"},
-        {"--fill", "WORD", PAL_FLAG_TEXT, &request.fill, 0, 0,
-         "on: voxels that the surface cuts count by their filled share; off: those at least half filled, whole (on)"},
+        {"--case", "ID", PAL_FLAG_TEXT, &args.load_case, 0, 0, "load case or reference (the only load case)"},
+        {"--kinematics", "linear|finite", PAL_FLAG_WORD, &args.kinematics, 0, 0,
+         "strain measure (the reference's, or linear)"},
+        {"--law", "linear|corotational|neo_hookean", PAL_FLAG_WORD, &args.law, 0, 0,
+         "material law (linear, or neo_hookean when finite)"},
+        {"--element", "LIST", PAL_FLAG_TEXT, &args.element, 0, 0,
+         "hex8_bbar, hex8, tet4 or tet10, or several separated by commas; tet10:16 stops at resolution 16 (hex8_bbar)"},
+        {"--resolution", "LIST", PAL_FLAG_TEXT, &args.resolution, 0, 0,
+         "voxels along the longest axis, 1 to 1024, or several in ascending order, separated by commas (32)"},
+        {"--fill", "on|off", PAL_FLAG_WORD, &args.fill, 0, 0,
+         "on: a voxel that the surface cuts has its filled share of stiffness; off: voxels at least half filled count\n"
+         "whole (on)"},
         {"--least-fill", "SHARE", PAL_FLAG_NUMBER, &o->min_fill, 1e-6, 1,
          "cut voxels with a smaller share inside are dropped (0.25 with fill, or 0.02 where that would lose 2.5 %\n"
          "of the volume; 0.5 without)"},
-        {"--align", "WORD", PAL_FLAG_TEXT, &request.align, 0, 0,
-         "on: voxels are shifted so that faces lie where a support, or else a material, ends inside the body; off: "
-         "they\n"
-         "begin at the box of the surface (on)"},
+        {"--align", "on|off", PAL_FLAG_WORD, &args.align, 0, 0,
+         "on: voxels are shifted so that their faces lie where a support, else a material, ends inside the body;\n"
+         "off: they begin at the bounding box of the surface (on)"},
         {"--split", "K", PAL_FLAG_COUNT, &o->split, 1, 16,
-         "every voxel is solved as K x K x K of its fill: what is left of the error is that of the jagged border (1)"},
-        {"--samples", "U.csv", PAL_FLAG_TEXT, &request.samples, 0, 0,
-         "compare at these points: CSV x,y,z,ux,uy,uz (the reference's)"},
-        {"--nu", "NU", PAL_FLAG_NUMBER, &o->poisson, -1e300, 1e300, "Poisson ratio (the problem's)"},
-        {"--young", "PA", PAL_FLAG_NUMBER, &o->young_Pa, -1e300, 1e300, "stiffness (the problem's)"},
+         "every voxel is solved as K x K x K elements of its fill: the remaining error is that of the voxel border "
+         "(1)"},
+        {"--samples", "U.csv", PAL_FLAG_TEXT, &args.samples, 0, 0,
+         "compare at these points: CSV x,y,z,ux,uy,uz in m (the reference's)"},
+        {"--nu", "NU", PAL_FLAG_NUMBER, &o->poisson, -1e300, 1e300, "Poisson's ratio (the problem's)"},
+        {"--young", "PA", PAL_FLAG_NUMBER, &o->young_Pa, -1e300, 1e300, "Young's modulus (the problem's)"},
         {"--tolerance", "T", PAL_FLAG_NUMBER, &o->tolerance, 1e-14, 0.1, "residual relative to the loads (1e-8)"},
-        {"--linear", "WORD", PAL_FLAG_TEXT, &request.linear, 0, 0,
-         "direct or pcg: how the linear systems are solved (whichever suits the size)"},
-        {"--free", "WORD", PAL_FLAG_TEXT, &request.free, 0, 0,
-         "a body without supports: refuse, or inertia_relief: its inertia balances the loads (refuse)"},
-        {"-o", "DIR", PAL_FLAG_TEXT, &request.folder, 0, 0, "writes DIR/solution.csv and DIR/solution.vtk"},
-        {"--csv", "FILE", PAL_FLAG_TEXT, &request.csv, 0, 0, "writes x,y,z,ux,uy,uz of all nodes, m"},
-        {"--vtk", "FILE", PAL_FLAG_TEXT, &request.vtk, 0, 0, "writes a legacy VTK file with displacement and stress"},
-        {"--plot", "FILE.svg", PAL_FLAG_TEXT, &request.plot, 0, 0,
-         "draws error over nodes, and in FILE_seconds.svg error over seconds"},
+        {"--linear", "direct|pcg", PAL_FLAG_WORD, &args.linear, 0, 0, "solver of the linear systems (chosen by size)"},
+        {"--free", "refuse|inertia_relief", PAL_FLAG_WORD, &args.free, 0, 0,
+         "a body without supports: refuse it, or balance the loads by its inertia (refuse)"},
+        {"-o", "DIR", PAL_FLAG_TEXT, &args.folder, 0, 0, "write DIR/solution.csv and DIR/solution.vtk"},
+        {"--csv", "FILE", PAL_FLAG_TEXT, &args.csv, 0, 0, "write x,y,z,ux,uy,uz of all nodes, m"},
+        {"--vtk", "FILE", PAL_FLAG_TEXT, &args.vtk, 0, 0, "write a legacy VTK file with displacement and stress"},
+        {"--plot", "FILE.svg", PAL_FLAG_TEXT, &args.plot, 0, 0,
+         "plot error over nodes, and in FILE_seconds.svg error over seconds"},
     };
-    const pal_flag_table table = {.usage = "solve PROBLEM.json --case ID [flags]",
+    const pal_flag_table flags = {.usage = "solve PROBLEM.json --case ID [flags]",
                                   .about = about,
+                                  .example = "palpate solve deploy/problems/beam.json --case tip --vtk tip.vtk\n"
+                                             "palpate solve deploy/problems/beam.json --case tip --resolution 8,16 "
+                                             "--element hex8_bbar,tet4 --plot error.svg\n",
                                   .flag = flag,
                                   .n_flag = sizeof flag / sizeof flag[0],
                                   .min_operand = 1,
                                   .max_operand = 1};
     pal_flag_common common;
-    int n = 0, code = pal_flags_parse(&table, argc, argv, &common, &request.problem, &n);
+    int n = 0, code = pal_flags_parse(&flags, argc, argv, &common, &args.problem, &n);
     if (code >= 0) return code;
     pal_diagnostic diag = {""};
-    if (!pal_solve_study_parse(request.element, request.resolution, &request.list, &diag))
-        return usage(&common, diag.text);
-    const char *sentence = check_words(&request);
-    if (sentence) return usage(&common, sentence);
-    o->element = request.list.element[0];
-    o->resolution = request.list.resolution[0];
-    o->fill = !request.fill || !strcmp(request.fill, "on");
-    o->align = !request.align || !strcmp(request.align, "on");
-    o->linear = request.linear;
-    o->inertia_relief = request.free && !strcmp(request.free, "inertia_relief");
-    return run(&common, &request);
+    if (!pal_solve_study_parse(args.element, args.resolution, &args.list, &diag))
+        return pal_flags_wrong(&common, "%s", diag.text);
+    const char *sentence = check_flags(&args);
+    if (sentence) return pal_flags_wrong(&common, "%s", sentence);
+    o->element = args.list.element[0];
+    o->resolution = args.list.resolution[0];
+    o->fill = !args.fill || !strcmp(args.fill, "on");
+    o->align = !args.align || !strcmp(args.align, "on");
+    o->linear = args.linear;
+    o->inertia_relief = args.free && !strcmp(args.free, "inertia_relief");
+    return run(&common, &args);
 }

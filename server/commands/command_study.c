@@ -1,10 +1,9 @@
-/* `palpate study`: what accuracy costs. Settings of a body are measured one after the other against a converged
- * reference and kept after each, so that a run that ends goes on; then the cheapest within an error, or the most
- * accurate in a time, is named and written as a scene. */
+/* `palpate study`: what accuracy costs. Configurations of a body are measured one after another against a converged
+ * reference and stored after each, so that an interrupted run can be continued; then the cheapest within an error, or
+ * the most accurate in a time, is reported and written as a scene. */
 #include "server/base/clock.h"
 #include "server/base/machine.h"
 #include "server/cli/flags.h"
-#include "server/cli/interrupt.h"
 #include "server/commands/commands.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/study/studied_scene.h"
@@ -14,59 +13,61 @@
 
 #include <limits.h>
 #include <math.h>
+#include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 static const char about[] =
-    "Measures one body under the same loads in many settings (method, element, law, resolution, step, tolerance), "
-    "each\n"
-    "with its error against a converged reference and the milliseconds of a live step, and marks those that nothing\n"
-    "else beats in both. SCENE is a scene.json, its folder, control cells or any surface or scan, which is pressed in\n"
-    "three places and pulled at one; PROBLEM.json is that of palpate solve, which brings its own loads.\n"
-    "Beside scene.json, or in --out, it keeps study.json (beside NAME.json NAME_study.json), a table .csv, a drawing\n"
-    ".svg and a page .html, and the answers of the reference in study.reference. Ctrl-C ends it; the same command\n"
-    "goes on after the last answer of the reference, or after the last setting. When all is measured\n"
-    "it draws what is gone of these anew.\n"
-    "--within and --budget name a setting, --pick the one of a row of the table, and with -o they write a scene of "
-    "it;\n"
-    "when the study is there already, nothing is measured again. A scene with \"accuracy\": {\"max_error_mm\": 1} or "
-    "\"budget\": {\"step_ms\": 4} is served "
-    "and\n"
-    "planned with the setting that the study beside it gives.\n"
-    "Example: palpate study liver/scene.json --within 1mm -o liver_1mm\n"
-    "Example: palpate study liver/scene.json --pick 12 -o liver_12\n"
-    "Example: palpate study deploy/problems/beam.json --case tip --out beam_study --budget 4ms -o beam_4ms\n";
+    "Measures one body under the same loads in many configurations (method, element, law, resolution, step, "
+    "tolerance),\n"
+    "each with its error against a converged reference and the milliseconds of a live step, and marks the Pareto "
+    "front:\n"
+    "those that no other one beats in both. SCENE is a scene.json, its folder, control cells, a surface or a scan, "
+    "which\n"
+    "is pressed in three places and pulled at one; PROBLEM.json is that of palpate solve with its own loads.\n"
+    "\n"
+    "Beside scene.json, or in --out, it keeps study.json (beside NAME.json NAME_study.json), a table .csv, a plot "
+    ".svg\n"
+    "and a page .html, and the solutions of the reference in study.reference. Ctrl-C ends it; the same command "
+    "continues\n"
+    "after the last stored result.\n"
+    "\n"
+    "--within and --budget pick a configuration, --pick the one of a row of the table; with -o they write its scene.\n"
+    "Nothing is measured again when the study is complete. A scene with \"accuracy\": {\"max_error_mm\": 1} or "
+    "\"budget\":\n"
+    "{\"step_ms\": 4} is served and planned in the configuration that the study beside it gives.\n";
 
-enum { MOST_PATH = PAL_STUDY_PATH + 8, FILES = 5 };
+enum { MAX_PATH = PAL_STUDY_PATH + 8, FILES = 5 };
 
 typedef struct study_run {
     pal_flag_common common;
     pal_study_request request;
     pal_accuracy_target target;
     const char *methods, *folder, *scene; /* scene: -o */
-    char load_case[PAL_NAME];             /* of the study that is there */
+    char load_case[PAL_NAME];             /* of the stored study */
     bool again;
-    bool of_kept; /* a setting of the study that is there is asked for, whatever its loads */
-    int row;      /* of the table, from 1; 0: none was asked for                           */
+    bool uses_stored; /* a configuration of the stored study is asked for, whatever its loads */
+    int row;          /* of the table, from 1; 0: none                                        */
     pal_study_input input;
-    char stem[PAL_STUDY_PATH], path[MOST_PATH]; /* of the study's files, study.json itself */
-    pal_study_file *file;                       /* as it is kept */
-    pal_study *before;                          /* measured before; NULL: none */
-    pal_study_journal *journal;                 /* what is known of the reference; NULL: nothing is measured */
+    char stem[PAL_STUDY_PATH], path[MAX_PATH]; /* of the study's files; study.json */
+    pal_study_file *file;                      /* the contents of study.json       */
+    pal_study *before;                         /* measured before; NULL: none      */
+    pal_study_journal *journal;                /* stored solutions of the reference; NULL: nothing is measured */
     int n_before, n_new;
-    double begin_s, first_s; /* clock when anything began, when the first new setting did */
-    char doing[160];
-    pal_err kept; /* of the last writing */
-    pal_diagnostic kept_note;
-    int picked; /* -1: none was asked for */
-    char written[MOST_PATH];
+    double begin_s, first_s; /* clock at the begin of all, of the first new configuration */
+    char activity[160];
+    pal_err store_err; /* of the last write */
+    pal_diagnostic store_diag;
+    int picked; /* -1: none */
+    char written[MAX_PATH];
 } study_run;
 
-/* ---- words ---- */
+/* ---- arguments ---- */
 
-/* "1mm", "4 ms": a number above 0 and its unit, in that of the table's factors. False: it is none */
+/* "1mm", "4 ms": a number above 0 and its unit -> number / factor; false: text is not that */
 static bool read_amount(const char *text, const char *const *unit, const double *factor, double *out)
 {
     char *end;
@@ -81,8 +82,8 @@ static bool read_amount(const char *text, const char *const *unit, const double 
     return false;
 }
 
-/* false: out says what is wrong with the words, and quotes them */
-static bool take_words(study_run *run, const char *within, const char *budget, char *out, size_t n_byte)
+/* false: out is a sentence that quotes the fault */
+static bool read_arguments(study_run *run, const char *within, const char *budget, char *out, size_t n_byte)
 {
     static const char *const length[] = {"mm", "um", "\xc2\xb5m", "cm", "m", NULL};
     static const double length_factor[] = {1e3, 1e6, 1e6, 1e2, 1};
@@ -96,9 +97,9 @@ static bool take_words(study_run *run, const char *within, const char *budget, c
         return !snprintf(out, n_byte, "--budget: \"%.40s\" is not a time above 0 with its unit, ms, us or s, as 4ms",
                          budget);
     if (run->scene && !within && !budget && !run->row)
-        return !snprintf(out, n_byte, "-o: which setting is to be written? --within, --budget or --pick says it");
+        return !snprintf(out, n_byte, "-o: needs --within, --budget or --pick, which name the configuration to write");
     if (run->row && (within || budget || run->again))
-        return !snprintf(out, n_byte, "--pick: names the setting of a row, so that %s has nothing to say",
+        return !snprintf(out, n_byte, "--pick: names the configuration of a row, %s does not go with it",
                          run->again ? "--again"
                          : within   ? "--within"
                                     : "--budget");
@@ -110,12 +111,12 @@ static bool take_words(study_run *run, const char *within, const char *budget, c
         while (model[k] && (strlen(model[k]) != n || strncmp(at, model[k], n) != 0)) k++;
         if (!model[k] || (at[n] && !at[n + 1]))
             return !snprintf(out, n_byte,
-                             "--methods: \"%.80s\" has a word that is not fem, tet_springs, adaptive_springs or "
+                             "--methods: \"%.80s\" contains a name that is not fem, tet_springs, adaptive_springs or "
                              "subdivision_fem",
                              run->methods);
         at += n + (at[n] == ',');
     }
-    if (run->methods && !run->methods[0]) return !snprintf(out, n_byte, "--methods: \"\" names none");
+    if (run->methods && !run->methods[0]) return !snprintf(out, n_byte, "--methods: \"\" is empty");
     return true;
 }
 
@@ -132,10 +133,10 @@ static void take_command(pal_study_file *file, int argc, char **argv)
         if ((unsigned char)*c < 0x20 || (unsigned char)*c > 0x7e) *c = '?';
 }
 
-/* ---- what was measured before ---- */
+/* ---- stored results ---- */
 
-/* is it of the same body, loads and machine? Which setting of it serves is asked of a study that goes with a scene
- * whatever its loads were, and a row's setting whatever the machine */
+/* refuses a stored study of another body, other loads or another machine. A pick from a complete study (answers)
+ * accepts any loads, a row of the table any machine */
 static pal_err check_same(const study_run *run, const pal_study_file *old, bool answers, pal_diagnostic *diag)
 {
     const pal_study_file *now = run->file;
@@ -155,12 +156,12 @@ static pal_err check_same(const study_run *run, const pal_study_file *old, bool 
     if (!strcmp(other, old->loads))
         return pal_diagnostic_set(
             diag, PAL_ERR_REFUSED,
-            "%.200s: is of a quick study: --quick goes on with it, --again starts over, --out keeps it", run->path);
+            "%.200s: is of a quick study: --quick continues it, --again starts over, --out keeps it", run->path);
     return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.200s: is of %s (%.150s): --again starts over, --out keeps it",
                               run->path, what, detail);
 }
 
-/* were all methods that are asked for swept? */
+/* are all requested methods measured? */
 static bool covers(const pal_study_file *old, const char *methods)
 {
     char word[PAL_NAME];
@@ -175,7 +176,7 @@ static bool covers(const pal_study_file *old, const char *methods)
     return true;
 }
 
-/* when those that are asked for now are swept as well, the study has both */
+/* the study will have the stored methods and the requested ones */
 static void join_methods(pal_study_file *now, const pal_study_file *old)
 {
     char both[2 * sizeof now->methods];
@@ -184,9 +185,8 @@ static void join_methods(pal_study_file *now, const pal_study_file *old)
     if (strlen(both) < sizeof now->methods) memcpy(now->methods, both, strlen(both) + 1);
 }
 
-/* which setting is to be picked is asked of the study that is there, whatever loads it has; those that are typed count
- */
-static pal_err take_kept_loads(study_run *run, pal_diagnostic *diag)
+/* a pick without load flags takes the loads of the stored study */
+static pal_err use_stored_loads(study_run *run, pal_diagnostic *diag)
 {
     pal_study_file *old = NULL;
     pal_study_request *q = &run->request;
@@ -199,7 +199,7 @@ static pal_err take_kept_loads(study_run *run, pal_diagnostic *diag)
         if (err) return pal_diagnostic_set(diag, err, "%.400s: --again starts over", reason.text);
         pal_study_loads_read(old->loads, &seconds, &q->quick, run->load_case);
         if (run->load_case[0]) q->load_case = run->load_case, q->keeps_case = true;
-        run->of_kept = true;
+        run->uses_stored = true;
         q->seconds = seconds;
         free(old);
     }
@@ -207,23 +207,23 @@ static pal_err take_kept_loads(study_run *run, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
-/* *whole: nothing is left to be measured */
-static pal_err look_before(study_run *run, bool *whole, pal_diagnostic *diag)
+/* *whole: nothing is left to measure */
+static pal_err read_stored(study_run *run, bool *whole, pal_diagnostic *diag)
 {
     pal_study_file *old = NULL;
     pal_diagnostic reason = {""};
     *whole = false;
-    bool is_there = !access(run->path, F_OK);
-    if (run->row && !is_there)
+    bool exists = !access(run->path, F_OK);
+    if (run->row && !exists)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--pick %d: there is no %.200s yet: run palpate study %.200s",
                                   run->row, run->path, run->request.word);
-    if (run->again || !is_there) return PAL_ERR_OK;
+    if (run->again || !exists) return PAL_ERR_OK;
     pal_err err = pal_study_file_read(run->path, &old, &reason);
     if (err) return pal_diagnostic_set(diag, err, "%.400s: --again starts over", reason.text);
-    /* a row is of the table that is there, also of one that was broken off */
-    bool there = run->row || covers(old, run->methods);
-    err = check_same(run, old, there && run->of_kept, diag);
-    if (!err && there) {
+    /* --pick reads the stored table, also of an interrupted study */
+    bool complete = run->row || covers(old, run->methods);
+    err = check_same(run, old, complete && run->uses_stored, diag);
+    if (!err && complete) {
         *whole = true;
         run->n_before = old->study.n_point;
         *run->file = *old;
@@ -240,7 +240,7 @@ static pal_err look_before(study_run *run, bool *whole, pal_diagnostic *diag)
 
 /* ---- measuring ---- */
 
-/* springs that could not be calibrated have the setting of those that were not to be: the error tells them apart */
+/* springs whose calibration failed have the configuration of uncalibrated ones: the error code distinguishes them */
 static bool has_point(const pal_study *study, const pal_study_point *point)
 {
     for (int k = 0; k < study->n_point; k++) {
@@ -251,8 +251,8 @@ static bool has_point(const pal_study *study, const pal_study_point *point)
     return false;
 }
 
-/* what the engine has now, and what was measured before and is not among that, as it is kept */
-static void take_study(study_run *run, const pal_study *study)
+/* the results of this run and the stored ones that it has not measured again */
+static void merge_results(study_run *run, const pal_study *study)
 {
     pal_study *to = &run->file->study;
     char name[PAL_NAME];
@@ -265,18 +265,18 @@ static void take_study(study_run *run, const pal_study *study)
     pal_study_mark_front(to);
 }
 
-/* the file after every point: a kill loses the one that is under way */
-static bool keep(const pal_study *study, int n_finest, void *user)
+/* writes the file after every result: a kill loses only the one in progress */
+static bool store(const pal_study *study, int n_all, void *user)
 {
     study_run *run = user;
-    take_study(run, study);
+    merge_results(run, study);
     bool is_new = study->n_point > 0 && !(run->before && has_point(run->before, &study->point[study->n_point - 1]));
     run->n_new += is_new;
-    run->file->n_finest = n_finest > run->file->study.n_point ? n_finest : run->file->study.n_point;
+    run->file->n_finest = n_all > run->file->study.n_point ? n_all : run->file->study.n_point;
     run->file->whole = false;
-    run->kept = pal_study_file_write(run->file, run->path, &run->kept_note);
-    /* the last one ends it anyway */
-    return !run->kept && (!pal_interrupt_requested() || study->n_point == n_finest);
+    run->store_err = pal_study_file_write(run->file, run->path, &run->store_diag);
+    /* a stop after the last result is none */
+    return !run->store_err && (!pal_stop_asked() || study->n_point == n_all);
 }
 
 static bool recall(uint64_t key, pal_study_answer *answer, double *value, int n, void *user)
@@ -285,7 +285,7 @@ static bool recall(uint64_t key, pal_study_answer *answer, double *value, int n,
     return pal_study_journal_find(run->journal, key, answer, value, n);
 }
 
-/* one that cannot be kept is worked out again, should this run be ended */
+/* a solution that cannot be stored is computed again after an interruption */
 static void remember(uint64_t key, const pal_study_answer *answer, const double *value, int n, void *user)
 {
     study_run *run = user;
@@ -300,7 +300,6 @@ static bool show(const char *what, double fraction, void *user)
     const pal_study_file *f = run->file;
     if (run->n_new == 0) run->first_s = now;
     if (run->begin_s == 0) run->begin_s = now;
-    /* of the reference, which may have to be made again */
     if (!strncmp(what, "reference", 9) && fraction > 0 && fraction < 1)
         snprintf(left, sizeof left, ", about %.0f s of it left", (now - run->begin_s) * (1 - fraction) / fraction);
     if (run->n_new > 0 && f->n_finest > f->study.n_point) {
@@ -314,20 +313,20 @@ static bool show(const char *what, double fraction, void *user)
     else
         snprintf(text, sizeof text, "%s%s%s", what, share, left);
     pal_report_progress(text, 0, &run->common);
-    return !pal_interrupt_requested();
+    return !pal_stop_asked();
 }
 
 static bool may_continue(void *user)
 {
     (void)user;
-    return !pal_interrupt_requested();
+    return !pal_stop_asked();
 }
 
-/* of the same body, loads and machine */
+/* keyed by body, loads and machine */
 static pal_err open_journal(study_run *run, pal_diagnostic *diag)
 {
     const pal_study_file *f = run->file;
-    char path[MOST_PATH + 4];
+    char path[MAX_PATH + 4];
     uint64_t of = pal_study_digest(0, f->shape, strlen(f->shape));
     of = pal_study_digest(pal_study_digest(of, f->digest, strlen(f->digest)), f->loads, strlen(f->loads));
     of = pal_study_digest(of, f->study.machine, strlen(f->study.machine));
@@ -347,7 +346,7 @@ static pal_err measure(study_run *run, pal_diagnostic *diag)
                            .before = run->before,
                            .recall = recall,
                            .remember = remember,
-                           .done = keep,
+                           .done = store,
                            .progress = show,
                            .may_continue = may_continue,
                            .user = run};
@@ -365,10 +364,10 @@ static pal_err measure(study_run *run, pal_diagnostic *diag)
     pal_diagnostic reason = {""};
     pal_err err = in->problem ? pal_study_problem(in->problem, in->load_case, &in->surface, &o, out, &reason)
                               : pal_study_scene(in->scene, &o, out, &reason);
-    if (!err || out->n_point > 0) take_study(run, out);
-    if (run->kept) {
-        err = run->kept;
-        *diag = run->kept_note;
+    if (!err || out->n_point > 0) merge_results(run, out);
+    if (run->store_err) {
+        err = run->store_err;
+        *diag = run->store_diag;
     } else if (err) {
         pal_diagnostic_set(diag, err, "%s: %s", run->request.word, reason.text);
     }
@@ -378,21 +377,21 @@ static pal_err measure(study_run *run, pal_diagnostic *diag)
     return err;
 }
 
-/* ---- the scene that is asked for ---- */
+/* ---- the picked scene ---- */
 
-/* the folder of a file, as it really is; false: it is not there yet */
+/* the real path of the folder of a file; false: it does not exist */
 static bool real_folder(const char *path, char out[PATH_MAX])
 {
-    char folder[MOST_PATH];
+    char folder[MAX_PATH];
     const char *slash = strrchr(path, '/');
     snprintf(folder, sizeof folder, "%.*s", slash ? (int)(slash - path) + 1 : 1, slash ? path : ".");
     return realpath(folder, out) != NULL;
 }
 
-/* would its meshes replace those of the scene that was read? */
+/* would the meshes of the new scene replace those of the source? */
 static bool is_beside_source(const study_run *run, const char *path)
 {
-    char own[PATH_MAX], other[PATH_MAX], source[MOST_PATH];
+    char own[PATH_MAX], other[PATH_MAX], source[MAX_PATH];
     size_t n = strlen(run->request.word);
     snprintf(source, sizeof source, "%s/scene.json", run->request.word);
     bool folder = !access(source, F_OK);
@@ -412,14 +411,15 @@ static pal_err scene_path(study_run *run, pal_diagnostic *diag)
     if (is_beside_source(run, run->written))
         return pal_diagnostic_set(
             diag, PAL_ERR_REFUSED,
-            "-o: %.300s lies beside what is read, whose meshes it could replace: name another folder", run->written);
+            "-o: %.300s is in the folder of the source, whose meshes it could replace: name another folder",
+            run->written);
     return PAL_ERR_OK;
 }
 
-/* the study goes with the scene that was made of it, so that it can be switched live */
+/* a copy of the study beside the new scene lets a session switch configurations */
 static pal_err copy_study(const study_run *run, const pal_scene *scene, pal_diagnostic *diag)
 {
-    char stem[PAL_STUDY_PATH], path[MOST_PATH];
+    char stem[PAL_STUDY_PATH], path[MAX_PATH];
     pal_study_file *copy = malloc(sizeof *copy);
     if (!copy) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the study");
     *copy = *run->file;
@@ -458,7 +458,7 @@ static pal_err write_scene(study_run *run, pal_diagnostic *diag)
     return err;
 }
 
-/* the setting of a row of the table, whether on the front or not */
+/* the configuration of a row of the table, on the Pareto front or not */
 static pal_err pick_row(study_run *run, pal_diagnostic *diag)
 {
     char text[PAL_CONFIGURATION_TEXT];
@@ -490,26 +490,26 @@ static pal_err answer(study_run *run, pal_diagnostic *diag)
     return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s", run->request.word, text);
 }
 
-/* ---- saying ---- */
+/* ---- report ---- */
 
-static int n_files(const study_run *run, char file[FILES][MOST_PATH])
+static int n_files(const study_run *run, char file[FILES][MAX_PATH])
 {
     static const char *const ending[] = {"json", "csv", "svg", "html"};
     int n = 0;
     for (int k = 0; k < 4; k++) {
-        snprintf(file[n], MOST_PATH, "%.*s.%s", PAL_STUDY_PATH, run->stem, ending[k]);
+        snprintf(file[n], MAX_PATH, "%.*s.%s", PAL_STUDY_PATH, run->stem, ending[k]);
         if (!access(file[n], F_OK)) n++;
     }
-    if (run->scene && run->picked >= 0) memcpy(file[n++], run->written, MOST_PATH);
+    if (run->scene && run->picked >= 0) memcpy(file[n++], run->written, MAX_PATH);
     return n;
 }
 
 static void print(const study_run *run)
 {
-    char text[PAL_CONFIGURATION_TEXT], asked[80], off[PAL_STUDY_ERROR_TEXT], file[FILES][MOST_PATH];
+    char text[PAL_CONFIGURATION_TEXT], asked[80], off[PAL_STUDY_ERROR_TEXT], file[FILES][MAX_PATH];
     const pal_study *study = &run->file->study;
     if (run->n_before > 0) printf("%d of %d measured before\n", run->n_before, run->file->n_finest);
-    /* of a study that is there already only the answer is news */
+    /* of a complete study only the pick is new */
     if (run->picked < 0 || run->n_new > 0) pal_study_print(run->file, stdout);
     if (run->picked >= 0) {
         const pal_study_point *point = &study->point[run->picked];
@@ -521,13 +521,13 @@ static void print(const study_run *run)
     }
     int n = n_files(run, file);
     for (int k = 0; k < n; k++)
-        printf("%s %s\n", run->n_new > 0 || !strcmp(file[k], run->written) ? "wrote" : "kept in", file[k]);
+        printf("%s %s\n", run->n_new > 0 || !strcmp(file[k], run->written) ? "wrote" : "stored in", file[k]);
     if (run->scene && run->picked >= 0) printf("palpate serve %s\n", run->scene);
 }
 
 static cJSON *as_json(const study_run *run)
 {
-    char text[PAL_CONFIGURATION_TEXT], file[FILES][MOST_PATH];
+    char text[PAL_CONFIGURATION_TEXT], file[FILES][MAX_PATH];
     cJSON *o = pal_study_file_tree(run->file), *list;
     if (!o) return NULL;
     cJSON_AddBoolToObject(o, "ok", true);
@@ -538,7 +538,7 @@ static cJSON *as_json(const study_run *run)
         cJSON *picked = cJSON_AddObjectToObject(o, "picked");
         cJSON_AddNumberToObject(picked, "point", run->picked);
         if (run->row) cJSON_AddNumberToObject(picked, "row", run->row);
-        cJSON_AddStringToObject(picked, "setting", pal_configuration_text(&p->setting, text));
+        cJSON_AddStringToObject(picked, "configuration", pal_configuration_text(&p->setting, text));
         cJSON_AddNumberToObject(picked, "ms", p->ms);
         cJSON_AddNumberToObject(picked, "error_m", p->error_m);
     }
@@ -548,7 +548,7 @@ static cJSON *as_json(const study_run *run)
     return o;
 }
 
-/* a study that is there whole and has lost its drawing gets it anew from what was measured */
+/* draws the plot of a complete study again when its file is gone */
 static pal_err draw_again(const study_run *run, pal_diagnostic *diag)
 {
     char path[PAL_STUDY_PATH + 8];
@@ -556,7 +556,7 @@ static pal_err draw_again(const study_run *run, pal_diagnostic *diag)
     return access(path, F_OK) ? pal_study_publish(run->file, run->stem, diag) : PAL_ERR_OK;
 }
 
-/* ---- the whole ---- */
+/* ---- the command ---- */
 
 static pal_err work(study_run *run, int argc, char **argv, pal_diagnostic *diag)
 {
@@ -564,32 +564,33 @@ static pal_err work(study_run *run, int argc, char **argv, pal_diagnostic *diag)
     if (run->scene) PAL_TRY(scene_path(run, diag));
     PAL_TRY(pal_study_stem(run->request.word, run->folder, run->stem, diag));
     snprintf(run->path, sizeof run->path, "%s.json", run->stem);
-    PAL_TRY(take_kept_loads(run, diag));
+    PAL_TRY(use_stored_loads(run, diag));
     PAL_TRY(pal_study_input_open(&run->request, &run->input, diag));
     pal_study_input_describe(&run->input, &run->request, run->file);
     snprintf(run->file->methods, sizeof run->file->methods, "%s", run->methods ? run->methods : "");
     pal_machine_name(run->file->study.machine);
     run->file->study.step_s = run->input.scene->step_s;
     take_command(run->file, argc, argv);
-    PAL_TRY(look_before(run, &whole, diag));
+    PAL_TRY(read_stored(run, &whole, diag));
     if (!whole) {
         if (run->folder) PAL_TRY(pal_scene_make_folder(run->folder, diag));
         pal_err err = measure(run, diag);
-        /* also what was broken off can be looked at */
+        /* an interrupted study is published as well */
         pal_diagnostic reason = {""};
         pal_err kept = run->file->study.n_point > 0 || !err ? pal_study_file_write(run->file, run->path, &reason) : 0;
         if (!kept && run->file->study.n_point > 0) kept = pal_study_publish(run->file, run->stem, &reason);
         int n = run->file->study.n_point > run->n_before ? run->file->study.n_point : run->n_before;
-        if (err && pal_interrupt_requested() && n == 0)
+        if (err && pal_stop_asked() && n == 0)
             return pal_diagnostic_set(
                 diag, PAL_ERR_STATE,
-                "stopped before the first setting was measured; %d answers of the reference are kept "
-                "in %.200s.reference; the same command goes on",
+                "stopped before the first configuration was measured; %d solutions of the reference are stored "
+                "in %.200s.reference; the same command continues",
                 run->journal ? pal_study_journal_count(run->journal, NULL) : 0, run->stem);
-        if (err && pal_interrupt_requested())
-            return pal_diagnostic_set(diag, PAL_ERR_STATE,
-                                      "stopped with %d settings of %d kept in %.200s; the same command goes on", n,
-                                      run->file->n_finest > n ? run->file->n_finest : n, run->path);
+        if (err && pal_stop_asked())
+            return pal_diagnostic_set(
+                diag, PAL_ERR_STATE,
+                "stopped with %d configurations of %d stored in %.200s; the same command continues", n,
+                run->file->n_finest > n ? run->file->n_finest : n, run->path);
         if (err) return err;
         if (kept) return pal_diagnostic_set(diag, kept, "%s", reason.text);
     } else {
@@ -603,7 +604,7 @@ static int start(study_run *run, int argc, char **argv)
     pal_diagnostic diag = {""};
     run->file = calloc(1, sizeof *run->file);
     run->picked = -1;
-    pal_interrupt_watch();
+    pal_stop_watch();
     pal_err err = run->file ? work(run, argc, argv, &diag) : PAL_ERR_MEMORY;
     pal_report_progress(NULL, 0, &run->common);
     int code = err                ? pal_report_refusal(&run->common, err, &diag)
@@ -625,32 +626,34 @@ int command_study(int argc, char **argv)
     run = (study_run){.request = {.options = &surface}};
     const pal_flag flag[] = {
         {"--within", "LENGTH", PAL_FLAG_TEXT, &within, 0, 0,
-         "names the cheapest setting whose error, with the reference's own, is no more: 1mm,\n300um"},
+         "pick the cheapest configuration whose error, with that of the reference, is at most this: 1mm, 300um"},
         {"--budget", "TIME", PAL_FLAG_TEXT, &budget, 0, 0,
-         "names the most accurate setting whose step takes no more: 4ms; with --within the cheapest that\n"
-         "keeps both"},
+         "pick the most accurate configuration whose step takes at most this: 4ms; with --within the cheapest that\n"
+         "meets both"},
         {"--pick", "ROW", PAL_FLAG_COUNT, &run.row, 1, PAL_STUDY_POINTS,
-         "names the setting of that row of the table of a study that is there"},
+         "pick that row of the table of a stored study"},
         {"-o", "SCENE", PAL_FLAG_TEXT, &run.scene, 0, 0,
-         "writes that setting as a scene for palpate serve, a folder or FILE.json, and the\nstudy beside it"},
+         "write the picked configuration as a scene, a folder or FILE.json, with the study beside it"},
         {"--methods", "WORD[,WORD...]", PAL_FLAG_TEXT, &run.methods, 0, 0,
-         "fem, tet_springs, adaptive_springs, subdivision_fem (all that fit the body)"},
+         "fem, tet_springs, adaptive_springs, subdivision_fem (all that suit the body)"},
         {"--case", "ID", PAL_FLAG_TEXT, &run.request.load_case, 0, 0,
-         "load case of a problem, or one of its references, whose CSV is then the truth at\n"
-         "rest (the first load case)"},
+         "load case of a problem, or one of its references, whose CSV is then the truth at rest (the first load case)"},
         {"--body", "NAME", PAL_FLAG_TEXT, &run.request.body, 0, 0, "body of a scene (the first)"},
         {"--reference", "FILE.csv", PAL_FLAG_TEXT, &run.request.samples, 0, 0,
-         "x,y,z,ux,uy,uz of the first load at rest, in place of finite elements of our own"},
-        {"--seconds", "S", PAL_FLAG_NUMBER, &run.request.seconds, 0.01, 60,
-         "how long the first load is followed (0.5)"},
-        {"--quick", NULL, PAL_FLAG_SWITCH, &run.request.quick, 0, 0,
-         "few settings and a coarser reference, to see what comes out"},
-        {"--out", "FOLDER", PAL_FLAG_TEXT, &run.folder, 0, 0, "where the study's files go (beside the scene)"},
-        {"--again", NULL, PAL_FLAG_SWITCH, &run.again, 0, 0, "starts over in place of going on with what is there"},
-        {"--units", "UNIT", PAL_FLAG_TEXT, &unit, 0, 0, "unit of a bare surface: m, cm, mm, um, in (guessed)"},
+         "x,y,z,ux,uy,uz of the first load at rest, instead of our own finite elements"},
+        {"--seconds", "S", PAL_FLAG_NUMBER, &run.request.seconds, 0.01, 60, "simulated time of the first load (0.5)"},
+        {"--quick", NULL, PAL_FLAG_SWITCH, &run.request.quick, 0, 0, "few configurations and a coarser reference"},
+        {"--out", "FOLDER", PAL_FLAG_TEXT, &run.folder, 0, 0, "folder of the study's files (beside the scene)"},
+        {"--again", NULL, PAL_FLAG_SWITCH, &run.again, 0, 0, "start over instead of continuing"},
+        {"--units", "UNIT", PAL_FLAG_TEXT, &unit, 0, 0, "unit of a surface file: m, cm, mm, um, in (guessed)"},
     };
     const pal_flag_table table = {.usage = "study SCENE|PROBLEM.json [flags]",
                                   .about = about,
+                                  .example = "palpate study deploy/problems/beam.json --case tip --quick --methods fem "
+                                             "--seconds 0.1 --out beam_study\n"
+                                             "palpate study deploy/problems/beam.json --case tip --quick --methods fem "
+                                             "--seconds 0.1 --out beam_study --pick 1 -o beam_fast\n"
+                                             "palpate plan beam_fast/scene.json\n",
                                   .flag = flag,
                                   .n_flag = sizeof flag / sizeof flag[0],
                                   .min_operand = 1,
@@ -658,13 +661,10 @@ int command_study(int argc, char **argv)
     int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.request.word, &n);
     if (code >= 0) return code;
     char sentence[240] = "";
-    bool fine = take_words(&run, within, budget, sentence, sizeof sentence);
+    bool fine = read_arguments(&run, within, budget, sentence, sizeof sentence);
     surface.unit_m = unit ? pal_mesh_unit_named(unit) : 0;
     if (fine && unit && surface.unit_m == 0)
         fine = !snprintf(sentence, sizeof sentence, "--units: \"%.40s\" is not m, cm, mm, um or in", unit) && fine;
-    if (!fine) {
-        fprintf(stderr, "palpate %s: %s (see palpate %s --help)\n", argv[0], sentence, argv[0]);
-        return 2;
-    }
+    if (!fine) return pal_flags_wrong(&run.common, "%s", sentence);
     return start(&run, argc, argv);
 }

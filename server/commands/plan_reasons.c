@@ -1,5 +1,5 @@
-/* The words that call for each effect. What a model lists is named with the model; the others follow from their stage,
- * so that a new effect needs no line here. */
+/* The effects that a model adds stand in the table; of the others the stage tells which entry adds them, so that a new
+ * effect needs no line here. */
 #include "server/commands/plan_reasons.h"
 
 #include "server/sim/core/effect_list.h"
@@ -39,10 +39,10 @@ const char *pal_effect_words(const char *name, char text[128])
 
 bool pal_plan_has(const pal_world *world, const char *name)
 {
-    pal_component_info row;
+    pal_component_info component;
     for (int r = 0; r < pal_world_component_count(world); r++) {
-        pal_world_component_info(world, r, &row);
-        if (!strcmp(row.name, name)) return true;
+        pal_world_component_info(world, r, &component);
+        if (!strcmp(component.name, name)) return true;
     }
     return false;
 }

@@ -1,7 +1,7 @@
-/* Preflights as text, JSON and one line of the log. */
 #include "server/commands/preflight_report.h"
 
 #include "server/base/log.h"
+#include "server/cli/report.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -15,13 +15,8 @@ void pal_preflight_print(const pal_preflight *preflight, double measured_ms)
         for (int k = 0; k < n; k++) printf("  %s: %s\n", preflight->body[b].name, line[k]);
     }
     if (isfinite(preflight->predicted_ms))
-        printf("  a step under load: %.3g ms predicted from counts (README's machine), %.3g ms measured here at rest\n",
+        printf("  a step under load: %.3g ms predicted from counts, %.3g ms measured here at rest\n",
                preflight->predicted_ms, measured_ms);
-}
-
-static void add_number(cJSON *o, const char *key, double value)
-{
-    if (isfinite(value)) cJSON_AddNumberToObject(o, key, value);
 }
 
 static void add_weak(cJSON *o, const char *key, const pal_weak_spot *weak)
@@ -30,29 +25,29 @@ static void add_weak(cJSON *o, const char *key, const pal_weak_spot *weak)
     cJSON_AddNumberToObject(w, "count", weak->n);
     if (weak->n == 0) return;
     cJSON_AddNumberToObject(w, "worst", weak->worst);
-    add_number(w, "value", weak->value);
+    pal_json_add_finite(w, "value", weak->value);
     cJSON_AddItemToObject(w, "at_m", cJSON_CreateDoubleArray(weak->at_m, 3));
 }
 
 cJSON *pal_preflight_json(const pal_preflight *preflight)
 {
     cJSON *o = cJSON_CreateObject(), *list = cJSON_AddArrayToObject(o, "bodies");
-    add_number(o, "predicted_ms", preflight->predicted_ms);
+    pal_json_add_finite(o, "predicted_ms", preflight->predicted_ms);
     cJSON_AddNumberToObject(o, "world_bytes", (double)preflight->n_byte);
     for (int i = 0; i < preflight->n_body; i++) {
         const pal_preflight_body *b = &preflight->body[i];
         cJSON *body = cJSON_CreateObject();
         cJSON_AddItemToArray(list, body);
         cJSON_AddStringToObject(body, "name", b->name);
-        cJSON_AddNumberToObject(body, "points", b->n_point);
+        cJSON_AddNumberToObject(body, "dofs", b->n_point);
         cJSON_AddNumberToObject(body, "elements", b->n_element);
-        cJSON_AddNumberToObject(body, "held", b->n_fixed);
-        add_number(body, "limit_s", b->limit_s);
+        cJSON_AddNumberToObject(body, "fixed", b->n_fixed);
+        pal_json_add_finite(body, "limit_s", b->limit_s);
         cJSON_AddNumberToObject(body, "substeps", b->n_sub);
         if (b->limit_node >= 0) {
             cJSON_AddNumberToObject(body, "limit_node", b->limit_node);
             cJSON_AddItemToObject(body, "limit_at_m", cJSON_CreateDoubleArray(b->limit_at_m, 3));
-            add_number(body, "limit_edge_m", b->limit_edge_m);
+            pal_json_add_finite(body, "limit_edge_m", b->limit_edge_m);
         }
         add_weak(body, "short_edges", &b->edge);
         add_weak(body, "flat_elements", &b->flat);
@@ -60,10 +55,10 @@ cJSON *pal_preflight_json(const pal_preflight *preflight)
         add_weak(body, "thin_elements", &b->thin);
         add_weak(body, "light_nodes", &b->light);
         if (b->locks) cJSON_AddStringToObject(body, "locks", b->locks);
-        if (b->locks) cJSON_AddStringToObject(body, "instead", b->instead);
-        add_number(body, "condition", b->condition);
-        add_number(body, "slowest_s", b->slowest_period_s);
-        add_number(body, "predicted_ms", b->predicted_ms);
+        if (b->locks) cJSON_AddStringToObject(body, "alternative", b->instead);
+        pal_json_add_finite(body, "condition", b->condition);
+        pal_json_add_finite(body, "slowest_s", b->slowest_period_s);
+        pal_json_add_finite(body, "predicted_ms", b->predicted_ms);
     }
     return o;
 }
@@ -84,5 +79,5 @@ void pal_preflight_log(const pal_preflight *preflight, const char *scene)
     pal_log(n_weak > 0 ? PAL_LOG_WARN : PAL_LOG_INFO, "preflight",
             "%s: %d sub-step%s a step, condition at least %.2g, %.1f MB, %d weak elements and nodes%s", scene, n_sub,
             n_sub == 1 ? "" : "s", condition, 1e-6 * (double)preflight->n_byte, n_weak,
-            n_weak > 0 ? " (palpate plan says which)" : "");
+            n_weak > 0 ? " (palpate plan lists them)" : "");
 }

@@ -1,4 +1,4 @@
-/* Small multiples: simulated seconds to the right, energy above rest as a share of its largest value upwards. */
+/* x: simulated seconds; y: energy above that at rest as a share of its largest value. */
 #include "server/commands/robustness_picture.h"
 
 #include "server/figure/svg.h"
@@ -20,7 +20,7 @@ static void frame(FILE *to, double x, double y)
             PLOT_HIGH);
 }
 
-/* the range of what was seen; false: nothing */
+/* the range of the samples; false: nothing moved */
 static bool range(const pal_robustness_result *r, double *seconds, double *low, double *high)
 {
     *seconds = *low = *high = 0;
@@ -29,7 +29,7 @@ static bool range(const pal_robustness_result *r, double *seconds, double *low, 
         *seconds = fmax(*seconds, r->time_s[i]);
         *low = fmin(*low, r->energy_J[i]), *high = fmax(*high, r->energy_J[i]);
     }
-    /* rounding is no motion */
+    /* a rounding error is no motion */
     if (*low > -1e-9 * *high) *low = 0;
     return *seconds > 0 && *high > 1e-20;
 }

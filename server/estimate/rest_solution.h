@@ -36,7 +36,7 @@ pal_err pal_rest_solution_coarser(const pal_scene *scene, const pal_body *body, 
 pal_err pal_rest_solution_sized(const pal_scene *scene, const pal_body *body, const pal_configuration *setting,
                                 int size, const char *law, pal_rest_solution *out);
 void pal_rest_solution_free(pal_rest_solution *rest); /* a zeroed one is fine */
-/* shape functions of a body's elements at local coordinates (mesh/locate.h): shape [n_corner] */
+/* shape functions of a body's elements at local coordinates (mesh/volume/locate.h): shape [n_corner] */
 void pal_element_shape_functions(const pal_body *body, const double local[4], double *shape);
 /* the rest under what the state bears -> x, known; false: no rest was found or *stop. from: places of the running
  * body's nodes to begin at; NULL, and in another mesh: where it was last.

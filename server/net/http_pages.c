@@ -1,8 +1,8 @@
 /* What the hub answers to GET besides the viewer's files: assets, health, readiness, sessions, metrics
  * (streaming.md 6; labels stay few: never session names or members). */
-#include "server/net/hub_core.h"
+#include "server/net/http_pages.h"
 
-#include "server/net/plain_text.h"
+#include "server/net/transport/plain_text.h"
 
 #include <stdarg.h>
 #include <stdio.h>

@@ -1,12 +1,18 @@
 /* The hub's peers: coming, going, and what each is sent next (streaming.md 1.6, 2.3). */
-#include "server/net/hub_core.h"
+#include "server/net/hub.h"
 
-#include "server/base/log.h"
-#include "server/net/plain_text.h"
+#include "server/net/http_pages.h"
+#include "server/net/hub_accuracy.h"
+#include "server/net/hub_fields.h"
+#include "server/net/hub_input.h"
+#include "server/net/hub_jobs.h"
+#include "server/net/hub_peers.h"
+#include "server/net/hub_plan.h"
+#include "server/net/hub_subscriptions.h"
+#include "server/net/transport/plain_text.h"
+#include "server/net/verb_table.h"
 
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -14,122 +20,6 @@
 #define STALL_NS       10000000000u
 #define TIER_WINDOW_NS 2000000000u
 #define TIER_CLEAN_NS  10000000000u
-
-uint32_t pal_hub_colour(int id)
-{
-    static const uint32_t colours[] = {0xFF8C42, 0x3FA7D6, 0x59CD90, 0xEE6352, 0xB388EB, 0xFAC05E,
-                                       0x2EC4B6, 0xF15BB5, 0x9BC53D, 0x5C7AEA, 0xD4A373, 0x8D99AE};
-    return colours[(unsigned)(id - 1) % (sizeof colours / sizeof *colours)];
-}
-
-static void empty(pal_client *c)
-{
-    for (; c->n_queue; c->n_queue--) {
-        pal_packet_drop(c->queue[c->queue_begin]);
-        c->queue_begin = (c->queue_begin + 1) % PAL_HUB_QUEUE;
-    }
-    for (; c->out_begin < c->n_out; c->out_begin++) pal_packet_drop(c->out[c->out_begin]);
-    c->out_begin = c->n_out = 0;
-    pal_packet_replace(&c->haptic, NULL);
-    c->members_due = c->status_due = false;
-}
-
-/* the member is gone for the others as soon as it is dropped, not when its socket is */
-static void leave_room(pal_hub *hub, pal_client *c)
-{
-    pal_hub_room *room = c->room;
-    empty(c);
-    if (!c->id) return;
-    pal_hub_unsubscribe_fields(c);
-    pal_hub_unsubscribe_estimates(c);
-    pal_member_entry *member = pal_members_find(&room->members, c->id);
-    int tool = member ? member->tool : -1;
-    pal_members_leave(&room->members, c->id);
-    if (tool >= 0) pal_hub_release_tool(room, tool);
-    room->tier_users[c->tier]--;
-    pal_session_observe(room->session, false);
-    c->id = 0;
-    pal_hub_members_changed(hub, room);
-}
-
-void pal_hub_drop(pal_hub *hub, pal_client *client, int code, const char *format, ...)
-{
-    char reason[PAL_PEER_REASON];
-    va_list args;
-    if (client->peer->drop_code) return;
-    va_start(args, format);
-    vsnprintf(reason, sizeof reason, format, args);
-    va_end(args);
-    pal_log(PAL_LOG_DEBUG, "drop", "a client is closed with %d: %s", code, reason);
-    pal_peer_drop(client->peer, code, "%s", reason);
-    leave_room(hub, client);
-}
-
-static void queue(pal_hub *hub, pal_client *c, pal_packet *packet)
-{
-    if (c->n_queue == PAL_HUB_QUEUE || !packet) {
-        pal_packet_drop(packet);
-        hub->count.n_overflow++;
-        pal_hub_drop(hub, c, PAL_WIRE_CLOSE_POLICY, "too many answers wait to be read");
-        return;
-    }
-    c->queue[(c->queue_begin + c->n_queue++) % PAL_HUB_QUEUE] = packet;
-    c->peer->ops->ready(c->peer);
-}
-
-pal_packet *pal_hub_encode(pal_hub *hub, const pal_control *control)
-{
-    size_t n = 0;
-    int refusal = pal_control_put(hub->text, PAL_CONTROL_OUT_MAX + 1, control, &n);
-    if (refusal) {
-        pal_log(PAL_LOG_ERROR, "control", "%s is not sent: %s", pal_control_name(control->type),
-                pal_refusal_text(refusal));
-        return NULL;
-    }
-    return pal_packet_create(hub->text, n, true);
-}
-
-void pal_hub_send(pal_hub *hub, pal_client *client, const pal_control *control)
-{
-    if (client->peer->drop_code) return;
-    queue(hub, client, pal_hub_encode(hub, control));
-}
-
-void pal_hub_send_error(pal_hub *hub, pal_client *client, const char *code, const char *format, ...)
-{
-    char text[512];
-    va_list args;
-    va_start(args, format);
-    vsnprintf(text, sizeof text, format, args);
-    va_end(args);
-    memset(hub->control, 0, sizeof *hub->control);
-    hub->control->type = PAL_CONTROL_ERROR;
-    pal_plain_text(hub->control->error.code, sizeof hub->control->error.code, code);
-    pal_plain_text(hub->control->error.text, sizeof hub->control->error.text, text);
-    pal_hub_send(hub, client, hub->control);
-}
-
-void pal_hub_members_changed(pal_hub *hub, pal_hub_room *room)
-{
-    for (int i = 0; i < hub->max_clients; i++) {
-        pal_client *c = &hub->client[i];
-        if (!c->peer || c->room != room || !c->id || c->peer->drop_code) continue;
-        c->members_due = true;
-        c->peer->ops->ready(c->peer);
-    }
-}
-
-void pal_hub_set_tier(pal_hub *hub, pal_client *client, int tier)
-{
-    pal_hub_room *room = client->room;
-    (void)hub;
-    if (tier == client->tier) return;
-    room->tier_users[client->tier]--;
-    client->tier = tier;
-    room->tier_users[tier]++;
-    pal_stream_begin_tier(room->stream, tier);
-    if (client->sent_cycle == room->stream->cycle) client->sent_cycle--;
-}
 
 /* ---- what is sent next ---- */
 
@@ -335,7 +225,7 @@ static void client_closed(void *user, pal_peer *peer)
     pal_hub *hub = user;
     pal_client *c = peer->client;
     if (!c) return;
-    leave_room(hub, c);
+    pal_hub_leave_room(hub, c);
     peer->client = NULL;
     c->peer = NULL;
     hub->n_client--;
@@ -376,8 +266,19 @@ static void hub_wake(void *user)
     if (due) pal_loop_set_due(hub->loop, due);
 }
 
+static void set_tier(pal_client *client, int tier)
+{
+    pal_hub_room *room = client->room;
+    if (tier == client->tier) return;
+    room->tier_users[client->tier]--;
+    client->tier = tier;
+    room->tier_users[tier]++;
+    pal_stream_begin_tier(room->stream, tier);
+    if (client->sent_cycle == room->stream->cycle) client->sent_cycle--;
+}
+
 /* a client that skips more than a quarter of the cycles for 2 s gets coarser frames, after 10 s without finer ones */
-static void judge_tier(pal_hub *hub, pal_client *c, uint64_t now)
+static void judge_tier(pal_client *c, uint64_t now)
 {
     if (now - c->tier_ns < TIER_WINDOW_NS) return;
     uint64_t sent = c->n_cycle - c->tier_cycle, skipped = c->n_skipped - c->tier_skipped;
@@ -388,9 +289,9 @@ static void judge_tier(pal_hub *hub, pal_client *c, uint64_t now)
     if (first || skipped > 0) c->clean_ns = now;
     if (first) return;
     if (4 * skipped > sent + skipped && c->tier + 1 < PAL_STREAM_TIER)
-        pal_hub_set_tier(hub, c, c->tier + 1);
+        set_tier(c, c->tier + 1);
     else if (c->tier > 0 && now - c->clean_ns >= TIER_CLEAN_NS) {
-        pal_hub_set_tier(hub, c, c->tier - 1);
+        set_tier(c, c->tier - 1);
         c->clean_ns = now;
     }
 }
@@ -402,8 +303,7 @@ static void hub_tick(void *user)
     hub_wake(hub);
     for (int r = 0; r < hub->n_room; r++) {
         pal_stream_measure(hub->room[r].stream, now);
-        pal_hub_update_fields(&hub->room[r]);
-        pal_hub_update_estimates(&hub->room[r]);
+        pal_hub_update_subscriptions(&hub->room[r]);
         pal_hub_count_unobserved(&hub->room[r]);
     }
     for (int i = 0; i < hub->max_clients; i++) {
@@ -418,7 +318,7 @@ static void hub_tick(void *user)
             pal_hub_drop(hub, c, PAL_WIRE_CLOSE_STALLED, "no acknowledgement for 10 s");
             continue;
         }
-        judge_tier(hub, c, now);
+        judge_tier(c, now);
         pal_hub_component_result(hub, c);
         c->status_due = true;
         pal_hub_estimates_due(c);
@@ -436,6 +336,8 @@ pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_sessi
     hub->site = options->site;
     hub->session = session;
     hub->error_m = options->error_m;
+    hub->verb = options->verb ? options->verb : pal_verb_table;
+    hub->n_verb = options->verb ? options->n_verb : pal_verb_count;
     hub->max_clients = options->max_clients > 0 ? options->max_clients : 200;
     hub->room = calloc((size_t)n_session, sizeof *hub->room);
     hub->client = calloc((size_t)hub->max_clients, sizeof *hub->client);

@@ -6,12 +6,13 @@
  * [net]. */
 #ifndef PAL_NET_HUB_H
 #define PAL_NET_HUB_H
-#include "server/net/site.h"
 #include "server/net/stream.h"
-#include "server/net/transport.h"
+#include "server/net/transport/site.h"
+#include "server/net/transport/transport.h"
 #include "server/sim/core/configuration.h"
 
 typedef struct pal_hub pal_hub;
+struct pal_verb;
 
 typedef struct pal_hub_options {
     double error_m;
@@ -20,7 +21,9 @@ typedef struct pal_hub_options {
     /* settings of a study of each session's scene, as in pal_server_options; borrowed; NULL: none */
     const pal_measured_configuration *const *setting;
     const int *n_configuration, *setting_body;
-    const double *reference_m; /* NULL: not known */
+    const double *reference_m;   /* NULL: not known */
+    const struct pal_verb *verb; /* commands that are known [n_verb]; borrowed; NULL: pal_verb_table */
+    int n_verb;
 } pal_hub_options;
 
 /* builds the streams; borrows loop, sessions and their array; listens to the loop. A session that a command of

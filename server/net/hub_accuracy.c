@@ -1,40 +1,16 @@
 /* What accuracy costs, as clients see it (protocol/README.md): the study's points once, then a body's estimate at every
  * tick of the hub, to those who ask for it. Who looks is counted as with fields; the session estimates while anybody
  * does, and nothing of it is there while nobody does. */
-#include "server/net/hub_core.h"
-
-#include "server/net/plain_text.h"
+#include "server/net/hub_accuracy.h"
 
 #include "server/base/log.h"
+#include "server/net/hub_peers.h"
+#include "server/net/hub_subscriptions.h"
+#include "server/net/transport/plain_text.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-
-void pal_hub_update_estimates(pal_hub_room *room)
-{
-    for (int b = 0; b < room->stream->n_part; b++) {
-        bool wanted = room->n_estimate[b] > 0;
-        if (wanted == room->estimate_requested[b]) continue;
-        pal_command command = {.kind = PAL_COMMAND_ESTIMATE, .body = b, .wanted = wanted};
-        /* a session whose queue is full is told at the next tick */
-        if (pal_session_command(room->session, &command) == PAL_ERR_OK) room->estimate_requested[b] = wanted;
-    }
-}
-
-static void look(pal_client *c, int body, bool wanted)
-{
-    if (c->estimate[body] == wanted) return;
-    c->room->n_estimate[body] += wanted ? 1 : -1;
-    c->estimate[body] = wanted;
-    if (!wanted) c->estimate_due[body] = false;
-}
-
-void pal_hub_unsubscribe_estimates(pal_client *c)
-{
-    for (int b = 0; b < c->room->stream->n_part; b++) look(c, b, false);
-    pal_hub_update_estimates(c->room);
-}
 
 /* ---- the study ---- */
 
@@ -256,26 +232,15 @@ void pal_hub_estimates_due(pal_client *c)
     for (int b = 0; b < c->room->stream->n_part; b++) c->estimate_due[b] = c->estimate[b];
 }
 
-bool pal_hub_estimate_command(pal_hub *hub, pal_client *c, const pal_wire_command *order)
+void pal_hub_run_estimate(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
-    const pal_stream *s = c->room->stream;
-    int body = order->target[0] ? -1 : 0;
-    if (strcmp(order->verb, "estimate")) return false;
-    for (int b = 0; b < s->n_part; b++)
-        if (!strcmp(s->part[b].info.name, order->target)) body = b;
-    if (body < 0) {
-        pal_hub_send_error(hub, c, "target", "there is no body %s", order->target);
-        return true;
-    }
-    if (order->n_arg != 1 || strcmp(order->arg[0].key, "enabled")) {
-        pal_hub_send_error(hub, c, "args", "estimate takes on");
-        return true;
-    }
-    bool wanted = order->arg[0].value != 0, before = c->estimate[body];
-    look(c, body, wanted);
-    pal_hub_update_estimates(c->room);
+    (void)verb;
+    int body = pal_hub_find_body(hub, c, command->target, 0);
+    if (body < 0) return;
+    bool wanted = pal_hub_arg(command, "enabled", 0) != 0, before = c->estimate[body];
+    pal_hub_set_estimate(c, body, wanted);
+    pal_hub_update_subscriptions(c->room);
     if (wanted && !before) say_study(hub, c, body);
     c->estimate_due[body] = wanted;
     c->peer->ops->ready(c->peer);
-    return true;
 }

@@ -1,9 +1,12 @@
-/* What hub.c, hub_input.c, hub_fields.c, hub_jobs.c, hub_sculpt.c, hub_switch.c, hub_plan.c, hub_accuracy.c and
- * http_pages.c share: the hub's records. Private to these. Thread: [net]. */
+/* The records of the hub: clients, rooms, counts. Every file of the hub knows them; they know no file. Thread: [net].
+ */
 #ifndef PAL_NET_HUB_CORE_H
 #define PAL_NET_HUB_CORE_H
-#include "server/net/credit.h"
-#include "server/net/hub.h"
+#include "server/net/stream.h"
+#include "server/net/transport/credit.h"
+#include "server/net/transport/site.h"
+#include "server/net/transport/transport.h"
+#include "server/sim/core/configuration.h"
 
 enum { PAL_HUB_QUEUE = 32, PAL_HUB_OLD_ASSETS = 8 };
 
@@ -81,11 +84,14 @@ typedef struct pal_hub_count {
 } pal_hub_count;
 
 typedef struct pal_hub_jobs pal_hub_jobs;
+typedef struct pal_verb pal_verb;
 
-struct pal_hub {
+typedef struct pal_hub {
     pal_loop *loop;
     pal_session **session; /* the caller's array [n_room] */
-    pal_hub_jobs *jobs;    /* NULL until somebody sculpts or switches */
+    pal_hub_jobs *jobs;    /* NULL until a command needs them */
+    const pal_verb *verb;  /* commands that are known [n_verb], borrowed */
+    int n_verb;
     double error_m;
     pal_site *site;
     int n_room, max_clients, n_client;
@@ -95,61 +101,5 @@ struct pal_hub {
     pal_control *control; /* scratch: it is large */
     char *text;           /* scratch [PAL_CONTROL_OUT_MAX] */
     pal_hub_count count;
-};
-
-/* hub.c */
-pal_packet *pal_hub_encode(pal_hub *hub, const pal_control *control);            /* NULL: it cannot be, logged */
-void pal_hub_send(pal_hub *hub, pal_client *client, const pal_control *control); /* queues; overflow drops the client */
-void pal_hub_send_error(pal_hub *hub, pal_client *client, const char *code, const char *format, ...)
-    __attribute__((format(printf, 4, 5)));
-void pal_hub_drop(pal_hub *hub, pal_client *client, int code, const char *format, ...)
-    __attribute__((format(printf, 4, 5)));
-void pal_hub_members_changed(pal_hub *hub, pal_hub_room *room);
-void pal_hub_set_tier(pal_hub *hub, pal_client *client, int tier);
-uint32_t pal_hub_colour(int id);
-/* hub_input.c */
-void pal_hub_received(void *hub, pal_peer *peer, const uint8_t *bytes, size_t n_byte, bool text);
-void pal_hub_release_tool(pal_hub_room *room, int tool); /* nobody holds it any more: it is lifted out */
-/* hub_fields.c */
-void pal_hub_subscribe_field(pal_hub *hub, pal_client *client,
-                             const pal_wire_field_subscription *view); /* what a client asks to see */
-void pal_hub_unsubscribe_fields(pal_client *client);                   /* it goes */
-void pal_hub_update_fields(pal_hub_room *room);                        /* what the session does not know yet */
-bool pal_hub_wants_field(const pal_client *client);
-pal_packet *pal_hub_next_field(pal_hub *hub, pal_client *client); /* NULL: none to be sent now */
-/* encodes what is new; the result is when to come again, 0: nothing waits */
-uint64_t pal_hub_make_fields(pal_hub *hub, pal_hub_room *room, uint64_t now_ns);
-/* hub_sculpt.c */
-/* an order that is one of sculpting is dealt with, now or when its turn comes; false: it is none */
-bool pal_hub_sculpt_command(pal_hub *hub, pal_client *client, const pal_wire_command *order);
-/* hub_switch.c: the same for an order that asks for another setting */
-bool pal_hub_switch_command(pal_hub *hub, pal_client *client, const pal_wire_command *order);
-/* hub_jobs.c */
-void pal_hub_jobs_update(pal_hub *hub); /* what the workshop has done, and the next order */
-void pal_hub_jobs_end(pal_hub *hub);    /* closes the sessions that the hub made */
-/* hub_accuracy.c */
-#define PAL_HUB_ESTIMATE_OLD_S 1.0 /* of steps awake: an older estimate bounds no switch */
-/* the order `estimate` is dealt with; false: it is another one */
-bool pal_hub_estimate_command(pal_hub *hub, pal_client *client, const pal_wire_command *order);
-void pal_hub_unsubscribe_estimates(pal_client *client); /* it goes */
-void pal_hub_update_estimates(pal_hub_room *room);      /* what the session does not know yet */
-void pal_hub_estimates_due(pal_client *client);         /* a tick */
-bool pal_hub_wants_estimate(const pal_client *client);
-pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *client); /* NULL: none is due */
-/* the errors that clients are shown of the setting that a body has (its estimate's, else its study's) and of the one
- * that it shall have (point: of the study; -1: its neighbour's, else the study's); NaN: none is shown. Neither of a
- * body whose estimate is now older than PAL_HUB_ESTIMATE_OLD_S of its steps, or that has woken since */
-void pal_hub_shown_errors(const pal_hub_room *room, int body, int point, const pal_configuration *to, double *now_m,
-                          double *then_m);
-/* hub_plan.c */
-void pal_hub_hello_components(const pal_hub_room *room, pal_wire_hello *out);
-void pal_hub_topology_components(const pal_hub_room *room, pal_wire_topology *out);
-void pal_hub_count_unobserved(pal_hub_room *room);
-void pal_hub_status_plan(const pal_hub_room *room, const pal_frame *frame, pal_wire_status *out); /* rows and bodies */
-/* what the world refused of the client's order about a row is told as an error */
-void pal_hub_component_result(pal_hub *hub, pal_client *c);
-/* an order about rows or single bodies is dealt with; false: it is another one */
-bool pal_hub_plan_command(pal_hub *hub, pal_client *client, const pal_wire_command *order);
-/* http_pages.c */
-void pal_hub_get(void *hub, const char *path, pal_reply *reply);
+} pal_hub;
 #endif

@@ -2,9 +2,11 @@
  * of each part at most; a field that nobody looks at is neither computed nor encoded. Values go out at most 10 times a
  * second, newest first and the rest never, only while the client's credit is free, behind control and before the next
  * cycle. */
-#include "server/net/hub_core.h"
+#include "server/net/hub_fields.h"
 
 #include "protocol/field_codec.h"
+#include "server/net/hub_peers.h"
+#include "server/net/hub_subscriptions.h"
 
 /* names and numbers of the wire are those of the simulation */
 _Static_assert((int)PAL_WIRE_FIELD_DISPLACEMENT_M == (int)PAL_FIELD_DISPLACEMENT_M &&
@@ -15,34 +17,6 @@ _Static_assert((int)PAL_WIRE_FIELD_DISPLACEMENT_M == (int)PAL_FIELD_DISPLACEMENT
                    (int)PAL_WIRE_FIELD_DISTORTION == (int)PAL_FIELD_DISTORTION &&
                    (int)PAL_WIRE_FIELD_COUNT == (int)PAL_FIELD_COUNT,
                "fields are numbered alike");
-
-void pal_hub_update_fields(pal_hub_room *room)
-{
-    for (int p = 0; p < room->stream->n_part; p++)
-        for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++) {
-            bool wanted = room->n_look[p][k] > 0;
-            if (wanted == room->told[p][k]) continue;
-            pal_command command = {.kind = PAL_COMMAND_FIELD, .body = p, .field = (pal_field)k, .wanted = wanted};
-            /* a session whose queue is full is told at the next tick */
-            if (pal_session_command(room->session, &command) == PAL_ERR_OK) room->told[p][k] = wanted;
-        }
-}
-
-static void look(pal_client *c, int part, pal_field field)
-{
-    pal_field before = (pal_field)c->view[part];
-    if (field == before) return;
-    if (before != PAL_FIELD_NONE) c->room->n_look[part][before]--;
-    if (field != PAL_FIELD_NONE) c->room->n_look[part][field]++;
-    c->view[part] = (uint8_t)field;
-    c->sent_field[part] = 0;
-}
-
-void pal_hub_unsubscribe_fields(pal_client *c)
-{
-    for (int p = 0; p < c->room->stream->n_part; p++) look(c, p, PAL_FIELD_NONE);
-    pal_hub_update_fields(c->room);
-}
 
 void pal_hub_subscribe_field(pal_hub *hub, pal_client *c, const pal_wire_field_subscription *view)
 {
@@ -62,8 +36,8 @@ void pal_hub_subscribe_field(pal_hub *hub, pal_client *c, const pal_wire_field_s
                            pal_field_title((pal_field)field));
         return;
     }
-    look(c, part, (pal_field)field);
-    pal_hub_update_fields(c->room);
+    pal_hub_set_field(c, part, (pal_field)field);
+    pal_hub_update_subscriptions(c->room);
     c->peer->ops->ready(c->peer); /* others may look at it already */
 }
 

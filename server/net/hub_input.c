@@ -1,20 +1,18 @@
 /* The hub's input: every message of a client is counted, decoded (untrusted), checked against who may do what, and
  * handed to the session. A malformed message closes the connection with its refusal's sentence; a well-formed one that
  * cannot be granted is answered with `error`; poses of a tool that the sender does not hold are ignored. */
-#include "server/net/hub_core.h"
+#include "server/net/hub_input.h"
 
 #include "server/base/clock.h"
-#include "server/net/plain_text.h"
+#include "server/net/hub_fields.h"
+#include "server/net/hub_peers.h"
+#include "server/net/hub_plan.h"
+#include "server/net/hub_verb.h"
+#include "server/net/transport/plain_text.h"
 
 #include <string.h>
 
 #define SCOLD_NS 1000000000u
-
-void pal_hub_release_tool(pal_hub_room *room, int tool)
-{
-    room->tool[tool] = (pal_stream_tool){0};
-    (void)pal_session_put_pose(room->session, tool, NULL);
-}
 
 static void malformed(pal_hub *hub, pal_client *c, int refusal)
 {
@@ -113,61 +111,6 @@ static void leave(pal_hub *hub, pal_client *c)
     pal_hub_members_changed(hub, c->room);
 }
 
-/* fills the command's material from what holds now and the numbers given; false: complained */
-static bool read_material(pal_hub *hub, pal_client *c, const pal_wire_command *order, pal_command *command)
-{
-    const pal_scene *scene = pal_session_scene(c->room->session);
-    int body = order->target[0] ? -1 : 0;
-    for (int i = 0; i < scene->n_body; i++)
-        if (!strcmp(scene->body[i].name, order->target)) body = i;
-    if (body < 0) {
-        pal_hub_send_error(hub, c, "target", "there is no body %s", order->target);
-        return false;
-    }
-    pal_material m = c->room->material[body];
-    for (uint32_t i = 0; i < order->n_arg; i++) {
-        const char *key = order->arg[i].key;
-        double *to = !strcmp(key, "young_Pa")        ? &m.young_Pa
-                     : !strcmp(key, "poisson")       ? &m.poisson
-                     : !strcmp(key, "density_kg_m3") ? &m.density_kg_m3
-                     : !strcmp(key, "damping_1_s")   ? &m.damping_1_s
-                                                     : NULL;
-        if (!to) {
-            pal_hub_send_error(hub, c, "args", "a material has no %s", key);
-            return false;
-        }
-        *to = order->arg[i].value;
-    }
-    command->body = body;
-    command->material = m;
-    return true;
-}
-
-static void command(pal_hub *hub, pal_client *c, const pal_wire_command *order)
-{
-    static const char *const verbs[PAL_COMMAND_FIELD] = {"pause", "resume", "step", "reset", "material"};
-    pal_command command = {.kind = PAL_COMMAND_COUNT};
-    if (pal_hub_estimate_command(hub, c, order)) return; /* everybody may look */
-    if (pal_hub_plan_command(hub, c, order)) return;
-    if (!pal_members_may_command(&c->room->members, c->id)) {
-        pal_hub_send_error(hub, c, "role", "a viewer gives no commands");
-        return;
-    }
-    if (pal_hub_sculpt_command(hub, c, order) || pal_hub_switch_command(hub, c, order)) return;
-    for (int i = 0; i < PAL_COMMAND_FIELD; i++) /* fields are asked for with `view` */
-        if (!strcmp(order->verb, verbs[i])) command.kind = (pal_command_kind)i;
-    if (command.kind == PAL_COMMAND_COUNT) {
-        pal_hub_send_error(hub, c, "verb", "there is no command %s", order->verb);
-        return;
-    }
-    if (command.kind == PAL_COMMAND_MATERIAL && !read_material(hub, c, order, &command)) return;
-    pal_err err = pal_session_command(c->room->session, &command);
-    if (err)
-        pal_hub_send_error(hub, c, err == PAL_ERR_FULL ? "busy" : "refused", "%s: %s", order->verb, pal_err_text(err));
-    else if (command.kind == PAL_COMMAND_MATERIAL)
-        c->room->material[command.body] = command.material;
-}
-
 static void control(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_byte)
 {
     /* read into a copy of its own: answers are made in hub->control */
@@ -193,7 +136,7 @@ static void control(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_
         leave(hub, c);
         break;
     case PAL_CONTROL_COMMAND:
-        command(hub, c, &in.command);
+        pal_hub_execute(hub, c, &in.command);
         break;
     case PAL_CONTROL_SUBSCRIBE_FIELD:
         pal_hub_subscribe_field(hub, c, &in.field_subscription);

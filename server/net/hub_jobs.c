@@ -1,55 +1,16 @@
-/* Orders that lead to another scene: the queue before the workshop, and its results in the place of what runs. */
+/* The queue of commands before the worker, and its results in the place of what runs. */
 #include "server/net/hub_jobs.h"
 
 #include "server/base/clock.h"
-#include "server/net/plain_text.h"
+#include "server/net/hub_peers.h"
+#include "server/net/hub_plan.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- orders and answers ---- */
-
-const pal_wire_arg *pal_hub_arg(const pal_wire_command *order, const char *key)
-{
-    for (uint32_t i = 0; i < order->n_arg; i++)
-        if (!strcmp(order->arg[i].key, key)) return &order->arg[i];
-    return NULL;
-}
-
-bool pal_hub_check_args(pal_hub *hub, pal_client *c, const char *args, const pal_wire_command *order)
-{
-    bool needed = true;
-    uint32_t n_known = 0;
-    for (const char *at = args; *at;) {
-        char key[32];
-        size_t n = strcspn(at, " ");
-        snprintf(key, sizeof key, "%.*s", (int)n, at);
-        at += n + (at[n] == ' ');
-        if (!strcmp(key, "|")) {
-            needed = false;
-            continue;
-        }
-        bool there = pal_hub_arg(order, key) != NULL;
-        n_known += there;
-        if (there || !needed) continue;
-        pal_hub_send_error(hub, c, "args", "%s: %s is missing", order->verb, key);
-        return false;
-    }
-    if (n_known == order->n_arg) return true;
-    pal_hub_send_error(hub, c, "args", "%s takes %s", order->verb, args[0] ? args : "no numbers");
-    return false;
-}
-
-bool pal_hub_jobs_check_rights(pal_hub *hub, pal_client *c, const char *verb, const char *does)
-{
-    const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
-    if (m->role == PAL_MEMBER_INSTRUCTOR || m->tool >= 0) return true;
-    pal_hub_send_error(hub, c, "role", "%s: only an instructor or who holds a tool %s", verb, does);
-    return false;
-}
-
-pal_client *pal_hub_requester(pal_hub *hub, const pal_hub_pending_job *w)
+/* NULL: has gone */
+static pal_client *requester(pal_hub *hub, const pal_hub_pending_job *w)
 {
     for (int i = 0; i < hub->max_clients; i++) {
         pal_client *c = &hub->client[i];
@@ -57,23 +18,6 @@ pal_client *pal_hub_requester(pal_hub *hub, const pal_hub_pending_job *w)
     }
     return NULL;
 }
-
-void pal_hub_answer_arg(pal_wire_answer *a, const char *key, double value)
-{
-    pal_wire_arg *to = &a->arg[a->n_arg++];
-    snprintf(to->key, sizeof to->key, "%s", key);
-    to->value = value;
-}
-
-pal_wire_answer *pal_hub_answer_begin(pal_hub *hub, const char *verb)
-{
-    memset(hub->control, 0, sizeof *hub->control);
-    hub->control->type = PAL_CONTROL_ANSWER;
-    pal_plain_text(hub->control->answer.verb, sizeof hub->control->answer.verb, verb);
-    return &hub->control->answer;
-}
-
-/* ---- one after the other ---- */
 
 /* assets that go are kept for a while: a client may be on its way to fetch one */
 static void keep_assets(pal_hub_room *room, const pal_stream *before)
@@ -88,65 +32,47 @@ static void keep_assets(pal_hub_room *room, const pal_stream *before)
     }
 }
 
-/* what came out stays as long as a scene is made from it; what it replaces goes with the session of before */
-static void keep_works(pal_hub_body_edits *at, pal_job *work, pal_retired *retired)
+/* Brushes acted in the session of before; where the job keeps them they are asked for again as they are. How many ended
+ */
+static int begin_brushes(pal_hub_tool_brush *brush, pal_hub_room *room, const pal_job_type *type)
 {
-    if (work->kind == PAL_JOB_SWITCH) {
-        retired->change = at->change;
-        at->change = work->change;
-        at->base = work->base ? work->base : at->base;
-        work->change = NULL, work->base = NULL;
-        return;
-    }
-    pal_sculptor_commit(at->sculptor, work->turn);
-    retired->turn = at->turn, retired->change = at->change;
-    at->turn = work->turn, at->change = NULL;
-    free(at->base);
-    at->base = NULL;
-    work->turn = NULL;
-}
-
-/* Rows of brushes went with the session of before, or go on in another setting of a solid (sim/transfer.h), where they
- * are asked for again as they are; those on cells that were edited are over. How many */
-static int begin_brushes(pal_hub_tool_brush *hand, pal_hub_room *room, pal_job_kind kind)
-{
-    int n_over = 0;
+    int n_ended = 0;
     for (int t = 0; t < PAL_TOOL_MAX; t++) {
-        pal_hub_tool_brush *h = &hand[t];
-        const pal_member_entry *m =
-            h->brush.kind == PAL_BRUSH_NONE ? NULL : pal_members_find(&room->members, h->member);
+        pal_hub_tool_brush *h = &brush[t];
+        if (h->brush.kind == PAL_BRUSH_NONE) continue;
+        const pal_member_entry *m = pal_members_find(&room->members, h->member);
         pal_command command = {.kind = PAL_COMMAND_BRUSH, .body = h->body, .slot = t, .brush = h->brush};
         bool acts = m && m->tool == t,
-             stays = acts && kind == PAL_JOB_SWITCH && room->stream->part[h->body].info.is_sculptable;
+             stays = acts && type->keeps_brushes && room->stream->part[h->body].info.is_sculptable;
         if (stays && pal_session_command(room->session, &command) == PAL_ERR_OK) continue;
-        n_over += acts;
+        n_ended += acts;
         command.brush.kind = PAL_BRUSH_NONE;
-        if (h->brush.kind != PAL_BRUSH_NONE) (void)pal_session_command(room->session, &command);
+        (void)pal_session_command(room->session, &command);
         *h = (pal_hub_tool_brush){.member = 0};
     }
-    return n_over;
+    return n_ended;
 }
 
-/* what came out takes the place of what stands; false: that goes on as it was, note says why */
-static bool take_over(pal_hub *hub, pal_hub_jobs *s, pal_job *work)
+/* the result takes the place of what runs; false: that goes on as it was, diag says why */
+static bool commit(pal_hub *hub, pal_hub_jobs *s, pal_job *job)
 {
-    pal_hub_room *room = s->now.room;
+    pal_hub_room *room = s->current.room;
     pal_retired retired = {.stream = room->stream, .session = room->session};
-    work->err = pal_session_transfer_end(work->next, room->session, &work->diag);
-    if (work->err) return false;
-    pal_stream_transfer(work->stream, room->stream);
-    room->stream = work->stream, room->session = work->next;
-    work->next = NULL, work->stream = NULL;
-    keep_works(&s->place[room - hub->room][s->body], work, &retired);
-    s->n_brush_over = begin_brushes(s->hand[room - hub->room], room, work->kind);
+    job->err = pal_session_transfer_end(job->next, room->session, &job->diag);
+    if (job->err) return false;
+    pal_stream_transfer(job->stream, room->stream);
+    room->stream = job->stream, room->session = job->next;
+    job->next = NULL, job->stream = NULL;
+    job->type->commit(pal_hub_edits(hub, room, job->body), job, &retired);
+    job->n_brush_ended = begin_brushes(s->brush[room - hub->room], room, job->type);
     keep_assets(room, retired.stream);
     hub->session[room - hub->room] = NULL;
     room->own = true;
-    pal_job_worker_retire(s->job_worker, &retired);
+    pal_job_worker_retire(s->worker, &retired);
     return true;
 }
 
-static void tell_topology(pal_hub *hub, pal_hub_room *room)
+static void send_topology(pal_hub *hub, pal_hub_room *room)
 {
     for (int i = 0; i < hub->max_clients; i++) {
         pal_client *c = &hub->client[i];
@@ -162,20 +88,19 @@ static void tell_topology(pal_hub *hub, pal_hub_room *room)
     }
 }
 
-static void finish(pal_hub *hub, pal_hub_jobs *s, pal_job *work)
+static void finish(pal_hub *hub, pal_hub_jobs *s, pal_job *job)
 {
-    pal_hub_room *room = s->now.room;
-    pal_client *c = pal_hub_requester(hub, &s->now);
-    if (!work->err && take_over(hub, s, work)) {
-        tell_topology(hub, room);
-        if (c && work->kind == PAL_JOB_SWITCH) pal_hub_switch_answer(hub, c, work);
-        if (c && work->kind == PAL_JOB_SCULPT) pal_hub_sculpt_answer(hub, c, work);
-    } else {
-        const char *verb = s->now.order.verb, *reason = work->diag.text[0] ? work->diag.text : pal_err_text(work->err);
-        bool named = !strncmp(reason, verb, strlen(verb)); /* edits of cells say it themselves */
-        if (c) pal_hub_send_error(hub, c, "refused", named ? "%s%s" : "%s: %s", named ? "" : verb, reason);
+    pal_hub_room *room = s->current.room;
+    pal_client *c = requester(hub, &s->current);
+    if (!job->err && commit(hub, s, job)) {
+        send_topology(hub, room);
+        if (c) job->type->answer(hub, c, job);
+    } else if (c) {
+        const char *reason = job->diag.text[0] ? job->diag.text : pal_err_text(job->err);
+        bool named = !strncmp(reason, job->verb, strlen(job->verb)); /* edits of cells name the verb themselves */
+        pal_hub_send_error(hub, c, "refused", named ? "%s%s" : "%s: %s", named ? "" : job->verb, reason);
     }
-    pal_job_free(work);
+    pal_job_free(job);
 }
 
 /* the scene that runs now, with the materials of now; NULL: out of memory */
@@ -188,80 +113,92 @@ static pal_scene *scene_now(const pal_hub_room *room)
     return scene;
 }
 
-/* gives the next order to the workshop; one that cannot be read is answered and gone */
+/* submits the next command; one that cannot be read was answered and is gone */
 static void begin_next(pal_hub *hub, pal_hub_jobs *s)
 {
     /* what is pointed at, and kept, is what is shown: a session that has just begun comes with its first frame */
-    while (s->n > 0 && s->list[0].room->stream->frame) {
-        s->now = s->list[0];
-        memmove(s->list, s->list + 1, sizeof *s->list * (size_t)--s->n);
-        pal_client *c = pal_hub_requester(hub, &s->now);
-        pal_hub_room *room = s->now.room;
-        pal_job work = {.kind = s->now.kind, .session = room->session, .error_m = hub->error_m};
+    while (s->n_pending > 0 && s->pending[0].room->stream->frame) {
+        s->current = s->pending[0];
+        memmove(s->pending, s->pending + 1, sizeof *s->pending * (size_t)--s->n_pending);
+        pal_client *c = requester(hub, &s->current);
+        pal_hub_room *room = s->current.room;
+        pal_job job = {.type = s->current.type,
+                       .session = room->session,
+                       .error_m = hub->error_m,
+                       .asked_ns = s->current.asked_ns};
         if (!c) continue; /* who has gone wants nothing any more */
-        bool good = work.kind == PAL_JOB_SWITCH ? pal_hub_switch_read(hub, c, &s->now.order, &work, &s->body)
-                                                : pal_hub_sculpt_read(hub, c, &s->now.order, &work, &s->body);
-        if (good && !(work.scene = scene_now(room))) {
-            pal_hub_send_error(hub, c, "refused", "%s: %s", s->now.order.verb, pal_err_text(PAL_ERR_MEMORY));
+        memcpy(job.verb, s->current.command.verb, sizeof job.verb);
+        bool good = job.type->read(hub, c, &s->current.command, &job);
+        if (good && !(job.scene = scene_now(room))) {
+            pal_hub_send_error(hub, c, "refused", "%s: %s", job.verb, pal_err_text(PAL_ERR_MEMORY));
             good = false;
         }
-        if (!good) {
-            pal_job_free(&work);
-            continue;
+        if (good) {
+            pal_job_worker_submit(s->worker, &job);
+            return;
         }
-        work.asked_ns = s->now.asked_ns;
-        pal_job_worker_submit(s->job_worker, &work);
-        return;
+        pal_job_free(&job);
     }
 }
 
-void pal_hub_jobs_enqueue(pal_hub *hub, pal_client *c, pal_job_kind kind, const pal_wire_command *order)
+pal_hub_body_edits *pal_hub_edits(pal_hub *hub, const pal_hub_room *room, int body)
 {
+    return &hub->jobs->edits[room - hub->room][body];
+}
+
+void pal_hub_jobs_enqueue(pal_hub *hub, pal_client *c, const pal_job_type *type, const pal_wire_command *command)
+{
+    if (!pal_hub_jobs_create(hub, c, command->verb)) return;
     pal_hub_jobs *s = hub->jobs;
-    if (s->n == PAL_HUB_JOBS_PENDING) {
-        pal_hub_send_error(hub, c, "busy", "%s: %d commands wait already", order->verb, PAL_HUB_JOBS_PENDING);
+    if (s->n_pending == PAL_HUB_JOBS_PENDING) {
+        pal_hub_send_error(hub, c, "busy", "%s: %d commands wait already", command->verb, PAL_HUB_JOBS_PENDING);
         return;
     }
-    s->list[s->n++] = (pal_hub_pending_job){c->room, c->id, pal_clock_ns(), kind, *order};
-    if (!pal_job_worker_busy(s->job_worker)) begin_next(hub, s);
+    s->pending[s->n_pending++] = (pal_hub_pending_job){c->room, c->id, pal_clock_ns(), type, *command};
+    if (!pal_job_worker_busy(s->worker)) begin_next(hub, s);
 }
 
 void pal_hub_jobs_update(pal_hub *hub)
 {
     pal_hub_jobs *s = hub->jobs;
-    pal_job work;
+    pal_job job;
     if (!s) return;
-    if (pal_job_worker_collect(s->job_worker, &work)) finish(hub, s, &work);
-    if (!pal_job_worker_busy(s->job_worker)) begin_next(hub, s);
+    if (pal_job_worker_collect(s->worker, &job)) finish(hub, s, &job);
+    if (!pal_job_worker_busy(s->worker)) begin_next(hub, s);
 }
-
-/* ---- coming in and ending ---- */
 
 static void wake_loop(void *user)
 {
     pal_loop_wake(user);
 }
 
-bool pal_hub_jobs_create(pal_hub *hub)
+static void free_jobs(pal_hub_jobs *s)
+{
+    free(s->edits);
+    free(s->brush);
+    free(s);
+}
+
+bool pal_hub_jobs_create(pal_hub *hub, pal_client *c, const char *verb)
 {
     if (hub->jobs) return true;
     pal_hub_jobs *s = calloc(1, sizeof *s);
-    if (s) s->place = calloc((size_t)hub->n_room, sizeof *s->place);
-    if (s) s->hand = calloc((size_t)hub->n_room, sizeof *s->hand);
-    if (!s || !s->place || !s->hand || pal_job_worker_open(wake_loop, hub->loop, &s->job_worker)) {
-        if (s) free(s->place), free(s->hand);
-        free(s);
-        return false;
+    if (s) s->edits = calloc((size_t)hub->n_room, sizeof *s->edits);
+    if (s) s->brush = calloc((size_t)hub->n_room, sizeof *s->brush);
+    if (s && s->edits && s->brush && !pal_job_worker_open(wake_loop, hub->loop, &s->worker)) {
+        hub->jobs = s;
+        return true;
     }
-    hub->jobs = s;
-    return true;
+    if (s) free_jobs(s);
+    pal_hub_send_error(hub, c, "refused", "%s: %s", verb, pal_err_text(PAL_ERR_MEMORY));
+    return false;
 }
 
 void pal_hub_jobs_end(pal_hub *hub)
 {
     pal_hub_jobs *s = hub->jobs;
     if (!s) return;
-    pal_job_worker_close(s->job_worker);
+    pal_job_worker_close(s->worker);
     for (int r = 0; r < hub->n_room; r++) {
         pal_hub_room *room = &hub->room[r];
         if (room->own) {
@@ -270,14 +207,13 @@ void pal_hub_jobs_end(pal_hub *hub)
             room->stream = NULL, room->session = NULL;
         }
         for (int b = 0; b < PAL_BODY_MAX; b++) {
-            pal_sculptor_destroy(s->place[r][b].sculptor);
-            pal_sculpt_edit_free(s->place[r][b].turn);
-            pal_configuration_switch_free(s->place[r][b].change);
-            free(s->place[r][b].base);
+            pal_hub_body_edits *at = &s->edits[r][b];
+            pal_sculptor_destroy(at->sculptor);
+            pal_sculpt_edit_free(at->edit);
+            pal_configuration_switch_free(at->change);
+            free(at->base);
         }
     }
-    free(s->place);
-    free(s->hand);
-    free(s);
+    free_jobs(s);
     hub->jobs = NULL;
 }

@@ -1,10 +1,11 @@
 /* What clients are told of a plan: its rows, whose they are, which of them are switched off; and of its bodies: who
  * stands still and why, who sleeps. Rows are switched and single bodies reset by orders (protocol/README.md, "Rows,
  * rescues, sleep"). */
-#include "server/net/hub_core.h"
+#include "server/net/hub_plan.h"
 
 #include "server/base/clock.h"
-#include "server/net/plain_text.h"
+#include "server/net/hub_peers.h"
+#include "server/net/transport/plain_text.h"
 
 #include <string.h>
 
@@ -107,32 +108,6 @@ void pal_hub_count_unobserved(pal_hub_room *room)
     room->was_unobserved = room->members.n_member == 0;
 }
 
-/* the order's body; -1: complained */
-static int body_named(pal_hub *hub, pal_client *c, const char *name)
-{
-    int body = body_of(c->room->session, name);
-    if (body < 0) pal_hub_send_error(hub, c, "target", "there is no body %s", name);
-    return body;
-}
-
-static void give(pal_hub *hub, pal_client *c, const char *verb, const pal_command *command)
-{
-    pal_err err = pal_session_command(c->room->session, command);
-    if (err) pal_hub_send_error(hub, c, err == PAL_ERR_FULL ? "busy" : "refused", "%s: %s", verb, pal_err_text(err));
-}
-
-/* a body that stands still does so for everybody, so whoever sees it may bring it back */
-static void reset_body(pal_hub *hub, pal_client *c, const pal_wire_command *order)
-{
-    int body = body_named(hub, c, order->target);
-    const pal_frame *f = c->room->stream->frame;
-    if (body < 0) return;
-    if (!pal_members_may_command(&c->room->members, c->id) && !(f && body < f->n_part && f->part[body].frozen))
-        pal_hub_send_error(hub, c, "role", "a viewer resets nothing but a body that was stopped");
-    else
-        give(hub, c, "reset", &(pal_command){.kind = PAL_COMMAND_RESET_BODY, .body = body});
-}
-
 /* The world answers between two steps: a count of what it refused, and the sentence of the last. Its thread goes by the
  * machine's clock, whatever the loop's is */
 static void note_asked(pal_client *c)
@@ -153,42 +128,20 @@ void pal_hub_component_result(pal_hub *hub, pal_client *c)
     if (refused || pal_clock_ns() > c->component_until_ns) c->component_until_ns = 0;
 }
 
-static void switch_row(pal_hub *hub, pal_client *c, const pal_wire_command *order)
+void pal_hub_run_component(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
-    pal_command command = {.kind = PAL_COMMAND_COMPONENT, .body = -1};
-    int on = -1;
-    const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
-    if (!m || m->role != PAL_MEMBER_INSTRUCTOR) {
-        pal_hub_send_error(hub, c, "role", "only an instructor enables and disables components");
+    double part = pal_hub_arg(command, "part", -1);
+    pal_command order = {.kind = PAL_COMMAND_COMPONENT, .wanted = pal_hub_arg(command, "enabled", 0) != 0};
+    if (!(part >= 0 && part < c->room->stream->n_part)) {
+        pal_hub_send_error(hub, c, "args", "component: part %g, wanted 0 to %d", part, c->room->stream->n_part - 1);
         return;
     }
-    for (uint32_t i = 0; i < order->n_arg; i++) {
-        const pal_wire_arg *arg = &order->arg[i];
-        if (!strcmp(arg->key, "enabled")) on = arg->value != 0;
-        if (!strcmp(arg->key, "part") && arg->value >= 0 && arg->value < c->room->stream->n_part)
-            command.body = (int)arg->value;
-    }
-    if (order->n_arg != 2 || on < 0 || command.body < 0) {
-        pal_hub_send_error(hub, c, "args", "component takes part (0 to %d) and enabled", c->room->stream->n_part - 1);
+    if (strlen(command->target) >= sizeof order.row) {
+        pal_hub_send_error(hub, c, "target", "there is no component %s", command->target);
         return;
     }
-    if (strlen(order->target) >= sizeof command.row) {
-        pal_hub_send_error(hub, c, "target", "there is no component %s", order->target);
-        return;
-    }
-    command.wanted = on == 1;
-    strcpy(command.row, order->target);
+    order.body = (int)part;
+    strcpy(order.row, command->target);
     note_asked(c);
-    give(hub, c, "component", &command);
-}
-
-bool pal_hub_plan_command(pal_hub *hub, pal_client *c, const pal_wire_command *order)
-{
-    if (!strcmp(order->verb, "reset") && order->target[0]) {
-        reset_body(hub, c, order);
-        return true;
-    }
-    if (strcmp(order->verb, "component")) return false;
-    switch_row(hub, c, order);
-    return true;
+    pal_hub_session_command(hub, c, verb->name, &order);
 }

@@ -1,39 +1,21 @@
-/* Orders for another setting at the hub (protocol/README.md, "Settings"): a point of the study, or a knob turned.
- * Made and put in place by hub_jobs.c. */
+/* Verbs that switch the configuration of a body (protocol/README.md, "Configurations"): a point of its study, or other
+ * parameters. Prepared and committed by hub_jobs.c. */
+#include "server/net/hub_switch.h"
+
+#include "server/net/hub_accuracy.h"
 #include "server/net/hub_jobs.h"
+#include "server/net/hub_peers.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const struct verb {
-    const char *name, *args;
-} verbs[] = {{"study_point", "index"}, {"configure", "| size step_ms tolerance"}, {NULL, NULL}};
-
-static const struct verb *find_verb(const char *name)
-{
-    const struct verb *v = verbs;
-    while (v->name && strcmp(v->name, name)) v++;
-    return v->name ? v : NULL;
-}
-
-/* the body named; "": that of the study, or the first. -1: complained */
-static int find_body(pal_hub *hub, pal_client *c, const pal_wire_command *order)
-{
-    const pal_scene *scene = pal_session_scene(c->room->session);
-    if (!order->target[0]) return c->room->setting ? c->room->setting_body : 0;
-    for (int b = 0; b < scene->n_body; b++)
-        if (!strcmp(scene->body[b].name, order->target)) return b;
-    pal_hub_send_error(hub, c, "target", "there is no body %s", order->target);
-    return -1;
-}
-
-/* a point of the room's study; -1: complained */
-static int read_point(pal_hub *hub, pal_client *c, int body, const pal_wire_command *order)
+/* a point of the room's study; -1: an error was sent */
+static int read_point(pal_hub *hub, pal_client *c, int body, const pal_wire_command *command)
 {
     const pal_hub_room *room = c->room;
-    double index = pal_hub_arg(order, "index")->value;
+    double index = pal_hub_arg(command, "index", -1);
     if (!room->setting || body != room->setting_body) {
         pal_hub_send_error(hub, c, "refused", "study_point: there is no study of %s here",
                            pal_session_scene(room->session)->body[body].name);
@@ -46,17 +28,18 @@ static int read_point(pal_hub *hub, pal_client *c, int body, const pal_wire_comm
     return (int)index;
 }
 
-/* the present setting with other numbers; false: complained */
-static bool read_knob(pal_hub *hub, pal_client *c, int body, const pal_wire_command *order, pal_configuration *to)
+/* the present configuration with other numbers; false: an error was sent */
+static bool read_parameters(pal_hub *hub, pal_client *c, int body, const pal_wire_command *command,
+                            pal_configuration *to)
 {
-    const pal_wire_arg *size = pal_hub_arg(order, "size"), *step = pal_hub_arg(order, "step_ms"),
-                       *tolerance = pal_hub_arg(order, "tolerance");
+    double size = pal_hub_arg(command, "size", 0), step_ms = pal_hub_arg(command, "step_ms", 0),
+           tolerance = pal_hub_arg(command, "tolerance", 0);
     pal_configuration_of(pal_session_scene(c->room->session), body, to);
-    if (size && !(size->value >= -1 && size->value <= 10000 && size->value == floor(size->value))) {
-        pal_hub_send_error(hub, c, "args", "configure: size %g is no number of voxels or levels", size->value);
+    if (!(size >= -1 && size <= 10000 && size == floor(size))) {
+        pal_hub_send_error(hub, c, "args", "configure: size %g is no number of voxels or levels", size);
         return false;
     }
-    bool other = size && size->value != 0 && (int)size->value != to->size;
+    bool other = size != 0 && (int)size != to->size;
     if (other && to->k_distance_J > 0) {
         pal_hub_send_error(
             hub, c, "refused",
@@ -64,37 +47,60 @@ static bool read_knob(pal_hub *hub, pal_client *c, int body, const pal_wire_comm
             to->size);
         return false;
     }
-    if (other) to->size = (int)size->value;
-    if (step && step->value != 0) to->step_s = 1e-3 * step->value;
-    if (tolerance && tolerance->value != 0) to->tolerance = tolerance->value;
+    if (other) to->size = (int)size;
+    if (step_ms != 0) to->step_s = 1e-3 * step_ms;
+    if (tolerance != 0) to->tolerance = tolerance;
     return true;
 }
 
-bool pal_hub_switch_read(pal_hub *hub, pal_client *c, const pal_wire_command *order, pal_job *to, int *body)
+static bool read_switch(pal_hub *hub, pal_client *c, const pal_wire_command *command, pal_job *job)
 {
-    const pal_scene *scene = pal_session_scene(c->room->session);
-    bool by_point = !strcmp(order->verb, "study_point");
-    *body = to->body = find_body(hub, c, order);
-    if (*body < 0) return false;
-    int point = by_point ? read_point(hub, c, *body, order) : -1;
-    if (by_point ? point < 0 : !read_knob(hub, c, *body, order, &to->setting)) return false;
-    if (by_point) to->setting = c->room->setting[point].setting;
-    pal_hub_shown_errors(c->room, *body, point, &to->setting, &to->now_m, &to->then_m);
-    to->was = hub->jobs->place[c->room - hub->room][*body].base;
-    if (to->was) return true;
+    bool by_point = pal_hub_has_arg(command, "index");
+    job->body = pal_hub_find_body(hub, c, command->target, c->room->setting ? c->room->setting_body : 0);
+    if (job->body < 0) return false;
+    int point = by_point ? read_point(hub, c, job->body, command) : -1;
+    if (by_point ? point < 0 : !read_parameters(hub, c, job->body, command, &job->configuration)) return false;
+    if (by_point) job->configuration = c->room->setting[point].setting;
+    pal_hub_shown_errors(c->room, job->body, point, &job->configuration, &job->error_now_m, &job->error_then_m);
+    job->was = pal_hub_edits(hub, c->room, job->body)->base;
+    if (job->was) return true;
     /* its first switch: what it can come back to is what it is now */
-    to->base = malloc(sizeof *to->base);
-    if (to->base) *to->base = scene->body[*body];
-    to->was = to->base;
-    if (!to->base) pal_hub_send_error(hub, c, "refused", "%s: %s", order->verb, pal_err_text(PAL_ERR_MEMORY));
-    return to->base != NULL;
+    job->was = job->base = malloc(sizeof *job->base);
+    if (job->base) *job->base = pal_session_scene(c->room->session)->body[job->body];
+    if (!job->base) pal_hub_send_error(hub, c, "refused", "%s: %s", command->verb, pal_err_text(PAL_ERR_MEMORY));
+    return job->base != NULL;
 }
 
-/* what jumped, against what was promised */
-static void put_jump(const pal_hub *hub, const pal_job *work, double change, pal_wire_answer *a)
+static pal_err prepare_switch(pal_job *job, const pal_scene **scene)
 {
-    const pal_configuration_switch_report *r = &work->report;
-    double bound_m = work->now_m + work->then_m, frame_mm = 1e3 * r->frame_move_m, most_mm = 1e3 * r->max_move_m;
+    PAL_TRY(pal_configuration_switch_prepare(job->scene, job->was, job->body, &job->configuration, &job->diag,
+                                             &job->change));
+    *scene = pal_configuration_switch_scene(job->change);
+    return PAL_ERR_OK;
+}
+
+static void transfer_switch(pal_job *job)
+{
+    pal_session_rehearse(job->next, job->session, pal_configuration_switch_snapshot, pal_configuration_switch_rehearse,
+                         job->change);
+    pal_session_transfer_begin(job->next, job->session, pal_configuration_switch_transfer, job->change);
+    pal_configuration_switch_get_report(job->change, &job->report);
+}
+
+static void commit_switch(pal_hub_body_edits *at, pal_job *job, pal_retired *retired)
+{
+    retired->change = at->change;
+    at->change = job->change;
+    at->base = job->base ? job->base : at->base;
+    job->change = NULL, job->base = NULL;
+}
+
+/* how far the body moved, against the bound that the shown errors give */
+static void put_jump(const pal_hub *hub, const pal_job *job, double change, pal_wire_answer *a)
+{
+    const pal_configuration_switch_report *r = &job->report;
+    double bound_m = job->error_now_m + job->error_then_m, frame_mm = 1e3 * r->frame_move_m,
+           most_mm = 1e3 * r->max_move_m;
     bool far = r->max_move_m > bound_m + hub->error_m;
     size_t n = strlen(a->text), room = sizeof a->text - n;
     if (isnan(bound_m))
@@ -110,49 +116,48 @@ static void put_jump(const pal_hub *hub, const pal_job *work, double change, pal
     pal_hub_answer_arg(a, "max_body_move_m", r->body_move_m);
     pal_hub_answer_arg(a, "max_frame_move_m", r->frame_move_m);
     if (isnan(bound_m)) return;
-    pal_hub_answer_arg(a, "error_before_m", work->now_m);
-    pal_hub_answer_arg(a, "error_after_m", work->then_m);
+    pal_hub_answer_arg(a, "error_before_m", job->error_now_m);
+    pal_hub_answer_arg(a, "error_after_m", job->error_then_m);
     pal_hub_answer_arg(a, "bound_m", bound_m);
 }
 
-void pal_hub_switch_answer(pal_hub *hub, pal_client *c, const pal_job *work)
+static void answer_switch(pal_hub *hub, pal_client *c, const pal_job *job)
 {
-    const char *verb = hub->jobs->now.order.verb;
-    const pal_configuration_switch_report *r = &work->report;
+    const pal_configuration_switch_report *r = &job->report;
     char text[PAL_CONFIGURATION_TEXT];
     pal_configuration now;
     /* a body at rest has no energy but rounding */
     bool any = r->energy_before_J > 1e-15;
     double change = any ? 100 * (r->energy_after_J / r->energy_before_J - 1) : 0;
     int n_rehearsed;
-    double made_ms = 1e-6 * (double)(work->made_ns - work->asked_ns),
-           stood_ms = 1e3 * pal_session_pause_s(c->room->session, &n_rehearsed);
-    pal_configuration_of(pal_session_scene(c->room->session), work->body, &now);
-    pal_wire_answer *a = pal_hub_answer_begin(hub, verb);
-    snprintf(a->text, sizeof a->text, "%s: %s; made in %.0f ms, stood still for %.0f ms; energy %+.2f %%%s, ", verb,
-             pal_configuration_text(&now, text), made_ms, stood_ms, change, fabs(change) > 2 ? ", beyond 2 %" : "");
-    put_jump(hub, work, change, a);
-    if (hub->jobs->n_brush_over > 0) {
+    double prepare_ms = 1e-6 * (double)(job->made_ns - job->asked_ns),
+           pause_ms = 1e3 * pal_session_pause_s(c->room->session, &n_rehearsed);
+    pal_configuration_of(pal_session_scene(c->room->session), job->body, &now);
+    pal_wire_answer *a = pal_hub_answer_begin(hub, job->verb);
+    snprintf(a->text, sizeof a->text, "%s: %s; prepared in %.0f ms, paused for %.0f ms; energy %+.2f %%%s, ", job->verb,
+             pal_configuration_text(&now, text), prepare_ms, pause_ms, change, fabs(change) > 2 ? ", beyond 2 %" : "");
+    put_jump(hub, job, change, a);
+    if (job->n_brush_ended > 0) {
         size_t n = strlen(a->text);
-        snprintf(a->text + n, sizeof a->text - n, "; brushes that ended: %d", hub->jobs->n_brush_over);
+        snprintf(a->text + n, sizeof a->text - n, "; brushes that ended: %d", job->n_brush_ended);
     }
-    pal_hub_answer_arg(a, "brushes_ended", hub->jobs->n_brush_over);
-    pal_hub_answer_arg(a, "prepare_ms", made_ms);
-    pal_hub_answer_arg(a, "pause_ms", stood_ms);
+    pal_hub_answer_arg(a, "brushes_ended", job->n_brush_ended);
+    pal_hub_answer_arg(a, "prepare_ms", prepare_ms);
+    pal_hub_answer_arg(a, "pause_ms", pause_ms);
     pal_hub_send(hub, c, hub->control);
 }
 
-bool pal_hub_switch_command(pal_hub *hub, pal_client *c, const pal_wire_command *order)
+static const pal_job_type switch_job = {.read = read_switch,
+                                        .prepare = prepare_switch,
+                                        .transfer = transfer_switch,
+                                        .commit = commit_switch,
+                                        .answer = answer_switch,
+                                        .keeps_brushes = true};
+
+void pal_hub_run_switch(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
-    const struct verb *v = find_verb(order->verb);
-    if (!v) return false;
-    if (!pal_hub_jobs_check_rights(hub, c, v->name, "changes settings") || !pal_hub_check_args(hub, c, v->args, order))
-        return true;
-    if (order->n_arg == 0)
-        pal_hub_send_error(hub, c, "args", "%s takes %s", v->name, v->args + 2);
-    else if (!pal_hub_jobs_create(hub))
-        pal_hub_send_error(hub, c, "refused", "%s: %s", v->name, pal_err_text(PAL_ERR_MEMORY));
+    if (command->n_arg == 0)
+        pal_hub_send_error(hub, c, "args", "%s takes %s", verb->name, verb->args + strlen("| "));
     else
-        pal_hub_jobs_enqueue(hub, c, PAL_JOB_SWITCH, order);
-    return true;
+        pal_hub_jobs_enqueue(hub, c, &switch_job, command);
 }

@@ -1,4 +1,4 @@
-/* The workshop's thread: sleeps until there is something to clear or to make. */
+/* The worker's thread: sleeps until there is something to free or to make. */
 #include "server/net/job_worker.h"
 
 #include "server/base/clock.h"
@@ -7,7 +7,7 @@
 #include <signal.h>
 #include <stdlib.h>
 
-enum { MOST_CLEAR = 8 };
+enum { RETIRED_MAX = 8 };
 
 struct pal_job_worker {
     pthread_t thread;
@@ -15,57 +15,45 @@ struct pal_job_worker {
     pthread_cond_t changed;
     void (*wake)(void *user);
     void *user;
-    pal_job work;
-    enum { IDLE, GIVEN, DONE } state;
-    pal_retired retired[MOST_CLEAR];
-    int n_waste;
+    pal_job job;
+    enum { IDLE, SUBMITTED, DONE } state;
+    pal_retired retired[RETIRED_MAX];
+    int n_retired;
     bool leaving;
 };
 
-static void make(pal_job *w)
+static void make(pal_job *job)
 {
-    if (w->kind == PAL_JOB_SWITCH)
-        w->err = pal_configuration_switch_prepare(w->scene, w->was, w->body, &w->setting, &w->diag, &w->change);
-    else
-        w->err = pal_sculptor_prepare(w->sculptor, w->scene, &w->command, &w->diag, &w->turn);
-    if (!w->err) {
-        const pal_scene *scene = w->change ? pal_configuration_switch_scene(w->change) : pal_sculpt_edit_scene(w->turn);
-        w->err = pal_session_open_after(w->session, scene, &w->diag, &w->next);
-    }
-    if (!w->err) w->err = pal_stream_open(w->next, w->error_m, &w->diag, &w->stream);
-    if (!w->err && w->change) {
-        pal_session_rehearse(w->next, w->session, pal_configuration_switch_snapshot, pal_configuration_switch_rehearse,
-                             w->change);
-        pal_session_transfer_begin(w->next, w->session, pal_configuration_switch_transfer, w->change);
-        pal_configuration_switch_get_report(w->change, &w->report);
-    } else if (!w->err) {
-        pal_session_transfer_begin(w->next, w->session, pal_sculpt_transfer, w->turn);
-    }
-    w->made_ns = pal_clock_ns();
+    const pal_scene *scene = NULL;
+    job->err = job->type->prepare(job, &scene);
+    if (!job->err) job->err = pal_session_open_after(job->session, scene, &job->diag, &job->next);
+    if (!job->err) job->err = pal_stream_open(job->next, job->error_m, &job->diag, &job->stream);
+    if (!job->err) job->type->transfer(job);
+    job->made_ns = pal_clock_ns();
 }
 
 static void clear(pal_retired *w)
 {
     pal_stream_close(w->stream);
     pal_session_close(w->session);
-    pal_sculpt_edit_free(w->turn);
+    pal_sculpt_edit_free(w->edit);
     pal_configuration_switch_free(w->change);
     *w = (pal_retired){.stream = NULL};
 }
 
-static void *work(void *user)
+static void *run(void *user)
 {
     pal_job_worker *s = user;
     pthread_mutex_lock(&s->lock);
-    while (!s->leaving || s->n_waste > 0) {
-        if (s->n_waste > 0) {
-            pal_retired w = s->retired[--s->n_waste];
+    while (!s->leaving || s->n_retired > 0) {
+        if (s->n_retired > 0) {
+            pal_retired w = s->retired[--s->n_retired];
             pthread_mutex_unlock(&s->lock);
             clear(&w);
             pthread_mutex_lock(&s->lock);
-        } else if (s->state == GIVEN) {
+        } else if (s->state == SUBMITTED) {
             pthread_mutex_unlock(&s->lock);
-            make(&s->work); /* nobody else looks at it until it is done */
+            make(&s->job); /* nobody else looks at it until it is done */
             pthread_mutex_lock(&s->lock);
             s->state = DONE;
             s->wake(s->user);
@@ -88,7 +76,7 @@ pal_err pal_job_worker_open(void (*wake)(void *user), void *user, pal_job_worker
     /* signals belong to the thread that waits for them */
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &old);
-    int failed = pthread_create(&s->thread, NULL, work, s);
+    int failed = pthread_create(&s->thread, NULL, run, s);
     pthread_sigmask(SIG_SETMASK, &old, NULL);
     if (failed) {
         free(s);
@@ -98,71 +86,69 @@ pal_err pal_job_worker_open(void (*wake)(void *user), void *user, pal_job_worker
     return PAL_ERR_OK;
 }
 
-void pal_job_worker_close(pal_job_worker *job_worker)
+void pal_job_worker_close(pal_job_worker *s)
 {
-    pal_job_worker *s = job_worker;
     if (!s) return;
     pthread_mutex_lock(&s->lock);
     s->leaving = true;
     pthread_cond_signal(&s->changed);
     pthread_mutex_unlock(&s->lock);
     pthread_join(s->thread, NULL);
-    pal_job_free(&s->work);
+    pal_job_free(&s->job);
     pthread_mutex_destroy(&s->lock);
     pthread_cond_destroy(&s->changed);
     free(s);
 }
 
-bool pal_job_worker_busy(const pal_job_worker *job_worker)
+bool pal_job_worker_busy(pal_job_worker *s)
 {
-    pal_job_worker *s = (pal_job_worker *)(uintptr_t)job_worker;
     pthread_mutex_lock(&s->lock);
     bool busy = s->state != IDLE;
     pthread_mutex_unlock(&s->lock);
     return busy;
 }
 
-void pal_job_worker_submit(pal_job_worker *job_worker, const pal_job *work)
+void pal_job_worker_submit(pal_job_worker *worker, const pal_job *job)
 {
-    pthread_mutex_lock(&job_worker->lock);
-    job_worker->work = *work;
-    job_worker->state = GIVEN;
-    pthread_cond_signal(&job_worker->changed);
-    pthread_mutex_unlock(&job_worker->lock);
+    pthread_mutex_lock(&worker->lock);
+    worker->job = *job;
+    worker->state = SUBMITTED;
+    pthread_cond_signal(&worker->changed);
+    pthread_mutex_unlock(&worker->lock);
 }
 
-bool pal_job_worker_collect(pal_job_worker *job_worker, pal_job *out)
+bool pal_job_worker_collect(pal_job_worker *worker, pal_job *out)
 {
-    pthread_mutex_lock(&job_worker->lock);
-    bool done = job_worker->state == DONE;
+    pthread_mutex_lock(&worker->lock);
+    bool done = worker->state == DONE;
     if (done) {
-        *out = job_worker->work;
-        job_worker->work = (pal_job){.err = PAL_ERR_OK};
-        job_worker->state = IDLE;
+        *out = worker->job;
+        worker->job = (pal_job){.err = PAL_ERR_OK};
+        worker->state = IDLE;
     }
-    pthread_mutex_unlock(&job_worker->lock);
+    pthread_mutex_unlock(&worker->lock);
     return done;
 }
 
-void pal_job_worker_retire(pal_job_worker *job_worker, const pal_retired *retired)
+void pal_job_worker_retire(pal_job_worker *worker, const pal_retired *retired)
 {
     pal_retired w = *retired;
-    pthread_mutex_lock(&job_worker->lock);
-    bool room = job_worker->n_waste < MOST_CLEAR;
-    if (room) job_worker->retired[job_worker->n_waste++] = w;
-    pthread_cond_signal(&job_worker->changed);
-    pthread_mutex_unlock(&job_worker->lock);
+    pthread_mutex_lock(&worker->lock);
+    bool room = worker->n_retired < RETIRED_MAX;
+    if (room) worker->retired[worker->n_retired++] = w;
+    pthread_cond_signal(&worker->changed);
+    pthread_mutex_unlock(&worker->lock);
     if (!room) clear(&w);
 }
 
-void pal_job_free(pal_job *work)
+void pal_job_free(pal_job *job)
 {
-    pal_stream_close(work->stream);
-    pal_session_close(work->next);
-    pal_sculpt_edit_free(work->turn);
-    pal_configuration_switch_free(work->change);
-    free(work->scene);
-    free(work->base);
-    free(work->point_m);
-    *work = (pal_job){.err = PAL_ERR_OK};
+    pal_stream_close(job->stream);
+    pal_session_close(job->next);
+    pal_sculpt_edit_free(job->edit);
+    pal_configuration_switch_free(job->change);
+    free(job->scene);
+    free(job->base);
+    free(job->point_m);
+    *job = (pal_job){.err = PAL_ERR_OK};
 }

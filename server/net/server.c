@@ -108,6 +108,7 @@ static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_
     hub.setting = options->setting, hub.n_configuration = options->n_configuration,
     hub.setting_body = options->setting_body;
     hub.reference_m = options->reference_m;
+    hub.verb = options->verb, hub.n_verb = options->n_verb;
     /* besides the clients: page loads, and what lws needs itself */
     PAL_TRY(pal_loop_create(s->road == &pal_ws_transport, hub.max_clients + 128, diag, &s->loop));
     PAL_TRY(pal_hub_create(s->loop, &hub, session, n_session, diag, &s->hub));

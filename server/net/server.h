@@ -6,6 +6,7 @@
 #include "server/sim/core/configuration.h"
 
 typedef struct pal_server pal_server;
+struct pal_verb;
 
 typedef struct pal_server_options {
     const char *listen; /* "127.0.0.1"; any other address needs allow_remote                         */
@@ -19,6 +20,8 @@ typedef struct pal_server_options {
      * body they are of, in the order of the sessions; borrowed until close. NULL, or n_configuration 0: no study */
     const pal_measured_configuration *const *setting; /* [n_session][n_configuration] */
     const int *n_configuration, *setting_body;        /* [n_session]            */
+    const struct pal_verb *verb; /* commands that clients may give [n_verb], borrowed; NULL: pal_verb_table */
+    int n_verb;
     const double *reference_m; /* error of each study's own reference [n_session]; NULL: not known */
 } pal_server_options;
 

@@ -6,7 +6,7 @@
 #include "protocol/frame_codec.h"
 #include "server/base/clock.h"
 #include "server/base/log.h"
-#include "server/net/plain_text.h"
+#include "server/net/transport/plain_text.h"
 
 #include <math.h>
 #include <stdio.h>

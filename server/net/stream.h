@@ -9,7 +9,7 @@
 #ifndef PAL_NET_STREAM_H
 #define PAL_NET_STREAM_H
 #include "protocol/control.h"
-#include "server/net/packet.h"
+#include "server/net/transport/packet.h"
 #include "server/net/triangle_slots.h"
 #include "server/session/members.h"
 #include "server/session/session.h"

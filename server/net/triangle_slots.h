@@ -7,7 +7,7 @@
 #ifndef PAL_NET_TRIANGLE_SLOTS_H
 #define PAL_NET_TRIANGLE_SLOTS_H
 #include "server/base/err.h"
-#include "server/net/packet.h"
+#include "server/net/transport/packet.h"
 #include "server/sim/world/world.h"
 
 enum { PAL_TRIANGLE_DELTAS_KEPT = 4 }; /* patches to the newest change that are kept for the next client */

@@ -15,11 +15,11 @@ typedef struct pal_mass_operator {
     double damping_max_1_s; /* the largest damping / mass of all samples */
     /* scratch of the model that fills the values: points of an element, at most n_max; their index among them, else -1;
      * their shape functions at the Gauss points; space for damping_kg_s */
-    int n_most;
-    int32_t *of_element;  /* [n_most]      */
-    int32_t *local;       /* [n_point]     */
-    double *shape;        /* [n_most][64]  */
-    double *scratch_kg_s; /* [n_entry]     */
+    int n_max;
+    int32_t *element_point; /* [n_max]      */
+    int32_t *local;         /* [n_point]     */
+    double *shape;          /* [n_max][64]  */
+    double *scratch_kg_s;   /* [n_entry]     */
 } pal_mass_operator;
 
 /* out = M p; p and out [n_point][3] do not overlap */

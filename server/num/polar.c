@@ -271,7 +271,7 @@ static void rotate(double q[4], const double w[3])
 
 int pal_polar_rotation(const double f[9], double q[4], int max)
 {
-    enum { PATIENCE = 10 };
+    enum { MAX_NEWTON = 10 };
     double h[9], w[3], square = 0;
     for (int i = 0; i < 9; i++) square += f[i] * f[i];
     double scale = 1 / sqrt(square);
@@ -283,7 +283,7 @@ int pal_polar_rotation(const double f[9], double q[4], int max)
     }
     for (int i = 0; i < 9; i++) h[i] = scale * f[i];
     for (int n = 1; n <= max; n++) {
-        if (n > PATIENCE || !newton_step(h, q, w)) {
+        if (n > MAX_NEWTON || !newton_step(h, q, w)) {
             rotation_by_svd(h, q);
             return n;
         }

@@ -25,4 +25,14 @@ static inline void pal_union_find_join(int32_t *root, int32_t a, int32_t b)
     else
         root[a] = b;
 }
+
+/* turns the forest into labels 0, 1, ... in the order of the roots; returns their number */
+static inline int pal_union_find_label(int32_t *root, int n)
+{
+    int n_set = 0;
+    for (int i = 0; i < n; i++) root[i] = pal_union_find_root(root, i);
+    /* a root precedes its members, so it has its label when they need it */
+    for (int i = 0; i < n; i++) root[i] = root[i] == i ? n_set++ : root[root[i]];
+    return n_set;
+}
 #endif

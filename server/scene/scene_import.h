@@ -28,8 +28,9 @@ pal_err pal_scene_rename(pal_loaded_scene *scene, const char *name, const char *
 /* reads, contours a label if it is a volume, chooses the resolution, makes tetrahedra and skin; report may be NULL */
 pal_err pal_scene_prepare_file(const char *path, const pal_surface_scene *options, pal_prepared *out,
                                pal_surface_scene_report *report, pal_diagnostic *diag);
-/* Leaves out what of body `index` nothing holds (scene_loose.c, mesh/loose_components.h), once its supports and effects
- * are there, and says in loaded->loose what that was. Model adaptive_springs keeps all pieces. Errors name the body */
+/* Leaves out what of body `index` nothing holds (scene_loose.c, mesh/volume/loose_components.h), once its supports and
+ * effects are there, and says in loaded->loose what that was. Model adaptive_springs keeps all pieces. Errors name the
+ * body */
 pal_err pal_scene_drop_loose(pal_loaded_scene *loaded, int index, bool largest_only, pal_diagnostic *diag);
 /* Model adaptive_springs (scene_adaptive.c). The surface alone, or its largest piece, as a prepared mesh; errors have
  * no file's name */
@@ -41,7 +42,7 @@ pal_err pal_scene_adaptive_inspect(const pal_surface *surface, const pal_surface
 /* model, output and supports of a body with defaults */
 pal_err pal_scene_adaptive_defaults(pal_body_def *body, const pal_surface_scene *options,
                                     const pal_surface_scene_report *report, pal_diagnostic *diag);
-/* a shape of mesh/stomach.h by name, its box's middle at zero, and how it is held; up where it has one */
+/* a shape of mesh/geometry/stomach.h by name, its box's middle at zero, and how it is held; up where it has one */
 typedef struct pal_scene_shape {
     const char *name, *title;
     pal_surface surface;

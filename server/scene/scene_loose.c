@@ -19,7 +19,7 @@ pal_err pal_scene_drop_loose(pal_loaded_scene *loaded, int index, bool largest_o
     uint8_t *fixed = calloc((size_t)n + 1, sizeof *fixed);
     if (!fixed)
         return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "body \"%s\": no memory to find what is held", def->name);
-    pal_body_def_hold(def, loaded->scene.up, def->cells ? cells->x : mesh->tets.x, n, fixed);
+    pal_body_def_mark_fixed(def, loaded->scene.up, def->cells ? cells->x : mesh->tets.x, n, fixed);
     pal_err err = def->cells ? pal_loose_cells_drop(def->name, fixed, largest_only, cells, parts, &reason)
                              : pal_loose_components_drop(def->name, fixed, largest_only, mesh, parts, &reason);
     free(fixed);

@@ -1,4 +1,4 @@
-/* What session.c and session_transfer.c share: the session's record and its thread. Private to these. */
+/* The record of a session and its thread: what session_thread.c and session_transfer.c share. Private to these. */
 #ifndef PAL_SESSION_SESSION_CORE_H
 #define PAL_SESSION_SESSION_CORE_H
 #include "server/base/command_queue.h"

@@ -78,7 +78,7 @@ static double missing(const pal_prepared *mesh)
     return 1 - sum / fabs(pal_surface_volume(&mesh->surface));
 }
 
-/* what no support holds is left out, as where a scene is made ready (mesh/loose_components.h) */
+/* what no support holds is left out, as where a scene is made ready (mesh/volume/loose_components.h) */
 static pal_err drop_loose(const pal_problem *p, pal_prepared *mesh, pal_diagnostic *diag)
 {
     const pal_tets *tets = &mesh->tets;

@@ -15,8 +15,8 @@ typedef struct pal_case_voxel_options {
     bool align;      /* shift the voxels so that their faces lie on the border of a support that cuts the body */
 } pal_case_voxel_options;
 
-/* components that no support of the problem holds are dropped or refused (mesh/loose_components.h); REFUSED, BUDGET,
- * MEMORY as of pal_prepared_make too */
+/* components that no support of the problem holds are dropped or refused (mesh/volume/loose_components.h); REFUSED,
+ * BUDGET, MEMORY as of pal_prepared_make too */
 pal_err pal_case_voxels(const pal_problem *problem, const pal_surface *surface, const pal_case_voxel_options *how,
                         pal_prepared *out, pal_diagnostic *diag);
 

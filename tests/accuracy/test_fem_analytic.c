@@ -8,6 +8,7 @@
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 #include "tests/fixtures/fem_beam.h"
+#include "tests/fixtures/random.h"
 #include "tests/stability/hard_case.h"
 
 static const char *const elements[4] = {"hex8_bbar", "hex8", "tet4", "tet10"};
@@ -24,8 +25,7 @@ static void make_irregular(fem_beam *b)
     pal_hexes_free(&b->mesh.hexes);
     for (int i = 0; i < t->n_node; i++)
         for (int c = 0; c < 3 && !t->on_surface[i]; c++) {
-            seed = seed * 6364136223846793005u + 1442695040888963407u;
-            t->x[3 * i + c] += 0.2 * t->edge_m * (double)(int64_t)seed / 9223372036854775808.0;
+            t->x[3 * i + c] += 0.2 * t->edge_m * (double)(int64_t)random_bits(&seed) * 0x1p-63;
         }
 }
 

@@ -6,6 +6,7 @@
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 #include "tests/fixtures/fem_beam.h"
+#include "tests/fixtures/random.h"
 
 static const double young_Pa = 1e5;
 
@@ -114,8 +115,8 @@ static bool find_frequencies(const fem_beam *b, int n, double hz[])
         mode[m] = calloc(3 * (size_t)body->n_node, sizeof(double));
         if (!mode[m]) abort();
         for (int i = 0; i < 3 * body->n_node; i++) {
-            seed = seed * 6364136223846793005u + 1442695040888963407u;
-            mode[m][i] = body->support[i / 3] ? 0 : (double)(int64_t)seed;
+            double value = (double)(int64_t)random_bits(&seed);
+            mode[m][i] = body->support[i / 3] ? 0 : value;
         }
     }
     for (int it = 0; it < 60 && good; it++) {

@@ -66,12 +66,12 @@ static void fixed_arena_refuses_beyond_its_size_and_empties(void)
 typedef struct pair {
     uint64_t a, b;
 } pair;
-enum { HANDED = 200000 };
+enum { PASSED = 200000 };
 
 static void *write_pairs(void *user)
 {
     pal_triple_buffer *buffer = user;
-    for (uint64_t i = 1; i <= HANDED; i++) {
+    for (uint64_t i = 1; i <= PASSED; i++) {
         pair *slot = pal_triple_buffer_slot(buffer);
         slot->a = slot->b = i;
         pal_triple_buffer_publish(buffer);
@@ -88,7 +88,7 @@ static void triple_buffer_passes_the_newest_value_whole_and_in_order(void)
     CHECK(!pal_triple_buffer_take(&buffer));
     REQUIRE(pthread_create(&writer, NULL, write_pairs, &buffer) == 0);
     uint64_t last = 0, torn = 0, back = 0;
-    while (last < HANDED) {
+    while (last < PASSED) {
         pair *p = pal_triple_buffer_take(&buffer);
         if (!p) continue;
         torn += p->a != p->b;

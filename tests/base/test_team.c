@@ -13,7 +13,7 @@
 #include <stdint.h>
 #include <time.h>
 
-enum { MOST_PIECE = 4096 };
+enum { MAX_PIECE = 4096 };
 
 static int threads_left = INT_MAX; /* so many may still be made */
 
@@ -29,8 +29,8 @@ int __wrap_pthread_create(pthread_t *thread, const pthread_attr_t *attr, void *(
 
 typedef struct board {
     int size;
-    uint8_t taken[MOST_PIECE]; /* plain memory: the thread sanitizer sees whether two pieces meet */
-    double value[MOST_PIECE];
+    uint8_t taken[MAX_PIECE]; /* plain memory: the thread sanitizer sees whether two pieces meet */
+    double value[MAX_PIECE];
     atomic_int busy[PAL_TEAM_MAX];
     atomic_int wrong;
     int64_t sum[PAL_TEAM_MAX]; /* of a worker, plain */
@@ -54,24 +54,24 @@ static void piece(void *user, int worker, int i)
 
 static void does_every_piece_once_and_one_at_a_time_per_worker(void)
 {
-    static double alone[MOST_PIECE];
+    static double alone[MAX_PIECE];
     static board b;
     for (int size = 1; size <= 5; size++) {
         pal_team *team = NULL;
         REQUIRE(pal_team_create(size, &team) == PAL_ERR_OK);
         CHECK_INT(pal_team_size(team), size);
-        const int count[] = {0, 1, 2, 3, 7, 100, MOST_PIECE, -5};
+        const int count[] = {0, 1, 2, 3, 7, 100, MAX_PIECE, -5};
         for (int c = 0; c < 8; c++) {
             memset(&b, 0, sizeof b);
             b.size = size;
             pal_team_run(team, count[c], piece, &b);
             int64_t sum = 0, n = count[c] > 0 ? count[c] : 0, bad = 0;
-            for (int i = 0; i < MOST_PIECE; i++) bad += b.taken[i] != (i < n);
+            for (int i = 0; i < MAX_PIECE; i++) bad += b.taken[i] != (i < n);
             for (int w = 0; w < size; w++) sum += b.sum[w];
             CHECK_INT(bad, 0);
             CHECK_INT(atomic_load(&b.wrong), 0);
             CHECK_INT(sum, n * (n - 1) / 2);
-            if (n < MOST_PIECE) continue;
+            if (n < MAX_PIECE) continue;
             if (size == 1) memcpy(alone, b.value, sizeof alone);
             CHECK(memcmp(alone, b.value, sizeof alone) == 0);
         }
@@ -190,7 +190,7 @@ static void is_as_large_as_the_cores_that_it_may_use(void)
     static board b;
     memset(&b, 0, sizeof b);
     b.size = PAL_TEAM_MAX;
-    pal_team_run(team, MOST_PIECE, piece, &b);
+    pal_team_run(team, MAX_PIECE, piece, &b);
     CHECK_INT(atomic_load(&b.wrong), 0);
     pal_team_destroy(team);
     pal_team_destroy(NULL);

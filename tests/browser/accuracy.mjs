@@ -379,7 +379,7 @@ await run(async () => {
     // the component that blends the last switch ends by itself after ten steps
     const all = await until(
         () => plan(ada),
-        (p) => p.switches > 0 && !p.names.includes("ease"),
+        (p) => p.switches > 0 && !p.names.includes("blend"),
     );
     check(
         "an instructor has a switch for every component, others have none",

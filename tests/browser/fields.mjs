@@ -12,6 +12,7 @@ import {
     palpate,
     pictures,
     prepare,
+    run,
     scratch,
     serve,
     until,

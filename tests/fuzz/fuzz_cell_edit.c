@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_COMMANDS = 24, MOST_CELLS = 40 };
+enum { MAX_COMMANDS = 24, MAX_CELLS = 40 };
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte);
 
@@ -68,7 +68,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
     pal_subdivision s;
     pal_diagnostic diag;
     if (n_byte < 1 || start(bytes[0], &c)) return 0;
-    for (size_t i = 0; i < MOST_COMMANDS && 1 + 8 * (i + 1) <= n_byte && c.n_cell <= MOST_CELLS; i++) {
+    for (size_t i = 0; i < MAX_COMMANDS && 1 + 8 * (i + 1) <= n_byte && c.n_cell <= MAX_CELLS; i++) {
         pal_cells_edit e;
         pal_cells_command k = command_of(bytes + 1 + 8 * i, &c);
         if (pal_cells_copy(&c, &same)) break;

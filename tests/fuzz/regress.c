@@ -1,5 +1,7 @@
 /* Replays a fuzz corpus with an ordinary compiler: every file of the folder, each also cut at every power of two and
  * with one byte changed at 64 places (seeded), so that the decoders meet broken input in every CI run. */
+#include "tests/fixtures/random.h"
+
 #include <dirent.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -28,12 +30,11 @@ static size_t try_file(const char *path)
     fclose(file);
     try_bytes(bytes, n);
     for (size_t cut = 1; cut < n; cut *= 2, n_try++) try_bytes(bytes, cut);
-    uint32_t random = 12345;
+    uint64_t seed = 12345;
     for (int k = 0; k < 64 && n > 0; k++, n_try++) {
-        random = random * 1664525u + 1013904223u;
-        size_t place = random % n;
+        size_t place = (size_t)random_below(&seed, n);
         uint8_t old = bytes[place];
-        bytes[place] = (uint8_t)(random >> 13);
+        bytes[place] = (uint8_t)random_below(&seed, 256);
         try_bytes(bytes, n);
         bytes[place] = old;
     }

@@ -1,14 +1,14 @@
 #!/bin/sh
 # `palpate cells` as a person runs it: figures beside those of Table 1, files that come back to the bit, boundaries that
 # are closed, one line for a refusal. Prints "N passed, N failed"; exit 1 when a check failed.
-# usage: test_cells.sh PALPATE [MOST_KB]     MOST_KB: address space a command may take (0: no limit, for sanitizers)
+# usage: test_cells.sh PALPATE [MAX_KB]     MAX_KB: address space a command may take (0: no limit, for sanitizers)
 set -u
 palpate=$(realpath "$1")
-most_kb=${2:-0}
+max_kb=${2:-0}
 . "$(dirname "$0")/shell.sh"
 run() { # run ARGS...: into out, err, code
     (
-        [ "$most_kb" -gt 0 ] && ulimit -v "$most_kb"
+        [ "$max_kb" -gt 0 ] && ulimit -v "$max_kb"
         exec timeout 60 "$palpate" cells "$@"
     ) >out 2>err </dev/null
     code=$?
@@ -112,9 +112,9 @@ refused 2 "--list goes with --rule, --json and --quiet only"
 run sofa
 refused 2 'there is no shape "sofa"'
 run head monster
-refused 2 '"monster" is one word too many'
+refused 2 '"monster" is one operand too many'
 run head --rule catmull
-refused 2 "--rule: is not maccracken_joy or averaging"
+refused 2 '--rule: "catmull" is not maccracken_joy or averaging'
 run head --levels 9
 refused 2 "--levels: 9 is outside 0 .. 8"
 run head --levels
@@ -131,10 +131,10 @@ run head --scale 2
 refused 2 "unknown flag --scale"
 for list in 3,3 3,3,3,3 3,3,x 3,3,2.5 3,3, nan,3,3 1e300,3,3 ""; do
     run block --cells "$list"
-    refused 2 "--cells: \"$list\" is not 3 whole numbers with commas between (along x, y and z)"
+    refused 2 "--cells: \"$list\" is not 3 whole numbers separated by commas (along x, y and z)"
 done
 run tube --size-m 0.01,0.02
-refused 2 '--size-m: "0.01,0.02" is not 3 numbers with commas between (inner radius, outer radius and length)'
+refused 2 '--size-m: "0.01,0.02" is not 3 numbers separated by commas (inner radius, outer radius and length)'
 end
 
 begin "numbers out of range and files that cannot be are refused with exit code 1, and nothing is written"

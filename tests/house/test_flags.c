@@ -13,7 +13,7 @@ static pal_config config;
 static pal_flag_common common;
 static const char *operand[2];
 static int n_operand;
-static char said[4096]; /* what went to stderr */
+static char output[4096]; /* what went to stderr */
 
 /* parses words (ended by NULL) with stderr caught; the result is the parser's */
 static int parse(bool with_config, char **word)
@@ -41,8 +41,8 @@ static int parse(bool with_config, char **word)
     dup2(old, STDERR_FILENO);
     close(old);
     rewind(file);
-    size_t n = fread(said, 1, sizeof said - 1, file);
-    said[n] = 0;
+    size_t n = fread(output, 1, sizeof output - 1, file);
+    output[n] = 0;
     fclose(file);
     return code;
 }
@@ -51,8 +51,8 @@ static int parse(bool with_config, char **word)
 #define WRONG(call, part)                                                                                              \
     do {                                                                                                               \
         CHECK_INT(call, 2);                                                                                            \
-        CHECK(strchr(said, '\n') == said + strlen(said) - 1);                                                          \
-        if (!strstr(said, part)) CHECK_FAIL("\"%s\" does not say \"%s\"", said, part);                                 \
+        CHECK(strchr(output, '\n') == output + strlen(output) - 1);                                                    \
+        if (!strstr(output, part)) CHECK_FAIL("\"%s\" does not say \"%s\"", output, part);                             \
     } while (0)
 
 static void values_may_stand_apart_or_behind_an_equal_sign(void)
@@ -65,7 +65,7 @@ static void values_may_stand_apart_or_behind_an_equal_sign(void)
     CHECK_INT(n_operand, 2);
     CHECK_TEXT(operand[1], "b");
     CHECK_TEXT(common.command, "try");
-    CHECK_TEXT(said, "");
+    CHECK_TEXT(output, "");
     CHECK_INT(PARSE("--quiet", "--", "--on", "-"), -1);
     CHECK(!on && common.quiet);
     CHECK_TEXT(operand[0], "--on");
@@ -88,8 +88,8 @@ static void what_is_wrong_is_said_in_one_line_with_the_flag_and_the_range(void)
     WRONG(PARSE("--count", "99999999999"), "--count: 99999999999 is outside 1 .. 9");
     WRONG(PARSE("--count"), "--count needs a value");
     WRONG(PARSE("--on=1"), "--on takes no value");
-    WRONG(PARSE("--on", "--on"), "--on is there twice");
-    WRONG(PARSE("a", "b", "c"), "\"c\" is one word too many");
+    WRONG(PARSE("--on", "--on"), "--on is given twice");
+    WRONG(PARSE("a", "b", "c"), "\"c\" is one operand too many");
     WRONG(PARSE("--port", "80"), "unknown flag --port");
     WRONG(PARSE("--x\ny"), "unknown flag --x y");
 }
@@ -124,15 +124,15 @@ static void flags_win_over_environment_over_file_over_defaults(void)
     unsetenv("PALPATE_CONFIG");
     setenv("PALPATE_PORT", "x", 1);
     CHECK_INT(CONFIGURE("a"), 1);
-    CHECK(strstr(said, "PALPATE_PORT: \"x\" is not a number") != NULL);
+    CHECK(strstr(output, "PALPATE_PORT: \"x\" is not a number") != NULL);
     unsetenv("PALPATE_PORT");
     unsetenv("PALPATE_ALLOW_REMOTE");
-    WRONG(CONFIGURE("--port", "1", "--port", "2"), "--port is there twice");
+    WRONG(CONFIGURE("--port", "1", "--port", "2"), "--port is given twice");
     WRONG(CONFIGURE("--max-clients", "0"), "--max-clients: 0 is outside 1 .. 10000");
     WRONG(CONFIGURE("--log", "loud"), "--log: \"loud\" is not error, warn, info or debug");
     WRONG(CONFIGURE("--listen", ""), "--listen: is empty");
     CHECK_INT(CONFIGURE("--config", "/no/such.json"), 1);
-    CHECK(strstr(said, "/no/such.json") != NULL);
+    CHECK(strstr(output, "/no/such.json") != NULL);
     unlink(path);
 }
 
@@ -145,7 +145,7 @@ static void a_bad_file_changes_nothing_and_names_file_and_key(void)
                {"[]", "c.json: not a JSON object"},
                {"{} x", "c.json: line 1: not JSON"},
                {"{\"prot\": 1}", "c.json: prot: unknown key"},
-               {"{\"port\": 1, \"port\": 2}", "c.json: port: the key is there twice"},
+               {"{\"port\": 1, \"port\": 2}", "c.json: port: the key is given twice"},
                {"{\"max_clients\": 3, \"port\": -1}", "c.json: port: -1 is outside 0 .. 65535"},
                {"{\"port\": 80.5}", "c.json: port: 80.5 is not a whole number"},
                {"{\"port\": \"80\"}", "c.json: port: is not a number"},

@@ -30,6 +30,7 @@ plant "finds an upward include" server/base/up.c '#include "server/mesh/geometry
 plant "finds a sideways include" protocol/side.c '#include "server/base/err.h"'
 plant "finds a client that sees the server" clients/scripted_client/peek.c '#include "server/sim/world/world.h"'
 plant "finds an effect that sees the world" server/sim/effects/big.c '#include "server/sim/world/world.h"'
+plant "finds a room that prints" server/sim/core/loud.c 'void f(void) { printf("x"); }'
 plant "finds threads in sim" server/sim/core/threads.c '#include <pthread.h>'
 plant "finds a room without a floor" server/sim/loose.c '#include "server/base/err.h"'
 plant "finds a ring" server/sim/core/a.h '#include "server/sim/core/b.h"' 1 server/sim/core/b.h '#include "server/sim/core/a.h"'

@@ -1,7 +1,7 @@
 // Every reference resolves inside the tree. Reads comments and messages of the sources and all pages (.md) and checks
 //   - papers: "paper B section 3.2", "paper A, Fig. 7", "Table I of paper C": the letter, and a section, figure, table or equation that it has;
 //     a section goes by its word ("paper B 2.2" does not), and by its letter ("A 3.4" does not)
-//   - errata: "erratum B12" is in server/sim/README.md
+//   - errata: "erratum B12" is in server/mesh/README.md or server/sim/README.md
 //   - files: a path, the end of a path or a file name that stands in the tree, and pages by the links of a page
 //   - tests: "sim/test_absent" names a test's file
 //   - sections: server/README.md section "Threads" is a heading of that page
@@ -32,7 +32,7 @@ const papers = {
 // files that are made when the tree is built or served, or that belong to the system and to other programs
 const foreign =
     /^(palpate_\w+_t\.h|.*\.node|three(\.module)?(\.min)?\.js|OrbitControls\.js|cholmod\.h|lws?\.h|(sys|lcm|cjson|lz4|suitesparse|openblas)\/.*|\w*math\.h|std\w+\.h|string\.h|Node\.js|node\.js|three\.js|config\.h)$/;
-const errata_page = "server/sim/README.md";
+const errata_pages = ["server/sim/README.md", "server/mesh/README.md"];
 
 const pages = (text) => text.replace(/\n[ \t]*(\*|\/\/|#)?[ \t]*/g, (m) => " ".repeat(m.length)); // lines run on
 const numbers = (text) =>
@@ -89,18 +89,18 @@ function faults_of(file, text) {
     const parts = split_source(file, text);
     const prose = pages(parts.comment),
         page = file.endsWith(".md");
-    const said = page ? prose : prose + "\n" + pages(parts.string); // strings: papers only
+    const text_of = page ? prose : prose + "\n" + pages(parts.string); // strings: papers only
     const place = (at) => (at > prose.length ? at - prose.length - 1 : at);
     // papers
-    for (const m of said.matchAll(/\bpaper ([A-Z])\b(?:'s)?(?:,? (\d[\d.]*\d|\d))?/g)) {
+    for (const m of text_of.matchAll(/\bpaper ([A-Z])\b(?:'s)?(?:,? (\d[\d.]*\d|\d))?/g)) {
         if (!papers[m[1]]) add(place(m.index), m[0], "there is no such paper");
         else if (m[2]) add(place(m.index), m[0], `say "paper ${m[1]} section ${m[2]}"`);
     }
-    for (const m of said.matchAll(new RegExp(`\\bpaper ([ABC])(?:'s)?,? \\(?${part.source}`, "g"))) {
+    for (const m of text_of.matchAll(new RegExp(`\\bpaper ([ABC])(?:'s)?,? \\(?${part.source}`, "g"))) {
         const why = paper_fault(m[1].toUpperCase(), m[2], m[3]);
         if (why) add(place(m.index), m[0], why);
     }
-    for (const m of said.matchAll(new RegExp(`${part.source} of paper ([ABC])\\b`, "g"))) {
+    for (const m of text_of.matchAll(new RegExp(`${part.source} of paper ([ABC])\\b`, "g"))) {
         const why = paper_fault(m[3], m[1], m[2]);
         if (why) add(place(m.index), m[0], why);
     }
@@ -109,12 +109,11 @@ function faults_of(file, text) {
     ))
         if (/[ABC]/.test(m[1])) add(m.index, m[0], `say "paper ${m[1]} ..."`);
     for (const m of prose.matchAll(/\berrat(?:um|a) ([ABC]\d+(?:(?:,| and| to|-|–)\s*[ABC]\d+)*)/g))
-        for (const id of m[1].match(/[ABC]\d+/g))
-            if (
-                !known.has(errata_page) ||
-                !new RegExp(`\\b${id}\\b`).test(readFileSync(path.join(tree, errata_page), "utf8"))
-            )
-                add(m.index, `erratum ${id}`, `is not in ${errata_page}`);
+        for (const id of m[1].match(/[ABC]\d+/g)) {
+            const lists = (page) =>
+                known.has(page) && new RegExp(`\\b${id}\\b`).test(readFileSync(path.join(tree, page), "utf8"));
+            if (!errata_pages.some(lists)) add(m.index, `erratum ${id}`, `is not in ${errata_pages.join(" or ")}`);
+        }
     // files
     const path_word =
         /(?<![\w/.$*{<%-])(?:\.\.?\/)*[A-Za-z_.][\w.-]*(?:\/[\w.-]+)*\.(?:c|h|md|mjs|js|sh|lcm|css|html)(?![\w*{/])/g;

@@ -27,7 +27,7 @@ refuse() { # refuse CODE TEXT ARGS...
 beam=$problems/beam.json
 
 # ---- words ----
-refuse 2 "nothing to work on" study
+refuse 2 "no operand is given" study
 refuse 2 "within: \"1\" is not a length" study "$beam" --within 1
 refuse 2 "within: \"1ms\" is not a length" study "$beam" --within 1ms
 refuse 2 "within: \"0mm\" is not a length" study "$beam" --within 0mm
@@ -35,13 +35,13 @@ refuse 2 "within: \"-1mm\" is not a length" study "$beam" --within -1mm
 refuse 2 "within: \"nanmm\" is not a length" study "$beam" --within nanmm
 refuse 2 "budget: \"4mm\" is not a time" study "$beam" --budget 4mm
 refuse 2 "budget: \"\" is not a time" study "$beam" --budget ""
-refuse 2 "which setting is to be written" study "$beam" -o x
+refuse 2 "which name the configuration to write" study "$beam" -o x
 refuse 2 "pick: 0 is outside" study "$beam" --pick 0
 refuse 2 "pick: \"x\"" study "$beam" --pick x
-refuse 2 "pick: names the setting of a row, so that --budget has nothing to say" study "$beam" --pick 3 --budget 1ms
+refuse 2 "pick: names the configuration of a row, --budget does not go with it" study "$beam" --pick 3 --budget 1ms
 refuse 1 "pick 3: there is no o/study.json yet: run palpate study .*beam.json" study "$beam" --pick 3 --out o
-refuse 2 "methods: \"fem,femur\" has a word that is not" study "$beam" --methods fem,femur
-refuse 2 "methods: \"fem,\" has a word that is not" study "$beam" --methods fem,
+refuse 2 "methods: \"fem,femur\" contains a name that is not" study "$beam" --methods fem,femur
+refuse 2 "methods: \"fem,\" contains a name that is not" study "$beam" --methods fem,
 refuse 2 "units: \"ell\" is not m, cm" study "$beam" --units ell
 refuse 2 "seconds: 0 is outside" study "$beam" --seconds 0
 refuse 1 "no load case or reference \"none\"; known are tip, tip_far, hang, timoshenko" study "$beam" --case none --out o
@@ -67,7 +67,7 @@ for _ in 1 2 3 4 5; do
     if [ "$code" -ne 0 ]; then break; fi
 done
 check "exit code $code" code_is 1
-check "stderr does not say that it goes on" has err "the same command goes on"
+check "stderr does not say how to continue" has err "the same command continues"
 check "stdout has not one line" lines_are out 1
 check "stdout is no refusal" has out '"code":"STATE"'
 check "it says it is whole" has o/study.json '"complete":[[:space:]]*false'
@@ -117,7 +117,7 @@ end
 
 refuse 1 "other loads" study "$beam" --quick --out o --seconds 0.2
 refuse 1 "other loads" study "$beam" --quick --out o --case tip_far
-refuse 1 "is of a quick study: --quick goes on with it" study "$beam" --out o
+refuse 1 "is of a quick study: --quick continues it" study "$beam" --out o
 sed 's/"machine":.*/"machine": "another one",/' whole.json >o/study.json
 refuse 1 "another machine (another one): --again starts over" study "$beam" --quick --out o
 sed 's/"shape":.*/"shape": "0000000000000000",/' whole.json >o/study.json
@@ -178,7 +178,7 @@ for row in 2 "$all"; do
     check "row $row: does not say which" [ "$(number row out)" = "$row" ]
     size=$(setting_of o/study.csv "$row" | cut -d , -f 5)
     model=$(setting_of o/study.csv "$row" | cut -d , -f 1)
-    check "row $row: its setting is not said" has out "\"setting\":\"$(echo "$model" | tr -d '"').* $size voxels"
+    check "row $row: its configuration is not in the output" has out "\"configuration\":\"$(echo "$model" | tr -d '"').* $size voxels"
     check "row $row: the scene has another model" has "row_$row/scene.json" "$model"
     check "row $row: the study is not beside it" [ -s "row_$row/study.json" ]
     check "row $row: the scene is not called as its problem" has "row_$row/scene.json" '"title":.*soft cantilever'
@@ -247,8 +247,8 @@ wait "$child"
 check "serve does not say which" has err "picked of the .* settings of near/study.json"
 check "serve did not start" has out '"port":'
 end
-refuse 1 "lies beside what is read" study near --quick --within 1mm -o near
-refuse 1 "lies beside what is read" study near/scene.json --quick --within 1mm -o ./near/../near/other.json
+refuse 1 "is in the folder of the source" study near --quick --within 1mm -o near
+refuse 1 "is in the folder of the source" study near/scene.json --quick --within 1mm -o ./near/../near/other.json
 ask 0.000001
 refuse 1 "palpate study near --again" plan near
 refuse 1 "none of the .* settings is within 1e-06 mm" serve near --port 0

@@ -26,7 +26,7 @@ static pal_study_file *read_record(const record *r)
     return file;
 }
 
-static void cost_and_error_are_foreseen_from_the_other_settings(void)
+static void cost_and_error_are_predicted_from_the_other_configurations(void)
 {
     for (size_t k = 0; k < sizeof records / sizeof *records; k++) {
         pal_study_file *file = read_record(&records[k]);
@@ -103,7 +103,7 @@ static void elements_are_in_the_order_of_numerics(void)
 
 int main(void)
 {
-    RUN(cost_and_error_are_foreseen_from_the_other_settings);
+    RUN(cost_and_error_are_predicted_from_the_other_configurations);
     RUN(the_front_and_what_is_picked_are_of_these_numbers);
     RUN(elements_are_in_the_order_of_numerics);
     return check_report();

@@ -4,6 +4,7 @@
 #include "server/study/studied_scene.h"
 #include "server/study/study_store.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 
 #include <stdint.h>
 
@@ -13,7 +14,7 @@ static uint64_t seed = 1;
 
 static double random01(void)
 {
-    return check_random01(&seed);
+    return random_unit(&seed);
 }
 
 /* over many powers of ten, with all bits of a double in use */

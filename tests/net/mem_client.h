@@ -6,7 +6,7 @@
 #include "protocol/field_codec.h"
 #include "protocol/frame_codec.h"
 #include "protocol/topology_delta_codec.h"
-#include "server/net/mem_transport.h"
+#include "server/net/transport/mem_transport.h"
 #include "tests/check.h"
 
 typedef struct mem_client {

@@ -187,7 +187,8 @@ static void bad_orders_are_refused_with_a_sentence(void)
         "{\"type\":\"command\",\"verb\":\"estimate\",\"target\":\"liver\",\"args\":{\"enabled\":1}}",
         "{\"type\":\"command\",\"verb\":\"estimate\"}",
         "{\"type\":\"command\",\"verb\":\"estimate\",\"args\":{\"disabled\":1}}"};
-    static const char *const said[] = {"there is no body liver", "estimate takes on", "estimate takes on"};
+    static const char *const said[] = {"there is no body liver", "estimate: enabled is missing",
+                                       "estimate: enabled is missing"};
     mem_client ada;
     begin(true);
     mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);

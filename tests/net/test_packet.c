@@ -1,8 +1,8 @@
 /* Packets, credit, rate limit, plain text and the viewer's files: the parts of the network room without a network. */
-#include "server/net/credit.h"
-#include "server/net/packet.h"
-#include "server/net/plain_text.h"
-#include "server/net/site.h"
+#include "server/net/transport/credit.h"
+#include "server/net/transport/packet.h"
+#include "server/net/transport/plain_text.h"
+#include "server/net/transport/site.h"
 #include "tests/check.h"
 
 #include <fcntl.h>

@@ -120,9 +120,8 @@ static void others_do_not_and_bad_orders_are_refused(void)
         ROW("tet_volume", 0), "{\"type\":\"command\",\"verb\":\"component\",\"target\":\"tet_volume\"}",
         "{\"type\":\"command\",\"verb\":\"component\",\"target\":\"a\",\"args\":{\"part\":1,\"enabled\":0}}",
         "{\"type\":\"command\",\"verb\":\"reset\",\"target\":\"liver\"}"};
-    static const char *const said[] = {"only an instructor enables and disables components",
-                                       "component takes part (0 to 0) and enabled",
-                                       "component takes part (0 to 0) and enabled", "there is no body liver"};
+    static const char *const said[] = {"component: only for instructors", "component: part is missing",
+                                       "component: part 1, wanted 0 to 0", "there is no body liver"};
     static mem_client ada, bo;
     begin(false);
     mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
@@ -148,13 +147,13 @@ static void everybody_resets_what_was_stopped_and_a_viewer_nothing_else(void)
     const pal_wire_status *s = &cy.last[PAL_CONTROL_STATUS].status;
     UNTIL(s->frozen && s->n_state == 1, &cy, NULL);
     CHECK(s->state[0].frozen && s->state[0].n_safeguard == 1);
-    CHECK(strstr(s->state[0].reason, "is no number"));
+    CHECK(strstr(s->state[0].reason, "is not finite"));
     mem_text(&cy, "{\"type\":\"command\",\"verb\":\"reset\",\"target\":\"organ\"}");
     UNTIL(!s->frozen && s->n_state == 0, &cy, NULL);
     CHECK_INT(cy.n_text[PAL_CONTROL_ERROR], 0);
     mem_text(&cy, "{\"type\":\"command\",\"verb\":\"reset\",\"target\":\"organ\"}");
     UNTIL(cy.n_text[PAL_CONTROL_ERROR] == 1, &cy, NULL);
-    CHECK_TEXT(cy.last[PAL_CONTROL_ERROR].error.text, "a viewer resets nothing but a body that was stopped");
+    CHECK_TEXT(cy.last[PAL_CONTROL_ERROR].error.text, "reset: a viewer resets nothing but a frozen body");
     mem_end(&cy);
     end();
 }

@@ -165,7 +165,7 @@ static void what_cannot_be_done_is_refused_with_a_sentence_and_changes_nothing(v
                {"merge", TOP ",\"x2_m\":0.5,\"y2_m\":0,\"z2_m\":0", "refused", "nothing of clay"},
                {"merge", TOP ",\"x2_m\":-0.05,\"y2_m\":0.02,\"z2_m\":0.02", "refused", "merge "},
                {"bridge", TOP ",\"x2_m\":0.02,\"y2_m\":0.02,\"z2_m\":0.05", "refused", "bridge "},
-               {"sharpen", TOP ",\"sharpness\":1,\"entity\":7", "args", "what is 7"},
+               {"sharpen", TOP ",\"sharpness\":1,\"entity\":7", "args", "entity is 7"},
                {"sharpen", TOP ",\"sharpness\":-1,\"entity\":0", "refused", "sharpness is -1"},
                {"cut", "\"nx\":0,\"ny\":0,\"nz\":0,\"offset_m\":0", "refused", "direction"},
                {"cut", "\"nx\":0,\"ny\":0,\"nz\":1,\"offset_m\":-1", "refused", "the cut leaves nothing"},

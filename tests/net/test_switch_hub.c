@@ -184,7 +184,7 @@ static void what_cannot_be_is_refused_with_a_sentence(void)
     /* who teaches nobody and holds no tool */
     join(&d, "Ben", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
     CHECK(!order(&d, "study_point", "\"index\":1"));
-    CHECK(strstr(trouble(&d), "only an instructor or who holds a tool") != NULL);
+    CHECK(strstr(trouble(&d), "only for instructors and holders of a tool") != NULL);
     mem_end(&c);
     mem_end(&d);
     end();

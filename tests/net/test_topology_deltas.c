@@ -1,7 +1,7 @@
 /* A body that adapts, from a real session to clients on mem://: who is told of its triangles, when, and that what they
  * have is the world's. */
-#include "server/net/credit.h"
 #include "server/net/stream.h"
+#include "server/net/transport/credit.h"
 #include "tests/net/adaptive_scene.h"
 #include "tests/net/server_fixture.h"
 

@@ -2,14 +2,14 @@
 #include "protocol/topology_delta_codec.h"
 #include "server/net/triangle_slots.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 
 enum { PLACES = 300, VERTICES = 170, CLIENTS = 6 };
 
-static uint32_t state = 1;
+static uint64_t state = 1;
 static uint32_t below(uint32_t n)
 {
-    state = state * 1664525u + 1013904223u;
-    return (uint32_t)((uint64_t)state * n >> 32);
+    return (uint32_t)random_below(&state, n);
 }
 
 static int32_t table[PLACES][3];

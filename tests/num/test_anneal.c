@@ -8,7 +8,7 @@
 
 #include <float.h>
 
-enum { MOST = 4, TRAIL = 20000 };
+enum { MAX = 4, TRAIL = 20000 };
 
 typedef struct task task;
 struct task {
@@ -17,19 +17,19 @@ struct task {
     pal_team *team;        /* NULL: the caller alone                       */
     const double *p;       /* of the batch under way                       */
     double *out;           /* its costs                                    */
-    int most_at_once;      /* largest batch                                */
+    int max_at_once;       /* largest batch                                */
     int64_t stop_at;       /* the step that ends the walk; 0: none         */
     int64_t fail_at, seen; /* evaluate fails when so many were asked for   */
     double scale, shift;   /* units: cost of (p - shift) / scale           */
     /* the walk */
-    double trail[TRAIL], trail_p[TRAIL][MOST], trail_best[TRAIL];
+    double trail[TRAIL], trail_p[TRAIL][MAX], trail_best[TRAIL];
     uint8_t kind[TRAIL]; /* 1 accepted, 2 improved, 4 start, 8 probe     */
     int n_trail, bad;
 };
 
 static double cost_of(task *t, const double *p)
 {
-    double x[MOST];
+    double x[MAX];
     for (int i = 0; i < t->n; i++) x[i] = (p[i] - t->shift) / t->scale;
     return t->cost(t, x);
 }
@@ -46,7 +46,7 @@ static pal_err evaluate(void *user, const double *p, int n, double *cost)
     task *t = user;
     t->seen += n;
     if (t->fail_at && t->seen >= t->fail_at) return PAL_ERR_FROZEN;
-    if (n > t->most_at_once) t->most_at_once = n;
+    if (n > t->max_at_once) t->max_at_once = n;
     t->p = p;
     t->out = cost;
     if (t->team) pal_team_run(t->team, n, piece, t);
@@ -68,7 +68,7 @@ static bool step(void *user, const pal_anneal_step *s)
     return t->n_trail != t->stop_at;
 }
 
-static double low[MOST], high[MOST];
+static double low[MAX], high[MAX];
 
 /* a task and options in the cube [a, b]^n, no re-annealing by generations */
 static pal_anneal_options begin(task *t, double (*cost)(task *, const double *), int n, double a, double b)
@@ -132,7 +132,7 @@ static double sinking(task *t, const double *p)
     return 1000.0 - (double)t->n_trail;
 }
 
-static void sinks_as_ingber_says(void)
+static void temperature_follows_ingbers_schedule(void)
 {
     pal_anneal_options o;
     pal_anneal_default(&o);
@@ -172,10 +172,10 @@ static int by_size(const void *a, const void *b)
 /* largest distance of the empirical distribution from the uniform one, times sqrt(n): above 1.95 once in 1000 */
 static double kolmogorov(double *u, int n)
 {
-    double most = 0;
+    double max = 0;
     qsort(u, (size_t)n, sizeof *u, by_size);
-    for (int i = 0; i < n; i++) most = fmax(most, fmax((i + 1.0) / n - u[i], u[i] - (double)i / n));
-    return most * sqrt(n);
+    for (int i = 0; i < n; i++) max = fmax(max, fmax((i + 1.0) / n - u[i], u[i] - (double)i / n));
+    return max * sqrt(n);
 }
 
 static void draws_from_ingbers_distribution(void)
@@ -234,9 +234,9 @@ static void cools_by_candidate_and_is_stretched_by_sensitivity(void)
                 continue;
             }
             for (int i = 0; i < 3; i++) {
-                double temperature = pal_anneal_temperature_ratio(&o, k[i]), least = chance(-first[i], temperature);
-                double y = t.trail_p[g][i] - first[i], most = chance(1 - first[i], temperature);
-                u[i][n] = (chance(y, temperature) - least) / (most - least);
+                double temperature = pal_anneal_temperature_ratio(&o, k[i]), min = chance(-first[i], temperature);
+                double y = t.trail_p[g][i] - first[i], max = chance(1 - first[i], temperature);
+                u[i][n] = (chance(y, temperature) - min) / (max - min);
                 k[i]++;
             }
             n++;
@@ -248,7 +248,7 @@ static void cools_by_candidate_and_is_stretched_by_sensitivity(void)
 }
 
 /* T_acc after the given number of evaluations of a cost that sinks by 1 each time, from 1000 */
-static double cooled(double cost_scale, const double *first, int reanneal_accepted, int64_t most)
+static double cooled(double cost_scale, const double *first, int reanneal_accepted, int64_t max)
 {
     static task t;
     pal_anneal_options o = begin(&t, sinking, 2, -1, 1);
@@ -257,12 +257,12 @@ static double cooled(double cost_scale, const double *first, int reanneal_accept
     o.first = first;
     o.cost_scale = cost_scale;
     o.reanneal_accepted = reanneal_accepted;
-    o.max_evaluation = most;
+    o.max_evaluation = max;
     double p[2];
     pal_anneal_result r;
     if (pal_anneal(&o, p, &r, NULL)) return -1;
-    CHECK_INT(r.n_accepted + 2 * r.n_reanneal, most - 10 - (first != NULL));
-    CHECK_NEAR(r.best, 1001 - (double)most, 0);
+    CHECK_INT(r.n_accepted + 2 * r.n_reanneal, max - 10 - (first != NULL));
+    CHECK_NEAR(r.best, 1001 - (double)max, 0);
     return r.temperature;
 }
 
@@ -353,7 +353,7 @@ static void walks_the_same_way_for_every_batch_and_team(void)
             CHECK_INT(now->bad, 0);
             CHECK_INT(r.n_evaluation, 3000);
             CHECK_INT(now->n_trail, 3000);
-            CHECK_LE(now->most_at_once, batches[b]);
+            CHECK_LE(now->max_at_once, batches[b]);
             CHECK_INT(r.n_spent, now->seen);
             if (b == 0) {
                 kept = r;
@@ -398,7 +398,7 @@ static void knows_no_units(void)
 
 /* the largest number of evaluations until the cost is `enough`, over eight seeds; -1: one did not get there */
 static int64_t slowest(double (*cost)(task *, const double *), int n, double box, double min_temperature_ratio,
-                       double enough, int64_t most)
+                       double enough, int64_t max)
 {
     static task t;
     int64_t worst = 0;
@@ -407,8 +407,8 @@ static int64_t slowest(double (*cost)(task *, const double *), int n, double box
         o.seed = seed;
         o.min_temperature_ratio = min_temperature_ratio;
         o.enough = enough;
-        o.max_evaluation = most;
-        double p[MOST];
+        o.max_evaluation = max;
+        double p[MAX];
         pal_anneal_result r;
         if (pal_anneal(&o, p, &r, NULL) || !(r.best <= enough)) {
             printf("  seed %d: %g after %d\n", (int)seed, r.best, (int)r.n_evaluation);
@@ -680,7 +680,7 @@ static void refuses_numbers_out_of_range(void)
 
 int main(void)
 {
-    RUN(sinks_as_ingber_says);
+    RUN(temperature_follows_ingbers_schedule);
     RUN(draws_from_ingbers_distribution);
     RUN(cools_by_candidate_and_is_stretched_by_sensitivity);
     RUN(cools_the_acceptance_by_what_was_accepted);

@@ -1,11 +1,12 @@
 /* Block matrices: the pattern of cliques, look-up, products. */
 #include "server/num/block_matrix.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 
 static double draw(void)
 {
     static uint64_t state = 0x9e3779b97f4a7c15u;
-    return check_random(&state);
+    return random_signed(&state);
 }
 
 static int draw_int(int n)

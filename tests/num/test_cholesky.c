@@ -4,6 +4,7 @@
 #include "server/num/incomplete_cholesky.h"
 #include "server/num/shape_functions.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 
 #include <SuiteSparse_config.h>
 #include <dirent.h>
@@ -41,7 +42,7 @@ void *__wrap_aligned_alloc(size_t a, size_t n)
 static double draw(void)
 {
     static uint64_t state = 88172645463325252u;
-    return check_random(&state);
+    return random_signed(&state);
 }
 
 /* a body of voxels, nx * ny * nz of them, its stiffness and inertia */
@@ -93,17 +94,17 @@ static void fill_grid(grid *g, double size, double inertia, double kappa, double
 /* |A x - b| / (|A| |x| + |b|) over points that are not held, |A| the largest diagonal entry; x = 0 at the held ones */
 static double residual(const grid *g, const uint8_t *fixed, const double *x, const double *b)
 {
-    double *r = calloc(3 * (size_t)g->n, sizeof *r), most = 0, top = 0, rr = 0, bb = 0, xx = 0;
-    for (int i = 0; i < 3 * g->n; i++) most = fmax(most, fabs(b[i]));
+    double *r = calloc(3 * (size_t)g->n, sizeof *r), max = 0, top = 0, rr = 0, bb = 0, xx = 0;
+    for (int i = 0; i < 3 * g->n; i++) max = fmax(max, fabs(b[i]));
     for (int i = 0; i < 3 * g->n; i++) top = fmax(top, g->a.value[9 * g->a.start[i / 3] + i % 3 * 4]);
-    pal_block_matrix_multiply(&g->a, 1 / most, x, r);
+    pal_block_matrix_multiply(&g->a, 1 / max, x, r);
     bool moved = false;
     for (int i = 0; i < 3 * g->n; i++) {
         if (fixed && fixed[i / 3]) {
             moved |= x[i] != 0;
             continue;
         }
-        double c = b[i] / most, d = r[i] - c, e = top / most * x[i];
+        double c = b[i] / max, d = r[i] - c, e = top / max * x[i];
         rr += d * d, bb += c * c, xx += e * e;
     }
     free(r);
@@ -258,7 +259,7 @@ static void answers_that_decay_to_nothing_are_zero(void)
         int subnormal = 0;
         for (int i = 0; i < 3 * g.n; i++) subnormal += x[i] != 0 && fabs(x[i]) < DBL_MIN;
         CHECK_INT(subnormal, 0);
-        volatile double least = DBL_MIN, half = least / 2;
+        volatile double min = DBL_MIN, half = min / 2;
         CHECK(half > 0);
     }
     pal_cholesky_destroy(c);
@@ -365,9 +366,9 @@ static void gives_columns_of_the_inverse(void)
         b[t] = 1;
         solve_dense(&g.a, g.fixed, b, wanted);
         CHECK_INT(pal_cholesky_solve(c, b, x), PAL_ERR_OK);
-        double most = 0, off = 0;
-        for (int i = 0; i < 3 * g.n; i++) most = fmax(most, fabs(wanted[i])), off = fmax(off, fabs(x[i] - wanted[i]));
-        CHECK_LE(off, (t % 2 ? 2e-5 : 1e-13) * most);
+        double max = 0, off = 0;
+        for (int i = 0; i < 3 * g.n; i++) max = fmax(max, fabs(wanted[i])), off = fmax(off, fabs(x[i] - wanted[i]));
+        CHECK_LE(off, (t % 2 ? 2e-5 : 1e-13) * max);
     }
     pal_cholesky_destroy(c);
     pal_arena_destroy(g.arena);

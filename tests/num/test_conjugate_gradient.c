@@ -36,13 +36,13 @@ static void make(chain *c, double contrast, int kind)
 }
 
 /* solves A x = A w from x = 0; the largest error is in *error */
-static int solve(chain *c, double target, int least, int most, double *error, double *residual)
+static int solve(chain *c, double target, int min, int max, double *error, double *residual)
 {
     double w[N], x[N] = {0}, r[N], z[N], p[N], q[N];
     for (int i = 0; i < N; i++) w[i] = 1 + i % 5;
     multiply(c, w, r);
     pal_conjugate_gradient cg = {N, multiply, precondition, c, r, z, p, q, -1};
-    int n = pal_conjugate_gradient_run(&cg, x, target, least, most);
+    int n = pal_conjugate_gradient_run(&cg, x, target, min, max);
     *error = 0;
     for (int i = 0; i < N; i++) *error = fmax(*error, fabs(x[i] - w[i]));
     *residual = cg.residual;

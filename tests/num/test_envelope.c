@@ -1,20 +1,21 @@
 /* Envelope factors: answers, order, skipped points, refusals. */
 #include "server/num/envelope.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 
-enum { SIDE = 7, N = SIDE * SIDE * SIDE, MOST = 27 * N };
+enum { SIDE = 7, N = SIDE * SIDE * SIDE, MAX = 27 * N };
 
 /* a lattice whose neighbours, 26 of each, are coupled at random; numbered at random too, `cut` leaves out all couplings
  * across the middle */
 typedef struct lattice {
-    int32_t start[N + 1], point[MOST], number[N];
-    double value[MOST];
+    int32_t start[N + 1], point[MAX], number[N];
+    double value[MAX];
 } lattice;
 
 static uint64_t seed;
 static double uniform(void)
 {
-    return check_random01(&seed);
+    return random_unit(&seed);
 }
 
 /* the same number for both ways round */
@@ -59,14 +60,14 @@ static void make(lattice *l, bool cut)
 /* |A x - b| at its largest over the points that count */
 static double residual(const lattice *l, const double *x, const double *b, const uint8_t *skip)
 {
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < N; i++)
         for (int c = 0; c < 3; c++) {
             double sum = -b[3 * i + c];
             for (int k = l->start[i]; k < l->start[i + 1]; k++) sum += l->value[k] * x[3 * l->point[k] + c];
-            if (!skip || !skip[i]) most = fmax(most, fabs(sum));
+            if (!skip || !skip[i]) max = fmax(max, fabs(sum));
         }
-    return most;
+    return max;
 }
 
 static void it_solves_in_one_and_in_two_pieces(void)

@@ -1,6 +1,7 @@
 /* Lanczos' iteration: against known eigenvalues, from good, bad and no first vectors. */
 #include "server/num/lanczos.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 
 #include <stdint.h>
 
@@ -36,7 +37,7 @@ static pal_lanczos begin(chain *c, room *r, double stiff, double m)
     for (int i = 0; i < N; i++) c->m[i] = m;
     uint64_t seed = 3;
     for (int i = 0; i < N; i++) {
-        r->z[i] = check_random(&seed);
+        r->z[i] = random_signed(&seed);
     }
     return (pal_lanczos){N, multiply, solve, c, r->z, r->basis, r->w, r->u, 0, 0, 0};
 }

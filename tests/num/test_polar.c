@@ -2,13 +2,14 @@
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 
 #include <stdint.h>
 
 static double draw(void)
 {
     static uint64_t state = 362436069u;
-    return check_random(&state);
+    return random_signed(&state);
 }
 
 static void draw_quat(double q[4])
@@ -35,9 +36,9 @@ static void transpose(const double a[9], double r[9])
 
 static double distance(const double *a, const double *b, int n)
 {
-    double most = 0;
-    for (int i = 0; i < n; i++) most = fmax(most, fabs(a[i] - b[i]));
-    return isfinite(most) ? most : INFINITY;
+    double max = 0;
+    for (int i = 0; i < n; i++) max = fmax(max, fabs(a[i] - b[i]));
+    return isfinite(max) ? max : INFINITY;
 }
 
 /* how far a is from a rotation */
@@ -204,7 +205,7 @@ static void finds_the_rotation_of_a_stretched_and_turned_matrix(void)
 
 static void needs_three_turns_from_a_warm_start(void)
 {
-    int most = 0;
+    int max = 0;
     for (int t = 0; t < 1000; t++) {
         double f[9], q[4] = {1, 0, 0, 0}, r[9], old[9];
         draw_quat(q);
@@ -212,13 +213,13 @@ static void needs_three_turns_from_a_warm_start(void)
         for (int i = 0; i < 9; i++) f[i] = (i % 4 == 0) + 0.1 * draw(); /* strains of 10 %, turned by up to 0.1 */
         product(old, f, f);
         int n = pal_polar_rotation(f, q, 100);
-        if (n > most) most = n;
+        if (n > max) max = n;
         CHECK_LE(shortfall(f, q), 1e-14);
         pal_quat_matrix(q, r);
         CHECK(distance(r, old, 9) < 0.4);
         CHECK_INT(pal_polar_rotation(f, q, 100), 1); /* there already */
     }
-    CHECK_LE(most, 4);
+    CHECK_LE(max, 4);
 }
 
 static void leaves_the_saddle_half_a_turn_off(void)

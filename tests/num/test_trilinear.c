@@ -2,12 +2,13 @@
  * nodes dropped of the paper's bar. */
 #include "server/num/trilinear.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 
 static uint64_t seed = 5;
 
 static double uniform(void) /* in [-1, 1) */
 {
-    return check_random(&seed);
+    return random_signed(&seed);
 }
 
 /* paper B section 3.5: the products of v_rel and 1 - v_rel, here (0.25, 0.5, 0.75) of one cell */

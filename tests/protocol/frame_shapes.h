@@ -2,6 +2,8 @@
  * must survive. All are exact functions of their arguments, so that results repeat. */
 #ifndef TESTS_PROTOCOL_SHAPES_H
 #define TESTS_PROTOCOL_SHAPES_H
+#include "tests/fixtures/random.h"
+
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -15,8 +17,7 @@ typedef struct shape {
 
 static inline double shape_random(uint64_t *state) /* in [-1, 1) */
 {
-    *state = *state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(int32_t)(*state >> 32) / 2147483648.0;
+    return (double)(int32_t)(random_bits(state) >> 32) * 0x1p-31;
 }
 
 /* vertex of a lattice point on the surface of the cube [0, f]^3, made when new */

@@ -12,7 +12,7 @@ enum { SLOTS = 5000, VERTICES = 2600, CAP = 20 * SLOTS };
 static uint32_t table[SLOTS][3], kept[SLOTS][3], place[SLOTS];
 static uint8_t work[PAL_TOPOLOGY_DELTA_WORK_BYTES(SLOTS)], bytes[CAP];
 
-static uint32_t random_below(uint64_t *state, uint32_t n)
+static uint32_t draw_below(uint64_t *state, uint32_t n)
 {
     return (uint32_t)((shape_random(state) + 1) / 2 * n);
 }
@@ -32,9 +32,9 @@ static void a_table_follows_random_changes_exactly(void)
     memset(table, 0, sizeof table);
     memset(kept, 0, sizeof kept);
     for (int round = 0; round < CHECK_REPEATS(200, 20); round++) {
-        uint32_t n = 0, gap = 1 + random_below(&state, round % 7 ? 400 : 1);
-        for (uint32_t p = random_below(&state, gap); p < SLOTS; p += 1 + random_below(&state, gap)) {
-            for (int c = 0; c < 3; c++) table[p][c] = random_below(&state, 3) ? random_below(&state, VERTICES) : 0;
+        uint32_t n = 0, gap = 1 + draw_below(&state, round % 7 ? 400 : 1);
+        for (uint32_t p = draw_below(&state, gap); p < SLOTS; p += 1 + draw_below(&state, gap)) {
+            for (int c = 0; c < 3; c++) table[p][c] = draw_below(&state, 3) ? draw_below(&state, VERTICES) : 0;
             place[n++] = p;
         }
         if (n == 0) continue;

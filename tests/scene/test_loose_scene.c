@@ -52,7 +52,7 @@ static void check_held(const pal_scene *scene, int body)
     int n = 0;
     REQUIRE(fixed && label && !pal_tets_components(tets, label, &n));
     REQUIRE((reached = calloc((size_t)n, 1)) != NULL);
-    pal_body_def_hold(def, scene->up, tets->x, tets->n_node, fixed);
+    pal_body_def_mark_fixed(def, scene->up, tets->x, tets->n_node, fixed);
     for (int i = 0; i < 4 * tets->n_tet; i++) reached[label[i / 4]] |= fixed[tets->tet[i]];
     for (int k = 0; k < n; k++) CHECK_INT(reached[k], 1);
     free(fixed), free(label), free(reached);

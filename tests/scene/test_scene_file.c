@@ -3,6 +3,7 @@
 #include "server/sim/core/effect.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 #include "tests/session/session_scene.h"
 
 #include <sys/stat.h>
@@ -355,8 +356,7 @@ static void constants_of_springs_come_back_bit_for_bit(void)
     uint64_t seed = 1;
     for (int k = 0; k < 2; k++)
         for (int i = 0; i < N; i++) {
-            seed = seed * 6364136223846793005u + 1442695040888963407u;
-            k_J[k][i] = 1e-4 * pow(2, (double)(seed >> 11) * 0x1p-53 * 8);
+            k_J[k][i] = 1e-4 * pow(2, random_unit(&seed) * 8);
         }
     k_J[1][0] = 1e-60, k_J[1][1] = 1e60, k_J[1][2] = nextafter(0.1, 1), k_J[1][3] = nextafter(0.1, 0),
     k_J[1][4] = 1.0 / 3, k_J[1][5] = nextafter(1, 2), k_J[1][6] = 3;

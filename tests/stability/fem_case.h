@@ -5,6 +5,7 @@
 #include "server/base/vec3.h"
 #include "server/sim/elements/elastic_hex.h"
 #include "tests/fixtures/fem_beam.h"
+#include "tests/fixtures/random.h"
 
 typedef struct hard_kind {
     const char *element, *law, *shown;
@@ -22,12 +23,6 @@ enum { HARD_SLOW = 4, HARD_KINDS = 4 };
 #else
 enum { HARD_SLOW = 1, HARD_KINDS = 6 };
 #endif
-
-/* the same everywhere, in [0, 1) */
-static inline double hard_random(uint64_t *seed)
-{
-    return check_random01(seed);
-}
 
 /* a box of nx x ny x nz voxels of 1 cm, soft and slightly damped, held at x = 0 unless free; not yet open */
 static inline void hard_make(fem_beam *b, const hard_kind *kind, int nx, int ny, int nz, bool fixed)
@@ -100,7 +95,7 @@ static inline void hard_insult(fem_beam *b, int insult, uint64_t seed)
     for (int i = 0; i < 3 * body->n_node; i++)
         low[i % 3] = fmin(low[i % 3], body->x_rest[i]), high[i % 3] = fmax(high[i % 3], body->x_rest[i]);
     seed = 1000 + 7919 * seed;
-    for (int i = 0; i < 10; i++) hard_random(&seed);
+    for (int i = 0; i < 10; i++) random_unit(&seed);
     for (int i = body->n_node - 1; i >= 0; i--) {
         double *x = body->x + 3 * i;
         if (body->support[i]) continue;
@@ -109,9 +104,9 @@ static inline void hard_insult(fem_beam *b, int insult, uint64_t seed)
         if (insult == HARD_MIRROR) x[0] = high[0] - x[0];
         if (insult == HARD_BLOWN) pal_scale3(x, 100, x);
         if (insult == HARD_SHUFFLE)
-            for (int c = 0; c < 3; c++) x[c] = low[c] + hard_random(&seed) * (high[c] - low[c]);
+            for (int c = 0; c < 3; c++) x[c] = low[c] + random_unit(&seed) * (high[c] - low[c]);
         if (insult == HARD_SWAP) {
-            int j = (int)(hard_random(&seed) * (i + 1));
+            int j = (int)(random_unit(&seed) * (i + 1));
             if (body->support[j]) continue;
             double keep[3];
             pal_copy3(keep, x);

@@ -3,6 +3,7 @@
 #ifndef TESTS_STABILITY_SOLID_HARD_H
 #define TESTS_STABILITY_SOLID_HARD_H
 #include "server/sim/subdivision/subdivision_mass.h"
+#include "tests/fixtures/random.h"
 #include "tests/fixtures/subdivision_scene.h"
 
 typedef struct solid_kind {
@@ -18,12 +19,6 @@ enum { SOLID_IMPLICIT, SOLID_EXPLICIT, SOLID_POLAR, SOLID_KINDS = 4 };
 
 static const double solid_step_s = 1.0 / 60;
 
-/* the same everywhere, in [0, 1) */
-static inline double solid_random(uint64_t *seed)
-{
-    return check_random01(seed);
-}
-
 /* a block of n cells of 2 cm, one level, smooth; its lowest points held unless free; not yet open */
 static inline void solid_make(solid_scene *s, const solid_kind *kind, int nx, int ny, int nz, bool fixed)
 {
@@ -36,7 +31,7 @@ static inline void solid_make(solid_scene *s, const solid_kind *kind, int nx, in
 static inline void solid_kick(solid_scene *s, double speed_m_s, uint64_t seed)
 {
     for (int i = 0; i < 3 * s->body->n_dof; i++)
-        if (!s->body->support[i / 3]) s->body->v[i] = speed_m_s * (2 * solid_random(&seed) - 1);
+        if (!s->body->support[i / 3]) s->body->v[i] = speed_m_s * (2 * random_unit(&seed) - 1);
 }
 
 /* elements that are turned over or flat in their middle */
@@ -102,7 +97,7 @@ static inline void solid_insult(solid_scene *s, int insult, uint64_t seed)
     for (int i = 0; i < 3 * body->n_dof; i++)
         low[i % 3] = fmin(low[i % 3], body->x_rest[i]), high[i % 3] = fmax(high[i % 3], body->x_rest[i]);
     seed = 1000 + 7919 * seed;
-    for (int i = 0; i < 10; i++) solid_random(&seed);
+    for (int i = 0; i < 10; i++) random_unit(&seed);
     for (int i = body->n_dof - 1; i >= 0; i--) {
         double *x = body->x + 3 * i;
         if (body->support[i]) continue;
@@ -111,9 +106,9 @@ static inline void solid_insult(solid_scene *s, int insult, uint64_t seed)
         if (insult == SOLID_MIRROR) x[0] = high[0] - x[0];
         if (insult == SOLID_BLOWN) pal_scale3(x, 100, x);
         if (insult == SOLID_SHUFFLE)
-            for (int c = 0; c < 3; c++) x[c] = low[c] + solid_random(&seed) * (high[c] - low[c]);
+            for (int c = 0; c < 3; c++) x[c] = low[c] + random_unit(&seed) * (high[c] - low[c]);
         if (insult == SOLID_SWAP) {
-            int j = (int)(solid_random(&seed) * (i + 1));
+            int j = (int)(random_unit(&seed) * (i + 1));
             double keep[3];
             if (body->support[j]) continue;
             pal_copy3(keep, x);

@@ -1,6 +1,7 @@
 /* The beam's surface as one that adapts, pulled by a grip while its number of levels is switched, for test_switch. */
 #ifndef TESTS_STABILITY_SWITCH_LEVELS_H
 #define TESTS_STABILITY_SWITCH_LEVELS_H
+#include "tests/fixtures/random.h"
 #include "tests/stability/switch_beam.h"
 
 enum { LEVELS_MOST_SWITCH = 24 };
@@ -140,8 +141,8 @@ static void plan_at_random(uint64_t seed, double up_m, pull_plan *out)
     *out = (pull_plan){.from_m = {0.19, 0.025, WIDTH}, .up_m = up_m, .lift = 30, .creep = 0.002, .n = 19};
     out->setting[0] = 1, out->wait[0] = 90;
     for (int s = 1; s <= out->n; s++) {
-        out->setting[s] = (out->setting[s - 1] + 1 + (int)(2 * check_random01(&seed))) % 3;
-        out->wait[s] = s == out->n ? 60 : 2 + (int)(12 * check_random01(&seed));
+        out->setting[s] = (out->setting[s - 1] + 1 + (int)(2 * random_unit(&seed))) % 3;
+        out->wait[s] = s == out->n ? 60 : 2 + (int)(12 * random_unit(&seed));
     }
 }
 

@@ -2,6 +2,7 @@
  * its state stays finite, its energy does not grow, its mass stays, and with anchors it comes back. Bodies run coarse,
  * refined and adapting: refinement must not make any of it worse. */
 #include "tests/fixtures/adaptive_worlds.h"
+#include "tests/fixtures/random.h"
 #include "tests/stability/hard_case.h"
 
 enum { STEPS_A_SECOND = 60 };
@@ -14,7 +15,7 @@ static const double radius_m = 0.05;
 static uint64_t seed;
 static double uniform(void) /* in [-1, 1) */
 {
-    return check_random(&seed);
+    return random_signed(&seed);
 }
 
 /* a sphere with its lowest part held, anchors on its rest place, damped */

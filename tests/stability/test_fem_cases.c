@@ -1,6 +1,7 @@
 /* Hard cases of numerics.md part 3 for model fem: insults from outside. Long steps, a meganewton, resting for long,
  * turns of body and support, numbers that are none, tools that jump, appear inside or press against one another. */
 #include "server/num/polar.h"
+#include "tests/fixtures/random.h"
 #include "tests/stability/fem_case.h"
 #include "tests/stability/hard_case.h"
 
@@ -21,7 +22,7 @@ static void long_steps_stay_bounded(void)
             REQUIRE(open_kind(&b, &hard_kinds[k], 4, 2, 2));
             uint64_t seed = 9;
             for (int i = 0; i < 3 * b.body->n_dof; i++)
-                if (!b.body->support[i / 3]) b.body->v[i] = 2 * hard_random(&seed) - 0.5;
+                if (!b.body->support[i / 3]) b.body->v[i] = 2 * random_unit(&seed) - 0.5;
             hard_run run;
             hard_steps(&b, times * 60.0 / 60, times / 60.0, &run);
             CHECK(run.finite);

@@ -1,5 +1,6 @@
 /* Hard cases of numerics.md part 3 for model fem: numbers. Materials at their limits, contrasts, scales, damping, edits
  * of a running body, bodies of odd topology, elements of next to no volume. */
+#include "tests/fixtures/random.h"
 #include "tests/stability/fem_case.h"
 #include "tests/stability/hard_case.h"
 
@@ -146,7 +147,7 @@ static bool scaled(const hard_kind *kind, double h, double young, double x[3])
     bool ok = !beam_open(&b, &diag);
     uint64_t seed = 5;
     for (int i = 0; ok && i < 3 * b.body->n_dof; i++)
-        if (!b.body->support[i / 3]) b.body->x[i] += 0.2 * h * (hard_random(&seed) - 0.3);
+        if (!b.body->support[i / 3]) b.body->x[i] += 0.2 * h * (random_unit(&seed) - 0.3);
     if (ok) pal_world_invalidate_limits(b.world, 0);
     for (int i = 0; ok && i < 6; i++) {
         /* the same push in units of E h^2 */
@@ -365,8 +366,8 @@ static void a_free_body_keeps_its_momentum_for_ten_thousand_steps(void)
         REQUIRE(!beam_open(&b, &diag));
         uint64_t seed = 3;
         for (int i = 0; i < b.body->n_node; i++)
-            pal_set3(b.body->v + 3 * i, 0.01 + 0.05 * hard_random(&seed), 0.5 * (b.body->x_rest[3 * i] - 0.01),
-                     0.05 * hard_random(&seed));
+            pal_set3(b.body->v + 3 * i, 0.01 + 0.05 * random_unit(&seed), 0.5 * (b.body->x_rest[3 * i] - 0.01),
+                     0.05 * random_unit(&seed));
         double before[3], now[3], energy = pal_world_energy_J(b.world);
         pal_body_momentum(b.body, before);
         for (int i = 0; i < 10000 / HARD_SLOW; i++) {

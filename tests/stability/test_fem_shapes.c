@@ -1,6 +1,7 @@
 /* Hard cases of numerics.md part 3 for model fem: shapes. Whatever a body's nodes are put to (one element turned over,
  * all in a plane, on a point, mirrored, shuffled, blown up), it comes back to rest with no element turned over, its
  * state stays finite and its energy does not rise above what the insult put in. */
+#include "tests/fixtures/random.h"
 #include "tests/stability/fem_case.h"
 #include "tests/stability/hard_case.h"
 
@@ -160,7 +161,7 @@ static void hardly_filled_voxels_come_to_rest(void)
         beam_make(&b, 4, 3, 2, 0.034, true);
         b.def->material = (pal_material){.young_Pa = 5e3, .poisson = 0.45, .density_kg_m3 = 1000, .damping_1_s = 4};
         beam_solver(&b, solvers[run_of % 2]);
-        for (int h = 0; h < b.mesh.hexes.n_hex; h++) b.mesh.hexes.fill[h] = hard_random(&seed) < 0.5 ? 0.02F : 1;
+        for (int h = 0; h < b.mesh.hexes.n_hex; h++) b.mesh.hexes.fill[h] = random_unit(&seed) < 0.5 ? 0.02F : 1;
         REQUIRE(!beam_open(&b, &diag));
         for (int insult = HARD_PLANE; insult < HARD_INSULTS; insult++) {
             if (insult == HARD_BLOWN) continue;
@@ -192,7 +193,7 @@ static void a_pressed_body_is_not_straightened(void)
     REQUIRE(!pal_world_load(b.world, 0, node, (double[3]){-force_N, -force_N, -force_N}));
     for (int i = 0; i < 300; i++) {
         REQUIRE(!pal_world_step(b.world, 1.0 / 60));
-        REQUIRE(!hard_hex_row(&b)->split->straight);
+        REQUIRE(!hard_hex_row(&b)->split->single_rotation);
     }
     CHECK(hard_inverted(&b) > 0);
     CHECK(b.body->safeguards.n_inversion > 200);

@@ -3,6 +3,7 @@
  * to some models. */
 #include "server/mesh/cells/cell_edits.h"
 #include "server/num/polar.h"
+#include "tests/fixtures/random.h"
 #include "tests/stability/four_models.h"
 #include "tests/stability/hard_case.h"
 
@@ -11,7 +12,7 @@ static const double step_s = 1.0 / 60;
 static uint64_t seed;
 static double uniform(void) /* in [-1, 1) */
 {
-    return check_random(&seed);
+    return random_signed(&seed);
 }
 
 static void shake(four *s, double amount_m, double speed_m_s)
@@ -255,8 +256,8 @@ static void a_tool_inside_a_shell_gives_no_more_than_cap_times_clamp(void)
 }
 
 /* the upper of two pieces falls by g dt^2 n (n + 1) / 2 and the lower one stands; that of explicit sub-steps by g t^2 /
- * 2 but for one of them. A scene file with two such pieces is refused (mesh/loose_components.h), but a world simulates
- * every component of the mesh it is given */
+ * 2 but for one of them. A scene file with two such pieces is refused (mesh/volume/loose_components.h), but a world
+ * simulates every component of the mesh it is given */
 static void of_two_pieces_the_held_one_stands_and_the_other_falls(void)
 {
     for (int m = 0; m < FOUR_MODELS; m += FOUR_SOLID) {

@@ -5,6 +5,7 @@
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 #include "tests/fixtures/boxes.h"
+#include "tests/fixtures/random.h"
 #include "tests/stability/hard_case.h"
 
 static pal_diagnostic diag;
@@ -13,7 +14,7 @@ static uint64_t seed;
 
 static double uniform(void) /* in [0, 1) */
 {
-    return check_random01(&seed);
+    return random_unit(&seed);
 }
 
 static bool bench_make(box_bench *b, bool fixed)

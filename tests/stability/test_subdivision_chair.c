@@ -2,6 +2,7 @@
  * in ten elements pyramids, 16 sub-steps in a step of central_cg. On one point, mirrored, shuffled, drawn out
  * eightfold: elements with one rotation each rested folded there (cell_recovery.h). */
 #include "server/mesh/cells/cell_models.h"
+#include "tests/fixtures/random.h"
 #include "tests/stability/hard_case.h"
 #include "tests/stability/subdivision_case.h"
 
@@ -39,7 +40,7 @@ static void insult(solid_scene *s, int how, uint64_t seed)
         if (body->support[i / 3]) continue;
         if (how == CHAIR_POINT) body->x[i] = l + 0.3 * (h - l);
         if (how == CHAIR_MIRROR && i % 3 == 0) body->x[i] = l + h - body->x[i];
-        if (how == CHAIR_SHUFFLE) body->x[i] = l + (h - l) * solid_random(&seed);
+        if (how == CHAIR_SHUFFLE) body->x[i] = l + (h - l) * random_unit(&seed);
         if (how == CHAIR_STRETCH) body->x[i] = 0.5 * (l + h) + 8 * (body->x[i] - 0.5 * (l + h));
     }
     pal_body_update_nodes(body);

@@ -43,7 +43,7 @@ static void check_pair(int i, int j, pal_world *before, double bound_m)
     double first_m = check_farthest(from->shown, to->shown, to->n_shown);
     CHECK_LE(first_m, 1e-7);
     CHECK(to->display_offset_m != NULL && r.frame_move_m > 0);
-    CHECK_NEAR(r.frame_move_m, r.max_move_m / 10, 1e-12);
+    CHECK_NEAR(r.frame_move_m, r.max_move_m * set[j]->scene.step_s * 6, 1e-12);
     if (table) printf("  %d -> %d: N", i, j);
     watch(next, set[j]->scene.step_s, first_m, &s);
     if (table)

@@ -1,5 +1,6 @@
 /* Hard cases of numerics.md part 3 that come through tools: teleports, tools inside, many tools on one spot, tools that
  * vanish, wild hands. Whatever happens, all stays finite, nothing freezes, caps hold, and the body comes back. */
+#include "tests/fixtures/random.h"
 #include "tests/fixtures/tool_scene.h"
 #include "tests/stability/hard_case.h"
 
@@ -38,11 +39,10 @@ void *__wrap_aligned_alloc(size_t a, size_t n)
     return __real_aligned_alloc(a, n);
 }
 
-static uint32_t seed;
+static uint64_t seed;
 static double random_in(double low, double high)
 {
-    seed = seed * 1664525u + 1013904223u;
-    return low + (high - low) * (seed >> 8) / 16777216.0;
+    return low + (high - low) * random_unit(&seed);
 }
 
 static void check_tools(const tool_scene *s)

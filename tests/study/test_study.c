@@ -6,6 +6,7 @@
 #include "server/solve/solve.h"
 #include "tests/check.h"
 #include "tests/fixtures/beam_problem.h"
+#include "tests/fixtures/random.h"
 
 static pal_study *new_study(void)
 {
@@ -15,12 +16,6 @@ static pal_study *new_study(void)
 }
 
 /* numbers without a pattern */
-static double noise(unsigned *state)
-{
-    *state = *state * 1664525u + 1013904223u;
-    return (*state >> 8) / 16777216.0;
-}
-
 static pal_study_point *put(pal_study *s, const char *element, int size, double ms, double error_m)
 {
     pal_study_point *p = &s->point[s->n_point++];
@@ -34,9 +29,10 @@ static pal_study_point *put(pal_study *s, const char *element, int size, double 
 static void the_front_is_what_nothing_beats(void)
 {
     pal_study *s = new_study();
-    unsigned state = 7;
+    uint64_t state = 7;
     for (int i = 0; i < 120; i++) {
-        pal_study_point *p = put(s, "hex8_bbar", i + 2, exp(4 * noise(&state)), 1e-3 * exp(-4 * noise(&state)));
+        pal_study_point *p =
+            put(s, "hex8_bbar", i + 2, exp(4 * random_unit(&state)), 1e-3 * exp(-4 * random_unit(&state)));
         if (i % 10 == 3) p->err = PAL_ERR_FROZEN;
         if (i % 10 == 7) p->measured.error_m = NAN;
     }
@@ -75,12 +71,13 @@ static int brute(const pal_study *s, double within, double budget)
 static void a_pick_is_the_best_of_all(void)
 {
     pal_study *s = new_study();
-    unsigned state = 11;
+    uint64_t state = 11;
     s->reference_m = 6e-5;
-    for (int i = 0; i < 60; i++) put(s, "tet4", i + 2, exp(4 * noise(&state)), 1e-3 * exp(-4 * noise(&state)));
+    for (int i = 0; i < 60; i++)
+        put(s, "tet4", i + 2, exp(4 * random_unit(&state)), 1e-3 * exp(-4 * random_unit(&state)));
     s->point[5].err = PAL_ERR_BUDGET, s->point[5].measured.ms = 1e-6;
     for (int i = 0; i < 40; i++) {
-        double within = 1e-3 * exp(-5 * noise(&state)), budget = exp(5 * noise(&state) - 0.5);
+        double within = 1e-3 * exp(-5 * random_unit(&state)), budget = exp(5 * random_unit(&state) - 0.5);
         CHECK_INT(pal_study_pick(s, within, NAN), brute(s, within, NAN));
         CHECK_INT(pal_study_pick(s, NAN, budget), brute(s, NAN, budget));
         CHECK_INT(pal_study_pick(s, within, budget), brute(s, within, budget));
@@ -152,12 +149,12 @@ static void costs_that_go_with_what_is_counted_are_foreseen_exactly(void)
     const double own_s[] = {1.0 / 60, 1.0 / 240}, overhead = 0.1, node = 60e-6;
     pal_study *s = new_study();
     s->step_s = 1.0 / 120;
-    unsigned state = 5;
+    uint64_t state = 5;
     for (int i = 0; i < 40; i++) {
         pal_study_point *p = put(s, "", 8 + i % 9, 0, 1e-3);
         snprintf(p->measured.setting.model, PAL_NAME, "tet_springs");
         p->measured.setting.step_s = own_s[i % 2];
-        p->n_node = 100 + (int)(3000 * noise(&state)), p->n_substep = 1 + (int)(60 * noise(&state));
+        p->n_node = 100 + (int)(3000 * random_unit(&state)), p->n_substep = 1 + (int)(60 * random_unit(&state));
         p->measured.ms = (overhead + node * p->n_node * p->n_substep) * s->step_s / own_s[i % 2];
     }
     double ms;

@@ -3,6 +3,7 @@
 #include "server/study/study.h"
 #include "tests/check.h"
 #include "tests/fixtures/beam_problem.h"
+#include "tests/fixtures/random.h"
 
 enum { MOST_ANSWERS = 64, MOST_NUMBERS = 3000, MOST_ENDS = 400 };
 
@@ -114,13 +115,12 @@ static void ended_anywhere_it_goes_on_to_the_same_table(void)
     CHECK_INT(all.n_recalled + all.n_twice, 0);
     int n_look = all.n_looks, n_end = 0, n_late = 0, in_reference = 0;
     CHECK(n_look > 100);
-    unsigned state = 3;
+    uint64_t state = 3;
     pal_err err = PAL_ERR_STATE;
     for (int k = 0; k < MOST_ENDS && err == PAL_ERR_STATE; k++) {
-        state = state * 1664525u + 1013904223u;
         /* ever later, so that the longest answer is found as well */
         int most = n_look / 100 + n_look * k / 50;
-        int left = 1 + (int)((state >> 8) % (unsigned)most);
+        int left = 1 + (int)random_below(&state, (uint64_t)most);
         /* with all settings measured once more: every time they are timed again */
         if (parts.so_far->n_point == once->n_point && n_late++ > 0) left = -1;
         err = go(&parts, p, &beam, left, again);

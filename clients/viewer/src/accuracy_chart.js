@@ -27,13 +27,13 @@ function drawAxes(plot) {
     return [
         ...plot.xTicks.flatMap(({ at, text }) => [
             shape("line", { x1: at, x2: at, y1: top, y2: bottom, class: "grid" }),
-            shape("text", { x: at, y: bottom + 13, class: "tick", "text-anchor": "middle" }, text),
+            shape("text", { x: at, y: bottom + 15, class: "tick", "text-anchor": "middle" }, text),
         ]),
         ...plot.yTicks.flatMap(({ at, text }) => [
             shape("line", { x1: left, x2: right, y1: at, y2: at, class: "grid" }),
             shape("text", { x: left - 5, y: at + 3.5, class: "tick", "text-anchor": "end" }, text),
         ]),
-        shape("text", { x: right, y: bottom + 26, class: "tick", "text-anchor": "end" }, "ms per step"),
+        shape("text", { x: right, y: bottom + 28, class: "tick", "text-anchor": "end" }, "ms per step"),
         shape("text", { x: 2, y: top - 9, class: "tick" }, "largest error, mm"),
     ];
 }

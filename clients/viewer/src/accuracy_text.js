@@ -113,7 +113,7 @@ export function switchText({ text, args = {} }) {
     const { energy_percent, max_frame_move_m, prepare_ms, max_move_m } = args;
     const facts = [];
     if (energy_percent !== undefined)
-        facts.push(`energy ${energy_percent >= 0 ? "+" : "−"}${Math.abs(energy_percent).toFixed(2)} %`);
+        facts.push(`energy ${energy_percent > -0.005 ? "+" : "−"}${Math.abs(energy_percent).toFixed(2)} %`);
     if (max_move_m !== undefined) facts.push(`surface moves ${millimetres(max_move_m)}${boundText(args)}`);
     if (max_frame_move_m !== undefined) facts.push(`${millimetres(max_frame_move_m)} per frame`);
     if (prepare_ms !== undefined)

@@ -52,7 +52,7 @@ export const FIELDS = Object.freeze({
         ],
     },
     stiffness: {
-        title: "Edge stiffness k_d",
+        title: "Edge stiffness",
         min: 1e-9,
         units: [
             ["nJ", 1e-9],

@@ -1,4 +1,4 @@
-// LZ4 block decoder (lz4_Block_format.md), for untrusted input: the block must expand to exactly the given length.
+// Decoder of the LZ4 block format, for untrusted input: the block must expand to exactly the given length.
 import { WireError } from "./wire.js";
 
 /** @returns {never} */

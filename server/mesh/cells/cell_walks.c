@@ -2,26 +2,12 @@
 #include "server/mesh/cells/cells.h"
 
 #include "server/base/vec3.h"
+#include "server/num/union_find.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 /* ---- pieces and holes ---- */
-
-static int32_t root(int32_t *parent, int32_t i)
-{
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-}
-
-static void join(int32_t *parent, int32_t a, int32_t b)
-{
-    a = root(parent, a), b = root(parent, b);
-    if (a < b)
-        parent[b] = a;
-    else
-        parent[a] = b;
-}
 
 static int32_t count_roots(const int32_t *parent, int32_t n)
 {
@@ -38,7 +24,7 @@ static void walk_sheets(const pal_cells *c, int32_t *parent, bool *seen, pal_cel
     for (int32_t u = 0; u < c->n_edge_use; u++) {
         if (c->edge_use[u].mate >= 0) continue;
         n_half++;
-        join(parent, pal_cells_face_of(c, u), pal_cells_face_of(c, pal_cells_across_edge(c, u)));
+        pal_union_find_join(parent, pal_cells_face_of(c, u), pal_cells_face_of(c, pal_cells_across_edge(c, u)));
         if (seen[u]) continue;
         n_vertex++;
         int32_t at = u;
@@ -63,10 +49,10 @@ pal_err pal_cells_find_topology(const pal_cells *cells, pal_cells_topology *out)
         free(seen);
         return PAL_ERR_MEMORY;
     }
-    for (int32_t i = 0; i < c->n_cell; i++) parent[i] = i;
+    pal_union_find_init(parent, c->n_cell);
     for (int32_t f = 0; f < c->n_face; f++)
         if (!pal_cells_face_boundary(c, f))
-            join(parent, c->face_use[c->face[f].use[0]].cell, c->face_use[c->face[f].use[1]].cell);
+            pal_union_find_join(parent, c->face_use[c->face[f].use[0]].cell, c->face_use[c->face[f].use[1]].cell);
     t.n_piece = count_roots(parent, c->n_cell);
     walk_sheets(c, parent, seen, &t);
     t.n_cavity = t.n_sheet - t.n_piece;

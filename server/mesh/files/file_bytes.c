@@ -48,14 +48,14 @@ pal_err pal_file_begin(pal_file_out *out, const char *path, pal_diagnostic *diag
 {
     size_t n = strlen(path);
     if (n >= sizeof out->path) return pal_diagnostic_set(diag, PAL_ERR_IO, "%.100s...: the path is too long", path);
-    struct stat info; /* the new file takes the name: a device or a pipe of that name would be gone */
+    struct stat info; /* the new file replaces the name: a device or a pipe of that name would be lost */
     if (!stat(path, &info) && !S_ISREG(info.st_mode))
         return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: not a file", path);
     memcpy(out->path, path, n + 1);
     snprintf(out->temporary, sizeof out->temporary, "%s.XXXXXX", out->path);
     int fd = mkstemp(out->temporary);
     if (fd < 0) return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s", path, strerror(errno));
-    /* mkstemp keeps the file to its owner; give it the rights of any new file */
+    /* mkstemp creates a file for its owner alone; set the permissions of a new file */
     mode_t mask = umask(0);
     umask(mask);
     fchmod(fd, 0666 & ~mask);

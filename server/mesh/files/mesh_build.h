@@ -1,5 +1,5 @@
-/* What the surface readers share: arrays that grow with the bytes that are there, polygons as fans, and refusals that
- * name the file and the place. Only for the readers of this room. Thread: [load]. */
+/* Shared by the surface readers: arrays that grow with the bytes that are there, polygons as fans, and refusals that
+ * name the file and the position. Private to the readers of this room. Thread: [load]. */
 #ifndef PAL_MESH_FILES_MESH_BUILD_H
 #define PAL_MESH_FILES_MESH_BUILD_H
 #include "server/base/err.h"

@@ -21,7 +21,7 @@ static bool ends_with(const char *name, const char *tail)
     return n >= m && strcasecmp(name + n - m, tail) == 0;
 }
 
-/* content first, name second; NULL: neither says anything */
+/* by content first, by name second; NULL: neither is known */
 static reader *choose(const char *name, const uint8_t *bytes, size_t n_byte)
 {
     if (n_byte >= 4 && memcmp(bytes, "ply", 3) == 0 && bytes[3] <= ' ') return pal_ply_parse;

@@ -1,4 +1,4 @@
-/* Surfaces from files: OBJ, STL, PLY, OFF, told apart by content first, name second. The bytes are untrusted.
+/* Surfaces from files: OBJ, STL, PLY, OFF, recognised by content first, by name second. The bytes are untrusted.
  *
  * Every refusal is one sentence with the file's name and the line (text) or byte offset (binary). Memory is bounded by
  * a small multiple of the file's size, whatever counts it claims. Thread: [load]. */
@@ -7,7 +7,7 @@
 #include "server/mesh/geometry/surface.h"
 #include "server/mesh/geometry/tets.h"
 
-/* the weld to use when nobody says otherwise: joins what single precision in a file has torn apart */
+/* default weld: joins vertices that single precision in a file has separated */
 #define PAL_MESH_WELD 1e-6
 
 /* NULL stands for {0, PAL_MESH_WELD} */

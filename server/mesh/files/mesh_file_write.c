@@ -49,7 +49,7 @@ static char *put_metres(char *p, double x, bool fixed)
     if (!fixed || !(fabs(x) < 1e6)) {
         char *end = p + snprintf(p, 32, "%.17g ", x);
         for (; p < end; p++)
-            if (*p == ',') *p = '.'; /* the locale's point */
+            if (*p == ',') *p = '.'; /* the decimal point of the locale */
         return end;
     }
     int64_t pico = (int64_t)(fabs(x) * 1e12 + 0.5), whole = pico / 1000000000000, rest = pico % 1000000000000;

@@ -1,7 +1,7 @@
 /* PLY 1.0: ascii, binary little- and big-endian; vertex x y z of any scalar type, faces as lists and triangle strips;
- * any other element or property is stepped over. Elements may come in any order.
+ * any other element or property is skipped. Elements may come in any order.
  *
- * A claimed count is never trusted: room is made for what the bytes that are left can hold. */
+ * A claimed count is never trusted: memory is reserved for what the remaining bytes can hold. */
 #include "server/mesh/files/mesh_build.h"
 #include "server/mesh/files/scalar_bytes.h"
 #include "server/mesh/files/text_scan.h"
@@ -12,7 +12,7 @@
 
 enum { MAX_ELEMENT = 32, MAX_PROPERTY = 128 };
 
-/* what a property means to us */
+/* role of a property */
 typedef enum role { OTHER, X, Y, Z, INDICES } role;
 
 typedef struct property {
@@ -171,7 +171,7 @@ static pal_err take_value(ply *p, pal_scalar type, double *out)
     return PAL_ERR_OK;
 }
 
-/* a triangle strip; -1 begins a new one; every other triangle is turned round */
+/* a triangle strip; -1 begins a new one; every second triangle is reversed */
 static pal_err strip_corner(ply *p, int64_t at, double value, double last[2], int *n)
 {
     if (value == -1) {

@@ -1,6 +1,6 @@
 /* STL: binary (84 bytes, then 50 a triangle) and ASCII. A binary file may begin with "solid", so the size decides
- * first: a file whose size fits its triangle count is binary. Normals are left out, the corners' order says the same.
- */
+ * first: a file whose size fits its triangle count is binary. Normals are ignored; the order of corners defines the
+ * orientation. */
 #include "server/mesh/files/mesh_build.h"
 #include "server/mesh/files/text_scan.h"
 

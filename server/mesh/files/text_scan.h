@@ -15,9 +15,9 @@ typedef struct pal_text_scan {
     bool joins;   /* a backslash before the line's end joins the next line to it */
 } pal_text_scan;
 
-/* true when the line holds another word; at is then on its first byte */
+/* true when the line has another word; at is then on its first byte */
 bool pal_text_more(pal_text_scan *scan);
-/* the rest of this line is left out; false when no line follows */
+/* skips the rest of this line; false when no line follows */
 bool pal_text_next_line(pal_text_scan *scan);
 /* the next word, on a later line if need be; false at the end of the file */
 bool pal_text_seek(pal_text_scan *scan);

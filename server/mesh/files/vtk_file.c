@@ -22,7 +22,7 @@ static void write_row(FILE *file, const double *value, const double *shift, int 
         char text[40];
         snprintf(text, sizeof text, "%.17g", value[k] + (shift ? shift[k] : 0));
         for (char *c = text; *c; c++)
-            if (*c == ',') *c = '.'; /* the locale's point */
+            if (*c == ',') *c = '.'; /* the decimal point of the locale */
         fputs(text, file);
         fputc(k + 1 < n ? ' ' : '\n', file);
     }

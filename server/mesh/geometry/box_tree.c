@@ -1,8 +1,8 @@
 /* AABB tree over the triangles of a surface (paper B section 2.2), with a dipole per box for the winding number (Barill
  * et al. 2018, first order).
  *
- * Triangles are split at the middle of the centroids along the longest side, so the depth is log2 n whatever the input.
- * Nodes stand in depth-first order: the left child follows its parent. Triangles with a non-finite corner are left out.
+ * Triangles are split at the median of the centroids along the longest side, so the depth is log2 n for any input.
+ * Nodes are in depth-first order: the left child follows its parent. Triangles with a non-finite corner are left out.
  */
 #include "server/mesh/geometry/box_tree.h"
 
@@ -13,7 +13,7 @@
 #include <string.h>
 
 enum { LEAF = 4, STACK = 128 };
-/* a box is far when it is seen from more than this many of its radii */
+/* a box is far when its distance exceeds this number of its radii */
 #define FAR_RADII 2.3
 #define PI        3.14159265358979323846
 
@@ -31,7 +31,7 @@ struct pal_box_tree {
     int32_t *item; /* triangles in tree order */
 };
 
-/* what the building recursion works on */
+/* state of the recursive build */
 typedef struct builder {
     pal_box_tree *tree;
     double *centroid; /* of each triangle [n_tri][3] */
@@ -42,7 +42,7 @@ static void corners_of(const pal_surface *s, int32_t tri, const double *corner[3
     for (int k = 0; k < 3; k++) corner[k] = s->x + 3 * (size_t)s->tri[3 * (size_t)tri + (size_t)k];
 }
 
-/* moves the item of rank middle to its place by coordinate (ties by index) */
+/* quickselect: moves the item of rank middle to its position by coordinate (ties by index) */
 static void select_middle(const builder *b, int low, int high, int middle, int axis)
 {
     int32_t *item = b->tree->item;
@@ -74,7 +74,7 @@ static void select_middle(const builder *b, int low, int high, int middle, int a
     }
 }
 
-/* farthest corner of the box from the dipole's place */
+/* distance of the farthest corner of the box from the dipole's centroid */
 static void find_radius(node *n)
 {
     double sum = 0;
@@ -218,7 +218,7 @@ static bool meets_box(const node *n, const double a[3], const double inverse[3],
     return from <= to;
 }
 
-/* six times the signed volume of d, u, v: the sign says on which side of edge u-v the line passes */
+/* six times the signed volume of d, u, v: its sign tells on which side of edge u-v the line passes */
 static double side_of(const double d[3], const double u[3], const double v[3])
 {
     double c[3];
@@ -281,7 +281,7 @@ double pal_box_tree_ray(const pal_box_tree *tree, const double a[3], const doubl
     return cast(tree, a, d, length, false, tri);
 }
 
-/* nearest point of a triangle: of its inside when the foot lies there, else of its edges */
+/* nearest point of a triangle: inside when the foot of the perpendicular lies there, else on its edges */
 static double nearest_on_triangle(const double *corner[3], const double p[3], double out[3])
 {
     double e[3], f[3], normal[3], from[3], best = INFINITY;
@@ -335,7 +335,7 @@ double pal_box_tree_nearest(const pal_box_tree *tree, const double p[3], double 
         const node *n = &tree->nodes[stack[--n_stack]];
         if (box_distance(n, p) >= best) continue;
         if (!n->n_item) {
-            /* the nearer child is looked at first */
+            /* the nearer child is searched first */
             int left = (int)(n - tree->nodes) + 1, right = n->right;
             bool left_first = box_distance(&tree->nodes[left], p) <= box_distance(&tree->nodes[right], p);
             stack[n_stack++] = left_first ? right : left;

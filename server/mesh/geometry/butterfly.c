@@ -112,7 +112,7 @@ static int32_t opposite(const pal_winged_mesh *w, int32_t e, int side)
     return pal_wing_other_end(w->edge, w->edge[e].next[side], w->edge[e].vertex[1 - side]);
 }
 
-/* eq. 3; a wing beyond the boundary is reflected across it */
+/* eq. 3; a point beyond the boundary is reflected across it */
 static void regular_rule(const pal_winged_mesh *w, int32_t e, entries *to)
 {
     const pal_winged_edge *edge = w->edge;
@@ -182,7 +182,7 @@ static int by_index(const void *a, const void *b)
     return i < j ? -1 : i > j;
 }
 
-/* ascending; few entries, except around vertices of hundreds of faces */
+/* sorts by index; few entries, except around vertices of hundreds of faces */
 static void sort(entries *to)
 {
     entry *heap = to->n > 64 ? malloc((size_t)to->n * sizeof *heap) : NULL;
@@ -203,7 +203,7 @@ static void sort(entries *to)
     }
 }
 
-/* each index once, without those that have cancelled */
+/* merges equal indices and drops entries that have cancelled */
 static void merge(entries *to)
 {
     int n = 0;

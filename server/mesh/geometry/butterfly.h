@@ -1,10 +1,10 @@
-/* Modified butterfly subdivision (paper C eq. 3-5): the stencil of an edge's midpoint on a triangle surface.
+/* Modified butterfly subdivision (paper C eq. 3 to 5): the stencil of an edge's midpoint on a triangle surface.
  *
- * Surfaces are seen through winged edges (paper C, implementation). An edge runs from vertex[0] to vertex[1]; side 0 is
- * the face on its left, walked along the edge, side 1 the face on its right, walked against it; prev and next are the
- * edges before and after it on that walk. A hole counts as a face with number -1 whose walk follows the boundary, so
- * that prev and next exist everywhere and undo each other. A boundary edge has its hole on side 1. Every vertex has one
- * fan of faces. Thread: [any], nothing is kept. */
+ * Surfaces have winged edges (paper C, implementation). An edge runs from vertex[0] to vertex[1]; side 0 is the face on
+ * its left, walked along the edge, side 1 the face on its right, walked against it; prev and next are the edges before
+ * and after it on that walk. A hole counts as a face with number -1 whose walk follows the boundary, so that prev and
+ * next exist everywhere and are inverse to each other. A boundary edge has its hole on side 1. Every vertex has one fan
+ * of faces. Thread: [any], no state. */
 #ifndef PAL_MESH_GEOMETRY_BUTTERFLY_H
 #define PAL_MESH_GEOMETRY_BUTTERFLY_H
 #include <stdbool.h>
@@ -52,7 +52,7 @@ double pal_butterfly_ring(int K, int i);
  * on ring vertex j of 0..k; j = -1: on the vertex itself. */
 double pal_butterfly_boundary(int k, int i, int j);
 
-/* most entries the stencil of edge e can have; 8 for most */
+/* maximum number of entries of the stencil of edge e; usually 8 */
 int pal_butterfly_max_entries(const pal_winged_mesh *wings, int32_t e);
 /* Indices, ascending and each once, and weights of the midpoint of edge e; returns their number. Weights sum to 1.
  * index and weight have room for pal_butterfly_max_entries entries. */

@@ -1,8 +1,8 @@
 /* Marching tetrahedra on a body-centred cubic lattice.
  *
- * Lattice points are the corners and centres of cubic cells. Two centres on either side of a face make a tetrahedron
- * with each of the face's four edges; all tetrahedra are alike, so the triangles have no preferred direction. A
- * crossing stays 1e-4 of its edge away from both ends, which keeps corners apart and moves no topology. */
+ * Lattice points are the corners and centres of cubic cells. Two centres on either side of a face form a tetrahedron
+ * with each of the face's four edges; all tetrahedra are congruent, so the triangles have no preferred direction. A
+ * crossing stays 1e-4 of its edge away from both ends, which keeps vertices apart and does not change the topology. */
 #include "server/mesh/geometry/contour.h"
 
 #include "server/base/vec3.h"
@@ -56,7 +56,7 @@ static void position(const lattice *l, int64_t id, double p[3])
     }
 }
 
-/* samples corners (shift 0) or centres (shift 1/2); border points are outside, whatever the field says */
+/* samples corners (shift 0) or centres (shift 1/2); border points are outside whatever the field */
 static void sample(lattice *l, pal_contour_field *field, const void *self, bool centre)
 {
     int64_t n[3], c[3];

@@ -1,11 +1,11 @@
 /* Quadric edge collapse in passes: every pass sorts all edges by the error of their collapse and takes the cheapest
  * whose two ends have not been part of a collapse in this pass.
  *
- * A collapse u -> v locks u and v only. The triangles around an unlocked vertex are then still those of the pass's
- * start, less the ones that shrank to an edge, with corners renamed by `remap`; so its ring is known without keeping
- * the adjacency up to date. A collapse is allowed when it keeps the topology (link condition), turns no triangle by
- * more than about 75 degrees and adds at most one thin one. Before each pass badly shaped pairs of triangles flip their
- * common edge. */
+ * A collapse u -> v locks u and v only. The triangles around an unlocked vertex are then those of the start of the
+ * pass, without the ones that shrank to an edge, with corners renamed by `remap`; so its ring is known without updating
+ * the adjacency. A collapse is allowed when it keeps the topology (link condition), rotates no triangle by more than
+ * about 75 degrees and adds at most one thin one. Before each pass badly shaped pairs of triangles flip their common
+ * edge. */
 #include "server/mesh/geometry/decimate.h"
 
 #include "server/base/vec3.h"
@@ -14,13 +14,13 @@
 #include <string.h>
 
 enum { MAX_RING = 24, MAX_DEGREE = 12 };
-/* pull to the edge's middle, as part of the quadric's area: spreads vertices evenly where the surface is flat */
+/* weight of the edge's midpoint, as part of the quadric's area: spreads vertices evenly where the surface is flat */
 static const double pull = 1e-3;
 /* triangles below this shape (0 flat, 0.577 equilateral) are thin */
 static const double thin = 0.12;
-/* triangles below this shape are offered a flip */
+/* triangles below this shape are candidates for a flip */
 static const double bad_shape = 0.3;
-/* a collapse may make triangles thinner by this in sum: flips mend one thin triangle, but not a cluster of them */
+/* a collapse may make triangles thinner by this sum: flips repair one thin triangle, but not a cluster of them */
 static const double thin_room = 0.1;
 
 /* x'Ax + 2b'x + c with A symmetric (xx xy xz yy yz zz), and the area it stands for */
@@ -56,7 +56,7 @@ static double quadric_at(const quadric *q, const double x[3])
     return ax * x[0] + ay * x[1] + az * x[2] + 2 * pal_dot3(q->b, x) + q->c;
 }
 
-/* where the quadric is least; false when that is not well defined */
+/* minimum of the quadric; false when it is not well defined */
 static bool quadric_minimum(const quadric *q, double x[3])
 {
     const double *a = q->a;
@@ -97,7 +97,7 @@ static void find_quadrics(const pal_surface *s, quadric *all)
     }
 }
 
-/* best place for the collapse of an edge and its error */
+/* best position for the collapse of an edge and its error */
 static double collapse_place(const pass *p, int32_t u, int32_t v, double x[3])
 {
     const double *xu = p->s->x + 3 * (size_t)u, *xv = p->s->x + 3 * (size_t)v;
@@ -172,13 +172,13 @@ static double thinness(const double a[3], const double b[3], const double c[3], 
     return sum > 0 ? 2 * pal_norm3(n) / sum : 0;
 }
 
-/* by how much the thin triangles around both ends of an edge are too thin, in sum, before and after its collapse */
+/* sum of the shape deficits of the thin triangles around both ends of an edge, before and after its collapse */
 typedef struct thin_sum {
     double before, after;
 } thin_sum;
 
-/* do the triangles of one end stay upright when it moves to x? other: the end that vanishes with it. The normal of a
- * thin or tiny triangle says nothing, so such a one is compared with the whole ring's. */
+/* Do the triangles of one end keep their orientation when it moves to x? other: the end that vanishes with it. The
+ * normal of a thin or tiny triangle is not defined well, so such a triangle is compared with the whole ring. */
 static bool keeps_orientation(const pass *p, int32_t u, int32_t other, int32_t ring[MAX_RING][2], int n,
                               const double x[3], thin_sum *sum)
 {
@@ -287,8 +287,8 @@ static bool flip_improves(const double *a, const double *b, const double *o, con
     return true;
 }
 
-/* turns the longest edge of a badly shaped triangle if that helps; collapses alone cannot mend caps, which have no
- * short edge. Every vertex takes part in one flip at most, so that the fans stay good enough */
+/* flips the longest edge of a badly shaped triangle if that improves it; collapses alone cannot repair caps, which have
+ * no short edge. Every vertex takes part in one flip at most, so that the fans stay valid enough */
 static bool flip(pass *p, int32_t t)
 {
     int32_t *c = p->s->tri + 3 * (size_t)t;

@@ -1,7 +1,7 @@
 /* kd-tree of points: the k nearest, deterministic (ties by smaller index).
  *
- * The tree is the point order itself: the middle point of a range splits it along the range's longest side, and the two
- * halves are the subtrees; ranges of up to LEAF points are searched whole. No node structs, no pointers. */
+ * The order of the points is the tree: the middle point of a range splits it along the range's longest side, and the
+ * two halves are the subtrees; ranges of up to LEAF points are searched linearly. No node structs, no pointers. */
 #include "server/mesh/geometry/kd_tree.h"
 
 #include <stdbool.h>
@@ -35,7 +35,7 @@ static bool before(const pal_kd_tree *tree, int a, int b, int axis)
     return p < q || (p == q && tree->index[a] < tree->index[b]);
 }
 
-/* quickselect with a middle-of-three pivot: the point of rank middle comes to its place, smaller ones before it */
+/* quickselect with a median-of-three pivot: moves the point of rank middle to its position, smaller ones before it */
 static void select_middle(pal_kd_tree *tree, int low, int high, int middle, int axis)
 {
     while (low < high) {
@@ -143,7 +143,7 @@ static void descend(query *q, int low, int high)
     bool first_low = to_plane < 0;
     for (int side = 0; side < 2; side++) {
         bool far_side = side == 1;
-        /* equal distances count, so that ties go to the smaller index wherever it lies */
+        /* equal distances count, so that ties go to the smaller index wherever it is stored */
         if (far_side && q->found == q->k && to_plane * to_plane > q->distance2[q->k - 1]) return;
         if (first_low != far_side)
             descend(q, low, middle - 1);

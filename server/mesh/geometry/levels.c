@@ -1,8 +1,8 @@
 /* Detail levels: checks, edges of the coarse surface, then split by split (paper C, pre-processing phase).
  *
- * Departures: the paper stores pointers to parents and children; here they follow from the order of the numbers. It
- * takes any mesh; here what has no winged edges or no stencil is refused by name, and the boundary's corners, which the
- * four-point rule would round off, are found by their angle at rest. */
+ * Departures: the paper stores pointers to parents and children; here they follow from the numbering. It takes any
+ * mesh; here meshes without winged edges or stencils are refused with the reason, and the corners of the boundary,
+ * which the four-point rule would round off, are found by their angle at rest. */
 #include "server/mesh/geometry/levels.h"
 
 #include "server/base/vec3.h"
@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define FLAT       1e-9 /* least height of a face, of its longest edge; least edge, of the surface's diagonal */
+#define FLAT       1e-9 /* minimum height of a face, of its longest edge; minimum edge, of the diagonal of the surface */
 #define FAR_M      1e9
 #define CORNER_COS 0.25881904510252074 /* cos 75 degrees */
 #define BUDGET     ((size_t)512 << 20)
@@ -24,7 +24,7 @@ void pal_levels_free(pal_levels *l)
     memset(l, 0, sizeof *l);
 }
 
-/* ---- what is refused before any edge is known ---- */
+/* ---- checks before any edge is known ---- */
 
 static pal_err check_face(const pal_surface *s, int t, pal_diagnostic *diag)
 {
@@ -306,7 +306,7 @@ static pal_err get_entries(pal_levels *l, int64_t irregular, size_t budget, pal_
     return l->stencil_vertex && l->stencil_weight ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-/* gives back what the stencils did not need */
+/* returns the memory that the stencils did not need */
 static void trim_entries(pal_levels *l)
 {
     size_t n = (size_t)l->stencil_start[l->n_vertex[l->n_level - 1] - l->n_vertex[0]];

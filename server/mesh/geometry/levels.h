@@ -58,9 +58,9 @@ typedef struct pal_levels {
     size_t n_byte;           /* memory of all arrays                                                   */
 } pal_levels;
 
-/* Makes the levels of a surface; its arrays are copied. REFUSED, with the first offender: no triangle, n_level out of
+/* Makes the levels of a surface; its arrays are copied. REFUSED, with the first fault: no triangle, n_level out of
  * range, a corner out of range or repeated, a position that is NaN or beyond 1e9 m, a face without area, a vertex of no
- * face, an edge with more than two faces or run through twice the same way, a vertex with more than one fan, two faces
+ * face, an edge with more than two faces or two faces in the same direction, a vertex with more than one fan, two faces
  * with the same corners, a level whose edges shrink to nothing. BUDGET, with both numbers; MEMORY. */
 pal_err pal_levels_make(const pal_surface *surface, const pal_levels_options *options, pal_levels *out,
                         pal_diagnostic *diag);
@@ -78,7 +78,7 @@ static inline int32_t pal_levels_n_face(const pal_levels *l, int level)
     return l->first_face[level + 1] - l->first_face[level];
 }
 
-/* family of an edge: below, -1 stands for "none" */
+/* parents and children of an edge; -1: none */
 static inline int32_t pal_levels_edge_midpoint(const pal_levels *l, int32_t e)
 {
     int level = l->edge_level[e];
@@ -106,7 +106,7 @@ static inline int32_t pal_levels_edge_parent_face(const pal_levels *l, int32_t e
     return i >= 0 ? l->first_face[level - 1] + i / 3 : -1;
 }
 
-/* family of a face */
+/* parents and children of a face */
 static inline int32_t pal_levels_face_child(const pal_levels *l, int32_t f, int k)
 {
     int level = l->face_level[f];
@@ -130,21 +130,21 @@ static inline int32_t pal_levels_vertex_parent(const pal_levels *l, int32_t v)
     int level = l->vertex_level[v];
     return level > 0 ? l->first_edge[level - 1] + (v - l->n_vertex[level - 1]) : -1;
 }
-/* an edge of the level at v, v < n_vertex[level]: where to begin to walk around it, all its faces before the hole */
+/* an edge of the level at v, v < n_vertex[level]: the start of a walk around it, all its faces before the hole */
 static inline int32_t pal_levels_spoke(const pal_levels *l, int level, int32_t v)
 {
     return l->spoke[l->first_spoke[level] + v];
 }
-/* on the boundary of the surface? the same on every level that has v */
+/* on the boundary of the surface? The same on every level that has v */
 static inline bool pal_levels_on_boundary(const pal_levels *l, int32_t v)
 {
     const pal_winged_edge *e = &l->edge[pal_levels_spoke(l, l->vertex_level[v], v)];
     return e->face[1] < 0;
 }
 
-/* Applies the stencil of vertex v >= n_vertex[0] to positions or any other triple per vertex x [][3]: where v stands
- * when all vertices of its stencil do as in x. They are of coarser levels, so that vertices nobody moves can be placed
- * in ascending order. out may be the row's own place in x, as no row names its own vertex. */
+/* Applies the stencil of vertex v >= n_vertex[0] to positions or any other triple per vertex x [][3]. The vertices of a
+ * stencil are of coarser levels, so midpoints can be computed in ascending order. out may be the row of v in x, because
+ * no stencil contains its own vertex. */
 static inline void pal_levels_midpoint(const pal_levels *l, int32_t v, const double *x, double out[3])
 {
     const int32_t row = v - l->n_vertex[0];

@@ -1,5 +1,5 @@
-/* A procedural organ of our own, shown when no scan can be had: liver-like, closed, smooth, about 0.2 m across.
- * Thread: [load]. */
+/* A procedural organ, shown when no scan is available: liver-like, closed, smooth, about 0.2 m across. Thread: [load].
+ */
 #ifndef PAL_MESH_GEOMETRY_ORGAN_H
 #define PAL_MESH_GEOMETRY_ORGAN_H
 #include "server/mesh/geometry/surface.h"

@@ -1,6 +1,5 @@
-/* Private to the mesh room: convex polygons of a few corners, cut by planes. A corner that lies on the plane belongs to
- * both sides, and the corners a cut makes are the same in both, so that no area is lost or counted twice. Thread: any.
- */
+/* Private to the mesh room: convex polygons of few corners, cut by planes. A corner on the plane belongs to both sides,
+ * and both sides share the corners that a cut makes, so that no area is lost or counted twice. Thread: any. */
 #ifndef PAL_MESH_GEOMETRY_POLYGON_H
 #define PAL_MESH_GEOMETRY_POLYGON_H
 #include <stddef.h>

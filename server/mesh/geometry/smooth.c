@@ -27,7 +27,7 @@ static void step(pal_surface *s, double factor, double *sum, const int32_t *degr
     }
 }
 
-/* a vertex is held when its outgoing neighbours are not its incoming ones: it lies on an open or flipped edge */
+/* a vertex is fixed when its outgoing neighbours are not its incoming ones: it lies on an open or misoriented edge */
 static void find_fixed(const pal_surface *s, int32_t *degree, int64_t *balance, uint8_t *fixed)
 {
     for (int i = 0; i < s->n_vertex; i++) degree[i] = 0, balance[i] = 0;
@@ -41,8 +41,8 @@ static void find_fixed(const pal_surface *s, int32_t *degree, int64_t *balance, 
     for (int i = 0; i < s->n_vertex; i++) fixed[i] = balance[i] != 0;
 }
 
-/* pulls every vertex back to within its reach of its start, measured along its normal there, and to within twice that
- * across it: sliding along the surface does not change the shape */
+/* moves every vertex back to within its reach of its start along its normal there, and to within twice that
+ * tangentially: sliding along the surface does not change the shape */
 static void limit_displacement(pal_surface *s, const double *start, const double *normal, const double *reach_m)
 {
     for (size_t i = 0; i < (size_t)s->n_vertex; i++) {

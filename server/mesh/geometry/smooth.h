@@ -6,8 +6,8 @@
 
 /* rounds of one step there (0.5) and back (-0.53), in place; vertices of open edges stay; MEMORY */
 pal_err pal_surface_smooth(pal_surface *surface, int rounds);
-/* rounds of the step towards the neighbours' mean alone, but vertex i stays within reach_m[i] along its normal, and
- * twice that across it, of where it began: takes out all waves that the reach covers, long ones too; in place; vertices
+/* Rounds of the step towards the neighbours' mean alone, but vertex i stays within reach_m[i] of its start along its
+ * normal and within twice that tangentially: removes all waves that the reach covers, long ones too; in place; vertices
  * of open edges stay; MEMORY */
 pal_err pal_surface_relax(pal_surface *surface, int rounds, const double *reach_m);
 #endif

@@ -1,6 +1,5 @@
-/* Hollow bodies: rings of vertices zipped into a tube with closed ends, blown up onto the zero set of a distance-like
- * function, spread evenly along it and turned to a Delaunay triangulation edge by edge. Counts are those of the rings.
- */
+/* Hollow bodies: rings of vertices joined to a tube with closed ends, projected onto the zero set of a distance-like
+ * function, distributed evenly along it and flipped to a Delaunay triangulation. Counts are those of the rings. */
 #include "server/mesh/geometry/stomach.h"
 
 #include "server/base/vec3.h"
@@ -9,7 +8,7 @@
 #include <string.h>
 
 #define PI       3.14159265358979323846
-#define WIDE_COS 0.766 /* of 40 degrees: angles above are left alone */
+#define WIDE_COS 0.766 /* cosine of 40 degrees: larger angles are not changed */
 
 /* distance-like: positive inside, zero at the surface */
 typedef double (*shape)(const double p[3]);
@@ -32,7 +31,7 @@ typedef struct hollow {
     uint8_t *valence; /* [n_vertex] */
     uint8_t *fixed;   /* [n_vertex] */
     double *move;     /* [n_vertex][4] */
-    double reach;     /* longest way in a step, m */
+    double reach;     /* maximum displacement in a step, m */
 } hollow;
 
 /* ---- rings ---- */
@@ -157,7 +156,7 @@ static void face_normal(const double *x, int32_t a, int32_t b, int32_t c, double
     pal_cross3(n, u, v);
 }
 
-/* whether c d b and d c a look the way a b c and b a d do together */
+/* do c d b and d c a have the orientation of a b c and b a d? */
 static bool stays_flat(const double *x, int32_t a, int32_t b, int32_t c, int32_t d)
 {
     double n[3], m[3];
@@ -170,7 +169,7 @@ static bool stays_flat(const double *x, int32_t a, int32_t b, int32_t c, int32_t
     return pal_dot3(n, m) > 0;
 }
 
-/* turns the edge a b of two faces into c d when its opposite angles are more than a half circle together */
+/* flips the edge a b of two faces to c d when its opposite angles sum to more than 180 degrees */
 static void flip_edge(hollow *body, int32_t a, int32_t b)
 {
     const pal_surface *s = body->s;
@@ -205,8 +204,8 @@ static void to_surface(const hollow *body, double x[3])
     }
 }
 
-/* along the surface a share of the way to the middle of the faces around, and onto the zero set; the middle is weighted
- * by area, or the vertices would slip off together as a rubber band slips off a ball */
+/* moves vertices along the surface by a fraction of the distance to the centre of the faces around, and onto the zero
+ * set; the centre is weighted by area, or the vertices would slip off together */
 static void smooth_tangentially(hollow *body, double share)
 {
     pal_surface *s = body->s;
@@ -248,7 +247,7 @@ static double min_cosine(const double *all, const double x[3], int32_t side[][2]
     return worst;
 }
 
-/* small steps along the surface that widen the least angle around a vertex */
+/* small steps along the surface that increase the smallest angle around a vertex */
 static void widen(hollow *body, int32_t v, double step)
 {
     enum { WAYS = 8 };
@@ -279,15 +278,16 @@ static void widen(hollow *body, int32_t v, double step)
     }
 }
 
-/* the rings, blown up and spread evenly; on failure nothing is left */
-static pal_err make_shell(const ring *rings, int n_ring, const node *spine, int n_node, shape inside, double reach,
-                          pal_surface *out)
+/* the rings, projected and distributed evenly; on failure nothing is left */
+static pal_err make_hollow_body(const ring *rings, int n_ring, const node *spine, int n_node, shape inside,
+                                double reach, pal_surface *out)
 {
-    enum { MOST = 256, STEPS = 500, WIDENINGS = 40 };
-    uint8_t valence[MOST], fixed[MOST];
+    enum { MAX_VERTEX = 256, STEPS = 500, WIDENINGS = 40 };
+    uint8_t valence[MAX_VERTEX], fixed[MAX_VERTEX];
     pal_surface s;
-    hollow body = {
-        &s, inside, malloc(MOST * MOST * sizeof(int32_t)), valence, fixed, malloc(MOST * 4 * sizeof(double)), reach};
+    hollow body = {&s,      inside, malloc(MAX_VERTEX * MAX_VERTEX * sizeof(int32_t)),
+                   valence, fixed,  malloc(MAX_VERTEX * 4 * sizeof(double)),
+                   reach};
     pal_err err = body.owner && body.move ? make_tube(rings, n_ring, spine, n_node, &body) : PAL_ERR_MEMORY;
     for (int step = 0; !err && step < STEPS; step++) {
         count_around(&body);
@@ -322,7 +322,7 @@ pal_err pal_sphere_make(double radius_m, pal_surface *out)
                                  {6, 2.65, 1, false}, {1, 3, 0, false}};
     static const node spine[] = {{{0, 0, -1}, 0.02}, {{0, 0, -0.5}, 0.8}, {{0, 0, 0.5}, 0.8}, {{0, 0, 1}, 0.02}};
     if (!(radius_m > 0) || !isfinite(radius_m)) return PAL_ERR_REFUSED;
-    PAL_TRY(make_shell(rings, sizeof rings / sizeof *rings, spine, 4, unit_ball, 0.1, out));
+    PAL_TRY(make_hollow_body(rings, sizeof rings / sizeof *rings, spine, 4, unit_ball, 0.1, out));
     for (int i = 0; i < out->n_vertex; i++) {
         pal_unit3(out->x + 3 * i, out->x + 3 * i, 0);
         pal_scale3(out->x + 3 * i, radius_m, out->x + 3 * i);
@@ -370,7 +370,7 @@ pal_err pal_stomach_make(pal_stomach *out)
                                  {22, 2.6, 1, false}, {20, 3.1, 1, false}, {18, 3.6, 1, false}, {14, 4.3, 1, false},
                                  {9, 5.1, 1, false},  {6, 5.8, 1, false},  {6, 7.0, 1, true},   {1, 7.0, 0, true}};
     pal_stomach made = {.oesophagus_cap = 0, .duodenum_cap = PAL_STOMACH_VERTEX - 1};
-    PAL_TRY(make_shell(rings, sizeof rings / sizeof *rings, gut, N_GUT, stomach, 0.003, &made.surface));
+    PAL_TRY(make_hollow_body(rings, sizeof rings / sizeof *rings, gut, N_GUT, stomach, 0.003, &made.surface));
     for (int k = 0; k < PAL_STOMACH_RING; k++) {
         made.oesophagus[k] = 1 + k;
         made.duodenum[k] = PAL_STOMACH_VERTEX - 1 - PAL_STOMACH_RING + k;

@@ -1,6 +1,5 @@
-/* Procedural hollow bodies of our own for the adaptive surface springs (paper C, Table I): a sphere of 114 vertices, a
- * stomach of 188, a sheet of fabric. The same surface every time; each is taken from the heap (pal_surface_free).
- * Thread: [load]. */
+/* Procedural hollow bodies for the adaptive surface springs (paper C, Table I): a sphere of 114 vertices, a stomach of
+ * 188, a sheet of fabric. The surfaces are deterministic; each owns heap memory (pal_surface_free). Thread: [load]. */
 #ifndef PAL_MESH_GEOMETRY_STOMACH_H
 #define PAL_MESH_GEOMETRY_STOMACH_H
 #include "server/mesh/geometry/surface.h"
@@ -10,7 +9,7 @@ enum { PAL_SPHERE_VERTEX = 114, PAL_STOMACH_VERTEX = 188, PAL_STOMACH_RING = 6 }
 typedef struct pal_stomach {
     pal_surface surface; /* closed; about 0.21 x 0.24 x 0.10 m, 1.4 l; x to the body's left, y up, z to the front */
     /* vertices around the ends of the oesophagus (the cardia's) and of the duodenum (the pylorus's), neighbours in
-     * turn; each ring is closed by a cap of six faces around one more vertex, which is held with it */
+     * order; each ring is closed by a cap of six faces around one more vertex, which is fixed with it */
     int32_t oesophagus[PAL_STOMACH_RING], oesophagus_cap;
     int32_t duodenum[PAL_STOMACH_RING], duodenum_cap;
 } pal_stomach;

@@ -117,7 +117,7 @@ pal_err pal_surface_fans(const pal_surface *surface, int32_t **start, int32_t **
         free(list);
         return PAL_ERR_MEMORY;
     }
-    /* counts are kept two places on, so that filling leaves each row's start in its own place */
+    /* counts are shifted by two entries, so that filling leaves each row's start in place */
     for (size_t c = 0; c < n_corner; c++) row[surface->tri[c] + 2]++;
     for (size_t i = 2; i < n_vertex + 2; i++) row[i] += row[i - 1];
     for (size_t c = 0; c < n_corner; c++) list[row[surface->tri[c] + 1]++] = (int32_t)(c / 3);
@@ -198,13 +198,7 @@ pal_err pal_surface_components(const pal_surface *surface, int32_t *label, int *
                 pal_union_find_join(label, sides[k].corner / 3, sides[k - 1].corner / 3);
     free(row);
     free(sides);
-    /* a root comes before its members: one pass finds the roots, one numbers them (as -1 - number) and hands these on
-     */
-    for (int32_t t = 0; t < surface->n_tri; t++) label[t] = label[label[t]];
-    int n = 0;
-    for (int32_t t = 0; t < surface->n_tri; t++) label[t] = label[t] == t ? -1 - n++ : label[label[t]];
-    for (int32_t t = 0; t < surface->n_tri; t++) label[t] = -1 - label[t];
-    *n_component = n;
+    *n_component = pal_union_find_label(label, surface->n_tri);
     return PAL_ERR_OK;
 }
 

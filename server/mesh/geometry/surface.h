@@ -17,7 +17,7 @@ typedef struct pal_surface {
     double origin_m[3]; /* file position (in m) = x + origin_m                */
 } pal_surface;
 
-/* what reading and cleaning dropped or joined; all counts of the file's own pieces */
+/* counts of what reading and cleaning dropped, joined or repaired */
 typedef struct pal_surface_report {
     char format[16];                   /* "obj", "stl binary", "stl ascii", "ply", "off", "nifti", "inr"         */
     char place[32];                    /* where the first face or voxel stands: "line 12", "byte 84"; or empty   */
@@ -26,10 +26,10 @@ typedef struct pal_surface_report {
     int64_t n_degenerate, n_duplicate; /* triangles dropped: repeated corner or no area; same three corners      */
     int64_t n_nonfinite;               /* triangles dropped because a corner is NaN or infinite                  */
     int64_t n_unused;                  /* vertices of no triangle, dropped                                       */
-    int64_t n_folded;                  /* triangles dropped, beside n_duplicate, because their doubles run the other
-                                        * way round: fins that enclose nothing                                   */
-    int64_t n_repaired;                /* triangles without area between three corners: not dropped, which would
-                                        * leave a slit, but mended by splitting their neighbour                  */
+    int64_t n_folded; /* triangles dropped, besides n_duplicate, because their doubles have the other orientation: fins
+                         that enclose nothing */
+    int64_t n_repaired; /* triangles without area between three corners: not dropped, which would leave a slit, but
+                           repaired by splitting their neighbour */
 } pal_surface_report;
 
 /* frees the arrays and zeroes the struct; a zeroed struct is fine */
@@ -56,7 +56,7 @@ pal_err pal_surface_fans(const pal_surface *surface, int32_t **start, int32_t **
 /* edge-connected components: label of each triangle [n_tri] (caller's memory), number out; MEMORY */
 pal_err pal_surface_components(const pal_surface *surface, int32_t *label, int *n_component);
 
-/* topology facts for reports: edges with one, with more than two triangles, and run through twice the same way */
+/* topology for reports: edges with one triangle, with more than two, and with two in the same direction */
 typedef struct pal_surface_topology {
     int n_open_edge, n_nonmanifold_edge, n_misoriented_edge;
     int n_nonmanifold_vertex; /* vertices with more than one fan of triangles */

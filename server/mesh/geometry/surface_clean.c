@@ -1,18 +1,18 @@
-/* Cleaning of a surface as read: welding, and dropping what carries no area or says the same twice.
+/* Cleaning of a surface as read: welding, and dropping triangles without area and duplicates.
  *
- * Welding joins a vertex to the first earlier kept vertex within the tolerance. Kept vertices are farther than the
- * tolerance apart, so a cell of four tolerances holds a bounded number of them however the file is made. */
+ * Welding joins a vertex to the first earlier kept vertex within the tolerance. Kept vertices are farther apart than
+ * the tolerance, so a cell of four tolerances holds a bounded number of them for any file. */
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/surface.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/* a coordinate beyond this cannot be cubed and summed any more, and counts as infinite */
+/* a coordinate beyond this cannot be cubed and summed, and counts as infinite */
 #define COORDINATE_LIMIT 1e30
-/* a triangle whose height is below this part of its longest side has no area */
+/* a triangle whose height is below this fraction of its longest side has no area */
 #define HEIGHT_LIMIT 1e-12
-/* flat triangles at a vertex of more triangles than this are dropped, not mended, so that the time stays linear */
+/* flat triangles at a vertex of more triangles than this are dropped, not repaired, so that the time stays linear */
 enum { MAX_FAN = 64 };
 
 typedef struct cleaner {
@@ -85,7 +85,7 @@ static int32_t weld_partner(const cleaner *k, uint64_t bucket, const double p[3]
     return best;
 }
 
-/* finds the partner of vertex i or files i as kept */
+/* finds the partner of vertex i or records i as kept */
 static void weld_vertex(cleaner *k, int32_t i)
 {
     const double *p = k->surface->x + 3 * (size_t)i;
@@ -172,8 +172,8 @@ static int32_t neighbour(const pal_surface *s, const int32_t *start, const int32
     return n == 1 ? found : -1;
 }
 
-/* a flat triangle with three corners lies along its longest edge a-c with b in between: the triangle a-c-d on the
- * other side is split at b, which keeps the surface closed where dropping the flat one would leave a slit */
+/* a flat triangle with three corners lies along its longest edge a-c with b in between: the triangle a-c-d on the other
+ * side is split at b, which keeps the surface closed; dropping the flat one would leave a slit */
 static bool split_neighbour(cleaner *k, const int32_t *start, const int32_t *item, int32_t t)
 {
     pal_surface *s = k->surface;
@@ -205,7 +205,7 @@ static bool split_neighbour(cleaner *k, const int32_t *start, const int32_t *ite
     return true;
 }
 
-/* mends flat triangles in rounds; a vertex takes part once in a round, so that its fan is still the one at hand */
+/* repairs flat triangles in rounds; a vertex takes part once in a round, so that its fan is still valid */
 static pal_err repair_flat(cleaner *k)
 {
     pal_surface *s = k->surface;
@@ -238,14 +238,14 @@ static void sort_corners(int32_t r[3], const int32_t c[3])
     r[1] = (int32_t)((int64_t)c[0] + c[1] + c[2] - r[0] - r[2]);
 }
 
-/* 1 or -1 by the sense in which the corners run through their sorted order */
+/* 1 or -1: parity of the corners against their sorted order */
 static int orientation(const int32_t c[3])
 {
     return (c[0] < c[1]) + (c[1] < c[2]) + (c[2] < c[0]) == 2 ? 1 : -1;
 }
 
-/* drops triangles of balance zero (as many run one way as the other) if the rest is no more open without them: such
- * a fin encloses nothing, but a body whose every triangle is there in both senses is still meant */
+/* drops triangles of balance zero (as many in one orientation as in the other) if the rest has no more open edges
+ * without them: such a fin encloses nothing, but a body whose triangles all exist in both orientations is kept */
 static pal_err drop_folded(cleaner *k, const int8_t *balance)
 {
     pal_surface *s = k->surface, rest = *s;

@@ -1,8 +1,8 @@
 /* Tetrahedral meshes at rest: boundary, unique edges and faces, components, faults.
  *
- * One tool serves all: the faces (or edges) of all tets are dealt into buckets by their smallest node and sorted inside
- * the bucket, so equal ones stand side by side. Linear in tets, since a node has a bounded number of tets around it; a
- * hostile mesh whose tets all meet in one node costs n log n. */
+ * One method serves all: the faces (or edges) of all tets are sorted into buckets by their smallest node and then
+ * inside the bucket, so equal ones are adjacent. Linear in tets, since a node has a bounded number of tets around it; a
+ * hostile mesh whose tets all meet in one node takes n log n. */
 #include "server/mesh/geometry/tets.h"
 
 #include "server/base/vec3.h"
@@ -66,7 +66,7 @@ static int compare_nodes(const void *a, const void *b)
     return s < t ? -1 : s > t;
 }
 
-/* buckets are short: insertion, and the library's sort for the odd long one */
+/* buckets are short: insertion sort, and qsort for long ones */
 static void sort_nodes(int32_t *node, int64_t n)
 {
     if (n > SHORT) {
@@ -290,17 +290,9 @@ pal_err pal_tets_components(const pal_tets *tets, int32_t *label, int *n_compone
             pal_union_find_join(parent, (int32_t)(s.item[a].from >> 2), (int32_t)(s.item[a + 1].from >> 2));
         }
     sides_free(&s);
-    int n = 0;
-    for (int t = 0; t < tets->n_tet; t++) n += parent[t] == t;
-    if (label) {
-        int next = 0;
-        for (int t = 0; t < tets->n_tet; t++) {
-            int32_t root = pal_union_find_root(parent, t);
-            label[t] = root == t ? next++ : label[root];
-        }
-    }
+    *n_component = pal_union_find_label(parent, tets->n_tet);
+    if (label) memcpy(label, parent, (size_t)tets->n_tet * sizeof *label);
     free(parent);
-    *n_component = n;
     return PAL_ERR_OK;
 }
 
@@ -364,7 +356,7 @@ static int compare_pairs(const void *a, const void *b)
     return s[2] < t[2] ? -1 : s[2] > t[2];
 }
 
-/* every boundary edge is run through equally often in both directions */
+/* every boundary edge must be run through equally often in both directions */
 static pal_err check_boundary(const pal_tets *tets, faults *f)
 {
     size_t n = 3 * (size_t)tets->n_face;

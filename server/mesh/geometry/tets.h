@@ -28,8 +28,8 @@ pal_err pal_tets_find_boundary(pal_tets *tets);
 pal_err pal_tets_edges(const pal_tets *tets, int32_t **out, int *n_edge);
 pal_err pal_tets_faces(const pal_tets *tets, int32_t **out, int *n_face);
 
-/* faults a mesh must not have: node out of range, repeated corner, volume <= 0, a face used by more than two tets, a
- * boundary that is not closed, a node of no tet. REFUSED names the first and counts all. */
+/* faults: node out of range, repeated corner, volume <= 0, a face of more than two tets, a boundary that is not closed,
+ * a node of no tet. REFUSED names the first and counts all. */
 pal_err pal_tets_check(const pal_tets *tets, pal_diagnostic *diag);
 
 /* face-connected components of the tets: label [n_tet] may be NULL; MEMORY */

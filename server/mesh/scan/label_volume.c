@@ -21,7 +21,7 @@
 static const int64_t max_voxel = (int64_t)1 << 29;
 static const size_t max_file = (size_t)4 << 30;
 /* a piece holds whole voxels of any type */
-enum { HEADER_MOST = 1 << 16, PIECE = 1 << 16, NIFTI_HEAD = 348 };
+enum { MAX_HEADER = 1 << 16, PIECE = 1 << 16, NIFTI_HEAD = 348 };
 
 /* fields of both headers */
 typedef struct header {
@@ -390,7 +390,7 @@ pal_err pal_label_volume_parse(const char *name, const uint8_t *bytes, size_t n_
     pal_file_printable_name(shown, name);
     source s = {.name = shown, .diag = diag, .bytes = bytes, .n_byte = n_byte, .packed = is_gzip(bytes, n_byte)};
     if (n_byte == 0) return refuse(&s, "byte", 0, "the file is empty");
-    uint8_t room[HEADER_MOST];
+    uint8_t room[MAX_HEADER];
     const uint8_t *head;
     size_t n_head;
     header h = {.slope = 1};

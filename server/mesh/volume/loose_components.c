@@ -173,19 +173,12 @@ pal_err pal_loose_components_drop(const char *name, const uint8_t *fixed, bool l
 
 static int label_cells(const pal_cells *cells, int32_t *label)
 {
-    int n = 0;
     pal_union_find_init(label, cells->n_cell);
     for (int32_t f = 0; f < cells->n_face; f++)
         if (!pal_cells_face_boundary(cells, f))
             pal_union_find_join(label, cells->face_use[cells->face[f].use[0]].cell,
                                 cells->face_use[cells->face[f].use[1]].cell);
-    /* the root of a set is its smallest member, so that it has its label before the others need it */
-    for (int32_t c = 0; c < cells->n_cell; c++) {
-        int32_t root = pal_union_find_root(label, c);
-        label[c] = root;
-    }
-    for (int32_t c = 0; c < cells->n_cell; c++) label[c] = label[c] == c ? n++ : label[label[c]];
-    return n;
+    return pal_union_find_label(label, cells->n_cell);
 }
 
 static pal_err keep_cells(pal_cells *cells, const int32_t *label, const component *part)

@@ -6,6 +6,7 @@
 #include "server/mesh/voxel/surface_part.h"
 
 #include "server/base/vec3.h"
+#include "server/num/union_find.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -27,12 +28,6 @@ typedef struct finder {
     uint8_t *reversed_of;  /* orientation against the patch parent; finally against the root */
     uint8_t *inconsistent; /* at a patch root: the patch has no common orientation (Moebius)    */
 } finder;
-
-static int32_t find_joined(int32_t *parent, int32_t i)
-{
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-}
 
 /* root of a patch and the orientation of the triangle against it; compresses the path */
 static int32_t find_patch(finder *f, int32_t i, uint8_t *reversed)
@@ -69,11 +64,7 @@ static void add_edge(finder *f, int32_t tri, uint64_t key, int sign)
     }
     if (e->n < 3) e->n++;
     if (e->n == 1) return;
-    int32_t a = find_joined(f->joined, tri), b = find_joined(f->joined, e->tri[0]);
-    if (a < b)
-        f->joined[b] = a;
-    else
-        f->joined[a] = b;
+    pal_union_find_join(f->joined, tri, e->tri[0]);
 }
 
 /* edges of exactly two triangles relate the orientations of these */
@@ -282,21 +273,12 @@ pal_err pal_parts_find(pal_scan_surface *scan, pal_parts *out)
     chain *chains = NULL;
     pal_err err = find_edges(&f);
     if (!err) {
-        for (int32_t t = 0; t < scan->n_tri; t++) parts.n += f.joined[t] == t;
+        parts.n = pal_union_find_label(f.joined, scan->n_tri);
+        scan->part = f.joined, f.joined = NULL;
         size_t room = parts.n ? (size_t)parts.n : 1;
-        scan->part = malloc((scan->n_tri ? (size_t)scan->n_tri : 1) * sizeof *scan->part);
         parts.part = calloc(room, sizeof *parts.part);
         chains = calloc(room, sizeof *chains);
-        if (!scan->part || !parts.part || !chains) err = PAL_ERR_MEMORY;
-    }
-    if (!err) {
-        /* a root is its part's first triangle, so it is numbered before the others look it up */
-        int next = 0;
-        for (int32_t t = 0; t < scan->n_tri; t++) {
-            int32_t root = find_joined(f.joined, t);
-            scan->part[t] = root == t ? next++ : scan->part[root];
-        }
-        err = orient(scan, &f, &parts, chains);
+        err = parts.part && chains ? orient(scan, &f, &parts, chains) : PAL_ERR_MEMORY;
     }
     finder_free(&f);
     free(chains);

@@ -39,14 +39,14 @@ static void add_sample(pal_contact_patch_track *track, double depth_m, double fo
 }
 
 /* depth goes on from the step before by the tool's move; a gap is known exactly */
-static void follow(pal_contact_patch_track *track, const pal_contact_patch_options *rules,
+static void follow(pal_contact_patch_track *track, const pal_contact_patch_options *options,
                    const pal_contact_group *group, const double move[3], bool moved)
 {
-    double prior = FIT_PRIOR_RADII * rules->radius_m, k = group->k_N_m;
+    double prior = FIT_PRIOR_RADII * options->radius_m, k = group->k_N_m;
     bool touches = group->force_N > 0;
     if (!touches) {
         track->depth_m = -group->gap_m;
-        if (k > 0) track->fit.k_N_m = fmin(fmax(k, rules->k_min_N_m), rules->k_max_N_m);
+        if (k > 0) track->fit.k_N_m = fmin(fmax(k, MIN_STIFFNESS_N_M), MAX_STIFFNESS_N_M);
         if (track->contact || k > 0) track->fit.k_start_N_m = track->fit.k_N_m;
     } else if (!track->contact) {
         /* first touch: the way since the gap was measured, or what the start stiffness makes of the force */
@@ -62,17 +62,17 @@ static void follow(pal_contact_patch_track *track, const pal_contact_patch_optio
         add_sample(track, track->depth_m, group->force_N, prior);
         double secant = group->force_N / track->depth_m;
         if (!(k > 0)) k = track->fit.k_N_m;
-        if (!(group->k_N_m > 0) && track->depth_m > SECANT_RADII * rules->radius_m)
+        if (!(group->k_N_m > 0) && track->depth_m > SECANT_RADII * options->radius_m)
             k = fmin(fmax(k, MIN_SECANT * secant), MAX_SECANT * secant);
-        track->fit.k_N_m = fmin(fmax(k, rules->k_min_N_m), rules->k_max_N_m);
+        track->fit.k_N_m = fmin(fmax(k, MIN_STIFFNESS_N_M), MAX_STIFFNESS_N_M);
     }
     track->contact = touches;
     pal_copy3(track->normal, group->normal);
 }
 
 /* the plane of zero force; low-passed while the tool rests */
-static void show(pal_contact_patch_track *track, const pal_contact_patch_options *rules, const pal_contact_group *group,
-                 const pal_tool *tool, bool fresh, bool rests)
+static void show(pal_contact_patch_track *track, const pal_contact_patch_options *options,
+                 const pal_contact_group *group, const pal_tool *tool, bool fresh, bool rests)
 {
     double k = track->fit.k_N_m, share = rests && !fresh ? REST_LOW_PASS : 1, normal[3], point[3];
     double height = group->force_N > 0 ? group->force_N / k : -group->gap_m;
@@ -87,14 +87,14 @@ static void show(pal_contact_patch_track *track, const pal_contact_patch_options
     track->shown.k1_N_m = fresh ? k : track->shown.k1_N_m + share * (k - track->shown.k1_N_m);
     track->shown.k2_N_m2 = 0;
     track->shown.id = track->shown.group = track->id;
-    track->shown.b_Ns_m = rules->b_s * track->shown.k1_N_m;
-    track->shown.kt_N_m = rules->friction > 0 ? SIDEWAYS_STIFFNESS * track->shown.k1_N_m : 0;
-    track->shown.mu_static = track->shown.mu_dynamic = rules->friction;
-    track->shown.radius_m = rules->radius_m;
+    track->shown.b_Ns_m = options->b_s * track->shown.k1_N_m;
+    track->shown.kt_N_m = options->friction > 0 ? SIDEWAYS_STIFFNESS * track->shown.k1_N_m : 0;
+    track->shown.mu_static = track->shown.mu_dynamic = options->friction;
+    track->shown.radius_m = options->radius_m;
     pal_set3(track->shown.velocity_m_s, 0, 0, 0);
 }
 
-void pal_contact_patches_update(pal_contact_patches *patches, const pal_contact_patch_options *rules,
+void pal_contact_patches_update(pal_contact_patches *patches, const pal_contact_patch_options *options,
                                 const pal_contact_group *group, int n, pal_tool *tool)
 {
     bool taken[PAL_CONTACT_PATCH_MAX] = {false};
@@ -110,11 +110,11 @@ void pal_contact_patches_update(pal_contact_patches *patches, const pal_contact_
             patches->next_id = (int16_t)(patches->next_id % 1023 + 1);
             track->id = (int16_t)(patches->id_base + patches->next_id);
             track->used = true;
-            pal_stiffness_fit_start(&track->fit, rules->k_start_N_m);
+            pal_stiffness_fit_start(&track->fit, options->k_start_N_m);
         }
         taken[track - patches->track] = true;
-        follow(track, rules, &group[i], move, patches->known);
-        show(track, rules, &group[i], tool, fresh, rests);
+        follow(track, options, &group[i], move, patches->known);
+        show(track, options, &group[i], tool, fresh, rests);
         if (tool->n_patch < PAL_CONTACT_PATCH_MAX) tool->patch[tool->n_patch++] = track->shown;
     }
     for (int i = 0; i < PAL_CONTACT_PATCH_MAX; i++)

@@ -13,7 +13,7 @@
 
 typedef struct pal_contact_patch_options {
     double radius_m;
-    double k_start_N_m, k_min_N_m, k_max_N_m;
+    double k_start_N_m;
     double b_s;      /* damping over stiffness, s                */
     double friction; /* coefficient, static and dynamic alike    */
 } pal_contact_patch_options;
@@ -37,6 +37,6 @@ typedef struct pal_contact_patches {
 void pal_contact_patches_reset(pal_contact_patches *patches, int id_base);
 /* once a step: matches blobs [n] (at most PAL_CONTACT_PATCH_MAX) with the patches of the step before and appends the
  * result to tool->patch. The tool's place is tool->here_m. */
-void pal_contact_patches_update(pal_contact_patches *patches, const pal_contact_patch_options *rules,
+void pal_contact_patches_update(pal_contact_patches *patches, const pal_contact_patch_options *options,
                                 const pal_contact_group *group, int n, pal_tool *tool);
 #endif

@@ -447,14 +447,13 @@ static void to_nodes(pal_contact_points *points, const pal_body *body)
 
 double pal_contact_points_assemble(pal_contact_points *points, const pal_body *body)
 {
-    double largest2 = 0;
+    double max2 = 0;
     to_nodes(points, body);
     for (int i = 0; i < points->n_node; i++) {
         const double *f = points->force + 3 * (size_t)points->node[i];
-        largest2 = fmax(largest2, pal_dot3(f, f));
+        max2 = fmax(max2, pal_dot3(f, f));
     }
-    double cap = body->load_cap_N;
-    return cap > 0 && largest2 > cap * cap ? cap / sqrt(largest2) : 1;
+    return sqrt(max2);
 }
 
 /* motion of a point along `away` when the nodes move with v and the frames with the spins in slot_torque */
@@ -492,20 +491,9 @@ double pal_contact_points_bound(const pal_contact_points *points, const pal_body
     return rate;
 }
 
-/* the same where points carry the nodes: the sum of the eigenvalues is no less than the largest, and what a point
- * between nodes moves is no more than their mean */
-static double sum_of_rates(const pal_contact_points *points, const pal_body *body, const pal_contact *contact, int n)
-{
-    double rate = 0;
-    for (int i = 0; i < n; i++)
-        rate += pal_contact_points_bound(points, body, contact[i].point, contact[i].k_N_m, NULL);
-    return rate;
-}
-
 double pal_contact_points_max_eigenvalue(pal_contact_points *points, const pal_body *body, const pal_contact *contact,
                                          int n)
 {
-    if (body->interpolation) return sum_of_rates(points, body, contact, n);
     enum { PASSES = 2, MOST = 256 };
     /* a patch of very many points is judged by a part of them, each standing for several */
     int stride = (n + MOST - 1) / MOST, m = 0;
@@ -587,16 +575,4 @@ void pal_contact_points_apply(const pal_contact_points *points, pal_body *body, 
         int32_t node = points->node[i];
         pal_axpy3(body->load + 3 * (size_t)node, scale, points->force + 3 * (size_t)node);
     }
-}
-
-double pal_tool_force_share(const pal_tool *tool, const double force_N[3])
-{
-    /* |g + s f|^2 <= cap^2 */
-    double cap = tool->force_cap_N * tool->ramp;
-    double a = pal_dot3(force_N, force_N), b = pal_dot3(tool->force_N, force_N);
-    double c = pal_dot3(tool->force_N, tool->force_N) - cap * cap;
-    if (!(a > 0) || a + 2 * b + c <= 0) return 1;
-    if (c >= 0) return 0;
-    double s = (-b + sqrt(b * b - a * c)) / a;
-    return s < 0 ? 0 : s > 1 ? 1 : s;
 }

@@ -73,13 +73,13 @@ void pal_contact_points_velocity(const pal_contact_points *points, int point, do
 bool pal_contact_points_nearest(const pal_contact_points *points, const pal_body *body, const double p[3],
                                 double place[3], double normal[3]);
 
-/* Explicit stability in a sub-step (numerics.md part 3): the largest eigenvalue of M^-1 sum k J' J over the contacts,
- * J being a point's motion along `away` with the free nodes, 1/s^2. Two power iterations from a uniform push, which is
- * nearly the vector looked for, since all points are pushed the same way. Where points carry the nodes
- * (pal_body.embed), a bound of it: the sum of k times the ease of each point. */
+/* Explicit stability in a sub-step: the largest eigenvalue of M^-1 sum k J' J over the contacts, J being a point's
+ * motion along `away` with the free nodes, 1/s^2. Two power iterations from a uniform push, which is nearly the vector
+ * looked for, since all points are pushed the same way */
 double pal_contact_points_max_eigenvalue(pal_contact_points *points, const pal_body *body, const pal_contact *contact,
                                          int n);
-/* where points carry the nodes: bound [n_node] += row sums of the stiffness k of a point; returns k times its ease */
+/* where points carry the nodes: bound [n_node] += row sums of the stiffness k of a point; returns k over its effective
+ * mass, 1/s^2 */
 double pal_contact_points_bound(const pal_contact_points *points, const pal_body *body, int point, double k_N_m,
                                 double *bound_N_m);
 /* true when two lists of contacts press on some common slot */
@@ -89,7 +89,7 @@ bool pal_contact_points_overlap(pal_contact_points *points, const pal_body *body
 /* forces of one tool: begin, push every point, gather them on nodes, then apply scale times all of it to body->load */
 void pal_contact_points_force_begin(pal_contact_points *points);
 void pal_contact_points_add_force(pal_contact_points *points, const pal_body *body, int point, const double force_N[3]);
-/* returns the largest share of the forces that keeps every node within body->load_cap_N (1 when there is no cap) */
+/* returns the largest force on a node, N */
 double pal_contact_points_assemble(pal_contact_points *points, const pal_body *body);
 void pal_contact_points_apply(const pal_contact_points *points, pal_body *body, double scale);
 
@@ -109,7 +109,4 @@ pal_err pal_contact_points_young(const pal_contact_points *points, const pal_bod
 
 /* nodes that bear shown vertex `vertex` and their weights, sum 1: node [5], weight [5]; returns how many */
 int pal_contact_points_nodes(const pal_body *body, int vertex, int32_t *node, double *weight);
-
-/* largest s in [0, 1] with |force so far on the tool + s force| <= the tool's cap at its present ramp */
-double pal_tool_force_share(const pal_tool *tool, const double force_N[3]);
 #endif

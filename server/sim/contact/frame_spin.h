@@ -1,7 +1,7 @@
 /* How a frame of a skin turns when the nodes around it move. Thread: [sim].
  *
  * A frame has X, the unit vector of N (the sum of its fan's normals), Y, the unit part of one edge e normal to X, and
- * Z = X x Y (mesh/skin.h). With v the velocities of the nodes its spin is
+ * Z = X x Y (mesh/volume/skin.h). With v the velocities of the nodes its spin is
  *     spin = X x X' + (Y'.Z) X,   X' = (1 - X X^T) N' / |N|,   Y'.Z = (Z.e' - (e.X) Z.X') / |e - X (X.e)| . */
 #ifndef PAL_SIM_CONTACT_FRAME_SPIN_H
 #define PAL_SIM_CONTACT_FRAME_SPIN_H

@@ -2,12 +2,13 @@
 #include "server/sim/contact/grasp_transfer.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/core/blend.h"
 
 void pal_grasp_transfer_begin(pal_grasp_transfer *h, const pal_grasp_spring *s)
 {
     double shift[3];
     h->due = false;
-    h->left_s = PAL_GRASP_BLEND_S;
+    h->left_s = PAL_BLEND_GRASP_S;
     if (s->firm && h->k_N_m > 0) {
         /* what caps and haste held back still is, where that is no jump */
         pal_sub3(shift, s->old_hold_m, s->hold);
@@ -29,7 +30,5 @@ void pal_grasp_transfer_begin(pal_grasp_transfer *h, const pal_grasp_spring *s)
 void pal_grasp_transfer_add(pal_grasp_transfer *h, double dt_s, double goal[3])
 {
     pal_add3(goal, goal, h->shift);
-    double fade = 1 - dt_s / (h->evenly ? fmax(h->left_s, dt_s) : PAL_GRASP_BLEND_S);
-    pal_scale3(h->shift, fmax(0, fade), h->shift);
-    h->left_s -= dt_s;
+    pal_scale3(h->shift, pal_blend_release(&h->left_s, dt_s), h->shift);
 }

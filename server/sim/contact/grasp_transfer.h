@@ -1,19 +1,16 @@
-/* A grip (tool_grasp) that goes on on another body in the same place (transfer.h): the hold o (tool_grasp.c) stays that
- * of the tissue for good, so that no switch takes anything from the pull; the force is at first what it was, by a shift
- * of the hold that fades in PAL_GRASP_BLEND_S, after which the new method's own force is felt; on surfaces that adapt
- * it is then all gone, as one of three levels may pull three times as hard as one of one. A switch before that sets the
- * shift anew. Thread: [sim]. */
+/* The transfer of a grasp (tool_grasp) to another body in the same place (transfer.h). The offset o between tool and
+ * tissue (tool_grasp.c) stays that of the tissue for good, so that no switch takes anything from the pull. The force is
+ * at first what it was, by a shift of o that is released over PAL_BLEND_GRASP_S, after which the new method's own force
+ * is felt (one of three levels of an adaptive surface may pull three times as hard as one of one). A switch before that
+ * sets the shift again. Thread: [sim]. */
 #ifndef PAL_SIM_CONTACT_GRASP_TRANSFER_H
 #define PAL_SIM_CONTACT_GRASP_TRANSFER_H
 #include <stdbool.h>
-
-#define PAL_GRASP_BLEND_S 0.4
 
 typedef struct pal_grasp_transfer {
     bool due; /* handed over, and nothing was felt since */
     /* on the body of before: patch, force on it, hold in the tool's axes; k of an implicit solver's spring, else 0 */
     double y[3], force_N[3], hold[3], k_N_m;
-    bool evenly;             /* shift goes by as much in every step */
     double shift[3], left_s; /* of the hold, axes of the world; until it is gone */
 } pal_grasp_transfer;
 

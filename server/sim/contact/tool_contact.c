@@ -2,6 +2,7 @@
 #include "server/sim/contact/tool_contact.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/core/blend.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -81,11 +82,11 @@ static void take_force(pal_tool_contact *to, const pal_body *body, const pal_too
 static void go_on(pal_tool_contact *to, const pal_tool_contact *from)
 {
     to->share = from->share;
-    if (!to->firm || !from->firm) return;
-    pal_copy3(to->firm->press.next_slip_m, from->firm->press.next_slip_m);
-    to->firm->press.next_slides = from->firm->press.next_slides;
-    to->firm->press.normal_N = from->firm->press.normal_N;
-    to->firm->haptic_stiffness = from->firm->haptic_stiffness;
+    if (!to->implicit || !from->implicit) return;
+    pal_copy3(to->implicit->solve.next_slip_m, from->implicit->solve.next_slip_m);
+    to->implicit->solve.next_slides = from->implicit->solve.next_slides;
+    to->implicit->solve.normal_N = from->implicit->solve.normal_N;
+    to->implicit->stiffness = from->implicit->stiffness;
 }
 
 void pal_tool_contact_transfer(pal_tool_contact *to, const pal_body *body, const pal_tool_contact *from,
@@ -95,21 +96,21 @@ void pal_tool_contact_transfer(pal_tool_contact *to, const pal_body *body, const
     pal_tool_contact_free(to);
     to->active = from->active;
     to->proxy = from->proxy;
-    to->ease = from->ease;
+    to->ramp = from->ramp;
     to->time_behind_s = from->time_behind_s;
     to->uncapped_N = from->uncapped_N;
     to->patches = from->patches;
     pal_copy3(to->slip, from->slip);
     if (!from->active) return;
-    if (to->firm) {
-        pal_copy3(to->firm->last_m, from->firm ? from->firm->last_m : from->limits.b);
-        to->firm->back_m = from->firm ? from->firm->back_m : 0;
+    if (to->implicit) {
+        pal_copy3(to->implicit->last_m, from->implicit ? from->implicit->last_m : from->limits.b);
+        to->implicit->back_m = from->implicit ? from->implicit->back_m : 0;
     }
     if (!place) {
         go_on(to, from);
         return;
     }
-    pal_copy3(to->hold.at_m, from->firm ? from->firm->last_m : from->limits.b);
+    pal_copy3(to->hold.at_m, from->implicit ? from->implicit->last_m : from->limits.b);
     to->hold.k_N_m = k_N_m;
     take_force(to, body, from, old, points, place);
 }
@@ -119,9 +120,9 @@ void pal_tool_contact_blend(pal_tool_contact *h, pal_step *step, pal_tool *tool,
     pal_contact_blend *hold = &h->hold;
     double back[3], size = pal_norm3(hold->total_N);
     if (!hold->acts) return;
-    if (step->sub == 0 && hold->n_done++ == 0) hold->ramp = tool->ramp;
-    hold->share = 1 - (hold->n_done - 1 + (step->sub + 1.0) / step->n_sub) / PAL_CONTACT_BLEND_STEPS;
-    if (hold->share < 1e-9) {
+    if (!hold->begun) hold->ramp = tool->ramp, hold->share = 1, hold->begun = true;
+    hold->share = pal_blend_toward(hold->share, 0, step->dt_s, PAL_BLEND_TRANSFER_S);
+    if (hold->share == 0) {
         pal_tool_contact_end_blend(h);
         return;
     }

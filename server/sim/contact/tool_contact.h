@@ -3,7 +3,7 @@
  *
  * Handed over are the proxy, its side, what friction holds, and the force: tissue that takes over is pressed at first
  * by the very force of before, on the nodes that lie where those before it were, and that force is let go over
- * PAL_CONTACT_BLEND_STEPS steps while contact comes in by as much:
+ * PAL_BLEND_TRANSFER_S while contact comes in by as much:
  *     force = s F + (1 - s) contact,   s = 1 -> 0,
  * so that what is felt goes from the force of before to that of after and not by way of none (a proxy that is seated
  * anew has no depth), nor of one that belongs to the other body's contact stiffness. A tool that goes back meanwhile is
@@ -17,12 +17,10 @@
 #include "server/sim/contact/proxy.h"
 #include "server/sim/core/effect.h"
 
-enum { PAL_CONTACT_BLEND_STEPS = 10 };
-
 /* what a tool needs beside with an implicit solver */
 typedef struct pal_tool_contact_implicit {
-    pal_contact_implicit press;
-    pal_haptic_stiffness haptic_stiffness;
+    pal_contact_implicit solve;
+    pal_haptic_stiffness stiffness;
     pal_contact_patches old_patches; /* published anew when the solver asks again */
     int n_old_patch;
     double old_side[3], old_back_m;
@@ -33,7 +31,7 @@ typedef struct pal_tool_contact_implicit {
 /* the force of before */
 typedef struct pal_contact_blend {
     bool acts;
-    int n_done; /* steps begun */
+    bool begun; /* a sub-step has been */
     int n_node;
     int32_t *node;     /* heap [n_node]                        */
     double *force_N;   /* on them at the switch, heap [n_node][3] */
@@ -49,7 +47,7 @@ typedef struct pal_contact_blend {
 typedef struct pal_tool_contact {
     bool active; /* the proxy is somewhere */
     pal_proxy proxy;
-    double ease;          /* 0..1: rises after the proxy was seated */
+    double ramp;          /* 0..1: rises after the proxy was seated */
     double time_behind_s; /* for how long it has been far behind    */
     int32_t *list;        /* contact points near in this step [max_point] */
     int n_list;
@@ -60,12 +58,12 @@ typedef struct pal_tool_contact {
     double slip[3];      /* sideways way of the tool over tissue that friction still holds, m */
     double uncapped_N;   /* normal force of the last sub-step before caps */
     bool retriangulated; /* other triangles are drawn since the step before */
-    double told;         /* the bound that `wanted` gave */
+    double wanted_1_s2;  /* interpolated: stiffness over mass that the solver made its sub-steps for */
     double share;        /* of the stiffness that is stable; falls at once, rises slowly; implicit: find_stiffening */
     double total[3];     /* on the tool, this sub-step, this body */
     pal_contact_patches patches;
     pal_contact_blend hold;
-    pal_tool_contact_implicit *firm; /* implicit solvers only */
+    pal_tool_contact_implicit *implicit; /* implicit solvers only */
 } pal_tool_contact;
 
 /* `to`, of `body`, goes on where `from`, of another body that stands in its place, is; points: that body's, and place

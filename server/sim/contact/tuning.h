@@ -8,7 +8,61 @@
  * spacing, as far as tissue goes under a tool, has no hole as wide as half a radius (test_tool_cases) */
 enum { PASSING_MAX = 4096, PASSING_CUTS = 6 };
 
-/* ---- implicit contact (test_contact_solved) ---- */
+/* ---- contact of a tool that pushes (test_tool_push, test_tool_cases) ---- */
+
+/* radii. The proxy keeps so far away from every point: points that far apart leave no hole for it */
+#define MAX_DEPTH_RADII 0.5
+/* contacts of one tool at a time; samples of one body */
+enum { CONTACT_MAX = 2048, SAMPLE_MAX = 200000 };
+/* share of a proxy's old side in its new one, over that of the force: it turns in some steps, not at once */
+#define SIDE_STEPS 4
+/* m. A patch is published within a radius of the tool, at least within this: a hand at 0.5 m/s needs 20 ms */
+#define NEAR_M 0.010
+/* s. The time that the rates per frame refer to, and the keys clamp_S and GRASP_STRETCH: they held for a step of 60 Hz
+ * and hold for any other alike (test_step_length) */
+#define FRAME_S (1.0 / 60)
+/* least share of the force that contact with other triangles begins with (blend.h: PAL_BLEND_CONTACT_S) */
+#define MIN_RAMP 0.01
+
+/* ---- explicit contact ---- */
+
+/* contact stiffness per area in E over radius: depth is then 0.5 % of a radius at a mean pressure of E */
+#define EXPLICIT_PRESSURE 200
+/* over the eigenvalue that two power iterations find, which is low by up to a quarter */
+#define EIGENVALUE_SAFETY 1.3
+/* s. The share of the stiffness rises at this rate at most: where the limit falls away for one sub-step only, contact
+ * does not follow (test_subdivision_fem: a pressed solid stays at rest; 0.04 does not) */
+#define SHARE_RISE_S 0.15
+/* radii. Points so near a proxy may come to touch before the solver asks again */
+#define WANTED_RADII 1.25
+
+/* ---- implicit contact (test_contact_implicit, test_contact_rest) ---- */
+
+/* contact over tissue stiffness: tissue gives way 15 times as much as contact */
+#define IMPLICIT_STIFFNESS 15.0
+/* shares by which the stiffness rises in FRAME_S while the proxy is kept from its tool, and falls while contact is
+ * shallower than so many radii; largest product */
+#define STIFFEN        0.3
+#define SOFTEN         0.05
+#define MAX_STIFFENING 8.0
+#define SHALLOW_RADII  0.05
+/* of a cap: contact itself gives this much, the rest is for what one step adds */
+#define BELOW_CAP 0.98
+/* radii. A tool that moved by less rests */
+#define REST_RADII 0.01
+
+/* ---- grasps (test_tool_grasp, test_contact_implicit) ---- */
+
+/* stiffness in E times reach: eight times that of the tissue held, so that tissue follows the tool and not the spring
+ */
+#define GRASP_STIFFNESS 16
+/* shares of m / dt^2 and m / dt that spring and damper of an explicit grasp take of a node's stability */
+#define GRASP_ALPHA 0.25
+#define GRASP_BETA  0.25
+/* box diagonals. An implicit grasp stretches by no more in FRAME_S, so that a tool that jumps does not strike */
+#define GRASP_STRETCH 0.02
+
+/* ---- solves of implicit contact (test_contact_solved) ---- */
 
 /* solves of a sub-step after which springs may be chosen again: contacts that act, friction that sticks or slides */
 enum { CHOOSE_ROUNDS = 2 };
@@ -49,6 +103,11 @@ enum { CHOOSE_ROUNDS = 2 };
 enum { STIFFNESS_STEPS = 3 };
 #define STIFFNESS_FORCE  0.02
 #define STIFFNESS_COSINE 0.995
+/* stiffnesses found in a step; points that stand for near tissue; radii within which they are as near as the nearest */
+enum { STIFFNESS_BUDGET = 2, STIFFNESS_POINTS = 256 };
+#define NEAR_RADII 0.125
+/* radii cubed of tissue that moves along with a tool, for damping */
+#define DRAG_VOLUME 4
 /* passes of conjugate gradients for a contact: one is 8 % low under a round tool, two less than 1 % */
 enum { STIFFNESS_PASSES = 2 };
 /* least share that turning of contacts leaves of a stiffness: the linear estimate of it ends there */

@@ -50,7 +50,7 @@ pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node)
     return PAL_ERR_OK;
 }
 
-pal_err pal_body_allocate_embedded(pal_body *body, pal_arena *arena, const pal_interpolation *rows)
+pal_err pal_body_allocate_interpolated(pal_body *body, pal_arena *arena, const pal_interpolation *rows)
 {
     size_t n3 = 3 * (size_t)rows->n_row;
     PAL_TRY(pal_body_allocate(body, arena, rows->n_point));
@@ -116,7 +116,7 @@ bool pal_body_finite(const pal_body *body)
 void pal_body_add_display_offset(pal_body *body)
 {
     float part = (float)body->display_offset_part;
-    /* of a body that adapts the points in use are written anew each time, the others stay */
+    /* of a body that adapts, the OUTPUT component writes the active dofs each time, the others stay */
     int n = !body->display_offset_m ? 0 : body->active ? body->n_active : body->n_shown;
     for (int k = 0; k < n; k++) {
         size_t i = 3 * (size_t)(body->active ? body->active[k] : k);

@@ -104,8 +104,8 @@ typedef struct pal_body {
     int n_element, n_corner;
     const float *fill;          /* share of material in each element, or tetrahedron where element is NULL; NULL: 1 */
     pal_node_order *node_order; /* memory order of the nodes for kernels; NULL: none made        */
-    struct pal_active_nodes *pack;        /* packed working arrays (active_nodes.h); NULL: none made       */
-    struct pal_spring_recovery *recovery; /* recovery of springs from inversion; NULL: none                */
+    struct pal_active_nodes *active_nodes; /* packed working arrays (active_nodes.h); NULL: none made       */
+    struct pal_spring_recovery *recovery;  /* recovery of springs from inversion; NULL: none                */
 
     /* ---- solver ---- */
     bool implicit;         /* the solver takes stiffness implicitly: contact need not suit explicit steps            */
@@ -174,7 +174,7 @@ static inline double pal_body_inverse_mass_1_kg(const pal_body *body, int node)
 /* arrays for n_node dofs without interpolation, all active, zeroed; MEMORY. [load] */
 pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node);
 /* arrays for the dofs and nodes of an interpolation, which is borrowed; MEMORY. [load] */
-pal_err pal_body_allocate_embedded(pal_body *body, pal_arena *arena, const pal_interpolation *rows);
+pal_err pal_body_allocate_interpolated(pal_body *body, pal_arena *arena, const pal_interpolation *rows);
 /* d = A x and dv = A v after x and v were set; nothing without interpolation. [sim] */
 void pal_body_update_nodes(pal_body *body);
 /* adds the display offset to what is shown, after the OUTPUT components. [sim] */

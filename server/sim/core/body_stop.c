@@ -65,7 +65,7 @@ void pal_body_stop_bad(pal_body *body, const char *otherwise)
         for (int k = 0; k < body->n_active; k++) {
             int i = pal_body_point(body, k);
             if (pal_finite3(number[w] + 3 * (size_t)i)) continue;
-            pal_body_stop(body, i, "its %s is no number", what[w]);
+            pal_body_stop(body, i, "its %s is not finite", what[w]);
             return;
         }
     pal_body_stop(body, -1, "%s", otherwise);

@@ -2,8 +2,8 @@
  * ended between steps (brush_components.h, world.h). All brushes of a body are one CONTACT component, `brush`, with
  * memory of its own.
  *
- * Force, pressure and lift ramp up, follow a change and ramp down over 10 steps each. A body has brushes when its shown
- * vertices are nodes and its topology is constant. Thread: [sim]; heap only in set and destroy. */
+ * Force, pressure and lift begin, follow a change and end over PAL_BLEND_BRUSH_S (blend.h) each. A body has brushes
+ * when its shown vertices are nodes and its topology is constant. Thread: [sim]; heap only in set and destroy. */
 #ifndef PAL_SIM_CORE_BRUSH_H
 #define PAL_SIM_CORE_BRUSH_H
 #include "server/sim/core/effect.h"

@@ -27,7 +27,7 @@ typedef struct pal_config_value {
 } pal_config_value;
 
 typedef struct pal_config_entry {
-    char path[PAL_ENTRY_TEXT]; /* where it stands: "effects[2]"  */
+    char path[PAL_ENTRY_TEXT]; /* its place in the scene: "effects[2]" */
     char name[PAL_ENTRY_TEXT]; /* effect, solver or model name   */
     pal_config_value value[PAL_ENTRY_KEYS];
     int n_value;

@@ -137,7 +137,7 @@ bool pal_configuration_equal(const pal_configuration *a, const pal_configuration
            near(a->k_volume_J, b->k_volume_J);
 }
 
-/* ---- what goes together ---- */
+/* ---- models that fit ---- */
 
 pal_err pal_configuration_check_model(const pal_body_def *body, const char *model, pal_diagnostic *diag)
 {
@@ -289,8 +289,8 @@ static pal_err drop_loose(const pal_body_def *body, const double up[3], pal_prep
 {
     pal_loose_components parts;
     uint8_t *fixed = calloc((size_t)mesh->tets.n_node, sizeof *fixed);
-    if (!fixed) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory to find what is held");
-    pal_body_def_hold(body, up, mesh->tets.x, mesh->tets.n_node, fixed);
+    if (!fixed) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory to find the fixed nodes");
+    pal_body_def_mark_fixed(body, up, mesh->tets.x, mesh->tets.n_node, fixed);
     pal_err err = pal_loose_components_drop(body->name, fixed, false, mesh, &parts, diag);
     free(fixed);
     return err;
@@ -323,7 +323,7 @@ static pal_err cells_surface(const pal_body_def *body, pal_surface *out, pal_dia
     pal_diagnostic reason = {{0}};
     int32_t *vertex = NULL, *face = NULL;
     pal_err err = pal_subdivision_make(body->cells, &options, &fine, &reason);
-    /* many cells: what is shown of them is fine enough */
+    /* many cells: their shown surface is fine enough */
     if (err == PAL_ERR_BUDGET) {
         options.n_level = 1;
         err = pal_subdivision_make(body->cells, &options, &fine, &reason);

@@ -76,7 +76,7 @@ pal_err pal_material_check(pal_material *material, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
-void pal_support_hold(const pal_support_def *support, const double up[3], const double *x, int n, uint8_t *fixed)
+void pal_support_mark_fixed(const pal_support_def *support, const double up[3], const double *x, int n, uint8_t *fixed)
 {
     double low = INFINITY, high = -INFINITY;
     if (support->rim) return;
@@ -112,12 +112,12 @@ bool pal_support_of_effect(const pal_config_entry *effect, pal_support_def *out)
     return true;
 }
 
-void pal_body_def_hold(const pal_body_def *def, const double up[3], const double *x, int n, uint8_t *fixed)
+void pal_body_def_mark_fixed(const pal_body_def *def, const double up[3], const double *x, int n, uint8_t *fixed)
 {
     pal_support_def support;
-    for (int k = 0; k < def->n_support; k++) pal_support_hold(&def->support[k], up, x, n, fixed);
+    for (int k = 0; k < def->n_support; k++) pal_support_mark_fixed(&def->support[k], up, x, n, fixed);
     for (int k = 0; k < def->n_effect; k++)
-        if (pal_support_of_effect(&def->effect[k], &support)) pal_support_hold(&support, up, x, n, fixed);
+        if (pal_support_of_effect(&def->effect[k], &support)) pal_support_mark_fixed(&support, up, x, n, fixed);
 }
 
 static pal_err check_support(const pal_body_def *body, int index, pal_diagnostic *diag)
@@ -253,8 +253,7 @@ pal_err pal_scene_check(const pal_scene *scene, pal_diagnostic *diag)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "gravity_m_s2: %g is outside [-1e4, 1e4]",
                                   scene->gravity_m_s2);
     if (scene->max_substep < 1 || scene->max_substep > 1000000)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "max_substep: %d is outside [1, 1000000]",
-                                  scene->max_substep);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "max_substep: %d is outside [1, 1000000]", scene->max_substep);
     if (scene->n_body < 1 || scene->n_body > PAL_BODY_MAX)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "bodies: %d, wanted 1 to %d", scene->n_body, PAL_BODY_MAX);
     if (scene->n_tool < 0 || scene->n_tool > PAL_TOOL_MAX)

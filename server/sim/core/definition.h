@@ -121,11 +121,11 @@ void pal_body_default_cells(pal_body_def *body, const char *name, const pal_prep
 /* the three tools of a scene that names none */
 void pal_tools_default(pal_scene *scene, int n_tool);
 /* fixed [n] = 1 for the points x [n][3] (body frame) in the box or lowest part of the support; rim: none */
-void pal_support_hold(const pal_support_def *support, const double up[3], const double *x, int n, uint8_t *fixed);
+void pal_support_mark_fixed(const pal_support_def *support, const double up[3], const double *x, int n, uint8_t *fixed);
 /* the part of the body that an effect supports (moving_support, penalty); false: it supports nothing */
 bool pal_support_of_effect(const pal_config_entry *effect, pal_support_def *out);
 /* fixed [n] = 1 for all points that the body's supports, rims excepted, and its effects support */
-void pal_body_def_hold(const pal_body_def *def, const double up[3], const double *x, int n, uint8_t *fixed);
+void pal_body_def_mark_fixed(const pal_body_def *def, const double up[3], const double *x, int n, uint8_t *fixed);
 /* REFUSED names the key of a number that is not finite or out of range (tuning.h). A Poisson ratio above
  * PAL_POISSON_CLAMP is taken as that, and diag reports it */
 pal_err pal_material_check(pal_material *material, pal_diagnostic *diag);

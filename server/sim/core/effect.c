@@ -1,4 +1,4 @@
-/* Running a body's FORCE rows. */
+/* Runs a body's FORCE components. */
 #include "server/sim/core/effect.h"
 
 #include "server/base/clock.h"

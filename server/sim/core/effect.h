@@ -150,7 +150,7 @@ typedef struct pal_effect {
     /* ---- force ---- */
     /* FORCE components add to body->f, CONTACT components to body->load and to the forces on tools. [sim] */
     pal_err (*run)(void *self, pal_step *step);
-    /* FORCE, optional: the same on body->pack, which make has made (active_nodes.h). [sim] */
+    /* FORCE, optional: the same on body->active_nodes, which make has made (active_nodes.h). [sim] */
     pal_err (*compute_forces)(void *self, pal_step *step);
     double (*energy)(void *self, const pal_body *body); /* J; run = minus its gradient (tested)                      */
     bool internal; /* FORCE: zero at rest, no net force, no net torque, whatever the deformation (tested)            */

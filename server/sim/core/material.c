@@ -103,7 +103,7 @@ static pal_err refuse(const pal_body_def *def, int index, pal_diagnostic *diag, 
                               value, wanted);
 }
 
-/* a constant or what a grid gives at its nodes; NaN constants: not given */
+/* a constant, or the values of a grid; NaN: not given */
 static pal_err check_number(const pal_body_def *def, int index, const char *key, double constant, const double *grid,
                             double low, double high, pal_diagnostic *diag)
 {

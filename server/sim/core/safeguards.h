@@ -1,7 +1,6 @@
-/* What was done so that a body goes on where it would have left its bounds, and why one was stopped. Counts and price
- * are those since the last reset of the body; the price is measured only when something happens, so that a body that
- * needs no rescue pays nothing. Ordinary work of a method (sub-steps, the search of a Newton iteration of several,
- * contact that is settled again) is no rescue. Thread: [sim]. */
+/* Safeguards of a body: what kept its state within bounds, counted since the last reset. Time is measured only when a
+ * safeguard acts, so that a body without one pays nothing. Ordinary work of a method (sub-steps, line searches of a
+ * Newton iteration, contact solved again) is not counted. Thread: [sim]. */
 #ifndef PAL_SIM_CORE_SAFEGUARDS_H
 #define PAL_SIM_CORE_SAFEGUARDS_H
 #include <stdint.h>
@@ -9,16 +8,15 @@
 enum { PAL_REASON_TEXT = 128 };
 
 typedef struct pal_safeguards {
-    uint64_t n_capped;      /* node loads shortened to load_cap_N                                                   */
-    uint64_t n_clamped;     /* node moves shortened by the solver                                                   */
-    uint64_t n_mass_scaled; /* sub-steps in which deformation asked for more than the budget of sub-steps           */
-    uint64_t n_inversion;   /* times that elements were found turned over: voxels ran on their split, those of solids
-                             on the edges of their cells                                                          */
-    uint64_t n_split;       /* changes between elements and that; not in the sum: n_inversion says it                 */
-    uint64_t n_search;      /* implicit steps taken again, shorter, because the energy had risen                    */
-    uint64_t n_tool_reset;  /* tools that stayed too far within, set anew at the nearest place outside              */
-    uint64_t n_stopped;     /* the body was stopped and put back: at most 1, a stopped body waits for its reset     */
-    uint64_t ns;            /* time all of them took: forces on the split, searches, loads and moves shortened      */
+    uint64_t n_capped;      /* node loads shortened to load_cap_N                                              */
+    uint64_t n_clamped;     /* node displacements shortened by the solver                                      */
+    uint64_t n_mass_scaled; /* sub-steps with added mass, since the budget of sub-steps was used up            */
+    uint64_t n_inversion;   /* updates that found inverted elements, which then ran on their recovery          */
+    uint64_t n_split;       /* changes between elements and recovery; not in the sum, since n_inversion counts */
+    uint64_t n_search;      /* implicit steps repeated with line search, because the energy had risen          */
+    uint64_t n_tool_reset;  /* tools that stayed too deep, moved to the nearest place outside                  */
+    uint64_t n_stopped;     /* the body was frozen: at most 1, since it then waits for its reset               */
+    uint64_t ns;            /* time that all of them took                                                      */
 } pal_safeguards;
 
 /* how many in all; n_split is left out, since n_inversion covers it [any] */

@@ -1,5 +1,5 @@
 /* Vectors of 8 lanes for the spring kernels. Only files compiled with the room's options include this: where the
- * processor has no such vectors the compiler splits them and the calling convention differs (-Wno-psabi), which is why
+ * processor has no such vectors, the compiler splits them and the calling convention differs (-Wno-psabi), so that
  * everything here is inlined. Thread: [sim]. */
 #ifndef PAL_SIM_CORE_SIMD_H
 #define PAL_SIM_CORE_SIMD_H

@@ -1,11 +1,10 @@
 /* Tool bookkeeping between poses and CONTACT rows. */
 #include "server/sim/core/tools.h"
 
+#include "server/sim/core/blend.h"
+
 #include <math.h>
 #include <string.h>
-
-/* a tool's forces rise and fall within this many steps, so that a client that comes or goes does not strike tissue */
-enum { RAMP_STEPS = 10 };
 
 bool pal_pose_ok(const pal_pose *pose, double limit_m)
 {
@@ -19,7 +18,7 @@ bool pal_pose_ok(const pal_pose *pose, double limit_m)
     return far2 <= limit_m * limit_m && fast2 <= 1e6 * limit_m * limit_m && quat2 > 0.9 && quat2 < 1.1;
 }
 
-void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose)
+void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose, double dt_s)
 {
     if (pose) {
         tool->next = *pose;
@@ -29,14 +28,11 @@ void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose)
             tool->last = *pose;
             memcpy(tool->here_m, pose->position_m, sizeof tool->here_m);
         }
-        tool->ramp += 1.0 / RAMP_STEPS;
-        if (tool->ramp > 1) tool->ramp = 1;
     } else {
         /* a tool that was let go stays where it is while its forces fade */
         tool->next = tool->last;
-        tool->ramp -= 1.0 / RAMP_STEPS;
-        if (tool->ramp < 1e-9) tool->ramp = 0;
     }
+    tool->ramp = pal_blend_toward(tool->ramp, pose ? 1 : 0, dt_s, PAL_BLEND_TOOL_S);
     tool->present = pose != NULL;
     tool->grasp = tool->present && (tool->next.buttons & 1);
     tool->grasped_before = tool->holding;

@@ -1,5 +1,5 @@
-/* Tools: poses in, forces and contact patches out. A tool is a sphere moved by one holder. World-frame SI; forces are
- * those that act on the tool (so on the hand); what acts on tissue is the opposite. Thread: [sim]. */
+/* Tools: poses in, forces and contact patches out. A tool is a sphere moved by one member. SI, world frame. Forces are
+ * those on the tool, and so on the hand; tissue receives the opposite. Thread: [sim]. */
 #ifndef PAL_SIM_CORE_TOOLS_H
 #define PAL_SIM_CORE_TOOLS_H
 #include "server/base/err.h"
@@ -9,18 +9,19 @@
 
 enum { PAL_TOOL_MAX = 8, PAL_CONTACT_PATCH_MAX = 4 };
 
-/* what a client says of its tool */
+/* pose of a tool as its client sends it */
 typedef struct pal_pose {
     double position_m[3];
     double quat[4];         /* w x y z, unit */
     double velocity_m_s[3]; /* 0 when unknown */
-    uint32_t buttons;       /* bit 0: grab */
+    uint32_t buttons;       /* bit 0: grasp */
     uint32_t seq;           /* client's count, echoed */
     uint64_t stamp_us;      /* client's clock, echoed */
 } pal_pose;
 
-/* local tangent contact model for a haptic bridge (haptics.md 2.3): plane of zero force in the tool centre's
- * configuration space. F = n (k1 d + k2 d^2 - b n.v), d = n.(p - x) > 0 in contact */
+/* Contact model for a haptic bridge, linearised at the tool: the plane of zero force in the configuration space of the
+ * tool's centre, with F = n (k1 d + k2 d^2 - b n.v), d = n.(p - x) > 0 in contact. The bridge evaluates it at the rate
+ * of its servo loop */
 typedef struct pal_contact_patch {
     int16_t id, group;      /* id persists while the neighbourhood does; convex contacts share a group */
     double point_m[3];      /* p: zero-force surface                                                  */
@@ -33,21 +34,23 @@ typedef struct pal_contact_patch {
     double radius_m; /* validity                                                               */
 } pal_contact_patch;
 
-/* one tool during a step. `here` moves linearly from `last` to `next` over the sub-steps, so that a fast tool sweeps */
+/* One tool during a step. here_m moves linearly from `last` to `next` over the sub-steps, so that a fast tool sweeps
+ * its path */
 typedef struct pal_tool {
     double radius_m, force_cap_N;
-    bool present;        /* somebody holds it                                              */
-    double ramp;         /* 0..1: rises in 10 steps after a tool appears, falls when it is let go; scales its forces */
-    pal_pose next, last; /* pose asked for at the end of this step, pose at the end of the step before   */
-    double here_m[3];    /* position at the end of the current sub-step                                  */
+    bool present; /* a member holds it                                              */
+    double ramp;  /* 0 to 1, scales its forces: rises over PAL_BLEND_TOOL_S once the tool appears, falls when it is
+                     released */
+    pal_pose next, last;    /* requested pose at the end of this step, pose at the end of the last one      */
+    double here_m[3];       /* position at the end of the current sub-step                                  */
     double velocity_m_s[3]; /* of `here`                                                                    */
     bool grasp;             /* bit 0 of next.buttons while present                                          */
-    double force_N[3];      /* on the tool, this sub-step; CONTACT rows add                                 */
+    double force_N[3];      /* on the tool, this sub-step; CONTACT components add                              */
     double mean_force_N[3]; /* mean over the step's sub-steps                                               */
-    bool grasped_before;    /* held tissue in the step before: what it holds it does not push as well */
-    bool touching, holding; /* pressed tissue, grabbed tissue in this step                                  */
+    bool grasped_before;    /* it held tissue in the last step: it does not push what it holds */
+    bool touching, holding; /* presses tissue, holds tissue in this step                                    */
     int n_patch;
-    pal_contact_patch patch[PAL_CONTACT_PATCH_MAX]; /* written by CONTACT rows in the last sub-step */
+    pal_contact_patch patch[PAL_CONTACT_PATCH_MAX]; /* written by CONTACT components in the last sub-step */
     bool has_grasp; /* bilateral part: f = f0 - k (x - x0) - b v                              */
     double grasp_x0_m[3], grasp_f0_N[3], grasp_k_N_m[6], grasp_b_Ns_m; /* k: xx xy xz yy yz zz                    */
 } pal_tool;
@@ -60,10 +63,10 @@ typedef struct pal_tools {
 /* is every number finite, the position within reach of limit_m, the velocity at most 1000 limit_m a second, the
  * quaternion near unit? (poses are untrusted) */
 bool pal_pose_ok(const pal_pose *pose, double limit_m);
-/* before a step: take over the pose asked for (NULL: let go), update ramp; the jump of a tool that appears is not swept
- */
-void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose);
-/* before sub-step `sub` of `n_sub`: here, velocity, zero force */
+/* before a step: takes the requested pose (NULL: released) and updates the ramp; a tool that appears does not sweep its
+ * path */
+void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose, double dt_s);
+/* before sub-step `sub` of `n_sub`: sets here_m and velocity, clears the force */
 void pal_tools_begin_substep(pal_tools *tools, int sub, int n_sub, double dt_s);
 /* after the step: mean force, last = next */
 void pal_tools_end_step(pal_tools *tools, int n_sub);

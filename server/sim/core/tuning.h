@@ -33,4 +33,38 @@
 /* largest load on a node is this times E h^2: a strain of the order of 10 in one element, far above any linear answer
  * (tests/sim/world/test_world.c) */
 #define PAL_LOAD_CAP_FACTOR 10
+
+/* ---- recovery from inversion: volume ratios at which each mechanism enters (LOW, HIGH) and leaves (LEAVE_*) ---- */
+
+/* voxel cubes, corner determinant over h^3. Above 30 the neo-Hookean energy, which grows with its square, lets nothing
+ * else count (tests/sim/elements/test_hex_recovery.c) */
+#define PAL_HEX_INVERTED_LOW  0.05
+#define PAL_HEX_INVERTED_HIGH 30.0
+#define PAL_HEX_LEAVE_LOW     0.3
+#define PAL_HEX_LEAVE_HIGH    20.0
+/* a return that failed within so many updates (one a Newton iteration) raises the limit for the next by a step, up to
+ * the highest */
+#define PAL_HEX_RETRY_UPDATES 600
+#define PAL_HEX_RETRY_STEP    0.05
+#define PAL_HEX_RETRY_MAX     0.9
+/* Poisson's ratio of the split at most: inverted voxels have no volume to conserve, and five tetrahedra a voxel lock
+ * well below 0.5; of 720 shuffled bodies all recover with it, one in a hundred does not with 0.45 */
+#define PAL_HEX_SPLIT_POISSON_MAX 0.3
+/* subdivision solids, volume at 8 points of an element (tests/sim/subdivision/test_cell_recovery.c) */
+#define PAL_CELL_INVERTED_LOW  0.05
+#define PAL_CELL_INVERTED_HIGH 30.0
+#define PAL_CELL_LEAVE_LOW     0.3
+#define PAL_CELL_LEAVE_HIGH    20.0
+/* springs, volume of a tetrahedron. Springs compress further than elements before they fold
+ * (tests/sim/springs/test_spring_recovery.c) */
+#define PAL_SPRING_INVERTED_LOW  0.01
+#define PAL_SPRING_INVERTED_HIGH 30.0
+#define PAL_SPRING_LEAVE_LOW     0.2
+#define PAL_SPRING_LEAVE_HIGH    20.0
+/* smallest factor s of a region: it never becomes too soft to move */
+#define PAL_REGION_SCALE_MIN 0.02
+/* a body is at rest when its kinetic energy is at most this part of what its regions store */
+#define PAL_REGION_REST_SHARE 1e-3
+/* least part of material of a border voxel, so that no node is left nearly without stiffness and mass */
+#define PAL_HEX_SHARE_MIN 0.02
 #endif

@@ -8,11 +8,10 @@
 #include "server/sim/core/brush.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/core/blend.h"
 
 #include <math.h>
 #include <string.h>
-
-enum { RAMP = 10 };
 
 /* of a triangle's area at rest, that pressure acts on */
 static const double most_area = 2;
@@ -27,14 +26,15 @@ typedef struct slot {
     double *begin;  /* CURVE: places of the nodes when it began  [n][3] */
     double *bow;    /* CURVE: 4 t (1 - t)                        [n]    */
     double now[3];  /* pressure_Pa, or lift_m */
-    int n_left;     /* steps until now is what the brush says */
-    int n_in;       /* steps of RAMP that it has come in      */
+    double left_s;  /* until `now` is what the brush says */
+    double share;   /* that has come in, 0 to 1 */
     bool ending;
 } slot;
 
 typedef struct brush_row {
     const pal_body *body;
     slot slot[PAL_TOOL_MAX];
+    double step_s; /* of the last step; 0: none yet */
 } brush_row;
 
 /* ---- numbers ---- */
@@ -153,7 +153,7 @@ static void goal(const pal_brush *b, double out[3])
 
 static bool acts(const slot *s)
 {
-    return s->arena && !(s->ending && s->n_in == 0);
+    return s->arena && !(s->ending && s->share == 0);
 }
 
 static bool may_continue(const slot *s, const pal_brush *b)
@@ -192,7 +192,7 @@ pal_err pal_brush_set(void *self, const pal_body *body, int slot_index, const pa
                                   b->pressure_Pa, body->name, most_Pa);
     if (may_continue(s, b)) {
         s->brush = *b;
-        s->n_left = RAMP;
+        s->left_s = PAL_BLEND_BRUSH_S;
         return PAL_ERR_OK;
     }
     fresh.arena = pal_arena_create(4096, true);
@@ -242,7 +242,7 @@ void pal_brush_hand(void *self, const pal_body *body, const void *before, const 
             pal_add3(fresh.begin + 3 * (size_t)k, body->d + node, way);
         }
         pal_copy3(fresh.now, was->now);
-        fresh.n_left = was->n_left, fresh.n_in = was->n_in, fresh.ending = was->ending;
+        fresh.left_s = was->left_s, fresh.share = was->share, fresh.ending = was->ending;
         pal_arena_destroy(s->arena);
         *s = fresh;
     }
@@ -278,21 +278,15 @@ static void destroy(void *self)
 
 /* ---- a step ---- */
 
-/* once a step */
-static void advance(slot *s)
+/* once a step, to its end */
+static void advance(slot *s, double step_s)
 {
-    double to[3], rest[3];
-    s->n_in = s->ending ? s->n_in - (s->n_in > 0) : s->n_in + (s->n_in < RAMP);
-    if (s->n_left == 0) return;
+    double to[3], left[3];
+    s->share = pal_blend_toward(s->share, s->ending ? 0 : 1, step_s, PAL_BLEND_BRUSH_S);
     goal(&s->brush, to);
-    pal_sub3(rest, to, s->now);
-    pal_axpy3(s->now, 1.0 / s->n_left, rest);
-    if (--s->n_left == 0) pal_copy3(s->now, to);
-}
-
-static double share(const slot *s)
-{
-    return (double)s->n_in / RAMP;
+    pal_sub3(left, s->now, to);
+    pal_scale3(left, pal_blend_release(&s->left_s, step_s), left);
+    pal_add3(s->now, to, left);
 }
 
 /* twice the area vector of a triangle at nodes x */
@@ -308,7 +302,7 @@ static void inflate(const slot *s, const pal_body *body, double *load)
 {
     for (int k = 0; k < s->n; k++) {
         const int t = s->item[k];
-        double n[3], rest[3], force = share(s) * s->now[0] * s->weight[k] / 6;
+        double n[3], rest[3], force = s->share * s->now[0] * s->weight[k] / 6;
         area2(body, body->d, t, n), area2(body, body->node_rest, t, rest);
         const double now2 = pal_dot3(n, n), most2 = most_area * most_area * pal_dot3(rest, rest);
         if (now2 > most2) force *= sqrt(most2 / now2);
@@ -326,17 +320,18 @@ static void pull(const slot *s, const pal_body *body, int k, double out[3])
 
 static double spring(const slot *s, int k)
 {
-    return share(s) * s->brush.stiffness_N_m * s->weight[k];
+    return s->share * s->brush.stiffness_N_m * s->weight[k];
 }
 
 static pal_err run(void *self, pal_step *step)
 {
     brush_row *row = self;
     pal_body *body = step->body;
+    if (step->sub == 0) row->step_s = step->dt_s * step->n_sub;
     for (int i = 0; i < PAL_TOOL_MAX; i++) {
         slot *s = &row->slot[i];
         if (!acts(s)) continue;
-        if (step->sub == 0) advance(s);
+        if (step->sub == 0) advance(s, row->step_s);
         if (s->brush.kind == PAL_BRUSH_INFLATE) inflate(s, body, body->load);
         for (int k = 0; k < s->n && s->brush.kind == PAL_BRUSH_CURVE; k++) {
             double off[3];
@@ -371,7 +366,7 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
     for (int i = 0; i < PAL_TOOL_MAX; i++) {
         const slot *s = &row->slot[i];
         if (!acts(s)) continue;
-        const double soon = fmin(1, share(s) + 1.0 / RAMP);
+        const double soon = row->step_s > 0 ? pal_blend_toward(s->share, 1, row->step_s, PAL_BLEND_BRUSH_S) : 1;
         for (int k = 0; k < s->n && s->brush.kind == PAL_BRUSH_CURVE; k++)
             bound_N_m[s->item[k]] += soon * s->brush.stiffness_N_m * s->weight[k];
         const double p = soon * fmax(fabs(s->now[0]), fabs(s->brush.pressure_Pa)) / 6;
@@ -406,7 +401,7 @@ static void reset(void *self, const pal_body *body)
 {
     brush_row *row = self;
     (void)body;
-    for (int i = 0; i < PAL_TOOL_MAX; i++) row->slot[i].ending = true, row->slot[i].n_in = 0;
+    for (int i = 0; i < PAL_TOOL_MAX; i++) row->slot[i].ending = true, row->slot[i].share = 0;
 }
 
 /* while there is a brush the row comes, stays and goes over time */

@@ -35,7 +35,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     *self = row;
     bool polar = strcmp(name, "polar") == 0;
     PAL_TRY(pal_cells_elastic_make(solid, polar ? PAL_CELL_POLAR : PAL_CELL_EDGES, build->arena, row, build->diag));
-    return polar && build->body->implicit ? pal_force_cache_make(build->body->n_node, build->arena, &row->kept)
+    return polar && build->body->implicit ? pal_force_cache_make(build->body->n_node, build->arena, &row->force_cache)
                                           : PAL_ERR_OK;
 }
 
@@ -48,8 +48,8 @@ static pal_err run(void *self, pal_step *step)
     body->safeguards.n_inversion += row->recovery.n_inversion, body->safeguards.n_split += row->recovery.n_change;
     row->recovery.n_inversion = row->recovery.n_change = 0;
     const uint64_t before = has_inversion ? pal_clock_ns() : 0;
-    if (pal_force_cache_matches(&row->kept, body->d))
-        pal_force_cache_add(&row->kept, body->f);
+    if (pal_force_cache_matches(&row->force_cache, body->d))
+        pal_force_cache_add(&row->force_cache, body->f);
     else
         pal_cells_elastic_force(row, body->d, body->f);
     if (has_inversion) body->safeguards.ns += pal_clock_ns() - before;
@@ -60,9 +60,9 @@ static double energy(void *self, const pal_body *body)
 {
     pal_cells_elastic *row = self;
     pal_cells_elastic_refresh(row);
-    if (pal_force_cache_matches(&row->kept, body->d)) return row->kept.energy_J;
-    return pal_force_cache_commit(&row->kept,
-                                  pal_cells_elastic_energy(row, body->d, pal_force_cache_begin(&row->kept, body->d)));
+    if (pal_force_cache_matches(&row->force_cache, body->d)) return row->force_cache.energy_J;
+    return pal_force_cache_commit(
+        &row->force_cache, pal_cells_elastic_energy(row, body->d, pal_force_cache_begin(&row->force_cache, body->d)));
 }
 
 static void reset(void *self, const pal_body *body)
@@ -95,9 +95,9 @@ static unsigned recover(void *self, pal_step *step)
     pal_cells_elastic *row = self;
     pal_cells_elastic_refresh(row);
     const bool changed = pal_cell_recovery_update(&row->recovery, row, step->body, is_loaded(step));
-    if (changed) pal_force_cache_invalidate(&row->kept);
+    if (changed) pal_force_cache_invalidate(&row->force_cache);
     if (row->recovery.stiffened_J > 0) pal_stiffening_damper_hold(step->body, row->recovery.stiffened_J);
-    const unsigned now = row->recovery.still ? PAL_INVERTED | PAL_INVERSION_AT_REST : PAL_INVERTED;
+    const unsigned now = row->recovery.at_rest ? PAL_INVERTED | PAL_INVERSION_AT_REST : PAL_INVERTED;
     return (row->recovery.n_region > 0 ? now : 0) | (changed ? PAL_INVERSION_CHANGED : 0);
 }
 

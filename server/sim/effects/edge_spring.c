@@ -9,8 +9,9 @@
  * Departures: a spring shorter than 1e-9 of its rest length has no direction. It takes that from rest, without damping,
  * so that a collapsed surface opens again.
  *
- * The springs in use are taken from the shell whenever its revision is a new one. Their ends stand in body->pack, in
- * the order of shell->node: place and velocity of an end are one load, and a force is one load and one store. */
+ * The springs in use are taken from the shell whenever its revision is a new one. Their ends stand in
+ * body->active_nodes, in the order of shell->node: place and velocity of an end are one load, and a force is one load
+ * and one store. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/surface/active_nodes.h"
@@ -247,7 +248,7 @@ static pal_err compute_forces(void *self, pal_step *step)
     edge_spring *e = self;
     take_springs(e);
     double k = e->k_N_m * e->adaptive->spring_ramp;
-    if (run_springs(e, step->body->pack, k, damping_now(e)) < LEAST_Q) reopen(e, step->body->pack, k);
+    if (run_springs(e, step->body->active_nodes, k, damping_now(e)) < LEAST_Q) reopen(e, step->body->active_nodes, k);
     return PAL_ERR_OK;
 }
 
@@ -265,7 +266,7 @@ static double energy(void *self, const pal_body *body)
     for (int b = 0; b < e->n_block; b++) {
         pal_quad d[PAL_LANES];
         pal_v8 q, rate, none = {0}, share = pal_load8(e->q + PAL_LANES * b), w2 = pal_load8(e->w2 + PAL_LANES * b);
-        measure_blocks(e, (const double *)body->pack->xv, b, 1, d, &q, &rate);
+        measure_blocks(e, (const double *)body->active_nodes->xv, b, 1, d, &q, &rate);
         pal_v8 strain = pal_sqrt8(q) - 1;
         sum += pal_select8(w2 > none, share * strain * strain / w2, none);
     }

@@ -4,8 +4,8 @@
  *
  * All but displacement: every FORCE row that can measure adds its value times volume to the nodes of its elements, and
  * the volume; a node shows the quotient, the mean of its elements weighted by volume. A shown vertex takes the mean of
- * the nodes that it is skinned to, with the skin's own weights (mesh/skin.h), or is a node itself. Displacement is the
- * distance of a shown vertex from where it is at rest. A number that is not finite shows as 0: that such a body
+ * the nodes that it is skinned to, with the skin's own weights (mesh/volume/skin.h), or is a node itself. Displacement
+ * is the distance of a shown vertex from where it is at rest. A number that is not finite shows as 0: that such a body
  * diverged is for its guard to say.
  *
  * A body that adapts (sim/adaptive_surface.h) shows 0 at vertices out of use.

@@ -15,21 +15,21 @@
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    pal_hex_options wish = {.law = PAL_LAW_COROTATIONAL, .element = PAL_HEX_BBAR, .fill = true, .recover = true};
+    pal_hex_options options = {.law = PAL_LAW_COROTATIONAL, .element = PAL_HEX_BBAR, .fill = true, .recover = true};
     const char *element = "hex8_bbar";
     PAL_TRY(pal_entry_read_text(item, "element", &element, build->diag));
-    wish.element = strcmp(element, "hex8_bbar") ? PAL_HEX_FULL : PAL_HEX_BBAR;
-    if (wish.element == PAL_HEX_FULL && strcmp(element, "hex8"))
+    options.element = strcmp(element, "hex8_bbar") ? PAL_HEX_FULL : PAL_HEX_BBAR;
+    if (options.element == PAL_HEX_FULL && strcmp(element, "hex8"))
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s.element: \"%s\" is neither hex8_bbar nor hex8",
                                   item->path, element);
-    PAL_TRY(pal_elastic_law_read(item, &wish.law, build->diag));
-    PAL_TRY(pal_entry_read_bool(item, "fill", &wish.fill, build->diag));
-    PAL_TRY(pal_entry_read_bool(item, "recover", &wish.recover, build->diag));
+    PAL_TRY(pal_elastic_law_read(item, &options.law, build->diag));
+    PAL_TRY(pal_entry_read_bool(item, "fill", &options.fill, build->diag));
+    PAL_TRY(pal_entry_read_bool(item, "recover", &options.recover, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     pal_elastic_hexes *row = PAL_NEW(build->arena, pal_elastic_hexes, 1);
     if (!row) return PAL_ERR_MEMORY;
     *self = row;
-    return pal_hex_make(&wish, build, item->path, row);
+    return pal_hex_make(&options, build, item->path, row);
 }
 
 static pal_err run(void *self, pal_step *step)
@@ -45,8 +45,8 @@ static pal_err run(void *self, pal_step *step)
         body->safeguards.ns += pal_clock_ns() - before;
         return PAL_ERR_OK;
     }
-    if (pal_force_cache_matches(&row->kept, body->d)) {
-        pal_force_cache_add(&row->kept, body->f);
+    if (pal_force_cache_matches(&row->force_cache, body->d)) {
+        pal_force_cache_add(&row->force_cache, body->f);
         return PAL_ERR_OK;
     }
     pal_node_order_load(body->node_order, body->d);
@@ -62,13 +62,13 @@ static double energy(void *self, const pal_body *body)
 {
     pal_elastic_hexes *row = self;
     if (row->has_inversion) return pal_elastic_tets_energy(row->split, body->d, NULL);
-    if (pal_force_cache_matches(&row->kept, body->d)) return row->kept.energy_J;
+    if (pal_force_cache_matches(&row->force_cache, body->d)) return row->force_cache.energy_J;
     pal_node_order_load(body->node_order, body->d);
-    double *forces = pal_force_cache_begin(&row->kept, body->d);
+    double *forces = pal_force_cache_begin(&row->force_cache, body->d);
     double sum = row->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_energy(row, body->node_order, forces)
                                                  : pal_hex_corot_energy(row, body->node_order, forces);
     if (forces) pal_node_order_add(body->node_order, forces);
-    return pal_force_cache_commit(&row->kept, sum);
+    return pal_force_cache_commit(&row->force_cache, sum);
 }
 
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)

@@ -10,12 +10,13 @@
  *   kind "fluid"     p = pressure_Pa + bulk_Pa (1 - s), the second part at most 10 bulk_Pa either way
  * The energy is -V_0 times the integral of p over s from 1, with V_0 the rest volume of the finest level; forces are
  * its gradient. A coarse level, whose volume is a little less, so gets a pressure that is a little more and does the
- * same work. pressure_Pa > 0 inflates, < 0 sucks; it comes in smoothly over the first ramp_s of simulated time, again
+ * same work. pressure_Pa > 0 inflates, < 0 sucks; it is blended in over the first ramp_s of simulated time, again
  * after a reset.
  *
  * Pieces that do not hang together share one volume. A surface whose faces look inwards is turned.
  * Keys: kind ("pressure"), pressure_Pa (0), absolute_Pa (101325, gas), bulk_Pa (20000, fluid), ramp_s (0.5). */
 #include "server/base/vec3.h"
+#include "server/sim/core/blend.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/surface/adaptive_surface.h"
 
@@ -186,7 +187,7 @@ static pal_err run(void *self, pal_step *step)
     inflate *row = self;
     pal_body *body = step->body;
     double s, t = step->time_s;
-    row->share = t < row->ramp_s ? 0.5 * (1 - cos(M_PI * t / row->ramp_s)) : 1;
+    row->share = pal_blend_toward(0, 1, t, row->ramp_s);
     double p = push(row, body, &s);
     for (int k = 0; k < body->n_active; k++) {
         size_t i = 3 * (size_t)pal_body_point(body, k);

@@ -27,6 +27,7 @@
  * (1/120), max_node (0: any number of nodes), ramp_s (0.15; 0: no factors). */
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
+#include "server/sim/core/blend.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/surface/refine_measure.h"
 
@@ -58,7 +59,7 @@ typedef struct refine {
     double *mass_was;                 /* before the switch, where `seen` is its number       [n_vertex] */
     uint64_t *seen;                   /* [n_vertex]                                                     */
     double *still, *bound_N_m;        /* velocities 0 [n_vertex][3]; stiffness of the rows [n_vertex]   */
-    double spring_slope, shape_slope; /* of the ramps, 1/s                                             */
+    double spring_s, shape_s;         /* left of the blend of each factor to 1                                */
     double inner_J;                   /* kinetic beside the rigid motion, before the switch             */
     pal_refine_history report;
 } refine;
@@ -77,7 +78,7 @@ static void clear(refine *row)
         row->switched_s[f] = -INFINITY;
         row->patience[f] = 0;
     }
-    row->clock_s = row->wait_s = row->spring_slope = row->shape_slope = row->way_m = 0;
+    row->clock_s = row->wait_s = row->spring_s = row->shape_s = row->way_m = 0;
     row->seen_revision = 0;
     row->put_off = row->seen_twice = false;
     for (int32_t i = 0; i < levels->n_vertex[levels->n_level - 1]; i++) row->seen[i] = 0;
@@ -359,11 +360,11 @@ static double keep_elastic(refine *row)
     double least = ramp_from * (row->inner_J + before->spring_J + before->shape_J);
     if (row->ramp_s > 0 && fabs(raw->spring_J - before->spring_J) > least) {
         adaptive->spring_ramp = ramp_after(was[0], before->spring_J, raw->spring_J, raw->shape_J);
-        row->spring_slope = (1 - adaptive->spring_ramp) / row->ramp_s;
+        row->spring_s = row->ramp_s;
     }
     if (row->ramp_s > 0 && fabs(raw->shape_J - before->shape_J) > least) {
         adaptive->shape_ramp = ramp_after(was[1], before->shape_J, raw->shape_J, raw->spring_J);
-        row->shape_slope = (1 - adaptive->shape_ramp) / row->ramp_s;
+        row->shape_s = row->ramp_s;
     }
     return raw->spring_J * adaptive->spring_ramp / was[0] - before->spring_J +
            raw->shape_J * adaptive->shape_ramp / was[1] - before->shape_J;
@@ -464,14 +465,6 @@ static bool keep_motion(const refine *row, pal_body *body, double gained_J, bool
     return true;
 }
 
-static double ease(double ramp, double *slope, double dt_s)
-{
-    double next = ramp + *slope * dt_s;
-    if (*slope != 0 && (next - 1) * *slope < 0) return next;
-    *slope = 0;
-    return 1;
-}
-
 /* all wishes of one evaluation, energy and momentum kept */
 static void change(refine *row, pal_step *step)
 {
@@ -531,8 +524,8 @@ static pal_err run(void *self, pal_step *step)
     pal_adaptive_surface *adaptive = row->adaptive;
     row->clock_s += step->dt_s;
     row->wait_s -= step->dt_s;
-    adaptive->spring_ramp = ease(adaptive->spring_ramp, &row->spring_slope, step->dt_s);
-    adaptive->shape_ramp = ease(adaptive->shape_ramp, &row->shape_slope, step->dt_s);
+    adaptive->spring_ramp = 1 + (adaptive->spring_ramp - 1) * pal_blend_release(&row->spring_s, step->dt_s);
+    adaptive->shape_ramp = 1 + (adaptive->shape_ramp - 1) * pal_blend_release(&row->shape_s, step->dt_s);
     double load2;
     const bool still = is_still(row, step->body, step->dt_s, &load2);
     if (row->wait_s > 1e-9 * row->every_s) return PAL_ERR_OK;
@@ -552,8 +545,8 @@ static pal_err run(void *self, pal_step *step)
 static double settled_s(const void *self)
 {
     const refine *row = self;
-    const bool eased = row->spring_slope == 0 && row->shape_slope == 0;
-    return !evaluates(row) || (row->seen_twice && !row->put_off && eased) ? 0 : INFINITY;
+    const bool blended = row->spring_s == 0 && row->shape_s == 0;
+    return !evaluates(row) || (row->seen_twice && !row->put_off && blended) ? 0 : INFINITY;
 }
 
 /* the body is at rest, but may have another level than at load */
@@ -577,7 +570,7 @@ static void transfer(void *self, const pal_body *body, const void *before, const
     memcpy(row->switched_s, was->switched_s, n_face * sizeof *row->switched_s);
     memcpy(row->patience, was->patience, n_face * sizeof *row->patience);
     row->clock_s = was->clock_s, row->wait_s = was->wait_s, row->way_m = was->way_m;
-    row->spring_slope = was->spring_slope, row->shape_slope = was->shape_slope;
+    row->spring_s = was->spring_s, row->shape_s = was->shape_s;
     row->seen_s = was->seen_s, row->seen_load2 = was->seen_load2;
     row->seen_revision = was->seen_revision == by->from->revision + 1 ? body->revision + 1 : 0;
     memcpy(row->measure.frame.quat, was->measure.frame.quat, sizeof row->measure.frame.quat);

@@ -95,7 +95,7 @@ static double damp_1_s(const shape_spring *row, const pal_adaptive_surface *adap
     return row->c_Ns_m < 0 ? damping_share * sqrt(row->k_N_m / m) : row->c_Ns_m / m;
 }
 
-/* frame: where the last fit ended, and the new one; packed: of body->pack */
+/* frame: where the last fit ended, and the new one; packed: of body->active_nodes */
 static hold find_hold(const shape_spring *row, const pal_body *body, pal_rigid_fit *frame, bool packed)
 {
     hold h = {.R = {1, 0, 0, 0, 1, 0, 0, 0, 1},
@@ -104,7 +104,7 @@ static hold find_hold(const shape_spring *row, const pal_body *body, pal_rigid_f
     if (row->world) return h;
     double at[3];
     if (packed)
-        pal_adaptive_fit_rigid_active(body->model.adaptive, body->pack, frame);
+        pal_adaptive_fit_rigid_active(body->model.adaptive, body->active_nodes, frame);
     else
         pal_adaptive_fit_rigid(body->model.adaptive, body, frame);
     memcpy(h.R, frame->R, sizeof h.R);
@@ -128,7 +128,7 @@ static pal_err compute_forces(void *self, pal_step *step)
 {
     shape_spring *row = self;
     const pal_body *body = step->body;
-    pal_active_nodes *pack = body->pack;
+    pal_active_nodes *pack = body->active_nodes;
     const hold h = find_hold(row, body, &row->frame, true);
     if (row->world) {
         for (int k = 0; k < body->n_active; k++) {

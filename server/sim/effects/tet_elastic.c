@@ -40,7 +40,7 @@ typedef struct tet_row {
     double least_volume_m3;         /* of those that are looked at, times six */
     bool has_inversion, cheap;      /* cheap: whole.n_inverted tells that the body is tangled */
     uint64_t n_inversion, n_switch; /* since run, which tells the body */
-    pal_force_cache kept;           /* under an implicit solver: of `whole` while nothing is inverted */
+    pal_force_cache force_cache;    /* under an implicit solver: of `whole` while nothing is inverted */
 } tet_row;
 
 /* beyond the first pair a body is tangled, within the second it is whole again */
@@ -51,7 +51,7 @@ static pal_err cut(const tet_row *row, pal_arena *arena, pal_elastic_tets_option
 {
     static const int piece[8][4] = {{0, 4, 6, 7}, {4, 1, 5, 8}, {6, 5, 2, 9}, {7, 8, 9, 3},
                                     {6, 8, 4, 5}, {6, 8, 5, 9}, {6, 8, 9, 7}, {6, 8, 7, 4}};
-    const pal_elastic_tets_options *from = &row->whole.wish;
+    const pal_elastic_tets_options *from = &row->whole.options;
     *to = *from;
     to->law = PAL_LAW_COROTATIONAL, to->recover = true, to->max_poisson = max_poisson;
     if (from->n_corner == 4) return PAL_ERR_OK;
@@ -77,19 +77,19 @@ static double six_volumes(const double *x, const int32_t *node)
 
 static pal_err make_split(tet_row *row, pal_build *build)
 {
-    const pal_elastic_tets_options *whole = &row->whole.wish;
-    pal_elastic_tets_options wish;
-    PAL_TRY(cut(row, build->arena, &wish));
+    const pal_elastic_tets_options *whole = &row->whole.options;
+    pal_elastic_tets_options options;
+    PAL_TRY(cut(row, build->arena, &options));
     row->split = PAL_NEW(build->arena, pal_elastic_tets, 1);
     if (!row->split) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_elastic_tets_make(&wish, build, row->split));
+    PAL_TRY(pal_elastic_tets_make(&options, build, row->split));
     row->cheap = whole->n_corner == 4 && whole->law == PAL_LAW_COROTATIONAL;
     double h = build->body->edge_m;
     /* slivers turn over at any touch: what they do tells nothing of the body */
     row->least_volume_m3 = 1e-3 * h * h * h;
-    row->rest = PAL_NEW(build->arena, double, wish.n_tet);
+    row->rest = PAL_NEW(build->arena, double, options.n_tet);
     if (!row->rest) return PAL_ERR_MEMORY;
-    for (int i = 0; i < wish.n_tet; i++) row->rest[i] = six_volumes(build->body->x_rest, wish.tet + 4 * i);
+    for (int i = 0; i < options.n_tet; i++) row->rest[i] = six_volumes(build->body->x_rest, options.tet + 4 * i);
     return PAL_ERR_OK;
 }
 
@@ -97,8 +97,8 @@ static bool is_tangled(const tet_row *row, const double *x)
 {
     if (row->cheap && !row->has_inversion) return row->whole.n_inverted > 0;
     const double *limit = row->has_inversion ? whole_det : tangled_det;
-    bool neo = row->whole.wish.law == PAL_LAW_NEO_HOOKEAN;
-    const pal_elastic_tets_options *pieces = &row->split->wish;
+    bool neo = row->whole.options.law == PAL_LAW_NEO_HOOKEAN;
+    const pal_elastic_tets_options *pieces = &row->split->options;
     for (int i = 0; i < pieces->n_tet; i++) {
         if (fabs(row->rest[i]) < row->least_volume_m3) continue;
         double det = six_volumes(x, pieces->tet + 4 * i) / row->rest[i];
@@ -110,26 +110,26 @@ static bool is_tangled(const tet_row *row, const double *x)
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     const pal_body *body = build->body;
-    pal_elastic_tets_options wish = {.recover = true};
+    pal_elastic_tets_options options = {.recover = true};
     bool fill = true;
-    PAL_TRY(pal_elastic_law_read(item, &wish.law, build->diag));
-    PAL_TRY(read_element(item, build, &wish.n_corner));
+    PAL_TRY(pal_elastic_law_read(item, &options.law, build->diag));
+    PAL_TRY(read_element(item, build, &options.n_corner));
     PAL_TRY(pal_entry_read_bool(item, "fill", &fill, build->diag));
-    PAL_TRY(pal_entry_read_bool(item, "recover", &wish.recover, build->diag));
+    PAL_TRY(pal_entry_read_bool(item, "recover", &options.recover, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
-    bool own = body->element && body->n_corner == wish.n_corner;
-    if (!own && (wish.n_corner == 10 || !body->tets))
+    bool own = body->element && body->n_corner == options.n_corner;
+    if (!own && (options.n_corner == 10 || !body->tets))
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: body \"%s\" has no elements of %d nodes",
-                                  item->path, body->name, wish.n_corner);
-    wish.tet = own ? body->element : body->tets->tet;
-    wish.n_tet = own ? body->n_element : body->tets->n_tet;
-    wish.fill = own && fill ? body->fill : NULL;
+                                  item->path, body->name, options.n_corner);
+    options.tet = own ? body->element : body->tets->tet;
+    options.n_tet = own ? body->n_element : body->tets->n_tet;
+    options.fill = own && fill ? body->fill : NULL;
     tet_row *row = PAL_NEW(build->arena, tet_row, 1);
     if (!row) return PAL_ERR_MEMORY;
     *self = row;
-    PAL_TRY(pal_elastic_tets_make(&wish, build, &row->whole));
-    if (body->implicit) PAL_TRY(pal_force_cache_make(body->n_node, build->arena, &row->kept));
-    return wish.recover && body->implicit && wish.law != PAL_LAW_LINEAR ? make_split(row, build) : PAL_ERR_OK;
+    PAL_TRY(pal_elastic_tets_make(&options, build, &row->whole));
+    if (body->implicit) PAL_TRY(pal_force_cache_make(body->n_node, build->arena, &row->force_cache));
+    return options.recover && body->implicit && options.law != PAL_LAW_LINEAR ? make_split(row, build) : PAL_ERR_OK;
 }
 
 /* what the forces come from now */
@@ -144,8 +144,8 @@ static pal_err run(void *self, pal_step *step)
     tet_row *row = self;
     step->body->safeguards.n_inversion += row->n_inversion, step->body->safeguards.n_split += row->n_switch;
     row->n_inversion = row->n_switch = 0;
-    if (!row->has_inversion && pal_force_cache_matches(&row->kept, step->body->d)) {
-        pal_force_cache_add(&row->kept, step->body->f);
+    if (!row->has_inversion && pal_force_cache_matches(&row->force_cache, step->body->d)) {
+        pal_force_cache_add(&row->force_cache, step->body->f);
         return PAL_ERR_OK;
     }
     uint64_t before = row->has_inversion ? pal_clock_ns() : 0;
@@ -158,10 +158,10 @@ static double energy(void *self, const pal_body *body)
 {
     tet_row *row = self;
     if (row->has_inversion) return pal_elastic_tets_energy(row->split, body->d, NULL);
-    if (pal_force_cache_matches(&row->kept, body->d)) return row->kept.energy_J;
-    double sum = pal_elastic_tets_energy(&row->whole, body->d, pal_force_cache_begin(&row->kept, body->d));
+    if (pal_force_cache_matches(&row->force_cache, body->d)) return row->force_cache.energy_J;
+    double sum = pal_elastic_tets_energy(&row->whole, body->d, pal_force_cache_begin(&row->force_cache, body->d));
     /* what inverted elements borrow may differ the next time it is asked for */
-    return row->whole.n_inverted > 0 ? sum : pal_force_cache_commit(&row->kept, sum);
+    return row->whole.n_inverted > 0 ? sum : pal_force_cache_commit(&row->force_cache, sum);
 }
 
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
@@ -175,7 +175,7 @@ static pal_err material(void *self, const pal_body *body, const pal_material *to
     (void)body, (void)diag;
     pal_elastic_tets_material(&row->whole, to);
     if (row->split) pal_elastic_tets_material(row->split, to);
-    pal_force_cache_invalidate(&row->kept);
+    pal_force_cache_invalidate(&row->force_cache);
     return PAL_ERR_OK;
 }
 
@@ -186,7 +186,7 @@ static void reset(void *self, const pal_body *body)
     pal_elastic_tets_reset(&row->whole);
     if (row->split) pal_elastic_tets_reset(row->split), row->split->n_single_rotation = 0;
     row->has_inversion = false;
-    pal_force_cache_invalidate(&row->kept);
+    pal_force_cache_invalidate(&row->force_cache);
     row->n_inversion = row->n_switch = 0;
 }
 
@@ -203,7 +203,8 @@ static void stress(void *self, const pal_body *body, pal_stress_take *take, void
 static bool couple(void *self, pal_cliques *out)
 {
     const pal_elastic_tets *whole = &((tet_row *)self)->whole;
-    *out = (pal_cliques){.n_item = whole->wish.n_tet, .n_corner = whole->wish.n_corner, .node = whole->wish.tet};
+    *out =
+        (pal_cliques){.n_item = whole->options.n_tet, .n_corner = whole->options.n_corner, .node = whole->options.tet};
     return true;
 }
 

@@ -1,5 +1,5 @@
 /* What is shown of voxel hexahedra: von Mises stress, energy density, strain and distortion at the Gauss point nearest
- * to each corner, which stands for an eighth of the cube. And the stress there, for estimates. */
+ * to each corner, which represents an eighth of the cube; and the stress there, for error estimates. */
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
 #include "server/num/shape_functions.h"
@@ -57,50 +57,51 @@ static void neo_points(cube *q)
     }
 }
 
-static void take_cube(const pal_elastic_hexes *row, const pal_body *body, int e, const double grad[8][8][3], cube *at)
+static void take_cube(const pal_elastic_hexes *cubes, const pal_body *body, int e, const double grad[8][8][3], cube *at)
 {
-    const double h = row->edge_m;
-    const int32_t *node = row->hexes->node + 8 * e;
-    int lane = row->simd_blocks.place[e], block = lane / PAL_LANES, l = lane % PAL_LANES;
-    double share = row->share[lane], centre[9] = {0}, q[4];
-    *at = (cube){.bbar = row->element == PAL_HEX_BBAR,
+    const double h = cubes->edge_m;
+    const int32_t *node = cubes->hexes->node + 8 * e;
+    int lane = cubes->simd_blocks.place[e], block = lane / PAL_LANES, l = lane % PAL_LANES;
+    double share = cubes->share[lane], centre[9] = {0}, q[4];
+    *at = (cube){.bbar = cubes->element == PAL_HEX_BBAR,
                  .volume_m3 = share * h * h * h,
-                 .mu = row->mu[lane] * 16 / (h * share),
-                 .lambda = row->lambda[lane] * 16 / (h * share)};
+                 .mu = cubes->mu[lane] * 16 / (h * share),
+                 .lambda = cubes->lambda[lane] * 16 / (h * share)};
     for (int p = 0; p < 8; p++)
         for (int i = 0; i < 9; i++) {
             for (int c = 0; c < 8; c++) at->f[p][i] += 2 / h * body->d[3 * node[c] + i / 3] * grad[p][c][i % 3];
             centre[i] += at->f[p][i] / 8;
         }
-    for (int i = 0; i < 4; i++) q[i] = row->law == PAL_LAW_LINEAR ? i == 0 : row->q[(4 * block + i) * PAL_LANES + l];
-    if (row->law == PAL_LAW_COROTATIONAL) pal_polar_rotation(centre, q, 50);
+    for (int i = 0; i < 4; i++)
+        q[i] = cubes->law == PAL_LAW_LINEAR ? i == 0 : cubes->q[(4 * block + i) * PAL_LANES + l];
+    if (cubes->law == PAL_LAW_COROTATIONAL) pal_polar_rotation(centre, q, 50);
     pal_quat_matrix(q, at->r);
-    if (row->law == PAL_LAW_NEO_HOOKEAN)
+    if (cubes->law == PAL_LAW_NEO_HOOKEAN)
         neo_points(at);
     else
         corot_points(at);
 }
 
-static double von_mises(const pal_elastic_hexes *row, const cube *at, int p)
+static double von_mises(const pal_elastic_hexes *cubes, const cube *at, int p)
 {
-    if (row->law != PAL_LAW_NEO_HOOKEAN) return pal_von_mises(at->stress[p]);
+    if (cubes->law != PAL_LAW_NEO_HOOKEAN) return pal_von_mises(at->stress[p]);
     double det = fmax(fabs(pal_det3(at->f[p])), 1e-3), cauchy[9];
     for (int i = 0; i < 9; i++) cauchy[i] = at->stress[p][i] / det;
     return pal_von_mises(cauchy);
 }
 
-void pal_hex_measure(pal_elastic_hexes *row, const pal_body *body, pal_field field, double *sum, double *volume_m3)
+void pal_hex_measure(pal_elastic_hexes *cubes, const pal_body *body, pal_field field, double *sum, double *volume_m3)
 {
     double grad[8][8][3];
     if (!(PAL_ELASTIC_FIELDS >> field & 1)) return;
     for (int p = 0; p < 8; p++) pal_hex_shape(pal_hex_gauss[p], NULL, grad[p]);
-    for (int e = 0; e < row->n_hex; e++) {
-        const int32_t *node = row->hexes->node + 8 * e;
+    for (int e = 0; e < cubes->n_hex; e++) {
+        const int32_t *node = cubes->hexes->node + 8 * e;
         cube at;
-        take_cube(row, body, e, (const double(*)[8][3])grad, &at);
+        take_cube(cubes, body, e, (const double(*)[8][3])grad, &at);
         double volume = at.volume_m3 / 8;
         for (int c = 0; c < 8; c++) {
-            sum[node[c]] += volume * (field == PAL_FIELD_VON_MISES_PA  ? von_mises(row, &at, c)
+            sum[node[c]] += volume * (field == PAL_FIELD_VON_MISES_PA  ? von_mises(cubes, &at, c)
                                       : field == PAL_FIELD_ENERGY_J_M3 ? at.density[c]
                                       : field == PAL_FIELD_STRAIN      ? pal_largest_strain(at.f[c])
                                                                        : pal_det3(at.f[c]) - 1);
@@ -118,22 +119,22 @@ static void turn_stress(const double r[9], const double s[9], double out[9])
     for (int i = 0; i < 9; i++) out[i] = pal_dot3(half + 3 * (i / 3), r + 3 * (i % 3));
 }
 
-void pal_hex_stress(pal_elastic_hexes *row, const pal_body *body, pal_stress_take *take, void *user)
+void pal_hex_stress(pal_elastic_hexes *cubes, const pal_body *body, pal_stress_take *take, void *user)
 {
     double grad[8][8][3], shape[8][8];
     for (int p = 0; p < 8; p++) pal_hex_shape(pal_hex_gauss[p], shape[p], grad[p]);
-    for (int e = 0; e < row->n_hex; e++) {
+    for (int e = 0; e < cubes->n_hex; e++) {
         cube at;
-        take_cube(row, body, e, (const double(*)[8][3])grad, &at);
+        take_cube(cubes, body, e, (const double(*)[8][3])grad, &at);
         pal_stress_point to = {.element = e,
                                .n_corner = 8,
-                               .node = row->hexes->node + 8 * e,
+                               .node = cubes->hexes->node + 8 * e,
                                .volume_m3 = at.volume_m3 / 8,
                                .mu_Pa = at.mu,
                                .lambda_Pa = at.lambda};
         for (int p = 0; p < 8; p++) {
             to.shape = shape[p];
-            if (row->law == PAL_LAW_NEO_HOOKEAN)
+            if (cubes->law == PAL_LAW_NEO_HOOKEAN)
                 memcpy(to.stress, at.stress[p], sizeof to.stress);
             else
                 turn_stress(at.r, at.stress[p], to.stress);

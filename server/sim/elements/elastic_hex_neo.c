@@ -6,9 +6,9 @@
  * element of linear elasticity. The tangent is the sum of the points' Hessians, each projected to positive
  * semi-definite with the mean's pressure kappa (Jm - 1) in it, and of the mean's own rank one kappa V grad Jm grad Jm'.
  *
- * Everything is kept in modes (elastic_hex_simd.h): F_ij at xi = sum over modes m with j of a_im xi^(m without j), a =
- * U / (4 h), so that sums over the points are Walsh transforms over their signs, and K of a cube is made from the
- * transform of the points' Hessians: K_(i,m)(k,n) = V sum_{j in m, l in n} H_ij,kl^ (m without j XOR n without l)
+ * Everything is force_cache in modes (elastic_hex_simd.h): F_ij at xi = sum over modes m with j of a_im xi^(m without
+ * j), a = U / (4 h), so that sums over the points are Walsh transforms over their signs, and K of a cube is made from
+ * the transform of the points' Hessians: K_(i,m)(k,n) = V sum_{j in m, l in n} H_ij,kl^ (m without j XOR n without l)
  * g^(|m| + |n| - 2) with g = 1/sqrt 3, where an axis in both exponents gives 1. 21 unknowns (translations are left
  * out), 231 numbers. */
 #include "server/sim/elements/elastic_hex_simd.h"
@@ -16,11 +16,11 @@
 static const double gauss = 0.57735026918962576451;
 
 /* mu, k1 and kappa of the mean dilatation, times share and h / 16 */
-PAL_INLINE void load_neo(const pal_elastic_hexes *row, int block, int l, pal_wide *mu, pal_wide *k1, pal_wide *kappa)
+PAL_INLINE void load_neo(const pal_elastic_hexes *cubes, int block, int l, pal_wide *mu, pal_wide *k1, pal_wide *kappa)
 {
-    pal_wide lambda = pal_wide_load(row->lambda + PAL_LANES * block + l);
-    *mu = pal_wide_load(row->mu + PAL_LANES * block + l);
-    if (row->element == PAL_HEX_BBAR)
+    pal_wide lambda = pal_wide_load(cubes->lambda + PAL_LANES * block + l);
+    *mu = pal_wide_load(cubes->mu + PAL_LANES * block + l);
+    if (cubes->element == PAL_HEX_BBAR)
         *k1 = *mu * (1.0 / 3), *kappa = lambda + *mu * (2.0 / 3);
     else
         *k1 = lambda + *mu, *kappa = wide_of(0);
@@ -80,17 +80,17 @@ PAL_INLINE pal_wide mean_dilatation(pal_wide f[8][9])
 enum { FORCE = 1, ENERGY = 2 };
 
 /* forces are added, the energy is returned */
-PAL_INLINE double all_blocks(const pal_elastic_hexes *row, pal_node_order *node_order, int what)
+PAL_INLINE double all_blocks(const pal_elastic_hexes *cubes, pal_node_order *node_order, int what)
 {
     pal_wide sum = {0};
-    for (int b = 0; b < row->n_block; b++) {
+    for (int b = 0; b < cubes->n_block; b++) {
         hex_view v;
-        hex_open(row, node_order, b, &v);
+        hex_open(cubes, node_order, b, &v);
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             pal_wide u[3][8], f[8][9], c[9], mu, k1, kappa, e = {0};
-            load_neo(row, b, l, &mu, &k1, &kappa);
+            load_neo(cubes, b, l, &mu, &k1, &kappa);
             hex_modes(&v, l, u);
-            gauss_gradients(1 / (4 * row->edge_m), u, f);
+            gauss_gradients(1 / (4 * cubes->edge_m), u, f);
             pal_wide mean = mean_dilatation(f), pressure = kappa * mean - mu - k1;
             for (int p = 0; p < 8; p++) {
                 pal_wide det = cofactors(f[p], c), j1 = det - 1, square = wide_of(-3), t = det * k1 + pressure;
@@ -101,24 +101,24 @@ PAL_INLINE double all_blocks(const pal_elastic_hexes *row, pal_node_order *node_
             e = 0.125 * e + 0.5 * kappa * mean * mean;
             if (what & ENERGY) sum += pal_wide_select(mu > 0, e, wide_of(0));
             if (!(what & FORCE)) continue;
-            gauss_sums(-0.5 * row->edge_m, f, u);
+            gauss_sums(-0.5 * cubes->edge_m, f, u);
             hex_add(&v, l, u);
         }
-        if (what & FORCE) hex_close(row, node_order, b, &v);
+        if (what & FORCE) hex_close(cubes, node_order, b, &v);
     }
     double all = 0;
     for (int l = 0; l < PAL_WIDE; l++) all += sum[l];
-    return 16 * row->edge_m * row->edge_m * all;
+    return 16 * cubes->edge_m * cubes->edge_m * all;
 }
 
-void pal_hex_neo_force(pal_elastic_hexes *row, pal_node_order *node_order)
+void pal_hex_neo_force(pal_elastic_hexes *cubes, pal_node_order *node_order)
 {
-    all_blocks(row, node_order, FORCE);
+    all_blocks(cubes, node_order, FORCE);
 }
 
-double pal_hex_neo_energy(pal_elastic_hexes *row, pal_node_order *node_order, bool forces)
+double pal_hex_neo_energy(pal_elastic_hexes *cubes, pal_node_order *node_order, bool forces)
 {
-    return forces ? all_blocks(row, node_order, FORCE | ENERGY) : all_blocks(row, node_order, ENERGY);
+    return forces ? all_blocks(cubes, node_order, FORCE | ENERGY) : all_blocks(cubes, node_order, ENERGY);
 }
 
 /* place of (r, s), r >= s, in the packed K; unknown 7 axis + mode - 1 */
@@ -251,8 +251,8 @@ PAL_INLINE void point_hessian(pal_wide mu, pal_wide c, pal_wide k1, const pal_wi
     }
     jacobi(a, v);
     for (int i = 0; i < 9; i++) {
-        const int row = 3 * (i / 3), k = i % 3;
-        u[i] = r[row] * v[k] + r[row + 1] * v[3 + k] + r[row + 2] * v[6 + k];
+        const int cubes = 3 * (i / 3), k = i % 3;
+        u[i] = r[cubes] * v[k] + r[cubes + 1] * v[3 + k] + r[cubes + 2] * v[6 + k];
     }
     for (int k = 0; k < 3; k++) {
         const int i = (k + 1) % 3, j = (k + 2) % 3;
@@ -270,12 +270,12 @@ PAL_INLINE void point_hessian(pal_wide mu, pal_wide c, pal_wide k1, const pal_wi
 
 /* projected Hessians of all points into h [45][point], the mean's gradient into mean; returns how many rotations took
  * the slow way */
-static int all_hessians(const pal_elastic_hexes *row, int block, int l, const pal_wide q0[4], pal_wide f[8][9],
+static int all_hessians(const pal_elastic_hexes *cubes, int block, int l, const pal_wide q0[4], pal_wide f[8][9],
                         pal_wide h[45][8], pal_wide mean[3][8])
 {
     pal_wide mu, k1, kappa, g[8][9], q[4], r[9], one[45];
     int n_slow = 0;
-    load_neo(row, block, l, &mu, &k1, &kappa);
+    load_neo(cubes, block, l, &mu, &k1, &kappa);
     pal_wide pressure = kappa * mean_dilatation(f) - mu - k1;
     for (int p = 0; p < 8; p++) {
         pal_wide c = cofactors(f[p], g[p]) * k1 + pressure;
@@ -288,37 +288,37 @@ static int all_hessians(const pal_elastic_hexes *row, int block, int l, const pa
     return n_slow;
 }
 
-void pal_hex_neo_linearise(pal_elastic_hexes *row, pal_node_order *node_order)
+void pal_hex_neo_linearise(pal_elastic_hexes *cubes, pal_node_order *node_order)
 {
-    row->n_slow = 0;
-    for (int b = 0; b < row->n_block && row->tangent; b++) {
+    cubes->n_slow = 0;
+    for (int b = 0; b < cubes->n_block && cubes->tangent; b++) {
         hex_view v;
-        hex_open(row, node_order, b, &v);
+        hex_open(cubes, node_order, b, &v);
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             pal_wide u[3][8], f[8][9], r[9], q[4], mu, k1, kappa, h[45][8];
             hex_modes(&v, l, u);
-            row->n_slow += hex_turn_block(row, b, l, u, r);
-            for (int i = 0; i < 9; i++) pal_wide_store(row->turn + (9 * b + i) * PAL_LANES + l, r[i]);
-            for (int i = 0; i < 4; i++) q[i] = pal_wide_load(row->q + (4 * b + i) * PAL_LANES + l);
-            gauss_gradients(1 / (4 * row->edge_m), u, f);
-            load_neo(row, b, l, &mu, &k1, &kappa);
+            cubes->n_slow += hex_turn_block(cubes, b, l, u, r);
+            for (int i = 0; i < 9; i++) pal_wide_store(cubes->turn + (9 * b + i) * PAL_LANES + l, r[i]);
+            for (int i = 0; i < 4; i++) q[i] = pal_wide_load(cubes->q + (4 * b + i) * PAL_LANES + l);
+            gauss_gradients(1 / (4 * cubes->edge_m), u, f);
+            load_neo(cubes, b, l, &mu, &k1, &kappa);
             /* lanes without element read anything */
             for (int i = 0; i < 72; i++)
                 f[i / 9][i % 9] = pal_wide_select(mu > 0, f[i / 9][i % 9], wide_of(i % 9 % 4 == 0));
-            row->n_slow += all_hessians(row, b, l, q, f, h, u);
+            cubes->n_slow += all_hessians(cubes, b, l, q, f, h, u);
             for (int i = 0; i < 45; i++) walsh(h[i]);
-            store_tangent(row->tangent + 231 * PAL_LANES * b + l, h, kappa, u);
+            store_tangent(cubes->tangent + 231 * PAL_LANES * b + l, h, kappa, u);
         }
     }
 }
 
-void pal_hex_neo_multiply(const pal_elastic_hexes *row, pal_node_order *node_order, double k)
+void pal_hex_neo_multiply(const pal_elastic_hexes *cubes, pal_node_order *node_order, double k)
 {
-    for (int b = 0; b < row->n_block && row->tangent; b++) {
+    for (int b = 0; b < cubes->n_block && cubes->tangent; b++) {
         hex_view v;
-        hex_open(row, node_order, b, &v);
+        hex_open(cubes, node_order, b, &v);
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
-            const double *a = row->tangent + 231 * PAL_LANES * b + l;
+            const double *a = cubes->tangent + 231 * PAL_LANES * b + l;
             pal_wide u[3][8], x[21], y[21];
             hex_modes(&v, l, u);
             for (int r = 0; r < 21; r++) x[r] = k * u[r / 7][r % 7 + 1];
@@ -334,14 +334,14 @@ void pal_hex_neo_multiply(const pal_elastic_hexes *row, pal_node_order *node_ord
             for (int r = 0; r < 21; r++) u[r / 7][r % 7 + 1] = y[r];
             hex_add(&v, l, u);
         }
-        hex_close(row, node_order, b, &v);
+        hex_close(cubes, node_order, b, &v);
     }
 }
 
-void pal_hex_neo_blocks(const pal_elastic_hexes *row, int block, double k, double *to)
+void pal_hex_neo_blocks(const pal_elastic_hexes *cubes, int block, double k, double *to)
 {
     for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
-        const double *a = row->tangent + 231 * PAL_LANES * block + l;
+        const double *a = cubes->tangent + 231 * PAL_LANES * block + l;
         for (int i = 0; i < 3; i++)
             for (int j = 0; j <= i; j++) {
                 pal_wide t[8][8], column[8];
@@ -369,10 +369,10 @@ void pal_hex_neo_blocks(const pal_elastic_hexes *row, int block, double k, doubl
 /* The largest eigenvalue of a cube's K is at most that of V/8 sum B'B, h / 2, times the largest |H| of its points, and
  * what the mean's rank one adds, kappa V |grad Jm|^2. |H| <= mu + 2/sqrt 3 |c| |F| + k1 |dJ/dF|^2, c the factor of
  * d2J/dF2 */
-static double largest_eigenvalue(const pal_elastic_hexes *row, int lane, double f[8][9], double grad[8][8][3])
+static double largest_eigenvalue(const pal_elastic_hexes *cubes, int lane, double f[8][9], double grad[8][8][3])
 {
-    const double mu = row->mu[lane], lambda = row->lambda[lane];
-    const bool bbar = row->element == PAL_HEX_BBAR;
+    const double mu = cubes->mu[lane], lambda = cubes->lambda[lane];
+    const bool bbar = cubes->element == PAL_HEX_BBAR;
     const double k1 = bbar ? mu / 3 : lambda + mu, kappa = bbar ? lambda + 2 * mu / 3 : 0;
     double cof[8][9], mean[24] = {0}, dilatation = -1, most = 0, square = 0;
     for (int p = 0; p < 8; p++) {
@@ -390,18 +390,18 @@ static double largest_eigenvalue(const pal_elastic_hexes *row, int lane, double 
     return 8 * most + 64 * kappa * square;
 }
 
-void pal_hex_neo_bound(pal_elastic_hexes *row, const pal_body *body, double *bound_N_m)
+void pal_hex_neo_bound(pal_elastic_hexes *cubes, const pal_body *body, double *bound_N_m)
 {
     double grad[8][8][3];
     for (int p = 0; p < 8; p++) pal_hex_shape(pal_hex_gauss[p], NULL, grad[p]);
-    for (int e = 0; e < row->n_hex; e++) {
-        const int32_t *node = row->hexes->node + 8 * e;
+    for (int e = 0; e < cubes->n_hex; e++) {
+        const int32_t *node = cubes->hexes->node + 8 * e;
         double f[8][9] = {{0}};
         for (int p = 0; p < 8; p++)
             for (int c = 0; c < 8; c++)
                 for (int i = 0; i < 9; i++)
-                    f[p][i] += 2 / row->edge_m * body->d[3 * node[c] + i / 3] * grad[p][c][i % 3];
-        double most = largest_eigenvalue(row, row->simd_blocks.place[e], f, grad);
+                    f[p][i] += 2 / cubes->edge_m * body->d[3 * node[c] + i / 3] * grad[p][c][i % 3];
+        double most = largest_eigenvalue(cubes, cubes->simd_blocks.place[e], f, grad);
         for (int c = 0; c < 8; c++) bound_N_m[node[c]] += most;
     }
 }

@@ -1,6 +1,6 @@
 /* Vector kernels of the voxel hexahedra, inlined into elastic_hex_*.c; include nowhere else.
  *
- * A cube's corners c stand at the signs s_j(c) of the axes j = x, y, z. Its trilinear field is best kept as the
+ * A cube's corners c stand at the signs s_j(c) of the axes j = x, y, z. Its trilinear field is best force_cache as the
  * coefficients of the eight monomials (modes) m = a set of axes, numbered like corners (x = 1, y = 2, z = 4),
  *     u(xi) = 1/8 sum_m U_m prod_{j in m} xi_j,   U_m = sum_c u_c prod_{j in m} s_j(c),
  * a Walsh transform: 24 additions per component, its own inverse but for the factor 8. The cube's mirror symmetries
@@ -49,7 +49,7 @@ PAL_INLINE pal_wide wide_inverse_root(pal_wide q)
     return r * (1.5 - half * r * r);
 }
 
-/* where 8 elements' corners stand: in a strip in the slots themselves, loose ones in copies */
+/* pointers to the corners of 8 elements: in a strip to the slots, in a loose block to copies */
 typedef struct hex_view {
     const double *x[8][3]; /* coordinates, 8 lanes each   */
     double *f[8][3];       /* to be added to, 8 lanes each */
@@ -57,11 +57,11 @@ typedef struct hex_view {
     double at[8][3][PAL_LANES], to[8][3][PAL_LANES];
 } hex_view;
 
-PAL_INLINE void hex_open(const pal_elastic_hexes *row, const pal_node_order *node_order, int block, hex_view *v)
+PAL_INLINE void hex_open(const pal_elastic_hexes *cubes, const pal_node_order *node_order, int block, hex_view *v)
 {
-    const int n_slot = node_order->n_slot, n_strip = row->simd_blocks.n_strip;
+    const int n_slot = node_order->n_slot, n_strip = cubes->simd_blocks.n_strip;
     if (block < n_strip) {
-        const int32_t *base = row->simd_blocks.base + 8 * block;
+        const int32_t *base = cubes->simd_blocks.base + 8 * block;
         for (int c = 0; c < 8; c++)
             for (int d = 0; d < 3; d++) {
                 v->x[c][d] = node_order->x + d * n_slot + base[c];
@@ -69,7 +69,7 @@ PAL_INLINE void hex_open(const pal_elastic_hexes *row, const pal_node_order *nod
             }
         return;
     }
-    v->node = row->simd_blocks.node + 8 * PAL_LANES * (block - n_strip);
+    v->node = cubes->simd_blocks.node + 8 * PAL_LANES * (block - n_strip);
     memset(v->to, 0, sizeof v->to);
     for (int c = 0; c < 8; c++)
         for (int d = 0; d < 3; d++) {
@@ -78,10 +78,10 @@ PAL_INLINE void hex_open(const pal_elastic_hexes *row, const pal_node_order *nod
             v->f[c][d] = v->to[c][d];
         }
 }
-/* brings what was added to copies into the slots */
-PAL_INLINE void hex_close(const pal_elastic_hexes *row, pal_node_order *node_order, int block, const hex_view *v)
+/* adds the copies of a loose block to the slots */
+PAL_INLINE void hex_close(const pal_elastic_hexes *cubes, pal_node_order *node_order, int block, const hex_view *v)
 {
-    if (block < row->simd_blocks.n_strip) return;
+    if (block < cubes->simd_blocks.n_strip) return;
     for (int c = 0; c < 8; c++)
         for (int d = 0; d < 3; d++)
             for (int l = 0; l < PAL_LANES; l++)
@@ -154,7 +154,7 @@ PAL_INLINE void hex_stress(pal_wide mu, pal_wide lambda, pal_wide beta, pal_wide
     u[0][7] = top * u[0][7], u[1][7] = top * u[1][7], u[2][7] = top * u[2][7];
 }
 
-/* u := R u or R' u, modes 1..7; r row-major */
+/* u := R u or R' u, modes 1..7; r cubes-major */
 PAL_INLINE void hex_rotate(const pal_wide r[9], pal_wide u[3][8])
 {
     for (int m = 1; m < 8; m++) {
@@ -245,16 +245,16 @@ PAL_INLINE int hex_turn(const pal_wide f[9], pal_wide_mask live, pal_wide q[4], 
     return n_slow;
 }
 
-/* F at the centre from the modes, the rotations from it, kept in row->q */
-PAL_INLINE int hex_turn_block(pal_elastic_hexes *row, int block, int l, pal_wide u[3][8], pal_wide r[9])
+/* F at the centre from the modes, the rotations from it, force_cache in cubes->q */
+PAL_INLINE int hex_turn_block(pal_elastic_hexes *cubes, int block, int l, pal_wide u[3][8], pal_wide r[9])
 {
-    const double scale = 1 / (4 * row->edge_m);
-    double *at = row->q + 4 * PAL_LANES * block + l;
+    const double scale = 1 / (4 * cubes->edge_m);
+    double *at = cubes->q + 4 * PAL_LANES * block + l;
     pal_wide f[9], q[4];
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) f[3 * i + j] = scale * u[i][1 << j];
     for (int i = 0; i < 4; i++) q[i] = pal_wide_load(at + i * PAL_LANES);
-    pal_wide_mask live = pal_wide_load(row->share + PAL_LANES * block + l) > 0;
+    pal_wide_mask live = pal_wide_load(cubes->share + PAL_LANES * block + l) > 0;
     int n_slow = hex_turn(f, live, q, r);
     for (int i = 0; i < 4; i++) pal_wide_store(at + i * PAL_LANES, q[i]);
     return n_slow;

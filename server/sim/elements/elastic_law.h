@@ -1,4 +1,4 @@
-/* Elastic laws, point by point: what the rows tet_elastic and hex_elastic compute at a Gauss point. 3x3 matrices are
+/* Elastic laws at a Gauss point, for tet_elastic and hex_elastic. 3x3 matrices are
  * row-major, F[3 r + c] = dx_r / dX_c; a 9x9 matrix H[9 i + j] has i, j running over the entries of F.
  *
  * Neo-Hookean: the stable form of Smith, de Goes, Kim 2018 without their term at the origin,
@@ -9,7 +9,7 @@
 #define PAL_SIM_ELEMENTS_ELASTIC_LAW_H
 #include "server/sim/core/effect.h"
 
-/* what rows of elements measure */
+/* fields that elements measure */
 enum {
     PAL_ELASTIC_FIELDS =
         1 << PAL_FIELD_VON_MISES_PA | 1 << PAL_FIELD_ENERGY_J_M3 | 1 << PAL_FIELD_STRAIN | 1 << PAL_FIELD_DISTORTION
@@ -28,7 +28,7 @@ void pal_linear_stress(double mu, double lambda, const double a[9], double p[9])
 /* P of the corotational law with rotation r (polar part of F): r (2 mu e + lambda tr e I), e = sym(r'F) - I; returns
  * the energy mu e:e + lambda/2 (tr e)^2 */
 double pal_corotational_stress(double mu, double lambda, const double f[9], const double r[9], double p[9]);
-/* largest principal stretch of F less 1, whatever way F is turned */
+/* largest principal stretch of F - 1, independent of rotation */
 double pal_largest_strain(const double f[9]);
 /* sqrt(3/2) of the length of the deviator of a symmetric stress */
 double pal_von_mises(const double stress[9]);
@@ -52,15 +52,14 @@ void pal_neo_modes_compute(double mu, double k1, double pressure, const double f
 void pal_neo_modes_apply(const pal_neo_modes *m, const double df[9], double dp[9]);
 void pal_neo_modes_hessian(const pal_neo_modes *m, double h[81]);
 
-/* E and nu of each element where the body's regions give them (NaN: the body's own), so that a live edit of the body's
- * material keeps them */
+/* E and nu of each element that a region gives (NaN: the body's), which a live edit of the body's material keeps */
 typedef struct pal_elastic_regions {
     double *young_Pa, *poisson; /* NULL: no regions [n_element] */
 } pal_elastic_regions;
-/* regions are asked at the mean of each element's first `n_mean` corners; arena memory. [load] */
+/* regions are evaluated at the mean of the first `n_mean` corners of each element; arena memory. [load] */
 pal_err pal_elastic_regions_make(const pal_build *build, const int32_t *element, int n_element, int n_corner,
                                  int n_mean, pal_elastic_regions *out);
-/* Lame constants of element e in a body of this material; Poisson above 0.4999 is taken as 0.4999 */
+/* Lame constants of element e in a body of this material; ratios above PAL_POISSON_CLAMP are taken as that */
 void pal_elastic_regions_lame(const pal_elastic_regions *parts, const pal_material *material, int e, double *mu_Pa,
                               double *lambda_Pa);
 #endif

@@ -24,7 +24,7 @@ static int entries(int n_corner)
 static void make_shape(pal_elastic_tets *t)
 {
     for (int g = 0; g < 5; g++) {
-        if (t->wish.n_corner == 4) {
+        if (t->options.n_corner == 4) {
             for (int c = 0; c < 3; c++) t->shape[g][c + 1][c] = 1, t->shape[g][0][c] = -1;
             continue;
         }
@@ -36,11 +36,11 @@ static void make_shape(pal_elastic_tets *t)
 /* lanes: tet4 in strips, tet10 as they come */
 static pal_err make_lanes(pal_elastic_tets *t, pal_build *build)
 {
-    int n_tet = t->wish.n_tet, n_corner = t->wish.n_corner;
+    int n_tet = t->options.n_tet, n_corner = t->options.n_corner;
     size_t n_index = (size_t)n_tet * (size_t)n_corner;
     t->corner = PAL_NEW(build->arena, int32_t, n_index);
     if (!t->corner) return PAL_ERR_MEMORY;
-    memcpy(t->corner, t->wish.tet, n_index * sizeof *t->corner);
+    memcpy(t->corner, t->options.tet, n_index * sizeof *t->corner);
     if (n_corner == 4) {
         pal_body *body = build->body;
         if (!body->node_order)
@@ -65,27 +65,28 @@ static pal_err make_lanes(pal_elastic_tets *t, pal_build *build)
 /* inverse of the edges at rest and volume; 0 where there is next to none */
 static void take_rest(pal_elastic_tets *t, double edge_m)
 {
-    for (int e = 0; e < t->wish.n_tet; e++) {
-        const int32_t *node = t->corner + (size_t)t->wish.n_corner * (size_t)e;
+    for (int e = 0; e < t->options.n_tet; e++) {
+        const int32_t *node = t->corner + (size_t)t->options.n_corner * (size_t)e;
         double a[3][3], inverse[3][3];
         for (int c = 0; c < 3; c++) pal_sub3(a[c], t->x_rest + 3 * node[c + 1], t->x_rest + 3 * node[0]);
         for (int c = 0; c < 3; c++) pal_cross3(inverse[c], a[(c + 1) % 3], a[(c + 2) % 3]);
         double det = pal_dot3(a[0], inverse[0]);
         if (!(fabs(det) > 6 * least_volume_h3 * edge_m * edge_m * edge_m)) continue;
         for (int i = 0; i < 9; i++) *lane_at(t->inverse, 9, t->place[e], i) = inverse[i / 3][i % 3] / det;
-        *lane_at(t->volume_m3, 1, t->place[e], 0) = fabs(det) / 6 * (t->wish.fill ? (double)t->wish.fill[e] : 1);
+        *lane_at(t->volume_m3, 1, t->place[e], 0) = fabs(det) / 6 * (t->options.fill ? (double)t->options.fill[e] : 1);
     }
 }
 
-pal_err pal_elastic_tets_make(const pal_elastic_tets_options *wish, pal_build *build, pal_elastic_tets *out)
+pal_err pal_elastic_tets_make(const pal_elastic_tets_options *options, pal_build *build, pal_elastic_tets *out)
 {
     const pal_body *body = build->body;
-    *out = (pal_elastic_tets){.wish = *wish, .n_node = body->n_node, .x_rest = body->x_rest, .fixed = body->support};
-    out->n_point = wish->n_corner == 4 ? 1 : 4;
+    *out =
+        (pal_elastic_tets){.options = *options, .n_node = body->n_node, .x_rest = body->x_rest, .fixed = body->support};
+    out->n_point = options->n_corner == 4 ? 1 : 4;
     make_shape(out);
     PAL_TRY(make_lanes(out, build));
     size_t n_lane = (size_t)out->n_block * PAL_LANES;
-    int n_keep = wish->law == PAL_LAW_NEO_HOOKEAN ? PAL_TET_MODES * out->n_point : 9;
+    int n_keep = options->law == PAL_LAW_NEO_HOOKEAN ? PAL_TET_MODES * out->n_point : 9;
     out->inverse = PAL_NEW(build->arena, double, 9 * n_lane);
     out->volume_m3 = PAL_NEW(build->arena, double, n_lane);
     out->stiff = PAL_NEW(build->arena, double, 2 * n_lane);
@@ -93,14 +94,14 @@ pal_err pal_elastic_tets_make(const pal_elastic_tets_options *wish, pal_build *b
     out->tangent = PAL_NEW(build->arena, double, (size_t)n_keep *n_lane);
     out->bound = PAL_NEW(build->arena, double, body->n_node);
     out->inverted = PAL_NEW(build->arena, int32_t, n_lane);
-    out->entry = PAL_NEW(build->arena, int32_t, (size_t)entries(wish->n_corner) * (size_t)wish->n_tet);
-    out->flag = PAL_NEW(build->arena, uint8_t, wish->n_tet);
-    if (wish->recover) out->around = PAL_NEW(build->arena, double, 9 * body->n_node);
-    if (wish->recover) out->seen = PAL_NEW(build->arena, double, 3 * body->n_node);
+    out->entry = PAL_NEW(build->arena, int32_t, (size_t)entries(options->n_corner) * (size_t)options->n_tet);
+    out->flag = PAL_NEW(build->arena, uint8_t, options->n_tet);
+    if (options->recover) out->around = PAL_NEW(build->arena, double, 9 * body->n_node);
+    if (options->recover) out->x_before = PAL_NEW(build->arena, double, 3 * body->n_node);
     if (!out->inverse || !out->volume_m3 || !out->stiff || !out->turn || !out->tangent || !out->bound ||
-        !out->inverted || !out->entry || !out->flag || (wish->recover && (!out->around || !out->seen)))
+        !out->inverted || !out->entry || !out->flag || (options->recover && (!out->around || !out->x_before)))
         return PAL_ERR_MEMORY;
-    PAL_TRY(pal_elastic_regions_make(build, wish->tet, wish->n_tet, wish->n_corner, 4, &out->parts));
+    PAL_TRY(pal_elastic_regions_make(build, options->tet, options->n_tet, options->n_corner, 4, &out->parts));
     take_rest(out, body->edge_m);
     pal_elastic_tets_reset(out);
     pal_elastic_tets_material(out, &build->def->material);
@@ -112,8 +113,8 @@ void pal_elastic_tets_reset(pal_elastic_tets *t)
     memset(t->turn, 0, 4 * sizeof(double) * PAL_LANES * (size_t)t->n_block);
     for (int b = 0; b < t->n_block; b++)
         for (int l = 0; l < PAL_LANES; l++) t->turn[(size_t)b * 4 * PAL_LANES + (size_t)l] = 1;
-    t->n_inverted = t->n_slow = t->n_look = 0;
-    t->straight = false;
+    t->n_inverted = t->n_slow = t->n_still = 0;
+    t->single_rotation = false;
 }
 
 /* gradients of the shape functions, dN_a/dX, turned by r (NULL: as at rest) */
@@ -126,7 +127,7 @@ static void gradients(const pal_elastic_tets *t, int e, int point, const double 
             pal_mul33(turned + 3 * c, r, inverse + 3 * c);
         else
             pal_copy3(turned + 3 * c, inverse + 3 * c);
-    for (int a = 0; a < t->wish.n_corner; a++)
+    for (int a = 0; a < t->options.n_corner; a++)
         for (int m = 0; m < 3; m++) {
             g[a][m] = 0;
             for (int c = 0; c < 3; c++) g[a][m] += t->shape[point][a][c] * turned[3 * c + m];
@@ -136,7 +137,7 @@ static void gradients(const pal_elastic_tets *t, int e, int point, const double 
 /* |K_ab| <= mu (|g_a.g_b| + |g_a||g_b|) + lambda |g_a||g_b|, whatever the rotation */
 static void bound_at_rest(pal_elastic_tets *t, int e, double *bound)
 {
-    int n = t->wish.n_corner;
+    int n = t->options.n_corner;
     double mu = *lane_at(t->stiff, 2, t->place[e], 0) / t->n_point,
            lambda = *lane_at(t->stiff, 2, t->place[e], 1) / t->n_point;
     const int32_t *node = t->corner + (size_t)n * (size_t)e;
@@ -153,9 +154,9 @@ static void bound_at_rest(pal_elastic_tets *t, int e, double *bound)
 
 void pal_elastic_tets_material(pal_elastic_tets *t, const pal_material *material)
 {
-    const double nu = t->wish.max_poisson;
+    const double nu = t->options.max_poisson;
     memset(t->bound, 0, sizeof(double) * (size_t)t->n_node);
-    for (int e = 0; e < t->wish.n_tet; e++) {
+    for (int e = 0; e < t->options.n_tet; e++) {
         double mu, lambda, volume = *lane_at(t->volume_m3, 1, t->place[e], 0);
         pal_elastic_regions_lame(&t->parts, material, e, &mu, &lambda);
         if (nu > 0) lambda = fmin(lambda, 2 * mu * nu / (1 - 2 * nu));
@@ -168,7 +169,7 @@ void pal_elastic_tets_material(pal_elastic_tets *t, const pal_material *material
 /* K_ab = mu g_a.g_b I + s [F (g_a x g_b)]x + k1 (C g_a)(C g_b)', C = dJ/dF, s = -mu + k1 (J - 1) */
 static void bound_neo(const pal_elastic_tets *t, int e, const double *d, double *bound)
 {
-    int n = t->wish.n_corner;
+    int n = t->options.n_corner;
     double mu = *lane_at(t->stiff, 2, t->place[e], 0) / t->n_point,
            k1 = mu + *lane_at(t->stiff, 2, t->place[e], 1) / t->n_point;
     const int32_t *node = t->corner + (size_t)n * (size_t)e;
@@ -192,8 +193,8 @@ static void bound_neo(const pal_elastic_tets *t, int e, const double *d, double 
 
 void pal_elastic_tets_bound(pal_elastic_tets *t, const double *d, double *bound_N_m)
 {
-    if (t->wish.law == PAL_LAW_NEO_HOOKEAN)
-        for (int e = 0; e < t->wish.n_tet; e++) bound_neo(t, e, d, bound_N_m);
+    if (t->options.law == PAL_LAW_NEO_HOOKEAN)
+        for (int e = 0; e < t->options.n_tet; e++) bound_neo(t, e, d, bound_N_m);
     else
         for (int i = 0; i < t->n_node; i++) bound_N_m[i] += t->bound[i];
 }
@@ -201,8 +202,8 @@ void pal_elastic_tets_bound(pal_elastic_tets *t, const double *d, double *bound_
 /* where the pairs of corners of every element stand in the pattern, once per pattern */
 static void find_entries(pal_elastic_tets *t, const pal_block_matrix *to)
 {
-    int n = t->wish.n_corner;
-    for (int e = 0; e < t->wish.n_tet; e++) {
+    int n = t->options.n_corner;
+    for (int e = 0; e < t->options.n_tet; e++) {
         const int32_t *node = t->corner + (size_t)n * (size_t)e;
         int32_t *entry = t->entry + (size_t)entries(n) * (size_t)e;
         for (int a = 0; a < n; a++)
@@ -216,7 +217,7 @@ static void find_entries(pal_elastic_tets *t, const pal_block_matrix *to)
 
 static void assemble_gradients(const pal_elastic_tets *t, int e, double k, pal_block_matrix *to)
 {
-    int n = t->wish.n_corner;
+    int n = t->options.n_corner;
     const int32_t *entry = t->entry + (size_t)entries(n) * (size_t)e;
     double r[9], g[4][PAL_TET10_CORNERS][3];
     double mu = k * *lane_at(t->stiff, 2, t->place[e], 0) / t->n_point,
@@ -264,7 +265,7 @@ static void modes_block(const double *stretch, const double *same, const double 
 
 static void assemble_modes(const pal_elastic_tets *t, int e, double k, pal_block_matrix *to)
 {
-    int n = t->wish.n_corner, width = PAL_TET_MODES * t->n_point;
+    int n = t->options.n_corner, width = PAL_TET_MODES * t->n_point;
     const int32_t *node = t->corner + (size_t)n * (size_t)e;
     for (int p = 0; p < t->n_point; p++) {
         double m[PAL_TET_MODES], g[PAL_TET10_CORNERS][3];
@@ -292,10 +293,10 @@ static void assemble_modes(const pal_elastic_tets *t, int e, double k, pal_block
 void pal_elastic_tets_assemble(pal_elastic_tets *t, double k, pal_block_matrix *to)
 {
     if (t->entry_row != to->row || t->entry_of != to) find_entries(t, to);
-    if (t->straight) k *= t->soft;
-    for (int e = 0; e < t->wish.n_tet; e++) {
+    if (t->single_rotation) k *= t->soft;
+    for (int e = 0; e < t->options.n_tet; e++) {
         if (*lane_at(t->volume_m3, 1, t->place[e], 0) <= 0) continue;
-        if (t->wish.law == PAL_LAW_NEO_HOOKEAN)
+        if (t->options.law == PAL_LAW_NEO_HOOKEAN)
             assemble_modes(t, e, k, to);
         else
             assemble_gradients(t, e, k, to);
@@ -304,11 +305,11 @@ void pal_elastic_tets_assemble(pal_elastic_tets *t, double k, pal_block_matrix *
 
 void pal_elastic_tets_rotate(const pal_elastic_tets *t, double *turn)
 {
-    for (int e = 0; e < t->wish.n_tet; e++) {
+    for (int e = 0; e < t->options.n_tet; e++) {
         double r[9], weight = *lane_at(t->stiff, 2, t->place[e], 0);
         pal_elastic_tets_rotation(t, e, r);
-        const int32_t *node = t->corner + (size_t)t->wish.n_corner * (size_t)e;
-        for (int c = 0; c < t->wish.n_corner; c++)
+        const int32_t *node = t->corner + (size_t)t->options.n_corner * (size_t)e;
+        for (int c = 0; c < t->options.n_corner; c++)
             for (int i = 0; i < 9; i++) turn[9 * node[c] + i] += weight * r[i];
     }
 }
@@ -323,7 +324,7 @@ static double field_at(const pal_elastic_tets *t, int e, int point, const double
     pal_elastic_tets_gradient(t, e, point, d, f);
     if (field == PAL_FIELD_STRAIN) return pal_largest_strain(f);
     if (field == PAL_FIELD_DISTORTION) return pal_det3(f) - 1;
-    if (t->wish.law == PAL_LAW_NEO_HOOKEAN) {
+    if (t->options.law == PAL_LAW_NEO_HOOKEAN) {
         if (field == PAL_FIELD_ENERGY_J_M3) return pal_neo_energy(mu, mu + lambda, f);
         pal_neo_stress(mu, mu + lambda, 0, f, p);
         for (int i = 0; i < 3; i++)
@@ -341,8 +342,8 @@ static double field_at(const pal_elastic_tets *t, int e, int point, const double
 void pal_elastic_tets_measure(pal_elastic_tets *t, const double *d, pal_field field, double *sum, double *volume_m3)
 {
     if (!(PAL_ELASTIC_FIELDS >> field & 1)) return;
-    int n = t->wish.n_corner;
-    for (int e = 0; e < t->wish.n_tet; e++) {
+    int n = t->options.n_corner;
+    for (int e = 0; e < t->options.n_tet; e++) {
         double share = *lane_at(t->volume_m3, 1, t->place[e], 0) / n, value = 0;
         if (share <= 0) continue;
         for (int p = 0; p < t->n_point; p++) value += field_at(t, e, p, d, field) / t->n_point;
@@ -357,10 +358,10 @@ void pal_elastic_tets_measure(pal_elastic_tets *t, const double *d, pal_field fi
 void pal_elastic_tets_stress(pal_elastic_tets *t, const double *d, pal_stress_take *take, void *user)
 {
     static const double centre[4] = {0.25, 0.25, 0.25, 0.25};
-    int n = t->wish.n_corner;
+    int n = t->options.n_corner;
     double shape[4][10];
     for (int p = 0; p < t->n_point && n == 10; p++) pal_tet10_shape(pal_tet_gauss[p], shape[p], NULL);
-    for (int e = 0; e < t->wish.n_tet; e++) {
+    for (int e = 0; e < t->options.n_tet; e++) {
         double volume = *lane_at(t->volume_m3, 1, t->place[e], 0), f[9], r[9], p[9];
         if (volume <= 0) continue;
         pal_stress_point to = {.element = e,
@@ -369,7 +370,7 @@ void pal_elastic_tets_stress(pal_elastic_tets *t, const double *d, pal_stress_ta
                                .volume_m3 = volume / t->n_point,
                                .mu_Pa = *lane_at(t->stiff, 2, t->place[e], 0) / volume,
                                .lambda_Pa = *lane_at(t->stiff, 2, t->place[e], 1) / volume};
-        bool neo = t->wish.law == PAL_LAW_NEO_HOOKEAN;
+        bool neo = t->options.law == PAL_LAW_NEO_HOOKEAN;
         pal_elastic_tets_rotation(t, e, r);
         for (int k = 0; k < t->n_point; k++) {
             pal_elastic_tets_gradient(t, e, k, d, f);

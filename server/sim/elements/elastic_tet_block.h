@@ -8,16 +8,16 @@
 
 #include <string.h>
 
-enum { PAL_TET_ROTATION_STEPS = 8 }; /* that vectors try */
+enum { PAL_TET_ROTATION_STEPS = 8 }; /* Newton steps for a rotation before pal_polar_rotation */
 
-/* 8 elements: where their corners' coordinates stand, and where their forces go */
+/* 8 elements: pointers to the coordinates of their corners and to their forces */
 typedef struct pal_tet_block {
     const double *x[PAL_TET10_CORNERS][3];
     double *f[PAL_TET10_CORNERS][3];
     double x_loose[PAL_TET10_CORNERS][3][PAL_LANES], f_loose[PAL_TET10_CORNERS][3][PAL_LANES];
 } pal_tet_block;
 
-/* tet4: from slots, strips in place, loose ones gathered */
+/* tet4: from slots, strips in place, loose blocks gathered */
 PAL_INLINE void pal_tet_load_block(const pal_elastic_tets *t, int b, pal_tet_block *to)
 {
     const pal_node_order *s = t->node_order;
@@ -130,9 +130,9 @@ void pal_elastic_tets_modes(pal_elastic_tets *t, const double *d);
 /* one element of a corotational law with the rotation it holds: returns its energy; force (NULL: none) [n_node][3] and
  * torque about the origin are added to */
 double pal_tet_add_element(const pal_elastic_tets *t, int e, const double *d, double *force, double *torque);
-/* f -= forces without sum that have this torque: what borrowed rotations turn, the body as a whole turns back */
+/* f -= forces without resultant that have this torque: balances averaged rotations */
 void pal_tet_balance_torque(const pal_elastic_tets *t, const double *d, const double torque[3], double *f);
-/* the whole of a body that is straightened */
+/* energy and forces of a body with a single rotation */
 double pal_tet_single_rotation_force(const pal_elastic_tets *t, const double *d, double *f);
 void pal_tet_fit_single_rotation(pal_elastic_tets *t, const double *d);
 #endif

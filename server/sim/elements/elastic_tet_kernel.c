@@ -74,13 +74,13 @@ PAL_INLINE pal_wide_mask note_inverted(pal_elastic_tets *t, int first_lane, pal_
     if (pal_wide_all(~inverted)) return live;
     for (int l = 0; l < PAL_WIDE; l++)
         if (inverted[l]) t->inverted[t->n_inverted++] = t->owner[first_lane + l];
-    return t->wish.recover && t->wish.law == PAL_LAW_COROTATIONAL ? live & ~inverted : live;
+    return t->options.recover && t->options.law == PAL_LAW_COROTATIONAL ? live & ~inverted : live;
 }
 
 enum { FORCE = 1, ENERGY = 2 };
 
-/* s = R [y] D', y = A^-1 t, A = tr(m) I - m for symmetric m = R'F at the centre: what the rotation's own change adds to
- * the force when a turn w of R changes the energy by t.w */
+/* s = R [y] D', y = A^-1 t, A = tr(m) I - m for symmetric m = R'F at the centre: what the change of the rotation adds
+ * to the force when a turn w of R changes the energy by t.w */
 PAL_INLINE void turn_stress(const pal_wide r[9], const pal_wide m[9], const pal_wide t[3], const pal_wide inverse[9],
                             pal_wide s[9])
 {
@@ -232,7 +232,7 @@ static double run_blocks(pal_elastic_tets *t, int what, const double *x, double 
 {
     t->n_inverted = t->n_slow = 0;
 #define CASE(n, l, w)                                                                                                  \
-    if (t->wish.n_corner == n && t->wish.law == l && what == (w)) return all_blocks(t, n, l, w, x, force)
+    if (t->options.n_corner == n && t->options.law == l && what == (w)) return all_blocks(t, n, l, w, x, force)
     CASE(4, PAL_LAW_COROTATIONAL, FORCE);
     CASE(4, PAL_LAW_LINEAR, FORCE);
     CASE(4, PAL_LAW_NEO_HOOKEAN, FORCE);
@@ -261,7 +261,7 @@ static void turn_blocks(pal_elastic_tets *t, const double *x)
     pal_tet_block at;
     t->n_inverted = t->n_slow = 0;
     for (int b = 0; b < t->n_block; b++) {
-        int n_corner = t->wish.n_corner;
+        int n_corner = t->options.n_corner;
         if (n_corner == 4)
             pal_tet_load_block(t, b, &at);
         else
@@ -271,7 +271,7 @@ static void turn_blocks(pal_elastic_tets *t, const double *x)
             pal_wide_mask live = pal_wide_load(t->stiff + (size_t)b * 2 * PAL_LANES + lane) > 0;
             pal_tet_load9(t->inverse + (size_t)b * 9 * PAL_LANES + lane, 9, inverse);
             note_inverted(t, PAL_LANES * b + lane, take_gradient(t, n_corner, &at, lane, inverse, f, inner), live);
-            if (t->wish.law != PAL_LAW_LINEAR)
+            if (t->options.law != PAL_LAW_LINEAR)
                 t->n_slow += take_turn(t->turn + (size_t)b * 4 * PAL_LANES + lane, live, f, r, m);
         }
     }
@@ -287,9 +287,9 @@ void pal_elastic_tets_rotation(const pal_elastic_tets *t, int e, double r[9])
 
 void pal_elastic_tets_gradient(const pal_elastic_tets *t, int e, int point, const double *d, double f[9])
 {
-    const int32_t *node = t->corner + (size_t)t->wish.n_corner * (size_t)e;
+    const int32_t *node = t->corner + (size_t)t->options.n_corner * (size_t)e;
     double h[9] = {0};
-    for (int a = 0; a < t->wish.n_corner; a++)
+    for (int a = 0; a < t->options.n_corner; a++)
         for (int r = 0; r < 3; r++)
             for (int c = 0; c < 3; c++) h[3 * r + c] += d[3 * node[a] + r] * t->shape[point][a][c];
     for (int r = 0; r < 3; r++)
@@ -305,9 +305,10 @@ double pal_tet_add_element(const pal_elastic_tets *t, int e, const double *d, do
 {
     double r[9], f[9], p[9], sum = 0;
     pal_elastic_tets_rotation(t, e, r);
-    double share = (t->straight ? t->soft : 1) / t->n_point, mu = share * pal_lane_get(t->stiff, 2, t->place[e], 0),
+    double share = (t->single_rotation ? t->soft : 1) / t->n_point,
+           mu = share * pal_lane_get(t->stiff, 2, t->place[e], 0),
            lambda = share * pal_lane_get(t->stiff, 2, t->place[e], 1);
-    const int32_t *node = t->corner + (size_t)t->wish.n_corner * (size_t)e;
+    const int32_t *node = t->corner + (size_t)t->options.n_corner * (size_t)e;
     for (int g = 0; g < t->n_point; g++) {
         pal_elastic_tets_gradient(t, e, g, d, f);
         sum += pal_corotational_stress(mu, lambda, f, r, p);
@@ -316,7 +317,7 @@ double pal_tet_add_element(const pal_elastic_tets *t, int e, const double *d, do
             int i = (k + 1) % 3, j = (k + 2) % 3;
             torque[k] += pal_dot3(f + 3 * j, p + 3 * i) - pal_dot3(f + 3 * i, p + 3 * j);
         }
-        for (int a = 0; a < t->wish.n_corner; a++)
+        for (int a = 0; a < t->options.n_corner; a++)
             for (int c = 0; c < 3; c++)
                 for (int m = 0; m < 3; m++)
                     for (int k = 0; k < 3; k++)
@@ -326,8 +327,8 @@ double pal_tet_add_element(const pal_elastic_tets *t, int e, const double *d, do
     return sum;
 }
 
-/* f -= forces without sum, a x r on the node at r from the mean, that have this torque: what the borrowed rotations
- * turn, the body as a whole turns back */
+/* f -= forces a x r at the nodes, r from the mean, which have this torque and no resultant: they balance averaged
+ * rotations */
 void pal_tet_balance_torque(const pal_elastic_tets *t, const double *d, const double torque[3], double *f)
 {
     double mean[3] = {0}, s[9] = {0}, r[3], w[3], v[9], a[3] = {0};
@@ -350,17 +351,17 @@ void pal_tet_balance_torque(const pal_elastic_tets *t, const double *d, const do
     }
 }
 
-/* the untangling rule: rotations around nodes from the elements that are not inverted, then those of the others */
+/* averaged rotations: around nodes from the elements that are not inverted, then of the others */
 static void recover(pal_elastic_tets *t)
 {
     memset(t->around, 0, 9 * sizeof(double) * (size_t)t->n_node);
     for (int i = 0; i < t->n_inverted; i++) t->flag[t->inverted[i]] = 1;
-    for (int e = 0; e < t->wish.n_tet; e++) {
+    for (int e = 0; e < t->options.n_tet; e++) {
         double r[9], volume = pal_lane_get(t->volume_m3, 1, t->place[e], 0);
         if (t->flag[e] || volume <= 0) continue;
         pal_elastic_tets_rotation(t, e, r);
         for (int c = 0; c < 4; c++)
-            for (int i = 0; i < 9; i++) t->around[9 * t->corner[t->wish.n_corner * e + c] + i] += volume * r[i];
+            for (int i = 0; i < 9; i++) t->around[9 * t->corner[t->options.n_corner * e + c] + i] += volume * r[i];
     }
     for (int k = 0; k < t->n_inverted; k++) {
         int e = t->inverted[k];
@@ -368,7 +369,7 @@ static void recover(pal_elastic_tets *t)
         t->flag[e] = 0;
         for (int c = 0; c < 4; c++) {
             /* a node counts by its rotation, not by the volume around it */
-            const double *a = t->around + 9 * t->corner[t->wish.n_corner * e + c];
+            const double *a = t->around + 9 * t->corner[t->options.n_corner * e + c];
             double length = 0;
             for (int i = 0; i < 9; i++) length += a[i] * a[i];
             for (int i = 0; i < 9 && length > 0; i++) sum[i] += a[i] / sqrt(length);
@@ -383,13 +384,13 @@ static void recover(pal_elastic_tets *t)
 
 static bool has_inversion(const pal_elastic_tets *t)
 {
-    return t->n_inverted > 0 && t->wish.recover && t->wish.law == PAL_LAW_COROTATIONAL;
+    return t->n_inverted > 0 && t->options.recover && t->options.law == PAL_LAW_COROTATIONAL;
 }
 
 static double take(pal_elastic_tets *t, int what, const double *d, double *f)
 {
-    bool node_order = t->wish.n_corner == 4;
-    if (t->straight) return pal_tet_single_rotation_force(t, d, f);
+    bool node_order = t->options.n_corner == 4;
+    if (t->single_rotation) return pal_tet_single_rotation_force(t, d, f);
     if (node_order) pal_node_order_load(t->node_order, d);
     double sum = run_blocks(t, what, d, f), torque[3] = {0};
     if (node_order && f) pal_node_order_add(t->node_order, f);
@@ -427,13 +428,13 @@ static void take_gradients(pal_elastic_tets *t)
 
 void pal_elastic_tets_linearise(pal_elastic_tets *t, const double *d)
 {
-    if (t->wish.n_corner == 4) pal_node_order_load(t->node_order, d);
-    if (t->straight)
+    if (t->options.n_corner == 4) pal_node_order_load(t->node_order, d);
+    if (t->single_rotation)
         pal_tet_fit_single_rotation(t, d);
     else
         turn_blocks(t, d);
-    if (has_inversion(t) && !t->straight) recover(t);
-    if (t->wish.law == PAL_LAW_NEO_HOOKEAN)
+    if (has_inversion(t) && !t->single_rotation) recover(t);
+    if (t->options.law == PAL_LAW_NEO_HOOKEAN)
         pal_elastic_tets_modes(t, d);
     else
         take_gradients(t);
@@ -508,9 +509,9 @@ PAL_INLINE void multiply_blocks(const pal_elastic_tets *t, int n_corner, bool ne
 
 void pal_elastic_tets_multiply(const pal_elastic_tets *t, double k, const double *p, double *out)
 {
-    bool neo = t->wish.law == PAL_LAW_NEO_HOOKEAN;
-    if (t->straight) k *= t->soft;
-    if (t->wish.n_corner == 4) {
+    bool neo = t->options.law == PAL_LAW_NEO_HOOKEAN;
+    if (t->single_rotation) k *= t->soft;
+    if (t->options.n_corner == 4) {
         pal_node_order_load(t->node_order, p);
         if (neo)
             multiply_blocks(t, 4, true, k, p, out);

@@ -155,7 +155,7 @@ PAL_INLINE void all_modes(pal_elastic_tets *t, int n_corner, const double *d)
 
 void pal_elastic_tets_modes(pal_elastic_tets *t, const double *d)
 {
-    if (t->wish.n_corner == 4)
+    if (t->options.n_corner == 4)
         all_modes(t, 4, d);
     else
         all_modes(t, 10, d);

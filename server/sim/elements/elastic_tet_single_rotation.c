@@ -1,20 +1,21 @@
-/* Folded bodies made straight: see elastic_tet.h. */
+/* One rotation for all elements of a folded body (elastic_tet.h, "Single rotation"). */
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
 #include "server/sim/elements/elastic_tet_block.h"
 
 #include <string.h>
 
-/* looks, one a Newton iteration, in which a body that is getting on moves by more than this share of S */
-enum { LOOKS = 64, MOST_TURNS = 200 };
-/* how often it is straightened without so many looks of peace */
-enum { TIMES = 2, PEACE = 600 };
+/* a body is stuck when it moves by less than still_S of its length scale within STUCK_UPDATES updates, one a Newton
+ * iteration */
+enum { STUCK_UPDATES = 64, MAX_TURNS = 200 };
+/* largest number of single rotations without QUIET_UPDATES updates free of inversion between them */
+enum { TIMES = 2, QUIET_UPDATES = 600 };
 static const double still_S = 1e-3;
-/* a share of the most that a node bears, 10 E h^2: what presses harder may well turn elements over for good */
+/* part of load_cap_N: a load above it may hold elements inverted for good */
 static const double pressed_share = 0.01;
 static const double least_soft = 1e-3;
 
-/* what leads the body's frame: the nodes that are held when there are three, else all */
+/* nodes that determine the rotation: the supports when there are three, else all */
 static bool leads(const pal_elastic_tets *t, bool by_held, int i)
 {
     return !by_held || t->fixed[i];
@@ -27,7 +28,7 @@ static bool has_frame(const pal_elastic_tets *t)
     return n >= 3;
 }
 
-/* all elements turn as the frame does */
+/* gives all elements the rotation of the frame */
 void pal_tet_fit_single_rotation(pal_elastic_tets *t, const double *d)
 {
     const bool by_held = has_frame(t);
@@ -44,17 +45,17 @@ void pal_tet_fit_single_rotation(pal_elastic_tets *t, const double *d)
         pal_sub3(a, d + 3 * i, c), pal_sub3(b, t->x_rest + 3 * i, o);
         for (int k = 0; k < 9; k++) f[k] += a[k / 3] * b[k % 3];
     }
-    pal_polar_rotation(f, q, MOST_TURNS);
-    for (int e = 0; e < t->wish.n_tet; e++)
+    pal_polar_rotation(f, q, MAX_TURNS);
+    for (int e = 0; e < t->options.n_tet; e++)
         for (int i = 0; i < 4; i++) pal_lane_set(t->turn, 4, t->place[e], i, q[i]);
 }
 
 double pal_tet_single_rotation_force(const pal_elastic_tets *t, const double *d, double *f)
 {
     double sum = 0, torque[3] = {0};
-    for (int e = 0; e < t->wish.n_tet; e++)
+    for (int e = 0; e < t->options.n_tet; e++)
         if (pal_lane_get(t->volume_m3, 1, t->place[e], 0) > 0) sum += pal_tet_add_element(t, e, d, f, torque);
-    /* what nothing holds does not turn itself */
+    /* a free body does not turn itself */
     if (f && !has_frame(t)) pal_tet_balance_torque(t, d, torque, f);
     return sum;
 }
@@ -63,7 +64,7 @@ static bool has_moved(const pal_elastic_tets *t, const pal_body *body)
 {
     double most = still_S * body->length_scale_m;
     for (int i = 0; i < t->n_node; i++)
-        if (pal_dist3(t->seen + 3 * i, body->d + 3 * i) > most) return true;
+        if (pal_dist3(t->x_before + 3 * i, body->d + 3 * i) > most) return true;
     return false;
 }
 
@@ -78,14 +79,14 @@ static bool is_pressed(const pal_body *body)
 bool pal_elastic_tets_check_rest(pal_elastic_tets *t, const pal_body *body, bool has_inversion)
 {
     t->n_whole = has_inversion ? 0 : t->n_whole + 1;
-    if (t->n_whole >= PEACE) t->n_single_rotation = t->n_whole = 0;
+    if (t->n_whole >= QUIET_UPDATES) t->n_single_rotation = t->n_whole = 0;
     if (!has_inversion || t->n_single_rotation >= TIMES) return false;
-    if (t->straight || t->n_look++ % LOOKS != 0) return false;
-    bool stuck = t->n_look > 1 && !has_moved(t, body) && !is_pressed(body);
-    memcpy(t->seen, body->d, 3 * sizeof(double) * (size_t)t->n_node);
+    if (t->single_rotation || t->n_still++ % STUCK_UPDATES != 0) return false;
+    bool stuck = t->n_still > 1 && !has_moved(t, body) && !is_pressed(body);
+    memcpy(t->x_before, body->d, 3 * sizeof(double) * (size_t)t->n_node);
     if (!stuck) return false;
     double before = pal_elastic_tets_energy(t, body->d, NULL);
-    t->straight = true, t->soft = 1;
+    t->single_rotation = true, t->soft = 1;
     t->n_single_rotation++;
     pal_tet_fit_single_rotation(t, body->d);
     double after = pal_tet_single_rotation_force(t, body->d, NULL);

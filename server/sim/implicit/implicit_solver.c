@@ -3,13 +3,13 @@
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
+#include "server/sim/core/step_guard.h"
 #include "server/sim/core/sums.h"
 #include "server/sim/subdivision/subdivision_mass.h"
 
 #include <limits.h>
 #include <string.h>
 
-static const double max_move_S = 0.2;
 /* of a step's loads: residuals below are not worth an iteration, so that a body at rest costs none */
 static const double floor_share = 1e-7;
 /* of 10 E h^2 (load_cap_N), the same for a body without loads: forces that move a node by less of an element are the
@@ -19,9 +19,9 @@ static const double still_share = 1e-11;
 enum { rescue_newton = 8 };
 /* a stage whose equations are solved may gain a little by its own error of time; more than this share counts */
 static const double gain_share = 0.01;
-/* sub-steps that may gain energy in spite of all iterations before the body has to stand still in such; so many without
- * one in between and they are counted anew */
-enum { patience = 30, calm_steps = 30 };
+/* s. Sub-steps of this much time in all may gain energy in spite of all iterations before the body has to stand still
+ * in such: an inverted body needs a few of them to recover. After as much time without one they are forgotten */
+static const double rise_s = 0.5;
 /* columns of an embedded body's matrices found anew in a step, each the work of one of conjugate gradients' */
 enum { PROBES_A_STEP = 4 };
 
@@ -298,7 +298,7 @@ static void keep_momentum(pal_implicit *core)
 static void clamp_moves(pal_implicit *core, double tau)
 {
     pal_body *body = core->system.body;
-    double most = max_move_S * body->length_scale_m / tau, longest = 0, mean[3] = {0, 0, 0}, mass = 0;
+    double most = pal_guard_max_move_m(body) / tau, longest = 0, mean[3] = {0, 0, 0}, mass = 0;
     for (int i = 0; i < body->n_dof && core->system.n_free == body->n_dof; i++) {
         pal_axpy3(mean, body->mass_kg[i], core->vs + 3 * i);
         pal_axpy3(mean, -body->mass_kg[i], core->start + 3 * i);
@@ -522,8 +522,7 @@ bool pal_implicit_begin(pal_implicit *core, pal_step *step)
         return false;
     }
     pal_system_interpolate(&core->system);
-    for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->recover) (void)step->force[i].effect->recover(step->force[i].self, step);
+    (void)pal_guard_recover(step);
     core->report.n_newton = core->report.n_cg = core->max_cg = 0;
     core->energy_rose = false;
     pal_system_linearise_contact(&core->system, step);
@@ -583,13 +582,13 @@ static void keep_probed(pal_implicit *core, pal_step *step)
 /* Is it time to stand still? Forces that no energy has, as those of elements turned over, which borrow rotations, may
  * lead in a circle: there is more energy than at the sub-step's begin after all iterations, now and then for ever. A
  * tangled body needs such steps to get out, no more than a few. */
-static bool circles(pal_implicit *core)
+static bool circles(pal_implicit *core, double dt_s)
 {
-    if (core->energy_rose)
-        core->n_energy_rise++, core->n_steady = 0;
-    else if (core->n_steady++ >= calm_steps)
-        core->n_energy_rise = 0;
-    return core->energy_rose && core->n_energy_rise > patience;
+    const double limit_s = rise_s * (1 + 1e-9);
+    core->steady_s = core->energy_rose ? 0 : core->steady_s + dt_s;
+    if (core->energy_rose) core->energy_rise_s += dt_s;
+    if (core->steady_s > limit_s) core->energy_rise_s = 0;
+    return core->energy_rose && core->energy_rise_s > limit_s;
 }
 
 /* the body goes back and stands there; what nothing holds goes on as a whole, with its momentum */
@@ -611,14 +610,13 @@ static void stand_still(pal_implicit *core, double dt_s)
 void pal_implicit_end(pal_implicit *core, pal_step *step)
 {
     pal_body *body = core->system.body;
-    if (!core->sound && !pal_body_finite(body)) {
-        pal_body_stop_bad(body, "");
+    if (!core->sound && !pal_guard_check_finite(body)) {
         memcpy(body->x, core->x0, bytes3(core));
         memset(body->v, 0, bytes3(core));
         pal_body_update_nodes(body);
         return;
     }
-    if (!body->mass_operator && circles(core)) stand_still(core, step->dt_s);
+    if (!body->mass_operator && circles(core, step->dt_s)) stand_still(core, step->dt_s);
     pal_body_update_nodes(body);
     pal_warp_step(&core->warp);
     pal_warp_step(&core->answer.warp);
@@ -670,7 +668,7 @@ void pal_implicit_reset(void *self, const pal_body *body)
 {
     pal_implicit *core = self;
     (void)body;
-    core->n_energy_rise = core->n_steady = 0;
+    core->energy_rise_s = core->steady_s = 0;
     if (core->system.n_free == 0) return;
     pal_node_rotations_reset(&core->turns);
     pal_compliance_solver_reset(&core->answer);

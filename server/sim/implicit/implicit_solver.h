@@ -7,9 +7,9 @@
  * The first iteration starts from the state at the stage's begin, not from an extrapolated one: with rotations taken
  * there the corotational energy (but for its volume term) is bounded from above by the quadratic that is solved, so
  * that a single iteration (newton 1, the default) seldom gains energy. Where it does, up to 7 more follow until energy
- * is no more than at the sub-step's begin. A body that gains in spite of them again and again (30 times without half a
- * second of peace at 1/60 s) goes round in a circle, as crushed elements on borrowed rotations do: from then on it goes
- * back and stands still in each such sub-step, so that its energy cannot rise. Conjugate gradients begin with the
+ * is no more than at the sub-step's begin. A body that gains in spite of them again and again (half a second in all
+ * without half a second of peace) goes round in a circle, as crushed elements on borrowed rotations do: from then on it
+ * goes back and stands still in each such sub-step, so that its energy cannot rise. Conjugate gradients begin with the
  * velocities of before. With newton > 1, and in those 7, a line search on the incremental potential follows each
  * iteration.
  *
@@ -50,18 +50,18 @@ typedef struct pal_implicit {
     double *xs, *vs; /* x*, v* of the stage, filled by the solver [n_dof][3] */
     double *start;   /* V that would leave the body where it was linearised [n_dof][3] */
     double *work, *moved;
-    double *node_displacement_m; /* the way of nodes for `settle`; moved without embed  [n_node][3] */
-    double tau_rest_s;           /* tau of the factor at rest           */
-    double density;              /* of the material, kg/m^3             */
-    double reference;            /* of the tolerance, N s               */
-    double start_energy_J;       /* at the sub-step's begin             */
-    bool guarded;                /* energy is watched: see above        */
-    bool sound;                  /* its last look found that x and v are finite */
-    bool energy_rose;            /* ... and was not kept in this sub-step ... */
-    int n_energy_rise, n_steady; /* ... nor in so many (0 after half a second of peace); sub-steps since then */
-    int max_cg;                  /* in one solve of this sub-step       */
-    uint64_t sampled;            /* material revision of the body at the factor (dofs.h) */
-    bool probing;                /* an embedded body's matrices are being found anew */
+    double *node_displacement_m;    /* the way of nodes for `settle`; moved without embed  [n_node][3] */
+    double tau_rest_s;              /* tau of the factor at rest           */
+    double density;                 /* of the material, kg/m^3             */
+    double reference;               /* of the tolerance, N s               */
+    double start_energy_J;          /* at the sub-step's begin             */
+    bool guarded;                   /* energy is watched: see above        */
+    bool sound;                     /* its last look found that x and v are finite */
+    bool energy_rose;               /* ... and was not kept in this sub-step ... */
+    double energy_rise_s, steady_s; /* ... nor in sub-steps of so much time (0 after half a second without); since */
+    int max_cg;                     /* in one solve of this sub-step       */
+    uint64_t sampled;               /* material revision of the body at the factor (dofs.h) */
+    bool probing;                   /* an embedded body's matrices are being found anew */
     pal_solve_report report;
 } pal_implicit;
 

@@ -4,6 +4,7 @@
 #include "server/base/vec3.h"
 #include "server/num/conjugate_gradient.h"
 #include "server/num/union_find.h"
+#include "server/sim/core/step_guard.h"
 #include "server/sim/subdivision/subdivision_mass.h"
 
 #include <stdlib.h>
@@ -299,10 +300,7 @@ double pal_system_energy(const pal_system *system)
 
 double pal_system_drag(const pal_system *system)
 {
-    double rate = 0;
-    for (int i = 0; i < system->n_force; i++)
-        if (system->force[i].effect->drag) rate += system->force[i].effect->drag(system->force[i].self);
-    return rate;
+    return pal_guard_drag_1_s(system->force, system->n_force);
 }
 
 /* ---- supports ---- */

@@ -30,7 +30,7 @@ static pal_err hold(pal_body *body, const pal_body_def *def, const double up[3],
 {
     for (int s = 0; s < def->n_support; s++) {
         if (def->support[s].rim) PAL_TRY(hold_rim(body, s, diag));
-        pal_support_hold(&def->support[s], up, body->x_rest, body->n_dof, body->support);
+        pal_support_mark_fixed(&def->support[s], up, body->x_rest, body->n_dof, body->support);
     }
     return PAL_ERR_OK;
 }

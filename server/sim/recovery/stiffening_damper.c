@@ -1,45 +1,47 @@
-/* When a change of stiffness is braked, and how much. */
+/* When a change of stiffness is damped, and how much. */
 #include "server/sim/recovery/stiffening_damper.h"
 
 #include "server/base/vec3.h"
 
 #include <math.h>
 
+/* the damper begins when the energy rises more than tenfold and would move the body by more than its length scale in a
+ * second; it lasts 8 times 1/w, when exp(-8) of the motion is left, or 0.1 s after the last increase
+ * (tests/sim/recovery/test_stiffening_damper.c) */
 static const double least_speed_S_s = 1, least_rise = 10, still_periods = 8, hold_s = 0.1;
 
-/* sum m u^2 of what is free, and its mass */
-static double way_kg_m2(const pal_body *body, double *mass_kg)
+/* sum m u^2 of the free dofs, and their mass */
+static double displacement_kg_m2(const pal_body *body, double *mass_kg)
 {
-    double way = 0, u[3];
+    double sum = 0, u[3];
     *mass_kg = 0;
     for (int k = 0; k < body->n_active; k++) {
         size_t i = (size_t)pal_body_point(body, k);
         if (body->support[i]) continue;
         pal_sub3(u, body->x + 3 * i, body->x_rest + 3 * i);
         *mass_kg += body->mass_kg[i];
-        way += body->mass_kg[i] * pal_dot3(u, u);
+        sum += body->mass_kg[i] * pal_dot3(u, u);
     }
-    return way;
+    return sum;
 }
 
 void pal_stiffening_damper_begin(pal_body *body, double before_J, double after_J)
 {
-    double mass, way = way_kg_m2(body, &mass);
+    double mass, sum = displacement_kg_m2(body, &mass);
     double most = least_speed_S_s * body->length_scale_m, work = after_J - before_J;
     if (!(after_J > least_rise * before_J * (1 + 1e-9))) return;
-    if (!(2 * work > most * most * mass) || !(way > 0) || !isfinite(work)) return;
-    double w = sqrt(2 * after_J / way);
-    /* one that is still at work goes on for as long as the stronger of both asks */
+    if (!(2 * work > most * most * mass) || !(sum > 0) || !isfinite(work)) return;
+    double w = sqrt(2 * after_J / sum);
+    /* a damper at work continues, with the larger constant and the longer time */
     body->stiffening_damping_1_s = fmax(body->stiffening_damping_1_s, 2 * w);
     body->stiffening_damping_s = fmax(body->stiffening_damping_s, still_periods / w);
 }
 
 void pal_stiffening_damper_hold(pal_body *body, double stored_J)
 {
-    double mass, way = way_kg_m2(body, &mass);
-    if (!(way > 0) || !isfinite(stored_J)) return;
-    const double c = 2 * sqrt(2 * stored_J / way);
-    /* one that is still at work goes on */
+    double mass, sum = displacement_kg_m2(body, &mass);
+    if (!(sum > 0) || !isfinite(stored_J)) return;
+    const double c = 2 * sqrt(2 * stored_J / sum);
     body->stiffening_damping_1_s = body->stiffening_damping_s > hold_s ? fmax(body->stiffening_damping_1_s, c) : c;
     body->stiffening_damping_s = fmax(body->stiffening_damping_s, hold_s);
 }

@@ -33,6 +33,7 @@
 #include "server/num/envelope.h"
 #include "server/num/lanczos.h"
 #include "server/sim/core/effect_list.h"
+#include "server/sim/core/step_guard.h"
 #include "server/sim/subdivision/subdivision_mass.h"
 
 #include <string.h>
@@ -71,7 +72,6 @@ typedef struct central {
     double *bound;                /* of CONTACT rows                                           [n_node]    */
 } central;
 
-static const double most_way = 0.2, max_move_S = 0.2;
 /* of wild, and what is left of it after a sub-step without clamps */
 static const double most_wild = 8, calm = 0.98;
 /* of omega^2 while elements are turned over: what throws a corner about is the fastest motion, which near its limit is
@@ -336,13 +336,6 @@ static void find_contact(central *row, const pal_step *step)
     row->contact_1_s = find_bound(row);
 }
 
-static bool finite_state(const pal_body *body)
-{
-    double sum = 0;
-    for (int i = 0; i < 3 * body->n_dof; i++) sum += 0 * body->x[i] + 0 * body->v[i];
-    return sum == 0;
-}
-
 static void look(central *row, pal_step *step)
 {
     const double before = row->known ? row->rows2 : 0;
@@ -359,13 +352,11 @@ static bool recover(central *row, pal_step *step)
 {
     pal_body *body = step->body;
     double *d = body->d;
-    unsigned seen = 0;
     if (row->n_unseen < (step->sub == 0 ? UNSEEN / 2 : UNSEEN)) return false;
     row->n_unseen = 0;
     pal_interpolation_apply(body->interpolation, body->x, row->d);
     body->d = row->d;
-    for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->recover) seen |= step->force[i].effect->recover(step->force[i].self, step);
+    const unsigned seen = pal_guard_recover(step);
     body->d = d;
     /* forces of another law times half of a sub-step that was as long as the old one allowed would be a blow */
     if (seen & PAL_INVERSION_CHANGED) row->dt_s = 0;
@@ -378,9 +369,10 @@ static double limit(void *self, pal_step *step)
 {
     central *row = self;
     const pal_body *body = step->body;
-    if (!finite_state(body)) return NAN;
+    if (!pal_body_finite(body)) return NAN;
     if (renew(row, body) || recover(row, step)) row->known = false;
-    if (!row->known || (row->n_since >= row->pause && !(row->way_m <= most_way * row->cell_m))) look(row, step);
+    if (!row->known || (row->n_since >= row->pause && !(row->way_m <= PAL_GUARD_RECHECK * row->cell_m)))
+        look(row, step);
     if (step->sub == 0) find_contact(row, step);
     const double rows2 = row->has_inversion ? tangled2 * row->rows2 : row->rows2, lambda = rows2 + row->contact2,
                  c = row->contact_1_s;
@@ -389,14 +381,6 @@ static double limit(void *self, pal_step *step)
 }
 
 /* ---- a sub-step ---- */
-
-static double drag_rate(const pal_step *step)
-{
-    double rate = step->body->stiffening_damping_1_s;
-    for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->drag) rate += step->force[i].effect->drag(step->force[i].self);
-    return rate;
-}
 
 /* what the velocities of fixed points change by is known; `was` is v before the change everywhere. True: it is not 0 */
 static bool begin_change(central *row, const pal_body *body)
@@ -428,7 +412,8 @@ static void take_away(central *row, double a, double b, double s, double t)
 static void find_change(central *row, const pal_step *step)
 {
     const pal_body *body = step->body;
-    const double dt = step->dt_s, k = 0.5 * (dt + row->dt_s), rate = drag_rate(step),
+    const double dt = step->dt_s, k = 0.5 * (dt + row->dt_s),
+                 rate = body->stiffening_damping_1_s + pal_guard_drag_1_s(step->force, step->n_force),
                  over = row->limit_s > 0 ? dt / row->limit_s : 0;
     const double scale = step->heavy && over > 1 ? over * over : 1;
     const bool varies = row->mass->damping_kg_s != NULL, moves = begin_change(row, body);
@@ -451,18 +436,10 @@ static void find_change(central *row, const pal_step *step)
     row->report.converged = row->cg.residual <= row->tolerance * norm;
 }
 
-static void shorten(pal_body *body, double *v, double to)
-{
-    uint64_t before = pal_clock_ns();
-    pal_scale3(v, to, v);
-    body->safeguards.n_clamped++;
-    body->safeguards.ns += pal_clock_ns() - before;
-}
-
 /* v+ and p+; the longest way of a point against the others, which is no number when a velocity is none */
 static double move(central *row, pal_body *body, double dt)
 {
-    const double max_m = max_move_S * body->length_scale_m;
+    const double max_m = pal_guard_max_move_m(body);
     const uint64_t n_clamped = body->safeguards.n_clamped;
     double mean[3] = {0, 0, 0}, most2 = 0, poison = 0;
     for (int i = 0; i < body->n_dof; i++) {
@@ -472,7 +449,11 @@ static double move(central *row, pal_body *body, double dt)
         if (!body->support[i]) pal_add3(v, v, row->change + 3 * (size_t)i);
         const double way = pal_norm3(v) * dt;
         poison += 0 * way;
-        if (way > max_m) shorten(body, v, max_m / way);
+        if (way > max_m) {
+            uint64_t before = pal_clock_ns();
+            pal_scale3(v, pal_guard_shorten(body, way, max_m), v);
+            body->safeguards.ns += pal_clock_ns() - before;
+        }
         pal_axpy3(body->x + 3 * (size_t)i, dt, v);
         pal_copy3(row->was + 3 * (size_t)i, v);
         pal_axpy3(mean, 1.0 / body->n_dof, v);

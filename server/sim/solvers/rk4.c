@@ -20,6 +20,7 @@
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
+#include "server/sim/core/step_guard.h"
 #include "server/sim/surface/active_nodes.h"
 
 #include <string.h>
@@ -64,7 +65,7 @@ typedef struct rk4 {
     double *at, *still, *force; /* the body's x, v and f while it looks [n_dof][3]; NULL: no shell */
 } rk4;
 
-static const double max_move_h = 0.2, max_move_S = 0.2, radius = 2.7;
+static const double radius = 2.7;
 /* row sums are hardly ever more than `most_over` times too high, nor `more` times more so than they were last */
 static const double most_over = 1.6, more = 1.05;
 /* sub-steps between Lanczos' bounds, and iterations for one, a gather each */
@@ -122,8 +123,8 @@ static void give_motion(const pal_body *body)
 {
     for (int k = 0; k < body->n_active; k++) {
         size_t i = 3 * (size_t)pal_body_point(body, k);
-        pal_quad_store(body->x + i, pal_v8_low(body->pack->xv[k]));
-        pal_quad_store(body->v + i, pal_v8_high(body->pack->xv[k]));
+        pal_quad_store(body->x + i, pal_v8_low(body->active_nodes->xv[k]));
+        pal_quad_store(body->v + i, pal_v8_high(body->active_nodes->xv[k]));
     }
 }
 
@@ -132,44 +133,28 @@ static pal_err find_forces(const rk4 *row, pal_step *step)
 {
     pal_body *body = step->body;
     if (row->pulls) {
-        memcpy(body->pack->f, row->load, sizeof *row->load * (size_t)body->n_active);
+        memcpy(body->active_nodes->f, row->load, sizeof *row->load * (size_t)body->n_active);
         return pal_active_nodes_assemble(step);
     }
     give_motion(body);
     PAL_TRY(pal_assemble_forces(step));
     for (int k = 0; k < body->n_active; k++)
-        body->pack->f[k] = pal_quad_load(body->g + 3 * (size_t)pal_body_point(body, k));
+        body->active_nodes->f[k] = pal_quad_load(body->g + 3 * (size_t)pal_body_point(body, k));
     return PAL_ERR_OK;
 }
 
 /* ---- the limit ---- */
-
-static void add_bounds(rk4 *row, const pal_component *rows, int n, const pal_body *body)
-{
-    for (int i = 0; i < n; i++) {
-        const pal_effect *effect = rows[i].effect;
-        if (effect->stiffness) effect->stiffness(rows[i].self, body, row->stiff);
-        if (effect->damping && !effect->drag) effect->damping(rows[i].self, body, row->damp);
-    }
-}
-
-/* contact comes and goes between steps without any node moving */
-static bool has_bounds(const pal_component *rows, int n)
-{
-    for (int i = 0; i < n; i++)
-        if (rows[i].effect->stiffness || rows[i].effect->damping) return true;
-    return false;
-}
 
 /* does the bound taken last still hold? */
 static bool still_known(const rk4 *row, const pal_step *step)
 {
     const pal_body *body = step->body;
     /* not finite is not known */
-    if (!row->known || row->revision != body->revision || !(row->way_m <= max_move_h * body->edge_m)) return false;
+    if (!row->known || row->revision != body->revision || !(row->way_m <= PAL_GUARD_RECHECK * body->edge_m))
+        return false;
     if (body->active && (row->ramp[0] != *body->dofs.ramp[0] || row->ramp[1] != *body->dofs.ramp[1])) return false;
     if (body->active && !row->sharp_known && row->n_since >= PAUSE) return false;
-    return step->sub != 0 || !has_bounds(step->contact, step->n_contact);
+    return step->sub != 0 || !pal_guard_has_bounds(step->contact, step->n_contact);
 }
 
 /* row sums of stiffness over mass at free nodes, the most of them */
@@ -214,8 +199,8 @@ static void begin_lanczos(rk4 *row, const pal_body *body)
             q[c] = weight * ((double)(bits >> 11) * 0x1p-52 - 1);
         }
         norm2 += pal_quad_dot(q, q);
-        row->memory[k].from = pal_v8_join(pal_v8_low(body->pack->xv[k]), q);
-        row->memory[k].sum = pal_v8_join(body->pack->f[k], (pal_quad){0});
+        row->memory[k].from = pal_v8_join(pal_v8_low(body->active_nodes->xv[k]), q);
+        row->memory[k].sum = pal_v8_join(body->active_nodes->f[k], (pal_quad){0});
     }
     const pal_quad one = {1, 1, 1, 1};
     const pal_v8 scale = pal_v8_join(one, norm2 > 0 ? one / sqrt(norm2) : 0 * one);
@@ -226,7 +211,7 @@ static void begin_lanczos(rk4 *row, const pal_body *body)
 static pal_err apply_stiffness(rk4 *row, pal_step *step, double *along)
 {
     pal_body *body = step->body;
-    pal_active_nodes *pack = body->pack;
+    pal_active_nodes *pack = body->active_nodes;
     double most2 = 0;
     for (int k = 0; k < body->n_active; k++) {
         pal_quad q = row->inverse_kg[k] * pal_v8_high(row->memory[k].from);
@@ -253,7 +238,7 @@ static double next_lanczos(rk4 *row, const pal_body *body, double alpha, double 
     double norm2 = 0;
     for (int k = 0; k < body->n_active; k++) {
         memory *m = &row->memory[k];
-        pal_quad q = pal_v8_high(m->from), next = body->pack->f[k] - (alpha * q + beta * pal_v8_high(m->sum));
+        pal_quad q = pal_v8_high(m->from), next = body->active_nodes->f[k] - (alpha * q + beta * pal_v8_high(m->sum));
         norm2 += pal_quad_dot(next, next);
         m->sum = pal_v8_join(pal_v8_low(m->sum), q);
         m->from = pal_v8_join(pal_v8_low(m->from), next);
@@ -343,7 +328,7 @@ static double bound_force(rk4 *row, pal_step *step, double most)
     const pal_body *body = step->body;
     /* looked at from outside, nothing moves: the world asks at rest with places that are no body's */
     if (!body->active || body->x == body->x_rest) return most;
-    bool moved = row->revision != body->revision || !(row->way_m <= max_move_h * body->edge_m);
+    bool moved = row->revision != body->revision || !(row->way_m <= PAL_GUARD_RECHECK * body->edge_m);
     row->sharp_known &= !moved;
     if (!row->sharp_known && row->n_since >= PAUSE) {
         if (would_help(row, most))
@@ -356,28 +341,19 @@ static double bound_force(rk4 *row, pal_step *step, double most)
     return fmin(most, grown * row->sharp2);
 }
 
-/* true: something runs on what untangles it */
-static bool recover(pal_step *step)
-{
-    unsigned seen = 0;
-    for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->recover) seen |= step->force[i].effect->recover(step->force[i].self, step);
-    return seen & PAL_INVERTED;
-}
-
 static double limit(void *self, pal_step *step)
 {
     rk4 *row = self;
     const pal_body *body = step->body;
     if (!(step->sub == 0 && row->has_inversion) && still_known(row, step)) return row->limit_s;
-    row->has_inversion = recover(step);
+    row->has_inversion = pal_guard_recover(step) & PAL_INVERTED;
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         row->stiff[i] = row->damp[i] = 0;
     }
-    add_bounds(row, step->contact, step->n_contact, body);
+    pal_guard_add_bounds(step->contact, step->n_contact, body, row->stiff, row->damp);
     double contact2 = most_stiff(row, body);
-    add_bounds(row, step->force, step->n_force, body);
+    pal_guard_add_bounds(step->force, step->n_force, body, row->stiff, row->damp);
     /* the largest of omega^2 and c */
     double most2 = most_stiff(row, body), most = 0;
     row->limit_s = one_if_finite(row, body);
@@ -397,14 +373,6 @@ static double limit(void *self, pal_step *step)
 }
 
 /* ---- a sub-step ---- */
-
-static double drag_rate(const pal_step *step)
-{
-    double rate = 0;
-    for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->drag) rate += step->force[i].effect->drag(step->force[i].self);
-    return rate;
-}
 
 /* phi_1, phi_2, phi_3 of -z, z >= 0: phi_k = sum over n of (-z)^n / (n + k)!. Series and doubling instead of exp, for
  * the same bits with every library */
@@ -465,7 +433,7 @@ static void take_masses(rk4 *row, const pal_body *body, const rates *r, bool hea
         row->inverse_kg[k] = body->support[i] ? 0 : 1 / mass;
         row->led[k] = body->support[i] == PAL_PRESCRIBED;
         if (body->support[i] == PAL_FIXED)
-            body->pack->xv[k] = pal_v8_join(pal_v8_low(body->pack->xv[k]), (pal_quad){0});
+            body->active_nodes->xv[k] = pal_v8_join(pal_v8_low(body->active_nodes->xv[k]), (pal_quad){0});
     }
 }
 
@@ -478,7 +446,7 @@ PAL_INLINE pal_v8 rate_of(const rk4 *row, const pal_active_nodes *pack, int k)
 /* the state at the start, and the second stage's */
 static void stage_first(rk4 *row, const pal_body *body, const rates *r)
 {
-    pal_active_nodes *pack = body->pack;
+    pal_active_nodes *pack = body->active_nodes;
     for (int k = 0; k < body->n_active; k++) {
         memory *m = &row->memory[k];
         const pal_v8 y = pack->xv[k], rate = rate_of(row, pack, k);
@@ -492,7 +460,7 @@ static void stage_first(rk4 *row, const pal_body *body, const rates *r)
  * the drag leaves of it, less what the first acceleration gave that */
 static void stage_second(rk4 *row, const pal_body *body, const rates *r)
 {
-    pal_active_nodes *pack = body->pack;
+    pal_active_nodes *pack = body->active_nodes;
     for (int k = 0; k < body->n_active; k++) {
         memory *m = &row->memory[k];
         const pal_v8 y = pack->xv[k], rate = rate_of(row, pack, k), half = r->half[row->led[k]];
@@ -506,7 +474,7 @@ static void stage_second(rk4 *row, const pal_body *body, const rates *r)
 /* from the third stage's forces the fourth stage's state */
 static void stage_third(rk4 *row, const pal_body *body, const rates *r)
 {
-    pal_active_nodes *pack = body->pack;
+    pal_active_nodes *pack = body->active_nodes;
     for (int k = 0; k < body->n_active; k++) {
         memory *m = &row->memory[k];
         const pal_v8 rate = rate_of(row, pack, k);
@@ -518,7 +486,7 @@ static void stage_third(rk4 *row, const pal_body *body, const rates *r)
 /* from the fourth stage's forces the state at the end; returns the square of the longest way, NaN where one is none */
 static double stage_last(rk4 *row, const pal_body *body, const rates *r)
 {
-    pal_active_nodes *pack = body->pack;
+    pal_active_nodes *pack = body->active_nodes;
     const double dt2 = r->dt * r->dt;
     double most2 = 0, poison = 0;
     for (int k = 0; k < body->n_active; k++) {
@@ -537,7 +505,7 @@ static double stage_last(rk4 *row, const pal_body *body, const rates *r)
 static void clamp_moves(const rk4 *row, pal_body *body, double dt_s, double max_m)
 {
     for (int k = 0; k < body->n_active; k++) {
-        pal_v8 *to = &body->pack->xv[k];
+        pal_v8 *to = &body->active_nodes->xv[k];
         pal_quad from = pal_v8_low(row->memory[k].from), move = pal_v8_low(*to) - from, v = pal_v8_high(*to);
         double way = sqrt(pal_quad_dot(move, move)), speed = sqrt(pal_quad_dot(v, v)) * dt_s;
         if (way > max_m) move *= max_m / way;
@@ -551,14 +519,14 @@ static void clamp_moves(const rk4 *row, pal_body *body, double dt_s, double max_
 static void give_forces(const rk4 *row, const pal_body *body)
 {
     for (int k = 0; k < body->n_active && row->pulls; k++)
-        pal_quad_store(body->f + 3 * (size_t)pal_body_point(body, k), body->pack->f[k]);
+        pal_quad_store(body->f + 3 * (size_t)pal_body_point(body, k), body->active_nodes->f[k]);
 }
 
 static pal_err run(void *self, pal_step *step)
 {
     rk4 *row = self;
     pal_body *body = step->body;
-    const rates r = find_rates(step->dt_s, drag_rate(step));
+    const rates r = find_rates(step->dt_s, pal_guard_drag_1_s(step->force, step->n_force));
     step->drag_separate = true;
     take_body(row, step);
     take_masses(row, body, &r, step->heavy);
@@ -569,7 +537,7 @@ static pal_err run(void *self, pal_step *step)
     PAL_TRY(find_forces(row, step));
     stage_third(row, body, &r);
     PAL_TRY(find_forces(row, step));
-    double way = sqrt(stage_last(row, body, &r)), most = max_move_S * body->length_scale_m;
+    double way = sqrt(stage_last(row, body, &r)), most = pal_guard_max_move_m(body);
     if (way > most) {
         uint64_t before = pal_clock_ns();
         clamp_moves(row, body, step->dt_s, most);

@@ -39,6 +39,7 @@
 #include "server/num/conjugate_gradient.h"
 #include "server/num/incomplete_cholesky.h"
 #include "server/sim/core/effect_list.h"
+#include "server/sim/core/step_guard.h"
 #include "server/sim/implicit/compliance.h"
 #include "server/sim/implicit/inertia_relief.h"
 
@@ -80,7 +81,6 @@ typedef struct static_newton {
 static const double relief_share = 1e-8, flops_per_nonzero = 20;
 /* an iteration that leaves more than this of the residual was a slow one */
 static const double slow = 0.1;
-static const double max_move_S = 0.2;
 /* what conjugate gradients on the true stiffness may leave of the residual where they are cut short */
 static const double enough = 0.1;
 /* energies that differ by less of their size are level (Hager & Zhang 2005), ways of less of a voxel's edge short */
@@ -516,7 +516,7 @@ static pal_err iterate(static_newton *row, pal_step *step, double size, bool *mo
     for (int i = 0; i < body->n_dof; i++) from.longest_m = fmax(from.longest_m, pal_norm3(row->move + 3 * i));
     row->report.n_newton++;
     /* where the true stiffness nearly vanishes, the way is long and means little */
-    double most = max_move_S * body->length_scale_m;
+    double most = pal_guard_max_move_m(body);
     if (row->exact && from.longest_m > most) {
         for (int i = 0; i < row->cg.n; i++) row->move[i] *= most / from.longest_m;
         from.slope_J *= most / from.longest_m;
@@ -584,11 +584,8 @@ static pal_err solve(static_newton *row, pal_step *step, bool *bad)
     if (row->part == 0) row->part = 1;
     PAL_TRY(find_rest(row, step));
     if (row->answer.door.solve) pal_warp_rotate(&row->answer.warp, &row->turns);
-    *bad = !pal_body_finite(body);
-    if (*bad) {
-        pal_body_stop_bad(body, "");
-        memcpy(body->x, row->x0, bytes3(row));
-    }
+    *bad = !pal_guard_check_finite(body);
+    if (*bad) memcpy(body->x, row->x0, bytes3(row));
     pal_body_update_nodes(body);
     return PAL_ERR_OK;
 }
@@ -597,10 +594,7 @@ static pal_err run(void *self, pal_step *step)
 {
     static_newton *row = self;
     pal_body *body = row->system.body;
-    if (!pal_body_finite(body)) {
-        pal_body_stop_bad(body, "");
-        return PAL_ERR_OK;
-    }
+    if (!pal_guard_check_finite(body)) return PAL_ERR_OK;
     memcpy(row->x0, body->x, bytes3(row));
     for (int i = 0; i < body->n_dof; i++) {
         if (body->support[i])

@@ -12,6 +12,7 @@
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
+#include "server/sim/core/step_guard.h"
 
 #include <string.h>
 
@@ -24,7 +25,6 @@ typedef struct verlet {
     bool has_inversion; /* rows are to be asked again in the coming step       */
 } verlet;
 
-static const double max_move_h = 0.2, max_move_S = 0.2;
 /* of a velocity in a sub-step, times the share of the mass that was added */
 static const double heavy_loss = 0.01;
 
@@ -48,46 +48,20 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     return PAL_ERR_OK;
 }
 
-static void add_bounds(verlet *row, const pal_component *rows, int n, const pal_body *body)
-{
-    for (int i = 0; i < n; i++) {
-        const pal_effect *effect = rows[i].effect;
-        if (effect->stiffness) effect->stiffness(rows[i].self, body, row->stiff);
-        if (effect->damping && !effect->drag) effect->damping(rows[i].self, body, row->damp);
-    }
-}
-
-/* contact comes and goes between steps without any node moving */
-static bool has_bounds(const pal_component *rows, int n)
-{
-    for (int i = 0; i < n; i++)
-        if (rows[i].effect->stiffness || rows[i].effect->damping) return true;
-    return false;
-}
-
-/* true: something runs on what untangles it */
-static bool recover(pal_step *step)
-{
-    unsigned seen = 0;
-    for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->recover) seen |= step->force[i].effect->recover(step->force[i].self, step);
-    return seen & PAL_INVERTED;
-}
-
 /* the smallest over free nodes of 2 safety t, t the positive root of t^2 K + t C = m */
 static double limit(void *self, pal_step *step)
 {
     verlet *row = self;
     const pal_body *body = step->body;
-    bool contact = step->sub == 0 && has_bounds(step->contact, step->n_contact);
+    bool contact = step->sub == 0 && pal_guard_has_bounds(step->contact, step->n_contact);
     bool has_inversion = step->sub == 0 && row->has_inversion;
-    if (row->known && !contact && !has_inversion && row->way_m <= max_move_h * body->edge_m) return row->limit_s;
-    row->has_inversion = recover(step);
+    if (row->known && !contact && !has_inversion && row->way_m <= PAL_GUARD_RECHECK * body->edge_m) return row->limit_s;
+    row->has_inversion = pal_guard_recover(step) & PAL_INVERTED;
     size_t n_byte = sizeof(double) * (size_t)body->n_dof;
     memset(row->stiff, 0, n_byte);
     memset(row->damp, 0, n_byte);
-    add_bounds(row, step->force, step->n_force, body);
-    add_bounds(row, step->contact, step->n_contact, body);
+    pal_guard_add_bounds(step->force, step->n_force, body, row->stiff, row->damp);
+    pal_guard_add_bounds(step->contact, step->n_contact, body, row->stiff, row->damp);
     double least = INFINITY, sum = 0;
     for (int i = 0; i < body->n_dof; i++) {
         double k = row->stiff[i], c = row->damp[i], m = body->mass_kg[i];
@@ -102,32 +76,13 @@ static double limit(void *self, pal_step *step)
     return row->limit_s;
 }
 
-static double drag_rate(const pal_step *step)
-{
-    double rate = 0;
-    for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->drag) rate += step->force[i].effect->drag(step->force[i].self);
-    return rate;
-}
-
-/* shortens moves longer than max_m; [sim] */
-static void clamp_moves(pal_body *body, double dt_s, double max_m)
-{
-    for (int i = 0; i < body->n_dof; i++) {
-        double *v = body->v + 3 * i, move = pal_norm3(v) * dt_s;
-        if (move > max_m) {
-            pal_scale3(v, max_m / move, v);
-            body->safeguards.n_clamped++;
-        }
-    }
-}
-
 static pal_err run(void *self, pal_step *step)
 {
     verlet *row = self;
     pal_body *body = step->body;
-    double dt = step->dt_s, keep = 1 / (1 + dt * (drag_rate(step) + body->stiffening_damping_1_s)), most2 = 0,
-           poison = 0;
+    double dt = step->dt_s,
+           keep = 1 / (1 + dt * (pal_guard_drag_1_s(step->force, step->n_force) + body->stiffening_damping_1_s)),
+           most2 = 0, poison = 0;
     double root = dt / (2 * row->safety);
     step->drag_separate = true;
     PAL_TRY(pal_assemble_forces(step));
@@ -146,10 +101,13 @@ static pal_err run(void *self, pal_step *step)
         most2 = v2 > most2 ? v2 : most2;
         poison += 0 * v2;
     }
-    double way = sqrt(most2) * dt, most = max_move_S * body->length_scale_m;
+    double way = sqrt(most2) * dt, most = pal_guard_max_move_m(body);
     if (way > most) {
         uint64_t before = pal_clock_ns();
-        clamp_moves(body, dt, most);
+        for (int i = 0; i < body->n_dof; i++) {
+            double *v = body->v + 3 * i;
+            pal_scale3(v, pal_guard_shorten(body, pal_norm3(v) * dt, most), v);
+        }
         body->safeguards.ns += pal_clock_ns() - before;
     }
     /* a velocity that is no number makes the way one too, and so the next limit */

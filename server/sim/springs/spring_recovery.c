@@ -8,12 +8,6 @@
 
 #include <math.h>
 
-/* volume over volume at rest: thresholds for entering a region and for leaving it */
-static const double least_in = 0.01, least_out = 0.2, most_in = 30, most_out = 20;
-/* smallest s: a region never becomes too soft to move */
-static const double least_scale = 0.02;
-/* kinetic energy of a region at rest, as a part of what all regions store */
-static const double still_share = 1e-3;
 /* largest energy of springs that return, as a part of the sum of their constants: with more they would fly apart */
 static const double calm_share = 0.02;
 /* tau, as a part of the time that edges permit an explicit step */
@@ -243,7 +237,7 @@ static void weigh(pal_spring_recovery *t, const sets *r, const pal_body *body)
         }
     for (int k = 0; k < tets->n_off; k++) {
         const double ratio = volume_ratio(tets, tets->off[k], body->d);
-        t->of[region_of(t, tets, tets->off[k])].bad |= !(ratio > least_out && ratio < most_out);
+        t->of[region_of(t, tets, tets->off[k])].bad |= !(ratio > PAL_SPRING_LEAVE_LOW && ratio < PAL_SPRING_LEAVE_HIGH);
     }
     for (int i = 0; i < t->n_node; i++) {
         if (t->region[i] < 0) continue;
@@ -271,7 +265,7 @@ static double springs(const sets *r, const pal_body *body)
 }
 
 /* chooses the regions that become springs again; true: any */
-static bool let_go(pal_spring_recovery *t, double spare_J, double little_J, double still_J, double passed_s)
+static bool leave(pal_spring_recovery *t, double spare_J, double little_J, double still_J, double passed_s)
 {
     bool any = false;
     for (int p = 0; p < t->n_region; p++) {
@@ -314,13 +308,13 @@ static bool leave_pressed(pal_spring_recovery *t, const pal_body *body)
 }
 
 /* nodes of inverted tetrahedra enter, and those beside regions that do not recover; true: any */
-static bool take_in(pal_spring_recovery *t, const sets *r, const pal_body *body)
+static bool enter(pal_spring_recovery *t, const sets *r, const pal_body *body)
 {
     const pal_spring_set *edges = r->of[PAL_SPRING_DISTANCE], *tets = r->of[PAL_SPRING_VOLUME];
     bool any = false, grows = false;
     for (int i = 0; i < tets->n_item; i++) {
         const double ratio = volume_ratio(tets, i, body->d);
-        if (!(ratio < least_in || ratio > most_in)) continue;
+        if (!(ratio < PAL_SPRING_INVERTED_LOW || ratio > PAL_SPRING_INVERTED_HIGH)) continue;
         for (int c = 0; c < 4; c++) {
             int32_t *to = &t->region[corners(tets, i)[c]];
             any |= *to == NOT;
@@ -410,10 +404,10 @@ static void begin(pal_spring_recovery *t, const sets *r, const pal_body *body, d
 {
     double fixed[9];
     int n_free = 0;
-    const bool led = pal_support_rotation(body, fixed);
+    const bool has_rotation = pal_support_rotation(body, fixed);
     for (int i = 0; i < t->n_node; i++) n_free += !body->support[i];
     for (int p = 0; p < t->n_region; p++) {
-        t->of[p].fixed = led && 2 * t->of[p].n > n_free;
+        t->of[p].fixed = has_rotation && 2 * t->of[p].n > n_free;
         if (t->of[p].fixed) memcpy(t->of[p].turn, fixed, sizeof fixed);
     }
     t->k_J = r->of[PAL_SPRING_DISTANCE]->spring.k_J;
@@ -422,7 +416,7 @@ static void begin(pal_spring_recovery *t, const sets *r, const pal_body *body, d
     double new_J = 0, left_J = before_J - springs(r, body), scale = 1;
     for (int p = 0; p < t->n_region; p++)
         *(t->of[p].stays ? &left_J : &new_J) += (t->of[p].stays ? -1 : 1) * t->of[p].region_J;
-    if (new_J > left_J) scale = left_J > least_scale * new_J ? left_J / new_J : least_scale;
+    if (new_J > left_J) scale = left_J > PAL_REGION_SCALE_MIN * new_J ? left_J / new_J : PAL_REGION_SCALE_MIN;
     for (int p = 0; p < t->n_region; p++) {
         if (t->of[p].stays) continue;
         t->of[p].scale = scale;
@@ -434,9 +428,9 @@ static void begin(pal_spring_recovery *t, const sets *r, const pal_body *body, d
 static void keep_up(pal_spring_recovery *t, const pal_spring_set *edges, const pal_body *body)
 {
     double fixed[9];
-    const bool led = pal_support_rotation(body, fixed);
+    const bool has_rotation = pal_support_rotation(body, fixed);
     for (int p = 0; p < t->n_region; p++) {
-        t->of[p].fixed = t->of[p].fixed && led;
+        t->of[p].fixed = t->of[p].fixed && has_rotation;
         if (t->of[p].fixed) memcpy(t->of[p].turn, fixed, sizeof fixed);
     }
     if (edges->spring.k_J == t->k_J) return;
@@ -472,7 +466,8 @@ unsigned pal_spring_recovery_update(pal_spring_recovery *t, pal_step *step)
     if (!r.of[PAL_SPRING_DISTANCE] || !r.of[PAL_SPRING_VOLUME] || body->d == body->x_rest) return seen(t, stale);
     double ratio[2] = {1, 1};
     if (t->n_region == 0) pal_spring_volume_range(r.of[PAL_SPRING_VOLUME], body->node_order, body->d, ratio);
-    if (t->n_region == 0 && !(ratio[0] < least_in || ratio[1] > most_in)) return seen(t, stale);
+    if (t->n_region == 0 && !(ratio[0] < PAL_SPRING_INVERTED_LOW || ratio[1] > PAL_SPRING_INVERTED_HIGH))
+        return seen(t, stale);
     if (!pal_body_finite(body)) return seen(t, stale);
     const uint64_t began = pal_clock_ns();
     const bool first = t->n_region == 0;
@@ -483,11 +478,11 @@ unsigned pal_spring_recovery_update(pal_spring_recovery *t, pal_step *step)
         weigh(t, &r, body);
         const double kinetic_J = pal_body_kinetic_J(body);
         before_J = springs(&r, body) + regions(t);
-        changed = let_go(t, t->first_J - kinetic_J - before_J, little_share * before_J, still_share * regions(t),
-                         fmax(0, step->time_s - t->seen_s));
+        changed = leave(t, t->first_J - kinetic_J - before_J, little_share * before_J,
+                        PAL_REGION_REST_SHARE * regions(t), fmax(0, step->time_s - t->seen_s));
     }
     t->seen_s = step->time_s;
-    changed |= take_in(t, &r, body);
+    changed |= enter(t, &r, body);
     if (first && changed) before_J = springs(&r, body);
     if (changed) change(t, &r, body, before_J);
     if (first && changed) t->first_J = pal_body_kinetic_J(body) + springs(&r, body) + regions(t);

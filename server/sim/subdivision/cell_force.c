@@ -24,7 +24,7 @@ PAL_INLINE const double *swell_at(const pal_cell_group *group, int n_node, int b
 {
     return group->swell + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane;
 }
-/* onto the sums of the control cells, and what they push with */
+/* sums over the control cells, and their mean strains */
 PAL_INLINE void take_swelling(const pal_cells_elastic *c, const int32_t *home, int n_live, pal_wide s)
 {
     for (int l = 0; l < n_live; l++) c->volume.sum[home[l]] += s[l];
@@ -40,7 +40,7 @@ static void find_push(const pal_cells_elastic *c)
     for (int i = 0; i < c->volume.n; i++) c->volume.push[i] = c->volume.share[i] * c->volume.sum[i];
 }
 
-/* g (world axes, forces with Q held) += what the turning of Q adds */
+/* g (world axes, forces with Q fixed) += the part from the change of Q */
 PAL_INLINE void add_turn(const pal_cell_group *group, int block, int lane, int n_node, const pal_wide r[9],
                          const pal_wide s[9], pal_wide (*y)[PAL_CELL_MAX_NODES], pal_wide (*g)[PAL_CELL_MAX_NODES])
 {
@@ -240,7 +240,7 @@ void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *turn)
     }
 }
 
-/* ---- turned over ---- */
+/* ---- inversion ---- */
 
 /* 8 corners of the cells of half a block, in the order of num/shape_functions.h */
 PAL_INLINE void cell_corners(const int32_t *node, int n_node, const double *d, pal_wide (*x)[8])
@@ -280,7 +280,7 @@ PAL_INLINE void corner_volumes(pal_wide (*x)[8], pal_wide *det)
     }
 }
 
-/* 1 / volumes at rest; 0 at a point that is flat or turned over there: nothing is asked of it */
+/* 1 / volumes at rest; 0 at a point that is flat or inverted at rest, which is not examined */
 void pal_cells_corners_make(pal_cells_elastic *c)
 {
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {

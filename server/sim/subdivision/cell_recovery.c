@@ -1,4 +1,4 @@
-/* Patches of elements that are turned over. */
+/* Regions of inverted elements (cell_kernel.h, "recovery from inversion"). */
 
 #include "server/base/vec3.h"
 #include "server/num/union_find.h"
@@ -9,18 +9,12 @@
 #include <math.h>
 #include <string.h>
 
-/* volume over that at rest: from where on an element is turned over or blown up, and until when it stays in a region */
-static const double least_in = 0.05, least_out = 0.3, most_in = 30, most_out = 20;
-/* of s, so that a region never is too soft to move */
-static const double least_scale = 0.02;
-/* kinetic energy of a body that stands still, of what its regions store */
-static const double still_share = 1e-3;
-/* of mu V: elements that store more would fly apart when they take over; operator edges, whose forces have no energy,
- * feeds what moves more than a little */
-static const double calm_share[] = {[PAL_CELL_POLAR] = 0.1, [PAL_CELL_EDGES] = 1e-3};
-enum { LOOSE_LOOKS = 120, GROW_LOOKS = 30, FIRM_LOOKS = 4, EDGES_MOST = 12 };
-/* s of a region under a lasting load, every FIRM_LOOKS looks */
-static const double firmer = 1.25;
+/* largest energy of elements that return, as a part of mu V: with more they would fly apart. Operator edges, whose
+ * forces have no energy, adds energy to larger motions */
+static const double leave_share[] = {[PAL_CELL_POLAR] = 0.1, [PAL_CELL_EDGES] = 1e-3};
+enum { LEAVE_UPDATES = 120, GROW_UPDATES = 30, STIFFEN_UPDATES = 4, EDGES_MAX = 12 };
+/* factor on s of a region under a lasting load, every STIFFEN_UPDATES updates */
+static const double stiffen_factor = 1.25;
 
 /* ---- load ---- */
 
@@ -67,7 +61,7 @@ static int corners(const pal_cell_recovery *t, const pal_subdivision_solid *soli
 }
 
 /* both nodes of each edge; returns how many there are */
-static int edges(const pal_cell_recovery *t, const pal_subdivision_solid *solid, int cell, int32_t out[EDGES_MOST][2])
+static int edges(const pal_cell_recovery *t, const pal_subdivision_solid *solid, int cell, int32_t out[EDGES_MAX][2])
 {
     int32_t node[8];
     int n = corners(t, solid, cell, node), k = 0;
@@ -85,7 +79,7 @@ void pal_cell_recovery_refresh(pal_cell_recovery *t, const pal_cells_elastic *c)
     const pal_subdivision_solid *solid = c->solid;
     for (int cell = 0; cell < t->n_cell; cell++) {
         int e, n;
-        int32_t edge[EDGES_MOST][2];
+        int32_t edge[EDGES_MAX][2];
         const pal_cell_kind kind = kind_of(t, cell, &e);
         const size_t at = (size_t)e * PAL_CELL_GAUSS_POINTS;
         double sum = 0, square = 0;
@@ -133,7 +127,7 @@ static void find_turns(pal_cell_recovery *t, const pal_subdivision_solid *solid,
 {
     for (int p = 0; p < t->n_region; p++) memset(t->of[p].sum, 0, sizeof t->of[p].sum);
     for (int cell = 0; cell < t->n_cell; cell++) {
-        int32_t edge[EDGES_MOST][2];
+        int32_t edge[EDGES_MAX][2];
         if (t->region[cell] < 0 || t->of[t->region[cell]].fixed) continue;
         for (int i = edges(t, solid, cell, edge) - 1; i >= 0; i--) {
             double x[3], y[3];
@@ -151,7 +145,7 @@ static double cell_edges(const pal_cell_recovery *t, const pal_subdivision_solid
 {
     const pal_cell_region *region = &t->of[t->region[cell]];
     const double k = t->k_N_m[cell], force = region->scale * k;
-    int32_t edge[EDGES_MOST][2];
+    int32_t edge[EDGES_MAX][2];
     double sum = 0;
     for (int i = edges(t, solid, cell, edge) - 1; i >= 0; i--) {
         double x[3], y[3], u[3];
@@ -178,7 +172,7 @@ void pal_cell_recovery_multiply(const pal_cell_recovery *t, const pal_subdivisio
                                 const double *p, double *out)
 {
     for (int cell = 0; cell < t->n_cell; cell++) {
-        int32_t edge[EDGES_MOST][2];
+        int32_t edge[EDGES_MAX][2];
         if (t->region[cell] < 0) continue;
         const double by = k * t->of[t->region[cell]].scale * t->k_N_m[cell];
         for (int i = edges(t, solid, cell, edge) - 1; i >= 0; i--) {
@@ -193,11 +187,11 @@ void pal_cell_recovery_multiply(const pal_cell_recovery *t, const pal_subdivisio
 
 static bool is_bad(const pal_cell_recovery *t, int cell)
 {
-    return t->ratio[0][cell] < least_in || t->ratio[1][cell] > most_in;
+    return t->ratio[0][cell] < PAL_CELL_INVERTED_LOW || t->ratio[1][cell] > PAL_CELL_INVERTED_HIGH;
 }
 static bool is_good(const pal_cell_recovery *t, int cell)
 {
-    return t->ratio[0][cell] > least_out && t->ratio[1][cell] < most_out;
+    return t->ratio[0][cell] > PAL_CELL_LEAVE_LOW && t->ratio[1][cell] < PAL_CELL_LEAVE_HIGH;
 }
 
 /* energies of the regions and of their elements as such at d */
@@ -226,7 +220,7 @@ static double regions(const pal_cell_recovery *t)
     return sum;
 }
 
-/* energy of the body's motion and of this row; the regions are weighed */
+/* energy of the body's motion and elements; the energies of regions are known */
 static double whole(const pal_cell_recovery *t, double kinetic_J)
 {
     double sum = kinetic_J + regions(t);
@@ -236,16 +230,16 @@ static double whole(const pal_cell_recovery *t, double kinetic_J)
 }
 
 /* which regions become elements again; true: some do */
-static bool let_go(pal_cell_recovery *t, double spare_J, double calm, bool still)
+static bool leave(pal_cell_recovery *t, double spare_J, double calm, bool at_rest)
 {
     bool any = false;
     for (int p = 0; p < t->n_region; p++) {
         pal_cell_region *region = &t->of[p];
         const double rise = region->element_J - region->region_J;
         region->age++;
-        region->loose = region->bad || !still ? 0 : region->loose + 1;
+        region->loose = region->bad || !at_rest ? 0 : region->loose + 1;
         const bool fits = rise <= spare_J && region->element_J <= calm * region->shear_J;
-        if (region->bad || (!fits && region->loose < LOOSE_LOOKS)) continue;
+        if (region->bad || (!fits && region->loose < LEAVE_UPDATES)) continue;
         spare_J -= rise;
         region->n = 0;
         any = true;
@@ -257,9 +251,9 @@ static bool let_go(pal_cell_recovery *t, double spare_J, double calm, bool still
 
 enum { NOT = -1, NEW = -2 };
 
-/* what is turned over joins, with its neighbours; so do those of regions that do not come loose, but not while a
- * lasting load pulls at the body: it is that which turns them over, and larger regions are softer. True: some do */
-static bool take_in(pal_cell_recovery *t, const pal_subdivision_solid *solid, bool loaded)
+/* inverted elements enter with their neighbours, and so do the neighbours of regions that do not recover, but not under
+ * a lasting load: the load inverts them, and larger regions are softer. True: any */
+static bool enter(pal_cell_recovery *t, const pal_subdivision_solid *solid, bool loaded)
 {
     bool any = false;
     memset(t->root, 0, sizeof *t->root * (size_t)t->n_node);
@@ -267,7 +261,7 @@ static bool take_in(pal_cell_recovery *t, const pal_subdivision_solid *solid, bo
         int32_t node[8];
         const pal_cell_region *region = t->region[cell] >= 0 ? &t->of[t->region[cell]] : NULL;
         const bool grows =
-            region && region->bad && !loaded && region->age >= GROW_LOOKS && region->age % GROW_LOOKS == 0;
+            region && region->bad && !loaded && region->age >= GROW_UPDATES && region->age % GROW_UPDATES == 0;
         if (region ? !grows : !is_bad(t, cell)) continue;
         for (int k = corners(t, solid, cell, node) - 1; k >= 0; k--) t->root[node[k]] = 1;
     }
@@ -283,9 +277,9 @@ static bool take_in(pal_cell_recovery *t, const pal_subdivision_solid *solid, bo
 }
 
 /* elements whose volume is that of their control cell go into a region together */
-static void take_whole_cells(pal_cell_recovery *t, const pal_cells_elastic *c)
+static void enter_whole_cells(pal_cell_recovery *t, const pal_cells_elastic *c)
 {
-    /* sums and pushes are found anew before each use */
+    /* sums and pushes are computed before each use */
     double *mark = c->volume.push;
     memset(mark, 0, sizeof *mark * (size_t)c->volume.n);
     for (int turn = 0; turn < 2; turn++)
@@ -298,7 +292,7 @@ static void take_whole_cells(pal_cell_recovery *t, const pal_cells_elastic *c)
         }
 }
 
-/* regions anew of all elements that are in one, connected by their nodes */
+/* numbers the regions of elements connected by nodes */
 static void number(pal_cell_recovery *t, const pal_subdivision_solid *solid)
 {
     int32_t node[8];
@@ -323,15 +317,15 @@ static void number(pal_cell_recovery *t, const pal_subdivision_solid *solid)
     }
 }
 
-/* G held or not and s of regions anew */
+/* chooses G and s of changed regions */
 static void begin(pal_cell_recovery *t, pal_cells_elastic *c, const pal_body *body)
 {
     double fixed[9];
-    const bool led = pal_support_rotation(body, fixed);
+    const bool has_rotation = pal_support_rotation(body, fixed);
     for (int cell = 0; cell < t->n_cell; cell++)
         if (t->region[cell] >= 0) t->of[t->region[cell]].n++;
     for (int p = 0; p < t->n_region; p++) {
-        t->of[p].fixed = led && 2 * t->of[p].n > t->n_cell;
+        t->of[p].fixed = has_rotation && 2 * t->of[p].n > t->n_cell;
         if (t->of[p].fixed) memcpy(t->of[p].turn, fixed, sizeof fixed);
     }
     weigh(t, c, body->d);
@@ -345,21 +339,21 @@ static void begin(pal_cell_recovery *t, pal_cells_elastic *c, const pal_body *bo
     for (int p = 0; p < t->n_region; p++) {
         pal_cell_region *region = &t->of[p];
         if (region->region_J > region->element_J)
-            region->scale = fmax(least_scale, region->element_J / region->region_J);
+            region->scale = fmax(PAL_REGION_SCALE_MIN, region->element_J / region->region_J);
         region->region_J *= region->scale;
     }
 }
 
-/* what a lasting load turns over would hang by a region that began soft, and be let out by 1 / s of what the elements
- * give: s goes back to 1. True: one has changed */
-static bool firm_up(pal_cell_recovery *t)
+/* tissue under a lasting load would hang by a region that began soft, and be drawn out by 1 / s: s returns to 1. True:
+ * one has changed */
+static bool stiffen(pal_cell_recovery *t)
 {
     bool any = false;
     for (int p = 0; p < t->n_region; p++) {
         pal_cell_region *region = &t->of[p];
-        if (region->scale >= 1 || region->age == 0 || region->age % FIRM_LOOKS != 0) continue;
-        region->scale = fmin(1, firmer * region->scale);
-        t->stiffened_J += firmer * region->region_J;
+        if (region->scale >= 1 || region->age == 0 || region->age % STIFFEN_UPDATES != 0) continue;
+        region->scale = fmin(1, stiffen_factor * region->scale);
+        t->stiffened_J += stiffen_factor * region->region_J;
         any = true;
     }
     return any;
@@ -385,12 +379,12 @@ bool pal_cell_recovery_update(pal_cell_recovery *t, pal_cells_elastic *c, const 
     memcpy(t->old, t->of, sizeof *t->of * (size_t)t->n_region);
     const bool first = t->n_region == 0;
     const double kinetic_J = pal_body_kinetic_J(body);
-    t->still = kinetic_J < still_share * regions(t);
-    bool changed = let_go(t, first ? 0 : t->first_J - whole(t, kinetic_J), calm_share[c->op], t->still);
+    t->at_rest = kinetic_J < PAL_REGION_REST_SHARE * regions(t);
+    bool changed = leave(t, first ? 0 : t->first_J - whole(t, kinetic_J), leave_share[c->op], t->at_rest);
     memcpy(t->before, t->region, sizeof *t->region * (size_t)t->n_cell);
-    changed |= take_in(t, c->solid, loaded);
-    if (changed && c->volume.n > 0) take_whole_cells(t, c);
-    if (!changed) return loaded && firm_up(t);
+    changed |= enter(t, c->solid, loaded);
+    if (changed && c->volume.n > 0) enter_whole_cells(t, c);
+    if (!changed) return loaded && stiffen(t);
     number(t, c->solid);
     begin(t, c, body);
     if (first) t->first_J = whole(t, kinetic_J);

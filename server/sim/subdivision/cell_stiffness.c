@@ -275,7 +275,7 @@ void pal_cells_elastic_refresh(pal_cells_elastic *c)
 {
     if (c->sampled == c->solid->sampled) return;
     c->sampled = c->solid->sampled;
-    pal_force_cache_invalidate(&c->kept);
+    pal_force_cache_invalidate(&c->force_cache);
     const bool shared = c->volume.n > 0, mean = c->op == PAL_CELL_POLAR;
     fill_cubic(c->solid, shared, &c->group[PAL_CELL_CUBIC]);
     fill_stored(c->solid, PAL_CELL_HEX, &c->group[PAL_CELL_HEX], mean, shared);
@@ -286,7 +286,7 @@ void pal_cells_elastic_refresh(pal_cells_elastic *c)
 
 void pal_cells_elastic_reset(pal_cells_elastic *c)
 {
-    pal_force_cache_invalidate(&c->kept);
+    pal_force_cache_invalidate(&c->force_cache);
     pal_cell_recovery_reset(&c->recovery, c);
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
         const pal_cell_group *g = &c->group[kind];

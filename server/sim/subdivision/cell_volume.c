@@ -1,18 +1,17 @@
-/* Changes of volume of nearly incompressible solids, one for a whole control cell.
+/* Volumetric locking of subdivision solids: mean change of volume of a control cell.
  *
- * A subdivided solid has few control points for its many elements (125 for 512 in a cube of 4 cells a side): keeping
- * the volume of each is more than they can, and they lock: by 8 % where a beam bends that is two cells across at nu
- * 0.45. Above nu = 0.3 a part of what a change of volume takes is therefore that of the mean over all elements of a
- * control cell, as the mean dilatation of one element is for its points (Hughes 1980), each element's strain in its own
- * frame:
+ * A subdivision solid has few control points for its many elements (125 for 512 in a cube of 4 cells a side). They
+ * cannot conserve the volume of each element, and the solid locks: by 8 % for a bent beam of two cells across at nu
+ * 0.45. Above nu = 0.3 a part of the bulk modulus therefore acts on the mean over all elements of a control cell, as
+ * the mean dilatation of one element does on its points (Hughes 1980), each element's strain in its own frame:
  *
  *     E_c = 1/2 (sum_e b_e.d^_e)^2 / int kappa dV,   b_e = int kappa grad N dV,   kappa = lambda - min(lambda, mu),
  *
- * and elements keep K of min(lambda, mu), as at nu = 0.25. Were all of it the cell's (kappa = lambda + 2/3 mu), one
- * side of a cell could swell for nothing while the other one shrinks: a beam of one cell across bends twice as far as
- * it should, with mu kept 5 to 9 % farther, and two or three cells across are 2 to 3 and 1 to 1.6 % too stiff at any
- * nu. E is a function of the d^ as before, and so are forces, momentum and tangent (cell_kernel.h). It takes a second
- * pass over the elements. */
+ * and elements keep K of min(lambda, mu), as at nu = 0.25. With all of it in the cell (kappa = lambda + 2/3 mu), one
+ * side of a cell could swell without energy while the other one shrinks: a beam of one cell across would bend twice as
+ * far as it should; with mu kept it bends 5 to 9 % farther, and beams of two or three cells are 2 to 3 and 1 to 1.6 %
+ * too stiff at any nu. E remains a function of the d^, and so do forces, momentum and tangent (cell_kernel.h). It takes
+ * a second pass over the elements. */
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
 #include "server/sim/elements/elastic_law.h"
@@ -21,7 +20,8 @@
 #include <math.h>
 #include <string.h>
 
-static const float from_poisson = 0.3f; /* as samples are */
+/* a body with a larger ratio somewhere shares its changes of volume; float, as samples are */
+static const float from_poisson = 0.3f;
 
 static bool asked(const pal_cells_elastic *c)
 {
@@ -37,7 +37,7 @@ static int32_t home_of(const pal_subdivision_solid *solid, pal_cell_kind kind, i
     return solid->subdivision.cell_origin[solid->elements.cell[kind][element]];
 }
 
-/* all nodes of each control cell's elements, for those who want to know what moves what */
+/* all nodes of each control cell's elements: what the shared energy couples */
 static pal_err couple(pal_cells_elastic *c, pal_arena *arena)
 {
     const pal_subdivision_solid *solid = c->solid;
@@ -108,7 +108,7 @@ static double swell_of(const pal_subdivision_solid *solid, pal_cell_kind kind, i
         double J[9], cofactor[9], mu, lambda;
         const double det = pal_subdivision_solid_jacobian(solid->node_rest, node, n_node, dn[p], J);
         pal_cofactor3(J, cofactor);
-        pal_lame((double)s->young_Pa[first + p], fmin((double)s->poisson[first + p], 0.4999), &mu, &lambda);
+        pal_lame((double)s->young_Pa[first + p], fmin((double)s->poisson[first + p], PAL_POISSON_CLAMP), &mu, &lambda);
         const double kappa_J = (lambda - pal_cell_own_lambda(mu, lambda)) * s->volume_m3[first + p];
         all += kappa_J;
         /* J^-T = cofactor / det */

@@ -1,4 +1,4 @@
-/* Masses of a body on a solid, and how easily its nodes move. */
+/* Masses of a body on a subdivision solid, and the mobility of its nodes. */
 #include "server/sim/subdivision/subdivision_body.h"
 
 #include "server/sim/subdivision/subdivision_mass.h"
@@ -7,14 +7,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* beyond so many free points the ease is bounded, not found */
+/* beyond so many free points mobility is bounded, not computed: its dense factor takes their number squared */
 enum { FACTOR_MOST = 1000 };
 /* D^-1 M~ with D its diagonal has no eigenvalue below the cube of 1/2 (trilinear), 0.1126 (cubic B-spline) */
 static const double most_hex = 8, most_cubic = 701;
 
 typedef struct mobility {
     int n_free;
-    int32_t *place; /* of a point among the free ones, -1: held  [n_dof]                        */
+    int32_t *place; /* index among the free points, -1: not free [n_dof]                        */
     double *factor; /* U of M~ = U'U, rows of the upper half    [n_free][n_free]; NULL: bounded */
     double *y;      /* [n_free]                                                                 */
 } mobility;
@@ -66,7 +66,7 @@ static double ease_of(const mobility *m, const pal_interpolation *rows, int node
     return sum;
 }
 
-/* what it is at most, by the diagonal of M~ */
+/* an upper bound of it, by the diagonal of M~ */
 static double bound_of(const mobility *m, const pal_body *body, int node)
 {
     const pal_interpolation *rows = body->interpolation;

@@ -5,7 +5,7 @@
 #include "server/sim/subdivision/subdivision_solid.h"
 
 /* Fills body->dofs. body->model.solid, mass_operator, node_inverse_mass_1_kg and the arrays of
- * pal_body_allocate_embedded are there. update_mass sets mass_kg, node_mass_kg, the values of mass_operator and, at
+ * pal_body_allocate_interpolated are there. update_mass sets mass_kg, node_mass_kg, the values of mass_operator and, at
  * shown nodes, node_inverse_mass_1_kg; set_material takes the samples again with another material of the body, with the
  * same regions and strokes, and then updates the masses */
 void pal_subdivision_body_dofs(pal_body *body);

@@ -39,7 +39,7 @@ static void weigh(const pal_subdivision_solid *solid, pal_cell_kind kind, int el
 
 /* ---- the pattern ---- */
 
-/* points of an element's nodes, each once, into list; local [n_point] is -1 for all others and says where they are */
+/* points of an element's nodes, each once, into list; local [n_point] is -1 for all others else the place in it */
 static int gather_points(const pal_subdivision_solid *solid, pal_cell_kind kind, int element, int32_t *list,
                          int32_t *local)
 {
@@ -155,14 +155,14 @@ pal_err pal_subdivision_mass_make(const pal_subdivision_solid *solid, pal_arena 
     for (int i = 0; i < n_point && !err; i++) out->local[i] = -1;
     if (!err) err = list_points(solid, list, out->local, &of);
     if (!err) err = make_pattern(&of, list, arena, out);
-    out->n_most = of.most;
+    out->n_max = of.most;
     free(of.start), free(of.point), free(list);
     PAL_TRY(err);
-    out->of_element = PAL_NEW(arena, int32_t, out->n_most);
-    out->shape = PAL_NEW(arena, double, (size_t)out->n_most *PAL_CELL_GAUSS_POINTS);
+    out->element_point = PAL_NEW(arena, int32_t, out->n_max);
+    out->shape = PAL_NEW(arena, double, (size_t)out->n_max *PAL_CELL_GAUSS_POINTS);
     out->mass_kg = PAL_NEW(arena, double, out->n_entry);
     out->scratch_kg_s = PAL_NEW(arena, double, out->n_entry);
-    if (!out->of_element || !out->shape || !out->mass_kg || !out->scratch_kg_s) return PAL_ERR_MEMORY;
+    if (!out->element_point || !out->shape || !out->mass_kg || !out->scratch_kg_s) return PAL_ERR_MEMORY;
     pal_subdivision_mass_fill(solid, out);
     return PAL_ERR_OK;
 }
@@ -175,7 +175,7 @@ static int find_shapes(const pal_subdivision_solid *solid, const kind_table *t, 
 {
     const int32_t *node = pal_subdivision_solid_nodes(solid, kind, element);
     const pal_interpolation *rows = &solid->rows;
-    int n = gather_points(solid, kind, element, mass->of_element, mass->local);
+    int n = gather_points(solid, kind, element, mass->element_point, mass->local);
     memset(mass->shape, 0, (size_t)n * PAL_CELL_GAUSS_POINTS * sizeof *mass->shape);
     for (int m = 0; m < t->n_node; m++)
         for (int32_t k = rows->start[node[m]]; k < rows->start[node[m] + 1]; k++) {
@@ -190,7 +190,7 @@ static int find_shapes(const pal_subdivision_solid *solid, const kind_table *t, 
 static void add_products(const pal_mass_operator *mass, int n, double *to)
 {
     for (int a = 0; a < n; a++) {
-        int32_t i = mass->of_element[a];
+        int32_t i = mass->element_point[a];
         const double *shape = mass->shape + (size_t)a * PAL_CELL_GAUSS_POINTS;
         for (int32_t k = mass->start[i + 1]; k-- > mass->start[i] && mass->point[k] >= i;) {
             int32_t b = mass->local[mass->point[k]];
@@ -257,7 +257,7 @@ void pal_subdivision_mass_fill(const pal_subdivision_solid *solid, pal_mass_oper
                 scale_shapes(mass, n, damping, at);
                 add_products(mass, n, mass->damping_kg_s);
             }
-            forget_points(n, mass->of_element, mass->local);
+            forget_points(n, mass->element_point, mass->local);
         }
     }
     mirror(mass, mass->mass_kg);

@@ -1,5 +1,6 @@
-/* A subdivided solid as finite elements (A 3.1, 3.4): the cells after subdivision, their elements, the rows of d = A p,
- * and the material as arrays of samples at the Gauss points, so that it may vary continuously inside an element.
+/* A subdivision solid as finite elements (paper A 3.1, 3.4): the cells after subdivision, their elements, the
+ * interpolation d = A p, and the material as samples at the Gauss points, so that it may vary continuously within an
+ * element.
  *
  * Nodes are the vertices of the subdivided cells, then the virtual nodes in the middle of cells that are no hexahedra.
  * A cubic element's nodes are control points of its spline: its material passes near them, not through them.
@@ -12,7 +13,7 @@
 #include "server/num/spline.h"
 #include "server/sim/core/definition.h"
 
-/* what stands at the 64 Gauss points (num/spline.h) of the elements of one kind, all [n][64] */
+/* samples at the 64 Gauss points (num/spline.h) of the elements of one kind, all [n][64] */
 typedef struct pal_material_samples {
     float *young_Pa, *poisson, *density_kg_m3;
     float *damping_1_s; /* gamma of A eq. 3 over density; 0: none there */
@@ -22,7 +23,7 @@ typedef struct pal_material_samples {
 typedef struct pal_subdivision_solid {
     pal_subdivision subdivision; /* cells: after the last level; rows: of their vertices */
     pal_cell_elements elements;
-    pal_interpolation rows; /* of all nodes, virtual ones last: body->embed */
+    pal_interpolation rows; /* of all nodes, virtual ones last: body->interpolation */
     double *node_rest;      /* rows times the control cells' x           [rows.n_row][3] */
     pal_material_samples samples[PAL_CELL_KINDS];
     uint64_t sampled; /* grows with every pal_subdivision_solid_sample, from 1 */
@@ -35,7 +36,7 @@ typedef struct pal_subdivision_solid {
 pal_err pal_subdivision_solid_make(const pal_body_def *def, const pal_subdivision_options *options,
                                    pal_subdivision_solid **out, pal_diagnostic *diag);
 void pal_subdivision_solid_free(pal_subdivision_solid *solid); /* NULL is fine */
-/* the samples anew from material, regions and strokes of def at the points' places at rest */
+/* takes the samples again, from material, regions and strokes of def at the points' positions at rest */
 void pal_subdivision_solid_sample(pal_subdivision_solid *solid, const pal_body_def *def);
 
 /* nodes of an element */

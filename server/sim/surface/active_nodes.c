@@ -1,24 +1,24 @@
-/* Packing of a body's active points, and FORCE rows on them. */
+/* Packing of a body's active dofs, and FORCE components on them. */
 #include "server/sim/surface/active_nodes.h"
 
 #include "server/base/clock.h"
 
 pal_err pal_active_nodes_make(pal_body *body, pal_arena *arena)
 {
-    if (body->pack) return PAL_ERR_OK;
+    if (body->active_nodes) return PAL_ERR_OK;
     pal_active_nodes *pack = PAL_NEW(arena, pal_active_nodes, 1);
     if (!pack) return PAL_ERR_MEMORY;
     pack->xv = PAL_NEW(arena, pal_v8, body->n_dof);
     pack->f = PAL_NEW(arena, pal_quad, body->n_dof);
     pack->rest = PAL_NEW(arena, pal_quad, body->n_dof);
     if (!pack->xv || !pack->f || !pack->rest) return PAL_ERR_MEMORY;
-    body->pack = pack;
+    body->active_nodes = pack;
     return PAL_ERR_OK;
 }
 
 void pal_active_nodes_load(const pal_body *body)
 {
-    pal_active_nodes *pack = body->pack;
+    pal_active_nodes *pack = body->active_nodes;
     for (int k = 0; k < body->n_active; k++) {
         size_t i = (size_t)pal_body_point(body, k);
         pal_quad rest = pal_quad_load(body->x_rest + 3 * i);
@@ -56,11 +56,11 @@ pal_err pal_active_nodes_run(void *self, pal_step *step, pal_err (*pull)(void *s
 {
     pal_body *body = step->body;
     pal_active_nodes_load(body);
-    for (int k = 0; k < body->n_active; k++) body->pack->f[k] = (pal_quad){0};
+    for (int k = 0; k < body->n_active; k++) body->active_nodes->f[k] = (pal_quad){0};
     PAL_TRY(pull(self, step));
     for (int k = 0; k < body->n_active; k++) {
         double *f = body->f + 3 * (size_t)pal_body_point(body, k);
-        pal_quad_store(f, pal_quad_load(f) + body->pack->f[k]);
+        pal_quad_store(f, pal_quad_load(f) + body->active_nodes->f[k]);
     }
     return PAL_ERR_OK;
 }

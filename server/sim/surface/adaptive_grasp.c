@@ -2,6 +2,7 @@
 #include "server/sim/surface/adaptive_grasp.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/core/blend.h"
 #include "server/sim/surface/adaptive_surface.h"
 
 #include <math.h>
@@ -38,7 +39,7 @@ void pal_adaptive_grasp_begin(pal_adaptive_grasp *l, const pal_body *body, const
     l->retriangulated = false;
 }
 
-/* what a vertex holds: to itself where it is in use, else by halves to the ends of its edge */
+/* adds the share of a vertex: to itself when it is a node, else in halves to the ends of its edge */
 static void give_up(const pal_adaptive_surface *s, int32_t vertex, double share, double *weight)
 {
     if (pal_adaptive_has(s, vertex)) {
@@ -106,10 +107,9 @@ void pal_adaptive_grasp_renew(pal_adaptive_grasp *l, const double was[3], const 
 void pal_adaptive_grasp_goal(pal_adaptive_grasp *l, const double quat[4], const double y[3], const double v[3],
                              double k_N_m, double dt_s, double goal[3])
 {
-    double fade = fmax(0, 1 - dt_s / PAL_GRASP_SHIFT_S);
-    pal_scale3(l->shift, fade, l->shift);
+    pal_scale3(l->shift, pal_blend_release(&l->left_s, dt_s), l->shift);
     if (k_N_m > 0 && l->k_N_m > 0 && (l->retriangulated || k_N_m != l->k_N_m)) {
-        /* what the spring of before would be stretched by now */
+        /* extension of the previous spring now */
         double was[3], moved[3];
         pal_add3(was, goal, l->shift), pal_sub3(was, was, y);
         if (l->retriangulated) {
@@ -118,6 +118,7 @@ void pal_adaptive_grasp_goal(pal_adaptive_grasp *l, const double quat[4], const 
             pal_sub3(was, was, l->y), pal_axpy3(was, -l->dt_s, v);
         }
         for (int c = 0; c < 3; c++) l->shift[c] = l->k_N_m / k_N_m * was[c] - (goal[c] - y[c]);
+        l->left_s = PAL_BLEND_GRASP_NODES_S;
     }
     if (!pal_finite3(l->shift)) pal_set3(l->shift, 0, 0, 0);
     pal_add3(goal, goal, l->shift);

@@ -6,8 +6,8 @@
  *
  * Departures: the paper places new vertices by the stencil on current positions (PAL_MIDPOINT_BUTTERFLY); that jumps
  * where the stencil reaches beyond a fold, so the default keeps the middle of the edge and its offset at rest. An edge
- * whose ends both stand at rest gives the rest position to the bit; a midpoint that is held while its edge is not
- * stands as far from rest as the end that is held. */
+ * with both ends at rest gives the rest position to the bit; a fixed midpoint of an edge with a free end has the
+ * displacement of the fixed end. */
 #include "server/sim/surface/adaptive_surface.h"
 
 #include "server/base/vec3.h"
@@ -17,7 +17,7 @@
 
 #define BUDGET ((size_t)512 << 20)
 #define MEBI   1048576.0
-/* a finest vertex of the leanest body takes more than this in rows (edge_spring, rk4) and in what is shown of it */
+/* a finest vertex takes more than this in components (edge_spring, rk4) and display, whatever the body */
 #define ROW_BYTE  400
 #define LOG_LEAST 1024
 #define LOG_MOST  65536
@@ -29,9 +29,9 @@ enum { CHAIN = 1 << (PAL_LEVELS_MAX - 1), FRESH = 3 * CHAIN };
 static pal_err check_options(const pal_adaptive_options *o, pal_diagnostic *diag)
 {
     if (!(o->mass_kg > 0) || !isfinite(o->mass_kg))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "shell: a mass of %g kg", o->mass_kg);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "adaptive surface: a mass of %g kg", o->mass_kg);
     if (o->n_level >= 1 && (o->start_level < 0 || o->start_level >= o->n_level))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "shell: start level %d, there are levels 0 to %d",
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "adaptive surface: start level %d, there are levels 0 to %d",
                                   o->start_level, o->n_level - 1);
     return PAL_ERR_OK;
 }
@@ -129,7 +129,7 @@ static pal_err refuse_bytes(int n_level, const char *what, size_t n_byte, size_t
 {
     return pal_diagnostic_set(
         diag, PAL_ERR_BUDGET,
-        "shell: %d levels need %s%.4g MiB, the budget is %.4g MiB: ask for fewer levels or a coarser "
+        "adaptive surface: %d levels need %s%.4g MiB, the budget is %.4g MiB: ask for fewer levels or a coarser "
         "surface",
         n_level, what, (double)n_byte / MEBI, (double)budget / MEBI);
 }
@@ -175,7 +175,7 @@ pal_err pal_adaptive_check_bytes(const pal_adaptive_surface *adaptive, size_t n_
 {
     const pal_adaptive_options *o = &adaptive->options;
     if (n_byte <= o->budget_byte) return PAL_ERR_OK;
-    return refuse_bytes(o->n_level, "with rows, tools and what is shown ", n_byte, o->budget_byte, diag);
+    return refuse_bytes(o->n_level, "with components, tools and display ", n_byte, o->budget_byte, diag);
 }
 
 /* ---- splitting ---- */
@@ -304,8 +304,8 @@ static void place(const pal_adaptive_surface *s, pal_body *body, int32_t e)
     double *x = body->x + 3 * (size_t)v, *rest = body->x_rest + 3 * (size_t)v;
     bool stands = body->support[v] == PAL_FIXED, firm[2] = {body->support[end[0]] > 0, body->support[end[1]] > 0};
     for (int c = 0; c < 3; c++) body->v[3 * (size_t)v + (size_t)c] = stands ? 0 : 0.5 * va[c] + 0.5 * vb[c];
-    /* an edge at rest keeps every bit; a held midpoint goes with its edge only when that is held too, else with the end
-     * that is: at rest, or where that was when it was taken hold of */
+    /* an edge at rest keeps every bit; a fixed midpoint takes the mean only when both ends are fixed, else the
+     * displacement of the fixed end */
     if (stands && firm[0] != firm[1]) {
         for (int c = 0; c < 3; c++) x[c] = rest[c] + (firm[0] ? xa[c] - ra[c] : xb[c] - rb[c]);
         return;
@@ -390,7 +390,7 @@ bool pal_adaptive_join(pal_adaptive_surface *s, pal_body *body, int32_t face)
 void pal_adaptive_set_level(pal_adaptive_surface *s, pal_body *body, int level)
 {
     const pal_levels *l = &s->levels;
-    /* what is a node before and after stays as it is */
+    /* a node before and after stays as it is */
     for (int32_t v = l->n_vertex[0]; v < l->n_vertex[l->n_level - 1]; v++)
         if (!pal_adaptive_has(s, v) || l->vertex_level[v] > level) retire(body, v);
     memset(s->face_state, PAL_FACE_SPLIT, (size_t)l->first_face[level]);

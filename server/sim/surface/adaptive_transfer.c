@@ -24,7 +24,7 @@ void pal_adaptive_transfer_state(const pal_body *to, const pal_body *from, doubl
         pal_copy3(xi, to->x_rest + 3 * (size_t)i);
         pal_set3(vi, 0, 0, 0);
         if (!pal_adaptive_has(to->model.adaptive, i)) continue;
-        if (pal_adaptive_uses(from->model.adaptive, i)) {
+        if (pal_dofs_has(&from->dofs, i)) {
             pal_copy3(xi, from->x + 3 * (size_t)i);
             if (to->support[i] != PAL_FIXED) pal_copy3(vi, from->v + 3 * (size_t)i);
             continue;

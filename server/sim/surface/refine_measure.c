@@ -1,4 +1,4 @@
-/* Criteria of refinement at the nodes of a shell, and sums on both sides of a switch of level. */
+/* Criteria of refinement at the nodes of an adaptive surface, and sums on both sides of a change of level. */
 #include "server/sim/surface/refine_measure.h"
 
 #include "server/base/vec3.h"

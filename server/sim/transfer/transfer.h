@@ -1,16 +1,16 @@
 /* The state of a body goes over to another model or mesh of the same organ, between two steps of a running world
  * (numerics.md part 3, "live switch of method or resolution").
  *
- * Places. Nodes of the new body are looked for in the elements of the old one at rest (mesh/locate.h; outside them the
- * nearest element goes on by one element at most) and take displacement and velocity by its shape functions. Of a solid
- * the elements are its subdivided cells as tetrahedra, and its control points are those that put the nodes there with
- * the least squares (numerics.md part 1 A), by conjugate gradients with a small pull to rest. Two solids of the same
- * control cells share their points to the bit; of two adaptive surfaces of one organ the new one refines where the old
- * one has, as far as it can.
- * Forces go the other way: those on old nodes are shared out to the new ones around them by their masses as well, so
- * that no net force is lost and nodes that are light (at the rim of cut elements) are not thrown; where the new mesh is
- * the finer one to all new nodes that look to the old one, so that they do not gather in few. What is not balanced, and
- * moves the old nodes, goes as their acceleration to new ones of less than half the mass.
+ * Places. Nodes of the new body are looked for in the elements of the old one at rest (mesh/volume/locate.h; outside
+ * them the nearest element goes on by one element at most) and take displacement and velocity by its shape functions.
+ * Of a solid the elements are its subdivided cells as tetrahedra, and its control points are those that put the nodes
+ * there with the least squares (numerics.md part 1 A), by conjugate gradients with a small pull to rest. Two solids of
+ * the same control cells share their points to the bit; of two adaptive surfaces of one organ the new one refines where
+ * the old one has, as far as it can. Forces go the other way: those on old nodes are shared out to the new ones around
+ * them by their masses as well, so that no net force is lost and nodes that are light (at the rim of cut elements) are
+ * not thrown; where the new mesh is the finer one to all new nodes that look to the old one, so that they do not gather
+ * in few. What is not balanced, and moves the old nodes, goes as their acceleration to new ones of less than half the
+ * mass.
  *
  * Energy. Interpolated places cost the new elements more than the old ones had: kinks at old faces, volume that the old
  * elements left free; of a surface that adapts fewer levels leave a sharp tip where a tool held fine vertices. First
@@ -53,7 +53,7 @@ typedef struct pal_transfer_report {
      */
     double max_move_m, body_move_m;
     /* farthest that a shown vertex goes from one frame to the next because of the switch: what is shown begins where it
-     * was and is let go over PAL_BLEND_STEPS steps (blend_component.h). Without memory for that: as far as the body
+     * was and is let go over PAL_BLEND_TRANSFER_S (blend_component.h). Without memory for that: as far as the body
      * moves */
     double frame_move_m;
     int n_smooth; /* rounds of smoothing that it took */
@@ -67,8 +67,8 @@ pal_err pal_transfer_make(const pal_scene *from, const pal_scene *to, int body, 
                           pal_transfer **out);
 void pal_transfer_free(pal_transfer *transfer); /* NULL is fine */
 /* `next`, a new world of `to`, goes on where `before`, one of `from`, is. Both stand still; the forces in before are
- * worked out anew, its state is as it was. Deterministic. Heap memory for row `ease`; where there is none, the forces
- * change at once. [sim] */
+ * worked out anew, its state is as it was. Deterministic. Heap memory for component `blend`; where there is none, the
+ * forces change at once. [sim] */
 void pal_transfer_apply(pal_transfer *transfer, pal_world *next, const pal_world *before, pal_transfer_report *out);
 
 /* Most of a carry's time goes into smoothing what was interpolated. That part can be rehearsed while the old world goes

@@ -2,6 +2,7 @@
 #include "server/sim/transfer/transfer.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/core/blend.h"
 #include "server/sim/transfer/transfer_core.h"
 #include "server/sim/world/world_core.h"
 
@@ -122,5 +123,5 @@ void pal_transfer_display(pal_transfer *t, pal_world *next, const pal_world *bef
     free(lag);
     /* other vertices are shown: what the body itself moves says more */
     if (same) out->max_move_m = most;
-    if (lags) out->frame_move_m = most / PAL_BLEND_STEPS;
+    if (lags) out->frame_move_m = most * fmin(1, next->step_s / PAL_BLEND_TRANSFER_S);
 }

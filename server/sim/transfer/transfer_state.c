@@ -52,11 +52,11 @@ static double pulled_J(pal_world *w, int body)
         pal_blend_components_add(&w->blends, body, 1, b->f);
         return sum;
     }
-    double *eased = calloc(3 * (size_t)b->n_node + 1, sizeof *eased);
-    if (!eased) return sum;
-    pal_blend_components_add(&w->blends, body, 1, eased);
-    pal_interpolation_apply_transpose(b->interpolation, eased, b->g);
-    free(eased);
+    double *blended = calloc(3 * (size_t)b->n_node + 1, sizeof *blended);
+    if (!blended) return sum;
+    pal_blend_components_add(&w->blends, body, 1, blended);
+    pal_interpolation_apply_transpose(b->interpolation, blended, b->g);
+    free(blended);
     return sum;
 }
 
@@ -267,7 +267,7 @@ static bool refines(const pal_world *w, int b)
 /* ---- forces ---- */
 
 /* the difference of forces goes out in steps; of a body that nothing holds it moves and turns nothing */
-static void ease(pal_transfer *t, pal_world *next)
+static void blend_forces(pal_transfer *t, pal_world *next)
 {
     pal_body *to = &next->plan.body[t->body];
     double c[3], p[3], l[3], a[3];
@@ -520,7 +520,7 @@ void pal_transfer_apply(pal_transfer *transfer, pal_world *next, const pal_world
     memcpy(t->v, to->v, n_byte);
     pal_world_transfer(next, before, t->body, t->x, t->v);
     hand_over(t, next, before);
-    if (t->back.n_row > 0) ease(t, next);
+    if (t->back.n_row > 0) blend_forces(t, next);
     pal_brush_components_transfer(&next->brushes, &next->plan, &before->brushes, &before->plan);
     out->energy_after_J = world_J(next);
     out->body_move_m = pal_transfer_body_move(t, from, to);

@@ -1,21 +1,20 @@
-/* Row ease (blend_component.h): a load that falls from all in the first step to a tenth in the last of PAL_BLEND_STEPS,
- * and what is shown, from all in the frame before it to nothing in that of the last. */
+/* Component blend (blend_component.h). */
 #include "server/sim/world/blend_component.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/core/blend.h"
 
-typedef struct ease {
-    int n_done; /* steps begun; PAL_BLEND_STEPS: the last one */
+typedef struct blend {
+    double share; /* of both that is left: 1, falls to 0 */
+    bool begun;   /* a sub-step has been */
     /* [n_node][3]; of a body that adapts N/kg, that of a vertex not in use the mean of its edge's ends */
     double *force_N;
     float *display_offset_m; /* [n_shown][3]; NULL: none */
     pal_body *body;
-    bool gone;
-} ease;
+} blend;
 
-/* what is shown lags less at the end of each sub-step: contact, which comes before this row in the plan, meets the
- * surface of the frame before and follows it from there */
-static void let_show(const ease *row, double share)
+/* share of the display offset that is left */
+static void set_display(const blend *row, double share)
 {
     if (!row->display_offset_m) return;
     row->body->display_offset_m = share > 0 ? row->display_offset_m : NULL;
@@ -23,7 +22,7 @@ static void let_show(const ease *row, double share)
 }
 
 /* share of the load to `load` */
-static void add_load(const ease *row, double share, double *load)
+static void add_load(const blend *row, double share, double *load)
 {
     const pal_body *body = row->body;
     for (int k = 0; k < pal_body_nodes(body); k++) {
@@ -34,24 +33,21 @@ static void add_load(const ease *row, double share, double *load)
 
 static pal_err run(void *self, pal_step *step)
 {
-    ease *row = self;
-    pal_body *body = step->body;
-    if (step->sub == 0) row->n_done++;
-    row->gone = row->n_done >= PAL_BLEND_STEPS && step->sub == step->n_sub - 1;
-    double share = (double)(PAL_BLEND_STEPS + 1 - row->n_done) / PAL_BLEND_STEPS;
-    if (share > 0) add_load(row, share, body->load);
-    /* the frame of the change itself has all of it, that of the last step nothing */
-    let_show(row, row->gone ? 0 : share - (double)(step->sub + 1) / (PAL_BLEND_STEPS * (double)step->n_sub));
+    blend *row = self;
+    if (row->share > 0) add_load(row, row->share, step->body->load);
+    row->share = pal_blend_toward(row->share, 0, step->dt_s, PAL_BLEND_TRANSFER_S);
+    row->begun = true;
+    /* contact met the surface of the sub-step before and follows it from there */
+    set_display(row, row->share);
     return PAL_ERR_OK;
 }
 
 static void reset(void *self, const pal_body *body)
 {
-    ease *row = self;
+    blend *row = self;
     (void)body;
-    row->n_done = PAL_BLEND_STEPS + 1;
-    row->gone = true;
-    let_show(row, 0);
+    row->share = 0;
+    set_display(row, 0);
 }
 
 /* while it is there its load falls */
@@ -62,12 +58,12 @@ static double settled_s(const void *self)
 }
 
 const pal_effect pal_effect_blend = {
-    .name = "ease", .stage = PAL_STAGE_CONTACT, .run = run, .reset = reset, .settled_s = settled_s};
+    .name = "blend", .stage = PAL_STAGE_CONTACT, .run = run, .reset = reset, .settled_s = settled_s};
 
 /* ---- rows that come and go ---- */
 
 /* what is split later shall not leave all of a coarse vertex's load on the fine one that it becomes */
-static void share_out(const pal_body *body, double *force)
+static void per_mass(const pal_body *body, double *force)
 {
     const pal_dofs *dofs = &body->dofs;
     for (int32_t i = 0; i < body->n_node; i++) {
@@ -82,12 +78,12 @@ static void share_out(const pal_body *body, double *force)
     }
 }
 
-static pal_err put_row(pal_plan *plan, int b, pal_arena *arena, const double *force_N, const float *display_offset_m,
-                       double display_offset_part, void **self)
+static pal_err insert(pal_plan *plan, int b, pal_arena *arena, const double *force_N, const float *display_offset_m,
+                      double display_offset_part, void **self)
 {
     pal_body *body = &plan->body[b];
     size_t n = 3 * (size_t)body->n_node, n_shown = 3 * (size_t)body->n_shown;
-    ease *row = PAL_NEW(arena, ease, 1);
+    blend *row = PAL_NEW(arena, blend, 1);
     if (!row || !(row->force_N = PAL_NEW(arena, double, n))) return PAL_ERR_MEMORY;
     if (display_offset_m && !(row->display_offset_m = PAL_NEW(arena, float, n_shown))) return PAL_ERR_MEMORY;
     for (size_t i = 0; i < n && force_N; i++) row->force_N[i] = isfinite(force_N[i]) ? force_N[i] : 0;
@@ -95,14 +91,15 @@ static pal_err put_row(pal_plan *plan, int b, pal_arena *arena, const double *fo
         row->display_offset_m[i] =
             isfinite(display_offset_m[i]) ? (float)(display_offset_part * (double)display_offset_m[i]) : 0;
     row->body = body;
+    row->share = 1;
     *self = row;
     return pal_plan_insert(plan, b,
                            &(pal_component){.effect = &pal_effect_blend, .self = row, .n_byte = pal_arena_used(arena)});
 }
 
-static void take_out(pal_blend_components *rows, pal_plan *plan, int b)
+static void take_away(pal_blend_components *rows, pal_plan *plan, int b)
 {
-    let_show(rows->self[b], 0);
+    set_display(rows->self[b], 0);
     pal_plan_remove(plan, rows->self[b]);
     pal_arena_destroy(rows->arena[b]);
     rows->arena[b] = NULL;
@@ -115,15 +112,15 @@ static pal_err change(pal_blend_components *rows, pal_plan *plan, int body, cons
     void *self = NULL;
     pal_arena *arena = pal_arena_create(4096, true);
     pal_err err =
-        arena ? put_row(plan, body, arena, force_N, display_offset_m, display_offset_part, &self) : PAL_ERR_MEMORY;
+        arena ? insert(plan, body, arena, force_N, display_offset_m, display_offset_part, &self) : PAL_ERR_MEMORY;
     if (err) {
         pal_arena_destroy(arena);
         return err;
     }
-    if (rows->self[body]) take_out(rows, plan, body);
+    if (rows->self[body]) take_away(rows, plan, body);
     rows->arena[body] = arena;
     rows->self[body] = self;
-    let_show(self, 1);
+    set_display(self, 1);
     return PAL_ERR_OK;
 }
 
@@ -131,29 +128,28 @@ pal_err pal_blend_components_set(pal_blend_components *rows, pal_plan *plan, int
 {
     const pal_body *b = &plan->body[body];
     PAL_TRY(change(rows, plan, body, force_N, b->display_offset_m, b->display_offset_part));
-    ease *row = rows->self[body];
-    if (b->active) share_out(b, row->force_N);
+    blend *row = rows->self[body];
+    if (b->active) per_mass(b, row->force_N);
     return PAL_ERR_OK;
 }
 
 pal_err pal_blend_components_set_display(pal_blend_components *rows, pal_plan *plan, int body,
                                          const float *display_offset_m)
 {
-    const ease *was = rows->self[body];
-    return change(rows, plan, body, was && was->n_done == 0 ? was->force_N : NULL, display_offset_m, 1);
+    const blend *was = rows->self[body];
+    return change(rows, plan, body, was && !was->begun ? was->force_N : NULL, display_offset_m, 1);
 }
 
 void pal_blend_components_add(const pal_blend_components *rows, int body, double scale, double *load)
 {
-    const ease *row = rows->self[body];
-    if (!row || row->n_done >= PAL_BLEND_STEPS) return;
-    add_load(row, scale * (double)(PAL_BLEND_STEPS - row->n_done) / PAL_BLEND_STEPS, load);
+    const blend *row = rows->self[body];
+    if (row) add_load(row, scale * row->share, load);
 }
 
 void pal_blend_components_remove_idle(pal_blend_components *rows, pal_plan *plan)
 {
     for (int b = 0; b < PAL_BODY_MAX; b++)
-        if (rows->self[b] && ((const ease *)rows->self[b])->gone) take_out(rows, plan, b);
+        if (rows->self[b] && ((const blend *)rows->self[b])->share == 0) take_away(rows, plan, b);
 }
 
 void pal_blend_components_free(pal_blend_components *rows)

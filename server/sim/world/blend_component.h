@@ -1,17 +1,14 @@
-/* What makes up for a change of a running body and is let go over 10 steps (numerics.md part 3):
- * Forces. When another body takes its place (transfer.h), or its supports change, the difference between what pulled on
- * it before and what pulls now acts as a load on its nodes that falls from all to nothing. On a body that adapts it
- * goes with their masses: what is split meanwhile leaves no coarse vertex's load on a fine one.
- * What is shown. The surface of another body hangs on other nodes and lies a little elsewhere where those of both stand
- * as near as they can: the way from there to where it was shown before is added to what is shown, and touched
- * (body.display_offset_m), all of it in the first frame, a tenth less in each of the next.
- * One CONTACT row, `ease`, per body, there only meanwhile: world.h, pal_world_blend_force, pal_world_blend_display. It
- * is no entry of scenes. [sim], heap only in make and destroy. */
+/* What makes up for a sudden change of a running body, and is released over PAL_BLEND_TRANSFER_S.
+ * Forces: when another body takes its place (transfer.h) or its supports change, the difference between the forces
+ * before and after acts as a load on its nodes that falls to nothing. On an adaptive surface it is kept per mass, so
+ * that a face that is split meanwhile leaves no coarse vertex's load on a fine one.
+ * Display: the surface of another body hangs on other nodes and lies a little elsewhere. The offset from where it lies
+ * to where it was shown is added to what is shown and touched (body.display_offset_m).
+ * One CONTACT component, `blend`, per body, present only meanwhile (world.h, pal_world_blend_force and
+ * pal_world_blend_display); scenes have no entry for it. [sim], heap only in set and remove. */
 #ifndef PAL_SIM_WORLD_BLEND_COMPONENT_H
 #define PAL_SIM_WORLD_BLEND_COMPONENT_H
 #include "server/sim/plan/plan.h"
-
-enum { PAL_BLEND_STEPS = 10 };
 
 extern const pal_effect pal_effect_blend;
 
@@ -21,8 +18,8 @@ typedef struct pal_blend_components {
     void *self[PAL_BODY_MAX];
 } pal_blend_components;
 
-/* the load [n_node][3], N, body axes, is copied and replaces one that still acts; not finite numbers count as 0. What
- * is shown goes on being let go as it was, from all of its PAL_BLEND_STEPS steps. MEMORY: as it was */
+/* The load [n_node][3], N, body axes, is copied and replaces one that still acts; numbers that are not finite count as
+ * 0. A display offset that is left is released again over the whole duration. MEMORY: unchanged */
 pal_err pal_blend_components_set(pal_blend_components *rows, pal_plan *plan, int body, const double *force_N);
 /* the way of what is shown [n_shown][3], m, copied; replaces one that is still being let go, begins together with the
  * load where that was set since the last step, else without one. MEMORY: what is shown jumps */

@@ -398,7 +398,7 @@ pal_err pal_world_step(pal_world *world, double dt_s)
     int frozen = count_frozen(w);
     for (int i = 0; i < w->plan.n_row; i++) w->plan.row[i].spent_ns = 0;
     for (int t = 0; t < w->tools.n_tool; t++)
-        pal_tool_begin_step(&w->tools.tool[t], w->has_requested_pose[t] ? &w->asked[t] : NULL);
+        pal_tool_begin_step(&w->tools.tool[t], w->has_requested_pose[t] ? &w->asked[t] : NULL, dt_s);
     w->component_err = PAL_ERR_OK;
     begin_step(w, dt_s);
     run_substeps(w, dt_s);

@@ -79,7 +79,7 @@ bool pal_world_has_field(const pal_world *world, int body, pal_field field); /* 
  * brushes of its slot, a reset ends all at once. REFUSED (one sentence): no such body or slot, a body without brushes,
  * a bad number, nothing within reach; MEMORY; both change nothing. Between steps; takes heap memory. [sim] */
 pal_err pal_world_brush(pal_world *world, int body, int slot, const pal_brush *brush, pal_diagnostic *diag);
-/* A load on the nodes of a body, N, body axes [n_node][3], that is let go over PAL_BLEND_STEPS steps
+/* A load on the nodes of a body, N, body axes [n_node][3], that is let go over PAL_BLEND_TRANSFER_S
  * (blend_component.h): what makes up for a change between two steps. Replaces one that still acts; reset ends it.
  * REFUSED: no such body; MEMORY. Between steps; takes heap memory. [sim] */
 pal_err pal_world_blend_force(pal_world *world, int body, const double *force_N);

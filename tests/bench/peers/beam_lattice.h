@@ -61,7 +61,7 @@ static double beam_error(const beam *b, const double *u, const char *csv)
 {
     FILE *from = fopen(csv, "r");
     char line[512];
-    double sum = 0, most = 0, r[6];
+    double sum = 0, max = 0, r[6];
     int n_row = 0;
     if (!from) return -1;
     while (fgets(line, sizeof line, from)) {
@@ -82,10 +82,10 @@ static double beam_error(const beam *b, const double *u, const char *csv)
         double away = 0, size = 0;
         for (int d = 0; d < 3; d++) away += (got[d] - r[3 + d]) * (got[d] - r[3 + d]), size += r[3 + d] * r[3 + d];
         sum += away;
-        most = size > most ? size : most;
+        max = size > max ? size : max;
         n_row++;
     }
     fclose(from);
-    return n_row ? 100 * sqrt(sum / n_row) / sqrt(most) : -1;
+    return n_row ? 100 * sqrt(sum / n_row) / sqrt(max) : -1;
 }
 #endif

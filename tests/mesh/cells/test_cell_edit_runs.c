@@ -196,7 +196,7 @@ static int32_t pick(dice *d, int32_t n)
 static int32_t partner(const pal_cells *c, int32_t face, bool merge)
 {
     int32_t first, n = pal_cells_face_loop(c, face, &first), best = -1;
-    double least = INFINITY, o[3], p[3], a[3], b[3];
+    double min = INFINITY, o[3], p[3], a[3], b[3];
     pal_cells_face_centre(c, NULL, face, o);
     pal_cells_face_area(c, NULL, face, a);
     for (int32_t f = 0; f < c->n_face; f++) {
@@ -211,8 +211,8 @@ static int32_t partner(const pal_cells *c, int32_t face, bool merge)
         pal_cells_face_area(c, NULL, f, b);
         double d = hypot(hypot(o[0] - p[0], o[1] - p[1]), o[2] - p[2]);
         double out = (p[0] - o[0]) * a[0] + (p[1] - o[1]) * a[1] + (p[2] - o[2]) * a[2];
-        if (common || a[0] * b[0] + a[1] * b[1] + a[2] * b[2] > 0 || out < 0 || d >= least) continue;
-        least = d, best = f;
+        if (common || a[0] * b[0] + a[1] * b[1] + a[2] * b[2] > 0 || out < 0 || d >= min) continue;
+        min = d, best = f;
     }
     return best;
 }

@@ -142,12 +142,12 @@ static int shared(const pal_cells *c, int32_t a, int32_t b)
 /* most corners that any cell with vertex v shares with a cell */
 static int nearness(const pal_cells *c, int32_t v, int32_t cell)
 {
-    int most = 0;
+    int max = 0;
     for (int32_t k = c->vertex_cell.start[v]; k < c->vertex_cell.start[v + 1]; k++) {
         int n = shared(c, c->vertex_cell.item[k], cell);
-        if (n > most) most = n;
+        if (n > max) max = n;
     }
-    return most;
+    return max;
 }
 
 /* Fig. 6: 8 own, 24 across faces, 24 across edges, 8 across corners; 28 and 44 are across the edge 25-41, 60 across 41
@@ -188,7 +188,7 @@ static void nodes_lie_across_faces_edges_and_corners_as_figure_6_says(void)
 /* ---- volumes ---- */
 
 /* volume of the trilinear hexahedron of positions p at corner bits, 2 x 2 x 2 Gauss points; least det J there */
-static double hex_volume(double p[8][3], double *least)
+static double hex_volume(double p[8][3], double *min)
 {
     static const double g = 0.5773502691896257;
     double sum = 0;
@@ -205,17 +205,17 @@ static double hex_volume(double p[8][3], double *least)
                 for (int x = 0; x < 3; x++) j[a][x] += slope * p[k][x];
             }
         double d = det3(j[0], j[1], j[2]);
-        sum += d, *least = fmin(*least, d);
+        sum += d, *min = fmin(*min, d);
     }
     return sum;
 }
 
 /* volume of all elements: hexahedra, the own corners of cubic ones, pyramids as hexahedra with four corners in one */
-static double volume_of(const pal_cell_elements *e, const double *x, double *least)
+static double volume_of(const pal_cell_elements *e, const double *x, double *min)
 {
     static const int own[8] = {21, 37, 25, 41, 22, 38, 26, 42}, base[8] = {0, 1, 3, 2, 4, 4, 4, 4};
     double sum = 0, p[8][3];
-    *least = 1e9;
+    *min = 1e9;
     for (int kind = 0; kind < PAL_CELL_KINDS; kind++)
         for (int32_t i = 0; i < e->n[kind]; i++) {
             const int32_t *node = e->node[kind] + pal_cell_kind_nodes((pal_cell_kind)kind) * i;
@@ -223,7 +223,7 @@ static double volume_of(const pal_cell_elements *e, const double *x, double *lea
                 int32_t v = node[kind == PAL_CELL_CUBIC ? own[k] : kind == PAL_CELL_HEX ? k : base[k]];
                 memcpy(p[k], x + 3 * v, sizeof p[k]);
             }
-            sum += hex_volume(p, least);
+            sum += hex_volume(p, min);
         }
     return sum;
 }
@@ -252,10 +252,10 @@ static void elements_fill_the_solid_without_a_gap(void)
         const pal_subdivision_options o = {.n_level = which == 3 ? 2 : 1};
         REQUIRE(pal_subdivision_make(&c, &o, &s, NULL) == PAL_ERR_OK);
         pal_cell_elements e = of(&s.cells);
-        double *d = places(&e, &s, c.x), least, whole = pal_cells_volume(&s.cells, NULL);
+        double *d = places(&e, &s, c.x), min, whole = pal_cells_volume(&s.cells, NULL);
         CHECK(memcmp(d, s.cells.x, (size_t)s.cells.n_vertex * 3 * sizeof *d) == 0);
-        CHECK_NEAR(volume_of(&e, d, &least), whole, 1e-12 * (1 + whole));
-        CHECK(least > 0);
+        CHECK_NEAR(volume_of(&e, d, &min), whole, 1e-12 * (1 + whole));
+        CHECK(min > 0);
         CHECK((e.n[PAL_CELL_PYRAMID] > 0) == (which == 3));
         free(d);
         pal_cell_elements_free(&e);
@@ -403,8 +403,8 @@ static void a_cell_with_other_faces_than_quads_is_refused(void)
     c = solid_prism(4);
     e = of(&c);
     CHECK_INT(e.n[PAL_CELL_HEX], 1);
-    double least;
-    CHECK_NEAR(volume_of(&e, c.x, &least), 2, 1e-14);
+    double min;
+    CHECK_NEAR(volume_of(&e, c.x, &min), 2, 1e-14);
     pal_cell_elements_free(&e);
     pal_cells_free(&c);
 }

@@ -4,6 +4,7 @@
 #include "server/mesh/cells/cell_shapes.h"
 #include "server/mesh/files/mesh_file.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 
 #include <locale.h>
 
@@ -19,11 +20,10 @@ static pal_err parse(const char *text, pal_cells *c)
 static pal_cells odd_torus(void)
 {
     pal_cells c;
-    uint32_t state = 3;
+    uint64_t state = 3;
     if (pal_cells_torus(7, 2, 1, .4, &c, &diag)) abort();
     for (int i = 0; i < 3 * c.n_vertex; i++) {
-        state = state * 1664525u + 1013904223u;
-        c.x[i] += (double)state * 1e-12 + (i % 5 == 0) * 5e-324;
+        c.x[i] += (double)(random_bits(&state) >> 32) * 1e-12 + (i % 5 == 0) * 5e-324;
     }
     c.x[1] = -0.0;
     for (int v = 0; v < c.n_vertex; v += 3) c.vertex_sharpness[v] = (float)v / 7;

@@ -91,7 +91,7 @@ static void fill(gradients *to, int n_node)
 }
 
 /* volume of an element; its least det J against the mean */
-static double element_volume(const gradients *to, const double *x, const int32_t *node, int n, double *least)
+static double element_volume(const gradients *to, const double *x, const int32_t *node, int n, double *min)
 {
     double J[3][3][PAL_CELL_GAUSS_POINTS] = {{{0}}}, volume = 0, low = DBL_MAX;
     for (int m = 0; m < n; m++)
@@ -105,20 +105,20 @@ static double element_volume(const gradients *to, const double *x, const int32_t
         volume += to->weight[p] * d;
         low = fmin(low, d / to->shrink[p]);
     }
-    *least = fmin(*least, low / fabs(volume));
+    *min = fmin(*min, low / fabs(volume));
     return volume;
 }
 
-static double quadrature(const pal_cell_elements *e, const double *x, double *least)
+static double quadrature(const pal_cell_elements *e, const double *x, double *min)
 {
     double sum = 0;
     static gradients to;
-    *least = DBL_MAX;
+    *min = DBL_MAX;
     for (int kind = 0; kind < PAL_CELL_KINDS; kind++) {
         int n = pal_cell_kind_nodes((pal_cell_kind)kind);
         fill(&to, n);
         for (int32_t i = 0; i < e->n[kind]; i++)
-            sum += element_volume(&to, x, e->node[kind] + (size_t)n * (size_t)i, n, least);
+            sum += element_volume(&to, x, e->node[kind] + (size_t)n * (size_t)i, n, min);
     }
     return sum;
 }

@@ -3,6 +3,7 @@
 
 #include "server/mesh/cells/cell_shapes.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 #include "tests/stability/hard_case.h"
 
 static pal_diagnostic diag;
@@ -515,7 +516,7 @@ static void faces_of_three_cells_and_cells_twice_round_are_refused(void)
 static void every_broken_index_is_found_by_the_check(void)
 {
     pal_cells c = block(2, 2, 2);
-    uint32_t state = 5;
+    uint64_t state = 5;
     int n_found = 0, n_try = 0;
     struct {
         int32_t *at;
@@ -531,8 +532,8 @@ static void every_broken_index_is_found_by_the_check(void)
                 {c.cell_vertex.item, 8 * c.n_cell},
                 {c.vertex_face.start, c.n_vertex + 1}};
     for (size_t k = 0; k < sizeof list / sizeof *list; k++)
-        for (int i = 0; i < list[k].n; i += 1 + (int)(state >> 29)) {
-            int32_t was = list[k].at[i], step = (int32_t)((state = state * 1664525u + 1013904223u) >> 28) + 1;
+        for (int i = 0; i < list[k].n; i += 1 + (int)(state >> 61)) {
+            int32_t was = list[k].at[i], step = (int32_t)random_below(&state, 16) + 1;
             list[k].at[i] = was + step;
             n_try++;
             n_found += pal_cells_check(&c, NULL, &diag) == PAL_ERR_REFUSED;

@@ -69,7 +69,7 @@ static void lattice_place(int32_t v, int out[3])
 
 /* largest difference of a row from the product of masks along the axes that are true */
 static double row_error(const pal_interpolation *rows, int32_t row, const int32_t *old, int n_old, const bool axis[3],
-                        int *most)
+                        int *max)
 {
     int place[3] = {0, 0, 0}, at[3], wanted = 0;
     double worst = 0;
@@ -85,7 +85,7 @@ static double row_error(const pal_interpolation *rows, int32_t row, const int32_
         worst = fmax(worst, fabs(want - weight_of(rows, row, v)));
     }
     if (rows->start[row + 1] - rows->start[row] != wanted) return 1e9;
-    if (wanted > *most) *most = wanted;
+    if (wanted > *max) *max = wanted;
     return worst;
 }
 
@@ -109,7 +109,7 @@ static void masks_of(pal_subdivision_rule rule)
 {
     pal_cells c = solid_block(SIDE, SIDE, SIDE);
     pal_subdivision s = of(&c, 1, rule);
-    int most_inner = 0, max_face = 0, n_inner = 0, n_face = 0;
+    int max_inner = 0, max_face = 0, n_inner = 0, n_face = 0;
     double inner = 0, face = 0;
     for (int32_t i = 0; i < s.rows.n_row; i++) {
         int32_t old[PAL_CELL_LOOP_MAX];
@@ -120,11 +120,11 @@ static void masks_of(pal_subdivision_rule rule)
         if (boundary)
             face = fmax(face, row_error(&s.rows, i, old, n, axis, &max_face)), n_face++;
         else
-            inner = fmax(inner, row_error(&s.rows, i, old, n, axis, &most_inner)), n_inner++;
+            inner = fmax(inner, row_error(&s.rows, i, old, n, axis, &max_inner)), n_inner++;
     }
     CHECK_LE(inner, 1e-12);
     CHECK_LE(face, 1e-12);
-    CHECK_INT(most_inner, 27);
+    CHECK_INT(max_inner, 27);
     CHECK_INT(max_face, 9);
     /* 11^3 new vertices, 9^3 of them inside, 6 9^2 inside the block's faces */
     CHECK_INT(s.rows.n_row, 1331);
@@ -328,7 +328,7 @@ static void a_lone_cube_becomes_round_by_numbers_found_by_hand(void)
 
 /* ---- topology ---- */
 
-static void holes_handles_and_hollows_stay(void)
+static void holes_handles_and_cavities_stay(void)
 {
     static const int32_t genus[N_SORT] = {0, 1, 1, 0, 0, 0, 0, -1}, cavity[N_SORT] = {0, 0, 0, 0, 0, 0, 1, -1};
     for (int which = 0; which < N_SORT; which++) {
@@ -522,7 +522,7 @@ static void a_crease_is_a_curve_of_its_own_and_straight_when_it_was(void)
 }
 
 /* sharpness 0.3 lies at 0.3 between smooth and sharp; s is worth that many levels */
-static void semi_sharp_blends_and_wears_off(void)
+static void semi_sharp_blends_and_fades(void)
 {
     pal_cells c = solid_block(3, 3, 3);
     solid_jitter(&c, 0.1, 31);
@@ -633,7 +633,7 @@ static void cells_that_touch_in_an_edge_or_a_vertex_only_are_corners_there(void)
 
 /* ---- refusals ---- */
 
-static void what_is_too_much_or_folds_over_is_refused_by_name(void)
+static void budgets_and_folds_are_refused_by_name(void)
 {
     pal_cells c = solid_block(4, 4, 4);
     pal_subdivision s = {0};
@@ -681,16 +681,16 @@ int main(void)
     RUN(positions_are_the_rows_of_the_control_points_and_follow_affine_maps);
     RUN(the_boundary_is_a_catmull_clark_surface_level_after_level);
     RUN(a_lone_cube_becomes_round_by_numbers_found_by_hand);
-    RUN(holes_handles_and_hollows_stay);
+    RUN(holes_handles_and_cavities_stay);
     RUN(a_level_has_the_cells_that_it_should);
     RUN(every_cell_and_face_knows_where_it_came_from);
     RUN(no_level_gives_the_control_cells);
     RUN(twice_the_same_is_the_same_to_the_bit);
     RUN(a_cube_with_sharp_edges_stays_a_cube);
     RUN(a_crease_is_a_curve_of_its_own_and_straight_when_it_was);
-    RUN(semi_sharp_blends_and_wears_off);
+    RUN(semi_sharp_blends_and_fades);
     RUN(a_third_sharp_edge_turns_a_crease_into_a_corner_without_a_jump);
     RUN(cells_that_touch_in_an_edge_or_a_vertex_only_are_corners_there);
-    RUN(what_is_too_much_or_folds_over_is_refused_by_name);
+    RUN(budgets_and_folds_are_refused_by_name);
     return check_report();
 }

@@ -3,6 +3,7 @@
 #include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/mesh_file.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 
 #include <locale.h>
 #include <sys/resource.h>
@@ -325,8 +326,8 @@ static void check_all_refused(const char *name, const char *const *text, int n_t
     for (int k = 0; k < n_text; k++) check_refused(name, text[k], strlen(text[k]));
     check_refused(name, "", 0);
     uint8_t noise[5000];
-    uint32_t random = 7;
-    for (size_t k = 0; k < sizeof noise; k++) noise[k] = (uint8_t)((random = random * 1664525u + 1013904223u) >> 24);
+    uint64_t seed = 7;
+    for (size_t k = 0; k < sizeof noise; k++) noise[k] = (uint8_t)random_below(&seed, 256);
     check_refused(name, noise, sizeof noise);
     memset(noise, 0, sizeof noise);
     check_refused(name, noise, sizeof noise);

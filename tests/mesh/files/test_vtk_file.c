@@ -3,6 +3,7 @@
 #include "server/mesh/files/vtk_file.h"
 #include "server/mesh/volume/hexes.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 #include "tests/fixtures/shapes.h"
 
 #include <locale.h>
@@ -76,7 +77,7 @@ static void hexahedra_and_fields_read_back_equal(void)
     REQUIRE(!pal_hexes_find(&tets, &hexes, &diag) && !pal_hexes_fill(&hexes, &tets, &ball, 0, &diag));
     double *u = malloc((size_t)tets.n_node * 24), *fill = malloc((size_t)hexes.n_hex * 8);
     uint64_t state = 4;
-    for (int i = 0; i < 3 * tets.n_node; i++) u[i] = shape_uniform(&state) * pow(10, i % 20 - 10);
+    for (int i = 0; i < 3 * tets.n_node; i++) u[i] = random_signed(&state) * pow(10, i % 20 - 10);
     for (int e = 0; e < hexes.n_hex; e++) fill[e] = (double)hexes.fill[e];
     pal_vtk_field point[2] = {{"displacement m", 3, u}, {"size", 1, u}}, cell = {"fill", 1, fill};
     pal_vtk_grid grid = {.title = "a ball\nof voxels",

@@ -1,6 +1,7 @@
 /* The box tree against analytic answers and against looking at every triangle. */
 #include "server/mesh/geometry/box_tree.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 #include "tests/fixtures/shapes.h"
 
 static void rays_from_the_centre_meet_the_sphere_at_its_radius(void)
@@ -11,7 +12,7 @@ static void rays_from_the_centre_meet_the_sphere_at_its_radius(void)
     uint64_t state = 1;
     for (int k = 0; k < 500; k++) {
         double a[3] = {0, 0, 0}, d[3], n = 0;
-        for (int i = 0; i < 3; i++) d[i] = shape_uniform(&state), n += d[i] * d[i];
+        for (int i = 0; i < 3; i++) d[i] = random_signed(&state), n += d[i] * d[i];
         for (int i = 0; i < 3; i++) d[i] /= sqrt(n);
         int tri = -1;
         CHECK_NEAR(pal_box_tree_ray(tree, a, d, 2, &tri), 1, 0.003);
@@ -53,7 +54,7 @@ static void nearest_points_of_a_cube_are_exact(void)
     for (int k = 0; k < 2000; k++) {
         double p[3], q[3], want = 0, inside = 3;
         for (int i = 0; i < 3; i++) {
-            p[i] = 3 * shape_uniform(&state);
+            p[i] = 3 * random_signed(&state);
             double out = fmax(0, fabs(p[i]) - 1);
             want += out * out;
             inside = fmin(inside, 1 - fabs(p[i]));
@@ -78,7 +79,7 @@ static void winding_number_is_one_inside_and_nought_outside(void)
     uint64_t state = 3;
     for (int k = 0; k < 500; k++) {
         double p[3], n = 0;
-        for (int i = 0; i < 3; i++) p[i] = 1.6 * shape_uniform(&state), n += p[i] * p[i];
+        for (int i = 0; i < 3; i++) p[i] = 1.6 * random_signed(&state), n += p[i] * p[i];
         n = sqrt(n);
         if (n > 0.79 && n < 1.21) continue;
         CHECK_NEAR(pal_box_tree_winding(tree, p), n < 1 ? 1 : 0, 0.03);

@@ -3,6 +3,7 @@
 #include "server/mesh/geometry/levels.h"
 #include "server/mesh/geometry/stomach.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 #include "tests/fixtures/shapes.h"
 
 /* levels of a surface, which is freed */
@@ -113,7 +114,7 @@ static void ring_weights_sum_to_a_quarter_for_every_valence(void)
 }
 
 /* on K equal angles around the vertex, the first harmonic must come out halved: where the midpoint is */
-static void ring_and_rim_rules_find_the_midpoint_of_a_flat_wheel(void)
+static void ring_and_boundary_rules_find_the_midpoint_of_a_flat_wheel(void)
 {
     for (int K = 5; K <= 12; K++) {
         double x = 0, y = 0;
@@ -301,7 +302,7 @@ static void sheets_stay_sheets_at_sides_and_corners(void)
 }
 
 /* an L: five corners like a sheet's and one that is hollow, whose inner edges stay straight */
-static void hollow_corners_keep_their_place(void)
+static void concave_corners_keep_their_position(void)
 {
     pal_surface s = sheet(7, 7, 6, 6);
     int n = 0;
@@ -406,7 +407,7 @@ static void normals_converge_at_every_kind_of_vertex(void)
     for (int half = 0; half < 2; half++)
         for (int K = half ? 2 : 3; K <= 9; K++) {
             pal_surface s = wheel(K, half, 0);
-            for (int v = 0; v < s.n_vertex; v++) s.x[3 * v + 2] = 0.2 * shape_uniform(&seed);
+            for (int v = 0; v < s.n_vertex; v++) s.x[3 * v + 2] = 0.2 * random_signed(&seed);
             pal_levels l = levels_of(s, 7);
             double early = normal_spread(&l, 2, 0), late = normal_spread(&l, 6, 0);
             printf("  %s of %d faces: normals within %.3f, four levels on %.4f rad\n", half ? "boundary" : "inner", K,
@@ -420,13 +421,13 @@ static void normals_converge_at_every_kind_of_vertex(void)
 int main(void)
 {
     RUN(ring_weights_sum_to_a_quarter_for_every_valence);
-    RUN(ring_and_rim_rules_find_the_midpoint_of_a_flat_wheel);
+    RUN(ring_and_boundary_rules_find_the_midpoint_of_a_flat_wheel);
     RUN(stencils_have_the_printed_weights);
     RUN(irregular_vertices_take_their_own_ring);
     RUN(irregular_boundary_vertices_take_the_crease_weights);
     RUN(cubics_are_reproduced_on_a_regular_grid);
     RUN(sheets_stay_sheets_at_sides_and_corners);
-    RUN(hollow_corners_keep_their_place);
+    RUN(concave_corners_keep_their_position);
     RUN(boundaries_depend_on_boundaries_only);
     RUN(a_mirrored_surface_has_mirrored_midpoints);
     RUN(normals_converge_at_every_kind_of_vertex);

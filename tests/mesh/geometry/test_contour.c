@@ -4,6 +4,7 @@
 #include "server/mesh/geometry/organ.h"
 #include "server/mesh/geometry/smooth.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 
 #define PI 3.14159265358979323846
 
@@ -144,9 +145,8 @@ static void smoothing_removes_roughness_and_keeps_volume(void)
     pal_surface s;
     REQUIRE(pal_contour(ball, NULL, &ball_box, &s, NULL) == PAL_ERR_OK);
     double volume = pal_surface_volume(&s);
-    uint32_t random = 1;
-    for (int i = 0; i < 3 * s.n_vertex; i++)
-        s.x[i] += 4e-4 * ((random = random * 1664525u + 1013904223u) / 4294967296.0 - 0.5);
+    uint64_t seed = 1;
+    for (int i = 0; i < 3 * s.n_vertex; i++) s.x[i] += 2e-4 * random_signed(&seed);
     double rough = worst_angle(&s);
     REQUIRE(pal_surface_smooth(&s, 10) == PAL_ERR_OK);
     CHECK_LE(worst_angle(&s), rough / 3);

@@ -1,6 +1,7 @@
 /* The kd-tree against looking at every point. */
 #include "server/mesh/geometry/kd_tree.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 #include "tests/fixtures/shapes.h"
 
 /* k nearest by looking at all, ties by index */
@@ -27,8 +28,8 @@ static void compare(const double *x, int n, int n_query, uint64_t *state)
     for (int q = 0; q < n_query; q++) {
         double p[3], d2[8], want2[8];
         int32_t index[8], want[8];
-        for (int k = 0; k < 3; k++) p[k] = 1.2 * shape_uniform(state);
-        if (q & 1) memcpy(p, x + 3 * (shape_random(state) % (uint64_t)n), sizeof p);
+        for (int k = 0; k < 3; k++) p[k] = 1.2 * random_signed(state);
+        if (q & 1) memcpy(p, x + 3 * (random_below(state, (uint64_t)n)), sizeof p);
         int k = 1 + q % 8, found = pal_kd_tree_nearest(tree, p, k, index, d2);
         CHECK_INT(found, look_at_all(x, n, p, k, want, want2));
         for (int i = 0; i < found; i++) {
@@ -47,7 +48,7 @@ static void random_points_give_the_same_as_looking_at_all(void)
     for (int n = 1; n < 3000; n = n * 2 + 1) {
         double *x = malloc((size_t)n * 3 * sizeof *x);
         REQUIRE(x);
-        for (int i = 0; i < 3 * n; i++) x[i] = shape_uniform(&state);
+        for (int i = 0; i < 3 * n; i++) x[i] = random_signed(&state);
         compare(x, n, 40, &state);
         free(x);
     }

@@ -13,10 +13,10 @@ static const pal_stomach *stomach(void)
 }
 
 /* least angle in degrees; fewest and most triangles of a vertex */
-static double least_angle(const pal_surface *s, int *fewest, int *most)
+static double min_angle(const pal_surface *s, int *fewest, int *max)
 {
     int *count = calloc((size_t)s->n_vertex, sizeof *count);
-    double least = 180;
+    double min = 180;
     if (!count) abort();
     for (int c = 0; c < 3 * s->n_tri; c++) {
         const int32_t *t = s->tri + 3 * (c / 3);
@@ -25,16 +25,16 @@ static double least_angle(const pal_surface *s, int *fewest, int *most)
         for (int k = 0; k < 3; k++)
             uv += (q[k] - p[k]) * (r[k] - p[k]), uu += (q[k] - p[k]) * (q[k] - p[k]),
                 vv += (r[k] - p[k]) * (r[k] - p[k]);
-        least = fmin(least, acos(uv / sqrt(uu * vv)) * 180 / SHAPE_PI);
+        min = fmin(min, acos(uv / sqrt(uu * vv)) * 180 / SHAPE_PI);
         count[t[c % 3]]++;
     }
-    *fewest = 1 << 30, *most = 0;
+    *fewest = 1 << 30, *max = 0;
     for (int v = 0; v < s->n_vertex; v++) {
         *fewest = count[v] < *fewest ? count[v] : *fewest;
-        *most = count[v] > *most ? count[v] : *most;
+        *max = count[v] > *max ? count[v] : *max;
     }
     free(count);
-    return least;
+    return min;
 }
 
 static bool sound(const pal_surface *s)
@@ -46,18 +46,18 @@ static bool sound(const pal_surface *s)
 static void stomach_has_the_papers_counts_and_good_triangles(void)
 {
     pal_stomach s = *stomach();
-    int fewest, most, components;
+    int fewest, max, components;
     CHECK_INT(s.surface.n_vertex, PAL_STOMACH_VERTEX);
     CHECK_INT(s.surface.n_tri, 372);
     CHECK(sound(&s.surface));
     int32_t label[372];
     CHECK(!pal_surface_components(&s.surface, label, &components));
     CHECK_INT(components, 1);
-    double least = least_angle(&s.surface, &fewest, &most), low[3], high[3];
-    printf("  least angle %.1f degrees, %d to %d triangles a vertex, %.3f l\n", least, fewest, most,
+    double min = min_angle(&s.surface, &fewest, &max), low[3], high[3];
+    printf("  least angle %.1f degrees, %d to %d triangles a vertex, %.3f l\n", min, fewest, max,
            pal_surface_volume(&s.surface) * 1e3);
-    CHECK(least > 25);
-    CHECK(fewest >= 4 && most <= 8);
+    CHECK(min > 25);
+    CHECK(fewest >= 4 && max <= 8);
     pal_surface_box(&s.surface, low, high);
     CHECK_NEAR(high[0] - low[0], 0.21, 0.01);
     CHECK_NEAR(high[1] - low[1], 0.24, 0.01);
@@ -127,12 +127,12 @@ static void refined_stomach_stays_sound(void)
     double volume = pal_surface_volume(&s.surface);
     for (int i = 1; i < 4; i++) {
         pal_surface fine;
-        int fewest, most;
+        int fewest, max;
         REQUIRE(!pal_levels_surface(&l, i, &fine));
-        double least = least_angle(&fine, &fewest, &most);
-        printf("  level %d: least angle %.1f degrees, %.3f l\n", i, least, pal_surface_volume(&fine) * 1e3);
-        CHECK(least > 15);
-        CHECK(fewest >= 4 && most <= 8);
+        double min = min_angle(&fine, &fewest, &max);
+        printf("  level %d: least angle %.1f degrees, %.3f l\n", i, min, pal_surface_volume(&fine) * 1e3);
+        CHECK(min > 15);
+        CHECK(fewest >= 4 && max <= 8);
         CHECK(sound(&fine));
         CHECK_NEAR(pal_surface_volume(&fine) / volume, 1.07, 0.06);
         pal_surface_free(&fine);
@@ -144,14 +144,14 @@ static void sphere_has_114_vertices_all_at_its_radius(void)
 {
     pal_surface s;
     REQUIRE(!pal_sphere_make(0.05, &s));
-    int fewest, most;
+    int fewest, max;
     CHECK_INT(s.n_vertex, PAL_SPHERE_VERTEX);
     CHECK_INT(s.n_tri, 224);
     CHECK(sound(&s));
-    double least = least_angle(&s, &fewest, &most), worst = 0, middle = 0;
-    printf("  least angle %.1f degrees, %d to %d triangles a vertex\n", least, fewest, most);
-    CHECK(least > 40);
-    CHECK(fewest >= 4 && most <= 8);
+    double min = min_angle(&s, &fewest, &max), worst = 0, middle = 0;
+    printf("  least angle %.1f degrees, %d to %d triangles a vertex\n", min, fewest, max);
+    CHECK(min > 40);
+    CHECK(fewest >= 4 && max <= 8);
     for (int v = 0; v < s.n_vertex; v++) {
         const double *x = s.x + 3 * v;
         worst = fmax(worst, fabs(sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]) - 0.05));

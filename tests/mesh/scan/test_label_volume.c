@@ -513,7 +513,7 @@ static void voxels_like_needles_are_refused_before_they_cost_memory(void)
     CHECK(s.x == NULL && diag.text[0] != 0);
 }
 
-static void files_are_told_apart_by_name_or_content(void)
+static void files_are_distinguished_by_name_or_content(void)
 {
     bytes b = make_inr("unsigned fixed", 2, false), packed = pack(&b);
     char path[] = "/tmp/pal_label_XXXXXX";
@@ -549,6 +549,6 @@ int main(void)
     RUN(damage_is_found_wherever_it_is_in_a_packed_file);
     RUN(plates_rods_and_specks_keep_their_volume);
     RUN(voxels_like_needles_are_refused_before_they_cost_memory);
-    RUN(files_are_told_apart_by_name_or_content);
+    RUN(files_are_distinguished_by_name_or_content);
     return check_report();
 }

@@ -199,7 +199,7 @@ static void a_surface_that_is_not_the_meshs_is_refused(void)
 }
 
 /* nodes and voxels of the bodies that reference solutions exist for, and the fill of those that remain */
-static void least_fill_leaves_the_voxels_of_the_reference_boxes(void)
+static void min_fill_leaves_the_voxels_of_the_reference_boxes(void)
 {
     static const struct {
         const char *path;
@@ -233,7 +233,7 @@ static void least_fill_leaves_the_voxels_of_the_reference_boxes(void)
 }
 
 /* what is dropped is what is nearly empty; a centre inside keeps its voxel however little it holds */
-static void least_fill_drops_border_voxels_only(void)
+static void min_fill_drops_border_voxels_only(void)
 {
     uint64_t state = 3;
     pal_surface s = shape_join(shape_ball(0.1, 64, 32, 0.2), shape_octahedron(0.01));
@@ -333,8 +333,8 @@ int main(void)
     RUN(total_fill_is_the_volume_of_a_box_at_an_angle_and_of_a_ball);
     RUN(overlapping_hollow_and_open_bodies_are_filled_too);
     RUN(a_surface_that_is_not_the_meshs_is_refused);
-    RUN(least_fill_leaves_the_voxels_of_the_reference_boxes);
-    RUN(least_fill_drops_border_voxels_only);
+    RUN(min_fill_leaves_the_voxels_of_the_reference_boxes);
+    RUN(min_fill_drops_border_voxels_only);
     RUN(voxels_joined_by_an_edge_are_counted);
     RUN(rows_of_a_grid_within_the_surface_end_with_the_grid);
     RUN(a_surface_that_reaches_beyond_the_mesh_fills_it_alike);

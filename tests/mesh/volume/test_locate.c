@@ -3,6 +3,7 @@
 #include "server/mesh/volume/locate.h"
 #include "server/num/shape_functions.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 #include "tests/fixtures/shapes.h"
 
 typedef struct body {
@@ -83,9 +84,9 @@ static void points_inside_are_found_with_coordinates_that_give_them_back(void)
         int n_in = 0;
         for (int i = 0; i < 3000; i++) {
             double x[3], local[4], outside;
-            int t = (int)(shape_random(&state) % (uint64_t)b.tets.n_tet);
+            int t = (int)(random_below(&state, (uint64_t)b.tets.n_tet));
             double w[4], sum = 0;
-            for (int c = 0; c < 4; c++) w[c] = 1 + shape_uniform(&state), sum += w[c];
+            for (int c = 0; c < 4; c++) w[c] = 1 + random_signed(&state), sum += w[c];
             for (int k = 0; k < 3; k++) {
                 x[k] = 0;
                 for (int c = 0; c < 4; c++) x[k] += w[c] / sum * b.tets.x[3 * b.tets.tet[4 * t + c] + k];
@@ -139,7 +140,7 @@ static void points_outside_go_to_the_nearest_element(void)
         double x[3], local[4], outside, outside_tet, best = INFINITY, far = i % 50 == 0 ? 20 : 0.2;
         /* products of three coordinates cancel */
         double rounding = 1e-14 * h * pow(2 * far / h, 3);
-        for (int k = 0; k < 3; k++) x[k] = far * shape_uniform(&state);
+        for (int k = 0; k < 3; k++) x[k] = far * random_signed(&state);
         for (int e = 0; e < b.hexes.n_hex; e++) {
             double sum = 0;
             for (int k = 0; k < 3; k++) {
@@ -254,13 +255,13 @@ static void slanted_faces_are_cut_by_the_elements(void)
                 int e = pal_locate_point(locate, p, local, NULL), n_corner = weigh(&b, hex, e, local, &node, w);
                 for (int c = 0; c < n_corner; c++) g[node[c]] += w[c] * area / ((double)M * M);
             }
-        double most = 0;
+        double max = 0;
         for (int i = 0; i < b.tets.n_node; i++) {
             /* off the mesh the piece's element is that of its middle, the point's its own */
             worst = fmax(worst, fabs(f[i] - g[i]));
-            most = fmax(most, f[i]);
+            max = fmax(max, f[i]);
         }
-        CHECK_LE(worst / most, 0.06);
+        CHECK_LE(worst / max, 0.06);
         free(f);
         free(g);
         free(piece);
@@ -283,7 +284,7 @@ static void a_triangle_within_is_integrated_exactly(void)
         int n;
         const pal_locate *locate = hex ? b.in_hexes : b.in_tets;
         REQUIRE(!pal_locate_surface(locate, &s, none, all, NULL, &piece, &n));
-        double area = total(piece, n), *f = spread(&b, hex, piece, n), worst = 0, most = 0;
+        double area = total(piece, n), *f = spread(&b, hex, piece, n), worst = 0, max = 0;
         for (int i = 0; i < n; i++) CHECK(within(hex, piece[i].local, 1e-9));
         enum { M = 900 };
         double *g = calloc((size_t)b.tets.n_node, sizeof *g);
@@ -297,9 +298,9 @@ static void a_triangle_within_is_integrated_exactly(void)
                 int e = pal_locate_point(locate, p, local, NULL), n_corner = weigh(&b, hex, e, local, &node, w);
                 for (int c = 0; c < n_corner; c++) g[node[c]] += w[c] * area / ((double)M * M);
             }
-        for (int i = 0; i < b.tets.n_node; i++) worst = fmax(worst, fabs(f[i] - g[i])), most = fmax(most, f[i]);
+        for (int i = 0; i < b.tets.n_node; i++) worst = fmax(worst, fabs(f[i] - g[i])), max = fmax(max, f[i]);
         /* the sums are only good to about 1 / M^2 */
-        CHECK_LE(worst / most, 5e-6);
+        CHECK_LE(worst / max, 5e-6);
         double u[3], v[3], cross[3];
         for (int k = 0; k < 3; k++) u[k] = corner[3 + k] - corner[k], v[k] = corner[6 + k] - corner[k];
         for (int k = 0; k < 3; k++) cross[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];

@@ -56,7 +56,7 @@ static void check_whole(const pal_prepared *mesh, int n_hex, int n_component)
     free(bytes);
 }
 
-static void what_meets_in_an_edge_or_a_corner_is_apart(void)
+static void parts_that_share_an_edge_or_a_corner_only_are_separate(void)
 {
     /* beside a cube of four voxels: in a face, along an edge, in a corner */
     static const double box[3][2][6] = {{{0, 0, 0, 4, 4, 4}, {4, 0, 0, 8, 4, 4}},
@@ -78,7 +78,7 @@ static void what_meets_in_an_edge_or_a_corner_is_apart(void)
 /* a voxel that meets the body of 1000 in an edge: six motions of its own but for the hinge */
 static const double speck[2][6] = {{0, 0, 0, 10, 10, 10}, {10, 10, 4, 11, 11, 5}};
 
-static void a_small_component_without_support_is_dropped_and_told(void)
+static void a_small_component_without_support_is_dropped_and_reported(void)
 {
     pal_prepared mesh;
     pal_loose_components parts;
@@ -242,8 +242,8 @@ static void control_cells_are_kept_by_the_same_rule(void)
 
 int main(void)
 {
-    RUN(what_meets_in_an_edge_or_a_corner_is_apart);
-    RUN(a_small_component_without_support_is_dropped_and_told);
+    RUN(parts_that_share_an_edge_or_a_corner_only_are_separate);
+    RUN(a_small_component_without_support_is_dropped_and_reported);
     RUN(a_small_component_that_is_held_stays);
     RUN(the_limit_is_one_in_a_hundred_of_the_largest);
     RUN(a_large_component_without_support_is_refused);

@@ -2,6 +2,7 @@
 #include "server/mesh/files/file_bytes.h"
 #include "server/mesh/volume/prepared.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 #include "tests/fixtures/shapes.h"
 
 static bool make_ball(pal_prepared *p, pal_prepare_report *report)
@@ -95,9 +96,9 @@ static void damaged_files_are_refused_with_their_place(void)
     int n_refused = 0, n_taken = 0;
     const int n_change = CHECK_REPEATS(3000, 400);
     for (int k = 0; k < n_change; k++) {
-        size_t at = 8 + shape_random(&state) % (k & 1 ? 512 : n - 8);
+        size_t at = 8 + random_below(&state, (k & 1 ? 512 : n - 8));
         uint8_t old = bytes[at];
-        bytes[at] = (uint8_t)shape_random(&state);
+        bytes[at] = (uint8_t)(random_bits(&state) >> 33);
         uint64_t sum = pal_prepared_checksum(bytes, n), before;
         memcpy(&before, bytes + 24, 8);
         if (at < 24 || at >= 32) memcpy(bytes + 24, &sum, 8);

@@ -3,6 +3,7 @@
 #include "server/mesh/volume/skin.h"
 #include "server/mesh/voxel/voxels.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 #include "tests/fixtures/shapes.h"
 #include "tests/stability/hard_case.h"
 
@@ -53,13 +54,13 @@ static void show(bound *b)
 /* largest distance between the shown vertices and want [n][3] */
 static double largest_error(const bound *b, const double *want)
 {
-    double most = 0;
+    double max = 0;
     for (int v = 0; v < b->surface.n_vertex; v++) {
         double d[3];
         for (int k = 0; k < 3; k++) d[k] = (double)b->out[3 * v + k] - want[3 * v + k];
-        most = fmax(most, pal_norm3(d));
+        max = fmax(max, pal_norm3(d));
     }
-    return most;
+    return max;
 }
 
 static void rest_gives_the_rest_surface(void)
@@ -102,9 +103,9 @@ static void rigid_motion_of_the_nodes_moves_the_surface_rigidly(void)
     REQUIRE(want);
     for (int k = 0; k < 50; k++) {
         double q[4], n = 0, move[3];
-        for (int i = 0; i < 4; i++) q[i] = shape_uniform(&state), n += q[i] * q[i];
+        for (int i = 0; i < 4; i++) q[i] = random_signed(&state), n += q[i] * q[i];
         for (int i = 0; i < 4; i++) q[i] /= sqrt(n);
-        for (int i = 0; i < 3; i++) move[i] = 0.2 * shape_uniform(&state);
+        for (int i = 0; i < 3; i++) move[i] = 0.2 * random_signed(&state);
         for (int i = 0; i < b.tets.n_node; i++) {
             pal_quat_rotate(b.x + 3 * i, q, b.tets.x + 3 * i);
             pal_add3(b.x + 3 * i, b.x + 3 * i, move);
@@ -141,7 +142,7 @@ static void a_vertex_on_a_node_gets_it_exactly(void)
     void *frames = calloc((size_t)on.n_frame, 64);
     REQUIRE(frames);
     for (int k = 0; k < 5; k++) {
-        for (int i = 0; i < 3 * b.tets.n_node; i++) b.x[i] = 0.2 * shape_uniform(&state);
+        for (int i = 0; i < 3 * b.tets.n_node; i++) b.x[i] = 0.2 * random_signed(&state);
         pal_skin_frames(&on, b.x, frames);
         pal_skin_evaluate(&on, b.x, frames, out);
         for (int f = 0; f < n; f++)
@@ -160,7 +161,7 @@ static void one_vertex_is_the_same_as_all(void)
     bound b;
     uint64_t state = 4;
     REQUIRE(bind_surface(shape_ball(0.1, 40, 20, 0.2), 10, &b));
-    for (int i = 0; i < 3 * b.tets.n_node; i++) b.x[i] += 0.003 * shape_uniform(&state);
+    for (int i = 0; i < 3 * b.tets.n_node; i++) b.x[i] += 0.003 * random_signed(&state);
     show(&b);
     for (int v = 0; v < b.surface.n_vertex; v += 7) {
         double one[3];
@@ -173,19 +174,19 @@ static void one_vertex_is_the_same_as_all(void)
 /* all shown vertices finite and within reach of their nodes: at most the offsets' length away */
 static void check_bounded(const bound *b)
 {
-    double most = 0;
+    double max = 0;
     bool finite = true;
     for (int v = 0; v < b->surface.n_vertex; v++) {
-        double least = 1e300;
+        double min = 1e300;
         for (int k = 0; k < 5; k++) {
             double p[3] = {(double)b->out[3 * v], (double)b->out[3 * v + 1], (double)b->out[3 * v + 2]};
             finite &= pal_finite3(p);
-            least = fmin(least, pal_dist3(p, b->x + 3 * b->skin.frame[b->skin.near[5 * v + k]]));
+            min = fmin(min, pal_dist3(p, b->x + 3 * b->skin.frame[b->skin.near[5 * v + k]]));
         }
-        most = fmax(most, least);
+        max = fmax(max, min);
     }
     CHECK(finite);
-    CHECK_LE(most, 2 * b->tets.edge_m);
+    CHECK_LE(max, 2 * b->tets.edge_m);
 }
 
 static void flat_inverted_and_collapsed_bodies_stay_finite_and_near(void)
@@ -214,17 +215,17 @@ static void flat_inverted_and_collapsed_bodies_stay_finite_and_near(void)
 /* largest motion of a shown vertex over the largest motion of a node since the last call */
 static double jump(bound *b, float *before, double *x_before)
 {
-    double moved = 0, most = 0;
+    double moved = 0, max = 0;
     memcpy(before, b->out, 3 * (size_t)b->surface.n_vertex * sizeof *before);
     for (int i = 0; i < b->tets.n_node; i++) moved = fmax(moved, pal_dist3(b->x + 3 * i, x_before + 3 * i));
     show(b);
     for (int v = 0; v < b->surface.n_vertex; v++) {
         double d[3];
         for (int k = 0; k < 3; k++) d[k] = (double)b->out[3 * v + k] - (double)before[3 * v + k];
-        most = fmax(most, pal_norm3(d));
+        max = fmax(max, pal_norm3(d));
     }
     memcpy(x_before, b->x, 3 * (size_t)b->tets.n_node * sizeof *x_before);
-    return most / moved;
+    return max / moved;
 }
 
 static void pressed_through_itself_or_crumpled_the_surface_does_not_jump(void)
@@ -246,7 +247,7 @@ static void pressed_through_itself_or_crumpled_the_surface_does_not_jump(void)
     jump(&b, before, x_before);
     double *way = malloc(3 * (size_t)b.tets.n_node * sizeof *way);
     REQUIRE(way);
-    for (int i = 0; i < 3 * b.tets.n_node; i++) way[i] = 0.02 * b.tets.edge_m * shape_uniform(&state);
+    for (int i = 0; i < 3 * b.tets.n_node; i++) way[i] = 0.02 * b.tets.edge_m * random_signed(&state);
     for (int step = 0; step < 50; step++) {
         for (int i = 0; i < 3 * b.tets.n_node; i++) b.x[i] += way[i];
         crumpled = fmax(crumpled, jump(&b, before, x_before));

@@ -42,7 +42,7 @@ static void a_box_of_even_sides_is_a_box_of_half_as_many(void)
     pal_hexes_free(&hexes);
 }
 
-static void planes_go_where_they_are_asked(void)
+static void planes_lie_where_requested(void)
 {
     for (int shift = 0; shift < 2; shift++) {
         pal_tets tets = {0};
@@ -109,7 +109,7 @@ static void without_voxels_it_is_refused(void)
 int main(void)
 {
     RUN(a_box_of_even_sides_is_a_box_of_half_as_many);
-    RUN(planes_go_where_they_are_asked);
+    RUN(planes_lie_where_requested);
     RUN(volume_is_kept_or_little_of_it_dropped);
     RUN(without_voxels_it_is_refused);
     return check_report();

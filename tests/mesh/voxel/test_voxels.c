@@ -2,6 +2,7 @@
 #include "server/mesh/geometry/tets.h"
 #include "server/mesh/voxel/voxels.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 #include "tests/fixtures/shapes.h"
 #include "tests/stability/hard_case.h"
 
@@ -66,7 +67,7 @@ static void unwelded_triangles_have_their_volume(void)
     expect_volume(s, 40, sphere_volume(0.1), 0.02, "scanline");
 }
 
-static void doubled_shells_do_not_cancel(void)
+static void doubled_surfaces_do_not_cancel(void)
 {
     /* exact copies, one turned inside out, one moved by a twentieth of a voxel, three in all */
     expect_volume(shape_join(shape_sphere(0.1), shape_sphere(0.1)), 40, sphere_volume(0.1), 0.02, "scanline");
@@ -78,7 +79,7 @@ static void doubled_shells_do_not_cancel(void)
                   "");
 }
 
-static void turned_copy_beside_its_twin_is_no_cavity(void)
+static void reversed_copy_beside_its_twin_is_no_cavity(void)
 {
     /* a hundredth of a voxel within */
     pal_surface turned = shape_sphere(0.1 - 0.00005);
@@ -110,7 +111,7 @@ static void overlapping_shapes_are_joined(void)
     }
 }
 
-static void inward_shells_within_stay_empty(void)
+static void inward_parts_within_stay_empty(void)
 {
     for (int turned = 0; turned < 2; turned++) {
         pal_surface cavity = shape_sphere(0.06);
@@ -132,17 +133,17 @@ static void inward_shells_within_stay_empty(void)
                   sphere_volume(0.1) - sphere_volume(0.07) + sphere_volume(0.04), 0.02, "scanline");
 }
 
-static void outward_shells_within_stay_full(void)
+static void outward_parts_within_stay_full(void)
 {
     expect_volume(shape_join(shape_sphere(0.1), shape_sphere(0.06)), 50, sphere_volume(0.1), 0.02, "scanline");
 }
 
-static void flipped_triangles_are_turned_back(void)
+static void reversed_triangles_are_corrected(void)
 {
     uint64_t state = 3;
     pal_surface s = shape_sphere(0.1);
     for (int t = 0; t < s.n_tri; t++)
-        if (shape_random(&state) & 1) {
+        if (random_below(&state, 2)) {
             int32_t swap = s.tri[3 * t];
             s.tri[3 * t] = s.tri[3 * t + 1];
             s.tri[3 * t + 1] = swap;
@@ -244,7 +245,7 @@ static void every_component_is_found(void)
     pal_surface_free(&s);
 }
 
-static void pieces_are_counted_with_their_border(void)
+static void components_are_counted_with_their_border(void)
 {
     /* two boxes of 4 voxels: 3 apart their borders leave a gap, 2 apart they touch */
     for (int gap = 2; gap <= 3; gap++) {
@@ -299,7 +300,7 @@ static void all_methods_agree_on_closed_shapes(void)
     }
 }
 
-static void flood_says_that_it_leaks(void)
+static void flood_reports_a_leak(void)
 {
     pal_surface s = shape_cube(0.1);
     s.n_tri--;
@@ -337,7 +338,7 @@ static void border_is_the_layer_beside_the_inside(void)
 /* how far beyond a convex shape's planes a point lies, in metres: negative inside */
 static double outside_of(const pal_surface *s, const double p[3])
 {
-    double most = -1e300;
+    double max = -1e300;
     for (int t = 0; t < s->n_tri; t++) {
         const double *a = s->x + 3 * s->tri[3 * t], *b = s->x + 3 * s->tri[3 * t + 1],
                      *c = s->x + 3 * s->tri[3 * t + 2];
@@ -345,9 +346,9 @@ static double outside_of(const pal_surface *s, const double p[3])
         for (int k = 0; k < 3; k++) u[k] = b[k] - a[k], w[k] = c[k] - a[k], d[k] = p[k] - a[k];
         for (int k = 0; k < 3; k++) n[k] = u[(k + 1) % 3] * w[(k + 2) % 3] - u[(k + 2) % 3] * w[(k + 1) % 3];
         double side = (n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) / sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-        if (side > most) most = side;
+        if (side > max) max = side;
     }
-    return most;
+    return max;
 }
 
 static void thousand_rotations_give_the_convex_shapes_own_voxels(void)
@@ -555,7 +556,7 @@ static void noise_is_refused_within_a_budget(void)
     enum { N = 20000 };
     uint64_t state = 9;
     pal_surface s = shape_room(3 * N, N);
-    for (int i = 0; i < 9 * N; i++) s.x[i] = shape_uniform(&state);
+    for (int i = 0; i < 9 * N; i++) s.x[i] = random_signed(&state);
     for (int i = 0; i < 3 * N; i++) s.tri[i] = i;
     pal_voxels v;
     pal_err err = fill(&s, 100, NULL, &v);
@@ -671,21 +672,21 @@ int main(void)
     RUN(closed_shapes_have_their_volume);
     RUN(inside_out_shapes_have_their_volume);
     RUN(unwelded_triangles_have_their_volume);
-    RUN(doubled_shells_do_not_cancel);
-    RUN(turned_copy_beside_its_twin_is_no_cavity);
+    RUN(doubled_surfaces_do_not_cancel);
+    RUN(reversed_copy_beside_its_twin_is_no_cavity);
     RUN(doubled_fin_leaves_a_closed_body_closed);
     RUN(overlapping_shapes_are_joined);
-    RUN(inward_shells_within_stay_empty);
-    RUN(outward_shells_within_stay_full);
-    RUN(flipped_triangles_are_turned_back);
+    RUN(inward_parts_within_stay_empty);
+    RUN(outward_parts_within_stay_full);
+    RUN(reversed_triangles_are_corrected);
     RUN(open_shapes_are_closed_by_vote_or_winding_number);
     RUN(surface_volume_has_its_holes_closed_flat);
     RUN(open_tube_is_a_volume);
     RUN(inner_wall_does_not_empty_its_row);
     RUN(every_component_is_found);
-    RUN(pieces_are_counted_with_their_border);
+    RUN(components_are_counted_with_their_border);
     RUN(all_methods_agree_on_closed_shapes);
-    RUN(flood_says_that_it_leaks);
+    RUN(flood_reports_a_leak);
     RUN(border_is_the_layer_beside_the_inside);
     RUN(thousand_rotations_give_the_convex_shapes_own_voxels);
     RUN(centres_on_vertices_edges_and_faces_belong_to_one_side_on_every_axis);

@@ -23,6 +23,8 @@ static struct {
     pal_effect contact_tapped, solver_tapped;
     pal_tangent tangent;
     double solved_N[3], node_share; /* by all contacts on the body, in the last solve */
+    double first_N[3];              /* in the first of two stages                     */
+    bool staged;
     /* of all sub-steps: the largest sum or force on a tool, the same over the caps of tools that act, the largest
      * difference between sum and what tools feel */
     double most_N, most_off_N, most_share;
@@ -59,6 +61,7 @@ static bool settle_tapped(void *self, pal_step *step, const double *moved, bool 
     tap.node_share = take_forces(body, tie);
     free(tie);
     tap.n_settle++;
+    if (!last) tap.staged = true, pal_copy3(tap.first_N, tap.solved_N);
     return tap.contact->tangent->settle(self, step, moved, last);
 }
 
@@ -67,9 +70,11 @@ static pal_err solve_tapped(void *self, pal_step *step)
     const pal_tools *tools = step->tools;
     double off[3], cap = 0;
     tap.node_share = take_forces(step->body, NULL);
-    tap.n_settle = 0;
+    tap.n_settle = 0, tap.staged = false;
     pal_err err = tap.solver->run(self, step);
+    /* two stages of sdirk2 give momentum as their mean, the first 1/sqrt 2 of it */
     pal_copy3(off, tap.solved_N);
+    for (int c = 0; c < 3 && tap.staged; c++) off[c] += M_SQRT1_2 * (tap.first_N[c] - tap.solved_N[c]);
     for (int t = 0; t < tools->n_tool; t++) {
         double force = pal_norm3(tools->tool[t].force_N), most = tools->tool[t].ramp * tools->tool[t].force_cap_N;
         pal_add3(off, off, tools->tool[t].force_N);
@@ -258,7 +263,7 @@ static void a_step_gives_no_more_momentum_than_the_cap(void)
             printf("  %s, %s: up to %.9g N, off by %.2g N\n", cases[i].solver, insult_name[what], most_N, most_off_N);
             CHECK(most_N > 0.02 * cap_N);
             CHECK_LE(most_N, cap_N * (1 + 1e-6));
-            if (i == 0) CHECK_LE(most_off_N, 1e-6 * cap_N);
+            CHECK_LE(most_off_N, 1e-6 * cap_N);
             model_scene_close(&m);
         }
 }

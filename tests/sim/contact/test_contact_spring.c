@@ -1,6 +1,7 @@
 /* Ties between tools and tissue: rows of contact as an implicit solver takes them. */
 #include "server/base/arena.h"
 #include "server/sim/contact/contact_spring.h"
+#include "tests/fixtures/random.h"
 #include "tests/fixtures/tool_scene.h"
 
 enum { MOST = 64 };
@@ -15,17 +16,11 @@ typedef struct tie_scene {
     double centre[3];
 } tie_scene;
 
-static double noise(uint32_t *seed)
-{
-    *seed = *seed * 1664525u + 1013904223u;
-    return (double)(*seed >> 8) / (1 << 24) - 0.5;
-}
-
-static double *field(const pal_body *body, uint32_t seed, double size)
+static double *field(const pal_body *body, uint64_t seed, double size)
 {
     double *u = calloc(3 * (size_t)body->n_node, sizeof *u);
     if (!u) abort();
-    for (int i = 0; i < 3 * body->n_node; i++) u[i] = size * noise(&seed);
+    for (int i = 0; i < 3 * body->n_node; i++) u[i] = 0.5 * size * random_signed(&seed);
     return u;
 }
 
@@ -88,7 +83,7 @@ static void measures_what_points_do(void)
         REQUIRE(open_ties(&t, skinned));
         pal_body *body = t.s.body;
         double worst = 0, most = 0, *motion = calloc((size_t)t.n, sizeof(double));
-        for (uint32_t seed = 1; seed < 6; seed++) {
+        for (uint64_t seed = 1; seed < 6; seed++) {
             double step = 2e-4 * body->edge_m, *u = field(body, seed, 1), x[3];
             pal_contact_springs_motion(&t.springs, u);
             for (int side = 0; side < 2; side++) {
@@ -123,7 +118,7 @@ static void stiffness_is_symmetric_and_sums_squares(void)
     REQUIRE(open_ties(&t, true));
     const pal_body *body = t.s.body;
     size_t n3 = 3 * (size_t)body->n_node;
-    for (uint32_t seed = 1; seed < 4; seed++) {
+    for (uint64_t seed = 1; seed < 4; seed++) {
         double *p = field(body, seed, 1), *q = field(body, 100 + seed, 1), *kp = calloc(n3, 8), *kq = calloc(n3, 8);
         double pkq = 0, qkp = 0, pkp = 0, wanted = 0;
         pal_contact_springs_multiply(&t.springs, 1, p, kp);

@@ -1,4 +1,4 @@
-/* Settings: what a scene has, put into it again, into other models and sizes, and what is refused. */
+/* Configurations: that of a scene, put into it again, into other models and sizes, and what is refused. */
 #include "server/sim/core/configuration.h"
 
 #include "server/mesh/geometry/stomach.h"
@@ -98,7 +98,7 @@ static void check_refused(const pal_scene *from, int body, const pal_configurati
     if (!strstr(diag.text, word)) printf("  \"%s\" has no \"%s\"\n", diag.text, word);
 }
 
-static void a_full_body_runs_in_every_setting(void)
+static void a_solid_body_runs_in_every_configuration(void)
 {
     organ o;
     organ_make(&o, true);
@@ -131,7 +131,7 @@ static void a_full_body_runs_in_every_setting(void)
 }
 
 /* keys that a setting does not speak of stay, those it does are replaced */
-static void keys_that_a_setting_does_not_speak_of_stay(void)
+static void keys_outside_a_configuration_stay(void)
 {
     organ o;
     pal_configured_scene *set = NULL;
@@ -196,7 +196,7 @@ static void voxels_end_where_the_support_does(void)
 }
 
 /* another mesh holds the same part of the body, its border in a plane of nodes */
-static void the_lowest_part_is_held_as_a_box(void)
+static void the_lowest_part_is_fixed_as_a_box(void)
 {
     organ o;
     organ_make(&o, true);
@@ -231,7 +231,7 @@ static void the_lowest_part_is_held_as_a_box(void)
 
 /* springs' own meshes keep every voxel that the surface touches: nodes up to a voxel below it are no reason to hold
  * nothing on another mesh */
-static void the_lowest_part_of_whole_voxels_is_held_on_every_mesh(void)
+static void the_lowest_part_of_whole_voxels_is_fixed_on_every_mesh(void)
 {
     organ o;
     organ_make(&o, true);
@@ -306,7 +306,7 @@ static void cells_go_into_voxels(void)
     solid_scene_close(&s);
 }
 
-static void what_does_not_fit_is_refused_in_a_sentence(void)
+static void models_that_do_not_fit_are_refused_in_a_sentence(void)
 {
     organ o;
     organ_make(&o, true);
@@ -337,7 +337,7 @@ static void what_does_not_fit_is_refused_in_a_sentence(void)
     organ_free(&o);
 }
 
-static void settings_have_a_text(void)
+static void configurations_have_a_text(void)
 {
     char text[PAL_CONFIGURATION_TEXT];
     const pal_configuration fem = {.model = "fem",
@@ -394,15 +394,15 @@ static void nodes_are_known_before_they_are_made(void)
 
 int main(void)
 {
-    RUN(settings_have_a_text);
+    RUN(configurations_have_a_text);
     RUN(nodes_are_known_before_they_are_made);
-    RUN(a_full_body_runs_in_every_setting);
-    RUN(keys_that_a_setting_does_not_speak_of_stay);
+    RUN(a_solid_body_runs_in_every_configuration);
+    RUN(keys_outside_a_configuration_stay);
     RUN(voxels_end_where_the_support_does);
-    RUN(the_lowest_part_is_held_as_a_box);
-    RUN(the_lowest_part_of_whole_voxels_is_held_on_every_mesh);
+    RUN(the_lowest_part_is_fixed_as_a_box);
+    RUN(the_lowest_part_of_whole_voxels_is_fixed_on_every_mesh);
     RUN(a_hollow_body_adapts_or_is_refined);
     RUN(cells_go_into_voxels);
-    RUN(what_does_not_fit_is_refused_in_a_sentence);
+    RUN(models_that_do_not_fit_are_refused_in_a_sentence);
     return check_report();
 }

@@ -1,5 +1,6 @@
-/* Forces that elastic rows keep from where a step looked at its energy to the next one that begins there: they are
- * those that a fresh pass gives, a move, an edit or a reset makes them anew, looking at the energy changes no bit. */
+/* Forces that elastic components keep from where a step looked at its energy to the next one that begins there: they
+ * are those that a fresh pass gives, a move, an edit or a reset makes them anew, looking at the energy changes no bit.
+ */
 #include "server/sim/elements/elastic_hex.h"
 #include "tests/fixtures/fem_beam.h"
 #include "tests/fixtures/subdivision_scene.h"
@@ -77,7 +78,7 @@ static void swing(fem_beam *b, const char *element, const char *law, double kick
         if (!b->body->support[i]) b->body->v[3 * i + 2] = kick_m_s * b->body->x[3 * i] / b->length_m;
 }
 
-static void what_is_kept_is_what_a_fresh_pass_gives(void)
+static void cached_forces_equal_those_of_a_new_pass(void)
 {
     static const char *const kind[][2] = {
         {"hex8_bbar", "corotational"}, {"hex8", "linear"}, {"hex8_bbar", "neo_hookean"}, {"tet4", "corotational"},
@@ -94,7 +95,7 @@ static void what_is_kept_is_what_a_fresh_pass_gives(void)
     }
 }
 
-static void a_solid_of_cells_keeps_them_too(void)
+static void a_subdivision_solid_has_the_cache_too(void)
 {
     solid_scene s;
     const int32_t n[3] = {3, 2, 2};
@@ -114,7 +115,7 @@ static void a_solid_of_cells_keeps_them_too(void)
 }
 
 /* one pass over the elements a step is saved; the energies are the same as without the watch, and so are places */
-static void a_calm_step_saves_one_pass(void)
+static void a_step_without_energy_rise_saves_one_pass(void)
 {
     enum { STEPS = 40 };
     fem_beam b, plain;
@@ -129,14 +130,14 @@ static void a_calm_step_saves_one_pass(void)
         CHECK(!pal_world_step(b.world, b.scene->step_s) && !pal_world_step(plain.world, b.scene->step_s));
         for (int c = 0; c < 3 * b.body->n_dof; c++) most = fmax(most, fabs(b.body->x[c] - plain.body->x[c]));
     }
-    printf("  %llu passes saved in %d steps, %g m apart\n", (unsigned long long)with->kept.n_add, STEPS, most);
-    CHECK(with->kept.n_add == STEPS && without->kept.n_add == 0);
+    printf("  %llu passes saved in %d steps, %g m apart\n", (unsigned long long)with->force_cache.n_add, STEPS, most);
+    CHECK(with->force_cache.n_add == STEPS && without->force_cache.n_add == 0);
     CHECK(b.body->safeguards.n_search == 0 && most < 1e-9);
     beam_free(&b);
     beam_free(&plain);
 }
 
-static void looking_at_the_energy_changes_no_bit(void)
+static void evaluating_the_energy_changes_no_bit(void)
 {
     fem_beam a, b;
     swing(&a, "hex8_bbar", "corotational", 1);
@@ -152,9 +153,9 @@ static void looking_at_the_energy_changes_no_bit(void)
 
 int main(void)
 {
-    RUN(what_is_kept_is_what_a_fresh_pass_gives);
-    RUN(a_solid_of_cells_keeps_them_too);
-    RUN(a_calm_step_saves_one_pass);
-    RUN(looking_at_the_energy_changes_no_bit);
+    RUN(cached_forces_equal_those_of_a_new_pass);
+    RUN(a_subdivision_solid_has_the_cache_too);
+    RUN(a_step_without_energy_rise_saves_one_pass);
+    RUN(evaluating_the_energy_changes_no_bit);
     return check_report();
 }

@@ -1,6 +1,7 @@
 /* Brushes: pressure without net force on closed surfaces, handles as springs, slow in and out, rows that come and go,
  * what is refused; on springs, elements and solids. */
 #include "server/sim/core/effect_list.h"
+#include "tests/fixtures/random.h"
 #include "tests/fixtures/solids.h"
 #include "tests/fixtures/tool_scene.h"
 #include "tests/heap_calls.h"
@@ -75,7 +76,7 @@ static void forces(tool_scene *s, int n_step)
 {
     const pal_component *row = brush_row(s->world);
     for (int i = 0; i < n_step; i++) {
-        pal_step step = {.body = s->body, .dt_s = 1e-3, .n_sub = 1};
+        pal_step step = {.body = s->body, .dt_s = 1.0 / 60, .n_sub = 1};
         memset(s->body->load, 0, 3 * sizeof(double) * (size_t)s->body->n_node);
         if (row->effect->run(row->self, &step)) abort();
     }
@@ -86,7 +87,7 @@ static void crumple(tool_scene *s, double far_m)
 {
     uint64_t seed = 5;
     for (int i = 0; i < 3 * s->body->n_dof; i++) {
-        s->body->x[i] = s->body->x_rest[i] + far_m * check_random(&seed);
+        s->body->x[i] = s->body->x_rest[i] + far_m * random_signed(&seed);
     }
     pal_world_invalidate_limits(s->world, 0);
 }
@@ -252,8 +253,8 @@ static void a_handle_is_a_spring_of_its_stiffness(void)
     }
 }
 
-/* steps of a tenth each, in and out; a change of lift as well */
-static void forces_come_and_go_over_ten_steps(void)
+/* ten steps of 1/60 s, in and out; a change of pressure as well */
+static void forces_are_blended_over_a_sixth_of_a_second(void)
 {
     tool_scene s;
     double sum[3];
@@ -461,7 +462,7 @@ int main(void)
     RUN(a_small_node_bears_less_of_a_lasting_load_whatever_the_solver);
     RUN(a_soft_brush_pushes_only_what_it_reaches_along_the_normals);
     RUN(a_handle_is_a_spring_of_its_stiffness);
-    RUN(forces_come_and_go_over_ten_steps);
+    RUN(forces_are_blended_over_a_sixth_of_a_second);
     RUN(rows_come_with_the_first_brush_and_go_with_the_last);
     RUN(a_curve_lifts_what_it_holds);
     RUN(what_cannot_be_is_refused_and_changes_nothing);

@@ -58,7 +58,7 @@ static void hurt(tool_scene *s, insult how)
         run_guard(s);
     else
         CHECK_INT(pal_world_step(s->world, s->scene->step_s), PAL_ERR_FROZEN);
-    const char *const want[] = {"is no number", "is no number", "is no number", "m allowed", "RMS allowed"};
+    const char *const want[] = {"is not finite", "is not finite", "is not finite", "m allowed", "RMS allowed"};
     char name[24];
     snprintf(name, sizeof name, "node %d of tetrahedron ", node);
     CHECK(strstr(s->body->reason, want[how]) != NULL);

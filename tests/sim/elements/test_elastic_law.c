@@ -3,13 +3,14 @@
 #include "server/num/polar.h"
 #include "server/sim/elements/elastic_law.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 
 #include <string.h>
 
 static uint64_t seed = 5;
 static double uniform(void) /* in [-1, 1) */
 {
-    return check_random(&seed);
+    return random_signed(&seed);
 }
 
 static const double mu = 1.3, k1 = 7.1;

@@ -1,4 +1,4 @@
-/* Row hex_elastic: laws, tangents, patch tests, invariance. */
+/* Component hex_elastic: laws, tangents, patch tests, invariance. */
 #include "tests/fixtures/hex_bodies.h"
 
 #include "server/base/vec3.h"
@@ -306,7 +306,7 @@ static void neo_hookean_tangent_is_that_of_one_point_at_a_time(void)
             hex_body b;
             begin(&b, 5, 3, 2, NULL, elements[element], "neo_hookean");
             b.def->material.poisson = 0.4;
-            /* points of turned over voxels are asked for as well */
+            /* points of inverted voxels are asked for as well */
             pal_entry_put_bool(&b.item, "recover", false, NULL);
             REQUIRE(hex_body_make(&b) == PAL_ERR_OK);
             int n = 3 * b.body.n_node;

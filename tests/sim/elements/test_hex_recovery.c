@@ -1,4 +1,4 @@
-/* Row hex_elastic: bodies whose voxels are turned over. */
+/* Component hex_elastic: bodies whose voxels are inverted. */
 #include "tests/fixtures/hex_bodies.h"
 
 #include "server/base/vec3.h"
@@ -28,8 +28,8 @@ static void relax(hex_body *b, int n_step)
     free(dx), free(all);
 }
 
-/* turned over (mirrored, shuffled, flat, in a point): found, run on the split, back on cubes at rest in the end */
-static void untangles_bodies_that_are_turned_over(void)
+/* inverted (mirrored, shuffled, flat, in a point): found, run on the split, back on cubes at rest in the end */
+static void inverted_bodies_recover(void)
 {
     for (int kind = 0; kind < 8; kind++) {
         hex_body b;
@@ -73,7 +73,7 @@ static void untangles_bodies_that_are_turned_over(void)
 
 static const char *const laws[3] = {"corotational", "linear", "neo_hookean"};
 
-static void tangled_body_without_the_rule_runs_on(void)
+static void an_inverted_body_without_recovery_runs_on(void)
 {
     for (int law = 0; law < 3; law++) {
         hex_body b;
@@ -91,7 +91,7 @@ static void tangled_body_without_the_rule_runs_on(void)
 
 int main(void)
 {
-    RUN(untangles_bodies_that_are_turned_over);
-    RUN(tangled_body_without_the_rule_runs_on);
+    RUN(inverted_bodies_recover);
+    RUN(an_inverted_body_without_recovery_runs_on);
     return check_report();
 }

@@ -1,4 +1,4 @@
-/* Row tet_elastic: both elements, all laws. */
+/* Component tet_elastic: both elements, all laws. */
 #include "tests/fixtures/elastic_bench.h"
 
 static const char *const laws[] = {"corotational", "linear", "neo_hookean"};
@@ -400,7 +400,7 @@ static void stiffness_bounds_the_tangent(void)
     }
 }
 
-static void other_constants_are_those_of_a_row_made_with_them(void)
+static void other_constants_are_those_of_a_component_made_with_them(void)
 {
     EACH_KIND(ten, law)
     {
@@ -471,7 +471,7 @@ static void an_inverted_tetrahedron_takes_its_neighbours_rotation(void)
 
 /* every node of a free body anywhere in its box: down the forces it comes to rest whole with the rule, and sticks with
  * each inverted element's own rotation */
-static void shuffled_bodies_untangle(void)
+static void shuffled_bodies_recover(void)
 {
     for (int rule = 0; rule < 2; rule++) {
         int n_whole = 0, n_seed = 6;
@@ -602,9 +602,9 @@ int main(void)
     RUN(ten_thousand_turns_leave_no_energy);
     RUN(a_sudden_half_turn_is_found);
     RUN(stiffness_bounds_the_tangent);
-    RUN(other_constants_are_those_of_a_row_made_with_them);
+    RUN(other_constants_are_those_of_a_component_made_with_them);
     RUN(an_inverted_tetrahedron_takes_its_neighbours_rotation);
-    RUN(shuffled_bodies_untangle);
+    RUN(shuffled_bodies_recover);
     RUN(collapsed_bodies_have_finite_forces);
     RUN(slivers_and_flat_tetrahedra_do_no_harm);
     RUN(a_nan_ends_and_leaves_nothing);

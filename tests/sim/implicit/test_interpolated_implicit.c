@@ -403,7 +403,7 @@ static void a_matrix_of_too_much_work_is_refused(void)
     rows.weight = calloc(NODES, sizeof *rows.weight);
     REQUIRE(arena && rows.start && rows.point && rows.weight);
     for (int i = 0; i < NODES; i++) rows.start[i + 1] = i + 1, rows.point[i] = i % POINTS, rows.weight[i] = 1;
-    REQUIRE(!pal_body_allocate_embedded(&body, arena, &rows));
+    REQUIRE(!pal_body_allocate_interpolated(&body, arena, &rows));
     CHECK_INT(pal_interpolated_system_make(&body, &row, 1, arena, &diag, &e), PAL_ERR_BUDGET);
     CHECK(strstr(diag.text, "200 control points by 600 or more products on 40000 nodes") != NULL);
     CHECK(e == NULL);

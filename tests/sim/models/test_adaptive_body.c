@@ -1,5 +1,6 @@
 /* A body that adapts in the world: steps without the heap, tools on the surface as it is now, frames, reset, guard. */
 #include "tests/fixtures/adaptive_worlds.h"
+#include "tests/fixtures/random.h"
 #include "tests/heap_calls.h"
 
 #include <stdint.h>
@@ -138,14 +139,13 @@ static void a_lasting_load_needs_a_node_in_use(void)
 }
 
 /* random splits and joins, several at once; false: nothing came of it */
-static bool change(shell_scene *s, unsigned *seed, int n)
+static bool change(shell_scene *s, uint64_t *seed, int n)
 {
     pal_adaptive_surface *adaptive = s->body->model.adaptive;
     for (int i = 0; i < n; i++) {
-        *seed = *seed * 1664525u + 1013904223u;
-        int32_t face = adaptive->leaf[(int)(*seed >> 8) % adaptive->n_leaf],
+        int32_t face = adaptive->leaf[random_below(seed, (uint64_t)adaptive->n_leaf)],
                 parent = pal_levels_face_parent(&adaptive->levels, face);
-        if (*seed & 128)
+        if (random_below(seed, 2))
             (void)pal_adaptive_split(adaptive, s->body, face, 0);
         else if (parent >= 0)
             (void)pal_adaptive_join(adaptive, s->body, parent);
@@ -168,7 +168,7 @@ static void another_body_is_switched_and_this_one_goes_on(void)
     snprintf(s.scene->body[1].name, sizeof s.scene->body[1].name, "beside");
     REQUIRE(shell_scene_start(&s));
     pal_body *first = s.body, *body = s.body = pal_world_body(s.world, 1);
-    unsigned seed = 3;
+    uint64_t seed = 3;
     for (int i = 0; i < 20; i++) change(&s, &seed, 20);
     REQUIRE(body->model.adaptive->finest == 2);
     CHECK_INT(pal_world_load(s.world, 1, front(&s), (double[3]){0, 0, -0.02}), 0);
@@ -228,7 +228,7 @@ static void frames_follow_the_table_of_triangles_whatever_they_skip(void)
         const int32_t *end = shown.parent + 2 * (i - shown.n_coarse);
         CHECK(end[0] != end[1] && end[0] >= 0 && end[1] >= 0 && end[0] < i && end[1] < i);
     }
-    unsigned seed = 4;
+    uint64_t seed = 4;
     int n_change = 0, n_long = 0;
     for (int i = 0; i < 300; i++) {
         uint64_t before = adaptive->n_log;
@@ -408,7 +408,7 @@ static void a_body_that_diverges_stops_at_its_last_good_state(void)
     }
     double before = shell_scene_rms(&s);
     CHECK(before > 1e-3);
-    unsigned seed = 9;
+    uint64_t seed = 9;
     CHECK(change(&s, &seed, 50));
     s.body->v[0] = NAN;
     CHECK_INT(pal_world_step(s.world, 1.0 / STEP_HZ), PAL_ERR_FROZEN);

@@ -1,5 +1,5 @@
 /* A bent body of springs that is made a thousand times as stiff at once, and soft again: the work that the change puts
- * in is taken away and does not throw it about. Small changes are not braked, to the bit. */
+ * in is taken away and does not throw it about. Small changes are not damped, to the bit. */
 #include "server/base/vec3.h"
 #include "server/sim/recovery/stiffening_damper.h"
 #include "server/sim/world/world.h"
@@ -10,7 +10,7 @@ static const double step_s = 1.0 / 120;
 static const int n[3] = {8, 3, 3};
 static pal_diagnostic diag;
 
-/* a bar held below in z, pulled sideways at an upper corner for a quarter of a second */
+/* a bar fixed below in z, pulled sideways at an upper corner for a quarter of a second */
 static bool bent_make(box_bench *b, double force_N)
 {
     if (!box_bench_make(b, n, 0.01, true, false)) return false;
@@ -111,7 +111,7 @@ static void little_work_is_left_alone(void)
     box_bench_close(&b);
 }
 
-static void a_reset_lets_go_of_the_brake(void)
+static void a_reset_ends_the_damper(void)
 {
     box_bench b;
     REQUIRE(bent_make(&b, 0.15));
@@ -147,8 +147,8 @@ static void it_is_critical_for_the_motion_of_the_work(void)
     CHECK_NEAR(body.stiffening_damping_1_s, 0, 0);
 }
 
-/* what grows bit by bit is braked by what is stored now, for 0.1 s; one that was begun is neither cut nor weakened */
-static void what_grows_is_braked_as_it_grows(void)
+/* what grows bit by bit is damped by what is stored now, for 0.1 s; one that was begun is neither cut nor weakened */
+static void growing_energy_is_damped_as_it_grows(void)
 {
     double x[6] = {0, 0, 0, 1.5, 0, 0}, rest[6] = {0, 0, 0, 1, 0, 0}, mass[2] = {7, 4};
     uint8_t fixed[2] = {1, 0};
@@ -176,8 +176,8 @@ int main(void)
 {
     RUN(the_work_of_a_thousandfold_change_is_taken_away);
     RUN(little_work_is_left_alone);
-    RUN(a_reset_lets_go_of_the_brake);
+    RUN(a_reset_ends_the_damper);
     RUN(it_is_critical_for_the_motion_of_the_work);
-    RUN(what_grows_is_braked_as_it_grows);
+    RUN(growing_energy_is_damped_as_it_grows);
     return check_report();
 }

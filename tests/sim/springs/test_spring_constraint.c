@@ -2,13 +2,14 @@
  * rotation leave alone, analytic values, shapes without a direction. */
 #include "server/sim/springs/spring_constraint.h"
 #include "tests/check.h"
+#include "tests/fixtures/random.h"
 
 static const pal_spring_kind kinds[] = {PAL_SPRING_DISTANCE, PAL_SPRING_AREA, PAL_SPRING_VOLUME};
 static uint64_t seed = 3;
 
 static double uniform(void) /* in [-1, 1) */
 {
-    return check_random(&seed);
+    return random_signed(&seed);
 }
 
 typedef struct spring {
@@ -31,7 +32,7 @@ static void spring_make(spring *s, pal_spring_kind kind, double shake)
     for (int c = 0; c < 4; c++) s->x[c] = s->at[c];
 }
 
-static void shapes_are_at_rest_where_they_were_measured(void)
+static void constraints_are_zero_at_their_rest_measure(void)
 {
     for (int k = 0; k < 3; k++)
         for (int turn = 0; turn < 20; turn++) {
@@ -86,7 +87,7 @@ static void gradient_is_the_difference_quotient(void)
         }
 }
 
-static void bend_is_the_difference_quotient_of_the_gradient(void)
+static void hessian_is_the_difference_quotient_of_the_gradient(void)
 {
     const double step = 1e-5;
     for (int k = 0; k < 3; k++)
@@ -114,7 +115,7 @@ static void bend_is_the_difference_quotient_of_the_gradient(void)
 
 /* H_ab = H_ba', sum over b of H_ab = 0, and turning all corners by t about an axis turns the gradient with them:
  * sum over b of H_ab (t x x_b) = t x g_a */
-static void bend_is_symmetric_and_blind_to_motion_as_a_whole(void)
+static void hessian_is_symmetric_and_invariant_to_translation(void)
 {
     for (int k = 0; k < 3; k++)
         for (int turn = 0; turn < 50; turn++) {
@@ -148,7 +149,7 @@ static void bend_is_symmetric_and_blind_to_motion_as_a_whole(void)
         }
 }
 
-static void shapes_without_direction_have_neither_gradient_nor_bend(void)
+static void constraints_without_direction_have_neither_gradient_nor_hessian(void)
 {
     static const double p[3] = {0.25, -1, 2};
     const double *x[4] = {p, p, p, p};
@@ -170,11 +171,11 @@ static void shapes_without_direction_have_neither_gradient_nor_bend(void)
 
 int main(void)
 {
-    RUN(shapes_are_at_rest_where_they_were_measured);
+    RUN(constraints_are_zero_at_their_rest_measure);
     RUN(constraints_of_a_right_angled_corner_are_analytic);
     RUN(gradient_is_the_difference_quotient);
-    RUN(bend_is_the_difference_quotient_of_the_gradient);
-    RUN(bend_is_symmetric_and_blind_to_motion_as_a_whole);
-    RUN(shapes_without_direction_have_neither_gradient_nor_bend);
+    RUN(hessian_is_the_difference_quotient_of_the_gradient);
+    RUN(hessian_is_symmetric_and_invariant_to_translation);
+    RUN(constraints_without_direction_have_neither_gradient_nor_hessian);
     return check_report();
 }

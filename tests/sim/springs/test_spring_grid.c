@@ -8,6 +8,7 @@
 #include "tests/check.h"
 #include "tests/fixtures/boxes.h"
 #include "tests/fixtures/largest_frequency.h"
+#include "tests/fixtures/random.h"
 
 enum { NODES = 5 * 4 * 3 };
 static pal_diagnostic diag;
@@ -15,7 +16,7 @@ static uint64_t seed;
 
 static double uniform(void) /* in [-1, 1) */
 {
-    return check_random(&seed);
+    return random_signed(&seed);
 }
 
 /* a free block of 4 x 3 x 2 voxels of 1 cm whose springs stand on a grid of 5 x 4 x 3 nodes */

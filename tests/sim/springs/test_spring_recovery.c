@@ -1,11 +1,12 @@
-/* Untangling of springs: regions push by the gradient of their energy, take no momentum, let go what is whole, leave
- * alone what a tool presses, and are not there for a body that is never turned over. */
+/* Recovery of springs from inversion: regions push by the gradient of their energy, take no momentum, let go what is
+ * whole, leave alone what a tool presses, and are not there for a body that is never inverted. */
 #include "server/sim/springs/spring_recovery.h"
 
 #include "server/base/vec3.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 #include "tests/fixtures/boxes.h"
+#include "tests/fixtures/random.h"
 
 static uint64_t seed;
 static pal_diagnostic diag;
@@ -32,7 +33,7 @@ static void fold(box_bench *b, double from_m)
         double *x = b->body->x + 3 * i;
         if (b->body->support[i] || b->body->x_rest[3 * i] < from_m) continue;
         x[0] = 2 * from_m - x[0];
-        for (int c = 0; c < 3; c++) x[c] += 0.002 * (check_random01(&seed) - 0.5);
+        for (int c = 0; c < 3; c++) x[c] += 0.002 * (random_unit(&seed) - 0.5);
     }
     pal_world_invalidate_limits(b->world, 0);
 }
@@ -54,7 +55,7 @@ static void forces(box_bench *b)
     pal_spring_recovery_force(b->body->recovery, edges_of(b), b->body);
 }
 
-static void patches_push_by_the_gradient_of_their_energy(void)
+static void forces_of_regions_are_the_gradient_of_their_energy(void)
 {
     box_bench b;
     REQUIRE(bench_open(&b, false, true, 0));
@@ -66,7 +67,7 @@ static void patches_push_by_the_gradient_of_their_energy(void)
     double worst = 0, most = 0;
     for (int i = 0; i < 3 * b.body->n_dof; i++) most = fmax(most, fabs(b.body->f[i]));
     for (int k = 0; k < 12; k++) {
-        int i = (int)(check_random01(&seed) * 3 * b.body->n_dof);
+        int i = (int)(random_unit(&seed) * 3 * b.body->n_dof);
         const double x = b.body->x[i], way = 1e-7;
         b.body->x[i] = x + way;
         double up = pal_spring_recovery_energy(t, edges_of(&b), b.body);
@@ -81,7 +82,7 @@ static void patches_push_by_the_gradient_of_their_energy(void)
 }
 
 /* with damping, whatever the velocities: the sums of forces and moments, and the power that damping takes */
-static void patches_have_no_net_force_or_torque_and_only_take_energy(void)
+static void regions_have_no_net_force_or_torque_and_only_take_energy(void)
 {
     box_bench b;
     REQUIRE(bench_open(&b, false, true, 0));
@@ -90,7 +91,7 @@ static void patches_have_no_net_force_or_torque_and_only_take_energy(void)
     double force[3] = {0, 0, 0}, moment[3] = {0, 0, 0}, size = 0, arm = 0, power = 0;
     forces(&b);
     for (int i = 0; i < b.body->n_dof; i++)
-        for (int c = 0; c < 3; c++) b.body->v[3 * i + c] = check_random01(&seed) - 0.5;
+        for (int c = 0; c < 3; c++) b.body->v[3 * i + c] = random_unit(&seed) - 0.5;
     for (int i = 0; i < b.body->n_dof; i++) power -= pal_dot3(b.body->f + 3 * i, b.body->v + 3 * i);
     forces(&b);
     for (int i = 0; i < b.body->n_dof; i++) {
@@ -120,7 +121,7 @@ static void spin(const pal_body *body, double out[3])
 }
 
 /* free, without drag, turning: from folded until it is springs again */
-static void untangling_keeps_momentum_and_angular_momentum(void)
+static void recovery_conserves_momentum_and_angular_momentum(void)
 {
     box_bench b;
     REQUIRE(bench_open(&b, false, true, 0));
@@ -146,7 +147,7 @@ static void untangling_keeps_momentum_and_angular_momentum(void)
 }
 
 /* every constant is what it was, to the bit, also where the material was edited meanwhile */
-static void springs_are_what_they_were_once_it_is_back(void)
+static void springs_are_unchanged_after_recovery(void)
 {
     box_bench b;
     REQUIRE(bench_open(&b, true, true, 8));
@@ -173,7 +174,7 @@ static void springs_are_what_they_were_once_it_is_back(void)
 }
 
 /* what is not asked for is not there */
-static void what_may_not_untangle_has_nothing_for_it(void)
+static void bodies_without_recovery_have_no_memory_for_it(void)
 {
     box_bench b;
     REQUIRE(bench_open(&b, true, false, 8));
@@ -185,7 +186,7 @@ static void what_may_not_untangle_has_nothing_for_it(void)
 }
 
 /* regions would be drawn out by a weight: soft as it is the cube hangs where its springs hold it, and stays there */
-static void what_hangs_by_its_weight_is_left_to_its_springs(void)
+static void bodies_under_gravity_form_no_regions(void)
 {
     pal_prepared box;
     pal_world *world = NULL;
@@ -215,7 +216,7 @@ static void what_hangs_by_its_weight_is_left_to_its_springs(void)
     box_free(&box);
 }
 
-/* a support that is put through its element: what hangs on it stays turned over, and its region takes in a ring of
+/* a support that is put through its element: what hangs on it stays inverted, and its region takes in a ring of
  * nodes every half second, whatever the length of a step */
 static bool open_bent(box_bench *b)
 {
@@ -227,7 +228,7 @@ static bool open_bent(box_bench *b)
 }
 
 /* the same body in another world: regions, energy and the way back are those of the first, to the bit */
-static void a_world_that_follows_goes_on_untangling(void)
+static void a_transferred_world_continues_recovery(void)
 {
     for (int stays = 0; stays < 2; stays++) {
         box_bench b;
@@ -257,7 +258,7 @@ static void a_world_that_follows_goes_on_untangling(void)
     }
 }
 
-static void patches_grow_by_seconds_not_by_steps(void)
+static void regions_grow_by_seconds_not_by_steps(void)
 {
     static const int per_s[] = {60, 240, 20};
     int n[3][4];
@@ -278,7 +279,7 @@ static void patches_grow_by_seconds_not_by_steps(void)
 }
 
 /* what happens at the other end leaves a region its times: it grows when it would have grown */
-static void a_patch_keeps_its_times_while_another_changes(void)
+static void a_region_keeps_its_clocks_while_another_changes(void)
 {
     const int n[3] = {8, 2, 2};
     box_bench b;
@@ -305,8 +306,8 @@ static void a_patch_keeps_its_times_while_another_changes(void)
 }
 
 /* A support turns one end over and then draws it out, which springs would not be calm about: its region is let go when
- * it has stood still for 2 s, also where the other end is turned over again and again and never stands still */
-static void a_patch_is_let_go_while_another_never_is(void)
+ * it has stood still for 2 s, also where the other end is inverted again and again and never stands still */
+static void a_region_is_released_while_another_stays(void)
 {
     const int n[3] = {8, 2, 2}, first = box_node(n, 0, 0, 0), other = box_node(n, 8, 2, 2);
     for (int turns = 0; turns < 2; turns++) {
@@ -339,7 +340,7 @@ static void a_patch_is_let_go_while_another_never_is(void)
 }
 
 /* rows that are switched off while there are regions leave none behind, and come back as they were */
-static void rows_that_go_take_their_patches_with_them(void)
+static void removed_components_leave_no_regions(void)
 {
     static const char *const row[] = {"edge_distance", "tet_volume"};
     for (int k = 0; k < 2; k++) {
@@ -361,7 +362,7 @@ static void rows_that_go_take_their_patches_with_them(void)
 }
 
 /* solver rk4 asks its rows as verlet does */
-static void rk4_untangles_too(void)
+static void rk4_recovers_too(void)
 {
     box_bench b;
     REQUIRE(box_bench_make(&b, (const int[3]){4, 3, 3}, 0.01, true, false));
@@ -388,7 +389,7 @@ static void rk4_untangles_too(void)
 }
 
 /* a load on a node leaves it and what hangs on it to the springs, as long as it is there */
-static void what_is_pressed_is_left_alone_until_it_is_let_go(void)
+static void loaded_springs_form_no_region_until_released(void)
 {
     box_bench b;
     REQUIRE(bench_open(&b, true, true, 8));
@@ -403,8 +404,8 @@ static void what_is_pressed_is_left_alone_until_it_is_let_go(void)
     box_bench_close(&b);
 }
 
-/* shaken at strains of 0.2, never turned over: the same bits, and what it costs in memory */
-static void what_is_never_turned_over_moves_to_the_same_bits(void)
+/* shaken at strains of 0.2, never inverted: the same bits, and what it costs in memory */
+static void a_body_without_inversion_moves_to_the_same_bits(void)
 {
     uint64_t hash[2];
     size_t n_byte[2];
@@ -428,19 +429,19 @@ static void what_is_never_turned_over_moves_to_the_same_bits(void)
 
 int main(void)
 {
-    RUN(patches_push_by_the_gradient_of_their_energy);
-    RUN(patches_have_no_net_force_or_torque_and_only_take_energy);
-    RUN(untangling_keeps_momentum_and_angular_momentum);
-    RUN(springs_are_what_they_were_once_it_is_back);
-    RUN(what_may_not_untangle_has_nothing_for_it);
-    RUN(what_hangs_by_its_weight_is_left_to_its_springs);
-    RUN(a_world_that_follows_goes_on_untangling);
-    RUN(patches_grow_by_seconds_not_by_steps);
-    RUN(a_patch_keeps_its_times_while_another_changes);
-    RUN(a_patch_is_let_go_while_another_never_is);
-    RUN(rows_that_go_take_their_patches_with_them);
-    RUN(rk4_untangles_too);
-    RUN(what_is_pressed_is_left_alone_until_it_is_let_go);
-    RUN(what_is_never_turned_over_moves_to_the_same_bits);
+    RUN(forces_of_regions_are_the_gradient_of_their_energy);
+    RUN(regions_have_no_net_force_or_torque_and_only_take_energy);
+    RUN(recovery_conserves_momentum_and_angular_momentum);
+    RUN(springs_are_unchanged_after_recovery);
+    RUN(bodies_without_recovery_have_no_memory_for_it);
+    RUN(bodies_under_gravity_form_no_regions);
+    RUN(a_transferred_world_continues_recovery);
+    RUN(regions_grow_by_seconds_not_by_steps);
+    RUN(a_region_keeps_its_clocks_while_another_changes);
+    RUN(a_region_is_released_while_another_stays);
+    RUN(removed_components_leave_no_regions);
+    RUN(rk4_recovers_too);
+    RUN(loaded_springs_form_no_region_until_released);
+    RUN(a_body_without_inversion_moves_to_the_same_bits);
     return check_report();
 }

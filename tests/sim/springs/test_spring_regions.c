@@ -6,16 +6,17 @@
 #include "server/sim/world/world.h"
 #include "tests/check.h"
 #include "tests/fixtures/boxes.h"
+#include "tests/fixtures/random.h"
 
 static pal_diagnostic diag;
 static uint64_t seed;
 
 static double uniform(void) /* in [-1, 1) */
 {
-    return check_random(&seed);
+    return random_signed(&seed);
 }
 
-/* 4 x 3 x 2 voxels of 1 cm, held nowhere, with area springs unless without */
+/* 4 x 3 x 2 voxels of 1 cm, without supports, with area springs unless without */
 typedef struct bench {
     pal_prepared box;
     pal_scene *scene;

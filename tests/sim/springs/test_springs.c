@@ -1,5 +1,5 @@
-/* Forces: what must hold for every FORCE row, looped over effect_list.h so that a new effect is covered, and what paper
- * B's springs promise. Rows are made by the plan of a scene that asks for all of them. */
+/* Forces: what must hold for every FORCE component, looped over effect_list.h so that a new effect is covered, and what
+ * paper B's springs promise. Rows are made by the plan of a scene that asks for all of them. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/plan/plan.h"
@@ -7,6 +7,7 @@
 #include "tests/check.h"
 #include "tests/fixtures/boxes.h"
 #include "tests/fixtures/largest_frequency.h"
+#include "tests/fixtures/random.h"
 #include "tests/stability/hard_case.h"
 
 static pal_diagnostic diag;
@@ -14,7 +15,7 @@ static uint64_t seed;
 
 static double uniform(void) /* in [-1, 1) */
 {
-    return check_random(&seed);
+    return random_signed(&seed);
 }
 
 /* a free box with every FORCE effect there is, springs damped too, at rest */
@@ -87,7 +88,7 @@ static double largest(const double *f, int n)
     for (const pal_component *row = (b).plan.row; row < (b).plan.row + (b).plan.n_row; row++)                          \
         if (row->effect->stage == PAL_STAGE_FORCE)
 
-static void internal_rows_are_silent_at_rest(void)
+static void internal_components_are_zero_at_rest(void)
 {
     bench b;
     REQUIRE(bench_open(&b, 4, 3, 3, 0));
@@ -102,7 +103,7 @@ static void internal_rows_are_silent_at_rest(void)
     bench_close(&b);
 }
 
-static void internal_rows_have_no_net_force_or_torque(void)
+static void internal_components_have_no_net_force_or_torque(void)
 {
     bench b;
     REQUIRE(bench_open(&b, 4, 3, 3, 1e-5));
@@ -437,8 +438,8 @@ static void drag_fades_a_free_motion_at_the_stated_rate(void)
 
 int main(void)
 {
-    RUN(internal_rows_are_silent_at_rest);
-    RUN(internal_rows_have_no_net_force_or_torque);
+    RUN(internal_components_are_zero_at_rest);
+    RUN(internal_components_have_no_net_force_or_torque);
     RUN(forces_are_the_gradient_of_their_energy);
     RUN(chooses_half_the_stable_substep_or_less);
     RUN(a_breathing_tetrahedron_has_the_analytic_period);

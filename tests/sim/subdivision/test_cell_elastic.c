@@ -1,4 +1,5 @@
-/* Row cell_elastic, operator polar: subdivided solids' elements in their own frames (A 3.2-3.4), node by node. */
+/* Component cell_elastic, operator polar: subdivision solids' elements in their own frames (A 3.2-3.4), node by node.
+ */
 #include "server/num/polar.h"
 #include "tests/fixtures/cell_bodies.h"
 #include "tests/stability/hard_case.h"
@@ -423,7 +424,7 @@ static void collapsed_elements_give_finite_forces(void)
     }
 }
 
-static void products_are_those_of_the_held_tangent(void)
+static void products_are_those_of_the_tangent_with_fixed_rotations(void)
 {
     for (int i = 0; i < CELL_BODIES; i++) {
         cell_body b;
@@ -536,7 +537,7 @@ int main(void)
     RUN(size_does_not_matter);
     RUN(shear_is_resisted_up_to_179_degrees);
     RUN(collapsed_elements_give_finite_forces);
-    RUN(products_are_those_of_the_held_tangent);
+    RUN(products_are_those_of_the_tangent_with_fixed_rotations);
     RUN(measures_are_those_of_the_strain);
     RUN(refuses_what_it_cannot_be);
     return check_report();

@@ -1,4 +1,5 @@
-/* Row cell_elastic, operator edges: relative displacements from edge lengths and angles (A 3.2.2) and their errata. */
+/* Component cell_elastic, operator edges: relative displacements from edge lengths and angles (A 3.2.2) and their
+ * errata. */
 #include "tests/fixtures/cell_bodies.h"
 #include "tests/stability/hard_case.h"
 

@@ -1,7 +1,7 @@
-/* Elements of subdivided solids that are turned over, and what they run on then: node by node, without a world. */
+/* Elements of subdivision solids that are inverted, and what they run on then: node by node, without a world. */
 #include "tests/fixtures/cell_bodies.h"
 
-/* as force and energy of a row, after a look */
+/* as force and energy of a component, after an update */
 static bool look(cell_body *b)
 {
     return cell_effect->recover(b->row, &(pal_step){.body = &b->body}) & PAL_INVERSION_CHANGED;
@@ -12,7 +12,7 @@ static double edge_m(const cell_body *b)
     return cbrt(pal_subdivision_solid_volume_m3(b->solid) / pal_cell_elements_count(&b->solid->elements));
 }
 
-/* turned, and shaken so that elements are turned over */
+/* turned, and shaken so that elements are inverted */
 static void recovery(cell_body *b, int i, uint64_t seed)
 {
     double turn[9];
@@ -22,7 +22,7 @@ static void recovery(cell_body *b, int i, uint64_t seed)
     cell_shake(b, (i == 0 ? 3 : 0.9) * edge_m(b), seed);
 }
 
-static void elements_that_are_not_turned_over_stay_what_they_are(void)
+static void elements_without_inversion_stay_elements(void)
 {
     for (int i = 0; i < CELL_BODIES; i++) {
         cell_body b;
@@ -44,7 +44,7 @@ static void elements_that_are_not_turned_over_stay_what_they_are(void)
     }
 }
 
-static void a_patch_begins_with_no_more_energy_than_its_elements(void)
+static void a_region_begins_with_no_more_energy_than_its_elements(void)
 {
     int n_region = 0;
     for (int i = 0; i < CELL_BODIES; i++)
@@ -85,7 +85,7 @@ static double worst_gradient(cell_body *b, int n_try)
 }
 
 /* regions beside elements: the exact gradient, no net force, no net torque */
-static void forces_of_patches_are_a_gradient_and_sum_up_to_nothing(void)
+static void forces_of_regions_are_a_gradient_and_sum_to_zero(void)
 {
     for (int i = 0; i < CELL_BODIES; i++) {
         cell_body b;
@@ -101,7 +101,7 @@ static void forces_of_patches_are_a_gradient_and_sum_up_to_nothing(void)
 }
 
 /* the tangent with rotations held: symmetric, never below 0, nothing for a push of all */
-static void the_tangent_of_patches_is_symmetric_and_never_negative(void)
+static void the_tangent_of_regions_is_symmetric_and_semi_definite(void)
 {
     for (int i = 0; i < CELL_BODIES; i++) {
         cell_body b;
@@ -124,8 +124,8 @@ static void the_tangent_of_patches_is_symmetric_and_never_negative(void)
     }
 }
 
-/* put back to where nothing is turned over, elements take over again, to the bit; a reset does the same at once */
-static void elements_come_back_when_nothing_is_turned_over(void)
+/* put back to where nothing is inverted, elements take over again, to the bit; a reset does the same at once */
+static void elements_return_when_nothing_is_inverted(void)
 {
     for (int i = 0; i < CELL_BODIES; i++)
         for (int reset = 0; reset < 2; reset++) {
@@ -153,7 +153,7 @@ static void elements_come_back_when_nothing_is_turned_over(void)
 }
 
 /* down the slope of their energy, regions have no rest but the shape at rest, turned: mirrored, flat, on one point */
-static void patches_have_no_other_rest(void)
+static void regions_have_no_other_rest(void)
 {
     static const double map[][9] = {{-1, 0, 0, 0, 1, 0, 0, 0, 1}, {1, 0, 0, 0, 1, 0, 0, 0, 0}, {0}};
     for (int i = 0; i < CELL_BODIES; i++)
@@ -186,7 +186,7 @@ static void patches_have_no_other_rest(void)
 
 /* half blocks of nothing but regions are not run: of numbers that are none there is nothing in the forces. A look asks
  * for all */
-static void elements_in_patches_cost_nothing(void)
+static void elements_in_regions_cost_nothing(void)
 {
     for (int i = 0; i < CELL_BODIES; i++) {
         cell_body b;
@@ -217,7 +217,7 @@ static void elements_in_patches_cost_nothing(void)
     }
 }
 
-static void held_parts_say_where_a_whole_body_turns_to(void)
+static void supports_give_the_rotation_of_a_large_region(void)
 {
     cell_body b;
     double turn[9];
@@ -240,13 +240,13 @@ static void held_parts_say_where_a_whole_body_turns_to(void)
 
 int main(void)
 {
-    RUN(elements_that_are_not_turned_over_stay_what_they_are);
-    RUN(a_patch_begins_with_no_more_energy_than_its_elements);
-    RUN(forces_of_patches_are_a_gradient_and_sum_up_to_nothing);
-    RUN(the_tangent_of_patches_is_symmetric_and_never_negative);
-    RUN(elements_come_back_when_nothing_is_turned_over);
-    RUN(patches_have_no_other_rest);
-    RUN(elements_in_patches_cost_nothing);
-    RUN(held_parts_say_where_a_whole_body_turns_to);
+    RUN(elements_without_inversion_stay_elements);
+    RUN(a_region_begins_with_no_more_energy_than_its_elements);
+    RUN(forces_of_regions_are_a_gradient_and_sum_to_zero);
+    RUN(the_tangent_of_regions_is_symmetric_and_semi_definite);
+    RUN(elements_return_when_nothing_is_inverted);
+    RUN(regions_have_no_other_rest);
+    RUN(elements_in_regions_cost_nothing);
+    RUN(supports_give_the_rotation_of_a_large_region);
     return check_report();
 }

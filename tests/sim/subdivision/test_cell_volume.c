@@ -1,5 +1,5 @@
-/* Subdivided solids that hardly change their volume: what whole control cells keep of it (cell_volume.c), node by node,
- * without a world. */
+/* Subdivision solids that hardly change their volume: what whole control cells keep of it (cell_volume.c), node by
+ * node, without a world. */
 #include "tests/fixtures/cell_bodies.h"
 
 /* bodies of all kinds of elements, several to a control cell but for the first */
@@ -132,7 +132,7 @@ static void elements_of_a_control_cell_share_its_volume(void)
     CHECK_NEAR(energy[1] / energy[0], 1, 1e-3);
 }
 
-static void patches_take_whole_control_cells(void)
+static void regions_take_whole_control_cells(void)
 {
     cell_body b;
     make(&b, 3, 0.49);
@@ -161,6 +161,6 @@ int main(void)
     RUN(forces_are_the_gradient_and_sum_up_to_nothing);
     RUN(the_tangent_is_that_of_the_forces);
     RUN(elements_of_a_control_cell_share_its_volume);
-    RUN(patches_take_whole_control_cells);
+    RUN(regions_take_whole_control_cells);
     return check_report();
 }

@@ -113,7 +113,7 @@ static void blocks_have_the_elements_of_the_paper(void)
     }
 }
 
-static void rows_are_those_that_the_material_asks_for(void)
+static void components_are_those_that_the_material_asks_for(void)
 {
     static const char *const want[2][9] = {
         {"tool_push", "tool_grasp", "cell_elastic", "gravity", "central_cg", "finite_guard", "surface_output"},
@@ -272,7 +272,7 @@ static void gravity_pulls_with_the_bodys_weight(void)
 }
 
 /* 1 Ns on a node alone, all points free: M~ v = a, and the node moves with a'v. Among them those far from others */
-static void ease_is_what_a_nodes_impulse_gives_it(void)
+static void mobility_is_the_velocity_from_an_impulse(void)
 {
     clay c;
     clay_block(&c, 2, 0.1);
@@ -541,13 +541,13 @@ static void what_makes_no_sense_is_refused_in_a_sentence(void)
 int main(void)
 {
     RUN(blocks_have_the_elements_of_the_paper);
-    RUN(rows_are_those_that_the_material_asks_for);
+    RUN(components_are_those_that_the_material_asks_for);
     RUN(masses_of_points_and_of_nodes_sum_up_to_the_solids);
     RUN(supports_hold_control_points);
     RUN(the_surface_is_the_boundary_of_the_subdivided_cells);
     RUN(a_cut_shows_what_it_hid);
     RUN(gravity_pulls_with_the_bodys_weight);
-    RUN(ease_is_what_a_nodes_impulse_gives_it);
+    RUN(mobility_is_the_velocity_from_an_impulse);
     RUN(edits_of_material_reach_masses_and_samples);
     RUN(nodes_stand_where_points_carry_them_after_steps_and_resets);
     RUN(the_same_steps_give_the_same_hash_and_a_reset_the_start);

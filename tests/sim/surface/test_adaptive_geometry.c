@@ -167,7 +167,7 @@ static void collapsed_bodies_split_to_finite_places(void)
 }
 
 /* with both ends held, with one, with none */
-static void held_midpoints_stand_as_far_from_rest_as_the_ends_that_are_held(void)
+static void fixed_midpoints_have_the_displacement_of_their_fixed_ends(void)
 {
     for (int n_fixed = 0; n_fixed <= 2; n_fixed++) {
         thing t = make(SHEET, (pal_adaptive_options){.n_level = 2});
@@ -290,7 +290,7 @@ int main(void)
     RUN(new_nodes_of_a_turned_body_stand_as_at_rest);
     RUN(velocity_of_a_new_node_is_the_mean_of_its_edge);
     RUN(collapsed_bodies_split_to_finite_places);
-    RUN(held_midpoints_stand_as_far_from_rest_as_the_ends_that_are_held);
+    RUN(fixed_midpoints_have_the_displacement_of_their_fixed_ends);
     RUN(the_frame_is_that_of_a_rigid_motion);
     RUN(the_frame_moves_with_the_momentum_of_the_body);
     RUN(collapsed_bodies_keep_their_last_frame);

@@ -493,19 +493,19 @@ static void refuses_with_a_sentence_that_names_the_offender(void)
     pal_surface s = surface_of(SPHERE);
     o = fine, o.mass_kg = 0;
     CHECK_INT(try_make(&s, o, &diag), PAL_ERR_REFUSED);
-    CHECK_TEXT(diag.text, "shell: a mass of 0 kg");
+    CHECK_TEXT(diag.text, "adaptive surface: a mass of 0 kg");
     o = fine, o.mass_kg = (double)NAN;
     CHECK_INT(try_make(&s, o, &diag), PAL_ERR_REFUSED);
     o = fine, o.start_level = 2;
     CHECK_INT(try_make(&s, o, &diag), PAL_ERR_REFUSED);
-    CHECK_TEXT(diag.text, "shell: start level 2, there are levels 0 to 1");
+    CHECK_TEXT(diag.text, "adaptive surface: start level 2, there are levels 0 to 1");
     o = fine, o.n_level = 11;
     CHECK_INT(try_make(&s, o, &diag), PAL_ERR_REFUSED);
     CHECK_TEXT(diag.text, "levels: 11 levels asked for, 1 to 10 are made");
     /* the levels alone would fit */
     o = fine, o.budget_byte = (size_t)180 << 10;
     CHECK_INT(try_make(&s, o, &diag), PAL_ERR_BUDGET);
-    CHECK(strstr(diag.text, "shell: 2 levels need ") && strstr(diag.text, "the budget is 0.1758 MiB"));
+    CHECK(strstr(diag.text, "adaptive surface: 2 levels need ") && strstr(diag.text, "the budget is 0.1758 MiB"));
     o = fine, o.n_level = 10;
     CHECK_INT(try_make(&s, o, &diag), PAL_ERR_BUDGET);
     CHECK(strstr(diag.text, "levels: 10 levels need ") && strstr(diag.text, "the budget is 512 MiB"));

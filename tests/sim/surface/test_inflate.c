@@ -1,4 +1,4 @@
-/* Filling of hollow bodies: pressure, gas, fluid (row inflate). */
+/* Filling of hollow bodies: pressure, gas, fluid (component inflate). */
 #include "tests/fixtures/adaptive_components.h"
 #include "tests/fixtures/adaptive_worlds.h"
 
@@ -134,7 +134,7 @@ static void fluid_is_as_stiff_as_its_bulk(void)
 }
 
 /* the same shape, coarse, mixed and fine: the same energy although their volumes differ */
-static void a_switch_of_level_changes_no_energy(void)
+static void a_change_of_level_changes_no_energy(void)
 {
     for (int kind = 0; kind < 3; kind++) {
         shell_row r;
@@ -172,7 +172,7 @@ static void pressure_comes_in_within_its_ramp_and_again_after_a_reset(void)
             shell_row_run(&r, times[i]);
             size[i] = shell_row_largest(&r);
         }
-        for (int i = 0; i < 5; i++) CHECK_NEAR(size[i] / size[5], 0.5 * (1 - cos(M_PI * times[i] / 0.5)), 1e-12);
+        for (int i = 0; i < 5; i++) CHECK_NEAR(size[i] / size[5], times[i] / 0.5, 1e-12);
         blow(&r, 1.1);
         CHECK(shell_row_energy(&r) < 0);
         r.effect->reset(r.self, &r.body);
@@ -402,7 +402,7 @@ int main(void)
     RUN(has_no_net_force_or_torque);
     RUN(gas_keeps_pressure_times_volume);
     RUN(fluid_is_as_stiff_as_its_bulk);
-    RUN(a_switch_of_level_changes_no_energy);
+    RUN(a_change_of_level_changes_no_energy);
     RUN(pressure_comes_in_within_its_ramp_and_again_after_a_reset);
     RUN(stays_finite_when_flat_or_inside_out);
     RUN(gas_pressure_is_capped_smoothly);

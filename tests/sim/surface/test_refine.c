@@ -1,4 +1,4 @@
-/* Row refine: where, when and how often levels switch, and what a switch keeps. */
+/* Component refine: where, when and how often levels switch, and what a switch keeps. */
 #include "server/sim/surface/refine_measure.h"
 #include "tests/fixtures/adaptive_worlds.h"
 #include "tests/stability/hard_case.h"
@@ -14,7 +14,7 @@ static void take_sphere(shell_scene *s)
     shell_scene_number(s, "levels", 3);
 }
 
-/* held at the rings and caps of its two openings */
+/* fixed at the rings and caps of its two openings */
 static void take_stomach(shell_scene *s)
 {
     pal_stomach stomach;
@@ -132,7 +132,7 @@ static void thresholds_of_0_switch_criteria_off(void)
     shell_scene_close(&s);
 }
 
-static void never_has_more_than_most_node(void)
+static void never_has_more_than_max_node(void)
 {
     shell_scene s;
     take_sphere(&s);
@@ -470,7 +470,7 @@ static void a_frozen_body_keeps_its_levels(void)
 }
 
 /* pinched as it rests and as it flies: the same levels and the same shape, whatever motion adds to the energy */
-static void what_flies_is_refined_as_what_rests(void)
+static void a_moving_body_is_refined_like_one_at_rest(void)
 {
     enum { STEPS = 75 };
     shell_scene s[2];
@@ -561,7 +561,7 @@ static worst watch_press(bool stomach, double force_N)
 }
 
 /* a blow on one node runs over a sphere that turns and flies */
-static void a_switch_under_a_wave_keeps_them_too(void)
+static void a_change_of_level_under_a_wave_conserves_them_too(void)
 {
     shell_scene s;
     worst w = {0};
@@ -590,7 +590,7 @@ static void a_switch_under_a_wave_keeps_them_too(void)
     shell_scene_close(&s);
 }
 
-static void a_switch_keeps_energy_mass_and_momentum(void)
+static void a_change_of_level_conserves_energy_mass_and_momentum(void)
 {
     for (int run = 0; run < 4; run++) {
         bool stomach = run & 1;
@@ -635,7 +635,7 @@ int main(void)
     RUN(curvature_is_that_of_spheres_and_cylinders_and_no_rigid_motion_changes_it);
     RUN(refines_where_pressed_and_only_there);
     RUN(thresholds_of_0_switch_criteria_off);
-    RUN(never_has_more_than_most_node);
+    RUN(never_has_more_than_max_node);
     RUN(a_wave_refines_by_speed_alone);
     RUN(rigid_motion_refines_nothing);
     RUN(a_bent_sheet_refines_by_curvature_alone);
@@ -645,9 +645,9 @@ int main(void)
     RUN(a_node_that_bears_a_lasting_load_is_not_taken_away);
     RUN(thresholds_follow_a_live_edit_of_the_material);
     RUN(a_frozen_body_keeps_its_levels);
-    RUN(what_flies_is_refined_as_what_rests);
-    RUN(a_switch_keeps_energy_mass_and_momentum);
-    RUN(a_switch_under_a_wave_keeps_them_too);
+    RUN(a_moving_body_is_refined_like_one_at_rest);
+    RUN(a_change_of_level_conserves_energy_mass_and_momentum);
+    RUN(a_change_of_level_under_a_wave_conserves_them_too);
     RUN(bad_numbers_are_refused_in_a_sentence);
     return check_report();
 }

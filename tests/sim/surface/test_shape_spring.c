@@ -177,7 +177,7 @@ static void its_stiffness_is_what_it_says(void)
     }
 }
 
-static void a_switch_of_level_is_ramped_alike_in_force_and_energy(void)
+static void a_change_of_level_is_ramped_alike_in_force_and_energy(void)
 {
     shell_row r;
     REQUIRE(open_sphere(&r, 2, "body", 0));
@@ -208,7 +208,7 @@ static void collapsed_bodies_are_pulled_open(void)
         CHECK(shell_row_finite(&r));
         CHECK(isfinite(shell_row_energy(&r)));
         shell_row_check_balance(&r, 1e-12);
-        /* the way it pulls is downhill: work over the way to rest in the row's own frame is 2 E */
+        /* the way it pulls is downhill: work over the way to rest in the component's own frame is 2 E */
         pal_rigid_fit frame = {.quat = {1}};
         pal_adaptive_fit_rigid(r.adaptive, &r.body, &frame);
         for (int k = 0; k < r.body.n_active; k++) {
@@ -450,7 +450,7 @@ int main(void)
     RUN(damping_takes_power_and_leaves_rigid_motion);
     RUN(refinement_changes_neither_sum_nor_frequency_of_anchors);
     RUN(its_stiffness_is_what_it_says);
-    RUN(a_switch_of_level_is_ramped_alike_in_force_and_energy);
+    RUN(a_change_of_level_is_ramped_alike_in_force_and_energy);
     RUN(collapsed_bodies_are_pulled_open);
     RUN(a_flat_sheet_keeps_its_frame_when_it_spins);
     RUN(the_same_state_gives_the_same_bits_after_a_reset);

@@ -1,0 +1,450 @@
+/* `palpate serve`: every input becomes a session, the network thread serves them, this thread waits for signals. SIGINT
+ * and SIGTERM shut down in order; SIGCHLD reports a palpate-lcm that has died and is restarted. LCM has a process of
+ * its own because two forged datagrams can crash any LCM subscriber. */
+#include "server/base/clock.h"
+#include "server/base/log.h"
+#include "server/cli/flags.h"
+#include "server/commands/commands.h"
+#include "server/commands/preflight_report.h"
+#include "server/mesh/files/mesh_file.h"
+#include "server/net/server.h"
+#include "server/net/verb_table.h"
+#include "server/scene/scene_arg.h"
+#include "server/study/studied_scene.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <libgen.h>
+#include <limits.h>
+#include <math.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+enum { MAX_SESSIONS = 8, MAX_URL = 400 };
+#define RESTART_NS 1000000000u /* least time between two starts of a palpate-lcm */
+#define LEAVE_NS   1000000000u /* time for it to end after SIGTERM */
+
+typedef struct lcm_child {
+    char server[MAX_URL];
+    pid_t pid; /* 0: not running */
+    uint64_t start_ns;
+} lcm_child;
+
+typedef struct serve_run {
+    pal_flag_common common;
+    pal_config config;
+    pal_surface_scene surface; /* how bare surfaces are prepared */
+    int n;
+    pal_loaded_scene *scene[MAX_SESSIONS];
+    const char *word[MAX_SESSIONS];          /* the operand; NULL: none                        */
+    pal_studied_scene studied[MAX_SESSIONS]; /* in the configuration that the scene asks for   */
+    pal_preflight preflight[MAX_SESSIONS];
+    pal_session *session[MAX_SESSIONS];
+    const pal_measured_configuration *setting[MAX_SESSIONS]; /* borrowed by the server */
+    int n_configuration[MAX_SESSIONS], setting_body[MAX_SESSIONS];
+    double reference_m[MAX_SESSIONS];
+    pal_server_gate *gate;
+    pal_server *server;
+    lcm_child lcm[MAX_SESSIONS];
+    char lcm_program[PATH_MAX];
+    pthread_t net_thread, main_thread;
+    pal_err net_err;
+    double seconds; /* serve for so long; 0: until a signal */
+} serve_run;
+
+/* ---- paths ---- */
+
+/* folder of this program; false: unknown */
+static bool program_folder(char *folder, size_t cap)
+{
+    char path[PATH_MAX];
+    ssize_t n = readlink("/proc/self/exe", path, sizeof path - 1);
+    if (n <= 0) return false;
+    path[n] = 0;
+    return (size_t)snprintf(folder, cap, "%s", dirname(path)) < cap;
+}
+
+static bool has_index(const char *folder)
+{
+    char path[PATH_MAX + 64];
+    return (size_t)snprintf(path, sizeof path, "%s/index.html", folder) < sizeof path && access(path, R_OK) == 0;
+}
+
+/* the page's files: as configured, else beside the program (installed or in the build tree); NULL: none */
+static const char *viewer_folder(const pal_config *config, char *folder, size_t cap)
+{
+    char own[PATH_MAX];
+    if (config->viewer[0]) return config->viewer;
+    if (program_folder(own, sizeof own) && (size_t)snprintf(folder, cap, "%s/../share/palpate/viewer", own) < cap &&
+        has_index(folder))
+        return folder;
+    return NULL;
+}
+
+/* ---- scenes and sessions ---- */
+
+static void report_surface(const serve_run *run, const char *path, const pal_surface_scene_report *report)
+{
+    if (run->common.quiet || run->common.json) return;
+    printf("palpate: %s: %lld triangles, resolution %d, unit %s (%g m)%s\n", path,
+           (long long)report->surface.n_tri_read, report->resolution, report->unit_name, report->unit_m,
+           report->unit_guessed ? ", guessed from its size (--units overrides)" : "");
+}
+
+static pal_err load_input(serve_run *run, const char *path, pal_diagnostic *diag)
+{
+    pal_surface_scene_report report;
+    pal_loaded_scene **out = &run->scene[run->n];
+    bool is_surface = false;
+    if (path)
+        PAL_TRY(pal_scene_arg(path, &run->surface, out, &is_surface, &report, diag));
+    else
+        PAL_TRY(pal_scene_procedural(&run->surface, out, &report, diag));
+    if (is_surface) report_surface(run, path, &report);
+    run->word[run->n++] = path;
+    return PAL_ERR_OK;
+}
+
+/* the second scene of one name becomes name-2 */
+static void make_unique(serve_run *run, int index)
+{
+    char *name = run->scene[index]->scene.name, base[PAL_NAME];
+    memcpy(base, name, PAL_NAME);
+    for (int number = 2, i = 0; i < index; i++)
+        if (!strcmp(run->scene[i]->scene.name, name)) {
+            snprintf(name, PAL_NAME, "%.*s-%d", PAL_NAME - 8, base, number++ % 10000);
+            i = -1;
+        }
+}
+
+/* the configurations that scenes ask for, and those that their sessions may switch to */
+static pal_err open_studies(serve_run *run, pal_diagnostic *diag)
+{
+    for (int i = 0; i < run->n; i++) {
+        pal_studied_scene *s = &run->studied[i];
+        const pal_scene *scene = &run->scene[i]->scene;
+        *s = (pal_studied_scene){.scene = scene, .picked = -1};
+        if (!run->word[i]) continue;
+        PAL_TRY(pal_studied_scene_open(run->word[i], scene, s, diag));
+        if (s->warn[0]) pal_log(PAL_LOG_WARN, "study", "%s", s->warn);
+        if (s->said[0]) pal_log(PAL_LOG_INFO, "study", "%s", s->said);
+    }
+    return PAL_ERR_OK;
+}
+
+static pal_err open_sessions(serve_run *run, pal_diagnostic *diag)
+{
+    char record[PAL_CONFIG_TEXT + PAL_NAME + 2];
+    if (!(run->gate = pal_server_gate_create())) return PAL_ERR_MEMORY;
+    for (int i = 0; i < run->n; i++) {
+        const pal_scene *scene = run->studied[i].scene;
+        PAL_TRY(pal_preflight_run(scene, PAL_PREFLIGHT_QUICK, &run->preflight[i], diag));
+        pal_session_options options = {.wake = pal_server_gate_wake, .user = run->gate, .only_observed = true};
+        snprintf(record, sizeof record, run->n > 1 ? "%s.%s" : "%s", run->config.record, scene->name);
+        if (run->config.record[0]) options.record_path = record;
+        PAL_TRY(pal_session_open(scene, &options, diag, &run->session[i]));
+    }
+    return PAL_ERR_OK;
+}
+
+static pal_err open_server(serve_run *run, pal_diagnostic *diag)
+{
+    char folder[PATH_MAX + 32];
+    for (int i = 0; i < run->n; i++) {
+        run->setting[i] = run->studied[i].setting;
+        run->n_configuration[i] = run->studied[i].n_configuration;
+        run->setting_body[i] = run->studied[i].body;
+        run->reference_m[i] = run->studied[i].file ? run->studied[i].file->study.reference_m : NAN;
+    }
+    pal_server_options options = {.listen = run->config.listen,
+                                  .port = run->config.port,
+                                  .allow_remote = run->config.allow_remote,
+                                  .viewer_folder = viewer_folder(&run->config, folder, sizeof folder),
+                                  .error_m = run->config.error_m,
+                                  .max_clients = run->config.max_clients,
+                                  .setting = run->setting,
+                                  .n_configuration = run->n_configuration,
+                                  .setting_body = run->setting_body,
+                                  .reference_m = run->reference_m};
+    PAL_TRY(pal_server_open(&options, run->session, run->n, diag, &run->server));
+    if (!options.viewer_folder)
+        pal_log(PAL_LOG_WARN, "viewer", "no viewer to serve: neither beside the program nor given with --viewer");
+    pal_server_connect(run->server, run->gate);
+    /* last: a refusal prints nothing else */
+    for (int i = 0; i < run->n; i++) pal_preflight_log(&run->preflight[i], run->studied[i].scene->name);
+    return PAL_ERR_OK;
+}
+
+/* address to open in a browser on this machine */
+static void make_address(const serve_run *run, char *out, size_t cap)
+{
+    const char *listen = run->config.listen;
+    if (!strcmp(listen, "0.0.0.0") || !strcmp(listen, "localhost")) listen = "127.0.0.1";
+    if (!strcmp(listen, "::")) listen = "::1";
+    snprintf(out, cap, strchr(listen, ':') ? "[%s]:%d" : "%s:%d", listen, pal_server_port(run->server));
+}
+
+static int announce(const serve_run *run)
+{
+    char address[MAX_URL], url[MAX_URL + 16];
+    make_address(run, address, sizeof address);
+    snprintf(url, sizeof url, "http://%s/", address);
+    if (run->common.json) {
+        cJSON *object = cJSON_CreateObject();
+        cJSON_AddBoolToObject(object, "ok", true);
+        cJSON_AddStringToObject(object, "open", url);
+        cJSON_AddStringToObject(object, "address", run->config.listen);
+        cJSON_AddNumberToObject(object, "port", pal_server_port(run->server));
+        cJSON_AddNumberToObject(object, "pid", getpid());
+        cJSON *sessions = cJSON_AddArrayToObject(object, "sessions");
+        for (int i = 0; i < run->n; i++) cJSON_AddItemToArray(sessions, cJSON_CreateString(run->scene[i]->scene.name));
+        return pal_report_json(&run->common, object);
+    }
+    if (!run->common.quiet) printf("palpate: open %s\n", url);
+    for (int i = 1; i < run->n && !run->common.quiet; i++)
+        printf("palpate: open %s?session=%s\n", url, run->scene[i]->scene.name);
+    fflush(stdout);
+    return 0;
+}
+
+/* ---- palpate-lcm ---- */
+
+/* one process for each session, with tools and channels of its own */
+static pal_err find_lcm(serve_run *run, pal_diagnostic *diag)
+{
+    char folder[PATH_MAX - 16], address[MAX_URL / 2];
+    if (!run->config.lcm[0]) return PAL_ERR_OK;
+    if (!program_folder(folder, sizeof folder))
+        return pal_diagnostic_set(diag, PAL_ERR_IO, "/proc/self/exe cannot be read, so palpate-lcm is not found");
+    snprintf(run->lcm_program, sizeof run->lcm_program, "%s/palpate-lcm", folder);
+    if (access(run->lcm_program, X_OK))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--lcm needs %s, which is not there", run->lcm_program);
+    make_address(run, address, sizeof address);
+    for (int i = 0; i < run->n; i++)
+        snprintf(run->lcm[i].server, MAX_URL, "ws://%s/ws?session=%s", address, run->scene[i]->scene.name);
+    return PAL_ERR_OK;
+}
+
+/* runs in the child between fork and exec: only async-signal-safe calls */
+static void become_lcm(const serve_run *run, const lcm_child *child)
+{
+    sigset_t none;
+    char *const argv[] = {(char *)"palpate-lcm",
+                          (char *)"--server",
+                          (char *)child->server,
+                          (char *)"--lcm",
+                          (char *)run->config.lcm,
+                          run->common.quiet ? (char *)"--quiet" : NULL,
+                          NULL};
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    sigemptyset(&none);
+    sigprocmask(SIG_SETMASK, &none, NULL);
+    signal(SIGPIPE, SIG_DFL);
+    /* stdout belongs to the parent's announcement, sockets to the parent */
+    dup2(STDERR_FILENO, STDOUT_FILENO);
+    close_range(3, ~0u, 0);
+    execv(run->lcm_program, argv);
+    _exit(127);
+}
+
+static void start_lcm(serve_run *run, lcm_child *child)
+{
+    child->start_ns = pal_clock_ns();
+    pid_t pid = fork();
+    if (pid == 0) become_lcm(run, child);
+    if (pid > 0) child->pid = pid;
+    if (pid < 0)
+        pal_log(PAL_LOG_WARN, "lcm", "palpate-lcm cannot be started: %s", strerror(errno));
+    else
+        pal_log(PAL_LOG_INFO, "lcm", "palpate-lcm runs as %d", (int)pid);
+}
+
+static void reap_lcm(serve_run *run, pal_log_level level)
+{
+    int status;
+    for (int i = 0; i < run->n; i++) {
+        lcm_child *child = &run->lcm[i];
+        if (!child->pid || waitpid(child->pid, &status, WNOHANG) != child->pid) continue;
+        if (WIFSIGNALED(status))
+            pal_log(level, "lcm", "palpate-lcm (%d) died of signal %d", (int)child->pid, WTERMSIG(status));
+        else
+            pal_log(level, "lcm", "palpate-lcm (%d) ended with %d", (int)child->pid, WEXITSTATUS(status));
+        child->pid = 0;
+    }
+}
+
+/* starts every palpate-lcm that does not run; the result is the time until the next start is due */
+static uint64_t restart_lcm(serve_run *run)
+{
+    uint64_t wait_ns = UINT64_MAX;
+    for (int i = 0; i < run->n; i++) {
+        lcm_child *child = &run->lcm[i];
+        uint64_t now = pal_clock_ns(), due = child->start_ns ? child->start_ns + RESTART_NS : now;
+        if (!child->server[0] || child->pid) continue;
+        if (due <= now)
+            start_lcm(run, child);
+        else if (due - now < wait_ns)
+            wait_ns = due - now;
+    }
+    return wait_ns;
+}
+
+static bool any_lcm(const serve_run *run)
+{
+    for (int i = 0; i < run->n; i++)
+        if (run->lcm[i].pid) return true;
+    return false;
+}
+
+static void end_lcm(serve_run *run, const sigset_t *signals)
+{
+    uint64_t end = pal_clock_ns() + LEAVE_NS;
+    const struct timespec pause = {0, 50000000};
+    for (int i = 0; i < run->n; i++)
+        if (run->lcm[i].pid) kill(run->lcm[i].pid, SIGTERM);
+    while (any_lcm(run) && pal_clock_ns() < end) {
+        sigtimedwait(signals, NULL, &pause);
+        reap_lcm(run, PAL_LOG_DEBUG);
+    }
+    for (int i = 0; i < run->n; i++)
+        if (run->lcm[i].pid) {
+            kill(run->lcm[i].pid, SIGKILL);
+            waitpid(run->lcm[i].pid, NULL, 0);
+        }
+}
+
+/* ---- running ---- */
+
+static void *net_main(void *user)
+{
+    serve_run *run = user;
+    run->net_err = pal_server_run(run->server);
+    /* wakes the waiting thread, also when the loop failed by itself */
+    pthread_kill(run->main_thread, SIGUSR1);
+    return NULL;
+}
+
+/* wait_for_end alone receives these signals; threads inherit the mask */
+static void block_signals(sigset_t *signals)
+{
+    sigemptyset(signals);
+    sigaddset(signals, SIGINT);
+    sigaddset(signals, SIGTERM);
+    sigaddset(signals, SIGCHLD);
+    sigaddset(signals, SIGUSR1);
+    pthread_sigmask(SIG_BLOCK, signals, NULL);
+    signal(SIGPIPE, SIG_IGN);
+}
+
+static void wait_for_end(serve_run *run, const sigset_t *signals)
+{
+    uint64_t end_ns = run->seconds > 0 ? pal_clock_ns() + (uint64_t)(1e9 * run->seconds) : UINT64_MAX;
+    for (;;) {
+        uint64_t wait_ns = restart_lcm(run), now = pal_clock_ns();
+        if (now >= end_ns) return;
+        if (end_ns - now < wait_ns) wait_ns = end_ns - now;
+        struct timespec wait = {(time_t)(wait_ns / 1000000000u), (long)(wait_ns % 1000000000u)};
+        int signal_number = sigtimedwait(signals, NULL, &wait);
+        if (signal_number == SIGCHLD) reap_lcm(run, PAL_LOG_WARN);
+        if (signal_number == SIGINT || signal_number == SIGTERM || signal_number == SIGUSR1) return;
+    }
+}
+
+static pal_err run_all(serve_run *run, pal_diagnostic *diag)
+{
+    sigset_t signals;
+    block_signals(&signals);
+    PAL_TRY(open_studies(run, diag));
+    PAL_TRY(open_sessions(run, diag));
+    PAL_TRY(open_server(run, diag));
+    PAL_TRY(find_lcm(run, diag));
+    run->main_thread = pthread_self();
+    if (pthread_create(&run->net_thread, NULL, net_main, run)) return PAL_ERR_INTERNAL;
+    if (announce(run)) run->net_err = PAL_ERR_IO;
+    wait_for_end(run, &signals);
+    end_lcm(run, &signals);
+    pal_server_stop(run->server);
+    pthread_join(run->net_thread, NULL);
+    return run->net_err;
+}
+
+static void close_all(serve_run *run)
+{
+    pal_server_close(run->server);
+    for (int i = 0; i < run->n; i++) pal_session_close(run->session[i]);
+    pal_server_gate_destroy(run->gate);
+    for (int i = 0; i < run->n; i++) pal_studied_scene_close(&run->studied[i]);
+    for (int i = 0; i < run->n; i++) pal_scene_free(run->scene[i]);
+}
+
+static const char about[] =
+    "Serves every scene (.json), surface (.obj .stl .ply .off), label volume (.nii .nii.gz .inr .inr.gz) or solid of\n"
+    "control cells (.palcells) as a session that browsers, haptic bridges and scripted clients share; without an "
+    "input\n"
+    "a computed organ. Prints the address to open. Ends on SIGINT or SIGTERM, or after --seconds.\n";
+
+static int print_protocol(void)
+{
+    static char text[8192];
+    int n = pal_verb_describe(pal_verb_table, pal_verb_count, text, sizeof text);
+    if (n >= (int)sizeof text) return 1;
+    fputs(text, stdout);
+    return 0;
+}
+
+int command_serve(int argc, char **argv)
+{
+    static serve_run run; /* too large for the stack */
+    const char *input[MAX_SESSIONS], *unit = NULL;
+    int n_input = 0, resolution = 0, label = -1;
+    bool largest_only = false, help_protocol = false;
+    pal_diagnostic diag = {""};
+    const pal_flag flag[] = {
+        {"--units", "UNIT", PAL_FLAG_TEXT, &unit, 0, 0, "unit of surfaces: m, cm, mm, um, in (guessed from the size)"},
+        {"--label", "N", PAL_FLAG_COUNT, &label, 0, INT_MAX, "label of a label volume (the most frequent)"},
+        {"--resolution", "N", PAL_FLAG_COUNT, &resolution, 1, 1024,
+         "voxels along the longest axis of a surface (about 13,000 tetrahedra)"},
+        {"--largest", NULL, PAL_FLAG_SWITCH, &largest_only, 0, 0,
+         "keep the largest of several components of a surface or of cells only (see palpate prepare --help)"},
+        {"--seconds", "S", PAL_FLAG_NUMBER, &run.seconds, 0.1, 1e9, "end after so long (a signal ends it)"},
+        {"--help-protocol", NULL, PAL_FLAG_SWITCH, &help_protocol, 0, 0,
+         "print the commands that clients may give: name, who, numbers, what it does"},
+    };
+    const pal_flag_table table = {.usage = "serve [SCENE.json | SURFACE | LABEL VOLUME | CELLS]... [flags]",
+                                  .about = about,
+                                  .example = "palpate serve --port 0 --seconds 2\n"
+                                             "palpate prepare --shape stomach -o stomach\n"
+                                             "palpate serve stomach/scene.json deploy/problems/gear.obj --port 0 "
+                                             "--seconds 2\n"
+                                             "palpate cells chair -o chair.palcells\n"
+                                             "palpate serve chair.palcells --port 0 --seconds 2\n",
+                                  .flag = flag,
+                                  .n_flag = sizeof flag / sizeof *flag,
+                                  .max_operand = MAX_SESSIONS,
+                                  .config = &run.config};
+    int code = pal_flags_parse(&table, argc, argv, &run.common, input, &n_input);
+    if (code >= 0) return code;
+    if (help_protocol) return print_protocol();
+    pal_log_set_level(run.common.quiet ? PAL_LOG_ERROR : pal_config_log_level(&run.config));
+    run.surface = (pal_surface_scene){.resolution = resolution,
+                                      .label = label,
+                                      .largest_only = largest_only,
+                                      .unit_m = unit ? pal_mesh_unit_named(unit) : 0,
+                                      .progress = pal_report_progress,
+                                      .user = &run.common};
+    pal_err err = PAL_ERR_OK;
+    if (unit && run.surface.unit_m == 0)
+        err = pal_diagnostic_set(&diag, PAL_ERR_REFUSED, "--units: \"%.20s\" is not a unit", unit);
+    for (int i = 0; !err && i < (n_input ? n_input : 1); i++) err = load_input(&run, n_input ? input[i] : NULL, &diag);
+    pal_report_progress(NULL, 0, &run.common);
+    for (int i = 0; i < run.n; i++) make_unique(&run, i);
+    if (!err) err = run_all(&run, &diag);
+    close_all(&run);
+    return err ? pal_report_refusal(&run.common, err, &diag) : 0;
+}

@@ -1,0 +1,119 @@
+/* What the hub sends to a client at once, and how a client leaves its room. */
+#include "server/net/hub_peers.h"
+
+#include "server/base/log.h"
+#include "server/net/hub_subscriptions.h"
+#include "server/net/transport/plain_text.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+void pal_hub_release_tool(pal_hub_room *room, int tool)
+{
+    room->tool[tool] = (pal_stream_tool){0};
+    (void)pal_session_put_pose(room->session, tool, NULL);
+}
+
+uint32_t pal_hub_colour(int id)
+{
+    static const uint32_t colours[] = {0xFF8C42, 0x3FA7D6, 0x59CD90, 0xEE6352, 0xB388EB, 0xFAC05E,
+                                       0x2EC4B6, 0xF15BB5, 0x9BC53D, 0x5C7AEA, 0xD4A373, 0x8D99AE};
+    return colours[(unsigned)(id - 1) % (sizeof colours / sizeof *colours)];
+}
+
+static void empty(pal_client *c)
+{
+    for (; c->n_queue; c->n_queue--) {
+        pal_packet_drop(c->queue[c->queue_begin]);
+        c->queue_begin = (c->queue_begin + 1) % PAL_HUB_QUEUE;
+    }
+    for (; c->out_begin < c->n_out; c->out_begin++) pal_packet_drop(c->out[c->out_begin]);
+    c->out_begin = c->n_out = 0;
+    pal_packet_replace(&c->haptic, NULL);
+    c->members_due = c->status_due = false;
+}
+
+/* the member is gone for the others as soon as it is dropped, not when its socket is */
+void pal_hub_leave_room(pal_hub *hub, pal_client *c)
+{
+    pal_hub_room *room = c->room;
+    empty(c);
+    if (!c->id) return;
+    pal_hub_unsubscribe_all(c);
+    pal_member_entry *member = pal_members_find(&room->members, c->id);
+    int tool = member ? member->tool : -1;
+    pal_members_leave(&room->members, c->id);
+    if (tool >= 0) pal_hub_release_tool(room, tool);
+    room->tier_users[c->tier]--;
+    pal_session_observe(room->session, false);
+    c->id = 0;
+    pal_hub_members_changed(hub, room);
+}
+
+void pal_hub_drop(pal_hub *hub, pal_client *client, int code, const char *format, ...)
+{
+    char reason[PAL_PEER_REASON];
+    va_list args;
+    if (client->peer->drop_code) return;
+    va_start(args, format);
+    vsnprintf(reason, sizeof reason, format, args);
+    va_end(args);
+    pal_log(PAL_LOG_DEBUG, "drop", "a client is closed with %d: %s", code, reason);
+    pal_peer_drop(client->peer, code, "%s", reason);
+    pal_hub_leave_room(hub, client);
+}
+
+static void queue(pal_hub *hub, pal_client *c, pal_packet *packet)
+{
+    if (c->n_queue == PAL_HUB_QUEUE || !packet) {
+        pal_packet_drop(packet);
+        hub->count.n_overflow++;
+        pal_hub_drop(hub, c, PAL_WIRE_CLOSE_POLICY, "too many answers wait to be read");
+        return;
+    }
+    c->queue[(c->queue_begin + c->n_queue++) % PAL_HUB_QUEUE] = packet;
+    c->peer->ops->ready(c->peer);
+}
+
+pal_packet *pal_hub_encode(pal_hub *hub, const pal_control *control)
+{
+    size_t n = 0;
+    int refusal = pal_control_put(hub->text, PAL_CONTROL_OUT_MAX + 1, control, &n);
+    if (refusal) {
+        pal_log(PAL_LOG_ERROR, "control", "%s is not sent: %s", pal_control_name(control->type),
+                pal_refusal_text(refusal));
+        return NULL;
+    }
+    return pal_packet_create(hub->text, n, true);
+}
+
+void pal_hub_send(pal_hub *hub, pal_client *client, const pal_control *control)
+{
+    if (client->peer->drop_code) return;
+    queue(hub, client, pal_hub_encode(hub, control));
+}
+
+void pal_hub_send_error(pal_hub *hub, pal_client *client, const char *code, const char *format, ...)
+{
+    char text[512];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    memset(hub->control, 0, sizeof *hub->control);
+    hub->control->type = PAL_CONTROL_ERROR;
+    pal_plain_text(hub->control->error.code, sizeof hub->control->error.code, code);
+    pal_plain_text(hub->control->error.text, sizeof hub->control->error.text, text);
+    pal_hub_send(hub, client, hub->control);
+}
+
+void pal_hub_members_changed(pal_hub *hub, pal_hub_room *room)
+{
+    for (int i = 0; i < hub->max_clients; i++) {
+        pal_client *c = &hub->client[i];
+        if (!c->peer || c->room != room || !c->id || c->peer->drop_code) continue;
+        c->members_due = true;
+        c->peer->ops->ready(c->peer);
+    }
+}

@@ -1,0 +1,109 @@
+/* Finds, checks and executes verbs. */
+#include "server/net/hub_verb.h"
+
+#include "server/net/hub_peers.h"
+#include "server/net/transport/plain_text.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static const pal_wire_arg *find_arg(const pal_wire_command *command, const char *key)
+{
+    for (uint32_t i = 0; i < command->n_arg; i++)
+        if (!strcmp(command->arg[i].key, key)) return &command->arg[i];
+    return NULL;
+}
+
+double pal_hub_arg(const pal_wire_command *command, const char *key, double otherwise)
+{
+    const pal_wire_arg *arg = find_arg(command, key);
+    return arg ? arg->value : otherwise;
+}
+
+bool pal_hub_has_arg(const pal_wire_command *command, const char *key)
+{
+    return find_arg(command, key) != NULL;
+}
+
+/* every number is there that must be, and no other */
+static bool check_args(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
+{
+    bool required = true;
+    uint32_t n_known = 0;
+    for (const char *at = verb->args; *at;) {
+        char key[32];
+        size_t n = strcspn(at, " ");
+        snprintf(key, sizeof key, "%.*s", (int)n, at);
+        at += n + (at[n] == ' ');
+        if (!strcmp(key, "|")) {
+            required = false;
+            continue;
+        }
+        bool there = find_arg(command, key) != NULL;
+        n_known += there;
+        if (there || !required) continue;
+        pal_hub_send_error(hub, c, "args", "%s: %s is missing", verb->name, key);
+        return false;
+    }
+    if (n_known == command->n_arg) return true;
+    pal_hub_send_error(hub, c, "args", "%s takes %s", verb->name, verb->args[0] ? verb->args : "no numbers");
+    return false;
+}
+
+static bool check_right(pal_hub *hub, pal_client *c, const pal_verb *verb)
+{
+    static const char *const who[PAL_RIGHT_COUNT] = {
+#define X(name, text) text,
+        PAL_RIGHT_TABLE(X)
+#undef X
+    };
+    const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
+    bool instructs = m->role == PAL_MEMBER_INSTRUCTOR;
+    bool may = verb->right == PAL_RIGHT_EVERYBODY || instructs ||
+               (verb->right == PAL_RIGHT_TRAINEE && m->role != PAL_MEMBER_VIEWER) ||
+               (verb->right == PAL_RIGHT_TOOL && m->tool >= 0);
+    if (!may) pal_hub_send_error(hub, c, "role", "%s: only for %s", verb->name, who[verb->right]);
+    return may;
+}
+
+void pal_hub_execute(pal_hub *hub, pal_client *c, const pal_wire_command *command)
+{
+    const pal_verb *verb = hub->verb, *end = hub->verb + hub->n_verb;
+    while (verb < end && strcmp(verb->name, command->verb)) verb++;
+    if (verb == end)
+        pal_hub_send_error(hub, c, "verb", "there is no command %s", command->verb);
+    else if (check_right(hub, c, verb) && check_args(hub, c, verb, command))
+        verb->run(hub, c, verb, command);
+}
+
+int pal_hub_find_body(pal_hub *hub, pal_client *c, const char *name, int otherwise)
+{
+    const pal_scene *scene = pal_session_scene(c->room->session);
+    if (!name[0]) return otherwise;
+    for (int b = 0; b < scene->n_body; b++)
+        if (!strcmp(scene->body[b].name, name)) return b;
+    pal_hub_send_error(hub, c, "target", "there is no body %s", name);
+    return -1;
+}
+
+void pal_hub_answer_arg(pal_wire_answer *answer, const char *key, double value)
+{
+    pal_wire_arg *to = &answer->arg[answer->n_arg++];
+    snprintf(to->key, sizeof to->key, "%s", key);
+    to->value = value;
+}
+
+pal_wire_answer *pal_hub_answer_begin(pal_hub *hub, const char *verb)
+{
+    memset(hub->control, 0, sizeof *hub->control);
+    hub->control->type = PAL_CONTROL_ANSWER;
+    pal_plain_text(hub->control->answer.verb, sizeof hub->control->answer.verb, verb);
+    return &hub->control->answer;
+}
+
+bool pal_hub_session_command(pal_hub *hub, pal_client *c, const char *verb, const pal_command *command)
+{
+    pal_err err = pal_session_command(c->room->session, command);
+    if (err) pal_hub_send_error(hub, c, err == PAL_ERR_FULL ? "busy" : "refused", "%s: %s", verb, pal_err_text(err));
+    return !err;
+}

@@ -1,0 +1,88 @@
+/* Credit and token bucket. The smallest round trip is kept over two windows of 10 s, so that one that has grown for
+ * good (another network) is believed after at most 20 s. At the end of each window one cycle goes alone. The first
+ * window is of 1 s, since a client is slow while it loads. */
+#include "server/net/transport/credit.h"
+
+#include <math.h>
+#include <string.h>
+
+#define WINDOW_NS       10000000000u
+#define FIRST_WINDOW_NS 1000000000u
+
+void pal_credit_begin(pal_credit *credit, double rate_hz)
+{
+    memset(credit, 0, sizeof *credit);
+    credit->rate_hz = rate_hz;
+    credit->most = 3;
+    credit->least_s[0] = credit->least_s[1] = HUGE_VAL;
+}
+
+bool pal_credit_free(const pal_credit *credit)
+{
+    return credit->n_flight < (credit->probing ? 1 : credit->most);
+}
+
+void pal_credit_sent(pal_credit *credit, uint32_t cycle, uint64_t now_ns)
+{
+    if (credit->n_flight == PAL_CREDIT_MAX) return;
+    if (credit->n_flight == 0) {
+        credit->heard_ns = now_ns;
+        credit->first_alone = true;
+    }
+    credit->cycle[credit->n_flight] = cycle;
+    credit->sent_ns[credit->n_flight++] = now_ns;
+}
+
+static void learn(pal_credit *c, double rtt_s, bool alone, uint64_t now_ns)
+{
+    c->rtt_s = c->rtt_s > 0 ? c->rtt_s + 0.125 * (rtt_s - c->rtt_s) : rtt_s;
+    if (c->window_ns == 0) c->window_ns = now_ns + FIRST_WINDOW_NS;
+    if (now_ns > c->window_ns) {
+        c->least_s[0] = c->least_s[1];
+        c->least_s[1] = HUGE_VAL;
+        c->window_ns = now_ns + WINDOW_NS;
+        c->probing = true;
+    }
+    if (!alone) return;
+    c->probing = false;
+    c->least_s[1] = fmin(c->least_s[1], rtt_s);
+    double k = 1 + ceil(c->rate_hz * fmin(c->least_s[0], c->least_s[1]));
+    c->most = (int)fmax(PAL_CREDIT_MIN, fmin(k, PAL_CREDIT_MAX));
+}
+
+bool pal_credit_acknowledge(pal_credit *credit, uint32_t cycle, uint64_t now_ns)
+{
+    int n = 0;
+    while (n < credit->n_flight && (int32_t)(credit->cycle[n] - cycle) <= 0) n++;
+    /* older acknowledgements say nothing new; one of a cycle that is still to come is a lie */
+    if (n == 0) return credit->acknowledged && (int32_t)(cycle - credit->acknowledged) <= 0;
+    if (credit->cycle[n - 1] != cycle) return false;
+    learn(credit, (double)(now_ns - credit->sent_ns[n - 1]) * 1e-9, n == 1 && credit->first_alone, now_ns);
+    credit->first_alone = false;
+    credit->n_flight -= n;
+    memmove(credit->cycle, credit->cycle + n, (size_t)credit->n_flight * sizeof *credit->cycle);
+    memmove(credit->sent_ns, credit->sent_ns + n, (size_t)credit->n_flight * sizeof *credit->sent_ns);
+    credit->heard_ns = now_ns;
+    credit->acknowledged = cycle;
+    return true;
+}
+
+bool pal_credit_stalled(const pal_credit *credit, uint64_t now_ns, uint64_t limit_ns)
+{
+    return credit->n_flight > 0 && now_ns > credit->heard_ns + limit_ns;
+}
+
+void pal_bucket_begin(pal_bucket *bucket, double per_s, double depth, uint64_t now_ns)
+{
+    *bucket = (pal_bucket){.level = depth, .depth = depth, .per_s = per_s, .at_ns = now_ns};
+}
+
+bool pal_bucket_take(pal_bucket *bucket, uint64_t now_ns)
+{
+    double past_s = (double)(now_ns - bucket->at_ns) * 1e-9;
+    bucket->at_ns = now_ns;
+    bucket->level = fmin(bucket->depth, bucket->level + past_s * bucket->per_s);
+    if (bucket->level < 1) return false;
+    bucket->level -= 1;
+    return true;
+}

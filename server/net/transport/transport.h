@@ -1,0 +1,62 @@
+/* The road interface: a road carries whole messages between a peer and the hub, and knows nothing of what they mean.
+ *
+ * Sending is by pull: the hub says that something waits (ready), the road asks for one message (next) each time the
+ * peer can take one. So nothing queues in a road, and what is sent is decided at the last moment: control first, then
+ * the newest frame. Thread: [net]. */
+#ifndef PAL_NET_TRANSPORT_TRANSPORT_H
+#define PAL_NET_TRANSPORT_TRANSPORT_H
+#include "server/net/transport/loop.h"
+#include "server/net/transport/packet.h"
+
+typedef struct pal_transport pal_transport;
+typedef struct pal_transport_ops pal_transport_ops;
+
+enum { PAL_PEER_REASON = 124 }; /* a websocket close reason fits 123 bytes */
+
+/* one connection; a road embeds it in its own record */
+typedef struct pal_peer {
+    const pal_transport_ops *ops;
+    void *client;  /* the hub's side; NULL after closed or when refused */
+    int drop_code; /* not 0: to be closed with this code, nothing is received or sent any more */
+    char drop_reason[PAL_PEER_REASON];
+} pal_peer;
+
+/* a resource asked for by path (roads that speak HTTP) */
+typedef struct pal_reply {
+    int status;
+    const char *type;    /* content type */
+    const char *caching; /* cache-control */
+    char etag[48];       /* quoted; "": none */
+    pal_packet *body;    /* the road drops it; NULL: none */
+} pal_reply;
+
+/* what the hub does for roads */
+typedef struct pal_peer_events {
+    /* a peer has come for a session ("": the first); may drop it at once */
+    void (*opened)(void *user, pal_peer *peer, const char *session);
+    /* one whole message; n_byte is never above 4096 (the road drops longer ones with 1009) */
+    void (*received)(void *user, pal_peer *peer, const uint8_t *bytes, size_t n_byte, bool text);
+    bool (*waiting)(void *user, const pal_peer *peer); /* would next give a message? */
+    pal_packet *(*next)(void *user, pal_peer *peer);   /* message to send now, the road drops it; NULL: none */
+    void (*closed)(void *user, pal_peer *peer);        /* once for every opened */
+    /* GET path: fills *reply; user data of other members never comes this way */
+    void (*get)(void *user, const char *path, pal_reply *reply);
+    void *user;
+} pal_peer_events;
+
+struct pal_transport_ops {
+    const char *scheme; /* "ws" | "mem"; LCM peers come through clients/lcm_bridge, which speaks ws */
+    /* url: "ws://127.0.0.1:8090" (port 0: any) | "mem://"; copies events. REFUSED names address and reason. [load] */
+    pal_err (*open)(pal_loop *loop, const char *url, const pal_peer_events *events, pal_diagnostic *diag,
+                    pal_transport **out);
+    int (*port)(const pal_transport *transport); /* 0: none */
+    void (*ready)(pal_peer *peer);               /* next has something */
+    void (*drop)(pal_peer *peer);                /* drop_code is set: close as soon as possible */
+    void (*close)(pal_transport *transport);     /* after pal_loop_shut; peers still there are closed. [load] */
+};
+
+extern const pal_transport_ops pal_ws_transport, pal_mem_transport;
+
+/* marks a peer for closing with a websocket close code and a reason of at most 123 bytes; the first mark wins */
+void pal_peer_drop(pal_peer *peer, int code, const char *format, ...) __attribute__((format(printf, 3, 4)));
+#endif

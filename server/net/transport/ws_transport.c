@@ -1,0 +1,459 @@
+/* ws://: websockets and HTTP on one port, by libwebsockets 4.1.6 (Debian).
+ *
+ * Measured facts it keeps to (streaming.md 2): tx_packet_size 1 MiB; no extensions, ever (permessage-deflate can abort
+ * the process); one lws_write per writable callback; protocols[0] takes connections without a subprotocol unchecked, so
+ * they are denied there; HTTP_CONFIRM_UPGRADE is not handled. The listening socket is our own and every accepted socket
+ * is adopted: so a port in use has a clear sentence, and socket options are set before the first byte.
+ * What is received: at most 4096 bytes a message. Browsers: Origin must be this host; on a loopback address Host must
+ * be a loopback name as well, so that no foreign name that resolves here reaches the server (DNS rebinding). */
+#include "protocol/control.h"
+#include "server/base/log.h"
+#include "server/net/transport/transport.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <libwebsockets.h>
+#include <netinet/tcp.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+enum { CHUNK = 64 << 10, HEADERS = 4096, SEND_QUEUE = 16 << 10, UNACKED_MS = 15000, DROP_S = 2, BACKLOG = 128 };
+_Static_assert((int)PAL_PACKET_HEADROOM >= LWS_PRE, "a packet has room for the websocket header");
+
+struct pal_transport {
+    pal_loop *loop;
+    pal_peer_events events;
+    struct lws_vhost *vhost;
+    int listen_fd, spare_fd; /* spare: given up to turn a caller away when descriptors run out */
+    int port;
+    bool any_host, adopted; /* adopted: lws closes listen_fd with the loop */
+    uint8_t chunk[LWS_PRE + CHUNK];
+};
+
+/* per request and per websocket; lws zeroes and owns them */
+typedef struct request {
+    pal_packet *body;
+    size_t at;
+} request;
+typedef struct connection {
+    pal_peer peer; /* first: the road's record is found from it */
+    struct lws *wsi;
+    bool text, open;
+    size_t n;
+    uint8_t bytes[PAL_CONTROL_IN_MAX];
+} connection;
+
+static pal_transport *road_of(struct lws *wsi)
+{
+    return lws_vhost_user(lws_get_vhost(wsi));
+}
+
+/* ---- who may come ---- */
+
+/* host of the request, made of harmless characters; false: none or hostile */
+static bool read_host(struct lws *wsi, char *host, int cap)
+{
+    if (lws_hdr_copy(wsi, host, cap, WSI_TOKEN_HOST) <= 0) return false;
+    return host[strspn(host, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-_:[]")] == 0;
+}
+
+static bool loopback_host(const char *host)
+{
+    const char *end = *host == '[' ? strchr(host, ']') : strchr(host, ':');
+    size_t n = end ? (size_t)(end - host) + (*host == '[') : strlen(host);
+    struct in_addr v4;
+    char name[64];
+    if (n >= sizeof name) return false;
+    memcpy(name, host, n);
+    name[n] = 0;
+    if (!strcasecmp(name, "localhost") || !strcmp(name, "[::1]")) return true;
+    return inet_pton(AF_INET, name, &v4) == 1 && ntohl(v4.s_addr) >> 24 == 127;
+}
+
+static bool host_allowed(struct lws *wsi, char *host, int cap)
+{
+    return read_host(wsi, host, cap) && (road_of(wsi)->any_host || loopback_host(host));
+}
+
+/* native clients send no Origin; a page's must be this very host */
+static bool origin_allowed(struct lws *wsi, const char *host)
+{
+    char origin[256];
+    int n = lws_hdr_total_length(wsi, WSI_TOKEN_ORIGIN);
+    if (n == 0) return true;
+    if (lws_hdr_copy(wsi, origin, sizeof origin, WSI_TOKEN_ORIGIN) <= 0) return false;
+    const char *name = !strncmp(origin, "http://", 7) ? origin + 7 : !strncmp(origin, "https://", 8) ? origin + 8 : "";
+    return !strcasecmp(name, host);
+}
+
+static int deny(struct lws *wsi, unsigned status)
+{
+    (void)lws_return_http_status(wsi, status, NULL);
+    return -1;
+}
+
+static int filter_upgrade(struct lws *wsi)
+{
+    char host[256], path[64];
+    if (lws_get_network_wsi(wsi) != wsi || !host_allowed(wsi, host, sizeof host)) return deny(wsi, 403);
+    if (lws_hdr_copy(wsi, path, sizeof path, WSI_TOKEN_GET_URI) <= 0 || strcmp(path, "/ws")) return deny(wsi, 403);
+    return origin_allowed(wsi, host) ? 0 : deny(wsi, 403);
+}
+
+/* ---- HTTP ---- */
+
+static int add(struct lws *wsi, const char *name, const char *value, unsigned char **p, unsigned char *end)
+{
+    return lws_add_http_header_by_name(wsi, (const unsigned char *)name, (const unsigned char *)value,
+                                       (int)strlen(value), p, end);
+}
+
+static int write_headers(struct lws *wsi, const pal_reply *reply, const char *host, size_t n_body)
+{
+    unsigned char buffer[LWS_PRE + HEADERS], *start = buffer + LWS_PRE, *p = start, *end = buffer + sizeof buffer - 1;
+    char policy[1024];
+    snprintf(policy, sizeof policy,
+             "default-src 'self'; connect-src 'self' ws://%s wss://%s; worker-src 'self'; img-src 'self' data:; "
+             "style-src 'self'; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+             host, host);
+    if (lws_add_http_header_status(wsi, (unsigned)reply->status, &p, end)) return 1;
+    if (reply->type && add(wsi, "content-type:", reply->type, &p, end)) return 1;
+    if (reply->status != 304 && lws_add_http_header_content_length(wsi, n_body, &p, end)) return 1;
+    if (reply->caching && add(wsi, "cache-control:", reply->caching, &p, end)) return 1;
+    if (reply->etag[0] && add(wsi, "etag:", reply->etag, &p, end)) return 1;
+    if (add(wsi, "content-security-policy:", policy, &p, end) ||
+        add(wsi, "x-content-type-options:", "nosniff", &p, end) ||
+        add(wsi, "referrer-policy:", "no-referrer", &p, end) ||
+        add(wsi, "cross-origin-resource-policy:", "same-origin", &p, end))
+        return 1;
+    return lws_finalize_write_http_header(wsi, start, &p, end);
+}
+
+/* does If-None-Match name this tag? */
+static bool has_already(struct lws *wsi, const char *etag)
+{
+    char tags[512];
+    if (!etag[0] || lws_hdr_copy(wsi, tags, sizeof tags, WSI_TOKEN_HTTP_IF_NONE_MATCH) <= 0) return false;
+    return strstr(tags, etag) != NULL || !strcmp(tags, "*");
+}
+
+static int complete(struct lws *wsi)
+{
+    return lws_http_transaction_completed(wsi) ? -1 : 0;
+}
+
+static int begin_reply(struct lws *wsi, request *r, const char *path)
+{
+    pal_transport *t = road_of(wsi);
+    pal_reply reply;
+    char host[256];
+    bool head = lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
+    if (lws_get_network_wsi(wsi) != wsi) return -1;
+    if (!host_allowed(wsi, host, sizeof host)) return deny(wsi, 403);
+    if (!head && lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0) return deny(wsi, 405);
+    t->events.get(t->events.user, path, &reply);
+    size_t n_body = reply.body ? reply.body->n_byte : 0;
+    bool same = reply.status == 200 && has_already(wsi, reply.etag);
+    if (same) reply.status = 304;
+    if (write_headers(wsi, &reply, host, n_body)) {
+        pal_packet_drop(reply.body);
+        return -1;
+    }
+    if (same || head || n_body == 0) {
+        pal_packet_drop(reply.body);
+        return complete(wsi);
+    }
+    pal_packet_replace(&r->body, reply.body);
+    r->at = 0;
+    lws_callback_on_writable(wsi);
+    return 0;
+}
+
+static int continue_reply(struct lws *wsi, request *r)
+{
+    pal_transport *t = road_of(wsi);
+    if (!r || !r->body) return 0;
+    size_t n = r->body->n_byte - r->at;
+    bool last = n <= CHUNK;
+    if (!last) n = CHUNK;
+    memcpy(t->chunk + LWS_PRE, r->body->bytes + r->at, n);
+    if (lws_write(wsi, t->chunk + LWS_PRE, n, last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP) < 0) return -1;
+    r->at += n;
+    if (last) {
+        pal_packet_replace(&r->body, NULL);
+        return complete(wsi);
+    }
+    lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, 30);
+    lws_callback_on_writable(wsi);
+    return 0;
+}
+
+static int http_callback(struct lws *wsi, enum lws_callback_reasons reason, void *own, void *in, size_t n_byte)
+{
+    request *r = own;
+    (void)n_byte;
+    switch (reason) {
+    case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
+        return deny(wsi, 403); /* no subprotocol, or none we know */
+    case LWS_CALLBACK_HTTP:
+        return begin_reply(wsi, r, in);
+    case LWS_CALLBACK_HTTP_WRITEABLE:
+        return continue_reply(wsi, r);
+    case LWS_CALLBACK_CLOSED_HTTP:
+    case LWS_CALLBACK_HTTP_DROP_PROTOCOL:
+        if (r) pal_packet_replace(&r->body, NULL);
+        return 0;
+    default:
+        return 0;
+    }
+}
+
+/* ---- websocket ---- */
+
+/* ends the callback: closes when the hub or the road has marked the peer */
+static int finish(connection *c)
+{
+    if (!c->peer.drop_code) return 0;
+    lws_close_reason(c->wsi, (enum lws_close_status)c->peer.drop_code, (unsigned char *)c->peer.drop_reason,
+                     strlen(c->peer.drop_reason));
+    return -1;
+}
+
+static int established(struct lws *wsi, connection *c)
+{
+    pal_transport *t = road_of(wsi);
+    char argument[64];
+    const char *session = lws_get_urlarg_by_name(wsi, "session=", argument, sizeof argument);
+    memset(c, 0, sizeof *c);
+    c->wsi = wsi;
+    c->peer.ops = &pal_ws_transport;
+    c->open = true;
+    t->events.opened(t->events.user, &c->peer, session ? session : "");
+    return 0;
+}
+
+static int received(struct lws *wsi, connection *c, const void *bytes, size_t n_byte)
+{
+    pal_transport *t = road_of(wsi);
+    if (c->peer.drop_code) return finish(c);
+    if (lws_is_first_fragment(wsi)) {
+        c->n = 0;
+        c->text = !lws_frame_is_binary(wsi);
+    }
+    size_t rest = lws_remaining_packet_payload(wsi);
+    if (n_byte > sizeof c->bytes - c->n || rest > sizeof c->bytes - c->n - n_byte) {
+        pal_peer_drop(&c->peer, PAL_WIRE_CLOSE_TOO_BIG, "a message is at most %d bytes", PAL_CONTROL_IN_MAX);
+        return finish(c);
+    }
+    if (n_byte) memcpy(c->bytes + c->n, bytes, n_byte);
+    c->n += n_byte;
+    if (rest == 0 && lws_is_final_fragment(wsi)) {
+        t->events.received(t->events.user, &c->peer, c->bytes, c->n, c->text);
+        c->n = 0;
+    }
+    return finish(c);
+}
+
+static int writable(struct lws *wsi, connection *c)
+{
+    pal_transport *t = road_of(wsi);
+    if (c->peer.drop_code) return finish(c);
+    pal_packet *p = t->events.next(t->events.user, &c->peer);
+    if (!p) return finish(c);
+    int n = lws_write(wsi, p->bytes, p->n_byte, p->text ? LWS_WRITE_TEXT : LWS_WRITE_BINARY);
+    pal_packet_drop(p);
+    if (n < 0) return -1;
+    if (t->events.waiting(t->events.user, &c->peer)) lws_callback_on_writable(wsi);
+    return finish(c);
+}
+
+static int ws_callback(struct lws *wsi, enum lws_callback_reasons reason, void *own, void *in, size_t n_byte)
+{
+    connection *c = own;
+    switch (reason) {
+    case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
+        return filter_upgrade(wsi);
+    case LWS_CALLBACK_ESTABLISHED:
+        return established(wsi, c);
+    case LWS_CALLBACK_RECEIVE:
+        return received(wsi, c, in, n_byte);
+    case LWS_CALLBACK_SERVER_WRITEABLE:
+        return writable(wsi, c);
+    case LWS_CALLBACK_CLOSED:
+        if (!c->open) return 0;
+        c->open = false;
+        c->peer.drop_code = c->peer.drop_code ? c->peer.drop_code : PAL_WIRE_CLOSE_NORMAL;
+        road_of(wsi)->events.closed(road_of(wsi)->events.user, &c->peer);
+        return 0;
+    default:
+        return 0;
+    }
+}
+
+/* ---- the listening socket ---- */
+
+static void tune(int fd)
+{
+    int on = 1, low = SEND_QUEUE, unacked_ms = UNACKED_MS;
+    (void)setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    /* what is not on the wire yet can still be replaced by something newer */
+    (void)setsockopt(fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &low, sizeof low);
+    (void)setsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &unacked_ms, sizeof unacked_ms);
+}
+
+static void accept_all(pal_transport *t)
+{
+    for (int i = 0; i < BACKLOG; i++) {
+        int fd = accept4(t->listen_fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+        if (fd >= 0) {
+            tune(fd);
+            lws_adopt_socket_vhost(t->vhost, fd); /* closes it when it cannot */
+            continue;
+        }
+        if (errno == EINTR || errno == ECONNABORTED) continue;
+        if ((errno != EMFILE && errno != ENFILE) || t->spare_fd < 0) return;
+        close(t->spare_fd);
+        fd = accept4(t->listen_fd, NULL, NULL, SOCK_CLOEXEC);
+        if (fd >= 0) close(fd);
+        t->spare_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    }
+}
+
+static int listen_callback(struct lws *wsi, enum lws_callback_reasons reason, void *own, void *in, size_t n_byte)
+{
+    (void)own, (void)in, (void)n_byte;
+    /* a protocol of ours, not a subprotocol to ask for */
+    if (reason == LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION) return deny(wsi, 403);
+    if (reason == LWS_CALLBACK_RAW_RX_FILE) accept_all(road_of(wsi));
+    return 0;
+}
+
+static const struct lws_protocols protocols[] = {
+    {"http", http_callback, sizeof(request), PAL_CONTROL_IN_MAX, 0, NULL, 1 << 20},
+    {PAL_PROTOCOL_NAME, ws_callback, sizeof(connection), PAL_CONTROL_IN_MAX, 0, NULL, 1 << 20},
+    {"palpate-listen", listen_callback, 0, 0, 0, NULL, 0},
+    {NULL, NULL, 0, 0, 0, NULL, 0}};
+
+static const lws_retry_bo_t alive = {.secs_since_valid_ping = 20, .secs_since_valid_hangup = 40};
+
+/* "ws://A.B.C.D:PORT", "ws://[V6]:PORT", each with "?hosts=any" or without; false: neither */
+static bool parse_url(const char *url, struct sockaddr_storage *address, socklen_t *n_address, bool *any_host)
+{
+    char text[128], *host = text, *port;
+    size_t n = strcspn(url, "?");
+    char *end;
+    if (n < 5 || n >= sizeof text || strncmp(url, "ws://", 5)) return false;
+    memcpy(text, url + 5, n - 5);
+    text[n - 5] = 0;
+    *any_host = !strcmp(url + n, "?hosts=any");
+    if (!(port = strrchr(text, ':'))) return false;
+    *port++ = 0;
+    long number = strtol(port, &end, 10);
+    if (end == port || *end || number < 0 || number > 65535) return false;
+    memset(address, 0, sizeof *address);
+    if (*host == '[' && port > host + 2 && port[-2] == ']') {
+        struct sockaddr_in6 *v6 = (struct sockaddr_in6 *)address;
+        port[-2] = 0;
+        v6->sin6_family = AF_INET6;
+        v6->sin6_port = htons((uint16_t)number);
+        *n_address = sizeof *v6;
+        return inet_pton(AF_INET6, host + 1, &v6->sin6_addr) == 1;
+    }
+    struct sockaddr_in *v4 = (struct sockaddr_in *)address;
+    v4->sin_family = AF_INET;
+    v4->sin_port = htons((uint16_t)number);
+    *n_address = sizeof *v4;
+    return inet_pton(AF_INET, host, &v4->sin_addr) == 1;
+}
+
+static pal_err open_socket(pal_transport *t, const char *url, pal_diagnostic *diag)
+{
+    struct sockaddr_storage address;
+    socklen_t n = 0;
+    int on = 1;
+    if (!parse_url(url, &address, &n, &t->any_host))
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s is not an address to listen on", url);
+    t->spare_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    t->listen_fd = socket(address.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    if (t->listen_fd < 0) return pal_diagnostic_set(diag, PAL_ERR_IO, "no socket: %s", strerror(errno));
+    (void)setsockopt(t->listen_fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+    int n_text = (int)strcspn(url, "?");
+    if (bind(t->listen_fd, (struct sockaddr *)&address, n) || listen(t->listen_fd, BACKLOG)) {
+        if (errno == EADDRINUSE)
+            return pal_diagnostic_set(
+                diag, PAL_ERR_REFUSED,
+                "%.*s is in use by another program; choose another port with --port (0: any free one)", n_text - 5,
+                url + 5);
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "cannot listen on %.*s: %s", n_text - 5, url + 5,
+                                  strerror(errno));
+    }
+    n = sizeof address;
+    if (getsockname(t->listen_fd, (struct sockaddr *)&address, &n)) return PAL_ERR_IO;
+    t->port = ntohs(address.ss_family == AF_INET6 ? ((struct sockaddr_in6 *)&address)->sin6_port
+                                                  : ((struct sockaddr_in *)&address)->sin_port);
+    return PAL_ERR_OK;
+}
+
+static void ws_close(pal_transport *transport)
+{
+    if (!transport) return;
+    if (!transport->adopted && transport->listen_fd >= 0) close(transport->listen_fd);
+    if (transport->spare_fd >= 0) close(transport->spare_fd);
+    free(transport);
+}
+
+static pal_err ws_open(pal_loop *loop, const char *url, const pal_peer_events *events, pal_diagnostic *diag,
+                       pal_transport **out)
+{
+    struct lws_context_creation_info info;
+    pal_transport *t = calloc(1, sizeof *t);
+    if (!t) return PAL_ERR_MEMORY;
+    t->loop = loop;
+    t->events = *events;
+    t->listen_fd = t->spare_fd = -1;
+    pal_err err = open_socket(t, url, diag);
+    if (err) return ws_close(t), err;
+    memset(&info, 0, sizeof info);
+    info.port = CONTEXT_PORT_NO_LISTEN_SERVER;
+    info.vhost_name = "palpate";
+    info.server_string = "palpate";
+    info.protocols = protocols;
+    info.user = t;
+    info.timeout_secs = 5;
+    info.timeout_secs_ah_idle = 5;
+    info.keepalive_timeout = 7;
+    info.retry_and_idle_policy = &alive;
+    t->vhost = lws_create_vhost(pal_loop_context(loop), &info);
+    lws_sock_file_fd_type fd = {.filefd = t->listen_fd};
+    if (!t->vhost || !lws_adopt_descriptor_vhost(t->vhost, LWS_ADOPT_RAW_FILE_DESC, fd, "palpate-listen", NULL)) {
+        ws_close(t);
+        return pal_diagnostic_set(diag, PAL_ERR_IO, "the network context could not listen");
+    }
+    t->adopted = true;
+    *out = t;
+    return PAL_ERR_OK;
+}
+
+static int ws_port(const pal_transport *transport)
+{
+    return transport->port;
+}
+
+static void ws_ready(pal_peer *peer)
+{
+    lws_callback_on_writable(((connection *)(void *)peer)->wsi);
+}
+
+/* asks for the writable callback, which closes; a peer that takes nothing more is cut off after DROP_S */
+static void ws_drop(pal_peer *peer)
+{
+    connection *c = (connection *)(void *)peer;
+    lws_set_timeout(c->wsi, PENDING_TIMEOUT_USER_REASON_BASE, DROP_S);
+    lws_callback_on_writable(c->wsi);
+}
+
+const pal_transport_ops pal_ws_transport = {"ws", ws_open, ws_port, ws_ready, ws_drop, ws_close};

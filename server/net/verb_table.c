@@ -1,0 +1,70 @@
+/* The table of verbs: a new command is one line here and one function. */
+#include "server/net/verb_table.h"
+
+#include "server/net/hub_accuracy.h"
+#include "server/net/hub_plan.h"
+#include "server/net/hub_sculpt.h"
+#include "server/net/hub_steering.h"
+#include "server/net/hub_switch.h"
+
+#include <stdio.h>
+
+#define AT   "x_m y_m z_m"
+#define FROM AT " x2_m y2_m z2_m"
+
+const pal_verb pal_verb_table[] = {
+    {"pause", "", PAL_RIGHT_TRAINEE, pal_hub_run_steering, PAL_COMMAND_PAUSE, "stop the simulation between two steps"},
+    {"resume", "", PAL_RIGHT_TRAINEE, pal_hub_run_steering, PAL_COMMAND_RESUME, "let it run again"},
+    {"step", "", PAL_RIGHT_TRAINEE, pal_hub_run_steering, PAL_COMMAND_STEP, "take one step while paused"},
+    {"reset", "", PAL_RIGHT_EVERYBODY, pal_hub_run_reset, 0,
+     "bring the body `target`, or the scene, back to rest; a viewer only a frozen body"},
+    {"material", "| young_Pa poisson density_kg_m3 damping_1_s", PAL_RIGHT_TRAINEE, pal_hub_run_material, 0,
+     "change the material of the body `target`"},
+    {"component", "part enabled", PAL_RIGHT_INSTRUCTOR, pal_hub_run_component, 0,
+     "disable or enable the component `target` of a part's plan"},
+    {"estimate", "enabled", PAL_RIGHT_EVERYBODY, pal_hub_run_estimate, 0,
+     "subscribe to the error estimate of the body `target`"},
+    {"study_point", "index", PAL_RIGHT_TOOL, pal_hub_run_switch, 0,
+     "give the body the configuration of a point of its study"},
+    {"configure", "| size step_ms tolerance", PAL_RIGHT_TOOL, pal_hub_run_switch, 0,
+     "change parameters of the body's configuration"},
+    {"delete", AT, PAL_RIGHT_TOOL, pal_hub_run_edit, PAL_CELLS_DELETE, "remove the control cell there"},
+    {"divide", AT, PAL_RIGHT_TOOL, pal_hub_run_edit, PAL_CELLS_DIVIDE, "divide the control cell there"},
+    {"extrude", AT " distance_m | scale", PAL_RIGHT_TOOL, pal_hub_run_edit, PAL_CELLS_EXTRUDE,
+     "grow a cell out of the control face there"},
+    {"merge", FROM, PAL_RIGHT_TOOL, pal_hub_run_edit, PAL_CELLS_MERGE, "merge two control faces"},
+    {"bridge", FROM, PAL_RIGHT_TOOL, pal_hub_run_edit, PAL_CELLS_BRIDGE, "join two control faces by a cell"},
+    {"sharpen", AT " sharpness entity", PAL_RIGHT_TOOL, pal_hub_run_edit, PAL_CELLS_SHARPEN_VERTEX,
+     "set the sharpness of a vertex (entity 0), edge (1) or face (2)"},
+    {"paint", AT " radius_m | softness young_factor density_factor", PAL_RIGHT_TOOL, pal_hub_run_edit, PAL_EDIT_PAINT,
+     "multiply stiffness and density under a brush"},
+    {"set_rest_shape", "", PAL_RIGHT_TOOL, pal_hub_run_edit, PAL_EDIT_SET_REST,
+     "make the present shape the rest shape"},
+    {"cut", "nx ny nz offset_m", PAL_RIGHT_TOOL, pal_hub_run_edit, PAL_EDIT_CUT, "hide what lies beyond a plane"},
+    {"uncut", "", PAL_RIGHT_TOOL, pal_hub_run_edit, PAL_EDIT_UNCUT, "show all of the body again"},
+    {"undo", "", PAL_RIGHT_TOOL, pal_hub_run_edit, PAL_EDIT_UNDO, "take the last edit back"},
+    {"redo", "", PAL_RIGHT_TOOL, pal_hub_run_edit, PAL_EDIT_REDO, "repeat the edit that was taken back"},
+    {"probe", AT, PAL_RIGHT_TRAINEE, pal_hub_run_probe, 0, "tell the material there"},
+    {"inflate", AT " radius_m pressure_Pa | softness", PAL_RIGHT_TOOL, pal_hub_run_brush, PAL_BRUSH_INFLATE,
+     "apply a pressure under a brush"},
+    {"curve", FROM " radius_m stiffness_N_m dx_m dy_m dz_m | softness", PAL_RIGHT_TOOL, pal_hub_run_brush,
+     PAL_BRUSH_CURVE, "pull a handle between two points by a spring"},
+    {"release", "", PAL_RIGHT_TOOL, pal_hub_run_brush, PAL_BRUSH_NONE, "end the brush of the own tool"},
+};
+const int pal_verb_count = sizeof pal_verb_table / sizeof *pal_verb_table;
+
+int pal_verb_describe(const pal_verb *verb, int n_verb, char *text, size_t cap)
+{
+    static const char *const who[PAL_RIGHT_COUNT] = {
+#define X(name, in_words) in_words,
+        PAL_RIGHT_TABLE(X)
+#undef X
+    };
+    int n = 0;
+    for (const pal_verb *v = verb; v < verb + n_verb; v++) {
+        size_t used = (size_t)n < cap ? (size_t)n : cap;
+        n += snprintf(cap ? text + used : NULL, cap - used, "%s\t%s\t%s\t%s\n", v->name, who[v->right], v->args,
+                      v->about);
+    }
+    return n;
+}

@@ -1,0 +1,12 @@
+/* All verbs of the message `command`, one line each. */
+#ifndef PAL_NET_VERB_TABLE_H
+#define PAL_NET_VERB_TABLE_H
+#include "server/net/hub_verb.h"
+
+extern const pal_verb pal_verb_table[]; /* [pal_verb_count] */
+extern const int pal_verb_count;
+
+/* the table as text, one line a verb: name, who may give it, numbers, what it does, separated by tabs; returns the
+ * bytes that all of it takes, as snprintf does. Thread: any */
+int pal_verb_describe(const pal_verb *verb, int n_verb, char *text, size_t cap);
+#endif

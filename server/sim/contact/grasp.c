@@ -1,0 +1,71 @@
+/* What explicit and implicit grasps share (grasp.h). */
+#include "server/sim/contact/grasp.h"
+
+#include "server/base/vec3.h"
+#include "server/sim/contact/tuning.h"
+
+double pal_grasp_reach_m(const pal_grasps *grasps, const pal_tool *tool)
+{
+    return grasps->asked_reach_m > 0 ? grasps->asked_reach_m : 2 * tool->radius_m;
+}
+
+double pal_grasp_stiffness_N_m(const pal_grasps *grasps, double reach_m)
+{
+    return grasps->asked_N_m > 0 ? grasps->asked_N_m : GRASP_STIFFNESS * grasps->young_Pa * reach_m;
+}
+
+void pal_grasp_mean(const pal_grasp *g, const double *p, double mean[3])
+{
+    pal_set3(mean, 0, 0, 0);
+    for (int i = 0; i < g->n_node; i++) pal_axpy3(mean, g->weight[i], p + 3 * (size_t)g->node[i]);
+}
+
+void pal_grasp_add_force(const pal_grasp *g, const double force_N[3], double *to)
+{
+    for (int i = 0; i < g->n_node; i++) pal_axpy3(to + 3 * (size_t)g->node[i], g->weight[i], force_N);
+}
+
+double pal_grasp_max_weight(const pal_grasp *g)
+{
+    double most = 0;
+    for (int i = 0; i < g->n_node; i++) most = fmax(most, g->weight[i]);
+    return most;
+}
+
+static void begin_transfer(pal_grasp *g, const pal_tool *tool, const pal_body *body, double k_N_m,
+                           const double damper_N[3])
+{
+    pal_grasp_spring s = {.k_N_m = k_N_m, .firm = g->implicit != NULL};
+    pal_grasp_mean(g, body->d, s.y);
+    pal_copy3(s.damper_N, damper_N);
+    pal_sub3(s.at_m, tool->last.position_m, body->offset_m);
+    pal_quat_rotate(s.hold, tool->last.quat, g->offset);
+    pal_quat_rotate(s.old_hold_m, tool->last.quat, g->transfer->hold);
+    pal_grasp_transfer_begin(g->transfer, &s);
+    if (g->implicit) g->implicit->stretch_m = pal_norm3(g->transfer->force_N) / k_N_m;
+}
+
+void pal_grasp_find_goal(pal_grasp *g, const pal_tool *tool, const pal_step *step, double k_N_m,
+                         const double damper_N[3], double goal[3])
+{
+    if (g->transfer && g->transfer->due && k_N_m > 0) begin_transfer(g, tool, step->body, k_N_m, damper_N);
+    pal_quat_rotate(goal, tool->next.quat, g->offset);
+    pal_add3(goal, goal, tool->here_m), pal_sub3(goal, goal, step->body->offset_m);
+    if (g->transfer) pal_grasp_transfer_add(g->transfer, step->dt_s, goal);
+}
+
+void pal_grasp_publish(pal_grasp *g, pal_tool *tool, double k_N_m, double c_Ns_m)
+{
+    double on_tissue[3], *k = &g->fit.k_N_m, *K = tool->grasp_k_N_m;
+    pal_scale3(on_tissue, -1, g->force);
+    pal_stiffness_fit_add(&g->fit, tool->here_m, on_tissue, FIT_PRIOR_RADII * tool->radius_m);
+    *k = fmin(fmax(*k, MIN_STIFFNESS_N_M), fmax(k_N_m, MIN_STIFFNESS_N_M));
+    tool->has_grasp = true;
+    pal_copy3(tool->grasp_x0_m, tool->here_m);
+    pal_copy3(tool->grasp_f0_N, g->force);
+    K[1] = K[2] = K[4] = 0;
+    K[0] = K[3] = K[5] = *k;
+    if (g->implicit && pal_grasp_compliance_series(&g->implicit->compliance, k_N_m, K))
+        *k = fmax(MIN_STIFFNESS_N_M, (K[0] + K[3] + K[5]) / 3);
+    tool->grasp_b_Ns_m = c_Ns_m * *k / fmax(k_N_m, MIN_STIFFNESS_N_M);
+}

@@ -1,0 +1,47 @@
+/* Grasps with explicit solvers. k and c are kept below the limits alpha m_i / dt^2 and beta m_i / dt of every free
+ * node, m_i being shared by the tools that hold it; where points carry the nodes, alpha and beta times what the tissue
+ * held weighs at least. */
+#include "server/base/vec3.h"
+#include "server/sim/contact/grasp.h"
+#include "server/sim/contact/tuning.h"
+
+/* least mass that the spring moves. Of nodes that points carry: W' C W <= sum W_i C_ii, C their mobility */
+static double min_mass_kg(const pal_grasps *grasps, const pal_grasp *g, const pal_body *body)
+{
+    double mass = INFINITY, mobility = 0;
+    for (int i = 0; i < g->n_node; i++) {
+        const int node = g->node[i];
+        if (body->interpolation)
+            mobility += grasps->sum_weight[node] * pal_body_inverse_mass_1_kg(body, node);
+        else if (!body->support[node])
+            mass = fmin(mass, body->mass_kg[node] / grasps->sum_weight[node]);
+    }
+    return mobility > 0 ? 1 / mobility : mass;
+}
+
+void pal_grasp_act_explicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *tool, pal_step *step)
+{
+    pal_body *body = step->body;
+    double y[3], v[3], goal[3], damper[3], felt[3], mass = min_mass_kg(grasps, g, body);
+    g->k_max_N_m = GRASP_ALPHA * mass / (step->dt_s * step->dt_s);
+    g->c_max_Ns_m = GRASP_BETA * mass / step->dt_s;
+    pal_grasp_mean(g, body->d, y);
+    pal_grasp_mean(g, body->dv, v);
+    double k = fmin(pal_grasp_stiffness_N_m(grasps, pal_grasp_reach_m(grasps, tool)), g->k_max_N_m);
+    double c = fmin(k * grasps->damping_s, g->c_max_Ns_m);
+    for (int d = 0; d < 3; d++) damper[d] = c * (tool->velocity_m_s[d] - v[d]), felt[d] = tool->ramp * damper[d];
+    pal_grasp_find_goal(g, tool, step, tool->ramp * k, felt, goal);
+    if (g->adaptive) pal_adaptive_grasp_goal(g->adaptive, tool->next.quat, y, v, k, step->dt_s, goal);
+    for (int d = 0; d < 3; d++) g->force[d] = -tool->ramp * (k * (goal[d] - y[d]) + damper[d]);
+    if (!pal_finite3(g->force)) {
+        pal_set3(g->force, 0, 0, 0);
+        return;
+    }
+    double max_node_N = pal_grasp_max_weight(g) * pal_norm3(g->force), on_tissue[3];
+    pal_scale3(g->force, pal_tool_force_share(body, tool, g->force, max_node_N), g->force);
+    pal_scale3(on_tissue, -1, g->force);
+    pal_grasp_add_force(g, on_tissue, body->load);
+    pal_add3(tool->force_N, tool->force_N, g->force);
+    tool->holding = true;
+    if (step->sub == step->n_sub - 1) pal_grasp_publish(g, tool, k, c);
+}
