@@ -4,7 +4,7 @@
 # usage: test_robustness.sh PALPATE
 set -u
 palpate=$(realpath "$1")
-. "$(dirname "$0")/adaptive_surface.sh"
+. "$(dirname "$0")/shell.sh"
 run() {
     timeout 600 "$palpate" robustness "$@" >out 2>err </dev/null
     code=$?
