@@ -7,9 +7,9 @@
  * error E is the mean over the loads that are fitted. (The paper averages metres; per cent let a load that moves little
  * count as much as one that moves a lot.)
  *
- * A calibration is made once (voxels, springs, truths) and then read only; every thread evaluates on a seat of its
- * own. What an evaluation gives depends on theta alone, never on the seat's past, unless it is asked to go on from its
- * last answer. Heap. */
+ * A calibration is made once (voxels, springs, truths) and then read only; every thread evaluates in a workspace of its
+ * own. What an evaluation gives depends on theta alone, never on the workspace's past, unless it is asked to go on from
+ * its last answer. Heap. */
 #ifndef PAL_CALIBRATE_CALIBRATE_H
 #define PAL_CALIBRATE_CALIBRATE_H
 #include "server/calibrate/equilibrium.h"
@@ -69,8 +69,8 @@ typedef struct pal_calibration_info {
     const double *low, *high;        /* bounds                                        [n_parameter]             */
 } pal_calibration_info;
 void pal_calibration_info_of(const pal_calibration *calibration, pal_calibration_info *out);
-/* theta of equal constants as a hand would set them first: 0.2, 0.4, 1 E h^3 on every spring (paper B 3.4; the factors
- * of numerics.md). They are divided by the mean weight of their kind where springs are weighted */
+/* theta of equal constants as a hand would set them first: 0.2, 0.4, 1 E h^3 on every spring (paper B 3.4). They are
+ * divided by the mean weight of their kind where springs are weighted */
 void pal_calibration_manual_start(const pal_calibration *calibration, double *theta);
 /* k_J at the mesh's nodes for kind index k (of info.kind), before weights [n_node] */
 void pal_calibration_constants(const pal_calibration *calibration, const double *theta, int k, double *k_J);

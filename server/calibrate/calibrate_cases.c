@@ -17,7 +17,7 @@ enum { ENOUGH_NODES = 700, FINEST = 64 };
 
 /* what every function of one reading shares */
 typedef struct job {
-    const pal_calibrate_input *wish;
+    const pal_calibrate_input *input;
     pal_calibrate_cases *set;
     const pal_problem_reference *reference[PAL_CALIBRATE_CASES]; /* of each case; NULL: none   */
     bool named[PAL_CALIBRATE_CASES];                             /* it was named itself        */
@@ -61,14 +61,14 @@ static pal_err add_case(job *j, const char *id, bool fit)
     const pal_problem_reference *named = pal_problem_reference_find(p, id);
     const pal_problem_case *load_case = pal_problem_case_find(p, named ? named->load_case : id);
     if (!load_case || strlen(id) >= PAL_NAME) return no_case(j, flag, id);
-    if (named && j->wish->kinematics && named->finite != is(j->wish->kinematics, "finite"))
+    if (named && j->input->kinematics && named->finite != is(j->input->kinematics, "finite"))
         return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "%s: reference \"%s\" is %s, --kinematics says %s", flag,
-                                  id, named->finite ? "finite" : "linear", j->wish->kinematics);
+                                  id, named->finite ? "finite" : "linear", j->input->kinematics);
     snprintf(s->id[s->n], PAL_NAME, "%s", id);
     j->reference[s->n] = named;
     j->named[s->n] = named != NULL;
     s->list[s->n++] = (pal_calibrate_case){
-        .load_case = load_case, .fit = fit, .linear = named ? !named->finite : is(j->wish->kinematics, "linear")};
+        .load_case = load_case, .fit = fit, .linear = named ? !named->finite : is(j->input->kinematics, "linear")};
     return PAL_ERR_OK;
 }
 
@@ -126,7 +126,7 @@ static bool answers(const job *j, int index, const pal_problem_reference *r)
     const pal_problem_material *m = &j->set->problem->material[0];
     const pal_calibrate_case *c = &j->set->list[index];
     if (strcmp(r->load_case, c->load_case->id) != 0) return false;
-    if (j->wish->kinematics && r->finite == c->linear) return false;
+    if (j->input->kinematics && r->finite == c->linear) return false;
     return (isnan(r->young_Pa) || same(r->young_Pa, m->young_Pa)) &&
            (isnan(r->poisson) || same(r->poisson, m->poisson));
 }
@@ -137,8 +137,8 @@ static pal_err choose_reference(job *j, int index)
     pal_calibrate_cases *s = j->set;
     pal_calibrate_case *c = &s->list[index];
     const pal_problem *p = s->problem;
-    if (is(j->wish->truth, "fem")) j->reference[index] = NULL;
-    if (!is(j->wish->truth, "reference")) return PAL_ERR_OK;
+    if (is(j->input->truth, "fem")) j->reference[index] = NULL;
+    if (!is(j->input->truth, "reference")) return PAL_ERR_OK;
     for (int k = 0, best = 0; k < p->n_reference && !j->named[index]; k++) {
         const pal_problem_reference *r = &p->reference[k];
         int rank = !answers(j, index, r) ? 0 : !r->finite ? 1 : strcmp(r->law, "neo-hookean") ? 2 : 3;
@@ -148,8 +148,8 @@ static pal_err choose_reference(job *j, int index)
     const pal_problem_reference *r = j->reference[index];
     if (!r)
         return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "%s: --truth: no reference answers load case \"%s\"%s%s",
-                                  p->path, s->id[index], j->wish->kinematics ? " with kinematics " : "",
-                                  j->wish->kinematics ? j->wish->kinematics : "");
+                                  p->path, s->id[index], j->input->kinematics ? " with kinematics " : "",
+                                  j->input->kinematics ? j->input->kinematics : "");
     c->linear = !r->finite;
     return PAL_ERR_OK;
 }
@@ -167,7 +167,7 @@ static pal_err read_truth(job *j, int index, const char *path, const char *name)
 static pal_err choose_truths(job *j)
 {
     pal_calibrate_cases *s = j->set;
-    const char *truth = j->wish->truth;
+    const char *truth = j->input->truth;
     bool file = truth && !is(truth, "fem") && !is(truth, "reference");
     int n_fit = 0;
     for (int k = 0; k < s->n; k++) n_fit += s->list[k].fit;
@@ -212,16 +212,16 @@ static pal_err check_box(const job *j, int index)
 pal_err pal_calibrate_cases_resolution(const pal_calibrate_cases *set, const pal_case_voxel_options *voxel, int *out,
                                        pal_diagnostic *diag)
 {
-    pal_case_voxel_options wish = *voxel;
-    for (wish.resolution = 4; wish.resolution < FINEST; wish.resolution += 2) {
+    pal_case_voxel_options input = *voxel;
+    for (input.resolution = 4; input.resolution < FINEST; input.resolution += 2) {
         pal_prepared mesh = {0};
-        pal_err err = pal_case_voxels(set->problem, &set->surface, &wish, &mesh, diag);
-        if (err && (err != PAL_ERR_REFUSED || wish.resolution + 2 >= FINEST)) return err;
+        pal_err err = pal_case_voxels(set->problem, &set->surface, &input, &mesh, diag);
+        if (err && (err != PAL_ERR_REFUSED || input.resolution + 2 >= FINEST)) return err;
         int n_node = err ? 0 : mesh.tets.n_node; /* refused: thinner than such voxels */
         pal_prepared_free(&mesh);
         if (n_node > ENOUGH_NODES) break;
     }
-    *out = wish.resolution;
+    *out = input.resolution;
     return PAL_ERR_OK;
 }
 
@@ -266,14 +266,14 @@ static pal_err check_supports(const job *j)
     return PAL_ERR_OK;
 }
 
-pal_err pal_calibrate_cases_read(const pal_calibrate_input *wish, pal_calibrate_cases *out, pal_diagnostic *diag)
+pal_err pal_calibrate_cases_read(const pal_calibrate_input *input, pal_calibrate_cases *out, pal_diagnostic *diag)
 {
     *out = (pal_calibrate_cases){0};
-    job j = {.wish = wish, .set = out, .diag = diag};
-    PAL_TRY(pal_problem_read(wish->problem, &out->problem, diag));
+    job j = {.input = input, .set = out, .diag = diag};
+    PAL_TRY(pal_problem_read(input->problem, &out->problem, diag));
     PAL_TRY(check_supports(&j));
-    PAL_TRY(add_list(&j, wish->fit, true));
-    PAL_TRY(add_list(&j, wish->verify, false));
+    PAL_TRY(add_list(&j, input->fit, true));
+    PAL_TRY(add_list(&j, input->verify, false));
     PAL_TRY(settle_material(&j));
     PAL_TRY(choose_truths(&j));
     pal_mesh_file_options file = {.unit_m = out->problem->unit_m, .weld = PAL_MESH_WELD};

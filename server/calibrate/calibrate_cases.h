@@ -28,7 +28,7 @@ typedef struct pal_calibrate_cases {
 /* reads all files. REFUSED names the entry: an unknown name, one twice, a reference of other kinematics than asked for,
  * references of different materials, no reference that answers, supports that move, points that lie outside the body;
  * IO, MEMORY. *out is to be freed in any case */
-pal_err pal_calibrate_cases_read(const pal_calibrate_input *wish, pal_calibrate_cases *out, pal_diagnostic *diag);
+pal_err pal_calibrate_cases_read(const pal_calibrate_input *input, pal_calibrate_cases *out, pal_diagnostic *diag);
 /* the least even number of voxels on the longest axis whose lattice has more than 700 nodes, as the paper's bodies
  * have; at most 64. Errors are those of pal_case_voxels */
 pal_err pal_calibrate_cases_resolution(const pal_calibrate_cases *set, const pal_case_voxel_options *voxel, int *out,

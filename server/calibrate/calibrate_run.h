@@ -12,7 +12,7 @@ enum { PAL_CALIBRATE_PATH = 1200, PAL_CALIBRATE_FILES = 4 };
 typedef struct pal_calibrate_run {
     pal_flag_common common;
     /* asked */
-    pal_calibrate_input wish;
+    pal_calibrate_input input;
     pal_calibrate_options options;
     pal_fit_options fit;
     bool annealing;

@@ -1,12 +1,12 @@
 /* Where a lattice of springs (model tet_springs) comes to rest under dead loads, by Newton on its energy, and the
  * derivative of any function of the rest displacement with respect to the constant of every spring, by the adjoint: one
- * more factor and one solve, whatever the number of springs (numerics.md part 2, "Calibration").
+ * more factor and one solve, whatever the number of springs.
  *
  *   W(x) = sum q k/2 C(x)^2 - f.x        grad W = 0 at the free nodes        H = sum q k (g g' + C H_C)
  *   H lambda = dJ/du                     dJ/dk = -q C g.lambda
  * Linearised at rest, where every C is 0: K = sum q k g g', K u = f, dJ/dk = -q (g.u)(g.lambda).
  *
- * The lattice is shared and read only; a seat is one thread's own work space. Heap. */
+ * The lattice is shared and read only; a workspace belongs to one thread. Heap. */
 #ifndef PAL_CALIBRATE_EQUILIBRIUM_H
 #define PAL_CALIBRATE_EQUILIBRIUM_H
 #include "server/num/block_matrix.h"
@@ -64,8 +64,8 @@ void pal_equilibrium_workspace_destroy(pal_equilibrium_workspace *workspace); /*
 pal_err pal_equilibrium(pal_equilibrium_workspace *workspace, const double *const k_J[PAL_SPRING_KINDS],
                         const double *force_N, const pal_equilibrium_options *options, double *x,
                         pal_equilibrium_report *report, pal_diagnostic *diag);
-/* after pal_equilibrium on this seat, same arguments: slope[kind] [n_item] = dJ/dk for dJ_du [n_node][3] (not read at
- * held nodes). NUMERIC, MEMORY */
+/* after pal_equilibrium in this workspace, same arguments: slope[kind] [n_item] = dJ/dk for dJ_du [n_node][3] (not read
+ * at held nodes). NUMERIC, MEMORY */
 pal_err pal_equilibrium_adjoint(pal_equilibrium_workspace *workspace, const double *const k_J[PAL_SPRING_KINDS],
                                 const double *x, const pal_equilibrium_options *options, const double *dJ_du,
                                 double *const slope[PAL_SPRING_KINDS], pal_diagnostic *diag);

@@ -91,7 +91,7 @@ static bool read_grid(const char *text, int grid[3])
 /* NULL: the flags fit together, else the sentence */
 static const char *read_arguments(pal_calibrate_run *run, const arguments *args)
 {
-    if (!run->wish.fit || !*run->wish.fit) return "--case ID is missing";
+    if (!run->input.fit || !*run->input.fit) return "--case ID is missing";
     if (!run->scene || !*run->scene) return "-o SCENE.json is missing";
     if (args->grid && !read_grid(args->grid, run->options.grid))
         return "--grid: is not NXxNYxNZ, three numbers of nodes from 1 to 1024, as 5x3x5";
@@ -171,8 +171,8 @@ static pal_err check_targets(const pal_calibrate_run *run, pal_diagnostic *diag)
     const char *const path[PAL_CALIBRATE_FILES] = {run->scene, run->trajectory, run->picture, run->vtk};
     for (int a = 0; a < PAL_CALIBRATE_FILES; a++) {
         PAL_TRY(check_target(target_flag[a], path[a], diag));
-        PAL_TRY(check_source(target_flag[a], path[a], run->wish.problem, "problem", diag));
-        PAL_TRY(check_source(target_flag[a], path[a], run->wish.truth, "truth", diag));
+        PAL_TRY(check_source(target_flag[a], path[a], run->input.problem, "problem", diag));
+        PAL_TRY(check_source(target_flag[a], path[a], run->input.truth, "truth", diag));
         for (int b = 0; b < a && path[a]; b++)
             if (path[b] && is_same_file(path[a], path[b]))
                 return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s is the file of %s as well", target_flag[a],
@@ -207,7 +207,7 @@ static pal_err make(pal_calibrate_run *run, pal_diagnostic *diag)
     if (!err)
         err = pal_calibration_create(run->set.problem, &run->set.surface, run->set.list, run->set.n, &run->options,
                                      &run->calibration, &reason);
-    if (err) return pal_diagnostic_set(diag, err, "%s: %s", run->wish.problem, reason.text);
+    if (err) return pal_diagnostic_set(diag, err, "%s: %s", run->input.problem, reason.text);
     pal_calibration_info_of(run->calibration, &run->info);
     run->theta = malloc(sizeof *run->theta * (size_t)run->info.n_parameter);
     if (!run->theta || pal_calibration_workspace_create(run->calibration, &run->workspace))
@@ -229,7 +229,7 @@ static pal_err search(pal_calibrate_run *run, pal_diagnostic *diag)
     pal_diagnostic reason = {""};
     pal_err err = run->annealing ? pal_fit_anneal(c, &run->fit, run->theta, &run->result, &reason)
                                  : pal_fit_adjoint(c, &run->fit, run->theta, &run->result, &reason);
-    if (err) return pal_diagnostic_set(diag, err, "%s: %s", run->wish.problem, reason.text);
+    if (err) return pal_diagnostic_set(diag, err, "%s: %s", run->input.problem, reason.text);
     return pal_calibration_evaluate(c, run->workspace, run->theta, ALL, &run->last, NULL, diag);
 }
 
@@ -277,7 +277,7 @@ static pal_err work(pal_calibrate_run *run, pal_diagnostic *diag)
 {
     pal_loaded_scene *scene = NULL;
     PAL_TRY(check_targets(run, diag));
-    PAL_TRY(pal_calibrate_cases_read(&run->wish, &run->set, diag));
+    PAL_TRY(pal_calibrate_cases_read(&run->input, &run->set, diag));
     PAL_TRY(check_sources(run, diag));
     PAL_TRY(make(run, diag));
     PAL_TRY(search(run, diag));
@@ -321,8 +321,8 @@ int command_calibrate(int argc, char **argv)
     pal_calibrate_default(o);
     o->voxel.resolution = 0;
     const pal_flag flag[] = {
-        {"--case", "ID[,ID...]", PAL_FLAG_TEXT, &run.wish.fit, 0, 0, "load cases or references to fit"},
-        {"--verify", "ID[,ID...]", PAL_FLAG_TEXT, &run.wish.verify, 0, 0, "others, whose error is only reported"},
+        {"--case", "ID[,ID...]", PAL_FLAG_TEXT, &run.input.fit, 0, 0, "load cases or references to fit"},
+        {"--verify", "ID[,ID...]", PAL_FLAG_TEXT, &run.input.verify, 0, 0, "others, whose error is only reported"},
         {"-o", "SCENE.json", PAL_FLAG_TEXT, &run.scene, 0, 0, "scene to write; its mesh is written beside it"},
         {"--grid", "NXxNYxNZ", PAL_FLAG_TEXT, &args.grid, 0, 0,
          "constants at the nodes of a grid over the body, trilinear between (one of each kind for the whole body)"},
@@ -340,9 +340,9 @@ int command_calibrate(int argc, char **argv)
          "voxels along the longest axis (the least even number that gives more than 700 nodes)"},
         {"--split", "K", PAL_FLAG_COUNT, &o->split, 1, 8,
          "the finite elements of the truth are K x K x K to a voxel (2)"},
-        {"--kinematics", "finite|linear", PAL_FLAG_WORD, &run.wish.kinematics, 0, 0,
+        {"--kinematics", "finite|linear", PAL_FLAG_WORD, &run.input.kinematics, 0, 0,
          "neo-Hookean truth and springs as they move; or both linearised (a reference's, or finite)"},
-        {"--truth", "WORD", PAL_FLAG_TEXT, &run.wish.truth, 0, 0,
+        {"--truth", "WORD", PAL_FLAG_TEXT, &run.input.truth, 0, 0,
          "fem, reference (the CSV of the reference that belongs to a load case), or a file U.csv of x,y,z,ux,uy,uz\n"
          "for the one case that is fitted"},
         {"--weights", "volume|equal", PAL_FLAG_WORD, &args.weights, 0, 0,
@@ -371,7 +371,7 @@ int command_calibrate(int argc, char **argv)
                                   .n_flag = sizeof flag / sizeof flag[0],
                                   .min_operand = 1,
                                   .max_operand = 1};
-    int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.wish.problem, &n);
+    int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.input.problem, &n);
     if (code >= 0) return code;
     const char *sentence = read_arguments(&run, &args);
     if (sentence) return pal_flags_wrong(&run.common, "%s", sentence);

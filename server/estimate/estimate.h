@@ -13,14 +13,14 @@ typedef struct pal_estimate {
     double age_s; /* steps in which the body was awake since then, as it is read: 0 while it sleeps as it did   */
     bool asleep;  /* it slept then; with age_s 0 it still does                */
     double max_m; /* largest displacement then                              */
-    /* largest displacement errors, m; NaN: not known for this body (note says why) */
+    /* largest displacement errors, m; NaN: not known for this body (diag gives the reason) */
     double error_m; /* of all parts together: their sum; NaN: a large one is not known (above) */
     double discretisation_m, algebraic_m, time_m, model_m;
     double energy_error_percent; /* energy norm of the error over that of the solution    */
-    bool locking;       /* nearly incompressible in elements that lock: the estimate is too small (numerics.md) */
-    double ms;          /* of a live step, median of the last second awake; never awake: of steps beside it */
-    double estimate_ms; /* processor time that this estimate took                 */
-    /* next lower and higher choice on each knob, with what they are foreseen to cost and to leave */
+    bool locking;                /* nearly incompressible in elements that lock: the estimate is too small */
+    double ms;                   /* of a live step, median of the last second awake; never awake: of steps beside it */
+    double estimate_ms;          /* processor time that this estimate took                 */
+    /* next lower and higher choice of each parameter, with predicted time and error */
     int n_neighbour;
     pal_measured_configuration neighbour[PAL_ESTIMATE_NEIGHBOURS];
     /* nodes that each is thought to have (within 25 %, pal_configuration_estimate_nodes; as many as now where the mesh
@@ -29,7 +29,7 @@ typedef struct pal_estimate {
     char diag[160];
 } pal_estimate;
 
-/* said of a body that sleeps */
+/* diagnostic of a body that sleeps */
 #define PAL_ESTIMATE_ASLEEP "asleep: ms are those of a step awake"
 enum { PAL_ESTIMATE_STEPS = 256, PAL_ESTIMATE_COMPONENTS = 2 * PAL_ENTRIES_MAX };
 

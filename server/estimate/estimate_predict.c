@@ -1,4 +1,4 @@
-/* Neighbours on the knobs. */
+/* Neighbours on the parameters. */
 #include "server/estimate/estimate_predict.h"
 
 #include "server/sim/core/configuration.h"

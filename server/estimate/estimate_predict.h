@@ -1,16 +1,17 @@
-/* The neighbours of a running body's setting: the next lower and higher choice on each knob, with what they are
- * foreseen to cost and to leave. Private to estimate_*.c. Thread: any.
+/* The neighbours of a running body's configuration: the next lower and higher choice of each parameter, with predicted
+ * time and error. Private to this room. Thread: any.
  *
- * ms is what a step of the scene takes, as it is now (configuration.h: a shorter step is priced by two of them).
- * size: half and twice. `once` of a step's time stays (refinement, guards, what is shown); `beside` goes with the
- * sub-steps (contact, other bodies), which are those of the body that needs most; the rest goes with the sub-steps and
- * with what one of them takes (estimate_cost_model.h). The part of discretisation goes with h^order, or as it was
- * measured where many voxels are cut. None for calibrated springs, whose constants are of one size. step (implicit
- * solvers): half and twice; each of them takes as long, the part of time goes with step^solver order. tolerance
- * (implicit solvers): a tenth and ten times; the algebraic part goes with it, time by what a decade was measured to
- * cost. What a switch would refuse is not offered: pal_configuration_check_live, and more sub-steps in a step than the
- * scene allows (of explicit solvers as many more as elements are smaller; in a longer step as many more as it is
- * longer). */
+ * ms is the time of a step of the scene as it is now (configuration.h: a shorter step counts as two of them).
+ *   size        half and twice. The share `once` of a step's time stays (refinement, guards, display); `beside` goes
+ * with the sub-steps (contact, other bodies), which are those of the body that needs most; the rest goes with the
+ *               sub-steps and with the time of one of them (estimate_cost_model.h). The discretisation error goes with
+ *               h^order, or as measured where many voxels are cut. None for calibrated springs, whose constants belong
+ * to one size step        half and twice (implicit solvers): each takes as long; the time error goes with step^order of
+ * the solver tolerance   a tenth and ten times (implicit solvers): the algebraic error goes with it, the time as
+ * measured for one decade A choice that a switch would refuse is not offered: pal_configuration_check_live, and more
+ * sub-steps in a step than the scene allows (of explicit solvers as many more as elements are smaller; in a longer step
+ * as many more as it is longer).
+ */
 #ifndef PAL_ESTIMATE_ESTIMATE_PREDICT_H
 #define PAL_ESTIMATE_ESTIMATE_PREDICT_H
 #include "server/estimate/estimate.h"
@@ -31,13 +32,13 @@ typedef struct pal_prediction {
      * it
      */
     double left[2];
-    bool implicit;    /* the knobs step and tolerance mean something */
+    bool implicit;    /* the parameters step and tolerance mean something */
     int solver_order; /* in time */
     double tolerance; /* of the solver as it is */
     double decade;    /* a step's time with a tenth of the tolerance over that as it is; NaN: not known */
 } pal_prediction;
 
 /* fills neighbour from ms and the parts that out has; those whose ms or change of
- * the error cannot be foreseen are left out; error_m NaN where out's is */
+ * the error cannot be predicted are left out; error_m NaN where out's is */
 void pal_estimate_predict(const pal_prediction *from, pal_estimate *out);
 #endif

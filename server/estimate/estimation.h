@@ -22,10 +22,10 @@ bool pal_estimation_run(pal_estimation *work, pal_estimate *out);
 
 /* tolerance of the solver that leaves next to nothing */
 static const double pal_estimate_tight = 1e-9;
-/* of displacements at nodes: 1.2 to 2.1 is observed (numerics.md). Taken for anything from 1 to 2 the first is off by a
- * factor of 0.55 to 1.64; the order that three meshes tell was farther off, as the coarsest is four times as coarse as
- * a live one. Where changes still grow from mesh to mesh (few voxels across, most of them cut) there is no order yet:
- * the first left 0.2 of the truth there, the second half of it to twice as much */
+/* of displacements at nodes: 1.2 to 2.1 is observed (tests/accuracy/test_effectivity.c). Taken for anything from 1 to 2
+ * the first is off by a factor of 0.55 to 1.64; the order that three meshes tell was farther off, as the coarsest is
+ * four times as coarse as a live one. Where changes still grow from mesh to mesh (few voxels across, most of them cut)
+ * there is no order yet: the first left 0.2 of the truth there, the second half of it to twice as much */
 static const double pal_usual_order = 1.5, pal_early_order = 1;
 
 struct pal_estimation {

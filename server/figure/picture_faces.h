@@ -1,4 +1,4 @@
-/* Private to the lab's pictures: what of a triangle surface is seen from one direction, as pieces from far to near
+/* Private to body_picture.c: the visible part of a triangle surface from one direction, as pieces from far to near
  * (painter's order, by the depth of their middles: exact for convex bodies and for triangles of similar size). Faces
  * that look away are left out where the surface is closed; a closed surface inside out is turned. Thread: [load]. */
 #ifndef PAL_FIGURE_PICTURE_FACES_H

@@ -1,25 +1,28 @@
-/* Insults on a user's own scene, one after another, each judged by the criterion of its hard case: tools that jump or
- * appear inside, a meganewton on a vertex, all nodes in one plane or on one point, mirrored, shuffled, blown up, steps
- * that are too long, numbers that are none, supports switched while deformed, stiffness times a thousand, an hour under
- * load, random orders. Bullet #3882, SOFA #4594 and #5751, FleX #130 are such cases elsewhere.
+/* Robustness cases: what is known to break simulations, done to a user's own scene, one case after another, each judged
+ * by its own criterion. Tools that jump or appear inside, a meganewton on a vertex, all nodes in one plane or on one
+ * point, mirrored, shuffled, scaled up, steps that are too long, NaN and Inf as input, supports that change while the
+ * body is deformed, stiffness times a thousand, an hour under load, random commands. Bullet #3882, SOFA #4594 and #5751
+ * and FleX #130 are such cases elsewhere.
  *
- * Every insult begins from the scene at its own rest (under gravity, with the tools away), so that one of them alone
- * gives what it gives among all. Common rule: no number that is none, no body stopped unless the insult says so, energy
- * at most what it was after the insult plus 1 % (5 % where the solver is verlet, 30 % where it is central_cg: their
- * velocities are half a sub-step before their positions, which shows as a ripple where much moves fast; a step in which
- * cubes change to their split or back is not judged: the two store other energies in one shape), and after release
- * within 0.1 % S of rest in RMS, S being the box diagonal. A body that nothing holds is compared after the best rigid
- * motion. Springs (tet_springs) untangle; where they may not (model key untangle false), or do not find back, they may
- * stay tangled or be stopped when their shape was taken away: a lattice of lengths and volumes has several rests; they
- * have to be finite, bounded and within 0.1 % S of rest after a reset. Each body of a scene is excused for itself
- * alone. Solids of cells are not excused: one that stays folded fails, is reset to see that this brings it back, and
- * the note says what helps.
+ * Every case begins at the scene's own rest state (under gravity, tools away), so that a case alone gives the same
+ * result as among all. The common criterion: finite       every number is finite, and no body is stopped unless the
+ * case allows it energy       at most the energy after the disturbance plus 1 %. Solver verlet 5 %, central_cg 30 %:
+ * their velocities are half a sub-step before their positions, which shows as a ripple. A step in which hexahedra
+ * change to their split or back is not judged: the two store different energies in one shape return       within 0.1 %
+ * S of rest in RMS after release, S being the box diagonal. A body without supports is compared after the best rigid
+ * motion
  *
- * A scene that a moving support leads for ever is compared with an untouched run beside it instead of with rest; its
- * energy is not judged. Springs that stay away until their reset are told apart: `collapsed`, no failure.
+ * Springs (tet_springs) recover from inversion. Where they may not (model key recover false) or do not, they may stay
+ * inverted or be stopped: a lattice of lengths and volumes has several rest states. They have to be finite, bounded and
+ * within 0.1 % S of rest after a reset; the verdict is `collapsed`, which is no failure. Each body of a scene is
+ * excused separately. Subdivision solids are not excused: one that stays folded fails, and the report says whether a
+ * reset helps.
  *
- * Time is simulated; what comes out depends on the scene, the seed and the processor time that is allowed: an insult
- * that runs out of it before it can be judged is `undecided`, which counts as not passed. Thread: [load]. */
+ * A scene that a moving support drives for ever is compared with an undisturbed run beside it instead of with rest; its
+ * energy is not judged.
+ *
+ * Time is simulated time. The result depends on the scene, the seed and the processor time that is allowed: a case that
+ * runs out of time before it can be judged is `undecided`, which counts as not passed. Thread: [load]. */
 #ifndef PAL_ROBUSTNESS_ROBUSTNESS_H
 #define PAL_ROBUSTNESS_ROBUSTNESS_H
 #include "server/sim/world/world.h"
@@ -31,15 +34,15 @@ typedef enum pal_verdict {
     PAL_VERDICT_FAILED,
     PAL_VERDICT_UNDECIDED,
     PAL_VERDICT_SKIPPED,
-    PAL_VERDICT_COLLAPSED /* springs, as numerics.md part 3 has it: bounded, away from rest, back after a reset */
+    PAL_VERDICT_COLLAPSED /* springs: bounded, away from rest, back after a reset */
 } pal_verdict;
 /* "passed", "FAILED", "undecided", "does not apply", "collapsed" [any] */
 const char *pal_verdict_name(pal_verdict verdict);
 
 typedef struct pal_robustness_options {
     uint64_t seed;
-    double max_cpu_s; /* processor time of all insults together; 0: 60, more for scenes whose steps are dear */
-    const char *only; /* this insult alone; NULL: all                                   */
+    double max_cpu_s; /* processor time of all cases together; 0: 60, more for scenes whose steps are expensive */
+    const char *only; /* this case alone; NULL: all                                   */
     bool (*progress)(const char *what, double fraction, void *user); /* false: stop; may be NULL */
     void *user;
 } pal_robustness_options;
@@ -64,7 +67,7 @@ typedef struct pal_robustness_result {
 
 typedef struct pal_robustness_report {
     bool rests;      /* the scene comes to rest by itself: without that nothing can be said about coming back, and
-                        insults that ask for it are undecided                                                 */
+                        cases that need it are undecided                                                 */
     bool led;        /* it does not because a moving support leads it: it is judged beside an untouched run */
     double settle_s; /* simulated time that took                                                              */
     double took_s;   /* processor time of everything                                                          */
@@ -72,11 +75,11 @@ typedef struct pal_robustness_report {
     pal_robustness_result result[PAL_ROBUSTNESS_CASES_MAX];
 } pal_robustness_report;
 
-int pal_robustness_case_count(void);               /* how many there are [any] */
-const char *pal_robustness_case_name(int insult);  /* "teleport" ... [any] */
-const char *pal_robustness_case_about(int insult); /* one sentence [any]   */
+int pal_robustness_case_count(void);              /* how many there are [any] */
+const char *pal_robustness_case_name(int index);  /* "teleport" ... [any] */
+const char *pal_robustness_case_about(int index); /* one sentence [any]   */
 
-/* REFUSED: no such insult, what pal_world_create gives; STATE: progress said stop; MEMORY */
+/* REFUSED: no such case, what pal_world_create gives; STATE: progress said stop; MEMORY */
 pal_err pal_robustness_run(const pal_scene *scene, const pal_robustness_options *options, pal_robustness_report *out,
                            pal_diagnostic *diag);
 #endif

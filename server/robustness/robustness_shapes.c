@@ -11,7 +11,7 @@ typedef enum shape { FLAT, POINT, MIRRORED, SHUFFLED, STRETCHED, BLOWN_UP } shap
 static const double return_s = 10, blown_s = 25, springs_s = 4;
 
 /* one free point from where it is */
-static void insult_point(pal_trial *trial, shape how, const double low[3], const double high[3], int flat, double x[3])
+static void disturb_point(pal_trial *trial, shape how, const double low[3], const double high[3], int flat, double x[3])
 {
     for (int c = 0; c < 3; c++) {
         double middle = 0.5 * (low[c] + high[c]);
@@ -46,7 +46,7 @@ static void spoil(pal_trial *trial, int b, shape how)
     int flat = thinnest(low, high);
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        if (!body->support[i]) insult_point(trial, how, low, high, flat, body->x + 3 * (size_t)i);
+        if (!body->support[i]) disturb_point(trial, how, low, high, flat, body->x + 3 * (size_t)i);
     }
 }
 
@@ -93,26 +93,26 @@ static void shaped(pal_trial *trial, shape how)
     bool springs = true;
     for (int b = 0; b < trial->scene->n_body; b++) {
         spoil(trial, b, how);
-        /* what untangles and has a guard is judged as all others when it is beyond the guard's reach */
-        const bool untangles = pal_world_body(trial->world, b)->recovery != NULL,
+        /* what recovers and has a guard is judged as all others when it is beyond the guard's reach */
+        const bool recovers = pal_world_body(trial->world, b)->recovery != NULL,
                    far = how == BLOWN_UP && guarded(trial, b);
-        trial->may_stay[b] = pal_trial_has_springs(trial, b) && !(untangles && far);
+        trial->may_stay[b] = pal_trial_has_springs(trial, b) && !(recovers && far);
         trial->may_stop[b] = trial->may_stay[b] || far;
-        springs = springs && trial->may_stay[b] && !untangles;
+        springs = springs && trial->may_stay[b] && !recovers;
     }
     double before = extent(trial);
     pal_trial_positions_set(trial);
-    /* springs that do not untangle need not come back: long enough to see that they are bounded */
+    /* springs that do not recover from inversion need not come back: long enough to see that they are bounded */
     pal_trial_relax(trial, springs ? springs_s : how == BLOWN_UP ? blown_s : return_s);
     int n = turned_over(trial);
     double after = extent(trial);
     if (!trial->out->finite || trial->out->frozen) return;
-    if (!(after <= 1.5 * fmax(before, 1))) pal_trial_fail(trial, "grew to %.2g S", after);
+    if (!(after <= 1.5 * fmax(before, 1))) pal_trial_report(trial, PAL_VERDICT_FAILED, "grew to %.2g S", after);
     if (trial->out->return_s < INFINITY)
-        pal_trial_report(trial, "back after %.2g s", trial->out->return_s);
+        pal_trial_report(trial, PAL_VERDICT_PASSED, "back after %.2g s", trial->out->return_s);
     else
-        pal_trial_report(trial, "%.2g %% S away after %.1f s, %d elements turned over", 100 * trial->out->deviation_S,
-                         trial->out->simulated_s, n);
+        pal_trial_report(trial, PAL_VERDICT_PASSED, "%.2g %% S away after %.1f s, %d elements turned over",
+                         100 * trial->out->deviation_S, trial->out->simulated_s, n);
 }
 
 void pal_robustness_flat(pal_trial *trial)
@@ -149,20 +149,22 @@ void pal_robustness_poisoned(pal_trial *trial)
     body->x[3 * (size_t)at] = NAN;
     out->energy = NAN;
     (void)pal_world_step(trial->world, trial->scene->step_s);
-    if (!body->frozen) pal_trial_fail(trial, "the body was not stopped");
-    if (body->frozen) pal_trial_report(trial, "%s stopped: %s", body->name, body->reason);
-    if (body->frozen && !body->reason[0]) pal_trial_fail(trial, "no reason is given");
+    if (!body->frozen) pal_trial_report(trial, PAL_VERDICT_FAILED, "the body was not stopped");
+    if (body->frozen) pal_trial_report(trial, PAL_VERDICT_PASSED, "%s stopped: %s", body->name, body->reason);
+    if (body->frozen && !body->reason[0]) pal_trial_report(trial, PAL_VERDICT_FAILED, "no reason is given");
     for (int b = 1; b < trial->scene->n_body; b++) {
         const pal_body *other = pal_world_body(trial->world, b);
-        if (other->frozen || !pal_body_finite(other)) pal_trial_fail(trial, "%s was stopped with it", other->name);
+        if (other->frozen || !pal_body_finite(other))
+            pal_trial_report(trial, PAL_VERDICT_FAILED, "%s was stopped with it", other->name);
     }
     if (trial->twin) pal_world_reset(trial->twin), pal_world_reset(trial->world); /* led alike again */
     if (pal_world_reset_body(trial->world, 0) || body->frozen || !pal_body_finite(body)) {
-        pal_trial_fail(trial, "a reset did not bring it back");
+        pal_trial_report(trial, PAL_VERDICT_FAILED, "a reset did not bring it back");
         return;
     }
     pal_trial_relax(trial, return_s);
-    if (out->return_s < INFINITY) pal_trial_report(trial, "at rest %.2g s after its reset", out->return_s);
+    if (out->return_s < INFINITY)
+        pal_trial_report(trial, PAL_VERDICT_PASSED, "at rest %.2g s after its reset", out->return_s);
 }
 
 /* ---- loads ---- */
@@ -196,9 +198,10 @@ void pal_robustness_meganewton(pal_trial *trial)
     double away = pal_trial_deviation_S(trial);
     unload_all(trial);
     if (good) pal_trial_relax(trial, return_s);
-    pal_trial_report(trial, "pulled %.2g S away in RMS", away);
-    if (isfinite(trial->out->return_s)) pal_trial_report(trial, "back after %.2g s", trial->out->return_s);
-    if (isinf(trial->out->return_s)) pal_trial_report(trial, "not back");
+    pal_trial_report(trial, PAL_VERDICT_PASSED, "pulled %.2g S away in RMS", away);
+    if (isfinite(trial->out->return_s))
+        pal_trial_report(trial, PAL_VERDICT_PASSED, "back after %.2g s", trial->out->return_s);
+    if (isinf(trial->out->return_s)) pal_trial_report(trial, PAL_VERDICT_PASSED, "not back");
 }
 
 /* ---- steps that are too long ---- */
@@ -228,14 +231,17 @@ static void long_steps(pal_trial *trial, double times, int n)
     for (int i = 0; i < n; i++) {
         bool good = pal_trial_step(trial, times * trial->scene->step_s);
         if (trial->err == PAL_ERR_BUDGET) {
-            if (hash != pal_world_hash(trial->world)) pal_trial_fail(trial, "refused, but something moved");
-            pal_trial_report(trial, "refused: more sub-steps than the budget of %d", trial->scene->max_substep);
+            if (hash != pal_world_hash(trial->world))
+                pal_trial_report(trial, PAL_VERDICT_FAILED, "refused, but something moved");
+            pal_trial_report(trial, PAL_VERDICT_PASSED, "refused: more sub-steps than the budget of %d",
+                             trial->scene->max_substep);
             break;
         }
         if (!good) return;
     }
     pal_trial_relax(trial, return_s);
-    if (trial->out->return_s < INFINITY) pal_trial_report(trial, "at rest after %.2g s", trial->out->return_s);
+    if (trial->out->return_s < INFINITY)
+        pal_trial_report(trial, PAL_VERDICT_PASSED, "at rest after %.2g s", trial->out->return_s);
 }
 
 void pal_robustness_long_step(pal_trial *trial)
@@ -261,16 +267,18 @@ void pal_robustness_stiffer(pal_trial *trial)
         to.young_Pa *= 1000;
         uint64_t hash = pal_world_hash(trial->world);
         pal_err err = pal_world_material(trial->world, b, &to, &reason);
-        if (err && hash != pal_world_hash(trial->world)) pal_trial_fail(trial, "refused, but something moved");
-        if (err) pal_trial_report(trial, "refused (%.90s)", reason.text);
+        if (err && hash != pal_world_hash(trial->world))
+            pal_trial_report(trial, PAL_VERDICT_FAILED, "refused, but something moved");
+        if (err) pal_trial_report(trial, PAL_VERDICT_PASSED, "refused (%.90s)", reason.text);
     }
     good = good && pal_trial_run(trial, 0.25);
     for (int b = 0; b < trial->scene->n_body; b++)
         if (pal_world_material(trial->world, b, &trial->scene->body[b].material, &reason))
-            pal_trial_fail(trial, "the old material was refused (%.90s)", reason.text);
+            pal_trial_report(trial, PAL_VERDICT_FAILED, "the old material was refused (%.90s)", reason.text);
     unload_all(trial);
     if (good) pal_trial_relax(trial, return_s);
-    if (trial->out->return_s < INFINITY) pal_trial_report(trial, "back after %.2g s", trial->out->return_s);
+    if (trial->out->return_s < INFINITY)
+        pal_trial_report(trial, PAL_VERDICT_PASSED, "back after %.2g s", trial->out->return_s);
 }
 
 /* ---- an hour ---- */
@@ -359,7 +367,7 @@ void pal_robustness_hour(pal_trial *trial)
     const double most_drift = 1e-6, most_kinetic = 1e-9, most_plan_s = 8, step = trial->scene->step_s;
     double ms = 1, drift = 0, kinetic = 0, slept_s = NAN;
     if (trial->twin) {
-        pal_trial_skip(trial, "a moving support leads it: it never rests");
+        pal_trial_report(trial, PAL_VERDICT_SKIPPED, "a moving support leads it: it never rests");
         return;
     }
     load_all(trial, 0.1, true);
@@ -379,11 +387,12 @@ void pal_robustness_hour(pal_trial *trial)
         if (isnan(slept_s) && asleep(trial)) slept_s = trial->out->simulated_s - begin;
     }
     double watched = trial->out->simulated_s - begin, stored = fmax(trial->scale_J, 1e-300);
-    pal_trial_report(trial, "%.0f s watched in steps of %.3g s: drift %.2g S, kinetic %.2g of what is stored", watched,
-                     dt, drift, kinetic / stored);
-    if (!isnan(slept_s)) pal_trial_report(trial, "asleep from %.3g s on", slept_s);
+    pal_trial_report(trial, PAL_VERDICT_PASSED,
+                     "%.0f s watched in steps of %.3g s: drift %.2g S, kinetic %.2g of what is stored", watched, dt,
+                     drift, kinetic / stored);
+    if (!isnan(slept_s)) pal_trial_report(trial, PAL_VERDICT_PASSED, "asleep from %.3g s on", slept_s);
     if (watched < HOUR_S * (1 - 1e-9))
-        pal_trial_undecided(trial, "the time did not reach for the hour: give more --seconds");
-    if (!(drift <= most_drift)) pal_trial_fail(trial, "it drifts");
-    if (!(kinetic <= most_kinetic * stored)) pal_trial_fail(trial, "it does not stand still");
+        pal_trial_report(trial, PAL_VERDICT_UNDECIDED, "the time did not reach for the hour: give more --seconds");
+    if (!(drift <= most_drift)) pal_trial_report(trial, PAL_VERDICT_FAILED, "it drifts");
+    if (!(kinetic <= most_kinetic * stored)) pal_trial_report(trial, PAL_VERDICT_FAILED, "it does not stand still");
 }

@@ -19,7 +19,8 @@ static const double bend_share = 0.05;
 
 static bool has_tools(pal_trial *trial)
 {
-    if (!trial->touches) pal_trial_skip(trial, "no body has the row tool_push: tools touch nothing");
+    if (!trial->touches)
+        pal_trial_report(trial, PAL_VERDICT_SKIPPED, "no body has the row tool_push: tools touch nothing");
     return trial->touches;
 }
 
@@ -70,14 +71,15 @@ static void release(pal_trial *trial, bool good)
     pal_trial_exclude_rise(trial, pal_trial_energy(trial));
     trial->base_J = pal_trial_energy(trial);
     if (good) pal_trial_relax(trial, return_s);
-    if (trial->out->return_s < INFINITY) pal_trial_report(trial, "back after %.2g s", trial->out->return_s);
+    if (trial->out->return_s < INFINITY)
+        pal_trial_report(trial, PAL_VERDICT_PASSED, "back after %.2g s", trial->out->return_s);
 }
 
 static void say_force(pal_trial *trial, double most_N)
 {
     double cap = trial->scene->tool[0].force_cap_N;
-    pal_trial_report(trial, "force up to %.3g N", most_N);
-    if (most_N > cap * (1 + 1e-9)) pal_trial_fail(trial, "beyond the cap of %.3g N", cap);
+    pal_trial_report(trial, PAL_VERDICT_PASSED, "force up to %.3g N", most_N);
+    if (most_N > cap * (1 + 1e-9)) pal_trial_report(trial, PAL_VERDICT_FAILED, "beyond the cap of %.3g N", cap);
 }
 
 static double force_N(const pal_trial *trial, int tool)
@@ -189,16 +191,16 @@ void pal_robustness_numbers(pal_trial *trial)
     n_taken +=
         !pal_world_pose(trial->world, PAL_TOOL_MAX, NULL) + !pal_world_load(trial->world, 0, -1, (double[3]){0, 0, 0});
     n_taken += !pal_world_step(trial->world, 0) + !pal_world_reset_body(trial->world, PAL_BODY_MAX);
-    if (n_taken > 0) pal_trial_fail(trial, "%d of them were taken", n_taken);
-    if (hash != pal_world_hash(trial->world)) pal_trial_fail(trial, "the state changed");
-    if (n_taken == 0) pal_trial_report(trial, "all refused");
+    if (n_taken > 0) pal_trial_report(trial, PAL_VERDICT_FAILED, "%d of them were taken", n_taken);
+    if (hash != pal_world_hash(trial->world)) pal_trial_report(trial, PAL_VERDICT_FAILED, "the state changed");
+    if (n_taken == 0) pal_trial_report(trial, PAL_VERDICT_PASSED, "all refused");
     /* 1e300 N is a number: it is shortened */
     if (!pal_world_load(trial->world, 0, node, (const double[3]){0, 1e300, 0})) {
         bool good = true;
         for (int i = 0; i < 6 && good; i++) good = pal_trial_step(trial, trial->scene->step_s);
         (void)pal_world_load(trial->world, 0, node, (const double[3]){0, 0, 0});
         if (good) pal_trial_relax(trial, return_s);
-        if (good) pal_trial_report(trial, "1e300 N on a node is shortened");
+        if (good) pal_trial_report(trial, PAL_VERDICT_PASSED, "1e300 N on a node is shortened");
     }
 }
 
@@ -252,7 +254,7 @@ static bool go_over(pal_trial *trial, const pal_scene *scene, double *jump)
     pal_world *next = NULL;
     pal_diagnostic reason = {""};
     if (pal_world_create(scene, &reason, &next)) {
-        pal_trial_skip(trial, "the scene with other supports is refused: %.150s", reason.text);
+        pal_trial_report(trial, PAL_VERDICT_SKIPPED, "the scene with other supports is refused: %.150s", reason.text);
         return false;
     }
     double before = pal_world_energy_J(trial->world);
@@ -279,17 +281,18 @@ static double speed_S_s(const pal_trial *trial)
 void pal_robustness_supports(pal_trial *trial)
 {
     if (trial->twin) {
-        pal_trial_skip(trial, "a moving support leads it: the insult asks for rest elsewhere");
+        pal_trial_report(trial, PAL_VERDICT_SKIPPED, "a moving support leads it: the case asks for rest elsewhere");
         return;
     }
     for (int b = 0; b < trial->scene->n_body; b++)
         if (pal_world_body(trial->world, b)->active) {
-            pal_trial_skip(trial, "a surface that adapts begins at rest when its scene changes");
+            pal_trial_report(trial, PAL_VERDICT_SKIPPED, "a surface that adapts begins at rest when its scene changes");
             return;
         }
     pal_scene *other = malloc(sizeof *other);
     if (!other) {
-        pal_trial_undecided(trial, "not judged, there is no memory for the scene with other supports");
+        pal_trial_report(trial, PAL_VERDICT_UNDECIDED,
+                         "not judged, there is no memory for the scene with other supports");
         return;
     }
     *other = *trial->scene;
@@ -313,10 +316,12 @@ void pal_robustness_supports(pal_trial *trial)
     }
     const double left = speed_S_s(trial);
     double share = trial->scale_J > 0 ? jump / trial->scale_J : 0;
-    pal_trial_report(trial, "energy rises by %.2g of what is stored at a switch, still after %.2g s", share,
+    pal_trial_report(trial, PAL_VERDICT_PASSED,
+                     "energy rises by %.2g of what is stored at a switch, still after %.2g s", share,
                      trial->out->simulated_s - begin);
-    if (!(share <= 0.01)) pal_trial_fail(trial, "more than 1 %%");
-    if (good && since_s < hold_s) pal_trial_fail(trial, "it still moves, at the end by %.2g S a second", left);
+    if (!(share <= 0.01)) pal_trial_report(trial, PAL_VERDICT_FAILED, "more than 1 %%");
+    if (good && since_s < hold_s)
+        pal_trial_report(trial, PAL_VERDICT_FAILED, "it still moves, at the end by %.2g S a second", left);
 }
 
 /* ---- all of it at random ---- */
@@ -400,5 +405,6 @@ void pal_robustness_random(pal_trial *trial)
     calm(trial);
     if (good) good = pal_trial_run(trial, 0.3);
     if (good) pal_trial_relax(trial, return_s);
-    if (trial->out->return_s < INFINITY) pal_trial_report(trial, "back after %.2g s", trial->out->return_s);
+    if (trial->out->return_s < INFINITY)
+        pal_trial_report(trial, PAL_VERDICT_PASSED, "back after %.2g s", trial->out->return_s);
 }

@@ -1,4 +1,4 @@
-/* The rig that insults run on: rest, watched steps, coming back, verdicts. */
+/* Runs a robustness case: rest, watched steps, return to rest, verdict. */
 #include "server/robustness/robustness.h"
 
 #include "server/base/clock.h"
@@ -27,7 +27,7 @@ static const double nothing_share = 1e-9;
 static const char rule_back[] =
     "finite, not stopped, energy no more than put in " ENERGY_RULE ", rest within 0.1 % S in " PATIENCE;
 static const char rule_shape[] =
-    "finite, energy never above the insult's " ENERGY_RULE ", rest within 0.1 % S in " PATIENCE "; "
+    "finite, energy never above the case's " ENERGY_RULE ", rest within 0.1 % S in " PATIENCE "; "
     "springs: bounded, that rest after a reset";
 static const char rule_blown[] =
     "the same in 25 s, or stopped by finite_guard beyond its reach and at rest after a reset";
@@ -35,7 +35,7 @@ static const char rule_long[] = "finite, not stopped, energy no more than put in
                                 ", rest within 0.1 % S; explicit: or refused beyond the budget, nothing moved";
 static const char rule_refused[] = "refused, not a bit of the state changed";
 
-static const pal_robustness_case insults[] = {
+static const pal_robustness_case cases[] = {
     {"teleport", "a tool jumps by S through the body in one step and back", rule_back, pal_robustness_teleport},
     {"inside", "a tool appears in the middle of the body", rule_back, pal_robustness_inside},
     {"pressed", "two tools press the body against each other", rule_back, pal_robustness_pressed},
@@ -60,21 +60,21 @@ static const pal_robustness_case insults[] = {
     {"hour", "an hour at rest under load",
      "all 3,600 s watched, drift below 1e-6 S, kinetic energy below 1e-9 of what is stored", pal_robustness_hour},
 };
-enum { N_INSULT = sizeof insults / sizeof insults[0] };
+enum { N_CASE = sizeof cases / sizeof cases[0] };
 
 int pal_robustness_case_count(void)
 {
-    return N_INSULT;
+    return N_CASE;
 }
 
-const char *pal_robustness_case_name(int insult)
+const char *pal_robustness_case_name(int index)
 {
-    return insults[insult].name;
+    return cases[index].name;
 }
 
-const char *pal_robustness_case_about(int insult)
+const char *pal_robustness_case_about(int index)
 {
-    return insults[insult].what;
+    return cases[index].what;
 }
 
 const char *pal_verdict_name(pal_verdict verdict)
@@ -88,48 +88,19 @@ void pal_robustness_default(pal_robustness_options *options)
     *options = (pal_robustness_options){.seed = 1};
 }
 
-/* ---- what insults say ---- */
+/* ---- report ---- */
 
-void pal_trial_report(pal_trial *trial, const char *format, ...)
+void pal_trial_report(pal_trial *trial, pal_verdict verdict, const char *format, ...)
 {
     char *text = trial->out->diag;
+    pal_verdict *now = &trial->out->verdict;
     size_t used = strlen(text), room = sizeof trial->out->diag;
     va_list list;
     va_start(list, format);
     if (used > 0 && used + 2 < room) used += (size_t)snprintf(text + used, room - used, "; ");
     if (used < room) vsnprintf(text + used, room - used, format, list);
     va_end(list);
-}
-
-void pal_trial_skip(pal_trial *trial, const char *format, ...)
-{
-    va_list list;
-    va_start(list, format);
-    vsnprintf(trial->out->diag, sizeof trial->out->diag, format, list);
-    va_end(list);
-    trial->out->verdict = PAL_VERDICT_SKIPPED;
-}
-
-void pal_trial_fail(pal_trial *trial, const char *format, ...)
-{
-    char text[200];
-    va_list list;
-    va_start(list, format);
-    vsnprintf(text, sizeof text, format, list);
-    va_end(list);
-    pal_trial_report(trial, "%s", text);
-    trial->out->verdict = PAL_VERDICT_FAILED;
-}
-
-void pal_trial_undecided(pal_trial *trial, const char *format, ...)
-{
-    char text[200];
-    va_list list;
-    va_start(list, format);
-    vsnprintf(text, sizeof text, format, list);
-    va_end(list);
-    pal_trial_report(trial, "%s", text);
-    if (trial->out->verdict == PAL_VERDICT_PASSED) trial->out->verdict = PAL_VERDICT_UNDECIDED;
+    if (verdict == PAL_VERDICT_FAILED || verdict == PAL_VERDICT_SKIPPED || *now == PAL_VERDICT_PASSED) *now = verdict;
 }
 
 double pal_trial_random(pal_trial *trial)
@@ -352,7 +323,8 @@ static void look(pal_trial *trial)
     for (int b = 0; b < trial->scene->n_body; b++) {
         const pal_body *body = pal_world_body(trial->world, b);
         out->finite &= pal_body_finite(body);
-        if (body->frozen && !out->frozen) pal_trial_report(trial, "%s stopped: %s", body->name, body->reason);
+        if (body->frozen && !out->frozen)
+            pal_trial_report(trial, PAL_VERDICT_PASSED, "%s stopped: %s", body->name, body->reason);
         out->frozen |= body->frozen, trial->stopped[b] |= body->frozen;
     }
     double energy = pal_world_energy_J(trial->world);
@@ -459,25 +431,26 @@ static void judge(pal_trial *trial)
     out->energy = judged ? trial->excess_J / trial->scale_J : (double)NAN;
     out->excluded_rise = judged ? trial->excluded_rise_J / trial->scale_J : (double)NAN;
     if (out->verdict == PAL_VERDICT_SKIPPED) return;
-    if (!out->finite) pal_trial_fail(trial, "a number was none");
+    if (!out->finite) pal_trial_report(trial, PAL_VERDICT_FAILED, "a number is not finite");
     for (int b = 0; b < trial->scene->n_body; b++)
         if (trial->stopped[b] && !trial->may_stop[b])
-            pal_trial_fail(trial, "%s was stopped", trial->scene->body[b].name);
+            pal_trial_report(trial, PAL_VERDICT_FAILED, "%s was stopped", trial->scene->body[b].name);
     if (out->finite && !out->frozen && judged && !(out->energy <= out->limit))
-        pal_trial_fail(trial, "energy rose by %.2g of what was put in, allowed %.2g", out->energy, out->limit);
+        pal_trial_report(trial, PAL_VERDICT_FAILED, "energy rose by %.2g of what was put in, allowed %.2g", out->energy,
+                         out->limit);
     if (out->verdict == PAL_VERDICT_FAILED || out->verdict == PAL_VERDICT_UNDECIDED) return;
     bool all_excused = true;
     for (int b = 0; b < trial->scene->n_body; b++) all_excused = all_excused && excused(trial, b);
     if (trial->late && !all_excused && !(trial->needs_rest && trial->has_returned))
-        pal_trial_undecided(trial, "not judged, the time was over after %.1f simulated s: give more --seconds",
-                            out->simulated_s);
+        pal_trial_report(trial, PAL_VERDICT_UNDECIDED,
+                         "not judged, the time was over after %.1f simulated s: give more --seconds", out->simulated_s);
     else if (trial->needs_rest && !trial->rests && !trial->twin)
-        pal_trial_undecided(trial, "not judged, the scene does not come to rest by itself");
+        pal_trial_report(trial, PAL_VERDICT_UNDECIDED, "not judged, the scene does not come to rest by itself");
     else if (trial->needs_rest && !trial->has_returned)
-        pal_trial_fail(trial, "%.2g %% S from rest at the end", 100 * asked_left(trial));
+        pal_trial_report(trial, PAL_VERDICT_FAILED, "%.2g %% S from rest at the end", 100 * asked_left(trial));
 }
 
-/* what was stopped, or stayed where it was, has to come to rest after a reset; the figures of the insult are kept */
+/* what was stopped, or stayed where it was, has to come to rest after a reset; the figures of the case are kept */
 static void check_reset(pal_trial *trial, double seconds)
 {
     const double max_cpu_s = 10;
@@ -495,11 +468,11 @@ static void check_reset(pal_trial *trial, double seconds)
     memcpy(was.diag, out->diag, sizeof was.diag);
     *out = was;
     if (stopped)
-        pal_trial_fail(trial, "a reset did not bring it back");
+        pal_trial_report(trial, PAL_VERDICT_FAILED, "a reset did not bring it back");
     else if (trial->rests && !back && trial->late)
-        pal_trial_undecided(trial, "not judged after its reset: give more --seconds");
+        pal_trial_report(trial, PAL_VERDICT_UNDECIDED, "not judged after its reset: give more --seconds");
     else if (trial->rests && !back)
-        pal_trial_fail(trial, "%.2g %% S from rest %.0f s after a reset", 100 * left, max_cpu_s);
+        pal_trial_report(trial, PAL_VERDICT_FAILED, "%.2g %% S from rest %.0f s after a reset", 100 * left, max_cpu_s);
 }
 
 /* a solid of control cells that was folded has other rests, as elements of one rotation each do: what helps */
@@ -514,7 +487,8 @@ static bool is_folded(const pal_trial *trial)
 static void advise(pal_trial *trial)
 {
     bool central = energy_limit(trial) == central_slack;
-    pal_trial_report(trial, "a reset brings it back%s", central ? ", solver implicit_euler comes back from more" : "");
+    pal_trial_report(trial, PAL_VERDICT_PASSED, "a reset brings it back%s",
+                     central ? ", solver implicit_euler comes back from more" : "");
 }
 
 /* springs whose shape was taken away and that did not find it again by themselves */
@@ -525,13 +499,13 @@ static bool has_collapsed(const pal_trial *trial)
     return false;
 }
 
-static void run_one(pal_trial *trial, const pal_robustness_case *insult, double seconds)
+static void run_one(pal_trial *trial, const pal_robustness_case *which, double seconds)
 {
     pal_robustness_result *out = trial->out;
     double begin = 1e-9 * (double)pal_clock_thread_ns();
-    *out = (pal_robustness_result){.name = insult->name,
-                                   .what = insult->what,
-                                   .criterion = insult->criterion,
+    *out = (pal_robustness_result){.name = which->name,
+                                   .what = which->what,
+                                   .criterion = which->criterion,
                                    .finite = true,
                                    .deviation_S = NAN,
                                    .return_s = NAN};
@@ -543,12 +517,12 @@ static void run_one(pal_trial *trial, const pal_robustness_case *insult, double 
     memset(trial->may_stop, 0, sizeof trial->may_stop);
     memset(trial->may_stay, 0, sizeof trial->may_stay);
     if (!pal_trial_back_to_rest(trial)) {
-        pal_trial_undecided(trial, "not judged, the scene did not come to rest before it");
+        pal_trial_report(trial, PAL_VERDICT_UNDECIDED, "not judged, the scene did not come to rest before it");
         return;
     }
     pal_trial_rebase(trial);
     sample(trial);
-    insult->run(trial);
+    which->run(trial);
     sum_rescues(trial);
     judge(trial);
     const bool folded = is_folded(trial), collapsed = has_collapsed(trial);
@@ -558,7 +532,7 @@ static void run_one(pal_trial *trial, const pal_robustness_case *insult, double 
     if (folded && trial->has_returned) advise(trial);
     if (collapsed && out->verdict == PAL_VERDICT_PASSED) {
         out->verdict = PAL_VERDICT_COLLAPSED;
-        pal_trial_report(trial, "a reset brings it back");
+        pal_trial_report(trial, PAL_VERDICT_PASSED, "a reset brings it back");
     }
     out->took_s = 1e-9 * (double)pal_clock_thread_ns() - begin;
 }
@@ -644,15 +618,15 @@ static pal_err run_all(pal_trial *trial, pal_robustness_report *out)
     pal_trial_save(trial, trial->rest);
     trial->return_time_s = pal_trial_return_time_s(trial);
     const double max_cpu_s = o->max_cpu_s > 0 ? o->max_cpu_s : enough_s(trial);
-    for (int k = 0; k < N_INSULT; k++) {
-        if (o->only && strcmp(o->only, insults[k].name)) continue;
-        if (o->progress && !o->progress(insults[k].name, (double)k / N_INSULT, o->user))
-            return pal_diagnostic_set(trial->diag, PAL_ERR_STATE, "stopped before the insult %s", insults[k].name);
+    for (int k = 0; k < N_CASE; k++) {
+        if (o->only && strcmp(o->only, cases[k].name)) continue;
+        if (o->progress && !o->progress(cases[k].name, (double)k / N_CASE, o->user))
+            return pal_diagnostic_set(trial->diag, PAL_ERR_STATE, "stopped before the case %s", cases[k].name);
         double left = begin + max_cpu_s - 1e-9 * (double)pal_clock_thread_ns();
         /* what is short leaves its time to the others; none takes more than a third of what is left */
-        int n_left = o->only ? 1 : N_INSULT - k;
+        int n_left = o->only ? 1 : N_CASE - k;
         trial->out = &out->result[out->n++];
-        run_one(trial, &insults[k], fmax(0.2, n_left > 3 ? fmin(left / 3, 3 * left / n_left) : left / n_left));
+        run_one(trial, &cases[k], fmax(0.2, n_left > 3 ? fmin(left / 3, 3 * left / n_left) : left / n_left));
     }
     count(out);
     out->took_s = 1e-9 * (double)pal_clock_thread_ns() - begin;
@@ -663,7 +637,7 @@ pal_err pal_robustness_run(const pal_scene *scene, const pal_robustness_options 
                            pal_diagnostic *diag)
 {
     bool known = !options->only;
-    for (int k = 0; k < N_INSULT && !known; k++) known = !strcmp(options->only, insults[k].name);
+    for (int k = 0; k < N_CASE && !known; k++) known = !strcmp(options->only, cases[k].name);
     if (!known) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is no case \"%.60s\"", options->only);
     pal_trial trial = {.options = options, .diag = diag};
     pal_robustness_report *report = calloc(1, sizeof *report);

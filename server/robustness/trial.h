@@ -1,4 +1,5 @@
-/* What robustness.c and the files of its insults share. Private to these. */
+/* A trial: one robustness case that runs on a world of the scene, is watched step by step and judged. Core of this
+ * room; private to it. */
 #ifndef PAL_ROBUSTNESS_TRIAL_H
 #define PAL_ROBUSTNESS_TRIAL_H
 #include "server/robustness/robustness.h"
@@ -12,10 +13,10 @@ typedef struct pal_trial {
     double *start[PAL_BODY_MAX]; /* room for where they are        [n_dof][3] */
     double rest_J;
     double return_time_s; /* that bodies have to come back */
-    bool anew;            /* rest cannot be put back as positions: it is found again for every insult */
+    bool anew;            /* rest cannot be put back as positions: it is found again for every case */
     bool touches;         /* a body has a row that tools push                                         */
     int body;             /* the first such body, else 0                                              */
-    double deadline_s;    /* processor time at which this insult ends */
+    double deadline_s;    /* processor time at which this case ends */
     bool late;            /* it was reached                           */
     pal_robustness_result *out;
     /* energy less the work of lasting loads: since the last change of those it may only fall */
@@ -30,7 +31,7 @@ typedef struct pal_trial {
     pal_err err;
 } pal_trial;
 
-/* one step, watched; false: stop (a number that is none, frozen, late, a step refused) */
+/* one step, watched; false: stop (a number that is not finite, frozen, late, a step refused) */
 bool pal_trial_step(pal_trial *trial, double dt_s);
 bool pal_trial_run(pal_trial *trial, double seconds); /* steps of the scene */
 /* runs until all bodies have been within 0.1 % S of rest for half a second, at most seconds (where 10 or more are
@@ -49,11 +50,9 @@ double pal_trial_energy(const pal_trial *trial);      /* energy less the work of
 /* loads or shapes have changed from outside: what is there now is what may not grow */
 void pal_trial_rebase(pal_trial *trial);
 void pal_trial_positions_set(pal_trial *trial); /* the same after positions were set */
-void pal_trial_report(pal_trial *trial, const char *format, ...) __attribute__((format(printf, 2, 3)));
-void pal_trial_skip(pal_trial *trial, const char *format, ...) __attribute__((format(printf, 2, 3)));
-void pal_trial_fail(pal_trial *trial, const char *format, ...) __attribute__((format(printf, 2, 3)));
-void pal_trial_undecided(pal_trial *trial, const char *format, ...)
-    __attribute__((format(printf, 2, 3))); /* unless failed */
+/* adds a sentence to what happened. A case that fails or does not apply keeps that verdict; PASSED changes none */
+void pal_trial_report(pal_trial *trial, pal_verdict verdict, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
 /* a rise to this energy is not judged, but summed up */
 void pal_trial_exclude_rise(pal_trial *trial, double energy_J);
 double pal_trial_random(pal_trial *trial);                /* in (0, 1) */

@@ -11,7 +11,7 @@
 static const double still_S_s = 1e-5; /* speed, RMS, that is rest */
 static const double settle_most_s = 30;
 static const double return_s = 10, longest_s = 120, n_period = 10;
-static const double lead_s = 0.5; /* that a led scene is on its way before an insult */
+static const double lead_s = 0.5; /* that a led scene is on its way before a case */
 
 /* RMS speed of the fastest body over its S, 1/s */
 double pal_trial_speed_S_s(const pal_trial *trial)
@@ -32,7 +32,7 @@ double pal_trial_speed_S_s(const pal_trial *trial)
 
 /* ---- rest ---- */
 
-/* how long bodies have to come back, s: ten of the slowest periods (numerics.md part 3), no less than 10 s, no more
+/* how long bodies have to come back, s: ten of the slowest periods, no less than 10 s, no more
  * than two minutes */
 double pal_trial_return_time_s(const pal_trial *trial)
 {

@@ -1,6 +1,8 @@
 /* The tree is cJSON's; what it does not check is checked here: depth, UTF-8, duplicate keys, bytes behind the root. */
 #include "server/scene/json_reader.h"
 
+#include "server/mesh/files/file_bytes.h"
+
 #include "server/base/utf8.h"
 
 #include <math.h>
@@ -248,4 +250,19 @@ cJSON *pal_json_exact_list(const double *number, int n)
     cJSON *list = cJSON_CreateRaw(text);
     free(text);
     return list;
+}
+
+pal_err pal_json_read(const char *path, char *folder, size_t n_folder, char **text, size_t *n_byte,
+                      pal_diagnostic *diag)
+{
+    const char *slash = strrchr(path, '/');
+    int n = slash == path ? snprintf(folder, n_folder, "/")
+            : slash       ? snprintf(folder, n_folder, "%.*s", (int)(slash - path), path)
+                          : snprintf(folder, n_folder, ".");
+    if (n < 0 || (size_t)n >= n_folder)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.100s...: the path is too long", path);
+    uint8_t *bytes;
+    PAL_TRY(pal_file_read(path, PAL_JSON_MAX_BYTES, &bytes, n_byte, diag));
+    *text = (char *)bytes;
+    return PAL_ERR_OK;
 }

@@ -14,6 +14,10 @@ typedef struct pal_json {
     pal_diagnostic *diag; /* may be NULL  */
 } pal_json;
 
+/* reads a file of at most PAL_JSON_MAX_BYTES into *text (heap) and the name of its folder; REFUSED: the path is too
+ * long; IO, BUDGET, MEMORY */
+pal_err pal_json_read(const char *path, char *folder, size_t n_folder, char **text, size_t *n_byte,
+                      pal_diagnostic *diag);
 /* text -> tree, whose root is an object; size, depth, UTF-8 and what stands behind the root are checked before and
  * after cJSON sees it; REFUSED names the line. The caller deletes *out. */
 pal_err pal_json_parse(const pal_json *json, const char *text, size_t n_byte, cJSON **out);

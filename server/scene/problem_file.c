@@ -474,17 +474,11 @@ pal_err pal_problem_parse(const char *name, const char *text, size_t n_byte, con
 pal_err pal_problem_read(const char *path, pal_problem **out, pal_diagnostic *diag)
 {
     char folder[512];
-    const char *slash = strrchr(path, '/');
-    int n = slash == path ? snprintf(folder, sizeof folder, "/")
-            : slash       ? snprintf(folder, sizeof folder, "%.*s", (int)(slash - path), path)
-                          : snprintf(folder, sizeof folder, ".");
-    if (n < 0 || (size_t)n >= sizeof folder)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.100s...: the path is too long", path);
-    uint8_t *bytes;
+    char *text;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, PAL_JSON_MAX_BYTES, &bytes, &n_byte, diag));
-    pal_err err = pal_problem_parse(path, (const char *)bytes, n_byte, folder, out, diag);
-    free(bytes);
+    PAL_TRY(pal_json_read(path, folder, sizeof folder, &text, &n_byte, diag));
+    pal_err err = pal_problem_parse(path, text, n_byte, folder, out, diag);
+    free(text);
     return err;
 }
 

@@ -241,8 +241,8 @@ static pal_err read_tools(const pal_json *json, const cJSON *root, pal_scene *sc
     return PAL_ERR_OK;
 }
 
-/* "x", "1 mm", "within 1 mm" tell people nothing: a wish in the wrong place */
-static bool is_wish(const char *text)
+/* "x", "1 mm", "within 1 mm" tell people nothing: a target in the wrong place */
+static bool is_target(const char *text)
 {
     static const char *const unit[] = {"mm", "cm", "um", "m"};
     const char *last = strrchr(text, ' ');
@@ -255,7 +255,7 @@ static bool is_wish(const char *text)
 }
 
 /* what the scene asks of its study: "accuracy" as text or {max_error_mm, text}, "budget" {step_ms} */
-static pal_err read_wish(const pal_json *json, const cJSON *root, pal_scene *scene)
+static pal_err read_target(const pal_json *json, const cJSON *root, pal_scene *scene)
 {
     const cJSON *accuracy = cJSON_GetObjectItemCaseSensitive(root, "accuracy");
     const cJSON *budget = cJSON_GetObjectItemCaseSensitive(root, "budget");
@@ -269,7 +269,7 @@ static pal_err read_wish(const pal_json *json, const cJSON *root, pal_scene *sce
         scene->max_error_m = most_mm / 1000;
     } else {
         PAL_TRY(pal_json_text(json, root, "", "accuracy", true, scene->accuracy, sizeof scene->accuracy));
-        if (is_wish(scene->accuracy))
+        if (is_target(scene->accuracy))
             return pal_json_refuse(json, "accuracy",
                                    "\"%.40s\" is no sentence on how far off the body is; an accuracy is asked for by "
                                    "{\"max_error_mm\": 1}",
@@ -293,7 +293,7 @@ static pal_err read_scene(const pal_json *json, const cJSON *root, const char *f
     if (strcmp(plain, scene->name)) return pal_json_refuse(json, "name", "has other characters than a-z 0-9 _ -");
     PAL_TRY(pal_json_text(json, root, "", "title", true, scene->title, sizeof scene->title));
     PAL_TRY(pal_json_text(json, root, "", "source", true, scene->source, sizeof scene->source));
-    PAL_TRY(read_wish(json, root, scene));
+    PAL_TRY(read_target(json, root, scene));
     PAL_TRY(pal_json_number(json, root, "", "step_s", 1e-4, 0.1, &scene->step_s));
     PAL_TRY(pal_json_number(json, root, "", "gravity_m_s2", -1e4, 1e4, &scene->gravity_m_s2));
     PAL_TRY(pal_json_count(json, root, "", "max_substep", 1, 1000000, &scene->max_substep));
@@ -329,17 +329,11 @@ pal_err pal_scene_parse(const char *name, const char *text, size_t n_byte, const
 pal_err pal_scene_load(const char *path, pal_loaded_scene **out, pal_diagnostic *diag)
 {
     char folder[FOLDER];
-    const char *slash = strrchr(path, '/');
-    int n = slash == path ? snprintf(folder, sizeof folder, "/")
-            : slash       ? snprintf(folder, sizeof folder, "%.*s", (int)(slash - path), path)
-                          : snprintf(folder, sizeof folder, ".");
-    if (n < 0 || (size_t)n >= sizeof folder)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.100s...: the path is too long", path);
-    uint8_t *bytes;
+    char *text;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, PAL_JSON_MAX_BYTES, &bytes, &n_byte, diag));
-    pal_err err = pal_scene_parse(path, (const char *)bytes, n_byte, folder, out, diag);
-    free(bytes);
+    PAL_TRY(pal_json_read(path, folder, sizeof folder, &text, &n_byte, diag));
+    pal_err err = pal_scene_parse(path, text, n_byte, folder, out, diag);
+    free(text);
     return err;
 }
 

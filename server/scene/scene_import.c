@@ -130,13 +130,13 @@ static double count_nodes(const pal_voxels *v)
 }
 
 /* the resolution that comes nearest to 2,600 kept voxels, or for model fem to 2,500 nodes */
-static pal_err choose_resolution(const pal_surface *surface, const pal_surface_scene *wish, int *out,
+static pal_err choose_resolution(const pal_surface *surface, const pal_surface_scene *requested, int *out,
                                  pal_diagnostic *diag)
 {
     int n = clamp(first_resolution(surface), 4, 400), best = 0;
     double best_miss = INFINITY;
     for (int round = 0; round < 4; round++) {
-        pal_voxel_options options = voxel_options(wish);
+        pal_voxel_options options = voxel_options(requested);
         options.resolution = n;
         pal_voxels voxels;
         pal_voxel_report report;
@@ -148,8 +148,8 @@ static pal_err choose_resolution(const pal_surface *surface, const pal_surface_s
         }
         if (err && best == 0) return err;
         if (err) break;
-        double kept = (double)(voxels.n_inside + voxels.n_border), want = wish->fem ? WANTED_NODES : WANTED_VOXELS;
-        if (wish->fem) kept = fmax(1, count_nodes(&voxels));
+        double kept = (double)(voxels.n_inside + voxels.n_border), want = requested->fem ? WANTED_NODES : WANTED_VOXELS;
+        if (requested->fem) kept = fmax(1, count_nodes(&voxels));
         double miss = fabs(log(kept / want));
         pal_voxels_free(&voxels);
         if (miss < best_miss) best_miss = miss, best = n;

@@ -96,16 +96,16 @@ static pal_err drop_loose(const pal_problem *p, pal_prepared *mesh, pal_diagnost
     return err;
 }
 
-pal_err pal_case_voxels(const pal_problem *problem, const pal_surface *surface, const pal_case_voxel_options *wish,
+pal_err pal_case_voxels(const pal_problem *problem, const pal_surface *surface, const pal_case_voxel_options *how,
                         pal_prepared *out, pal_diagnostic *diag)
 {
-    pal_voxel_options voxel = {.resolution = wish->resolution, .border = true, .min_fill = wish->min_fill};
+    pal_voxel_options voxel = {.resolution = how->resolution, .border = true, .min_fill = how->min_fill};
     pal_prepare_report report;
-    bool chosen = !(wish->min_fill > 0);
-    if (chosen) voxel.min_fill = wish->fill ? drop_fill : whole_fill;
-    if (wish->align) align(problem, wish->resolution, surface, voxel.ahead);
+    bool chosen = !(how->min_fill > 0);
+    if (chosen) voxel.min_fill = how->fill ? drop_fill : whole_fill;
+    if (how->align) align(problem, how->resolution, surface, voxel.ahead);
     PAL_TRY(pal_prepared_make(surface, &voxel, out, &report, diag));
-    if (chosen && wish->fill && missing(out) > most_missing) {
+    if (chosen && how->fill && missing(out) > most_missing) {
         pal_prepared_free(out);
         voxel.min_fill = keep_fill;
         PAL_TRY(pal_prepared_make(surface, &voxel, out, &report, diag));

@@ -17,7 +17,7 @@ typedef struct pal_case_voxel_options {
 
 /* components that no support of the problem holds are dropped or refused (mesh/volume/loose_components.h); REFUSED,
  * BUDGET, MEMORY as of pal_prepared_make too */
-pal_err pal_case_voxels(const pal_problem *problem, const pal_surface *surface, const pal_case_voxel_options *wish,
+pal_err pal_case_voxels(const pal_problem *problem, const pal_surface *surface, const pal_case_voxel_options *how,
                         pal_prepared *out, pal_diagnostic *diag);
 
 /* "(0, 0, 0) .. (1, 1, 1)" in the frame of the problem, for sentences */

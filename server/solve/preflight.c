@@ -280,7 +280,7 @@ static double component_ns(const pal_body *body, const char *name)
 /* A step under load. Explicit: forces and one pass over the points for every sub-step, four of each with rk4, the
  * masses' conjugate gradients with central_cg. Implicit: four iterations, each an application of the rows and two
  * passes through the factor, and forces, stiffness and energy around them */
-static double foresee_ms(const probe *p, const pal_body *body, int n_sub, int b)
+static double predict_ms(const probe *p, const pal_body *body, int n_sub, int b)
 {
     double forces = 0, solve = 0;
     const char *solver = "";
@@ -356,7 +356,7 @@ static pal_err look_at_body(pal_world *world, const pal_scene *scene, int b, int
     look_at_masses(body, out);
     look_for_locking(&scene->body[b], out);
     if (!look_at_modes(&p, out)) return PAL_ERR_MEMORY;
-    out->predicted_ms = foresee_ms(&p, body, out->n_sub, b);
+    out->predicted_ms = predict_ms(&p, body, out->n_sub, b);
     return PAL_ERR_OK;
 }
 

@@ -1,5 +1,5 @@
 /* What can be said of a scene before it runs: the stable sub-step and which node sets it, elements and nodes that are
- * weak and where they are, conditioning, memory, and what a step will cost, foreseen from counts. A scene that cannot
+ * weak and where they are, conditioning, memory, and what a step will cost, predicted from counts. A scene that cannot
  * run is refused with the reason that pal_world_create gives. Works on a world of its own, at rest; costs some hundred
  * evaluations of the forces, most of them for the slowest motion. Thread: [load]. */
 #ifndef PAL_SOLVE_PREFLIGHT_H

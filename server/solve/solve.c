@@ -291,8 +291,8 @@ static pal_err prepare(const job *j, const pal_surface *surface)
 {
     const pal_solve_options *o = j->options;
     pal_solution *s = j->s;
-    pal_case_voxel_options wish = {o->resolution, o->fill, o->min_fill, o->align};
-    PAL_TRY(pal_case_voxels(j->problem, surface, &wish, &s->mesh, j->diag));
+    pal_case_voxel_options voxels = {o->resolution, o->fill, o->min_fill, o->align};
+    PAL_TRY(pal_case_voxels(j->problem, surface, &voxels, &s->mesh, j->diag));
     if (o->split > 1) PAL_TRY(pal_refine_voxels(&s->mesh, o->split, j->diag));
     PAL_TRY(make_world(j));
     const pal_body *b = s->body;

@@ -9,11 +9,11 @@
 #include <string.h>
 #include <unistd.h>
 
-const char *pal_accuracy_target_text(const pal_accuracy_target *wish, char out[80])
+const char *pal_accuracy_target_text(const pal_accuracy_target *target, char out[80])
 {
-    bool within = wish->max_error_m > 0, budget = wish->budget_ms > 0;
-    int n = within ? snprintf(out, 80, "within %g mm", 1e3 * wish->max_error_m) : 0;
-    if (budget) snprintf(out + n, 80 - (size_t)n, "%sin at most %g ms", n ? " " : "", wish->budget_ms);
+    bool within = target->max_error_m > 0, budget = target->budget_ms > 0;
+    int n = within ? snprintf(out, 80, "within %g mm", 1e3 * target->max_error_m) : 0;
+    if (budget) snprintf(out + n, 80 - (size_t)n, "%sin at most %g ms", n ? " " : "", target->budget_ms);
     if (!within && !budget) out[0] = 0;
     return out;
 }
@@ -60,29 +60,29 @@ static pal_study *only(const pal_study *study, const char *methods)
     return out;
 }
 
-int pal_study_pick_target(const pal_study *study, const char *methods, const pal_accuracy_target *wish)
+int pal_study_pick_target(const pal_study *study, const char *methods, const pal_accuracy_target *target)
 {
     pal_study *some = only(study, methods);
     if (!some) return -1;
-    int picked = pal_study_pick(some, wish->max_error_m > 0 ? wish->max_error_m : NAN,
-                                wish->budget_ms > 0 ? wish->budget_ms : NAN);
+    int picked = pal_study_pick(some, target->max_error_m > 0 ? target->max_error_m : NAN,
+                                target->budget_ms > 0 ? target->budget_ms : NAN);
     if (picked >= 0 && isnan(some->point[picked].measured.ms)) picked = -1;
     free(some);
     return picked;
 }
 
-/* is a nearer to the wish than b? Within the budget by error, else by time */
-static bool is_nearer(const pal_study_point *a, const pal_study_point *b, const pal_accuracy_target *wish)
+/* is a nearer to the target than b? Within the budget by error, else by time */
+static bool is_nearer(const pal_study_point *a, const pal_study_point *b, const pal_accuracy_target *target)
 {
-    if (wish->max_error_m > 0 && wish->budget_ms > 0) {
-        bool a_in = a->measured.ms <= wish->budget_ms, b_in = b->measured.ms <= wish->budget_ms;
+    if (target->max_error_m > 0 && target->budget_ms > 0) {
+        bool a_in = a->measured.ms <= target->budget_ms, b_in = b->measured.ms <= target->budget_ms;
         if (a_in != b_in) return a_in;
         return a_in ? a->measured.error_m < b->measured.error_m : a->measured.ms < b->measured.ms;
     }
-    return wish->max_error_m > 0 ? a->measured.error_m < b->measured.error_m : a->measured.ms < b->measured.ms;
+    return target->max_error_m > 0 ? a->measured.error_m < b->measured.error_m : a->measured.ms < b->measured.ms;
 }
 
-void pal_study_describe_miss(const pal_study *study, const char *methods, const pal_accuracy_target *wish, char *out,
+void pal_study_describe_miss(const pal_study *study, const char *methods, const pal_accuracy_target *target, char *out,
                              size_t n_byte)
 {
     char asked[80], text[PAL_CONFIGURATION_TEXT], own[48] = "";
@@ -92,7 +92,7 @@ void pal_study_describe_miss(const pal_study *study, const char *methods, const 
         const pal_study_point *p = &study->point[k];
         if (!is_measured(p) || !pal_study_method_in(methods, p->measured.setting.model)) continue;
         n++;
-        if (!best || is_nearer(p, best, wish)) best = p;
+        if (!best || is_nearer(p, best, target)) best = p;
     }
     if (!pal_study_trusted(study)) {
         snprintf(out, n_byte,
@@ -101,8 +101,8 @@ void pal_study_describe_miss(const pal_study *study, const char *methods, const 
                  1e3 * study->reference_m, 1e3 * study->max_m);
         return;
     }
-    pal_accuracy_target_text(wish, asked);
-    if (wish->max_error_m > 0 && study->reference_m > 0)
+    pal_accuracy_target_text(target, asked);
+    if (target->max_error_m > 0 && study->reference_m > 0)
         snprintf(own, sizeof own, " and %.2g of the reference's own", 1e3 * study->reference_m);
     if (!best)
         snprintf(out, n_byte, "none of the settings was measured, so none is %s", asked);
@@ -130,15 +130,15 @@ static pal_err find(const char *path, const pal_scene *scene, pal_study_file **o
                               path);
 }
 
-static pal_err pick(const char *word, const char *path, const pal_scene *scene, const pal_accuracy_target *wish,
+static pal_err pick(const char *word, const char *path, const pal_scene *scene, const pal_accuracy_target *target,
                     pal_studied_scene *out, pal_diagnostic *diag)
 {
     char asked[80], text[PAL_CONFIGURATION_TEXT], none[360], off[PAL_STUDY_ERROR_TEXT];
     const pal_study *study = &out->file->study;
-    pal_accuracy_target_text(wish, asked);
-    out->picked = pal_study_pick_target(study, "", wish);
+    pal_accuracy_target_text(target, asked);
+    out->picked = pal_study_pick_target(study, "", target);
     if (out->picked < 0) {
-        pal_study_describe_miss(study, "", wish, none, sizeof none);
+        pal_study_describe_miss(study, "", target, none, sizeof none);
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s; more of them: palpate study %s --again", path, none,
                                   word);
     }
@@ -160,8 +160,8 @@ static pal_err pick(const char *word, const char *path, const pal_scene *scene, 
 pal_err pal_studied_scene_open(const char *word, const pal_scene *scene, pal_studied_scene *out, pal_diagnostic *diag)
 {
     char stem[PAL_STUDY_PATH], path[PAL_STUDY_PATH + 8], machine[PAL_MACHINE_TEXT], asked[80];
-    const pal_accuracy_target wish = {scene->max_error_m, scene->budget_ms};
-    bool wanted = wish.max_error_m > 0 || wish.budget_ms > 0;
+    const pal_accuracy_target target = {scene->max_error_m, scene->budget_ms};
+    bool wanted = target.max_error_m > 0 || target.budget_ms > 0;
     pal_diagnostic reason = {""};
     *out = (pal_studied_scene){.scene = scene, .picked = -1};
     PAL_TRY(pal_study_stem(word, NULL, stem, diag));
@@ -170,7 +170,7 @@ pal_err pal_studied_scene_open(const char *word, const pal_scene *scene, pal_stu
     if (!out->file && wanted)
         return pal_diagnostic_set(diag, err ? err : PAL_ERR_REFUSED,
                                   "%s: asks for a setting %s, %s%s: run palpate study %s%s", word,
-                                  pal_accuracy_target_text(&wish, asked), err ? "and " : "but there is no ",
+                                  pal_accuracy_target_text(&target, asked), err ? "and " : "but there is no ",
                                   err ? reason.text : path, word, err ? " --again" : "");
     if (!out->file) {
         if (err) snprintf(out->warn, sizeof out->warn, "%.300s: not looked at", reason.text);
@@ -186,7 +186,7 @@ pal_err pal_studied_scene_open(const char *word, const pal_scene *scene, pal_stu
     else if (!out->file->whole)
         snprintf(out->warn, sizeof out->warn, "%.150s: was broken off after %d of %d settings", path,
                  out->file->study.n_point, out->file->n_finest);
-    return wanted ? pick(word, path, scene, &wish, out, diag) : PAL_ERR_OK;
+    return wanted ? pick(word, path, scene, &target, out, diag) : PAL_ERR_OK;
 }
 
 void pal_studied_scene_close(pal_studied_scene *studied)

@@ -9,7 +9,7 @@ typedef struct pal_accuracy_target {
     double max_error_m, budget_ms;
 } pal_accuracy_target;
 /* "within 1 mm", "in at most 4 ms", "within 1 mm in at most 4 ms"; returns out */
-const char *pal_accuracy_target_text(const pal_accuracy_target *wish, char out[80]);
+const char *pal_accuracy_target_text(const pal_accuracy_target *target, char out[80]);
 enum { PAL_STUDY_ERROR_TEXT = 320 };
 /* "0.54 mm off, +- 0.42 mm of the reference, under three presses and a pull, 0.5 s, that move it by up to 18 mm" */
 const char *pal_study_error_text(const pal_study_file *file, double error_m, char out[PAL_STUDY_ERROR_TEXT]);
@@ -17,10 +17,10 @@ const char *pal_study_error_text(const pal_study_file *file, double error_m, cha
  * parts of the reference's description as fit */
 void pal_study_accuracy_text(const pal_study *study, double error_m, char *out, size_t n_byte);
 /* pal_study_pick among the methods (words with commas, "": all); index of the point, -1: none serves */
-int pal_study_pick_target(const pal_study *study, const char *methods, const pal_accuracy_target *wish);
+int pal_study_pick_target(const pal_study *study, const char *methods, const pal_accuracy_target *target);
 /* "none of the 48 settings is within 1 mm: the nearest is fem ..., 1.3 mm in 5.2 ms", or that the reference is not to
  * be trusted and what to do; for a study in which none serves */
-void pal_study_describe_miss(const pal_study *study, const char *methods, const pal_accuracy_target *wish, char *out,
+void pal_study_describe_miss(const pal_study *study, const char *methods, const pal_accuracy_target *target, char *out,
                              size_t n_byte);
 
 /* a scene as it runs */

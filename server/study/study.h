@@ -1,28 +1,22 @@
-/* What accuracy costs: one body under the same loads in many settings, each with its error against a converged
- * reference and its milliseconds per live step. [load]
+/* What accuracy costs: one body under the same loads in many configurations, each with its error against a converged
+ * reference and its milliseconds per live step. README.md explains the loads, the reference and the measures; here are
+ * the numbers that it leaves out. [load]
  *
- * Loads: those of a problem's load case; or of a scene three presses on patches of its surface far from the supports,
- * each as strong as moves the body by about 2 % of its diagonal (linear estimate, then the reference's own rest, within
- * a factor of 1.5), and a pull as wide as a hand at the first of these places, outward and aslant, with what the
- * first tool may (15 N where there is none), or what moves the body by 10 % of its diagonal (a wall by 5 %) where that
- * is less; half of that, up to four times, where the reference finds no rest. Static: the rest under every load, at up
- * to 1,000 points of the shown surface. Dynamic: half of the first load put on at once at rest, so that the swing goes
- * about as far as the whole load at rest, and the way of the point that it moves most for `seconds`, with the scene's
- * own damping; what would take too long (1.5e9 nodes times sub-steps) is timed and said not to be followed. Reference:
- * fem hex8_bbar with the law of the study on a mesh finer than any that is swept by 1.4 or more, whose own error is
- * estimated from its last changes (Richardson of an order between 1 and 2; changes that shrink less are scatter of cut
- * voxels, and the larger of them counts 1.25 times); a quick one is made finer, up to 12,000 nodes, until that is 15 %
- * of what moves most. Its dynamic run with sdirk2 of 1/960 s (quick: 1/480 s) or a quarter (a half) of the scene's step
- * where that is shorter; adaptive_springs: its own finest level, wholly refined, loaded and compared at the vertices of
- * the coarse surface; or samples that the caller has. Deterministic but for the milliseconds and seconds. Swept are the
- * scene's own step in every method and size, and beside it a quarter and a half of it, twice it up to 1/60 s, and
- * 1/1000 s. The milliseconds are the median over the steps of the way, which is gone again from rest until they have
- * taken 50 ms together (1,200 steps at most); when all is measured every way is gone twice more (quick: once), one
- * setting after the other, and the least median counts, as other work on the machine only adds to it. What is on the
- * front is tortured shortly (study_robustness.c); what fails without its guard stopping it says so in its `why` and is
- * not named. Calibrated springs keep a tenth of the volume stiffness that the material gives, and are fitted to the
- * reference under all loads but the last (the pull), which judges them unseen; where there is one load only, the
- * point's `why` says that it is judged by what it was fitted to, and it is neither on the front nor picked. */
+ * Presses move the body by 2 % of its diagonal within a factor of 1.5, by a linear estimate and then by the reference's
+ * own rest; a load under which the reference finds no rest is halved, up to four times. The dynamic run applies half of
+ * the first load at once at rest, so that the swing goes about as far as the whole load at rest; runs of more
+ * than 1.5e9 nodes times sub-steps are timed and marked as not followed. The reference runs with sdirk2 and 1/960 s
+ * (quick: 1/480 s), or a quarter (a half) of the scene's step where that is shorter. Changes between its meshes that do
+ * not shrink are the scatter of cut voxels, and the larger of them counts 1.25 times; a quick reference is refined, up
+ * to 12,000 nodes, until its error is below 15 % of what moves most. Samples of the caller may replace it.
+ *
+ * Every method and size runs with the scene's own step, and beside it with a quarter and a half of it, twice it up to
+ * 1/60 s, and 1/1000 s. A run repeats until its steps have taken 50 ms together (1,200 steps at most). All results but
+ * the milliseconds and seconds are deterministic.
+ *
+ * A configuration on the front runs two robustness cases (study_robustness.c); one that fails without being stopped by
+ * its guard says so in `reason` and leaves the front. Calibrated springs keep at least a tenth of the material's volume
+ * stiffness; with one load only, `reason` says that they are judged by the load they were fitted to. */
 #ifndef PAL_STUDY_STUDY_H
 #define PAL_STUDY_STUDY_H
 #include "server/sim/core/configuration.h"
@@ -116,19 +110,20 @@ void pal_study_mark_front(pal_study *study);
  * ms at most budget_ms (of those nearer than the reference's own error the cheapest); the one that is not asked for is
  * NaN; both: cheapest that keeps both. -1: none serves, or the reference is not to be trusted */
 int pal_study_pick(const pal_study *study, double max_error_m, double budget_ms);
-/* cost and error foreseen for a setting between those measured, leave_out (-1: none) being no part of them: by ms = a +
- * b n^c and error = d size^-p along the sizes of settings that are the same but for them, or by what each knob of the
- * model adds to the logarithms; false: too few points of the model, or none with such an element, law, solver, step */
+/* cost and error predicted for a setting between those measured, leave_out (-1: none) being no part of them: by ms = a
+ * + b n^c and error = d size^-p along the sizes of settings that are the same but for them, or by what each parameter
+ * of the model adds to the logarithms; false: too few points of the model, or none with such an element, law, solver,
+ * step */
 bool pal_study_predict_configuration(const pal_study *study, const pal_configuration *setting, int leave_out,
                                      double *ms, double *error_m);
-/* Cost foreseen for a setting that is made and has not run: of n_node nodes, n_element elements and n_substep sub-steps
- * in a step of its own at rest (body.h, pal_world_substeps), and what reading its factor takes (pal_study_point). Known
- * for that: what the other points of its model took, leave_out (-1: none) being no part of them, with their knobs,
- * nodes and sub-steps; of the setting its own knobs and these; no time of it. A step of its own is a + n_substep
- * (n_element + c read_ms) r (study_cost.c). Of a surface that adapts neither count is looked at, as how much of it is
- * refined is not known before it runs: the share is that of what the other levels refined, sub-steps are those of its
- * finest level. false: fewer than three points of the model, none with such an element, law or solver, or none that
- * adapts */
+/* Cost predicted for a setting that is made and has not run: of n_node nodes, n_element elements and n_substep
+ * sub-steps in a step of its own at rest (body.h, pal_world_substeps), and what reading its factor takes
+ * (pal_study_point). Known for that: what the other points of its model took, leave_out (-1: none) being no part of
+ * them, with their parameters, nodes and sub-steps; of the setting its own parameters and these; no time of it. A step
+ * of its own is a + n_substep (n_element + c read_ms) r (study_cost.c). Of a surface that adapts neither count is
+ * looked at, as how much of it is refined is not known before it runs: the share is that of what the other levels
+ * refined, sub-steps are those of its finest level. false: fewer than three points of the model, none with such an
+ * element, law or solver, or none that adapts */
 bool pal_study_predict_cost(const pal_study *study, const pal_configuration *setting, int n_node, double n_element,
                             int n_substep, double read_ms, int leave_out, double *ms);
 #endif

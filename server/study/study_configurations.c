@@ -1,5 +1,5 @@
-/* Which settings a study sweeps: one knob at a time turned from a base, at several sizes, so that what each knob adds
- * is seen at each of them. The base has the step of the scene. */
+/* Which settings a study sweeps: one parameter at a time turned from a base, at several sizes, so that what each
+ * parameter adds is seen at each of them. The base has the step of the scene. */
 #include "server/study/study_job.h"
 
 #include <math.h>

@@ -1,24 +1,24 @@
-/* What a setting costs, foreseen from what the other settings of its model took and from counts that are known before
+/* What a setting costs, predicted from what the other settings of its model took and from counts that are known before
  * it runs.
  *
  * A step of its own takes a + sub-steps (elements (e + t) + c q) r: a is what a step takes whatever is solved (the skin
  * above all), e what an element takes beside others, t what is added where the law has an exact tangent (neo_hookean:
  * matrices of all elements are made in every step), q the time of reading its solver's factor on this machine (what no
  * longer fits into caches is read slower), r what an element takes in a sub-step, whose logarithm is a sum of what each
- * knob adds and of what grows with the nodes. Elements and not nodes, of which a slender body has twice as many to an
- * element; of bodies without elements of their own (springs) nodes. a, c, t and the sum are fitted to the others by
- * least squares of logarithms; what the sum misses at those that are near in knobs and nodes is taken off. */
+ * parameter adds and of what grows with the nodes. Elements and not nodes, of which a slender body has twice as many to
+ * an element; of bodies without elements of their own (springs) nodes. a, c, t and the sum are fitted to the others by
+ * least squares of logarithms; what the sum misses at those that are near in parameters and nodes is taken off. */
 #include "server/study/study_job.h"
 
 #include <math.h>
 #include <string.h>
 
 enum { LEAST = 3, FEATURES = 18, GRID = 24, GOLDEN = 40, RATES = 16, ROUNDS = 4, ROUGH = 6 };
-/* weight of "no effect" for each knob of as many settings as are enough; of "off by nothing" beside settings that are
- * near */
+/* weight of "no effect" for each parameter of as many settings as are enough; of "off by nothing" beside settings that
+ * are near */
 static const double ridge = 3e-2, enough = 30, trust = 0.1;
-/* so many knobs that stand otherwise are as far as e times the nodes */
-static const double knobs_per_e = 4, whole_nodes = 1000;
+/* so many parameters that stand otherwise are as far as e times the nodes */
+static const double parameters_per_e = 4, whole_nodes = 1000;
 
 typedef struct seen {
     const pal_configuration *setting;
@@ -48,7 +48,7 @@ static void features(const pal_configuration *s, double n_node, double f[FEATURE
     f[17] = 0.5 * f[12] * n;
 }
 
-/* few settings tell little of each knob: elements times sub-steps alone tell most */
+/* few settings tell little of each parameter: elements times sub-steps alone tell most */
 static double hold_of(int n)
 {
     return ridge * fmax(1, pow(enough / n, 2));
@@ -223,15 +223,15 @@ static double nodes_in_use(const pal_study *study, int leave_out, const pal_conf
     return n > 0 ? coarse + share / n * (refined_nodes(study, leave_out, s, coarse) - coarse) : (double)NAN;
 }
 
-/* ---- foreseen ---- */
+/* ---- predicted ---- */
 
 static double distance(const seen *p, const pal_configuration *s, double n_node)
 {
     const pal_configuration *q = p->setting;
-    int knobs = !pal_study_is(q->element, s->element) + !pal_study_is(q->law, s->law) +
-                !pal_study_is(q->solver, s->solver) + (q->step_s != s->step_s) + (q->tolerance != s->tolerance) +
-                ((q->k_distance_J > 0) != (s->k_distance_J > 0));
-    return knobs + knobs_per_e * fabs(log(p->n_node / n_node));
+    int parameters = !pal_study_is(q->element, s->element) + !pal_study_is(q->law, s->law) +
+                     !pal_study_is(q->solver, s->solver) + (q->step_s != s->step_s) + (q->tolerance != s->tolerance) +
+                     ((q->k_distance_J > 0) != (s->k_distance_J > 0));
+    return parameters + parameters_per_e * fabs(log(p->n_node / n_node));
 }
 
 static bool has_words(const seen *p, int n, const pal_configuration *s)

@@ -74,30 +74,30 @@ static pal_err take_probes(pal_study_job *job)
 /* ---- the sweep ---- */
 
 /* was it measured before? */
-static const pal_study_point *known(const pal_study *before, const pal_study_entry *wish)
+static const pal_study_point *known(const pal_study *before, const pal_study_entry *entry)
 {
     for (int i = 0; before && i < before->n_point; i++) {
         const pal_study_point *p = &before->point[i];
         bool fitted = p->measured.setting.k_distance_J > 0 || !strncmp(p->reason, "calibration:", 12);
         pal_configuration bare = p->measured.setting;
         bare.k_distance_J = bare.k_area_J = bare.k_volume_J = 0;
-        if (fitted == wish->calibrate && pal_configuration_equal(&bare, &wish->setting)) return p;
+        if (fitted == entry->calibrate && pal_configuration_equal(&bare, &entry->setting)) return p;
     }
     return NULL;
 }
 
-static pal_err sweep(pal_study_job *job, const pal_study_entry *wish, int n)
+static pal_err sweep(pal_study_job *job, const pal_study_entry *entry, int n)
 {
     const pal_study_options *o = job->options;
     for (int i = 0; i < n; i++) {
         char name[PAL_CONFIGURATION_TEXT];
-        const pal_study_point *old = known(o->before, &wish[i]);
-        bool go = !o->progress || o->progress(pal_configuration_text(&wish[i].setting, name), (double)i / n, o->user);
+        const pal_study_point *old = known(o->before, &entry[i]);
+        bool go = !o->progress || o->progress(pal_configuration_text(&entry[i].setting, name), (double)i / n, o->user);
         if (!go) return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped after %d of %d settings", i, n);
         if (old)
             job->out->point[i] = *old;
         else
-            PAL_TRY(pal_study_measure(job, &wish[i], &job->out->point[i]));
+            PAL_TRY(pal_study_measure(job, &entry[i], &job->out->point[i]));
         job->out->n_point = i + 1;
         pal_study_mark_front(job->out);
         if (o->done && !o->done(job->out, n, o->user))
@@ -117,10 +117,10 @@ static pal_err check_methods(const pal_study_job *job)
 }
 
 /* the reference of a sweep that goes on is the one it began with: not made anew when nothing is left to measure */
-static bool all_known(const pal_study_job *job, const pal_study_entry *wish, int n)
+static bool all_known(const pal_study_job *job, const pal_study_entry *entry, int n)
 {
     for (int i = 0; i < n; i++)
-        if (!known(job->options->before, &wish[i])) return false;
+        if (!known(job->options->before, &entry[i])) return false;
     return n > 0;
 }
 
@@ -144,24 +144,24 @@ static pal_err press(pal_study_job *job)
 
 static pal_err study(pal_study_job *job)
 {
-    pal_study_entry *wish = calloc(PAL_STUDY_POINTS, sizeof *wish);
-    if (!wish) return pal_diagnostic_set(job->diag, PAL_ERR_MEMORY, "no memory for a study");
+    pal_study_entry *entry = calloc(PAL_STUDY_POINTS, sizeof *entry);
+    if (!entry) return pal_diagnostic_set(job->diag, PAL_ERR_MEMORY, "no memory for a study");
     const pal_study *before = job->options->before;
     pal_err err = pal_study_reference_size(job);
-    int n = err ? 0 : pal_study_list(job, wish);
+    int n = err ? 0 : pal_study_list(job, entry);
     /* with nothing left to measure the reference is asked for only where it costs nothing */
-    bool whole = !err && !job->options->recall && all_known(job, wish, n);
+    bool whole = !err && !job->options->recall && all_known(job, entry, n);
     if (!err && n == 0)
         err = pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "no method of those asked for fits the body");
     if (whole) take_over(job->out, before);
     if (!err && !whole) err = take_probes(job);
     if (!err && !whole) err = job->n_load == 0 ? press(job) : pal_study_reference(job);
-    if (!err) err = sweep(job, wish, n);
+    if (!err) err = sweep(job, entry, n);
     if (!err && !whole) err = pal_study_time_repeat(job);
     /* also where nothing was left to measure: the one that was broken off may have been there */
     if (!err) err = pal_study_check_robustness(job);
     pal_study_predict(job->out);
-    free(wish);
+    free(entry);
     return err;
 }
 
@@ -255,12 +255,12 @@ static pal_err set_materials(const pal_problem *p, const double origin[3], pal_b
 
 static pal_err problem_voxels(const pal_problem *p, const pal_surface *surface, pal_prepared *out, pal_diagnostic *diag)
 {
-    pal_case_voxel_options wish = {.resolution = SCENE_VOXELS, .fill = true, .align = true};
-    pal_err err = pal_case_voxels(p, surface, &wish, out, diag);
+    pal_case_voxel_options entry = {.resolution = SCENE_VOXELS, .fill = true, .align = true};
+    pal_err err = pal_case_voxels(p, surface, &entry, out, diag);
     /* thinner than such voxels */
-    while (err == PAL_ERR_REFUSED && wish.resolution < FINEST_SCENE) {
-        wish.resolution *= 2;
-        err = pal_case_voxels(p, surface, &wish, out, diag);
+    while (err == PAL_ERR_REFUSED && entry.resolution < FINEST_SCENE) {
+        entry.resolution *= 2;
+        err = pal_case_voxels(p, surface, &entry, out, diag);
     }
     return err;
 }

@@ -117,7 +117,7 @@ pal_err pal_study_reference_size(pal_study_job *job);
 pal_err pal_study_reference(pal_study_job *job);
 
 /* study_run.c: one point, whose setting and errors are set; STATE alone is an error */
-pal_err pal_study_measure(pal_study_job *job, const pal_study_entry *wish, pal_study_point *out);
+pal_err pal_study_measure(pal_study_job *job, const pal_study_entry *entry, pal_study_point *out);
 /* the way of the tip under the first load, every PAL_STUDY_FRAME_S; times of the steps in ms [most] unless NULL */
 pal_err pal_study_trajectory(pal_study_job *job, const pal_configuration *setting, double (*way)[3], double *ms,
                              int most, int *n_ms, pal_study_point *facts, pal_diagnostic *diag);

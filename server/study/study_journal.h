@@ -1,4 +1,4 @@
-/* The answers of a study's reference (lab/study.h: recall, remember) in a file beside it, STEM.reference, one record
+/* The answers of a study's reference (study.h: recall, remember) in a file beside it, STEM.reference, one record
  * after the other as they are found: a run that was ended anywhere, also while it wrote, goes on behind the last whole
  * record. Binary, of this machine: "palpate reference 1\n", a sum of what it is of (8 bytes), then records of key (8),
  * error (4), nodes (4), length n (8), sentence (120), n doubles and a sum of all that (8). A file of something else is

@@ -103,8 +103,8 @@ void pal_study_print(const pal_study_file *file, FILE *to)
 
 /* ---- drawing ---- */
 
-/* the knobs of a point on the front, as short as its mark allows */
-static void knobs_of(const pal_study *study, const pal_study_point *p, double usual, char *out, size_t n_byte)
+/* the parameters of a point on the front, as short as its mark allows */
+static void parameters_of(const pal_study *study, const pal_study_point *p, double usual, char *out, size_t n_byte)
 {
     const pal_configuration *s = &p->measured.setting;
     bool voxels = !strcmp(s->model, "fem") || !strcmp(s->model, "tet_springs");
@@ -148,7 +148,7 @@ typedef struct series {
     char tip_text[PAL_STUDY_POINTS][TIP];
     int n_tip;
     double front_x[PAL_STUDY_POINTS], front_y[PAL_STUDY_POINTS];
-    char knobs[FRONT_LABELS][64], title[160], x_label[96], live[64], own[80];
+    char parameters[FRONT_LABELS][64], title[160], x_label[96], live[64], own[80];
     pal_plot_label label[FRONT_LABELS];
     int n_label;
     double usual; /* tolerance that goes without saying */
@@ -176,8 +176,8 @@ static void add_point(series *s, const pal_study *study, const pal_study_point *
     s->front_x[s->n_front] = p->measured.ms;
     s->front_y[s->n_front++] = 1e3 * p->measured.error_m;
     if (s->n_label == FRONT_LABELS) return;
-    knobs_of(study, p, s->usual, s->knobs[s->n_label], sizeof *s->knobs);
-    s->label[s->n_label] = (pal_plot_label){p->measured.ms, 1e3 * p->measured.error_m, s->knobs[s->n_label]};
+    parameters_of(study, p, s->usual, s->parameters[s->n_label], sizeof *s->parameters);
+    s->label[s->n_label] = (pal_plot_label){p->measured.ms, 1e3 * p->measured.error_m, s->parameters[s->n_label]};
     s->n_label++;
 }
 
@@ -222,7 +222,8 @@ pal_err pal_study_draw(const pal_study_file *file, char **svg, size_t *n_byte, p
                                                  .dots = true};
     }
     if (any_apart)
-        plot.y_label = "largest error, mm (hollow: fitted to this load or failed a torture, so not on the front)";
+        plot.y_label =
+            "largest error, mm (hollow: fitted to this load or failed a robustness case, so not on the front)";
     pal_err err = pal_plot_text(&plot, svg, n_byte, diag);
     free(s);
     return err;
@@ -365,10 +366,10 @@ static const char sorting[] =
 
 static void put_page(FILE *to, const pal_study_file *file, const char *svg)
 {
-    static const char *const column[] = {"",          "row",         "setting",     "ms",      "ms p95",
-                                         "live",      "error mm",    "rest RMS mm", "rest mm", "rest RMS %",
-                                         "rest %",    "way RMS mm",  "way mm",      "nodes",   "sub-steps",
-                                         "made in s", "foreseen ms", "foreseen mm"};
+    static const char *const column[] = {"",          "row",          "setting",     "ms",      "ms p95",
+                                         "live",      "error mm",     "rest RMS mm", "rest mm", "rest RMS %",
+                                         "rest %",    "way RMS mm",   "way mm",      "nodes",   "sub-steps",
+                                         "made in s", "predicted ms", "predicted mm"};
     const pal_study *s = &file->study;
     char text[200];
     int order[PAL_STUDY_POINTS];

@@ -1,8 +1,8 @@
-/* The front of a study, what it answers, and what it foresees.
+/* The front of a study, what it answers, and what it predicts.
  *
  * Foreseen is along the sizes of settings that are the same but for them, where these follow a power law closely: ms =
  * a + b n^c, error = d n^-p, n the size (edges of adaptive levels and of subdivided cells double with each). Elsewhere
- * the logarithms of all points of the model are taken as sums of what each knob adds, and what that misses at the
+ * the logarithms of all points of the model are taken as sums of what each parameter adds, and what that misses at the
  * nearest settings of the same size is taken off: how many nodes there are is no smooth function of the size. */
 #include "server/base/vec3.h"
 #include "server/study/study_job.h"
@@ -12,7 +12,7 @@
 #include <string.h>
 
 enum { ALONG = 3, FEATURES = 24, GOLDEN = 44 };
-/* weight of "no effect" for each knob, so that one that was never turned has none */
+/* weight of "no effect" for each parameter, so that one that was never turned has none */
 static const double ridge = 1e-4, min_m = 1e-12;
 /* a power law is followed closely */
 static const double close_off = 0.05;
@@ -219,7 +219,7 @@ static void look_along(const pal_study *study, const pal_configuration *s, int l
     for (int v = 0; v < 2; v++) out[v] = law_along(x, y[v], n, at, v == 0);
 }
 
-/* ---- all knobs of a model ---- */
+/* ---- all parameters of a model ---- */
 
 static void add(double *f, const char *const *words, int n, int from, const char *word)
 {
@@ -260,7 +260,8 @@ static void solve_knobs(double A[FEATURES][FEATURES + 2], double w[2][FEATURES])
         }
 }
 
-/* knobs of which the others say nothing: a word that none of them has, a step or tolerance that none of them is near */
+/* parameters of which the others say nothing: a word that none of them has, a step or tolerance that none of them is
+ * near */
 static bool is_strange(const pal_study *study, const pal_configuration *s, int leave_out)
 {
     bool element = false, law = false, solver = false, fitted = false, step = false, tolerance = false;
@@ -282,7 +283,7 @@ static double sum_of(const double w[FEATURES], const double f[FEATURES])
     return sum;
 }
 
-/* knobs that stand otherwise */
+/* parameters that stand otherwise */
 static int differences(const pal_configuration *a, const pal_configuration *b)
 {
     return !pal_study_is(a->element, b->element) + !pal_study_is(a->law, b->law) + !pal_study_is(a->solver, b->solver) +
@@ -296,7 +297,8 @@ static bool is_mate(const pal_study *study, int i, const pal_configuration *s, i
 }
 
 /* logarithms of ms and error; *mates: other settings of the same size there are */
-static bool look_at_knobs(const pal_study *study, const pal_configuration *s, int leave_out, double out[2], int *mates)
+static bool look_at_parameters(const pal_study *study, const pal_configuration *s, int leave_out, double out[2],
+                               int *mates)
 {
     double A[FEATURES][FEATURES + 2] = {{0}}, w[2][FEATURES], f[FEATURES], g[FEATURES], off[2] = {0, 0}, weight = 0;
     int n = 0;
@@ -334,15 +336,15 @@ bool pal_study_predict_configuration(const pal_study *study, const pal_configura
                                      double *ms, double *error_m)
 {
     along line_of[2];
-    double knobs[2], *out[2] = {ms, error_m};
+    double parameters[2], *out[2] = {ms, error_m};
     int mates = 0;
     look_along(study, setting, leave_out, line_of);
-    bool known = look_at_knobs(study, setting, leave_out, knobs, &mates);
+    bool known = look_at_parameters(study, setting, leave_out, parameters, &mates);
     if (!known && line_of[0].n_size < ALONG) return false;
     for (int v = 0; v < 2; v++) {
         bool closely = line_of[v].n_size > ALONG && line_of[v].off < close_off;
         bool by_line = line_of[v].n_size >= ALONG && (closely || !known || mates == 0);
-        *out[v] = by_line ? line_of[v].value : exp(knobs[v]);
+        *out[v] = by_line ? line_of[v].value : exp(parameters[v]);
     }
     return true;
 }

@@ -1,4 +1,4 @@
-/* What may stand on the front has to bear being mistreated: the cheapest two insults of the torture that springs fitted
+/* What may stand on the front has to bear being mistreated: the cheapest two robustness cases that springs fitted
  * to gentle presses were seen not to come back from. What they leave undecided in their time excludes nothing, nor does
  * a body that its guard has stopped: it is safe, says so and is reset, while one that stays elsewhere says nothing. */
 #include "server/robustness/robustness.h"
@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* processor time of one insult on one setting */
+/* processor time of one case on one setting */
 static const double max_cpu_s = 1;
 
 static bool keeps_on(const char *what, double fraction, void *user)
@@ -16,10 +16,10 @@ static bool keeps_on(const char *what, double fraction, void *user)
     return pal_study_continues(user);
 }
 
-/* the first insult that it fails; NULL: none that was decided */
+/* the first case that it fails; NULL: none that was decided */
 static const char *failed(pal_study_job *job, const pal_configuration *setting)
 {
-    static const char *const insult[] = {"meganewton", "flat"};
+    static const char *const name[] = {"meganewton", "flat"};
     pal_configured_scene *set = NULL;
     pal_diagnostic reason = {{0}};
     const char *found = NULL;
@@ -28,12 +28,12 @@ static const char *failed(pal_study_job *job, const pal_configuration *setting)
         free(report);
         return NULL;
     }
-    for (size_t k = 0; k < sizeof insult / sizeof *insult && !found; k++) {
+    for (size_t k = 0; k < sizeof name / sizeof *name && !found; k++) {
         pal_robustness_options o;
         pal_robustness_default(&o);
-        o.only = insult[k], o.max_cpu_s = max_cpu_s, o.progress = keeps_on, o.user = job;
+        o.only = name[k], o.max_cpu_s = max_cpu_s, o.progress = keeps_on, o.user = job;
         if (!pal_robustness_run(&set->scene, &o, report, &reason) && report->n_failed > 0 && !report->result[0].frozen)
-            found = insult[k];
+            found = name[k];
     }
     pal_configured_scene_free(set);
     free(report);
@@ -50,13 +50,13 @@ pal_err pal_study_check_robustness(pal_study_job *job)
             i++;
             continue;
         }
-        bool go = !o->progress || o->progress("what is on the front, tortured", (double)i / job->out->n_point, o->user);
+        bool go = !o->progress || o->progress("robustness of the front", (double)i / job->out->n_point, o->user);
         if (!go || !pal_study_continues(job))
             return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped at the front");
         looked[i] = true;
-        const char *insult = failed(job, &p->measured.setting);
-        if (!insult) continue;
-        snprintf(p->reason, sizeof p->reason, "fails %s of palpate robustness: not named", insult);
+        const char *name = failed(job, &p->measured.setting);
+        if (!name) continue;
+        snprintf(p->reason, sizeof p->reason, "fails %s of palpate robustness: not named", name);
         /* what it stood before may be on the front now, also cheaper ones */
         pal_study_mark_front(job->out);
         i = 0;

@@ -233,14 +233,14 @@ static pal_err fit(pal_study_job *job, pal_study_point *out)
     return err;
 }
 
-pal_err pal_study_measure(pal_study_job *job, const pal_study_entry *wish, pal_study_point *out)
+pal_err pal_study_measure(pal_study_job *job, const pal_study_entry *entry, pal_study_point *out)
 {
     int n_node = 0;
-    *out = (pal_study_point){.measured = {.setting = wish->setting, .ms = NAN, .error_m = NAN}};
+    *out = (pal_study_point){.measured = {.setting = entry->setting, .ms = NAN, .error_m = NAN}};
     out->ms_p95 = out->static_rms_m = out->static_max_m = out->trajectory_rms_m = out->trajectory_max_m = NAN;
     out->predicted_ms = out->predicted_m = NAN;
-    if (wish->calibrate && fit(job, out) && pal_study_continues(job)) return PAL_ERR_OK;
-    if (wish->calibrate && job->n_load == 1)
+    if (entry->calibrate && fit(job, out) && pal_study_continues(job)) return PAL_ERR_OK;
+    if (entry->calibrate && job->n_load == 1)
         snprintf(out->reason, sizeof out->reason, "fitted to the load it is judged by");
     if (!job->rest.known || !same_rest(&job->rest.of, &out->measured.setting))
         find_rest(job, &out->measured.setting, &n_node);

@@ -91,10 +91,10 @@ static bool make_scene(const subject *s, solved *to, const char *solver)
 /* mesh, world and nodal loads; at rest without loads */
 static bool prepare(const subject *s, int resolution, const char *solver, solved *to)
 {
-    pal_case_voxel_options wish = {resolution, true, 0, true};
+    pal_case_voxel_options requested = {resolution, true, 0, true};
     pal_diagnostic diag = {""};
     memset(to, 0, sizeof *to);
-    bool good = !pal_case_voxels(s->problem, s->surface, &wish, &to->mesh, &diag) && make_scene(s, to, solver) &&
+    bool good = !pal_case_voxels(s->problem, s->surface, &requested, &to->mesh, &diag) && make_scene(s, to, solver) &&
                 !pal_world_create(to->scene, &diag, &to->world);
     if (!good) printf("  %s\n", diag.text);
     if (!good) return false;

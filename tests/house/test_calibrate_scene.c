@@ -54,9 +54,9 @@ static double difference(const int grid[3], bool equal, bool without_area, pal_s
     pal_calibrate_default(&o);
     o.voxel.resolution = RESOLUTION, o.split = SPLIT, o.equal = equal, o.without_area = without_area;
     for (int a = 0; a < 3; a++) o.grid[a] = grid[a];
-    const pal_calibrate_input wish = {.problem = problem, .fit = "bend"};
+    const pal_calibrate_input input = {.problem = problem, .fit = "bend"};
     const pal_fit_options fit = {.max_evaluation = EVALUATIONS};
-    pal_err err = pal_calibrate_cases_read(&wish, &set, &diag);
+    pal_err err = pal_calibrate_cases_read(&input, &set, &diag);
     if (!err) err = pal_calibration_create(set.problem, &set.surface, set.list, set.n, &o, &c, &diag);
     if (!err) pal_calibration_info_of(c, &info);
     double *theta = err ? NULL : malloc(sizeof *theta * (size_t)info.n_parameter);

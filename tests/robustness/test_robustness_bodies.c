@@ -1,6 +1,6 @@
-/* Several bodies in one world under insults: one is stopped alone, the others run on bit by bit as in a world in which
- * nothing happened. All bodies share the world's sub-steps: where the one that is stopped was the one that asked for
- * more, the others go on in longer ones, near what they were. Bodies do not touch. */
+/* Several bodies in one world under disturbances: one is stopped alone, the others run on bit by bit as in a world in
+ * which nothing happened. All bodies share the world's sub-steps: where the one that is stopped was the one that asked
+ * for more, the others go on in longer ones, near what they were. Bodies do not touch. */
 #include "server/robustness/robustness.h"
 #include "tests/fixtures/adaptive_worlds.h"
 #include "tests/fixtures/fem_beam.h"
@@ -34,7 +34,7 @@ static void three_make(fem_beam *b, bool springs)
 }
 
 /* what is done to the body `which` before step AT */
-typedef void insult(pal_world *world, int which);
+typedef void disturbance(pal_world *world, int which);
 
 static void poison(pal_world *world, int which)
 {
@@ -63,7 +63,7 @@ static double apart(const pal_body *a, const pal_body *b)
     return sqrt(sum / a->n_dof) / a->length_scale_m;
 }
 
-/* the others of a step: how many are what they are without the insult, and how far off the worst one is */
+/* the others of a step: how many are what they are without the disturbance, and how far off the worst one is */
 static int others(const fem_beam *hurt, const fem_beam *calm, int which, double *most_S)
 {
     int n = 0;
@@ -77,7 +77,7 @@ static int others(const fem_beam *hurt, const fem_beam *calm, int which, double 
 }
 
 /* the body is stopped and says why, the others run on, and it alone is reset */
-static void stop_one(insult *what, int which, bool springs, bool shared)
+static void stop_one(disturbance *what, int which, bool springs, bool shared)
 {
     fem_beam hurt, calm;
     int n_same = 0, n_step = STEPS + 3;
@@ -104,7 +104,7 @@ static void stop_one(insult *what, int which, bool springs, bool shared)
 }
 
 /* only the springs limit the sub-step of the three */
-static void stop_each(insult *what)
+static void stop_each(disturbance *what)
 {
     for (int which = 0; which < 3; which++) stop_one(what, which, false, which == 2);
 }
@@ -120,19 +120,19 @@ static void a_body_out_of_bounds_stops_alone(void)
     stop_each(throw_away);
 }
 
-static void tortured_together_each_is_judged(void)
+static void disturbed_together_each_is_judged(void)
 {
-    static const char *const insult_name[] = {"poisoned", "meganewton"};
+    static const char *const case_name[] = {"poisoned", "meganewton"};
     fem_beam b;
     three_make(&b, false);
     b.scene->n_body = 2;
-    for (size_t k = 0; k < sizeof insult_name / sizeof insult_name[0]; k++) {
+    for (size_t k = 0; k < sizeof case_name / sizeof case_name[0]; k++) {
         pal_robustness_options options;
         static pal_robustness_report report;
         pal_robustness_default(&options);
-        options.only = insult_name[k];
+        options.only = case_name[k];
         REQUIRE(!pal_robustness_run(b.scene, &options, &report, &diag));
-        printf("  %s: %s, %s\n", insult_name[k], pal_verdict_name(report.result[0].verdict), report.result[0].diag);
+        printf("  %s: %s, %s\n", case_name[k], pal_verdict_name(report.result[0].verdict), report.result[0].diag);
         CHECK(report.n == 1 && report.n_passed == 1);
     }
     beam_free(&b);
@@ -165,7 +165,7 @@ int main(void)
 {
     RUN_LONG(a_poisoned_body_stops_alone);
     RUN(a_body_out_of_bounds_stops_alone);
-    RUN(tortured_together_each_is_judged);
+    RUN(disturbed_together_each_is_judged);
     RUN(what_sleeps_under_a_meganewton_is_let_go);
     return check_report();
 }

@@ -64,7 +64,7 @@ static void show(const pal_study *s)
  * it being laid flat leaves them elsewhere for good */
 static void check_survives(const organ *o, const pal_configuration *setting)
 {
-    static const char *const insult[] = {"flat"};
+    static const char *const name[] = {"flat"};
     pal_configured_scene *set = NULL;
     pal_diagnostic diag = {{0}};
     pal_robustness_report *r = calloc(1, sizeof *r);
@@ -72,10 +72,10 @@ static void check_survives(const organ *o, const pal_configuration *setting)
     for (int k = 0; k < 1; k++) {
         pal_robustness_options options;
         pal_robustness_default(&options);
-        options.only = insult[k], options.max_cpu_s = 2;
+        options.only = name[k], options.max_cpu_s = 2;
         CHECK(!pal_robustness_run(&set->scene, &options, r, &diag));
         CHECK_INT(r->n_failed, 0);
-        if (r->n_failed) printf("  %s: %s\n", insult[k], r->result[0].diag);
+        if (r->n_failed) printf("  %s: %s\n", name[k], r->result[0].diag);
     }
     pal_configured_scene_free(set);
     free(r);
@@ -206,8 +206,8 @@ static void cells_are_pressed(void)
 static void the_step_of_the_scene_is_the_one_that_is_swept(void)
 {
     static const double own_s[] = {1.0 / 30, 1.0 / 60, 1.0 / 120, 1.0 / 250, 1.0 / 1000};
-    pal_study_entry *wish = calloc(PAL_STUDY_POINTS, sizeof *wish);
-    REQUIRE(wish);
+    pal_study_entry *target = calloc(PAL_STUDY_POINTS, sizeof *target);
+    REQUIRE(target);
     for (int full = 0; full < 2; full++) {
         organ o;
         organ_make(&o, full);
@@ -217,22 +217,22 @@ static void the_step_of_the_scene_is_the_one_that_is_swept(void)
             pal_study_job job = {.scene = o.scene, .options = &options, .law = "corotational", .adaptive = !full};
             job.reference = full ? 64 : 4, job.slender = 1;
             o.scene->step_s = own;
-            int n = pal_study_list(&job, wish), n_own = 0, n_other = 0;
+            int n = pal_study_list(&job, target), n_own = 0, n_other = 0;
             for (int i = 0; i < n; i++) {
-                const double times = wish[i].setting.step_s / own;
+                const double times = target[i].setting.step_s / own;
                 bool known = times == 1 || times == 0.25 || times == 0.5 || times == 2;
                 n_own += times == 1, n_other += times != 1;
-                CHECK(known || wish[i].setting.step_s == 1e-3);
-                CHECK(times <= 1 || wish[i].setting.step_s < 1.0001 / 60);
+                CHECK(known || target[i].setting.step_s == 1e-3);
+                CHECK(times <= 1 || target[i].setting.step_s < 1.0001 / 60);
                 for (int j = 0; j < i; j++)
-                    CHECK(wish[i].calibrate != wish[j].calibrate ||
-                          !pal_configuration_equal(&wish[i].setting, &wish[j].setting));
+                    CHECK(target[i].calibrate != target[j].calibrate ||
+                          !pal_configuration_equal(&target[i].setting, &target[j].setting));
             }
             CHECK(n_own > 2 && (full ? n_other > 0 : n_other == 0) && n < PAL_STUDY_POINTS);
         }
         organ_free(&o);
     }
-    free(wish);
+    free(target);
 }
 
 static void check_refused(organ *o, const pal_study_options *options, const char *word)
