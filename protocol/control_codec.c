@@ -299,12 +299,12 @@ static int read_number(const cJSON *item, double *out)
     return 0;
 }
 
-static int read_integer(const cJSON *item, double least, double most, double *out)
+static int read_integer(const cJSON *item, double min, double most, double *out)
 {
     double v;
     int refusal = read_number(item, &v);
     if (refusal) return refusal;
-    if (v < least || v > most || v != floor(v)) return PAL_REFUSAL_RANGE;
+    if (v < min || v > most || v != floor(v)) return PAL_REFUSAL_RANGE;
     *out = v;
     return 0;
 }

@@ -222,10 +222,10 @@ static uint32_t displace(pal_frame_encoder *e, const float *position_m, const do
  * positions as large as reach_m stays within its share of the bound, rounded up then */
 static float choose_q(double error_m, double largest_u, double reach_m)
 {
-    double q = 2 * error_m / Q_RATIO, least = fmax(16 * largest_u / X_ROOM, reach_m * 0x1p-16);
-    float down = (float)fmax(q, least);
-    if (q >= least) return (double)down > q ? nextafterf(down, 0) : down;
-    return (double)down < least ? nextafterf(down, INFINITY) : down;
+    double q = 2 * error_m / Q_RATIO, min = fmax(16 * largest_u / X_ROOM, reach_m * 0x1p-16);
+    float down = (float)fmax(q, min);
+    if (q >= min) return (double)down > q ? nextafterf(down, 0) : down;
+    return (double)down < min ? nextafterf(down, INFINITY) : down;
 }
 
 /* X of a hidden vertex is its prediction; a chain of predictors that extrapolate is kept in range */
@@ -278,12 +278,12 @@ static uint32_t cost(const uint32_t *v, uint32_t k, uint32_t n_code)
 
 /* the best parameter up to most is next to log2 of the mean, or far below it when few large values are better escaped
  */
-static uint32_t choose_k(const uint32_t *v, uint32_t sum, uint32_t n_code, uint32_t most, uint32_t *bits)
+static uint32_t choose_k(const uint32_t *v, uint32_t sum, uint32_t n_code, uint32_t max, uint32_t *bits)
 {
     uint32_t k = 0, next;
-    while (k < most && n_code << (k + 1) <= sum) k++;
+    while (k < max && n_code << (k + 1) <= sum) k++;
     *bits = cost(v, k, n_code);
-    if (k < most && (next = cost(v, k + 1, n_code)) < *bits) {
+    if (k < max && (next = cost(v, k + 1, n_code)) < *bits) {
         *bits = next;
         return k + 1;
     }
@@ -395,13 +395,13 @@ static void write_head(uint8_t *dst, const pal_frame_head *head)
 /* how much the map enlarges an error per axis */
 static double enlargement(const float affine[12])
 {
-    double most = 0;
+    double max = 0;
     for (int r = 0; r < 3; r++) {
         double row = 0;
         for (int c = 0; c < 3; c++) row += fabs((double)affine[4 * r + c]);
-        if (row > most) most = row;
+        if (row > max) max = row;
     }
-    return most;
+    return max;
 }
 
 int pal_frame_put(pal_frame_encoder *e, const pal_frame_input *given, uint8_t *dst, size_t cap,

@@ -215,10 +215,10 @@ static void rebuild(builder *b)
 /* active vertices by degree, fewest first; returns the smallest degree above 0, 0 when no edge is left */
 static uint32_t sort_by_degree(builder *b)
 {
-    uint32_t count[DEGREE_BUCKETS + 1] = {0}, least = 0;
+    uint32_t count[DEGREE_BUCKETS + 1] = {0}, min = 0;
     for (uint32_t i = 0; i < b->n_active; i++) {
         uint32_t v = b->active[i], degree = b->now.begin[v + 1] - b->now.begin[v];
-        if (degree && (!least || degree < least)) least = degree;
+        if (degree && (!min || degree < min)) min = degree;
         count[(degree < DEGREE_BUCKETS ? degree : DEGREE_BUCKETS - 1) + 1]++;
     }
     for (int d = 0; d < DEGREE_BUCKETS; d++) count[d + 1] += count[d];
@@ -226,15 +226,15 @@ static uint32_t sort_by_degree(builder *b)
         uint32_t v = b->active[i], degree = b->now.begin[v + 1] - b->now.begin[v];
         b->sorted[count[degree < DEGREE_BUCKETS ? degree : DEGREE_BUCKETS - 1]++] = v;
     }
-    return least;
+    return min;
 }
 
 /* peels one level; false when nothing worth a level is left */
 static bool peel(builder *b)
 {
-    uint32_t first = b->n_peeled, least = sort_by_degree(b);
-    uint32_t limit = least > DEGREE_LIMIT ? least : DEGREE_LIMIT;
-    if (!least || b->n_active <= BASE_SIZE) return false;
+    uint32_t first = b->n_peeled, min = sort_by_degree(b);
+    uint32_t limit = min > DEGREE_LIMIT ? min : DEGREE_LIMIT;
+    if (!min || b->n_active <= BASE_SIZE) return false;
     memset(b->mark, 0, b->n * sizeof *b->mark);
     for (uint32_t i = 0; i < b->n_active; i++) {
         uint32_t v = b->sorted[i], begin = b->now.begin[v], end = b->now.begin[v + 1];

@@ -26,13 +26,13 @@ static char check_missing[1024]; /* path of the data that the current test lacks
 /* the largest distance of two lists of n points */
 static inline double check_farthest(const float *a, const float *b, int n)
 {
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < n; i++) {
         double far = 0;
         for (int c = 0; c < 3; c++) far += pow((double)a[3 * i + c] - (double)b[3 * i + c], 2);
-        most = fmax(most, sqrt(far));
+        max = fmax(max, sqrt(far));
     }
-    return most;
+    return max;
 }
 
 #define CHECK_FAIL(...)                                                                                                \

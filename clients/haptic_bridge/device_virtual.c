@@ -15,13 +15,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define SUB_STEP_S      50e-6
-#define CATCH_UP_MOST_S 0.2 /* after a longer pause in wall time the plant skips the rest */
-#define VISCOUS_NS_M    0.05
-#define TOUCH_FELT_N    0.1
-#define TOUCH_REST_M_S  0.005 /* a hand this slow feels what it touches, no damping */
-#define TOUCH_TICKS     20    /* of the servo, which a late one answers with old forces */
-#define APPROACH_M_S    0.04
+#define SUB_STEP_S     50e-6
+#define CATCH_UP_MAX_S 0.2 /* after a longer pause in wall time the plant skips the rest */
+#define VISCOUS_NS_M   0.05
+#define TOUCH_FELT_N   0.1
+#define TOUCH_REST_M_S 0.005 /* a hand this slow feels what it touches, no damping */
+#define TOUCH_TICKS    20    /* of the servo, which a late one answers with old forces */
+#define APPROACH_M_S   0.04
 
 typedef struct virtual_device {
     const char *id, *name;
@@ -53,7 +53,7 @@ typedef struct virtual_state {
     const virtual_device *device;
     const virtual_hand *hand;
     virtual_script script;
-    double depth_m, height_m, wait_s, lag_s;
+    double depth_m, height_m, wait_s, display_offset_s;
     double viscous, coulomb;
     bool virtual_clock, touched;
     int n_felt; /* advances in a row at whose end the resting hand felt something */
@@ -100,7 +100,7 @@ static void virtual_axis(virtual_state *s, int k)
 {
     const double dt = SUB_STEP_S, m = s->device->mass_kg;
     const virtual_hand *h = s->hand;
-    s->applied[k] += (s->command[k] - s->applied[k]) * (1 - exp(-dt / s->lag_s));
+    s->applied[k] += (s->command[k] - s->applied[k]) * (1 - exp(-dt / s->display_offset_s));
     double force = s->applied[k] + s->push[k] - s->viscous * s->v[k];
     if (h->mass_kg > 0) {
         const double grip = h->k1 * (s->xh[k] - s->x[k]) + h->b1 * (s->vh[k] - s->v[k]);
@@ -110,8 +110,8 @@ static void virtual_axis(virtual_state *s, int k)
     }
     /* Coulomb friction takes away speed, at most all of it: that is sticking */
     double v = s->v[k] + dt / m * force;
-    const double most = dt / m * s->coulomb;
-    v = fabs(v) <= most ? 0 : v - copysign(most, v);
+    const double max = dt / m * s->coulomb;
+    v = fabs(v) <= max ? 0 : v - copysign(max, v);
     s->v[k] = v;
     s->x[k] += dt * v;
 }
@@ -163,7 +163,7 @@ static bool virtual_option(virtual_state *s, const char *key, const char *value)
     if (!strcmp(key, "height")) return s->height_m = number * 1e-3, true;
     if (!strcmp(key, "wait")) return s->wait_s = number, true;
     if (!strcmp(key, "fail")) return s->fail_at = (long)number, true;
-    if (!strcmp(key, "lag")) return s->lag_s = number * 1e-3, number > 0;
+    if (!strcmp(key, "lag")) return s->display_offset_s = number * 1e-3, number > 0;
     return false;
 }
 
@@ -194,7 +194,7 @@ static int virtual_open(void **handle, const char *id, pal_dev_info *out)
     s->depth_m = 0.008;
     s->height_m = 0.02;
     s->wait_s = 1.6;
-    s->lag_s = 1e-3;
+    s->display_offset_s = 1e-3;
     if (!virtual_parse(s, id)) {
         free(s);
         return -2;
@@ -224,7 +224,7 @@ static int virtual_read(void *handle, pal_dev_state *state)
     if (s->fail_at > 0 && ++s->n_read >= s->fail_at) return -3;
     if (!s->virtual_clock) {
         const uint64_t now = pal_clock_ns();
-        pal_virtual_advance(s, fmin((double)(now - s->last_ns) * 1e-9, CATCH_UP_MOST_S));
+        pal_virtual_advance(s, fmin((double)(now - s->last_ns) * 1e-9, CATCH_UP_MAX_S));
         s->last_ns = now;
     }
     *state = (pal_dev_state){.size = sizeof *state, .buttons = PAL_DEVICE_BUTTON_DEADMAN, .quat = {1, 0, 0, 0}};

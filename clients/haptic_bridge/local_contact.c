@@ -1,8 +1,8 @@
 #include "clients/haptic_bridge/local_contact.h"
 #include "server/base/vec3.h"
 
-#define EXTRAPOLATE_MOST_S 0.05
-#define HYSTERESIS_M       1e-4
+#define EXTRAPOLATE_MAX_S 0.05
+#define HYSTERESIS_M      1e-4
 
 /* depth of x under a patch's plane, and the tangential distance from its point */
 static double patch_depth(const pal_wire_haptic *model, const pal_wire_contact_patch *patch, double age_s,
@@ -33,14 +33,14 @@ static const pal_wire_contact_patch *patch_of_group(const pal_wire_haptic *model
                                                     const double x[3], const pal_local_contact_state *memory)
 {
     const pal_wire_contact_patch *best = NULL;
-    double least = INFINITY, across;
+    double min = INFINITY, across;
     for (uint32_t i = first; i < model->n_patch; i++) {
         const pal_wire_contact_patch *patch = &model->patch[i];
         if (patch->group != model->patch[first].group) continue;
         const double depth = patch_depth(model, patch, age_s, x, &across);
         if (!(depth > 0)) return NULL;
         const double ranked = depth - (patch_was_active(memory, patch) ? HYSTERESIS_M : 0);
-        if (ranked < least) least = ranked, best = patch;
+        if (ranked < min) min = ranked, best = patch;
     }
     return best;
 }
@@ -69,7 +69,7 @@ void pal_local_contact_force(const pal_wire_haptic *model, double age_s, const d
                              const pal_local_contact_limits *limits, pal_local_contact_state *memory,
                              pal_local_contact_result *out)
 {
-    const double age = fmin(fmax(age_s, 0), EXTRAPOLATE_MOST_S);
+    const double age = fmin(fmax(age_s, 0), EXTRAPOLATE_MAX_S);
     pal_local_contact_state now = {0};
     *out = (pal_local_contact_result){.finite = pal_finite3(x_m) && pal_finite3(v_m_s)};
     for (uint32_t i = 0; i < model->n_patch; i++) {

@@ -10,8 +10,8 @@
 
 #define VELOCITY_CUT_HZ    80.0
 #define USER_CAP_N         3.0
-#define STALE_LEAST_S      0.1
-#define STALE_MOST_S       0.5
+#define STALE_MIN_S        0.1
+#define STALE_MAX_S        0.5
 #define FADE_OUT_S         0.5
 #define FADE_IN_S          0.25
 #define FADE_START_S       1.0
@@ -24,9 +24,9 @@
 #define WALL_STIFFNESS_N_M 200.0
 #define WALL_FRACTION      0.95
 #define DRIVEN_SPEED_M_S   0.5
-#define SPEED_MOST_M_S     2.0
+#define SPEED_MAX_M_S      2.0
 #define DEGRADED_K_N_M     300.0
-#define BAD_READS_MOST     2
+#define BAD_READS_MAX      2
 
 enum { SERVO_GAPS = 64, SERVO_EVENTS = 64 };
 
@@ -261,7 +261,7 @@ static double servo_stale_after(const pal_servo *s)
             second = s->gap_s[i];
     }
     const double after = fmax(4e-6 * s->model.haptic.frame_us, 2 * second);
-    return fmin(fmax(after, STALE_LEAST_S), STALE_MOST_S);
+    return fmin(fmax(after, STALE_MIN_S), STALE_MAX_S);
 }
 
 static void servo_toward(double *value, double wanted, double step)
@@ -354,11 +354,11 @@ static bool servo_limit(pal_servo *s, double force_d[3], double dt)
     servo_toward(&s->scale_down, hot ? 0 : 1, hot ? dt / 2 : dt / 5);
     pal_scale3(force_d, s->scale_down, force_d);
     const double before = pal_norm3(s->force_prev), size = pal_norm3(force_d);
-    double most = s->cap_N;
-    if (size > most) cut = true;
-    most = fmin(most, before + s->cap_N / RISE_TIME_S * dt);
+    double max = s->cap_N;
+    if (size > max) cut = true;
+    max = fmin(max, before + s->cap_N / RISE_TIME_S * dt);
     /* a hair less, so that no rounding passes the cap */
-    if (size > most) pal_scale3(force_d, most / size * (1 - 1e-12), force_d);
+    if (size > max) pal_scale3(force_d, max / size * (1 - 1e-12), force_d);
     return cut;
 }
 
@@ -376,7 +376,7 @@ static void servo_render(pal_servo *s, uint64_t now, double dt, double force_d[3
         return;
     }
     const double speed = pal_norm3(s->v);
-    if ((pal_dot3(force, s->v) > 0 && pal_norm3(force) > 0.05 && speed > DRIVEN_SPEED_M_S) || speed > SPEED_MOST_M_S) {
+    if ((pal_dot3(force, s->v) > 0 && pal_norm3(force) > 0.05 && speed > DRIVEN_SPEED_M_S) || speed > SPEED_MAX_M_S) {
         servo_fault(s, PAL_EVENT_LIMIT, speed, "too fast: force off");
         pal_set3(force_d, 0, 0, 0);
         return;
@@ -455,7 +455,7 @@ void pal_servo_tick(pal_servo *s, uint64_t now_ns)
         /* one bad read keeps the force, more of them are a fault that stays */
         s->view.n_bad_read++;
         pal_copy3(force_d, s->force_prev);
-        if (++s->bad_reads >= BAD_READS_MOST) {
+        if (++s->bad_reads >= BAD_READS_MAX) {
             s->lost = true;
             s->fade = 0;
             s->view.state = PAL_SERVO_FAULT;

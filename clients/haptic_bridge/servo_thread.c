@@ -11,12 +11,12 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#define WATCHDOG_NS       20000000u
-#define WATCHDOG_STEP_NS  5000000u
-#define JUDGE_LEAST_TICKS 2000
-#define LIMIT_LATE_US     2000.0
-#define OFF_LATE_US       10000.0
-#define OFF_MISSED        0.01
+#define WATCHDOG_NS      20000000u
+#define WATCHDOG_STEP_NS 5000000u
+#define JUDGE_MIN_TICKS  2000
+#define LIMIT_LATE_US    2000.0
+#define OFF_LATE_US      10000.0
+#define OFF_MISSED       0.01
 
 enum { FIFO_SERVO = 80, FIFO_WATCHDOG = 81, STACK_TOUCH_BYTES = 256 * 1024, JUDGE_SECONDS = 10 };
 
@@ -53,7 +53,7 @@ static void thread_judge(pal_servo_thread *t)
         missed += t->second_missed[i];
     }
     int level = 0;
-    if (window.n + missed >= JUDGE_LEAST_TICKS) {
+    if (window.n + missed >= JUDGE_MIN_TICKS) {
         const double late = pal_jitter_at_us(&window, 0.999);
         if (late > LIMIT_LATE_US) level = 1;
         if (late > OFF_LATE_US || (double)missed > OFF_MISSED * (double)(window.n + missed)) level = 2;

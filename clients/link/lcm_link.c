@@ -54,13 +54,13 @@ static bool lcm_route(const char *url)
 static void lcm_check_buffer(void)
 {
     FILE *file = fopen("/proc/sys/net/core/rmem_max", "r");
-    long most = 0;
+    long max = 0;
     if (!file) return;
-    if (fscanf(file, "%ld", &most) == 1 && most < LCM_BUFFER_WANTED)
+    if (fscanf(file, "%ld", &max) == 1 && max < LCM_BUFFER_WANTED)
         pal_log(PAL_LOG_INFO, "lcm_buffer",
                 "the kernel allows %ld bytes of receive buffer; bursts are lost less with `sysctl -w "
                 "net.core.rmem_max=%d`",
-                most, LCM_BUFFER_WANTED);
+                max, LCM_BUFFER_WANTED);
     fclose(file);
 }
 

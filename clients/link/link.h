@@ -94,7 +94,7 @@ pal_link_counts pal_link_count(const pal_link *link);
 /* GET of a path on the server that url names: done is called once, status 200 with the whole body (borrowed), else the
  * status or 0 and the reason in why. REFUSED: URL; the body may have up to most bytes. [net] or before pal_link_run */
 typedef void (*pal_link_get_done)(void *user, int status, const uint8_t *bytes, size_t n_byte, const char *reason);
-pal_err pal_link_get(pal_link_loop *loop, const char *url, const char *path, size_t most, pal_link_get_done done,
+pal_err pal_link_get(pal_link_loop *loop, const char *url, const char *path, size_t max, pal_link_get_done done,
                      void *user, pal_diagnostic *diag);
 
 /* calls fn every period_us after the call before has returned, so never more often than asked; ends with the loop or

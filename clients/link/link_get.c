@@ -10,7 +10,7 @@ struct link_get {
     struct lws *wsi;
     pal_link_get_done done;
     void *user;
-    size_t most, n_byte, cap;
+    size_t max, n_byte, cap;
     uint8_t *bytes;
     int status;
 };
@@ -30,7 +30,7 @@ static void link_get_end(link_get *get, int status, const char *reason)
 /* grows by doubling, so memory follows what really came */
 static bool link_get_append(link_get *get, const void *bytes, size_t n_byte)
 {
-    if (n_byte > get->most - get->n_byte) return false;
+    if (n_byte > get->max - get->n_byte) return false;
     if (get->n_byte + n_byte > get->cap) {
         size_t cap = get->cap ? get->cap : 65536;
         while (cap < get->n_byte + n_byte) cap *= 2;
@@ -83,7 +83,7 @@ int link_get_callback(struct lws *wsi, enum lws_callback_reasons reason, void *u
     return 0;
 }
 
-pal_err pal_link_get(pal_link_loop *loop, const char *url, const char *path, size_t most, pal_link_get_done done,
+pal_err pal_link_get(pal_link_loop *loop, const char *url, const char *path, size_t max, pal_link_get_done done,
                      void *user, pal_diagnostic *diag)
 {
     link_address address;
@@ -93,7 +93,7 @@ pal_err pal_link_get(pal_link_loop *loop, const char *url, const char *path, siz
     get->loop = loop;
     get->done = done;
     get->user = user;
-    get->most = most;
+    get->max = max;
     get->next = loop->gets;
     loop->gets = get;
     struct lws_client_connect_info info = {0};

@@ -12,7 +12,7 @@ enum {
     LINK_MESSAGE_MAX = 96 << 20, /* a frame of the largest part fits, and a patch of all places */
     LINK_SMALL_SOCKET = 16384,   /* receive buffer of a client that reads slowly on purpose */
     LINK_PAUSE_FIRST_MS = 250,
-    LINK_PAUSE_MOST_MS = 5000
+    LINK_PAUSE_MAX_MS = 5000
 };
 
 struct pal_link {
@@ -107,7 +107,7 @@ static void link_lost(pal_link *link, const char *reason)
         return;
     }
     lws_sul_schedule(link->loop->context, 0, &link->retry, link_retry_fired, (lws_usec_t)link->pause_ms * 1000);
-    link->pause_ms = link->pause_ms * 2 < LINK_PAUSE_MOST_MS ? link->pause_ms * 2 : LINK_PAUSE_MOST_MS;
+    link->pause_ms = link->pause_ms * 2 < LINK_PAUSE_MAX_MS ? link->pause_ms * 2 : LINK_PAUSE_MAX_MS;
     link_tell(link, PAL_LINK_LOST, reason);
 }
 

@@ -29,10 +29,10 @@ pal_err pal_end_condition_parse(pal_end_condition *until, const char *text, pal_
                                       word, known);
         }
         char *end;
-        const double least = strtod(equals + 1, &end);
-        if (end != word + length || end == equals + 1 || !(least > 0) || !isfinite(least))
+        const double min = strtod(equals + 1, &end);
+        if (end != word + length || end == equals + 1 || !(min > 0) || !isfinite(min))
             return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "until: \"%.*s\" wants a number above 0", length, word);
-        until->least[which] = least;
+        until->min[which] = min;
         until->any = true;
         word += length + (word[length] == ',');
     }
@@ -47,6 +47,6 @@ bool pal_end_condition_met(const pal_end_condition *until, const pal_scripted_cl
 #undef X
     };
     bool all = until->any;
-    for (int i = 0; i < PAL_END_CONDITION_COUNT; i++) all = all && seen[i] >= until->least[i];
+    for (int i = 0; i < PAL_END_CONDITION_COUNT; i++) all = all && seen[i] >= until->min[i];
     return all;
 }

@@ -30,7 +30,7 @@ enum {
 
 typedef struct pal_end_condition {
     bool any;
-    double least[PAL_END_CONDITION_COUNT]; /* 0: nothing is asked of it */
+    double min[PAL_END_CONDITION_COUNT]; /* 0: nothing is asked of it */
 } pal_end_condition;
 
 /* REFUSED names the word */

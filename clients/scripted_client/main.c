@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { CLIENTS_MOST = 1000 };
+enum { CLIENTS_MAX = 1000 };
 
 typedef struct crowd {
     pal_link_loop *loop;
@@ -102,31 +102,31 @@ static void main_put_samples(cJSON *object, const char *name, pal_samples *s)
 }
 
 /* one line for each order */
-static void main_told(void *user, const pal_order_result *told)
+static void main_reported(void *user, const pal_order_result *reported)
 {
     if (!*(const bool *)user) {
-        printf("%s%s", told->answer ? "" : "refused: ", told->text);
-        if (told->frame_ms > 0)
-            printf("; epoch %u, %u vertices, seen after %.0f ms, longest gap %.0f ms", told->epoch, told->n_vertex,
-                   told->frame_ms, told->gap_ms);
-        if (told->moved_m > 0) printf("; moved %.1f mm", told->moved_m * 1e3);
+        printf("%s%s", reported->answer ? "" : "refused: ", reported->text);
+        if (reported->frame_ms > 0)
+            printf("; epoch %u, %u vertices, seen after %.0f ms, longest gap %.0f ms", reported->epoch,
+                   reported->n_vertex, reported->frame_ms, reported->gap_ms);
+        if (reported->moved_m > 0) printf("; moved %.1f mm", reported->moved_m * 1e3);
         printf("\n");
         fflush(stdout);
         return;
     }
     cJSON *o = cJSON_CreateObject();
-    cJSON_AddStringToObject(o, "order", told->line->order.verb);
-    cJSON_AddNumberToObject(o, "line", told->line->number);
-    cJSON_AddBoolToObject(o, "done", told->answer != NULL);
-    cJSON_AddStringToObject(o, "text", told->text);
-    cJSON_AddNumberToObject(o, "answer_ms", told->answer_ms);
-    cJSON_AddNumberToObject(o, "frame_ms", told->frame_ms);
-    cJSON_AddNumberToObject(o, "gap_ms", told->gap_ms);
-    cJSON_AddNumberToObject(o, "moved_mm", told->moved_m * 1e3);
-    cJSON_AddNumberToObject(o, "epoch", told->epoch);
-    cJSON_AddNumberToObject(o, "vertices", told->n_vertex);
-    for (uint32_t i = 0; told->answer && i < told->answer->n_arg; i++)
-        cJSON_AddNumberToObject(o, told->answer->arg[i].key, told->answer->arg[i].value);
+    cJSON_AddStringToObject(o, "order", reported->line->order.verb);
+    cJSON_AddNumberToObject(o, "line", reported->line->number);
+    cJSON_AddBoolToObject(o, "done", reported->answer != NULL);
+    cJSON_AddStringToObject(o, "text", reported->text);
+    cJSON_AddNumberToObject(o, "answer_ms", reported->answer_ms);
+    cJSON_AddNumberToObject(o, "frame_ms", reported->frame_ms);
+    cJSON_AddNumberToObject(o, "gap_ms", reported->gap_ms);
+    cJSON_AddNumberToObject(o, "moved_mm", reported->moved_m * 1e3);
+    cJSON_AddNumberToObject(o, "epoch", reported->epoch);
+    cJSON_AddNumberToObject(o, "vertices", reported->n_vertex);
+    for (uint32_t i = 0; reported->answer && i < reported->answer->n_arg; i++)
+        cJSON_AddNumberToObject(o, reported->answer->arg[i].key, reported->answer->arg[i].value);
     char *text = cJSON_PrintUnformatted(o);
     if (text) puts(text);
     fflush(stdout);
@@ -312,7 +312,7 @@ int main(int argc, char **argv)
          "cycles, frames, answered, fields, patches, triangles, orders, topologies,\n"
          "cycles_of_it (the last topology's), members, joins, stalls, moved_mm, force_N, field_high"},
         {"--rate", "HZ", PAL_CLIENT_NUMBER, &rate, 1, 240, NULL, "poses per second (120)"},
-        {"--clients", "N", PAL_CLIENT_NUMBER, &clients, 1, CLIENTS_MOST, NULL, "so many at once (1)"},
+        {"--clients", "N", PAL_CLIENT_NUMBER, &clients, 1, CLIENTS_MAX, NULL, "so many at once (1)"},
         {"--depth", "M", PAL_CLIENT_NUMBER, &depth, 1e-5, 1, NULL, "depth of a press in metres (8 % of the box)"},
         {"--up", "X,Y,Z", PAL_CLIENT_TEXT, &up, 0, 0, NULL, "from which side the organ is touched (0,0,1)"},
         {"--field", "NAME", PAL_CLIENT_TEXT, &field, 0, 0, NULL,
@@ -362,7 +362,7 @@ int main(int argc, char **argv)
     const int bad = main_read(sculpt, &orders, until, &seen);
     if (bad) return bad;
     if (sculpt) base.orders = &orders;
-    if (!quiet) base.told = main_told, base.user = &json;
+    if (!quiet) base.reported = main_reported, base.user = &json;
     signal(SIGINT, main_on_signal);
     signal(SIGTERM, main_on_signal);
     crowd c = {.trainee = calloc((size_t)base.n_client, sizeof *c.trainee),

@@ -2,14 +2,14 @@
 
 #include <stdlib.h>
 
-enum { SAMPLES_MOST = 1 << 20 };
+enum { SAMPLES_MAX = 1 << 20 };
 
 void pal_samples_add(pal_samples *s, double value)
 {
     s->n++;
     s->sum += value;
     if (s->n == 1 || value > s->max) s->max = value;
-    if (s->n_kept == SAMPLES_MOST) return;
+    if (s->n_kept == SAMPLES_MAX) return;
     if (s->n_kept == s->cap) {
         const size_t cap = s->cap ? 2 * s->cap : 1024;
         float *grown = realloc(s->value, cap * sizeof *grown);

@@ -136,20 +136,20 @@ static void trainee_tell(pal_scripted_client *t)
     if (!t->asked || !t->answered || (t->reshaped && !t->part[0].seen)) return;
     const pal_order_line *line = &t->options.orders->line[t->order++];
     const uint64_t now = pal_clock_ns();
-    const pal_order_result told = {.line = line,
-                                   .answer = t->refused ? NULL : &t->answer,
-                                   .text = t->text,
-                                   .answer_ms = (double)(t->answered_ns - t->asked_ns) * 1e-6,
-                                   .frame_ms = t->reshaped ? (double)(now - t->asked_ns) * 1e-6 : 0,
-                                   .gap_ms = t->gap_ms,
-                                   .moved_m = trainee_moved(t, line->order.target),
-                                   .epoch = t->part[0].epoch,
-                                   .n_vertex = t->part[0].n_vertex};
+    const pal_order_result reported = {.line = line,
+                                       .answer = t->refused ? NULL : &t->answer,
+                                       .text = t->text,
+                                       .answer_ms = (double)(t->answered_ns - t->asked_ns) * 1e-6,
+                                       .frame_ms = t->reshaped ? (double)(now - t->asked_ns) * 1e-6 : 0,
+                                       .gap_ms = t->gap_ms,
+                                       .moved_m = trainee_moved(t, line->order.target),
+                                       .epoch = t->part[0].epoch,
+                                       .n_vertex = t->part[0].n_vertex};
     t->asked = false;
     t->result.n_order++;
     if (t->refused && !line->may_fail && t->result.n_refused++ == 0)
         snprintf(t->result.refused, sizeof t->result.refused, "line %d: %.200s", line->number, t->text);
-    if (t->options.told) t->options.told(t->options.user, &told);
+    if (t->options.reported) t->options.reported(t->options.user, &reported);
 }
 
 static void trainee_answered(pal_scripted_client *t, const pal_control *c)

@@ -52,7 +52,7 @@ typedef struct pal_scripted_client_options {
     double read_bytes_s;      /* > 0: slow reader                                        */
     double stall_s;           /* > 0: reads nothing for this long, one second after the first cycle */
     const pal_orders *orders; /* to be given, as an instructor; borrowed; NULL: none               */
-    void (*told)(void *user, const pal_order_result *told); /* what came of each; NULL: nobody         */
+    void (*reported)(void *user, const pal_order_result *reported); /* what came of each; NULL: nobody         */
     void *user;
 } pal_scripted_client_options;
 

@@ -1,5 +1,5 @@
 /* Calibration: constants of springs (model tet_springs) that make a lattice come to rest where finite elements, or
- * measured displacements, say the body does (paper B 3).
+ * measured displacements, say the body does (paper B section 3).
  *
  * What is fitted are theta = ln k_J of edges, faces and tetrahedra: one number each (3.2), or one at each node of a
  * grid laid over the body, with trilinear values between them (3.5); a spring takes the mean over its corners. For a
@@ -69,8 +69,8 @@ typedef struct pal_calibration_info {
     const double *low, *high;        /* bounds                                        [n_parameter]             */
 } pal_calibration_info;
 void pal_calibration_info_of(const pal_calibration *calibration, pal_calibration_info *out);
-/* theta of equal constants as a hand would set them first: 0.2, 0.4, 1 E h^3 on every spring (paper B 3.4). They are
- * divided by the mean weight of their kind where springs are weighted */
+/* theta of equal constants as a hand would set them first: 0.2, 0.4, 1 E h^3 on every spring (paper B section 3.4).
+ * They are divided by the mean weight of their kind where springs are weighted */
 void pal_calibration_manual_start(const pal_calibration *calibration, double *theta);
 /* k_J at the mesh's nodes for kind index k (of info.kind), before weights [n_node] */
 void pal_calibration_constants(const pal_calibration *calibration, const double *theta, int k, double *k_J);

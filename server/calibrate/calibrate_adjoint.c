@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_EVALUATION = 1000, MEMORY_PAIRS = 30, MOST_ROUND = 4, FEW_PARAMETERS = 16 };
+enum { MAX_EVALUATION = 1000, MEMORY_PAIRS = 30, MAX_ROUND = 4, FEW_PARAMETERS = 16 };
 
 typedef struct fit {
     const pal_calibration *c;
@@ -24,7 +24,7 @@ typedef struct fit {
     double *best, *good, *slope; /* [n_parameter]: best so far; last point with a value, its slope    */
     double best_objective, good_objective;
     double best_percent;
-    int64_t most;
+    int64_t max;
     const char *ended; /* NULL: goes on */
     pal_err err;
     pal_diagnostic *diag;
@@ -48,7 +48,7 @@ static void tell(fit *f, const double *theta, double error_percent, bool improve
                          .improved = improved};
     if (o->step && !o->step(o->user, &step)) stop(f, "stopped");
     if (o->budget_s > 0 && step.seconds >= o->budget_s) stop(f, "budget");
-    if (f->out->n_evaluation >= f->most) stop(f, "evaluations");
+    if (f->out->n_evaluation >= f->max) stop(f, "evaluations");
     if (o->target_percent > 0 && f->best_percent <= o->target_percent) stop(f, "enough");
 }
 
@@ -112,8 +112,8 @@ static pal_err search(fit *f, double *theta)
     nlopt_set_vector_storage(f->opt, MEMORY_PAIRS);
     /* of the logarithm: a few constants are followed to the end of their valley, many are not worth it */
     nlopt_set_ftol_abs(f->opt, c->n_parameter <= FEW_PARAMETERS ? 1e-6 : 3e-4);
-    double least;
-    nlopt_optimize(f->opt, theta, &least);
+    double min;
+    nlopt_optimize(f->opt, theta, &min);
     nlopt_destroy(f->opt);
     f->opt = NULL;
     return f->err;
@@ -132,7 +132,7 @@ static pal_err run(fit *f, double *theta)
     memcpy(f->good, theta, n);
     f->good_objective = start;
     /* a search may end early behind a wall: begun again at the best it forgets its curvatures */
-    for (int round = 0; round < MOST_ROUND && !f->ended; round++) {
+    for (int round = 0; round < MAX_ROUND && !f->ended; round++) {
         double before = f->best_objective;
         memcpy(theta, f->best, n);
         memcpy(f->good, f->best, n);
@@ -168,7 +168,7 @@ pal_err pal_fit_adjoint(const pal_calibration *calibration, const pal_fit_option
              .begin_s = pal_clock_s(),
              .best_objective = DBL_MAX,
              .best_percent = DBL_MAX,
-             .most = options->max_evaluation > 0 ? options->max_evaluation : MOST_EVALUATION,
+             .max = options->max_evaluation > 0 ? options->max_evaluation : MAX_EVALUATION,
              .diag = diag};
     f.best = calloc(4 * n, sizeof(double));
     pal_err err = f.best ? pal_calibration_workspace_create(c, &f.workspace) : PAL_ERR_MEMORY;

@@ -1,5 +1,5 @@
-/* Calibration by adaptive simulated annealing (paper B 3.2; num/anneal.h): the cost is E, the mean error in per cent; a
- * point without a stable rest has no cost. Needs no slope, so it also checks the adjoint's answer from outside.
+/* Calibration by adaptive simulated annealing (paper B section 3.2; num/anneal.h): the cost is E, the mean error in per
+ * cent; a point without a stable rest has no cost. Needs no slope, so it also checks the adjoint's answer from outside.
  *
  * Every point is evaluated from the start's own rest, never from a neighbour's, on the seat of whichever worker is
  * free: E depends on theta alone and the walk on the seed alone.
@@ -20,7 +20,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_EVALUATION = 4000, MOST_STALL = 1500 };
+enum { MAX_EVALUATION = 4000, MAX_STALL = 1500 };
 /* steps below this share of the range change an error by less than anybody asks for: 5e-3 in ln k over 2 x 2 decades */
 static const double COLDEST = 5e-4;
 /* of the way that theta may go: most of the rest has no stable rest, or an error nobody would take */
@@ -37,7 +37,7 @@ typedef struct fit {
     int n_seat, n_batch;
     pal_fit_result *out;
     double begin_s;
-    int64_t most;
+    int64_t max;
     const char *ended; /* NULL: goes on */
     /* coordinates of the walk: where it begins, its box [n_parameter], and the same place as theta */
     double *first, *low, *high, *start;
@@ -134,7 +134,7 @@ static bool tell(void *user, const pal_anneal_step *at)
         f->ended = "stopped";
     else if (o->target_percent > 0 && at->best <= o->target_percent)
         f->ended = "enough";
-    else if (at->generation + 1 >= f->most)
+    else if (at->generation + 1 >= f->max)
         f->ended = "evaluations";
     else if (o->budget_s > 0 && step.seconds >= o->budget_s)
         f->ended = "budget";
@@ -153,9 +153,9 @@ static pal_err walk(fit *f, double *theta, pal_diagnostic *diag)
     a.low = f->low, a.high = f->high, a.first = f->first;
     a.seed = f->o->seed;
     a.n_batch = f->n_batch;
-    a.max_evaluation = f->most;
+    a.max_evaluation = f->max;
     a.min_temperature_ratio = COLDEST;
-    a.stall = MOST_STALL;
+    a.stall = MAX_STALL;
     a.evaluate = evaluate;
     a.step = tell;
     a.user = f;
@@ -212,7 +212,7 @@ pal_err pal_fit_anneal(const pal_calibration *calibration, const pal_fit_options
              .o = options,
              .out = out,
              .begin_s = pal_clock_s(),
-             .most = options->max_evaluation > 0 ? options->max_evaluation : MOST_EVALUATION};
+             .max = options->max_evaluation > 0 ? options->max_evaluation : MAX_EVALUATION};
     for (int i = 0; i < c->n_parameter; i++) theta[i] = fmin(fmax(theta[i], c->low[i]), c->high[i]);
     pal_err err = make(&f);
     if (err)

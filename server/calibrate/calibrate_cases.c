@@ -11,7 +11,7 @@
 #include <string.h>
 
 /* points farther outside the surface's box, as a share of its diagonal, are of another body */
-static const double most_outside = 0.05;
+static const double max_outside = 0.05;
 
 enum { ENOUGH_NODES = 700, FINEST = 64 };
 
@@ -194,7 +194,7 @@ static pal_err check_box(const job *j, int index)
     const pal_samples *samples = &s->samples[index];
     double low[3], high[3];
     pal_surface_box(&s->surface, low, high);
-    double slack = most_outside * pal_dist3(low, high);
+    double slack = max_outside * pal_dist3(low, high);
     for (int i = 0; i < samples->n; i++) {
         double x[3], out = 0;
         pal_sub3(x, samples->x + 3 * i, s->surface.origin_m);
@@ -232,7 +232,7 @@ pal_err pal_calibrate_cases_check(const pal_calibrate_cases *s, const pal_prepar
     for (int k = 0; k < s->n && !err; k++) {
         const pal_samples *samples = &s->samples[k];
         int n_far = 0;
-        double most = 0, out, local[4], x[3];
+        double max = 0, out, local[4], x[3];
         if (!s->list[k].samples) continue;
         if (!locate && pal_locate_create(&mesh->tets, NULL, &locate))
             return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for points in the mesh");
@@ -240,14 +240,14 @@ pal_err pal_calibrate_cases_check(const pal_calibrate_cases *s, const pal_prepar
             pal_sub3(x, samples->x + 3 * i, mesh->tets.origin_m);
             pal_locate_point(locate, x, local, &out);
             n_far += out > mesh->tets.edge_m;
-            most = fmax(most, out);
+            max = fmax(max, out);
         }
         if (n_far > 0.01 * samples->n)
             err =
                 pal_diagnostic_set(diag, PAL_ERR_REFUSED,
                                    "truth \"%s\": %d of %d points are more than a voxel outside of the body (by up to "
                                    "%.3g m): is it of another one?",
-                                   s->truth_name[k], n_far, samples->n, most);
+                                   s->truth_name[k], n_far, samples->n, max);
     }
     pal_locate_destroy(locate);
     return err;

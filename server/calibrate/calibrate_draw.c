@@ -14,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { TITLE = 120, TITLE_SHOWN = 48, MOST_DRAWN = 4000 };
+enum { TITLE = 120, TITLE_SHOWN = 48, MAX_DRAWN = 4000 };
 
 /* ---- trajectory ---- */
 
@@ -22,7 +22,7 @@ enum { TITLE = 120, TITLE_SHOWN = 48, MOST_DRAWN = 4000 };
  */
 static int thin_out(const pal_calibrate_run *run, double *x, double *error, double *best)
 {
-    int step = (run->n_trail + MOST_DRAWN - 1) / MOST_DRAWN, n = 0;
+    int step = (run->n_trail + MAX_DRAWN - 1) / MAX_DRAWN, n = 0;
     for (int from = 0; from < run->n_trail; from += step, n++) {
         int to = from + step < run->n_trail ? from + step : run->n_trail;
         x[n] = to;
@@ -37,8 +37,8 @@ static int thin_out(const pal_calibrate_run *run, double *x, double *error, doub
 pal_err pal_calibrate_draw_trajectory(const pal_calibrate_run *run, const char *path, pal_diagnostic *diag)
 {
     char title[TITLE], label[80] = "evaluations";
-    double *x = malloc(3 * ((size_t)MOST_DRAWN + 1) * sizeof *x), *error = x + MOST_DRAWN + 1,
-           *best = error + MOST_DRAWN + 1;
+    double *x = malloc(3 * ((size_t)MAX_DRAWN + 1) * sizeof *x), *error = x + MAX_DRAWN + 1,
+           *best = error + MAX_DRAWN + 1;
     if (!x) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory", path);
     int n = thin_out(run, x, error, best);
     const char *name = run->set.problem->name;
@@ -213,10 +213,10 @@ static void take_vertices(drawing *d)
 /* lengths in a unit that suits the body */
 static double length_unit(const drawing *d, const char **name)
 {
-    double most = 0;
-    for (int v = 0; v < d->n_vertex; v++) most = fmax(most, fmax(d->shape[START].value[v], d->shape[FOUND].value[v]));
-    *name = most >= 0.5 ? "m" : most >= 5e-4 ? "mm" : "um";
-    return most >= 0.5 ? 1 : most >= 5e-4 ? 1e3 : 1e6;
+    double max = 0;
+    for (int v = 0; v < d->n_vertex; v++) max = fmax(max, fmax(d->shape[START].value[v], d->shape[FOUND].value[v]));
+    *name = max >= 0.5 ? "m" : max >= 5e-4 ? "mm" : "um";
+    return max >= 0.5 ? 1 : max >= 5e-4 ? 1e3 : 1e6;
 }
 
 /* ---- pictures ---- */

@@ -17,7 +17,7 @@ struct pal_journal {
     FILE *file;
     char path[512];
     uint64_t problem;
-    size_t n_parameter, n, most;
+    size_t n_parameter, n, max;
     double *theta, *cost; /* [n][n_parameter], [n]                                   */
     int64_t *slot;        /* index of a point, -1: free; open addressing [n_slot]  */
     size_t n_slot;        /* a power of two, more than twice n                      */
@@ -46,8 +46,8 @@ static size_t slot_of(const pal_journal *j, const double *theta)
 
 static pal_err make_room(pal_journal *j)
 {
-    if (j->n < j->most) return PAL_ERR_OK;
-    size_t more = j->most > 0 ? 2 * j->most : 256;
+    if (j->n < j->max) return PAL_ERR_OK;
+    size_t more = j->max > 0 ? 2 * j->max : 256;
     double *theta = realloc(j->theta, more * j->n_parameter * sizeof *theta);
     if (theta) j->theta = theta;
     double *cost = theta ? realloc(j->cost, more * sizeof *cost) : NULL;
@@ -57,7 +57,7 @@ static pal_err make_room(pal_journal *j)
     free(j->slot);
     j->slot = slot;
     j->n_slot = 4 * more;
-    j->most = more;
+    j->max = more;
     for (size_t i = 0; i < j->n_slot; i++) slot[i] = -1;
     for (size_t i = 0; i < j->n; i++) slot[slot_of(j, theta + i * j->n_parameter)] = (int64_t)i;
     return PAL_ERR_OK;
@@ -190,7 +190,7 @@ pal_err pal_journal_begin(pal_journal *j, uint64_t problem, int n_parameter, pal
     free(j->slot);
     j->theta = j->cost = NULL;
     j->slot = NULL;
-    j->n = j->most = j->n_slot = 0;
+    j->n = j->max = j->n_slot = 0;
     j->problem = problem;
     j->n_parameter = (size_t)n_parameter;
     return read_lines(j, diag);

@@ -19,7 +19,7 @@ static const char *truth_of(const pal_calibrate_run *run, int index)
 
 /* least, middle and most of a kind on the grid */
 typedef struct spread {
-    double least, middle, most;
+    double min, middle, max;
 } spread;
 
 static int ascending(const void *a, const void *b)
@@ -107,7 +107,7 @@ static void print_constants(const pal_calibrate_run *run)
             continue;
         }
         spread s = spread_of(run, k);
-        printf("%s %.3g to %.3g J, median %.3g", pal_calibrate_key(run, k, true), s.least, s.most, s.middle);
+        printf("%s %.3g to %.3g J, median %.3g", pal_calibrate_key(run, k, true), s.min, s.max, s.middle);
         if (count_bound(run, k)) printf(", %d as far as --decades lets them go", count_bound(run, k));
         printf("\n");
     }
@@ -206,9 +206,9 @@ static void add_constants(const pal_calibrate_run *run, cJSON *o)
         }
         spread s = spread_of(run, k);
         cJSON *kind = cJSON_AddObjectToObject(grid, key);
-        add_number(kind, "min", s.least);
+        add_number(kind, "min", s.min);
         add_number(kind, "median", s.middle);
-        add_number(kind, "max", s.most);
+        add_number(kind, "max", s.max);
     }
 }
 
@@ -224,12 +224,12 @@ static void add_live(const pal_calibrate_run *run, cJSON *o)
     cJSON *live = cJSON_AddObjectToObject(o, "live"), *ladder;
     cJSON_AddBoolToObject(live, "steady", steady);
     cJSON_AddNumberToObject(live, "substeps", run->n_substep);
-    double most = 0;
+    double max = 0;
     for (int k = 0; k < run->set.n; k++) {
         double d = run->live.load[k].difference_percent;
-        most = d <= most ? most : d; /* NaN stays */
+        max = d <= max ? max : d; /* NaN stays */
     }
-    add_number(live, "difference_percent", most);
+    add_number(live, "difference_percent", max);
     ladder = cJSON_AddArrayToObject(live, "ladder");
     for (int k = 0; k < PAL_SETTLE_STEPS; k++) {
         cJSON *step = cJSON_CreateObject();

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_SUBSTEP = 1000000, N_TOOL = 3 };
+enum { MAX_SUBSTEP = 1000000, N_TOOL = 3 };
 
 /* "/a/Gear 2.json" -> "gear_2": what a scene and its mesh may be called */
 static void name_of(const char *path, char out[PAL_NAME])
@@ -94,14 +94,14 @@ static pal_err put_model(const pal_calibrate_run *run, pal_loaded_scene *scene, 
 /* tools as strong as the loads that were fitted, so that a hand can do to the body what they did */
 static void put_tools(const pal_calibrate_run *run, pal_scene *scene)
 {
-    double most = 0;
+    double max = 0;
     for (int k = 0; k < run->set.n; k++) {
         const double *f = pal_calibration_forces(run->calibration, k);
         double sum = 0;
         for (int i = 0; i < run->info.n_node && run->set.list[k].fit; i++) sum += pal_norm3(f + 3 * i);
-        most = fmax(most, sum);
+        max = fmax(max, sum);
     }
-    double unit = pow(10, floor(log10(most)) - 1), cap = unit * ceil(most / unit - 1e-9);
+    double unit = pow(10, floor(log10(max)) - 1), cap = unit * ceil(max / unit - 1e-9);
     pal_tools_default(scene, N_TOOL);
     for (int k = 0; k < N_TOOL; k++) scene->tool[k].force_cap_N = fmin(fmax(cap, 1e-3), 1000);
 }
@@ -111,8 +111,8 @@ static pal_err allow_substeps(pal_scene *scene, int *n_substep, pal_diagnostic *
 {
     pal_world *world = NULL;
     pal_err err = pal_world_create(scene, diag, &world);
-    while (err == PAL_ERR_BUDGET && scene->max_substep < MOST_SUBSTEP) {
-        scene->max_substep = 2 * scene->max_substep < MOST_SUBSTEP ? 2 * scene->max_substep : MOST_SUBSTEP;
+    while (err == PAL_ERR_BUDGET && scene->max_substep < MAX_SUBSTEP) {
+        scene->max_substep = 2 * scene->max_substep < MAX_SUBSTEP ? 2 * scene->max_substep : MAX_SUBSTEP;
         err = pal_world_create(scene, diag, &world);
     }
     if (!err) *n_substep = pal_world_substeps(world);

@@ -15,7 +15,7 @@ static const double floor_percent2 = 1e-6;
 
 static pal_err make_seat(const pal_calibration *c, pal_calibration_workspace *s)
 {
-    size_t n = 3 * (size_t)c->lattice.n_node, most = n;
+    size_t n = 3 * (size_t)c->lattice.n_node, max = n;
     s->calibration = c;
     PAL_TRY(pal_equilibrium_workspace_create(&c->lattice, &s->workspace));
     for (int k = 0; k < PAL_SPRING_KINDS; k++) {
@@ -25,14 +25,14 @@ static pal_err make_seat(const pal_calibration *c, pal_calibration_workspace *s)
         if (!s->k[k] || !s->slope[k]) return PAL_ERR_MEMORY;
     }
     for (int i = 0; i < c->n_case; i++) {
-        most = most > 3 * (size_t)c->fit[i].n_point ? most : 3 * (size_t)c->fit[i].n_point;
+        max = max > 3 * (size_t)c->fit[i].n_point ? max : 3 * (size_t)c->fit[i].n_point;
         s->x[i] = calloc(n, sizeof(double));
         if (!s->x[i]) return PAL_ERR_MEMORY;
     }
     s->value = calloc(2 * (size_t)c->n_used, sizeof(double));
     s->node = calloc(n / 3, sizeof(double));
     s->dJ_du = calloc(n, sizeof(double));
-    s->u = calloc(most, sizeof(double));
+    s->u = calloc(max, sizeof(double));
     s->gradient = calloc((size_t)c->n_parameter, sizeof(double));
     return s->value && s->node && s->dJ_du && s->u && s->gradient ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }

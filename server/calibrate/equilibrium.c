@@ -15,8 +15,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_HALVING = 30, MOST_SHIFT = 8 };
-static const double MOST_LINEAR = 1e-6; /* residual of a linear solve, relative */
+enum { MAX_HALVING = 30, MAX_SHIFT = 8 };
+static const double MAX_LINEAR = 1e-6; /* residual of a linear solve, relative */
 
 struct pal_equilibrium_workspace {
     const pal_lattice *lattice;
@@ -298,7 +298,7 @@ static pal_err factor_at(const search *s, const double *x)
     if (err != PAL_ERR_NUMERIC || s->o->linear) return err;
     s->report->n_shift++;
     double share = 0;
-    for (int k = 0; k < MOST_SHIFT && err == PAL_ERR_NUMERIC; k++) {
+    for (int k = 0; k < MAX_SHIFT && err == PAL_ERR_NUMERIC; k++) {
         assemble(workspace, s->k_J, x, SAFE_HESSIAN);
         if (share > 0) shift(&workspace->matrix, share);
         share = share > 0 ? 10 * share : 1e-8;
@@ -312,10 +312,10 @@ static pal_err factor_at(const search *s, const double *x)
 static double stretch_of(const pal_lattice *l, const double *x)
 {
     const pal_springs *s = &l->kind[PAL_SPRING_DISTANCE];
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < s->n_item; i++)
-        most = fmax(most, s->w[i] * pal_dist3(x + 3 * s->item[2 * i], x + 3 * s->item[2 * i + 1]));
-    return most;
+        max = fmax(max, s->w[i] * pal_dist3(x + 3 * s->item[2 * i], x + 3 * s->item[2 * i + 1]));
+    return max;
 }
 
 /* x += step p with the largest of 1, 1/2, 1/4 ... that lowers the energy, or the residual where energies are alike;
@@ -327,7 +327,7 @@ static bool advance(const search *s, double *x, double *energy, double *size)
     size_t n = 3 * (size_t)l->n_node;
     double slope = -dot(l, workspace->r, workspace->p), scale = fabs(*energy) + s->report->energy_J, step = 1;
     if (!(slope < 0)) return false;
-    for (int k = 0; k < MOST_HALVING; k++, step *= 0.5) {
+    for (int k = 0; k < MAX_HALVING; k++, step *= 0.5) {
         for (size_t i = 0; i < n; i++) workspace->trial[i] = x[i] + step * workspace->p[i];
         double e = residual(s, workspace->trial, workspace->f), there = norm(l, workspace->f);
         bool alike = fabs(step * slope) < 1e-11 * scale;
@@ -346,10 +346,10 @@ static bool advance(const search *s, double *x, double *energy, double *size)
 static double rounding(const search *s)
 {
     const pal_springs *edge = &s->workspace->lattice->kind[PAL_SPRING_DISTANCE];
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < edge->n_item; i++)
-        most = fmax(most, edge->q[i] * edge->w[i] * fabs(s->k_J[PAL_SPRING_DISTANCE][i]));
-    return 1e-14 * sqrt(s->workspace->lattice->n_free) * most;
+        max = fmax(max, edge->q[i] * edge->w[i] * fabs(s->k_J[PAL_SPRING_DISTANCE][i]));
+    return 1e-14 * sqrt(s->workspace->lattice->n_free) * max;
 }
 
 static pal_err newton(const search *s, double *x)
@@ -400,7 +400,7 @@ static pal_err linear(const search *s, double *x)
     memcpy(workspace->r, s->force_N, 3 * sizeof(double) * (size_t)l->n_node);
     pal_block_matrix_multiply(&workspace->matrix, -1, workspace->p, workspace->r);
     s->report->residual = load > 0 ? norm(l, workspace->r) / load : 0;
-    if (!(s->report->residual < MOST_LINEAR))
+    if (!(s->report->residual < MAX_LINEAR))
         return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "no rest: the linear system keeps a residual of %.2g",
                                   s->report->residual);
     for (int i = 0; i < 3 * l->n_node; i++) x[i] = l->x_rest[i] + (l->fixed[i / 3] ? 0 : workspace->p[i]);

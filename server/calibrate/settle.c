@@ -8,7 +8,7 @@
 #include <stdlib.h>
 
 /* what "still" means, header */
-static const double most_v = 1e-4, mean_v = 3e-5, most_a = 1e-2, mean_a = 1e-3, hold_s = 0.25;
+static const double max_v = 1e-4, mean_v = 3e-5, max_a = 1e-2, mean_a = 1e-3, hold_s = 0.25;
 
 const double pal_settle_rates_1_s[PAL_SETTLE_STEPS] = {0.5, 1, 2, 4, 8, 16};
 enum { USUAL = 3 };
@@ -37,7 +37,7 @@ static double mean_gain(const pal_body *body, const double *force_N)
 /* is the body still at this moment? damping: rate of the row viscous, which the solver applies apart from f */
 static bool is_still(const pal_body *body, double damping_1_s, double gain_m_s2)
 {
-    double v_most = 0, v_sum = 0, a_most = 0, a_sum = 0, u_most = 0;
+    double v_max = 0, v_sum = 0, a_max = 0, a_sum = 0, u_max = 0;
     int n = 0;
     for (int i = 0; i < body->n_dof; i++) {
         if (body->support[i]) continue;
@@ -45,19 +45,19 @@ static bool is_still(const pal_body *body, double damping_1_s, double gain_m_s2)
         double a[3], speed = pal_norm3(v);
         for (int c = 0; c < 3; c++) a[c] = f[c] / body->mass_kg[i] - damping_1_s * v[c];
         double size = pal_norm3(a);
-        v_most = fmax(v_most, speed), v_sum += speed;
-        a_most = fmax(a_most, size), a_sum += size;
-        u_most = fmax(u_most, pal_dist3(body->x + 3 * i, body->x_rest + 3 * i));
+        v_max = fmax(v_max, speed), v_sum += speed;
+        a_max = fmax(a_max, size), a_sum += size;
+        u_max = fmax(u_max, pal_dist3(body->x + 3 * i, body->x_rest + 3 * i));
         n++;
     }
-    double speed = sqrt(u_most * gain_m_s2);
-    return u_most > 0 && v_most <= most_v * speed && v_sum <= mean_v * speed * n && a_most <= most_a * gain_m_s2 &&
+    double speed = sqrt(u_max * gain_m_s2);
+    return u_max > 0 && v_max <= max_v * speed && v_sum <= mean_v * speed * n && a_max <= max_a * gain_m_s2 &&
            a_sum <= mean_a * gain_m_s2 * n;
 }
 
 static void compare(const pal_body *body, const double *u, pal_settle_run *out)
 {
-    double sum = 0, most = 0;
+    double sum = 0, max = 0;
     out->max_m = 0;
     out->difference_percent = NAN;
     for (int i = 0; i < body->n_dof; i++) {
@@ -67,9 +67,9 @@ static void compare(const pal_body *body, const double *u, pal_settle_run *out)
         if (!u) continue;
         pal_sub3(d, d, u + 3 * i);
         sum += pal_dot3(d, d);
-        most = fmax(most, pal_norm3(u + 3 * i));
+        max = fmax(max, pal_norm3(u + 3 * i));
     }
-    if (u && most > 0) out->difference_percent = 100 * sqrt(sum / body->n_dof) / most;
+    if (u && max > 0) out->difference_percent = 100 * sqrt(sum / body->n_dof) / max;
 }
 
 /* the damping that the world's row viscous has now */
@@ -113,11 +113,11 @@ pal_err pal_settle(pal_world *world, double step_s, const pal_settle_load *load,
 /* ---- ladder ---- */
 
 /* all loads at one rate; the mean is *mean, NaN when some is not steady within `most` seconds of all together */
-static pal_err try_rate(pal_world *world, double step_s, const pal_settle_load *load, int n_load, double most,
+static pal_err try_rate(pal_world *world, double step_s, const pal_settle_load *load, int n_load, double max,
                         pal_settle_options *options, double *work, pal_settle_run *run, double *mean,
                         pal_diagnostic *diag)
 {
-    double left = most, longest = options->max_simulated_s;
+    double left = max, longest = options->max_simulated_s;
     *mean = NAN;
     for (int k = 0; k < n_load; k++) {
         options->max_simulated_s = fmin(longest, left);
@@ -127,7 +127,7 @@ static pal_err try_rate(pal_world *world, double step_s, const pal_settle_load *
         left -= run[k].seconds;
         if (!run[k].steady) return PAL_ERR_OK;
     }
-    *mean = (most - left) / n_load;
+    *mean = (max - left) / n_load;
     return PAL_ERR_OK;
 }
 
@@ -149,10 +149,10 @@ static pal_err try_rung(climb *c, int rung, bool *better)
     pal_settle_report *out = c->out;
     pal_settle_run run[PAL_SETTLE_LOADS] = {0};
     pal_material material = c->scene->body[0].material;
-    double mean, most = c->n_load * (out->steady ? out->seconds : c->options.max_simulated_s);
+    double mean, max = c->n_load * (out->steady ? out->seconds : c->options.max_simulated_s);
     material.damping_1_s = pal_settle_rates_1_s[rung];
     PAL_TRY(pal_world_material(c->world, 0, &material, c->diag));
-    PAL_TRY(try_rate(c->world, c->scene->step_s, c->load, c->n_load, most, &c->options, &c->work, run, &mean, c->diag));
+    PAL_TRY(try_rate(c->world, c->scene->step_s, c->load, c->n_load, max, &c->options, &c->work, run, &mean, c->diag));
     out->rate_seconds[rung] = mean;
     *better = isfinite(mean) && (!out->steady || mean < out->seconds);
     /* of a body that never rests the first run is there to tell */
@@ -171,10 +171,10 @@ static int first_rung(const climb *c)
     double sum = 0;
     int best = USUAL;
     for (int k = 0; k < c->n_load; k++) {
-        double most = 0, gain = mean_gain(body, c->load[k].force_N);
-        for (int i = 0; i < body->n_node && c->load[k].u; i++) most = fmax(most, pal_norm3(c->load[k].u + 3 * i));
-        if (!(most > 0 && gain > 0)) return USUAL;
-        sum += log(2 * sqrt(gain / most)) / c->n_load;
+        double max = 0, gain = mean_gain(body, c->load[k].force_N);
+        for (int i = 0; i < body->n_node && c->load[k].u; i++) max = fmax(max, pal_norm3(c->load[k].u + 3 * i));
+        if (!(max > 0 && gain > 0)) return USUAL;
+        sum += log(2 * sqrt(gain / max)) / c->n_load;
     }
     for (int k = 0; k < PAL_SETTLE_STEPS; k++)
         if (fabs(log(pal_settle_rates_1_s[k]) - sum) < fabs(log(pal_settle_rates_1_s[best]) - sum)) best = k;

@@ -1,6 +1,6 @@
 /* The calibrated body as it will run live: its scene's own rows and solver, a case's nodal loads put on at once at
- * rest, stepped until all is still (paper B 3.3), and the damping that is still soonest. Where it comes to rest is
- * compared with Newton's rest: the springs that were fitted are those that run.
+ * rest, stepped until all is still (paper B section 3.3), and the damping that is still soonest. Where it comes to rest
+ * is compared with Newton's rest: the springs that were fitted are those that run.
  *
  * Still: over the free nodes |v| is at most 1e-4 U/T and 3e-5 U/T in the mean, |a| at most 1e-2 A and 1e-3 A in the
  * mean, for a quarter of a second without a break. U is the largest displacement at that time, A the sum of the loads'

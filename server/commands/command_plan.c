@@ -190,7 +190,7 @@ static void print_absent(const pal_world *world)
 static void print(const pal_studied_scene *studied, pal_world *world, cost *c)
 {
     const pal_scene *scene = studied->scene;
-    if (studied->said[0]) printf("%s\n", studied->said);
+    if (studied->summary[0]) printf("%s\n", studied->summary);
     if (studied->warn[0]) printf("%s\n", studied->warn);
     for (int b = 0; b < scene->n_body; b++) {
         const pal_adaptive_surface *adaptive = pal_world_body(world, b)->model.adaptive;

@@ -148,7 +148,7 @@ int command_robustness(int argc, char **argv)
         code = pal_report_refusal(&common, err, &diag);
     } else {
         code = common.json ? pal_report_json(&common, as_json(scene, &options, report)) : 0;
-        if (!common.json && !common.quiet && input.studied.said[0]) printf("%s\n", input.studied.said);
+        if (!common.json && !common.quiet && input.studied.summary[0]) printf("%s\n", input.studied.summary);
         if (!common.json && !common.quiet) print(scene, report);
         if (code == 0 && report->n_failed + report->n_undecided > 0) code = 1;
     }

@@ -133,7 +133,7 @@ static pal_err open_studies(serve_run *run, pal_diagnostic *diag)
         if (!run->word[i]) continue;
         PAL_TRY(pal_studied_scene_open(run->word[i], scene, s, diag));
         if (s->warn[0]) pal_log(PAL_LOG_WARN, "study", "%s", s->warn);
-        if (s->said[0]) pal_log(PAL_LOG_INFO, "study", "%s", s->said);
+        if (s->summary[0]) pal_log(PAL_LOG_INFO, "study", "%s", s->summary);
     }
     return PAL_ERR_OK;
 }

@@ -33,17 +33,17 @@ static pal_err find_rows(const pal_rest_solution *rest, const pal_surface *surfa
 
 static pal_err make(pal_display_error *s)
 {
-    int most = 1;
+    int max = 1;
     for (int k = 0; k < PAL_DISPLAY_RESTS; k++) {
         if (!s->rest[k]->world) continue;
         PAL_TRY(find_rows(s->rest[k], &s->mesh->surface, &s->by[k]));
-        most = (int)fmax(most, pal_world_view_body(s->rest[k]->world, 0)->n_node);
+        max = (int)fmax(max, pal_world_view_body(s->rest[k]->world, 0)->n_node);
     }
     size_t n = 3 * (size_t)s->n;
     s->frames = malloc(pal_skin_frames_bytes(&s->mesh->skin) + 64);
     s->place = malloc(n * sizeof *s->place), s->unmoved_m = malloc(n * sizeof *s->unmoved_m);
     s->u[0] = malloc(n * sizeof(double)), s->u[1] = malloc(n * sizeof(double));
-    s->node = malloc(3 * sizeof(double) * (size_t)most);
+    s->node = malloc(3 * sizeof(double) * (size_t)max);
     return s->frames && s->place && s->unmoved_m && s->u[0] && s->u[1] && s->node ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
@@ -89,9 +89,9 @@ static void by_elements(pal_display_error *s, int k, double *u)
 
 static double farthest(const pal_display_error *s)
 {
-    double most = 0;
-    for (int i = 0; i < s->n; i++) most = fmax(most, pal_dist3(s->u[0] + 3 * (size_t)i, s->u[1] + 3 * (size_t)i));
-    return most;
+    double max = 0;
+    for (int i = 0; i < s->n; i++) max = fmax(max, pal_dist3(s->u[0] + 3 * (size_t)i, s->u[1] + 3 * (size_t)i));
+    return max;
 }
 
 double pal_display_error_change(pal_display_error *s, int of, int to)

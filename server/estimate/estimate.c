@@ -67,12 +67,12 @@ static bool is_touched(const pal_world *world, const pal_body *body)
 
 static double other_limit_s(const pal_world *world, int body)
 {
-    double least = INFINITY;
+    double min = INFINITY;
     for (int b = 0; b < pal_world_body_count(world); b++) {
         const pal_body *other = pal_world_view_body(world, b);
-        if (b != body && !other->asleep && !other->frozen) least = fmin(least, other->dt_limit_s);
+        if (b != body && !other->asleep && !other->frozen) min = fmin(min, other->dt_limit_s);
     }
-    return least;
+    return min;
 }
 
 bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int body)

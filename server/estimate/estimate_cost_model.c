@@ -10,9 +10,9 @@
 
 enum { TIMED = 15 };
 /* of a step's time with fewer nodes; of the factor's entries with more */
-static const double least_growth = 0.6, most_growth = 2.2, min_fill = 1.1, most_fill = 1.6;
+static const double min_growth = 0.6, max_growth = 2.2, min_fill = 1.1, max_fill = 1.6;
 /* the factor's share of a sub-step at most; power of iterations with nodes */
-static const double most_factor = 0.7, most_more = 0.15;
+static const double max_factor = 0.7, max_more = 0.15;
 /* an entry is a float, read forwards and backwards */
 static const double entry_byte = 4, entry_reads = 2;
 
@@ -68,12 +68,12 @@ static void count(const pal_scene *scene, double limit_s, pal_prediction *out)
 static double grown(const pal_solve_report report[2], const double n_cg[2], double along, double nodes, double fine_ms)
 {
     double entries = (double)report[1].factor_nonzeros, fill = log(entries / (double)report[0].factor_nonzeros) / along;
-    fill = fmin(fmax(fill, min_fill), most_fill);
+    fill = fmin(fmax(fill, min_fill), max_fill);
     double times = pow(nodes, fill), now = pal_machine_read_ms(entry_byte * entries),
            then = pal_machine_read_ms(entry_byte * entries * times);
-    double factor_ms = fmin(n_cg[1] * entry_reads * now, most_factor * fine_ms);
+    double factor_ms = fmin(n_cg[1] * entry_reads * now, max_factor * fine_ms);
     /* finer meshes need a few more iterations */
-    double more = n_cg[0] > 0 ? fmin(fmax(log(n_cg[1] / n_cg[0]) / along, 0), most_more) : 0;
+    double more = n_cg[0] > 0 ? fmin(fmax(log(n_cg[1] / n_cg[0]) / along, 0), max_more) : 0;
     if (!(now > 0 && then > 0)) return nodes;
     return pow(nodes, more) * ((fine_ms - factor_ms) * nodes + factor_ms * fmax(then / now, times)) / fine_ms;
 }
@@ -90,7 +90,7 @@ void pal_estimate_cost_model(const pal_scene *scene, pal_world *live, pal_world 
     bool known = pal_world_solve_report(small, 0, &report[0]) && pal_world_solve_report(live, 0, &report[1]) &&
                  report[0].factor_nonzeros > 0 && report[1].factor_nonzeros > 0;
     count(scene, limit_s, out);
-    double growth = fmin(fmax(log(ms[1] / ms[0]) / along, least_growth), most_growth);
+    double growth = fmin(fmax(log(ms[1] / ms[0]) / along, min_growth), max_growth);
     out->work[0] = pow(out->nodes[0], growth);
     out->work[1] = known ? grown(report, n_cg, along, out->nodes[1], ms[1]) : out->nodes[1];
 }

@@ -12,10 +12,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_NODES = 16000, PROBES = 600, LEAST_SIZE = 4, MOST_SIZE = 400, MOST_FINER = 4 };
-/* MOST_FINER: finest mesh over this one; a mesh so much coarser than the finest can be told from it; order of those
+enum { MAX_NODES = 16000, PROBES = 600, MIN_SIZE = 4, MAX_SIZE = 400, MAX_FINER = 4 };
+/* MAX_FINER: finest mesh over this one; a mesh so much coarser than the finest can be told from it; order of those
  * that cannot, and the mean of that and of what half and this size show */
-static const double told_apart = 1.35, order = 2, far_order = 1.75, least_ratio = 0.02, most_times = 20;
+static const double reported_apart = 1.35, order = 2, far_order = 1.75, min_ratio = 0.02, max_times = 20;
 /* the factors that were observed, with finest meshes of so many times the voxels and without any */
 static const double observed = 2, observed_finer = 2, without = 3;
 /* cosine of two loads from which on what was measured under one is taken for the other; times that measuring took, to
@@ -53,9 +53,9 @@ static double nodes_of(const family *f, int size)
 /* the finest that may be had; 0: none that tells anything */
 static int finest_size(const family *f)
 {
-    int s = f->setting->size, r = MOST_FINER * s;
-    while (r >= told_apart * s && nodes_of(f, r) > MOST_NODES) r -= f->fits ? s : 1;
-    return r >= told_apart * s && r <= MOST_SIZE && nodes_of(f, r) > 0 ? r : 0;
+    int s = f->setting->size, r = MAX_FINER * s;
+    while (r >= reported_apart * s && nodes_of(f, r) > MAX_NODES) r -= f->fits ? s : 1;
+    return r >= reported_apart * s && r <= MAX_SIZE && nodes_of(f, r) > 0 ? r : 0;
 }
 
 /* ---- rests ---- */
@@ -109,9 +109,9 @@ static void sized_free(sized *m)
 
 static double between(const family *f, const sized *a, const sized *b)
 {
-    double most = 0;
-    for (int i = 0; i < f->n_probe; i++) most = fmax(most, pal_dist3(a->u + 3 * i, b->u + 3 * i));
-    return most;
+    double max = 0;
+    for (int i = 0; i < f->n_probe; i++) max = fmax(max, pal_dist3(a->u + 3 * i, b->u + 3 * i));
+    return max;
 }
 
 /* of the finest mesh, that of a mesh of `size` being 1 */
@@ -133,7 +133,7 @@ static double left_in(family *f, int size, const sized *finest)
 {
     sized m = {.u = NULL};
     double error = NAN;
-    if (size >= LEAST_SIZE && finest->size >= told_apart * size && solve(f, size, &m)) error = left(f, &m, finest);
+    if (size >= MIN_SIZE && finest->size >= reported_apart * size && solve(f, size, &m)) error = left(f, &m, finest);
     sized_free(&m);
     return error;
 }
@@ -149,16 +149,16 @@ static double ambiguity(double finer)
 static double change(family *f, const sized *own, bool shown)
 {
     sized merged = {.u = NULL};
-    double most = 0;
+    double max = 0;
     const bool good = solve(f, 0, &merged);
-    if (good && shown) most = between(f, own, &merged);
+    if (good && shown) max = between(f, own, &merged);
     if (good && !shown)
         for (int k = 0; k < merged.rest.n_common; k++) {
             size_t i = 3 * (size_t)merged.rest.common[k];
-            most = fmax(most, pal_dist3(own->rest.x + i, merged.rest.x + i));
+            max = fmax(max, pal_dist3(own->rest.x + i, merged.rest.x + i));
         }
     sized_free(&merged);
-    return most;
+    return max;
 }
 
 static void measure(family *f, bool shown, pal_estimate_hierarchy *out)
@@ -174,13 +174,13 @@ static void measure(family *f, bool shown, pal_estimate_hierarchy *out)
     sized_free(&own);
     if (error > 0 && last > 0) {
         const double finer = (double)r / size;
-        out->times = fmin(fmax(error / last, 1 / most_times), most_times);
+        out->times = fmin(fmax(error / last, 1 / max_times), max_times);
         out->uncertainty_factor = observed * fmax(1, ambiguity(finer) / ambiguity(observed_finer));
         if (out->times != error / last) out->uncertainty_factor = INFINITY;
         out->half = left_in(f, size / 2, &finest) / error;
         out->twice = left_in(f, 2 * size, &finest) / error;
         double seen = out->half > 0 ? 0.5 * (far_order + log2(out->half)) : far_order;
-        out->twice = isnan(out->twice) ? exp2(-fmin(seen, order)) : fmax(out->twice, least_ratio);
+        out->twice = isnan(out->twice) ? exp2(-fmin(seen, order)) : fmax(out->twice, min_ratio);
         out->finest = r, out->known = !stopped(f);
     }
     out->n_measured++;
@@ -224,7 +224,7 @@ bool pal_estimate_hierarchy_refresh(const pal_scene *scene, const pal_body *body
     family f = {scene, body, setting, state, stop, surface, fits, 1 + surface->n_vertex / PROBES, 0, 0};
     double began = pal_clock_s();
     f.n_probe = surface->n_vertex / f.stride;
-    if (setting->size < LEAST_SIZE || f.n_probe < 1 || scene->body[0].cells) return false;
+    if (setting->size < MIN_SIZE || f.n_probe < 1 || scene->body[0].cells) return false;
     double *now = malloc(3 * sizeof *now * (size_t)state->n_node);
     const bool loaded = now && take_loads(body, state, now), same = loaded && is_same(&f, out, now);
     if (!loaded || same || began < out->next_s) {

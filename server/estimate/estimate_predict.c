@@ -5,8 +5,8 @@
 
 #include <math.h>
 
-enum { LEAST_SIZE = 4, MOST_SIZE = 400 };
-static const double least_step_s = 1e-4, most_step_s = 0.1, least_tolerance = 1e-12, most_tolerance = 0.5;
+enum { MIN_SIZE = 4, MAX_SIZE = 400 };
+static const double min_step_s = 1e-4, max_step_s = 0.1, min_tolerance = 1e-12, max_tolerance = 0.5;
 
 /* nodes and sub-steps over what they are now */
 static void add(const pal_prediction *from, pal_estimate *out, const pal_configuration *setting, double ms,
@@ -52,11 +52,11 @@ static void sizes(const pal_prediction *from, pal_estimate *out)
     /* calibrated constants hold for the size that they were found for */
     if (!(from->setting.size > 0) || from->setting.k_distance_J > 0) return;
     to.size = from->setting.size / 2;
-    if (to.size >= LEAST_SIZE && taken(from, &to, 1))
+    if (to.size >= MIN_SIZE && taken(from, &to, 1))
         add(from, out, &to, out->ms * times(from, 0), out->discretisation_m * (left[0] - 1), from->nodes[0],
             from->substeps[0]);
     to.size = from->setting.size * 2;
-    if (to.size <= MOST_SIZE && taken(from, &to, from->implicit ? 1 : 2))
+    if (to.size <= MAX_SIZE && taken(from, &to, from->implicit ? 1 : 2))
         add(from, out, &to, out->ms * times(from, 1), out->discretisation_m * (left[1] - 1), from->nodes[1],
             from->substeps[1]);
 }
@@ -66,10 +66,10 @@ static void steps(const pal_prediction *from, pal_estimate *out)
     double shrink = exp2(-from->solver_order);
     pal_configuration to = from->setting;
     to.step_s = from->setting.step_s * 2;
-    if (to.step_s <= most_step_s && taken(from, &to, 2))
+    if (to.step_s <= max_step_s && taken(from, &to, 2))
         add(from, out, &to, out->ms / 2, out->time_m * (1 / shrink - 1), 1, 1);
     to.step_s = from->setting.step_s / 2;
-    if (to.step_s >= least_step_s && taken(from, &to, 1))
+    if (to.step_s >= min_step_s && taken(from, &to, 1))
         add(from, out, &to, out->ms * 2, out->time_m * (shrink - 1), 1, 1);
 }
 
@@ -77,10 +77,10 @@ static void tolerances(const pal_prediction *from, pal_estimate *out)
 {
     pal_configuration to = from->setting;
     to.tolerance = from->tolerance * 10;
-    if (to.tolerance <= most_tolerance && taken(from, &to, 1))
+    if (to.tolerance <= max_tolerance && taken(from, &to, 1))
         add(from, out, &to, out->ms / from->decade, out->algebraic_m * 9, 1, 1);
     to.tolerance = from->tolerance / 10;
-    if (to.tolerance >= least_tolerance && taken(from, &to, 1))
+    if (to.tolerance >= min_tolerance && taken(from, &to, 1))
         add(from, out, &to, out->ms * from->decade, out->algebraic_m * -0.9, 1, 1);
 }
 

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_AHEAD = 12, TIMED = 7 };
+enum { MAX_AHEAD = 12, TIMED = 7 };
 static const double ahead_s = 0.1, ahead_ms = 400;
 /* a body moved by less of its size has no error but rounding */
 static const double unmoved = 1e-9;
@@ -82,11 +82,11 @@ static bool go_ahead(const pal_estimation *w, pal_world *world, int n, double dt
     return good && pal_body_finite(body);
 }
 
-static double most_between(const double *a, const double *b, int n)
+static double max_between(const double *a, const double *b, int n)
 {
-    double most = 0;
-    for (int i = 0; i < n; i++) most = fmax(most, pal_dist3(a + 3 * (size_t)i, b + 3 * (size_t)i));
-    return most;
+    double max = 0;
+    for (int i = 0; i < n; i++) max = fmax(max, pal_dist3(a + 3 * (size_t)i, b + 3 * (size_t)i));
+    return max;
 }
 
 /* algebraic and time parts of the steps ahead */
@@ -94,18 +94,18 @@ static void look_ahead(pal_estimation *w, pal_estimate *out)
 {
     double step_s = w->scene->step_s, ms = isnan(out->ms) ? 1 : out->ms;
     int n_sub = w->state.n_substep > 0 ? w->state.n_substep : 1, n_dof = w->state.n_dof;
-    int n = (int)fmin(fmin(MOST_AHEAD, ceil(ahead_s / step_s)), fmax(1, ahead_ms / (4 * ms)));
+    int n = (int)fmin(fmin(MAX_AHEAD, ceil(ahead_s / step_s)), fmax(1, ahead_ms / (4 * ms)));
     pal_world *exact = w->exact ? w->exact : w->live;
     double live_ms = NAN, exact_ms = NAN, half_ms;
     out->algebraic_m = w->exact ? NAN : 0;
     if (w->exact && !go_ahead(w, w->live, n, step_s, w->first, &live_ms)) return;
     if (!go_ahead(w, exact, n * n_sub, step_s / n_sub, w->second, &exact_ms)) return;
-    if (w->exact) out->algebraic_m = most_between(w->first, w->second, n_dof);
+    if (w->exact) out->algebraic_m = max_between(w->first, w->second, n_dof);
     if (!go_ahead(w, exact, 2 * n * n_sub, 0.5 * step_s / n_sub, w->first, &half_ms)) return;
     if (w->exact && n_sub == 1)
         w->prediction.decade =
             pow(fmax(exact_ms / live_ms, 1), 1 / log10(w->prediction.tolerance / pal_estimate_tight));
-    out->time_m = most_between(w->first, w->second, n_dof) / (1 - ldexp(1, -w->prediction.solver_order));
+    out->time_m = max_between(w->first, w->second, n_dof) / (1 - ldexp(1, -w->prediction.solver_order));
 }
 
 /* the body's own method on the coarse mesh and on this one, under the same loads, once */
@@ -163,12 +163,12 @@ static double known(double part)
 /* the largest distance between a rest and a coarser one, at nodes of the running body that the coarser one has */
 static double change(const pal_rest_solution *rest, const pal_rest_solution *coarser)
 {
-    double most = 0;
+    double max = 0;
     for (int k = 0; k < coarser->n_common; k++) {
         size_t i = 3 * (size_t)coarser->common[k];
-        most = fmax(most, pal_dist3(rest->x + i, coarser->x + i));
+        max = fmax(max, pal_dist3(rest->x + i, coarser->x + i));
     }
-    return most;
+    return max;
 }
 
 /* is the last change no smaller than the one before it? */
@@ -188,9 +188,10 @@ static double skin_off(pal_estimation *w)
 
 static void discretise(pal_estimation *w, const pal_body *body, pal_estimate *out)
 {
-    pal_zz_error zz;
+    pal_zz_estimator_error zz_estimator;
     bool fresh = false;
-    if (!pal_zz_estimate(w->fine.world, 0, NULL, &zz, NULL)) out->energy_error_percent = zz.percent;
+    if (!pal_zz_estimator_estimate(w->fine.world, 0, NULL, &zz_estimator, NULL))
+        out->energy_error_percent = zz_estimator.percent;
     if (!pal_rest_solution_find(&w->coarse, &w->state, body, NULL, w->stop)) {
         if (w->coarse.world) tell(out, "discretisation: the coarser mesh finds no rest under these loads");
         return;
@@ -222,15 +223,15 @@ static void discretise(pal_estimation *w, const pal_body *body, pal_estimate *ou
  * voxels: how far they are from where Richardson carries the two meshes' rests. That has the mesh's part in it */
 static void compare_fitted(pal_estimation *w, pal_estimate *out)
 {
-    double most = 0, more = 1 / (exp2(w->prediction.order) - 1);
-    if (w->shown.n > 0) most = pal_display_error_skin(&w->shown, w->state.x, more);
+    double max = 0, more = 1 / (exp2(w->prediction.order) - 1);
+    if (w->shown.n > 0) max = pal_display_error_skin(&w->shown, w->state.x, more);
     for (int k = 0; k < w->coarse.n_common && w->shown.n == 0; k++) {
         size_t i = 3 * (size_t)w->coarse.common[k];
         double limit[3];
         for (size_t c = 0; c < 3; c++) limit[c] = w->fine.x[i + c] + more * (w->fine.x[i + c] - w->coarse.x[i + c]);
-        most = fmax(most, pal_dist3(w->state.x + i, limit));
+        max = fmax(max, pal_dist3(w->state.x + i, limit));
     }
-    out->model_m = most, out->discretisation_m = 0;
+    out->model_m = max, out->discretisation_m = 0;
     tell(out, "fitted: the mesh's part is in the model's");
 }
 
@@ -241,11 +242,11 @@ static void compare_models(pal_estimation *w, const pal_body *body, pal_estimate
         compare_fitted(w, out);
     else if (w->springs) /* where they are is where they rest under what they bear */
         out->model_m =
-            w->shown.n > 0 ? pal_display_error_skin(&w->shown, w->state.x, 0) : most_between(w->state.x, w->fine.x, n);
+            w->shown.n > 0 ? pal_display_error_skin(&w->shown, w->state.x, 0) : max_between(w->state.x, w->fine.x, n);
     else if (!w->model.world)
         out->model_m = !strcmp(pal_estimate_model_text(&w->scene->body[0], "law", ""), "neo_hookean") ? 0 : (double)NAN;
     else if (pal_rest_solution_find(&w->model, &w->state, body, w->fine.x, w->stop))
-        out->model_m = most_between(w->model.x, w->fine.x, n);
+        out->model_m = max_between(w->model.x, w->fine.x, n);
 }
 
 static bool has_moved(const pal_estimation *w, const pal_estimate *out)
@@ -275,7 +276,7 @@ static void find_rests(pal_estimation *w, pal_estimate *out)
 static double largest_move(const pal_estimation *w)
 {
     const pal_body *body = pal_world_body(w->live, 0);
-    return most_between(w->state.x, body->x_rest, w->state.n_dof);
+    return max_between(w->state.x, body->x_rest, w->state.n_dof);
 }
 
 /* without the large parts a sum would pass for the whole, beside those of a study that are whole */

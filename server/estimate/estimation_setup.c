@@ -151,14 +151,14 @@ static double cut_share(const pal_hexes *hexes)
 
 static bool is_thin(const pal_tets *tets)
 {
-    double least = INFINITY;
+    double min = INFINITY;
     for (int c = 0; c < 3; c++) {
         double low = INFINITY, high = -INFINITY;
         for (int i = 0; i < tets->n_node; i++)
             low = fmin(low, tets->x[3 * i + c]), high = fmax(high, tets->x[3 * i + c]);
-        least = fmin(least, high - low);
+        min = fmin(min, high - low);
     }
-    return least < few_across * tets->edge_m;
+    return min < few_across * tets->edge_m;
 }
 
 /* a mesh or law that cannot be had leaves its part unknown */

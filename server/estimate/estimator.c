@@ -231,11 +231,11 @@ static void grow_old(pal_estimate *e, uint64_t n_step, double step_s)
 {
     e->age_s = (double)n_step * step_s;
     if (!e->asleep || n_step == 0) return;
-    char *said = strstr(e->diag, PAL_ESTIMATE_ASLEEP);
-    if (!said) return;
-    const char *rest = said + strlen(PAL_ESTIMATE_ASLEEP);
+    char *summary = strstr(e->diag, PAL_ESTIMATE_ASLEEP);
+    if (!summary) return;
+    const char *rest = summary + strlen(PAL_ESTIMATE_ASLEEP);
     rest += 2 * !strncmp(rest, "; ", 2);
-    memmove(said, rest, strlen(rest) + 1);
+    memmove(summary, rest, strlen(rest) + 1);
     size_t n = strlen(e->diag);
     if (n > 1 && !strcmp(e->diag + n - 2, "; ")) e->diag[n - 2] = 0;
 }

@@ -15,17 +15,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum {
-    NEWTON_A_STEP = 3,
-    MOST_STEPS = 30,
-    LEAST_HEXES = 4,
-    MORE_PRESSES = 2,
-    MANY_NODES = 4000,
-    MOST_GRADIENTS = 3000
-};
+enum { NEWTON_A_STEP = 3, MAX_STEPS = 30, MIN_HEXES = 4, MORE_PRESSES = 2, MANY_NODES = 4000, MAX_GRADIENTS = 3000 };
 /* near enough in the work of contact; times that its loads are taken more or less at most, in one go */
 #define SAME_PRESS 0.05
-#define MOST_PART  5.0
+#define MAX_PART   5.0
 static const double rest_tolerance = 1e-6, drop_fill = 0.25, slack_h = 1e-6;
 /* of E h^2: what is left on a node of a body without loads is the rounding of its places, which no tolerance of loads
  * that are 0 is met by */
@@ -63,7 +56,7 @@ static pal_err spare_memory(pal_scene *scene)
 {
     pal_config_entry *solver = &scene->body[0].solver;
     PAL_TRY(pal_entry_put_text(solver, "linear", "incomplete", NULL));
-    return pal_entry_put_number(solver, "iterations", MOST_GRADIENTS, NULL);
+    return pal_entry_put_number(solver, "iterations", MAX_GRADIENTS, NULL);
 }
 
 /* the lowest part as a box where `up` is an axis, so that it is the same part of every mesh */
@@ -184,7 +177,7 @@ static pal_err merge_once(const pal_body_def *def, const pal_tets *tets, const p
     pal_err err = choose_shift(tets, fixed, shift);
     free(fixed);
     if (!err) err = pal_voxels_coarsen(tets, hexes, shift, drop_fill, out, diag);
-    if (!err && out->hexes.n_hex < LEAST_HEXES) {
+    if (!err && out->hexes.n_hex < MIN_HEXES) {
         err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d voxels are too few for a coarser mesh", hexes->n_hex);
         pal_prepared_free(out);
     }
@@ -242,11 +235,11 @@ static pal_err find_near(pal_rest_solution *r, const pal_body *body)
     for (int i = 0; i < r->n_node; i++) {
         double local[4];
         int e = pal_locate_point(locate, body->node_rest + 3 * i, local, NULL);
-        double *weight = r->weight + (size_t)n * (size_t)i, most = 0;
+        double *weight = r->weight + (size_t)n * (size_t)i, max = 0;
         if (r->sized) take_inside(own, local);
         pal_element_shape_functions(own, local, weight);
-        for (int k = 0; k < n; k++) most = fmax(most, weight[k]);
-        if (most > 1 - 1e-9) r->common[r->n_common++] = i;
+        for (int k = 0; k < n; k++) max = fmax(max, weight[k]);
+        if (max > 1 - 1e-9) r->common[r->n_common++] = i;
         memcpy(r->near + (size_t)n * (size_t)i, own->element + (size_t)n * (size_t)e, (size_t)n * sizeof *r->near);
     }
     pal_locate_destroy(locate);
@@ -388,15 +381,15 @@ static pal_err put_state(pal_rest_solution *r, const pal_estimate_state *state, 
 static bool nothing_acts(const pal_rest_solution *r, double young_Pa)
 {
     const pal_body *own = pal_world_view_body(r->world, 0);
-    double sum = 0, most = nothing_left * young_Pa * own->edge_m * own->edge_m;
+    double sum = 0, max = nothing_left * young_Pa * own->edge_m * own->edge_m;
     for (int i = 0; i < own->n_dof; i++)
         if (!own->support[i]) sum += pal_dot3(own->g + 3 * (size_t)i, own->g + 3 * (size_t)i);
-    return sum <= most * most * own->n_dof;
+    return sum <= max * max * own->n_dof;
 }
 
 static bool converge(pal_rest_solution *r, double young_Pa, const _Atomic bool *stop)
 {
-    for (int k = 0; k < MOST_STEPS; k++) {
+    for (int k = 0; k < MAX_STEPS; k++) {
         pal_solve_report report;
         if (stop && atomic_load_explicit(stop, memory_order_acquire)) return false;
         if (pal_world_step(r->world, r->scene->step_s) || pal_world_view_body(r->world, 0)->frozen) return false;
@@ -456,7 +449,7 @@ bool pal_rest_solution_find(pal_rest_solution *r, const pal_estimate_state *stat
     for (int k = 0; k < MORE_PRESSES && want_J > 0 && got_J > 0 && fabs(got_J / want_J - 1) > SAME_PRESS; k++) {
         /* without contact what rests under other loads counts for little: the first guess is a line from nothing */
         double slope = (got_J - last_J) / (part - last), next = part + (want_J - got_J) / slope;
-        if (!(next > part / MOST_PART && next < part * MOST_PART)) break;
+        if (!(next > part / MAX_PART && next < part * MAX_PART)) break;
         last = part, last_J = got_J, part = next;
         if (!find(r, state, body, r->n_near > 0 ? NULL : r->x, part, stop)) return find(r, state, body, from, 1, stop);
         got_J = pressed_J(state, body, r->x);

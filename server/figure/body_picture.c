@@ -12,7 +12,7 @@
 #include <string.h>
 
 enum { WIDE = 400, TALLEST = 360, LOWEST = 150, PAD = 14, TITLE = 34, LEGEND = 22, FOOT = 66, MARGIN = 14 };
-enum { PIECES_A_FILE = 16000, ARROWS_MOST = 60, CORNERS_MOST = 50000000 };
+enum { PIECES_A_FILE = 16000, ARROWS_MAX = 60, CORNERS_MAX = 50000000 };
 static const double arrow_share = 0.17; /* longest arrow over the diagonal of what is drawn */
 
 static const uint8_t plain[3] = {0xd8, 0xcc, 0xc4};
@@ -37,7 +37,7 @@ typedef struct panel {
 typedef struct sheet {
     int n;
     panel panel[PAL_BODY_PICTURES];
-    double load_most_N, tall; /* of all; height of the drawings, px */
+    double load_max_N, tall; /* of all; height of the drawings, px */
     bool titled, legend;
 } sheet;
 
@@ -137,10 +137,10 @@ static pal_err check_picture(const pal_body_picture *p, int index, const char *p
 {
     if (p->n_tri <= 0 || p->n_vertex <= 0 || !p->x || !p->tri)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: picture %d has nothing to draw", path, index + 1);
-    if (p->n_tri > CORNERS_MOST || p->n_vertex > CORNERS_MOST)
+    if (p->n_tri > CORNERS_MAX || p->n_vertex > CORNERS_MAX)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
                                   "%s: picture %d has %d triangles of %d vertices, at most %d go", path, index + 1,
-                                  p->n_tri, p->n_vertex, CORNERS_MOST);
+                                  p->n_tri, p->n_vertex, CORNERS_MAX);
     for (int i = 0; i < 3 * p->n_tri; i++)
         if (p->tri[i] < 0 || p->tri[i] >= p->n_vertex)
             return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: picture %d, triangle %d: no vertex %d among %d", path,
@@ -191,7 +191,7 @@ static void take_in(panel *g, const double x[3])
 /* loads are thinned evenly */
 static int load_step(const pal_body_picture *p)
 {
-    return p->n_load > ARROWS_MOST ? (p->n_load + ARROWS_MOST - 1) / ARROWS_MOST : 1;
+    return p->n_load > ARROWS_MAX ? (p->n_load + ARROWS_MAX - 1) / ARROWS_MAX : 1;
 }
 
 /* the ends of an arrow, m: a force towards the middle of the body ends at its place, another begins there */
@@ -199,7 +199,7 @@ static void arrow_ends(const sheet *page, const panel *g, int load, double from[
 {
     const double *at = g->p->load_at + 3 * load, *force = g->p->load_N + 3 * load;
     double inward[3], along[3];
-    pal_scale3(along, arrow_share / page->load_most_N, force);
+    pal_scale3(along, arrow_share / page->load_max_N, force);
     pal_sub3(inward, g->middle, at);
     bool pushes = pal_dot3(inward, along) > 0.3 * pal_norm3(inward) * pal_norm3(along);
     pal_copy3(from, at);
@@ -221,7 +221,7 @@ static void frame_body(panel *g)
 
 static void frame_loads(const sheet *page, panel *g)
 {
-    for (int i = 0; i < g->p->n_load && page->load_most_N > 0; i += load_step(g->p)) {
+    for (int i = 0; i < g->p->n_load && page->load_max_N > 0; i += load_step(g->p)) {
         double from[3], to[3];
         arrow_ends(page, g, i, from, to);
         take_in(g, from);
@@ -249,7 +249,7 @@ static void settle_frames(sheet *page)
         const pal_body_picture *p = page->panel[i].p;
         frame_body(&page->panel[i]);
         for (int l = 0; l < p->n_load; l += load_step(p))
-            page->load_most_N = fmax(page->load_most_N, pal_norm3(p->load_N + 3 * l));
+            page->load_max_N = fmax(page->load_max_N, pal_norm3(p->load_N + 3 * l));
     }
     share_frames(page);
     for (int i = 0; i < page->n; i++) {
@@ -409,7 +409,7 @@ static void draw_head_on(FILE *to, const int at[2], bool nearer)
 
 static void draw_loads(const sheet *page, const panel *g, FILE *to)
 {
-    if (g->p->n_load <= 0 || page->load_most_N <= 0) return;
+    if (g->p->n_load <= 0 || page->load_max_N <= 0) return;
     for (int halo = 1; halo >= 0; halo--) {
         fprintf(to, "<g stroke=\"%s\" stroke-width=\"%d\" fill=\"%s\">\n", halo ? "#fff" : load_ink, halo ? 44 : 18,
                 halo ? "#fff" : load_ink);
@@ -423,7 +423,7 @@ static void draw_loads(const sheet *page, const panel *g, FILE *to)
             place(page, g, q, b);
             if (hypot(b[0] - a[0], b[1] - a[1]) >= 40)
                 draw_arrow(to, a, b);
-            else if (!halo && pal_norm3(g->p->load_N + 3 * i) > 0.05 * page->load_most_N)
+            else if (!halo && pal_norm3(g->p->load_N + 3 * i) > 0.05 * page->load_max_N)
                 draw_head_on(to, a, q[2] > p[2]);
         }
         fputs("</g>\n", to);
@@ -486,17 +486,17 @@ static void draw_legend(const sheet *page, const panel *g, double y, FILE *to)
     const pal_body_picture *p = g->p;
     const char *small = " font-size=\"11\" fill=\"#555\"";
     bool fixed = false;
-    double x = g->left + PAD, most = 0;
+    double x = g->left + PAD, max = 0;
     for (int i = 0; p->fixed && i < p->n_vertex && !fixed; i++) fixed = p->fixed[i];
-    for (int i = 0; i < p->n_load; i += load_step(p)) most = fmax(most, pal_norm3(p->load_N + 3 * i));
+    for (int i = 0; i < p->n_load; i += load_step(p)) max = fmax(max, pal_norm3(p->load_N + 3 * i));
     if (fixed) {
         fprintf(to, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"3\" fill=\"%s\"/>\n", x + 3, y - 4, held_ink);
         pal_svg_text(to, x + 11, y, "start", small, "held", 0);
         x += 50;
     }
-    if (most > 0 && page->load_most_N > 0) {
+    if (max > 0 && page->load_max_N > 0) {
         char text[48];
-        int length = snprintf(text, sizeof text, "up to %.3g N", most);
+        int length = snprintf(text, sizeof text, "up to %.3g N", max);
         fprintf(to, "<path d=\"M%.1f %.1fh12v-3.5l7 4.2l-7 4.2v-3.5h-12z\" fill=\"%s\"/>\n", x, y - 4.7, load_ink);
         pal_svg_text(to, x + 24, y, "start", small, text, 0);
         x += 40 + 6.2 * length;

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { DIVIDE_MOST = 8, CLASSES_A_PIECE = 2 };
+enum { DIVIDE_MAX = 8, CLASSES_A_PIECE = 2 };
 static const double crease_cosine = 0.8; /* sharper than 37 degrees */
 
 /* an edge and the triangle it belongs to, corner `corner` and the next */
@@ -178,7 +178,7 @@ static pal_err join_cells(pal_picture_mesh *m, const double low[3], double size)
     return PAL_ERR_OK;
 }
 
-pal_err pal_picture_mesh_prepare(pal_picture_mesh *m, const pal_picture_axes *axes, int most)
+pal_err pal_picture_mesh_prepare(pal_picture_mesh *m, const pal_picture_axes *axes, int max)
 {
     PAL_TRY(find_closed(m));
     bool closed = m->closed;
@@ -188,7 +188,7 @@ pal_err pal_picture_mesh_prepare(pal_picture_mesh *m, const pal_picture_axes *ax
             m->tri[3 * t + 1] = m->tri[3 * t + 2], m->tri[3 * t + 2] = other;
         }
     int seen = count_seen(m, axes);
-    if (seen <= most) return PAL_ERR_OK;
+    if (seen <= max) return PAL_ERR_OK;
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, span[3], area = 0;
     for (int i = 0; i < m->n_vertex; i++)
         for (int k = 0; k < 3; k++) {
@@ -202,8 +202,8 @@ pal_err pal_picture_mesh_prepare(pal_picture_mesh *m, const pal_picture_axes *ax
         area += pal_norm3(normal) / 2;
     }
     /* a cell that a surface crosses gives about two triangles; half of them are seen */
-    double size = fmax(sqrt(area / most) * (closed ? 0.7 : 1), 1e-6 * pal_norm3(span));
-    for (; seen > most && size > 0; size *= 1.2) {
+    double size = fmax(sqrt(area / max) * (closed ? 0.7 : 1), 1e-6 * pal_norm3(span));
+    for (; seen > max && size > 0; size *= 1.2) {
         PAL_TRY(join_cells(m, low, size));
         m->closed = closed; /* cells fold a closed surface but open none */
         m->joined = true;
@@ -298,14 +298,14 @@ static pal_err mark_edges(const pal_picture_mesh *m, const pal_picture_axes *axe
 }
 
 /* parts of each edge, so that a part spans few colours */
-static int divisions(const face *f, int most)
+static int divisions(const face *f, int max)
 {
     double low = fmin(f->value[0], fmin(f->value[1], f->value[2]));
     double high = fmax(f->value[0], fmax(f->value[1], f->value[2]));
     double apart = (high - low) * PAL_PICTURE_CLASSES;
     for (int k = 0; k < 3; k++)
         if (!isfinite(f->value[k])) return 1;
-    return apart < most * CLASSES_A_PIECE ? (int)fmax(1, ceil(apart / CLASSES_A_PIECE)) : most;
+    return apart < max * CLASSES_A_PIECE ? (int)fmax(1, ceil(apart / CLASSES_A_PIECE)) : max;
 }
 
 /* corner (i, j) of a triangle divided into parts^2: towards corner 1 and corner 2 */
@@ -347,7 +347,7 @@ static int by_depth(const void *a, const void *b)
     return memcmp(p->at, q->at, sizeof p->at);
 }
 
-pal_err pal_picture_pieces(const pal_picture_mesh *m, const pal_picture_axes *axes, int most, pal_picture_piece **piece,
+pal_err pal_picture_pieces(const pal_picture_mesh *m, const pal_picture_axes *axes, int max, pal_picture_piece **piece,
                            int *n_piece, pal_picture_line **ghost, int *n_ghost)
 {
     *piece = NULL, *ghost = NULL;
@@ -356,7 +356,7 @@ pal_err pal_picture_pieces(const pal_picture_mesh *m, const pal_picture_axes *ax
     if (!f) return PAL_ERR_MEMORY;
     make_faces(m, axes, f);
     pal_err err = mark_edges(m, axes, f, ghost, n_ghost);
-    int parts = DIVIDE_MOST + 1;
+    int parts = DIVIDE_MAX + 1;
     long long n;
     do {
         n = 0, parts--;
@@ -364,7 +364,7 @@ pal_err pal_picture_pieces(const pal_picture_mesh *m, const pal_picture_axes *ax
             int d = f[t].seen ? divisions(&f[t], parts) : 0;
             n += d * d;
         }
-    } while (n > most && parts > 1);
+    } while (n > max && parts > 1);
     if (!err) *piece = malloc(sizeof **piece * (size_t)(n > 0 ? n : 1));
     if (!err && !*piece) err = PAL_ERR_MEMORY;
     for (int t = 0; t < m->n_tri && !err; t++)

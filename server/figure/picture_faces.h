@@ -33,7 +33,7 @@ typedef struct pal_picture_mesh {
 } pal_picture_mesh;
 void pal_picture_mesh_free(pal_picture_mesh *mesh);
 /* joins vertices within cells until at most `most` triangles can be seen; finds closed and turns what is inside out */
-pal_err pal_picture_mesh_prepare(pal_picture_mesh *mesh, const pal_picture_axes *axes, int most);
+pal_err pal_picture_mesh_prepare(pal_picture_mesh *mesh, const pal_picture_axes *axes, int max);
 
 typedef struct pal_picture_piece { /* a part of a triangle, of one colour */
     double depth;                  /* along axes->eye, m                  */
@@ -47,6 +47,6 @@ typedef struct pal_picture_line {
 } pal_picture_line;
 /* *piece: heap, far to near, at most `most` unless the mesh itself has more to see; triangles whose corners are some
  * classes apart are divided. *ghost: heap, the outline of the rest shape, none without. MEMORY */
-pal_err pal_picture_pieces(const pal_picture_mesh *mesh, const pal_picture_axes *axes, int most,
+pal_err pal_picture_pieces(const pal_picture_mesh *mesh, const pal_picture_axes *axes, int max,
                            pal_picture_piece **piece, int *n_piece, pal_picture_line **ghost, int *n_ghost);
 #endif

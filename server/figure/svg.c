@@ -56,7 +56,7 @@ static void put_character(FILE *to, const char *c, int n)
         fwrite(c, 1, (size_t)n, to);
 }
 
-void pal_svg_text(FILE *to, double x, double y, const char *anchor, const char *more, const char *text, int most)
+void pal_svg_text(FILE *to, double x, double y, const char *anchor, const char *more, const char *text, int max)
 {
     fprintf(to, "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\"%s>", x, y, anchor, more);
     size_t n_byte = text ? strlen(text) : 0, at = 0;
@@ -64,7 +64,7 @@ void pal_svg_text(FILE *to, double x, double y, const char *anchor, const char *
         uint32_t code = 0;
         int n = pal_utf8_next(text + at, n_byte - at, &code);
         bool shown = n > 0 && pal_utf8_printable(code) && code != 0xfffe && code != 0xffff;
-        if (most > 0 && k == most - 1 && at + (size_t)(n > 0 ? n : 1) < n_byte) {
+        if (max > 0 && k == max - 1 && at + (size_t)(n > 0 ? n : 1) < n_byte) {
             fputs("\u2026", to);
             break;
         }
@@ -74,9 +74,9 @@ void pal_svg_text(FILE *to, double x, double y, const char *anchor, const char *
     fputs("</text>\n", to);
 }
 
-double pal_svg_step(double span, int most)
+double pal_svg_step(double span, int max)
 {
-    double raw = span / most, power = pow(10, floor(log10(raw))), lead = raw / power;
+    double raw = span / max, power = pow(10, floor(log10(raw))), lead = raw / power;
     return power * (lead <= 1 ? 1 : lead <= 2 ? 2 : lead <= 5 ? 5 : 10);
 }
 

@@ -185,8 +185,8 @@ static void put_estimate(const pal_hub_room *room, const pal_estimate *from, con
 static void tell_far(pal_hub_room *room, const pal_wire_estimate *e)
 {
     double asked = pal_session_scene(room->session)->max_error_m;
-    if (room->told_far || !(asked > 0) || !(e->error_m > asked)) return;
-    room->told_far = true;
+    if (room->reported_far || !(asked > 0) || !(e->error_m > asked)) return;
+    room->reported_far = true;
     pal_log(PAL_LOG_WARN, "accuracy",
             "%s: the estimate is %.3g mm at %.3g mm moved, beyond the %.3g mm that the scene asks for", e->body,
             1e3 * e->error_m, 1e3 * e->max_displacement_m, 1e3 * asked);

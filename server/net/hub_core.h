@@ -71,10 +71,10 @@ typedef struct pal_hub_room {
         *setting; /* what a study found, for body setting_body [n_configuration]; NULL: no study */
     int n_configuration, setting_body;
     double reference_m; /* the study's reference's own error; NaN: not known */
-    bool told_far;      /* that an estimate is beyond what the scene asks for */
+    bool reported_far;  /* that an estimate is beyond what the scene asks for */
     int tier_users[PAL_STREAM_TIER];
-    int n_look[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* clients that look at a field   */
-    bool told[PAL_BODY_MAX][PAL_FIELD_COUNT];  /* the session knows that some do */
+    int n_look[PAL_BODY_MAX][PAL_FIELD_COUNT];    /* clients that look at a field   */
+    bool reported[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* the session knows that some do */
 } pal_hub_room;
 
 typedef struct pal_hub_count {

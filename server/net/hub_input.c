@@ -56,7 +56,7 @@ static void say_hello(pal_hub *hub, pal_client *c)
     pal_stream_hello(c->room->stream, hello);
     pal_hub_hello_components(c->room, hello);
     hello->estimates = true;
-    hello->credit = (uint32_t)c->credit.most;
+    hello->credit = (uint32_t)c->credit.max;
     hello->you_id = pal_stream_wire_id(m->id);
     hello->you_role = (pal_wire_role)m->role;
     hello->you_tool = m->tool >= 0 ? m->tool : PAL_WIRE_TOOL_NONE;

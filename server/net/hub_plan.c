@@ -85,7 +85,7 @@ void pal_hub_status_plan(const pal_hub_room *room, const pal_frame *f, pal_wire_
                                     .frozen = part->frozen,
                                     .asleep = part->asleep,
                                     .n_safeguard = part->n_safeguard,
-                                    .safeguard_ms = (double)part->rescue_ns * 1e-6};
+                                    .safeguard_ms = (double)part->safeguard_ns * 1e-6};
         if (part->frozen) pal_plain_text(to->reason, sizeof to->reason, part->reason);
         w->frozen |= part->frozen;
         w->n_state += part->frozen || part->asleep || part->n_safeguard > 0;

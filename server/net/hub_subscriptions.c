@@ -14,7 +14,7 @@ void pal_hub_update_subscriptions(pal_hub_room *room)
         request(room->session, room->n_estimate[b] > 0, &room->estimate_requested[b],
                 (pal_command){.kind = PAL_COMMAND_ESTIMATE, .body = b});
         for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++)
-            request(room->session, room->n_look[b][k] > 0, &room->told[b][k],
+            request(room->session, room->n_look[b][k] > 0, &room->reported[b][k],
                     (pal_command){.kind = PAL_COMMAND_FIELD, .body = b, .field = (pal_field)k});
     }
 }

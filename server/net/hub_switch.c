@@ -100,14 +100,14 @@ static void put_jump(const pal_hub *hub, const pal_job *job, double change, pal_
 {
     const pal_configuration_switch_report *r = &job->report;
     double bound_m = job->error_now_m + job->error_then_m, frame_mm = 1e3 * r->frame_move_m,
-           most_mm = 1e3 * r->max_move_m;
+           max_mm = 1e3 * r->max_move_m;
     bool far = r->max_move_m > bound_m + hub->error_m;
     size_t n = strlen(a->text), room = sizeof a->text - n;
     if (isnan(bound_m))
         snprintf(a->text + n, room, "moves %.3g mm, %.3g mm a frame (no bound: no error is shown of both settings)",
-                 most_mm, frame_mm);
+                 max_mm, frame_mm);
     else
-        snprintf(a->text + n, room, "moves %.3g mm, %s the bound of %.3g mm, %.3g mm a frame", most_mm,
+        snprintf(a->text + n, room, "moves %.3g mm, %s the bound of %.3g mm, %.3g mm a frame", max_mm,
                  far ? "beyond" : "within", 1e3 * bound_m, frame_mm);
     pal_hub_answer_arg(a, "energy_before_J", r->energy_before_J);
     pal_hub_answer_arg(a, "energy_after_J", r->energy_after_J);

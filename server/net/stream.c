@@ -91,7 +91,7 @@ static void widen_box(pal_stream *s, const pal_shown *shown)
 
 static pal_err open_parts(pal_stream *s, double error_m, pal_diagnostic *diag)
 {
-    uint32_t most = 0;
+    uint32_t max = 0;
     double side = 0;
     for (int c = 0; c < 3; c++) s->box_min_m[c] = HUGE_VAL, s->box_max_m[c] = -HUGE_VAL;
     for (int p = 0; p < s->n_part; p++) {
@@ -102,13 +102,13 @@ static pal_err open_parts(pal_stream *s, double error_m, pal_diagnostic *diag)
                                       shown.name, shown.n_vertex, PAL_WIRE_VERTEX_MAX);
         PAL_TRY(open_part(s, p, &shown, diag));
         widen_box(s, &shown);
-        if (s->part[p].info.n_vertex > most) most = s->part[p].info.n_vertex;
+        if (s->part[p].info.n_vertex > max) max = s->part[p].info.n_vertex;
     }
     for (int c = 0; c < 3; c++) side = fmax(side, s->box_max_m[c] - s->box_min_m[c]);
     s->error_m = error_m > 0 ? error_m : side > 0 ? fmin(5e-5, side / 3000) : 5e-5;
     for (int p = 0; p < s->n_part; p++) s->part[p].info.error_m = s->error_m;
-    s->coder->cap = pal_frame_bound(most);
-    if (s->coder->cap < pal_field_bound(most)) s->coder->cap = pal_field_bound(most);
+    s->coder->cap = pal_frame_bound(max);
+    if (s->coder->cap < pal_field_bound(max)) s->coder->cap = pal_field_bound(max);
     if (s->coder->cap < PAL_WIRE_TOOLS_MAX) s->coder->cap = PAL_WIRE_TOOLS_MAX;
     s->coder->buffer = malloc(s->coder->cap);
     return s->coder->buffer ? PAL_ERR_OK : PAL_ERR_MEMORY;
@@ -192,7 +192,7 @@ static uint64_t time_us(const pal_frame *frame)
 
 /* one part at one tier; a frame that shows nothing new is not kept, so the older message stays the newest, unless other
  * vertices are shown now or it is wanted anew */
-static void encode_part(pal_stream *s, int p, int tier, bool anew)
+static void encode_part(pal_stream *s, int p, int tier, bool again)
 {
     pal_stream_part *part = &s->part[p];
     const pal_frame_part *from = &s->frame->part[p];
@@ -210,7 +210,7 @@ static void encode_part(pal_stream *s, int p, int tier, bool anew)
     /* nobody looked, or nothing was shown anew since: a body asleep */
     if (!s->frame->watched) return;
     bool same = part->frame_output[tier] == from->n_output && part->frame_change[tier] == change;
-    if (part->frame[tier] && same && !anew) return;
+    if (part->frame[tier] && same && !again) return;
     uint64_t begin = pal_clock_ns();
     int refusal = pal_frame_put(s->coder->encoder[p][tier], &given, s->coder->buffer, s->coder->cap, &result);
     s->count.n_encode++;
@@ -221,7 +221,7 @@ static void encode_part(pal_stream *s, int p, int tier, bool anew)
         return;
     }
     part->frame_output[tier] = from->n_output;
-    if (!result.changed && part->frame[tier] && part->frame_change[tier] == change && !anew) return;
+    if (!result.changed && part->frame[tier] && part->frame_change[tier] == change && !again) return;
     pal_packet *packet = pal_packet_create(s->coder->buffer, result.n_byte, false);
     if (!packet) return;
     pal_packet_replace(&part->frame[tier], packet);

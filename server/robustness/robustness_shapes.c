@@ -69,13 +69,13 @@ static int turned_over(const pal_trial *trial)
 
 static double extent(const pal_trial *trial)
 {
-    double most = 0;
+    double max = 0;
     for (int b = 0; b < trial->scene->n_body; b++) {
         double low[3], high[3];
         pal_trial_box(trial, b, low, high);
-        most = fmax(most, pal_dist3(low, high) / pal_world_body(trial->world, b)->length_scale_m);
+        max = fmax(max, pal_dist3(low, high) / pal_world_body(trial->world, b)->length_scale_m);
     }
-    return most;
+    return max;
 }
 
 static bool guarded(const pal_trial *trial, int b)
@@ -285,13 +285,13 @@ void pal_robustness_stiffer(pal_trial *trial)
 
 static double drift_S(const pal_trial *trial)
 {
-    double most = 0;
+    double max = 0;
     for (int b = 0; b < trial->scene->n_body; b++) {
         const pal_body *body = pal_world_body(trial->world, b);
         for (int i = 0; i < 3 * body->n_dof; i++)
-            most = fmax(most, fabs(body->x[i] - trial->start[b][i]) / body->length_scale_m);
+            max = fmax(max, fabs(body->x[i] - trial->start[b][i]) / body->length_scale_m);
     }
-    return most;
+    return max;
 }
 
 static void take_start(pal_trial *trial)
@@ -364,7 +364,7 @@ static bool doze(pal_trial *trial, double until_s)
 void pal_robustness_hour(pal_trial *trial)
 {
     enum { HOUR_S = 3600 };
-    const double most_drift = 1e-6, most_kinetic = 1e-9, most_plan_s = 8, step = trial->scene->step_s;
+    const double max_drift = 1e-6, max_kinetic = 1e-9, max_plan_s = 8, step = trial->scene->step_s;
     double ms = 1, drift = 0, kinetic = 0, slept_s = NAN;
     if (trial->twin) {
         pal_trial_report(trial, PAL_VERDICT_SKIPPED, "a moving support leads it: it never rests");
@@ -376,7 +376,7 @@ void pal_robustness_hour(pal_trial *trial)
     pal_trial_rebase(trial);
     double room_s = trial->deadline_s - 1e-9 * (double)pal_clock_thread_ns(), begin = trial->out->simulated_s;
     /* implicit steps may be long: as many as there is time for, of at most ten seconds */
-    double n = fmax(1, 0.8e3 * fmin(most_plan_s, room_s) / ms),
+    double n = fmax(1, 0.8e3 * fmin(max_plan_s, room_s) / ms),
            dt = implicit(trial) ? fmin(10, fmax(step, HOUR_S / n)) : step;
     double late_s = 1e-9 * (double)pal_clock_thread_ns() + 0.9 * room_s;
     while (trial->out->simulated_s - begin < HOUR_S) {
@@ -393,6 +393,6 @@ void pal_robustness_hour(pal_trial *trial)
     if (!isnan(slept_s)) pal_trial_report(trial, PAL_VERDICT_PASSED, "asleep from %.3g s on", slept_s);
     if (watched < HOUR_S * (1 - 1e-9))
         pal_trial_report(trial, PAL_VERDICT_UNDECIDED, "the time did not reach for the hour: give more --seconds");
-    if (!(drift <= most_drift)) pal_trial_report(trial, PAL_VERDICT_FAILED, "it drifts");
-    if (!(kinetic <= most_kinetic * stored)) pal_trial_report(trial, PAL_VERDICT_FAILED, "it does not stand still");
+    if (!(drift <= max_drift)) pal_trial_report(trial, PAL_VERDICT_FAILED, "it drifts");
+    if (!(kinetic <= max_kinetic * stored)) pal_trial_report(trial, PAL_VERDICT_FAILED, "it does not stand still");
 }

@@ -75,11 +75,11 @@ static void release(pal_trial *trial, bool good)
         pal_trial_report(trial, PAL_VERDICT_PASSED, "back after %.2g s", trial->out->return_s);
 }
 
-static void say_force(pal_trial *trial, double most_N)
+static void say_force(pal_trial *trial, double max_N)
 {
     double cap = trial->scene->tool[0].force_cap_N;
-    pal_trial_report(trial, PAL_VERDICT_PASSED, "force up to %.3g N", most_N);
-    if (most_N > cap * (1 + 1e-9)) pal_trial_report(trial, PAL_VERDICT_FAILED, "beyond the cap of %.3g N", cap);
+    pal_trial_report(trial, PAL_VERDICT_PASSED, "force up to %.3g N", max_N);
+    if (max_N > cap * (1 + 1e-9)) pal_trial_report(trial, PAL_VERDICT_FAILED, "beyond the cap of %.3g N", cap);
 }
 
 static double force_N(const pal_trial *trial, int tool)
@@ -89,7 +89,7 @@ static double force_N(const pal_trial *trial, int tool)
 
 void pal_robustness_teleport(pal_trial *trial)
 {
-    double centre[3], half[3], at[3], most = 0;
+    double centre[3], half[3], at[3], max = 0;
     if (!has_tools(trial)) return;
     int axis = middle(trial, centre, half);
     const pal_body *body = pal_world_body(trial->world, trial->body);
@@ -102,31 +102,31 @@ void pal_robustness_teleport(pal_trial *trial)
         at[axis] += side > 0 ? half[axis] + 2 * radius : half[axis] + 2 * radius - body->length_scale_m;
         move(trial, 0, at, false);
         good = tool_step(trial, 1, 0);
-        most = fmax(most, force_N(trial, 0));
+        max = fmax(max, force_N(trial, 0));
     }
-    say_force(trial, most);
+    say_force(trial, max);
     release(trial, good);
 }
 
 void pal_robustness_inside(pal_trial *trial)
 {
-    double centre[3], half[3], most = 0;
+    double centre[3], half[3], max = 0;
     if (!has_tools(trial)) return;
     (void)middle(trial, centre, half);
     bool good = true;
     for (int i = 0; i < 60 && good; i++) {
         move(trial, 0, centre, false);
         good = tool_step(trial, 1, 0);
-        most = fmax(most, force_N(trial, 0));
+        max = fmax(max, force_N(trial, 0));
     }
-    say_force(trial, most);
+    say_force(trial, max);
     release(trial, good);
 }
 
 void pal_robustness_pressed(pal_trial *trial)
 {
     enum { IN = 30, HOLD = 30 };
-    double centre[3], half[3], most = 0;
+    double centre[3], half[3], max = 0;
     if (!has_tools(trial)) return;
     int axis = middle(trial, centre, half);
     bool good = true;
@@ -141,9 +141,9 @@ void pal_robustness_pressed(pal_trial *trial)
             move(trial, t, at, false);
         }
         good = tool_step(trial, 2, way_m);
-        most = fmax(most, fmax(force_N(trial, 0), force_N(trial, 1)));
+        max = fmax(max, fmax(force_N(trial, 0), force_N(trial, 1)));
     }
-    say_force(trial, most);
+    say_force(trial, max);
     release(trial, good);
 }
 
@@ -211,15 +211,15 @@ static void support_top(const pal_trial *trial, pal_scene *scene)
 {
     for (int b = 0; b < scene->n_body; b++) {
         const pal_body *body = pal_world_body(trial->world, b);
-        double least = INFINITY, most = -INFINITY;
+        double min = INFINITY, max = -INFINITY;
         for (int i = 0; i < body->n_dof; i++) {
             double at = pal_dot3(scene->up, body->x_rest + 3 * (size_t)i);
-            least = fmin(least, at), most = fmax(most, at);
+            min = fmin(min, at), max = fmax(max, at);
         }
         pal_support_def s = {.low_m = {INFINITY, INFINITY, INFINITY}, .high_m = {-INFINITY, -INFINITY, -INFINITY}};
         for (int i = 0; i < body->n_dof; i++) {
             const double *x = body->x_rest + 3 * (size_t)i;
-            if (pal_dot3(scene->up, x) < least + 0.8 * (most - least)) continue;
+            if (pal_dot3(scene->up, x) < min + 0.8 * (max - min)) continue;
             for (int c = 0; c < 3; c++) {
                 s.low_m[c] = fmin(s.low_m[c], x[c] - 1e-9 * body->length_scale_m);
                 s.high_m[c] = fmax(s.high_m[c], x[c] + 1e-9 * body->length_scale_m);
@@ -268,14 +268,14 @@ static bool go_over(pal_trial *trial, const pal_scene *scene, double *jump)
 
 static double speed_S_s(const pal_trial *trial)
 {
-    double most = 0;
+    double max = 0;
     for (int b = 0; b < trial->scene->n_body; b++) {
         const pal_body *body = pal_world_body(trial->world, b);
         double mass = 0;
         for (int i = 0; i < body->n_dof; i++) mass += body->mass_kg[i];
-        most = fmax(most, sqrt(2 * pal_body_kinetic_J(body) / mass) / body->length_scale_m);
+        max = fmax(max, sqrt(2 * pal_body_kinetic_J(body) / mass) / body->length_scale_m);
     }
-    return most;
+    return max;
 }
 
 void pal_robustness_supports(pal_trial *trial)
@@ -363,8 +363,8 @@ static void random_order(pal_trial *trial, const double centre[3], double size)
         random_pose(trial, centre, size);
     } else if (kind < 0.8) {
         int node = pal_body_point(body, (int)draw(trial, 0, pal_body_nodes(body)));
-        double force[3], most = pal_trial_load_cap_N(trial, b);
-        for (int c = 0; c < 3; c++) force[c] = draw(trial, -most, most);
+        double force[3], max = pal_trial_load_cap_N(trial, b);
+        for (int c = 0; c < 3; c++) force[c] = draw(trial, -max, max);
         if (pal_trial_random(trial) < 0.1) force[2] = 1e9;
         (void)pal_world_load(trial->world, b, node, force);
     } else if (kind < 0.9) {

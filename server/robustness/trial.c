@@ -17,7 +17,7 @@
 
 static const double back_S = 1e-3, slack = 0.01, central_slack = 0.3, verlet_slack = 0.05;
 static const double still_S_s = 1e-5; /* speed, RMS, that is rest */
-static const double least_s = 60,
+static const double min_s = 60,
                     typical_s = 500; /* --seconds by itself: at least, and simulated time it has to reach for */
 /* energy that is nothing to be judged: of what a body weighs (or its node cap) over S */
 static const double nothing_share = 1e-9;
@@ -170,23 +170,23 @@ static double body_left(const pal_trial *trial, int b)
 
 double pal_trial_deviation_S(const pal_trial *trial)
 {
-    double most = 0;
+    double max = 0;
     for (int b = 0; b < trial->scene->n_body; b++) {
         double left = body_left(trial, b);
-        if (!(left <= most)) most = left;
+        if (!(left <= max)) max = left;
     }
-    return most;
+    return max;
 }
 
 /* of the bodies that have to come back */
 static double asked_left(const pal_trial *trial)
 {
-    double most = 0;
+    double max = 0;
     for (int b = 0; b < trial->scene->n_body; b++) {
         double left = excused(trial, b) ? 0 : body_left(trial, b);
-        if (!(left <= most)) most = left;
+        if (!(left <= max)) max = left;
     }
-    return most;
+    return max;
 }
 
 /* of lasting loads since rest, as they act: shortened to the cap */
@@ -273,7 +273,7 @@ double pal_trial_load_cap_N(const pal_trial *trial, int b)
 int pal_trial_far_node(const pal_trial *trial, int b)
 {
     const pal_body *body = pal_world_body(trial->world, b);
-    double from[3] = {0, 0, 0}, most = -1;
+    double from[3] = {0, 0, 0}, max = -1;
     int n = 0, far = pal_body_point(body, 0);
     for (int i = 0; i < body->n_dof; i++)
         if (body->support[i]) pal_add3(from, from, body->x_rest + 3 * (size_t)i), n++;
@@ -283,7 +283,7 @@ int pal_trial_far_node(const pal_trial *trial, int b)
     for (int k = 0; k < pal_body_nodes(body); k++) {
         int i = pal_body_point(body, k);
         double way = pal_dist3(body->node_rest + 3 * (size_t)i, from);
-        if (way > most) most = way, far = i;
+        if (way > max) max = way, far = i;
     }
     return far;
 }
@@ -394,7 +394,7 @@ void pal_trial_relax(pal_trial *trial, double seconds)
 
 /* ---- verdicts ---- */
 
-static void sum_rescues(pal_trial *trial)
+static void sum_safeguards(pal_trial *trial)
 {
     pal_safeguards *to = &trial->out->safeguards;
     for (int b = 0; b < trial->scene->n_body; b++) {
@@ -523,7 +523,7 @@ static void run_one(pal_trial *trial, const pal_robustness_case *which, double s
     pal_trial_rebase(trial);
     sample(trial);
     which->run(trial);
-    sum_rescues(trial);
+    sum_safeguards(trial);
     judge(trial);
     const bool folded = is_folded(trial), collapsed = has_collapsed(trial);
     bool reset = out->frozen || folded;
@@ -544,7 +544,7 @@ static void look_at_rows(pal_trial *trial)
     bool first = true;
     for (int i = 0; i < pal_world_component_count(trial->world); i++) {
         const char *name = pal_world_component(trial->world, i)->effect->name;
-        trial->anew |= !strcmp(name, "moving_support") || !strcmp(name, "inflate");
+        trial->again |= !strcmp(name, "moving_support") || !strcmp(name, "inflate");
         if (strcmp(name, "tool_push")) continue;
         pal_component_info info;
         pal_world_component_info(trial->world, i, &info);
@@ -552,7 +552,7 @@ static void look_at_rows(pal_trial *trial)
             if (info.body == pal_world_body(trial->world, b)->name) trial->body = b, first = false;
         trial->touches = true;
     }
-    for (int b = 0; b < trial->scene->n_body; b++) trial->anew |= pal_world_body(trial->world, b)->active != NULL;
+    for (int b = 0; b < trial->scene->n_body; b++) trial->again |= pal_world_body(trial->world, b)->active != NULL;
 }
 
 static pal_err open_rig(pal_trial *trial, const pal_scene *scene)
@@ -604,14 +604,14 @@ static double enough_s(pal_trial *trial)
         (void)pal_world_step(trial->world, trial->scene->step_s);
     }
     double step_s = (1e-9 * (double)pal_clock_thread_ns() - before) / PROBE;
-    return fmin(1800, fmax(least_s, typical_s / trial->scene->step_s * step_s));
+    return fmin(1800, fmax(min_s, typical_s / trial->scene->step_s * step_s));
 }
 
 static pal_err run_all(pal_trial *trial, pal_robustness_report *out)
 {
     const pal_robustness_options *o = trial->options;
     double begin = 1e-9 * (double)pal_clock_thread_ns();
-    trial->deadline_s = begin + (o->max_cpu_s > 0 ? 0.5 * o->max_cpu_s : least_s);
+    trial->deadline_s = begin + (o->max_cpu_s > 0 ? 0.5 * o->max_cpu_s : min_s);
     if (o->progress && !o->progress("rest", 0, o->user)) return PAL_ERR_STATE;
     out->rests = trial->rests = pal_trial_settle(trial, &out->settle_s);
     if (!trial->rests && !trial->late) out->led = pal_trial_make_twin(trial);

@@ -13,7 +13,7 @@ typedef struct pal_trial {
     double *start[PAL_BODY_MAX]; /* room for where they are        [n_dof][3] */
     double rest_J;
     double return_time_s; /* that bodies have to come back */
-    bool anew;            /* rest cannot be put back as positions: it is found again for every case */
+    bool again;           /* rest cannot be put back as positions: it is found again for every case */
     bool touches;         /* a body has a row that tools push                                         */
     int body;             /* the first such body, else 0                                              */
     double deadline_s;    /* processor time at which this case ends */

@@ -9,14 +9,14 @@
 #include <string.h>
 
 static const double still_S_s = 1e-5; /* speed, RMS, that is rest */
-static const double settle_most_s = 30;
+static const double settle_max_s = 30;
 static const double return_s = 10, longest_s = 120, n_period = 10;
 static const double lead_s = 0.5; /* that a led scene is on its way before a case */
 
 /* RMS speed of the fastest body over its S, 1/s */
 double pal_trial_speed_S_s(const pal_trial *trial)
 {
-    double most = 0;
+    double max = 0;
     for (int b = 0; b < trial->scene->n_body; b++) {
         const pal_body *body = pal_world_body(trial->world, b);
         double sum = 0;
@@ -25,9 +25,9 @@ double pal_trial_speed_S_s(const pal_trial *trial)
             sum += pal_dot3(v, v);
         }
         double speed = sqrt(sum / (body->n_active > 0 ? body->n_active : 1)) / body->length_scale_m;
-        if (!(speed <= most)) most = speed;
+        if (!(speed <= max)) max = speed;
     }
-    return most;
+    return max;
 }
 
 /* ---- rest ---- */
@@ -36,12 +36,12 @@ double pal_trial_speed_S_s(const pal_trial *trial)
  * than two minutes */
 double pal_trial_return_time_s(const pal_trial *trial)
 {
-    double most = 0;
+    double max = 0;
     pal_preflight *look = malloc(sizeof *look);
     if (look && !pal_preflight_run(trial->scene, PAL_PREFLIGHT_FULL, look, NULL))
-        for (int b = 0; b < look->n_body; b++) most = fmax(most, look->body[b].slowest_period_s); /* of NaN the other */
+        for (int b = 0; b < look->n_body; b++) max = fmax(max, look->body[b].slowest_period_s); /* of NaN the other */
     free(look);
-    return fmax(return_s, fmin(longest_s, n_period * most));
+    return fmax(return_s, fmin(longest_s, n_period * max));
 }
 
 /* runs until nothing moves; false: it still does */
@@ -49,7 +49,7 @@ bool pal_trial_settle(pal_trial *trial, double *took_s)
 {
     const double step = trial->scene->step_s;
     double rest_time_s = 0, t = 0;
-    for (; t < settle_most_s && rest_time_s < 0.25; t += step) {
+    for (; t < settle_max_s && rest_time_s < 0.25; t += step) {
         if (pal_world_step(trial->world, step) || 1e-9 * (double)pal_clock_thread_ns() > trial->deadline_s)
             return false;
         rest_time_s = pal_trial_speed_S_s(trial) <= still_S_s ? rest_time_s + step : 0;
@@ -114,7 +114,7 @@ bool pal_trial_back_to_rest(pal_trial *trial)
     pal_world_destroy(trial->world);
     trial->world = fresh;
     if (trial->twin) return begin_twin(trial);
-    if (trial->anew) {
+    if (trial->again) {
         bool still = pal_trial_settle(trial, &took_s);
         if (still) pal_trial_save(trial, trial->rest);
         return still;

@@ -201,7 +201,7 @@ pal_err pal_json_text(const pal_json *json, const cJSON *object, const char *pat
     return PAL_ERR_OK;
 }
 
-pal_err pal_json_list(const pal_json *json, const cJSON *object, const char *path, const char *key, int most,
+pal_err pal_json_list(const pal_json *json, const cJSON *object, const char *path, const char *key, int max,
                       const cJSON **out)
 {
     char at[PAL_JSON_PATH];
@@ -210,7 +210,7 @@ pal_err pal_json_list(const pal_json *json, const cJSON *object, const char *pat
     if (!item) return PAL_ERR_OK;
     if (!cJSON_IsArray(item)) return pal_json_refuse(json, pal_json_key(at, path, key), "is not a list [...]");
     int n = cJSON_GetArraySize(item);
-    if (n > most) return pal_json_refuse(json, pal_json_key(at, path, key), "%d entries, more than %d", n, most);
+    if (n > max) return pal_json_refuse(json, pal_json_key(at, path, key), "%d entries, more than %d", n, max);
     *out = item;
     return PAL_ERR_OK;
 }

@@ -42,7 +42,7 @@ pal_err pal_json_vector(const pal_json *json, const cJSON *object, const char *p
 pal_err pal_json_text(const pal_json *json, const cJSON *object, const char *path, const char *key, bool may_be_empty,
                       char *out, size_t n_byte);
 /* a list of at most `most` entries, NULL when the key is absent */
-pal_err pal_json_list(const pal_json *json, const cJSON *object, const char *path, const char *key, int most,
+pal_err pal_json_list(const pal_json *json, const cJSON *object, const char *path, const char *key, int max,
                       const cJSON **out);
 
 /* a number, a list of n numbers, with as many digits as give the same bits when they are read again (cJSON's own may

@@ -19,7 +19,7 @@ typedef struct reader {
     pal_problem *out;
 } reader;
 
-static const double length_most = 1e9; /* m, of any coordinate: a body's frame is single precision on the wire */
+static const double length_max = 1e9; /* m, of any coordinate: a body's frame is single precision on the wire */
 
 /* ---- kinds of values ---- */
 
@@ -129,11 +129,11 @@ static pal_err read_region(const reader *r, const cJSON *parent, const char *abo
     if (out->all) {
         const char *extra = has(object, "min") ? "min" : has(object, "max") ? "max" : NULL;
         if (extra) return pal_json_refuse(&r->json, pal_json_key(at, path, extra), "only goes with type \"box\"");
-        for (int c = 0; c < 3; c++) out->low_m[c] = -length_most, out->high_m[c] = length_most;
+        for (int c = 0; c < 3; c++) out->low_m[c] = -length_max, out->high_m[c] = length_max;
         return PAL_ERR_OK;
     }
-    PAL_TRY(read_vector(r, object, path, "min", length_most, out->low_m));
-    PAL_TRY(read_vector(r, object, path, "max", length_most, out->high_m));
+    PAL_TRY(read_vector(r, object, path, "min", length_max, out->low_m));
+    PAL_TRY(read_vector(r, object, path, "max", length_max, out->high_m));
     for (int c = 0; c < 3; c++)
         if (out->low_m[c] > out->high_m[c])
             return pal_json_refuse(&r->json, path, "min[%d] %g is above max[%d] %g", c, out->low_m[c], c,
@@ -178,7 +178,7 @@ static pal_err read_support(const reader *r, const cJSON *object, int index)
     PAL_TRY(read_word(r, object, path, "type", types, type, sizeof type));
     PAL_TRY(read_region(r, object, path, &s->region));
     s->moved = !strcmp(type, "moved");
-    if (s->moved) return read_vector(r, object, path, "move", length_most, s->move_m);
+    if (s->moved) return read_vector(r, object, path, "move", length_max, s->move_m);
     if (has(object, "move"))
         return pal_json_refuse(&r->json, pal_json_key(at, path, "move"), "only goes with type \"moved\"");
     return PAL_ERR_OK;
@@ -239,7 +239,7 @@ static pal_err read_load(const reader *r, const cJSON *object, const char *path,
     if (!strcmp(type, "point")) {
         load->kind = PAL_LOAD_POINT;
         PAL_TRY(pal_json_object(&r->json, object, path, point));
-        PAL_TRY(read_vector(r, object, path, "point", length_most, load->point_m));
+        PAL_TRY(read_vector(r, object, path, "point", length_max, load->point_m));
         return read_vector(r, object, path, "force", 1e15, load->force_N);
     }
     load->kind = PAL_LOAD_GRAVITY;
@@ -405,14 +405,14 @@ static pal_err check_frequencies(const reader *r, const cJSON *root)
 }
 
 /* a list of entries, each by its own function; least: how many there must be */
-static pal_err read_list(const reader *r, const cJSON *root, const char *key, int least, int most, int *count,
+static pal_err read_list(const reader *r, const cJSON *root, const char *key, int min, int most, int *count,
                          pal_err (*read)(const reader *r, const cJSON *object, int index))
 {
     const cJSON *list;
     PAL_TRY(pal_json_list(&r->json, root, "", key, most, &list));
-    if (least >= 0 && !list) return pal_json_refuse(&r->json, key, "is missing");
+    if (min >= 0 && !list) return pal_json_refuse(&r->json, key, "is missing");
     int n = list ? cJSON_GetArraySize(list) : 0;
-    if (n < least) return pal_json_refuse(&r->json, key, "%d entries, wanted at least %d", n, least);
+    if (n < min) return pal_json_refuse(&r->json, key, "%d entries, wanted at least %d", n, min);
     for (const cJSON *child = list ? list->child : NULL; child; child = child->next, (*count)++)
         PAL_TRY(read(r, child, *count));
     return PAL_ERR_OK;

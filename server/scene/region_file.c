@@ -16,7 +16,7 @@
 #include <string.h>
 
 enum { PATH = 1600 };
-static const double voxels_most = 512e6;
+static const double voxels_max = 512e6;
 
 /* of the frame of the body's file */
 static const double *origin_of(const pal_body_def *def)
@@ -131,7 +131,7 @@ static bool invert(const double to_m[12], double out[9])
 /* the axes' grid of a volume: its spacing, count and first point in the file's frame */
 static void lay_grid(const pal_label_volume *v, pal_region *out)
 {
-    double high[3], least = INFINITY;
+    double high[3], min = INFINITY;
     bool aligned = true;
     for (int c = 0; c < 3; c++) {
         double across = 0, along = 0, edge = 0;
@@ -145,10 +145,10 @@ static void lay_grid(const pal_label_volume *v, pal_region *out)
         }
         out->spacing_m[c] = along;
         aligned = aligned && across - along < 1e-6 * along;
-        least = fmin(least, sqrt(edge));
+        min = fmin(min, sqrt(edge));
     }
     for (int c = 0; c < 3; c++) {
-        if (!aligned) out->spacing_m[c] = 0.5 * least;
+        if (!aligned) out->spacing_m[c] = 0.5 * min;
         double n = floor((high[c] - out->low_m[c]) / out->spacing_m[c] + 0.5) + 1;
         out->n[c] = n < 1e9 ? (int)n : 1000000000;
     }
@@ -165,7 +165,7 @@ static pal_err sample(const pal_json *json, const char *path, const pal_label_vo
     double count = (double)out->n[0] * out->n[1] * out->n[2];
     for (int c = 0; c < 3; c++)
         if (out->n[c] > 32767) return pal_json_refuse(json, path, "%d voxels on an axis, more than 32767", out->n[c]);
-    if (count > voxels_most) return pal_json_refuse(json, path, "%g voxels, more than %g", count, voxels_most);
+    if (count > voxels_max) return pal_json_refuse(json, path, "%g voxels, more than %g", count, voxels_max);
     *own = calloc((size_t)count, 1);
     if (!*own) return pal_diagnostic_set(json->diag, PAL_ERR_MEMORY, "%s: no memory for its voxels", path);
     for (int k = 0; k < out->n[2]; k++)

@@ -32,9 +32,9 @@ pal_err pal_scene_arg(const char *word, const pal_surface_scene *options, pal_lo
 {
     PAL_TRY(load(word, options, out, is_surface, report, diag));
     for (int k = 0; k < (*out)->scene.n_body; k++) {
-        pal_diagnostic told;
-        pal_loose_components_describe(&(*out)->loose[k], (*out)->scene.body[k].name, &told);
-        if (told.text[0]) pal_log(PAL_LOG_WARN, "scene", "%s: %s", word, told.text);
+        pal_diagnostic reported;
+        pal_loose_components_describe(&(*out)->loose[k], (*out)->scene.body[k].name, &reported);
+        if (reported.text[0]) pal_log(PAL_LOG_WARN, "scene", "%s: %s", word, reported.text);
     }
     return PAL_ERR_OK;
 }

@@ -260,13 +260,13 @@ static pal_err read_target(const pal_json *json, const cJSON *root, pal_scene *s
     const cJSON *accuracy = cJSON_GetObjectItemCaseSensitive(root, "accuracy");
     const cJSON *budget = cJSON_GetObjectItemCaseSensitive(root, "budget");
     if (cJSON_IsObject(accuracy)) {
-        double most_mm = 0;
+        double max_mm = 0;
         PAL_TRY(pal_json_object(json, accuracy, "accuracy", pal_scene_keys(PAL_KEYS_ACCURACY, NULL)));
         PAL_TRY(pal_json_text(json, accuracy, "accuracy", "text", true, scene->accuracy, sizeof scene->accuracy));
-        PAL_TRY(pal_json_number(json, accuracy, "accuracy", "max_error_mm", 1e-6, 1e6, &most_mm));
-        if (most_mm == 0) return pal_json_refuse(json, "accuracy", "has no max_error_mm");
+        PAL_TRY(pal_json_number(json, accuracy, "accuracy", "max_error_mm", 1e-6, 1e6, &max_mm));
+        if (max_mm == 0) return pal_json_refuse(json, "accuracy", "has no max_error_mm");
         /* divided: 0.1 mm is 1e-4 m and comes back as 0.1 */
-        scene->max_error_m = most_mm / 1000;
+        scene->max_error_m = max_mm / 1000;
     } else {
         PAL_TRY(pal_json_text(json, root, "", "accuracy", true, scene->accuracy, sizeof scene->accuracy));
         if (is_target(scene->accuracy))

@@ -33,7 +33,7 @@ enum {
     WANTED_ELEMENTS = 2000
 };
 static const double border_factor = 1.1; /* border voxels per A/h^2, from spheres */
-static const double fem_least_fill = 0.1;
+static const double fem_min_fill = 0.1;
 
 static void say(const pal_surface_scene *options, const char *what, double fraction)
 {
@@ -110,7 +110,7 @@ static pal_voxel_options voxel_options(const pal_surface_scene *options)
     return (pal_voxel_options){.resolution = options->resolution,
                                .border = true,
                                .largest_only = options->largest_only,
-                               .min_fill = options->fem ? fem_least_fill : 0};
+                               .min_fill = options->fem ? fem_min_fill : 0};
 }
 
 /* corners of kept voxels, or 0 when there is no memory to tell */
@@ -356,19 +356,19 @@ pal_err pal_scene_rename(pal_loaded_scene *loaded, const char *name, const char 
 static pal_err drop_loose(pal_loaded_scene *loaded, const pal_surface_scene *options, pal_surface_scene_report *report,
                           pal_diagnostic *diag)
 {
-    pal_prepare_report *told = &report->prepare;
+    pal_prepare_report *reported = &report->prepare;
     const pal_prepared *mesh = &loaded->mesh[0];
     pal_diagnostic reason = {""};
-    if (told->voxel.n_component == 1) return PAL_ERR_OK;
+    if (reported->voxel.n_component == 1) return PAL_ERR_OK;
     pal_err err = pal_scene_drop_loose(loaded, 0, options->largest_only, &reason);
     if (err == PAL_ERR_REFUSED)
         return pal_diagnostic_set(diag, err, "%s; finer voxels may join them (--resolution, now %d)", reason.text,
                                   report->resolution);
     if (err) return pal_diagnostic_set(diag, err, "%s", reason.text);
     if (loaded->loose[0].n_dropped == 0) return PAL_ERR_OK;
-    told->voxel.n_component -= loaded->loose[0].n_dropped;
-    told->n_voxel = mesh->hexes.n_hex;
-    told->volume_m3 = pal_tets_volume(&mesh->tets);
+    reported->voxel.n_component -= loaded->loose[0].n_dropped;
+    reported->n_voxel = mesh->hexes.n_hex;
+    reported->volume_m3 = pal_tets_volume(&mesh->tets);
     return PAL_ERR_OK;
 }
 

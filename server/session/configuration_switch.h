@@ -3,8 +3,9 @@
  * pal_configuration_switch_transfer, without a jump: displacement and velocity by
  * interpolation in the old body's elements, energy within 2 % of what it was as far as displacements and velocities
  * PAL_TRANSFER_MAX_SCALE and _RATE times as long or short can make it so (the report tells), the mismatch of forces,
- * and of what is shown, let go over 10 steps (sim/transfer.h). What tools hold or press they go on holding and
- * pressing, friction too, lasting loads stay, and brushes where the new body has some. Thread: one at a time. */
+ * and of what is shown, let go over 10 steps (server/sim/transfer/transfer.h). What tools hold or press they go on
+ * holding and pressing, friction too, lasting loads stay, and brushes where the new body has some. Thread: one at a
+ * time. */
 #ifndef PAL_SESSION_CONFIGURATION_SWITCH_H
 #define PAL_SESSION_CONFIGURATION_SWITCH_H
 #include "server/sim/core/configuration.h"
@@ -15,10 +16,10 @@ typedef struct pal_configuration_switch pal_configuration_switch;
 /* what the carry saw, for people and tests */
 typedef struct pal_configuration_switch_report {
     double energy_before_J, energy_after_J; /* of the whole world: kinetic and elastic */
-    double max_move_m, body_move_m;         /* of a shown vertex and of a point of the body (sim/transfer.h) */
-    double frame_move_m;                    /* of a shown vertex from one frame to the next, as it is let in */
-    double scale; /* of displacements, for the sake of the energy; 1: none, PAL_TRANSFER_MAX_SCALE or
-                   * 1 over it: at its bound, the energy is off by more */
+    double max_move_m, body_move_m; /* of a shown vertex and of a point of the body (server/sim/transfer/transfer.h) */
+    double frame_move_m;            /* of a shown vertex from one frame to the next, as it is let in */
+    double scale;                   /* of displacements, for the sake of the energy; 1: none, PAL_TRANSFER_MAX_SCALE or
+                                     * 1 over it: at its bound, the energy is off by more */
 } pal_configuration_switch_report;
 
 /* The scene with `to`, its mesh and all that the carry needs (where every new node lies in the old body). It is made

@@ -355,13 +355,13 @@ static double off_edge(const pal_cells *c, int32_t edge, const double at[3])
 static int32_t nearest_use(const pal_cells *c, int32_t face, const double at[3], bool vertex)
 {
     int32_t first, best = -1;
-    double least = INFINITY;
+    double min = INFINITY;
     if (face < 0 || face >= c->n_face) return -1;
     int32_t n = pal_cells_face_loop(c, face, &first);
     for (int32_t use = first; use < first + n; use++) {
         const double *x = c->x + 3 * (size_t)c->edge_use[use].vertex;
         double off = vertex ? pal_dist3(x, at) : off_edge(c, c->edge_use[use].edge, at);
-        if (off < least) least = off, best = use;
+        if (off < min) min = off, best = use;
     }
     return best;
 }

@@ -1,5 +1,5 @@
-/* Sculpting: the control cells, paint and view of one body of a session, changed while it runs (A 4.1), with undo and
- * redo. A body of model subdivision_fem only.
+/* Sculpting: the control cells, paint and view of one body of a session, changed while it runs (paper A section 4.1),
+ * with undo and redo. A body of model subdivision_fem only.
  *
  * Every command makes a whole scene beside the running one (pal_sculptor_prepare: slow, any thread that may take
  * memory); its world is built while the old one runs on, and takes over between two steps with pal_session_transfer and

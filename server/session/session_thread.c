@@ -15,9 +15,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double reach_sizes = 100;    /* a pose may be this many body sizes from the origin */
-static const double late_part = 0.1;      /* a step is late when it begins this part of a step after its time */
-static const double young_most_Pa = 1e12; /* beyond any solid */
+static const double reach_sizes = 100;   /* a pose may be this many body sizes from the origin */
+static const double late_part = 0.1;     /* a step is late when it begins this part of a step after its time */
+static const double young_max_Pa = 1e12; /* beyond any solid */
 
 /* ---- what the thread does ---- */
 
@@ -490,7 +490,7 @@ pal_err pal_session_put_pose(pal_session *s, int tool, const pal_pose *pose)
 
 static bool material_ok(const pal_material *m)
 {
-    return m->young_Pa > 0 && m->young_Pa <= young_most_Pa && m->poisson > -1 && m->poisson < 0.5 &&
+    return m->young_Pa > 0 && m->young_Pa <= young_max_Pa && m->poisson > -1 && m->poisson < 0.5 &&
            m->density_kg_m3 > 0 && isfinite(m->density_kg_m3) && m->damping_1_s >= 0 && isfinite(m->damping_1_s);
 }
 

@@ -6,9 +6,9 @@
 
 #include <string.h>
 
-static uint64_t later(uint64_t ns, uint64_t by_ns, uint64_t most_ns)
+static uint64_t later(uint64_t ns, uint64_t by_ns, uint64_t max_ns)
 {
-    return ns + by_ns < most_ns ? ns + by_ns : most_ns;
+    return ns + by_ns < max_ns ? ns + by_ns : max_ns;
 }
 
 /* Tools as they are held, and poses that had not been taken yet. Nobody could take one while neither thread ran, for

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { POINTS_MOST = 4096 };
+enum { POINTS_MAX = 4096 };
 
 double pal_observed_order(double h_coarse, double coarse, double h_fine, double fine)
 {
@@ -51,7 +51,7 @@ void pal_convergence_orders(pal_convergence_point *point, int n)
 /* where displacements are compared: the samples, or vertices of the surface; frame of the problem */
 static pal_err choose_points(const pal_surface *surface, const pal_samples *samples, double **x, int *n_out)
 {
-    int n = samples ? samples->n : surface->n_vertex, step = samples ? 1 : (n + POINTS_MOST - 1) / POINTS_MOST;
+    int n = samples ? samples->n : surface->n_vertex, step = samples ? 1 : (n + POINTS_MAX - 1) / POINTS_MAX;
     *n_out = n = samples ? n : n / (step > 0 ? step : 1);
     *x = malloc(3 * (size_t)(n > 0 ? n : 1) * sizeof **x);
     if (!*x) return PAL_ERR_MEMORY;

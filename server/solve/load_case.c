@@ -20,7 +20,7 @@
 #include <string.h>
 
 /* cut voxels with less are dropped; as long as no more of the volume goes than ...; else; and without fill */
-static const double drop_fill = 0.25, most_missing = 0.025, keep_fill = 0.02, whole_fill = 0.5;
+static const double drop_fill = 0.25, max_missing = 0.025, keep_fill = 0.02, whole_fill = 0.5;
 
 pal_box_text pal_box_describe(const pal_box *box)
 {
@@ -105,7 +105,7 @@ pal_err pal_case_voxels(const pal_problem *problem, const pal_surface *surface, 
     if (chosen) voxel.min_fill = how->fill ? drop_fill : whole_fill;
     if (how->align) align(problem, how->resolution, surface, voxel.ahead);
     PAL_TRY(pal_prepared_make(surface, &voxel, out, &report, diag));
-    if (chosen && how->fill && missing(out) > most_missing) {
+    if (chosen && how->fill && missing(out) > max_missing) {
         pal_prepared_free(out);
         voxel.min_fill = keep_fill;
         PAL_TRY(pal_prepared_make(surface, &voxel, out, &report, diag));

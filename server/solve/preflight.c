@@ -12,8 +12,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double least_shape = 0.1, least_edge_S = 1e-6, min_fill = 0.05, least_mass = 1e-3;
-enum { MOST_LANCZOS = 24 };
+static const double min_shape = 0.1, min_edge_S = 1e-6, min_fill = 0.05, min_mass = 1e-3;
+enum { MAX_LANCZOS = 24 };
 
 typedef struct probe {
     pal_world *world;
@@ -51,7 +51,7 @@ static void look_at_edges(const pal_body *body, const double *x, const int32_t *
         for (int b = 0; b < a; b++, n_edge++) {
             double length = pal_dist3(x + 3 * (size_t)corner[a], x + 3 * (size_t)corner[b]);
             *mean2 += length * length;
-            if (length < least_edge_S * body->length_scale_m)
+            if (length < min_edge_S * body->length_scale_m)
                 weak(&out->edge, corner[a], length, x + 3 * (size_t)corner[a], body);
             if (corner[a] == out->limit_node || corner[b] == out->limit_node)
                 out->limit_edge_m = fmin(out->limit_edge_m, length);
@@ -84,7 +84,7 @@ static void look_at_elements(const pal_body *body, bool volumes, pal_preflight_b
         look_at_edges(body, body->x_rest, corner, n, out, &mean2);
         double shape = shape_of(body->x_rest, corner, n, mean2);
         middle(body->x_rest, corner, n, at);
-        if (shape < least_shape) weak(&out->flat, e, shape, at, body);
+        if (shape < min_shape) weak(&out->flat, e, shape, at, body);
         if (tets && volumes) out->n_sliver += shape < PAL_SPRING_SLIVER;
     }
     int n_corner = body->element ? body->n_corner : 4, n_fill = body->element ? body->n_element : n_simplex;
@@ -106,7 +106,7 @@ static void look_at_masses(const pal_body *body, pal_preflight_body *out)
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         out->n_fixed += body->support[i] != 0;
-        if (!body->support[i] && body->mass_kg[i] < least_mass * mass / body->n_active)
+        if (!body->support[i] && body->mass_kg[i] < min_mass * mass / body->n_active)
             weak(&out->light, i, body->mass_kg[i], body->x_rest + 3 * (size_t)i, body);
     }
 }
@@ -115,14 +115,14 @@ static void look_at_masses(const pal_body *body, pal_preflight_body *out)
 static bool find_limit_node(const probe *p, pal_preflight_body *out)
 {
     const pal_body *body = p->body;
-    double *bound = calloc((size_t)body->n_dof + 1, sizeof *bound), most = 0;
+    double *bound = calloc((size_t)body->n_dof + 1, sizeof *bound), max = 0;
     if (!bound) return false;
     for (int i = 0; i < p->n_force && !body->interpolation; i++)
         if (p->force[i].effect->stiffness) p->force[i].effect->stiffness(p->force[i].self, body, bound);
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        if (body->support[i] || !(bound[i] > most * body->mass_kg[i])) continue;
-        most = bound[i] / body->mass_kg[i];
+        if (body->support[i] || !(bound[i] > max * body->mass_kg[i])) continue;
+        max = bound[i] / body->mass_kg[i];
         out->limit_node = i, out->limit_mass_kg = body->mass_kg[i];
         pal_add3(out->limit_at_m, body->x_rest + 3 * (size_t)i, body->offset_m);
     }
@@ -154,9 +154,9 @@ static void apply(void *user, const double *v, double *out)
 {
     probe *p = user;
     const pal_body *body = p->body;
-    double most = 0;
-    for (int i = 0; i < 3 * body->n_dof; i++) most = fmax(most, fabs(v[i]));
-    double way = most > 0 ? p->way_m / most : 0;
+    double max = 0;
+    for (int i = 0; i < 3 * body->n_dof; i++) max = fmax(max, fabs(v[i]));
+    double way = max > 0 ? p->way_m / max : 0;
     force_at(p, v, -way, p->low);
     force_at(p, v, way, out);
     for (int i = 0; i < 3 * body->n_dof; i++) {
@@ -188,7 +188,7 @@ static double fast(probe *p, double *room)
 {
     const pal_body *body = p->body;
     int n = 3 * body->n_dof;
-    double *basis = calloc((size_t)MOST_LANCZOS * (size_t)n, sizeof *basis);
+    double *basis = calloc((size_t)MAX_LANCZOS * (size_t)n, sizeof *basis);
     if (!basis) return NAN;
     pal_lanczos l = {.n = n,
                      .multiply = apply_lanczos,
@@ -203,7 +203,7 @@ static double fast(probe *p, double *room)
         seed = seed * 6364136223846793005u + 1442695040888963407u;
         l.z[i] = body->support[i / 3] ? 0 : body->mass_kg[i / 3] * ((double)(seed >> 11) * 0x1p-53 - 0.5);
     }
-    (void)pal_lanczos_run(&l, 0.02, 4, MOST_LANCZOS);
+    (void)pal_lanczos_run(&l, 0.02, 4, MAX_LANCZOS);
     free(basis);
     return sqrt(l.ritz);
 }
@@ -213,7 +213,7 @@ static double slow(probe *p, double *room)
 {
     const pal_body *body = p->body;
     size_t n = 3 * (size_t)body->n_dof;
-    double least = INFINITY, *u = room, *b = room + n;
+    double min = INFINITY, *u = room, *b = room + n;
     for (size_t axis = 0; axis < 3; axis++) {
         pal_conjugate_gradient cg = {.n = (int)n,
                                      .multiply = apply,
@@ -231,9 +231,9 @@ static double slow(probe *p, double *room)
         (void)pal_conjugate_gradient_run(&cg, u, 0.03 * sqrt(pal_dot_product((int)n, b, b)), 1, p->max_cg);
         /* u'Ku = u'(b - r) */
         for (size_t i = 0; i < n; i++) uf += u[i] * (b[i] - cg.r[i]), uu += body->mass_kg[i / 3] * u[i] * u[i];
-        if (uu > 0 && uf / uu < least) least = uf / uu;
+        if (uu > 0 && uf / uu < min) min = uf / uu;
     }
-    return sqrt(least);
+    return sqrt(min);
 }
 
 static bool look_at_modes(probe *p, pal_preflight_body *out)
@@ -293,14 +293,14 @@ static double predict_ms(const probe *p, const pal_body *body, int n_sub, int b)
     }
     if (!(forces > 0) || !strcmp(solver, "static_newton")) return NAN;
     (void)pal_world_solve_report(p->world, b, &report);
-    double shown = (body->skin ? 11.6 : 1.0) * body->n_shown, least = 1500;
+    double shown = (body->skin ? 11.6 : 1.0) * body->n_shown, min = 1500;
     if (body->implicit) {
         const double iterations = 4, factor = 0.9 * (double)report.factor_nonzeros;
         return 1e-6 * (forces * (5 + iterations) + iterations * (factor + 30.0 * body->n_dof) + shown);
     }
     int evaluations = !strcmp(solver, "rk4") ? 4 : 1;
     solve = (!strcmp(solver, "central_cg") ? 200.0 : 12.0) * body->n_active;
-    return 1e-6 * (n_sub * (evaluations * (forces + solve) + least) + shown + 2 * least);
+    return 1e-6 * (n_sub * (evaluations * (forces + solve) + min) + shown + 2 * min);
 }
 
 /* ---- elements that lock ---- */

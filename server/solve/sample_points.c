@@ -161,13 +161,13 @@ pal_err pal_samples_read(const char *path, pal_samples *out, pal_diagnostic *dia
 
 pal_err pal_samples_write(const pal_samples *samples, const char *path, pal_diagnostic *diag)
 {
-    size_t most = 32 + (size_t)samples->n * ROW, n = 0;
-    char *text = malloc(most);
+    size_t max = 32 + (size_t)samples->n * ROW, n = 0;
+    char *text = malloc(max);
     if (!text) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for %d samples", path, samples->n);
-    n += (size_t)snprintf(text, most, "x,y,z,ux,uy,uz\n");
+    n += (size_t)snprintf(text, max, "x,y,z,ux,uy,uz\n");
     for (int i = 0; i < samples->n; i++) {
         const double *x = samples->x + 3 * i, *u = samples->u + 3 * i;
-        n += (size_t)snprintf(text + n, most - n, "%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n", x[0], x[1], x[2], u[0], u[1],
+        n += (size_t)snprintf(text + n, max - n, "%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n", x[0], x[1], x[2], u[0], u[1],
                               u[2]);
     }
     pal_err err = pal_file_write(path, text, n, diag);
@@ -184,14 +184,14 @@ void pal_samples_free(pal_samples *samples)
 
 void pal_samples_error(const pal_samples *reference, const double *u, double *rms_percent, double *max_percent)
 {
-    double sum = 0, most_off = 0, most = 0;
+    double sum = 0, max_off = 0, max = 0;
     for (int i = 0; i < reference->n; i++) {
         double off = pal_dist3(u + 3 * i, reference->u + 3 * i);
         sum += off * off;
-        most_off = fmax(most_off, off);
-        most = fmax(most, pal_norm3(reference->u + 3 * i));
+        max_off = fmax(max_off, off);
+        max = fmax(max, pal_norm3(reference->u + 3 * i));
     }
     double rms = reference->n ? sqrt(sum / reference->n) : 0;
-    *rms_percent = rms == 0 ? 0 : 100 * rms / most;
-    *max_percent = most_off == 0 ? 0 : 100 * most_off / most;
+    *rms_percent = rms == 0 ? 0 : 100 * rms / max;
+    *max_percent = max_off == 0 ? 0 : 100 * max_off / max;
 }

@@ -19,7 +19,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NEWTON_A_STEP = 4, MOST_NEWTON = 400, MOST_RAMP = 40 };
+enum { NEWTON_A_STEP = 4, MAX_NEWTON = 400, MAX_RAMP = 40 };
 static const double lab_step_s = 1.0 / 60; /* a static solver has no use for it */
 
 struct pal_solution {
@@ -202,16 +202,16 @@ static void move_supports(const job *j, double share)
 
 static int count_ramp(const job *j)
 {
-    double most = 0;
-    for (int k = 0; k < j->problem->n_support; k++) most = fmax(most, pal_norm3(j->problem->support[k].move_m));
-    double n = ceil(most / (0.5 * j->s->body->edge_m));
-    return n > MOST_RAMP ? MOST_RAMP : (int)n;
+    double max = 0;
+    for (int k = 0; k < j->problem->n_support; k++) max = fmax(max, pal_norm3(j->problem->support[k].move_m));
+    double n = ceil(max / (0.5 * j->s->body->edge_m));
+    return n > MAX_RAMP ? MAX_RAMP : (int)n;
 }
 
 /* steps the world until its solver has met the tolerance */
 static pal_err converge(const job *j, double fraction)
 {
-    int most = j->options->max_newton > 0 ? j->options->max_newton : MOST_NEWTON;
+    int max = j->options->max_newton > 0 ? j->options->max_newton : MAX_NEWTON;
     for (;;) {
         char what[80];
         pal_solve_report report;
@@ -225,7 +225,7 @@ static pal_err converge(const job *j, double fraction)
                                       "no solution: the body froze after %d iterations at a residual of %g",
                                       j->result->n_newton, report.residual);
         if (report.converged) return PAL_ERR_OK;
-        if (j->result->n_newton >= most || report.n_newton == 0)
+        if (j->result->n_newton >= max || report.n_newton == 0)
             return pal_diagnostic_set(j->diag, PAL_ERR_NUMERIC,
                                       "no solution after %d iterations: residual %g, step size %g", j->result->n_newton,
                                       report.residual, report.step_size);

@@ -151,7 +151,7 @@ static pal_err pick(const char *word, const char *path, const pal_scene *scene, 
         return pal_diagnostic_set(diag, err, "%s: %s: %s", path, pal_configuration_text(&p->setting, text),
                                   reason.text);
     out->scene = &out->set->scene;
-    snprintf(out->said, sizeof out->said, "%s: %s, %s in %.3g ms, picked of the %d settings of %.160s (%s)",
+    snprintf(out->summary, sizeof out->summary, "%s: %s, %s in %.3g ms, picked of the %d settings of %.160s (%s)",
              scene->body[out->file->index].name, pal_configuration_text(&p->setting, text),
              pal_study_error_text(out->file, p->error_m, off), p->ms, out->n_configuration, path, asked);
     return PAL_ERR_OK;

@@ -31,8 +31,8 @@ typedef struct pal_studied_scene {
     int picked;                /* point of the study; -1: none was asked for               */
     int body, n_configuration; /* what a session may switch to                             */
     pal_measured_configuration *setting;
-    char said[720]; /* which setting was picked and from which study; "": none                           */
-    char warn[400]; /* a study that was not looked at, or that another machine made; "": nothing to say */
+    char summary[720]; /* which setting was picked and from which study; "": none                           */
+    char warn[400];    /* a study that was not looked at, or that another machine made; "": nothing to say */
 } pal_studied_scene;
 /* word: as it was given to the command (scene_arg.h); scene: loaded from it, borrowed until close. REFUSED when a
  * setting is asked for and there is no study, one of another body, or none of its settings serves: one sentence that

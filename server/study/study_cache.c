@@ -64,7 +64,7 @@ static void remember(const pal_study_job *job, uint64_t key, const pal_study_ans
 }
 
 /* forwards an answer's error with its sentence */
-static pal_err said(const pal_study_answer *answer, pal_diagnostic *diag)
+static pal_err summary(const pal_study_answer *answer, pal_diagnostic *diag)
 {
     return answer->err ? pal_diagnostic_set(diag, answer->err, "%s", answer->reason) : PAL_ERR_OK;
 }
@@ -83,7 +83,7 @@ pal_err pal_study_cached_static(pal_study_job *job, const pal_configuration *set
         remember(job, key, &answer, u, n);
     }
     *n_node = answer.n_node;
-    return said(&answer, diag);
+    return summary(&answer, diag);
 }
 
 pal_err pal_study_cached_trajectory(pal_study_job *job, const pal_configuration *setting, double (*way)[3],
@@ -99,5 +99,5 @@ pal_err pal_study_cached_trajectory(pal_study_job *job, const pal_configuration 
         if (answer.err) memset(way, 0, sizeof *way * (size_t)job->n_trajectory);
         remember(job, key, &answer, way[0], n);
     }
-    return said(&answer, diag);
+    return summary(&answer, diag);
 }

@@ -37,7 +37,7 @@ static bool wants(const list *l, const char *model)
 
 int pal_study_fit_size(const pal_study_job *job, double wanted)
 {
-    double longest = fmax(job->box_m[0], fmax(job->box_m[1], job->box_m[2])), least = INFINITY;
+    double longest = fmax(job->box_m[0], fmax(job->box_m[1], job->box_m[2])), min = INFINITY;
     int best = (int)lround(wanted);
     for (int n = (int)ceil(wanted / 1.35); n <= wanted * 1.35 && longest > 0; n++) {
         double off = fabs(log(n / wanted));
@@ -45,7 +45,7 @@ int pal_study_fit_size(const pal_study_job *job, double wanted)
             double voxels = job->box_m[c] * n / longest;
             off += 4 * fmax(ceil(voxels - 1e-6) - voxels, 0);
         }
-        if (off < least) least = off, best = n;
+        if (off < min) min = off, best = n;
     }
     return best;
 }

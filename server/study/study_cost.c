@@ -13,7 +13,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { LEAST = 3, FEATURES = 18, GRID = 24, GOLDEN = 40, RATES = 16, ROUNDS = 4, ROUGH = 6 };
+enum { MIN = 3, FEATURES = 18, GRID = 24, GOLDEN = 40, RATES = 16, ROUNDS = 4, ROUGH = 6 };
 /* weight of "no effect" for each parameter of as many settings as are enough; of "off by nothing" beside settings that
  * are near */
 static const double ridge = 3e-2, enough = 30, trust = 0.1;
@@ -118,18 +118,18 @@ static cost_law fit(const seen *p, int n, double a, double c)
 
 static double cheapest(const seen *p, int n)
 {
-    double least = INFINITY;
-    for (int i = 0; i < n; i++) least = fmin(least, p[i].ms);
-    return 0.999 * least;
+    double min = INFINITY;
+    for (int i = 0; i < n; i++) min = fmin(min, p[i].ms);
+    return 0.999 * min;
 }
 
 /* a between nothing and what the cheapest step took: the best of a grid */
 static cost_law on_grid(const seen *p, int n, double c, int grid)
 {
-    double most = cheapest(p, n);
+    double max = cheapest(p, n);
     cost_law best = fit(p, n, 0, c);
     for (int k = 1; k <= grid; k++) {
-        cost_law next = fit(p, n, most * k / grid, c);
+        cost_law next = fit(p, n, max * k / grid, c);
         if (next.misfit < best.misfit) best = next;
     }
     return best;
@@ -140,7 +140,7 @@ static cost_law on_grid(const seen *p, int n, double c, int grid)
 static cost_law best_fit(const seen *p, int n)
 {
     const double g = 0.6180339887498949;
-    double slowest = 0, most = cheapest(p, n);
+    double slowest = 0, max = cheapest(p, n);
     for (int i = 0; i < n; i++) slowest = fmax(slowest, p[i].read_ms / p[i].n_node);
     cost_law best = on_grid(p, n, 0, GRID);
     for (int k = 0; k < RATES && slowest > 0; k++) {
@@ -148,7 +148,7 @@ static cost_law best_fit(const seen *p, int n)
         if (next.misfit < best.misfit) best = next;
     }
     if (best.c > 0) best = on_grid(p, n, best.c, GRID);
-    double low = fmax(best.a - most / GRID, 0), high = fmin(best.a + most / GRID, most);
+    double low = fmax(best.a - max / GRID, 0), high = fmin(best.a + max / GRID, max);
     for (int k = 0; k < GOLDEN; k++) {
         double p_at = high - g * (high - low), q_at = low + g * (high - low);
         cost_law at = fit(p, n, p_at, best.c), other = fit(p, n, q_at, best.c);
@@ -274,7 +274,7 @@ bool pal_study_predict_cost(const pal_study *study, const pal_configuration *s, 
         features(p[n].setting, p[n].n_node, p[n].f);
         n++;
     }
-    if (n < LEAST || !has_words(p, n, s)) return false;
+    if (n < MIN || !has_words(p, n, s)) return false;
     cost_law law = best_fit(p, n);
     for (int i = 0; i < n; i++) {
         double near = exp2(-2 * distance(&p[i], s, nodes));

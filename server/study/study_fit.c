@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_EVALUATIONS = 60 };
+enum { MAX_EVALUATIONS = 60 };
 /* of the material's own: without their volume springs tetrahedra that were turned over stay so (palpate robustness) */
 static const double min_volume_ratio = 0.1;
 
@@ -35,7 +35,7 @@ static pal_err fit(pal_study_job *job, const pal_calibration *calibration, pal_c
 {
     pal_calibration_info info;
     pal_fit_result result;
-    const pal_fit_options options = {.max_evaluation = MOST_EVALUATIONS, .step = look, .user = job};
+    const pal_fit_options options = {.max_evaluation = MAX_EVALUATIONS, .step = look, .user = job};
     pal_calibration_info_of(calibration, &info);
     double *theta = malloc(sizeof *theta * (size_t)info.n_parameter);
     if (!theta) return PAL_ERR_MEMORY;

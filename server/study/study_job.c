@@ -56,16 +56,16 @@ static pal_err take_probes(pal_study_job *job)
     snprintf(s.model, PAL_NAME, "%s", job->adaptive ? "adaptive_springs" : "fem");
     PAL_TRY(pal_study_open(job, &s, true, &w, job->diag));
     const pal_surface *surface = &w.set->scene.body[0].mesh->surface;
-    int n = surface->n_vertex, most = samples ? samples->n : n < PAL_STUDY_PROBES ? n : PAL_STUDY_PROBES;
+    int n = surface->n_vertex, max = samples ? samples->n : n < PAL_STUDY_PROBES ? n : PAL_STUDY_PROBES;
     double low[3], high[3];
     pal_surface_box(surface, low, high);
     job->out->length_scale_m = pal_dist3(low, high);
-    pal_err err = take_room(job, most);
-    for (int i = 0; i < most && !err; i++) {
+    pal_err err = take_room(job, max);
+    for (int i = 0; i < max && !err; i++) {
         if (samples)
             pal_sub3(job->probe + 3 * i, samples->x + 3 * i, surface->origin_m);
         else
-            pal_copy3(job->probe + 3 * i, surface->x + 3 * (size_t)((int64_t)i * n / most));
+            pal_copy3(job->probe + 3 * i, surface->x + 3 * (size_t)((int64_t)i * n / max));
     }
     pal_study_close(&w);
     return err;

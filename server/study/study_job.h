@@ -107,7 +107,7 @@ void pal_study_press_halve(pal_study_job *job); /* half as strong */
 /* a press whose rest by the reference is far from what was wanted, or which has none (err), is made another strength;
  * false: it is as it should be, is no press, or was changed often enough */
 bool pal_study_press_adjust(pal_study_job *job, int index, pal_err err);
-/* study.c: false: the user wants it ended, now */
+/* study_job.c: false: the user wants it ended, now */
 bool pal_study_continues(const pal_study_job *job);
 /* the constants of springs fitted to the reference's rest, into the setting */
 pal_err pal_study_fit(pal_study_job *job, pal_configuration *setting, pal_diagnostic *diag);
@@ -120,7 +120,7 @@ pal_err pal_study_reference(pal_study_job *job);
 pal_err pal_study_measure(pal_study_job *job, const pal_study_entry *entry, pal_study_point *out);
 /* the way of the tip under the first load, every PAL_STUDY_FRAME_S; times of the steps in ms [most] unless NULL */
 pal_err pal_study_trajectory(pal_study_job *job, const pal_configuration *setting, double (*way)[3], double *ms,
-                             int most, int *n_ms, pal_study_point *facts, pal_diagnostic *diag);
+                             int max, int *n_ms, pal_study_point *facts, pal_diagnostic *diag);
 
 /* study_run.c: milliseconds of every setting once more, at other moments of the machine: the least median counts;
  * STATE: stopped */

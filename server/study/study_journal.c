@@ -10,8 +10,8 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { MOST_RECORDS = 4096, MOST_NUMBERS = 1 << 24, HEAD = 28 };
-static const size_t most_bytes = (size_t)1 << 30;
+enum { MAX_RECORDS = 4096, MAX_NUMBERS = 1 << 24, HEAD = 28 };
+static const size_t max_bytes = (size_t)1 << 30;
 static const char magic[] = "palpate reference 1\n";
 
 typedef struct record_head {
@@ -25,7 +25,7 @@ struct pal_study_journal {
     FILE *file; /* NULL: nothing is added any more */
     char path[PAL_STUDY_PATH + 16];
     int n, n_before;
-    unsigned char *record[MOST_RECORDS]; /* head, numbers, sum */
+    unsigned char *record[MAX_RECORDS]; /* head, numbers, sum */
 };
 
 static size_t size_of(int64_t n)
@@ -46,7 +46,7 @@ static size_t whole_record(const unsigned char *at, size_t left)
     uint64_t sum;
     if (left < size_of(0)) return 0;
     record_head head = head_of(at);
-    bool sound = head.n >= 0 && head.n <= MOST_NUMBERS && head.err >= 0 && head.err < PAL_ERR_COUNT &&
+    bool sound = head.n >= 0 && head.n <= MAX_NUMBERS && head.err >= 0 && head.err < PAL_ERR_COUNT &&
                  head.n_node >= 0 && memchr(head.reason, 0, sizeof head.reason);
     size_t size = sound ? size_of(head.n) : 0;
     if (size == 0 || size > left) return 0;
@@ -56,7 +56,7 @@ static size_t whole_record(const unsigned char *at, size_t left)
 
 static pal_err keep(pal_study_journal *j, const unsigned char *record, size_t size)
 {
-    if (j->n == MOST_RECORDS || !(j->record[j->n] = malloc(size))) return PAL_ERR_MEMORY;
+    if (j->n == MAX_RECORDS || !(j->record[j->n] = malloc(size))) return PAL_ERR_MEMORY;
     memcpy(j->record[j->n++], record, size);
     return PAL_ERR_OK;
 }
@@ -69,7 +69,7 @@ static pal_err take(pal_study_journal *j, uint64_t of, size_t *whole)
     *whole = 0;
     if (access(j->path, F_OK)) return PAL_ERR_OK;
     /* what cannot be read is begun anew like what is of something else */
-    if (pal_file_read(j->path, most_bytes, &bytes, &n_byte, NULL)) return PAL_ERR_OK;
+    if (pal_file_read(j->path, max_bytes, &bytes, &n_byte, NULL)) return PAL_ERR_OK;
     pal_err err = PAL_ERR_OK;
     bool same =
         n_byte >= HEAD && !memcmp(bytes, magic, HEAD - sizeof of) && !memcmp(bytes + HEAD - sizeof of, &of, sizeof of);
@@ -134,7 +134,7 @@ pal_err pal_study_journal_add(pal_study_journal *j, uint64_t key, const pal_stud
     head.key = key, head.err = answer->err, head.n_node = answer->n_node, head.n = n;
     snprintf(head.reason, sizeof head.reason, "%s", answer->reason);
     size_t size = size_of(n);
-    unsigned char *record = n >= 0 && n <= MOST_NUMBERS ? malloc(size) : NULL;
+    unsigned char *record = n >= 0 && n <= MAX_NUMBERS ? malloc(size) : NULL;
     if (!record || !j->file) {
         free(record);
         return record ? PAL_ERR_IO : PAL_ERR_MEMORY;

@@ -75,9 +75,9 @@ static void inward(const pal_surface *s, const double at[3], double half, double
 static void turn_to_pull(double n[3])
 {
     double axis[3] = {0, 0, 0}, side[3];
-    int least = fabs(n[1]) < fabs(n[0]) ? 1 : 0;
-    if (fabs(n[2]) < fabs(n[least])) least = 2;
-    axis[least] = 1;
+    int min = fabs(n[1]) < fabs(n[0]) ? 1 : 0;
+    if (fabs(n[2]) < fabs(n[min])) min = 2;
+    axis[min] = 1;
     pal_cross3(side, n, axis);
     pal_scale3(side, aslant / fmax(pal_norm3(side), 1e-30), side);
     for (int c = 0; c < 3; c++) n[c] = side[c] - n[c];

@@ -128,12 +128,12 @@ static void parameters_of(const pal_study *study, const pal_study_point *p, doub
 static double usual_tolerance(const pal_study *study)
 {
     double usual = 0;
-    int most = 0;
+    int max = 0;
     for (int k = 0; k < study->n_point; k++) {
         double t = study->point[k].measured.setting.tolerance;
         int n = 0;
         for (int i = 0; i < study->n_point; i++) n += study->point[i].measured.setting.tolerance == t;
-        if (t > 0 && n > most) most = n, usual = t;
+        if (t > 0 && n > max) max = n, usual = t;
     }
     return usual;
 }

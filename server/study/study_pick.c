@@ -67,9 +67,9 @@ int pal_study_pick(const pal_study *study, double max_error_m, double budget_ms)
         if (!isnan(budget_ms) && !(p->ms <= budget_ms)) continue;
         if (best >= 0) {
             const pal_measured_configuration *b = &study->point[best].measured;
-            double far = far_of(study, p), least = far_of(study, b);
+            double far = far_of(study, p), min = far_of(study, b);
             bool cheaper = p->ms < b->ms || (p->ms == b->ms && p->error_m < b->error_m);
-            bool nearer = far < least || (far == least && p->ms < b->ms);
+            bool nearer = far < min || (far == min && p->ms < b->ms);
             if (!(isnan(max_error_m) ? nearer : cheaper)) continue;
         }
         best = i;
@@ -159,14 +159,14 @@ static double cost_at(const cost_law *law, double x)
 /* ms = a + b n^c, a between 0 and what the cheapest costs; a straight line where there are but three points */
 static cost_law fit_cost(const double *x, const double *y, int n)
 {
-    double intercept, slope, b, c, least = INFINITY, straight = 0;
-    for (int i = 0; i < n; i++) least = fmin(least, y[i]);
+    double intercept, slope, b, c, min = INFINITY, straight = 0;
+    for (int i = 0; i < n; i++) min = fmin(min, y[i]);
     line(x, y, n, &intercept, &slope);
     for (int i = 0; i < n; i++) straight += (intercept + slope * x[i] - y[i]) * (intercept + slope * x[i] - y[i]);
     const cost_law power = {0, intercept, slope};
     if (n < 4 || straight < 1e-18 || slope <= 0) return power;
     const double g = 0.6180339887498949;
-    double low = 0, high = exp(least) * 0.999999;
+    double low = 0, high = exp(min) * 0.999999;
     for (int k = 0; k < GOLDEN; k++) {
         double p = high - g * (high - low), q = low + g * (high - low);
         if (best_power(x, y, n, p, &c, &b) < best_power(x, y, n, q, &c, &b))
@@ -244,7 +244,7 @@ static void features(const pal_configuration *s, double f[FEATURES])
 }
 
 /* (F'F + ridge) w = F'y by elimination; the constant is not held back */
-static void solve_knobs(double A[FEATURES][FEATURES + 2], double w[2][FEATURES])
+static void solve_parameters(double A[FEATURES][FEATURES + 2], double w[2][FEATURES])
 {
     for (int i = 0; i < FEATURES; i++) A[i][i] += i == 0 ? 1e-12 : ridge;
     for (int i = 0; i < FEATURES; i++)
@@ -316,7 +316,7 @@ static bool look_at_parameters(const pal_study *study, const pal_configuration *
         n++;
     }
     if (n < ALONG) return false;
-    solve_knobs(A, w);
+    solve_parameters(A, w);
     features(s, f);
     for (int i = 0; i < study->n_point; i++) {
         const pal_measured_configuration *p = &study->point[i].measured;

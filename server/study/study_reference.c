@@ -9,10 +9,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WHOLE_NODES = 30000, QUICK_NODES = 4000, QUICK_MOST = 12000, COUNTED = 12 };
+enum { WHOLE_NODES = 30000, QUICK_NODES = 4000, QUICK_MAX = 12000, COUNTED = 12 };
 /* at most this, and at most this share of the scene's own: about as short as any that is swept, and of second order */
 static const double whole_step_s = 1.0 / 960, quick_step_s = 1.0 / 480, whole_share = 0.25, quick_share = 0.5,
-                    reference_tolerance = 1e-4, full_share = 0.95, least_order = 1, scatter = 1.25;
+                    reference_tolerance = 1e-4, full_share = 0.95, min_order = 1, scatter = 1.25;
 /* a quick reference that is farther off than this share of what moves is made finer, by so much */
 static const double quick_enough = 0.15, finer = 1.42;
 
@@ -50,7 +50,7 @@ pal_err pal_study_reference_size(pal_study_job *job)
     static const int whole[] = {80, 64, 56, 48, 40, 34, 28, 24, 20, 16, 12}, quick[] = {20, 18, 16, 14, 12, 10};
     const int *size = job->options->quick ? quick : whole;
     int n = job->options->quick ? 6 : 11;
-    double most = job->options->quick ? QUICK_NODES : WHOLE_NODES;
+    double max = job->options->quick ? QUICK_NODES : WHOLE_NODES;
     pal_study_world w;
     if (job->adaptive) {
         job->reference = job->options->quick ? 3 : 4;
@@ -63,23 +63,23 @@ pal_err pal_study_reference_size(pal_study_job *job)
     pal_study_close(&w);
     for (int i = 0; i < n; i++) {
         job->reference = pal_study_size(job, size[i]);
-        if (count * pow((double)size[i] / COUNTED, 3) <= most) break;
+        if (count * pow((double)size[i] / COUNTED, 3) <= max) break;
     }
     return PAL_ERR_OK;
 }
 
-static double most_of(const double *u, int n)
+static double max_of(const double *u, int n)
 {
-    double most = 0;
-    for (int i = 0; i < n; i++) most = fmax(most, pal_norm3(u + 3 * i));
-    return most;
+    double max = 0;
+    for (int i = 0; i < n; i++) max = fmax(max, pal_norm3(u + 3 * i));
+    return max;
 }
 
-static double most_between(const double *a, const double *b, int n)
+static double max_between(const double *a, const double *b, int n)
 {
-    double most = 0;
-    for (int i = 0; i < n; i++) most = fmax(most, pal_dist3(a + 3 * i, b + 3 * i));
-    return most;
+    double max = 0;
+    for (int i = 0; i < n; i++) max = fmax(max, pal_dist3(a + 3 * i, b + 3 * i));
+    return max;
 }
 
 /* what is left of one load, from its rest at two coarser sizes: what the next changes would be, summed up (Richardson,
@@ -93,10 +93,10 @@ static pal_err estimate_load(pal_study_job *job, int load, const int size[3], do
         PAL_TRY(pal_study_cached_static(job, &s, job->load[load], u[k], &n_node, job->diag));
     }
     for (int k = 0; k < 3; k++) h[k] = job->adaptive ? exp2(-size[k]) : 1.0 / size[k];
-    double first = most_between(u[0], u[1], job->n_probe), last = most_between(u[1], job->still[load], job->n_probe);
+    double first = max_between(u[0], u[1], job->n_probe), last = max_between(u[1], job->still[load], job->n_probe);
     double order = pal_richardson_order(h, first, last);
     /* changes that do not shrink as first order does are scatter of cut voxels: as far as they reach, and a margin */
-    *out = order >= least_order ? last / (pow(h[1] / h[2], fmin(order, 2)) - 1) : scatter * fmax(first, last);
+    *out = order >= min_order ? last / (pow(h[1] / h[2], fmin(order, 2)) - 1) : scatter * fmax(first, last);
     return PAL_ERR_OK;
 }
 
@@ -166,7 +166,7 @@ static pal_err at_rest(pal_study_job *job)
 {
     PAL_TRY(job->options->samples ? given(job) : made(job));
     job->out->max_m = 0;
-    for (int k = 0; k < job->n_load; k++) job->out->max_m = fmax(job->out->max_m, most_of(job->still[k], job->n_probe));
+    for (int k = 0; k < job->n_load; k++) job->out->max_m = fmax(job->out->max_m, max_of(job->still[k], job->n_probe));
     return PAL_ERR_OK;
 }
 
@@ -174,7 +174,7 @@ pal_err pal_study_reference(pal_study_job *job)
 {
     PAL_TRY(at_rest(job));
     while (job->options->quick && !job->adaptive && !job->options->samples &&
-           job->out->reference_m > quick_enough * job->out->max_m && job->n_reference * pow(finer, 3) <= QUICK_MOST) {
+           job->out->reference_m > quick_enough * job->out->max_m && job->n_reference * pow(finer, 3) <= QUICK_MAX) {
         job->reference = pal_study_fit_size(job, finer * job->reference);
         PAL_TRY(at_rest(job));
     }

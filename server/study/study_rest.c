@@ -10,10 +10,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_NEWTON = 120, MOST_RELAX = 4000, QUIET = 3, RAMPS = 4 };
+enum { MAX_NEWTON = 120, MAX_RELAX = 4000, QUIET = 3, RAMPS = 4 };
 static const double rest_tolerance = 1e-6, relax_change = 1e-4;
 /* what running a body of finite elements to rest may take where Newton found none */
-static const double rescue_work = 1e6;
+static const double safeguard_work = 1e6;
 
 /* ---- finite elements ---- */
 
@@ -29,7 +29,7 @@ static pal_err converge(const pal_study_job *job, pal_study_world *w, pal_diagno
         if (err || w->body->frozen)
             return pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "no rest: it froze after %d Newton iterations", n_newton);
         if (report.converged) return PAL_ERR_OK;
-        if (n_newton >= MOST_NEWTON || report.n_newton == 0)
+        if (n_newton >= MAX_NEWTON || report.n_newton == 0)
             return pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "no rest after %d Newton iterations (residual %.2g)",
                                       n_newton, report.residual);
     }
@@ -161,25 +161,25 @@ static pal_err lattice(pal_study_job *job, const pal_configuration *setting, con
 
 /* ---- by running ---- */
 
-static double change(double *before, const double *u, int n, double *most)
+static double change(double *before, const double *u, int n, double *max)
 {
     double largest = 0;
-    *most = 0;
+    *max = 0;
     for (int i = 0; i < n; i++) {
         largest = fmax(largest, pal_dist3(before + 3 * i, u + 3 * i));
-        *most = fmax(*most, pal_norm3(u + 3 * i));
+        *max = fmax(*max, pal_norm3(u + 3 * i));
     }
     memcpy(before, u, 3 * sizeof *u * (size_t)n);
     return largest;
 }
 
 /* steps until a few peaks in a row have moved nothing to speak of */
-static pal_err relax_world(pal_study_job *job, pal_study_world *w, int most_step, double *before, double *u,
+static pal_err relax_world(pal_study_job *job, pal_study_world *w, int max_step, double *before, double *u,
                            pal_diagnostic *diag)
 {
-    double last = 0, most = 0;
+    double last = 0, max = 0;
     int quiet = 0;
-    for (int step = 1; step <= most_step; step++) {
+    for (int step = 1; step <= max_step; step++) {
         if (!pal_study_continues(job)) return pal_diagnostic_set(diag, PAL_ERR_STATE, "stopped");
         pal_err err = pal_world_step(w->world, w->set->scene.step_s);
         if (err || w->body->frozen)
@@ -192,10 +192,10 @@ static pal_err relax_world(pal_study_job *job, pal_study_world *w, int most_step
         memset(w->body->v, 0, 3 * sizeof(double) * (size_t)w->body->n_dof);
         last = 0;
         PAL_TRY(pal_study_displacement(w, job->probe, job->n_probe, u, diag));
-        quiet = change(before, u, job->n_probe, &most) <= relax_change * most ? quiet + 1 : 0;
+        quiet = change(before, u, job->n_probe, &max) <= relax_change * max ? quiet + 1 : 0;
         if (quiet == QUIET) return PAL_ERR_OK;
     }
-    return pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "not at rest after %d steps", most_step);
+    return pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "not at rest after %d steps", max_step);
 }
 
 /* max_work: steps times nodes; 0: any */
@@ -211,8 +211,8 @@ static pal_err relax(pal_study_job *job, const pal_configuration *setting, const
     double *before = calloc(3 * (size_t)job->n_probe, sizeof *before);
     pal_err err = before ? pal_study_apply_load(job, &w, load, 1, diag) : PAL_ERR_MEMORY;
     if (!err)
-        err = relax_world(job, &w, max_work > 0 ? (int)fmin(MOST_RELAX, max_work / *n_node) : MOST_RELAX, before, u,
-                          diag);
+        err =
+            relax_world(job, &w, max_work > 0 ? (int)fmin(MAX_RELAX, max_work / *n_node) : MAX_RELAX, before, u, diag);
     if (!err) *n_node = pal_body_nodes(w.body);
     free(before);
     pal_study_close(&w);
@@ -237,7 +237,7 @@ pal_err pal_study_static(pal_study_job *job, const pal_configuration *setting, c
     if (pal_study_is(setting->model, "fem") || pal_study_is(setting->model, "subdivision_fem")) {
         pal_err err = newton(job, setting, load, u, n_node, diag);
         pal_diagnostic other = {{0}};
-        if (err != PAL_ERR_NUMERIC || relax(job, setting, load, u, n_node, rescue_work, &other)) return err;
+        if (err != PAL_ERR_NUMERIC || relax(job, setting, load, u, n_node, safeguard_work, &other)) return err;
         return PAL_ERR_OK;
     }
     if (pal_study_is(setting->model, "tet_springs") && only_gravity(&job->scene->body[0]))

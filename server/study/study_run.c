@@ -9,9 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_TIMES = 1200, WARM = 3, LEAST_TIMES = 30, ROUNDS = 2 };
+enum { MAX_TIMES = 1200, WARM = 3, MIN_TIMES = 30, ROUNDS = 2 };
 /* the way is gone again until its steps have taken so long together: a median of some microseconds is of nothing */
-static const double least_ms = 50;
+static const double min_ms = 50;
 /* sub-steps times nodes of a way: what is slower is not followed, only timed */
 static const double max_work = 1.5e9, timed_s = 2;
 /* of the first load: put on at once it swings about as far as the whole one moves the body at rest */
@@ -59,7 +59,7 @@ static int compare(const void *a, const void *b)
 }
 
 /* one step on the clock; false: it cannot go on */
-static pal_err timed_step(pal_study_world *w, double *ms, int most, int *n_ms, pal_diagnostic *diag)
+static pal_err timed_step(pal_study_world *w, double *ms, int max, int *n_ms, pal_diagnostic *diag)
 {
     pal_world_wake(w->world);
     uint64_t before = pal_clock_thread_ns();
@@ -67,27 +67,27 @@ static pal_err timed_step(pal_study_world *w, double *ms, int most, int *n_ms, p
     if (err == PAL_ERR_BUDGET) return pal_diagnostic_set(diag, err, "needs more sub-steps than the scene allows");
     if (err || w->body->frozen || !pal_body_finite(w->body))
         return pal_diagnostic_set(diag, err ? err : PAL_ERR_FROZEN, "diverged and froze");
-    if (ms && *n_ms < most) ms[(*n_ms)++] = 1e-6 * (double)(pal_clock_thread_ns() - before);
+    if (ms && *n_ms < max) ms[(*n_ms)++] = 1e-6 * (double)(pal_clock_thread_ns() - before);
     return PAL_ERR_OK;
 }
 
 /* steps for the clock alone, until there are enough */
-static pal_err only_time(pal_study_world *w, double *ms, int most, int *n_ms, pal_diagnostic *diag)
+static pal_err only_time(pal_study_world *w, double *ms, int max, int *n_ms, pal_diagnostic *diag)
 {
     double start = pal_clock_s();
-    while (*n_ms < LEAST_TIMES + WARM && (*n_ms <= 2 * WARM || pal_clock_s() - start < timed_s))
-        PAL_TRY(timed_step(w, ms, most, n_ms, diag));
+    while (*n_ms < MIN_TIMES + WARM && (*n_ms <= 2 * WARM || pal_clock_s() - start < timed_s))
+        PAL_TRY(timed_step(w, ms, max, n_ms, diag));
     return PAL_ERR_OK;
 }
 
 /* frames lie between steps: linear from the one before to the one after; way NULL: for the clock alone */
-static pal_err follow(pal_study_job *job, pal_study_world *w, double (*way)[3], double *ms, int most, int *n_ms,
+static pal_err follow(pal_study_job *job, pal_study_world *w, double (*way)[3], double *ms, int max, int *n_ms,
                       pal_diagnostic *diag)
 {
     double last[3] = {0}, now[3], time = 0, step_s = w->set->scene.step_s;
     for (int frame = 0; frame < job->n_trajectory;) {
         if (!pal_study_continues(job)) return pal_diagnostic_set(diag, PAL_ERR_STATE, "stopped");
-        pal_err err = timed_step(w, ms, most, n_ms, diag);
+        pal_err err = timed_step(w, ms, max, n_ms, diag);
         if (err == PAL_ERR_FROZEN) return pal_diagnostic_set(diag, err, "diverged and froze after %.2f s", time);
         PAL_TRY(err);
         if (way) PAL_TRY(pal_study_displacement(w, job->probe + 3 * job->tip, 1, now, diag));
@@ -102,16 +102,16 @@ static pal_err follow(pal_study_job *job, pal_study_world *w, double (*way)[3], 
 }
 
 /* the same way from rest as often as it takes, so that short steps are timed as well as long ones */
-static pal_err repeat(pal_study_job *job, pal_study_world *w, double *ms, int most, int *n_ms, pal_diagnostic *diag)
+static pal_err repeat(pal_study_job *job, pal_study_world *w, double *ms, int max, int *n_ms, pal_diagnostic *diag)
 {
     pal_err err = PAL_ERR_OK;
     for (;;) {
         double sum = 0;
         for (int i = 0; i < *n_ms; i++) sum += ms[i];
-        if (err || sum >= least_ms || *n_ms >= most) return err;
+        if (err || sum >= min_ms || *n_ms >= max) return err;
         pal_world_reset(w->world);
         err = pal_study_apply_load(job, w, job->load[0], way_share, diag);
-        if (!err) err = follow(job, w, NULL, ms, most, n_ms, diag);
+        if (!err) err = follow(job, w, NULL, ms, max, n_ms, diag);
     }
 }
 
@@ -125,7 +125,7 @@ static double read_ms(const pal_world *world)
 }
 
 pal_err pal_study_trajectory(pal_study_job *job, const pal_configuration *setting, double (*way)[3], double *ms,
-                             int most, int *n_ms, pal_study_point *facts, pal_diagnostic *diag)
+                             int max, int *n_ms, pal_study_point *facts, pal_diagnostic *diag)
 {
     pal_study_world w;
     PAL_TRY(pal_study_open(job, setting, false, &w, diag));
@@ -134,13 +134,13 @@ pal_err pal_study_trajectory(pal_study_job *job, const pal_configuration *settin
     pal_err err = pal_study_apply_load(job, &w, job->load[0], way_share, diag);
     /* the reference is followed whatever it takes */
     if (!err && facts && work > max_work) {
-        err = only_time(&w, ms, most, n_ms, diag);
+        err = only_time(&w, ms, max, n_ms, diag);
         if (!err) err = pal_diagnostic_set(diag, PAL_ERR_BUDGET, "way not followed: %d sub-steps a step", n_substep);
     } else if (!err) {
-        err = follow(job, &w, way, ms, most, n_ms, diag);
+        err = follow(job, &w, way, ms, max, n_ms, diag);
         if (facts) facts->n_node = pal_body_nodes(w.body);
-        if (!err && ms) err = only_time(&w, ms, most, n_ms, diag);
-        if (!err && ms) err = repeat(job, &w, ms, most, n_ms, diag);
+        if (!err && ms) err = only_time(&w, ms, max, n_ms, diag);
+        if (!err && ms) err = repeat(job, &w, ms, max, n_ms, diag);
     }
     if (facts) {
         /* what adapts takes the sub-steps of the finest level that it came to use */
@@ -171,11 +171,11 @@ static void compare_ways(const pal_study_job *job, pal_study_point *out)
 /* the way on the clock; counts when it is the first, or quicker than those before it */
 static pal_err time_way(pal_study_job *job, pal_study_point *out, double (*way)[3], pal_diagnostic *diag)
 {
-    double *ms = calloc(MOST_TIMES, sizeof *ms);
+    double *ms = calloc(MAX_TIMES, sizeof *ms);
     int n_ms = 0;
     pal_study_point facts = *out;
     pal_err err = !ms ? PAL_ERR_MEMORY
-                      : pal_study_trajectory(job, &out->measured.setting, way, ms, MOST_TIMES, &n_ms, &facts, diag);
+                      : pal_study_trajectory(job, &out->measured.setting, way, ms, MAX_TIMES, &n_ms, &facts, diag);
     /* how fast it reads is a matter of other work as well */
     double read = way ? facts.read_ms : fmin(out->read_ms, facts.read_ms);
     if (way) *out = facts;

@@ -79,8 +79,8 @@ static void corners(const pal_surface *s, int tri, const double *x[3])
 static bool box_meets(const double low[3], const double high[3], const double *x[3])
 {
     for (int c = 0; c < 3; c++) {
-        double least = fmin(x[0][c], fmin(x[1][c], x[2][c])), most = fmax(x[0][c], fmax(x[1][c], x[2][c]));
-        if (least > high[c] || most < low[c]) return false;
+        double min = fmin(x[0][c], fmin(x[1][c], x[2][c])), max = fmax(x[0][c], fmax(x[1][c], x[2][c]));
+        if (min > high[c] || max < low[c]) return false;
     }
     return true;
 }
@@ -197,20 +197,20 @@ static void surface_point(const pal_study_world *w, const double at[3], double u
 {
     const pal_surface *s = w->surface;
     int nearest = 0, found = -1;
-    double least = INFINITY, share[3], best[3] = {1, 0, 0};
+    double min = INFINITY, share[3], best[3] = {1, 0, 0};
     for (int i = 0; i < s->n_vertex; i++) {
         double d = pal_dist3(s->x + 3 * (size_t)i, at);
-        if (d < least) least = d, nearest = i;
+        if (d < min) min = d, nearest = i;
     }
-    least = INFINITY;
+    min = INFINITY;
     for (int t = 0; t < s->n_tri; t++) {
         const double *x[3];
         const int32_t *tri = s->tri + 3 * (size_t)t;
         if (tri[0] != nearest && tri[1] != nearest && tri[2] != nearest) continue;
         corners(s, t, x);
         double d = foot(x, at, share);
-        if (d >= least) continue;
-        least = d, found = t;
+        if (d >= min) continue;
+        min = d, found = t;
         pal_copy3(best, share);
     }
     pal_set3(u, 0, 0, 0);

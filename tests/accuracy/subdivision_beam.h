@@ -44,9 +44,9 @@ static inline int solid_beam_settle(solid_beam *b)
     const double dt_s = 0.5;
     for (int i = 1; i <= 300; i++) {
         if (pal_world_step(b->s.world, dt_s)) return 0;
-        double most = 0;
-        for (int k = 0; k < b->s.body->n_dof; k++) most = fmax(most, pal_norm3(b->s.body->v + 3 * k));
-        if (most * dt_s < 1e-6 * b->length_m) return i;
+        double max = 0;
+        for (int k = 0; k < b->s.body->n_dof; k++) max = fmax(max, pal_norm3(b->s.body->v + 3 * k));
+        if (max * dt_s < 1e-6 * b->length_m) return i;
     }
     return 0;
 }

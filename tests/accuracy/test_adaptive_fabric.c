@@ -54,14 +54,14 @@ static bool press_curve(int level, const char *law, double curve[STEPS])
 
 static void compare(const char *law, double *worst, double *ratio)
 {
-    double coarse[STEPS], fine[STEPS], most = 0;
+    double coarse[STEPS], fine[STEPS], max = 0;
     *worst = 0;
     REQUIRE(press_curve(0, law, coarse) && press_curve(1, law, fine));
-    for (int i = 0; i < STEPS; i++) most = fmax(most, fabs(coarse[i]));
-    for (int i = 0; i < STEPS; i++) *worst = fmax(*worst, fabs(coarse[i] - fine[i]) / most);
+    for (int i = 0; i < STEPS; i++) max = fmax(max, fabs(coarse[i]));
+    for (int i = 0; i < STEPS; i++) *worst = fmax(*worst, fabs(coarse[i] - fine[i]) / max);
     *ratio = fine[STEPS_A_SECOND - 1] / coarse[STEPS_A_SECOND - 1];
     printf("  %s law: pressed %.1f mm, curves %.2f %% apart at most, refined over coarse at one second %.3f\n", law,
-           1e3 * most, 100 * *worst, *ratio);
+           1e3 * max, 100 * *worst, *ratio);
 }
 
 static void coarse_and_refined_fabric_move_alike(void)

@@ -134,16 +134,16 @@ static void counts_are_those_of_table_1(void)
 
 /* pressed for two seconds, let go for `free_s`; returns the distance from rest over the body's size, *most the
  * largest while pressed */
-static double press_and_release(shell_scene *s, const body_case *c, double share, double free_s, double *most)
+static double press_and_release(shell_scene *s, const body_case *c, double share, double free_s, double *max)
 {
     const double none[3] = {0, 0, 0};
     double force[3];
     pal_scale3(force, share, c->force);
-    *most = 0;
+    *max = 0;
     for (int step = 0; step < (int)((2 + free_s) * STEPS_A_SECOND); step++) {
         shell_scene_press(s, c->at, c->radius_m, step < 2 * STEPS_A_SECOND ? force : none);
         if (pal_world_step(s->world, 1.0 / STEPS_A_SECOND) || !pal_body_finite(s->body)) return INFINITY;
-        *most = fmax(*most, shell_scene_rms(s) / s->body->length_scale_m);
+        *max = fmax(*max, shell_scene_rms(s) / s->body->length_scale_m);
     }
     return shell_scene_rms(s) / s->body->length_scale_m;
 }
@@ -154,16 +154,16 @@ static void anchors_bring_a_pressed_body_back(bool (*take)(shell_scene *, body_c
         for (int anchors = 0; anchors < 2; anchors++) {
             shell_scene s;
             body_case c;
-            double most;
+            double max;
             if (!take(&s, &c)) return;
             REQUIRE(start(&s, &c, (run_kind)kind, anchors));
-            double left = press_and_release(&s, &c, share, 5, &most);
+            double left = press_and_release(&s, &c, share, 5, &max);
             printf("  %s, %s, %s anchors: %.2f %% of its size while pressed, %.4f %% left after 5 s\n", c.name,
                    kind == COARSE    ? "coarse"
                    : kind == REFINED ? "refined"
                                      : "adaptive",
-                   anchors ? "with" : "without", 100 * most, 100 * left);
-            CHECK(most > 0.02);
+                   anchors ? "with" : "without", 100 * max, 100 * left);
+            CHECK(max > 0.02);
             if (anchors)
                 CHECK_LE(left, 1e-3);
             else
@@ -186,8 +186,7 @@ static void a_stomach_comes_back_with_anchors_only(void)
 
 enum { CURVE = 600 }; /* steps: 2 s pressed, then released, 2.5 s in all */
 
-static bool curve_of(bool (*take)(shell_scene *, body_case *), run_kind kind, double curve[CURVE], int *least,
-                     int *most)
+static bool curve_of(bool (*take)(shell_scene *, body_case *), run_kind kind, double curve[CURVE], int *min, int *max)
 {
     shell_scene s;
     body_case c;
@@ -196,13 +195,13 @@ static bool curve_of(bool (*take)(shell_scene *, body_case *), run_kind kind, do
     if (kind == ADAPTIVE) pal_entry_put_number(shell_scene_effect(&s, "refine"), "every_s", 0, NULL);
     if (!start(&s, &c, kind, true)) return false;
     int node = shell_scene_nearest(&s, c.at);
-    *least = *most = s.body->n_active;
+    *min = *max = s.body->n_active;
     for (int step = 0; step < CURVE; step++) {
         shell_scene_press(&s, c.at, c.radius_m, step < 2 * QUICK * STEPS_A_SECOND ? c.force : none);
         if (pal_world_step(s.world, 1.0 / (QUICK * STEPS_A_SECOND))) return false;
         curve[step] = pal_dist3(s.body->x + 3 * node, s.body->x_rest + 3 * node);
-        if (s.body->n_active < *least) *least = s.body->n_active;
-        if (s.body->n_active > *most) *most = s.body->n_active;
+        if (s.body->n_active < *min) *min = s.body->n_active;
+        if (s.body->n_active > *max) *max = s.body->n_active;
     }
     shell_scene_close(&s);
     return true;
@@ -210,23 +209,23 @@ static bool curve_of(bool (*take)(shell_scene *, body_case *), run_kind kind, do
 
 static double difference(const double *a, const double *b)
 {
-    double most = 0, size = 0;
-    for (int i = 0; i < CURVE; i++) most = fmax(most, fabs(a[i] - b[i])), size = fmax(size, b[i]);
-    return most / size;
+    double max = 0, size = 0;
+    for (int i = 0; i < CURVE; i++) max = fmax(max, fabs(a[i] - b[i])), size = fmax(size, b[i]);
+    return max / size;
 }
 
 static void compare(bool (*take)(shell_scene *, body_case *), const char *name, int n0, int n1)
 {
     double curve[3][CURVE];
-    int least[3], most[3];
+    int min[3], max[3];
     for (int kind = COARSE; kind <= ADAPTIVE; kind++)
-        REQUIRE(curve_of(take, (run_kind)kind, curve[kind], &least[kind], &most[kind]));
+        REQUIRE(curve_of(take, (run_kind)kind, curve[kind], &min[kind], &max[kind]));
     double adaptive = difference(curve[ADAPTIVE], curve[REFINED]), coarse = difference(curve[COARSE], curve[REFINED]);
     printf("  %s, pressed node, of its way when refined: adaptive %.2f %% off with %d-%d nodes, coarse %.2f %% off\n",
-           name, 100 * adaptive, least[ADAPTIVE], most[ADAPTIVE], 100 * coarse);
+           name, 100 * adaptive, min[ADAPTIVE], max[ADAPTIVE], 100 * coarse);
     CHECK_LE(adaptive, 0.03);
-    CHECK_INT(least[ADAPTIVE], n0);
-    CHECK(most[ADAPTIVE] > n0 && most[ADAPTIVE] < (n0 + n1) / 2);
+    CHECK_INT(min[ADAPTIVE], n0);
+    CHECK(max[ADAPTIVE] > n0 && max[ADAPTIVE] < (n0 + n1) / 2);
 }
 
 static void an_adaptive_sphere_moves_as_the_refined_one(void)

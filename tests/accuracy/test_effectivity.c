@@ -3,10 +3,10 @@
  * is three times as fine; in energy that of Zienkiewicz and Zhu over the error of the work of the loads, which
  * for elements that fit together and the linear law is the square of the error in energy, and for B-bar, whose stress
  * is not that of its displacement, over the distance of its stress from that of a finer mesh. The estimate is the one
- * of a running session (session/estimation.h). Where elements lock the estimate is too small, and says so; where
- * many voxels are cut (the gear) it is within a factor of 2 as well, from meshes of other sizes
- * (session/estimate_hierarchy.h), and the display says that they are. With PALPATE_LONG=1 finer beams, a finer cube and
- * a finer gear too. */
+ * of a running session (server/estimate/estimation.h). Where elements lock the estimate is too small, and says so;
+ * where many voxels are cut (the gear) it is within a factor of 2 as well, from meshes of other sizes
+ * (server/estimate/estimate_hierarchy.h), and the display says that they are. With PALPATE_LONG=1 finer beams, a finer
+ * cube and a finer gear too. */
 #include "server/estimate/estimation.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/num/shape_functions.h"
@@ -135,27 +135,27 @@ static double distance(const double a[3], const double b[3])
     return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
 }
 
-static double most_off_samples(const solved *s, const pal_samples *samples)
+static double max_off_samples(const solved *s, const pal_samples *samples)
 {
-    double most = 0, u[3];
+    double max = 0, u[3];
     for (int i = 0; i < samples->n; i++) {
         displacement(s, samples->x + 3 * i, u);
-        most = fmax(most, distance(u, samples->u + 3 * i));
+        max = fmax(max, distance(u, samples->u + 3 * i));
     }
-    return most;
+    return max;
 }
 
-static double most_off_finer(const solved *s, const solved *finer)
+static double max_off_finer(const solved *s, const solved *finer)
 {
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < s->body->n_node; i++) {
         double x[3], own[3], true_u[3];
         for (int c = 0; c < 3; c++) x[c] = s->body->x_rest[3 * i + c] + s->mesh.tets.origin_m[c];
         displacement(s, x, own);
         displacement(finer, x, true_u);
-        most = fmax(most, distance(own, true_u));
+        max = fmax(max, distance(own, true_u));
     }
-    return most;
+    return max;
 }
 
 /* ---- distance of stress, hexahedra ---- */
@@ -243,10 +243,10 @@ static bool estimate(const subject *s, const solved *rest, pal_estimate *out)
 }
 
 /* what it says and what is true */
-static void tell(const row *r, const pal_estimate *e, double said_m, double true_m, double true_percent)
+static void tell(const row *r, const pal_estimate *e, double summary_m, double true_m, double true_percent)
 {
     printf("  | %s, %s, %s, %d | %.3f | %.3f | %.2f |", r->name, r->element, r->law, r->resolution, 1e3 * true_m,
-           1e3 * said_m, said_m / true_m);
+           1e3 * summary_m, summary_m / true_m);
     if (true_percent > 0)
         printf(" %.1f | %.1f | %.2f |", true_percent, e->energy_error_percent, e->energy_error_percent / true_percent);
     else
@@ -263,14 +263,14 @@ static void compare(const subject *s, const pal_samples *samples)
     if (good && r->finer > 0) good = solve(s, r->finer * r->resolution, &finer);
     CHECK(good);
     if (good) {
-        double true_m = samples ? most_off_samples(&own, samples) : most_off_finer(&own, &finer), percent = 0;
+        double true_m = samples ? max_off_samples(&own, samples) : max_off_finer(&own, &finer), percent = 0;
         if (r->work_J > 0) percent = 100 * sqrt(fabs(1 - own.work_J / r->work_J));
         if (r->finer > 0) percent = stress_off(&own, &finer);
         /* references are neo-Hookean where bodies bend far: what another law makes of it is part of the error */
-        double said_m = e.discretisation_m + (strcmp(r->law, "corotational") ? 0 : e.model_m);
-        tell(r, &e, said_m, true_m, percent);
+        double summary_m = e.discretisation_m + (strcmp(r->law, "corotational") ? 0 : e.model_m);
+        tell(r, &e, summary_m, true_m, percent);
         CHECK(e.locking == r->locks && (strstr(e.diag, "voxels are cut") != NULL) == r->cut);
-        CHECK(r->locks || (said_m >= true_m / 2 && said_m <= 2 * true_m));
+        CHECK(r->locks || (summary_m >= true_m / 2 && summary_m <= 2 * true_m));
         CHECK(percent == 0 || r->locks ||
               (e.energy_error_percent >= 0.5 * percent && e.energy_error_percent <= 2 * percent));
         CHECK(isfinite(e.time_m) && isfinite(e.algebraic_m) && e.error_m >= e.discretisation_m);

@@ -281,7 +281,7 @@ static double bending_error(const char *element, bool irregular)
 {
     fem_beam b;
     pal_diagnostic diag = {""};
-    double most = 0, far = 0, u[3], nu = 0.45;
+    double max = 0, far = 0, u[3], nu = 0.45;
     beam_make(&b, 4, 3, 3, 0.02, true);
     if (irregular) make_irregular(&b);
     hold_boundary(&b);
@@ -291,7 +291,7 @@ static double bending_error(const char *element, bool irregular)
     if (beam_open(&b, &diag)) return INFINITY;
     for (int i = 0; i < b.body->n_node; i++) {
         bend(b.body->x_rest + 3 * i, nu, u);
-        most = fmax(most, pal_norm3(u));
+        max = fmax(max, pal_norm3(u));
         if (b.body->support[i]) pal_add3(b.body->x + 3 * i, b.body->x_rest + 3 * i, u);
     }
     pal_world_invalidate_limits(b.world, 0);
@@ -303,7 +303,7 @@ static double bending_error(const char *element, bool irregular)
         far = fmax(far, pal_dist3(moved, u));
     }
     beam_free(&b);
-    return far / most;
+    return far / max;
 }
 
 static void linear_strain_is_exact_for_tet10_only(void)
@@ -439,16 +439,16 @@ static void ten_thousand_turns_leave_no_energy(void)
             beam_element(&b, elements[e], laws[l]);
             REQUIRE(!beam_open(&b, &diag));
             for (int i = 0; i < b.body->n_node; i++) b.body->x[3 * i] *= 1.01;
-            double stretched = energy_now(&b), most = 0;
+            double stretched = energy_now(&b), max = 0;
             memcpy(b.body->x, b.body->x_rest, 3 * sizeof(double) * (size_t)b.body->n_node);
             const pal_component *row = elastic_row(&b);
             for (int k = 1; k <= n_step; k++) {
                 turn_all(b.body, r);
                 row->effect->tangent->linearise(row->self, b.body);
-                if (k % 97 == 0 || k > n_step - 20) most = fmax(most, energy_now(&b));
+                if (k % 97 == 0 || k > n_step - 20) max = fmax(max, energy_now(&b));
             }
             CHECK(stretched > 0);
-            HARD_CASE("many_turns", "fem", "energy over that of 1 % strain", most / stretched, 1e-6, "");
+            HARD_CASE("many_turns", "fem", "energy over that of 1 % strain", max / stretched, 1e-6, "");
             /* and the field is rigid: forces are gone too */
             pal_step now = {.body = b.body, .dt_s = 0.01};
             memset(b.body->f, 0, 3 * sizeof(double) * (size_t)b.body->n_node);

@@ -53,7 +53,7 @@ static void check_row(const pal_problem *problem, const pal_surface *surface, co
     pal_solution *solution = NULL;
     pal_solve_result result;
     pal_diagnostic diag = {""};
-    double rms = NAN, most = NAN;
+    double rms = NAN, max = NAN;
     pal_err err = pal_samples_read(reference->file, &samples, &diag);
     if (!err)
         err = pal_solve(problem, pal_problem_case_find(problem, reference->load_case), surface, &options, &solution,
@@ -63,9 +63,9 @@ static void check_row(const pal_problem *problem, const pal_surface *surface, co
     double *u = malloc(3 * sizeof *u * (size_t)samples.n);
     REQUIRE(u);
     for (int i = 0; i < samples.n; i++) pal_solution_at(solution, samples.x + 3 * i, u + 3 * i);
-    pal_samples_error(&samples, u, &rms, &most);
+    pal_samples_error(&samples, u, &rms, &max);
     printf("  %-13s %-12s %-9s %6d nodes: RMS %6.3f %% (at most %g), largest %6.3f %%\n", r->reference, r->law,
-           r->element, result.n_node, rms, r->rms_percent, most);
+           r->element, result.n_node, rms, r->rms_percent, max);
     CHECK_LE(rms, r->rms_percent);
     if (on_record && !strcmp(r->element, "hex8_bbar"))
         HARD_CASE("poisson_static", "fem", "soft on stiff, 729 and 4,913 nodes: RMS off the reference", rms, 3, "%");

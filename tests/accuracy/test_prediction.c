@@ -1,8 +1,8 @@
-/* What the live estimate says of a body's error, and foresees of half and twice the size (session/estimate_predict.h),
- * against what such meshes leave: the same body, made in those sizes as a switch makes it, at rest under the same load,
- * against a mesh that is finer still. That one is off as well, by the share that order 1.5 gives it, which is added.
- * Both are asked for within a factor of 2, of organs too, whose voxels are cut (session/estimate_hierarchy.h). With
- * PALPATE_LONG=1 in more and finer sizes (about a minute). */
+/* What the live estimate says of a body's error, and foresees of half and twice the size
+ * (server/estimate/estimate_predict.h), against what such meshes leave: the same body, made in those sizes as a switch
+ * makes it, at rest under the same load, against a mesh that is finer still. That one is off as well, by the share that
+ * order 1.5 gives it, which is added. Both are asked for within a factor of 2, of organs too, whose voxels are cut
+ * (server/estimate/estimate_hierarchy.h). With PALPATE_LONG=1 in more and finer sizes (about a minute). */
 #include "server/base/vec3.h"
 #include "server/estimate/estimation.h"
 #include "server/mesh/files/mesh_file.h"
@@ -94,14 +94,14 @@ static void moved(const body *of, const double x[3], double u[3])
 /* the largest distance at vertices of the surface */
 static double off(const body *a, const body *truth, const pal_surface *s)
 {
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < s->n_vertex; i += 1 + s->n_vertex / PROBES) {
         double u[3], v[3];
         moved(a, s->x + 3 * (size_t)i, u);
         moved(truth, s->x + 3 * (size_t)i, v);
-        most = fmax(most, pal_dist3(u, v));
+        max = fmax(max, pal_dist3(u, v));
     }
-    return most;
+    return max;
 }
 
 /* of the body where it rests */
@@ -126,7 +126,7 @@ static bool estimate(const body *at, double pull, pal_estimate *out)
 }
 
 /* the part of discretisation of the neighbour in size; NaN: none is offered */
-static double foreseen(const pal_estimate *e, int size)
+static double predicted(const pal_estimate *e, int size)
 {
     for (int i = 0; i < e->n_neighbour; i++)
         if (e->neighbour[i].setting.size == size) return e->neighbour[i].error_m - e->error_m + e->discretisation_m;
@@ -134,10 +134,11 @@ static double foreseen(const pal_estimate *e, int size)
 }
 
 /* within a factor of 2 of what is left */
-static void compare(const char *name, int size, int at, double left, double told)
+static void compare(const char *name, int size, int at, double left, double reported)
 {
-    printf("  | %s, %d voxels | %d | %.3f | %.3f | %.2f |\n", name, size, at, 1e3 * left, 1e3 * told, told / left);
-    CHECK(told >= left / 2 && told <= 2 * left);
+    printf("  | %s, %d voxels | %d | %.3f | %.3f | %.2f |\n", name, size, at, 1e3 * left, 1e3 * reported,
+           reported / left);
+    CHECK(reported >= left / 2 && reported <= 2 * left);
 }
 
 /* cut: many voxels are, and the display says so */
@@ -159,7 +160,7 @@ static void check_size(const char *name, const pal_scene *scene, int size, int f
     double rest_m = good ? off(&b[2], &b[3], surface) / (pow(finest / (2.0 * size), order) - 1) : 0;
     for (int k = 0; k < 3 && good; k++)
         compare(name, size, at[k], off(&b[k], &b[3], surface) + rest_m,
-                k == 0 ? e.discretisation_m : foreseen(&e, at[k]));
+                k == 0 ? e.discretisation_m : predicted(&e, at[k]));
     CHECK((strstr(e.diag, "voxels are cut: good to a factor of 2") != NULL) == cut);
     for (int k = 0; k < 4; k++) body_free(&b[k]);
     pal_configured_scene_free(other);

@@ -52,14 +52,14 @@ static void own_gear_moves_as_the_gear_of_the_reference(void)
     double *own = solve("deploy/problems/gear.json", "twist", &samples, &result);
     double *their = solve(theirs, "twist", &samples, &their_result);
     REQUIRE(own && their);
-    double rms, most, own_rms, own_most;
+    double rms, max, own_rms, own_max;
     of_theirs = (pal_samples){samples.n, samples.x, their};
-    pal_samples_error(&of_theirs, own, &rms, &most);
-    pal_samples_error(&samples, own, &own_rms, &own_most);
-    printf("  own surface against theirs: RMS %.4f %%, largest %.4f %%; against the reference: RMS %.3f %%\n", rms,
-           most, own_rms);
+    pal_samples_error(&of_theirs, own, &rms, &max);
+    pal_samples_error(&samples, own, &own_rms, &own_max);
+    printf("  own surface against theirs: RMS %.4f %%, largest %.4f %%; against the reference: RMS %.3f %%\n", rms, max,
+           own_rms);
     CHECK_LE(rms, 1);
-    CHECK_LE(most, 1);
+    CHECK_LE(max, 1);
     CHECK_LE(own_rms, 2);
     CHECK_NEAR(result.volume_m3 / their_result.volume_m3, 1, 1e-3);
     for (int l = 0; l < 2; l++) CHECK_NEAR(result.area_m2[l], 0.048175005, 1e-6);

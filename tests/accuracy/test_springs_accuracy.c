@@ -83,7 +83,7 @@ static void a_bar_shows_its_poisson_ratio(void)
 static double beam_error(box_bench *b, const int n[3], FILE *csv, double load_part)
 {
     char line[256];
-    double sum = 0, most = 0, h = b->body->edge_m;
+    double sum = 0, max = 0, h = b->body->edge_m;
     int count = 0;
     while (fgets(line, sizeof line, csv)) {
         double p[3], u[3];
@@ -100,10 +100,10 @@ static double beam_error(box_bench *b, const int n[3], FILE *csv, double load_pa
             sum += (found - u[c]) * (found - u[c]);
             size += u[c] * u[c];
         }
-        most = fmax(most, sqrt(size));
+        max = fmax(max, sqrt(size));
         count++;
     }
-    return 100 * sqrt(sum / count) / most;
+    return 100 * sqrt(sum / count) / max;
 }
 
 static void a_cantilever_bends_like_the_reference(void)

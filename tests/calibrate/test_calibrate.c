@@ -158,12 +158,12 @@ static double uniform(uint64_t key, uint64_t counter) /* in (-1, 1) */
 
 static void check_slope(bench *b)
 {
-    double slope[MOST], other[MOST], most = 0, worst = 0;
+    double slope[MOST], other[MOST], max = 0, worst = 0;
     int n = b->info.n_parameter, step_by = n > 24 ? n / 11 : 1;
     for (int i = 0; i < n; i++) b->theta[i] += 0.3 * uniform(3, (uint64_t)i);
     pal_calibration_value v = value_at(b, b->theta, PAL_CALIBRATION_FIT, slope);
     CHECK(v.objective < DBL_MAX);
-    for (int i = 0; i < n; i++) most = fmax(most, fabs(slope[i]));
+    for (int i = 0; i < n; i++) max = fmax(max, fabs(slope[i]));
     for (int i = 0; i < n; i += step_by) {
         const double step = 2e-4, was = b->theta[i];
         b->theta[i] = was + step;
@@ -173,8 +173,8 @@ static void check_slope(bench *b)
         b->theta[i] = was;
         worst = fmax(worst, fabs((up - down) / (2 * step) - slope[i]));
     }
-    CHECK(most > 0.01);
-    CHECK_LE(worst, 1e-5 * most);
+    CHECK(max > 0.01);
+    CHECK_LE(worst, 1e-5 * max);
     /* the same bits again, with a slope or without */
     CHECK_NEAR(value_at(b, b->theta, PAL_CALIBRATION_FIT, other).objective, v.objective, 0);
     CHECK_NEAR(value_at(b, b->theta, PAL_CALIBRATION_FIT, NULL).objective, v.objective, 0);

@@ -216,19 +216,19 @@ static void at_rest_no_free_node_is_pushed(void)
         vary(&b);
         load_end(&b, 0.02);
         REQUIRE(!rest(&b, false, 0, b.x, &r));
-        double *f = b.f + 3 * b.lattice.n_node, most = 0, moved = 0;
+        double *f = b.f + 3 * b.lattice.n_node, max = 0, moved = 0;
         CHECK_NEAR(pal_lattice_force(&b.lattice, constants(&b), b.x, f), r.energy_J, 0);
         for (int i = 0; i < b.lattice.n_node; i++) {
             double sum[3];
             pal_add3(sum, f + 3 * i, b.f + 3 * i);
-            if (!b.lattice.fixed[i]) most = fmax(most, pal_norm3(sum));
+            if (!b.lattice.fixed[i]) max = fmax(max, pal_norm3(sum));
             if (b.lattice.fixed[i]) pal_axpy3(reaction, 1, f + 3 * i);
             pal_axpy3(load, 1, b.f + 3 * i);
             moved = fmax(moved, pal_dist3(b.x + 3 * i, b.lattice.x_rest + 3 * i));
         }
-        printf("  moved %.3g of the length, net force %.2g N, %d iterations\n", moved / length_m, most, r.n_newton);
+        printf("  moved %.3g of the length, net force %.2g N, %d iterations\n", moved / length_m, max, r.n_newton);
         CHECK(moved > 0.05 * length_m);
-        CHECK_LE(most, 1e-9 * pal_norm3(load));
+        CHECK_LE(max, 1e-9 * pal_norm3(load));
         CHECK_LE(pal_dist3(reaction, load), 1e-9 * pal_norm3(load) * b.lattice.n_node);
         bench_close(&b);
     }
@@ -249,15 +249,15 @@ static void forces_are_those_of_the_live_rows(void)
         for (int i = 0; i < 3 * b.lattice.n_node; i++)
             body->x[i] = b.x[i] += 0.2 * 0.25 * length_m * uniform(9, (uint64_t)i);
         REQUIRE(!pal_assemble_forces(&step));
-        double energy = 0, most = 0, worst = 0;
+        double energy = 0, max = 0, worst = 0;
         for (int r = 0; r < 3; r++) energy += row[r].effect->energy(row[r].self, body);
         CHECK_NEAR(pal_lattice_force(&b.lattice, constants(&b), b.x, b.f), energy, 1e-13 * energy);
         for (int i = 0; i < 3 * b.lattice.n_node; i++) {
-            most = fmax(most, fabs(body->f[i]));
+            max = fmax(max, fabs(body->f[i]));
             worst = fmax(worst, fabs(body->f[i] - b.f[i]));
         }
-        CHECK(most > 0);
-        CHECK_LE(worst, 1e-12 * most);
+        CHECK(max > 0);
+        CHECK_LE(worst, 1e-12 * max);
         bench_close(&b);
     }
 }
@@ -321,8 +321,8 @@ static void slopes_are_those_of_differences(void)
         CHECK_INT(pal_equilibrium_adjoint(b.workspace, constants(&b), b.x, &o, dJ_du, slope, &diag), 0);
         for (int k = 0; k < PAL_SPRING_KINDS; k++) {
             int n = b.lattice.kind[k].n_item;
-            double most = 0, worst = 0;
-            for (int i = 0; i < n; i++) most = fmax(most, fabs(slope[k][i]) * given_J);
+            double max = 0, worst = 0;
+            for (int i = 0; i < n; i++) max = fmax(max, fabs(slope[k][i]) * given_J);
             for (int turns = 0; turns < 8; turns++) {
                 int i = (int)(n * pal_random_unit(7, (uint64_t)(8 * k + turns)));
                 double was = b.k[k][i], step = 1e-4 * was;
@@ -334,8 +334,8 @@ static void slopes_are_those_of_differences(void)
                 worst = fmax(worst, given_J * fabs((up - down) / (2 * step) - slope[k][i]));
                 if (!isfinite(up) || !isfinite(down)) worst = INFINITY;
             }
-            CHECK(most > 0);
-            CHECK_LE(worst, 1e-5 * most);
+            CHECK(max > 0);
+            CHECK_LE(worst, 1e-5 * max);
             free(slope[k]);
         }
         bench_close(&b);

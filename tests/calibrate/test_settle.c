@@ -98,9 +98,9 @@ static bool open_beam(beam *b, double load_N)
 
 static double largest(const beam *b)
 {
-    double most = 0;
-    for (int i = 0; i < b->n; i++) most = fmax(most, pal_norm3(b->u + 3 * i));
-    return most;
+    double max = 0;
+    for (int i = 0; i < b->n; i++) max = fmax(max, pal_norm3(b->u + 3 * i));
+    return max;
 }
 
 /* 0.7 N bend the beam of 12 cm by more than a fifth of its length: far from linear */

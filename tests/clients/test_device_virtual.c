@@ -168,17 +168,17 @@ static void damping_on_the_way_is_no_touch(void)
     void *d = opened("premium,script=press-hold,depth=8,clock=virtual", &info);
     REQUIRE(d);
     const double torque[3] = {0, 0, 0};
-    double x[3], v[3], most_above = 0, deepest = 1;
+    double x[3], v[3], max_above = 0, deepest = 1;
     for (int i = 0; i < 6000; i++) {
         pal_virtual_truth(d, x, v, NULL);
         double force[3] = {-3 * v[0], -3 * v[1], -3 * v[2]};
-        if (x[2] > 0) most_above = fmax(most_above, fabs(force[2]));
+        if (x[2] > 0) max_above = fmax(max_above, fabs(force[2]));
         if (x[2] < 0) force[2] -= 300 * x[2];
         pal_device_virtual()->write(d, force, torque, 0);
         pal_virtual_advance(d, 1e-3);
         deepest = fmin(deepest, x[2]);
     }
-    CHECK(most_above > 0.1);
+    CHECK(max_above > 0.1);
     /* the hand's two springs in series share the depth with the surface: 8 mm * 134 / (134 + 300), and the touch itself
      */
     CHECK(deepest < -0.002);

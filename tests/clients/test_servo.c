@@ -171,15 +171,15 @@ static void force_keeps_its_cap_and_rises_no_faster_than_the_cap_in_10_ms(void)
 {
     trial r;
     REQUIRE(rig_open(&r, "omega3,hand=firm,script=press-hold,depth=40,clock=virtual", 2000));
-    double at = 0, worst = 0, most = 0;
+    double at = 0, worst = 0, max = 0;
     for (int i = 0; i < 6000; i++) {
         rig_tick(&r);
         worst = fmax(worst, rig_force(&r) - at);
         at = rig_force(&r);
-        most = fmax(most, at);
+        max = fmax(max, at);
     }
-    CHECK_LE(most, 3 + 1e-9);
-    CHECK_NEAR(most, 3, 1e-6);
+    CHECK_LE(max, 3 + 1e-9);
+    CHECK_NEAR(max, 3, 1e-6);
     CHECK_LE(worst, 0.3 + 1e-9);
     CHECK(r.view.n_saturated > 0);
     rig_close(&r);
@@ -280,15 +280,15 @@ static void handle_driven_faster_than_two_metres_a_second_loses_force(void)
     pal_virtual_push(r.device, none);
     rig_run(&r, 2);
     pal_virtual_push(r.device, throw_N);
-    double most_after = 0;
+    double max_after = 0;
     bool fault = false;
     for (int i = 0; i < 100; i++) {
         rig_tick(&r);
         if (r.view.n_fault > 0) fault = true;
-        if (fault) most_after = fmax(most_after, rig_force(&r));
+        if (fault) max_after = fmax(max_after, rig_force(&r));
     }
     CHECK(fault);
-    CHECK_NEAR(most_after, 0, 0);
+    CHECK_NEAR(max_after, 0, 0);
     rig_close(&r);
 }
 

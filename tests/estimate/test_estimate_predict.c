@@ -1,4 +1,4 @@
-/* What is offered as a neighbour on a knob is what a switch takes (estimate_foresee.h): the same check on both sides.
+/* What is offered as a neighbour on a knob is what a switch takes (estimate_predict.h): the same check on both sides.
  */
 #include "server/estimate/estimate_predict.h"
 #include "server/session/configuration_switch.h"
@@ -26,7 +26,7 @@ static pal_prediction prediction(int size, bool implicit)
     return f;
 }
 
-static void foresee(const pal_prediction *f, pal_estimate *out)
+static void predict(const pal_prediction *f, pal_estimate *out)
 {
     *out = (pal_estimate){.ms = 1, .error_m = 4e-3, .discretisation_m = 1e-3, .time_m = 1e-3, .algebraic_m = 1e-3};
     pal_estimate_predict(f, out);
@@ -49,7 +49,7 @@ static void what_is_offered_is_taken_and_the_other_way_round(void)
         pal_estimate e;
         pal_diagnostic diag = {""};
         pal_configuration_switch *change = NULL;
-        foresee(&f, &e);
+        predict(&f, &e);
         for (int i = 0; i < e.n_neighbour; i++, n_offered++)
             CHECK_INT(pal_configuration_check_live(&scene, 0, &e.neighbour[i].setting, &diag), PAL_ERR_OK);
         if (offers(&e, 2 * size)) continue;
@@ -66,7 +66,7 @@ static void what_is_offered_can_be_made(void)
 {
     pal_prediction f = prediction(8, true);
     pal_estimate e;
-    foresee(&f, &e);
+    predict(&f, &e);
     CHECK_INT(e.n_neighbour, 6);
     for (int i = 0; i < e.n_neighbour; i++) {
         pal_diagnostic diag = {""};
@@ -85,13 +85,13 @@ static void sub_steps_that_are_not_allowed_are_not_offered(void)
     pal_prediction springs = prediction(8, false), fem = prediction(8, true);
     scene.max_substep = 30;
     springs.n_substep = fem.n_substep = 16;
-    foresee(&springs, &e);
+    predict(&springs, &e);
     CHECK(offers(&e, 4) && !offers(&e, 16));
-    foresee(&fem, &e);
+    predict(&fem, &e);
     CHECK(offers(&e, 4) && offers(&e, 16));
     for (int i = 0; i < e.n_neighbour; i++) CHECK_LE(e.neighbour[i].setting.step_s, scene.step_s);
     scene.max_substep = 32;
-    foresee(&springs, &e);
+    predict(&springs, &e);
     CHECK(offers(&e, 16));
 }
 

@@ -47,7 +47,7 @@ static double true_time_error(const pal_scene *at, const pal_world *w)
     pal_scene *exact = malloc(sizeof *exact);
     pal_world *a[2] = {NULL, NULL};
     const pal_body *from = pal_world_view_body(w, 0);
-    double most = 0;
+    double max = 0;
     if (!exact) abort();
     *exact = *at;
     pal_entry_put_number(&exact->body[0].solver, "tolerance", 1e-10, NULL);
@@ -62,11 +62,11 @@ static double true_time_error(const pal_scene *at, const pal_world *w)
     }
     const double *x = pal_world_view_body(a[0], 0)->x, *y = pal_world_view_body(a[1], 0)->x;
     for (int i = 0; i < from->n_dof; i++)
-        most = fmax(most, sqrt(pow(x[3 * i] - y[3 * i], 2) + pow(x[3 * i + 1] - y[3 * i + 1], 2) +
-                               pow(x[3 * i + 2] - y[3 * i + 2], 2)));
+        max = fmax(max, sqrt(pow(x[3 * i] - y[3 * i], 2) + pow(x[3 * i + 1] - y[3 * i + 1], 2) +
+                             pow(x[3 * i + 2] - y[3 * i + 2], 2)));
     for (int k = 0; k < 2; k++) pal_world_destroy(a[k]);
     free(exact);
-    return most;
+    return max;
 }
 
 static void the_part_of_time_is_what_shorter_steps_change(void)

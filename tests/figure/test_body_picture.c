@@ -21,10 +21,10 @@ static char *draw(const pal_body_picture *picture, int n)
     pal_diagnostic diag = {""};
     pal_err err = pal_body_picture_write(picture, n, path, &diag);
     if (err) CHECK_FAIL("%s", diag.text);
-    size_t most = 4 << 20;
+    size_t max = 4 << 20;
     FILE *in = err ? NULL : fopen(path, "rb");
-    char *text = in ? calloc(1, most) : NULL;
-    if (text && fread(text, 1, most - 1, in) == 0) CHECK_FAIL("the file is empty");
+    char *text = in ? calloc(1, max) : NULL;
+    if (text && fread(text, 1, max - 1, in) == 0) CHECK_FAIL("the file is empty");
     if (in) fclose(in);
     unlink(path);
     return text;
@@ -70,7 +70,7 @@ typedef struct triangle {
 } triangle;
 
 /* the filled triangles of the surfaces in the order they are drawn in */
-static int read_triangles(const char *text, triangle *out, int most)
+static int read_triangles(const char *text, triangle *out, int max)
 {
     int n = 0;
     for (const char *at = text; (at = strstr(at, "<path fill=\"#")) != NULL;) {
@@ -79,7 +79,7 @@ static int read_triangles(const char *text, triangle *out, int most)
         for (at = strstr(at, " d=\""); at && at < end; at++) {
             int p[6];
             if (*at != 'M' || sscanf(at, "M%d %dl%d %d %d %dz", p, p + 1, p + 2, p + 3, p + 4, p + 5) != 6) continue;
-            if (n < most)
+            if (n < max)
                 out[n] = (triangle){fill,
                                     {p[0] / 10.0, (p[0] + p[2]) / 10.0, (p[0] + p[2] + p[4]) / 10.0},
                                     {p[1] / 10.0, (p[1] + p[3]) / 10.0, (p[1] + p[3] + p[5]) / 10.0}};

@@ -132,10 +132,10 @@ static void names_cannot_leave_their_text(void)
 }
 
 /* the boxes of all small texts, 6.2 pixels a character, 11 high */
-static int small_texts(const char *text, double box[][4], int most)
+static int small_texts(const char *text, double box[][4], int max)
 {
     int n = 0;
-    for (const char *at = text; n < most && (at = strstr(at, "<text x=")); at++) {
+    for (const char *at = text; n < max && (at = strstr(at, "<text x=")); at++) {
         double x, y;
         const char *end = strchr(at, '>'), *stop = end ? strchr(end, '<') : NULL;
         if (!stop || sscanf(at, "<text x=\"%lf\" y=\"%lf\"", &x, &y) != 2) continue;

@@ -47,7 +47,7 @@ static inline bool order(mem_client *c, const char *verb, const char *args)
     return c->n_text[PAL_CONTROL_ANSWER] > n_done;
 }
 
-static inline double told(const mem_client *c, const char *key)
+static inline double reported(const mem_client *c, const char *key)
 {
     const pal_wire_answer *a = &c->last[PAL_CONTROL_ANSWER].answer;
     for (uint32_t i = 0; i < a->n_arg; i++)

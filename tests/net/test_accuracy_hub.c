@@ -118,7 +118,7 @@ static void without_a_study_there_is_the_estimate_alone(void)
 }
 
 /* what a choice is foreseen to cost is for the same time of the body as what it costs now */
-static void neighbours_are_priced_once(void)
+static void neighbours_are_measured_once(void)
 {
     pal_body_def *def = &organ.scene.body[0], *was = malloc(sizeof *was);
     pal_configuration now;
@@ -157,7 +157,7 @@ static void calibrated_springs_keep_their_size(void)
     pal_config_entry *model = &organ.scene.body[0].model, was = *model;
     pal_configuration now;
     mem_client ada;
-    char text[160], said[64];
+    char text[160], summary[64];
     CHECK(!pal_entry_put_number(model, "k_distance_J", 1e-3, NULL));
     CHECK(!pal_entry_put_text(model, "weights", "volume", NULL));
     pal_configuration_of(&organ.scene, 0, &now);
@@ -172,8 +172,8 @@ static void calibrated_springs_keep_their_size(void)
         mem_text(&ada, text);
         UNTIL(ada.n_text[PAL_CONTROL_ERROR] + ada.n_text[PAL_CONTROL_ANSWER] == k + 1, &ada, NULL);
     }
-    snprintf(said, sizeof said, "calibrated for %d voxels", now.size);
-    CHECK(strstr(ada.last[PAL_CONTROL_ERROR].error.text, said) != NULL);
+    snprintf(summary, sizeof summary, "calibrated for %d voxels", now.size);
+    CHECK(strstr(ada.last[PAL_CONTROL_ERROR].error.text, summary) != NULL);
     CHECK_INT(ada.n_text[PAL_CONTROL_ERROR], 1);
     CHECK_INT(ada.n_text[PAL_CONTROL_ANSWER], 1);
     mem_end(&ada);
@@ -187,8 +187,8 @@ static void bad_orders_are_refused_with_a_sentence(void)
         "{\"type\":\"command\",\"verb\":\"estimate\",\"target\":\"liver\",\"args\":{\"enabled\":1}}",
         "{\"type\":\"command\",\"verb\":\"estimate\"}",
         "{\"type\":\"command\",\"verb\":\"estimate\",\"args\":{\"disabled\":1}}"};
-    static const char *const said[] = {"there is no body liver", "estimate: enabled is missing",
-                                       "estimate: enabled is missing"};
+    static const char *const summary[] = {"there is no body liver", "estimate: enabled is missing",
+                                          "estimate: enabled is missing"};
     mem_client ada;
     begin(true);
     mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
@@ -196,7 +196,7 @@ static void bad_orders_are_refused_with_a_sentence(void)
     for (int i = 0; i < 3; i++) {
         mem_text(&ada, bad[i]);
         UNTIL(ada.n_text[PAL_CONTROL_ERROR] == i + 1, &ada, NULL);
-        CHECK_TEXT(ada.last[PAL_CONTROL_ERROR].error.text, said[i]);
+        CHECK_TEXT(ada.last[PAL_CONTROL_ERROR].error.text, summary[i]);
     }
     CHECK_INT(ada.n_text[PAL_CONTROL_STUDY] + ada.n_text[PAL_CONTROL_ESTIMATE], 0);
     CHECK_INT(pal_estimator_threads(), 0);
@@ -211,7 +211,7 @@ int main(void)
     RUN(nothing_is_estimated_while_nobody_looks);
     RUN(who_asks_sees_study_and_estimate_until_the_last_has_gone);
     RUN(without_a_study_there_is_the_estimate_alone);
-    RUN(neighbours_are_priced_once);
+    RUN(neighbours_are_measured_once);
     RUN(calibrated_springs_keep_their_size);
     RUN(bad_orders_are_refused_with_a_sentence);
     pal_prepared_free(&organ.mesh);

@@ -175,16 +175,16 @@ static void stalled_client_costs_little_and_is_current_within_two_frames(void)
     mem_join(&slow, road, "slow", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     UNTIL(fast.n_tools > 3 && slow.n_tools > 3, &fast, &slow);
     turn(&fast, &slow);
-    size_t fixed = pal_packet_total(), most = 0;
+    size_t fixed = pal_packet_total(), max = 0;
     int got = fast.n_tools;
     /* 5 s: the slow one reads nothing at all */
     apart_ns = 2 * FRAME_NS;
     for (int i = 0; i < 150; i++) {
         turn(&fast, NULL);
-        if (pal_packet_total() > most) most = pal_packet_total();
+        if (pal_packet_total() > max) max = pal_packet_total();
     }
     CHECK(fast.n_tools - got > 100);
-    CHECK_LE((double)most, (double)fixed + 65536); /* a cycle of this organ is 1 to 3 kB */
+    CHECK_LE((double)max, (double)fixed + 65536); /* a cycle of this organ is 1 to 3 kB */
     /* it wakes: the newest cycle is among the first two */
     int before = slow.n_tools;
     for (int i = 0; slow.n_tools < before + 2 && i < 50; i++) mem_pull(&slow, 1);
@@ -501,25 +501,25 @@ static void answers_that_nobody_reads_close_the_peer(void)
 }
 
 /* largest value that a client was shown last, and largest distance of its vertices from rest */
-static double shown_most(const mem_client *c)
+static double shown_max(const mem_client *c)
 {
-    double most = 0;
-    for (uint32_t i = 0; i < c->asset->order->n_vertex; i++) most = fmax(most, pal_field_value(&c->field, c->level[i]));
-    return most;
+    double max = 0;
+    for (uint32_t i = 0; i < c->asset->order->n_vertex; i++) max = fmax(max, pal_field_value(&c->field, c->level[i]));
+    return max;
 }
 
-static double moved_most(const mem_client *c)
+static double moved_max(const mem_client *c)
 {
-    double most = 0;
+    double max = 0;
     for (uint32_t i = 0; i < c->asset->order->n_vertex; i++) {
         double d2 = 0;
         for (int k = 0; k < 3; k++) {
             double d = (double)c->position_m[3 * i + (uint32_t)k] - (double)c->asset->rest_m[3 * i + (uint32_t)k];
             d2 += d * d;
         }
-        most = fmax(most, sqrt(d2));
+        max = fmax(max, sqrt(d2));
     }
-    return most;
+    return max;
 }
 
 static void a_field_goes_only_to_those_who_ask_and_ends_with_them(void)
@@ -550,8 +550,8 @@ static void a_field_goes_only_to_those_who_ask_and_ends_with_them(void)
     for (int i = 0; i < 120; i++) turn(&ada, &bob); /* 2 s */
     CHECK(ada.n_field - before >= 10 && ada.n_field - before <= 21);
     REQUIRE(ada.level && ada.position_m);
-    CHECK_NEAR(shown_most(&ada), (double)ada.field.high, 1e-9);
-    CHECK_LE(fabs(shown_most(&ada) - moved_most(&ada)), 0.3 * moved_most(&ada) + 2e-4);
+    CHECK_NEAR(shown_max(&ada), (double)ada.field.high, 1e-9);
+    CHECK_LE(fabs(shown_max(&ada) - moved_max(&ada)), 0.3 * moved_max(&ada) + 2e-4);
     CHECK_INT(bob.n_field, 0);
     /* a second one who looks is served from what is there, the row stays until the last has gone */
     mem_text(&bob, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}");

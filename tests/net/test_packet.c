@@ -35,17 +35,17 @@ static void credit_follows_the_smallest_round_trip(void)
     /* 100 ms: 1 + ceil(60 x 0.1) = 7 */
     pal_credit_sent(&c, 1, now);
     CHECK(pal_credit_acknowledge(&c, 1, now + 100 * MS));
-    CHECK_INT(c.most, 7);
+    CHECK_INT(c.max, 7);
     /* one of 1 ms: the least of 2 */
     pal_credit_sent(&c, 2, now);
     CHECK(pal_credit_acknowledge(&c, 2, now + 1 * MS));
-    CHECK_INT(c.most, 2);
+    CHECK_INT(c.max, 2);
     /* a network that became slow is believed after two windows; never more than 12 */
     for (uint32_t i = 3; i < 80; i++, now += 400 * MS) {
         pal_credit_sent(&c, i, now);
         CHECK(pal_credit_acknowledge(&c, i, now + 390 * MS));
     }
-    CHECK_INT(c.most, PAL_CREDIT_MAX);
+    CHECK_INT(c.max, PAL_CREDIT_MAX);
 }
 
 static void credit_runs_out_and_comes_back(void)
@@ -71,7 +71,7 @@ static void credit_does_not_grow_from_its_own_queue(void)
     pal_credit c;
     uint64_t ready[PAL_CREDIT_MAX] = {0}, busy = 0; /* when the client acknowledges what is in flight */
     uint32_t sent[PAL_CREDIT_MAX] = {0}, cycle = 0;
-    int n = 0, most = 0, n_acknowledged = 0;
+    int n = 0, max = 0, n_acknowledged = 0;
     pal_credit_begin(&c, 120);
     for (uint64_t now = 1 * MS; now < 60000 * MS; now += MS) {
         for (; n > 0 && ready[0] <= now; n--, n_acknowledged++) {
@@ -79,7 +79,7 @@ static void credit_does_not_grow_from_its_own_queue(void)
             memmove(ready, ready + 1, sizeof ready - sizeof *ready);
             memmove(sent, sent + 1, sizeof sent - sizeof *sent);
         }
-        if (c.most > most) most = c.most;
+        if (c.max > max) max = c.max;
         if (now % (8 * MS) || !pal_credit_free(&c)) continue;
         pal_credit_sent(&c, ++cycle, now);
         /* the first cycle waits for the asset: 400 ms */
@@ -88,8 +88,8 @@ static void credit_does_not_grow_from_its_own_queue(void)
         ready[n++] = busy;
         REQUIRE(n < PAL_CREDIT_MAX || now < 3000 * MS);
     }
-    CHECK_INT(most, PAL_CREDIT_MAX); /* after the asset, for a second */
-    CHECK_INT(c.most, 4);
+    CHECK_INT(max, PAL_CREDIT_MAX); /* after the asset, for a second */
+    CHECK_INT(c.max, 4);
     CHECK(n_acknowledged > 3600); /* of the 3750 that it could take in a minute */
 }
 

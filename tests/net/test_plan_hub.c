@@ -120,8 +120,8 @@ static void others_do_not_and_bad_orders_are_refused(void)
         ROW("tet_volume", 0), "{\"type\":\"command\",\"verb\":\"component\",\"target\":\"tet_volume\"}",
         "{\"type\":\"command\",\"verb\":\"component\",\"target\":\"a\",\"args\":{\"part\":1,\"enabled\":0}}",
         "{\"type\":\"command\",\"verb\":\"reset\",\"target\":\"liver\"}"};
-    static const char *const said[] = {"component: only for instructors", "component: part is missing",
-                                       "component: part 1, wanted 0 to 0", "there is no body liver"};
+    static const char *const summary[] = {"component: only for instructors", "component: part is missing",
+                                          "component: part 1, wanted 0 to 0", "there is no body liver"};
     static mem_client ada, bo;
     begin(false);
     mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
@@ -132,7 +132,7 @@ static void others_do_not_and_bad_orders_are_refused(void)
         int before = who->n_text[PAL_CONTROL_ERROR];
         mem_text(who, bad[i]);
         UNTIL(who->n_text[PAL_CONTROL_ERROR] > before, &ada, &bo);
-        CHECK_TEXT(who->last[PAL_CONTROL_ERROR].error.text, said[i]);
+        CHECK_TEXT(who->last[PAL_CONTROL_ERROR].error.text, summary[i]);
     }
     CHECK_INT(ada.last[PAL_CONTROL_STATUS].status.n_disabled, 0);
     mem_end(&ada), mem_end(&bo);

@@ -18,10 +18,10 @@ static void begin(void)
 /* farthest vertex from its place at rest, m */
 static double moved(const mem_client *c)
 {
-    double most = 0;
+    double max = 0;
     for (size_t i = 0; i < 3 * (size_t)c->asset->order->n_vertex; i++)
-        most = fmax(most, fabs((double)c->position_m[i] - (double)c->asset->rest_m[i]));
-    return most;
+        max = fmax(max, fabs((double)c->position_m[i] - (double)c->asset->rest_m[i]));
+    return max;
 }
 
 static void a_cell_grows_and_the_frames_are_of_the_new_epoch(void)
@@ -34,8 +34,8 @@ static void a_cell_grows_and_the_frames_are_of_the_new_epoch(void)
     CHECK_INT(before.epoch, 1);
     CHECK(order(&c, "extrude", TOP ",\"distance_m\":0.03"));
     CHECK_TEXT(c.last[PAL_CONTROL_ANSWER].answer.verb, "extrude");
-    CHECK_NEAR(told(&c, "cells"), 9, 0);
-    CHECK_NEAR(told(&c, "can_undo"), 1, 0);
+    CHECK_NEAR(reported(&c, "cells"), 9, 0);
+    CHECK_NEAR(reported(&c, "can_undo"), 1, 0);
     CHECK_INT(c.n_text[PAL_CONTROL_TOPOLOGY], 1);
     CHECK_INT(part(&c)->epoch, 2);
     /* a brick of the control mesh, subdivided once, adds 4 sides of 4 faces: 16 quads at the sides, 4 on top for 4 */
@@ -55,7 +55,7 @@ static void a_cell_grows_and_the_frames_are_of_the_new_epoch(void)
     until_frame(&c);
     CHECK(order(&c, "redo", ""));
     CHECK_INT(part(&c)->n_vertex, before.n_vertex + 16);
-    CHECK_NEAR(told(&c, "can_redo"), 0, 0);
+    CHECK_NEAR(reported(&c, "can_redo"), 0, 0);
     until_frame(&c);
     mem_end(&c);
     end();
@@ -93,20 +93,20 @@ static void paint_is_what_a_probe_finds(void)
     begin();
     join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
     CHECK(order(&c, "probe", TOP));
-    double young = told(&c, "young_Pa"), density = told(&c, "density_kg_m3");
+    double young = reported(&c, "young_Pa"), density = reported(&c, "density_kg_m3");
     CHECK_NEAR(young, clay.scene.body[0].material.young_Pa, 1e-9 * young);
     CHECK(order(&c, "paint", TOP ",\"radius_m\":0.03,\"young_factor\":4,\"density_factor\":2"));
     CHECK_INT(part(&c)->epoch, 2);
     CHECK(order(&c, "probe", TOP));
-    CHECK_NEAR(told(&c, "young_Pa"), 4 * young, 1e-6 * young);
-    CHECK_NEAR(told(&c, "density_kg_m3"), 2 * density, 1e-6 * density);
+    CHECK_NEAR(reported(&c, "young_Pa"), 4 * young, 1e-6 * young);
+    CHECK_NEAR(reported(&c, "density_kg_m3"), 2 * density, 1e-6 * density);
     /* beyond the brush it is as it was */
     CHECK(order(&c, "probe", "\"x_m\":-0.05,\"y_m\":-0.04,\"z_m\":-0.04"));
-    CHECK_NEAR(told(&c, "young_Pa"), young, 1e-9 * young);
+    CHECK_NEAR(reported(&c, "young_Pa"), young, 1e-9 * young);
     CHECK_INT(part(&c)->epoch, 2); /* who asks changes nothing */
     CHECK(order(&c, "undo", ""));
     CHECK(order(&c, "probe", TOP));
-    CHECK_NEAR(told(&c, "young_Pa"), young, 1e-9 * young);
+    CHECK_NEAR(reported(&c, "young_Pa"), young, 1e-9 * young);
     until_frame(&c);
     mem_end(&c);
     end();
@@ -119,11 +119,11 @@ static void a_material_that_was_refused_does_not_stick(void)
     begin();
     join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
     CHECK(order(&c, "probe", TOP));
-    double young = told(&c, "young_Pa");
+    double young = reported(&c, "young_Pa");
     mem_text(&c, "{\"type\":\"command\",\"verb\":\"material\",\"args\":{\"young_Pa\":1e12}}");
     CHECK(order(&c, "extrude", TOP ",\"distance_m\":0.02"));
     CHECK(order(&c, "probe", TOP));
-    CHECK_NEAR(told(&c, "young_Pa"), young, 1e-9 * young);
+    CHECK_NEAR(reported(&c, "young_Pa"), young, 1e-9 * young);
     mem_end(&c);
     end();
 }
@@ -138,14 +138,14 @@ static void a_cut_shows_the_inside_and_goes_again(void)
     /* the half below: a plane of 4 by 4 faces where the block is cut, and 4 sides of 4 by 2, a bottom of 4 by 4 */
     CHECK_INT(part(&c)->n_triangle, 2 * (16 + 4 * 8 + 16));
     until_frame(&c);
-    double most = -1;
-    for (uint32_t i = 0; i < c.asset->order->n_vertex; i++) most = fmax(most, (double)c.asset->rest_m[3 * i + 2]);
-    CHECK_NEAR(most, 0, 0.005);
-    CHECK_NEAR(told(&c, "can_undo"), 0, 0);
+    double max = -1;
+    for (uint32_t i = 0; i < c.asset->order->n_vertex; i++) max = fmax(max, (double)c.asset->rest_m[3 * i + 2]);
+    CHECK_NEAR(max, 0, 0.005);
+    CHECK_NEAR(reported(&c, "can_undo"), 0, 0);
     CHECK(order(&c, "uncut", ""));
     CHECK_TEXT(part(&c)->asset, before.asset);
     CHECK(order(&c, "set_rest_shape", ""));
-    CHECK_NEAR(told(&c, "can_undo"), 1, 0);
+    CHECK_NEAR(reported(&c, "can_undo"), 1, 0);
     until_frame(&c);
     CHECK_LE(moved(&c), 1e-4);
     mem_end(&c);
@@ -178,9 +178,9 @@ static void what_cannot_be_done_is_refused_with_a_sentence_and_changes_nothing(v
     join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         bool done = order(&c, bad[i].verb, bad[i].args);
-        bool as_said = !done && strstr(trouble(&c), bad[i].word);
-        CHECK(as_said);
-        if (done || !as_said) printf("  %s %s: \"%s\"\n", bad[i].verb, bad[i].args, done ? "done" : trouble(&c));
+        bool as_summary = !done && strstr(trouble(&c), bad[i].word);
+        CHECK(as_summary);
+        if (done || !as_summary) printf("  %s %s: \"%s\"\n", bad[i].verb, bad[i].args, done ? "done" : trouble(&c));
         CHECK_TEXT(c.last[PAL_CONTROL_ERROR].error.code, bad[i].code);
     }
     mem_text(&c, "{\"type\":\"command\",\"verb\":\"undo\",\"target\":\"liver\"}");
@@ -197,9 +197,9 @@ static void what_cannot_be_done_is_refused_with_a_sentence_and_changes_nothing(v
 /* the highest of what is shown */
 static double height(const mem_client *c)
 {
-    double most = -1;
-    for (uint32_t i = 0; i < c->asset->order->n_vertex; i++) most = fmax(most, (double)c->position_m[3 * i + 2]);
-    return most;
+    double max = -1;
+    for (uint32_t i = 0; i < c->asset->order->n_vertex; i++) max = fmax(max, (double)c->position_m[3 * i + 2]);
+    return max;
 }
 
 /* frames until the height is beyond a number, or below it */
@@ -282,7 +282,7 @@ static void sixteen_wait_and_the_next_one_is_told(void)
     CHECK_TEXT(c.last[PAL_CONTROL_ERROR].error.code, "busy");
     CHECK_INT(c.n_text[PAL_CONTROL_ANSWER], 17);
     CHECK_INT(part(&c)->epoch, 18); /* in order: each undo had something to undo */
-    CHECK_NEAR(told(&c, "cells"), 9, 0);
+    CHECK_NEAR(reported(&c, "cells"), 9, 0);
     CHECK(order(&c, "undo", "")); /* and there is room again */
     mem_end(&c);
     end();

@@ -101,13 +101,13 @@ static void wait_steps(mem_client *c, int n, bool pressed)
 static void check_jump(const mem_client *c)
 {
     const char *text = c->last[PAL_CONTROL_ANSWER].answer.text;
-    double bound_m = told(c, "bound_m");
-    CHECK_NEAR(bound_m, told(c, "error_before_m") + told(c, "error_after_m"), 1e-12);
-    CHECK_LE(fabs(told(c, "energy_percent")), 2);
-    CHECK(told(c, "energy_before_J") > 1e-4);
-    CHECK(told(c, "max_move_m") > 0 && told(c, "max_body_move_m") > 0);
-    CHECK_LE(told(c, "max_move_m"), bound_m);
-    CHECK_NEAR(told(c, "max_frame_move_m"), told(c, "max_move_m") / 10, 1e-9);
+    double bound_m = reported(c, "bound_m");
+    CHECK_NEAR(bound_m, reported(c, "error_before_m") + reported(c, "error_after_m"), 1e-12);
+    CHECK_LE(fabs(reported(c, "energy_percent")), 2);
+    CHECK(reported(c, "energy_before_J") > 1e-4);
+    CHECK(reported(c, "max_move_m") > 0 && reported(c, "max_body_move_m") > 0);
+    CHECK_LE(reported(c, "max_move_m"), bound_m);
+    CHECK_NEAR(reported(c, "max_frame_move_m"), reported(c, "max_move_m") / 10, 1e-9);
     CHECK(strstr(text, "within the bound") != NULL);
     CHECK(!strstr(text, "beyond 2 %"));
 }
@@ -124,8 +124,8 @@ static void every_pair_keeps_the_errors_shown(void)
         snprintf(args, sizeof args, "\"index\":%d", way[k]);
         CHECK(order(&c, "study_point", args));
         check_jump(&c);
-        CHECK_NEAR(told(&c, "error_before_m"), point[at].error_m, 1e-9);
-        CHECK_NEAR(told(&c, "error_after_m"), point[way[k]].error_m, 1e-9);
+        CHECK_NEAR(reported(&c, "error_before_m"), point[at].error_m, 1e-9);
+        CHECK_NEAR(reported(&c, "error_after_m"), point[way[k]].error_m, 1e-9);
         until_frame(&c);
         wait_steps(&c, 20, true);
     }
@@ -166,12 +166,13 @@ static void a_knob_keeps_the_errors_foreseen(bool pressed)
     snprintf(args, sizeof args, "\"size\":%u", next->size);
     CHECK(order(&c, "configure", args));
     check_jump(&c);
-    CHECK_LE(told(&c, "max_body_move_m"), told(&c, "bound_m"));
+    CHECK_LE(reported(&c, "max_body_move_m"), reported(&c, "bound_m"));
     printf("  %s: moves %.3f mm, %.3f mm a frame, a point of the body %.3f mm, bound %.3f mm\n",
-           pressed ? "pressed" : "under its weight", 1e3 * told(&c, "max_move_m"), 1e3 * told(&c, "max_frame_move_m"),
-           1e3 * told(&c, "max_body_move_m"), 1e3 * told(&c, "bound_m"));
-    CHECK_NEAR(told(&c, "error_before_m"), now_m, 0.2 * now_m);
-    CHECK_NEAR(told(&c, "error_after_m"), then_m, 0.2 * then_m);
+           pressed ? "pressed" : "under its weight", 1e3 * reported(&c, "max_move_m"),
+           1e3 * reported(&c, "max_frame_move_m"), 1e3 * reported(&c, "max_body_move_m"),
+           1e3 * reported(&c, "bound_m"));
+    CHECK_NEAR(reported(&c, "error_before_m"), now_m, 0.2 * now_m);
+    CHECK_NEAR(reported(&c, "error_after_m"), then_m, 0.2 * then_m);
     mem_end(&c);
     end();
 }
@@ -194,7 +195,7 @@ static void without_errors_shown_there_is_no_bound(void)
     join(&c, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
     wait_steps(&c, 20, true);
     CHECK(order(&c, "configure", "\"step_ms\":4"));
-    CHECK(isnan(told(&c, "bound_m")) && told(&c, "max_move_m") >= 0);
+    CHECK(isnan(reported(&c, "bound_m")) && reported(&c, "max_move_m") >= 0);
     CHECK(strstr(c.last[PAL_CONTROL_ANSWER].answer.text, "no bound") != NULL);
     mem_end(&c);
     end();
@@ -221,7 +222,7 @@ static void an_old_estimate_bounds_nothing(void)
         turn(&c, NULL);
     CHECK(e->age_s > 1 && e->error_m > 0);
     CHECK(order(&c, "configure", "\"step_ms\":4"));
-    CHECK(isnan(told(&c, "bound_m")) && strstr(c.last[PAL_CONTROL_ANSWER].answer.text, "no bound") != NULL);
+    CHECK(isnan(reported(&c, "bound_m")) && strstr(c.last[PAL_CONTROL_ANSWER].answer.text, "no bound") != NULL);
     pal_estimator_pause_all(false);
     mem_end(&c);
     end();

@@ -44,10 +44,10 @@ static void two_clients_see_a_point_of_the_study(void)
     CHECK_INT(b.n_text[PAL_CONTROL_ANSWER], 0);
     CHECK(strstr(a.last[PAL_CONTROL_ANSWER].answer.text, "fem hex8_bbar") != NULL);
     /* nothing has pushed it: what energy it has is rounding */
-    CHECK_LE(told(&a, "energy_before_J"), 1e-9);
-    CHECK_LE(fabs(told(&a, "energy_after_J") - told(&a, "energy_before_J")), 1e-9);
-    CHECK(isfinite(told(&a, "energy_percent")));
-    CHECK_LE(told(&a, "max_move_m"), 0.005);
+    CHECK_LE(reported(&a, "energy_before_J"), 1e-9);
+    CHECK_LE(fabs(reported(&a, "energy_after_J") - reported(&a, "energy_before_J")), 1e-9);
+    CHECK(isfinite(reported(&a, "energy_percent")));
+    CHECK_LE(reported(&a, "max_move_m"), 0.005);
     /* a parameter of it, and back to the cells, which can be sculpted again */
     CHECK(order(&a, "configure", "\"size\":10,\"tolerance\":0.001"));
     CHECK(strstr(a.last[PAL_CONTROL_ANSWER].answer.text, "10 voxels") != NULL);
@@ -57,15 +57,15 @@ static void two_clients_see_a_point_of_the_study(void)
     CHECK(part(&a)->is_sculptable);
     CHECK_INT(part(&b)->epoch, 4);
     CHECK(order(&a, "divide", TOP));
-    CHECK(told(&a, "cells") > 8);
+    CHECK(reported(&a, "cells") > 8);
     /* what was sculpted is switched as it is, and comes back as it was */
-    double cells = told(&a, "cells");
+    double cells = reported(&a, "cells");
     CHECK(order(&a, "study_point", "\"index\":1"));
     CHECK(!order(&a, "divide", TOP));
     CHECK(strstr(trouble(&a), "cannot be sculpted") || strstr(trouble(&a), "can be sculpted"));
     CHECK(order(&a, "study_point", "\"index\":0"));
     CHECK(order(&a, "undo", ""));
-    CHECK(told(&a, "cells") < cells);
+    CHECK(reported(&a, "cells") < cells);
     mem_end(&a);
     mem_end(&b);
     end();
@@ -95,9 +95,9 @@ static void tools_stay_with_who_holds_them(void)
 
 static double highest(const mem_client *c)
 {
-    double most = -1;
-    for (uint32_t i = 0; i < c->asset->order->n_vertex; i++) most = fmax(most, (double)c->position_m[3 * i + 2]);
-    return most;
+    double max = -1;
+    for (uint32_t i = 0; i < c->asset->order->n_vertex; i++) max = fmax(max, (double)c->position_m[3 * i + 2]);
+    return max;
 }
 
 static void wait_frames(mem_client *c, int n)
@@ -120,12 +120,12 @@ static void a_pressure_goes_on(void)
     double lifted = highest(&c) - rest;
     CHECK(lifted > 0.001);
     CHECK(order(&c, "study_point", "\"index\":2"));
-    CHECK_INT((int)told(&c, "brushes_ended"), 0);
+    CHECK_INT((int)reported(&c, "brushes_ended"), 0);
     until_frame(&c);
     wait_frames(&c, 60);
     CHECK_NEAR(highest(&c) - rest, lifted, 0.5 * lifted);
     CHECK(order(&c, "study_point", "\"index\":1"));
-    CHECK_INT((int)told(&c, "brushes_ended"), 1);
+    CHECK_INT((int)reported(&c, "brushes_ended"), 1);
     CHECK(strstr(c.last[PAL_CONTROL_ANSWER].answer.text, "brushes that ended: 1") != NULL);
     mem_end(&c);
     end();
@@ -148,7 +148,7 @@ static void a_handle_goes_on(void)
     double lifted = highest(&c) - rest;
     CHECK(lifted > 0.001);
     CHECK(order(&c, "study_point", "\"index\":2"));
-    CHECK_INT((int)told(&c, "brushes_ended"), 0);
+    CHECK_INT((int)reported(&c, "brushes_ended"), 0);
     until_frame(&c);
     wait_frames(&c, 60);
     CHECK_NEAR(highest(&c) - rest, lifted, 0.3 * lifted);

@@ -65,13 +65,13 @@ static bool same_table(const mem_client *a, const mem_client *b)
 /* largest distance of the vertices that they both draw, per axis */
 static double apart(const mem_client *a, const mem_client *b)
 {
-    double most = 0;
+    double max = 0;
     for (size_t e = 0; e < 3 * (size_t)a->asset->n_triangle; e++)
         for (size_t c = 0; c < 3; c++) {
             size_t i = 3 * (size_t)a->tri[e] + c;
-            most = fmax(most, fabs((double)a->position_m[i] - (double)b->position_m[i]));
+            max = fmax(max, fabs((double)a->position_m[i] - (double)b->position_m[i]));
         }
-    return most;
+    return max;
 }
 
 static void hello_tells_which_parts_adapt_and_the_asset_holds_the_finest_level(void)
@@ -260,7 +260,7 @@ static void a_change_of_accuracy_loses_no_triangle(void)
     next_cycle(&fast);
     mem_pull(&coarse, 1000);
     /* two clean seconds, then it takes one cycle in four, until it is given larger steps, then all of them again */
-    float q = fast.frame.q_m, most = 0;
+    float q = fast.frame.q_m, max = 0;
     for (int i = 0; i < 600; i++) {
         if (i % 8 == 0)
             step(&fast);
@@ -270,11 +270,11 @@ static void a_change_of_accuracy_loses_no_triangle(void)
         }
         if (i % 7 == 6) {
             mem_pull(&coarse, 1000);
-            most = fmaxf(most, coarse.frame.q_m);
+            max = fmaxf(max, coarse.frame.q_m);
         }
-        if (most > 1.5f * q) break;
+        if (max > 1.5f * q) break;
     }
-    CHECK(most > 1.5f * q);
+    CHECK(max > 1.5f * q);
     for (int i = 0; i < 4; i++) {
         step(&fast);
         mem_pull(&coarse, 1000);

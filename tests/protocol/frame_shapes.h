@@ -131,11 +131,11 @@ static inline uint32_t shape_midpoint(shape_family *f, uint32_t *table, uint32_t
 static inline shape_family shape_family_create(int fineness, int n_level)
 {
     shape s = shape_create(fineness);
-    size_t most = 4 * (size_t)s.n_vertex;
-    for (int l = 1; l < n_level; l++) most *= 4;
-    shape_family f = {{s.n_vertex, s.n_triangle, malloc(3 * most * sizeof(float)), malloc(6 * most * sizeof(uint32_t))},
+    size_t max = 4 * (size_t)s.n_vertex;
+    for (int l = 1; l < n_level; l++) max *= 4;
+    shape_family f = {{s.n_vertex, s.n_triangle, malloc(3 * max * sizeof(float)), malloc(6 * max * sizeof(uint32_t))},
                       s.n_vertex,
-                      malloc(2 * most * sizeof(uint32_t))};
+                      malloc(2 * max * sizeof(uint32_t))};
     memcpy(f.fine.rest_m, s.rest_m, 3 * (size_t)s.n_vertex * sizeof(float));
     memcpy(f.fine.triangle, s.triangle, 3 * (size_t)s.n_triangle * sizeof(uint32_t));
     for (int l = 1; l < n_level; l++) {

@@ -185,14 +185,14 @@ static void accuracy_is_said_only_where_there_is_one(void)
     CHECK(!strstr(text, "accuracy"));
     golden_accuracy(&hello.hello);
     REQUIRE(pal_control_put(text, sizeof text, &hello, &n) == 0);
-    char *at = strstr(text, "\"organ\":"), *said = strstr(text, ",\"accuracy\":\"2.1 % RMS of finite elements");
-    CHECK(at && said && said > at && strstr(said, ",\"step_rate_hz\":500"));
+    char *at = strstr(text, "\"organ\":"), *summary = strstr(text, ",\"accuracy\":\"2.1 % RMS of finite elements");
+    CHECK(at && summary && summary > at && strstr(summary, ",\"step_rate_hz\":500"));
     REQUIRE(pal_control_get(text, n, true, &c) == 0);
     CHECK_TEXT(c.hello.accuracy, hello.hello.accuracy);
     /* a number is no text */
-    REQUIRE(said);
-    n = (size_t)snprintf(other, sizeof other, "%.*s,\"accuracy\":7%s", (int)(said - text), text,
-                         strstr(said, ",\"step_rate_hz\""));
+    REQUIRE(summary);
+    n = (size_t)snprintf(other, sizeof other, "%.*s,\"accuracy\":7%s", (int)(summary - text), text,
+                         strstr(summary, ",\"step_rate_hz\""));
     CHECK_INT(pal_control_get(other, n, true, &c), PAL_REFUSAL_FIELD);
     memset(hello.hello.accuracy, 7, 3);
     CHECK(pal_control_put(text, sizeof text, &hello, &n) != 0);

@@ -42,12 +42,12 @@ static void rig_release(trial *r)
 
 static double largest_error(const trial *r)
 {
-    double most = 0;
+    double max = 0;
     for (size_t i = 0; i < 3 * (size_t)r->s.n_vertex; i++) {
         double error = fabs((double)r->given[i] - (double)r->shown[i]);
-        if (!(error <= most)) most = error;
+        if (!(error <= max)) max = error;
     }
-    return most;
+    return max;
 }
 
 static pal_frame_input given_of(const trial *r, double error_m)
@@ -86,7 +86,7 @@ static void error_stays_within_its_bound_in_every_frame(void)
 
 static void live_deformation_costs_less_than_half_a_byte_per_vertex(void)
 {
-    static const double most[MOTION_COUNT] = {0.01, 0.25, 0.3, 0.45, 0.1, 0, 0, 0};
+    static const double max[MOTION_COUNT] = {0.01, 0.25, 0.3, 0.45, 0.1, 0, 0, 0};
     trial r;
     REQUIRE(rig_create(&r, 70));
     pal_frame_input given = given_of(&r, 5e-5);
@@ -99,7 +99,7 @@ static void live_deformation_costs_less_than_half_a_byte_per_vertex(void)
             n_byte += (double)result.n_byte / 10;
         }
         printf("  motion %d: %.0f bytes a frame, %.3f a vertex\n", motion, n_byte, n_byte / r.s.n_vertex);
-        CHECK_LE(n_byte / r.s.n_vertex, most[motion]);
+        CHECK_LE(n_byte / r.s.n_vertex, max[motion]);
     }
     rig_release(&r);
 }

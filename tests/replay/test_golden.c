@@ -83,7 +83,7 @@ static void a_collapsed_and_a_tumbling_body_have_their_golden_hash(void)
 }
 
 /* a block with damped springs, turned inside out at one corner by a grabbed tool, pressed by another */
-static void press_and_grab(pal_world *world, int tick)
+static void press_and_grasp(pal_world *world, int tick)
 {
     double t = tick / 60.0;
     pal_pose press = {.position_m = {0.012, 0.012, 0.05 - 0.02 * t}, .quat = {1, 0, 0, 0}};
@@ -103,7 +103,7 @@ static void a_pressed_and_grabbed_block_has_its_golden_hash(void)
     pal_entry_init(&def->effect[def->n_effect++], "effects[3]", "tool_grasp");
     pal_tools_default(scene, 2);
     scene->tool[0].radius_m = scene->tool[1].radius_m = 0.006;
-    CHECK(run(&box, scene, press_and_grab, 100) == 0xfa86fb8808a89bd4u);
+    CHECK(run(&box, scene, press_and_grasp, 100) == 0xfa86fb8808a89bd4u);
 }
 
 /* our stomach, held at one end, on three levels: pressed at the front and grabbed beside it, both let go; levels come
@@ -113,7 +113,7 @@ static void a_pressed_and_grabbed_stomach_that_adapts_has_its_golden_hash(void)
     pal_stomach stomach;
     REQUIRE(!pal_stomach_make(&stomach));
     const double *x = stomach.surface.x;
-    int front = 0, most = 0;
+    int front = 0, max = 0;
     for (int i = 0; i < stomach.surface.n_vertex; i++)
         if (x[3 * i + 2] > x[3 * front + 2]) front = i;
     double top[3], low[3], high[3];
@@ -138,11 +138,11 @@ static void a_pressed_and_grabbed_stomach_that_adapts_has_its_golden_hash(void)
         CHECK(!pal_world_pose(s.world, 0, i < 60 ? &press : NULL));
         CHECK(!pal_world_pose(s.world, 1, i < 70 ? &pull : NULL));
         REQUIRE(!pal_world_step(s.world, 1.0 / 60));
-        if (s.body->n_active > most) most = s.body->n_active;
+        if (s.body->n_active > max) max = s.body->n_active;
     }
-    CHECK(most > 250);
+    CHECK(max > 250);
     uint64_t hash = pal_world_hash(s.world);
-    printf("  hash %016llx, %d nodes at most\n", (unsigned long long)hash, most);
+    printf("  hash %016llx, %d nodes at most\n", (unsigned long long)hash, max);
     CHECK(hash == 0x2a5513e44ca608c5u);
     pal_world_reset(s.world);
     CHECK(pal_world_hash(s.world) == start);

@@ -64,14 +64,14 @@ static double apart(const pal_body *a, const pal_body *b)
 }
 
 /* the others of a step: how many are what they are without the disturbance, and how far off the worst one is */
-static int others(const fem_beam *hurt, const fem_beam *calm, int which, double *most_S)
+static int others(const fem_beam *hurt, const fem_beam *calm, int which, double *max_S)
 {
     int n = 0;
     for (int k = 0; k < 3; k++) {
         const pal_body *a = pal_world_body(hurt->world, k), *b = pal_world_body(calm->world, k);
         if (k == which) continue;
         n += same_bits(a, b);
-        *most_S = fmax(*most_S, apart(a, b));
+        *max_S = fmax(*max_S, apart(a, b));
     }
     return n;
 }
@@ -81,7 +81,7 @@ static void stop_one(disturbance *what, int which, bool springs, bool shared)
 {
     fem_beam hurt, calm;
     int n_same = 0, n_step = STEPS + 3;
-    double most_S = 0;
+    double max_S = 0;
     three_make(&hurt, springs);
     three_make(&calm, springs);
     const pal_body *stopped = pal_world_body(hurt.world, which);
@@ -89,15 +89,15 @@ static void stop_one(disturbance *what, int which, bool springs, bool shared)
         if (i == AT) what(hurt.world, which);
         (void)pal_world_step(hurt.world, hurt.scene->step_s);
         CHECK(!pal_world_step(calm.world, calm.scene->step_s));
-        n_same += others(&hurt, &calm, which, &most_S);
+        n_same += others(&hurt, &calm, which, &max_S);
         if (i != STEPS) continue;
         CHECK(stopped->frozen && stopped->reason[0] && stopped->safeguards.n_stopped == 1 && pal_body_finite(stopped));
         for (int k = 0; k < 3; k++) CHECK(pal_world_body(hurt.world, k)->frozen == (k == which));
         printf("  %s: %s\n", stopped->name, stopped->reason);
         CHECK(!pal_world_reset_body(hurt.world, which) && !stopped->frozen);
     }
-    printf("  %d of %d states of the others the same, %g S apart at most\n", n_same, 2 * n_step, most_S);
-    CHECK(!stopped->frozen && (shared ? most_S < 0.02 : n_same == 2 * n_step));
+    printf("  %d of %d states of the others the same, %g S apart at most\n", n_same, 2 * n_step, max_S);
+    CHECK(!stopped->frozen && (shared ? max_S < 0.02 : n_same == 2 * n_step));
     for (int k = 0; k < 3; k++) CHECK(pal_body_finite(pal_world_body(hurt.world, k)));
     beam_free(&hurt);
     beam_free(&calm);

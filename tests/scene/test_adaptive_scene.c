@@ -404,10 +404,10 @@ static void every_bad_key_has_its_sentence(void)
     for (size_t k = 0; k < sizeof bad / sizeof bad[0]; k++) {
         pal_loaded_scene *loaded;
         pal_world *world;
-        const char *said = try_text(bad[k].text, &loaded, &world);
+        const char *summary = try_text(bad[k].text, &loaded, &world);
         CHECK(world == NULL);
-        if (!strstr(said, bad[k].sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", said, bad[k].sentence);
-        if (strchr(said, '\n')) CHECK_FAIL("\"%s\" has a line end", said);
+        if (!strstr(summary, bad[k].sentence)) CHECK_FAIL("\"%s\" does not say \"%s\"", summary, bad[k].sentence);
+        if (strchr(summary, '\n')) CHECK_FAIL("\"%s\" has a line end", summary);
         pal_world_destroy(world);
         pal_scene_free(loaded);
     }

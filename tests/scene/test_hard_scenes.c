@@ -37,21 +37,21 @@ static void close_scene(hard_scene *s)
 /* percent of S, at most */
 static double off(const hard_scene *s)
 {
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < s->body->n_node; i++)
-        most = fmax(most, pal_dist3(s->body->d + 3 * i, s->body->node_rest + 3 * i));
-    return 100 * most / s->body->length_scale_m;
+        max = fmax(max, pal_dist3(s->body->d + 3 * i, s->body->node_rest + 3 * i));
+    return 100 * max / s->body->length_scale_m;
 }
 
 /* NaN: a step was refused, or the body frozen; else how far it was off rest at most */
 static double run(hard_scene *s, double seconds, double dt_s)
 {
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < (int)lround(seconds / dt_s); i++) {
         if (pal_world_step(s->world, dt_s) || !pal_body_finite(s->body) || s->body->frozen) return NAN;
-        most = fmax(most, off(s));
+        max = fmax(max, off(s));
     }
-    return most;
+    return max;
 }
 
 /* bulletphysics/bullet3 issue 3882 */
@@ -78,10 +78,10 @@ static void plausible_stiffness_holds_at_the_steps_of_documents(void)
     for (int k = 0; k < 2; k++) {
         hard_scene s;
         REQUIRE(open_scene(name[k], &s));
-        const double most = run(&s, k ? 0.5 : 1, s.loaded->scene.step_s);
-        printf("  %s: %.3g %% S at most, %.3g at the end\n", name[k], most, off(&s));
-        HARD_CASE("docs_step", model[k], "scene: farthest that a cube of 50 kPa sags", most, 2, "% S");
-        CHECK(most > 0.1);
+        const double max = run(&s, k ? 0.5 : 1, s.loaded->scene.step_s);
+        printf("  %s: %.3g %% S at most, %.3g at the end\n", name[k], max, off(&s));
+        HARD_CASE("docs_step", model[k], "scene: farthest that a cube of 50 kPa sags", max, 2, "% S");
+        CHECK(max > 0.1);
         close_scene(&s);
     }
 }
@@ -91,16 +91,16 @@ static void a_body_follows_its_anchor(void)
 {
     hard_scene s;
     REQUIRE(open_scene("anchors", &s));
-    double most = run(&s, 2, 1.0 / 60), stretch = 0;
+    double max = run(&s, 2, 1.0 / 60), stretch = 0;
     /* led nodes stand to one another as at rest, and the others are not far from them */
     for (int i = 0; i < s.body->n_node; i++)
         for (int j = 0; j < i; j++)
             stretch = fmax(stretch, fabs(pal_dist3(s.body->x + 3 * i, s.body->x + 3 * j) -
                                          pal_dist3(s.body->x_rest + 3 * i, s.body->x_rest + 3 * j)));
-    printf("  %.3g %% S away at most, distances change by %.3g %% S\n", most, 100 * stretch / s.body->length_scale_m);
+    printf("  %.3g %% S away at most, distances change by %.3g %% S\n", max, 100 * stretch / s.body->length_scale_m);
     HARD_CASE("anchors", "fem", "scene: to and fro with 1.7 Hz, distances change by",
               100 * stretch / s.body->length_scale_m, 5, "% S");
-    CHECK(most > 20);
+    CHECK(max > 20);
     close_scene(&s);
 }
 
@@ -135,7 +135,7 @@ static void levels_do_not_flicker_at_the_threshold(void)
     const pal_adaptive_surface *adaptive = s.body->model.adaptive;
     const int n = adaptive->levels.first_face[adaptive->levels.n_level];
     uint8_t *was = malloc((size_t)n);
-    int *switched = calloc((size_t)n, sizeof *switched), most = 0, top = 0, nodes = 0;
+    int *switched = calloc((size_t)n, sizeof *switched), max = 0, top = 0, nodes = 0;
     for (int k = 0; k < s.body->n_active; k++)
         if (s.body->x_rest[3 * pal_body_point(s.body, k) + 2] > s.body->x_rest[3 * top + 2])
             top = pal_body_point(s.body, k);
@@ -147,13 +147,13 @@ static void levels_do_not_flicker_at_the_threshold(void)
         nodes = s.body->n_active > nodes ? s.body->n_active : nodes;
         for (int k = 0; k < n; k++) {
             switched[k] += (adaptive->face_state[k] == PAL_FACE_SPLIT) != (was[k] == PAL_FACE_SPLIT);
-            most = switched[k] > most ? switched[k] : most;
+            max = switched[k] > max ? switched[k] : max;
             was[k] = adaptive->face_state[k];
         }
     }
-    printf("  %d switches of a face in 2 s at most, %d nodes of %d\n", most, nodes, s.body->n_node);
+    printf("  %d switches of a face in 2 s at most, %d nodes of %d\n", max, nodes, s.body->n_node);
     CHECK(nodes > 386 && nodes < 500);
-    HARD_CASE("threshold", "adaptive_springs", "scene: most switches of a face in a second", 0.5 * most, 5, "");
+    HARD_CASE("threshold", "adaptive_springs", "scene: most switches of a face in a second", 0.5 * max, 5, "");
     free(was), free(switched);
     close_scene(&s);
 }

@@ -243,10 +243,10 @@ static void pieces_of_an_adaptive_surface_all_stay(void)
     REQUIRE(!pal_world_create(&loaded->scene, &diag, &world));
     for (int k = 0; k < 60; k++) REQUIRE(!pal_world_step(world, loaded->scene.step_s));
     const pal_body *body = pal_world_body(world, 0);
-    double most = 0;
-    for (int i = 0; i < body->n_node; i++) most = fmax(most, fabs(body->d[3 * i + 2] - body->node_rest[3 * i + 2]));
+    double max = 0;
+    for (int i = 0; i < body->n_node; i++) max = fmax(max, fabs(body->d[3 * i + 2] - body->node_rest[3 * i + 2]));
     /* a second of free fall is 4.9 m */
-    CHECK_LE(most, 0.05);
+    CHECK_LE(max, 0.05);
     pal_world_destroy(world);
     pal_scene_free(loaded);
 }

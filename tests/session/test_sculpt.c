@@ -1,5 +1,5 @@
-/* Sculpting (A 4.1): a command makes another scene or changes nothing, the body goes on where it was, undo brings back
- * every bit; and thousands of commands one after the other leave a solid that can be simulated. */
+/* Sculpting (paper A section 4.1): a command makes another scene or changes nothing, the body goes on where it was,
+ * undo brings back every bit; and thousands of commands one after the other leave a solid that can be simulated. */
 #include "server/num/random.h"
 #include "server/session/sculpt.h"
 #include "server/sim/subdivision/subdivision_solid.h"
@@ -262,9 +262,9 @@ static void a_shape_that_is_kept_rests_where_it_is(void)
     CHECK(!memcmp(body->x_rest, x, 3 * sizeof *x * (size_t)n));
     CHECK_LE(pal_world_energy_J(s.world), 1e-16);
     steps(&s, 20);
-    double most = 0;
-    for (int i = 0; i < 3 * n; i++) most = fmax(most, fabs(pal_world_body(s.world, 0)->x[i] - x[i]));
-    CHECK_LE(most, 1e-12);
+    double max = 0;
+    for (int i = 0; i < 3 * n; i++) max = fmax(max, fabs(pal_world_body(s.world, 0)->x[i] - x[i]));
+    CHECK_LE(max, 1e-12);
     /* and what is folded cannot be kept */
     for (int i = 0; i < n; i++) x[3 * i + 2] = -x[3 * i + 2];
     CHECK_INT(studio_do(&s, &(pal_sculpt){.kind = PAL_SCULPT_SET_REST, .point_m = x, .n_point = n}), PAL_ERR_REFUSED);

@@ -42,9 +42,9 @@ static void the_limit_is_the_bodys_and_its_node_is_found(void)
     REQUIRE(!pal_preflight_run(scene, PAL_PREFLIGHT_FULL, &p, &diag));
     CHECK(p.body[0].n_sliver > 0 && p.body[0].n_sliver <= p.body[0].flat.n);
     n_line = pal_preflight_describe(b, line);
-    bool told = false;
-    for (int i = 0; i < n_line; i++) told |= strstr(line[i], "springs leave the volume out") != NULL;
-    CHECK(told);
+    bool reported = false;
+    for (int i = 0; i < n_line; i++) reported |= strstr(line[i], "springs leave the volume out") != NULL;
+    CHECK(reported);
     /* without a row of volumes they are no slivers to anybody */
     pal_entry_put_number(&scene->body[0].model, "k_volume_J", 0, NULL);
     REQUIRE(!pal_preflight_run(scene, PAL_PREFLIGHT_FULL, &p, &diag));
@@ -106,7 +106,7 @@ static void elements_that_lock_are_named_with_one_that_does_not(void)
             fem_beam b;
             pal_preflight p;
             char line[PAL_PREFLIGHT_LINES][PAL_PREFLIGHT_LINE];
-            bool told = false;
+            bool reported = false;
             beam_make(&b, 4, 2, 2, 0.01, true);
             beam_element(&b, of[i].element, "corotational");
             b.def->material.poisson = in_region ? 0.3 : of[i].poisson;
@@ -115,9 +115,9 @@ static void elements_that_lock_are_named_with_one_that_does_not(void)
             if (in_region) b.def->region[b.def->n_region++] = region;
             REQUIRE(!pal_preflight_run(b.scene, PAL_PREFLIGHT_QUICK, &p, &diag));
             for (int k = pal_preflight_describe(&p.body[0], line) - 1; k >= 0; k--)
-                told |= strstr(line[k], "locks at Poisson's ratio") && of[i].instead &&
-                        strstr(line[k], of[i].element) && strstr(line[k], of[i].instead);
-            CHECK_INT(told, of[i].instead != NULL);
+                reported |= strstr(line[k], "locks at Poisson's ratio") && of[i].instead &&
+                            strstr(line[k], of[i].element) && strstr(line[k], of[i].instead);
+            CHECK_INT(reported, of[i].instead != NULL);
             CHECK((p.body[0].locks != NULL) == (of[i].instead != NULL));
             beam_free(&b);
         }

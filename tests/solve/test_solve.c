@@ -252,13 +252,13 @@ static void files_hold_what_was_solved(void)
     CHECK_INT(pal_solution_vtk(s, vtk, &diag), 0);
     FILE *file = fopen(vtk, "r");
     int n_point = 0, n_cell = 0, n_vector = 0, n_scalar = 0;
-    double stress[4] = {0}, least = INFINITY, most = 0;
+    double stress[4] = {0}, min = INFINITY, max = 0;
     while (file && fgets(line, sizeof line, file)) {
         sscanf(line, "POINTS %d", &n_point);
         sscanf(line, "CELLS %d", &n_cell);
         n_vector += !strncmp(line, "VECTORS displacement_m", 22);
         if (n_scalar > 0 && sscanf(line, "%lf", &stress[0]) == 1)
-            least = fmin(least, stress[0]), most = fmax(most, stress[0]);
+            min = fmin(min, stress[0]), max = fmax(max, stress[0]);
         n_scalar += !strncmp(line, "SCALARS von_mises_Pa", 20);
     }
     if (file) fclose(file);
@@ -266,8 +266,8 @@ static void files_hold_what_was_solved(void)
     CHECK_INT(n_cell, r.n_element);
     CHECK_INT(n_vector, 1);
     CHECK_INT(n_scalar, 1);
-    CHECK_NEAR(least, 200, 1e-6); /* uniaxial: the traction itself */
-    CHECK_NEAR(most, 200, 1e-6);
+    CHECK_NEAR(min, 200, 1e-6); /* uniaxial: the traction itself */
+    CHECK_NEAR(max, 200, 1e-6);
     CHECK_INT(pal_solution_csv(s, "/nowhere/at/all.csv", &diag), PAL_ERR_IO);
     CHECK_INT(pal_solution_vtk(s, "/nowhere/at/all.vtk", &diag), PAL_ERR_IO);
     pal_solution_free(s);

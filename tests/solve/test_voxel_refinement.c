@@ -28,7 +28,7 @@ static void the_body_stays_and_its_voxels_shrink(void)
         pal_diagnostic diag = {""};
         REQUIRE(make_organ(&p));
         int n_hex = p.hexes.n_hex, cubes = split * split * split;
-        double h = p.tets.edge_m, volume = filled(&p), low[2] = {INFINITY, INFINITY}, least = 1, share = 1;
+        double h = p.tets.edge_m, volume = filled(&p), low[2] = {INFINITY, INFINITY}, min = 1, share = 1;
         float *fill = malloc(sizeof *fill * (size_t)n_hex);
         double *corner = malloc(3 * sizeof *corner * (size_t)n_hex);
         REQUIRE(fill && corner);
@@ -57,10 +57,10 @@ static void the_body_stays_and_its_voxels_shrink(void)
                 if (in) at = k;
             }
             if (at < 0 || p.hexes.fill[e] != fill[at]) share = 0;
-            least = fmin(least, (double)p.hexes.fill[e]);
+            min = fmin(min, (double)p.hexes.fill[e]);
         }
         CHECK_NEAR(share, 1, 0);
-        CHECK(least < 0.5); /* there are cut voxels */
+        CHECK(min < 0.5); /* there are cut voxels */
         free(fill);
         free(corner);
         pal_prepared_free(&p);

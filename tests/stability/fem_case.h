@@ -85,9 +85,9 @@ static inline double hard_energy_J(const fem_beam *b)
     return fmax(now, other);
 }
 
-enum { HARD_PLANE, HARD_POINT, HARD_MIRROR, HARD_BLOWN, HARD_SHUFFLE, HARD_SWAP, HARD_INSULTS };
+enum { HARD_PLANE, HARD_POINT, HARD_MIRROR, HARD_BLOWN, HARD_SHUFFLE, HARD_SWAP, HARD_CASES };
 
-static inline void hard_insult(fem_beam *b, int insult, uint64_t seed)
+static inline void hard_case(fem_beam *b, int trial_case, uint64_t seed)
 {
     pal_body *body = b->body;
     double low[3], high[3];
@@ -99,13 +99,13 @@ static inline void hard_insult(fem_beam *b, int insult, uint64_t seed)
     for (int i = body->n_node - 1; i >= 0; i--) {
         double *x = body->x + 3 * i;
         if (body->support[i]) continue;
-        if (insult == HARD_PLANE) x[2] = 0.3 * high[2];
-        if (insult == HARD_POINT) pal_set3(x, 0.3 * high[0], 0.3 * high[1], 0.3 * high[2]);
-        if (insult == HARD_MIRROR) x[0] = high[0] - x[0];
-        if (insult == HARD_BLOWN) pal_scale3(x, 100, x);
-        if (insult == HARD_SHUFFLE)
+        if (trial_case == HARD_PLANE) x[2] = 0.3 * high[2];
+        if (trial_case == HARD_POINT) pal_set3(x, 0.3 * high[0], 0.3 * high[1], 0.3 * high[2]);
+        if (trial_case == HARD_MIRROR) x[0] = high[0] - x[0];
+        if (trial_case == HARD_BLOWN) pal_scale3(x, 100, x);
+        if (trial_case == HARD_SHUFFLE)
             for (int c = 0; c < 3; c++) x[c] = low[c] + random_unit(&seed) * (high[c] - low[c]);
-        if (insult == HARD_SWAP) {
+        if (trial_case == HARD_SWAP) {
             int j = (int)(random_unit(&seed) * (i + 1));
             if (body->support[j]) continue;
             double keep[3];
@@ -120,7 +120,7 @@ static inline void hard_insult(fem_beam *b, int insult, uint64_t seed)
 /* what a run of steps saw */
 typedef struct hard_run {
     bool finite;
-    double most; /* energy less the work of lasting loads, over that at the begin */
+    double max;  /* energy less the work of lasting loads, over that at the begin */
     double rise; /* largest rise of it in one step in which cubes and split did not change, over that at the begin */
     double return_s; /* when it was within 0.1 % S of rest for good with no element inverted; INFINITY: was not */
 } hard_run;
@@ -131,14 +131,14 @@ static inline void hard_steps(fem_beam *b, double seconds, double dt_s, hard_run
     before -= hard_work_J(b->body);
     int n = (int)lround(seconds / dt_s);
     const double size = fabs(first) > 0 ? fabs(first) : 1;
-    *out = (hard_run){.finite = true, .most = 0, .return_s = INFINITY};
+    *out = (hard_run){.finite = true, .max = 0, .return_s = INFINITY};
     for (int i = 0; i < n; i++) {
         uint64_t split = b->body->safeguards.n_split;
         pal_err err = pal_world_step(b->world, dt_s);
         out->finite = out->finite && !err && pal_body_finite(b->body) && !b->body->frozen;
         if (!out->finite) return;
         double now = pal_world_energy_J(b->world) - hard_work_J(b->body);
-        out->most = fmax(out->most, now / size);
+        out->max = fmax(out->max, now / size);
         if (b->body->safeguards.n_split == split) out->rise = fmax(out->rise, (now - before) / size);
         before = now;
         if (hard_rms(b->body) > 1e-3 * b->body->length_scale_m || hard_inverted(b) > 0)

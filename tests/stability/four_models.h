@@ -124,11 +124,11 @@ static inline double four_off(const four *s)
 static inline int four_top(const four *s)
 {
     int best = -1;
-    double most = -INFINITY;
+    double max = -INFINITY;
     for (int k = 0; k < pal_body_nodes(s->body); k++) {
         const int i = s->body->interpolation ? k : pal_body_point(s->body, k);
         const double *x = s->body->node_rest + 3 * i, at = x[2] - 0.01 * fabs(x[0] - x[1]);
-        if (at > most) most = at, best = i;
+        if (at > max) max = at, best = i;
     }
     return best;
 }
@@ -162,11 +162,11 @@ static inline void four_load(four *s, const double force_N[3])
 /* largest distance between points of two worlds of the same body, percent of S */
 static inline double four_apart(const four *a, const double *x)
 {
-    double most = 0;
+    double max = 0;
     for (int k = 0; k < a->body->n_active; k++) {
         const int i = pal_body_point(a->body, k);
-        most = fmax(most, pal_dist3(a->body->x + 3 * i, x + 3 * i));
+        max = fmax(max, pal_dist3(a->body->x + 3 * i, x + 3 * i));
     }
-    return 100 * most / a->body->length_scale_m;
+    return 100 * max / a->body->length_scale_m;
 }
 #endif

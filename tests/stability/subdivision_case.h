@@ -86,10 +86,10 @@ static inline void solid_momentum(const pal_body *body, double linear[3], double
     free(q);
 }
 
-enum { SOLID_PLANE, SOLID_POINT, SOLID_MIRROR, SOLID_BLOWN, SOLID_SHUFFLE, SOLID_SWAP, SOLID_INSULTS };
+enum { SOLID_PLANE, SOLID_POINT, SOLID_MIRROR, SOLID_BLOWN, SOLID_SHUFFLE, SOLID_SWAP, SOLID_CASES };
 static const char *const solid_insults[] = {"plane", "point", "mirror", "x 100", "shuffle", "swap"};
 
-static inline void solid_insult(solid_scene *s, int insult, uint64_t seed)
+static inline void solid_case(solid_scene *s, int trial_case, uint64_t seed)
 {
     pal_body *body = s->body;
     double low[3], high[3];
@@ -101,13 +101,13 @@ static inline void solid_insult(solid_scene *s, int insult, uint64_t seed)
     for (int i = body->n_dof - 1; i >= 0; i--) {
         double *x = body->x + 3 * i;
         if (body->support[i]) continue;
-        if (insult == SOLID_PLANE) x[2] = 0.3 * high[2];
-        if (insult == SOLID_POINT) pal_set3(x, 0.3 * high[0], 0.3 * high[1], 0.3 * high[2]);
-        if (insult == SOLID_MIRROR) x[0] = high[0] - x[0];
-        if (insult == SOLID_BLOWN) pal_scale3(x, 100, x);
-        if (insult == SOLID_SHUFFLE)
+        if (trial_case == SOLID_PLANE) x[2] = 0.3 * high[2];
+        if (trial_case == SOLID_POINT) pal_set3(x, 0.3 * high[0], 0.3 * high[1], 0.3 * high[2]);
+        if (trial_case == SOLID_MIRROR) x[0] = high[0] - x[0];
+        if (trial_case == SOLID_BLOWN) pal_scale3(x, 100, x);
+        if (trial_case == SOLID_SHUFFLE)
             for (int c = 0; c < 3; c++) x[c] = low[c] + random_unit(&seed) * (high[c] - low[c]);
-        if (insult == SOLID_SWAP) {
+        if (trial_case == SOLID_SWAP) {
             int j = (int)(random_unit(&seed) * (i + 1));
             double keep[3];
             if (body->support[j]) continue;
@@ -123,7 +123,7 @@ static inline void solid_insult(solid_scene *s, int insult, uint64_t seed)
 /* what a run of steps saw */
 typedef struct solid_run {
     bool finite;
-    double most;     /* energy less the work of lasting loads, over that at the begin */
+    double max;      /* energy less the work of lasting loads, over that at the begin */
     double rise;     /* largest rise of it in one step, over that at the begin */
     double return_s; /* when it was within 0.1 % S of rest for good with no element inverted; INFINITY: was not */
 } solid_run;
@@ -133,13 +133,13 @@ static inline void solid_steps(solid_scene *s, double seconds, double dt_s, soli
     double first = pal_world_energy_J(s->world) - solid_work_J(s->body), before = first;
     int n = (int)lround(seconds / dt_s);
     const double size = fabs(first) > 0 ? fabs(first) : 1;
-    *out = (solid_run){.finite = true, .most = 0, .return_s = INFINITY};
+    *out = (solid_run){.finite = true, .max = 0, .return_s = INFINITY};
     for (int i = 0; i < n; i++) {
         pal_err err = pal_world_step(s->world, dt_s);
         out->finite = out->finite && !err && pal_body_finite(s->body) && !s->body->frozen;
         if (!out->finite) return;
         double now = pal_world_energy_J(s->world) - solid_work_J(s->body);
-        out->most = fmax(out->most, now / size), out->rise = fmax(out->rise, (now - before) / size);
+        out->max = fmax(out->max, now / size), out->rise = fmax(out->rise, (now - before) / size);
         before = now;
         if (solid_rms(s->body) > 1e-3 * s->body->length_scale_m || solid_inverted(s) > 0)
             out->return_s = INFINITY;

@@ -1,4 +1,4 @@
-/* A beam in many settings, for the tests of live switches (sim/transfer.h). */
+/* A beam in many settings, for the tests of live switches (server/sim/transfer/transfer.h). */
 #ifndef TESTS_STABILITY_SWITCH_BEAM_H
 #define TESTS_STABILITY_SWITCH_BEAM_H
 #include "server/base/vec3.h"

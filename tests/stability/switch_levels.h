@@ -4,7 +4,7 @@
 #include "tests/fixtures/random.h"
 #include "tests/stability/switch_beam.h"
 
-enum { LEVELS_MOST_SWITCH = 24 };
+enum { LEVELS_MAX_SWITCH = 24 };
 
 /* settings 0, 1 and 2: 1, 2 and 3 levels */
 static void begin_surface(beam *b, bool fixed, double young_Pa, double damping_1_s, pal_prepared *surface)
@@ -23,14 +23,14 @@ static void begin_surface(beam *b, bool fixed, double young_Pa, double damping_1
 static double farthest_vertex(pal_world *w, double *x, int n)
 {
     const pal_body *body = pal_world_view_body(w, 0);
-    double most = 0;
+    double max = 0;
     for (int k = 0; k < body->n_active; k++) {
         int i = body->active[k];
-        if (i < n && !isnan(x[3 * i])) most = fmax(most, pal_dist3(x + 3 * i, body->x + 3 * i));
+        if (i < n && !isnan(x[3 * i])) max = fmax(max, pal_dist3(x + 3 * i, body->x + 3 * i));
     }
     for (int i = 0; i < 3 * n; i++) x[i] = NAN;
     for (int k = 0; k < body->n_active; k++) pal_copy3(x + 3 * body->active[k], body->x + 3 * body->active[k]);
-    return most;
+    return max;
 }
 
 /* a tool closes at `from` and goes up by up_m in `lift` steps, and on by `creep` of that in each step; wait[k] steps in
@@ -38,7 +38,7 @@ static double farthest_vertex(pal_world *w, double *x, int n)
 typedef struct pull_plan {
     bool turned;
     double from_m[3], up_m, creep;
-    int lift, n, setting[LEVELS_MOST_SWITCH + 1], wait[LEVELS_MOST_SWITCH + 1];
+    int lift, n, setting[LEVELS_MAX_SWITCH + 1], wait[LEVELS_MAX_SWITCH + 1];
 } pull_plan;
 
 /* what was worst in rows of switches: energy; way of a vertex in a step, of what is shown; force in the step after a

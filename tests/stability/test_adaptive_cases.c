@@ -44,26 +44,25 @@ static double total_mass(const pal_body *body)
  * returns the distance from rest at the end over the size */
 static double run_bounded(shell_scene *s, double seconds)
 {
-    double start = pal_world_energy_J(s->world), most = 0, mass = total_mass(s->body), off = 0;
+    double start = pal_world_energy_J(s->world), max = 0, mass = total_mass(s->body), off = 0;
     for (int i = 0; i < (int)(seconds * STEPS_A_SECOND); i++) {
         if (pal_world_step(s->world, 1.0 / STEPS_A_SECOND) || !pal_body_finite(s->body)) return NAN;
-        most = fmax(most, pal_world_energy_J(s->world));
+        max = fmax(max, pal_world_energy_J(s->world));
         off = fmax(off, fabs(total_mass(s->body) / mass - 1));
     }
-    CHECK_LE(most, 1.01 * start);
+    CHECK_LE(max, 1.01 * start);
     CHECK_LE(off, 1e-12);
     CHECK(!s->body->frozen);
     return shell_scene_rms(s) / s->body->length_scale_m;
 }
 
-typedef enum insult { FLAT, POINT, MIRRORED, SHUFFLED, BLOWN_UP, INVERTED, TOUCHING, INSULTS } insult;
-static const char *const insult_name[INSULTS] = {
-    "flat", "on a point", "mirrored", "shuffled in its box", "blown up", "turned inside out", "walls touching"};
+typedef enum trial_case { FLAT, POINT, MIRRORED, SHUFFLED, BLOWN_UP, INVERTED, TOUCHING, CASES } trial_case;
+static const char *const case_name[CASES] = {"flat",     "on a point",        "mirrored",      "shuffled in its box",
+                                             "blown up", "turned inside out", "walls touching"};
 
-static const char *const insult_case[INSULTS] = {"plane",    "point",    "mirror",  "shuffle",
-                                                 "blown_up", "inverted", "inverted"};
+static const char *const case_case[CASES] = {"plane", "point", "mirror", "shuffle", "blown_up", "inverted", "inverted"};
 
-static void insult_node(const double *rest, insult kind, double *x)
+static void case_node(const double *rest, trial_case kind, double *x)
 {
     switch (kind) {
     case FLAT:
@@ -92,7 +91,7 @@ static void insult_node(const double *rest, insult kind, double *x)
     }
 }
 
-static void insulted(insult kind, double seconds, double back)
+static void insulted(trial_case kind, double seconds, double back)
 {
     for (int run = 0; run < KINDS; run++) {
         shell_scene s;
@@ -101,14 +100,13 @@ static void insulted(insult kind, double seconds, double back)
         REQUIRE(shell_scene_start(&s));
         for (int k = 0; k < s.body->n_active; k++) {
             int i = pal_body_point(s.body, k);
-            if (!s.body->support[i]) insult_node(s.body->x_rest + 3 * i, kind, s.body->x + 3 * i);
+            if (!s.body->support[i]) case_node(s.body->x_rest + 3 * i, kind, s.body->x + 3 * i);
         }
         pal_world_invalidate_limits(s.world, 0);
         double left = run_bounded(&s, seconds);
-        printf("  %s, %s: %.3g of its size left, %d nodes\n", insult_name[kind], kind_name[run], left,
-               s.body->n_active);
+        printf("  %s, %s: %.3g of its size left, %d nodes\n", case_name[kind], kind_name[run], left, s.body->n_active);
         CHECK_LE(left, back);
-        HARD_CASE(insult_case[kind], "adaptive_springs", "off rest after 1.2 s", 100 * left, 0.1, "% S");
+        HARD_CASE(case_case[kind], "adaptive_springs", "off rest after 1.2 s", 100 * left, 0.1, "% S");
         shell_scene_close(&s);
     }
 }
@@ -245,15 +243,15 @@ static void a_patch_a_thousand_times_as_stiff_is_borne(void)
             REQUIRE(!pal_world_step(s.world, 1.0 / STEPS_A_SECOND));
         }
         /* the stiff cap keeps its shape: distances within it hardly change */
-        double most = 0;
+        double max = 0;
         const pal_body *b = s.body;
         for (int i = 0; i < s.mesh.surface.n_vertex; i++)
             for (int j = 0; j < i; j++) {
                 const double *p = b->x_rest + 3 * i, *q = b->x_rest + 3 * j;
                 if (p[2] < 0.62 * radius_m || q[2] < 0.62 * radius_m) continue;
-                most = fmax(most, fabs(pal_dist3(b->x + 3 * i, b->x + 3 * j) / pal_dist3(p, q) - 1));
+                max = fmax(max, fabs(pal_dist3(b->x + 3 * i, b->x + 3 * j) / pal_dist3(p, q) - 1));
             }
-        CHECK_LE(most, 0.02);
+        CHECK_LE(max, 0.02);
         shell_scene_press(&s, side, 0.02, (const double[3]){0, 0, 0});
         /* wholly refined only as long as it takes to see that it is bounded */
         double left = run_bounded(&s, run == REFINED ? 0.1 : CHECK_REPEATS(0.7, 0.2));
@@ -318,7 +316,7 @@ static void a_free_shell_keeps_its_momentum(void)
     pal_body_momentum(s.body, before);
     CHECK_NEAR(before[0], 0.2 * 0.1, 1e-6);
     CHECK_NEAR(before[2], -0.3 * 0.1, 1e-6);
-    int least = s.body->n_active, most = least;
+    int min = s.body->n_active, max = min;
     double energy = pal_world_energy_J(s.world), high = energy;
     uint64_t revision = 0;
     for (int i = 0; i < CHECK_REPEATS(10000, 360); i++) {
@@ -326,16 +324,16 @@ static void a_free_shell_keeps_its_momentum(void)
         if (i == 2 * STEPS_A_SECOND) revision = s.body->revision;
         /* after six seconds what is left is a steady turn, and that changes nothing */
         if (i == 6 * STEPS_A_SECOND - 1) CHECK_INT(s.body->revision, revision);
-        least = s.body->n_active < least ? s.body->n_active : least;
-        most = s.body->n_active > most ? s.body->n_active : most;
+        min = s.body->n_active < min ? s.body->n_active : min;
+        max = s.body->n_active > max ? s.body->n_active : max;
         high = fmax(high, pal_world_energy_J(s.world));
     }
     pal_body_momentum(s.body, after);
     HARD_CASE("momentum", "adaptive_springs", "drift of momentum in 10,000 steps, levels changing",
               pal_dist3(before, after) / pal_norm3(before), 1e-4, "");
     HARD_CASE("no_drag", "adaptive_springs", "levels changing: energy over the first", high / energy, 1.01, "");
-    printf("  %d to %d nodes while it flew\n", least, most);
-    CHECK(most > least);
+    printf("  %d to %d nodes while it flew\n", min, max);
+    CHECK(max > min);
     shell_scene_close(&s);
 }
 

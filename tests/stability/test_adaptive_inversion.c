@@ -53,16 +53,16 @@ static void put_turned(shell_scene *s, const double quat[4], double stretch)
 static double not_rigid(const shell_scene *s)
 {
     pal_rigid_fit frame = {.quat = {1, 0, 0, 0}};
-    double most = 0, at[3];
+    double max = 0, at[3];
     pal_adaptive_fit_rigid(s->body->model.adaptive, s->body, &frame);
     for (int k = 0; k < s->body->n_active; k++) {
         const int i = pal_body_point(s->body, k);
         pal_sub3(at, s->body->x_rest + 3 * i, frame.rest_centre_m);
         pal_mul33(at, frame.R, at);
         pal_add3(at, at, frame.centre_m);
-        most = fmax(most, pal_dist3(at, s->body->x + 3 * i));
+        max = fmax(max, pal_dist3(at, s->body->x + 3 * i));
     }
-    return most / s->body->length_scale_m;
+    return max / s->body->length_scale_m;
 }
 
 /* energy of the body stretched by one hundredth every way */
@@ -120,17 +120,17 @@ static void ten_thousand_turns_strain_nothing(void)
     shell_scene_text(&s, "frame", "body");
     REQUIRE(shell_scene_start(&s));
     const double strained = strained_J(&s);
-    double most = 0;
+    double max = 0;
     for (int i = 1; i <= n; i++) {
         const double axis[3] = {0.3 * sin(1e-3 * i), 0.3 * cos(1e-3 * i), 1};
         turn_quat(axis, 2 * M_PI * fmod(stride * i, 1), quat);
         put_turned(&s, quat, 1);
         REQUIRE(!pal_world_step(s.world, step_s));
-        most = fmax(most, pal_world_energy_J(s.world));
+        max = fmax(max, pal_world_energy_J(s.world));
     }
     printf("  %.0f turns: at most %.2g of the energy of 1 %% strain, rigid to %.2g of its size\n", n * stride,
-           most / strained, not_rigid(&s));
-    HARD_CASE("many_turns", "adaptive_springs", "energy over that of 1 % strain", most / strained, 1e-6, "");
+           max / strained, not_rigid(&s));
+    HARD_CASE("many_turns", "adaptive_springs", "energy over that of 1 % strain", max / strained, 1e-6, "");
     CHECK_LE(not_rigid(&s), 1e-5);
     for (int i = 0; i < STEPS_A_SECOND; i++) REQUIRE(!pal_world_step(s.world, step_s));
     CHECK_LE(pal_world_energy_J(s.world), 1e-6 * strained);
@@ -170,15 +170,15 @@ static void a_spinning_shell_keeps_its_angular_momentum(void)
         angular_momentum(s.body, before);
         const double start = pal_world_energy_J(s.world);
         const int turns = CHECK_REPEATS(100, 10);
-        double most = 0;
+        double max = 0;
         for (int i = 0; i < turns * STEPS_A_SECOND; i++) {
             REQUIRE(!pal_world_step(s.world, step_s));
-            most = fmax(most, pal_world_energy_J(s.world));
+            max = fmax(max, pal_world_energy_J(s.world));
         }
         angular_momentum(s.body, after);
         printf("  %d s: angular momentum changed by %.2g, energy %.4f of what it was, %d nodes\n", turns,
                pal_dist3(before, after) / pal_norm3(before), pal_world_energy_J(s.world) / start, s.body->n_active);
-        CHECK_LE(most, 1.01 * start);
+        CHECK_LE(max, 1.01 * start);
         /* rk4 keeps it to its order: 1e-4 in 10,000 steps is what may be gained, ten times that lost */
         CHECK_LE(pal_dist3(before, after), 1e-3 * pal_norm3(before));
         CHECK_LE(pal_norm3(after), (1 + 1e-4) * pal_norm3(before));
@@ -200,7 +200,7 @@ static void an_hour_at_rest_under_load_moves_nothing(void)
     shell_scene_hold(&s, (const double[3]){-1, -1, -1}, (const double[3]){1, 1, -0.9 * radius_m});
     REQUIRE(shell_scene_start(&s));
     const int settled = 120 * STEPS_A_SECOND, hour = CHECK_REPEATS(3600, 300) * STEPS_A_SECOND;
-    double at[3 * 32], drift = 0, most_J = 0, strained = 0;
+    double at[3 * 32], drift = 0, max_J = 0, strained = 0;
     uint64_t revision = 0;
     REQUIRE(s.body->n_node <= 32);
     for (int i = 0; i < settled; i++) {
@@ -213,13 +213,13 @@ static void an_hour_at_rest_under_load_moves_nothing(void)
     CHECK(shell_scene_rms(&s) > 1e-3 * s.body->length_scale_m);
     for (int i = 0; i < hour; i++) {
         REQUIRE(!pal_world_step(s.world, step_s));
-        most_J = fmax(most_J, pal_body_kinetic_J(s.body));
+        max_J = fmax(max_J, pal_body_kinetic_J(s.body));
     }
     for (int i = 0; i < s.body->n_node; i++) drift = fmax(drift, pal_dist3(at + 3 * i, s.body->x + 3 * i));
     printf("  %d s: drift %.2g of its size, kinetic energy %.2g of the elastic one\n", hour / STEPS_A_SECOND,
-           drift / s.body->length_scale_m, most_J / strained);
+           drift / s.body->length_scale_m, max_J / strained);
     HARD_CASE("hour", "adaptive_springs", "drift in an hour", drift / s.body->length_scale_m, 1e-6, "S");
-    HARD_CASE("hour", "adaptive_springs", "kinetic energy over what is stored", most_J / strained, 1e-9, "");
+    HARD_CASE("hour", "adaptive_springs", "kinetic energy over what is stored", max_J / strained, 1e-9, "");
     CHECK_INT(s.body->revision, revision);
     shell_scene_close(&s);
 }
@@ -247,13 +247,13 @@ static int switch_support(shell_scene *s, const double low[3], const double high
  */
 static double run_bounded(shell_scene *s, double seconds)
 {
-    double start = pal_world_energy_J(s->world), most = 0;
+    double start = pal_world_energy_J(s->world), max = 0;
     for (int i = 0; i < (int)(seconds * STEPS_A_SECOND); i++) {
         if (pal_world_step(s->world, step_s) || !pal_body_finite(s->body) || s->body->frozen) return NAN;
-        most = fmax(most, pal_world_energy_J(s->world));
+        max = fmax(max, pal_world_energy_J(s->world));
     }
-    printf("  most %.4f of the energy at the switch, %d nodes\n", most / start, s->body->n_active);
-    HARD_CASE("supports", "adaptive_springs", "rise of energy after a switch", 100 * fmax(0, most / start - 1), 1, "%");
+    printf("  most %.4f of the energy at the switch, %d nodes\n", max / start, s->body->n_active);
+    HARD_CASE("supports", "adaptive_springs", "rise of energy after a switch", 100 * fmax(0, max / start - 1), 1, "%");
     return shell_scene_rms(s) / s->body->length_scale_m;
 }
 

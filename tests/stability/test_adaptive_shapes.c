@@ -169,7 +169,7 @@ static void take(shell_scene *s, int kind, bool other)
 
 typedef struct seen {
     uint64_t hash;
-    int most, least;
+    int max, min;
     double mass_off;
 } seen;
 
@@ -183,8 +183,8 @@ static void watch(const shell_scene *s, double mass_kg, seen *w)
     }
     w->mass_off = fmax(w->mass_off, fabs(sum / mass_kg - 1));
     w->hash = 31 * w->hash + pal_world_hash(s->world);
-    w->most = s->body->n_active > w->most ? s->body->n_active : w->most;
-    w->least = s->body->n_active < w->least ? s->body->n_active : w->least;
+    w->max = s->body->n_active > w->max ? s->body->n_active : w->max;
+    w->min = s->body->n_active < w->min ? s->body->n_active : w->min;
 }
 
 /* one tool pulls vertex 0 away, the other comes down on the last one */
@@ -203,7 +203,7 @@ static void pose_tools(shell_scene *s, int step)
 /* a press, a blow, 1.5 s free */
 static seen handle(shell_scene *s, double mass_kg)
 {
-    seen w = {.least = s->body->n_active};
+    seen w = {.min = s->body->n_active};
     for (int i = 0; i < 5 * STEPS_A_SECOND / 2; i++) {
         pose_tools(s, i);
         if (i == 75) pal_set3(s->body->v, 0.5, -0.7, 1);
@@ -224,10 +224,10 @@ static void whatever_can_be_split_is_borne(void)
             const double mass = s.body->model.adaptive->options.mass_kg;
             seen a = handle(&s, mass);
             printf("  %s, %s: %d to %d nodes, mass off by %.1g\n", odd_of(kind).name,
-                   other ? "paper's law" : "membrane", a.least, a.most, a.mass_off);
+                   other ? "paper's law" : "membrane", a.min, a.max, a.mass_off);
             CHECK(!s.body->frozen);
             /* a membrane of one triangle goes with its tool as it is */
-            CHECK(a.most > a.least || (kind == TRIANGLE && !other));
+            CHECK(a.max > a.min || (kind == TRIANGLE && !other));
             HARD_CASE(kind == TWO_PIECES || kind == PIECE_AND_SHEET ? "pieces"
                       : kind == TRIANGLE                            ? "one_element"
                                                                     : "hanging",
@@ -261,7 +261,7 @@ static void bodies_beside_each_other_do_not_meet(void)
     const pal_body *body[3];
     for (int b = 0; b < 3; b++) body[b] = pal_world_body(s.world, b);
     size_t n_byte = 3 * sizeof(double) * (size_t)body[0]->n_node;
-    int most = 0, unlike = 0;
+    int max = 0, unlike = 0;
     double drift = 0;
     for (int i = 0; i < 2 * STEPS_A_SECOND; i++) {
         double force[3] = {0, 0, i < STEPS_A_SECOND ? 0.05 : 0};
@@ -270,11 +270,11 @@ static void bodies_beside_each_other_do_not_meet(void)
         unlike += memcmp(body[0]->x, body[1]->x, n_byte) != 0 || body[0]->n_active != body[1]->n_active;
         for (int k = 0; k < 3 * body[2]->n_node; k++) drift = fmax(drift, fabs(body[2]->x[k] - body[2]->x_rest[k]));
         unlike += body[2]->n_active != 48;
-        if (body[0]->n_active > most) most = body[0]->n_active;
+        if (body[0]->n_active > max) max = body[0]->n_active;
     }
     CHECK_INT(unlike, 0);
     CHECK_LE(drift, 1e-12);
-    CHECK(most > 60 && pal_dist3(body[0]->x, body[0]->x_rest) > 1e-3);
+    CHECK(max > 60 && pal_dist3(body[0]->x, body[0]->x_rest) > 1e-3);
     shell_scene_close(&s);
 }
 

@@ -26,7 +26,7 @@ static void long_steps_stay_bounded(void)
             hard_run run;
             hard_steps(&b, times * 60.0 / 60, times / 60.0, &run);
             CHECK(run.finite);
-            HARD_CASE("long_step", "fem", "x 10, x 100: energy over the first", run.most, 1.01, "");
+            HARD_CASE("long_step", "fem", "x 10, x 100: energy over the first", run.max, 1.01, "");
             CHECK_LE(run.rise, 1e-6);
             HARD_CASE("long_step", "fem", "at rest after steps", run.return_s / (times / 60.0), 10, "");
             CHECK_INT(hard_inverted(&b), 0);
@@ -58,7 +58,7 @@ static void a_meganewton_on_a_vertex_is_capped_and_forgotten(void)
             hard_run run;
             hard_steps(&b, 2, 1.0 / 60, &run);
             CHECK(run.finite);
-            CHECK_LE(run.most, 1.01);
+            CHECK_LE(run.max, 1.01);
             HARD_CASE("meganewton", "fem", "turned over 2 s after", hard_inverted(&b), 0, "");
             hard_steps(&b, 8, 1.0 / 60, &run);
             CHECK_LE(hard_rms(b.body), 1e-3 * b.body->length_scale_m);
@@ -108,7 +108,7 @@ static void quarter_and_half_turns_store_nothing(void)
         hard_make(&b, &hard_kinds[k], 3, 2, 2, false);
         REQUIRE(!beam_open(&b, &diag));
         for (int i = 0; i < b.body->n_node; i++) b.body->x[3 * i] *= 1.01;
-        double strained = pal_world_energy_J(b.world), most = 0, moved = 0;
+        double strained = pal_world_energy_J(b.world), max = 0, moved = 0;
         for (int turn = 0; turn < 10; turn++) {
             double angle = (turn & 1 ? 1 : 0.5) * M_PI, r[9];
             const double *axis = axes[turn / 2];
@@ -117,16 +117,16 @@ static void quarter_and_half_turns_store_nothing(void)
             pal_world_reset(b.world);
             for (int i = 0; i < b.body->n_node; i++) pal_mul33(b.body->x + 3 * i, r, b.body->x_rest + 3 * i);
             pal_world_invalidate_limits(b.world, 0);
-            most = fmax(most, pal_world_energy_J(b.world));
+            max = fmax(max, pal_world_energy_J(b.world));
             for (int i = 0; i < 30; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
-            most = fmax(most, pal_world_energy_J(b.world));
+            max = fmax(max, pal_world_energy_J(b.world));
             for (int i = 0; i < b.body->n_node; i++) {
                 double to[3];
                 pal_mul33(to, r, b.body->x_rest + 3 * i);
                 moved = fmax(moved, pal_dist3(b.body->x + 3 * i, to));
             }
         }
-        HARD_CASE("turns", "fem", "energy over that of 1 % strain", most / strained, 1e-6, "");
+        HARD_CASE("turns", "fem", "energy over that of 1 % strain", max / strained, 1e-6, "");
         HARD_CASE("turns", "fem", "not rigid by", moved / b.body->length_scale_m, 1e-5, "S");
         beam_free(&b);
     }
@@ -182,7 +182,7 @@ static void a_body_that_is_crushed_for_good_stands_still(void)
 {
     static const double way[][3] = {{1, 1, 0}, {-1, -1, -1}, {-2, -2, -2}};
     enum { SECONDS = 7, LAST = 120 };
-    double fastest = 0, most_rise = 0;
+    double fastest = 0, max_rise = 0;
     for (int k = 0; k < 2; k++)
         for (size_t w = (size_t)k; w < sizeof way / sizeof way[0]; w++) {
             fem_beam b;
@@ -205,11 +205,11 @@ static void a_body_that_is_crushed_for_good_stands_still(void)
             }
             printf("  %-11s crushed %zu: %d turned over, %.2g S/s, rises by %.2g, %llu searches\n", hard_kinds[k].shown,
                    w, hard_inverted(&b), speed, rise, (unsigned long long)b.body->safeguards.n_search);
-            fastest = fmax(fastest, speed), most_rise = fmax(most_rise, rise);
+            fastest = fmax(fastest, speed), max_rise = fmax(max_rise, rise);
             beam_free(&b);
         }
     HARD_CASE("meganewton", "fem", "crushed for good: speed after 5 s", fastest, 1e-3, "S/s");
-    HARD_CASE("meganewton", "fem", "crushed for good: rise of energy in a step after 5 s", 100 * most_rise, 1e-4, "%");
+    HARD_CASE("meganewton", "fem", "crushed for good: rise of energy in a step after 5 s", 100 * max_rise, 1e-4, "%");
 }
 
 int main(void)

@@ -24,15 +24,14 @@ static void hardly_compressible_bodies_step(void)
             b.def->material.poisson = poisson[q];
             REQUIRE(!beam_open(&b, &diag));
             beam_load_end(&b, 60);
-            double lowest = 0, most = 0, end[3];
+            double lowest = 0, max = 0, end[3];
             for (int i = 0; i < 120; i++) {
                 REQUIRE(!pal_world_step(b.world, 1.0 / 60));
                 double now = pal_world_energy_J(b.world) - hard_work_J(b.body);
-                lowest = fmin(lowest, now), most = fmax(most, now);
+                lowest = fmin(lowest, now), max = fmax(max, now);
             }
             CHECK(pal_body_finite(b.body));
-            HARD_CASE("poisson_step", "fem", "energy above the first, of what was put in", 100 * most / -lowest, 1,
-                      "%");
+            HARD_CASE("poisson_step", "fem", "energy above the first, of what was put in", 100 * max / -lowest, 1, "%");
             beam_end(&b, end);
             CHECK(end[2] > 0 && end[2] < 0.5 * b.body->length_scale_m);
             CHECK_INT(hard_inverted(&b), 0);
@@ -105,20 +104,20 @@ static void a_contrast_of_a_million_is_solved(void)
                                             .high_m = {hard_first ? 0.03 : 1, 1, 1}};
             REQUIRE(!beam_open(&b, &diag));
             beam_load_end(&b, 10);
-            int most = 0, n = rest ? 1 : 60;
+            int max = 0, n = rest ? 1 : 60;
             for (int i = 0; i < n; i++) {
                 REQUIRE(!pal_world_step(b.world, 1.0 / 60));
                 pal_solve_report report;
                 pal_world_solve_report(b.world, 0, &report);
                 int each = report.n_newton > 0 ? (report.n_cg + report.n_newton - 1) / report.n_newton : 0;
-                most = each > most ? each : most;
+                max = each > max ? each : max;
                 CHECK(report.converged);
                 CHECK_LE(report.residual, 1e-6);
             }
             HARD_CASE("contrast", "fem",
                       hard_first ? "hard half held: iterations to 1e-6"
                                  : "hard half at the free end: iterations to 1e-6",
-                      most, 30, "");
+                      max, 30, "");
             double hard = 0, soft = 0;
             for (int i = 0; i < b.body->n_node; i++) {
                 double *to = (b.body->x_rest[3 * i] < 0.03 + 1e-9) == hard_first ? &hard : &soft;
@@ -127,7 +126,7 @@ static void a_contrast_of_a_million_is_solved(void)
             if (hard_first) HARD_CASE("contrast", "fem", "hard half moves, over the soft one", hard / soft, 1e-4, "");
             CHECK(soft > 1e-4);
             printf("  %-11s %s, hard half %s: %d iterations, it moves %.2g of the soft one\n", hard_kinds[k].shown,
-                   solvers[rest], hard_first ? "held" : "free", most, hard / soft);
+                   solvers[rest], hard_first ? "held" : "free", max, hard / soft);
             beam_free(&b);
         }
 }
@@ -273,15 +272,15 @@ static void each_of_several_pieces_is_simulated(void)
         /* then it is faster than 0.2 S a step, the most a body that something holds may move */
         const int n_step = 4;
         for (int i = 0; i < n_step; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
-        double fall = 9.81 / 3600 * n_step * (n_step + 1) / 2, most = 0, fixed = 0;
+        double fall = 9.81 / 3600 * n_step * (n_step + 1) / 2, max = 0, fixed = 0;
         for (int i = 0; i < b.body->n_node; i++) {
             double moved = b.body->x_rest[3 * i + 2] - b.body->x[3 * i + 2];
             if (b.body->x_rest[3 * i] > 0.025)
-                most = fmax(most, fabs(moved - fall));
+                max = fmax(max, fabs(moved - fall));
             else
                 fixed = fmax(fixed, fabs(moved));
         }
-        HARD_CASE("pieces", "fem", "fall of the loose piece beside its formula", 100 * most / fall, 1e-4, "%");
+        HARD_CASE("pieces", "fem", "fall of the loose piece beside its formula", 100 * max / fall, 1e-4, "%");
         CHECK_LE(fixed, 0.1 * b.body->length_scale_m);
         CHECK(fixed > 0);
         pal_world *none = NULL;
@@ -318,15 +317,15 @@ static void slivers_and_flat_tetrahedra_at_rest_do_no_harm(void)
             CHECK(pal_body_finite(b.body));
             double pressed = hard_rms(b.body);
             CHECK(pressed > 1e-4 * b.body->length_scale_m && pressed < 0.5 * b.body->length_scale_m);
-            double none[3] = {0, 0, 0}, first = pal_world_energy_J(b.world), most = 0;
+            double none[3] = {0, 0, 0}, first = pal_world_energy_J(b.world), max = 0;
             for (int i = 0; i < tets->n_node; i++) pal_world_load(b.world, 0, i, none);
             for (int i = 0; i < 600; i++) {
                 REQUIRE(!pal_world_step(b.world, 1.0 / 60));
-                most = fmax(most, pal_world_energy_J(b.world));
+                max = fmax(max, pal_world_energy_J(b.world));
             }
             printf("  %-11s %s: pressed %.2g, back within %.2g of S\n", hard_kinds[k].shown, flat ? "flat" : "sliver",
                    pressed / b.body->length_scale_m, hard_rms(b.body) / b.body->length_scale_m);
-            CHECK_LE(most, 1.01 * first);
+            CHECK_LE(max, 1.01 * first);
             HARD_CASE("slivers", "fem", "every element: off rest 10 s after",
                       100 * hard_rms(b.body) / b.body->length_scale_m, 0.1, "% S");
             beam_free(&b);

@@ -6,8 +6,8 @@
 #include "tests/stability/hard_case.h"
 
 static pal_diagnostic diag;
-static const char *const insult_cases[] = {"plane", "point", "mirror", "blown_up"};
-static const char *const insult_names[] = {"plane", "point", "mirror", "x 100", "shuffle", "swap"};
+static const char *const case_cases[] = {"plane", "point", "mirror", "blown_up"};
+static const char *const case_names[] = {"plane", "point", "mirror", "x 100", "shuffle", "swap"};
 
 static bool open_kind(fem_beam *b, const hard_kind *kind, int nx, int ny, int nz, double poisson)
 {
@@ -29,11 +29,11 @@ static void an_element_that_is_turned_over_turns_back(void)
         REQUIRE(hard_inverted(&b) > 0);
         hard_run run;
         hard_steps(&b, 2, 1.0 / 60, &run);
-        printf("  %s: back after %.2f s, energy up to %.3f\n", hard_kinds[k].shown, run.return_s, run.most);
+        printf("  %s: back after %.2f s, energy up to %.3f\n", hard_kinds[k].shown, run.return_s, run.max);
         CHECK(run.finite);
-        CHECK_LE(run.most, 1.01);
+        CHECK_LE(run.max, 1.01);
         HARD_CASE("inverted", "fem", "within 0.1 % S of rest after", run.return_s, 2, "s");
-        HARD_CASE("inverted", "fem", "energy over the insult's", run.most, 1.01, "");
+        HARD_CASE("inverted", "fem", "energy over the insult's", run.max, 1.01, "");
         CHECK_INT(hard_inverted(&b), 0);
         beam_free(&b);
     }
@@ -48,18 +48,18 @@ static void flat_collapsed_mirrored_and_blown_up_bodies_come_back(void)
             fem_beam b;
             REQUIRE(open_kind(&b, &hard_kinds[k], 4, 2, 2, poisson[q]));
             printf("  %-11s nu %.3f:", hard_kinds[k].shown, poisson[q]);
-            for (int insult = HARD_PLANE; insult <= HARD_BLOWN; insult++) {
+            for (int trial_case = HARD_PLANE; trial_case <= HARD_BLOWN; trial_case++) {
                 pal_world_reset(b.world);
-                hard_insult(&b, insult, 0);
+                hard_case(&b, trial_case, 0);
                 hard_run run;
                 /* 9.9 s for the slowest of them in release, and more with the rounding of sanitizers' builds */
-                const bool slowest = k == HARD_TET && q == 2 && insult == HARD_BLOWN;
+                const bool slowest = k == HARD_TET && q == 2 && trial_case == HARD_BLOWN;
                 const double max_simulated_s = slowest ? CHECK_REPEATS(10, 11) : 10;
                 hard_steps(&b, max_simulated_s, 1.0 / 60, &run);
-                printf(" %s %.2f s (energy %.2f)", insult_names[insult], run.return_s, run.most);
+                printf(" %s %.2f s (energy %.2f)", case_names[trial_case], run.return_s, run.max);
                 CHECK(run.finite);
-                HARD_CASE(insult_cases[insult], "fem", "energy over the insult's", run.most, 1.01, "");
-                HARD_CASE(insult_cases[insult], "fem", "within 0.1 % S of rest after", run.return_s, max_simulated_s,
+                HARD_CASE(case_cases[trial_case], "fem", "energy over the insult's", run.max, 1.01, "");
+                HARD_CASE(case_cases[trial_case], "fem", "within 0.1 % S of rest after", run.return_s, max_simulated_s,
                           "s");
             }
             printf("\n");
@@ -74,22 +74,22 @@ static void shuffled_bodies_come_back_for_every_seed(void)
         for (int q = 0; q < 3; q++) {
             fem_beam b;
             int back = 0, n_seed = CHECK_REPEATS(k >= HARD_TET10 ? 4 : 20, 2), n = 0;
-            double most = 0, last = 0, rise = 0;
+            double max = 0, last = 0, rise = 0;
             REQUIRE(open_kind(&b, &hard_kinds[k], 4, 2, 2, poisson[q]));
             for (int seed = 0; seed < 2 * n_seed; seed++, n++) {
                 pal_world_reset(b.world);
-                hard_insult(&b, seed & 1 ? HARD_SWAP : HARD_SHUFFLE, (uint64_t)seed / 2);
+                hard_case(&b, seed & 1 ? HARD_SWAP : HARD_SHUFFLE, (uint64_t)seed / 2);
                 hard_run run;
                 hard_steps(&b, 10, 1.0 / 60, &run);
                 REQUIRE(run.finite);
                 back += run.return_s <= 10;
-                most = fmax(most, run.most), rise = fmax(rise, run.rise);
+                max = fmax(max, run.max), rise = fmax(rise, run.rise);
                 if (run.return_s <= 10) last = fmax(last, run.return_s);
             }
             printf("  %-11s nu %.3f: %d of %d back, the last after %.2f s; energy up to %.3f, largest rise %.2g\n",
-                   hard_kinds[k].shown, poisson[q], back, n, last, most, rise);
+                   hard_kinds[k].shown, poisson[q], back, n, last, max, rise);
             HARD_CASE_ALL("shuffle", "fem", "shuffled or exchanged: back within 10 s", back, n);
-            HARD_CASE("shuffle", "fem", "energy over the insult's", most, 1.01, "");
+            HARD_CASE("shuffle", "fem", "energy over the insult's", max, 1.01, "");
             beam_free(&b);
         }
 }
@@ -102,7 +102,7 @@ static void mirrored_hexahedra_are_found_untangled_and_counted(void)
         REQUIRE(open_kind(&b, &hard_kinds[k], 4, 2, 2, 0.45));
         REQUIRE(!pal_world_step(b.world, 1.0 / 60));
         CHECK_INT(b.body->safeguards.n_inversion, 0);
-        hard_insult(&b, HARD_MIRROR, 0);
+        hard_case(&b, HARD_MIRROR, 0);
         double first = hard_energy_J(&b);
         CHECK(first > 0);
         CHECK_INT(hard_hex_row(&b)->has_inversion, 0);
@@ -111,7 +111,7 @@ static void mirrored_hexahedra_are_found_untangled_and_counted(void)
         CHECK_LE(pal_world_energy_J(b.world), 1.01 * first);
         hard_run run;
         hard_steps(&b, 3, 1.0 / 60, &run);
-        CHECK_LE(run.most, 1.01);
+        CHECK_LE(run.max, 1.01);
         CHECK_LE(run.return_s, 3);
         CHECK(b.body->safeguards.n_inversion > 0 && b.body->safeguards.n_split >= 2 &&
               b.body->safeguards.n_split % 2 == 0);
@@ -124,23 +124,23 @@ static void mirrored_hexahedra_are_found_untangled_and_counted(void)
 static void free_bodies_come_back_to_their_shape(void)
 {
     for (int k = HARD_HEX; k <= HARD_TET; k++)
-        for (int insult = HARD_PLANE; insult < HARD_INSULTS; insult++) {
-            if (insult == HARD_POINT || insult == HARD_BLOWN) continue;
+        for (int trial_case = HARD_PLANE; trial_case < HARD_CASES; trial_case++) {
+            if (trial_case == HARD_POINT || trial_case == HARD_BLOWN) continue;
             fem_beam b;
             hard_make(&b, &hard_kinds[k], 3, 2, 2, false);
             REQUIRE(!beam_open(&b, &diag));
-            hard_insult(&b, insult, 3);
-            double first = hard_energy_J(&b), most = 0, worst = 0;
+            hard_case(&b, trial_case, 3);
+            double first = hard_energy_J(&b), max = 0, worst = 0;
             for (int i = 0; i < 600; i++) {
                 REQUIRE(!pal_world_step(b.world, 1.0 / 60));
-                most = fmax(most, pal_world_energy_J(b.world));
+                max = fmax(max, pal_world_energy_J(b.world));
             }
             for (int i = 0; i < b.body->n_node; i++)
                 for (int j = 0; j < i; j++)
                     worst = fmax(worst, fabs(pal_dist3(b.body->x + 3 * i, b.body->x + 3 * j) -
                                              pal_dist3(b.body->x_rest + 3 * i, b.body->x_rest + 3 * j)));
-            CHECK_LE(most, 1.01 * first);
-            HARD_CASE(insult < HARD_SHUFFLE ? insult_cases[insult] : "shuffle", "fem",
+            CHECK_LE(max, 1.01 * first);
+            HARD_CASE(trial_case < HARD_SHUFFLE ? case_cases[trial_case] : "shuffle", "fem",
                       "free bodies: distances off those at rest after 10 s", 100 * worst / b.body->length_scale_m, 0.1,
                       "% S");
             CHECK_INT(hard_inverted(&b), 0);
@@ -163,17 +163,17 @@ static void hardly_filled_voxels_come_to_rest(void)
         beam_solver(&b, solvers[run_of % 2]);
         for (int h = 0; h < b.mesh.hexes.n_hex; h++) b.mesh.hexes.fill[h] = random_unit(&seed) < 0.5 ? 0.02F : 1;
         REQUIRE(!beam_open(&b, &diag));
-        for (int insult = HARD_PLANE; insult < HARD_INSULTS; insult++) {
-            if (insult == HARD_BLOWN) continue;
+        for (int trial_case = HARD_PLANE; trial_case < HARD_CASES; trial_case++) {
+            if (trial_case == HARD_BLOWN) continue;
             pal_world_reset(b.world);
-            hard_insult(&b, insult, (uint64_t)fill);
+            hard_case(&b, trial_case, (uint64_t)fill);
             hard_run run;
             hard_steps(&b, 10, 1.0 / 60, &run);
-            printf("  %s, %s: back after %.2f s, energy up to %.3f\n", solvers[run_of % 2], insult_names[insult],
-                   run.return_s, run.most);
+            printf("  %s, %s: back after %.2f s, energy up to %.3f\n", solvers[run_of % 2], case_names[trial_case],
+                   run.return_s, run.max);
             CHECK(run.finite);
-            CHECK_LE(run.most, 1.01);
-            HARD_CASE(insult < HARD_SHUFFLE ? insult_cases[insult] : "shuffle", "fem",
+            CHECK_LE(run.max, 1.01);
+            HARD_CASE(trial_case < HARD_SHUFFLE ? case_cases[trial_case] : "shuffle", "fem",
                       "every second voxel hardly filled: within 0.1 % S of rest after", run.return_s, 10, "s");
             if (run_of % 2) CHECK_LE(run.return_s, 5);
         }

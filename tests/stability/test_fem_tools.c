@@ -83,12 +83,12 @@ static void a_tool_that_jumps_into_the_body_gives_no_more_than_cap_times_clamp(v
             pal_world_reset(f.s.world);
             move_tool(&f.s, 0, 0, 0, f.s.body->length_scale_m - 0.05, false);
             REQUIRE(step_world(&f.s, 12));
-            double before = pal_world_energy_J(f.s.world), most = 15 * 0.02 * f.s.body->length_scale_m;
+            double before = pal_world_energy_J(f.s.world), max = 15 * 0.02 * f.s.body->length_scale_m;
             move_tool(&f.s, 0, to[way][0], to[way][1], to[way][2], false);
             REQUIRE(step_world(&f.s, 1));
             double rise = pal_world_energy_J(f.s.world) - before;
-            worst = fmax(worst, rise / most);
-            HARD_CASE("teleport", "fem", "rise of energy over what is allowed", rise / most, 1, "");
+            worst = fmax(worst, rise / max);
+            HARD_CASE("teleport", "fem", "rise of energy over what is allowed", rise / max, 1, "");
             check_caps(&f.s);
             for (int i = 0; i < 30; i++) {
                 REQUIRE(step_world(&f.s, 1));
@@ -109,19 +109,19 @@ static void a_tool_that_appears_inside_pushes_out_gently(void)
         fem_scene f;
         REQUIRE(fem_ball(&f, resolution_of(k), 1, 0.01, 15) && open_tools(&f, &hard_kinds[k]));
         move_tool(&f.s, 0, 0.025, 0, 0.005, false);
-        double first = 0, most = 0, rise = 0;
+        double first = 0, max = 0, rise = 0;
         for (int i = 0; i < 30; i++) {
             REQUIRE(step_world(&f.s, 1));
             check_caps(&f.s);
             double now = pal_world_energy_J(f.s.world);
             if (i == 0) first = pal_norm3(tool_of(&f.s, 0)->mean_force_N), rise = now;
-            most = fmax(most, pal_body_kinetic_J(f.s.body));
+            max = fmax(max, pal_body_kinetic_J(f.s.body));
         }
         printf("  %-11s begins with %.2g N, energy rises by %.2g of what is allowed\n", hard_kinds[k].shown, first,
                rise / (15 * 0.02 * f.s.body->length_scale_m));
         HARD_CASE("tool_inside", "fem", "rise of energy over what is allowed",
                   rise / (15 * 0.02 * f.s.body->length_scale_m), 1, "");
-        CHECK_LE(most, 15 * 0.02 * f.s.body->length_scale_m);
+        CHECK_LE(max, 15 * 0.02 * f.s.body->length_scale_m);
         CHECK(!f.s.body->frozen);
         check_comes_back(&f.s);
         fem_close(&f);

@@ -97,7 +97,7 @@ static bool resupport(four *s, const four *other)
 static void supports_put_on_and_taken_off_while_bent_give_no_energy(void)
 {
     for (int m = 0; m < FOUR_MODELS; m++) {
-        if (m == FOUR_ADAPTIVE) continue; /* on changing levels: test_adaptive_turns */
+        if (m == FOUR_ADAPTIVE) continue; /* on changing levels: test_adaptive_inversion */
         four s, other;
         double rise = 0, left = NAN;
         four_take(&s, m, true);
@@ -234,7 +234,7 @@ static void two_hands_press_and_die(void)
 static void an_hour_under_load_moves_nothing(void)
 {
     for (int m = 0; m < FOUR_MODELS; m++) {
-        if (m == FOUR_ADAPTIVE) continue; /* test_adaptive_turns */
+        if (m == FOUR_ADAPTIVE) continue; /* test_adaptive_inversion */
         four s;
         const double hour = CHECK_REPEATS(3600, 60), dt_s = m == FOUR_SPRINGS ? step_s : 0.25;
         double kinetic = 0;

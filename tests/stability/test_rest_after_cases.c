@@ -89,7 +89,7 @@ static void springs_do_not_mind_being_turned(void)
 {
     static const double axes[][3] = {{1, 0, 0}, {0, 0, 1}, {1, -2, 3}};
     four s;
-    double most[2] = {0, 0}, r[9];
+    double max[2] = {0, 0}, r[9];
     four_take(&s, FOUR_SPRINGS, false);
     REQUIRE(four_open(&s));
     for (int i = 0; i < s.body->n_dof; i++) s.body->x[3 * i] *= 1.01;
@@ -99,15 +99,15 @@ static void springs_do_not_mind_being_turned(void)
         const double sine = sin(half) / pal_norm3(axis);
         pal_quat_matrix((const double[4]){cos(half), sine * axis[0], sine * axis[1], sine * axis[2]}, r);
         for (int i = 0; i < s.body->n_dof; i++) pal_mul33(s.body->x + 3 * i, r, s.body->x_rest + 3 * i);
-        most[turn >= 6] = fmax(most[turn >= 6], pal_world_energy_J(s.world));
+        max[turn >= 6] = fmax(max[turn >= 6], pal_world_energy_J(s.world));
         if (turn >= 6) continue;
         memset(s.body->v, 0, 3 * sizeof(double) * (size_t)s.body->n_dof);
         pal_world_invalidate_limits(s.world, 0);
         REQUIRE(four_step(&s, 10, step_s));
-        most[0] = fmax(most[0], pal_world_energy_J(s.world));
+        max[0] = fmax(max[0], pal_world_energy_J(s.world));
     }
-    HARD_CASE("turns", "tet_springs", "energy over that of 1 % strain", most[0] / strained, 1e-6, "");
-    HARD_CASE("many_turns", "tet_springs", "energy over that of 1 % strain", most[1] / strained, 1e-6, "");
+    HARD_CASE("turns", "tet_springs", "energy over that of 1 % strain", max[0] / strained, 1e-6, "");
+    HARD_CASE("many_turns", "tet_springs", "energy over that of 1 % strain", max[1] / strained, 1e-6, "");
     four_close(&s);
 }
 
@@ -135,7 +135,7 @@ static void springs_at_any_poisson_ratio_stay_bounded(void)
     static const double poisson[] = {0.49, 0.499, 0.4999, -0.5};
     for (int q = 0; q < 4; q++) {
         four s;
-        double most = 0;
+        double max = 0;
         seed = 8;
         four_take(&s, FOUR_SPRINGS, true);
         s.def->material.poisson = poisson[q];
@@ -155,16 +155,16 @@ static void springs_at_any_poisson_ratio_stay_bounded(void)
         const double first = pal_world_energy_J(s.world);
         for (int i = 0; i < 60; i++) {
             REQUIRE(four_step(&s, 1, step_s));
-            most = fmax(most, energy_in_phase_J(&s));
+            max = fmax(max, energy_in_phase_J(&s));
         }
         /* at 0.4999 the deformed body asks for more than the budget and goes on with heavier nodes (safeguards.h)
          */
         if (q == 2) {
-            HARD_CASE("poisson_step", "tet_springs", "energy over the first at 0.4999, with heavier nodes",
-                      most / first, 1.01, "");
+            HARD_CASE("poisson_step", "tet_springs", "energy over the first at 0.4999, with heavier nodes", max / first,
+                      1.01, "");
             CHECK(s.body->safeguards.n_mass_scaled > 0);
         } else
-            HARD_CASE("poisson_step", "tet_springs", "energy over the first", most / first, 1.01, "");
+            HARD_CASE("poisson_step", "tet_springs", "energy over the first", max / first, 1.01, "");
         four_close(&s);
     }
 }
@@ -221,14 +221,14 @@ static void a_shell_in_syrup_creeps(void)
     }
     pal_world_invalidate_limits(s.world, 0);
     const double first = pal_world_energy_J(s.world);
-    double before = first, most = 0;
+    double before = first, max = 0;
     for (int i = 0; i < 60; i++) {
         REQUIRE(four_step(&s, 1, step_s));
-        most = fmax(most, pal_world_energy_J(s.world) / before);
+        max = fmax(max, pal_world_energy_J(s.world) / before);
         before = pal_world_energy_J(s.world);
     }
     CHECK(before > 0.5 * first && before < first);
-    HARD_CASE("drag", "adaptive_springs", "energy over that of the step before", most, 1, "");
+    HARD_CASE("drag", "adaptive_springs", "energy over that of the step before", max, 1, "");
     four_close(&s);
 }
 

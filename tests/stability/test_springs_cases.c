@@ -71,23 +71,23 @@ static double rms_of_shape(const pal_body *body)
 
 static double extent(const pal_body *body)
 {
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < body->n_dof; i++)
-        for (int j = 0; j < i; j++) most = fmax(most, pal_dist3(body->x + 3 * i, body->x + 3 * j));
-    return most;
+        for (int j = 0; j < i; j++) max = fmax(max, pal_dist3(body->x + 3 * i, body->x + 3 * j));
+    return max;
 }
 
 /* runs and checks after every step that state is finite and energy no more than at the start */
 static void run_bounded(box_bench *b, double seconds)
 {
-    double start = pal_world_energy_J(b->world), most = 0;
+    double start = pal_world_energy_J(b->world), max = 0;
     for (int i = 0; i < (int)(seconds * 60); i++) {
         REQUIRE(!pal_world_step(b->world, 1.0 / 60));
         REQUIRE(pal_body_finite(b->body));
-        most = fmax(most, pal_world_energy_J(b->world));
+        max = fmax(max, pal_world_energy_J(b->world));
     }
-    if (!(most <= 1.01 * start)) printf("  energy rose from %.4g to %.4g J\n", start, most);
-    CHECK_LE(most, 1.01 * start);
+    if (!(max <= 1.01 * start)) printf("  energy rose from %.4g to %.4g J\n", start, max);
+    CHECK_LE(max, 1.01 * start);
 }
 
 static void an_inverted_corner_turns_back(void)
@@ -107,7 +107,7 @@ static void an_inverted_corner_turns_back(void)
     box_bench_close(&b);
 }
 
-static void insult(box_bench *b, int kind)
+static void trial_case(box_bench *b, int kind)
 {
     double *x = b->body->x;
     for (int i = 0; i < b->body->n_dof; i++, x += 3) {
@@ -144,7 +144,7 @@ static void flattened_collapsed_mirrored_shuffled_and_blown_up_bodies_come_back(
             box_bench b;
             REQUIRE(bench_make(&b, fixed));
             REQUIRE(box_bench_start(&b));
-            insult(&b, kind);
+            trial_case(&b, kind);
             double before = extent(b.body);
             const bool goes_back = (fixed && kind <= 1) || CHECK_REPEATS(true, false);
             run_bounded(&b, goes_back ? 5 : CHECK_REPEATS(5, 1));
@@ -176,7 +176,7 @@ static void blown_up_without_area_springs_the_guard_freezes_the_last_good_state(
     pal_entry_init(&def->effect[def->n_effect++], "effects[0]", "finite_guard");
     REQUIRE(box_bench_start(&b));
     REQUIRE(!pal_world_step(b.world, 1.0 / 60));
-    insult(&b, 4);
+    trial_case(&b, 4);
     CHECK_INT(pal_world_step(b.world, 1.0 / 60), PAL_ERR_FROZEN);
     CHECK(b.body->frozen);
     for (int i = 0; i < 60; i++) REQUIRE(!pal_world_step(b.world, 1.0 / 60));
@@ -227,12 +227,12 @@ static void a_step_ten_times_too_long_is_split_and_beyond_the_budget_refused(voi
     REQUIRE(!pal_world_step(b.world, 10.0 / 60));
     for (int i = 0; i < 10; i++) REQUIRE(!pal_world_step(c.world, 1.0 / 60));
     CHECK_LE(pal_world_energy_J(b.world), 1.01 * 0.5 * b.body->mass_kg[40] * 0.04);
-    double apart = 0, most = 0;
+    double apart = 0, max = 0;
     for (int i = 0; i < 3 * b.body->n_dof; i++) {
         apart = fmax(apart, fabs(b.body->x[i] - c.body->x[i]));
-        most = fmax(most, fabs(c.body->x[i] - c.body->x_rest[i]));
+        max = fmax(max, fabs(c.body->x[i] - c.body->x_rest[i]));
     }
-    CHECK_LE(apart, 0.2 * most);
+    CHECK_LE(apart, 0.2 * max);
     uint64_t hash = pal_world_hash(b.world);
     CHECK_INT(pal_world_step(b.world, 1000), PAL_ERR_BUDGET);
     CHECK_INT(pal_world_step(b.world, NAN), PAL_ERR_REFUSED);

@@ -39,12 +39,12 @@ static bool stomach_open(shell_scene *s)
 
 static double farthest_m(const shell_scene *s)
 {
-    double most = 0;
+    double max = 0;
     for (int k = 0; k < s->body->n_active; k++) {
         size_t i = 3 * (size_t)pal_body_point(s->body, k);
-        most = fmax(most, pal_dist3(s->body->x + i, s->body->x_rest + i));
+        max = fmax(max, pal_dist3(s->body->x + i, s->body->x_rest + i));
     }
-    return most;
+    return max;
 }
 
 static bool run(shell_scene *s, double time_s)
@@ -59,7 +59,7 @@ static bool run(shell_scene *s, double time_s)
 static double pull(shell_scene *s, uint64_t seed, double *way_m)
 {
     uint64_t count = 0;
-    double dir[3], most = 0;
+    double dir[3], max = 0;
     int v = 0, n = s->body->model.adaptive->levels.n_vertex[0];
     do v = (int)(pal_random_unit(seed, count++) * n);
     while (s->body->support[v]);
@@ -72,29 +72,29 @@ static double pull(shell_scene *s, uint64_t seed, double *way_m)
         pal_copy3(pose.position_m, s->body->x_rest + 3 * (size_t)v);
         pal_axpy3(pose.position_m, *way_m * fmin(1, i * step_s / 0.5), dir);
         if (pal_world_pose(s->world, 0, &pose) || pal_world_step(s->world, step_s)) return NAN;
-        most = fmax(most, farthest_m(s));
+        max = fmax(max, farthest_m(s));
     }
-    return pal_world_pose(s->world, 0, NULL) ? NAN : most;
+    return pal_world_pose(s->world, 0, NULL) ? NAN : max;
 }
 
 static void no_pull_leaves_a_dent_or_a_fine_mesh(void)
 {
     shell_scene s;
     int n_dent = 0, n_fine = 0;
-    double least = INFINITY, left = 0;
+    double min = INFINITY, left = 0;
     REQUIRE(stomach_open(&s));
     const int n_coarse = s.body->n_active;
     for (uint64_t k = 0; k < CHECK_REPEATS(PULLS, 3); k++) {
-        double way_m, most = pull(&s, k < 2 ? early[k] : k - 2, &way_m);
-        CHECK(most > 0.01 && !s.body->frozen);
-        least = fmin(least, most);
+        double way_m, max = pull(&s, k < 2 ? early[k] : k - 2, &way_m);
+        CHECK(max > 0.01 && !s.body->frozen);
+        min = fmin(min, max);
         CHECK(run(&s, 5));
         double now = farthest_m(&s);
         left = fmax(left, now), n_dent += !(now <= 1e-3), n_fine += s.body->n_active != n_coarse;
         CHECK(s.body->asleep);
         pal_world_reset(s.world);
     }
-    printf("  moved by %.0f mm at least, %.2g mm left at most after 5 s\n", 1e3 * least, 1e3 * left);
+    printf("  moved by %.0f mm at least, %.2g mm left at most after 5 s\n", 1e3 * min, 1e3 * left);
     CHECK_INT(n_dent, 0);
     CHECK_INT(n_fine, 0);
     shell_scene_close(&s);

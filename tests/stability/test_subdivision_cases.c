@@ -17,10 +17,10 @@ static bool open_kind(solid_scene *s, int kind, int nx, int ny, int nz)
 static int corner_node(const pal_body *body)
 {
     int far = 0;
-    double most = -INFINITY;
+    double max = -INFINITY;
     for (int i = 0; i < body->n_node; i++) {
         const double *x = body->node_rest + 3 * i, at = x[0] + x[1] + x[2];
-        if (at > most) most = at, far = i;
+        if (at > max) max = at, far = i;
     }
     return far;
 }
@@ -49,7 +49,7 @@ static void a_meganewton_on_a_node_is_capped_and_forgotten(void)
             solid_steps(&s, 2, solid_step_s, &run);
             CHECK(run.finite);
             /* v of the explicit solver is half a sub-step before x: a ripple where it moves fast */
-            CHECK_LE(run.most, solid_kinds[k].explicit ? 1.3 : 1.01);
+            CHECK_LE(run.max, solid_kinds[k].explicit ? 1.3 : 1.01);
             HARD_CASE("meganewton", "subdivision_fem", "turned over 2 s after", solid_inverted(&s), 0, "");
             HARD_CASE("meganewton", "subdivision_fem", "within 0.1 % S of rest after", run.return_s, 10, "s");
         }
@@ -115,7 +115,7 @@ static void tools_that_jump_or_appear_inside_give_no_more_than_cap_times_clamp(v
             REQUIRE(open_tool(&s, k));
             if (!inside) move_tool(&s, 0.03, 0.03, 0.02 + s.body->length_scale_m);
             if (!inside) REQUIRE(solid_scene_step(&s, 12, solid_step_s));
-            const double before = pal_world_energy_J(s.world), most = 5 * 0.02 * s.body->length_scale_m;
+            const double before = pal_world_energy_J(s.world), max = 5 * 0.02 * s.body->length_scale_m;
             CHECK_INT(move_tool(&s, 0.03, 0.03, 0.02), PAL_ERR_OK);
             REQUIRE(solid_scene_step(&s, 1, solid_step_s));
             const double rise = pal_world_energy_J(s.world) - before;
@@ -124,9 +124,9 @@ static void tools_that_jump_or_appear_inside_give_no_more_than_cap_times_clamp(v
                 force = fmax(force, pal_norm3(pal_world_tools(s.world)->tool[0].force_N));
             }
             printf("  %s, %s: energy rises by %.2g of what is allowed, force up to %.2g N\n", solid_kinds[k].shown,
-                   inside ? "inside" : "jumps", rise / most, force);
+                   inside ? "inside" : "jumps", rise / max, force);
             HARD_CASE(inside ? "tool_inside" : "teleport", "subdivision_fem", "rise of energy over what is allowed",
-                      rise / most, 1, "");
+                      rise / max, 1, "");
             CHECK_LE(force, 5 * (1 + 1e-9));
             CHECK(pal_body_finite(s.body) && !s.body->frozen);
             CHECK_INT(pal_world_pose(s.world, 0, NULL), PAL_ERR_OK);
@@ -198,7 +198,7 @@ static void deleting_a_cell_leaves_the_others_where_they_were(void)
         HARD_CASE("cut", "subdivision_fem", "what is left is off by", off / a.body->length_scale_m, 1e-6, "S");
         solid_steps(&b, 5, solid_step_s, &run);
         CHECK(run.finite);
-        CHECK_LE(run.most, 1.01);
+        CHECK_LE(run.max, 1.01);
         CHECK_LE(run.return_s, 5);
         free(x), free(v);
         pal_cells_edit_free(&edit);
@@ -223,17 +223,17 @@ static void the_same_force_moves_painted_mass_otherwise(void)
         const int node = corner_node(s.body);
         for (int i = 0; i < s.body->n_node; i++)
             if (s.body->node_rest[3 * i + 2] > 0.07) (void)pal_world_load(s.world, 0, i, (double[3]){1e-4, 0, 0});
-        double most = 0;
+        double max = 0;
         turn_s[q] = 0;
         for (int i = 1; i <= 300; i++) {
             REQUIRE(solid_scene_step(&s, 1, 0.01));
             const double moved = s.body->d[3 * node] - s.body->node_rest[3 * node];
             if (i == 2) first[q] = moved;
-            if (moved > most) most = moved, turn_s[q] = 0.01 * i;
-            if (moved < 0.8 * most) break;
+            if (moved > max) max = moved, turn_s[q] = 0.01 * i;
+            if (moved < 0.8 * max) break;
         }
         printf("  density x %g: %.3g mm after 0.02 s, turns after %.2f s at %.3g mm\n", factor[q], 1e3 * first[q],
-               turn_s[q], 1e3 * most);
+               turn_s[q], 1e3 * max);
         solid_scene_close(&s);
     }
     /* f / m at first, sqrt(m) for the swing */

@@ -28,7 +28,7 @@ static bool open_chair(solid_scene *s, const char *solver)
     return solid_scene_open(s);
 }
 
-static void insult(solid_scene *s, int how, uint64_t seed)
+static void trial_case(solid_scene *s, int how, uint64_t seed)
 {
     pal_body *body = s->body;
     double low[3], high[3];
@@ -59,15 +59,15 @@ static void a_chair_comes_back_from_any_shape(void)
                 solid_run run;
                 pal_world_reset(s.world);
                 CHECK(s.body->safeguards.n_inversion == 0);
-                insult(&s, how, 77 + (uint64_t)seed);
+                trial_case(&s, how, 77 + (uint64_t)seed);
                 const double before = pal_world_energy_J(s.world);
                 solid_steps(&s, 10, solid_step_s, &run);
                 printf("  %s, %s: back after %.2f s, energy up to %.3f of %.3g J, %d looks found it turned over\n",
-                       solvers[k], chair_words[how], run.return_s, run.most, before,
+                       solvers[k], chair_words[how], run.return_s, run.max, before,
                        (int)s.body->safeguards.n_inversion);
                 CHECK(run.finite && s.body->safeguards.n_inversion > 0 && s.body->safeguards.n_split >= 2);
                 HARD_CASE(chair_cases[how], "subdivision_fem", chair_words[how], run.return_s, 10, "s");
-                HARD_CASE(chair_cases[how], "subdivision_fem", "chair: energy over the insult's", run.most, 1.01, "");
+                HARD_CASE(chair_cases[how], "subdivision_fem", "chair: energy over the insult's", run.max, 1.01, "");
             }
         solid_scene_close(&s);
     }

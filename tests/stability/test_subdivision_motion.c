@@ -31,7 +31,7 @@ static double ripple(int n_level, int n_step)
 {
     solid_scene s;
     const int n = n_level > 0 ? 2 : 1;
-    double first = NAN, most = 0;
+    double first = NAN, max = 0;
     solid_make(&s, &solid_kinds[SOLID_EXPLICIT], 2, n, 2, true);
     pal_entry_put_number(&s.def->model, "levels", n_level, NULL);
     s.def->material.damping_1_s = 0;
@@ -52,12 +52,12 @@ static double ripple(int n_level, int n_step)
         for (int k = 0; k < n3; k++) kinetic += 0.5 * momentum[k] * s.body->v[k];
         /* the first step is half of one, from standing still: it has no v before */
         if (i == 1) first = rest + kinetic;
-        if (i > 1) most = fmax(most, fabs((rest + kinetic) / first - 1));
+        if (i > 1) max = fmax(max, fabs((rest + kinetic) / first - 1));
     }
-    printf("  %d levels, %d sub-steps of half the limit: energy off by %.3g %% at most\n", n_level, n_step, 100 * most);
+    printf("  %d levels, %d sub-steps of half the limit: energy off by %.3g %% at most\n", n_level, n_step, 100 * max);
     free(momentum);
     solid_scene_close(&s);
-    return 100 * most;
+    return 100 * max;
 }
 
 /* what the world tells of it takes v as it is, half a sub-step early: a ripple where much moves fast */
@@ -72,14 +72,14 @@ static void the_energy_that_is_shown_ripples(void)
     pal_body_update_nodes(s.body);
     pal_world_invalidate_limits(s.world, 0);
     const double first = pal_world_energy_J(s.world);
-    double most = 0, least = INFINITY;
+    double max = 0, min = INFINITY;
     for (int i = 0; i < CHECK_REPEATS(120, 20); i++) {
         REQUIRE(solid_scene_step(&s, 1, solid_step_s));
-        most = fmax(most, pal_world_energy_J(s.world)), least = fmin(least, pal_world_energy_J(s.world));
+        max = fmax(max, pal_world_energy_J(s.world)), min = fmin(min, pal_world_energy_J(s.world));
     }
-    printf("  shown: between %.4f and %.4f of the first\n", least / first, most / first);
-    CHECK_LE(most, 1.06 * first);
-    CHECK(least > 0.94 * first);
+    printf("  shown: between %.4f and %.4f of the first\n", min / first, max / first);
+    CHECK_LE(max, 1.06 * first);
+    CHECK(min > 0.94 * first);
     solid_scene_close(&s);
 }
 

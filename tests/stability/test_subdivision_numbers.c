@@ -64,14 +64,14 @@ static double cube_top_m(double poisson, bool fem, bool *good)
  * cells keep a part of it (cell_volume.c) */
 static void hardly_compressible_cubes_are_as_soft_as_those_of_model_fem(void)
 {
-    static const double poisson[] = {0.3, 0.45, 0.47, 0.49, 0.499}, most[] = {0.015, 0.012, 0.015, 0.02, 0.02};
+    static const double poisson[] = {0.3, 0.45, 0.47, 0.49, 0.499}, max[] = {0.015, 0.012, 0.015, 0.02, 0.02};
     for (int q = 0; q < CHECK_REPEATS(5, 1); q++) {
         bool good[2];
         double fem = cube_top_m(poisson[q], true, &good[0]), solid = cube_top_m(poisson[q], false, &good[1]);
         printf("  nu %.3f: %.4f mm, of model fem %.4f mm, %+.2f %%\n", poisson[q], 1e3 * solid, 1e3 * fem,
                100 * (solid / fem - 1));
         CHECK(good[0] && good[1]);
-        CHECK_LE(fabs(solid / fem - 1), most[q]);
+        CHECK_LE(fabs(solid / fem - 1), max[q]);
         if (q > 2)
             HARD_CASE("poisson_static", "subdivision_fem", "729 nodes, off model fem by", 100 * fabs(solid / fem - 1),
                       3, "%");
@@ -90,7 +90,7 @@ static void steps_stay_finite_at_the_largest_poisson_ratio(void)
         solid_steps(&s, 0.25, solid_step_s, &run);
         CHECK(run.finite);
         if (solid_kinds[k].energy)
-            HARD_CASE("poisson_step", "subdivision_fem", "nu 0.4999: energy over the first", run.most, 1.01, "");
+            HARD_CASE("poisson_step", "subdivision_fem", "nu 0.4999: energy over the first", run.max, 1.01, "");
         solid_scene_close(&s);
     }
 }
@@ -99,7 +99,7 @@ static void steps_stay_finite_at_the_largest_poisson_ratio(void)
 static void a_contrast_of_a_million_costs_few_iterations(void)
 {
     solid_scene s;
-    int most = 0;
+    int max = 0;
     double hard = 0, soft = 0;
     const pal_stroke stroke = {
         .at_m = {0.02, 0.02, 0}, .radius_m = 0.045, .soft = 0, .young_factor = 1e6, .density_factor = 1};
@@ -111,16 +111,16 @@ static void a_contrast_of_a_million_costs_few_iterations(void)
         if (s.body->node_rest[3 * i + 2] > 0.06) (void)pal_world_load(s.world, 0, i, (double[3]){1.2e-3, 0, 0});
     for (int i = 0; i < 60; i++) {
         REQUIRE(solid_scene_step(&s, 1, solid_step_s));
-        most = solid_scene_report(&s).n_cg > most ? solid_scene_report(&s).n_cg : most;
+        max = solid_scene_report(&s).n_cg > max ? solid_scene_report(&s).n_cg : max;
     }
     for (int i = 0; i < s.body->n_node; i++) {
         const double *rest = s.body->node_rest + 3 * i, moved = pal_dist3(s.body->d + 3 * i, rest);
         if (rest[2] < 0.015) hard = fmax(hard, moved);
         soft = fmax(soft, moved);
     }
-    printf("  %d iterations at most, hard part moves %.2g of the soft one\n", most, hard / soft);
+    printf("  %d iterations at most, hard part moves %.2g of the soft one\n", max, hard / soft);
     CHECK(soft > 1e-4);
-    HARD_CASE("contrast", "subdivision_fem", "painted: iterations to 1e-6", most, 30, "");
+    HARD_CASE("contrast", "subdivision_fem", "painted: iterations to 1e-6", max, 30, "");
     HARD_CASE("contrast", "subdivision_fem", "hard part moves, over the soft one", hard / soft, 1e-4, "");
     solid_scene_close(&s);
     /* explicit steps are a thousand times as many: refused with the number */
@@ -140,15 +140,15 @@ static void long_steps_stay_bounded(void)
             const double dt_s = times * solid_step_s;
             REQUIRE(open_kind(&s, k, 2, 2, 2, true));
             solid_kick(&s, 0.5, 9);
-            double first = pal_world_energy_J(s.world), most = 0;
+            double first = pal_world_energy_J(s.world), max = 0;
             for (int i = 0; i < (times == 10 ? 12 : 2); i++) {
                 REQUIRE(solid_scene_step(&s, 1, dt_s));
                 CHECK(pal_body_finite(s.body) && !s.body->frozen && s.body->safeguards.n_mass_scaled == 0);
-                most = fmax(most, pal_world_energy_J(s.world));
+                max = fmax(max, pal_world_energy_J(s.world));
                 if (solid_kinds[k].explicit)
                     CHECK_LE(dt_s / pal_world_substeps(s.world), 1.05 * pal_world_limit_s(s.world));
             }
-            HARD_CASE("long_step", "subdivision_fem", "x 10, x 100: energy over the first", most / first, 1.01, "");
+            HARD_CASE("long_step", "subdivision_fem", "x 10, x 100: energy over the first", max / first, 1.01, "");
             CHECK_LE(solid_rms(s.body), 1e-2 * s.body->length_scale_m);
             solid_scene_close(&s);
         }

@@ -18,10 +18,10 @@ static bool open_kind(solid_scene *s, int kind, int n, double poisson)
 static int outermost(const pal_body *body)
 {
     int far = 0;
-    double most = -INFINITY;
+    double max = -INFINITY;
     for (int i = 0; i < body->n_dof; i++) {
         const double *x = body->x_rest + 3 * i, at = x[0] + x[1] + x[2];
-        if (at > most) most = at, far = i;
+        if (at > max) max = at, far = i;
     }
     return far;
 }
@@ -41,9 +41,9 @@ static void a_corner_that_is_turned_over_turns_back(void)
         REQUIRE(solid_inverted(&s) > 0);
         solid_steps(&s, 2, solid_step_s, &run);
         printf("  %s, nu %.3f: back after %.2f s, energy up to %.3f\n", solid_kinds[k].shown, poisson[q], run.return_s,
-               run.most);
+               run.max);
         CHECK(run.finite);
-        HARD_CASE("inverted", "subdivision_fem", "energy over the insult's", run.most, 1.01, "");
+        HARD_CASE("inverted", "subdivision_fem", "energy over the insult's", run.max, 1.01, "");
         HARD_CASE("inverted", "subdivision_fem", "within 0.1 % S of rest after", run.return_s, 2, "s");
         CHECK(s.body->safeguards.n_inversion > 0);
         solid_scene_close(&s);
@@ -53,32 +53,32 @@ static void a_corner_that_is_turned_over_turns_back(void)
 static const char *const solid_cases[] = {"plane", "point", "mirror", "blown_up", "shuffle", "shuffle"};
 
 /* returns after how long all were back; INFINITY: one was not */
-static double insult_all(int kind, double poisson, int n_seed, double *most)
+static double case_all(int kind, double poisson, int n_seed, double *max)
 {
     solid_scene s;
     double last = 0;
     if (!open_kind(&s, kind, 2, poisson)) return INFINITY;
     printf("  %s, nu %.3f:", solid_kinds[kind].shown, poisson);
-    for (int insult = 0; insult < SOLID_INSULTS; insult++) {
-        int n = insult < SOLID_SHUFFLE ? 1 : n_seed, back = 0;
+    for (int trial_case = 0; trial_case < SOLID_CASES; trial_case++) {
+        int n = trial_case < SOLID_SHUFFLE ? 1 : n_seed, back = 0;
         double late = 0;
         for (int seed = 0; seed < n; seed++) {
             solid_run run;
             pal_world_reset(s.world);
-            solid_insult(&s, insult, (uint64_t)seed);
+            solid_case(&s, trial_case, (uint64_t)seed);
             solid_steps(&s, 10, solid_step_s, &run);
             CHECK(run.finite);
             back += run.return_s <= 10;
-            late = fmax(late, run.return_s), *most = fmax(*most, run.most);
+            late = fmax(late, run.return_s), *max = fmax(*max, run.max);
         }
-        const char *id = solid_cases[insult];
+        const char *id = solid_cases[trial_case];
         if (n > 1) HARD_CASE_ALL(id, "subdivision_fem", "shuffled or exchanged: back within 10 s", back, n);
-        HARD_CASE(id, "subdivision_fem", "energy over the insult's", *most, 1.01, "");
+        HARD_CASE(id, "subdivision_fem", "energy over the insult's", *max, 1.01, "");
         HARD_CASE(id, "subdivision_fem", "within 0.1 % S of rest after", late, 10, "s");
-        printf(" %s %d of %d (%.2f s)", solid_insults[insult], back, n, late);
+        printf(" %s %d of %d (%.2f s)", solid_insults[trial_case], back, n, late);
         last = fmax(last, late);
     }
-    printf(", energy up to %.3f\n", *most);
+    printf(", energy up to %.3f\n", *max);
     solid_scene_close(&s);
     return last;
 }
@@ -87,22 +87,22 @@ static void flat_collapsed_mirrored_blown_up_and_shuffled_solids_come_back(void)
 {
     static const double poisson[] = {0.45, 0.499, 0.3};
     for (int q = 0; q < CHECK_REPEATS(3, 1); q++) {
-        double most = 0;
-        CHECK_LE(insult_all(SOLID_IMPLICIT, poisson[q], CHECK_REPEATS(10, 1), &most), 10);
-        CHECK_LE(most, 1.01);
+        double max = 0;
+        CHECK_LE(case_all(SOLID_IMPLICIT, poisson[q], CHECK_REPEATS(10, 1), &max), 10);
+        CHECK_LE(max, 1.01);
     }
     for (int q = 0; q < CHECK_REPEATS(2, 0); q++) {
-        double most = 0;
-        CHECK_LE(insult_all(SOLID_EXPLICIT, poisson[q], 3, &most), 10);
-        CHECK_LE(most, 1.01);
+        double max = 0;
+        CHECK_LE(case_all(SOLID_EXPLICIT, poisson[q], 3, &max), 10);
+        CHECK_LE(max, 1.01);
     }
 }
 
 static void operator_edges_comes_back_with_the_implicit_solver(void)
 {
-    double most = 0;
-    CHECK_LE(insult_all(SOLID_IMPLICIT + 2, 0.45, CHECK_REPEATS(4, 1), &most), 10);
-    CHECK_LE(most, 1.01);
+    double max = 0;
+    CHECK_LE(case_all(SOLID_IMPLICIT + 2, 0.45, CHECK_REPEATS(4, 1), &max), 10);
+    CHECK_LE(max, 1.01);
 }
 
 /* energy of all of it turned beside that of 1 % of strain; steps leave it where it is */
@@ -111,7 +111,7 @@ static void turns_store_nothing(void)
     static const double axes[][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 0}, {1, -2, 3}};
     for (int k = 0; k < SOLID_KINDS; k++) {
         solid_scene s;
-        double most = 0, moved = 0, to[3], r[9];
+        double max = 0, moved = 0, to[3], r[9];
         solid_make(&s, &solid_kinds[k], 2, 2, 2, false);
         REQUIRE(solid_scene_open(&s));
         for (int i = 0; i < s.body->n_dof; i++) s.body->x[3 * i] *= 1.01;
@@ -125,17 +125,17 @@ static void turns_store_nothing(void)
             for (int i = 0; i < s.body->n_dof; i++) pal_mul33(s.body->x + 3 * i, r, s.body->x_rest + 3 * i);
             pal_body_update_nodes(s.body);
             pal_world_invalidate_limits(s.world, 0);
-            most = fmax(most, pal_world_energy_J(s.world));
+            max = fmax(max, pal_world_energy_J(s.world));
             REQUIRE(solid_scene_step(&s, 6, solid_step_s));
-            most = fmax(most, pal_world_energy_J(s.world));
+            max = fmax(max, pal_world_energy_J(s.world));
             for (int i = 0; i < s.body->n_dof; i++) {
                 pal_mul33(to, r, s.body->x_rest + 3 * i);
                 moved = fmax(moved, pal_dist3(s.body->x + 3 * i, to));
             }
         }
-        printf("  %s: energy %.2g of 1 %% strain's, off by %.2g S\n", solid_kinds[k].shown, most / strained,
+        printf("  %s: energy %.2g of 1 %% strain's, off by %.2g S\n", solid_kinds[k].shown, max / strained,
                moved / s.body->length_scale_m);
-        HARD_CASE("turns", "subdivision_fem", "energy over that of 1 % strain", most / strained, 1e-6, "");
+        HARD_CASE("turns", "subdivision_fem", "energy over that of 1 % strain", max / strained, 1e-6, "");
         HARD_CASE("turns", "subdivision_fem", "not rigid by", moved / s.body->length_scale_m, 1e-5, "S");
         solid_scene_close(&s);
     }
@@ -145,7 +145,7 @@ static void turns_store_nothing(void)
 static void ten_thousand_turns_leave_no_energy(void)
 {
     solid_scene s;
-    double most = 0, r[9];
+    double max = 0, r[9];
     solid_make(&s, &solid_kinds[0], 1, 1, 1, false);
     REQUIRE(solid_scene_open(&s));
     for (int i = 0; i < s.body->n_dof; i++) s.body->x[3 * i] *= 1.01;
@@ -156,9 +156,9 @@ static void ten_thousand_turns_leave_no_energy(void)
         pal_quat_matrix((const double[4]){cos(half), sine, 2 * sine, 3 * sine}, r);
         for (int i = 0; i < s.body->n_dof; i++) pal_mul33(s.body->x + 3 * i, r, s.body->x_rest + 3 * i);
         pal_body_update_nodes(s.body);
-        most = fmax(most, pal_world_energy_J(s.world));
+        max = fmax(max, pal_world_energy_J(s.world));
     }
-    HARD_CASE("many_turns", "subdivision_fem", "energy over that of 1 % strain", most / strained, 1e-6, "");
+    HARD_CASE("many_turns", "subdivision_fem", "energy over that of 1 % strain", max / strained, 1e-6, "");
     REQUIRE(solid_scene_step(&s, 10, solid_step_s));
     CHECK_LE(pal_world_energy_J(s.world), 1e-6 * strained);
     solid_scene_close(&s);

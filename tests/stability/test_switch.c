@@ -1,6 +1,6 @@
-/* A live switch (sim/transfer.h) in detail: momentum, forces that are let go, hashes, drift, grips, loads, levels of
- * surfaces, refusals. --table prints figures; --sweep N pulls a surface that adapts through nineteen switches at
- * random, with N seeds, and asserts nothing. */
+/* A live switch (server/sim/transfer/transfer.h) in detail: momentum, forces that are let go, hashes, drift, grips,
+ * loads, levels of surfaces, refusals. --table prints figures; --sweep N pulls a surface that adapts through nineteen
+ * switches at random, with N seeds, and asserts nothing. */
 #include "server/sim/world/blend_component.h"
 #include "tests/stability/hard_case.h"
 #include "tests/stability/switch_levels.h"
@@ -148,22 +148,22 @@ static void go_round(int first, int second, int n, int rest, double drift)
     pal_world *w = open_world(&b.set[0]->scene);
     pal_transfer_report r;
     step(w, 1.0 / 60, 60);
-    double least = INFINITY, most = -INFINITY, begin_J = 0, z = tip_z(w);
+    double min = INFINITY, max = -INFINITY, begin_J = 0, z = tip_z(w);
     for (int k = 0; k < n; k++) {
         pal_world *next = open_world(&b.set[(k + 1) % 2]->scene);
         pal_transfer_apply(x[k % 2], next, w, &r);
         CHECK_NEAR(r.energy_after_J / r.energy_before_J, 1, 0.02);
         if (k == 0) begin_J = r.energy_before_J;
         step(next, 1.0 / 60, rest);
-        least = fmin(least, tip_z(next)), most = fmax(most, tip_z(next));
+        min = fmin(min, tip_z(next)), max = fmax(max, tip_z(next));
         pal_world_destroy(w);
         w = next;
     }
     if (table)
         printf("  %d switches, %d steps between: tip %.2f, then %.2f to %.2f mm, energy %.4f of the first\n", n, rest,
-               1e3 * z, 1e3 * least, 1e3 * most, r.energy_after_J / begin_J);
-    CHECK_LE(fabs(least - z), drift * fabs(z));
-    CHECK_LE(fabs(most - z), drift * fabs(z));
+               1e3 * z, 1e3 * min, 1e3 * max, r.energy_after_J / begin_J);
+    CHECK_LE(fabs(min - z), drift * fabs(z));
+    CHECK_LE(fabs(max - z), drift * fabs(z));
     if (rest == 0) CHECK_NEAR(r.energy_after_J / begin_J, 1, 0.02);
     for (int k = 0; k < 2; k++) pal_transfer_free(x[k]);
     pal_world_destroy(w);
@@ -486,18 +486,18 @@ static void a_grip_on_a_surface_comes_back_to_its_force(void)
 static void a_surface_that_is_drawn_out_is_still(void)
 {
     const pull_plan plan = {.from_m = {0.19, 0.025, WIDTH}, .up_m = 0.015, .lift = 30, .creep = 0.002};
-    double most_J = 0;
+    double max_J = 0;
     beam b;
     pal_prepared surface;
     begin_surface(&b, false, 1e4, 20, &surface);
     pal_world *w = open_world(&b.set[1]->scene);
     for (int k = 0; k < 120; k++) {
         pull_step(w, &plan, k);
-        if (k > 60) most_J = fmax(most_J, pal_body_kinetic_J(pal_world_view_body(w, 0)));
+        if (k > 60) max_J = fmax(max_J, pal_body_kinetic_J(pal_world_view_body(w, 0)));
     }
-    if (table) printf("  drawn out: kinetic %.2g of %.2g J at most\n", most_J, pal_world_energy_J(w));
+    if (table) printf("  drawn out: kinetic %.2g of %.2g J at most\n", max_J, pal_world_energy_J(w));
     CHECK(grip_N(w) > 4);
-    CHECK_LE(most_J, 2e-3 * pal_world_energy_J(w));
+    CHECK_LE(max_J, 2e-3 * pal_world_energy_J(w));
     pal_world_destroy(w);
     pal_prepared_free(&surface);
     end(&b);
@@ -599,15 +599,15 @@ static void handles_hold_on(void)
         int n_row = pal_world_component_count(next);
         pal_transfer_apply(x, next, w, &r);
         CHECK_INT(pal_world_component_count(next), n_row + 2); /* ease and brush */
-        double least = INFINITY, most = -INFINITY;
+        double min = INFINITY, max = -INFINITY;
         for (int k = 0; k < 30; k++) {
             step(next, 1.0 / 60, 1);
             tip_of(next, u, v);
-            least = fmin(least, u[2]), most = fmax(most, u[2]);
+            min = fmin(min, u[2]), max = fmax(max, u[2]);
         }
-        if (table) printf("  handle: tip %.2f, then %.2f to %.2f mm\n", 1e3 * tip[2], 1e3 * least, 1e3 * most);
-        CHECK_LE(fabs(least - tip[2]), 0.2 * tip[2]);
-        CHECK_LE(fabs(most - tip[2]), 0.2 * tip[2]);
+        if (table) printf("  handle: tip %.2f, then %.2f to %.2f mm\n", 1e3 * tip[2], 1e3 * min, 1e3 * max);
+        CHECK_LE(fabs(min - tip[2]), 0.2 * tip[2]);
+        CHECK_LE(fabs(max - tip[2]), 0.2 * tip[2]);
         /* and lets go */
         CHECK(!pal_world_brush(next, 0, 0, NULL, &diag));
         step(next, 1.0 / 60, 50);

@@ -1,7 +1,7 @@
-/* Live switches between unlike meshes of one organ (sim/transfer.h): springs on whole voxels of the border and finite
- * elements on cut ones differ in mass, in how they are held and in where their nodes are. A ball under its weight that
- * a tool presses, at the first touch, while it moves and at rest: every pair of settings. --table prints what every
- * pair does. */
+/* Live switches between unlike meshes of one organ (server/sim/transfer/transfer.h): springs on whole voxels of the
+ * border and finite elements on cut ones differ in mass, in how they are held and in where their nodes are. A ball
+ * under its weight that a tool presses, at the first touch, while it moves and at rest: every pair of settings. --table
+ * prints what every pair does. */
 #include "tests/session/session_scene.h"
 #include "tests/stability/hard_case.h"
 #include "tests/stability/switch_beam.h"
@@ -42,14 +42,14 @@ static void check_pair(pal_configured_scene *const set[N], int i, int j, int m, 
     if (pal_transfer_make(&set[i]->scene, &set[j]->scene, 0, &diag, &x)) CHECK_FAIL("%s", diag.text);
     pal_world *next = open_world(&set[j]->scene);
     pal_transfer_apply(x, next, before, &r);
-    double off = 100 * (r.energy_after_J / r.energy_before_J - 1), most = 0;
+    double off = 100 * (r.energy_after_J / r.energy_before_J - 1), max = 0;
     const pal_body *b = pal_world_body(before, 0);
-    for (int k = 0; k < b->n_node; k++) most = fmax(most, pal_dist3(b->d + 3 * k, b->node_rest + 3 * k));
+    for (int k = 0; k < b->n_node; k++) max = fmax(max, pal_dist3(b->d + 3 * k, b->node_rest + 3 * k));
     if (table)
         printf("  %d: %d -> %d energy %+6.1f %% by interpolation, %+6.3f %%; %2d rounds, scale %.4f; moved %.3f of "
                "%.3f mm\n",
                m, i, j, 100 * (r.interpolated_J / r.energy_before_J - 1), off, r.n_smooth, r.scale, 1e3 * r.max_move_m,
-               1e3 * most);
+               1e3 * max);
     CHECK(r.energy_before_J > 1e-6);
     HARD_CASE("switch", list[j].model, "to it from unlike meshes of a pressed ball: energy jumps by", fabs(off), 2,
               "%");

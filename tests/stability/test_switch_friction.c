@@ -1,5 +1,5 @@
-/* Friction through a live switch (sim/transfer.h): what holds a tool sideways goes on holding it. --table prints what
- * every pair does. */
+/* Friction through a live switch (server/sim/transfer/transfer.h): what holds a tool sideways goes on holding it.
+ * --table prints what every pair does. */
 #include "tests/stability/switch_press.h"
 
 /* a tool that dragged the top sideways by friction goes on holding it where it was: across as much as along */
@@ -17,17 +17,17 @@ static void friction_holds_through_every_switch(void)
             pal_world *next = open_world(&set[j]->scene);
             const double *force_N = pal_world_tools(next)->tool[0].mean_force_N;
             pal_transfer *x = carry(i, j, w, next, &r);
-            double least_N = INFINITY, most_N = -INFINITY;
+            double min_N = INFINITY, max_N = -INFINITY;
             for (int k = 0; k < AFTER; k++) {
                 step(next, set[j]->scene.step_s, 1);
-                least_N = fmin(least_N, force_N[0]), most_N = fmax(most_N, force_N[0]);
+                min_N = fmin(min_N, force_N[0]), max_N = fmax(max_N, force_N[0]);
             }
             step(next, set[j]->scene.step_s, LATER);
             if (table)
-                printf("  %d -> %d: across %.3f N, then %.3f to %.3f, at rest %.3f\n", i, j, was_N, least_N, most_N,
+                printf("  %d -> %d: across %.3f N, then %.3f to %.3f, at rest %.3f\n", i, j, was_N, min_N, max_N,
                        force_N[0]);
-            CHECK_LE(most_N, 0.8 * fmax(was_N, force_N[0]));
-            CHECK_LE(1.2 * fmin(was_N, force_N[0]), least_N);
+            CHECK_LE(max_N, 0.8 * fmax(was_N, force_N[0]));
+            CHECK_LE(1.2 * fmin(was_N, force_N[0]), min_N);
             pal_world_destroy(next);
             pal_transfer_free(x);
         }

@@ -1,5 +1,6 @@
-/* The state of a running body goes over to another method, element, law, solver or resolution (sim/transfer.h): every
- * pair of settings on a beam that bends, moves and is pressed by a tool. --table prints what every pair does. */
+/* The state of a running body goes over to another method, element, law, solver or resolution
+ * (server/sim/transfer/transfer.h): every pair of settings on a beam that bends, moves and is pressed by a tool.
+ * --table prints what every pair does. */
 #include "tests/stability/hard_case.h"
 #include "tests/stability/switch_beam.h"
 

@@ -1,10 +1,11 @@
-/* A live switch (sim/transfer.h) while a tool presses: what is seen does not jump, and what is felt goes from the force
- * of before to that of after without a swing. Every pair of settings. --table prints what every pair does. */
+/* A live switch (server/sim/transfer/transfer.h) while a tool presses: what is seen does not jump, and what is felt
+ * goes from the force of before to that of after without a swing. Every pair of settings. --table prints what every
+ * pair does. */
 #include "tests/stability/hard_case.h"
 #include "tests/stability/switch_press.h"
 
 typedef struct seen {
-    double frame_m, least_N, most_N, is_N;
+    double frame_m, min_N, max_N, is_N;
 } seen;
 
 /* steps after the switch: the farthest that a vertex goes in a frame, the forces felt, the last of them at rest again
@@ -16,13 +17,13 @@ static void watch(pal_world *next, double step_s, double from_m, seen *out)
     const size_t n_byte = 3 * sizeof(float) * (size_t)to->n_shown;
     float *last = malloc(n_byte);
     if (!last) abort();
-    *out = (seen){.frame_m = from_m, .least_N = INFINITY};
+    *out = (seen){.frame_m = from_m, .min_N = INFINITY};
     for (int k = 0; k < AFTER; k++) {
         memcpy(last, to->shown, n_byte);
         step(next, step_s, 1);
         out->frame_m = fmax(out->frame_m, check_farthest(last, to->shown, to->n_shown));
         double now_N = pal_norm3(tool->mean_force_N);
-        out->least_N = fmin(out->least_N, now_N), out->most_N = fmax(out->most_N, now_N);
+        out->min_N = fmin(out->min_N, now_N), out->max_N = fmax(out->max_N, now_N);
         if (table) printf(k < 16 ? " %.2f" : "", now_N);
     }
     step(next, step_s, LATER);
@@ -48,12 +49,12 @@ static void check_pair(int i, int j, pal_world *before, double bound_m)
     watch(next, set[j]->scene.step_s, first_m, &s);
     if (table)
         printf("; lag %.3f mm, of a frame at most %.3f, bound %.3f; force %.3f, then %.3f to %.3f, %.3f\n",
-               1e3 * r.max_move_m, 1e3 * s.frame_m, 1e3 * bound_m, was_N, s.least_N, s.most_N, s.is_N);
+               1e3 * r.max_move_m, 1e3 * s.frame_m, 1e3 * bound_m, was_N, s.min_N, s.max_N, s.is_N);
     HARD_CASE("switch", list[j].model,
               "under a press: farthest move of the surface in a frame, over the errors of both", s.frame_m / bound_m, 1,
               "");
     HARD_CASE("switch", list[j].model, "under a press: force beyond those at rest before and after",
-              100 * fmax(s.most_N / fmax(was_N, s.is_N) - 1, 1 - s.least_N / fmin(was_N, s.is_N)), 20, "%");
+              100 * fmax(s.max_N / fmax(was_N, s.is_N) - 1, 1 - s.min_N / fmin(was_N, s.is_N)), 20, "%");
     CHECK(to->display_offset_m == NULL && pal_body_finite(to) && !to->frozen);
     pal_world_destroy(next);
     pal_transfer_free(x);

@@ -1,8 +1,9 @@
-/* The slider moved at random while a tool pulls: twenty live switches (sim/transfer.h) of an organ and of a beam, some
- * rehearsed, some before the one before has been let in, the hand going on meanwhile. No frame tears: no shown vertex
- * goes farther in a frame than the errors of both settings allow, no edge that is shown is drawn out, the grip holds
- * and pulls without a jump, and at last pulls as if only the last setting had ever been there. --table prints every
- * switch, --sweep MM SEEDS the worst of an organ pulled by MM mm with each of so many seeds, and asserts nothing. */
+/* The slider moved at random while a tool pulls: twenty live switches (server/sim/transfer/transfer.h) of an organ and
+ * of a beam, some rehearsed, some before the one before has been let in, the hand going on meanwhile. No frame tears:
+ * no shown vertex goes farther in a frame than the errors of both settings allow, no edge that is shown is drawn out,
+ * the grip holds and pulls without a jump, and at last pulls as if only the last setting had ever been there. --table
+ * prints every switch, --sweep MM SEEDS the worst of an organ pulled by MM mm with each of so many seeds, and asserts
+ * nothing. */
 #include "server/mesh/geometry/organ.h"
 #include "server/num/random.h"
 #include "tests/stability/hard_case.h"
@@ -48,7 +49,7 @@ static double longest_edge(const pal_world *w)
 {
     const pal_body *b = pal_world_view_body(w, 0);
     pal_shown shown;
-    double most = 0;
+    double max = 0;
     pal_world_shown(w, 0, &shown);
     for (int t = 0; t < shown.n_tri; t++)
         for (int c = 0; c < 3; c++) {
@@ -58,9 +59,9 @@ static double longest_edge(const pal_world *w)
                 now += pow((double)b->shown[i + k] - (double)b->shown[j + k], 2);
                 rest += pow((double)shown.rest_m[i + k] - (double)shown.rest_m[j + k], 2);
             }
-            most = fmax(most, sqrt(now / rest));
+            max = fmax(max, sqrt(now / rest));
         }
-    return most;
+    return max;
 }
 
 /* where settings rest under the pull, and the longest edge of any */
@@ -90,7 +91,7 @@ typedef struct worst {
 } worst;
 
 typedef struct seen {
-    double frame, edge, least_N, most_N, first_J; /* first_J: kinetic energy after a step */
+    double frame, edge, min_N, max_N, first_J; /* first_J: kinetic energy after a step */
 } seen;
 
 /* n steps, in units of bound_m for what goes in a frame */
@@ -106,7 +107,7 @@ static void watch(const pulled *p, pal_world *w, double step_s, int n, double bo
         if (k == 0) out->first_J = pal_body_kinetic_J(b);
         out->frame = fmax(out->frame, check_farthest(last, b->shown, b->n_shown) / bound_m);
         out->edge = fmax(out->edge, longest_edge(w));
-        out->least_N = fmin(out->least_N, pal_norm3(force_N)), out->most_N = fmax(out->most_N, pal_norm3(force_N));
+        out->min_N = fmin(out->min_N, pal_norm3(force_N)), out->max_N = fmax(out->max_N, pal_norm3(force_N));
         memcpy(last, b->shown, 3 * sizeof *last * (size_t)b->n_shown);
         CHECK(pal_world_tools(w)->tool[0].holding && !b->frozen);
     }
@@ -193,7 +194,7 @@ static worst slide(pulled *p, uint64_t seed)
         int n = 2 + (int)(12 * pal_random_unit(seed, 3 * k + 1));
         pal_transfer_report r;
         double before_N = pal_norm3(pal_world_tools(w)->tool[0].mean_force_N);
-        seen s = {.least_N = before_N, .most_N = before_N};
+        seen s = {.min_N = before_N, .max_N = before_N};
         double bound_m = sweep ? 1 : p->error_m[at_setting] + p->error_m[to];
         w = change(p, at_setting, to, pal_random_unit(seed, 3 * k + 2) < 0.5, w, &r);
         CHECK_LE(check_farthest(last, pal_world_view_body(w, 0)->shown, pal_world_view_body(w, 0)->n_shown), 1e-6);
@@ -202,8 +203,8 @@ static worst slide(pulled *p, uint64_t seed)
         if (table)
             printf("  %d -> %d, %2d steps: %.3f of %.2f mm in a frame, edges %.2f (%.2f), force %.2f, %.2f to %.2f N, "
                    "energy %+.2f %%, kinetic %.4f of all\n",
-                   at_setting, to, n, s.frame, 1e3 * bound_m, s.edge, longest, before_N, s.least_N, s.most_N,
-                   100 * energy, s.first_J / r.energy_before_J);
+                   at_setting, to, n, s.frame, 1e3 * bound_m, s.edge, longest, before_N, s.min_N, s.max_N, 100 * energy,
+                   s.first_J / r.energy_before_J);
         if (!sweep) judge(p, to, &s, bound_m, longest, r.energy_before_J);
         all.frame_m = fmax(all.frame_m, s.frame * bound_m);
         all.energy = fmax(all.energy, fabs(energy)), all.n_energy += fabs(energy) > 0.02;
@@ -319,18 +320,18 @@ static void crushed_cubes_come_to_rest(void)
 static int sweep_seeds(double by_m, int n_seed)
 {
     pal_surface organ;
-    worst most = {0};
+    worst max = {0};
     if (pal_organ_make(1500, &organ)) return 1;
     for (uint64_t seed = 1; seed <= (uint64_t)n_seed; seed++) {
         worst one = pull_and_slide(&organ, &(how){.along = 2, .by_m = by_m, .seed = seed});
         printf("seed %d: %.2f mm in a frame (%.1f %% of the way), energy off by %.2f %%, at last by %+.1f %% of the "
                "force\n",
                (int)seed, 1e3 * one.frame_m, 100 * one.frame_m / by_m, 100 * one.energy, 100 * one.force);
-        most.frame_m = fmax(most.frame_m, one.frame_m), most.energy = fmax(most.energy, one.energy);
-        most.force = fmax(most.force, fabs(one.force)), most.n_energy += one.n_energy;
+        max.frame_m = fmax(max.frame_m, one.frame_m), max.energy = fmax(max.energy, one.energy);
+        max.force = fmax(max.force, fabs(one.force)), max.n_energy += one.n_energy;
     }
-    printf("worst of %d: %.2f mm (%.1f %%), %.2f %%, %d switches beyond 2 %%, %.1f %%\n", n_seed, 1e3 * most.frame_m,
-           100 * most.frame_m / by_m, 100 * most.energy, most.n_energy, 100 * most.force);
+    printf("worst of %d: %.2f mm (%.1f %%), %.2f %%, %d switches beyond 2 %%, %.1f %%\n", n_seed, 1e3 * max.frame_m,
+           100 * max.frame_m / by_m, 100 * max.energy, max.n_energy, 100 * max.force);
     pal_surface_free(&organ);
     return 0;
 }

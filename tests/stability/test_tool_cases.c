@@ -80,9 +80,9 @@ static void teleport_by_a_body_size_gives_no_more_than_cap_times_clamp(void)
         double before = pal_world_energy_J(s.world);
         move_tool(&s, 0, to[k][0], to[k][1], to[k][2], false);
         REQUIRE(step_world(&s, 1));
-        double rise = pal_world_energy_J(s.world) - before, most = 15 * 0.02 * s.body->length_scale_m;
-        printf("  rise %.3g of %.3g mJ allowed\n", 1e3 * rise, 1e3 * most);
-        HARD_CASE("teleport", "tet_springs", "rise of energy over what is allowed", rise / most, 1, "");
+        double rise = pal_world_energy_J(s.world) - before, max = 15 * 0.02 * s.body->length_scale_m;
+        printf("  rise %.3g of %.3g mJ allowed\n", 1e3 * rise, 1e3 * max);
+        HARD_CASE("teleport", "tet_springs", "rise of energy over what is allowed", rise / max, 1, "");
         CHECK(tool_of(&s, 0)->touching);
         check_tools(&s);
     }
@@ -95,20 +95,20 @@ static void tool_that_appears_inside_pushes_out_gently(void)
     tool_scene s;
     REQUIRE(ball_scene(&s, VOXELS, true, 1, 0.01, 15) && tool_scene_open(&s));
     move_tool(&s, 0, 0.025, 0, 0.005, false);
-    double most_energy = 0;
+    double max_energy = 0;
     for (int i = 0; i < 30; i++) {
         REQUIRE(step_world(&s, 1));
         check_tools(&s);
-        most_energy = fmax(most_energy, pal_body_kinetic_J(s.body));
+        max_energy = fmax(max_energy, pal_body_kinetic_J(s.body));
         /* the nearest way out is +x, so tissue is pushed to -x and the tool to +x */
         const double *f = tool_of(&s, 0)->mean_force_N;
         CHECK(f[0] >= 0);
         if (i < 10) CHECK(f[0] >= 0.8 * pal_norm3(f));
         if (i == 0) CHECK_LE(pal_norm3(f), 0.1 * 15);
     }
-    printf("  kinetic energy up to %.3g mJ\n", 1e3 * most_energy);
+    printf("  kinetic energy up to %.3g mJ\n", 1e3 * max_energy);
     HARD_CASE("tool_inside", "tet_springs", "kinetic energy over the energy allowed",
-              most_energy / (15 * 0.02 * s.body->length_scale_m), 1, "");
+              max_energy / (15 * 0.02 * s.body->length_scale_m), 1, "");
     CHECK(!s.body->frozen);
     check_comes_back(&s);
     tool_scene_close(&s);
@@ -127,13 +127,13 @@ static void eight_tools_press_and_grab_one_spot(void)
     CHECK(!s.body->frozen);
     /* a few elements deep tissue is folded and does not come to rest; it must stay far below what eight caps could give
      */
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < 30; i++) {
         REQUIRE(step_world(&s, 1));
-        most = fmax(most, pal_body_kinetic_J(s.body));
+        max = fmax(max, pal_body_kinetic_J(s.body));
     }
-    printf("  kinetic energy up to %.3g mJ\n", 1e3 * most);
-    CHECK_LE(most, 0.1);
+    printf("  kinetic energy up to %.3g mJ\n", 1e3 * max);
+    CHECK_LE(max, 0.1);
     check_comes_back(&s);
     tool_scene_close(&s);
 }

@@ -61,8 +61,8 @@ static int brute(const pal_study *s, double within, double budget)
         if (!isnan(within) && p->error_m + s->reference_m > within) continue;
         if (!isnan(budget) && p->ms > budget) continue;
         /* below the reference's own error all are the same, and the cheapest is taken */
-        double far = fmax(p->error_m, s->reference_m), least = b ? fmax(b->error_m, s->reference_m) : INFINITY;
-        bool nearer = far < least || (b && far == least && p->ms < b->ms);
+        double far = fmax(p->error_m, s->reference_m), min = b ? fmax(b->error_m, s->reference_m) : INFINITY;
+        bool nearer = far < min || (b && far == min && p->ms < b->ms);
         if (!b || (isnan(within) ? nearer : p->ms < b->ms)) best = i;
     }
     return best;
@@ -215,11 +215,11 @@ static void how_much_is_refined_is_seen_of_other_levels(void)
     }
     double ms;
     for (int i = 0; i < 5; i++)
-        for (int told = 100; told < 5000; told += 2000) {
+        for (int reported = 100; reported < 5000; reported += 2000) {
             bool is_adaptive = i == 1 || i == 3;
             const pal_study_point *p = &s->point[i];
-            CHECK(pal_study_predict_cost(s, &p->measured.setting, is_adaptive ? told : p->n_node, 0,
-                                         is_adaptive ? told / 100 : p->n_substep, 0, i, &ms));
+            CHECK(pal_study_predict_cost(s, &p->measured.setting, is_adaptive ? reported : p->n_node, 0,
+                                         is_adaptive ? reported / 100 : p->n_substep, 0, i, &ms));
             CHECK_NEAR(ms / p->measured.ms, 1, 0.01);
         }
     s->point[3].err = PAL_ERR_FROZEN;
@@ -230,7 +230,7 @@ static void how_much_is_refined_is_seen_of_other_levels(void)
 /* ---- a beam ---- */
 
 typedef struct calls {
-    int n_done, n_reference, most;
+    int n_done, n_reference, max;
 } calls;
 
 static bool count_done(const pal_study *study, int n_finest, void *user)
@@ -238,7 +238,7 @@ static bool count_done(const pal_study *study, int n_finest, void *user)
     calls *c = user;
     c->n_done++;
     CHECK(study->n_point <= n_finest);
-    return c->most == 0 || study->n_point < c->most;
+    return c->max == 0 || study->n_point < c->max;
 }
 
 static bool count_progress(const char *what, double fraction, void *user)
@@ -254,7 +254,7 @@ static double between(const pal_problem *p, const pal_surface *beam, int size, i
 {
     pal_solution *s[2] = {NULL, NULL};
     pal_diagnostic diag = {{0}};
-    double most = 0;
+    double max = 0;
     for (int k = 0; k < 2; k++) {
         pal_solve_result r;
         pal_solve_options o = {.element = "hex8_bbar",
@@ -270,11 +270,11 @@ static double between(const pal_problem *p, const pal_surface *beam, int size, i
         double x[3], u[2][3];
         pal_add3(x, beam->x + 3 * i, beam->origin_m);
         for (int k = 0; k < 2; k++) pal_solution_at(s[k], x, u[k]);
-        most = fmax(most, pal_dist3(u[0], u[1]));
+        max = fmax(max, pal_dist3(u[0], u[1]));
     }
     pal_solution_free(s[0]);
     pal_solution_free(s[1]);
-    return most;
+    return max;
 }
 
 static void check_errors(const pal_study *s, const pal_problem *p, const pal_surface *beam)
@@ -312,7 +312,7 @@ static void check_points(const pal_study *s)
 
 /* the steps of a beam of a few voxels take microseconds, on a machine that does other things as well: a factor of 4.
  * Errors do not depend on that */
-static void check_foreseen(const pal_study *s)
+static void check_predicted(const pal_study *s)
 {
     int n = 0, n_cost = 0;
     for (int i = 0; i < s->n_point; i++) {
@@ -350,7 +350,7 @@ static void check_resumed(const pal_study *s, const pal_problem *p, const pal_su
     CHECK_INT(c.n_reference, 0);
     CHECK_INT(c.n_done, s->n_point);
     CHECK(!memcmp(again->point, s->point, sizeof s->point) && again->reference_m == s->reference_m);
-    c = (calls){.most = 2};
+    c = (calls){.max = 2};
     o.before = NULL;
     CHECK(pal_study_problem(p, &p->load_case[0], beam, &o, part, &diag) == PAL_ERR_STATE);
     CHECK_INT(part->n_point, 2);
@@ -376,7 +376,7 @@ static void a_beam_is_swept_and_taken_up_again(void)
     CHECK_INT(s->n_point, 7);
     check_points(s);
     check_errors(s, p, &beam);
-    check_foreseen(s);
+    check_predicted(s);
     check_resumed(s, p, &beam);
     pal_surface_free(&beam);
     free(p);

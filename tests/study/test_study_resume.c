@@ -5,17 +5,17 @@
 #include "tests/fixtures/beam_problem.h"
 #include "tests/fixtures/random.h"
 
-enum { MOST_ANSWERS = 64, MOST_NUMBERS = 3000, MOST_ENDS = 400 };
+enum { MAX_ANSWERS = 64, MAX_NUMBERS = 3000, MAX_ENDS = 400 };
 
 typedef struct kept {
     uint64_t key;
     pal_study_answer answer;
     int n;
-    double value[MOST_NUMBERS];
+    double value[MAX_NUMBERS];
 } kept;
 
 typedef struct run {
-    kept *kept; /* [MOST_ANSWERS] */
+    kept *kept; /* [MAX_ANSWERS] */
     int n_kept, n_recalled, n_twice;
     pal_study *so_far; /* as `done` was told last */
     int left;          /* looks until it is ended, which lasts; below 0: never */
@@ -38,8 +38,8 @@ static bool recall(uint64_t key, pal_study_answer *answer, double *value, int n,
 static void remember(uint64_t key, const pal_study_answer *answer, const double *value, int n, void *user)
 {
     run *r = user;
-    CHECK(n > 0 && n <= MOST_NUMBERS && r->n_kept < MOST_ANSWERS);
-    if (!(n > 0 && n <= MOST_NUMBERS && r->n_kept < MOST_ANSWERS)) return;
+    CHECK(n > 0 && n <= MAX_NUMBERS && r->n_kept < MAX_ANSWERS);
+    if (!(n > 0 && n <= MAX_NUMBERS && r->n_kept < MAX_ANSWERS)) return;
     for (int k = 0; k < r->n_kept; k++) r->n_twice += r->kept[k].key == key;
     kept *to = &r->kept[r->n_kept++];
     to->key = key, to->answer = *answer, to->n = n;
@@ -106,8 +106,8 @@ static void ended_anywhere_it_goes_on_to_the_same_table(void)
     pal_surface beam;
     pal_problem *p = malloc(sizeof *p);
     pal_study *once = calloc(1, sizeof *once), *again = calloc(1, sizeof *again);
-    run all = {.kept = calloc(MOST_ANSWERS, sizeof(kept)), .so_far = calloc(1, sizeof(pal_study))};
-    run parts = {.kept = calloc(MOST_ANSWERS, sizeof(kept)), .so_far = calloc(1, sizeof(pal_study))};
+    run all = {.kept = calloc(MAX_ANSWERS, sizeof(kept)), .so_far = calloc(1, sizeof(pal_study))};
+    run parts = {.kept = calloc(MAX_ANSWERS, sizeof(kept)), .so_far = calloc(1, sizeof(pal_study))};
     REQUIRE(p && once && again && all.kept && all.so_far && parts.kept && parts.so_far && make_beam(&beam, p));
     CHECK(go(&all, p, &beam, -1, once) == PAL_ERR_OK);
     /* the rest at three sizes and the way, none asked for twice */
@@ -117,10 +117,10 @@ static void ended_anywhere_it_goes_on_to_the_same_table(void)
     CHECK(n_look > 100);
     uint64_t state = 3;
     pal_err err = PAL_ERR_STATE;
-    for (int k = 0; k < MOST_ENDS && err == PAL_ERR_STATE; k++) {
+    for (int k = 0; k < MAX_ENDS && err == PAL_ERR_STATE; k++) {
         /* ever later, so that the longest answer is found as well */
-        int most = n_look / 100 + n_look * k / 50;
-        int left = 1 + (int)random_below(&state, (uint64_t)most);
+        int max = n_look / 100 + n_look * k / 50;
+        int left = 1 + (int)random_below(&state, (uint64_t)max);
         /* with all settings measured once more: every time they are timed again */
         if (parts.so_far->n_point == once->n_point && n_late++ > 0) left = -1;
         err = go(&parts, p, &beam, left, again);

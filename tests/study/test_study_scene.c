@@ -119,29 +119,29 @@ static void a_full_organ_is_pressed(void)
 }
 
 /* rests of the reference itself, the one with most nodes, in the order in which they were found */
-enum { MOST_RESTS = 16, MOST_VALUES = 3000 };
+enum { MAX_RESTS = 16, MAX_VALUES = 3000 };
 typedef struct rests {
     int n, n_node, n_value;
-    double u[MOST_RESTS][MOST_VALUES];
+    double u[MAX_RESTS][MAX_VALUES];
 } rests;
 
 static void take_rest(uint64_t key, const pal_study_answer *answer, const double *value, int n, void *user)
 {
     rests *r = user;
     (void)key;
-    if (answer->err || answer->n_node < r->n_node || n > MOST_VALUES) return;
+    if (answer->err || answer->n_node < r->n_node || n > MAX_VALUES) return;
     if (answer->n_node > r->n_node) r->n = 0;
-    if (r->n == MOST_RESTS) return;
+    if (r->n == MAX_RESTS) return;
     r->n_node = answer->n_node, r->n_value = n;
     memcpy(r->u[r->n++], value, sizeof *value * (size_t)n);
 }
 
-static int most_moved(const double *u, int n_value)
+static int max_moved(const double *u, int n_value)
 {
-    int most = 0;
+    int max = 0;
     for (int i = 0; i < n_value / 3; i++)
-        if (pal_norm3(u + 3 * i) > pal_norm3(u + 3 * most)) most = i;
-    return most;
+        if (pal_norm3(u + 3 * i) > pal_norm3(u + 3 * max)) max = i;
+    return max;
 }
 
 /* three times in by about 2 % of its diagonal, then out by no more than 7.5 %, at the place of the first press */
@@ -151,11 +151,11 @@ static void check_loads(const rests *r, double length_scale_m)
     if (r->n < 4) return;
     const double *first = r->u[0], *pull = r->u[r->n - 1];
     for (int k = 0; k < r->n; k++) {
-        double moved = pal_norm3(r->u[k] + 3 * most_moved(r->u[k], r->n_value));
+        double moved = pal_norm3(r->u[k] + 3 * max_moved(r->u[k], r->n_value));
         printf("  load %d moves it by %.2f %% of its diagonal\n", k, 100 * moved / length_scale_m);
         if (k == r->n - 1) CHECK(moved > 0.03 * length_scale_m && moved < 0.075 * length_scale_m);
     }
-    const int at = 3 * most_moved(pull, r->n_value);
+    const int at = 3 * max_moved(pull, r->n_value);
     CHECK(pal_dot3(pull + at, first + at) < 0);
 }
 

@@ -13,13 +13,13 @@ void pal_credit_begin(pal_credit *credit, double rate_hz)
 {
     memset(credit, 0, sizeof *credit);
     credit->rate_hz = rate_hz;
-    credit->most = 3;
-    credit->least_s[0] = credit->least_s[1] = HUGE_VAL;
+    credit->max = 3;
+    credit->min_s[0] = credit->min_s[1] = HUGE_VAL;
 }
 
 bool pal_credit_free(const pal_credit *credit)
 {
-    return credit->n_flight < (credit->probing ? 1 : credit->most);
+    return credit->n_flight < (credit->probing ? 1 : credit->max);
 }
 
 void pal_credit_sent(pal_credit *credit, uint32_t cycle, uint64_t now_ns)
@@ -38,16 +38,16 @@ static void learn(pal_credit *c, double rtt_s, bool alone, uint64_t now_ns)
     c->rtt_s = c->rtt_s > 0 ? c->rtt_s + 0.125 * (rtt_s - c->rtt_s) : rtt_s;
     if (c->window_ns == 0) c->window_ns = now_ns + FIRST_WINDOW_NS;
     if (now_ns > c->window_ns) {
-        c->least_s[0] = c->least_s[1];
-        c->least_s[1] = HUGE_VAL;
+        c->min_s[0] = c->min_s[1];
+        c->min_s[1] = HUGE_VAL;
         c->window_ns = now_ns + WINDOW_NS;
         c->probing = true;
     }
     if (!alone) return;
     c->probing = false;
-    c->least_s[1] = fmin(c->least_s[1], rtt_s);
-    double k = 1 + ceil(c->rate_hz * fmin(c->least_s[0], c->least_s[1]));
-    c->most = (int)fmax(PAL_CREDIT_MIN, fmin(k, PAL_CREDIT_MAX));
+    c->min_s[1] = fmin(c->min_s[1], rtt_s);
+    double k = 1 + ceil(c->rate_hz * fmin(c->min_s[0], c->min_s[1]));
+    c->max = (int)fmax(PAL_CREDIT_MIN, fmin(k, PAL_CREDIT_MAX));
 }
 
 bool pal_credit_acknowledge(pal_credit *credit, uint32_t cycle, uint64_t now_ns)

@@ -13,14 +13,14 @@ enum { PAL_CREDIT_MIN = 2, PAL_CREDIT_MAX = 12 };
 
 typedef struct pal_credit {
     double rate_hz; /* of cycles                                          */
-    int most;       /* K = 1 + ceil(rate x smallest round trip), clamped  */
+    int max;        /* K = 1 + ceil(rate x smallest round trip), clamped  */
     int n_flight;   /* sent and not acknowledged, oldest first            */
     uint32_t cycle[PAL_CREDIT_MAX];
     uint64_t sent_ns[PAL_CREDIT_MAX];
     uint32_t acknowledged; /* newest acknowledged cycle; 0: none                 */
     uint64_t heard_ns;     /* last acknowledgement, or the first cycle sent      */
     double rtt_s;          /* smoothed; 0: none yet                              */
-    double least_s[2];     /* smallest round trip of the last and this window    */
+    double min_s[2];       /* smallest round trip of the last and this window    */
     uint64_t window_ns;    /* end of this window; 0: before the first            */
     bool probing;          /* a cycle goes alone: nothing else until it is back  */
     bool first_alone;      /* cycle[0] was sent with none before it in flight    */

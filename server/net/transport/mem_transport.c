@@ -9,7 +9,7 @@ struct pal_mem_peer {
     pal_peer peer; /* first: the transport's record is found from it */
     pal_transport *road;
     pal_packet *fixed; /* what receive returned last */
-    bool told, closed;
+    bool reported, closed;
     pal_mem_peer *next;
 };
 
@@ -39,12 +39,12 @@ static void tell_closed(pal_mem_peer *p)
 /* a drop may come out of the middle of a hub call, so nothing is told here: the hub knows its own drops */
 static void mem_drop(pal_peer *peer)
 {
-    ((pal_mem_peer *)(void *)peer)->told = false;
+    ((pal_mem_peer *)(void *)peer)->reported = false;
 }
 
 static void mem_ready(pal_peer *peer)
 {
-    ((pal_mem_peer *)(void *)peer)->told = true;
+    ((pal_mem_peer *)(void *)peer)->reported = true;
 }
 
 static int mem_port(const pal_transport *transport)
@@ -96,7 +96,7 @@ void pal_mem_send(pal_mem_peer *peer, const void *bytes, size_t n_byte, bool tex
 
 const pal_packet *pal_mem_receive(pal_mem_peer *peer)
 {
-    peer->told = false;
+    peer->reported = false;
     pal_packet_replace(&peer->fixed, NULL);
     if (!peer->peer.drop_code) peer->fixed = peer->road->events.next(peer->road->events.user, &peer->peer);
     return peer->fixed;
@@ -109,7 +109,7 @@ void pal_mem_get(pal_transport *transport, const char *path, pal_reply *reply)
 
 bool pal_mem_is_ready(const pal_mem_peer *peer)
 {
-    return peer->told;
+    return peer->reported;
 }
 
 int pal_mem_code(const pal_mem_peer *peer)

@@ -11,7 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { MOST_FILES = 512, MOST_FILE_BYTES = 16 << 20, MOST_BYTES = 64 << 20, ETAG = 48, PATH = 512 };
+enum { MAX_FILES = 512, MAX_FILE_BYTES = 16 << 20, MAX_BYTES = 64 << 20, ETAG = 48, PATH = 512 };
 
 typedef struct entry {
     char path[PATH], etag[ETAG];
@@ -24,7 +24,7 @@ struct pal_site {
     char root[PATH_MAX];
     int n_entry;
     size_t n_byte;
-    entry entry[MOST_FILES];
+    entry entry[MAX_FILES];
 };
 
 const char *pal_site_type(const char *name)
@@ -87,7 +87,7 @@ static int open_inside(const pal_site *site, const char *path, struct stat *stat
     snprintf(full, sizeof full, "%s%s", site->root, path);
     if (!realpath(full, real) || strncmp(real, site->root, n) || (real[n] != '/' && n > 1)) return -1;
     int fd = open(real, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
-    if (fd >= 0 && (fstat(fd, stat) || !S_ISREG(stat->st_mode) || stat->st_size > MOST_FILE_BYTES)) {
+    if (fd >= 0 && (fstat(fd, stat) || !S_ISREG(stat->st_mode) || stat->st_size > MAX_FILE_BYTES)) {
         close(fd);
         return -1;
     }
@@ -113,7 +113,7 @@ static bool fill(pal_site *site, entry *e, int fd, const struct stat *stat)
 {
     uint8_t digest[32];
     size_t n = (size_t)stat->st_size, old = e->bytes ? e->bytes->n_byte : 0;
-    if (site->n_byte - old + n > MOST_BYTES) return false;
+    if (site->n_byte - old + n > MAX_BYTES) return false;
     pal_packet *bytes = read_all(fd, n);
     if (!bytes) return false;
     site->n_byte += n - old;
@@ -139,7 +139,7 @@ bool pal_site_get(pal_site *site, const char *path, pal_site_file *out)
     for (int i = 0; i < site->n_entry && !e; i++)
         if (!strcmp(site->entry[i].path, path)) e = &site->entry[i];
     bool known = e != NULL, good = true;
-    if (!known && site->n_entry < MOST_FILES) {
+    if (!known && site->n_entry < MAX_FILES) {
         e = &site->entry[site->n_entry];
         memcpy(e->path, path, strlen(path) + 1);
     }

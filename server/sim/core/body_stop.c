@@ -24,12 +24,12 @@ static int smallest_around(const pal_body *body, int node)
     const int32_t *element = body->element ? body->element : body->tets ? body->tets->tet : NULL;
     int n = body->element ? body->n_element : body->tets ? body->tets->n_tet : 0, best = -1;
     int n_corner = body->element ? body->n_corner : 4;
-    double least = INFINITY;
+    double min = INFINITY;
     for (int e = 0; e < n && element && !body->interpolation; e++)
         for (int c = 0; c < n_corner; c++) {
             const int32_t *corner = element + (size_t)e * (size_t)n_corner;
             double size = corner[c] == node ? volume6(body->x_rest, corner, n_corner) : INFINITY;
-            if (size < least) least = size, best = e;
+            if (size < min) min = size, best = e;
         }
     return best;
 }

@@ -12,9 +12,9 @@ enum { MIN_VOXELS = 2, MAX_VOXELS = 400, MAX_LEVELS = 10, MAX_CUTS = 8, MAX_KEPT
 /* subdivisions of control cells whose boundary is filled with voxels: as shown, or finer */
 enum { FINE_LEVELS = 3 };
 
-/* cut voxels with less inside are dropped, unless more than most_missing of the volume would go; then those below
+/* cut voxels with less inside are dropped, unless more than max_missing of the volume would go; then those below
  * keep_fill (solve/load_case.c has the same numbers) */
-static const double drop_fill = 0.25, most_missing = 0.025, keep_fill = 0.02;
+static const double drop_fill = 0.25, max_missing = 0.025, keep_fill = 0.02;
 
 static bool is(const char *a, const char *b)
 {
@@ -183,10 +183,10 @@ static const char *solver_of(const pal_configuration *s)
 static pal_err check_numbers(const pal_configuration *s, pal_diagnostic *diag)
 {
     bool voxels = is_voxels(s->model), solid = is(s->model, "subdivision_fem");
-    int least = voxels ? MIN_VOXELS : solid ? -1 : 1, most = voxels ? MAX_VOXELS : solid ? MAX_CUTS : MAX_LEVELS;
-    if (s->size != 0 && (s->size < least || s->size > most))
+    int min = voxels ? MIN_VOXELS : solid ? -1 : 1, max = voxels ? MAX_VOXELS : solid ? MAX_CUTS : MAX_LEVELS;
+    if (s->size != 0 && (s->size < min || s->size > max))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "size: %d %s, wanted %d to %d", s->size,
-                                  voxels ? "voxels" : "levels", least, most);
+                                  voxels ? "voxels" : "levels", min, max);
     if (s->step_s != 0 && !(s->step_s >= 1e-4 && s->step_s <= 0.1))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "step_s: %g is outside [1e-4, 0.1]", s->step_s);
     if (s->tolerance != 0 && !(s->tolerance >= 1e-14 && s->tolerance <= 0.5))
@@ -305,7 +305,7 @@ static pal_err fill_voxels(const pal_body_def *body, const double up[3], const p
         .resolution = size, .border = true, .min_fill = drop_fill, .fill = true, .max_voxel = MAX_KEPT_VOXELS};
     align(body, surface, size, voxel.ahead);
     pal_err err = pal_prepared_make(surface, &voxel, out, &report, &reason);
-    if (!err && missing(out) > most_missing) {
+    if (!err && missing(out) > max_missing) {
         pal_prepared_free(out);
         voxel.min_fill = keep_fill;
         err = pal_prepared_make(surface, &voxel, out, &report, &reason);

@@ -34,7 +34,7 @@ typedef struct pal_region {
     const double *grid_young_Pa, *grid_poisson, *grid_density_kg_m3; /* NULL: not given                          */
 } pal_region;
 
-/* Constants of springs that vary over the body (model tet_springs, paper B 3.5): values at the nodes of a grid,
+/* Constants of springs that vary over the body (model tet_springs, paper B section 3.5): values at the nodes of a grid,
  * trilinear between them, the border's values beyond. A spring takes the mean over its corners at rest. At most
  * PAL_SPRING_GRID_NODES_MAX nodes. Numbers are borrowed, x fastest */
 typedef struct pal_spring_grid {
@@ -52,9 +52,10 @@ typedef struct pal_support_def {
     double low_m[3], high_m[3];
 } pal_support_def;
 
-/* A stroke of a soft brush over the material at rest (painting, paper A 4.1; model subdivision_fem). Within radius_m of
- * at_m, Young's modulus and density are multiplied by factor^w; w is 1 up to (1 - soft) radius_m and falls smoothly to
- * 0 at radius_m. Strokes multiply. Ranges: factors PAL_STROKE_FACTOR_MIN to _MAX, soft 0 to 1, radius_m above 0 */
+/* A stroke of a soft brush over the material at rest (painting, paper A section 4.1; model subdivision_fem). Within
+ * radius_m of at_m, Young's modulus and density are multiplied by factor^w; w is 1 up to (1 - soft) radius_m and falls
+ * smoothly to 0 at radius_m. Strokes multiply. Ranges: factors PAL_STROKE_FACTOR_MIN to _MAX, soft 0 to 1, radius_m
+ * above 0 */
 typedef struct pal_stroke {
     double at_m[3], radius_m, soft; /* body frame, rest shape */
     double young_factor, density_factor;

@@ -26,7 +26,7 @@ static bool in_label(const pal_region *r, const double x[3])
     return r->label[at] == r->is;
 }
 
-/* trilinear between the grid's nodes, the border's values beyond them (paper B 3.5, erratum B12) */
+/* trilinear between the grid's nodes, the border's values beyond them (paper B section 3.5, erratum B12) */
 static double on_grid(const pal_region *r, const double *value, const double x[3])
 {
     pal_grid grid = {{r->n[0], r->n[1], r->n[2]},

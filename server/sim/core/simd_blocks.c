@@ -6,7 +6,7 @@
 #include <string.h>
 
 /* a strip with fewer elements costs more than a loose block */
-enum { LEAST_LANES = 2, TILE = 128 };
+enum { MIN_LANES = 2, TILE = 128 };
 
 typedef struct lattice {
     double low[3];
@@ -120,7 +120,7 @@ static void place_all(const entry *first, int n_item, pal_simd_blocks *out)
     int n_strip = 0, n_loose = 0;
     for (const entry *e = first; e < end;) {
         int n = strip_length(e, end);
-        bool strip = n >= LEAST_LANES;
+        bool strip = n >= MIN_LANES;
         for (int i = 0; i < n; i++) {
             if (strip) {
                 out->place[e[i].item] = PAL_LANES * n_strip + e[i].slot[0] - e->slot[0];

@@ -69,9 +69,9 @@ PAL_INLINE void pal_wide_rotation(const pal_wide q[4], pal_wide r[9])
     pal_wide s = 2 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     pal_wide x = s * q[1], y = s * q[2], z = s * q[3];
     pal_wide wx = q[0] * x, wy = q[0] * y, wz = q[0] * z, xx = q[1] * x, xy = q[1] * y, xz = q[1] * z;
-    pal_wide yy = q[2] * y, yz = q[2] * z, zz = q[3] * z;
-    r[0] = 1 - (yy + zz), r[1] = xy - wz, r[2] = xz + wy;
-    r[3] = xy + wz, r[4] = 1 - (xx + zz), r[5] = yz - wx;
+    pal_wide yy = q[2] * y, yz = q[2] * z, zz_estimator = q[3] * z;
+    r[0] = 1 - (yy + zz_estimator), r[1] = xy - wz, r[2] = xz + wy;
+    r[3] = xy + wz, r[4] = 1 - (xx + zz_estimator), r[5] = yz - wx;
     r[6] = xz - wy, r[7] = yz + wx, r[8] = 1 - (xx + yy);
 }
 
@@ -104,7 +104,7 @@ PAL_INLINE void pal_wide_rotation_step(const pal_wide m[9], pal_wide q[4], pal_w
 
 /* Rotations of as many elements as are live (mask), from q (in and out): r, and m = r'f. Returns the lanes, as bits,
  * that pal_polar_rotation has to settle (then r and m are to be taken again); `most` turns at most */
-PAL_INLINE unsigned pal_wide_polar(const pal_wide f[9], pal_wide_mask live, int most, pal_wide q[4], pal_wide r[9],
+PAL_INLINE unsigned pal_wide_polar(const pal_wide f[9], pal_wide_mask live, int max, pal_wide q[4], pal_wide r[9],
                                    pal_wide m[9])
 {
     pal_wide_mask settled = ~live, stuck = ~live;
@@ -112,7 +112,7 @@ PAL_INLINE unsigned pal_wide_polar(const pal_wide f[9], pal_wide_mask live, int 
     for (int k = 0;; k++) {
         pal_wide_rotation(q, r);
         pal_wide_tmul(m, r, f);
-        if (done || k == most) break;
+        if (done || k == max) break;
         pal_wide_rotation_step(m, q, &settled, &stuck);
         settled = settled | ~live;
         done = pal_wide_all(settled | stuck);

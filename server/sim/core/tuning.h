@@ -25,7 +25,7 @@
 
 /* m: positions, radii; a body of this size in mm as a file's unit is still one (tests/scene/test_scene_file.c) */
 #define PAL_LENGTH_MAX_M 1e9
-/* factors of a paint stroke (tests/scene/test_solid_scene.c) */
+/* factors of a paint stroke (tests/scene/test_subdivision_scene.c) */
 #define PAL_STROKE_FACTOR_MIN 1e-6
 #define PAL_STROKE_FACTOR_MAX 1e6
 /* nodes of a grid of spring constants */

@@ -14,7 +14,7 @@
 #include <string.h>
 
 /* of a triangle's area at rest, that pressure acts on */
-static const double most_area = 2;
+static const double max_area = 2;
 
 /* a brush that acts; `now` is what it does now, on its way to `to` */
 typedef struct slot {
@@ -115,7 +115,7 @@ static pal_err fill(const pal_body *body, const pal_brush *b, slot *s, pal_diagn
 {
     const bool curve = b->kind == PAL_BRUSH_CURVE;
     const int n = curve ? body->n_shown : body->surface->n_tri;
-    double t = 0, sum = 0, most = 0;
+    double t = 0, sum = 0, max = 0;
     for (int i = 0; i < n; i++) s->n += reach(body, b, i, &t) > 0;
     if (s->n == 0)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: nothing of body \"%s\" is within radius_m %g of it",
@@ -128,14 +128,14 @@ static pal_err fill(const pal_body *body, const pal_brush *b, slot *s, pal_diagn
     for (int i = 0, k = 0; i < n; i++) {
         double w = reach(body, b, i, &t);
         if (!(w > 0)) continue;
-        s->weight[k] = w, sum += w, most = fmax(most, w);
+        s->weight[k] = w, sum += w, max = fmax(max, w);
         s->item[k] = curve ? body->shown_node[i] : i;
         if (curve) pal_copy3(s->begin + 3 * (size_t)k, body->d + 3 * (size_t)s->item[k]), s->bow[k] = 4 * t * (1 - t);
         k++;
     }
     if (!curve) return PAL_ERR_OK;
     for (int k = 0; k < s->n; k++) s->weight[k] /= sum;
-    double limit = body->load_cap_N / body->edge_m * sum / most;
+    double limit = body->load_cap_N / body->edge_m * sum / max;
     if (b->stiffness_N_m > limit)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
                                   "brush: stiffness_N_m %g, body \"%s\" takes up to %.3g over %d nodes",
@@ -186,10 +186,10 @@ pal_err pal_brush_set(void *self, const pal_body *body, int slot_index, const pa
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: lift_m of %g m, body \"%s\" takes up to %g",
                                   pal_norm3(b->lift_m), body->name, 10 * body->length_scale_m);
     /* 10 E: beyond it loads on nodes are shortened, and sub-steps become too many to be live */
-    const double most_Pa = body->load_cap_N / (body->edge_m * body->edge_m);
-    if (b->kind == PAL_BRUSH_INFLATE && !(fabs(b->pressure_Pa) <= most_Pa))
+    const double max_Pa = body->load_cap_N / (body->edge_m * body->edge_m);
+    if (b->kind == PAL_BRUSH_INFLATE && !(fabs(b->pressure_Pa) <= max_Pa))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: pressure_Pa %g, body \"%s\" takes up to %.3g",
-                                  b->pressure_Pa, body->name, most_Pa);
+                                  b->pressure_Pa, body->name, max_Pa);
     if (may_continue(s, b)) {
         s->brush = *b;
         s->left_s = PAL_BLEND_BRUSH_S;
@@ -304,8 +304,8 @@ static void inflate(const slot *s, const pal_body *body, double *load)
         const int t = s->item[k];
         double n[3], rest[3], force = s->share * s->now[0] * s->weight[k] / 6;
         area2(body, body->d, t, n), area2(body, body->node_rest, t, rest);
-        const double now2 = pal_dot3(n, n), most2 = most_area * most_area * pal_dot3(rest, rest);
-        if (now2 > most2) force *= sqrt(most2 / now2);
+        const double now2 = pal_dot3(n, n), max2 = max_area * max_area * pal_dot3(rest, rest);
+        if (now2 > max2) force *= sqrt(max2 / now2);
         for (int c = 0; c < 3; c++)
             pal_axpy3(load + 3 * (size_t)body->shown_node[body->surface->tri[3 * (size_t)t + (size_t)c]], force, n);
     }

@@ -1,4 +1,5 @@
-/* Component cell_elastic: elements of a subdivision solid in their own moving frames (paper A 3.2-3.4; cell_kernel.h).
+/* Component cell_elastic: elements of a subdivision solid in their own moving frames (paper A section 3.2-3.4;
+ * cell_kernel.h).
  *
  * Key: operator ("polar": displacements from the rest shape rotated by the element's polar rotation, the default |
  * "edges": changes of edge lengths and angles as in the paper, corrected; its forces have no energy, and

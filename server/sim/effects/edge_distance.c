@@ -1,5 +1,5 @@
 /* Component edge_distance: every edge keeps its length. C = (l - l0)/l0, E = k/2 C^2, f_i = +(k C + c C') (d/l)/l0 and
- * the opposite on j, d from i to j (paper B 4.1, F_D).
+ * the opposite on j, d from i to j (paper B section 4.1, F_D).
  *
  * Departures: erratum B1 (the paper's force lacks 1/l0^2). An edge shorter than 1e-9 of its rest length has no
  * direction and takes its rest direction, so that a body collapsed to a plane or a point opens again. Where tetrahedra
@@ -10,7 +10,7 @@
 #include <stdlib.h>
 
 /* of (l/l0)^2 */
-#define LEAST_Q 1e-18
+#define MIN_Q 1e-18
 
 typedef struct edge_distance {
     pal_spring_set row; /* first: see pal_spring_set_material */
@@ -57,13 +57,13 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 }
 
 /* with q = (l/l0)^2 and r = 1/sqrt(q): C (d/l)/l0 = (1 - r) d/l0^2 */
-PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *least)
+PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *min)
 {
-    const pal_v8 floor = LEAST_Q - (pal_v8){0}, one = 1 - (pal_v8){0};
+    const pal_v8 floor = MIN_Q - (pal_v8){0}, one = 1 - (pal_v8){0};
     pal_v8 dx = pal_load8(p[1][0]) - pal_load8(p[0][0]), dy = pal_load8(p[1][1]) - pal_load8(p[0][1]),
            dz = pal_load8(p[1][2]) - pal_load8(p[0][2]), w2 = w * w;
     pal_v8 q = (dx * dx + dy * dy + dz * dz) * w2, known = pal_select8(w > 0, q, one);
-    *least = pal_select8(known < *least, known, *least);
+    *min = pal_select8(known < *min, known, *min);
     pal_v8 s = kq * w2 * (pal_inverse_sqrt8(pal_select8(q < floor, floor, q)) - 1);
     f[0][0] = s * dx, f[0][1] = s * dy, f[0][2] = s * dz;
 }
@@ -75,7 +75,7 @@ static void reopen(const pal_spring_set *row, const pal_body *body)
         int a = 3 * row->item[2 * i], b = 3 * row->item[2 * i + 1], lane = row->simd_blocks.place[i];
         double d[3], w = row->w[lane];
         pal_sub3(d, body->d + b, body->d + a);
-        if (pal_dot3(d, d) * w * w >= LEAST_Q) continue;
+        if (pal_dot3(d, d) * w * w >= MIN_Q) continue;
         pal_sub3(d, body->x_rest + b, body->x_rest + a);
         double s = row->spring.k_J * row->q[lane] * w * w;
         pal_axpy3(body->f + b, s, d);
@@ -93,9 +93,9 @@ static pal_err run(void *self, pal_step *step)
     const edge_distance *e = self;
     pal_body *body = step->body;
     pal_node_order_load(body->node_order, body->d);
-    double least = pal_spring_run(&e->row, body->node_order, kernel, 2);
+    double min = pal_spring_run(&e->row, body->node_order, kernel, 2);
     pal_node_order_add(body->node_order, body->f);
-    if (least < LEAST_Q) reopen(&e->row, body);
+    if (min < MIN_Q) reopen(&e->row, body);
     if (e->row.n_off > 0) pal_spring_recovery_force(body->recovery, &e->row, body);
     if (e->row.spring.c_Js > 0) pal_spring_damp(&e->row, body, PAL_SPRING_DISTANCE);
     return PAL_ERR_OK;

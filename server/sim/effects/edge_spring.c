@@ -1,9 +1,9 @@
 /* Component edge_spring: the springs of an adaptive surface, f = -[k (l - l0) + c (dv.dx)/l] dx/l on the first end and
- * the opposite on the second (C eq. 2). Keys: k_N_m, c_Ns_m, of a spring of level 0.
+ * the opposite on the second (paper C, eq. 2). Keys: k_N_m, c_Ns_m, of a spring of level 0.
  *
- * Every spring has k times its share (adaptive_surface.h: the law of the body) and c in the same proportion (C eq. 8:
- * KD_l = KD_0 KS_l / KS_0); with material regions k times E at its middle at rest over the body's E besides. Constants
- * that are not given follow the material: k = sqrt(3)/2 E thickness, c = 0.02 sqrt(k m_0). spring_ramp
+ * Every spring has k times its share (adaptive_surface.h: the law of the body) and c in the same proportion (paper C,
+ * eq. 8: KD_l = KD_0 KS_l / KS_0); with material regions k times E at its middle at rest over the body's E besides.
+ * Constants that are not given follow the material: k = sqrt(3)/2 E thickness, c = 0.02 sqrt(k m_0). spring_ramp
  * multiplies k.
  *
  * Departures: a spring shorter than 1e-9 of its rest length has no direction. It takes that from rest, without damping,
@@ -20,7 +20,7 @@
 #include <math.h>
 
 /* of (l/l0)^2 */
-#define LEAST_Q 1e-18
+#define MIN_Q 1e-18
 
 /* springs at a time, so that the processor has several blocks under way */
 enum { BATCH = 8 };
@@ -186,8 +186,8 @@ PAL_INLINE void measure_blocks(const edge_spring *e, const double *xv, int first
 /* with q = (l/l0)^2 and r = 1/sqrt(q): k (l - l0) d/l = k (1 - r) d, and c (dv.d)/l^2 d; returns the least q */
 static double run_springs(const edge_spring *e, const pal_active_nodes *pack, double k, double c)
 {
-    const pal_v8 floor = LEAST_Q - (pal_v8){0}, none = {0}, one = 1 - none;
-    pal_v8 least = one;
+    const pal_v8 floor = MIN_Q - (pal_v8){0}, none = {0}, one = 1 - none;
+    pal_v8 min = one;
     const double *xv = (const double *)pack->xv;
     float *f = (float *)pack->f; /* 8 floats are as long as 4 doubles */
     for (int first = 0; first < e->n_block; first += BATCH) {
@@ -198,7 +198,7 @@ static double run_springs(const edge_spring *e, const pal_active_nodes *pack, do
         measure_blocks(e, xv, first, n, d, q, rate);
         for (int b = 0; b < n; b++) {
             pal_v8 share = pal_load8(e->q + PAL_LANES * (first + b)), known = pal_select8(share > none, q[b], one);
-            least = pal_select8(known < least, known, least);
+            min = pal_select8(known < min, known, min);
             pal_v8 r = pal_inverse_sqrt8(pal_select8(q[b] < floor, floor, q[b])),
                    s8 = k * (one - r) + c * rate[b] * r * r;
             *(pal_v8_unaligned *)(s + PAL_LANES * b) = pal_select8(q[b] < floor, none, share * s8);
@@ -212,8 +212,8 @@ static double run_springs(const edge_spring *e, const pal_active_nodes *pack, do
             }
         }
     }
-    for (int l = 1; l < PAL_LANES; l++) least[0] = least[l] < least[0] ? least[l] : least[0];
-    return least[0];
+    for (int l = 1; l < PAL_LANES; l++) min[0] = min[l] < min[0] ? min[l] : min[0];
+    return min[0];
 }
 
 /* false: the lane has no spring */
@@ -235,7 +235,7 @@ static void reopen(const edge_spring *e, const pal_active_nodes *pack, double k)
         int place[2];
         if (!spring_ends(e, s, place, vertex)) continue;
         pal_quad d = pal_v8_low(pack->xv[place[1]]) - pal_v8_low(pack->xv[place[0]]);
-        if (pal_quad_dot(d, d) * e->w2[s] >= LEAST_Q) continue;
+        if (pal_quad_dot(d, d) * e->w2[s] >= MIN_Q) continue;
         d = pack->rest[place[1]] - pack->rest[place[0]];
         d[3] = 0;
         pack->f[place[1]] += k * e->q[s] * d;
@@ -248,7 +248,7 @@ static pal_err compute_forces(void *self, pal_step *step)
     edge_spring *e = self;
     take_springs(e);
     double k = e->k_N_m * e->adaptive->spring_ramp;
-    if (run_springs(e, step->body->active_nodes, k, damping_now(e)) < LEAST_Q) reopen(e, step->body->active_nodes, k);
+    if (run_springs(e, step->body->active_nodes, k, damping_now(e)) < MIN_Q) reopen(e, step->body->active_nodes, k);
     return PAL_ERR_OK;
 }
 

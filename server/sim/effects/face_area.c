@@ -1,5 +1,5 @@
 /* Component face_area: every triangle of the mesh, inner ones too, keeps its area. C = (A - A0)/A0, E = k/2 C^2,
- * f_a = -(k C + c C') n x (x_c - x_b)/(2 A0) and cyclic, n the unit normal (paper B 4.1, F_A).
+ * f_a = -(k C + c C') n x (x_c - x_b)/(2 A0) and cyclic, n the unit normal (paper B section 4.1, F_A).
  *
  * Departures: errata B2, B3, B5 (true gradients: the paper's sign pushes away from A0 and its equal magnitudes create
  * momentum). Below 1e-12 of its rest area a triangle has no normal and its force fades to nothing. */
@@ -9,7 +9,7 @@
 #include <stdlib.h>
 
 /* of (A/A0)^2 */
-#define LEAST_Q 1e-24
+#define MIN_Q 1e-24
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
@@ -27,10 +27,10 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 }
 
 /* with q = (A/A0)^2 and r = 1/sqrt(q): C n/|n| = (1 - r) n w, and the gradients are crosses of n with the edges */
-PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *least)
+PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *min)
 {
-    (void)least;
-    const pal_v8 floor = LEAST_Q - (pal_v8){0};
+    (void)min;
+    const pal_v8 floor = MIN_Q - (pal_v8){0};
     pal_v8 x = pal_load8(p[0][0]), y = pal_load8(p[0][1]), z = pal_load8(p[0][2]), w2 = w * w;
     pal_v8 ax = pal_load8(p[1][0]) - x, ay = pal_load8(p[1][1]) - y, az = pal_load8(p[1][2]) - z;
     pal_v8 bx = pal_load8(p[2][0]) - x, by = pal_load8(p[2][1]) - y, bz = pal_load8(p[2][2]) - z;

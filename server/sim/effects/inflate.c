@@ -23,7 +23,7 @@
 #include <string.h>
 
 /* least rest volume over S^3 */
-#define LEAST_FILL 1e-9
+#define MIN_FILL 1e-9
 
 typedef enum filling { PRESSURE, GAS, FLUID } filling;
 
@@ -38,7 +38,7 @@ typedef struct inflate {
 } inflate;
 
 /* stiff parts of pressure are at most this often stiff_Pa */
-static const double most = 10;
+static const double max = 10;
 
 static pal_err read_keys(inflate *row, pal_config_entry *item, pal_diagnostic *diag)
 {
@@ -89,8 +89,8 @@ static pal_err check_surface(inflate *row, const pal_config_entry *item, const p
                                   item->name, n_open);
     row->fine_m3 =
         volume(levels->x, levels->face + 3 * (size_t)levels->first_face[last], pal_levels_n_face(levels, last));
-    double size = build->body->length_scale_m, least_m3 = LEAST_FILL * size * size * size;
-    if (!(fabs(row->fine_m3) > least_m3))
+    double size = build->body->length_scale_m, min_m3 = MIN_FILL * size * size * size;
+    if (!(fabs(row->fine_m3) > min_m3))
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
                                   "%s: the surface encloses %g m3, which cannot be told from nothing", item->path,
                                   fabs(row->fine_m3));
@@ -154,15 +154,15 @@ typedef struct answer {
 
 static answer answer_gas(double s)
 {
-    double low = 1 / (1 + most), least = fmax(s, low);
-    answer a = {.value = 1 / least - 1, .slope = s > low ? 1 / (s * s) : 0, .sum = log(least) - (least - 1)};
-    a.sum += a.value * (s - least);
+    double low = 1 / (1 + max), min = fmax(s, low);
+    answer a = {.value = 1 / min - 1, .slope = s > low ? 1 / (s * s) : 0, .sum = log(min) - (min - 1)};
+    a.sum += a.value * (s - min);
     return a;
 }
 
 static answer answer_fluid(double s)
 {
-    double at = fmin(fmax(s, 1 - most), 1 + most);
+    double at = fmin(fmax(s, 1 - max), 1 + max);
     answer a = {.value = 1 - at, .slope = s == at ? 1 : 0, .sum = -0.5 * (1 - at) * (1 - at)};
     a.sum += a.value * (s - at);
     return a;

@@ -65,9 +65,9 @@ typedef struct refine {
 } refine;
 
 /* shares: of the mass, of the energy, of the largest inertia */
-static const double mass_changed = 1e-3, ramp_from = 2.5e-3, least_inertia = 1e-6;
-static const double most_factor = 2, least_ramp = 0.25, most_ramp = 2;
-enum { MOST_PATIENCE = 3, LET_DOWN_MOST = 8 };
+static const double mass_changed = 1e-3, ramp_from = 2.5e-3, min_inertia = 1e-6;
+static const double max_factor = 2, min_ramp = 0.25, max_ramp = 2;
+enum { MAX_PATIENCE = 3, LET_DOWN_MAX = 8 };
 
 /* ---- load ---- */
 
@@ -176,10 +176,10 @@ static bool settled(const refine *row, int32_t face)
 /* the face is split: was it joined too early? */
 static void note_split(refine *row, int32_t face)
 {
-    bool early = row->clock_s - row->switched_s[face] < ldexp(row->dwell_s, MOST_PATIENCE);
+    bool early = row->clock_s - row->switched_s[face] < ldexp(row->dwell_s, MAX_PATIENCE);
     if (!early)
         row->patience[face] = 0;
-    else if (row->patience[face] < MOST_PATIENCE)
+    else if (row->patience[face] < MAX_PATIENCE)
         row->patience[face]++;
     row->switched_s[face] = row->clock_s;
 }
@@ -249,7 +249,7 @@ static int32_t parent_of_first(const pal_levels *levels, int32_t leaf)
 }
 
 /* fills wish for the leaves of the list; false: there is none */
-static bool take_wishes(refine *row, const pal_body *body)
+static bool take_options(refine *row, const pal_body *body)
 {
     const pal_adaptive_surface *adaptive = row->adaptive;
     bool any = false;
@@ -271,7 +271,7 @@ static bool take_wishes(refine *row, const pal_body *body)
 
 /* ---- a switch ---- */
 
-static bool grant_wishes(refine *row, pal_body *body)
+static bool grant_options(refine *row, pal_body *body)
 {
     pal_adaptive_surface *adaptive = row->adaptive;
     uint64_t n_split = 0, n_join = 0;
@@ -328,12 +328,12 @@ static void let_down(refine *row, pal_step *step)
 {
     const pal_body *body = step->body;
     const pal_refine_balance *before = &row->report.before;
-    const double was = pal_refine_balance_total_J(before) - before->kinetic_J, least = ramp_from * (was + row->inner_J);
+    const double was = pal_refine_balance_total_J(before) - before->kinetic_J, min = ramp_from * (was + row->inner_J);
     for (int k = 0; k < body->n_active; k++) row->bound_N_m[pal_body_point(body, k)] = 0;
     for (int i = 0; i < step->n_force; i++)
         if (step->force[i].effect->stiffness)
             step->force[i].effect->stiffness(step->force[i].self, body, row->bound_N_m);
-    for (int turn = 0; turn < LET_DOWN_MOST && elastic_J(step) - was > least; turn++)
+    for (int turn = 0; turn < LET_DOWN_MAX && elastic_J(step) - was > min; turn++)
         if (!let_down_once(row, step)) return;
 }
 
@@ -349,7 +349,7 @@ static bool in_region(const refine *row, const pal_body *body, bool whole, int i
 static double ramp_after(double ramp, double was, double now, double other)
 {
     if (!(was > 1e-9 * other) || !(now > 1e-9 * other)) return ramp;
-    return fmin(fmax(ramp * was / now, least_ramp), most_ramp);
+    return fmin(fmax(ramp * was / now, min_ramp), max_ramp);
 }
 
 /* sets the ramps; returns by how much the energy of springs and anchors has grown all the same, J */
@@ -358,12 +358,12 @@ static double keep_elastic(refine *row)
     const pal_refine_balance *before = &row->report.before, *raw = &row->report.raw;
     pal_adaptive_surface *adaptive = row->adaptive;
     double was[2] = {adaptive->spring_ramp, adaptive->shape_ramp};
-    double least = ramp_from * (row->inner_J + before->spring_J + before->shape_J);
-    if (row->ramp_s > 0 && fabs(raw->spring_J - before->spring_J) > least) {
+    double min = ramp_from * (row->inner_J + before->spring_J + before->shape_J);
+    if (row->ramp_s > 0 && fabs(raw->spring_J - before->spring_J) > min) {
         adaptive->spring_ramp = ramp_after(was[0], before->spring_J, raw->spring_J, raw->shape_J);
         row->spring_s = row->ramp_s;
     }
-    if (row->ramp_s > 0 && fabs(raw->shape_J - before->shape_J) > least) {
+    if (row->ramp_s > 0 && fabs(raw->shape_J - before->shape_J) > min) {
         adaptive->shape_ramp = ramp_after(was[1], before->shape_J, raw->shape_J, raw->spring_J);
         row->shape_s = row->ramp_s;
     }
@@ -381,7 +381,7 @@ static void spin_of(const region *r, const double turn[3], double Omega[3])
 {
     pal_set3(Omega, 0, 0, 0);
     for (int k = 0; k < 3; k++)
-        if (r->inertia[k] > least_inertia * r->inertia[2])
+        if (r->inertia[k] > min_inertia * r->inertia[2])
             pal_axpy3(Omega, pal_dot3(r->inertia_axis + 3 * k, turn) / r->inertia[k], r->inertia_axis + 3 * k);
 }
 
@@ -453,9 +453,9 @@ static bool keep_motion(const refine *row, pal_body *body, double gained_J, bool
                       0.5 * (r.mass * pal_dot3(V, V) + pal_dot3(spin, turn));
     /* nothing to scale where the region moves as one */
     double scale = r.inner_J > 1e-12 * raw->kinetic_J ? sqrt(fmax(wanted_J, 0) / r.inner_J) : 1;
-    bool enough = scale >= 1 / most_factor && scale <= most_factor && r.inertia[0] > least_inertia * r.inertia[2];
+    bool enough = scale >= 1 / max_factor && scale <= max_factor && r.inertia[0] > min_inertia * r.inertia[2];
     if (!enough && !whole) return false;
-    scale = fmin(fmax(scale, 1 / most_factor), most_factor);
+    scale = fmin(fmax(scale, 1 / max_factor), max_factor);
     for (int k = 0; k < body->n_active; k++) {
         const int i = pal_body_point(body, k);
         if (!in_region(row, body, whole, i)) continue;
@@ -484,7 +484,7 @@ static void change(refine *row, pal_step *step)
         row->mass_was[i] = body->mass_kg[i];
         row->seen[i] = report->n_switch;
     }
-    if (!grant_wishes(row, body)) {
+    if (!grant_options(row, body)) {
         report->n_switch--;
         return;
     }
@@ -501,15 +501,15 @@ static void change(refine *row, pal_step *step)
 /* would an evaluation look at what the last one saw? */
 static bool is_still(refine *row, const pal_body *body, double dt_s, double *load2)
 {
-    double most2 = 0;
+    double max2 = 0;
     *load2 = 0;
     for (int k = 0; k < body->n_active; k++) {
         const size_t i = 3 * (size_t)pal_body_point(body, k);
         double v2 = pal_dot3(body->v + i, body->v + i);
-        most2 = v2 > most2 ? v2 : most2;
+        max2 = v2 > max2 ? v2 : max2;
         *load2 += pal_dot3(body->load + i, body->load + i);
     }
-    row->way_m += dt_s * sqrt(most2);
+    row->way_m += dt_s * sqrt(max2);
     return row->seen_revision == body->revision + 1 && row->way_m < still_h * row->edge_m &&
            fabs(*load2 - row->seen_load2) <= 1e-6 * *load2;
 }
@@ -537,7 +537,7 @@ static pal_err run(void *self, pal_step *step)
     row->seen_load2 = load2, row->way_m = 0;
     pal_refine_mark_nodes(&row->measure, adaptive, step->body, &row->limits);
     const uint64_t n_switch = row->report.n_switch;
-    if (take_wishes(row, step->body)) change(row, step);
+    if (take_options(row, step->body)) change(row, step);
     row->seen_twice = still && row->report.n_switch == n_switch;
     return PAL_ERR_OK;
 }

@@ -1,7 +1,7 @@
-/* Component shape_spring: every node hangs on its place in the shape at rest (C eq. 10, the shape-preserving springs).
- *     f_i = -(m_i/m_0) [k' (x_i - R (X_i - C) - c) + c' (v_i - V - Omega x (x_i - c))]
- * X_i the place at rest, m_0 the mass of a node of level 0, k' and c' the constants of such a node. As anchors go by
- * mass, they add up to the same whatever is refined and pull every level alike: translation has (w^2 = k'/m_0).
+/* Component shape_spring: every node hangs on its place in the shape at rest (paper C, eq. 10, the shape-preserving
+ * springs). f_i = -(m_i/m_0) [k' (x_i - R (X_i - C) - c) + c' (v_i - V - Omega x (x_i - c))] X_i the place at rest, m_0
+ * the mass of a node of level 0, k' and c' the constants of such a node. As anchors go by mass, they add up to the same
+ * whatever is refined and pull every level alike: translation has (w^2 = k'/m_0).
  *
  * frame "world": the places at rest themselves, R 1, V and Omega 0; the force goes to the ground.
  * frame "body": the rigid frame that fits the body best (adaptive_surface.h), so that the body may move freely. The fit

@@ -1,5 +1,5 @@
-/* Shown vertices by skinning (paper B 4.2; the equations and errata are in mesh/volume/skin.h): frames of the used
- * surface nodes, then every shown vertex from its five nearest ones. */
+/* Shown vertices by skinning (paper B section 4.2; the equations and errata are in mesh/volume/skin.h): frames of the
+ * used surface nodes, then every shown vertex from its five nearest ones. */
 #include "server/sim/core/effect.h"
 
 #include <string.h>

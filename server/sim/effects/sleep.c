@@ -46,11 +46,11 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 /* no point moves; a speed that is not finite is not slow */
 static bool slow(const sleeper *row, const pal_body *body)
 {
-    double most = row->speed_1_s * body->length_scale_m, most2 = most * most;
+    double max = row->speed_1_s * body->length_scale_m, max2 = max * max;
     bool all = true;
     for (int k = 0; k < body->n_active; k++) {
         const double *v = body->v + 3 * (size_t)pal_body_point(body, k);
-        all &= pal_dot3(v, v) <= most2;
+        all &= pal_dot3(v, v) <= max2;
     }
     return all;
 }

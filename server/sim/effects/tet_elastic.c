@@ -37,14 +37,14 @@ typedef struct tet_row {
     pal_elastic_tets whole;         /* first: tests look at it */
     pal_elastic_tets *split;        /* NULL: never untangles this way */
     double *rest;                   /* six times the volume of each piece at rest [n_piece] */
-    double least_volume_m3;         /* of those that are looked at, times six */
+    double min_volume_m3;           /* of those that are looked at, times six */
     bool has_inversion, cheap;      /* cheap: whole.n_inverted tells that the body is tangled */
     uint64_t n_inversion, n_switch; /* since run, which tells the body */
     pal_force_cache force_cache;    /* under an implicit solver: of `whole` while nothing is inverted */
 } tet_row;
 
 /* beyond the first pair a body is tangled, within the second it is whole again */
-static const double max_poisson = 0.3, tangled_det[2] = {0.05, 30}, whole_det[2] = {0.5, 2};
+static const double max_poisson = 0.3, inverted_det[2] = {0.05, 30}, whole_det[2] = {0.5, 2};
 
 /* tetrahedra of four nodes on the body's own, eight in one of ten */
 static pal_err cut(const tet_row *row, pal_arena *arena, pal_elastic_tets_options *to)
@@ -86,21 +86,21 @@ static pal_err make_split(tet_row *row, pal_build *build)
     row->cheap = whole->n_corner == 4 && whole->law == PAL_LAW_COROTATIONAL;
     double h = build->body->edge_m;
     /* slivers turn over at any touch: what they do tells nothing of the body */
-    row->least_volume_m3 = 1e-3 * h * h * h;
+    row->min_volume_m3 = 1e-3 * h * h * h;
     row->rest = PAL_NEW(build->arena, double, options.n_tet);
     if (!row->rest) return PAL_ERR_MEMORY;
     for (int i = 0; i < options.n_tet; i++) row->rest[i] = six_volumes(build->body->x_rest, options.tet + 4 * i);
     return PAL_ERR_OK;
 }
 
-static bool is_tangled(const tet_row *row, const double *x)
+static bool is_inverted(const tet_row *row, const double *x)
 {
     if (row->cheap && !row->has_inversion) return row->whole.n_inverted > 0;
-    const double *limit = row->has_inversion ? whole_det : tangled_det;
+    const double *limit = row->has_inversion ? whole_det : inverted_det;
     bool neo = row->whole.options.law == PAL_LAW_NEO_HOOKEAN;
     const pal_elastic_tets_options *pieces = &row->split->options;
     for (int i = 0; i < pieces->n_tet; i++) {
-        if (fabs(row->rest[i]) < row->least_volume_m3) continue;
+        if (fabs(row->rest[i]) < row->min_volume_m3) continue;
         double det = six_volumes(x, pieces->tet + 4 * i) / row->rest[i];
         if (det < limit[0] || (neo && det > limit[1])) return true;
     }
@@ -212,9 +212,9 @@ static void linearise(void *self, const pal_body *body)
 {
     tet_row *row = self;
     bool before = row->has_inversion, known = row->split && (before || !row->cheap);
-    bool told = known && is_tangled(row, body->d);
-    if (!told) pal_elastic_tets_linearise(&row->whole, body->d);
-    row->has_inversion = known ? told : row->split && is_tangled(row, body->d);
+    bool reported = known && is_inverted(row, body->d);
+    if (!reported) pal_elastic_tets_linearise(&row->whole, body->d);
+    row->has_inversion = known ? reported : row->split && is_inverted(row, body->d);
     row->n_inversion += row->has_inversion;
     row->n_switch += row->has_inversion != before;
     if (row->has_inversion && !before) pal_elastic_tets_reset(row->split);

@@ -1,5 +1,5 @@
 /* Component tet_volume: every tetrahedron keeps its signed volume, so that an inverted one turns back. C = (V - V0)/V0,
- * E = k/2 C^2, f_a = -(k C + c C') dV/dx_a / V0 (paper B 4.1, F_V).
+ * E = k/2 C^2, f_a = -(k C + c C') dV/dx_a / V0 (paper B section 4.1, F_V).
  *
  * Departures: errata B3, B4 (true gradients, area/3 each, not unit directions; 1/V0^2; V0 is the rest volume, signed by
  * the order of the corners). A tetrahedron with V0 below 1e-6 h^3 is left out, and so is a sliver, of less than 0.01 of
@@ -35,9 +35,9 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     return err;
 }
 
-PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *least)
+PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *min)
 {
-    (void)least;
+    (void)min;
     pal_v8 x = pal_load8(p[0][0]), y = pal_load8(p[0][1]), z = pal_load8(p[0][2]);
     pal_v8 ax = pal_load8(p[1][0]) - x, ay = pal_load8(p[1][1]) - y, az = pal_load8(p[1][2]) - z;
     pal_v8 bx = pal_load8(p[2][0]) - x, by = pal_load8(p[2][1]) - y, bz = pal_load8(p[2][2]) - z;

@@ -1,4 +1,4 @@
-/* Component viscous: f = -k_damp v with k_damp = rate m, paper B 4.1's drag. Key: rate_1_s (the material's
+/* Component viscous: f = -k_damp v with k_damp = rate m, paper B section 4.1's drag. Key: rate_1_s (the material's
  * damping_1_s).
  *
  * Departure: the paper applies it explicitly; a solver that knows the hook `drag` divides by 1 + dt rate instead, which

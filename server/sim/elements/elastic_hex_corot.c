@@ -29,11 +29,11 @@ PAL_INLINE void turn_force(pal_wide x[3][8], pal_wide g[3][8])
         ty += g[2][m] * x[0][m] - g[0][m] * x[2][m];
         tz += g[0][m] * x[1][m] - g[1][m] * x[0][m];
     }
-    pal_wide xx = x[1][2] + x[2][4], yy = x[0][1] + x[2][4], zz = x[0][1] + x[1][2];
+    pal_wide xx = x[1][2] + x[2][4], yy = x[0][1] + x[2][4], zz_estimator = x[0][1] + x[1][2];
     pal_wide yz = -0.5 * (x[1][4] + x[2][2]), xz = -0.5 * (x[0][4] + x[2][1]), xy = -0.5 * (x[0][2] + x[1][1]);
-    pal_wide cxx = yy * zz - yz * yz, cyy = xx * zz - xz * xz, czz = xx * yy - xy * xy;
-    pal_wide cxy = xz * yz - xy * zz, cxz = xy * yz - xz * yy, cyz = xy * xz - yz * xx;
-    pal_wide det = xx * cxx + xy * cxy + xz * cxz, t = xx + yy + zz;
+    pal_wide cxx = yy * zz_estimator - yz * yz, cyy = xx * zz_estimator - xz * xz, czz = xx * yy - xy * xy;
+    pal_wide cxy = xz * yz - xy * zz_estimator, cxz = xy * yz - xz * yy, cyz = xy * xz - yz * xx;
+    pal_wide det = xx * cxx + xy * cxy + xz * cxz, t = xx + yy + zz_estimator;
     /* omitted where the rotation is nearly undefined: collapsed and inverted cubes */
     pal_wide_mask good = (det > 1e-3 * (t * t * t)) & (t > 0);
     pal_wide inverse = pal_wide_select(good, wide_of(1), wide_of(0)) / pal_wide_select(good, det, wide_of(1));

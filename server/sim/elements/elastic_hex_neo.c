@@ -221,7 +221,7 @@ static void raise_stretches(pal_wide mu, pal_wide c, pal_wide k1, const pal_wide
         a[i] = mu + k1 * g[i] * g[i];
         a[3 + i] = c * s[i] + k1 * g[(i + 1) % 3] * g[(i + 2) % 3];
     }
-    pal_wide least = 1e-13 * (a[0] + a[1] + a[2]), x = a[0] + least, y = a[1] + least, z = a[2] + least;
+    pal_wide min = 1e-13 * (a[0] + a[1] + a[2]), x = a[0] + min, y = a[1] + min, z = a[2] + min;
     pal_wide minor = x * y - a[5] * a[5];
     pal_wide det = z * minor - x * a[3] * a[3] - y * a[4] * a[4] + 2 * a[3] * a[4] * a[5];
     if (!wide_any(~((minor > 0) & (det > 0)))) return;
@@ -374,7 +374,7 @@ static double largest_eigenvalue(const pal_elastic_hexes *cubes, int lane, doubl
     const double mu = cubes->mu[lane], lambda = cubes->lambda[lane];
     const bool bbar = cubes->element == PAL_HEX_BBAR;
     const double k1 = bbar ? mu / 3 : lambda + mu, kappa = bbar ? lambda + 2 * mu / 3 : 0;
-    double cof[8][9], mean[24] = {0}, dilatation = -1, most = 0, square = 0;
+    double cof[8][9], mean[24] = {0}, dilatation = -1, max = 0, square = 0;
     for (int p = 0; p < 8; p++) {
         pal_cofactor3(f[p], cof[p]);
         dilatation += pal_det3(f[p]) / 8;
@@ -384,10 +384,10 @@ static double largest_eigenvalue(const pal_elastic_hexes *cubes, int lane, doubl
     for (int p = 0; p < 8; p++) {
         double f2 = 0, c2 = 0, c = -mu + k1 * (pal_det3(f[p]) - 1) + kappa * dilatation;
         for (int i = 0; i < 9; i++) f2 += f[p][i] * f[p][i], c2 += cof[p][i] * cof[p][i];
-        most = fmax(most, mu + 2 / sqrt(3) * fabs(c) * sqrt(f2) + k1 * c2);
+        max = fmax(max, mu + 2 / sqrt(3) * fabs(c) * sqrt(f2) + k1 * c2);
     }
     /* the constants have h / 16, gradients here lack 2 / h */
-    return 8 * most + 64 * kappa * square;
+    return 8 * max + 64 * kappa * square;
 }
 
 void pal_hex_neo_bound(pal_elastic_hexes *cubes, const pal_body *body, double *bound_N_m)
@@ -401,7 +401,7 @@ void pal_hex_neo_bound(pal_elastic_hexes *cubes, const pal_body *body, double *b
             for (int c = 0; c < 8; c++)
                 for (int i = 0; i < 9; i++)
                     f[p][i] += 2 / cubes->edge_m * body->d[3 * node[c] + i / 3] * grad[p][c][i % 3];
-        double most = largest_eigenvalue(cubes, cubes->simd_blocks.place[e], f, grad);
-        for (int c = 0; c < 8; c++) bound_N_m[node[c]] += most;
+        double max = largest_eigenvalue(cubes, cubes->simd_blocks.place[e], f, grad);
+        for (int c = 0; c < 8; c++) bound_N_m[node[c]] += max;
     }
 }

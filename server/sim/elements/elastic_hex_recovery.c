@@ -10,7 +10,7 @@ void pal_hex_recovery_reset(pal_elastic_hexes *cubes)
 /* smallest and largest determinant of the three edges at a corner */
 PAL_INLINE void range_of_corners(const hex_view *v, int l, pal_wide *low, pal_wide *high)
 {
-    pal_wide x[8][3], least = wide_of(INFINITY), most = wide_of(-INFINITY);
+    pal_wide x[8][3], min = wide_of(INFINITY), max = wide_of(-INFINITY);
     for (int c = 0; c < 8; c++)
         for (int d = 0; d < 3; d++) x[c][d] = pal_wide_load(v->x[c][d] + l);
     for (int c = 0; c < 8; c++) {
@@ -22,17 +22,17 @@ PAL_INLINE void range_of_corners(const hex_view *v, int l, pal_wide *low, pal_wi
         }
         pal_wide det = a[0] * (b[1] * e[2] - b[2] * e[1]) + a[1] * (b[2] * e[0] - b[0] * e[2]) +
                        a[2] * (b[0] * e[1] - b[1] * e[0]);
-        least = pal_wide_select(det < least, det, least);
-        most = pal_wide_select(det > most, det, most);
+        min = pal_wide_select(det < min, det, min);
+        max = pal_wide_select(det > max, det, max);
     }
-    *low = least, *high = most;
+    *low = min, *high = max;
 }
 
 /* the same over all voxels, h^3 */
 static void corner_range(const pal_elastic_hexes *cubes, const pal_body *body, double *low, double *high)
 {
     const double volume = cubes->edge_m * cubes->edge_m * cubes->edge_m;
-    pal_wide least = wide_of(INFINITY), most = wide_of(-INFINITY);
+    pal_wide min = wide_of(INFINITY), max = wide_of(-INFINITY);
     pal_node_order_load(body->node_order, body->d);
     for (int b = 0; b < cubes->n_block; b++) {
         hex_view v;
@@ -41,12 +41,12 @@ static void corner_range(const pal_elastic_hexes *cubes, const pal_body *body, d
             pal_wide small, large;
             range_of_corners(&v, l, &small, &large);
             pal_wide_mask live = pal_wide_load(cubes->share + PAL_LANES * b + l) > 0;
-            least = pal_wide_select(live & (small < least), small, least);
-            most = pal_wide_select(live & (large > most), large, most);
+            min = pal_wide_select(live & (small < min), small, min);
+            max = pal_wide_select(live & (large > max), large, max);
         }
     }
     *low = INFINITY, *high = -INFINITY;
-    for (int l = 0; l < PAL_WIDE; l++) *low = fmin(*low, least[l] / volume), *high = fmax(*high, most[l] / volume);
+    for (int l = 0; l < PAL_WIDE; l++) *low = fmin(*low, min[l] / volume), *high = fmax(*high, max[l] / volume);
 }
 
 double pal_hex_min_corner(const pal_elastic_hexes *cubes, const pal_body *body)

@@ -178,9 +178,9 @@ PAL_INLINE void wide_quat_matrix(const pal_wide q[4], pal_wide r[9])
 {
     pal_wide x2 = q[1] + q[1], y2 = q[2] + q[2], z2 = q[3] + q[3];
     pal_wide wx = q[0] * x2, wy = q[0] * y2, wz = q[0] * z2, xx = q[1] * x2, xy = q[1] * y2, xz = q[1] * z2;
-    pal_wide yy = q[2] * y2, yz = q[2] * z2, zz = q[3] * z2;
-    r[0] = 1 - (yy + zz), r[1] = xy - wz, r[2] = xz + wy;
-    r[3] = xy + wz, r[4] = 1 - (xx + zz), r[5] = yz - wx;
+    pal_wide yy = q[2] * y2, yz = q[2] * z2, zz_estimator = q[3] * z2;
+    r[0] = 1 - (yy + zz_estimator), r[1] = xy - wz, r[2] = xz + wy;
+    r[3] = xy + wz, r[4] = 1 - (xx + zz_estimator), r[5] = yz - wx;
     r[6] = xz - wy, r[7] = yz + wx, r[8] = 1 - (xx + yy);
 }
 
@@ -194,11 +194,11 @@ PAL_INLINE pal_wide hex_turn_step(const pal_wide f[9], const pal_wide r[9], pal_
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) m[3 * i + j] = r[i] * f[j] + r[3 + i] * f[3 + j] + r[6 + i] * f[6 + j];
     pal_wide ax = m[7] - m[5], ay = m[2] - m[6], az = m[3] - m[1];
-    pal_wide xx = m[4] + m[8], yy = m[0] + m[8], zz = m[0] + m[4];
+    pal_wide xx = m[4] + m[8], yy = m[0] + m[8], zz_estimator = m[0] + m[4];
     pal_wide yz = -0.5 * (m[5] + m[7]), xz = -0.5 * (m[2] + m[6]), xy = -0.5 * (m[1] + m[3]);
-    pal_wide cxx = yy * zz - yz * yz, cyy = xx * zz - xz * xz, czz = xx * yy - xy * xy;
-    pal_wide cxy = xz * yz - xy * zz, cxz = xy * yz - xz * yy, cyz = xy * xz - yz * xx;
-    pal_wide det = xx * cxx + xy * cxy + xz * cxz, t = xx + yy + zz;
+    pal_wide cxx = yy * zz_estimator - yz * yz, cyy = xx * zz_estimator - xz * xz, czz = xx * yy - xy * xy;
+    pal_wide cxy = xz * yz - xy * zz_estimator, cxz = xy * yz - xz * yy, cyz = xy * xz - yz * xx;
+    pal_wide det = xx * cxx + xy * cxy + xz * cxz, t = xx + yy + zz_estimator;
     pal_wide_mask good = (det > 1e-5 * (t * t * t)) & (t > 0) & (cxx + cyy + czz > 0) & (xx > 0) & (czz > 0);
     pal_wide half = 0.5 / pal_wide_select(good, det, wide_of(1));
     pal_wide wx = half * (cxx * ax + cxy * ay + cxz * az), wy = half * (cxy * ax + cyy * ay + cyz * az),

@@ -40,8 +40,8 @@ void pal_linear_stress(double mu, double lambda, const double a[9], double p[9])
 {
     double pressure = lambda * (a[0] + a[4] + a[8]);
     double xy = mu * (a[1] + a[3]), xz = mu * (a[2] + a[6]), yz = mu * (a[5] + a[7]);
-    double xx = 2 * mu * a[0] + pressure, yy = 2 * mu * a[4] + pressure, zz = 2 * mu * a[8] + pressure;
-    p[0] = xx, p[4] = yy, p[8] = zz;
+    double xx = 2 * mu * a[0] + pressure, yy = 2 * mu * a[4] + pressure, zz_estimator = 2 * mu * a[8] + pressure;
+    p[0] = xx, p[4] = yy, p[8] = zz_estimator;
     p[1] = p[3] = xy, p[2] = p[6] = xz, p[5] = p[7] = yz;
 }
 
@@ -84,7 +84,7 @@ double pal_largest_strain(const double f[9])
     for (int i = 0; i < 3; i++) e[4 * i] -= mean;
     for (int i = 0; i < 9; i++) square += e[i] * e[i];
     double p = sqrt(square / 6), turn = p > 0 ? 0.5 * pal_det3(e) / (p * p * p) : 1;
-    double most = mean + 2 * p * cos(acos(fmax(-1, fmin(1, turn))) / 3), stretch2 = fmax(0, 1 + 2 * most);
+    double max = mean + 2 * p * cos(acos(fmax(-1, fmin(1, turn))) / 3), stretch2 = fmax(0, 1 + 2 * max);
     return (stretch2 - 1) / (sqrt(stretch2) + 1);
 }
 

@@ -8,7 +8,7 @@
 
 #include <string.h>
 
-static const double least_volume_h3 = 1e-6;
+static const double min_volume_h3 = 1e-6;
 
 static double *lane_at(double *array, int width, int place, int k)
 {
@@ -71,7 +71,7 @@ static void take_rest(pal_elastic_tets *t, double edge_m)
         for (int c = 0; c < 3; c++) pal_sub3(a[c], t->x_rest + 3 * node[c + 1], t->x_rest + 3 * node[0]);
         for (int c = 0; c < 3; c++) pal_cross3(inverse[c], a[(c + 1) % 3], a[(c + 2) % 3]);
         double det = pal_dot3(a[0], inverse[0]);
-        if (!(fabs(det) > 6 * least_volume_h3 * edge_m * edge_m * edge_m)) continue;
+        if (!(fabs(det) > 6 * min_volume_h3 * edge_m * edge_m * edge_m)) continue;
         for (int i = 0; i < 9; i++) *lane_at(t->inverse, 9, t->place[e], i) = inverse[i / 3][i % 3] / det;
         *lane_at(t->volume_m3, 1, t->place[e], 0) = fabs(det) / 6 * (t->options.fill ? (double)t->options.fill[e] : 1);
     }

@@ -365,7 +365,7 @@ static void recover(pal_elastic_tets *t)
     }
     for (int k = 0; k < t->n_inverted; k++) {
         int e = t->inverted[k];
-        double sum[9] = {0}, q[4], most = 0;
+        double sum[9] = {0}, q[4], max = 0;
         t->flag[e] = 0;
         for (int c = 0; c < 4; c++) {
             /* a node is weighted by its rotation, not by the volume around it */
@@ -374,8 +374,8 @@ static void recover(pal_elastic_tets *t)
             for (int i = 0; i < 9; i++) length += a[i] * a[i];
             for (int i = 0; i < 9 && length > 0; i++) sum[i] += a[i] / sqrt(length);
         }
-        for (int i = 0; i < 9; i++) most = fmax(most, fabs(sum[i]));
-        if (!(most > 1e-9)) continue;
+        for (int i = 0; i < 9; i++) max = fmax(max, fabs(sum[i]));
+        if (!(max > 1e-9)) continue;
         for (int i = 0; i < 4; i++) q[i] = pal_lane_get(t->turn, 4, t->place[e], i);
         pal_polar_rotation(sum, q, SLOW_TURNS);
         for (int i = 0; i < 4; i++) pal_lane_set(t->turn, 4, t->place[e], i, q[i]);

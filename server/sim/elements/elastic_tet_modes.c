@@ -16,11 +16,11 @@ PAL_INLINE pal_wide inverse_root(pal_wide q)
 /* one rotation of Jacobi's method in the plane of axes p and q: a symmetric, diagonal d[3], off-diagonals a_pq, and
  * a_pr, a_qr with the third axis; rows p and q of v'. Off-diagonals below `least` in square are taken as 0, before they
  * become denormal */
-PAL_INLINE void jacobi_turn(pal_wide least, pal_wide *dp, pal_wide *dq, pal_wide *apq, pal_wide *apr, pal_wide *aqr,
+PAL_INLINE void jacobi_turn(pal_wide min, pal_wide *dp, pal_wide *dq, pal_wide *apq, pal_wide *apr, pal_wide *aqr,
                             pal_wide vp[3], pal_wide vq[3])
 {
     const pal_wide zero = {0};
-    pal_wide_mask flat = ~(*apq * *apq > least);
+    pal_wide_mask flat = ~(*apq * *apq > min);
     *apq = pal_wide_select(flat, zero, *apq);
     pal_wide d = *dq - *dp, h = 2 * *apq, square = pal_wide_select(flat, 1 + zero, d * d + h * h);
     pal_wide root = square * inverse_root(square);
@@ -42,13 +42,13 @@ PAL_INLINE void jacobi(const pal_wide a[6], pal_wide w[3], pal_wide v[9])
     pal_wide yz = a[3], zx = a[4], xy = a[5];
     for (int i = 0; i < 9; i++) v[i] = zero + (i % 4 == 0 ? 1.0 : 0.0);
     for (int i = 0; i < 3; i++) w[i] = a[i];
-    pal_wide least = 1e-36 * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2] + yz * yz + zx * zx + xy * xy);
+    pal_wide min = 1e-36 * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2] + yz * yz + zx * zx + xy * xy);
     for (int k = 0; k < SWEEPS; k++) {
-        jacobi_turn(least, &w[0], &w[1], &xy, &zx, &yz, v, v + 3);
-        jacobi_turn(least, &w[0], &w[2], &zx, &xy, &yz, v, v + 6);
-        jacobi_turn(least, &w[1], &w[2], &yz, &xy, &zx, v + 3, v + 6);
+        jacobi_turn(min, &w[0], &w[1], &xy, &zx, &yz, v, v + 3);
+        jacobi_turn(min, &w[0], &w[2], &zx, &xy, &yz, v, v + 6);
+        jacobi_turn(min, &w[1], &w[2], &yz, &xy, &zx, v + 3, v + 6);
         /* what is left turns the vectors by 1e-12 of the largest eigenvalue over their distance */
-        if (pal_wide_all(yz * yz + zx * zx + xy * xy <= 1e12 * least)) break;
+        if (pal_wide_all(yz * yz + zx * zx + xy * xy <= 1e12 * min)) break;
     }
 }
 

@@ -13,7 +13,7 @@ enum { TIMES = 2, QUIET_UPDATES = 600 };
 static const double still_S = 1e-3;
 /* part of load_cap_N: a load above it may hold elements inverted for good */
 static const double pressed_share = 0.01;
-static const double least_soft = 1e-3;
+static const double min_soft = 1e-3;
 
 /* nodes that determine the rotation: the supports when there are three, else all */
 static bool leads(const pal_elastic_tets *t, bool by_held, int i)
@@ -62,17 +62,17 @@ double pal_tet_single_rotation_force(const pal_elastic_tets *t, const double *d,
 
 static bool has_moved(const pal_elastic_tets *t, const pal_body *body)
 {
-    double most = still_S * body->length_scale_m;
+    double max = still_S * body->length_scale_m;
     for (int i = 0; i < t->n_node; i++)
-        if (pal_dist3(t->x_before + 3 * i, body->d + 3 * i) > most) return true;
+        if (pal_dist3(t->x_before + 3 * i, body->d + 3 * i) > max) return true;
     return false;
 }
 
 static bool is_pressed(const pal_body *body)
 {
-    double most = pressed_share * body->load_cap_N;
+    double max = pressed_share * body->load_cap_N;
     for (int i = 0; i < body->n_node; i++)
-        if (pal_norm3(body->load + 3 * i) > most) return true;
+        if (pal_norm3(body->load + 3 * i) > max) return true;
     return false;
 }
 
@@ -90,6 +90,6 @@ bool pal_elastic_tets_check_rest(pal_elastic_tets *t, const pal_body *body, bool
     t->n_single_rotation++;
     pal_tet_fit_single_rotation(t, body->d);
     double after = pal_tet_single_rotation_force(t, body->d, NULL);
-    t->soft = after > 0 ? fmax(least_soft, fmin(1, before / after)) : 1;
+    t->soft = after > 0 ? fmax(min_soft, fmin(1, before / after)) : 1;
     return true;
 }

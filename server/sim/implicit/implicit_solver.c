@@ -16,7 +16,7 @@ static const double floor_share = 1e-7;
  * rounding of positions, and conjugate gradients and the watch of energy would go on over it */
 static const double still_share = 1e-11;
 /* most iterations of a step that began with one and gained energy */
-enum { rescue_newton = 8 };
+enum { safeguard_newton = 8 };
 /* a stage whose equations are solved may gain a little by its own error of time; more than this share counts */
 static const double gain_share = 0.01;
 /* s. Sub-steps of this much time in all may gain energy in spite of all iterations before the body has to stand still
@@ -210,7 +210,7 @@ static double residual(pal_implicit *core, double tau, const double *velocity, d
 
 /* of an embedded body: what is neither of rows nor of contact. Fixed points count too, with what they have in common at
  * any V of the same stage */
-static double embedded_potential(pal_implicit *core, const double *velocity)
+static double interpolated_potential(pal_implicit *core, const double *velocity)
 {
     const pal_system *system = &core->system;
     double *p = core->cg.z;
@@ -226,7 +226,7 @@ static double potential(pal_implicit *core, double tau, const double *velocity)
 {
     const pal_body *body = core->system.body;
     double sum = pal_system_energy(&core->system), keep = core->system.mass - 1;
-    if (body->interpolation) sum += embedded_potential(core, velocity);
+    if (body->interpolation) sum += interpolated_potential(core, velocity);
     for (int i = 0; i < body->n_dof && !body->interpolation; i++) {
         double m = 0.5 * body->mass_kg[i];
         if (body->support[i]) continue;
@@ -298,7 +298,7 @@ static void keep_momentum(pal_implicit *core)
 static void clamp_moves(pal_implicit *core, double tau)
 {
     pal_body *body = core->system.body;
-    double most = pal_guard_max_move_m(body) / tau, longest = 0, mean[3] = {0, 0, 0}, mass = 0;
+    double max = pal_guard_max_move_m(body) / tau, longest = 0, mean[3] = {0, 0, 0}, mass = 0;
     for (int i = 0; i < body->n_dof && core->system.n_free == body->n_dof; i++) {
         pal_axpy3(mean, body->mass_kg[i], core->vs + 3 * i);
         pal_axpy3(mean, -body->mass_kg[i], core->start + 3 * i);
@@ -311,14 +311,14 @@ static void clamp_moves(pal_implicit *core, double tau)
         double far = pal_norm3(way), own = fmin(far, pal_dist3(way, mean));
         if (body->support[i]) continue;
         longest = fmax(longest, own);
-        body->safeguards.n_clamped += own > most;
+        body->safeguards.n_clamped += own > max;
     }
-    if (!(longest > most)) return;
+    if (!(longest > max)) return;
     uint64_t before = pal_clock_ns();
     for (int i = 0; i < core->cg.n; i++) {
         if (body->support[i / 3]) continue;
         double way = body->v[i] - core->start[i] - mean[i % 3];
-        body->v[i] = core->start[i] + mean[i % 3] + most / longest * way;
+        body->v[i] = core->start[i] + mean[i % 3] + max / longest * way;
     }
     body->safeguards.ns += pal_clock_ns() - before;
 }
@@ -453,7 +453,7 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
 {
     pal_body *body = core->system.body;
     pal_solve_report *to = &core->report;
-    int most = core->options.newton;
+    int max = core->options.newton;
     uint64_t again_ns = 0;
     open_stage(core, tau);
     for (int k = 0;; k++) {
@@ -467,7 +467,7 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
         double best = core->options.tolerance * core->reference;
         to->residual = core->reference > 0 ? left / core->reference : 0;
         to->converged = k > 0 && left <= best;
-        if (to->converged || k == most || !isfinite(left)) {
+        if (to->converged || k == max || !isfinite(left)) {
             core->energy_rose |= k > 0 && rises(core, gain_share);
             if (again_ns) body->safeguards.ns += pal_clock_ns() - again_ns;
             return PAL_ERR_OK;
@@ -481,14 +481,14 @@ pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau)
         to->residual = core->reference > 0 ? core->cg.residual / core->reference : 0;
         to->converged = core->cg.residual <= best;
         /* from here on all is a rescue: the search, and the iterations that follow it */
-        if (most > core->options.newton) body->safeguards.ns += pal_clock_ns() - again_ns;
+        if (max > core->options.newton) body->safeguards.ns += pal_clock_ns() - again_ns;
         if (!rises(core, 0)) return PAL_ERR_OK;
-        core->energy_rose = most == rescue_newton;
+        core->energy_rose = max == safeguard_newton;
         if (core->energy_rose) return PAL_ERR_OK;
         again_ns = pal_clock_ns();
         body->safeguards.n_search++;
         search(core, tau);
-        most++;
+        max++;
     }
 }
 

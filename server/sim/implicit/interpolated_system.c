@@ -44,20 +44,20 @@ static pal_err add_cliques(clique_list *l, const pal_interpolation *rows, const 
 {
     size_t n_item = (size_t)from->n_item, wide = (size_t)from->n_corner;
     int32_t *mark = calloc((size_t)rows->n_point + 1, sizeof *mark), turn = 0, *point = NULL;
-    int most = 1;
+    int max = 1;
     for (size_t i = 0; i < n_item && mark; i++) {
         int n = find_points(rows, from->node + wide * i, from->n_corner, mark, ++turn, NULL);
-        most = n > most ? n : most;
+        max = n > max ? n : max;
     }
-    if (mark) point = malloc(sizeof *point * (n_item * (size_t)most + 1));
+    if (mark) point = malloc(sizeof *point * (n_item * (size_t)max + 1));
     for (size_t i = 0; i < n_item && point; i++) {
-        int32_t *to = point + i * (size_t)most;
+        int32_t *to = point + i * (size_t)max;
         int n = find_points(rows, from->node + wide * i, from->n_corner, mark, ++turn, to);
-        for (; n < most; n++) to[n] = n > 0 ? to[0] : 0;
+        for (; n < max; n++) to[n] = n > 0 ? to[0] : 0;
     }
     free(mark);
     if (!point) return PAL_ERR_MEMORY;
-    l->list[l->n++] = (pal_cliques){.n_item = (int)n_item, .n_corner = most, .node = point};
+    l->list[l->n++] = (pal_cliques){.n_item = (int)n_item, .n_corner = max, .node = point};
     return PAL_ERR_OK;
 }
 

@@ -103,12 +103,12 @@ static void probe(pal_interpolated_system *e, const pal_system *system, int move
                 value[9 * (size_t)k + (size_t)(3 * c + axis)] = e->answer[3 * e->rest.row[k] + c];
 }
 
-bool pal_system_probe(const pal_system *system, int most)
+bool pal_system_probe(const pal_system *system, int max)
 {
     pal_interpolated_system *e = system->interpolated_system;
     if (!e || e->next == e->n_move) return true;
     pal_system_linearise_rest(system);
-    for (; most > 0 && e->next < e->n_move; most--, e->next++) {
+    for (; max > 0 && e->next < e->n_move; max--, e->next++) {
         bool second = e->next >= 3 * e->n_group;
         probe(e, system, second ? e->next - 3 * e->n_group : e->next, second ? e->damping : e->rest.value);
     }
@@ -250,7 +250,7 @@ void pal_system_true_stiffness(const pal_system *system, const double *x, double
 }
 
 /* rest and damping of an embedded body, and its masses */
-static void assemble_embedded(const pal_system *system, pal_block_matrix *to)
+static void assemble_interpolated(const pal_system *system, pal_block_matrix *to)
 {
     const pal_body *body = system->body;
     const pal_interpolated_system *e = system->interpolated_system;
@@ -274,7 +274,7 @@ void pal_system_assemble(const pal_system *system, pal_block_matrix *to)
 {
     const pal_body *body = system->body;
     if (system->interpolated_system) {
-        assemble_embedded(system, to);
+        assemble_interpolated(system, to);
         return;
     }
     pal_block_matrix_zero(to);

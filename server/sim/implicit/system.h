@@ -49,7 +49,7 @@ void pal_system_true_stiffness(const pal_system *system, const double *x, double
 void pal_system_assemble(const pal_system *system, pal_block_matrix *to);
 /* K and C of an embedded body at rest, wherever it is now, by at most `most` multiplies; true: all there. The rows are
  * linearised at rest afterwards unless there was nothing to do. Nothing and true without embed. No heap */
-bool pal_system_probe(const pal_system *system, int most);
+bool pal_system_probe(const pal_system *system, int max);
 /* linearises at rest, wherever the body is now */
 void pal_system_linearise_rest(const pal_system *system);
 /* d = E x; nothing without embed */

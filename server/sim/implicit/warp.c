@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-enum { TURNS_MOST = 4, PAUSE_STEPS = 20 };
+enum { TURNS_MAX = 4, PAUSE_STEPS = 20 };
 static const double slow_flops = 1e9; /* operations a second that every machine does on its spare thread */
 
 pal_err pal_node_rotations_make(const pal_system *system, pal_arena *arena, pal_node_rotations *out)
@@ -31,7 +31,7 @@ void pal_node_rotations_update(pal_node_rotations *turns, const pal_system *syst
 {
     if (!turns->any) return;
     pal_system_rotate(system, turns->sum);
-    for (int i = 0; i < turns->n_dof; i++) pal_polar_rotation(turns->sum + 9 * i, turns->quat + 4 * i, TURNS_MOST);
+    for (int i = 0; i < turns->n_dof; i++) pal_polar_rotation(turns->sum + 9 * i, turns->quat + 4 * i, TURNS_MAX);
 }
 
 pal_err pal_warp_make(const pal_block_matrix *pattern, const pal_body *body, const pal_node_rotations *turns,

@@ -1,9 +1,9 @@
 /* Model subdivision_fem: control cells, subdivided into cubic, hexahedral and pyramidal finite elements whose nodes are
  * carried by the control points (paper A; subdivision_solid.h has the elements and the material at their Gauss points).
  *
- * The solver moves the control points p; nodes stand at d = A p (A eq. 1). Supports hold control points: those inside a
- * box or of the lowest part of the control cells, and what they hold is no unknown (A 3.3). What is shown and touched
- * is the boundary of the subdivided cells; without the cells behind a cut where the body is cut.
+ * The solver moves the control points p; nodes stand at d = A p (paper A, eq. 1). Supports hold control points: those
+ * inside a box or of the lowest part of the control cells, and what they hold is no unknown (paper A section 3.3). What
+ * is shown and touched is the boundary of the subdivided cells; without the cells behind a cut where the body is cut.
  *
  * Elements that are inverted become patches until they are not (cell_recovery.h). Above nu 0.3, of what there is at
  * load, whole control cells keep a part of the volume instead of each element (cell_volume.c).

@@ -11,10 +11,10 @@
  * Regions of the body: what follows from the material, derived constants and masses, is of each tetrahedron's own
  * (spring_law.h); constants that are given stand for all of them.
  *
- * Constants that vary over the body stand on the body's spring_grid (paper B 3.5) in place of their keys; with a grid
- * there are area springs only when it, or the key, gives their constant. Where k_area_J is 0 the derived constants of
- * edges and volumes give the same moduli without it: a row less, about half the time. The row `viscous` exists when the
- * material's damping rate is given. */
+ * Constants that vary over the body stand on the body's spring_grid (paper B section 3.5) in place of their keys; with
+ * a grid there are area springs only when it, or the key, gives their constant. Where k_area_J is 0 the derived
+ * constants of edges and volumes give the same moduli without it: a row less, about half the time. The row `viscous`
+ * exists when the material's damping rate is given. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/springs/spring_recovery.h"

@@ -73,17 +73,17 @@ typedef struct central {
 } central;
 
 /* of wild, and what is left of it after a sub-step without clamps */
-static const double most_wild = 8, calm = 0.98;
+static const double max_wild = 8, calm = 0.98;
 /* of omega^2 while elements are inverted: what throws a corner about is the fastest motion, which near its limit is
  * seen with up to twice its energy, velocities being those of half a sub-step before */
-static const double tangled2 = 3;
+static const double inverted2 = 3;
 /* of a move in elements, as forces may be of single precision; of omega^2 and of its solves */
 static const double small_h = 1e-4, near = 0.02, exact = 1e-6;
-enum { PAUSE = 12, MOST_PAUSE = 96 };
+enum { PAUSE = 12, MAX_PAUSE = 96 };
 /* sub-steps between looks for elements that are inverted, about */
 enum { UNSEEN = 16 };
 /* iterations for a sub-step; Lanczos' first and later ones; entries of a factor */
-enum { MOST = 300, FIRST = 24, AGAIN = 6, MOST_ENTRY = 1 << 22 };
+enum { MOST = 300, FIRST = 24, AGAIN = 6, MAX_ENTRY = 1 << 22 };
 
 /* ---- load ---- */
 
@@ -142,8 +142,8 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     row->cell_m = body->dofs.spacing_m;
     PAL_TRY(allocate(row, body, build->arena));
     if (factor) {
-        pal_err err = pal_envelope_make(row->mass->n_point, row->mass->start, row->mass->point, MOST_ENTRY,
-                                        build->arena, &row->envelope);
+        pal_err err = pal_envelope_make(row->mass->n_point, row->mass->start, row->mass->point, MAX_ENTRY, build->arena,
+                                        &row->envelope);
         if (err && err != PAL_ERR_BUDGET) return err;
     }
     *self = row;
@@ -232,9 +232,9 @@ static bool multiply_stiffness(void *user, const double *v, double *out)
 {
     central *row = user;
     const int n = row->cg.n;
-    double most = 0;
-    for (int i = 0; i < n; i++) most = fmax(most, fabs(v[i]));
-    const double small = most > 0 ? small_h * row->step->body->edge_m / most : 0, per = most > 0 ? 1 / small : 0;
+    double max = 0;
+    for (int i = 0; i < n; i++) max = fmax(max, fabs(v[i]));
+    const double small = max > 0 ? small_h * row->step->body->edge_m / max : 0, per = max > 0 ? 1 / small : 0;
     for (int i = 0; i < n; i++) row->at[i] = row->x[i] + small * v[i];
     if (!gather(row)) return false;
     for (int i = 0; i < n; i++) out[i] = row->fixed[i / 3] ? 0 : per * (row->g0[i] - row->g[i]);
@@ -273,7 +273,7 @@ static double find_rows2(central *row, pal_step *step)
     const pal_body kept = *body;
     const bool apart = step->drag_separate;
     const int n_cg = row->report.n_cg;
-    double most = NAN;
+    double max = NAN;
     row->step = step, row->x = body->x;
     memcpy(row->at, body->x, sizeof(double) * (size_t)row->cg.n);
     body->x = row->at, body->v = row->still, body->g = row->g;
@@ -284,13 +284,13 @@ static double find_rows2(central *row, pal_step *step)
         if (!row->known) memset(row->lanczos.z, 0, sizeof(double) * (size_t)row->cg.n);
         add_any(row, 0.1, row->lanczos.z);
         row->lanczos.multiply = multiply_stiffness;
-        most = pal_lanczos_run(&row->lanczos, near, row->known ? 3 : 8, row->known ? AGAIN : FIRST);
+        max = pal_lanczos_run(&row->lanczos, near, row->known ? 3 : 8, row->known ? AGAIN : FIRST);
     }
     step->drag_separate = apart;
     body->x = kept.x, body->v = kept.v, body->g = kept.g;
     body->d = kept.d, body->dv = kept.dv, body->f = kept.f;
     row->report.n_cg = n_cg;
-    return most > 0 || isnan(most) ? most : 0;
+    return max > 0 || isnan(max) ? max : 0;
 }
 
 /* the largest eigenvalue of row->bound over mass */
@@ -307,10 +307,10 @@ static double find_bound(central *row)
     multiply_bound(row, row->at, row->g);
     memcpy(row->at, row->g, sizeof(double) * (size_t)row->cg.n);
     row->lanczos.multiply = multiply_bound;
-    const double most = pal_lanczos_run(&row->lanczos, near, 2, AGAIN);
+    const double max = pal_lanczos_run(&row->lanczos, near, 2, AGAIN);
     row->lanczos.z = z;
     row->report.n_cg = n_cg;
-    return most;
+    return max;
 }
 
 static void clear_bound(central *row)
@@ -342,7 +342,7 @@ static void look(central *row, pal_step *step)
     const double before = row->known ? row->rows2 : 0;
     row->rows2 = find_rows2(row, step);
     bool same = fabs(row->rows2 - before) <= near * before;
-    row->pause = !same ? PAUSE : row->pause < MOST_PAUSE ? 2 * row->pause : MOST_PAUSE;
+    row->pause = !same ? PAUSE : row->pause < MAX_PAUSE ? 2 * row->pause : MAX_PAUSE;
     row->known = true;
     row->way_m = 0;
     row->n_since = 0;
@@ -375,7 +375,7 @@ static double limit(void *self, pal_step *step)
     if (!row->known || (row->n_since >= row->pause && !(row->way_m <= PAL_GUARD_RECHECK * row->cell_m)))
         look(row, step);
     if (step->sub == 0) find_contact(row, step);
-    const double rows2 = row->has_inversion ? tangled2 * row->rows2 : row->rows2, lambda = rows2 + row->contact2,
+    const double rows2 = row->has_inversion ? inverted2 * row->rows2 : row->rows2, lambda = rows2 + row->contact2,
                  c = row->contact_1_s;
     row->limit_s = row->safety * 4 / (c + sqrt(c * c + 4 * lambda)) / row->wild;
     return row->limit_s;
@@ -418,9 +418,9 @@ static void find_change(central *row, const pal_step *step)
                  over = row->limit_s > 0 ? dt / row->limit_s : 0;
     const double scale = step->heavy && over > 1 ? over * over : 1;
     const bool varies = row->mass->damping_kg_s != NULL, moves = begin_change(row, body);
-    const double most = k * (rate + (varies ? row->mass->damping_max_1_s : 0));
+    const double max = k * (rate + (varies ? row->mass->damping_max_1_s : 0));
     double theta = row->dt_s / (dt + row->dt_s);
-    if (most > 0) theta = fmax(theta, 1 - 1 / most);
+    if (max > 0) theta = fmax(theta, 1 - 1 / max);
     const double a = scale + theta * k * rate, b = varies ? theta * k : 0;
     for (int i = 0; i < row->cg.n; i++) row->cg.r[i] = k * body->g[i];
     if (rate > 0 || moves) take_away(row, 1, 0, k * rate, a);
@@ -442,7 +442,7 @@ static double move(central *row, pal_body *body, double dt)
 {
     const double max_m = pal_guard_max_move_m(body);
     const uint64_t n_clamped = body->safeguards.n_clamped;
-    double mean[3] = {0, 0, 0}, most2 = 0, poison = 0;
+    double mean[3] = {0, 0, 0}, max2 = 0, poison = 0;
     for (int i = 0; i < body->n_dof; i++) {
         double *v = body->v + 3 * (size_t)i;
         /* prescribed points have theirs */
@@ -462,10 +462,10 @@ static double move(central *row, pal_body *body, double dt)
     for (int i = 0; i < body->n_dof; i++) {
         double from[3];
         pal_sub3(from, body->v + 3 * (size_t)i, mean);
-        most2 = fmax(most2, pal_dot3(from, from));
+        max2 = fmax(max2, pal_dot3(from, from));
     }
-    row->wild = body->safeguards.n_clamped > n_clamped ? fmin(2 * row->wild, most_wild) : 1 + calm * (row->wild - 1);
-    return dt * sqrt(most2) + poison;
+    row->wild = body->safeguards.n_clamped > n_clamped ? fmin(2 * row->wild, max_wild) : 1 + calm * (row->wild - 1);
+    return dt * sqrt(max2) + poison;
 }
 
 static pal_err run(void *self, pal_step *step)
@@ -477,7 +477,7 @@ static pal_err run(void *self, pal_step *step)
     find_change(row, step);
     row->way_m += move(row, step->body, step->dt_s);
     row->dt_s = step->dt_s;
-    row->n_since += row->n_since < MOST_PAUSE;
+    row->n_since += row->n_since < MAX_PAUSE;
     row->n_unseen++;
     return PAL_ERR_OK;
 }

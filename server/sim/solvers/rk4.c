@@ -67,8 +67,8 @@ typedef struct rk4 {
 } rk4;
 
 static const double radius = 2.7;
-/* row sums are hardly ever more than `most_over` times too high, nor `more` times more so than they were last */
-static const double most_over = 1.6, more = 1.05;
+/* row sums are hardly ever more than `max_over` times too high, nor `more` times more so than they were last */
+static const double max_over = 1.6, more = 1.05;
 /* sub-steps between Lanczos' bounds, and iterations for one, a gather each */
 enum { PAUSE = 12, LANCZOS = 10 };
 
@@ -100,7 +100,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
         if (!row->at || !row->still || !row->force) return PAL_ERR_MEMORY;
     }
     row->n_since = PAUSE;
-    row->over = most_over;
+    row->over = max_over;
     row->safety = safety;
     row->reach = safety * radius;
     *self = row;
@@ -159,15 +159,15 @@ static bool still_known(const rk4 *row, const pal_step *step)
 }
 
 /* row sums of stiffness over mass at free nodes, the most of them */
-static double most_stiff(const rk4 *row, const pal_body *body)
+static double max_stiff(const rk4 *row, const pal_body *body)
 {
-    double most = 0;
+    double max = 0;
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         double omega2 = row->stiff[i] / body->mass_kg[i];
-        if (!body->support[i] && omega2 > most) most = omega2;
+        if (!body->support[i] && omega2 > max) max = omega2;
     }
-    return most;
+    return max;
 }
 
 /* 1 for a state and row sums that are finite, else NaN */
@@ -213,13 +213,13 @@ static pal_err apply_stiffness(rk4 *row, pal_step *step, double *along)
 {
     pal_body *body = step->body;
     pal_active_nodes *pack = body->active_nodes;
-    double most2 = 0;
+    double max2 = 0;
     for (int k = 0; k < body->n_active; k++) {
         pal_quad q = row->inverse_kg[k] * pal_v8_high(row->memory[k].from);
         double q2 = pal_quad_dot(q, q);
-        most2 = q2 > most2 ? q2 : most2;
+        max2 = q2 > max2 ? q2 : max2;
     }
-    double small = most2 > 0 ? 1e-6 * body->edge_m / sqrt(most2) : 0, per = most2 > 0 ? 1 / small : 0;
+    double small = max2 > 0 ? 1e-6 * body->edge_m / sqrt(max2) : 0, per = max2 > 0 ? 1 / small : 0;
     for (int k = 0; k < body->n_active; k++) {
         pal_quad move = small * row->inverse_kg[k] * pal_v8_high(row->memory[k].from);
         pack->xv[k] = pal_v8_join(pal_v8_low(row->memory[k].from) + move, (pal_quad){0});
@@ -253,9 +253,9 @@ static double next_lanczos(rk4 *row, const pal_body *body, double alpha, double 
 
 /* largest eigenvalue of the tridiagonal matrix with diagonal a and b beside it, plus the residual that b[n - 1] leaves
  * in the whole one. Bisection below `most`, which is above it, by the signs of leading minors */
-static double largest_of(const double *a, const double *b, int n, double most)
+static double largest_of(const double *a, const double *b, int n, double max)
 {
-    double low = a[0], high = most;
+    double low = a[0], high = max;
     for (int turn = 0; turn < 30 && low < high; turn++) {
         double middle = 0.5 * (low + high), d = middle - a[0];
         bool above = d > 0;
@@ -275,7 +275,7 @@ static double largest_of(const double *a, const double *b, int n, double most)
 }
 
 /* Lanczos' bound on omega^2 of the FORCE components; above `most`: it knows nothing better */
-static pal_err run_lanczos(rk4 *row, pal_step *step, double most, double *out)
+static pal_err run_lanczos(rk4 *row, pal_step *step, double max, double *out)
 {
     double a[LANCZOS], b[LANCZOS];
     int n = 0;
@@ -285,14 +285,14 @@ static pal_err run_lanczos(rk4 *row, pal_step *step, double most, double *out)
     while (n < LANCZOS) {
         PAL_TRY(apply_stiffness(row, step, &a[n]));
         b[n] = next_lanczos(row, step->body, a[n], n > 0 ? b[n - 1] : 0);
-        if (!(b[n++] > 1e-6 * most)) break;
+        if (!(b[n++] > 1e-6 * max)) break;
     }
-    *out = largest_of(a, b, n, 1.01 * most);
+    *out = largest_of(a, b, n, 1.01 * max);
     return PAL_ERR_OK;
 }
 
 /* the same on a body that stands still, all of whose arrays stay as they are */
-static void find_sharp(rk4 *row, pal_step *step, double most)
+static void find_sharp(rk4 *row, pal_step *step, double max)
 {
     pal_body *body = step->body;
     const pal_body kept = *body;
@@ -306,9 +306,9 @@ static void find_sharp(rk4 *row, pal_step *step, double most)
     body->f = body->g = row->force;
     step->drag_separate = true;
     double sharp2 = NAN;
-    row->sharp_known = !run_lanczos(row, step, most, &sharp2) && sharp2 == sharp2;
+    row->sharp_known = !run_lanczos(row, step, max, &sharp2) && sharp2 == sharp2;
     row->sharp2 = sharp2;
-    row->over = more * fmax(1, sqrt(most / row->sharp2));
+    row->over = more * fmax(1, sqrt(max / row->sharp2));
     step->drag_separate = apart;
     body->x = kept.x, body->d = kept.d, body->v = kept.v, body->dv = kept.dv, body->f = kept.f, body->g = kept.g;
     row->sharp_ramp[0] = *body->dofs.ramp[0], row->sharp_ramp[1] = *body->dofs.ramp[1];
@@ -316,30 +316,30 @@ static void find_sharp(rk4 *row, pal_step *step, double most)
 }
 
 /* would a longer limit save a sub-step? */
-static bool would_help(const rk4 *row, double most)
+static bool would_help(const rk4 *row, double max)
 {
-    double n = row->step_s * sqrt(most) / row->reach;
+    double n = row->step_s * sqrt(max) / row->reach;
     return !(row->step_s > 0) || ceil(n / row->over) < ceil(n);
 }
 
 /* omega^2 of the FORCE components: `most` of the row sums or less. Stiffness that the common factors have not grown for
  * is less than the same with all of it grown */
-static double bound_force(rk4 *row, pal_step *step, double most)
+static double bound_force(rk4 *row, pal_step *step, double max)
 {
     const pal_body *body = step->body;
     /* looked at from outside, nothing moves: the world asks at rest with places that are no body's */
-    if (!body->active || body->x == body->x_rest) return most;
+    if (!body->active || body->x == body->x_rest) return max;
     bool moved = row->revision != body->revision || !(row->way_m <= PAL_GUARD_RECHECK * body->edge_m);
     row->sharp_known &= !moved;
     if (!row->sharp_known && row->n_since >= PAUSE) {
-        if (would_help(row, most))
-            find_sharp(row, step, most);
+        if (would_help(row, max))
+            find_sharp(row, step, max);
         else
             row->n_since = 0;
     }
-    if (!row->sharp_known) return most;
+    if (!row->sharp_known) return max;
     double grown = fmax(1, fmax(*body->dofs.ramp[0] / row->sharp_ramp[0], *body->dofs.ramp[1] / row->sharp_ramp[1]));
-    return fmin(most, grown * row->sharp2);
+    return fmin(max, grown * row->sharp2);
 }
 
 static double limit(void *self, pal_step *step)
@@ -353,19 +353,19 @@ static double limit(void *self, pal_step *step)
         row->stiff[i] = row->damp[i] = 0;
     }
     pal_guard_add_bounds(step->contact, step->n_contact, body, row->stiff, row->damp);
-    double contact2 = most_stiff(row, body);
+    double contact2 = max_stiff(row, body);
     pal_guard_add_bounds(step->force, step->n_force, body, row->stiff, row->damp);
     /* the largest of omega^2 and c */
-    double most2 = most_stiff(row, body), most = 0;
+    double max2 = max_stiff(row, body), max = 0;
     row->limit_s = one_if_finite(row, body);
-    if (row->limit_s == 1) most2 = fmin(most2, bound_force(row, step, most2) + contact2);
+    if (row->limit_s == 1) max2 = fmin(max2, bound_force(row, step, max2) + contact2);
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         double c = row->damp[i] / body->mass_kg[i];
-        if (!body->support[i] && c > most) most = c;
+        if (!body->support[i] && c > max) max = c;
     }
-    most = fmax(sqrt(most2), most);
-    row->limit_s *= most > 0 ? row->reach / most : INFINITY;
+    max = fmax(sqrt(max2), max);
+    row->limit_s *= max > 0 ? row->reach / max : INFINITY;
     if (!row->sharp_known || row->n_since == 0) row->way_m = 0;
     row->revision = body->revision;
     for (int k = 0; k < 2 && body->active; k++) row->ramp[k] = *body->dofs.ramp[k];
@@ -489,7 +489,7 @@ static double stage_last(rk4 *row, const pal_body *body, const rates *r)
 {
     pal_active_nodes *pack = body->active_nodes;
     const double dt2 = r->dt * r->dt;
-    double most2 = 0, poison = 0;
+    double max2 = 0, poison = 0;
     for (int k = 0; k < body->n_active; k++) {
         const memory *m = &row->memory[k];
         const pal_v8 sum = m->sum + r->weight[2] * rate_of(row, pack, k), square = sum * sum;
@@ -497,9 +497,9 @@ static double stage_last(rk4 *row, const pal_body *body, const rates *r)
         pack->xv[k] = pal_v8_join(pal_v8_low(m->from) + pal_v8_low(sum), pal_v8_high(sum));
         poison += 0 * way2 + 0 * v2;
         way2 = v2 > way2 ? v2 : way2;
-        most2 = way2 > most2 ? way2 : most2;
+        max2 = way2 > max2 ? way2 : max2;
     }
-    return most2 + poison;
+    return max2 + poison;
 }
 
 /* shortens moves, and velocities that would make such, longer than max_m */
@@ -538,15 +538,15 @@ static pal_err run(void *self, pal_step *step)
     PAL_TRY(find_forces(row, step));
     stage_third(row, body, &r);
     PAL_TRY(find_forces(row, step));
-    double way = sqrt(stage_last(row, body, &r)), most = pal_guard_max_move_m(body);
-    if (way > most) {
+    double way = sqrt(stage_last(row, body, &r)), max = pal_guard_max_move_m(body);
+    if (way > max) {
         uint64_t before = pal_clock_ns();
-        clamp_moves(row, body, step->dt_s, most);
+        clamp_moves(row, body, step->dt_s, max);
         body->safeguards.ns += pal_clock_ns() - before;
     }
     give_motion(body);
     give_forces(row, body);
-    row->way_m += way > most ? most : way;
+    row->way_m += way > max ? max : way;
     row->n_since += row->n_since < PAUSE;
     if (step->sub == 0) row->step_s = step->dt_s * step->n_sub;
     return PAL_ERR_OK;
@@ -559,7 +559,7 @@ static void reset(void *self, const pal_body *body)
     row->known = row->sharp_known = false;
     row->n_since = PAUSE;
     row->step_s = 0;
-    row->over = most_over;
+    row->over = max_over;
 }
 
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)

@@ -516,11 +516,11 @@ static pal_err iterate(static_newton *row, pal_step *step, double size, bool *mo
     for (int i = 0; i < body->n_dof; i++) from.longest_m = fmax(from.longest_m, pal_norm3(row->move + 3 * i));
     row->report.n_newton++;
     /* where the true stiffness nearly vanishes, the way is long and means little */
-    double most = pal_guard_max_move_m(body);
-    if (row->exact && from.longest_m > most) {
-        for (int i = 0; i < row->cg.n; i++) row->move[i] *= most / from.longest_m;
-        from.slope_J *= most / from.longest_m;
-        from.longest_m = most;
+    double max = pal_guard_max_move_m(body);
+    if (row->exact && from.longest_m > max) {
+        for (int i = 0; i < row->cg.n; i++) row->move[i] *= max / from.longest_m;
+        from.slope_J *= max / from.longest_m;
+        from.longest_m = max;
     }
     *moved = search(row, step, &from) && from.longest_m > 1e-15 * body->length_scale_m;
     return PAL_ERR_OK;

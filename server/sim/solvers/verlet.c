@@ -1,4 +1,4 @@
-/* Solver verlet: v += dt f/m, x += dt v (the velocity form of paper B 4.1).
+/* Solver verlet: v += dt f/m, x += dt v (the velocity form of paper B section 4.1).
  *
  * Departures. Drag is implicit: v <- (v + dt f/m) / (1 + dt rate), the rate being the sum of the components' drag rates
  * and of the stiffening damper (stiffening_damper.h), so that no rate makes it unstable. The sub-step is `safety` (key,
@@ -61,15 +61,15 @@ static double limit(void *self, pal_step *step)
     memset(row->damp, 0, n_byte);
     pal_guard_add_bounds(step->force, step->n_force, body, row->stiff, row->damp);
     pal_guard_add_bounds(step->contact, step->n_contact, body, row->stiff, row->damp);
-    double least = INFINITY, sum = 0;
+    double min = INFINITY, sum = 0;
     for (int i = 0; i < body->n_dof; i++) {
         double k = row->stiff[i], c = row->damp[i], m = body->mass_kg[i];
         sum += 0 * k + 0 * c;
         if (body->support[i] || k + c == 0) continue;
         double dt = row->safety * 4 * m / (c + sqrt(c * c + 4 * k * m));
-        if (dt < least) least = dt;
+        if (dt < min) min = dt;
     }
-    row->limit_s = sum == 0 ? least : NAN;
+    row->limit_s = sum == 0 ? min : NAN;
     row->way_m = 0;
     row->known = true;
     return row->limit_s;
@@ -81,7 +81,7 @@ static pal_err run(void *self, pal_step *step)
     pal_body *body = step->body;
     double dt = step->dt_s,
            keep = 1 / (1 + dt * (pal_guard_drag_1_s(step->force, step->n_force) + body->stiffening_damping_1_s)),
-           most2 = 0, poison = 0;
+           max2 = 0, poison = 0;
     double root = dt / (2 * row->safety);
     step->drag_separate = true;
     PAL_TRY(pal_assemble_forces(step));
@@ -97,20 +97,20 @@ static pal_err run(void *self, pal_step *step)
         }
         for (int c = 0; c < 3; c++) v[c] = k * (v[c] + s * g[c]);
         double v2 = pal_dot3(v, v);
-        most2 = v2 > most2 ? v2 : most2;
+        max2 = v2 > max2 ? v2 : max2;
         poison += 0 * v2;
     }
-    double way = sqrt(most2) * dt, most = pal_guard_max_move_m(body);
-    if (way > most) {
+    double way = sqrt(max2) * dt, max = pal_guard_max_move_m(body);
+    if (way > max) {
         uint64_t before = pal_clock_ns();
         for (int i = 0; i < body->n_dof; i++) {
             double *v = body->v + 3 * i;
-            pal_scale3(v, pal_guard_shorten(body, pal_norm3(v) * dt, most), v);
+            pal_scale3(v, pal_guard_shorten(body, pal_norm3(v) * dt, max), v);
         }
         body->safeguards.ns += pal_clock_ns() - before;
     }
     /* a velocity that is not finite makes the way one too, and so the next limit */
-    row->way_m += (way < most ? way : most) + poison;
+    row->way_m += (way < max ? way : max) + poison;
 
     /* positions */
     for (int i = 0; i < 3 * body->n_dof; i++) body->x[i] += dt * body->v[i];

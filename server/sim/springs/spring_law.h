@@ -14,8 +14,8 @@
  * the body, at its centre; with equal weights, by their mean over the spring's tetrahedra. Given constants hold for all
  * materials, as they do in a live edit.
  *
- * Constants on a grid (paper B 3.5): k_i is the weight times the mean over the spring's corners of the grid's value
- * there. Thread: [load], pal_spring_material [sim]. */
+ * Constants on a grid (paper B section 3.5): k_i is the weight times the mean over the spring's corners of the grid's
+ * value there. Thread: [load], pal_spring_material [sim]. */
 #ifndef PAL_SIM_SPRINGS_SPRING_LAW_H
 #define PAL_SIM_SPRINGS_SPRING_LAW_H
 #include "server/sim/core/effect.h"

@@ -374,13 +374,13 @@ static void number(pal_spring_recovery *t, const pal_spring_set *edges)
 /* the time that edges alone give to an explicit step: the least sqrt(m / K) of free nodes, K their row sums */
 static double edge_time_s(pal_spring_recovery *t, const pal_spring_set *edges, const pal_body *body)
 {
-    double least = INFINITY, *sum = t->room;
+    double min = INFINITY, *sum = t->room;
     memset(sum, 0, sizeof *sum * (size_t)t->n_node);
     for (int i = 0; i < edges->n_item; i++)
         for (int c = 0; c < 2; c++) sum[corners(edges, i)[c]] += 2 * edge_N_m(edges, i);
     for (int i = 0; i < t->n_node; i++)
-        if (!body->support[i] && sum[i] > 0 && body->mass_kg[i] < least * sum[i]) least = body->mass_kg[i] / sum[i];
-    return isfinite(least) ? sqrt(least) : 0;
+        if (!body->support[i] && sum[i] > 0 && body->mass_kg[i] < min * sum[i]) min = body->mass_kg[i] / sum[i];
+    return isfinite(min) ? sqrt(min) : 0;
 }
 
 /* switches the springs at nodes of regions off, all others on */

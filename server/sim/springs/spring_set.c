@@ -116,7 +116,7 @@ pal_err pal_spring_set_check(const pal_config_entry *entry, const pal_build *bui
 }
 
 pal_err pal_spring_set_make(pal_spring_kind kind, pal_config_entry *entry, pal_build *build, int32_t *item, int n_item,
-                            double least, pal_spring_set *out)
+                            double min, pal_spring_set *out)
 {
     const pal_body *body = build->body;
     const int n_corner = pal_spring_corner_count(kind);
@@ -125,7 +125,7 @@ pal_err pal_spring_set_make(pal_spring_kind kind, pal_config_entry *entry, pal_b
     for (int i = 0; i < n_item; i++) {
         const double *x[PAL_CORNERS];
         corners_at(body->x_rest, item + n_corner * i, n_corner, x);
-        if (!(fabs(pal_spring_measure(kind, x)) > least)) continue;
+        if (!(fabs(pal_spring_measure(kind, x)) > min)) continue;
         memmove(item + n_corner * out->n_item++, item + n_corner * i, sizeof *item * (size_t)n_corner);
     }
     size_t n = (size_t)out->n_item * (size_t)n_corner;

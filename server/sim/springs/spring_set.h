@@ -9,7 +9,7 @@
 /* 8 springs with constants k q: p [n_corner][3] points to the coordinates of the corners, 8 lanes each; f [n_corner -
  * 1][3] receives the forces on corners 1, 2, 3 (corner 0 gets minus their sum); the kernel may lower `least` to the
  * minimum of a quantity of its own */
-typedef void (*pal_spring_kernel)(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *least);
+typedef void (*pal_spring_kernel)(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *min);
 
 /* Gershgorin row sums of 8 springs at each corner: k q |g_a| sum |g_b|, and with `bend` those of the second derivative
  * of C where it stiffens */
@@ -37,7 +37,7 @@ pal_err pal_spring_set_check(const pal_config_entry *entry, const pal_build *bui
 /* Reads the keys (pal_spring_read) and keeps the springs of item [n_item][corners of the kind] with a measure above
  * `least`, w = 1 / measure; item is reordered */
 pal_err pal_spring_set_make(pal_spring_kind kind, pal_config_entry *entry, pal_build *build, int32_t *item, int n_item,
-                            double least, pal_spring_set *out);
+                            double min, pal_spring_set *out);
 /* smallest and largest of 1 and the ratios of volume to volume at rest, whichever springs are off; d [n_node][3] */
 void pal_spring_volume_range(const pal_spring_set *set, pal_node_order *node_order, const double *d, double out[2]);
 /* Young's modulus, Pa, for which a set of edges stands: that of a material whose derived constants have the same sum of
@@ -91,12 +91,12 @@ PAL_INLINE double pal_spring_run(const pal_spring_set *set, pal_node_order *node
     const double k = set->spring.k_J;
     double *const fx = node_order->f, *const fy = fx + node_order->n_slot, *const fz = fy + node_order->n_slot;
     const double *const x = node_order->x, *const y = x + node_order->n_slot, *const z = y + node_order->n_slot;
-    pal_v8 f[PAL_CORNERS - 1][3], least = {1, 1, 1, 1, 1, 1, 1, 1};
+    pal_v8 f[PAL_CORNERS - 1][3], min = {1, 1, 1, 1, 1, 1, 1, 1};
     const double *p[PAL_CORNERS][3];
     for (int b = 0; b < n_strip; b++) {
         const int32_t *base = set->simd_blocks.base + n_corner * b;
         for (int c = 0; c < n_corner; c++) p[c][0] = x + base[c], p[c][1] = y + base[c], p[c][2] = z + base[c];
-        kernel(p, pal_load8(set->w + PAL_LANES * b), k * pal_load8(set->q + PAL_LANES * b), f, &least);
+        kernel(p, pal_load8(set->w + PAL_LANES * b), k * pal_load8(set->q + PAL_LANES * b), f, &min);
         pal_v8 sum[3] = {f[0][0], f[0][1], f[0][2]};
         for (int c = 2; c < n_corner; c++)
             for (int d = 0; d < 3; d++) sum[d] += f[c - 1][d];
@@ -114,11 +114,11 @@ PAL_INLINE double pal_spring_run(const pal_spring_set *set, pal_node_order *node
         for (int c = 0; c < n_corner; c++)
             for (int d = 0; d < 3; d++) p[c][d] = at[c][d];
         int lane = PAL_LANES * (n_strip + b);
-        kernel(p, pal_load8(set->w + lane), k * pal_load8(set->q + lane), f, &least);
+        kernel(p, pal_load8(set->w + lane), k * pal_load8(set->q + lane), f, &min);
         pal_loose_add(node_order, node, n_corner, f);
     }
-    for (int l = 1; l < PAL_LANES; l++) least[0] = least[l] < least[0] ? least[l] : least[0];
-    return least[0];
+    for (int l = 1; l < PAL_LANES; l++) min[0] = min[l] < min[0] ? min[l] : min[0];
+    return min[0];
 }
 
 /* bound [n_node] += the row sums at positions x [n_node][3] */

@@ -5,7 +5,7 @@ void pal_spring_volume_range(const pal_spring_set *set, pal_node_order *node_ord
 {
     const pal_v8 one = 1 - (pal_v8){0};
     const int n_strip = set->simd_blocks.n_strip, n_slot = node_order->n_slot;
-    pal_v8 least = one, most = one;
+    pal_v8 min = one, max = one;
     const double *p[PAL_CORNERS][3];
     pal_node_order_load(node_order, d);
     for (int b = 0; b < n_strip + set->simd_blocks.n_loose; b++) {
@@ -22,11 +22,11 @@ void pal_spring_volume_range(const pal_spring_set *set, pal_node_order *node_ord
             w * (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) + e[0][1] * (e[1][2] * e[2][0] - e[1][0] * e[2][2]) +
                  e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]));
         v = pal_select8(w * w > 0, v, one);
-        least = pal_select8(v < least, v, least), most = pal_select8(v > most, v, most);
+        min = pal_select8(v < min, v, min), max = pal_select8(v > max, v, max);
     }
     for (int l = 1; l < PAL_LANES; l++) {
-        least[0] = least[l] < least[0] ? least[l] : least[0];
-        most[0] = most[l] > most[0] ? most[l] : most[0];
+        min[0] = min[l] < min[0] ? min[l] : min[0];
+        max[0] = max[l] > max[0] ? max[l] : max[0];
     }
-    out[0] = least[0], out[1] = most[0];
+    out[0] = min[0], out[1] = max[0];
 }

@@ -302,8 +302,7 @@ void pal_cells_corners_make(pal_cells_elastic *c)
 PAL_INLINE void ratios_of(pal_cells_elastic *c, pal_cell_kind kind, int n_node, const double *d)
 {
     const pal_cell_group *g = &c->group[kind];
-    double *least = c->recovery.ratio[0] + c->recovery.first[kind],
-           *most = c->recovery.ratio[1] + c->recovery.first[kind];
+    double *min = c->recovery.ratio[0] + c->recovery.first[kind], *max = c->recovery.ratio[1] + c->recovery.first[kind];
     for (int b = 0; b < g->n_block; b++)
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             const pal_wide one = 1 - (pal_wide){0};
@@ -316,8 +315,7 @@ PAL_INLINE void ratios_of(pal_cells_elastic *c, pal_cell_kind kind, int n_node, 
                 pal_wide ratio = pal_wide_select(inverse > 0, det[p] * inverse, one);
                 low = pal_wide_select(ratio < low, ratio, low), high = pal_wide_select(ratio > high, ratio, high);
             }
-            for (int k = 0; k < n_live; k++)
-                least[b * PAL_LANES + l + k] = low[k], most[b * PAL_LANES + l + k] = high[k];
+            for (int k = 0; k < n_live; k++) min[b * PAL_LANES + l + k] = low[k], max[b * PAL_LANES + l + k] = high[k];
         }
 }
 

@@ -1,5 +1,5 @@
-/* Elements of a subdivision solid that follow their own frames (paper A 3.2-3.4): forces, energy, tangent, measures,
- * recovery.
+/* Elements of a subdivision solid that follow their own frames (paper A section 3.2-3.4): forces, energy, tangent,
+ * measures, recovery.
  *
  * With Q the polar rotation of F at an element's middle, y = x - x_0 its nodes relative to one of them and X the same
  * at rest: d^ = Q' y - X,   E = 1/2 d^' K d^,   K = int B' C B dV over the rest shape, at 64 Gauss points, with
@@ -23,7 +23,7 @@
 
 typedef enum pal_cell_operator {
     PAL_CELL_POLAR, /* d^ = Q'y - X                                                            */
-    PAL_CELL_EDGES, /* d^ = R d of paper A 3.2.2 with errata A5 to A8 (cell_operator.c); no gradient */
+    PAL_CELL_EDGES, /* d^ = R d of paper A section 3.2.2 with errata A5 to A8 (cell_operator.c); no gradient */
 } pal_cell_operator;
 
 /* one dimension of the sum factorisation: even and odd parts (cell_simd.h) */

@@ -1,5 +1,5 @@
-/* The operator R of paper A 3.2.2: relative displacements of an element's nodes from changes of edge lengths and of
- * angles between edges, with the errata of the room's README:
+/* The operator R of paper A section 3.2.2: relative displacements of an element's nodes from changes of edge lengths
+ * and of angles between edges, with the errata of the room's README:
  *   - lengths change along the current edge (A8): e = (l - l0) s / l, s from the edge's first node to its second;
  *   - at the corner of edges s1, s2 with the angle theta, delta = theta - theta0, s1 turned by +delta/2 and s2 by
  *     -delta/2 about s1 x s2 are the unsheared a', b'; what counts is a - a' and b - b' (A7). Half a turn of delta

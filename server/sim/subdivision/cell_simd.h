@@ -133,12 +133,12 @@ PAL_INLINE void cell_turn_stress(const pal_wide r[9], const pal_wide s[9], const
     pal_wide axy = -0.5 * (s[1] + s[3]), axz = -0.5 * (s[2] + s[6]), ayz = -0.5 * (s[5] + s[7]);
     pal_wide cxx = ayy * azz - ayz * ayz, cxy = axz * ayz - axy * azz, cxz = axy * ayz - axz * ayy;
     pal_wide cyy = axx * azz - axz * axz, cyz = axy * axz - axx * ayz, czz = axx * ayy - axy * axy;
-    pal_wide det = axx * cxx + axy * cxy + axz * cxz, sum = axx + ayy + azz, least = 1e-3 * sum * sum * sum;
+    pal_wide det = axx * cxx + axy * cxy + axz * cxz, sum = axx + ayy + azz, min = 1e-3 * sum * sum * sum;
     /* beyond the least it fades with det, which is where the rotation is hardly known */
     pal_wide_mask some = (det > 0) & (sum > 1e-30);
-    pal_wide weak = pal_wide_select(det < least, det / pal_wide_select(some, least, 1 + zero), 1 + zero);
+    pal_wide weak = pal_wide_select(det < min, det / pal_wide_select(some, min, 1 + zero), 1 + zero);
     pal_wide one =
-        pal_wide_select(some, weak, zero) / pal_wide_select(some, pal_wide_select(det < least, least, det), 1 + zero);
+        pal_wide_select(some, weak, zero) / pal_wide_select(some, pal_wide_select(det < min, min, det), 1 + zero);
     pal_wide x = one * (cxx * t[0] + cxy * t[1] + cxz * t[2]), y = one * (cxy * t[0] + cyy * t[1] + cyz * t[2]),
              z = one * (cxz * t[0] + cyz * t[1] + czz * t[2]);
     pal_wide p[9];

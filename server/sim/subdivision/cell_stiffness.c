@@ -224,7 +224,7 @@ static inline pal_wide rest_gradients(const double *rest, int n_node, double (*d
 
 /* K_ab = int mu (g_b g_a' + g_a.g_b I - 2/3 g_a g_b') dV + k_a k_b' / int kappa dV, k_a = int kappa g_a dV, kappa =
  * lambda + 2/3 mu, of half a block: the mean dilatation (B-bar; Hughes 1980), which locks less as nu goes to 1/2. Not
- * `mean`: K of A 3.2, int B' C B dV */
+ * `mean`: K of paper A section 3.2, int B' C B dV */
 static void fill_half(const pal_subdivision_solid *solid, pal_cell_kind kind, pal_cell_group *group, point_gradients dn,
                       bool mean, bool shared, int block, int lane)
 {

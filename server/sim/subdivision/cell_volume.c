@@ -25,11 +25,11 @@ static const float from_poisson = 0.3f;
 
 static bool asked(const pal_cells_elastic *c)
 {
-    float most = 0;
+    float max = 0;
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
         for (size_t i = 0; i < (size_t)c->solid->elements.n[kind] * PAL_CELL_GAUSS_POINTS; i++)
-            most = fmaxf(most, c->solid->samples[kind].poisson[i]);
-    return c->op == PAL_CELL_POLAR && most > from_poisson;
+            max = fmaxf(max, c->solid->samples[kind].poisson[i]);
+    return c->op == PAL_CELL_POLAR && max > from_poisson;
 }
 
 static int32_t home_of(const pal_subdivision_solid *solid, pal_cell_kind kind, int element)
@@ -43,29 +43,28 @@ static pal_err couple(pal_cells_elastic *c, pal_arena *arena)
     const pal_subdivision_solid *solid = c->solid;
     const int n = c->volume.n;
     int32_t *count = PAL_NEW(arena, int32_t, n), *node;
-    int most = 1;
+    int max = 1;
     if (!count) return PAL_ERR_MEMORY;
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
         for (int e = 0; e < solid->elements.n[kind]; e++) {
             int32_t *to = &count[home_of(solid, kind, e)];
             *to += pal_cell_kind_nodes(kind);
-            most = *to > most ? *to : most;
+            max = *to > max ? *to : max;
         }
-    node = PAL_NEW(arena, int32_t, (size_t)n * (size_t)most);
+    node = PAL_NEW(arena, int32_t, (size_t)n * (size_t)max);
     if (!node) return PAL_ERR_MEMORY;
     memset(count, 0, sizeof *count * (size_t)n);
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
         for (int e = 0; e < solid->elements.n[kind]; e++) {
             const int32_t home = home_of(solid, kind, e);
             const int n_node = pal_cell_kind_nodes(kind);
-            memcpy(node + (size_t)home * (size_t)most + count[home], pal_subdivision_solid_nodes(solid, kind, e),
+            memcpy(node + (size_t)home * (size_t)max + count[home], pal_subdivision_solid_nodes(solid, kind, e),
                    sizeof *node * (size_t)n_node);
             count[home] += n_node;
         }
     for (int i = 0; i < n; i++)
-        for (int k = count[i]; k < most; k++)
-            node[(size_t)i * (size_t)most + (size_t)k] = node[(size_t)i * (size_t)most];
-    c->volume.couple = (pal_cliques){.n_item = n, .n_corner = most, .node = node};
+        for (int k = count[i]; k < max; k++) node[(size_t)i * (size_t)max + (size_t)k] = node[(size_t)i * (size_t)max];
+    c->volume.couple = (pal_cliques){.n_item = n, .n_corner = max, .node = node};
     return PAL_ERR_OK;
 }
 

@@ -8,9 +8,9 @@
 #include <string.h>
 
 /* beyond so many free points mobility is bounded, not computed: its dense factor takes their number squared */
-enum { FACTOR_MOST = 1000 };
+enum { FACTOR_MAX = 1000 };
 /* D^-1 M~ with D its diagonal has no eigenvalue below the cube of 1/2 (trilinear), 0.1126 (cubic B-spline) */
-static const double most_hex = 8, most_cubic = 701;
+static const double max_hex = 8, max_cubic = 701;
 
 typedef struct mobility {
     int n_free;
@@ -23,7 +23,7 @@ typedef struct mobility {
 static bool factorise(const pal_mass_operator *mass, mobility *m)
 {
     const size_t n = (size_t)m->n_free;
-    double *u = n <= FACTOR_MOST ? calloc(n * n + 1, sizeof *u) : NULL;
+    double *u = n <= FACTOR_MAX ? calloc(n * n + 1, sizeof *u) : NULL;
     if (!u) return false;
     m->factor = u;
     for (int i = 0; i < mass->n_point; i++)
@@ -71,14 +71,14 @@ static double bound_of(const mobility *m, const pal_body *body, int node)
 {
     const pal_interpolation *rows = body->interpolation;
     const pal_mass_operator *mass = body->mass_operator;
-    double sum = 0, most = body->model.solid->subdivision.n_level > 0 ? most_cubic : most_hex;
+    double sum = 0, max = body->model.solid->subdivision.n_level > 0 ? max_cubic : max_hex;
     for (int32_t k = rows->start[node]; k < rows->start[node + 1]; k++) {
         int32_t i = rows->point[k], at = mass->start[i];
         if (m->place && m->place[i] < 0) continue;
         while (at + 1 < mass->start[i + 1] && mass->point[at] != i) at++;
         sum += rows->weight[k] * rows->weight[k] / mass->mass_kg[at];
     }
-    return most * sum;
+    return max * sum;
 }
 
 static void find_mobility(pal_body *body)

@@ -62,7 +62,7 @@ static void forget_points(int n, const int32_t *list, int32_t *local)
 /* lists of points by element, for the time of loading */
 typedef struct element_points {
     int64_t n_finest;
-    int n_element, most;
+    int n_element, max;
     int64_t *start; /* [n_element + 1] */
     int32_t *point; /* [n_finest]         */
 } element_points;
@@ -84,7 +84,7 @@ static pal_err list_points(const pal_subdivision_solid *solid, int32_t *list, in
             }
             memcpy(out->point + out->n_finest, list, (size_t)n * sizeof *list);
             out->start[++out->n_element] = out->n_finest += n;
-            if (n > out->most) out->most = n;
+            if (n > out->max) out->max = n;
         }
     return PAL_ERR_OK;
 }
@@ -155,7 +155,7 @@ pal_err pal_subdivision_mass_make(const pal_subdivision_solid *solid, pal_arena 
     for (int i = 0; i < n_point && !err; i++) out->local[i] = -1;
     if (!err) err = list_points(solid, list, out->local, &of);
     if (!err) err = make_pattern(&of, list, arena, out);
-    out->n_max = of.most;
+    out->n_max = of.max;
     free(of.start), free(of.point), free(list);
     PAL_TRY(err);
     out->element_point = PAL_NEW(arena, int32_t, out->n_max);
@@ -227,15 +227,15 @@ static void mirror(pal_mass_operator *mass, double *value)
 /* gamma over mu: the same everywhere, or NaN, and the most of all */
 static void find_damping(const pal_subdivision_solid *solid, pal_mass_operator *mass)
 {
-    double least = INFINITY, most = 0;
+    double min = INFINITY, max = 0;
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
         for (size_t i = 0; i < (size_t)solid->elements.n[kind] * PAL_CELL_GAUSS_POINTS; i++) {
-            least = fmin(least, (double)solid->samples[kind].damping_1_s[i]);
-            most = fmax(most, (double)solid->samples[kind].damping_1_s[i]);
+            min = fmin(min, (double)solid->samples[kind].damping_1_s[i]);
+            max = fmax(max, (double)solid->samples[kind].damping_1_s[i]);
         }
-    bool same = !(least < most);
-    mass->damping_max_1_s = most;
-    mass->damping_1_s = same ? most : NAN;
+    bool same = !(min < max);
+    mass->damping_max_1_s = max;
+    mass->damping_1_s = same ? max : NAN;
     mass->damping_kg_s = same ? NULL : mass->scratch_kg_s;
 }
 

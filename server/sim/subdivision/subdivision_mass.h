@@ -1,6 +1,6 @@
 /* The mass matrix of a subdivision solid on its control points, M~ = A' M A with M = int mu G' G dV from the samples
- * (paper A 3.2.1), and the damping matrix D~ from gamma in the same pattern. One number for each pair of points, the
- * same for x, y and z. Memory from the arena. Thread: [load] to make, [sim]. */
+ * (paper A section 3.2.1), and the damping matrix D~ from gamma in the same pattern. One number for each pair of
+ * points, the same for x, y and z. Memory from the arena. Thread: [load] to make, [sim]. */
 #ifndef PAL_SIM_SUBDIVISION_SUBDIVISION_MASS_H
 #define PAL_SIM_SUBDIVISION_SUBDIVISION_MASS_H
 #include "server/base/arena.h"

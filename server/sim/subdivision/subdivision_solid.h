@@ -1,4 +1,4 @@
-/* A subdivision solid as finite elements (paper A 3.1, 3.4): the cells after subdivision, their elements, the
+/* A subdivision solid as finite elements (paper A section 3.1, 3.4): the cells after subdivision, their elements, the
  * interpolation d = A p, and the material as samples at the Gauss points, so that it may vary continuously within an
  * element.
  *
@@ -16,7 +16,7 @@
 /* samples at the 64 Gauss points (num/spline.h) of the elements of one kind, all [n][64] */
 typedef struct pal_material_samples {
     float *young_Pa, *poisson, *density_kg_m3;
-    float *damping_1_s; /* gamma of A eq. 3 over density; 0: none there */
+    float *damping_1_s; /* gamma of paper A, eq. 3 over density; 0: none there */
     double *volume_m3;  /* that the point stands for at rest: weight det J, above 0 */
 } pal_material_samples;
 

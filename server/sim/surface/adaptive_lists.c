@@ -209,7 +209,7 @@ bool pal_adaptive_update(pal_adaptive_surface *s, pal_body *body)
     walk w = {.s = s};
     int n_leaf = s->n_leaf;
     for (int k = 0; k < l->n_level; k++)
-        w.level_share[k] = ldexp(s->level_mass_kg[k] / s->level_mass_kg[0], k); /* C eq. 8 */
+        w.level_share[k] = ldexp(s->level_mass_kg[k] / s->level_mass_kg[0], k); /* paper C, eq. 8 */
     memset(s->n_leaf_of, 0, sizeof s->n_leaf_of);
     s->n_leaf = s->n_spring = s->n_tri = s->finest = 0;
     s->n_node = l->n_vertex[0];

@@ -18,9 +18,9 @@
 #define BUDGET ((size_t)512 << 20)
 #define MEBI   1048576.0
 /* a finest vertex takes more than this in components (edge_spring, rk4) and display, whatever the body */
-#define ROW_BYTE  400
-#define LOG_LEAST 1024
-#define LOG_MOST  65536
+#define ROW_BYTE 400
+#define LOG_MIN  1024
+#define LOG_MAX  65536
 /* a face of level l asks for two of level l - 1 at most, and level 0 for none */
 enum { CHAIN = 1 << (PAL_LEVELS_MAX - 1), FRESH = 3 * CHAIN };
 
@@ -47,7 +47,7 @@ static room room_of(const pal_levels *l)
     room r = {.vertex = (size_t)l->n_vertex[last]};
     r.edge = (size_t)pal_levels_n_edge(l, last), r.face = (size_t)pal_levels_n_face(l, last);
     r.all_edge = (size_t)l->first_edge[last + 1], r.all_face = (size_t)l->first_face[last + 1];
-    r.log = r.face / 4 < LOG_LEAST ? LOG_LEAST : r.face / 4 > LOG_MOST ? LOG_MOST : r.face / 4;
+    r.log = r.face / 4 < LOG_MIN ? LOG_MIN : r.face / 4 > LOG_MAX ? LOG_MAX : r.face / 4;
     return r;
 }
 
@@ -143,10 +143,10 @@ pal_err pal_adaptive_make(const pal_surface *surface, const pal_adaptive_options
     PAL_TRY(pal_levels_make(surface, &(pal_levels_options){.n_level = options->n_level, .budget_byte = budget}, &levels,
                             diag));
     room r = room_of(&levels);
-    size_t n_byte = levels.n_byte + state_bytes(&r), least = n_byte + ROW_BYTE * r.vertex;
-    if (least > budget) {
+    size_t n_byte = levels.n_byte + state_bytes(&r), min = n_byte + ROW_BYTE * r.vertex;
+    if (min > budget) {
         pal_levels_free(&levels);
-        return refuse_bytes(options->n_level, "at least ", least, budget, diag);
+        return refuse_bytes(options->n_level, "at least ", min, budget, diag);
     }
     pal_adaptive_surface *s = PAL_NEW(arena, pal_adaptive_surface, 1);
     bool ok = s && move_levels(&levels, arena, &s->levels) && get_state(s, arena);
@@ -225,7 +225,7 @@ static bool edge_normal(const pal_levels *l, int32_t e, const double *x, double 
 }
 
 /* r = a rotated by the smallest rotation from unit vector `from` to unit vector `to` */
-static void least_turn(double r[3], const double from[3], const double to[3], const double a[3])
+static void min_turn(double r[3], const double from[3], const double to[3], const double a[3])
 {
     double q[4] = {1 + pal_dot3(from, to)};
     pal_cross3(q + 1, from, to);
@@ -259,9 +259,9 @@ static void turn_offset(const pal_levels *l, int32_t e, const double *x, double 
         }
     }
     if (along)
-        least_turn(offset, t0, t, offset);
+        min_turn(offset, t0, t, offset);
     else if (across)
-        least_turn(offset, n0, n, offset);
+        min_turn(offset, n0, n, offset);
 }
 
 /* position of v by its stencil; vertices of it that are no nodes take theirs recursively */

@@ -38,13 +38,13 @@ PAL_INLINE void add_node(sums *t, const double from[3], const double c[3], doubl
 }
 
 /* I^-1 L; zero about an axis without inertia (a line, a point) */
-static void spin(const double inertia[9], const double moment[3], double least_kg_m2, double omega[3])
+static void spin(const double inertia[9], const double moment[3], double min_kg_m2, double omega[3])
 {
     double w[3], axis[9];
     pal_set3(omega, 0, 0, 0);
     pal_eigen3(inertia, w, axis);
     for (int k = 0; k < 3; k++)
-        if (w[k] > 1e-9 * w[2] && w[k] > least_kg_m2)
+        if (w[k] > 1e-9 * w[2] && w[k] > min_kg_m2)
             pal_axpy3(omega, pal_dot3(axis + 3 * k, moment) / w[k], axis + 3 * k);
 }
 
@@ -63,9 +63,10 @@ static void fit(const pal_adaptive_surface *s, const double from[3], sums t, pal
     pal_copy3(frame->rest_centre_m, s->rest_centre_m);
     pal_cross3(arm, c, t.v);
     pal_sub3(moment, t.turn, arm);
-    double xx = t.square[0] - c[0] * t.x[0], yy = t.square[1] - c[1] * t.x[1], zz = t.square[2] - c[2] * t.x[2];
+    double xx = t.square[0] - c[0] * t.x[0], yy = t.square[1] - c[1] * t.x[1],
+           zz_estimator = t.square[2] - c[2] * t.x[2];
     double xy = t.square[3] - c[0] * t.x[1], xz = t.square[4] - c[0] * t.x[2], yz = t.square[5] - c[1] * t.x[2];
-    const double inertia[9] = {yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy};
+    const double inertia[9] = {yy + zz_estimator, -xy, -xz, -xy, xx + zz_estimator, -yz, -xz, -yz, xx + yy};
     spin(inertia, moment, SMALL * SMALL * s->rest_kg_m2, frame->Omega_1_s);
 }
 

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define MOST_ENTRY ((int64_t)1 << 28)
+#define MAX_ENTRY ((int64_t)1 << 28)
 
 /* a body by its model alone, without rows and supports */
 typedef struct bare {
@@ -78,10 +78,10 @@ static pal_err cut_solid(bare *b)
     static const int hex[5][4] = {{0, 1, 2, 4}, {3, 1, 7, 2}, {5, 1, 4, 7}, {6, 2, 7, 4}, {1, 2, 4, 7}};
     static const int pyramid[2][4] = {{0, 1, 2, 4}, {0, 2, 3, 4}};
     const pal_cliques *clique = b->body.dofs.clique;
-    size_t most =
+    size_t max =
         5 * (clique[PAL_CELL_CUBIC].n_item + clique[PAL_CELL_HEX].n_item) + 2 * clique[PAL_CELL_PYRAMID].n_item;
     b->tets = (pal_tets){.n_node = b->body.n_node, .x = b->body.node_rest, .edge_m = b->body.edge_m};
-    b->tets.tet = malloc(4 * sizeof(int32_t) * (most + 1));
+    b->tets.tet = malloc(4 * sizeof(int32_t) * (max + 1));
     if (!b->tets.tet) return PAL_ERR_MEMORY;
     for (int kind = 0; kind < PAL_CELL_KINDS; kind++)
         for (int e = 0; e < (int)clique[kind].n_item; e++) {
@@ -153,7 +153,7 @@ static void add_point(const bare *in, const double x[3], pal_interpolation_build
 static pal_err make_rows(const bare *of, const bare *in, pal_interpolation *out)
 {
     pal_interpolation_builder rows;
-    pal_interpolation_builder_begin(&rows, of->body.n_node, in->body.n_node, MOST_ENTRY);
+    pal_interpolation_builder_begin(&rows, of->body.n_node, in->body.n_node, MAX_ENTRY);
     for (int i = 0; i < of->body.n_node && !rows.err; i++) {
         double x[3];
         for (int c = 0; c < 3; c++) x[c] = of->body.node_rest[3 * i + c] + of->origin_m[c] - in->origin_m[c];

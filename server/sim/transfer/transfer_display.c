@@ -23,11 +23,11 @@ static bool is_inside(const pal_interpolation *rows, int i)
  */
 double pal_transfer_body_move(const pal_transfer *t, const pal_body *from, const pal_body *to)
 {
-    double most = 0;
+    double max = 0;
     int n_common = from->n_node < to->n_node ? from->n_node : to->n_node;
     for (int i = 0; i < n_common && t->adaptive; i++)
         if (pal_dofs_has(&from->dofs, i) && pal_dofs_has(&to->dofs, i))
-            most = fmax(most, pal_dist3(from->x + 3 * i, to->x + 3 * i));
+            max = fmax(max, pal_dist3(from->x + 3 * i, to->x + 3 * i));
     for (int i = 0; i < from->n_node && !t->adaptive; i++) {
         double move[3] = {0, 0, 0};
         if (!is_inside(&t->back, i)) continue;
@@ -36,9 +36,9 @@ double pal_transfer_body_move(const pal_transfer *t, const pal_body *from, const
             for (size_t c = 0; c < 3; c++) move[c] += t->back.weight[k] * (to->d[j + c] - to->node_rest[j + c]);
         }
         for (int c = 0; c < 3; c++) move[c] -= from->d[3 * i + c] - from->node_rest[3 * i + c];
-        most = fmax(most, pal_norm3(move));
+        max = fmax(max, pal_norm3(move));
     }
-    return most;
+    return max;
 }
 
 /* ---- what is shown ---- */
@@ -101,7 +101,7 @@ void pal_transfer_display(pal_transfer *t, pal_world *next, const pal_world *bef
     transfer_other_offsets(t, next, before);
     if (to->n_shown == 0 || from->n_shown == 0 || (!same && !t->adaptive && to->skin)) return;
     float *offset_m = malloc(3 * sizeof *offset_m * (size_t)to->n_shown);
-    double most = 0;
+    double max = 0;
     if (!same && !t->adaptive) pal_transfer_place_nodes(t, from, to);
     for (int i = 0; i < to->n_shown && offset_m; i++) {
         double was[3];
@@ -110,11 +110,11 @@ void pal_transfer_display(pal_transfer *t, pal_world *next, const pal_world *bef
             was[c] -= (double)to->shown[3 * (size_t)i + (size_t)c];
             offset_m[3 * (size_t)i + (size_t)c] = (float)was[c];
         }
-        most = fmax(most, pal_norm3(was));
+        max = fmax(max, pal_norm3(was));
     }
     bool offset_set = offset_m && pal_world_blend_display(next, t->body, offset_m) == PAL_ERR_OK;
     free(offset_m);
     /* other vertices are shown: what the body itself moves says more */
-    if (same) out->max_move_m = most;
-    if (offset_set) out->frame_move_m = most * fmin(1, next->step_s / PAL_BLEND_TRANSFER_S);
+    if (same) out->max_move_m = max;
+    if (offset_set) out->frame_move_m = max * fmin(1, next->step_s / PAL_BLEND_TRANSFER_S);
 }

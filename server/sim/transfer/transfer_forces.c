@@ -8,7 +8,7 @@
 #include <string.h>
 
 /* of an old node's mass: new nodes that depend on it with less take as much less of its force */
-#define LEAST_SHARE 0.25
+#define MIN_SHARE 0.25
 /* times a new node's mass that old ones may weigh which accelerate it by their whole force */
 #define HEAVIER 2.0
 
@@ -41,9 +41,9 @@ static bool find_dependents(const pal_interpolation *in, int n_from, dependents 
 static void add_spread(const pal_transfer *t, const pal_body *from, const pal_body *to, const dependents *l, int i,
                        pal_interpolation_builder *rows)
 {
-    double sum = 0, least = LEAST_SHARE * from->node_mass_kg[i];
+    double sum = 0, min = MIN_SHARE * from->node_mass_kg[i];
     for (int32_t k = l->first[i]; k < l->first[i + 1]; k++) sum += l->weight[k] * to->node_mass_kg[l->who[k]];
-    double part = sum >= least ? 1 : sum > 0 ? sum / least : 0;
+    double part = sum >= min ? 1 : sum > 0 ? sum / min : 0;
     for (int32_t k = l->first[i]; k < l->first[i + 1] && part > 0; k++)
         pal_interpolation_builder_add(rows, l->who[k], part / sum * l->weight[k] * to->node_mass_kg[l->who[k]]);
     for (int32_t k = t->back.start[i]; k < t->back.start[i + 1] && part < 1; k++)

@@ -180,10 +180,10 @@ static void no_change(void *user, const double *r, double *out)
 }
 
 /* points out [n_dof][3] that carry the nodes nearest to `want` [n_node][3]; of what is held 0 */
-static void least_squares(pal_transfer *t, const pal_body *to, const double *want, double *out)
+static void min_squares(pal_transfer *t, const pal_body *to, const double *want, double *out)
 {
     size_t n_byte = 3 * sizeof(double) * (size_t)to->n_dof;
-    double *r = t->work[0], most = 0;
+    double *r = t->work[0], max = 0;
     squares s = {.body = to, .node = t->pull};
     memset(r, 0, n_byte);
     memset(out, 0, n_byte);
@@ -192,10 +192,10 @@ static void least_squares(pal_transfer *t, const pal_body *to, const double *wan
     for (int32_t k = 0; k < to->interpolation->start[to->interpolation->n_row]; k++)
         t->work[1][to->interpolation->point[k]] += to->interpolation->weight[k] * to->interpolation->weight[k];
     for (int i = 0; i < to->n_dof; i++) {
-        most = fmax(most, t->work[1][i]);
+        max = fmax(max, t->work[1][i]);
         if (to->support[i]) pal_set3(r + 3 * i, 0, 0, 0);
     }
-    s.pull = REST_PULL * most;
+    s.pull = REST_PULL * max;
     pal_conjugate_gradient cg = {.n = 3 * to->n_dof,
                                  .multiply = multiply,
                                  .precondition = no_change,
@@ -219,8 +219,8 @@ static void set_points(pal_transfer *t, const pal_body *from, const pal_body *to
     }
     if (to->interpolation) {
         for (int i = 0; i < 3 * to->n_node; i++) t->place[i] -= to->node_rest[i];
-        least_squares(t, to, t->place, t->x);
-        least_squares(t, to, t->rate, t->v);
+        min_squares(t, to, t->place, t->x);
+        min_squares(t, to, t->rate, t->v);
         for (int i = 0; i < 3 * to->n_dof; i++) t->x[i] += to->x_rest[i];
         return;
     }
@@ -310,12 +310,12 @@ static bool find_bound(const pal_world *w, int body, double *bound)
 static int smooth(pal_transfer *t, pal_world *next, double want_J)
 {
     pal_body *to = &next->plan.body[t->body];
-    double *way = t->work[0], now_J = elastic_energy_J(next, t->body), most_J = 1.5 * now_J;
+    double *way = t->work[0], now_J = elastic_energy_J(next, t->body), max_J = 1.5 * now_J;
     int n = 0;
     if (to->interpolation || !find_bound(next, t->body, t->bound)) return 0;
     memset(way, 0, 3 * sizeof *way * (size_t)to->n_dof);
-    int n_most = now_J > FAR * want_J ? SMOOTH_FAR_ROUNDS : t->has_rehearsed ? SMOOTH_AGAIN_ROUNDS : SMOOTH_ROUNDS;
-    for (; n < n_most && now_J > (1 + SAME_ENERGY) * want_J && now_J < most_J; n++) {
+    int n_max = now_J > FAR * want_J ? SMOOTH_FAR_ROUNDS : t->has_rehearsed ? SMOOTH_AGAIN_ROUNDS : SMOOTH_ROUNDS;
+    for (; n < n_max && now_J > (1 + SAME_ENERGY) * want_J && now_J < max_J; n++) {
         for (int k = 0; k < to->n_active; k++) {
             int i = pal_body_point(to, k);
             if (to->support[i] || !(t->bound[i] > 0)) continue;
@@ -352,9 +352,9 @@ static void find_reference(const pal_body *to, double *out)
     }
 }
 
-static double within(double s, double most)
+static double within(double s, double max)
 {
-    return fmin(fmax(s, 1 / most), most);
+    return fmin(fmax(s, 1 / max), max);
 }
 
 /* the displacement longer or shorter until the elastic energy is as wanted; by how much */
@@ -575,8 +575,8 @@ void pal_transfer_rehearse(pal_transfer *t, pal_world *next)
 double pal_transfer_drift_m(const pal_transfer *t, const pal_world *before)
 {
     const pal_body *from = &before->plan.body[t->body];
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < from->n_node; i++)
-        most = fmax(most, pal_dist3(from->d + 3 * (size_t)i, t->snapshot.d + 3 * (size_t)i));
-    return most;
+        max = fmax(max, pal_dist3(from->d + 3 * (size_t)i, t->snapshot.d + 3 * (size_t)i));
+    return max;
 }

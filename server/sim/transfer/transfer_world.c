@@ -17,12 +17,12 @@ static void copy_loads(pal_world *w, int b, const pal_body *from)
 /* the node nearest to a place at rest, scene frame */
 static int nearest_node(const pal_body *body, const double at_m[3])
 {
-    double x[3], least = INFINITY;
+    double x[3], min = INFINITY;
     int best = 0;
     pal_sub3(x, at_m, body->offset_m);
     for (int i = 0; i < body->n_node; i++) {
         double far = pal_dist3(body->node_rest + 3 * (size_t)i, x);
-        if (far < least) least = far, best = i;
+        if (far < min) min = far, best = i;
     }
     return best;
 }

@@ -26,7 +26,7 @@ typedef struct pal_frame_part {
     char reason[PAL_REASON_TEXT]; /* one sentence while frozen, else empty */
     /* since the body's reset: what kept it within its bounds (safeguards.h), how many in all, and their time */
     pal_safeguards safeguards;
-    uint64_t n_safeguard, rescue_ns;
+    uint64_t n_safeguard, safeguard_ns;
     bool asleep;       /* at rest: its rows are not run until something comes near (component sleep)      */
     uint64_t n_output; /* OUTPUT runs of the body so far: while it stays, nothing here was computed */
     pal_frame_field field[PAL_FIELD_COUNT]; /* by pal_field */

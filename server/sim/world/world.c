@@ -33,7 +33,7 @@ pal_step pal_world_body_step(pal_world *w, int b)
 /* the least limit of all bodies that move, infinite when nothing limits; a body whose limit is not finite is frozen */
 double pal_world_find_limit(pal_world *w, int sub)
 {
-    double least = INFINITY;
+    double min = INFINITY;
     for (int b = 0; b < w->plan.n_body; b++) {
         pal_step step = pal_world_body_step(w, b);
         step.sub = sub;
@@ -43,11 +43,11 @@ double pal_world_find_limit(pal_world *w, int sub)
         step.body->dt_limit_s = limit;
         if (!(limit > 0))
             pal_body_stop_bad(step.body, "its forces allow no stable step");
-        else if (limit < least)
-            least = limit;
+        else if (limit < min)
+            min = limit;
     }
-    w->limit_s = least;
-    return least;
+    w->limit_s = min;
+    return min;
 }
 
 /* sub-steps for a time; beyond the budget: budget + 1 */
@@ -76,7 +76,7 @@ static void forget_forces(pal_world *w, int b)
  * solver's knowledge of its limit empty */
 static double find_rest_limit(pal_world *w)
 {
-    double least = INFINITY, limit_s = w->limit_s;
+    double min = INFINITY, limit_s = w->limit_s;
     for (int b = 0; b < w->plan.n_body; b++) {
         pal_body *body = &w->plan.body[b];
         const pal_component *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
@@ -90,14 +90,14 @@ static double find_rest_limit(pal_world *w)
         double limit = solve->effect->limit(solve->self, &step);
         body->x = x, body->d = d;
         pal_body_update_nodes(body);
-        /* refinement may bring the finest level, each level about half the step (C eq. 9) */
+        /* refinement may bring the finest level, each level about half the step (paper C, eq. 9) */
         if (refines(w, b)) limit = ldexp(limit, body->dofs.finest + 1 - body->dofs.levels->n_level);
         if (solve->effect->reset) solve->effect->reset(solve->self, body);
         if (body->interpolation) forget_forces(w, b);
-        if (!(limit >= least)) least = limit;
+        if (!(limit >= min)) min = limit;
     }
     w->limit_s = limit_s;
-    return least;
+    return min;
 }
 
 pal_err pal_world_check_budget(pal_world *w, pal_diagnostic *diag)

@@ -44,11 +44,11 @@ void pal_body_begin_loads(pal_body *body)
 }
 
 /* of its cap a node bears at least so much, wherever it is */
-static const double least_share = 0.01;
+static const double min_share = 0.01;
 
 /* Of a body that something holds still a part that many loads pull out, each within its cap, goes as far as their sum
  * stretches it and swings twice as far: from 2 S off its rest place on a node lets go of a lasting load, down
- * to least_share at 4 S. What nothing holds, or what is led, may be anywhere */
+ * to min_share at 4 S. What nothing holds, or what is led, may be anywhere */
 static bool stays(const pal_body *body)
 {
     bool fixed = false, led = false;
@@ -59,7 +59,7 @@ static bool stays(const pal_body *body)
 
 static double share_far_S(double far_S)
 {
-    return far_S > 2 ? fmax(least_share, 0.5 * (4 - far_S)) : 1;
+    return far_S > 2 ? fmax(min_share, 0.5 * (4 - far_S)) : 1;
 }
 
 void pal_body_cap_loads(pal_body *body, bool body_arena)
@@ -70,7 +70,7 @@ void pal_body_cap_loads(pal_body *body, bool body_arena)
         double *load = body->load + 3 * i, load2 = pal_dot3(load, load);
         if (load2 == 0) continue;
         double cap = body_arena ? pal_body_node_load_cap_N(body, i) : body->load_cap_N;
-        if (body_arena && load2 > least_share * least_share * cap * cap) {
+        if (body_arena && load2 > min_share * min_share * cap * cap) {
             double far_S = pal_dist3(body->d + 3 * i, body->node_rest + 3 * i) / body->length_scale_m;
             if (far_S > 2 && staying < 0) staying = stays(body);
             if (staying > 0) cap *= share_far_S(far_S);

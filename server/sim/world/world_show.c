@@ -46,7 +46,7 @@ static void copy_part(const pal_body *body, pal_frame_part *to)
     memcpy(to->reason, body->reason, sizeof to->reason);
     to->safeguards = body->safeguards;
     to->n_safeguard = pal_safeguards_sum(&body->safeguards);
-    to->rescue_ns = body->safeguards.ns;
+    to->safeguard_ns = body->safeguards.ns;
     to->asleep = body->asleep;
     bool same = to->n_output == body->n_output; /* these are the positions that it has */
     to->n_output = body->n_output;
@@ -149,7 +149,7 @@ void pal_world_current_material(const pal_world *world, int body, pal_material *
 void pal_world_describe_limit(const pal_world *world, char *text, size_t n_byte)
 {
     const pal_world *w = world;
-    double most = 0;
+    double max = 0;
     text[0] = 0;
     for (int b = 0; b < w->plan.n_body; b++) {
         const pal_body *body = &w->plan.body[b];
@@ -163,8 +163,8 @@ void pal_world_describe_limit(const pal_world *world, char *text, size_t n_byte)
         for (int k = 0; k < body->n_active; k++) {
             int i = pal_body_point(body, k);
             const double *x = body->x_rest + 3 * (size_t)i, *o = body->offset_m;
-            if (body->support[i] || !(body->g[i] > most * body->mass_kg[i])) continue;
-            most = body->g[i] / body->mass_kg[i];
+            if (body->support[i] || !(body->g[i] > max * body->mass_kg[i])) continue;
+            max = body->g[i] / body->mass_kg[i];
             snprintf(text, n_byte, ", node %d at (%.4g, %.4g, %.4g) mm sets it", i, 1e3 * (x[0] + o[0]),
                      1e3 * (x[1] + o[1]), 1e3 * (x[2] + o[2]));
         }

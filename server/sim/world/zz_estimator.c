@@ -5,12 +5,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_MATERIAL = 16 };
+enum { MAX_MATERIAL = 16 };
 static const double same = 1.25;
 
 /* one pass over all stress points after another */
 typedef struct recovery {
-    double mu[MOST_MATERIAL], lambda[MOST_MATERIAL];
+    double mu[MAX_MATERIAL], lambda[MAX_MATERIAL];
     int n_material, material; /* material: the one that is looked at */
     double *sum, *volume;     /* [n_node][9], [n_node]                */
     double *share;            /* NULL: not wanted                     */
@@ -25,13 +25,13 @@ static double apart(double a, double b)
 /* the material of a point, a new one when there is room; lambda may be next to 0 or below */
 static int material_of(recovery *r, const pal_stress_point *p)
 {
-    double least = INFINITY, kappa = p->lambda_Pa + 2 * p->mu_Pa / 3;
+    double min = INFINITY, kappa = p->lambda_Pa + 2 * p->mu_Pa / 3;
     int nearest = 0;
     for (int k = 0; k < r->n_material; k++) {
         double off = fmax(apart(p->mu_Pa, r->mu[k]), apart(kappa, r->lambda[k] + 2 * r->mu[k] / 3));
-        if (off < least) least = off, nearest = k;
+        if (off < min) min = off, nearest = k;
     }
-    if (least <= same || r->n_material == MOST_MATERIAL) return nearest;
+    if (min <= same || r->n_material == MAX_MATERIAL) return nearest;
     r->mu[r->n_material] = p->mu_Pa, r->lambda[r->n_material] = p->lambda_Pa;
     return r->n_material++;
 }
@@ -105,11 +105,12 @@ static const pal_component *stress_row(const pal_world *world, const pal_body *b
     return NULL;
 }
 
-pal_err pal_zz_estimate(const pal_world *world, int body, double *share_J, pal_zz_error *out, pal_diagnostic *diag)
+pal_err pal_zz_estimator_estimate(const pal_world *world, int body, double *share_J, pal_zz_estimator_error *out,
+                                  pal_diagnostic *diag)
 {
     const pal_body *at = pal_world_view_body(world, body);
     const pal_component *row = stress_row(world, at);
-    *out = (pal_zz_error){.error = NAN, .solution = NAN, .percent = NAN};
+    *out = (pal_zz_estimator_error){.error = NAN, .solution = NAN, .percent = NAN};
     if (!row)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": none of its rows gives stress in elements",
                                   at->name);
@@ -121,10 +122,10 @@ pal_err pal_zz_estimate(const pal_world *world, int body, double *share_J, pal_z
     if (!err) {
         recover(&r, row, at);
         double all = r.error2 + r.solution2;
-        *out = (pal_zz_error){.error = sqrt(r.error2),
-                              .solution = sqrt(r.solution2),
-                              .percent = all > 0 ? 100 * sqrt(r.error2 / all) : 0,
-                              .n_material = r.n_material};
+        *out = (pal_zz_estimator_error){.error = sqrt(r.error2),
+                                        .solution = sqrt(r.solution2),
+                                        .percent = all > 0 ? 100 * sqrt(r.error2 / all) : 0,
+                                        .n_material = r.n_material};
     }
     free(r.sum);
     free(r.volume);

@@ -11,17 +11,18 @@
  * large, as their stress varies within an element, of which the mean alone is recovered from. Rows without a stress
  * hook (springs, cell_elastic) have no such estimate. Heap memory while it runs, nothing else: a world that is never
  * asked has no trace of it. Thread: that of the world, between steps. */
-#ifndef PAL_SIM_WORLD_ZZ_ESTIMATOR_H
-#define PAL_SIM_WORLD_ZZ_ESTIMATOR_H
+#ifndef PAL_SIM_WORLD_ZZ_ESTIMATOR_ESTIMATOR_H
+#define PAL_SIM_WORLD_ZZ_ESTIMATOR_ESTIMATOR_H
 #include "server/sim/world/world.h"
 
-typedef struct pal_zz_error {
+typedef struct pal_zz_estimator_error {
     double error, solution; /* eta and |u_h|, J^1/2: half their squares are energies */
     double percent;         /* 100 eta / sqrt(eta^2 + |u_h|^2); 0 where both are 0   */
     int n_material;
-} pal_zz_error;
+} pal_zz_estimator_error;
 
 /* share: eta^2 of each element [the row's elements], J, may be NULL. REFUSED: no row of the body gives stress; MEMORY
  */
-pal_err pal_zz_estimate(const pal_world *world, int body, double *share_J, pal_zz_error *out, pal_diagnostic *diag);
+pal_err pal_zz_estimator_estimate(const pal_world *world, int body, double *share_J, pal_zz_estimator_error *out,
+                                  pal_diagnostic *diag);
 #endif

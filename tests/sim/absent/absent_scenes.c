@@ -137,7 +137,7 @@ static int rising(const void *a, const void *b)
 /* microseconds of a step of a world that runs; awake, as asleep no row is run at all */
 static double time_step(pal_world *world, double step_s, int n)
 {
-    double us[TIMED], least = INFINITY;
+    double us[TIMED], min = INFINITY;
     for (int k = 0; k < n; k++) {
         for (int i = 0; i < TIMED; i++) {
             pal_world_wake(world);
@@ -146,9 +146,9 @@ static double time_step(pal_world *world, double step_s, int n)
             us[i] = 1e-3 * (double)(pal_clock_thread_ns() - before);
         }
         qsort(us, TIMED, sizeof *us, rising);
-        least = fmin(least, us[TIMED / 2]);
+        min = fmin(min, us[TIMED / 2]);
     }
-    return least;
+    return min;
 }
 
 static void time_all(int n)

@@ -27,9 +27,9 @@ static void force(pal_component *row, pal_body *body, double *f)
 
 static double apart(int n, const double *a, const double *b, double times)
 {
-    double most = 0, size = 0;
-    for (int i = 0; i < n; i++) most = fmax(most, fabs(a[i] - times * b[i])), size = fmax(size, fabs(a[i]));
-    return size > 0 ? most / size : INFINITY;
+    double max = 0, size = 0;
+    for (int i = 0; i < n; i++) max = fmax(max, fabs(a[i] - times * b[i])), size = fmax(size, fabs(a[i]));
+    return size > 0 ? max / size : INFINITY;
 }
 
 /* what is kept against what is found without it, where the body is, after a move and after an edit */
@@ -125,14 +125,14 @@ static void a_step_without_energy_rise_saves_one_pass(void)
     REQUIRE(!beam_open(&plain, &diag));
     memcpy(plain.body->v, b.body->v, 3 * sizeof(double) * (size_t)b.body->n_dof);
     const pal_elastic_hexes *with = elastic(b.world)->self, *without = elastic(plain.world)->self;
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < STEPS; i++) {
         CHECK(!pal_world_step(b.world, b.scene->step_s) && !pal_world_step(plain.world, b.scene->step_s));
-        for (int c = 0; c < 3 * b.body->n_dof; c++) most = fmax(most, fabs(b.body->x[c] - plain.body->x[c]));
+        for (int c = 0; c < 3 * b.body->n_dof; c++) max = fmax(max, fabs(b.body->x[c] - plain.body->x[c]));
     }
-    printf("  %llu passes saved in %d steps, %g m apart\n", (unsigned long long)with->force_cache.n_add, STEPS, most);
+    printf("  %llu passes saved in %d steps, %g m apart\n", (unsigned long long)with->force_cache.n_add, STEPS, max);
     CHECK(with->force_cache.n_add == STEPS && without->force_cache.n_add == 0);
-    CHECK(b.body->safeguards.n_search == 0 && most < 1e-9);
+    CHECK(b.body->safeguards.n_search == 0 && max < 1e-9);
     beam_free(&b);
     beam_free(&plain);
 }

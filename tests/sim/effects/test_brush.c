@@ -217,7 +217,7 @@ static void a_handle_is_a_spring_of_its_stiffness(void)
         REQUIRE(row != NULL);
         forces(&s, 10);
         /* 4 t (1 - t) of the lift at each node: at most all of it, and nothing sideways */
-        double before[3], after[3], most = 0;
+        double before[3], after[3], max = 0;
         sum_loads(s.body, before);
         CHECK(before[2] > 0.2 * 20 * 0.005 && before[2] < 20 * 0.005);
         CHECK_NEAR(fabs(before[0]) + fabs(before[1]), 0, 1e-16);
@@ -227,10 +227,10 @@ static void a_handle_is_a_spring_of_its_stiffness(void)
             double *d = &s.body->d[i], was = *d, h = 1e-6, e[2], f = s.body->load[i];
             for (int k = 0; k < 2; k++) *d = was + (k ? h : -h), e[k] = row->effect->energy(row->self, s.body);
             *d = was;
-            most = fmax(most, fabs(f));
+            max = fmax(max, fabs(f));
             CHECK_NEAR(f, -(e[1] - e[0]) / (2 * h), 1e-8);
         }
-        CHECK(most > 1e-4);
+        CHECK(max > 1e-4);
         /* all nodes moved alike */
         sum_loads(s.body, before);
         for (int i = 0; i < s.body->n_node; i++) s.body->d[3 * i + 1] += 0.001;

@@ -203,9 +203,9 @@ static void values_are_taken_ten_times_a_second_without_heap_and_at_once_after_r
     CHECK_INT(n_new, 20);
     CHECK_NEAR(field->time_s, 2, 1e-9);
     const float *moved = s.body->field[PAL_FIELD_DISPLACEMENT_M]->value;
-    double most = 0;
-    for (int i = 0; i < s.body->n_shown; i++) most = fmax(most, (double)moved[i]);
-    CHECK(most > 1e-3);
+    double max = 0;
+    for (int i = 0; i < s.body->n_shown; i++) max = fmax(max, (double)moved[i]);
+    CHECK(max > 1e-3);
     pal_world_reset(s.world);
     CHECK(field->revision != seen);
     for (int i = 0; i < s.body->n_shown; i++) CHECK_LE((double)moved[i], 1e-8);

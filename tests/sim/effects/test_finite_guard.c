@@ -27,7 +27,7 @@ static void check_frozen_and_back(tool_scene *s, const double *good)
     CHECK(!s->body->frozen);
 }
 
-typedef enum insult { NOT_A_NUMBER_X, NOT_A_NUMBER_V, INFINITE_V, FAR_AWAY, TOO_FAST } insult;
+typedef enum trial_case { NOT_A_NUMBER_X, NOT_A_NUMBER_V, INFINITE_V, FAR_AWAY, TOO_FAST } trial_case;
 
 /* the row alone: in a step the solver's own clamp comes first and tissue may well find its way back */
 static void run_guard(tool_scene *s)
@@ -39,7 +39,7 @@ static void run_guard(tool_scene *s)
     }
 }
 
-static void hurt(tool_scene *s, insult how)
+static void hurt(tool_scene *s, trial_case how)
 {
     double good[3 * 5 * 5 * 4];
     for (int i = 0; i < 5; i++) {
@@ -76,7 +76,7 @@ static void freezes_what_is_no_number_too_far_or_too_fast(void)
 {
     tool_scene s;
     REQUIRE(open_two(&s));
-    for (insult how = NOT_A_NUMBER_X; how <= TOO_FAST; how++) hurt(&s, how);
+    for (trial_case how = NOT_A_NUMBER_X; how <= TOO_FAST; how++) hurt(&s, how);
     tool_scene_close(&s);
 }
 
@@ -179,7 +179,7 @@ static void rescues_are_counted_with_their_price_and_only_then(void)
     }
     pal_world_frame(s.world, frame);
     CHECK_INT(frame->part[0].n_safeguard, 0);
-    CHECK_INT(frame->part[0].rescue_ns, 0);
+    CHECK_INT(frame->part[0].safeguard_ns, 0);
     const double force_N[3] = {0, 0, 1e6};
     CHECK_INT(pal_world_load(s.world, 0, s.body->n_node - 1, force_N), 0);
     REQUIRE(step_world(&s, 2));
@@ -187,7 +187,7 @@ static void rescues_are_counted_with_their_price_and_only_then(void)
     const pal_frame_part *part = &frame->part[0];
     CHECK_INT(part->safeguards.n_capped, s.body->safeguards.n_capped);
     CHECK(part->safeguards.n_capped >= 2 && part->n_safeguard >= part->safeguards.n_capped);
-    CHECK(part->rescue_ns > 0);
+    CHECK(part->safeguard_ns > 0);
     s.body->x[0] = NAN;
     CHECK_INT(pal_world_step(s.world, s.scene->step_s), PAL_ERR_FROZEN);
     pal_world_frame(s.world, frame);
@@ -195,7 +195,7 @@ static void rescues_are_counted_with_their_price_and_only_then(void)
     CHECK_INT(part->safeguards.n_stopped, 1);
     pal_world_reset(s.world);
     pal_world_frame(s.world, frame);
-    CHECK(!part->frozen && part->reason[0] == 0 && part->n_safeguard == 0 && part->rescue_ns == 0);
+    CHECK(!part->frozen && part->reason[0] == 0 && part->n_safeguard == 0 && part->safeguard_ns == 0);
     pal_frame_destroy(frame);
     tool_scene_close(&s);
 }

@@ -28,9 +28,9 @@ static void sleepy(model_scene *m, int kind, double damping_1_s)
 }
 
 /* until it sleeps; -1: it does not */
-static int steps_to_sleep(model_scene *m, int most)
+static int steps_to_sleep(model_scene *m, int max)
 {
-    for (int i = 0; i < most; i++) {
+    for (int i = 0; i < max; i++) {
         if (m->body->asleep) return i;
         if (pal_world_step(m->world, m->scene->step_s)) return -1;
     }
@@ -182,10 +182,10 @@ static void a_field_is_shown_without_waking_it(void)
     REQUIRE(model_scene_open(&m));
     REQUIRE(steps_to_sleep(&m, 1500) >= 0);
     CHECK_INT(pal_world_field(m.world, 0, PAL_FIELD_DISPLACEMENT_M, true, &diag), 0);
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < m.body->n_shown; i++)
-        most = fmax(most, (double)m.body->field[PAL_FIELD_DISPLACEMENT_M]->value[i]);
-    CHECK(most > 1e-4);
+        max = fmax(max, (double)m.body->field[PAL_FIELD_DISPLACEMENT_M]->value[i]);
+    CHECK(max > 1e-4);
     CHECK(model_scene_steps(&m, 5));
     CHECK(m.body->asleep);
     CHECK_INT(pal_world_field(m.world, 0, PAL_FIELD_DISPLACEMENT_M, false, &diag), 0);

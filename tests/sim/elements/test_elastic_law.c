@@ -98,19 +98,19 @@ static void projection_is_that_of_the_eigenvalues(void)
         some_gradient(n % 5, f);
         pal_neo_hessian(mu, k1, pressure, f, h);
         eigen9(h, w, v);
-        double least = 0, most = 0;
-        for (int m = 0; m < 9; m++) least = fmin(least, w[m]), most = fmax(most, fabs(w[m]));
+        double min = 0, max = 0;
+        for (int m = 0; m < 9; m++) min = fmin(min, w[m]), max = fmax(max, fabs(w[m]));
         pal_neo_modes modes;
         pal_neo_modes_compute(mu, k1, pressure, f, &modes);
         pal_neo_modes_hessian(&modes, closed);
-        if (least < -1e-9) CHECK(modes.projected);
+        if (min < -1e-9) CHECK(modes.projected);
         for (int i = 0; i < 9; i++)
             for (int j = 0; j < 9; j++) {
                 double sum = 0;
                 for (int m = 0; m < 9; m++) sum += fmax(w[m], 0) * v[9 * m + i] * v[9 * m + j];
-                CHECK_NEAR(closed[9 * i + j], sum, 1e-10 * most);
+                CHECK_NEAR(closed[9 * i + j], sum, 1e-10 * max);
             }
-        n_projected += least < -1e-9, n_whole += !modes.projected;
+        n_projected += min < -1e-9, n_whole += !modes.projected;
     }
     CHECK(n_projected > 20);
     CHECK(n_whole > 3);

@@ -152,7 +152,7 @@ static void force_is_minus_the_gradient_of_the_energy(void)
             int n = 3 * b.body.n_node;
             double *f = hex_zeros(n);
             memcpy(f, hex_force(&b), sizeof *f * (size_t)n);
-            double most = hex_largest(f, n), worst = 0;
+            double max = hex_largest(f, n), worst = 0;
             for (int i = 0; i < n; i++) {
                 double x = b.body.x[i], step = 1e-7, e[2];
                 for (int s = 0; s < 2; s++) {
@@ -162,7 +162,7 @@ static void force_is_minus_the_gradient_of_the_energy(void)
                 b.body.x[i] = x;
                 worst = fmax(worst, fabs((e[1] - e[0]) / (2 * step) + f[i]));
             }
-            CHECK_LE(worst, 1e-6 * most);
+            CHECK_LE(worst, 1e-6 * max);
             free(f);
             hex_body_free(&b);
         }
@@ -219,8 +219,8 @@ static void tangent_is_symmetric_and_semi_definite(void)
                     for (int s = 0; s < 20 && t < 5; s++) {
                         memset(kp, 0, sizeof *kp * (size_t)n);
                         hex_effect->tangent->multiply(b.row, &b.body, 1, 0, p, kp);
-                        double most = hex_largest(kp, n) / hex_largest(p, n);
-                        for (int i = 0; i < n; i++) p[i] -= kp[i] / (3 * most + 1e-300);
+                        double max = hex_largest(kp, n) / hex_largest(p, n);
+                        for (int i = 0; i < n; i++) p[i] -= kp[i] / (3 * max + 1e-300);
                     }
                     memset(kp, 0, sizeof *kp * (size_t)n);
                     hex_effect->tangent->multiply(b.row, &b.body, 1, 0, p, kp);
@@ -406,10 +406,10 @@ static void affine_state_has_no_force_within(void)
                 for (int j = 0; j < 3; j++) b.body.x[i] += affine[3 * (i % 3) + j] * b.body.x_rest[i / 3 * 3 + j];
             }
             const double *f = hex_force(&b);
-            double most = hex_largest(f, n), inner = 0;
+            double max = hex_largest(f, n), inner = 0;
             for (int i = 0; i < b.body.n_node; i++)
                 if (whole_inside(&b, i)) inner = fmax(inner, hex_largest(f + 3 * i, 3));
-            CHECK_LE(inner, 1e-12 * most);
+            CHECK_LE(inner, 1e-12 * max);
             hex_body_free(&b);
         }
 }
@@ -478,8 +478,8 @@ static void nearly_incompressible_stays_finite(void)
             b.def->material.poisson = 0.4999;
             REQUIRE(hex_body_make(&b) == PAL_ERR_OK);
             hex_shake(&b, 0.3, 4);
-            double most = hex_largest(hex_force(&b), 3 * b.body.n_node);
-            CHECK(most > 0 && most < 1e6);
+            double max = hex_largest(hex_force(&b), 3 * b.body.n_node);
+            CHECK(max > 0 && max < 1e6);
             CHECK(isfinite(hex_energy(&b)));
             hex_body_free(&b);
         }
@@ -505,15 +505,15 @@ static void ten_thousand_turns_leave_no_energy(void)
         begin(&b, 3, 2, 2, NULL, "hex8_bbar", laws[law]);
         REQUIRE(hex_body_make(&b) == PAL_ERR_OK);
         for (int i = 0; i < 3 * b.body.n_node; i++) b.body.x[i] *= i % 3 ? 1 : 1.01;
-        double strained = hex_energy(&b), worst = 0, most = 0;
+        double strained = hex_energy(&b), worst = 0, max = 0;
         for (int t = 0; t < 9 * CHECK_REPEATS(10000, 1000); t++) {
             turn_body(&b, axis, t * (M_PI / 4.5));
             const double *f = hex_force(&b);
             if (t % 1000 < 9) worst = fmax(worst, fabs(hex_energy(&b)));
-            most = fmax(most, hex_largest(f, 3 * b.body.n_node));
+            max = fmax(max, hex_largest(f, 3 * b.body.n_node));
         }
         CHECK_LE(worst, 1e-6 * strained);
-        CHECK_LE(most, 1e-9 * 5000 * 0.01 * 0.01);
+        CHECK_LE(max, 1e-9 * 5000 * 0.01 * 0.01);
         CHECK_INT(b.body.safeguards.n_inversion, 0);
         hex_body_free(&b);
     }

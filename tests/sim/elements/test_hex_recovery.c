@@ -22,7 +22,7 @@ static void relax(hex_body *b, int n_step)
         const double *f = hex_force(b);
         memset(dx, 0, sizeof *dx * (size_t)n);
         hex_solve(b, all, 0.5, f, dx);
-        double most = hex_largest(dx, n), cut = most > 0.005 ? 0.005 / most : 1;
+        double max = hex_largest(dx, n), cut = max > 0.005 ? 0.005 / max : 1;
         for (int i = 0; i < n; i++) b->body.x[i] += cut * dx[i];
     }
     free(dx), free(all);

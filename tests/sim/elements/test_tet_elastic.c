@@ -27,7 +27,7 @@ static void is_silent_at_rest(void)
         elastic_bench b;
         REQUIRE(open_box(&b, 4, 3, 3, 0.2, ten, law, true));
         elastic_force(&b);
-        CHECK_LE(elastic_most(b.body.f, 3 * b.n), 1e-13 * scale_N(&b));
+        CHECK_LE(elastic_max(b.body.f, 3 * b.n), 1e-13 * scale_N(&b));
         CHECK_LE(fabs(elastic_energy(&b)), 1e-20 * scale_N(&b) * b.body.edge_m);
         elastic_close(&b);
     }
@@ -63,13 +63,13 @@ static void force_is_the_gradient_of_the_energy(void)
         elastic_force(&b);
         if (turn == 2) CHECK(b.tets->n_inverted > 0);
         /* every node by itself, so that no error hides behind another's size */
-        double most = elastic_most(b.body.f, 3 * b.n);
+        double max = elastic_max(b.body.f, 3 * b.n);
         double *f = malloc(3 * sizeof *f * (size_t)b.n);
         memcpy(f, b.body.f, 3 * sizeof *f * (size_t)b.n);
         for (int i = 0; i < 3 * b.n; i += 7) {
             memset(p, 0, 3 * sizeof *p * (size_t)b.n);
             p[i] = 1;
-            CHECK_NEAR(-energy_slope(&b, p, 2e-4 * b.body.edge_m), f[i], 1e-6 * most);
+            CHECK_NEAR(-energy_slope(&b, p, 2e-4 * b.body.edge_m), f[i], 1e-6 * max);
         }
         free(f);
         free(p);
@@ -124,10 +124,10 @@ static void multiply_is_the_assembled_matrix(void)
         for (size_t i = 0; i < n; i++) p[i] = uniform();
         t->multiply(b.row.self, &b.body, 2, 0, p, one);
         pal_block_matrix_multiply(&k, 1, p, two);
-        double most = elastic_most(two, (int)n);
-        CHECK(most > 0);
+        double max = elastic_max(two, (int)n);
+        CHECK(max > 0);
         for (size_t i = 0; i < n; i++) {
-            CHECK_NEAR(one[i], two[i], 1e-12 * most);
+            CHECK_NEAR(one[i], two[i], 1e-12 * max);
             pkp += p[i] * one[i];
         }
         CHECK(pkp > 0);
@@ -176,9 +176,9 @@ static void tangent_is_the_slope_of_the_force(void)
         b.row.effect->tangent->linearise(b.row.self, &b.body);
         multiply_rows(&b, p, one);
         force_slope(&b, p, 1e-5 * b.body.edge_m, two);
-        double most = elastic_most(two, (int)n);
-        CHECK(most > 0);
-        for (size_t i = 0; i < n; i++) CHECK_NEAR(one[i], two[i], 1e-6 * most);
+        double max = elastic_max(two, (int)n);
+        CHECK(max > 0);
+        for (size_t i = 0; i < n; i++) CHECK_NEAR(one[i], two[i], 1e-6 * max);
         free(p), free(one), free(two);
         elastic_close(&b);
     }
@@ -205,10 +205,10 @@ static void corotational_tangent_is_the_turned_one(void)
         elastic_place(&b, rs, 0);
         b.row.effect->tangent->linearise(b.row.self, &b.body);
         multiply_rows(&b, p, one);
-        double most = elastic_most(two, (int)n);
+        double max = elastic_max(two, (int)n);
         for (int i = 0; i < b.n; i++) {
             pal_mul33(back + 3 * i, r, two + 3 * i);
-            for (int c = 0; c < 3; c++) CHECK_NEAR(one[3 * i + c], back[3 * i + c], 1e-9 * most);
+            for (int c = 0; c < 3; c++) CHECK_NEAR(one[3 * i + c], back[3 * i + c], 1e-9 * max);
         }
         /* rotations around nodes: all R */
         double *turn = calloc(9 * (size_t)b.n, sizeof *turn);
@@ -252,10 +252,10 @@ static void patch_test_is_exact(void)
         elastic_place(&b, f, 0);
         /* the field itself is in balance */
         elastic_force(&b);
-        double most = elastic_most(b.body.f, 3 * b.n);
+        double max = elastic_max(b.body.f, 3 * b.n);
         int n_free = 0;
         for (int i = 0; i < b.n; i++)
-            for (int c = 0; c < 3 && inside(&b, i, n); c++, n_free++) CHECK_LE(fabs(b.body.f[3 * i + c]), 1e-9 * most);
+            for (int c = 0; c < 3 && inside(&b, i, n); c++, n_free++) CHECK_LE(fabs(b.body.f[3 * i + c]), 1e-9 * max);
         CHECK(n_free > 3 * 12 - 1);
         /* Newton from a start that is off, each step by conjugate gradients */
         for (int i = 0; i < b.n; i++)
@@ -273,7 +273,7 @@ static void patch_test_is_exact(void)
                     g[k] = p[k] = inside(&b, i, n) ? b.body.f[k] : 0;
                     u[k] = 0, rho += g[k] * g[k];
                 }
-            if (rho < 1e-30 * most * most) break;
+            if (rho < 1e-30 * max * max) break;
             first = rho;
             for (int k = 0; k < 600 && rho > 1e-24 * first; k++) {
                 double pq = 0, last = rho;
@@ -337,17 +337,17 @@ static void ten_thousand_turns_leave_no_energy(void)
             /* the neo-Hookean law keeps nothing from step to step */
             elastic_bench b;
             REQUIRE(open_box(&b, 1, 1, 1, 0, ten, law, true));
-            double one_percent = 0.5 * b.scene->body[0].material.young_Pa * 1e-4 * elastic_volume(&b), most = 0;
+            double one_percent = 0.5 * b.scene->body[0].material.young_Pa * 1e-4 * elastic_volume(&b), max = 0;
             const int n_step = law || ten ? 10007 : 53000;
             for (int k = 1; k <= n_step; k++) {
                 double r[9], turns = law || ten ? 2000 : 10000;
                 elastic_turn((double[3]){1, 2, 3}, 2 * M_PI * turns / n_step * k, r);
                 elastic_place(&b, r, 0);
                 elastic_force(&b);
-                if (k % 100 == 0) most = fmax(most, fabs(elastic_energy(&b)));
+                if (k % 100 == 0) max = fmax(max, fabs(elastic_energy(&b)));
             }
-            CHECK_LE(most, 1e-6 * one_percent);
-            CHECK_LE(elastic_most(b.body.f, 3 * b.n), 1e-9 * scale_N(&b));
+            CHECK_LE(max, 1e-6 * one_percent);
+            CHECK_LE(elastic_max(b.body.f, 3 * b.n), 1e-9 * scale_N(&b));
             elastic_close(&b);
         }
 }
@@ -364,7 +364,7 @@ static void a_sudden_half_turn_is_found(void)
             elastic_turn(axis, M_PI, r);
             elastic_place(&b, r, 0.1);
             elastic_force(&b);
-            CHECK_LE(elastic_most(b.body.f, 3 * b.n), 1e-9 * scale_N(&b));
+            CHECK_LE(elastic_max(b.body.f, 3 * b.n), 1e-9 * scale_N(&b));
             b.row.effect->reset(b.row.self, &b.body);
         }
         elastic_close(&b);
@@ -389,9 +389,9 @@ static void stiffness_bounds_the_tangent(void)
             multiply_rows(&b, p, q);
             for (size_t i = 0; i < n; i++) up += p[i] * q[i], down += p[i] * p[i] * bound[i / 3];
             value = up / down;
-            double most = 0;
-            for (size_t i = 0; i < n; i++) p[i] = q[i] / bound[i / 3], most = fmax(most, fabs(p[i]));
-            for (size_t i = 0; i < n; i++) p[i] /= most;
+            double max = 0;
+            for (size_t i = 0; i < n; i++) p[i] = q[i] / bound[i / 3], max = fmax(max, fabs(p[i]));
+            for (size_t i = 0; i < n; i++) p[i] /= max;
         }
         CHECK_LE(value, 1);
         CHECK(value > 0.05);
@@ -419,8 +419,8 @@ static void other_constants_are_those_of_a_component_made_with_them(void)
         to.young_Pa /= 2;
         CHECK_INT(c.row.effect->material(c.row.self, &c.body, &to, NULL), 0);
         elastic_force(&c);
-        double most = elastic_most(f, 3 * b.n);
-        for (int i = 0; i < 3 * b.n; i++) CHECK_NEAR(c.body.f[i], 0.5 * f[i], 1e-12 * most);
+        double max = elastic_max(f, 3 * b.n);
+        for (int i = 0; i < 3 * b.n; i++) CHECK_NEAR(c.body.f[i], 0.5 * f[i], 1e-12 * max);
         free(f);
         elastic_close(&b);
         elastic_close(&c);
@@ -510,7 +510,7 @@ static void collapsed_bodies_have_finite_forces(void)
         REQUIRE(open_box(&b, 3, 2, 2, 0, ten, law, true));
         elastic_place(&b, shape[k], 0);
         elastic_force(&b);
-        CHECK(isfinite(elastic_most(b.body.f, 3 * b.n)));
+        CHECK(isfinite(elastic_max(b.body.f, 3 * b.n)));
         CHECK(elastic_energy(&b) > 0);
         b.row.effect->tangent->linearise(b.row.self, &b.body);
         double *p = malloc(3 * sizeof *p * (size_t)b.n), *q = malloc(3 * sizeof *q * (size_t)b.n), pq = 0;
@@ -535,8 +535,8 @@ static void slivers_and_flat_tetrahedra_do_no_harm(void)
         REQUIRE(elastic_open(&b, &box, ten, laws[law], true));
         elastic_shake(&b, 0.1);
         elastic_force(&b);
-        double most = elastic_most(b.body.f, 3 * b.n);
-        CHECK(k ? most == 0 : most > 0 && isfinite(most));
+        double max = elastic_max(b.body.f, 3 * b.n);
+        CHECK(k ? max == 0 : max > 0 && isfinite(max));
         b.row.effect->tangent->linearise(b.row.self, &b.body);
         elastic_close(&b);
     }
@@ -555,15 +555,15 @@ static void a_nan_ends_and_leaves_nothing(void)
         elastic_force(&b);
         elastic_energy(&b);
         b.row.effect->tangent->linearise(b.row.self, &b.body);
-        CHECK(!isfinite(elastic_most(b.body.f, 3 * b.n)) || k == 2);
+        CHECK(!isfinite(elastic_max(b.body.f, 3 * b.n)) || k == 2);
         b.body.x[10] = keep;
         elastic_force(&b);
-        double *f = malloc(3 * sizeof *f * (size_t)b.n), most = elastic_most(b.body.f, 3 * b.n);
+        double *f = malloc(3 * sizeof *f * (size_t)b.n), max = elastic_max(b.body.f, 3 * b.n);
         memcpy(f, b.body.f, 3 * sizeof *f * (size_t)b.n);
         b.row.effect->reset(b.row.self, &b.body);
         elastic_force(&b);
-        CHECK(isfinite(most));
-        for (int i = 0; i < 3 * b.n; i++) CHECK_NEAR(b.body.f[i], f[i], 1e-9 * most);
+        CHECK(isfinite(max));
+        for (int i = 0; i < 3 * b.n; i++) CHECK_NEAR(b.body.f[i], f[i], 1e-9 * max);
         free(f);
         elastic_close(&b);
     }

@@ -78,11 +78,11 @@ static void find_forces(thing *t, double *out)
         if (body->support[i / 3]) out[i] = 0;
 }
 
-static double most_difference(const double *a, const double *b, int n)
+static double max_difference(const double *a, const double *b, int n)
 {
-    double most = 0;
-    for (int i = 0; i < n; i++) most = fmax(most, fabs(a[i] - b[i]));
-    return most;
+    double max = 0;
+    for (int i = 0; i < n; i++) max = fmax(max, fabs(a[i] - b[i]));
+    return max;
 }
 
 /* velocities by dense algebra: of the stage (M (V - vs) = tau (f(xs + tau V) - c M V)), the body being at xs */
@@ -118,8 +118,8 @@ static void a_step_is_that_of_dense_algebra(void)
         pal_entry_put_number(&t.item, "tolerance", 1e-13, NULL);
         REQUIRE(add_solver(&t, &pal_effect_implicit_euler, "iterations", 1000));
         REQUIRE(go(&t));
-        CHECK_LE(most_difference(t.body.v, v, n), 1e-8 * 0.2);
-        CHECK_LE(most_difference(t.body.x, x, n), 1e-8 * 2e-3);
+        CHECK_LE(max_difference(t.body.v, v, n), 1e-8 * 0.2);
+        CHECK_LE(max_difference(t.body.x, x, n), 1e-8 * 2e-3);
         CHECK(report_of(&t).converged);
         /* the factor is of this very matrix: as exact as single precision */
         CHECK_LE(report_of(&t).n_cg, 4);
@@ -149,7 +149,7 @@ static void a_step_of_two_stages_is_that_of_dense_algebra(void)
     pal_entry_put_number(&t.item, "tolerance", 1e-13, NULL);
     REQUIRE(add_solver(&t, &pal_effect_sdirk2, "iterations", 1000));
     REQUIRE(go(&t));
-    CHECK_LE(most_difference(t.body.v, v2, (int)n), 1e-8 * 0.2);
+    CHECK_LE(max_difference(t.body.v, v2, (int)n), 1e-8 * 0.2);
     free(keep);
     free_thing(&t);
 }
@@ -206,12 +206,12 @@ static void steps_a_hundred_times_as_long_are_stable(void)
         shake(&t, 1.5e-2, 1);
         t.dt_s *= 100;
         REQUIRE(add_solver(&t, &pal_effect_implicit_euler, NULL, 0));
-        double first = energy_J(&t), most = 0;
+        double first = energy_J(&t), max = 0;
         for (int i = 0; i < 60; i++) {
             REQUIRE(go(&t));
-            most = fmax(most, energy_J(&t));
+            max = fmax(max, energy_J(&t));
         }
-        CHECK_LE(most, first * (1 + 1e-6));
+        CHECK_LE(max, first * (1 + 1e-6));
         /* of a body without supports the rigid motion is left */
         CHECK_LE(springs_energy(t.springs, &t.body), 1e-3 * first);
         free_thing(&t);
@@ -255,16 +255,16 @@ static void the_end_is_that_of_dense_statics(void)
         make_dense(&m, &t, 0, 1);
         find_forces(&t, m.b);
         solve_dense(&m);
-        double most = 0, wrong = 0;
+        double max = 0, wrong = 0;
         if (s < 2) t.dt_s = 10;
         REQUIRE(add_solver(&t, solver[s], NULL, 0));
         for (int i = 0; i < (s < 2 ? 40 : 1); i++) REQUIRE(go(&t));
         for (int i = 0; i < m.n; i++) {
-            most = fmax(most, fabs(m.b[i]));
+            max = fmax(max, fabs(m.b[i]));
             wrong = fmax(wrong, fabs(t.body.x[i] - t.body.x_rest[i] - m.b[i]));
         }
-        CHECK(most > 1e-3);
-        CHECK_LE(wrong, 1e-6 * most);
+        CHECK(max > 1e-3);
+        CHECK_LE(wrong, 1e-6 * max);
         free_dense(&m);
         free_thing(&t);
     }
@@ -289,7 +289,7 @@ static void statics_of_springs_that_turn_leave_no_force(void)
     /* nodes are where points carry them */
     double *d = malloc(3 * sizeof(double) * (size_t)t.body.n_node);
     pal_interpolation_apply(t.body.interpolation, t.body.x, d);
-    CHECK_LE(most_difference(d, t.body.d, 3 * t.body.n_node), 0);
+    CHECK_LE(max_difference(d, t.body.d, 3 * t.body.n_node), 0);
     free(f), free(d);
     free_thing(&t);
 }
@@ -431,7 +431,7 @@ static void all_held_is_no_work(void)
     REQUIRE(add_solver(&t, &pal_effect_implicit_euler, NULL, 0));
     load_top(&t, 3);
     CHECK(go(&t));
-    CHECK_LE(most_difference(t.body.x, t.body.x_rest, 3 * t.body.n_dof), 0);
+    CHECK_LE(max_difference(t.body.x, t.body.x_rest, 3 * t.body.n_dof), 0);
     free_thing(&t);
 }
 

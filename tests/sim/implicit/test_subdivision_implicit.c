@@ -109,7 +109,7 @@ static void bends_as_the_same_elements_of_model_fem(void)
 /* a bar bent until its end points down: conjugate gradients with the factor of rest, turned or not */
 static void a_factor_that_turns_saves_iterations(void)
 {
-    int n_cg[2] = {0}, most[2] = {0};
+    int n_cg[2] = {0}, max[2] = {0};
     double end[2];
     for (int warp = 0; warp < 2; warp++) {
         tool_scene s;
@@ -125,17 +125,17 @@ static void a_factor_that_turns_saves_iterations(void)
         for (int i = 0; i < 50; i++) {
             REQUIRE(step_world(&s, 1));
             n_cg[warp] += report_of(&s).n_cg;
-            most[warp] = report_of(&s).n_cg > most[warp] ? report_of(&s).n_cg : most[warp];
+            max[warp] = report_of(&s).n_cg > max[warp] ? report_of(&s).n_cg : max[warp];
         }
         end[warp] = end_m(&s, 0.1);
         clay_close(&s, &cells);
     }
     printf("  end %.4g m; iterations of 50 steps to 1e-4: %d, at most %d; without turning %d, at most %d\n", end[1],
-           n_cg[1], most[1], n_cg[0], most[0]);
+           n_cg[1], max[1], n_cg[0], max[0]);
     CHECK(end[1] < -0.04);
     CHECK_NEAR(end[0], end[1], 1e-3 * fabs(end[1]));
     CHECK_LE(n_cg[1], 0.5 * n_cg[0]);
-    CHECK_LE(most[1], 12);
+    CHECK_LE(max[1], 12);
 }
 
 /* of masses between points */
@@ -160,7 +160,7 @@ static void the_force_on_the_tool_is_equal_and_opposite(void)
         pal_entry_put_number(&s.scene->body[0].solver, "tolerance", 1e-13, NULL);
         pal_entry_put_number(&s.scene->body[0].solver, "iterations", 500, NULL);
         REQUIRE(tool_scene_open(&s));
-        double worst = 0, most = 0;
+        double worst = 0, max = 0;
         for (int i = 0; i < 40; i++) {
             double before[3], after[3], down = 0.0008 * i;
             momentum_of(s.body, before);
@@ -173,12 +173,12 @@ static void the_force_on_the_tool_is_equal_and_opposite(void)
             pal_sub3(after, after, before);
             pal_axpy3(after, s.scene->step_s, tool_of(&s, 0)->force_N);
             worst = fmax(worst, pal_norm3(after) / s.scene->step_s);
-            most = fmax(most, pal_norm3(tool_of(&s, 0)->force_N));
+            max = fmax(max, pal_norm3(tool_of(&s, 0)->force_N));
         }
-        printf("  %s: most force %.4g N, momentum off by %.2g of it in a step\n", grasp ? "pulled" : "pressed", most,
-               worst / most);
-        CHECK(most > 0.05);
-        CHECK_LE(worst, 1e-9 * most);
+        printf("  %s: most force %.4g N, momentum off by %.2g of it in a step\n", grasp ? "pulled" : "pressed", max,
+               worst / max);
+        CHECK(max > 0.05);
+        CHECK_LE(worst, 1e-9 * max);
         CHECK(grasp ? mean_move(s.body, 2) > 1e-3 : mean_move(s.body, 2) < -1e-3);
         clay_close(&s, &cells);
     }

@@ -74,7 +74,7 @@ static void steps_without_the_heap_while_levels_switch(void)
     pal_copy3(top, s.body->x_rest + 3 * front(&s));
     pal_frame *frame = pal_frame_create(s.world);
     REQUIRE(frame);
-    int most = 0, n_switch = 0, n_finest = frame->part[0].n_finest, least = s.body->n_active;
+    int max = 0, n_switch = 0, n_finest = frame->part[0].n_finest, min = s.body->n_active;
     for (int i = 0; i < 6 * STEP_HZ; i++) {
         uint64_t revision = s.body->revision;
         press_front(&s, top, i, 0.02);
@@ -84,16 +84,16 @@ static void steps_without_the_heap_while_levels_switch(void)
         counting = false;
         CHECK_INT(err, 0);
         n_switch += s.body->revision != revision;
-        if (s.body->n_active > most) most = s.body->n_active;
+        if (s.body->n_active > max) max = s.body->n_active;
     }
-    printf("  %d to %d of %d nodes, %d switches\n", least, most, n_finest, n_switch);
+    printf("  %d to %d of %d nodes, %d switches\n", min, max, n_finest, n_switch);
     CHECK_INT(n_heap_call, 0);
-    CHECK(most > least + 40 && most < n_finest / 2);
+    CHECK(max > min + 40 && max < n_finest / 2);
     CHECK(n_switch > 10);
     /* the tool is gone for 4 s: coarse again, at rest, and what is out of use is where it is at rest */
-    CHECK_INT(s.body->n_active, least);
+    CHECK_INT(s.body->n_active, min);
     CHECK_LE(shell_scene_rms(&s), 1e-4);
-    for (int i = least; i < s.body->n_node; i++)
+    for (int i = min; i < s.body->n_node; i++)
         for (int c = 0; c < 3; c++) {
             CHECK(s.body->shown[3 * i + c] == (float)s.body->x_rest[3 * i + c]);
             CHECK(s.body->x[3 * i + c] == s.body->x_rest[3 * i + c] && s.body->load[3 * i + c] == 0);
@@ -266,9 +266,9 @@ static void sum_of_loads(const pal_body *body, double sum[3])
 /* how deep the sphere at p is in the surface */
 static double depth_m(const shell_scene *s, const double p[3])
 {
-    double least = INFINITY;
-    for (int k = 0; k < s->body->n_active; k++) least = fmin(least, pal_dist3(s->body->x + 3 * s->body->active[k], p));
-    return tool_radius_m - least;
+    double min = INFINITY;
+    for (int k = 0; k < s->body->n_active; k++) min = fmin(min, pal_dist3(s->body->x + 3 * s->body->active[k], p));
+    return tool_radius_m - min;
 }
 
 /* 1 cm/s, so that what jumps is contact and not tissue; in steps of one or two sub-steps */
@@ -277,7 +277,7 @@ static void a_pressed_surface_refines_under_the_tool_without_a_kick(void)
     enum { PER_S = 1000 };
     shell_scene s;
     REQUIRE(stomach_make(&s, 3));
-    double top[3], p[3], was = 0, most = 0, rise = 0, fall = 0, deepest = 0, low = INFINITY, high = 0;
+    double top[3], p[3], was = 0, max = 0, rise = 0, fall = 0, deepest = 0, low = INFINITY, high = 0;
     int n_switch = 0, max_node = 0;
     bool switched = false;
     pal_copy3(top, s.body->x_rest + 3 * front(&s));
@@ -296,7 +296,7 @@ static void a_pressed_surface_refines_under_the_tool_without_a_kick(void)
         switched = s.body->revision != revision;
         n_switch += switched;
         was = force;
-        most = fmax(most, force);
+        max = fmax(max, force);
         deepest = fmax(deepest, depth_m(&s, p));
         if (s.body->n_active > max_node) max_node = s.body->n_active;
         if (i >= 2.5 * PER_S) low = fmin(low, force), high = fmax(high, force);
@@ -304,11 +304,11 @@ static void a_pressed_surface_refines_under_the_tool_without_a_kick(void)
     printf(
         "  %d nodes, %d switches; %.3g N at most, %.2g up and %.2g down at a switch; %.2g mm deep; %.4g to %.4g N in "
         "the end\n",
-        max_node, n_switch, most, rise, fall, 1e3 * deepest, low, high);
+        max_node, n_switch, max, rise, fall, 1e3 * deepest, low, high);
     CHECK(n_switch > 10 && max_node > s.mesh.surface.n_vertex + 40);
-    CHECK(most > 0.01);
-    CHECK_LE(rise, 0.05 * most);
-    CHECK_LE(fall, 0.05 * most);
+    CHECK(max > 0.01);
+    CHECK_LE(rise, 0.05 * max);
+    CHECK_LE(fall, 0.05 * max);
     CHECK_LE(deepest, 0.1 * tool_radius_m);
     /* calm */
     CHECK_LE(high - low, 0.1 * high);
@@ -332,7 +332,7 @@ static void a_grip_holds_while_tissue_is_pulled_and_refines(void)
     enum { PER_S = 1000 };
     shell_scene s;
     REQUIRE(stomach_make(&s, 3));
-    double top[3], p[3], was = 0, most = 0, jump = 0, between = 0, share = 0, furthest = 0;
+    double top[3], p[3], was = 0, max = 0, jump = 0, between = 0, share = 0, furthest = 0;
     int n_switch = 0;
     bool switched = false;
     pal_copy3(top, s.body->x_rest + 3 * front(&s));
@@ -358,15 +358,15 @@ static void a_grip_holds_while_tissue_is_pulled_and_refines(void)
         n_switch += switched;
         share = fmax(share, refined_share(&s));
         was = force;
-        most = fmax(most, force);
+        max = fmax(max, force);
         furthest = fmax(furthest, gap_m(&s, p));
     }
     printf("  %d switches, %.0f %% more nodes; %.3g N at most, steps of %.2g N, %.2g N at a switch; tissue within %.2g "
            "mm, %.2g mm in the end\n",
-           n_switch, 100 * share, most, between, jump, 1e3 * furthest, 1e3 * gap_m(&s, p));
+           n_switch, 100 * share, max, between, jump, 1e3 * furthest, 1e3 * gap_m(&s, p));
     CHECK(n_switch > 10 && share > 0.2);
-    CHECK(most > 0.02);
-    CHECK_LE(jump, 0.1 * most);
+    CHECK(max > 0.02);
+    CHECK_LE(jump, 0.1 * max);
     CHECK_LE(furthest, tool_radius_m + 0.005);
     /* back where it was taken: nearly coarse again, and where it was at rest */
     CHECK_LE(refined_share(&s), 0.5 * share);
@@ -435,13 +435,13 @@ static void displacement_in_colour_is_0_where_nothing_is_in_use(void)
         press_front(&s, top, i, 0.02);
         CHECK_INT(pal_world_step(s.world, 1.0 / STEP_HZ), 0);
         const float *value = s.body->field[PAL_FIELD_DISPLACEMENT_M]->value;
-        double most = 0;
+        double max = 0;
         for (int k = 0; k < s.body->n_node; k++) {
-            most = fmax(most, (double)value[k]);
+            max = fmax(max, (double)value[k]);
             /* taken 10 times a second: the newest set may be of the table before */
             if (i % 6 == 5 && !pal_adaptive_has(s.body->model.adaptive, k)) CHECK(value[k] == 0);
         }
-        if (i == 2 * STEP_HZ - 1) CHECK(most > 0.01);
+        if (i == 2 * STEP_HZ - 1) CHECK(max > 0.01);
     }
     shell_scene_close(&s);
 }

@@ -89,7 +89,7 @@ static void goes_on_as_a_world_that_never_had_the_row(void)
 {
     static const char *const rows[] = {"gravity", "tool_push", "tool_grasp", "finite_guard", "viscous"};
     for (int k = 0; k < MODEL_KINDS; k++) {
-        double most = 0;
+        double max = 0;
         /* a body that adapts begins at rest in another world */
         for (int r = 0; r < 5 && k != SHELL; r++) {
             model_scene m, never;
@@ -111,12 +111,12 @@ static void goes_on_as_a_world_that_never_had_the_row(void)
             pal_world_invalidate_limits(m.world, 0);
             CHECK(pal_world_hash(m.world) == pal_world_hash(never.world));
             CHECK(model_scene_steps(&m, 20) && model_scene_steps(&never, 20));
-            for (int i = 0; i < 3 * m.body->n_dof; i++) most = fmax(most, fabs(m.body->x[i] - never.body->x[i]));
+            for (int i = 0; i < 3 * m.body->n_dof; i++) max = fmax(max, fabs(m.body->x[i] - never.body->x[i]));
             model_scene_close(&m), model_scene_close(&never);
         }
-        printf("  %s: apart by %.3g m\n", model_kind_name[k], most);
+        printf("  %s: apart by %.3g m\n", model_kind_name[k], max);
         /* rows and iterations that go on are warm, those of a new world are not */
-        CHECK_LE(most, k == SPRINGS ? 0 : 1e-12);
+        CHECK_LE(max, k == SPRINGS ? 0 : 1e-12);
     }
 }
 
@@ -139,15 +139,15 @@ static void energy_changes_by_the_rows_own_and_then_only_falls(void)
         double before = pal_world_energy_J(m.world), own = row_energy(&m, "gravity");
         CHECK_INT(turn(&m, "gravity", false), 0);
         CHECK(pal_world_hash(m.world) == hash);
-        double after = pal_world_energy_J(m.world), most = after;
+        double after = pal_world_energy_J(m.world), max = after;
         CHECK_NEAR(after, before - own, 1e-12 * (fabs(before) + fabs(own)));
         for (int i = 0; i < 120; i++) {
             REQUIRE(model_scene_steps(&m, 1));
-            most = fmax(most, pal_world_energy_J(m.world));
+            max = fmax(max, pal_world_energy_J(m.world));
         }
-        printf("  %s: %.3g J, gravity off %.3g J, most %.3g J, end %.3g J\n", model_kind_name[k], before, after, most,
+        printf("  %s: %.3g J, gravity off %.3g J, most %.3g J, end %.3g J\n", model_kind_name[k], before, after, max,
                pal_world_energy_J(m.world));
-        CHECK_LE(most, after * 1.02 + 1e-12);
+        CHECK_LE(max, after * 1.02 + 1e-12);
         CHECK_LE(pal_world_energy_J(m.world), 0.05 * after);
         model_scene_close(&m);
     }

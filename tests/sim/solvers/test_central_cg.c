@@ -193,9 +193,9 @@ static double fastest(solid_world *w, int n_round)
     memcpy(g, b->g, sizeof *g * (size_t)n);
     for (int i = 0; i < n; i++) v[i] = b->support[i / 3] ? 0 : solid_uniform(&w->t);
     for (int round = 0; round < n_round; round++) {
-        double most = 0, along = 0, norm2 = 0;
-        for (int i = 0; i < n; i++) most = fmax(most, fabs(v[i]));
-        for (int i = 0; i < n; i++) v[i] /= most, b->x[i] = x[i] + b->edge_m * v[i];
+        double max = 0, along = 0, norm2 = 0;
+        for (int i = 0; i < n; i++) max = fmax(max, fabs(v[i]));
+        for (int i = 0; i < n; i++) v[i] /= max, b->x[i] = x[i] + b->edge_m * v[i];
         solid_forces(w);
         for (int i = 0; i < n; i++) u[i] = b->support[i / 3] ? 0 : (g[i] - b->g[i]) / b->edge_m;
         for (int i = 0; i < n; i++) along += u[i] * v[i];
@@ -225,10 +225,10 @@ static void limit_is_the_true_one_within_two_percent(void)
 
 static double farthest(const solid_world *w)
 {
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < 3 * w->t.body.n_dof; i++)
-        most = fmax(most, fabs(w->t.body.x[i] - w->t.body.x_rest[i]) / w->t.body.edge_m);
-    return most;
+        max = fmax(max, fabs(w->t.body.x[i] - w->t.body.x_rest[i]) / w->t.body.edge_m);
+    return max;
 }
 
 static void just_below_the_true_limit_is_stable_and_just_above_is_not(void)
@@ -255,19 +255,19 @@ static void limit_holds_in_flight(void)
     solid_world w;
     REQUIRE(open_kind(&w, SUBDIVIDED, false));
     add_drag(&w, 3);
-    double at_rest = solid_limit(&w), least = INFINITY, most = 0;
+    double at_rest = solid_limit(&w), min = INFINITY, max = 0;
     for (int i = 0; i < w.t.body.n_dof; i++) w.t.body.v[3 * i] = 40 * w.t.body.x_rest[3 * i + 1];
     w.solve.effect->reset(w.solve.self, &w.t.body);
     for (int i = 0; i < CHECK_REPEATS(1000, 300); i++) {
         double limit = solid_limit(&w);
-        least = fmin(least, limit), most = fmax(most, limit);
+        min = fmin(min, limit), max = fmax(max, limit);
         solid_run(&w, 1, limit);
     }
     CHECK(pal_body_finite(&w.t.body));
     CHECK_INT(w.t.body.safeguards.n_clamped, 0);
     CHECK_LE(farthest(&w), 40);
-    CHECK_LE(0.5 * at_rest, least);
-    CHECK_LE(most, 2 * at_rest);
+    CHECK_LE(0.5 * at_rest, min);
+    CHECK_LE(max, 2 * at_rest);
     solid_world_close(&w);
 }
 

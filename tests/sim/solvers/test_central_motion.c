@@ -42,15 +42,15 @@ static void undamped_energy_stays_over_many_steps(void)
     const double dt = 0.5 * solid_limit(&w) / 0.9;
     solid_shake(&w, 0.1);
     const double before = kept_energy(&w, dt);
-    double least = before, most = before;
+    double min = before, max = before;
     CHECK(before > 0);
     for (int i = 0; i < 100; i++) {
         solid_run(&w, CHECK_REPEATS(999, 99), dt);
         const double now = kept_energy(&w, dt);
-        least = fmin(least, now), most = fmax(most, now);
+        min = fmin(min, now), max = fmax(max, now);
     }
-    CHECK_LE(most, before * (1 + 1e-9));
-    CHECK_LE(before * (1 - 1e-9), least);
+    CHECK_LE(max, before * (1 + 1e-9));
+    CHECK_LE(before * (1 - 1e-9), min);
     solid_world_close(&w);
 }
 
@@ -115,7 +115,7 @@ static void a_free_body_keeps_its_momentum_and_angular_momentum(void)
         pal_body *b = &w.t.body;
         for (int i = 0; i < 3 * b->n_dof; i++) b->v[i] = 0.1 * (1 + (i % 3 == 1 ? 5 * b->x[i - 1] : 0));
         solid_shake(&w, 0.1);
-        double p[2][3], l[2][3], said[3];
+        double p[2][3], l[2][3], summary[3];
         const double dt = 0.5 * solid_limit(&w);
         find_momenta(&w, p[0], l[0]);
         for (int i = 0; i < CHECK_REPEATS(500, 50); i++) {
@@ -123,11 +123,11 @@ static void a_free_body_keeps_its_momentum_and_angular_momentum(void)
             solid_run(&w, 1, uneven ? 0.6 * dt : dt);
         }
         find_momenta(&w, p[1], l[1]);
-        pal_body_momentum(b, said);
+        pal_body_momentum(b, summary);
         double swing = 0.1 * 0.01 * pal_subdivision_solid_mass_kg(w.t.solid);
         for (int c = 0; c < 3; c++) {
             CHECK_NEAR(p[1][c] / p[0][0], p[0][c] / p[0][0], 1e-10);
-            CHECK_NEAR(said[c] / p[0][0], p[1][c] / p[0][0], 1e-10);
+            CHECK_NEAR(summary[c] / p[0][0], p[1][c] / p[0][0], 1e-10);
             CHECK_NEAR(l[1][c] / swing, l[0][c] / swing, 1e-10);
         }
         solid_world_close(&w);

@@ -97,17 +97,17 @@ static void undamped_oscillation_keeps_its_energy(void)
         int n = pal_body_point(p.body, i);
         p.body->x[3 * n] += 1e-5 * sin(M_PI * p.body->x_rest[3 * n] / 0.16);
     }
-    double before = shell_plan_energy(&p), least = INFINITY, most = 0, dt = 0.2 * shell_plan_limit(&p);
+    double before = shell_plan_energy(&p), min = INFINITY, max = 0, dt = 0.2 * shell_plan_limit(&p);
     CHECK(before > 0);
     for (int i = 0; i < CHECK_REPEATS(5, 1); i++) {
         shell_plan_run(&p, 1000, dt);
         double now = shell_plan_energy(&p);
-        least = fmin(least, now), most = fmax(most, now);
+        min = fmin(min, now), max = fmax(max, now);
     }
-    CHECK_LE(0.99 * before, least);
-    CHECK_LE(most, 1.000001 * before);
+    CHECK_LE(0.99 * before, min);
+    CHECK_LE(max, 1.000001 * before);
     HARD_CASE("no_drag", "adaptive_springs", "a refined sheet: energy off the first",
-              100 * fmax(most / before - 1, 1 - least / before), 1, "%");
+              100 * fmax(max / before - 1, 1 - min / before), 1, "%");
     shell_plan_close(&p);
 }
 
@@ -120,9 +120,9 @@ static double fastest_mode(shell_plan *p, double *mode)
     for (size_t i = 0; i < n; i++) mode[i] = i % 3 == 2 || p->body->mass_kg[i / 3] == 0 ? 0 : shell_plan_uniform(p);
     for (int round = 0; round < 800; round++) {
         /* the mode's largest entry is 1 */
-        double most = 0, dot = 0, norm2 = 0;
-        for (size_t i = 0; i < n; i++) most = fmax(most, fabs(mode[i]));
-        for (size_t i = 0; i < n; i++) mode[i] /= most;
+        double max = 0, dot = 0, norm2 = 0;
+        for (size_t i = 0; i < n; i++) max = fmax(max, fabs(mode[i]));
+        for (size_t i = 0; i < n; i++) mode[i] /= max;
         for (size_t i = 0; i < n; i++) p->body->x[i] = p->body->x_rest[i] + small * mode[i];
         shell_plan_force(p, row);
         for (size_t i = 0; i < n; i++) {
@@ -133,9 +133,9 @@ static double fastest_mode(shell_plan *p, double *mode)
         }
         omega2 = dot / norm2;
     }
-    double most = 0;
-    for (size_t i = 0; i < n; i++) most = fmax(most, fabs(mode[i]));
-    for (size_t i = 0; i < n; i++) mode[i] /= most;
+    double max = 0;
+    for (size_t i = 0; i < n; i++) max = fmax(max, fabs(mode[i]));
+    for (size_t i = 0; i < n; i++) mode[i] /= max;
     memcpy(p->body->x, p->body->x_rest, n * sizeof *mode);
     return sqrt(omega2);
 }
@@ -175,10 +175,10 @@ static double fastest(shell_plan *p, int n_round, double shift)
     for (size_t i = 0; i < n; i++)
         mode[i] = body->mass_kg[i / 3] > 0 && !body->support[i / 3] ? shell_plan_uniform(p) : 0;
     for (int round = 0; round < n_round; round++) {
-        double most = 0, along = 0, norm2 = 0;
-        for (size_t i = 0; i < n; i++) most = fmax(most, fabs(mode[i]));
+        double max = 0, along = 0, norm2 = 0;
+        for (size_t i = 0; i < n; i++) max = fmax(max, fabs(mode[i]));
         double small = 1e-6 * body->edge_m;
-        for (size_t i = 0; i < n; i++) mode[i] /= most, body->x[i] = x[i] + small * mode[i];
+        for (size_t i = 0; i < n; i++) mode[i] /= max, body->x[i] = x[i] + small * mode[i];
         pal_assemble_forces(&step);
         for (size_t i = 0; i < n; i++) {
             double m = body->mass_kg[i / 3], force = (f[i] - body->f[i]) / small;
@@ -291,7 +291,7 @@ static void limit_holds_with_strong_damping(void)
     shell_plan_close(&q);
 }
 
-/* C eq. 9: TS_l = TS_0 / 2^l; the paper's own law of stiffness (eq. 8) asks for 2^(-l/2) only */
+/* paper C, eq. 9: TS_l = TS_0 / 2^l; the paper's own law of stiffness (eq. 8) asks for 2^(-l/2) only */
 static void limit_falls_by_level_as_the_law_says(void)
 {
     for (int law = 0; law < 2; law++) {

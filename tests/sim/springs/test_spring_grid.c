@@ -1,5 +1,5 @@
-/* Springs whose constants vary over the body (paper B 3.5): what a grid means, that it keeps what springs promise, what
- * is refused. */
+/* Springs whose constants vary over the body (paper B section 3.5): what a grid means, that it keeps what springs
+ * promise, what is refused. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/plan/plan.h"
@@ -131,14 +131,14 @@ static void a_grid_of_equal_values_is_the_homogeneous_body(void)
         for (int r = 0; r < a.plan.n_row; r++) {
             const pal_component *row = &a.plan.row[r], *other = &b.plan.row[r];
             if (!row->effect->internal || row->effect->stage != PAL_STAGE_FORCE) continue;
-            double most = 0, apart = 0, bound[2][128] = {{0}};
+            double max = 0, apart = 0, bound[2][128] = {{0}};
             run_row(&a, row), run_row(&b, other);
             for (int i = 0; i < 3 * a.body->n_dof; i++) {
-                most = fmax(most, fabs(a.body->f[i]));
+                max = fmax(max, fabs(a.body->f[i]));
                 apart = fmax(apart, fabs(a.body->f[i] - b.body->f[i]));
             }
-            CHECK(most > 1e-6);
-            CHECK_LE(apart, 1e-12 * most);
+            CHECK(max > 1e-6);
+            CHECK_LE(apart, 1e-12 * max);
             REQUIRE(a.body->n_dof <= 128);
             row->effect->damping(row->self, a.body, bound[0]);
             other->effect->damping(other->self, b.body, bound[1]);
@@ -279,7 +279,7 @@ static void forces_of_varied_springs_are_the_gradient_of_their_energy(void)
         shake(&b, turn == 0 ? 0.05 : 0.5);
         EACH_SPRING_ROW(b, row)
         {
-            double most = 0, worst = 0, step = 1e-6 * b.body->edge_m;
+            double max = 0, worst = 0, step = 1e-6 * b.body->edge_m;
             run_row(&b, row);
             for (int i = 0; i < 3 * b.body->n_dof; i++) {
                 double x = b.body->x[i];
@@ -288,11 +288,11 @@ static void forces_of_varied_springs_are_the_gradient_of_their_energy(void)
                 b.body->x[i] = x - step;
                 double down = row->effect->energy(row->self, b.body);
                 b.body->x[i] = x;
-                most = fmax(most, fabs(b.body->f[i]));
+                max = fmax(max, fabs(b.body->f[i]));
                 worst = fmax(worst, fabs(b.body->f[i] + (up - down) / (2 * step)));
             }
-            CHECK(most > 0);
-            CHECK_LE(worst, 3e-6 * most);
+            CHECK(max > 0);
+            CHECK_LE(worst, 3e-6 * max);
         }
     }
     bench_close(&b);

@@ -65,8 +65,8 @@ static void forces_of_regions_are_the_gradient_of_their_energy(void)
     CHECK_INT(t->n_region, 1);
     CHECK(t->of[0].n >= 32 && t->of[0].scale > 0 && t->of[0].scale <= 1);
     forces(&b);
-    double worst = 0, most = 0;
-    for (int i = 0; i < 3 * b.body->n_dof; i++) most = fmax(most, fabs(b.body->f[i]));
+    double worst = 0, max = 0;
+    for (int i = 0; i < 3 * b.body->n_dof; i++) max = fmax(max, fabs(b.body->f[i]));
     for (int k = 0; k < 12; k++) {
         int i = (int)(random_unit(&seed) * 3 * b.body->n_dof);
         const double x = b.body->x[i], way = 1e-7;
@@ -77,8 +77,8 @@ static void forces_of_regions_are_the_gradient_of_their_energy(void)
         b.body->x[i] = x;
         worst = fmax(worst, fabs((up - down) / (2 * way) + b.body->f[i]));
     }
-    printf("  off by %.2g of the largest force, scale %.3g\n", worst / most, t->of[0].scale);
-    CHECK_LE(worst, 1e-6 * most);
+    printf("  off by %.2g of the largest force, scale %.3g\n", worst / max, t->of[0].scale);
+    CHECK_LE(worst, 1e-6 * max);
     box_bench_close(&b);
 }
 
@@ -374,17 +374,17 @@ static void rk4_recovers_too(void)
     fold(&b, 0.015);
     REQUIRE(b.body->recovery && b.body->recovery->n_region > 0);
     const double first_J = pal_world_energy_J(b.world);
-    double most_J = 0;
+    double max_J = 0;
     for (int i = 0; i < 240; i++) {
         REQUIRE(!pal_world_step(b.world, 1.0 / 60));
-        most_J = fmax(most_J, pal_world_energy_J(b.world));
+        max_J = fmax(max_J, pal_world_energy_J(b.world));
     }
     double sum = 0;
     for (int i = 0; i < b.body->n_dof; i++) sum += pow(pal_dist3(b.body->x + 3 * i, b.body->x_rest + 3 * i), 2);
-    printf("  rk4: energy %.3g of the first at most, %.2g of its size off rest\n", most_J / first_J,
+    printf("  rk4: energy %.3g of the first at most, %.2g of its size off rest\n", max_J / first_J,
            sqrt(sum / b.body->n_dof) / b.body->length_scale_m);
     CHECK_INT(b.body->recovery->n_region, 0);
-    CHECK_LE(most_J, 1.01 * first_J);
+    CHECK_LE(max_J, 1.01 * first_J);
     CHECK_LE(sqrt(sum / b.body->n_dof), 1e-3 * b.body->length_scale_m);
     box_bench_close(&b);
 }

@@ -93,13 +93,13 @@ static double energy(const bench *b, const char *name)
 
 static void check_same(const bench *a, const bench *b)
 {
-    double f[2][3 * 128], most = 0;
+    double f[2][3 * 128], max = 0;
     REQUIRE(a->body->n_node == b->body->n_node && a->body->n_node <= 128);
     shake(a), shake(b);
     forces(a, f[0]), forces(b, f[1]);
-    for (int i = 0; i < 3 * a->body->n_node; i++) most = fmax(most, fabs(f[0][i]));
-    CHECK(most > 1e-3);
-    for (int i = 0; i < 3 * a->body->n_node; i++) CHECK_NEAR(f[0][i], f[1][i], 1e-11 * most);
+    for (int i = 0; i < 3 * a->body->n_node; i++) max = fmax(max, fabs(f[0][i]));
+    CHECK(max > 1e-3);
+    for (int i = 0; i < 3 * a->body->n_node; i++) CHECK_NEAR(f[0][i], f[1][i], 1e-11 * max);
     for (int i = 0; i < a->body->n_dof; i++)
         CHECK_NEAR(a->body->mass_kg[i], b->body->mass_kg[i], 1e-12 * b->body->mass_kg[i]);
     CHECK_NEAR(pal_world_limit_s(a->world) / pal_world_limit_s(b->world), 1, 1e-9);

@@ -79,9 +79,9 @@ static void shake(bench *b, double amount, double speed_m_s)
 
 static double largest(const double *f, int n)
 {
-    double most = 0;
-    for (int i = 0; i < n; i++) most = fmax(most, fabs(f[i]));
-    return most;
+    double max = 0;
+    for (int i = 0; i < n; i++) max = fmax(max, fabs(f[i]));
+    return max;
 }
 
 #define EACH_FORCE_ROW(b, row)                                                                                         \
@@ -141,7 +141,7 @@ static void forces_are_the_gradient_of_their_energy(void)
         {
             if (!row->effect->energy) continue;
             run_row(&b, row);
-            double most = largest(b.body->f, 3 * b.body->n_node), step = 1e-6 * b.body->edge_m, worst = 0;
+            double max = largest(b.body->f, 3 * b.body->n_node), step = 1e-6 * b.body->edge_m, worst = 0;
             for (int i = 0; i < 3 * b.body->n_dof; i++) {
                 double x = b.body->x[i];
                 b.body->x[i] = x + step;
@@ -151,8 +151,8 @@ static void forces_are_the_gradient_of_their_energy(void)
                 b.body->x[i] = x;
                 worst = fmax(worst, fabs(b.body->f[i] + (up - down) / (2 * step)));
             }
-            if (!(worst <= 3e-6 * most)) printf("  %s, turn %d\n", row->effect->name, turn);
-            CHECK_LE(worst, 3e-6 * most);
+            if (!(worst <= 3e-6 * max)) printf("  %s, turn %d\n", row->effect->name, turn);
+            CHECK_LE(worst, 3e-6 * max);
         }
     }
     bench_close(&b);
@@ -325,16 +325,16 @@ static void keeps_the_energy_of_an_undamped_body(void)
     pal_world *world = open_free(&box, &scene);
     REQUIRE(world);
     REQUIRE(!pal_world_step(world, scene->step_s));
-    double start = energy_in_phase_J(world, scene->step_s / pal_world_substeps(world)), least = start, most = start;
+    double start = energy_in_phase_J(world, scene->step_s / pal_world_substeps(world)), min = start, max = start;
     for (int i = 0, n = 0; n < CHECK_REPEATS(100000, 10000); i++) {
         REQUIRE(!pal_world_step(world, scene->step_s));
         double now = energy_in_phase_J(world, scene->step_s / pal_world_substeps(world));
-        least = fmin(least, now), most = fmax(most, now);
+        min = fmin(min, now), max = fmax(max, now);
         n += pal_world_substeps(world);
     }
-    printf("  energy within -%.2f %% and +%.2f %%\n", 100 * (1 - least / start), 100 * (most / start - 1));
+    printf("  energy within -%.2f %% and +%.2f %%\n", 100 * (1 - min / start), 100 * (max / start - 1));
     HARD_CASE("no_drag", "tet_springs", "100,000 sub-steps at half the limit: energy off the first",
-              100 * fmax(most / start - 1, 1 - least / start), 1, "%");
+              100 * fmax(max / start - 1, 1 - min / start), 1, "%");
     pal_world_destroy(world);
     free(scene);
     box_free(&box);
@@ -404,16 +404,16 @@ static void answers_a_symmetric_load_symmetrically(void)
         REQUIRE(!pal_world_load(world, 0, box_node(n, 4, j, 2), (const double[3]){0.05, 0, 0}));
     }
     for (int i = 0; i < 60; i++) REQUIRE(!pal_world_step(world, scene->step_s));
-    double most = 0, apart = 0;
+    double max = 0, apart = 0;
     for (int k = 0; k <= n[2]; k++)
         for (int j = 0; j <= n[1]; j++)
             for (int i = 0; i <= n[0]; i++) {
                 const double *l = body->x + 3 * box_node(n, i, j, k), *r = body->x + 3 * box_node(n, n[0] - i, j, k);
-                most = fmax(most, fabs(l[2] - 0.01 * k));
+                max = fmax(max, fabs(l[2] - 0.01 * k));
                 apart = fmax(apart, fabs(l[0] + r[0] - 0.04) + fabs(l[1] - r[1]) + fabs(l[2] - r[2]));
             }
-    CHECK(most > 1e-4);
-    CHECK_LE(apart, 1e-9 * most);
+    CHECK(max > 1e-4);
+    CHECK_LE(apart, 1e-9 * max);
     pal_world_destroy(world);
     free(scene);
     box_free(&box);

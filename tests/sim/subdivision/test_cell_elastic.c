@@ -1,4 +1,5 @@
-/* Component cell_elastic, operator polar: subdivision solids' elements in their own frames (A 3.2-3.4), node by node.
+/* Component cell_elastic, operator polar: subdivision solids' elements in their own frames (paper A section 3.2-3.4),
+ * node by node.
  */
 #include "server/num/polar.h"
 #include "tests/fixtures/cell_bodies.h"
@@ -54,7 +55,7 @@ static void rigid_motion_costs_no_energy(void)
 static void ten_thousand_turns_leave_no_drift(void)
 {
     cell_body b;
-    double turn[9], first, most = 0, lowest = 1e300;
+    double turn[9], first, max = 0, lowest = 1e300;
     const int n = CHECK_REPEATS(10000, 200);
     cell_nth(&b, 1);
     cell_map(&b, (double[9]){1.01, 0, 0, 0, 1, 0, 0, 0, 1}, 0);
@@ -66,9 +67,9 @@ static void ten_thousand_turns_leave_no_drift(void)
         for (int i = 0; i < b.body.n_node; i++)
             for (int c = 0; c < 3; c++) b.body.d[3 * i + c] = pal_dot3(turn + 3 * c, bent + 3 * i);
         double e = cell_energy(&b);
-        most = fmax(most, e), lowest = fmin(lowest, e);
+        max = fmax(max, e), lowest = fmin(lowest, e);
     }
-    CHECK_NEAR(most / first, 1, 1e-9);
+    CHECK_NEAR(max / first, 1, 1e-9);
     CHECK_NEAR(lowest / first, 1, 1e-9);
     cell_rotation(0, turn);
     cell_map(&b, turn, 0);
@@ -269,8 +270,8 @@ static void where_kinds_meet_uniform_strain_leaves_little(void)
     double *g = calloc(3 * (size_t)b.body.n_dof, sizeof *g);
     pal_interpolation_apply_transpose(b.body.interpolation, cell_force(&b), g);
     for (int i = 0; i < b.body.n_dof; i++) {
-        double *most = cell_largest(b.cells.x + 3 * i, 3) < 1 ? &inner : &external_force;
-        *most = fmax(*most, pal_norm3(g + 3 * i));
+        double *max = cell_largest(b.cells.x + 3 * i, 3) < 1 ? &inner : &external_force;
+        *max = fmax(*max, pal_norm3(g + 3 * i));
     }
     CHECK(inner > 0);
     CHECK_LE(inner, 0.015 * external_force);

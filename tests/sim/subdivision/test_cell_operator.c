@@ -1,5 +1,5 @@
-/* Component cell_elastic, operator edges: relative displacements from edge lengths and angles (A 3.2.2) and their
- * errata. */
+/* Component cell_elastic, operator edges: relative displacements from edge lengths and angles (paper A section 3.2.2)
+ * and their errata. */
 #include "tests/fixtures/cell_bodies.h"
 #include "tests/stability/hard_case.h"
 

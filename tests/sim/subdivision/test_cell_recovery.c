@@ -144,10 +144,10 @@ static void elements_return_when_nothing_is_inverted(void)
             cell_map(&same, turn, 0.3);
             cell_shake(&b, 0.05, 6), cell_shake(&same, 0.05, 6);
             const double *f = cell_force(&b), *g = cell_force(&same);
-            double most = 0;
-            for (int k = 0; k < 3 * b.body.n_node; k++) most = fmax(most, fabs(f[k] - g[k]));
+            double max = 0;
+            for (int k = 0; k < 3 * b.body.n_node; k++) max = fmax(max, fabs(f[k] - g[k]));
             /* the rotations' iterations began elsewhere */
-            CHECK_LE(most, 1e-9 * cell_largest(g, 3 * b.body.n_node));
+            CHECK_LE(max, 1e-9 * cell_largest(g, 3 * b.body.n_node));
             cell_free(&b), cell_free(&same);
         }
 }

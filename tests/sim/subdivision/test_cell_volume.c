@@ -90,7 +90,7 @@ static void the_tangent_is_that_of_the_forces(void)
         cell_body b;
         make(&b, i, 0.49);
         const int n = 3 * b.body.n_node;
-        double *p = calloc(4 * (size_t)n, sizeof *p), *q = p + n, *kp = q + n, *kq = kp + n, most = 0;
+        double *p = calloc(4 * (size_t)n, sizeof *p), *q = p + n, *kp = q + n, *kq = kp + n, max = 0;
         cell_effect->tangent->linearise(b.row, &b.body);
         for (int k = 0; k < n; k++)
             p[k] = pal_random_unit(7, (uint64_t)k) - 0.5, q[k] = pal_random_unit(8, (uint64_t)k) - 0.5;
@@ -99,8 +99,8 @@ static void the_tangent_is_that_of_the_forces(void)
         CHECK_NEAR(cell_dot(p, kq, n) / cell_dot(p, kp, n), cell_dot(q, kp, n) / cell_dot(p, kp, n), 1e-6);
         for (int k = 0; k < n; k++) b.body.d[k] = b.body.node_rest[k] + 1e-6 * p[k];
         const double *f = cell_force(&b);
-        for (int k = 0; k < n; k++) most = fmax(most, fabs(-1e6 * f[k] - kp[k]));
-        CHECK_LE(most, 1e-4 * cell_largest(kp, n));
+        for (int k = 0; k < n; k++) max = fmax(max, fabs(-1e6 * f[k] - kp[k]));
+        CHECK_LE(max, 1e-4 * cell_largest(kp, n));
         free(p);
         cell_free(&b);
     }

@@ -98,7 +98,8 @@ static void inner_nodes_are_shown_where_they_are(void)
     clay_close(&c);
 }
 
-/* bent about y, e_xx = kappa z: energy density grows from the middle outward, and the cut shows it (A Fig. 13) */
+/* bent about y, e_xx = kappa z: energy density grows from the middle outward, and the cut shows it (paper A, Fig. 13)
+ */
 static void fields_colour_the_cut(void)
 {
     const double kappa = 0.5;

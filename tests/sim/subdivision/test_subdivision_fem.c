@@ -346,7 +346,7 @@ static void edits_of_material_reach_masses_and_samples(void)
 static void nodes_stand_where_points_carry_them_after_steps_and_resets(void)
 {
     clay c;
-    double most = 0;
+    double max = 0;
     clay_block(&c, 2, 0.1);
     REQUIRE(clay_start(&c));
     double *d = calloc(3 * (size_t)c.body->n_node, sizeof *d);
@@ -359,8 +359,8 @@ static void nodes_stand_where_points_carry_them_after_steps_and_resets(void)
         }
         if (way == 2) pal_world_reset(c.world);
         pal_interpolation_apply(c.body->interpolation, c.body->x, d);
-        for (int i = 0; i < 3 * c.body->n_node; i++) most = fmax(most, fabs(d[i] - c.body->d[i]));
-        CHECK(most == 0);
+        for (int i = 0; i < 3 * c.body->n_node; i++) max = fmax(max, fabs(d[i] - c.body->d[i]));
+        CHECK(max == 0);
         for (int i = 0; i < c.body->n_shown && way != 1; i++)
             for (int a = 0; a < 3; a++) CHECK(c.body->shown[3 * i + a] == (float)d[3 * c.body->shown_node[i] + a]);
     }

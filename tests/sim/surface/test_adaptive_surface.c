@@ -149,7 +149,7 @@ static void every_state_is_balanced_watertight_and_of_the_same_mass(void)
     for (int n = 1; n <= 4; n++) CHECK(seen[n] > 0);
 }
 
-/* C eq. 6 and 7, counted edge by edge over all levels */
+/* paper C, eq. 6 and 7, counted edge by edge over all levels */
 static void mixed_nodes_weigh_the_mean_of_their_springs_levels(void)
 {
     thing t = make(STOMACH, (pal_adaptive_options){.n_level = 3});
@@ -328,11 +328,11 @@ static void ten_thousand_random_changes_and_back_leave_every_bit(void)
     dice d = {.seed = 11};
     shake(&t, 1);
     record before = record_of(&t);
-    int done = 0, wanted = CHECK_REPEATS(10000, 1500), most = 0;
+    int done = 0, wanted = CHECK_REPEATS(10000, 1500), max = 0;
     for (int n = 0; done < wanted; n++) {
         done += stir(&t, &d, 1 + roll(&d, 8), 3000);
         pal_adaptive_update(t.adaptive, &t.body);
-        if (t.adaptive->n_node > most) most = t.adaptive->n_node;
+        if (t.adaptive->n_node > max) max = t.adaptive->n_node;
         /* from time to time all the way back, so that it is not one long walk */
         if (n % 500 == 499) {
             join_all(&t);
@@ -340,7 +340,7 @@ static void ten_thousand_random_changes_and_back_leave_every_bit(void)
             CHECK_INT(t.adaptive->n_node, 188);
         }
     }
-    CHECK(most > 800);
+    CHECK(max > 800);
     join_all(&t);
     CHECK(pal_adaptive_update(t.adaptive, &t.body));
     CHECK(same_record(before, record_of(&t)));
@@ -423,7 +423,7 @@ static void there_are_never_more_nodes_than_allowed(void)
     thing t = make(SPHERE, (pal_adaptive_options){.n_level = 4});
     pal_adaptive_surface *s = t.adaptive;
     dice d = {.seed = 61};
-    int most = 0, worst = 0;
+    int max = 0, worst = 0;
     record before = record_of(&t);
     CHECK_INT(pal_adaptive_split(s, &t.body, 3, 116), 0);
     CHECK(!pal_adaptive_update(s, &t.body));
@@ -432,10 +432,10 @@ static void there_are_never_more_nodes_than_allowed(void)
     for (int k = 0; k < 300; k++) {
         stir(&t, &d, 5, 200);
         pal_adaptive_update(s, &t.body);
-        if (s->n_node > most) most = s->n_node;
+        if (s->n_node > max) max = s->n_node;
         worst += count_steep(s) + count_odd_nodes(&t);
     }
-    CHECK(most > 190 && most <= 200);
+    CHECK(max > 190 && max <= 200);
     CHECK_INT(worst, 0);
     give_back(&t);
 }
@@ -537,8 +537,8 @@ static void its_memory_is_what_it_says(void)
     pal_adaptive_surface *s = NULL;
     pal_adaptive_options o = {.n_level = 5, .mass_kg = 1};
     REQUIRE(!pal_adaptive_make(&surface, &o, &body, arena, NULL, &s));
-    double n = s->levels.n_vertex[4], said = (double)pal_adaptive_node_bytes(s) * n;
-    CHECK_LE(fabs((double)pal_arena_used(arena) / said - 1), 0.01);
+    double n = s->levels.n_vertex[4], summary = (double)pal_adaptive_node_bytes(s) * n;
+    CHECK_LE(fabs((double)pal_arena_used(arena) / summary - 1), 0.01);
     pal_arena_destroy(arena);
     pal_surface_free(&surface);
 }

@@ -19,9 +19,9 @@ static bool open_mixture(shell_plan *p, int shape, const char *law, double c_Ns_
 
 static double largest(const shell_plan *p)
 {
-    double most = 0;
-    for (int i = 0; i < 3 * p->body->n_node; i++) most = fmax(most, fabs(p->body->f[i]));
-    return most;
+    double max = 0;
+    for (int i = 0; i < 3 * p->body->n_node; i++) max = fmax(max, fabs(p->body->f[i]));
+    return max;
 }
 
 static const char *const laws[2] = {"membrane", "paper"};
@@ -36,8 +36,8 @@ static void force_is_minus_the_gradient_of_energy(void)
             shell_plan_shake(&p, 0.1, 0);
             p.adaptive->spring_ramp = 0.7;
             shell_plan_force(&p, row);
-            double most = largest(&p), worst = 0, step = 1e-6 * p.body->edge_m;
-            CHECK(most > 0.01);
+            double max = largest(&p), worst = 0, step = 1e-6 * p.body->edge_m;
+            CHECK(max > 0.01);
             for (int k = 0; k < p.body->n_active; k += 3)
                 for (int c = 0; c < 3; c++) {
                     int i = 3 * pal_body_point(p.body, k) + c;
@@ -47,7 +47,7 @@ static void force_is_minus_the_gradient_of_energy(void)
                     p.body->x[i] = x - step;
                     double down = row->effect->energy(row->self, p.body);
                     p.body->x[i] = x;
-                    worst = fmax(worst, fabs(p.body->f[i] + (up - down) / (2 * step)) / most);
+                    worst = fmax(worst, fabs(p.body->f[i] + (up - down) / (2 * step)) / max);
                 }
             CHECK_LE(worst, 1e-6);
             shell_plan_close(&p);
@@ -229,7 +229,7 @@ static void fabric_of_square_cells_bears_seven_eighths_along_its_threads(void)
     shell_plan_mix(&p, 40);
     const pal_component *row = shell_plan_row(&p, "edge_spring");
     const double strain = 1e-5, area = 0.08 * 0.08;
-    double least = INFINITY;
+    double min = INFINITY;
     for (int way = -1; way <= 1; way += 2) {
         for (int k = 0; k < p.body->n_active; k++) {
             double *x = p.body->x + 3 * pal_body_point(p.body, k);
@@ -237,13 +237,13 @@ static void fabric_of_square_cells_bears_seven_eighths_along_its_threads(void)
             x[0] = r[0] + strain * (r[0] + way * r[1]);
             x[1] = r[1];
         }
-        least = fmin(least, row->effect->energy(row->self, p.body));
+        min = fmin(min, row->effect->energy(row->self, p.body));
     }
-    CHECK_NEAR(least / (0.5 * 5000 * 0.003 * strain * strain * area), sqrt(3) / 2, 1e-4);
+    CHECK_NEAR(min / (0.5 * 5000 * 0.003 * strain * strain * area), sqrt(3) / 2, 1e-4);
     shell_plan_close(&p);
 }
 
-/* C eq. 8: KS_l = 2^l KS_0 m_l/m_0, damping alike */
+/* paper C, eq. 8: KS_l = 2^l KS_0 m_l/m_0, damping alike */
 static void paper_law_softens_by_level(void)
 {
     for (int level = 0; level < 3; level++) {

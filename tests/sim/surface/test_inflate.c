@@ -195,7 +195,7 @@ static void stays_finite_when_flat_or_inside_out(void)
         double *g = malloc(3 * sizeof *g * (size_t)r.body.n_node);
         REQUIRE(g);
         for (int turn = 0; turn < (int)(sizeof scale / sizeof *scale); turn++) {
-            double power = 0, most = 0;
+            double power = 0, max = 0;
             for (int k = 0; k < 3 * r.body.n_active; k++) {
                 int i = 3 * r.body.active[k / 3] + k % 3;
                 r.body.x[i] = scale[turn][k % 3] * r.body.x_rest[i];
@@ -207,8 +207,8 @@ static void stays_finite_when_flat_or_inside_out(void)
                 int i = 3 * r.body.active[k / 3] + k % 3;
                 power += r.body.f[i] * g[i];
             }
-            for (int i = 0; i < r.body.n_node; i++) most = fmax(most, pal_norm3(g + 3 * (size_t)i));
-            CHECK_LE(shell_row_largest(&r), 10.6 * stiff_Pa * most);
+            for (int i = 0; i < r.body.n_node; i++) max = fmax(max, pal_norm3(g + 3 * (size_t)i));
+            CHECK_LE(shell_row_largest(&r), 10.6 * stiff_Pa * max);
             /* up from where it is too small, down from where it is too large */
             if (turn <= 1 || turn == 4 || turn == 5) CHECK(power > 0);
             if (turn == 6) CHECK(power < 0);
@@ -326,7 +326,7 @@ static void a_flattened_body_is_blown_up_by_its_gas(void)
 {
     for (int anchors = 0; anchors < 2; anchors++) {
         shell_scene s;
-        double least = 1;
+        double min = 1;
         pal_config_entry *item = world_sphere(&s, anchors);
         pal_entry_put_text(item, "kind", "gas", NULL);
         pal_entry_put_number(item, "absolute_Pa", 2000, NULL);
@@ -338,10 +338,10 @@ static void a_flattened_body_is_blown_up_by_its_gas(void)
             REQUIRE(!pal_world_step(s.world, 1.0 / 60));
             CHECK(pal_body_finite(s.body));
             CHECK_LE(pal_world_energy_J(s.world), 1.01 * energy_J);
-            least = fmin(least, world_volume(&s, s.body->x) / rest_m3);
+            min = fmin(min, world_volume(&s, s.body->x) / rest_m3);
         }
         printf("  volume %.6f of rest, least %.3f, %.2e of the size from rest\n", world_volume(&s, s.body->x) / rest_m3,
-               least, shell_scene_rms(&s) / s.body->length_scale_m);
+               min, shell_scene_rms(&s) / s.body->length_scale_m);
         CHECK_NEAR(world_volume(&s, s.body->x), rest_m3, 0.01 * rest_m3);
         if (anchors) CHECK_LE(shell_scene_rms(&s), 1e-3 * s.body->length_scale_m);
         shell_scene_close(&s);

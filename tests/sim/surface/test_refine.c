@@ -83,12 +83,12 @@ static void pinch(shell_scene *s, double force_N)
 /* farthest place at rest, from `at`, of a node that is not of level 0 */
 static double farthest_new(const shell_scene *s, const double at[3])
 {
-    double most = 0;
+    double max = 0;
     for (int k = 0; k < s->body->n_active; k++) {
         int i = pal_body_point(s->body, k);
-        if (i >= s->body->model.adaptive->levels.n_vertex[0]) most = fmax(most, pal_dist3(s->body->x_rest + 3 * i, at));
+        if (i >= s->body->model.adaptive->levels.n_vertex[0]) max = fmax(max, pal_dist3(s->body->x_rest + 3 * i, at));
     }
-    return most;
+    return max;
 }
 
 /* ---- where ---- */
@@ -138,13 +138,13 @@ static void never_has_more_than_max_node(void)
     take_sphere(&s);
     pal_entry_put_number(thresholds(&s, 0.001, 0, 0), "most_node", 150, NULL);
     REQUIRE(shell_scene_start(&s));
-    int most = 0;
+    int max = 0;
     for (int i = 0; i < 60; i++) {
         load_all(&s, pole, 0.08, (double[3]){0, 0, -1});
         steps(&s, 1.0 / 60);
-        if (s.body->n_active > most) most = s.body->n_active;
+        if (s.body->n_active > max) max = s.body->n_active;
     }
-    CHECK(most > 140 && most <= 150);
+    CHECK(max > 140 && max <= 150);
     shell_scene_close(&s);
 }
 
@@ -290,14 +290,14 @@ static void curvature_is_that_of_spheres_and_cylinders_and_no_rigid_motion_chang
 
 /* ---- when ---- */
 
-static uint64_t press_and_release(shell_scene *s, double *most)
+static uint64_t press_and_release(shell_scene *s, double *max)
 {
     uint64_t hash = 0;
     for (int i = 0; i < 300; i++) {
         pinch(s, i < 60 ? 0.1 : 0);
         steps(s, 1.0 / 60);
         hash = 31 * hash + pal_world_hash(s->world);
-        *most = fmax(*most, s->body->n_active);
+        *max = fmax(*max, s->body->n_active);
     }
     return hash;
 }
@@ -307,20 +307,20 @@ static void goes_back_to_the_coarse_mesh_and_repeats_bit_by_bit(void)
     uint64_t hash[2] = {0};
     for (int run = 0; run < 2; run++) {
         shell_scene s;
-        double most = 0;
+        double max = 0;
         take_sphere(&s);
         REQUIRE(shell_scene_start(&s));
         double mass = s.body->mass_kg[0];
-        hash[run] = press_and_release(&s, &most);
-        CHECK(most > 150);
+        hash[run] = press_and_release(&s, &max);
+        CHECK(max > 150);
         CHECK_INT(s.body->n_active, 114);
         CHECK_INT(s.body->model.adaptive->n_spring, 336);
         CHECK(s.body->mass_kg[0] == mass);
         CHECK_LE(shell_scene_rms(&s), 1e-3 * s.body->length_scale_m);
         if (run == 0) { /* the same world again */
             pal_world_reset(s.world);
-            most = 0;
-            CHECK(press_and_release(&s, &most) == hash[0]);
+            max = 0;
+            CHECK(press_and_release(&s, &max) == hash[0]);
         }
         shell_scene_close(&s);
     }
@@ -346,7 +346,7 @@ static void reset_goes_back_to_the_start_level(void)
 }
 
 /* most switches of one face within a second, the force on the pole being force(step) times the threshold there */
-static int most_switches(double (*force)(int), int n_step, bool spread)
+static int max_switches(double (*force)(int), int n_step, bool spread)
 {
     enum { WINDOW = 60 };
     shell_scene s;
@@ -354,7 +354,7 @@ static int most_switches(double (*force)(int), int n_step, bool spread)
     thresholds(&s, 0.05, 0, 0);
     if (!shell_scene_start(&s)) return 1000;
     const pal_adaptive_surface *adaptive = s.body->model.adaptive;
-    int n = adaptive->levels.first_face[3], most = 0, top = shell_scene_nearest(&s, pole);
+    int n = adaptive->levels.first_face[3], max = 0, top = shell_scene_nearest(&s, pole);
     uint8_t *was = malloc((size_t)n), (*switched)[WINDOW] = calloc((size_t)n, WINDOW);
     memcpy(was, adaptive->face_state, (size_t)n);
     for (int i = 0; i < n_step; i++) {
@@ -372,12 +372,12 @@ static int most_switches(double (*force)(int), int n_step, bool spread)
             was[k] = adaptive->face_state[k];
             int sum = 0;
             for (int w = 0; now && w < WINDOW; w++) sum += switched[k][w];
-            if (sum > most) most = sum;
+            if (sum > max) max = sum;
         }
     }
     free(was), free(switched);
     shell_scene_close(&s);
-    return most;
+    return max;
 }
 
 static double at_threshold(int i)
@@ -405,13 +405,13 @@ static double sweeps(int i)
 static void never_flickers(void)
 {
     const char *const what = "most switches of a face in a second";
-    HARD_CASE("threshold", "adaptive_springs", what, most_switches(at_threshold, 120, false), 1, "");
-    CHECK_INT(most_switches(around_threshold, 120, false), 1);
-    HARD_CASE("threshold", "adaptive_springs", what, most_switches(around_both, 120, false), 5, "");
-    int worst = most_switches(on_and_off, 240, false);
+    HARD_CASE("threshold", "adaptive_springs", what, max_switches(at_threshold, 120, false), 1, "");
+    CHECK_INT(max_switches(around_threshold, 120, false), 1);
+    HARD_CASE("threshold", "adaptive_springs", what, max_switches(around_both, 120, false), 5, "");
+    int worst = max_switches(on_and_off, 240, false);
     CHECK(worst >= 4 && worst <= 5);
     HARD_CASE("threshold", "adaptive_springs", what, worst, 5, "");
-    HARD_CASE("threshold", "adaptive_springs", what, most_switches(sweeps, 240, true), 5, "");
+    HARD_CASE("threshold", "adaptive_springs", what, max_switches(sweeps, 240, true), 5, "");
 }
 
 static void a_node_that_bears_a_lasting_load_is_not_taken_away(void)
@@ -475,7 +475,7 @@ static void a_moving_body_is_refined_like_one_at_rest(void)
     enum { STEPS = 75 };
     shell_scene s[2];
     double worst = 0;
-    int unlike = 0, most = 0;
+    int unlike = 0, max = 0;
     for (int run = 0; run < 2; run++) {
         take_sphere(&s[run]);
         REQUIRE(shell_scene_start(&s[run]));
@@ -488,7 +488,7 @@ static void a_moving_body_is_refined_like_one_at_rest(void)
         }
         const pal_body *a = s[0].body, *b = s[1].body;
         unlike += a->n_active != b->n_active;
-        most = a->n_active > most ? a->n_active : most;
+        max = a->n_active > max ? a->n_active : max;
         for (int k = 0; k < a->n_active && !unlike; k++) {
             int n = pal_body_point(a, k);
             double back[3] = {b->x[3 * n] - (i + 1) / 60.0, b->x[3 * n + 1], b->x[3 * n + 2]};
@@ -496,7 +496,7 @@ static void a_moving_body_is_refined_like_one_at_rest(void)
         }
     }
     CHECK_INT(unlike, 0);
-    CHECK(most > 200);
+    CHECK(max > 200);
     CHECK_LE(worst, 1e-4 * radius_m);
     for (int run = 0; run < 2; run++) shell_scene_close(&s[run]);
 }

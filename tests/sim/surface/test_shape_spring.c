@@ -1,4 +1,5 @@
-/* Anchors of adaptive surfaces (C eq. 10; errata C6, C7): they hold the shape and nothing else, whatever is refined. */
+/* Anchors of adaptive surfaces (paper C, eq. 10; errata C6, C7): they hold the shape and nothing else, whatever is
+ * refined. */
 #include "tests/fixtures/adaptive_components.h"
 #include "tests/fixtures/adaptive_worlds.h"
 
