@@ -4,9 +4,7 @@
 import { readdirSync, readFileSync, statSync } from "node:fs";
 import path from "node:path";
 
-// rings and headers of parts are counted as faults with --rings
-const rings_count = process.argv.includes("--rings");
-const tree = process.argv.slice(2).find((a) => !a.startsWith("--")) ?? path.join(import.meta.dirname, "../..");
+const tree = process.argv[2] ?? path.join(import.meta.dirname, "../..");
 
 // rooms from the lowest floor up; rooms of one line do not see each other
 const floors = [
@@ -54,7 +52,6 @@ const own_state =
 const level = new Map(floors.flatMap((rooms, i) => rooms.map((room) => [room, i])));
 const faults = [];
 const fault = (file, text) => faults.push(`${file}: ${text}`);
-const ring_fault = (file, text) => rings_count && fault(file, text);
 
 const walk = (folder) =>
     readdirSync(path.join(tree, folder), { withFileTypes: true }).flatMap((e) => {
@@ -147,7 +144,7 @@ function visit(u) {
     }
     if (ring.length < 2) return;
     rings++;
-    ring_fault(ring.sort()[0], `a ring of ${ring.length} files that include each other: ${ring.join(" ")}`);
+    fault(ring.sort()[0], `a ring of ${ring.length} files that include each other: ${ring.join(" ")}`);
 }
 for (const u of includes.keys()) if (!index.has(u)) visit(u);
 
@@ -160,7 +157,7 @@ for (const file of files) {
     if (names.has(name)) fault(file, `the name stands more than once in the tree: ${names.get(name)}`);
     names.set(name, file);
     if (/_parts\.h$/.test(name))
-        ring_fault(file, "a header of parts: a room has a core that knows nobody, and files that know the core");
+        fault(file, "a header of parts: a room has a core that knows nobody, and files that know the core");
     if (name.endsWith(".c")) folders.set(path.dirname(file), (folders.get(path.dirname(file)) ?? 0) + 1);
 }
 for (const [folder, n] of folders) if (n > 22) fault(folder, `${n} .c files, more than 22`);

@@ -18,7 +18,7 @@ plant() { # NAME FILE TEXT [EXIT [FILE TEXT]]: a clean little tree with what is 
     echo '#include "server/base/err.h"' >"$tree/server/mesh/geometry/clean.c"
     if [ -n "$2" ]; then printf '%s\n' "$3" >"$tree/$2"; fi
     if [ -n "${5-}" ]; then printf '%s\n' "$6" >"$tree/$5"; fi
-    node "$here/check_floors.mjs" --rings "$tree" >/dev/null 2>&1
+    node "$here/check_floors.mjs" "$tree" >/dev/null 2>&1
     code=$?
     rm -rf "$tree"
     verdict "$1" "${4:-1}" "$code"

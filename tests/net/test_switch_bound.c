@@ -4,6 +4,7 @@
  * is made beside the loop, not by it. */
 #include "server/estimate/estimation.h"
 #include "server/session/configuration_switch.h"
+#include "server/sim/core/blend.h"
 #include "tests/net/command_room.h"
 #include "tests/session/session_scene.h"
 
@@ -107,7 +108,8 @@ static void check_jump(const mem_client *c)
     CHECK(reported(c, "energy_before_J") > 1e-4);
     CHECK(reported(c, "max_move_m") > 0 && reported(c, "max_body_move_m") > 0);
     CHECK_LE(reported(c, "max_move_m"), bound_m);
-    CHECK_NEAR(reported(c, "max_frame_move_m"), reported(c, "max_move_m") / 10, 1e-9);
+    /* the share of the blend that one step lets in */
+    CHECK_NEAR(reported(c, "max_frame_move_m"), reported(c, "max_move_m") * scene.step_s / PAL_BLEND_TRANSFER_S, 1e-9);
     CHECK(strstr(text, "within the bound") != NULL);
     CHECK(!strstr(text, "beyond 2 %"));
 }

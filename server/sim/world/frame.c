@@ -1,7 +1,6 @@
 /* Frames: memory for what a step shows. */
 #include "server/sim/world/frame.h"
 
-#include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
 #include <stdlib.h>

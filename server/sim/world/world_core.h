@@ -14,6 +14,7 @@ typedef struct pal_world_part {
     int32_t *parent; /* of midpoints, of an adaptive body; else NULL */
 } pal_world_part;
 
+typedef struct pal_world pal_world;
 struct pal_world {
     pal_arena *arena, *scratch;
     pal_plan plan;
