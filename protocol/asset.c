@@ -1,8 +1,8 @@
 /* Asset container: a 40-byte header, then one LZ4-HC block of byte planes.
  *
  * Every section is an array of u32 or u16 written as planes (all low bytes, then the next, ...): indices are first
- * turned into small differences, so that the high planes are runs which LZ4 removes. README.md, "Assets", has the
- * tables. */
+ * turned into small differences, so that the high planes are runs which LZ4 removes. protocol/README.md, "Assets", has
+ * the tables. */
 #include "protocol/asset.h"
 
 #include "protocol/bytes.h"

@@ -1,4 +1,4 @@
-/* The text messages of palpate.v2: one JSON object each, `type` says which (README.md, "Control").
+/* The text messages of palpate.v2: one JSON object each, `type` says which (protocol/README.md, "Control").
  *
  * Structs on this side, JSON on the wire, no JSON type in between. pal_control_get reads untrusted text: size, nesting,
  * number of values, UTF-8 and every field are checked; unknown keys are ignored (that is how the protocol grows),
@@ -211,7 +211,7 @@ typedef struct pal_wire_command {     /* an order to the session */
     pal_wire_arg arg[PAL_WIRE_ARG_MAX]; /* numbers by name, SI, e.g. young_Pa                       */
 } pal_wire_command;
 
-/* to the one who gave the order: what was done, in a sentence, and its numbers (README.md, "Sculpting") */
+/* to the one who gave the order: what was done, in a sentence, and its numbers (protocol/README.md, "Sculpting") */
 typedef struct pal_wire_answer {
     char verb[32];
     char text[PAL_WIRE_TEXT_BYTES];
@@ -219,7 +219,7 @@ typedef struct pal_wire_answer {
     pal_wire_arg arg[PAL_WIRE_ARG_MAX];
 } pal_wire_answer;
 
-/* one setting of a study: what it costs and how far off it is (README.md, "What accuracy costs") */
+/* one setting of a study: what it costs and how far off it is (protocol/README.md, "Accuracy") */
 typedef struct pal_wire_study_point {
     uint32_t index;                     /* in the server's list: arg of the order `study_point`        */
     char method[PAL_WIRE_METHOD_BYTES]; /* points of one method belong together                 */

@@ -1,4 +1,5 @@
-/* FIELD: one number per shown vertex of one part, for colouring: displacement, stress ... (README.md, "FIELD").
+/* FIELD: one number per shown vertex of one part, for colouring: displacement, stress ... (protocol/README.md,
+ * "FIELD").
  *
  * Values are quantised to one byte between the least and the largest of them and packed in one LZ4 block. A message
  * stands alone and is sent only to clients that asked with `subscribe_field`. Error of a decoded value: half of (high -

@@ -1,4 +1,4 @@
-/* FRAME encoder and decoder (README.md, "FRAME").
+/* FRAME encoder and decoder (protocol/README.md, "FRAME").
  *
  * X, the reconstruction in q/16, is kept as four int32 per vertex (the fourth unused), so that one 16-byte load serves
  * a neighbour on all axes. Prediction needs |sum w X| < 2^31: |X| < 2^18 and sum |w| <= 8191 give it; the encoder

@@ -1,4 +1,4 @@
-/* FRAME: the shown vertices of one part, coded alone against the rest pose (README.md, "FRAME").
+/* FRAME: the shown vertices of one part, coded alone against the rest pose (protocol/README.md, "FRAME").
  *
  * Displacements are predicted in a coarse-to-fine order from the vertices already reconstructed, the rest is quantised
  * with step q (closed loop, so that errors do not add up), written as Rice codes in groups of 16 vertices and packed in

@@ -1,4 +1,4 @@
-/* TOPOLOGY_DELTA: the triangles of a part that adapts, as far as they changed (README.md, "TOPOLOGY_DELTA").
+/* TOPOLOGY_DELTA: the triangles of a part that adapts, as far as they changed (protocol/README.md, "TOPOLOGY_DELTA").
  *
  * Such a part has a table of places, one triangle or 0 0 0 (empty) each; the asset holds the table at load. A message
  * names changed places and what stands in them now. It does not stand alone: the first to a client is relative to the

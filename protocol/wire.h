@@ -38,7 +38,7 @@ typedef enum pal_wire_kind {
     PAL_WIRE_ACK = 17            /* client to server: cycle taken in, gives credit              */
 } pal_wire_kind;
 
-/* websocket close codes with the meaning they have here (README.md, "Closing") */
+/* websocket close codes with the meaning they have here (protocol/README.md, "Closing") */
 typedef enum pal_wire_close {
     PAL_WIRE_CLOSE_NORMAL = 1000,
     PAL_WIRE_CLOSE_GOING_AWAY = 1001, /* server ends, page leaves               */
@@ -98,7 +98,7 @@ typedef struct pal_wire_pose {
 size_t pal_wire_put_pose(uint8_t *dst, size_t cap, const pal_wire_pose *p);
 int pal_wire_get_pose(const uint8_t *bytes, size_t n_byte, pal_wire_pose *out);
 
-/* ACK, client to server, one per TOOLS message taken in (README.md, "Credit"). */
+/* ACK, client to server, one per TOOLS message taken in (protocol/README.md, "Cycles and credit"). */
 typedef struct pal_wire_ack {
     uint32_t cycle;     /* of the TOOLS message: all messages of this and earlier cycles were processed */
     uint32_t decode_us; /* time the client spent on decoding the cycle's frames, for statistics         */

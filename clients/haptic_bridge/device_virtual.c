@@ -1,4 +1,4 @@
-/* Virtual device and hand (README.md, "Devices").
+/* Virtual device and hand (clients/haptic_bridge/README.md, "Devices").
  *   plant     m v' = Fa + k1 (xh - x) + b1 (vh - v) - b v - Coulomb(fc, stick)
  *   hand      M vh' = -(k1 (xh - x) + b1 (vh - v)) + k2 (xd - xh) - b2 vh
  *   actuator  Fa' = (F - Fa) / tau, F applied one tick after it was written, clamped to the peak

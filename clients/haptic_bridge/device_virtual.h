@@ -1,6 +1,6 @@
-/* The virtual device and hand (README.md, "Devices"): a lumped plant with friction, encoder steps, actuator lag and one
- * tick of delay, held by a two-mass hand that follows a script. Deterministic: in virtual time the same calls give the
- * same numbers.
+/* The virtual device and hand (clients/haptic_bridge/README.md, "Devices"): a lumped plant with friction, encoder
+ * steps, actuator lag and one tick of delay, held by a two-mass hand that follows a script. Deterministic: in virtual
+ * time the same calls give the same numbers.
  *
  * id: "touch" or "touch,key=value,..." with the devices touch premium omega3 inverse3 falcon and the keys
  *   hand    average light firm off       (average; off: no hand, a constant push of 0.5 N downward)

@@ -1,5 +1,5 @@
 /* The local contact model a bridge renders between two messages of the server: tangent plane patches of the zero-force
- * surface, in the tool centre's configuration space (README.md, "One tick").
+ * surface, in the tool centre's configuration space (clients/haptic_bridge/README.md, "One tick").
  *
  * Per convex group: d_i = n_i . (p_i + v_i min(age, 50 ms) - x); contact when all d_i > 0; the patch with the least d
  * acts (0.1 mm hysteresis):

@@ -1,4 +1,4 @@
-/* The real-time thread that runs a servo, its watchdog and its own measurement (README.md, "Real time").
+/* The real-time thread of a servo, its watchdog and its own measurement (clients/haptic_bridge/README.md, "Real time").
  *
  * Absolute clock_nanosleep; a tick later than one period counts as missed and is skipped, never caught up. SCHED_FIFO
  * 80 (watchdog 81), locked memory, touched stack and the last processor when the system allows them; what it does not

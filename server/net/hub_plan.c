@@ -1,6 +1,6 @@
 /* What clients are told of a plan: its rows, whose they are, which of them are switched off; and of its bodies: who
- * stands still and why, who sleeps. Rows are switched and single bodies reset by orders (protocol/README.md, "Rows,
- * rescues, sleep"). */
+ * stands still and why, who sleeps. Rows are switched and single bodies reset by orders (protocol/README.md,
+ * "Components and bodies"). */
 #include "server/net/hub_plan.h"
 
 #include "server/base/clock.h"

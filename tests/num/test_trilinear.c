@@ -124,7 +124,7 @@ static void matrix_is_the_interpolation_of_its_points(void)
 }
 
 /* points in the lower half along x of a 9x3x3 grid touch its first five planes only: 45 of 81 nodes, and those exactly
- * on a plane touch no node beyond it (the paper's bar keeps 54, erratum B13) */
+ * on a plane touch no node beyond it (the paper states 54 for such a grid: erratum B13) */
 static void nodes_that_touch_no_point_are_dropped(void)
 {
     const pal_grid grid = {{9, 3, 3}, {0, 0, 0}, {8, 2, 2}};

@@ -1,6 +1,6 @@
 /* Hard cases (catalogue.txt) for model subdivision_fem: the demo chair, thin cells of which none is cubic, three
  * in ten elements pyramids, 16 sub-steps in a step of central_cg. On one point, mirrored, shuffled, drawn out
- * eightfold: elements with one rotation each rested folded there (cell_recovery.h). */
+ * eightfold: elements with one rotation each rested folded there (cell_recovery.c). */
 #include "server/mesh/cells/cell_models.h"
 #include "tests/fixtures/random.h"
 #include "tests/stability/hard_case.h"

@@ -7,7 +7,7 @@
  *
  * Acts on nodes: body->d from solid->node_rest, forces to body->f. Moduli are those of solid->samples; when these
  * change (painting, a live edit of the material), the constants are computed again before their next use. Inverted
- * elements run on the edges of their cells (cell_recovery.h), counted and timed in
+ * elements run on the edges of their cells (cell_recovery.c), counted and timed in
  * body->safeguards. There is no bound of stiffness: nodes are no degrees of freedom, and solvers that need a limit find
  * it by differences of forces. For the same reason the tangent is given by products only. */
 #include "server/base/clock.h"

@@ -5,7 +5,7 @@
  * inside a box or of the lowest part of the control cells, and what they hold is no unknown (paper A section 3.3). What
  * is shown and touched is the boundary of the subdivided cells; without the cells behind a cut where the body is cut.
  *
- * Elements that are inverted become patches until they are not (cell_recovery.h). Above nu 0.3, of what there is at
+ * Elements that are inverted become patches until they are not (cell_recovery.c). Above nu 0.3, of what there is at
  * load, whole control cells keep a part of the volume instead of each element (cell_volume.c).
  *
  * Keys: levels (2; 0 to 8) of subdivision, rule ("maccracken_joy" | "averaging"), operator ("polar" | "edges", of the
