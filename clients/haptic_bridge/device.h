@@ -1,9 +1,9 @@
-/* The back-end interface of the bridge, and at the same time the C ABI of a plug-in: a plug-in is a
- * shared object that exports `const pal_haptic_v1 *pal_haptic_entry(void)`. Every back end implements this table.
+/* The back-end interface of the bridge, and the C ABI of a plug-in: a shared object that exports the function
+ * `const pal_haptic_v1 *pal_haptic_entry(void)`. Every back end implements this table.
  *
- * Units m, m/s, N, N m, s; axes of the device: x to the user, y right, z up; origin in the middle of its workspace.
- * Results of functions: 0 ok, > 0 warning, < 0 error (text by strerror).
- * Thread: probe, open, close, force_enable [load]; read and write [servo]; stop [any], async-safe. */
+ * Units: m, m/s, N, N m, s. Device axes: x to the user, y right, z up; origin at the centre of its workspace. Return
+ * values: 0 ok, > 0 warning, < 0 error (text from strerror). Thread: probe, open, close, force_enable [load]; read and
+ * write [servo]; stop [any], async-signal-safe. */
 #ifndef PAL_HAPTIC_BRIDGE_DEVICE_H
 #define PAL_HAPTIC_BRIDGE_DEVICE_H
 #include <stddef.h>
@@ -17,10 +17,10 @@ enum { PAL_DEVICE_BUTTON_GRASP = 1, PAL_DEVICE_BUTTON_CLUTCH = 2, PAL_DEVICE_BUT
 typedef struct pal_dev_info {
     uint32_t size; /* sizeof of the caller's struct */
     char name[64];
-    double peak_N, continuous_N; /* force the device can give, and for ever          */
-    double stiffness_max_N_m;    /* largest contact stiffness it renders stably      */
+    double peak_N, continuous_N; /* maximum force, peak and continuous */
+    double stiffness_max_N_m;    /* largest contact stiffness rendered stably */
     double damping_max_Ns_m;
-    double low_m[3], high_m[3]; /* workspace                                         */
+    double low_m[3], high_m[3]; /* workspace bounds */
     int32_t dof_in, dof_out;
     int32_t pose_only; /* 1: no force                                       */
     int32_t thread_model;
@@ -31,19 +31,19 @@ typedef struct pal_dev_state {
     uint32_t buttons; /* PAL_DEVICE_BUTTON_*                                          */
     double position_m[3];
     double quat[4];           /* w x y z, handle to device                                    */
-    double grip;              /* opening, rad or m                                            */
-    uint64_t stamp_us;        /* device's time                                                */
-    double motor_temperature; /* fraction of the limit, 0 unknown                        */
+    double grip;              /* gripper opening, rad or m */
+    uint64_t stamp_us;        /* device clock */
+    double motor_temperature; /* fraction of the limit; 0: unknown */
 } pal_dev_state;
 
 typedef struct pal_haptic_v1 {
     uint32_t abi, size;                   /* PAL_HAPTIC_ABI, sizeof of this table */
     const char *name;                     /* "virtual"                              */
-    int (*probe)(char *reason, size_t n); /* how many devices are there, or < 0 and the reason in why */
-    int (*open)(void **handle, const char *id, pal_dev_info *out); /* id: what follows "name:" */
+    int (*probe)(char *reason, size_t n); /* returns the number of devices, or < 0 with the reason in `reason` */
+    int (*open)(void **handle, const char *id, pal_dev_info *out); /* id: the text after "name:" */
     int (*read)(void *handle, pal_dev_state *state);
     int (*write)(void *handle, const double force_N[3], const double torque_N_m[3], double grip);
-    int (*run)(void *handle, int (*tick)(void *), void *user); /* callback and request-reply devices, else NULL */
+    int (*run)(void *handle, int (*tick)(void *), void *user); /* callback and request-reply devices; else NULL */
     int (*force_enable)(void *handle, int on);
     int (*stop)(void *handle); /* zero force and brake */
     void (*close)(void *handle);
@@ -52,8 +52,8 @@ typedef struct pal_haptic_v1 {
 
 typedef const pal_haptic_v1 *(*pal_haptic_entry_fn)(void);
 
-/* the back ends of this build, NULL beyond the last */
+/* back ends of this build; NULL beyond the last */
 const pal_haptic_v1 *pal_device_backend(int index);
-/* by name, n_name bytes of it; NULL: none */
+/* finds a back end by name of n_name bytes; NULL: none */
 const pal_haptic_v1 *pal_device_find(const char *name, size_t n_name);
 #endif

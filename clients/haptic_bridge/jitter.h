@@ -1,5 +1,6 @@
-/* Log2 histogram of times with 32 steps per octave (3 % resolution), for period and lateness of a servo loop.
- * Adding is a few instructions without branches on memory; one thread writes. Reading a copy: any thread. */
+/* Log2 histogram of times with 32 bins per octave (3 % resolution), for the period and lateness of a servo loop.
+ * Adding takes a few instructions without data-dependent branches on memory. One thread writes; any thread may read a
+ * copy. */
 #ifndef PAL_HAPTIC_BRIDGE_JITTER_H
 #define PAL_HAPTIC_BRIDGE_JITTER_H
 #include <stdint.h>
@@ -13,6 +14,6 @@ typedef struct pal_jitter {
 
 void pal_jitter_add(pal_jitter *j, uint64_t ns);
 void pal_jitter_merge(pal_jitter *into, const pal_jitter *from);
-/* upper edge of the bin that holds the fraction, us; at most the maximum; 0 when empty */
+/* upper edge of the bin at this fraction, us; at most the maximum; 0 when empty */
 double pal_jitter_at_us(const pal_jitter *j, double fraction);
 #endif

@@ -1,18 +1,25 @@
 /* One tick of the bridge (README.md): device pose in, local contact force out, states, limits.
  *
  * The servo owns no thread: servo_thread.h calls pal_servo_tick from a real-time loop, tests call it in virtual time.
- * A tick takes no lock, calls no heap and does no input or output but the device's. Models come in and views go out by
- * triple buffer, events by ring; e-stop and re-arm are atomic flags.
+ * A tick takes no lock, allocates no memory, and does no input or output except the device's. Models arrive and views
+ * leave through triple buffers, events through a queue; e-stop and re-arm are atomic flags.
  *
- * States: ARMING until the dead man's switch is held and the handle rests (< 0.05 m/s) for 0.5 s, then force fades in
- * over 1 s; FREE and CONTACT render; STALE when the newest model is older than max(100 ms, 4 frame times, twice the
- * usual longest gap): force fades out over 500 ms under 3 N s/m damping, then FREE without a model (0.5 N s/m); a new
- * model fades in over 250 ms. ESTOP and FAULT give no force until re-armed; e-stop is latched, a fault of speed, a
- * number or a stalled loop re-arms by ARMING's conditions, a device that does not answer does not.
- * Limits: |F| <= cap, may rise by cap / 10 ms and fall at once; rms of 1 s above the device's continuous rating scales
- * force down; contact stiffness <= device's / (scale force_scale), 300 N/m without real time; walls of 200 N/m at 95 %
- * of the workspace. World: x_w = origin + scale R (x_d - centre), F_d = force_scale R' F_w. While the clutch button is
- * down the world pose stands still and force is faded out. */
+ * States:
+ *   - ARMING lasts until the dead man's switch is held and the handle rests (< 0.05 m/s) for 0.5 s; force then fades in
+ *     over 1 s.
+ *   - FREE and CONTACT render forces.
+ *   - STALE begins when the newest model is older than max(100 ms, 4 frame times, twice the usual longest gap). Force
+ *     fades out over 500 ms under 3 N s/m damping; FREE without a model (0.5 N s/m) follows. A new model fades in over
+ *     250 ms.
+ *   - ESTOP and FAULT give no force until re-armed. E-stop is latched. A fault of speed, number or stalled loop re-arms
+ *     by the conditions of ARMING; a device that does not answer does not re-arm.
+ *
+ * Limits: |F| <= cap, rising by at most cap / 10 ms and falling without limit. An rms over 1 s above the device's
+ * continuous rating scales force down. Contact stiffness <= device limit / (scale force_scale), 300 N/m without real
+ * time. Walls of 200 N/m stand at 95 % of the workspace.
+ *
+ * World frame: x_w = origin + scale R (x_d - centre), F_d = force_scale R' F_w. While the clutch button is down, the
+ * world pose is constant and force is faded out. */
 #ifndef PAL_HAPTIC_BRIDGE_SERVO_H
 #define PAL_HAPTIC_BRIDGE_SERVO_H
 #include "clients/haptic_bridge/device.h"
@@ -53,50 +60,50 @@ typedef enum pal_servo_event_kind {
 typedef struct pal_servo_event {
     int16_t kind, code;
     float value;
-    const char *text; /* constant */
+    const char *text; /* static string */
 } pal_servo_event;
 
 typedef struct pal_servo_options {
-    const pal_haptic_v1 *backend; /* borrowed                                                       */
-    void *device;                 /* opened, borrowed                                               */
+    const pal_haptic_v1 *backend; /* borrowed */
+    void *device;                 /* open, borrowed */
     pal_dev_info info;
     double rate_hz;            /* nominal, 1000                                                 */
-    double force_cap_N;        /* 0: least of 3 N and the device's peak                         */
-    double origin_m[3];        /* world place of the workspace's centre                          */
+    double force_cap_N;        /* 0: the smaller of 3 N and the device's peak */
+    double origin_m[3];        /* world position of the workspace centre */
     double rotation[9];        /* device to world, row-major                                     */
     double scale, force_scale; /* 0: 1                                                           */
     bool pose_only;
-    bool hand_off; /* the hand looks off: damping floor 5 ms instead of 2.5 ms       */
+    bool hand_off; /* the hand appears off the handle: damping floor 5 ms instead of 2.5 ms */
 } pal_servo_options;
 
-/* copies. [load] */
+/* copies options. [load] */
 pal_err pal_servo_create(const pal_servo_options *options, pal_servo **out);
 void pal_servo_destroy(pal_servo *servo); /* NULL is fine */
 
-/* [servo] one tick at this time; times must not go back */
+/* [servo] one tick at now_ns, which must not decrease */
 void pal_servo_tick(pal_servo *servo, uint64_t now_ns);
-/* [servo] real-time class, by the loop's own measurement: 0 good, 1 stiffness limited, 2 forces off */
+/* [servo] real-time class measured by the loop: 0 good, 1 stiffness limited, 2 forces off */
 void pal_servo_set_degraded(pal_servo *servo, int level);
-/* [servo] zero force to the device, at the end */
+/* [servo] sends zero force to the device, at the end */
 void pal_servo_end(pal_servo *servo);
 
-/* [net] newest model wins; generation changes with every new session (reconnect): older models are dropped.
- * arrival_ns: pal_clock_ns when it came */
+/* [net] The newest model wins. generation changes with every new session (reconnect); models of older ones are
+ * dropped. arrival_ns: pal_clock_ns of its arrival */
 void pal_servo_put_model(pal_servo *servo, const pal_wire_haptic *model, uint32_t generation, uint64_t arrival_ns);
-/* [net] the server is gone or came back as another session: drop the model at once, fade */
+/* [net] the server is lost or has returned as another session: drops the model at once and fades */
 void pal_servo_put_generation(pal_servo *servo, uint32_t generation);
-/* [net] moves the world place of the workspace's centre; taken while there is no force */
+/* [net] moves the world position of the workspace centre; applied while there is no force */
 void pal_servo_put_origin(pal_servo *servo, const double origin_m[3]);
 void pal_servo_estop(pal_servo *servo);   /* [any] async-signal-safe; takes effect within one tick */
 void pal_servo_rearm(pal_servo *servo);   /* [any] clears e-stop: ARMING follows                   */
 void pal_servo_stalled(pal_servo *servo); /* [any] the watchdog has stopped the device: ARMING follows */
 
-/* what others may know of a tick */
+/* state of one tick, for other threads */
 typedef struct pal_servo_view {
     uint64_t stamp_ns, n_tick;
     pal_servo_state state;
     double position_m[3], quat[4], velocity_m_s[3]; /* world */
-    double force_N[3];                              /* world, really commanded, on the hand */
+    double force_N[3];                              /* commanded force on the hand, world */
     double device_m[3];
     double fade, grip;
     uint32_t flags, buttons; /* PAL_WIRE_POSE_*, PAL_WIRE_GRASP       */
@@ -105,12 +112,12 @@ typedef struct pal_servo_view {
     uint64_t n_model, n_model_old, n_bad_read, n_saturated, n_clamped, n_stale, n_fault, n_not_finite;
     double force_rms_N, force_max_N, jump_max_N; /* jump: largest step at a model change */
     double depth_m, motor_temperature;
-    double rendered_stiffness_N_m; /* tangent force over depth, 0 out of contact */
+    double rendered_stiffness_N_m; /* norm of the contact force / depth; 0 out of contact */
 } pal_servo_view;
 /* [net] newest unseen view or NULL; valid until the next call */
 const pal_servo_view *pal_servo_take_view(pal_servo *servo);
 /* [net] next event; false: none */
 bool pal_servo_take_event(pal_servo *servo, pal_servo_event *out);
-/* [any] grows with every tick, for the watchdog */
+/* [any] increases with every tick, for the watchdog */
 uint64_t pal_servo_ticks(const pal_servo *servo);
 #endif

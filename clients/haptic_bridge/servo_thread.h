@@ -1,9 +1,11 @@
-/* The real-time thread of a servo, its watchdog and its own measurement (clients/haptic_bridge/README.md, "Real time").
+/* The real-time thread of a servo, its watchdog and its timing measurement (clients/haptic_bridge/README.md, "Real
+ * time").
  *
- * Absolute clock_nanosleep; a tick later than one period counts as missed and is skipped, never caught up. SCHED_FIFO
- * 80 (watchdog 81), locked memory, touched stack and the last processor when the system allows them; what it does not
- * is stated. Every second the lateness of the last 10 s decides: p99.9 above 2 ms limits stiffness, above 10 ms or more
- * than 1 % missed turns forces off. The watchdog stops the device when no tick has happened for 20 ms. */
+ * The loop uses absolute clock_nanosleep. A tick later than one period counts as missed and is skipped, never caught
+ * up. Where the system allows it: SCHED_FIFO 80 (watchdog 81), locked memory, a prefaulted stack, the last processor;
+ * what it refuses is reported. Every second the lateness of the last 10 s is checked: p99.9 above 2 ms limits
+ * stiffness; above 10 ms, or more than 1 % missed ticks, forces are off. The watchdog stops the device after 20 ms
+ * without a tick. */
 #ifndef PAL_HAPTIC_BRIDGE_SERVO_THREAD_H
 #define PAL_HAPTIC_BRIDGE_SERVO_THREAD_H
 #include "clients/haptic_bridge/jitter.h"
@@ -20,11 +22,11 @@ typedef struct pal_servo_timing {
     uint64_t n_watchdog; /* times the watchdog stopped the device */
 } pal_servo_timing;
 
-/* starts both threads; borrows servo and device until stop. note: what the system refused, "" when nothing. [load] */
+/* Starts both threads; borrows servo and device until stop. diag: what the system refused, "" for nothing. [load] */
 pal_err pal_servo_thread_start(pal_servo *servo, const pal_servo_options *options, pal_diagnostic *diag,
                                pal_servo_thread **out);
-/* ends the threads with zero force; *timing is the whole run's, may be NULL. NULL thread is fine. [load] */
+/* ends the threads with zero force; *timing: of the whole run, may be NULL. NULL thread is fine. [load] */
 void pal_servo_thread_stop(pal_servo_thread *thread, pal_servo_timing *timing);
-/* [net] the timing as of the last full second; NULL: not newer than at the last call */
+/* [net] timing as of the last full second; NULL: unchanged since the last call */
 const pal_servo_timing *pal_servo_thread_timing(pal_servo_thread *thread);
 #endif

@@ -1,6 +1,6 @@
-/* Flags of the client programs: a table says what there is, the rest is refused by name.
- * `--name value` and `--name=value` are the same; a switch takes no value; an option with `bare` may stand alone and
- * then means that text. Every program has --help; exit codes are 0 ok, 1 refused or failed, 2 usage. Thread: [load]. */
+/* Flags of the client programs, parsed by a table; unknown flags are refused by name. `--name value` and
+ * `--name=value` are equivalent. A switch takes no value. An option with `bare` may stand alone and then has that
+ * value. Every program has --help; exit codes are 0 ok, 1 refused or failed, 2 usage. Thread: [load]. */
 #ifndef PAL_LINK_CLIENT_FLAGS_H
 #define PAL_LINK_CLIENT_FLAGS_H
 #include <stdbool.h>
@@ -9,12 +9,12 @@ typedef enum pal_client_flag_kind { PAL_CLIENT_SWITCH, PAL_CLIENT_TEXT, PAL_CLIE
 
 typedef struct pal_client_flag {
     const char *name;  /* "--rate"                                       */
-    const char *value; /* word for the value in the manual, NULL: switch */
+    const char *value; /* placeholder of the value in the help; NULL: switch */
     pal_client_flag_kind kind;
-    void *out;        /* bool *, const char ** or double *; untouched when absent */
-    double low, high; /* range of a number                              */
-    const char *bare; /* text meant by the flag alone (as last word or before another flag), or NULL */
-    const char *help; /* one line, or several                           */
+    void *out;        /* bool *, const char ** or double *; unchanged when absent */
+    double low, high; /* range of a number */
+    const char *bare; /* value of the flag alone (as last word or before another flag), or NULL */
+    const char *help; /* one or more lines */
 } pal_client_flag;
 
 typedef struct pal_client_table {
@@ -24,8 +24,8 @@ typedef struct pal_client_table {
     int min_operand, max_operand;
 } pal_client_table;
 
-/* -1: go on; else the exit code (0 after --help, 2 after one line on stderr). operand: max_operand places */
+/* -1: continue; else the exit code (0 after --help, 2 after one line on stderr). operand: [max_operand] */
 int pal_client_flags_parse(const pal_client_table *table, int argc, char **argv, const char **operand, int *n_operand);
-/* three numbers "x,y,z"; false: not that */
+/* three numbers "x,y,z"; false: malformed */
 bool pal_client_parse_vector(const char *text, double out[3]);
 #endif

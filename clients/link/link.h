@@ -1,16 +1,17 @@
-/* A client of palpate.v2 over libwebsockets, and the one event loop it runs on: shared by palpate-client,
- * palpate-lcm and palpate-bridge.
+/* A client of palpate.v2 over libwebsockets and its event loop, shared by palpate-client, palpate-lcm and
+ * palpate-bridge.
  *
- * A pal_link_loop is one libwebsockets context; all its links, gets, timers and watched descriptors call back on the
- * thread inside pal_link_run ([net]). Only pal_link_stop and pal_link_wake may be called from other threads.
- * A link connects, joins, and connects again with growing pauses (0.25 s doubling to 5 s, by timer) until it is closed
- * or the server refuses for good (README.md of protocol, "Closing"). Sending never blocks: the newest pose and the
- * newest acknowledgement wait in one place each, control messages in a queue of 16; one message is written each time
- * the socket is writable, control first. Of ws URLs only plain ones are taken (TLS ends at a proxy).
+ * A pal_link_loop is one libwebsockets context. Its links, gets, timers and watched descriptors call back on the
+ * thread inside pal_link_run ([net]). Other threads may call only pal_link_stop and pal_link_wake.
+ *
+ * A link connects and joins. After a loss it reconnects by timer, with pauses that double from 0.25 s to 5 s, until it
+ * is closed or the server refuses permanently (protocol/README.md, "Closing"). Sending never blocks: the newest pose
+ * and the newest acknowledgement wait in one slot each, control messages in a queue of 16. One message is written each
+ * time the socket is writable, control first. Only plain ws URLs are accepted; a proxy terminates TLS.
  *
  *     pal_link_loop *loop; pal_link *link;
  *     pal_link_loop_create(&loop);
- *     pal_link_open(loop, &(pal_link_options){.url = "ws://127.0.0.1:8090/ws", .events = &events, .user = me}, &note,
+ *     pal_link_open(loop, &(pal_link_options){.url = "ws://127.0.0.1:8090/ws", .events = &events, .user = me}, &diag,
  *                   &link);
  *     pal_link_run(loop);           // until pal_link_stop
  *     pal_link_loop_destroy(loop);  // closes and frees links, timers, watches */
@@ -28,79 +29,80 @@ typedef struct pal_link_timer pal_link_timer;
 
 pal_err pal_link_loop_create(pal_link_loop **out);          /* [load] MEMORY */
 void pal_link_loop_destroy(pal_link_loop *loop);            /* [load] after pal_link_run has returned; NULL is fine */
-void pal_link_run(pal_link_loop *loop);                     /* this thread is [net] until pal_link_stop */
+void pal_link_run(pal_link_loop *loop);                     /* the calling thread is [net] until pal_link_stop */
 void pal_link_run_for(pal_link_loop *loop, double seconds); /* the same, for at most that time (tests) */
 void pal_link_stop(pal_link_loop *loop);                    /* [any] */
-/* [any] makes the loop call `woken` soon; several wakes may become one call */
+/* [any] makes the loop call `woken` soon; several wakes may share one call */
 void pal_link_wake(pal_link_loop *loop);
 void pal_link_set_wake(pal_link_loop *loop, void (*woken)(void *user), void *user); /* [load] */
 
 typedef enum pal_link_state {
     PAL_LINK_CONNECTING,
-    PAL_LINK_OPEN,   /* websocket is up, join was sent            */
-    PAL_LINK_JOINED, /* hello came: poses may be sent             */
-    PAL_LINK_LOST,   /* connection lost, it will be tried again   */
-    PAL_LINK_ENDED   /* refused or not to be tried again          */
+    PAL_LINK_OPEN,   /* websocket is open, join was sent */
+    PAL_LINK_JOINED, /* hello was received: poses may be sent */
+    PAL_LINK_LOST,   /* connection lost, reconnecting */
+    PAL_LINK_ENDED   /* refused or not to be retried */
 } pal_link_state;
 
-/* all called [net]; any of them may be NULL; bytes and messages are borrowed for the call */
+/* all called [net]; any may be NULL; bytes and messages are borrowed for the call */
 typedef struct pal_link_events {
-    /* why: sentence for people; code: websocket close code, 0 when there is none */
+    /* reason: a sentence for the user; code: websocket close code, 0: none */
     void (*state)(void *user, pal_link *link, pal_link_state state, int code, const char *reason);
-    /* every text message of the server, well-formed; hello too, before state JOINED */
+    /* every well-formed text message of the server; hello too, before state JOINED */
     void (*control)(void *user, pal_link *link, const pal_control *c);
-    /* every whole binary message with a known head of the server's kinds; the body is unchecked */
+    /* every whole binary message of a server kind with a valid header; the body is unchecked */
     void (*message)(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte);
-    /* a message of the server that is not well-formed (pal_refusal); it is dropped, the connection stays */
+    /* a malformed message of the server (pal_refusal); it is dropped, the connection stays open */
     void (*fault)(void *user, pal_link *link, int refusal);
 } pal_link_events;
 
 typedef struct pal_link_options {
-    const char *url;  /* ws://host[:port][/path]; http:// is the same; path "/ws" by default; copied   */
+    const char *url;  /* ws://host[:port][/path]; http:// is equivalent; default path "/ws"; copied */
     const char *name; /* of the member; copied                                             */
     pal_wire_role role;
-    int tool;             /* wanted: index, PAL_WIRE_TOOL_ANY or PAL_WIRE_TOOL_NONE                      */
-    bool topology_deltas; /* takes TOPOLOGY_DELTA (triangle_table.h); else parts that adapt look as at load          */
-    bool once;            /* do not connect again after the first loss                                   */
-    double read_bytes_s;  /* > 0: take no more than this many bytes per second (a slow client)           */
-    const pal_link_events *events; /* borrowed while the link lives                                               */
+    int tool;             /* requested: index, PAL_WIRE_TOOL_ANY or PAL_WIRE_TOOL_NONE */
+    bool topology_deltas; /* accepts TOPOLOGY_DELTA (triangle_table.h); without it, adaptive parts keep the triangles of
+                             their asset */
+    bool once;            /* does not reconnect after the first loss */
+    double read_bytes_s;  /* > 0: read limit, bytes per second (a slow client) */
+    const pal_link_events *events; /* borrowed while the link lives */
     void *user;
 } pal_link_options;
 
-/* begins to connect; REFUSED: URL is not understood. [net] or before pal_link_run */
+/* starts connecting; REFUSED: invalid URL. [net] or before pal_link_run */
 pal_err pal_link_open(pal_link_loop *loop, const pal_link_options *options, pal_diagnostic *diag, pal_link **out);
-/* says goodbye (1000) and frees the link, no further events. [net] or after pal_link_run; NULL is fine */
+/* closes with 1000 and frees the link, no further events. [net] or after pal_link_run; NULL is fine */
 void pal_link_close(pal_link *link);
 
 pal_link_state pal_link_current_state(const pal_link *link);
-/* copy of the last hello; NULL before the first one */
+/* copy of the last hello; NULL before the first */
 const pal_wire_hello *pal_link_hello(const pal_link *link);
 
-/* newest wins; STATE: not joined; REFUSED: a number is not finite. [net] */
+/* the newest wins; STATE: not joined; REFUSED: a number is not finite. [net] */
 pal_err pal_link_send_pose(pal_link *link, const pal_wire_pose *pose);
 pal_err pal_link_send_ack(pal_link *link, const pal_wire_ack *ack);
-/* FULL: 16 are waiting; STATE: not connected; REFUSED: does not fit the protocol */
+/* FULL: 16 are pending; STATE: not connected; REFUSED: does not fit the protocol */
 pal_err pal_link_send_control(pal_link *link, const pal_control *c);
-/* stop reading from the socket (a stalled client) or go on */
+/* hold true: stops reading from the socket (a stalled client); false: resumes */
 void pal_link_pause_reading(pal_link *link, bool hold);
 
 typedef struct pal_link_counts {
     uint64_t bytes_in, messages_in, bytes_out, messages_out;
-    uint64_t faults; /* messages that were not well-formed       */
-    uint32_t joins;  /* times a hello came                       */
+    uint64_t faults; /* malformed messages */
+    uint32_t joins;  /* hellos received */
 } pal_link_counts;
 pal_link_counts pal_link_count(const pal_link *link);
 
-/* GET of a path on the server that url names: done is called once, status 200 with the whole body (borrowed), else the
- * status or 0 and the reason in why. REFUSED: URL; the body may have up to most bytes. [net] or before pal_link_run */
+/* GET of a path on the server of url. done is called once: status 200 with the whole body (borrowed), else the status
+ * or 0 with the reason. max: size limit of the body, bytes. REFUSED: URL. [net] or before pal_link_run */
 typedef void (*pal_link_get_done)(void *user, int status, const uint8_t *bytes, size_t n_byte, const char *reason);
 pal_err pal_link_get(pal_link_loop *loop, const char *url, const char *path, size_t max, pal_link_get_done done,
                      void *user, pal_diagnostic *diag);
 
-/* calls fn every period_us after the call before has returned, so never more often than asked; ends with the loop or
- * pal_link_remove_timer. NULL: out of memory */
+/* Calls fn every period_us, counted from the return of the previous call, so never more often. Ends with the loop or
+ * pal_link_remove_timer. NULL: out of memory. */
 pal_link_timer *pal_link_add_timer(pal_link_loop *loop, uint64_t period_us, void (*fn)(void *user), void *user);
-void pal_link_remove_timer(pal_link_timer *timer); /* ends and frees; not from its own fn; NULL is fine */
-/* calls fn when the descriptor is readable; borrows fd (a copy of it is polled). IO */
+void pal_link_remove_timer(pal_link_timer *timer); /* stops and frees; not from its own fn; NULL is fine */
+/* calls fn when the descriptor is readable; borrows fd (polls a duplicate). IO */
 pal_err pal_link_poll_fd(pal_link_loop *loop, int fd, void (*fn)(void *user), void *user);
 #endif

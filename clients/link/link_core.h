@@ -1,4 +1,4 @@
-/* What link_peer.c, link_loop.c and link_get.c share; nobody else includes it. Thread: [net]. */
+/* Structs and functions shared by link_peer.c, link_loop.c and link_get.c; private to them. Thread: [net]. */
 #ifndef PAL_LINK_LINK_CORE_H
 #define PAL_LINK_LINK_CORE_H
 #include "clients/link/link.h"
@@ -26,7 +26,7 @@ struct pal_link_loop {
     atomic_bool stop;
     void (*woken)(void *user);
     void *woken_user;
-    pal_link *links; /* open and closing ones */
+    pal_link *links; /* open and closing */
     pal_link_timer *timers;
     link_get *gets;
     link_watch *watches;
@@ -39,14 +39,14 @@ typedef struct link_address {
 } link_address;
 pal_err link_address_parse(const char *url, link_address *out, pal_diagnostic *diag);
 
-/* names of the local protocols; a connection's object is its opaque user data */
+/* names of the local protocols; the user data is the connection's own object */
 #define LINK_LOCAL_GET   "pal-get"
 #define LINK_LOCAL_WATCH "pal-watch"
 int link_ws_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len);
 int link_get_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len);
 
-void link_close_all(pal_link_loop *loop);      /* says goodbye to every server  */
-bool link_any_open(const pal_link_loop *loop); /* a websocket is still up      */
-void link_free_all(pal_link_loop *loop);       /* after the context is gone    */
+void link_close_all(pal_link_loop *loop);      /* closes every connection with 1000 */
+bool link_any_open(const pal_link_loop *loop); /* a websocket is still open */
+void link_free_all(pal_link_loop *loop);       /* after the context is destroyed */
 void link_get_free_all(pal_link_loop *loop);
 #endif

@@ -1,14 +1,14 @@
-/* What a trainee has to have seen before it may end: "NAME=NUMBER,...", all of it reached. Tests wait for what they
- * need instead of for a time. SI units but for moved_mm. Thread: [load]. */
+/* Conditions that a scripted client must meet before it may end: "NAME=NUMBER,...", all of them. Tests wait for a
+ * condition instead of a time. SI units except moved_mm. Thread: [load]. */
 #ifndef PAL_SCRIPTED_CLIENT_END_CONDITION_H
 #define PAL_SCRIPTED_CLIENT_END_CONDITION_H
 #include "clients/scripted_client/scripted_client.h"
 
-/*     NAME      how much of it a client has seen */
+/* NAME, amount seen by the client */
 #define PAL_END_CONDITION_TABLE(X)                                                                                     \
     X(cycles, (double)r->n_cycle)                                                                                      \
     X(frames, (double)r->n_frame)                                                                                      \
-    X(answered, (double)r->latency_ms.n) /* poses that came back in frames */                                          \
+    X(answered, (double)r->latency_ms.n) /* poses echoed in frames */                                                  \
     X(fields, (double)r->n_field)                                                                                      \
     X(patches, (double)r->n_patch)                                                                                     \
     X(triangles, (double)r->n_triangle)                                                                                \
@@ -16,7 +16,7 @@
     X(orders, (double)r->n_order)                                                                                      \
     X(topologies, (double)r->n_topology)                                                                               \
     X(cycles_of_it, (double)r->n_cycle_since_topology) /* since the last topology or join */                           \
-    X(members, (double)r->n_member)                    /* that the session has */                                      \
+    X(members, (double)r->n_member)                    /* in the session */                                            \
     X(joins, (double)r->joins)                                                                                         \
     X(stalls, (double)r->stall_done)                                                                                   \
     X(moved_mm, r->moved_m * 1e3)                                                                                      \
@@ -30,11 +30,11 @@ enum {
 
 typedef struct pal_end_condition {
     bool any;
-    double min[PAL_END_CONDITION_COUNT]; /* 0: nothing is asked of it */
+    double min[PAL_END_CONDITION_COUNT]; /* 0: no condition */
 } pal_end_condition;
 
-/* REFUSED names the word */
+/* REFUSED: names the word */
 pal_err pal_end_condition_parse(pal_end_condition *until, const char *text, pal_diagnostic *diag);
-/* false while something is not reached, and when nothing was asked for */
+/* true: all conditions are met; false otherwise, and when there are none */
 bool pal_end_condition_met(const pal_end_condition *until, const pal_scripted_client_result *r);
 #endif

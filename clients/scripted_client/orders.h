@@ -1,9 +1,11 @@
-/* Orders of sculpting that a trainee gives at their times, from a file of lines
+/* Sculpting commands that a scripted client sends at given times, from a file of lines
+ *
  *     SECONDS VERB key=value ... [at=SIDE] [at2=SIDE]
- * SECONDS since the first cycle, in order; `?` before SECONDS: it may be refused; `#` begins a comment. SIDE is top,
- * bottom, front, back, left or right (+z -z -y +y -x +x of the scene): there the surface is asked for x_m y_m z_m, with
- * at2 for x2_m y2_m z2_m. `target=NAME` names the body. An order waits until the one before has been answered.
- * Thread: any. */
+ *
+ * SECONDS count from the first cycle and must not decrease. `?` before SECONDS allows a refusal; `#` begins a comment.
+ * SIDE is top, bottom, front, back, left or right (+z -z -y +y -x +x of the scene): the surface point on that side
+ * gives x_m y_m z_m, and with at2 x2_m y2_m z2_m. `target=NAME` names the body. A command waits for the answer to the
+ * previous one. Thread: any. */
 #ifndef PAL_SCRIPTED_CLIENT_ORDERS_H
 #define PAL_SCRIPTED_CLIENT_ORDERS_H
 #include "protocol/control.h"
@@ -23,7 +25,7 @@ typedef enum pal_side {
 } pal_side;
 
 typedef struct pal_order_line {
-    int number; /* in the file */
+    int number; /* line number in the file */
     double t_s;
     bool may_fail;
     pal_side at[2];
@@ -35,23 +37,23 @@ typedef struct pal_orders {
     pal_order_line *line; /* [n_line] owned */
 } pal_orders;
 
-/* what came of one; borrowed for the call that hands it out */
+/* result of one command; borrowed for the callback */
 typedef struct pal_order_result {
     const pal_order_line *line;
-    const pal_wire_answer *answer; /* NULL: refused              */
-    const char *text;              /* the server's sentence       */
-    double answer_ms;              /* from sending to the answer  */
-    double frame_ms;               /* to the first frame of another topology, 0: there is none */
-    double gap_ms;                 /* longest time between two cycles meanwhile */
-    double moved_m;           /* most that a vertex of its body is now from its place in the topology's first frame */
-    uint32_t epoch, n_vertex; /* of the first part now       */
+    const pal_wire_answer *answer; /* NULL: refused */
+    const char *text;              /* diagnostic of the server */
+    double answer_ms;              /* from sending to the answer */
+    double frame_ms;               /* to the first frame of another topology; 0: none */
+    double gap_ms;                 /* longest interval between two cycles until then */
+    double moved_m;           /* largest displacement of a vertex of its body since the first frame of the topology */
+    uint32_t epoch, n_vertex; /* of the first part now */
 } pal_order_result;
 
 pal_err pal_orders_load(pal_orders *orders, const char *path,
-                        pal_diagnostic *diag); /* REFUSED names file and line; IO */
+                        pal_diagnostic *diag); /* REFUSED: names file and line; IO */
 void pal_orders_free(pal_orders *orders);
-/* in the middle of the vertices that lie furthest to a side; false: no vertex */
+/* mean position of the vertices furthest to a side; false: no vertex */
 bool pal_side_point(const float *x, uint32_t n_vertex, pal_side side, double out[3]);
-/* the line's order with its sides' places filled in; false: no vertex, or too many numbers */
+/* the line's command with the positions of its sides; false: no vertex, or too many numbers */
 bool pal_order_fill(const pal_order_line *line, const float *x, uint32_t n_vertex, pal_wire_command *out);
 #endif

@@ -1,4 +1,4 @@
-/* Numbers kept for percentiles; the first 1,048,576 are kept, all count for the maximum and mean. Thread: one. */
+/* Samples for percentiles. Keeps the first 1,048,576; maximum and mean count all. Thread: one. */
 #ifndef PAL_SCRIPTED_CLIENT_SAMPLES_H
 #define PAL_SCRIPTED_CLIENT_SAMPLES_H
 #include <stddef.h>

@@ -1,5 +1,5 @@
-/* What the hub answers to GET besides the viewer's files: assets, health, readiness, sessions, metrics
- * Labels stay few: never names of sessions or members. */
+/* Responses to GET other than the viewer's files: assets, health, readiness, sessions, metrics. Label values of
+ * metrics stay few: never names of sessions or members. */
 #include "server/net/http_pages.h"
 
 #include "server/net/transport/plain_text.h"
@@ -49,7 +49,7 @@ static void get_health(pal_hub *hub, pal_reply *reply)
         reply_text(reply, 503, "text/plain; charset=utf-8", "a simulation stands\n", 20);
 }
 
-/* assets are built before the first request is served */
+/* assets are built before the first request */
 static void get_ready(pal_hub *hub, pal_reply *reply)
 {
     if (!hub->leaving)

@@ -1,7 +1,7 @@
-/* Answers to GET: assets, health, readiness, sessions, metrics, the viewer's files. Thread: [net]. */
+/* Responses to GET: assets, health, readiness, sessions, metrics, viewer files. Thread: [net]. */
 #ifndef PAL_NET_HTTP_PAGES_H
 #define PAL_NET_HTTP_PAGES_H
 #include "server/net/hub_core.h"
 
-void pal_hub_get(void *hub, const char *path, pal_reply *reply); /* as pal_peer_events.get wants it */
+void pal_hub_get(void *hub, const char *path, pal_reply *reply); /* a pal_peer_events.get */
 #endif

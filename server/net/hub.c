@@ -1,4 +1,5 @@
-/* The hub's peers: coming, going, and what each is sent next (protocol/README.md, "Cycles and credit"). */
+/* Peers of the hub: connection, disconnection, and the choice of the next message
+ * (protocol/README.md, "Cycles and credit"). */
 #include "server/net/hub.h"
 
 #include "server/net/http_pages.h"
@@ -21,7 +22,7 @@
 #define TIER_WINDOW_NS 2000000000u
 #define TIER_CLEAN_NS  10000000000u
 
-/* ---- what is sent next ---- */
+/* ---- sending ---- */
 
 static bool wants_cycle(const pal_client *c)
 {
@@ -55,7 +56,7 @@ static pal_packet *members_message(pal_hub *hub, const pal_hub_room *room)
     return pal_hub_encode(hub, hub->control);
 }
 
-/* NULL: nothing to tell yet of bodies that have just taken others' place; their time goes on with the first frame */
+/* NULL: a replaced session has no frame yet, and its simulated time continues with the first */
 static pal_packet *status_message(pal_hub *hub, pal_client *c)
 {
     const pal_stream *s = c->room->stream;
@@ -98,7 +99,7 @@ static pal_packet *status_message(pal_hub *hub, pal_client *c)
     return pal_hub_encode(hub, hub->control);
 }
 
-/* the triangles that go with the newest frame of a part; false: they cannot be had now, so the frame waits too */
+/* queues the TOPOLOGY_DELTA for the newest frame of a part; false: not available now, so the frame waits too */
 static bool add_patch(pal_hub *hub, pal_client *c, int p)
 {
     const pal_stream_part *part = &c->room->stream->part[p];
@@ -113,7 +114,7 @@ static bool add_patch(pal_hub *hub, pal_client *c, int p)
     return true;
 }
 
-/* the newest of what this client has not got, as one cycle */
+/* queues the newest messages that this client lacks, as one cycle */
 static void begin_cycle(pal_hub *hub, pal_client *c)
 {
     const pal_stream *s = c->room->stream;
@@ -178,7 +179,7 @@ static pal_packet *client_next(void *user, pal_peer *peer)
     return p;
 }
 
-/* ---- coming and going ---- */
+/* ---- connection and disconnection ---- */
 
 static pal_hub_room *find_room(pal_hub *hub, const char *session)
 {
@@ -213,7 +214,7 @@ static void client_opened(void *user, pal_peer *peer, const char *session)
     c->peer = peer;
     c->room = room;
     c->opened_ns = now;
-    /* 600 a second as the protocol says; half a second's depth, so that a hiccup of ours closes nobody */
+    /* 600 per second, as in the protocol; a depth of half a second, so that a delay of the server closes no client */
     pal_bucket_begin(&c->bucket, 600, 300, now);
     pal_credit_begin(&c->credit, pal_stream_rate_hz(room->stream));
     peer->client = c;
@@ -277,7 +278,7 @@ static void set_tier(pal_client *client, int tier)
     if (client->sent_cycle == room->stream->cycle) client->sent_cycle--;
 }
 
-/* a client that skips more than a quarter of the cycles for 2 s gets coarser frames, after 10 s without finer ones */
+/* more than a quarter of the cycles skipped for 2 s: coarser frames; 10 s without a skip: finer ones */
 static void judge_tier(pal_client *c, uint64_t now)
 {
     if (now - c->tier_ns < TIER_WINDOW_NS) return;

@@ -1,6 +1,6 @@
-/* What accuracy costs, as clients see it (protocol/README.md): the study's points once, then a body's estimate at every
- * tick of the hub, to those who ask for it. Who looks is counted as with fields; the session estimates while anybody
- * does, and nothing of it is there while nobody does. */
+/* Accuracy and cost as clients see them (protocol/README.md): the points of the study once, then the estimate of a
+ * body at every tick of the hub, to its subscribers. Subscribers are counted as for fields; without one, the session
+ * has no estimator. */
 #include "server/net/hub_accuracy.h"
 
 #include "server/base/log.h"
@@ -14,7 +14,7 @@
 
 /* ---- the study ---- */
 
-/* points of one method are one curve: "fem hex8_bbar", "tet_springs calibrated" */
+/* points of one method form one curve: "fem hex8_bbar", "tet_springs calibrated" */
 static void method_text(const pal_configuration *s, char out[PAL_WIRE_METHOD_BYTES])
 {
     char text[3 * PAL_NAME];
@@ -34,7 +34,7 @@ static void say_study(pal_hub *hub, pal_client *c, int body)
     study->step_ms = 1e3 * room->step_s;
     study->reference_m = n > 0 ? room->reference_m : NAN;
     for (int i = 0; i < n; i++) n_front += room->setting[i].front;
-    /* as many as fit, those of the front before others */
+    /* as many as fit, Pareto-optimal points first */
     int room_left = PAL_WIRE_POINT_MAX - (n_front < PAL_WIRE_POINT_MAX ? n_front : PAL_WIRE_POINT_MAX);
     for (int i = 0; i < n && study->n_point < PAL_WIRE_POINT_MAX; i++) {
         const pal_measured_configuration *p = &room->setting[i];
@@ -50,10 +50,10 @@ static void say_study(pal_hub *hub, pal_client *c, int body)
     pal_hub_send(hub, c, hub->control);
 }
 
-/* ---- where it is in the study ---- */
+/* ---- position in the study ---- */
 
-/* does a setting of a study say what holds now? Words and numbers that it leaves open fit anything; better: how many
- * it does say. -1: it says something else */
+/* Similarity of a study configuration to the current one: the number of values that it specifies, -1 if one differs.
+ * An unspecified word or number matches anything. */
 static int likeness(const pal_configuration *of, const pal_configuration *now)
 {
     const char *const word[][2] = {
@@ -77,7 +77,7 @@ static int likeness(const pal_configuration *of, const pal_configuration *now)
     return n_same;
 }
 
-/* index in the study of what holds now, NaN: it is none of those */
+/* index in the study of the current configuration; NaN: none matches */
 static double point_of(const pal_hub_room *room, int body, const pal_configuration *now)
 {
     int best = -1, best_same = -1;
@@ -88,7 +88,7 @@ static double point_of(const pal_hub_room *room, int body, const pal_configurati
     return best < 0 ? NAN : (double)best;
 }
 
-/* ---- errors as they are shown ---- */
+/* ---- displayed errors ---- */
 
 static double error_of(const pal_hub_room *room, double point)
 {
@@ -100,14 +100,14 @@ static bool near(double a, double b)
     return fabs(a - b) <= 1e-6 * fabs(a);
 }
 
-/* a neighbour's setting is the present one with another number: nothing in it is open */
+/* a neighbour is the current configuration with one parameter changed, so every value is specified */
 static bool is_neighbour(const pal_configuration *of, const pal_configuration *to)
 {
     return likeness(of, to) >= 0 && of->size == to->size && near(of->step_s, to->step_s) &&
            near(of->tolerance, to->tolerance);
 }
 
-/* is it of a body that has gone on for a second since, or has woken? It bounds nothing then */
+/* outdated: the body has taken steps for a second since, or has woken */
 static bool is_old(const pal_estimate *e)
 {
     return e->age_s > PAL_HUB_ESTIMATE_OLD_S || (e->age_s > 0 && e->asleep);
@@ -135,14 +135,13 @@ static double known(double value)
     return isfinite(value) ? value : NAN;
 }
 
-/* a step's milliseconds as those of as many steps as go into one of the scene as it was opened: shorter steps are not
- * cheaper for being more */
+/* cost of the steps that replace one step of the opened scene: comparable across step lengths */
 static double price(const pal_hub_room *room, double ms, double step_s)
 {
     return isfinite(ms) && step_s > 0 ? ms * room->step_s / step_s : NAN;
 }
 
-/* a neighbour's ms is what a step as it is now would take: one of half the length is in there twice already */
+/* a neighbour's ms is per current step; for half the step length it already contains two steps */
 static void put_neighbour(const pal_hub_room *room, const pal_measured_configuration *from,
                           const pal_configuration *now, pal_wire_neighbour *to)
 {
@@ -181,7 +180,7 @@ static void put_estimate(const pal_hub_room *room, const pal_estimate *from, con
         put_neighbour(room, &from->neighbour[i], now, &to->neighbour[to->n_neighbour++]);
 }
 
-/* a scene that asks for an accuracy is served by a study of its loads: a hand that goes farther is told once */
+/* the study covers the scene's own loads; a larger displacement can exceed the tolerance, which is reported once */
 static void tell_far(pal_hub_room *room, const pal_wire_estimate *e)
 {
     double asked = pal_session_scene(room->session)->max_error_m;
@@ -208,7 +207,7 @@ pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *c)
     pal_configuration_of(pal_session_scene(c->room->session), b, &now);
     pal_plain_text(out->configuration, sizeof out->configuration, pal_configuration_text(&now, text));
     out->study_point = point_of(c->room, b, &now);
-    /* until there is an estimate; asleep a step costs nothing that a setting could be judged by */
+    /* defaults without an estimate; the step time of a sleeping body gives no cost of its configuration */
     const pal_frame *f = c->room->stream->frame;
     bool awake = !f || b >= f->n_part || !f->part[b].asleep;
     bool known_ms = awake && c->room->stream->step_ms > 0;

@@ -1,5 +1,4 @@
-/* The records of the hub: clients, rooms, counts. Every file of the hub knows them; they know no file. Thread: [net].
- */
+/* Structs of the hub: clients, rooms, counters. Shared by all files of the hub. Thread: [net]. */
 #ifndef PAL_NET_HUB_CORE_H
 #define PAL_NET_HUB_CORE_H
 #include "server/net/stream.h"
@@ -12,69 +11,68 @@ enum { PAL_HUB_QUEUE = 32, PAL_HUB_OLD_ASSETS = 8 };
 
 struct pal_hub_room;
 
-/* one peer that has come; a free place has peer NULL */
+/* one connected peer; in a free entry, peer is NULL */
 typedef struct pal_client {
     pal_peer *peer;
     struct pal_hub_room *room;
-    int id; /* member, 0: has not joined */
+    int id; /* member id; 0: not joined */
     uint64_t opened_ns;
     pal_bucket bucket;
     pal_credit credit;
     int tier;
-    /* control that waits, oldest first, and what is made when asked for */
+    /* control messages: a queue, oldest first, and flags for messages encoded on demand */
     pal_packet *queue[PAL_HUB_QUEUE];
     int queue_begin, n_queue;
     bool members_due, status_due;
-    pal_packet *haptic; /* newest, unsent */
-    /* the cycle that is being sent: of each part a patch if its triangles changed, and a frame; then tools */
+    pal_packet *haptic; /* newest contact model, unsent */
+    /* cycle in transmission: per part a TOPOLOGY_DELTA if its triangles changed, and a FRAME; then TOOLS */
     pal_packet *out[2 * PAL_BODY_MAX + 1];
     int n_out, out_begin;
     uint32_t out_cycle, sent_cycle;
-    uint32_t sent_frame[PAL_BODY_MAX];  /* number of the frame of each part sent last */
-    bool topology_deltas;               /* takes TOPOLOGY_DELTA                                     */
-    uint32_t sent_change[PAL_BODY_MAX]; /* triangles that it has of each part, of pal_triangle_slots.change */
-    uint8_t view[PAL_BODY_MAX];         /* pal_field looked at, of each part         */
-    uint64_t sent_field[PAL_BODY_MAX];  /* number of the values sent last            */
-    bool estimate[PAL_BODY_MAX], estimate_due[PAL_BODY_MAX]; /* looked at; to be sent */
-    /* figures */
+    uint32_t sent_frame[PAL_BODY_MAX];  /* number of the last frame sent, per part */
+    bool topology_deltas;               /* accepts TOPOLOGY_DELTA */
+    uint32_t sent_change[PAL_BODY_MAX]; /* last triangle change sent, per part (pal_triangle_slots.change) */
+    uint8_t view[PAL_BODY_MAX];         /* subscribed pal_field, per part */
+    uint64_t sent_field[PAL_BODY_MAX];  /* number of the last values sent */
+    bool estimate[PAL_BODY_MAX], estimate_due[PAL_BODY_MAX]; /* subscribed; due */
+    /* statistics */
     uint64_t n_byte, n_cycle, n_skipped;
-    uint64_t status_byte, status_ns;                      /* at the last status                   */
-    uint64_t tier_cycle, tier_skipped, tier_ns, clean_ns; /* of the tier's window   */
-    /* an order about a row that is not answered yet, until when; 0: none; what the session had refused before */
+    uint64_t status_byte, status_ns;                      /* at the last status */
+    uint64_t tier_cycle, tier_skipped, tier_ns, clean_ns; /* window of the tier control */
+    /* a command about a component without an answer: deadline, 0: none; refusals of the session before it */
     uint64_t component_until_ns, component_refused;
-    uint64_t pose_error_ns; /* last error about poses               */
+    uint64_t pose_error_ns; /* last error about poses */
 } pal_client;
 
-/* an asset that was shown before: who was told of it may still be asking for it */
+/* a replaced asset; a client that knows its path may still request it */
 typedef struct pal_hub_old_asset {
     char path[PAL_WIRE_NAME_BYTES];
     pal_packet *asset; /* NULL: none */
 } pal_hub_old_asset;
 
-/* one session as the hub sees it */
+/* one session, as the hub sees it */
 typedef struct pal_hub_room {
     pal_session *session;
-    bool own; /* the hub made it: sculpting or a switch has replaced the one that was given */
+    bool own; /* the hub created it, to replace the given session after an edit or a switch */
     pal_stream *stream;
-    pal_hub_old_asset past[PAL_HUB_OLD_ASSETS]; /* as a ring, the oldest at n_old_asset */
+    pal_hub_old_asset past[PAL_HUB_OLD_ASSETS]; /* ring buffer, the oldest at n_old_asset */
     int n_old_asset;
     pal_member_list members;
     pal_stream_tool tool[PAL_TOOL_MAX];
-    pal_material material[PAL_BODY_MAX]; /* as last asked for */
-    /* steps of which nothing was shown because nobody was here; tick and OUTPUT runs when they were counted last */
+    pal_material material[PAL_BODY_MAX]; /* as last requested */
+    /* steps without output for lack of observers; tick and OUTPUT runs at the last count */
     uint64_t n_unobserved, seen_tick, seen_output;
-    bool was_unobserved;                   /* nobody was here then */
-    int n_estimate[PAL_BODY_MAX];          /* clients that look at an estimate */
-    bool estimate_requested[PAL_BODY_MAX]; /* the session knows that some do */
-    double step_s;                         /* of the scene as it was opened: what all prices are for */
-    const pal_measured_configuration
-        *setting; /* what a study found, for body setting_body [n_configuration]; NULL: no study */
+    bool was_unobserved;                       /* no observers at the last count */
+    int n_estimate[PAL_BODY_MAX];              /* clients subscribed to an estimate */
+    bool estimate_requested[PAL_BODY_MAX];     /* the session has been asked for it */
+    double step_s;                             /* of the scene as opened: the reference of all costs */
+    const pal_measured_configuration *setting; /* of a study of body setting_body [n_configuration]; NULL: no study */
     int n_configuration, setting_body;
-    double reference_m; /* the study's reference's own error; NaN: not known */
-    bool reported_far;  /* that an estimate is beyond what the scene asks for */
+    double reference_m; /* error of the study's reference itself; NaN: unknown */
+    bool reported_far;  /* an estimate above the scene's tolerance has been reported */
     int tier_users[PAL_STREAM_TIER];
-    int n_look[PAL_BODY_MAX][PAL_FIELD_COUNT];    /* clients that look at a field   */
-    bool reported[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* the session knows that some do */
+    int n_look[PAL_BODY_MAX][PAL_FIELD_COUNT];    /* clients subscribed to a field */
+    bool reported[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* the session has been asked for it */
 } pal_hub_room;
 
 typedef struct pal_hub_count {
@@ -89,8 +87,8 @@ typedef struct pal_verb pal_verb;
 typedef struct pal_hub {
     pal_loop *loop;
     pal_session **session; /* the caller's array [n_room] */
-    pal_hub_jobs *jobs;    /* NULL until a command needs them */
-    const pal_verb *verb;  /* commands that are known [n_verb], borrowed */
+    pal_hub_jobs *jobs;    /* NULL until a command needs it */
+    const pal_verb *verb;  /* known commands [n_verb], borrowed */
     int n_verb;
     double error_m;
     pal_site *site;
@@ -98,7 +96,7 @@ typedef struct pal_hub {
     bool leaving;
     pal_hub_room *room;   /* [n_room] */
     pal_client *client;   /* [max_clients] */
-    pal_control *control; /* scratch: it is large */
+    pal_control *control; /* scratch, too large for the stack */
     char *text;           /* scratch [PAL_CONTROL_OUT_MAX] */
     pal_hub_count count;
 } pal_hub;

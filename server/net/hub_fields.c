@@ -1,14 +1,13 @@
-/* Fields in colour at the hub: who looks at what, and the newest values for those who do. A client looks at one field
- * of each part at most; a field that nobody looks at is neither computed nor encoded. Values go out at most 10 times a
- * second, newest first and the rest never, only while the client's credit is free, behind control and before the next
- * cycle. */
+/* Fields for colouring. A client subscribes to at most one field per part; a field without subscribers is neither
+ * computed nor encoded. The newest values are sent at most 10 times a second and older ones are dropped, only while
+ * the client has credit, after control and before the next cycle. */
 #include "server/net/hub_fields.h"
 
 #include "protocol/field_codec.h"
 #include "server/net/hub_peers.h"
 #include "server/net/hub_subscriptions.h"
 
-/* names and numbers of the wire are those of the simulation */
+/* names and numbers on the wire are those of the simulation */
 _Static_assert((int)PAL_WIRE_FIELD_DISPLACEMENT_M == (int)PAL_FIELD_DISPLACEMENT_M &&
                    (int)PAL_WIRE_FIELD_VON_MISES_PA == (int)PAL_FIELD_VON_MISES_PA &&
                    (int)PAL_WIRE_FIELD_ENERGY_J_M3 == (int)PAL_FIELD_ENERGY_J_M3 &&
@@ -38,10 +37,10 @@ void pal_hub_subscribe_field(pal_hub *hub, pal_client *c, const pal_wire_field_s
     }
     pal_hub_set_field(c, part, (pal_field)field);
     pal_hub_update_subscriptions(c->room);
-    c->peer->ops->ready(c->peer); /* others may look at it already */
+    c->peer->ops->ready(c->peer); /* other clients may already subscribe to it */
 }
 
-/* the first part of which this client lacks the newest values; -1: none */
+/* the first part with values that this client lacks; -1: none */
 static int lacking(const pal_client *c)
 {
     const pal_stream *s = c->room->stream;

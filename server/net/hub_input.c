@@ -1,6 +1,6 @@
-/* The hub's input: every message of a client is counted, decoded (untrusted), checked against who may do what, and
- * handed to the session. A malformed message closes the connection with its refusal's sentence; a well-formed one that
- * cannot be granted is answered with `error`; poses of a tool that the sender does not hold are ignored. */
+/* Input of the hub. Every message is counted, decoded (untrusted), checked for permission, and passed to the session.
+ * A malformed message closes the connection with the text of the refusal. A well-formed request that cannot be granted
+ * is answered with `error`. Poses of a tool that the sender does not hold are ignored. */
 #include "server/net/hub_input.h"
 
 #include "server/base/clock.h"
@@ -20,7 +20,7 @@ static void malformed(pal_hub *hub, pal_client *c, int refusal)
     pal_hub_drop(hub, c, PAL_WIRE_CLOSE_PROTOCOL, "%s", pal_refusal_text(refusal));
 }
 
-/* takes a tool and says so to nobody */
+/* takes a tool without notifying anyone */
 static pal_err take_tool(pal_client *c, int wanted)
 {
     pal_hub_room *room = c->room;
@@ -83,7 +83,7 @@ static void join(pal_hub *hub, pal_client *c, const pal_wire_join *wanted)
     c->topology_deltas = wanted->topology_deltas;
     pal_session_observe(room->session, true);
     if (room->tier_users[c->tier]++ == 0) pal_stream_begin_tier(room->stream, c->tier);
-    /* hello says which tool was given; a refusal follows it */
+    /* hello names the granted tool; a refusal follows it */
     pal_err err = PAL_ERR_OK;
     if (wanted->tool != PAL_WIRE_TOOL_NONE && wanted->role != PAL_WIRE_ROLE_VIEWER) err = take_tool(c, wanted->tool);
     say_hello(hub, c);
@@ -113,8 +113,8 @@ static void leave(pal_hub *hub, pal_client *c)
 
 static void control(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_byte)
 {
-    /* read into a copy of its own: answers are made in hub->control */
-    static pal_control in; /* about 30 KiB, [net] only */
+    /* decoded into a separate struct, because answers use hub->control */
+    static pal_control in; /* about 30 KiB; [net] only */
     int refusal = pal_control_get((const char *)bytes, n_byte, false, &in);
     hub->count.n_control++;
     if (refusal) {

@@ -1,4 +1,4 @@
-/* The queue of commands before the worker, and its results in the place of what runs. */
+/* The queue of commands before the job worker, and the commit of its results. */
 #include "server/net/hub_jobs.h"
 
 #include "server/base/clock.h"
@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* NULL: has gone */
+/* NULL: has left */
 static pal_client *requester(pal_hub *hub, const pal_hub_pending_job *w)
 {
     for (int i = 0; i < hub->max_clients; i++) {
@@ -19,7 +19,7 @@ static pal_client *requester(pal_hub *hub, const pal_hub_pending_job *w)
     return NULL;
 }
 
-/* assets that go are kept for a while: a client may be on its way to fetch one */
+/* keeps replaced assets for a while, because clients may be about to fetch them */
 static void keep_assets(pal_hub_room *room, const pal_stream *before)
 {
     for (int p = 0; p < before->n_part; p++) {
@@ -32,8 +32,8 @@ static void keep_assets(pal_hub_room *room, const pal_stream *before)
     }
 }
 
-/* Brushes acted in the session of before; where the job keeps them they are asked for again as they are. How many ended
- */
+/* Repeats the brushes of the replaced session in the new one, where the job type keeps them. Returns the number
+ * ended. */
 static int begin_brushes(pal_hub_tool_brush *brush, pal_hub_room *room, const pal_job_type *type)
 {
     int n_ended = 0;
@@ -53,7 +53,7 @@ static int begin_brushes(pal_hub_tool_brush *brush, pal_hub_room *room, const pa
     return n_ended;
 }
 
-/* the result takes the place of what runs; false: that goes on as it was, diag says why */
+/* replaces the running session by the result; false: it continues unchanged, diag gives the reason */
 static bool commit(pal_hub *hub, pal_hub_jobs *s, pal_job *job)
 {
     pal_hub_room *room = s->current.room;
@@ -97,13 +97,13 @@ static void finish(pal_hub *hub, pal_hub_jobs *s, pal_job *job)
         if (c) job->type->answer(hub, c, job);
     } else if (c) {
         const char *reason = job->diag.text[0] ? job->diag.text : pal_err_text(job->err);
-        bool named = !strncmp(reason, job->verb, strlen(job->verb)); /* edits of cells name the verb themselves */
+        bool named = !strncmp(reason, job->verb, strlen(job->verb)); /* cell edits name the verb */
         pal_hub_send_error(hub, c, "refused", named ? "%s%s" : "%s: %s", named ? "" : job->verb, reason);
     }
     pal_job_free(job);
 }
 
-/* the scene that runs now, with the materials of now; NULL: out of memory */
+/* copy of the running scene with the current materials; NULL: out of memory */
 static pal_scene *scene_now(const pal_hub_room *room)
 {
     pal_scene *scene = malloc(sizeof *scene);
@@ -113,10 +113,10 @@ static pal_scene *scene_now(const pal_hub_room *room)
     return scene;
 }
 
-/* submits the next command; one that cannot be read was answered and is gone */
+/* submits the next command; one that cannot be parsed was answered and is dropped */
 static void begin_next(pal_hub *hub, pal_hub_jobs *s)
 {
-    /* what is pointed at, and kept, is what is shown: a session that has just begun comes with its first frame */
+    /* picking and undo need the displayed state, so a new session must have its first frame */
     while (s->n_pending > 0 && s->pending[0].room->stream->frame) {
         s->current = s->pending[0];
         memmove(s->pending, s->pending + 1, sizeof *s->pending * (size_t)--s->n_pending);
@@ -126,7 +126,7 @@ static void begin_next(pal_hub *hub, pal_hub_jobs *s)
                        .session = room->session,
                        .error_m = hub->error_m,
                        .asked_ns = s->current.asked_ns};
-        if (!c) continue; /* who has gone wants nothing any more */
+        if (!c) continue; /* the requester has left */
         memcpy(job.verb, s->current.command.verb, sizeof job.verb);
         bool good = job.type->read(hub, c, &s->current.command, &job);
         if (good && !(job.scene = scene_now(room))) {

@@ -1,5 +1,5 @@
-/* Commands that lead to another scene: a queue before the worker, and what has come out of it. A command waits as it
- * came and is read when its turn comes, so that it means what the ones before it left. Thread: [net]. */
+/* Commands that produce another scene: the queue before the job worker, and its results. A pending command is parsed
+ * when its turn comes, so that it applies to the result of its predecessors. Thread: [net]. */
 #ifndef PAL_NET_HUB_JOBS_H
 #define PAL_NET_HUB_JOBS_H
 #include "server/net/job_worker.h"
@@ -14,18 +14,18 @@ typedef struct pal_hub_pending_job {
     pal_wire_command command;
 } pal_hub_pending_job;
 
-/* one body of a room that has been edited or switched */
+/* edits and switches of one body of a room */
 typedef struct pal_hub_body_edits {
     pal_sculptor *sculptor;
-    pal_sculpt_edit *edit;            /* whose cells the body has; NULL: those of the start          */
-    pal_configuration_switch *change; /* whose mesh the body has; NULL: that of the start, or of edit */
-    pal_body_def *base;               /* owned: as it was before it was switched; NULL: as it is now  */
+    pal_sculpt_edit *edit;            /* edit that made the body's control cells; NULL: the original ones */
+    pal_configuration_switch *change; /* switch that made the body's mesh; NULL: the original, or that of edit */
+    pal_body_def *base;               /* owned: the body before its first switch; NULL: as it is now */
 } pal_hub_body_edits;
 
-/* the brush that a tool's holder asked for last */
+/* the last brush requested by a tool's holder */
 typedef struct pal_hub_tool_brush {
     int member, body;
-    double asked_m[6]; /* places as they came */
+    double asked_m[6]; /* positions as received */
     pal_brush brush;   /* kind NONE: none     */
 } pal_hub_tool_brush;
 
@@ -33,16 +33,16 @@ struct pal_hub_jobs {
     pal_job_worker *worker;
     pal_hub_pending_job pending[PAL_HUB_JOBS_PENDING]; /* oldest first */
     int n_pending;
-    pal_hub_pending_job current;               /* under way; no longer pending */
+    pal_hub_pending_job current;               /* in progress, no longer pending */
     pal_hub_body_edits (*edits)[PAL_BODY_MAX]; /* [n_room] */
     pal_hub_tool_brush (*brush)[PAL_TOOL_MAX]; /* [n_room] */
 };
 
-/* jobs are made with the first command that needs them; false: out of memory, an error was sent */
+/* creates hub->jobs at the first command that needs it; false: out of memory, an error was sent */
 bool pal_hub_jobs_create(pal_hub *hub, pal_client *client, const char *verb);
-/* puts a command behind the others; an error is sent when too many wait */
+/* appends a command; sends an error when the queue is full */
 void pal_hub_jobs_enqueue(pal_hub *hub, pal_client *client, const pal_job_type *type, const pal_wire_command *command);
 pal_hub_body_edits *pal_hub_edits(pal_hub *hub, const pal_hub_room *room, int body);
-void pal_hub_jobs_update(pal_hub *hub); /* what the worker has done, and the next command */
-void pal_hub_jobs_end(pal_hub *hub);    /* closes the sessions that the hub made */
+void pal_hub_jobs_update(pal_hub *hub); /* collects the finished job and starts the next command */
+void pal_hub_jobs_end(pal_hub *hub);    /* closes the sessions created by the hub */
 #endif

@@ -1,4 +1,4 @@
-/* What the hub sends to a client at once, and how a client leaves its room. */
+/* Messages that the hub sends at once, and how a client leaves its room. */
 #include "server/net/hub_peers.h"
 
 #include "server/base/log.h"
@@ -34,7 +34,7 @@ static void empty(pal_client *c)
     c->members_due = c->status_due = false;
 }
 
-/* the member is gone for the others as soon as it is dropped, not when its socket is */
+/* a dropped member leaves at once, before its socket closes */
 void pal_hub_leave_room(pal_hub *hub, pal_client *c)
 {
     pal_hub_room *room = c->room;

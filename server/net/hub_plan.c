@@ -1,6 +1,5 @@
-/* What clients are told of a plan: its rows, whose they are, which of them are switched off; and of its bodies: who
- * stands still and why, who sleeps. Rows are switched and single bodies reset by orders (protocol/README.md,
- * "Components and bodies"). */
+/* Messages about the plan: its components, their bodies, which are disabled; and about bodies: frozen with the reason,
+ * or asleep. Commands disable components and reset single bodies (protocol/README.md, "Components and bodies"). */
 #include "server/net/hub_plan.h"
 
 #include "server/base/clock.h"
@@ -9,7 +8,7 @@
 
 #include <string.h>
 
-static const uint64_t ASKED_NS = 5000000000u; /* an order about a row is taken or refused by then */
+static const uint64_t ASKED_NS = 5000000000u; /* time limit for the result of a command about a component */
 
 static int body_of(const pal_session *session, const char *name)
 {
@@ -19,7 +18,7 @@ static int body_of(const pal_session *session, const char *name)
     return -1;
 }
 
-/* rows of the plan as the session was opened, as hello and topology name them */
+/* components of the plan at open, as hello and topology name them */
 static uint32_t plan_rows(const pal_session *session, char (*name)[PAL_WIRE_NAME_BYTES], double *part,
                           char (*reason)[PAL_WIRE_REASON_BYTES], double *fixed)
 {
@@ -48,8 +47,8 @@ void pal_hub_topology_components(const pal_hub_room *room, pal_wire_topology *ou
         plan_rows(room->session, out->component, out->component_part, out->component_reason, out->component_required);
 }
 
-/* rows of the opened plan that are not in the running one have been switched off; others (fields, brushes) have come.
- * Both lists keep the plan's order */
+/* Components of the opened plan that the running plan lacks are disabled; the running plan may have others (fields,
+ * brushes). Both lists have the order of the plan. */
 static void tell_rows(const pal_hub_room *room, const pal_frame *f, pal_wire_status *w)
 {
     int n = pal_session_component_count(room->session), n_found = 0;
@@ -67,7 +66,7 @@ static void tell_rows(const pal_hub_room *room, const pal_frame *f, pal_wire_sta
             w->disabled[w->n_disabled++].part = body < 0 ? 0 : (uint32_t)body;
         }
     }
-    /* as they are now, when that is not the plan of hello, or when hello spoke of a session that has been replaced */
+    /* current list, when it differs from the plan in hello, or when hello described a session since replaced */
     if (same && n_found == n) return;
     for (int r = 0; r < f->n_row; r++) {
         pal_plain_text(w->component[w->n_component_name++], PAL_WIRE_NAME_BYTES, f->component_name[r]);
@@ -93,7 +92,7 @@ void pal_hub_status_plan(const pal_hub_room *room, const pal_frame *f, pal_wire_
     w->n_unobserved = room->n_unobserved;
 }
 
-/* steps since the last call of which nothing was shown, if nobody has looked since */
+/* counts the steps since the last call without output, if there was no observer since */
 void pal_hub_count_unobserved(pal_hub_room *room)
 {
     const pal_frame *f = room->stream->frame;
@@ -108,8 +107,8 @@ void pal_hub_count_unobserved(pal_hub_room *room)
     room->was_unobserved = room->members.n_member == 0;
 }
 
-/* The world answers between two steps: a count of what it refused, and the sentence of the last. Its thread goes by the
- * machine's clock, whatever the loop's is */
+/* The world answers between two steps, with a count of refusals and the last diagnostic. Its thread uses the machine's
+ * clock, whatever the clock of the loop. */
 static void note_asked(pal_client *c)
 {
     const pal_frame *f = c->room->stream->frame;

@@ -1,4 +1,5 @@
-/* Verbs of sculpting (protocol/README.md, "Sculpting"): edits through hub_jobs.c; brushes and probes at once. */
+/* Verbs for sculpting (protocol/README.md, "Sculpting"): edits go through hub_jobs.c, brushes and probes act at
+ * once. */
 #include "server/net/hub_sculpt.h"
 
 #include "server/base/vec3.h"
@@ -12,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* the body named, or the first that can be sculpted; -1: an error was sent */
+/* the named body, or the first that can be sculpted; -1: an error was sent */
 static int find_body(pal_hub *hub, pal_client *c, const pal_wire_command *command)
 {
     const pal_stream *s = c->room->stream;
@@ -29,13 +30,13 @@ static int find_body(pal_hub *hub, pal_client *c, const pal_wire_command *comman
     return -1;
 }
 
-/* of a body's frame in the scene's */
+/* origin of a body's frame in the scene's frame */
 static void body_origin(const pal_scene *scene, int body, double out[3])
 {
     pal_sub3(out, scene->body[body].mesh->surface.origin_m, scene->body[0].mesh->surface.origin_m);
 }
 
-/* how far a body's origin lies along a direction of any length but 0, m */
+/* offset of a body's origin along a nonzero direction, m */
 static double frame_offset(const pal_hub_room *room, int body, const double direction[3])
 {
     double origin[3], length = pal_norm3(direction);
@@ -43,8 +44,8 @@ static double frame_offset(const pal_hub_room *room, int body, const double dire
     return length > 0 ? pal_dot3(origin, direction) / length : 0;
 }
 
-/* a place on the surface as it is shown now, as a control face and a place at rest in the body's frame; false: an error
- * was sent, the surface is too far away */
+/* picks the nearest point of the displayed surface, as a control face and a rest position in the body's frame; false:
+ * the surface is too far away, an error was sent */
 static bool pick(pal_hub *hub, pal_client *c, int body, const pal_wire_command *command, bool second, pal_pick *out)
 {
     const double at[3] = {pal_hub_arg(command, second ? "x2_m" : "x_m", 0),
@@ -67,7 +68,7 @@ static bool pick(pal_hub *hub, pal_client *c, int body, const pal_wire_command *
     return true;
 }
 
-/* control points as they are now, for `set_rest_shape`; NULL: out of memory or no frame yet */
+/* current control points, for `set_rest_shape`; NULL: out of memory or no frame yet */
 static double *points_now(const pal_hub_room *room, int body, int *n)
 {
     const pal_frame *frame = room->stream->frame;
@@ -79,7 +80,7 @@ static double *points_now(const pal_hub_room *room, int body, int *n)
 
 /* ---- edits ---- */
 
-/* an edit of cells from what was pointed at; false: an error was sent */
+/* builds a cell edit from the picked points; false: an error was sent */
 static bool read_cells(pal_hub *hub, pal_client *c, int kind, const pal_wire_command *command, pal_job *job)
 {
     pal_pick a, b = {.face = -1};
@@ -206,7 +207,7 @@ void pal_hub_run_edit(pal_hub *hub, pal_client *c, const pal_verb *verb, const p
     if (find_body(hub, c, command) >= 0) pal_hub_jobs_enqueue(hub, c, &edit_job, command);
 }
 
-/* ---- at once ---- */
+/* ---- immediate commands ---- */
 
 void pal_hub_run_probe(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
@@ -232,8 +233,8 @@ void pal_hub_run_probe(pal_hub *hub, pal_client *c, const pal_verb *verb, const 
     pal_hub_send(hub, c, hub->control);
 }
 
-/* Places of a brush at rest. One whose places are those of the brush that the tool holds stays where that is, however
- * far the surface has moved since; false: an error was sent */
+/* Sets the rest positions of a brush. A repeat of the tool's last request keeps its positions, however far the surface
+ * has moved since. false: an error was sent */
 static bool place_brush(pal_hub *hub, pal_client *c, int body, const pal_wire_command *command, pal_hub_tool_brush *h,
                         pal_brush *to)
 {

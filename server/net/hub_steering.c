@@ -1,4 +1,4 @@
-/* Verbs that steer a session. */
+/* Verbs that control a session. */
 #include "server/net/hub_steering.h"
 
 #include "server/net/hub_peers.h"
@@ -9,7 +9,7 @@ void pal_hub_run_steering(pal_hub *hub, pal_client *c, const pal_verb *verb, con
     pal_hub_session_command(hub, c, verb->name, &(pal_command){.kind = (pal_command_kind)verb->detail});
 }
 
-/* a frozen body is frozen for everybody, so everybody may bring it back */
+/* a body is frozen for everybody, so everybody may reset it */
 void pal_hub_run_reset(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
     const pal_frame *f = c->room->stream->frame;

@@ -1,4 +1,4 @@
-/* Verbs that steer a session: pause, resume, step, reset, material. Thread: [net]. */
+/* Verbs that control a session: pause, resume, step, reset, material. Thread: [net]. */
 #ifndef PAL_NET_HUB_STEERING_H
 #define PAL_NET_HUB_STEERING_H
 #include "server/net/hub_verb.h"

@@ -1,4 +1,4 @@
-/* Counts of who looks at a field or an estimate. */
+/* Counts of subscribers to fields and estimates. */
 #include "server/net/hub_subscriptions.h"
 
 static void request(pal_session *session, bool wanted, bool *requested, pal_command command)

@@ -1,5 +1,5 @@
-/* Verbs that switch the configuration of a body (protocol/README.md, "Configurations"): a point of its study, or other
- * parameters. Prepared and committed by hub_jobs.c. */
+/* Verbs that switch the configuration of a body (protocol/README.md, "Configurations") to a point of its study or to
+ * other parameters. hub_jobs.c prepares and commits. */
 #include "server/net/hub_switch.h"
 
 #include "server/net/hub_accuracy.h"
@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* a point of the room's study; -1: an error was sent */
+/* finds a point of the room's study; -1: an error was sent */
 static int read_point(pal_hub *hub, pal_client *c, int body, const pal_wire_command *command)
 {
     const pal_hub_room *room = c->room;
@@ -28,7 +28,7 @@ static int read_point(pal_hub *hub, pal_client *c, int body, const pal_wire_comm
     return (int)index;
 }
 
-/* the present configuration with other numbers; false: an error was sent */
+/* the current configuration with the given parameters changed; false: an error was sent */
 static bool read_parameters(pal_hub *hub, pal_client *c, int body, const pal_wire_command *command,
                             pal_configuration *to)
 {
@@ -64,7 +64,7 @@ static bool read_switch(pal_hub *hub, pal_client *c, const pal_wire_command *com
     pal_hub_shown_errors(c->room, job->body, point, &job->configuration, &job->error_now_m, &job->error_then_m);
     job->was = pal_hub_edits(hub, c->room, job->body)->base;
     if (job->was) return true;
-    /* its first switch: what it can come back to is what it is now */
+    /* first switch: keeps the body as it is, so that the switch can be reverted */
     job->was = job->base = malloc(sizeof *job->base);
     if (job->base) *job->base = pal_session_scene(c->room->session)->body[job->body];
     if (!job->base) pal_hub_send_error(hub, c, "refused", "%s: %s", command->verb, pal_err_text(PAL_ERR_MEMORY));
@@ -95,7 +95,7 @@ static void commit_switch(pal_hub_body_edits *at, pal_job *job, pal_retired *ret
     job->change = NULL, job->base = NULL;
 }
 
-/* how far the body moved, against the bound that the shown errors give */
+/* adds the displacement caused by the switch, and its bound from the displayed errors */
 static void put_jump(const pal_hub *hub, const pal_job *job, double change, pal_wire_answer *a)
 {
     const pal_configuration_switch_report *r = &job->report;
@@ -126,7 +126,7 @@ static void answer_switch(pal_hub *hub, pal_client *c, const pal_job *job)
     const pal_configuration_switch_report *r = &job->report;
     char text[PAL_CONFIGURATION_TEXT];
     pal_configuration now;
-    /* a body at rest has no energy but rounding */
+    /* below this the energy of a body at rest is rounding, J */
     bool any = r->energy_before_J > 1e-15;
     double change = any ? 100 * (r->energy_after_J / r->energy_before_J - 1) : 0;
     int n_rehearsed;

@@ -25,7 +25,7 @@ bool pal_hub_has_arg(const pal_wire_command *command, const char *key)
     return find_arg(command, key) != NULL;
 }
 
-/* every number is there that must be, and no other */
+/* are all required arguments present, and no unknown ones? */
 static bool check_args(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
     bool required = true;

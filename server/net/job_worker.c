@@ -1,4 +1,4 @@
-/* The worker's thread: sleeps until there is something to free or to make. */
+/* The worker thread: sleeps until there is a job to run or an object to free. */
 #include "server/net/job_worker.h"
 
 #include "server/base/clock.h"
@@ -53,7 +53,7 @@ static void *run(void *user)
             pthread_mutex_lock(&s->lock);
         } else if (s->state == SUBMITTED) {
             pthread_mutex_unlock(&s->lock);
-            make(&s->job); /* nobody else looks at it until it is done */
+            make(&s->job); /* no other thread uses it until it is done */
             pthread_mutex_lock(&s->lock);
             s->state = DONE;
             s->wake(s->user);
@@ -73,7 +73,7 @@ pal_err pal_job_worker_open(void (*wake)(void *user), void *user, pal_job_worker
     s->wake = wake, s->user = user;
     pthread_mutex_init(&s->lock, NULL);
     pthread_cond_init(&s->changed, NULL);
-    /* signals belong to the thread that waits for them */
+    /* signals go to the thread that waits for them */
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &old);
     int failed = pthread_create(&s->thread, NULL, run, s);

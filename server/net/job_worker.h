@@ -1,7 +1,7 @@
-/* One thread beside the loop that prepares the scene, world and stream that a command leads to, slowly and with memory,
- * while the session runs on; that then stops the session and transfers its state, while other sessions and the loop go
- * on; and that frees what has been replaced. One job at a time: the next is submitted when the last was collected.
- * Thread: [net] unless said otherwise. */
+/* The background thread of the hub. While the session runs, it prepares the scene, world and stream that a command
+ * leads to, which is slow and allocates. It then stops that session and transfers its state, while other sessions and
+ * the loop continue, and frees what was replaced. One job at a time: collect a job before the next submit. Thread:
+ * [net] unless noted. */
 #ifndef PAL_NET_JOB_WORKER_H
 #define PAL_NET_JOB_WORKER_H
 #include "server/net/hub_core.h"
@@ -12,7 +12,7 @@ typedef struct pal_job_worker pal_job_worker;
 typedef struct pal_job pal_job;
 struct pal_hub_body_edits;
 
-/* what has been replaced; each may be NULL */
+/* replaced objects; each may be NULL */
 typedef struct pal_retired {
     pal_stream *stream;
     pal_session *session;
@@ -20,42 +20,42 @@ typedef struct pal_retired {
     pal_configuration_switch *change;
 } pal_retired;
 
-/* a kind of job: how it is read, prepared, transferred, committed and answered */
+/* a kind of job: how it is parsed, prepared, transferred, committed and answered */
 typedef struct pal_job_type {
-    /* [net] what the command means at this moment; false: an error was sent */
+    /* [net] parses the command against the current state; false: an error was sent */
     bool (*read)(pal_hub *hub, pal_client *client, const pal_wire_command *command, pal_job *job);
-    /* [job] makes the scene that the next session runs, which lives as long as the job's product */
+    /* [job] builds the scene of the next session; it lives as long as the job's product */
     pal_err (*prepare)(pal_job *job, const pal_scene **scene);
-    void (*transfer)(pal_job *job); /* [job] the running session's state into the next one */
-    /* [net] the next session runs: keeps the job's product, hands over what it replaces */
+    void (*transfer)(pal_job *job); /* [job] transfers the state of the running session to the next one */
+    /* [net] the next session runs: stores the job's product, moves what it replaces to *retired */
     void (*commit)(struct pal_hub_body_edits *edits, pal_job *job, pal_retired *retired);
     void (*answer)(pal_hub *hub, pal_client *client, const pal_job *job); /* [net] */
-    bool keeps_brushes;                                                   /* they act on in the next session */
+    bool keeps_brushes;                                                   /* brushes continue in the next session */
 } pal_job_type;
 
-/* What is to be made, and what has been. Borrowed until it is collected: sculptor, session and was, which nobody
- * changes or closes meanwhile. When it is collected without err the session stands, and its state is in next */
+/* One job and its result. Borrows sculptor, session and was until collected; nobody changes or closes them meanwhile.
+ * A collected job without err has a running session in `next`, with the state transferred. */
 struct pal_job {
     const pal_job_type *type;
-    pal_session *session; /* that runs now */
-    pal_scene *scene;     /* its scene with live materials; owned */
+    pal_session *session; /* the running session */
+    pal_scene *scene;     /* its scene with current materials; owned */
     int body;
     double error_m;
     char verb[32];
     uint64_t asked_ns, made_ns;
-    /* an edit */
+    /* edit */
     pal_sculptor *sculptor;
     pal_sculpt command;
-    double *point_m; /* what the command points to, or NULL; owned */
+    double *point_m; /* points of the command, or NULL; owned */
     pal_sculpt_edit *edit;
-    /* a switch of configuration */
+    /* configuration switch */
     pal_configuration configuration;
-    const pal_body_def *was;          /* the body before its first switch               */
-    pal_body_def *base;               /* the same where this is its first, else NULL; owned */
-    double error_now_m, error_then_m; /* as clients see them; NaN: none is shown */
+    const pal_body_def *was;          /* the body before its first switch */
+    pal_body_def *base;               /* a copy of it when this is the first switch, else NULL; owned */
+    double error_now_m, error_then_m; /* as displayed to clients; NaN: none */
     pal_configuration_switch *change;
     pal_configuration_switch_report report;
-    /* the result; when err is not 0 there is none, and diag says why */
+    /* result; on err there is none, and diag gives the reason */
     pal_err err;
     pal_diagnostic diag;
     pal_session *next;
@@ -63,17 +63,17 @@ struct pal_job {
     int n_brush_ended;
 };
 
-/* wake is called on the thread when a job is done. MEMORY. [load] */
+/* wake is called on the worker thread when a job is done. MEMORY. [load] */
 pal_err pal_job_worker_open(void (*wake)(void *user), void *user, pal_job_worker **out);
-/* waits for the job under way and frees it; NULL is fine */
+/* waits for the job in progress and frees it; NULL is fine */
 void pal_job_worker_close(pal_job_worker *worker);
-bool pal_job_worker_busy(pal_job_worker *worker); /* has a job that was not collected */
-/* takes the job over, owned parts included; only when it is not busy */
+bool pal_job_worker_busy(pal_job_worker *worker); /* true: has an uncollected job */
+/* takes the job with its owned parts; only when not busy */
 void pal_job_worker_submit(pal_job_worker *worker, const pal_job *job);
-/* the finished job, once; false: none yet. Owned parts are the caller's again */
+/* returns the finished job once; false: none yet. The caller owns its parts again */
 bool pal_job_worker_collect(pal_job_worker *worker, pal_job *out);
-/* closes and frees on the thread, in the order of the struct; before the next submit */
+/* closes and frees on the worker thread, in the order of the struct; before the next submit */
 void pal_job_worker_retire(pal_job_worker *worker, const pal_retired *retired);
-/* frees what a job owns, the result included */
+/* frees what a job owns, including its result */
 void pal_job_free(pal_job *job);
 #endif

@@ -1,4 +1,4 @@
-/* The server puts loop, hub and transport together. */
+/* Connects loop, hub and transports. */
 #include "server/net/server.h"
 
 #include "server/base/clock.h"
@@ -14,7 +14,7 @@
 
 #define GOODBYE_NS 500000000u
 
-/* users counts the threads inside wake: disconnecting waits for them, wake waits for nobody */
+/* users counts the threads inside wake; disconnecting waits for them, wake never waits */
 struct pal_server_gate {
     _Atomic(pal_loop *) loop;
     _Atomic int users;
@@ -52,7 +52,7 @@ void pal_server_connect(pal_server *server, pal_server_gate *gate)
 {
     server->gate = gate;
     atomic_store(&gate->loop, server->loop);
-    /* frames published before */
+    /* for frames published before the gate was connected */
     pal_loop_wake(server->loop);
 }
 
@@ -70,7 +70,7 @@ static bool is_loopback(const char *listen)
     return inet_pton(AF_INET, listen, &v4) == 1 && ntohl(v4.s_addr) >> 24 == 127;
 }
 
-/* an address alone: names of hosts and ports behind a colon are none */
+/* a numeric IPv4 or IPv6 address; host names and ports are not accepted */
 static bool is_address(const char *listen)
 {
     unsigned char bytes[sizeof(struct in6_addr)];
@@ -109,7 +109,7 @@ static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_
     hub.setting_body = options->setting_body;
     hub.reference_m = options->reference_m;
     hub.verb = options->verb, hub.n_verb = options->n_verb;
-    /* besides the clients: page loads, and what lws needs itself */
+    /* in addition to clients: page loads, and descriptors of lws itself */
     PAL_TRY(pal_loop_create(s->road == &pal_ws_transport, hub.max_clients + 128, diag, &s->loop));
     PAL_TRY(pal_hub_create(s->loop, &hub, session, n_session, diag, &s->hub));
     pal_hub_events(s->hub, &events);
@@ -134,7 +134,7 @@ pal_err pal_server_run(pal_server *server)
 {
     pal_err err = pal_loop_run(server->loop);
     if (err) return err;
-    /* clients are told why; those that do not listen are left after GOODBYE_NS */
+    /* notifies the clients; connections still open after GOODBYE_NS are abandoned */
     uint64_t end = pal_clock_ns() + GOODBYE_NS;
     pal_hub_goodbye(server->hub);
     while (pal_hub_clients(server->hub) && pal_clock_ns() < end) pal_loop_step(server->loop, end);

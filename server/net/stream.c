@@ -1,5 +1,4 @@
-/* Streams (protocol/README.md, "Cycles and credit"). Encoding is done here on the network thread (0.4 ms per part and
- * cycle). */
+/* Streams (protocol/README.md, "Cycles and credit"). The network thread encodes (0.4 ms per part and cycle). */
 #include "server/net/stream.h"
 
 #include "protocol/asset.h"
@@ -20,7 +19,7 @@ static const double tier_factor[PAL_STREAM_TIER] = {1, 2, 5};
 
 struct pal_stream_coder {
     pal_frame_encoder *encoder[PAL_BODY_MAX][PAL_STREAM_TIER];
-    uint32_t seq[PAL_BODY_MAX]; /* per part, all tiers together */
+    uint32_t seq[PAL_BODY_MAX]; /* per part, across all tiers */
     uint8_t *buffer;            /* [cap] */
     size_t cap;
     uint32_t haptic_seq;
@@ -35,7 +34,7 @@ static pal_err refuse(pal_diagnostic *diag, int refusal, const char *part, const
                               part, what, pal_refusal_text(refusal));
 }
 
-/* asset and encoders of one part */
+/* builds the asset and encoders of one part */
 static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_diagnostic *diag)
 {
     pal_stream_part *part = &s->part[index];
@@ -44,7 +43,7 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
     size_t n_byte = 0;
     char hash[PAL_ASSET_HASH_CHARS];
     pal_err err = PAL_ERR_OK;
-    const uint32_t *tri = (const uint32_t *)shown->tri; /* indices are not negative */
+    const uint32_t *tri = (const uint32_t *)shown->tri; /* indices are nonnegative */
 
     int refusal =
         shown->parent
@@ -190,8 +189,8 @@ static uint64_t time_us(const pal_frame *frame)
     return frame->time_s > 0 ? (uint64_t)(frame->time_s * 1e6) : 0;
 }
 
-/* one part at one tier; a frame that shows nothing new is not kept, so the older message stays the newest, unless other
- * vertices are shown now or it is wanted anew */
+/* Encodes one part at one tier. A frame identical to the last is discarded, so the older message stays the newest,
+ * unless other vertices are displayed now or `again` is set. */
 static void encode_part(pal_stream *s, int p, int tier, bool again)
 {
     pal_stream_part *part = &s->part[p];
@@ -207,7 +206,7 @@ static void encode_part(pal_stream *s, int p, int tier, bool again)
     uint32_t change = part->places ? part->places->change : 0;
     pal_frame_result result;
     if (from->n_vertex != (int)part->info.n_vertex) return;
-    /* nobody looked, or nothing was shown anew since: a body asleep */
+    /* no observer; or, below, no new output: the body sleeps */
     if (!s->frame->watched) return;
     bool same = part->frame_output[tier] == from->n_output && part->frame_change[tier] == change;
     if (part->frame[tier] && same && !again) return;
@@ -244,7 +243,7 @@ static void copy_quat(float to[4], const double from[4])
     for (int i = 0; i < 4; i++) to[i] = good ? (float)from[i] : i == 0;
 }
 
-/* the pose that the step has used is the holder's own, not that of the one who held the tool before */
+/* echoes only a pose of the current holder, not of an earlier one */
 static bool echoes(const pal_frame_tool *f, const pal_stream_tool *t)
 {
     return f->present && t->holder && f->pose_ns >= t->taken_ns && f->pose_ns;
@@ -300,8 +299,7 @@ static void copy_patch(pal_wire_contact_patch *to, const pal_contact_patch *from
     to->radius_m = (float)from->radius_m;
 }
 
-/* contact model of a held tool (protocol/README.md, "HAPTIC"); its origin is the tool's own position, so floats suffice
- */
+/* contact model of a held tool (protocol/README.md, "HAPTIC"); relative to the tool position, so floats suffice */
 static void put_haptic(pal_stream *s, int i, const pal_stream_tool *tool)
 {
     const pal_frame_tool *f = &s->frame->tool[i];
@@ -358,19 +356,19 @@ bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_
     }
     put_tools(stream, tool);
     for (int i = 0; i < frame->n_tool; i++) put_haptic(stream, i, &tool[i]);
-    /* rows have come or gone, so the places mean others */
+    /* components have changed, so the entries have other meanings */
     if (frame->n_row != stream->coder->n_row) memset(stream->component_ms, 0, sizeof stream->component_ms);
     stream->coder->n_row = frame->n_row;
     for (int r = 0; r < frame->n_row; r++) {
         stream->component_ms[r] += 0.2 * (frame->component_ns[r] * 1e-6 - stream->component_ms[r]);
-        /* less than the clock's tick is what is left of a mean of nothing */
+        /* below the clock resolution, the mean has decayed to zero */
         if (stream->component_ms[r] < 1e-6) stream->component_ms[r] = 0;
     }
     stream->step_ms += 0.2 * ((double)frame->step_ns * 1e-6 - stream->step_ms);
     return true;
 }
 
-/* one message of the newest values; work is scratch that is taken for the call */
+/* encodes one message of the newest values; work is scratch, allocated for the call */
 static bool encode_field(pal_stream *s, int p, int k, uint64_t now_ns)
 {
     pal_stream_part *part = &s->part[p];
@@ -386,7 +384,7 @@ static bool encode_field(pal_stream *s, int p, int k, uint64_t now_ns)
         work ? pal_field_put(from->value, &head, work, s->coder->buffer, s->coder->cap, &n_byte) : PAL_REFUSAL_MEMORY;
     free(work);
     pal_packet *packet = refusal ? NULL : pal_packet_create(s->coder->buffer, n_byte, false);
-    /* a message a little late does not put the next one off, so that the rate is kept and never exceeded for long */
+    /* a slightly late message does not delay the next, so the mean rate is kept and exceeded only briefly */
     uint64_t *due = &part->field_due_ns[k], apart = (uint64_t)(1e9 / PAL_STREAM_FIELD_HZ), slack = apart / 10;
     *due = now_ns > *due + slack ? now_ns + apart - slack : *due + apart;
     part->field_revision[k] = from->revision;
@@ -466,7 +464,7 @@ void pal_stream_hello(const pal_stream *stream, pal_wire_hello *out)
     out->n_tool = (uint32_t)scene->n_tool;
     for (int t = 0; t < scene->n_tool; t++) {
         pal_plain_text(out->tool[t].name, sizeof out->tool[t].name, scene->tool[t].name);
-        /* the world's own radius when a frame tells it, else the rule of pal_tool_def */
+        /* the world's radius when a frame gives it, else the default of pal_tool_def */
         out->tool[t].radius_m = stream->frame && t < stream->frame->n_tool ? stream->frame->tool[t].radius_m
                                 : scene->tool[t].radius_m > 0              ? scene->tool[t].radius_m
                                                                            : 0.04 * sqrt(size);

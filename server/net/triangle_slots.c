@@ -1,5 +1,5 @@
-/* Every place is compared when the revision says that something changed (0.1 ms for 200,000); uses of a vertex are
- * counted along, so that hidden ones cost nothing more. */
+/* The server's triangle table. Every entry is compared when the revision changes (0.1 ms for 200,000). The uses of
+ * each vertex are counted incrementally, so that the flags of hidden vertices need no extra pass. */
 #include "server/net/triangle_slots.h"
 
 #include "protocol/topology_delta_codec.h"
@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* an empty place uses no vertex */
+/* an empty entry uses no vertex */
 static void use(pal_triangle_slots *s, const uint32_t tri[3], bool begin)
 {
     if (!(tri[0] | tri[1] | tri[2])) return;
@@ -38,7 +38,7 @@ pal_err pal_triangle_slots_make(int part, uint32_t epoch, const pal_shown *shown
     s->epoch = epoch;
     s->n_place = (uint32_t)shown->n_tri;
     s->n_vertex = (uint32_t)shown->n_vertex;
-    s->revision = UINT64_MAX; /* the simulation may have gone on since that table: the first frame is compared */
+    s->revision = UINT64_MAX; /* the simulation may have changed the table since: compare the first frame */
     s->tri = calloc(3 * (size_t)s->n_place + 1, sizeof *s->tri);
     s->written = calloc((size_t)s->n_place + 1, sizeof *s->written);
     s->n_use = calloc((size_t)s->n_vertex + 1, sizeof *s->n_use);
@@ -91,7 +91,7 @@ bool pal_triangle_slots_update(pal_triangle_slots *places, const int32_t *slot, 
     return true;
 }
 
-/* encodes the n places that changed after `from`; room holds places, planes and the message */
+/* encodes the n entries that changed after `from`; one allocation for entries, planes and the message */
 static pal_packet *encode(pal_triangle_slots *s, uint32_t from, uint32_t n)
 {
     size_t n_place = (size_t)n * sizeof(uint32_t), n_work = PAL_TOPOLOGY_DELTA_WORK_BYTES(n),

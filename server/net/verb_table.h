@@ -6,7 +6,7 @@
 extern const pal_verb pal_verb_table[]; /* [pal_verb_count] */
 extern const int pal_verb_count;
 
-/* the table as text, one line a verb: name, who may give it, numbers, what it does, separated by tabs; returns the
- * bytes that all of it takes, as snprintf does. Thread: any */
+/* formats the table as text, one line per verb with tab-separated name, permission, arguments and description; returns
+ * the number of bytes of the whole text, as snprintf does. Thread: any */
 int pal_verb_describe(const pal_verb *verb, int n_verb, char *text, size_t cap);
 #endif

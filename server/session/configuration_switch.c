@@ -1,4 +1,4 @@
-/* Live switches: a scene made by pal_configuration_make, and a transfer to it from the one that runs. */
+/* Live switches: a scene from pal_configuration_make, and the transfer of the running state to it. */
 #include "server/session/configuration_switch.h"
 
 #include <stdlib.h>
@@ -6,7 +6,7 @@
 struct pal_configuration_switch {
     int body;
     bool has_rehearsed;
-    pal_scene from; /* what the new scene is made of */
+    pal_scene from; /* the new scene */
     pal_configured_scene *set;
     pal_transfer *transfer;
     pal_transfer_report report;
@@ -26,7 +26,7 @@ static pal_err prepare(const pal_scene *scene, const pal_body_def *base, int bod
     }
     PAL_TRY(pal_configuration_check_live(&s->from, body, to, diag));
     PAL_TRY(pal_configuration_make(&s->from, body, to, diag, &s->set));
-    s->set->scene.accuracy[0] = 0; /* was said of the setting before */
+    s->set->scene.accuracy[0] = 0; /* the measured accuracy belongs to the old configuration */
     pal_configuration_of(scene, body, &now);
     pal_configuration_of(&s->set->scene, body, &next);
     if (pal_configuration_equal(&now, &next)) {

@@ -1,4 +1,4 @@
-/* Rows that stay off when one session follows another. */
+/* Keeps components disabled across successive sessions. */
 #include "server/session/disabled_components.h"
 
 #include <stdio.h>
@@ -37,7 +37,7 @@ void pal_disabled_components_transfer(pal_disabled_components *to, const pal_dis
     to->n = 0;
     for (int i = 0; i < from->n; i++)
         if (!has_row(before, from->at[i].body, from->at[i].row)) put(to, from->at[i].body, from->at[i].row);
-    /* rows of services are of no body and cannot be switched */
+    /* components of services belong to no body and cannot be disabled */
     for (int k = 0; k < n_row; k++)
         if (has_body(scene, row[k].body) && !has_row(before, row[k].body, row[k].name))
             put(to, row[k].body, row[k].name);

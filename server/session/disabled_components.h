@@ -1,5 +1,5 @@
-/* Rows of the plan that were switched off, by name, so that they stay off through any number of sessions that follow
- * one another, those whose methods have no such row as well. Thread: of who opens, follows and closes sessions. */
+/* Disabled components of the plan, stored by name. They stay disabled across any number of successive sessions,
+ * including sessions whose method has no such component. Thread: the one that opens, transfers and closes sessions. */
 #ifndef PAL_SESSION_DISABLED_COMPONENTS_H
 #define PAL_SESSION_DISABLED_COMPONENTS_H
 #include "server/sim/world/world.h"
@@ -10,11 +10,12 @@ typedef struct pal_disabled_components {
     int n;
     struct {
         char body[PAL_NAME], row[PAL_NAME];
-    } at[PAL_DISABLED_COMPONENTS_MAX]; /* more are on again after a switch */
+    } at[PAL_DISABLED_COMPONENTS_MAX]; /* any beyond these are enabled again by a switch */
 } pal_disabled_components;
 
-/* What is off in `before` (not in its plan though it was at open, row [n_row], or known to be off since an earlier
- * session, *from) is switched off in `next`, a new world of scene, where that has it, and kept in *to */
+/* Disables in `next`, a new world of scene, every component that is disabled in `before`, and stores the list in *to.
+ * A component counts as disabled when it was in the plan at open (row [n_row]) and no longer is, or when *from lists
+ * it. */
 void pal_disabled_components_transfer(pal_disabled_components *to, const pal_disabled_components *from,
                                       const pal_component_info *row, int n_row, const pal_world *before,
                                       pal_world *next, const pal_scene *scene);

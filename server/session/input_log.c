@@ -1,5 +1,5 @@
-/* Writer: one producer (the simulation thread), one consumer (the writer thread), a ring of bytes between them. Reader:
- * plain functions on bytes in memory. */
+/* Writer: a byte ring buffer between one producer (the simulation thread) and one consumer (the writer thread).
+ * Reader: plain functions on bytes in memory. */
 #include "server/session/input_log.h"
 
 #include "server/base/clock.h"
@@ -22,7 +22,7 @@ struct pal_input_log {
     pthread_t thread;
     uint8_t *ring;
     size_t n_ring;                /* a power of two                              */
-    _Atomic uint64_t filled, out; /* bytes put in, bytes written: only ever grow */
+    _Atomic uint64_t filled, out; /* bytes put in, bytes written; both only increase */
     _Atomic bool stop, failed;
     uint64_t n_dropped;
 };
@@ -117,12 +117,12 @@ static uint64_t mix_mesh(uint64_t h, const pal_prepared *mesh)
     h = mix_bytes(h, mesh->tets.x, (size_t)mesh->tets.n_node * 3 * sizeof(double));
     h = mix_bytes(h, mesh->tets.tet, (size_t)mesh->tets.n_tet * 4 * sizeof(int32_t));
     h = mix_bytes(h, mesh->surface.x, (size_t)mesh->surface.n_vertex * 3 * sizeof(double));
-    /* elsewhere what moves is the tetrahedra */
+    /* a mesh with tetrahedra is simulated by them alone, so its surface triangles do not count */
     if (mesh->tets.n_tet == 0) h = mix_bytes(h, mesh->surface.tri, (size_t)mesh->surface.n_tri * 3 * sizeof(int32_t));
     return mix_bytes(h, mesh->tets.origin_m, sizeof mesh->tets.origin_m);
 }
 
-/* control cells, their sharp features and what is painted on them */
+/* control cells, their sharp features and paint */
 static uint64_t mix_cells(uint64_t h, const pal_body_def *def)
 {
     const pal_cells *c = def->cells;
@@ -136,7 +136,7 @@ static uint64_t mix_cells(uint64_t h, const pal_body_def *def)
     for (int32_t i = 0; i < c->n_edge_use; i++) h = mix_bytes(h, &c->edge_use[i].vertex, sizeof(int32_t));
     for (int32_t i = 0; i < c->n_edge; i++) h = mix_bytes(h, &c->edge[i].sharp, sizeof(float));
     for (int32_t i = 0; i < c->n_face; i++) h = mix_bytes(h, &c->face[i].sharp, sizeof(float));
-    /* what is cut away cannot be touched */
+    /* removed tissue has no contact */
     const double cut[4] = {def->cut_normal[0], def->cut_normal[1], def->cut_normal[2], def->cut_m};
     if (def->cut) h = mix_bytes(h, cut, sizeof cut);
     for (int i = 0; i < def->n_stroke; i++) {
@@ -190,7 +190,7 @@ static bool write_all(int file, const uint8_t *bytes, size_t n)
     return true;
 }
 
-/* writes out what the ring holds, in at most two pieces */
+/* writes the content of the ring buffer, in at most two pieces */
 static void drain(pal_input_log *log)
 {
     uint64_t out = atomic_load_explicit(&log->out, memory_order_relaxed);

@@ -1,23 +1,24 @@
-/* The input log's bytes (private to this room): writer and reader of the records that replay.h speaks of.
+/* Byte format of the input log, its writer and its reader. Private to server/session; replay.h is the public
+ * interface.
  *
- * Little-endian. Header 40 bytes: "palinlog", u32 version 4 (1 has no BRUSH, 2 no RESET_BODY, 3 no ROW), u32 hash
- * interval in steps, f64 step_s, u64 fingerprint of the scene, u32 bodies, u32 tools. Then records: u8 kind, u8 index
- * (tool or body), u16 payload bytes, u32 zero, u64 steps taken since open, payload. A record takes effect before the
- * next step. The last record is END; a file without it is cut.
+ * Little-endian. Header, 40 bytes: "palinlog", u32 version 4 (1 lacks BRUSH, 2 lacks RESET_BODY, 3 lacks COMPONENT),
+ * u32 hash interval in steps, f64 step_s, u64 scene fingerprint, u32 bodies, u32 tools. Records follow: u8 kind, u8
+ * index (tool or body), u16 payload bytes, u32 zero, u64 steps taken since open, payload. A record takes effect before
+ * the next step. The last record is END; a file without it is truncated.
  *
  *   POSE      tool   88  f64 position[3], quat[4], velocity[3], u32 buttons, u32 seq
- *   LET_GO    tool    0
+ *   RELEASE   tool    0
  *   RESET     0       0
  *   RESET_BODY body   0                                  (version 3)
  *   MATERIAL  body   32  f64 young_Pa, poisson, density_kg_m3, damping_1_s
  *   BRUSH     body  112  u32 tool, u32 kind, f64 at_m[3], to_m[3], radius_m, soft, pressure_Pa, lift_m[3],
  *                        stiffness_N_m (version 2)
- *   ROW       body   52  u32 on, name[48] ended by zeros (version 4)
+ *   COMPONENT body   52  u32 on, name[48], zero-padded (version 4)
  *   HASH      0       8  u64 world hash, at least every `hash interval` steps
- *   END       0      16  u64 world hash, u64 records that were dropped (0: the log is whole)
+ *   END       0      16  u64 world hash, u64 dropped records (0: the log is complete)
  *
- * The writer's put functions copy into a ring of bytes and never wait, allocate or touch the file; a thread of its own
- * writes it out. What does not fit is dropped and counted, and the log says that it is not whole. */
+ * The put functions copy into a ring buffer; they never wait, allocate or touch the file. A separate thread writes the
+ * file. A record that does not fit is dropped and counted, and END reports it. */
 #ifndef PAL_SESSION_INPUT_LOG_H
 #define PAL_SESSION_INPUT_LOG_H
 #include "server/sim/core/brush.h"
@@ -45,18 +46,18 @@ typedef enum pal_input_kind {
 
 typedef struct pal_input_record {
     pal_input_kind kind;
-    int index;     /* tool or body                          */
-    uint64_t step; /* steps taken since open                */
+    int index;     /* tool or body */
+    uint64_t step; /* steps taken since open */
     pal_pose pose;
     pal_material material;
     uint64_t hash, n_dropped;
     int slot; /* BRUSH: tool */
     pal_brush brush;
-    bool wanted; /* ROW */
+    bool wanted; /* COMPONENT */
     char row[PAL_NAME];
 } pal_input_record;
 
-/* a number for everything of a scene that decides the simulation: steps, meshes, materials, entries; not its texts */
+/* hash of everything in a scene that decides the simulation: steps, meshes, materials, entries; texts are excluded */
 uint64_t pal_scene_fingerprint(const pal_scene *scene);
 
 typedef struct pal_input_log pal_input_log;
@@ -65,8 +66,7 @@ pal_err pal_input_log_open(const char *path, const pal_scene *scene, size_t ring
                            pal_input_log **out);
 void pal_input_log_put(pal_input_log *log, const pal_input_record *record); /* [sim] NULL log is fine */
 uint64_t pal_input_log_dropped(const pal_input_log *log);                   /* [sim] */
-/* writes END with the world's last hash, joins the writer, closes the file; IO when anything could not be written
- * [load] */
+/* writes END with the last hash of the world, joins the writer and closes the file; IO: any write failed. [load] */
 pal_err pal_input_log_close(pal_input_log *log, uint64_t step, uint64_t hash);
 
 typedef struct pal_input_header {
@@ -74,7 +74,7 @@ typedef struct pal_input_header {
     double step_s;
     uint64_t fingerprint;
 } pal_input_header;
-/* bounds-checked: *at moves on; REFUSED with the byte offset */
+/* bounds-checked; advance *at; REFUSED gives the byte offset */
 pal_err pal_input_get_header(const char *name, const uint8_t *bytes, size_t n_byte, pal_input_header *out, size_t *at,
                              pal_diagnostic *diag);
 pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_byte, size_t *at, pal_input_record *out,

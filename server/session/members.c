@@ -1,4 +1,4 @@
-/* The member table: linear searches over a few dozen places, so that there is nothing to keep in step. */
+/* The member table: linear searches over a few dozen entries, without an index to maintain. */
 #include "server/session/members.h"
 
 #include "server/base/utf8.h"
@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* room kept at a name's end for " 64" */
+/* reserved at the end of a name for " 64" */
 enum { NAME_NUMBER = 4 };
 
 void pal_members_init(pal_member_list *members, int n_tool)
@@ -16,7 +16,7 @@ void pal_members_init(pal_member_list *members, int n_tool)
     members->next_id = 1;
 }
 
-/* well-formed characters that may be shown, blanks joined and trimmed, cut at a whole character */
+/* keeps valid printable characters, merges and trims blanks, truncates at a whole character */
 static void clean_name(const char *from, char to[PAL_MEMBER_NAME])
 {
     size_t n_from = from ? strnlen(from, 4096) : 0, n = 0;
@@ -90,7 +90,7 @@ pal_err pal_members_take_tool(pal_member_list *members, int id, int tool, int *t
 {
     pal_member_entry *member = pal_members_find(members, id);
     if (!member || member->role == PAL_MEMBER_VIEWER || tool < -1 || tool >= members->n_tool) return PAL_ERR_REFUSED;
-    /* any: the one held already, else the first free one */
+    /* any: the tool already held, else the first free one */
     if (tool == -1) tool = member->tool;
     for (int k = 0; k < members->n_tool && tool == -1; k++)
         if (!members->holder[k]) tool = k;

@@ -1,6 +1,6 @@
-/* Members of a session: who is there, in what role, and who holds which tool. A plain table without threads: the hub
- * owns it. A tool has one holder, hence one writer. (Type names differ from protocol/control.h's, which net sees too.)
- * Thread: [net]. */
+/* Members of a session: their roles, and which of them holds which tool. A plain table without locks, owned by the
+ * hub. A tool has one holder, hence one writer. Type names differ from those of protocol/control.h, which server/net
+ * also includes. Thread: [net]. */
 #ifndef PAL_SESSION_MEMBERS_H
 #define PAL_SESSION_MEMBERS_H
 #include "server/sim/core/tools.h"
@@ -10,10 +10,10 @@ enum { PAL_MEMBER_LIST_MAX = 64, PAL_MEMBER_NAME = 48 };
 typedef enum pal_member_role { PAL_MEMBER_VIEWER, PAL_MEMBER_TRAINEE, PAL_MEMBER_INSTRUCTOR } pal_member_role;
 
 typedef struct pal_member_entry {
-    int id; /* > 0, never used twice; 0: free place */
+    int id; /* > 0, never reused; 0: free entry */
     pal_member_role role;
     char name[PAL_MEMBER_NAME]; /* UTF-8, control characters removed; made unique by a number */
-    int tool;                   /* held, -1: none */
+    int tool;                   /* index of the tool that the member holds; -1: none */
 } pal_member_entry;
 
 typedef struct pal_member_list {
@@ -23,13 +23,13 @@ typedef struct pal_member_list {
 } pal_member_list;
 
 void pal_members_init(pal_member_list *members, int n_tool);
-/* FULL when no place is left */
+/* FULL: no free entry */
 pal_err pal_members_join(pal_member_list *members, pal_member_role role, const char *name, int *id);
-void pal_members_leave(pal_member_list *members, int id); /* its tool becomes free */
+void pal_members_leave(pal_member_list *members, int id); /* releases the member's tool */
 pal_member_entry *pal_members_find(pal_member_list *members, int id);
-/* tool -1: any free one. STATE: held by somebody else or none free; REFUSED: a viewer, or no such tool. Taking another
- * tool gives back the one held. */
+/* tool -1: any free tool. STATE: another member holds it, or none is free; REFUSED: a viewer, or no such tool.
+ * Releases the tool held before. */
 pal_err pal_members_take_tool(pal_member_list *members, int id, int tool, int *taken);
 void pal_members_release_tool(pal_member_list *members, int id);
-bool pal_members_may_command(const pal_member_list *members, int id); /* trainees and instructors; viewers not */
+bool pal_members_may_command(const pal_member_list *members, int id); /* true for trainees and instructors */
 #endif

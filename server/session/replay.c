@@ -1,5 +1,5 @@
-/* Runs an input log: first the whole log is checked without a world, then the world is stepped to each record's step
- * and the record takes effect, exactly as in the session that wrote it. */
+/* Replays an input log. A first pass checks the whole log without a world. The second steps the world to the step of
+ * each record and applies the record, exactly as the recorded session did. */
 #include "server/session/replay.h"
 
 #include "server/mesh/files/file_bytes.h"
@@ -7,7 +7,7 @@
 
 #include <stdlib.h>
 
-/* is the log whole, in order, and within the scene's tools and bodies? */
+/* is the log complete, ordered, and within the scene's tools and bodies? */
 static pal_err check(const char *name, const uint8_t *bytes, size_t n_byte, pal_input_header *header,
                      pal_diagnostic *diag)
 {
@@ -18,7 +18,7 @@ static pal_err check(const char *name, const uint8_t *bytes, size_t n_byte, pal_
         pal_input_record record;
         size_t place = at;
         PAL_TRY(pal_input_get_record(name, bytes, n_byte, &at, &record, diag));
-        /* END first: a log with lost records may have gaps, and that is the better sentence */
+        /* END first: a log with dropped records may have gaps, and the drop is the better diagnostic */
         if (record.kind == PAL_INPUT_END && record.n_dropped)
             return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %llu records were lost while the log was written",
                                       name, (unsigned long long)record.n_dropped);
@@ -42,7 +42,7 @@ static pal_err check(const char *name, const uint8_t *bytes, size_t n_byte, pal_
     }
 }
 
-/* one record against the world, which has taken record->step steps */
+/* applies one record to the world, which has taken record->step steps */
 static pal_err apply(pal_world *world, const pal_scene *scene, const pal_input_record *record,
                      pal_replay_report *report, pal_diagnostic *diag)
 {

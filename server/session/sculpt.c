@@ -1,5 +1,5 @@
-/* Sculpting. A shape is what undo brings back: cells, strokes, and the state it had when it was left. A turn holds the
- * shape that comes, a scene with copies of its own, and room for the state that goes. */
+/* Sculpting. A shape is the unit of undo: cells, strokes, and the mechanical state at the time it was replaced. An
+ * edit contains the new shape, a scene with its own copies, and memory for the replaced state. */
 #include "server/session/sculpt.h"
 
 #include "server/base/vec3.h"
@@ -12,12 +12,12 @@ typedef struct shape {
     pal_cells cells;
     pal_stroke *stroke; /* [n_stroke] */
     int n_stroke;
-    double *x, *v; /* state when it was left, NULL: never left [cells.n_vertex][3] */
+    double *x, *v; /* state when it was replaced; NULL: never replaced [cells.n_vertex][3] */
 } shape;
 
 struct pal_sculptor {
     int body;
-    double origin_m[3]; /* of the body's frame, whatever becomes of its shape */
+    double origin_m[3]; /* of the body's frame, independent of the shape */
     bool cut;
     double cut_normal[3], cut_m;
     shape now, past[PAL_SCULPT_HISTORY], future[PAL_SCULPT_HISTORY]; /* newest last */
@@ -27,11 +27,11 @@ struct pal_sculptor {
 struct pal_sculpt_edit {
     pal_sculpt_kind kind;
     int body;
-    const pal_cells *from;   /* the sculptor's, until the turn is taken        */
-    shape to;                /* after the command; moves into the sculptor       */
-    pal_cells_edit edit;     /* CELLS: where its points come from                */
-    double *x, *v;           /* state that is left            [n points before]  */
-    double *next_x, *next_v; /* state that comes            [n points after]  */
+    const pal_cells *from;   /* the sculptor's, until commit */
+    shape to;                /* after the command; moved to the sculptor by commit */
+    pal_cells_edit edit;     /* CELLS: origin of the new points */
+    double *x, *v;           /* replaced state [points before] */
+    double *next_x, *next_v; /* new state [points after] */
     int n_before;
     bool cut;
     double cut_normal[3], cut_m;
@@ -60,7 +60,7 @@ static void *copied(const void *from, size_t n_byte)
     return to;
 }
 
-/* cells and strokes; not the state */
+/* copies cells and strokes, without the state */
 static pal_err copy_shape(const shape *from, shape *to)
 {
     *to = (shape){.n_stroke = from->n_stroke};
@@ -70,7 +70,7 @@ static pal_err copy_shape(const shape *from, shape *to)
     return err;
 }
 
-/* puts a shape on top of a list, the oldest falls out */
+/* pushes a shape on a list; a full list drops the oldest */
 static void push(shape *list, int *n, const shape *s)
 {
     if (*n == PAL_SCULPT_HISTORY) {
@@ -162,7 +162,7 @@ static pal_err keep(const pal_sculptor *s, const pal_sculpt *command, shape *to,
     return PAL_ERR_OK;
 }
 
-/* back or forth: the shape and the state it was left in */
+/* undo or redo: the shape with the state at its replacement */
 static pal_err turn_to(const shape *list, int n, const char *what, pal_sculpt_edit *turn, pal_diagnostic *diag)
 {
     if (n == 0) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is nothing to %s", what);
@@ -213,9 +213,9 @@ static pal_err obey(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt
     return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is no way of sculpting %d", (int)command->kind);
 }
 
-/* ---- turns ---- */
+/* ---- edits ---- */
 
-/* the scene with the body's new shape; everything that the body borrows is the turn's */
+/* builds the scene with the body's new shape; the edit owns all that the body borrows */
 static pal_err make_scene(const pal_sculptor *s, const pal_scene *scene, pal_sculpt_edit *turn)
 {
     pal_surface surface = {0};
@@ -225,7 +225,7 @@ static pal_err make_scene(const pal_sculptor *s, const pal_scene *scene, pal_scu
     turn->stroke = copied(turn->to.stroke, sizeof *turn->stroke * (size_t)turn->to.n_stroke);
     if (!turn->stroke) return PAL_ERR_MEMORY;
     PAL_TRY(pal_cells_boundary(&turn->cells, &surface, NULL, NULL));
-    /* the body's frame stays where it is */
+    /* the body's frame does not move */
     pal_copy3(surface.origin_m, s->origin_m);
     pal_err err = pal_prepared_surface(&surface, &turn->mesh);
     pal_surface_free(&surface);
@@ -274,7 +274,7 @@ const pal_scene *pal_sculpt_edit_scene(const pal_sculpt_edit *turn)
     return &turn->scene;
 }
 
-/* where an edit's points stand now */
+/* current positions and velocities of an edit's points */
 static void carry_points(pal_sculpt_edit *turn)
 {
     const pal_cells_edit *edit = &turn->edit;
@@ -336,7 +336,7 @@ void pal_sculpt_edit_free(pal_sculpt_edit *turn)
     free(turn);
 }
 
-/* ---- what was pointed at ---- */
+/* ---- picking ---- */
 
 static double off_edge(const pal_cells *c, int32_t edge, const double at[3])
 {
@@ -351,7 +351,7 @@ static double off_edge(const pal_cells *c, int32_t edge, const double at[3])
     return pal_dist3(near, at);
 }
 
-/* the edge use of the face whose edge, or whose start, is nearest; -1: no such face */
+/* the edge use of the face with the nearest edge or start vertex; -1: no such face */
 static int32_t nearest_use(const pal_cells *c, int32_t face, const double at[3], bool vertex)
 {
     int32_t first, best = -1;

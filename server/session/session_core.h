@@ -1,4 +1,4 @@
-/* The record of a session and its thread: what session_thread.c and session_transfer.c share. Private to these. */
+/* The struct of a session, shared by session_thread.c and session_transfer.c. Private to them. */
 #ifndef PAL_SESSION_SESSION_CORE_H
 #define PAL_SESSION_SESSION_CORE_H
 #include "server/base/command_queue.h"
@@ -22,31 +22,31 @@ typedef struct pose_slot {
 typedef struct tool_place {
     pal_triple_buffer triple_buffer;
     pose_slot slot[3];
-    /* the rest is the simulation thread's */
+    /* the simulation thread's own */
     pal_pose pose;
     uint64_t arrived_ns;
-    bool present, brushes; /* brushes: a brush began since it was let go */
+    bool present, brushes; /* brushes: a brush began since the last release */
 } tool_place;
 
-/* a moment and the steps taken until then */
+/* a time and the number of steps taken until then */
 typedef struct mark {
     uint64_t ns, step;
 } mark;
 
 struct pal_session {
     const pal_scene *scene;
-    pal_session_options options; /* record_path is ours */
+    pal_session_options options; /* owns record_path */
     pal_world *world;
     double reach_m;
     uint64_t step_ns, lease_ns;
     pal_component_info *row;
     int n_row;
-    pal_disabled_components off; /* since sessions before this one */
+    pal_disabled_components off; /* inherited from earlier sessions */
     pal_shown part[PAL_BODY_MAX];
     bool gives[PAL_BODY_MAX][PAL_FIELD_COUNT];
     int n_part;
     pthread_t thread;
-    bool running; /* there is a thread: of who opens, follows and closes */
+    bool running; /* the thread exists: for the thread that opens, transfers and closes */
 
     /* crossing points */
     tool_place tool[PAL_TOOL_MAX];
@@ -54,31 +54,32 @@ struct pal_session {
     pal_frame *frame[3];
     pal_triple_buffer frames;
     _Atomic bool stop;
-    _Atomic bool replaced; /* another one is about to go on where it stands */
+    _Atomic bool replaced; /* another session is about to replace this one */
     _Atomic uint64_t beat_ns, n_refused;
-    _Atomic int n_observer; /* who looks at frames; only_observed alone asks */
+    _Atomic int n_observer; /* observers of frames; used with only_observed */
     pthread_mutex_t note_lock;
     pal_diagnostic diag;
     pal_material material[PAL_BODY_MAX]; /* guarded by note_lock */
-    pal_estimator_set watch;             /* who looks at estimates */
+    pal_estimator_set watch;             /* subscribers to estimates */
 
     /* the simulation thread's own */
     pal_input_log *log;
     bool paused, watched;
-    int single;                    /* steps asked for while paused        */
-    uint64_t step;                 /* taken since open: resets do not count */
-    uint64_t n_late;               /* began late                          */
-    uint64_t work_ns;              /* processor time of the last step     */
-    uint64_t carried_ns;           /* of one that follows: when the other one was asked to stop */
-    uint64_t stopped_ns, pause_ns; /* when it had, and the longest that neither ran; of who opens and follows */
+    int single;                    /* single steps requested while paused */
+    uint64_t step;                 /* taken since open; resets do not count */
+    uint64_t n_late;               /* steps that began late */
+    uint64_t work_ns;              /* processor time of the last step */
+    uint64_t carried_ns;           /* after a transfer: when the predecessor was asked to stop */
+    uint64_t stopped_ns, pause_ns; /* when the predecessor had stopped, and the longest time that neither ran; for the
+                                      thread that opens and transfers */
     int n_rehearsed;
     uint64_t end_ns;
-    uint32_t n_look[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* who looks at a field */
-    mark marks[N_MARK + 2];                         /* a ring, oldest at first              */
+    uint32_t n_look[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* subscribers to a field */
+    mark marks[N_MARK + 2];                         /* ring buffer, oldest at first */
     int first, n_marks;
 };
 
-/* the simulation thread, of who opens, follows and closes; INTERNAL: it could not be started */
+/* for the thread that opens, transfers and closes; INTERNAL: the thread could not be started */
 pal_err pal_session_start(pal_session *session, pal_diagnostic *diag);
-void pal_session_stop(pal_session *session); /* between two steps; waits for it */
+void pal_session_stop(pal_session *session); /* between two steps; waits for the thread */
 #endif

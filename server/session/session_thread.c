@@ -1,9 +1,8 @@
-/* The simulation thread: take commands and newest poses, step the world, publish a frame, sleep until the next absolute
- * time. Nothing here waits for another thread: poses and frames go through triple buffers, commands through a ring, and
- * the only lock guards the one sentence of pal_session_last_diagnostic, which the thread touches when a command was
- * refused or a body frozen, never in an ordinary step.
+/* The simulation thread: takes commands and the newest poses, steps the world, publishes a frame, and sleeps until the
+ * next absolute time. It waits for no other thread: poses and frames use triple buffers, commands a queue. The only
+ * lock guards the last diagnostic and the materials; an ordinary step does not take it.
  *
- * Slowdown is real over simulated time since a mark that is between 1 and 1 + 1/16 s old. */
+ * Slowdown is real time over simulated time since a mark that is 1 to 1 + 1/16 s old. */
 #include "server/session/session_core.h"
 
 #include "server/base/clock.h"
@@ -15,11 +14,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double reach_sizes = 100;   /* a pose may be this many body sizes from the origin */
-static const double late_part = 0.1;     /* a step is late when it begins this part of a step after its time */
-static const double young_max_Pa = 1e12; /* beyond any solid */
+static const double reach_sizes = 100;   /* maximum distance of a pose from the origin, in body sizes */
+static const double late_part = 0.1;     /* a step is late when it begins this fraction of a step after its due time */
+static const double young_max_Pa = 1e12; /* above any solid */
 
-/* ---- what the thread does ---- */
+/* ---- the thread ---- */
 
 static void say(pal_session *s, const pal_diagnostic *diag)
 {
@@ -33,7 +32,7 @@ static void forget_pace(pal_session *s)
     s->first = s->n_marks = 0;
 }
 
-/* a mark every 1/16 s; those older than the second are dropped, but the newest of them is kept */
+/* sets a mark every 1/16 s; of the marks older than 1 s, keeps only the newest */
 static void mark_pace(pal_session *s, uint64_t now)
 {
     const int size = N_MARK + 2;
@@ -49,7 +48,7 @@ static void mark_pace(pal_session *s, uint64_t now)
     s->marks[(s->first + s->n_marks++) % size] = (mark){now, s->step};
 }
 
-/* needs a tenth of a second and one step to say anything */
+/* the estimate needs at least 0.1 s and one step */
 static double slowdown(const pal_session *s)
 {
     if (s->n_marks == 0) return 1;
@@ -62,7 +61,7 @@ static double slowdown(const pal_session *s)
 static void publish(pal_session *s)
 {
     pal_frame *frame = pal_triple_buffer_slot(&s->frames);
-    (void)pal_frame_fit(frame, s->world); /* without memory that frame goes without the field */
+    (void)pal_frame_fit(frame, s->world); /* out of memory: this frame omits the field */
     pal_world_frame(s->world, frame);
     frame->end_ns = s->end_ns;
     frame->step_ns = s->work_ns;
@@ -73,7 +72,7 @@ static void publish(pal_session *s)
     for (int t = 0; t < frame->n_tool; t++) {
         tool_place *place = &s->tool[t];
         frame->tool[t].pose_ns = place->arrived_ns;
-        /* while paused tools are shown where they are held, though nothing feels them */
+        /* while paused, tools are displayed at their poses but exert no force */
         if (s->paused && place->present) {
             frame->tool[t].present = true;
             frame->tool[t].pose = place->pose;
@@ -83,7 +82,7 @@ static void publish(pal_session *s)
     if (s->options.wake) s->options.wake(s->options.user);
 }
 
-/* newest pose of every tool into the world; a silent holder's tool is let go. true when one changed */
+/* copies the newest pose of every tool to the world and releases tools whose lease has expired; true: one changed */
 static bool take_poses(pal_session *s, uint64_t now)
 {
     bool changed = false;
@@ -115,8 +114,8 @@ static bool take_poses(pal_session *s, uint64_t now)
     return changed;
 }
 
-/* the row comes with the first who looks and goes with the last; one that could not be made is tried again when the
- * next one asks */
+/* the first subscriber creates the component, the last removes it; creation that failed is retried by the next
+ * subscriber */
 static void look(pal_session *s, const pal_command *command)
 {
     uint32_t *n = &s->n_look[command->body][command->field];
@@ -162,7 +161,7 @@ static void switch_row(pal_session *s, const pal_command *command)
     say(s, &diag);
 }
 
-/* has somebody begun to look, or the last one ceased to? true: what is shown is new */
+/* updates the observed state; true: observation began, so display data must be computed */
 static bool look_around(pal_session *s)
 {
     bool watched = !s->options.only_observed || atomic_load_explicit(&s->n_observer, memory_order_relaxed) > 0;
@@ -233,13 +232,13 @@ static bool take_commands(pal_session *s)
 {
     pal_command command;
     bool any = false, was_paused = s->paused;
-    /* a flood that refills the ring as fast as it is emptied must not keep the step waiting */
+    /* bounded, so that a flood of commands cannot delay the step */
     for (int k = 0; k < N_COMMAND && pal_command_queue_get(s->command, &command); k++, any = true) obey(s, &command);
     if (was_paused != s->paused) forget_pace(s);
     return any;
 }
 
-/* what went wrong in a step: the bodies that stand still, with their reasons */
+/* reports the bodies that a step froze, with their reasons */
 static void tell(pal_session *s, pal_err err)
 {
     pal_diagnostic diag;
@@ -276,7 +275,7 @@ static void estimate(pal_session *s, bool stepped)
     if (pal_estimator_set_step(&s->watch, s->world, step_ms, &diag)) say(s, &diag);
 }
 
-/* waits for the step's time; a step that is a whole step late or more is due now and the missed ones are dropped */
+/* waits for the due time; a step at least one whole step late is due now, and the missed ones are dropped */
 static void pace(pal_session *s, uint64_t *due)
 {
     *due += s->step_ns;
@@ -357,7 +356,7 @@ static pal_err prepare(pal_session *s, pal_diagnostic *diag)
 
 pal_err pal_session_start(pal_session *s, pal_diagnostic *diag)
 {
-    /* signals belong to the thread that waits for them */
+    /* signals go to the thread that waits for them */
     sigset_t all, old;
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &old);
@@ -437,7 +436,7 @@ void pal_session_close(pal_session *s)
     release(s);
 }
 
-/* ---- any thread ---- */
+/* ---- functions for any thread ---- */
 
 const pal_scene *pal_session_scene(const pal_session *s)
 {

@@ -1,4 +1,4 @@
-/* A session that goes on where another one is (session.h). */
+/* Transfer of one session to another that replaces it (session.h). */
 #include "server/session/session_core.h"
 
 #include "server/base/clock.h"
@@ -11,8 +11,7 @@ static uint64_t later(uint64_t ns, uint64_t by_ns, uint64_t max_ns)
     return ns + by_ns < max_ns ? ns + by_ns : max_ns;
 }
 
-/* Tools as they are held, and poses that had not been taken yet. Nobody could take one while neither thread ran, for
- * away_ns: that time counts for no lease */
+/* transfers tool poses, including poses not yet taken; the away_ns during which no thread ran count for no lease */
 static void hand_tools(pal_session *to, pal_session *from, uint64_t now_ns)
 {
     uint64_t away_ns = now_ns - to->carried_ns;
@@ -30,7 +29,7 @@ static void hand_tools(pal_session *to, pal_session *from, uint64_t now_ns)
     }
 }
 
-/* what the thread of `from` knew and that of `to` goes on with, before the carry */
+/* transfers the state of the simulation thread, before the world's state */
 static void hand_over(pal_session *to, pal_session *from)
 {
     to->paused = from->paused, to->single = from->single;
@@ -43,7 +42,7 @@ static void hand_over(pal_session *to, pal_session *from)
             if (to->n_look[b][k] > 0) (void)pal_world_field(to->world, b, (pal_field)k, true, NULL);
 }
 
-/* what others may have changed meanwhile, and orders that nobody has taken yet */
+/* transfers what other threads may have changed, and pending commands */
 static void hand_orders(pal_session *to, pal_session *from)
 {
     atomic_store_explicit(&to->n_refused, atomic_load_explicit(&from->n_refused, memory_order_relaxed),
@@ -72,7 +71,7 @@ void pal_session_rehearse(pal_session *next, pal_session *before, pal_session_sn
         atomic_store_explicit(&before->stop, false, memory_order_release);
         pal_err err = pal_session_start(before, NULL);
         stood(next, stopped_ns);
-        /* without its thread it stands until the carry, which tells */
+        /* if the thread did not start, the session stands still until the transfer, which reports it */
         if (err || !wanted) return;
         rehearse(user, next->world);
         next->n_rehearsed++;

@@ -1,9 +1,9 @@
-/* Credit: how many cycles a client may have unacknowledged (protocol/README.md, "Cycles and credit"),
- * and the rate limit of what it says. Plain structs without a clock of their own. Thread: [net].
+/* Credit: the number of cycles that a client may leave unacknowledged (protocol/README.md, "Cycles and credit"), and
+ * the rate limit of incoming messages. Plain structs; the caller passes the time. Thread: [net].
  *
- * A round trip counts for K only when the cycle was sent with none before it in flight: a client slower than the
- * cycles lets them wait, and a K taken from that wait makes it longer still, up to the clamp. So that there is always
- * such a cycle, one is sent alone at intervals. */
+ * K is estimated only from cycles sent with none in flight. A client slower than the cycle rate queues them, and a K
+ * taken from that queueing delay would lengthen the queue up to the clamp. At intervals one cycle is therefore sent
+ * alone. */
 #ifndef PAL_NET_TRANSPORT_CREDIT_H
 #define PAL_NET_TRANSPORT_CREDIT_H
 #include <stdbool.h>
@@ -14,22 +14,22 @@ enum { PAL_CREDIT_MIN = 2, PAL_CREDIT_MAX = 12 };
 typedef struct pal_credit {
     double rate_hz; /* of cycles                                          */
     int max;        /* K = 1 + ceil(rate x smallest round trip), clamped  */
-    int n_flight;   /* sent and not acknowledged, oldest first            */
+    int n_flight;   /* sent and unacknowledged, oldest first */
     uint32_t cycle[PAL_CREDIT_MAX];
     uint64_t sent_ns[PAL_CREDIT_MAX];
-    uint32_t acknowledged; /* newest acknowledged cycle; 0: none                 */
-    uint64_t heard_ns;     /* last acknowledgement, or the first cycle sent      */
+    uint32_t acknowledged; /* newest acknowledged cycle; 0: none */
+    uint64_t heard_ns;     /* time of the last acknowledgement, or of the first cycle sent */
     double rtt_s;          /* smoothed; 0: none yet                              */
-    double min_s[2];       /* smallest round trip of the last and this window    */
-    uint64_t window_ns;    /* end of this window; 0: before the first            */
-    bool probing;          /* a cycle goes alone: nothing else until it is back  */
-    bool first_alone;      /* cycle[0] was sent with none before it in flight    */
+    double min_s[2];       /* smallest round trip of the last and the current window */
+    uint64_t window_ns;    /* end of the current window; 0: before the first */
+    bool probing;          /* a cycle is sent alone: no other until it is acknowledged */
+    bool first_alone;      /* cycle[0] was sent with none in flight */
 } pal_credit;
 
 void pal_credit_begin(pal_credit *credit, double rate_hz);
 bool pal_credit_free(const pal_credit *credit); /* may a cycle be sent now? */
 void pal_credit_sent(pal_credit *credit, uint32_t cycle, uint64_t now_ns);
-/* takes in an acknowledgement of this and all earlier cycles; false: of a cycle that was never sent */
+/* acknowledges this and all earlier cycles; false: the cycle was never sent */
 bool pal_credit_acknowledge(pal_credit *credit, uint32_t cycle, uint64_t now_ns);
 bool pal_credit_stalled(const pal_credit *credit, uint64_t now_ns, uint64_t limit_ns);
 
@@ -39,5 +39,5 @@ typedef struct pal_bucket {
     uint64_t at_ns;
 } pal_bucket;
 void pal_bucket_begin(pal_bucket *bucket, double per_s, double depth, uint64_t now_ns);
-bool pal_bucket_take(pal_bucket *bucket, uint64_t now_ns); /* false: too many */
+bool pal_bucket_take(pal_bucket *bucket, uint64_t now_ns); /* false: rate exceeded */
 #endif

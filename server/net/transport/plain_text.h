@@ -1,12 +1,11 @@
-/* Text of any origin made fit for a control message: valid UTF-8 without control characters, cut at a character.
- * Thread: any. */
+/* Sanitises text from any source for a control message: valid UTF-8 without control characters, truncated at a
+ * character. Thread: any. */
 #ifndef PAL_NET_TRANSPORT_PLAIN_TEXT_H
 #define PAL_NET_TRANSPORT_PLAIN_TEXT_H
 #include <stddef.h>
 
-/* at most cap - 1 bytes; every byte that is not part of valid UTF-8, and every control character, becomes one '?' or
- * blank */
+/* writes at most cap - 1 bytes; each byte outside valid UTF-8 and each control character becomes one '?' or blank */
 void pal_plain_text(char *to, size_t cap, const char *from);
-/* as the inside of a JSON string: quotes and backslashes escaped as well */
+/* the same for the inside of a JSON string: also escapes quotes and backslashes */
 void pal_plain_json(char *to, size_t cap, const char *from);
 #endif

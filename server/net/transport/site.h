@@ -1,8 +1,8 @@
-/* The viewer's files, read from one folder and kept in memory with a content hash as ETag.
+/* The viewer's files, read from one folder and cached in memory with a content hash as ETag.
  *
- * A path is served only when every segment is made of [A-Za-z0-9@._-] and does not begin with a dot, when the file lies
- * inside the folder after all links are followed, and when its type is one of those declared. "/" is "/index.html". A
- * file that has changed on disk is read again. At most 16 MiB a file, 64 MiB in all. Thread: [net]. */
+ * A path is served only when every segment consists of [A-Za-z0-9@._-] and does not begin with a dot, the file lies
+ * inside the folder after symbolic links are resolved, and its type is declared. "/" is "/index.html". A changed file
+ * is read again. At most 16 MiB per file, 64 MiB in total. Thread: [net]. */
 #ifndef PAL_NET_TRANSPORT_SITE_H
 #define PAL_NET_TRANSPORT_SITE_H
 #include "server/base/err.h"
@@ -13,14 +13,14 @@ typedef struct pal_site pal_site;
 typedef struct pal_site_file {
     const char *type;
     const char *etag;  /* quoted; valid until the next get */
-    pal_packet *bytes; /* borrowed: hold it to keep it */
+    pal_packet *bytes; /* borrowed; hold it to keep it */
 } pal_site_file;
 
-/* IO: not a folder, or no index.html in it; copies folder. [load] */
+/* IO: not a folder, or it has no index.html; copies folder. [load] */
 pal_err pal_site_open(const char *folder, pal_diagnostic *diag, pal_site **out);
 void pal_site_close(pal_site *site); /* NULL is fine */
-/* path as in the request, decoded, from the first slash; false: no such file */
+/* path: as in the request, decoded, from the first slash; false: no such file */
 bool pal_site_get(pal_site *site, const char *path, pal_site_file *out);
-/* content type of a name by its ending; NULL: not declared */
+/* content type by file extension; NULL: not declared */
 const char *pal_site_type(const char *name);
 #endif

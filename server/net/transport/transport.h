@@ -1,8 +1,7 @@
-/* The transport interface: a transport carries whole messages between a peer and the hub, and knows nothing of what
- * they mean.
+/* The transport interface. A transport carries whole messages between a peer and the hub without interpreting them.
  *
- * Sending is by pull: the hub says that something waits (ready), the transport asks for one message (next) each time
- * the peer can take one. So nothing queues in a transport, and what is sent is decided at the last moment: control
+ * Sending is pull-based: the hub signals that messages wait (ready), and the transport asks for one (next) whenever
+ * the peer can take one. A transport therefore queues nothing, and each message is chosen at the last moment: control
  * first, then the newest frame. Thread: [net]. */
 #ifndef PAL_NET_TRANSPORT_TRANSPORT_H
 #define PAL_NET_TRANSPORT_TRANSPORT_H
@@ -12,48 +11,48 @@
 typedef struct pal_transport pal_transport;
 typedef struct pal_transport_ops pal_transport_ops;
 
-enum { PAL_PEER_REASON = 124 }; /* a websocket close reason fits 123 bytes */
+enum { PAL_PEER_REASON = 124 }; /* a websocket close reason holds 123 bytes */
 
-/* one connection; a transport embeds it in its own record */
+/* one connection; a transport embeds it in its own struct */
 typedef struct pal_peer {
     const pal_transport_ops *ops;
-    void *client;  /* the hub's side; NULL after closed or when refused */
-    int drop_code; /* not 0: to be closed with this code, nothing is received or sent any more */
+    void *client;  /* the hub's data; NULL after closed or when refused */
+    int drop_code; /* nonzero: closing with this code, nothing more is sent or received */
     char drop_reason[PAL_PEER_REASON];
 } pal_peer;
 
-/* a resource asked for by path (transports that speak HTTP) */
+/* an HTTP response */
 typedef struct pal_reply {
     int status;
     const char *type;    /* content type */
     const char *caching; /* cache-control */
     char etag[48];       /* quoted; "": none */
-    pal_packet *body;    /* the transport drops it; NULL: none */
+    pal_packet *body;    /* owned by the transport; NULL: none */
 } pal_reply;
 
-/* what the hub does for transports */
+/* callbacks of the hub */
 typedef struct pal_peer_events {
-    /* a peer has come for a session ("": the first); may drop it at once */
+    /* a peer connected for a session ("": the first); may drop it at once */
     void (*opened)(void *user, pal_peer *peer, const char *session);
-    /* one whole message; n_byte is never above 4096 (the transport drops longer ones with 1009) */
+    /* one whole message; n_byte <= 4096 (the transport drops longer ones with 1009) */
     void (*received)(void *user, pal_peer *peer, const uint8_t *bytes, size_t n_byte, bool text);
-    bool (*waiting)(void *user, const pal_peer *peer); /* would next give a message? */
-    pal_packet *(*next)(void *user, pal_peer *peer);   /* message to send now, the transport drops it; NULL: none */
+    bool (*waiting)(void *user, const pal_peer *peer); /* would next return a message? */
+    pal_packet *(*next)(void *user, pal_peer *peer);   /* message to send now, owned by the transport; NULL: none */
     void (*closed)(void *user, pal_peer *peer);        /* once for every opened */
-    /* GET path: fills *reply; user data of other members never comes this way */
+    /* GET path: fills *reply; never serves data of other members */
     void (*get)(void *user, const char *path, pal_reply *reply);
     void *user;
 } pal_peer_events;
 
 struct pal_transport_ops {
-    const char *scheme; /* "ws" | "mem"; LCM peers come through clients/lcm_bridge, which speaks ws */
-    /* url: "ws://127.0.0.1:8090" (port 0: any) | "mem://"; copies events. REFUSED names address and reason. [load] */
+    const char *scheme; /* "ws" | "mem"; LCM peers use clients/lcm_bridge, which speaks ws */
+    /* url: "ws://127.0.0.1:8090" (port 0: any) | "mem://"; copies events. REFUSED: names address and reason. [load] */
     pal_err (*open)(pal_loop *loop, const char *url, const pal_peer_events *events, pal_diagnostic *diag,
                     pal_transport **out);
     int (*port)(const pal_transport *transport); /* 0: none */
-    void (*ready)(pal_peer *peer);               /* next has something */
+    void (*ready)(pal_peer *peer);               /* next has a message */
     void (*drop)(pal_peer *peer);                /* drop_code is set: close as soon as possible */
-    void (*close)(pal_transport *transport);     /* after pal_loop_shut; peers still there are closed. [load] */
+    void (*close)(pal_transport *transport);     /* after pal_loop_shut; closes the remaining peers. [load] */
 };
 
 extern const pal_transport_ops pal_ws_transport, pal_mem_transport;

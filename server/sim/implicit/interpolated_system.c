@@ -1,7 +1,6 @@
 /* The matrix of an embedded body in numbers. */
 #include "server/sim/implicit/interpolated_system.h"
 
-
 #include <stdlib.h>
 #include <string.h>
 
