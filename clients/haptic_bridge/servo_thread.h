@@ -1,5 +1,5 @@
-/* The real-time thread of a servo, its watchdog and its timing measurement (clients/haptic_bridge/README.md, "Real
- * time").
+/* The real-time thread of a servo, its watchdog and its timing measurement (
+ * clients/haptic_bridge/README.md, "Real time").
  *
  * The loop uses absolute clock_nanosleep. A tick later than one period counts as missed and is skipped, never caught
  * up. Where the system allows it: SCHED_FIFO 80 (watchdog 81), locked memory, a prefaulted stack, the last processor;

@@ -1,8 +1,9 @@
-/* Calibration by gradient: L-BFGS in a box (Nocedal 1980; Luksan's code in NLopt) on theta, with the adjoint's slope.
+/* Calibration by gradient: bounded L-BFGS (Nocedal 1980; Luksan's code in NLopt) on theta, with the slope of the
+ * adjoint.
  *
- * A point that comes to no stable rest has no value and no slope. The line search is given a wall instead: the last
- * good objective plus a parabola around the last good point, whose slope leads back there; it then shortens its step.
- */
+ * A point without a stable equilibrium has no value and no slope. The line search then receives a barrier: the last
+ * good objective plus a parabola around the last good point, whose slope leads back there. The search shortens its
+ * step. */
 #include "server/calibrate/calibration.h"
 
 #include "server/base/clock.h"
@@ -25,7 +26,7 @@ typedef struct fit {
     double best_objective, good_objective;
     double best_percent;
     int64_t max;
-    const char *ended; /* NULL: goes on */
+    const char *ended; /* NULL: not ended */
     pal_err err;
     pal_diagnostic *diag;
     nlopt_opt opt;
@@ -76,7 +77,7 @@ static double evaluate(fit *f, const double *theta, double *slope)
     return rests ? v.objective : DBL_MAX;
 }
 
-/* what NLopt sees */
+/* the objective passed to NLopt */
 static double see(unsigned n, const double *theta, double *slope, void *user)
 {
     fit *f = user;
@@ -110,7 +111,7 @@ static pal_err search(fit *f, double *theta)
     nlopt_set_lower_bounds(f->opt, c->low);
     nlopt_set_upper_bounds(f->opt, c->high);
     nlopt_set_vector_storage(f->opt, MEMORY_PAIRS);
-    /* of the logarithm: a few constants are followed to the end of their valley, many are not worth it */
+    /* of the logarithm: a few constants are optimised to the end of their valley, many are not worth the time */
     nlopt_set_ftol_abs(f->opt, c->n_parameter <= FEW_PARAMETERS ? 1e-6 : 3e-4);
     double min;
     nlopt_optimize(f->opt, theta, &min);
@@ -131,7 +132,7 @@ static pal_err run(fit *f, double *theta)
                                   "the start has no stable rest under its loads, so there is no gradient to follow");
     memcpy(f->good, theta, n);
     f->good_objective = start;
-    /* a search may end early behind a wall: begun again at the best it forgets its curvatures */
+    /* a search may end early at a barrier: restarting at the best point discards its curvature estimates */
     for (int round = 0; round < MAX_ROUND && !f->ended; round++) {
         double before = f->best_objective;
         memcpy(theta, f->best, n);
@@ -143,7 +144,8 @@ static pal_err run(fit *f, double *theta)
     return PAL_ERR_OK;
 }
 
-/* the value of the best, found anew; a mean of squares may fall where the mean of errors does not: never worse */
+/* Evaluates the best point again. The mean of squares may fall where the mean of errors does not; the result is
+ * never worse than the start. */
 static pal_err close_up(fit *f, const double *start, double *theta)
 {
     const unsigned all = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY;
@@ -151,7 +153,7 @@ static pal_err close_up(fit *f, const double *start, double *theta)
     if (f->best_percent > out->start_percent) memcpy(theta, start, sizeof(double) * (size_t)f->c->n_parameter);
     PAL_TRY(pal_calibration_evaluate(f->c, f->workspace, theta, all, &out->value, NULL, f->diag));
     if (out->value.error_percent <= out->start_percent) return PAL_ERR_OK;
-    /* none, or another, worse one: the rest is only reached from its neighbours, a live body may not find it either */
+    /* no equilibrium, or a worse one: it is reached only from nearby states, and a live body may not find it either */
     memcpy(theta, start, sizeof(double) * (size_t)f->c->n_parameter);
     return pal_calibration_evaluate(f->c, f->workspace, theta, all, &out->value, NULL, f->diag);
 }

@@ -1,14 +1,16 @@
-/* Calibration by adaptive simulated annealing (paper B section 3.2; num/anneal.h): the cost is E, the mean error in per
- * cent; a point without a stable rest has no cost. Needs no slope, so it also checks the adjoint's answer from outside.
+/* Calibration by adaptive simulated annealing (paper B section 3.2; num/anneal.h). The cost is E, the mean error in
+ * per cent. A point without a stable equilibrium has no cost. Needs no slope, so it is an independent check of the
+ * adjoint.
  *
- * Every point is evaluated from the start's own rest, never from a neighbour's, on the seat of whichever worker is
- * free: E depends on theta alone and the walk on the seed alone.
+ * Every point is evaluated from the start's own equilibrium, never from a neighbour's, in the workspace of any free
+ * worker. E therefore depends on theta alone, and the walk on the seed alone.
  *
- * The walk does not go along ln k_d, ln k_a, ln k_v, in which a body's stiffness is a bent valley across the axes, but
- * along ln G of the lattice's shear modulus G (spring_law.h) and the logarithms of k_a/k_d and k_v/k_d: what
- * displacements depend on most is one coordinate then. Evaluations until within 1.2 times the adjoint's error, gear's
- * twist: linear, 10 voxels, ten seeds: three need more than 1500 along the constants, 600 at most along these; finite,
- * 16 voxels, seeds 1 to 5: 151 to 1328 (median 634), and 199 to 665 (median 262). */
+ * The coordinates of the walk are not ln k_d, ln k_a, ln k_v, in which the stiffness of a body forms a curved
+ * valley across the axes. They are ln G of the lattice's shear modulus G (spring_law.h) and the logarithms of
+ * k_a/k_d and k_v/k_d, so that one coordinate has the largest effect on displacements. Evaluations until within 1.2
+ * times the adjoint's error, gear's twist: linear, 10 voxels, ten seeds: three need more than 1500 along the
+ * constants, at most 600 along these; finite, 16 voxels, seeds 1 to 5: 151 to 1328 (median 634) against 199 to 665
+ * (median 262). */
 #include "server/calibrate/calibration.h"
 
 #include "server/base/clock.h"
@@ -21,9 +23,9 @@
 #include <string.h>
 
 enum { MAX_EVALUATION = 4000, MAX_STALL = 1500 };
-/* steps below this share of the range change an error by less than anybody asks for: 5e-3 in ln k over 2 x 2 decades */
+/* steps below this share of the range change the error insignificantly: 5e-3 in ln k over 2 x 2 decades */
 static const double COLDEST = 5e-4;
-/* of the way that theta may go: most of the rest has no stable rest, or an error nobody would take */
+/* share of the range of theta: most points beyond have no stable equilibrium, or an unacceptable error */
 static const double BOX = 2.0 / 3;
 /* shares of a lattice's shear modulus, by kind (spring_law.h) */
 static const double shear[PAL_SPRING_KINDS] = {2.0 / 3, 4.0 / 9, 0};
@@ -32,17 +34,17 @@ typedef struct fit {
     const pal_calibration *c;
     const pal_fit_options *o;
     pal_team *team;                        /* NULL: points are evaluated elsewhere */
-    pal_calibration_workspace **workspace; /* one for each worker [n_seat] */
-    pal_err *err;                          /* what went wrong on a seat [n_seat] */
+    pal_calibration_workspace **workspace; /* one per worker [n_seat] */
+    pal_err *err;                          /* error of each worker [n_seat] */
     int n_seat, n_batch;
     pal_fit_result *out;
     double begin_s;
     int64_t max;
-    const char *ended; /* NULL: goes on */
-    /* coordinates of the walk: where it begins, its box [n_parameter], and the same place as theta */
+    const char *ended; /* NULL: not ended */
+    /* coordinates of the walk: start, bounds [n_parameter], and the start as theta */
     double *first, *low, *high, *start;
     double *shown, *theta; /* theta of a step [n_parameter], of a batch [n_batch][n_parameter] */
-    double *cost;          /* of the batch at hand, the walk's own */
+    double *cost;          /* of the current batch; owned by the walk */
 } fit;
 
 /* ---- coordinates: ln of the shear modulus, and of the other constants over that of edges, node by node ---- */

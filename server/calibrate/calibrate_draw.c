@@ -1,5 +1,5 @@
-/* What `palpate calibrate` draws: the search, the body, and the mesh for other tools. Pictures show the problem's own
- * surface, skinned to the nodes as it is live. */
+/* Drawings of `palpate calibrate`: the search, the body, and the mesh for other tools. Pictures show the problem's
+ * own surface, skinned to the nodes as in a live scene. */
 #include "server/calibrate/calibrate_run.h"
 
 #include "server/base/vec3.h"
@@ -18,8 +18,7 @@ enum { TITLE = 120, TITLE_SHOWN = 48, MAX_DRAWN = 4000 };
 
 /* ---- trajectory ---- */
 
-/* of a long search every so many evaluations are drawn, each as the worst of those it stands for (error), or the best
- */
+/* Thins out a long search. Each drawn evaluation is the worst (error) or the best of those it represents. */
 static int thin_out(const pal_calibrate_run *run, double *x, double *error, double *best)
 {
     int step = (run->n_trail + MAX_DRAWN - 1) / MAX_DRAWN, n = 0;
@@ -43,7 +42,7 @@ pal_err pal_calibrate_draw_trajectory(const pal_calibrate_run *run, const char *
     int n = thin_out(run, x, error, best);
     const char *name = run->set.problem->name;
     int room = TITLE_SHOWN;
-    /* not within a letter of several bytes */
+    /* not inside a multi-byte character */
     while (strlen(name) > TITLE_SHOWN && room > 0 && ((unsigned char)name[room] & 0xc0) == 0x80) room--;
     snprintf(title, sizeof title, "%.*s%s: %s", room, name, strlen(name) > TITLE_SHOWN ? "..." : "",
              pal_calibrate_method(run));
@@ -67,8 +66,8 @@ pal_err pal_calibrate_draw_trajectory(const pal_calibrate_run *run, const char *
 
 /* ---- displacements ---- */
 
-/* the truth at the nodes [n_node][3]; of samples the mean of the four nearest, by inverse squared distance: good
- * enough to be looked at */
+/* Truth at the nodes [n_node][3]. For samples: the mean of the four nearest, weighted by inverse squared distance,
+ * which suffices for a picture. */
 static pal_err truth_at_nodes(const pal_calibrate_run *run, int index, double *u, pal_diagnostic *diag)
 {
     const pal_samples *s = &run->set.samples[index];
@@ -94,7 +93,7 @@ static pal_err truth_at_nodes(const pal_calibrate_run *run, int index, double *u
     return PAL_ERR_OK;
 }
 
-/* springs at rest with theta; zero and false: they find none */
+/* equilibrium of the springs with theta; zero and false: none found */
 static bool springs_at_nodes(const pal_calibrate_run *run, const double *theta, int index, double *u)
 {
     enum { ALL = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY };
@@ -105,9 +104,9 @@ static bool springs_at_nodes(const pal_calibrate_run *run, const double *theta, 
     return good;
 }
 
-/* ---- the body as it is shown ---- */
+/* ---- the displayed body ---- */
 
-/* one state of the surface [n_vertex] and what is drawn of it */
+/* one state of the surface [n_vertex] and the values drawn on it */
 typedef struct shape {
     double *x, *value; /* [n_vertex][3], [n_vertex] */
 } shape;
@@ -151,7 +150,7 @@ static pal_err take_memory(drawing *d, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
-/* a value at nodes -> at shown vertices, by the weights of the skin */
+/* nodal values to values at displayed vertices, by the skin weights */
 static void skin_value(const drawing *d, const double *value, double *out)
 {
     const pal_skin *s = &d->mesh->skin;
@@ -210,7 +209,7 @@ static void take_vertices(drawing *d)
     skin_value(d, d->value, d->k_d);
 }
 
-/* lengths in a unit that suits the body */
+/* a unit of length that suits the size of the body */
 static double length_unit(const drawing *d, const char **name)
 {
     double max = 0;
@@ -258,7 +257,7 @@ static int add_shapes(drawing *d, pal_body_picture *to, char title[][TITLE])
     return N_SHAPE;
 }
 
-/* the map of constants beside the material that it is to look like */
+/* the map of constants beside the material it should resemble */
 static int add_maps(const drawing *d, pal_body_picture *to, char title[][TITLE])
 {
     const pal_surface *s = &d->mesh->surface;

@@ -1,4 +1,4 @@
-/* A journal of evaluations: text in the file, a hash table of one problem's points in memory. */
+/* Journal of evaluations: text in the file, a hash table of the points of one problem in memory. */
 #include "server/calibrate/calibrate_journal.h"
 
 #include <errno.h>
@@ -33,7 +33,7 @@ uint64_t pal_journal_hash(uint64_t before, const void *bytes, size_t n_byte)
 
 /* ---- the points in memory ---- */
 
-/* the slot of a point, or the free one where it belongs */
+/* the slot of a point, or the free slot for it */
 static size_t slot_of(const pal_journal *j, const double *theta)
 {
     size_t n_byte = j->n_parameter * sizeof *theta, mask = j->n_slot - 1;
@@ -117,7 +117,7 @@ static bool read_number(const char **at, double *out)
     return true;
 }
 
-/* one line, its end cut off; NULL: fine, else what is wrong with it */
+/* Parses one line without its end. NULL: valid; otherwise the fault. */
 static const char *take_line(pal_journal *j, const char *line, size_t n, double *theta, pal_err *err)
 {
     uint64_t problem, check;
@@ -138,7 +138,7 @@ static const char *take_line(pal_journal *j, const char *line, size_t n, double 
     return NULL;
 }
 
-/* the head, or nothing at all, or a beginning of the head that was torn; false: another file */
+/* Reads the header. True also for an empty file or an incomplete header. False: another file. */
 static bool read_head(pal_journal *j)
 {
     char begin[sizeof head] = "";
@@ -148,7 +148,7 @@ static bool read_head(pal_journal *j)
     return n == sizeof head - 1 || !ferror(j->file);
 }
 
-/* a file whose last line has its end, for appending */
+/* Truncates the file after its last complete line, for appending. */
 static pal_err cut(pal_journal *j, long whole, pal_diagnostic *diag)
 {
     if (fseek(j->file, 0, SEEK_SET) || ftruncate(fileno(j->file), whole)) return no_io(j, "cannot be cut", diag);
@@ -168,7 +168,7 @@ static pal_err read_lines(pal_journal *j, pal_diagnostic *diag)
     if (!theta) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory", j->path);
     rewind(j->file);
     for (int64_t number = 1; !err && (n = getline(&line, &room, j->file)) > 0; number++) {
-        if (line[n - 1] != '\n') break; /* torn */
+        if (line[n - 1] != '\n') break; /* incomplete line */
         line[n - 1] = 0;
         const char *wrong = number > 1 ? take_line(j, line, (size_t)n - 1, theta, &err) : NULL;
         if (wrong)
@@ -196,7 +196,7 @@ pal_err pal_journal_begin(pal_journal *j, uint64_t problem, int n_parameter, pal
     return read_lines(j, diag);
 }
 
-/* text of a line into a buffer of its own; NULL: no memory */
+/* text of a line in a heap buffer; NULL: out of memory */
 static char *write_line(const pal_journal *j, const double *theta, double cost, size_t *n_byte)
 {
     char *text = NULL;

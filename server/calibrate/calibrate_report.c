@@ -1,4 +1,4 @@
-/* What `palpate calibrate` says: a short table for people, one object for scripts. */
+/* Output of `palpate calibrate`: a short table for people, one object for scripts. */
 #include "server/calibrate/calibrate_run.h"
 
 #include <float.h>
@@ -17,7 +17,7 @@ static const char *truth_of(const pal_calibrate_run *run, int index)
 
 /* ---- constants ---- */
 
-/* least, middle and most of a kind on the grid */
+/* minimum, median and maximum of a kind on the grid */
 typedef struct spread {
     double min, middle, max;
 } spread;
@@ -47,7 +47,7 @@ static double ratio_of(const pal_calibrate_run *run, int k)
     return exp(run->theta[k * run->info.n_used] - run->info.start[k * run->info.n_used]);
 }
 
-/* constants of kind k that stand at a bound: displacements alone do not tell how large they are */
+/* Number of constants of kind k at a bound: displacements alone do not determine them. */
 static int count_bound(const pal_calibrate_run *run, int k)
 {
     const pal_calibration_info *i = &run->info;
@@ -156,7 +156,7 @@ void pal_calibrate_print(const pal_calibrate_run *run)
 
 /* ---- json ---- */
 
-/* DBL_MAX (no rest) and NaN (not known) are null */
+/* DBL_MAX (no equilibrium) and NaN (unknown) become null */
 static void add_number(cJSON *object, const char *key, double number)
 {
     if (isfinite(number) && number < DBL_MAX)
@@ -227,7 +227,7 @@ static void add_live(const pal_calibrate_run *run, cJSON *o)
     double max = 0;
     for (int k = 0; k < run->set.n; k++) {
         double d = run->live.load[k].difference_percent;
-        max = d <= max ? max : d; /* NaN stays */
+        max = d <= max ? max : d; /* keeps NaN */
     }
     add_number(live, "difference_percent", max);
     ladder = cJSON_AddArrayToObject(live, "ladder");

@@ -1,4 +1,4 @@
-/* Calibrated constants -> the scene that serve runs. */
+/* Writes calibrated constants to the scene for serve. */
 #include "server/calibrate/calibrate_run.h"
 
 #include "server/base/vec3.h"
@@ -12,7 +12,7 @@
 
 enum { MAX_SUBSTEP = 1000000, N_TOOL = 3 };
 
-/* "/a/Gear 2.json" -> "gear_2": what a scene and its mesh may be called */
+/* "/a/Gear 2.json" -> "gear_2": a valid name for a scene and its mesh */
 static void name_of(const char *path, char out[PAL_NAME])
 {
     const char *slash = strrchr(path, '/'), *from = slash ? slash + 1 : path, *dot = strrchr(from, '.');
@@ -27,7 +27,7 @@ static void name_of(const char *path, char out[PAL_NAME])
     if (n == 0) snprintf(out, PAL_NAME, "calibrated");
 }
 
-/* for information, contact and mass: E its geometric mean, nu and density their means over the tetrahedra */
+/* for information, contact and mass: E is the geometric mean, nu and density are the means over the tetrahedra */
 static void take_material(const pal_calibrate_run *run, pal_material *out)
 {
     const pal_problem *p = run->set.problem;
@@ -43,7 +43,7 @@ static void take_material(const pal_calibrate_run *run, pal_material *out)
         for (int k = 0; k < 4; k++) pal_axpy3(x, 0.25, t->x + 3 * t->tet[4 * e + k]);
         for (int k = 0; k < p->n_material; k++)
             if (pal_box_contains(&p->material[k].region, x, 0)) m = &p->material[k];
-        /* what is the same in all materials stays what it is, to the bit */
+        /* a value common to all materials is kept bit by bit */
         poisson += (m->poisson - p->material[0].poisson) / t->n_tet;
         density += (m->density_kg_m3 - p->material[0].density_kg_m3) / t->n_tet;
     }
@@ -60,7 +60,7 @@ static pal_err put_constants(const pal_calibrate_run *run, pal_config_entry *mod
     return PAL_ERR_OK;
 }
 
-/* constants at all nodes of the grid; those that touch nothing of the body take the mean of the others */
+/* constants at all nodes of the grid; nodes outside the body take the mean of the others */
 static pal_err put_grid(const pal_calibrate_run *run, pal_loaded_scene *scene, pal_diagnostic *diag)
 {
     const pal_grid *from = run->info.grid;
@@ -91,7 +91,7 @@ static pal_err put_model(const pal_calibrate_run *run, pal_loaded_scene *scene, 
     return run->options.without_area ? pal_entry_put_number(model, "k_area_J", 0, diag) : PAL_ERR_OK;
 }
 
-/* tools as strong as the loads that were fitted, so that a hand can do to the body what they did */
+/* tools as strong as the fitted loads, so that a user can reproduce them */
 static void put_tools(const pal_calibrate_run *run, pal_scene *scene)
 {
     double max = 0;
@@ -106,7 +106,7 @@ static void put_tools(const pal_calibrate_run *run, pal_scene *scene)
     for (int k = 0; k < N_TOOL; k++) scene->tool[k].force_cap_N = fmin(fmax(cap, 1e-3), 1000);
 }
 
-/* stiff constants may want more sub-steps than a scene usually has */
+/* stiff constants may need more sub-steps than the default limit */
 static pal_err allow_substeps(pal_scene *scene, int *n_substep, pal_diagnostic *diag)
 {
     pal_world *world = NULL;
@@ -168,7 +168,7 @@ pal_err pal_calibrate_scene(pal_calibrate_run *run, pal_loaded_scene **out, pal_
 
 /* ---- accuracy ---- */
 
-/* "0.52 % RMS of finite elements (twist)" behind what stands there already; false: no room */
+/* Appends "0.52 % RMS of finite elements (twist)". False: no room. */
 static bool add_accuracy(const pal_calibrate_run *run, int index, char *out, size_t n_byte)
 {
     size_t at = strlen(out);

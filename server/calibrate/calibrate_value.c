@@ -8,10 +8,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* of mean e_L^2: below a thousandth of a per cent nobody asks for more */
+/* floor of mean e_L^2: a thousandth of a per cent is accurate enough */
 static const double floor_percent2 = 1e-6;
 
-/* ---- seat ---- */
+/* ---- workspace ---- */
 
 static pal_err make_seat(const pal_calibration *c, pal_calibration_workspace *s)
 {
@@ -93,7 +93,7 @@ static void spread_constants(pal_calibration_workspace *s, const double *theta)
     }
 }
 
-/* slope of the springs' constants -> += gradient [n_parameter] */
+/* adds the slopes of the spring constants to gradient [n_parameter] */
 static void gather_slopes(pal_calibration_workspace *s, const double *theta)
 {
     const pal_calibration *c = s->calibration;
@@ -140,7 +140,7 @@ static double compare(const pal_calibration *c, const pal_fit_case *fit, const d
     return sqrt(scale * sum);
 }
 
-/* the rest of a case: from where it is asked to begin, else from no deformation */
+/* Equilibrium of a case, from the requested start, otherwise from the undeformed body. */
 static pal_err find_rest(pal_calibration_workspace *s, int index, bool go_on, pal_equilibrium_options *o, int *n_newton)
 {
     const pal_calibration *c = s->calibration;
@@ -180,7 +180,7 @@ static pal_err evaluate_case(pal_calibration_workspace *s, const double *theta, 
     return err;
 }
 
-/* ---- the whole ---- */
+/* ---- all cases ---- */
 
 static void regularise(const pal_calibration *c, const double *theta, pal_calibration_value *out, double *slope)
 {
@@ -239,7 +239,7 @@ pal_err pal_calibration_evaluate(const pal_calibration *c, pal_calibration_works
     for (int i = 0; i < c->n_case; i++) {
         bool fit = c->cases[i].fit;
         if (!(ask & (fit ? PAL_CALIBRATION_FIT : PAL_CALIBRATION_VERIFY))) continue;
-        if (fit && lost) { /* one case without rest: no value */
+        if (fit && lost) { /* one case without an equilibrium: no value */
             out->case_percent[i] = DBL_MAX;
             continue;
         }

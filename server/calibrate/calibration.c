@@ -1,4 +1,4 @@
-/* Making a calibration: voxels, springs, loads, truths, parameters. */
+/* Makes a calibration: voxels, springs, loads, truths, parameters. */
 #include "server/calibrate/calibration.h"
 
 #include "server/base/clock.h"
@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* what every function of one making reads */
+/* input of every function of one calibration */
 typedef struct job {
     pal_calibration *c;
     const pal_surface *surface;
@@ -32,7 +32,7 @@ static pal_err no_memory(const job *j, const char *what)
 
 /* ---- the body ---- */
 
-/* the last material that holds x wins, as in the problem's solve */
+/* the last material that contains x wins, as in solve.c */
 static const pal_problem_material *material_at(const pal_problem *p, const double x[3])
 {
     const pal_problem_material *found = &p->material[0];
@@ -76,21 +76,21 @@ static pal_err make_world(const job *j)
     body->material = (pal_material){.young_Pa = 1, .poisson = 0.4, .density_kg_m3 = c->mean_density};
     body->n_support = c->problem->n_support;
     memcpy(body->support, c->support, sizeof c->support);
-    /* constants of 1 J: only the weights of the rows are taken */
+    /* constants of 1 J: only the weights of the components are used */
     static const char *const key[PAL_SPRING_KINDS] = {"k_distance_J", "k_area_J", "k_volume_J"};
     pal_entry_init(&body->model, "model", "tet_springs");
     pal_err err = pal_entry_put_text(&body->model, "weights", c->options.equal ? "equal" : "volume", j->diag);
     for (int k = 0; k < PAL_SPRING_KINDS && !err; k++)
         err = pal_entry_put_number(&body->model, key[k], k == PAL_SPRING_AREA && c->options.without_area ? 0 : 1,
                                    j->diag);
-    scene->step_s = 1e-4; /* never taken; springs of 1 J have a limit of their own */
+    scene->step_s = 1e-4; /* never used; springs of 1 J have their own limit */
     scene->max_substep = 2000;
     if (!err) err = pal_world_create(scene, j->diag, &c->world);
     free(scene);
     return err ? err : pal_lattice_make(c->world, 0, &c->lattice, j->diag);
 }
 
-/* held nodes on one line let the body turn about it: neither truth nor springs have a rest then */
+/* With all fixed nodes on one line the body can rotate about it: neither truth nor springs have an equilibrium. */
 static pal_err check_hold(const job *j)
 {
     const pal_lattice *l = &j->c->lattice;
@@ -132,7 +132,7 @@ static pal_err make_body(const job *j)
 
 /* ---- loads ---- */
 
-/* sums of |f| over all nodes and over held ones */
+/* sums of |f| over all nodes and over the fixed ones */
 static void sum_up(const pal_calibration *c, const double *f, double *all, double *fixed)
 {
     *all = *fixed = 0;
@@ -224,7 +224,7 @@ static pal_err truth_by_elements(const job *j, int index)
     return fit->u ? PAL_ERR_OK : no_memory(j, "the truth");
 }
 
-/* points of the samples in the tetrahedra around them */
+/* locates the points of the samples in the tetrahedra around them */
 static pal_err truth_by_samples(const job *j, int index)
 {
     pal_calibration *c = j->c;
@@ -266,7 +266,7 @@ static pal_err make_truth(const job *j, int index)
 
 /* ---- parameters ---- */
 
-/* neighbours on the grid among the used nodes */
+/* pairs of used nodes that are neighbours on the grid */
 static pal_err make_edges(const job *j)
 {
     pal_calibration *c = j->c;
@@ -341,7 +341,7 @@ static pal_err make_parameters(const job *j)
     c->low = c->theta + c->n_parameter, c->high = c->low + c->n_parameter;
     for (int k = 0; k < c->n_kind; k++) {
         const pal_springs *s = &c->lattice.kind[c->kind[k]];
-        /* the derived law's weights are those of volume: as many joules in all when they are alike */
+        /* the derived law weights by volume: the total stiffness is the same when all springs are alike */
         double f = factor[c->kind[k]], manual_theta = hand[c->kind[k]] / mean_weight(s);
         double start = log(scale * (c->options.equal ? hand[c->kind[k]] : f));
         c->manual_theta[k] = log(scale * manual_theta);
@@ -356,7 +356,7 @@ static pal_err make_parameters(const job *j)
     return PAL_ERR_OK;
 }
 
-/* rests at the start's constants, where searches of evaluations begin */
+/* equilibria at the start's constants, where evaluations begin */
 static pal_err make_starts(const job *j)
 {
     pal_calibration *c = j->c;

@@ -1,4 +1,4 @@
-/* A calibration's insides (private to calibrate*.c). */
+/* Internals of a calibration (private to calibrate*.c). */
 #ifndef PAL_CALIBRATE_CALIBRATION_H
 #define PAL_CALIBRATE_CALIBRATION_H
 #include "server/calibrate/calibrate.h"
@@ -6,14 +6,14 @@
 /* one load with its truth */
 typedef struct pal_fit_case {
     double *force_N; /* [n_node][3]                                                                  */
-    /* points of the truth as sums over nodes: start NULL: point i is node i */
+    /* Points of the truth as weighted sums over nodes. start NULL: point i is node i. */
     int n_point;
     int32_t *start, *node;
     double *weight;
-    double *u; /* truth [n_point][3], m                                                              */
+    double *u; /* truth, m [n_point][3] */
     double max_m;
     bool linear;
-    double *x_start; /* rest at the start's constants; at rest where there is none [n_node][3]      */
+    double *x_start; /* equilibrium at the start's constants; rest positions if there is none [n_node][3] */
 } pal_fit_case;
 
 struct pal_calibration {
@@ -28,11 +28,11 @@ struct pal_calibration {
     pal_grid grid;
     pal_grid_weights weights;
     bool has_grid;
-    int32_t *edge; /* used nodes that are neighbours on the grid [n_edge][2] */
+    int32_t *edge; /* pairs of used nodes that are neighbours on the grid [n_edge][2] */
     int n_edge;
     int n_kind, kind[PAL_SPRING_KINDS], n_used, n_parameter;
     double *theta, *low, *high;            /* start and bounds [n_parameter] */
-    double manual_theta[PAL_SPRING_KINDS]; /* theta of each kind index       */
+    double manual_theta[PAL_SPRING_KINDS]; /* theta of each kind index */
     double mean_young_Pa, mean_poisson, mean_density, truth_s, prepare_s;
     bool clamped;
     pal_fit_case fit[PAL_CALIBRATE_CASES];
@@ -42,9 +42,9 @@ struct pal_calibration_workspace {
     const pal_calibration *calibration;
     pal_equilibrium_workspace *workspace;
     double *k[PAL_SPRING_KINDS], *slope[PAL_SPRING_KINDS]; /* by pal_spring_kind [n_item] */
-    double *value, *node;           /* exp theta and its slope [n_used]; values at nodes [n_node]  */
-    double *x[PAL_CALIBRATE_CASES]; /* last rest [n_node][3]       */
+    double *value, *node;           /* exp theta and its slope [n_used]; values at nodes [n_node] */
+    double *x[PAL_CALIBRATE_CASES]; /* last equilibrium [n_node][3] */
     bool rests[PAL_CALIBRATE_CASES];
-    double *dJ_du, *u, *gradient; /* [n_node][3], [most points][3], [n_parameter]         */
+    double *dJ_du, *u, *gradient; /* [n_node][3], [largest point count][3], [n_parameter] */
 };
 #endif

@@ -1,10 +1,10 @@
 /* Statics of springs.
  *
- * Newton's direction comes from the true Hessian where that is positive definite. Where it is not (springs under
- * pressure have a negative stiffness across), the parts that can be negative are left out: g g' of every spring and
- * what a tensed edge adds across, which is positive semi-definite; should that still be singular, a growing multiple of
- * its diagonal is added. The line search asks for a lower energy; close to the end, where its change is lost in
- * rounding, for a smaller residual. */
+ * Newton's direction uses the true Hessian where that is positive definite. Compressed springs have a negative
+ * transverse stiffness; where the Hessian is indefinite, the possibly negative parts are omitted. This keeps g g'
+ * of every spring and the transverse stiffness of stretched edges, which is positive semi-definite. If the result
+ * is still singular, a growing multiple of its diagonal is added. The line search requires a lower energy. Near
+ * convergence, where the energy change is lost in rounding, it requires a smaller residual. */
 #include "server/calibrate/equilibrium.h"
 
 #include "server/num/cholesky.h"
@@ -16,11 +16,11 @@
 #include <string.h>
 
 enum { MAX_HALVING = 30, MAX_SHIFT = 8 };
-static const double MAX_LINEAR = 1e-6; /* residual of a linear solve, relative */
+static const double MAX_LINEAR = 1e-6; /* relative residual of a linear solve */
 
 struct pal_equilibrium_workspace {
     const pal_lattice *lattice;
-    pal_block_matrix matrix; /* pattern borrowed, values our own */
+    pal_block_matrix matrix; /* pattern borrowed, values owned */
     pal_cholesky *factor;
     double *f, *p, *r, *trial; /* [n_node][3] */
 };
@@ -100,7 +100,7 @@ static pal_err take(const pal_world *world, const pal_body *body, pal_lattice *o
 
 pal_err pal_lattice_make(const pal_world *world, int body, pal_lattice *out, pal_diagnostic *diag)
 {
-    /* a body is only read here */
+    /* the body is only read here */
     const pal_body *b = pal_world_body((pal_world *)(uintptr_t)world, body);
     *out = (pal_lattice){.arena = pal_arena_create(1 << 20, true)};
     pal_err err = out->arena ? take(world, b, out) : PAL_ERR_MEMORY;
@@ -123,7 +123,7 @@ void pal_lattice_free(pal_lattice *lattice)
     *lattice = (pal_lattice){0};
 }
 
-/* ---- seat ---- */
+/* ---- workspace ---- */
 
 pal_err pal_equilibrium_workspace_create(const pal_lattice *lattice, pal_equilibrium_workspace **out)
 {
@@ -236,7 +236,7 @@ static void assemble(pal_equilibrium_workspace *workspace, const double *const k
     stiffness_of(&l->kind[PAL_SPRING_VOLUME], PAL_SPRING_VOLUME, k_J[PAL_SPRING_VOLUME], x, which, &workspace->matrix);
 }
 
-/* diagonal += share of itself */
+/* adds a share of the diagonal to it */
 static void shift(pal_block_matrix *a, double share)
 {
     for (int j = 0; j < a->n; j++)
@@ -245,7 +245,7 @@ static void shift(pal_block_matrix *a, double share)
 
 /* ---- Newton ---- */
 
-/* all that a search reads */
+/* input of one search */
 typedef struct search {
     pal_equilibrium_workspace *workspace;
     const double *const *k_J;
@@ -271,7 +271,7 @@ static double dot(const pal_lattice *l, const double *a, const double *b)
     return sum;
 }
 
-/* r = f - grad W at the free nodes, 0 at held ones; returns W - f.(x - rest) */
+/* r = f - grad W at the free nodes, 0 at fixed ones; returns W - f.(x - rest) */
 static double residual(const search *s, const double *x, double *r)
 {
     const pal_lattice *l = s->workspace->lattice;
@@ -318,8 +318,8 @@ static double stretch_of(const pal_lattice *l, const double *x)
     return max;
 }
 
-/* x += step p with the largest of 1, 1/2, 1/4 ... that lowers the energy, or the residual where energies are alike;
- * energy and r become those there. false: none does */
+/* x += step p with the largest of 1, 1/2, 1/4 ... that lowers the energy, or the residual where energies are equal.
+ * Updates energy and r. False: none does. */
 static bool advance(const search *s, double *x, double *energy, double *size)
 {
     pal_equilibrium_workspace *workspace = s->workspace;
@@ -342,7 +342,7 @@ static bool advance(const search *s, double *x, double *energy, double *size)
     return false;
 }
 
-/* what rounding leaves of the forces of springs at rest, N: the target of a body without load */
+/* rounding error of the spring forces at rest, N: the target for a body without loads */
 static double rounding(const search *s)
 {
     const pal_springs *edge = &s->workspace->lattice->kind[PAL_SPRING_DISTANCE];
@@ -377,7 +377,7 @@ static pal_err newton(const search *s, double *x)
         PAL_TRY(pal_cholesky_solve(workspace->factor, workspace->r, workspace->p));
         s->report->n_newton++;
         if (!advance(s, x, &energy, &size)) {
-            if (size <= 1e3 * target && stable) return PAL_ERR_OK; /* rounding */
+            if (size <= 1e3 * target && stable) return PAL_ERR_OK; /* limited by rounding */
             return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC,
                                       "no rest: no step lowers the energy at a residual of %.2g", s->report->residual);
         }
@@ -395,7 +395,7 @@ static pal_err linear(const search *s, double *x)
     if (!err) err = pal_cholesky_solve(workspace->factor, s->force_N, workspace->p);
     if (err) return pal_diagnostic_set(s->diag, err, "no rest: no factor at rest (%s)", pal_err_text(err));
     if (!isfinite(norm(l, workspace->p))) return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "no rest: not finite");
-    /* constants too far apart for the factor leave a residual */
+    /* the factor is inaccurate for constants of very different magnitude */
     double load = norm(l, s->force_N);
     memcpy(workspace->r, s->force_N, 3 * sizeof(double) * (size_t)l->n_node);
     pal_block_matrix_multiply(&workspace->matrix, -1, workspace->p, workspace->r);
@@ -465,7 +465,7 @@ pal_err pal_equilibrium_adjoint(pal_equilibrium_workspace *workspace, const doub
 {
     const pal_lattice *l = workspace->lattice;
     pal_err err = PAL_ERR_OK;
-    if (!options->linear) { /* the factor at hand is that of the iteration before */
+    if (!options->linear) { /* the present factor is that of the previous iteration */
         assemble(workspace, k_J, x, TRUE_HESSIAN);
         err = pal_cholesky_factor(workspace->factor, &workspace->matrix, false);
     }

@@ -1,12 +1,13 @@
-/* Where a lattice of springs (model tet_springs) comes to rest under dead loads, by Newton on its energy, and the
- * derivative of any function of the rest displacement with respect to the constant of every spring, by the adjoint: one
- * more factor and one solve, whatever the number of springs.
+/* Equilibrium of a spring lattice (model tet_springs) under dead loads, by Newton's method on its energy. The
+ * adjoint method gives the derivative of any function of the displacement with respect to every spring constant,
+ * for one more factorisation and one solve, whatever the number of springs.
  *
  *   W(x) = sum q k/2 C(x)^2 - f.x        grad W = 0 at the free nodes        H = sum q k (g g' + C H_C)
  *   H lambda = dJ/du                     dJ/dk = -q C g.lambda
+ *
  * Linearised at rest, where every C is 0: K = sum q k g g', K u = f, dJ/dk = -q (g.u)(g.lambda).
  *
- * The lattice is shared and read only; a workspace belongs to one thread. Heap. */
+ * The lattice is shared and read-only. Each workspace belongs to one thread. Allocates heap memory. */
 #ifndef PAL_CALIBRATE_EQUILIBRIUM_H
 #define PAL_CALIBRATE_EQUILIBRIUM_H
 #include "server/num/block_matrix.h"
@@ -15,12 +16,12 @@
 
 enum { PAL_SPRING_KINDS = 3 };
 
-/* springs of one kind, as the live row has them */
+/* springs of one kind, as in the live component */
 typedef struct pal_springs {
-    int n_item, n_corner; /* n_item 0: no such row                                    */
+    int n_item, n_corner; /* n_item 0: no such component */
     int32_t *item;        /* nodes                                 [n_item][n_corner] */
-    double *w, *q;        /* 1 / rest measure (spring_constraint.h); weight      [n_item]  */
-    int32_t *place;       /* block of each pair of corners a >= b, negative: ~place, transposed [n_item][pairs] */
+    double *w, *q;        /* 1 / rest measure (spring_constraint.h); weight [n_item] */
+    int32_t *place;       /* block of each pair of corners a >= b; negative: block ~place, transposed [n_item][pairs] */
 } pal_springs;
 
 typedef struct pal_lattice {
@@ -33,16 +34,16 @@ typedef struct pal_lattice {
     pal_block_matrix pattern;
 } pal_lattice;
 
-/* copies the springs of the rows edge_distance, face_area, tet_volume of a body. REFUSED: it has no edges; nothing
- * holds it, or everything; MEMORY. [load] */
+/* Copies the springs of the components edge_distance, face_area, tet_volume of a body. Errors: REFUSED: no edges,
+ * no fixed node, or no free node; MEMORY. [load] */
 pal_err pal_lattice_make(const pal_world *world, int body, pal_lattice *out, pal_diagnostic *diag);
-void pal_lattice_free(pal_lattice *lattice); /* a zeroed struct is fine */
+void pal_lattice_free(pal_lattice *lattice); /* accepts a zeroed struct */
 
 typedef struct pal_equilibrium_options {
     bool linear;        /* linearised at rest                                                             */
-    int max_iteration;  /* 60                                                                             */
-    double tolerance;   /* 1e-9: of the residual's norm, relative to that of the loads                    */
-    double max_stretch; /* 4: a spring longer than this many rest lengths ends the search (NUMERIC)       */
+    int max_iteration;  /* default 60 */
+    double tolerance;   /* norm of the residual relative to that of the loads; default 1e-9 */
+    double max_stretch; /* a spring longer than this many rest lengths ends the search (NUMERIC); default 4 */
 } pal_equilibrium_options;
 void pal_equilibrium_default(pal_equilibrium_options *options);
 
@@ -53,23 +54,24 @@ typedef struct pal_equilibrium_report {
 } pal_equilibrium_report;
 
 typedef struct pal_equilibrium_workspace pal_equilibrium_workspace;
-/* MEMORY */
+/* Errors: MEMORY. */
 pal_err pal_equilibrium_workspace_create(const pal_lattice *lattice,
                                          pal_equilibrium_workspace **out);    /* borrows the lattice */
-void pal_equilibrium_workspace_destroy(pal_equilibrium_workspace *workspace); /* NULL is fine        */
+void pal_equilibrium_workspace_destroy(pal_equilibrium_workspace *workspace); /* accepts NULL */
 
-/* k_J[kind] [n_item]: constants, before the weights q; force_N [n_node][3]; x [n_node][3] in: where to begin (linear:
- * not read), out: the rest under load, only on success. NUMERIC (note says why): not converged, a Hessian that is not
- * positive definite at the end (no stable rest), a number that is not finite; MEMORY */
+/* Finds the equilibrium. k_J[kind] [n_item]: constants, before the weights q. force_N [n_node][3]. x [n_node][3]:
+ * in: initial guess (linear: not read); out: the equilibrium, written on success only. Errors: NUMERIC (diag gives
+ * the reason): not converged, a final Hessian that is not positive definite (no stable equilibrium), a value that
+ * is not finite; MEMORY. */
 pal_err pal_equilibrium(pal_equilibrium_workspace *workspace, const double *const k_J[PAL_SPRING_KINDS],
                         const double *force_N, const pal_equilibrium_options *options, double *x,
                         pal_equilibrium_report *report, pal_diagnostic *diag);
-/* after pal_equilibrium in this workspace, same arguments: slope[kind] [n_item] = dJ/dk for dJ_du [n_node][3] (not read
- * at held nodes). NUMERIC, MEMORY */
+/* Call after pal_equilibrium in this workspace, with the same arguments. slope[kind] [n_item] = dJ/dk for dJ_du
+ * [n_node][3] (not read at fixed nodes). Errors: NUMERIC, MEMORY. */
 pal_err pal_equilibrium_adjoint(pal_equilibrium_workspace *workspace, const double *const k_J[PAL_SPRING_KINDS],
                                 const double *x, const pal_equilibrium_options *options, const double *dJ_du,
                                 double *const slope[PAL_SPRING_KINDS], pal_diagnostic *diag);
-/* -grad of the elastic energy [n_node][3] at x, held nodes too; returns the energy, J */
+/* Writes -grad of the elastic energy at x [n_node][3], including fixed nodes. Returns the energy, J. */
 double pal_lattice_force(const pal_lattice *lattice, const double *const k_J[PAL_SPRING_KINDS], const double *x,
                          double *force_N);
 #endif

@@ -1,4 +1,4 @@
-/* Running a calibrated body until it is still. */
+/* Runs a calibrated body until it is at rest. */
 #include "server/calibrate/settle.h"
 
 #include "server/base/vec3.h"
@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* what "still" means, header */
+/* thresholds for rest, see settle.h */
 static const double max_v = 1e-4, mean_v = 3e-5, max_a = 1e-2, mean_a = 1e-3, hold_s = 0.25;
 
 const double pal_settle_rates_1_s[PAL_SETTLE_STEPS] = {0.5, 1, 2, 4, 8, 16};
@@ -23,7 +23,7 @@ static bool say(const pal_settle_options *options, const char *what, double frac
     return !options->progress || options->progress(what, fraction, options->user);
 }
 
-/* A of the header */
+/* A of settle.h */
 static double mean_gain(const pal_body *body, const double *force_N)
 {
     double force = 0, mass = 0;
@@ -34,7 +34,7 @@ static double mean_gain(const pal_body *body, const double *force_N)
     return force / mass;
 }
 
-/* is the body still at this moment? damping: rate of the row viscous, which the solver applies apart from f */
+/* Is the body at rest now? damping: rate of the component viscous, which the solver applies separately from f. */
 static bool is_still(const pal_body *body, double damping_1_s, double gain_m_s2)
 {
     double v_max = 0, v_sum = 0, a_max = 0, a_sum = 0, u_max = 0;
@@ -72,7 +72,7 @@ static void compare(const pal_body *body, const double *u, pal_settle_run *out)
     if (u && max > 0) out->difference_percent = 100 * sqrt(sum / body->n_dof) / max;
 }
 
-/* the damping that the world's row viscous has now */
+/* present damping of the component viscous */
 static double damping_of(const pal_world *world)
 {
     double rate = 0;
@@ -110,9 +110,9 @@ pal_err pal_settle(pal_world *world, double step_s, const pal_settle_load *load,
     return PAL_ERR_OK;
 }
 
-/* ---- ladder ---- */
+/* ---- search over the rates ---- */
 
-/* all loads at one rate; the mean is *mean, NaN when some is not steady within `most` seconds of all together */
+/* Runs all loads at one rate. *mean is NaN if one is not steady within `max` seconds of all together. */
 static pal_err try_rate(pal_world *world, double step_s, const pal_settle_load *load, int n_load, double max,
                         pal_settle_options *options, double *work, pal_settle_run *run, double *mean,
                         pal_diagnostic *diag)
@@ -131,7 +131,7 @@ static pal_err try_rate(pal_world *world, double step_s, const pal_settle_load *
     return PAL_ERR_OK;
 }
 
-/* what a climb shares */
+/* state of one search */
 typedef struct climb {
     pal_world *world;
     const pal_scene *scene;
@@ -143,7 +143,7 @@ typedef struct climb {
     pal_diagnostic *diag;
 } climb;
 
-/* one rung; *better: sooner than all before */
+/* tries one rate; *better: settles sooner than all before */
 static pal_err try_rung(climb *c, int rung, bool *better)
 {
     pal_settle_report *out = c->out;
@@ -155,7 +155,7 @@ static pal_err try_rung(climb *c, int rung, bool *better)
     PAL_TRY(try_rate(c->world, c->scene->step_s, c->load, c->n_load, max, &c->options, &c->work, run, &mean, c->diag));
     out->rate_seconds[rung] = mean;
     *better = isfinite(mean) && (!out->steady || mean < out->seconds);
-    /* of a body that never rests the first run is there to tell */
+    /* a body that never rests reports its first run */
     for (int i = 0; i < c->n_load && (*better || (!out->steady && rung == c->first)); i++) out->load[i] = run[i];
     if (!*better) return PAL_ERR_OK;
     out->steady = true;
@@ -164,7 +164,7 @@ static pal_err try_rung(climb *c, int rung, bool *better)
     return PAL_ERR_OK;
 }
 
-/* the rung nearest to 2/T, by the geometric mean of the loads */
+/* the rate nearest to 2/T, by the geometric mean of the loads */
 static int first_rung(const climb *c)
 {
     const pal_body *body = pal_world_body(c->world, 0);
@@ -191,7 +191,7 @@ static pal_err run_climb(climb *c)
         if (!better && c->out->steady) break;
         up |= better;
     }
-    /* a body that swings faster than the ladder reaches is stillest soonest at its top */
+    /* a body that oscillates faster than the rates cover settles soonest at the largest one */
     up |= c->first == PAL_SETTLE_STEPS - 1 && c->out->steady;
     for (int k = c->first - 1; k >= 0 && !up && c->work > 0; k--) {
         PAL_TRY(try_rung(c, k, &better));
@@ -214,7 +214,7 @@ pal_err pal_settle_damping(const pal_scene *scene, const pal_settle_load *load, 
     pal_world *world = NULL;
     if (!own) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a live body");
     *own = *scene;
-    /* nobody looks and nobody touches; the row viscous is there when there is a rate */
+    /* no display and no tools; with a rate the component viscous exists */
     own->body[0].output.name[0] = 0;
     own->body[0].n_effect = 0;
     own->body[0].material.damping_1_s = pal_settle_rates_1_s[USUAL];

@@ -1,4 +1,4 @@
-/* Shown vertices by skin and by elements (display_error.h). */
+/* Displayed vertices by skin and by element interpolation (display_error.h). */
 #include "server/estimate/display_error.h"
 
 #include "server/base/vec3.h"
@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* where vertices lie in the elements of a rest; a little outside of them these go on */
+/* Interpolation of the vertices in the elements of a rest solution; slightly outside points are extrapolated. */
 static pal_err find_rows(const pal_rest_solution *rest, const pal_surface *surface, pal_interpolation *out)
 {
     const pal_body *own = pal_world_view_body(rest->world, 0);
@@ -47,7 +47,7 @@ static pal_err make(pal_display_error *s)
     return s->frames && s->place && s->unmoved_m && s->u[0] && s->u[1] && s->node ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-/* frames that nothing was in yet: what a neighbourhood that has collapsed would go on with */
+/* Clears the frames first: otherwise a collapsed neighbourhood would reuse the previous frame. */
 static void show(pal_display_error *s, const double *x, float *out)
 {
     memset(s->frames, 0, pal_skin_frames_bytes(&s->mesh->skin));
@@ -79,7 +79,7 @@ void pal_display_error_free(pal_display_error *s)
     *s = (pal_display_error){.n = 0};
 }
 
-/* displacements of vertices by the elements of a rest */
+/* displacements of the vertices by the elements of a rest solution */
 static void by_elements(pal_display_error *s, int k, double *u)
 {
     const pal_body *own = pal_world_view_body(s->rest[k]->world, 0);

@@ -1,8 +1,8 @@
-/* Errors of what is shown: the surface that hangs on a body's nodes by its skin, against the displacements that
- * elements have there. Nodes tell less: between them, where a tool presses a vertex, meshes differ by more than at
- * those that both have, and a skin, which turns with its nodes and is not stretched with them, hangs off its own
- * elements by as much again (a press on a ball: 5 times what the nodes told). Private to estimate_*.c. Heap memory.
- * Thread: one at a time. */
+/* Errors at the vertices of the displayed surface: its skin is compared with the displacement field of the
+ * elements. Comparing nodes alone underestimates the error. Meshes differ more between nodes, for example where a
+ * tool presses a vertex, than at common nodes. The skin rotates with its nodes but does not stretch with them, so
+ * it deviates from its own elements by a similar amount (a press on a ball: 5 times the error at the nodes).
+ * Private to estimate_*.c. Allocates heap memory. Thread: one at a time. */
 #ifndef PAL_ESTIMATE_DISPLAY_ERROR_H
 #define PAL_ESTIMATE_DISPLAY_ERROR_H
 #include "server/estimate/rest_solution.h"
@@ -11,25 +11,26 @@
 enum { PAL_DISPLAY_FINE, PAL_DISPLAY_COARSE, PAL_DISPLAY_COARSEST, PAL_DISPLAY_RESTS };
 
 typedef struct pal_display_error {
-    int n; /* shown vertices; 0: nothing hangs on nodes, which are compared themselves then */
+    int n; /* displayed vertices; 0: no skin, so nodes are compared instead */
     const pal_prepared *mesh;
     const pal_rest_solution *rest[PAL_DISPLAY_RESTS];
-    pal_interpolation by[PAL_DISPLAY_RESTS]; /* vertices by the nodes of each rest; n_row 0: there is no such rest */
+    /* interpolation from the nodes of each rest solution to the vertices; n_row 0: no such solution */
+    pal_interpolation by[PAL_DISPLAY_RESTS];
     void *frames;
-    float *place;     /* of vertices, m [n][3] */
+    float *place;     /* positions of the vertices, m [n][3] */
     double *u[2];     /* displacements of vertices, m [n][3] */
-    double *node;     /* of nodes [most nodes of a rest][3] */
-    float *unmoved_m; /* places of vertices at rest, as the skin rounds them [n][3] */
+    double *node;     /* nodal values [largest node count of a rest solution][3] */
+    float *unmoved_m; /* vertex positions at rest, as the skin rounds them, m [n][3] */
 } pal_display_error;
 
-/* rests: FINE has a world, others may have none; all are borrowed. Nodes of the skin are numbered as those of FINE.
- * MEMORY */
+/* Borrows the rest solutions. `fine` must have a world; the others may have none. The skin uses the node numbers of
+ * `fine`. Error: MEMORY. */
 pal_err pal_display_error_make(const pal_rest_solution *fine, const pal_rest_solution *coarse,
                                const pal_rest_solution *coarsest, pal_display_error *out);
-void pal_display_error_free(pal_display_error *shown); /* a zeroed one is fine */
-/* the largest distance between two rests at shown vertices, by their elements, m */
+void pal_display_error_free(pal_display_error *shown); /* accepts a zeroed struct */
+/* Largest distance between two rest solutions at the displayed vertices, by element interpolation, m. */
 double pal_display_error_change(pal_display_error *shown, int of, int to);
-/* the largest distance between what is shown where nodes are at x [n_node][3] and where elements of FINE, gone on from
- * COARSE by `more` of the way between these, have it */
+/* Largest distance, m, between the skin with nodes at x [n_node][3] and the element interpolation of FINE,
+ * extrapolated from COARSE by the fraction `more` of the change between the two. */
 double pal_display_error_skin(pal_display_error *shown, const double *x, double more);
 #endif

@@ -1,4 +1,4 @@
-/* The state of a body, copied from a running world and put on another one. */
+/* Copies the state of a body from a running world and matches the components of another world to it. */
 #include "server/estimate/estimate.h"
 
 #include "server/base/vec3.h"
@@ -46,14 +46,14 @@ pal_estimate_cost pal_estimate_cost_of(const pal_world *world, int body, double 
                                                                : &once_ns;
         *sum_ns += (double)row->spent_ns;
     }
-    /* of the rows alone: they are on another clock than the step */
+    /* relative to the components alone: the step is measured by another clock */
     double all_ns = once_ns + beside_ns + own_ns;
     pal_estimate_cost cost = {.ms = (float)step_ms};
     if (all_ns > 0) cost.once = (float)(once_ns / all_ns), cost.beside = (float)(beside_ns / all_ns);
     return cost;
 }
 
-/* some tool is felt, and this body bears something that nobody set: tools on another body are not this one's */
+/* A tool reports a force and this body bears a contact load. Tools on another body do not count. */
 static bool is_touched(const pal_world *world, const pal_body *body)
 {
     const pal_tools *tools = pal_world_tools(world);

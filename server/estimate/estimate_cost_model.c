@@ -1,4 +1,4 @@
-/* The probe: some steps of two worlds in turn, a look at their factors, the machine's rate of reading. */
+/* The probe: alternating steps of two worlds, the sizes of their factors, and the machine's read rate. */
 #include "server/estimate/estimate_cost_model.h"
 
 #include "server/base/clock.h"
@@ -9,11 +9,11 @@
 #include <string.h>
 
 enum { TIMED = 15 };
-/* of a step's time with fewer nodes; of the factor's entries with more */
+/* bounds of the growth with nodes: of step time on fewer nodes; of factor entries on more nodes */
 static const double min_growth = 0.6, max_growth = 2.2, min_fill = 1.1, max_fill = 1.6;
-/* the factor's share of a sub-step at most; power of iterations with nodes */
+/* upper bounds: the factor's share of a sub-step; exponent of iterations with nodes */
 static const double max_factor = 0.7, max_more = 0.15;
-/* an entry is a float, read forwards and backwards */
+/* a factor entry is a float, read forwards and backwards */
 static const double entry_byte = 4, entry_reads = 2;
 
 static int rising(const void *a, const void *b)
@@ -30,8 +30,8 @@ static void rest(pal_world *world)
     pal_world_invalidate_limits(world, 0);
 }
 
-/* a few steps of both from rest under the loads they have; what a sub-step took, medians, ms, and iterations of a step
- */
+/* Makes a few steps of both worlds from rest under their loads. out: median time of a sub-step, ms; n_cg:
+ * iterations of a step. */
 static bool time_steps(pal_world *const world[2], double step_s, double out[2], double n_cg[2])
 {
     pal_solve_report report;
@@ -59,12 +59,12 @@ static void count(const pal_scene *scene, double limit_s, pal_prediction *out)
         at.size = k ? 2 * out->setting.size : out->setting.size / 2;
         double n = at.size > 0 ? pal_configuration_estimate_nodes(scene, 0, &at) : 0;
         out->nodes[k] = n > 0 ? n / now : k ? 8 : 0.125;
-        /* the limit of explicit solvers goes with the edge of a voxel */
+        /* the limit of explicit solvers is proportional to the voxel edge */
         out->substeps[k] = out->implicit ? 1 : fmax(ceil(limit_times * (k ? 2 : 0.5) - 1e-9), 1) / whole;
     }
 }
 
-/* a sub-step's time on more nodes over that on this mesh */
+/* time of a sub-step on more nodes over that on this mesh */
 static double grown(const pal_solve_report report[2], const double n_cg[2], double along, double nodes, double fine_ms)
 {
     double entries = (double)report[1].factor_nonzeros, fill = log(entries / (double)report[0].factor_nonzeros) / along;
@@ -72,7 +72,7 @@ static double grown(const pal_solve_report report[2], const double n_cg[2], doub
     double times = pow(nodes, fill), now = pal_machine_read_ms(entry_byte * entries),
            then = pal_machine_read_ms(entry_byte * entries * times);
     double factor_ms = fmin(n_cg[1] * entry_reads * now, max_factor * fine_ms);
-    /* finer meshes need a few more iterations */
+    /* finer meshes need slightly more iterations */
     double more = n_cg[0] > 0 ? fmin(fmax(log(n_cg[1] / n_cg[0]) / along, 0), max_more) : 0;
     if (!(now > 0 && then > 0)) return nodes;
     return pow(nodes, more) * ((fine_ms - factor_ms) * nodes + factor_ms * fmax(then / now, times)) / fine_ms;

@@ -1,4 +1,4 @@
-/* Bodies of other sizes beside a running one. */
+/* Measures bodies of other sizes beside a running one (estimate_hierarchy.h). */
 #include "server/estimate/estimate_hierarchy.h"
 
 #include "server/base/clock.h"
@@ -13,15 +13,16 @@
 #include <string.h>
 
 enum { MAX_NODES = 16000, PROBES = 600, MIN_SIZE = 4, MAX_SIZE = 400, MAX_FINER = 4 };
-/* MAX_FINER: finest mesh over this one; a mesh so much coarser than the finest can be told from it; order of those
- * that cannot, and the mean of that and of what half and this size show */
+/* MAX_FINER: finest size over this one. reported_apart: smallest ratio to the finest size at which an error can be
+ * measured. order: order of the error of closer meshes; it is averaged with what half and this size show
+ * (far_order). */
 static const double reported_apart = 1.35, order = 2, far_order = 1.75, min_ratio = 0.02, max_times = 20;
-/* the factors that were observed, with finest meshes of so many times the voxels and without any */
+/* observed factors of uncertainty: with a finest mesh of observed_finer times the voxels; without a hierarchy */
 static const double observed = 2, observed_finer = 2, without = 3;
-/* cosine of two loads from which on what was measured under one is taken for the other; times that measuring took, to
- * wait before the next */
+/* smallest cosine of two loads for which a measurement is reused; wait before the next one, in multiples of its
+ * duration */
 static const double same_loads = 0.8, waits = 20;
-static atomic_flag busy = ATOMIC_FLAG_INIT; /* one family is measured at a time, whatever the sessions */
+static atomic_flag busy = ATOMIC_FLAG_INIT; /* one hierarchy is measured at a time, over all sessions */
 
 typedef struct sized {
     pal_rest_solution rest;
@@ -37,7 +38,7 @@ typedef struct family {
     const _Atomic bool *stop;
     const pal_surface *surface;
     bool fits;
-    int stride, n_probe; /* every so many vertices of the surface */
+    int stride, n_probe; /* every stride-th vertex of the surface is a probe */
     int n_mesh;          /* solved so far */
 } family;
 
@@ -50,7 +51,7 @@ static double nodes_of(const family *f, int size)
     return pal_configuration_estimate_nodes(f->scene, 0, &s);
 }
 
-/* the finest that may be had; 0: none that tells anything */
+/* the finest size available; 0: none fine enough */
 static int finest_size(const family *f)
 {
     int s = f->setting->size, r = MAX_FINER * s;
@@ -87,7 +88,7 @@ static bool stopped(const family *f)
     return f->stop && atomic_load_explicit(f->stop, memory_order_acquire);
 }
 
-/* size 0: merged voxels; that of the setting: the body's own mesh */
+/* size 0: merged voxels; the configuration's size: the body's own mesh */
 static bool solve(family *f, int size, sized *m)
 {
     if (stopped(f)) return false;
@@ -114,21 +115,21 @@ static double between(const family *f, const sized *a, const sized *b)
     return max;
 }
 
-/* of the finest mesh, that of a mesh of `size` being 1 */
+/* error of the finest mesh relative to that of a mesh of `size` */
 static double share_of(int size, int finest)
 {
     return pow((double)size / finest, order);
 }
 
-/* The distance of two meshes is the difference of errors of the same sign, and what is random of them (which voxels are
- * cut, and how) adds up in squares: the geometric mean of what either says */
+/* The distance of two meshes is the difference of errors of equal sign. Random errors (which voxels are cut, and
+ * how) add in squares. Divides by the geometric mean of the two rules. */
 static double left(const family *f, const sized *m, const sized *finest)
 {
     const double share = share_of(m->size, finest->size);
     return between(f, m, finest) / sqrt((1 - share) * sqrt(1 + share * share));
 }
 
-/* NaN: no such mesh, or too near to the finest */
+/* NaN: no such mesh, or too close to the finest */
 static double left_in(family *f, int size, const sized *finest)
 {
     sized m = {.u = NULL};
@@ -138,14 +139,14 @@ static double left_in(family *f, int size, const sized *finest)
     return error;
 }
 
-/* either way over their geometric mean */
+/* either rule over their geometric mean */
 static double ambiguity(double finer)
 {
     const double share = pow(finer, -order);
     return sqrt(sqrt(1 + share * share) / (1 - share));
 }
 
-/* from merged voxels to this mesh */
+/* change from merged voxels to this mesh */
 static double change(family *f, const sized *own, bool shown)
 {
     sized merged = {.u = NULL};
@@ -168,7 +169,8 @@ static void measure(family *f, bool shown, pal_estimate_hierarchy *out)
     double error = 0, last = 0;
     out->known = false;
     if (r > 0 && solve(f, r, &finest)) {
-        pal_rest_solution_free(&finest.rest); /* its places are kept, it is the largest thing here */
+        /* frees the largest allocation; only its displacements at the probes are needed */
+        pal_rest_solution_free(&finest.rest);
         if (solve(f, size, &own)) error = left(f, &own, &finest), last = change(f, &own, shown);
     }
     sized_free(&own);
@@ -188,7 +190,7 @@ static void measure(family *f, bool shown, pal_estimate_hierarchy *out)
     sized_free(&finest);
 }
 
-/* what it bears, of length 1 */
+/* the loads of the state at free nodes, scaled to length 1 */
 static bool take_loads(const pal_body *body, const pal_estimate_state *state, double *out)
 {
     double sum = 0;
@@ -207,7 +209,7 @@ static double cosine(const double *a, const double *b, int n)
     return sum;
 }
 
-/* is what was measured under `loads` of one material good for the other? Moduli that are the same everywhere cancel */
+/* Does the earlier measurement apply to these loads and this material? A uniform Young's modulus cancels. */
 static bool is_same(const family *f, const pal_estimate_hierarchy *of, const double *loads)
 {
     const pal_material *now = &f->state->material;
@@ -231,7 +233,7 @@ bool pal_estimate_hierarchy_refresh(const pal_scene *scene, const pal_body *body
         free(now);
         return out->known && same;
     }
-    /* bodies that are watched at the same time wait for one another */
+    /* estimators of other bodies measure one after the other */
     if (atomic_flag_test_and_set_explicit(&busy, memory_order_acquire)) {
         out->next_s = began + 1;
         free(now);

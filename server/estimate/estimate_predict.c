@@ -1,4 +1,4 @@
-/* Neighbours on the parameters. */
+/* Predicts the neighbours in each parameter (estimate_predict.h). */
 #include "server/estimate/estimate_predict.h"
 
 #include "server/sim/core/configuration.h"
@@ -8,7 +8,7 @@
 enum { MIN_SIZE = 4, MAX_SIZE = 400 };
 static const double min_step_s = 1e-4, max_step_s = 0.1, min_tolerance = 1e-12, max_tolerance = 0.5;
 
-/* nodes and sub-steps over what they are now */
+/* nodes, substeps: relative to the present */
 static void add(const pal_prediction *from, pal_estimate *out, const pal_configuration *setting, double ms,
                 double change_m, double nodes, double substeps)
 {
@@ -21,7 +21,7 @@ static void add(const pal_prediction *from, pal_estimate *out, const pal_configu
         (pal_measured_configuration){.setting = *setting, .ms = ms, .error_m = error_m};
 }
 
-/* would a switch take it? With `more` times the sub-steps in a step */
+/* Would a switch accept it, with `more` times the sub-steps in a step? */
 static bool taken(const pal_prediction *from, const pal_configuration *to, double more)
 {
     if (!from->scene) return true;
@@ -29,7 +29,7 @@ static bool taken(const pal_prediction *from, const pal_configuration *to, doubl
     return fits && !pal_configuration_check_live(from->scene, from->body, to, NULL);
 }
 
-/* sub-steps of all bodies over what they are now */
+/* sub-steps of all bodies relative to the present */
 static double substeps(const pal_prediction *from, int side)
 {
     double own = from->rest_substeps, beside = from->other_substeps;
@@ -37,7 +37,7 @@ static double substeps(const pal_prediction *from, int side)
     return fmax(own * from->substeps[side], beside) / fmax(own, beside);
 }
 
-/* a step's time over what it is now */
+/* time of a step relative to the present */
 static double times(const pal_prediction *from, int side)
 {
     double own = fmax(1 - from->once - from->beside, 0);
@@ -49,7 +49,7 @@ static void sizes(const pal_prediction *from, pal_estimate *out)
     double left[2] = {from->left[0] > 0 ? from->left[0] : exp2(from->order),
                       from->left[1] > 0 ? from->left[1] : exp2(-from->order)};
     pal_configuration to = from->setting;
-    /* calibrated constants hold for the size that they were found for */
+    /* calibrated constants are valid only for their own size */
     if (!(from->setting.size > 0) || from->setting.k_distance_J > 0) return;
     to.size = from->setting.size / 2;
     if (to.size >= MIN_SIZE && taken(from, &to, 1))

@@ -1,44 +1,45 @@
-/* The neighbours of a running body's configuration: the next lower and higher choice of each parameter, with predicted
- * time and error. Private to this room. Thread: any.
+/* Neighbours of a running body's configuration: the next lower and next higher value of each parameter, with
+ * predicted time and error. Private to this room. Thread: any.
  *
- * ms is the time of a step of the scene as it is now (configuration.h: a shorter step counts as two of them).
- *   size        half and twice. The share `once` of a step's time stays (refinement, guards, display); `beside` goes
- * with the sub-steps (contact, other bodies), which are those of the body that needs most; the rest goes with the
- *               sub-steps and with the time of one of them (estimate_cost_model.h). The discretisation error goes with
- *               h^order, or as measured where many voxels are cut. None for calibrated springs, whose constants belong
- * to one size step        half and twice (implicit solvers): each takes as long; the time error goes with step^order of
- * the solver tolerance   a tenth and ten times (implicit solvers): the algebraic error goes with it, the time as
- * measured for one decade A choice that a switch would refuse is not offered: pal_configuration_check_live, and more
- * sub-steps in a step than the scene allows (of explicit solvers as many more as elements are smaller; in a longer step
- * as many more as it is longer).
- */
+ * ms is the time of a step of the present scene (configuration.h: a step of half the length counts as two).
+ *   size        Half and twice. The share `once` of a step's time is constant (refinement, safeguards, display).
+ *               `beside` scales with the sub-steps (contact, other bodies), which the most demanding body sets. The
+ *               rest scales with the sub-steps and the time of each (estimate_cost_model.h). The discretisation
+ *               error scales with h^order, or as measured where many voxels are cut. Not offered for calibrated
+ *               springs, whose constants are valid for one size.
+ *   step        Half and twice (implicit solvers). Each step takes the same time. The time error scales with
+ *               step^order of the solver.
+ *   tolerance   A tenth and ten times (implicit solvers). The algebraic error is proportional to it; the time is
+ *               measured for one decade.
+ * A value that a switch would refuse is not offered: see pal_configuration_check_live. Neither is one that needs
+ * more sub-steps in a step than the scene allows. Explicit solvers need sub-steps in proportion to 1 / element size
+ * and to the step length. */
 #ifndef PAL_ESTIMATE_ESTIMATE_PREDICT_H
 #define PAL_ESTIMATE_ESTIMATE_PREDICT_H
 #include "server/estimate/estimate.h"
 
 typedef struct pal_prediction {
-    const pal_scene *scene; /* of the body, as it is; NULL: all is taken */
+    const pal_scene *scene; /* scene of the body, as it is; NULL: every value is accepted */
     int body;
-    int n_substep;             /* of a step now, all bodies; 0: not known */
-    pal_configuration setting; /* as it is */
-    int n_node, rest_substeps; /* as it is; of a step at rest, of the body alone */
-    double other_substeps;     /* that other bodies need; 0: none do */
+    int n_substep;             /* of a present step, over all bodies; 0: unknown */
+    pal_configuration setting; /* present configuration */
+    int n_node, rest_substeps; /* present nodes; sub-steps of a step at rest, of this body alone */
+    double other_substeps;     /* sub-steps that other bodies need; 0: none */
     double once, beside;       /* shares of a step's time: pal_estimate_cost */
-    /* half and twice the size, over what is now: nodes as they are thought to be, sub-steps, time of a sub-step; NaN:
-     * not known, no neighbour in size */
+    /* half and twice the size, relative to the present: predicted nodes, sub-steps, time of a sub-step; NaN:
+     * unknown, so no neighbour in size */
     double nodes[2], substeps[2], work[2];
     double order; /* of the elements */
-    /* error of half and of twice as many voxels over this mesh's, as measured (estimate_hierarchy.h); 0: as `order` has
-     * it
-     */
+    /* measured error with half and with twice as many voxels over that of this mesh (estimate_hierarchy.h); 0: use
+     * `order` */
     double left[2];
-    bool implicit;    /* the parameters step and tolerance mean something */
+    bool implicit;    /* the parameters step and tolerance apply */
     int solver_order; /* in time */
-    double tolerance; /* of the solver as it is */
-    double decade;    /* a step's time with a tenth of the tolerance over that as it is; NaN: not known */
+    double tolerance; /* present tolerance of the solver */
+    double decade;    /* time of a step with a tenth of the tolerance over the present one; NaN: unknown */
 } pal_prediction;
 
-/* fills neighbour from ms and the parts that out has; those whose ms or change of
- * the error cannot be predicted are left out; error_m NaN where out's is */
+/* Fills `neighbour` of `out` from its ms and its parts of the error. Omits neighbours whose ms or error cannot be
+ * predicted. Their error_m is NaN where that of `out` is. */
 void pal_estimate_predict(const pal_prediction *from, pal_estimate *out);
 #endif

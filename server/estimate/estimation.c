@@ -1,4 +1,4 @@
-/* The parts of the error of one body: the steps ahead (time and algebraic parts), the rests (the other parts). */
+/* The parts of the error of one body: from future steps (time, algebraic) and from equilibria (the other parts). */
 #include "server/estimate/estimation.h"
 
 #include "server/base/clock.h"
@@ -12,7 +12,7 @@
 
 enum { MAX_AHEAD = 12, TIMED = 7 };
 static const double ahead_s = 0.1, ahead_ms = 400;
-/* a body moved by less of its size has no error but rounding */
+/* share of the body's size: smaller displacements are rounding */
 static const double unmoved = 1e-9;
 
 /* ---- one estimate ---- */
@@ -38,7 +38,7 @@ static float beside_of(const pal_estimate_cost *c)
     return c->beside;
 }
 
-/* in the middle of the steps, as one that was interrupted says too much */
+/* the median, because an interrupted step takes too long */
 static double middle(const pal_estimate_state *s, float (*of)(const pal_estimate_cost *))
 {
     float value[PAL_ESTIMATE_STEPS];
@@ -48,7 +48,7 @@ static double middle(const pal_estimate_state *s, float (*of)(const pal_estimate
     return (double)value[s->n_cost / 2];
 }
 
-/* the state into a world of the same mesh, under its loads */
+/* sets the state and its loads in a world of the same mesh */
 static pal_err set_state(const pal_estimation *w, pal_world *world)
 {
     const pal_estimate_state *s = &w->state;
@@ -70,7 +70,7 @@ static pal_err set_state(const pal_estimation *w, pal_world *world)
     return PAL_ERR_OK;
 }
 
-/* n steps of dt_s from the state -> x, and what one took; false: stopped or not possible */
+/* Makes n steps of dt_s from the state -> x; ms: time of one. False: stopped, or not possible. */
 static bool go_ahead(const pal_estimation *w, pal_world *world, int n, double dt_s, double *x, double *ms)
 {
     const pal_body *body = pal_world_body(world, 0);
@@ -89,7 +89,7 @@ static double max_between(const double *a, const double *b, int n)
     return max;
 }
 
-/* algebraic and time parts of the steps ahead */
+/* computes the algebraic and time parts from future steps */
 static void look_ahead(pal_estimation *w, pal_estimate *out)
 {
     double step_s = w->scene->step_s, ms = isnan(out->ms) ? 1 : out->ms;
@@ -108,7 +108,7 @@ static void look_ahead(pal_estimation *w, pal_estimate *out)
     out->time_m = max_between(w->first, w->second, n_dof) / (1 - ldexp(1, -w->prediction.solver_order));
 }
 
-/* the body's own method on the coarse mesh and on this one, under the same loads, once */
+/* Measures once the body's own method on the coarse mesh and on this one, under the same loads. */
 static void price_size(pal_estimation *w)
 {
     pal_world *small = NULL;
@@ -132,7 +132,7 @@ static void price_size(pal_estimation *w)
     free(scene);
 }
 
-/* ---- the rests ---- */
+/* ---- equilibria ---- */
 
 static void tell(pal_estimate *out, const char *text)
 {
@@ -140,8 +140,9 @@ static void tell(pal_estimate *out, const char *text)
     snprintf(out->diag + n, sizeof out->diag - n, "%s%s", n > 0 ? "; " : "", text);
 }
 
-/* The loads under which the body would rest where it is now: those that act less what is left over, which accelerates
- * it and is taken by drag (d'Alembert). At rest they are those that act. Supports bear what is left over at theirs */
+/* Computes the loads under which the present shape is an equilibrium: the acting loads less the residual, which
+ * accelerates the body or is taken by drag (d'Alembert). At rest they equal the acting loads. Supports bear the
+ * residual of their own nodes. */
 static bool find_borne(pal_estimation *w)
 {
     pal_estimate_state *s = &w->state;
@@ -160,7 +161,7 @@ static double known(double part)
     return isnan(part) ? 0 : part;
 }
 
-/* the largest distance between a rest and a coarser one, at nodes of the running body that the coarser one has */
+/* largest distance between two rest solutions, at nodes of the running body that the coarser one has */
 static double change(const pal_rest_solution *rest, const pal_rest_solution *coarser)
 {
     double max = 0;
@@ -171,7 +172,7 @@ static double change(const pal_rest_solution *rest, const pal_rest_solution *coa
     return max;
 }
 
-/* is the last change no smaller than the one before it? */
+/* Is the last change at least as large as the previous one? */
 static bool changes_grow(pal_estimation *w, const pal_body *body, double last)
 {
     if (!w->coarsest.world || !pal_rest_solution_find(&w->coarsest, &w->state, body, NULL, w->stop)) return false;
@@ -180,7 +181,7 @@ static bool changes_grow(pal_estimation *w, const pal_body *body, double last)
     return first > 0 && last >= first;
 }
 
-/* how the skin hangs off its elements; how that of springs does is in how far they are from elements */
+/* Distance of the skin from its elements. 0 for springs, whose distance from the elements already includes it. */
 static double skin_off(pal_estimation *w)
 {
     return w->shown.n > 0 && !w->springs ? pal_display_error_skin(&w->shown, w->fine.x, 0) : 0;
@@ -219,8 +220,8 @@ static void discretise(pal_estimation *w, const pal_body *body, pal_estimate *ou
     out->discretisation_m = last / (exp2(w->prediction.order) - 1) + skin_off(w);
 }
 
-/* Springs whose constants were fitted to converged finite elements stand nearer to these than to those of their own
- * voxels: how far they are from where Richardson carries the two meshes' rests. That has the mesh's part in it */
+/* Springs fitted to converged finite elements are closer to those than to elements on their own voxels. The error
+ * is therefore their distance from the Richardson limit of the two meshes, which includes the discretisation part. */
 static void compare_fitted(pal_estimation *w, pal_estimate *out)
 {
     double max = 0, more = 1 / (exp2(w->prediction.order) - 1);
@@ -240,7 +241,7 @@ static void compare_models(pal_estimation *w, const pal_body *body, pal_estimate
     int n = w->state.n_node;
     if (w->springs && w->prediction.setting.k_distance_J > 0 && out->discretisation_m > 0)
         compare_fitted(w, out);
-    else if (w->springs) /* where they are is where they rest under what they bear */
+    else if (w->springs) /* their present positions are the equilibrium under `borne` */
         out->model_m =
             w->shown.n > 0 ? pal_display_error_skin(&w->shown, w->state.x, 0) : max_between(w->state.x, w->fine.x, n);
     else if (!w->model.world)
@@ -279,7 +280,8 @@ static double largest_move(const pal_estimation *w)
     return max_between(w->state.x, body->x_rest, w->state.n_dof);
 }
 
-/* without the large parts a sum would pass for the whole, beside those of a study that are whole */
+/* Without its dominant parts the sum must stay unknown: it would otherwise be compared with complete errors of a
+ * study. */
 static void sum_up(const pal_estimation *w, pal_estimate *out)
 {
     bool whole = !isnan(out->discretisation_m) && !(w->springs && isnan(out->model_m));
@@ -287,7 +289,7 @@ static void sum_up(const pal_estimation *w, pal_estimate *out)
                          : (double)NAN;
 }
 
-/* asleep a step costs next to nothing: what counts is what it takes to be awake */
+/* a sleeping body costs almost nothing: measures the cost of an awake step */
 static void price_sleep(pal_estimation *w, pal_estimate *out)
 {
     if (!w->state.asleep) return;
@@ -297,7 +299,7 @@ static void price_sleep(pal_estimation *w, pal_estimate *out)
     tell(out, PAL_ESTIMATE_ASLEEP);
 }
 
-/* the steps ahead of a body that stands where it was made leave rounding alone */
+/* the steps of a body at its initial shape contain only rounding */
 static void drop_rounding(const pal_estimation *w, pal_estimate *out)
 {
     double min_m = unmoved * pal_world_view_body(w->live, 0)->length_scale_m;

@@ -1,5 +1,5 @@
-/* What an estimator computes, without its thread: the parts of the error of one body in one state (estimator.h). Heap
- * memory; everything here is slow. Thread: one at a time. */
+/* The computation of an estimator, without its thread: the parts of the error of one body in one state
+ * (estimator.h). Allocates heap memory; every function is slow. Thread: one at a time. */
 #ifndef PAL_ESTIMATE_ESTIMATION_H
 #define PAL_ESTIMATE_ESTIMATION_H
 #include "server/estimate/display_error.h"
@@ -9,44 +9,45 @@
 #include <stdatomic.h>
 
 typedef struct pal_estimation pal_estimation;
-/* meshes and worlds for one body of a scene, which is borrowed; ends early with STATE when *stop is set (NULL: never).
- * REFUSED: no such body, or one of which nothing can be estimated (one sentence); MEMORY */
+/* Makes meshes and worlds for one body of a scene. Borrows the scene. Errors: STATE: *stop was set (NULL: never
+ * stops); REFUSED: no such body, or nothing can be estimated for it (diag: one sentence); MEMORY. */
 pal_err pal_estimation_open(const pal_scene *scene, int body, const _Atomic bool *stop, pal_diagnostic *diag,
                             pal_estimation **out);
-void pal_estimation_close(pal_estimation *work); /* NULL is fine */
+void pal_estimation_close(pal_estimation *work); /* accepts NULL */
 pal_estimate_state *pal_estimation_state(pal_estimation *work);
-/* estimates the state; false: it was stopped */
+/* Estimates the error of the state. False: stopped. */
 bool pal_estimation_run(pal_estimation *work, pal_estimate *out);
 
 /* ---- private to estimation.c and estimation_setup.c ---- */
 
-/* tolerance of the solver that leaves next to nothing */
+/* solver tolerance with a negligible algebraic error */
 static const double pal_estimate_tight = 1e-9;
-/* of displacements at nodes: 1.2 to 2.1 is observed (tests/accuracy/test_effectivity.c). Taken for anything from 1 to 2
- * the first is off by a factor of 0.55 to 1.64; the order that three meshes tell was farther off, as the coarsest is
- * four times as coarse as a live one. Where changes still grow from mesh to mesh (few voxels across, most of them cut)
- * there is no order yet: the first left 0.2 of the truth there, the second half of it to twice as much */
+/* Order of convergence of nodal displacements: 1.2 to 2.1 was observed (tests/accuracy/test_effectivity.c). For a
+ * true order of 1 to 2, assuming 1.5 is off by a factor of 0.55 to 1.64. The order fitted to three meshes was less
+ * accurate, because the coarsest is four times as coarse as the live one. Where changes still grow from mesh to
+ * mesh (few voxels across, most of them cut), no order exists yet: there 1.5 gave 0.2 of the true error, and 1 gave
+ * half of it to twice as much. */
 static const double pal_usual_order = 1.5, pal_early_order = 1;
 
 struct pal_estimation {
     const _Atomic bool *stop;
-    pal_scene *scene; /* the body alone, without tools and what is shown */
+    pal_scene *scene; /* the body alone, without tools and display */
     pal_scene *exact_scene;
     pal_estimate_state state;
-    pal_world *live;        /* as it runs                                                     */
-    pal_world *exact;       /* the same with a solver that leaves next to nothing; NULL: it solves nothing */
+    pal_world *live;        /* the body as it runs */
+    pal_world *exact;       /* the same with pal_estimate_tight; NULL: its method solves no system */
     double *first, *second; /* [n_dof][3] */
-    /* springs: voxels that finite elements may stand on; n_hex 0: those of the scene's mesh */
+    /* springs: voxels for finite elements; n_hex 0: use those of the scene's mesh */
     pal_prepared voxels;
     bool springs, locks;
-    bool cut, thin;                                  /* many voxels are cut; there are two across, or one */
-    bool skinned;                                    /* what is shown hangs on nodes */
-    pal_rest_solution fine, coarse, coarsest, model; /* world NULL: there is none */
-    pal_display_error shown;                         /* n 0: nothing is, or nodes are */
+    bool cut, thin;                                  /* many voxels are cut; the body is one or two voxels across */
+    bool skinned;                                    /* a skin displays the body */
+    pal_rest_solution fine, coarse, coarsest, model; /* world NULL: absent */
+    pal_display_error shown;                         /* n 0: no displayed vertices, or nodes are used */
     pal_prediction prediction;
-    pal_estimate_hierarchy family; /* of cut voxels */
-    bool measured;                 /* what more nodes cost has been measured, or cannot be */
-    double awake_ms;               /* of a step of a body that was never seen awake; 0: not measured yet */
+    pal_estimate_hierarchy family; /* for cut voxels */
+    bool measured;                 /* the cost of more nodes is measured, or cannot be */
+    double awake_ms;               /* time of a step of a body never seen awake; 0: not measured yet */
     char diag[160];
 };
 
@@ -54,6 +55,6 @@ static inline bool pal_estimate_stopped(const pal_estimation *w)
 {
     return w->stop && atomic_load_explicit(w->stop, memory_order_acquire);
 }
-/* a key of the model, a text; otherwise: where the scene does not give it */
+/* Text value of a model key, or `otherwise` if the scene does not set it. */
 const char *pal_estimate_model_text(const pal_body_def *def, const char *key, const char *otherwise);
 #endif

@@ -1,5 +1,4 @@
-/* What an estimator works with: its own scene, worlds as they run and nearly exact, meshes for the rests; and states
- * that it is given. */
+/* Creates what an estimation works with: its own scene, live and nearly exact worlds, meshes for the equilibria. */
 #include "server/estimate/estimation.h"
 
 #include "server/base/vec3.h"
@@ -10,21 +9,22 @@
 #include <string.h>
 
 static const double usual_tolerance = 1e-2; /* of implicit solvers */
-/* voxels with less than that are cut; of the volume in them (tests/accuracy/test_effectivity.c, the gear) */
+/* voxels filled less are cut; share of the volume in cut voxels that counts as much, and voxels across that count
+ * as few (tests/accuracy/test_effectivity.c, the gear) */
 static const double whole_fill = 0.98, much_cut = 0.1, few_across = 2.5;
-/* hexahedra with all points and tetrahedra of four nodes lock above */
+/* Poisson's ratio above which fully integrated hexahedra and four-node tetrahedra lock */
 static const double locks_above = 0.47;
 
 /* ---- own scene ---- */
 
-/* a moving support stands where it is: its nodes are held, and put in place with the state */
+/* A moving support counts as stationary: its nodes are fixed and positioned with the state. */
 static void hold_led(pal_body_def *def, const pal_config_entry *item)
 {
     if (def->n_support == PAL_SUPPORT_MAX) return;
     if (pal_support_of_effect(item, &def->support[def->n_support])) def->n_support++;
 }
 
-/* what bears on the body but for contact, which the state's loads stand for */
+/* Keeps all force components except contact, which the loads of the state represent. */
 static void keep_forces(pal_body_def *def)
 {
     static const char *const kept[] = {"gravity", "viscous", "penalty", "inflate"};
@@ -101,7 +101,7 @@ static pal_err make_live(pal_estimation *w, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
-/* ---- bodies at rest ---- */
+/* ---- equilibria ---- */
 
 static void say(pal_estimation *w, const char *text)
 {
@@ -128,7 +128,7 @@ static bool nearly_incompressible(const pal_body_def *def)
     return found;
 }
 
-/* the hexahedra that a body of springs does not have; nothing where it is of no voxels */
+/* Finds the hexahedra that a body of springs lacks; none if it has no voxels. */
 static void find_voxels(pal_estimation *w)
 {
     pal_body_def *def = &w->scene->body[0];
@@ -138,7 +138,7 @@ static void find_voxels(pal_estimation *w)
         def->mesh = &w->voxels;
 }
 
-/* share of the volume in voxels that the surface cuts, whose part changes from mesh to mesh in no order */
+/* Share of the volume in cut voxels, whose error changes from mesh to mesh without a definite order. */
 static double cut_share(const pal_hexes *hexes)
 {
     double cut = 0, all = 0;
@@ -161,7 +161,7 @@ static bool is_thin(const pal_tets *tets)
     return min < few_across * tets->edge_m;
 }
 
-/* a mesh or law that cannot be had leaves its part unknown */
+/* a mesh or law that is not available leaves its part of the error unknown */
 static pal_err make_rests(pal_estimation *w)
 {
     const pal_body *body = pal_world_body(w->live, 0);
@@ -189,7 +189,7 @@ static pal_err make_rests(pal_estimation *w)
     if (pal_estimate_stopped(w)) return PAL_ERR_STATE;
     w->cut = !err && cut_share(&def->mesh->hexes) > much_cut;
     w->thin = !err && hexes && is_thin(&def->mesh->tets);
-    /* one that cannot be had tells nothing of the order */
+    /* without it the order is not tested */
     if (!err) (void)pal_rest_solution_coarser(w->coarse.scene, body, NULL, NULL, NULL, &w->coarsest);
     if (pal_estimate_stopped(w)) return PAL_ERR_STATE;
     if (w->skinned) PAL_TRY(pal_display_error_make(&w->fine, &w->coarse, &w->coarsest, &w->shown));

@@ -1,8 +1,8 @@
-/* The estimator's thread and its two crossing points: a state in, when the thread is free and a quarter of a second has
- * gone by, and an estimate out, under a lock that the simulation never takes.
+/* The estimator's thread and its two exchanges. A state goes in when the thread is idle and a quarter of a second
+ * has passed. An estimate comes out under a lock that the simulation never takes.
  *
- * The state's place belongs to the thread while `place` is BUSY and to the simulation while it is FREE; whoever has it
- * hands it over, so neither waits. */
+ * The thread owns the state while `place` is BUSY, the simulation while it is FREE. The owner passes it on, so
+ * neither waits. */
 #include "server/estimate/estimator.h"
 
 #include "server/base/clock.h"
@@ -22,7 +22,7 @@
 
 enum { BUSY, FREE };
 static const uint64_t period_ns = 250000000;
-static const int niceness = 10; /* the simulation goes first */
+static const int niceness = 10; /* the simulation has priority */
 
 static _Atomic int n_thread;
 static _Atomic uint64_t n_made;
@@ -35,25 +35,25 @@ struct pal_estimator {
     sem_t wake;
     _Atomic bool stop, gone;
     _Atomic int place;
-    pal_estimation *work;      /* the thread's */
-    pal_estimate_state *state; /* of work; whose it is says `place` */
+    pal_estimation *work;      /* owned by the thread */
+    pal_estimate_state *state; /* of work; `place` gives its owner */
     pthread_mutex_t lock;
     pal_estimate newest; /* tick 0: none yet */
     bool there, refused;
-    unsigned newest_life; /* in which life of the body; refused: any */
-    /* how often the body has frozen and come back: odd while it is frozen */
+    unsigned newest_life; /* `life` of the body at that time; refused: any */
+    /* how often the body was frozen and reset: odd while frozen */
     _Atomic unsigned life;
     _Atomic uint64_t frozen_tick;
-    unsigned looked_life;     /* of the state; goes with `place` */
-    uint64_t looked_awake;    /* n_awake then; the same */
-    uint64_t newest_awake;    /* of newest; under the lock */
-    _Atomic uint64_t n_awake; /* steps in which the body was awake: these make an estimate old */
-    /* the simulation's own */
+    unsigned looked_life;     /* `life` of the state; owned with the state */
+    uint64_t looked_awake;    /* n_awake of the state; owned with the state */
+    uint64_t newest_awake;    /* of newest; guarded by the lock */
+    _Atomic uint64_t n_awake; /* steps in which the body was awake: these age an estimate */
+    /* owned by the simulation thread */
     uint64_t looked_ns, looked_tick;
     pal_estimate_cost cost[PAL_ESTIMATE_STEPS];
     uint64_t n_cost;
     double step_s;
-    bool slept; /* it has been looked at since it fell asleep */
+    bool slept; /* copied since it fell asleep */
 };
 
 static void publish(pal_estimator *e, const pal_estimate *estimate, bool refused)
@@ -67,7 +67,7 @@ static void publish(pal_estimator *e, const pal_estimate *estimate, bool refused
     atomic_fetch_add_explicit(&n_made, 1, memory_order_relaxed);
 }
 
-/* nothing is known, and why */
+/* an estimate with all values unknown, and the reason */
 static pal_estimate nothing(const char *reason)
 {
     pal_estimate none = {.error_m = NAN,
@@ -122,7 +122,7 @@ static void *estimate(void *user)
 
 static pal_err start(pal_estimator *e, pal_diagnostic *diag)
 {
-    /* signals belong to the thread that waits for them */
+    /* leaves signals to the thread that waits for them */
     sigset_t all, old;
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &old);
@@ -183,7 +183,7 @@ static uint64_t n_awake(const pal_estimator *e)
     return atomic_load_explicit(&e->n_awake, memory_order_relaxed);
 }
 
-/* what the last second's steps took */
+/* copies the times of the last second's steps */
 static void copy_costs(const pal_estimator *e, pal_estimate_state *to)
 {
     uint64_t n = e->n_cost < PAL_ESTIMATE_STEPS ? e->n_cost : PAL_ESTIMATE_STEPS;
@@ -192,7 +192,7 @@ static void copy_costs(const pal_estimator *e, pal_estimate_state *to)
     for (int i = 0; i < to->n_cost; i++) to->cost[i] = e->cost[(e->n_cost - 1 - (uint64_t)i) % PAL_ESTIMATE_STEPS];
 }
 
-/* what was known of a body is over when it freezes; it is another one when it comes back */
+/* A frozen body invalidates what was known; after a reset it counts as a new one. */
 static void note_frozen(pal_estimator *e, const pal_world *world, bool frozen)
 {
     unsigned life = atomic_load_explicit(&e->life, memory_order_relaxed);
@@ -213,7 +213,7 @@ void pal_estimator_observe(pal_estimator *e, const pal_world *world, double step
     if (e->slept || atomic_load_explicit(&fixed, memory_order_relaxed)) return;
     if (atomic_load_explicit(&e->place, memory_order_acquire) != FREE) return;
     uint64_t now = pal_clock_ns(), tick = pal_world_tick(world);
-    /* nothing has moved since */
+    /* unchanged since the last copy */
     if (e->looked_ns && tick == e->looked_tick && isnan(step_ms)) return;
     if (e->looked_ns && now - e->looked_ns < period_ns) return;
     if (!pal_estimate_copy(e->state, world, e->body)) return;
@@ -226,7 +226,7 @@ void pal_estimator_observe(pal_estimator *e, const pal_world *world, double step
     sem_post(&e->wake);
 }
 
-/* n_step: in which the body was awake since the state was looked at */
+/* n_step: awake steps since the state was copied */
 static void grow_old(pal_estimate *e, uint64_t n_step, double step_s)
 {
     e->age_s = (double)n_step * step_s;

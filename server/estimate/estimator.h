@@ -1,56 +1,63 @@
-/* The error of a running body, in parts, while somebody looks.
+/* The error of a running body, in parts, while a client subscribes to it.
  *
- * An estimator has its own thread and worlds. The simulation gives it a copy of its state and loads, at most 4 times a
- * second and only while the estimator is idle. It then solves, beside the running session:
- *   borne           the loads under which the body would rest where it is: the acting loads less inertia and drag
- *                   (d'Alembert), so that a body that swings has an error as well
- *   discretisation  the rest under `borne` on this mesh and on its voxels merged by eights: the largest distance at
- * common nodes over 2^1.5 - 1 (Richardson; for a true order between 1 and 2 that is off by a factor of 0.55 to 1.64).
- * Where a third mesh shows no convergence yet, over 2^1 - 1, and the diagnostic says that the error may be larger: 0.4
- * to 2 times the true error was observed where the other rule gave a fifth. Springs: of finite elements on their
- * voxels. With many cut voxels, or two voxels across, that distance times what a hierarchy of meshes says is left
- * (estimate_hierarchy.h) energy          the same in the energy norm, by the recovery estimator of Zienkiewicz and Zhu
- * on this mesh; about twice too large for tetrahedra of ten nodes model           the largest distance between the rest
- * by the neo-Hookean law and by the body's own; of springs, between their positions and the rest of finite elements
- * (hex8_bbar, corotational); of calibrated springs, to the Richardson limit of these, with no separate part of
- * discretisation time            the steps of the next 0.1 s (12 at most) under constant loads against twice as many of
- * half the length, over 1 - 2^-order of the solver algebraic       the same steps against a solver with a tolerance of
- * 1e-9 Where a surface is displayed through a skin, distances are those at its vertices, by the elements, and the part
- * of discretisation (of springs: model) includes how far the skin is off its elements. Else distances are at nodes. A
- * tool stays where it is, whatever force another mesh needs there: loads of a felt tool are scaled until they press as
- * far (rest_solution.h). All parts are 0 while nothing has moved by more than 1e-9 of the body's size.
+ * An estimator has its own thread and worlds. The simulation gives it a copy of the body's state and loads, at most
+ * 4 times a second and only while the estimator is idle. The estimator then solves, beside the running session:
+ *   borne           The loads under which the present shape is an equilibrium: the acting loads less inertia and
+ *                   drag (d'Alembert). A swinging body therefore has an error estimate as well.
+ *   discretisation  The equilibrium under `borne` on this mesh and on its voxels merged by eights: the largest
+ *                   distance at common nodes over 2^1.5 - 1 (Richardson; for a true order of 1 to 2 this is off by
+ *                   a factor of 0.55 to 1.64). If a third mesh shows no convergence yet, the divisor is 2^1 - 1 and
+ *                   the diagnostic warns of a larger error: 0.4 to 2 times the true error was observed, against a
+ *                   fifth with the other divisor. Springs: of finite elements on their voxels. With many cut
+ *                   voxels, or two voxels across, the distance is scaled by the remaining error that a mesh
+ *                   hierarchy measures (estimate_hierarchy.h).
+ *   energy          The same in the energy norm, by the Zienkiewicz-Zhu recovery estimator on this mesh. About
+ *                   twice too large for tetrahedra of ten nodes.
+ *   model           The largest distance between the equilibria of the neo-Hookean law and of the body's own law.
+ *                   Springs: between their positions and the equilibrium of finite elements (hex8_bbar,
+ *                   corotational). Calibrated springs: to the Richardson limit of the latter, with no separate part
+ *                   for discretisation.
+ *   time            The steps of the next 0.1 s (at most 12) under constant loads against twice as many of half the
+ *                   length, over 1 - 2^-order of the solver.
+ *   algebraic       The same steps against a solver with tolerance 1e-9.
+ * Where a skin displays the surface, distances are taken at its vertices by element interpolation, and the
+ * discretisation part (springs: model) includes the distance of the skin from its elements. Otherwise distances are
+ * taken at nodes. Tools keep their position whatever force another mesh would need: the loads of a haptic tool are
+ * scaled until they press equally far (rest_solution.h). All parts are 0 until something has moved by more than
+ * 1e-9 of the body's size.
  *
- * error_m is the sum of the parts: above the true error where parts have opposite signs, below it where elements lock
- * or a small part is unknown. It is unknown where the discretisation, or of springs the model, is. It is 0.6 to 1.7
- * times the true error where nothing locks (tests/accuracy/test_effectivity.c), and 0.9 to 2.4 times for a ball that a
- * tool presses (tests/net/test_switch_bound.c). Components that are off are off in the estimator's worlds as well; a
- * moving support counts as standing. Of control cells (subdivision_fem) only the parts of time and solver are known; a
- * body that adapts is refused.
+ * error_m is the sum of the parts. It exceeds the true error where parts have opposite signs, and falls short where
+ * elements lock or a small part is unknown. It is unknown if the discretisation part (springs: the model part) is.
+ * It is 0.6 to 1.7 times the true error where nothing locks (tests/accuracy/test_effectivity.c), and 0.9 to 2.4
+ * times for a ball pressed by a tool (tests/net/test_switch_bound.c). Components that are off are also off in the
+ * estimator's worlds. A moving support counts as stationary. For control cells (subdivision_fem) only the time and
+ * algebraic parts are known. An adaptive body is refused.
  *
- * Without an observer there is no thread, no world and no copy. Thread: as said at each function. */
+ * Without a subscriber there is no thread, world or copy. Thread: as stated at each function. */
 #ifndef PAL_ESTIMATE_ESTIMATOR_H
 #define PAL_ESTIMATE_ESTIMATOR_H
 #include "server/estimate/estimate.h"
 
 typedef struct pal_estimator pal_estimator;
-/* Starts the thread of one body of a scene, which is borrowed until close, and returns; meshes and worlds are made on
- * that thread. What cannot be estimated is said in the note of the first estimate. REFUSED: no such body; MEMORY;
- * INTERNAL: no thread. Short enough for [sim]. [any] */
+/* Starts the estimator thread of one body and returns; that thread makes meshes and worlds. Borrows the scene until
+ * close. The diagnostic of the first estimate reports what cannot be estimated. Errors: REFUSED: no such body;
+ * MEMORY; INTERNAL: no thread. Short enough for [sim]. [any] */
 pal_err pal_estimator_open(const pal_scene *scene, int body, pal_diagnostic *diag, pal_estimator **out);
-/* asks the thread to end as soon as it can; never waits. The estimator gives no more estimates. [any] */
+/* Asks the thread to end soon; never waits. The estimator gives no more estimates. [any] */
 void pal_estimator_request_stop(pal_estimator *estimator);
-bool pal_estimator_has_stopped(const pal_estimator *estimator); /* the thread has ended: close does not wait. [any] */
-void pal_estimator_close(pal_estimator *estimator);             /* leaves, joins the thread; NULL is fine */
-/* After every step (step_ms NaN: none was made, as while paused): notes what it took, and copies the state as it is now
- * when the estimator is free and it is time for another one; of a body that sleeps once, until it wakes. Never waits,
- * takes no memory. One thread. [sim] */
+/* true: the thread has ended, so close does not wait. [any] */
+bool pal_estimator_has_stopped(const pal_estimator *estimator);
+void pal_estimator_close(pal_estimator *estimator); /* requests a stop, joins the thread; accepts NULL */
+/* Call after every step; step_ms is its time (NaN: no step was made, for example while paused). Records the time,
+ * and copies the state when the estimator is idle and the next estimate is due. A sleeping body is copied once
+ * until it wakes. Never waits, takes no memory. One thread. [sim] */
 void pal_estimator_observe(pal_estimator *estimator, const pal_world *world, double step_ms);
-/* newest estimate; false: none yet, or none since the body was frozen and reset. While it is frozen: nothing is known,
- * and diag gives the reason. Copies. [any] */
+/* Copies the newest estimate. False: none yet, or none since the body was frozen and reset. While the body is
+ * frozen all values are unknown and diag gives the reason. [any] */
 bool pal_estimator_read(pal_estimator *estimator, pal_estimate *out);
-/* how many threads of estimators there are in this process, and how many estimates they have made, for tests [any] */
+/* number of estimator threads in this process, and of estimates they have made; for tests [any] */
 int pal_estimator_threads(void);
 uint64_t pal_estimator_count(void);
-/* while held no estimator of this process takes another state, so that estimates grow old: for tests [any] */
+/* while `hold` is true no estimator of this process takes a new state, so estimates age; for tests [any] */
 void pal_estimator_pause_all(bool hold);
 #endif

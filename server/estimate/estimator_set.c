@@ -1,4 +1,4 @@
-/* Estimators that come and go with those who look. */
+/* Estimators that open and close with their subscribers. */
 #include "server/estimate/estimator_set.h"
 
 #include <math.h>
@@ -19,7 +19,7 @@ void pal_estimator_set_request(pal_estimator_set *w, int body, bool wanted)
     w->busy = true;
 }
 
-/* opens and leaves what shall be there or shall not; true: something is there or wanted */
+/* Opens and closes the estimator of a body as requested. True: an estimator exists or is wanted. */
 static bool come_and_go(pal_estimator_set *w, int b, pal_diagnostic *diag, bool *failed)
 {
     pal_estimator **e = &w->estimator[b];

@@ -1,8 +1,8 @@
-/* Rests in other meshes: voxels merged by eights, loads and displacements handed over by shape functions.
+/* Equilibria on other meshes: voxels merged by eights, loads and displacements transferred by shape functions.
  *
- * A support that ends between two coarse planes would hold another part of the body, whose error is that of a support
- * moved by a voxel. So the coarse planes of each axis go where the coarse nodes, being held where they are, say best
- * which fine nodes are. */
+ * A support that ends between two coarse planes would fix another part of the body, with the error of a support
+ * moved by one voxel. The planes of each axis are therefore shifted so that the fixed coarse nodes match the fixed
+ * fine nodes best. */
 #include "server/estimate/rest_solution.h"
 
 #include "server/base/vec3.h"
@@ -16,12 +16,12 @@
 #include <string.h>
 
 enum { NEWTON_A_STEP = 3, MAX_STEPS = 30, MIN_HEXES = 4, MORE_PRESSES = 2, MANY_NODES = 4000, MAX_GRADIENTS = 3000 };
-/* near enough in the work of contact; times that its loads are taken more or less at most, in one go */
+/* accepted relative error of the work of contact; largest factor by which contact loads change at once */
 #define SAME_PRESS 0.05
 #define MAX_PART   5.0
 static const double rest_tolerance = 1e-6, drop_fill = 0.25, slack_h = 1e-6;
-/* of E h^2: what is left on a node of a body without loads is the rounding of its places, which no tolerance of loads
- * that are 0 is met by */
+/* Of E h^2: rounding of the positions leaves this residual on a node of an unloaded body. A tolerance relative to
+ * zero loads cannot be met. */
 static const double nothing_left = 1e-11;
 
 /* ---- scene ---- */
@@ -51,7 +51,7 @@ static pal_err make_scene(const pal_scene *scene, const char *element, const cha
     return pal_entry_put_number(&def->solver, "newton", NEWTON_A_STEP, diag);
 }
 
-/* a factor of many nodes takes hundreds of megabytes, and as long as conjugate gradients without one */
+/* a factor for many nodes takes hundreds of megabytes, and as long as conjugate gradients without one */
 static pal_err spare_memory(pal_scene *scene)
 {
     pal_config_entry *solver = &scene->body[0].solver;
@@ -59,7 +59,7 @@ static pal_err spare_memory(pal_scene *scene)
     return pal_entry_put_number(solver, "iterations", MAX_GRADIENTS, NULL);
 }
 
-/* the lowest part as a box where `up` is an axis, so that it is the same part of every mesh */
+/* fixes the lowest part by a box if `up` is an axis, so that every mesh has the same part fixed */
 static void fix_lowest(pal_scene *scene, const pal_body *body)
 {
     pal_body_def *def = &scene->body[0];
@@ -86,7 +86,7 @@ static void fix_lowest(pal_scene *scene, const pal_body *body)
 
 /* ---- coarse meshes ---- */
 
-/* nodes of a voxel mesh by their place on the lattice */
+/* nodes of a voxel mesh by their lattice position */
 typedef struct lattice {
     int n[3];
     double low[3], edge_m;
@@ -118,7 +118,7 @@ static pal_err make_lattice(const pal_tets *tets, lattice *l)
     return PAL_ERR_OK;
 }
 
-/* how wrong the planes of `shift` are about which nodes are held */
+/* mismatch between the fixed nodes and the planes of `shift` */
 static double misheld(const lattice *l, const uint8_t *fixed, int axis, int shift)
 {
     double sum = 0;
@@ -142,7 +142,7 @@ static double misheld(const lattice *l, const uint8_t *fixed, int axis, int shif
     return sum;
 }
 
-/* held: of the fine nodes, by supports alone */
+/* fixed: fine nodes, by supports alone */
 static pal_err choose_shift(const pal_tets *tets, const uint8_t *fixed, int shift[3])
 {
     lattice l = {.node = NULL};
@@ -152,7 +152,7 @@ static pal_err choose_shift(const pal_tets *tets, const uint8_t *fixed, int shif
     return PAL_ERR_OK;
 }
 
-/* which nodes of a mesh the boxes hold */
+/* marks the nodes inside the support boxes */
 static void find_held(const pal_body_def *def, const pal_tets *tets, uint8_t *fixed)
 {
     for (int i = 0; i < tets->n_node; i++) {
@@ -197,7 +197,7 @@ static pal_err merge(pal_rest_solution *r, const pal_prepared *mesh, pal_diagnos
     return err;
 }
 
-/* ---- where the running body's nodes lie ---- */
+/* ---- positions of the running body's nodes ---- */
 
 void pal_element_shape_functions(const pal_body *b, const double local[4], double *shape)
 {
@@ -209,7 +209,8 @@ void pal_element_shape_functions(const pal_body *b, const double local[4], doubl
         memcpy(shape, local, 4 * sizeof *shape);
 }
 
-/* what lies outside is taken where it is nearest: extrapolated, a load would become a pair of large ones */
+/* moves outside points to the nearest inside one: extrapolation would turn a load into a pair of large opposite
+ * ones */
 static void take_inside(const pal_body *b, double local[4])
 {
     double sum = 0;
@@ -246,7 +247,7 @@ static pal_err find_near(pal_rest_solution *r, const pal_body *body)
     return PAL_ERR_OK;
 }
 
-/* ---- doors ---- */
+/* ---- public functions ---- */
 
 static pal_err open_world(pal_rest_solution *r, pal_diagnostic *diag)
 {
@@ -316,13 +317,13 @@ void pal_rest_solution_free(pal_rest_solution *r)
 
 /* ---- rest ---- */
 
-/* of what the state bears the loads of tools, with what of them accelerates the body */
+/* the part of the loads that is due to tools, including its share of the acceleration */
 static void touch_at(const pal_estimate_state *s, int i, double out[3])
 {
     pal_sub3(out, s->borne + 3 * (size_t)i, s->external_force + 3 * (size_t)i);
 }
 
-/* what the state bears, with `part` times the loads of tools in it */
+/* the loads of the state, with the tool loads scaled by `part` */
 static void load_at(const pal_estimate_state *s, double part, int i, double out[3])
 {
     double touch[3];
@@ -368,7 +369,7 @@ static pal_err put_state(pal_rest_solution *r, const pal_estimate_state *state, 
         own->load_cap_N = INFINITY;
     }
     own->frozen = false;
-    /* from scratch after a failure, else from where it was */
+    /* from rest after a failure, otherwise from the previous solution */
     if (!r->known) memcpy(own->x, own->x_rest, 3 * sizeof *own->x * (size_t)own->n_dof);
     for (int i = 0; i < own->n_node && r->n_near == 0; i++)
         if (from || own->support[i])
@@ -427,7 +428,7 @@ static bool find(pal_rest_solution *r, const pal_estimate_state *state, const pa
     return good;
 }
 
-/* work of the loads of tools on the way from rest to x */
+/* work of the tool loads from rest to x */
 static double pressed_J(const pal_estimate_state *s, const pal_body *body, const double *x)
 {
     double sum = 0;
@@ -447,7 +448,7 @@ bool pal_rest_solution_find(pal_rest_solution *r, const pal_estimate_state *stat
     double want_J = pressed_J(state, body, state->x), got_J = pressed_J(state, body, r->x), part = 1, last = 0,
            last_J = 0;
     for (int k = 0; k < MORE_PRESSES && want_J > 0 && got_J > 0 && fabs(got_J / want_J - 1) > SAME_PRESS; k++) {
-        /* without contact what rests under other loads counts for little: the first guess is a line from nothing */
+        /* neglects the displacement by other loads: the first secant passes through zero */
         double slope = (got_J - last_J) / (part - last), next = part + (want_J - got_J) / slope;
         if (!(next > part / MAX_PART && next < part * MAX_PART)) break;
         last = part, last_J = got_J, part = next;

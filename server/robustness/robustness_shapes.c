@@ -1,4 +1,4 @@
-/* Insults to the shape of bodies, to their stiffness and to the step; loads. */
+/* Cases that disturb shapes, stiffness, the step and loads. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/robustness/trial.h"
@@ -10,7 +10,7 @@ typedef enum shape { FLAT, POINT, MIRRORED, SHUFFLED, STRETCHED, BLOWN_UP } shap
 
 static const double return_s = 10, blown_s = 25, springs_s = 4;
 
-/* one free point from where it is */
+/* moves one free point to its disturbed position */
 static void disturb_point(pal_trial *trial, shape how, const double low[3], const double high[3], int flat, double x[3])
 {
     for (int c = 0; c < 3; c++) {
@@ -24,7 +24,7 @@ static void disturb_point(pal_trial *trial, shape how, const double low[3], cons
     }
 }
 
-/* the axis along which the body is thinnest */
+/* axis along which the body is thinnest */
 static int thinnest(const double low[3], const double high[3])
 {
     int axis = 0;
@@ -50,7 +50,7 @@ static void spoil(pal_trial *trial, int b, shape how)
     }
 }
 
-/* tetrahedra turned over; of bodies that have some and whose points are their nodes */
+/* Number of inverted tetrahedra, over the bodies that have tetrahedra on their own points. */
 static int turned_over(const pal_trial *trial)
 {
     int n = 0;
@@ -93,7 +93,7 @@ static void shaped(pal_trial *trial, shape how)
     bool springs = true;
     for (int b = 0; b < trial->scene->n_body; b++) {
         spoil(trial, b, how);
-        /* what recovers and has a guard is judged as all others when it is beyond the guard's reach */
+        /* beyond the reach of its safeguards a body with recovery is judged like any other */
         const bool recovers = pal_world_body(trial->world, b)->recovery != NULL,
                    far = how == BLOWN_UP && guarded(trial, b);
         trial->may_stay[b] = pal_trial_has_springs(trial, b) && !(recovers && far);
@@ -102,7 +102,7 @@ static void shaped(pal_trial *trial, shape how)
     }
     double before = extent(trial);
     pal_trial_positions_set(trial);
-    /* springs that do not recover from inversion need not come back: long enough to see that they are bounded */
+    /* springs without recovery need not return: long enough to see that they stay bounded */
     pal_trial_relax(trial, springs ? springs_s : how == BLOWN_UP ? blown_s : return_s);
     int n = turned_over(trial);
     double after = extent(trial);
@@ -140,7 +140,7 @@ void pal_robustness_blown_up(pal_trial *trial)
     shaped(trial, BLOWN_UP);
 }
 
-/* a NaN in the first body: it alone stops, and comes back alone */
+/* A NaN in the first body: only that body stops, and only it is reset. */
 void pal_robustness_poisoned(pal_trial *trial)
 {
     pal_robustness_result *out = trial->out;
@@ -157,7 +157,7 @@ void pal_robustness_poisoned(pal_trial *trial)
         if (other->frozen || !pal_body_finite(other))
             pal_trial_report(trial, PAL_VERDICT_FAILED, "%s was stopped with it", other->name);
     }
-    if (trial->twin) pal_world_reset(trial->twin), pal_world_reset(trial->world); /* led alike again */
+    if (trial->twin) pal_world_reset(trial->twin), pal_world_reset(trial->world); /* drives both alike again */
     if (pal_world_reset_body(trial->world, 0) || body->frozen || !pal_body_finite(body)) {
         pal_trial_report(trial, PAL_VERDICT_FAILED, "a reset did not bring it back");
         return;
@@ -169,7 +169,7 @@ void pal_robustness_poisoned(pal_trial *trial)
 
 /* ---- loads ---- */
 
-/* the same load on the far node of every body, off the supports; 0: none */
+/* Applies the same load to the far node of every body, off the supports; 0: no load. */
 static void load_all(pal_trial *trial, double force_N, bool of_cap)
 {
     for (int b = 0; b < trial->scene->n_body; b++) {
@@ -180,7 +180,7 @@ static void load_all(pal_trial *trial, double force_N, bool of_cap)
     pal_trial_rebase(trial);
 }
 
-/* of one that adapts the node may go out of use meanwhile: all loads are taken away where they are */
+/* Removes all loads, because the loaded node of an adaptive body may no longer be in use. */
 static void unload_all(pal_trial *trial)
 {
     for (int b = 0; b < trial->scene->n_body; b++) {
@@ -216,7 +216,7 @@ static void long_steps(pal_trial *trial, double times, int n)
         for (int k = 0; k < body->n_active; k++) {
             size_t i = (size_t)pal_body_point(body, k);
             if (body->support[i]) continue;
-            /* a blow that grows with the height */
+            /* an impulse that grows with the height */
             double height = 0, all = 1e-300;
             for (int c = 0; c < 3; c++) {
                 height += up[c] * (body->x[3 * i + (size_t)c] + body->offset_m[c] - low[c]);
@@ -259,7 +259,7 @@ void pal_robustness_longer_step(pal_trial *trial)
 void pal_robustness_stiffer(pal_trial *trial)
 {
     pal_diagnostic reason = {""};
-    trial->out->energy = NAN; /* changing stiffness is work */
+    trial->out->energy = NAN; /* changing the stiffness does work */
     load_all(trial, 0.3, true);
     bool good = pal_trial_run(trial, 0.25);
     for (int b = 0; b < trial->scene->n_body && good; b++) {
@@ -330,7 +330,7 @@ static bool implicit(const pal_trial *trial)
     return true;
 }
 
-/* until a quarter of a second moves nothing by more than 1e-8 S, or a minute */
+/* runs until a quarter of a second moves nothing by more than 1e-8 S, for at most a minute */
 static bool settle_loaded(pal_trial *trial, double *ms)
 {
     const double step = trial->scene->step_s, begin = trial->out->simulated_s;
@@ -348,8 +348,8 @@ static bool settle_loaded(pal_trial *trial, double *ms)
     }
 }
 
-/* Steps while all are asleep, up to ten seconds: looking at energies of thousands of springs that do not move costs a
- * hundred times what such a step does. false: a step was refused */
+/* Steps while all bodies are asleep, up to ten seconds, without the monitor: the energy of thousands of springs
+ * costs a hundred times such a step. False: a step was refused. */
 static bool doze(pal_trial *trial, double until_s)
 {
     const double step = trial->scene->step_s, end = fmin(trial->out->simulated_s + 10, until_s - 2 * step);
@@ -375,7 +375,7 @@ void pal_robustness_hour(pal_trial *trial)
     take_start(trial);
     pal_trial_rebase(trial);
     double room_s = trial->deadline_s - 1e-9 * (double)pal_clock_thread_ns(), begin = trial->out->simulated_s;
-    /* implicit steps may be long: as many as there is time for, of at most ten seconds */
+    /* implicit steps may be long: as many as the time allows, of at most ten seconds each */
     double n = fmax(1, 0.8e3 * fmin(max_plan_s, room_s) / ms),
            dt = implicit(trial) ? fmin(10, fmax(step, HOUR_S / n)) : step;
     double late_s = 1e-9 * (double)pal_clock_thread_ns() + 0.9 * room_s;

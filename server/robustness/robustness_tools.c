@@ -1,4 +1,4 @@
-/* Insults by tools, by numbers that are none, by supports, and by all of it at random. */
+/* Cases with tools, invalid numbers, supports, and random commands that combine them. */
 #include "server/base/vec3.h"
 #include "server/robustness/trial.h"
 #include "server/sim/elements/elastic_hex.h"
@@ -9,10 +9,10 @@
 #include <string.h>
 
 static const double return_s = 10, clamp_S = 0.02;
-/* RMS speed that counts as standing still after supports were switched */
+/* RMS speed that counts as rest after supports were switched */
 static const double still_S_s = 1e-3;
-/* of a node's cap (or the weight): bends a body, and crushes no element as a tenth of the cap, E h^2, does (in a liver
- * of 6 voxels; a beam and one of 8 bear a fifth) */
+/* Share of a node's load cap (or the weight). It bends a body without crushing an element; a tenth of the cap, E
+ * h^2, crushes one (in a liver of 6 voxels; a beam, and a liver of 8, bear a fifth). */
 static const double bend_share = 0.05;
 
 /* ---- tools ---- */
@@ -31,8 +31,8 @@ static void move(pal_trial *trial, int tool, const double at_m[3], bool grasp)
     (void)pal_world_pose(trial->world, tool, &pose);
 }
 
-/* A step in which each of n tools may put in its cap times the clamp of the contact's correction and times its way; a
- * jump is no way: there is only the correction of one step. What was put in may not grow afterwards */
+/* One step. Each of n tools may add its force cap times the contact's correction limit and times its path. A jump
+ * has no path, only the correction of one step. The added energy may not grow afterwards. */
 static bool tool_step(pal_trial *trial, int n, double way_m)
 {
     double size = pal_world_body(trial->world, trial->body)->length_scale_m, before = pal_trial_energy(trial), cap = 0;
@@ -50,7 +50,7 @@ static void let_go(pal_trial *trial)
     for (int t = 0; t < trial->scene->n_tool; t++) (void)pal_world_pose(trial->world, t, NULL);
 }
 
-/* a horizontal axis through the middle of the body that tools touch, its middle and half extents */
+/* Centre and half extents of the body that tools touch; returns a horizontal axis through it. */
 static int middle(const pal_trial *trial, double centre[3], double half[3])
 {
     double low[3], high[3];
@@ -67,7 +67,7 @@ static void release(pal_trial *trial, bool good)
 {
     let_go(trial);
     for (int i = 0; i < 12 && good; i++) good = tool_step(trial, 2, 0);
-    /* what the contacts' last steps gave, or took, is the begin of coming back */
+    /* the energy of the last contact steps is the start of the return */
     pal_trial_exclude_rise(trial, pal_trial_energy(trial));
     trial->base_J = pal_trial_energy(trial);
     if (good) pal_trial_relax(trial, return_s);
@@ -98,7 +98,7 @@ void pal_robustness_teleport(pal_trial *trial)
     for (int i = 0; i < 48 && good; i++) {
         double side = i < 12 || i >= 30 ? 1 : 0;
         pal_copy3(at, centre);
-        /* beside, then by S into and beyond, then back */
+        /* beside the body, then by S into it and beyond, then back */
         at[axis] += side > 0 ? half[axis] + 2 * radius : half[axis] + 2 * radius - body->length_scale_m;
         move(trial, 0, at, false);
         good = tool_step(trial, 1, 0);
@@ -168,7 +168,7 @@ static int bad_material(pal_trial *trial, double number)
         pal_material to = trial->scene->body[0].material;
         double *number_of[4] = {&to.young_Pa, &to.poisson, &to.density_kg_m3, &to.damping_1_s};
         *number_of[at] = number;
-        /* what is huge may be taken where it is no more than heavy or damped: it is put back */
+        /* a huge value may be accepted if it only makes the body heavy or damped: restores it */
         if (pal_world_material(trial->world, 0, &to, NULL)) continue;
         n_taken += !isfinite(number);
         (void)pal_world_material(trial->world, 0, &trial->scene->body[0].material, NULL);
@@ -194,7 +194,7 @@ void pal_robustness_numbers(pal_trial *trial)
     if (n_taken > 0) pal_trial_report(trial, PAL_VERDICT_FAILED, "%d of them were taken", n_taken);
     if (hash != pal_world_hash(trial->world)) pal_trial_report(trial, PAL_VERDICT_FAILED, "the state changed");
     if (n_taken == 0) pal_trial_report(trial, PAL_VERDICT_PASSED, "all refused");
-    /* 1e300 N is a number: it is shortened */
+    /* 1e300 N is a valid number: it is clamped */
     if (!pal_world_load(trial->world, 0, node, (const double[3]){0, 1e300, 0})) {
         bool good = true;
         for (int i = 0; i < 6 && good; i++) good = pal_trial_step(trial, trial->scene->step_s);
@@ -206,7 +206,7 @@ void pal_robustness_numbers(pal_trial *trial)
 
 /* ---- supports ---- */
 
-/* everything in the upper fifth of each body is held instead of what was */
+/* fixes the upper fifth of each body instead of the original supports */
 static void support_top(const pal_trial *trial, pal_scene *scene)
 {
     for (int b = 0; b < scene->n_body; b++) {
@@ -230,8 +230,9 @@ static void support_top(const pal_trial *trial, pal_scene *scene)
     }
 }
 
-/* Energy of a world that has just followed another. Cubes and their split store other energies in one shape: those that
- * ran on their split are looked at on it here too, though only the next step will decide that */
+/* Energy of a world that has just taken over the state of another. Hexahedra and their split store different
+ * energies at the same shape. Those that ran on their split are evaluated on it here too, although only the next
+ * step decides this. */
 static double followed_J(pal_world *next, const pal_world *before)
 {
     double energy = 0;
@@ -248,7 +249,7 @@ static double followed_J(pal_world *next, const pal_world *before)
     return energy;
 }
 
-/* a world made from another scene goes on where this one is */
+/* a world made from another scene continues from the present state */
 static bool go_over(pal_trial *trial, const pal_scene *scene, double *jump)
 {
     pal_world *next = NULL;
@@ -307,7 +308,7 @@ void pal_robustness_supports(pal_trial *trial)
     good = good && go_over(trial, trial->scene, &jump) && pal_trial_run(trial, 0.1);
     free(other);
     if (trial->out->verdict == PAL_VERDICT_SKIPPED) return;
-    /* where it is held is another place now: it has to come to rest, not to come back */
+    /* its supports have moved: it must come to rest, not return */
     const double begin = trial->out->simulated_s, hold_s = 0.25;
     double since_s = 0;
     while (good && since_s < hold_s && trial->out->simulated_s - begin < trial->return_time_s) {
@@ -378,7 +379,7 @@ static void random_order(pal_trial *trial, const double centre[3], double size)
     }
 }
 
-/* as it was: nobody holds anything, loads, brushes and materials are those of the scene */
+/* Restores the scene: releases tools, resets loads, brushes and materials. */
 static void calm(pal_trial *trial)
 {
     let_go(trial);
@@ -397,7 +398,7 @@ void pal_robustness_random(pal_trial *trial)
     (void)middle(trial, centre, half);
     double size = pal_world_body(trial->world, trial->body)->length_scale_m;
     bool good = true;
-    trial->out->energy = NAN; /* orders are work */
+    trial->out->energy = NAN; /* commands do work */
     for (int i = 0; i < STEPS && good; i++) {
         if (pal_trial_random(trial) < 0.5) random_order(trial, centre, size);
         good = pal_trial_step(trial, trial->scene->step_s);

@@ -1,4 +1,4 @@
-/* Runs a robustness case: rest, watched steps, return to rest, verdict. */
+/* Runs a robustness case: rest, monitored steps, return to rest, verdict. */
 #include "server/robustness/robustness.h"
 
 #include "server/base/clock.h"
@@ -16,10 +16,10 @@
 #include <string.h>
 
 static const double back_S = 1e-3, slack = 0.01, central_slack = 0.3, verlet_slack = 0.05;
-static const double still_S_s = 1e-5; /* speed, RMS, that is rest */
+static const double still_S_s = 1e-5; /* RMS speed that counts as rest */
 static const double min_s = 60,
-                    typical_s = 500; /* --seconds by itself: at least, and simulated time it has to reach for */
-/* energy that is nothing to be judged: of what a body weighs (or its node cap) over S */
+                    typical_s = 500; /* default of --seconds: its minimum, and the simulated time it should cover */
+/* energy below this share of the body's weight (or its node load cap) times S is not judged */
 static const double nothing_share = 1e-9;
 
 #define ENERGY_RULE "+ 1 % (verlet 5 %, central_cg 30 %)"
@@ -110,7 +110,7 @@ double pal_trial_random(pal_trial *trial)
 
 /* ---- measures ---- */
 
-/* points that are there in every state of a body: of one that adapts those of its coarsest level */
+/* Points present in every state of a body: for an adaptive body, those of its coarsest level. */
 static int common_points(const pal_body *body)
 {
     return body->active ? body->dofs.levels->n_vertex[0] : body->n_dof;
@@ -131,7 +131,7 @@ static double held_rms(const pal_body *body, const double *rest)
     return sqrt(sum / n);
 }
 
-/* after the best rigid motion */
+/* RMS distance after the best rigid motion */
 static double free_rms(const pal_body *body, const double *rest)
 {
     int n = common_points(body);
@@ -156,7 +156,8 @@ static double free_rms(const pal_body *body, const double *rest)
     return sqrt(sum / n);
 }
 
-/* springs whose shape was taken away, and what its guard has stopped where it may, need not come back by themselves */
+/* Springs whose shape was destroyed, and bodies stopped by their safeguards where the case allows it, need not
+ * return by themselves. */
 static bool excused(const pal_trial *trial, int b)
 {
     return trial->may_stay[b] || (trial->may_stop[b] && trial->stopped[b]);
@@ -178,7 +179,7 @@ double pal_trial_deviation_S(const pal_trial *trial)
     return max;
 }
 
-/* of the bodies that have to come back */
+/* largest deviation of the bodies that must return */
 static double asked_left(const pal_trial *trial)
 {
     double max = 0;
@@ -189,7 +190,7 @@ static double asked_left(const pal_trial *trial)
     return max;
 }
 
-/* of lasting loads since rest, as they act: shortened to the cap */
+/* work of sustained loads since rest, as applied: clamped to the cap */
 static double work_J(const pal_body *body)
 {
     double sum = 0;
@@ -210,7 +211,7 @@ double pal_trial_energy(const pal_trial *trial)
     return sum;
 }
 
-/* cubes and their split store other energies in the same shape: the larger one */
+/* Hexahedra and their split store different energies at the same shape: takes the larger one. */
 static double shape_energy(const pal_trial *trial)
 {
     double now = pal_trial_energy(trial);
@@ -230,7 +231,7 @@ static uint64_t count_splits(const pal_trial *trial)
     uint64_t n = 0;
     for (int b = 0; b < trial->scene->n_body; b++) {
         const pal_body *body = pal_world_body(trial->world, b);
-        /* patches of springs begin and end with no more than there was */
+        /* inverted regions of springs begin and end without added energy */
         if (!body->recovery) n += body->safeguards.n_split;
     }
     return n;
@@ -239,7 +240,7 @@ static uint64_t count_splits(const pal_trial *trial)
 void pal_trial_rebase(pal_trial *trial)
 {
     trial->base_J = shape_energy(trial);
-    trial->n_split = count_splits(trial); /* of a world that was made or reset it begins anew */
+    trial->n_split = count_splits(trial); /* the counter restarts when a world is made or reset */
     trial->allowed_J = 0;
     trial->scale_J = fmax(trial->scale_J, fabs(pal_world_energy_J(trial->world) - trial->rest_J));
 }
@@ -301,7 +302,7 @@ void pal_trial_box(const pal_trial *trial, int b, double low_m[3], double high_m
 
 /* ---- watched steps ---- */
 
-/* every n-th step; when the room is full every second sample goes */
+/* records every n-th step; when the buffer is full, drops every second sample */
 static void sample(pal_trial *trial)
 {
     pal_robustness_result *out = trial->out;
@@ -329,7 +330,7 @@ static void look(pal_trial *trial)
     }
     double energy = pal_world_energy_J(trial->world);
     trial->scale_J = fmax(trial->scale_J, fabs(energy - trial->rest_J));
-    /* cubes and their split store other energies in one shape */
+    /* hexahedra and their split store different energies at the same shape */
     uint64_t n_split = count_splits(trial);
     if (n_split != trial->n_split) pal_trial_exclude_rise(trial, pal_trial_energy(trial));
     trial->n_split = n_split;
@@ -337,7 +338,7 @@ static void look(pal_trial *trial)
     sample(trial);
 }
 
-/* a body stopped that may not, or all of them: no use in going on */
+/* Did a body stop that may not, or have all stopped? */
 static bool halted(const pal_trial *trial)
 {
     int n = 0;
@@ -384,7 +385,7 @@ void pal_trial_relax(pal_trial *trial, double seconds)
         else if (isinf(out->return_s))
             out->return_s = now;
         if (now - out->return_s >= hold_s) break;
-        /* what does not move any more will not come back either */
+        /* what no longer moves will not return either */
         rest_time_s = pal_trial_speed_S_s(trial) <= still_S_s ? rest_time_s + trial->scene->step_s : 0;
         if (rest_time_s > 2 * hold_s) break;
     }
@@ -416,7 +417,7 @@ static double energy_limit(const pal_trial *trial)
     return limit;
 }
 
-/* what was put in less than this is rounding, and a share of it says nothing */
+/* a smaller energy input is rounding, and a share of it is meaningless */
 static double nothing_J(const pal_trial *trial, int b)
 {
     return nothing_share * pal_trial_load_cap_N(trial, b) * pal_world_body(trial->world, b)->length_scale_m;
@@ -425,7 +426,8 @@ static double nothing_J(const pal_trial *trial, int b)
 static void judge(pal_trial *trial)
 {
     pal_robustness_result *out = trial->out;
-    bool judged = !isnan(out->energy) && trial->scale_J > 0 && !trial->twin; /* who leads it does work all the time */
+    /* a driving support does work continuously */
+    bool judged = !isnan(out->energy) && trial->scale_J > 0 && !trial->twin;
     for (int b = 0; b < trial->scene->n_body; b++) trial->scale_J = fmax(trial->scale_J, nothing_J(trial, b));
     out->limit = energy_limit(trial);
     out->energy = judged ? trial->excess_J / trial->scale_J : (double)NAN;
@@ -450,7 +452,7 @@ static void judge(pal_trial *trial)
         pal_trial_report(trial, PAL_VERDICT_FAILED, "%.2g %% S from rest at the end", 100 * asked_left(trial));
 }
 
-/* what was stopped, or stayed where it was, has to come to rest after a reset; the figures of the case are kept */
+/* A body that was stopped or stayed away must be at rest after a reset. Keeps the figures of the case. */
 static void check_reset(pal_trial *trial, double seconds)
 {
     const double max_cpu_s = 10;
@@ -475,7 +477,7 @@ static void check_reset(pal_trial *trial, double seconds)
         pal_trial_report(trial, PAL_VERDICT_FAILED, "%.2g %% S from rest %.0f s after a reset", 100 * left, max_cpu_s);
 }
 
-/* a solid of control cells that was folded has other rests, as elements of one rotation each do: what helps */
+/* A folded subdivision solid has other rest states, as elements with one rotation each do; reports what helps. */
 static bool is_folded(const pal_trial *trial)
 {
     bool away = trial->out->verdict == PAL_VERDICT_FAILED && trial->needs_rest && !trial->has_returned && !trial->late;
@@ -491,7 +493,7 @@ static void advise(pal_trial *trial)
                      central ? ", solver implicit_euler comes back from more" : "");
 }
 
-/* springs whose shape was taken away and that did not find it again by themselves */
+/* springs whose shape was destroyed and that did not recover it by themselves */
 static bool has_collapsed(const pal_trial *trial)
 {
     for (int b = 0; b < trial->scene->n_body; b++)
@@ -537,7 +539,7 @@ static void run_one(pal_trial *trial, const pal_robustness_case *which, double s
     out->took_s = 1e-9 * (double)pal_clock_thread_ns() - begin;
 }
 
-/* ---- all of them ---- */
+/* ---- all cases ---- */
 
 static void look_at_rows(pal_trial *trial)
 {
@@ -594,7 +596,7 @@ static void count(pal_robustness_report *out)
     }
 }
 
-/* processor time for everything: by what a step costs from the pose that was found */
+/* processor time of all cases, from the cost of a step in the rest state */
 static double enough_s(pal_trial *trial)
 {
     enum { PROBE = 10 };
@@ -623,7 +625,7 @@ static pal_err run_all(pal_trial *trial, pal_robustness_report *out)
         if (o->progress && !o->progress(cases[k].name, (double)k / N_CASE, o->user))
             return pal_diagnostic_set(trial->diag, PAL_ERR_STATE, "stopped before the case %s", cases[k].name);
         double left = begin + max_cpu_s - 1e-9 * (double)pal_clock_thread_ns();
-        /* what is short leaves its time to the others; none takes more than a third of what is left */
+        /* short cases leave their time to the others; none takes more than a third of the remainder */
         int n_left = o->only ? 1 : N_CASE - k;
         trial->out = &out->result[out->n++];
         run_one(trial, &cases[k], fmax(0.2, n_left > 3 ? fmin(left / 3, 3 * left / n_left) : left / n_left));

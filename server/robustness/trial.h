@@ -1,41 +1,41 @@
-/* A trial: one robustness case that runs on a world of the scene, is watched step by step and judged. Core of this
- * room; private to it. */
+/* A trial: one robustness case run on a world of the scene, monitored at each step and judged. Core of this room;
+ * private to it. */
 #ifndef PAL_ROBUSTNESS_TRIAL_H
 #define PAL_ROBUSTNESS_TRIAL_H
 #include "server/robustness/robustness.h"
 
 typedef struct pal_trial {
-    pal_scene *scene;        /* the user's, with two tools at least where tools can touch; heap */
-    pal_world *world, *twin; /* twin: an untouched run of a scene that is led; else NULL */
+    pal_scene *scene;        /* the user's, with at least two tools if tools can touch it; heap */
+    pal_world *world, *twin; /* twin: an undisturbed run of a driven scene; otherwise NULL */
     const pal_robustness_options *options;
     pal_diagnostic *diag;        /* of the whole run */
-    double *rest[PAL_BODY_MAX];  /* where the bodies rest          [n_dof][3] */
-    double *start[PAL_BODY_MAX]; /* room for where they are        [n_dof][3] */
+    double *rest[PAL_BODY_MAX];  /* rest positions of the bodies [n_dof][3] */
+    double *start[PAL_BODY_MAX]; /* scratch: present positions [n_dof][3] */
     double rest_J;
-    double return_time_s; /* that bodies have to come back */
-    bool again;           /* rest cannot be put back as positions: it is found again for every case */
-    bool touches;         /* a body has a row that tools push                                         */
+    double return_time_s; /* time allowed for the return */
+    bool again;           /* rest cannot be restored from positions: it is found again for every case */
+    bool touches;         /* a body has a component that tools push */
     int body;             /* the first such body, else 0                                              */
     double deadline_s;    /* processor time at which this case ends */
-    bool late;            /* it was reached                           */
+    bool late;            /* it was reached */
     pal_robustness_result *out;
-    /* energy less the work of lasting loads: since the last change of those it may only fall */
+    /* Energy less the work of sustained loads. It may only fall after the last change of those loads. */
     double base_J, scale_J, excess_J, allowed_J;
-    double excluded_rise_J; /* rises that were not judged, summed */
+    double excluded_rise_J; /* sum of the rises that were not judged */
     uint64_t n_split;
     int n_skip, since;
     uint64_t count;                /* random numbers drawn */
-    bool rests;                    /* the scene does by itself: else nothing can be said about coming back */
-    bool needs_rest, has_returned; /* ... has to come back; all bodies that have to did                    */
+    bool rests;                    /* the scene comes to rest by itself; otherwise the return cannot be judged */
+    bool needs_rest, has_returned; /* the case requires a return; all required bodies have returned */
     bool may_stop[PAL_BODY_MAX], may_stay[PAL_BODY_MAX], stopped[PAL_BODY_MAX]; /* of each body */
     pal_err err;
 } pal_trial;
 
-/* one step, watched; false: stop (a number that is not finite, frozen, late, a step refused) */
+/* Makes one monitored step. False: stop (a value that is not finite, frozen, deadline reached, step refused). */
 bool pal_trial_step(pal_trial *trial, double dt_s);
 bool pal_trial_run(pal_trial *trial, double seconds); /* steps of the scene */
-/* runs until all bodies have been within 0.1 % S of rest for half a second, at most seconds (where 10 or more are
- * given, return_time_s if that is more); sets deviation_S and return_s */
+/* Runs until all bodies have been within 0.1 % S of rest for half a second, at most `seconds` (if that is 10 or
+ * more: at least return_time_s). Sets deviation_S and return_s. */
 void pal_trial_relax(pal_trial *trial, double seconds);
 /* trial_rest.c */
 double pal_trial_return_time_s(const pal_trial *trial);
@@ -47,21 +47,21 @@ bool pal_trial_make_twin(pal_trial *trial);
 bool pal_trial_step_twin(pal_trial *trial, double dt_s);
 double pal_trial_deviation_S(const pal_trial *trial); /* largest RMS from rest of any body over its S */
 double pal_trial_energy(const pal_trial *trial);      /* energy less the work of lasting loads */
-/* loads or shapes have changed from outside: what is there now is what may not grow */
+/* Takes the present energy as the new reference, after loads or shapes were changed from outside. */
 void pal_trial_rebase(pal_trial *trial);
 void pal_trial_positions_set(pal_trial *trial); /* the same after positions were set */
-/* adds a sentence to what happened. A case that fails or does not apply keeps that verdict; PASSED changes none */
+/* Adds a sentence to the diagnostic. A verdict of failed or does not apply is kept. PASSED changes no verdict. */
 void pal_trial_report(pal_trial *trial, pal_verdict verdict, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
-/* a rise to this energy is not judged, but summed up */
+/* Excludes a rise to this energy from judgement and adds it to excluded_rise_J. */
 void pal_trial_exclude_rise(pal_trial *trial, double energy_J);
 double pal_trial_random(pal_trial *trial);                /* in (0, 1) */
-int pal_trial_far_node(const pal_trial *trial, int body); /* in use and farthest from what is held */
+int pal_trial_far_node(const pal_trial *trial, int body); /* in use and farthest from the fixed nodes */
 void pal_trial_box(const pal_trial *trial, int body, double low_m[3],
-                   double high_m[3]);                         /* of the nodes now, scene frame */
+                   double high_m[3]);                         /* of the present nodes, scene frame */
 bool pal_trial_has_springs(const pal_trial *trial, int body); /* it is of model tet_springs */
 double pal_trial_load_cap_N(const pal_trial *trial,
-                            int body); /* load_cap_N, or what its weight would be where that is less */
+                            int body); /* load_cap_N, or the weight of the body if that is smaller */
 
 typedef struct pal_robustness_case {
     const char *name, *what, *criterion;

@@ -1,4 +1,4 @@
-/* Where the rig's scene rests, and where it would be untouched when it never does. */
+/* The rest state of a trial's scene, and the undisturbed run that replaces it for a driven scene. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/robustness/trial.h"
@@ -8,12 +8,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double still_S_s = 1e-5; /* speed, RMS, that is rest */
+static const double still_S_s = 1e-5; /* RMS speed that counts as rest */
 static const double settle_max_s = 30;
 static const double return_s = 10, longest_s = 120, n_period = 10;
-static const double lead_s = 0.5; /* that a led scene is on its way before a case */
+static const double lead_s = 0.5; /* time that a driven scene runs before a case */
 
-/* RMS speed of the fastest body over its S, 1/s */
+/* largest RMS speed of a body over its S, 1/s */
 double pal_trial_speed_S_s(const pal_trial *trial)
 {
     double max = 0;
@@ -32,19 +32,18 @@ double pal_trial_speed_S_s(const pal_trial *trial)
 
 /* ---- rest ---- */
 
-/* how long bodies have to come back, s: ten of the slowest periods, no less than 10 s, no more
- * than two minutes */
+/* Time allowed for the return, s: ten of the slowest periods, at least 10 s, at most two minutes. */
 double pal_trial_return_time_s(const pal_trial *trial)
 {
     double max = 0;
     pal_preflight *look = malloc(sizeof *look);
     if (look && !pal_preflight_run(trial->scene, PAL_PREFLIGHT_FULL, look, NULL))
-        for (int b = 0; b < look->n_body; b++) max = fmax(max, look->body[b].slowest_period_s); /* of NaN the other */
+        for (int b = 0; b < look->n_body; b++) max = fmax(max, look->body[b].slowest_period_s); /* fmax ignores NaN */
     free(look);
     return fmax(return_s, fmin(longest_s, n_period * max));
 }
 
-/* runs until nothing moves; false: it still does */
+/* Runs until nothing moves. False: it still does. */
 bool pal_trial_settle(pal_trial *trial, double *took_s)
 {
     const double step = trial->scene->step_s;
@@ -67,9 +66,9 @@ void pal_trial_save(pal_trial *trial, double **to)
     trial->rest_J = pal_world_energy_J(trial->world);
 }
 
-/* ---- a scene that is led for ever ---- */
+/* ---- a driven scene ---- */
 
-/* one step of the untouched run; false: it cannot follow, and nothing can be said any more */
+/* Makes one step of the undisturbed run. False: it cannot follow, so nothing can be judged any more. */
 bool pal_trial_step_twin(pal_trial *trial, double dt_s)
 {
     if (!trial->twin) return true;
@@ -83,7 +82,7 @@ bool pal_trial_step_twin(pal_trial *trial, double dt_s)
     return true;
 }
 
-/* both worlds anew, and both on their way for a while */
+/* makes both worlds again and runs both for a while */
 static bool begin_twin(pal_trial *trial)
 {
     pal_world *twin = NULL;
@@ -96,7 +95,7 @@ static bool begin_twin(pal_trial *trial)
     return true;
 }
 
-/* it did not come to rest: is it because something leads it? Then an untouched run beside it says where it should be */
+/* If the scene did not come to rest because a support drives it, makes an undisturbed run as the reference. */
 bool pal_trial_make_twin(pal_trial *trial)
 {
     bool led = false;
@@ -105,7 +104,7 @@ bool pal_trial_make_twin(pal_trial *trial)
     return led && !pal_world_create(trial->scene, NULL, &trial->twin);
 }
 
-/* the scene at rest, as if nothing had been: a new world, as solvers keep factors of what they have seen */
+/* Restores the scene at rest in a new world, because solvers keep factors of earlier states. */
 bool pal_trial_back_to_rest(pal_trial *trial)
 {
     double took_s;

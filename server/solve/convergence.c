@@ -1,8 +1,8 @@
-/* Resolutions one after another; displacements at fixed points are kept from one to the next.
+/* Solves the resolutions in turn and compares displacements at fixed points.
  *
- * Richardson's order is found by bisection, for meshes whose h is in no fixed ratio: (h0^p - h1^p) / (h1^p - h2^p)
- * grows with p when h0 > h1 > h2. It holds for the size of a change, not for the change itself; where errors of two
- * kinds cancel (cut voxels beside their interior) no p fits, and the number is left out rather than guessed. */
+ * Richardson's order is found by bisection, for meshes whose h has no fixed ratio: (h0^p - h1^p) / (h1^p - h2^p)
+ * grows with p if h0 > h1 > h2. It applies to the magnitude of a change, not to the change itself. Where errors of
+ * two kinds cancel (cut voxels and their interior), no p fits and no order is reported. */
 #include "server/solve/convergence.h"
 
 #include "server/base/vec3.h"
@@ -48,7 +48,7 @@ void pal_convergence_orders(pal_convergence_point *point, int n)
     }
 }
 
-/* where displacements are compared: the samples, or vertices of the surface; frame of the problem */
+/* where displacements are compared: at the samples, or at vertices of the surface; frame of the problem */
 static pal_err choose_points(const pal_surface *surface, const pal_samples *samples, double **x, int *n_out)
 {
     int n = samples ? samples->n : surface->n_vertex, step = samples ? 1 : (n + POINTS_MAX - 1) / POINTS_MAX;
@@ -60,7 +60,8 @@ static pal_err choose_points(const pal_surface *surface, const pal_samples *samp
     return PAL_ERR_OK;
 }
 
-/* displacements into u [n][3], what they differ from `before` [n][3] (NULL: nothing) and from the samples into out */
+/* Writes displacements to u [n][3], and their differences from `before` [n][3] (NULL: none) and from the samples to
+ * out. */
 static void compare(const pal_solution *s, const double *x, int n, const pal_samples *samples, const double *before,
                     double *u, pal_convergence_point *out)
 {

@@ -1,13 +1,13 @@
 /* Voxels, supports and nodal loads of a case.
  *
- * Voxels that the surface cuts count by their filled share, spread over the whole voxel. That is right in volume and
- * too stiff in bending, since the spread reaches beyond the surface. Dropping the voxels that are less than a quarter
- * full takes most of it back (gear of ../shared/reference, linear, 20, 30, 40 voxels: RMS 1.95, 1.63, 1.09 % against
- * 5.05, 3.53, 2.28 % with all of them). Where a flat side lies so that more than 2.5 % of the volume would go, they are
- * kept (a beam that loses a layer of 0.24 voxels of 4 bends by a fifth more).
+ * A voxel cut by the surface is scaled by its filled share, spread over the whole voxel. The volume is then right,
+ * but the voxel is too stiff in bending, because the spread reaches beyond the surface. Dropping voxels less than a
+ * quarter full removes most of this error (gear of ../shared/reference, linear, 20, 30, 40 voxels: RMS 1.95, 1.63,
+ * 1.09 %, against 5.05, 3.53, 2.28 % with all of them). They are kept where a flat side lies so that more than 2.5
+ * % of the volume would be lost (a beam that loses a layer of 0.24 voxels of 4 bends by a fifth more).
  *
- * Dead loads stand at nodes as the consistent forces of the shape functions, integrated over the surface that the
- * region selects (not over the voxels' faces), so that their sum is exact whatever the mesh. */
+ * Dead loads are the consistent nodal forces of the shape functions, integrated over the surface that the region
+ * selects, not over the voxel faces. Their sum is therefore exact on every mesh. */
 #include "server/solve/load_case.h"
 
 #include "server/base/vec3.h"
@@ -19,7 +19,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* cut voxels with less are dropped; as long as no more of the volume goes than ...; else; and without fill */
+/* fill below which cut voxels are dropped; the largest volume that may be lost by it; the limits otherwise; and
+ * without fill */
 static const double drop_fill = 0.25, max_missing = 0.025, keep_fill = 0.02, whole_fill = 0.5;
 
 pal_box_text pal_box_describe(const pal_box *box)
@@ -47,8 +48,8 @@ double pal_case_tolerance_m(const pal_tets *tets)
 
 /* ---- voxels ---- */
 
-/* Planes of the grid go through the border of the first support (else material) that cuts the body on an axis: where
- * what is held ends within a voxel, the error is that of a support moved by up to a voxel. */
+/* Aligns grid planes with the border of the first support (else material) that cuts the body on an axis. A support
+ * that ends within a voxel has the error of one moved by up to a voxel. */
 static void align(const pal_problem *p, int resolution, const pal_surface *surface, double ahead[3])
 {
     double low[3], high[3], longest = 0;
@@ -70,7 +71,7 @@ static void align(const pal_problem *p, int resolution, const pal_surface *surfa
     }
 }
 
-/* share of the surface's volume that the filled voxels miss */
+/* share of the surface's volume that the filled voxels lack */
 static double missing(const pal_prepared *mesh)
 {
     double sum = 0, cube = mesh->tets.edge_m * mesh->tets.edge_m * mesh->tets.edge_m;
@@ -78,7 +79,7 @@ static double missing(const pal_prepared *mesh)
     return 1 - sum / fabs(pal_surface_volume(&mesh->surface));
 }
 
-/* what no support holds is left out, as where a scene is made ready (mesh/volume/loose_components.h) */
+/* drops components without a support, as in the preparation of a scene (mesh/volume/loose_components.h) */
 static pal_err drop_loose(const pal_problem *p, pal_prepared *mesh, pal_diagnostic *diag)
 {
     const pal_tets *tets = &mesh->tets;
@@ -156,7 +157,7 @@ int pal_case_shape_functions(const pal_body *body, int element, const double loc
     return n_corner;
 }
 
-/* one load on its way to the nodes */
+/* one load being applied to the nodes */
 typedef struct job {
     const pal_problem *problem;
     const pal_problem_case *load_case;

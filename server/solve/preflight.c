@@ -1,5 +1,5 @@
-/* Limits, weak places, conditioning and cost of a scene at rest. K is applied by differences of the forces, so that any
- * row counts, whatever it is made of. */
+/* Limits, weak spots, conditioning and cost of a scene at rest. K is applied by differences of the forces, so that
+ * every component counts, whatever its kind. */
 #include "server/solve/preflight.h"
 
 #include "server/base/vec3.h"
@@ -20,13 +20,13 @@ typedef struct probe {
     pal_body *body;
     pal_component force[32];
     int n_force;
-    double way_m; /* of the differences */
+    double way_m; /* displacement of the differences */
     double *x, *low;
     bool failed;
     int max_cg; /* iterations for each axis of the slowest motion */
 } probe;
 
-/* ---- places ---- */
+/* ---- weak spots ---- */
 
 static void weak(pal_weak_spot *w, int index, double value, const double at[3], const pal_body *body)
 {
@@ -41,7 +41,7 @@ static void middle(const double *x, const int32_t *corner, int n, double at[3])
     for (int c = 0; c < n; c++) pal_axpy3(at, 1.0 / n, x + 3 * (size_t)corner[c]);
 }
 
-/* edges of an element of n corners that all hang together */
+/* edges of an element of n corners, all connected to each other */
 static void look_at_edges(const pal_body *body, const double *x, const int32_t *corner, int n, pal_preflight_body *out,
                           double *mean2)
 {
@@ -72,7 +72,7 @@ static double shape_of(const double *x, const int32_t *corner, int n, double mea
     return sqrt(2) * fabs(pal_dot3(g, c)) / (mean2 * sqrt(mean2));
 }
 
-/* volumes: springs keep the volumes of tetrahedra */
+/* volumes: the body has springs that preserve the volume of tetrahedra */
 static void look_at_elements(const pal_body *body, bool volumes, pal_preflight_body *out)
 {
     const pal_tets *tets = body->interpolation ? NULL : body->tets;
@@ -111,7 +111,7 @@ static void look_at_masses(const pal_body *body, pal_preflight_body *out)
     }
 }
 
-/* the node whose stiffness asks for the shortest sub-step, by the rows' own bounds */
+/* finds the node that requires the shortest sub-step, by the bounds of the components */
 static bool find_limit_node(const probe *p, pal_preflight_body *out)
 {
     const pal_body *body = p->body;
@@ -132,7 +132,7 @@ static bool find_limit_node(const probe *p, pal_preflight_body *out)
 
 /* ---- conditioning ---- */
 
-/* forces of the rows at rest + way v, pulled back to the points */
+/* forces of the components at rest + way v, assembled to the points */
 static void force_at(probe *p, const double *v, double way_m, double *out)
 {
     pal_body *body = p->body;
@@ -208,7 +208,7 @@ static double fast(probe *p, double *room)
     return sqrt(l.ritz);
 }
 
-/* Rayleigh quotient of the shape under a weight along each axis: the lowest */
+/* smallest Rayleigh quotient of the shapes under a weight along each axis */
 static double slow(probe *p, double *room)
 {
     const pal_body *body = p->body;
@@ -247,7 +247,7 @@ static bool look_at_modes(probe *p, pal_preflight_body *out)
     memcpy(p->x, body->x, n * sizeof(double));
     out->omega_max_1_s = out->n_fixed < body->n_active ? fast(p, room) : (double)NAN;
     out->omega_min_1_s = out->n_fixed > 0 && out->n_fixed < body->n_active ? slow(p, room) : (double)NAN;
-    /* anchors hold a body too, but its own weight says so only when it is there */
+    /* anchors fix a body too, but the weight loads them only where gravity is present */
     out->condition = out->omega_max_1_s * out->omega_max_1_s / (out->omega_min_1_s * out->omega_min_1_s);
     out->slowest_period_s = 2 * M_PI / out->omega_min_1_s;
     memcpy(body->x, p->x, n * sizeof(double));
@@ -258,8 +258,7 @@ static bool look_at_modes(probe *p, pal_preflight_body *out)
 
 /* ---- cost ---- */
 
-/* ns of a row for one evaluation, from what `palpate bench` measured on the machine of README's tables; NaN: not known
- */
+/* ns of a component for one evaluation, measured by `palpate bench` on the machine of README's tables; NaN: unknown */
 static double component_ns(const pal_body *body, const char *name)
 {
     const double n_tet = body->tets ? body->tets->n_tet : 0, n_spring = body->dofs.n_spring;
@@ -278,8 +277,8 @@ static double component_ns(const pal_body *body, const char *name)
 }
 
 /* A step under load. Explicit: forces and one pass over the points for every sub-step, four of each with rk4, the
- * masses' conjugate gradients with central_cg. Implicit: four iterations, each an application of the rows and two
- * passes through the factor, and forces, stiffness and energy around them */
+ * conjugate gradients of the mass matrix with central_cg. Implicit: four iterations, each with one application of
+ * the components and two passes through the factor, plus forces, stiffness and energy. */
 static double predict_ms(const probe *p, const pal_body *body, int n_sub, int b)
 {
     double forces = 0, solve = 0;
@@ -305,7 +304,7 @@ static double predict_ms(const probe *p, const pal_body *body, int n_sub, int b)
 
 /* ---- elements that lock ---- */
 
-/* tests/stability, case poisson_static; below it full integration is within some percent */
+/* Poisson's ratio; with less, full integration is within some percent (tests/stability, case poisson_static) */
 static const double locks_above = 0.47;
 
 static void look_for_locking(const pal_body_def *def, pal_preflight_body *out)
@@ -329,7 +328,7 @@ static void look_for_locking(const pal_body_def *def, pal_preflight_body *out)
     out->instead = def->mesh->hexes.n_hex > 0 ? "hex8_bbar" : "tet10";
 }
 
-/* ---- all ---- */
+/* ---- whole scene ---- */
 
 static pal_err look_at_body(pal_world *world, const pal_scene *scene, int b, int max_cg, pal_preflight_body *out)
 {

@@ -1,5 +1,5 @@
-/* CSV of sample points, read line by line: six columns whose names are checked, so that a file with its columns in
- * another order is refused and not compared. Numbers by strtod in the C locale, which the commands never leave. */
+/* CSV of sample points, read line by line. The names of the six columns are checked, so a file with another column
+ * order is refused. Numbers are read by strtod in the C locale, which the commands never change. */
 #include "server/solve/sample_points.h"
 
 #include "server/base/vec3.h"
@@ -15,7 +15,7 @@ static const char *const column_name[COLUMNS] = {"x", "y", "z", "ux", "uy", "uz"
 
 typedef struct csv {
     const char *name;
-    const char *at, *end; /* of this line, without its end */
+    const char *at, *end; /* the current line, without its end */
     int line;
     pal_diagnostic *diag;
 } csv;
@@ -25,7 +25,7 @@ static bool is_blank(char c)
     return c == ' ' || c == '\t';
 }
 
-/* takes the next line; false: none */
+/* advances to the next line; false: none */
 static bool next_line(csv *c, const char **rest, const char *last)
 {
     const char *from = *rest;
@@ -40,7 +40,7 @@ static bool next_line(csv *c, const char **rest, const char *last)
     return true;
 }
 
-/* takes a cell of the line into word, without blanks around it and cut; false: the line has no further cell */
+/* Copies a cell of the line to word, trimmed and truncated. False: no further cell. */
 static bool next_cell(csv *c, char word[WORD])
 {
     if (!c->at) return false;
@@ -55,7 +55,7 @@ static bool next_cell(csv *c, char word[WORD])
     return true;
 }
 
-/* a cell as it may be printed */
+/* a cell in printable form */
 static const char *shown(char word[WORD])
 {
     size_t n = 0;
@@ -139,7 +139,7 @@ pal_err pal_samples_parse(const char *name, const uint8_t *bytes, size_t n_byte,
     csv c = {.name = name, .diag = diag};
     pal_samples made = {0};
     const char *text = (const char *)bytes;
-    /* a mark that spreadsheets put in front */
+    /* byte order mark, written by spreadsheets */
     if (n_byte >= 3 && !memcmp(text, "\xef\xbb\xbf", 3)) text += 3;
     pal_err err = read_all(&c, text, (const char *)bytes + n_byte, &made);
     if (err)

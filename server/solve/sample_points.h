@@ -1,5 +1,5 @@
-/* Sample points with displacements, and the error measure over them. CSV: the header line "x,y,z,ux,uy,uz", then one
- * row of six numbers a point, m; blanks around a number and blank lines are fine. [load] */
+/* Sample points with displacements, and the error measure over them. CSV: the header line "x,y,z,ux,uy,uz", then
+ * one row of six numbers per point, m. Blanks around a number and blank lines are allowed. [load] */
 #ifndef PAL_SOLVE_SAMPLE_POINTS_H
 #define PAL_SOLVE_SAMPLE_POINTS_H
 #include "server/base/err.h"
@@ -11,16 +11,16 @@ typedef struct pal_samples {
     double *x, *u; /* heap [n][3] each, m */
 } pal_samples;
 
-/* at most 256 MiB. REFUSED names file, line and column: another header, a missing or extra column, no number, no rows;
- * IO, BUDGET, MEMORY */
+/* At most 256 MiB. Errors: REFUSED (names file, line and column): another header, a missing or extra column, not a
+ * number, no rows; IO, BUDGET, MEMORY. */
 pal_err pal_samples_read(const char *path, pal_samples *out, pal_diagnostic *diag);
-/* the same from memory; name is used in messages only */
+/* The same from memory; name appears in messages only. */
 pal_err pal_samples_parse(const char *name, const uint8_t *bytes, size_t n_byte, pal_samples *out,
                           pal_diagnostic *diag);
-/* every number with as many digits as give it back exactly; whole file or none; IO, MEMORY */
+/* Writes enough digits to restore each number exactly; the whole file or none. Errors: IO, MEMORY. */
 pal_err pal_samples_write(const pal_samples *samples, const char *path, pal_diagnostic *diag);
-void pal_samples_free(pal_samples *samples); /* a zeroed struct is fine */
-/* sqrt(mean |u - ref|^2) / max |ref| and max |u - ref| / max |ref|, in per cent; u [n][3]; infinite when the reference
- * is zero everywhere and u is not */
+void pal_samples_free(pal_samples *samples); /* accepts a zeroed struct */
+/* sqrt(mean |u - ref|^2) / max |ref| and max |u - ref| / max |ref|, in per cent; u [n][3]. Infinite if the
+ * reference is zero everywhere and u is not. */
 void pal_samples_error(const pal_samples *reference, const double *u, double *rms_percent, double *max_percent);
 #endif

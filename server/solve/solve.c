@@ -1,8 +1,8 @@
-/* A load case through the product's own pipeline: the same voxels, model and world that a live scene has, with the
- * solver static_newton.
+/* Solves a load case through the pipeline of a live scene: the same voxels, model and world, with the solver
+ * static_newton.
  *
- * Moved supports: their nodes are set to rest + move in steps of at most half a voxel, each of them solved, so that no
- * element is turned inside out on the way. */
+ * Moved supports: their nodes are set to rest + move in steps of at most half a voxel. Each step is solved, so that
+ * no element inverts on the way. */
 #include "server/solve/solve.h"
 
 #include "server/base/clock.h"
@@ -20,7 +20,7 @@
 #include <string.h>
 
 enum { NEWTON_A_STEP = 4, MAX_NEWTON = 400, MAX_RAMP = 40 };
-static const double lab_step_s = 1.0 / 60; /* a static solver has no use for it */
+static const double lab_step_s = 1.0 / 60; /* not used by a static solver */
 
 struct pal_solution {
     pal_prepared mesh;
@@ -31,7 +31,7 @@ struct pal_solution {
     const char *element;
 };
 
-/* what every function of one solve reads */
+/* input of every function of one solve */
 typedef struct job {
     const pal_problem *problem;
     const pal_problem_case *load_case;
@@ -48,7 +48,7 @@ static bool say(const job *j, const char *what, double fraction)
 
 /* ---- scene ---- */
 
-/* material `index` with what the options say in its place */
+/* material `index` with the replacements of the options */
 static pal_err material_of(const job *j, int index, pal_material *out)
 {
     const pal_problem_material *m = &j->problem->material[index];
@@ -92,7 +92,7 @@ static pal_err set_materials(const job *j, pal_body_def *body)
     return PAL_ERR_OK;
 }
 
-/* no voxel may be without material */
+/* every voxel must have a material */
 static pal_err check_covered(const job *j)
 {
     const pal_problem *p = j->problem;
@@ -183,7 +183,7 @@ static pal_err set_loads(const job *j)
 
 /* ---- solving ---- */
 
-/* nodes of moved supports at rest + share * move; later supports win */
+/* moves the nodes of moved supports to rest + share * move; later supports win */
 static void move_supports(const job *j, double share)
 {
     pal_body *b = j->s->body;
@@ -208,7 +208,7 @@ static int count_ramp(const job *j)
     return n > MAX_RAMP ? MAX_RAMP : (int)n;
 }
 
-/* steps the world until its solver has met the tolerance */
+/* steps the world until its solver meets the tolerance */
 static pal_err converge(const job *j, double fraction)
 {
     int max = j->options->max_newton > 0 ? j->options->max_newton : MAX_NEWTON;
@@ -246,7 +246,7 @@ static pal_err solve(const job *j)
     return PAL_ERR_OK;
 }
 
-/* what the solver says it spent on assembling and factoring since load, into the result; returns the sum */
+/* Writes the solver's time for assembly and factorisation since loading to the result; returns the sum. */
 static double factored(const job *j)
 {
     pal_solve_report report;
@@ -270,9 +270,9 @@ static void sum_up(const job *j)
     r->energy_J = pal_world_energy_J(j->s->world);
 }
 
-/* ---- doors ---- */
+/* ---- public functions ---- */
 
-/* of the material: each element's by its filled share */
+/* volume of the material: each element by its filled share */
 static double volume_of(const pal_solution *s)
 {
     const pal_body *b = s->body;
@@ -381,7 +381,7 @@ pal_err pal_solution_csv(const pal_solution *s, const char *path, pal_diagnostic
     return err;
 }
 
-/* von Mises stress at the nodes: what the elements around a node measure, by volume */
+/* von Mises stress at the nodes: volume-weighted mean over the elements around a node */
 static void measure(const pal_solution *s, double *stress_Pa, double *volume_m3)
 {
     const pal_body *b = s->body;

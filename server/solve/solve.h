@@ -8,18 +8,21 @@
 typedef struct pal_solve_options {
     const char *element; /* "hex8_bbar" | "hex8" | "tet4" | "tet10"                       */
     const char *law;     /* "linear" | "corotational" | "neo_hookean"                     */
-    int resolution;      /* voxels on the longest axis                                   */
-    bool fill;           /* scale cut voxels by their filled share; false: voxels at least half filled, whole */
-    double min_fill;     /* cut voxels with less inside are dropped; 0: with fill 0.25, or 0.02 where that would lose
-                              2.5 % of the volume; without fill 0.5 */
-    bool align;          /* shift the voxels so that their faces lie on the border of a support that cuts the body */
-    int split;           /* each voxel is solved as split^3 of its fill: the border's error apart; 0: 1          */
-    double tolerance;    /* of the residual, relative to the loads; 0: 1e-8               */
-    int max_newton;      /* NUMERIC beyond this many Newton iterations; 0: 400            */
-    const char *linear;  /* "direct" | "pcg"; NULL: the solver chooses                      */
-    bool inertia_relief; /* a body without supports: loads are balanced by its inertia; false: refused */
-    double young_Pa, poisson; /* in place of the problem's only material; NaN: do not            */
-    /* [load] called between iterations; false stops with STATE. May be NULL */
+    int resolution;      /* voxels on the longest axis */
+    /* scale cut voxels by their filled share; false: keep voxels at least half filled, as full ones */
+    bool fill;
+    /* cut voxels with a smaller share are dropped; 0: with fill 0.25, or 0.02 where that would lose 2.5 % of the
+     * volume; without fill 0.5 */
+    double min_fill;
+    bool align; /* shift the voxels so that their faces lie on the border of a support that cuts the body */
+    /* each voxel is solved as split^3 voxels of its fill, which separates the element error from the border's; 0: 1 */
+    int split;
+    double tolerance;         /* of the residual, relative to the loads; 0: 1e-8 */
+    int max_newton;           /* NUMERIC after this many Newton iterations; 0: 400 */
+    const char *linear;       /* "direct" | "pcg"; NULL: chosen automatically */
+    bool inertia_relief;      /* a body without supports: its inertia balances the loads; false: refused */
+    double young_Pa, poisson; /* replace those of the problem's only material; NaN: unchanged */
+    /* [load] Called between iterations. False stops with STATE. May be NULL. */
     bool (*progress)(const char *what, double fraction, void *user);
     void *user;
 } pal_solve_options;
@@ -28,29 +31,30 @@ typedef struct pal_solve_result {
     int n_node, n_element, n_dof, n_newton, n_cg;
     int n_fixed; /* nodes in supports                                         */
     double residual;
-    double prepare_s, assemble_s, factor_s, solve_s, total_s; /* solve_s: Newton without assembling and factoring */
+    double prepare_s, assemble_s, factor_s, solve_s, total_s; /* solve_s: Newton without assembly and factorisation */
     double edge_m;                     /* voxel edge                                                */
-    double volume_m3;                  /* of the material, by fill                                   */
+    double volume_m3;                  /* of the material, by fill */
     double load_N[3];                  /* sum of all loads                                           */
-    double area_m2[PAL_PROBLEM_LOADS]; /* that each traction found                      */
-    double reaction_N[3];              /* of the supports on the body; zero: free                    */
+    double area_m2[PAL_PROBLEM_LOADS]; /* area that each traction acts on */
+    double reaction_N[3];              /* of the supports on the body; zero: free */
     double work_J;                     /* f . u                                                      */
     double energy_J;                   /* elastic                                                    */
     double max_m;                      /* largest displacement of a node                             */
-    bool clamped;                      /* a Poisson ratio above 0.4999 was taken as 0.4999           */
+    bool clamped;                      /* a Poisson ratio above 0.4999 was replaced by 0.4999 */
 } pal_solve_result;
 
 typedef struct pal_solution pal_solution; /* owns mesh and world */
-/* NUMERIC: no convergence (note says how far it came); REFUSED names entry and numbers: a load region that meets no
- * surface, a point outside the body, an empty support, no support, a point of no material; MEMORY. The result is filled
- * as far as it got */
+/* Solves the load case. The result is filled as far as the solve went. Errors: NUMERIC: no convergence (diag gives
+ * the progress); REFUSED (names entry and numbers): a load region that meets no surface, a point outside the body,
+ * an empty support, no support, a point of no material; MEMORY. */
 pal_err pal_solve(const pal_problem *problem, const pal_problem_case *load_case, const pal_surface *surface,
                   const pal_solve_options *options, pal_solution **out, pal_solve_result *result, pal_diagnostic *diag);
-void pal_solution_free(pal_solution *solution); /* NULL is fine */
-/* displacement of the material point x (frame of the problem), through the shape functions of its element (or of the
- * nearest one, extrapolated) */
+void pal_solution_free(pal_solution *solution); /* accepts NULL */
+/* Displacement of the material point x (frame of the problem), by the shape functions of its element (or of the
+ * nearest one, extrapolated). */
 void pal_solution_at(const pal_solution *solution, const double x[3], double u[3]);
-/* legacy VTK (unstructured grid, displacement, von Mises stress) and CSV x,y,z,ux,uy,uz of all nodes; IO, MEMORY */
+/* Legacy VTK (unstructured grid, displacement, von Mises stress) and CSV x,y,z,ux,uy,uz of all nodes. Errors: IO,
+ * MEMORY. */
 pal_err pal_solution_vtk(const pal_solution *solution, const char *path, pal_diagnostic *diag);
 pal_err pal_solution_csv(const pal_solution *solution, const char *path, pal_diagnostic *diag);
 #endif

@@ -1,4 +1,4 @@
-/* Voxels split into equal parts, by way of the grid that they came from. */
+/* Splits voxels into equal parts on the grid they came from. */
 #include "server/solve/voxel_refinement.h"
 
 #include <math.h>
@@ -7,7 +7,7 @@
 
 enum { MOST = 20 * 1000 * 1000 };
 
-/* lowest corner of hexahedron e, counted in voxels from low */
+/* lowest corner of hexahedron e, in voxels from low */
 static void place_of(const pal_tets *tets, const pal_hexes *hexes, int e, const double low[3], double h, int at[3])
 {
     const double *x = tets->x + 3 * (size_t)hexes->node[8 * (size_t)e];
@@ -19,7 +19,7 @@ static size_t cell(const int n[3], int x, int y, int z)
     return (size_t)x + (size_t)n[0] * ((size_t)y + (size_t)n[1] * (size_t)z);
 }
 
-/* the lattice of the voxels, with an empty layer around; fill [n2][n1][n0], 0 where there is none */
+/* voxel lattice with an empty layer around it; fill [n2][n1][n0], 0 where there is no voxel */
 static pal_err lay_coarse(const pal_prepared *mesh, double low[3], int n[3], float **fill)
 {
     const pal_tets *t = &mesh->tets;
@@ -41,7 +41,7 @@ static pal_err lay_coarse(const pal_prepared *mesh, double low[3], int n[3], flo
     return PAL_ERR_OK;
 }
 
-/* the fine grid, kept where the coarse one is */
+/* the fine grid, with voxels where the coarse one has them */
 static pal_err lay_fine(const pal_prepared *mesh, const double low[3], const int n[3], const float *fill, int split,
                         pal_voxels *out)
 {

@@ -1,4 +1,4 @@
-/* Picking from a study that is kept beside a scene. */
+/* Picks a configuration from the study stored beside a scene. */
 #include "server/study/studied_scene.h"
 
 #include "server/base/machine.h"
@@ -45,7 +45,7 @@ static bool is_measured(const pal_study_point *p)
     return !p->err && isfinite(p->measured.ms) && isfinite(p->measured.error_m);
 }
 
-/* the study with the points of other methods not measured; indices stay. NULL: no memory */
+/* Copy of the study in which other methods count as not measured; indices are kept. NULL: out of memory. */
 static pal_study *only(const pal_study *study, const char *methods)
 {
     pal_study *out = malloc(sizeof *out);
@@ -71,7 +71,7 @@ int pal_study_pick_target(const pal_study *study, const char *methods, const pal
     return picked;
 }
 
-/* is a nearer to the target than b? Within the budget by error, else by time */
+/* Is a closer to the target than b? By error within the budget, otherwise by time. */
 static bool is_nearer(const pal_study_point *a, const pal_study_point *b, const pal_accuracy_target *target)
 {
     if (target->max_error_m > 0 && target->budget_ms > 0) {
@@ -114,7 +114,7 @@ void pal_study_describe_miss(const pal_study *study, const char *methods, const 
 
 /* ---- a scene and its study ---- */
 
-/* reads and checks; *out NULL and OK: there is none. The sentence is about the study */
+/* Reads and checks a study. *out NULL and OK: there is none. The diagnostic is about the study. */
 static pal_err find(const char *path, const pal_scene *scene, pal_study_file **out, pal_diagnostic *diag)
 {
     char shape[PAL_STUDY_SHAPE];

@@ -1,5 +1,5 @@
-/* What of a reference was worked out before: rests and the way, each under a sum of whatever it depends on beside the
- * body, which whoever keeps them answers for. */
+/* Cache of a reference's equilibria and trajectory. The key is a hash of everything they depend on except the body,
+ * for which the store is responsible. */
 #include "server/study/study_job.h"
 
 #include <stdio.h>
@@ -18,7 +18,7 @@ static uint64_t add_numbers(uint64_t sum, const double *value, int n)
     return add_bytes(sum, value, (size_t)n * sizeof *value);
 }
 
-/* words with their ends, so that none runs into the next */
+/* includes the terminators, so that words do not run together */
 static uint64_t add_word(uint64_t sum, const char *word)
 {
     return add_bytes(sum, word, strlen(word) + 1);
@@ -34,7 +34,7 @@ static uint64_t add_load(uint64_t sum, const pal_problem_load *l)
     return add_numbers(add_numbers(sum, l->force_N, 3), l->gravity_m_s2, 3);
 }
 
-/* what is asked of which setting under which load at which points */
+/* hash of the request: kind, configuration, load and points */
 static uint64_t sum_of(const pal_study_job *job, const char *what, const pal_configuration *s,
                        const pal_problem_case *load)
 {
@@ -55,7 +55,7 @@ static bool recall(const pal_study_job *job, uint64_t key, pal_study_answer *ans
     return o->recall && o->recall(key, answer, value, n, o->user);
 }
 
-/* what a stop or a lack of memory has ended is no answer */
+/* an answer cut short by a stop or by lack of memory is not stored */
 static void remember(const pal_study_job *job, uint64_t key, const pal_study_answer *answer, const double *value, int n)
 {
     const pal_study_options *o = job->options;
@@ -63,7 +63,7 @@ static void remember(const pal_study_job *job, uint64_t key, const pal_study_ans
     if (o->remember && whole) o->remember(key, answer, value, n, o->user);
 }
 
-/* forwards an answer's error with its sentence */
+/* returns the error of an answer with its sentence */
 static pal_err summary(const pal_study_answer *answer, pal_diagnostic *diag)
 {
     return answer->err ? pal_diagnostic_set(diag, answer->err, "%s", answer->reason) : PAL_ERR_OK;

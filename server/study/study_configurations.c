@@ -1,5 +1,5 @@
-/* Which settings a study sweeps: one parameter at a time turned from a base, at several sizes, so that what each
- * parameter adds is seen at each of them. The base has the step of the scene. */
+/* The configurations of a study: one parameter at a time varied from a base, at several sizes, so that the effect
+ * of each parameter is measured at each size. The base has the scene's step. */
 #include "server/study/study_job.h"
 
 #include <math.h>
@@ -8,7 +8,7 @@
 
 enum { BASE_LEVELS = 3 };
 static const double base_tolerance = 1e-2, frame_s = 1.0 / 60, haptic_s = 1.0 / 1000;
-/* the finest that is swept is this much coarser than the reference */
+/* ratio of the reference's size to the finest size of the sweep */
 static const double below_reference = 1.4;
 
 typedef struct list {
@@ -74,8 +74,8 @@ static pal_configuration fem_base(const pal_study_job *job, int size)
     return s;
 }
 
-/* a quarter and a half of the scene's step, that of a haptic device where it is another one, and twice as long up to
- * that of frames; returns how many */
+/* A quarter and a half of the scene's step, the step of a haptic device if different, and twice the scene's step up
+ * to a frame's. Returns the count. */
 static int other_steps(double own_s, double out[4])
 {
     int n = 0;
@@ -85,7 +85,7 @@ static int other_steps(double own_s, double out[4])
     return n;
 }
 
-/* solver, step and tolerance turned at one size: the rest is the base's */
+/* varies solver, step and tolerance at one size; the rest is the base's */
 static void add_times(list *l, const pal_configuration *base, bool whole)
 {
     static const double tolerance[] = {1e-1, 1e-4};

@@ -1,35 +1,38 @@
-/* What a setting costs, predicted from what the other settings of its model took and from counts that are known before
- * it runs.
+/* Predicts the cost of a configuration from the measured cost of the other configurations of its model and from
+ * counts known before it runs.
  *
- * A step of its own takes a + sub-steps (elements (e + t) + c q) r: a is what a step takes whatever is solved (the skin
- * above all), e what an element takes beside others, t what is added where the law has an exact tangent (neo_hookean:
- * matrices of all elements are made in every step), q the time of reading its solver's factor on this machine (what no
- * longer fits into caches is read slower), r what an element takes in a sub-step, whose logarithm is a sum of what each
- * parameter adds and of what grows with the nodes. Elements and not nodes, of which a slender body has twice as many to
- * an element; of bodies without elements of their own (springs) nodes. a, c, t and the sum are fitted to the others by
- * least squares of logarithms; what the sum misses at those that are near in parameters and nodes is taken off. */
+ * A step takes a + sub-steps (elements (e + t) + c q) r.
+ *   a  constant part of a step, whatever is solved (mainly the skin)
+ *   e  share of an element
+ *   t  addition where the law has an exact tangent (neo_hookean: every step rebuilds all element matrices)
+ *   q  time to read the solver's factor on this machine (slower for data that exceeds the caches)
+ *   r  time of an element in a sub-step; its logarithm is a sum of the effects of each parameter and of growth with
+ *      the nodes
+ * Counts elements instead of nodes, because a slender body has twice as many nodes per element. Bodies without
+ * elements (springs) count nodes. a, c, t and the sum are fitted to the other configurations by least squares of
+ * logarithms. The residual of those close in parameters and nodes is then subtracted. */
 #include "server/study/study_job.h"
 
 #include <math.h>
 #include <string.h>
 
 enum { MIN = 3, FEATURES = 18, GRID = 24, GOLDEN = 40, RATES = 16, ROUNDS = 4, ROUGH = 6 };
-/* weight of "no effect" for each parameter of as many settings as are enough; of "off by nothing" beside settings that
- * are near */
+/* ridge weight of "no effect" for each parameter, given as many configurations as are enough; weight of "no
+ * residual" beside neighbours */
 static const double ridge = 3e-2, enough = 30, trust = 0.1;
-/* so many parameters that stand otherwise are as far as e times the nodes */
+/* this many different parameters are as distant as a factor e in nodes */
 static const double parameters_per_e = 4, whole_nodes = 1000;
 
 typedef struct seen {
     const pal_configuration *setting;
-    double n_node, n_element, n_substep, ms; /* of a step of its own */
+    double n_node, n_element, n_substep, ms; /* of one of its steps */
     double read_ms;
     double f[FEATURES];
 } seen;
 
-enum { TANGENT = 11 }; /* feature whose weight is t's logarithm */
+enum { TANGENT = 11 }; /* index of the feature whose weight is ln t */
 typedef struct cost_law {
-    double a, c, w[FEATURES], misfit; /* c: elements a ms of reading */
+    double a, c, w[FEATURES], misfit; /* c: elements per ms of reading */
 } cost_law;
 
 static void features(const pal_configuration *s, double n_node, double f[FEATURES])
@@ -44,17 +47,17 @@ static void features(const pal_configuration *s, double n_node, double f[FEATURE
         f[6 + k] =
             pal_study_is(s->element, word[k]) || pal_study_is(s->law, word[k]) || pal_study_is(s->solver, word[k]);
     f[15] = 0.3 * step * n, f[16] = 0.3 * tolerance * n;
-    /* the second stage grows otherwise with the nodes */
+    /* the second stage grows with the nodes at another rate */
     f[17] = 0.5 * f[12] * n;
 }
 
-/* few settings tell little of each parameter: elements times sub-steps alone tell most */
+/* With few configurations the parameters are poorly determined, and elements times sub-steps predict best. */
 static double hold_of(int n)
 {
     return ridge * fmax(1, pow(enough / n, 2));
 }
 
-/* (F'F + hold) w = F'y by elimination; the constant is not held back */
+/* Solves (F'F + hold) w = F'y by elimination; the constant term is not regularised. */
 static void solve(double A[FEATURES][FEATURES + 1], double hold, double w[FEATURES])
 {
     for (int i = 0; i < FEATURES; i++) A[i][i] += i == 0 ? 1e-12 : hold;
@@ -70,13 +73,14 @@ static void solve(double A[FEATURES][FEATURES + 1], double hold, double w[FEATUR
     }
 }
 
-/* elements are nothing to a factor but its entries, which are counted; nor is a law that turns nothing */
+/* Features that scale the element work but not the read time of a factor, whose entries are counted: element types,
+ * and a law without rotation. */
 static bool is_of_elements(int feature)
 {
     return feature == 6 || feature == 7 || feature == 8 || feature == 10;
 }
 
-/* what all sub-steps of a step take; slope (may be NULL): its logarithm's by each weight */
+/* time of all sub-steps of a step; slope (may be NULL): derivative of its logarithm by each weight */
 static double work_ms(const cost_law *law, const seen *p, double slope[FEATURES])
 {
     double sum = 0, own = 0;
@@ -89,13 +93,13 @@ static double work_ms(const cost_law *law, const seen *p, double slope[FEATURES]
     return p->n_substep * all * exp(sum);
 }
 
-/* the best sum for an a below all costs and a rate */
+/* best sum for given a (below all costs) and c */
 static cost_law fit(const seen *p, int n, double a, double c)
 {
     cost_law law = {.a = a, .c = c};
     bool sums = c > 0;
     for (int i = 0; i < n; i++) sums |= p[i].f[TANGENT] > 0;
-    /* of one product it is linear in the logarithm; of sums Gauss and Newton's way there is short */
+    /* a single product is linear in the logarithm; sums need a few Gauss-Newton iterations */
     for (int round = 0; round < (sums ? ROUNDS : 1); round++) {
         double A[FEATURES][FEATURES + 1] = {{0}};
         for (int i = 0; i < n; i++) {
@@ -123,7 +127,7 @@ static double cheapest(const seen *p, int n)
     return 0.999 * min;
 }
 
-/* a between nothing and what the cheapest step took: the best of a grid */
+/* a between zero and the cheapest step: best of a grid */
 static cost_law on_grid(const seen *p, int n, double c, int grid)
 {
     double max = cheapest(p, n);
@@ -135,8 +139,7 @@ static cost_law on_grid(const seen *p, int n, double c, int grid)
     return best;
 }
 
-/* c of nothing, or up to where reading weighs more than all else in the body that is read slowest; then a by golden
- * section */
+/* c: zero, or up to where reading dominates all else in the body that reads slowest; then a by golden section */
 static cost_law best_fit(const seen *p, int n)
 {
     const double g = 0.6180339887498949;
@@ -176,7 +179,8 @@ static bool counts(const pal_study *study, int i, int leave_out, const pal_confi
            p->n_substep > 0 && p->measured.setting.step_s > 0 && pal_study_is(p->measured.setting.model, s->model);
 }
 
-/* nodes of a body that adapts, wholly refined: as counted of that setting, else four times as many with each level */
+/* Nodes of a fully refined adaptive body: as counted for that configuration, otherwise four times as many per
+ * level. */
 static double refined_nodes(const pal_study *study, int leave_out, const pal_configuration *s, double coarse)
 {
     for (int i = 0; i < study->n_point; i++) {
@@ -187,8 +191,8 @@ static double refined_nodes(const pal_study *study, int leave_out, const pal_con
     return coarse * exp2(2 * (s->size - 1));
 }
 
-/* sub-steps on its finest level, which one refined face is enough for: counted where it is wholly refined, else twice
- * as many with each level */
+/* Sub-steps on the finest level, which a single refined face requires: as counted where fully refined, otherwise
+ * twice as many per level. */
 static double finest_substeps(const pal_study *study, int leave_out, const pal_configuration *s)
 {
     double coarse = NAN;
@@ -196,7 +200,7 @@ static double finest_substeps(const pal_study *study, int leave_out, const pal_c
         const pal_study_point *p = &study->point[i];
         const pal_configuration *q = &p->measured.setting;
         if (!counts(study, i, leave_out, s)) continue;
-        /* of steps of their own */
+        /* sub-steps of its own step */
         double n = p->n_substep * s->step_s / q->step_s;
         if (pal_study_is(q->element, "refined") && q->size == s->size) return n;
         if (q->size == 1) coarse = n * exp2(s->size - 1);
@@ -204,8 +208,7 @@ static double finest_substeps(const pal_study *study, int leave_out, const pal_c
     return coarse;
 }
 
-/* how many of its nodes will be in use is seen of other levels: the same share of what refining could add; NaN: there
- * are none */
+/* Predicted active nodes: the share of the possible refinement observed at other levels. NaN: no other levels. */
 static double nodes_in_use(const pal_study *study, int leave_out, const pal_configuration *s)
 {
     double coarse = NAN, share = 0;
@@ -244,8 +247,8 @@ static bool has_words(const seen *p, int n, const pal_configuration *s)
     return element && law && solver;
 }
 
-/* are the elements of all that count known? Else nodes stand for them: springs, studies kept before they were counted
- */
+/* Are the elements of all points known? If not, nodes replace them (springs, studies stored before elements were
+ * recorded). */
 static bool are_counted(const pal_study *study, int leave_out, const pal_configuration *s)
 {
     for (int i = 0; i < study->n_point; i++)

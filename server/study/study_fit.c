@@ -1,5 +1,5 @@
-/* Springs fitted to the study's reference: homogeneous constants of edges and volumes, by the adjoint. Where there are
- * several loads the last one is not fitted to, so that the point is judged by a load it has never seen as well. */
+/* Fits springs to the study's reference: homogeneous constants of edges and volumes, by the adjoint. With several
+ * loads the last one is not fitted, so that the point is also judged by an unseen load. */
 #include "server/base/vec3.h"
 #include "server/calibrate/calibrate.h"
 #include "server/study/study_job.h"
@@ -9,10 +9,10 @@
 #include <string.h>
 
 enum { MAX_EVALUATIONS = 60 };
-/* of the material's own: without their volume springs tetrahedra that were turned over stay so (palpate robustness) */
+/* share of the material's volume stiffness: without it, inverted tetrahedra stay inverted (palpate robustness) */
 static const double min_volume_ratio = 0.1;
 
-/* the reference's rest under a load, in the problem's frame */
+/* the reference's equilibrium under a load, in the frame of the problem */
 static pal_err take_samples(const pal_study_job *job, int load, pal_samples *out)
 {
     const pal_prepared *mesh = job->scene->body[0].mesh;

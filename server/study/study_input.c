@@ -1,4 +1,4 @@
-/* A word of the command line -> body and loads of a study. */
+/* Converts a word of the command line to the body and loads of a study. */
 #include "server/study/study_input.h"
 
 #include "server/mesh/files/file_bytes.h"
@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* a JSON file whose root has a "format" is a problem; what cannot be read is told later, by the scene's reader */
+/* A JSON file whose root has a "format" is a problem. Read errors are reported later, by the scene reader. */
 static bool is_problem(const char *word)
 {
     uint8_t *bytes;
@@ -97,7 +97,7 @@ void pal_study_input_close(pal_study_input *input)
     *input = (pal_study_input){0};
 }
 
-/* ---- what it is of ---- */
+/* ---- identity of the study ---- */
 
 static uint64_t add_numbers(uint64_t sum, const double *value, size_t n)
 {
@@ -131,7 +131,7 @@ void pal_study_loads_read(const char *loads, double *seconds, bool *quick, char 
 void pal_study_input_describe(const pal_study_input *in, const pal_study_request *q, pal_study_file *file)
 {
     const pal_scene *scene = in->scene;
-    /* whatever the reference depends on beside the body itself */
+    /* everything that the reference depends on besides the body itself */
     uint64_t sum = add_numbers(add_numbers(0, &scene->step_s, 1), scene->up, 3);
     pal_configuration now;
     pal_configuration_of(scene, in->body, &now);

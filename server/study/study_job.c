@@ -1,4 +1,4 @@
-/* The sweep: body and loads, reference, one point after the other. */
+/* The sweep: body and loads, reference, then one point after the other. */
 #include "server/study/study.h"
 
 #include "server/base/machine.h"
@@ -12,8 +12,7 @@
 #include <string.h>
 
 enum { SCENE_VOXELS = 16, FINEST_SCENE = 64, COARSE = 10, SOFTER = 3 };
-static const double usual_s = 0.5,
-                    hair = 1e-7; /* of the diagonal: supports reach so much farther than they are given */
+static const double usual_s = 0.5, hair = 1e-7; /* share of the diagonal by which supports are extended */
 
 static void free_job(pal_study_job *job)
 {
@@ -47,7 +46,7 @@ static pal_err take_room(pal_study_job *job, int n_probe)
                                         : pal_diagnostic_set(job->diag, PAL_ERR_MEMORY, "no memory for a study");
 }
 
-/* evenly picked vertices of the shown surface, or the points of the samples */
+/* evenly picked vertices of the displayed surface, or the points of the samples */
 static pal_err take_probes(pal_study_job *job)
 {
     const pal_samples *samples = job->options->samples;
@@ -73,7 +72,7 @@ static pal_err take_probes(pal_study_job *job)
 
 /* ---- the sweep ---- */
 
-/* was it measured before? */
+/* the point if it was measured before */
 static const pal_study_point *known(const pal_study *before, const pal_study_entry *entry)
 {
     for (int i = 0; before && i < before->n_point; i++) {
@@ -116,7 +115,7 @@ static pal_err check_methods(const pal_study_job *job)
     return err;
 }
 
-/* the reference of a sweep that goes on is the one it began with: not made anew when nothing is left to measure */
+/* A continued sweep keeps its reference: it is not rebuilt if no point is left to measure. */
 static bool all_known(const pal_study_job *job, const pal_study_entry *entry, int n)
 {
     for (int i = 0; i < n; i++)
@@ -130,7 +129,8 @@ static void take_over(pal_study *to, const pal_study *from)
     to->reference_m = from->reference_m, to->max_m = from->max_m, to->length_scale_m = from->length_scale_m;
 }
 
-/* fine elements under the edge of a patch may find no rest where the coarse estimate saw one: then half as strong */
+/* Fine elements under the edge of a pressed area may have no equilibrium where the coarse estimate had one: halves
+ * the load. */
 static pal_err press(pal_study_job *job)
 {
     PAL_TRY(pal_study_presses(job));
@@ -149,7 +149,7 @@ static pal_err study(pal_study_job *job)
     const pal_study *before = job->options->before;
     pal_err err = pal_study_reference_size(job);
     int n = err ? 0 : pal_study_list(job, entry);
-    /* with nothing left to measure the reference is asked for only where it costs nothing */
+    /* with no point left to measure, the reference is used only if it costs nothing */
     bool whole = !err && !job->options->recall && all_known(job, entry, n);
     if (!err && n == 0)
         err = pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "no method of those asked for fits the body");
@@ -158,7 +158,7 @@ static pal_err study(pal_study_job *job)
     if (!err && !whole) err = job->n_load == 0 ? press(job) : pal_study_reference(job);
     if (!err) err = sweep(job, entry, n);
     if (!err && !whole) err = pal_study_time_repeat(job);
-    /* also where nothing was left to measure: the one that was broken off may have been there */
+    /* also if no point was left to measure: the interrupted run may have stopped here */
     if (!err) err = pal_study_check_robustness(job);
     pal_study_predict(job->out);
     free(entry);
@@ -167,7 +167,7 @@ static pal_err study(pal_study_job *job)
 
 /* ---- from a scene ---- */
 
-/* every mesh of the study holds the same; what is no box calibration does not know */
+/* Every mesh of the study has the same supports. Calibration accepts boxes only. */
 static void set_supports(pal_study_job *job)
 {
     pal_body_def *body = &job->scene->body[0];
@@ -199,7 +199,7 @@ static pal_err begin(pal_study_job *job, const pal_scene *scene, int body)
     job->scene->n_body = 1;
     if (body != 0) job->scene->body[0] = scene->body[body];
     pal_body_def *def = &job->scene->body[0];
-    /* a scene's own grid of constants is no setting */
+    /* the scene's own grid of constants is not part of a configuration */
     def->spring_grid = (pal_spring_grid){.n = {0}};
     job->adaptive = !def->cells && def->mesh->tets.n_node < 1;
     pal_configuration now;
@@ -257,7 +257,7 @@ static pal_err problem_voxels(const pal_problem *p, const pal_surface *surface, 
 {
     pal_case_voxel_options entry = {.resolution = SCENE_VOXELS, .fill = true, .align = true};
     pal_err err = pal_case_voxels(p, surface, &entry, out, diag);
-    /* thinner than such voxels */
+    /* the body is thinner than such voxels */
     while (err == PAL_ERR_REFUSED && entry.resolution < FINEST_SCENE) {
         entry.resolution *= 2;
         err = pal_case_voxels(p, surface, &entry, out, diag);

@@ -1,4 +1,4 @@
-/* A study's journal: every record is in memory as it is in the file. */
+/* The journal of a study: records in memory have the layout of the file. */
 #include "server/study/study_journal.h"
 
 #include "server/mesh/files/file_bytes.h"
@@ -22,10 +22,10 @@ typedef struct record_head {
 } record_head;
 
 struct pal_study_journal {
-    FILE *file; /* NULL: nothing is added any more */
+    FILE *file; /* NULL: nothing more is added */
     char path[PAL_STUDY_PATH + 16];
     int n, n_before;
-    unsigned char *record[MAX_RECORDS]; /* head, numbers, sum */
+    unsigned char *record[MAX_RECORDS]; /* header, numbers, hash */
 };
 
 static size_t size_of(int64_t n)
@@ -40,7 +40,7 @@ static record_head head_of(const unsigned char *record)
     return head;
 }
 
-/* bytes of the whole record that begins here; 0: there is none */
+/* bytes of the complete record that begins here; 0: none */
 static size_t whole_record(const unsigned char *at, size_t left)
 {
     uint64_t sum;
@@ -61,14 +61,14 @@ static pal_err keep(pal_study_journal *j, const unsigned char *record, size_t si
     return PAL_ERR_OK;
 }
 
-/* *whole: bytes of the file that stay; 0: it is of something else or is not there */
+/* *whole: bytes of the file to keep; 0: another subject, or no file */
 static pal_err take(pal_study_journal *j, uint64_t of, size_t *whole)
 {
     unsigned char *bytes = NULL;
     size_t n_byte, size;
     *whole = 0;
     if (access(j->path, F_OK)) return PAL_ERR_OK;
-    /* what cannot be read is begun anew like what is of something else */
+    /* an unreadable file is overwritten like one of another subject */
     if (pal_file_read(j->path, max_bytes, &bytes, &n_byte, NULL)) return PAL_ERR_OK;
     pal_err err = PAL_ERR_OK;
     bool same =

@@ -1,4 +1,4 @@
-/* Presses and a pull for a scene that has no load cases: where they stand, how strong they are. */
+/* Presses and a pull for a scene without load cases: their positions and strengths. */
 #include "server/base/vec3.h"
 #include "server/study/study_job.h"
 
@@ -8,13 +8,14 @@
 #include <string.h>
 
 enum { PRESSES = 3, PULL = PRESSES, COARSE = 10, ROUNDS = 4 };
-static const double coarse_share = 0.6; /* of the reference's size, at least COARSE: a thin tip is stiff in fewer */
-/* of the body's diagonal: half a patch's side, what it is pressed in by, what is looked at first */
+/* of the reference's size, at least COARSE: a thin tip is too stiff in fewer voxels */
+static const double coarse_share = 0.6;
+/* shares of the body's diagonal: half the side of a loaded area, depth of a press, first trial displacement */
 static const double patch_share = 0.1, press_share = 0.02, first_share = 1e-3;
-/* the same of the pull: as wide as a hand takes hold, no farther than this by the linear estimate, of a wall half as
- * far, as it folds; aslant by so much */
+/* The same for the pull: half width of a grasp; largest displacement by the linear estimate, half of it for an
+ * adaptive surface, which folds; sideways component; default force cap. */
 static const double grip_share = 0.06, pull_share = 0.1, wall_share = 0.05, aslant = 0.7, usual_cap_N = 15;
-/* what the reference moves by may be so many times what was wanted, or so little of it */
+/* accepted factor between the reference's displacement and the wanted one */
 static const double wide_of = 1.5;
 
 static double pull_of(const pal_study_job *job)
@@ -29,7 +30,7 @@ static double diagonal(const pal_surface *s, double low[3])
     return pal_dist3(low, high);
 }
 
-/* probes farthest from what is held and from each other */
+/* probes farthest from the supports and from each other */
 static pal_err choose_places(const pal_study_job *job, const pal_study_world *w, int out[PRESSES])
 {
     double *far = malloc(sizeof *far * (size_t)job->n_probe);
@@ -50,7 +51,7 @@ static pal_err choose_places(const pal_study_job *job, const pal_study_world *w,
     return PAL_ERR_OK;
 }
 
-/* the way in, by the triangles that have a corner in the patch */
+/* inward direction, from the triangles with a corner in the loaded area */
 static void inward(const pal_surface *s, const double at[3], double half, double out[3])
 {
     double sum[3] = {0, 0, 0};
@@ -71,7 +72,7 @@ static void inward(const pal_surface *s, const double at[3], double half, double
     if (size > 0) pal_scale3(out, -1 / size, sum);
 }
 
-/* outward and aslant, so that no press has said it before */
+/* outward and sideways, so that it is independent of the presses */
 static void turn_to_pull(double n[3])
 {
     double axis[3] = {0, 0, 0}, side[3];
@@ -89,7 +90,7 @@ static void place_load(pal_study_job *job, int index, const pal_surface *s, cons
     pal_problem_case *c = &job->problem->load_case[index];
     double n[3], low[3];
     inward(s, at, 1.5 * half, n);
-    /* a surface with a fold there: against its middle */
+    /* a fold in the surface: points away from the body's centre */
     if (!(pal_norm3(n) > 0)) {
         double size = diagonal(s, low);
         for (int k = 0; k < 3; k++) n[k] = low[k] - at[k] + size / 2;
@@ -119,13 +120,14 @@ static pal_configuration coarse(const pal_study_job *job)
     return s;
 }
 
-/* so that what it moves most moves by its share: by what the coarse body answers, which is linear in it or nearly so */
+/* Scales the load so that its largest displacement has the wanted share, from the nearly linear response of the
+ * coarse body. */
 static pal_err scale_load(pal_study_job *job, int index, double length_scale_m)
 {
     pal_configuration s = coarse(job);
     double *total = job->problem->load_case[index].load[0].total_N;
     const double share[2] = {job->adaptive ? first_share : press_share, press_share};
-    /* a linear body says all at once; from a guess of what a body of that stiffness bears */
+    /* a linear body needs one solve; the guess follows from the stiffness */
     double guess = job->scene->body[0].material.young_Pa * first_share * length_scale_m * length_scale_m *
                    (job->adaptive ? 1e-3 : 1);
     pal_scale3(total, guess, total);
@@ -138,7 +140,7 @@ static pal_err scale_load(pal_study_job *job, int index, double length_scale_m)
             return pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "%s of %g N moves nothing", job->load[index]->id,
                                       pal_norm3(total));
         double wanted = share[round] * length_scale_m / moved, size_N = pal_norm3(total);
-        /* a hand pulls with what the tool may, and no farther than a body can be said to bear */
+        /* limited by the tool's force cap and by the deformation that the body can bear */
         double cap_N = job->scene->n_tool > 0 ? job->scene->tool[0].force_cap_N : usual_cap_N;
         if (index == PULL) wanted = fmin(cap_N / size_N, pull_of(job) * length_scale_m / moved);
         pal_scale3(total, wanted, total);
@@ -179,7 +181,7 @@ pal_err pal_study_presses(pal_study_job *job)
     double length_scale_m = diagonal(surface, low);
     for (int k = 0; k < PRESSES && !err; k++)
         place_load(job, k, surface, job->probe + 3 * place[k], patch_share * length_scale_m);
-    /* where it moves most: at the place that is farthest from what holds it */
+    /* where it moves most: at the place farthest from the supports */
     if (!err) place_load(job, PULL, surface, job->probe + 3 * place[0], grip_share * length_scale_m);
     pal_study_close(&w);
     job->n_load = job->n_press = job->problem->n_case = PULL + 1;

@@ -1,4 +1,4 @@
-/* Studies as table, drawing and page. */
+/* Studies as table, plot and page. */
 #include "server/study/study_page.h"
 
 #include "server/figure/plot.h"
@@ -33,7 +33,7 @@ bool pal_study_is_live(const pal_study *study, const pal_study_point *p)
     return is_measured(p) && 1e-3 * p->measured.ms <= study->step_s;
 }
 
-/* as the command has written its loads (study_input.c) */
+/* as the command writes its loads (study_input.c) */
 static bool is_quick(const pal_study_file *file)
 {
     return strstr(file->loads, ", quick") != NULL;
@@ -41,7 +41,7 @@ static bool is_quick(const pal_study_file *file)
 
 /* ---- table ---- */
 
-/* a cell of the table; "-" when the number is not known */
+/* a cell of the table; "-" for an unknown number */
 static void print_cell(FILE *to, int width, const char *format, double value)
 {
     char text[32] = "-";
@@ -101,9 +101,9 @@ void pal_study_print(const pal_study_file *file, FILE *to)
     }
 }
 
-/* ---- drawing ---- */
+/* ---- plot ---- */
 
-/* the parameters of a point on the front, as short as its mark allows */
+/* the parameters of a point on the front, as short as its marker allows */
 static void parameters_of(const pal_study *study, const pal_study_point *p, double usual, char *out, size_t n_byte)
 {
     const pal_configuration *s = &p->measured.setting;
@@ -124,7 +124,7 @@ static void parameters_of(const pal_study *study, const pal_study_point *p, doub
         snprintf(out + n, n_byte - (size_t)n, ", to %.0e", s->tolerance);
 }
 
-/* the tolerance that most settings have; 0: none has one */
+/* the tolerance of most configurations; 0: none has one */
 static double usual_tolerance(const pal_study *study)
 {
     double usual = 0;
@@ -138,11 +138,11 @@ static double usual_tolerance(const pal_study *study)
     return usual;
 }
 
-/* what a drawing of a study borrows */
+/* what the plot of a study borrows */
 typedef struct series {
     char name[METHODS][PAL_CONFIGURATION_TEXT];
     int n_method, n[METHODS], n_front;
-    bool apart[METHODS]; /* not for the front, as their `why` says */
+    bool apart[METHODS]; /* excluded from the front, as their `reason` states */
     double x[METHODS][PAL_STUDY_POINTS], y[METHODS][PAL_STUDY_POINTS];
     const char *tip[METHODS][PAL_STUDY_POINTS];
     char tip_text[PAL_STUDY_POINTS][TIP];
@@ -151,7 +151,7 @@ typedef struct series {
     char parameters[FRONT_LABELS][64], title[160], x_label[96], live[64], own[80];
     pal_plot_label label[FRONT_LABELS];
     int n_label;
-    double usual; /* tolerance that goes without saying */
+    double usual; /* tolerance that labels omit */
 } series;
 
 static void add_point(series *s, const pal_study *study, const pal_study_point *p)
@@ -260,7 +260,7 @@ static void put_number(FILE *to, const char *form, double value)
     fputs("</td>", to);
 }
 
-/* a word of a command, which may stand in quotes; returns what follows it and the blanks behind it */
+/* End of a word of a command, which may be quoted; returns the start of the next word. */
 static const char *word_end(const char *at)
 {
     for (bool quoted = false; *at && (quoted || *at != ' '); at++)
@@ -269,7 +269,7 @@ static const char *word_end(const char *at)
     return at;
 }
 
-/* the command of a study without what asks for a setting, for starting over or for another kind of output */
+/* The command of a study without options that request a configuration, a restart or another output. */
 static void put_study(FILE *to, const pal_study_file *file)
 {
     static const char *const apart[] = {"--within", "--budget", "--pick", "-o", "--again", "--json", "--quiet"};
@@ -347,8 +347,8 @@ static const char head[] =
     "td.n{text-align:right;font-variant-numeric:tabular-nums}\n"
     "tr.front{background:#fff6dc}tr.bad{color:#888}tr.bad td{white-space:normal}p{color:#555}\n</style>\n<title>";
 
-/* a click on a heading sorts by it, another one the other way; empty cells stay last; a row's button copies its
- * command, also from a file, where some browsers keep the clipboard to what is selected */
+/* A click on a heading sorts by it, a second click reverses the order. Empty cells stay last. The button of a row
+ * copies its command, also from a local file, where some browsers limit the clipboard to the selection. */
 static const char sorting[] =
     "<script>\ndocument.querySelectorAll('th').forEach((th,c)=>th.addEventListener('click',()=>{\n"
     "const body=document.querySelector('tbody'),way=th.dataset.way==='1'?-1:1;th.dataset.way=String(way);\n"

@@ -1,9 +1,9 @@
-/* The front of a study, what it answers, and what it predicts.
+/* The Pareto front of a study, picking from it, and predictions.
  *
- * Foreseen is along the sizes of settings that are the same but for them, where these follow a power law closely: ms =
- * a + b n^c, error = d n^-p, n the size (edges of adaptive levels and of subdivided cells double with each). Elsewhere
- * the logarithms of all points of the model are taken as sums of what each parameter adds, and what that misses at the
- * nearest settings of the same size is taken off: how many nodes there are is no smooth function of the size. */
+ * Predicts along the sizes of configurations that are equal otherwise, where these follow a power law closely: ms =
+ * a + b n^c, error = d n^-p, with n the size (edges of adaptive levels and of subdivided cells double with each).
+ * Elsewhere the logarithm over all points of the model is a sum of the effects of each parameter, less the residual
+ * of the nearest configurations of the same size, because the number of nodes is not a smooth function of the size. */
 #include "server/base/vec3.h"
 #include "server/study/study_job.h"
 
@@ -12,9 +12,9 @@
 #include <string.h>
 
 enum { ALONG = 3, FEATURES = 24, GOLDEN = 44 };
-/* weight of "no effect" for each parameter, so that one that was never turned has none */
+/* ridge weight of "no effect" for each parameter, so that one that was never varied has none */
 static const double ridge = 1e-4, min_m = 1e-12;
-/* a power law is followed closely */
+/* residual up to which a power law fits closely */
 static const double close_off = 0.05;
 
 static bool measured(const pal_study_point *p)
@@ -23,7 +23,7 @@ static bool measured(const pal_study_point *p)
            isfinite(p->measured.error_m);
 }
 
-/* what was fitted to the one load that judges it says nothing of any other */
+/* False: fitted to the one load that judges it, which tells nothing about other loads. */
 static bool judged(const pal_study_point *p)
 {
     return measured(p) && !p->reason[0];
@@ -34,7 +34,7 @@ bool pal_study_trusted(const pal_study *study)
     return !(study->max_m > 0 && study->reference_m > PAL_STUDY_TRUST * study->max_m);
 }
 
-/* nearer than the reference is to the truth says nothing */
+/* error, at least that of the reference: smaller differences are not significant */
 static double far_of(const pal_study *study, const pal_measured_configuration *p)
 {
     return study->reference_m > p->error_m ? study->reference_m : p->error_m;
@@ -105,7 +105,7 @@ static void line(const double *x, const double *y, int n, double *a, double *slo
     *a = my - *slope * mx;
 }
 
-/* squares of logarithms for ms = a + b n^c, the best b for a and c; *b its logarithm */
+/* sum of squared logarithmic residuals of ms = a + b n^c with the best b for a and c; *b: its logarithm */
 static double misfit(const double *x, const double *y, int n, double a, double c, double *b)
 {
     double sum = 0, mean = 0;
@@ -114,7 +114,7 @@ static double misfit(const double *x, const double *y, int n, double a, double c
         if (!(left > 0)) return INFINITY;
         mean += (log(left) - c * x[i]) / n;
     }
-    for (int k = 0; k < 4; k++) { /* Newton for b, whose logarithm is not linear in y once a is there */
+    for (int k = 0; k < 4; k++) { /* Newton's method for ln b, which is nonlinear once a is present */
         double g = 0, h = 0;
         for (int i = 0; i < n; i++) {
             double part = exp(mean + c * x[i]), r = log(a + part) - y[i], d = part / (a + part);
@@ -130,7 +130,7 @@ static double misfit(const double *x, const double *y, int n, double a, double c
     return sum;
 }
 
-/* the best c for a, by golden section within what costs can grow by */
+/* best c for a, by golden section within the plausible growth */
 static double best_power(const double *x, const double *y, int n, double a, double *c, double *b)
 {
     const double g = 0.6180339887498949;
@@ -156,7 +156,7 @@ static double cost_at(const cost_law *law, double x)
     return law->a + exp(law->b + law->c * x);
 }
 
-/* ms = a + b n^c, a between 0 and what the cheapest costs; a straight line where there are but three points */
+/* ms = a + b n^c with a between 0 and the cheapest cost; a straight line if there are only three points */
 static cost_law fit_cost(const double *x, const double *y, int n)
 {
     double intercept, slope, b, c, min = INFINITY, straight = 0;
@@ -178,7 +178,7 @@ static cost_law fit_cost(const double *x, const double *y, int n)
     return best_power(x, y, n, out.a, &out.c, &out.b) < straight ? out : power;
 }
 
-/* a law along the sizes: what it gives at `at`, how far off it is at its points (RMS of logarithms) */
+/* a law along the sizes: its value at `at`, its RMS logarithmic residual */
 typedef struct along {
     int n_size;
     double value, off;
@@ -239,11 +239,11 @@ static void features(const pal_configuration *s, double f[FEATURES])
     add(f, law, 2, 10, s->law);
     add(f, solver, 5, 12, s->solver);
     f[17] = step * n, f[18] = tolerance * n;
-    /* quadratic elements and the second stage grow otherwise with the size */
+    /* quadratic elements and the second stage grow with the size at another rate */
     f[19] = f[8] * n, f[20] = f[12] * n, f[21] = f[5] * n, f[22] = f[7] * n;
 }
 
-/* (F'F + ridge) w = F'y by elimination; the constant is not held back */
+/* Solves (F'F + ridge) w = F'y by elimination; the constant term is not regularised. */
 static void solve_parameters(double A[FEATURES][FEATURES + 2], double w[2][FEATURES])
 {
     for (int i = 0; i < FEATURES; i++) A[i][i] += i == 0 ? 1e-12 : ridge;
@@ -260,8 +260,8 @@ static void solve_parameters(double A[FEATURES][FEATURES + 2], double w[2][FEATU
         }
 }
 
-/* parameters of which the others say nothing: a word that none of them has, a step or tolerance that none of them is
- * near */
+/* Parameters without data in the other points: a word that none of them has, a step or tolerance far from all of
+ * them. */
 static bool is_strange(const pal_study *study, const pal_configuration *s, int leave_out)
 {
     bool element = false, law = false, solver = false, fitted = false, step = false, tolerance = false;
@@ -283,7 +283,7 @@ static double sum_of(const double w[FEATURES], const double f[FEATURES])
     return sum;
 }
 
-/* parameters that stand otherwise */
+/* number of different parameters */
 static int differences(const pal_configuration *a, const pal_configuration *b)
 {
     return !pal_study_is(a->element, b->element) + !pal_study_is(a->law, b->law) + !pal_study_is(a->solver, b->solver) +
@@ -296,7 +296,7 @@ static bool is_mate(const pal_study *study, int i, const pal_configuration *s, i
     return i != leave_out && measured(p) && pal_study_is(p->measured.setting.model, s->model);
 }
 
-/* logarithms of ms and error; *mates: other settings of the same size there are */
+/* Predicted logarithms of ms and error; *mates: number of other configurations of the same size. */
 static bool look_at_parameters(const pal_study *study, const pal_configuration *s, int leave_out, double out[2],
                                int *mates)
 {

@@ -1,5 +1,5 @@
-/* What a study compares with: the finest body that can be afforded, how far from the truth it is by its own last
- * changes, the way of the tip. */
+/* The reference of a study: the finest affordable body, its error estimated from its last changes, and the
+ * trajectory of the tip. */
 #include "server/base/vec3.h"
 #include "server/solve/convergence.h"
 #include "server/study/study_job.h"
@@ -10,10 +10,10 @@
 #include <string.h>
 
 enum { WHOLE_NODES = 30000, QUICK_NODES = 4000, QUICK_MAX = 12000, COUNTED = 12 };
-/* at most this, and at most this share of the scene's own: about as short as any that is swept, and of second order */
+/* largest step, and largest share of the scene's step: about as short as any in the sweep, and of second order */
 static const double whole_step_s = 1.0 / 960, quick_step_s = 1.0 / 480, whole_share = 0.25, quick_share = 0.5,
                     reference_tolerance = 1e-4, full_share = 0.95, min_order = 1, scatter = 1.25;
-/* a quick reference that is farther off than this share of what moves is made finer, by so much */
+/* a quick reference with a larger share of error is refined by this factor */
 static const double quick_enough = 0.15, finer = 1.42;
 
 static pal_configuration reference_setting(const pal_study_job *job, int size)
@@ -30,7 +30,7 @@ static pal_configuration reference_setting(const pal_study_job *job, int size)
     return s;
 }
 
-/* longest over shortest side, a quarter of it, 1 to 3; the sides of what is a box or nearly one */
+/* longest over shortest side, a quarter of it, 1 to 3; the sides of a box-shaped body */
 static void take_sides(pal_study_job *job, const pal_surface *surface)
 {
     double low[3], high[3], side[3], longest = 0, shortest = INFINITY, volume = 1;
@@ -44,7 +44,7 @@ static void take_sides(pal_study_job *job, const pal_surface *surface)
     job->slender = shortest > 0 ? fmin(fmax(longest / shortest / 4, 1), 3) : 1;
 }
 
-/* nodes of a size, from those of a coarse one */
+/* predicts the nodes of a size from those of a coarse one */
 pal_err pal_study_reference_size(pal_study_job *job)
 {
     static const int whole[] = {80, 64, 56, 48, 40, 34, 28, 24, 20, 16, 12}, quick[] = {20, 18, 16, 14, 12, 10};
@@ -82,8 +82,8 @@ static double max_between(const double *a, const double *b, int n)
     return max;
 }
 
-/* what is left of one load, from its rest at two coarser sizes: what the next changes would be, summed up (Richardson,
- * of an order between 1 and 2) */
+/* Remaining error of one load from its equilibria at two coarser sizes: the sum of the expected further changes
+ * (Richardson, of order 1 to 2). */
 static pal_err estimate_load(pal_study_job *job, int load, const int size[3], double *u[2], double *out)
 {
     double h[3];
@@ -95,12 +95,12 @@ static pal_err estimate_load(pal_study_job *job, int load, const int size[3], do
     for (int k = 0; k < 3; k++) h[k] = job->adaptive ? exp2(-size[k]) : 1.0 / size[k];
     double first = max_between(u[0], u[1], job->n_probe), last = max_between(u[1], job->still[load], job->n_probe);
     double order = pal_richardson_order(h, first, last);
-    /* changes that do not shrink as first order does are scatter of cut voxels: as far as they reach, and a margin */
+    /* changes that shrink more slowly than first order are scatter of cut voxels: takes the largest, with a margin */
     *out = order >= min_order ? last / (pow(h[1] / h[2], fmin(order, 2)) - 1) : scatter * fmax(first, last);
     return PAL_ERR_OK;
 }
 
-/* the largest over the loads */
+/* largest error over the loads */
 static pal_err estimate(pal_study_job *job, double *out)
 {
     int size[3] = {pal_study_fit_size(job, job->reference / 2.0), pal_study_fit_size(job, job->reference / 1.42),
@@ -117,7 +117,7 @@ static pal_err estimate(pal_study_job *job, double *out)
     for (int k = 0; k < job->n_load && !err; k++) {
         double left = 0;
         err = estimate_load(job, k, size, u, &left);
-        /* coarse voxels that hold too little of it, or fold: nearer to the reference's own */
+        /* coarse voxels lose parts of the body or fold: uses sizes closer to the reference's */
         if ((err == PAL_ERR_REFUSED || err == PAL_ERR_NUMERIC || err == PAL_ERR_FROZEN) && !job->adaptive)
             err = estimate_load(job, k, nearer, u, &left);
         *out = fmax(*out, left);

@@ -1,6 +1,6 @@
-/* Where a body comes to rest under a load: by Newton where its rows have tangents, by the equilibrium of its lattice
- * for springs, else by running it and taking its speed away whenever its kinetic energy has a peak (kinetic damping;
- * Cundall 1976). */
+/* The equilibrium of a body under a load: by Newton's method where its components have tangents, by the lattice
+ * equilibrium for springs, otherwise by running it and zeroing its velocity at each peak of kinetic energy (kinetic
+ * damping; Cundall 1976). */
 #include "server/base/vec3.h"
 #include "server/calibrate/equilibrium.h"
 #include "server/study/study_job.h"
@@ -12,7 +12,7 @@
 
 enum { MAX_NEWTON = 120, MAX_RELAX = 4000, QUIET = 3, RAMPS = 4 };
 static const double rest_tolerance = 1e-6, relax_change = 1e-4;
-/* what running a body of finite elements to rest may take where Newton found none */
+/* largest work of running finite elements to rest after Newton's method failed */
 static const double safeguard_work = 1e6;
 
 /* ---- finite elements ---- */
@@ -35,7 +35,7 @@ static pal_err converge(const pal_study_job *job, pal_study_world *w, pal_diagno
     }
 }
 
-/* the whole load at once, or in parts where that leads nowhere */
+/* applies the whole load at once, or in parts if that fails */
 static pal_err newton(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load, double *u,
                       int *n_node, pal_diagnostic *diag)
 {
@@ -77,7 +77,7 @@ static void free_springs(springs *s)
     pal_lattice_free(&s->lattice);
 }
 
-/* as the live rows have them: given, or from the material (spring_law.h) */
+/* as in the live components: given, or from the material (spring_law.h) */
 static void constants_of(const pal_configuration *setting, const pal_body_def *def, double edge_m,
                          double out[PAL_SPRING_KINDS])
 {
@@ -90,7 +90,7 @@ static void constants_of(const pal_configuration *setting, const pal_body_def *d
     }
 }
 
-/* weights of the scene's own; nothing but gravity pulls at nodes */
+/* Uses the weights of the scene. Gravity is the only other nodal force. */
 static pal_err take_springs(const pal_configuration *setting, const pal_study_world *w, springs *s,
                             pal_diagnostic *diag)
 {
@@ -145,7 +145,7 @@ static pal_err lattice(pal_study_job *job, const pal_configuration *setting, con
     pal_study_world w;
     springs s = {.workspace = NULL};
     pal_configuration still = *setting;
-    /* the shortest step: a body of stiff springs shall come to rest whatever it costs to run it */
+    /* the shortest step: stiff springs must come to rest at any cost */
     still.step_s = 1e-4, still.solver[0] = 0;
     PAL_TRY(pal_study_open(job, &still, true, &w, diag));
     *n_node = w.body->n_node;
@@ -173,7 +173,7 @@ static double change(double *before, const double *u, int n, double *max)
     return largest;
 }
 
-/* steps until a few peaks in a row have moved nothing to speak of */
+/* steps until several successive peaks show no significant change */
 static pal_err relax_world(pal_study_job *job, pal_study_world *w, int max_step, double *before, double *u,
                            pal_diagnostic *diag)
 {
@@ -198,13 +198,13 @@ static pal_err relax_world(pal_study_job *job, pal_study_world *w, int max_step,
     return pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "not at rest after %d steps", max_step);
 }
 
-/* max_work: steps times nodes; 0: any */
+/* max_work: steps times nodes; 0: unlimited */
 static pal_err relax(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load, double *u,
                      int *n_node, double max_work, pal_diagnostic *diag)
 {
     pal_study_world w;
     pal_configuration still = *setting;
-    /* quiet means little where a step is but a part of a swing */
+    /* with a step much shorter than a period, slow motion does not mean rest */
     still.step_s = PAL_STUDY_FRAME_S;
     PAL_TRY(pal_study_open(job, &still, true, &w, diag));
     *n_node = pal_body_nodes(w.body);
@@ -219,7 +219,7 @@ static pal_err relax(pal_study_job *job, const pal_configuration *setting, const
     return err;
 }
 
-/* rows whose forces go with the shape, which the lattice's rest does not know */
+/* components whose forces depend on the shape, which the lattice equilibrium ignores */
 static bool only_gravity(const pal_body_def *body)
 {
     for (int k = 0; k < body->n_effect; k++) {

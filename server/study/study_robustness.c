@@ -1,13 +1,13 @@
-/* What may stand on the front has to bear being mistreated: the cheapest two robustness cases that springs fitted
- * to gentle presses were seen not to come back from. What they leave undecided in their time excludes nothing, nor does
- * a body that its guard has stopped: it is safe, says so and is reset, while one that stays elsewhere says nothing. */
+/* Configurations on the front must pass robustness cases: the two cheapest that springs fitted to gentle presses
+ * were observed to fail. An undecided case excludes nothing. Neither does a body stopped by its safeguards: it is
+ * reported and reset, whereas one that silently stays away from rest is not. */
 #include "server/robustness/robustness.h"
 #include "server/study/study_job.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 
-/* processor time of one case on one setting */
+/* processor time of one case on one configuration */
 static const double max_cpu_s = 1;
 
 static bool keeps_on(const char *what, double fraction, void *user)
@@ -57,7 +57,7 @@ pal_err pal_study_check_robustness(pal_study_job *job)
         const char *name = failed(job, &p->measured.setting);
         if (!name) continue;
         snprintf(p->reason, sizeof p->reason, "fails %s of palpate robustness: not named", name);
-        /* what it stood before may be on the front now, also cheaper ones */
+        /* points that it dominated may be on the front now, also cheaper ones */
         pal_study_mark_front(job->out);
         i = 0;
     }

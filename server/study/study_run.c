@@ -1,4 +1,4 @@
-/* One point of a study: what it costs and how far off it is. */
+/* One point of a study: its cost and its error. */
 #include "server/base/clock.h"
 #include "server/base/machine.h"
 #include "server/base/vec3.h"
@@ -10,11 +10,11 @@
 #include <string.h>
 
 enum { MAX_TIMES = 1200, WARM = 3, MIN_TIMES = 30, ROUNDS = 2 };
-/* the way is gone again until its steps have taken so long together: a median of some microseconds is of nothing */
+/* the trajectory repeats until its steps have taken this long: a median of some microseconds is unreliable */
 static const double min_ms = 50;
-/* sub-steps times nodes of a way: what is slower is not followed, only timed */
+/* sub-steps times nodes of a trajectory: above this it is only timed */
 static const double max_work = 1.5e9, timed_s = 2;
-/* of the first load: put on at once it swings about as far as the whole one moves the body at rest */
+/* of the first load: applied at once, its overshoot reaches about the static displacement of the whole load */
 static const double way_share = 0.5;
 
 /* ---- at rest ---- */
@@ -58,7 +58,7 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* one step on the clock; false: it cannot go on */
+/* one timed step; an error: it cannot continue */
 static pal_err timed_step(pal_study_world *w, double *ms, int max, int *n_ms, pal_diagnostic *diag)
 {
     pal_world_wake(w->world);
@@ -71,7 +71,7 @@ static pal_err timed_step(pal_study_world *w, double *ms, int max, int *n_ms, pa
     return PAL_ERR_OK;
 }
 
-/* steps for the clock alone, until there are enough */
+/* runs further steps for timing only, until there are enough */
 static pal_err only_time(pal_study_world *w, double *ms, int max, int *n_ms, pal_diagnostic *diag)
 {
     double start = pal_clock_s();
@@ -80,7 +80,7 @@ static pal_err only_time(pal_study_world *w, double *ms, int max, int *n_ms, pal
     return PAL_ERR_OK;
 }
 
-/* frames lie between steps: linear from the one before to the one after; way NULL: for the clock alone */
+/* Frames lie between steps and are interpolated linearly. way NULL: timing only. */
 static pal_err follow(pal_study_job *job, pal_study_world *w, double (*way)[3], double *ms, int max, int *n_ms,
                       pal_diagnostic *diag)
 {
@@ -101,7 +101,7 @@ static pal_err follow(pal_study_job *job, pal_study_world *w, double (*way)[3], 
     return PAL_ERR_OK;
 }
 
-/* the same way from rest as often as it takes, so that short steps are timed as well as long ones */
+/* repeats the trajectory from rest until short steps are timed as well as long ones */
 static pal_err repeat(pal_study_job *job, pal_study_world *w, double *ms, int max, int *n_ms, pal_diagnostic *diag)
 {
     pal_err err = PAL_ERR_OK;
@@ -115,7 +115,8 @@ static pal_err repeat(pal_study_job *job, pal_study_world *w, double *ms, int ma
     }
 }
 
-/* a factor's entries, floats, forwards and backwards, as fast as so much is read as all that a step may go through */
+/* Time to read a factor's entries (float) forwards and backwards, at the read rate for all data that a step may
+ * access. */
 static double read_ms(const pal_world *world)
 {
     pal_solve_report report;
@@ -132,7 +133,7 @@ pal_err pal_study_trajectory(pal_study_job *job, const pal_configuration *settin
     int n_substep = pal_world_substeps(w.world);
     double work = (double)n_substep * w.body->n_node * job->seconds / w.set->scene.step_s;
     pal_err err = pal_study_apply_load(job, &w, job->load[0], way_share, diag);
-    /* the reference is followed whatever it takes */
+    /* the reference is always followed */
     if (!err && facts && work > max_work) {
         err = only_time(&w, ms, max, n_ms, diag);
         if (!err) err = pal_diagnostic_set(diag, PAL_ERR_BUDGET, "way not followed: %d sub-steps a step", n_substep);
@@ -143,7 +144,7 @@ pal_err pal_study_trajectory(pal_study_job *job, const pal_configuration *settin
         if (!err && ms) err = repeat(job, &w, ms, max, n_ms, diag);
     }
     if (facts) {
-        /* what adapts takes the sub-steps of the finest level that it came to use */
+        /* an adaptive body takes the sub-steps of the finest level it reached */
         facts->n_substep = w.body->active ? pal_world_substeps(w.world) : n_substep;
         if (facts->n_node == 0) facts->n_node = pal_body_nodes(w.body);
         facts->prepare_s = w.prepare_s;
@@ -168,7 +169,7 @@ static void compare_ways(const pal_study_job *job, pal_study_point *out)
 
 /* ---- both ---- */
 
-/* the way on the clock; counts when it is the first, or quicker than those before it */
+/* times the trajectory; keeps the result if it is the first or the fastest */
 static pal_err time_way(pal_study_job *job, pal_study_point *out, double (*way)[3], pal_diagnostic *diag)
 {
     double *ms = calloc(MAX_TIMES, sizeof *ms);
@@ -176,13 +177,13 @@ static pal_err time_way(pal_study_job *job, pal_study_point *out, double (*way)[
     pal_study_point facts = *out;
     pal_err err = !ms ? PAL_ERR_MEMORY
                       : pal_study_trajectory(job, &out->measured.setting, way, ms, MAX_TIMES, &n_ms, &facts, diag);
-    /* how fast it reads is a matter of other work as well */
+    /* the read rate also depends on other load of the machine */
     double read = way ? facts.read_ms : fmin(out->read_ms, facts.read_ms);
     if (way) *out = facts;
     out->read_ms = read;
     if (n_ms > 2 * WARM) {
         qsort(ms + WARM, (size_t)(n_ms - WARM), sizeof *ms, compare);
-        /* shorter steps are more of them in the same time: what a step of the scene takes is what can be compared */
+        /* shorter steps are more steps in the same time: compares the cost per step of the scene */
         double share = job->out->step_s / out->measured.setting.step_s;
         double median = share * quantile(ms + WARM, n_ms - WARM, 0.5);
         if (!(out->measured.ms <= median)) {
@@ -203,7 +204,7 @@ pal_err pal_study_time_repeat(pal_study_job *job)
         bool go = !o->progress || o->progress("timed again", (double)i / (n * n_round), o->user);
         pal_diagnostic reason = {{0}};
         if (go && !(p->measured.ms > 0)) continue;
-        /* what went once goes again, or is stopped */
+        /* it succeeded before: an error here can only be a stop */
         if (go) (void)time_way(job, p, NULL, &reason);
         if (!go || !pal_study_continues(job))
             return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped while settings were timed again");

@@ -1,4 +1,4 @@
-/* Studies as JSON and CSV. Every point has the same keys; a table says where they are in memory. */
+/* Studies as JSON and CSV. Every point has the same keys; a table maps them to struct members. */
 #include "server/study/study_store.h"
 
 #include "server/mesh/files/file_bytes.h"
@@ -14,13 +14,13 @@
 
 static const char format[] = "palpate-study-1";
 
-/* numbers of a point, with the range that is taken; may be null where `hole` */
+/* numbers of a point, with their accepted range; may be null where `hole` */
 typedef struct number_key {
     const char *key;
     size_t at;
     double low, high;
     bool hole;
-    bool late; /* studies that were kept before it was there have 0 */
+    bool late; /* studies stored before it existed read as 0 */
 } number_key;
 #define AT(field) offsetof(pal_study_point, field)
 static const number_key number[] = {
@@ -66,7 +66,7 @@ static const char *text_at(const pal_study_point *p, int k)
     return (const char *)p + text[k].at;
 }
 
-/* ---- what a study is of ---- */
+/* ---- identity of the study ---- */
 
 uint64_t pal_study_digest(uint64_t before, const void *bytes, size_t n_byte)
 {
@@ -96,7 +96,7 @@ static uint64_t add_region(uint64_t sum, const pal_region *r)
     return add_numbers(sum, r->grid_density_kg_m3, n);
 }
 
-/* effects that move a body which nobody touches: gravity, inflate, penalty */
+/* effects that move an untouched body: gravity, inflate, penalty */
 static uint64_t add_effect(uint64_t sum, const pal_config_entry *item)
 {
     static const char *const quiet[] = {"tool_push", "tool_grasp", "finite_guard", "sleep"};
@@ -154,7 +154,7 @@ pal_err pal_study_stem(const char *word, const char *folder, char out[PAL_STUDY_
         n = snprintf(out, PAL_STUDY_PATH, "%.*sstudy", (int)(name - word), word);
     else
         n = snprintf(out, PAL_STUDY_PATH, "%.*s_study", stem, word);
-    /* room for an ending */
+    /* room for a file ending */
     if (n < 0 || n + 8 >= PAL_STUDY_PATH)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.80s...: the path is too long", folder ? folder : word);
     return PAL_ERR_OK;
@@ -281,7 +281,7 @@ static pal_err need(const pal_json *json, const cJSON *object, const char *path,
     return pal_json_refuse(json, pal_json_key(at, path, key), "is not there");
 }
 
-/* null is NaN where that may be */
+/* null is NaN where allowed */
 static pal_err get_number(const pal_json *json, const cJSON *object, const char *path, const number_key *k, void *out)
 {
     double value = k->late ? 0 : (double)NAN;
@@ -433,7 +433,7 @@ static bool is_before(const pal_study_point *a, const pal_study_point *b)
 
 void pal_study_order(const pal_study *study, int *out)
 {
-    /* by insertion: equal ones keep their order */
+    /* insertion sort: equal elements keep their order */
     for (int k = 0; k < study->n_point; k++) {
         int at = k;
         for (; at > 0 && is_before(&study->point[k], &study->point[out[at - 1]]); at--) out[at] = out[at - 1];

@@ -1,4 +1,4 @@
-/* A body in a setting: its world, the loads on its nodes, where its points are. */
+/* A body in a configuration: its world, its nodal loads, its points. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/solve/load_case.h"
@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* pieces that a triangle's side is cut into where a load's box may cut it */
+/* pieces of a triangle's side where the box of a load may cut it */
 enum { CUTS = 12 };
 
 void pal_study_close(pal_study_world *w)
@@ -24,7 +24,7 @@ static bool is_tool(const char *name)
     return pal_study_is(name, "tool_push") || pal_study_is(name, "tool_grasp") || pal_study_is(name, "finite_guard");
 }
 
-/* what statics have no use for; few Newton iterations a step, so that one may look on */
+/* Removes what statics do not need; few Newton iterations per step, so that progress can be observed. */
 static pal_err make_still(pal_body_def *body, pal_diagnostic *diag)
 {
     int kept = 0;
@@ -85,7 +85,7 @@ static bool box_meets(const double low[3], const double high[3], const double *x
     return true;
 }
 
-/* shares of the corners in the part of a triangle in a box, by the middles of equal small triangles, m^2 */
+/* Shares of the corners in the part of a triangle inside a box, by the midpoints of equal small triangles, m^2. */
 static void triangle_shares(const double *x[3], const double low[3], const double high[3], double share[3])
 {
     double e[2][3], n[3];
@@ -107,7 +107,7 @@ static void triangle_shares(const double *x[3], const double low[3], const doubl
             }
 }
 
-/* a traction on the vertices of a surface; forces are of the whole area, as much as it may be */
+/* Distributes a traction over the vertices of a surface. A total force is divided by the area found. */
 static pal_err surface_traction(const pal_study_world *w, const pal_problem_load *load, const char *name, double *f,
                                 pal_diagnostic *diag)
 {
@@ -177,7 +177,8 @@ static void node_displacement_m(const pal_body *b, int node, double share, doubl
     pal_axpy3(u, -share, b->node_rest + 3 * (size_t)node);
 }
 
-/* the nearest point of a triangle's plane within it, by its corners' shares; returns the distance */
+/* Projects a point onto the plane of a triangle and clamps it to the triangle. share: weights of the corners.
+ * Returns the distance. */
 static double foot(const double *x[3], const double at[3], double share[3])
 {
     double a[3], b[3], p[3], near[3];
