@@ -67,7 +67,8 @@ static inline int pal_dofs_element_count(const pal_dofs *dofs)
 static inline bool pal_dofs_has(const pal_dofs *dofs, int32_t vertex)
 {
     const pal_levels *l = dofs->levels;
+    if (vertex >= l->n_vertex[l->n_level - 1]) return false;
     int32_t parent = pal_levels_vertex_parent(l, vertex);
-    return vertex < l->n_vertex[l->n_level - 1] && (parent < 0 || dofs->edge_split[parent] > 0);
+    return parent < 0 || dofs->edge_split[parent] > 0;
 }
 #endif
