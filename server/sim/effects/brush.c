@@ -1,10 +1,11 @@
-/* Component brush (brush.h): what sculpting hands do to a body, at its shown nodes.
+/* Component brush (brush.h): the action of sculpting tools on the shown nodes of a body.
  *
  * INFLATE: a triangle with corners x and weight w gives each corner p w / 6 (x1 - x0) x (x2 - x0). With w = 1 over a
- * closed surface that is p times the gradient of its volume: no net force, no net moment. A triangle is pushed by two
- * times its area at rest at most: what grows with what it blows up would have no rest from about E/3 on. A pressure
- * that follows normals has no energy, and its stiffness, which is not symmetric, is left out of the tangent. CURVE: f_i
- * = k_i (begin_i + 4 t_i (1 - t_i) lift - d_i), k_i = stiffness w_i / sum w; energy sum k_i/2 |..|^2. */
+ * closed surface that is p times the gradient of its volume: no net force, no net moment. The area that the pressure
+ * acts on is capped at twice the triangle's rest area; a load that grows with the area it inflates has no
+ * equilibrium from about E/3 on. A follower pressure has no energy; its stiffness is not symmetric and is left out
+ * of the tangent.
+ * CURVE: f_i = k_i (begin_i + 4 t_i (1 - t_i) lift - d_i), k_i = stiffness w_i / sum w; energy sum k_i/2 |..|^2. */
 #include "server/sim/core/brush.h"
 
 #include "server/base/vec3.h"
@@ -13,21 +14,21 @@
 #include <math.h>
 #include <string.h>
 
-/* of a triangle's area at rest, that pressure acts on */
+/* max loaded area over a triangle's rest area */
 static const double max_area = 2;
 
-/* a brush that acts; `now` is what it does now, on its way to `to` */
+/* an active brush; `now` is its present value, which ramps to `to` */
 typedef struct slot {
     pal_brush brush;
-    pal_arena *arena; /* of what follows; NULL: no brush here */
+    pal_arena *arena; /* of the arrays below; NULL: no brush in this slot */
     int n;
     int32_t *item;  /* triangles (INFLATE) or nodes (CURVE)      [n]    */
-    double *weight; /* of triangles; of nodes their share k_i / k [n]    */
-    double *begin;  /* CURVE: places of the nodes when it began  [n][3] */
+    double *weight; /* of triangles; share k_i / k of nodes [n] */
+    double *begin;  /* CURVE: positions of the nodes at the start [n][3] */
     double *bow;    /* CURVE: 4 t (1 - t)                        [n]    */
     double now[3];  /* pressure_Pa, or lift_m */
-    double left_s;  /* until `now` is what the brush says */
-    double share;   /* that has come in, 0 to 1 */
+    double left_s;  /* until `now` reaches its target */
+    double share;   /* ramp of the load, 0 to 1 */
     bool ending;
 } slot;
 
@@ -71,7 +72,7 @@ pal_err pal_brush_check(const pal_brush *b, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
-/* ---- what it reaches ---- */
+/* ---- reach ---- */
 
 static double weight_at(const pal_brush *b, const double middle[3], const double x[3])
 {
@@ -80,7 +81,7 @@ static double weight_at(const pal_brush *b, const double middle[3], const double
     return pal_stroke_weight(&stroke, x);
 }
 
-/* the nearest place of the handle to x, as t = 0..1 */
+/* the parameter t = 0..1 of the handle's point nearest to x */
 static double along(const pal_brush *b, const double x[3], double at[3])
 {
     double way[3], off[3];
@@ -97,7 +98,7 @@ static const double *corner_at(const pal_body *body, const double *x, int t, int
     return x + 3 * (size_t)body->shown_node[body->surface->tri[3 * (size_t)t + (size_t)c]];
 }
 
-/* weight of triangle or shown vertex i, and what a node of a handle needs */
+/* weight of triangle or shown vertex i, and for a node of a handle its t and position */
 static double reach(const pal_body *body, const pal_brush *b, int i, double *t)
 {
     double at[3] = {0, 0, 0};
@@ -110,7 +111,7 @@ static double reach(const pal_body *body, const pal_brush *b, int i, double *t)
     return weight_at(b, at, x);
 }
 
-/* arrays of a slot for what the brush reaches; weights of a handle sum up to 1 */
+/* allocates the arrays of a slot for the items in reach; the weights of a handle sum to 1 */
 static pal_err fill(const pal_body *body, const pal_brush *b, slot *s, pal_diagnostic *diag)
 {
     const bool curve = b->kind == PAL_BRUSH_CURVE;
@@ -185,7 +186,7 @@ pal_err pal_brush_set(void *self, const pal_body *body, int slot_index, const pa
     if (b->kind == PAL_BRUSH_CURVE && !(pal_norm3(b->lift_m) <= 10 * body->length_scale_m))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: lift_m of %g m, body \"%s\" takes up to %g",
                                   pal_norm3(b->lift_m), body->name, 10 * body->length_scale_m);
-    /* 10 E: beyond it loads on nodes are shortened, and sub-steps become too many to be live */
+    /* 10 E: beyond it node loads are capped, and there are too many sub-steps for real time */
     const double max_Pa = body->load_cap_N / (body->edge_m * body->edge_m);
     if (b->kind == PAL_BRUSH_INFLATE && !(fabs(b->pressure_Pa) <= max_Pa))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: pressure_Pa %g, body \"%s\" takes up to %.3g",
@@ -208,9 +209,9 @@ pal_err pal_brush_set(void *self, const pal_body *body, int slot_index, const pa
     return PAL_ERR_OK;
 }
 
-/* ---- another body in this one's place ---- */
+/* ---- transfer to another body ---- */
 
-/* how far nodes of a handle were from where it began, at a place at rest: the mean of those near, by distance */
+/* displacement of a handle's nodes since its start near a rest position: the distance-weighted mean */
 static void way_back(const slot *s, const pal_body *from, const double x[3], double out[3])
 {
     double sum = 0, near2 = 1e-6 * s->brush.radius_m * s->brush.radius_m;
@@ -278,7 +279,7 @@ static void destroy(void *self)
 
 /* ---- a step ---- */
 
-/* once a step, to its end */
+/* ramps to the end of the step, once per step */
 static void advance(slot *s, double step_s)
 {
     double to[3], left[3];
@@ -311,7 +312,7 @@ static void inflate(const slot *s, const pal_body *body, double *load)
     }
 }
 
-/* from a node of the handle to where it is pulled */
+/* from a node of the handle to its target */
 static void pull(const slot *s, const pal_body *body, int k, double out[3])
 {
     pal_sub3(out, s->begin + 3 * (size_t)k, body->d + 3 * (size_t)s->item[k]);
@@ -358,8 +359,8 @@ static double energy(void *self, const pal_body *body)
     return sum;
 }
 
-/* an edge opposite to corner c couples its ends by p w |way from c to its middle| / 6, as in row inflate; what has come
- * in at the end of the step that follows */
+/* the edge opposite corner c couples its ends by p w |vector from c to its middle| / 6, as in component inflate,
+ * with the ramp at the end of the next step */
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
     const brush_row *row = self;
@@ -396,7 +397,7 @@ static void multiply(void *self, const pal_body *body, double k, double c, const
     }
 }
 
-/* the body is back at rest: no hand is on it */
+/* the body was reset: no brush acts on it */
 static void reset(void *self, const pal_body *body)
 {
     brush_row *row = self;
@@ -404,7 +405,7 @@ static void reset(void *self, const pal_body *body)
     for (int i = 0; i < PAL_TOOL_MAX; i++) row->slot[i].ending = true, row->slot[i].share = 0;
 }
 
-/* while there is a brush the row comes, stays and goes over time */
+/* the load of an active brush changes with time */
 static double settled_s(const void *self)
 {
     (void)self;

@@ -1,15 +1,15 @@
 /* Component cell_elastic: elements of a subdivision solid in their own moving frames (paper A section 3.2-3.4;
  * cell_kernel.h).
  *
- * Key: operator ("polar": displacements from the rest shape rotated by the element's polar rotation, the default |
- * "edges": changes of edge lengths and angles as in the paper, corrected; its forces have no energy, and
- * `energy` gives 1/2 d^' K d^ of them).
+ * Key: operator ("polar", the default: displacements from the rest shape rotated by the element's polar rotation |
+ * "edges": changes of edge lengths and angles as in the paper, corrected; its forces have no energy, and `energy`
+ * gives 1/2 d^' K d^).
  *
- * Acts on nodes: body->d from solid->node_rest, forces to body->f. Moduli are those of solid->samples; when these
- * change (painting, a live edit of the material), the constants are computed again before their next use. Inverted
- * elements run on the edges of their cells (cell_recovery.c), counted and timed in
- * body->safeguards. There is no bound of stiffness: nodes are no degrees of freedom, and solvers that need a limit find
- * it by differences of forces. For the same reason the tangent is given by products only. */
+ * Acts on nodes: reads body->d against solid->node_rest, adds forces to body->f. Moduli are those of solid->samples;
+ * when these change (painting, a live material edit), the constants are recomputed before their next use. Inverted
+ * elements use the edges of their cells (cell_recovery.h) and are counted and timed in body->safeguards. There is no
+ * bound of stiffness, because nodes are not dofs; solvers that need a limit find it by differences of forces. For
+ * the same reason the tangent is given by products only. */
 #include "server/base/clock.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/elements/elastic_law.h"
@@ -72,8 +72,8 @@ static void reset(void *self, const pal_body *body)
     pal_cells_elastic_reset(self);
 }
 
-/* elements overlap far beyond the points' own neighbours: a matrix of nodes would be mostly full. Where volumes are
- * those of control cells, points move what their elements alone would not tell */
+/* A sparsity pattern over nodes would be mostly full, because elements overlap far beyond the neighbours of their
+ * control points. Where volumes are those of control cells, control points move nodes beyond the elements' own */
 static bool couple(void *self, pal_cliques *out)
 {
     const pal_cells_elastic *row = self;
@@ -81,7 +81,7 @@ static bool couple(void *self, pal_cliques *out)
     return row->volume.n > 0;
 }
 
-/* does something that lasts pull at the body: loads set, or a row that stores energy outside of it, as weight does */
+/* true: a lasting force acts on the body: lasting loads or a component with external energy, such as weight */
 static bool is_loaded(const pal_step *step)
 {
     const pal_body *body = step->body;
@@ -102,7 +102,7 @@ static unsigned recover(void *self, pal_step *step)
     return (row->recovery.n_region > 0 ? now : 0) | (changed ? PAL_INVERSION_CHANGED : 0);
 }
 
-/* at rest, which solvers ask for between steps, there are no regions */
+/* at rest, for which solvers ask between steps, there are no inverted regions */
 static void linearise(void *self, const pal_body *body)
 {
     pal_cells_elastic *row = self;

@@ -1,22 +1,22 @@
-/* Component edge_distance: every edge keeps its length. C = (l - l0)/l0, E = k/2 C^2, f_i = +(k C + c C') (d/l)/l0 and
- * the opposite on j, d from i to j (paper B section 4.1, F_D).
+/* Component edge_distance: every edge keeps its length. C = (l - l0)/l0, E = k/2 C^2, f_i = +(k C + c C') (d/l)/l0
+ * and the opposite on j, d from i to j (paper B section 4.1, F_D).
  *
- * Departures: erratum B1 (the paper's force lacks 1/l0^2). An edge shorter than 1e-9 of its rest length has no
- * direction and takes its rest direction, so that a body collapsed to a plane or a point opens again. Where tetrahedra
- * are inverted its edges keep vectors (spring_recovery.h), whose forces and energy are this row's. */
+ * Departures: erratum B1 (the paper's force lacks 1/l0^2). An edge shorter than 1e-9 of its rest length takes its
+ * rest direction, so that a body collapsed to a plane or a point opens again. Near inverted tetrahedra the edges are
+ * restored as vectors (spring_recovery.h); those forces and that energy belong to this component. */
 #include "server/sim/core/effect_list.h"
 #include "server/sim/springs/spring_recovery.h"
 
 #include <stdlib.h>
 
-/* of (l/l0)^2 */
+/* smallest (l/l0)^2 that gives a direction */
 #define MIN_Q 1e-18
 
 typedef struct edge_distance {
     pal_spring_set row; /* first: see pal_spring_set_material */
     int n_dof;
     double *node_bound; /* sum of 2 q / l0^2 over the edges of each node            [n_dof] */
-    double *node_J;     /* constants at the nodes, of a grid; NULL: all are row.k_J [n_dof] */
+    double *node_J;     /* constants at the nodes, of a grid; NULL: row.k_J everywhere [n_dof] */
 } edge_distance;
 
 static void sum_bounds(edge_distance *e)
@@ -68,7 +68,7 @@ PAL_INLINE void kernel(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3],
     f[0][0] = s * dx, f[0][1] = s * dy, f[0][2] = s * dz;
 }
 
-/* adds what the kernel leaves out: edges without length push their ends apart along the rest direction */
+/* adds what the kernel omits: edges without length push their ends apart along the rest direction */
 static void reopen(const pal_spring_set *row, const pal_body *body)
 {
     for (int i = 0; i < row->n_item; i++) {
@@ -114,14 +114,14 @@ static void reset(void *self, const pal_body *body)
     if (body->recovery) pal_spring_recovery_reset(body->recovery);
 }
 
-/* what untangles does not sleep, however still it stands */
+/* a body under inversion recovery does not sleep, however slow it is */
 static double settled_s(const void *self)
 {
     return ((const edge_distance *)self)->row.n_off > 0 ? INFINITY : 0;
 }
 
-/* |g| = 1/l0 at both ends whatever the deformation; the stiffness across the edge, k C/(l l0), is never more for l > l0
- * and is none for l < l0 */
+/* |g| = 1/l0 at both ends whatever the deformation; the stiffness across the edge, k C/(l l0), is at most that along
+ * it for l > l0 and zero for l < l0 */
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
     const edge_distance *e = self;
@@ -131,12 +131,12 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 static void damping(void *self, const pal_body *body, double *bound_Ns_m)
 {
     const edge_distance *e = self;
-    /* of patches: stiffness times their time; nodes of none have less */
+    /* of inverted regions: stiffness times duration; nodes outside have less */
     const double c_Js = e->row.spring.c_Js + (e->row.n_off > 0 ? body->recovery->damp_s * e->row.spring.k_J : 0);
     for (int i = 0; i < body->n_dof; i++) bound_Ns_m[i] += c_Js * e->node_bound[i];
 }
 
-/* with regions the weights are others by now */
+/* material regions change the weights */
 static pal_err edit(void *self, const pal_body *body, const pal_material *material, pal_diagnostic *diag)
 {
     edge_distance *e = self;
@@ -145,7 +145,7 @@ static pal_err edit(void *self, const pal_body *body, const pal_material *materi
     return PAL_ERR_OK;
 }
 
-/* the constants of regions at the nodes: the means over their springs */
+/* constants of material regions at the nodes: means over their springs */
 static void measure_regions(const pal_spring_set *row, double *sum, double *volume_m3)
 {
     for (int i = 0; i < 2 * row->n_item; i++) {
@@ -157,8 +157,8 @@ static void measure_regions(const pal_spring_set *row, double *sum, double *volu
     }
 }
 
-/* the constant as the scene gives it, before the springs' weights: those differ from edge to edge of a lattice, and a
- * uniform body would look chequered */
+/* the constant as the scene gives it, before the springs' weights, which differ between edges of a lattice and would
+ * make a uniform body look chequered */
 static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
 {
     const edge_distance *e = self;

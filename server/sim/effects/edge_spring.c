@@ -1,17 +1,17 @@
-/* Component edge_spring: the springs of an adaptive surface, f = -[k (l - l0) + c (dv.dx)/l] dx/l on the first end and
- * the opposite on the second (paper C, eq. 2). Keys: k_N_m, c_Ns_m, of a spring of level 0.
+/* Component edge_spring: the springs of an adaptive surface, f = -[k (l - l0) + c (dv.dx)/l] dx/l on the first end
+ * and the opposite on the second (paper C, eq. 2). Keys: k_N_m, c_Ns_m, of a spring of level 0.
  *
- * Every spring has k times its share (adaptive_surface.h: the law of the body) and c in the same proportion (paper C,
- * eq. 8: KD_l = KD_0 KS_l / KS_0); with material regions k times E at its middle at rest over the body's E besides.
- * Constants that are not given follow the material: k = sqrt(3)/2 E thickness, c = 0.02 sqrt(k m_0). spring_ramp
- * multiplies k.
+ * Every spring has k times its share (the body's law, adaptive_surface.h) and c in the same proportion (paper C, eq.
+ * 8: KD_l = KD_0 KS_l / KS_0). With material regions, k is also scaled by E at the spring's middle at rest over the
+ * body's E. Constants that are not given follow the material: k = sqrt(3)/2 E thickness, c = 0.02 sqrt(k m_0).
+ * spring_ramp multiplies k.
  *
- * Departures: a spring shorter than 1e-9 of its rest length has no direction. It takes that from rest, without damping,
- * so that a collapsed surface opens again.
+ * Departures: a spring shorter than 1e-9 of its rest length takes its rest direction, without damping, so that a
+ * collapsed surface opens again.
  *
- * The springs in use are taken from the shell whenever its revision is a new one. Their ends stand in
- * body->active_nodes, in the order of shell->node: place and velocity of an end are one load, and a force is one load
- * and one store. */
+ * The list of active springs is rebuilt when the revision of the surface changes. Their ends are indices into
+ * body->active_nodes in the order of shell->node, so position and velocity of an end are one load, and a force is
+ * one load and one store. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/surface/active_nodes.h"
@@ -19,10 +19,10 @@
 
 #include <math.h>
 
-/* of (l/l0)^2 */
+/* smallest (l/l0)^2 that gives a direction */
 #define MIN_Q 1e-18
 
-/* springs at a time, so that the processor has several blocks under way */
+/* springs per batch, so that the processor has several blocks in flight */
 enum { BATCH = 8 };
 
 typedef struct edge_spring {
@@ -30,13 +30,13 @@ typedef struct edge_spring {
     double thickness_m;
     bool k_given, c_given;
     const pal_adaptive_surface *adaptive;
-    double young_Pa; /* of the body, to which E of regions is compared */
+    double young_Pa; /* of the body, the reference for E of regions */
     float *young;    /* E at the middles of all edges, NaN: the body's; NULL: no regions [n edges] */
 
-    uint64_t revision; /* of the shell, what follows was made for; 0: none yet */
+    uint64_t revision; /* revision of the surface that the arrays below belong to; 0: none yet */
     int n_block, n_node;
-    int32_t *place; /* of a vertex in shell->node                                       [finest vertices] */
-    uint32_t *end;  /* 8 times the places of both ends, in blocks of 8: first, then second [n_block][2][8] */
+    int32_t *place; /* index of a vertex in shell->node [finest vertices] */
+    uint32_t *end;  /* 8 times the indices of both ends, in blocks of 8: first, then second [n_block][2][8] */
     double *w2, *q; /* 1/l0^2 and share; 0 in lanes without a spring                       [n_block][8]    */
     double *bound;  /* sum of 2 q over the springs of a node                               [n_node]        */
 } edge_spring;
@@ -46,7 +46,7 @@ static double derived_k(const edge_spring *e, double young_Pa)
     return e->k_given ? e->k_N_m : sqrt(3) / 2 * young_Pa * e->thickness_m;
 }
 
-/* a live edit changes the masses after the rows */
+/* a live material edit changes the masses after the components */
 static double damping_now(const edge_spring *e)
 {
     return e->c_given ? e->c_Ns_m : 0.02 * sqrt(e->k_N_m * e->adaptive->level_mass_kg[0]);
@@ -106,7 +106,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     PAL_TRY(pal_entry_read_number(item, "k_N_m", 0, 1e60, &e->k_N_m, build->diag));
     PAL_TRY(pal_entry_read_number(item, "c_Ns_m", 0, 1e60, &e->c_Ns_m, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
-    /* the model's key, also for an entry that stands in the place of the model's row */
+    /* the model's key, also for an entry that replaces the model's component */
     pal_config_entry model = build->def->model;
     e->thickness_m = 0.003;
     PAL_TRY(pal_entry_read_number(&model, "thickness_m", 0, 1e9, &e->thickness_m, build->diag));
@@ -119,8 +119,8 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     return PAL_ERR_OK;
 }
 
-/* the springs in use. Neighbours in the shell's list stand in other blocks: springs side by side have no end in common,
- * for whose force the next would have to wait */
+/* the active springs, distributed over blocks so that adjacent springs of the list share no end, whose force update
+ * the next would have to wait for */
 static void take_springs(edge_spring *e)
 {
     const pal_adaptive_surface *adaptive = e->adaptive;
@@ -227,7 +227,7 @@ static bool spring_ends(const edge_spring *e, int s, int place[2], int32_t verte
     return e->w2[s] > 0;
 }
 
-/* what the vectors leave out: springs without length push their ends apart along the rest direction */
+/* adds what the SIMD kernel omits: springs without length push their ends apart along the rest direction */
 static void reopen(const edge_spring *e, const pal_active_nodes *pack, double k)
 {
     for (int s = 0; s < PAL_LANES * e->n_block; s++) {
@@ -275,7 +275,7 @@ static double energy(void *self, const pal_body *body)
     return e->k_N_m * e->adaptive->spring_ramp * half;
 }
 
-/* k at both ends along the spring; across it k (1 - l0/l) is never more for l > l0 and none for l < l0 */
+/* k along the spring at both ends; across it k (1 - l0/l) is at most that for l > l0 and zero for l < l0 */
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
     edge_spring *e = self;

@@ -8,7 +8,7 @@
 
 #include <stdlib.h>
 
-/* of (A/A0)^2 */
+/* smallest (A/A0)^2 that gives a normal */
 #define MIN_Q 1e-24
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)

@@ -1,17 +1,17 @@
-/* A field shown in colour: displacement, von Mises stress, strain energy density, edge stiffness, largest strain
- * or volume distortion at the shown vertices. The row is there while somebody looks: pal_world_field adds it to a
- * running world, or the scene has an entry for it. It takes no part in the simulation: nothing that moves reads it.
+/* Component field_output: a field shown in colour at the shown vertices: displacement, von Mises stress, strain
+ * energy density, edge stiffness, largest strain or volume distortion. It exists while an observer asks for it
+ * (pal_world_field) or where the scene has an entry for it. The simulation does not depend on it.
  *
- * All but displacement: every FORCE component that can measure adds its value times volume to the nodes of its
- * elements, and the volume; a node shows the quotient, the mean of its elements weighted by volume. A shown vertex
- * takes the mean of the nodes that it is skinned to, with the skin's own weights (mesh/volume/skin.h), or is a node
- * itself. Displacement is the distance of a shown vertex from where it is at rest. A number that is not finite shows as
- * 0: that such a body diverged is for its guard to say.
+ * All but displacement: every FORCE component that can measure adds its value times volume, and the volume, to the
+ * nodes of its elements; a node shows the quotient, the volume-weighted mean of its elements. A shown vertex takes
+ * the mean of the nodes it is skinned to, with the skin's weights (mesh/volume/skin.h), or is a node itself.
+ * Displacement is the distance of a shown vertex from its rest position. A non-finite number is shown as 0; the
+ * finite guard reports divergence.
  *
- * An adaptive body (adaptive_surface.h) shows 0 at vertices out of use.
+ * An adaptive body (adaptive_surface.h) shows 0 at inactive vertices.
  *
- * Keys: field ("displacement" | "von_mises" | "energy" | "stiffness" | "strain" | "distortion"), rate_hz (10): so often
- * in simulated time it is taken again. */
+ * Keys: field ("displacement" | "von_mises" | "energy" | "stiffness" | "strain" | "distortion"), rate_hz (10:
+ * updates per simulated second). */
 #include "server/sim/core/effect_list.h"
 
 #include <math.h>
@@ -23,7 +23,7 @@ typedef struct field_output {
     double period_s, next_s;
     double *sum, *volume_m3; /* NULL: displacement [n_node] */
     pal_body *body;
-    uint64_t revision; /* of the triangles at the last values */
+    uint64_t revision; /* topology revision at the last values */
 } field_output;
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
@@ -113,7 +113,7 @@ static void measured(field_output *out, const pal_step *step)
 static pal_err run(void *self, pal_step *step)
 {
     field_output *out = self;
-    /* the step nearest to the time wanted, so that a period of whole steps stays one */
+    /* update in the step nearest to the due time, so that a period of whole steps stays one */
     if (step->time_s + 0.5 * step->dt_s < out->next_s) return PAL_ERR_OK;
     if (out->revision != step->body->revision) memset(out->shown.value, 0, sizeof(float) * (size_t)step->body->n_shown);
     out->revision = step->body->revision;
@@ -134,7 +134,7 @@ static void reset(void *self, const pal_body *body)
     ((field_output *)self)->next_s = -INFINITY;
 }
 
-/* nobody looks any more: the body forgets where the field was */
+/* no observer is left: clear the body's pointer to the field */
 static void destroy(void *self)
 {
     field_output *out = self;

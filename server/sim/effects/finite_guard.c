@@ -1,12 +1,13 @@
-/* Freezes a body that diverges, so that one bad body never takes the session with it.
+/* Component finite_guard: freezes a body that diverges, so that the session survives it.
  *
- * Diverged means: a position or velocity is not finite, a node is farther than `reach` box diagonals from its rest
- * place, or the root mean square speed is beyond `speed_m_s`. The last good positions (a copy of every step) come back,
- * standing still, and the body stays as it is until reset: body->frozen is what says so (the world's step reports it),
- * body->reason names the point, the element and the number.
- * Of a body whose points carry nodes (body.interpolation) the points are looked at and put back, the speed is that of
- * the nodes. Of an adaptive body (adaptive_surface.h) the active points are looked at and copied. Which are active is
- * not taken back: one that came into use since the last good state is put between the ends of its edge. */
+ * A body diverges when a position or velocity is not finite, a node is farther than `reach` box diagonals from its
+ * rest position, or the root mean square speed exceeds `speed_m_s`. The guard restores the last good positions
+ * (copied every step) with zero velocity, and the body stays frozen until reset. body->frozen marks it (the world's
+ * step reports it); body->reason names the point, the element and the number.
+ * Of a body whose nodes are interpolated from control points (body.interpolation) the control points are checked and
+ * restored; the speed is that of the nodes. Of an adaptive body (adaptive_surface.h) the active points are checked
+ * and copied. The set of active points is not restored: a point that became active since the last good state is
+ * placed between the ends of its edge. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect.h"
 #include "server/sim/core/sums.h"
@@ -17,14 +18,14 @@
 typedef struct finite_guard {
     pal_body *body;
     double *x;      /* last good positions [n_dof][3] */
-    uint32_t *kept; /* turn in which a point was copied last, of an adaptive body; else NULL [n_dof] */
+    uint32_t *kept; /* step index of the last copy of a point, of an adaptive body; else NULL [n_dof] */
     uint32_t turn;
     double reach;
     double speed_m_s, asked_speed_m_s; /* in use; as the scene gave it, 0: from the material */
     double gravity_m_s2, mass_kg;
 } finite_guard;
 
-/* far above what tissue does: 20 times the shear wave and free-fall speeds */
+/* far above speeds of tissue: 20 times the shear wave and free-fall speeds */
 static double auto_speed(const finite_guard *guard, const pal_material *material)
 {
     double wave = sqrt(material->young_Pa / material->density_kg_m3);
@@ -44,7 +45,7 @@ static void keep(finite_guard *guard, const pal_body *body)
     memcpy(guard->x, body->x, 3 * sizeof(double) * (size_t)body->n_dof);
 }
 
-/* where a point of an adaptive body was in the last good state, or would have been */
+/* position of a point of an adaptive body in the last good state; interpolated if it was inactive */
 static void last_place(const finite_guard *guard, const pal_levels *levels, int32_t i, double x[3])
 {
     int32_t edge = pal_levels_vertex_parent(levels, i);
@@ -124,8 +125,8 @@ static bool sound(const finite_guard *guard, const pal_body *body)
     return far == 0 && energy <= guard->mass_kg * guard->speed_m_s * guard->speed_m_s;
 }
 
-/* names what is out of bounds: no number, the point that is farthest out, or the fastest one with the mean that
- * is judged */
+/* describes the violation: a non-finite number, the farthest point, or the fastest point with the mean speed that is
+ * tested */
 static void tell(const finite_guard *guard, pal_body *body)
 {
     double far_m = 0, fast_m_s = 0, limit = guard->reach * body->length_scale_m;
@@ -154,7 +155,7 @@ static pal_err run(void *self, pal_step *step)
 {
     finite_guard *guard = self;
     pal_body *body = step->body;
-    /* a body that the solver froze for a state that is not finite comes here frozen and gets its last good state too */
+    /* a body that the solver froze for a non-finite state is restored here too */
     if (sound(guard, body)) {
         if (!body->frozen) keep(guard, body);
         return PAL_ERR_OK;

@@ -43,7 +43,7 @@ static double energy(void *self, const pal_body *body)
     int i = 0;
     for (int k = 0; k < pal_body_nodes(body) && body->active; k++)
         sum += m[body->active[k]] * pal_dot3(row->g, body->d + 3 * body->active[k]);
-    /* in lanes: implicit solvers ask twice a step */
+    /* SIMD: implicit solvers call it twice per step */
     for (; i + 8 <= n; i += 8)
         for (int l = 0; l < 8; l++) lane[l] += m[i + l] * pal_dot3(row->g, body->d + 3 * (i + l));
     for (; i < n; i++) sum += m[i] * pal_dot3(row->g, body->d + 3 * i);

@@ -1,12 +1,12 @@
 /* Component hex_elastic: elastic voxel hexahedra, one per voxel of the body (elastic_hex.h).
  *
- * Keys: element ("hex8_bbar": mean dilatation, the default | "hex8": full integration), law ("corotational" | "linear"
- * | "neo_hookean"), fill (true: a voxel counts with the share of it that lies inside the surface, at least 0.02),
- * recover (true: the body runs on its five-tetrahedra split while a corner is inverted, and is straightened when it
- * stays so, elastic_tet.h; not for linear).
+ * Keys: element ("hex8_bbar": mean dilatation, the default | "hex8": full integration), law ("corotational" |
+ * "linear" | "neo_hookean"), fill (true: the stiffness of a voxel is scaled by its fraction inside the surface, at
+ * least 0.02), recover (true: while a corner is inverted the body uses its five-tetrahedra split, and a persistent
+ * inversion is straightened, elastic_tet.h; not for linear).
  *
- * The tangent is taken at linearise, and with it the decision on inversion recovery; without an implicit solver the
- * decision is taken whenever forces are. */
+ * The tangent and the decision on inversion recovery are taken at linearise; without an implicit solver the decision
+ * is taken at every evaluation of forces. */
 #include "server/base/clock.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/elements/elastic_hex.h"

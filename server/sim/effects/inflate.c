@@ -1,19 +1,18 @@
-/* Component inflate: what a closed hollow body is filled with pushes its walls. f_i = p dV/dx_i, V the volume within
- * the drawn triangles (watertight on every mixture of levels), dV/dx_i a third of the area normals of the triangles at
- * i. Without net force and moment, whatever the shape.
+/* Component inflate: the content of a closed hollow body exerts pressure on its walls. f_i = p dV/dx_i, where V is
+ * the volume within the drawn triangles (watertight for every mixture of levels) and dV/dx_i is a third of the area
+ * normals of the triangles at i. Net force and net moment are zero for every shape.
  *
  * With s = V/V_rest, both of the triangles drawn now, so that a switch of level does not change s:
  *   kind "pressure"  p = pressure_Pa
- *   kind "gas"       p = pressure_Pa + absolute_Pa (1/s - 1), the temperature kept: p_absolute V = const. Below
- *                    s = 1/11, squeezed flat or turned inside out, the second part stays at 10 absolute_Pa: finite, and
- *                    blowing the body up again
- *   kind "fluid"     p = pressure_Pa + bulk_Pa (1 - s), the second part at most 10 bulk_Pa either way
- * The energy is -V_0 times the integral of p over s from 1, with V_0 the rest volume of the finest level; forces are
- * its gradient. A coarse level, whose volume is a little less, so gets a pressure that is a little more and does the
- * same work. pressure_Pa > 0 inflates, < 0 sucks; it is blended in over the first ramp_s of simulated time, again
- * after a reset.
+ *   kind "gas"       p = pressure_Pa + absolute_Pa (1/s - 1), isothermal: p_absolute V = const. Below s = 1/11
+ *                    (squeezed flat or everted) the second part stays at 10 absolute_Pa: finite, and reinflating
+ *   kind "fluid"     p = pressure_Pa + bulk_Pa (1 - s), the second part within +-10 bulk_Pa
+ * The energy is -V_0 times the integral of p over s from 1, where V_0 is the rest volume of the finest level; forces
+ * are its gradient. A coarse level has a slightly smaller volume, gets a slightly larger pressure and does the same
+ * work. pressure_Pa > 0 inflates, < 0 deflates; it ramps up over the first ramp_s of simulated time, again after a
+ * reset.
  *
- * Pieces that do not hang together share one volume. A surface whose faces look inwards is turned.
+ * Disconnected parts share one volume. A surface whose faces point inwards is reversed.
  * Keys: kind ("pressure"), pressure_Pa (0), absolute_Pa (101325, gas), bulk_Pa (20000, fluid), ramp_s (0.5). */
 #include "server/base/vec3.h"
 #include "server/sim/core/blend.h"
@@ -22,7 +21,7 @@
 
 #include <string.h>
 
-/* least rest volume over S^3 */
+/* min rest volume over S^3 */
 #define MIN_FILL 1e-9
 
 typedef enum filling { PRESSURE, GAS, FLUID } filling;
@@ -30,14 +29,14 @@ typedef enum filling { PRESSURE, GAS, FLUID } filling;
 typedef struct inflate {
     filling kind;
     double pressure_Pa, stiff_Pa, ramp_s; /* stiff_Pa: absolute_Pa or bulk_Pa             */
-    double share;                         /* of pressure_Pa at the last run               */
+    double share;                         /* ramp of pressure_Pa at the last run */
     double fine_m3;                       /* V_0, signed                                  */
     double rest_m3;                       /* V_rest of the triangles at `revision`        */
     uint64_t revision;
     double *gradient; /* dV/dx_i, m^2, of the active nodes [n_node][3] */
 } inflate;
 
-/* stiff parts of pressure are at most this often stiff_Pa */
+/* max of the stiff part of the pressure over stiff_Pa */
 static const double max = 10;
 
 static pal_err read_keys(inflate *row, pal_config_entry *item, pal_diagnostic *diag)
@@ -111,7 +110,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     return PAL_ERR_OK;
 }
 
-/* V_rest of what is drawn now; where that encloses next to nothing, that of the finest level */
+/* V_rest of the drawn triangles; if they enclose almost nothing, that of the finest level */
 static void follow(inflate *row, const pal_adaptive_surface *adaptive)
 {
     if (row->revision == adaptive->revision) return;
@@ -120,8 +119,8 @@ static void follow(inflate *row, const pal_adaptive_surface *adaptive)
     if (!(row->rest_m3 / row->fine_m3 > 0.01)) row->rest_m3 = row->fine_m3;
 }
 
-/* row->gradient of the active nodes at the present positions; returns V. On a closed surface the area normals give the
- * exact gradient, and V is a third of the sum of x . dV/dx */
+/* Sets row->gradient of the active nodes at the present positions; returns V. On a closed surface the area normals
+ * give the exact gradient, and V is a third of the sum of x . dV/dx */
 static double measure_volume(inflate *row, const pal_body *body)
 {
     const pal_adaptive_surface *adaptive = body->model.adaptive;
@@ -173,7 +172,8 @@ static answer answer_to(const inflate *row, double s)
     return row->kind == GAS ? answer_gas(s) : row->kind == FLUID ? answer_fluid(s) : (answer){0};
 }
 
-/* p V_0/V_rest: the force is that times row->gradient; s and the gradient at the present positions */
+/* returns p V_0/V_rest, the factor of row->gradient in the force; also sets s and the gradient at the present
+ * positions */
 static double push(inflate *row, const pal_body *body, double *s)
 {
     follow(row, body->model.adaptive);
@@ -205,9 +205,9 @@ static double energy(void *self, const pal_body *body)
     return -fabs(row->fine_m3) * sum;
 }
 
-/* Two parts. The change of p stiffens along g = dV/dx alone: k g g', whose largest w^2, k sum of g.g/m over the free
- * nodes, is taken at every node. And at constant p the edge (i, j) between corners k and l couples its ends by
- * p |x_k - x_l|/6, at most the way from both to its middle */
+/* Two parts. The change of p adds stiffness along g = dV/dx only: k g g', whose largest w^2, k times the sum of
+ * g.g/m over the free nodes, is applied at every node. At constant p the edge (i, j) between corners k and l couples
+ * its ends by p |x_k - x_l|/6, at most the distances from both to its middle */
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
     inflate *row = self;
@@ -216,7 +216,7 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
     (void)push(row, body, &s);
     const answer now = answer_to(row, s);
     double w = fabs(row->fine_m3 / row->rest_m3), k = row->stiff_Pa * now.slope * w / fabs(row->rest_m3);
-    /* all of pressure_Pa, whatever has come in so far: a limit is kept while nodes hardly move */
+    /* all of pressure_Pa, whatever the ramp: a limit is reused while nodes hardly move */
     double p = w * (fabs(row->pressure_Pa) + row->stiff_Pa * fabs(now.value));
     for (int n = 0; n < body->n_active; n++) {
         int i = pal_body_point(body, n);

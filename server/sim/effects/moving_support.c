@@ -1,13 +1,14 @@
-/* Component moving_support: nodes with a prescribed motion, once or there and back (breathing).
+/* Component moving_support: nodes with a prescribed motion, single or periodic (breathing).
  *
- * A node at X at rest is at  c + R(s angle) (X - c) + s shift  at time t, c being the centroid of the nodes at rest and
- * R the rotation about `turn_axis`. s rises smoothly from 0 to 1 in rise_s, (1 - cos(pi t / rise)) / 2, within one step
- * of the scene at least, and stays; with period_s it is multiplied by (1 - cos(2 pi t / period)) / 2. In each sub-step
- * the nodes get the velocity that brings them to their place at its end, which solvers keep (PAL_PRESCRIBED). The path
- * depends on time alone, so a restart or another sub-step gives the same places.
+ * A node at X at rest is at  c + R(s angle) (X - c) + s shift  at time t, where c is the centroid of the nodes at
+ * rest and R the rotation about `turn_axis`. s rises smoothly from 0 to 1 within rise_s, (1 - cos(pi t / rise)) / 2,
+ * but no faster than in one step of the scene, and stays 1; with period_s it is multiplied by (1 - cos(2 pi t /
+ * period)) / 2. In each sub-step the nodes get the velocity that brings them to their position at its end; solvers
+ * do not change it (PAL_PRESCRIBED). The path depends on time only, so a restart or another sub-step gives the same
+ * positions.
  *
- * Keys: those of rest_region.h, shift_m (0 0 0), turn_axis (0 0 1), turn_deg (0), rise_s (0), period_s (0: s stays 1).
- */
+ * Keys: those of rest_region.h, shift_m (0 0 0), turn_axis (0 0 1), turn_deg (0), rise_s (0), period_s (0: s stays
+ * 1). */
 #include "server/base/vec3.h"
 #include "server/sim/contact/rest_region.h"
 #include "server/sim/core/effect_list.h"
@@ -84,7 +85,7 @@ static pal_err run(void *self, pal_step *step)
         pal_add3(move, move, m->centre);
         pal_axpy3(move, s, m->shift_m);
         pal_sub3(move, move, body->x + k);
-        /* rounding is no motion */
+        /* ignore displacements within rounding */
         bool arrived = pal_norm3(move) <= 1e-14 * body->length_scale_m;
         pal_scale3(v, arrived ? 0 : 1 / step->dt_s, move);
     }

@@ -1,13 +1,13 @@
-/* Component penalty: nodes held near their rest position by springs (paper A section 3.3: "constraints via the penalty
- * method"), where supports remove the dofs.
+/* Component penalty: springs pull nodes to their rest positions (paper A section 3.3: "constraints via the penalty
+ * method"); supports remove the dofs instead.
  *
- *     f_i = -k w_i (x_i - X_i),  w_i the node's share of the mass of all, so that refinement changes nothing
+ *     f_i = -k w_i (x_i - X_i),  w_i the node's share of the total mass, so that refinement changes nothing
  *
- * k is the stiffness against moving all nodes as one: under a force f they give way by f / k. Explicit solvers take
- * their step from it: a stiffer component asks for more sub-steps.
+ * k is the stiffness against a translation of all nodes: under a force f they move by f / k. Explicit solvers derive
+ * their step from it: a stiffer component needs more sub-steps.
  *
- * Keys: those of rest_region.h, k_N_m (100 E S, S the box diagonal). A k that is not given follows a live edit of the
- * material. */
+ * Keys: those of rest_region.h, k_N_m (100 E S, S the box diagonal). A k that is not given follows a live material
+ * edit. */
 #include "server/base/vec3.h"
 #include "server/sim/contact/rest_region.h"
 #include "server/sim/contact/tuning.h"
@@ -79,7 +79,7 @@ static double energy(void *self, const pal_body *body)
     return 0.5 * p->k_N_m * sum;
 }
 
-/* of nodes that are dofs; solvers of interpolated nodes look at the forces */
+/* bounds only where nodes are dofs; solvers of interpolated nodes take differences of forces */
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
     const penalty *p = self;

@@ -1,30 +1,31 @@
-/* Component refine: splits the faces of a shell where it is pressed, moves or bends, and joins them where it is quiet
- * (C, criterion for refinement and simplification, fig. 2). Once in every_s of simulated time
+/* Component refine: splits the faces of an adaptive surface where it is pressed, moves or bends, and joins them
+ * where it is quiet (paper C, criterion for refinement and simplification, fig. 2). Once in every_s of simulated
+ * time
  *
  *   split   every leaf that has a node beyond a threshold, as a corner or hanging on a side, by one level
- *   join    every face whose children are leaves when all their corners are below half of every threshold, and the
- *           middles of its edges stand where they would be put if it were split now: the coarse face would lose less
- *           bend than a quarter of the threshold, so that it is not split again for what it has just lost
+ *   join    every face whose children are leaves if all their corners are below half of every threshold and the
+ *           midpoints of its edges are where a split would put them: the coarse face loses less curvature than a
+ *           quarter of the threshold, so that it is not split again for this loss
  *
- * of external force, speed relative to the rigid motion and change of curvature (refine_measure.h).
+ * Thresholds are of external force, speed relative to the rigid motion, and change of curvature (refine_measure.h).
  *
- * Departures. The paper has one threshold for both directions and flickers at it: here a face stays for dwell_s as it
- * has become, also where a finer neighbour would have it split, which is then put off, so that a face switches at most
- * 1/dwell_s times a second; one that was joined too early waits up to 8 times as long the next time. A node that bears
- * a lasting load is not taken away. New nodes are first let down towards balance between the others, which stand still,
- * as long as they hold more energy than there was: a bent coarse face does not strain, but its finer springs would.
- * What one evaluation changes is one switch, and it keeps energy, momentum and angular momentum. The stiffness of
- * springs and of anchors gets one factor each that leaves their energies as they were (where that is more than 0.25 %
- * of the whole beside rigid motion) and goes back to 1 in ramp_s. The velocities of the changed region (new nodes and
- * those of another mass) are changed by a rigid motion, until both momenta of the free nodes are what they were, and
- * their deviations from the region's rigid motion are scaled until the sum of energies is; those of the whole body
- * where the region is too small for that. Velocities are scaled by 1/2 to 2, stiffness by 1/4 to 2.
+ * Departures. The paper has one threshold for both directions and flickers at it. Here a face keeps its state for
+ * dwell_s, also where a finer neighbour would have it split; that split is deferred, so that a face switches at most
+ * 1/dwell_s times a second. A face that was joined too early waits up to 8 times as long the next time. A node with
+ * a lasting load is not removed. New nodes first relax towards equilibrium with the others fixed, while they store
+ * more energy than there was before: a bent coarse face has no strain, but its finer springs would.
+ * The changes of one evaluation are one switch, which conserves energy, momentum and angular momentum. The stiffness
+ * of springs and of anchors gets one factor each that keeps their energies (where the change exceeds 0.25 % of the
+ * total energy without rigid motion) and returns to 1 in ramp_s. The velocities of the changed region (new nodes and
+ * those of changed mass) get a rigid motion that restores both momenta of the free nodes, and their deviations from
+ * the region's rigid motion are scaled to restore the total energy; where the region is too small, those of the
+ * whole body are. Velocities are scaled by 1/2 to 2, stiffness by 1/4 to 2.
  *
- * Keys: force_N (absent: 0.005 k_0 h_0; k_0 the spring constant and h_0 the mean edge of level 0), speed_m_s (absent:
- * 0.05 h_0 sqrt(k_0/m_0)), curvature_1_m (absent: 0.3/h_0); 0 switches a criterion off, and with all three off nothing
- * ever changes. What stands as it was looked at last is looked at again after dwell_s only; until that has found
- * nothing to do, now or later, the body does not sleep (component sleep). dwell_s (0.2), every_s
- * (1/120), max_node (0: any number of nodes), ramp_s (0.15; 0: no factors). */
+ * Keys: force_N (default: 0.005 k_0 h_0; k_0 the spring constant and h_0 the mean edge of level 0), speed_m_s
+ * (default: 0.05 h_0 sqrt(k_0/m_0)), curvature_1_m (default: 0.3/h_0); 0 disables a criterion, and with all three
+ * disabled nothing ever changes. dwell_s (0.2), every_s (1/120), max_node (0: no limit), ramp_s (0.15; 0: no
+ * factors). A body unchanged since the last evaluation is evaluated again only after dwell_s; until that finds no
+ * present or deferred change, the body does not sleep (component sleep). */
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
 #include "server/sim/core/blend.h"
@@ -42,7 +43,7 @@ typedef struct refine {
     pal_body *body;
     pal_refine_measure measure;
     pal_refine_limits limits;
-    bool given_force, given_speed; /* by the scene: a live edit of the material leaves them */
+    bool given_force, given_speed; /* given by the scene: a live material edit does not change them */
     double k_N_m;                  /* given by the model; 0: from the material             */
     double thickness_m, edge_m, kg_per_density;
     double dwell_s, every_s, ramp_s;
@@ -50,21 +51,21 @@ typedef struct refine {
 
     double clock_s, wait_s;           /* simulated since reset; until the next evaluation              */
     double seen_s, seen_load2, way_m; /* clock and sum of squared loads at the last one; no node went farther since */
-    bool put_off;                     /* it had wishes that have to wait for dwell_s                         */
+    bool put_off;                     /* it had requests deferred by dwell_s */
     bool seen_twice;                  /* nothing had moved since the one before, and it changed nothing      */
     uint64_t seen_revision;           /* 0: there was none                                             */
-    uint8_t *patience;                /* twos by which a face waits longer to be joined                  [n faces]  */
-    double *switched_s;               /* clock of a face's last switch                       [n faces]  */
-    uint8_t *wish;                    /* what each leaf of the list, or its parent, shall do [n_slot]   */
-    double *mass_was;                 /* before the switch, where `seen` is its number       [n_vertex] */
+    uint8_t *patience;                /* log2 of the factor on a face's waiting time before it is joined [n faces] */
+    double *switched_s;               /* time of a face's last switch [n faces] */
+    uint8_t *wish;                    /* request of each leaf of the list, or of its parent [n_slot] */
+    double *mass_was;                 /* values before the switch, valid where `seen` is its number [n_vertex] */
     uint64_t *seen;                   /* [n_vertex]                                                     */
-    double *still, *bound_N_m;        /* velocities 0 [n_vertex][3]; stiffness of the rows [n_vertex]   */
-    double spring_s, shape_s;         /* left of the blend of each factor to 1                                */
-    double inner_J;                   /* kinetic beside the rigid motion, before the switch             */
+    double *still, *bound_N_m;        /* zero velocities [n_vertex][3]; stiffness of the components [n_vertex] */
+    double spring_s, shape_s;         /* remaining blend of each factor to 1 */
+    double inner_J;                   /* kinetic energy without the rigid motion, before the switch */
     pal_refine_history report;
 } refine;
 
-/* shares: of the mass, of the energy, of the largest inertia */
+/* fractions: of the mass, of the energy, of the largest inertia */
 static const double mass_changed = 1e-3, ramp_from = 2.5e-3, min_inertia = 1e-6;
 static const double max_factor = 2, min_ramp = 0.25, max_ramp = 2;
 enum { MAX_PATIENCE = 3, LET_DOWN_MAX = 8 };
@@ -87,7 +88,7 @@ static void clear(refine *row)
     row->measure.frame.quat[0] = 1;
 }
 
-/* thresholds that the scene did not give */
+/* defaults of the thresholds */
 static void derive(refine *row, const pal_material *material)
 {
     double k = row->k_N_m > 0 ? row->k_N_m : 0.5 * sqrt(3) * material->young_Pa * row->thickness_m;
@@ -164,16 +165,16 @@ static pal_err material(void *self, const pal_body *body, const pal_material *to
     return PAL_ERR_OK;
 }
 
-/* ---- wishes, from the state as it is ---- */
+/* ---- requests from the present state ---- */
 
-/* has the face kept its state long enough? */
+/* true: the face has kept its state long enough */
 static bool settled(const refine *row, int32_t face)
 {
     bool split = row->adaptive->face_state[face] == PAL_FACE_SPLIT;
     return row->clock_s - row->switched_s[face] >= ldexp(row->dwell_s, split ? row->patience[face] : 0) * (1 - 1e-9);
 }
 
-/* the face is split: was it joined too early? */
+/* true: the face is split and was joined too early */
 static void note_split(refine *row, int32_t face)
 {
     bool early = row->clock_s - row->switched_s[face] < ldexp(row->dwell_s, MAX_PATIENCE);
@@ -184,7 +185,7 @@ static void note_split(refine *row, int32_t face)
     row->switched_s[face] = row->clock_s;
 }
 
-/* may the leaf be split, and with it the coarser neighbours that 2:1 asks for? */
+/* true: the leaf may be split, with the coarser neighbours that the 2:1 rule requires */
 static bool may_split(const refine *row, int32_t face)
 {
     const pal_adaptive_surface *adaptive = row->adaptive;
@@ -214,7 +215,7 @@ static bool wants_split(const refine *row, int32_t leaf)
     return false;
 }
 
-/* does the edge's midpoint stand where the coarse edge would have it, but for a bend far below the threshold? */
+/* true: the edge's midpoint is where the coarse edge places it, up to a deflection far below the threshold */
 static bool is_straight(const refine *row, const pal_body *body, int32_t edge)
 {
     const pal_adaptive_surface *adaptive = row->adaptive;
@@ -241,14 +242,14 @@ static bool wants_join(const refine *row, const pal_body *body, int32_t face)
     return true;
 }
 
-/* the first child speaks for its parent */
+/* the first child represents its parent */
 static int32_t parent_of_first(const pal_levels *levels, int32_t leaf)
 {
     int level = levels->face_level[leaf];
     return level > 0 && (leaf - levels->first_face[level]) % 4 == 0 ? pal_levels_face_parent(levels, leaf) : -1;
 }
 
-/* fills wish for the leaves of the list; false: there is none */
+/* sets the requests of the leaves of the list; false: none */
 static bool take_options(refine *row, const pal_body *body)
 {
     const pal_adaptive_surface *adaptive = row->adaptive;
@@ -278,7 +279,7 @@ static bool grant_options(refine *row, pal_body *body)
     for (int k = 0; k < adaptive->n_leaf; k++)
         if (row->wish[k] == SPLIT && adaptive->face_state[adaptive->leaf[k]] == PAL_FACE_LEAF)
             n_split += (uint64_t)pal_adaptive_split(adaptive, body, adaptive->leaf[k], row->max_node);
-    /* every leaf of the list is split at most once in a switch, by its own wish or a neighbour's */
+    /* every leaf of the list is split at most once in a switch, by its own request or a neighbour's */
     for (int k = 0; k < adaptive->n_leaf && n_split > 0; k++)
         if (adaptive->face_state[adaptive->leaf[k]] == PAL_FACE_SPLIT) note_split(row, adaptive->leaf[k]);
     for (int k = 0; k < adaptive->n_leaf; k++) {
@@ -323,7 +324,7 @@ static bool let_down_once(refine *row, pal_step *step)
     return done;
 }
 
-/* new nodes go towards balance while springs, anchors and the like hold more energy than before the switch */
+/* relaxes new nodes while springs, anchors and similar components store more energy than before the switch */
 static void let_down(refine *row, pal_step *step)
 {
     const pal_body *body = step->body;
@@ -337,7 +338,7 @@ static void let_down(refine *row, pal_step *step)
         if (!let_down_once(row, step)) return;
 }
 
-/* free, and of the changed region, where that is not all of the body */
+/* true: free and of the changed region, unless that is the whole body */
 static bool in_region(const refine *row, const pal_body *body, bool whole, int i)
 {
     if (body->support[i]) return false;
@@ -345,14 +346,14 @@ static bool in_region(const refine *row, const pal_body *body, bool whole, int i
     return fabs(body->mass_kg[i] - row->mass_was[i]) > mass_changed * row->mass_was[i];
 }
 
-/* the factor that makes `now` J what it was; what is nothing beside `other` J is left alone */
+/* the factor that restores the energy `now`, J; 1 where it is negligible beside `other`, J */
 static double ramp_after(double ramp, double was, double now, double other)
 {
     if (!(was > 1e-9 * other) || !(now > 1e-9 * other)) return ramp;
     return fmin(fmax(ramp * was / now, min_ramp), max_ramp);
 }
 
-/* sets the ramps; returns by how much the energy of springs and anchors has grown all the same, J */
+/* sets the ramps; returns the remaining increase of the energy of springs and anchors, J */
 static double keep_elastic(refine *row)
 {
     const pal_refine_balance *before = &row->report.before, *raw = &row->report.raw;
@@ -371,12 +372,12 @@ static double keep_elastic(refine *row)
            raw->shape_J * adaptive->shape_ramp / was[1] - before->shape_J;
 }
 
-/* the region's free nodes as one: their mean motion is rigid, V + Omega x (x - centre) */
+/* rigid part of the motion of the region's free nodes: V + Omega x (x - centre) */
 typedef struct region {
     double mass, centre[3], V[3], turn[3], inertia_axis[9], inertia[3], inner_J;
 } region;
 
-/* I^-1 L; no turn about an axis without inertia */
+/* I^-1 L; no rotation about an axis without inertia */
 static void spin_of(const region *r, const double turn[3], double Omega[3])
 {
     pal_set3(Omega, 0, 0, 0);
@@ -385,7 +386,7 @@ static void spin_of(const region *r, const double turn[3], double Omega[3])
             pal_axpy3(Omega, pal_dot3(r->inertia_axis + 3 * k, turn) / r->inertia[k], r->inertia_axis + 3 * k);
 }
 
-/* velocity beside the rigid motion, and the place beside the centre */
+/* velocity relative to the rigid motion, and position relative to the centre */
 static void beside(const region *r, const double Omega[3], const pal_body *body, int i, double arm[3], double d[3])
 {
     double rigid[3];
@@ -431,9 +432,9 @@ static bool find_region(const refine *row, const pal_body *body, bool whole, reg
     return true;
 }
 
-/* both momenta of the free nodes become those from before, and the kinetic energy that less `gained` J, by the
- * velocities of the changed region, or those of the whole body; false: the region is too small for that and nothing
- * was done, which with the whole body never happens */
+/* Restores both momenta of the free nodes, and the kinetic energy less `gained`, J, by the velocities of the changed
+ * region or of the whole body. false: the region is too small and nothing was changed, which never happens with the
+ * whole body */
 static bool keep_motion(const refine *row, pal_body *body, double gained_J, bool whole)
 {
     const pal_refine_balance *before = &row->report.before, *raw = &row->report.raw;
@@ -451,7 +452,7 @@ static bool keep_motion(const refine *row, pal_body *body, double gained_J, bool
     double rigid_J = 0.5 * (r.mass * pal_dot3(r.V, r.V) + pal_dot3(Omega, r.turn));
     double wanted_J = before->kinetic_J - gained_J - (raw->kinetic_J - rigid_J - r.inner_J) -
                       0.5 * (r.mass * pal_dot3(V, V) + pal_dot3(spin, turn));
-    /* nothing to scale where the region moves as one */
+    /* nothing to scale where the region moves rigidly */
     double scale = r.inner_J > 1e-12 * raw->kinetic_J ? sqrt(fmax(wanted_J, 0) / r.inner_J) : 1;
     bool enough = scale >= 1 / max_factor && scale <= max_factor && r.inertia[0] > min_inertia * r.inertia[2];
     if (!enough && !whole) return false;
@@ -466,14 +467,14 @@ static bool keep_motion(const refine *row, pal_body *body, double gained_J, bool
     return true;
 }
 
-/* all wishes of one evaluation, energy and momentum kept */
+/* executes all requests of one evaluation, conserving energy and momentum */
 static void change(refine *row, pal_step *step)
 {
     pal_body *body = step->body;
     pal_refine_history *report = &row->report;
     pal_refine_balance before;
     pal_refine_balance_compute(&before, step);
-    /* a state that is not finite is left to the guard */
+    /* the guard handles a non-finite state */
     if (!isfinite(pal_refine_balance_total_J(&before))) return;
     region whole;
     double Omega[3];
@@ -498,7 +499,7 @@ static void change(refine *row, pal_step *step)
     pal_refine_balance_compute(&report->after, step);
 }
 
-/* would an evaluation look at what the last one saw? */
+/* true: an evaluation would see the same state as the last one */
 static bool is_still(refine *row, const pal_body *body, double dt_s, double *load2)
 {
     double max2 = 0;
@@ -542,7 +543,7 @@ static pal_err run(void *self, pal_step *step)
     return PAL_ERR_OK;
 }
 
-/* a body that slept before its faces may be joined would stay fine for ever */
+/* a body that fell asleep before its faces may be joined would stay refined */
 static double settled_s(const void *self)
 {
     const refine *row = self;
@@ -550,7 +551,7 @@ static double settled_s(const void *self)
     return !evaluates(row) || (row->seen_twice && !row->put_off && blended) ? 0 : INFINITY;
 }
 
-/* the body is at rest, but may have another level than at load */
+/* the body was reset, but may have another level than at load */
 static void reset(void *self, const pal_body *body)
 {
     (void)body;
@@ -560,7 +561,8 @@ static void reset(void *self, const pal_body *body)
     clear(row);
 }
 
-/* clocks, patience and factors of the same surface in another world; of another number of levels they start again */
+/* transfers times, waiting factors and stiffness factors of the same surface in another world; with another number
+ * of levels they start again */
 static void transfer(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
 {
     refine *row = self;

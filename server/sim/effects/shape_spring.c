@@ -1,19 +1,20 @@
-/* Component shape_spring: every node hangs on its place in the shape at rest (paper C, eq. 10, the shape-preserving
- * springs). f_i = -(m_i/m_0) [k' (x_i - R (X_i - C) - c) + c' (v_i - V - Omega x (x_i - c))] X_i the place at rest, m_0
- * the mass of a node of level 0, k' and c' the constants of such a node. As anchors go by mass, they add up to the same
- * whatever is refined and pull every level alike: translation has (w^2 = k'/m_0).
+/* Component shape_spring: a spring pulls every node to its position in the rest shape (paper C, eq. 10, the
+ * shape-preserving springs). f_i = -(m_i/m_0) [k' (x_i - R (X_i - C) - c) + c' (v_i - V - Omega x (x_i - c))], where
+ * X_i is the rest position, m_0 the mass of a node of level 0, and k' and c' the constants of such a node. Because
+ * these springs are proportional to mass, their sum does not depend on refinement and they act on every level alike:
+ * a translation has w^2 = k'/m_0.
  *
- * frame "world": the places at rest themselves, R 1, V and Omega 0; the force goes to the ground.
- * frame "body": the rigid frame that fits the body best (adaptive_surface.h), so that the body may move freely. The fit
- * is weighted by mass as the anchors are; R, C, c then minimise the energy sum k'_i/2 |x_i - R (X_i - C) - c|^2, the
- * force is its exact gradient although the frame follows (envelope theorem), and neither force nor damping has a
- * resultant or a moment.
+ * frame "world": the rest positions themselves, R = 1, V = Omega = 0; the reaction acts on the ground.
+ * frame "body": the best-fitting rigid frame (adaptive_surface.h), so that the body may move freely. The fit has the
+ * same mass weights; R, C, c then minimise the energy sum k'_i/2 |x_i - R (X_i - C) - c|^2. The force is its exact
+ * gradient although the frame follows the body (envelope theorem), and neither force nor damping has a resultant or
+ * a moment.
  *
- * Departures: errata C7 (the paper's damping is divided by the spring's length, which is 0 at rest, and its anchors
- * stop rigid motion) and C6 (its constant does not know levels: refinement stiffens 4 times a level).
+ * Departures: errata C7 (the paper divides the damping by the spring's length, which is 0 at rest, and its anchors
+ * block rigid motion) and C6 (its constant does not depend on the level: refinement stiffens 4 times per level).
  *
- * Keys: k_N_m (0.3 k_0, k_0 the model's constant of springs), c_Ns_m (0.6 sqrt(k' m_0): damping ratio 0.3), frame
- * (as the model has it). What is not given follows a live material edit. */
+ * Keys: k_N_m (0.3 k_0, k_0 the model's spring constant), c_Ns_m (0.6 sqrt(k' m_0): damping ratio 0.3), frame (the
+ * model's). Constants that are not given follow a live material edit. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/surface/active_nodes.h"
@@ -28,14 +29,14 @@ typedef struct shape_spring {
     pal_rigid_fit frame; /* of the last run */
 } shape_spring;
 
-/* x -> R x + shift is the place where a node belongs, v -> V + Omega x x its velocity there; constants per mass */
+/* x -> R x + shift is the target position of a node, v -> V + Omega x x the target velocity; constants per mass */
 typedef struct hold {
     double R[9], shift[3], V[3], Omega[3], k, c;
 } hold;
 
 static const double anchor_share = 0.3, damping_share = 0.6;
 
-/* k' as the model's keys have it, and how it goes with E */
+/* k' of the model's keys, and its ratio to E */
 static pal_err derive(shape_spring *row, pal_build *build)
 {
     pal_config_entry model = build->def->model;
@@ -95,7 +96,7 @@ static double damp_1_s(const shape_spring *row, const pal_adaptive_surface *adap
     return row->c_Ns_m < 0 ? damping_share * sqrt(row->k_N_m / m) : row->c_Ns_m / m;
 }
 
-/* frame: where the last fit ended, and the new one; packed: of body->active_nodes */
+/* frame: start from the last fit, and the new one; packed: of body->active_nodes */
 static hold find_hold(const shape_spring *row, const pal_body *body, pal_rigid_fit *frame, bool packed)
 {
     hold h = {.R = {1, 0, 0, 0, 1, 0, 0, 0, 1},
@@ -168,7 +169,7 @@ static double energy(void *self, const pal_body *body)
     return 0.5 * h.k * sum;
 }
 
-/* the frame only takes motion away from what is stretched or damped, so the anchors alone bound both */
+/* the frame only removes motion from what is stretched or damped, so the anchors alone bound both */
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
     double k = stiff_1_s2(self, body->model.adaptive);

@@ -1,5 +1,6 @@
-/* Shown vertices by skinning (paper B section 4.2; the equations and errata are in mesh/volume/skin.h): frames of the
- * used surface nodes, then every shown vertex from its five nearest ones. */
+/* Component skin_output: shown vertices by skinning (paper B section 4.2; the equations and errata are in
+ * mesh/volume/skin.h). It computes frames of the surface nodes in use, then every shown vertex from its five nearest
+ * ones. */
 #include "server/sim/core/effect.h"
 
 #include <string.h>
@@ -50,7 +51,7 @@ static pal_err run(void *self, pal_step *step)
 
 static void reset(void *self, const pal_body *body)
 {
-    /* frames that were carried over from a flat neighbourhood are forgotten */
+    /* resets frames that were kept through a flat neighbourhood */
     pal_body *own = ((skin_output *)self)->body;
     (void)body;
     memset(own->skin_axes, 0, axes_count(own->skin) * sizeof(double));

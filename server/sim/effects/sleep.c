@@ -1,19 +1,19 @@
-/* Component sleep: a body at rest costs next to nothing until something comes near .
+/* Component sleep: a body at rest costs almost nothing until something comes near.
  *
- * It falls asleep when for `rest_time_s` of simulated time no point was faster than speed_1_s S, the triangles were the
- * same, no tool was near, no row's force changed by itself with time and refinement had nothing left to do, and when
- * after that the forces left over would move it by less than rest_1_s2 S in s^2, on average over its mass (S: the
- * body's box diagonal). Velocities are then 0, positions stay as they are to the bit, and none of the body's rows is
- * run. What CONTACT components knew of tools is forgotten, as after a reset.
+ * Conditions to fall asleep: for `rest_time_s` of simulated time no point was faster than speed_1_s S, the triangles
+ * were unchanged, no tool was near, no component's force changed with time and refinement had nothing left to do;
+ * and the residual forces would then move the body by less than rest_1_s2 S in s^2, as a mass-weighted mean (S: the
+ * body's box diagonal). Velocities are then 0, positions stay the same to the bit, and none of the body's components
+ * runs. CONTACT components forget their tool state, as after a reset.
  *
- * It wakes in the step in which a tool comes as near as the CONTACT components reach (their hook reach_m), swept along
- * the tool's way and before contact; and by what the world does to it: a load, a material, a brush, a switched row, a
- * reset. A tool that is near where the shown surface is farther away than one triangle's edge keeps it awake, so that
- * nearness is a matter of vertices alone; so does one that holds or presses the body, wherever it is by now: tissue
- * follows no farther than the tool's cap pulls, and has to come back when it is released.
+ * The body wakes in the step in which a tool, swept along its path and before contact, comes within reach of the
+ * CONTACT components (their hook reach_m). It also wakes at a change from the world: a load, a material, a brush, a
+ * switched component, a reset. Two kinds of tool keep a body awake. One is near while the shown surface is farther
+ * away than one triangle edge, so that a distance to vertices suffices. The other grasps or presses the body,
+ * wherever it is: tissue follows no farther than the tool's force cap pulls, and must return when it is released.
  *
- * A threshold of speed alone is not enough: a body that creeps against a drag of 1e6 times the
- * critical one is slow and not at rest, hence the forces.
+ * A speed threshold alone is not enough: a body that creeps against a drag of 1e6 times the critical one is slow but
+ * not at rest. Hence the test of forces.
  *
  * Keys: rest_time_s (0.5), speed_1_s (1e-4), rest_1_s2 (1e-4). */
 #include "server/base/vec3.h"
@@ -24,9 +24,9 @@
 
 typedef struct sleeper {
     double rest_time_s, speed_1_s, rest_1_s2;
-    double calm_s;     /* for so long nothing has moved */
-    uint64_t revision; /* of the triangles, meanwhile   */
-    bool boxed;        /* box and edge_m are of now     */
+    double calm_s;     /* time without motion */
+    uint64_t revision; /* topology revision during that time */
+    bool boxed;        /* box and edge_m are up to date */
     double low[3], high[3], edge_m;
 } sleeper;
 
@@ -43,7 +43,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     return PAL_ERR_OK;
 }
 
-/* no point moves; a speed that is not finite is not slow */
+/* true: no point moves; a non-finite speed is not slow */
 static bool slow(const sleeper *row, const pal_body *body)
 {
     double max = row->speed_1_s * body->length_scale_m, max2 = max * max;
@@ -55,7 +55,7 @@ static bool slow(const sleeper *row, const pal_body *body)
     return all;
 }
 
-/* does some row still change something by itself? */
+/* true: a component still changes without outside action */
 static bool changes(const pal_component *row, int n, double time_s)
 {
     for (int i = 0; i < n; i++)
@@ -68,7 +68,7 @@ static const float *shown_vertex(const pal_body *body, int k)
     return body->shown + 3 * (size_t)(body->active ? body->active[k] : k);
 }
 
-/* box of what is shown and its longest edge */
+/* computes the box of the shown surface and its longest edge */
 static void measure(sleeper *row, const pal_body *body)
 {
     const int32_t *tri = body->surface->tri;
@@ -90,7 +90,7 @@ static void measure(sleeper *row, const pal_body *body)
     row->boxed = true;
 }
 
-/* does the way a..b come within reach of the box? conservative: each axis on its own */
+/* true: the path a..b comes within reach of the box; conservative: each axis separately */
 static bool passes_box(const sleeper *row, const double a[3], const double b[3], double reach)
 {
     bool all = true;
@@ -99,7 +99,7 @@ static bool passes_box(const sleeper *row, const double a[3], const double b[3],
     return all;
 }
 
-/* does it come within reach of a vertex? */
+/* true: the path comes within reach of a vertex */
 static bool passes_vertex(const pal_body *body, const double a[3], const double b[3], double reach)
 {
     int n_shown = body->active ? body->n_active : body->n_shown;
@@ -116,7 +116,7 @@ static bool passes_vertex(const pal_body *body, const double a[3], const double 
     return false;
 }
 
-/* comes some tool as near in this step as some row of contact reaches? */
+/* true: a tool comes within reach of a CONTACT component in this step */
 static bool tool_near(sleeper *row, const pal_step *step)
 {
     const pal_body *body = step->body;
@@ -129,9 +129,9 @@ static bool tool_near(sleeper *row, const pal_step *step)
             if (of->effect->reach_m) reach = fmax(reach, of->effect->reach_m(of->self, tool));
         }
         if (reach == 0) continue;
-        if (isinf(reach)) return true; /* it holds the body */
+        if (isinf(reach)) return true; /* the tool grasps or presses the body */
         if (!row->boxed) measure(row, body);
-        /* no place of a triangle is farther from its nearest corner */
+        /* no point of a triangle is farther from its nearest corner */
         reach += row->edge_m * 0.57735026918962573;
         pal_sub3(a, tool->last.position_m, body->offset_m);
         pal_sub3(b, tool->next.position_m, body->offset_m);
@@ -140,7 +140,7 @@ static bool tool_near(sleeper *row, const pal_step *step)
     return false;
 }
 
-/* sum of the forces left over against what rest allows */
+/* sum of the residual forces against the limit for rest */
 static bool balanced(const sleeper *row, pal_step *step)
 {
     const pal_body *body = step->body;
@@ -178,7 +178,7 @@ static pal_err run(void *self, pal_step *step)
                 !changes(step->contact, step->n_contact, step->time_s) &&
                 !changes(step->adapt, step->n_adapt, step->time_s) && !tool_near(row, step);
     row->calm_s = calm ? row->calm_s + step->dt_s : 0;
-    /* a hair less, so that a sum of steps is what it is meant to be */
+    /* slightly less, so that rounding in a sum of steps does not add one */
     if (row->calm_s < row->rest_time_s * (1 - 1e-9)) return PAL_ERR_OK;
     row->calm_s = 0;
     if (calm && balanced(row, step)) fall_asleep(step);

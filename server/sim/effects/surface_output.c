@@ -1,9 +1,9 @@
-/* Shown vertices are the surface nodes of the simulated mesh themselves: no skin, the boundary faces are what is
- * shown.
+/* Component surface_output: shown vertices are the surface nodes of the simulated mesh, without a skin; the boundary
+ * faces are drawn.
  *
- * An adaptive body (adaptive_surface.h) shows all its points, those out of use where they are at rest, and the
- * triangles of its present leaves; a step costs what its active points do. Of a solid (subdivision_solid.h) the
- * model has said what is its boundary and which node each vertex is. */
+ * An adaptive body (adaptive_surface.h) shows all its points, inactive ones at rest, and the triangles of its
+ * present leaves; the cost of a step is that of its active points. Of a subdivision solid (subdivision_solid.h) the
+ * model gives the boundary and the node of each vertex. */
 #include "server/sim/core/effect.h"
 
 #include <string.h>
@@ -28,7 +28,7 @@ static void evaluate(pal_body *body)
     for (int i = 0; i < body->n_shown; i++) show(body, i, body->d + 3 * (size_t)body->shown_node[i]);
 }
 
-/* the active points; those that went out of use go back to rest */
+/* shows the active points; points that became inactive return to rest */
 static void evaluate_active(surface_output *out)
 {
     pal_body *body = out->body;
@@ -66,7 +66,7 @@ static pal_err make_adaptive(pal_build *build, void **self)
     return PAL_ERR_OK;
 }
 
-/* surface and shown_node are there already */
+/* surface and shown_node exist already */
 static pal_err make_solid(pal_build *build, void **self)
 {
     pal_body *body = build->body;

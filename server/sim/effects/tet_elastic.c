@@ -1,19 +1,20 @@
-/* Component tet_elastic: elastic tetrahedra of four or ten nodes; the machinery is in elastic_tet.h.
+/* Component tet_elastic: elastic tetrahedra of four or ten nodes; the implementation is in elastic_tet.h.
  *
  * Keys: element ("tet4" or "tet10"; default by the body's elements), law ("corotational", "linear", "neo_hookean"),
- * fill (true: stiffness by the share of material in each element where the body has it), recover (true).
+ * fill (true: stiffness by the fraction of material in each element where the body has it), recover (true).
  *
- * Inversion recovery goes farther here than the rule of elastic_tet.h, which alone left bodies of ten
- * nodes an element and of the neo-Hookean law tangled for good. Under an implicit solver the whole body runs, while any
- * piece is inverted, on its split: tetrahedra of four nodes (eight in one of ten), corotational, with the rule,
- * Poisson ratios above 0.3 taken as 0.3. Pieces are looked at when the tangent is taken. corotational tet4 is tangled
- * once det F <= 0 in a piece, tet10 and neo_hookean below 0.05, neo_hookean above 30 too, where its energy, which grows
- * with the square of that, lets nothing else count. All are whole again when every piece is above 0.5 (neo_hookean: and
- * below 2). What rests folded on the split, as a few shuffled bodies in a hundred do, is straightened (elastic_tet.h).
+ * Inversion recovery extends the rule of elastic_tet.h, which alone left bodies with ten-node elements or the
+ * neo-Hookean law inverted permanently. Under an implicit solver the whole body uses its split while any piece is
+ * inverted: tetrahedra of four nodes (eight in one of ten), corotational, with the rule, Poisson ratios above 0.3
+ * replaced by 0.3. Pieces are checked when the tangent is taken. A body counts as inverted when in a piece det F <=
+ * 0 (corotational tet4) or det F < 0.05 (tet10 and neo_hookean); for neo_hookean also when det F > 30, where its
+ * energy, which grows with the square of det F, outweighs everything else. It counts as recovered when every piece
+ * is above 0.5 (neo_hookean: and below 2). A body that rests folded on the split, as a few shuffled bodies in a
+ * hundred do, is straightened (elastic_tet.h).
  *
- * `internal` holds for corotational and neo_hookean; the linear law has no net force, but a torque once it turns, as
- * every linear model. Ten nodes, corotational: a torque too while an element is crushed to next to nothing
- * (elastic_tet.h). */
+ * `internal` is true for corotational and neo_hookean. The linear law has no net force, but a torque under rotation,
+ * as every linear model has. Ten-node corotational elements also have a torque while an element is almost completely
+ * crushed (elastic_tet.h). */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
@@ -34,16 +35,16 @@ static pal_err read_element(pal_config_entry *item, const pal_build *build, int 
 }
 
 typedef struct tet_row {
-    pal_elastic_tets whole;         /* first: tests look at it */
-    pal_elastic_tets *split;        /* NULL: never untangles this way */
+    pal_elastic_tets whole;         /* first member: tests read it */
+    pal_elastic_tets *split;        /* NULL: no inversion recovery by the split */
     double *rest;                   /* six times the volume of each piece at rest [n_piece] */
-    double min_volume_m3;           /* of those that are looked at, times six */
-    bool has_inversion, cheap;      /* cheap: whole.n_inverted tells that the body is tangled */
-    uint64_t n_inversion, n_switch; /* since run, which tells the body */
+    double min_volume_m3;           /* of the pieces that are checked, times six */
+    bool has_inversion, cheap;      /* cheap: whole.n_inverted shows that the body is inverted */
+    uint64_t n_inversion, n_switch; /* since run, which has the body */
     pal_force_cache force_cache;    /* under an implicit solver: of `whole` while nothing is inverted */
 } tet_row;
 
-/* beyond the first pair a body is tangled, within the second it is whole again */
+/* outside the first pair a body is inverted, inside the second it is recovered */
 static const double max_poisson = 0.3, inverted_det[2] = {0.05, 30}, whole_det[2] = {0.5, 2};
 
 /* tetrahedra of four nodes on the body's own, eight in one of ten */
@@ -85,7 +86,7 @@ static pal_err make_split(tet_row *row, pal_build *build)
     PAL_TRY(pal_elastic_tets_make(&options, build, row->split));
     row->cheap = whole->n_corner == 4 && whole->law == PAL_LAW_COROTATIONAL;
     double h = build->body->edge_m;
-    /* slivers turn over at any touch: what they do tells nothing of the body */
+    /* skip slivers: they invert at any contact and say nothing about the body */
     row->min_volume_m3 = 1e-3 * h * h * h;
     row->rest = PAL_NEW(build->arena, double, options.n_tet);
     if (!row->rest) return PAL_ERR_MEMORY;
@@ -132,7 +133,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     return options.recover && body->implicit && options.law != PAL_LAW_LINEAR ? make_split(row, build) : PAL_ERR_OK;
 }
 
-/* what the forces come from now */
+/* elements that forces come from now */
 static pal_elastic_tets *acting(void *self)
 {
     tet_row *row = self;
@@ -160,7 +161,7 @@ static double energy(void *self, const pal_body *body)
     if (row->has_inversion) return pal_elastic_tets_energy(row->split, body->d, NULL);
     if (pal_force_cache_matches(&row->force_cache, body->d)) return row->force_cache.energy_J;
     double sum = pal_elastic_tets_energy(&row->whole, body->d, pal_force_cache_begin(&row->force_cache, body->d));
-    /* what inverted elements borrow may differ the next time it is asked for */
+    /* the fallback of inverted elements may differ at the next evaluation */
     return row->whole.n_inverted > 0 ? sum : pal_force_cache_commit(&row->force_cache, sum);
 }
 

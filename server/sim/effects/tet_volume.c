@@ -1,10 +1,11 @@
-/* Component tet_volume: every tetrahedron keeps its signed volume, so that an inverted one turns back. C = (V - V0)/V0,
- * E = k/2 C^2, f_a = -(k C + c C') dV/dx_a / V0 (paper B section 4.1, F_V).
+/* Component tet_volume: every tetrahedron keeps its signed volume, so that an inverted one recovers. C = (V -
+ * V0)/V0, E = k/2 C^2, f_a = -(k C + c C') dV/dx_a / V0 (paper B section 4.1, F_V).
  *
- * Departures: errata B3, B4 (true gradients, area/3 each, not unit directions; 1/V0^2; V0 is the rest volume, signed by
- * the order of the corners). A tetrahedron with V0 below 1e-6 h^3 is left out, and so is a sliver, of less than 0.01 of
- * the volume that a regular one has with its edges: it would set the sub-step of the whole body for a volume that is
- * none, and turn over at any touch. Their edges stay; a preflight counts and names them. */
+ * Departures: errata B3, B4 (true gradients, area/3 each, not unit directions; 1/V0^2; V0 is the rest volume, signed
+ * by the order of the corners). A tetrahedron with V0 below 1e-6 h^3 is omitted, and so is a sliver with less than
+ * 0.01 of the volume of a regular one with its edges: its negligible volume would set the sub-step of the whole
+ * body, and it would invert at any contact. The edges of omitted tetrahedra stay; a preflight check counts and names
+ * them. */
 #include "server/sim/core/effect_list.h"
 #include "server/sim/springs/spring_recovery.h"
 

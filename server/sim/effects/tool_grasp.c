@@ -1,17 +1,18 @@
-/* Component tool_grasp: each tool holds tissue by a damped spring (grasp.h).
+/* Component tool_grasp: each tool grasps tissue by a damped spring (grasp.h).
  *
- * When the grasp button goes down the shown vertices within `reach` of the tool are held with weights (1 - d^2/R^2)^2,
- * or the nearest one alone when it lies within 1.5 reach; the skin turns these into node weights. On an adaptive body
- * weights go with the masses of the nodes as well, so that fine and coarse parts move alike, and a grasp goes on when
- * nodes come and go (adaptive_grasp.h). Tissue is released when the button goes up or the tool's ramp is 0.
+ * When the grasp button goes down the shown vertices within `reach` of the tool are grasped with weights (1 -
+ * d^2/R^2)^2, or only the nearest one if it lies within 1.5 reach; the skin turns these into node weights. On an
+ * adaptive body weights are also proportional to node mass, so that fine and coarse parts move alike, and a grasp
+ * persists when nodes are added or removed (adaptive_grasp.h). Tissue is released when the button goes up or the
+ * tool's ramp is 0.
  *
- * Transfer to another body: where it shows the same surface the grasp holds the same vertices by its own skin; of
- * another surface those about the place at rest where it closed. The offset changes by what the place at rest of the
- * tissue held does, so that it stays that of the tissue, however often; the force does not jump (grasp_transfer.h).
+ * Transfer to another body: if it shows the same surface, the grasp keeps its vertices with the new skin; otherwise
+ * it takes the vertices around the rest position at which it closed. The offset changes with the rest position of
+ * the grasped tissue, so that repeated transfers cause no drift; the force does not jump (grasp_transfer.h).
  *
- * For a haptic bridge the bilateral part is f0 - K (x - x0) - b v: K from the compliance of the tissue held where the
- * solver has one (haptic_stiffness.h), else k 1 by least squares (stiffness_fit.h), which starts at this spring in
- * series with the tissue, 2 E R / (1 - nu^2).
+ * A haptic bridge receives the bilateral part f0 - K (x - x0) - b v. K comes from the compliance of the grasped
+ * tissue if the solver provides one (haptic_stiffness.h), otherwise it is k 1 by least squares (stiffness_fit.h),
+ * starting at this spring in series with the tissue, 2 E R / (1 - nu^2).
  *
  * Keys: stiffness_N_m (0: 16 E reach), damping_s (0.01: c over k), reach_m (0: 2 tool radii). */
 #include "server/base/vec3.h"
@@ -111,8 +112,8 @@ static void take_vertex(pal_grasps *grasps, pal_grasp *g, const pal_body *body, 
     if (!g->adaptive) add_vertex(grasps, body, vertex, share);
 }
 
-/* node weights of shown vertices (at shown, m) that lie within reach of p, left in gather, of bodies that adapt in
- * share alone; false: nothing there */
+/* node weights of shown vertices (at shown, m) within reach of p, left in gather; of adaptive bodies in share only;
+ * false: none in reach */
 static bool find_vertices(pal_grasps *grasps, pal_grasp *g, const pal_body *body, const float *shown, const double p[3],
                           double reach)
 {
@@ -136,7 +137,7 @@ static bool find_vertices(pal_grasps *grasps, pal_grasp *g, const pal_body *body
     return true;
 }
 
-/* nodes and weights from those in gather, which is then 0 again */
+/* takes nodes and weights from gather and sets it to 0 */
 static void take_gathered(pal_grasps *grasps, pal_grasp *g, const pal_body *body)
 {
     double sum = 0;
@@ -184,7 +185,7 @@ static void close_grasp(pal_grasps *grasps, pal_grasp *g, const pal_tool *tool, 
     }
 }
 
-/* once a step: the same grasps on the nodes that are in use now */
+/* once per step: rebuilds the grasps on the active nodes */
 static void follow(pal_grasps *grasps, const pal_body *body)
 {
     if (!body->active || grasps->revision == body->revision) return;
@@ -202,17 +203,17 @@ static void follow(pal_grasps *grasps, const pal_body *body)
     }
 }
 
-/* once a step: the button's edges */
+/* once per step: handles the button's edges */
 static void begin_tool(pal_grasps *grasps, pal_grasp *g, const pal_tool *tool, const pal_body *body)
 {
     bool pressed = tool->grasp && !g->button;
     g->button = tool->grasp;
-    /* a tool that is gone holds on while its ramp falls, so that its force fades */
+    /* an absent tool keeps its grasp while its ramp falls, so that its force fades */
     if (g->closed && ((tool->present && !tool->grasp) || tool->ramp <= 0)) let_go(grasps, g);
     if (pressed && !g->closed) close_grasp(grasps, g, tool, body);
 }
 
-/* what the grasp b of another body holds, by this body's nodes */
+/* the grasp b of another body, by this body's nodes */
 static void transfer_nodes(pal_grasps *grasps, pal_grasp *g, const pal_body *body, const pal_grasp *b,
                            const pal_component_transfer *by)
 {
@@ -237,7 +238,7 @@ static void transfer_nodes(pal_grasps *grasps, pal_grasp *g, const pal_body *bod
     take_gathered(grasps, g, body);
 }
 
-/* left_N += what the grasp before pulled on nodes, less what this one does */
+/* left_N += nodal forces of the grasp before, less those of this one */
 static void add_left(const pal_grasp *g, const pal_grasp *b, const double force_N[3], const pal_component_transfer *by)
 {
     const pal_interpolation *place = by->place;
@@ -250,7 +251,7 @@ static void add_left(const pal_grasp *g, const pal_grasp *b, const double force_
     for (int i = 0; i < g->n_node; i++) pal_axpy3(by->left_N + 3 * (size_t)g->node[i], -g->weight[i], force_N);
 }
 
-/* the offset by what the place at rest of the tissue held differs */
+/* changes the offset by the difference in the rest position of the grasped tissue */
 static void move_offset(pal_grasp *g, const pal_body *body, const pal_grasp *b, const pal_body *from)
 {
     double was[3], moved[3], back[4] = {b->quat[0], -b->quat[1], -b->quat[2], -b->quat[3]};
@@ -309,7 +310,7 @@ static pal_err run(void *self, pal_step *step)
     return PAL_ERR_OK;
 }
 
-/* the nearest vertex is held within 1.5 reach (find_vertices); a tool that holds acts from however far */
+/* the nearest vertex is grasped within 1.5 reach (find_vertices); an active grasp acts at any distance */
 static double reach_m(const void *self, const pal_tool *tool)
 {
     const pal_grasps *grasps = self;

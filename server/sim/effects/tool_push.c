@@ -1,18 +1,17 @@
 /* Component tool_push: penalty contact between the sphere of each tool and the shown surface, in every sub-step.
  *
- * Tools touch the surface that is shown, not the voxels below it (contact_points.h). A proxy of the tool stays on the
- * side it came from (proxy.h). A contact point at depth d within the proxy's sphere is pushed straight away from the
- * proxy's centre with f = k d, k = stiffness_Pa_m * area, and the opposite force acts on the tool; what k is, and how a
- * solver takes it, is the regime's (push.h). The sum is shortened to the caps (tool_force.h) and scaled by the tool's
- * ramp.
+ * Tools touch the shown surface, not the voxels below it (contact_points.h). A proxy of the tool stays on the side
+ * it came from (proxy.h). A contact point at depth d within the proxy's sphere is pushed away from the proxy's
+ * centre with f = k d, k = stiffness_Pa_m * area, and the opposite force acts on the tool. The contact regime sets k
+ * and how a solver treats it (push.h). The sum is limited to the caps (tool_force.h) and scaled by the tool's ramp.
  *
- * A tool that holds tissue (tool_grasp) does not push it as well: its ball would work against its own grasp. A tool
- * that appears inside tissue starts at the nearest place outside. A proxy that stays farther than slip_S box diagonals
- * behind its tool for slip_s starts again where the tool is.
+ * A tool that grasps tissue (tool_grasp) does not push it, because its sphere would act against its own grasp. A
+ * tool that appears inside tissue starts at the nearest position outside. A proxy that stays farther than slip_S box
+ * diagonals behind its tool for slip_s is reset to the tool's position.
  *
- * Keys: stiffness_Pa_m (0: the regime's), friction (Coulomb, 0), clamp_S (0.02: correction of penetration in 1/60 s, in
- * box diagonals), near_m (0: the larger of a radius and 10 mm; a patch is published within), slip_S (0.25), slip_s
- * (0.5). */
+ * Keys: stiffness_Pa_m (0: the regime's), friction (Coulomb, 0), clamp_S (0.02: correction of penetration in 1/60 s,
+ * in box diagonals), near_m (0: the larger of a radius and 10 mm; a contact patch is published within it), slip_S
+ * (0.25), slip_s (0.5). */
 #include "server/base/vec3.h"
 #include "server/sim/contact/push.h"
 #include "server/sim/contact/tuning.h"
@@ -90,7 +89,7 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
         min_m = fmin(min_m, radius > 0 ? radius : 0.04 * pal_dist3(low, high));
     }
     if (!(min_m > 0 && isfinite(min_m))) min_m = 0.04 * build->body->length_scale_m;
-    /* the proxy keeps half a radius away from every point: points half a radius apart leave no hole for it */
+    /* the proxy keeps half a radius away from every point: points half a radius apart leave no gap for it */
     PAL_TRY(pal_contact_points_make(build->body, MAX_DEPTH_RADII * min_m, SAMPLE_MAX, build->arena, &push->points));
     size_t n_point = (size_t)push->points.sample.max_point;
     for (int t = 0; t < push->n_tool; t++) {
@@ -110,7 +109,7 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
     return PAL_ERR_OK;
 }
 
-/* the proxy's first place: the tool's own, or the nearest place outside when that is inside tissue */
+/* initial position of the proxy: the tool's own, or the nearest one outside if that is inside tissue */
 static void place_proxy(pal_push *push, pal_tool_contact *h, const pal_body *body, const double at[3], double radius_m)
 {
     double p[3], out[3], normal[3];
@@ -128,7 +127,7 @@ static void place_proxy(pal_push *push, pal_tool_contact *h, const pal_body *bod
     for (int c = 0; c < 3; c++) h->proxy.x[c] = p[c] + radius_m * normal[c];
 }
 
-/* once a step: is the proxy there, and which points can it meet */
+/* once per step: places the proxy and finds the points that it can reach */
 static void begin_tool(pal_push *push, pal_tool_contact *h, const pal_tool *tool, pal_step *step)
 {
     pal_body *body = step->body;
@@ -148,7 +147,7 @@ static void begin_tool(pal_push *push, pal_tool_contact *h, const pal_tool *tool
         pal_sub3(last, tool->last.position_m, body->offset_m);
         place_proxy(push, h, body, last, tool->radius_m);
         h->ramp = 1;
-        /* it has neither touched nor slipped before */
+        /* no contact and no slip so far */
         h->retriangulated = false;
         pal_set3(h->slip, 0, 0, 0);
     } else if (h->time_behind_s > push->slip_s) {
@@ -164,7 +163,7 @@ static void begin_tool(pal_push *push, pal_tool_contact *h, const pal_tool *tool
     h->n_list = pal_contact_points_collect(&push->points, body, h->proxy.x, next, reach, h->list);
 }
 
-/* contacts of the proxy where it is now; x [n_list][3] are the points */
+/* contacts of the proxy at its present position; x [n_list][3] are the points */
 static void find_contacts(const pal_push *push, pal_tool_contact *h, const pal_body *body, const double *x)
 {
     double radius = h->limits.radius_m, reach = push->regime->reach_radii * radius;
@@ -245,7 +244,7 @@ static bool settle(void *self, pal_step *step, const double *moved, bool last)
 
 static void transfer(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
 {
-    pal_push *push = self, *old = (pal_push *)(uintptr_t)before; /* its points are scratch for forces */
+    pal_push *push = self, *old = (pal_push *)(uintptr_t)before; /* its points use the scratch memory of forces */
     for (int t = 0; t < push->n_tool && t < old->n_tool; t++) {
         double k_N_m = 0.5 * pal_push_punch_N_m(push, old->tool[t].limits.radius_m);
         pal_tool_contact_transfer(&push->tool[t], body, &old->tool[t], by->from, &old->points, by->place, k_N_m);
@@ -258,7 +257,7 @@ static void destroy(void *self)
     for (int t = 0; t < push->n_tool; t++) pal_tool_contact_free(&push->tool[t]);
 }
 
-/* a tool in contact acts from however far */
+/* a tool in contact acts at any distance */
 static double reach_m(const void *self, const pal_tool *tool)
 {
     const pal_push *push = self;

@@ -1,8 +1,8 @@
-/* Component viscous: f = -k_damp v with k_damp = rate m, paper B section 4.1's drag. Key: rate_1_s (the material's
- * damping_1_s).
+/* Component viscous: f = -k_damp v with k_damp = rate m, the drag of paper B section 4.1. Key: rate_1_s (the
+ * material's damping_1_s).
  *
- * Departure: the paper applies it explicitly; a solver that knows the hook `drag` divides by 1 + dt rate instead, which
- * no rate can upset. */
+ * Departure: the paper applies it explicitly; a solver that knows the hook `drag` divides by 1 + dt rate instead,
+ * which is stable for every rate. */
 #include "server/sim/core/effect_list.h"
 
 typedef struct viscous {

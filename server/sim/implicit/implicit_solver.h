@@ -1,40 +1,40 @@
-/* The core that implicit_euler and sdirk2 share. A stage finds velocities V with
+/* Core shared by implicit_euler and sdirk2. A stage finds velocities V with
  *     M (V - v*) = tau (f(x* + tau V) - c M V),
- * f being the forces of all components and contact, c the drag rate. Newton's method: with the forces linearised about
- * a state, V solves A V = b, A = (1 + tau c) M + tau^2 K + tau C, by conjugate gradients with the warped factor of A at
- * rest.
+ * where f is the force of all components and contact, and c the drag rate. Newton's method linearises the forces
+ * about a state, so that V solves A V = b, A = (1 + tau c) M + tau^2 K + tau C, by conjugate gradients with the
+ * warped factor of A at rest.
  *
- * The first iteration starts from the state at the begin of the stage, not from an extrapolated one: with the rotations
- * of that state the corotational energy (but for its volume term) is bounded from above by the quadratic that is
- * solved, so that a single iteration (newton 1, the default) seldom gains energy. Where it does, up to 7 more follow,
- * each with a line search on the incremental potential, until the energy is no more than at the begin of the sub-step.
- * A body that gains in spite of them for half a second in all, without half a second of peace, goes round in a circle,
- * as crushed elements with borrowed rotations do: from then on it goes back and stands still in each such sub-step, so
- * that its energy cannot rise.
+ * The first iteration starts from the state at the beginning of the stage, not from an extrapolated one. With the
+ * rotations of that state the quadratic that is solved bounds the corotational energy (except its volume term) from
+ * above, so a single iteration (newton 1, the default) seldom gains energy. Where it does, up to 7 more iterations
+ * follow, each with a line search on the incremental potential, until the energy is no more than at the beginning of
+ * the sub-step. A body that gains energy in spite of them for a total of half a second, without an interval of half
+ * a second free of gains, is in a cycle, as crushed elements with fallback rotations are. From then on each such
+ * sub-step is undone and the velocity set to zero, so that the energy cannot rise.
  *
- * Contact gave its loads at the begin of the sub-step; its stiffness and damping act on the motion since then, and
- * `settle` brings the forces on tools to the end of the sub-step. Fixed nodes move with body->v (0 unless prescribed).
- * The momentum of a free body is kept to rounding whatever the tolerance: the mean of the residual is taken out. Moves
- * are limited by step_guard.h.
+ * Contact gives its loads at the beginning of the sub-step; its stiffness and damping act on the motion since then,
+ * and `settle` brings the forces on tools to the end of the sub-step. Fixed nodes move with body->v (0 unless
+ * prescribed). The momentum of a free body is conserved to rounding whatever the tolerance, because the mean of the
+ * residual is removed. step_guard.h limits displacements.
  *
- * Where nodes are interpolated from control points, the unknowns are the points' velocities and the factor is that of
- * the matrix at rest (interpolated_system.h); after an edit of the material it is found again over some steps, while
- * refresh and refresh_iterations do nothing. Thread: [load] to make, then [sim]. */
+ * Where nodes are interpolated from control points, the unknowns are the velocities of the control points and the
+ * factor is that of the matrix at rest (interpolated_system.h). After a material edit that matrix is rebuilt over
+ * several steps; refresh and refresh_iterations have no effect. Thread: [load] to make, then [sim]. */
 #ifndef PAL_SIM_IMPLICIT_IMPLICIT_SOLVER_H
 #define PAL_SIM_IMPLICIT_IMPLICIT_SOLVER_H
 #include "server/num/conjugate_gradient.h"
 #include "server/sim/implicit/compliance.h"
 #include "server/sim/implicit/warp.h"
 
-/* keys of both solvers */
+/* keys of both solvers, with their defaults */
 typedef struct pal_implicit_options {
-    double tolerance;       /* 1e-2: residual of the stage's equations over |M v* + tau f|, Euclidean      */
-    int iterations, newton; /* 60: most conjugate gradients per Newton iteration; 1: Newton iterations     */
+    double tolerance;       /* 1e-2: residual of the stage's equations over |M v* + tau f|, Euclidean norm */
+    int iterations, newton; /* 60: max conjugate gradient iterations per Newton iteration; 1: Newton iterations */
     double substep_s;       /* 0: the scene's step                                                         */
-    int refresh_iterations; /* 12: more in one solve begin a new factor ...                                */
+    int refresh_iterations; /* 12: a solve that takes more starts a new factor, if ... */
     bool refresh;           /* ... true                                                                    */
-    bool warp;              /* true: the factor turns with the body (false shows what that is worth)        */
-    bool watch;             /* true: energy is watched (false shows what that costs)                        */
+    bool warp;              /* true: the factor rotates with the body (false for comparison) */
+    bool watch;             /* true: energy is checked (false for comparison of the cost) */
 } pal_implicit_options;
 
 typedef struct pal_implicit {
@@ -43,24 +43,25 @@ typedef struct pal_implicit {
     pal_block_matrix blocks; /* pattern of K; values are work space */
     pal_node_rotations turns;
     pal_warp warp;
-    pal_compliance_solver answer; /* static compliance; answer.door.solve NULL: none wanted or none there is */
+    pal_compliance_solver answer; /* static compliance; answer.door.solve NULL: not wanted or not available */
     pal_conjugate_gradient cg;
-    double *x0, *v0; /* at the sub-step's begin                  [n_dof][3] */
+    double *x0, *v0; /* at the beginning of the sub-step [n_dof][3] */
     double *xs, *vs; /* x*, v* of the stage, filled by the solver [n_dof][3] */
-    double *start;   /* V that would leave the body where it was linearised [n_dof][3] */
+    double *start;   /* V that keeps the body where it was linearised [n_dof][3] */
     double *work, *moved;
-    double *node_displacement_m;    /* the way of nodes for `settle`; moved without embed  [n_node][3] */
-    double tau_rest_s;              /* tau of the factor at rest           */
-    double density;                 /* of the material, kg/m^3             */
-    double reference;               /* of the tolerance, N s               */
-    double start_energy_J;          /* at the sub-step's begin             */
-    bool guarded;                   /* energy is watched: see above        */
-    bool sound;                     /* its last look found that x and v are finite */
-    bool energy_rose;               /* ... and was not kept in this sub-step ... */
-    double energy_rise_s, steady_s; /* ... nor in sub-steps of so much time (0 after half a second without); since */
-    int max_cg;                     /* in one solve of this sub-step       */
-    uint64_t sampled;               /* material revision of the body at the factor (dofs.h) */
-    bool probing;                   /* an embedded body's matrices are being found again */
+    double *node_displacement_m; /* displacement of nodes for `settle`; `moved` without interpolation [n_node][3] */
+    double tau_rest_s;           /* tau for which the factor at rest was made */
+    double density;              /* of the material, kg/m^3             */
+    double reference;            /* residual norm that the tolerance scales, N s */
+    double start_energy_J;       /* at the beginning of the sub-step */
+    bool guarded;                /* energy is checked, see above */
+    bool sound;                  /* the last check found x and v finite */
+    bool energy_rose;            /* the energy rose in this sub-step */
+    double energy_rise_s,
+        steady_s;     /* total time of such sub-steps (0 after half a second without one); time since the last */
+    int max_cg;       /* max iterations in one solve of this sub-step */
+    uint64_t sampled; /* material revision of the body at the factor (dofs.h) */
+    bool probing;     /* the matrices of an interpolated body are being rebuilt */
     pal_solve_report report;
 } pal_implicit;
 
@@ -70,18 +71,20 @@ pal_err pal_implicit_read(pal_config_entry *item, const pal_build *build, pal_im
 pal_err pal_implicit_make(const pal_implicit_options *options, pal_build *build, double share, pal_implicit **out);
 void pal_implicit_destroy(void *self);
 
-/* false: nothing to solve (all held: prescribed nodes have moved) or the state is not finite (body->frozen is set) */
+/* false: nothing to solve (every node is fixed; prescribed nodes have moved) or the state is not finite
+ * (body->frozen is set) */
 bool pal_implicit_begin(pal_implicit *core, pal_step *step);
-/* body->x: where to linearise first, body->v: first guess of V and velocities of fixed nodes; both hold the result.
- * Loads may change afterwards: solve again after setting x and the guess again */
+/* body->x: state of the first linearisation; body->v: first guess of V and velocities of fixed nodes; both contain
+ * the result. If loads change afterwards, set x and the guess again and solve again */
 pal_err pal_implicit_stage(pal_implicit *core, pal_step *step, double tau_s);
-/* after a stage, the last of the sub-step or not: true when contact has changed its loads, so that the sub-step must be
+/* after a stage; last: it is the last of the sub-step. true: contact has changed its loads, so the sub-step must be
  * solved again */
 bool pal_implicit_settle(pal_implicit *core, pal_step *step, bool last);
-/* checks the result (not finite: back to the begin, frozen) and keeps the factor fresh */
+/* checks the result (not finite: the state at the beginning is restored and the body frozen) and refreshes the
+ * factor */
 void pal_implicit_end(pal_implicit *core, pal_step *step);
 
-/* hooks of pal_effect that both have in common */
+/* hooks of pal_effect that both solvers share */
 double pal_implicit_limit(void *self, pal_step *step);
 pal_err pal_implicit_material(void *self, const pal_body *body, const pal_material *material, pal_diagnostic *diag);
 void pal_implicit_reset(void *self, const pal_body *body);

@@ -1,6 +1,6 @@
-/* The plan: the ordered components of a scene. An entry of a scene becomes one component; what neither an entry nor a
- * model asks for does not exist. Components are ordered by stage, within a stage by body, within that as the model and
- * then the scene list them. An entry of the scene replaces the model's component of the same effect. Thread: [load] to
+/* The plan: the ordered components of a scene. One entry of a scene becomes one component; a component exists only
+ * if an entry or a model asks for it. Components are ordered by stage, then by body, then in the order of the model
+ * and of the scene. An entry of the scene replaces the model's component of the same effect. Thread: [load] to
  * build, then components belong to [sim]. */
 #ifndef PAL_SIM_PLAN_PLAN_H
 #define PAL_SIM_PLAN_PLAN_H
@@ -8,35 +8,38 @@
 
 typedef struct pal_plan {
     int n_body, n_row;
-    int n_load;                               /* rows at load: the room of the arena's own tables */
+    int n_load;                               /* components at load: capacity of the arena's tables */
     pal_body *body;                           /* [n_body]                                         */
     pal_component *row;                       /* [n_row]                                          */
-    int *component_body;                      /* index of each row's body [n_row]                 */
-    int first[PAL_STAGE_COUNT][PAL_BODY_MAX]; /* rows of a stage and body: row + first, ...       */
+    int *component_body;                      /* index of each component's body [n_row] */
+    int first[PAL_STAGE_COUNT][PAL_BODY_MAX]; /* components of a stage and body: row + first, ... */
     int n_of[PAL_STAGE_COUNT][PAL_BODY_MAX];  /* ... and how many                                 */
-    size_t scratch_byte;                      /* most that one row needs in a sub-step            */
-    const char *reason[PAL_BODY_MAX];         /* what calls for each entry of a body, one text behind the other */
-    pal_component *load_component;            /* the arena's own tables, used while there is room */
+    size_t scratch_byte;                      /* max need of one component in a sub-step */
+    const char *reason[PAL_BODY_MAX]; /* scene entry that asks for each component of a body, texts one after another */
+    pal_component *load_component;    /* the arena's tables, used while they suffice */
     int *load_component_body;
 } pal_plan;
 
-/* builds bodies and rows into arena; REFUSED names the entry, MEMORY */
+/* builds bodies and components into arena; REFUSED names the entry; MEMORY */
 pal_err pal_plan_build(const pal_scene *scene, pal_arena *arena, pal_diagnostic *diag, pal_plan *out);
-void pal_plan_free(pal_plan *plan); /* what rows took beside the arena; before the arena goes */
-/* puts a made row behind the others of its stage and body, or takes it out again (and destroys it, its own memory
- * too); between steps. More rows than at load stand in heap memory, which is gone when they are; MEMORY: unchanged.
- * [sim] */
+void pal_plan_free(
+    pal_plan *plan); /* frees what components allocated outside the arena; call it before the arena is freed */
+/* insert appends a made component to those of its stage and body; remove takes it out and destroys it with its own
+ * memory. Call between steps. Components beyond the capacity at load are stored in heap memory, which is freed with
+ * them; MEMORY: unchanged. [sim] */
 pal_err pal_plan_insert(pal_plan *plan, int body, const pal_component *row);
-/* the same in front of the row at `at` */
+/* the same, before the component at `at` */
 pal_err pal_plan_insert_at(pal_plan *plan, int at, int body, const pal_component *row);
 void pal_plan_remove(pal_plan *plan, const void *self);
-/* Switches a row off or on again (world.h, pal_world_switch_component), budget and limits apart. *changed: it was not
- * so already. material: of the body now. scratch_byte of the plan may have grown. [sim] */
+/* Switches a component off or on (world.h, pal_world_switch_component), without checks of budget and limits.
+ * *changed: the state was different before. material: the present one of the body. scratch_byte of the plan may
+ * grow. [sim] */
 pal_err pal_plan_switch(pal_plan *plan, const pal_scene *scene, int body, const char *name, bool on,
                         const pal_material *material, pal_diagnostic *diag, bool *changed);
-/* would pal_plan_switch refuse to switch this row off as the plan is now? */
+/* true: pal_plan_switch would refuse to switch this component off in the present plan */
 bool pal_plan_requires(const pal_plan *plan, int row);
-size_t pal_plan_bytes(const pal_plan *plan); /* heap memory: tables of more rows than at load, rows, solids */
-/* one line per row into text (cut at n_byte, always ended); returns the length it wanted. [any] */
+size_t pal_plan_bytes(
+    const pal_plan *plan); /* heap memory: tables beyond the capacity at load, components, subdivision solids */
+/* prints one line per component into text (truncated at n_byte, always terminated); returns the full length. [any] */
 size_t pal_plan_print(const pal_plan *plan, char *text, size_t n_byte);
 #endif

@@ -1,32 +1,31 @@
-/* Solver central_cg: central differences on the control points of a solid, the mass matrix by conjugate gradients (A
- * 3.3, eq. 16-20; explicit in the stiffness, erratum A10). Eq. 20 in steps of body->v, the velocity between the points
- * of time:
+/* Solver central_cg: central differences on the control points of a subdivision solid, with the mass matrix solved
+ * by conjugate gradients (paper A section 3.3, eq. 16-20; explicit in the stiffness, erratum A10). Eq. 20 in
+ * increments of body->v, the velocity between the points of time:
  *
  *     (M~ + theta k D~) (v+ - v) = k (f~ - D~ v),    p+ = p + dt v+,    theta = 1/2, k = dt, v = (p - p-) / dt
  *
- * What is zero stays zero to the bit, and no digits go into where the body is. When the sub-step changes, k is (dt +
- * dt-) / 2 and theta dt- / (dt + dt-): D~ acts on the velocity at p, by interpolation. At the start and whenever the
- * body was put somewhere else v is that at p and dt- = 0, which is the start p- = p - dt v + dt^2 a / 2.
+ * In this form zero stays zero to the bit, and precision does not depend on the body's position. When the sub-step
+ * changes, k is (dt + dt-) / 2 and theta dt- / (dt + dt-): D~ acts on the velocity at p, by interpolation. At the
+ * start and after the body was placed elsewhere, v is the velocity at p and dt- = 0, which is the start p- = p - dt
+ * v + dt^2 a / 2.
  *
- * D~ is the components' drag (hook `drag`) and the body's brake (stiffening_damper.h) times M~, and where the samples'
- * gamma/mu varies their matrix as well. Departure: theta is at least 1 - 1/(k gamma/mu), so that drag that would turn
- * the motion round within a sub-step lets it creep. Conjugate gradients begin with v+ = v, that is p+ = p + (p - p-),
- * and end when |r|
- * <= tolerance |k (f~ - D~ v)| (key, 1e-4): in one iteration with the default preconditioner, a Cholesky factor of M~
- * (num/envelope.h), and in 40 to 100 with key preconditioner "diagonal", which the paper has. Its own 2 to 4 leave 1e-4
- * of the whole right side of eq. 20.
+ * D~ is the components' drag (hook `drag`) and the body's stiffening damper (stiffening_damper.h) times M~, plus the
+ * samples' damping matrix where their gamma/mu varies. Departure: theta is at least 1 - 1/(k gamma/mu), so that drag
+ * that would reverse the motion within a sub-step gives creep instead. Conjugate gradients start with v+ = v, that
+ * is p+ = p + (p - p-), and end when |r| <= tolerance |k (f~ - D~ v)| (key, 1e-4). This takes one iteration with the
+ * default preconditioner, a Cholesky factor of M~ (num/envelope.h), and 40 to 100 with key preconditioner
+ * "diagonal", the paper's. The paper's 2 to 4 iterations leave 1e-4 of the whole right side of eq. 20.
  *
- * The sub-step is `safety` (key, 0.9) of 2 / omega_max of (M~, K~) by Lanczos' iteration with K~ from differences of
- * forces at the present state (num/lanczos.h): at load, after edits, and again, from the last Ritz vector, when points
- * have moved a fifth of a control cell against one another, but at most once in 12 sub-steps, and once in up to 96 as
- * long as that changes it by less than 2 %. Stiffness and damping that CONTACT components say or want at nodes add
- * their own largest eigenvalues at the begin of every step. Fixed points' rows are dropped, prescribed ones keep their
- * velocity and pull their neighbours by its change. Moves are limited by step_guard.h; where one would have moved
- * farther, the stiffness is not that which the limit knows, and sub-steps are halved up to three times and grow again
- * by 2 % of what was halved a sub-step. While elements are inverted sub-steps are 0.6 times as long, unless the body
- * stands still. Where the world cannot afford the sub-steps (step->heavy) all masses are multiplied so that the limit
- * is met.
- */
+ * The sub-step is `safety` (key, 0.9) of 2 / omega_max of (M~, K~), by Lanczos iteration with K~ from differences of
+ * forces at the present state (num/lanczos.h). It is computed at load, after edits, and again from the last Ritz
+ * vector when points have moved a fifth of a control cell relative to one another, but at most once in 12 sub-steps,
+ * and once in up to 96 while it changes by less than 2 %. Stiffness and damping that CONTACT components report at
+ * nodes add their largest eigenvalues at the beginning of every step. Rows of fixed points are omitted; prescribed
+ * points keep their velocity and act on their neighbours by its change. step_guard.h limits displacements; where it
+ * does so, the stiffness is not the one the limit was computed for, so sub-steps are halved up to three times and
+ * then grow by 2 % of the reduction per sub-step. While elements are inverted sub-steps are 0.6 times as long,
+ * unless the body is at rest. Where the world cannot afford the sub-steps (step->heavy), all masses are scaled so
+ * that the limit is met. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/num/conjugate_gradient.h"
@@ -42,52 +41,52 @@ typedef struct central {
     const pal_interpolation *rows;
     const pal_mass_operator *mass;
     double safety, tolerance;
-    double dt_s; /* of the sub-step before; 0: none, v is that at p */
+    double dt_s; /* previous sub-step; 0: none, v is that at p */
     pal_conjugate_gradient cg;
     double a, b;           /* its matrix is a M~ + b D~ on the free points, D~ that of the samples where it varies */
-    pal_envelope envelope; /* n 0: too large, or not asked for                                             */
+    pal_envelope envelope; /* n 0: too large or not requested */
     bool factored;
-    uint8_t *fixed;   /* held when the preconditioner was made                     [n_dof]    */
+    uint8_t *fixed;   /* supports when the preconditioner was made [n_dof] */
     double *inverse;  /* 1 / diagonal of M~, 0 for fixed points                    [n_dof]    */
     double *change;   /* v+ - v                                                    [n_dof][3] */
-    double *was;      /* v of the sub-step before                                  [n_dof][3] */
+    double *was;      /* v of the previous sub-step [n_dof][3] */
     uint64_t sampled; /* dofs.material_revision when the preconditioner was made; 0: never    */
     pal_solve_report report;
 
     /* ---- the limit ---- */
     pal_lanczos lanczos;
-    double limit_s, rows2;        /* omega^2 of the FORCE components, at most, 1/s^2                      */
-    double cell_m;                /* edge of a control cell, about */
-    double way_m;                 /* no point has moved farther against the others since it was taken */
-    bool has_inversion;           /* elements run on something else since they are inverted      */
-    int n_unseen;                 /* sub-steps since inverted elements were looked for */
-    int n_since, pause;           /* sub-steps since, and how many at least between two */
-    bool known;                   /* rows2 holds, but for what has moved                             */
+    double limit_s, rows2;        /* upper bound of omega^2 of the FORCE components, 1/s^2 */
+    double cell_m;                /* approximate edge of a control cell */
+    double way_m;                 /* upper bound of relative motion since the bound was computed */
+    bool has_inversion;           /* inverted elements use their fallback */
+    int n_unseen;                 /* sub-steps since the last check for inversion */
+    int n_since, pause;           /* sub-steps since the last bound; min interval */
+    bool known;                   /* rows2 is valid except for motion */
     double wild;                  /* divides the limit: 1, more after points were clamped */
     double contact2, contact_1_s; /* largest eigenvalues of contact's stiffness and of explicit damping over mass */
-    pal_step *step;               /* that asks for the limit                                  */
+    pal_step *step;               /* that requests the limit */
     const double *x;              /* the body's own                                                       */
-    double *at, *still, *g, *g0;  /* the body's x, v, g while it looks; g at the state itself  [n_dof][3]  */
-    double *d, *dv, *f;           /* its d, dv, f                                              [n_node][3] */
+    double *at, *still, *g, *g0;  /* saved x, v, g of the body during the iteration; g at the state itself [n_dof][3] */
+    double *d, *dv, *f;           /* saved d, dv, f [n_node][3] */
     double *bound;                /* of CONTACT components                                           [n_node]    */
 } central;
 
-/* of wild, and what is left of it after a sub-step without clamps */
+/* back-off of the sub-step after a clamped displacement, and its decay per sub-step without one */
 static const double max_wild = 8, calm = 0.98;
-/* of omega^2 while elements are inverted: what throws a corner about is the fastest motion, which near its limit is
- * seen with up to twice its energy, velocities being those of half a sub-step before */
+/* of omega^2 while elements are inverted: the displaced corner is the fastest mode, which near its limit shows up to
+ * twice its energy, as velocities are those of half a sub-step before */
 static const double inverted2 = 3;
 /* of a move in elements, as forces may be of single precision; of omega^2 and of its solves */
 static const double small_h = 1e-4, near = 0.02, exact = 1e-6;
 enum { PAUSE = 12, MAX_PAUSE = 96 };
-/* sub-steps between looks for elements that are inverted, about */
+/* approximate sub-steps between checks for inversion */
 enum { UNSEEN = 16 };
-/* iterations for a sub-step; Lanczos' first and later ones; entries of a factor */
+/* max iterations per sub-step; first and later ones of Lanczos; max entries of a factor */
 enum { MOST = 300, FIRST = 24, AGAIN = 6, MAX_ENTRY = 1 << 22 };
 
 /* ---- load ---- */
 
-/* n arrays of count numbers; false: no memory */
+/* allocates n arrays of count numbers; false: no memory */
 static bool take(pal_arena *arena, size_t count, double **to[], int n)
 {
     for (int i = 0; i < n; i++)
@@ -178,7 +177,7 @@ static void precondition(void *user, const double *r, double *out)
     for (int i = 0; i < row->mass->n_point; i++) pal_scale3(out + 3 * (size_t)i, row->inverse[i], r + 3 * (size_t)i);
 }
 
-/* the preconditioner again when masses or supports are others. True: it was */
+/* rebuilds the preconditioner when masses or supports have changed; true: rebuilt */
 static bool renew(central *row, const pal_body *body)
 {
     const pal_mass_operator *m = row->mass;
@@ -197,7 +196,7 @@ static bool renew(central *row, const pal_body *body)
     return true;
 }
 
-/* x += A^-1 r from what is in cg.r, until |r| <= target; rows of fixed points are no rows */
+/* x += A^-1 r with r in cg.r, until |r| <= target; rows of fixed points are omitted */
 static void solve(central *row, double *x, double target)
 {
     for (int i = 0; i < row->mass->n_point; i++)
@@ -227,7 +226,7 @@ static bool gather(central *row)
     return good;
 }
 
-/* out = K~ v of the FORCE components, by the difference of forces over a small move along v */
+/* out = K~ v of the FORCE components, by the difference of forces over a small displacement along v */
 static bool multiply_stiffness(void *user, const double *v, double *out)
 {
     central *row = user;
@@ -241,7 +240,7 @@ static bool multiply_stiffness(void *user, const double *v, double *out)
     return true;
 }
 
-/* out = A' bound A v, bound being one number at each node */
+/* out = A' bound A v, with one number of bound per node */
 static bool multiply_bound(void *user, const double *v, double *out)
 {
     central *row = user;
@@ -254,7 +253,7 @@ static bool multiply_bound(void *user, const double *v, double *out)
     return true;
 }
 
-/* adds any signs at the free points, of length `share` of the vector's own, 1 when there is none */
+/* adds arbitrary signs at the free points, of length `share` of the vector's norm, or 1 if it is zero */
 static void add_any(const central *row, double share, double *z)
 {
     const double norm = sqrt(pal_dot_product(row->cg.n, z, z)), each = share * norm / sqrt(row->cg.n);
@@ -265,8 +264,7 @@ static void add_any(const central *row, double share, double *z)
     }
 }
 
-/* omega^2 of the FORCE components on a body that stands still at its present place, all of whose arrays stay as they
- * are */
+/* omega^2 of the FORCE components at the present position with zero velocity; restores all arrays of the body */
 static double find_rows2(central *row, pal_step *step)
 {
     pal_body *body = step->body;
@@ -296,7 +294,7 @@ static double find_rows2(central *row, pal_step *step)
 /* the largest eigenvalue of row->bound over mass */
 static double find_bound(central *row)
 {
-    /* the Ritz vector of the FORCE components is kept for later */
+    /* keep the Ritz vector of the FORCE components */
     double *z = row->lanczos.z, sum = 0;
     const int n_cg = row->report.n_cg;
     for (int i = 0; i < row->rows->n_row; i++) sum += row->bound[i];
@@ -318,7 +316,7 @@ static void clear_bound(central *row)
     memset(row->bound, 0, sizeof(double) * (size_t)row->rows->n_row);
 }
 
-/* contact comes and goes between steps without any point moving */
+/* contact changes between steps without motion of any point */
 static void find_contact(central *row, const pal_step *step)
 {
     clear_bound(row);
@@ -348,7 +346,7 @@ static void look(central *row, pal_step *step)
     row->n_since = 0;
 }
 
-/* true: elements were found that run on something else from now on */
+/* true: elements were found inverted and use their fallback from now on */
 static bool recover(central *row, pal_step *step)
 {
     pal_body *body = step->body;
@@ -359,7 +357,7 @@ static bool recover(central *row, pal_step *step)
     body->d = row->d;
     const unsigned seen = pal_guard_recover(step);
     body->d = d;
-    /* forces of another law times half of a sub-step that was as long as the old one allowed would be a blow */
+    /* half a sub-step of the previous length with the forces of another law would be an impulse */
     if (seen & PAL_INVERSION_CHANGED) row->dt_s = 0;
     row->has_inversion = (seen & PAL_INVERTED) && !(seen & PAL_INVERSION_AT_REST);
     return seen & PAL_INVERSION_CHANGED;
@@ -383,7 +381,7 @@ static double limit(void *self, pal_step *step)
 
 /* ---- a sub-step ---- */
 
-/* what the velocities of fixed points change by is known; `was` is v before the change everywhere. True: it is not 0 */
+/* applies the known change of velocity of fixed points; `was` is v before the change. True: it is not 0 */
 static bool begin_change(central *row, const pal_body *body)
 {
     bool any = false;
@@ -431,13 +429,13 @@ static void find_change(central *row, const pal_step *step)
     const double norm = sqrt(pal_dot_product(row->cg.n, row->cg.r, row->cg.r));
     if (step->sub == 0) row->report.n_cg = 0;
     solve(row, row->change, row->tolerance * norm);
-    /* forces that are not finite give velocities that are not */
+    /* non-finite forces give non-finite velocities */
     for (int i = 0; i < row->cg.n && !isfinite(norm); i++) row->change[i] = NAN;
     row->report.residual = norm > 0 ? row->cg.residual / norm : 0;
     row->report.converged = row->cg.residual <= row->tolerance * norm;
 }
 
-/* v+ and p+; the longest way of a point against the others, which is not finite when a velocity is none */
+/* computes v+ and p+; returns the largest relative displacement of a point, not finite when a velocity is not */
 static double move(central *row, pal_body *body, double dt)
 {
     const double max_m = pal_guard_max_move_m(body);
@@ -445,7 +443,7 @@ static double move(central *row, pal_body *body, double dt)
     double mean[3] = {0, 0, 0}, max2 = 0, poison = 0;
     for (int i = 0; i < body->n_dof; i++) {
         double *v = body->v + 3 * (size_t)i;
-        /* prescribed points have theirs */
+        /* prescribed points already have theirs */
         if (body->support[i] == PAL_FIXED) pal_set3(v, 0, 0, 0);
         if (!body->support[i]) pal_add3(v, v, row->change + 3 * (size_t)i);
         const double way = pal_norm3(v) * dt;

@@ -1,5 +1,6 @@
-/* Solver implicit_euler: backward Euler, x = x0 + dt V, M (V - v0) = dt f(x, V), after Baraff & Witkin (1998) with one
- * linearisation per step (newton 1) or as many as asked. First order, damps; contact and drag are implicit too.
+/* Solver implicit_euler: backward Euler, x = x0 + dt V, M (V - v0) = dt f(x, V), after Baraff & Witkin (1998) with
+ * one linearisation per step (newton 1) or more. First order, with numerical damping; contact and drag are implicit
+ * too.
  *
  * Keys: tolerance (1e-2), iterations (60), newton (1), substep_s (0: the scene's step), refresh_iterations (12),
  * refresh (true), warp (true), watch (true); see implicit_solver.h. */

@@ -1,22 +1,23 @@
-/* Solver rk4: the classical fourth-order Runge-Kutta method over the body's active nodes (C, equations of motion).
- * Loads of CONTACT components are constant within a sub-step.
+/* Solver rk4: the classical fourth-order Runge-Kutta method over the body's active nodes (paper C, equations of
+ * motion). Loads of CONTACT components are constant within a sub-step.
  *
- * The sub-step is `safety` (key, 0.9) of 2.7 / max(omega, c) over the free nodes; c = C/m with the Gershgorin row sums
- * C of explicit damping, omega^2 bounds the stiffness over mass. The method is stable where |lambda dt| <= 2.61 in the
- * left half plane, and no eigenvalue is larger than max(omega, c). Row sums K/m put omega up to 1.4 times too high on a
- * surface; there Lanczos' iteration says more, on M^-1 K through differences of forces, K of all FORCE components at
- * the present state: the largest Ritz value plus its residual (Zhou and Li, Bounding the spectrum of large Hermitian
- * matrices, 2011), at most 2 % below the true one where it was measured, never above the row sums, to which those of
- * CONTACT components come. With the membrane law it halves with every level, as eq. 9 asks. The bounds are taken again
- * when a node may have moved a fifth of an element or when the active part is another, Lanczos' at most once in 12
- * sub-steps and only where it saves one, between with the row sums alone; common factors that change scale it.
+ * The sub-step is `safety` (key, 0.9) of 2.7 / max(omega, c) over the free nodes. c = C/m, where C are the
+ * Gershgorin row sums of explicit damping; omega^2 bounds stiffness over mass. The method is stable where |lambda
+ * dt| <= 2.61 in the left half plane, and no eigenvalue exceeds max(omega, c). Row sums K/m overestimate omega by up
+ * to 1.4 times on a surface; there Lanczos iteration gives a sharper bound, on M^-1 K through differences of forces,
+ * K of all FORCE components at the present state: the largest Ritz value plus its residual (Zhou and Li, Bounding
+ * the spectrum of large Hermitian matrices, 2011). It was measured at most 2 % below the true value and never
+ * exceeds the row sums; the row sums of CONTACT components are added. With the membrane law the sub-step halves with
+ * every level, as eq. 9 requires. The bounds are recomputed when a node may have moved a fifth of an element or when
+ * the active part has changed, the Lanczos bound at most once in 12 sub-steps and only where it saves one; between,
+ * row sums alone are used. Changes of common factors scale the bound.
  *
- * Departures. Drag of the rows (hook `drag`, rate r, v' = -r v) is taken exactly: the exponential Runge-Kutta method of
- * Cox and Matthews (2002, eq. 26-29), which is the classical one for r = 0, of order 4 for every r, stable for all r
- * where the classical one is stable without drag, and creeps as v = f/(m r) when r is huge. Fixed nodes stand,
- * prescribed ones keep their velocity. Moves are limited by step_guard.h. Where the world cannot afford the sub-steps
- * (step->heavy), nodes that break the limit get the mass that meets it. Where the bounds are taken, components look for
- * inverted elements, and in every step while there are any. */
+ * Departures. Drag of the components (hook `drag`, rate r, v' = -r v) is integrated exactly by the exponential
+ * Runge-Kutta method of Cox and Matthews (2002, eq. 26-29). It equals the classical method for r = 0, has order 4
+ * for every r, is stable for all r where the classical one is stable without drag, and creeps as v = f/(m r) for
+ * very large r. Fixed nodes do not move; prescribed ones keep their velocity. step_guard.h limits displacements.
+ * Where the world cannot afford the sub-steps (step->heavy), nodes that break the limit get the mass that meets it.
+ * Components check for inverted elements whenever the bounds are computed, and in every step while there are any. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
@@ -25,15 +26,15 @@
 
 #include <string.h>
 
-/* what a node keeps between the stages, as place and velocity: what its next one starts from, and the sum of rates.
- * Lanczos' iteration: place and q, forces at the state itself and the q before */
+/* Data of a node between the stages, as position and velocity: the start of its next stage, and the sum of rates. In
+ * Lanczos iteration: position and q, forces at the state itself and the previous q */
 typedef struct memory {
     pal_v8 from, sum;
 } memory;
 
-/* of a sub-step dt with drag r, z = r dt, for place and velocity. What is kept of the start after half a sub-step and a
- * whole one (exp(-z/2), exp(-z)), of free and of prescribed nodes; what rates count for at half (dt/2, dt/2 phi1(z/2)),
- * in the fourth stage, and in the sum in stages 1, 2 and 3, 4 */
+/* Coefficients of a sub-step dt with drag r, z = r dt, for position and velocity: decay of the start after half a
+ * sub-step and a whole one (exp(-z/2), exp(-z)), of free and of prescribed nodes; weights of rates at half (dt/2,
+ * dt/2 phi1(z/2)), in the fourth stage, and in the sum in stages 1, 2 and 3, 4 */
 typedef struct rates {
     double dt;
     pal_v8 half[2], whole[2], grow, last, weight[3];
@@ -41,35 +42,36 @@ typedef struct rates {
 
 typedef struct rk4 {
     double *stiff, *damp; /* Gershgorin row sums, N/m and Ns/m [n_dof] */
-    /* by place among the active nodes [n_dof] */
+    /* by index among the active nodes [n_dof] */
     memory *memory;
     pal_quad *load;
     double *inverse_kg;
     uint8_t *led;
-    bool pulls;           /* all FORCE components can work on the pack */
+    bool pulls;           /* all FORCE components support active_nodes */
     double safety, reach; /* of the stability limit; safety times the radius 2.7 */
     double limit_s;
-    double way_m; /* no node has moved farther since the bounds were taken */
-    /* of the body when they were taken */
+    double way_m; /* upper bound of motion since the bounds were computed */
+    /* of the body when they were computed */
     uint64_t revision;
     double ramp[2];
     bool known;         /* limit_s holds */
-    bool has_inversion; /* rows are to be asked again in the coming step */
+    bool has_inversion; /* bounds must be computed again in the coming step */
 
     /* Lanczos' bound on omega^2 of the FORCE components, 1/s^2, at which common factors it was taken, and sub-steps
      * since */
     double sharp2, sharp_ramp[2];
     int n_since;
     bool sharp_known;
-    double step_s;              /* the last whole step; 0: none yet */
-    double over;                /* row sums put omega at most so many times too high */
-    double *at, *still, *force; /* the body's x, v and f while it looks [n_dof][3]; NULL: no shell */
+    double step_s; /* the last whole step; 0: none yet */
+    double over;   /* max overestimate of omega by row sums */
+    double *at, *still,
+        *force; /* saved x, v and f of the body during the iteration [n_dof][3]; NULL: no adaptive surface */
 } rk4;
 
 static const double radius = 2.7;
-/* row sums are hardly ever more than `max_over` times too high, nor `more` times more so than they were last */
+/* row sums are rarely more than `max_over` times too high, or `more` times more so than last time */
 static const double max_over = 1.6, more = 1.05;
-/* sub-steps between Lanczos' bounds, and iterations for one, a gather each */
+/* sub-steps between Lanczos bounds, and iterations for one, each an evaluation of forces */
 enum { PAUSE = 12, LANCZOS = 10 };
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
@@ -109,7 +111,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 
 /* ---- forces ---- */
 
-/* the body as it is, and its loads */
+/* the body's state and its loads */
 static void take_body(rk4 *row, const pal_step *step)
 {
     const pal_body *body = step->body;
@@ -119,7 +121,7 @@ static void take_body(rk4 *row, const pal_step *step)
         row->load[k] = pal_quad_load(body->load + 3 * (size_t)pal_body_point(body, k));
 }
 
-/* places and velocities of the pack to the body */
+/* copies positions and velocities of active_nodes to the body */
 static void give_motion(const pal_body *body)
 {
     for (int k = 0; k < body->n_active; k++) {
@@ -129,7 +131,7 @@ static void give_motion(const pal_body *body)
     }
 }
 
-/* forces at the pack's places and velocities, into the pack */
+/* forces at the positions and velocities of active_nodes, into active_nodes */
 static pal_err find_forces(const rk4 *row, pal_step *step)
 {
     pal_body *body = step->body;
@@ -146,11 +148,11 @@ static pal_err find_forces(const rk4 *row, pal_step *step)
 
 /* ---- the limit ---- */
 
-/* does the bound taken last still hold? */
+/* true: the last bound is still valid */
 static bool still_known(const rk4 *row, const pal_step *step)
 {
     const pal_body *body = step->body;
-    /* not finite is not known */
+    /* a non-finite bound is unknown */
     if (!row->known || row->revision != body->revision || !(row->way_m <= PAL_GUARD_RECHECK * body->edge_m))
         return false;
     if (body->active && (row->ramp[0] != *body->dofs.ramp[0] || row->ramp[1] != *body->dofs.ramp[1])) return false;
@@ -158,7 +160,7 @@ static bool still_known(const rk4 *row, const pal_step *step)
     return step->sub != 0 || !pal_guard_has_bounds(step->contact, step->n_contact);
 }
 
-/* row sums of stiffness over mass at free nodes, the most of them */
+/* max over free nodes of row sums of stiffness over mass */
 static double max_stiff(const rk4 *row, const pal_body *body)
 {
     double max = 0;
@@ -183,9 +185,9 @@ static double one_if_finite(const rk4 *row, const pal_body *body)
     return 1 + sum;
 }
 
-/* ---- Lanczos' iteration; vectors are sqrt(m) times moves, A q takes the place of the forces ---- */
+/* ---- Lanczos' iteration; vectors are sqrt(m) times displacements, A q replaces the forces ---- */
 
-/* the first one: any signs, nodes weighted by their row sums over mass, as the stiffest are where fast modes live */
+/* the first vector: arbitrary signs, weighted by row sums over mass, because fast modes are where nodes are stiffest */
 static void begin_lanczos(rk4 *row, const pal_body *body)
 {
     double norm2 = 0;
@@ -208,7 +210,7 @@ static void begin_lanczos(rk4 *row, const pal_body *body)
     for (int k = 0; k < body->n_active; k++) row->memory[k].from *= scale;
 }
 
-/* A q by the difference of forces over a move of 1e-6 of an element; returns q A q */
+/* A q by the difference of forces over a displacement of 1e-6 of an element; returns q A q */
 static pal_err apply_stiffness(rk4 *row, pal_step *step, double *along)
 {
     pal_body *body = step->body;
@@ -233,7 +235,7 @@ static pal_err apply_stiffness(rk4 *row, pal_step *step, double *along)
     return PAL_ERR_OK;
 }
 
-/* the next vector from A q - alpha q - beta q'; returns its length before it was made 1 */
+/* the next vector from A q - alpha q - beta q'; returns its norm before normalisation */
 static double next_lanczos(rk4 *row, const pal_body *body, double alpha, double beta)
 {
     double norm2 = 0;
@@ -251,8 +253,8 @@ static double next_lanczos(rk4 *row, const pal_body *body, double alpha, double 
     return norm;
 }
 
-/* largest eigenvalue of the tridiagonal matrix with diagonal a and b beside it, plus the residual that b[n - 1] leaves
- * in the whole one. Bisection below `most`, which is above it, by the signs of leading minors */
+/* largest eigenvalue of the tridiagonal matrix with diagonal a and off-diagonal b, plus the residual from b[n - 1].
+ * Bisection below `max`, an upper bound, by the signs of leading minors */
 static double largest_of(const double *a, const double *b, int n, double max)
 {
     double low = a[0], high = max;
@@ -274,7 +276,7 @@ static double largest_of(const double *a, const double *b, int n, double max)
     return high + fabs(b[n - 1] * s) / sqrt(sum);
 }
 
-/* Lanczos' bound on omega^2 of the FORCE components; above `most`: it knows nothing better */
+/* Lanczos bound on omega^2 of the FORCE components; above `max`: no better bound */
 static pal_err run_lanczos(rk4 *row, pal_step *step, double max, double *out)
 {
     double a[LANCZOS], b[LANCZOS];
@@ -291,7 +293,7 @@ static pal_err run_lanczos(rk4 *row, pal_step *step, double max, double *out)
     return PAL_ERR_OK;
 }
 
-/* the same on a body that stands still, all of whose arrays stay as they are */
+/* the same at zero velocity; restores all arrays of the body */
 static void find_sharp(rk4 *row, pal_step *step, double max)
 {
     pal_body *body = step->body;
@@ -315,19 +317,19 @@ static void find_sharp(rk4 *row, pal_step *step, double max)
     row->n_since = 0;
 }
 
-/* would a longer limit save a sub-step? */
+/* true: a longer limit would save a sub-step */
 static bool would_help(const rk4 *row, double max)
 {
     double n = row->step_s * sqrt(max) / row->reach;
     return !(row->step_s > 0) || ceil(n / row->over) < ceil(n);
 }
 
-/* omega^2 of the FORCE components: `most` of the row sums or less. Stiffness that the common factors have not grown for
- * is less than the same with all of it grown */
+/* omega^2 of the FORCE components: at most the largest row sum `max`. If the common factors have grown for only part of
+ * the stiffness, scaling all of it gives an upper bound */
 static double bound_force(rk4 *row, pal_step *step, double max)
 {
     const pal_body *body = step->body;
-    /* looked at from outside, nothing moves: the world asks at rest with places that are no body's */
+    /* called from outside without motion: the world asks at rest, with positions that are not the body's */
     if (!body->active || body->x == body->x_rest) return max;
     bool moved = row->revision != body->revision || !(row->way_m <= PAL_GUARD_RECHECK * body->edge_m);
     row->sharp_known &= !moved;
@@ -423,7 +425,7 @@ static rates find_rates(double dt_s, double rate)
                    .weight = {both(dt_s / 6, weight[0]), both(dt_s / 3, weight[1]), both(dt_s / 6, weight[2])}};
 }
 
-/* inverse masses: fixed nodes have no acceleration, and standing ones no velocity */
+/* inverse masses: fixed nodes have no acceleration, and those that do not move no velocity */
 static void take_masses(rk4 *row, const pal_body *body, const rates *r, bool heavy)
 {
     double t = r->dt / row->reach;
@@ -438,7 +440,7 @@ static void take_masses(rk4 *row, const pal_body *body, const rates *r, bool hea
     }
 }
 
-/* velocity and acceleration of a packed node */
+/* velocity and acceleration of an active node */
 PAL_INLINE pal_v8 rate_of(const rk4 *row, const pal_active_nodes *pack, int k)
 {
     return pal_v8_join(pal_v8_high(pack->xv[k]), row->inverse_kg[k] * pack->f[k]);
@@ -457,8 +459,8 @@ static void stage_first(rk4 *row, const pal_body *body, const rates *r)
     }
 }
 
-/* from the second stage's forces the third stage's state. The fourth one's velocity goes on from the second's with what
- * the drag leaves of it, less what the first acceleration gave that */
+/* the third stage's state from the second stage's forces. The fourth stage's velocity continues from the second's
+ * after drag, less the contribution of the first acceleration */
 static void stage_second(rk4 *row, const pal_body *body, const rates *r)
 {
     pal_active_nodes *pack = body->active_nodes;
@@ -472,7 +474,7 @@ static void stage_second(rk4 *row, const pal_body *body, const rates *r)
     }
 }
 
-/* from the third stage's forces the fourth stage's state */
+/* the fourth stage's state from the third stage's forces */
 static void stage_third(rk4 *row, const pal_body *body, const rates *r)
 {
     pal_active_nodes *pack = body->active_nodes;
@@ -484,7 +486,7 @@ static void stage_third(rk4 *row, const pal_body *body, const rates *r)
     }
 }
 
-/* from the fourth stage's forces the state at the end; returns the square of the longest way, NaN where one is none */
+/* the final state from the fourth stage's forces; returns the square of the largest displacement, NaN if one is NaN */
 static double stage_last(rk4 *row, const pal_body *body, const rates *r)
 {
     pal_active_nodes *pack = body->active_nodes;
@@ -502,7 +504,7 @@ static double stage_last(rk4 *row, const pal_body *body, const rates *r)
     return max2 + poison;
 }
 
-/* shortens moves, and velocities that would make such, longer than max_m */
+/* limits displacements to max_m, and velocities that would cause longer ones */
 static void clamp_moves(const rk4 *row, pal_body *body, double dt_s, double max_m)
 {
     for (int k = 0; k < body->n_active; k++) {
@@ -516,7 +518,7 @@ static void clamp_moves(const rk4 *row, pal_body *body, double dt_s, double max_
     }
 }
 
-/* forces of the fourth stage, for those who look at what supports bear */
+/* forces of the fourth stage, for support reactions */
 static void give_forces(const rk4 *row, const pal_body *body)
 {
     for (int k = 0; k < body->n_active && row->pulls; k++)

@@ -1,17 +1,17 @@
-/* Solver sdirk2: the two-stage singly diagonally implicit Runge-Kutta method of order 2, stiffly accurate and L-stable
- * (Alexander 1977), g = 1 - 1/sqrt 2:
+/* Solver sdirk2: the two-stage singly diagonally implicit Runge-Kutta method of order 2, stiffly accurate and
+ * L-stable (Alexander 1977), g = 1 - 1/sqrt 2:
  *     V1 = v0 + g dt a1,                    x1 = x0 + g dt V1
  *     V2 = v0 + (1 - g) dt a1 + g dt a2,    x2 = x0 + (1 - g) dt V1 + g dt V2,     v = V2, x = x2,
- * a1, a2 being the accelerations of the stages. Both stages have the matrix of a backward Euler step of g dt, so one
- * factor serves both; the second is linearised where the first ends. Order 2 shows with newton > 1: a single iteration
- * drops the derivative of the rotations from the tangent.
- * A tool feels the mean force of the sub-step, (1 - g) f1 + g f2, which is what gives the body its momentum; its
- * patches are those of the end, f2.
+ * where a1 and a2 are the accelerations of the stages. Both stages have the matrix of a backward Euler step of g dt,
+ * so one factor serves both; the second is linearised where the first ends. Order 2 is reached with newton > 1: a
+ * single iteration omits the derivative of the rotations from the tangent.
+ * A tool receives the mean force of the sub-step, (1 - g) f1 + g f2, which is the one that gives the body its
+ * momentum; its contact patches are those of the end, f2.
  *
- * The second stage extrapolates the acceleration of the first by a factor of 2.4, which is stable where forces are
- * smooth. Elements that invert and recover are not: energy rose in one sub-step of thirty without end. After a sub-step
- * that gained energy in spite of all iterations the solver continues by backward Euler until half a second passes
- * without one.
+ * The second stage extrapolates the acceleration of the first by a factor of 2.4, which is stable for smooth forces
+ * but not for elements that invert and recover: energy rose in one sub-step of thirty without end. After a sub-step
+ * that gained energy in spite of all iterations the solver uses backward Euler until half a second passes without a
+ * gain.
  *
  * Keys: as implicit_euler. */
 #include "server/base/vec3.h"
@@ -68,7 +68,7 @@ static pal_err run(void *self, pal_step *step)
         memcpy(core->xs, core->x0, n_byte);
         memcpy(core->vs, core->v0, n_byte);
         two_stages = core->energy_rise_s <= 0;
-        if (!two_stages) { /* one stage of the whole step: see above */
+        if (!two_stages) { /* backward Euler over the whole step, see above */
             PAL_TRY(pal_implicit_stage(core, step, step->dt_s));
         } else {
             PAL_TRY(pal_implicit_stage(core, step, gamma_share * step->dt_s));

@@ -1,38 +1,42 @@
-/* Solver static_newton: the body at rest under its loads, by Newton's method with a line search on the total energy.
+/* Solver static_newton: static equilibrium under the loads, by Newton's method with a line search on the total
+ * energy.
  *
- * Each world step goes on from the present shape with all speeds 0 and makes at most `newton` iterations, so that a
- * caller may follow the way with few per step. The linear systems K d = r (K as the rows hold it: for the corotational
- * law without the rotations' derivative, which costs iterations but keeps the energy falling at full steps) are solved
- *   direct: by a factor of the present K, made again in every iteration (once for the linear law),
+ * Each world step continues from the present shape with zero velocities and makes at most `newton` iterations, so
+ * that a caller may show the progress with few per step. The linear systems K d = r (K as the components have it:
+ * the corotational law omits the derivative of the rotations, which costs iterations but keeps the energy falling at
+ * full steps) are solved
+ *   direct: by a factor of the present K, rebuilt in every iteration (once for the linear law),
  *   pcg:    by conjugate gradients with the warped factor of K at rest (warp.h),
- *   auto:   as pcg, but when a solve took more iterations than a factor is worth by its operation count, the factor is
- *           made of the present K before the next; where that happens again at once, before every one until an
- *           iteration leaves a tenth of the residual or less,
- *   incomplete: by conjugate gradients with an incomplete factor of K (num/incomplete_cholesky.h), of K as it is in
- * every iteration: a tenth of the memory or less, for bodies of many nodes; many more iterations the more nearly
- *           incompressible and the thinner the body is.
- * After an iteration that left more than a tenth of the residual, the next solves for the true stiffness (differences
- * of forces along each direction, system.h) by conjugate gradients with the same factor (truncated Newton; Nash 2000):
- * half the iterations or fewer on a bent beam. Where that meets a direction of no positive curvature before it has
- * done its work, what it found is dropped and K taken: far from rest a nearly incompressible body has pressures by
- * accident, its true stiffness is indefinite, and the ways cut short there led a body of nu 0.499 nowhere.
+ *   auto:   as pcg, but after a solve that took more iterations than a factor is worth by its operation count, the
+ *           present K is factored before the next; where that repeats at once, before every solve until an iteration
+ *           leaves a tenth of the residual or less,
+ *   incomplete: by conjugate gradients with an incomplete factor of the present K (num/incomplete_cholesky.h) in every
+ *           iteration: a tenth of the memory or less, for bodies of many nodes; iterations increase strongly for
+ *           nearly incompressible and for thin bodies.
+ * After an iteration that left more than a tenth of the residual, the next solves for the true stiffness
+ * (differences of forces along each direction, system.h) by conjugate gradients with the same factor (truncated
+ * Newton; Nash 2000): half the iterations or fewer on a bent beam. If that meets a direction of non-positive
+ * curvature too early, its result is discarded and K is used. Far from equilibrium a nearly incompressible body has
+ * spurious pressures and an indefinite true stiffness, and truncated directions made no progress for a body of nu
+ * 0.499.
  *
- * The line search asks for a fall of the energy; where the fall to come is lost in the rounding of the energy, it asks
- * for the slope at the point tried (approximate Wolfe condition; Hager & Zhang 2005).
+ * The line search requires a decrease of the energy; where the expected decrease is below the energy's rounding, it
+ * tests the slope at the trial point (approximate Wolfe condition; Hager & Zhang 2005).
  *
- * Converged: the Euclidean norm of the residual force at free nodes is at most `tolerance` times the larger of the sums
- * of |load| over all nodes and of |reaction| over held ones. Loads (lasting, contact, gravity) are taken up in
+ * Converged: the Euclidean norm of the residual force at free nodes is at most `tolerance` times the larger of the
+ * sums of |load| over all nodes and of |reaction| over fixed ones. Loads (lasting, contact, gravity) are applied in
  * `load_steps` equal parts, each solved before the next.
  *
- * A body that its supports do not hold is refused at load (free "refuse"), or, being one part without any held node,
- * solved by inertia relief (free "inertia_relief"): inertia_relief.h balances the loads, K + eps M is what is solved,
- * rigid motion is taken out of every d.
+ * A body whose supports leave a rigid motion free is refused at load (free "refuse"). If it is a single part without
+ * fixed nodes it can be solved by inertia relief (free "inertia_relief"): inertia_relief.h balances the loads, K +
+ * eps M is solved, and rigid motion is removed from every d.
  *
- * A body whose nodes are carried by control points (body.h, embed) is solved for the points by pcg, its factor being of
- * the matrix at rest as interpolated_system.h finds it; `direct`, `incomplete` and inertia relief are refused.
+ * A body whose nodes are interpolated from control points (body.h, interpolation) is solved for the control points
+ * by pcg, with a factor of the matrix at rest from interpolated_system.h; `direct`, `incomplete` and inertia relief
+ * are refused.
  *
- * Keys: tolerance (1e-8), newton (50), linear ("auto"), free ("refuse"), load_steps (1), cg_tolerance (1e-3: residual
- * of conjugate gradients over that of the iteration, for laws that are not linear), iterations (500, of one solve).
+ * Keys: tolerance (1e-8), newton (50), linear ("auto"), free ("refuse"), load_steps (1), cg_tolerance (1e-3:
+ * residual of conjugate gradients over that of the iteration, for nonlinear laws), iterations (500, of one solve).
  * Departure from the rules of a step: `direct` and `auto` take heap memory for factors. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
@@ -57,35 +61,36 @@ typedef struct static_newton {
     pal_block_matrix blocks;
     pal_node_rotations turns;
     pal_warp warp;
-    pal_incomplete_cholesky incomplete; /* in place of the warp's factor */
+    pal_incomplete_cholesky incomplete; /* replaces the warp's factor */
     pal_compliance_solver answer;
     pal_conjugate_gradient cg;
     pal_inertia_relief relief;
-    double *x0, *external_force; /* at the step's begin; loads that do not come from within [n_dof][3] */
+    double *x0, *external_force; /* at the beginning of the step; external loads [n_dof][3] */
     double *force, *move;        /* residual and d of the iteration                       [n_dof][3] */
     double *now, *low;           /* work space of the true stiffness [n_dof][3] */
-    double *inertia;             /* what balances the loads; NULL: no relief              [n_dof][3] */
-    double *node_displacement_m; /* the way of nodes carried by points; NULL: none        [n_node][3] */
+    double *inertia;             /* inertia forces that balance the loads; NULL: no relief [n_dof][3] */
+    double *node_displacement_m; /* displacement of interpolated nodes; NULL: none [n_node][3] */
     uint64_t sampled;            /* pal_dofs_material_revision(&body->dofs) at the factor   */
     double shift_1_s2;           /* eps                                           */
-    bool has_factor, stale;      /* a factor is there; it is not worth its while  */
-    bool eager;                  /* nor was it in the iteration after its own: one is made in every iteration */
+    bool has_factor, stale;      /* a factor exists; its last solve took too many iterations */
+    bool eager;                  /* the factor was stale at its second solve: rebuild it in every iteration */
     int age;                     /* solves with the factor */
-    bool exact;                  /* the tangent is too slow here: the true stiffness */
-    int calm;                    /* iterations left without it */
+    bool exact;                  /* the tangent converges too slowly: use the true stiffness */
+    int calm;                    /* iterations left without the true stiffness */
     int part;                    /* of the load, of load_steps                    */
     double scale_N;              /* of the tolerance                              */
     pal_solve_report report;
 } static_newton;
 
 static const double relief_share = 1e-8, flops_per_nonzero = 20;
-/* an iteration that leaves more than this of the residual was a slow one */
+/* an iteration that leaves more of the residual is slow */
 static const double slow = 0.1;
-/* what conjugate gradients on the true stiffness may leave of the residual where they are cut short */
+/* max residual of conjugate gradients on the true stiffness where they are truncated */
 static const double enough = 0.1;
-/* energies that differ by less of their size are level (Hager & Zhang 2005), ways of less of a voxel's edge short */
+/* relative energy difference that counts as equal (Hager & Zhang 2005); displacement over a voxel's edge that counts
+ * as small */
 static const double level_share = 1e-6, short_h = 1e-4;
-/* iterations by the tangent alone after the true stiffness has led nowhere */
+/* iterations with the tangent alone after the true stiffness failed */
 enum { CALM = 4 };
 
 static size_t bytes3(const static_newton *row)
@@ -187,7 +192,7 @@ static void assemble(static_newton *row)
     row->report.assemble_s += pal_clock_s() - before;
 }
 
-/* of an embedded body: at rest, after a change of its samples found again; the present linearisation is taken again */
+/* of an interpolated body: at rest, rebuilt after a change of its samples; then restores the present linearisation */
 static void probe(static_newton *row)
 {
     const pal_body *body = row->system.body;
@@ -212,7 +217,7 @@ static pal_err factor(static_newton *row)
     return PAL_ERR_OK;
 }
 
-/* eps: a small part of what K is per mass */
+/* eps: a small fraction of K over mass */
 static void choose_shift(static_newton *row)
 {
     const pal_body *body = row->system.body;
@@ -320,7 +325,7 @@ static pal_err run_rows(pal_step *step, bool internal)
     return PAL_ERR_OK;
 }
 
-/* loads that do not come from within, as they are at the step's begin */
+/* external loads at the beginning of the step */
 static pal_err find_outer(static_newton *row, pal_step *step)
 {
     pal_body *body = row->system.body;
@@ -371,7 +376,7 @@ static pal_err find_residual(static_newton *row, pal_step *step, double *size)
     return PAL_ERR_OK;
 }
 
-/* its sum, and the sum of its parts' sizes, which its rounding goes with */
+/* its sum, and the sum of absolute values, which bounds its rounding error */
 typedef struct energy {
     double sum_J, size_J;
 } energy;
@@ -382,7 +387,7 @@ static void add_energy(energy *to, double part_J)
     to->size_J += fabs(part_J);
 }
 
-/* energy of the rows less the work of loads since x0, those of inertia relief as of the last residual */
+/* energy of the components less the work of loads since x0; inertia relief as of the last residual */
 static energy potential(static_newton *row)
 {
     const pal_body *body = row->system.body;
@@ -407,8 +412,8 @@ static energy potential(static_newton *row)
 
 /* ---- an iteration ---- */
 
-/* conjugate gradients on the true stiffness from move = 0; 0: it is not positive along the way, move and cg.r are as
- * before */
+/* conjugate gradients on the true stiffness from move = 0; 0: a direction of non-positive curvature, move and cg.r
+ * are unchanged */
 static int run_true(static_newton *row, double target, double size)
 {
     memcpy(row->now, row->system.body->x, bytes3(row));
@@ -424,7 +429,7 @@ static int run_true(static_newton *row, double target, double size)
     return 0;
 }
 
-/* conjugate gradients on K, or on the true stiffness where that is positive */
+/* conjugate gradients on K, or on the true stiffness if that is positive */
 static void run_gradients(static_newton *row, double size)
 {
     double target = 0.3 * row->tolerance * row->scale_N;
@@ -463,11 +468,11 @@ static pal_err solve_linear(static_newton *row, double size)
 typedef struct way {
     energy energy;    /* at x                          */
     double size_N;    /* |residual| there              */
-    double slope_J;   /* what the energy promises to fall by along all of move, and falls by half of it */
+    double slope_J;   /* predicted decrease of the energy along move; the decrease at full step is half of it */
     double longest_m; /* move of a node                */
 } way;
 
-/* the point tried, at x + move, where energies cannot tell: the forces do */
+/* tests the trial point x + move by forces where energies cannot decide */
 static bool is_flat(static_newton *row, pal_step *step, const way *from, double rise_J)
 {
     const pal_body *body = row->system.body;
@@ -482,8 +487,8 @@ static bool is_flat(static_newton *row, pal_step *step, const way *from, double 
     return found;
 }
 
-/* x += step move with the largest step of 1, 1/2, 1/4 ... that lets the energy fall by a little of what the slope
- * promises; false: none does */
+/* x += step move with the largest step of 1, 1/2, 1/4 ... that decreases the energy sufficiently (Armijo); false:
+ * none */
 static bool search(static_newton *row, pal_step *at, const way *from)
 {
     pal_body *body = row->system.body;
@@ -507,7 +512,7 @@ static pal_err iterate(static_newton *row, pal_step *step, double size, bool *mo
     const pal_body *body = row->system.body;
     way from = {.size_N = size};
     memcpy(row->force, row->cg.r, bytes3(row));
-    /* before the tangent is taken, which energies may disturb */
+    /* before linearising, which energies may disturb */
     if (!row->constant) from.energy = potential(row);
     pal_system_linearise(&row->system);
     pal_node_rotations_update(&row->turns, &row->system);
@@ -515,7 +520,7 @@ static pal_err iterate(static_newton *row, pal_step *step, double size, bool *mo
     from.slope_J = pal_dot_product(row->cg.n, row->force, row->move);
     for (int i = 0; i < body->n_dof; i++) from.longest_m = fmax(from.longest_m, pal_norm3(row->move + 3 * i));
     row->report.n_newton++;
-    /* where the true stiffness nearly vanishes, the way is long and means little */
+    /* where the true stiffness is nearly singular, the displacement is long and unreliable */
     double max = pal_guard_max_move_m(body);
     if (row->exact && from.longest_m > max) {
         for (int i = 0; i < row->cg.n; i++) row->move[i] *= max / from.longest_m;
@@ -526,7 +531,7 @@ static pal_err iterate(static_newton *row, pal_step *step, double size, bool *mo
     return PAL_ERR_OK;
 }
 
-/* iterations until the tolerance, or the step's budget of them, is met */
+/* iterates to the tolerance or to the step's iteration limit */
 static pal_err find_rest(static_newton *row, pal_step *step)
 {
     pal_solve_report *to = &row->report;
@@ -570,7 +575,7 @@ static bool settle(static_newton *row, pal_step *step)
     return again;
 }
 
-/* the body at rest under its loads as they are now; *bad: it is not finite, and went back to where it was */
+/* solves for equilibrium under the present loads; *bad: not finite, the initial state was restored */
 static pal_err solve(static_newton *row, pal_step *step, bool *bad)
 {
     pal_body *body = row->system.body;
@@ -624,7 +629,7 @@ static void reset(void *self, const pal_body *body)
     row->part = 0;
     if (row->system.n_free == 0) return;
     pal_node_rotations_reset(&row->turns);
-    /* a factor of some other state: made again when it is wanted */
+    /* the factor is of another state: rebuild it when it is needed */
     if (row->linear != LINEAR_PCG && row->warp.n_factor > 1) row->has_factor = false;
 }
 

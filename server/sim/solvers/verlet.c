@@ -1,13 +1,14 @@
 /* Solver verlet: v += dt f/m, x += dt v (the velocity form of paper B section 4.1).
  *
- * Departures. Drag is implicit: v <- (v + dt f/m) / (1 + dt rate), the rate being the sum of the components' drag rates
- * and of the stiffening damper (stiffening_damper.h), so that no rate makes it unstable. The sub-step is `safety` (key,
- * 0.5) of the stability limit by Gershgorin's bound: with K and C the row sums of stiffness and explicit damping, dt =
- * safety * 2 t where t is the largest with t^2 K + t C <= m at every free node. The bound is found again when a node
- * may have moved a fifth of an element. Prescribed nodes keep their velocity. Moves are limited by step_guard.h. Where
- * the budget of sub-steps is used up (step->heavy), the same inequality is met by adding mass to the nodes that break
- * it. Added mass comes and goes, which would bring energy, so such a node loses up to a hundredth of its velocity in a
- * sub-step. Where the bound is found, components look for inverted elements, and in every step while there are any. */
+ * Departures. Drag is implicit: v <- (v + dt f/m) / (1 + dt rate), where the rate is the sum of the components' drag
+ * rates and of the stiffening damper (stiffening_damper.h); it is stable for every rate. The sub-step is `safety`
+ * (key, 0.5) of the stability limit by Gershgorin's bound: with K and C the row sums of stiffness and explicit
+ * damping, dt = safety * 2 t where t is the largest with t^2 K + t C <= m at every free node. The bound is
+ * recomputed when a node may have moved a fifth of an element. Prescribed nodes keep their velocity. step_guard.h
+ * limits displacements. Where the budget of sub-steps is exhausted (step->heavy), mass is added to the nodes that
+ * break the inequality. Changes of added mass would add energy, so such a node loses up to a hundredth of its
+ * velocity per sub-step. Components check for inverted elements whenever the bound is computed, and in every step
+ * while there are any. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
@@ -19,12 +20,12 @@ typedef struct verlet {
     double *stiff, *damp; /* Gershgorin row sums, N/m and Ns/m [n_dof] */
     double safety;        /* of the stability limit             */
     double limit_s;
-    double way_m;       /* no node has moved farther since the bound was taken */
+    double way_m;       /* upper bound of motion since the bound was computed */
     bool known;         /* limit_s holds                                       */
-    bool has_inversion; /* rows are to be asked again in the coming step       */
+    bool has_inversion; /* bounds must be computed again in the coming step */
 } verlet;
 
-/* of a velocity in a sub-step, times the share of the mass that was added */
+/* velocity loss per sub-step, times the fraction of added mass */
 static const double heavy_loss = 0.01;
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
@@ -109,7 +110,7 @@ static pal_err run(void *self, pal_step *step)
         }
         body->safeguards.ns += pal_clock_ns() - before;
     }
-    /* a velocity that is not finite makes the way one too, and so the next limit */
+    /* a non-finite velocity makes the displacement, and so the next limit, non-finite */
     row->way_m += (way < max ? way : max) + poison;
 
     /* positions */

@@ -1,78 +1,80 @@
 /* Transfer of a body's state to another model or mesh of the same organ, between two steps of a running world.
  *
- * Project. Nodes of the new body are located in the elements of the old one at rest (mesh/volume/locate.h; outside them
- * the nearest element is extended by one element at most) and take displacement and velocity by its shape functions.
- * The elements of a subdivision solid are its subdivided cells as tetrahedra, and its control points are those that
- * place the nodes with the least squares, by conjugate gradients with a small pull to rest. Two solids of the same
- * control cells share their points to the bit; an adaptive surface refines where the old one does, as far as it can.
- * Forces go the other way: those on old nodes are spread over the new ones around them by their masses as well, so that
- * no net force is lost and light nodes (at the rim of cut elements) are not thrown; where the new mesh is the finer
- * one, to all new nodes located in elements of the old node, so that they do not gather in few. What is not balanced
- * and accelerates the old nodes goes over as acceleration to new ones of less than half the mass.
+ * Projection. Nodes of the new body are located in the elements of the old body at rest (mesh/volume/locate.h;
+ * outside them the nearest element is extended by at most one element) and take displacement and velocity by its
+ * shape functions. The elements of a subdivision solid are its subdivided cells as tetrahedra. Its control points
+ * are those that place the nodes best in the least-squares sense, by conjugate gradients with a small regularisation
+ * towards rest. Two solids of the same control cells share their control points to the bit. An adaptive surface
+ * refines where the old one does, as far as it can.
+ * Forces are transferred the other way. Forces on old nodes are distributed over the surrounding new nodes, weighted
+ * by mass, so that no net force is lost and light nodes (at the rim of cut elements) are not accelerated too much.
+ * Where the new mesh is finer, they are distributed over all new nodes located in elements of the old node, so that
+ * they do not concentrate in few. The unbalanced force, which accelerates the old nodes, is transferred as
+ * acceleration to new nodes of less than half the mass.
  *
- * Energy. Interpolated places cost the new elements more energy than the old ones had: kinks at old faces, volume that
- * the old elements left free, a sharp tip where fewer levels of a surface remain under a tool. First every node moves
- * by its missing force over a bound of its stiffness (kinks go first) until the elastic energy is that of before, in at
- * most 40 rounds, 200 where it is half as much again. Then the displacement from rest (of a free body, from its best
- * rigid place) is scaled by at most PAL_TRANSFER_MAX_SCALE, and what is still missing is made up for by the velocity,
- * by at most PAL_TRANSFER_MAX_VELOCITY_SCALE. A body at rest whose scale reaches its bound has another energy then: the
- * report says so. A body that rests under a load with the same elastic energy stands about half way between where it
- * rested before and where it will; the other half follows as the difference of forces is released (blend_component.h).
- * A free body keeps its momentum and angular momentum.
+ * Energy. Interpolated positions give the new elements more energy than the old ones had: from kinks at old faces,
+ * from volume that the old elements left free, from a sharp tip where fewer levels of a surface remain under a tool.
+ * First every node moves by its force residual over a bound of its stiffness (which removes kinks first) until the
+ * elastic energy equals that before, in at most 40 rounds, or 200 where the energy is more than half as much again.
+ * Then the displacement from rest (of a free body, from the best-fitting rigid placement) is scaled by at most
+ * PAL_TRANSFER_MAX_SCALE. The remaining difference goes into the velocity, scaled by at most
+ * PAL_TRANSFER_MAX_VELOCITY_SCALE. A body at rest whose scale reaches its bound has a different energy, which the
+ * report shows. A body that rests under a load with the same elastic energy is about half way between its old and
+ * its new equilibrium; the other half follows as the difference of forces is released (blend_component.h). A free
+ * body keeps its momentum and angular momentum.
  *
- * Display. Nodes at the same places carry a skin elsewhere: the offset from what the new body would show to what the
- * old one did is released with the forces (pal_world_blend_display), so that nothing jumps and tools touch what is
- * snapshot.
+ * Display. Equal node positions can give a different skin. The offset from what the new body would show to what the
+ * old one showed is released with the forces (pal_world_blend_display), so that nothing jumps and tools touch what
+ * is shown.
  *
- * Also transferred: time, tools, poses, materials, other bodies (transfer_world.h), lasting loads, what a tool holds
- * (pal_effect.transfer) or presses, with friction (tool_contact.h), and brushes. Thread: one at a time. */
+ * Also transferred: time, tools, poses, materials, other bodies (transfer_world.h), lasting loads, tissue that a
+ * tool grasps (pal_effect.transfer) or presses, with friction (tool_contact.h), and brushes. Thread: one at a time. */
 #ifndef PAL_SIM_TRANSFER_TRANSFER_H
 #define PAL_SIM_TRANSFER_TRANSFER_H
 #include "server/sim/world/world.h"
 
-/* most that a displacement, and a velocity, is lengthened or shortened for the sake of the energy */
+/* largest factor, up or down, by which displacement and velocity are scaled to match the energy */
 #define PAL_TRANSFER_MAX_SCALE          1.8
 #define PAL_TRANSFER_MAX_VELOCITY_SCALE 4.0
 
 typedef struct pal_transfer pal_transfer;
 
 typedef struct pal_transfer_report {
-    /* kinetic energy and that of elastic rows, of the whole world; loads and gravity are not in it */
+    /* kinetic energy and that of elastic components, of the whole world; without loads and gravity */
     double energy_before_J, energy_after_J;
-    double interpolated_J; /* as interpolation alone would have it */
-    /* of a shown vertex (where another surface is shown, as the next), and of a point of the body: a node of before
-     * that lies within the new elements. Skins hang on the nodes of their mesh, so that a vertex may move where no
-     * point does
-     */
+    double interpolated_J; /* after interpolation alone */
+    /* Largest displacement by the transfer: of a shown vertex (where another surface is shown, as body_move_m) and
+     * of a point of the body, an old node that lies within the new elements. Skins follow the nodes of their mesh,
+     * so a vertex may move where no point of the body does */
     double max_move_m, body_move_m;
-    /* farthest that a shown vertex goes from one frame to the next because of the switch: what is shown begins where it
-     * was and is released over PAL_BLEND_TRANSFER_S (blend_component.h). Without memory for that: as far as the body
-     * moves */
+    /* Largest displacement of a shown vertex between two frames due to the switch. The shown surface starts where it
+     * was and is released over PAL_BLEND_TRANSFER_S (blend_component.h). Without memory for that it equals the
+     * displacement of the body */
     double frame_move_m;
-    int n_smooth; /* rounds of smoothing that it took */
-    double scale; /* of the displacement, 1: as interpolated and smoothed */
+    int n_smooth; /* rounds of smoothing */
+    double scale; /* of the displacement; 1: as interpolated and smoothed */
 } pal_transfer_report;
 
-/* What the carry needs, found beforehand: where every node of the body in scene `to` lies in that in `from` and the
- * other way round, and memory. REFUSED: an adaptive surface and another model, or two of different surfaces; what the
- * models say; MEMORY. Borrows nothing. [load] */
+/* Precomputes a transfer: the location of every node of the body of scene `to` in that of `from` and vice versa, and
+ * work memory. REFUSED: an adaptive surface and another model, or two of different surfaces; errors of the models;
+ * MEMORY. Borrows nothing. [load] */
 pal_err pal_transfer_make(const pal_scene *from, const pal_scene *to, int body, pal_diagnostic *diag,
                           pal_transfer **out);
-void pal_transfer_free(pal_transfer *transfer); /* NULL is fine */
-/* `next`, a new world of `to`, goes on where `before`, one of `from`, is. Both stand still; the forces in before are
- * computed again, its state is as it was. Deterministic. Heap memory for component `blend`; where there is none, the
- * forces change at once. [sim] */
+void pal_transfer_free(pal_transfer *transfer); /* NULL is allowed */
+/* Sets the state of `next`, a new world of `to`, to that of `before`, a world of `from`. Both must be between steps.
+ * Recomputes the forces in before; its state is unchanged. Deterministic. Allocates heap memory for component
+ * `blend`; without memory the forces change at once. [sim] */
 void pal_transfer_apply(pal_transfer *transfer, pal_world *next, const pal_world *before, pal_transfer_report *out);
 
-/* Most of a carry's time goes into smoothing what was interpolated. That part can be rehearsed while the old world goes
- * on: look takes copies of the old body and of what pulls on it (one evaluation of its forces, hash and state as they
- * were; heap memory the first time), rehearse smooths the new body and keeps what had to be added to interpolated
- * places, and the carry, and each later rehearsal, begins with it. A body that has gone on far since costs the carry
- * more rounds, never another result than within its bounds. look: false: there is nothing to rehearse (a body that
- * adapts, that is frozen), or no memory. [sim of before] rehearse: after look; the old world may go on meanwhile. [any]
- */
+/* Most of the time of a transfer goes into smoothing. This part can be rehearsed while the old world runs.
+ * pal_transfer_snapshot copies the old body and the forces on it (one evaluation of its forces; hash and state are
+ * unchanged; heap memory the first time). pal_transfer_rehearse smooths the new body and stores the correction of
+ * the interpolated positions; the transfer and each later rehearsal start from it. If the body has moved far since,
+ * the transfer takes more rounds, but its result stays within the same bounds.
+ * snapshot: false: nothing to rehearse (an adaptive or frozen body) or no memory. [sim of before] rehearse: after
+ * snapshot; the old world may run meanwhile. [any] */
 bool pal_transfer_snapshot(pal_transfer *transfer, const pal_world *before);
 void pal_transfer_rehearse(pal_transfer *transfer, pal_world *next);
-/* farthest that a node of the old body has gone since it was looked at, m; between two of its steps. [sim of before] */
+/* largest displacement of a node of the old body since the snapshot, m; between two of its steps. [sim of before] */
 double pal_transfer_drift_m(const pal_transfer *transfer, const pal_world *before);
 #endif

@@ -1,4 +1,4 @@
-/* The record of a transfer, for the files of this room only. */
+/* The record of a transfer, for the files of sim/transfer only. */
 #ifndef PAL_SIM_TRANSFER_TRANSFER_CORE_H
 #define PAL_SIM_TRANSFER_TRANSFER_CORE_H
 #include "server/sim/world/world.h"
@@ -7,45 +7,44 @@ typedef struct pal_transfer pal_transfer;
 
 struct pal_transfer {
     int body;
-    bool adaptive;            /* both adapt: rows are made when the new state is known    */
-    bool same_control_points; /* both are solids of the same control cells                */
-    pal_interpolation in;     /* nodes of the new body by those of the old one            */
-    pal_interpolation back;   /* nodes of the old body by those of the new one            */
-    pal_interpolation spread; /* how forces on old nodes go to new ones; none: as back   */
+    bool adaptive;            /* both are adaptive: interpolations are made when the new state is known */
+    bool same_control_points; /* both are subdivision solids of the same control cells */
+    pal_interpolation in;     /* interpolates nodes of the new body from those of the old */
+    pal_interpolation back;   /* interpolates nodes of the old body from those of the new */
+    pal_interpolation spread; /* map of forces on old nodes to new nodes; none: use back */
     int n_from, n_to;         /* nodes                                                    */
-    int n_dof;                /* points of the new body                                   */
-    double *x, *v;            /* new points                                 [n_dof][3]    */
-    double *place, *rate;     /* new nodes                                  [n_to][3]     */
-    double *pull;             /* what shall pull on them, N                 [n_to][3]     */
-    double *bound;            /* of stiffness; work                         [n_to]        */
-    double *work[5];          /* of least squares                           [n_dof][3]    */
+    int n_dof;                /* dofs of the new body */
+    double *x, *v;            /* state of the new dofs [n_dof][3] */
+    double *place, *rate;     /* state of the new nodes [n_to][3] */
+    double *pull;             /* target forces on the new nodes, N [n_to][3] */
+    double *bound;            /* bound of stiffness; work [n_to] */
+    double *work[5];          /* work of least squares [n_dof][3] */
     double *old;              /* work                                       [n_from][3]   */
     double *load;             /* loads of the old body's last step, N       [n_from][3]   */
-    double *moving;           /* what accelerates its nodes, with these, N  [n_from][3]   */
-    /* while the old world goes on */
+    double *moving;           /* unbalanced force on the nodes, with these loads, N [n_from][3] */
+    /* rehearsal while the old world runs */
     bool has_rehearsed;
-    double *fix;              /* what smoothing added to places by interpolation, NULL: none yet [n_dof][3] */
-    pal_body snapshot;        /* the old body as it was looked at; what changes of it is in snapshot_room */
-    double *snapshot_room;    /* NULL: it never was */
-    double snapshot_energy_J; /* its elastic energy then */
+    double *fix;              /* correction of interpolated positions by smoothing, NULL: none yet [n_dof][3] */
+    pal_body snapshot;        /* the old body at the snapshot; its variable arrays are in snapshot_room */
+    double *snapshot_room;    /* NULL: no snapshot */
+    double snapshot_energy_J; /* its elastic energy at the snapshot */
 };
 
-/* Forces. Rows of t->spread, made once: forces at old nodes -> at new ones, no net force is lost, by masses */
+/* Builds t->spread once: distributes forces on old nodes over new nodes by mass, conserving the net force */
 void pal_transfer_make_force_map(pal_transfer *t, const pal_body *from, const pal_body *to);
-const pal_interpolation *pal_transfer_force_map(const pal_transfer *t); /* those; without memory for them t->back */
-/* lasting loads, in memory of the new body's arena where it has none; without memory they are gone */
+const pal_interpolation *pal_transfer_force_map(const pal_transfer *t); /* t->spread; without memory for it t->back */
+/* transfers lasting loads, in memory of the new body's arena where it has none; without memory they are lost */
 void pal_transfer_loads(const pal_transfer *t, const pal_body *from, pal_world *next);
-/* t->pull: what shall pull on the new nodes for them to be as fast in a moment as the old ones would be, by f and g of
- * before as it stands, whose g goes, and t->moving. Takes t->old, t->rate, t->bound */
+/* Sets t->pull, the forces on the new nodes that give them the accelerations of the old ones, from f and g of before
+ * in its present state (g is overwritten) and t->moving. Overwrites t->old, t->rate, t->bound */
 void pal_transfer_forces(pal_transfer *t, const pal_body *from, const pal_body *to);
-/* t->place: nodes of the new body by those of the old one as they stand */
+/* sets t->place: nodes of the new body interpolated from the present nodes of the old one */
 void pal_transfer_place_nodes(pal_transfer *t, const pal_body *from, const pal_body *to);
-/* farthest that a node of before within the new elements is from where it was; of adaptive surfaces a vertex of both
- */
+/* largest displacement of an old node within the new elements; of adaptive surfaces, of a vertex that both have */
 double pal_transfer_body_move(const pal_transfer *t, const pal_body *from, const pal_body *to);
-/* do shown vertices of body b of the same number mean the same place in both worlds? */
+/* true: shown vertices of body b with equal numbers are the same place in both worlds */
 bool pal_transfer_same_shown(const pal_world *next, const pal_world *before, int b);
 struct pal_transfer_report;
-/* the new body is shown where the old one was, and how far it is to be released from there; body_move_m is known */
+/* shows the new body where the old one was, to be released from there, and reports how far; body_move_m is known */
 void pal_transfer_display(pal_transfer *t, pal_world *next, const pal_world *before, struct pal_transfer_report *out);
 #endif

@@ -5,15 +5,15 @@
 #include "server/sim/core/blend.h"
 
 typedef struct blend {
-    double share; /* of both that is left: 1, falls to 0 */
-    bool begun;   /* a sub-step has been */
-    /* [n_node][3]; of an adaptive body N/kg, that of a vertex not in use the mean of its edge's ends */
+    double share; /* remaining fraction of both: from 1 to 0 */
+    bool begun;   /* a sub-step was made */
+    /* [n_node][3]; of an adaptive body in N/kg, at an inactive vertex the mean of its edge's ends */
     double *force_N;
     float *display_offset_m; /* [n_shown][3]; NULL: none */
     pal_body *body;
 } blend;
 
-/* share of the display offset that is left */
+/* remaining fraction of the display offset */
 static void set_display(const blend *row, double share)
 {
     if (!row->display_offset_m) return;
@@ -21,7 +21,7 @@ static void set_display(const blend *row, double share)
     row->body->display_offset_part = share > 0 ? share : 0;
 }
 
-/* share of the load to `load` */
+/* adds the fraction of the load to `load` */
 static void add_load(const blend *row, double share, double *load)
 {
     const pal_body *body = row->body;
@@ -37,7 +37,7 @@ static pal_err run(void *self, pal_step *step)
     if (row->share > 0) add_load(row, row->share, step->body->load);
     row->share = pal_blend_toward(row->share, 0, step->dt_s, PAL_BLEND_TRANSFER_S);
     row->begun = true;
-    /* contact met the surface of the sub-step before and follows it from there */
+    /* contact used the surface of the previous sub-step and follows it from there */
     set_display(row, row->share);
     return PAL_ERR_OK;
 }
@@ -50,7 +50,7 @@ static void reset(void *self, const pal_body *body)
     set_display(row, 0);
 }
 
-/* while it is there its load falls */
+/* the load decreases while the component exists */
 static double settled_s(const void *self)
 {
     (void)self;
@@ -60,9 +60,9 @@ static double settled_s(const void *self)
 const pal_effect pal_effect_blend = {
     .name = "blend", .stage = PAL_STAGE_CONTACT, .run = run, .reset = reset, .settled_s = settled_s};
 
-/* ---- rows that come and go ---- */
+/* ---- components inserted and removed at run time ---- */
 
-/* what is split later shall not leave all of a coarse vertex's load on the fine one that it becomes */
+/* a later split must not leave the whole load of a coarse vertex on the fine vertex it becomes */
 static void per_mass(const pal_body *body, double *force)
 {
     const pal_dofs *dofs = &body->dofs;

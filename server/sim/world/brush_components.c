@@ -1,4 +1,4 @@
-/* Rows `brush` that come and go. */
+/* Components `brush` inserted and removed at run time. */
 #include "server/sim/world/brush_components.h"
 
 typedef struct grasp_transfer {
@@ -6,7 +6,8 @@ typedef struct grasp_transfer {
     const pal_body *body;
 } grasp_transfer;
 
-/* the row with its first brush, or those of another row, put behind the body's other CONTACT components */
+/* inserts the component with its first brush, or with the brushes of another component, after the body's other
+ * CONTACT components */
 static pal_err make_row(pal_plan *plan, int b, int slot, const pal_brush *brush, const grasp_transfer *before,
                         pal_arena *arena, pal_diagnostic *diag, void **self)
 {

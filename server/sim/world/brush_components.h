@@ -1,5 +1,5 @@
-/* Brushes in a running world: the component `brush` is inserted into the plan with the first brush of a body and
- * removed after the last (world.h, pal_world_brush). Between steps. [sim] */
+/* Brushes in a running world. The component `brush` is inserted into the plan with the first brush of a body and
+ * removed after the last (world.h, pal_world_brush). Call between steps. Thread: [sim]. */
 #ifndef PAL_SIM_WORLD_BRUSH_COMPONENTS_H
 #define PAL_SIM_WORLD_BRUSH_COMPONENTS_H
 #include "server/sim/core/brush.h"
@@ -7,19 +7,20 @@
 
 /* by body; zeroed: none */
 typedef struct pal_brush_components {
-    pal_arena *arena[PAL_BODY_MAX]; /* each row's memory, NULL: no such component */
+    pal_arena *arena[PAL_BODY_MAX]; /* memory of each component, NULL: none */
     void *self[PAL_BODY_MAX];
 } pal_brush_components;
 
-/* brush of kind NONE or NULL: the slot's ends. Errors as of pal_brush_make and pal_brush_set; no such body or slot */
+/* A brush of kind NONE or NULL ends the brush of the slot. Errors: those of pal_brush_make and pal_brush_set; no
+ * such body or slot */
 pal_err pal_brush_components_set(pal_brush_components *rows, pal_plan *plan, int body, int slot, const pal_brush *brush,
                                  pal_diagnostic *diag);
-/* brushes of another world go on in this one (pal_brush_hand), those on bodies that have none are over */
+/* transfers the brushes of another world (pal_brush_hand); those on bodies that cannot have brushes end */
 void pal_brush_components_transfer(pal_brush_components *rows, pal_plan *plan, const pal_brush_components *before,
                                    const pal_plan *from);
-void pal_brush_components_end(pal_brush_components *rows, int slot); /* on all bodies; no heap call */
-void pal_brush_components_remove_idle(pal_brush_components *rows,
-                                      pal_plan *plan);      /* rows that do nothing any more go */
+void pal_brush_components_end(pal_brush_components *rows,
+                              int slot); /* ends the slot's brushes on all bodies; no heap call */
+void pal_brush_components_remove_idle(pal_brush_components *rows, pal_plan *plan); /* removes idle components */
 void pal_brush_components_free(pal_brush_components *rows); /* memory only: after pal_plan_free */
 size_t pal_brush_components_bytes(const pal_brush_components *rows);
 #endif

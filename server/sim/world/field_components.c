@@ -1,4 +1,4 @@
-/* Rows field_output that come and go. */
+/* Components field_output inserted and removed at run time. */
 #include "server/sim/world/field_components.h"
 
 #include "server/sim/core/effect_list.h"
@@ -31,7 +31,7 @@ pal_err pal_field_components_check(const pal_plan *plan, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
-/* the row, made as an entry of the scene would be */
+/* makes the component as an entry of the scene does */
 static pal_err make_row(pal_plan *plan, int b, pal_field field, pal_arena *arena, pal_diagnostic *diag,
                         pal_component *row)
 {
@@ -62,7 +62,7 @@ pal_err pal_field_components_add(pal_field_components *rows, pal_plan *plan, int
     }
     rows->arena[body][field] = arena;
     rows->self[body][field] = row.self;
-    /* the table of rows may have moved */
+    /* the table of components may have moved */
     step->force = plan->row + plan->first[PAL_STAGE_FORCE][body];
     step->contact = plan->row + plan->first[PAL_STAGE_CONTACT][body];
     return row.effect->run(row.self, step);

@@ -1,11 +1,11 @@
-/* Frames: memory for what a step shows. */
+/* Memory of frames. */
 #include "server/sim/world/frame.h"
 
 #include "server/sim/world/world_core.h"
 
 #include <stdlib.h>
 
-/* room for the triangles of a part that adapts; no table taken yet */
+/* allocates the triangles of an adaptive part; no table copied yet */
 static bool make_slots(pal_frame_part *part, const pal_dofs *dofs)
 {
     const pal_levels *levels = dofs->levels;

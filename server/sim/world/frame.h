@@ -1,6 +1,6 @@
-/* What a step shows: copied out of the world, float metres in the scene frame, safe to read on another thread.
- * Allocated once (pal_frame_create) to the world's sizes; filling it never calls the heap. Room for fields comes and
- * goes with pal_frame_fit, so their pointers hold while nobody fills the frame again. */
+/* A frame: what one step shows, copied out of the world as float metres in the scene frame, so that another thread
+ * can read it. Allocated once (pal_frame_create) for the world's sizes; filling it makes no heap call. pal_frame_fit
+ * allocates and frees the arrays of fields, so pointers to them are valid until the frame is fitted again. */
 #ifndef PAL_SIM_WORLD_FRAME_H
 #define PAL_SIM_WORLD_FRAME_H
 #include "server/sim/core/body.h"
@@ -14,8 +14,8 @@ enum { PAL_FRAME_COMPONENT_MAX = 64 };
 /* a field in colour; value NULL: not shown */
 typedef struct pal_frame_field {
     float *value;      /* SI [n_vertex]                                      */
-    uint64_t revision; /* another number for every set of values, never twice */
-    double time_s;     /* simulated, when they were taken                     */
+    uint64_t revision; /* unique to every set of values, never reused */
+    double time_s;     /* simulated time of the values */
 } pal_frame_field;
 
 typedef struct pal_frame_part {
@@ -24,28 +24,30 @@ typedef struct pal_frame_part {
     uint64_t revision; /* of the topology these positions belong to */
     bool frozen;
     char reason[PAL_REASON_TEXT]; /* one sentence while frozen, else empty */
-    /* since the body's reset: what kept it within its bounds (safeguards.h), how many in all, and their time */
+    /* since the body's reset: interventions that kept it within its bounds (safeguards.h), their total and their
+     * time */
     pal_safeguards safeguards;
     uint64_t n_safeguard, safeguard_ns;
-    bool asleep;       /* at rest: its rows are not run until something comes near (component sleep)      */
-    uint64_t n_output; /* OUTPUT runs of the body so far: while it stays, nothing here was computed */
+    bool asleep;       /* at rest: its components do not run until something comes near (component sleep) */
+    uint64_t n_output; /* OUTPUT runs of the body so far; unchanged: nothing here was recomputed */
     pal_frame_field field[PAL_FIELD_COUNT]; /* by pal_field */
-    /* adaptive bodies (adaptive_surface.h): the table of drawn triangles at this revision, 0 0 0 in empty places.
-     * Vertices of no triangle are hidden and their positions mean nothing. n_slot 0: the triangles never change */
+    /* Adaptive bodies (adaptive_surface.h): the table of drawn triangles at this revision, 0 0 0 in empty slots.
+     * Vertices of no triangle are hidden and their positions are undefined. n_slot 0: the triangles never change */
     int n_slot;
     int32_t *slot;                 /* [n_slot][3]                                      */
-    uint64_t slot_log;             /* changes taken in so far, of pal_adaptive_surface.n_log      */
-    int n_active, n_spring;        /* nodes and springs now                            */
-    int n_finest, n_finest_spring; /* and if all of the body were of its finest level  */
-    /* bodies whose nodes are carried by control points (body.interpolation): those, body frame, for sculpting */
-    int n_point;     /* 0: another body */
+    uint64_t slot_log;             /* changes applied so far, of pal_adaptive_surface.n_log */
+    int n_active, n_spring;        /* present nodes and springs */
+    int n_finest, n_finest_spring; /* the same if the whole body were at its finest level */
+    /* Bodies whose nodes are interpolated from control points (body.interpolation): the control points in the body
+     * frame, for sculpting */
+    int n_point;     /* 0: no control points */
     double *point_m; /* [n_point][3]    */
 } pal_frame_part;
 
 typedef struct pal_frame_tool {
     bool present, touching, holding;
-    pal_pose pose;     /* newest used, with its seq and stamp            */
-    uint64_t pose_ns;  /* pal_clock_ns when that pose came in            */
+    pal_pose pose;     /* latest pose used, with its seq and stamp */
+    uint64_t pose_ns;  /* pal_clock_ns when that pose arrived */
     double force_N[3]; /* on the tool, mean over the step                */
     double radius_m;
     int n_patch;
@@ -60,25 +62,26 @@ typedef struct pal_frame {
     uint64_t end_ns;  /* pal_clock_ns at the end of the step                                     */
     uint64_t step_ns; /* processor time of the step                                              */
     int n_substep;
-    bool watched; /* positions are of this tick; false: nobody looks, they may be older */
+    bool watched; /* positions are of this tick; false: there are no observers, and positions may be older */
     /* filled by the session */
     bool paused;
-    double slowdown;    /* real over simulated time, 1: in time (mean over the last second)        */
-    uint64_t n_late;    /* steps that began late                                                   */
+    double slowdown;    /* real over simulated time, 1: real time (mean over the last second) */
+    uint64_t n_late;    /* steps that started late */
     uint64_t n_refused; /* poses and commands refused                                              */
     int n_part;
     pal_frame_part part[PAL_BODY_MAX];
     int n_tool;
     pal_frame_tool tool[PAL_TOOL_MAX];
     int n_row;
-    uint32_t component_ns[PAL_FRAME_COMPONENT_MAX];      /* of the last step, in the plan's order           */
-    const char *component_name[PAL_FRAME_COMPONENT_MAX]; /* constants; more than at load while fields are shown */
-    int component_body[PAL_FRAME_COMPONENT_MAX];         /* whose row it is                                     */
+    uint32_t component_ns[PAL_FRAME_COMPONENT_MAX]; /* of the last step, in the plan's order           */
+    const char
+        *component_name[PAL_FRAME_COMPONENT_MAX]; /* constant strings; more than at load while fields are shown */
+    int component_body[PAL_FRAME_COMPONENT_MAX];  /* body of each component */
 } pal_frame;
 
 pal_frame *pal_frame_create(const pal_world *world); /* [load] NULL: out of memory */
-/* the frame gets or loses room for fields as the world's bodies have them now; heap calls only when that has changed.
- * MEMORY: that field is left out. Between steps, by the thread that fills the frame */
+/* Allocates or frees the arrays of fields to match the world's bodies; calls the heap only if that has changed.
+ * MEMORY: the field is omitted. Call between steps, on the thread that fills the frame */
 pal_err pal_frame_fit(pal_frame *frame, const pal_world *world);
 void pal_frame_destroy(pal_frame *frame);
 #endif

@@ -1,5 +1,5 @@
-/* Nearest point of a triangle (Ericson, Real-Time Collision Detection, 2005, section 5.1.5), over all triangles: a
- * command picks once, so no search structure is kept. */
+/* Nearest point of a triangle (Ericson, Real-Time Collision Detection, 2005, section 5.1.5), over all triangles. A
+ * command picks once, so there is no search structure. */
 #include "server/sim/world/pick.h"
 
 #include "server/base/vec3.h"

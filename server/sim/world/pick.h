@@ -1,5 +1,5 @@
-/* The point of a shown surface that is nearest to a place, for commands that point at a body. Thread: [any]; no heap.
- */
+/* The point of a shown surface nearest to a given position, for commands that point at a body. Thread: [any]; no
+ * heap. */
 #ifndef PAL_SIM_WORLD_PICK_H
 #define PAL_SIM_WORLD_PICK_H
 #include "server/sim/world/world.h"
@@ -12,7 +12,8 @@ typedef struct pal_pick {
     double distance_m;
 } pal_pick;
 
-/* position_m: the shown vertices now [n_vertex][3]; NULL: at rest. On a surface with control faces only triangles of a
- * control face count. Empty triangle slots (0 0 0) never count. false: no such triangle. */
+/* position_m: present positions of the shown vertices [n_vertex][3]; NULL: at rest. On a surface with control faces
+ * only triangles of a control face count. Empty triangle slots (0 0 0) never count. false: there is no such
+ * triangle. */
 bool pal_pick_nearest(const pal_shown *shown, const float *position_m, const double at_m[3], pal_pick *out);
 #endif

@@ -1,4 +1,4 @@
-/* The world: steps a plan. Reading order: pal_world_step at the end. */
+/* The world: steps a plan. Start reading at pal_world_step, at the end. */
 #include "server/sim/world/world.h"
 
 #include "server/base/clock.h"
@@ -30,7 +30,7 @@ pal_step pal_world_body_step(pal_world *w, int b)
                       .time_s = w->time_s};
 }
 
-/* the least limit of all bodies that move, infinite when nothing limits; a body whose limit is not finite is frozen */
+/* smallest limit of all bodies that move, infinite when nothing limits; a body whose limit is not finite is frozen */
 double pal_world_find_limit(pal_world *w, int sub)
 {
     double min = INFINITY;
@@ -50,7 +50,7 @@ double pal_world_find_limit(pal_world *w, int sub)
     return min;
 }
 
-/* sub-steps for a time; beyond the budget: budget + 1 */
+/* number of sub-steps for a time; beyond the budget: budget + 1 */
 static int count_substeps(const pal_world *w, double time_s, double limit_s)
 {
     double n = ceil(time_s / limit_s * (1 - 1e-12));
@@ -62,8 +62,8 @@ static bool refines(const pal_world *w, int b)
     return w->plan.body[b].active && w->plan.n_of[PAL_STAGE_ADAPT][b] > 0;
 }
 
-/* what FORCE components have kept of the last forces (turns of elements), so that a new world is as one that was reset
- */
+/* Clears what FORCE components cached with the last forces (rotations of elements), so that a new world equals a
+ * reset one */
 static void forget_forces(pal_world *w, int b)
 {
     for (int i = 0; i < w->plan.n_of[PAL_STAGE_FORCE][b]; i++) {
@@ -72,8 +72,8 @@ static void forget_forces(pal_world *w, int b)
     }
 }
 
-/* the limit that holds at rest, whatever the bodies do now, and on the finest level that they may reach; leaves every
- * solver's knowledge of its limit empty */
+/* the limit at rest and on the finest level that bodies may reach, whatever their present state; invalidates every
+ * solver's limit */
 static double find_rest_limit(pal_world *w)
 {
     double min = INFINITY, limit_s = w->limit_s;
@@ -90,7 +90,7 @@ static double find_rest_limit(pal_world *w)
         double limit = solve->effect->limit(solve->self, &step);
         body->x = x, body->d = d;
         pal_body_update_nodes(body);
-        /* refinement may bring the finest level, each level about half the step (paper C, eq. 9) */
+        /* refinement may reach the finest level; each level halves the step approximately (paper C, eq. 9) */
         if (refines(w, b)) limit = ldexp(limit, body->dofs.finest + 1 - body->dofs.levels->n_level);
         if (solve->effect->reset) solve->effect->reset(solve->self, body);
         if (body->interpolation) forget_forces(w, b);
@@ -120,7 +120,7 @@ pal_err pal_world_check_budget(pal_world *w, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
-/* the two vertices that each midpoint of an adaptive body lies between, for those who code or draw them */
+/* the two parent vertices of each midpoint of an adaptive body, for encoders and renderers */
 static pal_err make_parents(pal_world *w, const pal_levels *levels, pal_world_part *p)
 {
     int n_coarse = levels->n_vertex[0];
@@ -232,7 +232,7 @@ void pal_world_destroy(pal_world *world)
 
 /* ---- a step ---- */
 
-/* stored in the rows of a body */
+/* energy stored in the components of a body */
 double pal_world_component_energy_J(const pal_world *w, int b)
 {
     double sum = 0;
@@ -253,7 +253,7 @@ pal_err pal_world_assemble_forces(pal_world *world, int body)
     return err;
 }
 
-/* a row that fails stops its body alone; true: it has */
+/* a component that fails freezes only its body; true: it has failed */
 static bool fails(pal_world *w, pal_body *body, const pal_component *row, pal_err err)
 {
     if (!err) return false;
@@ -262,8 +262,8 @@ static bool fails(pal_world *w, pal_body *body, const pal_component *row, pal_er
     return true;
 }
 
-/* lasting loads and tool contact of one body, every node's load within the cap. Loads that an implicit solver gives
- * back by the stiffness of the contact are beyond any cap: there the rows themselves keep what is left within it */
+/* Lasting loads and tool contact of one body, each node's load within the cap. Loads that an implicit solver returns
+ * through the contact stiffness are exempt; there the components themselves keep the remainder within the cap */
 static void run_contact(pal_world *w, pal_step *step, int b)
 {
     pal_body *body = step->body;
@@ -301,7 +301,7 @@ static void run_substep(pal_world *w, pal_step *shared)
         uint64_t before = pal_clock_ns(), forces = force_ns(&step);
         solve->n_run++;
         if (!step.body->frozen) (void)fails(w, step.body, solve, solve->effect->run(solve->self, &step));
-        /* nodes follow their points, for contact and for what comes after the step */
+        /* interpolates the nodes, for contact and for the stages after the step */
         if (step.n_contact > 0 || step.sub == step.n_sub - 1) pal_body_update_nodes(step.body);
         uint64_t took = pal_clock_ns() - before;
         solve->spent_ns += took - (force_ns(&step) - forces);
@@ -310,7 +310,7 @@ static void run_substep(pal_world *w, pal_step *shared)
     }
 }
 
-/* ADAPT, GUARD and OUTPUT components, once a step */
+/* runs ADAPT, GUARD and OUTPUT components, once per step */
 static void run_stage(pal_world *w, pal_stage stage, double dt_s)
 {
     for (int b = 0; b < w->plan.n_body; b++) {
@@ -319,12 +319,12 @@ static void run_stage(pal_world *w, pal_stage stage, double dt_s)
         step.n_sub = 1;
         bool output = stage == PAL_STAGE_OUTPUT,
              skips = output ? w->unobserved && !step.body->asleep : step.body->asleep;
-        /* a body that fell asleep in this step is shown where it lies: that is how tools are seen to come near */
+        /* show a body that fell asleep in this step at its final position, from which nearness of tools is tested */
         if (skips || (output && step.body->asleep && !step.body->stale)) continue;
         int n_run = 0;
         for (int i = 0; i < w->plan.n_of[stage][b]; i++) {
             pal_component *row = &w->plan.row[w->plan.first[stage][b] + i];
-            /* a frozen body is shown where it stopped, as long as that is somewhere; its guard may put it back */
+            /* a frozen body is shown where it stopped, if that is finite; its guard may restore it */
             if (step.body->frozen && stage == PAL_STAGE_ADAPT) continue;
             if (step.body->frozen && stage == PAL_STAGE_OUTPUT && !pal_body_finite(step.body)) continue;
             uint64_t before = pal_clock_ns();
@@ -340,7 +340,7 @@ static void run_stage(pal_world *w, pal_stage stage, double dt_s)
     }
 }
 
-/* bodies at rest wake when something comes near in this step; what nobody looks at is brought up to date where tools
+/* Wakes sleeping bodies that a tool approaches in this step; without observers updates the shown surface where tools
  * may touch it */
 static void begin_step(pal_world *w, double dt_s)
 {
@@ -358,7 +358,7 @@ static void begin_step(pal_world *w, double dt_s)
     }
 }
 
-/* equal sub-steps; the rest of the step is split again when the limit falls below them */
+/* equal sub-steps; the rest of the step is divided again when the limit falls below them */
 static void run_substeps(pal_world *w, double dt_s)
 {
     double done_s = 0;
@@ -393,7 +393,7 @@ pal_err pal_world_step(pal_world *world, double dt_s)
 {
     pal_world *w = world;
     if (!(dt_s > 0) || !isfinite(dt_s)) return PAL_ERR_REFUSED;
-    /* a step that is too long at rest is refused; deformation is dealt with on the way */
+    /* a step that is too long at rest is refused; deformation is handled during the step */
     if (count_substeps(w, dt_s, w->rest_limit_s) > w->max_substep) return PAL_ERR_BUDGET;
     uint64_t began = pal_clock_thread_ns();
     int frozen = count_frozen(w);
@@ -415,7 +415,7 @@ pal_err pal_world_step(pal_world *world, double dt_s)
     return w->component_err ? w->component_err : count_frozen(w) > frozen ? PAL_ERR_FROZEN : PAL_ERR_OK;
 }
 
-/* ---- what others see: frames and shown surfaces are in world_show.c ---- */
+/* ---- read access; frames and shown surfaces are in world_show.c ---- */
 
 double pal_world_limit_s(const pal_world *world)
 {

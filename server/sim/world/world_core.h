@@ -1,4 +1,4 @@
-/* The record of a world, for the files of world and transfer only. */
+/* The record of a world, for the files of sim/world and sim/transfer only. */
 #ifndef PAL_SIM_WORLD_WORLD_CORE_H
 #define PAL_SIM_WORLD_WORLD_CORE_H
 #include "server/sim/plan/plan.h"
@@ -26,39 +26,40 @@ struct pal_world {
     pal_world_part part[PAL_BODY_MAX];
     double step_s, time_s, limit_s, rest_limit_s;
     int max_substep, n_substep;
-    bool unobserved; /* nobody looks: OUTPUT components are run only where tools need them */
+    bool unobserved; /* no observers: OUTPUT components run only where tools need them */
     uint64_t tick, step_ns, end_ns;
-    pal_err component_err;       /* of the first row that failed in this step */
-    pal_field_components fields; /* put in while the world runs */
+    pal_err component_err;       /* of the first component that failed in this step */
+    pal_field_components fields; /* inserted at run time */
     pal_brush_components brushes;
     pal_blend_components blends;
 };
 
-/* what the rows of body b may touch, without times */
+/* what the components of body b may access, without times */
 pal_step pal_world_body_step(pal_world *world, int b);
-/* the least limit of all bodies that move, infinite when nothing limits, for sub-step `sub`; a body whose limit is no
- * number is frozen. s */
+/* smallest limit of all bodies that move, s, for sub-step `sub`; infinite when nothing limits. A body whose limit is
+ * NaN is frozen */
 double pal_world_find_limit(pal_world *world, int sub);
-/* BUDGET: at rest, on the finest level, a step needs more sub-steps than the scene allows */
+/* BUDGET: at rest, at the finest level, a step needs more sub-steps than the scene allows */
 pal_err pal_world_check_budget(pal_world *world, pal_diagnostic *diag);
-/* stored in the rows of a body, J */
+/* energy stored in the components of a body, J */
 double pal_world_component_energy_J(const pal_world *world, int b);
 
-/* load [n_node][3] again: the lasting ones (`outer`) */
+/* sets load [n_node][3] to the lasting loads */
 void pal_body_begin_loads(pal_body *body);
-/* shortens what is beyond what nodes bear (pal_body_node_load_cap_N, load_cap_N), counted as rescues; lasting: what
- * else presses the nodes is not there yet, and nodes that stray from their rest places bear less */
+/* Scales down loads above what nodes bear (pal_body_node_load_cap_N, load_cap_N) and counts them as safeguards.
+ * lasting: other loads are not added yet, and nodes far from their rest positions bear less */
 void pal_body_cap_loads(pal_body *body, bool body_arena);
 
-/* lasting loads of a body [n_node][3], N, which take memory the first time; NULL: there is none */
+/* lasting loads of a body [n_node][3], N, allocated at the first call; NULL: no memory */
 double *pal_world_external_force(pal_world *w, int body);
 
-/* OUTPUT components of one body, of all bodies, so that what is shown is where they are */
+/* runs the OUTPUT components of one body or of all bodies, so that the shown surface is up to date */
 void pal_world_show(pal_world *world, int b);
 void pal_world_show_all(pal_world *world);
 
-/* ", node 512 at (1, 2, 3) mm sets it": the node that the rows' bounds make responsible. Where bounds are of nodes that
- * are not the points, and without bounds, nothing. The forces' room is free between steps */
+/* writes ", node 512 at (1, 2, 3) mm sets it": the node that determines the limit by the components' bounds. Writes
+ * nothing without bounds or where the bounds are of nodes that are not dofs. Uses the force arrays, which are free
+ * between steps */
 void pal_world_describe_limit(const pal_world *world, char *text, size_t n_byte);
 
 #endif

@@ -1,4 +1,4 @@
-/* Commands to a world between two steps: poses, resets, materials, fields, brushes, rows. */
+/* Commands to a world between two steps: poses, resets, materials, fields, brushes, components. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/recovery/stiffening_damper.h"
@@ -22,7 +22,7 @@ pal_err pal_world_pose(pal_world *world, int tool, const pal_pose *pose)
     return PAL_ERR_OK;
 }
 
-/* one body at rest, its rows as at load */
+/* resets one body to rest, its components as at load */
 static void rest_body(pal_world *w, int b)
 {
     pal_body *body = &w->plan.body[b];
@@ -92,7 +92,7 @@ pal_err pal_world_material(pal_world *world, int body, const pal_material *mater
     pal_material to = *material, was = world->material[body];
     PAL_TRY(pal_material_check(&to, diag));
     world->plan.body[body].asleep = false;
-    /* asking rows for their energy may change what they keep: only where it may matter */
+    /* evaluating the energy may change what components cache: do so only where needed */
     bool brakes =
         !world->plan.body[body].implicit && !world->plan.body[body].interpolation && to.young_Pa > 10 * was.young_Pa;
     double before_J = brakes ? pal_world_component_energy_J(world, body) : 0;
@@ -100,7 +100,7 @@ pal_err pal_world_material(pal_world *world, int body, const pal_material *mater
     if (!err) err = pal_world_check_budget(world, diag);
     if (!err && brakes)
         pal_stiffening_damper_begin(&world->plan.body[body], before_J, pal_world_component_energy_J(world, body));
-    /* constants are functions of the material, so putting the old one back puts everything back */
+    /* constants are functions of the material, so restoring the old one restores everything */
     if (err) (void)apply_material(world, body, &was, NULL);
     pal_world_find_limit(world, 0);
     return err;
@@ -134,11 +134,11 @@ pal_err pal_world_switch_component(pal_world *world, const pal_scene *scene, int
     const pal_material *now = body >= 0 && body < PAL_BODY_MAX ? &world->material[body] : NULL;
     PAL_TRY(pal_plan_switch(&world->plan, scene, body, row, on, now, diag, &changed));
     if (!changed) return PAL_ERR_OK;
-    /* what the solver knows of its limit is of the rows before */
+    /* the solver's limit belongs to the previous components */
     pal_world_invalidate_limits(world, body);
     pal_err err = pal_world_check_budget(world, diag);
     if (err) {
-        /* it was within the budget without the row */
+        /* the plan without the component was within the budget */
         (void)pal_plan_switch(&world->plan, scene, body, row, false, now, NULL, &changed);
         pal_world_invalidate_limits(world, body);
         (void)pal_world_check_budget(world, NULL);

@@ -1,4 +1,4 @@
-/* Lasting loads on nodes, and how much of a load nodes bear. */
+/* Lasting loads on nodes, and the caps of node loads. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/sim/world/world.h"
@@ -24,8 +24,8 @@ pal_err pal_world_load(pal_world *world, int body, int node, const double force_
     return PAL_ERR_OK;
 }
 
-/* loads again: the lasting ones. Nodes out of use have none (adaptive_surface.h) and keep theirs in `outer` until they
- * return */
+/* Resets loads to the lasting ones. Inactive nodes have none (adaptive_surface.h) and keep theirs in external_force
+ * until they are active again */
 void pal_body_begin_loads(pal_body *body)
 {
     size_t n_byte = 3 * sizeof(double) * (size_t)body->n_node;
@@ -43,12 +43,12 @@ void pal_body_begin_loads(pal_body *body)
         memset(body->load, 0, n_byte);
 }
 
-/* of its cap a node bears at least so much, wherever it is */
+/* smallest fraction of its cap that a node bears anywhere */
 static const double min_share = 0.01;
 
-/* Of a body that something holds still a part that many loads pull out, each within its cap, goes as far as their sum
- * stretches it and swings twice as far: from 2 S off its rest place on a node lets go of a lasting load, down
- * to min_share at 4 S. What nothing holds, or what is led, may be anywhere */
+/* A part of a supported body that many loads pull out, each within its cap, stretches by their sum and overshoots to
+ * twice that. So the cap of lasting loads decreases beyond 2 S off the rest position, down to min_share at 4 S. An
+ * unsupported body or one with prescribed nodes may be anywhere */
 static bool stays(const pal_body *body)
 {
     bool fixed = false, led = false;
@@ -64,7 +64,7 @@ static double share_far_S(double far_S)
 
 void pal_body_cap_loads(pal_body *body, bool body_arena)
 {
-    int staying = -1; /* not looked for yet */
+    int staying = -1; /* not computed yet */
     for (int k = 0; k < pal_body_nodes(body); k++) {
         int i = pal_body_point(body, k);
         double *load = body->load + 3 * i, load2 = pal_dot3(load, load);

@@ -1,4 +1,4 @@
-/* What a world shows of itself: frames, hash, rows, surfaces. */
+/* Read access to a world: frames, hash, components, surfaces. */
 #include "server/sim/world/world.h"
 
 #include "server/base/vec3.h"
@@ -19,7 +19,7 @@ static void copy_fields(const pal_body *body, pal_frame_part *to)
     }
 }
 
-/* what of the table of triangles has changed since this frame was filled last, or all of it */
+/* copies the changes of the triangle table since this frame was last filled, or all of it */
 static void copy_slots(const pal_body *body, pal_frame_part *to)
 {
     const pal_dofs *dofs = &body->dofs;
@@ -48,7 +48,7 @@ static void copy_part(const pal_body *body, pal_frame_part *to)
     to->n_safeguard = pal_safeguards_sum(&body->safeguards);
     to->safeguard_ns = body->safeguards.ns;
     to->asleep = body->asleep;
-    bool same = to->n_output == body->n_output; /* these are the positions that it has */
+    bool same = to->n_output == body->n_output; /* the frame has these positions already */
     to->n_output = body->n_output;
     if (to->n_point > 0) memcpy(to->point_m, body->x, 3 * sizeof(double) * (size_t)to->n_point);
     if (to->n_slot > 0) {

@@ -1,4 +1,4 @@
-/* Recovery of stress at nodes, and what it tells of the error. */
+/* Recovery of stress at nodes, and the error estimate from it. */
 #include "server/sim/world/zz_estimator.h"
 
 #include <math.h>
@@ -8,12 +8,12 @@
 enum { MAX_MATERIAL = 16 };
 static const double same = 1.25;
 
-/* one pass over all stress points after another */
+/* state of the passes over all stress points */
 typedef struct recovery {
     double mu[MAX_MATERIAL], lambda[MAX_MATERIAL];
-    int n_material, material; /* material: the one that is looked at */
+    int n_material, material; /* material: the present one */
     double *sum, *volume;     /* [n_node][9], [n_node]                */
-    double *share;            /* NULL: not wanted                     */
+    double *share;            /* NULL: not requested */
     double error2, solution2;
 } recovery;
 
@@ -22,7 +22,7 @@ static double apart(double a, double b)
     return a > b ? a / b : b / a;
 }
 
-/* the material of a point, a new one when there is room; lambda may be next to 0 or below */
+/* the material of a point, a new one while there is room; lambda may be near 0 or negative */
 static int material_of(recovery *r, const pal_stress_point *p)
 {
     double min = INFINITY, kappa = p->lambda_Pa + 2 * p->mu_Pa / 3;
@@ -41,7 +41,7 @@ static void list_materials(void *user, const pal_stress_point *p)
     (void)material_of(user, p);
 }
 
-/* every point of an element counts alike for all of its nodes: together they are the element's mean */
+/* all points of an element add to all of its nodes alike: their sum is the element's mean */
 static void gather(void *user, const pal_stress_point *p)
 {
     recovery *r = user;
@@ -81,7 +81,7 @@ static void compare(void *user, const pal_stress_point *p)
 static void recover(recovery *r, const pal_component *row, const pal_body *body)
 {
     size_t n = (size_t)body->n_node;
-    (void)row->effect->energy(row->self, body); /* rows take their rotations with it */
+    (void)row->effect->energy(row->self, body); /* components update their rotations with it */
     row->effect->stress(row->self, body, list_materials, r);
     for (r->material = 0; r->material < r->n_material; r->material++) {
         memset(r->sum, 0, 9 * n * sizeof *r->sum);
@@ -93,7 +93,7 @@ static void recover(recovery *r, const pal_component *row, const pal_body *body)
     }
 }
 
-/* the first row of the body that gives stress; NULL: none */
+/* the first component of the body that gives stress; NULL: none */
 static const pal_component *stress_row(const pal_world *world, const pal_body *body)
 {
     for (int i = 0; i < pal_world_component_count(world); i++) {
