@@ -64,7 +64,7 @@ static void to_walk(const pal_calibration *c, const double *theta, double *p)
     }
 }
 
-/* within the bounds of theta; the walk's first point is the start to the bit */
+/* Clamps to the bounds of theta. The first point of the walk is the start bit by bit. */
 static void to_theta(const fit *f, const double *p, double *theta)
 {
     const pal_calibration *c = f->c;
@@ -80,7 +80,7 @@ static void to_theta(const fit *f, const double *p, double *theta)
     for (int i = 0; i < c->n_parameter; i++) theta[i] = fmin(fmax(theta[i], c->low[i]), c->high[i]);
 }
 
-/* the box, around the calibration's start, the walk's own start included */
+/* bounds around the calibration's start that include the start of the walk */
 static void make_box(fit *f, const double *theta)
 {
     const pal_calibration *c = f->c;
@@ -105,7 +105,7 @@ static void evaluate_one(void *user, int worker, int index)
     if (err == PAL_ERR_MEMORY) f->err[worker] = err;
 }
 
-/* a batch of the walk */
+/* evaluates a batch of the walk */
 static pal_err evaluate(void *user, const double *p, int n, double *cost)
 {
     fit *f = user;
@@ -119,7 +119,7 @@ static pal_err evaluate(void *user, const double *p, int n, double *cost)
     return PAL_ERR_OK;
 }
 
-/* shows a step of the walk to the caller; false: enough of it */
+/* reports a step of the walk to the caller; false: stop */
 static bool tell(void *user, const pal_anneal_step *at)
 {
     fit *f = user;
@@ -174,7 +174,7 @@ static pal_err walk(fit *f, double *theta, pal_diagnostic *diag)
     return err ? pal_diagnostic_set(diag, err, "%s", reason.text[0] ? reason.text : pal_err_text(err)) : err;
 }
 
-/* team and seats; with points evaluated elsewhere one seat, for the best */
+/* team and workspaces; one workspace, for the best point, if points are evaluated elsewhere */
 static pal_err make(fit *f)
 {
     size_t n = (size_t)f->c->n_parameter;

@@ -1,4 +1,4 @@
-/* Names of load cases and references -> cases with their truths. */
+/* Resolves names of load cases and references to cases with their truths. */
 #include "server/calibrate/calibrate_cases.h"
 
 #include "server/base/vec3.h"
@@ -10,17 +10,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* points farther outside the surface's box, as a share of its diagonal, are of another body */
+/* points farther outside the surface's box, as a share of its diagonal, belong to another body */
 static const double max_outside = 0.05;
 
 enum { ENOUGH_NODES = 700, FINEST = 64 };
 
-/* what every function of one reading shares */
+/* input of every function of one reading */
 typedef struct job {
     const pal_calibrate_input *input;
     pal_calibrate_cases *set;
     const pal_problem_reference *reference[PAL_CALIBRATE_CASES]; /* of each case; NULL: none   */
-    bool named[PAL_CALIBRATE_CASES];                             /* it was named itself        */
+    bool named[PAL_CALIBRATE_CASES];                             /* it was named explicitly */
     pal_diagnostic *diag;
 } job;
 
@@ -92,7 +92,7 @@ static bool same(double a, double b)
     return fabs(a - b) <= 1e-9 * fabs(b);
 }
 
-/* E and nu that a case is of */
+/* E and nu of a case */
 static void material_of(const job *j, int index, double *young_Pa, double *poisson)
 {
     const pal_problem_material *m = &j->set->problem->material[0];
@@ -101,7 +101,7 @@ static void material_of(const job *j, int index, double *young_Pa, double *poiss
     *poisson = r && !isnan(r->poisson) ? r->poisson : m->poisson;
 }
 
-/* a reference may be of another material than the problem's: then that is the body's, in all of its cases */
+/* A reference may have another material than the problem. The body then takes that material in all of its cases. */
 static pal_err settle_material(job *j)
 {
     pal_calibrate_cases *s = j->set;
@@ -131,7 +131,7 @@ static bool answers(const job *j, int index, const pal_problem_reference *r)
            (isnan(r->poisson) || same(r->poisson, m->poisson));
 }
 
-/* which reference, or finite elements, a case is compared with; finite ones before linear ones, neo-Hookean first */
+/* Chooses the reference of a case, or finite elements: finite kinematics before linear, neo-Hookean first. */
 static pal_err choose_reference(job *j, int index)
 {
     pal_calibrate_cases *s = j->set;
@@ -187,7 +187,7 @@ static pal_err choose_truths(job *j)
 
 /* ---- the body ---- */
 
-/* points in the file's frame that are far outside of the surface's box */
+/* refuses points (frame of the file) far outside the surface's box */
 static pal_err check_box(const job *j, int index)
 {
     const pal_calibrate_cases *s = j->set;

@@ -341,7 +341,7 @@ static pal_err make_parameters(const job *j)
     c->low = c->theta + c->n_parameter, c->high = c->low + c->n_parameter;
     for (int k = 0; k < c->n_kind; k++) {
         const pal_springs *s = &c->lattice.kind[c->kind[k]];
-        /* the derived law weights by volume: the total stiffness is the same when all springs are alike */
+        /* the derived law weights springs by volume: the total energy is the same when all springs are alike */
         double f = factor[c->kind[k]], manual_theta = hand[c->kind[k]] / mean_weight(s);
         double start = log(scale * (c->options.equal ? hand[c->kind[k]] : f));
         c->manual_theta[k] = log(scale * manual_theta);

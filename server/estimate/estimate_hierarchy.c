@@ -59,7 +59,7 @@ static int finest_size(const family *f)
     return r >= reported_apart * s && r <= MAX_SIZE && nodes_of(f, r) > 0 ? r : 0;
 }
 
-/* ---- rests ---- */
+/* ---- equilibria ---- */
 
 static bool probe(const family *f, sized *m)
 {

@@ -132,7 +132,7 @@ static bool find_limit_node(const probe *p, pal_preflight_body *out)
 
 /* ---- conditioning ---- */
 
-/* forces of the components at rest + way v, assembled to the points */
+/* forces of the components at rest + way_m v, assembled to the points */
 static void force_at(probe *p, const double *v, double way_m, double *out)
 {
     pal_body *body = p->body;
@@ -247,7 +247,7 @@ static bool look_at_modes(probe *p, pal_preflight_body *out)
     memcpy(p->x, body->x, n * sizeof(double));
     out->omega_max_1_s = out->n_fixed < body->n_active ? fast(p, room) : (double)NAN;
     out->omega_min_1_s = out->n_fixed > 0 && out->n_fixed < body->n_active ? slow(p, room) : (double)NAN;
-    /* anchors fix a body too, but the weight loads them only where gravity is present */
+    /* anchors also restrain a body, but without fixed nodes omega_min and the condition stay unknown */
     out->condition = out->omega_max_1_s * out->omega_max_1_s / (out->omega_min_1_s * out->omega_min_1_s);
     out->slowest_period_s = 2 * M_PI / out->omega_min_1_s;
     memcpy(body->x, p->x, n * sizeof(double));

@@ -7,7 +7,7 @@
  *
  * Acts on nodes: reads body->d against solid->node_rest, adds forces to body->f. Moduli are those of solid->samples;
  * when these change (painting, a live material edit), the constants are recomputed before their next use. Inverted
- * elements use the edges of their cells (cell_recovery.h) and are counted and timed in body->safeguards. There is no
+ * elements use the edges of their cells (cell_recovery.c) and are counted and timed in body->safeguards. There is no
  * bound of stiffness, because nodes are not dofs; solvers that need a limit find it by differences of forces. For
  * the same reason the tangent is given by products only. */
 #include "server/base/clock.h"
