@@ -50,7 +50,7 @@ void pal_hub_topology_components(const pal_hub_room *room, pal_wire_topology *ou
 
 /* rows of the opened plan that are not in the running one have been switched off; others (fields, brushes) have come.
  * Both lists keep the plan's order */
-static void tell_rows(const pal_hub_room *room, const pal_frame *f, pal_wire_status *w)
+static void report_components(const pal_hub_room *room, const pal_frame *f, pal_wire_status *w)
 {
     int n = pal_session_component_count(room->session), n_found = 0;
     bool same = n == f->n_row && !room->own;
@@ -77,7 +77,7 @@ static void tell_rows(const pal_hub_room *room, const pal_frame *f, pal_wire_sta
 
 void pal_hub_status_plan(const pal_hub_room *room, const pal_frame *f, pal_wire_status *w)
 {
-    tell_rows(room, f, w);
+    report_components(room, f, w);
     for (int p = 0; p < f->n_part && p < PAL_WIRE_PART_MAX; p++) {
         const pal_frame_part *part = &f->part[p];
         pal_wire_part_state *to = &w->state[w->n_state];

@@ -24,7 +24,7 @@ struct pal_server {
     pal_loop *loop;
     pal_hub *hub;
     pal_site *site;
-    const pal_transport_ops *road;
+    const pal_transport_ops *ops;
     pal_transport *transport;
     pal_server_gate *gate;
 };
@@ -110,10 +110,10 @@ static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_
     hub.reference_m = options->reference_m;
     hub.verb = options->verb, hub.n_verb = options->n_verb;
     /* besides the clients: page loads, and what lws needs itself */
-    PAL_TRY(pal_loop_create(s->road == &pal_ws_transport, hub.max_clients + 128, diag, &s->loop));
+    PAL_TRY(pal_loop_create(s->ops == &pal_ws_transport, hub.max_clients + 128, diag, &s->loop));
     PAL_TRY(pal_hub_create(s->loop, &hub, session, n_session, diag, &s->hub));
     pal_hub_events(s->hub, &events);
-    return s->road->open(s->loop, url, &events, diag, &s->transport);
+    return s->ops->open(s->loop, url, &events, diag, &s->transport);
 }
 
 pal_err pal_server_open(const pal_server_options *options, pal_session **session, int n_session, pal_diagnostic *diag,
@@ -122,8 +122,8 @@ pal_err pal_server_open(const pal_server_options *options, pal_session **session
     if (n_session < 1) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "a server needs a session");
     pal_server *s = calloc(1, sizeof *s);
     if (!s) return PAL_ERR_MEMORY;
-    s->road =
-        options->road && !strcmp(options->road, pal_mem_transport.scheme) ? &pal_mem_transport : &pal_ws_transport;
+    s->ops = options->transport && !strcmp(options->transport, pal_mem_transport.scheme) ? &pal_mem_transport
+                                                                                         : &pal_ws_transport;
     pal_err err = open_parts(s, options, session, n_session, diag);
     if (err) return pal_server_close(s), err;
     *out = s;
@@ -148,7 +148,7 @@ void pal_server_stop(pal_server *server)
 
 int pal_server_port(const pal_server *server)
 {
-    return server->road->port(server->transport);
+    return server->ops->port(server->transport);
 }
 
 void pal_server_close(pal_server *server)
@@ -156,7 +156,7 @@ void pal_server_close(pal_server *server)
     if (!server) return;
     disconnect(server);
     pal_loop_shut(server->loop);
-    if (server->transport) server->road->close(server->transport);
+    if (server->transport) server->ops->close(server->transport);
     pal_hub_destroy(server->hub);
     pal_loop_destroy(server->loop);
     pal_site_close(server->site);

@@ -15,7 +15,7 @@ typedef struct pal_server_options {
     const char *viewer_folder; /* files served at /; NULL: none                                             */
     double error_m;            /* bound of streamed positions per axis; 0: 1/3000 of the box, at most 0.05 mm */
     int max_clients;           /* 0: 200                                                                    */
-    const char *road;          /* "ws" (default) or "mem" (tests)                                           */
+    const char *transport;     /* "ws" (default) or "mem" (tests)                                           */
     /* what a study of each session's scene found, for those who pick a point of it live: lists by ascending ms and the
      * body they are of, in the order of the sessions; borrowed until close. NULL, or n_configuration 0: no study */
     const pal_measured_configuration *const *setting; /* [n_session][n_configuration] */

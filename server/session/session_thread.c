@@ -21,7 +21,7 @@ static const double young_max_Pa = 1e12; /* beyond any solid */
 
 /* ---- what the thread does ---- */
 
-static void say(pal_session *s, const pal_diagnostic *diag)
+static void log_diagnostic(pal_session *s, const pal_diagnostic *diag)
 {
     pthread_mutex_lock(&s->note_lock);
     s->diag = *diag;
@@ -126,7 +126,7 @@ static void look(pal_session *s, const pal_command *command)
     if (!command->wanted && *n > 0) return;
     if (pal_world_field(s->world, command->body, command->field, command->wanted, &diag)) {
         atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
-        say(s, &diag);
+        log_diagnostic(s, &diag);
     }
 }
 
@@ -144,7 +144,7 @@ static void brush(pal_session *s, const pal_command *command)
                                                       .brush = command->brush});
         diag.text[0] = 0;
     }
-    say(s, &diag);
+    log_diagnostic(s, &diag);
 }
 
 static void switch_row(pal_session *s, const pal_command *command)
@@ -159,7 +159,7 @@ static void switch_row(pal_session *s, const pal_command *command)
         pal_input_log_put(s->log, &record);
         diag.text[0] = 0;
     }
-    say(s, &diag);
+    log_diagnostic(s, &diag);
 }
 
 /* has somebody begun to look, or the last one ceased to? true: what is shown is new */
@@ -172,7 +172,7 @@ static bool look_around(pal_session *s)
     return watched;
 }
 
-static void obey(pal_session *s, const pal_command *command)
+static void execute(pal_session *s, const pal_command *command)
 {
     pal_diagnostic diag = {""};
     switch (command->kind) {
@@ -187,13 +187,13 @@ static void obey(pal_session *s, const pal_command *command)
         break;
     case PAL_COMMAND_RESET:
         pal_world_reset(s->world);
-        say(s, &diag);
+        log_diagnostic(s, &diag);
         for (int t = 0; t < s->scene->n_tool; t++) s->tool[t].present = s->tool[t].brushes = false;
         pal_input_log_put(s->log, &(pal_input_record){.kind = PAL_INPUT_RESET, .step = s->step});
         break;
     case PAL_COMMAND_RESET_BODY:
         (void)pal_world_reset_body(s->world, command->body);
-        say(s, &diag);
+        log_diagnostic(s, &diag);
         pal_input_log_put(s->log,
                           &(pal_input_record){.kind = PAL_INPUT_RESET_BODY, .index = command->body, .step = s->step});
         break;
@@ -210,7 +210,7 @@ static void obey(pal_session *s, const pal_command *command)
             s->material[command->body] = command->material;
             pthread_mutex_unlock(&s->note_lock);
         }
-        say(s, &diag);
+        log_diagnostic(s, &diag);
         break;
     case PAL_COMMAND_FIELD:
         look(s, command);
@@ -234,13 +234,13 @@ static bool take_commands(pal_session *s)
     pal_command command;
     bool any = false, was_paused = s->paused;
     /* a flood that refills the ring as fast as it is emptied must not keep the step waiting */
-    for (int k = 0; k < N_COMMAND && pal_command_queue_get(s->command, &command); k++, any = true) obey(s, &command);
+    for (int k = 0; k < N_COMMAND && pal_command_queue_get(s->command, &command); k++, any = true) execute(s, &command);
     if (was_paused != s->paused) forget_pace(s);
     return any;
 }
 
 /* what went wrong in a step: the bodies that stand still, with their reasons */
-static void tell(pal_session *s, pal_err err)
+static void report_error(pal_session *s, pal_err err)
 {
     pal_diagnostic diag;
     pal_diagnostic_set(&diag, err, "step %llu: %s", (unsigned long long)s->step, pal_err_text(err));
@@ -250,7 +250,7 @@ static void tell(pal_session *s, pal_err err)
         if (body->frozen)
             (void)snprintf(diag.text + used, sizeof diag.text - used, "; %s: %s", body->name, body->reason);
     }
-    say(s, &diag);
+    log_diagnostic(s, &diag);
 }
 
 static void step(pal_session *s)
@@ -266,14 +266,14 @@ static void step(pal_session *s)
     if (s->log && s->step % PAL_INPUT_HASH_STEPS == 0)
         pal_input_log_put(
             s->log, &(pal_input_record){.kind = PAL_INPUT_HASH, .step = s->step, .hash = pal_world_hash(s->world)});
-    if (err) tell(s, err);
+    if (err) report_error(s, err);
 }
 
 static void estimate(pal_session *s, bool stepped)
 {
     pal_diagnostic diag = {""};
     double step_ms = stepped ? 1e-6 * (double)s->work_ns : (double)NAN;
-    if (pal_estimator_set_step(&s->watch, s->world, step_ms, &diag)) say(s, &diag);
+    if (pal_estimator_set_step(&s->watch, s->world, step_ms, &diag)) log_diagnostic(s, &diag);
 }
 
 /* waits for the step's time; a step that is a whole step late or more is due now and the missed ones are dropped */
