@@ -299,12 +299,12 @@ static int read_number(const cJSON *item, double *out)
     return 0;
 }
 
-static int read_integer(const cJSON *item, double min, double most, double *out)
+static int read_integer(const cJSON *item, double min, double max, double *out)
 {
     double v;
     int refusal = read_number(item, &v);
     if (refusal) return refusal;
-    if (v < min || v > most || v != floor(v)) return PAL_REFUSAL_RANGE;
+    if (v < min || v > max || v != floor(v)) return PAL_REFUSAL_RANGE;
     *out = v;
     return 0;
 }
@@ -322,11 +322,11 @@ static int read_role(const cJSON *item, pal_wire_role *out)
 
 static int read_scalar(const pal_control_field *f, const cJSON *item, uint8_t *at)
 {
-    static const double most[] = {[U16] = 65535, [U32] = 4294967295.0, [U64] = INTEGER_MAX};
+    static const double max[] = {[U16] = 65535, [U32] = 4294967295.0, [U64] = INTEGER_MAX};
     double v = 0;
     int refusal = 0;
     if (f->type <= U64) {
-        refusal = read_integer(item, 0, most[f->type], &v);
+        refusal = read_integer(item, 0, max[f->type], &v);
         const uint64_t u64 = (uint64_t)v;
         const uint32_t u32 = (uint32_t)u64;
         const uint16_t u16 = (uint16_t)u64;

@@ -15,13 +15,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define SUB_STEP_S     50e-6
-#define CATCH_UP_MAX_S 0.2 /* after a longer pause in wall time the plant skips the rest */
-#define VISCOUS_NS_M   0.05
-#define TOUCH_FELT_N   0.1
-#define TOUCH_REST_M_S 0.005 /* a hand this slow feels what it touches, no damping */
-#define TOUCH_TICKS    20    /* of the servo, which a late one answers with old forces */
-#define APPROACH_M_S   0.04
+#define SUB_STEP_S      50e-6
+#define CATCH_UP_MAX_S  0.2 /* after a longer pause in wall time the plant skips the rest */
+#define VISCOUS_NS_M    0.05
+#define TOUCH_CONTACT_N 0.1
+#define TOUCH_REST_M_S  0.005 /* a hand this slow feels what it touches, no damping */
+#define TOUCH_TICKS     20    /* of the servo, which a late one answers with old forces */
+#define APPROACH_M_S    0.04
 
 typedef struct virtual_device {
     const char *id, *name;
@@ -56,7 +56,7 @@ typedef struct virtual_state {
     double depth_m, height_m, wait_s, display_offset_s;
     double viscous, coulomb;
     bool virtual_clock, touched;
-    int n_felt; /* advances in a row at whose end the resting hand felt something */
+    int n_contact; /* advances in a row at whose end the resting hand felt something */
     long n_read, fail_at;
     double time_s, touched_s, rest_s; /* rest: time not yet turned into whole sub-steps */
     double touched_z;
@@ -72,10 +72,10 @@ static void virtual_intend(virtual_state *s)
     if (s->script == STILL) return;
     if (!s->touched) {
         /* damping is no touch: the hand halts where it feels something, and has touched when it still does at rest */
-        const bool haptic_stiffness = pal_norm3(s->applied) > TOUCH_FELT_N;
-        if (!haptic_stiffness && s->time_s > s->wait_s)
+        const bool in_contact = pal_norm3(s->applied) > TOUCH_CONTACT_N;
+        if (!in_contact && s->time_s > s->wait_s)
             s->xd[2] = fmax(s->xd[2] - APPROACH_M_S * SUB_STEP_S, -0.9 * s->device->radius_m);
-        if (s->n_felt >= TOUCH_TICKS) {
+        if (s->n_contact >= TOUCH_TICKS) {
             s->touched = true;
             s->touched_s = s->time_s;
             s->touched_z = s->xd[2];
@@ -83,8 +83,8 @@ static void virtual_intend(virtual_state *s)
         return;
     }
     const double t = s->time_s - s->touched_s, u = fmin(t / 0.5, 1);
-    const double ease = u * u * u * (10 - 15 * u + 6 * u * u);
-    double down = s->depth_m * ease;
+    const double blend = u * u * u * (10 - 15 * u + 6 * u * u);
+    double down = s->depth_m * blend;
     if (s->script == CYCLE) down = s->depth_m * 0.5 * (1 - cos(2 * 3.14159265358979 * t));
     if (s->script == RAMP) down = s->depth_m * fmin(t / 6, 1);
     if (s->script == TAP) {
@@ -128,8 +128,8 @@ void pal_virtual_advance(void *handle, double dt_s)
         s->time_s += SUB_STEP_S;
         s->rest_s -= SUB_STEP_S;
     }
-    const bool haptic_stiffness = pal_norm3(s->applied) > TOUCH_FELT_N && pal_norm3(s->v) < TOUCH_REST_M_S;
-    s->n_felt = haptic_stiffness ? s->n_felt + 1 : 0;
+    const bool in_contact = pal_norm3(s->applied) > TOUCH_CONTACT_N && pal_norm3(s->v) < TOUCH_REST_M_S;
+    s->n_contact = in_contact ? s->n_contact + 1 : 0;
     if (!off) pal_copy3(s->command, s->next);
 }
 

@@ -49,7 +49,7 @@ struct pal_link {
 
 static void link_connect(pal_link *link);
 
-static void link_tell(pal_link *link, pal_link_state state, const char *reason)
+static void link_report(pal_link *link, pal_link_state state, const char *reason)
 {
     link->state = state;
     if (!link->closing && link->events->state)
@@ -103,19 +103,19 @@ static void link_lost(pal_link *link, const char *reason)
         return;
     }
     if (link->once || !link_may_return(link->close_code)) {
-        link_tell(link, PAL_LINK_ENDED, reason);
+        link_report(link, PAL_LINK_ENDED, reason);
         return;
     }
     lws_sul_schedule(link->loop->context, 0, &link->retry, link_retry_fired, (lws_usec_t)link->pause_ms * 1000);
     link->pause_ms = link->pause_ms * 2 < LINK_PAUSE_MAX_MS ? link->pause_ms * 2 : LINK_PAUSE_MAX_MS;
-    link_tell(link, PAL_LINK_LOST, reason);
+    link_report(link, PAL_LINK_LOST, reason);
 }
 
 static void link_connect(pal_link *link)
 {
     link->close_code = 0;
     link->close_why[0] = 0;
-    link_tell(link, PAL_LINK_CONNECTING, "");
+    link_report(link, PAL_LINK_CONNECTING, "");
     struct lws_client_connect_info info = {0};
     info.context = link->loop->context;
     info.vhost = link->loop->vhost;
@@ -306,7 +306,7 @@ static void link_text(pal_link *link)
         link->count.joins++;
     }
     if (link->events->control) link->events->control(link->user, link, &link->control);
-    if (hello && !link->closing) link_tell(link, PAL_LINK_JOINED, "");
+    if (hello && !link->closing) link_report(link, PAL_LINK_JOINED, "");
 }
 
 static void link_binary(pal_link *link)
@@ -381,7 +381,7 @@ static void link_established(pal_link *link, struct lws *wsi)
     join.join.tool = link->tool;
     join.join.topology_deltas = link->topology_deltas;
     pal_link_send_control(link, &join);
-    link_tell(link, PAL_LINK_OPEN, "");
+    link_report(link, PAL_LINK_OPEN, "");
     if (link->fixed) lws_rx_flow_control(wsi, 0);
 }
 

@@ -11,7 +11,7 @@
 /* a client that cannot keep up is served with larger steps, at most this many times the stated error */
 #define COARSEST 10.0
 
-typedef struct trainee_part {
+typedef struct client_part {
     pal_stored_asset *asset; /* of the current epoch, perhaps not ready */
     uint32_t epoch, seq, n_vertex;
     bool seen, looks;       /* looks: a field was asked for  */
@@ -21,7 +21,7 @@ typedef struct trainee_part {
     char name[PAL_WIRE_NAME_BYTES];
     uint8_t *kept; /* newest frame that came before its asset   */
     size_t n_kept;
-} trainee_part;
+} client_part;
 
 struct pal_scripted_client {
     pal_link_loop *loop;
@@ -38,7 +38,7 @@ struct pal_scripted_client {
     int patched; /* part whose TOPOLOGY_DELTA came last and whose frame has not; -1: none */
     uint64_t start_ns, hello_ns, first_cycle_ns, stall_ns, last_cycle_ns, first_field_ns;
     double decode_s;
-    trainee_part part[PAL_WIRE_PART_MAX];
+    client_part part[PAL_WIRE_PART_MAX];
     uint16_t id;
     /* the order under way */
     int order;
@@ -60,7 +60,7 @@ const char *pal_fault_name(pal_fault fault)
     return name[fault];
 }
 
-static const char *trainee_fault_text(pal_fault fault)
+static const char *client_fault_text(pal_fault fault)
 {
     static const char *const text[] = {
 #define X(code, sentence) sentence,
@@ -71,7 +71,7 @@ static const char *trainee_fault_text(pal_fault fault)
 }
 
 static void __attribute__((format(printf, 3, 4)))
-trainee_fault(pal_scripted_client *t, pal_fault fault, const char *format, ...)
+client_fault(pal_scripted_client *t, pal_fault fault, const char *format, ...)
 {
     if (t->result.fault[fault]++ || t->result.first_fault[0]) return;
     char detail[160];
@@ -79,11 +79,11 @@ trainee_fault(pal_scripted_client *t, pal_fault fault, const char *format, ...)
     va_start(arguments, format);
     vsnprintf(detail, sizeof detail, format, arguments);
     va_end(arguments);
-    snprintf(t->result.first_fault, sizeof t->result.first_fault, "%s: %s", trainee_fault_text(fault), detail);
+    snprintf(t->result.first_fault, sizeof t->result.first_fault, "%s: %s", client_fault_text(fault), detail);
 }
 
 /* touched place: the vertex furthest along up, for several trainees around it */
-static void trainee_place(pal_scripted_client *t)
+static void client_place(pal_scripted_client *t)
 {
     const pal_asset *asset = t->part[0].asset->asset;
     double top[3], near[3];
@@ -98,7 +98,7 @@ static void trainee_place(pal_scripted_client *t)
     t->has_place = true;
 }
 
-static void trainee_measure(pal_scripted_client *t, trainee_part *part)
+static void client_measure(pal_scripted_client *t, client_part *part)
 {
     const double *low = t->box_low, *high = t->box_high;
     for (uint32_t i = 0; i < part->n_vertex; i++) {
@@ -107,7 +107,7 @@ static void trainee_measure(pal_scripted_client *t, trainee_part *part)
         for (int k = 0; k < 3; k++) {
             const double size = high[k] - low[k] + 0.1;
             if (!(p[k] > low[k] - size && p[k] < high[k] + size)) {
-                trainee_fault(t, PAL_FAULT_PLACE, "vertex %u axis %d at %g m", i, k, (double)p[k]);
+                client_fault(t, PAL_FAULT_PLACE, "vertex %u axis %d at %g m", i, k, (double)p[k]);
                 return;
             }
             moved += (double)(p[k] - f[k]) * (double)(p[k] - f[k]);
@@ -117,12 +117,12 @@ static void trainee_measure(pal_scripted_client *t, trainee_part *part)
 }
 
 /* how far a vertex of an order's body, the first part when it names none, is at most from its first place */
-static double trainee_moved(const pal_scripted_client *t, const char *target)
+static double client_moved(const pal_scripted_client *t, const char *target)
 {
     double moved = 0;
     uint32_t p = 0;
     while (p < t->n_part && target[0] && strcmp(t->part[p].name, target)) p++;
-    const trainee_part *part = &t->part[p];
+    const client_part *part = &t->part[p];
     for (uint32_t i = 0; p < t->n_part && part->seen && i < part->n_vertex; i++) {
         const float *a = part->now_m + 3 * (size_t)i, *b = part->first_m + 3 * (size_t)i;
         moved = fmax(moved, pal_dist3((const double[]){a[0], a[1], a[2]}, (const double[]){b[0], b[1], b[2]}));
@@ -131,7 +131,7 @@ static double trainee_moved(const pal_scripted_client *t, const char *target)
 }
 
 /* what came of the order under way, once it is answered and what it changed is seen */
-static void trainee_tell(pal_scripted_client *t)
+static void client_report(pal_scripted_client *t)
 {
     if (!t->asked || !t->answered || (t->reshaped && !t->part[0].seen)) return;
     const pal_order_line *line = &t->options.orders->line[t->order++];
@@ -142,7 +142,7 @@ static void trainee_tell(pal_scripted_client *t)
                                        .answer_ms = (double)(t->answered_ns - t->asked_ns) * 1e-6,
                                        .frame_ms = t->reshaped ? (double)(now - t->asked_ns) * 1e-6 : 0,
                                        .gap_ms = t->gap_ms,
-                                       .moved_m = trainee_moved(t, line->order.target),
+                                       .moved_m = client_moved(t, line->order.target),
                                        .epoch = t->part[0].epoch,
                                        .n_vertex = t->part[0].n_vertex};
     t->asked = false;
@@ -152,7 +152,7 @@ static void trainee_tell(pal_scripted_client *t)
     if (t->options.reported) t->options.reported(t->options.user, &reported);
 }
 
-static void trainee_answered(pal_scripted_client *t, const pal_control *c)
+static void client_answered(pal_scripted_client *t, const pal_control *c)
 {
     if (!t->asked || t->answered) return;
     t->refused = c->type == PAL_CONTROL_ERROR;
@@ -160,14 +160,14 @@ static void trainee_answered(pal_scripted_client *t, const pal_control *c)
     snprintf(t->text, sizeof t->text, "%s", t->refused ? c->error.text : c->answer.text);
     t->answered = true;
     t->answered_ns = pal_clock_ns();
-    trainee_tell(t);
+    client_report(t);
 }
 
 /* gives the next order when its time has come and the one before is done */
-static void trainee_order(pal_scripted_client *t, uint64_t now)
+static void client_order(pal_scripted_client *t, uint64_t now)
 {
     const pal_orders *orders = t->options.orders;
-    const trainee_part *part = &t->part[0];
+    const client_part *part = &t->part[0];
     if (!orders || t->order >= orders->n_line || t->asked || !t->cycle_seen || !part->seen) return;
     if ((double)(now - t->first_cycle_ns) * 1e-9 < orders->line[t->order].t_s) return;
     pal_control c = {.type = PAL_CONTROL_COMMAND};
@@ -179,57 +179,57 @@ static void trainee_order(pal_scripted_client *t, uint64_t now)
     t->gap_ms = 0;
 }
 
-static void trainee_decode(pal_scripted_client *t, uint32_t index, const uint8_t *bytes, size_t n_byte)
+static void client_decode(pal_scripted_client *t, uint32_t index, const uint8_t *bytes, size_t n_byte)
 {
-    trainee_part *part = &t->part[index];
+    client_part *part = &t->part[index];
     pal_frame_head head;
     const double start = pal_clock_s();
     const int refusal = pal_frame_get(part->asset->decoder, bytes, n_byte, &head, part->now_m);
     t->decode_s += pal_clock_s() - start;
     if (refusal) {
-        trainee_fault(t, PAL_FAULT_DECODE, "part %u: %s", index, pal_refusal_text(refusal));
+        client_fault(t, PAL_FAULT_DECODE, "part %u: %s", index, pal_refusal_text(refusal));
         return;
     }
     t->result.n_frame++;
     if (!part->seen) memcpy(part->first_m, part->now_m, (size_t)part->n_vertex * 3 * sizeof(float));
     part->seen = true;
-    trainee_measure(t, part);
-    trainee_tell(t);
+    client_measure(t, part);
+    client_report(t);
     /* q = 2 e / (1 + 1/16 + 1/64), protocol README "FRAME" */
     const double error = (double)head.q_m * (1 + 1.0 / 16 + 1.0 / 64) / 2;
     const double stated = t->error_m[index];
     if (stated > 0 && error > stated * 1.001) t->result.n_coarse++;
     if (stated > 0 && error > stated * COARSEST * 1.001)
-        trainee_fault(t, PAL_FAULT_BOUND, "part %u: %g m, stated %g m", index, error, stated);
+        client_fault(t, PAL_FAULT_BOUND, "part %u: %g m, stated %g m", index, error, stated);
 }
 
-static void trainee_frame(pal_scripted_client *t, const uint8_t *bytes, size_t n_byte)
+static void client_frame(pal_scripted_client *t, const uint8_t *bytes, size_t n_byte)
 {
     pal_frame_head head;
     const int refusal = pal_frame_get_head(bytes, n_byte, &head);
     if (refusal) {
-        trainee_fault(t, PAL_FAULT_DECODE, "head: %s", pal_refusal_text(refusal));
+        client_fault(t, PAL_FAULT_DECODE, "head: %s", pal_refusal_text(refusal));
         return;
     }
     if (head.part >= t->n_part) {
-        trainee_fault(t, PAL_FAULT_PART, "part %u of %u", head.part, t->n_part);
+        client_fault(t, PAL_FAULT_PART, "part %u of %u", head.part, t->n_part);
         return;
     }
-    trainee_part *part = &t->part[head.part];
+    client_part *part = &t->part[head.part];
     if (t->patched >= 0 && t->patched != (int)head.part)
-        trainee_fault(t, PAL_FAULT_PATCH, "of part %d, before a frame of part %u", t->patched, head.part);
+        client_fault(t, PAL_FAULT_PATCH, "of part %d, before a frame of part %u", t->patched, head.part);
     t->patched = -1;
     if (head.cycle > t->frame_cycle) t->frame_cycle = head.cycle;
     if (head.epoch < part->epoch && !part->seen && !part->n_kept) return; /* on its way when the topology changed */
     if (part->n_kept || part->seen) {
         if (head.epoch < part->epoch)
-            trainee_fault(t, PAL_FAULT_EPOCH, "epoch %u after %u", head.epoch, part->epoch);
+            client_fault(t, PAL_FAULT_EPOCH, "epoch %u after %u", head.epoch, part->epoch);
         else if (head.seq <= part->seq && head.epoch == part->epoch)
-            trainee_fault(t, PAL_FAULT_SEQ, "part %u: seq %u after %u", head.part, head.seq, part->seq);
+            client_fault(t, PAL_FAULT_SEQ, "part %u: seq %u after %u", head.part, head.seq, part->seq);
     }
     part->seq = head.seq;
     if (head.epoch == part->epoch && part->asset && part->asset->ready) {
-        trainee_decode(t, head.part, bytes, n_byte);
+        client_decode(t, head.part, bytes, n_byte);
         return;
     }
     uint8_t *kept = realloc(part->kept, n_byte);
@@ -239,7 +239,7 @@ static void trainee_frame(pal_scripted_client *t, const uint8_t *bytes, size_t n
     part->n_kept = n_byte;
 }
 
-static void trainee_latency(pal_scripted_client *t, const pal_wire_tool *own, uint64_t now_ns)
+static void client_latency(pal_scripted_client *t, const pal_wire_tool *own, uint64_t now_ns)
 {
     const double force = sqrt((double)own->force_N[0] * own->force_N[0] + (double)own->force_N[1] * own->force_N[1] +
                               (double)own->force_N[2] * own->force_N[2]);
@@ -250,7 +250,7 @@ static void trainee_latency(pal_scripted_client *t, const pal_wire_tool *own, ui
 }
 
 /* cycles that come right after a stall: the pose they show was sent before reading began again */
-static void trainee_after_stall(pal_scripted_client *t, const pal_wire_tool *own, uint64_t now_ns)
+static void client_after_stall(pal_scripted_client *t, const pal_wire_tool *own, uint64_t now_ns)
 {
     if (!t->result.stall_done || !own || own->echo_seq == 0) return;
     if ((double)(now_ns / 1000) - (double)own->echo_stamp_us > t->options.stall_s * 5e5 &&
@@ -258,22 +258,22 @@ static void trainee_after_stall(pal_scripted_client *t, const pal_wire_tool *own
         t->result.n_old_after_stall++;
 }
 
-static void trainee_tools(pal_scripted_client *t, const uint8_t *bytes, size_t n_byte)
+static void client_tools(pal_scripted_client *t, const uint8_t *bytes, size_t n_byte)
 {
     pal_wire_tools tools;
     const uint64_t now = pal_clock_ns();
     const int refusal = pal_wire_get_tools(bytes, n_byte, &tools);
     if (refusal) {
-        trainee_fault(t, PAL_FAULT_MALFORMED, "TOOLS: %s", pal_refusal_text(refusal));
+        client_fault(t, PAL_FAULT_MALFORMED, "TOOLS: %s", pal_refusal_text(refusal));
         return;
     }
     /* a cycle may come again, with the frames of another accuracy */
     if (t->cycle_seen && tools.cycle < t->cycle)
-        trainee_fault(t, PAL_FAULT_CYCLE, "cycle %u after %u", tools.cycle, t->cycle);
+        client_fault(t, PAL_FAULT_CYCLE, "cycle %u after %u", tools.cycle, t->cycle);
     /* a frame may have waited for credit, so its cycle may lie before the one that it came in, never behind */
     if (t->frame_cycle > tools.cycle)
-        trainee_fault(t, PAL_FAULT_CYCLE, "frame of cycle %u before cycle %u", t->frame_cycle, tools.cycle);
-    if (t->patched >= 0) trainee_fault(t, PAL_FAULT_PATCH, "of part %d, before the end of its cycle", t->patched);
+        client_fault(t, PAL_FAULT_CYCLE, "frame of cycle %u before cycle %u", t->frame_cycle, tools.cycle);
+    if (t->patched >= 0) client_fault(t, PAL_FAULT_PATCH, "of part %d, before the end of its cycle", t->patched);
     t->patched = -1;
     t->frame_cycle = 0;
     t->cycle = tools.cycle;
@@ -289,15 +289,15 @@ static void trainee_tools(pal_scripted_client *t, const uint8_t *bytes, size_t n
     t->result.n_cycle_since_topology += t->part[0].seen;
     const int tool = t->result.tool;
     const bool own = tool >= 0 && (uint32_t)tool < tools.n_tool && tools.tool[tool].holder == t->id;
-    if (own) trainee_latency(t, &tools.tool[tool], now);
-    trainee_after_stall(t, own ? &tools.tool[tool] : NULL, now);
+    if (own) client_latency(t, &tools.tool[tool], now);
+    client_after_stall(t, own ? &tools.tool[tool] : NULL, now);
     pal_samples_add(&t->result.decode_ms, t->decode_s * 1e3);
     const pal_wire_ack ack = {tools.cycle, (uint32_t)(t->decode_s * 1e6)};
     t->decode_s = 0;
     pal_link_send_ack(t->link, &ack);
 }
 
-static void trainee_patch(pal_scripted_client *t, const uint8_t *bytes, size_t n_byte)
+static void client_patch(pal_scripted_client *t, const uint8_t *bytes, size_t n_byte)
 {
     pal_topology_delta_head head;
     int refusal = pal_topology_delta_get_head(bytes, n_byte, &head);
@@ -309,16 +309,16 @@ static void trainee_patch(pal_scripted_client *t, const uint8_t *bytes, size_t n
     if (!refusal && head.epoch != t->part[head.part].epoch) refusal = PAL_REFUSAL_EPOCH;
     if (!refusal) refusal = pal_triangle_table_apply(&t->part[head.part].table, bytes, n_byte, &head);
     if (refusal) {
-        trainee_fault(t, PAL_FAULT_PATCH, "%s", pal_refusal_text(refusal));
+        client_fault(t, PAL_FAULT_PATCH, "%s", pal_refusal_text(refusal));
         return;
     }
-    if (t->patched >= 0) trainee_fault(t, PAL_FAULT_PATCH, "of part %d, before another", t->patched);
+    if (t->patched >= 0) client_fault(t, PAL_FAULT_PATCH, "of part %d, before another", t->patched);
     t->patched = (int)head.part;
     t->result.n_patch++;
     t->result.patch_bytes += n_byte;
 }
 
-static void trainee_field(pal_scripted_client *t, const uint8_t *bytes, size_t n_byte)
+static void client_field(pal_scripted_client *t, const uint8_t *bytes, size_t n_byte)
 {
     pal_field_head head;
     int refusal = pal_field_get_head(bytes, n_byte, &head);
@@ -331,7 +331,7 @@ static void trainee_field(pal_scripted_client *t, const uint8_t *bytes, size_t n
     if (level) refusal = pal_field_get(bytes, n_byte, t->part[head.part].n_vertex, &head, level);
     free(level);
     if (refusal) {
-        trainee_fault(t, PAL_FAULT_FIELD, "%s", pal_refusal_text(refusal));
+        client_fault(t, PAL_FAULT_FIELD, "%s", pal_refusal_text(refusal));
         return;
     }
     pal_scripted_client_result *r = &t->result;
@@ -347,7 +347,7 @@ static void trainee_field(pal_scripted_client *t, const uint8_t *bytes, size_t n
 }
 
 /* asks for the field of every part that gives it; a server of before fields is asked for nothing */
-static void trainee_look(pal_scripted_client *t, const pal_wire_part_info *info, uint32_t n_part)
+static void client_subscribe(pal_scripted_client *t, const pal_wire_part_info *info, uint32_t n_part)
 {
     for (uint32_t i = 0; i < n_part && t->options.field; i++) {
         t->part[i].looks = false;
@@ -357,45 +357,45 @@ static void trainee_look(pal_scripted_client *t, const pal_wire_part_info *info,
         pal_control ask = {.type = PAL_CONTROL_SUBSCRIBE_FIELD, .field_subscription = {.part = i}};
         snprintf(ask.field_subscription.field, sizeof ask.field_subscription.field, "%s", t->options.field);
         t->result.field_given = true;
-        if (pal_link_send_control(t->link, &ask)) trainee_fault(t, PAL_FAULT_FIELD, "it cannot be asked for");
+        if (pal_link_send_control(t->link, &ask)) client_fault(t, PAL_FAULT_FIELD, "it cannot be asked for");
     }
 }
 
-static void trainee_on_message(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes,
-                               size_t n_byte)
+static void client_on_message(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes,
+                              size_t n_byte)
 {
     (void)link;
     pal_scripted_client *t = user;
     pal_wire_haptic haptic;
-    if (head->kind == PAL_WIRE_FRAME) trainee_frame(t, bytes, n_byte);
-    if (head->kind == PAL_WIRE_TOOLS) trainee_tools(t, bytes, n_byte);
-    if (head->kind == PAL_WIRE_FIELD) trainee_field(t, bytes, n_byte);
-    if (head->kind == PAL_WIRE_TOPOLOGY_DELTA) trainee_patch(t, bytes, n_byte);
+    if (head->kind == PAL_WIRE_FRAME) client_frame(t, bytes, n_byte);
+    if (head->kind == PAL_WIRE_TOOLS) client_tools(t, bytes, n_byte);
+    if (head->kind == PAL_WIRE_FIELD) client_field(t, bytes, n_byte);
+    if (head->kind == PAL_WIRE_TOPOLOGY_DELTA) client_patch(t, bytes, n_byte);
     if (head->kind == PAL_WIRE_HAPTIC && pal_wire_get_haptic(bytes, n_byte, &haptic))
-        trainee_fault(t, PAL_FAULT_MALFORMED, "HAPTIC");
+        client_fault(t, PAL_FAULT_MALFORMED, "HAPTIC");
 }
 
 /* the table of a part that adapts begins at its asset again, with every connection */
-static void trainee_table(pal_scripted_client *t, const pal_wire_part_info *info, uint32_t i)
+static void client_table(pal_scripted_client *t, const pal_wire_part_info *info, uint32_t i)
 {
-    trainee_part *part = &t->part[i];
+    client_part *part = &t->part[i];
     pal_triangle_table_free(&part->table);
     part->is_adaptive = info->is_adaptive;
     if (!info->is_adaptive) return;
     const pal_err err = pal_triangle_table_init(&part->table, info->n_triangle, info->n_vertex);
-    if (err) trainee_fault(t, PAL_FAULT_PATCH, "part %u of %u places: %s", i, info->n_triangle, pal_err_text(err));
+    if (err) client_fault(t, PAL_FAULT_PATCH, "part %u of %u places: %s", i, info->n_triangle, pal_err_text(err));
 }
 
 /* parts as hello or topology name them; buffers follow */
-static void trainee_parts(pal_scripted_client *t, const pal_wire_part_info *info, uint32_t n_part)
+static void client_parts(pal_scripted_client *t, const pal_wire_part_info *info, uint32_t n_part)
 {
     t->n_part = n_part;
     for (uint32_t i = 0; i < n_part; i++) {
-        trainee_part *part = &t->part[i];
+        client_part *part = &t->part[i];
         t->error_m[i] = info[i].error_m;
         snprintf(part->name, sizeof part->name, "%s", info[i].name);
         part->asset = pal_asset_store_request(t->store, info[i].asset);
-        trainee_table(t, &info[i], i);
+        client_table(t, &info[i], i);
         if (part->now_m && part->epoch == info[i].epoch && part->n_vertex == info[i].n_vertex) continue;
         free(part->now_m);
         free(part->first_m);
@@ -414,7 +414,7 @@ static void trainee_parts(pal_scripted_client *t, const pal_wire_part_info *info
             pal_scripted_client_asset_changed(t, t->part[i].asset);
 }
 
-static void trainee_hello(pal_scripted_client *t, const pal_wire_hello *hello)
+static void client_hello(pal_scripted_client *t, const pal_wire_hello *hello)
 {
     t->id = hello->you_id;
     t->result.tool = hello->you_tool;
@@ -444,22 +444,22 @@ static void trainee_hello(pal_scripted_client *t, const pal_wire_hello *hello)
         if (pal_script_load(&t->script, t->options.script, radius, depth, &diag)) return;
         t->script_made = true;
     }
-    trainee_parts(t, hello->part, hello->n_part);
-    trainee_look(t, hello->part, t->n_part);
+    client_parts(t, hello->part, hello->n_part);
+    client_subscribe(t, hello->part, t->n_part);
 }
 
-static void trainee_on_control(void *user, pal_link *link, const pal_control *c)
+static void client_on_control(void *user, pal_link *link, const pal_control *c)
 {
     (void)link;
     pal_scripted_client *t = user;
-    if (c->type == PAL_CONTROL_HELLO) trainee_hello(t, &c->hello);
+    if (c->type == PAL_CONTROL_HELLO) client_hello(t, &c->hello);
     if (c->type == PAL_CONTROL_TOPOLOGY) {
         t->result.n_topology++;
         t->result.n_cycle_since_topology = 0;
         t->reshaped = true;
-        trainee_parts(t, c->topology.part, c->topology.n_part);
+        client_parts(t, c->topology.part, c->topology.n_part);
     }
-    if (c->type == PAL_CONTROL_ANSWER || c->type == PAL_CONTROL_ERROR) trainee_answered(t, c);
+    if (c->type == PAL_CONTROL_ANSWER || c->type == PAL_CONTROL_ERROR) client_answered(t, c);
     if (c->type == PAL_CONTROL_MEMBERS) {
         t->result.n_member = c->members.n_member;
         for (uint32_t i = 0; i < c->members.n_member; i++)
@@ -467,7 +467,7 @@ static void trainee_on_control(void *user, pal_link *link, const pal_control *c)
     }
 }
 
-static void trainee_on_state(void *user, pal_link *link, pal_link_state state, int code, const char *reason)
+static void client_on_state(void *user, pal_link *link, pal_link_state state, int code, const char *reason)
 {
     (void)link;
     pal_scripted_client *t = user;
@@ -475,40 +475,40 @@ static void trainee_on_state(void *user, pal_link *link, pal_link_state state, i
     snprintf(t->result.closed, sizeof t->result.closed, "%d %.150s", code, reason);
     if (state == PAL_LINK_ENDED) {
         t->ended = true;
-        trainee_fault(t, PAL_FAULT_CLOSED, "%d %.120s", code, reason);
+        client_fault(t, PAL_FAULT_CLOSED, "%d %.120s", code, reason);
     }
 }
 
-static void trainee_on_fault(void *user, pal_link *link, int refusal)
+static void client_on_fault(void *user, pal_link *link, int refusal)
 {
     (void)link;
-    trainee_fault(user, PAL_FAULT_MALFORMED, "%s", pal_refusal_text(refusal));
+    client_fault(user, PAL_FAULT_MALFORMED, "%s", pal_refusal_text(refusal));
 }
 
 void pal_scripted_client_asset_changed(pal_scripted_client *t, const pal_stored_asset *asset)
 {
     for (uint32_t i = 0; i < t->n_part; i++) {
-        trainee_part *part = &t->part[i];
+        client_part *part = &t->part[i];
         if (part->asset != asset) continue;
         if (asset->failed || asset->asset->order->n_vertex != part->n_vertex) {
-            trainee_fault(t, PAL_FAULT_ASSET, "%s: %s", asset->path, asset->failed ? asset->reason : "vertex count");
+            client_fault(t, PAL_FAULT_ASSET, "%s: %s", asset->path, asset->failed ? asset->reason : "vertex count");
             continue;
         }
         if (part->is_adaptive && pal_triangle_table_set_base(&part->table, asset->asset))
-            trainee_fault(t, PAL_FAULT_ASSET, "%s: another table of triangles", asset->path);
+            client_fault(t, PAL_FAULT_ASSET, "%s: another table of triangles", asset->path);
         t->result.asset_bytes += asset->n_byte;
-        if (i == 0 && !t->has_place) trainee_place(t);
+        if (i == 0 && !t->has_place) client_place(t);
         if (part->n_kept) {
             pal_frame_head head;
             if (!pal_frame_get_head(part->kept, part->n_kept, &head) && head.epoch == part->epoch)
-                trainee_decode(t, i, part->kept, part->n_kept);
+                client_decode(t, i, part->kept, part->n_kept);
             part->n_kept = 0;
         }
     }
 }
 
 /* the stall: one second after the first cycle nothing is read for stall_s */
-static void trainee_stall(pal_scripted_client *t, uint64_t now)
+static void client_stall(pal_scripted_client *t, uint64_t now)
 {
     if (!(t->options.stall_s > 0) || t->first_cycle_ns == 0 || t->result.stall_done) return;
     if (!t->stalled && now - t->first_cycle_ns > 1000000000) {
@@ -523,12 +523,12 @@ static void trainee_stall(pal_scripted_client *t, uint64_t now)
     }
 }
 
-static void trainee_tick(void *user)
+static void client_tick(void *user)
 {
     pal_scripted_client *t = user;
     const uint64_t now = pal_clock_ns();
-    trainee_stall(t, now);
-    trainee_order(t, now);
+    client_stall(t, now);
+    client_order(t, now);
     if (!t->script_made || t->script.idle || !t->has_place || t->result.tool < 0) return;
     if (!t->start_ns) t->start_ns = now;
     double offset[3];
@@ -549,7 +549,7 @@ pal_err pal_scripted_client_open(pal_link_loop *loop, pal_asset_store *store,
                                  const pal_scripted_client_options *options, pal_diagnostic *diag,
                                  pal_scripted_client **out)
 {
-    static const pal_link_events events = {trainee_on_state, trainee_on_control, trainee_on_message, trainee_on_fault};
+    static const pal_link_events events = {client_on_state, client_on_control, client_on_message, client_on_fault};
     pal_scripted_client *t = calloc(1, sizeof *t);
     if (!t) return PAL_ERR_MEMORY;
     t->loop = loop;
@@ -572,7 +572,7 @@ pal_err pal_scripted_client_open(pal_link_loop *loop, pal_asset_store *store,
                                    .events = &events,
                                    .user = t};
     if (!err) err = pal_link_open(loop, &link, diag, &t->link);
-    if (!err) t->timer = pal_link_add_timer(loop, (uint64_t)(1e6 / options->rate_hz), trainee_tick, t);
+    if (!err) t->timer = pal_link_add_timer(loop, (uint64_t)(1e6 / options->rate_hz), client_tick, t);
     if (!err && !t->timer) err = PAL_ERR_MEMORY;
     if (err) {
         pal_link_close(t->link);

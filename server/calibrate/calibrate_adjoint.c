@@ -38,7 +38,7 @@ static void stop(fit *f, const char *reason)
     if (f->opt) nlopt_force_stop(f->opt);
 }
 
-static void tell(fit *f, const double *theta, double error_percent, bool improved)
+static void report_step(fit *f, const double *theta, double error_percent, bool improved)
 {
     const pal_fit_options *o = f->o;
     pal_fit_step step = {.evaluation = f->out->n_evaluation - 1,
@@ -73,7 +73,7 @@ static double evaluate(fit *f, const double *theta, double *slope)
         f->best_objective = v.objective;
         f->best_percent = v.error_percent;
     }
-    tell(f, theta, rests ? v.error_percent : DBL_MAX, improved);
+    report_step(f, theta, rests ? v.error_percent : DBL_MAX, improved);
     return rests ? v.objective : DBL_MAX;
 }
 

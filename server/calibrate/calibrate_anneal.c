@@ -120,7 +120,7 @@ static pal_err evaluate(void *user, const double *p, int n, double *cost)
 }
 
 /* reports a step of the walk to the caller; false: stop */
-static bool tell(void *user, const pal_anneal_step *at)
+static bool report_step(void *user, const pal_anneal_step *at)
 {
     fit *f = user;
     const pal_fit_options *o = f->o;
@@ -159,7 +159,7 @@ static pal_err walk(fit *f, double *theta, pal_diagnostic *diag)
     a.min_temperature_ratio = COLDEST;
     a.stall = MAX_STALL;
     a.evaluate = evaluate;
-    a.step = tell;
+    a.step = report_step;
     a.user = f;
     make_box(f, theta);
     pal_err err = pal_anneal(&a, f->shown, &r, &reason);

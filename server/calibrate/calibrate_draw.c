@@ -313,9 +313,9 @@ pal_err pal_calibrate_draw_body(const pal_calibrate_run *run, const char *path, 
 
 pal_err pal_calibrate_write_vtk(const pal_calibrate_run *run, const char *path, pal_diagnostic *diag)
 {
-    enum { MOST = PAL_SPRING_KINDS + 2 * PAL_CALIBRATE_CASES };
-    pal_vtk_field field[MOST];
-    char name[MOST][PAL_NAME + 16];
+    enum { MAX_FIELDS = PAL_SPRING_KINDS + 2 * PAL_CALIBRATE_CASES };
+    pal_vtk_field field[MAX_FIELDS];
+    char name[MAX_FIELDS][PAL_NAME + 16];
     const pal_tets *t = &run->info.mesh->tets;
     size_t n = (size_t)t->n_node;
     int n_field = 0;

@@ -141,14 +141,15 @@ static double compare(const pal_calibration *c, const pal_fit_case *fit, const d
 }
 
 /* Equilibrium of a case, from the requested start, otherwise from the undeformed body. */
-static pal_err find_rest(pal_calibration_workspace *s, int index, bool go_on, pal_equilibrium_options *o, int *n_newton)
+static pal_err find_rest(pal_calibration_workspace *s, int index, bool warm_start, pal_equilibrium_options *o,
+                         int *n_newton)
 {
     const pal_calibration *c = s->calibration;
     const pal_fit_case *fit = &c->fit[index];
     const double *const k[PAL_SPRING_KINDS] = {s->k[0], s->k[1], s->k[2]};
     size_t n = 3 * sizeof(double) * (size_t)c->lattice.n_node;
     pal_equilibrium_report report;
-    if (!(go_on && s->rests[index])) memcpy(s->x[index], fit->x_start, n);
+    if (!(warm_start && s->rests[index])) memcpy(s->x[index], fit->x_start, n);
     pal_err err = pal_equilibrium(s->workspace, k, fit->force_N, o, s->x[index], &report, NULL);
     *n_newton += report.n_newton;
     if (err == PAL_ERR_NUMERIC && !o->linear) {

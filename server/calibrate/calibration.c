@@ -186,7 +186,7 @@ static pal_err make_loads(const job *j, int index)
 
 /* ---- truths ---- */
 
-static bool say(const pal_calibration *c, const char *what, double fraction)
+static bool report_progress(const pal_calibration *c, const char *what, double fraction)
 {
     return !c->options.progress || c->options.progress(what, fraction, c->options.user);
 }
@@ -255,7 +255,7 @@ static pal_err make_truth(const job *j, int index)
     pal_fit_case *fit = &c->fit[index];
     const pal_calibrate_case *k = &c->cases[index];
     fit->linear = k->linear;
-    if (!say(c, "truth", (double)index / c->n_case))
+    if (!report_progress(c, "truth", (double)index / c->n_case))
         return pal_diagnostic_set(j->diag, PAL_ERR_STATE, "stopped before the truth of \"%s\"", k->load_case->id);
     PAL_TRY(k->samples ? truth_by_samples(j, index) : truth_by_elements(j, index));
     for (int i = 0; i < fit->n_point; i++) fit->max_m = fmax(fit->max_m, pal_norm3(fit->u + 3 * i));

@@ -18,7 +18,7 @@ void pal_settle_default(pal_settle_options *options)
     *options = (pal_settle_options){.max_simulated_s = 60, .max_work = 1.5e9};
 }
 
-static bool say(const pal_settle_options *options, const char *what, double fraction)
+static bool report_progress(const pal_settle_options *options, const char *what, double fraction)
 {
     return !options->progress || options->progress(what, fraction, options->user);
 }
@@ -97,7 +97,7 @@ pal_err pal_settle(pal_world *world, double step_s, const pal_settle_load *load,
             if (err) return pal_diagnostic_set(diag, err, "no memory for the loads of a live run");
         }
     while (!out->steady && time<options->max_simulated_s && * work> 0) {
-        if (!say(options, "live body comes to rest", time / options->max_simulated_s))
+        if (!report_progress(options, "live body comes to rest", time / options->max_simulated_s))
             return pal_diagnostic_set(diag, PAL_ERR_STATE, "stopped while the live body was coming to rest");
         if (pal_world_step(world, step_s) || body->frozen) break;
         time += step_s;

@@ -109,7 +109,7 @@ static void look_ahead(pal_estimation *w, pal_estimate *out)
 }
 
 /* Measures once the body's own method on the coarse mesh and on this one, under the same loads. */
-static void price_size(pal_estimation *w)
+static void measure_size_cost(pal_estimation *w)
 {
     pal_world *small = NULL;
     if (w->measured || !w->coarse.world) return;
@@ -134,7 +134,7 @@ static void price_size(pal_estimation *w)
 
 /* ---- equilibria ---- */
 
-static void tell(pal_estimate *out, const char *text)
+static void add_remark(pal_estimate *out, const char *text)
 {
     size_t n = strlen(out->diag);
     snprintf(out->diag + n, sizeof out->diag - n, "%s%s", n > 0 ? "; " : "", text);
@@ -194,7 +194,7 @@ static void discretise(pal_estimation *w, const pal_body *body, pal_estimate *ou
     if (!pal_zz_estimator_estimate(w->fine.world, 0, NULL, &zz_estimator, NULL))
         out->energy_error_percent = zz_estimator.percent;
     if (!pal_rest_solution_find(&w->coarse, &w->state, body, NULL, w->stop)) {
-        if (w->coarse.world) tell(out, "discretisation: the coarser mesh finds no rest under these loads");
+        if (w->coarse.world) add_remark(out, "discretisation: the coarser mesh finds no rest under these loads");
         return;
     }
     double last = w->shown.n > 0 ? pal_display_error_change(&w->shown, PAL_DISPLAY_FINE, PAL_DISPLAY_COARSE)
@@ -207,7 +207,7 @@ static void discretise(pal_estimation *w, const pal_body *body, pal_estimate *ou
     if (w->cut) {
         char text[80];
         pal_estimate_hierarchy_describe(f, fresh, text, sizeof text);
-        tell(out, text);
+        add_remark(out, text);
     }
     if (f->known) {
         w->prediction.order = pal_usual_order;
@@ -216,7 +216,7 @@ static void discretise(pal_estimation *w, const pal_body *body, pal_estimate *ou
     }
     bool early = changes_grow(w, body, last);
     w->prediction.order = early ? pal_early_order : pal_usual_order;
-    if (early) tell(out, "discretisation: still grows from mesh to mesh, so more may be left");
+    if (early) add_remark(out, "discretisation: still grows from mesh to mesh, so more may be left");
     out->discretisation_m = last / (exp2(w->prediction.order) - 1) + skin_off(w);
 }
 
@@ -233,7 +233,7 @@ static void compare_fitted(pal_estimation *w, pal_estimate *out)
         max = fmax(max, pal_dist3(w->state.x + i, limit));
     }
     out->model_m = max, out->discretisation_m = 0;
-    tell(out, "fitted: the mesh's part is in the model's");
+    add_remark(out, "fitted: the mesh's part is in the model's");
 }
 
 static void compare_models(pal_estimation *w, const pal_body *body, pal_estimate *out)
@@ -267,7 +267,7 @@ static void find_rests(pal_estimation *w, pal_estimate *out)
     }
     if (!find_borne(w) || !pal_rest_solution_find(&w->fine, &w->state, body, w->state.x, w->stop)) {
         out->locking = false;
-        tell(out, "no rest was found under these loads");
+        add_remark(out, "no rest was found under these loads");
         return;
     }
     discretise(w, body, out);
@@ -290,13 +290,13 @@ static void sum_up(const pal_estimation *w, pal_estimate *out)
 }
 
 /* a sleeping body costs almost nothing: measures the cost of an awake step */
-static void price_sleep(pal_estimation *w, pal_estimate *out)
+static void report_sleep_cost(pal_estimation *w, pal_estimate *out)
 {
     if (!w->state.asleep) return;
     if (isnan(out->ms) && !w->awake_ms) (void)go_ahead(w, w->live, TIMED, w->scene->step_s, w->first, &w->awake_ms);
     if (isnan(out->ms)) out->ms = w->awake_ms;
     out->asleep = true;
-    tell(out, PAL_ESTIMATE_ASLEEP);
+    add_remark(out, PAL_ESTIMATE_ASLEEP);
 }
 
 /* the steps of a body at its initial shape contain only rounding */
@@ -320,12 +320,12 @@ bool pal_estimation_run(pal_estimation *w, pal_estimate *out)
                           .energy_error_percent = NAN,
                           .ms = middle(&w->state, ms_of)};
     memcpy(out->diag, w->diag, sizeof out->diag);
-    price_sleep(w, out);
+    report_sleep_cost(w, out);
     look_ahead(w, out);
     drop_rounding(w, out);
     if (!pal_estimate_stopped(w)) find_rests(w, out);
     sum_up(w, out);
-    if (!pal_estimate_stopped(w)) price_size(w);
+    if (!pal_estimate_stopped(w)) measure_size_cost(w);
     w->prediction.n_substep = w->state.n_substep;
     w->prediction.other_substeps = ceil(w->scene->step_s / w->state.other_limit_s * (1 - 1e-12));
     w->prediction.once = w->state.n_cost ? middle(&w->state, once_of) : 0;

@@ -103,7 +103,7 @@ static pal_err make_live(pal_estimation *w, pal_diagnostic *diag)
 
 /* ---- equilibria ---- */
 
-static void say(pal_estimation *w, const char *text)
+static void add_remark(pal_estimation *w, const char *text)
 {
     size_t n = strlen(w->diag);
     snprintf(w->diag + n, sizeof w->diag - n, "%s%s", n > 0 ? "; " : "", text);
@@ -170,7 +170,7 @@ static pal_err make_rests(pal_estimation *w)
     pal_diagnostic diag = {""};
     w->springs = !strcmp(def->model.name, "tet_springs");
     if (!w->springs && strcmp(def->model.name, "fem")) {
-        say(w, "discretisation and model: not known of control cells");
+        add_remark(w, "discretisation and model: not known of control cells");
         return PAL_ERR_OK;
     }
     if (w->springs) find_voxels(w);
@@ -180,12 +180,12 @@ static pal_err make_rests(pal_estimation *w)
     w->locks = (!strcmp(is, "tet4") || !strcmp(is, "hex8")) && nearly_incompressible(def);
     pal_err err = pal_rest_solution_make(w->scene, body, element, law, &diag, &w->fine);
     if (err) {
-        say(w, diag.text);
+        add_remark(w, diag.text);
         return err == PAL_ERR_MEMORY ? err : PAL_ERR_OK;
     }
     if (pal_estimate_stopped(w)) return PAL_ERR_STATE;
     err = pal_rest_solution_coarser(w->scene, body, element, law, &diag, &w->coarse);
-    if (err) say(w, diag.text);
+    if (err) add_remark(w, diag.text);
     if (pal_estimate_stopped(w)) return PAL_ERR_STATE;
     w->cut = !err && cut_share(&def->mesh->hexes) > much_cut;
     w->thin = !err && hexes && is_thin(&def->mesh->tets);
@@ -195,7 +195,7 @@ static pal_err make_rests(pal_estimation *w)
     if (w->skinned) PAL_TRY(pal_display_error_make(&w->fine, &w->coarse, &w->coarsest, &w->shown));
     bool neo = !strcmp(pal_estimate_model_text(def, "law", ""), "neo_hookean");
     if (!w->springs && !neo && pal_rest_solution_make(w->scene, body, NULL, "neo_hookean", &diag, &w->model))
-        say(w, diag.text);
+        add_remark(w, diag.text);
     return PAL_ERR_OK;
 }
 

@@ -23,7 +23,7 @@ static void method_text(const pal_configuration *s, char out[PAL_WIRE_METHOD_BYT
     pal_plain_text(out, PAL_WIRE_METHOD_BYTES, text);
 }
 
-static void say_study(pal_hub *hub, pal_client *c, int body)
+static void send_study(pal_hub *hub, pal_client *c, int body)
 {
     const pal_hub_room *room = c->room;
     pal_wire_study *study = &hub->control->study;
@@ -136,7 +136,7 @@ static double known(double value)
 }
 
 /* cost of the steps that replace one step of the opened scene: comparable across step lengths */
-static double price(const pal_hub_room *room, double ms, double step_s)
+static double step_cost_ms(const pal_hub_room *room, double ms, double step_s)
 {
     return isfinite(ms) && step_s > 0 ? ms * room->step_s / step_s : NAN;
 }
@@ -150,7 +150,7 @@ static void put_neighbour(const pal_hub_room *room, const pal_measured_configura
     bool step = s->step_s > 0 && fabs(s->step_s - now->step_s) > 1e-9;
     bool tolerance = s->tolerance > 0 && s->tolerance != now->tolerance;
     bool method = strcmp(s->model, now->model) || strcmp(s->element, now->element) || strcmp(s->law, now->law);
-    *to = (pal_wire_neighbour){.cost_ms = price(room, from->ms, now->step_s), .error_m = known(from->error_m)};
+    *to = (pal_wire_neighbour){.cost_ms = step_cost_ms(room, from->ms, now->step_s), .error_m = known(from->error_m)};
     if (s->size > 0 && s->size != now->size) to->size = (uint32_t)s->size;
     if (step) to->step_ms = 1e3 * s->step_s;
     if (tolerance) to->tolerance = s->tolerance;
@@ -169,7 +169,7 @@ static void put_estimate(const pal_hub_room *room, const pal_estimate *from, con
     to->tick = from->tick, to->age_s = from->age_s;
     to->time_s = isfinite(from->time_s) ? from->time_s : 0;
     to->estimate_ms = isfinite(from->estimate_ms) ? from->estimate_ms : 0;
-    if (isfinite(from->ms) && from->ms > 0) to->cost_ms = price(room, from->ms, now->step_s);
+    if (isfinite(from->ms) && from->ms > 0) to->cost_ms = step_cost_ms(room, from->ms, now->step_s);
     to->max_displacement_m = known(from->max_m), to->error_m = known(from->error_m);
     to->discretisation_m = known(from->discretisation_m), to->algebraic_m = known(from->algebraic_m);
     to->time_m = known(from->time_m), to->model_m = known(from->model_m),
@@ -181,7 +181,7 @@ static void put_estimate(const pal_hub_room *room, const pal_estimate *from, con
 }
 
 /* the study covers the scene's own loads; a larger displacement can exceed the tolerance, which is reported once */
-static void tell_far(pal_hub_room *room, const pal_wire_estimate *e)
+static void report_far(pal_hub_room *room, const pal_wire_estimate *e)
 {
     double asked = pal_session_scene(room->session)->max_error_m;
     if (room->reported_far || !(asked > 0) || !(e->error_m > asked)) return;
@@ -211,11 +211,11 @@ pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *c)
     const pal_frame *f = c->room->stream->frame;
     bool awake = !f || b >= f->n_part || !f->part[b].asleep;
     bool known_ms = awake && c->room->stream->step_ms > 0;
-    out->cost_ms = known_ms ? price(c->room, c->room->stream->step_ms, now.step_s) : NAN;
+    out->cost_ms = known_ms ? step_cost_ms(c->room, c->room->stream->step_ms, now.step_s) : NAN;
     out->age_s = out->max_displacement_m = out->error_m = out->discretisation_m = out->algebraic_m = out->time_m =
         out->model_m = out->energy_error_percent = NAN;
     if (pal_session_estimate(c->room->session, b, &estimate)) put_estimate(c->room, &estimate, &now, out);
-    tell_far(c->room, out);
+    report_far(c->room, out);
     return pal_hub_encode(hub, hub->control);
 }
 
@@ -239,7 +239,7 @@ void pal_hub_run_estimate(pal_hub *hub, pal_client *c, const pal_verb *verb, con
     bool wanted = pal_hub_arg(command, "enabled", 0) != 0, before = c->estimate[body];
     pal_hub_set_estimate(c, body, wanted);
     pal_hub_update_subscriptions(c->room);
-    if (wanted && !before) say_study(hub, c, body);
+    if (wanted && !before) send_study(hub, c, body);
     c->estimate_due[body] = wanted;
     c->peer->ops->ready(c->peer);
 }

@@ -12,7 +12,7 @@
 
 #include <string.h>
 
-#define SCOLD_NS 1000000000u
+#define POSE_ERROR_INTERVAL_NS 1000000000u
 
 static void malformed(pal_hub *hub, pal_client *c, int refusal)
 {
@@ -47,7 +47,7 @@ static void explain_take(pal_hub *hub, pal_client *c, int wanted, pal_err err)
         pal_hub_send_error(hub, c, "tool", "there is no tool %d", wanted);
 }
 
-static void say_hello(pal_hub *hub, pal_client *c)
+static void send_hello(pal_hub *hub, pal_client *c)
 {
     const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
     pal_wire_hello *hello = &hub->control->hello;
@@ -86,7 +86,7 @@ static void join(pal_hub *hub, pal_client *c, const pal_wire_join *wanted)
     /* hello names the granted tool; a refusal follows it */
     pal_err err = PAL_ERR_OK;
     if (wanted->tool != PAL_WIRE_TOOL_NONE && wanted->role != PAL_WIRE_ROLE_VIEWER) err = take_tool(c, wanted->tool);
-    say_hello(hub, c);
+    send_hello(hub, c);
     if (err && c->id) explain_take(hub, c, wanted->tool, err);
     pal_hub_members_changed(hub, room);
 }
@@ -166,7 +166,8 @@ static void pose(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_byt
     const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
     if (m->tool < 0 || m->tool != w.tool) {
         hub->count.n_pose_ignored++;
-        if (m->role == PAL_MEMBER_VIEWER && (c->pose_error_ns == 0 || now - c->pose_error_ns > SCOLD_NS)) {
+        if (m->role == PAL_MEMBER_VIEWER &&
+            (c->pose_error_ns == 0 || now - c->pose_error_ns > POSE_ERROR_INTERVAL_NS)) {
             c->pose_error_ns = now;
             pal_hub_send_error(hub, c, "role", "a viewer moves no tool");
         }

@@ -49,7 +49,7 @@ void pal_hub_topology_components(const pal_hub_room *room, pal_wire_topology *ou
 
 /* Components of the opened plan that the running plan lacks are disabled; the running plan may have others (fields,
  * brushes). Both lists have the order of the plan. */
-static void tell_rows(const pal_hub_room *room, const pal_frame *f, pal_wire_status *w)
+static void report_components(const pal_hub_room *room, const pal_frame *f, pal_wire_status *w)
 {
     int n = pal_session_component_count(room->session), n_found = 0;
     bool same = n == f->n_row && !room->own;
@@ -76,7 +76,7 @@ static void tell_rows(const pal_hub_room *room, const pal_frame *f, pal_wire_sta
 
 void pal_hub_status_plan(const pal_hub_room *room, const pal_frame *f, pal_wire_status *w)
 {
-    tell_rows(room, f, w);
+    report_components(room, f, w);
     for (int p = 0; p < f->n_part && p < PAL_WIRE_PART_MAX; p++) {
         const pal_frame_part *part = &f->part[p];
         pal_wire_part_state *to = &w->state[w->n_state];

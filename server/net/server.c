@@ -1,4 +1,4 @@
-/* Connects loop, hub and transports. */
+/* The server puts loop, hub and transport together. */
 #include "server/net/server.h"
 
 #include "server/base/clock.h"
@@ -14,7 +14,7 @@
 
 #define GOODBYE_NS 500000000u
 
-/* users counts the threads inside wake; disconnecting waits for them, wake never waits */
+/* users counts the threads inside wake: disconnecting waits for them, wake waits for nobody */
 struct pal_server_gate {
     _Atomic(pal_loop *) loop;
     _Atomic int users;
@@ -24,7 +24,7 @@ struct pal_server {
     pal_loop *loop;
     pal_hub *hub;
     pal_site *site;
-    const pal_transport_ops *road;
+    const pal_transport_ops *ops;
     pal_transport *transport;
     pal_server_gate *gate;
 };
@@ -52,7 +52,7 @@ void pal_server_connect(pal_server *server, pal_server_gate *gate)
 {
     server->gate = gate;
     atomic_store(&gate->loop, server->loop);
-    /* for frames published before the gate was connected */
+    /* frames published before */
     pal_loop_wake(server->loop);
 }
 
@@ -70,7 +70,7 @@ static bool is_loopback(const char *listen)
     return inet_pton(AF_INET, listen, &v4) == 1 && ntohl(v4.s_addr) >> 24 == 127;
 }
 
-/* a numeric IPv4 or IPv6 address; host names and ports are not accepted */
+/* an address alone: names of hosts and ports behind a colon are none */
 static bool is_address(const char *listen)
 {
     unsigned char bytes[sizeof(struct in6_addr)];
@@ -109,11 +109,11 @@ static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_
     hub.setting_body = options->setting_body;
     hub.reference_m = options->reference_m;
     hub.verb = options->verb, hub.n_verb = options->n_verb;
-    /* in addition to clients: page loads, and descriptors of lws itself */
-    PAL_TRY(pal_loop_create(s->road == &pal_ws_transport, hub.max_clients + 128, diag, &s->loop));
+    /* besides the clients: page loads, and what lws needs itself */
+    PAL_TRY(pal_loop_create(s->ops == &pal_ws_transport, hub.max_clients + 128, diag, &s->loop));
     PAL_TRY(pal_hub_create(s->loop, &hub, session, n_session, diag, &s->hub));
     pal_hub_events(s->hub, &events);
-    return s->road->open(s->loop, url, &events, diag, &s->transport);
+    return s->ops->open(s->loop, url, &events, diag, &s->transport);
 }
 
 pal_err pal_server_open(const pal_server_options *options, pal_session **session, int n_session, pal_diagnostic *diag,
@@ -122,8 +122,8 @@ pal_err pal_server_open(const pal_server_options *options, pal_session **session
     if (n_session < 1) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "a server needs a session");
     pal_server *s = calloc(1, sizeof *s);
     if (!s) return PAL_ERR_MEMORY;
-    s->road =
-        options->road && !strcmp(options->road, pal_mem_transport.scheme) ? &pal_mem_transport : &pal_ws_transport;
+    s->ops = options->transport && !strcmp(options->transport, pal_mem_transport.scheme) ? &pal_mem_transport
+                                                                                         : &pal_ws_transport;
     pal_err err = open_parts(s, options, session, n_session, diag);
     if (err) return pal_server_close(s), err;
     *out = s;
@@ -134,7 +134,7 @@ pal_err pal_server_run(pal_server *server)
 {
     pal_err err = pal_loop_run(server->loop);
     if (err) return err;
-    /* notifies the clients; connections still open after GOODBYE_NS are abandoned */
+    /* clients are told why; those that do not listen are left after GOODBYE_NS */
     uint64_t end = pal_clock_ns() + GOODBYE_NS;
     pal_hub_goodbye(server->hub);
     while (pal_hub_clients(server->hub) && pal_clock_ns() < end) pal_loop_step(server->loop, end);
@@ -148,7 +148,7 @@ void pal_server_stop(pal_server *server)
 
 int pal_server_port(const pal_server *server)
 {
-    return server->road->port(server->transport);
+    return server->ops->port(server->transport);
 }
 
 void pal_server_close(pal_server *server)
@@ -156,7 +156,7 @@ void pal_server_close(pal_server *server)
     if (!server) return;
     disconnect(server);
     pal_loop_shut(server->loop);
-    if (server->transport) server->road->close(server->transport);
+    if (server->transport) server->ops->close(server->transport);
     pal_hub_destroy(server->hub);
     pal_loop_destroy(server->loop);
     pal_site_close(server->site);

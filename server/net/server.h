@@ -15,7 +15,7 @@ typedef struct pal_server_options {
     const char *viewer_folder; /* files served at /; NULL: none                                             */
     double error_m;            /* bound of streamed positions per axis; 0: 1/3000 of the box, at most 0.05 mm */
     int max_clients;           /* 0: 200                                                                    */
-    const char *road;          /* transport: "ws" (default) or "mem" (tests) */
+    const char *transport;     /* transport: "ws" (default) or "mem" (tests) */
     /* Study of each session's scene, for a live choice among its points: configurations by ascending ms, and their
      * body, in the order of the sessions; borrowed until close. NULL, or n_configuration 0: no study */
     const pal_measured_configuration *const *setting; /* [n_session][n_configuration] */

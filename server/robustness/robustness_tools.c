@@ -75,7 +75,7 @@ static void release(pal_trial *trial, bool good)
         pal_trial_report(trial, PAL_VERDICT_PASSED, "back after %.2g s", trial->out->return_s);
 }
 
-static void say_force(pal_trial *trial, double max_N)
+static void report_force(pal_trial *trial, double max_N)
 {
     double cap = trial->scene->tool[0].force_cap_N;
     pal_trial_report(trial, PAL_VERDICT_PASSED, "force up to %.3g N", max_N);
@@ -104,7 +104,7 @@ void pal_robustness_teleport(pal_trial *trial)
         good = tool_step(trial, 1, 0);
         max = fmax(max, force_N(trial, 0));
     }
-    say_force(trial, max);
+    report_force(trial, max);
     release(trial, good);
 }
 
@@ -119,7 +119,7 @@ void pal_robustness_inside(pal_trial *trial)
         good = tool_step(trial, 1, 0);
         max = fmax(max, force_N(trial, 0));
     }
-    say_force(trial, max);
+    report_force(trial, max);
     release(trial, good);
 }
 
@@ -143,7 +143,7 @@ void pal_robustness_pressed(pal_trial *trial)
         good = tool_step(trial, 2, way_m);
         max = fmax(max, fmax(force_N(trial, 0), force_N(trial, 1)));
     }
-    say_force(trial, max);
+    report_force(trial, max);
     release(trial, good);
 }
 
@@ -380,7 +380,7 @@ static void random_order(pal_trial *trial, const double centre[3], double size)
 }
 
 /* Restores the scene: releases tools, resets loads, brushes and materials. */
-static void calm(pal_trial *trial)
+static void restore_scene_loads(pal_trial *trial)
 {
     let_go(trial);
     for (int b = 0; b < trial->scene->n_body; b++) {
@@ -403,7 +403,7 @@ void pal_robustness_random(pal_trial *trial)
         if (pal_trial_random(trial) < 0.5) random_order(trial, centre, size);
         good = pal_trial_step(trial, trial->scene->step_s);
     }
-    calm(trial);
+    restore_scene_loads(trial);
     if (good) good = pal_trial_run(trial, 0.3);
     if (good) pal_trial_relax(trial, return_s);
     if (trial->out->return_s < INFINITY)

@@ -23,11 +23,11 @@ static const double min_s = 60,
 static const double nothing_share = 1e-9;
 
 #define ENERGY_RULE "+ 1 % (verlet 5 %, central_cg 30 %)"
-#define PATIENCE    "10 s or ten of its slowest periods (at most 120 s)"
+#define REST_LIMIT  "10 s or ten of its slowest periods (at most 120 s)"
 static const char rule_back[] =
-    "finite, not stopped, energy no more than put in " ENERGY_RULE ", rest within 0.1 % S in " PATIENCE;
+    "finite, not stopped, energy no more than put in " ENERGY_RULE ", rest within 0.1 % S in " REST_LIMIT;
 static const char rule_shape[] =
-    "finite, energy never above the case's " ENERGY_RULE ", rest within 0.1 % S in " PATIENCE "; "
+    "finite, energy never above the case's " ENERGY_RULE ", rest within 0.1 % S in " REST_LIMIT "; "
     "springs: bounded, that rest after a reset";
 static const char rule_blown[] =
     "the same in 25 s, or stopped by finite_guard beyond its reach and at rest after a reset";
@@ -52,7 +52,7 @@ static const pal_robustness_case cases[] = {
     {"poisoned", "a NaN in the state of one body", "that body alone stops, says which node, and is reset alone",
      pal_robustness_poisoned},
     {"supports", "what is held is let go and held elsewhere while deformed, then back",
-     "energy rises by at most 1 % at a switch, stands still within " PATIENCE, pal_robustness_supports},
+     "energy rises by at most 1 % at a switch, stands still within " REST_LIMIT, pal_robustness_supports},
     {"stiffer", "stiffness times a thousand while loaded, then back", "finite, not stopped, rest within 0.1 % S",
      pal_robustness_stiffer},
     {"random", "300 steps of random poses, grabs, loads, materials and brushes, good and bad",

@@ -38,16 +38,16 @@ static pal_err need(const reader *r, const cJSON *object, const char *path, cons
 }
 
 /* a vector whose numbers are at most `most`, and that is there */
-static pal_err read_vector(const reader *r, const cJSON *object, const char *path, const char *key, double most,
+static pal_err read_vector(const reader *r, const cJSON *object, const char *path, const char *key, double max,
                            double out[3])
 {
     char at[PAL_JSON_PATH];
     if (!has(object, key)) return pal_json_refuse(&r->json, pal_json_key(at, path, key), "is missing");
     PAL_TRY(pal_json_vector(&r->json, object, path, key, out));
     for (int c = 0; c < 3; c++)
-        if (!(fabs(out[c]) <= most))
+        if (!(fabs(out[c]) <= max))
             return pal_json_refuse(&r->json, pal_json_key(at, path, key), "number %d, %g, is beyond %g", c + 1, out[c],
-                                   most);
+                                   max);
     return PAL_ERR_OK;
 }
 
@@ -405,11 +405,11 @@ static pal_err check_frequencies(const reader *r, const cJSON *root)
 }
 
 /* a list of entries, each by its own function; least: how many there must be */
-static pal_err read_list(const reader *r, const cJSON *root, const char *key, int min, int most, int *count,
+static pal_err read_list(const reader *r, const cJSON *root, const char *key, int min, int max, int *count,
                          pal_err (*read)(const reader *r, const cJSON *object, int index))
 {
     const cJSON *list;
-    PAL_TRY(pal_json_list(&r->json, root, "", key, most, &list));
+    PAL_TRY(pal_json_list(&r->json, root, "", key, max, &list));
     if (min >= 0 && !list) return pal_json_refuse(&r->json, key, "is missing");
     int n = list ? cJSON_GetArraySize(list) : 0;
     if (n < min) return pal_json_refuse(&r->json, key, "%d entries, wanted at least %d", n, min);

@@ -35,7 +35,7 @@ enum {
 static const double border_factor = 1.1; /* border voxels per A/h^2, from spheres */
 static const double fem_min_fill = 0.1;
 
-static void say(const pal_surface_scene *options, const char *what, double fraction)
+static void report_progress(const pal_surface_scene *options, const char *what, double fraction)
 {
     if (options->progress) options->progress(what, fraction, options->user);
 }
@@ -170,7 +170,7 @@ static pal_err read_volume(const char *path, const pal_surface_scene *options, p
     pal_label_volume volume;
     pal_label_count count[LABELS];
     PAL_TRY(pal_label_volume_read(path, &volume, diag));
-    say(options, "label", 0);
+    report_progress(options, "label", 0);
     int n = pal_label_volume_list(&volume, count, LABELS);
     snprintf(report->surface.place, sizeof report->surface.place, "byte %lld", (long long)volume.first_byte);
     pal_err err = n == 0 ? pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s: the volume holds no label but 0", path,
@@ -200,7 +200,7 @@ static pal_err read_any(const char *path, const pal_surface_scene *options, pal_
 {
     double start = pal_clock_s();
     struct stat facts;
-    say(options, "read", 0);
+    report_progress(options, "read", 0);
     report->label = -1;
     /* a pipe or device would be waited for */
     if (stat(path, &facts)) return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s", path, strerror(errno));
@@ -234,9 +234,9 @@ static pal_err make(const char *name, const pal_surface *surface, const pal_surf
     if (options->adaptive) {
         err = pal_scene_adaptive_prepare(surface, options, out, &reason);
     } else {
-        say(options, "fill", 0);
+        report_progress(options, "fill", 0);
         if (!options->resolution) err = choose_resolution(surface, options, &voxel.resolution, &reason);
-        say(options, "split and skin", 0);
+        report_progress(options, "split and skin", 0);
         if (!err) err = pal_prepared_make(surface, &voxel, out, &report->prepare, &reason);
         report->resolution = voxel.resolution;
     }
@@ -393,7 +393,7 @@ pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *option
     pal_scene_stem(path, stem, sizeof stem);
     pal_err err = pal_scene_prepare_file(path, options, &loaded->mesh[0], report, diag);
     pal_diagnostic reason = {""};
-    say(options, "levels", 0);
+    report_progress(options, "levels", 0);
     if (!err && options->adaptive) err = pal_scene_adaptive_inspect(&loaded->mesh[0].surface, options, report, &reason);
     if (!err) err = dress(loaded, stem, options, report, &reason);
     if (!err) err = drop_loose(loaded, options, report, &reason);
@@ -529,7 +529,7 @@ pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene 
     if (!loaded) return PAL_ERR_MEMORY;
     pal_scene_shape shape = {0};
     double start = pal_clock_s();
-    say(options, "organ", 0);
+    report_progress(options, "organ", 0);
     pal_err err = make_procedural(options, &shape, diag);
     report->read_s = pal_clock_s() - start;
     report->unit_m = 1;

@@ -129,7 +129,7 @@ static double in_mm(double metres)
 }
 
 /* "accuracy" and "budget" as they were asked for */
-static void add_wish(cJSON *root, const pal_scene *scene)
+static void add_requests(cJSON *root, const pal_scene *scene)
 {
     if (scene->max_error_m > 0) {
         cJSON *accuracy = cJSON_AddObjectToObject(root, "accuracy");
@@ -148,7 +148,7 @@ static char *scene_text(const pal_scene *scene)
     cJSON_AddStringToObject(root, "name", scene->name);
     cJSON_AddStringToObject(root, "title", scene->title);
     cJSON_AddStringToObject(root, "source", scene->source);
-    add_wish(root, scene);
+    add_requests(root, scene);
     add_number(root, "step_s", scene->step_s);
     cJSON_AddItemToObject(root, "up", pal_json_exact_list(scene->up, 3));
     add_number(root, "gravity_m_s2", scene->gravity_m_s2);

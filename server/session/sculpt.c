@@ -188,7 +188,7 @@ static pal_err set_cut(const pal_sculptor *s, const pal_sculpt *command, pal_scu
     return copy_shape(&s->now, &turn->to);
 }
 
-static pal_err obey(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt_edit *turn, pal_diagnostic *diag)
+static pal_err execute(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt_edit *turn, pal_diagnostic *diag)
 {
     switch (command->kind) {
     case PAL_SCULPT_CELLS:
@@ -259,7 +259,7 @@ pal_err pal_sculptor_prepare(const pal_sculptor *sculptor, const pal_scene *scen
     turn->body = s->body;
     turn->cut = s->cut, turn->cut_m = s->cut_m;
     pal_copy3(turn->cut_normal, s->cut_normal);
-    pal_err err = obey(s, command, turn, diag);
+    pal_err err = execute(s, command, turn, diag);
     if (!err) err = make_room(s, turn);
     if (!err) err = make_scene(s, scene, turn);
     if (err)

@@ -20,7 +20,7 @@ static const double young_max_Pa = 1e12; /* above any solid */
 
 /* ---- the thread ---- */
 
-static void say(pal_session *s, const pal_diagnostic *diag)
+static void log_diagnostic(pal_session *s, const pal_diagnostic *diag)
 {
     pthread_mutex_lock(&s->note_lock);
     s->diag = *diag;
@@ -125,7 +125,7 @@ static void look(pal_session *s, const pal_command *command)
     if (!command->wanted && *n > 0) return;
     if (pal_world_field(s->world, command->body, command->field, command->wanted, &diag)) {
         atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
-        say(s, &diag);
+        log_diagnostic(s, &diag);
     }
 }
 
@@ -143,7 +143,7 @@ static void brush(pal_session *s, const pal_command *command)
                                                       .brush = command->brush});
         diag.text[0] = 0;
     }
-    say(s, &diag);
+    log_diagnostic(s, &diag);
 }
 
 static void switch_row(pal_session *s, const pal_command *command)
@@ -158,7 +158,7 @@ static void switch_row(pal_session *s, const pal_command *command)
         pal_input_log_put(s->log, &record);
         diag.text[0] = 0;
     }
-    say(s, &diag);
+    log_diagnostic(s, &diag);
 }
 
 /* updates the observed state; true: observation began, so display data must be computed */
@@ -171,7 +171,7 @@ static bool look_around(pal_session *s)
     return watched;
 }
 
-static void obey(pal_session *s, const pal_command *command)
+static void execute(pal_session *s, const pal_command *command)
 {
     pal_diagnostic diag = {""};
     switch (command->kind) {
@@ -186,13 +186,13 @@ static void obey(pal_session *s, const pal_command *command)
         break;
     case PAL_COMMAND_RESET:
         pal_world_reset(s->world);
-        say(s, &diag);
+        log_diagnostic(s, &diag);
         for (int t = 0; t < s->scene->n_tool; t++) s->tool[t].present = s->tool[t].brushes = false;
         pal_input_log_put(s->log, &(pal_input_record){.kind = PAL_INPUT_RESET, .step = s->step});
         break;
     case PAL_COMMAND_RESET_BODY:
         (void)pal_world_reset_body(s->world, command->body);
-        say(s, &diag);
+        log_diagnostic(s, &diag);
         pal_input_log_put(s->log,
                           &(pal_input_record){.kind = PAL_INPUT_RESET_BODY, .index = command->body, .step = s->step});
         break;
@@ -209,7 +209,7 @@ static void obey(pal_session *s, const pal_command *command)
             s->material[command->body] = command->material;
             pthread_mutex_unlock(&s->note_lock);
         }
-        say(s, &diag);
+        log_diagnostic(s, &diag);
         break;
     case PAL_COMMAND_FIELD:
         look(s, command);
@@ -233,13 +233,13 @@ static bool take_commands(pal_session *s)
     pal_command command;
     bool any = false, was_paused = s->paused;
     /* bounded, so that a flood of commands cannot delay the step */
-    for (int k = 0; k < N_COMMAND && pal_command_queue_get(s->command, &command); k++, any = true) obey(s, &command);
+    for (int k = 0; k < N_COMMAND && pal_command_queue_get(s->command, &command); k++, any = true) execute(s, &command);
     if (was_paused != s->paused) forget_pace(s);
     return any;
 }
 
 /* reports the bodies that a step froze, with their reasons */
-static void tell(pal_session *s, pal_err err)
+static void report_error(pal_session *s, pal_err err)
 {
     pal_diagnostic diag;
     pal_diagnostic_set(&diag, err, "step %llu: %s", (unsigned long long)s->step, pal_err_text(err));
@@ -249,7 +249,7 @@ static void tell(pal_session *s, pal_err err)
         if (body->frozen)
             (void)snprintf(diag.text + used, sizeof diag.text - used, "; %s: %s", body->name, body->reason);
     }
-    say(s, &diag);
+    log_diagnostic(s, &diag);
 }
 
 static void step(pal_session *s)
@@ -265,14 +265,14 @@ static void step(pal_session *s)
     if (s->log && s->step % PAL_INPUT_HASH_STEPS == 0)
         pal_input_log_put(
             s->log, &(pal_input_record){.kind = PAL_INPUT_HASH, .step = s->step, .hash = pal_world_hash(s->world)});
-    if (err) tell(s, err);
+    if (err) report_error(s, err);
 }
 
 static void estimate(pal_session *s, bool stepped)
 {
     pal_diagnostic diag = {""};
     double step_ms = stepped ? 1e-6 * (double)s->work_ns : (double)NAN;
-    if (pal_estimator_set_step(&s->watch, s->world, step_ms, &diag)) say(s, &diag);
+    if (pal_estimator_set_step(&s->watch, s->world, step_ms, &diag)) log_diagnostic(s, &diag);
 }
 
 /* waits for the due time; a step at least one whole step late is due now, and the missed ones are dropped */

@@ -376,8 +376,8 @@ pal_err pal_preflight_run(const pal_scene *scene, int max_cg, pal_preflight *out
 
 /* ---- sentences ---- */
 
-static void say_weak(const pal_weak_spot *w, const char *what, double scale, const char *unit, int *n,
-                     char line[PAL_PREFLIGHT_LINES][PAL_PREFLIGHT_LINE])
+static void report_weak(const pal_weak_spot *w, const char *what, double scale, const char *unit, int *n,
+                        char line[PAL_PREFLIGHT_LINES][PAL_PREFLIGHT_LINE])
 {
     if (w->n == 0) return;
     snprintf(line[(*n)++], PAL_PREFLIGHT_LINE, "%d %s: the worst is %d at (%.4g, %.4g, %.4g) mm, %.2g%s", w->n, what,
@@ -400,13 +400,13 @@ int pal_preflight_describe(const pal_preflight_body *b, char line[PAL_PREFLIGHT_
                      1e3 * b->limit_edge_m, 1e3 * b->limit_mass_kg);
         n++;
     }
-    say_weak(&b->edge, "edges have next to no length", 1e3, " mm", &n, line);
-    say_weak(&b->flat, "elements are badly shaped", 1, " of a regular one", &n, line);
+    report_weak(&b->edge, "edges have next to no length", 1e3, " mm", &n, line);
+    report_weak(&b->flat, "elements are badly shaped", 1, " of a regular one", &n, line);
     if (b->n_sliver > 0)
         snprintf(line[n++], PAL_PREFLIGHT_LINE, "%d of them %s: springs leave the volume out", b->n_sliver,
                  b->n_sliver == 1 ? "is a sliver" : "are slivers");
-    say_weak(&b->thin, "elements are hardly filled", 100, " %", &n, line);
-    say_weak(&b->light, "nodes are very light", 1e3, " g", &n, line);
+    report_weak(&b->thin, "elements are hardly filled", 100, " %", &n, line);
+    report_weak(&b->light, "nodes are very light", 1e3, " g", &n, line);
     if (isfinite(b->condition))
         snprintf(line[n++], PAL_PREFLIGHT_LINE, "condition %.2g: its slowest motion takes %.3g s, its fastest %.3g ms",
                  b->condition, b->slowest_period_s, 2e3 * M_PI / b->omega_max_1_s);

@@ -41,7 +41,7 @@ typedef struct job {
     pal_diagnostic *diag;
 } job;
 
-static bool say(const job *j, const char *what, double fraction)
+static bool report_progress(const job *j, const char *what, double fraction)
 {
     return !j->options->progress || j->options->progress(what, fraction, j->options->user);
 }
@@ -230,7 +230,7 @@ static pal_err converge(const job *j, double fraction)
                                       "no solution after %d iterations: residual %g, step size %g", j->result->n_newton,
                                       report.residual, report.step_size);
         snprintf(what, sizeof what, "solve: iteration %d, residual %.2g", j->result->n_newton, report.residual);
-        if (!say(j, what, fraction))
+        if (!report_progress(j, what, fraction))
             return pal_diagnostic_set(j->diag, PAL_ERR_STATE, "stopped after %d iterations", j->result->n_newton);
     }
 }
@@ -321,12 +321,12 @@ pal_err pal_solve(const pal_problem *problem, const pal_problem_case *load_case,
              .result = result,
              .diag = diag ? diag : &own};
     if (!j.s) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a solution");
-    say(&j, "prepare", 0);
+    report_progress(&j, "prepare", 0);
     pal_err err = prepare(&j, surface);
     if (!err) err = set_loads(&j);
     double ready = pal_clock_s(), early_s = factored(&j);
     result->prepare_s = ready - start - early_s;
-    if (!err && !say(&j, "solve", 0))
+    if (!err && !report_progress(&j, "solve", 0))
         err = pal_diagnostic_set(diag, PAL_ERR_STATE, "stopped before the first iteration");
     if (!err) err = solve(&j);
     if (!err) sum_up(&j);

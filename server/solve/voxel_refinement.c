@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST = 20 * 1000 * 1000 };
+enum { MAX_HEXAHEDRA = 20 * 1000 * 1000 };
 
 /* lowest corner of hexahedron e, in voxels from low */
 static void place_of(const pal_tets *tets, const pal_hexes *hexes, int e, const double low[3], double h, int at[3])
@@ -73,9 +73,9 @@ pal_err pal_refine_voxels(pal_prepared *mesh, int split, pal_diagnostic *diag)
     pal_hexes hexes = {0};
     if (n_hex == 0 || split < 1)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there are no voxels to split by %d", split);
-    if ((double)n_hex * split * split * split > MOST)
+    if ((double)n_hex * split * split * split > MAX_HEXAHEDRA)
         return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "%d voxels split by %d on each axis are more than %d", n_hex,
-                                  split, MOST);
+                                  split, MAX_HEXAHEDRA);
     pal_err err = lay_coarse(mesh, low, n, &fill);
     if (!err) err = lay_fine(mesh, low, n, fill, split, &fine);
     if (!err) err = pal_voxels_split(&fine, &tets);

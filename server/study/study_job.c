@@ -123,7 +123,7 @@ static bool all_known(const pal_study_job *job, const pal_study_entry *entry, in
     return n > 0;
 }
 
-static void take_over(pal_study *to, const pal_study *from)
+static void transfer_results(pal_study *to, const pal_study *from)
 {
     memcpy(to->reference, from->reference, sizeof to->reference);
     to->reference_m = from->reference_m, to->max_m = from->max_m, to->length_scale_m = from->length_scale_m;
@@ -153,7 +153,7 @@ static pal_err study(pal_study_job *job)
     bool whole = !err && !job->options->recall && all_known(job, entry, n);
     if (!err && n == 0)
         err = pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "no method of those asked for fits the body");
-    if (whole) take_over(job->out, before);
+    if (whole) transfer_results(job->out, before);
     if (!err && !whole) err = take_probes(job);
     if (!err && !whole) err = job->n_load == 0 ? press(job) : pal_study_reference(job);
     if (!err) err = sweep(job, entry, n);

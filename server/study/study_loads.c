@@ -14,7 +14,7 @@ static const double coarse_share = 0.6;
 static const double patch_share = 0.1, press_share = 0.02, first_share = 1e-3;
 /* The same for the pull: half width of a grasp; largest displacement by the linear estimate, half of it for an
  * adaptive surface, which folds; sideways component; default force cap. */
-static const double grip_share = 0.06, pull_share = 0.1, wall_share = 0.05, aslant = 0.7, usual_cap_N = 15;
+static const double grasp_share = 0.06, pull_share = 0.1, wall_share = 0.05, aslant = 0.7, usual_cap_N = 15;
 /* accepted factor between the reference's displacement and the wanted one */
 static const double wide_of = 1.5;
 
@@ -182,7 +182,7 @@ pal_err pal_study_presses(pal_study_job *job)
     for (int k = 0; k < PRESSES && !err; k++)
         place_load(job, k, surface, job->probe + 3 * place[k], patch_share * length_scale_m);
     /* where it moves most: at the place farthest from the supports */
-    if (!err) place_load(job, PULL, surface, job->probe + 3 * place[0], grip_share * length_scale_m);
+    if (!err) place_load(job, PULL, surface, job->probe + 3 * place[0], grasp_share * length_scale_m);
     pal_study_close(&w);
     job->n_load = job->n_press = job->problem->n_case = PULL + 1;
     for (int k = 0; k <= PULL && !err; k++) err = scale_load(job, k, length_scale_m);

@@ -126,7 +126,7 @@ static pal_err estimate(pal_study_job *job, double *out)
     return err;
 }
 
-static bool say(const pal_study_job *job, const char *what, double fraction)
+static bool report_progress(const pal_study_job *job, const char *what, double fraction)
 {
     return !job->options->progress || job->options->progress(what, fraction, job->options->user);
 }
@@ -146,7 +146,7 @@ static pal_err made(pal_study_job *job)
     char name[PAL_CONFIGURATION_TEXT];
     int n_node = 0;
     for (int k = 0; k < job->n_load; k++) {
-        if (!say(job, "reference at rest", (double)k / (job->n_load + 2)))
+        if (!report_progress(job, "reference at rest", (double)k / (job->n_load + 2)))
             return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped at the reference");
         pal_err err;
         do err = pal_study_cached_static(job, &s, job->load[k], job->still[k], &n_node, job->diag);
@@ -154,7 +154,7 @@ static pal_err made(pal_study_job *job)
         PAL_TRY(err);
     }
     job->n_reference = n_node;
-    if (!say(job, "reference, its own error", (double)job->n_load / (job->n_load + 2)))
+    if (!report_progress(job, "reference, its own error", (double)job->n_load / (job->n_load + 2)))
         return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped at the reference");
     PAL_TRY(estimate(job, &job->out->reference_m));
     s.tolerance = 0;
@@ -182,7 +182,7 @@ pal_err pal_study_reference(pal_study_job *job)
         return pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "the loads move nothing: there is nothing to compare");
     for (int i = 0; i < job->n_probe; i++)
         if (pal_norm3(job->still[0] + 3 * i) > pal_norm3(job->still[0] + 3 * job->tip)) job->tip = i;
-    if (!say(job, "reference in motion", (double)(job->n_load + 1) / (job->n_load + 2)))
+    if (!report_progress(job, "reference in motion", (double)(job->n_load + 1) / (job->n_load + 2)))
         return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped at the reference");
     pal_configuration s = reference_setting(job, job->reference);
     return pal_study_cached_trajectory(job, &s, job->way, job->diag);

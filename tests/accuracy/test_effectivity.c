@@ -243,7 +243,7 @@ static bool estimate(const subject *s, const solved *rest, pal_estimate *out)
 }
 
 /* what it says and what is true */
-static void tell(const row *r, const pal_estimate *e, double summary_m, double true_m, double true_percent)
+static void print_row(const row *r, const pal_estimate *e, double summary_m, double true_m, double true_percent)
 {
     printf("  | %s, %s, %s, %d | %.3f | %.3f | %.2f |", r->name, r->element, r->law, r->resolution, 1e3 * true_m,
            1e3 * summary_m, summary_m / true_m);
@@ -268,7 +268,7 @@ static void compare(const subject *s, const pal_samples *samples)
         if (r->finer > 0) percent = stress_off(&own, &finer);
         /* references are neo-Hookean where bodies bend far: what another law makes of it is part of the error */
         double summary_m = e.discretisation_m + (strcmp(r->law, "corotational") ? 0 : e.model_m);
-        tell(r, &e, summary_m, true_m, percent);
+        print_row(r, &e, summary_m, true_m, percent);
         CHECK(e.locking == r->locks && (strstr(e.diag, "voxels are cut") != NULL) == r->cut);
         CHECK(r->locks || (summary_m >= true_m / 2 && summary_m <= 2 * true_m));
         CHECK(percent == 0 || r->locks ||

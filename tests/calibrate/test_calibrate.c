@@ -10,7 +10,7 @@
 
 #include <float.h>
 
-enum { MOST = 256 };
+enum { MAX_PARAMETERS = 256 };
 static pal_diagnostic diag;
 
 /* ---- a bar of 4 x 1 x 1 dm, its end at x = 3 held; and the same with a foot ---- */
@@ -90,7 +90,7 @@ typedef struct bench {
     pal_calibration *c;
     pal_calibration_info info;
     pal_calibration_workspace *workspace;
-    double theta[MOST];
+    double theta[MAX_PARAMETERS];
 } bench;
 
 /* the first n_case loads, all fitted */
@@ -119,7 +119,7 @@ static bool bench_make(bench *b)
     if (err) printf("  %s\n", diag.text);
     if (err || pal_calibration_workspace_create(b->c, &b->workspace)) return false;
     pal_calibration_info_of(b->c, &b->info);
-    if (b->info.n_parameter > MOST) return false;
+    if (b->info.n_parameter > MAX_PARAMETERS) return false;
     memcpy(b->theta, b->info.start, sizeof(double) * (size_t)b->info.n_parameter);
     return true;
 }
@@ -158,7 +158,7 @@ static double uniform(uint64_t key, uint64_t counter) /* in (-1, 1) */
 
 static void check_slope(bench *b)
 {
-    double slope[MOST], other[MOST], max = 0, worst = 0;
+    double slope[MAX_PARAMETERS], other[MAX_PARAMETERS], max = 0, worst = 0;
     int n = b->info.n_parameter, step_by = n > 24 ? n / 11 : 1;
     for (int i = 0; i < n; i++) b->theta[i] += 0.3 * uniform(3, (uint64_t)i);
     pal_calibration_value v = value_at(b, b->theta, PAL_CALIBRATION_FIT, slope);

@@ -5,7 +5,7 @@ import { connect, createServer } from "node:net";
 
 const FRAME = 1,
     CYCLE_AT = 24,
-    LEAST_CYCLE = 50;
+    MIN_CYCLE = 50;
 const [port, second] = process.argv.slice(2).map(Number);
 let cut = false;
 
@@ -48,7 +48,7 @@ createServer((client) => {
             rest = rest.subarray(message.length);
             const frame = websocket && (message[0] & 15) === 2 && payload[4] === FRAME,
                 cycle = frame ? payload.readUInt32LE(CYCLE_AT) : 0;
-            if (cycle < LEAST_CYCLE) continue;
+            if (cycle < MIN_CYCLE) continue;
             cut = true;
             console.log(cycle);
             server.destroy();

@@ -80,7 +80,7 @@ static void coulomb_friction_holds_below_its_force_and_gives_way_above(void)
     pal_device_virtual()->close(d);
 }
 
-static void command_waits_one_tick_and_follows_its_lag(void)
+static void command_waits_one_tick_and_follows_its_time_constant(void)
 {
     pal_dev_info info;
     void *d = opened("touch,hand=off,clock=virtual", &info);
@@ -203,7 +203,7 @@ int main(void)
     RUN(push_against_viscous_friction_follows_the_exponential);
     RUN(hand_spring_rings_with_the_frequency_of_mass_and_spring);
     RUN(coulomb_friction_holds_below_its_force_and_gives_way_above);
-    RUN(command_waits_one_tick_and_follows_its_lag);
+    RUN(command_waits_one_tick_and_follows_its_time_constant);
     RUN(encoder_shows_whole_steps_and_force_is_cut_at_the_peak);
     RUN(stop_takes_the_force_away_at_once);
     RUN(same_calls_give_the_same_numbers);

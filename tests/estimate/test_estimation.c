@@ -453,7 +453,7 @@ static void what_rounding_moved_has_no_error(void)
 }
 
 /* what a step costs asleep is not what its setting costs */
-static void a_sleeping_body_is_priced_awake(void)
+static void a_sleeping_body_has_its_cost_awake(void)
 {
     pal_scene *fem = fem_scene();
     pal_estimation *work = NULL;
@@ -582,7 +582,7 @@ int main(void)
     RUN(a_body_at_rest_has_no_error);
     RUN_LONG(a_body_let_go_errs_as_it_did_under_load);
     RUN_LONG(what_rounding_moved_has_no_error);
-    RUN_LONG(a_sleeping_body_is_priced_awake);
+    RUN_LONG(a_sleeping_body_has_its_cost_awake);
     pal_prepared_free(&mesh);
     if (!estimate_scene(4)) return 1;
     RUN(meshes_of_many_nodes_have_no_factor);

@@ -8,7 +8,7 @@
 
 #include <dirent.h>
 
-static const uint64_t patience_ns = 120000000000u; /* sanitizers on a busy machine */
+static const uint64_t timeout_ns = 120000000000u; /* sanitizers on a busy machine */
 
 static int threads(void)
 {
@@ -32,7 +32,7 @@ static void ask(pal_session *s, bool wanted)
 /* the first estimate, or one of a later tick; gives up after two minutes */
 static bool wait_estimate(pal_session *s, uint64_t after, pal_estimate *out)
 {
-    uint64_t until = pal_clock_ns() + patience_ns;
+    uint64_t until = pal_clock_ns() + timeout_ns;
     while (!(pal_session_estimate(s, 0, out) && out->tick >= after)) {
         if (pal_clock_ns() > until) return false;
         sleep_ms(5);
@@ -42,7 +42,7 @@ static bool wait_estimate(pal_session *s, uint64_t after, pal_estimate *out)
 
 static bool wait_threads(int n)
 {
-    uint64_t until = pal_clock_ns() + patience_ns;
+    uint64_t until = pal_clock_ns() + timeout_ns;
     while (pal_estimator_threads() != n) {
         if (pal_clock_ns() > until) return false;
         sleep_ms(2);
@@ -209,7 +209,7 @@ static void a_sleeping_body_is_looked_at_once(void)
     for (int i = 0; i < 200 && !pal_world_view_body(w, 0)->asleep; i++) CHECK(!pal_world_step(w, fem->step_s));
     REQUIRE(pal_world_view_body(w, 0)->asleep);
     REQUIRE(!pal_estimator_open(fem, 0, NULL, &e));
-    CHECK_INT((long long)look_for(e, w, 1, patience_ns), 1);
+    CHECK_INT((long long)look_for(e, w, 1, timeout_ns), 1);
     uint64_t tick = pal_estimator_read(e, &estimate) ? estimate.tick : 0;
     CHECK(strstr(estimate.diag, "asleep") && estimate.error_m == 0 && estimate.ms != 1);
     CHECK_INT((long long)look_for(e, w, 1, 600000000), 0);
@@ -224,7 +224,7 @@ static void a_sleeping_body_is_looked_at_once(void)
         check_age(e, w, tick, n, fem->step_s);
     }
     pal_estimator_pause_all(false);
-    CHECK_INT((long long)look_for(e, w, 1, patience_ns), 1);
+    CHECK_INT((long long)look_for(e, w, 1, timeout_ns), 1);
     CHECK(pal_estimator_read(e, &estimate) && estimate.tick > tick && estimate.max_m > 0);
     pal_estimator_close(e);
     pal_world_destroy(w);
@@ -239,7 +239,7 @@ static void nothing_is_known_of_a_frozen_body(void)
     pal_estimate estimate;
     REQUIRE(!pal_world_create(fem, NULL, &w));
     REQUIRE(!pal_estimator_open(fem, 0, NULL, &e));
-    CHECK_INT((long long)look_for(e, w, 1, patience_ns), 1);
+    CHECK_INT((long long)look_for(e, w, 1, timeout_ns), 1);
     CHECK(pal_estimator_read(e, &estimate) && estimate.error_m >= 0);
     pal_world_body(w, 0)->frozen = true;
     pal_estimator_observe(e, w, 1);
@@ -250,8 +250,8 @@ static void nothing_is_known_of_a_frozen_body(void)
     CHECK(!pal_world_reset_body(w, 0));
     pal_estimator_observe(e, w, NAN);
     CHECK(!pal_estimator_read(e, &estimate));
-    CHECK_INT((long long)look_for(e, w, 1, patience_ns), 1);
-    for (int k = 0; k < 100 && !pal_estimator_read(e, &estimate); k++) look_for(e, w, 1, patience_ns);
+    CHECK_INT((long long)look_for(e, w, 1, timeout_ns), 1);
+    for (int k = 0; k < 100 && !pal_estimator_read(e, &estimate); k++) look_for(e, w, 1, timeout_ns);
     CHECK(pal_estimator_read(e, &estimate) && estimate.error_m >= 0);
     pal_estimator_close(e);
     pal_world_destroy(w);
@@ -266,7 +266,7 @@ static void a_pressed_body_is_estimated_while_it_runs(void)
     pal_estimate e = {.tick = 0};
     REQUIRE(!pal_session_open(fem, NULL, NULL, &s));
     ask(s, true);
-    uint64_t until = pal_clock_ns() + patience_ns;
+    uint64_t until = pal_clock_ns() + timeout_ns;
     while (pal_clock_ns() < until && !(e.max_m > 1e-4 && e.discretisation_m > 0)) {
         const pal_pose pose = {.position_m = {0.048, 0, 0.01}, .quat = {1, 0, 0, 0}};
         CHECK(!pal_session_put_pose(s, 0, &pose));

@@ -17,7 +17,7 @@ static bool begin(void)
     static small_scene organ;
     static pal_session *session;
     pal_session_options options = {.start_paused = true};
-    pal_server_options net = {.road = "mem"};
+    pal_server_options net = {.transport = "mem"};
     return small_scene_make(&organ, "small") && !pal_session_open(&organ.scene, &options, NULL, &session) &&
            !pal_server_open(&net, &session, 1, NULL, &server);
 }

@@ -43,12 +43,13 @@ const terms = {
 };
 // uses that are right: the identifier, or the file, matches
 const right = {
-    trainee: /^(.*role.*|PAL_ROLE_TRAINEE|trainee)$/i,
+    trainee: /^(.*role.*|PAL_(MEMBER|RIGHT)_TRAINEE|trainee)$/i, // a role of a member
     trainees: /role/i,
     relief: /inertia_?relief/i,
     zz: /zz_?(estimator|energy)/i,
-    holder: /^(clients|server\/(session|net)|tests\/(session|net|clients|browser))\//,
-    holders: /^(clients|server\/(session|net)|tests\/(session|net|clients|browser))\//,
+    holder: /^(protocol|clients|server\/(session|net)|tests\/(protocol|session|net|clients|browser))\//, // a member with a tool
+    holders: /^(protocol|clients|server\/(session|net)|tests\/(protocol|session|net|clients|browser))\//,
+    grip: /^(protocol|clients|tests\/(protocol|clients))\//, // of a stylus; opening of a gripper, a field of LCM messages
     most: /almost/i,
 };
 // words that are right in a sentence, which a name of five words or more is (tests are named so)

@@ -15,7 +15,7 @@ enum {
     ADAPTIVE_PLACES = 224 * 16
 };
 
-typedef enum adaptive_weather { ADAPTIVE_CALM, ADAPTIVE_STORM, ADAPTIVE_WEIGHTLESS } adaptive_weather;
+typedef enum adaptive_weather { ADAPTIVE_LOW_GRAVITY, ADAPTIVE_STORM, ADAPTIVE_WEIGHTLESS } adaptive_weather;
 typedef struct adaptive_scene {
     pal_prepared mesh;
     pal_scene scene;
@@ -35,7 +35,7 @@ static inline bool adaptive_scene_make(adaptive_scene *s, adaptive_weather weath
     pal_entry_init(&def->effect[def->n_effect++], "effects[0]", "gravity");
     pal_tools_default(&s->scene, 1);
     bool good = !pal_entry_put_number(&def->model, "levels", ADAPTIVE_LEVELS, NULL);
-    s->scene.gravity_m_s2 = weather == ADAPTIVE_STORM ? 9.81 : weather == ADAPTIVE_CALM ? 2 : 0;
+    s->scene.gravity_m_s2 = weather == ADAPTIVE_STORM ? 9.81 : weather == ADAPTIVE_LOW_GRAVITY ? 2 : 0;
     if (weather == ADAPTIVE_WEIGHTLESS)
         good = good && !pal_entry_put_number(&def->model, "start_level", ADAPTIVE_LEVELS - 1, NULL);
     if (weather == ADAPTIVE_WEIGHTLESS) return good;

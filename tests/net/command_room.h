@@ -70,7 +70,7 @@ static inline void until_frame(mem_client *c)
 
 static inline void join(mem_client *c, const char *name, pal_wire_role role, int tool)
 {
-    mem_join(c, road, name, role, tool);
+    mem_join(c, transport, name, role, tool);
     mem_pull(c, 1000);
     REQUIRE(c->asset);
     until_frame(c);

@@ -10,7 +10,7 @@
 #include "tests/check.h"
 
 typedef struct mem_client {
-    pal_transport *road;
+    pal_transport *transport;
     pal_mem_peer *peer;
     pal_control last[PAL_CONTROL_COUNT]; /* newest of each type */
     int n_text[PAL_CONTROL_COUNT];
@@ -32,7 +32,7 @@ typedef struct mem_client {
     bool patched;  /* a patch has come and not yet its frame */
 } mem_client;
 
-static inline void mem_say(mem_client *c, const pal_control *message)
+static inline void mem_send(mem_client *c, const pal_control *message)
 {
     char text[PAL_CONTROL_IN_MAX + 1];
     size_t n = 0;
@@ -45,23 +45,23 @@ static inline void mem_text(mem_client *c, const char *text)
     pal_mem_send(c->peer, text, strlen(text), true);
 }
 
-static inline void mem_join_as(mem_client *c, pal_transport *road, const char *name, pal_wire_role role, int tool,
+static inline void mem_join_as(mem_client *c, pal_transport *transport, const char *name, pal_wire_role role, int tool,
                                bool patches)
 {
     pal_control join = {.type = PAL_CONTROL_JOIN};
     memset(c, 0, sizeof *c);
-    c->road = road;
-    c->peer = pal_mem_connect(road, "");
+    c->transport = transport;
+    c->peer = pal_mem_connect(transport, "");
     join.join.role = role;
     join.join.tool = tool;
     join.join.topology_deltas = patches;
     snprintf(join.join.name, sizeof join.join.name, "%s", name);
-    mem_say(c, &join);
+    mem_send(c, &join);
 }
 
-static inline void mem_join(mem_client *c, pal_transport *road, const char *name, pal_wire_role role, int tool)
+static inline void mem_join(mem_client *c, pal_transport *transport, const char *name, pal_wire_role role, int tool)
 {
-    mem_join_as(c, road, name, role, tool, false);
+    mem_join_as(c, transport, name, role, tool, false);
 }
 
 static inline void mem_drop_asset(mem_client *c)
@@ -78,7 +78,7 @@ static inline void mem_drop_asset(mem_client *c)
 static inline void mem_load_asset(mem_client *c, const pal_wire_part_info *part)
 {
     pal_reply reply;
-    pal_mem_get(c->road, part->asset, &reply);
+    pal_mem_get(c->transport, part->asset, &reply);
     CHECK_INT(reply.status, 200);
     if (!reply.body) return;
     mem_drop_asset(c);

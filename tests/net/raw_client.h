@@ -42,7 +42,7 @@ static inline void raw_put(int fd, const void *bytes, size_t n)
     }
 }
 
-static inline void raw_say(int fd, const char *text)
+static inline void raw_send_text(int fd, const char *text)
 {
     raw_put(fd, text, strlen(text));
 }
@@ -92,7 +92,7 @@ static inline int raw_request(int port, const char *request, char *head, size_t 
                               size_t *n_body)
 {
     int fd = raw_connect(port);
-    raw_say(fd, request);
+    raw_send_text(fd, request);
     int status = raw_head(fd, head, cap);
     size_t n = 0;
     char *length = strstr(head, "content-length:");
@@ -113,7 +113,7 @@ static inline int raw_upgrade(int port, const char *path, const char *extra, cha
              "GET %s HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
              "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n%s\r\n",
              path, port, extra);
-    raw_say(fd, request);
+    raw_send_text(fd, request);
     *status = raw_head(fd, head, cap);
     return fd;
 }

@@ -11,7 +11,7 @@
 static pal_session *session;
 static pal_server *server;
 static pal_server_gate *gate;
-static pal_transport *road;
+static pal_transport *transport;
 static uint64_t now_ns;
 
 static inline void served_session(const pal_scene *scene, pal_session_options options)
@@ -26,10 +26,10 @@ static inline void served_session(const pal_scene *scene, pal_session_options op
 static inline void served_open(pal_server_options net)
 {
     pal_diagnostic diag = {""};
-    net.road = "mem";
+    net.transport = "mem";
     if (pal_server_open(&net, &session, 1, &diag, &server)) CHECK_FAIL("no server: %s", diag.text);
     pal_server_connect(server, gate);
-    road = pal_server_transport(server);
+    transport = pal_server_transport(server);
     now_ns = 1000000000ull;
 }
 

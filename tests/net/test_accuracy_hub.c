@@ -49,7 +49,7 @@ static void nothing_is_estimated_while_nobody_looks(void)
     mem_client ada;
     uint64_t made = pal_estimator_count();
     begin(true);
-    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     UNTIL(ada.n_text[PAL_CONTROL_STATUS] > 3, &ada, NULL);
     CHECK(ada.last[PAL_CONTROL_HELLO].hello.estimates);
     CHECK_INT(ada.n_text[PAL_CONTROL_STUDY] + ada.n_text[PAL_CONTROL_ESTIMATE], 0);
@@ -63,8 +63,8 @@ static void who_asks_sees_study_and_estimate_until_the_last_has_gone(void)
 {
     mem_client ada, bo;
     begin(true);
-    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
-    mem_join(&bo, road, "Bo", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    mem_join(&bo, transport, "Bo", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     turn(&ada, &bo);
     mem_text(&ada, LOOK(1));
     mem_text(&ada, LOOK(1)); /* twice is once */
@@ -107,7 +107,7 @@ static void without_a_study_there_is_the_estimate_alone(void)
 {
     mem_client ada;
     begin(false);
-    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     mem_text(&ada, LOOK(1));
     UNTIL(ada.n_text[PAL_CONTROL_ESTIMATE] > 0, &ada, NULL);
     CHECK_INT(ada.n_text[PAL_CONTROL_STUDY], 1);
@@ -130,7 +130,7 @@ static void neighbours_are_measured_once(void)
     pal_entry_init(&def->model, "model", "fem");
     pal_entry_init(&def->solver, "solver", "implicit_euler");
     begin(false);
-    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     mem_text(&ada, LOOK(1));
     const pal_wire_estimate *e = &ada.last[PAL_CONTROL_ESTIMATE].estimate;
     UNTIL(e->n_neighbour >= 2 && e->cost_ms > 0, &ada, NULL);
@@ -163,7 +163,7 @@ static void calibrated_springs_keep_their_size(void)
     pal_configuration_of(&organ.scene, 0, &now);
     CHECK(now.k_distance_J > 0 && now.size > 0);
     begin(false);
-    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
     turn(&ada, NULL);
     for (int k = 0; k < 2; k++) {
         snprintf(text, sizeof text,
@@ -191,7 +191,7 @@ static void bad_orders_are_refused_with_a_sentence(void)
                                           "estimate: enabled is missing"};
     mem_client ada;
     begin(true);
-    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     turn(&ada, NULL);
     for (int i = 0; i < 3; i++) {
         mem_text(&ada, bad[i]);

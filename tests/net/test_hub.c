@@ -13,7 +13,7 @@ static small_scene organ;
 static pal_session *session;
 static pal_server *server;
 static pal_server_gate *gate;
-static pal_transport *road;
+static pal_transport *transport;
 static uint64_t now_ns, apart_ns; /* time, and what a turn adds to it */
 static bool running;
 
@@ -24,12 +24,12 @@ static void begin(bool paused, int max_clients)
     gate = pal_server_gate_create();
     pal_session_options options = {
         .lease_s = 60, .start_paused = paused, .unpaced = !paused, .wake = pal_server_gate_wake, .user = gate};
-    pal_server_options net = {.road = "mem", .max_clients = max_clients};
+    pal_server_options net = {.transport = "mem", .max_clients = max_clients};
     if (pal_session_open(&organ.scene, &options, &diag, &session)) CHECK_FAIL("no session: %s", diag.text);
     list[0] = session;
     if (pal_server_open(&net, list, 1, &diag, &server)) CHECK_FAIL("no server: %s", diag.text);
     pal_server_connect(server, gate);
-    road = pal_server_transport(server);
+    transport = pal_server_transport(server);
     now_ns = 1000000000ull;
     apart_ns = FRAME_NS;
     running = !paused;
@@ -119,7 +119,7 @@ static void newcomer_gets_hello_members_frame_and_tools_in_this_order(void)
     begin(true, 0);
     UNTIL(pal_session_is_alive(session), NULL, NULL);
     turn(NULL, NULL);
-    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     CHECK_INT(mem_pull(&ada, 1), 1);
     CHECK_INT(ada.n_text[PAL_CONTROL_HELLO], 1);
     const pal_wire_hello *hello = &ada.last[PAL_CONTROL_HELLO].hello;
@@ -147,7 +147,7 @@ static void late_joiner_sees_the_paused_tissue_as_everybody_does(void)
 {
     mem_client ada, bob;
     begin(false, 0);
-    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     UNTIL(ada.n_tools > 5, &ada, NULL);
     mem_text(&ada, "{\"type\":\"command\",\"verb\":\"pause\"}");
     running = false;
@@ -155,7 +155,7 @@ static void late_joiner_sees_the_paused_tissue_as_everybody_does(void)
     uint32_t frames = (uint32_t)ada.n_frame;
     for (int i = 0; i < 30; i++) turn(&ada, NULL);
     CHECK_INT(ada.n_frame, frames); /* nothing moves, nothing is sent */
-    mem_join(&bob, road, "Bob", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&bob, transport, "Bob", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     mem_pull(&bob, 1000);
     CHECK_INT(bob.n_frame, 1); /* from what the hub holds, without another step */
     CHECK_INT(bob.n_tools, 1);
@@ -171,8 +171,8 @@ static void stalled_client_costs_little_and_is_current_within_two_frames(void)
 {
     mem_client fast, slow;
     begin(false, 0);
-    mem_join(&fast, road, "fast", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
-    mem_join(&slow, road, "slow", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&fast, transport, "fast", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&slow, transport, "slow", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     UNTIL(fast.n_tools > 3 && slow.n_tools > 3, &fast, &slow);
     turn(&fast, &slow);
     size_t fixed = pal_packet_total(), max = 0;
@@ -201,8 +201,8 @@ static void without_acknowledgement_frames_stop_and_control_goes_on(void)
 {
     mem_client deaf, other;
     begin(false, 0);
-    mem_join(&deaf, road, "deaf", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
-    mem_join(&other, road, "other", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&deaf, transport, "deaf", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&other, transport, "other", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     deaf.mute = true;
     UNTIL(other.n_tools > 60, &other, &deaf);
     CHECK_INT(deaf.n_tools, 3); /* the credit at the start */
@@ -224,8 +224,8 @@ static void without_acknowledgement_frames_stop_and_control_goes_on(void)
 static double until_coarser(mem_client *all, mem_client *c, pal_wire_role role)
 {
     begin(false, 0);
-    mem_join(all, road, "all", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
-    mem_join(c, road, "c", role, role == PAL_WIRE_ROLE_VIEWER ? PAL_WIRE_TOOL_NONE : PAL_WIRE_TOOL_ANY);
+    mem_join(all, transport, "all", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(c, transport, "c", role, role == PAL_WIRE_ROLE_VIEWER ? PAL_WIRE_TOOL_NONE : PAL_WIRE_TOOL_ANY);
     UNTIL(c->n_frame > 5, all, c);
     double fine = (double)c->frame.q_m;
     apart_ns = 6 * FRAME_NS;
@@ -272,15 +272,15 @@ static void a_tool_has_one_holder(void)
 {
     mem_client a, b, c;
     begin(true, 0);
-    mem_join(&a, road, "Ada", PAL_WIRE_ROLE_TRAINEE, 1);
-    mem_join(&b, road, "Ada", PAL_WIRE_ROLE_TRAINEE, 1);
+    mem_join(&a, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, 1);
+    mem_join(&b, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, 1);
     mem_pull(&a, 1000), mem_pull(&b, 1000);
     CHECK_INT(a.last[PAL_CONTROL_HELLO].hello.you_tool, 1);
     CHECK_INT(b.last[PAL_CONTROL_HELLO].hello.you_tool, PAL_WIRE_TOOL_NONE);
     CHECK_TEXT(b.last[PAL_CONTROL_ERROR].error.code, "tool_taken");
     CHECK(strcmp(b.last[PAL_CONTROL_HELLO].hello.you_name, "Ada") != 0); /* names are unique */
     mem_text(&b, "{\"type\":\"take_tool\",\"tool\":0}");
-    mem_join(&c, road, "Eve", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_ANY);
+    mem_join(&c, transport, "Eve", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_ANY);
     mem_pull(&c, 1000);
     CHECK_INT(c.last[PAL_CONTROL_HELLO].hello.you_tool, PAL_WIRE_TOOL_NONE);
     CHECK_TEXT(c.last[PAL_CONTROL_ERROR].error.code, "tool_taken");
@@ -312,8 +312,8 @@ static void pose_of_the_holder_moves_the_tool_and_is_echoed(void)
     mem_client a, b;
     const double at[3] = {0.01, -0.02, 0.3}, elsewhere[3] = {0.5, 0.5, 0.5};
     begin(false, 0);
-    mem_join(&a, road, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
-    mem_join(&b, road, "Bob", PAL_WIRE_ROLE_TRAINEE, 1);
+    mem_join(&a, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    mem_join(&b, transport, "Bob", PAL_WIRE_ROLE_TRAINEE, 1);
     UNTIL(a.n_tools && b.n_tools, &a, &b);
     CHECK(a.tools.tool[0].flags & PAL_WIRE_TOOL_AWAY);
     mem_pose(&a, 0, 7, at);
@@ -342,8 +342,8 @@ static void viewer_moves_no_tool_and_gives_no_command(void)
     mem_client v, t;
     const double at[3] = {0, 0, 0.1};
     begin(false, 0);
-    mem_join(&v, road, "Vera", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_ANY);
-    mem_join(&t, road, "Tim", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
+    mem_join(&v, transport, "Vera", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_ANY);
+    mem_join(&t, transport, "Tim", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
     UNTIL(v.n_tools && t.n_tools, &v, &t);
     CHECK_INT(v.last[PAL_CONTROL_HELLO].hello.you_tool, PAL_WIRE_TOOL_NONE);
     for (uint32_t i = 1; i < 20; i++) {
@@ -368,7 +368,7 @@ static void commands_are_checked_and_carried_out(void)
 {
     mem_client a;
     begin(true, 0);
-    mem_join(&a, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    mem_join(&a, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     static const char *const refused[][2] = {
         {"{\"type\":\"command\",\"verb\":\"explode\"}", "verb"},
         {"{\"type\":\"command\",\"verb\":\"material\",\"target\":\"brain\",\"args\":{\"young_Pa\":1}}", "target"},
@@ -403,11 +403,11 @@ static void hostile_messages_close_with_a_reason_and_nobody_else_notices(void)
     pal_wire_pose p = {.quaternion = {1, 0, 0, 0}};
     pal_wire_put_ack(ack, sizeof ack, &(pal_wire_ack){.cycle = 99999999});
     begin(false, 0);
-    mem_join(&good, road, "good", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    mem_join(&good, transport, "good", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     for (int kind = 0; kind < 11; kind++) {
         int code = PAL_WIRE_CLOSE_PROTOCOL;
         pal_wire_put_pose(pose, sizeof pose, &p);
-        mem_join(&bad, road, "bad", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+        mem_join(&bad, transport, "bad", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
         UNTIL(bad.n_tools > 0, &good, &bad);
         switch (kind) {
         case 0:
@@ -463,16 +463,16 @@ static void strangers_are_turned_away(void)
 {
     mem_client a, b;
     begin(true, 3);
-    pal_mem_peer *lost = pal_mem_connect(road, "no-such-session"), *silent = pal_mem_connect(road, "small");
+    pal_mem_peer *lost = pal_mem_connect(transport, "no-such-session"), *silent = pal_mem_connect(transport, "small");
     CHECK_INT(pal_mem_code(lost), PAL_WIRE_CLOSE_NO_SESSION);
     const double at[3] = {0, 0, 0};
-    mem_client early = {.road = road, .peer = pal_mem_connect(road, "")};
+    mem_client early = {.transport = transport, .peer = pal_mem_connect(transport, "")};
     mem_pose(&early, 0, 1, at);
     CHECK_INT(pal_mem_code(early.peer), PAL_WIRE_CLOSE_POLICY); /* join comes first */
     mem_end(&early);
-    mem_join(&a, road, "a", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
-    mem_join(&b, road, "b", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
-    pal_mem_peer *fourth = pal_mem_connect(road, "");
+    mem_join(&a, transport, "a", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&b, transport, "b", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    pal_mem_peer *fourth = pal_mem_connect(transport, "");
     CHECK_INT(pal_mem_code(fourth), PAL_WIRE_CLOSE_FULL);
     for (int i = 0; i < 330 && !pal_mem_code(silent); i++) turn(&a, &b); /* 5.5 s */
     CHECK_INT(pal_mem_code(silent), PAL_WIRE_CLOSE_POLICY);
@@ -489,7 +489,7 @@ static void answers_that_nobody_reads_close_the_peer(void)
 {
     mem_client a;
     begin(true, 0);
-    mem_join(&a, road, "a", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&a, transport, "a", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     size_t fixed = pal_packet_total();
     int n = 0;
     while (!pal_mem_code(a.peer) && n < 100) mem_text(&a, "{\"type\":\"ping\",\"stamp_ms\":1}"), n++;
@@ -526,8 +526,8 @@ static void a_field_goes_only_to_those_who_ask_and_ends_with_them(void)
 {
     mem_client ada, bob;
     begin(false, 0);
-    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
-    mem_join(&bob, road, "Bob", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&bob, transport, "Bob", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     UNTIL(ada.n_tools > 2 && bob.n_tools > 2, &ada, &bob);
     const pal_wire_hello *hello = &ada.last[PAL_CONTROL_HELLO].hello;
     CHECK_INT(hello->part[0].n_field, 2);
@@ -573,7 +573,7 @@ static void a_field_comes_while_paused_and_is_not_sent_twice(void)
 {
     mem_client ada;
     begin(true, 0);
-    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     UNTIL(ada.n_tools > 0, &ada, NULL);
     mem_text(&ada, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}");
     UNTIL(ada.n_field > 0, &ada, NULL);
@@ -588,8 +588,8 @@ static void a_client_that_acknowledges_nothing_gets_no_more_fields(void)
 {
     mem_client deaf, other;
     begin(false, 0);
-    mem_join(&deaf, road, "deaf", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
-    mem_join(&other, road, "other", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&deaf, transport, "deaf", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&other, transport, "other", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     UNTIL(deaf.n_tools > 2 && other.n_tools > 2, &other, &deaf);
     mem_text(&deaf, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}");
     mem_text(&other, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}");
@@ -615,7 +615,7 @@ static void what_cannot_be_shown_is_answered_with_a_sentence(void)
                {"{\"type\":\"subscribe_field\",\"part\":7,\"field\":\"displacement\"}", "part", "7"}};
     mem_client a;
     begin(true, 0);
-    mem_join(&a, road, "a", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&a, transport, "a", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     UNTIL(a.n_tools > 0, &a, NULL);
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         mem_text(&a, bad[i].text);

@@ -47,7 +47,7 @@ static void rows_say_whose_they_are_and_what_called_for_them(void)
 {
     mem_client ada;
     begin(false);
-    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
     UNTIL(ada.n_text[PAL_CONTROL_STATUS] > 2, &ada, NULL);
     const pal_wire_hello *h = &ada.last[PAL_CONTROL_HELLO].hello;
     CHECK(h->n_component > 3 && h->n_component_part == h->n_component && h->n_component_reason == h->n_component);
@@ -75,8 +75,8 @@ static void an_instructor_switches_a_row_off_and_on_and_all_hear_of_it(void)
 {
     static mem_client ada, bo;
     begin(false);
-    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
-    mem_join(&bo, road, "Bo", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    mem_join(&bo, transport, "Bo", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     UNTIL(ada.n_text[PAL_CONTROL_STATUS] > 2 && bo.n_text[PAL_CONTROL_STATUS] > 0, &ada, &bo);
     pal_wire_hello *h = &ada.last[PAL_CONTROL_HELLO].hello;
     const pal_wire_status *a = &ada.last[PAL_CONTROL_STATUS].status, *b = &bo.last[PAL_CONTROL_STATUS].status;
@@ -124,8 +124,8 @@ static void others_do_not_and_bad_orders_are_refused(void)
                                           "component: part 1, wanted 0 to 0", "there is no body liver"};
     static mem_client ada, bo;
     begin(false);
-    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
-    mem_join(&bo, road, "Bo", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
+    mem_join(&bo, transport, "Bo", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     turn(&ada, &bo);
     for (int i = 0; i < 4; i++) {
         mem_client *who = i == 0 ? &bo : &ada;
@@ -143,7 +143,7 @@ static void everybody_resets_what_was_stopped_and_a_viewer_nothing_else(void)
 {
     static mem_client cy;
     begin(true);
-    mem_join(&cy, road, "Cy", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&cy, transport, "Cy", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     const pal_wire_status *s = &cy.last[PAL_CONTROL_STATUS].status;
     UNTIL(s->frozen && s->n_state == 1, &cy, NULL);
     CHECK(s->state[0].frozen && s->state[0].n_safeguard == 1);
@@ -162,7 +162,7 @@ static void everybody_resets_what_was_stopped_and_a_viewer_nothing_else(void)
 static double counter(const char *name)
 {
     pal_reply reply = {0};
-    pal_mem_get(road, "/metrics", &reply);
+    pal_mem_get(transport, "/metrics", &reply);
     if (!reply.body) return NAN;
     char line[128];
     snprintf(line, sizeof line, "\n%s ", name);
@@ -179,7 +179,7 @@ static void a_body_asleep_is_neither_stepped_nor_encoded(void)
     pal_config_entry gravity = organ.scene.body[0].effect[0];
     pal_entry_init(&organ.scene.body[0].effect[0], "effects[0]", "sleep");
     begin(false);
-    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, 0);
     const pal_wire_status *s = &ada.last[PAL_CONTROL_STATUS].status;
     UNTIL(s->n_state == 1 && s->state[0].asleep && ada.n_frame > 0, &ada, NULL);
     UNTIL(s->n_component > 3, &ada, NULL);

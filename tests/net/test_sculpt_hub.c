@@ -71,7 +71,7 @@ static void assets_that_have_been_replaced_can_still_be_fetched(void)
     snprintf(first, sizeof first, "%s", part(&c)->asset);
     CHECK(order(&c, "divide", TOP));
     CHECK(strcmp(first, part(&c)->asset) != 0);
-    pal_mem_get(road, first, &reply);
+    pal_mem_get(transport, first, &reply);
     CHECK_INT(reply.status, 200);
     pal_packet_drop(reply.body);
     /* not for ever */
@@ -80,7 +80,7 @@ static void assets_that_have_been_replaced_can_still_be_fetched(void)
         snprintf(args, sizeof args, "\"nx\":0,\"ny\":0,\"nz\":1,\"offset_m\":%g", -0.03 + 0.005 * i);
         CHECK(order(&c, "cut", args));
     }
-    pal_mem_get(road, first, &reply);
+    pal_mem_get(transport, first, &reply);
     CHECK_INT(reply.status, 404);
     pal_packet_drop(reply.body);
     mem_end(&c);

@@ -145,7 +145,7 @@ static const pal_wire_neighbour *next_size(const pal_wire_estimate *e)
 }
 
 /* while somebody looks the bound is that of the estimate and of the neighbour on the parameter */
-static void a_knob_keeps_the_errors_foreseen(bool pressed)
+static void a_parameter_change_keeps_the_predicted_errors(bool pressed)
 {
     mem_client c;
     char args[64];
@@ -179,14 +179,14 @@ static void a_knob_keeps_the_errors_foreseen(bool pressed)
     end();
 }
 
-static void a_knob_at_rest_keeps_the_errors_foreseen(void)
+static void a_parameter_change_at_rest_keeps_the_predicted_errors(void)
 {
-    a_knob_keeps_the_errors_foreseen(false);
+    a_parameter_change_keeps_the_predicted_errors(false);
 }
 
-static void a_knob_under_a_press_keeps_them_too(void)
+static void a_parameter_change_under_a_press_keeps_them_too(void)
 {
-    a_knob_keeps_the_errors_foreseen(true);
+    a_parameter_change_keeps_the_predicted_errors(true);
 }
 
 /* no study, and nobody looks: what it moved is told, a bound is not made up */
@@ -235,8 +235,8 @@ int main(void)
     make_study();
     RUN(a_press_is_estimated_as_it_is_shown);
     RUN_LONG(every_pair_keeps_the_errors_shown);
-    RUN(a_knob_at_rest_keeps_the_errors_foreseen);
-    RUN_LONG(a_knob_under_a_press_keeps_them_too);
+    RUN(a_parameter_change_at_rest_keeps_the_predicted_errors);
+    RUN_LONG(a_parameter_change_under_a_press_keeps_them_too);
     RUN(without_errors_shown_there_is_no_bound);
     RUN_LONG(an_old_estimate_bounds_nothing);
     pal_prepared_free(&mesh);

@@ -106,7 +106,7 @@ static void wait_frames(mem_client *c, int n)
 }
 
 /* a pressure goes on at another number of levels; where nothing can be sculpted it ends, and the answer says so */
-static void a_pressure_goes_on(void)
+static void a_pressure_is_transferred(void)
 {
     mem_client c;
     uint32_t seq = 0;
@@ -132,7 +132,7 @@ static void a_pressure_goes_on(void)
 }
 
 /* a handle as well: it goes on pulling to where it pulled, and its hand ends it */
-static void a_handle_goes_on(void)
+static void a_handle_is_transferred(void)
 {
     mem_client c;
     uint32_t seq = 0;
@@ -162,7 +162,7 @@ static void a_handle_goes_on(void)
 static void what_cannot_be_is_refused_with_a_sentence(void)
 {
     static const struct {
-        const char *verb, *args, *says;
+        const char *verb, *args, *expected;
     } bad[] = {
         {"study_point", "", "index is missing"},           {"study_point", "\"index\":7", "wanted 0 to 2"},
         {"study_point", "\"index\":0.5", "wanted 0 to 2"}, {"study_point", "\"index\":0,\"size\":3", "takes index"},
@@ -174,8 +174,8 @@ static void what_cannot_be_is_refused_with_a_sentence(void)
     join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         CHECK(!order(&c, bad[i].verb, bad[i].args));
-        CHECK(strstr(trouble(&c), bad[i].says) != NULL);
-        if (!strstr(trouble(&c), bad[i].says)) printf("  %s\n", trouble(&c));
+        CHECK(strstr(trouble(&c), bad[i].expected) != NULL);
+        if (!strstr(trouble(&c), bad[i].expected)) printf("  %s\n", trouble(&c));
     }
     CHECK_INT(c.n_text[PAL_CONTROL_TOPOLOGY], 0);
     mem_text(&c, "{\"type\":\"command\",\"verb\":\"study_point\",\"target\":\"stone\",\"args\":{\"index\":1}}");
@@ -212,8 +212,8 @@ int main(void)
     setting(2, "subdivision_fem", "", 2);
     RUN_SERIAL(two_clients_see_a_point_of_the_study);
     RUN(tools_stay_with_who_holds_them);
-    RUN_SERIAL(a_pressure_goes_on);
-    RUN_SERIAL(a_handle_goes_on);
+    RUN_SERIAL(a_pressure_is_transferred);
+    RUN_SERIAL(a_handle_is_transferred);
     RUN(what_cannot_be_is_refused_with_a_sentence);
     RUN(a_server_that_ends_in_the_middle_ends);
     clay_free(&clay);

@@ -5,7 +5,7 @@
 #include "tests/net/adaptive_scene.h"
 #include "tests/net/server_fixture.h"
 
-static adaptive_scene calm, storm, weightless;
+static adaptive_scene low_gravity, storm, weightless;
 static void begin(const adaptive_scene *which)
 {
     served_begin(&which->scene, (pal_session_options){.start_paused = true, .unpaced = true}, (pal_server_options){0});
@@ -40,7 +40,7 @@ static void step(mem_client *c)
 
 static void join(mem_client *c, const char *name, bool patches)
 {
-    mem_join_as(c, road, name, PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE, patches);
+    mem_join_as(c, transport, name, PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE, patches);
     mem_pull(c, 1000);
 }
 
@@ -77,7 +77,7 @@ static double apart(const mem_client *a, const mem_client *b)
 static void hello_tells_which_parts_adapt_and_the_asset_holds_the_finest_level(void)
 {
     mem_client c;
-    begin(&calm);
+    begin(&low_gravity);
     join(&c, "Ada", true);
     const pal_wire_part_info *part = &c.last[PAL_CONTROL_HELLO].hello.part[0];
     CHECK(part->is_adaptive);
@@ -315,7 +315,7 @@ static void triangles_that_change_while_nothing_moves_come_with_a_frame(void)
 static void at_rest_nothing_is_sent(void)
 {
     mem_client c;
-    begin(&calm);
+    begin(&low_gravity);
     join(&c, "Ada", true);
     next_cycle(&c);
     mem_text(&c, "{\"type\":\"command\",\"verb\":\"resume\"}");
@@ -336,7 +336,7 @@ static void at_rest_nothing_is_sent(void)
 
 int main(void)
 {
-    if (!adaptive_scene_make(&calm, ADAPTIVE_CALM) || !adaptive_scene_make(&storm, ADAPTIVE_STORM) ||
+    if (!adaptive_scene_make(&low_gravity, ADAPTIVE_LOW_GRAVITY) || !adaptive_scene_make(&storm, ADAPTIVE_STORM) ||
         !adaptive_scene_make(&weightless, ADAPTIVE_WEIGHTLESS))
         return 1;
     RUN(hello_tells_which_parts_adapt_and_the_asset_holds_the_finest_level);
@@ -346,7 +346,7 @@ int main(void)
     RUN_LONG(a_change_of_accuracy_loses_no_triangle);
     RUN(triangles_that_change_while_nothing_moves_come_with_a_frame);
     RUN_SERIAL(at_rest_nothing_is_sent);
-    adaptive_scene_free(&calm);
+    adaptive_scene_free(&low_gravity);
     adaptive_scene_free(&storm);
     adaptive_scene_free(&weightless);
     return check_report();

@@ -25,8 +25,8 @@ static void a_verb_of_ones_own_table_is_checked_and_run(void)
     n_run = 0;
     served_begin(&fixture.scene, (pal_session_options){.start_paused = true},
                  (pal_server_options){.verb = own, .n_verb = 1});
-    mem_join(&ada, road, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
-    mem_join(&bo, road, "Bo", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
+    mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_NONE);
+    mem_join(&bo, transport, "Bo", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     mem_text(&ada, "{\"type\":\"command\",\"verb\":\"whistle\",\"args\":{\"pitch_Hz\":440}}");
     mem_text(&bo, "{\"type\":\"command\",\"verb\":\"whistle\",\"args\":{\"pitch_Hz\":440}}");
     mem_pull(&ada, 100), mem_pull(&bo, 100);

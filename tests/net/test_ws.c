@@ -108,8 +108,8 @@ static void upgrade_needs_the_subprotocol_the_path_and_the_own_origin(void)
     }
     /* a foreign name that resolves to this machine */
     int fd = raw_connect(port);
-    raw_say(fd,
-            "GET /ws HTTP/1.1\r\nHost: evil.example\r\nOrigin: http://evil.example\r\nConnection: Upgrade\r\n"
+    raw_send_text(
+        fd, "GET /ws HTTP/1.1\r\nHost: evil.example\r\nOrigin: http://evil.example\r\nConnection: Upgrade\r\n"
             "Upgrade: websocket\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n" PALPATE
             "\r\n");
     CHECK_INT(raw_head(fd, head, sizeof head), 403);
@@ -148,9 +148,9 @@ static void other_upgrades_leave_the_server_well(void)
                  "HTTP2-Settings: AAMAAABkAAQCAAAAAAIAAAAA\r\n\r\n",
                  port, wanted[i]);
         int fd = raw_connect(port);
-        raw_say(fd, request);
+        raw_send_text(fd, request);
         raw_head(fd, head, sizeof head);
-        raw_say(fd, "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n");
+        raw_send_text(fd, "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n");
         CHECK(still_serves());
         close(fd);
     }
@@ -195,7 +195,7 @@ static void one_connection_serves_many_requests(void)
     int fd = raw_connect(port);
     snprintf(request, sizeof request, "GET / HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", port);
     for (int i = 0; i < 20; i++) {
-        raw_say(fd, request);
+        raw_send_text(fd, request);
         CHECK_INT(raw_head(fd, head, sizeof head), 200);
         CHECK_INT(raw_get(fd, body, 9), 9);
     }
@@ -210,7 +210,7 @@ static void large_file_arrives_whole_at_a_slow_reader(void)
     size_t at = 0, wrong = 0;
     setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &small, sizeof small);
     snprintf(request, sizeof request, "GET /large.bin HTTP/1.1\r\nHost: localhost:%d\r\n\r\n", port);
-    raw_say(fd, request);
+    raw_send_text(fd, request);
     CHECK_INT(raw_head(fd, head, sizeof head), 200);
     while (at < LARGE) {
         size_t n = raw_get(fd, piece, at + sizeof piece < LARGE ? sizeof piece : LARGE - at);
@@ -221,7 +221,7 @@ static void large_file_arrives_whole_at_a_slow_reader(void)
     CHECK_INT(at, LARGE);
     CHECK_INT(wrong, 0);
     /* and the connection goes on */
-    raw_say(fd, "GET / HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    raw_send_text(fd, "GET / HTTP/1.1\r\nHost: localhost\r\n\r\n");
     CHECK_INT(raw_head(fd, head, sizeof head), 200);
     close(fd);
 }
@@ -367,8 +367,8 @@ static void half_open_connections_keep_nobody_out(void)
 {
     for (int i = 0; i < CROWD; i++) {
         crowd[i] = raw_connect(port);
-        if (i % 3 == 1) raw_say(crowd[i], "GET / HTTP/1.1\r\nHost: 127.");
-        if (i % 3 == 2) raw_say(crowd[i], "\x16\x03\x01\x02\x00\x01garbage\r\n\r\n");
+        if (i % 3 == 1) raw_send_text(crowd[i], "GET / HTTP/1.1\r\nHost: 127.");
+        if (i % 3 == 2) raw_send_text(crowd[i], "\x16\x03\x01\x02\x00\x01garbage\r\n\r\n");
     }
     CHECK(still_serves());
     int client = joined(WATCH);

@@ -192,8 +192,8 @@ static void check_finds_every_broken_table(void)
     CHECK_INT(pal_frame_order_check(o), PAL_REFUSAL_ORDER);
     o->weight[4 * last]--;
     CHECK_INT(pal_frame_order_check(o), PAL_REFUSAL_NONE);
-    const int16_t wild[4] = {8000, -3904, 0, 0};
-    memcpy(o->weight + 4 * last, wild, sizeof wild);
+    const int16_t extreme[4] = {8000, -3904, 0, 0};
+    memcpy(o->weight + 4 * last, extreme, sizeof extreme);
     memset(o->neighbour + 4 * last, 0, 4 * sizeof *o->neighbour);
     CHECK_INT(pal_frame_order_check(o), PAL_REFUSAL_ORDER);
     pal_frame_order_destroy(o);

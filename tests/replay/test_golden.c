@@ -92,7 +92,7 @@ static void press_and_grasp(pal_world *world, int tick)
     pal_world_pose(world, 1, tick < 70 ? &pull : NULL);
 }
 
-static void a_pressed_and_grabbed_block_has_its_golden_hash(void)
+static void a_pressed_and_grasped_block_has_its_golden_hash(void)
 {
     pal_prepared box;
     REQUIRE(!box_make(4, 3, 3, 0.01, &box));
@@ -108,7 +108,7 @@ static void a_pressed_and_grabbed_block_has_its_golden_hash(void)
 
 /* our stomach, held at one end, on three levels: pressed at the front and grabbed beside it, both let go; levels come
  * and go */
-static void a_pressed_and_grabbed_stomach_that_adapts_has_its_golden_hash(void)
+static void a_pressed_and_grasped_stomach_that_adapts_has_its_golden_hash(void)
 {
     pal_stomach stomach;
     REQUIRE(!pal_stomach_make(&stomach));
@@ -151,9 +151,9 @@ static void a_pressed_and_grabbed_stomach_that_adapts_has_its_golden_hash(void)
 
 int main(void)
 {
-    RUN(a_pressed_and_grabbed_stomach_that_adapts_has_its_golden_hash);
+    RUN(a_pressed_and_grasped_stomach_that_adapts_has_its_golden_hash);
     RUN(a_pulled_and_stiffened_block_has_its_golden_hash);
     RUN(a_collapsed_and_a_tumbling_body_have_their_golden_hash);
-    RUN(a_pressed_and_grabbed_block_has_its_golden_hash);
+    RUN(a_pressed_and_grasped_block_has_its_golden_hash);
     return check_report();
 }

@@ -64,11 +64,11 @@ static double apart(const pal_body *a, const pal_body *b)
 }
 
 /* the others of a step: how many are what they are without the disturbance, and how far off the worst one is */
-static int others(const fem_beam *hurt, const fem_beam *calm, int which, double *max_S)
+static int others(const fem_beam *hurt, const fem_beam *reference, int which, double *max_S)
 {
     int n = 0;
     for (int k = 0; k < 3; k++) {
-        const pal_body *a = pal_world_body(hurt->world, k), *b = pal_world_body(calm->world, k);
+        const pal_body *a = pal_world_body(hurt->world, k), *b = pal_world_body(reference->world, k);
         if (k == which) continue;
         n += same_bits(a, b);
         *max_S = fmax(*max_S, apart(a, b));
@@ -79,17 +79,17 @@ static int others(const fem_beam *hurt, const fem_beam *calm, int which, double 
 /* the body is stopped and says why, the others run on, and it alone is reset */
 static void stop_one(disturbance *what, int which, bool springs, bool shared)
 {
-    fem_beam hurt, calm;
+    fem_beam hurt, reference;
     int n_same = 0, n_step = STEPS + 3;
     double max_S = 0;
     three_make(&hurt, springs);
-    three_make(&calm, springs);
+    three_make(&reference, springs);
     const pal_body *stopped = pal_world_body(hurt.world, which);
     for (int i = 0; i < n_step; i++) {
         if (i == AT) what(hurt.world, which);
         (void)pal_world_step(hurt.world, hurt.scene->step_s);
-        CHECK(!pal_world_step(calm.world, calm.scene->step_s));
-        n_same += others(&hurt, &calm, which, &max_S);
+        CHECK(!pal_world_step(reference.world, reference.scene->step_s));
+        n_same += others(&hurt, &reference, which, &max_S);
         if (i != STEPS) continue;
         CHECK(stopped->frozen && stopped->reason[0] && stopped->safeguards.n_stopped == 1 && pal_body_finite(stopped));
         for (int k = 0; k < 3; k++) CHECK(pal_world_body(hurt.world, k)->frozen == (k == which));
@@ -100,7 +100,7 @@ static void stop_one(disturbance *what, int which, bool springs, bool shared)
     CHECK(!stopped->frozen && (shared ? max_S < 0.02 : n_same == 2 * n_step));
     for (int k = 0; k < 3; k++) CHECK(pal_body_finite(pal_world_body(hurt.world, k)));
     beam_free(&hurt);
-    beam_free(&calm);
+    beam_free(&reference);
 }
 
 /* only the springs limit the sub-step of the three */

@@ -298,7 +298,7 @@ static void what_cannot_be_made_is_refused_with_a_sentence(void)
 {
     const struct {
         pal_configuration to;
-        const char *says;
+        const char *expected;
     } bad[] = {{{.model = "adaptive_springs", .size = 2}, "does not take model"},
                {{.model = "marble"}, "no model"},
                {{.model = "fem", .element = "hex9", .size = 8}, "no element"},
@@ -314,8 +314,8 @@ static void what_cannot_be_made_is_refused_with_a_sentence(void)
         pal_configuration_switch *change = NULL;
         CHECK_INT(pal_configuration_switch_prepare(pal_session_scene(s), &scene.body[0], 0, &bad[i].to, &diag, &change),
                   PAL_ERR_REFUSED);
-        CHECK(!change && strstr(diag.text, bad[i].says));
-        if (!strstr(diag.text, bad[i].says)) printf("  %s\n", diag.text);
+        CHECK(!change && strstr(diag.text, bad[i].expected));
+        if (!strstr(diag.text, bad[i].expected)) printf("  %s\n", diag.text);
     }
     pal_diagnostic diag = {""};
     pal_configuration_switch *change = NULL;

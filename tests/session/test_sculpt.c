@@ -287,13 +287,13 @@ static void paint_makes_heavier_and_stiffer_where_it_is(void)
     CHECK_NEAR(pal_world_body(s.world, 0)->model.solid->samples[PAL_CELL_HEX].young_Pa[17], 10000, 1e-2);
     static const struct {
         pal_stroke stroke;
-        const char *says;
+        const char *expected;
     } bad[] = {{{{0, 0, 0}, 0, 0, 1, 1}, "radius_m: 0"},     {{{0, 0, 0}, NAN, 0, 1, 1}, "radius_m: nan"},
                {{{0, 0, 0}, 1, 2, 1, 1}, "soft: 2"},         {{{0, NAN, 0}, 1, 0, 1, 1}, "at_m[1]"},
                {{{0, 0, 0}, 1, 0, 0, 1}, "young_factor: 0"}, {{{0, 0, 0}, 1, 0, 1, INFINITY}, "density_factor: inf"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         CHECK_INT(studio_do(&s, &(pal_sculpt){.kind = PAL_SCULPT_PAINT, .stroke = bad[i].stroke}), PAL_ERR_REFUSED);
-        if (!strstr(diag.text, bad[i].says)) CHECK_FAIL("\"%s\" does not name %s", diag.text, bad[i].says);
+        if (!strstr(diag.text, bad[i].expected)) CHECK_FAIL("\"%s\" does not name %s", diag.text, bad[i].expected);
     }
     CHECK_INT(pal_sculptor_undo_count(s.sculptor), 1);
     studio_close(&s);

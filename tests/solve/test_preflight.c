@@ -124,7 +124,7 @@ static void elements_that_lock_are_named_with_one_that_does_not(void)
 }
 
 /* a row whose cost nobody measured: no figure instead of one that leaves it out */
-static void what_costs_of_unknown_rows_is_not_foreseen(void)
+static void costs_of_unknown_components_are_not_predicted(void)
 {
     fem_beam b;
     pal_preflight p;
@@ -174,7 +174,7 @@ int main(void)
     RUN(the_limit_is_the_bodys_and_its_node_is_found);
     RUN(the_slowest_motion_of_a_bar_is_that_of_beams);
     RUN(elements_that_lock_are_named_with_one_that_does_not);
-    RUN(what_costs_of_unknown_rows_is_not_foreseen);
+    RUN(costs_of_unknown_components_are_not_predicted);
     RUN(what_nothing_holds_has_no_slowest_motion);
     RUN(what_cannot_run_is_refused_with_the_node_that_is_to_blame);
     return check_report();

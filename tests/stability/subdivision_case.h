@@ -87,7 +87,7 @@ static inline void solid_momentum(const pal_body *body, double linear[3], double
 }
 
 enum { SOLID_PLANE, SOLID_POINT, SOLID_MIRROR, SOLID_BLOWN, SOLID_SHUFFLE, SOLID_SWAP, SOLID_CASES };
-static const char *const solid_insults[] = {"plane", "point", "mirror", "x 100", "shuffle", "swap"};
+static const char *const subdivision_case_names[] = {"plane", "point", "mirror", "x 100", "shuffle", "swap"};
 
 static inline void solid_case(solid_scene *s, int trial_case, uint64_t seed)
 {

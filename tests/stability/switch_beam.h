@@ -12,7 +12,7 @@
 
 #define LENGTH 0.2
 #define WIDTH  0.05
-enum { MOST = 8 };
+enum { MAX_LEVELS = 8 };
 
 static bool table;
 
@@ -32,9 +32,9 @@ typedef struct beam {
     pal_cells cells;
     pal_scene *scene;
     int n;
-    pal_configured_scene *set[MOST];
-    double rest_m[MOST]; /* of the tip, upward */
-    double right_m;      /* the same by a finer mesh */
+    pal_configured_scene *set[MAX_LEVELS];
+    double rest_m[MAX_LEVELS]; /* of the tip, upward */
+    double right_m;            /* the same by a finer mesh */
 } beam;
 
 static inline pal_world *open_world(const pal_scene *scene)

@@ -47,7 +47,7 @@ typedef struct pulled {
     double energy, frame_m, shown_m, force, end_N;
 } pulled;
 
-static inline double grip_N(pal_world *w)
+static inline double grasp_N(pal_world *w)
 {
     return pal_norm3(pal_world_tools(w)->tool[0].mean_force_N);
 }
@@ -98,18 +98,18 @@ static void pull_and_switch(const beam *b, const pull_plan *p, pulled *out)
     pal_world_destroy(finest);
     if (p->turned) turn_body(w);
     for (int s = 0; s <= p->n; s++) {
-        double was_N = grip_N(w);
+        double was_N = grasp_N(w);
         if (s > 0) w = change_levels(b, p->setting[s - 1], p->setting[s], w, out);
         (void)farthest_vertex(w, x, n);
         for (int i = 0; i < p->wait[s]; i++, k++) {
             pull_step(w, p, k);
             double frame_m = farthest_vertex(w, x, n);
             if (k > p->lift) out->frame_m = fmax(out->frame_m, frame_m);
-            if (s > 0 && i == 0) out->force = fmax(out->force, fabs(grip_N(w) / was_N - 1));
+            if (s > 0 && i == 0) out->force = fmax(out->force, fabs(grasp_N(w) / was_N - 1));
         }
         CHECK(pal_world_tools(w)->tool[0].holding && !pal_world_view_body(w, 0)->frozen);
     }
-    out->end_N = grip_N(w);
+    out->end_N = grasp_N(w);
     free(x);
     pal_world_destroy(w);
 }
@@ -121,7 +121,7 @@ static double pull_alone_N(const beam *b, const pull_plan *p)
     int n = 0;
     for (int s = 0; s <= p->n; s++) n += p->wait[s];
     for (int k = 0; k < n; k++) pull_step(w, p, k);
-    double end_N = grip_N(w);
+    double end_N = grasp_N(w);
     pal_world_destroy(w);
     return end_N;
 }

@@ -3,13 +3,13 @@
 #include "tests/fixtures/adaptive_worlds.h"
 #include "tests/stability/hard_case.h"
 
-enum { STEPS_A_SECOND = 60, MOST = 64 };
+enum { STEPS_A_SECOND = 60, MAX_VERTICES = 64 };
 
 /* grows triangle by triangle; positions are taken as they are written */
 typedef struct odd {
     const char *name;
-    double x[MOST][3];
-    int32_t tri[2 * MOST][3];
+    double x[MAX_VERTICES][3];
+    int32_t tri[2 * MAX_VERTICES][3];
     int n_vertex, n_tri;
 } odd;
 

@@ -95,7 +95,7 @@ static void shuffled_bodies_come_back_for_every_seed(void)
 }
 
 /* the counters tell of it, and the energy of the shape the switch happens at bounds what follows */
-static void mirrored_hexahedra_are_found_untangled_and_counted(void)
+static void mirrored_hexahedra_are_found_recovered_and_counted(void)
 {
     for (int k = HARD_HEX; k <= HARD_NEO_HEX; k += HARD_NEO_HEX - HARD_HEX) {
         fem_beam b;
@@ -208,7 +208,7 @@ int main(void)
     RUN(an_element_that_is_turned_over_turns_back);
     RUN(flat_collapsed_mirrored_and_blown_up_bodies_come_back);
     RUN(shuffled_bodies_come_back_for_every_seed);
-    RUN(mirrored_hexahedra_are_found_untangled_and_counted);
+    RUN(mirrored_hexahedra_are_found_recovered_and_counted);
     RUN(free_bodies_come_back_to_their_shape);
     RUN(hardly_filled_voxels_come_to_rest);
     RUN(a_pressed_body_is_not_straightened);

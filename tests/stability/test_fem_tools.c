@@ -25,13 +25,13 @@ static void check_caps(const tool_scene *s)
 static void check_comes_back(tool_scene *s)
 {
     for (int t = 0; t < pal_world_tools(s->world)->n_tool; t++) pal_world_pose(s->world, t, NULL);
-    int calm = 0;
-    for (int i = 0; i < 300 && calm < 30; i++) {
+    int n_at_rest = 0;
+    for (int i = 0; i < 300 && n_at_rest < 30; i++) {
         REQUIRE(step_world(s, 1));
-        calm = rms_displacement(s->body) <= 1e-3 * s->body->length_scale_m ? calm + 1 : 0;
+        n_at_rest = rms_displacement(s->body) <= 1e-3 * s->body->length_scale_m ? n_at_rest + 1 : 0;
     }
     CHECK(!s->body->frozen);
-    CHECK_INT(calm, 30);
+    CHECK_INT(n_at_rest, 30);
 }
 
 /* fewer voxels for elements of ten nodes */

@@ -75,7 +75,7 @@ static double case_all(int kind, double poisson, int n_seed, double *max)
         if (n > 1) HARD_CASE_ALL(id, "subdivision_fem", "shuffled or exchanged: back within 10 s", back, n);
         HARD_CASE(id, "subdivision_fem", "energy over the insult's", *max, 1.01, "");
         HARD_CASE(id, "subdivision_fem", "within 0.1 % S of rest after", late, 10, "s");
-        printf(" %s %d of %d (%.2f s)", solid_insults[trial_case], back, n, late);
+        printf(" %s %d of %d (%.2f s)", subdivision_case_names[trial_case], back, n, late);
         last = fmax(last, late);
     }
     printf(", energy up to %.3f\n", *max);

@@ -237,7 +237,7 @@ static void lift_and_turn(pal_world *w, int k)
 /* a grip is handed over while its tool turns: its force goes on in size and direction (a
  * tool has no torque of its own), and tissue turns with the tool as in a body that
  * was held so from the start */
-static void a_turning_grip_goes_on(void)
+static void a_turning_grasp_is_transferred(void)
 {
     const int pair[3][2] = {{0, 1}, {0, 6}, {6, 1}};
     for (int n = 0; n < 3; n++) {
@@ -282,7 +282,7 @@ static void a_turning_grip_goes_on(void)
 
 /* and of another surface it holds the same tissue: what solids show are no voxels. After six switches it pulls as if
  * it had always held that body */
-static void grips_go_between_surfaces(void)
+static void grasps_transfer_between_surfaces(void)
 {
     const pal_configuration list[2] = {{.model = "subdivision_fem", .size = 1, .solver = "implicit_euler"}, full[0]};
     pal_world *w[2];
@@ -457,7 +457,7 @@ static void a_pulled_surface_goes_between_levels(void)
 
 /* and pulls as a body without switches in the end: what it holds follows from the refinement alone (where vertices'
  * weights were handed from one refinement to the next, and the hold went by where they stood, 4 to 60 % off) */
-static void a_grip_on_a_surface_comes_back_to_its_force(void)
+static void a_grasp_on_a_surface_comes_back_to_its_force(void)
 {
     const struct {
         const char *text;
@@ -496,7 +496,7 @@ static void a_surface_that_is_drawn_out_is_still(void)
         if (k > 60) max_J = fmax(max_J, pal_body_kinetic_J(pal_world_view_body(w, 0)));
     }
     if (table) printf("  drawn out: kinetic %.2g of %.2g J at most\n", max_J, pal_world_energy_J(w));
-    CHECK(grip_N(w) > 4);
+    CHECK(grasp_N(w) > 4);
     CHECK_LE(max_J, 2e-3 * pal_world_energy_J(w));
     pal_world_destroy(w);
     pal_prepared_free(&surface);
@@ -504,7 +504,7 @@ static void a_surface_that_is_drawn_out_is_still(void)
 }
 
 /* a grip that closed on fine vertices alone holds the ends of their edges on a coarse surface, and them again later */
-static void a_grip_finds_its_fine_vertices_again(void)
+static void a_grasp_finds_its_fine_vertices_again(void)
 {
     pull_plan plan = {.from_m = {0.1945, 0.025, WIDTH},
                       .up_m = 0.001,
@@ -527,7 +527,7 @@ static void a_grip_finds_its_fine_vertices_again(void)
 }
 
 /* the hold goes with the tissue's places at rest as the body was turned when the grip closed */
-static void a_grip_on_a_turned_surface_pulls_as_hard(void)
+static void a_grasp_on_a_turned_surface_pulls_as_hard(void)
 {
     double end_N[2];
     beam b;
@@ -670,18 +670,18 @@ int main(int argc, char **argv)
     RUN(the_same_switch_gives_the_same_hash);
     RUN(there_and_back_fifty_times);
     RUN(tools_hold_on);
-    RUN(a_turning_grip_goes_on);
-    RUN(grips_go_between_surfaces);
+    RUN(a_turning_grasp_is_transferred);
+    RUN(grasps_transfer_between_surfaces);
     RUN(friction_holds_on);
     RUN(lasting_loads_stay);
     RUN(handles_hold_on);
     RUN(a_rehearsed_carry_takes_few_rounds);
     RUN(surfaces_go_between_levels);
     RUN(a_pulled_surface_goes_between_levels);
-    RUN(a_grip_on_a_surface_comes_back_to_its_force);
-    RUN(a_grip_on_a_turned_surface_pulls_as_hard);
+    RUN(a_grasp_on_a_surface_comes_back_to_its_force);
+    RUN(a_grasp_on_a_turned_surface_pulls_as_hard);
     RUN(a_surface_that_is_drawn_out_is_still);
-    RUN(a_grip_finds_its_fine_vertices_again);
+    RUN(a_grasp_finds_its_fine_vertices_again);
     RUN(what_does_not_fit_is_refused);
     return check_report();
 }

@@ -114,7 +114,7 @@ static void tool_that_appears_inside_pushes_out_gently(void)
     tool_scene_close(&s);
 }
 
-static void eight_tools_press_and_grab_one_spot(void)
+static void eight_tools_press_and_grasp_one_spot(void)
 {
     tool_scene s;
     REQUIRE(ball_scene(&s, VOXELS, true, 8, 0.01, 15) && tool_scene_open(&s));
@@ -214,7 +214,7 @@ int main(void)
 {
     RUN(teleport_by_a_body_size_gives_no_more_than_cap_times_clamp);
     RUN(tool_that_appears_inside_pushes_out_gently);
-    RUN(eight_tools_press_and_grab_one_spot);
+    RUN(eight_tools_press_and_grasp_one_spot);
     RUN(opposed_tools_pinch_a_thin_sheet);
     RUN(wild_hands_never_break_it_and_never_touch_the_heap);
     RUN(same_hands_give_the_same_state);

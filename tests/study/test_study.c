@@ -109,7 +109,7 @@ static void the_reference_bounds_what_is_named(void)
     free(s);
 }
 
-static void power_laws_are_foreseen_exactly(void)
+static void power_laws_are_predicted_exactly(void)
 {
     const double overhead[2] = {0, 0.7};
     for (int k = 0; k < 2; k++) {
@@ -144,7 +144,7 @@ static void power_laws_are_foreseen_exactly(void)
 
 /* what a step takes beside its nodes, what a node takes in a sub-step and what an element or a solver adds come out
  * whatever the nodes and sub-steps are; nothing is taken of the point that is left out */
-static void costs_that_go_with_what_is_counted_are_foreseen_exactly(void)
+static void costs_proportional_to_the_count_are_predicted_exactly(void)
 {
     const double own_s[] = {1.0 / 60, 1.0 / 240}, overhead = 0.1, node = 60e-6;
     pal_study *s = new_study();
@@ -450,8 +450,8 @@ int main(void)
     RUN(the_front_is_what_nothing_beats);
     RUN(a_pick_is_the_best_of_all);
     RUN(the_reference_bounds_what_is_named);
-    RUN(power_laws_are_foreseen_exactly);
-    RUN(costs_that_go_with_what_is_counted_are_foreseen_exactly);
+    RUN(power_laws_are_predicted_exactly);
+    RUN(costs_proportional_to_the_count_are_predicted_exactly);
     RUN(steps_go_with_elements_where_they_are_counted);
     RUN(how_much_is_refined_is_seen_of_other_levels);
     RUN(a_beam_is_swept_and_taken_up_again);

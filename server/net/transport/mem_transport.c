@@ -7,7 +7,7 @@
 
 struct pal_mem_peer {
     pal_peer peer; /* first: the transport's record is found from it */
-    pal_transport *road;
+    pal_transport *transport;
     pal_packet *fixed; /* what receive returned last */
     bool reported, closed;
     pal_mem_peer *next;
@@ -29,11 +29,11 @@ static pal_err mem_open(pal_loop *loop, const char *url, const pal_peer_events *
     return PAL_ERR_OK;
 }
 
-static void tell_closed(pal_mem_peer *p)
+static void notify_closed(pal_mem_peer *p)
 {
     if (p->closed) return;
     p->closed = true;
-    p->road->events.closed(p->road->events.user, &p->peer);
+    p->transport->events.closed(p->transport->events.user, &p->peer);
 }
 
 /* a drop may come out of the middle of a hub call, so nothing is told here: the hub knows its own drops */
@@ -67,7 +67,7 @@ pal_mem_peer *pal_mem_connect(pal_transport *transport, const char *session)
     pal_mem_peer *p = calloc(1, sizeof *p);
     if (!p) return NULL;
     p->peer.ops = &pal_mem_transport;
-    p->road = transport;
+    p->transport = transport;
     p->next = transport->first;
     transport->first = p;
     transport->events.opened(transport->events.user, &p->peer, session);
@@ -76,10 +76,10 @@ pal_mem_peer *pal_mem_connect(pal_transport *transport, const char *session)
 
 void pal_mem_leave(pal_mem_peer *peer)
 {
-    pal_mem_peer **at = &peer->road->first;
+    pal_mem_peer **at = &peer->transport->first;
     while (*at != peer) at = &(*at)->next;
     *at = peer->next;
-    tell_closed(peer);
+    notify_closed(peer);
     pal_packet_drop(peer->fixed);
     free(peer);
 }
@@ -89,16 +89,16 @@ void pal_mem_send(pal_mem_peer *peer, const void *bytes, size_t n_byte, bool tex
     if (peer->peer.drop_code) return;
     if (n_byte > PAL_CONTROL_IN_MAX) {
         pal_peer_drop(&peer->peer, PAL_WIRE_CLOSE_TOO_BIG, "a message is at most %d bytes", PAL_CONTROL_IN_MAX);
-        tell_closed(peer);
+        notify_closed(peer);
     } else
-        peer->road->events.received(peer->road->events.user, &peer->peer, bytes, n_byte, text);
+        peer->transport->events.received(peer->transport->events.user, &peer->peer, bytes, n_byte, text);
 }
 
 const pal_packet *pal_mem_receive(pal_mem_peer *peer)
 {
     peer->reported = false;
     pal_packet_replace(&peer->fixed, NULL);
-    if (!peer->peer.drop_code) peer->fixed = peer->road->events.next(peer->road->events.user, &peer->peer);
+    if (!peer->peer.drop_code) peer->fixed = peer->transport->events.next(peer->transport->events.user, &peer->peer);
     return peer->fixed;
 }
 

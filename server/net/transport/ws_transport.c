@@ -47,7 +47,7 @@ typedef struct connection {
     uint8_t bytes[PAL_CONTROL_IN_MAX];
 } connection;
 
-static pal_transport *road_of(struct lws *wsi)
+static pal_transport *transport_of(struct lws *wsi)
 {
     return lws_vhost_user(lws_get_vhost(wsi));
 }
@@ -76,7 +76,7 @@ static bool loopback_host(const char *host)
 
 static bool host_allowed(struct lws *wsi, char *host, int cap)
 {
-    return read_host(wsi, host, cap) && (road_of(wsi)->any_host || loopback_host(host));
+    return read_host(wsi, host, cap) && (transport_of(wsi)->any_host || loopback_host(host));
 }
 
 /* native clients send no Origin; a page's must be this very host */
@@ -148,7 +148,7 @@ static int complete(struct lws *wsi)
 
 static int begin_reply(struct lws *wsi, request *r, const char *path)
 {
-    pal_transport *t = road_of(wsi);
+    pal_transport *t = transport_of(wsi);
     pal_reply reply;
     char host[256];
     bool head = lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
@@ -175,7 +175,7 @@ static int begin_reply(struct lws *wsi, request *r, const char *path)
 
 static int continue_reply(struct lws *wsi, request *r)
 {
-    pal_transport *t = road_of(wsi);
+    pal_transport *t = transport_of(wsi);
     if (!r || !r->body) return 0;
     size_t n = r->body->n_byte - r->at;
     bool last = n <= CHUNK;
@@ -225,7 +225,7 @@ static int finish(connection *c)
 
 static int established(struct lws *wsi, connection *c)
 {
-    pal_transport *t = road_of(wsi);
+    pal_transport *t = transport_of(wsi);
     char argument[64];
     const char *session = lws_get_urlarg_by_name(wsi, "session=", argument, sizeof argument);
     memset(c, 0, sizeof *c);
@@ -238,7 +238,7 @@ static int established(struct lws *wsi, connection *c)
 
 static int received(struct lws *wsi, connection *c, const void *bytes, size_t n_byte)
 {
-    pal_transport *t = road_of(wsi);
+    pal_transport *t = transport_of(wsi);
     if (c->peer.drop_code) return finish(c);
     if (lws_is_first_fragment(wsi)) {
         c->n = 0;
@@ -260,7 +260,7 @@ static int received(struct lws *wsi, connection *c, const void *bytes, size_t n_
 
 static int writable(struct lws *wsi, connection *c)
 {
-    pal_transport *t = road_of(wsi);
+    pal_transport *t = transport_of(wsi);
     if (c->peer.drop_code) return finish(c);
     pal_packet *p = t->events.next(t->events.user, &c->peer);
     if (!p) return finish(c);
@@ -287,7 +287,7 @@ static int ws_callback(struct lws *wsi, enum lws_callback_reasons reason, void *
         if (!c->open) return 0;
         c->open = false;
         c->peer.drop_code = c->peer.drop_code ? c->peer.drop_code : PAL_WIRE_CLOSE_NORMAL;
-        road_of(wsi)->events.closed(road_of(wsi)->events.user, &c->peer);
+        transport_of(wsi)->events.closed(transport_of(wsi)->events.user, &c->peer);
         return 0;
     default:
         return 0;
@@ -328,7 +328,7 @@ static int listen_callback(struct lws *wsi, enum lws_callback_reasons reason, vo
     (void)own, (void)in, (void)n_byte;
     /* a protocol of ours, not a subprotocol to ask for */
     if (reason == LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION) return deny(wsi, 403);
-    if (reason == LWS_CALLBACK_RAW_RX_FILE) accept_all(road_of(wsi));
+    if (reason == LWS_CALLBACK_RAW_RX_FILE) accept_all(transport_of(wsi));
     return 0;
 }
 

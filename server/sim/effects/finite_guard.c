@@ -127,7 +127,7 @@ static bool sound(const finite_guard *guard, const pal_body *body)
 
 /* describes the violation: a non-finite number, the farthest point, or the fastest point with the mean speed that is
  * tested */
-static void tell(const finite_guard *guard, pal_body *body)
+static void report_stop(const finite_guard *guard, pal_body *body)
 {
     double far_m = 0, fast_m_s = 0, limit = guard->reach * body->length_scale_m;
     double twice_J =
@@ -160,7 +160,7 @@ static pal_err run(void *self, pal_step *step)
         if (!body->frozen) keep(guard, body);
         return PAL_ERR_OK;
     }
-    tell(guard, body);
+    report_stop(guard, body);
     put_back(guard, body);
     return PAL_ERR_OK;
 }

@@ -54,9 +54,9 @@ typedef struct refine {
     bool put_off;                     /* it had requests deferred by dwell_s */
     bool seen_twice;                  /* nothing had moved since the one before, and it changed nothing      */
     uint64_t seen_revision;           /* 0: there was none                                             */
-    uint8_t *patience;                /* log2 of the factor on a face's waiting time before it is joined [n faces] */
+    uint8_t *backoff;                 /* log2 of the factor on a face's waiting time before it is joined [n faces] */
     double *switched_s;               /* time of a face's last switch [n faces] */
-    uint8_t *wish;                    /* request of each leaf of the list, or of its parent [n_slot] */
+    uint8_t *action;                  /* request of each leaf of the list, or of its parent [n_slot] */
     double *mass_was;                 /* values before the switch, valid where `seen` is its number [n_vertex] */
     uint64_t *seen;                   /* [n_vertex]                                                     */
     double *still, *bound_N_m;        /* zero velocities [n_vertex][3]; stiffness of the components [n_vertex] */
@@ -68,7 +68,7 @@ typedef struct refine {
 /* fractions: of the mass, of the energy, of the largest inertia */
 static const double mass_changed = 1e-3, ramp_from = 2.5e-3, min_inertia = 1e-6;
 static const double max_factor = 2, min_ramp = 0.25, max_ramp = 2;
-enum { MAX_PATIENCE = 3, LET_DOWN_MAX = 8 };
+enum { MAX_BACKOFF = 3, LET_DOWN_MAX = 8 };
 
 /* ---- load ---- */
 
@@ -77,7 +77,7 @@ static void clear(refine *row)
     const pal_levels *levels = &row->adaptive->levels;
     for (int32_t f = 0; f < levels->first_face[levels->n_level]; f++) {
         row->switched_s[f] = -INFINITY;
-        row->patience[f] = 0;
+        row->backoff[f] = 0;
     }
     row->clock_s = row->wait_s = row->spring_s = row->shape_s = row->way_m = 0;
     row->seen_revision = 0;
@@ -144,13 +144,13 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     PAL_TRY(read_keys(row, item, build));
     PAL_TRY(pal_refine_measure_make(&row->measure, adaptive, build->arena));
     row->switched_s = PAL_NEW(build->arena, double, levels->first_face[levels->n_level]);
-    row->patience = PAL_NEW(build->arena, uint8_t, levels->first_face[levels->n_level]);
-    row->wish = PAL_NEW(build->arena, uint8_t, adaptive->n_slot);
+    row->backoff = PAL_NEW(build->arena, uint8_t, levels->first_face[levels->n_level]);
+    row->action = PAL_NEW(build->arena, uint8_t, adaptive->n_slot);
     row->mass_was = PAL_NEW(build->arena, double, n_vertex);
     row->seen = PAL_NEW(build->arena, uint64_t, n_vertex);
     row->still = PAL_NEW(build->arena, double, 3 * n_vertex);
     row->bound_N_m = PAL_NEW(build->arena, double, n_vertex);
-    if (!row->switched_s || !row->patience || !row->wish || !row->mass_was || !row->seen || !row->still ||
+    if (!row->switched_s || !row->backoff || !row->action || !row->mass_was || !row->seen || !row->still ||
         !row->bound_N_m)
         return PAL_ERR_MEMORY;
     clear(row);
@@ -171,17 +171,17 @@ static pal_err material(void *self, const pal_body *body, const pal_material *to
 static bool settled(const refine *row, int32_t face)
 {
     bool split = row->adaptive->face_state[face] == PAL_FACE_SPLIT;
-    return row->clock_s - row->switched_s[face] >= ldexp(row->dwell_s, split ? row->patience[face] : 0) * (1 - 1e-9);
+    return row->clock_s - row->switched_s[face] >= ldexp(row->dwell_s, split ? row->backoff[face] : 0) * (1 - 1e-9);
 }
 
 /* true: the face is split and was joined too early */
 static void note_split(refine *row, int32_t face)
 {
-    bool early = row->clock_s - row->switched_s[face] < ldexp(row->dwell_s, MAX_PATIENCE);
+    bool early = row->clock_s - row->switched_s[face] < ldexp(row->dwell_s, MAX_BACKOFF);
     if (!early)
-        row->patience[face] = 0;
-    else if (row->patience[face] < MAX_PATIENCE)
-        row->patience[face]++;
+        row->backoff[face] = 0;
+    else if (row->backoff[face] < MAX_BACKOFF)
+        row->backoff[face]++;
     row->switched_s[face] = row->clock_s;
 }
 
@@ -257,15 +257,15 @@ static bool take_options(refine *row, const pal_body *body)
     row->put_off = false;
     for (int k = 0; k < adaptive->n_leaf; k++) {
         int32_t leaf = adaptive->leaf[k], parent = parent_of_first(&adaptive->levels, leaf);
-        int wish = NOTHING;
+        int action = NOTHING;
         if (wants_split(row, leaf))
-            wish = SPLIT;
+            action = SPLIT;
         else if (parent >= 0 && pal_adaptive_can_join(adaptive, parent) && wants_join(row, body, parent))
-            wish = JOIN;
-        const bool now = wish == SPLIT ? may_split(row, leaf) : wish == NOTHING || settled(row, parent);
+            action = JOIN;
+        const bool now = action == SPLIT ? may_split(row, leaf) : action == NOTHING || settled(row, parent);
         row->put_off |= !now;
-        row->wish[k] = (uint8_t)(now ? wish : NOTHING);
-        any |= row->wish[k] != NOTHING;
+        row->action[k] = (uint8_t)(now ? action : NOTHING);
+        any |= row->action[k] != NOTHING;
     }
     return any;
 }
@@ -277,13 +277,13 @@ static bool grant_options(refine *row, pal_body *body)
     pal_adaptive_surface *adaptive = row->adaptive;
     uint64_t n_split = 0, n_join = 0;
     for (int k = 0; k < adaptive->n_leaf; k++)
-        if (row->wish[k] == SPLIT && adaptive->face_state[adaptive->leaf[k]] == PAL_FACE_LEAF)
+        if (row->action[k] == SPLIT && adaptive->face_state[adaptive->leaf[k]] == PAL_FACE_LEAF)
             n_split += (uint64_t)pal_adaptive_split(adaptive, body, adaptive->leaf[k], row->max_node);
     /* every leaf of the list is split at most once in a switch, by its own request or a neighbour's */
     for (int k = 0; k < adaptive->n_leaf && n_split > 0; k++)
         if (adaptive->face_state[adaptive->leaf[k]] == PAL_FACE_SPLIT) note_split(row, adaptive->leaf[k]);
     for (int k = 0; k < adaptive->n_leaf; k++) {
-        if (row->wish[k] != JOIN) continue;
+        if (row->action[k] != JOIN) continue;
         int32_t parent = pal_levels_face_parent(&adaptive->levels, adaptive->leaf[k]);
         if (!pal_adaptive_can_join(adaptive, parent) || !pal_adaptive_join(adaptive, body, parent)) continue;
         row->switched_s[parent] = row->clock_s;
@@ -571,7 +571,7 @@ static void transfer(void *self, const pal_body *body, const void *before, const
     if (by->place || levels->n_level != was->adaptive->levels.n_level) return;
     const size_t n_face = (size_t)levels->first_face[levels->n_level];
     memcpy(row->switched_s, was->switched_s, n_face * sizeof *row->switched_s);
-    memcpy(row->patience, was->patience, n_face * sizeof *row->patience);
+    memcpy(row->backoff, was->backoff, n_face * sizeof *row->backoff);
     row->clock_s = was->clock_s, row->wait_s = was->wait_s, row->way_m = was->way_m;
     row->spring_s = was->spring_s, row->shape_s = was->shape_s;
     row->seen_s = was->seen_s, row->seen_load2 = was->seen_load2;

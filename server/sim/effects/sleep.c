@@ -24,7 +24,7 @@
 
 typedef struct sleeper {
     double rest_time_s, speed_1_s, rest_1_s2;
-    double calm_s;     /* time without motion */
+    double at_rest_s;  /* time without motion */
     uint64_t revision; /* topology revision during that time */
     bool boxed;        /* box and edge_m are up to date */
     double low[3], high[3], edge_m;
@@ -174,14 +174,14 @@ static pal_err run(void *self, pal_step *step)
     bool same = row->revision == body->revision;
     row->revision = body->revision;
     row->boxed = false;
-    bool calm = same && !body->frozen && slow(row, body) && !changes(step->force, step->n_force, step->time_s) &&
-                !changes(step->contact, step->n_contact, step->time_s) &&
-                !changes(step->adapt, step->n_adapt, step->time_s) && !tool_near(row, step);
-    row->calm_s = calm ? row->calm_s + step->dt_s : 0;
+    bool at_rest = same && !body->frozen && slow(row, body) && !changes(step->force, step->n_force, step->time_s) &&
+                   !changes(step->contact, step->n_contact, step->time_s) &&
+                   !changes(step->adapt, step->n_adapt, step->time_s) && !tool_near(row, step);
+    row->at_rest_s = at_rest ? row->at_rest_s + step->dt_s : 0;
     /* slightly less, so that rounding in a sum of steps does not add one */
-    if (row->calm_s < row->rest_time_s * (1 - 1e-9)) return PAL_ERR_OK;
-    row->calm_s = 0;
-    if (calm && balanced(row, step)) fall_asleep(step);
+    if (row->at_rest_s < row->rest_time_s * (1 - 1e-9)) return PAL_ERR_OK;
+    row->at_rest_s = 0;
+    if (at_rest && balanced(row, step)) fall_asleep(step);
     row->boxed = false;
     return PAL_ERR_OK;
 }
@@ -195,7 +195,7 @@ static void reset(void *self, const pal_body *body)
 {
     sleeper *row = self;
     (void)body;
-    row->calm_s = 0;
+    row->at_rest_s = 0;
     row->boxed = false;
 }
 

@@ -6,7 +6,7 @@
 
 /* residual over the force at which the answer is good enough, and the most iterations for it in one call */
 static const double enough = 1e-2;
-enum { MOST = 3 };
+enum { MAX_ITERATIONS = 3 };
 /* an earlier answer serves as first guess when its force points the same way */
 static const double alike = 0.5;
 
@@ -66,7 +66,7 @@ static bool solve_points(pal_compliance_solver *answer, const pal_body *body, do
         multiply(answer, move_m, answer->cg.q);
         for (int i = 0; i < n; i++) r[i] = body->support[i / 3] ? 0 : r[i] - answer->cg.q[i];
     }
-    (void)pal_conjugate_gradient_run(&answer->cg, move_m, enough * sqrt(size2), share == 0, MOST);
+    (void)pal_conjugate_gradient_run(&answer->cg, move_m, enough * sqrt(size2), share == 0, MAX_ITERATIONS);
     memcpy(known->move, move_m, bytes3(body));
     if (!isfinite(answer->cg.residual)) known->size2 = 0;
     return isfinite(answer->cg.residual);

@@ -50,7 +50,7 @@ static pal_err collect(pal_plan *plan, const pal_scene *scene, int b, pal_diagno
     return pal_plan_requests_collect(s);
 }
 
-static int find_wish(const pal_plan_requests *s, const char *name)
+static int find_request(const pal_plan_requests *s, const char *name)
 {
     for (int i = 0; i < s->n_request; i++)
         if (!strcmp(s->request[i].effect->name, name)) return i;
@@ -60,7 +60,7 @@ static int find_wish(const pal_plan_requests *s, const char *name)
 /* place of a row of load in the body's list of entries; rows that were put in later stand behind them all */
 static int rank(const pal_plan_requests *s, const pal_component *row)
 {
-    return row->arena ? find_wish(s, row->effect->name) : PAL_PLAN_REQUEST_MAX;
+    return row->arena ? find_request(s, row->effect->name) : PAL_PLAN_REQUEST_MAX;
 }
 
 static int find_row(const pal_plan *plan, int b, const char *name)
@@ -133,7 +133,7 @@ static pal_err remake_solver(pal_plan *plan, pal_plan_requests *s, int b, int wi
     for (int i = 0; i < s->build.n_made; i++)
         body->wants_compliance |= list[i].effect->tangent && list[i].effect->tangent->settle;
     body->compliance = NULL;
-    pal_err err = pal_plan_requests_make(s, &s->request[find_wish(s, old->effect->name)], false, out);
+    pal_err err = pal_plan_requests_make(s, &s->request[find_request(s, old->effect->name)], false, out);
     out->reason = old->reason, out->n_run = old->n_run;
     free(list);
     if (err) {
@@ -216,7 +216,7 @@ pal_err pal_plan_switch(pal_plan *plan, const pal_scene *scene, int b, const cha
     pal_err err = s && now ? PAL_ERR_OK : PAL_ERR_MEMORY;
     if (!err) *now = *scene;
     if (!err) err = collect(plan, now, b, diag, s);
-    int request = err ? -1 : find_wish(s, name), at = find_row(plan, b, name);
+    int request = err ? -1 : find_request(s, name), at = find_row(plan, b, name);
     if (!err && request < 0)
         err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": nothing in the scene calls for a row \"%s\"",
                                  plan->body[b].name, name);

@@ -62,7 +62,7 @@ typedef struct central {
     int n_unseen;                 /* sub-steps since the last check for inversion */
     int n_since, pause;           /* sub-steps since the last bound; min interval */
     bool known;                   /* rows2 is valid except for motion */
-    double wild;                  /* divides the limit: 1, more after points were clamped */
+    double backoff;               /* divides the limit: 1, more after points were clamped */
     double contact2, contact_1_s; /* largest eigenvalues of contact's stiffness and of explicit damping over mass */
     pal_step *step;               /* that requests the limit */
     const double *x;              /* the body's own                                                       */
@@ -72,7 +72,7 @@ typedef struct central {
 } central;
 
 /* back-off of the sub-step after a clamped displacement, and its decay per sub-step without one */
-static const double max_wild = 8, calm = 0.98;
+static const double max_backoff = 8, backoff_decay = 0.98;
 /* of omega^2 while elements are inverted: the displaced corner is the fastest mode, which near its limit shows up to
  * twice its energy, as velocities are those of half a sub-step before */
 static const double inverted2 = 3;
@@ -82,7 +82,7 @@ enum { PAUSE = 12, MAX_PAUSE = 96 };
 /* approximate sub-steps between checks for inversion */
 enum { UNSEEN = 16 };
 /* max iterations per sub-step; first and later ones of Lanczos; max entries of a factor */
-enum { MOST = 300, FIRST = 24, AGAIN = 6, MAX_ENTRY = 1 << 22 };
+enum { MAX_CG = 300, FIRST = 24, AGAIN = 6, MAX_ENTRY = 1 << 22 };
 
 /* ---- load ---- */
 
@@ -137,7 +137,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     if (!row) return PAL_ERR_MEMORY;
     row->rows = body->interpolation, row->mass = body->mass_operator;
     row->n_unseen = UNSEEN;
-    row->safety = safety, row->tolerance = tolerance, row->wild = 1;
+    row->safety = safety, row->tolerance = tolerance, row->backoff = 1;
     row->cell_m = body->dofs.spacing_m;
     PAL_TRY(allocate(row, body, build->arena));
     if (factor) {
@@ -201,7 +201,7 @@ static void solve(central *row, double *x, double target)
 {
     for (int i = 0; i < row->mass->n_point; i++)
         if (row->fixed[i]) pal_set3(row->cg.r + 3 * (size_t)i, 0, 0, 0);
-    row->report.n_cg += pal_conjugate_gradient_run(&row->cg, x, target, 0, MOST);
+    row->report.n_cg += pal_conjugate_gradient_run(&row->cg, x, target, 0, MAX_CG);
 }
 
 /* ---- the limit ---- */
@@ -375,7 +375,7 @@ static double limit(void *self, pal_step *step)
     if (step->sub == 0) find_contact(row, step);
     const double rows2 = row->has_inversion ? inverted2 * row->rows2 : row->rows2, lambda = rows2 + row->contact2,
                  c = row->contact_1_s;
-    row->limit_s = row->safety * 4 / (c + sqrt(c * c + 4 * lambda)) / row->wild;
+    row->limit_s = row->safety * 4 / (c + sqrt(c * c + 4 * lambda)) / row->backoff;
     return row->limit_s;
 }
 
@@ -462,7 +462,8 @@ static double move(central *row, pal_body *body, double dt)
         pal_sub3(from, body->v + 3 * (size_t)i, mean);
         max2 = fmax(max2, pal_dot3(from, from));
     }
-    row->wild = body->safeguards.n_clamped > n_clamped ? fmin(2 * row->wild, max_wild) : 1 + calm * (row->wild - 1);
+    row->backoff = body->safeguards.n_clamped > n_clamped ? fmin(2 * row->backoff, max_backoff)
+                                                          : 1 + backoff_decay * (row->backoff - 1);
     return dt * sqrt(max2) + poison;
 }
 
@@ -485,7 +486,7 @@ static void reset(void *self, const pal_body *body)
     central *row = self;
     (void)body;
     row->dt_s = 0;
-    row->wild = 1;
+    row->backoff = 1;
     row->has_inversion = false;
     row->known = false;
     row->n_unseen = UNSEEN;

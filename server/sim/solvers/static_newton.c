@@ -64,7 +64,7 @@ typedef struct static_newton {
     pal_incomplete_cholesky incomplete; /* replaces the warp's factor */
     pal_compliance_solver answer;
     pal_conjugate_gradient cg;
-    pal_inertia_relief relief;
+    pal_inertia_relief inertia_relief;
     double *x0, *external_force; /* at the beginning of the step; external loads [n_dof][3] */
     double *force, *move;        /* residual and d of the iteration                       [n_dof][3] */
     double *now, *low;           /* work space of the true stiffness [n_dof][3] */
@@ -76,13 +76,13 @@ typedef struct static_newton {
     bool eager;                  /* the factor was stale at its second solve: rebuild it in every iteration */
     int age;                     /* solves with the factor */
     bool exact;                  /* the tangent converges too slowly: use the true stiffness */
-    int calm;                    /* iterations left without the true stiffness */
+    int backoff;                 /* iterations left without the true stiffness */
     int part;                    /* of the load, of load_steps                    */
     double scale_N;              /* of the tolerance                              */
     pal_solve_report report;
 } static_newton;
 
-static const double relief_share = 1e-8, flops_per_nonzero = 20;
+static const double inertia_relief_share = 1e-8, flops_per_nonzero = 20;
 /* an iteration that leaves more of the residual is slow */
 static const double slow = 0.1;
 /* max residual of conjugate gradients on the true stiffness where they are truncated */
@@ -91,7 +91,7 @@ static const double enough = 0.1;
  * as small */
 static const double level_share = 1e-6, short_h = 1e-4;
 /* iterations with the tangent alone after the true stiffness failed */
-enum { CALM = 4 };
+enum { BACKOFF = 4 };
 
 static size_t bytes3(const static_newton *row)
 {
@@ -228,7 +228,7 @@ static void choose_shift(static_newton *row)
         stiff += (block[0] + block[4] + block[8]) / 3;
         mass += body->mass_kg[i];
     }
-    row->shift_1_s2 = relief_share * stiff / mass;
+    row->shift_1_s2 = inertia_relief_share * stiff / mass;
     row->system.mass = row->shift_1_s2;
 }
 
@@ -366,9 +366,9 @@ static pal_err find_residual(static_newton *row, pal_step *step, double *size)
         reactions += pal_norm3(r + 3 * i);
         pal_set3(r + 3 * i, 0, 0, 0);
     }
-    if (row->relieved && pal_inertia_relief_make(body, row->constant ? body->x_rest : body->x, &row->relief)) {
+    if (row->relieved && pal_inertia_relief_make(body, row->constant ? body->x_rest : body->x, &row->inertia_relief)) {
         memcpy(row->inertia, r, bytes3(row));
-        pal_inertia_relief_balance(&row->relief, body, r);
+        pal_inertia_relief_balance(&row->inertia_relief, body, r);
         for (int i = 0; i < row->cg.n; i++) row->inertia[i] = r[i] - row->inertia[i];
     }
     row->scale_N = fmax(loads, reactions);
@@ -425,7 +425,7 @@ static int run_true(static_newton *row, double target, double size)
     memcpy(row->cg.r, row->force, bytes3(row));
     memset(row->move, 0, bytes3(row));
     row->exact = false;
-    row->calm = CALM;
+    row->backoff = BACKOFF;
     return 0;
 }
 
@@ -459,7 +459,7 @@ static pal_err solve_linear(static_newton *row, double size)
         pal_warp_solve(&row->warp, row->cg.r, row->move);
     else
         run_gradients(row, size);
-    if (row->relieved) pal_inertia_relief_remove_rigid(&row->relief, row->system.body, row->move);
+    if (row->relieved) pal_inertia_relief_remove_rigid(&row->inertia_relief, row->system.body, row->move);
     row->report.solve_s += pal_clock_s() - before;
     return PAL_ERR_OK;
 }
@@ -538,7 +538,7 @@ static pal_err find_rest(static_newton *row, pal_step *step)
     to->n_newton = to->n_cg = 0;
     double before = INFINITY;
     row->exact = row->eager = false;
-    row->calm = 0;
+    row->backoff = 0;
     for (bool moved = true;;) {
         double size;
         PAL_TRY(find_residual(row, step, &size));
@@ -549,9 +549,9 @@ static pal_err find_rest(static_newton *row, pal_step *step)
             before = INFINITY;
             continue;
         }
-        if (!moved && row->exact) moved = true, row->calm = CALM;
-        row->exact = !row->constant && row->calm == 0 && size > slow * before;
-        row->calm -= row->calm > 0;
+        if (!moved && row->exact) moved = true, row->backoff = BACKOFF;
+        row->exact = !row->constant && row->backoff == 0 && size > slow * before;
+        row->backoff -= row->backoff > 0;
         if (size <= slow * before) row->eager = false;
         before = size;
         if (to->converged || !moved || !isfinite(size) || to->n_newton == row->newton) return PAL_ERR_OK;

@@ -9,7 +9,7 @@
 #include <math.h>
 
 /* largest energy of springs that return, as a part of the sum of their constants: with more they would fly apart */
-static const double calm_share = 0.02;
+static const double max_energy_share = 0.02;
 /* tau, as a part of the time that edges permit an explicit step */
 static const double damp_share = 0.25;
 /* energy that the return of a body at rest may add, as a part of what is stored */
@@ -273,7 +273,7 @@ static bool leave(pal_spring_recovery *t, double spare_J, double little_J, doubl
         const double rise = region->spring_J - region->region_J;
         region->grow_s += passed_s;
         region->loose_s = region->bad || !(region->kinetic_J < still_J) ? 0 : region->loose_s + passed_s;
-        const bool fits = rise <= spare_J && region->spring_J <= calm_share * region->size_J;
+        const bool fits = rise <= spare_J && region->spring_J <= max_energy_share * region->size_J;
         if (region->bad || (!fits && (region->loose_s < nearly * loose_after_s || rise > little_J))) continue;
         spare_J -= rise;
         region->n = 0;

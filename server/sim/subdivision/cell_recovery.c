@@ -230,7 +230,7 @@ static double whole(const pal_cell_recovery *t, double kinetic_J)
 }
 
 /* chooses the regions that become elements again; true: any */
-static bool leave(pal_cell_recovery *t, double spare_J, double calm, bool at_rest)
+static bool leave(pal_cell_recovery *t, double spare_J, double max_energy_share, bool at_rest)
 {
     bool any = false;
     for (int p = 0; p < t->n_region; p++) {
@@ -238,7 +238,7 @@ static bool leave(pal_cell_recovery *t, double spare_J, double calm, bool at_res
         const double rise = region->element_J - region->region_J;
         region->age++;
         region->loose = region->bad || !at_rest ? 0 : region->loose + 1;
-        const bool fits = rise <= spare_J && region->element_J <= calm * region->shear_J;
+        const bool fits = rise <= spare_J && region->element_J <= max_energy_share * region->shear_J;
         if (region->bad || (!fits && region->loose < LEAVE_UPDATES)) continue;
         spare_J -= rise;
         region->n = 0;

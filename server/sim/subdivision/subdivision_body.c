@@ -46,7 +46,7 @@ static bool factorise(const pal_mass_operator *mass, mobility *m)
 }
 
 /* a' M~^-1 a of a node's row over the free points: |y|^2 with U'y = a */
-static double ease_of(const mobility *m, const pal_interpolation *rows, int node)
+static double inverse_mass_of(const mobility *m, const pal_interpolation *rows, int node)
 {
     const size_t n = (size_t)m->n_free;
     double *y = m->y, sum = 0;
@@ -89,7 +89,8 @@ static void find_mobility(pal_body *body)
     bool found = m.place && m.y && factorise(body->mass_operator, &m);
     for (int i = 0; i < body->surface->n_vertex; i++) {
         int node = body->shown_node[i];
-        body->node_inverse_mass_1_kg[node] = found ? ease_of(&m, body->interpolation, node) : bound_of(&m, body, node);
+        body->node_inverse_mass_1_kg[node] =
+            found ? inverse_mass_of(&m, body->interpolation, node) : bound_of(&m, body, node);
     }
     free(m.place), free(m.factor), free(m.y);
 }

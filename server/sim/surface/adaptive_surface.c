@@ -302,15 +302,15 @@ static void place(const pal_adaptive_surface *s, pal_body *body, int32_t e)
     const double *ra = body->x_rest + 3 * (size_t)end[0], *rb = body->x_rest + 3 * (size_t)end[1];
     const double *va = body->v + 3 * (size_t)end[0], *vb = body->v + 3 * (size_t)end[1];
     double *x = body->x + 3 * (size_t)v, *rest = body->x_rest + 3 * (size_t)v;
-    bool stands = body->support[v] == PAL_FIXED, firm[2] = {body->support[end[0]] > 0, body->support[end[1]] > 0};
+    bool stands = body->support[v] == PAL_FIXED, supported[2] = {body->support[end[0]] > 0, body->support[end[1]] > 0};
     for (int c = 0; c < 3; c++) body->v[3 * (size_t)v + (size_t)c] = stands ? 0 : 0.5 * va[c] + 0.5 * vb[c];
     /* an edge at rest keeps every bit; a fixed midpoint takes the mean only when both ends are fixed, else the
      * displacement of the fixed end */
-    if (stands && firm[0] != firm[1]) {
-        for (int c = 0; c < 3; c++) x[c] = rest[c] + (firm[0] ? xa[c] - ra[c] : xb[c] - rb[c]);
+    if (stands && supported[0] != supported[1]) {
+        for (int c = 0; c < 3; c++) x[c] = rest[c] + (supported[0] ? xa[c] - ra[c] : xb[c] - rb[c]);
         return;
     }
-    if (stands) stands = !firm[0];
+    if (stands) stands = !supported[0];
     if (!memcmp(xa, ra, 3 * sizeof *xa) && !memcmp(xb, rb, 3 * sizeof *xb)) stands = true;
     if (stands) {
         pal_copy3(x, rest);

@@ -93,12 +93,12 @@ pal_err pal_world_material(pal_world *world, int body, const pal_material *mater
     PAL_TRY(pal_material_check(&to, diag));
     world->plan.body[body].asleep = false;
     /* evaluating the energy may change what components cache: do so only where needed */
-    bool brakes =
+    bool damps =
         !world->plan.body[body].implicit && !world->plan.body[body].interpolation && to.young_Pa > 10 * was.young_Pa;
-    double before_J = brakes ? pal_world_component_energy_J(world, body) : 0;
+    double before_J = damps ? pal_world_component_energy_J(world, body) : 0;
     pal_err err = apply_material(world, body, &to, diag);
     if (!err) err = pal_world_check_budget(world, diag);
-    if (!err && brakes)
+    if (!err && damps)
         pal_stiffening_damper_begin(&world->plan.body[body], before_J, pal_world_component_energy_J(world, body));
     /* constants are functions of the material, so restoring the old one restores everything */
     if (err) (void)apply_material(world, body, &was, NULL);

@@ -167,7 +167,7 @@ static void a_row_that_fails_stops_its_body_alone(void)
     tool_scene_close(&s);
 }
 
-static void rescues_are_counted_with_their_price_and_only_then(void)
+static void safeguards_are_counted_with_their_cost_and_only_then(void)
 {
     tool_scene s;
     REQUIRE(open_two(&s));
@@ -203,9 +203,9 @@ static void rescues_are_counted_with_their_price_and_only_then(void)
 /* sums of 8 at a time are what they say for any number of points, and no number that is none is lost in them */
 static void sums_miss_no_number(void)
 {
-    enum { MOST = 35 };
-    double mass[MOST], v[3 * MOST], x[3 * MOST], x0[3 * MOST], copy[3 * MOST + 1];
-    for (int n = 0; n <= MOST; n++) {
+    enum { MAX_NODES = 35 };
+    double mass[MAX_NODES], v[3 * MAX_NODES], x[3 * MAX_NODES], x0[3 * MAX_NODES], copy[3 * MAX_NODES + 1];
+    for (int n = 0; n <= MAX_NODES; n++) {
         double motion = 0, way = 0;
         for (int i = 0; i < 3 * n; i++) {
             mass[i / 3] = 0.5 + i / 3, v[i] = sin(i), x[i] = cos(i), x0[i] = 0.1 * i;
@@ -235,6 +235,6 @@ int main(void)
     RUN(leaves_a_body_alone_that_is_only_pressed_hard);
     RUN(one_of_two_bodies_stops_alone_and_is_reset_alone);
     RUN(a_row_that_fails_stops_its_body_alone);
-    RUN(rescues_are_counted_with_their_price_and_only_then);
+    RUN(safeguards_are_counted_with_their_cost_and_only_then);
     return check_report();
 }

@@ -327,7 +327,7 @@ static double gap_m(const shell_scene *s, const double p[3])
     return tool_radius_m - depth_m(s, p);
 }
 
-static void a_grip_holds_while_tissue_is_pulled_and_refines(void)
+static void a_grasp_holds_while_tissue_is_pulled_and_refines(void)
 {
     enum { PER_S = 1000 };
     shell_scene s;
@@ -374,7 +374,7 @@ static void a_grip_holds_while_tissue_is_pulled_and_refines(void)
     shell_scene_close(&s);
 }
 
-static void a_grip_on_a_fine_node_goes_on_when_that_is_gone(void)
+static void a_grasp_on_a_fine_node_goes_on_when_that_is_gone(void)
 {
     shell_scene s;
     REQUIRE(stomach_make(&s, 3));
@@ -476,8 +476,8 @@ int main(void)
     RUN(a_lasting_load_needs_a_node_in_use);
     RUN(frames_follow_the_table_of_triangles_whatever_they_skip);
     RUN(a_pressed_surface_refines_under_the_tool_without_a_kick);
-    RUN(a_grip_holds_while_tissue_is_pulled_and_refines);
-    RUN(a_grip_on_a_fine_node_goes_on_when_that_is_gone);
+    RUN(a_grasp_holds_while_tissue_is_pulled_and_refines);
+    RUN(a_grasp_on_a_fine_node_goes_on_when_that_is_gone);
     RUN(a_body_that_diverges_stops_at_its_last_good_state);
     RUN(displacement_in_colour_is_0_where_nothing_is_in_use);
     RUN(a_step_too_long_for_the_finest_level_is_refused_at_load);

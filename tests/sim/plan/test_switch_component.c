@@ -180,7 +180,7 @@ static void refuses_what_a_body_cannot_be_without(void)
 {
     static const struct {
         model_kind kind;
-        const char *row, *says;
+        const char *row, *expected;
     } no[] = {{SPRINGS, "verlet", "moves it"},
               {FEM, "implicit_euler", "moves it"},
               {SPRINGS, "surface_output", "shown"},
@@ -198,7 +198,7 @@ static void refuses_what_a_body_cannot_be_without(void)
         uint64_t hash = pal_world_hash(m.world);
         size_t n_byte = pal_world_bytes(m.world);
         CHECK_INT(turn(&m, no[i].row, false), PAL_ERR_REFUSED);
-        if (!strstr(diag.text, no[i].says)) CHECK_FAIL("%s", diag.text);
+        if (!strstr(diag.text, no[i].expected)) CHECK_FAIL("%s", diag.text);
         CHECK_INT(pal_world_switch_component(m.world, m.scene, 1, "gravity", false, &diag), PAL_ERR_REFUSED);
         CHECK_INT(pal_world_switch_component(m.world, m.scene, -1, "gravity", false, &diag), PAL_ERR_REFUSED);
         CHECK(pal_world_hash(m.world) == hash && pal_world_bytes(m.world) == n_byte);

@@ -283,7 +283,7 @@ static void mobility_is_the_velocity_from_an_impulse(void)
     const int n = b->n_dof;
     for (int k = 0; k < b->n_shown; k += 37) {
         const int node = b->shown_node[k];
-        double v[27] = {0}, r[27] = {0}, p[27], q[27], rr = 0, ease = 0;
+        double v[27] = {0}, r[27] = {0}, p[27], q[27], rr = 0, inverse_mass = 0;
         REQUIRE(n == 27);
         for (int32_t i = b->interpolation->start[node]; i < b->interpolation->start[node + 1]; i++)
             r[b->interpolation->point[i]] = b->interpolation->weight[i];
@@ -301,10 +301,10 @@ static void mobility_is_the_velocity_from_an_impulse(void)
             rr = next;
         }
         for (int32_t i = b->interpolation->start[node]; i < b->interpolation->start[node + 1]; i++)
-            ease += b->interpolation->weight[i] * v[b->interpolation->point[i]];
-        CHECK_NEAR(b->node_inverse_mass_1_kg[node] / ease, 1, 1e-6);
+            inverse_mass += b->interpolation->weight[i] * v[b->interpolation->point[i]];
+        CHECK_NEAR(b->node_inverse_mass_1_kg[node] / inverse_mass, 1, 1e-6);
         /* a node is never heavier than the body */
-        CHECK_LE(1 / pal_subdivision_solid_mass_kg(b->model.solid), ease * (1 + 1e-9));
+        CHECK_LE(1 / pal_subdivision_solid_mass_kg(b->model.solid), inverse_mass * (1 + 1e-9));
     }
     clay_close(&c);
 }
@@ -319,7 +319,8 @@ static void edits_of_material_reach_masses_and_samples(void)
     c.def->n_stroke = 1, c.def->stroke = &stroke;
     REQUIRE(clay_start(&c));
     const pal_subdivision_solid *solid = c.body->model.solid;
-    double mass = pal_subdivision_solid_mass_kg(solid), ease = c.body->node_inverse_mass_1_kg[c.body->shown_node[0]];
+    double mass = pal_subdivision_solid_mass_kg(solid),
+           inverse_mass = c.body->node_inverse_mass_1_kg[c.body->shown_node[0]];
     CHECK(mass > 1000 * pal_subdivision_solid_volume_m3(solid) * (1 + 1e-3));
     float young = 0;
     for (int e = 0; e < 64 * solid->elements.n[PAL_CELL_HEX]; e++)
@@ -329,7 +330,7 @@ static void edits_of_material_reach_masses_and_samples(void)
     to.young_Pa = 8000, to.density_kg_m3 = 1500;
     CHECK_INT(pal_world_material(c.world, 0, &to, &c.diag), 0);
     CHECK_NEAR(pal_subdivision_solid_mass_kg(solid) / mass, 1.5, 1e-6);
-    CHECK_NEAR(c.body->node_inverse_mass_1_kg[c.body->shown_node[0]] * 1.5 / ease, 1, 1e-6);
+    CHECK_NEAR(c.body->node_inverse_mass_1_kg[c.body->shown_node[0]] * 1.5 / inverse_mass, 1, 1e-6);
     double sum = 0;
     for (int i = 0; i < c.body->n_dof; i++) sum += c.body->mass_kg[i];
     CHECK_NEAR(sum / mass, 1.5, 1e-6);
