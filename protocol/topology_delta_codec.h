@@ -2,7 +2,7 @@
  *
  * Such a part has a table of places, one triangle or 0 0 0 (empty) each; the asset holds the table at load. A message
  * names changed places and what stands in them now. It does not stand alone: the first to a client is relative to the
- * asset, every later one to the one before. It goes only to clients whose `join` said that they take patches.
+ * asset, every later one to the one before. It goes only to clients whose `join` said that they take topology deltas.
  * Thread: any; nothing is allocated. */
 #ifndef PAL_PROTOCOL_TOPOLOGY_DELTA_CODEC_H
 #define PAL_PROTOCOL_TOPOLOGY_DELTA_CODEC_H

@@ -1,6 +1,7 @@
 /* The one table of effects, solvers and models. Adding one is its file in effects/, solvers/ or models/, which defines
- * `const pal_effect pal_effect_NAME` (or `pal_model_NAME`), its line in CMakeLists.txt and its line here. Tests loop
- * over these tables, so a new entry is covered by every test that holds for all. Thread: any (constants). */
+ * `const pal_effect pal_effect_NAME` (or `pal_model_NAME`), its line in CMakeLists.txt and its line here. Tests of
+ * the table (names, absent effects) cover a new entry; its own test checks its force. The effects brush and blend are
+ * not listed, since no scene names them: the world adds them. Thread: any (constants). */
 #ifndef PAL_SIM_CORE_EFFECT_LIST_H
 #define PAL_SIM_CORE_EFFECT_LIST_H
 #include "server/sim/core/effect.h"

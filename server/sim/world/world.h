@@ -51,7 +51,7 @@ pal_err pal_world_pose(pal_world *world, int tool, const pal_pose *pose);
  * scene->max_substep sub-steps even at rest with an adaptive body at its finest level. Both leave the world
  * unchanged. FROZEN: a body diverged in this step and was frozen (body.reason). The error of a component that failed is
  * returned and its body is frozen. In both cases the other bodies advance. If only deformation exceeds the budget,
- * the step continues with scaled masses (pal_body.n_mass_scaled). [sim] */
+ * the step continues with scaled masses (body.safeguards.n_mass_scaled). [sim] */
 pal_err pal_world_step(pal_world *world, double dt_s);
 /* resets every body to rest, releases tools, sets time to 0. [sim] */
 void pal_world_reset(pal_world *world);
