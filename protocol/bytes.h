@@ -23,12 +23,6 @@ static inline void pal_put_f32(uint8_t *b, float v)
     memcpy(&bits, &v, sizeof bits);
     pal_put_u32(b, bits);
 }
-static inline void pal_put_f64(uint8_t *b, double v)
-{
-    uint64_t bits;
-    memcpy(&bits, &v, sizeof bits);
-    pal_put_u64(b, bits);
-}
 static inline uint16_t pal_get_u16(const uint8_t *b)
 {
     return (uint16_t)(b[0] | b[1] << 8);

@@ -1,10 +1,9 @@
 /* The text messages of palpate.v2: one JSON object each, `type` says which (protocol/README.md, "Control").
  *
- * Structs on this side, JSON on the wire, no JSON type in between. pal_control_get reads untrusted text: size, nesting,
- * number of values, UTF-8 and every field are checked; unknown keys are ignored (that is how the protocol grows),
+ * pal_control_get reads untrusted text: size, nesting,
+ * number of values, UTF-8 and every field are checked; unknown keys are ignored (so that the protocol can grow),
  * unknown types are refused. Strings are UTF-8, zero terminated, without control characters; pal_control_put
- * refuses what pal_control_get would refuse. Both directions exist in C because the bridge, palpate-lcm
- * and the trainee are clients. Thread: any. */
+ * refuses what pal_control_get would refuse. Both directions exist in C for the clients. Thread: any. */
 #ifndef PAL_PROTOCOL_CONTROL_H
 #define PAL_PROTOCOL_CONTROL_H
 #include "protocol/refusal.h"
@@ -37,18 +36,18 @@
     X(HELLO, "hello", true)                /* first message of the server after join                          */       \
     X(TOPOLOGY, "topology", true)          /* parts changed: new epochs and assets                            */       \
     X(STATUS, "status", true)              /* 2-4 Hz                                                          */       \
-    X(MEMBERS, "members", true)            /* on every change: who is here, who holds which tool              */       \
+    X(MEMBERS, "members", true)            /* on every change: members and the tools they hold              */         \
     X(ERROR, "error", true)                /* a request was refused, the connection stays                     */       \
     X(PONG, "pong", true)                  /* answer to ping                                                  */       \
-    X(ANSWER, "answer", true)              /* a command of sculpting was done, or what was asked for          */       \
-    X(STUDY, "study", true)                /* what a body costs and errs in other settings; to who said `estimate` */  \
-    X(ESTIMATE, "estimate", true)          /* 2-4 Hz to who said `estimate`: cost and error of a body now          */  \
+    X(ANSWER, "answer", true)              /* result of a command: done, or the requested numbers             */       \
+    X(STUDY, "study", true)                /* cost and error of other configurations; to subscribers of `estimate` */  \
+    X(ESTIMATE, "estimate", true)          /* 2-4 Hz: cost and error of a body now; to the same                    */  \
     X(JOIN, "join", false)                 /* first message of a client                                       */       \
     X(COMMAND, "command", false)           /* pause, resume, step, reset, material ...                        */       \
     X(TAKE_TOOL, "take_tool", false)       /* take a tool                                                     */       \
-    X(RELEASE_TOOL, "release_tool", false) /* give the own tool back                                          */       \
+    X(RELEASE_TOOL, "release_tool", false) /* release the own tool                                            */       \
     X(PING, "ping", false)                 /* round trip                                                      */       \
-    X(SUBSCRIBE_FIELD, "subscribe_field", false) /* which field of a part to be sent, instead of the last one asked */
+    X(SUBSCRIBE_FIELD, "subscribe_field", false) /* subscribe to a field of a part, in place of the last one */
 
 typedef enum pal_control_type {
 #define X(name, text, from_server) PAL_CONTROL_##name,
@@ -72,25 +71,26 @@ typedef struct pal_wire_part_info {
     uint32_t n_vertex, n_triangle;
     char asset[PAL_WIRE_NAME_BYTES]; /* path on the same server: "/asset/<hash>"   */
     double error_m;                  /* bound per axis of its frames in normal use */
-    uint32_t n_field;                /* what `subscribe_field` may ask for; 0 also from servers that know no fields */
+    uint32_t n_field;                /* fields for `subscribe_field`; 0 also from servers without fields */
     char field[PAL_WIRE_FIELDS_MAX][PAL_WIRE_FIELD_BYTES]; /* "displacement", "von_mises" ...           */
     bool is_sculptable; /* its control cells and material can be changed by commands; false is not on the wire */
-    bool is_adaptive;   /* its triangles change while it runs: TOPOLOGY_DELTA goes to clients that take it; n_triangle
-                           counts   places */
-} pal_wire_part_info;   /* its place in the array is its part index   */
-/* rows of a plan in order, of hello, topology and status: each with the part whose body it works on, -1 the whole
- * scene, why it is there (which key of the scene called for it), and whether it can be switched off (1: it cannot).
- * n_component_part, n_component_reason and n_component_required 0: nobody said, and then they are not on the wire; else
- * as many as there are rows */
+    bool is_adaptive;   /* its triangles change; clients that accept TOPOLOGY_DELTA get the changes, and n_triangle
+                           counts slots */
+} pal_wire_part_info;   /* its index in the array is the part index   */
+/* The components of a plan in order, of hello and topology: name, part whose body the component works on (-1: the whole
+ * scene), reason (the key of the scene that calls for it), and whether it can be disabled (1: it cannot). n_part,
+ * n_reason and n_required are n_component, or 0: unknown, and then not on the wire */
+typedef struct pal_wire_plan {
+    uint32_t n_component, n_part, n_reason, n_required;
+    char component[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_NAME_BYTES];
+    double part[PAL_WIRE_COMPONENT_MAX];
+    char reason[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_REASON_BYTES];
+    double required[PAL_WIRE_COMPONENT_MAX];
+} pal_wire_plan;
 typedef struct pal_wire_topology {
     uint32_t n_part;
     pal_wire_part_info part[PAL_WIRE_PART_MAX];
-    uint32_t n_component, n_component_part, n_component_reason,
-        n_component_required; /* n_component 0: the rows did not change */
-    char component[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_NAME_BYTES];
-    double component_part[PAL_WIRE_COMPONENT_MAX];
-    char component_reason[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_REASON_BYTES];
-    double component_required[PAL_WIRE_COMPONENT_MAX];
+    pal_wire_plan plan; /* n_component 0: unchanged */
 } pal_wire_topology;
 
 typedef struct pal_wire_tool_info {
@@ -102,44 +102,40 @@ typedef struct pal_wire_hello {
     char session[PAL_WIRE_NAME_BYTES];
     char title[PAL_WIRE_TEXT_BYTES];    /* for people                                                  */
     char organ[PAL_WIRE_TEXT_BYTES];    /* which organ this is and where from: "liver, abdominal CT"   */
-    char accuracy[PAL_WIRE_TEXT_BYTES]; /* how far from its reference: "2.1 % RMS of finite elements"; "": nobody said,
-                                           and then it is not on the wire */
+    char accuracy[PAL_WIRE_TEXT_BYTES]; /* error against a reference: "2.1 % RMS of finite elements"; "": unknown, and
+                                           not on the wire */
     double step_rate_hz, frame_rate_hz;
     uint32_t credit;                   /* unacknowledged cycles the server allows now                 */
     double box_min_m[3], box_max_m[3]; /* of the whole scene at rest                            */
     double up[3];                      /* unit, away from the ground                            */
-    uint32_t n_part, n_tool, n_component;
+    uint32_t n_part, n_tool;
     pal_wire_part_info part[PAL_WIRE_PART_MAX];
     pal_wire_tool_info tool[PAL_WIRE_TOOL_MAX];
-    char component[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_NAME_BYTES]; /* the plan, in order                                */
-    uint32_t n_component_part, n_component_reason, n_component_required;
-    double component_part[PAL_WIRE_COMPONENT_MAX];
-    char component_reason[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_REASON_BYTES];
-    double component_required[PAL_WIRE_COMPONENT_MAX];
-    bool estimates;  /* `estimate` may be asked for; false is not on the wire */
+    pal_wire_plan plan;
+    bool estimates;  /* `estimate` is available; false is not on the wire */
     uint16_t you_id; /* member id, > 0                                              */
     pal_wire_role you_role;
     char you_name[PAL_WIRE_MEMBER_NAME];
-    int you_tool; /* tool given, or PAL_WIRE_TOOL_NONE                                */
+    int you_tool; /* granted tool, or PAL_WIRE_TOOL_NONE                                */
 } pal_wire_hello;
 
-/* how much of a part that adapts is in use */
+/* active nodes and springs of an adaptive part */
 typedef struct pal_wire_active {
     uint32_t part;
     uint32_t n_node, n_spring;               /* now                                      */
-    uint32_t n_finest_node, n_finest_spring; /* and if all of it were of its finest level */
+    uint32_t n_finest_node, n_finest_spring; /* if every region had its finest level */
 } pal_wire_active;
 
-/* a part of which there is something to tell; what is false, empty or 0 is not on the wire */
+/* a part that is frozen, asleep or was safeguarded; false, empty and 0 are not on the wire */
 typedef struct pal_wire_part_state {
     uint32_t part;
-    bool frozen;                        /* its guard has stopped it; `reset` with its body as target brings it back */
-    bool asleep;                        /* at rest: its rows do not run                                     */
-    char reason[PAL_WIRE_REASON_BYTES]; /* it was stopped, one sentence                                  */
-    uint64_t n_safeguard;               /* steps that would have gone wrong without a guard, total         */
-    double safeguard_ms;                /* what they took, total                                           */
+    bool frozen;                        /* stopped after divergence; `reset` of its body restores it */
+    bool asleep;                        /* at rest: its components do not run                                     */
+    char reason[PAL_WIRE_REASON_BYTES]; /* why it is frozen, one sentence                                  */
+    uint64_t n_safeguard;               /* steps in which a safeguard acted, total         */
+    double safeguard_ms;                /* time of those safeguards, total                                           */
 } pal_wire_part_state;
-/* a row that was switched off and could be switched on */
+/* a disabled component that can be enabled */
 typedef struct pal_wire_disabled {
     char component[PAL_WIRE_NAME_BYTES];
     uint32_t part;
@@ -154,9 +150,9 @@ typedef struct pal_wire_status {
     uint32_t substeps;
     double step_ms; /* mean time of one step                                          */
     uint32_t n_component;
-    double component_ms[PAL_WIRE_COMPONENT_MAX]; /* mean time of each row of the plan in one step           */
-    uint32_t n_component_name;                   /* 0: the rows are those of hello                          */
-    char component[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_NAME_BYTES]; /* the plan while fields are shown         */
+    double component_ms[PAL_WIRE_COMPONENT_MAX]; /* mean time of each component in one step           */
+    uint32_t n_component_name;                   /* 0: the components are those of hello                          */
+    char component[PAL_WIRE_COMPONENT_MAX][PAL_WIRE_NAME_BYTES]; /* the current plan         */
     uint32_t n_member;
     double bytes_s;                 /* sent by the server to this member, bytes per second            */
     double rtt_ms;                  /* of this member as the server sees it; 0 unknown                */
@@ -168,11 +164,11 @@ typedef struct pal_wire_status {
     pal_wire_active active[PAL_WIRE_PART_MAX];
     uint32_t n_component_part; /* with n_component_name                                           */
     double component_part[PAL_WIRE_COMPONENT_MAX];
-    uint32_t n_state; /* parts that are frozen or asleep or were rescued           */
+    uint32_t n_state; /* parts that are frozen, asleep or were safeguarded           */
     pal_wire_part_state state[PAL_WIRE_PART_MAX];
     uint32_t n_disabled;
     pal_wire_disabled disabled[PAL_WIRE_COMPONENT_MAX];
-    uint64_t n_unobserved; /* steps of which nothing was shown because nobody looked     */
+    uint64_t n_unobserved; /* steps without observers     */
 } pal_wire_status;
 
 typedef struct pal_wire_member {
@@ -196,7 +192,7 @@ typedef struct pal_wire_join {
     char name[PAL_WIRE_MEMBER_NAME];
     pal_wire_role role;
     int tool;             /* wanted: index, PAL_WIRE_TOOL_ANY or PAL_WIRE_TOOL_NONE   */
-    bool topology_deltas; /* takes TOPOLOGY_DELTA; else it sees adapting parts with the triangles of load; false is not
+    bool topology_deltas; /* accepts TOPOLOGY_DELTA; else adaptive parts keep the triangles of their asset; false is not
                              on the wire */
 } pal_wire_join;
 
@@ -204,14 +200,14 @@ typedef struct pal_wire_arg {
     char key[32];
     double value;
 } pal_wire_arg;
-typedef struct pal_wire_command {     /* an order to the session */
+typedef struct pal_wire_command {     /* a command to the session */
     char verb[32];                    /* pause resume step reset material ...                     */
-    char target[PAL_WIRE_NAME_BYTES]; /* what it is about (a body, a component), or ""                 */
+    char target[PAL_WIRE_NAME_BYTES]; /* a body or a component, or ""                 */
     uint32_t n_arg;
     pal_wire_arg arg[PAL_WIRE_ARG_MAX]; /* numbers by name, SI, e.g. young_Pa                       */
 } pal_wire_command;
 
-/* to the one who gave the order: what was done, in a sentence, and its numbers (protocol/README.md, "Sculpting") */
+/* to the sender of a command: its result in a sentence, and numbers (protocol/README.md, "Sculpting") */
 typedef struct pal_wire_answer {
     char verb[32];
     char text[PAL_WIRE_TEXT_BYTES];
@@ -219,38 +215,38 @@ typedef struct pal_wire_answer {
     pal_wire_arg arg[PAL_WIRE_ARG_MAX];
 } pal_wire_answer;
 
-/* one setting of a study: what it costs and how far off it is (protocol/README.md, "Accuracy") */
+/* one configuration of a study, its cost and error (protocol/README.md, "Accuracy") */
 typedef struct pal_wire_study_point {
-    uint32_t index;                     /* in the server's list: arg of the order `study_point`        */
-    char method[PAL_WIRE_METHOD_BYTES]; /* points of one method belong together                 */
+    uint32_t index;                     /* in the study: argument of the command `study_point`        */
+    char method[PAL_WIRE_METHOD_BYTES]; /* points of one method form a curve                 */
     char label[PAL_WIRE_LABEL_BYTES];   /* for people                                           */
     double cost_ms, error_m;            /* of a step, as the study measured it; largest error    */
-    bool pareto_optimal;                /* nothing else is both cheaper and nearer              */
+    bool pareto_optimal;                /* no other point is both cheaper and more accurate              */
 } pal_wire_study_point;
 typedef struct pal_wire_study {
     char body[PAL_WIRE_NAME_BYTES];
-    double step_ms;     /* the time that all `ms` of study and estimate are for: a step of the scene as it was opened */
-    double reference_m; /* error of what the study compared with, NaN: not known: below it nothing is told apart */
-    uint32_t n_point;   /* 0: there is no study, `estimate` alone */
+    double step_ms;     /* step of the scene as opened: reference of all costs of study and estimate */
+    double reference_m; /* error of the reference of the study; smaller differences are not significant; NaN: unknown */
+    uint32_t n_point;   /* 0: no study, estimates alone */
     pal_wire_study_point point[PAL_WIRE_POINT_MAX];
 } pal_wire_study;
 
-/* a neighbour on a parameter, as foreseen; NaN: not known, and not on the wire */
+/* prediction for the configuration with one parameter changed; NaN: unknown, and not on the wire */
 typedef struct pal_wire_neighbour {
     char parameter[PAL_WIRE_METHOD_BYTES]; /* "resolution", "step", "tolerance", "method"                      */
     char label[PAL_WIRE_LABEL_BYTES];
     double cost_ms, error_m;
-    uint32_t size; /* args of the order `parameter`; 0: as it is, and not on the wire */
+    uint32_t size; /* arguments of the command `configure`; 0: unchanged, and not on the wire */
     double step_ms, tolerance;
 } pal_wire_neighbour;
-/* where a body stands now; NaN: not known, and not on the wire */
+/* estimate of a body; NaN: unknown, and not on the wire */
 typedef struct pal_wire_estimate {
     char body[PAL_WIRE_NAME_BYTES];
-    char configuration[PAL_WIRE_LABEL_BYTES]; /* the present one, for people                           */
-    double study_point;                       /* its index in the study; NaN: it is none of those      */
-    uint64_t tick;                            /* of the state that was looked at; 0: there is none yet */
+    char configuration[PAL_WIRE_LABEL_BYTES]; /* the current one, for people                           */
+    double study_point;                       /* its index in the study; NaN: none      */
+    uint64_t tick;                            /* of the estimated state; 0: none yet */
     double time_s;
-    double age_s;              /* steps in which the body was awake since that state                     */
+    double age_s;              /* simulated time awake since that state                     */
     double cost_ms;            /* of a live step, median of the last second                              */
     double estimate_ms;        /* processor time that the estimate took                                  */
     double max_displacement_m; /* largest displacement then                                              */

@@ -1,224 +1,168 @@
 /* Which fields each control message has, in the order in which they are written. */
 #include "protocol/control_table.h"
 
-#define AT(type, member)  offsetof(type, member)
-#define LEN(type, member) sizeof(((type *)0)->member)
-#define END                                                                                                            \
-    {                                                                                                                  \
-        0                                                                                                              \
-    }
+/* offset, size, count, max and sub of one value, of a fixed array and of a counted list */
+#define ONE(of, member)   offsetof(pal_wire_##of, member), sizeof(((pal_wire_##of *)0)->member), 0, 0, NULL
+#define ARRAY(of, member) offsetof(pal_wire_##of, member), ITEM(of, member), FIXED, LENGTH(of, member)
+#define LIST(of, member, count)                                                                                        \
+    offsetof(pal_wire_##of, member), ITEM(of, member), offsetof(pal_wire_##of, count), LENGTH(of, member)
+#define ITEM(of, member)   sizeof(((pal_wire_##of *)0)->member[0])
+#define LENGTH(of, member) (sizeof(((pal_wire_##of *)0)->member) / ITEM(of, member))
 
-static const pal_control_field part_fields[] = {
-    {"name", TEXT, true, AT(pal_wire_part_info, name), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
-    {"epoch", U32, true, AT(pal_wire_part_info, epoch), 0, 0, 0, NULL},
-    {"n_vertex", U32, true, AT(pal_wire_part_info, n_vertex), 0, 0, 0, NULL},
-    {"n_triangle", U32, true, AT(pal_wire_part_info, n_triangle), 0, 0, 0, NULL},
-    {"asset", TEXT, true, AT(pal_wire_part_info, asset), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
-    {"error_m", F64, true, AT(pal_wire_part_info, error_m), 0, 0, 0, NULL},
-    {"fields", TEXTS, false, AT(pal_wire_part_info, field), PAL_WIRE_FIELD_BYTES, AT(pal_wire_part_info, n_field),
-     PAL_WIRE_FIELDS_MAX, NULL},
-    {"adaptive", BOOL, false, AT(pal_wire_part_info, is_adaptive), 0, 0, 0, NULL},
-    {"sculptable", BOOL, false, AT(pal_wire_part_info, is_sculptable), 0, 0, 0, NULL},
-    END};
+static const pal_control_field part_fields[] = {{"name", TEXT, true, ONE(part_info, name)},
+                                                {"epoch", U32, true, ONE(part_info, epoch)},
+                                                {"n_vertex", U32, true, ONE(part_info, n_vertex)},
+                                                {"n_triangle", U32, true, ONE(part_info, n_triangle)},
+                                                {"asset", TEXT, true, ONE(part_info, asset)},
+                                                {"error_m", F64, true, ONE(part_info, error_m)},
+                                                {"fields", TEXTS, false, LIST(part_info, field, n_field), NULL},
+                                                {"adaptive", BOOL, false, ONE(part_info, is_adaptive)},
+                                                {"sculptable", BOOL, false, ONE(part_info, is_sculptable)},
+                                                {0}};
 static const pal_control_field tool_fields[] = {
-    {"name", TEXT, true, AT(pal_wire_tool_info, name), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
-    {"radius_m", F64, true, AT(pal_wire_tool_info, radius_m), 0, 0, 0, NULL},
-    END};
-static const pal_control_field you_fields[] = {
-    {"id", U16, true, AT(pal_wire_hello, you_id), 0, 0, 0, NULL},
-    {"role", ROLE, true, AT(pal_wire_hello, you_role), 0, 0, 0, NULL},
-    {"name", TEXT, true, AT(pal_wire_hello, you_name), PAL_WIRE_MEMBER_NAME, 0, 0, NULL},
-    {"tool", TOOL, false, AT(pal_wire_hello, you_tool), 0, 0, 0, NULL},
-    END};
-static const pal_control_field hello_fields[] = {
-    {"version", U32, true, AT(pal_wire_hello, version), 0, 0, 0, NULL},
-    {"session", TEXT, true, AT(pal_wire_hello, session), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
-    {"title", TEXT, true, AT(pal_wire_hello, title), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
-    {"organ", TEXT, true, AT(pal_wire_hello, organ), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
-    {"accuracy", TEXT_OR_EMPTY, false, AT(pal_wire_hello, accuracy), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
-    {"step_rate_hz", F64, true, AT(pal_wire_hello, step_rate_hz), 0, 0, 0, NULL},
-    {"frame_rate_hz", F64, true, AT(pal_wire_hello, frame_rate_hz), 0, 0, 0, NULL},
-    {"credit", U32, true, AT(pal_wire_hello, credit), 0, 0, 0, NULL},
-    {"box_min_m", NUMBERS, true, AT(pal_wire_hello, box_min_m), 0, FIXED, 3, NULL},
-    {"box_max_m", NUMBERS, true, AT(pal_wire_hello, box_max_m), 0, FIXED, 3, NULL},
-    {"up", NUMBERS, true, AT(pal_wire_hello, up), 0, FIXED, 3, NULL},
-    {"parts", OBJECTS, true, AT(pal_wire_hello, part), sizeof(pal_wire_part_info), AT(pal_wire_hello, n_part),
-     PAL_WIRE_PART_MAX, part_fields},
-    {"tools", OBJECTS, true, AT(pal_wire_hello, tool), sizeof(pal_wire_tool_info), AT(pal_wire_hello, n_tool),
-     PAL_WIRE_TOOL_MAX, tool_fields},
-    {"components", TEXTS, true, AT(pal_wire_hello, component), PAL_WIRE_NAME_BYTES, AT(pal_wire_hello, n_component),
-     PAL_WIRE_COMPONENT_MAX, NULL},
-    {"component_parts", NUMBERS, false, AT(pal_wire_hello, component_part), 0, AT(pal_wire_hello, n_component_part),
-     PAL_WIRE_COMPONENT_MAX, NULL},
-    {"component_reasons", TEXTS_OR_EMPTY, false, AT(pal_wire_hello, component_reason), PAL_WIRE_REASON_BYTES,
-     AT(pal_wire_hello, n_component_reason), PAL_WIRE_COMPONENT_MAX, NULL},
-    {"component_required", NUMBERS, false, AT(pal_wire_hello, component_required), 0,
-     AT(pal_wire_hello, n_component_required), PAL_WIRE_COMPONENT_MAX, NULL},
-    {"estimates", BOOL, false, AT(pal_wire_hello, estimates), 0, 0, 0, NULL},
+    {"name", TEXT, true, ONE(tool_info, name)}, {"radius_m", F64, true, ONE(tool_info, radius_m)}, {0}};
+static const pal_control_field you_fields[] = {{"id", U16, true, ONE(hello, you_id)},
+                                               {"role", ROLE, true, ONE(hello, you_role)},
+                                               {"name", TEXT, true, ONE(hello, you_name)},
+                                               {"tool", TOOL, false, ONE(hello, you_tool)},
+                                               {0}};
+static const pal_control_field HELLO_fields[] = {
+    {"version", U32, true, ONE(hello, version)},
+    {"session", TEXT, true, ONE(hello, session)},
+    {"title", TEXT, true, ONE(hello, title)},
+    {"organ", TEXT, true, ONE(hello, organ)},
+    {"accuracy", TEXT_OR_EMPTY, false, ONE(hello, accuracy)},
+    {"step_rate_hz", F64, true, ONE(hello, step_rate_hz)},
+    {"frame_rate_hz", F64, true, ONE(hello, frame_rate_hz)},
+    {"credit", U32, true, ONE(hello, credit)},
+    {"box_min_m", NUMBERS, true, ARRAY(hello, box_min_m), NULL},
+    {"box_max_m", NUMBERS, true, ARRAY(hello, box_max_m), NULL},
+    {"up", NUMBERS, true, ARRAY(hello, up), NULL},
+    {"parts", OBJECTS, true, LIST(hello, part, n_part), part_fields},
+    {"tools", OBJECTS, true, LIST(hello, tool, n_tool), tool_fields},
+    {"components", TEXTS, true, LIST(hello, plan.component, plan.n_component), NULL},
+    {"component_parts", NUMBERS, false, LIST(hello, plan.part, plan.n_part), NULL},
+    {"component_reasons", TEXTS_OR_EMPTY, false, LIST(hello, plan.reason, plan.n_reason), NULL},
+    {"component_required", NUMBERS, false, LIST(hello, plan.required, plan.n_required), NULL},
+    {"estimates", BOOL, false, ONE(hello, estimates)},
     {"you", OBJECT, true, 0, 0, 0, 0, you_fields},
-    END};
-static const pal_control_field topology_fields[] = {
-    {"parts", OBJECTS, true, AT(pal_wire_topology, part), sizeof(pal_wire_part_info), AT(pal_wire_topology, n_part),
-     PAL_WIRE_PART_MAX, part_fields},
-    {"components", TEXTS_OR_EMPTY, false, AT(pal_wire_topology, component), PAL_WIRE_NAME_BYTES,
-     AT(pal_wire_topology, n_component), PAL_WIRE_COMPONENT_MAX, NULL},
-    {"component_parts", NUMBERS, false, AT(pal_wire_topology, component_part), 0,
-     AT(pal_wire_topology, n_component_part), PAL_WIRE_COMPONENT_MAX, NULL},
-    {"component_reasons", TEXTS_OR_EMPTY, false, AT(pal_wire_topology, component_reason), PAL_WIRE_REASON_BYTES,
-     AT(pal_wire_topology, n_component_reason), PAL_WIRE_COMPONENT_MAX, NULL},
-    {"component_required", NUMBERS, false, AT(pal_wire_topology, component_required), 0,
-     AT(pal_wire_topology, n_component_required), PAL_WIRE_COMPONENT_MAX, NULL},
-    END};
-static const pal_control_field active_fields[] = {
-    {"part", U32, true, AT(pal_wire_active, part), 0, 0, 0, NULL},
-    {"nodes", U32, true, AT(pal_wire_active, n_node), 0, 0, 0, NULL},
-    {"springs", U32, true, AT(pal_wire_active, n_spring), 0, 0, 0, NULL},
-    {"finest_nodes", U32, true, AT(pal_wire_active, n_finest_node), 0, 0, 0, NULL},
-    {"finest_springs", U32, true, AT(pal_wire_active, n_finest_spring), 0, 0, 0, NULL},
-    END};
-static const pal_control_field state_fields[] = {
-    {"part", U32, true, AT(pal_wire_part_state, part), 0, 0, 0, NULL},
-    {"frozen", BOOL, false, AT(pal_wire_part_state, frozen), 0, 0, 0, NULL},
-    {"asleep", BOOL, false, AT(pal_wire_part_state, asleep), 0, 0, 0, NULL},
-    {"reason", TEXT_OR_EMPTY, false, AT(pal_wire_part_state, reason), PAL_WIRE_REASON_BYTES, 0, 0, NULL},
-    {"safeguards", U64, false, AT(pal_wire_part_state, n_safeguard), 0, 0, 0, NULL},
-    {"safeguard_ms", F64, false, AT(pal_wire_part_state, safeguard_ms), 0, 0, 0, NULL},
-    END};
+    {0}};
+static const pal_control_field TOPOLOGY_fields[] = {
+    {"parts", OBJECTS, true, LIST(topology, part, n_part), part_fields},
+    {"components", TEXTS_OR_EMPTY, false, LIST(topology, plan.component, plan.n_component), NULL},
+    {"component_parts", NUMBERS, false, LIST(topology, plan.part, plan.n_part), NULL},
+    {"component_reasons", TEXTS_OR_EMPTY, false, LIST(topology, plan.reason, plan.n_reason), NULL},
+    {"component_required", NUMBERS, false, LIST(topology, plan.required, plan.n_required), NULL},
+    {0}};
+static const pal_control_field active_fields[] = {{"part", U32, true, ONE(active, part)},
+                                                  {"nodes", U32, true, ONE(active, n_node)},
+                                                  {"springs", U32, true, ONE(active, n_spring)},
+                                                  {"finest_nodes", U32, true, ONE(active, n_finest_node)},
+                                                  {"finest_springs", U32, true, ONE(active, n_finest_spring)},
+                                                  {0}};
+static const pal_control_field state_fields[] = {{"part", U32, true, ONE(part_state, part)},
+                                                 {"frozen", BOOL, false, ONE(part_state, frozen)},
+                                                 {"asleep", BOOL, false, ONE(part_state, asleep)},
+                                                 {"reason", TEXT_OR_EMPTY, false, ONE(part_state, reason)},
+                                                 {"safeguards", U64, false, ONE(part_state, n_safeguard)},
+                                                 {"safeguard_ms", F64, false, ONE(part_state, safeguard_ms)},
+                                                 {0}};
 static const pal_control_field off_fields[] = {
-    {"component", TEXT, true, AT(pal_wire_disabled, component), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
-    {"part", U32, true, AT(pal_wire_disabled, part), 0, 0, 0, NULL},
-    END};
-static const pal_control_field status_fields[] = {
-    {"tick", U64, true, AT(pal_wire_status, tick), 0, 0, 0, NULL},
-    {"sim_time_s", F64, true, AT(pal_wire_status, sim_time_s), 0, 0, 0, NULL},
-    {"paused", BOOL, true, AT(pal_wire_status, paused), 0, 0, 0, NULL},
-    {"frozen", BOOL, true, AT(pal_wire_status, frozen), 0, 0, 0, NULL},
-    {"step_rate_hz", F64, true, AT(pal_wire_status, step_rate_hz), 0, 0, 0, NULL},
-    {"slowdown", F64, true, AT(pal_wire_status, slowdown), 0, 0, 0, NULL},
-    {"substeps", U32, true, AT(pal_wire_status, substeps), 0, 0, 0, NULL},
-    {"step_ms", F64, true, AT(pal_wire_status, step_ms), 0, 0, 0, NULL},
-    {"component_ms", NUMBERS, true, AT(pal_wire_status, component_ms), 0, AT(pal_wire_status, n_component),
-     PAL_WIRE_COMPONENT_MAX, NULL},
-    {"components", TEXTS, false, AT(pal_wire_status, component), PAL_WIRE_NAME_BYTES,
-     AT(pal_wire_status, n_component_name), PAL_WIRE_COMPONENT_MAX, NULL},
-    {"members", U32, true, AT(pal_wire_status, n_member), 0, 0, 0, NULL},
-    {"bytes_s", F64, true, AT(pal_wire_status, bytes_s), 0, 0, 0, NULL},
-    {"rtt_ms", F64, true, AT(pal_wire_status, rtt_ms), 0, 0, 0, NULL},
-    {"skipped_cycles", U32, true, AT(pal_wire_status, n_skipped), 0, 0, 0, NULL},
-    {"late_steps", U64, true, AT(pal_wire_status, n_late), 0, 0, 0, NULL},
-    {"refused_inputs", U64, true, AT(pal_wire_status, n_refused), 0, 0, 0, NULL},
-    {"diagnostic", TEXT, false, AT(pal_wire_status, diag), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
-    {"active", OBJECTS, false, AT(pal_wire_status, active), sizeof(pal_wire_active), AT(pal_wire_status, n_active),
-     PAL_WIRE_PART_MAX, active_fields},
-    {"component_parts", NUMBERS, false, AT(pal_wire_status, component_part), 0, AT(pal_wire_status, n_component_part),
-     PAL_WIRE_COMPONENT_MAX, NULL},
-    {"parts", OBJECTS, false, AT(pal_wire_status, state), sizeof(pal_wire_part_state), AT(pal_wire_status, n_state),
-     PAL_WIRE_PART_MAX, state_fields},
-    {"disabled", OBJECTS, false, AT(pal_wire_status, disabled), sizeof(pal_wire_disabled),
-     AT(pal_wire_status, n_disabled), PAL_WIRE_COMPONENT_MAX, off_fields},
-    {"unobserved_steps", U64, false, AT(pal_wire_status, n_unobserved), 0, 0, 0, NULL},
-    END};
+    {"component", TEXT, true, ONE(disabled, component)}, {"part", U32, true, ONE(disabled, part)}, {0}};
+static const pal_control_field STATUS_fields[] = {
+    {"tick", U64, true, ONE(status, tick)},
+    {"sim_time_s", F64, true, ONE(status, sim_time_s)},
+    {"paused", BOOL, true, ONE(status, paused)},
+    {"frozen", BOOL, true, ONE(status, frozen)},
+    {"step_rate_hz", F64, true, ONE(status, step_rate_hz)},
+    {"slowdown", F64, true, ONE(status, slowdown)},
+    {"substeps", U32, true, ONE(status, substeps)},
+    {"step_ms", F64, true, ONE(status, step_ms)},
+    {"component_ms", NUMBERS, true, LIST(status, component_ms, n_component), NULL},
+    {"components", TEXTS, false, LIST(status, component, n_component_name), NULL},
+    {"members", U32, true, ONE(status, n_member)},
+    {"bytes_s", F64, true, ONE(status, bytes_s)},
+    {"rtt_ms", F64, true, ONE(status, rtt_ms)},
+    {"skipped_cycles", U32, true, ONE(status, n_skipped)},
+    {"late_steps", U64, true, ONE(status, n_late)},
+    {"refused_inputs", U64, true, ONE(status, n_refused)},
+    {"diagnostic", TEXT, false, ONE(status, diag)},
+    {"active", OBJECTS, false, LIST(status, active, n_active), active_fields},
+    {"component_parts", NUMBERS, false, LIST(status, component_part, n_component_part), NULL},
+    {"parts", OBJECTS, false, LIST(status, state, n_state), state_fields},
+    {"disabled", OBJECTS, false, LIST(status, disabled, n_disabled), off_fields},
+    {"unobserved_steps", U64, false, ONE(status, n_unobserved)},
+    {0}};
 static const pal_control_field member_fields[] = {
-    {"id", U16, true, AT(pal_wire_member, id), 0, 0, 0, NULL},
-    {"role", ROLE, true, AT(pal_wire_member, role), 0, 0, 0, NULL},
-    {"name", TEXT, true, AT(pal_wire_member, name), PAL_WIRE_MEMBER_NAME, 0, 0, NULL},
-    {"tool", TOOL, false, AT(pal_wire_member, tool), 0, 0, 0, NULL},
-    {"colour", U32, true, AT(pal_wire_member, colour), 0, 0, 0, NULL},
-    END};
-static const pal_control_field members_fields[] = {{"members", OBJECTS, true, AT(pal_wire_members, member),
-                                                    sizeof(pal_wire_member), AT(pal_wire_members, n_member),
-                                                    PAL_WIRE_MEMBER_MAX, member_fields},
-                                                   END};
-static const pal_control_field error_fields[] = {
-    {"code", TEXT, true, AT(pal_wire_error, code), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
-    {"text", TEXT, true, AT(pal_wire_error, text), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
-    END};
-static const pal_control_field join_fields[] = {
-    {"name", TEXT, true, AT(pal_wire_join, name), PAL_WIRE_MEMBER_NAME, 0, 0, NULL},
-    {"role", ROLE, true, AT(pal_wire_join, role), 0, 0, 0, NULL},
-    {"tool", TOOL, false, AT(pal_wire_join, tool), 0, 0, 0, NULL},
-    {"topology_deltas", BOOL, false, AT(pal_wire_join, topology_deltas), 0, 0, 0, NULL},
-    END};
-static const pal_control_field command_fields[] = {
-    {"verb", TEXT, true, AT(pal_wire_command, verb), LEN(pal_wire_command, verb), 0, 0, NULL},
-    {"target", TEXT, false, AT(pal_wire_command, target), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
-    {"args", ARGS, false, AT(pal_wire_command, arg), 0, AT(pal_wire_command, n_arg), PAL_WIRE_ARG_MAX, NULL},
-    END};
-static const pal_control_field take_fields[] = {{"tool", TOOL, true, 0, 0, 0, 0, NULL}, END};
-static const pal_control_field leave_fields[] = {END};
-static const pal_control_field view_fields[] = {
-    {"part", U32, true, AT(pal_wire_field_subscription, part), 0, 0, 0, NULL},
-    {"field", TEXT, true, AT(pal_wire_field_subscription, field), PAL_WIRE_FIELD_BYTES, 0, 0, NULL},
-    END};
-static const pal_control_field answer_fields[] = {
-    {"verb", TEXT, true, AT(pal_wire_answer, verb), LEN(pal_wire_answer, verb), 0, 0, NULL},
-    {"text", TEXT, true, AT(pal_wire_answer, text), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
-    {"args", ARGS, false, AT(pal_wire_answer, arg), 0, AT(pal_wire_answer, n_arg), PAL_WIRE_ARG_MAX, NULL},
-    END};
-static const pal_control_field point_fields[] = {
-    {"index", U32, true, AT(pal_wire_study_point, index), 0, 0, 0, NULL},
-    {"method", TEXT, true, AT(pal_wire_study_point, method), PAL_WIRE_METHOD_BYTES, 0, 0, NULL},
-    {"label", TEXT, true, AT(pal_wire_study_point, label), PAL_WIRE_LABEL_BYTES, 0, 0, NULL},
-    {"cost_ms", F64, true, AT(pal_wire_study_point, cost_ms), 0, 0, 0, NULL},
-    {"error_m", F64, true, AT(pal_wire_study_point, error_m), 0, 0, 0, NULL},
-    {"pareto_optimal", BOOL, false, AT(pal_wire_study_point, pareto_optimal), 0, 0, 0, NULL},
-    END};
-static const pal_control_field study_fields[] = {
-    {"body", TEXT, true, AT(pal_wire_study, body), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
-    {"step_ms", F64, true, AT(pal_wire_study, step_ms), 0, 0, 0, NULL},
-    {"reference_m", NUMBER_OR_NAN, false, AT(pal_wire_study, reference_m), 0, 0, 0, NULL},
-    {"points", OBJECTS, false, AT(pal_wire_study, point), sizeof(pal_wire_study_point), AT(pal_wire_study, n_point),
-     PAL_WIRE_POINT_MAX, point_fields},
-    END};
-static const pal_control_field neighbour_fields[] = {
-    {"parameter", TEXT, true, AT(pal_wire_neighbour, parameter), PAL_WIRE_METHOD_BYTES, 0, 0, NULL},
-    {"label", TEXT, true, AT(pal_wire_neighbour, label), PAL_WIRE_LABEL_BYTES, 0, 0, NULL},
-    {"cost_ms", NUMBER_OR_NAN, false, AT(pal_wire_neighbour, cost_ms), 0, 0, 0, NULL},
-    {"error_m", NUMBER_OR_NAN, false, AT(pal_wire_neighbour, error_m), 0, 0, 0, NULL},
-    {"size", U32, false, AT(pal_wire_neighbour, size), 0, 0, 0, NULL},
-    {"step_ms", F64, false, AT(pal_wire_neighbour, step_ms), 0, 0, 0, NULL},
-    {"tolerance", F64, false, AT(pal_wire_neighbour, tolerance), 0, 0, 0, NULL},
-    END};
-static const pal_control_field estimate_fields[] = {
-    {"body", TEXT, true, AT(pal_wire_estimate, body), PAL_WIRE_NAME_BYTES, 0, 0, NULL},
-    {"configuration", TEXT, true, AT(pal_wire_estimate, configuration), PAL_WIRE_LABEL_BYTES, 0, 0, NULL},
-    {"study_point", NUMBER_OR_NAN, false, AT(pal_wire_estimate, study_point), 0, 0, 0, NULL},
-    {"tick", U64, true, AT(pal_wire_estimate, tick), 0, 0, 0, NULL},
-    {"time_s", F64, true, AT(pal_wire_estimate, time_s), 0, 0, 0, NULL},
-    {"age_s", NUMBER_OR_NAN, false, AT(pal_wire_estimate, age_s), 0, 0, 0, NULL},
-    {"cost_ms", NUMBER_OR_NAN, false, AT(pal_wire_estimate, cost_ms), 0, 0, 0, NULL},
-    {"estimate_ms", F64, true, AT(pal_wire_estimate, estimate_ms), 0, 0, 0, NULL},
-    {"max_displacement_m", NUMBER_OR_NAN, false, AT(pal_wire_estimate, max_displacement_m), 0, 0, 0, NULL},
-    {"error_m", NUMBER_OR_NAN, false, AT(pal_wire_estimate, error_m), 0, 0, 0, NULL},
-    {"discretisation_m", NUMBER_OR_NAN, false, AT(pal_wire_estimate, discretisation_m), 0, 0, 0, NULL},
-    {"algebraic_m", NUMBER_OR_NAN, false, AT(pal_wire_estimate, algebraic_m), 0, 0, 0, NULL},
-    {"time_m", NUMBER_OR_NAN, false, AT(pal_wire_estimate, time_m), 0, 0, 0, NULL},
-    {"model_m", NUMBER_OR_NAN, false, AT(pal_wire_estimate, model_m), 0, 0, 0, NULL},
-    {"energy_error_percent", NUMBER_OR_NAN, false, AT(pal_wire_estimate, energy_error_percent), 0, 0, 0, NULL},
-    {"locking", BOOL, false, AT(pal_wire_estimate, locking), 0, 0, 0, NULL},
-    {"diagnostic", TEXT_OR_EMPTY, false, AT(pal_wire_estimate, diag), PAL_WIRE_TEXT_BYTES, 0, 0, NULL},
-    {"neighbours", OBJECTS, false, AT(pal_wire_estimate, neighbour), sizeof(pal_wire_neighbour),
-     AT(pal_wire_estimate, n_neighbour), PAL_WIRE_NEIGHBOUR_MAX, neighbour_fields},
-    END};
-static const pal_control_field stamp_fields[] = {{"stamp_ms", F64, true, 0, 0, 0, 0, NULL}, END};
+    {"id", U16, true, ONE(member, id)},         {"role", ROLE, true, ONE(member, role)},
+    {"name", TEXT, true, ONE(member, name)},    {"tool", TOOL, false, ONE(member, tool)},
+    {"colour", U32, true, ONE(member, colour)}, {0}};
+static const pal_control_field MEMBERS_fields[] = {
+    {"members", OBJECTS, true, LIST(members, member, n_member), member_fields}, {0}};
+static const pal_control_field ERROR_fields[] = {
+    {"code", TEXT, true, ONE(error, code)}, {"text", TEXT, true, ONE(error, text)}, {0}};
+static const pal_control_field JOIN_fields[] = {{"name", TEXT, true, ONE(join, name)},
+                                                {"role", ROLE, true, ONE(join, role)},
+                                                {"tool", TOOL, false, ONE(join, tool)},
+                                                {"topology_deltas", BOOL, false, ONE(join, topology_deltas)},
+                                                {0}};
+static const pal_control_field COMMAND_fields[] = {{"verb", TEXT, true, ONE(command, verb)},
+                                                   {"target", TEXT, false, ONE(command, target)},
+                                                   {"args", ARGS, false, LIST(command, arg, n_arg), NULL},
+                                                   {0}};
+static const pal_control_field TAKE_TOOL_fields[] = {{"tool", TOOL, true, 0, 0, 0, 0, NULL}, {0}};
+static const pal_control_field RELEASE_TOOL_fields[] = {{0}};
+static const pal_control_field SUBSCRIBE_FIELD_fields[] = {
+    {"part", U32, true, ONE(field_subscription, part)}, {"field", TEXT, true, ONE(field_subscription, field)}, {0}};
+static const pal_control_field ANSWER_fields[] = {{"verb", TEXT, true, ONE(answer, verb)},
+                                                  {"text", TEXT, true, ONE(answer, text)},
+                                                  {"args", ARGS, false, LIST(answer, arg, n_arg), NULL},
+                                                  {0}};
+static const pal_control_field point_fields[] = {{"index", U32, true, ONE(study_point, index)},
+                                                 {"method", TEXT, true, ONE(study_point, method)},
+                                                 {"label", TEXT, true, ONE(study_point, label)},
+                                                 {"cost_ms", F64, true, ONE(study_point, cost_ms)},
+                                                 {"error_m", F64, true, ONE(study_point, error_m)},
+                                                 {"pareto_optimal", BOOL, false, ONE(study_point, pareto_optimal)},
+                                                 {0}};
+static const pal_control_field STUDY_fields[] = {{"body", TEXT, true, ONE(study, body)},
+                                                 {"step_ms", F64, true, ONE(study, step_ms)},
+                                                 {"reference_m", NUMBER_OR_NAN, false, ONE(study, reference_m)},
+                                                 {"points", OBJECTS, false, LIST(study, point, n_point), point_fields},
+                                                 {0}};
+static const pal_control_field neighbour_fields[] = {{"parameter", TEXT, true, ONE(neighbour, parameter)},
+                                                     {"label", TEXT, true, ONE(neighbour, label)},
+                                                     {"cost_ms", NUMBER_OR_NAN, false, ONE(neighbour, cost_ms)},
+                                                     {"error_m", NUMBER_OR_NAN, false, ONE(neighbour, error_m)},
+                                                     {"size", U32, false, ONE(neighbour, size)},
+                                                     {"step_ms", F64, false, ONE(neighbour, step_ms)},
+                                                     {"tolerance", F64, false, ONE(neighbour, tolerance)},
+                                                     {0}};
+static const pal_control_field ESTIMATE_fields[] = {
+    {"body", TEXT, true, ONE(estimate, body)},
+    {"configuration", TEXT, true, ONE(estimate, configuration)},
+    {"study_point", NUMBER_OR_NAN, false, ONE(estimate, study_point)},
+    {"tick", U64, true, ONE(estimate, tick)},
+    {"time_s", F64, true, ONE(estimate, time_s)},
+    {"age_s", NUMBER_OR_NAN, false, ONE(estimate, age_s)},
+    {"cost_ms", NUMBER_OR_NAN, false, ONE(estimate, cost_ms)},
+    {"estimate_ms", F64, true, ONE(estimate, estimate_ms)},
+    {"max_displacement_m", NUMBER_OR_NAN, false, ONE(estimate, max_displacement_m)},
+    {"error_m", NUMBER_OR_NAN, false, ONE(estimate, error_m)},
+    {"discretisation_m", NUMBER_OR_NAN, false, ONE(estimate, discretisation_m)},
+    {"algebraic_m", NUMBER_OR_NAN, false, ONE(estimate, algebraic_m)},
+    {"time_m", NUMBER_OR_NAN, false, ONE(estimate, time_m)},
+    {"model_m", NUMBER_OR_NAN, false, ONE(estimate, model_m)},
+    {"energy_error_percent", NUMBER_OR_NAN, false, ONE(estimate, energy_error_percent)},
+    {"locking", BOOL, false, ONE(estimate, locking)},
+    {"diagnostic", TEXT_OR_EMPTY, false, ONE(estimate, diag)},
+    {"neighbours", OBJECTS, false, LIST(estimate, neighbour, n_neighbour), neighbour_fields},
+    {0}};
+static const pal_control_field PONG_fields[] = {{"stamp_ms", F64, true, 0, 0, 0, 0, NULL}, {0}};
+static const pal_control_field PING_fields[] = {{"stamp_ms", F64, true, 0, 0, 0, 0, NULL}, {0}};
 
 const pal_control_message pal_control_message_table[PAL_CONTROL_COUNT] = {
-#define FIELDS_HELLO               hello_fields
-#define FIELDS_TOPOLOGY            topology_fields
-#define FIELDS_STATUS              status_fields
-#define FIELDS_MEMBERS             members_fields
-#define FIELDS_ERROR               error_fields
-#define FIELDS_PONG                stamp_fields
-#define FIELDS_JOIN                join_fields
-#define FIELDS_COMMAND             command_fields
-#define FIELDS_TAKE_TOOL           take_fields
-#define FIELDS_RELEASE_TOOL        leave_fields
-#define FIELDS_PING                stamp_fields
-#define FIELDS_SUBSCRIBE_FIELD     view_fields
-#define FIELDS_ANSWER              answer_fields
-#define FIELDS_STUDY               study_fields
-#define FIELDS_ESTIMATE            estimate_fields
-#define X(name, text, from_server) {text, from_server, FIELDS_##name},
+#define X(name, text, from_server) {text, from_server, name##_fields},
     PAL_CONTROL_TABLE(X)
 #undef X
 };

@@ -13,11 +13,6 @@
 static const char *const name_of[PAL_WIRE_FIELD_COUNT] = {"none",      "displacement", "von_mises", "energy",
                                                           "stiffness", "strain",       "distortion"};
 
-const char *pal_wire_field_name(pal_wire_field field)
-{
-    return (unsigned)field < PAL_WIRE_FIELD_COUNT ? name_of[field] : name_of[0];
-}
-
 pal_wire_field pal_wire_field_find(const char *name)
 {
     int i = 0;

@@ -24,9 +24,8 @@ typedef enum pal_wire_field {
     PAL_WIRE_FIELD_DISTORTION,
     PAL_WIRE_FIELD_COUNT
 } pal_wire_field;
-/* as in `subscribe_field` and in parts: "none", "displacement", "von_mises", "energy", "stiffness", "strain",
- * "distortion"; never NULL. find: COUNT when unknown */
-const char *pal_wire_field_name(pal_wire_field field);
+/* field of a name, as in `subscribe_field` and in parts: "none", "displacement", "von_mises", "energy", "stiffness",
+ * "strain", "distortion"; COUNT: unknown */
 pal_wire_field pal_wire_field_find(const char *name);
 
 typedef struct pal_field_head {

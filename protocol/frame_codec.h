@@ -26,7 +26,7 @@ typedef struct pal_frame_head {
     uint16_t part;
     uint8_t flags;
     uint32_t epoch; /* topology generation: names the asset the frame belongs to              */
-    uint32_t seq;   /* of this part, grows by one per frame that changed                      */
+    uint32_t seq;   /* of this part, grows from frame to frame by one or more */
     uint64_t sim_time_us;
     uint32_t cycle; /* messages of one simulation output share it; TOOLS closes it            */
     float q_m;      /* quantisation step m, > 0                                               */

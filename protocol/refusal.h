@@ -33,7 +33,6 @@ typedef enum pal_refusal {
         PAL_REFUSAL_END
 } pal_refusal;
 
-/* name ("SHORT") and sentence of a code; never NULL */
-const char *pal_refusal_name(int code);
+/* sentence of a code; never NULL */
 const char *pal_refusal_text(int code);
 #endif

@@ -22,7 +22,6 @@
 #define PAL_WIRE_VERTEX_MAX            (1u << 22) /* shown vertices of a part, PAL_ORDER_VERTEX_MAX */
 #define PAL_WIRE_POSE_BYTES            152
 #define PAL_WIRE_ACK_BYTES             16
-#define PAL_WIRE_IN_MAX                PAL_WIRE_POSE_BYTES /* longest binary message a client may send */
 #define PAL_WIRE_TOOLS_BYTES(n_tool)   (24u + 68u * (n_tool))
 #define PAL_WIRE_HAPTIC_BYTES(n_patch) (140u + 68u * (n_patch))
 #define PAL_WIRE_TOOLS_MAX             PAL_WIRE_TOOLS_BYTES(PAL_WIRE_TOOL_MAX)
@@ -61,7 +60,7 @@ typedef struct pal_wire_head {
 /* head of any message, e.g. to dispatch on kind: SHORT, MAGIC or KIND refused */
 int pal_wire_get_head(const uint8_t *bytes, size_t n_byte, pal_wire_head *out);
 
-/* pal_wire_pose.flags: those of tool_state_t (lcmtypes) and AWAY */
+/* pal_wire_pose.flags: those of tool_state_t (lcmtypes/) and AWAY */
 enum {
     PAL_WIRE_POSE_CONTACT = 1,
     PAL_WIRE_POSE_CLUTCHED = 2,
@@ -72,22 +71,22 @@ enum {
     PAL_WIRE_POSE_ESTOP = 64,
     PAL_WIRE_POSE_POSE_ONLY = 128,
     PAL_WIRE_POSE_AWAY =
-        256, /* the tool is lifted out of the scene: touches and grabs nothing until a pose without it */
+        256, /* the tool is lifted out of the scene: touches and grasps nothing until a pose without it */
     PAL_WIRE_POSE_FLAGS = 511
 };
 enum { PAL_WIRE_GRASP = 1 };
 
-/* POSE, client to server. Carries all of tool_state_t, so that palpate-lcm can pass it on unchanged. */
+/* POSE, client to server. Carries all of tool_state_t (lcmtypes/), so that palpate-lcm can pass it on unchanged. */
 typedef struct pal_wire_pose {
     uint16_t tool;
     uint32_t seq;          /* grows by one per pose of this client and tool                          */
     uint32_t flags;        /* PAL_WIRE_POSE_*                                                             */
     uint64_t stamp_us;     /* the client's own monotonic clock, echoed by TOOLS and HAPTIC           */
     double position_m[3];  /* of the tool's centre, |component| <= 1000                              */
-    double quaternion[4];  /* w x y z, tool to world, | |q|^2 - 1 | <= 1e-3                          */
+    double quaternion[4];  /* w x y z, tool to scene axes, | |q|^2 - 1 | <= 1e-3                          */
     float velocity_m_s[3]; /* 0 when not measured                                                    */
     float omega_rad_s[3];
-    float force_N[3]; /* really commanded to the device, world frame, acting on the hand        */
+    float force_N[3]; /* really commanded to the device, scene axes, acting on the hand        */
     float torque_N_m[3];
     float grip;         /* opening, rad or m; 0 without a gripper                                 */
     uint32_t buttons;   /* PAL_WIRE_GRASP                                                           */
@@ -110,15 +109,15 @@ int pal_wire_get_ack(const uint8_t *bytes, size_t n_byte, pal_wire_ack *out);
 enum {
     PAL_WIRE_TOOL_HELD = 1,    /* some member holds it                         */
     PAL_WIRE_TOOL_CONTACT = 2, /* its force on the tissue is not zero          */
-    PAL_WIRE_TOOL_GRASPS = 4,  /* a grab spring is attached                    */
-    PAL_WIRE_TOOL_STALE = 8,   /* no pose for longer than the stale time       */
+    PAL_WIRE_TOOL_GRASPS = 4,  /* it holds tissue */
+    PAL_WIRE_TOOL_STALE = 8,   /* no pose for 0.25 s */
     PAL_WIRE_TOOL_AWAY = 16,   /* lifted out of the scene: do not draw         */
     PAL_WIRE_TOOL_FLAGS = 31
 };
 /* one tool of a TOOLS message; its place in the array is the tool's index */
 typedef struct pal_wire_tool {
     uint16_t holder; /* member id (control message `members`), 0 nobody                            */
-    uint16_t flags;  /* PAL_TOOL_*                                                                 */
+    uint16_t flags;  /* PAL_WIRE_TOOL_* */
     uint32_t colour; /* 0xRRGGBB of the holder                                                     */
     float radius_m;
     float position_m[3];    /* as used by the step that made this cycle                                   */
@@ -138,7 +137,7 @@ typedef struct pal_wire_tools {
 size_t pal_wire_put_tools(uint8_t *dst, size_t cap, const pal_wire_tools *t);
 int pal_wire_get_tools(const uint8_t *bytes, size_t n_byte, pal_wire_tools *out);
 
-/* one tangent contact patch, contact_patch_t of lcmtypes */
+/* one tangent contact patch, contact_patch_t (lcmtypes/) */
 typedef struct pal_wire_contact_patch {
     uint16_t id, group;
     float p_m[3]; /* point of the zero-force surface, relative to the model's origin */
@@ -152,7 +151,7 @@ enum {
     PAL_WIRE_HAPTIC_TOPOLOGY_CHANGED = 4,
     PAL_WIRE_HAPTIC_FLAGS = 7
 };
-/* HAPTIC, server to the holder of the tool: haptic_model_t of lcmtypes */
+/* HAPTIC, server to the holder of the tool: haptic_model_t (lcmtypes/) */
 typedef struct pal_wire_haptic {
     uint16_t tool;
     uint32_t seq;
@@ -165,7 +164,7 @@ typedef struct pal_wire_haptic {
     uint32_t n_patch;
     double origin_m[3];
     float f_ref_N[3];   /* force of the simulation on the tool, for display and checks; never rendered */
-    uint32_t has_grasp; /* 1: grip_* hold a bilateral spring              */
+    uint32_t has_grasp; /* 1: grasp_* hold a bilateral spring */
     float grasp_x0_m[3], grasp_f0_N[3];
     float grasp_k_N_m[6]; /* xx xy xz yy yz zz                              */
     float grasp_b_N_s_m;

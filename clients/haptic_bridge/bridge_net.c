@@ -15,6 +15,8 @@
 
 #define RESTARTED_NS 1000000000u /* after this pause a server on LCM may count from the start again */
 
+#define TOUCH_FORCE_N 0.05 /* a force that a hand notices */
+
 enum { POSE_PERIOD_US = 4000, EVENT_PERIOD_US = 20000, STATUS_PERIOD_US = 100000, EVENT_KEEP = 16, EVENT_REPEATS = 3 };
 
 struct pal_bridge_net {
@@ -27,9 +29,10 @@ struct pal_bridge_net {
     pal_asset_store *store;
     const pal_stored_asset *asset;
     double radius_m;
-    uint32_t generation, pose_seq, echo_seq, model_seq, model_newest, event_seq, status_seq;
-    uint64_t joined_ns, model_ns, model_first_seq, n_status;
-    bool placed; /* the workspace is where it belongs */
+    uint32_t generation, pose_seq, echo_seq, model_newest, event_seq, status_seq;
+    uint64_t joined_ns, model_ns, n_status;
+    bool placed;  /* the origin of the workspace is known */
+    bool touched; /* the device has rendered a force; it is reported once */
     pal_servo_view view;
     pal_servo_timing timing;
     struct {
@@ -50,16 +53,15 @@ static void net_round_trip(pal_bridge_net *n, uint32_t echo_seq, uint64_t echo_u
 
 static void net_model(pal_bridge_net *n, const pal_wire_haptic *model)
 {
-    const uint64_t now = pal_clock_ns();
     n->count.n_model++;
-    n->model_ns = now;
+    n->model_ns = pal_clock_ns();
     n->model_newest = model->seq;
     net_round_trip(n, model->echo_seq, model->echo_stamp_us, model->hold_us);
-    pal_servo_put_model(n->servo, model, n->generation, now);
+    pal_servo_put_model(n->servo, model, n->generation, pal_clock_now_ns(n->o.servo.clock));
 }
 
-/* where the tool's centre is when it touches the organ at rest from above; until then no pose goes out, for it would be
- * one within the organ or anywhere */
+/* places the workspace where the tool's centre touches the organ at rest from above; no pose is sent before, because it
+ * could lie within the organ */
 static void net_place(pal_bridge_net *n)
 {
     double point[3];
@@ -90,9 +92,9 @@ static void net_joined(pal_bridge_net *n)
 static void ws_control(void *user, pal_link *link, const pal_control *c)
 {
     pal_bridge_net *n = user;
+    if (c->type == PAL_CONTROL_HELLO || c->type == PAL_CONTROL_MEMBERS) n->count.tool = pal_link_tool(link);
     if (c->type == PAL_CONTROL_HELLO) {
         const pal_wire_hello *hello = &c->hello;
-        n->count.tool = hello->you_tool;
         n->radius_m = hello->you_tool >= 0 && (uint32_t)hello->you_tool < hello->n_tool
                           ? hello->tool[hello->you_tool].radius_m
                           : 0.01;
@@ -104,9 +106,6 @@ static void ws_control(void *user, pal_link *link, const pal_control *c)
         net_place(n);
         pal_log(PAL_LOG_INFO, "joined", "%s with tool %d", hello->session, hello->you_tool);
     }
-    if (c->type == PAL_CONTROL_MEMBERS && pal_link_hello(link))
-        for (uint32_t i = 0; i < c->members.n_member; i++)
-            if (c->members.member[i].id == pal_link_hello(link)->you_id) n->count.tool = c->members.member[i].tool;
     if (c->type == PAL_CONTROL_ERROR) pal_log(PAL_LOG_WARN, "server", "%s", c->error.text);
 }
 
@@ -114,9 +113,7 @@ static void ws_message(void *user, pal_link *link, const pal_wire_head *head, co
 {
     pal_bridge_net *n = user;
     if (head->kind == PAL_WIRE_TOOLS) {
-        pal_wire_tools tools;
-        if (pal_wire_get_tools(bytes, n_byte, &tools)) return;
-        pal_link_send_ack(link, &(pal_wire_ack){.cycle = tools.cycle});
+        pal_link_acknowledge(link, bytes, n_byte);
     } else if (head->kind == PAL_WIRE_HAPTIC) {
         pal_wire_haptic haptic;
         if (pal_wire_get_haptic(bytes, n_byte, &haptic))
@@ -169,6 +166,8 @@ static void net_send_pose(void *user)
     if (!fresh) return;
     n->view = *fresh;
     const pal_servo_view *v = &n->view;
+    if (v->force_max_N > TOUCH_FORCE_N && !n->touched) pal_log(PAL_LOG_INFO, "touch", "%.2f N", v->force_max_N);
+    n->touched = v->force_max_N > TOUCH_FORCE_N;
     const int tool = n->lcm ? n->o.tool : n->count.tool;
     if (tool < 0 || !n->placed) return;
     pal_wire_pose pose = {.tool = (uint16_t)tool,
@@ -209,18 +208,16 @@ static void net_send_events(void *user)
     while (pal_servo_take_event(n->servo, &event)) {
         pal_log(event.kind == PAL_EVENT_DEVICE_READY || event.kind == PAL_EVENT_RECOVERED ? PAL_LOG_INFO : PAL_LOG_WARN,
                 "device", "%s (%g)", event.text, (double)event.value);
-        n->count.n_event++;
-        snprintf(n->count.last_event, sizeof n->count.last_event, "%s", event.text);
-        const int place = n->next_pending++ % EVENT_KEEP;
-        n->pending[place].left = EVENT_REPEATS;
-        n->pending[place].event = (palpate_haptic_event_t){.utime = (int64_t)(pal_clock_ns() / 1000),
-                                                           .seq = (int32_t)++n->event_seq,
-                                                           .version = PAL_LCM_VERSION,
-                                                           .tool = (int16_t)n->o.tool,
-                                                           .kind = event.kind,
-                                                           .code = event.code,
-                                                           .value = event.value,
-                                                           .text = (char *)(uintptr_t)event.text};
+        const int slot = n->next_pending++ % EVENT_KEEP;
+        n->pending[slot].left = EVENT_REPEATS;
+        n->pending[slot].event = (palpate_haptic_event_t){.utime = (int64_t)(pal_clock_ns() / 1000),
+                                                          .seq = (int32_t)++n->event_seq,
+                                                          .version = PAL_LCM_VERSION,
+                                                          .tool = (int16_t)n->o.tool,
+                                                          .kind = event.kind,
+                                                          .code = event.code,
+                                                          .value = event.value,
+                                                          .text = (char *)(uintptr_t)event.text};
     }
     if (!n->lcm) return;
     char channel[PAL_LCM_CHANNEL_MAX + 1];
@@ -332,6 +329,7 @@ pal_err pal_bridge_net_open(pal_link_loop *loop, pal_servo *servo, pal_servo_thr
     n->servo = servo;
     n->thread = thread;
     n->o = *options;
+    if (!n->o.servo.clock) n->o.servo.clock = &pal_clock_monotonic;
     n->count.tool = PAL_WIRE_TOOL_NONE;
     const bool bus = !strncmp(options->server, "lcm://", 6) || !strncmp(options->server, "udpm://", 7);
     n->placed = bus || options->has_origin;
@@ -355,9 +353,8 @@ void pal_bridge_net_close(pal_bridge_net *net)
     free(net);
 }
 
-pal_bridge_net_counts pal_bridge_net_count(pal_bridge_net *net)
+pal_bridge_net_counts pal_bridge_net_count(const pal_bridge_net *net)
 {
-    net->count.seconds_joined = net->joined_ns ? (double)(pal_clock_ns() - net->joined_ns) * 1e-9 : 0;
     return net->count;
 }
 

@@ -20,10 +20,9 @@ typedef struct pal_bridge_net_options {
 typedef struct pal_bridge_net_counts {
     bool joined; /* a server answered */
     int tool;
-    uint64_t n_pose, n_model, n_event, n_refused;
+    uint64_t n_pose, n_model, n_refused;
     pal_jitter rtt; /* own clock - echoed stamp - holding time of the server */
-    double seconds_joined;
-    char last_event[96], reason[128];
+    char reason[128];
 } pal_bridge_net_counts;
 
 /* Borrows loop, servo and thread (NULL: no timing). With a websocket and no origin, the centre of the workspace is
@@ -31,6 +30,6 @@ typedef struct pal_bridge_net_counts {
 pal_err pal_bridge_net_open(pal_link_loop *loop, pal_servo *servo, pal_servo_thread *thread,
                             const pal_bridge_net_options *options, pal_diagnostic *diag, pal_bridge_net **out);
 void pal_bridge_net_close(pal_bridge_net *net); /* after the loop is destroyed; NULL is fine */
-pal_bridge_net_counts pal_bridge_net_count(pal_bridge_net *net);
+pal_bridge_net_counts pal_bridge_net_count(const pal_bridge_net *net);
 const pal_servo_view *pal_bridge_net_view(const pal_bridge_net *net); /* newest view */
 #endif

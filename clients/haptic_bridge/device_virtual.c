@@ -6,7 +6,6 @@
  * three axes alike, semi-implicit Euler at 50 us. Departure: README.md's table gives no viscous term b of the
  * plant; 0.05 N s/m is taken for all devices (a guess, as most of the column of apparent mass). */
 #include "clients/haptic_bridge/device_virtual.h"
-#include "server/base/clock.h"
 #include "server/base/vec3.h"
 
 #include <stdatomic.h>
@@ -55,7 +54,10 @@ typedef struct virtual_state {
     virtual_script script;
     double depth_m, height_m, wait_s, display_offset_s;
     double viscous, coulomb;
-    bool virtual_clock, touched;
+    const pal_clock *clock; /* that read advances to; NULL: only pal_virtual_advance does */
+    pal_clock steps;
+    _Atomic uint64_t steps_ns;
+    bool touched;
     int n_contact; /* advances in a row at whose end the resting hand felt something */
     long n_read, fail_at;
     double time_s, touched_s, rest_s; /* rest: time not yet turned into whole sub-steps */
@@ -153,8 +155,9 @@ static bool virtual_option(virtual_state *s, const char *key, const char *value)
         return false;
     }
     if (!strcmp(key, "clock")) {
-        s->virtual_clock = !strcmp(value, "virtual");
-        return s->virtual_clock || !strcmp(value, "wall");
+        const bool steps = !strcmp(value, "steps"), none = !strcmp(value, "virtual");
+        s->clock = none ? NULL : (steps ? &s->steps : &pal_clock_monotonic);
+        return steps || none || !strcmp(value, "wall");
     }
     char *end;
     const double number = strtod(value, &end);
@@ -185,6 +188,26 @@ static bool virtual_parse(virtual_state *s, const char *id)
     return true;
 }
 
+static uint64_t steps_now(void *user)
+{
+    return atomic_load((_Atomic uint64_t *)user);
+}
+
+static void steps_sleep_until(void *user, uint64_t when_ns)
+{
+    _Atomic uint64_t *now_ns = user;
+    const uint64_t before = atomic_load(now_ns);
+    if (when_ns <= before) return;
+    pal_clock_sleep_until_ns(pal_clock_ns() + when_ns - before);
+    atomic_store(now_ns, when_ns);
+}
+
+const pal_clock *pal_virtual_clock(void *handle)
+{
+    virtual_state *s = handle;
+    return s->clock == &s->steps ? s->clock : NULL;
+}
+
 static int virtual_open(void **handle, const char *id, pal_dev_info *out)
 {
     virtual_state *s = calloc(1, sizeof *s);
@@ -195,6 +218,9 @@ static int virtual_open(void **handle, const char *id, pal_dev_info *out)
     s->height_m = 0.02;
     s->wait_s = 1.6;
     s->display_offset_s = 1e-3;
+    s->clock = &pal_clock_monotonic;
+    s->steps = (pal_clock){.now_ns = steps_now, .sleep_until_ns = steps_sleep_until, .user = &s->steps_ns};
+    atomic_store(&s->steps_ns, pal_clock_ns());
     if (!virtual_parse(s, id)) {
         free(s);
         return -2;
@@ -204,7 +230,7 @@ static int virtual_open(void **handle, const char *id, pal_dev_info *out)
     s->coulomb = d->coulomb_N;
     s->x[2] = s->xh[2] = s->xd[2] = s->height_m;
     if (s->hand->mass_kg <= 0) s->push[2] = -0.5;
-    s->last_ns = pal_clock_ns();
+    if (s->clock) s->last_ns = pal_clock_now_ns(s->clock);
     *out = (pal_dev_info){.size = sizeof *out,
                           .peak_N = d->peak_N,
                           .continuous_N = d->continuous_N,
@@ -222,8 +248,8 @@ static int virtual_read(void *handle, pal_dev_state *state)
 {
     virtual_state *s = handle;
     if (s->fail_at > 0 && ++s->n_read >= s->fail_at) return -3;
-    if (!s->virtual_clock) {
-        const uint64_t now = pal_clock_ns();
+    if (s->clock) {
+        const uint64_t now = pal_clock_now_ns(s->clock);
         pal_virtual_advance(s, fmin((double)(now - s->last_ns) * 1e-9, CATCH_UP_MAX_S));
         s->last_ns = now;
     }

@@ -12,16 +12,21 @@
  *   height  start above the workspace centre, mm (20)
  *   wait    time at rest before the script, s, so that the bridge can arm (1.6)
  *   lag     actuator time constant, ms (1)
- *   clock   wall virtual (wall: read advances to the present; virtual: only pal_virtual_advance does)
+ *   clock   wall steps virtual (wall): wall: read advances to the present. steps: read advances by what the servo has
+ *           slept on pal_virtual_clock, so that a servo loop on a busy machine is slow and never late. virtual: only
+ *           pal_virtual_advance does
  *   fail    number of the first read that fails, like a broken cable; all later reads fail too (none) */
 #ifndef PAL_HAPTIC_BRIDGE_DEVICE_VIRTUAL_H
 #define PAL_HAPTIC_BRIDGE_DEVICE_VIRTUAL_H
 #include "clients/haptic_bridge/device.h"
+#include "server/base/clock.h"
 
 const pal_haptic_v1 *pal_device_virtual(void);
 
 /* virtual time: advances by dt in sub-steps of 50 us; the force written before takes effect at the end */
 void pal_virtual_advance(void *handle, double dt_s);
+/* clock of a device with clock=steps, which advances as the one thread that sleeps on it does; else NULL. Borrowed */
+const pal_clock *pal_virtual_clock(void *handle);
 /* values hidden by a real device: exact position, velocity and motor force; any may be NULL */
 void pal_virtual_truth(void *handle, double position_m[3], double velocity_m_s[3], double force_N[3]);
 /* constant external force instead of the hand's (tests) */

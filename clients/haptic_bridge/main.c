@@ -1,11 +1,13 @@
 /* palpate-bridge: a haptic device, real or virtual, in a session: servo thread (servo_thread.h), network thread (this
  * one), triple buffer between them. Ends with zero force. SIGUSR1 is the emergency stop, SIGUSR2 re-arms. */
 #include "clients/haptic_bridge/bridge_net.h"
+#include "clients/haptic_bridge/device_virtual.h"
 #include "clients/link/client_flags.h"
+#include "clients/link/end_condition.h"
+#include "server/base/json_members.h"
 #include "server/base/log.h"
 #include "server/base/vec3.h"
 
-#include <cjson/cJSON.h>
 #include <math.h>
 #include <signal.h>
 #include <stdatomic.h>
@@ -27,7 +29,12 @@ typedef struct bridge {
     pal_link_loop *loop;
     pal_bridge_net *net;
     char rt_refused[160];
+    const char *until_text;
+    pal_end_condition until;
 } bridge;
+
+/* what --until may wait for, in the order of main_watch */
+static const char *const until_name[] = {"models", "poses", "force_N", "stale", "free"};
 
 /* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
 static atomic_int main_signal;
@@ -43,9 +50,13 @@ static void main_on_signal(int number)
         main_signal = number;
 }
 
-static void main_watch(void *loop)
+static void main_watch(void *user)
 {
-    if (main_signal) pal_link_stop(loop);
+    bridge *b = user;
+    const pal_servo_view *v = pal_bridge_net_view(b->net);
+    const double seen[] = {(double)v->n_model, (double)pal_bridge_net_count(b->net).n_pose, v->force_max_N,
+                           (double)v->n_stale, v->state == PAL_SERVO_FREE};
+    if (main_signal || pal_end_condition_met(&b->until, seen)) pal_link_stop(b->loop);
 }
 
 /* closed standard input is an emergency stop: whoever held it open is gone */
@@ -74,15 +85,13 @@ static pal_err main_open_device(bridge *b, pal_diagnostic *diag)
     const size_t n_name = strcspn(b->device, ":");
     const char *which = b->device[n_name] ? b->device + n_name + 1 : "touch";
     b->backend = pal_device_find(b->device, n_name);
-    if (!b->backend)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "no back end \"%.*s\" (--list-devices)", (int)n_name,
-                                  b->device);
+    if (!b->backend) return PAL_REFUSE(diag, "no back end \"%.*s\" (--list-devices)", (int)n_name, b->device);
     char id[256];
     const int n = snprintf(id, sizeof id, "%s,hand=%s,script=%s%s%s", which, b->hand, b->script, b->options ? "," : "",
                            b->options ? b->options : "");
-    if (n >= (int)sizeof id) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "device description is too long");
+    if (n >= (int)sizeof id) return PAL_REFUSE(diag, "device description is too long");
     const int error = b->backend->open(&b->handle, id, &b->servo_options.info);
-    if (error < 0) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s", id, b->backend->strerror(NULL, error));
+    if (error < 0) return PAL_REFUSE(diag, "%s: %s", id, b->backend->strerror(NULL, error));
     return PAL_ERR_OK;
 }
 
@@ -92,7 +101,7 @@ static pal_err main_workspace(bridge *b, pal_bridge_net_options *net, pal_diagno
     pal_servo_options *o = &b->servo_options;
     double ex[3], ey[3];
     if (!pal_client_parse_vector(b->up, net->up) || !pal_unit3(net->up, net->up, 1e-9))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--up wants three numbers, not \"%s\"", b->up);
+        return PAL_REFUSE(diag, "--up wants three numbers, not \"%s\"", b->up);
     const double other[3] = {fabs(net->up[0]) < 0.9, fabs(net->up[0]) >= 0.9, 0};
     pal_cross3(ey, net->up, other);
     pal_unit3(ey, ey, 1e-9);
@@ -101,60 +110,38 @@ static pal_err main_workspace(bridge *b, pal_bridge_net_options *net, pal_diagno
         o->rotation[3 * k] = ex[k], o->rotation[3 * k + 1] = ey[k], o->rotation[3 * k + 2] = net->up[k];
     net->has_origin = b->origin != NULL;
     if (b->origin && !pal_client_parse_vector(b->origin, o->origin_m))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--origin wants three numbers, not \"%s\"", b->origin);
+        return PAL_REFUSE(diag, "--origin wants three numbers, not \"%s\"", b->origin);
     return PAL_ERR_OK;
 }
 
-static void main_put_times(cJSON *object, const char *name, const pal_jitter *j)
+static cJSON *times_json(const pal_jitter *j)
 {
-    cJSON *o = cJSON_AddObjectToObject(object, name);
-    cJSON_AddNumberToObject(o, "n", (double)j->n);
-    cJSON_AddNumberToObject(o, "p50", pal_jitter_at_us(j, 0.5));
-    cJSON_AddNumberToObject(o, "p99", pal_jitter_at_us(j, 0.99));
-    cJSON_AddNumberToObject(o, "p99_9", pal_jitter_at_us(j, 0.999));
-    cJSON_AddNumberToObject(o, "max", (double)j->max_ns * 1e-3);
+    return PAL_JSON({"n", JSON_NUMBER(j->n)}, {"p50", JSON_NUMBER(pal_jitter_at_us(j, 0.5))},
+                    {"p99", JSON_NUMBER(pal_jitter_at_us(j, 0.99))}, {"p99_9", JSON_NUMBER(pal_jitter_at_us(j, 0.999))},
+                    {"max", JSON_NUMBER((double)j->max_ns * 1e-3)});
 }
 
 static void main_json(const bridge *b, const pal_servo_timing *t, const pal_servo_view *v,
                       const pal_bridge_net_counts *c, const char *reason)
 {
-    cJSON *o = cJSON_CreateObject();
-    cJSON_AddBoolToObject(o, "ok", reason == NULL);
-    if (reason) cJSON_AddStringToObject(o, "reason", reason);
-    cJSON_AddStringToObject(o, "device", b->servo_options.info.name);
-    cJSON_AddNumberToObject(o, "rate_hz", b->rate_hz);
-    cJSON_AddBoolToObject(o, "fifo", t->rt_flags & PAL_RT_FIFO);
-    cJSON_AddBoolToObject(o, "memory_locked", t->rt_flags & PAL_RT_LOCKED);
-    cJSON_AddStringToObject(o, "real_time_refused", b->rt_refused);
-    cJSON_AddStringToObject(o, "forces",
-                            t->rt_flags & PAL_RT_OFF
-                                ? "off: servo loop is late"
-                                : (t->rt_flags & PAL_RT_LIMITED ? "limited: servo loop is late" : "full"));
-    cJSON_AddNumberToObject(o, "ticks", (double)t->n_tick);
-    cJSON_AddNumberToObject(o, "missed", (double)t->n_missed);
-    cJSON_AddNumberToObject(o, "watchdog_stops", (double)t->n_watchdog);
-    main_put_times(o, "period_us", &t->period);
-    main_put_times(o, "lateness_us", &t->lateness);
-    main_put_times(o, "rtt_us", &c->rtt);
-    cJSON_AddStringToObject(o, "state", pal_servo_state_name(v->state));
-    cJSON_AddNumberToObject(o, "force_max_N", v->force_max_N);
-    cJSON_AddNumberToObject(o, "force_rms_N", v->force_rms_N);
-    cJSON_AddNumberToObject(o, "jump_max_N", v->jump_max_N);
-    cJSON_AddNumberToObject(o, "felt_N_m", v->rendered_stiffness_N_m);
-    cJSON_AddNumberToObject(o, "models", (double)v->n_model);
-    cJSON_AddNumberToObject(o, "models_old", (double)v->n_model_old);
-    cJSON_AddNumberToObject(o, "stale", (double)v->n_stale);
-    cJSON_AddNumberToObject(o, "faults", (double)v->n_fault);
-    cJSON_AddNumberToObject(o, "not_finite", (double)v->n_not_finite);
-    cJSON_AddNumberToObject(o, "poses", (double)c->n_pose);
-    cJSON_AddNumberToObject(o, "tool", c->tool);
-    cJSON_AddBoolToObject(o, "joined", c->joined);
-    cJSON *place = cJSON_AddArrayToObject(o, "position_m");
-    for (int k = 0; k < 3; k++) cJSON_AddItemToArray(place, cJSON_CreateNumber(v->position_m[k]));
-    char *text = cJSON_PrintUnformatted(o);
-    if (text) puts(text);
-    cJSON_free(text);
-    cJSON_Delete(o);
+    const char *forces = t->rt_flags & PAL_RT_OFF       ? "off: servo loop is late"
+                         : t->rt_flags & PAL_RT_LIMITED ? "limited: servo loop is late"
+                                                        : "full";
+    pal_client_print_json(PAL_JSON(
+        {"ok", JSON_BOOL(reason == NULL)}, {"reason", reason ? JSON_TEXT(reason) : NULL},
+        {"device", JSON_TEXT(b->servo_options.info.name)}, {"rate_hz", JSON_NUMBER(b->rate_hz)},
+        {"fifo", JSON_BOOL(t->rt_flags & PAL_RT_FIFO)}, {"memory_locked", JSON_BOOL(t->rt_flags & PAL_RT_LOCKED)},
+        {"real_time_refused", JSON_TEXT(b->rt_refused)}, {"forces", JSON_TEXT(forces)},
+        {"ticks", JSON_NUMBER(t->n_tick)}, {"missed", JSON_NUMBER(t->n_missed)},
+        {"watchdog_stops", JSON_NUMBER(t->n_watchdog)}, {"period_us", times_json(&t->period)},
+        {"lateness_us", times_json(&t->lateness)}, {"rtt_us", times_json(&c->rtt)},
+        {"state", JSON_TEXT(pal_servo_state_name(v->state))}, {"force_max_N", JSON_NUMBER(v->force_max_N)},
+        {"force_rms_N", JSON_NUMBER(v->force_rms_N)}, {"jump_max_N", JSON_NUMBER(v->jump_max_N)},
+        {"felt_N_m", JSON_NUMBER(v->rendered_stiffness_N_m)}, {"models", JSON_NUMBER(v->n_model)},
+        {"models_old", JSON_NUMBER(v->n_model_old)}, {"stale", JSON_NUMBER(v->n_stale)},
+        {"faults", JSON_NUMBER(v->n_fault)}, {"not_finite", JSON_NUMBER(v->n_not_finite)},
+        {"poses", JSON_NUMBER(c->n_pose)}, {"tool", JSON_NUMBER(c->tool)}, {"joined", JSON_BOOL(c->joined)},
+        {"position_m", cJSON_CreateDoubleArray(v->position_m, 3)}));
 }
 
 static void main_table(const bridge *b, const pal_servo_timing *t, const pal_servo_view *v,
@@ -169,9 +156,10 @@ static void main_table(const bridge *b, const pal_servo_timing *t, const pal_ser
         printf("%-10s us: p50 %.0f  p99 %.0f  p99.9 %.0f  max %.0f\n", name[i], pal_jitter_at_us(row[i], 0.5),
                pal_jitter_at_us(row[i], 0.99), pal_jitter_at_us(row[i], 0.999), (double)row[i]->max_ns * 1e-3);
     printf(
-        "force N: max %.2f  rms %.2f  largest step at an update %.3f; felt %.0f N/m; %llu models, %llu times stale\n",
-        v->force_max_N, v->force_rms_N, v->jump_max_N, v->rendered_stiffness_N_m, (unsigned long long)v->n_model,
-        (unsigned long long)v->n_stale);
+        "state %s; force N: max %.2f  rms %.2f  largest step at an update %.3f; felt %.0f N/m; %llu models, %llu times "
+        "stale\n",
+        pal_servo_state_name(v->state), v->force_max_N, v->force_rms_N, v->jump_max_N, v->rendered_stiffness_N_m,
+        (unsigned long long)v->n_model, (unsigned long long)v->n_stale);
 }
 
 static pal_err main_start(bridge *b, pal_diagnostic *diag)
@@ -191,6 +179,8 @@ static pal_err main_start(bridge *b, pal_diagnostic *diag)
     o->force_scale = b->force_scale;
     o->pose_only = b->pose_only || o->info.pose_only;
     o->hand_off = !strcmp(b->hand, "off");
+    o->clock = b->backend == pal_device_virtual() ? pal_virtual_clock(b->handle) : NULL;
+    o->no_watchdog = o->clock != NULL;
     PAL_TRY(pal_servo_create(o, &b->servo));
     main_servo = b->servo;
     PAL_TRY(pal_link_loop_create(&b->loop));
@@ -202,7 +192,7 @@ static pal_err main_start(bridge *b, pal_diagnostic *diag)
     net.servo = *o;
     PAL_TRY(pal_bridge_net_open(b->loop, b->servo, b->thread, &net, diag, &b->net));
     if (b->stdin_stop) PAL_TRY(pal_link_poll_fd(b->loop, STDIN_FILENO, main_stdin, b));
-    return pal_link_add_timer(b->loop, 50000, main_watch, b->loop) ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    return pal_link_add_timer(b->loop, 50000, main_watch, b) ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 static int main_run(bridge *b)
@@ -302,9 +292,12 @@ int main(int argc, char **argv)
         {"--hand", "NAME", PAL_CLIENT_TEXT, &b.hand, 0, 0, NULL, "virtual: average | light | firm | off"},
         {"--script", "NAME", PAL_CLIENT_TEXT, &b.script, 0, 0, NULL,
          "virtual: still | press-hold | cycle | ramp | stroke | tap"},
-        {"--options", "K=V,...", PAL_CLIENT_TEXT, &b.options, 0, 0, NULL, "virtual: depth, height mm, wait s, lag ms"},
+        {"--options", "K=V,...", PAL_CLIENT_TEXT, &b.options, 0, 0, NULL,
+         "virtual: depth, height mm, wait s, lag ms, clock"},
         {"--rate", "HZ", PAL_CLIENT_NUMBER, &b.rate_hz, 500, 4000, NULL, "servo rate (1000)"},
         {"--seconds", "S", PAL_CLIENT_NUMBER, &b.seconds, 0.1, 86400, NULL, "end after this time (never)"},
+        {"--until", "NAME=N,...", PAL_CLIENT_TEXT, &b.until_text, 0, 0, NULL,
+         "end before that once all is reached: models, poses, force_N, stale, free=1"},
         {"--force-cap", "N", PAL_CLIENT_NUMBER, &b.cap_N, 0, 20, NULL, "largest force (3, and the device's peak)"},
         {"--origin", "X,Y,Z", PAL_CLIENT_TEXT, &b.origin, 0, 0, NULL, "world place of the workspace's centre, m"},
         {"--up", "X,Y,Z", PAL_CLIENT_TEXT, &b.up, 0, 0, NULL, "world direction of the device's up (0,0,1)"},
@@ -330,6 +323,12 @@ int main(int argc, char **argv)
     const int code = pal_client_flags_parse(&table, argc, argv, NULL, &n_operand);
     if (code >= 0) return code;
     if (b.list) return main_list();
+    pal_diagnostic diag = {""};
+    if (b.until_text &&
+        pal_end_condition_parse(&b.until, until_name, sizeof until_name / sizeof *until_name, b.until_text, &diag)) {
+        fprintf(stderr, "palpate-bridge: %s\n", diag.text);
+        return 2;
+    }
     pal_log_set_level(b.quiet || b.json ? PAL_LOG_ERROR : PAL_LOG_INFO);
     if (b.doctor) return main_doctor(&b);
     signal(SIGINT, main_on_signal);

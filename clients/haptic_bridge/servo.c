@@ -201,7 +201,7 @@ static bool servo_read(pal_servo *s, double dt)
     pal_mul33(x, r, away);
     for (int k = 0; k < 3; k++) x[k] = s->o.origin_m[k] + s->o.scale * x[k];
     if (s->clutched) {
-        /* the world pose stands: the centre follows the handle */
+        /* the world pose is constant: the centre follows the handle */
         double back[3];
         pal_sub3(back, s->frozen_x, s->o.origin_m);
         pal_tmul33(back, r, back);
@@ -229,7 +229,7 @@ static void servo_take_model(pal_servo *s)
     s->model_changed = false;
     if (!fresh) return;
     const bool other = fresh->generation != s->model.generation;
-    /* another session: what was felt before means nothing, force comes in slowly */
+    /* another session: force fades in from zero */
     if (other) s->fade = 0;
     if (fresh->empty) {
         s->model.generation = fresh->generation;
@@ -249,7 +249,7 @@ static void servo_take_model(pal_servo *s)
     if (fresh->haptic.flags & PAL_WIRE_HAPTIC_FORCE_OFF) atomic_store(&s->estop, true);
 }
 
-/* age beyond which a model is stale: the second longest of the last gaps stands for the usual longest */
+/* age beyond which a model is stale: the second longest of the last gaps is taken for the usual longest */
 static double servo_stale_after(const pal_servo *s)
 {
     double longest = 0, second = 0;
@@ -262,6 +262,12 @@ static double servo_stale_after(const pal_servo *s)
     }
     const double after = fmax(4e-6 * s->model.haptic.frame_us, 2 * second);
     return fmin(fmax(after, STALE_MIN_S), STALE_MAX_S);
+}
+
+/* time since the arrival of the model in use; one that came while the tick was under way is new */
+static double servo_model_age_s(const pal_servo *s, uint64_t now)
+{
+    return s->model.empty || now < s->model.arrival_ns ? 0 : (double)(now - s->model.arrival_ns) * 1e-9;
 }
 
 static void servo_toward(double *value, double wanted, double step)
@@ -284,7 +290,7 @@ static bool servo_states(pal_servo *s, uint64_t now, double dt)
     }
     if (atomic_exchange(&s->stalled, false) && !s->estop_latched) {
         s->o.backend->force_enable(s->o.device, 1);
-        servo_fault(s, PAL_EVENT_FAULT, 0, "servo loop stood still: device was stopped");
+        servo_fault(s, PAL_EVENT_FAULT, 0, "servo loop stalled: device was stopped");
     }
     if (s->estop_latched || s->lost || s->o.pose_only) return false;
     if (s->view.state == PAL_SERVO_ARMING) {
@@ -295,7 +301,7 @@ static bool servo_states(pal_servo *s, uint64_t now, double dt)
         s->fade_rate = 1 / FADE_START_S;
         servo_event(s, PAL_EVENT_DEVICE_READY, 0, 0, "armed");
     }
-    const double age = s->model.empty ? INFINITY : (double)(now - s->model.arrival_ns) * 1e-9;
+    const double age = s->model.empty ? INFINITY : servo_model_age_s(s, now);
     s->stale = age > servo_stale_after(s) || (s->model.haptic.flags & PAL_WIRE_HAPTIC_FREEZE);
     if (s->stale && !s->was_stale && s->view.n_model > 0) {
         s->view.n_stale++;
@@ -320,8 +326,7 @@ static void servo_patches(pal_servo *s, uint64_t now, double force[3], pal_local
     *result = (pal_local_contact_result){.finite = true};
     pal_set3(force, 0, 0, 0);
     if (s->model.empty || s->fade <= 0) return;
-    pal_local_contact_force(&s->model.haptic, (double)(now - s->model.arrival_ns) * 1e-9, s->x, s->v, &limits,
-                            &s->memory, result);
+    pal_local_contact_force(&s->model.haptic, servo_model_age_s(s, now), s->x, s->v, &limits, &s->memory, result);
     pal_scale3(force, s->fade * s->clutch_fade, result->force_N);
     if (s->model_changed) {
         const double jump = pal_dist3(force, s->patch_prev);
@@ -357,7 +362,7 @@ static bool servo_limit(pal_servo *s, double force_d[3], double dt)
     double max = s->cap_N;
     if (size > max) cut = true;
     max = fmin(max, before + s->cap_N / RISE_TIME_S * dt);
-    /* a hair less, so that no rounding passes the cap */
+    /* slightly less, so that no rounding passes the cap */
     if (size > max) pal_scale3(force_d, max / size * (1 - 1e-12), force_d);
     return cut;
 }
@@ -399,11 +404,9 @@ static void servo_render(pal_servo *s, uint64_t now, double dt, double force_d[3
 static void servo_publish(pal_servo *s, uint64_t now, const double force_d[3])
 {
     pal_servo_view *v = &s->view;
-    v->stamp_ns = now;
     v->n_tick++;
     pal_copy3(v->position_m, s->x);
     pal_copy3(v->velocity_m_s, s->v);
-    pal_copy3(v->device_m, s->device.position_m);
     memcpy(v->quat, s->device.quat, sizeof v->quat);
     pal_mul33(v->force_N, s->o.rotation, force_d);
     v->fade = s->fade;
@@ -419,7 +422,7 @@ static void servo_publish(pal_servo *s, uint64_t now, const double force_d[3])
     if (s->o.pose_only) v->flags |= PAL_WIRE_POSE_POSE_ONLY;
     if (s->fade > 0 && v->state != PAL_SERVO_ESTOP) v->flags |= PAL_WIRE_POSE_FORCES_ON;
     const bool model = !s->model.empty;
-    const double age_us = model ? (double)(now - s->model.arrival_ns) * 1e-3 : 0;
+    const double age_us = 1e6 * servo_model_age_s(s, now);
     v->model_seq = model ? s->model.haptic.seq : 0;
     v->model_stamp_us = model ? s->model.haptic.stamp_us : 0;
     v->model_age_us = age_us < 4e9 ? (uint32_t)age_us : UINT32_MAX;
@@ -444,7 +447,7 @@ void pal_servo_tick(pal_servo *s, uint64_t now_ns)
     servo_take_model(s);
     if (good) {
         s->bad_reads = 0;
-        /* the place of the workspace may move only while nothing is felt */
+        /* the workspace may move only while no force is rendered */
         const servo_origin *origin = pal_norm3(s->force_prev) < 0.01 ? pal_triple_buffer_take(&s->origins) : NULL;
         if (origin) {
             pal_copy3(s->o.origin_m, origin->m);
@@ -452,8 +455,7 @@ void pal_servo_tick(pal_servo *s, uint64_t now_ns)
         }
         if (servo_states(s, now_ns, dt)) servo_render(s, now_ns, dt, force_d);
     } else if (!s->lost) {
-        /* one bad read keeps the force, more of them are a fault that stays */
-        s->view.n_bad_read++;
+        /* one bad read keeps the force, more of them are a latched fault */
         pal_copy3(force_d, s->force_prev);
         if (++s->bad_reads >= BAD_READS_MAX) {
             s->lost = true;

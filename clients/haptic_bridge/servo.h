@@ -24,6 +24,7 @@
 #define PAL_HAPTIC_BRIDGE_SERVO_H
 #include "clients/haptic_bridge/device.h"
 #include "protocol/wire.h"
+#include "server/base/clock.h"
 #include "server/base/err.h"
 
 #include <stdbool.h>
@@ -41,7 +42,7 @@ typedef enum pal_servo_state {
 } pal_servo_state;
 const char *pal_servo_state_name(pal_servo_state state);
 
-/* kinds of haptic_event_t */
+/* kinds of haptic_event_t (lcmtypes/) */
 typedef enum pal_servo_event_kind {
     PAL_EVENT_BUTTON_DOWN = 1,
     PAL_EVENT_BUTTON_UP,
@@ -73,7 +74,9 @@ typedef struct pal_servo_options {
     double rotation[9];        /* device to world, row-major                                     */
     double scale, force_scale; /* 0: 1                                                           */
     bool pose_only;
-    bool hand_off; /* the hand appears off the handle: damping floor 5 ms instead of 2.5 ms */
+    bool hand_off;          /* the hand appears off the handle: damping floor 5 ms instead of 2.5 ms */
+    const pal_clock *clock; /* of servo_thread.h, borrowed; NULL: pal_clock_monotonic */
+    bool no_watchdog;       /* simulated device on a simulated clock: nobody is at risk */
 } pal_servo_options;
 
 /* copies options. [load] */
@@ -88,7 +91,7 @@ void pal_servo_set_degraded(pal_servo *servo, int level);
 void pal_servo_end(pal_servo *servo);
 
 /* [net] The newest model wins. generation changes with every new session (reconnect); models of older ones are
- * dropped. arrival_ns: pal_clock_ns of its arrival */
+ * dropped. arrival_ns: time of its arrival on the clock of the ticks; may be after the tick that takes it */
 void pal_servo_put_model(pal_servo *servo, const pal_wire_haptic *model, uint32_t generation, uint64_t arrival_ns);
 /* [net] the server is lost or has returned as another session: drops the model at once and fades */
 void pal_servo_put_generation(pal_servo *servo, uint32_t generation);
@@ -100,16 +103,15 @@ void pal_servo_stalled(pal_servo *servo); /* [any] the watchdog has stopped the 
 
 /* state of one tick, for other threads */
 typedef struct pal_servo_view {
-    uint64_t stamp_ns, n_tick;
+    uint64_t n_tick;
     pal_servo_state state;
     double position_m[3], quat[4], velocity_m_s[3]; /* world */
     double force_N[3];                              /* commanded force on the hand, world */
-    double device_m[3];
     double fade, grip;
     uint32_t flags, buttons; /* PAL_WIRE_POSE_*, PAL_WIRE_GRASP       */
     uint32_t model_seq, model_age_us;
     uint64_t model_stamp_us;
-    uint64_t n_model, n_model_old, n_bad_read, n_saturated, n_clamped, n_stale, n_fault, n_not_finite;
+    uint64_t n_model, n_model_old, n_saturated, n_clamped, n_stale, n_fault, n_not_finite;
     double force_rms_N, force_max_N, jump_max_N; /* jump: largest step at a model change */
     double depth_m, motor_temperature;
     double rendered_stiffness_N_m; /* norm of the contact force / depth; 0 out of contact */

@@ -1,5 +1,4 @@
 #include "clients/haptic_bridge/servo_thread.h"
-#include "server/base/clock.h"
 #include "server/base/triple_buffer.h"
 
 #include <errno.h>
@@ -23,7 +22,9 @@ enum { FIFO_SERVO = 80, FIFO_WATCHDOG = 81, STACK_TOUCH_BYTES = 256 * 1024, JUDG
 struct pal_servo_thread {
     pal_servo *servo;
     pal_servo_options options;
+    const pal_clock *clock;
     pthread_t loop, watchdog;
+    bool has_watchdog;
     atomic_bool stop;
     atomic_uint n_watchdog;
     atomic_int rt_flags;
@@ -69,14 +70,20 @@ static void thread_judge(pal_servo_thread *t)
     t->second_missed[t->now_second] = 0;
 }
 
+/* false: the thread is to end */
+static bool thread_sleep_until(pal_servo_thread *t, uint64_t when_ns)
+{
+    t->clock->sleep_until_ns(t->clock->user, when_ns);
+    return !atomic_load(&t->stop);
+}
+
 static void *thread_loop(void *user)
 {
     pal_servo_thread *t = user;
     thread_touch_stack();
-    uint64_t due = pal_clock_ns() + t->period_ns, last = 0, judge = due + 1000000000;
-    while (!atomic_load_explicit(&t->stop, memory_order_relaxed)) {
-        pal_clock_sleep_until_ns(due);
-        const uint64_t now = pal_clock_ns(), late = now > due ? now - due : 0;
+    uint64_t due = pal_clock_now_ns(t->clock) + t->period_ns, last = 0, judge = due + 1000000000;
+    while (thread_sleep_until(t, due)) {
+        const uint64_t now = pal_clock_now_ns(t->clock), late = now > due ? now - due : 0;
         pal_servo_tick(t->servo, now);
         pal_jitter_add(&t->total.lateness, late);
         pal_jitter_add(&t->second[t->now_second], late);
@@ -85,7 +92,7 @@ static void *thread_loop(void *user)
         t->total.n_tick++;
         due += t->period_ns;
         /* missed ticks are left out, the grid of due times stays */
-        const uint64_t after = pal_clock_ns();
+        const uint64_t after = pal_clock_now_ns(t->clock);
         if (after > due) {
             const uint64_t missed = (after - due) / t->period_ns + (after - due > t->period_ns / 2);
             t->total.n_missed += missed;
@@ -104,10 +111,11 @@ static void *thread_loop(void *user)
 static void *thread_watch(void *user)
 {
     pal_servo_thread *t = user;
-    uint64_t seen = pal_servo_ticks(t->servo), since = pal_clock_ns();
+    uint64_t now = pal_clock_now_ns(t->clock), since = now, seen = pal_servo_ticks(t->servo);
     bool stopped = false;
-    while (!atomic_load_explicit(&t->stop, memory_order_relaxed)) {
-        const uint64_t now = pal_clock_ns(), ticks = pal_servo_ticks(t->servo);
+    while (thread_sleep_until(t, now + WATCHDOG_STEP_NS)) {
+        const uint64_t ticks = pal_servo_ticks(t->servo);
+        now = pal_clock_now_ns(t->clock);
         if (ticks != seen) {
             seen = ticks, since = now;
             stopped = false;
@@ -117,7 +125,6 @@ static void *thread_watch(void *user)
             atomic_fetch_add(&t->n_watchdog, 1);
             stopped = true;
         }
-        pal_clock_sleep_until_ns(now + WATCHDOG_STEP_NS);
     }
     return NULL;
 }
@@ -138,6 +145,15 @@ static pal_err thread_make(pthread_t *thread, void *(*run)(void *), void *user, 
     return failed ? PAL_ERR_MEMORY : PAL_ERR_OK;
 }
 
+/* ends the threads that run */
+static void thread_join(pal_servo_thread *t)
+{
+    atomic_store(&t->stop, true);
+    pal_clock_wake(t->clock);
+    pthread_join(t->loop, NULL);
+    if (t->has_watchdog) pthread_join(t->watchdog, NULL);
+}
+
 pal_err pal_servo_thread_start(pal_servo *servo, const pal_servo_options *options, pal_diagnostic *diag,
                                pal_servo_thread **out)
 {
@@ -145,6 +161,7 @@ pal_err pal_servo_thread_start(pal_servo *servo, const pal_servo_options *option
     if (!t) return PAL_ERR_MEMORY;
     t->servo = servo;
     t->options = *options;
+    t->clock = options->clock ? options->clock : &pal_clock_monotonic;
     t->period_ns = (uint64_t)(1e9 / options->rate_hz);
     pal_triple_buffer_init(&t->timings, &t->slot[0], &t->slot[1], &t->slot[2]);
     bool fifo = false, fifo_watch = false;
@@ -152,10 +169,10 @@ pal_err pal_servo_thread_start(pal_servo *servo, const pal_servo_options *option
     options->backend->force_enable(options->device, !options->pose_only);
     atomic_store(&t->rt_flags, locked ? PAL_RT_LOCKED : 0);
     pal_err err = thread_make(&t->loop, thread_loop, t, FIFO_SERVO, &fifo);
-    if (!err && thread_make(&t->watchdog, thread_watch, t, FIFO_WATCHDOG, &fifo_watch)) {
-        atomic_store(&t->stop, true);
-        pthread_join(t->loop, NULL);
-        err = PAL_ERR_MEMORY;
+    if (!err && !options->no_watchdog) {
+        err = thread_make(&t->watchdog, thread_watch, t, FIFO_WATCHDOG, &fifo_watch);
+        t->has_watchdog = !err;
+        if (err) thread_join(t);
     }
     if (err) {
         free(t);
@@ -176,9 +193,7 @@ pal_err pal_servo_thread_start(pal_servo *servo, const pal_servo_options *option
 void pal_servo_thread_stop(pal_servo_thread *thread, pal_servo_timing *timing)
 {
     if (!thread) return;
-    atomic_store(&thread->stop, true);
-    pthread_join(thread->loop, NULL);
-    pthread_join(thread->watchdog, NULL);
+    thread_join(thread);
     thread->total.n_watchdog = atomic_load(&thread->n_watchdog);
     thread->total.rt_flags |= atomic_load(&thread->rt_flags);
     if (timing) *timing = thread->total;

@@ -1,11 +1,11 @@
-/* The real-time thread of a servo, its watchdog and its timing measurement (
- * clients/haptic_bridge/README.md, "Real time").
+/* The real-time thread of a servo, its watchdog and its timing measurement (clients/haptic_bridge/README.md,
+ * "Real time").
  *
- * The loop uses absolute clock_nanosleep. A tick later than one period counts as missed and is skipped, never caught
- * up. Where the system allows it: SCHED_FIFO 80 (watchdog 81), locked memory, a prefaulted stack, the last processor;
- * what it refuses is reported. Every second the lateness of the last 10 s is checked: p99.9 above 2 ms limits
- * stiffness; above 10 ms, or more than 1 % missed ticks, forces are off. The watchdog stops the device after 20 ms
- * without a tick. */
+ * The loop sleeps until absolute times of the clock in pal_servo_options. A tick later than one period counts as missed
+ * and is skipped, never caught up. Where the system allows it: SCHED_FIFO 80 (watchdog 81), locked memory, a prefaulted
+ * stack, the last processor; what it refuses is reported. Every second the lateness of the last 10 s is checked: p99.9
+ * above 2 ms limits stiffness; above 10 ms, or more than 1 % missed ticks, forces are off. The watchdog stops the
+ * device after 20 ms without a tick. */
 #ifndef PAL_HAPTIC_BRIDGE_SERVO_THREAD_H
 #define PAL_HAPTIC_BRIDGE_SERVO_THREAD_H
 #include "clients/haptic_bridge/jitter.h"

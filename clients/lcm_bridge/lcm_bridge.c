@@ -19,7 +19,7 @@
 typedef struct bridge_tool {
     pal_lcm_bridge *bridge;
     pal_link *link; /* NULL: no member */
-    int index, fixed;
+    int index;
     double tokens;
     uint32_t seq;
     uint64_t last_ns;
@@ -133,17 +133,10 @@ static void bridge_frame(pal_lcm_bridge *b, const uint8_t *bytes, size_t n_byte)
     bridge_body(b, head.part);
 }
 
-static void bridge_acknowledge(pal_link *link, const uint8_t *bytes, size_t n_byte)
-{
-    pal_wire_tools tools;
-    if (pal_wire_get_tools(bytes, n_byte, &tools)) return;
-    pal_link_send_ack(link, &(pal_wire_ack){.cycle = tools.cycle});
-}
-
 static void watcher_message(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
 {
     if (head->kind == PAL_WIRE_FRAME) bridge_frame(user, bytes, n_byte);
-    if (head->kind == PAL_WIRE_TOOLS) bridge_acknowledge(link, bytes, n_byte);
+    if (head->kind == PAL_WIRE_TOOLS) pal_link_acknowledge(link, bytes, n_byte);
 }
 
 static void watcher_control(void *user, pal_link *link, const pal_control *c)
@@ -182,7 +175,7 @@ static void tool_message(void *user, pal_link *link, const pal_wire_head *head, 
     bridge_tool *tool = user;
     pal_lcm_bridge *b = tool->bridge;
     pal_wire_haptic haptic;
-    if (head->kind == PAL_WIRE_TOOLS) bridge_acknowledge(link, bytes, n_byte);
+    if (head->kind == PAL_WIRE_TOOLS) pal_link_acknowledge(link, bytes, n_byte);
     if (head->kind != PAL_WIRE_HAPTIC || pal_wire_get_haptic(bytes, n_byte, &haptic) || haptic.tool != tool->index)
         return;
     palpate_haptic_model_t model;
@@ -195,12 +188,8 @@ static void tool_message(void *user, pal_link *link, const pal_wire_head *head, 
 
 static void tool_control(void *user, pal_link *link, const pal_control *c)
 {
+    (void)link;
     bridge_tool *tool = user;
-    const pal_wire_hello *hello = pal_link_hello(link);
-    if (c->type == PAL_CONTROL_HELLO) tool->fixed = c->hello.you_tool;
-    if (c->type == PAL_CONTROL_MEMBERS && hello)
-        for (uint32_t i = 0; i < c->members.n_member; i++)
-            if (c->members.member[i].id == hello->you_id) tool->fixed = c->members.member[i].tool;
     if (c->type == PAL_CONTROL_ERROR) pal_log(PAL_LOG_WARN, "lcm_tool", "tool %d: %s", tool->index, c->error.text);
 }
 
@@ -208,7 +197,6 @@ static void tool_state(void *user, pal_link *link, pal_link_state state, int cod
 {
     (void)link;
     bridge_tool *tool = user;
-    if (state == PAL_LINK_LOST || state == PAL_LINK_ENDED) tool->fixed = PAL_WIRE_TOOL_NONE;
     if (state == PAL_LINK_ENDED) pal_log(PAL_LOG_WARN, "lcm_tool", "tool %d: %d %s", tool->index, code, reason);
 }
 
@@ -224,13 +212,12 @@ static void tool_open(pal_lcm_bridge *b, bridge_tool *tool)
                                       .tool = tool->index,
                                       .events = &tool_events,
                                       .user = tool};
-    tool->fixed = PAL_WIRE_TOOL_NONE;
     tool->seq = 0;
     if (pal_link_open(b->loop, &options, NULL, &tool->link)) tool->link = NULL;
     b->count.n_tool += tool->link != NULL;
 }
 
-/* a walked tool_state_t */
+/* a tool_state_t (lcmtypes/) that passed the walk */
 static void bridge_state(pal_lcm_bridge *b, int index, const void *bytes, size_t n_byte)
 {
     bridge_tool *tool = &b->tool[index];
@@ -252,7 +239,7 @@ static void bridge_state(pal_lcm_bridge *b, int index, const void *bytes, size_t
     tool->tokens = tool->tokens + POSE_RATE_HZ * 1e-9 * (double)silence;
     if (tool->tokens > POSE_BURST) tool->tokens = POSE_BURST;
     if (!tool->link) tool_open(b, tool);
-    if (!tool->link || tool->fixed != index || tool->tokens < 1) return;
+    if (!tool->link || pal_link_tool(tool->link) != index || tool->tokens < 1) return;
     tool->tokens -= 1;
     pal_link_send_pose(tool->link, &pose);
 }
@@ -275,8 +262,8 @@ static void bridge_lcm_refused(void *user, const char *channel, pal_walk reason)
     pal_log(PAL_LOG_DEBUG, "lcm_refused", "%.63s: %s", channel, pal_walk_text(reason));
 }
 
-/* four times a second: tools nobody moves are given back or asked for again, parts at rest repeated, status kept alive
- */
+/* four times a second: releases tools without states, requests tools that were refused, and repeats parts at rest and
+ * the status */
 static void bridge_tidy(void *user)
 {
     pal_lcm_bridge *b = user;
@@ -288,7 +275,7 @@ static void bridge_tidy(void *user)
             pal_link_close(tool->link);
             tool->link = NULL;
             b->count.n_tool--;
-        } else if (pal_link_current_state(tool->link) == PAL_LINK_JOINED && tool->fixed != i) {
+        } else if (pal_link_current_state(tool->link) == PAL_LINK_JOINED && pal_link_tool(tool->link) != i) {
             pal_link_send_control(tool->link, &(pal_control){.type = PAL_CONTROL_TAKE_TOOL, .tool = i});
         }
     }

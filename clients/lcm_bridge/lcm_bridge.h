@@ -3,10 +3,14 @@
  * One watching member takes frames and status to LCM; each tool whose states come in on
  * PALPATE1/<session>/TOOL/<n> gets a trainee member of its own that takes tool n, passes the newest state on as POSE
  * (at most 245 a second) and brings HAPTIC back as HMODEL/<n>; after 5 s of silence it gives the tool back.
- *   out  BODY/<part>   body_frame_t: the FRAME message byte for byte, one datagram; repeated after 1 s without change,
- * so that a late listener sees a part at rest; longer than 65,000 bytes: dropped, counted, one warning STATUS
- * session_status_t with every status message of the server, 1 Hz without a server HMODEL/<n>    haptic_model_t in
- * TOOL/<n>      tool_state_t: length walk, then version, range and finite numbers, seq growing Thread: [net].
+ * Types: lcmtypes/. Out:
+ *   - BODY/<part>, body_frame_t: the FRAME message byte for byte, one datagram. Repeated after 1 s without change, so
+ *     that a late listener sees a part at rest. Longer than 65,000 bytes: dropped, counted, one warning.
+ *   - STATUS, session_status_t: with every status message of the server, 1 Hz without a server.
+ *   - HMODEL/<n>, haptic_model_t.
+ * In: TOOL/<n>, tool_state_t: length walk, then version, range and finite numbers, increasing seq.
+ * Thread: [net].
+ *
  * A part that adapts is shown on LCM with the triangles of its asset: TOPOLOGY_DELTA needs every one before it,
  * datagrams may be lost and listeners come late. */
 #ifndef PAL_LCM_BRIDGE_LCM_BRIDGE_H

@@ -84,6 +84,15 @@ int pal_client_flags_parse(const pal_client_table *table, int argc, char **argv,
     return -1;
 }
 
+void pal_client_print_json(cJSON *taken)
+{
+    char *text = cJSON_PrintUnformatted(taken);
+    if (text) puts(text);
+    fflush(stdout);
+    cJSON_free(text);
+    cJSON_Delete(taken);
+}
+
 bool pal_client_parse_vector(const char *text, double out[3])
 {
     for (int i = 0; i < 3; i++) {

@@ -3,6 +3,7 @@
  * value. Every program has --help; exit codes are 0 ok, 1 refused or failed, 2 usage. Thread: [load]. */
 #ifndef PAL_LINK_CLIENT_FLAGS_H
 #define PAL_LINK_CLIENT_FLAGS_H
+#include <cjson/cJSON.h>
 #include <stdbool.h>
 
 typedef enum pal_client_flag_kind { PAL_CLIENT_SWITCH, PAL_CLIENT_TEXT, PAL_CLIENT_NUMBER } pal_client_flag_kind;
@@ -26,6 +27,8 @@ typedef struct pal_client_table {
 
 /* -1: continue; else the exit code (0 after --help, 2 after one line on stderr). operand: [max_operand] */
 int pal_client_flags_parse(const pal_client_table *table, int argc, char **argv, const char **operand, int *n_operand);
+/* prints a tree as one line on stdout; takes it */
+void pal_client_print_json(cJSON *taken);
 /* three numbers "x,y,z"; false: malformed */
 bool pal_client_parse_vector(const char *text, double out[3]);
 #endif

@@ -9,10 +9,10 @@
 
 #include <stddef.h>
 
-/* encoded tool_state_t to a pose; REFUSED: version, tool, position or quaternion out of range */
+/* encoded tool_state_t (lcmtypes/) to a pose; REFUSED: version, tool, position or quaternion out of range */
 pal_err pal_lcm_to_pose(const void *bytes, size_t n_byte, pal_wire_pose *out);
 void pal_lcm_from_pose(const pal_wire_pose *pose, palpate_tool_state_t *out);
-/* encoded haptic_model_t to HAPTIC; REFUSED: version, tool, number of patches, flags */
+/* encoded haptic_model_t (lcmtypes/) to HAPTIC; REFUSED: version, tool, number of patches, flags */
 pal_err pal_lcm_to_haptic(const void *bytes, size_t n_byte, pal_wire_haptic *out);
 /* writes the patches to patch [PAL_WIRE_CONTACT_PATCH_MAX], which out borrows */
 void pal_lcm_from_haptic(const pal_wire_haptic *haptic, palpate_haptic_model_t *out, palpate_contact_patch_t *patch);

@@ -129,17 +129,17 @@ static pal_err lcm_url(char out[LCM_URL_BYTES], const char *url, bool *memory, p
         strcpy(out, url);
         return PAL_ERR_OK;
     }
-    if (!rest) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: not an lcm://, udpm:// or memq:// address", url);
+    if (!rest) return PAL_REFUSE(diag, "%s: not an lcm://, udpm:// or memq:// address", url);
     const size_t n_host = strcspn(rest, "?");
     char host[128];
-    if (n_host >= sizeof host) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: too long", url);
+    if (n_host >= sizeof host) return PAL_REFUSE(diag, "%s: too long", url);
     memcpy(host, rest, n_host);
     host[n_host] = 0;
     const char *options = rest[n_host] ? rest + n_host + 1 : "ttl=0";
     char buffer[40] = "";
     if (!strstr(options, "recv_buf_size")) snprintf(buffer, sizeof buffer, "&recv_buf_size=%d", LCM_BUFFER_WANTED);
     const int n = snprintf(out, LCM_URL_BYTES, "udpm://%s?%s%s", n_host ? host : LCM_DEFAULT_GROUP, options, buffer);
-    return n < LCM_URL_BYTES ? PAL_ERR_OK : pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: too long", url);
+    return n < LCM_URL_BYTES ? PAL_ERR_OK : PAL_REFUSE(diag, "%s: too long", url);
 }
 
 pal_err pal_lcm_link_open(pal_link_loop *loop, const char *url, const pal_lcm_events *events, void *user,
@@ -171,11 +171,6 @@ void pal_lcm_link_close(pal_lcm_link *link)
     if (link->lcm) lcm_destroy(link->lcm);
     free(link->buffer);
     free(link);
-}
-
-bool pal_lcm_link_is_up(const pal_lcm_link *link)
-{
-    return link->lcm != NULL;
 }
 
 pal_err pal_lcm_link_subscribe(pal_lcm_link *link, const char *channel, const lcm_type_info_t *type)

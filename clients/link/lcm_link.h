@@ -31,7 +31,6 @@ typedef struct pal_lcm_events {
 pal_err pal_lcm_link_open(pal_link_loop *loop, const char *url, const pal_lcm_events *events, void *user,
                           pal_diagnostic *diag, pal_lcm_link **out);
 void pal_lcm_link_close(pal_lcm_link *link); /* after the loop is destroyed; NULL is fine */
-bool pal_lcm_link_is_up(const pal_lcm_link *link);
 
 /* channel: an LCM regular expression, kept when the bus reopens; at most 8. type: expected by the length check. */
 pal_err pal_lcm_link_subscribe(pal_lcm_link *link, const char *channel, const lcm_type_info_t *type);

@@ -2,7 +2,7 @@
  * palpate-bridge.
  *
  * A pal_link_loop is one libwebsockets context. Its links, gets, timers and watched descriptors call back on the
- * thread inside pal_link_run ([net]). Other threads may call only pal_link_stop and pal_link_wake.
+ * thread inside pal_link_run ([net]). Other threads may call only pal_link_stop.
  *
  * A link connects and joins. After a loss it reconnects by timer, with pauses that double from 0.25 s to 5 s, until it
  * is closed or the server refuses permanently (protocol/README.md, "Closing"). Sending never blocks: the newest pose
@@ -32,9 +32,6 @@ void pal_link_loop_destroy(pal_link_loop *loop);            /* [load] after pal_
 void pal_link_run(pal_link_loop *loop);                     /* the calling thread is [net] until pal_link_stop */
 void pal_link_run_for(pal_link_loop *loop, double seconds); /* the same, for at most that time (tests) */
 void pal_link_stop(pal_link_loop *loop);                    /* [any] */
-/* [any] makes the loop call `woken` soon; several wakes may share one call */
-void pal_link_wake(pal_link_loop *loop);
-void pal_link_set_wake(pal_link_loop *loop, void (*woken)(void *user), void *user); /* [load] */
 
 typedef enum pal_link_state {
     PAL_LINK_CONNECTING,
@@ -75,21 +72,22 @@ pal_err pal_link_open(pal_link_loop *loop, const pal_link_options *options, pal_
 void pal_link_close(pal_link *link);
 
 pal_link_state pal_link_current_state(const pal_link *link);
-/* copy of the last hello; NULL before the first */
-const pal_wire_hello *pal_link_hello(const pal_link *link);
+/* tool that the member holds by the newest hello or members; PAL_WIRE_TOOL_NONE: none, or not connected */
+int pal_link_tool(const pal_link *link);
 
 /* the newest wins; STATE: not joined; REFUSED: a number is not finite. [net] */
 pal_err pal_link_send_pose(pal_link *link, const pal_wire_pose *pose);
 pal_err pal_link_send_ack(pal_link *link, const pal_wire_ack *ack);
+/* acknowledges the cycle that a TOOLS message closes; a malformed message is ignored */
+void pal_link_acknowledge(pal_link *link, const uint8_t *bytes, size_t n_byte);
 /* FULL: 16 are pending; STATE: not connected; REFUSED: does not fit the protocol */
 pal_err pal_link_send_control(pal_link *link, const pal_control *c);
 /* hold true: stops reading from the socket (a stalled client); false: resumes */
 void pal_link_pause_reading(pal_link *link, bool hold);
 
 typedef struct pal_link_counts {
-    uint64_t bytes_in, messages_in, bytes_out, messages_out;
-    uint64_t faults; /* malformed messages */
-    uint32_t joins;  /* hellos received */
+    uint64_t bytes_in;
+    uint32_t joins; /* hellos received */
 } pal_link_counts;
 pal_link_counts pal_link_count(const pal_link *link);
 

@@ -24,8 +24,6 @@ struct pal_link_loop {
     struct lws_context *context;
     struct lws_vhost *vhost;
     atomic_bool stop;
-    void (*woken)(void *user);
-    void *woken_user;
     pal_link *links; /* open and closing */
     pal_link_timer *timers;
     link_get *gets;

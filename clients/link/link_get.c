@@ -107,7 +107,7 @@ pal_err pal_link_get(pal_link_loop *loop, const char *url, const char *path, siz
     info.local_protocol_name = LINK_LOCAL_GET;
     info.opaque_user_data = get;
     info.pwsi = &get->wsi;
-    /* on failure the callback has told the caller already */
+    /* on failure the callback has reported it */
     lws_client_connect_via_info(&info);
     return PAL_ERR_OK;
 }

@@ -17,16 +17,6 @@ struct link_watch {
     void *user;
 };
 
-static int link_loop_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len)
-{
-    (void)user, (void)in, (void)len;
-    if (reason == LWS_CALLBACK_EVENT_WAIT_CANCELLED) {
-        pal_link_loop *loop = lws_context_user(lws_get_context(wsi));
-        if (loop && loop->woken) loop->woken(loop->woken_user);
-    }
-    return 0;
-}
-
 static int link_watch_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len)
 {
     (void)user, (void)in, (void)len;
@@ -36,10 +26,10 @@ static int link_watch_callback(struct lws *wsi, enum lws_callback_reasons reason
 }
 
 static const struct lws_protocols link_protocols[] = {
-    {"pal-loop", link_loop_callback, 0, 0, 0, NULL, 0},
+    /* the first one is also called for connections that are bound to none yet */
+    {LINK_LOCAL_WATCH, link_watch_callback, 0, 0, 0, NULL, 0},
     {PAL_PROTOCOL_NAME, link_ws_callback, 0, LINK_RX_BYTES, 0, NULL, 0},
     {LINK_LOCAL_GET, link_get_callback, 0, LINK_RX_BYTES, 0, NULL, 0},
-    {LINK_LOCAL_WATCH, link_watch_callback, 0, 0, 0, NULL, 0},
     {NULL, NULL, 0, 0, 0, NULL, 0},
 };
 
@@ -120,17 +110,6 @@ void pal_link_stop(pal_link_loop *loop)
     lws_cancel_service(loop->context);
 }
 
-void pal_link_wake(pal_link_loop *loop)
-{
-    lws_cancel_service(loop->context);
-}
-
-void pal_link_set_wake(pal_link_loop *loop, void (*woken)(void *user), void *user)
-{
-    loop->woken = woken;
-    loop->woken_user = user;
-}
-
 static void link_timer_fired(lws_sorted_usec_list_t *sul)
 {
     pal_link_timer *timer = lws_container_of(sul, pal_link_timer, sul);
@@ -187,7 +166,7 @@ pal_err link_address_parse(const char *url, link_address *out, pal_diagnostic *d
     const char *host = NULL;
     if (!strncmp(url, "ws://", 5)) host = url + 5;
     if (!strncmp(url, "http://", 7)) host = url + 7;
-    if (!host) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: not a ws:// or http:// address", url);
+    if (!host) return PAL_REFUSE(diag, "%s: not a ws:// or http:// address", url);
     const size_t n_finest = strcspn(host, "/"), n_path = strlen(host + n_finest);
     const char *colon = NULL;
     const bool bracket = host[0] == '[';
@@ -196,13 +175,13 @@ pal_err link_address_parse(const char *url, link_address *out, pal_diagnostic *d
     colon = memchr(host + after, ':', n_finest - after);
     const size_t n_host = close ? after - 1 : (colon ? (size_t)(colon - host) : n_finest);
     if (n_host == 0 || n_host >= sizeof out->host || n_path >= sizeof out->path || (bracket && !close))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: host or path is empty or too long", url);
+        return PAL_REFUSE(diag, "%s: host or path is empty or too long", url);
     long port = 80;
     if (colon) {
         char *end;
         port = strtol(colon + 1, &end, 10);
         if (end != host + n_finest || port < 1 || port > 65535)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: port is not a number of 1 to 65535", url);
+            return PAL_REFUSE(diag, "%s: port is not a number of 1 to 65535", url);
     }
     memcpy(out->host, host + bracket, n_host);
     out->host[n_host] = 0;

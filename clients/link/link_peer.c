@@ -9,7 +9,7 @@
 
 enum {
     LINK_QUEUE = 16,
-    LINK_MESSAGE_MAX = 96 << 20, /* a frame of the largest part fits, and a patch of all places */
+    LINK_MESSAGE_MAX = 96 << 20, /* a frame of the largest part, or a delta of all triangles */
     LINK_SMALL_SOCKET = 16384,   /* receive buffer of a client that reads slowly on purpose */
     LINK_PAUSE_FIRST_MS = 250,
     LINK_PAUSE_MAX_MS = 5000
@@ -37,12 +37,13 @@ struct pal_link {
     uint8_t *in; /* message being put together  [in_cap] */
     size_t n_in, in_cap;
     bool in_drop;
-    bool has_pose, has_ack, has_hello;
+    bool has_pose, has_ack;
     uint8_t pose[PAL_WIRE_POSE_BYTES], ack[PAL_WIRE_ACK_BYTES];
     int n_queued, queue_first;
     size_t queued_bytes[LINK_QUEUE];
     char queued[LINK_QUEUE][PAL_CONTROL_IN_MAX + 1];
-    pal_wire_hello hello;
+    uint16_t id; /* of the member; 0: before the first hello */
+    int held;    /* tool */
     pal_control control;
     pal_link_counts count;
 };
@@ -82,7 +83,7 @@ static void link_free(pal_link *link)
     free(link);
 }
 
-/* after these a client comes back, after the others it says why and stops (protocol, "Closing") */
+/* closures after which a client reconnects; after the others it ends (protocol/README.md, "Closing") */
 static bool link_may_return(int code)
 {
     return code == 0 || code == PAL_WIRE_CLOSE_NORMAL || code == PAL_WIRE_CLOSE_GOING_AWAY || code == 1005 ||
@@ -97,6 +98,7 @@ static void link_lost(pal_link *link, const char *reason)
     link->n_queued = 0;
     link->n_in = 0;
     link->in_drop = false;
+    link->held = PAL_WIRE_TOOL_NONE;
     lws_sul_schedule(link->loop->context, 0, &link->resume, link_resume_fired, LWS_SET_TIMER_USEC_CANCEL);
     if (link->closing) {
         link_free(link);
@@ -127,7 +129,7 @@ static void link_connect(pal_link *link)
     info.ietf_version_or_minus_one = -1;
     info.opaque_user_data = link;
     info.pwsi = &link->wsi;
-    /* on failure the callback has told already */
+    /* on failure the callback has reported it */
     lws_client_connect_via_info(&info);
 }
 
@@ -150,6 +152,7 @@ pal_err pal_link_open(pal_link_loop *loop, const pal_link_options *options, pal_
     link->read_budget = options->read_bytes_s / 4;
     link->events = options->events;
     link->user = options->user;
+    link->held = PAL_WIRE_TOOL_NONE;
     link->pause_ms = LINK_PAUSE_FIRST_MS;
     link->next = loop->links;
     loop->links = link;
@@ -201,9 +204,9 @@ pal_link_state pal_link_current_state(const pal_link *link)
 {
     return link->state;
 }
-const pal_wire_hello *pal_link_hello(const pal_link *link)
+int pal_link_tool(const pal_link *link)
 {
-    return link->has_hello ? &link->hello : NULL;
+    return link->held;
 }
 pal_link_counts pal_link_count(const pal_link *link)
 {
@@ -233,12 +236,18 @@ pal_err pal_link_send_ack(pal_link *link, const pal_wire_ack *ack)
     return PAL_ERR_OK;
 }
 
+void pal_link_acknowledge(pal_link *link, const uint8_t *bytes, size_t n_byte)
+{
+    pal_wire_tools tools;
+    if (!pal_wire_get_tools(bytes, n_byte, &tools)) pal_link_send_ack(link, &(pal_wire_ack){.cycle = tools.cycle});
+}
+
 pal_err pal_link_send_control(pal_link *link, const pal_control *c)
 {
     if (!link->up) return PAL_ERR_STATE;
     if (link->n_queued == LINK_QUEUE) return PAL_ERR_FULL;
-    const int place = (link->queue_first + link->n_queued) % LINK_QUEUE;
-    if (pal_control_put(link->queued[place], sizeof link->queued[place], c, &link->queued_bytes[place]))
+    const int slot = (link->queue_first + link->n_queued) % LINK_QUEUE;
+    if (pal_control_put(link->queued[slot], sizeof link->queued[slot], c, &link->queued_bytes[slot]))
         return PAL_ERR_REFUSED;
     link->n_queued++;
     link_want_write(link);
@@ -279,15 +288,12 @@ static int link_write(pal_link *link, struct lws *wsi)
         return 0;
     }
     if (lws_write(wsi, buffer + LWS_PRE, n, kind) < 0) return -1;
-    link->count.bytes_out += n;
-    link->count.messages_out++;
     if (link->n_queued > 0 || link->has_pose || link->has_ack) lws_callback_on_writable(wsi);
     return 0;
 }
 
 static void link_fault(pal_link *link, int refusal)
 {
-    link->count.faults++;
     if (link->events->fault) link->events->fault(link->user, link, refusal);
 }
 
@@ -299,9 +305,12 @@ static void link_text(pal_link *link)
         return;
     }
     const bool hello = link->control.type == PAL_CONTROL_HELLO;
+    const pal_wire_members *members = &link->control.members;
+    for (uint32_t i = 0; link->control.type == PAL_CONTROL_MEMBERS && i < members->n_member; i++)
+        if (members->member[i].id == link->id) link->held = members->member[i].tool;
     if (hello) {
-        link->hello = link->control.hello;
-        link->has_hello = true;
+        link->id = link->control.hello.you_id;
+        link->held = link->control.hello.you_tool;
         link->pause_ms = LINK_PAUSE_FIRST_MS;
         link->count.joins++;
     }
@@ -320,7 +329,7 @@ static void link_binary(pal_link *link)
         link->events->message(link->user, link, &head, link->in, link->n_in);
 }
 
-/* a slow client's purse: read_bytes_s flows in, messages take out; empty: reading rests until it is filled */
+/* token bucket of a slow client: read_bytes_s fills it, messages empty it; reading pauses while it is empty */
 static void link_spend(pal_link *link, struct lws *wsi, size_t n_byte)
 {
     const uint64_t now = pal_clock_ns();
@@ -356,7 +365,6 @@ static void link_receive(pal_link *link, struct lws *wsi, const uint8_t *bytes, 
         link->n_in += n_byte;
     }
     if (!lws_is_final_fragment(wsi) || lws_remaining_packet_payload(wsi) > 0) return;
-    link->count.messages_in++;
     if (link->in_drop)
         link_fault(link, PAL_REFUSAL_LONG);
     else if (lws_frame_is_binary(wsi))

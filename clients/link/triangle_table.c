@@ -1,4 +1,4 @@
-/* Before the asset is there, a corner that no table has marks a place that no patch has named. */
+/* Before the asset is there, a corner that no table has marks a slot that no delta has named. */
 #include "clients/link/triangle_table.h"
 
 #include <stdlib.h>
@@ -6,15 +6,15 @@
 
 #define UNNAMED UINT32_MAX
 
-pal_err pal_triangle_table_init(pal_triangle_table *table, uint32_t n_place, uint32_t n_vertex)
+pal_err pal_triangle_table_init(pal_triangle_table *table, uint32_t n_slot, uint32_t n_vertex)
 {
     memset(table, 0, sizeof *table);
-    if (n_place > PAL_TRIANGLE_SLOT_MAX || n_vertex > PAL_WIRE_VERTEX_MAX) return PAL_ERR_REFUSED;
-    size_t n_byte = 3 * (size_t)n_place * sizeof *table->tri;
-    table->n_place = n_place;
+    if (n_slot > PAL_TRIANGLE_SLOT_MAX || n_vertex > PAL_WIRE_VERTEX_MAX) return PAL_ERR_REFUSED;
+    size_t n_byte = 3 * (size_t)n_slot * sizeof *table->tri;
+    table->n_slot = n_slot;
     table->n_vertex = n_vertex;
     table->tri = malloc(n_byte + 1);
-    table->work = malloc(PAL_TOPOLOGY_DELTA_WORK_BYTES(n_place) + 1);
+    table->work = malloc(PAL_TOPOLOGY_DELTA_WORK_BYTES(n_slot) + 1);
     if (!table->tri || !table->work) {
         pal_triangle_table_free(table);
         return PAL_ERR_MEMORY;
@@ -32,8 +32,8 @@ void pal_triangle_table_free(pal_triangle_table *table)
 
 pal_err pal_triangle_table_set_base(pal_triangle_table *table, const pal_asset *asset)
 {
-    if (asset->n_triangle != table->n_place || asset->order->n_vertex != table->n_vertex) return PAL_ERR_REFUSED;
-    for (size_t i = 0; i < 3 * (size_t)table->n_place && !table->based; i++)
+    if (asset->n_triangle != table->n_slot || asset->order->n_vertex != table->n_vertex) return PAL_ERR_REFUSED;
+    for (size_t i = 0; i < 3 * (size_t)table->n_slot && !table->based; i++)
         if (table->tri[i] == UNNAMED) table->tri[i] = asset->triangle[i];
     table->based = true;
     return PAL_ERR_OK;
@@ -46,7 +46,7 @@ int pal_triangle_table_apply(pal_triangle_table *table, const uint8_t *bytes, si
     int refusal = pal_topology_delta_get_head(bytes, n_byte, &h);
     if (!refusal && table->revision && h.revision <= table->revision) refusal = PAL_REFUSAL_ORDER;
     if (!refusal)
-        refusal = pal_topology_delta_get(bytes, n_byte, table->n_place, table->n_vertex, table->work, &h, table->tri);
+        refusal = pal_topology_delta_get(bytes, n_byte, table->n_slot, table->n_vertex, table->work, &h, table->tri);
     if (refusal) return refusal;
     table->revision = h.revision;
     *head = h;
@@ -56,7 +56,7 @@ int pal_triangle_table_apply(pal_triangle_table *table, const uint8_t *bytes, si
 uint32_t pal_triangle_table_count(const pal_triangle_table *table)
 {
     uint32_t n = 0;
-    for (size_t i = 0; i < table->n_place && table->based; i++)
+    for (size_t i = 0; i < table->n_slot && table->based; i++)
         n += (table->tri[3 * i] | table->tri[3 * i + 1] | table->tri[3 * i + 2]) != 0;
     return n;
 }

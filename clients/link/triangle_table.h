@@ -9,16 +9,16 @@
 #include <stdbool.h>
 
 typedef struct pal_triangle_table {
-    uint32_t n_place, n_vertex;
-    uint32_t *tri;     /* 0 0 0: empty [n_place][3] */
+    uint32_t n_slot, n_vertex;
+    uint32_t *tri;     /* 0 0 0: empty [n_slot][3] */
     uint8_t *work;     /* scratch of the codec            */
     bool based;        /* the asset's triangles are present */
     uint64_t revision; /* of the last update; 0: none yet */
 } pal_triangle_table;
 
-/* n_place, n_vertex: from hello. Starts without asset and updates. The table must be zeroed or freed. REFUSED: more
+/* n_slot, n_vertex: from hello. Starts without asset and updates. The table must be zeroed or freed. REFUSED: more
  * entries or vertices than the protocol allows; MEMORY */
-pal_err pal_triangle_table_init(pal_triangle_table *table, uint32_t n_place, uint32_t n_vertex);
+pal_err pal_triangle_table_init(pal_triangle_table *table, uint32_t n_slot, uint32_t n_vertex);
 void pal_triangle_table_free(pal_triangle_table *table); /* frees and zeroes */
 /* sets the asset's triangle in every entry that no update has written; REFUSED: another number of entries or
  * vertices */

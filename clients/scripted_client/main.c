@@ -1,12 +1,12 @@
 /* palpate-client: scripted headless trainees against a server; load, latency, frame checks (scripted_client.h). */
 #include "clients/link/client_flags.h"
-#include "clients/scripted_client/end_condition.h"
+#include "clients/link/end_condition.h"
 #include "clients/scripted_client/scripted_client.h"
 #include "protocol/field_codec.h"
+#include "server/base/json_members.h"
 #include "server/base/log.h"
 #include "server/base/vec3.h"
 
-#include <cjson/cJSON.h>
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -45,16 +45,18 @@ static void main_watch(void *user)
     bool all = true, reached = true;
     for (int i = 0; i < c->n; i++) {
         all = all && pal_scripted_client_has_ended(c->trainee[i]);
-        reached = reached && pal_end_condition_met(&c->until, pal_scripted_client_get_result(c->trainee[i]));
+        double seen[PAL_CLIENT_SEEN_COUNT];
+        pal_client_seen(pal_scripted_client_get_result(c->trainee[i]), seen);
+        reached = reached && pal_end_condition_met(&c->until, seen);
     }
     if (main_signal || all || reached) pal_link_stop(c->loop);
 }
 
 typedef struct totals {
     pal_samples latency, decode, gap;
-    uint64_t frames, coarse, cycles, poses, bytes, asset_bytes, fields, field_bytes, patches, patch_bytes,
+    uint64_t frames, coarse, cycles, poses, bytes, asset_bytes, fields, field_bytes, deltas, delta_bytes,
         fault[PAL_FAULT_COUNT];
-    uint32_t triangles, places; /* of the last client */
+    uint32_t triangles, slots; /* of the last client */
     int joined, with_tool, reconnects, old_after_stall, stalls_done, silent, unanswered;
     int without_field, ungiven, n_order, n_refused;
     uint32_t topologies;
@@ -73,8 +75,8 @@ static void main_add(totals *sum, const pal_scripted_client_result *r)
     if (r->n_field) sum->field_low = sum->fields ? fmin(sum->field_low, r->field_low) : r->field_low;
     sum->field_high = fmax(sum->field_high, r->field_high);
     sum->fields += r->n_field, sum->field_bytes += r->field_bytes, sum->field_s += r->field_s;
-    sum->patches += r->n_patch, sum->patch_bytes += r->patch_bytes;
-    if (r->n_place) sum->triangles = r->n_triangle, sum->places = r->n_place;
+    sum->deltas += r->n_delta, sum->delta_bytes += r->delta_bytes;
+    if (r->n_slot) sum->triangles = r->n_triangle, sum->slots = r->n_slot;
     sum->without_field += r->joined && r->n_field == 0;
     sum->ungiven += r->joined && !r->field_given;
     for (int i = 0; i < PAL_FAULT_COUNT; i++) sum->fault[i] += r->fault[i];
@@ -91,14 +93,11 @@ static void main_add(totals *sum, const pal_scripted_client_result *r)
     if (!sum->closed && r->closed[0]) sum->closed = r->closed;
 }
 
-static void main_put_samples(cJSON *object, const char *name, pal_samples *s)
+static cJSON *samples_json(pal_samples *s)
 {
-    cJSON *o = cJSON_AddObjectToObject(object, name);
-    cJSON_AddNumberToObject(o, "n", (double)s->n);
-    cJSON_AddNumberToObject(o, "mean", pal_samples_mean(s));
-    cJSON_AddNumberToObject(o, "p50", pal_samples_at(s, 0.5));
-    cJSON_AddNumberToObject(o, "p99", pal_samples_at(s, 0.99));
-    cJSON_AddNumberToObject(o, "max", s->max);
+    return PAL_JSON({"n", JSON_NUMBER(s->n)}, {"mean", JSON_NUMBER(pal_samples_mean(s))},
+                    {"p50", JSON_NUMBER(pal_samples_at(s, 0.5))}, {"p99", JSON_NUMBER(pal_samples_at(s, 0.99))},
+                    {"max", JSON_NUMBER(s->max)});
 }
 
 /* one line for each order */
@@ -114,24 +113,15 @@ static void main_reported(void *user, const pal_order_result *reported)
         fflush(stdout);
         return;
     }
-    cJSON *o = cJSON_CreateObject();
-    cJSON_AddStringToObject(o, "order", reported->line->order.verb);
-    cJSON_AddNumberToObject(o, "line", reported->line->number);
-    cJSON_AddBoolToObject(o, "done", reported->answer != NULL);
-    cJSON_AddStringToObject(o, "text", reported->text);
-    cJSON_AddNumberToObject(o, "answer_ms", reported->answer_ms);
-    cJSON_AddNumberToObject(o, "frame_ms", reported->frame_ms);
-    cJSON_AddNumberToObject(o, "gap_ms", reported->gap_ms);
-    cJSON_AddNumberToObject(o, "moved_mm", reported->moved_m * 1e3);
-    cJSON_AddNumberToObject(o, "epoch", reported->epoch);
-    cJSON_AddNumberToObject(o, "vertices", reported->n_vertex);
-    for (uint32_t i = 0; reported->answer && i < reported->answer->n_arg; i++)
-        cJSON_AddNumberToObject(o, reported->answer->arg[i].key, reported->answer->arg[i].value);
-    char *text = cJSON_PrintUnformatted(o);
-    if (text) puts(text);
-    fflush(stdout);
-    cJSON_free(text);
-    cJSON_Delete(o);
+    const pal_order_result *r = reported;
+    cJSON *o = PAL_JSON({"order", JSON_TEXT(r->line->order.verb)}, {"line", JSON_NUMBER(r->line->number)},
+                        {"done", JSON_BOOL(r->answer != NULL)}, {"text", JSON_TEXT(r->text)},
+                        {"answer_ms", JSON_NUMBER(r->answer_ms)}, {"frame_ms", JSON_NUMBER(r->frame_ms)},
+                        {"gap_ms", JSON_NUMBER(r->gap_ms)}, {"moved_mm", JSON_NUMBER(r->moved_m * 1e3)},
+                        {"epoch", JSON_NUMBER(r->epoch)}, {"vertices", JSON_NUMBER(r->n_vertex)});
+    for (uint32_t i = 0; r->answer && i < r->answer->n_arg; i++)
+        cJSON_AddNumberToObject(o, r->answer->arg[i].key, r->answer->arg[i].value);
+    pal_client_print_json(o);
 }
 
 /* fields a second that one client got */
@@ -144,56 +134,34 @@ static double main_field_rate(const totals *sum, int n_client)
 
 static void main_json(totals *sum, int n_client, bool ok, const char *reason)
 {
-    cJSON *o = cJSON_CreateObject();
-    const double seconds = sum->seconds > 0 ? sum->seconds : 1;
-    cJSON_AddBoolToObject(o, "ok", ok);
-    if (!ok) cJSON_AddStringToObject(o, "reason", reason);
-    cJSON_AddNumberToObject(o, "clients", n_client);
-    cJSON_AddNumberToObject(o, "joined", sum->joined);
-    cJSON_AddNumberToObject(o, "with_tool", sum->with_tool);
-    cJSON_AddNumberToObject(o, "seconds", sum->seconds);
-    cJSON_AddNumberToObject(o, "frames", (double)sum->frames);
-    cJSON_AddNumberToObject(o, "coarse_frames", (double)sum->coarse);
-    cJSON_AddNumberToObject(o, "cycles", (double)sum->cycles);
-    cJSON_AddNumberToObject(o, "poses", (double)sum->poses);
-    cJSON_AddNumberToObject(o, "frames_per_s", (double)sum->frames / seconds / n_client);
-    cJSON_AddNumberToObject(o, "cycles_per_s", (double)sum->cycles / seconds / n_client);
-    cJSON_AddNumberToObject(o, "bytes_per_s", (double)sum->bytes / seconds / n_client);
-    cJSON_AddNumberToObject(o, "asset_bytes", (double)sum->asset_bytes);
-    cJSON_AddNumberToObject(o, "moved_mm", sum->moved_m * 1e3);
-    cJSON_AddNumberToObject(o, "force_max_N", sum->force_N);
-    if (sum->fields) {
-        cJSON *field = cJSON_AddObjectToObject(o, "field");
-        cJSON_AddNumberToObject(field, "n", (double)sum->fields);
-        cJSON_AddNumberToObject(field, "per_s", main_field_rate(sum, n_client));
-        cJSON_AddNumberToObject(field, "low", sum->field_low);
-        cJSON_AddNumberToObject(field, "high", sum->field_high);
-        cJSON_AddNumberToObject(field, "bytes_mean", (double)sum->field_bytes / (double)sum->fields);
-    }
-    if (sum->places) {
-        cJSON *patches = cJSON_AddObjectToObject(o, "patches");
-        cJSON_AddNumberToObject(patches, "n", (double)sum->patches);
-        cJSON_AddNumberToObject(patches, "bytes_mean",
-                                sum->patches ? (double)sum->patch_bytes / (double)sum->patches : 0);
-        cJSON_AddNumberToObject(patches, "triangles", sum->triangles);
-        cJSON_AddNumberToObject(patches, "places", sum->places);
-    }
-    main_put_samples(o, "latency_ms", &sum->latency);
-    main_put_samples(o, "decode_ms", &sum->decode);
-    main_put_samples(o, "gap_ms", &sum->gap);
-    cJSON_AddNumberToObject(o, "reconnects", sum->reconnects);
-    cJSON_AddNumberToObject(o, "topologies", sum->topologies);
-    if (sum->n_order) cJSON_AddNumberToObject(o, "orders", sum->n_order);
-    if (sum->n_order) cJSON_AddNumberToObject(o, "orders_refused", sum->n_refused);
-    if (sum->stalls_done) cJSON_AddNumberToObject(o, "old_cycles_after_stall", sum->old_after_stall);
-    if (sum->closed) cJSON_AddStringToObject(o, "closed", sum->closed);
-    cJSON *faults = cJSON_AddObjectToObject(o, "faults");
+    const double per_s = 1 / (sum->seconds > 0 ? sum->seconds : 1) / n_client;
+    cJSON *field = NULL, *deltas = NULL, *faults = cJSON_CreateObject();
+    if (sum->fields)
+        field = PAL_JSON({"n", JSON_NUMBER(sum->fields)}, {"per_s", JSON_NUMBER(main_field_rate(sum, n_client))},
+                         {"low", JSON_NUMBER(sum->field_low)}, {"high", JSON_NUMBER(sum->field_high)},
+                         {"bytes_mean", JSON_NUMBER((double)sum->field_bytes / (double)sum->fields)});
+    if (sum->slots)
+        deltas = PAL_JSON({"n", JSON_NUMBER(sum->deltas)},
+                          {"bytes_mean", JSON_NUMBER(sum->deltas ? (double)sum->delta_bytes / (double)sum->deltas : 0)},
+                          {"triangles", JSON_NUMBER(sum->triangles)}, {"slots", JSON_NUMBER(sum->slots)});
     for (int i = 0; i < PAL_FAULT_COUNT; i++)
         cJSON_AddNumberToObject(faults, pal_fault_name((pal_fault)i), (double)sum->fault[i]);
-    char *text = cJSON_PrintUnformatted(o);
-    if (text) puts(text);
-    cJSON_free(text);
-    cJSON_Delete(o);
+    pal_client_print_json(PAL_JSON(
+        {"ok", JSON_BOOL(ok)}, {"reason", ok ? NULL : JSON_TEXT(reason)}, {"clients", JSON_NUMBER(n_client)},
+        {"joined", JSON_NUMBER(sum->joined)}, {"with_tool", JSON_NUMBER(sum->with_tool)},
+        {"seconds", JSON_NUMBER(sum->seconds)}, {"frames", JSON_NUMBER(sum->frames)},
+        {"coarse_frames", JSON_NUMBER(sum->coarse)}, {"cycles", JSON_NUMBER(sum->cycles)},
+        {"poses", JSON_NUMBER(sum->poses)}, {"frames_per_s", JSON_NUMBER((double)sum->frames * per_s)},
+        {"cycles_per_s", JSON_NUMBER((double)sum->cycles * per_s)},
+        {"bytes_per_s", JSON_NUMBER((double)sum->bytes * per_s)}, {"asset_bytes", JSON_NUMBER(sum->asset_bytes)},
+        {"moved_mm", JSON_NUMBER(sum->moved_m * 1e3)}, {"force_max_N", JSON_NUMBER(sum->force_N)}, {"field", field},
+        {"topology_deltas", deltas}, {"latency_ms", samples_json(&sum->latency)},
+        {"decode_ms", samples_json(&sum->decode)}, {"gap_ms", samples_json(&sum->gap)},
+        {"reconnects", JSON_NUMBER(sum->reconnects)}, {"topologies", JSON_NUMBER(sum->topologies)},
+        {"orders", sum->n_order ? JSON_NUMBER(sum->n_order) : NULL},
+        {"orders_refused", sum->n_order ? JSON_NUMBER(sum->n_refused) : NULL},
+        {"old_cycles_after_stall", sum->stalls_done ? JSON_NUMBER(sum->old_after_stall) : NULL},
+        {"closed", sum->closed ? JSON_TEXT(sum->closed) : NULL}, {"faults", faults}));
 }
 
 static void main_table(totals *sum, int n_client)
@@ -212,10 +180,10 @@ static void main_table(totals *sum, int n_client)
         printf("field:            %.1f/s each, values from %.4g to %.4g, %.0f bytes each\n",
                main_field_rate(sum, n_client), sum->field_low, sum->field_high,
                (double)sum->field_bytes / (double)sum->fields);
-    if (sum->places)
-        printf("patches:          %llu, %.0f bytes each, %u triangles drawn now of %u places\n",
-               (unsigned long long)sum->patches, sum->patches ? (double)sum->patch_bytes / (double)sum->patches : 0,
-               sum->triangles, sum->places);
+    if (sum->slots)
+        printf("topology deltas:  %llu, %.0f bytes each, %u triangles drawn now in %u slots\n",
+               (unsigned long long)sum->deltas, sum->deltas ? (double)sum->delta_bytes / (double)sum->deltas : 0,
+               sum->triangles, sum->slots);
     for (int i = 0; i < PAL_FAULT_COUNT; i++)
         if (sum->fault[i]) printf("%s: %llu\n", pal_fault_name((pal_fault)i), (unsigned long long)sum->fault[i]);
 }
@@ -289,8 +257,9 @@ static int main_read(const char *sculpt, pal_orders *orders, const char *until, 
         fputs("palpate-client: --until \"\" waits for nothing: NAME=N,... is wanted\n", stderr);
         return 2;
     }
-    const int code =
-        until && pal_end_condition_parse(seen, until, &diag) ? 2 : sculpt && pal_orders_load(orders, sculpt, &diag);
+    const int code = until && pal_end_condition_parse(seen, pal_client_seen_name, PAL_CLIENT_SEEN_COUNT, until, &diag)
+                         ? 2
+                         : sculpt && pal_orders_load(orders, sculpt, &diag);
     if (code) fprintf(stderr, "palpate-client: %s\n", diag.text);
     return code;
 }
@@ -309,8 +278,9 @@ int main(int argc, char **argv)
         {"--seconds", "S", PAL_CLIENT_NUMBER, &seconds, 0.1, 86400, NULL, "how long (5)"},
         {"--until", "NAME=N,...", PAL_CLIENT_TEXT, &until, 0, 0, NULL,
          "end before that once each client has seen so much:\n"
-         "cycles, frames, answered, fields, patches, triangles, orders, topologies,\n"
-         "cycles_of_it (the last topology's), members, joins, stalls, moved_mm, force_N, field_high"},
+         "cycles, frames, answered, fields, deltas, triangles, orders, topologies,\n"
+         "cycles_of_it (the last topology's), members, joins, stalls, cycles_after_stall,\n"
+         "moved_mm, force_N, field_high"},
         {"--rate", "HZ", PAL_CLIENT_NUMBER, &rate, 1, 240, NULL, "poses per second (120)"},
         {"--clients", "N", PAL_CLIENT_NUMBER, &clients, 1, CLIENTS_MAX, NULL, "so many at once (1)"},
         {"--depth", "M", PAL_CLIENT_NUMBER, &depth, 1e-5, 1, NULL, "depth of a press in metres (8 % of the box)"},

@@ -54,16 +54,15 @@ static pal_err read_line(pal_order_line *to, char *text, const char *path, pal_d
     char *time = strtok_r(text, blank, &rest);
     to->t_s = time ? strtod(time, &end) : -1;
     if (!time || *end || !(to->t_s >= 0) || !isfinite(to->t_s))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s:%d: wants `SECONDS VERB key=value ...`", path, to->number);
+        return PAL_REFUSE(diag, "%s:%d: wants `SECONDS VERB key=value ...`", path, to->number);
     const char *verb = strtok_r(NULL, blank, &rest);
     if (!verb || (size_t)snprintf(to->order.verb, sizeof to->order.verb, "%s", verb) >= sizeof to->order.verb)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s:%d: has no verb", path, to->number);
+        return PAL_REFUSE(diag, "%s:%d: has no verb", path, to->number);
     while ((word = strtok_r(NULL, blank, &rest))) {
         const char *reason;
         char shown[48];
         snprintf(shown, sizeof shown, "%.40s", word);
-        if (!read_word(to, word, &reason))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s:%d: \"%s\" %s", path, to->number, shown, reason);
+        if (!read_word(to, word, &reason)) return PAL_REFUSE(diag, "%s:%d: \"%s\" %s", path, to->number, shown, reason);
     }
     return PAL_ERR_OK;
 }
@@ -81,20 +80,18 @@ pal_err pal_orders_load(pal_orders *orders, const char *path, pal_diagnostic *di
         if (text[strspn(text, " \t")] == 0 && whole) continue;
         pal_order_line *to = &orders->line[orders->n_line];
         if (!whole)
-            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s:%d: is longer than %zu bytes", path, number,
-                                     sizeof text - 2);
+            err = PAL_REFUSE(diag, "%s:%d: is longer than %zu bytes", path, number, sizeof text - 2);
         else if (orders->n_line == PAL_ORDERS_MAX)
-            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s:%d: more than %d orders", path, number, PAL_ORDERS_MAX);
+            err = PAL_REFUSE(diag, "%s:%d: more than %d orders", path, number, PAL_ORDERS_MAX);
         if (err) break;
         to->number = number;
         err = read_line(to, text, path, diag);
         if (!err && orders->n_line > 0 && to->t_s < to[-1].t_s)
-            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s:%d: time %g s is before the line above", path, number,
-                                     to->t_s);
+            err = PAL_REFUSE(diag, "%s:%d: time %g s is before the line above", path, number, to->t_s);
         orders->n_line++;
     }
     if (file) fclose(file);
-    if (!err && orders->n_line < 1) err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: has no order", path);
+    if (!err && orders->n_line < 1) err = PAL_REFUSE(diag, "%s: has no order", path);
     if (err) pal_orders_free(orders);
     return err;
 }

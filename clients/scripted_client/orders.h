@@ -2,10 +2,10 @@
  *
  *     SECONDS VERB key=value ... [at=SIDE] [at2=SIDE]
  *
- * SECONDS count from the first cycle and must not decrease. `?` before SECONDS allows a refusal; `#` begins a comment.
- * SIDE is top, bottom, front, back, left or right (+z -z -y +y -x +x of the scene): the surface point on that side
- * gives x_m y_m z_m, and with at2 x2_m y2_m z2_m. `target=NAME` names the body. A command waits for the answer to the
- * previous one. Thread: any. */
+ * SECONDS count from the first cycle in the time of the session, and must not decrease. `?` before SECONDS allows a
+ * refusal; `#` begins a comment. SIDE is top, bottom, front, back, left or right (+z -z -y +y -x +x of the scene): the
+ * surface point on that side gives x_m y_m z_m, and with at2 x2_m y2_m z2_m. `target=NAME` names the body. A command
+ * waits for the answer to the previous one. Thread: any. */
 #ifndef PAL_SCRIPTED_CLIENT_ORDERS_H
 #define PAL_SCRIPTED_CLIENT_ORDERS_H
 #include "protocol/control.h"

@@ -59,16 +59,16 @@ static pal_err script_file(pal_script *script, const char *path, pal_diagnostic 
         if (sscanf(line, "%lf %lf %lf %lf %u %c", &key.t_s, &key.offset_m[0], &key.offset_m[1], &key.offset_m[2],
                    &buttons, &rest) != 5 ||
             !(key.t_s >= 0) || !isfinite(key.t_s) || !isfinite(o[0] + o[1] + o[2]))
-            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s:%d: wants `t_s x_m y_m z_m buttons`", path, number);
+            err = PAL_REFUSE(diag, "%s:%d: wants `t_s x_m y_m z_m buttons`", path, number);
         else if (key.t_s <= before)
-            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s:%d: time %g s does not grow", path, number, key.t_s);
+            err = PAL_REFUSE(diag, "%s:%d: time %g s does not grow", path, number, key.t_s);
         else if (script->n_key == PAL_SCRIPT_KEYS)
-            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s:%d: more than %d lines", path, number, PAL_SCRIPT_KEYS);
+            err = PAL_REFUSE(diag, "%s:%d: more than %d lines", path, number, PAL_SCRIPT_KEYS);
         key.buttons = buttons;
         if (!err) script->key[script->n_key++] = key;
     }
     fclose(file);
-    if (!err && script->n_key < 1) err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: has no line", path);
+    if (!err && script->n_key < 1) err = PAL_REFUSE(diag, "%s: has no line", path);
     return err;
 }
 

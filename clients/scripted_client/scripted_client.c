@@ -14,7 +14,7 @@
 typedef struct client_part {
     pal_stored_asset *asset; /* of the current epoch, perhaps not ready */
     uint32_t epoch, seq, n_vertex;
-    bool seen, looks;       /* looks: a field was asked for  */
+    bool seen, subscribed;  /* subscribed: to a field */
     float *now_m, *first_m; /* [n_vertex][3]; first: of the first frame   */
     bool is_adaptive;
     pal_triangle_table table; /* its triangles                         */
@@ -35,7 +35,8 @@ struct pal_scripted_client {
     double box_low[3], box_high[3], error_m[PAL_WIRE_PART_MAX];
     uint32_t n_part, cycle, frame_cycle, echo_seq, pose_seq;
     bool cycle_seen;
-    int patched; /* part whose TOPOLOGY_DELTA came last and whose frame has not; -1: none */
+    int delta_part;                /* part whose TOPOLOGY_DELTA came last and whose frame has not; -1: none */
+    uint64_t sim_us, first_sim_us; /* time of the session */
     uint64_t start_ns, hello_ns, first_cycle_ns, stall_ns, last_cycle_ns, first_field_ns;
     double decode_s;
     client_part part[PAL_WIRE_PART_MAX];
@@ -58,6 +59,19 @@ const char *pal_fault_name(pal_fault fault)
 #undef X
     };
     return name[fault];
+}
+
+const char *const pal_client_seen_name[PAL_CLIENT_SEEN_COUNT] = {
+#define X(name, amount) #name,
+    PAL_CLIENT_SEEN_TABLE(X)
+#undef X
+};
+
+void pal_client_seen(const pal_scripted_client_result *r, double seen[PAL_CLIENT_SEEN_COUNT])
+{
+#define X(name, amount) seen[PAL_CLIENT_SEEN_##name] = amount;
+    PAL_CLIENT_SEEN_TABLE(X)
+#undef X
 }
 
 static const char *client_fault_text(pal_fault fault)
@@ -163,13 +177,13 @@ static void client_answered(pal_scripted_client *t, const pal_control *c)
     client_report(t);
 }
 
-/* gives the next order when its time has come and the one before is done */
+/* gives the next order when the session has reached its time and the one before is done */
 static void client_order(pal_scripted_client *t, uint64_t now)
 {
     const pal_orders *orders = t->options.orders;
     const client_part *part = &t->part[0];
     if (!orders || t->order >= orders->n_line || t->asked || !t->cycle_seen || !part->seen) return;
-    if ((double)(now - t->first_cycle_ns) * 1e-9 < orders->line[t->order].t_s) return;
+    if ((double)(t->sim_us - t->first_sim_us) * 1e-6 < orders->line[t->order].t_s) return;
     pal_control c = {.type = PAL_CONTROL_COMMAND};
     if (!pal_order_fill(&orders->line[t->order], part->now_m, part->n_vertex, &c.command)) return;
     if (pal_link_send_control(t->link, &c)) return;
@@ -216,9 +230,9 @@ static void client_frame(pal_scripted_client *t, const uint8_t *bytes, size_t n_
         return;
     }
     client_part *part = &t->part[head.part];
-    if (t->patched >= 0 && t->patched != (int)head.part)
-        client_fault(t, PAL_FAULT_PATCH, "of part %d, before a frame of part %u", t->patched, head.part);
-    t->patched = -1;
+    if (t->delta_part >= 0 && t->delta_part != (int)head.part)
+        client_fault(t, PAL_FAULT_TOPOLOGY_DELTA, "of part %d, before a frame of part %u", t->delta_part, head.part);
+    t->delta_part = -1;
     if (head.cycle > t->frame_cycle) t->frame_cycle = head.cycle;
     if (head.epoch < part->epoch && !part->seen && !part->n_kept) return; /* on its way when the topology changed */
     if (part->n_kept || part->seen) {
@@ -273,19 +287,22 @@ static void client_tools(pal_scripted_client *t, const uint8_t *bytes, size_t n_
     /* a frame may have waited for credit, so its cycle may lie before the one that it came in, never behind */
     if (t->frame_cycle > tools.cycle)
         client_fault(t, PAL_FAULT_CYCLE, "frame of cycle %u before cycle %u", t->frame_cycle, tools.cycle);
-    if (t->patched >= 0) client_fault(t, PAL_FAULT_PATCH, "of part %d, before the end of its cycle", t->patched);
-    t->patched = -1;
+    if (t->delta_part >= 0)
+        client_fault(t, PAL_FAULT_TOPOLOGY_DELTA, "of part %d, before the end of its cycle", t->delta_part);
+    t->delta_part = -1;
     t->frame_cycle = 0;
     t->cycle = tools.cycle;
+    t->sim_us = tools.sim_time_us;
     const double gap_ms = t->cycle_seen ? (double)(now - t->last_cycle_ns) * 1e-6 : 0;
     t->gap_ms = fmax(t->gap_ms, gap_ms);
     if (t->cycle_seen)
         pal_samples_add(&t->result.gap_ms, gap_ms);
     else
-        t->first_cycle_ns = now;
+        t->first_cycle_ns = now, t->first_sim_us = tools.sim_time_us;
     t->last_cycle_ns = now;
     t->cycle_seen = true;
     t->result.n_cycle++;
+    t->result.n_cycle_after_stall += t->result.stall_done;
     t->result.n_cycle_since_topology += t->part[0].seen;
     const int tool = t->result.tool;
     const bool own = tool >= 0 && (uint32_t)tool < tools.n_tool && tools.tool[tool].holder == t->id;
@@ -297,32 +314,32 @@ static void client_tools(pal_scripted_client *t, const uint8_t *bytes, size_t n_
     pal_link_send_ack(t->link, &ack);
 }
 
-static void client_patch(pal_scripted_client *t, const uint8_t *bytes, size_t n_byte)
+static void client_topology_delta(pal_scripted_client *t, const uint8_t *bytes, size_t n_byte)
 {
     pal_topology_delta_head head;
     int refusal = pal_topology_delta_get_head(bytes, n_byte, &head);
     if (!refusal && (head.part >= t->n_part || !t->part[head.part].is_adaptive)) refusal = PAL_REFUSAL_KIND;
     if (!refusal && head.epoch < t->part[head.part].epoch) {
-        t->patched = (int)head.part;
+        t->delta_part = (int)head.part;
         return;
     }
     if (!refusal && head.epoch != t->part[head.part].epoch) refusal = PAL_REFUSAL_EPOCH;
     if (!refusal) refusal = pal_triangle_table_apply(&t->part[head.part].table, bytes, n_byte, &head);
     if (refusal) {
-        client_fault(t, PAL_FAULT_PATCH, "%s", pal_refusal_text(refusal));
+        client_fault(t, PAL_FAULT_TOPOLOGY_DELTA, "%s", pal_refusal_text(refusal));
         return;
     }
-    if (t->patched >= 0) client_fault(t, PAL_FAULT_PATCH, "of part %d, before another", t->patched);
-    t->patched = (int)head.part;
-    t->result.n_patch++;
-    t->result.patch_bytes += n_byte;
+    if (t->delta_part >= 0) client_fault(t, PAL_FAULT_TOPOLOGY_DELTA, "of part %d, before another", t->delta_part);
+    t->delta_part = (int)head.part;
+    t->result.n_delta++;
+    t->result.delta_bytes += n_byte;
 }
 
 static void client_field(pal_scripted_client *t, const uint8_t *bytes, size_t n_byte)
 {
     pal_field_head head;
     int refusal = pal_field_get_head(bytes, n_byte, &head);
-    if (!refusal && (head.part >= t->n_part || !t->part[head.part].looks)) refusal = PAL_REFUSAL_KIND;
+    if (!refusal && (head.part >= t->n_part || !t->part[head.part].subscribed)) refusal = PAL_REFUSAL_KIND;
     if (!refusal && t->options.field && head.field != pal_wire_field_find(t->options.field)) refusal = PAL_REFUSAL_KIND;
     if (!refusal && head.epoch < t->part[head.part].epoch) return;
     if (!refusal && head.epoch != t->part[head.part].epoch) refusal = PAL_REFUSAL_EPOCH;
@@ -350,10 +367,10 @@ static void client_field(pal_scripted_client *t, const uint8_t *bytes, size_t n_
 static void client_subscribe(pal_scripted_client *t, const pal_wire_part_info *info, uint32_t n_part)
 {
     for (uint32_t i = 0; i < n_part && t->options.field; i++) {
-        t->part[i].looks = false;
+        t->part[i].subscribed = false;
         for (uint32_t k = 0; k < info[i].n_field; k++)
-            t->part[i].looks = t->part[i].looks || !strcmp(info[i].field[k], t->options.field);
-        if (!t->part[i].looks) continue;
+            t->part[i].subscribed = t->part[i].subscribed || !strcmp(info[i].field[k], t->options.field);
+        if (!t->part[i].subscribed) continue;
         pal_control ask = {.type = PAL_CONTROL_SUBSCRIBE_FIELD, .field_subscription = {.part = i}};
         snprintf(ask.field_subscription.field, sizeof ask.field_subscription.field, "%s", t->options.field);
         t->result.field_given = true;
@@ -370,7 +387,7 @@ static void client_on_message(void *user, pal_link *link, const pal_wire_head *h
     if (head->kind == PAL_WIRE_FRAME) client_frame(t, bytes, n_byte);
     if (head->kind == PAL_WIRE_TOOLS) client_tools(t, bytes, n_byte);
     if (head->kind == PAL_WIRE_FIELD) client_field(t, bytes, n_byte);
-    if (head->kind == PAL_WIRE_TOPOLOGY_DELTA) client_patch(t, bytes, n_byte);
+    if (head->kind == PAL_WIRE_TOPOLOGY_DELTA) client_topology_delta(t, bytes, n_byte);
     if (head->kind == PAL_WIRE_HAPTIC && pal_wire_get_haptic(bytes, n_byte, &haptic))
         client_fault(t, PAL_FAULT_MALFORMED, "HAPTIC");
 }
@@ -383,7 +400,8 @@ static void client_table(pal_scripted_client *t, const pal_wire_part_info *info,
     part->is_adaptive = info->is_adaptive;
     if (!info->is_adaptive) return;
     const pal_err err = pal_triangle_table_init(&part->table, info->n_triangle, info->n_vertex);
-    if (err) client_fault(t, PAL_FAULT_PATCH, "part %u of %u places: %s", i, info->n_triangle, pal_err_text(err));
+    if (err)
+        client_fault(t, PAL_FAULT_TOPOLOGY_DELTA, "part %u of %u slots: %s", i, info->n_triangle, pal_err_text(err));
 }
 
 /* parts as hello or topology name them; buffers follow */
@@ -417,14 +435,13 @@ static void client_parts(pal_scripted_client *t, const pal_wire_part_info *info,
 static void client_hello(pal_scripted_client *t, const pal_wire_hello *hello)
 {
     t->id = hello->you_id;
-    t->result.tool = hello->you_tool;
     t->result.joined = true;
     t->hello_ns = t->hello_ns ? t->hello_ns : pal_clock_ns();
     pal_copy3(t->box_low, hello->box_min_m);
     pal_copy3(t->box_high, hello->box_max_m);
     t->cycle_seen = false;
     t->asked = false; /* an order that was under way is given again */
-    t->patched = -1;
+    t->delta_part = -1;
     t->frame_cycle = 0; /* the connection of before may have ended between a frame and its cycle */
     t->decode_s = 0;
     t->result.n_cycle_since_topology = 0;
@@ -450,8 +467,9 @@ static void client_hello(pal_scripted_client *t, const pal_wire_hello *hello)
 
 static void client_on_control(void *user, pal_link *link, const pal_control *c)
 {
-    (void)link;
     pal_scripted_client *t = user;
+    if (c->type == PAL_CONTROL_HELLO || c->type == PAL_CONTROL_MEMBERS) t->result.tool = pal_link_tool(link);
+    if (c->type == PAL_CONTROL_MEMBERS) t->result.n_member = c->members.n_member;
     if (c->type == PAL_CONTROL_HELLO) client_hello(t, &c->hello);
     if (c->type == PAL_CONTROL_TOPOLOGY) {
         t->result.n_topology++;
@@ -460,11 +478,6 @@ static void client_on_control(void *user, pal_link *link, const pal_control *c)
         client_parts(t, c->topology.part, c->topology.n_part);
     }
     if (c->type == PAL_CONTROL_ANSWER || c->type == PAL_CONTROL_ERROR) client_answered(t, c);
-    if (c->type == PAL_CONTROL_MEMBERS) {
-        t->result.n_member = c->members.n_member;
-        for (uint32_t i = 0; i < c->members.n_member; i++)
-            if (c->members.member[i].id == t->id) t->result.tool = c->members.member[i].tool;
-    }
 }
 
 static void client_on_state(void *user, pal_link *link, pal_link_state state, int code, const char *reason)
@@ -560,7 +573,7 @@ pal_err pal_scripted_client_open(pal_link_loop *loop, pal_asset_store *store,
     const double *up = options->up;
     const double other[3] = {fabs(up[0]) < 0.9, fabs(up[0]) >= 0.9, 0};
     pal_cross3(t->e2, up, other);
-    pal_err err = pal_unit3(t->e2, t->e2, 1e-9) ? PAL_ERR_OK : pal_diagnostic_set(diag, PAL_ERR_REFUSED, "up is zero");
+    pal_err err = pal_unit3(t->e2, t->e2, 1e-9) ? PAL_ERR_OK : PAL_REFUSE(diag, "up is zero");
     pal_cross3(t->e1, t->e2, up);
     if (!err) err = pal_script_load(&t->script, options->script, 0.01, 0.01, diag);
     const pal_link_options link = {.url = options->url,
@@ -605,19 +618,15 @@ const pal_scripted_client_result *pal_scripted_client_get_result(pal_scripted_cl
         t->result.bytes_in = counts.bytes_in;
         t->result.joins = counts.joins;
     }
-    t->result.n_triangle = t->result.n_place = 0;
+    t->result.n_triangle = t->result.n_slot = 0;
     for (uint32_t i = 0; i < t->n_part; i++) {
         t->result.n_triangle += pal_triangle_table_count(&t->part[i].table);
-        t->result.n_place += t->part[i].table.n_place;
+        t->result.n_slot += t->part[i].table.n_slot;
     }
     t->result.seconds = t->hello_ns ? (double)(pal_clock_ns() - t->hello_ns) * 1e-9 : 0;
     return &t->result;
 }
 
-bool pal_scripted_client_is_active(const pal_scripted_client *t)
-{
-    return t->result.joined && (t->script.idle || t->result.tool >= 0);
-}
 bool pal_scripted_client_has_ended(const pal_scripted_client *t)
 {
     return t->ended;

@@ -33,7 +33,7 @@
     X(BOUND, "a frame's step is too coarse for the stated error")                                                      \
     X(PLACE, "a vertex lies far outside the scene or is not finite")                                                   \
     X(FIELD, "a field is not what was asked for")                                                                      \
-    X(PATCH, "a patch of triangles does not fit or comes without its frame")                                           \
+    X(TOPOLOGY_DELTA, "a topology delta does not fit or comes without its frame")                                      \
     X(ASSET, "an asset is missing, damaged or not what its name says")                                                 \
     X(CLOSED, "the server closed the connection for a fault of ours")
 typedef enum pal_fault {
@@ -65,7 +65,7 @@ typedef struct pal_scripted_client_result {
     bool joined, stall_done;
     int tool;                          /* at the end; PAL_WIRE_TOOL_NONE: none */
     uint32_t joins, n_old_after_stall; /* n_old_after_stall: cycles after a stall with a pose older than half of it */
-    uint64_t n_frame, n_coarse, n_cycle, n_pose, bytes_in;
+    uint64_t n_frame, n_coarse, n_cycle, n_cycle_after_stall, n_pose, bytes_in;
     uint64_t fault[PAL_FAULT_COUNT];
     char first_fault[256], closed[160];
     double seconds; /* from hello to now */
@@ -75,8 +75,8 @@ typedef struct pal_scripted_client_result {
     uint64_t n_field, field_bytes;
     double field_low, field_high; /* range of all values received, SI */
     double field_s;               /* from the first field to the last */
-    uint64_t n_patch, patch_bytes;
-    uint32_t n_triangle, n_place;    /* non-empty triangles now, and table entries, of all adaptive parts */
+    uint64_t n_delta, delta_bytes;
+    uint32_t n_triangle, n_slot;     /* non-empty triangles now, and slots, of all adaptive parts */
     bool field_given;                /* a part of the session has the requested field */
     uint32_t n_member;               /* in the session, including itself */
     uint32_t n_topology;             /* topologies received after the first */
@@ -94,7 +94,31 @@ void pal_scripted_client_destroy(pal_scripted_client *t); /* after the loop is d
 /* an asset of the store became ready or failed */
 void pal_scripted_client_asset_changed(pal_scripted_client *t, const pal_stored_asset *asset);
 const pal_scripted_client_result *pal_scripted_client_get_result(pal_scripted_client *t);
-/* can the script run: joined and (unless idle) holding a tool? */
-bool pal_scripted_client_is_active(const pal_scripted_client *t);
+/* What a client has seen, for end_condition.h: NAME, amount. SI units except moved_mm */
+#define PAL_CLIENT_SEEN_TABLE(X)                                                                                       \
+    X(cycles, (double)r->n_cycle)                                                                                      \
+    X(frames, (double)r->n_frame)                                                                                      \
+    X(answered, (double)r->latency_ms.n) /* poses echoed in frames */                                                  \
+    X(fields, (double)r->n_field)                                                                                      \
+    X(deltas, (double)r->n_delta)                                                                                      \
+    X(triangles, (double)r->n_triangle)                                                                                \
+    X(field_high, r->field_high)                                                                                       \
+    X(orders, (double)r->n_order)                                                                                      \
+    X(topologies, (double)r->n_topology)                                                                               \
+    X(cycles_of_it, (double)r->n_cycle_since_topology) /* since the last topology or join */                           \
+    X(members, (double)r->n_member)                    /* in the session */                                            \
+    X(joins, (double)r->joins)                                                                                         \
+    X(stalls, (double)r->stall_done)                                                                                   \
+    X(cycles_after_stall, (double)r->n_cycle_after_stall)                                                              \
+    X(moved_mm, r->moved_m * 1e3)                                                                                      \
+    X(force_N, r->force_N)
+enum {
+#define X(name, amount) PAL_CLIENT_SEEN_##name,
+    PAL_CLIENT_SEEN_TABLE(X)
+#undef X
+        PAL_CLIENT_SEEN_COUNT
+};
+extern const char *const pal_client_seen_name[PAL_CLIENT_SEEN_COUNT];
+void pal_client_seen(const pal_scripted_client_result *r, double seen[PAL_CLIENT_SEEN_COUNT]);
 bool pal_scripted_client_has_ended(const pal_scripted_client *t); /* the link will not reconnect */
 #endif

@@ -16,12 +16,12 @@ usage() {
 }
 case ${1-} in
 -h | --help) usage 0 ;;
-head) cells=head flags="--script pull --up 0,-1,0 --depth 0.025 --seconds 6.5" ;;
-chair) cells=chair flags="--script $here/hover.script --seconds 9" ;;
-paint) cells=chair flags="--script $here/hover.script --seconds 8" ;;
-mass) cells=block flags="--script $here/hover.script --seconds 2" ;;
-nozzle) cells=nozzle flags="--script $here/hover.script --seconds 6 --field strain" ;;
-bridge) cells=bridge flags="--script $here/hover.script --seconds 6 --field displacement" ;;
+head) cells=head flags="--script pull --up 0,-1,0 --depth 0.025" cycles=390 ;;
+chair) cells=chair flags="--script $here/hover.script" cycles=540 ;;
+paint) cells=chair flags="--script $here/hover.script" cycles=480 ;;
+mass) cells=block flags="--script $here/hover.script" cycles=120 ;;
+nozzle) cells=nozzle flags="--script $here/hover.script --field strain" cycles=360 ;;
+bridge) cells=bridge flags="--script $here/hover.script --field displacement" cycles=360 ;;
 *) usage 2 >&2 ;;
 esac
 name=$1
@@ -57,13 +57,12 @@ else
     "$bin/palpate" cells $cells -o "$work/$cells.palcells" --quiet || exit 1
 fi
 cp "$here/$name.json" "$work/" || exit 1
+mkfifo "$work/serve" || exit 1
 "$bin/palpate" serve "$work/$name.json" --port 0 --json --quiet "$@" >"$work/serve" &
 server=$!
 pids=$server
-until port=$(sed -n 's/.*"port":\([0-9]*\).*/\1/p' "$work/serve") && [ -n "$port" ]; do
-    kill -0 $server 2>/dev/null || exit 1
-    sleep 0.1
-done
+port=$(sed -n 's/.*"port":\([0-9]*\).*/\1/p;q' "$work/serve")
+[ -n "$port" ] || exit 1
 echo "palpate: $name: http://127.0.0.1:$port/" >&2
 sleep "$pause"
 
@@ -72,7 +71,8 @@ players='' code=0
 for orders in "$here/$name".orders "$here/$name"_*.orders; do
     [ -e "$orders" ] || continue
     file=$(basename "$orders" .orders)
-    "$bin/palpate-client" "ws://127.0.0.1:$port/ws" --name "$file" $flags --sculpt "$orders" $json >"$work/$file.report" &
+    "$bin/palpate-client" "ws://127.0.0.1:$port/ws" --name "$file" $flags --sculpt "$orders" $json \
+        --seconds 300 --until "orders=$(grep -c '^[?0-9]' "$orders"),cycles=$cycles" >"$work/$file.report" &
     players="$players $!"
     pids="$pids $!"
 done

@@ -85,6 +85,13 @@ void *pal_arena_array(pal_arena *arena, size_t n_item, size_t n_byte)
     return pal_arena_alloc(arena, total);
 }
 
+bool pal_arena_doubles(pal_arena *arena, size_t n, double **const list[], size_t n_list)
+{
+    for (size_t i = 0; i < n_list; i++)
+        if (!(*list[i] = PAL_NEW(arena, double, n))) return false;
+    return true;
+}
+
 size_t pal_arena_used(const pal_arena *arena)
 {
     return arena->allocated;

@@ -1,6 +1,6 @@
 /* Arena memory: many allocations, one free. It has two uses: the memory of a world, which grows at load and is freed
- * whole, and the scratch memory of a step, a fixed block that is emptied after every step, so that a step makes no heap
- * call. Thread: an arena belongs to one thread at a time. */
+ * whole, and the scratch memory of a step, a fixed block that is emptied after every sub-step, so that a step makes no
+ * heap call. Thread: an arena belongs to one thread at a time. */
 #ifndef PAL_BASE_ARENA_H
 #define PAL_BASE_ARENA_H
 #include "server/base/err.h"
@@ -20,6 +20,11 @@ void *pal_arena_alloc(pal_arena *arena, size_t n_byte);
 /* zeroed array of n_item items of n_byte; NULL also when the product overflows */
 void *pal_arena_array(pal_arena *arena, size_t n_item, size_t n_byte);
 #define PAL_NEW(arena, type, n) ((type *)pal_arena_array((arena), (size_t)(n), sizeof(type)))
+/* *list[i] = zeroed array of n doubles, for each of the list; false: full or out of memory */
+bool pal_arena_doubles(pal_arena *arena, size_t n, double **const list[], size_t n_list);
+#define PAL_NEW_DOUBLES(arena, n, ...)                                                                                 \
+    pal_arena_doubles((arena), (size_t)(n), (double **const[]){__VA_ARGS__},                                           \
+                      sizeof((double **const[]){__VA_ARGS__}) / sizeof(double **))
 
 /* bytes allocated since the last reset, with padding; of a fixed arena also the mark to rewind to */
 size_t pal_arena_used(const pal_arena *arena);

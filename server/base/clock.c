@@ -32,3 +32,27 @@ void pal_clock_sleep_until_ns(uint64_t when)
     while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, 0) == EINTR) {
     }
 }
+
+static uint64_t monotonic_now(void *user)
+{
+    (void)user;
+    return pal_clock_ns();
+}
+
+static void monotonic_sleep(void *user, uint64_t when_ns)
+{
+    (void)user;
+    pal_clock_sleep_until_ns(when_ns);
+}
+
+const pal_clock pal_clock_monotonic = {.now_ns = monotonic_now, .sleep_until_ns = monotonic_sleep};
+
+uint64_t pal_clock_now_ns(const pal_clock *clock)
+{
+    return clock->now_ns(clock->user);
+}
+
+void pal_clock_wake(const pal_clock *clock)
+{
+    if (clock->wake) clock->wake(clock->user);
+}

@@ -36,10 +36,11 @@ typedef struct pal_diagnostic {
     char text[512];
 } pal_diagnostic;
 
-/* writes the sentence (cut at the buffer's end) unless note is NULL, and returns err: return pal_diagnostic_set(note,
- * PAL_ERR_REFUSED, ...) */
+/* writes the sentence (cut at the buffer's end) unless diag is NULL, and returns err */
 pal_err pal_diagnostic_set(pal_diagnostic *diag, pal_err err, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
+
+#define PAL_REFUSE(diag, ...) pal_diagnostic_set(diag, PAL_ERR_REFUSED, __VA_ARGS__)
 
 #define PAL_TRY(call)                                                                                                  \
     do {                                                                                                               \

@@ -2,10 +2,10 @@
  * pieces; a worker that wakes later does not enter it, so nobody waits for a thread that has no work. */
 #include "server/base/team.h"
 
+#include "server/base/thread.h"
+
 #include <errno.h>
-#include <pthread.h>
 #include <sched.h>
-#include <signal.h>
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -87,16 +87,11 @@ pal_err pal_team_create(int n_worker, pal_team **out)
     pthread_mutex_init(&team->lock, NULL);
     pthread_cond_init(&team->begun, NULL);
     pthread_cond_init(&team->left, NULL);
-    /* signals are handled by the threads of the program */
-    sigset_t all, old;
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &old);
     for (int i = 0; i < size - 1; i++) {
         team->worker[i] = (worker){.team = team, .number = i + 1};
-        if (pthread_create(&team->worker[i].thread, NULL, live, &team->worker[i])) break;
+        if (pal_thread_start(&team->worker[i].thread, live, &team->worker[i])) break;
         team->n_thread++;
     }
-    pthread_sigmask(SIG_SETMASK, &old, NULL);
     team->size = team->n_thread + 1;
     if (size > 1 && team->n_thread == 0) {
         pal_team_destroy(team);

@@ -31,15 +31,4 @@ static inline bool pal_utf8_printable(uint32_t c)
     return !(c < 0x20 || (c >= 0x7f && c < 0xa0) || (c >= 0x200b && c <= 0x200f) || (c >= 0x2028 && c <= 0x202e) ||
              (c >= 0x2060 && c <= 0x206f) || c == 0xfeff);
 }
-
-static inline bool pal_utf8_valid(const char *text, size_t n_byte)
-{
-    uint32_t code;
-    for (size_t at = 0; at < n_byte;) {
-        int n = pal_utf8_next(text + at, n_byte - at, &code);
-        if (n == 0) return false;
-        at += (size_t)n;
-    }
-    return true;
-}
 #endif

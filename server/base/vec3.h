@@ -48,7 +48,40 @@ static inline double pal_dist3(const double a[3], const double b[3])
     pal_sub3(d, a, b);
     return pal_norm3(d);
 }
-/* a / |a|; false and r untouched when |a| <= least or not finite */
+/* the largest length of vectors a [n][3], and the largest distance of points a and b [n][3]; 0 of none */
+static inline double pal_max_norm3(const double *a, int n)
+{
+    double max = 0;
+    for (int i = 0; i < n; i++) max = fmax(max, pal_norm3(a + 3 * (long)i));
+    return max;
+}
+static inline double pal_max_dist3(const double *a, const double *b, int n)
+{
+    double max = 0;
+    for (int i = 0; i < n; i++) max = fmax(max, pal_dist3(a + 3 * (long)i, b + 3 * (long)i));
+    return max;
+}
+/* r = (b - a) x (c - a), twice the vector area of the triangle a b c */
+static inline void pal_normal3(double r[3], const double a[3], const double b[3], const double c[3])
+{
+    double u[3], v[3];
+    pal_sub3(u, b, a);
+    pal_sub3(v, c, a);
+    pal_cross3(r, u, v);
+}
+/* the box of no point, and the smallest box around it and x; a NaN changes nothing */
+static inline void pal_box3_empty(double low[3], double high[3])
+{
+    for (int k = 0; k < 3; k++) low[k] = INFINITY, high[k] = -INFINITY;
+}
+static inline void pal_box3_add(double low[3], double high[3], const double x[3])
+{
+    for (int k = 0; k < 3; k++) {
+        if (x[k] < low[k]) low[k] = x[k];
+        if (x[k] > high[k]) high[k] = x[k];
+    }
+}
+/* a / |a|; false and r untouched when |a| <= min or not finite */
 static inline bool pal_unit3(double r[3], const double a[3], double min)
 {
     double n = pal_norm3(a);

@@ -1,20 +1,12 @@
 /* `palpate bench NAME`. Thread: [load]. */
 #ifndef PAL_BENCH_BENCH_H
 #define PAL_BENCH_BENCH_H
-#include <stdbool.h>
+#include "server/bench/bench_report.h"
 
 int command_bench(int argc, char **argv); /* as in commands/commands.h */
 
-/* one file a bench; each prints a table, or with json one object; the result is the exit code */
-int bench_adaptive(bool json, const char *picture); /* picture: SVG of trajectories, or NULL */
-int bench_calibrate(const char *folder_or_null, bool json);
-int bench_estimate(bool json);
-int bench_fem(bool json);
-int bench_guards(bool json);
-int bench_latency(bool json);
-int bench_mesh(const char *ply_path_or_null, bool json);
-int bench_protocol(bool json);
-int bench_sleep(bool json);
-int bench_solids(bool json);
-int bench_springs(bool json);
+/* one file a bench, which reports as it measures */
+typedef pal_err bench_run(bench_report *r, pal_diagnostic *diag);
+bench_run bench_adaptive, bench_calibrate, bench_estimate, bench_fem, bench_guards, bench_latency, bench_mesh,
+    bench_protocol, bench_sleep, bench_solids, bench_springs;
 #endif

@@ -4,48 +4,36 @@
  * (a) Paper C, Table I: a sphere of 114 and a stomach of 188 vertices, our own and, where they exist, those of
  * ../shared (PAL_SHARED names another folder), coarse, fully refined (450, 746) and adaptive, pressed at one place for
  * 2 s and then free for 0.3 s: the 2.3 s of paper C, Fig. 11. The paper does not give its constants; ours: E 5 kPa, a
- * wall of 3 mm with the mass of what it encloses, 1000 kg/m^3, anchors fixed in space, thresholds from size and
- * stiffness. Every body is pressed for 0.1 ms before the run, so that the adaptive one starts refined. `off` is the
- * largest distance of the pressed vertex from its trajectory in the fully refined body, as a share of the largest
- *     displacement there (paper C, Fig. 12). --picture draws these trajectories of our two surfaces (paper C, Figs. 10
- *     and 12).
- * (b) A hollow ball of 0.2 m with four levels, the finest of 28,674 vertices, on which a palm of 7 cm rests: its place
- *     refined, against all of it refined.
+ * wall of 3 mm with the mass of what it encloses, 1000 kg/m^3, anchors fixed in space. Every body is pressed for 0.1 ms
+ * before the run, so that the adaptive one starts refined. `off` is the largest distance of the pressed vertex from its
+ * trajectory in the fully refined body over the largest displacement there (paper C, Fig. 12). --picture draws these
+ * trajectories of our two surfaces (paper C, Figs. 10 and 12).
+ * (b) A hollow ball of 0.2 m with four levels, the finest of 28,674 vertices, on which a palm of 7 cm rests: refined
+ * under the palm alone, against refined everywhere.
  * (c) The same with a finest level of 114,690 vertices, at most 2,000 of them active, in steps of 1 ms.
  * (d) There, the cost of one switch: a face split or joined, and the additional time of the step after it.
  *
  * The press is distributed over the nodes of a patch by mass and a smooth bump: the same pressure on every level. */
 #include "server/bench/bench.h"
-#include "server/bench/bench_report.h"
+#include "server/bench/bench_body.h"
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
-#include "server/cli/median.h"
 #include "server/figure/plot.h"
-#include "server/mesh/geometry/stomach.h"
+#include "server/num/median.h"
 #include "server/scene/scene_file.h"
 #include "server/sim/surface/adaptive_surface.h"
-#include "server/sim/world/world.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-enum {
-    TABLE_STEPS = 138,
-    ROUNDS = 21,
-    PALM_ROUNDS = 3,
-    TABLES = 4,
-    KINDS = 3,
-    SWITCHES = 61,
-    MAX_NODE = 2000,
-    COMPONENTS = 12
-};
+enum { TABLE_STEPS = 138, ROUNDS = 21, PALM_ROUNDS = 3, KINDS = 3, SWITCHES = 61, MAX_NODE = 2000, COMPONENTS = 12 };
 enum { COARSE, REFINED, ADAPTIVE };
 static const char *const kind_name[KINDS] = {"coarse", "refined", "adaptive"};
-static const double frame_s = 1.0 / 60, press_s = 2, free_s = 0.3, look_s = 1e-4;
+static const char *const shape_name[2] = {"sphere", "stomach"};
+static const double frame_s = 1.0 / 60, press_s = 2, free_s = 0.3, adapt_s = 1e-4;
 
 /* a body with its scene, and the pressed patch */
 typedef struct pressed {
@@ -58,46 +46,16 @@ typedef struct pressed {
     double at[3];
 } pressed;
 
-typedef struct table_row {
-    const char *name;
-    char source[40];
-    double paper_s[KINDS];
-    int n_node[KINDS][2], n_spring[KINDS][2];  /* least and most active */
-    int n_sub[KINDS];                          /* sub-steps of a run    */
-    double run_s[KINDS], moved_m[KINDS];       /* moved_m: the vertex pressed, at the end of the press */
-    double displacement_m[KINDS][TABLE_STEPS]; /* the same after every step                            */
+/* what a run of one kind shows */
+typedef struct run {
+    int n_node[2], n_spring[2];         /* least and most active */
+    int n_sub;                          /* sub-steps             */
+    double moved_m;                     /* of the vertex pressed, at the end of the press */
+    double displacement_m[TABLE_STEPS]; /* the same after every step              */
     int n_sample;
-    double off[KINDS]; /* from the refined one's, in parts of its largest       */
-    double ratio;      /* adaptive over refined: of the paper 0.31 and 0.48 */
-} table_row;
-
-typedef struct palm_row {
-    int n_node[2], n_spring[2]; /* refined, adaptive */
-    double second_s[2], ratio;  /* for a simulated second */
-} palm_row;
-
-typedef struct live_row {
-    int n_finest, n_node, n_spring, n_sub;
-    double p50_ms, p95_ms;
-    int n_component;
-    char component[COMPONENTS][24];
-    double component_ms[COMPONENTS];
-    double split_us, join_us, after_us; /* of one switch; after: what the next step takes longer */
-} live_row;
-
-typedef struct results {
-    int n_table;
-    table_row table[TABLES];
-    palm_row palm;
-    live_row live;
-} results;
+} run;
 
 /* ---- bodies ---- */
-
-static pal_surface_scene options_of(const char *shape)
-{
-    return (pal_surface_scene){.label = -1, .adaptive = true, .shape = shape, .material = {5000, 0.45, 1000, 4}};
-}
 
 /* a file of ../shared; its path, or NULL when it is not there */
 static const char *shared_path(const char *file)
@@ -111,7 +69,7 @@ static const char *shared_path(const char *file)
 /* a surface from a file, or with path NULL the shape; pressed where it is farthest along the axis */
 static pal_err take(const char *name, const char *path, int axis, pressed *out, pal_diagnostic *diag)
 {
-    const pal_surface_scene options = options_of(name);
+    const pal_surface_scene options = {.label = -1, .adaptive = true, .shape = name, .material = {5000, 0.45, 1000, 4}};
     *out = (pressed){.name = name, .axis = axis, .source = "procedural"};
     if (path) {
         snprintf(out->source, sizeof out->source, "%s", strrchr(path, '/') + 1);
@@ -184,69 +142,147 @@ static double moved(const pal_body *body, const pressed *p)
     return pal_dist3(body->x + 3 * best, body->x_rest + 3 * best);
 }
 
-/* runs steps, the load follows the active nodes; the result is the processor time of the steps, s; < 0: frozen */
-static double run_steps(pal_world *world, const pressed *p, double share, int n_step, double step_s, table_row *out,
-                        int kind)
+static void widen(int range[2], int n)
+{
+    if (n < range[0] || !range[0]) range[0] = n;
+    if (n > range[1]) range[1] = n;
+}
+
+/* runs steps, the load follows the active nodes; the result is the processor time of the steps, s; < 0: frozen. out
+ * may be NULL */
+static double run_steps(pal_world *world, const pressed *p, double share, double seconds, double step_s, run *out)
 {
     const pal_body *body = pal_world_body(world, 0);
-    uint64_t spent = 0, seen = body->revision - 1;
-    for (int step = 0; step < n_step; step++) {
-        if (body->revision != seen) load(world, p, share);
-        seen = body->revision;
+    double spent_ms = 0, ms;
+    uint64_t seen = body->display.revision - 1;
+    for (long step = lround(seconds / step_s); step > 0; step--) {
+        if (body->display.revision != seen) load(world, p, share);
+        seen = body->display.revision;
         pal_world_wake(world);
-        uint64_t began = pal_clock_thread_ns();
-        if (pal_world_step(world, step_s)) return -1;
-        spent += pal_clock_thread_ns() - began;
+        if (bench_step(world, step_s, &ms)) return -1;
+        spent_ms += ms;
         if (!out) continue;
-        out->n_sub[kind] += pal_world_substeps(world);
-        if (out->n_sample < TABLE_STEPS) out->displacement_m[kind][out->n_sample++] = moved(body, p);
-        int *node = out->n_node[kind], *spring = out->n_spring[kind];
-        node[0] = body->n_active < node[0] || !node[0] ? body->n_active : node[0];
-        node[1] = body->n_active > node[1] ? body->n_active : node[1];
-        spring[0] =
-            body->model.adaptive->n_spring < spring[0] || !spring[0] ? body->model.adaptive->n_spring : spring[0];
-        spring[1] = body->model.adaptive->n_spring > spring[1] ? body->model.adaptive->n_spring : spring[1];
+        out->n_sub += pal_world_substeps(world);
+        if (out->n_sample < TABLE_STEPS) out->displacement_m[out->n_sample++] = moved(body, p);
+        widen(out->n_node, body->n_active);
+        widen(out->n_spring, body->model.adaptive->n_spring);
     }
-    return 1e-9 * (double)spent;
+    return 1e-3 * spent_ms;
 }
 
 /* ---- (a) ---- */
 
-static pal_err run_table(const pressed *p, const double paper_s[KINDS], table_row *out, pal_diagnostic *diag)
+static const char *range_text(const int n[2], char text[32])
+{
+    snprintf(text, 32, n[0] == n[1] ? "%d" : "%d-%d", n[0], n[1]);
+    return text;
+}
+
+static void report_table(bench_report *r, const pressed *p, const run all[KINDS], const double run_s[KINDS],
+                         const double paper_s[KINDS])
+{
+    const run *refined = &all[REFINED];
+    double max = 0;
+    for (int i = 0; i < refined->n_sample; i++) max = fmax(max, refined->displacement_m[i]);
+    for (int kind = 0; kind < KINDS; kind++) {
+        const run *a = &all[kind];
+        char nodes[32], springs[32];
+        double off = 0;
+        for (int i = 0; i < a->n_sample; i++)
+            off = fmax(off, fabs(a->displacement_m[i] - refined->displacement_m[i]) / max);
+        BENCH_ROW(r, TEXT("body", "body", -8, p->name), TEXT("run", "run", -9, kind_name[kind]),
+                  TEXT("surface", "surface", -17, p->source), TEXT("nodes", "nodes", 9, range_text(a->n_node, nodes)),
+                  TEXT("springs", "springs", 11, range_text(a->n_spring, springs)),
+                  NUMBER("moved_m", "moved m", 9, 5, a->moved_m), NUMBER("off", "off", 7, 4, off),
+                  NUMBER("substeps", "sub-steps", 10, 0, a->n_sub), NUMBER("run_s", "run s", 9, 4, run_s[kind]),
+                  NUMBER("paper_s", "paper s", 9, 3, paper_s[kind]),
+                  NUMBER("ratio", "of refined", 10, 2, run_s[kind] / run_s[REFINED]),
+                  NUMBER(NULL, "of paper", 8, 2, paper_s[kind] / paper_s[REFINED]),
+                  NUMBER(NULL, "times as fast", 13, 0, paper_s[kind] / run_s[kind]));
+    }
+}
+
+static pal_err run_table(const pressed *p, const double paper_s[KINDS], run out[KINDS], bench_report *r,
+                         pal_diagnostic *diag)
 {
     pal_world *world[KINDS] = {NULL};
-    double run_s[KINDS][ROUNDS], ratio[ROUNDS];
+    double run_s[KINDS][ROUNDS], median_s[KINDS];
     pal_err err = PAL_ERR_OK;
-    *out = (table_row){.name = p->name};
-    memcpy(out->source, p->source, sizeof out->source);
-    memcpy(out->paper_s, paper_s, sizeof out->paper_s);
+    memset(out, 0, KINDS * sizeof *out);
     for (int kind = 0; kind < KINDS && !err; kind++) err = start(p, kind, 2, 0, frame_s, &world[kind], diag);
-    for (int round = 0; round < ROUNDS && !err; round++) {
+    for (int round = 0; round < ROUNDS && !err; round++)
         for (int kind = 0; kind < KINDS && !err; kind++) {
             pal_world_reset(world[kind]);
-            out->n_sub[kind] = out->n_sample = 0;
-            double looking = run_steps(world[kind], p, 1, 1, look_s, NULL, 0);
-            double pressing = run_steps(world[kind], p, 1, (int)lround(press_s / frame_s), frame_s, out, kind);
-            out->moved_m[kind] = moved(pal_world_body(world[kind], 0), p);
-            double after = run_steps(world[kind], p, 0, (int)lround(free_s / frame_s), frame_s, out, kind);
-            run_s[kind][round] = looking + pressing + after;
-            if (looking < 0 || pressing < 0 || after < 0)
+            out[kind].n_sub = out[kind].n_sample = 0;
+            double adapting = run_steps(world[kind], p, 1, adapt_s, adapt_s, NULL);
+            double pressing = run_steps(world[kind], p, 1, press_s, frame_s, &out[kind]);
+            out[kind].moved_m = moved(pal_world_body(world[kind], 0), p);
+            double after = run_steps(world[kind], p, 0, free_s, frame_s, &out[kind]);
+            run_s[kind][round] = adapting + pressing + after;
+            if (adapting < 0 || pressing < 0 || after < 0)
                 err = pal_diagnostic_set(diag, PAL_ERR_FROZEN, "%s: it diverged", p->name);
         }
-        ratio[round] = err ? 0 : run_s[ADAPTIVE][round] / run_s[REFINED][round];
-    }
     for (int kind = 0; kind < KINDS; kind++) {
-        if (!err) out->run_s[kind] = pal_median(run_s[kind], ROUNDS);
+        if (!err) median_s[kind] = pal_median(run_s[kind], ROUNDS);
         pal_world_destroy(world[kind]);
     }
-    if (!err) out->ratio = pal_median(ratio, ROUNDS);
-    double max = 0;
-    for (int i = 0; i < out->n_sample; i++) max = fmax(max, out->displacement_m[REFINED][i]);
-    for (int kind = 0; kind < KINDS; kind++)
-        for (int i = 0; i < out->n_sample; i++)
-            out->off[kind] =
-                fmax(out->off[kind], fabs(out->displacement_m[kind][i] - out->displacement_m[REFINED][i]) / max);
+    if (!err) report_table(r, p, out, median_s, paper_s);
     return err;
+}
+
+/* the mass of what it encloses; pressed on a patch of a twelfth of its size */
+static void fill(pressed *body, double force_N)
+{
+    const pal_surface *surface = &body->loaded->mesh[0].surface;
+    double low[3], high[3];
+    pal_surface_box(surface, low, high);
+    body->mass_kg = 1000 * fabs(pal_surface_volume(surface));
+    body->radius_m = pal_dist3(low, high) / 12, body->force_N = force_N;
+}
+
+/* our own surface of each shape into drawn, then the shared one where it exists. The sphere is pressed at its equator,
+ * where every vertex is regular */
+static pal_err run_tables(run drawn[2][KINDS], bench_report *r, pal_diagnostic *diag)
+{
+    static const double paper_s[2][KINDS] = {{2.334, 10.078, 3.136}, {3.328, 14.422, 6.906}};
+    static const char *const file[2] = {"sphere_114.obj", "stomach_188.obj"};
+    static const int axis[2] = {0, 2};
+    static const double force_N[2] = {0.025, 0.075};
+    static run shared[KINDS];
+    pal_err err = PAL_ERR_OK;
+    for (int k = 0; k < 4 && !err; k++) {
+        const char *path = k & 1 ? shared_path(file[k / 2]) : NULL;
+        if (k & 1 && !path) continue;
+        pressed body;
+        err = take(shape_name[k / 2], path, axis[k / 2], &body, diag);
+        if (!err) fill(&body, force_N[k / 2]);
+        if (!err) err = run_table(&body, paper_s[k / 2], k & 1 ? shared : drawn[k / 2], r, diag);
+        pal_scene_free(body.loaded);
+    }
+    return err;
+}
+
+/* the trajectory of the pressed vertex of our own surfaces */
+static pal_err draw_trajectories(run drawn[2][KINDS], const char *path, pal_diagnostic *diag)
+{
+    static char name[2 * KINDS][24];
+    static double time_s[TABLE_STEPS], displacement_mm[2 * KINDS][TABLE_STEPS];
+    pal_plot plot = {.title = "The vertex that is pressed for 2 s and then released",
+                     .x_label = "time, s",
+                     .y_label = "displacement, mm"};
+    for (int i = 0; i < TABLE_STEPS; i++) time_s[i] = (i + 1) * frame_s;
+    for (int c = 0; c < 2 * KINDS; c++) {
+        const run *from = &drawn[c / KINDS][c % KINDS];
+        snprintf(name[c], sizeof name[c], "%s, %s", shape_name[c / KINDS], kind_name[c % KINDS]);
+        for (int i = 0; i < from->n_sample; i++) displacement_mm[c][i] = 1e3 * from->displacement_m[i];
+        plot.curve[plot.n_curve++] = (pal_curve){.name = name[c],
+                                                 .n = from->n_sample,
+                                                 .x = time_s,
+                                                 .y = displacement_mm[c],
+                                                 .bare = true,
+                                                 .dashed = c % KINDS == ADAPTIVE};
+    }
+    return pal_plot_write(&plot, path, diag);
 }
 
 /* ---- (b) ---- */
@@ -277,7 +313,7 @@ static pal_err make_ball(int n_split, double radius_m, double force_N, pressed *
     return PAL_ERR_OK;
 }
 
-static pal_err run_palm(const pressed *p, palm_row *out, pal_diagnostic *diag)
+static pal_err run_palm(const pressed *p, bench_report *r, pal_diagnostic *diag)
 {
     pal_world *world[2] = {NULL};
     double run_s[2][PALM_ROUNDS], ratio[PALM_ROUNDS];
@@ -285,24 +321,25 @@ static pal_err run_palm(const pressed *p, palm_row *out, pal_diagnostic *diag)
     for (int k = 0; k < 2 && !err; k++)
         err = start(p, k ? ADAPTIVE : REFINED, PALM_LEVELS, 0, frame_s, &world[k], diag);
     /* only what adapts has to come to its state */
-    if (!err && run_steps(world[1], p, 1, (int)lround(settle_s / frame_s), frame_s, NULL, 0) < 0) err = PAL_ERR_FROZEN;
+    if (!err && run_steps(world[1], p, 1, settle_s, frame_s, NULL) < 0) err = PAL_ERR_FROZEN;
     for (int round = 0; round < PALM_ROUNDS && !err; round++) {
         for (int k = 0; k < 2; k++) {
-            run_s[k][round] = run_steps(world[k], p, 1, (int)lround(palm_s / frame_s), frame_s, NULL, 0) / palm_s;
+            run_s[k][round] = run_steps(world[k], p, 1, palm_s, frame_s, NULL) / palm_s;
             if (run_s[k][round] < 0) err = PAL_ERR_FROZEN;
         }
         ratio[round] = run_s[1][round] / run_s[0][round];
     }
     if (err == PAL_ERR_FROZEN) pal_diagnostic_set(diag, err, "four levels: it diverged");
     for (int k = 0; k < 2; k++) {
-        if (!err) {
-            const pal_adaptive_surface *adaptive = pal_world_body(world[k], 0)->model.adaptive;
-            out->n_node[k] = adaptive->n_node, out->n_spring[k] = adaptive->n_spring;
-            out->second_s[k] = pal_median(run_s[k], PALM_ROUNDS);
-        }
+        const pal_adaptive_surface *adaptive = err ? NULL : pal_world_body(world[k], 0)->model.adaptive;
+        if (!err)
+            BENCH_ROW(r, TEXT("run", "run", -9, kind_name[REFINED + k]),
+                      NUMBER("nodes", "nodes", 7, 0, adaptive->n_node),
+                      NUMBER("springs", "springs", 7, 0, adaptive->n_spring),
+                      NUMBER("second_s", "s", 8, 3, pal_median(run_s[k], PALM_ROUNDS)),
+                      NUMBER("ratio", "of refined", 10, 3, k ? pal_median(ratio, PALM_ROUNDS) : 1));
         pal_world_destroy(world[k]);
     }
-    if (!err) out->ratio = pal_median(ratio, PALM_ROUNDS);
     return err;
 }
 
@@ -310,26 +347,6 @@ static pal_err run_palm(const pressed *p, palm_row *out, pal_diagnostic *diag)
 
 static const double live_s = 1e-3;
 enum { BALL_LEVELS = 4, LIVE_STEPS = 301 };
-
-/* median milliseconds of the components, with their names */
-static void store_component_times(pal_world *world, double *ms, int n_step, live_row *out)
-{
-    out->n_component = pal_world_component_count(world) < COMPONENTS ? pal_world_component_count(world) : COMPONENTS;
-    for (int r = 0; r < out->n_component; r++) {
-        pal_component_info info;
-        pal_world_component_info(world, r, &info);
-        snprintf(out->component[r], sizeof out->component[r], "%s", info.name);
-        out->component_ms[r] = pal_median(ms + (size_t)r * LIVE_STEPS, n_step);
-    }
-}
-
-static double timed_step(pal_world *world)
-{
-    pal_world_wake(world);
-    uint64_t began = pal_clock_thread_ns();
-    if (pal_world_step(world, live_s)) return NAN;
-    return 1e-6 * (double)(pal_clock_thread_ns() - began);
-}
 
 /* a leaf that splits alone and can be joined again; -1: none */
 static int32_t find_leaf(pal_adaptive_surface *adaptive, pal_body *body)
@@ -345,203 +362,97 @@ static int32_t find_leaf(pal_adaptive_surface *adaptive, pal_body *body)
     return -1;
 }
 
-/* splits and joins one face again and again, with a step after each and steps without any between */
-static pal_err run_switches(pal_world *world, live_row *out, pal_diagnostic *diag)
+/* us: a split, a join, what the step after one takes longer. One face is split and joined again and again, with a step
+ * after each and steps without any between */
+static pal_err run_switches(pal_world *world, double us[3], pal_diagnostic *diag)
 {
     pal_body *body = pal_world_body(world, 0);
     pal_adaptive_surface *adaptive = body->model.adaptive;
-    double us[2][SWITCHES], more[SWITCHES];
+    double sample[3][SWITCHES];
     int32_t face = find_leaf(adaptive, body);
     if (face < 0) return pal_diagnostic_set(diag, PAL_ERR_INTERNAL, "no face can be split alone");
     for (int turn = 0; turn < SWITCHES; turn++) {
         double with = 0, without = 0;
         for (int join = 0; join < 2; join++) {
+            double ms[2] = {NAN, NAN};
             uint64_t began = pal_clock_thread_ns();
             if (join)
                 pal_adaptive_join(adaptive, body, face);
             else
                 pal_adaptive_split(adaptive, body, face, 0);
             pal_adaptive_update(adaptive, body);
-            us[join][turn] = 1e-3 * (double)(pal_clock_thread_ns() - began);
-            with += timed_step(world), without += timed_step(world);
+            sample[join][turn] = 1e-3 * (double)(pal_clock_thread_ns() - began);
+            for (int k = 0; k < 2; k++) {
+                pal_world_wake(world);
+                PAL_TRY(bench_step(world, live_s, &ms[k]));
+            }
+            with += ms[0], without += ms[1];
         }
-        more[turn] = 1e3 * (with - without) / 2;
+        sample[2][turn] = 1e3 * (with - without) / 2;
     }
-    out->split_us = pal_median(us[0], SWITCHES), out->join_us = pal_median(us[1], SWITCHES);
-    out->after_us = pal_median(more, SWITCHES);
+    for (int k = 0; k < 3; k++) us[k] = pal_median(sample[k], SWITCHES);
     return PAL_ERR_OK;
 }
 
-static pal_err run_live(const pressed *p, live_row *out, pal_diagnostic *diag)
+static pal_err measure_live(pal_world *world, const pressed *p, bench_report *r, pal_diagnostic *diag)
 {
     static double step_ms[LIVE_STEPS], component_ms[COMPONENTS][LIVE_STEPS];
-    pal_world *world = NULL;
-    PAL_TRY(start(p, ADAPTIVE, BALL_LEVELS, MAX_NODE, live_s, &world, diag));
     const pal_body *body = pal_world_body(world, 0);
-    pal_err err = PAL_ERR_OK;
-    if (run_steps(world, p, 1, 700, live_s, NULL, 0) < 0)
-        err = pal_diagnostic_set(diag, PAL_ERR_FROZEN, "ball: it diverged");
-    for (int step = 0; step < LIVE_STEPS && !err; step++) {
-        step_ms[step] = timed_step(world);
-        for (int r = 0; r < pal_world_component_count(world) && r < COMPONENTS; r++) {
-            pal_component_info info;
-            pal_world_component_info(world, r, &info);
-            component_ms[r][step] = 1e-6 * (double)info.spent_ns;
+    int n_component = pal_world_component_count(world);
+    pal_component_info info;
+    double us[3];
+    if (n_component > COMPONENTS) n_component = COMPONENTS;
+    if (run_steps(world, p, 1, 0.7, live_s, NULL) < 0)
+        return pal_diagnostic_set(diag, PAL_ERR_FROZEN, "ball: it diverged");
+    for (int step = 0; step < LIVE_STEPS; step++) {
+        pal_world_wake(world);
+        PAL_TRY(bench_step(world, live_s, &step_ms[step]));
+        for (int k = 0; k < n_component; k++) {
+            pal_world_component_info(world, k, &info);
+            component_ms[k][step] = 1e-6 * (double)info.spent_ns;
         }
     }
-    if (!err) {
-        *out = (live_row){.n_finest = body->n_node,
-                          .n_node = body->n_active,
-                          .n_spring = body->model.adaptive->n_spring,
-                          .n_sub = pal_world_substeps(world)};
-        out->p50_ms = pal_median(step_ms, LIVE_STEPS), out->p95_ms = step_ms[LIVE_STEPS * 95 / 100];
-        store_component_times(world, component_ms[0], LIVE_STEPS, out);
-        err = run_switches(world, out, diag);
+    int n_node = body->n_active, n_spring = body->model.adaptive->n_spring, n_sub = pal_world_substeps(world);
+    double p50_ms = pal_median(step_ms, LIVE_STEPS), p95_ms = step_ms[LIVE_STEPS * 95 / 100];
+    PAL_TRY(run_switches(world, us, diag));
+    bench_note(r, "\nfinest level of %d nodes, steps of 1 ms; wanted: less than 1 ms", body->n_node);
+    bench_list(r, "live");
+    BENCH_ROW(r, VALUE("finest_nodes", body->n_node), NUMBER("nodes", "nodes", 7, 0, n_node),
+              NUMBER("springs", "springs", 7, 0, n_spring), NUMBER("substeps", "sub-steps", 9, 0, n_sub),
+              NUMBER("p50_ms", "ms p50", 7, 3, p50_ms), NUMBER("p95_ms", "ms p95", 7, 3, p95_ms),
+              NUMBER("split_us", "split us", 9, 1, us[0]), NUMBER("join_us", "join us", 9, 1, us[1]),
+              NUMBER("after_us", "next step us", 12, 1, us[2]));
+    bench_list(r, "components");
+    for (int k = 0; k < n_component; k++) {
+        pal_world_component_info(world, k, &info);
+        BENCH_ROW(r, TEXT("name", "component", -16, info.name),
+                  NUMBER("ms", "ms", 7, 4, pal_median(component_ms[k], LIVE_STEPS)));
     }
-    pal_world_destroy(world);
-    return err;
+    return PAL_ERR_OK;
 }
 
-/* ---- report ---- */
-
-static void range_text(const int n[2], char text[32])
+pal_err bench_adaptive(bench_report *r, pal_diagnostic *diag)
 {
-    snprintf(text, 32, n[0] == n[1] ? "%d" : "%d-%d", n[0], n[1]);
-}
-
-static void add_run(bench_report *r, const table_row *a, int k)
-{
-    char nodes[32], springs[32];
-    range_text(a->n_node[k], nodes);
-    range_text(a->n_spring[k], springs);
-    bench_record(r);
-    bench_text(r, "body", "body", -8, a->name);
-    bench_text(r, "run", "run", -9, kind_name[k]);
-    bench_text(r, "surface", "surface", -17, a->source);
-    bench_text(r, "nodes", "nodes", 9, nodes);
-    bench_text(r, "springs", "springs", 11, springs);
-    bench_number(r, "moved_m", "moved m", 9, 5, a->moved_m[k]);
-    bench_number(r, "off", "off", 7, 4, a->off[k]);
-    bench_number(r, "substeps", "sub-steps", 10, 0, a->n_sub[k]);
-    bench_number(r, "run_s", "run s", 9, 4, a->run_s[k]);
-    bench_number(r, "paper_s", "paper s", 9, 3, a->paper_s[k]);
-    bench_number(r, "ratio", "of refined", 10, 2, a->run_s[k] / a->run_s[REFINED]);
-    bench_number(r, NULL, "of paper", 8, 2, a->paper_s[k] / a->paper_s[REFINED]);
-    bench_number(r, NULL, "times as fast", 13, 0, a->paper_s[k] / a->run_s[k]);
-}
-
-static int print(const results *all, bool json, pal_err err, const pal_diagnostic *diag)
-{
-    bench_report r;
-    const palm_row *p = &all->palm;
-    const live_row *l = &all->live;
-    bench_begin(&r, "adaptive", json);
-    bench_number(&r, "rounds", NULL, 0, 0, ROUNDS);
-    bench_number(&r, "simulated_s", NULL, 0, 0, press_s + free_s);
-    bench_note(&r,
+    static run drawn[2][KINDS];
+    pressed ball[2] = {{.name = NULL}};
+    pal_world *world = NULL;
+    BENCH_ROW(r, VALUE("rounds", ROUNDS), VALUE("simulated_s", press_s + free_s));
+    bench_note(r,
                "paper C, Table I, %.1f simulated seconds: pressed for %.0f s, then free; medians of %d, one core\n"
                "wanted: adaptive at most 0.30 of refined; stomach 500 times as fast refined, 1000 times adaptive",
                press_s + free_s, press_s, ROUNDS);
-    bench_list(&r, "table");
-    for (int t = 0; t < all->n_table && !err; t++)
-        for (int k = 0; k < KINDS; k++) add_run(&r, &all->table[t], k);
+    bench_list(r, "table");
+    PAL_TRY(run_tables(drawn, r, diag));
+    if (r->argument) PAL_TRY(draw_trajectories(drawn, r->argument, diag));
     bench_note(
-        &r, "\nfour levels, a palm refined, processor seconds of a simulated second; wanted: at most 0.08 of refined");
-    bench_list(&r, "palm");
-    for (int k = 0; k < 2 && !err; k++) {
-        bench_record(&r);
-        bench_text(&r, "run", "run", -9, kind_name[REFINED + k]);
-        bench_number(&r, "nodes", "nodes", 7, 0, p->n_node[k]);
-        bench_number(&r, "springs", "springs", 7, 0, p->n_spring[k]);
-        bench_number(&r, "second_s", "s", 8, 3, p->second_s[k]);
-        bench_number(&r, "ratio", "of refined", 10, 3, k ? p->ratio : 1);
-    }
-    bench_note(&r, "\nfinest level of %d nodes, steps of 1 ms; wanted: less than 1 ms", l->n_finest);
-    bench_list(&r, "live");
-    bench_record(&r);
-    bench_number(&r, "finest_nodes", NULL, 0, 0, l->n_finest);
-    bench_number(&r, "nodes", "nodes", 7, 0, l->n_node);
-    bench_number(&r, "springs", "springs", 7, 0, l->n_spring);
-    bench_number(&r, "substeps", "sub-steps", 9, 0, l->n_sub);
-    bench_number(&r, "p50_ms", "ms p50", 7, 3, l->p50_ms);
-    bench_number(&r, "p95_ms", "ms p95", 7, 3, l->p95_ms);
-    bench_number(&r, "split_us", "split us", 9, 1, l->split_us);
-    bench_number(&r, "join_us", "join us", 9, 1, l->join_us);
-    bench_number(&r, "after_us", "next step us", 12, 1, l->after_us);
-    bench_list(&r, "components");
-    for (int k = 0; k < l->n_component && !err; k++) {
-        bench_record(&r);
-        bench_text(&r, "name", "component", -16, l->component[k]);
-        bench_number(&r, "ms", "ms", 7, 4, l->component_ms[k]);
-    }
-    return bench_end(&r, err, diag);
-}
-
-/* the mass of what it encloses; pressed on a patch of a twelfth of its size */
-static void fill(pressed *body, double force_N)
-{
-    const pal_surface *surface = &body->loaded->mesh[0].surface;
-    double low[3], high[3];
-    pal_surface_box(surface, low, high);
-    body->mass_kg = 1000 * fabs(pal_surface_volume(surface));
-    body->radius_m = pal_dist3(low, high) / 12, body->force_N = force_N;
-}
-
-/* the sphere is pressed at its equator, where every vertex is regular */
-static pal_err run_tables(results *out, pal_diagnostic *diag)
-{
-    static const double paper_s[2][KINDS] = {{2.334, 10.078, 3.136}, {3.328, 14.422, 6.906}};
-    static const char *const name[2] = {"sphere", "stomach"}, *const file[2] = {"sphere_114.obj", "stomach_188.obj"};
-    static const int axis[2] = {0, 2};
-    static const double force_N[2] = {0.025, 0.075};
-    pal_err err = PAL_ERR_OK;
-    for (int k = 0; k < TABLES && !err; k++) {
-        const char *path = k & 1 ? shared_path(file[k / 2]) : NULL;
-        if (k & 1 && !path) continue;
-        pressed body;
-        err = take(name[k / 2], path, axis[k / 2], &body, diag);
-        if (!err) fill(&body, force_N[k / 2]);
-        if (!err) err = run_table(&body, paper_s[k / 2], &out->table[out->n_table++], diag);
-        pal_scene_free(body.loaded);
-    }
-    return err;
-}
-
-/* the trajectory of the pressed vertex of our own surfaces */
-static pal_err draw_trajectories(const results *r, const char *path, pal_diagnostic *diag)
-{
-    static const char *const name[2][KINDS] = {{"sphere, coarse", "sphere, refined", "sphere, adaptive"},
-                                               {"stomach, coarse", "stomach, refined", "stomach, adaptive"}};
-    static double time_s[TABLE_STEPS], displacement_mm[2 * KINDS][TABLE_STEPS];
-    pal_plot plot = {.title = "The vertex that is pressed for 2 s and then released",
-                     .x_label = "time, s",
-                     .y_label = "displacement, mm"};
-    for (int i = 0; i < TABLE_STEPS; i++) time_s[i] = (i + 1) * frame_s;
-    for (int t = 0, body = 0; t < r->n_table && body < 2; t++) {
-        const table_row *row = &r->table[t];
-        if (strcmp(row->source, "procedural") != 0) continue;
-        for (int k = 0; k < KINDS; k++) {
-            double *y = displacement_mm[plot.n_curve];
-            for (int i = 0; i < row->n_sample; i++) y[i] = 1e3 * row->displacement_m[k][i];
-            plot.curve[plot.n_curve++] = (pal_curve){
-                .name = name[body][k], .n = row->n_sample, .x = time_s, .y = y, .bare = true, .dashed = k == ADAPTIVE};
-        }
-        body++;
-    }
-    return pal_plot_write(&plot, path, diag);
-}
-
-int bench_adaptive(bool json, const char *picture)
-{
-    static results r;
-    pressed ball[2] = {{.name = NULL}};
-    pal_diagnostic diag = {""};
-    pal_err err = run_tables(&r, &diag);
-    if (!err && picture) err = draw_trajectories(&r, picture, &diag);
-    if (!err) err = make_ball(1, 0.035, 0.12, &ball[0], &diag);
-    if (!err) err = run_palm(&ball[0], &r.palm, &diag);
-    if (!err) err = make_ball(2, 0.016, 0.3, &ball[1], &diag);
-    if (!err) err = run_live(&ball[1], &r.live, &diag);
+        r, "\nfour levels, a palm refined, processor seconds of a simulated second; wanted: at most 0.08 of refined");
+    bench_list(r, "palm");
+    pal_err err = make_ball(1, 0.035, 0.12, &ball[0], diag);
+    if (!err) err = run_palm(&ball[0], r, diag);
+    if (!err) err = make_ball(2, 0.016, 0.3, &ball[1], diag);
+    if (!err) err = start(&ball[1], ADAPTIVE, BALL_LEVELS, MAX_NODE, live_s, &world, diag);
+    if (!err) err = measure_live(world, &ball[1], r, diag);
+    pal_world_destroy(world);
     for (int k = 0; k < 2; k++) pal_scene_free(ball[k].loaded);
-    return print(&r, json, err, &diag);
+    return err;
 }

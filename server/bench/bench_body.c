@@ -1,6 +1,6 @@
 #include "server/bench/bench_body.h"
 
-#include "server/mesh/voxel/voxels.h"
+#include "server/base/clock.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -26,6 +26,14 @@ pal_err bench_solid(const pal_cell_model *model, pal_cells *cells, pal_prepared 
     if (!err) err = pal_cells_boundary(cells, &surface, NULL, NULL);
     if (!err) err = pal_prepared_surface(&surface, mesh);
     pal_surface_free(&surface);
+    return err;
+}
+
+pal_err bench_step(pal_world *world, double step_s, double *ms)
+{
+    uint64_t began = pal_clock_thread_ns();
+    pal_err err = pal_world_step(world, step_s);
+    *ms = 1e-6 * (double)(pal_clock_thread_ns() - began);
     return err;
 }
 

@@ -9,6 +9,8 @@
 pal_err bench_box(const int n[3], double edge_m, pal_prepared *out, pal_diagnostic *diag);
 /* control cells of a named solid and their boundary; free both, also after an error */
 pal_err bench_solid(const pal_cell_model *model, pal_cells *cells, pal_prepared *mesh, pal_diagnostic *diag);
+/* one step; *ms: its processor time; FROZEN */
+pal_err bench_step(pal_world *world, double step_s, double *ms);
 /* milliseconds of the last step that went into components of the stage, or of the name; NULL: any */
 double bench_component_ms(const pal_world *world, const char *stage, const char *name);
 #endif

@@ -4,11 +4,9 @@
  * are finite elements, neo-Hookean; every search starts at the default constants. Searches below a few seconds are
  * repeated, the median counts. */
 #include "server/bench/bench.h"
-#include "server/bench/bench_report.h"
 
-#include "server/base/clock.h"
 #include "server/calibrate/calibrate_cases.h"
-#include "server/cli/median.h"
+#include "server/num/median.h"
 
 #include <float.h>
 #include <math.h>
@@ -38,11 +36,11 @@ static const job jobs[] = {
 enum { N_JOB = sizeof jobs / sizeof jobs[0] };
 
 typedef struct result {
-    int n_node, n_parameter, n_repeat;
-    double start_percent, hand_percent, percent, verify_percent; /* verify: NaN: no such case */
-    double make_s, truth_s, fit_s;
-    long long n_evaluation, n_rejected;
-    const char *ended;
+    pal_calibration_info info; /* its pointers are valid during the job only */
+    pal_fit_result fit;
+    int n_repeat;
+    double manual_percent, percent, verify_percent; /* verify: NaN: no such case */
+    double search_s;
 } result;
 
 /* mean over the fitted load cases, or over the others; NaN: none */
@@ -60,35 +58,30 @@ static pal_err search(const job *j, const pal_calibrate_cases *set, const pal_ca
                       result *out, pal_diagnostic *diag)
 {
     enum { ALL = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY };
-    pal_calibration_info info;
+    const pal_calibration_info *info = &out->info;
     pal_calibration_workspace *workspace = NULL;
     pal_calibration_value v = {0};
-    pal_fit_result r = {0};
     double seconds[REPEATS];
-    pal_calibration_info_of(c, &info);
-    double *theta = malloc(sizeof *theta * (size_t)info.n_parameter);
+    pal_calibration_info_of(c, &out->info);
+    double *theta = malloc(sizeof *theta * (size_t)info->n_parameter);
     pal_err err = theta ? pal_calibration_workspace_create(c, &workspace) : PAL_ERR_MEMORY;
     if (!err) pal_calibration_manual_start(c, theta);
     if (!err) err = pal_calibration_evaluate(c, workspace, theta, ALL, &v, NULL, diag);
-    out->hand_percent = mean_of(set, &v, true);
+    out->manual_percent = mean_of(set, &v, true);
     while (!err && out->n_repeat < REPEATS) {
-        memcpy(theta, info.start, sizeof *theta * (size_t)info.n_parameter);
+        memcpy(theta, info->start, sizeof *theta * (size_t)info->n_parameter);
         const pal_fit_options o = {.max_evaluation = j->annealing ? MAX_EVALUATION : 0,
                                    .target_percent = j->annealing ? target_percent : 0,
                                    .seed = 1,
                                    .n_worker = 1};
-        err = j->annealing ? pal_fit_anneal(c, &o, theta, &r, diag) : pal_fit_adjoint(c, &o, theta, &r, diag);
-        seconds[out->n_repeat++] = r.seconds;
-        if (r.seconds > short_s) break;
+        err = j->annealing ? pal_fit_anneal(c, &o, theta, &out->fit, diag)
+                           : pal_fit_adjoint(c, &o, theta, &out->fit, diag);
+        seconds[out->n_repeat++] = out->fit.seconds;
+        if (out->fit.seconds > short_s) break;
     }
-    if (!err) out->fit_s = pal_median(seconds, out->n_repeat);
-    out->start_percent = r.start_percent;
-    out->percent = mean_of(set, &r.value, true);
-    out->verify_percent = mean_of(set, &r.value, false);
-    out->n_evaluation = (long long)r.n_evaluation, out->n_rejected = (long long)r.n_rejected;
-    out->ended = r.ended;
-    out->n_node = info.n_node, out->n_parameter = info.n_parameter;
-    out->make_s = info.prepare_s, out->truth_s = info.truth_s;
+    if (!err) out->search_s = pal_median(seconds, out->n_repeat);
+    out->percent = mean_of(set, &out->fit.value, true);
+    out->verify_percent = mean_of(set, &out->fit.value, false);
     pal_calibration_workspace_destroy(workspace);
     free(theta);
     return err;
@@ -100,7 +93,7 @@ static pal_err run_job(const job *j, const char *folder, double target_percent, 
     pal_calibrate_options o;
     pal_calibration *c = NULL;
     pal_calibrate_cases *set = calloc(1, sizeof *set);
-    *out = (result){.ended = ""};
+    *out = (result){.n_repeat = 0};
     if (!set) return PAL_ERR_MEMORY;
     snprintf(path, sizeof path, "%s/%s", folder, j->problem);
     const pal_calibrate_input input = {.problem = path, .fit = j->fit, .verify = j->verify};
@@ -116,68 +109,49 @@ static pal_err run_job(const job *j, const char *folder, double target_percent, 
     return err;
 }
 
-/* "5x3x5", or "one" */
-static const char *grid_text(const job *j, char out[32])
-{
-    if (j->grid[0] > 0)
-        snprintf(out, 32, "%dx%dx%d", j->grid[0], j->grid[1], j->grid[2]);
-    else
-        snprintf(out, 32, "one");
-    return out;
-}
-
 static void add_job(bench_report *r, const job *j, const result *c)
 {
-    char grid[32];
-    bench_record(r);
-    bench_text(r, "body", "body", -5, j->name);
-    bench_text(r, "fitted", "fitted", -16, j->fit);
-    bench_text(r, "grid", "constants", -9, grid_text(j, grid));
-    bench_number(r, "parameters", "", 6, 0, c->n_parameter);
-    bench_text(r, "method", "method", -9, j->annealing ? "annealing" : "adjoint");
-    bench_number(r, "nodes", "nodes", 6, 0, c->n_node);
-    bench_number(r, "start_percent", "start %", 8, 2, c->start_percent);
-    bench_number(r, "manual_percent", "manual %", 8, 2, c->hand_percent);
-    bench_number(r, "percent", "found %", 8, 3, c->percent);
-    bench_number(r, "verify_percent", "verify %", 9, 2, c->verify_percent);
-    bench_number(r, "evaluations", "evaluations", 12, 0, (double)c->n_evaluation);
-    bench_number(r, "rejected", NULL, 0, 0, (double)c->n_rejected);
-    bench_text(r, "ended", NULL, 0, c->ended);
-    bench_number(r, "runs", NULL, 0, 0, c->n_repeat);
-    bench_number(r, "prepare_s", NULL, 0, 0, c->make_s);
-    bench_number(r, "truth_s", "truth s", 8, 2, c->truth_s);
-    bench_number(r, "search_s", "search s", 9, 2, c->fit_s);
+    char grid[40] = "one";
+    if (j->grid[0] > 0) snprintf(grid, sizeof grid, "%dx%dx%d", j->grid[0], j->grid[1], j->grid[2]);
+    BENCH_ROW(
+        r, TEXT("body", "body", -5, j->name), TEXT("fitted", "fitted", -16, j->fit),
+        TEXT("grid", "constants", -9, grid), NUMBER("parameters", "", 6, 0, c->info.n_parameter),
+        TEXT("method", "method", -9, j->annealing ? "annealing" : "adjoint"),
+        NUMBER("nodes", "nodes", 6, 0, c->info.n_node), NUMBER("start_percent", "start %", 8, 2, c->fit.start_percent),
+        NUMBER("manual_percent", "manual %", 8, 2, c->manual_percent), NUMBER("percent", "found %", 8, 3, c->percent),
+        NUMBER("verify_percent", "verify %", 9, 2, c->verify_percent),
+        NUMBER("evaluations", "evaluations", 12, 0, (double)c->fit.n_evaluation),
+        VALUE("rejected", (double)c->fit.n_rejected), TEXT("ended", NULL, 0, c->fit.ended), VALUE("runs", c->n_repeat),
+        VALUE("prepare_s", c->info.prepare_s), NUMBER("truth_s", "truth s", 8, 2, c->info.truth_s),
+        NUMBER("search_s", "search s", 9, 2, c->search_s));
 }
 
-int bench_calibrate(const char *folder_or_null, bool json)
+pal_err bench_calibrate(bench_report *r, pal_diagnostic *diag)
 {
+    static const char *const key[N_JOB / 2] = {"annealing_over_adjoint", "gear_grid_over_one", "cube_grid_over_one",
+                                               "bar_grid_over_one"};
     result all[N_JOB];
-    pal_diagnostic diag = {""};
-    pal_err err = PAL_ERR_OK;
-    for (int k = 0; k < N_JOB && !err; k++) {
+    double ratio[N_JOB / 2];
+    bench_note(r, "springs calibrated on finite elements, RMS in %% of the largest displacement, one thread");
+    bench_list(r, "cases");
+    for (int k = 0; k < N_JOB; k++) {
         double enough = k > 0 ? near_enough * all[k - 1].percent : 0;
-        err = run_job(&jobs[k], folder_or_null ? folder_or_null : "deploy/problems", enough, &all[k], &diag);
+        pal_err err = run_job(&jobs[k], r->argument ? r->argument : "deploy/problems", enough, &all[k], diag);
+        pal_diagnostic reason = *diag;
+        if (err == PAL_ERR_IO && !r->argument)
+            pal_diagnostic_set(diag, err, "%.300s (palpate bench calibrate FOLDER names the folder of the problems)",
+                               reason.text);
+        if (err) return err;
+        add_job(r, &jobs[k], &all[k]);
     }
-    if (err == PAL_ERR_IO && !folder_or_null) {
-        pal_diagnostic reason = diag;
-        pal_diagnostic_set(&diag, err, "%.300s (palpate bench calibrate FOLDER names the folder of the problems)",
-                           reason.text);
+    bench_list(r, NULL);
+    for (int k = 0; k < N_JOB / 2; k++) {
+        ratio[k] = all[2 * k + 1].percent / all[2 * k].percent;
+        BENCH_ROW(r, VALUE(key[k], ratio[k]));
     }
-    bench_report r;
-    bench_begin(&r, "calibrate", json);
-    bench_note(&r, "springs calibrated on finite elements, RMS in %% of the largest displacement, one thread");
-    bench_list(&r, "cases");
-    for (int k = 0; k < N_JOB && !err; k++) add_job(&r, &jobs[k], &all[k]);
-    if (!err) {
-        bench_list(&r, NULL);
-        bench_number(&r, "annealing_over_adjoint", NULL, 0, 0, all[1].percent / all[0].percent);
-        bench_number(&r, "gear_grid_over_one", NULL, 0, 0, all[3].percent / all[2].percent);
-        bench_number(&r, "cube_grid_over_one", NULL, 0, 0, all[5].percent / all[4].percent);
-        bench_number(&r, "bar_grid_over_one", NULL, 0, 0, all[7].percent / all[6].percent);
-        bench_note(&r, "annealing ended by %s at %.2f times the error of adjoint, after %.1f times its seconds",
-                   all[1].ended, all[1].percent / all[0].percent, all[1].fit_s / all[0].fit_s);
-        bench_note(&r, "error of the grid over that of one constant of each kind: gear %.2f, cube %.2f, bar %.2f",
-                   all[3].percent / all[2].percent, all[5].percent / all[4].percent, all[7].percent / all[6].percent);
-    }
-    return bench_end(&r, err, &diag);
+    bench_note(r, "annealing ended by %s at %.2f times the error of adjoint, after %.1f times its seconds",
+               all[1].fit.ended, ratio[0], all[1].search_s / all[0].search_s);
+    bench_note(r, "error of the grid over that of one constant of each kind: gear %.2f, cube %.2f, bar %.2f", ratio[1],
+               ratio[2], ratio[3]);
+    return PAL_ERR_OK;
 }

@@ -5,19 +5,16 @@
  * in the old, medians of processor time, predicted over measured; once alone and once with a second body that keeps its
  * configuration. Error: the estimate of the new configuration for the state that it received, predicted over estimated.
  * Wanted: cost within 30 %. */
-#include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/bench/bench.h"
-#include "server/bench/bench_report.h"
-#include "server/cli/median.h"
+#include "server/bench/bench_body.h"
 #include "server/estimate/estimation.h"
+#include "server/num/median.h"
 #include "server/scene/scene_file.h"
 #include "server/session/configuration_switch.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 enum { N_CASE = 8, WARM = 12, ROUNDS = 6, MAX_SAMPLE = 1024, MAX_NODE = 30000 };
 static const double max_ratio = 1.3, round_s = 0.1;
@@ -39,17 +36,10 @@ typedef struct neighbour {
 } neighbour;
 
 typedef struct result {
-    int n_node, n_substep, n_neighbour;
+    int n_neighbour;
     pal_estimate estimate;
     neighbour neighbour[PAL_ESTIMATE_NEIGHBOURS];
 } result;
-
-static void put_other(pal_scene *scene)
-{
-    pal_body_def *other = &scene->body[scene->n_body++];
-    *other = scene->body[0];
-    snprintf(other->name, sizeof other->name, "other");
-}
 
 /* sideways, proportional to the masses of the nodes: the same on every mesh */
 static pal_err put_load(pal_world *world, const pal_scene *scene)
@@ -75,14 +65,13 @@ static pal_err swing(pal_world *world, const pal_scene *scene)
     return PAL_ERR_OK;
 }
 
-/* a round of timed steps */
-static pal_err timed(pal_world *world, double step_s, pal_estimate_cost *cost, int *n)
+/* a round of timed steps; cost [MAX_SAMPLE] may be NULL */
+static pal_err timed(pal_world *world, double step_s, double *ms, pal_estimate_cost *cost, int *n)
 {
-    for (double time = 0; time < round_s - 1e-9 && *n < MAX_SAMPLE; time += step_s) {
+    for (double time = 0; time < round_s - 1e-9 && *n < MAX_SAMPLE; time += step_s, ++*n) {
         pal_world_wake(world);
-        uint64_t began = pal_clock_thread_ns();
-        PAL_TRY(pal_world_step(world, step_s));
-        cost[(*n)++] = pal_estimate_cost_of(world, 0, 1e-6 * (double)(pal_clock_thread_ns() - began));
+        PAL_TRY(bench_step(world, step_s, &ms[*n]));
+        if (cost) cost[*n] = pal_estimate_cost_of(world, 0, ms[*n]);
     }
     return PAL_ERR_OK;
 }
@@ -100,27 +89,18 @@ static pal_err estimate(const pal_scene *scene, pal_world *world, const pal_esti
     return ok ? PAL_ERR_OK : pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "the state has no estimate");
 }
 
-static double median_ms(const pal_estimate_cost *cost, int n)
-{
-    double ms[MAX_SAMPLE];
-    for (int i = 0; i < n; i++) ms[i] = (double)cost[i].ms;
-    return pal_median(ms, n);
-}
-
 /* both worlds step alternately from the transferred state */
 static pal_err step_alternately(pal_world *was, double was_s, pal_world *now, double now_s, neighbour *r)
 {
-    pal_estimate_cost *cost = malloc(2 * MAX_SAMPLE * sizeof *cost);
+    double ms[2][MAX_SAMPLE];
     int n[2] = {0, 0};
-    pal_err err = cost ? PAL_ERR_OK : PAL_ERR_MEMORY;
-    for (int k = 0; k < ROUNDS && !err; k++) {
-        err = timed(was, was_s, cost, &n[0]);
-        if (!err) err = timed(now, now_s, cost + MAX_SAMPLE, &n[1]);
+    for (int k = 0; k < ROUNDS; k++) {
+        PAL_TRY(timed(was, was_s, ms[0], NULL, &n[0]));
+        PAL_TRY(timed(now, now_s, ms[1], NULL, &n[1]));
     }
     r->n_substep = pal_world_substeps(now);
-    if (!err) r->was_ms = median_ms(cost, n[0]), r->ms = median_ms(cost + MAX_SAMPLE, n[1]) * was_s / now_s;
-    free(cost);
-    return err;
+    r->was_ms = pal_median(ms[0], n[0]), r->ms = pal_median(ms[1], n[1]) * was_s / now_s;
+    return PAL_ERR_OK;
 }
 
 static pal_err try_neighbour(const pal_scene *scene, pal_world *world, neighbour *r, pal_diagnostic *diag)
@@ -154,17 +134,22 @@ static pal_err measure(const subject *s, result *out, pal_diagnostic *diag)
     pal_loaded_scene *loaded = NULL;
     pal_world *world = NULL;
     pal_estimate_cost cost[MAX_SAMPLE];
+    double ms[MAX_SAMPLE];
     int n = 0;
+    *out = (result){0};
     PAL_TRY(pal_scene_procedural(&s->options, &loaded, NULL, diag));
-    if (s->two) put_other(&loaded->scene);
-    const pal_scene *scene = &loaded->scene;
+    pal_scene *scene = &loaded->scene;
+    if (s->two) {
+        pal_body_def *other = &scene->body[scene->n_body++];
+        *other = scene->body[0];
+        snprintf(other->name, sizeof other->name, "other");
+    }
     pal_err err = pal_world_create(scene, diag, &world);
     if (!err) err = swing(world, scene);
-    for (int k = 0; k < ROUNDS && !err; k++) err = timed(world, scene->step_s, cost, &n);
+    for (int k = 0; k < ROUNDS && !err; k++) err = timed(world, scene->step_s, ms, cost, &n);
     if (!err) err = swing(world, scene);
     if (!err) err = estimate(scene, world, cost, n, &out->estimate, diag);
     if (!err) {
-        out->n_node = pal_world_view_body(world, 0)->n_node, out->n_substep = pal_world_substeps(world);
         out->n_neighbour = out->estimate.n_neighbour;
         for (int k = 0; k < out->n_neighbour; k++) {
             neighbour *r = &out->neighbour[k];
@@ -201,22 +186,19 @@ static void add_neighbour(bench_report *report, const subject *s, const result *
 {
     char text[64];
     const neighbour *r = &c->neighbour[k];
-    bench_record(report);
-    bench_text(report, "body", "body", -30, s->name);
-    bench_text(report, "configuration", "configuration", -34, configuration_text(r, text));
-    bench_number(report, "nodes", "nodes", 6, 0, r->n_node);
-    bench_number(report, "nodes_predicted", "predicted", 9, 0, c->estimate.neighbour_nodes[k]);
-    bench_number(report, "substeps", NULL, 0, 0, r->n_substep);
-    bench_number(report, "substeps_predicted", NULL, 0, 0, c->estimate.neighbour_substeps[k]);
-    bench_number(report, "ms", "ms", 8, 3, r->ms * c->estimate.ms / r->was_ms);
-    bench_number(report, "predicted_ms", "predicted", 9, 3, r->predicted.ms);
-    bench_number(report, "cost_ratio", "ratio", 6, 2, cost_ratio(c, r));
-    bench_text(report, NULL, "", 3, is_within(cost_ratio(c, r)) ? "" : "(!)");
-    bench_number(report, "error_m", "error m", 10, 7, r->own_m);
-    bench_number(report, "predicted_error_m", "predicted", 10, 7, r->predicted.error_m);
+    const pal_estimate *e = &c->estimate;
+    BENCH_ROW(
+        report, TEXT("body", "body", -30, s->name),
+        TEXT("configuration", "configuration", -34, configuration_text(r, text)),
+        NUMBER("nodes", "nodes", 6, 0, r->n_node), NUMBER("nodes_predicted", "predicted", 9, 0, e->neighbour_nodes[k]),
+        VALUE("substeps", r->n_substep), VALUE("substeps_predicted", e->neighbour_substeps[k]),
+        NUMBER("ms", "ms", 8, 3, r->ms * e->ms / r->was_ms), NUMBER("predicted_ms", "predicted", 9, 3, r->predicted.ms),
+        NUMBER("cost_ratio", "ratio", 6, 2, cost_ratio(c, r)),
+        TEXT(NULL, "", 3, is_within(cost_ratio(c, r)) ? "" : "(!)"), NUMBER("error_m", "error m", 10, 7, r->own_m),
+        NUMBER("predicted_error_m", "predicted", 10, 7, r->predicted.error_m));
 }
 
-int bench_estimate(bool json)
+pal_err bench_estimate(bench_report *r, pal_diagnostic *diag)
 {
     static const subject subjects[N_CASE] = {
         {.name = "fem hex8_bbar, 12 voxels", .options = {.label = -1, .hold = 0.3, .fem = true, .resolution = 12}},
@@ -231,25 +213,19 @@ int bench_estimate(bool json)
          .options = {.label = -1, .hold = 0.3, .fem = true, .resolution = 12},
          .two = true},
         {.name = "springs, 12 voxels, twice", .options = {.label = -1, .hold = 0.3, .resolution = 12}, .two = true}};
+    static result c;
     int n = 0, within = 0;
-    pal_diagnostic diag = {""};
-    pal_err err = PAL_ERR_OK;
-    bench_report r;
-    bench_begin(&r, "estimate", json);
-    bench_list(&r, "neighbours");
-    for (int k = 0; k < N_CASE && !err; k++) {
-        result *c = calloc(1, sizeof *c);
-        err = c ? measure(&subjects[k], c, &diag) : PAL_ERR_MEMORY;
-        for (int i = 0; !err && i < c->n_neighbour; i++) {
-            if (c->neighbour[i].err) continue;
-            n++, within += is_within(cost_ratio(c, &c->neighbour[i]));
-            add_neighbour(&r, &subjects[k], c, i);
+    bench_list(r, "neighbours");
+    for (int k = 0; k < N_CASE; k++) {
+        PAL_TRY(measure(&subjects[k], &c, diag));
+        for (int i = 0; i < c.n_neighbour; i++) {
+            if (c.neighbour[i].err) continue;
+            n++, within += is_within(cost_ratio(&c, &c.neighbour[i]));
+            add_neighbour(r, &subjects[k], &c, i);
         }
-        free(c);
     }
-    bench_list(&r, NULL);
-    bench_number(&r, "n", NULL, 0, 0, n);
-    bench_number(&r, "within", NULL, 0, 0, within);
-    bench_note(&r, "cost within 30 %% for %d of %d neighbours", within, n);
-    return bench_end(&r, err, &diag);
+    bench_list(r, NULL);
+    BENCH_ROW(r, VALUE("n", n), VALUE("within", within));
+    bench_note(r, "cost within 30 %% for %d of %d neighbours", within, n);
+    return PAL_ERR_OK;
 }

@@ -7,14 +7,11 @@
  */
 #include "server/bench/bench.h"
 #include "server/bench/bench_body.h"
-#include "server/bench/bench_report.h"
 
 #include "server/base/clock.h"
-#include "server/cli/median.h"
-#include "server/sim/world/world.h"
+#include "server/num/median.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -26,11 +23,6 @@ typedef struct job {
     double edge_m, poisson, step_s, force_N, limit_ms;
     bool warp;
 } job;
-
-typedef struct result {
-    int n_node, n_element;
-    double p50_ms, p95_ms, force_ms, mean_cg, max_cg, tip_m;
-} result;
 
 /* the scene of one body clamped at its lowest face along `axis`, without output and tools */
 static pal_err make_scene(const job *j, const pal_prepared *mesh, int axis, const char *solver, pal_scene *scene,
@@ -86,16 +78,16 @@ static pal_err load_face(pal_world *world, int axis, double low, double high, co
     return err;
 }
 
-static pal_err run_live(const job *j, result *out, pal_diagnostic *diag)
+static pal_err run_live(const job *j, bench_report *r, pal_diagnostic *diag)
 {
     static double ms[N_STEP], force[N_STEP];
+    static pal_scene scene;
     pal_prepared mesh = {0};
-    pal_scene *scene = calloc(1, sizeof *scene);
     pal_world *world = NULL;
-    pal_err err = scene ? bench_box(j->n, j->edge_m, &mesh, diag) : PAL_ERR_MEMORY;
-    if (!err) err = make_scene(j, &mesh, 0, "implicit_euler", scene, diag);
-    if (!err) err = pal_world_create(scene, diag, &world);
-    *out = (result){0};
+    double mean_cg = 0, max_cg = 0, tip_m = 0;
+    pal_err err = bench_box(j->n, j->edge_m, &mesh, diag);
+    if (!err) err = make_scene(j, &mesh, 0, "implicit_euler", &scene, diag);
+    if (!err) err = pal_world_create(&scene, diag, &world);
     int half = (int)lround(0.5 / j->step_s);
     for (int i = -half; i < N_STEP && !err; i++) {
         int phase = (i + half) / half & 1;
@@ -107,32 +99,29 @@ static pal_err run_live(const job *j, result *out, pal_diagnostic *diag)
         if (err || i < 0) continue;
         pal_world_solve_report(world, 0, &report);
         ms[i] = 1e3 * (pal_clock_s() - began), force[i] = bench_component_ms(world, "force", NULL);
-        out->mean_cg += (double)report.n_cg / N_STEP;
-        out->max_cg = fmax(out->max_cg, report.n_cg);
+        mean_cg += (double)report.n_cg / N_STEP, max_cg = fmax(max_cg, report.n_cg);
         const pal_body *body = pal_world_body(world, 0);
-        for (int k = 0; k < body->n_node; k++)
-            out->tip_m = fmax(out->tip_m, fabs(body->x[3 * k + 2] - body->x_rest[3 * k + 2]));
+        for (int k = 0; k < body->n_node; k++) tip_m = fmax(tip_m, fabs(body->x[3 * k + 2] - body->x_rest[3 * k + 2]));
     }
     if (!err) {
         const pal_body *body = pal_world_body(world, 0);
-        out->n_node = body->n_node, out->n_element = body->n_element;
-        out->p50_ms = pal_median(ms, N_STEP), out->p95_ms = ms[N_STEP * 95 / 100];
-        out->force_ms = pal_median(force, N_STEP);
+        double p50_ms = pal_median(ms, N_STEP), p95_ms = ms[N_STEP * 95 / 100];
+        BENCH_ROW(r, TEXT("name", "body", -17, j->name), TEXT("element", "element", -10, j->element),
+                  TEXT("law", "law", -13, j->law), NUMBER("nodes", "nodes", 5, 0, body->n_node),
+                  NUMBER("elements", "elements", 8, 0, body->n_element),
+                  NUMBER("step_ms", "step ms", 8, 2, 1e3 * j->step_s), NUMBER("p50_ms", "ms p50", 7, 3, p50_ms),
+                  NUMBER("p95_ms", "ms p95", 7, 3, p95_ms), NUMBER("limit_ms", "limit", 6, 1, j->limit_ms),
+                  NUMBER("force_ms", "forces ms", 9, 3, pal_median(force, N_STEP)),
+                  NUMBER("cg_mean", "CG mean", 7, 1, mean_cg), NUMBER("cg_max", "CG max", 6, 0, max_cg),
+                  NUMBER("tip_m", "tip m", 6, 3, tip_m));
     }
     pal_world_destroy(world);
     pal_prepared_free(&mesh);
-    free(scene);
     return err;
 }
 
-typedef struct static_result {
-    int n_node, n_newton;
-    double create_ms, solve_ms, factor_ms, residual;
-    bool converged;
-} static_result;
-
 /* the reference cube: 0.1 m, nu 0.499, soft above stiff, a patch of its top loaded down and sideways */
-static pal_err run_static(int n, static_result *out, pal_diagnostic *diag)
+static pal_err run_static(int n, bench_report *r, pal_diagnostic *diag)
 {
     const job j = {.element = "hex8_bbar",
                    .law = "linear",
@@ -140,35 +129,38 @@ static pal_err run_static(int n, static_result *out, pal_diagnostic *diag)
                    .edge_m = 0.1 / n,
                    .poisson = 0.499,
                    .step_s = 1.0 / 60};
+    static pal_scene scene;
     pal_prepared mesh = {0};
-    pal_scene *scene = calloc(1, sizeof *scene);
     pal_world *world = NULL;
-    pal_err err = scene ? bench_box(j.n, j.edge_m, &mesh, diag) : PAL_ERR_MEMORY;
-    if (!err) err = make_scene(&j, &mesh, 2, "static_newton", scene, diag);
+    pal_err err = bench_box(j.n, j.edge_m, &mesh, diag);
+    if (!err) err = make_scene(&j, &mesh, 2, "static_newton", &scene, diag);
     if (!err) {
-        pal_region *soft = &scene->body[0].region[scene->body[0].n_region++];
+        pal_region *soft = &scene.body[0].region[scene.body[0].n_region++];
         *soft = (pal_region){.kind = PAL_REGION_BOX, .young_Pa = 5e4, .poisson = NAN, .density_kg_m3 = NAN};
-        scene->body[0].material.young_Pa = 1e6;
+        scene.body[0].material.young_Pa = 1e6;
         for (int c = 0; c < 3; c++) soft->low_m[c] = -1, soft->high_m[c] = 1;
         soft->low_m[2] = 0.05;
     }
     double began = pal_clock_s();
-    if (!err) err = pal_world_create(scene, diag, &world);
-    out->create_ms = 1e3 * (pal_clock_s() - began);
+    if (!err) err = pal_world_create(&scene, diag, &world);
+    double made = pal_clock_s();
     const double force[3] = {5, 0, -12.5};
     if (!err) err = load_face(world, 2, 0.025, 0.075, force);
-    began = pal_clock_s();
-    if (!err) err = pal_world_step(world, scene->step_s);
-    out->solve_ms = 1e3 * (pal_clock_s() - began);
+    double loaded = pal_clock_s();
+    if (!err) err = pal_world_step(world, scene.step_s);
     if (!err) {
         pal_solve_report report;
+        double solve_ms = 1e3 * (pal_clock_s() - loaded);
         pal_world_solve_report(world, 0, &report);
-        out->n_node = pal_world_body(world, 0)->n_node, out->n_newton = report.n_newton;
-        out->factor_ms = 1e3 * report.factor_s, out->residual = report.residual, out->converged = report.converged;
+        BENCH_ROW(
+            r, NUMBER("nodes", "nodes", 6, 0, pal_world_body(world, 0)->n_node),
+            NUMBER("make_ms", "make ms", 8, 0, 1e3 * (made - began)), NUMBER("solve_ms", "solve ms", 8, 0, solve_ms),
+            NUMBER("factor_ms", "factor ms", 9, 0, 1e3 * report.factor_s), NUMBER(NULL, "limit ms", 8, 0, 1500),
+            NUMBER("newton", "Newton", 6, 0, report.n_newton), NUMBER("residual", "residual", 12, 10, report.residual),
+            TEXT("converged", "converged", 9, report.converged ? "yes" : "no"));
     }
     pal_world_destroy(world);
     pal_prepared_free(&mesh);
-    free(scene);
     return err;
 }
 
@@ -182,47 +174,12 @@ static const job jobs[] = {
 };
 enum { N_JOB = sizeof jobs / sizeof jobs[0] };
 
-static void add_job(bench_report *r, const job *j, const result *c)
+pal_err bench_fem(bench_report *r, pal_diagnostic *diag)
 {
-    bench_record(r);
-    bench_text(r, "name", "body", -17, j->name);
-    bench_text(r, "element", "element", -10, j->element);
-    bench_text(r, "law", "law", -13, j->law);
-    bench_number(r, "nodes", "nodes", 5, 0, c->n_node);
-    bench_number(r, "elements", "elements", 8, 0, c->n_element);
-    bench_number(r, "step_ms", "step ms", 8, 2, 1e3 * j->step_s);
-    bench_number(r, "p50_ms", "ms p50", 7, 3, c->p50_ms);
-    bench_number(r, "p95_ms", "ms p95", 7, 3, c->p95_ms);
-    bench_number(r, "limit_ms", "limit", 6, 1, j->limit_ms);
-    bench_number(r, "force_ms", "forces ms", 9, 3, c->force_ms);
-    bench_number(r, "cg_mean", "CG mean", 7, 1, c->mean_cg);
-    bench_number(r, "cg_max", "CG max", 6, 0, c->max_cg);
-    bench_number(r, "tip_m", "tip m", 6, 3, c->tip_m);
-}
-
-int bench_fem(bool json)
-{
-    result all[N_JOB];
-    static_result s = {0};
-    pal_diagnostic diag = {""};
-    pal_err err = PAL_ERR_OK;
-    for (int k = 0; k < N_JOB && !err; k++) err = run_live(&jobs[k], &all[k], &diag);
-    if (!err) err = run_static(16, &s, &diag);
-    bench_report r;
-    bench_begin(&r, "fem", json);
-    bench_note(&r, "live steps, medians of %d, one thread", N_STEP);
-    bench_list(&r, "cases");
-    for (int k = 0; k < N_JOB && !err; k++) add_job(&r, &jobs[k], &all[k]);
-    bench_note(&r, "static cube, nu 0.499:");
-    bench_list(&r, "static");
-    bench_record(&r);
-    bench_number(&r, "nodes", "nodes", 6, 0, s.n_node);
-    bench_number(&r, "make_ms", "make ms", 8, 0, s.create_ms);
-    bench_number(&r, "solve_ms", "solve ms", 8, 0, s.solve_ms);
-    bench_number(&r, "factor_ms", "factor ms", 9, 0, s.factor_ms);
-    bench_number(&r, NULL, "limit ms", 8, 0, 1500);
-    bench_number(&r, "newton", "Newton", 6, 0, s.n_newton);
-    bench_number(&r, "residual", "residual", 12, 10, s.residual);
-    bench_text(&r, "converged", "converged", 9, s.converged ? "yes" : "no");
-    return bench_end(&r, err, &diag);
+    bench_note(r, "live steps, medians of %d, one thread", N_STEP);
+    bench_list(r, "cases");
+    for (int k = 0; k < N_JOB; k++) PAL_TRY(run_live(&jobs[k], r, diag));
+    bench_note(r, "static cube, nu 0.499:");
+    bench_list(r, "static");
+    return run_static(16, r, diag);
 }

@@ -1,24 +1,17 @@
 /* `palpate bench guards`: the cost of the guards while nothing goes wrong, as a share of a step, for every model. Two
  * worlds of one scene step alternately under the same load; one has the component finite_guard and an implicit solver
  * that checks its energy, the other neither. The worlds are created several times in alternating order, because the
- * place in memory alone makes two worlds of one scene differ by several percent. A step repeats the same work each
- * round, so its least processor time counts; the result is the mean of these over the steps. (Medians over all rounds
- * gave 0.9 and 5.8 % on a busy machine where least times gave 3.4 and 3.6.) The checks that every solver makes (are all
- * numbers finite?) cannot be switched off and are timed alone, as is the component. Wanted: 3 % of a step for all
- * together. Checks within a step cannot be timed and are listed. */
+ * place in memory alone makes two worlds of one scene differ by several percent. Every round repeats the same steps, so
+ * the least processor time of a step counts, which a busy machine disturbs least; the result is its mean over the
+ * steps. The checks that every solver makes (are all numbers finite?) and the component are timed alone. Wanted: 3 % of
+ * a step for all together. */
 #include "server/base/clock.h"
 #include "server/bench/bench.h"
 #include "server/bench/bench_body.h"
-#include "server/bench/bench_report.h"
-#include "server/cli/median.h"
-#include "server/mesh/cells/cell_models.h"
+#include "server/num/median.h"
 #include "server/mesh/geometry/organ.h"
-#include "server/sim/world/world.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { N_CASE = 4, N_STEP = 40, N_WARM = 8 };
 
@@ -48,19 +41,11 @@ static pal_err make_bodies(bodies *b, pal_diagnostic *diag)
     return err;
 }
 
-static void free_bodies(bodies *b)
-{
-    pal_prepared_free(&b->voxels);
-    pal_prepared_free(&b->adaptive);
-    pal_prepared_free(&b->boundary);
-    pal_cells_free(&b->cells);
-}
-
 static const char *const model_name[N_CASE] = {"tet_springs", "fem", "adaptive_springs", "subdivision_fem"};
 /* pairs of worlds: more where a step is short */
 static const int n_round[N_CASE] = {10, 40, 40, 4};
 
-static pal_err dress(pal_scene *scene, const bodies *b, int which, bool guard, pal_diagnostic *diag)
+static pal_err make_scene(pal_scene *scene, const bodies *b, int which, bool guard, pal_diagnostic *diag)
 {
     pal_scene_default(scene);
     scene->n_body = 1;
@@ -84,10 +69,9 @@ static pal_err dress(pal_scene *scene, const bodies *b, int which, bool guard, p
 }
 
 /* the check of a solver at both ends of a step */
-static double finite_ms(pal_world *world)
+static double finite_ms(const pal_body *body)
 {
     double ms[N_STEP], sum = 0;
-    const pal_body *body = pal_world_body(world, 0);
     for (int k = 0; k < N_STEP; k++) {
         uint64_t before = pal_clock_thread_ns();
         sum += pal_body_finite(body) + pal_body_finite(body);
@@ -109,23 +93,10 @@ static pal_err alternate_load(pal_world *world, int step)
     return err;
 }
 
-static pal_err step_ms(pal_world *world, double step_s, double *ms)
-{
-    uint64_t before = pal_clock_thread_ns();
-    pal_err err = pal_world_step(world, step_s);
-    *ms = 1e-6 * (double)(pal_clock_thread_ns() - before);
-    return err;
-}
-
 /* of each step, the least time of all rounds; ms[1]: with guards */
 typedef struct times {
-    double ms[2][N_STEP], row[N_STEP];
+    double ms[2][N_STEP], component_ms[N_STEP];
 } times;
-
-static void keep_min(double *min, double ms, bool first)
-{
-    *min = first ? ms : fmin(*min, ms);
-}
 
 /* makes both worlds, steps them alternately and frees them; counts come from the guarded one */
 static pal_err one_round(const bodies *b, int which, int round, times *t, guards *out, pal_diagnostic *diag)
@@ -135,7 +106,7 @@ static pal_err one_round(const bodies *b, int which, int round, times *t, guards
     pal_err err = PAL_ERR_OK;
     for (int turn = 0; turn < 2 && !err; turn++) {
         int g = (round + turn) & 1;
-        err = dress(&scene[g], b, which, g == 1, diag);
+        err = make_scene(&scene[g], b, which, g == 1, diag);
         if (!err) err = pal_world_create(&scene[g], diag, &world[g]);
     }
     for (int k = -N_WARM; k < N_STEP && !err; k++) {
@@ -144,17 +115,18 @@ static pal_err one_round(const bodies *b, int which, int round, times *t, guards
             int g = (k + turn) & 1;
             double took = 0;
             err = alternate_load(world[g], k + N_WARM);
-            if (!err) err = step_ms(world[g], scene[g].step_s, &took);
-            if (k >= 0) keep_min(&t->ms[g][k], took, round == 0);
-            if (k >= 0 && g == 1) keep_min(&t->row[k], bench_component_ms(world[1], NULL, "finite_guard"), round == 0);
+            if (!err) err = bench_step(world[g], scene[g].step_s, &took);
+            if (k < 0) continue;
+            t->ms[g][k] = fmin(t->ms[g][k], took);
+            if (g == 1)
+                t->component_ms[k] = fmin(t->component_ms[k], bench_component_ms(world[1], NULL, "finite_guard"));
         }
     }
     if (!err) {
-        out->n_point = pal_world_body(world[1], 0)->n_active;
-        out->n_sub = pal_world_substeps(world[1]);
-        out->n_safeguard += pal_safeguards_sum(&pal_world_body(world[1], 0)->safeguards);
-        out->finite_ms = finite_ms(world[1]);
-        out->checks_energy = pal_world_body(world[1], 0)->implicit;
+        const pal_body *body = pal_world_body(world[1], 0);
+        out->n_point = body->n_active, out->n_sub = pal_world_substeps(world[1]);
+        out->n_safeguard += pal_safeguards_sum(&body->safeguards);
+        out->finite_ms = finite_ms(body), out->checks_energy = body->implicit;
     }
     for (int g = 0; g < 2; g++) pal_world_destroy(world[g]);
     return err;
@@ -165,11 +137,12 @@ static pal_err measure(const bodies *b, int which, guards *out, pal_diagnostic *
     static times t;
     pal_err err = PAL_ERR_OK;
     *out = (guards){.model = model_name[which]};
+    for (int k = 0; k < N_STEP; k++) t.ms[0][k] = t.ms[1][k] = t.component_ms[k] = INFINITY;
     for (int round = 0; round < n_round[which] && !err; round++) err = one_round(b, which, round, &t, out, diag);
     for (int k = 0; k < N_STEP; k++) {
         out->with_ms += t.ms[1][k] / N_STEP;
         out->without_ms += t.ms[0][k] / N_STEP;
-        out->component_ms += t.row[k] / N_STEP;
+        out->component_ms += t.component_ms[k] / N_STEP;
     }
     if (out->checks_energy) out->energy_ms = out->with_ms - out->without_ms - out->component_ms;
     return err;
@@ -179,52 +152,34 @@ static const double max_share = 0.03;
 static const char not_timed[] = "search for inverted elements, caps of loads and displacements, choice of sub-steps, "
                                 "refusal of bad numbers, corrections of contacts";
 
-/* a negative difference is noise */
-static double checks_ms(const guards *r)
-{
-    return r->finite_ms + fmax(0, r->energy_ms);
-}
-
-/* component and solver checks as a share of a step of the guarded world */
-static double share(const guards *r)
-{
-    return (r->component_ms + checks_ms(r)) / r->with_ms;
-}
-
-static bool fits(const guards *r)
-{
-    return share(r) <= max_share && r->n_safeguard == 0;
-}
-
 static void add_case(bench_report *r, const guards *c)
 {
-    bench_record(r);
-    bench_text(r, "model", "model", -18, c->model);
-    bench_number(r, "dofs", "dofs", 8, 0, c->n_point);
-    bench_number(r, NULL, "sub-steps", 10, 0, c->n_sub);
-    bench_number(r, "safeguards", NULL, 0, 0, (double)c->n_safeguard);
-    bench_number(r, "with_ms", "ms with", 12, 4, c->with_ms);
-    bench_number(r, "without_ms", "ms without", 12, 4, c->without_ms);
-    bench_number(r, "component_share", "component", 9, 4, c->component_ms / c->with_ms);
-    bench_number(r, "checks_share", "checks", 8, 4, checks_ms(c) / c->with_ms);
-    bench_number(r, "sum_share", "sum", 8, 4, share(c));
-    bench_text(r, "verdict", "", 0, c->n_safeguard ? "something went wrong" : fits(c) ? "ok" : "too much");
+    /* a negative difference is noise */
+    double checks_ms = c->finite_ms + fmax(0, c->energy_ms), share = (c->component_ms + checks_ms) / c->with_ms;
+    const char *verdict = c->n_safeguard ? "something went wrong" : share <= max_share ? "ok" : "too much";
+    BENCH_ROW(r, TEXT("model", "model", -18, c->model), NUMBER("dofs", "dofs", 8, 0, c->n_point),
+              NUMBER(NULL, "sub-steps", 10, 0, c->n_sub), VALUE("safeguards", c->n_safeguard),
+              NUMBER("with_ms", "ms with", 12, 4, c->with_ms), NUMBER("without_ms", "ms without", 12, 4, c->without_ms),
+              NUMBER("component_share", "component", 9, 4, c->component_ms / c->with_ms),
+              NUMBER("checks_share", "checks", 8, 4, checks_ms / c->with_ms), NUMBER("sum_share", "sum", 8, 4, share),
+              TEXT("verdict", "", 0, verdict));
 }
 
-int bench_guards(bool json)
+pal_err bench_guards(bench_report *r, pal_diagnostic *diag)
 {
     bodies b = {0};
-    guards all[N_CASE] = {0};
-    pal_diagnostic diag = {""};
-    pal_err err = make_bodies(&b, &diag);
-    for (int k = 0; k < N_CASE && !err; k++) err = measure(&b, k, &all[k], &diag);
-    free_bodies(&b);
-    bench_report r;
-    bench_begin(&r, "guards", json);
-    bench_number(&r, "max_share", NULL, 0, 0, max_share);
-    bench_text(&r, "not_timed", NULL, 0, not_timed);
-    bench_note(&r, "shares of a step, wanted at most %g together. Not timed: %s", max_share, not_timed);
-    bench_list(&r, "cases");
-    for (int k = 0; k < N_CASE && !err; k++) add_case(&r, &all[k]);
-    return bench_end(&r, err, &diag);
+    guards one;
+    BENCH_ROW(r, VALUE("max_share", max_share), TEXT("not_timed", NULL, 0, not_timed));
+    bench_note(r, "shares of a step, wanted at most %g together. Not timed: %s", max_share, not_timed);
+    bench_list(r, "cases");
+    pal_err err = make_bodies(&b, diag);
+    for (int k = 0; k < N_CASE && !err; k++) {
+        err = measure(&b, k, &one, diag);
+        if (!err) add_case(r, &one);
+    }
+    pal_prepared_free(&b.voxels);
+    pal_prepared_free(&b.adaptive);
+    pal_prepared_free(&b.boundary);
+    pal_cells_free(&b.cells);
+    return err;
 }

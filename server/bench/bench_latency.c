@@ -2,15 +2,12 @@
  * without a network: the cost of pacing, of one step and of the transfer between threads. The waiting thread sleeps
  * until the wake callback. Poses are put at times that drift through the step, so that the wait for the next step is
  * sampled evenly. */
-#include "server/base/clock.h"
 #include "server/bench/bench.h"
-#include "server/bench/bench_report.h"
+#include "server/num/median.h"
 #include "server/scene/scene_file.h"
 #include "server/session/session.h"
 
 #include <pthread.h>
-#include <stdio.h>
-#include <stdlib.h>
 
 enum { POSES = 300, WARM = 20 };
 
@@ -29,17 +26,11 @@ static void ring(void *user)
     pthread_mutex_unlock(&b->lock);
 }
 
-static int by_size(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* milliseconds from put_pose to having the frame that used it */
+/* milliseconds from the request of a pose to having the frame that used it */
 static double one(pal_session *session, bell *b, const pal_pose *pose)
 {
     uint64_t start = pal_clock_ns(), seen = 0;
-    pal_session_put_pose(session, 0, pose);
+    pal_session_request_pose(session, 0, pose);
     for (;;) {
         const pal_frame *frame = pal_session_take_frame(session);
         if (frame && frame->tool[0].present && frame->tool[0].pose.seq == pose->seq)
@@ -51,17 +42,16 @@ static double one(pal_session *session, bell *b, const pal_pose *pose)
     }
 }
 
-int bench_latency(bool json)
+pal_err bench_latency(bench_report *r, pal_diagnostic *diag)
 {
     static double ms[POSES];
     const pal_surface_scene plain = {.label = -1};
     bell b = {.lock = PTHREAD_MUTEX_INITIALIZER, .rung = PTHREAD_COND_INITIALIZER};
     pal_loaded_scene *loaded = NULL;
     pal_session *session = NULL;
-    pal_diagnostic diag = {""};
     pal_session_options options = {.lease_s = 5, .wake = ring, .user = &b};
-    pal_err err = pal_scene_procedural(&plain, &loaded, NULL, &diag);
-    if (!err) err = pal_session_open(&loaded->scene, &options, &diag, &session);
+    pal_err err = pal_scene_procedural(&plain, &loaded, NULL, diag);
+    if (!err) err = pal_session_open(&loaded->scene, &options, diag, &session);
     double step_ms = err ? 0 : 1e3 * loaded->scene.step_s;
     for (int k = -WARM; k < POSES && !err; k++) {
         pal_pose pose = {.position_m = {0.15, 0, 0.0001 * k}, .quat = {1, 0, 0, 0}, .seq = (uint32_t)(k + WARM + 1)};
@@ -71,16 +61,11 @@ int bench_latency(bool json)
     }
     pal_session_close(session);
     pal_scene_free(loaded);
-    qsort(ms, POSES, sizeof *ms, by_size);
-    bench_report r;
-    bench_begin(&r, "latency", json);
-    bench_note(&r, "pose to frame inside the server; at most one step and 5 ms are wanted");
-    bench_list(&r, "cases");
-    bench_record(&r);
-    bench_number(&r, "poses", "poses", 6, 0, POSES);
-    bench_number(&r, "step_ms", "step ms", 8, 2, step_ms);
-    bench_number(&r, "median_ms", "median ms", 10, 2, ms[POSES / 2]);
-    bench_number(&r, "p99_ms", "p99 ms", 8, 2, ms[POSES * 99 / 100]);
-    bench_number(&r, "max_ms", "max ms", 8, 2, ms[POSES - 1]);
-    return bench_end(&r, err, &diag);
+    double median_ms = pal_median(ms, POSES);
+    bench_note(r, "pose to frame inside the server; at most one step and 5 ms are wanted");
+    bench_list(r, "cases");
+    BENCH_ROW(r, NUMBER("poses", "poses", 6, 0, POSES), NUMBER("step_ms", "step ms", 8, 2, step_ms),
+              NUMBER("median_ms", "median ms", 10, 2, median_ms),
+              NUMBER("p99_ms", "p99 ms", 8, 2, ms[POSES * 99 / 100]), NUMBER("max_ms", "max ms", 8, 2, ms[POSES - 1]));
+    return err;
 }

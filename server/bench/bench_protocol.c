@@ -2,16 +2,14 @@
  * a second. Motions: `all` (a moving dent, a bend, a wave), `noise` (all and 0.02 mm of white noise), `sim` (a damped
  * surface of springs hit by a ball), `local` (about 5 % of the vertices), `rest`. Medians over the frames, thread time
  * of one core; the largest error of every frame is checked against the bound. */
-#include "protocol/asset.h"
 #include "protocol/frame_codec.h"
+#include "server/base/arena.h"
 #include "server/base/clock.h"
+#include "server/base/vec3.h"
 #include "server/bench/bench.h"
-#include "server/bench/bench_report.h"
-#include "server/cli/median.h"
+#include "server/num/median.h"
 
 #include <math.h>
-#include <stdint.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -28,6 +26,7 @@ typedef struct surface_model { /* surface, its springs, and the state of the `si
 } surface_model;
 
 typedef struct bench {
+    pal_arena *arena;
     surface_model s;
     pal_asset asset;
     pal_frame_encoder *encoder;
@@ -96,9 +95,9 @@ static void step_springs(surface_model *s, int frame)
             }
         }
         for (size_t i = 0; i < s->n_vertex; i++) {
-            double d[3], r = 0;
-            for (size_t c = 0; c < 3; c++) d[c] = s->x[3 * i + c] - ball[c], r += d[c] * d[c];
-            r = sqrt(r);
+            double d[3];
+            pal_sub3(d, s->x + 3 * i, ball);
+            const double r = pal_norm3(d);
             for (size_t c = 0; c < 3; c++) {
                 double push = r < 0.025 && r > 0 ? 20000 * (0.025 - r) * d[c] / r : 0;
                 s->v[3 * i + c] += dt * (s->f[3 * i + c] + push);
@@ -108,7 +107,7 @@ static void step_springs(surface_model *s, int frame)
     }
 }
 
-static void place(bench *b, int motion, int frame)
+static void deform(bench *b, int motion, int frame)
 {
     surface_model *s = &b->s;
     double t = frame / 60.0, centre[3] = {0.07 * cos(2 * t), 0.07 * sin(2 * t), 0.03 * sin(3 * t)};
@@ -139,7 +138,7 @@ static int measure_motion(bench *b, int motion)
 {
     double encode[BOUNDS][FRAMES], decode[BOUNDS][FRAMES];
     for (int k = 0; k < FRAMES; k++) {
-        place(b, motion, k);
+        deform(b, motion, k);
         for (int e = 0; e < BOUNDS; e++) {
             const pal_frame_input given = {.seq = (uint32_t)k, .error_m = bound_m[e], .position_m = b->given};
             pal_frame_result result;
@@ -167,18 +166,14 @@ static int measure_motion(bench *b, int motion)
 static int prepare(bench *b)
 {
     surface_model *s = &b->s;
-    size_t n = 6 * (size_t)FINENESS * FINENESS + 2, lattice = (FINENESS + 1) * (FINENESS + 1) * (size_t)(FINENESS + 1);
-    s->rest_m = malloc(3 * n * sizeof *s->rest_m);
-    s->triangle = malloc(6 * n * sizeof *s->triangle);
-    s->table = calloc(lattice, sizeof *s->table);
-    s->x = calloc(3 * n, sizeof *s->x);
-    s->v = calloc(3 * n, sizeof *s->v);
-    s->f = calloc(3 * n, sizeof *s->f);
-    b->given = malloc(3 * n * sizeof *b->given);
-    b->shown = malloc(3 * n * sizeof *b->shown);
+    const size_t n = 6 * (size_t)FINENESS * FINENESS + 2, line = FINENESS + 1;
     b->cap = pal_frame_bound((uint32_t)n);
-    b->bytes = malloc(b->cap);
-    if (!s->rest_m || !s->triangle || !s->table || !s->x || !s->v || !s->f || !b->given || !b->shown || !b->bytes)
+    b->arena = pal_arena_create(1 << 20, true);
+    if (!b->arena || !(s->rest_m = PAL_NEW(b->arena, float, 3 * n)) ||
+        !(s->triangle = PAL_NEW(b->arena, uint32_t, 6 * n)) ||
+        !(s->table = PAL_NEW(b->arena, uint32_t, line * line * line)) ||
+        !(b->given = PAL_NEW(b->arena, float, 3 * n)) || !(b->shown = PAL_NEW(b->arena, float, 3 * n)) ||
+        !(b->bytes = PAL_NEW(b->arena, uint8_t, b->cap)) || !PAL_NEW_DOUBLES(b->arena, 3 * n, &s->x, &s->v, &s->f))
         return PAL_REFUSAL_MEMORY;
     fill_surface(s);
 
@@ -200,48 +195,33 @@ static int prepare(bench *b)
     return refusal;
 }
 
-static void release(bench *b)
+static void report(bench_report *r, const bench *b)
 {
-    pal_frame_encoder_destroy(b->encoder);
-    pal_frame_decoder_destroy(b->decoder);
-    pal_frame_order_destroy(b->asset.order);
-    void *const block[] = {b->s.rest_m, b->s.triangle, b->s.table, b->s.x,  b->s.v,
-                           b->s.f,      b->given,      b->shown,   b->bytes};
-    for (size_t i = 0; i < sizeof block / sizeof *block; i++) free(block[i]);
-    free(b);
+    double n = b->s.n_vertex;
+    BENCH_ROW(r, VALUE("vertices", n), VALUE("triangles", b->s.n_triangle), VALUE("order_s", b->order_s),
+              VALUE("asset_s", b->asset_s), VALUE("asset_bytes", b->asset_bytes));
+    bench_note(r, "%.0f vertices, %u triangles; order %.0f ms, asset %.0f ms, %.0f kB (%.1f bytes a vertex)", n,
+               b->s.n_triangle, 1e3 * b->order_s, 1e3 * b->asset_s, b->asset_bytes / 1e3, b->asset_bytes / n);
+    bench_list(r, "motions");
+    for (int m = 0; m < MOTIONS; m++)
+        for (int e = 0; e < BOUNDS; e++)
+            BENCH_ROW(r, TEXT("motion", "motion", -8, motion_name[m]), NUMBER("bound_m", "bound m", 10, 6, bound_m[e]),
+                      NUMBER("bytes", "bytes", 8, 0, b->byte_count[m][e]),
+                      NUMBER(NULL, "bytes/vertex", 12, 3, b->byte_count[m][e] / n),
+                      NUMBER("encode_ms", "encode ms", 10, 3, 1e3 * b->encode_s[m][e]),
+                      NUMBER("decode_ms", "decode ms", 10, 3, 1e3 * b->decode_s[m][e]),
+                      NUMBER("max_error_m", "max error m", 12, 7, b->error_m[m][e]));
 }
 
-int bench_protocol(bool json)
+pal_err bench_protocol(bench_report *r, pal_diagnostic *diag)
 {
-    bench *b = calloc(1, sizeof *b);
-    int refusal = b ? prepare(b) : PAL_REFUSAL_MEMORY;
-    for (int m = 0; m < MOTIONS && !refusal; m++) refusal = measure_motion(b, m);
-    pal_diagnostic diag = {""};
-    pal_err err = refusal ? pal_diagnostic_set(&diag, PAL_ERR_INTERNAL, "%s", pal_refusal_text(refusal)) : PAL_ERR_OK;
-    bench_report r;
-    bench_begin(&r, "protocol", json);
-    double n = b && !err ? b->s.n_vertex : 1;
-    if (b && !err) {
-        bench_number(&r, "vertices", NULL, 0, 0, n);
-        bench_number(&r, "triangles", NULL, 0, 0, b->s.n_triangle);
-        bench_number(&r, "order_s", NULL, 0, 0, b->order_s);
-        bench_number(&r, "asset_s", NULL, 0, 0, b->asset_s);
-        bench_number(&r, "asset_bytes", NULL, 0, 0, b->asset_bytes);
-        bench_note(&r, "%.0f vertices, %u triangles; order %.0f ms, asset %.0f ms, %.0f kB (%.1f bytes a vertex)", n,
-                   b->s.n_triangle, 1e3 * b->order_s, 1e3 * b->asset_s, b->asset_bytes / 1e3, b->asset_bytes / n);
-    }
-    bench_list(&r, "motions");
-    for (int m = 0; m < MOTIONS && !err; m++)
-        for (int e = 0; e < BOUNDS; e++) {
-            bench_record(&r);
-            bench_text(&r, "motion", "motion", -8, motion_name[m]);
-            bench_number(&r, "bound_m", "bound m", 10, 6, bound_m[e]);
-            bench_number(&r, "bytes", "bytes", 8, 0, b->byte_count[m][e]);
-            bench_number(&r, NULL, "bytes/vertex", 12, 3, b->byte_count[m][e] / n);
-            bench_number(&r, "encode_ms", "encode ms", 10, 3, 1e3 * b->encode_s[m][e]);
-            bench_number(&r, "decode_ms", "decode ms", 10, 3, 1e3 * b->decode_s[m][e]);
-            bench_number(&r, "max_error_m", "max error m", 12, 7, b->error_m[m][e]);
-        }
-    if (b) release(b);
-    return bench_end(&r, err, &diag);
+    static bench b;
+    int refusal = prepare(&b);
+    for (int m = 0; m < MOTIONS && !refusal; m++) refusal = measure_motion(&b, m);
+    if (!refusal) report(r, &b);
+    pal_frame_encoder_destroy(b.encoder);
+    pal_frame_decoder_destroy(b.decoder);
+    pal_frame_order_destroy(b.asset.order);
+    pal_arena_destroy(b.arena);
+    return refusal ? pal_diagnostic_set(diag, PAL_ERR_INTERNAL, "%s", pal_refusal_text(refusal)) : PAL_ERR_OK;
 }

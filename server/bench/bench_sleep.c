@@ -3,27 +3,14 @@
  * surface, a subdivision solid of 3 x 3 x 3 cells. Wanted: asleep below 5 % of awake. */
 #include "server/bench/bench.h"
 #include "server/bench/bench_body.h"
-#include "server/bench/bench_report.h"
 
 #include "server/base/clock.h"
-#include "server/cli/median.h"
-#include "server/mesh/cells/cell_models.h"
+#include "server/num/median.h"
 #include "server/scene/scene_file.h"
-#include "server/sim/world/world.h"
-
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 /* a step asleep is as short as a reading of the clock: MANY are timed together */
-enum { N_STEP = 61, MANY = 64, MAX_STEP = 6000, CASES = 4 };
+enum { N_STEP = 61, MANY = 64, MAX_STEP = 6000 };
 static const double max_share = 0.05;
-
-typedef struct result {
-    const char *name;
-    int n_node;
-    double awake_ms, unobserved_ms, asleep_ms, asleep_s; /* asleep_s: simulated, until it sleeps */
-} result;
 
 static pal_err timed(pal_world *world, double step_s, bool awake, double *median_ms)
 {
@@ -39,88 +26,73 @@ static pal_err timed(pal_world *world, double step_s, bool awake, double *median
     return PAL_ERR_OK;
 }
 
-static pal_err measure_world(const pal_scene *scene, result *out, pal_diagnostic *diag)
+static pal_err measure_world(const char *name, const pal_scene *scene, bench_report *r, pal_diagnostic *diag)
 {
     pal_world *world;
+    double awake_ms = 0, unobserved_ms = 0, asleep_ms = 0;
     PAL_TRY(pal_world_create(scene, diag, &world));
     const pal_body *body = pal_world_body(world, 0);
     pal_err err = PAL_ERR_OK;
-    out->n_node = body->n_node;
     int n = 0;
     for (; n < MAX_STEP && !body->asleep && !err; n++) err = pal_world_step(world, scene->step_s);
-    out->asleep_s = n * scene->step_s;
-    if (body->frozen) err = pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "%s stopped: %s", out->name, body->reason);
+    double asleep_s = n * scene->step_s;
+    if (body->frozen) err = pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "%s stopped: %s", name, body->reason);
     if (!err && !body->asleep)
-        err = pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "%s does not come to rest in %g s", out->name, out->asleep_s);
+        err = pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "%s does not come to rest in %g s", name, asleep_s);
     pal_pose pose = {.quat = {1, 0, 0, 0}};
     for (int c = 0; c < 3; c++) pose.position_m[c] = 1.5 * body->length_scale_m * scene->up[c];
     if (!err) err = pal_world_pose(world, 0, &pose);
-    if (!err) err = timed(world, scene->step_s, false, &out->asleep_ms);
-    if (!err && !body->asleep) err = pal_diagnostic_set(diag, PAL_ERR_INTERNAL, "%s woke by itself", out->name);
-    if (!err) err = timed(world, scene->step_s, true, &out->awake_ms);
+    if (!err) err = timed(world, scene->step_s, false, &asleep_ms);
+    if (!err && !body->asleep) err = pal_diagnostic_set(diag, PAL_ERR_INTERNAL, "%s woke by itself", name);
+    if (!err) err = timed(world, scene->step_s, true, &awake_ms);
     if (!err) err = pal_world_pose(world, 0, NULL);
     if (!err) pal_world_watch(world, false);
-    if (!err) err = timed(world, scene->step_s, true, &out->unobserved_ms);
+    if (!err) err = timed(world, scene->step_s, true, &unobserved_ms);
+    if (!err)
+        BENCH_ROW(r, TEXT("name", "model", -18, name), NUMBER("nodes", "nodes", 8, 0, body->n_node),
+                  NUMBER("awake_ms", "awake ms", 10, 4, awake_ms),
+                  NUMBER("unobserved_ms", "unobserved ms", 13, 4, unobserved_ms),
+                  NUMBER("asleep_ms", "asleep ms", 10, 5, asleep_ms),
+                  NUMBER("share", "share", 8, 4, asleep_ms / awake_ms),
+                  NUMBER("asleep_after_s", "asleep after s", 14, 2, asleep_s),
+                  TEXT(NULL, "", 8, asleep_ms <= max_share * awake_ms ? "" : "too much"));
     pal_world_destroy(world);
     return err;
 }
 
-static pal_err measure_organ(const pal_surface_scene *options, result *out, pal_diagnostic *diag)
+static pal_err measure_solid(const pal_cell_model *model, bench_report *r, pal_diagnostic *diag)
 {
-    pal_loaded_scene *loaded = NULL;
-    PAL_TRY(pal_scene_procedural(options, &loaded, NULL, diag));
-    pal_err err = measure_world(&loaded->scene, out, diag);
-    pal_scene_free(loaded);
-    return err;
-}
-
-static pal_err measure_solid(const pal_cell_model *model, result *out, pal_diagnostic *diag)
-{
+    static pal_scene scene;
     pal_cells cells = {0};
     pal_prepared mesh = {0};
-    pal_scene *scene = calloc(1, sizeof *scene);
-    if (!scene) return PAL_ERR_MEMORY;
     pal_err err = bench_solid(model, &cells, &mesh, diag);
     if (!err) {
-        pal_scene_default(scene);
-        pal_body_default_cells(&scene->body[0], model->name, &mesh, &cells);
-        pal_entry_init(&scene->body[0].effect[scene->body[0].n_effect++], "effects[4]", "sleep");
-        scene->n_body = 1;
-        pal_tools_default(scene, 1);
-        err = pal_entry_put_number(&scene->body[0].model, "levels", model->n_level, diag);
-        if (!err) err = measure_world(scene, out, diag);
+        pal_scene_default(&scene);
+        pal_body_default_cells(&scene.body[0], model->name, &mesh, &cells);
+        pal_entry_init(&scene.body[0].effect[scene.body[0].n_effect++], "effects[4]", "sleep");
+        scene.n_body = 1;
+        pal_tools_default(&scene, 1);
+        err = pal_entry_put_number(&scene.body[0].model, "levels", model->n_level, diag);
+        if (!err) err = measure_world("subdivision_fem", &scene, r, diag);
     }
     pal_prepared_free(&mesh);
     pal_cells_free(&cells);
-    free(scene);
     return err;
 }
 
-int bench_sleep(bool json)
+pal_err bench_sleep(bench_report *r, pal_diagnostic *diag)
 {
-    result all[CASES] = {
-        {.name = "tet_springs"}, {.name = "fem"}, {.name = "adaptive_springs"}, {.name = "subdivision_fem"}};
+    static const char *const name[3] = {"tet_springs", "fem", "adaptive_springs"};
     const pal_surface_scene organ[3] = {
         {.label = -1}, {.label = -1, .fem = true}, {.label = -1, .adaptive = true, .shape = "stomach"}};
-    pal_diagnostic diag = {""};
-    pal_err err = PAL_ERR_OK;
-    for (int k = 0; k < 3 && !err; k++) err = measure_organ(&organ[k], &all[k], &diag);
-    if (!err) err = measure_solid(pal_cell_model_find("block3"), &all[3], &diag);
-    bench_report r;
-    bench_begin(&r, "sleep", json);
-    bench_note(&r, "a body at rest, medians of %d steps; wanted: asleep at most %.2f of awake", N_STEP, max_share);
-    bench_list(&r, "cases");
-    for (int k = 0; k < CASES && !err; k++) {
-        const result *c = &all[k];
-        bench_record(&r);
-        bench_text(&r, "name", "model", -18, c->name);
-        bench_number(&r, "nodes", "nodes", 8, 0, c->n_node);
-        bench_number(&r, "awake_ms", "awake ms", 10, 4, c->awake_ms);
-        bench_number(&r, "unobserved_ms", "unobserved ms", 13, 4, c->unobserved_ms);
-        bench_number(&r, "asleep_ms", "asleep ms", 10, 5, c->asleep_ms);
-        bench_number(&r, "share", "share", 8, 4, c->asleep_ms / c->awake_ms);
-        bench_number(&r, "asleep_after_s", "asleep after s", 14, 2, c->asleep_s);
-        bench_text(&r, NULL, "", 8, c->asleep_ms <= max_share * c->awake_ms ? "" : "too much");
+    bench_note(r, "a body at rest, medians of %d steps; wanted: asleep at most %.2f of awake", N_STEP, max_share);
+    bench_list(r, "cases");
+    for (int k = 0; k < 3; k++) {
+        pal_loaded_scene *loaded = NULL;
+        PAL_TRY(pal_scene_procedural(&organ[k], &loaded, NULL, diag));
+        pal_err err = measure_world(name[k], &loaded->scene, r, diag);
+        pal_scene_free(loaded);
+        if (err) return err;
     }
-    return bench_end(&r, err, &diag);
+    return measure_solid(pal_cell_model_find("block3"), r, diag);
 }

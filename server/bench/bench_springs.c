@@ -7,25 +7,19 @@
  * multiply-add limit at most. */
 #include "server/bench/bench.h"
 #include "server/bench/bench_body.h"
-#include "server/bench/bench_report.h"
 
 #include "server/base/clock.h"
-#include "server/cli/median.h"
 #include "server/mesh/geometry/organ.h"
-#include "server/sim/world/world.h"
 
+#include "server/num/median.h"
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 enum { N_CASE = 3, N_STEP = 31, TRIAD = 4 << 20, CHAINS = 128, LINKS = 16 };
 
 typedef struct result {
-    char name[48];
-    int n_tet, n_node, n_tri, n_sub;
-    double step_ms, spring_ms[3], solve_ms, skin_ms; /* sub-step; its three spring components; verlet; a frame */
-    double limit_ms, flop, byte;
+    int n_sub;
+    double ms[6], flop, byte; /* ms: a sub-step; its three spring components; verlet; skinning of a frame */
 } result;
 
 /* GB/s of a = b + s c, far beyond the caches */
@@ -108,103 +102,71 @@ static pal_err count_work(const pal_tets *tets, result *out)
     return err;
 }
 
-static void read_times(const pal_world *world, result *r)
-{
-    static const char *const spring[3] = {"edge_distance", "face_area", "tet_volume"};
-    r->skin_ms = bench_component_ms(world, "output", NULL);
-    r->solve_ms = bench_component_ms(world, "solve", NULL) / r->n_sub;
-    r->step_ms = bench_component_ms(world, "force", NULL) / r->n_sub + r->solve_ms;
-    for (int k = 0; k < 3; k++) r->spring_ms[k] = bench_component_ms(world, NULL, spring[k]) / r->n_sub;
-}
-
 static pal_err run_world(const pal_scene *scene, result *out, pal_diagnostic *diag)
 {
-    double step[N_STEP], spring[3][N_STEP], solve[N_STEP], skin[N_STEP];
+    static const char *const spring[3] = {"edge_distance", "face_area", "tet_volume"};
+    double ms[6][N_STEP]; /* sub-step, springs, solver, skinning */
     pal_world *world;
     PAL_TRY(pal_world_create(scene, diag, &world));
     pal_err err = PAL_ERR_OK;
     for (int i = -2; i < N_STEP && !err; i++) {
         pal_world_wake(world);
         err = pal_world_step(world, scene->step_s);
-        out->n_sub = pal_world_substeps(world);
         if (i < 0) continue;
-        read_times(world, out);
-        step[i] = out->step_ms, solve[i] = out->solve_ms, skin[i] = out->skin_ms;
-        for (int k = 0; k < 3; k++) spring[k][i] = out->spring_ms[k];
+        out->n_sub = pal_world_substeps(world);
+        for (int k = 0; k < 3; k++) ms[1 + k][i] = bench_component_ms(world, NULL, spring[k]) / out->n_sub;
+        ms[4][i] = bench_component_ms(world, "solve", NULL) / out->n_sub;
+        ms[0][i] = bench_component_ms(world, "force", NULL) / out->n_sub + ms[4][i];
+        ms[5][i] = bench_component_ms(world, "output", NULL);
     }
     pal_world_destroy(world);
     if (err) return pal_diagnostic_set(diag, err, "the step failed: %s", pal_err_text(err));
-    out->step_ms = pal_median(step, N_STEP), out->solve_ms = pal_median(solve, N_STEP);
-    out->skin_ms = pal_median(skin, N_STEP);
-    for (int k = 0; k < 3; k++) out->spring_ms[k] = pal_median(spring[k], N_STEP);
+    for (int k = 0; k < 6; k++) out->ms[k] = pal_median(ms[k], N_STEP);
     return PAL_ERR_OK;
 }
 
-static pal_err run_case(const char *name, const pal_prepared *mesh, double limit_ms, result *out, pal_diagnostic *diag)
+static pal_err run_case(const char *name, const pal_prepared *mesh, double limit_ms, const double machine[2],
+                        bench_report *r, pal_diagnostic *diag)
 {
-    *out = (result){.n_tet = mesh->tets.n_tet, .n_node = mesh->tets.n_node, .limit_ms = limit_ms};
-    snprintf(out->name, sizeof out->name, "%s", name);
-    pal_scene *scene = calloc(1, sizeof *scene);
-    if (!scene) return PAL_ERR_MEMORY;
-    pal_scene_default(scene);
-    scene->n_body = 1;
-    pal_body_default(&scene->body[0], "body", mesh);
-    if (mesh->skin.n_vertex > 0)
-        out->n_tri = mesh->surface.n_tri;
-    else
-        scene->body[0].output.name[0] = 0;
-    scene->body[0].n_effect = 1;
-    pal_err err = count_work(&mesh->tets, out);
-    if (!err) err = run_world(scene, out, diag);
-    free(scene);
-    return err;
+    static pal_scene scene;
+    result c = {0};
+    bool skinned = mesh->skin.n_vertex > 0;
+    pal_scene_default(&scene);
+    scene.n_body = 1;
+    pal_body_default(&scene.body[0], "body", mesh);
+    if (!skinned) scene.body[0].output.name[0] = 0;
+    scene.body[0].n_effect = 1;
+    PAL_TRY(count_work(&mesh->tets, &c));
+    PAL_TRY(run_world(&scene, &c, diag));
+    double gflops = 1e-6 * c.flop / c.ms[0], gbs = 1e-6 * c.byte / c.ms[0];
+    BENCH_ROW(r, TEXT("name", "body", -10, name), NUMBER("tets", "tets", 7, 0, mesh->tets.n_tet),
+              NUMBER("nodes", "nodes", 7, 0, mesh->tets.n_node), NUMBER("substep_ms", "ms/sub-step", 11, 3, c.ms[0]),
+              NUMBER("edge_distance_ms", "edges", 6, 3, c.ms[1]), NUMBER("face_area_ms", "faces", 6, 3, c.ms[2]),
+              NUMBER("tet_volume_ms", "tets", 6, 3, c.ms[3]), NUMBER("verlet_ms", "verlet", 7, 3, c.ms[4]),
+              NUMBER("limit_ms", "limit", 6, 2, limit_ms), NUMBER("GFLOP_s", "GFLOP/s", 8, 1, gflops),
+              NUMBER("of_fma", "of limit", 8, 2, gflops / machine[1]), NUMBER("GB_s", "GB/s", 6, 1, gbs),
+              NUMBER("of_triad", "of triad", 8, 2, gbs / machine[0]), NUMBER("substeps", "sub-steps", 9, 0, c.n_sub),
+              NUMBER("triangles", "triangles", 9, 0, skinned ? mesh->surface.n_tri : 0),
+              NUMBER("skin_ms", "skin ms", 8, 3, skinned ? c.ms[5] : NAN));
+    return PAL_ERR_OK;
 }
 
-static void add_case(bench_report *r, const result *c, double triad, double fma_limit)
-{
-    double gflops = 1e-6 * c->flop / c->step_ms, gbs = 1e-6 * c->byte / c->step_ms;
-    bench_record(r);
-    bench_text(r, "name", "body", -10, c->name);
-    bench_number(r, "tets", "tets", 7, 0, c->n_tet);
-    bench_number(r, "nodes", "nodes", 7, 0, c->n_node);
-    bench_number(r, "substep_ms", "ms/sub-step", 11, 3, c->step_ms);
-    bench_number(r, "edge_distance_ms", "edges", 6, 3, c->spring_ms[0]);
-    bench_number(r, "face_area_ms", "faces", 6, 3, c->spring_ms[1]);
-    bench_number(r, "tet_volume_ms", "tets", 6, 3, c->spring_ms[2]);
-    bench_number(r, "verlet_ms", "verlet", 7, 3, c->solve_ms);
-    bench_number(r, "limit_ms", "limit", 6, 2, c->limit_ms);
-    bench_number(r, "GFLOP_s", "GFLOP/s", 8, 1, gflops);
-    bench_number(r, "of_fma", "of limit", 8, 2, gflops / fma_limit);
-    bench_number(r, "GB_s", "GB/s", 6, 1, gbs);
-    bench_number(r, "of_triad", "of triad", 8, 2, gbs / triad);
-    bench_number(r, "substeps", "sub-steps", 9, 0, c->n_sub);
-    bench_number(r, "triangles", "triangles", 9, 0, c->n_tri);
-    bench_number(r, "skin_ms", "skin ms", 8, 3, c->n_tri > 0 ? c->skin_ms : NAN);
-}
-
-int bench_springs(bool json)
+pal_err bench_springs(bench_report *r, pal_diagnostic *diag)
 {
     static const int box[2][3] = {{20, 13, 10}, {40, 26, 25}};
     static const char *const name[N_CASE] = {"box 13k", "box 130k", "organ 13k"};
     static const double limit_ms[N_CASE] = {0.25, 3, 0.25};
-    result all[N_CASE];
-    pal_diagnostic diag = {""};
+    const double machine[2] = {measure_triad(), measure_fma()};
+    BENCH_ROW(r, VALUE("steps", N_STEP), VALUE("triad_GB_s", machine[0]), VALUE("fma_GFLOP_s", machine[1]));
+    bench_note(r, "one thread, medians of %d steps; this machine: triad %.1f GB/s, multiply-add %.1f GFLOP/s", N_STEP,
+               machine[0], machine[1]);
+    bench_list(r, "cases");
     pal_err err = PAL_ERR_OK;
     for (int k = 0; k < N_CASE && !err; k++) {
         pal_prepared mesh = {0};
-        err = k < 2 ? bench_box(box[k], 0.006, &mesh, &diag) : make_organ(&mesh, &diag);
-        if (!err) err = run_case(name[k], &mesh, limit_ms[k], &all[k], &diag);
+        err = k < 2 ? bench_box(box[k], 0.006, &mesh, diag) : make_organ(&mesh, diag);
+        if (!err) err = run_case(name[k], &mesh, limit_ms[k], machine, r, diag);
         pal_prepared_free(&mesh);
     }
-    double triad = measure_triad(), fma_limit = measure_fma();
-    bench_report r;
-    bench_begin(&r, "springs", json);
-    bench_number(&r, "steps", NULL, 0, 0, N_STEP);
-    bench_number(&r, "triad_GB_s", NULL, 0, 0, triad);
-    bench_number(&r, "fma_GFLOP_s", NULL, 0, 0, fma_limit);
-    bench_note(&r, "one thread, medians of %d steps; this machine: triad %.1f GB/s, multiply-add %.1f GFLOP/s", N_STEP,
-               triad, fma_limit);
-    bench_list(&r, "cases");
-    for (int k = 0; k < N_CASE && !err; k++) add_case(&r, &all[k], triad, fma_limit);
-    return bench_end(&r, err, &diag);
+    return err;
 }

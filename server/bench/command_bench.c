@@ -1,54 +1,71 @@
-/* `palpate bench NAME`: dispatch. */
+/* `palpate bench NAME`: finds the bench, runs it and reports its results. */
 #include "server/bench/bench.h"
 #include "server/cli/flags.h"
 
 #include <stdio.h>
 #include <string.h>
 
+static const struct {
+    const char *name, *operand, *about; /* operand: the one it may have */
+    bench_run *run;
+} bench_table[] = {
+    {"mesh", "[SURFACE.ply]", "tetrahedra of a surface, or of a computed organ, at several resolutions", bench_mesh},
+    {"springs", "", "forces, integration and skinning against the limits of the machine", bench_springs},
+    {"adaptive", "", "surfaces that refine where they are touched: coarse, refined, adaptive", bench_adaptive},
+    {"fem", "", "live steps and static solves of finite elements", bench_fem},
+    {"solids", "", "subdivision solids as finite elements (paper A, Table 1)", bench_solids},
+    {"calibrate", "[FOLDER]",
+     "springs fitted to finite elements, by gradient and by annealing\n                      (FOLDER: deploy/problems)",
+     bench_calibrate},
+    {"guards", "", "cost of the guards while nothing goes wrong, as a share of a step", bench_guards},
+    {"protocol", "", "encoding and decoding of frames", bench_protocol},
+    {"sleep", "", "bodies at rest: awake, not observed, asleep", bench_sleep},
+    {"estimate", "", "predicted cost and error of other configurations against measured ones", bench_estimate},
+    {"latency", "", "from a pose put into a session to the frame that shows it", bench_latency},
+};
+enum { BENCHES = sizeof bench_table / sizeof bench_table[0] };
+
+static int run_bench(int index, const char *argument, const pal_flag_common *common)
+{
+    bench_report r = {.argument = argument, .json = common->json, .root = cJSON_CreateObject()};
+    pal_diagnostic diag = {""}, named = {""};
+    cJSON_AddBoolToObject(r.root, "ok", true);
+    cJSON_AddStringToObject(r.root, "bench", bench_table[index].name);
+    pal_err err = bench_table[index].run(&r, &diag);
+    if (err)
+        pal_diagnostic_set(&named, err, "%s: %s", bench_table[index].name,
+                           diag.text[0] ? diag.text : pal_err_text(err));
+    if (r.json) return pal_report_end(common, err, &named, r.root);
+    cJSON_Delete(r.root);
+    return pal_report_end(common, err, &named, NULL);
+}
+
 int command_bench(int argc, char **argv)
 {
-    static const struct {
-        const char *name;
-        int (*run)(bool json);
-    } bench[] = {{"springs", bench_springs},   {"fem", bench_fem},           {"solids", bench_solids},
-                 {"guards", bench_guards},     {"protocol", bench_protocol}, {"sleep", bench_sleep},
-                 {"estimate", bench_estimate}, {"latency", bench_latency}};
-    const char *picture = NULL;
+    static char about[2048];
+    const char *picture = NULL, *word[2] = {NULL, NULL};
+    int n = 0, k = 0,
+        used = snprintf(about, sizeof about, "Measures this machine, medians of several runs. NAME is one of\n");
+    for (int b = 0; b < BENCHES; b++)
+        used += snprintf(about + used, sizeof about - (size_t)used, "  %-9s %-10s%s%s\n", bench_table[b].name,
+                         bench_table[b].operand, strlen(bench_table[b].operand) < 10 ? "" : " ", bench_table[b].about);
     const pal_flag flag[] = {{"--picture", "FILE.svg", PAL_FLAG_TEXT, &picture, 0, 0,
                               "adaptive: plot the displacement of the pressed vertex (paper C, Figs. 10 and 12)"}};
-    const pal_flag_table table = {
-        .usage = "bench NAME [flags]",
-        .about = "Measures this machine, medians of several runs. NAME is one of\n"
-                 "  mesh [SURFACE.ply]  tetrahedra of a surface, or of a computed organ, at several resolutions\n"
-                 "  springs             forces, integration and skinning against the limits of the machine\n"
-                 "  adaptive            surfaces that refine where they are touched: coarse, refined, adaptive\n"
-                 "  fem                 live steps and static solves of finite elements\n"
-                 "  solids              subdivision solids as finite elements (paper A, Table 1)\n"
-                 "  calibrate [FOLDER]  springs fitted to finite elements, by gradient and by annealing\n"
-                 "                      (FOLDER: deploy/problems)\n"
-                 "  guards              cost of the guards while nothing goes wrong, as a share of a step\n"
-                 "  protocol            encoding and decoding of frames\n"
-                 "  sleep               bodies at rest: awake, not observed, asleep\n"
-                 "  estimate            predicted cost and error of other configurations against measured ones\n"
-                 "  latency             from a pose put into a session to the frame that shows it\n",
-        .example = "palpate bench protocol\n",
-        .flag = flag,
-        .n_flag = sizeof flag / sizeof flag[0],
-        .min_operand = 1,
-        .max_operand = 2};
+    const pal_flag_table table = {.usage = "bench NAME [flags]",
+                                  .about = about,
+                                  .example = "palpate bench protocol\n",
+                                  PAL_FLAGS(flag),
+                                  .min_operand = 1,
+                                  .max_operand = 2};
     pal_flag_common common;
-    const char *word[2] = {NULL, NULL};
-    int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
+    int code = pal_flags_parse(&table, argc, argv, &common, word, &n);
     if (code >= 0) return code;
-    bool mesh = !strcmp(word[0], "mesh"), calibrate = !strcmp(word[0], "calibrate");
-    if (n == 2 && !mesh && !calibrate) return pal_flags_wrong(&common, "\"%.60s\" is one operand too many", word[1]);
+    while (k < BENCHES && strcmp(word[0], bench_table[k].name) != 0) k++;
+    if (n == 2 && (k == BENCHES || !bench_table[k].operand[0]))
+        return pal_flags_wrong(&common, "\"%.60s\" is one operand too many", word[1]);
     if (picture && strcmp(word[0], "adaptive") != 0) return pal_flags_wrong(&common, "--picture belongs to adaptive");
+    if (k == BENCHES) return pal_flags_wrong(&common, "there is no bench \"%.60s\"", word[0]);
     /* a quiet bench only has to run */
     if (common.quiet && !common.json && !freopen("/dev/null", "w", stdout)) return 3;
-    if (mesh) return bench_mesh(word[1], common.json);
-    if (calibrate) return bench_calibrate(word[1], common.json);
-    if (!strcmp(word[0], "adaptive")) return bench_adaptive(common.json, picture);
-    for (size_t k = 0; k < sizeof bench / sizeof bench[0]; k++)
-        if (!strcmp(word[0], bench[k].name)) return bench[k].run(common.json);
-    return pal_flags_wrong(&common, "there is no bench \"%.60s\"", word[0]);
+    return run_bench(k, picture ? picture : word[1], &common);
 }

@@ -59,7 +59,9 @@ typedef struct pal_calibration_info {
     int n_parameter, n_kind, n_used; /* n_parameter = n_kind * n_used, ordered by kind */
     int kind[PAL_SPRING_KINDS];      /* pal_spring_kind of each kind index */
     int n_node, n_free, n_spring, n_tet;
-    double edge_m, mean_young_Pa;      /* of the start: exponential of the volume mean of ln E */
+    double edge_m;
+    /* of the start, means over the volume: E is the geometric mean, nu at most 0.4999 */
+    double mean_young_Pa, mean_poisson, mean_density_kg_m3;
     double max_m[PAL_CALIBRATE_CASES]; /* largest displacement of each truth */
     int n_point[PAL_CALIBRATE_CASES];
     double truth_s, prepare_s;

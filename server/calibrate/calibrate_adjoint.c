@@ -35,28 +35,13 @@ typedef struct fit {
 static void stop(fit *f, const char *reason)
 {
     if (!f->ended) f->ended = reason;
-    if (f->opt) nlopt_force_stop(f->opt);
-}
-
-static void report_step(fit *f, const double *theta, double error_percent, bool improved)
-{
-    const pal_fit_options *o = f->o;
-    pal_fit_step step = {.evaluation = f->out->n_evaluation - 1,
-                         .error_percent = error_percent,
-                         .best_percent = f->best_percent,
-                         .seconds = pal_clock_s() - f->begin_s,
-                         .theta = theta,
-                         .improved = improved};
-    if (o->step && !o->step(o->user, &step)) stop(f, "stopped");
-    if (o->budget_s > 0 && step.seconds >= o->budget_s) stop(f, "budget");
-    if (f->out->n_evaluation >= f->max) stop(f, "evaluations");
-    if (o->target_percent > 0 && f->best_percent <= o->target_percent) stop(f, "enough");
+    if (f->ended && f->opt) nlopt_force_stop(f->opt);
 }
 
 /* objective and slope at a point; DBL_MAX: none */
 static double evaluate(fit *f, const double *theta, double *slope)
 {
-    size_t n = sizeof(double) * (size_t)f->c->n_parameter;
+    size_t n = sizeof(double) * (size_t)f->c->info.n_parameter;
     pal_calibration_value v;
     pal_err err = pal_calibration_evaluate(f->c, f->workspace, theta, PAL_CALIBRATION_FIT | PAL_CALIBRATION_CONTINUE,
                                            &v, slope, f->diag);
@@ -73,12 +58,18 @@ static double evaluate(fit *f, const double *theta, double *slope)
         f->best_objective = v.objective;
         f->best_percent = v.error_percent;
     }
-    report_step(f, theta, rests ? v.error_percent : DBL_MAX, improved);
+    const pal_fit_step step = {.evaluation = f->out->n_evaluation - 1,
+                               .error_percent = rests ? v.error_percent : DBL_MAX,
+                               .best_percent = f->best_percent,
+                               .seconds = pal_clock_s() - f->begin_s,
+                               .theta = theta,
+                               .improved = improved};
+    stop(f, pal_fit_report(f->o, &step, f->max));
     return rests ? v.objective : DBL_MAX;
 }
 
 /* the objective passed to NLopt */
-static double see(unsigned n, const double *theta, double *slope, void *user)
+static double objective(unsigned n, const double *theta, double *slope, void *user)
 {
     fit *f = user;
     size_t n_byte = sizeof(double) * (size_t)n;
@@ -105,14 +96,14 @@ static double see(unsigned n, const double *theta, double *slope, void *user)
 static pal_err search(fit *f, double *theta)
 {
     const pal_calibration *c = f->c;
-    f->opt = nlopt_create(NLOPT_LD_LBFGS, (unsigned)c->n_parameter);
+    f->opt = nlopt_create(NLOPT_LD_LBFGS, (unsigned)c->info.n_parameter);
     if (!f->opt) return PAL_ERR_MEMORY;
-    nlopt_set_min_objective(f->opt, see, f);
+    nlopt_set_min_objective(f->opt, objective, f);
     nlopt_set_lower_bounds(f->opt, c->low);
     nlopt_set_upper_bounds(f->opt, c->high);
     nlopt_set_vector_storage(f->opt, MEMORY_PAIRS);
     /* of the logarithm: a few constants are optimised to the end of their valley, many are not worth the time */
-    nlopt_set_ftol_abs(f->opt, c->n_parameter <= FEW_PARAMETERS ? 1e-6 : 3e-4);
+    nlopt_set_ftol_abs(f->opt, c->info.n_parameter <= FEW_PARAMETERS ? 1e-6 : 3e-4);
     double min;
     nlopt_optimize(f->opt, theta, &min);
     nlopt_destroy(f->opt);
@@ -123,7 +114,7 @@ static pal_err search(fit *f, double *theta)
 static pal_err run(fit *f, double *theta)
 {
     const pal_calibration *c = f->c;
-    size_t n = sizeof(double) * (size_t)c->n_parameter;
+    size_t n = sizeof(double) * (size_t)c->info.n_parameter;
     double start = evaluate(f, theta, f->slope);
     f->out->start_percent = f->best_percent;
     if (f->err) return f->err;
@@ -150,11 +141,11 @@ static pal_err close_up(fit *f, const double *start, double *theta)
 {
     const unsigned all = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY;
     pal_fit_result *out = f->out;
-    if (f->best_percent > out->start_percent) memcpy(theta, start, sizeof(double) * (size_t)f->c->n_parameter);
+    if (f->best_percent > out->start_percent) memcpy(theta, start, sizeof(double) * (size_t)f->c->info.n_parameter);
     PAL_TRY(pal_calibration_evaluate(f->c, f->workspace, theta, all, &out->value, NULL, f->diag));
     if (out->value.error_percent <= out->start_percent) return PAL_ERR_OK;
     /* no equilibrium, or a worse one: it is reached only from nearby states, and a live body may not find it either */
-    memcpy(theta, start, sizeof(double) * (size_t)f->c->n_parameter);
+    memcpy(theta, start, sizeof(double) * (size_t)f->c->info.n_parameter);
     return pal_calibration_evaluate(f->c, f->workspace, theta, all, &out->value, NULL, f->diag);
 }
 
@@ -162,7 +153,7 @@ pal_err pal_fit_adjoint(const pal_calibration *calibration, const pal_fit_option
                         pal_fit_result *out, pal_diagnostic *diag)
 {
     const pal_calibration *c = calibration;
-    size_t n = (size_t)c->n_parameter;
+    size_t n = (size_t)c->info.n_parameter;
     *out = (pal_fit_result){.start_percent = DBL_MAX};
     fit f = {.c = c,
              .o = options,
@@ -176,7 +167,7 @@ pal_err pal_fit_adjoint(const pal_calibration *calibration, const pal_fit_option
     pal_err err = f.best ? pal_calibration_workspace_create(c, &f.workspace) : PAL_ERR_MEMORY;
     if (err) {
         free(f.best);
-        return pal_diagnostic_set(diag, err, "no memory to calibrate %d constants", c->n_parameter);
+        return pal_diagnostic_set(diag, err, "no memory to calibrate %d constants", c->info.n_parameter);
     }
     f.good = f.best + n, f.slope = f.good + n;
     double *start = f.slope + n;

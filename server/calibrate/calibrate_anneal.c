@@ -5,16 +5,14 @@
  * Every point is evaluated from the start's own equilibrium, never from a neighbour's, in the workspace of any free
  * worker. E therefore depends on theta alone, and the walk on the seed alone.
  *
- * The coordinates of the walk are not ln k_d, ln k_a, ln k_v, in which the stiffness of a body forms a curved
- * valley across the axes. They are ln G of the lattice's shear modulus G (spring_law.h) and the logarithms of
- * k_a/k_d and k_v/k_d, so that one coordinate has the largest effect on displacements. Evaluations until within 1.2
- * times the adjoint's error, gear's twist: linear, 10 voxels, ten seeds: three need more than 1500 along the
- * constants, at most 600 along these; finite, 16 voxels, seeds 1 to 5: 151 to 1328 (median 634) against 199 to 665
- * (median 262). */
+ * ln k_d, ln k_a, ln k_v would form a curved valley across the axes. The walk takes ln G of the lattice's shear modulus
+ * (spring_law.h) and the logarithms of k_a/k_d and k_v/k_d, of which G has the largest effect. Evaluations until within
+ * 1.2 times the adjoint's error, gear's twist, finite, 16 voxels, seeds 1 to 5: median 262, against 634 along ln k. */
 #include "server/calibrate/calibration.h"
 
 #include "server/base/clock.h"
 #include "server/base/team.h"
+#include "server/calibrate/tuning.h"
 #include "server/num/anneal.h"
 
 #include <float.h>
@@ -23,10 +21,6 @@
 #include <string.h>
 
 enum { MAX_EVALUATION = 4000, MAX_STALL = 1500 };
-/* steps below this share of the range change the error insignificantly: 5e-3 in ln k over 2 x 2 decades */
-static const double COLDEST = 5e-4;
-/* share of the range of theta: most points beyond have no stable equilibrium, or an unacceptable error */
-static const double BOX = 2.0 / 3;
 /* shares of a lattice's shear modulus, by kind (spring_law.h) */
 static const double shear[PAL_SPRING_KINDS] = {2.0 / 3, 4.0 / 9, 0};
 
@@ -34,9 +28,9 @@ typedef struct fit {
     const pal_calibration *c;
     const pal_fit_options *o;
     pal_team *team;                        /* NULL: points are evaluated elsewhere */
-    pal_calibration_workspace **workspace; /* one per worker [n_seat] */
-    pal_err *err;                          /* error of each worker [n_seat] */
-    int n_seat, n_batch;
+    pal_calibration_workspace **workspace; /* one per worker [n_workspace] */
+    pal_err *err;                          /* error of each worker [n_workspace] */
+    int n_workspace, n_batch;
     pal_fit_result *out;
     double begin_s;
     int64_t max;
@@ -51,15 +45,15 @@ typedef struct fit {
 
 static double shear_of(const pal_calibration *c, const double *ratio, int i)
 {
-    double sum = shear[c->kind[0]];
-    for (int k = 1; k < c->n_kind; k++) sum += shear[c->kind[k]] * exp(ratio[k * c->n_used + i]);
+    double sum = shear[c->info.kind[0]];
+    for (int k = 1; k < c->info.n_kind; k++) sum += shear[c->info.kind[k]] * exp(ratio[k * c->info.n_used + i]);
     return log(sum);
 }
 
 static void to_walk(const pal_calibration *c, const double *theta, double *p)
 {
-    for (int i = 0; i < c->n_used; i++) {
-        for (int k = 1; k < c->n_kind; k++) p[k * c->n_used + i] = theta[k * c->n_used + i] - theta[i];
+    for (int i = 0; i < c->info.n_used; i++) {
+        for (int k = 1; k < c->info.n_kind; k++) p[k * c->info.n_used + i] = theta[k * c->info.n_used + i] - theta[i];
         p[i] = theta[i] + shear_of(c, p, i);
     }
 }
@@ -68,28 +62,28 @@ static void to_walk(const pal_calibration *c, const double *theta, double *p)
 static void to_theta(const fit *f, const double *p, double *theta)
 {
     const pal_calibration *c = f->c;
-    size_t n = sizeof(double) * (size_t)c->n_parameter;
+    size_t n = sizeof(double) * (size_t)c->info.n_parameter;
     if (!memcmp(p, f->first, n)) {
         memcpy(theta, f->start, n);
         return;
     }
-    for (int i = 0; i < c->n_used; i++) {
+    for (int i = 0; i < c->info.n_used; i++) {
         theta[i] = p[i] - shear_of(c, p, i);
-        for (int k = 1; k < c->n_kind; k++) theta[k * c->n_used + i] = theta[i] + p[k * c->n_used + i];
+        for (int k = 1; k < c->info.n_kind; k++) theta[k * c->info.n_used + i] = theta[i] + p[k * c->info.n_used + i];
     }
-    for (int i = 0; i < c->n_parameter; i++) theta[i] = fmin(fmax(theta[i], c->low[i]), c->high[i]);
+    for (int i = 0; i < c->info.n_parameter; i++) theta[i] = fmin(fmax(theta[i], c->low[i]), c->high[i]);
 }
 
 /* bounds around the calibration's start that include the start of the walk */
 static void make_box(fit *f, const double *theta)
 {
     const pal_calibration *c = f->c;
-    memcpy(f->start, theta, sizeof(double) * (size_t)c->n_parameter);
+    memcpy(f->start, theta, sizeof(double) * (size_t)c->info.n_parameter);
     to_walk(c, theta, f->first);
     to_walk(c, c->theta, f->shown);
-    for (int i = 0; i < c->n_parameter; i++) {
-        f->low[i] = fmin(f->first[i], f->shown[i] + BOX * (c->low[i] - c->theta[i]));
-        f->high[i] = fmax(f->first[i], f->shown[i] + BOX * (c->high[i] - c->theta[i]));
+    for (int i = 0; i < c->info.n_parameter; i++) {
+        f->low[i] = fmin(f->first[i], f->shown[i] + PAL_ANNEAL_BOX * (c->low[i] - c->theta[i]));
+        f->high[i] = fmax(f->first[i], f->shown[i] + PAL_ANNEAL_BOX * (c->high[i] - c->theta[i]));
     }
 }
 
@@ -99,7 +93,7 @@ static void evaluate_one(void *user, int worker, int index)
 {
     fit *f = user;
     pal_calibration_value v;
-    const double *theta = f->theta + (size_t)index * (size_t)f->c->n_parameter;
+    const double *theta = f->theta + (size_t)index * (size_t)f->c->info.n_parameter;
     pal_err err = pal_calibration_evaluate(f->c, f->workspace[worker], theta, PAL_CALIBRATION_FIT, &v, NULL, NULL);
     f->cost[index] = err ? DBL_MAX : v.error_percent;
     if (err == PAL_ERR_MEMORY) f->err[worker] = err;
@@ -109,12 +103,12 @@ static void evaluate_one(void *user, int worker, int index)
 static pal_err evaluate(void *user, const double *p, int n, double *cost)
 {
     fit *f = user;
-    size_t n_parameter = (size_t)f->c->n_parameter;
+    size_t n_parameter = (size_t)f->c->info.n_parameter;
     for (size_t i = 0; i < (size_t)n; i++) to_theta(f, p + i * n_parameter, f->theta + i * n_parameter);
     if (f->o->evaluate) return f->o->evaluate(f->o->user, f->theta, n, cost);
     f->cost = cost;
     pal_team_run(f->team, n, evaluate_one, f);
-    for (int i = 0; i < f->n_seat; i++)
+    for (int i = 0; i < f->n_workspace; i++)
         if (f->err[i]) return f->err[i];
     return PAL_ERR_OK;
 }
@@ -123,7 +117,6 @@ static pal_err evaluate(void *user, const double *p, int n, double *cost)
 static bool report_step(void *user, const pal_anneal_step *at)
 {
     fit *f = user;
-    const pal_fit_options *o = f->o;
     if (at->generation == 0) f->out->start_percent = at->cost;
     to_theta(f, at->p, f->shown);
     pal_fit_step step = {.evaluation = at->generation,
@@ -132,14 +125,7 @@ static bool report_step(void *user, const pal_anneal_step *at)
                          .seconds = pal_clock_s() - f->begin_s,
                          .theta = f->shown,
                          .improved = at->improved};
-    if (o->step && !o->step(o->user, &step))
-        f->ended = "stopped";
-    else if (o->target_percent > 0 && at->best <= o->target_percent)
-        f->ended = "enough";
-    else if (at->generation + 1 >= f->max)
-        f->ended = "evaluations";
-    else if (o->budget_s > 0 && step.seconds >= o->budget_s)
-        f->ended = "budget";
+    f->ended = pal_fit_report(f->o, &step, f->max);
     return !f->ended;
 }
 
@@ -151,12 +137,12 @@ static pal_err walk(fit *f, double *theta, pal_diagnostic *diag)
     pal_anneal_result r;
     pal_diagnostic reason = {""};
     pal_anneal_default(&a);
-    a.n_parameter = c->n_parameter;
+    a.n_parameter = c->info.n_parameter;
     a.low = f->low, a.high = f->high, a.first = f->first;
     a.seed = f->o->seed;
     a.n_batch = f->n_batch;
     a.max_evaluation = f->max;
-    a.min_temperature_ratio = COLDEST;
+    a.min_temperature_ratio = PAL_ANNEAL_COLDEST;
     a.stall = MAX_STALL;
     a.evaluate = evaluate;
     a.step = report_step;
@@ -177,28 +163,28 @@ static pal_err walk(fit *f, double *theta, pal_diagnostic *diag)
 /* team and workspaces; one workspace, for the best point, if points are evaluated elsewhere */
 static pal_err make(fit *f)
 {
-    size_t n = (size_t)f->c->n_parameter;
-    f->n_seat = 1;
+    size_t n = (size_t)f->c->info.n_parameter;
+    f->n_workspace = 1;
     f->n_batch = f->o->n_batch < 1 ? 1 : f->o->n_batch > PAL_ANNEAL_MAX_BATCH ? PAL_ANNEAL_MAX_BATCH : f->o->n_batch;
     if (!f->o->evaluate) {
         PAL_TRY(pal_team_create(f->o->n_worker, &f->team));
-        f->n_seat = f->n_batch = pal_team_size(f->team);
+        f->n_workspace = f->n_batch = pal_team_size(f->team);
     }
     f->first = calloc((5 + (size_t)f->n_batch) * n, sizeof(double));
     if (!f->first) return PAL_ERR_MEMORY;
     f->low = f->first + n, f->high = f->low + n, f->start = f->high + n, f->shown = f->start + n;
     f->theta = f->shown + n;
-    f->workspace = calloc((size_t)f->n_seat, sizeof(pal_calibration_workspace *));
-    f->err = calloc((size_t)f->n_seat, sizeof *f->err);
+    f->workspace = calloc((size_t)f->n_workspace, sizeof(pal_calibration_workspace *));
+    f->err = calloc((size_t)f->n_workspace, sizeof *f->err);
     if (!f->workspace || !f->err) return PAL_ERR_MEMORY;
-    for (int i = 0; i < f->n_seat; i++) PAL_TRY(pal_calibration_workspace_create(f->c, &f->workspace[i]));
+    for (int i = 0; i < f->n_workspace; i++) PAL_TRY(pal_calibration_workspace_create(f->c, &f->workspace[i]));
     return PAL_ERR_OK;
 }
 
 static void clean_up(fit *f)
 {
     pal_team_destroy(f->team);
-    for (int i = 0; i < f->n_seat && f->workspace; i++) pal_calibration_workspace_destroy(f->workspace[i]);
+    for (int i = 0; i < f->n_workspace && f->workspace; i++) pal_calibration_workspace_destroy(f->workspace[i]);
     free(f->workspace);
     free(f->err);
     free(f->first);
@@ -215,10 +201,10 @@ pal_err pal_fit_anneal(const pal_calibration *calibration, const pal_fit_options
              .out = out,
              .begin_s = pal_clock_s(),
              .max = options->max_evaluation > 0 ? options->max_evaluation : MAX_EVALUATION};
-    for (int i = 0; i < c->n_parameter; i++) theta[i] = fmin(fmax(theta[i], c->low[i]), c->high[i]);
+    for (int i = 0; i < c->info.n_parameter; i++) theta[i] = fmin(fmax(theta[i], c->low[i]), c->high[i]);
     pal_err err = make(&f);
     if (err)
-        pal_diagnostic_set(diag, err, "no memory to calibrate %d constants", c->n_parameter);
+        pal_diagnostic_set(diag, err, "no memory to calibrate %d constants", c->info.n_parameter);
     else
         err = walk(&f, theta, diag);
     if (!err) err = pal_calibration_evaluate(c, f.workspace[0], theta, all, &out->value, NULL, diag);

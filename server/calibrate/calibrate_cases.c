@@ -2,6 +2,8 @@
 #include "server/calibrate/calibrate_cases.h"
 
 #include "server/base/vec3.h"
+#include "server/calibrate/tuning.h"
+#include "server/cli/flag.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/problem_file.h"
 
@@ -9,9 +11,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* points farther outside the surface's box, as a share of its diagonal, belong to another body */
-static const double max_outside = 0.05;
 
 enum { ENOUGH_NODES = 700, FINEST = 64 };
 
@@ -27,19 +26,6 @@ typedef struct job {
 static bool is(const char *word, const char *what)
 {
     return word && !strcmp(word, what);
-}
-
-static pal_err no_case(const job *j, const char *flag, const char *id)
-{
-    char list[320] = "";
-    size_t n = 0;
-    const pal_problem *p = j->set->problem;
-    for (int k = 0; k < p->n_case + p->n_reference && n < sizeof list; k++)
-        n += (size_t)snprintf(list + n, sizeof list - n, "%s%s", k ? ", " : "",
-                              k < p->n_case ? p->load_case[k].id : p->reference[k - p->n_case].id);
-    return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED,
-                              "%s: %s: there is no load case or reference \"%.40s\"; known are %s", p->path, flag, id,
-                              list);
 }
 
 /* ---- which cases ---- */
@@ -60,7 +46,7 @@ static pal_err add_case(job *j, const char *id, bool fit)
                                   flag, id, PAL_CALIBRATE_CASES);
     const pal_problem_reference *named = pal_problem_reference_find(p, id);
     const pal_problem_case *load_case = pal_problem_case_find(p, named ? named->load_case : id);
-    if (!load_case || strlen(id) >= PAL_NAME) return no_case(j, flag, id);
+    if (!load_case || strlen(id) >= PAL_NAME) return pal_problem_refuse_case(p, flag, id, j->diag);
     if (named && j->input->kinematics && named->finite != is(j->input->kinematics, "finite"))
         return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "%s: reference \"%s\" is %s, --kinematics says %s", flag,
                                   id, named->finite ? "finite" : "linear", j->input->kinematics);
@@ -75,13 +61,7 @@ static pal_err add_case(job *j, const char *id, bool fit)
 static pal_err add_list(job *j, const char *list, bool fit)
 {
     char word[256];
-    while (list) {
-        const char *comma = strchr(list, ',');
-        int n = comma ? (int)(comma - list) : (int)strlen(list);
-        snprintf(word, sizeof word, "%.*s", n, list);
-        PAL_TRY(add_case(j, word, fit));
-        list = comma ? comma + 1 : NULL;
-    }
+    while (pal_flag_next_word(&list, word, sizeof word)) PAL_TRY(add_case(j, word, fit));
     return PAL_ERR_OK;
 }
 
@@ -194,7 +174,7 @@ static pal_err check_box(const job *j, int index)
     const pal_samples *samples = &s->samples[index];
     double low[3], high[3];
     pal_surface_box(&s->surface, low, high);
-    double slack = max_outside * pal_dist3(low, high);
+    double slack = PAL_MAX_OUTSIDE * pal_dist3(low, high);
     for (int i = 0; i < samples->n; i++) {
         double x[3], out = 0;
         pal_sub3(x, samples->x + 3 * i, s->surface.origin_m);
@@ -209,23 +189,21 @@ static pal_err check_box(const job *j, int index)
     return PAL_ERR_OK;
 }
 
-pal_err pal_calibrate_cases_resolution(const pal_calibrate_cases *set, const pal_case_voxel_options *voxel, int *out,
-                                       pal_diagnostic *diag)
+static pal_err choose_resolution(const pal_calibrate_cases *set, pal_case_voxel_options *voxel, pal_diagnostic *diag)
 {
-    pal_case_voxel_options input = *voxel;
-    for (input.resolution = 4; input.resolution < FINEST; input.resolution += 2) {
+    for (voxel->resolution = 4; voxel->resolution < FINEST; voxel->resolution += 2) {
         pal_prepared mesh = {0};
-        pal_err err = pal_case_voxels(set->problem, &set->surface, &input, &mesh, diag);
-        if (err && (err != PAL_ERR_REFUSED || input.resolution + 2 >= FINEST)) return err;
+        pal_err err = pal_case_voxels(set->problem, &set->surface, voxel, &mesh, diag);
+        if (err && (err != PAL_ERR_REFUSED || voxel->resolution + 2 >= FINEST)) return err;
         int n_node = err ? 0 : mesh.tets.n_node; /* refused: thinner than such voxels */
         pal_prepared_free(&mesh);
         if (n_node > ENOUGH_NODES) break;
     }
-    *out = input.resolution;
     return PAL_ERR_OK;
 }
 
-pal_err pal_calibrate_cases_check(const pal_calibrate_cases *s, const pal_prepared *mesh, pal_diagnostic *diag)
+/* refuses points of a truth outside the voxels; those of a body that does not fit its voxels are within half a voxel */
+static pal_err check_points(const pal_calibrate_cases *s, const pal_prepared *mesh, pal_diagnostic *diag)
 {
     pal_locate *locate = NULL;
     pal_err err = PAL_ERR_OK;
@@ -251,6 +229,31 @@ pal_err pal_calibrate_cases_check(const pal_calibrate_cases *s, const pal_prepar
     }
     pal_locate_destroy(locate);
     return err;
+}
+
+pal_err pal_calibrate_cases_make(const pal_calibrate_cases *set, const pal_calibrate_options *options,
+                                 pal_calibration **out, pal_calibration_info *info, pal_diagnostic *diag)
+{
+    pal_calibrate_options o = *options;
+    pal_diagnostic reason = {""};
+    pal_err err = o.voxel.resolution == 0 ? choose_resolution(set, &o.voxel, &reason) : PAL_ERR_OK;
+    if (!err) err = pal_calibration_create(set->problem, &set->surface, set->list, set->n, &o, out, &reason);
+    if (err) return pal_diagnostic_set(diag, err, "%s: %s", set->problem->path, reason.text);
+    pal_calibration_info_of(*out, info);
+    return check_points(set, info->mesh, diag);
+}
+
+const char *pal_calibrate_grid(const char *text, int grid[3])
+{
+    for (int a = 0; a < 3; a++) {
+        char *end;
+        long n = *text >= '0' && *text <= '9' ? strtol(text, &end, 10) : 0;
+        if (n < 1 || n > 1024 || *end != (a < 2 ? 'x' : 0))
+            return "--grid: is not NXxNYxNZ, three numbers of nodes from 1 to 1024, as 5x3x5";
+        grid[a] = (int)n;
+        text = end + 1;
+    }
+    return NULL;
 }
 
 static pal_err check_supports(const job *j)

@@ -30,13 +30,13 @@ typedef struct pal_calibrate_cases {
  * than requested, references of different materials, no reference that answers, moving supports, points outside the
  * body; IO, MEMORY. Free *out in any case. */
 pal_err pal_calibrate_cases_read(const pal_calibrate_input *input, pal_calibrate_cases *out, pal_diagnostic *diag);
-/* The smallest even number of voxels on the longest axis whose lattice has more than 700 nodes, as the bodies of
- * the paper do; at most 64. Errors as pal_case_voxels. */
-pal_err pal_calibrate_cases_resolution(const pal_calibrate_cases *set, const pal_case_voxel_options *voxel, int *out,
-                                       pal_diagnostic *diag);
-/* Tests that the points of the truths lie in or near these voxels. REFUSED (names the case): more than 1 % of them
- * are farther than one voxel from any voxel. (If a body does not fit its voxels, its points stay within half a
- * voxel.) */
-pal_err pal_calibrate_cases_check(const pal_calibrate_cases *set, const pal_prepared *mesh, pal_diagnostic *diag);
+/* Makes their calibration and its properties; the set must outlive it. Resolution 0: the smallest even number of voxels
+ * whose lattice has more than 700 nodes, as the bodies of the paper do; at most 64. Errors: those of
+ * pal_calibration_create; REFUSED (names the case) if more than 1 % of a truth's points lie farther than a voxel from
+ * the voxels. Destroy *out also after an error. */
+pal_err pal_calibrate_cases_make(const pal_calibrate_cases *set, const pal_calibrate_options *options,
+                                 pal_calibration **out, pal_calibration_info *info, pal_diagnostic *diag);
+/* Reads "5x3x5". NULL: text is that; otherwise the sentence for a user. */
+const char *pal_calibrate_grid(const char *text, int grid[3]);
 void pal_calibrate_cases_free(pal_calibrate_cases *set); /* accepts a zeroed struct */
 #endif

@@ -27,8 +27,8 @@ static int thin_out(const pal_calibrate_run *run, double *x, double *error, doub
         x[n] = to;
         error[n] = NAN;
         for (int i = from; i < to; i++)
-            if (run->error[i] < DBL_MAX) error[n] = fmax(error[n], run->error[i]);
-        best[n] = run->best[to - 1] < DBL_MAX ? run->best[to - 1] : NAN;
+            if (run->trail[i][0] < DBL_MAX) error[n] = fmax(error[n], run->trail[i][0]);
+        best[n] = run->trail[to - 1][1] < DBL_MAX ? run->trail[to - 1][1] : NAN;
     }
     return n;
 }
@@ -117,7 +117,8 @@ typedef struct drawing {
     const pal_calibrate_run *run;
     const pal_prepared *mesh;
     int n_vertex, n_node, index; /* index: of the case */
-    double *memory, *node_u[N_SHAPE], *node_x, *value;
+    pal_arena *arena;
+    double *node_u[N_SHAPE], *node_x, *value;
     shape shape[N_SHAPE];
     double *k_d, *young;
     uint8_t *fixed;
@@ -129,25 +130,24 @@ typedef struct drawing {
 
 static pal_err take_memory(drawing *d, pal_diagnostic *diag)
 {
-    size_t n = (size_t)d->n_node, m = (size_t)d->n_vertex;
-    double *at = d->memory = calloc(3 * n * (N_SHAPE + 1) + n + 4 * m * N_SHAPE + 2 * m + 6 * n, sizeof *at);
-    d->fixed = calloc(m, 1);
-    d->frames = calloc(1, pal_skin_frames_bytes(&d->mesh->skin) + 64);
-    d->shown = malloc(3 * m * sizeof *d->shown);
-    if (!at || !d->fixed || !d->frames || !d->shown)
-        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a picture");
-    for (int k = 0; k < N_SHAPE; k++, at += 3 * n) d->node_u[k] = at;
-    d->node_x = at, at += 3 * n;
-    d->value = at, at += n;
+    pal_arena *arena = d->arena = pal_arena_create(1 << 20, true);
+    if (!arena) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a picture");
+    const int n = d->n_node, m = d->n_vertex;
+    bool made = true;
     for (int k = 0; k < N_SHAPE; k++) {
-        d->shape[k].x = at, at += 3 * m;
-        d->shape[k].value = at, at += m;
+        d->node_u[k] = PAL_NEW(arena, double, 3 * n);
+        d->shape[k].x = PAL_NEW(arena, double, 3 * m);
+        d->shape[k].value = PAL_NEW(arena, double, m);
+        made = made && d->node_u[k] && d->shape[k].x && d->shape[k].value;
     }
-    d->k_d = at, at += m;
-    d->young = at, at += m;
-    d->load_at = at, at += 3 * n;
-    d->load_N = at;
-    return PAL_ERR_OK;
+    double **const more[] = {&d->node_x, &d->value, &d->k_d, &d->young, &d->load_at, &d->load_N};
+    const int size[] = {3 * n, n, m, m, 3 * n, 3 * n};
+    for (int k = 0; k < 6; k++) made = (*more[k] = PAL_NEW(arena, double, size[k])) && made;
+    d->fixed = PAL_NEW(arena, uint8_t, m);
+    d->frames = pal_arena_alloc(arena, pal_skin_frames_bytes(&d->mesh->skin) + 64);
+    d->shown = PAL_NEW(arena, float, 3 * m);
+    made = made && d->fixed && d->frames && d->shown;
+    return made ? PAL_ERR_OK : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a picture");
 }
 
 /* nodal values to values at displayed vertices, by the skin weights */
@@ -194,10 +194,8 @@ static void take_vertices(drawing *d)
         const double *at = d->mesh->surface.x + 3 * v;
         double x[3];
         pal_add3(x, at, t->origin_m);
-        const pal_problem_material *m = &p->material[0];
-        for (int k = 0; k < p->n_material; k++)
-            if (pal_box_contains(&p->material[k].region, x, 0)) m = &p->material[k];
-        d->young[v] = m->young_Pa;
+        const pal_problem_material *m = pal_case_material_at(p, x);
+        d->young[v] = m ? m->young_Pa : p->material[0].young_Pa;
         for (int k = 0; k < n_support; k++) {
             bool in = true;
             for (int c = 0; c < 3; c++) in = in && at[c] >= support[k].low_m[c] && at[c] <= support[k].high_m[c];
@@ -302,10 +300,7 @@ pal_err pal_calibrate_draw_body(const pal_calibrate_run *run, const char *path, 
         .run = run, .mesh = run->info.mesh, .n_vertex = run->info.mesh->skin.n_vertex, .n_node = run->info.n_node};
     while (!run->set.list[d.index].fit) d.index++;
     pal_err err = draw(&d, path, diag);
-    free(d.memory);
-    free(d.fixed);
-    free(d.frames);
-    free(d.shown);
+    pal_arena_destroy(d.arena);
     return err;
 }
 

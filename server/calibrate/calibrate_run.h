@@ -26,7 +26,7 @@ typedef struct pal_calibrate_run {
     /* of all cases at the default start, at manual constants, at the fitted ones */
     pal_calibration_value start, hand, last;
     pal_fit_result result;
-    double *error, *best; /* of every evaluation, per cent; DBL_MAX: no equilibrium [n_trail] */
+    double (*trail)[2]; /* error and best so far of every evaluation, per cent; DBL_MAX: no equilibrium [n_trail] */
     int n_trail, max_trail;
     bool settled; /* live is valid */
     pal_settle_report live;
@@ -37,13 +37,13 @@ typedef struct pal_calibrate_run {
     int n_file;
 } pal_calibrate_run;
 
+/* ---- calibrate_scene.c ---- */
+
 const char *pal_calibrate_method(const pal_calibrate_run *run); /* "adjoint", "annealing" */
 /* "k_distance_J" ... of kind index k of info.kind; brief: "k_d" ... */
 const char *pal_calibrate_key(const pal_calibrate_run *run, int k, bool brief);
 /* Mean over the fitted (or the other) cases. NaN: there are none; DBL_MAX: one has no equilibrium. */
 double pal_calibrate_mean(const pal_calibrate_run *run, const pal_calibration_value *value, bool fit);
-
-/* ---- calibrate_scene.c ---- */
 
 /* The scene for serve, complete except for damping and accuracy. Borrows mesh and supports of the calibration; free
  * with pal_scene_free. Sets n_substep. Errors: MEMORY, REFUSED. */
@@ -60,9 +60,4 @@ pal_err pal_calibrate_draw_trajectory(const pal_calibrate_run *run, const char *
 pal_err pal_calibrate_draw_body(const pal_calibrate_run *run, const char *path, pal_diagnostic *diag);
 /* Writes tetrahedra with constants at nodes, and for every case the displacements of the truth and of the springs. */
 pal_err pal_calibrate_write_vtk(const pal_calibrate_run *run, const char *path, pal_diagnostic *diag);
-
-/* ---- calibrate_report.c ---- */
-
-void pal_calibrate_print(const pal_calibrate_run *run);
-cJSON *pal_calibrate_json(const pal_calibrate_run *run);
 #endif

@@ -12,6 +12,31 @@
 
 enum { MAX_SUBSTEP = 1000000, N_TOOL = 3 };
 
+const char *pal_calibrate_method(const pal_calibrate_run *run)
+{
+    return run->annealing ? "annealing" : "adjoint";
+}
+
+const char *pal_calibrate_key(const pal_calibrate_run *run, int k, bool brief)
+{
+    static const char *const name[PAL_SPRING_KINDS][2] = {
+        {"k_distance_J", "k_d"}, {"k_area_J", "k_a"}, {"k_volume_J", "k_v"}};
+    return name[run->info.kind[k]][brief];
+}
+
+double pal_calibrate_mean(const pal_calibrate_run *run, const pal_calibration_value *value, bool fit)
+{
+    double sum = 0;
+    int n = 0;
+    for (int k = 0; k < run->set.n; k++) {
+        if (run->set.list[k].fit != fit) continue;
+        if (!(value->case_percent[k] < DBL_MAX)) return DBL_MAX;
+        sum += value->case_percent[k];
+        n++;
+    }
+    return n > 0 ? sum / n : NAN;
+}
+
 /* "/a/Gear 2.json" -> "gear_2": a valid name for a scene and its mesh */
 static void name_of(const char *path, char out[PAL_NAME])
 {
@@ -25,31 +50,6 @@ static void name_of(const char *path, char out[PAL_NAME])
     }
     out[n] = 0;
     if (n == 0) snprintf(out, PAL_NAME, "calibrated");
-}
-
-/* for information, contact and mass: E is the geometric mean, nu and density are the means over the tetrahedra */
-static void take_material(const pal_calibrate_run *run, pal_material *out)
-{
-    const pal_problem *p = run->set.problem;
-    const pal_tets *t = &run->info.mesh->tets;
-    double poisson = p->material[0].poisson, density = p->material[0].density_kg_m3;
-    out->young_Pa = p->n_material > 1 ? run->info.mean_young_Pa : p->material[0].young_Pa;
-    out->poisson = fmin(p->material[0].poisson, PAL_POISSON_CLAMP);
-    out->density_kg_m3 = p->material[0].density_kg_m3;
-    for (int e = 0; e < t->n_tet && p->n_material > 1; e++) {
-        const pal_problem_material *m = &p->material[0];
-        double x[3];
-        pal_copy3(x, t->origin_m);
-        for (int k = 0; k < 4; k++) pal_axpy3(x, 0.25, t->x + 3 * t->tet[4 * e + k]);
-        for (int k = 0; k < p->n_material; k++)
-            if (pal_box_contains(&p->material[k].region, x, 0)) m = &p->material[k];
-        /* a value common to all materials is kept bit by bit */
-        poisson += (m->poisson - p->material[0].poisson) / t->n_tet;
-        density += (m->density_kg_m3 - p->material[0].density_kg_m3) / t->n_tet;
-    }
-    if (p->n_material == 1) return;
-    out->poisson = fmin(poisson, PAL_POISSON_CLAMP);
-    out->density_kg_m3 = density;
 }
 
 /* constants as keys of the model */
@@ -122,7 +122,6 @@ static pal_err allow_substeps(pal_scene *scene, int *n_substep, pal_diagnostic *
 
 static pal_err fill(pal_calibrate_run *run, pal_loaded_scene *loaded, pal_diagnostic *diag)
 {
-    static const char *const effects[] = {"tool_push", "tool_grasp", "finite_guard"};
     pal_scene *scene = &loaded->scene;
     pal_body_def *body = &scene->body[0];
     char name[PAL_NAME], source[sizeof scene->source], list[160] = "";
@@ -132,16 +131,14 @@ static pal_err fill(pal_calibrate_run *run, pal_loaded_scene *loaded, pal_diagno
     name_of(run->scene, name);
     scene->n_body = 1;
     pal_body_default(body, name, run->info.mesh);
-    take_material(run, &body->material);
+    /* for information, contact and mass */
+    body->material.young_Pa = run->info.mean_young_Pa, body->material.poisson = run->info.mean_poisson;
+    body->material.density_kg_m3 = run->info.mean_density_kg_m3;
     const pal_support_def *support = pal_calibration_supports(run->calibration, &n_support);
     body->n_support = n_support;
     memcpy(body->support, support, (size_t)n_support * sizeof *support);
-    body->n_effect = (int)(sizeof effects / sizeof effects[0]);
-    for (int k = 0; k < body->n_effect; k++) {
-        char path[PAL_ENTRY_TEXT];
-        snprintf(path, sizeof path, "effects[%d]", k);
-        pal_entry_init(&body->effect[k], path, effects[k]);
-    }
+    /* the default effects without gravity */
+    memmove(body->effect, body->effect + 1, (size_t)--body->n_effect * sizeof *body->effect);
     for (int k = 0; k < run->set.n; k++)
         if (run->set.list[k].fit && n < sizeof list)
             n += (size_t)snprintf(list + n, sizeof list - n, "%s%s", n ? ", " : "", run->set.id[k]);

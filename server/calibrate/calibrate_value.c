@@ -2,46 +2,41 @@
 #include "server/calibrate/calibration.h"
 
 #include "server/base/vec3.h"
+#include "server/calibrate/tuning.h"
 
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* floor of mean e_L^2: a thousandth of a per cent is accurate enough */
-static const double floor_percent2 = 1e-6;
-
 /* ---- workspace ---- */
 
-static pal_err make_seat(const pal_calibration *c, pal_calibration_workspace *s)
+static pal_err make_workspace(const pal_calibration *c, pal_calibration_workspace *s)
 {
-    size_t n = 3 * (size_t)c->lattice.n_node, max = n;
+    const int n = 3 * c->lattice.n_node;
+    bool made = true;
     s->calibration = c;
-    PAL_TRY(pal_equilibrium_workspace_create(&c->lattice, &s->workspace));
+    s->arena = pal_arena_create(1 << 16, true);
+    if (!s->arena) return PAL_ERR_MEMORY;
     for (int k = 0; k < PAL_SPRING_KINDS; k++) {
-        size_t n_item = (size_t)c->lattice.kind[k].n_item;
-        s->k[k] = calloc(n_item + 1, sizeof(double));
-        s->slope[k] = calloc(n_item + 1, sizeof(double));
-        if (!s->k[k] || !s->slope[k]) return PAL_ERR_MEMORY;
+        s->k[k] = PAL_NEW(s->arena, double, c->lattice.kind[k].n_item);
+        s->slope[k] = PAL_NEW(s->arena, double, c->lattice.kind[k].n_item);
+        made = made && s->k[k] && s->slope[k];
     }
-    for (int i = 0; i < c->n_case; i++) {
-        max = max > 3 * (size_t)c->fit[i].n_point ? max : 3 * (size_t)c->fit[i].n_point;
-        s->x[i] = calloc(n, sizeof(double));
-        if (!s->x[i]) return PAL_ERR_MEMORY;
-    }
-    s->value = calloc(2 * (size_t)c->n_used, sizeof(double));
-    s->node = calloc(n / 3, sizeof(double));
-    s->dJ_du = calloc(n, sizeof(double));
-    s->u = calloc(max, sizeof(double));
-    s->gradient = calloc((size_t)c->n_parameter, sizeof(double));
-    return s->value && s->node && s->dJ_du && s->u && s->gradient ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    for (int i = 0; i < c->n_case; i++) made = (s->x[i] = PAL_NEW(s->arena, double, n)) && made;
+    s->value = PAL_NEW(s->arena, double, c->info.n_used);
+    s->node = PAL_NEW(s->arena, double, n / 3);
+    s->dJ_du = PAL_NEW(s->arena, double, n);
+    s->gradient = PAL_NEW(s->arena, double, c->info.n_parameter);
+    if (!made || !s->value || !s->node || !s->dJ_du || !s->gradient) return PAL_ERR_MEMORY;
+    return pal_equilibrium_workspace_create(&c->lattice, &s->workspace);
 }
 
 pal_err pal_calibration_workspace_create(const pal_calibration *calibration, pal_calibration_workspace **out)
 {
     pal_calibration_workspace *s = calloc(1, sizeof *s);
     if (!s) return PAL_ERR_MEMORY;
-    pal_err err = make_seat(calibration, s);
+    pal_err err = make_workspace(calibration, s);
     if (err)
         pal_calibration_workspace_destroy(s);
     else
@@ -53,16 +48,7 @@ void pal_calibration_workspace_destroy(pal_calibration_workspace *s)
 {
     if (!s) return;
     pal_equilibrium_workspace_destroy(s->workspace);
-    for (int k = 0; k < PAL_SPRING_KINDS; k++) {
-        free(s->k[k]);
-        free(s->slope[k]);
-    }
-    for (int i = 0; i < PAL_CALIBRATE_CASES; i++) free(s->x[i]);
-    free(s->value);
-    free(s->node);
-    free(s->dJ_du);
-    free(s->u);
-    free(s->gradient);
+    pal_arena_destroy(s->arena);
     free(s);
 }
 
@@ -70,7 +56,7 @@ void pal_calibration_workspace_destroy(pal_calibration_workspace *s)
 
 void pal_calibration_constants(const pal_calibration *c, const double *theta, int k, double *k_J)
 {
-    const double *t = theta + (size_t)k * (size_t)c->n_used;
+    const double *t = theta + (size_t)k * (size_t)c->info.n_used;
     for (int i = 0; i < c->lattice.n_node; i++) {
         k_J[i] = 0;
         if (!c->has_grid) k_J[i] = exp(t[0]);
@@ -82,13 +68,13 @@ void pal_calibration_constants(const pal_calibration *c, const double *theta, in
 static void spread_constants(pal_calibration_workspace *s, const double *theta)
 {
     const pal_calibration *c = s->calibration;
-    for (int k = 0; k < c->n_kind; k++) {
-        const pal_springs *row = &c->lattice.kind[c->kind[k]];
+    for (int k = 0; k < c->info.n_kind; k++) {
+        const pal_springs *springs = &c->lattice.kind[c->info.kind[k]];
         pal_calibration_constants(c, theta, k, s->node);
-        for (int i = 0; i < row->n_item; i++) {
+        for (int i = 0; i < springs->n_item; i++) {
             double sum = 0;
-            for (int p = 0; p < row->n_corner; p++) sum += s->node[row->item[row->n_corner * i + p]];
-            s->k[c->kind[k]][i] = sum / row->n_corner;
+            for (int p = 0; p < springs->n_corner; p++) sum += s->node[springs->item[springs->n_corner * i + p]];
+            s->k[c->info.kind[k]][i] = sum / springs->n_corner;
         }
     }
 }
@@ -97,18 +83,18 @@ static void spread_constants(pal_calibration_workspace *s, const double *theta)
 static void gather_slopes(pal_calibration_workspace *s, const double *theta)
 {
     const pal_calibration *c = s->calibration;
-    for (int k = 0; k < c->n_kind; k++) {
-        const pal_springs *row = &c->lattice.kind[c->kind[k]];
-        const double *t = theta + (size_t)k * (size_t)c->n_used, *slope = s->slope[c->kind[k]];
-        double *to = s->gradient + (size_t)k * (size_t)c->n_used, *used = s->value;
+    for (int k = 0; k < c->info.n_kind; k++) {
+        const pal_springs *springs = &c->lattice.kind[c->info.kind[k]];
+        const double *t = theta + (size_t)k * (size_t)c->info.n_used, *slope = s->slope[c->info.kind[k]];
+        double *to = s->gradient + (size_t)k * (size_t)c->info.n_used, *used = s->value;
         memset(s->node, 0, sizeof(double) * (size_t)c->lattice.n_node);
-        memset(used, 0, sizeof(double) * (size_t)c->n_used);
-        for (int i = 0; i < row->n_item; i++)
-            for (int p = 0; p < row->n_corner; p++)
-                s->node[row->item[row->n_corner * i + p]] += slope[i] / row->n_corner;
+        memset(used, 0, sizeof(double) * (size_t)c->info.n_used);
+        for (int i = 0; i < springs->n_item; i++)
+            for (int p = 0; p < springs->n_corner; p++)
+                s->node[springs->item[springs->n_corner * i + p]] += slope[i] / springs->n_corner;
         if (c->has_grid) pal_grid_weights_apply_transpose(&c->weights, s->node, used);
         for (int i = 0; i < c->lattice.n_node && !c->has_grid; i++) used[0] += s->node[i];
-        for (int i = 0; i < c->n_used; i++) to[i] += exp(t[i]) * used[i];
+        for (int i = 0; i < c->info.n_used; i++) to[i] += exp(t[i]) * used[i];
     }
 }
 
@@ -141,7 +127,7 @@ static double compare(const pal_calibration *c, const pal_fit_case *fit, const d
 }
 
 /* Equilibrium of a case, from the requested start, otherwise from the undeformed body. */
-static pal_err find_rest(pal_calibration_workspace *s, int index, bool warm_start, pal_equilibrium_options *o,
+static pal_err find_rest(pal_calibration_workspace *s, int index, bool warm_start, const pal_equilibrium_options *o,
                          int *n_newton)
 {
     const pal_calibration *c = s->calibration;
@@ -168,9 +154,7 @@ static pal_err evaluate_case(pal_calibration_workspace *s, const double *theta, 
     const pal_fit_case *fit = &c->fit[index];
     const double *const k[PAL_SPRING_KINDS] = {s->k[0], s->k[1], s->k[2]};
     bool slope = want_slope && c->cases[index].fit;
-    pal_equilibrium_options o;
-    pal_equilibrium_default(&o);
-    o.linear = fit->linear;
+    const pal_equilibrium_options o = {.linear = fit->linear};
     out->case_percent[index] = DBL_MAX;
     pal_err err = find_rest(s, index, ask & PAL_CALIBRATION_CONTINUE, &o, &out->n_newton);
     if (err) return err;
@@ -185,17 +169,17 @@ static pal_err evaluate_case(pal_calibration_workspace *s, const double *theta, 
 
 static void regularise(const pal_calibration *c, const double *theta, pal_calibration_value *out, double *slope)
 {
-    double smooth = c->n_edge > 0 ? 1.0 / (c->n_edge * c->n_kind) : 0;
-    double pull = c->n_kind > 1 && c->has_grid ? 1.0 / (c->n_used * (c->n_kind - 1)) : 0;
-    for (int k = 0; k < c->n_kind; k++) {
-        int at = k * c->n_used;
+    double smooth = c->n_edge > 0 ? 1.0 / (c->n_edge * c->info.n_kind) : 0;
+    double pull = c->info.n_kind > 1 && c->has_grid ? 1.0 / (c->info.n_used * (c->info.n_kind - 1)) : 0;
+    for (int k = 0; k < c->info.n_kind; k++) {
+        int at = k * c->info.n_used;
         for (int e = 0; e < c->n_edge; e++) {
             int a = at + c->edge[2 * e], b = at + c->edge[2 * e + 1];
             double d = theta[a] - theta[b];
             out->smooth += smooth * d * d;
             if (slope) slope[a] += 2 * c->options.smooth * smooth * d, slope[b] -= 2 * c->options.smooth * smooth * d;
         }
-        for (int i = 0; i < c->n_used && k > 0 && pull > 0; i++) {
+        for (int i = 0; i < c->info.n_used && k > 0 && pull > 0; i++) {
             double d = theta[at + i] - theta[i] - (c->theta[at + i] - c->theta[i]);
             out->pull += pull * d * d;
             if (slope) slope[at + i] += 2 * c->options.pull * pull * d, slope[i] -= 2 * c->options.pull * pull * d;
@@ -215,11 +199,11 @@ static bool add_up(const pal_calibration *c, pal_calibration_value *out, double 
         mean += e / c->n_fit;
         square += e * e / c->n_fit;
     }
-    double objective = log(square + floor_percent2) + c->options.smooth * out->smooth + c->options.pull * out->pull;
+    double objective = log(square + PAL_ERROR_FLOOR) + c->options.smooth * out->smooth + c->options.pull * out->pull;
     if (!isfinite(objective)) return false;
     out->error_percent = mean;
     out->objective = objective;
-    *scale = 1 / (square + floor_percent2);
+    *scale = 1 / (square + PAL_ERROR_FLOOR);
     return true;
 }
 
@@ -228,9 +212,9 @@ pal_err pal_calibration_evaluate(const pal_calibration *c, pal_calibration_works
 {
     *out = (pal_calibration_value){.error_percent = DBL_MAX, .objective = DBL_MAX};
     for (int i = 0; i < c->n_case; i++) out->case_percent[i] = NAN;
-    size_t n = sizeof(double) * (size_t)c->n_parameter;
+    size_t n = sizeof(double) * (size_t)c->info.n_parameter;
     if (slope) memset(slope, 0, n);
-    for (int i = 0; i < c->n_parameter; i++)
+    for (int i = 0; i < c->info.n_parameter; i++)
         if (!isfinite(theta[i]) || fabs(theta[i]) > 600)
             return pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "parameter %d is %g, not the logarithm of a constant", i,
                                       theta[i]);
@@ -249,16 +233,10 @@ pal_err pal_calibration_evaluate(const pal_calibration *c, pal_calibration_works
         lost |= fit && err;
     }
     double scale = 1;
-    if (!slope) {
-        regularise(c, theta, out, NULL);
-        if (ask & PAL_CALIBRATION_FIT && !lost) add_up(c, out, &scale);
-        return PAL_ERR_OK;
-    }
     regularise(c, theta, out, slope);
-    if (ask & PAL_CALIBRATION_FIT && !lost && add_up(c, out, &scale))
-        for (int i = 0; i < c->n_parameter; i++) slope[i] += scale * workspace->gradient[i];
-    else
-        memset(slope, 0, n);
+    const bool valued = ask & PAL_CALIBRATION_FIT && !lost && add_up(c, out, &scale);
+    for (int i = 0; slope && i < c->info.n_parameter; i++)
+        slope[i] = valued ? slope[i] + scale * workspace->gradient[i] : 0;
     return PAL_ERR_OK;
 }
 
@@ -268,4 +246,12 @@ bool pal_calibration_displacement(const pal_calibration *c, const pal_calibratio
     for (int i = 0; i < 3 * c->lattice.n_node && workspace->rests[index]; i++)
         u[i] = workspace->x[index][i] - c->lattice.x_rest[i];
     return workspace->rests[index];
+}
+
+const char *pal_fit_report(const pal_fit_options *o, const pal_fit_step *step, int64_t max_evaluation)
+{
+    if (o->step && !o->step(o->user, step)) return "stopped";
+    if (o->target_percent > 0 && step->best_percent <= o->target_percent) return "enough";
+    if (step->evaluation + 1 >= max_evaluation) return "evaluations";
+    return o->budget_s > 0 && step->seconds >= o->budget_s ? "budget" : NULL;
 }

@@ -7,7 +7,6 @@
 
 #include <float.h>
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -32,33 +31,24 @@ static pal_err no_memory(const job *j, const char *what)
 
 /* ---- the body ---- */
 
-/* the last material that contains x wins, as in solve.c */
-static const pal_problem_material *material_at(const pal_problem *p, const double x[3])
-{
-    const pal_problem_material *found = &p->material[0];
-    for (int k = 0; k < p->n_material; k++)
-        if (pal_box_contains(&p->material[k].region, x, 0)) found = &p->material[k];
-    return found;
-}
-
-/* means over the volume: of ln E, nu and density */
+/* Means over the volume, as deviations from the first material: a value common to all is kept bit by bit. */
 static void take_material(pal_calibration *c)
 {
     const pal_tets *t = &c->mesh.tets;
-    double young = 0, poisson = 0, density = 0;
+    const pal_problem_material *first = &c->problem->material[0];
+    double young = 0, poisson = first->poisson, density = first->density_kg_m3;
     for (int e = 0; e < t->n_tet; e++) {
-        double middle[3];
-        pal_copy3(middle, t->origin_m);
-        for (int k = 0; k < 4; k++) pal_axpy3(middle, 0.25, t->x + 3 * t->tet[4 * e + k]);
-        const pal_problem_material *m = material_at(c->problem, middle);
-        young += log(m->young_Pa) / t->n_tet;
-        poisson += m->poisson / t->n_tet;
-        density += m->density_kg_m3 / t->n_tet;
-        c->clamped |= m->poisson > PAL_POISSON_CLAMP;
+        double x[3];
+        const pal_problem_material *m = pal_case_material_of(c->problem, t, e, x);
+        if (!m) m = first;
+        young += log(m->young_Pa / first->young_Pa) / t->n_tet;
+        poisson += (m->poisson - first->poisson) / t->n_tet;
+        density += (m->density_kg_m3 - first->density_kg_m3) / t->n_tet;
+        c->info.clamped |= m->poisson > PAL_POISSON_CLAMP;
     }
-    c->mean_young_Pa = exp(young);
-    c->mean_poisson = fmin(poisson, PAL_POISSON_CLAMP);
-    c->mean_density = density;
+    c->info.mean_young_Pa = first->young_Pa * exp(young);
+    c->info.mean_poisson = fmin(poisson, PAL_POISSON_CLAMP);
+    c->info.mean_density_kg_m3 = density;
 }
 
 static pal_err make_world(const job *j)
@@ -73,7 +63,7 @@ static pal_err make_world(const job *j)
     pal_body_default(body, "body", &c->mesh);
     body->n_effect = 0;
     body->output.name[0] = 0;
-    body->material = (pal_material){.young_Pa = 1, .poisson = 0.4, .density_kg_m3 = c->mean_density};
+    body->material = (pal_material){.young_Pa = 1, .poisson = 0.4, .density_kg_m3 = c->info.mean_density_kg_m3};
     body->n_support = c->problem->n_support;
     memcpy(body->support, c->support, sizeof c->support);
     /* constants of 1 J: only the weights of the components are used */
@@ -150,17 +140,14 @@ static pal_err make_loads(const job *j, int index)
     const pal_problem_case *load_case = c->cases[index].load_case;
     const pal_body *body = pal_world_body(c->world, 0);
     size_t n = 3 * (size_t)body->n_node;
-    double sum = 0, *one = calloc(n, sizeof *one);
-    fit->force_N = calloc(n, sizeof(double));
-    if (!one || !fit->force_N) {
-        free(one);
-        return no_memory(j, "the loads");
-    }
+    double sum = 0, *one = PAL_NEW(c->arena, double, n);
+    fit->force_N = PAL_NEW(c->arena, double, n);
+    if (!one || !fit->force_N) return no_memory(j, "the loads");
     pal_err err = PAL_ERR_OK;
     for (int k = 0; k < load_case->n_load && !err; k++) {
         double all, fixed;
         memset(one, 0, n * sizeof *one);
-        err = pal_case_force(c->problem, load_case, k, body, j->locate, &c->mesh.surface, one, NULL, j->diag);
+        err = pal_case_forces(c->problem, load_case, k, body, j->locate, &c->mesh.surface, one, NULL, j->diag);
         if (err) break;
         sum_up(c, one, &all, &fixed);
         sum += all;
@@ -170,7 +157,6 @@ static pal_err make_loads(const job *j, int index)
                                      (int)(load_case - c->problem->load_case), k, 100 * fixed / all);
         for (size_t i = 0; i < n; i++) fit->force_N[i] += one[i];
     }
-    free(one);
     if (err) return err;
     double left, fixed;
     sum_up(c, fit->force_N, &left, &fixed);
@@ -198,10 +184,7 @@ static pal_err truth_by_elements(const job *j, int index)
     const pal_tets *t = &c->mesh.tets;
     pal_solve_options o = {.element = "hex8_bbar",
                            .law = fit->linear ? "linear" : "neo_hookean",
-                           .resolution = c->options.voxel.resolution,
-                           .fill = c->options.voxel.fill,
-                           .min_fill = c->options.voxel.min_fill,
-                           .align = c->options.voxel.align,
+                           .voxel = c->options.voxel,
                            .split = c->options.split,
                            .young_Pa = NAN,
                            .poisson = NAN,
@@ -212,9 +195,9 @@ static pal_err truth_by_elements(const job *j, int index)
     pal_diagnostic reason = {""};
     pal_err err = pal_solve(c->problem, c->cases[index].load_case, j->surface, &o, &solution, &result, &reason);
     if (err) return pal_diagnostic_set(j->diag, err, "truth of \"%s\": %s", c->cases[index].load_case->id, reason.text);
-    c->clamped |= result.clamped;
+    c->info.clamped |= result.clamped;
     fit->n_point = t->n_node;
-    fit->u = malloc(3 * sizeof(double) * (size_t)t->n_node);
+    fit->u = PAL_NEW(c->arena, double, 3 * t->n_node);
     for (int i = 0; i < t->n_node && fit->u; i++) {
         double x[3];
         pal_add3(x, t->x + 3 * i, t->origin_m);
@@ -232,10 +215,10 @@ static pal_err truth_by_samples(const job *j, int index)
     const pal_samples *s = c->cases[index].samples;
     size_t n = (size_t)s->n;
     fit->n_point = s->n;
-    fit->start = malloc((n + 1) * sizeof *fit->start);
-    fit->node = malloc(4 * n * sizeof *fit->node);
-    fit->weight = malloc(4 * n * sizeof *fit->weight);
-    fit->u = malloc(3 * n * sizeof *fit->u);
+    fit->start = PAL_NEW(c->arena, int32_t, n + 1);
+    fit->node = PAL_NEW(c->arena, int32_t, 4 * n);
+    fit->weight = PAL_NEW(c->arena, double, 4 * n);
+    fit->u = PAL_NEW(c->arena, double, 3 * n);
     if (!fit->start || !fit->node || !fit->weight || !fit->u) return no_memory(j, "the truth");
     memcpy(fit->u, s->u, 3 * n * sizeof *fit->u);
     for (int i = 0; i <= s->n; i++) fit->start[i] = 4 * i;
@@ -258,7 +241,7 @@ static pal_err make_truth(const job *j, int index)
     if (!report_progress(c, "truth", (double)index / c->n_case))
         return pal_diagnostic_set(j->diag, PAL_ERR_STATE, "stopped before the truth of \"%s\"", k->load_case->id);
     PAL_TRY(k->samples ? truth_by_samples(j, index) : truth_by_elements(j, index));
-    for (int i = 0; i < fit->n_point; i++) fit->max_m = fmax(fit->max_m, pal_norm3(fit->u + 3 * i));
+    fit->max_m = pal_max_norm3(fit->u, fit->n_point);
     if (fit->max_m > 0) return PAL_ERR_OK;
     return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "load case \"%s\": its truth (%s) moves nothing",
                               k->load_case->id, k->truth_name ? k->truth_name : "finite elements");
@@ -272,12 +255,9 @@ static pal_err make_edges(const job *j)
     pal_calibration *c = j->c;
     const int *n = c->grid.n;
     int64_t total = (int64_t)n[0] * n[1] * n[2], step[3] = {1, n[0], (int64_t)n[0] * n[1]};
-    int32_t *number = malloc(sizeof *number * (size_t)total);
-    c->edge = malloc(6 * sizeof *c->edge * ((size_t)c->weights.n_used + 1));
-    if (!number || !c->edge) {
-        free(number);
-        return no_memory(j, "the grid");
-    }
+    int32_t *number = PAL_NEW(c->arena, int32_t, total);
+    c->edge = PAL_NEW(c->arena, int32_t, 6 * (size_t)c->weights.n_used);
+    if (!number || !c->edge) return no_memory(j, "the grid");
     for (int64_t i = 0; i < total; i++) number[i] = -1;
     for (int i = 0; i < c->weights.n_used; i++) number[c->weights.used[i]] = i;
     for (int i = 0; i < c->weights.n_used; i++)
@@ -287,7 +267,6 @@ static pal_err make_edges(const job *j)
             c->edge[2 * c->n_edge] = i;
             c->edge[2 * c->n_edge++ + 1] = number[at + step[a]];
         }
-    free(number);
     return PAL_ERR_OK;
 }
 
@@ -296,7 +275,7 @@ static pal_err make_grid(const job *j)
     pal_calibration *c = j->c;
     const pal_tets *t = &c->mesh.tets;
     const int *n = c->options.grid;
-    c->n_used = 1;
+    c->info.n_used = 1;
     if (n[0] <= 0) return PAL_ERR_OK;
     for (int a = 0; a < 3; a++) {
         if (n[a] < 1 || n[a] > 1024)
@@ -315,7 +294,7 @@ static pal_err make_grid(const job *j)
                                   n[0], n[1], n[2], PAL_CALIBRATE_PARAMETERS);
     c->has_grid = true;
     if (pal_grid_weights_make(&c->grid, t->x, t->n_node, &c->weights)) return no_memory(j, "the grid's weights");
-    c->n_used = c->weights.n_used;
+    c->info.n_used = c->weights.n_used;
     return make_edges(j);
 }
 
@@ -331,26 +310,28 @@ static pal_err make_parameters(const job *j)
 {
     static const double hand[PAL_SPRING_KINDS] = {0.2, 0.4, 1};
     pal_calibration *c = j->c;
-    double factor[PAL_SPRING_KINDS], scale = c->mean_young_Pa * pow(c->lattice.edge_m, 3), range = c->options.decades;
-    pal_spring_factors(c->mean_poisson, c->options.without_area, factor);
+    double factor[PAL_SPRING_KINDS], scale = c->info.mean_young_Pa * pow(c->lattice.edge_m, 3),
+                                     range = c->options.decades;
+    pal_spring_factors(c->info.mean_poisson, c->options.without_area, factor);
     for (int k = 0; k < PAL_SPRING_KINDS; k++)
-        if (c->lattice.kind[k].n_item > 0) c->kind[c->n_kind++] = k;
-    c->n_parameter = c->n_kind * c->n_used;
-    c->theta = calloc(3 * (size_t)c->n_parameter, sizeof(double));
+        if (c->lattice.kind[k].n_item > 0) c->info.kind[c->info.n_kind++] = k;
+    c->info.n_parameter = c->info.n_kind * c->info.n_used;
+    c->theta = PAL_NEW(c->arena, double, 3 * (size_t)c->info.n_parameter);
     if (!c->theta) return no_memory(j, "the parameters");
-    c->low = c->theta + c->n_parameter, c->high = c->low + c->n_parameter;
-    for (int k = 0; k < c->n_kind; k++) {
-        const pal_springs *s = &c->lattice.kind[c->kind[k]];
+    c->low = c->theta + c->info.n_parameter, c->high = c->low + c->info.n_parameter;
+    for (int k = 0; k < c->info.n_kind; k++) {
+        const pal_springs *s = &c->lattice.kind[c->info.kind[k]];
         /* the derived law weights springs by volume: the total energy is the same when all springs are alike */
-        double f = factor[c->kind[k]], manual_theta = hand[c->kind[k]] / mean_weight(s);
-        double start = log(scale * (c->options.equal ? hand[c->kind[k]] : f));
-        c->manual_theta[k] = log(scale * manual_theta);
-        for (int i = 0; i < c->n_used; i++) {
-            c->theta[k * c->n_used + i] = start;
-            c->low[k * c->n_used + i] = start - range * log(10);
-            c->high[k * c->n_used + i] = start + range * log(10);
-            if (c->kind[k] == PAL_SPRING_VOLUME && c->options.min_volume_ratio > 0)
-                c->low[k * c->n_used + i] = fmax(c->low[k * c->n_used + i], start + log(c->options.min_volume_ratio));
+        double f = factor[c->info.kind[k]], by_hand = hand[c->info.kind[k]] / mean_weight(s);
+        double start = log(scale * (c->options.equal ? hand[c->info.kind[k]] : f));
+        c->manual_theta[k] = log(scale * by_hand);
+        for (int i = 0; i < c->info.n_used; i++) {
+            c->theta[k * c->info.n_used + i] = start;
+            c->low[k * c->info.n_used + i] = start - range * log(10);
+            c->high[k * c->info.n_used + i] = start + range * log(10);
+            if (c->info.kind[k] == PAL_SPRING_VOLUME && c->options.min_volume_ratio > 0)
+                c->low[k * c->info.n_used + i] =
+                    fmax(c->low[k * c->info.n_used + i], start + log(c->options.min_volume_ratio));
         }
     }
     return PAL_ERR_OK;
@@ -364,7 +345,7 @@ static pal_err make_starts(const job *j)
     pal_calibration_value value;
     size_t n = 3 * (size_t)c->lattice.n_node;
     for (int i = 0; i < c->n_case; i++) {
-        c->fit[i].x_start = malloc(n * sizeof(double));
+        c->fit[i].x_start = PAL_NEW(c->arena, double, n);
         if (!c->fit[i].x_start) return no_memory(j, "the start");
         memcpy(c->fit[i].x_start, c->lattice.x_rest, n * sizeof(double));
     }
@@ -377,6 +358,18 @@ static pal_err make_starts(const job *j)
     return err;
 }
 
+static void complete_info(pal_calibration *c)
+{
+    pal_calibration_info *out = &c->info;
+    out->n_node = c->lattice.n_node, out->n_free = c->lattice.n_free, out->n_tet = c->mesh.tets.n_tet;
+    out->edge_m = c->lattice.edge_m;
+    out->mesh = &c->mesh;
+    out->grid = c->has_grid ? &c->grid : NULL, out->weights = c->has_grid ? &c->weights : NULL;
+    out->start = c->theta, out->low = c->low, out->high = c->high;
+    for (int k = 0; k < out->n_kind; k++) out->n_spring += c->lattice.kind[out->kind[k]].n_item;
+    for (int i = 0; i < c->n_case; i++) out->max_m[i] = c->fit[i].max_m, out->n_point[i] = c->fit[i].n_point;
+}
+
 static pal_err make(const job *j)
 {
     pal_calibration *c = j->c;
@@ -385,10 +378,11 @@ static pal_err make(const job *j)
     for (int i = 0; i < c->n_case; i++) PAL_TRY(make_loads(j, i));
     double loaded = pal_clock_s();
     for (int i = 0; i < c->n_case; i++) PAL_TRY(make_truth(j, i));
-    c->truth_s = pal_clock_s() - loaded;
+    c->info.truth_s = pal_clock_s() - loaded;
     PAL_TRY(make_parameters(j));
     PAL_TRY(make_starts(j));
-    c->prepare_s += pal_clock_s() - begin - c->truth_s;
+    c->info.prepare_s += pal_clock_s() - begin - c->info.truth_s;
+    complete_info(c);
     return PAL_ERR_OK;
 }
 
@@ -412,9 +406,10 @@ pal_err pal_calibration_create(const pal_problem *problem, const pal_surface *su
     pal_calibration *c = j.c = calloc(1, sizeof *c);
     if (!c) return no_memory(&j, "a calibration");
     *c = (pal_calibration){.options = *options, .problem = problem, .cases = cases, .n_case = n_case, .n_fit = n_fit};
+    c->arena = pal_arena_create(1 << 20, true);
     double begin = pal_clock_s();
-    pal_err err = make_body(&j);
-    c->prepare_s = pal_clock_s() - begin;
+    pal_err err = c->arena ? make_body(&j) : no_memory(&j, "a calibration");
+    c->info.prepare_s = pal_clock_s() - begin;
     if (!err && pal_locate_create(&c->mesh.tets, NULL, &j.locate)) err = no_memory(&j, "points in the mesh");
     if (!err) err = make(&j);
     pal_locate_destroy(j.locate);
@@ -428,56 +423,22 @@ pal_err pal_calibration_create(const pal_problem *problem, const pal_surface *su
 void pal_calibration_destroy(pal_calibration *c)
 {
     if (!c) return;
-    for (int i = 0; i < PAL_CALIBRATE_CASES; i++) {
-        pal_fit_case *fit = &c->fit[i];
-        free(fit->force_N);
-        free(fit->start);
-        free(fit->node);
-        free(fit->weight);
-        free(fit->u);
-        free(fit->x_start);
-    }
-    free(c->theta);
-    free(c->edge);
     pal_grid_weights_free(&c->weights);
     pal_lattice_free(&c->lattice);
     pal_world_destroy(c->world);
     pal_prepared_free(&c->mesh);
+    pal_arena_destroy(c->arena);
     free(c);
 }
 
 void pal_calibration_info_of(const pal_calibration *c, pal_calibration_info *out)
 {
-    *out = (pal_calibration_info){.n_parameter = c->n_parameter,
-                                  .n_kind = c->n_kind,
-                                  .n_used = c->n_used,
-                                  .n_node = c->lattice.n_node,
-                                  .n_free = c->lattice.n_free,
-                                  .n_tet = c->mesh.tets.n_tet,
-                                  .edge_m = c->lattice.edge_m,
-                                  .mean_young_Pa = c->mean_young_Pa,
-                                  .truth_s = c->truth_s,
-                                  .prepare_s = c->prepare_s,
-                                  .clamped = c->clamped,
-                                  .mesh = &c->mesh,
-                                  .grid = c->has_grid ? &c->grid : NULL,
-                                  .weights = c->has_grid ? &c->weights : NULL,
-                                  .start = c->theta,
-                                  .low = c->low,
-                                  .high = c->high};
-    for (int k = 0; k < c->n_kind; k++) {
-        out->kind[k] = c->kind[k];
-        out->n_spring += c->lattice.kind[c->kind[k]].n_item;
-    }
-    for (int i = 0; i < c->n_case; i++) {
-        out->max_m[i] = c->fit[i].max_m;
-        out->n_point[i] = c->fit[i].n_point;
-    }
+    *out = c->info;
 }
 
 void pal_calibration_manual_start(const pal_calibration *c, double *theta)
 {
-    for (int i = 0; i < c->n_parameter; i++) theta[i] = c->manual_theta[i / c->n_used];
+    for (int i = 0; i < c->info.n_parameter; i++) theta[i] = c->manual_theta[i / c->info.n_used];
 }
 
 const double *pal_calibration_forces(const pal_calibration *c, int index)

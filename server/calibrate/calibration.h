@@ -17,6 +17,7 @@ typedef struct pal_fit_case {
 } pal_fit_case;
 
 struct pal_calibration {
+    pal_arena *arena; /* of all arrays that it owns */
     pal_calibrate_options options;
     const pal_problem *problem;
     const pal_calibrate_case *cases;
@@ -30,21 +31,23 @@ struct pal_calibration {
     bool has_grid;
     int32_t *edge; /* pairs of used nodes that are neighbours on the grid [n_edge][2] */
     int n_edge;
-    int n_kind, kind[PAL_SPRING_KINDS], n_used, n_parameter;
+    pal_calibration_info info;
     double *theta, *low, *high;            /* start and bounds [n_parameter] */
     double manual_theta[PAL_SPRING_KINDS]; /* theta of each kind index */
-    double mean_young_Pa, mean_poisson, mean_density, truth_s, prepare_s;
-    bool clamped;
     pal_fit_case fit[PAL_CALIBRATE_CASES];
 };
 
 struct pal_calibration_workspace {
+    pal_arena *arena; /* of its arrays */
     const pal_calibration *calibration;
     pal_equilibrium_workspace *workspace;
     double *k[PAL_SPRING_KINDS], *slope[PAL_SPRING_KINDS]; /* by pal_spring_kind [n_item] */
-    double *value, *node;           /* exp theta and its slope [n_used]; values at nodes [n_node] */
+    double *value, *node;           /* slopes of the constants [n_used]; values at nodes [n_node] */
     double *x[PAL_CALIBRATE_CASES]; /* last equilibrium [n_node][3] */
     bool rests[PAL_CALIBRATE_CASES];
-    double *dJ_du, *u, *gradient; /* [n_node][3], [largest point count][3], [n_parameter] */
+    double *dJ_du, *gradient; /* [n_node][3], [n_parameter] */
 };
+
+/* Reports an evaluation of a method to its caller. Returns why the search ends now, NULL: it goes on. */
+const char *pal_fit_report(const pal_fit_options *options, const pal_fit_step *step, int64_t max_evaluation);
 #endif

@@ -7,6 +7,7 @@
  * convergence, where the energy change is lost in rounding, it requires a smaller residual. */
 #include "server/calibrate/equilibrium.h"
 
+#include "server/calibrate/tuning.h"
 #include "server/num/cholesky.h"
 #include "server/sim/springs/spring_constraint.h"
 #include "server/sim/springs/spring_set.h"
@@ -15,8 +16,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_HALVING = 30, MAX_SHIFT = 8 };
-static const double MAX_LINEAR = 1e-6; /* relative residual of a linear solve */
+enum { MAX_NEWTON = 60, MAX_HALVING = 30, MAX_SHIFT = 8 };
 
 struct pal_equilibrium_workspace {
     const pal_lattice *lattice;
@@ -32,20 +32,21 @@ static int pair_count(int n_corner)
     return n_corner * (n_corner + 1) / 2;
 }
 
-static pal_err take_row(const pal_spring_set *row, pal_lattice *to)
+static pal_err copy_springs(const pal_spring_set *from, pal_lattice *to)
 {
-    pal_springs *s = &to->kind[row->spring.kind];
-    s->n_corner = row->n_corner;
-    s->item = PAL_NEW(to->arena, int32_t, (size_t)row->n_item * (size_t)row->n_corner);
-    s->w = PAL_NEW(to->arena, double, row->n_item);
-    s->q = PAL_NEW(to->arena, double, row->n_item);
-    s->place = PAL_NEW(to->arena, int32_t, row->n_item * pair_count(row->n_corner));
-    if (!s->item || !s->w || !s->q || !s->place) return PAL_ERR_MEMORY;
-    s->n_item = row->n_item;
-    memcpy(s->item, row->item, sizeof *s->item * (size_t)row->n_item * (size_t)row->n_corner);
-    for (int i = 0; i < row->n_item; i++) {
-        s->w[i] = row->w[row->simd_blocks.place[i]];
-        s->q[i] = row->q[row->simd_blocks.place[i]];
+    pal_springs *s = &to->kind[from->spring.kind];
+    const int n = from->n_item, n_corner = from->n_corner;
+    *s = (pal_springs){.n_item = n,
+                       .n_corner = n_corner,
+                       .item = PAL_NEW(to->arena, int32_t, (size_t)n * (size_t)n_corner),
+                       .w = PAL_NEW(to->arena, double, n),
+                       .q = PAL_NEW(to->arena, double, n),
+                       .block = PAL_NEW(to->arena, int32_t, n * pair_count(n_corner))};
+    if (!s->item || !s->w || !s->q || !s->block) return PAL_ERR_MEMORY;
+    memcpy(s->item, from->item, sizeof *s->item * (size_t)n * (size_t)n_corner);
+    for (int i = 0; i < n; i++) {
+        s->w[i] = from->w[from->simd_blocks.place[i]];
+        s->q[i] = from->q[from->simd_blocks.place[i]];
     }
     return PAL_ERR_OK;
 }
@@ -60,14 +61,14 @@ static pal_err make_pattern(pal_lattice *l)
     PAL_TRY(pal_block_matrix_make(l->n_node, list, n_list, l->arena, &l->pattern));
     for (int k = 0; k < PAL_SPRING_KINDS; k++) {
         pal_springs *s = &l->kind[k];
-        int32_t *place = s->place;
+        int32_t *block = s->block;
         for (int i = 0; i < s->n_item; i++) {
             const int32_t *node = s->item + s->n_corner * i;
             for (int a = 0; a < s->n_corner; a++)
                 for (int b = 0; b <= a; b++) {
                     bool low = node[a] >= node[b];
                     int at = pal_block_matrix_find(&l->pattern, low ? node[a] : node[b], low ? node[b] : node[a]);
-                    *place++ = low ? at : ~at;
+                    *block++ = low ? at : ~at;
                 }
         }
     }
@@ -93,7 +94,7 @@ static pal_err take(const pal_world *world, const pal_body *body, pal_lattice *o
         pal_world_component_info(world, r, &info);
         for (int k = 0; k < PAL_SPRING_KINDS; k++)
             if (!strcmp(info.name, name[k]) && !strcmp(info.body, body->name))
-                PAL_TRY(take_row(pal_world_component(world, r)->self, out));
+                PAL_TRY(copy_springs(pal_world_component(world, r)->self, out));
     }
     return out->kind[PAL_SPRING_DISTANCE].n_item > 0 ? make_pattern(out) : PAL_ERR_OK;
 }
@@ -154,11 +155,6 @@ void pal_equilibrium_workspace_destroy(pal_equilibrium_workspace *workspace)
     free(workspace);
 }
 
-void pal_equilibrium_default(pal_equilibrium_options *options)
-{
-    *options = (pal_equilibrium_options){.max_iteration = 60, .tolerance = 1e-9, .max_stretch = 4};
-}
-
 /* ---- energy, force, Hessian ---- */
 
 static void corners_of(const pal_springs *s, const double *x, int i, const double *to[PAL_CORNERS])
@@ -186,17 +182,17 @@ double pal_lattice_force(const pal_lattice *l, const double *const k_J[PAL_SPRIN
                          double *force_N)
 {
     if (force_N) memset(force_N, 0, 3 * sizeof(double) * (size_t)l->n_node);
-    return force_of(&l->kind[PAL_SPRING_DISTANCE], PAL_SPRING_DISTANCE, k_J[PAL_SPRING_DISTANCE], x, force_N) +
-           force_of(&l->kind[PAL_SPRING_AREA], PAL_SPRING_AREA, k_J[PAL_SPRING_AREA], x, force_N) +
-           force_of(&l->kind[PAL_SPRING_VOLUME], PAL_SPRING_VOLUME, k_J[PAL_SPRING_VOLUME], x, force_N);
+    double sum = 0;
+    for (int k = 0; k < PAL_SPRING_KINDS; k++) sum += force_of(&l->kind[k], (pal_spring_kind)k, k_J[k], x, force_N);
+    return sum;
 }
 
 typedef enum hessian { TRUE_HESSIAN, SAFE_HESSIAN, REST_STIFFNESS } hessian;
 
-PAL_INLINE void add_block(pal_block_matrix *a, int32_t place, const double m[9])
+PAL_INLINE void add_block(pal_block_matrix *a, int32_t block, const double m[9])
 {
-    double *to = a->value + 9 * (size_t)(place < 0 ? ~place : place);
-    if (place >= 0)
+    double *to = a->value + 9 * (size_t)(block < 0 ? ~block : block);
+    if (block >= 0)
         for (int i = 0; i < 9; i++) to[i] += m[i];
     else
         for (int i = 0; i < 9; i++) to[i] += m[3 * (i % 3) + i / 3];
@@ -206,7 +202,7 @@ PAL_INLINE void stiffness_of(const pal_springs *s, pal_spring_kind kind, const d
                              hessian which, pal_block_matrix *a)
 {
     const int n_corner = pal_spring_corner_count(kind);
-    const int32_t *place = s->place;
+    const int32_t *block = s->block;
     for (int i = 0; i < s->n_item; i++) {
         const double *at[PAL_CORNERS];
         pal_constraint shape;
@@ -220,7 +216,7 @@ PAL_INLINE void stiffness_of(const pal_springs *s, pal_spring_kind kind, const d
             for (int q = 0; q <= p; q++) {
                 for (int r = 0; r < 9; r++)
                     m[r] = k * shape.g[p][r / 3] * shape.g[q][r % 3] + (bends ? bend * h[p][q][r] : 0);
-                add_block(a, *place++, m);
+                add_block(a, *block++, m);
             }
     }
 }
@@ -230,10 +226,8 @@ static void assemble(pal_equilibrium_workspace *workspace, const double *const k
 {
     const pal_lattice *l = workspace->lattice;
     pal_block_matrix_zero(&workspace->matrix);
-    stiffness_of(&l->kind[PAL_SPRING_DISTANCE], PAL_SPRING_DISTANCE, k_J[PAL_SPRING_DISTANCE], x, which,
-                 &workspace->matrix);
-    stiffness_of(&l->kind[PAL_SPRING_AREA], PAL_SPRING_AREA, k_J[PAL_SPRING_AREA], x, which, &workspace->matrix);
-    stiffness_of(&l->kind[PAL_SPRING_VOLUME], PAL_SPRING_VOLUME, k_J[PAL_SPRING_VOLUME], x, which, &workspace->matrix);
+    for (int k = 0; k < PAL_SPRING_KINDS; k++)
+        stiffness_of(&l->kind[k], (pal_spring_kind)k, k_J[k], x, which, &workspace->matrix);
 }
 
 /* adds a share of the diagonal to it */
@@ -255,20 +249,17 @@ typedef struct search {
     pal_diagnostic *diag;
 } search;
 
-static double norm(const pal_lattice *l, const double *v)
-{
-    double sum = 0;
-    for (int i = 0; i < l->n_node; i++)
-        if (!l->fixed[i]) sum += pal_dot3(v + 3 * i, v + 3 * i);
-    return sqrt(sum);
-}
-
 static double dot(const pal_lattice *l, const double *a, const double *b)
 {
     double sum = 0;
     for (int i = 0; i < l->n_node; i++)
         if (!l->fixed[i]) sum += pal_dot3(a + 3 * i, b + 3 * i);
     return sum;
+}
+
+static double norm(const pal_lattice *l, const double *v)
+{
+    return sqrt(dot(l, v, v));
 }
 
 /* r = f - grad W at the free nodes, 0 at fixed ones; returns W - f.(x - rest) */
@@ -292,7 +283,6 @@ static double residual(const search *s, const double *x, double *r)
 static pal_err factor_at(const search *s, const double *x)
 {
     pal_equilibrium_workspace *workspace = s->workspace;
-    s->report->n_factor++;
     assemble(workspace, s->k_J, x, s->o->linear ? REST_STIFFNESS : TRUE_HESSIAN);
     pal_err err = pal_cholesky_factor(workspace->factor, &workspace->matrix, false);
     if (err != PAL_ERR_NUMERIC || s->o->linear) return err;
@@ -302,7 +292,6 @@ static pal_err factor_at(const search *s, const double *x)
         assemble(workspace, s->k_J, x, SAFE_HESSIAN);
         if (share > 0) shift(&workspace->matrix, share);
         share = share > 0 ? 10 * share : 1e-8;
-        s->report->n_factor++;
         err = pal_cholesky_factor(workspace->factor, &workspace->matrix, false);
     }
     return err;
@@ -356,7 +345,8 @@ static pal_err newton(const search *s, double *x)
 {
     pal_equilibrium_workspace *workspace = s->workspace;
     const pal_lattice *l = workspace->lattice;
-    double load = norm(l, s->force_N), target = load > 0 ? s->o->tolerance * load : rounding(s);
+    double load = norm(l, s->force_N),
+           target = load > 0 ? (s->o->tolerance > 0 ? s->o->tolerance : PAL_EQUILIBRIUM_TOLERANCE) * load : rounding(s);
     double energy = residual(s, x, workspace->r), size = norm(l, workspace->r);
     bool stable = false;
     for (int k = 0;; k++) {
@@ -364,7 +354,7 @@ static pal_err newton(const search *s, double *x)
         if (!isfinite(size))
             return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "no rest: not finite at iteration %d", k);
         if (size <= target && stable) return PAL_ERR_OK;
-        if (k == s->o->max_iteration)
+        if (k == MAX_NEWTON)
             return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "no rest within %d iterations: residual %.2g", k,
                                       s->report->residual);
         int shifted = s->report->n_shift;
@@ -381,9 +371,9 @@ static pal_err newton(const search *s, double *x)
             return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC,
                                       "no rest: no step lowers the energy at a residual of %.2g", s->report->residual);
         }
-        if (stretch_of(l, x) > s->o->max_stretch)
+        if (stretch_of(l, x) > PAL_MAX_STRETCH)
             return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "no rest: an edge is stretched more than %g times",
-                                      s->o->max_stretch);
+                                      PAL_MAX_STRETCH);
     }
 }
 
@@ -400,7 +390,7 @@ static pal_err linear(const search *s, double *x)
     memcpy(workspace->r, s->force_N, 3 * sizeof(double) * (size_t)l->n_node);
     pal_block_matrix_multiply(&workspace->matrix, -1, workspace->p, workspace->r);
     s->report->residual = load > 0 ? norm(l, workspace->r) / load : 0;
-    if (!(s->report->residual < MAX_LINEAR))
+    if (!(s->report->residual < PAL_LINEAR_RESIDUAL))
         return pal_diagnostic_set(s->diag, PAL_ERR_NUMERIC, "no rest: the linear system keeps a residual of %.2g",
                                   s->report->residual);
     for (int i = 0; i < 3 * l->n_node; i++) x[i] = l->x_rest[i] + (l->fixed[i / 3] ? 0 : workspace->p[i]);
@@ -471,9 +461,7 @@ pal_err pal_equilibrium_adjoint(pal_equilibrium_workspace *workspace, const doub
     }
     if (!err) err = pal_cholesky_solve(workspace->factor, dJ_du, workspace->p);
     if (err) return pal_diagnostic_set(diag, err, "no gradient: no factor at the rest found (%s)", pal_err_text(err));
-    for (int k = 0; k < PAL_SPRING_KINDS; k++) {
-        pal_spring_kind kind = (pal_spring_kind)k;
-        slopes_of(&l->kind[k], kind, x, l->x_rest, workspace->p, options->linear, slope[k]);
-    }
+    for (int k = 0; k < PAL_SPRING_KINDS; k++)
+        slopes_of(&l->kind[k], (pal_spring_kind)k, x, l->x_rest, workspace->p, options->linear, slope[k]);
     return PAL_ERR_OK;
 }

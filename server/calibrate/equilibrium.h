@@ -21,7 +21,7 @@ typedef struct pal_springs {
     int n_item, n_corner; /* n_item 0: no such component */
     int32_t *item;        /* nodes                                 [n_item][n_corner] */
     double *w, *q;        /* 1 / rest measure (spring_constraint.h); weight [n_item] */
-    int32_t *place;       /* block of each pair of corners a >= b; negative: block ~place, transposed [n_item][pairs] */
+    int32_t *block;       /* block of each pair of corners a >= b; negative: ~block, transposed [n_item][pairs] */
 } pal_springs;
 
 typedef struct pal_lattice {
@@ -40,17 +40,14 @@ pal_err pal_lattice_make(const pal_world *world, int body, pal_lattice *out, pal
 void pal_lattice_free(pal_lattice *lattice); /* accepts a zeroed struct */
 
 typedef struct pal_equilibrium_options {
-    bool linear;        /* linearised at rest                                                             */
-    int max_iteration;  /* default 60 */
-    double tolerance;   /* norm of the residual relative to that of the loads; default 1e-9 */
-    double max_stretch; /* a spring longer than this many rest lengths ends the search (NUMERIC); default 4 */
+    bool linear;      /* linearised at rest */
+    double tolerance; /* norm of the residual relative to that of the loads; 0: 1e-9 */
 } pal_equilibrium_options;
-void pal_equilibrium_default(pal_equilibrium_options *options);
 
 typedef struct pal_equilibrium_report {
-    int n_newton, n_factor, n_shift; /* shift: iterations whose Hessian was not positive definite */
-    double residual;                 /* relative                                                  */
-    double energy_J;                 /* elastic                                                   */
+    int n_newton, n_shift; /* shift: iterations whose Hessian was not positive definite */
+    double residual;       /* relative                                                  */
+    double energy_J;       /* elastic                                                   */
 } pal_equilibrium_report;
 
 typedef struct pal_equilibrium_workspace pal_equilibrium_workspace;

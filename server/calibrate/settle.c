@@ -2,13 +2,10 @@
 #include "server/calibrate/settle.h"
 
 #include "server/base/vec3.h"
+#include "server/calibrate/tuning.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
-
-/* thresholds for rest, see settle.h */
-static const double max_v = 1e-4, mean_v = 3e-5, max_a = 1e-2, mean_a = 1e-3, hold_s = 0.25;
 
 const double pal_settle_rates_1_s[PAL_SETTLE_STEPS] = {0.5, 1, 2, 4, 8, 16};
 enum { USUAL = 3 };
@@ -35,7 +32,7 @@ static double mean_gain(const pal_body *body, const double *force_N)
 }
 
 /* Is the body at rest now? damping: rate of the component viscous, which the solver applies separately from f. */
-static bool is_still(const pal_body *body, double damping_1_s, double gain_m_s2)
+static bool is_at_rest(const pal_body *body, double damping_1_s, double gain_m_s2)
 {
     double v_max = 0, v_sum = 0, a_max = 0, a_sum = 0, u_max = 0;
     int n = 0;
@@ -51,8 +48,8 @@ static bool is_still(const pal_body *body, double damping_1_s, double gain_m_s2)
         n++;
     }
     double speed = sqrt(u_max * gain_m_s2);
-    return u_max > 0 && v_max <= max_v * speed && v_sum <= mean_v * speed * n && a_max <= max_a * gain_m_s2 &&
-           a_sum <= mean_a * gain_m_s2 * n;
+    return u_max > 0 && v_max <= PAL_SETTLE_MAX_V * speed && v_sum <= PAL_SETTLE_MEAN_V * speed * n &&
+           a_max <= PAL_SETTLE_MAX_A * gain_m_s2 && a_sum <= PAL_SETTLE_MEAN_A * gain_m_s2 * n;
 }
 
 static void compare(const pal_body *body, const double *u, pal_settle_run *out)
@@ -77,8 +74,8 @@ static double damping_of(const pal_world *world)
 {
     double rate = 0;
     for (int k = 0; k < pal_world_component_count(world); k++) {
-        const pal_component *row = pal_world_component(world, k);
-        if (row->effect->drag) rate += row->effect->drag(row->self);
+        const pal_component *component = pal_world_component(world, k);
+        if (component->effect->drag) rate += component->effect->drag(component->self);
     }
     return rate;
 }
@@ -102,8 +99,8 @@ pal_err pal_settle(pal_world *world, double step_s, const pal_settle_load *load,
         if (pal_world_step(world, step_s) || body->frozen) break;
         time += step_s;
         *work -= (double)pal_world_substeps(world) * body->tets->n_tet;
-        since = is_still(body, damping, gain) ? since + step_s : 0;
-        out->steady = since >= hold_s;
+        since = is_at_rest(body, damping, gain) ? since + step_s : 0;
+        out->steady = since >= PAL_SETTLE_HOLD_S;
     }
     out->seconds = time;
     compare(body, load->u, out);
@@ -171,8 +168,8 @@ static int first_rung(const climb *c)
     double sum = 0;
     int best = USUAL;
     for (int k = 0; k < c->n_load; k++) {
-        double max = 0, gain = mean_gain(body, c->load[k].force_N);
-        for (int i = 0; i < body->n_node && c->load[k].u; i++) max = fmax(max, pal_norm3(c->load[k].u + 3 * i));
+        double max = c->load[k].u ? pal_max_norm3(c->load[k].u, body->n_node) : 0;
+        double gain = mean_gain(body, c->load[k].force_N);
         if (!(max > 0 && gain > 0)) return USUAL;
         sum += log(2 * sqrt(gain / max)) / c->n_load;
     }

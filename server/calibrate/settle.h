@@ -1,14 +1,11 @@
-/* Live run of the calibrated body: with the components and solver of its scene, the nodal loads of a case are
- * applied at once at rest, and the scene is stepped until it is at rest again (paper B section 3.3). The damping
- * that settles first is chosen. The final state is compared with Newton's equilibrium, which verifies that the live
- * springs are the fitted ones.
+/* Live run of the calibrated body: with the components and solver of its scene, the nodal loads of a case are applied
+ * at once at rest, and the scene is stepped until it is at rest again (paper B section 3.3). The damping that settles
+ * first is chosen. The final state is compared with Newton's equilibrium: the live springs are the fitted ones.
  *
- * At rest: over the free nodes |v| is at most 1e-4 U/T and 3e-5 U/T in the mean, and |a| at most 1e-2 A and 1e-3 A
- * in the mean, for a quarter of a second without interruption. U is the largest displacement at that time, A the
- * sum of the load magnitudes over the mass of the free nodes, and T = sqrt(U/A) the time scale of the oscillation.
- * These thresholds are equivalent for light and heavy loads and for stiff and soft bodies. Time is simulated time;
- * the result depends on the scene alone, not on the speed of the machine.
- * Thread: [load]. */
+ * At rest: over the free nodes |v| is at most 1e-4 U/T and 3e-5 U/T in the mean, and |a| at most 1e-2 A and 1e-3 A in
+ * the mean, for a quarter of a second. U is the largest displacement at that time, A the sum of the load magnitudes
+ * over the mass of the free nodes, T = sqrt(U/A) the time scale of the oscillation; so light and heavy loads, stiff and
+ * soft bodies are judged alike. Time is simulated time. Thread: [load]. */
 #ifndef PAL_CALIBRATE_SETTLE_H
 #define PAL_CALIBRATE_SETTLE_H
 #include "server/sim/world/world.h"

@@ -6,36 +6,32 @@
 
 #include <cjson/cJSON.h>
 #include <ctype.h>
-#include <errno.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { FILE_MAX = 1 << 16, VARIABLE = 64 };
-#define PLACE(field) offsetof(pal_config, field), sizeof(((pal_config *)0)->field)
+static const char levels[] = "error|warn|info|debug";
 
-static const pal_config_key keys[] = {
-    {"listen", "ADDRESS", PAL_CONFIG_KEY_TEXT, PLACE(listen), 0, 0, "address to listen on (127.0.0.1)"},
-    {"port", "N", PAL_CONFIG_KEY_INT, PLACE(port), 0, 65535, "port; 0 takes any free one (8090)"},
-    {"allow_remote", "BOOL", PAL_CONFIG_KEY_BOOL, PLACE(allow_remote), 0, 1,
+const pal_flag pal_config_keys[PAL_CONFIG_KEYS] = {
+    {"listen", "ADDRESS", PAL_FLAG_TEXT, NULL, 0, 0, "address to listen on (127.0.0.1)"},
+    {"port", "N", PAL_FLAG_COUNT, NULL, 0, 65535, "port; 0 takes any free one (8090)"},
+    {"allow_remote", NULL, PAL_FLAG_SWITCH, NULL, 0, 1,
      "let other machines connect: needed for any address but this machine's own"},
-    {"viewer", "FOLDER", PAL_CONFIG_KEY_TEXT, PLACE(viewer), 0, 0, "files of the page (those beside the program)"},
-    {"error_m", "M", PAL_CONFIG_KEY_NUMBER, PLACE(error_m), 0, 0.01,
+    {"viewer", "FOLDER", PAL_FLAG_TEXT, NULL, 0, 0, "files of the page (those beside the program)"},
+    {"error_m", "M", PAL_FLAG_NUMBER, NULL, 0, 0.01,
      "most error of streamed positions, m (1/3000 of the box, at most 0.00005)"},
-    {"max_clients", "N", PAL_CONFIG_KEY_INT, PLACE(max_clients), 1, 10000, "clients at once (200)"},
-    {"lcm", "URL", PAL_CONFIG_KEY_TEXT, PLACE(lcm), 0, 0, "also speak LCM there, in a process of its own (off)"},
-    {"log", "LEVEL", PAL_CONFIG_KEY_TEXT, PLACE(log), 0, 0, "error, warn, info or debug (info)"},
-    {"record", "FILE", PAL_CONFIG_KEY_TEXT, PLACE(record), 0, 0, "write the input log there, for palpate replay (off)"},
+    {"max_clients", "N", PAL_FLAG_COUNT, NULL, 1, 10000, "clients at once (200)"},
+    {"lcm", "URL", PAL_FLAG_TEXT, NULL, 0, 0, "also speak LCM there, in a process of its own (off)"},
+    {"log", levels, PAL_FLAG_WORD, NULL, 0, 0, "what is logged (info)"},
+    {"record", "FILE", PAL_FLAG_TEXT, NULL, 0, 0, "write the input log there, for palpate replay (off)"},
 };
-enum { N_KEY = sizeof keys / sizeof keys[0] };
-static const char *const level_name[] = {"error", "warn", "info", "debug"};
-
-const pal_config_key *pal_config_keys(int *n)
-{
-    *n = N_KEY;
-    return keys;
-}
+/* where a key is stored, in the order of the keys */
+static const size_t place[PAL_CONFIG_KEYS] = {
+    offsetof(pal_config, listen), offsetof(pal_config, port),    offsetof(pal_config, allow_remote),
+    offsetof(pal_config, viewer), offsetof(pal_config, error_m), offsetof(pal_config, max_clients),
+    offsetof(pal_config, lcm),    offsetof(pal_config, log),     offsetof(pal_config, record),
+};
 
 void pal_config_default(pal_config *config)
 {
@@ -44,109 +40,81 @@ void pal_config_default(pal_config *config)
 
 pal_log_level pal_config_log_level(const pal_config *config)
 {
-    for (int k = 0; k < 4; k++)
-        if (!strcmp(config->log, level_name[k])) return (pal_log_level)k;
-    return PAL_LOG_INFO;
+    int level = pal_flag_word(levels, config->log);
+    return level < 0 ? PAL_LOG_INFO : (pal_log_level)level;
 }
 
-static const pal_config_key *find(const char *key)
+/* PAL_CONFIG_KEYS: unknown */
+static size_t find(const char *key)
 {
-    for (int k = 0; k < N_KEY; k++)
-        if (!strcmp(keys[k].key, key)) return &keys[k];
-    return NULL;
+    size_t k = 0;
+    while (k < PAL_CONFIG_KEYS && strcmp(pal_config_keys[k].name, key) != 0) k++;
+    return k;
 }
 
-static pal_err set_text(pal_config *config, const pal_config_key *s, const char *text, const char *where,
-                        pal_diagnostic *diag)
+static pal_err check_text(const char *text, size_t n, const char *where, pal_diagnostic *diag)
 {
     uint32_t code;
-    size_t n = strlen(text);
-    if (n >= s->n_byte && strcmp(s->key, "log") != 0)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %zu bytes of text, more than %zu", where, n,
-                                  s->n_byte - 1);
+    if (n >= PAL_CONFIG_TEXT)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %zu bytes of text, more than %d", where, n,
+                                  PAL_CONFIG_TEXT - 1);
     for (size_t k = 0; k < n;) {
         int size = pal_utf8_next(text + k, n - k, &code);
         if (size == 0 || !pal_utf8_printable(code))
             return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: has a control character", where);
         k += (size_t)size;
     }
-    if (!strcmp(s->key, "log")) {
-        bool known = false;
-        for (int k = 0; k < 4; k++) known = known || !strcmp(text, level_name[k]);
-        if (!known)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: \"%.20s\" is not error, warn, info or debug", where,
-                                      text);
-    }
-    if (!strcmp(s->key, "listen") && n == 0) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: is empty", where);
-    memcpy((char *)config + s->offset, text, n + 1);
-    return PAL_ERR_OK;
-}
-
-static pal_err set_number(pal_config *config, const pal_config_key *s, double number, const char *where,
-                          pal_diagnostic *diag)
-{
-    void *place = (char *)config + s->offset;
-    if (!(number >= s->low && number <= s->high))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.15g is outside %g .. %g", where, number, s->low,
-                                  s->high);
-    if (s->kind == PAL_CONFIG_KEY_INT && number != floor(number))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.15g is not a whole number", where, number);
-    if (s->kind == PAL_CONFIG_KEY_INT)
-        *(int *)place = (int)number;
-    else
-        *(double *)place = number;
     return PAL_ERR_OK;
 }
 
 pal_err pal_config_set(pal_config *config, const char *key, const char *text, const char *where, pal_diagnostic *diag)
 {
-    const pal_config_key *s = find(key);
-    if (!s) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: unknown key", where);
-    if (s->kind == PAL_CONFIG_KEY_TEXT) return set_text(config, s, text, where, diag);
-    if (s->kind == PAL_CONFIG_KEY_BOOL) {
-        bool yes = !strcmp(text, "true") || !strcmp(text, "1"), no = !strcmp(text, "false") || !strcmp(text, "0");
-        if (!yes && !no)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: \"%.40s\" is not true or false", where, text);
-        *(bool *)((char *)config + s->offset) = yes;
-        return PAL_ERR_OK;
-    }
-    char *end;
-    double number = strtod(text, &end);
-    if (end == text || *end || isspace((unsigned char)*text))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: \"%.40s\" is not a number", where, text);
-    return set_number(config, s, number, where, diag);
+    size_t k = find(key), n = strlen(text);
+    if (k == PAL_CONFIG_KEYS) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: unknown key", where);
+    void *out = (char *)config + place[k];
+    PAL_TRY(pal_flag_read(&pal_config_keys[k], text, where, out, diag));
+    if (pal_config_keys[k].kind != PAL_FLAG_TEXT && pal_config_keys[k].kind != PAL_FLAG_WORD) return PAL_ERR_OK;
+    PAL_TRY(check_text(text, n, where, diag));
+    if (out == config->listen && n == 0) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: is empty", where);
+    memcpy(out, text, n + 1);
+    return PAL_ERR_OK;
 }
 
-static pal_err set_json(pal_config *config, const pal_config_key *s, const cJSON *item, const char *where,
-                        pal_diagnostic *diag)
+/* a value of the file as text; NULL: of the wrong kind, and *fault says so */
+static const char *text_of(const cJSON *item, pal_flag_kind kind, char number[32], const char **fault)
 {
-    switch (s->kind) {
-    case PAL_CONFIG_KEY_TEXT:
-        if (!cJSON_IsString(item)) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: is not a text", where);
-        return set_text(config, s, item->valuestring, where, diag);
-    case PAL_CONFIG_KEY_BOOL:
-        if (!cJSON_IsBool(item)) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: is not true or false", where);
-        *(bool *)((char *)config + s->offset) = cJSON_IsTrue(item);
-        return PAL_ERR_OK;
-    case PAL_CONFIG_KEY_INT:
-    case PAL_CONFIG_KEY_NUMBER:
+    switch (kind) {
+    case PAL_FLAG_SWITCH:
+        *fault = "is not true or false";
+        return cJSON_IsBool(item) ? cJSON_IsTrue(item) ? "true" : "false" : NULL;
+    case PAL_FLAG_TEXT:
+    case PAL_FLAG_WORD:
+        *fault = "is not a text";
+        return cJSON_IsString(item) ? item->valuestring : NULL;
+    case PAL_FLAG_NUMBER:
+    case PAL_FLAG_COUNT:
         break;
     }
-    if (!cJSON_IsNumber(item)) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: is not a number", where);
-    return set_number(config, s, item->valuedouble, where, diag);
+    *fault = "is not a number";
+    if (!cJSON_IsNumber(item)) return NULL;
+    snprintf(number, 32, "%.17g", item->valuedouble);
+    return number;
 }
 
 static pal_err read_keys(pal_config *config, const char *name, const cJSON *root, pal_diagnostic *diag)
 {
-    char where[PAL_CONFIG_TEXT];
+    char where[PAL_CONFIG_TEXT], number[32];
+    const char *fault;
     if (!cJSON_IsObject(root)) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: not a JSON object", name);
     for (const cJSON *item = root->child; item; item = item->next) {
-        const pal_config_key *s = find(item->string);
+        size_t k = find(item->string);
         snprintf(where, sizeof where, "%.180s: %.60s", name, item->string);
-        if (!s) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: unknown key", where);
+        if (k == PAL_CONFIG_KEYS) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: unknown key", where);
         if (cJSON_GetObjectItemCaseSensitive(root, item->string) != item)
             return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: the key is given twice", where);
-        PAL_TRY(set_json(config, s, item, where, diag));
+        const char *text = text_of(item, pal_config_keys[k].kind, number, &fault);
+        if (!text) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s", where, fault);
+        PAL_TRY(pal_config_set(config, item->string, text, where, diag));
     }
     return PAL_ERR_OK;
 }

@@ -2,16 +2,14 @@
  *
  * The file is one JSON object with the keys below; the environment variable of a
  * key is PALPATE_ and the key in capitals (PALPATE_ALLOW_REMOTE=true); the flag is the key with dashes
- * (--allow-remote). An unknown key, an unknown PALPATE_ variable and a value out of range are errors that name where
- * they stand. Thread: [load]. */
+ * (--allow-remote). An unknown key, an unknown PALPATE_ variable and a value out of range are errors that name their
+ * source. Thread: [load]. */
 #ifndef PAL_CLI_CONFIG_H
 #define PAL_CLI_CONFIG_H
-#include "server/base/err.h"
 #include "server/base/log.h"
+#include "server/cli/flag.h"
 
-#include <stdbool.h>
-
-enum { PAL_CONFIG_TEXT = 256 };
+enum { PAL_CONFIG_TEXT = 256, PAL_CONFIG_KEYS = 9 };
 
 typedef struct pal_config {
     char listen[PAL_CONFIG_TEXT]; /* "127.0.0.1"                                                         */
@@ -21,26 +19,13 @@ typedef struct pal_config {
     double error_m;               /* bound of streamed positions; 0: 1/3000 of the box, at most 0.05 mm  */
     int max_clients;              /* 200                                                                 */
     char lcm[PAL_CONFIG_TEXT];    /* LCM URL: start palpate-lcm with it; "": no LCM                      */
-    char log[8];                  /* "error" | "warn" | "info" | "debug"; info                           */
+    char log[PAL_CONFIG_TEXT];    /* "error" | "warn" | "info" | "debug"; info                           */
     char record[PAL_CONFIG_TEXT]; /* write the input log there; "": do not                               */
 } pal_config;
 
-typedef enum pal_config_kind {
-    PAL_CONFIG_KEY_TEXT,
-    PAL_CONFIG_KEY_BOOL,
-    PAL_CONFIG_KEY_INT,
-    PAL_CONFIG_KEY_NUMBER
-} pal_config_kind;
-/* one key, for manuals and checks */
-typedef struct pal_config_key {
-    const char *key, *value; /* "allow_remote"; word for its value in a manual */
-    pal_config_kind kind;
-    size_t offset, n_byte; /* place in pal_config; bytes of a text */
-    double low, high;
-    const char *help;
-} pal_config_key;
+/* a key, for manuals and checks: its name ("allow_remote"), value, range and help; out is unused */
+extern const pal_flag pal_config_keys[PAL_CONFIG_KEYS];
 
-const pal_config_key *pal_config_keys(int *n);
 void pal_config_default(pal_config *config);
 /* reads a file over what is there; REFUSED names file and key, IO. All or nothing. */
 pal_err pal_config_file(pal_config *config, const char *path, pal_diagnostic *diag);

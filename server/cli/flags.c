@@ -3,8 +3,6 @@
 
 #include "server/cli/report.h"
 
-#include <ctype.h>
-#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,16 +11,15 @@
 
 enum { FLAGS = 64, KEY = 48, USAGE = 2 };
 
+/* the flags of a command: its own, those of the configuration, and those that every command has */
 typedef struct parse {
     const pal_flag_table *table;
     pal_flag_common *common;
+    pal_flag flag[FLAGS];
+    int n_flag;
     bool seen[FLAGS];
-    const char *config_file;
-    struct {
-        const pal_config_key *key;
-        const char *text;
-    } given[FLAGS];
-    int n_given;
+    const char *config_file, *given[PAL_CONFIG_KEYS]; /* text of a key that is a flag; NULL: not given */
+    char name[PAL_CONFIG_KEYS][KEY];                  /* "--allow-remote"                               */
 } parse;
 
 /* ---- manual ---- */
@@ -42,33 +39,15 @@ static void manual_line(const char *name, const char *value, const char *help)
     putchar('\n');
 }
 
-static void flag_name(const char *key, char out[KEY])
+static int manual(const parse *p)
 {
-    snprintf(out, KEY, "--%s", key);
-    for (char *c = out; *c; c++)
-        if (*c == '_') *c = '-';
-}
-
-static int manual(const pal_flag_table *table)
-{
-    char name[KEY];
-    int n;
+    const pal_flag_table *table = p->table;
     printf("usage: palpate %s\n\n%s\n", table->usage, table->about);
     if (table->example) printf("EXAMPLES (from the top folder of the tree, with build/release/bin in PATH)\n");
     for (const char *line = table->example; line && *line; line = strchr(line, '\n') + 1)
         printf("  %.*s\n", (int)strcspn(line, "\n"), line);
     printf("%sFLAGS\n", table->example ? "\n" : "");
-    for (int k = 0; k < table->n_flag; k++) manual_line(table->flag[k].name, table->flag[k].value, table->flag[k].help);
-    if (table->config) {
-        const pal_config_key *key = pal_config_keys(&n);
-        for (int k = 0; k < n; k++) {
-            flag_name(key[k].key, name);
-            manual_line(name, key[k].kind == PAL_CONFIG_KEY_BOOL ? NULL : key[k].value, key[k].help);
-        }
-        manual_line("--config", "FILE", "JSON file of these keys (PALPATE_CONFIG, or none)");
-    }
-    manual_line("--json", NULL, "one JSON object on stdout and nothing else");
-    manual_line("--quiet", NULL, "print nothing but a refusal");
+    for (int k = 0; k < p->n_flag; k++) manual_line(p->flag[k].name, p->flag[k].value, p->flag[k].help);
     manual_line("--help", NULL, "this text");
     if (table->config)
         printf("\nThe file and the environment take the same keys (allow_remote, PALPATE_ALLOW_REMOTE). Flags override "
@@ -93,72 +72,30 @@ int pal_flags_wrong(const pal_flag_common *common, const char *format, ...)
     return USAGE;
 }
 
-/* text is one of the words of value, "linear|corotational|neo_hookean" */
-static int set_word(const parse *p, const pal_flag *flag, const char *text)
+static void list_flags(parse *p)
 {
-    char list[200] = "";
-    size_t n = strlen(text), used = 0;
-    for (const char *word = flag->value; *word;) {
-        size_t length = strcspn(word, "|");
-        if (length == n && !strncmp(word, text, n)) {
-            *(const char **)flag->out = text;
-            return -1;
-        }
-        const char *next = word + length + (word[length] == '|');
-        const char *link = !used ? "" : *next ? ", " : " or ";
-        used += (size_t)snprintf(list + used, sizeof list - used, "%s%.*s", link, (int)length, word);
-        word = next;
+    pal_flag *flag = p->flag;
+    for (int k = 0; k < p->table->n_flag; k++) *flag++ = p->table->flag[k];
+    for (int k = 0; p->table->config && k < PAL_CONFIG_KEYS; k++) {
+        snprintf(p->name[k], KEY, "--%s", pal_config_keys[k].name);
+        for (char *c = p->name[k]; *c; c++)
+            if (*c == '_') *c = '-';
+        *flag = pal_config_keys[k];
+        flag->name = p->name[k], flag->kind = PAL_FLAG_TEXT;
+        flag++->out = &p->given[k];
     }
-    return pal_flags_wrong(p->common, "%s: \"%.60s\" is not %s", flag->name, text, list);
-}
-
-static int set_number(const parse *p, const pal_flag *flag, const char *text)
-{
-    char *end;
-    double number = strtod(text, &end);
-    if (end == text || *end || isspace((unsigned char)*text) || !isfinite(number))
-        return pal_flags_wrong(p->common, "%s: \"%.60s\" is not a number", flag->name, text);
-    if (!(number >= flag->low && number <= flag->high))
-        return pal_flags_wrong(p->common, "%s: %.15g is outside %.10g .. %.10g", flag->name, number, flag->low,
-                               flag->high);
-    if (flag->kind == PAL_FLAG_COUNT && number != floor(number))
-        return pal_flags_wrong(p->common, "%s: %.15g is not a whole number", flag->name, number);
-    if (flag->kind == PAL_FLAG_COUNT)
-        *(int *)flag->out = (int)number;
-    else
-        *(double *)flag->out = number;
-    return -1;
-}
-
-static int set_flag(parse *p, const pal_flag *flag, const char *text)
-{
-    switch (flag->kind) {
-    case PAL_FLAG_SWITCH:
-        *(bool *)flag->out = true;
-        return -1;
-    case PAL_FLAG_TEXT:
-        *(const char **)flag->out = text;
-        return -1;
-    case PAL_FLAG_WORD:
-        return set_word(p, flag, text);
-    case PAL_FLAG_NUMBER:
-    case PAL_FLAG_COUNT:
-        break;
-    }
-    return set_number(p, flag, text);
-}
-
-/* a flag of the configuration, "--allow-remote" -> allow_remote; NULL: none */
-static const pal_config_key *key_named(const pal_flag_table *table, const char *name)
-{
-    char known[KEY];
-    int n;
-    const pal_config_key *key = pal_config_keys(&n);
-    for (int k = 0; table->config && k < n; k++) {
-        flag_name(key[k].key, known);
-        if (!strcmp(known, name)) return &key[k];
-    }
-    return NULL;
+    if (p->table->config)
+        *flag++ = (pal_flag){"--config",
+                             "FILE",
+                             PAL_FLAG_TEXT,
+                             &p->config_file,
+                             0,
+                             0,
+                             "JSON file of these keys (PALPATE_CONFIG, or none)"};
+    *flag++ = (pal_flag){
+        "--json", NULL, PAL_FLAG_SWITCH, &p->common->json, 0, 0, "one JSON object on stdout and nothing else"};
+    *flag++ = (pal_flag){"--quiet", NULL, PAL_FLAG_SWITCH, &p->common->quiet, 0, 0, "print nothing but a refusal"};
+    p->n_flag = (int)(flag - p->flag);
 }
 
 /* the flag argv[*at]; moves *at over a value that is an argument of its own */
@@ -167,40 +104,24 @@ static int take(parse *p, int argc, char **argv, int *at)
     char name[KEY];
     const char *word = argv[*at], *equal = strchr(word, '=');
     snprintf(name, sizeof name, "%.*s", equal ? (int)(equal - word) : (int)strlen(word), word);
-    int found = -1;
-    for (int k = 0; k < p->table->n_flag; k++)
-        if (!strcmp(p->table->flag[k].name, name)) found = k;
-    const pal_config_key *key = found < 0 ? key_named(p->table, name) : NULL;
-    bool config_file = p->table->config && !strcmp(name, "--config");
-    bool json = !strcmp(name, "--json"), quiet = !strcmp(name, "--quiet");
-    if (found < 0 && !key && !config_file && !json && !quiet)
-        return pal_flags_wrong(p->common, "unknown flag %.60s", word);
-    bool is_switch = json || quiet || (found >= 0 && p->table->flag[found].kind == PAL_FLAG_SWITCH) ||
-                     (key && key->kind == PAL_CONFIG_KEY_BOOL);
-    if (is_switch && equal) return pal_flags_wrong(p->common, "%s takes no value", name);
-    if (!is_switch && !equal && *at + 1 >= argc) return pal_flags_wrong(p->common, "%s needs a value", name);
-    const char *text = is_switch ? "true" : equal ? equal + 1 : argv[++*at];
-    if (json) p->common->json = true;
-    if (quiet) p->common->quiet = true;
-    if (json || quiet) return -1;
-    if (config_file ? p->config_file != NULL : found >= 0 && p->seen[found])
-        return pal_flags_wrong(p->common, "%s is given twice", name);
-    for (int k = 0; key && k < p->n_given; k++)
-        if (p->given[k].key == key) return pal_flags_wrong(p->common, "%s is given twice", name);
-    if (config_file) {
-        p->config_file = text;
-    } else if (key) {
-        p->given[p->n_given].key = key;
-        p->given[p->n_given++].text = text;
-    } else {
-        p->seen[found] = true;
-        return set_flag(p, &p->table->flag[found], text);
-    }
+    int k = 0;
+    while (k < p->n_flag && strcmp(p->flag[k].name, name) != 0) k++;
+    if (k == p->n_flag) return pal_flags_wrong(p->common, "unknown flag %.60s", word);
+    const pal_flag *flag = &p->flag[k];
+    if (!flag->value && equal) return pal_flags_wrong(p->common, "%s takes no value", name);
+    if (flag->value && !equal && *at + 1 >= argc) return pal_flags_wrong(p->common, "%s needs a value", name);
+    const char *text = !flag->value ? "true" : equal ? equal + 1 : argv[++*at];
+    /* --json and --quiet, the last two, may be repeated */
+    if (p->seen[k] && k < p->n_flag - 2) return pal_flags_wrong(p->common, "%s is given twice", name);
+    p->seen[k] = true;
+    pal_diagnostic diag;
+    if (pal_flag_read(flag, text, name, flag->out, &diag)) return pal_flags_wrong(p->common, "%s", diag.text);
+    if (flag->kind == PAL_FLAG_TEXT || flag->kind == PAL_FLAG_WORD) *(const char **)flag->out = text;
     return -1;
 }
 
 /* defaults < file < environment < flags; a bad flag is wrong usage, a bad file or variable is refused input */
-static int configure(parse *p)
+static int configure(const parse *p)
 {
     pal_config *config = p->table->config;
     pal_diagnostic diag = {""};
@@ -209,12 +130,9 @@ static int configure(parse *p)
     pal_err err = file && *file ? pal_config_file(config, file, &diag) : PAL_ERR_OK;
     if (!err) err = pal_config_environment(config, environ, &diag);
     if (err) return pal_report_refusal(p->common, err, &diag);
-    for (int k = 0; k < p->n_given; k++) {
-        char name[KEY];
-        flag_name(p->given[k].key->key, name);
-        if (pal_config_set(config, p->given[k].key->key, p->given[k].text, name, &diag))
+    for (int k = 0; k < PAL_CONFIG_KEYS; k++)
+        if (p->given[k] && pal_config_set(config, pal_config_keys[k].name, p->given[k], p->name[k], &diag))
             return pal_flags_wrong(p->common, "%s", diag.text);
-    }
     return -1;
 }
 
@@ -225,11 +143,9 @@ int pal_flags_parse(const pal_flag_table *table, int argc, char **argv, pal_flag
     int n = 0;
     bool only_operands = false;
     *common = (pal_flag_common){.command = argv[0]};
-    for (int k = 1; k < argc; k++)
-        if (!strcmp(argv[k], "--"))
-            break;
-        else if (!strcmp(argv[k], "--help") || !strcmp(argv[k], "-h"))
-            return manual(table);
+    list_flags(&p);
+    for (int k = 1; k < argc && strcmp(argv[k], "--") != 0; k++)
+        if (!strcmp(argv[k], "--help") || !strcmp(argv[k], "-h")) return manual(&p);
     for (int k = 1; k < argc; k++) {
         const char *word = argv[k];
         if (!only_operands && !strcmp(word, "--")) {

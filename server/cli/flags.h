@@ -7,35 +7,16 @@
  *         {"--grid", NULL, PAL_FLAG_SWITCH, &grid, 0, 0, "keep the grid"},
  *     };
  *     const pal_flag_table table = {.usage = "prepare IN -o DIR", .about = "...", .example = "palpate prepare ...\n",
- *                                   .flag = flag, .n_flag = 3, .min_operand = 1, .max_operand = 1};
+ *                                   PAL_FLAGS(flag), .min_operand = 1, .max_operand = 1};
  *     int code = pal_flags_parse(&table, argc, argv, &common, in, &n_in);
  *     if (code >= 0) return code;
  *
  * `--name value` and `--name=value` are the same; `-o DIR` is a name like any other; `--` ends the flags. A flag may
- * stand anywhere, once. Thread: [load]. */
+ * appear anywhere, once. Thread: [load]. */
 #ifndef PAL_CLI_FLAGS_H
 #define PAL_CLI_FLAGS_H
 #include "server/cli/config.h"
 #include "server/cli/report.h"
-
-#include <stdbool.h>
-
-typedef enum pal_flag_kind {
-    PAL_FLAG_SWITCH, /* out: bool *                                            */
-    PAL_FLAG_TEXT,   /* out: const char **                                     */
-    PAL_FLAG_WORD,   /* out: const char **; one of the words of value, "on|off" */
-    PAL_FLAG_NUMBER, /* out: double *                                          */
-    PAL_FLAG_COUNT   /* out: int *                                             */
-} pal_flag_kind;
-
-typedef struct pal_flag {
-    const char *name;  /* "--resolution" or "-o"                                  */
-    const char *value; /* placeholder for the value in the manual, or its words; NULL for a switch */
-    pal_flag_kind kind;
-    void *out;        /* untouched when the flag is absent: the default           */
-    double low, high; /* range of a number; the refusal names it                  */
-    const char *help; /* one or more lines (\n) of the manual                     */
-} pal_flag;
 
 typedef struct pal_flag_table {
     const char *usage, *about; /* "prepare IN -o DIR [flags]"; paragraphs of the manual, each ends with \n */
@@ -45,9 +26,10 @@ typedef struct pal_flag_table {
     int n_flag;
     int min_operand, max_operand;
     /* not NULL: every key of the configuration is a flag as well (allow_remote: --allow-remote), and --config FILE;
-     * on success the struct holds defaults < file < environment < flags. A key of PAL_CONFIG_KEY_BOOL is a switch. */
+     * on success the struct holds defaults < file < environment < flags. */
     pal_config *config;
 } pal_flag_table;
+#define PAL_FLAGS(array) .flag = array, .n_flag = sizeof array / sizeof array[0] /* members of the table above */
 
 /* -1: continue; else the exit code: 0 after --help, 2 after one line about wrong usage, 1 for a refused configuration.
  * operand: room for max_operand; both may be NULL when that is 0. */

@@ -1,11 +1,11 @@
 #include "server/cli/report.h"
 
+#include <float.h>
 #include <math.h>
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdint.h>
 #include <stdio.h>
-#include <string.h>
 #include <unistd.h>
 
 int pal_report_code(pal_err err)
@@ -29,14 +29,10 @@ int pal_report_refusal(const pal_flag_common *common, pal_err err, const pal_dia
         if ((unsigned char)*c < 0x20 || *c == 0x7f) *c = ' ';
     pal_report_progress(NULL, 0, (void *)(uintptr_t)common);
     fprintf(stderr, "palpate %s: %s\n", common->command, text);
-    if (common->json) {
-        cJSON *object = cJSON_CreateObject();
-        cJSON_AddBoolToObject(object, "ok", false);
-        cJSON *error = cJSON_AddObjectToObject(object, "error");
-        cJSON_AddStringToObject(error, "code", pal_err_name(err));
-        cJSON_AddStringToObject(error, "text", text);
-        pal_report_json(common, object);
-    }
+    if (common->json)
+        pal_report_json(
+            common, PAL_JSON({"ok", JSON_BOOL(false)},
+                             {"error", PAL_JSON({"code", JSON_TEXT(pal_err_name(err))}, {"text", JSON_TEXT(text)})}));
     return pal_report_code(err);
 }
 
@@ -48,6 +44,14 @@ int pal_report_json(const pal_flag_common *common, cJSON *object)
     cJSON_Delete(object);
     if (!good) fprintf(stderr, "palpate %s: the JSON object could not be written\n", common->command);
     return good ? 0 : 3;
+}
+
+int pal_report_end(const pal_flag_common *common, pal_err err, const pal_diagnostic *diag, cJSON *object)
+{
+    pal_report_progress(NULL, 0, (void *)(uintptr_t)common);
+    if (!err) return common->json ? pal_report_json(common, object) : 0;
+    cJSON_Delete(object);
+    return pal_report_refusal(common, err, diag);
 }
 
 void pal_report_progress(const char *what, double fraction, void *user)
@@ -66,14 +70,21 @@ void pal_report_progress(const char *what, double fraction, void *user)
     shown = what != NULL;
 }
 
-void pal_json_add_finite(cJSON *object, const char *key, double value)
+cJSON *pal_json_finite(double value)
 {
-    if (isfinite(value)) cJSON_AddNumberToObject(object, key, value);
+    return isfinite(value) ? cJSON_CreateNumber(value) : NULL;
 }
 
-void pal_json_add_or_null(cJSON *object, const char *key, double value)
+cJSON *pal_json_or_null(double value)
 {
-    cJSON_AddItemToObject(object, key, isfinite(value) ? cJSON_CreateNumber(value) : cJSON_CreateNull());
+    return isfinite(value) && value < DBL_MAX ? cJSON_CreateNumber(value) : cJSON_CreateNull();
+}
+
+cJSON *pal_json_texts(const char *text, size_t stride, int n)
+{
+    cJSON *list = cJSON_CreateArray();
+    for (int k = 0; k < n; k++) cJSON_AddItemToArray(list, cJSON_CreateString(text + stride * (size_t)k));
+    return list;
 }
 
 /* a handler may run on any thread: a lock-free atomic is safe in it and between threads */

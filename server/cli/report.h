@@ -1,9 +1,9 @@
-/* What a command says: refusals, progress and the one JSON object. Thread: [load]. */
+/* Output of a command: refusals, progress and the one JSON object. Thread: [load]. */
 #ifndef PAL_CLI_REPORT_H
 #define PAL_CLI_REPORT_H
 #include "server/base/err.h"
+#include "server/base/json_members.h"
 
-#include <cjson/cJSON.h>
 #include <stdbool.h>
 
 /* flags that every command has */
@@ -19,9 +19,14 @@ int pal_report_code(pal_err err);
 int pal_report_refusal(const pal_flag_common *common, pal_err err, const pal_diagnostic *diag);
 /* prints the object on stdout (one line) and takes it; the result is 0, or 3 when it could not be made or written */
 int pal_report_json(const pal_flag_common *common, cJSON *object);
-/* a number that is not finite is left out, or becomes null */
-void pal_json_add_finite(cJSON *object, const char *key, double value);
-void pal_json_add_or_null(cJSON *object, const char *key, double value);
+/* the end of a command, which clears the progress line: the refusal of err; or with --json the object, which is taken,
+ * and NULL without; the exit code */
+int pal_report_end(const pal_flag_common *common, pal_err err, const pal_diagnostic *diag, cJSON *object);
+/* a number that is not finite is left out, or (DBL_MAX as well) becomes null */
+cJSON *pal_json_finite(double value);
+cJSON *pal_json_or_null(double value);
+/* n texts that are stored stride bytes apart */
+cJSON *pal_json_texts(const char *text, size_t stride, int n);
 
 /* progress on one line of stderr that is rewritten, "fill 42 %"; only on a terminal, without --quiet and --json. user
  * is the pal_flag_common, so that it fits callbacks; what NULL clears the line */

@@ -4,14 +4,15 @@
  * the result is the same to the bit for any number of ranks and after an interruption: evaluations in the journal are
  * read instead of computed. */
 #include "server/base/clock.h"
+#include "server/base/hash.h"
 #include "server/base/team.h"
 #include "server/calibrate/calibrate_cases.h"
-#include "server/calibrate/calibrate_journal.h"
+#include "server/calibrate/journal.h"
 #include "server/cli/flags.h"
+#include "server/mesh/files/file_bytes.h"
 #include "server/num/anneal.h"
 #include "server/scene/scene_file.h"
 
-#include <errno.h>
 #include <float.h>
 #include <limits.h>
 #include <math.h>
@@ -24,12 +25,11 @@
 enum { MAX_PROBLEM = 256, MAX_SEED = 64, TAG_COUNT = 1, TAG_THETA, TAG_COST, COUNT_END = -1 };
 
 static const char about[] =
-    "Calibrates springs as `palpate calibrate --method annealing` does, with evaluations distributed over MPI ranks, "
-    "for\n"
-    "many problems and seeds one after another. Every evaluation is written to the journal; a run that is started "
-    "again\n"
-    "with the same journal reads them from there and ends with the same result. A problem that is refused is reported\n"
-    "and the next one started. -o DIR: DIR/NAME.json with the constants of each (NAME_S.json with several seeds S).\n";
+    "Calibrates springs as `palpate calibrate --method annealing` does, with evaluations distributed over MPI\n"
+    "ranks, for many problems and seeds one after another. Every evaluation is written to the journal; a run that\n"
+    "is started again with the same journal reads them from there and ends with the same result. A problem that\n"
+    "is refused is reported and the next one started. -o DIR: DIR/NAME.json with the constants of each\n"
+    "(NAME_S.json with several seeds S).\n";
 
 /* the state of one process */
 typedef struct job {
@@ -81,6 +81,29 @@ static pal_err agree(job *j, pal_err err)
     MPI_Bcast(&code, 1, MPI_INT, first, MPI_COMM_WORLD);
     MPI_Bcast(j->diag.text, sizeof j->diag.text, MPI_CHAR, first, MPI_COMM_WORLD);
     return (pal_err)code;
+}
+
+/* ---- journal: theta = error in per cent, or `none`: no stable equilibrium ---- */
+
+static bool find_evaluation(const job *j, const double *theta, double *cost)
+{
+    char *key = j->journal ? pal_journal_text(theta, (size_t)j->info.n_parameter) : NULL;
+    const char *value = key ? pal_journal_find(j->journal, key) : NULL;
+    bool none = value && !strcmp(value, "none");
+    free(key);
+    if (none) *cost = DBL_MAX;
+    return none || (value && pal_journal_numbers(value, cost, 1));
+}
+
+static pal_err store_evaluation(job *j, const double *theta, double cost)
+{
+    if (!j->journal) return PAL_ERR_OK;
+    char *key = pal_journal_text(theta, (size_t)j->info.n_parameter);
+    char *value = cost < DBL_MAX ? pal_journal_text(&cost, 1) : strdup("none");
+    pal_err err = key && value ? pal_journal_put(j->journal, key, value, &j->diag)
+                               : pal_diagnostic_set(&j->diag, PAL_ERR_MEMORY, "no memory for a line of the journal");
+    free(key), free(value);
+    return err;
 }
 
 /* ---- evaluations ---- */
@@ -142,8 +165,8 @@ static pal_err gather(job *j, int rank, const double *theta, int m, double *cost
         j->n_computed++;
         if (isnan(cost[at]))
             j->no_memory = true;
-        else if (!err && j->journal)
-            err = pal_journal_put(j->journal, theta + (size_t)at * (size_t)j->info.n_parameter, cost[at], &j->diag);
+        else if (!err)
+            err = store_evaluation(j, theta + (size_t)at * (size_t)j->info.n_parameter, cost[at]);
     }
     return err;
 }
@@ -155,7 +178,7 @@ static pal_err evaluate(void *user, const double *theta, int n, double *cost)
     size_t n_parameter = (size_t)j->info.n_parameter;
     int m = 0, waiting = 0;
     for (int i = 0; i < n; i++) {
-        if (j->journal && pal_journal_find(j->journal, theta + (size_t)i * n_parameter, &cost[i]))
+        if (find_evaluation(j, theta + (size_t)i * n_parameter, &cost[i]))
             j->n_taken++;
         else
             j->missing[m++] = i;
@@ -184,46 +207,38 @@ static pal_err evaluate(void *user, const double *theta, int n, double *cost)
 
 /* ---- a problem ---- */
 
-/* stands for everything that an evaluation depends on, and its answer at the start */
+/* a hash of everything that an evaluation depends on, and of its result at the start */
 static uint64_t fingerprint(const job *j, double start_percent)
 {
     const pal_tets *t = &j->info.mesh->tets;
     size_t n = 3 * sizeof(double) * (size_t)t->n_node, n_theta = sizeof(double) * (size_t)j->info.n_parameter;
-    uint64_t sum = pal_journal_hash(0, PAL_VERSION, sizeof PAL_VERSION);
+    uint64_t sum = pal_hash_bytes(PAL_HASH_START, PAL_VERSION, sizeof PAL_VERSION);
     const int facts[8] = {j->info.n_parameter, j->info.n_kind,          j->info.n_node,         j->info.n_tet,
                           j->options.equal,    j->options.without_area, j->options.grid[0] > 0, j->info.n_spring};
-    sum = pal_journal_hash(sum, facts, sizeof facts);
-    sum = pal_journal_hash(sum, t->x, n);
-    sum = pal_journal_hash(sum, t->tet, 4 * sizeof *t->tet * (size_t)t->n_tet);
-    sum = pal_journal_hash(sum, j->info.start, n_theta);
-    sum = pal_journal_hash(sum, j->info.low, n_theta);
+    sum = pal_hash_bytes(sum, facts, sizeof facts);
+    sum = pal_hash_bytes(sum, t->x, n);
+    sum = pal_hash_bytes(sum, t->tet, 4 * sizeof *t->tet * (size_t)t->n_tet);
+    sum = pal_hash_bytes(sum, j->info.start, n_theta);
+    sum = pal_hash_bytes(sum, j->info.low, n_theta);
     for (int k = 0; k < j->set->n; k++) {
         const pal_calibrate_case *one = &j->set->list[k];
         const int what[3] = {one->fit, one->linear, j->info.n_point[k]};
         if (!one->fit) continue;
-        sum = pal_journal_hash(sum, what, sizeof what);
-        sum = pal_journal_hash(sum, pal_calibration_forces(j->c, k), n);
-        sum = pal_journal_hash(sum, &j->info.max_m[k], sizeof(double));
-        if (one->samples) sum = pal_journal_hash(sum, one->samples->x, 3 * sizeof(double) * (size_t)one->samples->n);
-        if (one->samples) sum = pal_journal_hash(sum, one->samples->u, 3 * sizeof(double) * (size_t)one->samples->n);
+        sum = pal_hash_bytes(sum, what, sizeof what);
+        sum = pal_hash_bytes(sum, pal_calibration_forces(j->c, k), n);
+        sum = pal_hash_bytes(sum, &j->info.max_m[k], sizeof(double));
+        if (one->samples) sum = pal_hash_bytes(sum, one->samples->x, 3 * sizeof(double) * (size_t)one->samples->n);
+        if (one->samples) sum = pal_hash_bytes(sum, one->samples->u, 3 * sizeof(double) * (size_t)one->samples->n);
     }
-    return pal_journal_hash(sum, &start_percent, sizeof start_percent);
+    return pal_hash_bytes(sum, &start_percent, sizeof start_percent);
 }
 
 static pal_err make(job *j, const char *problem)
 {
-    pal_diagnostic reason = {""};
     pal_calibration_value v;
-    pal_calibrate_options o = j->options;
     j->input.problem = problem;
     PAL_TRY(pal_calibrate_cases_read(&j->input, j->set, &j->diag));
-    pal_err err = PAL_ERR_OK;
-    if (o.voxel.resolution == 0) err = pal_calibrate_cases_resolution(j->set, &o.voxel, &o.voxel.resolution, &reason);
-    if (!err)
-        err = pal_calibration_create(j->set->problem, &j->set->surface, j->set->list, j->set->n, &o, &j->c, &reason);
-    if (err) return pal_diagnostic_set(&j->diag, err, "%s: %s", problem, reason.text);
-    pal_calibration_info_of(j->c, &j->info);
-    PAL_TRY(pal_calibrate_cases_check(j->set, j->info.mesh, &j->diag));
+    PAL_TRY(pal_calibrate_cases_make(j->set, &j->options, &j->c, &j->info, &j->diag));
     size_t batch = (size_t)j->n_batch;
     j->theta = malloc(batch * (size_t)j->info.n_parameter * sizeof *j->theta);
     j->cost = malloc(batch * sizeof *j->cost);
@@ -267,75 +282,49 @@ static pal_err same_everywhere(job *j, const char *problem)
 
 /* ---- results ---- */
 
-static void add_percent(cJSON *to, const char *key, double percent)
-{
-    if (percent < DBL_MAX)
-        cJSON_AddNumberToObject(to, key, percent);
-    else
-        cJSON_AddNullToObject(to, key);
-}
-
 /* independent of ranks and time */
 static cJSON *as_json(const job *j, int seed, const double *theta, const pal_fit_result *r)
 {
     static const char *const name[PAL_SPRING_KINDS] = {"k_distance_J", "k_area_J", "k_volume_J"};
-    cJSON *o = cJSON_CreateObject();
-    cJSON_AddBoolToObject(o, "ok", true);
-    cJSON_AddStringToObject(o, "problem", j->set->problem->name);
-    cJSON_AddNumberToObject(o, "seed", seed);
-    cJSON *cases = cJSON_AddArrayToObject(o, "cases");
-    for (int k = 0; k < j->set->n; k++) {
-        cJSON *one = cJSON_CreateObject();
-        cJSON_AddStringToObject(one, "id", j->set->id[k]);
-        cJSON_AddBoolToObject(one, "fitted", j->set->list[k].fit);
-        add_percent(one, "percent", r->value.case_percent[k]);
-        cJSON_AddItemToArray(cases, one);
-    }
-    add_percent(o, "start_percent", r->start_percent);
-    add_percent(o, "error_percent", r->value.error_percent);
-    cJSON_AddNumberToObject(o, "evaluations", (double)r->n_evaluation);
-    cJSON_AddNumberToObject(o, "rejected", (double)r->n_rejected);
-    cJSON_AddStringToObject(o, "ended", r->ended);
-    cJSON_AddNumberToObject(o, "nodes", j->info.n_node);
-    cJSON_AddNumberToObject(o, "used", j->info.n_used);
-    cJSON *constants = cJSON_AddObjectToObject(o, "constants");
+    cJSON *cases = cJSON_CreateArray(), *constants = cJSON_CreateObject(), *exact = cJSON_CreateArray();
+    for (int k = 0; k < j->set->n; k++)
+        cJSON_AddItemToArray(cases,
+                             PAL_JSON({"id", JSON_TEXT(j->set->id[k])}, {"fitted", JSON_BOOL(j->set->list[k].fit)},
+                                      {"percent", pal_json_or_null(r->value.case_percent[k])}));
     for (int k = 0; k < j->info.n_kind; k++) {
         cJSON *list = cJSON_AddArrayToObject(constants, name[j->info.kind[k]]);
         for (int i = 0; i < j->info.n_used; i++)
-            cJSON_AddItemToArray(list, cJSON_CreateNumber(exp(theta[k * j->info.n_used + i])));
+            cJSON_AddItemToArray(list, JSON_NUMBER(exp(theta[k * j->info.n_used + i])));
     }
     /* logarithms, exact to the bit */
-    cJSON *exact = cJSON_AddArrayToObject(o, "ln_constants");
     for (int i = 0; i < j->info.n_parameter; i++) {
         char text[40];
         snprintf(text, sizeof text, "%a", theta[i]);
-        cJSON_AddItemToArray(exact, cJSON_CreateString(text));
+        cJSON_AddItemToArray(exact, JSON_TEXT(text));
     }
-    return o;
+    return PAL_JSON({"ok", JSON_BOOL(true)}, {"problem", JSON_TEXT(j->set->problem->name)}, {"seed", JSON_NUMBER(seed)},
+                    {"cases", cases}, {"start_percent", pal_json_or_null(r->start_percent)},
+                    {"error_percent", pal_json_or_null(r->value.error_percent)},
+                    {"evaluations", JSON_NUMBER(r->n_evaluation)}, {"rejected", JSON_NUMBER(r->n_rejected)},
+                    {"ended", JSON_TEXT(r->ended)}, {"nodes", JSON_NUMBER(j->info.n_node)},
+                    {"used", JSON_NUMBER(j->info.n_used)}, {"constants", constants}, {"ln_constants", exact});
 }
 
 /* writes DIR/NAME.json whole or not at all */
 static pal_err write_result(job *j, const char *problem, int seed, const cJSON *result)
 {
-    char path[1200], temporary[1220], tail[32] = "";
+    char path[1200], tail[32] = "";
     const char *name = strrchr(problem, '/') ? strrchr(problem, '/') + 1 : problem, *dot = strrchr(name, '.');
     if (!j->folder) return PAL_ERR_OK;
     if (j->n_seed > 1) snprintf(tail, sizeof tail, "_%d", seed);
     int n = snprintf(path, sizeof path, "%.900s/%.*s%s.json", j->folder, dot ? (int)(dot - name) : 200, name, tail);
     if (n < 0 || (size_t)n >= sizeof path)
         return pal_diagnostic_set(&j->diag, PAL_ERR_REFUSED, "%.200s: too long", problem);
-    snprintf(temporary, sizeof temporary, "%s.part", path);
     char *text = result ? cJSON_Print(result) : NULL;
     if (!text) return pal_diagnostic_set(&j->diag, PAL_ERR_MEMORY, "%.200s: no memory for the result", path);
-    FILE *file = fopen(temporary, "we");
-    bool good = file && fprintf(file, "%s\n", text) > 0;
-    if (file) good = fclose(file) == 0 && good;
-    if (good) good = rename(temporary, path) == 0;
+    pal_err err = pal_file_write(path, text, strlen(text), &j->diag);
     cJSON_free(text);
-    if (good) return PAL_ERR_OK;
-    int reason = errno;
-    remove(temporary);
-    return pal_diagnostic_set(&j->diag, PAL_ERR_IO, "%.300s: cannot be written: %s", path, strerror(reason));
+    return err;
 }
 
 static void print(const job *j, const char *problem, int seed, const pal_fit_result *r)
@@ -393,9 +382,7 @@ static pal_err run_one(job *j, const char *problem, cJSON *results)
 {
     pal_err err = agree(j, make(j, problem));
     if (!err) err = agree(j, same_everywhere(j, problem));
-    if (!err)
-        err = agree(j, j->journal ? pal_journal_begin(j->journal, j->fingerprint, j->info.n_parameter, &j->diag)
-                                  : PAL_ERR_OK);
+    if (!err) err = agree(j, j->journal ? pal_journal_begin(j->journal, j->fingerprint, &j->diag) : PAL_ERR_OK);
     if (!err && j->rank > 0) serve(j);
     if (!err && j->rank == 0) {
         for (int s = 0; s < j->n_seed && !err; s++) err = fit(j, problem, j->seed[s], results);
@@ -404,29 +391,6 @@ static pal_err run_one(job *j, const char *problem, cJSON *results)
     err = agree(j, err);
     unmake(j);
     return err;
-}
-
-static void add_refusal(cJSON *results, const char *problem, pal_err err, const pal_diagnostic *diag)
-{
-    cJSON *one = cJSON_CreateObject();
-    cJSON_AddBoolToObject(one, "ok", false);
-    cJSON_AddStringToObject(one, "problem", problem);
-    cJSON *error = cJSON_AddObjectToObject(one, "error");
-    cJSON_AddStringToObject(error, "code", pal_err_name(err));
-    cJSON_AddStringToObject(error, "text", diag->text);
-    cJSON_AddItemToArray(results, one);
-}
-
-/* depends on ranks and time */
-static cJSON *add_run(const job *j, cJSON *object, double seconds)
-{
-    cJSON *run = cJSON_AddObjectToObject(object, "run");
-    cJSON_AddNumberToObject(run, "ranks", j->n_rank);
-    cJSON_AddNumberToObject(run, "workers", pal_team_size(j->team));
-    cJSON_AddNumberToObject(run, "computed", (double)j->n_computed);
-    cJSON_AddNumberToObject(run, "from_journal", (double)j->n_taken);
-    cJSON_AddNumberToObject(run, "seconds", seconds);
-    return object;
 }
 
 static pal_err prepare(job *j)
@@ -444,9 +408,7 @@ static int run(job *j)
 {
     double begin = pal_clock_s();
     int code = 0;
-    cJSON *object = cJSON_CreateObject();
-    cJSON_AddBoolToObject(object, "ok", true);
-    cJSON *results = cJSON_AddArrayToObject(object, "results");
+    cJSON *results = cJSON_CreateArray();
     pal_err err = agree(j, prepare(j));
     int mine = err ? 1 : pal_team_size(j->team), max_team;
     MPI_Allreduce(&mine, &max_team, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
@@ -459,21 +421,26 @@ static int run(job *j)
             err = one;
             break;
         }
-        add_refusal(results, j->problem[p], one, &j->diag);
+        cJSON *error = PAL_JSON({"code", JSON_TEXT(pal_err_name(one))}, {"text", JSON_TEXT(j->diag.text)});
+        cJSON_AddItemToArray(
+            results, PAL_JSON({"ok", JSON_BOOL(false)}, {"problem", JSON_TEXT(j->problem[p])}, {"error", error}));
         fprintf(stderr, "palpate-calibrate-mpi: %s\n", j->diag.text);
     }
-    if (j->rank == 0) {
-        if (err) code = pal_report_refusal(&j->common, err, &j->diag);
-        if (!err && code) cJSON_ReplaceItemInObject(object, "ok", cJSON_CreateFalse());
-        add_run(j, object, pal_clock_s() - begin);
-        if (!err && !j->common.json && !j->common.quiet)
-            printf("%d ranks of %d workers: %lld evaluations computed, %lld from the journal, %.1f s\n", j->n_rank,
-                   pal_team_size(j->team), (long long)j->n_computed, (long long)j->n_taken, pal_clock_s() - begin);
-        if (!err && j->common.json) {
-            int bad = pal_report_json(&j->common, object);
-            object = NULL;
-            code = bad ? bad : code;
-        }
+    double seconds = pal_clock_s() - begin;
+    int n_worker = j->team ? pal_team_size(j->team) : 0;
+    /* how the work was done: depends on ranks and time */
+    cJSON *how = PAL_JSON({"ranks", JSON_NUMBER(j->n_rank)}, {"workers", JSON_NUMBER(n_worker)},
+                          {"computed", JSON_NUMBER(j->n_computed)}, {"from_journal", JSON_NUMBER(j->n_taken)},
+                          {"seconds", JSON_NUMBER(seconds)});
+    cJSON *object = PAL_JSON({"ok", JSON_BOOL(code == 0)}, {"results", results}, {"run", how});
+    if (j->rank == 0 && err) code = pal_report_refusal(&j->common, err, &j->diag);
+    if (j->rank == 0 && !err && !j->common.json && !j->common.quiet)
+        printf("%d ranks of %d workers: %lld evaluations computed, %lld from the journal, %.1f s\n", j->n_rank,
+               n_worker, (long long)j->n_computed, (long long)j->n_taken, seconds);
+    if (j->rank == 0 && !err && j->common.json) {
+        int bad = pal_report_json(&j->common, object);
+        object = NULL;
+        code = bad ? bad : code;
     }
     cJSON_Delete(object);
     pal_journal_close(j->journal);
@@ -487,28 +454,14 @@ static int run(job *j)
 /* "1,2,3"; NULL: fine */
 static const char *read_seeds(job *j)
 {
-    const char *at = j->seed_text ? j->seed_text : "0";
-    for (; j->n_seed < MAX_SEED; at++) {
-        char *end;
-        errno = 0;
-        long n = strtol(at, &end, 10);
-        if (*at < '0' || *at > '9' || errno || n > INT_MAX) break;
-        j->seed[j->n_seed++] = (int)n;
-        at = end;
-        if (!*at) return NULL;
-        if (*at != ',') break;
-    }
-    return "--seed: is not a list of up to 64 whole numbers, as 1,2,3";
-}
-
-static const char *read_grid(job *j)
-{
-    int n = 0, *g = j->options.grid;
-    if (!j->grid_text) return NULL;
-    if (sscanf(j->grid_text, "%4dx%4dx%4d%n", &g[0], &g[1], &g[2], &n) == 3 && !j->grid_text[n] && g[0] > 0 &&
-        g[1] > 0 && g[2] > 0)
-        return NULL;
-    return "--grid: is not NXxNYxNZ, three numbers of nodes from 1 to 1024, as 5x3x5";
+    char word[16];
+    const char *rest = j->seed_text ? j->seed_text : "0";
+    const pal_flag seed = {.kind = PAL_FLAG_COUNT, .high = INT_MAX};
+    while (pal_flag_next_word(&rest, word, sizeof word))
+        if (j->n_seed == MAX_SEED || !word[0] || word[strspn(word, "0123456789")] ||
+            pal_flag_read(&seed, word, "", &j->seed[j->n_seed++], NULL))
+            return "--seed: is not a list of up to 64 whole numbers, as 1,2,3";
+    return NULL;
 }
 
 static int parse(job *j, int argc, char **argv)
@@ -538,8 +491,7 @@ static int parse(job *j, int argc, char **argv)
                                   .example =
                                       "mpirun --oversubscribe -n 2 palpate-calibrate-mpi deploy/problems/gear.json "
                                       "--case twist --resolution 8 --evaluations 40 --journal gear.txt -o fits\n",
-                                  .flag = flag,
-                                  .n_flag = sizeof flag / sizeof flag[0],
+                                  PAL_FLAGS(flag),
                                   .min_operand = 1,
                                   .max_operand = MAX_PROBLEM};
     pal_calibrate_default(&j->options);
@@ -548,9 +500,8 @@ static int parse(job *j, int argc, char **argv)
     int code = pal_flags_parse(&table, argc, argv, &j->common, j->problem, &j->n_problem);
     if (code >= 0) return code;
     const char *wrong = j->input.fit ? read_seeds(j) : "--case ID is missing";
-    if (!wrong) wrong = read_grid(j);
-    if (!wrong) return -1;
-    return pal_flags_wrong(&j->common, "%s", wrong);
+    if (!wrong && j->grid_text) wrong = pal_calibrate_grid(j->grid_text, j->options.grid);
+    return wrong ? pal_flags_wrong(&j->common, "%s", wrong) : -1;
 }
 
 int main(int argc, char **argv)

@@ -4,13 +4,14 @@
 #include "server/calibrate/calibrate_run.h"
 #include "server/cli/flags.h"
 #include "server/commands/commands.h"
+#include "server/commands/tuning.h"
+#include "server/num/median.h"
+#include "server/scene/json_reader.h"
 
 #include <errno.h>
 #include <float.h>
 #include <limits.h>
 #include <math.h>
-#include <signal.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,14 +20,15 @@
 
 static const char about[] =
     "Finds spring constants (edges, faces, volumes) whose equilibrium matches finite elements or measured\n"
-    "displacements, and writes a scene for palpate serve. PROBLEM.json is that of palpate solve. A name of --case is\n"
-    "a load case, whose truth is computed by finite elements, or a reference, whose CSV is the truth. The error is "
-    "the\n"
-    "RMS distance in per cent of the largest displacement of the truth, averaged over the fitted cases.\n"
-    "Ctrl-C ends the search and writes the best result; a second Ctrl-C ends the process.\n";
+    "displacements, and writes a scene for palpate serve. PROBLEM.json is that of palpate solve. A name of --case\n"
+    "is a load case, whose truth is computed by finite elements, or a reference, whose CSV is the truth. The\n"
+    "error is the RMS distance in per cent of the largest displacement of the truth, averaged over the fitted\n"
+    "cases. Ctrl-C ends the search and writes the best result; a second Ctrl-C ends the process.\n";
 
-static const double LIVE_WORK_1_S = 7.5e7; /* sub-steps times tetrahedra per second of one core of a 2020s server */
-enum { MAX_GRID = 16000 };                 /* three numbers of 20 characters each fit into the 1 MiB of a scene file */
+enum {
+    MANY_SUBSTEPS = 200,
+    MAX_GRID = 16000
+}; /* grid: three numbers of 20 characters each fit into the 1 MiB of a scene file */
 
 typedef struct arguments {
     const char *problem, *grid, *method, *weights, *area;
@@ -59,33 +61,15 @@ static bool record_step(void *user, const pal_fit_step *step)
     pal_calibrate_run *run = user;
     if (run->n_trail == run->max_trail) {
         int more = run->max_trail > 0 ? 2 * run->max_trail : 256;
-        double *error = realloc(run->error, (size_t)more * sizeof *error);
-        if (error) run->error = error;
-        double *best = error ? realloc(run->best, (size_t)more * sizeof *best) : NULL;
-        if (best) run->best = best;
-        if (best) run->max_trail = more;
+        double(*trail)[2] = realloc(run->trail, (size_t)more * sizeof *trail);
+        if (trail) run->trail = trail, run->max_trail = more;
     }
     if (run->n_trail < run->max_trail) {
-        run->error[run->n_trail] = step->error_percent;
-        run->best[run->n_trail++] = step->best_percent;
+        run->trail[run->n_trail][0] = step->error_percent;
+        run->trail[run->n_trail++][1] = step->best_percent;
     }
     show_fit(run, step);
     return !pal_stop_asked();
-}
-
-/* "5x3x5"; false: text is not that */
-static bool read_grid(const char *text, int grid[3])
-{
-    const char *at = text;
-    for (int a = 0; a < 3; a++) {
-        char *end;
-        if (*at < '0' || *at > '9') return false;
-        long n = strtol(at, &end, 10);
-        if (n < 1 || n > 1024 || *end != (a < 2 ? 'x' : 0)) return false;
-        grid[a] = (int)n;
-        at = end + 1;
-    }
-    return true;
 }
 
 /* NULL: the flags fit together, else the sentence */
@@ -93,8 +77,8 @@ static const char *read_arguments(pal_calibrate_run *run, const arguments *args)
 {
     if (!run->input.fit || !*run->input.fit) return "--case ID is missing";
     if (!run->scene || !*run->scene) return "-o SCENE.json is missing";
-    if (args->grid && !read_grid(args->grid, run->options.grid))
-        return "--grid: is not NXxNYxNZ, three numbers of nodes from 1 to 1024, as 5x3x5";
+    const char *wrong = args->grid ? pal_calibrate_grid(args->grid, run->options.grid) : NULL;
+    if (wrong) return wrong;
     run->annealing = args->method && !strcmp(args->method, "annealing");
     run->options.equal = args->weights && !strcmp(args->weights, "equal");
     if (args->area) run->options.without_area = !strcmp(args->area, "off");
@@ -115,11 +99,8 @@ static bool is_same_file(const char *a, const char *b)
     const char *path[2] = {a, b}, *name[2];
     for (int k = 0; k < 2; k++) {
         const char *slash = strrchr(path[k], '/');
-        int n = slash ? (int)(slash - path[k]) + 1 : 0;
-        name[k] = path[k] + n;
-        if (n >= PATH_MAX) return false;
-        snprintf(folder, sizeof folder, "%.*s", n > 0 ? n : 1, n > 0 ? path[k] : ".");
-        if (!realpath(folder, real[k])) return false;
+        name[k] = slash ? slash + 1 : path[k];
+        if (!pal_json_folder(path[k], folder, sizeof folder) || !realpath(folder, real[k])) return false;
     }
     return !strcmp(real[0], real[1]) && !strcmp(name[0], name[1]);
 }
@@ -131,19 +112,12 @@ static pal_err check_target(const char *flag, const char *path, pal_diagnostic *
     struct stat facts;
     if (!path) return PAL_ERR_OK;
     const char *slash = strrchr(path, '/');
-    int n = slash == path ? snprintf(folder, sizeof folder, "/")
-            : slash       ? snprintf(folder, sizeof folder, "%.*s", (int)(slash - path), path)
-                          : snprintf(folder, sizeof folder, ".");
-    if (n < 0 || (size_t)n + 64 >= sizeof folder || !path[0] || (slash && !slash[1]))
+    if (!pal_json_folder(path, folder, sizeof folder) || !path[0] || (slash && !slash[1]))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: \"%.80s\" is not the name of a file", flag, path);
     if (stat(folder, &facts) || !S_ISDIR(facts.st_mode))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s: there is no folder %.200s", flag, path, folder);
-    snprintf(folder + n, sizeof folder - (size_t)n, "/.palpate_XXXXXX");
-    int file = mkstemp(folder);
-    if (file < 0)
+    if (access(folder, W_OK | X_OK))
         return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %.200s: cannot be written: %s", flag, path, strerror(errno));
-    close(file);
-    unlink(folder);
     if (!stat(path, &facts) && S_ISDIR(facts.st_mode))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s is a folder, wanted a file in it", flag, path);
     if (!stat(path, &facts) && !S_ISREG(facts.st_mode))
@@ -198,21 +172,13 @@ static pal_err check_sources(const pal_calibrate_run *run, pal_diagnostic *diag)
 
 static pal_err make(pal_calibrate_run *run, pal_diagnostic *diag)
 {
-    pal_diagnostic reason = {""};
-    pal_case_voxel_options *voxel = &run->options.voxel;
     run->options.progress = pal_report_continue;
     run->options.user = &run->common;
-    pal_err err = PAL_ERR_OK;
-    if (voxel->resolution == 0) err = pal_calibrate_cases_resolution(&run->set, voxel, &voxel->resolution, &reason);
-    if (!err)
-        err = pal_calibration_create(run->set.problem, &run->set.surface, run->set.list, run->set.n, &run->options,
-                                     &run->calibration, &reason);
-    if (err) return pal_diagnostic_set(diag, err, "%s: %s", run->input.problem, reason.text);
-    pal_calibration_info_of(run->calibration, &run->info);
+    PAL_TRY(pal_calibrate_cases_make(&run->set, &run->options, &run->calibration, &run->info, diag));
     run->theta = malloc(sizeof *run->theta * (size_t)run->info.n_parameter);
     if (!run->theta || pal_calibration_workspace_create(run->calibration, &run->workspace))
         return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for %d constants", run->info.n_parameter);
-    return pal_calibrate_cases_check(&run->set, run->info.mesh, diag);
+    return PAL_ERR_OK;
 }
 
 static pal_err search(pal_calibrate_run *run, pal_diagnostic *diag)
@@ -233,7 +199,7 @@ static pal_err search(pal_calibrate_run *run, pal_diagnostic *diag)
     return pal_calibration_evaluate(c, run->workspace, run->theta, ALL, &run->last, NULL, diag);
 }
 
-/* runs the springs live: does the body come to rest where the search says, with which damping? */
+/* runs the springs live: does the body come to rest at the equilibrium of the search, with which damping? */
 static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_diagnostic *diag)
 {
     pal_settle_load load[PAL_CALIBRATE_CASES];
@@ -244,7 +210,8 @@ static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_diagn
     options.progress = pal_report_continue;
     options.user = &run->common;
     /* as long as the search at most; counted in sub-steps, so that the scene does not depend on the clock */
-    if (run->fit.budget_s > 0) options.max_work = fmin(options.max_work, LIVE_WORK_1_S * fmax(run->fit.budget_s, 1));
+    if (run->fit.budget_s > 0)
+        options.max_work = fmin(options.max_work, PAL_LIVE_WORK_1_S * fmax(run->fit.budget_s, 1));
     if (!u) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for %d loads", run->set.n);
     for (int k = 0; k < run->set.n; k++) {
         bool rests = pal_calibration_displacement(run->calibration, run->workspace, k, u + n * (size_t)k);
@@ -291,6 +258,231 @@ static pal_err work(pal_calibrate_run *run, pal_diagnostic *diag)
     return err;
 }
 
+static const char *truth_of(const pal_calibrate_run *run, int index)
+{
+    const char *name = run->set.list[index].truth_name;
+    return name ? name : "finite elements";
+}
+
+/* ---- report: constants ---- */
+
+/* minimum, median and maximum of a kind on the grid */
+typedef struct spread {
+    double min, middle, max;
+} spread;
+
+static spread spread_of(const pal_calibrate_run *run, int k)
+{
+    int n = run->info.n_used;
+    const double *theta = run->theta + (size_t)k * (size_t)n;
+    double *sorted = malloc((size_t)n * sizeof *sorted);
+    if (!sorted) return (spread){NAN, NAN, NAN};
+    memcpy(sorted, theta, (size_t)n * sizeof *sorted);
+    double middle = 0.5 * (pal_median(sorted, n) + sorted[(n - 1) / 2]);
+    spread out = {exp(sorted[0]), exp(middle), exp(sorted[n - 1])};
+    free(sorted);
+    return out;
+}
+
+static double ratio_of(const pal_calibrate_run *run, int k)
+{
+    return exp(run->theta[k * run->info.n_used] - run->info.start[k * run->info.n_used]);
+}
+
+/* Number of constants of kind k at a bound: displacements alone do not determine them. */
+static int count_bound(const pal_calibrate_run *run, int k)
+{
+    const pal_calibration_info *i = &run->info;
+    int n = 0;
+    for (int p = k * i->n_used; p < (k + 1) * i->n_used; p++)
+        n += run->theta[p] <= i->low[p] + 1e-6 || run->theta[p] >= i->high[p] - 1e-6;
+    return n;
+}
+
+/* ---- report: text ---- */
+
+/* "12.34 %", or "no rest" */
+static const char *percent(char out[32], double value)
+{
+    if (isnan(value))
+        snprintf(out, 32, "-");
+    else if (value < DBL_MAX)
+        snprintf(out, 32, value < 0.0995 ? "%.2g %%" : value < 9.95 ? "%.2f %%" : "%.1f %%", value);
+    else
+        snprintf(out, 32, "no rest");
+    return out;
+}
+
+static void print_row(const pal_calibrate_run *run, const char *id, const char *role, const char *truth, double start,
+                      double hand, double found, double live)
+{
+    char a[32], b[32], c[32], d[32];
+    printf("  %-16s %-10s %-18s %10s %10s %10s", id, role, truth, percent(a, start), percent(b, hand),
+           percent(c, found));
+    if (run->settled) printf(" %12s", percent(d, live));
+    printf("\n");
+}
+
+static void print_cases(const pal_calibrate_run *run)
+{
+    printf("\n  %-16s %-10s %-18s %10s %10s %10s%s\n", "load case", "", "truth", "start", "by hand", "calibrated",
+           run->settled ? "  live differs" : "");
+    int n_fit = 0;
+    for (int k = 0; k < run->set.n; k++) {
+        bool fit = run->set.list[k].fit;
+        n_fit += fit;
+        print_row(run, run->set.id[k], fit ? "fitted" : "not fitted", truth_of(run, k), run->start.case_percent[k],
+                  run->hand.case_percent[k], run->last.case_percent[k], run->live.load[k].difference_percent);
+    }
+    if (n_fit > 1)
+        print_row(run, "mean", "fitted", "", pal_calibrate_mean(run, &run->start, true),
+                  pal_calibrate_mean(run, &run->hand, true), pal_calibrate_mean(run, &run->last, true), NAN);
+    printf("\n");
+}
+
+static void print_constants(const pal_calibrate_run *run)
+{
+    for (int k = 0; k < run->info.n_kind; k++) {
+        if (!run->info.grid) {
+            printf("%s %.6g J, %.3g times the start%s\n", pal_calibrate_key(run, k, true), exp(run->theta[k]),
+                   ratio_of(run, k), count_bound(run, k) ? ", as far as --decades lets it go" : "");
+            continue;
+        }
+        spread s = spread_of(run, k);
+        printf("%s %.3g to %.3g J, median %.3g", pal_calibrate_key(run, k, true), s.min, s.max, s.middle);
+        if (count_bound(run, k)) printf(", %d as far as --decades lets them go", count_bound(run, k));
+        printf("\n");
+    }
+}
+
+static void print_live(const pal_calibrate_run *run)
+{
+    double damping = run->damping_1_s;
+    bool linear = false;
+    for (int k = 0; k < run->set.n; k++) linear |= run->set.list[k].linear;
+    if (!run->settled)
+        printf("live: stopped before its damping was looked for\n");
+    else if (run->live.steady)
+        printf(
+            "live: steady after %.2f s with damping %g 1/s, as far from the rest that Newton finds as the table says\n",
+            run->live.seconds, damping);
+    else
+        printf("live: no steady state within %.3g s of simulated time; damping %g 1/s\n", run->live.load[0].seconds,
+               damping);
+    if (run->settled && linear) printf("live: springs bend as they do, where a linear case is linearised\n");
+    if (run->n_substep > MANY_SUBSTEPS)
+        printf("live: stiff and light: a step of 1/60 s takes %d sub-steps (palpate plan says how long that is here)\n",
+               run->n_substep);
+}
+
+static void print(const pal_calibrate_run *run)
+{
+    const pal_calibration_info *i = &run->info;
+    const pal_fit_result *r = &run->result;
+    printf("%s: %d nodes (%d free), %d tetrahedra, voxels of %.4g m, %d springs\n", run->set.problem->name, i->n_node,
+           i->n_free, i->n_tet, i->edge_m, i->n_spring);
+    if (i->clamped) printf("a Poisson ratio above 0.4999 was taken as 0.4999\n");
+    if (i->grid)
+        printf("grid %d x %d x %d, %d of its nodes touch the body: %d constants\n", i->grid->n[0], i->grid->n[1],
+               i->grid->n[2], i->n_used, i->n_parameter);
+    printf("%s: %s after %lld evaluations", pal_calibrate_method(run), r->ended, (long long)r->n_evaluation);
+    if (r->n_rejected > 0) printf(" (%lld without a rest)", (long long)r->n_rejected);
+    printf(" and %.2f s\n", r->seconds);
+    print_cases(run);
+    print_constants(run);
+    print_live(run);
+    printf("seconds: prepare %.2f, truth %.2f, search %.2f, live %.2f, total %.2f\n", i->prepare_s, i->truth_s,
+           r->seconds, run->settle_s, run->total_s);
+    for (int k = 0; k < run->n_file; k++) printf("wrote %s\n", run->file[k]);
+}
+
+/* ---- report: JSON ---- */
+
+static cJSON *cases_json(const pal_calibrate_run *run)
+{
+    cJSON *list = cJSON_CreateArray();
+    for (int k = 0; k < run->set.n; k++) {
+        const pal_settle_run *live = &run->live.load[k];
+        cJSON_AddItemToArray(
+            list,
+            PAL_JSON({"id", JSON_TEXT(run->set.id[k])}, {"fitted", JSON_BOOL(run->set.list[k].fit)},
+                     {"truth", JSON_TEXT(truth_of(run, k))},
+                     {"kinematics", JSON_TEXT(run->set.list[k].linear ? "linear" : "finite")},
+                     {"start_percent", pal_json_or_null(run->start.case_percent[k])},
+                     {"hand_percent", pal_json_or_null(run->hand.case_percent[k])},
+                     {"percent", pal_json_or_null(run->last.case_percent[k])},
+                     {"most_m", pal_json_or_null(run->info.max_m[k])},
+                     {"points", pal_json_or_null(run->info.n_point[k])},
+                     {"live_s", pal_json_or_null(run->settled && live->steady ? live->seconds : NAN)},
+                     {"live_difference_percent", pal_json_or_null(run->settled ? live->difference_percent : NAN)}));
+    }
+    return list;
+}
+
+static void add_constants(const pal_calibrate_run *run, cJSON *o)
+{
+    const pal_calibration_info *i = &run->info;
+    cJSON *constants = cJSON_CreateObject(), *ratio = i->grid ? NULL : cJSON_CreateObject();
+    if (i->grid) PAL_JSON_ADD(constants, {"n", cJSON_CreateIntArray(i->grid->n, 3)}, {"used", JSON_NUMBER(i->n_used)});
+    for (int k = 0; k < i->n_kind; k++) {
+        const char *key = pal_calibrate_key(run, k, false);
+        spread s = spread_of(run, k);
+        PAL_JSON_ADD(constants,
+                     {key, i->grid ? PAL_JSON({"min", pal_json_or_null(s.min)}, {"median", pal_json_or_null(s.middle)},
+                                              {"max", pal_json_or_null(s.max)})
+                                   : pal_json_or_null(exp(run->theta[k]))});
+        if (!i->grid) PAL_JSON_ADD(ratio, {key, pal_json_or_null(ratio_of(run, k))});
+    }
+    PAL_JSON_ADD(o, {i->grid ? "grid" : "constants", constants}, {"ratio_to_start", ratio});
+}
+
+static cJSON *live_json(const pal_calibrate_run *run)
+{
+    double max = 0;
+    cJSON *ladder = cJSON_CreateArray();
+    for (int k = 0; k < run->set.n; k++) {
+        double d = run->live.load[k].difference_percent;
+        max = d <= max ? max : d; /* keeps NaN */
+    }
+    for (int k = 0; k < PAL_SETTLE_STEPS; k++)
+        cJSON_AddItemToArray(ladder, PAL_JSON({"damping_1_s", pal_json_or_null(pal_settle_rates_1_s[k])},
+                                              {"steady_s", pal_json_or_null(run->live.rate_seconds[k])}));
+    return PAL_JSON({"steady", JSON_BOOL(run->live.steady)}, {"substeps", JSON_NUMBER(run->n_substep)},
+                    {"difference_percent", pal_json_or_null(max)}, {"ladder", ladder});
+}
+
+static cJSON *as_json(const pal_calibrate_run *run)
+{
+    const pal_calibration_info *i = &run->info;
+    const pal_fit_result *r = &run->result;
+    int n_bound = 0;
+    for (int k = 0; k < i->n_kind; k++) n_bound += count_bound(run, k);
+    cJSON *seconds = PAL_JSON({"prepare", pal_json_or_null(i->prepare_s)}, {"truth", pal_json_or_null(i->truth_s)},
+                              {"fit", pal_json_or_null(r->seconds)}, {"live", pal_json_or_null(run->settle_s)},
+                              {"total", pal_json_or_null(run->total_s)});
+    cJSON *o = PAL_JSON(
+        {"ok", JSON_BOOL(true)}, {"problem", JSON_TEXT(run->set.problem->name)}, {"cases", cases_json(run)},
+        {"error_percent", pal_json_or_null(pal_calibrate_mean(run, &run->last, true))},
+        {"start_percent", pal_json_or_null(pal_calibrate_mean(run, &run->start, true))},
+        {"hand_percent", pal_json_or_null(pal_calibrate_mean(run, &run->hand, true))},
+        {"verify_percent", pal_json_or_null(pal_calibrate_mean(run, &run->last, false))},
+        {"method", JSON_TEXT(pal_calibrate_method(run))}, {"evaluations", pal_json_or_null(r->n_evaluation)},
+        {"rejected", pal_json_or_null(r->n_rejected)},
+        {"spent", pal_json_or_null(r->n_spent > 0 ? r->n_spent : r->n_evaluation)}, {"ended", JSON_TEXT(r->ended)});
+    add_constants(run, o);
+    return PAL_JSON_ADD(o, {"at_bound", pal_json_or_null(n_bound)}, {"nodes", pal_json_or_null(i->n_node)},
+                        {"free_nodes", pal_json_or_null(i->n_free)}, {"tets", pal_json_or_null(i->n_tet)},
+                        {"springs", pal_json_or_null(i->n_spring)}, {"voxel_m", pal_json_or_null(i->edge_m)},
+                        {"weights", JSON_TEXT(run->options.equal ? "equal" : "volume")},
+                        {"area_springs", JSON_BOOL(!run->options.without_area)},
+                        {"poisson_clamped", JSON_BOOL(i->clamped)}, {"damping_1_s", pal_json_or_null(run->damping_1_s)},
+                        {"steady_s", pal_json_or_null(run->settled && run->live.steady ? run->live.seconds : NAN)},
+                        {"live", run->settled ? live_json(run) : cJSON_CreateNull()},
+                        {"files", pal_json_texts(run->file[0], PAL_CALIBRATE_PATH, run->n_file)}, {"seconds", seconds});
+}
+
+/* ---- the command ---- */
+
 static int start(pal_calibrate_run *run)
 {
     pal_diagnostic diag = {""};
@@ -298,17 +490,13 @@ static int start(pal_calibrate_run *run)
     pal_stop_watch();
     pal_err err = work(run, &diag);
     run->total_s = pal_clock_s() - begin;
-    pal_report_progress(NULL, 0, &run->common);
-    int code = err                ? pal_report_refusal(&run->common, err, &diag)
-               : run->common.json ? pal_report_json(&run->common, pal_calibrate_json(run))
-                                  : 0;
-    if (!err && !run->common.json && !run->common.quiet) pal_calibrate_print(run);
+    int code = pal_report_end(&run->common, err, &diag, err || !run->common.json ? NULL : as_json(run));
+    if (!err && !run->common.json && !run->common.quiet) print(run);
     pal_calibration_workspace_destroy(run->workspace);
     pal_calibration_destroy(run->calibration);
     pal_calibrate_cases_free(&run->set);
     free(run->theta);
-    free(run->error);
-    free(run->best);
+    free(run->trail);
     return code;
 }
 
@@ -367,8 +555,7 @@ int command_calibrate(int argc, char **argv)
                                              "--resolution 10 --budget 5 -o gear.json\n"
                                              "palpate calibrate deploy/problems/cube.json --case push --grid 3x3x3 "
                                              "--resolution 6 --budget 5 --picture cube.svg -o cube.json\n",
-                                  .flag = flag,
-                                  .n_flag = sizeof flag / sizeof flag[0],
+                                  PAL_FLAGS(flag),
                                   .min_operand = 1,
                                   .max_operand = 1};
     int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.input.problem, &n);

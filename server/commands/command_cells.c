@@ -15,10 +15,10 @@
 #include <string.h>
 
 static const char about[] =
-    "Makes the control cells of a subdivision solid (paper A), subdivides them and writes them to a file.\n"
-    "SHAPE is a primitive: block, ring, tube or torus; a named solid: soccer, monster, block3, chair, block4, head,\n"
-    "bridge, nozzle or kidney; or a file of cells, .palcells or .vtk. FILE.palcells and FILE.vtk receive the cells,\n"
-    "FILE.ply, .obj and .stl the boundary. Without -o only the figures are printed.\n";
+    "Makes the control cells of a subdivision solid (paper A), subdivides them and writes them to a file. SHAPE\n"
+    "is a primitive: block, ring, tube or torus; a named solid: soccer, monster, block3, chair, block4, head,\n"
+    "bridge, nozzle or kidney; or a file of cells, .palcells or .vtk. FILE.palcells and FILE.vtk receive the\n"
+    "cells, FILE.ply, .obj and .stl the boundary. Without -o only the figures are printed.\n";
 
 typedef struct arguments {
     const char *file, *rule, *cells, *size;
@@ -139,40 +139,30 @@ static pal_err subdivide(outcome *o, int n_level, pal_subdivision_rule rule, pal
 static cJSON *as_json(const outcome *o, const char *rule)
 {
     const pal_cells *c = &o->made.cells;
-    cJSON *to = cJSON_CreateObject();
-    cJSON_AddBoolToObject(to, "ok", true);
-    cJSON_AddStringToObject(to, "name", o->name);
-    cJSON_AddNumberToObject(to, "levels", o->made.n_level);
-    cJSON_AddStringToObject(to, "rule", rule);
-    cJSON_AddNumberToObject(to, "control_cells", o->control.n_cell);
-    cJSON_AddNumberToObject(to, "control_vertices", o->control.n_vertex);
-    cJSON_AddNumberToObject(to, "cells", c->n_cell);
-    cJSON_AddNumberToObject(to, "vertices", c->n_vertex);
-    if (o->has_elements) {
-        static const char *const kind[PAL_CELL_KINDS] = {"cubic_percent", "linear_percent", "pyramid_percent"};
-        cJSON_AddNumberToObject(to, "elements", pal_cell_elements_count(&o->elements));
-        for (int k = 0; k < PAL_CELL_KINDS; k++)
-            cJSON_AddNumberToObject(to, kind[k], pal_cell_elements_percent(&o->elements, (pal_cell_kind)k));
-    }
-    if (o->model && o->model->n_element) {
-        cJSON *paper = cJSON_AddObjectToObject(to, "paper");
-        cJSON_AddNumberToObject(paper, "levels", o->model->n_level);
-        cJSON_AddNumberToObject(paper, "control_cells", o->model->n_cell);
-        cJSON_AddNumberToObject(paper, "elements", o->model->n_element);
-        cJSON_AddItemToObject(paper, "percent", cJSON_CreateIntArray(o->model->percent, PAL_CELL_KINDS));
-    }
-    cJSON_AddNumberToObject(to, "pieces", o->topology.n_piece);
-    cJSON_AddNumberToObject(to, "genus", o->topology.genus);
-    cJSON_AddNumberToObject(to, "cavities", o->topology.n_cavity);
-    cJSON_AddNumberToObject(to, "pinched_edges", c->n_pinched_edge);
-    cJSON_AddNumberToObject(to, "pinched_vertices", c->n_pinched_vertex);
-    cJSON_AddItemToObject(to, "size_m", cJSON_CreateDoubleArray(o->size_m, 3));
-    cJSON_AddNumberToObject(to, "control_volume_m3", o->control_m3);
-    cJSON_AddNumberToObject(to, "volume_m3", o->volume_m3);
-    cJSON_AddNumberToObject(to, "boundary_vertices", o->n_boundary_vertex);
-    cJSON_AddNumberToObject(to, "boundary_triangles", o->n_triangle);
-    cJSON_AddNumberToObject(to, "bytes", (double)o->made.n_byte);
-    return to;
+    const pal_cell_elements *e = &o->elements;
+    const pal_cell_model *m = o->model;
+    cJSON *to =
+        PAL_JSON({"ok", JSON_BOOL(true)}, {"name", JSON_TEXT(o->name)}, {"levels", JSON_NUMBER(o->made.n_level)},
+                 {"rule", JSON_TEXT(rule)}, {"control_cells", JSON_NUMBER(o->control.n_cell)},
+                 {"control_vertices", JSON_NUMBER(o->control.n_vertex)}, {"cells", JSON_NUMBER(c->n_cell)},
+                 {"vertices", JSON_NUMBER(c->n_vertex)});
+    if (o->has_elements)
+        PAL_JSON_ADD(to, {"elements", JSON_NUMBER(pal_cell_elements_count(e))},
+                     {"cubic_percent", JSON_NUMBER(pal_cell_elements_percent(e, PAL_CELL_CUBIC))},
+                     {"linear_percent", JSON_NUMBER(pal_cell_elements_percent(e, PAL_CELL_HEX))},
+                     {"pyramid_percent", JSON_NUMBER(pal_cell_elements_percent(e, PAL_CELL_PYRAMID))});
+    if (m && m->n_element)
+        PAL_JSON_ADD(to,
+                     {"paper", PAL_JSON({"levels", JSON_NUMBER(m->n_level)}, {"control_cells", JSON_NUMBER(m->n_cell)},
+                                        {"elements", JSON_NUMBER(m->n_element)},
+                                        {"percent", cJSON_CreateIntArray(m->percent, PAL_CELL_KINDS)})});
+    return PAL_JSON_ADD(
+        to, {"pieces", JSON_NUMBER(o->topology.n_piece)}, {"genus", JSON_NUMBER(o->topology.genus)},
+        {"cavities", JSON_NUMBER(o->topology.n_cavity)}, {"pinched_edges", JSON_NUMBER(c->n_pinched_edge)},
+        {"pinched_vertices", JSON_NUMBER(c->n_pinched_vertex)}, {"size_m", cJSON_CreateDoubleArray(o->size_m, 3)},
+        {"control_volume_m3", JSON_NUMBER(o->control_m3)}, {"volume_m3", JSON_NUMBER(o->volume_m3)},
+        {"boundary_vertices", JSON_NUMBER(o->n_boundary_vertex)}, {"boundary_triangles", JSON_NUMBER(o->n_triangle)},
+        {"bytes", JSON_NUMBER(o->made.n_byte)});
 }
 
 static const char *plural(int64_t n)
@@ -221,11 +211,9 @@ static void print_row(const outcome *o)
 
 static int list_models(const pal_flag_common *common, pal_subdivision_rule rule, const char *rule_name)
 {
-    cJSON *all = cJSON_CreateObject(), *list = NULL;
+    cJSON *list = cJSON_CreateArray();
     pal_diagnostic diag = {""};
     pal_err err = PAL_ERR_OK;
-    cJSON_AddBoolToObject(all, "ok", true);
-    list = cJSON_AddArrayToObject(all, "models");
     if (!common->json && !common->quiet)
         printf("%-8s %6s %6s %6s %5s %5s %5s   %-16s %5s %10s %7s\n", "name", "levels", "#CC", "#FE", "%BE", "%LE",
                "%PE", "paper A", "genus", "volume ml", "MB");
@@ -238,9 +226,7 @@ static int list_models(const pal_flag_common *common, pal_subdivision_rule rule,
         if (!err && !common->json && !common->quiet) print_row(&o);
         free_outcome(&o);
     }
-    if (!err && common->json) return pal_report_json(common, all);
-    cJSON_Delete(all);
-    return err ? pal_report_refusal(common, err, &diag) : 0;
+    return pal_report_end(common, err, &diag, PAL_JSON({"ok", JSON_BOOL(true)}, {"models", list}));
 }
 
 /* ---- the command ---- */
@@ -342,8 +328,7 @@ int command_cells(int argc, char **argv)
                                              "palpate cells chair --levels 1 -o chair.ply\n"
                                              "palpate cells block --cells 3,2,2 --size-m 0.12,0.06,0.06 -o "
                                              "block.palcells\n",
-                                  .flag = flag,
-                                  .n_flag = sizeof flag / sizeof flag[0],
+                                  PAL_FLAGS(flag),
                                   .max_operand = 1};
     pal_flag_common common;
     const char *word[1] = {NULL};

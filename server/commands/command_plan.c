@@ -3,11 +3,10 @@
  * many as fit into two seconds, of a body at rest that is kept awake. */
 #include "server/base/clock.h"
 #include "server/cli/flags.h"
-#include "server/cli/median.h"
 #include "server/commands/commands.h"
-#include "server/commands/plan_reasons.h"
 #include "server/commands/preflight_report.h"
 #include "server/commands/scene_input.h"
+#include "server/num/median.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/subdivision/subdivision_solid.h"
 #include "server/sim/surface/adaptive_surface.h"
@@ -15,7 +14,6 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { STEPS = 60, MAX_S = 2 };
@@ -50,132 +48,168 @@ static double component_ms(cost *c, int component)
     return component < PAL_FRAME_COMPONENT_MAX ? pal_median(c->component_ms[component], c->n_step) : 0;
 }
 
+/* ---- what calls for an effect ---- */
+
+/* The effects that a model adds are in the table; of the others the stage determines which entry adds them, so that a
+ * new effect needs no line here. */
+
+static const struct {
+    const char *name, *words;
+} of_model[] = {{"edge_distance", "model \"tet_springs\""},
+                {"face_area", "model \"tet_springs\" with k_area_J not 0"},
+                {"tet_volume", "model \"tet_springs\""},
+                {"tet_elastic", "model \"fem\" with element \"tet4\" or \"tet10\""},
+                {"hex_elastic", "model \"fem\" with element \"hex8_bbar\" or \"hex8\""},
+                {"cell_elastic", "model \"subdivision_fem\""},
+                {"edge_spring", "model \"adaptive_springs\""},
+                {"shape_spring", "model \"adaptive_springs\" with k_shape_N_m not 0"},
+                {"refine", "model \"adaptive_springs\" with more than one level"},
+                {"viscous", "material.damping_1_s above 0"}};
+
+/* "an entry \"gravity\" in effects"; returns text */
+static const char *effect_words(const char *name, char text[128])
+{
+    const pal_effect *effect = pal_effect_find(name);
+    for (size_t i = 0; i < sizeof of_model / sizeof of_model[0]; i++)
+        if (!strcmp(of_model[i].name, name)) {
+            snprintf(text, 128, "%s", of_model[i].words);
+            return text;
+        }
+    if (effect && effect->stage == PAL_STAGE_SOLVE)
+        snprintf(text, 128, "solver \"%s\"", name);
+    else if (effect && effect->stage == PAL_STAGE_OUTPUT && strcmp(name, "field_output") != 0)
+        snprintf(text, 128, "output \"%s\"", name);
+    else
+        snprintf(text, 128, "an entry \"%s\" in effects", name);
+    return text;
+}
+
+/* has any body of the world a component of the effect? */
+static bool has_component(const pal_world *world, const char *name)
+{
+    pal_component_info component;
+    for (int r = 0; r < pal_world_component_count(world); r++) {
+        pal_world_component_info(world, r, &component);
+        if (!strcmp(component.name, name)) return true;
+    }
+    return false;
+}
+
+/* ---- report ---- */
+
 /* nodes and springs that are active, and of every level */
 static void add_levels(cJSON *body, const pal_adaptive_surface *adaptive)
 {
     const pal_levels *levels = &adaptive->levels;
-    cJSON_AddNumberToObject(body, "nodes", adaptive->n_node);
-    cJSON_AddNumberToObject(body, "springs", adaptive->n_spring);
-    cJSON *list = cJSON_AddArrayToObject(body, "levels");
-    for (int l = 0; l < levels->n_level; l++) {
-        cJSON *level = cJSON_CreateObject();
-        cJSON_AddItemToArray(list, level);
-        cJSON_AddNumberToObject(level, "nodes", levels->n_vertex[l]);
-        cJSON_AddNumberToObject(level, "springs", pal_levels_n_edge(levels, l));
-    }
+    cJSON *list = cJSON_CreateArray();
+    for (int l = 0; l < levels->n_level; l++)
+        cJSON_AddItemToArray(list, PAL_JSON({"nodes", JSON_NUMBER(levels->n_vertex[l])},
+                                            {"springs", JSON_NUMBER(pal_levels_n_edge(levels, l))}));
+    PAL_JSON_ADD(body, {"nodes", JSON_NUMBER(adaptive->n_node)}, {"springs", JSON_NUMBER(adaptive->n_spring)},
+                 {"levels", list});
 }
 
 static void add_solid(cJSON *body, const pal_body_def *def, const pal_body *b)
 {
     const pal_subdivision_solid *solid = b->model.solid;
-    static const char *const kind[PAL_CELL_KINDS] = {"cubic_percent", "hex_percent", "pyramid_percent"};
-    cJSON_AddNumberToObject(body, "control_cells", def->cells->n_cell);
-    cJSON_AddNumberToObject(body, "control_points", b->n_dof);
-    cJSON_AddNumberToObject(body, "levels", solid->subdivision.n_level);
-    cJSON_AddNumberToObject(body, "elements", pal_cell_elements_count(&solid->elements));
-    for (int k = 0; k < PAL_CELL_KINDS; k++)
-        cJSON_AddNumberToObject(body, kind[k], pal_cell_elements_percent(&solid->elements, (pal_cell_kind)k));
-    cJSON_AddNumberToObject(body, "nodes", b->n_node);
-    cJSON_AddNumberToObject(body, "solid_bytes", (double)solid->n_byte);
+    const pal_cell_elements *e = &solid->elements;
+    PAL_JSON_ADD(body, {"control_cells", JSON_NUMBER(def->cells->n_cell)}, {"control_points", JSON_NUMBER(b->n_dof)},
+                 {"levels", JSON_NUMBER(solid->subdivision.n_level)},
+                 {"elements", JSON_NUMBER(pal_cell_elements_count(e))},
+                 {"cubic_percent", JSON_NUMBER(pal_cell_elements_percent(e, PAL_CELL_CUBIC))},
+                 {"hex_percent", JSON_NUMBER(pal_cell_elements_percent(e, PAL_CELL_HEX))},
+                 {"pyramid_percent", JSON_NUMBER(pal_cell_elements_percent(e, PAL_CELL_PYRAMID))},
+                 {"nodes", JSON_NUMBER(b->n_node)}, {"solid_bytes", JSON_NUMBER(solid->n_byte)});
+}
+
+static cJSON *body_json(const pal_body_def *def, const pal_body *b)
+{
+    int n_tri = b->model.solid ? b->display.surface->n_tri : def->mesh->surface.n_tri;
+    cJSON *body = PAL_JSON({"name", JSON_TEXT(def->name)}, {"triangles", JSON_NUMBER(n_tri)});
+    if (b->model.adaptive)
+        add_levels(body, b->model.adaptive);
+    else if (b->model.solid)
+        add_solid(body, def, b);
+    else
+        PAL_JSON_ADD(body, {"tets", JSON_NUMBER(def->mesh->tets.n_tet)},
+                     {"nodes", JSON_NUMBER(def->mesh->tets.n_node)});
+    return body;
 }
 
 /* the effects that no component of this scene is of */
-static void add_absent(cJSON *o, const pal_world *world)
+static cJSON *absent_json(const pal_world *world)
 {
-    cJSON *absent = cJSON_AddArrayToObject(o, "absent");
+    char words[128];
+    cJSON *absent = cJSON_CreateArray();
     for (int i = 0; i < PAL_EFFECT_COUNT; i++) {
-        char words[128];
         const char *name = pal_effects[i]->name;
-        if (pal_plan_has(world, name)) continue;
-        cJSON *entry = cJSON_CreateObject();
-        cJSON_AddItemToArray(absent, entry);
-        cJSON_AddStringToObject(entry, "name", name);
-        cJSON_AddStringToObject(entry, "called_by", pal_effect_words(name, words));
+        if (!has_component(world, name))
+            cJSON_AddItemToArray(
+                absent, PAL_JSON({"name", JSON_TEXT(name)}, {"called_by", JSON_TEXT(effect_words(name, words))}));
     }
+    return absent;
 }
 
-/* the configuration that was picked from the study */
-static void add_configuration(cJSON *o, const pal_studied_scene *studied)
+/* the configuration that was picked from the study; NULL: none */
+static cJSON *picked_json(const pal_studied_scene *studied)
 {
     char text[PAL_CONFIGURATION_TEXT];
-    if (studied->warn[0]) cJSON_AddStringToObject(o, "study_warning", studied->warn);
-    if (studied->picked < 0) return;
+    if (studied->picked < 0) return NULL;
     const pal_measured_configuration *p = &studied->file->study.point[studied->picked].measured;
-    cJSON *picked = cJSON_AddObjectToObject(o, "picked");
-    cJSON_AddStringToObject(picked, "body", studied->scene->body[studied->body].name);
-    cJSON_AddStringToObject(picked, "configuration", pal_configuration_text(&p->setting, text));
-    cJSON_AddNumberToObject(picked, "ms", p->ms);
-    cJSON_AddNumberToObject(picked, "error_m", p->error_m);
+    return PAL_JSON({"body", JSON_TEXT(studied->scene->body[studied->body].name)},
+                    {"configuration", JSON_TEXT(pal_configuration_text(&p->setting, text))}, {"ms", JSON_NUMBER(p->ms)},
+                    {"error_m", JSON_NUMBER(p->error_m)});
 }
 
 static cJSON *as_json(const pal_studied_scene *studied, pal_world *world, cost *c)
 {
     const pal_scene *scene = studied->scene;
-    cJSON *o = cJSON_CreateObject();
     double step_ms = pal_median(c->step_ms, c->n_step);
-    cJSON_AddBoolToObject(o, "ok", true);
-    cJSON_AddStringToObject(o, "name", scene->name);
-    add_configuration(o, studied);
-    cJSON_AddNumberToObject(o, "step_s", scene->step_s);
-    cJSON_AddNumberToObject(o, "substeps", pal_world_substeps(world));
-    cJSON_AddNumberToObject(o, "limit_s", pal_world_limit_s(world));
-    cJSON_AddNumberToObject(o, "steps_measured", c->n_step);
-    cJSON_AddNumberToObject(o, "step_ms", step_ms);
-    cJSON_AddNumberToObject(o, "load", 1e-3 * step_ms / scene->step_s);
-    cJSON_AddNumberToObject(o, "world_bytes", (double)pal_world_bytes(world));
-    cJSON *bodies = cJSON_AddArrayToObject(o, "bodies");
-    for (int b = 0; b < scene->n_body; b++) {
-        cJSON *body = cJSON_CreateObject();
-        cJSON_AddItemToArray(bodies, body);
-        cJSON_AddStringToObject(body, "name", scene->body[b].name);
-        const pal_body *moving = pal_world_body(world, b);
-        if (moving->model.adaptive) {
-            add_levels(body, moving->model.adaptive);
-        } else if (moving->model.solid) {
-            add_solid(body, &scene->body[b], moving);
-        } else {
-            cJSON_AddNumberToObject(body, "tets", scene->body[b].mesh->tets.n_tet);
-            cJSON_AddNumberToObject(body, "nodes", scene->body[b].mesh->tets.n_node);
-        }
-        cJSON_AddNumberToObject(body, "triangles",
-                                moving->model.solid ? moving->surface->n_tri : scene->body[b].mesh->surface.n_tri);
-    }
-    cJSON *list = cJSON_AddArrayToObject(o, "components");
+    cJSON *bodies = cJSON_CreateArray(), *components = cJSON_CreateArray();
+    for (int b = 0; b < scene->n_body; b++)
+        cJSON_AddItemToArray(bodies, body_json(&scene->body[b], pal_world_body(world, b)));
     for (int k = 0; k < pal_world_component_count(world); k++) {
         pal_component_info info;
-        cJSON *entry = cJSON_CreateObject();
         pal_world_component_info(world, k, &info);
-        cJSON_AddItemToArray(list, entry);
-        cJSON_AddStringToObject(entry, "name", info.name);
-        cJSON_AddStringToObject(entry, "body", info.body);
-        cJSON_AddStringToObject(entry, "stage", info.stage);
-        cJSON_AddNumberToObject(entry, "bytes", (double)info.n_byte);
-        cJSON_AddNumberToObject(entry, "ms", component_ms(c, k));
-        cJSON_AddStringToObject(entry, "reason", info.reason);
+        cJSON_AddItemToArray(components,
+                             PAL_JSON({"name", JSON_TEXT(info.name)}, {"body", JSON_TEXT(info.body)},
+                                      {"stage", JSON_TEXT(info.stage)}, {"bytes", JSON_NUMBER(info.n_byte)},
+                                      {"ms", JSON_NUMBER(component_ms(c, k))}, {"reason", JSON_TEXT(info.reason)}));
     }
-    add_absent(o, world);
-    return o;
+    return PAL_JSON({"ok", JSON_BOOL(true)}, {"name", JSON_TEXT(scene->name)},
+                    {"study_warning", studied->warn[0] ? JSON_TEXT(studied->warn) : NULL},
+                    {"picked", picked_json(studied)}, {"step_s", JSON_NUMBER(scene->step_s)},
+                    {"substeps", JSON_NUMBER(pal_world_substeps(world))},
+                    {"limit_s", JSON_NUMBER(pal_world_limit_s(world))}, {"steps_measured", JSON_NUMBER(c->n_step)},
+                    {"step_ms", JSON_NUMBER(step_ms)}, {"load", JSON_NUMBER(1e-3 * step_ms / scene->step_s)},
+                    {"world_bytes", JSON_NUMBER(pal_world_bytes(world))}, {"bodies", bodies},
+                    {"components", components}, {"absent", absent_json(world)});
 }
 
-static void print_shell(const char *name, const pal_adaptive_surface *adaptive)
+static void print_body(const pal_body_def *def, const pal_body *b)
 {
-    const pal_levels *levels = &adaptive->levels;
-    printf("%s: an adaptive surface, %d nodes and %d springs active of\n", name, adaptive->n_node, adaptive->n_spring);
-    for (int l = 0; l < levels->n_level; l++)
-        printf("  level %d: %d nodes, %d springs\n", l, levels->n_vertex[l], pal_levels_n_edge(levels, l));
-}
-
-static void print_solid(const pal_body_def *def, const pal_body *b)
-{
-    const pal_cell_elements *e = &b->model.solid->elements;
-    printf("%s: %d control cells (#CC), after %d level%s %d elements (#FE): %.0f %% cubic, %.0f %% hexahedra, %.0f %% "
-           "pyramids\n",
-           def->name, def->cells->n_cell, b->model.solid->subdivision.n_level,
-           b->model.solid->subdivision.n_level == 1 ? "" : "s", pal_cell_elements_count(e),
-           pal_cell_elements_percent(e, PAL_CELL_CUBIC), pal_cell_elements_percent(e, PAL_CELL_HEX),
-           pal_cell_elements_percent(e, PAL_CELL_PYRAMID));
-    printf("  %d control points carry %d nodes, %d surface triangles; the solid takes %.1f MB\n", b->n_dof, b->n_node,
-           b->surface->n_tri, 1e-6 * (double)b->model.solid->n_byte);
+    const pal_adaptive_surface *adaptive = b->model.adaptive;
+    const pal_subdivision_solid *solid = b->model.solid;
+    if (adaptive) {
+        const pal_levels *levels = &adaptive->levels;
+        printf("%s: an adaptive surface, %d nodes and %d springs active of\n", def->name, adaptive->n_node,
+               adaptive->n_spring);
+        for (int l = 0; l < levels->n_level; l++)
+            printf("  level %d: %d nodes, %d springs\n", l, levels->n_vertex[l], pal_levels_n_edge(levels, l));
+    } else if (solid) {
+        const pal_cell_elements *e = &solid->elements;
+        int n_level = solid->subdivision.n_level;
+        printf("%s: %d control cells (#CC), after %d level%s %d elements (#FE): %.0f %% cubic, %.0f %% hexahedra, %.0f "
+               "%% pyramids\n",
+               def->name, def->cells->n_cell, n_level, n_level == 1 ? "" : "s", pal_cell_elements_count(e),
+               pal_cell_elements_percent(e, PAL_CELL_CUBIC), pal_cell_elements_percent(e, PAL_CELL_HEX),
+               pal_cell_elements_percent(e, PAL_CELL_PYRAMID));
+        printf("  %d control points carry %d nodes, %d surface triangles; the solid takes %.1f MB\n", b->n_dof,
+               b->n_node, b->display.surface->n_tri, 1e-6 * (double)solid->n_byte);
+    } else {
+        printf("%s: %d tetrahedra, %d nodes, %d surface triangles\n", def->name, def->mesh->tets.n_tet,
+               def->mesh->tets.n_node, def->mesh->surface.n_tri);
+    }
 }
 
 static void print_absent(const pal_world *world)
@@ -183,8 +217,8 @@ static void print_absent(const pal_world *world)
     char words[128];
     printf("\n%-52s %s\n", "absent: no component, no memory, no time", "called for by");
     for (int i = 0; i < PAL_EFFECT_COUNT; i++)
-        if (!pal_plan_has(world, pal_effects[i]->name))
-            printf("  %-50s %s\n", pal_effects[i]->name, pal_effect_words(pal_effects[i]->name, words));
+        if (!has_component(world, pal_effects[i]->name))
+            printf("  %-50s %s\n", pal_effects[i]->name, effect_words(pal_effects[i]->name, words));
 }
 
 static void print(const pal_studied_scene *studied, pal_world *world, cost *c)
@@ -192,19 +226,7 @@ static void print(const pal_studied_scene *studied, pal_world *world, cost *c)
     const pal_scene *scene = studied->scene;
     if (studied->summary[0]) printf("%s\n", studied->summary);
     if (studied->warn[0]) printf("%s\n", studied->warn);
-    for (int b = 0; b < scene->n_body; b++) {
-        const pal_adaptive_surface *adaptive = pal_world_body(world, b)->model.adaptive;
-        if (adaptive) {
-            print_shell(scene->body[b].name, adaptive);
-            continue;
-        }
-        if (pal_world_body(world, b)->model.solid) {
-            print_solid(&scene->body[b], pal_world_body(world, b));
-            continue;
-        }
-        printf("%s: %d tetrahedra, %d nodes, %d surface triangles\n", scene->body[b].name,
-               scene->body[b].mesh->tets.n_tet, scene->body[b].mesh->tets.n_node, scene->body[b].mesh->surface.n_tri);
-    }
+    for (int b = 0; b < scene->n_body; b++) print_body(&scene->body[b], pal_world_body(world, b));
     printf("\n%-9s %-16s %-16s %10s %10s  %s\n", "stage", "component", "body", "kB", "ms a step", "called for by");
     for (int k = 0; k < pal_world_component_count(world); k++) {
         pal_component_info info;
@@ -252,17 +274,13 @@ int command_plan(int argc, char **argv)
     }
     pal_report_progress("measure", 0, &common);
     if (!err) err = measure(world, scene->step_s, &measured);
-    pal_report_progress(NULL, 0, &common);
-    if (err) {
-        code = pal_report_refusal(&common, err, &diag);
-    } else if (common.json) {
-        cJSON *plan = as_json(&input.studied, world, &measured);
-        cJSON_AddItemToObject(plan, "preflight", pal_preflight_json(&preflight));
-        code = pal_report_json(&common, plan);
-    } else {
-        code = 0;
-        if (!common.quiet) print(&input.studied, world, &measured);
-        if (!common.quiet) pal_preflight_print(&preflight, pal_median(measured.step_ms, measured.n_step));
+    code = pal_report_end(&common, err, &diag,
+                          err || !common.json ? NULL
+                                              : PAL_JSON_ADD(as_json(&input.studied, world, &measured),
+                                                             {"preflight", pal_preflight_json(&preflight)}));
+    if (!err && !common.json && !common.quiet) {
+        print(&input.studied, world, &measured);
+        pal_preflight_print(&preflight, pal_median(measured.step_ms, measured.n_step));
     }
     pal_world_destroy(world);
     pal_scene_input_close(&input);

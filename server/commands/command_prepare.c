@@ -5,6 +5,7 @@
 #include "server/base/vec3.h"
 #include "server/cli/flags.h"
 #include "server/commands/commands.h"
+#include "server/commands/tuning.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/mesh/scan/label_volume.h"
 #include "server/scene/scene_file.h"
@@ -23,16 +24,15 @@
 enum { PATH = 1200, TETGEN_MAX = 1000000, LABELS = 256, FILES = 64 };
 
 static const char about[] =
-    "Makes a scene from a surface (OBJ, STL, PLY, OFF) or a segmented scan (NIfTI .nii .nii.gz, INRIMAGE .inr "
-    ".inr.gz):\n"
-    "tetrahedra (paper B section 2.2), skin, tissue, supports and tools. `palpate serve DIR/scene.json` serves it.\n"
-    "With --model adaptive the surface of a hollow organ carries springs and refines where it is touched (paper C).\n"
+    "Makes a scene from a surface (OBJ, STL, PLY, OFF) or a segmented scan (NIfTI .nii .nii.gz, INRIMAGE .inr\n"
+    ".inr.gz): tetrahedra (paper B section 2.2), skin, tissue, supports and tools. `palpate serve DIR/scene.json`\n"
+    "serves it. With --model adaptive the surface of a hollow organ carries springs and refines where it is\n"
+    "touched (paper C).\n"
     "\n"
-    "Voxels connect through faces. A component without a support is dropped, with a message, when it is below 1 % of\n"
-    "the largest one. A larger one is refused: --largest keeps the largest component only, --hold may reach the "
-    "others,\n"
-    "a finer --resolution may connect them. In scene.json each component may have its own support, or the body none:\n"
-    "then it is free.\n"
+    "Voxels connect through faces. A component without a support is dropped, with a message, when it is below 1 %\n"
+    "of the largest one. A larger one is refused: --largest keeps the largest component only, --hold may reach\n"
+    "the others, a finer --resolution may connect them. In scene.json each component may have its own support, or\n"
+    "the body none: then it is free.\n"
     "\n"
     "Writes DIR/scene.json, DIR/NAME.palmesh, and DIR/NAME.node .ele .face for TetGen when the mesh has at most\n"
     "1,000,000 tetrahedra (--tetgen: always, --no-tetgen: never). Either all files are written or none.\n";
@@ -75,17 +75,12 @@ static int list_labels(const pal_flag_common *common, const char *path)
             printf("%10d %12lld %12.1f\n", count[k].label, (long long)count[k].n_voxel, 1e6 * count[k].volume_m3);
         return 0;
     }
-    cJSON *object = cJSON_CreateObject();
-    cJSON_AddBoolToObject(object, "ok", true);
-    cJSON *list = cJSON_AddArrayToObject(object, "labels");
-    for (int k = 0; k < n; k++) {
-        cJSON *entry = cJSON_CreateObject();
-        cJSON_AddItemToArray(list, entry);
-        cJSON_AddNumberToObject(entry, "label", count[k].label);
-        cJSON_AddNumberToObject(entry, "voxels", (double)count[k].n_voxel);
-        cJSON_AddNumberToObject(entry, "volume_m3", count[k].volume_m3);
-    }
-    return pal_report_json(common, object);
+    cJSON *list = cJSON_CreateArray();
+    for (int k = 0; k < n; k++)
+        cJSON_AddItemToArray(list,
+                             PAL_JSON({"label", JSON_NUMBER(count[k].label)}, {"voxels", JSON_NUMBER(count[k].n_voxel)},
+                                      {"volume_m3", JSON_NUMBER(count[k].volume_m3)}));
+    return pal_report_json(common, PAL_JSON({"ok", JSON_BOOL(true)}, {"labels", list}));
 }
 
 /* ---- writing ---- */
@@ -168,89 +163,65 @@ static pal_err save(const pal_loaded_scene *loaded, const arguments *args, outco
 /* figures of voxels and tetrahedra */
 static void add_solid(cJSON *o, const pal_prepared *mesh, const pal_surface_scene_report *r)
 {
-    cJSON_AddNumberToObject(o, "resolution", r->resolution);
-    cJSON_AddNumberToObject(o, "voxels", (double)r->prepare.n_voxel);
-    cJSON_AddNumberToObject(o, "tets", mesh->tets.n_tet);
-    cJSON_AddNumberToObject(o, "nodes", mesh->tets.n_node);
-    cJSON_AddNumberToObject(o, "components", r->prepare.voxel.n_component);
-    cJSON_AddStringToObject(o, "method", r->prepare.voxel.method);
-    cJSON_AddBoolToObject(o, "open", r->prepare.voxel.open);
-    cJSON_AddNumberToObject(o, "disagreeing_voxels", (double)r->prepare.voxel.n_disagree);
-    cJSON_AddNumberToObject(o, "volume_m3", r->prepare.volume_m3);
-    cJSON_AddNumberToObject(o, "surface_volume_m3", r->prepare.voxel.surface_volume_m3);
-    cJSON_AddNumberToObject(o, "inside_volume_m3", r->prepare.voxel.inside_volume_m3);
-    cJSON_AddNumberToObject(o, "volume_error", r->prepare.volume_error);
+    const pal_voxel_report *v = &r->prepare.voxel;
+    PAL_JSON_ADD(
+        o, {"resolution", JSON_NUMBER(r->resolution)}, {"voxels", JSON_NUMBER(r->prepare.n_voxel)},
+        {"tets", JSON_NUMBER(mesh->tets.n_tet)}, {"nodes", JSON_NUMBER(mesh->tets.n_node)},
+        {"components", JSON_NUMBER(v->n_component)}, {"method", JSON_TEXT(v->method)}, {"open", JSON_BOOL(v->open)},
+        {"disagreeing_voxels", JSON_NUMBER(v->n_disagree)}, {"volume_m3", JSON_NUMBER(r->prepare.volume_m3)},
+        {"surface_volume_m3", JSON_NUMBER(v->surface_volume_m3)},
+        {"inside_volume_m3", JSON_NUMBER(v->inside_volume_m3)}, {"volume_error", JSON_NUMBER(r->prepare.volume_error)});
 }
 
 /* figures of the levels of an adaptive surface */
 static void add_levels(cJSON *o, const outcome *out)
 {
     const pal_surface_scene_report *r = &out->report;
-    cJSON *levels = cJSON_AddArrayToObject(o, "levels");
-    for (int l = 0; l < r->n_level; l++) {
-        cJSON *level = cJSON_CreateObject();
-        cJSON_AddItemToArray(levels, level);
-        cJSON_AddNumberToObject(level, "nodes", r->n_node[l]);
-        cJSON_AddNumberToObject(level, "springs", r->n_spring[l]);
-    }
-    cJSON_AddNumberToObject(o, "components", r->n_piece);
-    cJSON_AddBoolToObject(o, "closed", r->n_open_edge == 0);
-    cJSON_AddNumberToObject(o, "open_edges", r->n_open_edge);
-    cJSON_AddNumberToObject(o, "area_m2", r->area_m2);
-    if (r->n_open_edge == 0) cJSON_AddNumberToObject(o, "surface_volume_m3", r->volume_m3);
-    cJSON_AddNumberToObject(o, "mass_kg", r->mass_kg);
-    cJSON_AddNumberToObject(o, "level_bytes", (double)r->level_byte);
-    cJSON_AddNumberToObject(o, "world_bytes", (double)out->world_byte);
-    cJSON_AddNumberToObject(o, "substeps", out->n_substep);
-    cJSON_AddNumberToObject(o, "limit_s", out->limit_s);
-    cJSON_AddNumberToObject(o, "finest_substeps", out->fine_substep);
-    if (out->max_node > 0) cJSON_AddNumberToObject(o, "most_node", out->max_node);
-    cJSON_AddNumberToObject(o, "share_of_real_time", out->busy);
+    bool closed = r->n_open_edge == 0;
+    cJSON *levels = cJSON_CreateArray();
+    for (int l = 0; l < r->n_level; l++)
+        cJSON_AddItemToArray(levels,
+                             PAL_JSON({"nodes", JSON_NUMBER(r->n_node[l])}, {"springs", JSON_NUMBER(r->n_spring[l])}));
+    PAL_JSON_ADD(o, {"levels", levels}, {"components", JSON_NUMBER(r->n_piece)}, {"closed", JSON_BOOL(closed)},
+                 {"open_edges", JSON_NUMBER(r->n_open_edge)}, {"area_m2", JSON_NUMBER(r->area_m2)},
+                 {"surface_volume_m3", closed ? JSON_NUMBER(r->volume_m3) : NULL}, {"mass_kg", JSON_NUMBER(r->mass_kg)},
+                 {"level_bytes", JSON_NUMBER(r->level_byte)}, {"world_bytes", JSON_NUMBER(out->world_byte)},
+                 {"substeps", JSON_NUMBER(out->n_substep)}, {"limit_s", JSON_NUMBER(out->limit_s)},
+                 {"finest_substeps", JSON_NUMBER(out->fine_substep)},
+                 {"most_node", out->max_node > 0 ? JSON_NUMBER(out->max_node) : NULL},
+                 {"share_of_real_time", JSON_NUMBER(out->busy)});
 }
 
 static cJSON *as_json(const pal_loaded_scene *loaded, const arguments *args, const outcome *out)
 {
     const pal_surface_scene_report *r = &out->report;
+    const pal_surface_report *read = &r->surface;
     const pal_prepared *mesh = &loaded->mesh[0];
+    const pal_loose_components *loose = &loaded->loose[0];
     char path[PATH + 16];
-    cJSON *o = cJSON_CreateObject();
     snprintf(path, sizeof path, "%s/scene.json", args->folder);
-    cJSON_AddBoolToObject(o, "ok", true);
-    cJSON_AddStringToObject(o, "scene", path);
-    cJSON_AddStringToObject(o, "name", loaded->scene.name);
-    cJSON_AddStringToObject(o, "title", loaded->scene.title);
-    cJSON *files = cJSON_AddArrayToObject(o, "files");
-    for (int k = 0; k < out->n_file; k++) cJSON_AddItemToArray(files, cJSON_CreateString(out->file[k]));
-    cJSON_AddStringToObject(o, "format", r->surface.format);
-    cJSON *units = cJSON_AddObjectToObject(o, "units");
-    cJSON_AddStringToObject(units, "name", args->units ? args->units : r->unit_name);
-    cJSON_AddNumberToObject(units, "m", r->unit_m);
-    cJSON_AddBoolToObject(units, "guessed", r->unit_guessed);
-    if (r->label >= 0) cJSON_AddNumberToObject(o, "label", r->label);
-    cJSON_AddNumberToObject(o, "triangles", mesh->surface.n_tri);
-    cJSON_AddNumberToObject(o, "vertices", mesh->surface.n_vertex);
+    cJSON *o = PAL_JSON(
+        {"ok", JSON_BOOL(true)}, {"scene", JSON_TEXT(path)}, {"name", JSON_TEXT(loaded->scene.name)},
+        {"title", JSON_TEXT(loaded->scene.title)},
+        {"files", pal_json_texts(out->file[0], sizeof out->file[0], out->n_file)}, {"format", JSON_TEXT(read->format)},
+        {"units", PAL_JSON({"name", JSON_TEXT(args->units ? args->units : r->unit_name)}, {"m", JSON_NUMBER(r->unit_m)},
+                           {"guessed", JSON_BOOL(r->unit_guessed)})},
+        {"label", r->label >= 0 ? JSON_NUMBER(r->label) : NULL}, {"triangles", JSON_NUMBER(mesh->surface.n_tri)},
+        {"vertices", JSON_NUMBER(mesh->surface.n_vertex)});
     if (r->n_level > 0)
         add_levels(o, out);
     else
         add_solid(o, mesh, r);
-    cJSON *dropped = cJSON_AddObjectToObject(o, "dropped");
-    cJSON_AddNumberToObject(dropped, "degenerate", (double)r->surface.n_degenerate);
-    cJSON_AddNumberToObject(dropped, "duplicate", (double)r->surface.n_duplicate);
-    cJSON_AddNumberToObject(dropped, "nonfinite", (double)r->surface.n_nonfinite);
-    cJSON_AddNumberToObject(dropped, "folded", (double)r->surface.n_folded);
-    cJSON_AddNumberToObject(dropped, "loose_components", loaded->loose[0].n_dropped);
-    cJSON_AddNumberToObject(dropped, "loose_m3", loaded->loose[0].dropped_m3);
-    cJSON_AddNumberToObject(o, "mended", (double)r->surface.n_repaired);
-    cJSON_AddNumberToObject(o, "welded", (double)r->surface.n_welded);
-    cJSON *seconds = cJSON_AddObjectToObject(o, "seconds");
-    cJSON_AddNumberToObject(seconds, "read", r->read_s);
-    cJSON_AddNumberToObject(seconds, "tree", r->prepare.voxel.tree_s);
-    cJSON_AddNumberToObject(seconds, "fill", r->prepare.voxel.fill_s);
-    cJSON_AddNumberToObject(seconds, "split", r->prepare.split_s);
-    cJSON_AddNumberToObject(seconds, "skin", r->prepare.skin_s);
-    cJSON_AddNumberToObject(seconds, "write", out->write_s);
-    cJSON_AddNumberToObject(seconds, "total", out->total_s);
-    return o;
+    cJSON *dropped =
+        PAL_JSON({"degenerate", JSON_NUMBER(read->n_degenerate)}, {"duplicate", JSON_NUMBER(read->n_duplicate)},
+                 {"nonfinite", JSON_NUMBER(read->n_nonfinite)}, {"folded", JSON_NUMBER(read->n_folded)},
+                 {"loose_components", JSON_NUMBER(loose->n_dropped)}, {"loose_m3", JSON_NUMBER(loose->dropped_m3)});
+    cJSON *seconds = PAL_JSON({"read", JSON_NUMBER(r->read_s)}, {"tree", JSON_NUMBER(r->prepare.voxel.tree_s)},
+                              {"fill", JSON_NUMBER(r->prepare.voxel.fill_s)},
+                              {"split", JSON_NUMBER(r->prepare.split_s)}, {"skin", JSON_NUMBER(r->prepare.skin_s)},
+                              {"write", JSON_NUMBER(out->write_s)}, {"total", JSON_NUMBER(out->total_s)});
+    return PAL_JSON_ADD(o, {"dropped", dropped}, {"mended", JSON_NUMBER(read->n_repaired)},
+                        {"welded", JSON_NUMBER(read->n_welded)}, {"seconds", seconds});
 }
 
 typedef struct volume_text {
@@ -358,20 +329,16 @@ static pal_err try_world(const pal_loaded_scene *loaded, const char *name, outco
     return PAL_ERR_OK;
 }
 
-/* Cost model of an adaptive surface: node_s, processor time of a node with its springs and anchor in one sub-step of
- * rk4 on a 2020s server core. Half of a step is allowed for it. Where the finest level of the whole surface would take
- * more, refinement is limited, to no fewer than an eighth more nodes than the coarsest level has, plus 400. */
-static const double node_s = 120e-9, max_busy = 0.5;
-enum { MIN_EXTRA = 400 };
-
+/* Where the finest level of the whole surface would take more than its share of a step, refinement is limited. */
 static pal_err limit_nodes(pal_loaded_scene *loaded, outcome *out, pal_diagnostic *diag)
 {
     pal_scene *scene = &loaded->scene;
     const pal_surface_scene_report *r = &out->report;
     int finest = r->n_level - 1, n = r->n_node[finest];
-    double limit = n, pace = scene->step_s / node_s;
+    double limit = n, pace = scene->step_s / PAL_NODE_S;
     out->fine_substep = (int)fmax(1, ceil(ldexp(scene->step_s / out->limit_s, finest)));
-    if (finest > 0) limit = fmax(max_busy * pace / out->fine_substep, 1.125 * r->n_node[0] + MIN_EXTRA);
+    if (finest > 0)
+        limit = fmax(PAL_MAX_BUSY * pace / out->fine_substep, (1 + PAL_MIN_EXTRA_SHARE) * r->n_node[0] + PAL_MIN_EXTRA);
     out->busy = fmin(limit, n) * out->fine_substep / pace;
     if (limit >= n) return PAL_ERR_OK;
     out->max_node = (int)limit;
@@ -401,42 +368,34 @@ static int run(pal_flag_common *common, const char *in, arguments *args)
     if (!err) err = save(loaded, args, &out, &diag);
     out.write_s = pal_clock_s() - before;
     out.total_s = pal_clock_s() - start;
-    pal_report_progress(NULL, 0, common);
-    int code = err            ? pal_report_refusal(common, err, &diag)
-               : common->json ? pal_report_json(common, as_json(loaded, args, &out))
-                              : 0;
+    int code = pal_report_end(common, err, &diag, err || !common->json ? NULL : as_json(loaded, args, &out));
     if (!err && !common->json && !common->quiet) print(loaded, args, &out);
     pal_scene_free(loaded);
     return code;
 }
 
-/* flags that the model refuses; NULL: none, else the sentence */
-static const char *check_adaptive(const arguments *args)
-{
-    const pal_surface_scene *s = &args->scene;
-    if (!s->adaptive) {
-        if (s->n_level) return "--levels: only goes with --model adaptive";
-        if (args->thickness_mm > 0) return "--thickness-mm: only goes with --model adaptive";
-        if (s->inflate_Pa != 0) return "--inflate: only goes with --model adaptive";
-        return NULL;
-    }
-    if (s->resolution) return "--resolution: model adaptive has no voxels";
-    if (s->area_springs) return "--area-springs: model adaptive has springs along edges only";
-    if (args->tetgen) return "--tetgen: model adaptive has no tetrahedra";
-    return NULL;
-}
-
-/* NULL: the flags fit together, else the sentence */
+/* NULL: the flags fit the model, else the sentence */
 static const char *check_model(arguments *args)
 {
     pal_surface_scene *s = &args->scene;
     s->fem = args->model && !strcmp(args->model, "fem");
     s->adaptive = args->model ? !strcmp(args->model, "adaptive") : s->shape && strcmp(s->shape, "organ") != 0;
-    if (s->fem && s->area_springs) return "--area-springs: model fem has no springs";
-    if (!s->fem && s->element) return "--element: only goes with --model fem";
-    if (!s->fem && s->law) return "--law: only goes with --model fem";
-    if (!s->fem && s->solver) return "--solver: only goes with --model fem";
-    return check_adaptive(args);
+    const struct {
+        bool wrong;
+        const char *sentence;
+    } check[] = {{s->fem && s->area_springs, "--area-springs: model fem has no springs"},
+                 {!s->fem && s->element, "--element: only goes with --model fem"},
+                 {!s->fem && s->law, "--law: only goes with --model fem"},
+                 {!s->fem && s->solver, "--solver: only goes with --model fem"},
+                 {!s->adaptive && s->n_level, "--levels: only goes with --model adaptive"},
+                 {!s->adaptive && args->thickness_mm > 0, "--thickness-mm: only goes with --model adaptive"},
+                 {!s->adaptive && s->inflate_Pa != 0, "--inflate: only goes with --model adaptive"},
+                 {s->adaptive && s->resolution, "--resolution: model adaptive has no voxels"},
+                 {s->adaptive && s->area_springs, "--area-springs: model adaptive has springs along edges only"},
+                 {s->adaptive && args->tetgen, "--tetgen: model adaptive has no tetrahedra"}};
+    for (size_t k = 0; k < sizeof check / sizeof check[0]; k++)
+        if (check[k].wrong) return check[k].sentence;
+    return NULL;
 }
 
 /* "-y" -> (0, -1, 0) */
@@ -449,10 +408,6 @@ static bool read_axis(const char *word, double axis[3])
     axis[word[0] - 'x'] = sign;
     return true;
 }
-
-/* soft tissue, and the wall of a hollow organ, which is muscle */
-#define SOLID_YOUNG_PA 5000
-#define WALL_YOUNG_PA  50000
 
 static arguments args = {.scene = {.label = -1, .material = {0, 0.45, 1000, 4}}};
 static const pal_flag flag[] = {
@@ -514,8 +469,7 @@ int command_prepare(int argc, char **argv)
                                   .example = "palpate prepare --procedural -o organ\n"
                                              "palpate prepare deploy/problems/gear.obj --model fem --hold 12 -o gear\n"
                                              "palpate prepare --shape stomach -o stomach\n",
-                                  .flag = flag,
-                                  .n_flag = sizeof flag / sizeof flag[0],
+                                  PAL_FLAGS(flag),
                                   .max_operand = 1};
     pal_flag_common common;
     const char *in[1] = {NULL};
@@ -534,7 +488,7 @@ int command_prepare(int argc, char **argv)
     if (args.up && !read_axis(args.up, args.scene.up))
         return pal_flags_wrong(&common, "--up: is not x, y, z, -x, -y or -z");
     pal_material *m = &args.scene.material;
-    if (m->young_Pa == 0) m->young_Pa = args.scene.adaptive ? WALL_YOUNG_PA : SOLID_YOUNG_PA;
+    if (m->young_Pa == 0) m->young_Pa = args.scene.adaptive ? PAL_WALL_YOUNG_PA : PAL_SOLID_YOUNG_PA;
     args.scene.hold = args.hold_percent / 100;
     args.scene.thickness_m = args.thickness_mm / 1000;
     if (args.units && !(args.scene.unit_m = pal_mesh_unit_named(args.units)))

@@ -10,21 +10,13 @@
 static cJSON *as_json(const pal_replay_report *r, double seconds)
 {
     char hash[24];
-    cJSON *o = cJSON_CreateObject();
+    bool equal = r->n_hash == r->n_hash_equal;
     snprintf(hash, sizeof hash, "%016llx", (unsigned long long)r->last_hash);
-    cJSON_AddBoolToObject(o, "ok", r->n_hash == r->n_hash_equal);
-    cJSON_AddNumberToObject(o, "steps", (double)r->n_tick);
-    cJSON_AddNumberToObject(o, "poses", (double)r->n_pose);
-    cJSON_AddNumberToObject(o, "commands", (double)r->n_command);
-    cJSON_AddNumberToObject(o, "hashes", (double)r->n_hash);
-    cJSON_AddNumberToObject(o, "hashes_equal", (double)r->n_hash_equal);
-    if (r->n_hash == r->n_hash_equal)
-        cJSON_AddNullToObject(o, "first_difference");
-    else
-        cJSON_AddNumberToObject(o, "first_difference", (double)r->first_difference);
-    cJSON_AddStringToObject(o, "last_hash", hash);
-    cJSON_AddNumberToObject(o, "seconds", seconds);
-    return o;
+    return PAL_JSON({"ok", JSON_BOOL(equal)}, {"steps", JSON_NUMBER(r->n_tick)}, {"poses", JSON_NUMBER(r->n_pose)},
+                    {"commands", JSON_NUMBER(r->n_command)}, {"hashes", JSON_NUMBER(r->n_hash)},
+                    {"hashes_equal", JSON_NUMBER(r->n_hash_equal)},
+                    {"first_difference", equal ? cJSON_CreateNull() : JSON_NUMBER(r->first_difference)},
+                    {"last_hash", JSON_TEXT(hash)}, {"seconds", JSON_NUMBER(seconds)});
 }
 
 int command_replay(int argc, char **argv)

@@ -2,8 +2,9 @@
  * criterion. Exit code 1 when a case failed or could not be judged. */
 #include "server/cli/flags.h"
 #include "server/commands/commands.h"
-#include "server/commands/robustness_picture.h"
 #include "server/commands/scene_input.h"
+#include "server/figure/svg.h"
+#include "server/robustness/robustness.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -13,51 +14,33 @@
 static cJSON *result_json(const pal_robustness_result *r)
 {
     static const char *const verdict[] = {"passed", "failed", "undecided", "skipped", "collapsed"};
-    cJSON *o = cJSON_CreateObject(), *safeguards = cJSON_AddObjectToObject(o, "safeguards");
-    const struct {
-        const char *key;
-        uint64_t n;
-    } count[] = {{"capped", r->safeguards.n_capped},           {"clamped", r->safeguards.n_clamped},
-                 {"mass_scaled", r->safeguards.n_mass_scaled}, {"inverted", r->safeguards.n_inversion},
-                 {"search", r->safeguards.n_search},           {"tool_reset", r->safeguards.n_tool_reset},
-                 {"stopped", r->safeguards.n_stopped},         {"ns", r->safeguards.ns}};
-    cJSON_AddStringToObject(o, "name", r->name);
-    cJSON_AddStringToObject(o, "what", r->what);
-    cJSON_AddStringToObject(o, "criterion", r->criterion);
-    cJSON_AddStringToObject(o, "verdict", verdict[r->verdict]);
-    cJSON_AddStringToObject(o, "happened", r->diag);
-    cJSON_AddBoolToObject(o, "finite", r->finite);
-    cJSON_AddBoolToObject(o, "stopped", r->frozen);
-    pal_json_add_finite(o, "energy_excess", r->energy);
-    pal_json_add_finite(o, "energy_limit", r->limit);
-    pal_json_add_finite(o, "energy_excluded", r->excluded_rise);
-    pal_json_add_finite(o, "deviation_S", r->deviation_S);
-    pal_json_add_finite(o, "return_s", r->return_s);
-    pal_json_add_finite(o, "simulated_s", r->simulated_s);
-    pal_json_add_finite(o, "cpu_s", r->took_s);
-    for (size_t k = 0; k < sizeof count / sizeof count[0]; k++)
-        cJSON_AddNumberToObject(safeguards, count[k].key, (double)count[k].n);
-    return o;
+    const pal_safeguards *s = &r->safeguards;
+    cJSON *safeguards =
+        PAL_JSON({"capped", JSON_NUMBER(s->n_capped)}, {"clamped", JSON_NUMBER(s->n_clamped)},
+                 {"mass_scaled", JSON_NUMBER(s->n_mass_scaled)}, {"inverted", JSON_NUMBER(s->n_inversion)},
+                 {"search", JSON_NUMBER(s->n_search)}, {"tool_reset", JSON_NUMBER(s->n_tool_reset)},
+                 {"stopped", JSON_NUMBER(s->n_stopped)}, {"ns", JSON_NUMBER(s->ns)});
+    return PAL_JSON({"name", JSON_TEXT(r->name)}, {"what", JSON_TEXT(r->what)}, {"criterion", JSON_TEXT(r->criterion)},
+                    {"verdict", JSON_TEXT(verdict[r->verdict])}, {"happened", JSON_TEXT(r->diag)},
+                    {"finite", JSON_BOOL(r->finite)}, {"stopped", JSON_BOOL(r->frozen)},
+                    {"energy_excess", pal_json_finite(r->energy)}, {"energy_limit", pal_json_finite(r->limit)},
+                    {"energy_excluded", pal_json_finite(r->excluded_rise)},
+                    {"deviation_S", pal_json_finite(r->deviation_S)}, {"return_s", pal_json_finite(r->return_s)},
+                    {"simulated_s", pal_json_finite(r->simulated_s)}, {"cpu_s", pal_json_finite(r->took_s)},
+                    {"safeguards", safeguards});
 }
 
 static cJSON *as_json(const pal_scene *scene, const pal_robustness_options *options,
                       const pal_robustness_report *report)
 {
-    cJSON *o = cJSON_CreateObject();
-    cJSON_AddBoolToObject(o, "ok", report->n_failed + report->n_undecided == 0);
-    cJSON_AddStringToObject(o, "name", scene->name);
-    cJSON_AddNumberToObject(o, "seed", (double)options->seed);
-    cJSON_AddBoolToObject(o, "rests", report->rests);
-    pal_json_add_finite(o, "settle_s", report->settle_s);
-    pal_json_add_finite(o, "cpu_s", report->took_s);
-    cJSON_AddNumberToObject(o, "passed", report->n_passed);
-    cJSON_AddNumberToObject(o, "collapsed", report->n_collapsed);
-    cJSON_AddNumberToObject(o, "failed", report->n_failed);
-    cJSON_AddNumberToObject(o, "undecided", report->n_undecided);
-    cJSON_AddNumberToObject(o, "skipped", report->n_skipped);
-    cJSON *list = cJSON_AddArrayToObject(o, "cases");
+    cJSON *list = cJSON_CreateArray();
     for (int k = 0; k < report->n; k++) cJSON_AddItemToArray(list, result_json(&report->result[k]));
-    return o;
+    return PAL_JSON({"ok", JSON_BOOL(report->n_failed + report->n_undecided == 0)}, {"name", JSON_TEXT(scene->name)},
+                    {"seed", JSON_NUMBER(options->seed)}, {"rests", JSON_BOOL(report->rests)},
+                    {"settle_s", pal_json_finite(report->settle_s)}, {"cpu_s", pal_json_finite(report->took_s)},
+                    {"passed", JSON_NUMBER(report->n_passed)}, {"collapsed", JSON_NUMBER(report->n_collapsed)},
+                    {"failed", JSON_NUMBER(report->n_failed)}, {"undecided", JSON_NUMBER(report->n_undecided)},
+                    {"skipped", JSON_NUMBER(report->n_skipped)}, {"cases", list});
 }
 
 static void print_result(const pal_robustness_result *r)
@@ -91,12 +74,90 @@ static void print(const pal_scene *scene, const pal_robustness_report *report)
            collapsed, report->n_failed, report->n_undecided, report->n_skipped, report->took_s);
 }
 
+/* ---- picture: x: simulated seconds; y: energy above that at rest as a share of its largest value ---- */
+
+enum { COLUMNS = 4, WIDE = 250, HIGH = 170, LEFT = 46, TOP = 40, HEAD = 44, PLOT_WIDE = 180, PLOT_HIGH = 92 };
+
+static const char *colour_of(pal_verdict verdict)
+{
+    static const char *const colour[] = {"#009e73", "#d55e00", "#e69f00", "#999999", "#cc79a7"};
+    return colour[verdict];
+}
+
+static void frame(FILE *to, double x, double y)
+{
+    fprintf(to, "<rect x=\"%g\" y=\"%g\" width=\"%d\" height=\"%d\" fill=\"none\" stroke=\"#999\"/>\n", x, y, PLOT_WIDE,
+            PLOT_HIGH);
+}
+
+/* the range of the samples; false: nothing moved */
+static bool range(const pal_robustness_result *r, double *seconds, double *low, double *high)
+{
+    *seconds = *low = *high = 0;
+    for (int i = 0; i < r->n_sample; i++) {
+        if (!isfinite(r->energy_J[i])) continue;
+        *seconds = fmax(*seconds, r->time_s[i]);
+        *low = fmin(*low, r->energy_J[i]), *high = fmax(*high, r->energy_J[i]);
+    }
+    /* a rounding error is no motion */
+    if (*low > -1e-9 * *high) *low = 0;
+    return *seconds > 0 && *high > 1e-20;
+}
+
+static void curve(FILE *to, const pal_robustness_result *r, double x, double y)
+{
+    double seconds, low, high;
+    char text[40];
+    frame(to, x, y);
+    if (!range(r, &seconds, &low, &high)) {
+        pal_svg_text(to, x + 0.5 * PLOT_WIDE, y + 0.5 * PLOT_HIGH, "middle", " font-size=\"11\" fill=\"#777\"",
+                     r->verdict == PAL_VERDICT_SKIPPED ? "does not apply"
+                     : r->frozen                       ? "stopped"
+                                                       : "nothing moved",
+                     0);
+        return;
+    }
+    fprintf(to, "<polyline fill=\"none\" stroke=\"%s\" stroke-width=\"1.4\" points=\"", colour_of(r->verdict));
+    for (int i = 0; i < r->n_sample; i++)
+        if (isfinite(r->energy_J[i]))
+            fprintf(to, "%.1f,%.1f ", x + PLOT_WIDE * r->time_s[i] / seconds,
+                    y + PLOT_HIGH * (high - r->energy_J[i]) / (high - low));
+    fprintf(to, "\"/>\n");
+    snprintf(text, sizeof text, "%.2g", high);
+    pal_svg_text(to, x - 4, y + 9, "end", " font-size=\"10\"", text, 0);
+    snprintf(text, sizeof text, "%.2g", low);
+    pal_svg_text(to, x - 4, y + PLOT_HIGH, "end", " font-size=\"10\"", text, 0);
+    snprintf(text, sizeof text, "%.3g s", seconds);
+    pal_svg_text(to, x + PLOT_WIDE, y + PLOT_HIGH + 13, "end", " font-size=\"10\"", text, 0);
+}
+
+static pal_err draw(const pal_robustness_report *report, const char *title, const char *path, pal_diagnostic *diag)
+{
+    pal_svg svg;
+    char text[80];
+    int rows = (report->n + COLUMNS - 1) / COLUMNS;
+    PAL_TRY(pal_svg_begin(&svg, COLUMNS * WIDE, HEAD + rows * HIGH, diag));
+    pal_svg_text(svg.to, 16, 26, "start", " font-size=\"15\" font-weight=\"bold\"", title, 60);
+    pal_svg_text(svg.to, COLUMNS * WIDE - 16, 26, "end", " font-size=\"12\"",
+                 "energy above that at rest, J, over simulated time", 0);
+    for (int k = 0; k < report->n; k++) {
+        const pal_robustness_result *r = &report->result[k];
+        double x = LEFT + k % COLUMNS * WIDE, y = HEAD + k / COLUMNS * HIGH + TOP - 14;
+        snprintf(text, sizeof text, "%s: %s", r->name, pal_verdict_name(r->verdict));
+        pal_svg_text(svg.to, x, y - 7, "start", " font-size=\"12\" font-weight=\"bold\"", text, 0);
+        curve(svg.to, r, x, y);
+    }
+    return pal_svg_end(&svg, path, diag);
+}
+
+/* ---- the command ---- */
+
 static void list_cases(char *text, size_t n_byte)
 {
     size_t used = 0;
-    for (int k = 0; k < pal_robustness_case_count() && used < n_byte; k++)
-        used += (size_t)snprintf(text + used, n_byte - used, "  %-11s %s\n", pal_robustness_case_name(k),
-                                 pal_robustness_case_about(k));
+    const char *name, *about;
+    for (int k = 0; (name = pal_robustness_case_name(k, &about)) && used < n_byte; k++)
+        used += (size_t)snprintf(text + used, n_byte - used, "  %-11s %s\n", name, about);
 }
 
 int command_robustness(int argc, char **argv)
@@ -120,8 +181,7 @@ int command_robustness(int argc, char **argv)
                                   .about = about,
                                   .example = "palpate prepare --shape sphere --resolution 6 --model fem -o ball\n"
                                              "palpate robustness ball/scene.json --only meganewton --seconds 20\n",
-                                  .flag = flag,
-                                  .n_flag = sizeof flag / sizeof flag[0],
+                                  PAL_FLAGS(flag),
                                   .min_operand = 1,
                                   .max_operand = 1};
     pal_flag_common common;
@@ -129,7 +189,8 @@ int command_robustness(int argc, char **argv)
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
     if (code >= 0) return code;
     bool known = !only;
-    for (int k = 0; k < pal_robustness_case_count() && !known; k++) known = !strcmp(only, pal_robustness_case_name(k));
+    const char *name;
+    for (int k = 0; (name = pal_robustness_case_name(k, NULL)) && !known; k++) known = !strcmp(only, name);
     if (!known) return pal_flags_wrong(&common, "there is no case \"%.60s\"", only);
     pal_robustness_options options;
     pal_robustness_default(&options);
@@ -143,7 +204,7 @@ int command_robustness(int argc, char **argv)
     if (!err && (err = pal_robustness_run(scene, &options, report, &reason)))
         pal_diagnostic_set(&diag, err, "%s: %s", word[0], reason.text);
     pal_report_progress(NULL, 0, &common);
-    if (!err && picture) err = pal_robustness_picture(report, scene->title, picture, &diag);
+    if (!err && picture) err = draw(report, scene->title, picture, &diag);
     if (err) {
         code = pal_report_refusal(&common, err, &diag);
     } else {

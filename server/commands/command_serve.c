@@ -1,14 +1,20 @@
 /* `palpate serve`: every input becomes a session, the network thread serves them, this thread waits for signals. SIGINT
  * and SIGTERM shut down in order; SIGCHLD reports a palpate-lcm that has died and is restarted. LCM has a process of
- * its own because two forged datagrams can crash any LCM subscriber. */
+ * its own because two forged datagrams can crash any LCM subscriber.
+ *
+ * Signals have handlers instead of a blocked mask and sigwait: OpenBLAS starts threads before main, and a signal that
+ * one thread does not block is delivered to that thread. Without a handler it is then discarded where it is ignored
+ * (SIGINT of a background process of a shell), else it kills the process. */
 #include "server/base/clock.h"
 #include "server/base/log.h"
+#include "server/base/thread.h"
 #include "server/cli/flags.h"
 #include "server/commands/commands.h"
 #include "server/commands/preflight_report.h"
+#include "server/commands/tuning.h"
 #include "server/mesh/files/mesh_file.h"
+#include "server/net/hub_verb.h"
 #include "server/net/server.h"
-#include "server/net/verb_table.h"
 #include "server/scene/scene_arg.h"
 #include "server/study/studied_scene.h"
 
@@ -18,17 +24,16 @@
 #include <limits.h>
 #include <math.h>
 #include <pthread.h>
+#include <semaphore.h>
 #include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 enum { MAX_SESSIONS = 8, MAX_URL = 400 };
-#define RESTART_NS 1000000000u /* least time between two starts of a palpate-lcm */
-#define LEAVE_NS   1000000000u /* time for it to end after SIGTERM */
 
 typedef struct lcm_child {
     char server[MAX_URL];
@@ -46,14 +51,12 @@ typedef struct serve_run {
     pal_studied_scene studied[MAX_SESSIONS]; /* in the configuration that the scene asks for   */
     pal_preflight preflight[MAX_SESSIONS];
     pal_session *session[MAX_SESSIONS];
-    const pal_measured_configuration *setting[MAX_SESSIONS]; /* borrowed by the server */
-    int n_configuration[MAX_SESSIONS], setting_body[MAX_SESSIONS];
-    double reference_m[MAX_SESSIONS];
+    pal_session_study study[MAX_SESSIONS]; /* borrowed by the server */
     pal_server_gate *gate;
     pal_server *server;
     lcm_child lcm[MAX_SESSIONS];
     char lcm_program[PATH_MAX];
-    pthread_t net_thread, main_thread;
+    pthread_t net_thread;
     pal_err net_err;
     double seconds; /* serve for so long; 0: until a signal */
 } serve_run;
@@ -157,10 +160,11 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
 {
     char folder[PATH_MAX + 32];
     for (int i = 0; i < run->n; i++) {
-        run->setting[i] = run->studied[i].setting;
-        run->n_configuration[i] = run->studied[i].n_configuration;
-        run->setting_body[i] = run->studied[i].body;
-        run->reference_m[i] = run->studied[i].file ? run->studied[i].file->study.reference_m : NAN;
+        const pal_studied_scene *studied = &run->studied[i];
+        run->study[i] = (pal_session_study){.configuration = studied->setting,
+                                            .n = studied->n_configuration,
+                                            .body = studied->body,
+                                            .reference_m = studied->file ? studied->file->study.reference_m : NAN};
     }
     pal_server_options options = {.listen = run->config.listen,
                                   .port = run->config.port,
@@ -168,10 +172,7 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
                                   .viewer_folder = viewer_folder(&run->config, folder, sizeof folder),
                                   .error_m = run->config.error_m,
                                   .max_clients = run->config.max_clients,
-                                  .setting = run->setting,
-                                  .n_configuration = run->n_configuration,
-                                  .setting_body = run->setting_body,
-                                  .reference_m = run->reference_m};
+                                  .study = run->study};
     PAL_TRY(pal_server_open(&options, run->session, run->n, diag, &run->server));
     if (!options.viewer_folder)
         pal_log(PAL_LOG_WARN, "viewer", "no viewer to serve: neither beside the program nor given with --viewer");
@@ -196,21 +197,45 @@ static int announce(const serve_run *run)
     make_address(run, address, sizeof address);
     snprintf(url, sizeof url, "http://%s/", address);
     if (run->common.json) {
-        cJSON *object = cJSON_CreateObject();
-        cJSON_AddBoolToObject(object, "ok", true);
-        cJSON_AddStringToObject(object, "open", url);
-        cJSON_AddStringToObject(object, "address", run->config.listen);
-        cJSON_AddNumberToObject(object, "port", pal_server_port(run->server));
-        cJSON_AddNumberToObject(object, "pid", getpid());
-        cJSON *sessions = cJSON_AddArrayToObject(object, "sessions");
-        for (int i = 0; i < run->n; i++) cJSON_AddItemToArray(sessions, cJSON_CreateString(run->scene[i]->scene.name));
-        return pal_report_json(&run->common, object);
+        cJSON *sessions = cJSON_CreateArray();
+        for (int i = 0; i < run->n; i++) cJSON_AddItemToArray(sessions, JSON_TEXT(run->scene[i]->scene.name));
+        return pal_report_json(&run->common, PAL_JSON({"ok", JSON_BOOL(true)}, {"open", JSON_TEXT(url)},
+                                                      {"address", JSON_TEXT(run->config.listen)},
+                                                      {"port", JSON_NUMBER(pal_server_port(run->server))},
+                                                      {"pid", JSON_NUMBER(getpid())}, {"sessions", sessions}));
     }
     if (!run->common.quiet) printf("palpate: open %s\n", url);
     for (int i = 1; i < run->n && !run->common.quiet; i++)
         printf("palpate: open %s?session=%s\n", url, run->scene[i]->scene.name);
     fflush(stdout);
     return 0;
+}
+
+/* ---- signals ---- */
+
+static const int handled_signal[] = {SIGINT, SIGTERM, SIGCHLD};
+enum { N_HANDLED = sizeof handled_signal / sizeof *handled_signal };
+static sem_t woken; /* posted by each handled signal and by the end of the network thread */
+static atomic_bool stop_asked;
+
+static void on_signal(int number)
+{
+    if (number != SIGCHLD) stop_asked = true;
+    sem_post(&woken);
+}
+
+static void handle_signals(void)
+{
+    struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_RESTART};
+    sem_init(&woken, 0, 0);
+    for (int k = 0; k < N_HANDLED; k++) sigaction(handled_signal[k], &action, NULL);
+    signal(SIGPIPE, SIG_IGN);
+}
+
+static void wait_until(uint64_t when_ns)
+{
+    struct timespec when = {(time_t)(when_ns / 1000000000u), (long)(when_ns % 1000000000u)};
+    sem_clockwait(&woken, CLOCK_MONOTONIC, &when);
 }
 
 /* ---- palpate-lcm ---- */
@@ -231,7 +256,7 @@ static pal_err find_lcm(serve_run *run, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
-/* runs in the child between fork and exec: only async-signal-safe calls */
+/* runs in the child between fork and exec, with signals blocked: only async-signal-safe calls */
 static void become_lcm(const serve_run *run, const lcm_child *child)
 {
     sigset_t none;
@@ -243,9 +268,10 @@ static void become_lcm(const serve_run *run, const lcm_child *child)
                           run->common.quiet ? (char *)"--quiet" : NULL,
                           NULL};
     prctl(PR_SET_PDEATHSIG, SIGTERM);
+    for (int k = 0; k < N_HANDLED; k++) signal(handled_signal[k], SIG_DFL);
+    signal(SIGPIPE, SIG_DFL);
     sigemptyset(&none);
     sigprocmask(SIG_SETMASK, &none, NULL);
-    signal(SIGPIPE, SIG_DFL);
     /* stdout belongs to the parent's announcement, sockets to the parent */
     dup2(STDERR_FILENO, STDOUT_FILENO);
     close_range(3, ~0u, 0);
@@ -255,9 +281,13 @@ static void become_lcm(const serve_run *run, const lcm_child *child)
 
 static void start_lcm(serve_run *run, lcm_child *child)
 {
+    sigset_t all, old;
     child->start_ns = pal_clock_ns();
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &old);
     pid_t pid = fork();
     if (pid == 0) become_lcm(run, child);
+    pthread_sigmask(SIG_SETMASK, &old, NULL);
     if (pid > 0) child->pid = pid;
     if (pid < 0)
         pal_log(PAL_LOG_WARN, "lcm", "palpate-lcm cannot be started: %s", strerror(errno));
@@ -279,20 +309,20 @@ static void reap_lcm(serve_run *run, pal_log_level level)
     }
 }
 
-/* starts every palpate-lcm that does not run; the result is the time until the next start is due */
+/* starts every palpate-lcm that does not run; the result is the time when the next start is due */
 static uint64_t restart_lcm(serve_run *run)
 {
-    uint64_t wait_ns = UINT64_MAX;
+    uint64_t next_ns = UINT64_MAX;
     for (int i = 0; i < run->n; i++) {
         lcm_child *child = &run->lcm[i];
-        uint64_t now = pal_clock_ns(), due = child->start_ns ? child->start_ns + RESTART_NS : now;
+        uint64_t due_ns = child->start_ns ? child->start_ns + PAL_LCM_RESTART_NS : 0;
         if (!child->server[0] || child->pid) continue;
-        if (due <= now)
+        if (due_ns <= pal_clock_ns())
             start_lcm(run, child);
-        else if (due - now < wait_ns)
-            wait_ns = due - now;
+        else if (due_ns < next_ns)
+            next_ns = due_ns;
     }
-    return wait_ns;
+    return next_ns;
 }
 
 static bool any_lcm(const serve_run *run)
@@ -302,14 +332,13 @@ static bool any_lcm(const serve_run *run)
     return false;
 }
 
-static void end_lcm(serve_run *run, const sigset_t *signals)
+static void end_lcm(serve_run *run)
 {
-    uint64_t end = pal_clock_ns() + LEAVE_NS;
-    const struct timespec pause = {0, 50000000};
+    uint64_t end_ns = pal_clock_ns() + PAL_LCM_LEAVE_NS;
     for (int i = 0; i < run->n; i++)
         if (run->lcm[i].pid) kill(run->lcm[i].pid, SIGTERM);
-    while (any_lcm(run) && pal_clock_ns() < end) {
-        sigtimedwait(signals, NULL, &pause);
+    while (any_lcm(run) && pal_clock_ns() < end_ns) {
+        wait_until(end_ns);
         reap_lcm(run, PAL_LOG_DEBUG);
     }
     for (int i = 0; i < run->n; i++)
@@ -326,49 +355,32 @@ static void *net_main(void *user)
     serve_run *run = user;
     run->net_err = pal_server_run(run->server);
     /* wakes the waiting thread, also when the loop failed by itself */
-    pthread_kill(run->main_thread, SIGUSR1);
+    stop_asked = true;
+    sem_post(&woken);
     return NULL;
 }
 
-/* wait_for_end alone receives these signals; threads inherit the mask */
-static void block_signals(sigset_t *signals)
-{
-    sigemptyset(signals);
-    sigaddset(signals, SIGINT);
-    sigaddset(signals, SIGTERM);
-    sigaddset(signals, SIGCHLD);
-    sigaddset(signals, SIGUSR1);
-    pthread_sigmask(SIG_BLOCK, signals, NULL);
-    signal(SIGPIPE, SIG_IGN);
-}
-
-static void wait_for_end(serve_run *run, const sigset_t *signals)
+static void wait_for_end(serve_run *run)
 {
     uint64_t end_ns = run->seconds > 0 ? pal_clock_ns() + (uint64_t)(1e9 * run->seconds) : UINT64_MAX;
-    for (;;) {
-        uint64_t wait_ns = restart_lcm(run), now = pal_clock_ns();
-        if (now >= end_ns) return;
-        if (end_ns - now < wait_ns) wait_ns = end_ns - now;
-        struct timespec wait = {(time_t)(wait_ns / 1000000000u), (long)(wait_ns % 1000000000u)};
-        int signal_number = sigtimedwait(signals, NULL, &wait);
-        if (signal_number == SIGCHLD) reap_lcm(run, PAL_LOG_WARN);
-        if (signal_number == SIGINT || signal_number == SIGTERM || signal_number == SIGUSR1) return;
+    while (!stop_asked && pal_clock_ns() < end_ns) {
+        reap_lcm(run, PAL_LOG_WARN);
+        uint64_t next_ns = restart_lcm(run);
+        wait_until(next_ns < end_ns ? next_ns : end_ns);
     }
 }
 
 static pal_err run_all(serve_run *run, pal_diagnostic *diag)
 {
-    sigset_t signals;
-    block_signals(&signals);
+    handle_signals();
     PAL_TRY(open_studies(run, diag));
     PAL_TRY(open_sessions(run, diag));
     PAL_TRY(open_server(run, diag));
     PAL_TRY(find_lcm(run, diag));
-    run->main_thread = pthread_self();
-    if (pthread_create(&run->net_thread, NULL, net_main, run)) return PAL_ERR_INTERNAL;
+    if (pal_thread_start(&run->net_thread, net_main, run)) return PAL_ERR_INTERNAL;
     if (announce(run)) run->net_err = PAL_ERR_IO;
-    wait_for_end(run, &signals);
-    end_lcm(run, &signals);
+    wait_for_end(run);
+    end_lcm(run);
     pal_server_stop(run->server);
     pthread_join(run->net_thread, NULL);
     return run->net_err;
@@ -384,10 +396,9 @@ static void close_all(serve_run *run)
 }
 
 static const char about[] =
-    "Serves every scene (.json), surface (.obj .stl .ply .off), label volume (.nii .nii.gz .inr .inr.gz) or solid of\n"
-    "control cells (.palcells) as a session that browsers, haptic bridges and scripted clients share; without an "
-    "input\n"
-    "a computed organ. Prints the address to open. Ends on SIGINT or SIGTERM, or after --seconds.\n";
+    "Serves every scene (.json), surface (.obj .stl .ply .off), label volume (.nii .nii.gz .inr .inr.gz) or solid\n"
+    "of control cells (.palcells) as a session that browsers, haptic bridges and scripted clients share; without\n"
+    "an input a computed organ. Prints the address to open. Ends on SIGINT or SIGTERM, or after --seconds.\n";
 
 static int print_protocol(void)
 {
@@ -424,8 +435,7 @@ int command_serve(int argc, char **argv)
                                              "--seconds 2\n"
                                              "palpate cells chair -o chair.palcells\n"
                                              "palpate serve chair.palcells --port 0 --seconds 2\n",
-                                  .flag = flag,
-                                  .n_flag = sizeof flag / sizeof *flag,
+                                  PAL_FLAGS(flag),
                                   .max_operand = MAX_SESSIONS,
                                   .config = &run.config};
     int code = pal_flags_parse(&table, argc, argv, &run.common, input, &n_input);

@@ -2,35 +2,42 @@
 #include "server/base/clock.h"
 #include "server/cli/flags.h"
 #include "server/commands/commands.h"
-#include "server/commands/convergence_report.h"
+#include "server/figure/plot.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/problem_file.h"
 #include "server/scene/scene_file.h"
-#include "server/solve/solve.h"
+#include "server/solve/convergence.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { PATH = 1200 };
+enum { PATH = 1200, WORDS = 400, ELEMENTS = 4 };
 
 static const char about[] =
-    "Solves a load case with finite elements on the voxels of a surface and compares displacements with a reference.\n"
-    "PROBLEM.json has the format palpate-reference-1: surface, materials, supports, load cases, references (every "
-    "key:\n"
-    "server/scene/problem_file.h). --case names a load case, which is compared with the reference of the same\n"
-    "kinematics, E and nu if there is one; or a reference, which determines load case, law, E and nu.\n"
+    "Solves a load case with finite elements on the voxels of a surface and compares displacements with a\n"
+    "reference. PROBLEM.json has the format palpate-reference-1: surface, materials, supports, load cases,\n"
+    "references (every key: server/scene/problem_file.h). --case names a load case, which is compared with the\n"
+    "reference of the same kinematics, E and nu if there is one; or a reference, which determines load case, law,\n"
+    "E and nu.\n"
     "\n"
-    "Several resolutions or elements, separated by commas, give a table: error, observed order of convergence from "
-    "one\n"
-    "resolution to the next, change of displacement between them, order and error estimated from the changes\n"
-    "(Richardson extrapolation), seconds.\n";
+    "Several resolutions or elements, separated by commas, give a table: error, observed order of convergence\n"
+    "from one resolution to the next, change of displacement between them, order and error estimated from the\n"
+    "changes (Richardson extrapolation), seconds.\n";
+
+/* the values of --element and --resolution */
+typedef struct lists {
+    int n_element, n_resolution;
+    const char *element[ELEMENTS];
+    int max_resolution[ELEMENTS]; /* of the element */
+    int resolution[PAL_CONVERGENCE_MAX];
+} lists;
 
 typedef struct arguments {
     const char *problem, *load_case, *kinematics, *law, *element, *resolution, *samples, *fill, *align, *linear, *free,
         *folder, *vtk, *csv, *plot;
-    pal_study_list list;
+    lists list;
     pal_solve_options solve;
 } arguments;
 
@@ -49,20 +56,71 @@ typedef struct study {
     int n_file;
 } study;
 
-/* ---- choice of the load case ---- */
+/* ---- lists of elements and resolutions ---- */
 
-static pal_err no_case(const study *s, const char *id, pal_diagnostic *diag)
+static const char *const known[ELEMENTS] = {"hex8_bbar", "hex8", "tet4", "tet10"};
+
+static bool wrong(pal_diagnostic *diag, const char *flag, const char *word, const char *what)
 {
-    char list[320] = "";
-    size_t n = 0;
-    const pal_problem *p = s->problem;
-    for (int k = 0; k < p->n_case + p->n_reference && n < sizeof list; k++)
-        n += (size_t)snprintf(list + n, sizeof list - n, "%s%s", k ? ", " : "",
-                              k < p->n_case ? p->load_case[k].id : p->reference[k - p->n_case].id);
-    if (!id) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: --case is missing; known are %s", p->path, list);
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: there is no load case or reference \"%.40s\"; known are %s",
-                              p->path, id, list);
+    pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.40s %s", flag, word[0] ? word : "\"\"", what);
+    for (char *c = diag->text; *c; c++)
+        if ((unsigned char)*c < 0x20 || *c == 0x7f) *c = ' ';
+    return false;
 }
+
+/* a whole number of 1 to 1024 and nothing else */
+static bool read_resolution(const char *flag, const char *word, int *out, pal_diagnostic *diag)
+{
+    char *end;
+    long n = strtol(word, &end, 10);
+    if (end == word || *end) return wrong(diag, flag, word, "is not a whole number");
+    *out = (int)n;
+    return (n >= 1 && n <= 1024) || wrong(diag, flag, word, "is outside 1 .. 1024");
+}
+
+static bool add_element(char *word, lists *out, pal_diagnostic *diag)
+{
+    char *limit_text = strchr(word, ':');
+    int limit = 1024;
+    if (limit_text) *limit_text++ = 0;
+    if (limit_text && !read_resolution("--element", limit_text, &limit, diag)) return false;
+    for (int k = 0; k < ELEMENTS; k++) {
+        if (strcmp(word, known[k])) continue;
+        for (int j = 0; j < out->n_element; j++)
+            if (out->element[j] == known[k]) return wrong(diag, "--element", word, "is given twice");
+        out->element[out->n_element] = known[k];
+        out->max_resolution[out->n_element++] = limit;
+        return true;
+    }
+    return wrong(diag, "--element", word, "is not hex8_bbar, hex8, tet4 or tet10");
+}
+
+static bool add_resolution(const char *word, lists *out, pal_diagnostic *diag)
+{
+    static const char flag[] = "--resolution";
+    int n = 0, before = out->n_resolution > 0 ? out->resolution[out->n_resolution - 1] : 0;
+    if (!read_resolution(flag, word, &n, diag)) return false;
+    if (out->n_resolution == PAL_CONVERGENCE_MAX) return wrong(diag, flag, word, "is the 17th, at most 16 are allowed");
+    if (n <= before) return wrong(diag, flag, word, "is not above the one before, they must ascend");
+    out->resolution[out->n_resolution++] = n;
+    return true;
+}
+
+/* element: "hex8_bbar,tet10:8", resolution: "8,16,32"; false: diag names the fault */
+static bool read_lists(const char *element, const char *resolution, lists *out, pal_diagnostic *diag)
+{
+    char word[WORDS];
+    *out = (lists){0};
+    if (strlen(element) >= WORDS) return wrong(diag, "--element", element, "... is too long");
+    if (strlen(resolution) >= WORDS) return wrong(diag, "--resolution", resolution, "... is too long");
+    while (pal_flag_next_word(&element, word, sizeof word))
+        if (!add_element(word, out, diag)) return false;
+    while (pal_flag_next_word(&resolution, word, sizeof word))
+        if (!add_resolution(word, out, diag)) return false;
+    return true;
+}
+
+/* ---- choice of the load case ---- */
 
 /* --law, or the law that --kinematics or the reference implies */
 static const char *law_of(const arguments *args, const pal_problem_reference *reference)
@@ -97,7 +155,7 @@ static pal_err choose(study *s, arguments *args, pal_diagnostic *diag)
     const char *id = args->load_case ? args->load_case : p->n_case == 1 ? p->load_case[0].id : NULL;
     const pal_problem_reference *named = id ? pal_problem_reference_find(p, id) : NULL;
     s->load_case = named ? pal_problem_case_find(p, named->load_case) : id ? pal_problem_case_find(p, id) : NULL;
-    if (!s->load_case) return no_case(s, id, diag);
+    if (!s->load_case) return pal_problem_refuse_case(s->problem, "--case", id, diag);
     args->solve.law = law_of(args, named);
     if (named && isnan(args->solve.young_Pa)) args->solve.young_Pa = named->young_Pa;
     if (named && isnan(args->solve.poisson)) args->solve.poisson = named->poisson;
@@ -168,57 +226,36 @@ static pal_err work(study *s, const arguments *args, pal_diagnostic *diag)
 
 /* ---- report ---- */
 
-static void add_seconds(cJSON *object, const study *s)
+static cJSON *seconds_json(const pal_solve_result *r, double total_s)
 {
-    const pal_solve_result *r = &s->result;
-    cJSON *seconds = cJSON_AddObjectToObject(object, "seconds");
-    cJSON_AddNumberToObject(seconds, "prepare", r->prepare_s);
-    cJSON_AddNumberToObject(seconds, "assemble", r->assemble_s);
-    cJSON_AddNumberToObject(seconds, "factor", r->factor_s);
-    cJSON_AddNumberToObject(seconds, "solve", r->solve_s);
-    cJSON_AddNumberToObject(seconds, "total", s->total_s);
+    return PAL_JSON({"prepare", JSON_NUMBER(r->prepare_s)}, {"assemble", JSON_NUMBER(r->assemble_s)},
+                    {"factor", JSON_NUMBER(r->factor_s)}, {"solve", JSON_NUMBER(r->solve_s)},
+                    {"total", JSON_NUMBER(total_s)});
 }
 
 static cJSON *as_json(const study *s, const arguments *args)
 {
     const pal_solve_result *r = &s->result;
-    cJSON *o = cJSON_CreateObject();
+    const pal_problem_reference *reference = s->reference;
     bool compared = s->samples_file != NULL;
-    cJSON_AddBoolToObject(o, "ok", true);
-    cJSON_AddStringToObject(o, "problem", s->problem->name);
-    cJSON_AddStringToObject(o, "case", s->load_case->id);
-    if (s->reference)
-        cJSON_AddStringToObject(o, "reference", s->reference->id);
-    else
-        cJSON_AddNullToObject(o, "reference");
-    cJSON_AddStringToObject(o, "element", args->solve.element);
-    cJSON_AddStringToObject(o, "law", args->solve.law);
-    cJSON_AddNumberToObject(o, "resolution", args->solve.resolution);
-    cJSON_AddBoolToObject(o, "fill", args->solve.fill);
-    pal_json_add_or_null(o, "rms_percent", compared ? s->rms_percent : NAN);
-    pal_json_add_or_null(o, "max_percent", compared ? s->max_percent : NAN);
-    pal_json_add_or_null(o, "reference_rms_percent", s->reference ? 100 * s->reference->estimated_rms : NAN);
-    cJSON_AddNumberToObject(o, "samples", s->samples.n);
-    cJSON_AddNumberToObject(o, "nodes", r->n_node);
-    cJSON_AddNumberToObject(o, "elements", r->n_element);
-    cJSON_AddNumberToObject(o, "dof", r->n_dof);
-    cJSON_AddNumberToObject(o, "held_nodes", r->n_fixed);
-    cJSON_AddNumberToObject(o, "iterations", r->n_newton);
-    cJSON_AddNumberToObject(o, "cg_iterations", r->n_cg);
-    cJSON_AddNumberToObject(o, "residual", r->residual);
-    cJSON_AddNumberToObject(o, "voxel_m", r->edge_m);
-    cJSON_AddNumberToObject(o, "volume_m3", r->volume_m3);
-    cJSON_AddItemToObject(o, "load_area_m2", cJSON_CreateDoubleArray(r->area_m2, s->load_case->n_load));
-    cJSON_AddItemToObject(o, "load_N", cJSON_CreateDoubleArray(r->load_N, 3));
-    cJSON_AddItemToObject(o, "reaction_N", cJSON_CreateDoubleArray(r->reaction_N, 3));
-    cJSON_AddNumberToObject(o, "work_J", r->work_J);
-    cJSON_AddNumberToObject(o, "energy_J", r->energy_J);
-    cJSON_AddNumberToObject(o, "max_displacement_m", r->max_m);
-    cJSON_AddBoolToObject(o, "poisson_clamped", r->clamped);
-    cJSON *files = cJSON_AddArrayToObject(o, "files");
-    for (int k = 0; k < s->n_file; k++) cJSON_AddItemToArray(files, cJSON_CreateString(s->file[k]));
-    add_seconds(o, s);
-    return o;
+    return PAL_JSON(
+        {"ok", JSON_BOOL(true)}, {"problem", JSON_TEXT(s->problem->name)}, {"case", JSON_TEXT(s->load_case->id)},
+        {"reference", reference ? JSON_TEXT(reference->id) : cJSON_CreateNull()},
+        {"element", JSON_TEXT(args->solve.element)}, {"law", JSON_TEXT(args->solve.law)},
+        {"resolution", JSON_NUMBER(args->solve.voxel.resolution)}, {"fill", JSON_BOOL(args->solve.voxel.fill)},
+        {"rms_percent", pal_json_or_null(compared ? s->rms_percent : NAN)},
+        {"max_percent", pal_json_or_null(compared ? s->max_percent : NAN)},
+        {"reference_rms_percent", pal_json_or_null(reference ? 100 * reference->estimated_rms : NAN)},
+        {"samples", JSON_NUMBER(s->samples.n)}, {"nodes", JSON_NUMBER(r->n_node)},
+        {"elements", JSON_NUMBER(r->n_element)}, {"dof", JSON_NUMBER(r->n_dof)},
+        {"held_nodes", JSON_NUMBER(r->n_fixed)}, {"iterations", JSON_NUMBER(r->n_newton)},
+        {"cg_iterations", JSON_NUMBER(r->n_cg)}, {"residual", JSON_NUMBER(r->residual)},
+        {"voxel_m", JSON_NUMBER(r->edge_m)}, {"volume_m3", JSON_NUMBER(r->volume_m3)},
+        {"load_area_m2", cJSON_CreateDoubleArray(r->area_m2, s->load_case->n_load)},
+        {"load_N", cJSON_CreateDoubleArray(r->load_N, 3)}, {"reaction_N", cJSON_CreateDoubleArray(r->reaction_N, 3)},
+        {"work_J", JSON_NUMBER(r->work_J)}, {"energy_J", JSON_NUMBER(r->energy_J)},
+        {"max_displacement_m", JSON_NUMBER(r->max_m)}, {"poisson_clamped", JSON_BOOL(r->clamped)},
+        {"files", pal_json_texts(s->file[0], PATH, s->n_file)}, {"seconds", seconds_json(r, s->total_s)});
 }
 
 static void print(const study *s, const arguments *args)
@@ -241,25 +278,167 @@ static void print(const study *s, const arguments *args)
     for (int k = 0; k < s->n_file; k++) printf("wrote %s\n", s->file[k]);
 }
 
+/* ---- a table ---- */
+
+/* One convergence series for each element (solve/convergence.h). Plots: the error over nodes and, in a second file,
+ * over seconds; the error is against the reference, or the Richardson estimate where there is none. */
+typedef struct series {
+    pal_convergence_point point[PAL_CONVERGENCE_MAX];
+    int n;
+} series;
+
+static pal_err solve_all(const study *s, const arguments *args, series *out, pal_diagnostic *diag)
+{
+    for (int e = 0; e < args->list.n_element; e++) {
+        pal_solve_options options = args->solve;
+        int n = 0;
+        options.element = args->list.element[e];
+        while (n < args->list.n_resolution && args->list.resolution[n] <= args->list.max_resolution[e]) n++;
+        if (n == 0) continue;
+        pal_diagnostic reason = {""};
+        pal_err err =
+            pal_convergence(s->problem, s->load_case, &s->surface, &options, s->samples_file ? &s->samples : NULL,
+                            args->list.resolution, n, out[e].point, &out[e].n, &reason);
+        if (err)
+            return pal_diagnostic_set(diag, err, "%s: %s at resolution %d: %s", s->problem->path, args->list.element[e],
+                                      args->list.resolution[out[e].n], reason.text);
+    }
+    return PAL_ERR_OK;
+}
+
+/* the plotted error, per cent */
+static double error_of(const study *s, const pal_convergence_point *p)
+{
+    return s->samples_file ? p->rms_percent : p->estimate_percent;
+}
+
+/* the second file's name: "_seconds" before ".svg" */
+static void seconds_path(const char *plot, char out[PATH])
+{
+    size_t n = strlen(plot), stem = n > 4 && !strcmp(plot + n - 4, ".svg") ? n - 4 : n;
+    snprintf(out, PATH, "%.*s_seconds%s", (int)stem, plot, plot + stem);
+}
+
+/* over nodes, or over seconds */
+static pal_err draw(const study *s, const arguments *args, const series *all, bool seconds, const char *path,
+                    pal_diagnostic *diag)
+{
+    double x[ELEMENTS][PAL_CONVERGENCE_MAX], y[ELEMENTS][PAL_CONVERGENCE_MAX], guide_x[2] = {0}, guide_y[2] = {0};
+    char title[220];
+    const char *id = s->reference ? s->reference->id : s->load_case->id, *law = args->solve.law;
+    bool named = strstr(id, law) != NULL; /* the reference names the law */
+    snprintf(title, sizeof title, "%s: %s%s%s", s->problem->name, id, named ? "" : ", ", named ? "" : law);
+    pal_plot plot = {.title = title,
+                     .x_label = seconds ? "seconds, from surface to displacements" : "nodes",
+                     .y_label = s->samples_file ? "RMS error, % of the largest displacement" : "estimated RMS error, %",
+                     .log_x = true,
+                     .log_y = true};
+    for (int e = 0; e < args->list.n_element; e++) {
+        const series *one = &all[e];
+        for (int k = 0; k < one->n; k++) {
+            x[e][k] = seconds ? one->point[k].result.total_s : one->point[k].result.n_node;
+            y[e][k] = error_of(s, &one->point[k]);
+        }
+        plot.curve[plot.n_curve++] = (pal_curve){.name = args->list.element[e], .n = one->n, .x = x[e], .y = y[e]};
+    }
+    /* a guide of order 2 in h, below the first curve */
+    int last = all[0].n - 1;
+    if (!seconds && last > 0 && y[0][last] > 0) {
+        guide_x[0] = x[0][0], guide_x[1] = x[0][last];
+        guide_y[1] = 0.6 * y[0][last];
+        guide_y[0] = guide_y[1] * pow(x[0][last] / x[0][0], 2.0 / 3);
+        plot.curve[plot.n_curve++] =
+            (pal_curve){.name = "order 2 in h", .n = 2, .x = guide_x, .y = guide_y, .dashed = true, .bare = true};
+    }
+    return pal_plot_write(&plot, path, diag);
+}
+
+static cJSON *point_json(const char *element, const pal_convergence_point *p)
+{
+    const pal_solve_result *r = &p->result;
+    return PAL_JSON(
+        {"element", JSON_TEXT(element)}, {"resolution", JSON_NUMBER(p->resolution)},
+        {"voxel_m", JSON_NUMBER(r->edge_m)}, {"nodes", JSON_NUMBER(r->n_node)}, {"elements", JSON_NUMBER(r->n_element)},
+        {"dof", JSON_NUMBER(r->n_dof)}, {"rms_percent", pal_json_or_null(p->rms_percent)},
+        {"max_percent", pal_json_or_null(p->max_percent)}, {"order", pal_json_or_null(p->order)},
+        {"change_percent", pal_json_or_null(p->change_percent)}, {"change_order", pal_json_or_null(p->change_order)},
+        {"estimate_percent", pal_json_or_null(p->estimate_percent)}, {"iterations", JSON_NUMBER(r->n_newton)},
+        {"cg_iterations", JSON_NUMBER(r->n_cg)}, {"seconds", seconds_json(r, r->total_s)});
+}
+
+static cJSON *table_json(const study *s, const arguments *args, const series *all, const char *const file[2])
+{
+    cJSON *table = cJSON_CreateArray();
+    for (int e = 0; e < args->list.n_element; e++)
+        for (int k = 0; k < all[e].n; k++)
+            cJSON_AddItemToArray(table, point_json(args->list.element[e], &all[e].point[k]));
+    return PAL_JSON({"ok", JSON_BOOL(true)}, {"problem", JSON_TEXT(s->problem->name)},
+                    {"case", JSON_TEXT(s->load_case->id)},
+                    {"reference", s->reference ? JSON_TEXT(s->reference->id) : cJSON_CreateNull()},
+                    {"law", JSON_TEXT(args->solve.law)}, {"fill", JSON_BOOL(args->solve.voxel.fill)}, {"table", table},
+                    {"files", cJSON_CreateStringArray(file, file[0] ? 2 : 0)});
+}
+
+/* a cell of the table; "-" when the number is not known */
+static void print_cell(int width, int digits, double number)
+{
+    if (isfinite(number))
+        printf(" %*.*f", width, digits, number);
+    else
+        printf(" %*s", width, "-");
+}
+
+static void print_table(const study *s, const arguments *args, const series *all, const char *const file[2])
+{
+    printf("%s, load case %s, %s", s->problem->name, s->load_case->id, args->solve.law);
+    if (s->samples_file)
+        printf(", against %s (%d points)\n", s->reference ? s->reference->id : s->samples_file, s->samples.n);
+    else
+        printf(", without a reference\n");
+    printf("%-10s %10s %8s %8s %8s %6s %9s %6s %10s %9s %9s\n", "element", "resolution", "nodes", "RMS %", "max %",
+           "order", "change %", "order", "estimate %", "factor s", "total s");
+    for (int e = 0; e < args->list.n_element; e++)
+        for (int k = 0; k < all[e].n; k++) {
+            const pal_convergence_point *p = &all[e].point[k];
+            printf("%-10s %10d %8d", args->list.element[e], p->resolution, p->result.n_node);
+            const struct {
+                int width, digits;
+                double number;
+            } cell[] = {{8, 3, p->rms_percent},     {8, 3, p->max_percent},   {6, 2, p->order},
+                        {9, 3, p->change_percent},  {6, 2, p->change_order},  {10, 3, p->estimate_percent},
+                        {9, 3, p->result.factor_s}, {9, 3, p->result.total_s}};
+            for (size_t c = 0; c < sizeof cell / sizeof cell[0]; c++)
+                print_cell(cell[c].width, cell[c].digits, cell[c].number);
+            printf("\n");
+        }
+    for (int k = 0; k < 2 && file[k]; k++) printf("wrote %s\n", file[k]);
+}
+
+static int run_table(pal_flag_common *common, const study *s, const arguments *args)
+{
+    series *all = calloc(ELEMENTS, sizeof *all);
+    pal_diagnostic diag = {""};
+    char second[PATH];
+    const char *file[2] = {NULL, NULL};
+    pal_err err = all ? solve_all(s, args, all, &diag) : PAL_ERR_MEMORY;
+    if (args->plot && !err) {
+        seconds_path(args->plot, second);
+        err = draw(s, args, all, false, args->plot, &diag);
+        if (!err) err = draw(s, args, all, true, second, &diag);
+        file[0] = args->plot, file[1] = second;
+    }
+    int code = pal_report_end(common, err, &diag, err || !common->json ? NULL : table_json(s, args, all, file));
+    if (!err && !common->json && !common->quiet) print_table(s, args, all, file);
+    free(all);
+    return code;
+}
+
 /* ---- the command ---- */
 
 /* a table: several elements or resolutions, or a plot of them */
 static bool is_table(const arguments *args)
 {
     return args->list.n_element * args->list.n_resolution > 1 || args->plot;
-}
-
-static int run_table(const pal_flag_common *common, const study *s, const arguments *args)
-{
-    const pal_solve_study what = {.problem = s->problem,
-                                  .load_case = s->load_case,
-                                  .reference = s->reference,
-                                  .samples_file = s->samples_file,
-                                  .samples = s->samples_file ? &s->samples : NULL,
-                                  .surface = &s->surface,
-                                  .options = &args->solve,
-                                  .plot = args->plot};
-    return pal_solve_study_run(common, &what, &args->list);
 }
 
 static int run(pal_flag_common *common, arguments *args)
@@ -273,11 +452,8 @@ static int run(pal_flag_common *common, arguments *args)
     bool table = !err && is_table(args);
     if (!err && !table) err = work(&s, args, &diag);
     s.total_s = pal_clock_s() - start;
-    pal_report_progress(NULL, 0, common);
-    int code = err            ? pal_report_refusal(common, err, &diag)
-               : table        ? run_table(common, &s, args)
-               : common->json ? pal_report_json(common, as_json(&s, args))
-                              : 0;
+    int code = table ? run_table(common, &s, args)
+                     : pal_report_end(common, err, &diag, err || !common->json ? NULL : as_json(&s, args));
     if (!err && !table && !common->json && !common->quiet) print(&s, args);
     pal_solution_free(s.solution);
     pal_surface_free(&s.surface);
@@ -313,7 +489,7 @@ int command_solve(int argc, char **argv)
         {"--fill", "on|off", PAL_FLAG_WORD, &args.fill, 0, 0,
          "on: a voxel that the surface cuts has its filled share of stiffness; off: voxels at least half filled count\n"
          "whole (on)"},
-        {"--least-fill", "SHARE", PAL_FLAG_NUMBER, &o->min_fill, 1e-6, 1,
+        {"--least-fill", "SHARE", PAL_FLAG_NUMBER, &o->voxel.min_fill, 1e-6, 1,
          "cut voxels with a smaller share inside are dropped (0.25 with fill, or 0.02 where that would lose 2.5 %\n"
          "of the volume; 0.5 without)"},
         {"--align", "on|off", PAL_FLAG_WORD, &args.align, 0, 0,
@@ -341,22 +517,20 @@ int command_solve(int argc, char **argv)
                                   .example = "palpate solve deploy/problems/beam.json --case tip --vtk tip.vtk\n"
                                              "palpate solve deploy/problems/beam.json --case tip --resolution 8,16 "
                                              "--element hex8_bbar,tet4 --plot error.svg\n",
-                                  .flag = flag,
-                                  .n_flag = sizeof flag / sizeof flag[0],
+                                  PAL_FLAGS(flag),
                                   .min_operand = 1,
                                   .max_operand = 1};
     pal_flag_common common;
     int n = 0, code = pal_flags_parse(&flags, argc, argv, &common, &args.problem, &n);
     if (code >= 0) return code;
     pal_diagnostic diag = {""};
-    if (!pal_solve_study_parse(args.element, args.resolution, &args.list, &diag))
-        return pal_flags_wrong(&common, "%s", diag.text);
+    if (!read_lists(args.element, args.resolution, &args.list, &diag)) return pal_flags_wrong(&common, "%s", diag.text);
     const char *sentence = check_flags(&args);
     if (sentence) return pal_flags_wrong(&common, "%s", sentence);
     o->element = args.list.element[0];
-    o->resolution = args.list.resolution[0];
-    o->fill = !args.fill || !strcmp(args.fill, "on");
-    o->align = !args.align || !strcmp(args.align, "on");
+    o->voxel.resolution = args.list.resolution[0];
+    o->voxel.fill = !args.fill || !strcmp(args.fill, "on");
+    o->voxel.align = !args.align || !strcmp(args.align, "on");
     o->linear = args.linear;
     o->inertia_relief = args.free && !strcmp(args.free, "inertia_relief");
     return run(&common, &args);

@@ -3,42 +3,38 @@
  * the most accurate in a time, is reported and written as a scene. */
 #include "server/base/clock.h"
 #include "server/base/machine.h"
+#include "server/calibrate/journal.h"
 #include "server/cli/flags.h"
 #include "server/commands/commands.h"
 #include "server/mesh/files/mesh_file.h"
+#include "server/scene/json_reader.h"
 #include "server/study/studied_scene.h"
 #include "server/study/study_input.h"
-#include "server/study/study_journal.h"
 #include "server/study/study_page.h"
+#include "server/study/tuning.h"
 
+#include <inttypes.h>
 #include <limits.h>
 #include <math.h>
-#include <signal.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 static const char about[] =
-    "Measures one body under the same loads in many configurations (method, element, law, resolution, step, "
-    "tolerance),\n"
-    "each with its error against a converged reference and the milliseconds of a live step, and marks the Pareto "
-    "front:\n"
-    "those that no other one beats in both. SCENE is a scene.json, its folder, control cells, a surface or a scan, "
-    "which\n"
-    "is pressed in three places and pulled at one; PROBLEM.json is that of palpate solve with its own loads.\n"
+    "Measures one body under the same loads in many configurations (method, element, law, resolution, step,\n"
+    "tolerance), each with its error against a converged reference and the milliseconds of a live step, and marks\n"
+    "the Pareto front: those that no other one beats in both. SCENE is a scene.json, its folder, control cells, a\n"
+    "surface or a scan, which is pressed in three places and pulled at one; PROBLEM.json is that of palpate solve\n"
+    "with its own loads.\n"
     "\n"
-    "Beside scene.json, or in --out, it keeps study.json (beside NAME.json NAME_study.json), a table .csv, a plot "
-    ".svg\n"
-    "and a page .html, and the solutions of the reference in study.reference. Ctrl-C ends it; the same command "
-    "continues\n"
-    "after the last stored result.\n"
+    "Beside scene.json, or in --out, it keeps study.json (beside NAME.json NAME_study.json), a table .csv, a plot\n"
+    ".svg and a page .html, and the solutions of the reference in study.reference. Ctrl-C ends it; the same\n"
+    "command continues after the last stored result.\n"
     "\n"
-    "--within and --budget pick a configuration, --pick the one of a row of the table; with -o they write its scene.\n"
-    "Nothing is measured again when the study is complete. A scene with \"accuracy\": {\"max_error_mm\": 1} or "
-    "\"budget\":\n"
-    "{\"step_ms\": 4} is served and planned in the configuration that the study beside it gives.\n";
+    "--within and --budget pick a configuration, --pick the one of a row of the table; with -o they write its\n"
+    "scene. Nothing is measured again when the study is complete. A scene with \"accuracy\": {\"max_error_mm\": 1} or\n"
+    "\"budget\": {\"step_ms\": 4} is served and planned in the configuration that the study beside it gives.\n";
 
 enum { MAX_PATH = PAL_STUDY_PATH + 8, FILES = 5 };
 
@@ -46,16 +42,20 @@ typedef struct study_run {
     pal_flag_common common;
     pal_study_request request;
     pal_accuracy_target target;
-    const char *methods, *folder, *scene; /* scene: -o */
-    char load_case[PAL_NAME];             /* of the stored study */
+    const char *methods, *folder, *scene;             /* scene: -o */
+    char load_case[PAL_NAME];                         /* of the stored study */
+    char words[sizeof((pal_study_file *)0)->methods]; /* --methods, cut into ... */
+    const char *method[PAL_STUDY_METHODS];
+    int n_method;
     bool again;
     bool uses_stored; /* a configuration of the stored study is asked for, whatever its loads */
     int row;          /* of the table, from 1; 0: none                                        */
     pal_study_input input;
     char stem[PAL_STUDY_PATH], path[MAX_PATH]; /* of the study's files; study.json */
     pal_study_file *file;                      /* the contents of study.json       */
-    pal_study *before;                         /* measured before; NULL: none      */
-    pal_study_journal *journal;                /* stored solutions of the reference; NULL: nothing is measured */
+    pal_study_file *old;                       /* as it was stored; NULL: none     */
+    const pal_study *before;                   /* old's results, to be continued; NULL: none */
+    pal_journal *journal;                      /* stored solutions of the reference; NULL: nothing is measured */
     int n_before, n_new;
     double begin_s, first_s; /* clock at the begin of all, of the first new configuration */
     char activity[160];
@@ -67,33 +67,46 @@ typedef struct study_run {
 
 /* ---- arguments ---- */
 
-/* "1mm", "4 ms": a number above 0 and its unit -> number / factor; false: text is not that */
-static bool read_amount(const char *text, const char *const *unit, const double *factor, double *out)
+typedef struct unit_scale {
+    const char *name;
+    double in_base; /* how many make one m or ms */
+} unit_scale;
+static const unit_scale length_unit[] = {{"mm", 1e3}, {"um", 1e6}, {"\xc2\xb5m", 1e6},
+                                         {"cm", 1e2}, {"m", 1},    {NULL, 0}};
+static const unit_scale time_unit[] = {{"ms", 1}, {"us", 1e3}, {"\xc2\xb5s", 1e3}, {"s", 1e-3}, {NULL, 0}};
+
+/* "1mm", "4 ms": a number above 0 and its unit; false: text is not that */
+static bool read_amount(const char *text, const unit_scale *unit, double *out)
 {
     char *end;
     double number = strtod(text, &end);
     if (end == text || !isfinite(number) || number <= 0) return false;
     while (*end == ' ') end++;
-    for (int k = 0; unit[k]; k++)
-        if (!strcmp(end, unit[k])) {
-            *out = number / factor[k];
-            return *out > 0 && isfinite(*out);
-        }
-    return false;
+    while (unit->name && strcmp(end, unit->name) != 0) unit++;
+    if (unit->name) *out = number / unit->in_base;
+    return unit->name && *out > 0 && isfinite(*out);
+}
+
+/* "fem,tet_springs" -> run->method; false: a word is no method */
+static bool read_methods(study_run *run)
+{
+    static const char known[] = "fem|tet_springs|adaptive_springs|subdivision_fem";
+    const char *rest = run->methods;
+    for (char *to = run->words; pal_flag_next_word(&rest, to, sizeof run->words - (size_t)(to - run->words));
+         to += strlen(to) + 1) {
+        if (pal_flag_word(known, to) < 0) return false;
+        if (run->n_method < PAL_STUDY_METHODS) run->method[run->n_method++] = to;
+    }
+    return true;
 }
 
 /* false: out is a sentence that quotes the fault */
 static bool read_arguments(study_run *run, const char *within, const char *budget, char *out, size_t n_byte)
 {
-    static const char *const length[] = {"mm", "um", "\xc2\xb5m", "cm", "m", NULL};
-    static const double length_factor[] = {1e3, 1e6, 1e6, 1e2, 1};
-    static const char *const span[] = {"ms", "us", "\xc2\xb5s", "s", NULL};
-    static const double span_factor[] = {1, 1e3, 1e3, 1e-3};
-    static const char *const model[] = {"fem", "tet_springs", "adaptive_springs", "subdivision_fem", NULL};
-    if (within && !read_amount(within, length, length_factor, &run->target.max_error_m))
+    if (within && !read_amount(within, length_unit, &run->target.max_error_m))
         return !snprintf(out, n_byte,
                          "--within: \"%.40s\" is not a length above 0 with its unit, mm, um, cm or m, as 1mm", within);
-    if (budget && !read_amount(budget, span, span_factor, &run->target.budget_ms))
+    if (budget && !read_amount(budget, time_unit, &run->target.budget_ms))
         return !snprintf(out, n_byte, "--budget: \"%.40s\" is not a time above 0 with its unit, ms, us or s, as 4ms",
                          budget);
     if (run->scene && !within && !budget && !run->row)
@@ -103,20 +116,15 @@ static bool read_arguments(study_run *run, const char *within, const char *budge
                          run->again ? "--again"
                          : within   ? "--within"
                                     : "--budget");
-    if (run->methods && strlen(run->methods) >= sizeof run->file->methods)
+    if (run->methods && strlen(run->methods) >= sizeof run->words)
         return !snprintf(out, n_byte, "--methods: \"%.40s...\" is too long", run->methods);
-    for (const char *at = run->methods; at && *at;) {
-        size_t n = strcspn(at, ",");
-        int k = 0;
-        while (model[k] && (strlen(model[k]) != n || strncmp(at, model[k], n) != 0)) k++;
-        if (!model[k] || (at[n] && !at[n + 1]))
-            return !snprintf(out, n_byte,
-                             "--methods: \"%.80s\" contains a name that is not fem, tet_springs, adaptive_springs or "
-                             "subdivision_fem",
-                             run->methods);
-        at += n + (at[n] == ',');
-    }
     if (run->methods && !run->methods[0]) return !snprintf(out, n_byte, "--methods: \"\" is empty");
+    if (run->methods && !read_methods(run))
+        return !snprintf(out, n_byte,
+                         "--methods: \"%.80s\" contains a name that is not fem, tet_springs, adaptive_springs or "
+                         "subdivision_fem",
+                         run->methods);
+    if (!run->methods) run->methods = "";
     return true;
 }
 
@@ -162,18 +170,12 @@ static pal_err check_same(const study_run *run, const pal_study_file *old, bool 
 }
 
 /* are all requested methods measured? */
-static bool covers(const pal_study_file *old, const char *methods)
+static bool covers(const study_run *run)
 {
-    char word[PAL_NAME];
-    if (!old->whole || !old->methods[0]) return old->whole;
-    if (!methods) return false;
-    for (const char *at = methods; *at;) {
-        size_t n = strcspn(at, ",");
-        snprintf(word, sizeof word, "%.*s", (int)n, at);
-        if (!pal_study_method_in(old->methods, word)) return false;
-        at += n + (at[n] == ',');
-    }
-    return true;
+    if (!run->old->whole || !run->old->methods[0]) return run->old->whole;
+    bool all = run->n_method > 0;
+    for (int k = 0; k < run->n_method; k++) all = all && pal_study_method_in(run->old->methods, run->method[k]);
+    return all;
 }
 
 /* the study will have the stored methods and the requested ones */
@@ -185,57 +187,46 @@ static void join_methods(pal_study_file *now, const pal_study_file *old)
     if (strlen(both) < sizeof now->methods) memcpy(now->methods, both, strlen(both) + 1);
 }
 
-/* a pick without load flags takes the loads of the stored study */
-static pal_err use_stored_loads(study_run *run, pal_diagnostic *diag)
+/* the stored study. A pick without load flags takes the loads from it */
+static pal_err read_old(study_run *run, pal_diagnostic *diag)
 {
-    pal_study_file *old = NULL;
     pal_study_request *q = &run->request;
+    bool exists = !access(run->path, F_OK);
     bool asks = run->row > 0 || run->target.max_error_m > 0 || run->target.budget_ms > 0;
     bool given = q->quick || q->seconds > 0 || q->load_case || q->samples;
-    double seconds = 0;
-    if (asks && !given && !run->again && !access(run->path, F_OK)) {
-        pal_diagnostic reason = {""};
-        pal_err err = pal_study_file_read(run->path, &old, &reason);
-        if (err) return pal_diagnostic_set(diag, err, "%.400s: --again starts over", reason.text);
-        pal_study_loads_read(old->loads, &seconds, &q->quick, run->load_case);
+    pal_diagnostic reason = {""};
+    if (run->row && !exists)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--pick %d: there is no %.200s yet: run palpate study %.200s",
+                                  run->row, run->path, q->word);
+    pal_err err = exists && !run->again ? pal_study_file_read(run->path, &run->old, &reason) : PAL_ERR_OK;
+    if (err) return pal_diagnostic_set(diag, err, "%.400s: --again starts over", reason.text);
+    if (run->old && asks && !given) {
+        pal_study_loads_read(run->old->loads, &q->seconds, &q->quick, run->load_case);
         if (run->load_case[0]) q->load_case = run->load_case, q->keeps_case = true;
         run->uses_stored = true;
-        q->seconds = seconds;
-        free(old);
     }
     if (!(q->seconds > 0)) q->seconds = PAL_STUDY_SECONDS;
     return PAL_ERR_OK;
 }
 
 /* *whole: nothing is left to measure */
-static pal_err read_stored(study_run *run, bool *whole, pal_diagnostic *diag)
+static pal_err use_old(study_run *run, bool *whole, pal_diagnostic *diag)
 {
-    pal_study_file *old = NULL;
-    pal_diagnostic reason = {""};
     *whole = false;
-    bool exists = !access(run->path, F_OK);
-    if (run->row && !exists)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--pick %d: there is no %.200s yet: run palpate study %.200s",
-                                  run->row, run->path, run->request.word);
-    if (run->again || !exists) return PAL_ERR_OK;
-    pal_err err = pal_study_file_read(run->path, &old, &reason);
-    if (err) return pal_diagnostic_set(diag, err, "%.400s: --again starts over", reason.text);
+    if (!run->old) return PAL_ERR_OK;
     /* --pick reads the stored table, also of an interrupted study */
-    bool complete = run->row || covers(old, run->methods);
-    err = check_same(run, old, complete && run->uses_stored, diag);
-    if (!err && complete) {
-        *whole = true;
-        run->n_before = old->study.n_point;
-        *run->file = *old;
+    bool complete = run->row || covers(run);
+    PAL_TRY(check_same(run, run->old, complete && run->uses_stored, diag));
+    run->n_before = run->old->study.n_point;
+    *whole = complete;
+    if (complete) {
+        *run->file = *run->old;
         pal_study_mark_front(&run->file->study);
-    } else if (!err) {
-        join_methods(run->file, old);
-        run->before = malloc(sizeof *run->before);
-        if (!run->before) err = pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the study");
-        if (!err) *run->before = old->study, run->n_before = old->study.n_point;
+    } else {
+        join_methods(run->file, run->old);
+        run->before = &run->old->study;
     }
-    free(old);
-    return err;
+    return PAL_ERR_OK;
 }
 
 /* ---- measuring ---- */
@@ -266,30 +257,52 @@ static void merge_results(study_run *run, const pal_study *study)
 }
 
 /* writes the file after every result: a kill loses only the one in progress */
-static bool store(const pal_study *study, int n_all, void *user)
+static bool store(const pal_study *study, int n_total, void *user)
 {
     study_run *run = user;
     merge_results(run, study);
     bool is_new = study->n_point > 0 && !(run->before && has_point(run->before, &study->point[study->n_point - 1]));
     run->n_new += is_new;
-    run->file->n_finest = n_all > run->file->study.n_point ? n_all : run->file->study.n_point;
+    run->file->n_total = n_total > run->file->study.n_point ? n_total : run->file->study.n_point;
     run->file->whole = false;
     run->store_err = pal_study_file_write(run->file, run->path, &run->store_diag);
     /* a stop after the last result is none */
-    return !run->store_err && (!pal_stop_asked() || study->n_point == n_all);
+    return !run->store_err && (!pal_stop_asked() || study->n_point == n_total);
+}
+
+/* a line of the journal: hash and length = error, nodes; numbers; sentence */
+static void answer_key(uint64_t key, int n, char out[40])
+{
+    snprintf(out, 40, "%016" PRIx64 " %d", key, n);
 }
 
 static bool recall(uint64_t key, pal_study_answer *answer, double *value, int n, void *user)
 {
     const study_run *run = user;
-    return pal_study_journal_find(run->journal, key, answer, value, n);
+    char word[40];
+    int err;
+    answer_key(key, n, word);
+    const char *text = pal_journal_find(run->journal, word), *number = text ? strchr(text, ';') : NULL;
+    const char *reason = number ? strchr(number + 1, ';') : NULL;
+    if (!reason || sscanf(text, "%d %d", &err, &answer->n_node) != 2 ||
+        !pal_journal_numbers(number + 1, value, (size_t)n))
+        return false;
+    answer->err = (pal_err)err;
+    snprintf(answer->reason, sizeof answer->reason, "%s", reason + 1);
+    return true;
 }
 
 /* a solution that cannot be stored is computed again after an interruption */
 static void remember(uint64_t key, const pal_study_answer *answer, const double *value, int n, void *user)
 {
     study_run *run = user;
-    pal_study_journal_add(run->journal, key, answer, value, n);
+    char word[40], *text, *number = pal_journal_text(value, (size_t)n);
+    answer_key(key, n, word);
+    if (number && asprintf(&text, "%d %d; %s;%s", (int)answer->err, answer->n_node, number, answer->reason) >= 0) {
+        (void)pal_journal_put(run->journal, word, text, NULL);
+        free(text);
+    }
+    free(number);
 }
 
 static bool show(const char *what, double fraction, void *user)
@@ -302,14 +315,14 @@ static bool show(const char *what, double fraction, void *user)
     if (run->begin_s == 0) run->begin_s = now;
     if (!strncmp(what, "reference", 9) && fraction > 0 && fraction < 1)
         snprintf(left, sizeof left, ", about %.0f s of it left", (now - run->begin_s) * (1 - fraction) / fraction);
-    if (run->n_new > 0 && f->n_finest > f->study.n_point) {
-        double rest = (now - run->first_s) / run->n_new * (f->n_finest - f->study.n_point);
+    if (run->n_new > 0 && f->n_total > f->study.n_point) {
+        double rest = (now - run->first_s) / run->n_new * (f->n_total - f->study.n_point);
         snprintf(left, sizeof left, rest < 90 ? ", about %.0f s left" : ", about %.0f min left",
                  rest < 90 ? rest : rest / 60);
     }
     if (fraction > 0) snprintf(share, sizeof share, " %.0f %%", 100 * fraction);
     if (run->n_new > 0)
-        snprintf(text, sizeof text, "%d of %d, %s%s%s", f->study.n_point, f->n_finest, what, share, left);
+        snprintf(text, sizeof text, "%d of %d, %s%s%s", f->study.n_point, f->n_total, what, share, left);
     else
         snprintf(text, sizeof text, "%s%s%s", what, share, left);
     pal_report_progress(text, 0, &run->common);
@@ -322,26 +335,34 @@ static bool may_continue(void *user)
     return !pal_stop_asked();
 }
 
-/* keyed by body, loads and machine */
+/* Opens STEM.reference for body, loads and machine; a file without solutions of these is started again. */
 static pal_err open_journal(study_run *run, pal_diagnostic *diag)
 {
     const pal_study_file *f = run->file;
     char path[MAX_PATH + 4];
-    uint64_t of = pal_study_digest(0, f->shape, strlen(f->shape));
-    of = pal_study_digest(pal_study_digest(of, f->digest, strlen(f->digest)), f->loads, strlen(f->loads));
-    of = pal_study_digest(of, f->study.machine, strlen(f->study.machine));
+    uint64_t of = pal_hash_bytes(PAL_HASH_START, f->shape, strlen(f->shape));
+    of = pal_hash_bytes(pal_hash_bytes(of, f->digest, strlen(f->digest)), f->loads, strlen(f->loads));
+    of = pal_hash_bytes(of, f->study.machine, strlen(f->study.machine));
     snprintf(path, sizeof path, "%.*s.reference", PAL_STUDY_PATH, run->stem);
-    return pal_study_journal_open(path, of, run->again, &run->journal, diag);
+    for (bool again = run->again;; again = true) {
+        if (again) (void)remove(path);
+        pal_err err = pal_journal_open(path, &run->journal, diag);
+        if (!err) err = pal_journal_begin(run->journal, of, diag);
+        bool useless = err == PAL_ERR_REFUSED || (!err && pal_journal_count(run->journal) == 0);
+        if (again || !useless) return err;
+        pal_journal_close(run->journal);
+        run->journal = NULL;
+    }
 }
 
 static pal_err measure(study_run *run, pal_diagnostic *diag)
 {
-    const char *method[PAL_STUDY_METHODS] = {NULL};
-    char words[sizeof run->file->methods] = "", *save = NULL;
     pal_study *out = calloc(1, sizeof *out);
     pal_study_options o = {.body = run->input.body,
                            .seconds = run->request.seconds,
                            .quick = run->request.quick,
+                           .method = run->n_method ? run->method : NULL,
+                           .n_method = run->n_method,
                            .samples = run->input.has_samples ? &run->input.samples : NULL,
                            .before = run->before,
                            .recall = recall,
@@ -356,10 +377,6 @@ static pal_err measure(study_run *run, pal_diagnostic *diag)
         free(out);
         return opened;
     }
-    snprintf(words, sizeof words, "%s", run->methods ? run->methods : "");
-    for (char *w = strtok_r(words, ",", &save); w && o.n_method < PAL_STUDY_METHODS; w = strtok_r(NULL, ",", &save))
-        method[o.n_method++] = w;
-    o.method = o.n_method ? method : NULL;
     const pal_study_input *in = &run->input;
     pal_diagnostic reason = {""};
     pal_err err = in->problem ? pal_study_problem(in->problem, in->load_case, &in->surface, &o, out, &reason)
@@ -371,7 +388,7 @@ static pal_err measure(study_run *run, pal_diagnostic *diag)
     } else if (err) {
         pal_diagnostic_set(diag, err, "%s: %s", run->request.word, reason.text);
     }
-    run->file->n_finest = err ? run->file->n_finest : run->file->study.n_point;
+    run->file->n_total = err ? run->file->n_total : run->file->study.n_point;
     run->file->whole = !err;
     free(out);
     return err;
@@ -383,9 +400,7 @@ static pal_err measure(study_run *run, pal_diagnostic *diag)
 static bool real_folder(const char *path, char out[PATH_MAX])
 {
     char folder[MAX_PATH];
-    const char *slash = strrchr(path, '/');
-    snprintf(folder, sizeof folder, "%.*s", slash ? (int)(slash - path) + 1 : 1, slash ? path : ".");
-    return realpath(folder, out) != NULL;
+    return pal_json_folder(path, folder, sizeof folder) && realpath(folder, out) != NULL;
 }
 
 /* would the meshes of the new scene replace those of the source? */
@@ -481,12 +496,11 @@ static pal_err answer(study_run *run, pal_diagnostic *diag)
 {
     char text[400];
     const pal_study *study = &run->file->study;
-    const char *methods = run->methods ? run->methods : "";
     if (run->row) return pick_row(run, diag);
     if (!(run->target.max_error_m > 0) && !(run->target.budget_ms > 0)) return PAL_ERR_OK;
-    run->picked = pal_study_pick_target(study, methods, &run->target);
+    run->picked = pal_study_pick_target(study, run->methods, &run->target);
     if (run->picked >= 0) return run->scene ? write_scene(run, diag) : PAL_ERR_OK;
-    pal_study_describe_miss(study, methods, &run->target, text, sizeof text);
+    pal_study_describe_miss(study, run->methods, &run->target, text, sizeof text);
     return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s", run->request.word, text);
 }
 
@@ -508,7 +522,7 @@ static void print(const study_run *run)
 {
     char text[PAL_CONFIGURATION_TEXT], asked[80], off[PAL_STUDY_ERROR_TEXT], file[FILES][MAX_PATH];
     const pal_study *study = &run->file->study;
-    if (run->n_before > 0) printf("%d of %d measured before\n", run->n_before, run->file->n_finest);
+    if (run->n_before > 0) printf("%d of %d measured before\n", run->n_before, run->file->n_total);
     /* of a complete study only the pick is new */
     if (run->picked < 0 || run->n_new > 0) pal_study_print(run->file, stdout);
     if (run->picked >= 0) {
@@ -528,24 +542,17 @@ static void print(const study_run *run)
 static cJSON *as_json(const study_run *run)
 {
     char text[PAL_CONFIGURATION_TEXT], file[FILES][MAX_PATH];
-    cJSON *o = pal_study_file_tree(run->file), *list;
-    if (!o) return NULL;
-    cJSON_AddBoolToObject(o, "ok", true);
-    cJSON_AddNumberToObject(o, "measured_before", run->n_before);
-    cJSON_AddNumberToObject(o, "measured", run->n_new);
-    if (run->picked >= 0) {
-        const pal_measured_configuration *p = &run->file->study.point[run->picked].measured;
-        cJSON *picked = cJSON_AddObjectToObject(o, "picked");
-        cJSON_AddNumberToObject(picked, "point", run->picked);
-        if (run->row) cJSON_AddNumberToObject(picked, "row", run->row);
-        cJSON_AddStringToObject(picked, "configuration", pal_configuration_text(&p->setting, text));
-        cJSON_AddNumberToObject(picked, "ms", p->ms);
-        cJSON_AddNumberToObject(picked, "error_m", p->error_m);
-    }
-    list = cJSON_AddArrayToObject(o, "files");
     int n = n_files(run, file);
-    for (int k = 0; k < n; k++) cJSON_AddItemToArray(list, cJSON_CreateString(file[k]));
-    return o;
+    cJSON *o = pal_study_file_tree(run->file);
+    if (!o) return NULL;
+    PAL_JSON_ADD(o, {"ok", JSON_BOOL(true)}, {"measured_before", JSON_NUMBER(run->n_before)},
+                 {"measured", JSON_NUMBER(run->n_new)}, {"files", pal_json_texts(file[0], MAX_PATH, n)});
+    if (run->picked < 0) return o;
+    const pal_measured_configuration *p = &run->file->study.point[run->picked].measured;
+    return PAL_JSON_ADD(
+        o, {"picked", PAL_JSON({"point", JSON_NUMBER(run->picked)}, {"row", run->row ? JSON_NUMBER(run->row) : NULL},
+                               {"configuration", JSON_TEXT(pal_configuration_text(&p->setting, text))},
+                               {"ms", JSON_NUMBER(p->ms)}, {"error_m", JSON_NUMBER(p->error_m)})});
 }
 
 /* draws the plot of a complete study again when its file is gone */
@@ -564,14 +571,14 @@ static pal_err work(study_run *run, int argc, char **argv, pal_diagnostic *diag)
     if (run->scene) PAL_TRY(scene_path(run, diag));
     PAL_TRY(pal_study_stem(run->request.word, run->folder, run->stem, diag));
     snprintf(run->path, sizeof run->path, "%s.json", run->stem);
-    PAL_TRY(use_stored_loads(run, diag));
+    PAL_TRY(read_old(run, diag));
     PAL_TRY(pal_study_input_open(&run->request, &run->input, diag));
     pal_study_input_describe(&run->input, &run->request, run->file);
-    snprintf(run->file->methods, sizeof run->file->methods, "%s", run->methods ? run->methods : "");
+    snprintf(run->file->methods, sizeof run->file->methods, "%s", run->methods);
     pal_machine_name(run->file->study.machine);
     run->file->study.step_s = run->input.scene->step_s;
     take_command(run->file, argc, argv);
-    PAL_TRY(read_stored(run, &whole, diag));
+    PAL_TRY(use_old(run, &whole, diag));
     if (!whole) {
         if (run->folder) PAL_TRY(pal_scene_make_folder(run->folder, diag));
         pal_err err = measure(run, diag);
@@ -585,12 +592,12 @@ static pal_err work(study_run *run, int argc, char **argv, pal_diagnostic *diag)
                 diag, PAL_ERR_STATE,
                 "stopped before the first configuration was measured; %d solutions of the reference are stored "
                 "in %.200s.reference; the same command continues",
-                run->journal ? pal_study_journal_count(run->journal, NULL) : 0, run->stem);
+                run->journal ? pal_journal_count(run->journal) : 0, run->stem);
         if (err && pal_stop_asked())
             return pal_diagnostic_set(
                 diag, PAL_ERR_STATE,
                 "stopped with %d configurations of %d stored in %.200s; the same command continues", n,
-                run->file->n_finest > n ? run->file->n_finest : n, run->path);
+                run->file->n_total > n ? run->file->n_total : n, run->path);
         if (err) return err;
         if (kept) return pal_diagnostic_set(diag, kept, "%s", reason.text);
     } else {
@@ -606,15 +613,12 @@ static int start(study_run *run, int argc, char **argv)
     run->picked = -1;
     pal_stop_watch();
     pal_err err = run->file ? work(run, argc, argv, &diag) : PAL_ERR_MEMORY;
-    pal_report_progress(NULL, 0, &run->common);
-    int code = err                ? pal_report_refusal(&run->common, err, &diag)
-               : run->common.json ? pal_report_json(&run->common, as_json(run))
-                                  : 0;
+    int code = pal_report_end(&run->common, err, &diag, err || !run->common.json ? NULL : as_json(run));
     if (!err && !run->common.json && !run->common.quiet) print(run);
     pal_study_input_close(&run->input);
-    pal_study_journal_close(run->journal);
+    pal_journal_close(run->journal);
     free(run->file);
-    free(run->before);
+    free(run->old);
     return code;
 }
 
@@ -654,8 +658,7 @@ int command_study(int argc, char **argv)
                                              "palpate study deploy/problems/beam.json --case tip --quick --methods fem "
                                              "--seconds 0.1 --out beam_study --pick 1 -o beam_fast\n"
                                              "palpate plan beam_fast/scene.json\n",
-                                  .flag = flag,
-                                  .n_flag = sizeof flag / sizeof flag[0],
+                                  PAL_FLAGS(flag),
                                   .min_operand = 1,
                                   .max_operand = 1};
     int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.request.word, &n);

@@ -15,52 +15,39 @@ void pal_preflight_print(const pal_preflight *preflight, double measured_ms)
         for (int k = 0; k < n; k++) printf("  %s: %s\n", preflight->body[b].name, line[k]);
     }
     if (isfinite(preflight->predicted_ms))
-        printf("  a step under load: %.3g ms predicted from counts, %.3g ms measured here at rest\n",
-               preflight->predicted_ms, measured_ms);
+        printf("  a step under load: %.3g ms predicted, %.3g ms measured here at rest\n", preflight->predicted_ms,
+               measured_ms);
 }
 
-static void add_weak(cJSON *o, const char *key, const pal_weak_spot *weak)
+static cJSON *weak_json(const pal_weak_spot *weak)
 {
-    cJSON *w = cJSON_AddObjectToObject(o, key);
-    cJSON_AddNumberToObject(w, "count", weak->n);
-    if (weak->n == 0) return;
-    cJSON_AddNumberToObject(w, "worst", weak->worst);
-    pal_json_add_finite(w, "value", weak->value);
-    cJSON_AddItemToObject(w, "at_m", cJSON_CreateDoubleArray(weak->at_m, 3));
+    if (weak->n == 0) return PAL_JSON({"count", JSON_NUMBER(0)});
+    return PAL_JSON({"count", JSON_NUMBER(weak->n)}, {"worst", JSON_NUMBER(weak->worst)},
+                    {"value", pal_json_finite(weak->value)}, {"at_m", cJSON_CreateDoubleArray(weak->at_m, 3)});
+}
+
+static cJSON *body_json(const pal_preflight_body *b)
+{
+    bool limited = b->limit_node >= 0;
+    return PAL_JSON(
+        {"name", JSON_TEXT(b->name)}, {"dofs", JSON_NUMBER(b->n_point)}, {"elements", JSON_NUMBER(b->n_element)},
+        {"fixed", JSON_NUMBER(b->n_fixed)}, {"limit_s", pal_json_finite(b->limit_s)},
+        {"substeps", JSON_NUMBER(b->n_sub)}, {"limit_node", limited ? JSON_NUMBER(b->limit_node) : NULL},
+        {"limit_at_m", limited ? cJSON_CreateDoubleArray(b->limit_at_m, 3) : NULL},
+        {"limit_edge_m", limited ? pal_json_finite(b->limit_edge_m) : NULL}, {"short_edges", weak_json(&b->edge)},
+        {"flat_elements", weak_json(&b->flat)}, {"slivers", b->n_sliver > 0 ? JSON_NUMBER(b->n_sliver) : NULL},
+        {"thin_elements", weak_json(&b->thin)}, {"light_nodes", weak_json(&b->light)},
+        {"locks", b->locks ? JSON_TEXT(b->locks) : NULL}, {"alternative", b->locks ? JSON_TEXT(b->instead) : NULL},
+        {"condition", pal_json_finite(b->condition)}, {"slowest_s", pal_json_finite(b->slowest_period_s)},
+        {"predicted_ms", pal_json_finite(b->predicted_ms)});
 }
 
 cJSON *pal_preflight_json(const pal_preflight *preflight)
 {
-    cJSON *o = cJSON_CreateObject(), *list = cJSON_AddArrayToObject(o, "bodies");
-    pal_json_add_finite(o, "predicted_ms", preflight->predicted_ms);
-    cJSON_AddNumberToObject(o, "world_bytes", (double)preflight->n_byte);
-    for (int i = 0; i < preflight->n_body; i++) {
-        const pal_preflight_body *b = &preflight->body[i];
-        cJSON *body = cJSON_CreateObject();
-        cJSON_AddItemToArray(list, body);
-        cJSON_AddStringToObject(body, "name", b->name);
-        cJSON_AddNumberToObject(body, "dofs", b->n_point);
-        cJSON_AddNumberToObject(body, "elements", b->n_element);
-        cJSON_AddNumberToObject(body, "fixed", b->n_fixed);
-        pal_json_add_finite(body, "limit_s", b->limit_s);
-        cJSON_AddNumberToObject(body, "substeps", b->n_sub);
-        if (b->limit_node >= 0) {
-            cJSON_AddNumberToObject(body, "limit_node", b->limit_node);
-            cJSON_AddItemToObject(body, "limit_at_m", cJSON_CreateDoubleArray(b->limit_at_m, 3));
-            pal_json_add_finite(body, "limit_edge_m", b->limit_edge_m);
-        }
-        add_weak(body, "short_edges", &b->edge);
-        add_weak(body, "flat_elements", &b->flat);
-        if (b->n_sliver > 0) cJSON_AddNumberToObject(body, "slivers", b->n_sliver);
-        add_weak(body, "thin_elements", &b->thin);
-        add_weak(body, "light_nodes", &b->light);
-        if (b->locks) cJSON_AddStringToObject(body, "locks", b->locks);
-        if (b->locks) cJSON_AddStringToObject(body, "alternative", b->instead);
-        pal_json_add_finite(body, "condition", b->condition);
-        pal_json_add_finite(body, "slowest_s", b->slowest_period_s);
-        pal_json_add_finite(body, "predicted_ms", b->predicted_ms);
-    }
-    return o;
+    cJSON *list = cJSON_CreateArray();
+    for (int i = 0; i < preflight->n_body; i++) cJSON_AddItemToArray(list, body_json(&preflight->body[i]));
+    return PAL_JSON({"bodies", list}, {"predicted_ms", pal_json_finite(preflight->predicted_ms)},
+                    {"world_bytes", JSON_NUMBER(preflight->n_byte)});
 }
 
 void pal_preflight_log(const pal_preflight *preflight, const char *scene)

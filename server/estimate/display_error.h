@@ -1,12 +1,10 @@
-/* Errors at the vertices of the displayed surface: its skin is compared with the displacement field of the
- * elements. Comparing nodes alone underestimates the error. Meshes differ more between nodes, for example where a
- * tool presses a vertex, than at common nodes. The skin rotates with its nodes but does not stretch with them, so
- * it deviates from its own elements by a similar amount (a press on a ball: 5 times the error at the nodes).
+/* Errors at the vertices of the displayed surface: its skin against the displacement field of the elements. Nodes alone
+ * underestimate the error: meshes differ more between common nodes, for example where a tool presses, and the skin
+ * rotates with its nodes but does not stretch with them (a press on a ball: 5 times the error at the nodes).
  * Private to estimate_*.c. Allocates heap memory. Thread: one at a time. */
 #ifndef PAL_ESTIMATE_DISPLAY_ERROR_H
 #define PAL_ESTIMATE_DISPLAY_ERROR_H
 #include "server/estimate/rest_solution.h"
-#include "server/num/interpolation.h"
 
 enum { PAL_DISPLAY_FINE, PAL_DISPLAY_COARSE, PAL_DISPLAY_COARSEST, PAL_DISPLAY_RESTS };
 
@@ -17,9 +15,8 @@ typedef struct pal_display_error {
     /* interpolation from the nodes of each rest solution to the vertices; n_row 0: no such solution */
     pal_interpolation by[PAL_DISPLAY_RESTS];
     void *frames;
-    float *place;     /* positions of the vertices, m [n][3] */
+    float *skin_m;    /* positions of the vertices, m [n][3] */
     double *u[2];     /* displacements of vertices, m [n][3] */
-    double *node;     /* nodal values [largest node count of a rest solution][3] */
     float *unmoved_m; /* vertex positions at rest, as the skin rounds them, m [n][3] */
 } pal_display_error;
 

@@ -6,13 +6,13 @@
 #include <math.h>
 #include <string.h>
 
-static bool has_row(const pal_world *world, int body, const char *name)
+static bool has_component(const pal_world *world, int body, const char *name)
 {
     const char *of = pal_world_view_body(world, body)->name;
     for (int i = 0; i < pal_world_component_count(world); i++) {
-        pal_component_info row;
-        pal_world_component_info(world, i, &row);
-        if (row.body == of && !strcmp(row.name, name)) return true;
+        pal_component_info info;
+        pal_world_component_info(world, i, &info);
+        if (info.body == of && !strcmp(info.name, name)) return true;
     }
     return false;
 }
@@ -21,11 +21,11 @@ pal_err pal_estimate_match_components(const pal_estimate_state *state, pal_world
                                       bool recipe)
 {
     const pal_body_def *def = &scene->body[0];
-    for (int k = 0; k < state->n_row; k++) {
-        bool has = has_row(world, 0, state->row[k]), may = recipe || has;
-        for (int i = 0; i < def->n_effect; i++) may = may || !strcmp(def->effect[i].name, state->row[k]);
+    for (int k = 0; k < state->n_component; k++) {
+        bool has = has_component(world, 0, state->component[k]), may = recipe || has;
+        for (int i = 0; i < def->n_effect; i++) may = may || !strcmp(def->effect[i].name, state->component[k]);
         if (has == state->component_enabled[k] || !may) continue;
-        PAL_TRY(pal_world_switch_component(world, scene, 0, state->row[k], state->component_enabled[k], NULL));
+        PAL_TRY(pal_world_switch_component(world, scene, 0, state->component[k], state->component_enabled[k], NULL));
         pal_world_body(world, 0)->load_cap_N = INFINITY;
     }
     return PAL_ERR_OK;
@@ -36,15 +36,15 @@ pal_estimate_cost pal_estimate_cost_of(const pal_world *world, int body, double 
     const char *of = pal_world_view_body(world, body)->name;
     double once_ns = 0, beside_ns = 0, own_ns = 0;
     for (int i = 0; i < pal_world_component_count(world); i++) {
-        const pal_component *row = pal_world_component(world, i);
-        const pal_stage stage = row->effect->stage;
+        const pal_component *component = pal_world_component(world, i);
+        const pal_stage stage = component->effect->stage;
         const bool inner = stage == PAL_STAGE_FORCE || stage == PAL_STAGE_SOLVE;
         pal_component_info info;
         pal_world_component_info(world, i, &info);
         double *sum_ns = inner && info.body == of              ? &own_ns
                          : inner || stage == PAL_STAGE_CONTACT ? &beside_ns
                                                                : &once_ns;
-        *sum_ns += (double)row->spent_ns;
+        *sum_ns += (double)component->spent_ns;
     }
     /* relative to the components alone: the step is measured by another clock */
     double all_ns = once_ns + beside_ns + own_ns;
@@ -95,6 +95,7 @@ bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int bo
     state->other_limit_s = other_limit_s(world, body);
     state->asleep = from->asleep;
     pal_world_current_material(world, body, &state->material);
-    for (int k = 0; k < state->n_row; k++) state->component_enabled[k] = has_row(world, body, state->row[k]);
+    for (int k = 0; k < state->n_component; k++)
+        state->component_enabled[k] = has_component(world, body, state->component[k]);
     return true;
 }

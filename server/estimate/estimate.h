@@ -57,9 +57,9 @@ typedef struct pal_estimate_state {
     double other_limit_s; /* longest sub-step that all other bodies allow */
     pal_material material;
     /* FORCE components of the body: their names, valid from open on, and which are enabled */
-    const char *row[PAL_ESTIMATE_COMPONENTS];
+    const char *component[PAL_ESTIMATE_COMPONENTS];
     bool component_enabled[PAL_ESTIMATE_COMPONENTS];
-    int n_row;
+    int n_component;
     pal_estimate_cost cost[PAL_ESTIMATE_STEPS]; /* of the latest awake steps, in any order */
     int n_cost;
 } pal_estimate_state;

@@ -3,24 +3,15 @@
 
 #include "server/base/clock.h"
 #include "server/base/machine.h"
+#include "server/estimate/tuning.h"
+#include "server/num/median.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { TIMED = 15 };
-/* bounds of the growth with nodes: of step time on fewer nodes; of factor entries on more nodes */
-static const double min_growth = 0.6, max_growth = 2.2, min_fill = 1.1, max_fill = 1.6;
-/* upper bounds: the factor's share of a sub-step; exponent of iterations with nodes */
-static const double max_factor = 0.7, max_more = 0.15;
 /* a factor entry is a float, read forwards and backwards */
 static const double entry_byte = 4, entry_reads = 2;
-
-static int rising(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 static void rest(pal_world *world)
 {
@@ -44,10 +35,7 @@ static bool time_steps(pal_world *const world[2], double step_s, double out[2], 
             if (pal_world_solve_report(world[v], 0, &report)) n_cg[v] += (double)report.n_cg / TIMED;
             ms[v][k] = 1e-6 * (double)(pal_clock_thread_ns() - began) / pal_world_substeps(world[v]);
         }
-    for (int v = 0; v < 2; v++) {
-        qsort(ms[v], TIMED, sizeof **ms, rising);
-        out[v] = ms[v][TIMED / 2];
-    }
+    for (int v = 0; v < 2; v++) out[v] = pal_median(ms[v], TIMED);
     return out[0] > 0 && out[1] > 0;
 }
 
@@ -68,12 +56,12 @@ static void count(const pal_scene *scene, double limit_s, pal_prediction *out)
 static double grown(const pal_solve_report report[2], const double n_cg[2], double along, double nodes, double fine_ms)
 {
     double entries = (double)report[1].factor_nonzeros, fill = log(entries / (double)report[0].factor_nonzeros) / along;
-    fill = fmin(fmax(fill, min_fill), max_fill);
+    fill = fmin(fmax(fill, PAL_MIN_FILL_RATE), PAL_MAX_FILL_RATE);
     double times = pow(nodes, fill), now = pal_machine_read_ms(entry_byte * entries),
            then = pal_machine_read_ms(entry_byte * entries * times);
-    double factor_ms = fmin(n_cg[1] * entry_reads * now, max_factor * fine_ms);
+    double factor_ms = fmin(n_cg[1] * entry_reads * now, PAL_MAX_FACTOR * fine_ms);
     /* finer meshes need slightly more iterations */
-    double more = n_cg[0] > 0 ? fmin(fmax(log(n_cg[1] / n_cg[0]) / along, 0), max_more) : 0;
+    double more = n_cg[0] > 0 ? fmin(fmax(log(n_cg[1] / n_cg[0]) / along, 0), PAL_MAX_ITERATIONS) : 0;
     if (!(now > 0 && then > 0)) return nodes;
     return pow(nodes, more) * ((fine_ms - factor_ms) * nodes + factor_ms * fmax(then / now, times)) / fine_ms;
 }
@@ -90,7 +78,7 @@ void pal_estimate_cost_model(const pal_scene *scene, pal_world *live, pal_world 
     bool known = pal_world_solve_report(small, 0, &report[0]) && pal_world_solve_report(live, 0, &report[1]) &&
                  report[0].factor_nonzeros > 0 && report[1].factor_nonzeros > 0;
     count(scene, limit_s, out);
-    double growth = fmin(fmax(log(ms[1] / ms[0]) / along, min_growth), max_growth);
+    double growth = fmin(fmax(log(ms[1] / ms[0]) / along, PAL_MIN_GROWTH), PAL_MAX_GROWTH);
     out->work[0] = pow(out->nodes[0], growth);
     out->work[1] = known ? grown(report, n_cg, along, out->nodes[1], ms[1]) : out->nodes[1];
 }

@@ -1,13 +1,10 @@
-/* Predicts the cost of a step of a running body's method on other meshes, from a short probe on two meshes: the
- * body's own, and its voxels merged by eights. Private to estimate_*.c. Allocates heap memory; takes some tens of
- * ms. Thread: one at a time.
+/* Predicts the cost of a step of a running body's method on other meshes, from a short probe on two meshes: the body's
+ * own, and its voxels merged by eights. Private to estimate_*.c. Allocates heap memory; takes some tens of ms.
  *
- * Fewer nodes: time is proportional to nodes^growth, with the growth observed between the two meshes.
- * More nodes: all time except the factor's share is proportional to the nodes. The factor's share is the number of
- * solves times the entries, each read twice, at this machine's read rate for arrays of that length. The rate falls
- * where the arrays exceed the caches. The entries, and the iterations of every part, grow as observed between the
- * two meshes.
- * Node counts are those of pal_configuration_estimate_nodes. */
+ * Fewer nodes: time is proportional to nodes^growth, with the growth observed between the two meshes. More nodes: all
+ * time is proportional to the nodes except the factor's, which is the number of solves times the entries, each read
+ * twice, at this machine's read rate for arrays of that length. The entries, and the iterations of every part, grow as
+ * observed. Node counts are those of pal_configuration_estimate_nodes. Thread: one at a time. */
 #ifndef PAL_ESTIMATE_ESTIMATE_COST_MODEL_H
 #define PAL_ESTIMATE_ESTIMATE_COST_MODEL_H
 #include "server/estimate/estimate_predict.h"

@@ -3,8 +3,7 @@
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
-#include "server/mesh/volume/locate.h"
-#include "server/num/shape_functions.h"
+#include "server/estimate/tuning.h"
 
 #include <math.h>
 #include <stdatomic.h>
@@ -13,15 +12,6 @@
 #include <string.h>
 
 enum { MAX_NODES = 16000, PROBES = 600, MIN_SIZE = 4, MAX_SIZE = 400, MAX_FINER = 4 };
-/* MAX_FINER: finest size over this one. reported_apart: smallest ratio to the finest size at which an error can be
- * measured. order: order of the error of closer meshes; it is averaged with what half and this size show
- * (far_order). */
-static const double reported_apart = 1.35, order = 2, far_order = 1.75, min_ratio = 0.02, max_times = 20;
-/* observed factors of uncertainty: with a finest mesh of observed_finer times the voxels; without a hierarchy */
-static const double observed = 2, observed_finer = 2, without = 3;
-/* smallest cosine of two loads for which a measurement is reused; wait before the next one, in multiples of its
- * duration */
-static const double same_loads = 0.8, waits = 20;
 static atomic_flag busy = ATOMIC_FLAG_INIT; /* one hierarchy is measured at a time, over all sessions */
 
 typedef struct sized {
@@ -55,31 +45,20 @@ static double nodes_of(const family *f, int size)
 static int finest_size(const family *f)
 {
     int s = f->setting->size, r = MAX_FINER * s;
-    while (r >= reported_apart * s && nodes_of(f, r) > MAX_NODES) r -= f->fits ? s : 1;
-    return r >= reported_apart * s && r <= MAX_SIZE && nodes_of(f, r) > 0 ? r : 0;
+    while (r >= PAL_MIN_APART * s && nodes_of(f, r) > MAX_NODES) r -= f->fits ? s : 1;
+    return r >= PAL_MIN_APART * s && r <= MAX_SIZE && nodes_of(f, r) > 0 ? r : 0;
 }
 
 /* ---- equilibria ---- */
 
 static bool probe(const family *f, sized *m)
 {
-    const pal_body *own = pal_world_view_body(m->rest.world, 0);
-    const pal_prepared *mesh = m->rest.scene->body[0].mesh;
-    pal_locate *locate = NULL;
+    pal_interpolation by = {.n_row = 0};
     m->u = calloc(3 * (size_t)f->n_probe, sizeof *m->u);
-    if (!m->u || pal_locate_create(&mesh->tets, own->n_corner == PAL_HEX_CORNERS ? &mesh->hexes : NULL, &locate))
+    if (!m->u || pal_rest_solution_interpolation(&m->rest, f->surface->x, f->n_probe, f->stride, false, &by))
         return false;
-    for (int i = 0; i < f->n_probe; i++) {
-        double local[4], shape[PAL_TET10_CORNERS];
-        int e = pal_locate_point(locate, f->surface->x + 3 * (size_t)(i * f->stride), local, NULL);
-        const int32_t *node = own->element + (size_t)own->n_corner * (size_t)e;
-        pal_element_shape_functions(own, local, shape);
-        for (int k = 0; k < own->n_corner; k++) {
-            pal_axpy3(m->u + 3 * i, shape[k], own->d + 3 * (size_t)node[k]);
-            pal_axpy3(m->u + 3 * i, -shape[k], own->node_rest + 3 * (size_t)node[k]);
-        }
-    }
-    pal_locate_destroy(locate);
+    pal_rest_solution_displacement(&m->rest, &by, m->u);
+    pal_interpolation_free(&by);
     return true;
 }
 
@@ -108,17 +87,10 @@ static void sized_free(sized *m)
     memset(m, 0, sizeof *m);
 }
 
-static double between(const family *f, const sized *a, const sized *b)
-{
-    double max = 0;
-    for (int i = 0; i < f->n_probe; i++) max = fmax(max, pal_dist3(a->u + 3 * i, b->u + 3 * i));
-    return max;
-}
-
 /* error of the finest mesh relative to that of a mesh of `size` */
 static double share_of(int size, int finest)
 {
-    return pow((double)size / finest, order);
+    return pow((double)size / finest, PAL_HIERARCHY_ORDER);
 }
 
 /* The distance of two meshes is the difference of errors of equal sign. Random errors (which voxels are cut, and
@@ -126,7 +98,7 @@ static double share_of(int size, int finest)
 static double left(const family *f, const sized *m, const sized *finest)
 {
     const double share = share_of(m->size, finest->size);
-    return between(f, m, finest) / sqrt((1 - share) * sqrt(1 + share * share));
+    return pal_max_dist3(m->u, finest->u, f->n_probe) / sqrt((1 - share) * sqrt(1 + share * share));
 }
 
 /* NaN: no such mesh, or too close to the finest */
@@ -134,7 +106,7 @@ static double left_in(family *f, int size, const sized *finest)
 {
     sized m = {.u = NULL};
     double error = NAN;
-    if (size >= MIN_SIZE && finest->size >= reported_apart * size && solve(f, size, &m)) error = left(f, &m, finest);
+    if (size >= MIN_SIZE && finest->size >= PAL_MIN_APART * size && solve(f, size, &m)) error = left(f, &m, finest);
     sized_free(&m);
     return error;
 }
@@ -142,7 +114,7 @@ static double left_in(family *f, int size, const sized *finest)
 /* either rule over their geometric mean */
 static double ambiguity(double finer)
 {
-    const double share = pow(finer, -order);
+    const double share = pow(finer, -PAL_HIERARCHY_ORDER);
     return sqrt(sqrt(1 + share * share) / (1 - share));
 }
 
@@ -152,7 +124,7 @@ static double change(family *f, const sized *own, bool shown)
     sized merged = {.u = NULL};
     double max = 0;
     const bool good = solve(f, 0, &merged);
-    if (good && shown) max = between(f, own, &merged);
+    if (good && shown) max = pal_max_dist3(own->u, merged.u, f->n_probe);
     if (good && !shown)
         for (int k = 0; k < merged.rest.n_common; k++) {
             size_t i = 3 * (size_t)merged.rest.common[k];
@@ -176,13 +148,13 @@ static void measure(family *f, bool shown, pal_estimate_hierarchy *out)
     sized_free(&own);
     if (error > 0 && last > 0) {
         const double finer = (double)r / size;
-        out->times = fmin(fmax(error / last, 1 / max_times), max_times);
-        out->uncertainty_factor = observed * fmax(1, ambiguity(finer) / ambiguity(observed_finer));
+        out->times = fmin(fmax(error / last, 1 / PAL_MAX_ERROR_CHANGE), PAL_MAX_ERROR_CHANGE);
+        out->uncertainty_factor = PAL_OBSERVED_FACTOR * fmax(1, ambiguity(finer) / ambiguity(PAL_OBSERVED_FINER));
         if (out->times != error / last) out->uncertainty_factor = INFINITY;
         out->half = left_in(f, size / 2, &finest) / error;
         out->twice = left_in(f, 2 * size, &finest) / error;
-        double seen = out->half > 0 ? 0.5 * (far_order + log2(out->half)) : far_order;
-        out->twice = isnan(out->twice) ? exp2(-fmin(seen, order)) : fmax(out->twice, min_ratio);
+        double seen = out->half > 0 ? 0.5 * (PAL_FAR_ORDER + log2(out->half)) : PAL_FAR_ORDER;
+        out->twice = isnan(out->twice) ? exp2(-fmin(seen, PAL_HIERARCHY_ORDER)) : fmax(out->twice, PAL_MIN_TWICE);
         out->finest = r, out->known = !stopped(f);
     }
     out->n_measured++;
@@ -202,20 +174,15 @@ static bool take_loads(const pal_body *body, const pal_estimate_state *state, do
     return sum > 0;
 }
 
-static double cosine(const double *a, const double *b, int n)
-{
-    double sum = 0;
-    for (int i = 0; i < n; i++) sum += a[i] * b[i];
-    return sum;
-}
-
 /* Does the earlier measurement apply to these loads and this material? A uniform Young's modulus cancels. */
 static bool is_same(const family *f, const pal_estimate_hierarchy *of, const double *loads)
 {
     const pal_material *now = &f->state->material;
     const bool regions = f->scene->body[0].n_region > 0;
-    return of->loads && cosine(loads, of->loads, 3 * f->state->n_node) > same_loads &&
-           now->poisson == of->material.poisson && (!regions || now->young_Pa == of->material.young_Pa);
+    double cosine = 0;
+    for (int i = 0; i < 3 * f->state->n_node && of->loads; i++) cosine += loads[i] * of->loads[i];
+    return cosine > PAL_SAME_LOADS && now->poisson == of->material.poisson &&
+           (!regions || now->young_Pa == of->material.young_Pa);
 }
 
 bool pal_estimate_hierarchy_refresh(const pal_scene *scene, const pal_body *body, const pal_configuration *setting,
@@ -245,15 +212,15 @@ bool pal_estimate_hierarchy_refresh(const pal_scene *scene, const pal_body *body
     measure(&f, shown, out);
     atomic_flag_clear_explicit(&busy, memory_order_release);
     double end = pal_clock_s();
-    out->next_s = end + waits * (end - began);
+    out->next_s = end + PAL_WAIT_SHARE * (end - began);
     return out->known;
 }
 
 void pal_estimate_hierarchy_describe(const pal_estimate_hierarchy *f, bool fresh, char *text, size_t n_byte)
 {
-    const double uncertainty_factor = !f->known ? without
+    const double uncertainty_factor = !f->known ? PAL_UNKNOWN_FACTOR
                                       : fresh   ? f->uncertainty_factor
-                                                : fmax(f->uncertainty_factor, without);
+                                                : fmax(f->uncertainty_factor, PAL_UNKNOWN_FACTOR);
     if (isfinite(uncertainty_factor))
         snprintf(text, n_byte, "many voxels are cut: good to a factor of %.2g", uncertainty_factor);
     else

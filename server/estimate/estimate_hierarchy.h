@@ -1,27 +1,18 @@
-/* Measures the error that remains at other resolutions, for a body with many cut voxels or two voxels across. The
- * meshes are the body's own, half and twice as many voxels, and a still finer one (four times as many, or up to
- * 16,000 nodes). They are made as a configuration switch makes them (pal_configuration_make) and solved at rest by
- * the linear law under the same loads.
+/* Measures the error that remains at other resolutions, for a body with many cut voxels or two voxels across: the
+ * body's own mesh, half and twice as many voxels, and a still finer one (four times as many, or up to 16,000 nodes) are
+ * made as a configuration switch makes them and solved at rest by the linear law under the same loads.
  *
- * No power of h describes this error. A voxel cut by the surface is scaled by the share that lies inside. Its
- * stiffness along the surface is then right, but in bending it is 1 / share^2 too stiff. Thin parts of few voxels
- * therefore hardly move, and the error is as large as the solution. Once voxels less than a quarter full can be
- * dropped (configuration.h), the error falls to a third at once. Merged voxels do not show this: for four organs of
- * 5 to 40 voxels the remaining error was 0.2 to 6 times their estimate.
- * The error at size s is here the largest distance, at vertices of the displayed surface, from the finest mesh of
- * size r, over sqrt((1 - q) sqrt(1 + q^2)), q = (s / r)^2. This lies between errors of equal sign and independent
- * errors. If twice as many voxels are too close to the finest mesh, their error is extrapolated from half and the
- * present size, no faster than h^2.
+ * No power of h describes this error. The stiffness of a cut voxel is scaled by the share that lies inside: right along
+ * the surface, 1 / share^2 too large in bending, so that thin parts of few voxels hardly move. Merged voxels do not
+ * show it (for four organs of 5 to 40 voxels the error was 0.2 to 6 times their estimate; a beam of two voxels merges
+ * to one, which has almost no bending stiffness: 8 times). The error at size s is the largest distance, at vertices of
+ * the displayed surface, from the finest mesh of size r, over sqrt((1 - q) sqrt(1 + q^2)), q = (s / r)^2, between
+ * errors of equal sign and independent ones. If twice as many voxels are too close to the finest mesh, their error is
+ * extrapolated from half and the present size, no faster than h^2. Random errors of the finest mesh remain: for the
+ * gear in 30 voxels the estimate was 0.44, 1.5 and 2 times the error with finest meshes of 42, 46 and none.
  *
- * Random errors of the finest mesh remain: for the gear in 30 voxels the estimate was 0.44, 1.5 and 2 times the
- * error with finest meshes of 42, 46 and none.
- *
- * A body two voxels across merges to one voxel, which has almost no bending stiffness with B-bar: a beam's error
- * was estimated 8 times too large.
- *
- * Private to estimate_*.c. Allocates heap memory, up to 80 MB while it runs, because large meshes are solved
- * without a complete factor (rest_solution.h). Slow: half a second for an organ of 20 voxels, three seconds if
- * nearly incompressible. Thread: one at a time. */
+ * Private to estimate_*.c. Allocates heap memory, up to 80 MB while it runs. Slow: half a second for an organ of 20
+ * voxels, three seconds if nearly incompressible. Thread: one at a time. */
 #ifndef PAL_ESTIMATE_ESTIMATE_HIERARCHY_H
 #define PAL_ESTIMATE_ESTIMATE_HIERARCHY_H
 #include "server/estimate/rest_solution.h"
@@ -31,9 +22,8 @@ typedef struct pal_estimate_hierarchy {
     double times;       /* remaining error over the change from merged voxels to this mesh */
     double half, twice; /* error with half and with twice as many voxels over that of this mesh; NaN: no such mesh */
     int finest;         /* voxels of the finest mesh */
-    /* `times` is accurate within this factor: 2, as observed with twice as many voxels in the finest mesh. With
-     * fewer it is larger, by the difference between the two ways in which errors may add up. INFINITY: beyond the
-     * estimate. */
+    /* `times` is accurate within this factor: 2 with twice as many voxels in the finest mesh, more with fewer;
+     * INFINITY: beyond the estimate */
     double uncertainty_factor;
     /* Conditions of the measurement: loads [n_node][3] scaled to length 1, and the material. next_s: earliest clock
      * time of the next measurement. Then the number of measurements, and of meshes solved for them. */

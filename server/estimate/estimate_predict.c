@@ -1,12 +1,12 @@
 /* Predicts the neighbours in each parameter (estimate_predict.h). */
 #include "server/estimate/estimate_predict.h"
 
+#include "server/estimate/tuning.h"
 #include "server/sim/core/configuration.h"
 
 #include <math.h>
 
 enum { MIN_SIZE = 4, MAX_SIZE = 400 };
-static const double min_step_s = 1e-4, max_step_s = 0.1, min_tolerance = 1e-12, max_tolerance = 0.5;
 
 /* nodes, substeps: relative to the present */
 static void add(const pal_prediction *from, pal_estimate *out, const pal_configuration *setting, double ms,
@@ -66,10 +66,10 @@ static void steps(const pal_prediction *from, pal_estimate *out)
     double shrink = exp2(-from->solver_order);
     pal_configuration to = from->setting;
     to.step_s = from->setting.step_s * 2;
-    if (to.step_s <= max_step_s && taken(from, &to, 2))
+    if (to.step_s <= PAL_NEIGHBOUR_MAX_STEP_S && taken(from, &to, 2))
         add(from, out, &to, out->ms / 2, out->time_m * (1 / shrink - 1), 1, 1);
     to.step_s = from->setting.step_s / 2;
-    if (to.step_s >= min_step_s && taken(from, &to, 1))
+    if (to.step_s >= PAL_NEIGHBOUR_MIN_STEP_S && taken(from, &to, 1))
         add(from, out, &to, out->ms * 2, out->time_m * (shrink - 1), 1, 1);
 }
 
@@ -77,10 +77,10 @@ static void tolerances(const pal_prediction *from, pal_estimate *out)
 {
     pal_configuration to = from->setting;
     to.tolerance = from->tolerance * 10;
-    if (to.tolerance <= max_tolerance && taken(from, &to, 1))
+    if (to.tolerance <= PAL_NEIGHBOUR_MAX_TOLERANCE && taken(from, &to, 1))
         add(from, out, &to, out->ms / from->decade, out->algebraic_m * 9, 1, 1);
     to.tolerance = from->tolerance / 10;
-    if (to.tolerance >= min_tolerance && taken(from, &to, 1))
+    if (to.tolerance >= PAL_NEIGHBOUR_MIN_TOLERANCE && taken(from, &to, 1))
         add(from, out, &to, out->ms * from->decade, out->algebraic_m * -0.9, 1, 1);
 }
 

@@ -3,49 +3,25 @@
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
+#include "server/estimate/tuning.h"
+#include "server/num/median.h"
 #include "server/sim/world/zz_estimator.h"
 
 #include <math.h>
-#include <stdio.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { MAX_AHEAD = 12, TIMED = 7 };
-static const double ahead_s = 0.1, ahead_ms = 400;
-/* share of the body's size: smaller displacements are rounding */
-static const double unmoved = 1e-9;
 
 /* ---- one estimate ---- */
 
-static int rising(const void *a, const void *b)
+/* the median of a member (offset), because an interrupted step takes too long; NaN: no step */
+static double median_cost(const pal_estimate_state *s, size_t offset)
 {
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
-static float ms_of(const pal_estimate_cost *c)
-{
-    return c->ms;
-}
-
-static float once_of(const pal_estimate_cost *c)
-{
-    return c->once;
-}
-
-static float beside_of(const pal_estimate_cost *c)
-{
-    return c->beside;
-}
-
-/* the median, because an interrupted step takes too long */
-static double middle(const pal_estimate_state *s, float (*of)(const pal_estimate_cost *))
-{
-    float value[PAL_ESTIMATE_STEPS];
-    if (s->n_cost == 0) return NAN;
-    for (int i = 0; i < s->n_cost; i++) value[i] = of(&s->cost[i]);
-    qsort(value, (size_t)s->n_cost, sizeof *value, rising);
-    return (double)value[s->n_cost / 2];
+    double value[PAL_ESTIMATE_STEPS];
+    for (int i = 0; i < s->n_cost; i++) value[i] = (double)*(const float *)((const char *)&s->cost[i] + offset);
+    return s->n_cost > 0 ? pal_median(value, s->n_cost) : (double)NAN;
 }
 
 /* sets the state and its loads in a world of the same mesh */
@@ -71,7 +47,7 @@ static pal_err set_state(const pal_estimation *w, pal_world *world)
 }
 
 /* Makes n steps of dt_s from the state -> x; ms: time of one. False: stopped, or not possible. */
-static bool go_ahead(const pal_estimation *w, pal_world *world, int n, double dt_s, double *x, double *ms)
+static bool make_steps(const pal_estimation *w, pal_world *world, int n, double dt_s, double *x, double *ms)
 {
     const pal_body *body = pal_world_body(world, 0);
     bool good = !set_state(w, world);
@@ -82,30 +58,23 @@ static bool go_ahead(const pal_estimation *w, pal_world *world, int n, double dt
     return good && pal_body_finite(body);
 }
 
-static double max_between(const double *a, const double *b, int n)
-{
-    double max = 0;
-    for (int i = 0; i < n; i++) max = fmax(max, pal_dist3(a + 3 * (size_t)i, b + 3 * (size_t)i));
-    return max;
-}
-
 /* computes the algebraic and time parts from future steps */
-static void look_ahead(pal_estimation *w, pal_estimate *out)
+static void find_time_parts(pal_estimation *w, pal_estimate *out)
 {
     double step_s = w->scene->step_s, ms = isnan(out->ms) ? 1 : out->ms;
     int n_sub = w->state.n_substep > 0 ? w->state.n_substep : 1, n_dof = w->state.n_dof;
-    int n = (int)fmin(fmin(MAX_AHEAD, ceil(ahead_s / step_s)), fmax(1, ahead_ms / (4 * ms)));
+    int n = (int)fmin(fmin(MAX_AHEAD, ceil(PAL_AHEAD_S / step_s)), fmax(1, PAL_AHEAD_MS / (4 * ms)));
     pal_world *exact = w->exact ? w->exact : w->live;
     double live_ms = NAN, exact_ms = NAN, half_ms;
     out->algebraic_m = w->exact ? NAN : 0;
-    if (w->exact && !go_ahead(w, w->live, n, step_s, w->first, &live_ms)) return;
-    if (!go_ahead(w, exact, n * n_sub, step_s / n_sub, w->second, &exact_ms)) return;
-    if (w->exact) out->algebraic_m = max_between(w->first, w->second, n_dof);
-    if (!go_ahead(w, exact, 2 * n * n_sub, 0.5 * step_s / n_sub, w->first, &half_ms)) return;
+    if (w->exact && !make_steps(w, w->live, n, step_s, w->first, &live_ms)) return;
+    if (!make_steps(w, exact, n * n_sub, step_s / n_sub, w->second, &exact_ms)) return;
+    if (w->exact) out->algebraic_m = pal_max_dist3(w->first, w->second, n_dof);
+    if (!make_steps(w, exact, 2 * n * n_sub, 0.5 * step_s / n_sub, w->first, &half_ms)) return;
     if (w->exact && n_sub == 1)
         w->prediction.decade =
-            pow(fmax(exact_ms / live_ms, 1), 1 / log10(w->prediction.tolerance / pal_estimate_tight));
-    out->time_m = max_between(w->first, w->second, n_dof) / (1 - ldexp(1, -w->prediction.solver_order));
+            pow(fmax(exact_ms / live_ms, 1), 1 / log10(w->prediction.tolerance / PAL_TOLERANCE_EXACT));
+    out->time_m = pal_max_dist3(w->first, w->second, n_dof) / (1 - ldexp(1, -w->prediction.solver_order));
 }
 
 /* Measures once the body's own method on the coarse mesh and on this one, under the same loads. */
@@ -133,12 +102,6 @@ static void measure_size_cost(pal_estimation *w)
 }
 
 /* ---- equilibria ---- */
-
-static void add_remark(pal_estimate *out, const char *text)
-{
-    size_t n = strlen(out->diag);
-    snprintf(out->diag + n, sizeof out->diag - n, "%s%s", n > 0 ? "; " : "", text);
-}
 
 /* Computes the loads under which the present shape is an equilibrium: the acting loads less the residual, which
  * accelerates the body or is taken by drag (d'Alembert). At rest they equal the acting loads. Supports bear the
@@ -194,7 +157,8 @@ static void discretise(pal_estimation *w, const pal_body *body, pal_estimate *ou
     if (!pal_zz_estimator_estimate(w->fine.world, 0, NULL, &zz_estimator, NULL))
         out->energy_error_percent = zz_estimator.percent;
     if (!pal_rest_solution_find(&w->coarse, &w->state, body, NULL, w->stop)) {
-        if (w->coarse.world) add_remark(out, "discretisation: the coarser mesh finds no rest under these loads");
+        if (w->coarse.world)
+            pal_estimate_remark(out->diag, "discretisation: the coarser mesh finds no rest under these loads");
         return;
     }
     double last = w->shown.n > 0 ? pal_display_error_change(&w->shown, PAL_DISPLAY_FINE, PAL_DISPLAY_COARSE)
@@ -207,16 +171,16 @@ static void discretise(pal_estimation *w, const pal_body *body, pal_estimate *ou
     if (w->cut) {
         char text[80];
         pal_estimate_hierarchy_describe(f, fresh, text, sizeof text);
-        add_remark(out, text);
+        pal_estimate_remark(out->diag, text);
     }
     if (f->known) {
-        w->prediction.order = pal_usual_order;
+        w->prediction.order = PAL_USUAL_ORDER;
         out->discretisation_m = last * f->times + skin_off(w);
         return;
     }
     bool early = changes_grow(w, body, last);
-    w->prediction.order = early ? pal_early_order : pal_usual_order;
-    if (early) add_remark(out, "discretisation: still grows from mesh to mesh, so more may be left");
+    w->prediction.order = early ? PAL_EARLY_ORDER : PAL_USUAL_ORDER;
+    if (early) pal_estimate_remark(out->diag, "discretisation: still grows from mesh to mesh, so more may be left");
     out->discretisation_m = last / (exp2(w->prediction.order) - 1) + skin_off(w);
 }
 
@@ -233,7 +197,7 @@ static void compare_fitted(pal_estimation *w, pal_estimate *out)
         max = fmax(max, pal_dist3(w->state.x + i, limit));
     }
     out->model_m = max, out->discretisation_m = 0;
-    add_remark(out, "fitted: the mesh's part is in the model's");
+    pal_estimate_remark(out->diag, "fitted: the mesh's part is in the model's");
 }
 
 static void compare_models(pal_estimation *w, const pal_body *body, pal_estimate *out)
@@ -243,16 +207,16 @@ static void compare_models(pal_estimation *w, const pal_body *body, pal_estimate
         compare_fitted(w, out);
     else if (w->springs) /* their present positions are the equilibrium under `borne` */
         out->model_m =
-            w->shown.n > 0 ? pal_display_error_skin(&w->shown, w->state.x, 0) : max_between(w->state.x, w->fine.x, n);
+            w->shown.n > 0 ? pal_display_error_skin(&w->shown, w->state.x, 0) : pal_max_dist3(w->state.x, w->fine.x, n);
     else if (!w->model.world)
         out->model_m = !strcmp(pal_estimate_model_text(&w->scene->body[0], "law", ""), "neo_hookean") ? 0 : (double)NAN;
     else if (pal_rest_solution_find(&w->model, &w->state, body, w->fine.x, w->stop))
-        out->model_m = max_between(w->model.x, w->fine.x, n);
+        out->model_m = pal_max_dist3(w->model.x, w->fine.x, n);
 }
 
 static bool has_moved(const pal_estimation *w, const pal_estimate *out)
 {
-    return out->max_m > unmoved * pal_world_view_body(w->live, 0)->length_scale_m;
+    return out->max_m > PAL_UNMOVED * pal_world_view_body(w->live, 0)->length_scale_m;
 }
 
 static void find_rests(pal_estimation *w, pal_estimate *out)
@@ -267,7 +231,7 @@ static void find_rests(pal_estimation *w, pal_estimate *out)
     }
     if (!find_borne(w) || !pal_rest_solution_find(&w->fine, &w->state, body, w->state.x, w->stop)) {
         out->locking = false;
-        add_remark(out, "no rest was found under these loads");
+        pal_estimate_remark(out->diag, "no rest was found under these loads");
         return;
     }
     discretise(w, body, out);
@@ -277,7 +241,7 @@ static void find_rests(pal_estimation *w, pal_estimate *out)
 static double largest_move(const pal_estimation *w)
 {
     const pal_body *body = pal_world_body(w->live, 0);
-    return max_between(w->state.x, body->x_rest, w->state.n_dof);
+    return pal_max_dist3(w->state.x, body->x_rest, w->state.n_dof);
 }
 
 /* Without its dominant parts the sum must stay unknown: it would otherwise be compared with complete errors of a
@@ -293,16 +257,16 @@ static void sum_up(const pal_estimation *w, pal_estimate *out)
 static void report_sleep_cost(pal_estimation *w, pal_estimate *out)
 {
     if (!w->state.asleep) return;
-    if (isnan(out->ms) && !w->awake_ms) (void)go_ahead(w, w->live, TIMED, w->scene->step_s, w->first, &w->awake_ms);
+    if (isnan(out->ms) && !w->awake_ms) (void)make_steps(w, w->live, TIMED, w->scene->step_s, w->first, &w->awake_ms);
     if (isnan(out->ms)) out->ms = w->awake_ms;
     out->asleep = true;
-    add_remark(out, PAL_ESTIMATE_ASLEEP);
+    pal_estimate_remark(out->diag, PAL_ESTIMATE_ASLEEP);
 }
 
 /* the steps of a body at its initial shape contain only rounding */
 static void drop_rounding(const pal_estimation *w, pal_estimate *out)
 {
-    double min_m = unmoved * pal_world_view_body(w->live, 0)->length_scale_m;
+    double min_m = PAL_UNMOVED * pal_world_view_body(w->live, 0)->length_scale_m;
     if (has_moved(w, out)) return;
     if (out->time_m < min_m) out->time_m = 0;
     if (out->algebraic_m < min_m) out->algebraic_m = 0;
@@ -318,18 +282,18 @@ bool pal_estimation_run(pal_estimation *w, pal_estimate *out)
                           .time_m = NAN,
                           .model_m = NAN,
                           .energy_error_percent = NAN,
-                          .ms = middle(&w->state, ms_of)};
+                          .ms = median_cost(&w->state, offsetof(pal_estimate_cost, ms))};
     memcpy(out->diag, w->diag, sizeof out->diag);
     report_sleep_cost(w, out);
-    look_ahead(w, out);
+    find_time_parts(w, out);
     drop_rounding(w, out);
     if (!pal_estimate_stopped(w)) find_rests(w, out);
     sum_up(w, out);
     if (!pal_estimate_stopped(w)) measure_size_cost(w);
     w->prediction.n_substep = w->state.n_substep;
     w->prediction.other_substeps = ceil(w->scene->step_s / w->state.other_limit_s * (1 - 1e-12));
-    w->prediction.once = w->state.n_cost ? middle(&w->state, once_of) : 0;
-    w->prediction.beside = w->state.n_cost ? middle(&w->state, beside_of) : 0;
+    w->prediction.once = w->state.n_cost ? median_cost(&w->state, offsetof(pal_estimate_cost, once)) : 0;
+    w->prediction.beside = w->state.n_cost ? median_cost(&w->state, offsetof(pal_estimate_cost, beside)) : 0;
     pal_estimate_predict(&w->prediction, out);
     return !pal_estimate_stopped(w);
 }

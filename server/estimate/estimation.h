@@ -5,8 +5,11 @@
 #include "server/estimate/display_error.h"
 #include "server/estimate/estimate_cost_model.h"
 #include "server/estimate/estimate_hierarchy.h"
+#include "server/estimate/tuning.h"
 
 #include <stdatomic.h>
+#include <stdio.h>
+#include <string.h>
 
 typedef struct pal_estimation pal_estimation;
 /* Makes meshes and worlds for one body of a scene. Borrows the scene. Errors: STATE: *stop was set (NULL: never
@@ -20,22 +23,13 @@ bool pal_estimation_run(pal_estimation *work, pal_estimate *out);
 
 /* ---- private to estimation.c and estimation_setup.c ---- */
 
-/* solver tolerance with a negligible algebraic error */
-static const double pal_estimate_tight = 1e-9;
-/* Order of convergence of nodal displacements: 1.2 to 2.1 was observed (tests/accuracy/test_effectivity.c). For a
- * true order of 1 to 2, assuming 1.5 is off by a factor of 0.55 to 1.64. The order fitted to three meshes was less
- * accurate, because the coarsest is four times as coarse as the live one. Where changes still grow from mesh to
- * mesh (few voxels across, most of them cut), no order exists yet: there 1.5 gave 0.2 of the true error, and 1 gave
- * half of it to twice as much. */
-static const double pal_usual_order = 1.5, pal_early_order = 1;
-
 struct pal_estimation {
     const _Atomic bool *stop;
     pal_scene *scene; /* the body alone, without tools and display */
     pal_scene *exact_scene;
     pal_estimate_state state;
     pal_world *live;        /* the body as it runs */
-    pal_world *exact;       /* the same with pal_estimate_tight; NULL: its method solves no system */
+    pal_world *exact;       /* the same with PAL_TOLERANCE_EXACT; NULL: its method solves no system */
     double *first, *second; /* [n_dof][3] */
     /* springs: voxels for finite elements; n_hex 0: use those of the scene's mesh */
     pal_prepared voxels;
@@ -51,6 +45,12 @@ struct pal_estimation {
     char diag[160];
 };
 
+/* appends a clause to a diagnostic */
+static inline void pal_estimate_remark(char diag[160], const char *text)
+{
+    size_t n = strlen(diag);
+    snprintf(diag + n, 160 - n, "%s%s", n > 0 ? "; " : "", text);
+}
 static inline bool pal_estimate_stopped(const pal_estimation *w)
 {
     return w->stop && atomic_load_explicit(w->stop, memory_order_acquire);

@@ -1,24 +1,17 @@
 /* Creates what an estimation works with: its own scene, live and nearly exact worlds, meshes for the equilibria. */
 #include "server/estimate/estimation.h"
 
-#include "server/base/vec3.h"
+#include "server/estimate/tuning.h"
+#include "server/sim/core/effect_list.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-static const double usual_tolerance = 1e-2; /* of implicit solvers */
-/* voxels filled less are cut; share of the volume in cut voxels that counts as much, and voxels across that count
- * as few (tests/accuracy/test_effectivity.c, the gear) */
-static const double whole_fill = 0.98, much_cut = 0.1, few_across = 2.5;
-/* Poisson's ratio above which fully integrated hexahedra and four-node tetrahedra lock */
-static const double locks_above = 0.47;
 
 /* ---- own scene ---- */
 
 /* A moving support counts as stationary: its nodes are fixed and positioned with the state. */
-static void hold_led(pal_body_def *def, const pal_config_entry *item)
+static void fix_moving_support(pal_body_def *def, const pal_config_entry *item)
 {
     if (def->n_support == PAL_SUPPORT_MAX) return;
     if (pal_support_of_effect(item, &def->support[def->n_support])) def->n_support++;
@@ -27,13 +20,11 @@ static void hold_led(pal_body_def *def, const pal_config_entry *item)
 /* Keeps all force components except contact, which the loads of the state represent. */
 static void keep_forces(pal_body_def *def)
 {
-    static const char *const kept[] = {"gravity", "viscous", "penalty", "inflate"};
     int n = 0;
     for (int i = 0; i < def->n_effect; i++) {
-        bool keep = false;
-        if (!strcmp(def->effect[i].name, "moving_support")) hold_led(def, &def->effect[i]);
-        for (int k = 0; k < 4; k++) keep = keep || !strcmp(def->effect[i].name, kept[k]);
-        if (keep) def->effect[n++] = def->effect[i];
+        const pal_effect *effect = pal_effect_find(def->effect[i].name);
+        if (!strcmp(def->effect[i].name, "moving_support")) fix_moving_support(def, &def->effect[i]);
+        if (effect && effect->stage == PAL_STAGE_FORCE) def->effect[n++] = def->effect[i];
     }
     def->n_effect = n;
 }
@@ -86,15 +77,15 @@ static pal_err make_live(pal_estimation *w, pal_diagnostic *diag)
     f->solver_order = !strcmp(solver, "implicit_euler") ? 1 : !strcmp(solver, "rk4") ? 4 : 2;
     f->work[0] = f->work[1] = f->decade = NAN;
     f->n_node = pal_world_body(w->live, 0)->n_node, f->rest_substeps = pal_world_substeps(w->live);
-    f->order = pal_usual_order;
-    f->tolerance = f->setting.tolerance > 0 ? f->setting.tolerance : usual_tolerance;
+    f->order = PAL_USUAL_ORDER;
+    f->tolerance = f->setting.tolerance > 0 ? f->setting.tolerance : PAL_TOLERANCE_LIVE;
     if (!implicit && !cg) return PAL_ERR_OK;
     w->exact_scene = malloc(sizeof *w->exact_scene);
     if (!w->exact_scene) return PAL_ERR_MEMORY;
     *w->exact_scene = *w->scene;
     pal_config_entry *item = &w->exact_scene->body[0].solver;
     if (!item->name[0]) pal_entry_init(item, "solver", solver);
-    put_number(item, "tolerance", pal_estimate_tight);
+    put_number(item, "tolerance", PAL_TOLERANCE_EXACT);
     if (implicit) put_number(item, "iterations", 400);
     PAL_TRY(pal_world_create(w->exact_scene, diag, &w->exact));
     pal_world_body(w->exact, 0)->load_cap_N = INFINITY;
@@ -102,12 +93,6 @@ static pal_err make_live(pal_estimation *w, pal_diagnostic *diag)
 }
 
 /* ---- equilibria ---- */
-
-static void add_remark(pal_estimation *w, const char *text)
-{
-    size_t n = strlen(w->diag);
-    snprintf(w->diag + n, sizeof w->diag - n, "%s%s", n > 0 ? "; " : "", text);
-}
 
 const char *pal_estimate_model_text(const pal_body_def *def, const char *key, const char *otherwise)
 {
@@ -118,12 +103,12 @@ const char *pal_estimate_model_text(const pal_body_def *def, const char *key, co
 
 static bool nearly_incompressible(const pal_body_def *def)
 {
-    bool found = def->material.poisson > locks_above;
+    bool found = def->material.poisson > PAL_LOCKS_ABOVE;
     for (int k = 0; k < def->n_region; k++) {
         const pal_region *r = &def->region[k];
-        found = found || r->poisson > locks_above;
+        found = found || r->poisson > PAL_LOCKS_ABOVE;
         for (int i = 0; r->kind == PAL_REGION_GRID && r->grid_poisson && i < r->n[0] * r->n[1] * r->n[2]; i++)
-            found = found || r->grid_poisson[i] > locks_above;
+            found = found || r->grid_poisson[i] > PAL_LOCKS_ABOVE;
     }
     return found;
 }
@@ -144,7 +129,7 @@ static double cut_share(const pal_hexes *hexes)
     double cut = 0, all = 0;
     for (int e = 0; e < hexes->n_hex; e++) {
         all += (double)hexes->fill[e];
-        if ((double)hexes->fill[e] < whole_fill) cut += (double)hexes->fill[e];
+        if ((double)hexes->fill[e] < PAL_WHOLE_FILL) cut += (double)hexes->fill[e];
     }
     return all > 0 ? cut / all : 0;
 }
@@ -158,7 +143,7 @@ static bool is_thin(const pal_tets *tets)
             low = fmin(low, tets->x[3 * i + c]), high = fmax(high, tets->x[3 * i + c]);
         min = fmin(min, high - low);
     }
-    return min < few_across * tets->edge_m;
+    return min < PAL_FEW_ACROSS * tets->edge_m;
 }
 
 /* a mesh or law that is not available leaves its part of the error unknown */
@@ -170,7 +155,7 @@ static pal_err make_rests(pal_estimation *w)
     pal_diagnostic diag = {""};
     w->springs = !strcmp(def->model.name, "tet_springs");
     if (!w->springs && strcmp(def->model.name, "fem")) {
-        add_remark(w, "discretisation and model: not known of control cells");
+        pal_estimate_remark(w->diag, "discretisation and model: not known of control cells");
         return PAL_ERR_OK;
     }
     if (w->springs) find_voxels(w);
@@ -180,14 +165,14 @@ static pal_err make_rests(pal_estimation *w)
     w->locks = (!strcmp(is, "tet4") || !strcmp(is, "hex8")) && nearly_incompressible(def);
     pal_err err = pal_rest_solution_make(w->scene, body, element, law, &diag, &w->fine);
     if (err) {
-        add_remark(w, diag.text);
+        pal_estimate_remark(w->diag, diag.text);
         return err == PAL_ERR_MEMORY ? err : PAL_ERR_OK;
     }
     if (pal_estimate_stopped(w)) return PAL_ERR_STATE;
     err = pal_rest_solution_coarser(w->scene, body, element, law, &diag, &w->coarse);
-    if (err) add_remark(w, diag.text);
+    if (err) pal_estimate_remark(w->diag, diag.text);
     if (pal_estimate_stopped(w)) return PAL_ERR_STATE;
-    w->cut = !err && cut_share(&def->mesh->hexes) > much_cut;
+    w->cut = !err && cut_share(&def->mesh->hexes) > PAL_MUCH_CUT;
     w->thin = !err && hexes && is_thin(&def->mesh->tets);
     /* without it the order is not tested */
     if (!err) (void)pal_rest_solution_coarser(w->coarse.scene, body, NULL, NULL, NULL, &w->coarsest);
@@ -195,7 +180,7 @@ static pal_err make_rests(pal_estimation *w)
     if (w->skinned) PAL_TRY(pal_display_error_make(&w->fine, &w->coarse, &w->coarsest, &w->shown));
     bool neo = !strcmp(pal_estimate_model_text(def, "law", ""), "neo_hookean");
     if (!w->springs && !neo && pal_rest_solution_make(w->scene, body, NULL, "neo_hookean", &diag, &w->model))
-        add_remark(w, diag.text);
+        pal_estimate_remark(w->diag, diag.text);
     return PAL_ERR_OK;
 }
 
@@ -212,9 +197,9 @@ static pal_err take_state(pal_estimation *w)
     w->first = malloc(n * sizeof(double)), w->second = malloc(n * sizeof(double));
     for (int i = 0; i < pal_world_component_count(w->live); i++) {
         const pal_effect *effect = pal_world_component(w->live, i)->effect;
-        if (effect->stage != PAL_STAGE_FORCE || s->n_row == PAL_ESTIMATE_COMPONENTS) continue;
-        s->row[s->n_row] = effect->name;
-        s->component_enabled[s->n_row++] = true;
+        if (effect->stage != PAL_STAGE_FORCE || s->n_component == PAL_ESTIMATE_COMPONENTS) continue;
+        s->component[s->n_component] = effect->name;
+        s->component_enabled[s->n_component++] = true;
     }
     return s->x && s->v && s->load && s->external_force && s->borne && w->first && w->second ? PAL_ERR_OK
                                                                                              : PAL_ERR_MEMORY;

@@ -1,17 +1,16 @@
 /* The estimator's thread and its two exchanges. A state goes in when the thread is idle and a quarter of a second
  * has passed. An estimate comes out under a lock that the simulation never takes.
  *
- * The thread owns the state while `place` is BUSY, the simulation while it is FREE. The owner passes it on, so
+ * The thread owns the state while `owner` is BUSY, the simulation while it is FREE. The owner passes it on, so
  * neither waits. */
 #include "server/estimate/estimator.h"
 
-#include "server/base/clock.h"
+#include "server/base/thread.h"
 #include "server/estimate/estimation.h"
+#include "server/estimate/tuning.h"
 
 #include <math.h>
-#include <pthread.h>
 #include <semaphore.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,22 +20,21 @@
 #include <unistd.h>
 
 enum { BUSY, FREE };
-static const uint64_t period_ns = 250000000;
 static const int niceness = 10; /* the simulation has priority */
 
 static _Atomic int n_thread;
 static _Atomic uint64_t n_made;
-static _Atomic bool fixed;
 
 struct pal_estimator {
     const pal_scene *scene;
+    const pal_clock *clock;
     int body;
     pthread_t thread;
     sem_t wake;
     _Atomic bool stop, gone;
-    _Atomic int place;
+    _Atomic int owner;
     pal_estimation *work;      /* owned by the thread */
-    pal_estimate_state *state; /* of work; `place` gives its owner */
+    pal_estimate_state *state; /* of work; `owner` gives its owner */
     pthread_mutex_t lock;
     pal_estimate newest; /* tick 0: none yet */
     bool there, refused;
@@ -44,12 +42,12 @@ struct pal_estimator {
     /* how often the body was frozen and reset: odd while frozen */
     _Atomic unsigned life;
     _Atomic uint64_t frozen_tick;
-    unsigned looked_life;     /* `life` of the state; owned with the state */
-    uint64_t looked_awake;    /* n_awake of the state; owned with the state */
+    unsigned copied_life;     /* `life` of the state; owned with the state */
+    uint64_t copied_awake;    /* n_awake of the state; owned with the state */
     uint64_t newest_awake;    /* of newest; guarded by the lock */
     _Atomic uint64_t n_awake; /* steps in which the body was awake: these age an estimate */
     /* owned by the simulation thread */
-    uint64_t looked_ns, looked_tick;
+    uint64_t copied_ns, copied_tick;
     pal_estimate_cost cost[PAL_ESTIMATE_STEPS];
     uint64_t n_cost;
     double step_s;
@@ -61,10 +59,11 @@ static void publish(pal_estimator *e, const pal_estimate *estimate, bool refused
     pthread_mutex_lock(&e->lock);
     e->newest = *estimate;
     e->there = true, e->refused = refused;
-    e->newest_life = e->looked_life;
-    e->newest_awake = e->looked_awake;
+    e->newest_life = e->copied_life;
+    e->newest_awake = e->copied_awake;
     pthread_mutex_unlock(&e->lock);
     atomic_fetch_add_explicit(&n_made, 1, memory_order_relaxed);
+    pal_clock_wake(e->clock);
 }
 
 /* an estimate with all values unknown, and the reason */
@@ -90,9 +89,10 @@ static void publish_refusal(pal_estimator *e, const pal_diagnostic *diag)
 
 static bool wait_state(pal_estimator *e)
 {
-    atomic_store_explicit(&e->place, FREE, memory_order_release);
+    atomic_store_explicit(&e->owner, FREE, memory_order_release);
+    pal_clock_wake(e->clock);
     while (!atomic_load_explicit(&e->stop, memory_order_acquire)) {
-        if (atomic_load_explicit(&e->place, memory_order_acquire) == BUSY) return true;
+        if (atomic_load_explicit(&e->owner, memory_order_acquire) == BUSY) return true;
         while (sem_wait(&e->wake)) continue;
     }
     return false;
@@ -117,18 +117,14 @@ static void *estimate(void *user)
     e->work = NULL;
     atomic_fetch_sub_explicit(&n_thread, 1, memory_order_relaxed);
     atomic_store_explicit(&e->gone, true, memory_order_release);
+    pal_clock_wake(e->clock);
     return NULL;
 }
 
 static pal_err start(pal_estimator *e, pal_diagnostic *diag)
 {
-    /* leaves signals to the thread that waits for them */
-    sigset_t all, old;
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &old);
     atomic_fetch_add_explicit(&n_thread, 1, memory_order_relaxed);
-    int failed = pthread_create(&e->thread, NULL, estimate, e);
-    pthread_sigmask(SIG_SETMASK, &old, NULL);
+    int failed = pal_thread_start(&e->thread, estimate, e);
     if (!failed) return PAL_ERR_OK;
     atomic_fetch_sub_explicit(&n_thread, 1, memory_order_relaxed);
     return pal_diagnostic_set(diag, PAL_ERR_INTERNAL, "the estimator's thread cannot be started");
@@ -141,7 +137,8 @@ static void release(pal_estimator *e)
     free(e);
 }
 
-pal_err pal_estimator_open(const pal_scene *scene, int body, pal_diagnostic *diag, pal_estimator **out)
+pal_err pal_estimator_open(const pal_scene *scene, int body, const pal_clock *clock, pal_diagnostic *diag,
+                           pal_estimator **out)
 {
     if (body < 0 || body >= scene->n_body)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body %d does not exist: the scene has %d", body,
@@ -149,6 +146,7 @@ pal_err pal_estimator_open(const pal_scene *scene, int body, pal_diagnostic *dia
     pal_estimator *e = calloc(1, sizeof *e);
     if (!e) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for an estimator");
     e->scene = scene, e->body = body, e->step_s = scene->step_s;
+    e->clock = clock ? clock : &pal_clock_monotonic;
     pthread_mutex_init(&e->lock, NULL);
     sem_init(&e->wake, 0, 0);
     pal_err err = start(e, diag);
@@ -210,19 +208,18 @@ void pal_estimator_observe(pal_estimator *e, const pal_world *world, double step
         atomic_fetch_add_explicit(&e->n_awake, 1, memory_order_relaxed);
     }
     if (!body->asleep) e->slept = false;
-    if (e->slept || atomic_load_explicit(&fixed, memory_order_relaxed)) return;
-    if (atomic_load_explicit(&e->place, memory_order_acquire) != FREE) return;
-    uint64_t now = pal_clock_ns(), tick = pal_world_tick(world);
+    if (e->slept || atomic_load_explicit(&e->owner, memory_order_acquire) != FREE) return;
+    uint64_t now = pal_clock_now_ns(e->clock), tick = pal_world_tick(world);
     /* unchanged since the last copy */
-    if (e->looked_ns && tick == e->looked_tick && isnan(step_ms)) return;
-    if (e->looked_ns && now - e->looked_ns < period_ns) return;
+    if (e->copied_ns && tick == e->copied_tick && isnan(step_ms)) return;
+    if (e->copied_ns && now - e->copied_ns < PAL_ESTIMATE_PERIOD_NS) return;
     if (!pal_estimate_copy(e->state, world, e->body)) return;
-    e->looked_ns = now, e->looked_tick = tick;
+    e->copied_ns = now, e->copied_tick = tick;
     e->slept = body->asleep;
-    e->looked_life = atomic_load_explicit(&e->life, memory_order_relaxed);
-    e->looked_awake = n_awake(e);
+    e->copied_life = atomic_load_explicit(&e->life, memory_order_relaxed);
+    e->copied_awake = n_awake(e);
     copy_costs(e, e->state);
-    atomic_store_explicit(&e->place, BUSY, memory_order_release);
+    atomic_store_explicit(&e->owner, BUSY, memory_order_release);
     sem_post(&e->wake);
 }
 
@@ -263,9 +260,4 @@ int pal_estimator_threads(void)
 uint64_t pal_estimator_count(void)
 {
     return atomic_load_explicit(&n_made, memory_order_relaxed);
-}
-
-void pal_estimator_pause_all(bool hold)
-{
-    atomic_store_explicit(&fixed, hold, memory_order_relaxed);
 }

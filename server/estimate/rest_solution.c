@@ -6,6 +6,7 @@
 #include "server/estimate/rest_solution.h"
 
 #include "server/base/vec3.h"
+#include "server/estimate/tuning.h"
 #include "server/mesh/volume/locate.h"
 #include "server/mesh/volume/voxel_coarsening.h"
 #include "server/num/shape_functions.h"
@@ -16,13 +17,6 @@
 #include <string.h>
 
 enum { NEWTON_A_STEP = 3, MAX_STEPS = 30, MIN_HEXES = 4, MORE_PRESSES = 2, MANY_NODES = 4000, MAX_GRADIENTS = 3000 };
-/* accepted relative error of the work of contact; largest factor by which contact loads change at once */
-#define SAME_PRESS 0.05
-#define MAX_PART   5.0
-static const double rest_tolerance = 1e-6, drop_fill = 0.25, slack_h = 1e-6;
-/* Of E h^2: rounding of the positions leaves this residual on a node of an unloaded body. A tolerance relative to
- * zero loads cannot be met. */
-static const double nothing_left = 1e-11;
 
 /* ---- scene ---- */
 
@@ -47,7 +41,7 @@ static pal_err make_scene(const pal_scene *scene, const char *element, const cha
     if (element) PAL_TRY(put_text(&def->model, "element", element, diag));
     if (law) PAL_TRY(put_text(&def->model, "law", law, diag));
     pal_entry_init(&def->solver, "solver", "static_newton");
-    PAL_TRY(pal_entry_put_number(&def->solver, "tolerance", rest_tolerance, diag));
+    PAL_TRY(pal_entry_put_number(&def->solver, "tolerance", PAL_TOLERANCE_REST, diag));
     return pal_entry_put_number(&def->solver, "newton", NEWTON_A_STEP, diag);
 }
 
@@ -80,7 +74,8 @@ static void fix_lowest(pal_scene *scene, const pal_body *body)
             for (int c = 0; c < 3; c++) s->low_m[c] = -1e9, s->high_m[c] = 1e9;
             *(sign > 0 ? &s->high_m[axis] : &s->low_m[axis]) = top;
         }
-        for (int c = 0; c < 3 && !s->lowest; c++) s->low_m[c] -= slack_h * h, s->high_m[c] += slack_h * h;
+        for (int c = 0; c < 3 && !s->lowest; c++)
+            s->low_m[c] -= PAL_SUPPORT_SLACK * h, s->high_m[c] += PAL_SUPPORT_SLACK * h;
     }
 }
 
@@ -93,7 +88,7 @@ typedef struct lattice {
     int32_t *node; /* -1: none */
 } lattice;
 
-static size_t place(const lattice *l, const int at[3])
+static size_t lattice_index(const lattice *l, const int at[3])
 {
     return (size_t)at[0] + (size_t)l->n[0] * ((size_t)at[1] + (size_t)l->n[1] * (size_t)at[2]);
 }
@@ -113,7 +108,7 @@ static pal_err make_lattice(const pal_tets *tets, lattice *l)
     for (int i = 0; i < tets->n_node; i++) {
         int at[3];
         for (int c = 0; c < 3; c++) at[c] = (int)floor((tets->x[3 * i + c] - l->low[c]) / l->edge_m + 0.5);
-        l->node[place(l, at)] = i;
+        l->node[lattice_index(l, at)] = i;
     }
     return PAL_ERR_OK;
 }
@@ -126,7 +121,7 @@ static double misheld(const lattice *l, const uint8_t *fixed, int axis, int shif
     for (at[2] = 0; at[2] < l->n[2]; at[2]++)
         for (at[1] = 0; at[1] < l->n[1]; at[1]++)
             for (at[0] = 0; at[0] < l->n[0]; at[0]++) {
-                int32_t i = l->node[place(l, at)];
+                int32_t i = l->node[lattice_index(l, at)];
                 if (i < 0 || (at[axis] + shift) % 2 == 0) continue;
                 double beside = 0;
                 int n = 0;
@@ -134,7 +129,7 @@ static double misheld(const lattice *l, const uint8_t *fixed, int axis, int shif
                     int next[3] = {at[0], at[1], at[2]};
                     next[axis] += side;
                     if (next[axis] < 0 || next[axis] >= l->n[axis]) continue;
-                    int32_t j = l->node[place(l, next)];
+                    int32_t j = l->node[lattice_index(l, next)];
                     if (j >= 0) beside += fixed[j] != 0, n++;
                 }
                 sum += fabs((fixed[i] != 0) - (n > 0 ? beside / n : 0));
@@ -176,7 +171,7 @@ static pal_err merge_once(const pal_body_def *def, const pal_tets *tets, const p
     find_held(def, tets, fixed);
     pal_err err = choose_shift(tets, fixed, shift);
     free(fixed);
-    if (!err) err = pal_voxels_coarsen(tets, hexes, shift, drop_fill, out, diag);
+    if (!err) err = pal_voxels_coarsen(tets, hexes, shift, PAL_MERGE_MIN_FILL, out, diag);
     if (!err && out->hexes.n_hex < MIN_HEXES) {
         err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d voxels are too few for a coarser mesh", hexes->n_hex);
         pal_prepared_free(out);
@@ -199,7 +194,7 @@ static pal_err merge(pal_rest_solution *r, const pal_prepared *mesh, pal_diagnos
 
 /* ---- positions of the running body's nodes ---- */
 
-void pal_element_shape_functions(const pal_body *b, const double local[4], double *shape)
+static void shape_functions(const pal_body *b, const double local[4], double *shape)
 {
     if (b->n_corner == PAL_HEX_CORNERS)
         pal_hex_shape(local, shape, NULL);
@@ -222,29 +217,52 @@ static void take_inside(const pal_body *b, double local[4])
     for (int c = 0; c < 4 && !hex; c++) local[c] /= sum;
 }
 
-static pal_err find_near(pal_rest_solution *r, const pal_body *body)
+pal_err pal_rest_solution_interpolation(const pal_rest_solution *r, const double *x, int n, int stride, bool inside,
+                                        pal_interpolation *out)
 {
     const pal_body *own = pal_world_view_body(r->world, 0);
+    const pal_prepared *mesh = r->scene->body[0].mesh;
     pal_locate *locate = NULL;
-    int n = own->n_corner;
-    r->n_near = n;
-    r->near = malloc((size_t)r->n_node * (size_t)n * sizeof *r->near);
-    r->weight = malloc((size_t)r->n_node * (size_t)n * sizeof *r->weight);
-    r->common = malloc((size_t)r->n_node * sizeof *r->common);
-    if (!r->near || !r->weight || !r->common) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_locate_create(&r->mesh.tets, n == PAL_HEX_CORNERS ? &r->mesh.hexes : NULL, &locate));
-    for (int i = 0; i < r->n_node; i++) {
-        double local[4];
-        int e = pal_locate_point(locate, body->node_rest + 3 * i, local, NULL);
-        double *weight = r->weight + (size_t)n * (size_t)i, max = 0;
-        if (r->sized) take_inside(own, local);
-        pal_element_shape_functions(own, local, weight);
-        for (int k = 0; k < n; k++) max = fmax(max, weight[k]);
-        if (max > 1 - 1e-9) r->common[r->n_common++] = i;
-        memcpy(r->near + (size_t)n * (size_t)i, own->element + (size_t)n * (size_t)e, (size_t)n * sizeof *r->near);
+    pal_interpolation_builder rows;
+    PAL_TRY(pal_locate_create(&mesh->tets, own->n_corner == PAL_HEX_CORNERS ? &mesh->hexes : NULL, &locate));
+    pal_interpolation_builder_begin(&rows, n, own->n_node, INT32_MAX);
+    for (int i = 0; i < n && !rows.err; i++) {
+        double local[4], shape[PAL_MAX_CORNERS];
+        int e = pal_locate_point(locate, x + 3 * (size_t)i * (size_t)stride, local, NULL);
+        const int32_t *node = own->element + (size_t)own->n_corner * (size_t)e;
+        if (inside) take_inside(own, local);
+        shape_functions(own, local, shape);
+        for (int k = 0; k < own->n_corner; k++) pal_interpolation_builder_add(&rows, node[k], shape[k]);
+        pal_interpolation_builder_end_row(&rows);
     }
     pal_locate_destroy(locate);
-    return PAL_ERR_OK;
+    return pal_interpolation_builder_finish(&rows, out);
+}
+
+void pal_rest_solution_displacement(const pal_rest_solution *r, const pal_interpolation *by, double *u)
+{
+    const pal_body *own = pal_world_view_body(r->world, 0);
+    for (int i = 0; i < by->n_row; i++, u += 3) {
+        pal_set3(u, 0, 0, 0);
+        for (int k = by->start[i]; k < by->start[i + 1]; k++) {
+            const size_t node = 3 * (size_t)by->point[k];
+            pal_axpy3(u, by->weight[k], own->d + node);
+            pal_axpy3(u, -by->weight[k], own->node_rest + node);
+        }
+    }
+}
+
+/* outside: nodes of the running body may lie outside of this mesh */
+static pal_err find_nodes(pal_rest_solution *r, const pal_body *body, bool outside)
+{
+    PAL_TRY(pal_rest_solution_interpolation(r, body->node_rest, r->n_node, 1, outside, &r->by));
+    r->common = malloc((size_t)r->n_node * sizeof *r->common);
+    for (int i = 0; i < r->n_node && r->common; i++) {
+        double max = 0;
+        for (int k = r->by.start[i]; k < r->by.start[i + 1]; k++) max = fmax(max, r->by.weight[k]);
+        if (max > 1 - 1e-9) r->common[r->n_common++] = i;
+    }
+    return r->common ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 /* ---- public functions ---- */
@@ -278,7 +296,7 @@ pal_err pal_rest_solution_coarser(const pal_scene *scene, const pal_body *body, 
     if (!err) err = merge(out, scene->body[0].mesh, diag);
     if (!err) out->scene->body[0].mesh = &out->mesh;
     if (!err) err = open_world(out, diag);
-    if (!err) err = find_near(out, body);
+    if (!err) err = find_nodes(out, body, false);
     if (err) pal_rest_solution_free(out);
     return err;
 }
@@ -288,7 +306,7 @@ pal_err pal_rest_solution_sized(const pal_scene *scene, const pal_body *body, co
 {
     pal_configured_scene *set = NULL;
     pal_configuration to = *setting;
-    *out = (pal_rest_solution){.n_node = body->n_node, .sized = true};
+    *out = (pal_rest_solution){.n_node = body->n_node};
     to.size = size;
     PAL_TRY(pal_configuration_make(scene, 0, &to, NULL, &set));
     pal_err err = make_scene(&set->scene, NULL, law, NULL, out);
@@ -301,7 +319,7 @@ pal_err pal_rest_solution_sized(const pal_scene *scene, const pal_body *body, co
         err = open_world(out, NULL);
     }
     pal_configured_scene_free(set);
-    if (!err) err = find_near(out, body);
+    if (!err) err = find_nodes(out, body, true);
     if (err) pal_rest_solution_free(out);
     return err;
 }
@@ -311,7 +329,8 @@ void pal_rest_solution_free(pal_rest_solution *r)
     pal_world_destroy(r->world);
     pal_prepared_free(&r->mesh);
     free(r->scene);
-    free(r->near), free(r->weight), free(r->common), free(r->x);
+    pal_interpolation_free(&r->by);
+    free(r->common), free(r->x);
     memset(r, 0, sizeof *r);
 }
 
@@ -334,27 +353,14 @@ static void load_at(const pal_estimate_state *s, double part, int i, double out[
 
 static pal_err put_loads(pal_rest_solution *r, const pal_estimate_state *state, double part)
 {
-    double load[3];
     const pal_body *own = pal_world_view_body(r->world, 0);
-    if (r->n_near == 0) {
-        for (int i = 0; i < own->n_node; i++) {
-            load_at(state, part, i, load);
-            PAL_TRY(pal_world_load(r->world, 0, i, load));
-        }
-        return PAL_ERR_OK;
-    }
-    double *f = calloc(3 * (size_t)own->n_node, sizeof *f);
-    if (!f) return PAL_ERR_MEMORY;
-    for (int i = 0; i < r->n_node; i++) {
-        load_at(state, part, i, load);
-        for (int k = 0; k < r->n_near; k++) {
-            size_t at = (size_t)r->n_near * (size_t)i + (size_t)k;
-            pal_axpy3(f + 3 * (size_t)r->near[at], r->weight[at], load);
-        }
-    }
+    double *load = calloc(3 * ((size_t)r->n_node + (size_t)own->n_node), sizeof *load), *f = load;
+    if (!load) return PAL_ERR_MEMORY;
+    for (int i = 0; i < r->n_node; i++) load_at(state, part, i, load + 3 * (size_t)i);
+    if (r->by.n_row > 0) pal_interpolation_apply_transpose(&r->by, load, f += 3 * (size_t)r->n_node);
     pal_err err = PAL_ERR_OK;
-    for (int i = 0; i < own->n_node && !err; i++) err = pal_world_load(r->world, 0, i, f + 3 * i);
-    free(f);
+    for (int i = 0; i < own->n_node && !err; i++) err = pal_world_load(r->world, 0, i, f + 3 * (size_t)i);
+    free(load);
     return err;
 }
 
@@ -371,7 +377,7 @@ static pal_err put_state(pal_rest_solution *r, const pal_estimate_state *state, 
     own->frozen = false;
     /* from rest after a failure, otherwise from the previous solution */
     if (!r->known) memcpy(own->x, own->x_rest, 3 * sizeof *own->x * (size_t)own->n_dof);
-    for (int i = 0; i < own->n_node && r->n_near == 0; i++)
+    for (int i = 0; i < own->n_node && r->by.n_row == 0; i++)
         if (from || own->support[i])
             pal_copy3(own->x + 3 * i, from && !own->support[i] ? from + 3 * i : state->x + 3 * i);
     memset(own->v, 0, 3 * sizeof *own->v * (size_t)own->n_dof);
@@ -382,7 +388,7 @@ static pal_err put_state(pal_rest_solution *r, const pal_estimate_state *state, 
 static bool nothing_acts(const pal_rest_solution *r, double young_Pa)
 {
     const pal_body *own = pal_world_view_body(r->world, 0);
-    double sum = 0, max = nothing_left * young_Pa * own->edge_m * own->edge_m;
+    double sum = 0, max = PAL_UNLOADED_RESIDUAL * young_Pa * own->edge_m * own->edge_m;
     for (int i = 0; i < own->n_dof; i++)
         if (!own->support[i]) sum += pal_dot3(own->g + 3 * (size_t)i, own->g + 3 * (size_t)i);
     return sum <= max * max * own->n_dof;
@@ -401,22 +407,12 @@ static bool converge(pal_rest_solution *r, double young_Pa, const _Atomic bool *
     return false;
 }
 
-static void take_places(pal_rest_solution *r, const pal_body *body)
+static void take_positions(pal_rest_solution *r, const pal_body *body)
 {
     const pal_body *own = pal_world_view_body(r->world, 0);
-    if (r->n_near == 0) {
-        memcpy(r->x, own->d, 3 * sizeof *r->x * (size_t)r->n_node);
-        return;
-    }
-    for (int i = 0; i < r->n_node; i++) {
-        pal_copy3(r->x + 3 * i, body->node_rest + 3 * i);
-        for (int k = 0; k < r->n_near; k++) {
-            size_t at = (size_t)r->n_near * (size_t)i + (size_t)k;
-            const double *x = own->d + 3 * (size_t)r->near[at], *rest = own->node_rest + 3 * (size_t)r->near[at];
-            pal_axpy3(r->x + 3 * i, r->weight[at], x);
-            pal_axpy3(r->x + 3 * i, -r->weight[at], rest);
-        }
-    }
+    if (r->by.n_row == 0) memcpy(r->x, own->d, 3 * sizeof *r->x * (size_t)r->n_node);
+    pal_rest_solution_displacement(r, &r->by, r->x);
+    for (int i = 0; i < 3 * r->by.n_row; i++) r->x[i] += body->node_rest[i];
 }
 
 static bool find(pal_rest_solution *r, const pal_estimate_state *state, const pal_body *body, const double *from,
@@ -424,7 +420,7 @@ static bool find(pal_rest_solution *r, const pal_estimate_state *state, const pa
 {
     bool good = !put_state(r, state, from, part) && converge(r, state->material.young_Pa, stop);
     r->known = good;
-    if (good) take_places(r, body);
+    if (good) take_positions(r, body);
     return good;
 }
 
@@ -447,12 +443,13 @@ bool pal_rest_solution_find(pal_rest_solution *r, const pal_estimate_state *stat
     if (!r->world || !find(r, state, body, from, 1, stop)) return false;
     double want_J = pressed_J(state, body, state->x), got_J = pressed_J(state, body, r->x), part = 1, last = 0,
            last_J = 0;
-    for (int k = 0; k < MORE_PRESSES && want_J > 0 && got_J > 0 && fabs(got_J / want_J - 1) > SAME_PRESS; k++) {
+    for (int k = 0; k < MORE_PRESSES && want_J > 0 && got_J > 0 && fabs(got_J / want_J - 1) > PAL_SAME_PRESS; k++) {
         /* neglects the displacement by other loads: the first secant passes through zero */
         double slope = (got_J - last_J) / (part - last), next = part + (want_J - got_J) / slope;
-        if (!(next > part / MAX_PART && next < part * MAX_PART)) break;
+        if (!(next > part / PAL_MAX_PRESS && next < part * PAL_MAX_PRESS)) break;
         last = part, last_J = got_J, part = next;
-        if (!find(r, state, body, r->n_near > 0 ? NULL : r->x, part, stop)) return find(r, state, body, from, 1, stop);
+        if (!find(r, state, body, r->by.n_row > 0 ? NULL : r->x, part, stop))
+            return find(r, state, body, from, 1, stop);
         got_J = pressed_J(state, body, r->x);
         if (!(fabs(got_J - want_J) < fabs(last_J - want_J))) return find(r, state, body, from, 1, stop);
     }

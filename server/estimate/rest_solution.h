@@ -4,6 +4,7 @@
 #ifndef PAL_ESTIMATE_REST_SOLUTION_H
 #define PAL_ESTIMATE_REST_SOLUTION_H
 #include "server/estimate/estimate.h"
+#include "server/num/interpolation.h"
 
 #include <stdatomic.h>
 
@@ -11,9 +12,7 @@ typedef struct pal_rest_solution {
     pal_scene *scene;
     pal_prepared mesh; /* owned; n_node 0: the mesh of the source scene */
     pal_world *world;
-    int n_near;    /* element nodes and weights per node of the running body; 0: the nodes are identical */
-    int32_t *near; /* [n_node][n_near] */
-    double *weight;
+    pal_interpolation by; /* from its nodes to those of the running body; n_row 0: the nodes are identical */
     /* nodes of the running body that are corners here too, where two meshes compare without interpolation
      * [n_common] */
     int n_common;
@@ -21,7 +20,6 @@ typedef struct pal_rest_solution {
     double *x; /* equilibrium positions at the nodes of the running body, m [n_node][3] */
     int n_node;
     bool known; /* x is valid */
-    bool sized; /* other voxels instead of merged ones: nodes of the running body may lie outside */
 } pal_rest_solution;
 
 /* scene: one body, without tools (estimation_setup.c). element, law: NULL keeps those of the model; otherwise the
@@ -37,8 +35,12 @@ pal_err pal_rest_solution_coarser(const pal_scene *scene, const pal_body *body, 
 pal_err pal_rest_solution_sized(const pal_scene *scene, const pal_body *body, const pal_configuration *setting,
                                 int size, const char *law, pal_rest_solution *out);
 void pal_rest_solution_free(pal_rest_solution *rest); /* accepts a zeroed struct */
-/* Shape functions of a body's elements at local coordinates (mesh/volume/locate.h): shape [n_corner]. */
-void pal_element_shape_functions(const pal_body *body, const double local[4], double *shape);
+/* Interpolates in the elements of a rest solution at every stride-th of the points x [n * stride][3] (body frame).
+ * Points slightly outside are extrapolated; inside: they are moved into the nearest element first. Error: MEMORY. */
+pal_err pal_rest_solution_interpolation(const pal_rest_solution *rest, const double *x, int n, int stride, bool inside,
+                                        pal_interpolation *out);
+/* Displacements there in the last equilibrium, m [n][3]. */
+void pal_rest_solution_displacement(const pal_rest_solution *rest, const pal_interpolation *by, double *u);
 /* Finds the equilibrium under the loads of the state and sets x and known. False: no equilibrium, or *stop is set.
  * from: initial positions of the running body's nodes; NULL, and on another mesh: the previous solution.
  * A tool keeps its position, so its force depends on the mesh. Tool loads are therefore scaled until they press as

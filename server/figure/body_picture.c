@@ -2,14 +2,11 @@
  * dots, outline at rest, arrows, legend, axes, colour bar. */
 #include "server/figure/body_picture.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/figure/picture_faces.h"
 #include "server/figure/svg.h"
-
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#include "server/num/sort.h"
 
 enum { WIDE = 400, TALLEST = 360, LOWEST = 150, PAD = 14, TITLE = 34, LEGEND = 22, FOOT = 66, MARGIN = 14 };
 enum { PIECES_A_FILE = 16000, ARROWS_MAX = 60, CORNERS_MAX = 50000000 };
@@ -21,23 +18,24 @@ static const char *const outline_ink = "#30343a", *const crease_ink = "#6a7078",
 
 typedef struct panel {
     const pal_body_picture *p;
-    pal_picture_axes axes;
     pal_picture_mesh mesh;
     pal_picture_piece *piece;
     pal_picture_line *ghost;
     int n_piece, n_ghost;
-    double low[2], high[2]; /* what is drawn, along right and up, m */
-    double span_m;          /* diagonal of the bodies alone         */
-    double middle[3];       /* of the body, m                       */
-    bool ranged, grey;      /* a value to colour; one that has no colour */
-    double from, to;        /* range of colours: values, or their log10 */
-    double px_m, left, top; /* scale; corner of the drawing on the page, px */
+    double middle[3];  /* of the body, m                       */
+    bool ranged, grey; /* a value to colour; one that has no colour */
+    double from, to;   /* range of colours: values, or their log10 */
+    double left;       /* of the drawing on the page, px           */
 } panel;
 
 typedef struct sheet {
     int n;
     panel panel[PAL_BODY_PICTURES];
-    double load_max_N, tall; /* of all; height of the drawings, px */
+    pal_picture_axes axes;
+    double low[2], high[2]; /* what is drawn, along right and up, m */
+    double span_m;          /* diagonal of the bodies alone         */
+    double px_m, top, tall; /* scale; upper edge and height of the drawings, px */
+    double load_max_N;      /* of all */
     bool titled, legend;
 } sheet;
 
@@ -73,11 +71,6 @@ static bool same_quantity(const pal_body_picture *a, const pal_body_picture *b)
 {
     return a->value && b->value && a->log == b->log && same_text(a->value_title, b->value_title) &&
            same_text(a->unit, b->unit);
-}
-
-static bool same_side(const panel *a, const panel *b)
-{
-    return pal_dist3(a->axes.eye, b->axes.eye) < 1e-6 && pal_dist3(a->axes.up, b->axes.up) < 1e-6;
 }
 
 /* range of the values themselves; false: there is none */
@@ -162,18 +155,18 @@ static pal_err check_picture(const pal_body_picture *p, int index, const char *p
 static pal_err copy_mesh(panel *g)
 {
     const pal_body_picture *p = g->p;
-    size_t n = 3 * sizeof(double) * (size_t)p->n_vertex, n_tri = 3 * sizeof(int32_t) * (size_t)p->n_tri;
-    g->mesh = (pal_picture_mesh){.n_vertex = p->n_vertex,
-                                 .n_tri = p->n_tri,
-                                 .x = malloc(n),
-                                 .rest = p->rest ? malloc(n) : NULL,
-                                 .value = malloc(n / 3),
-                                 .tri = malloc(n_tri)};
     pal_picture_mesh *m = &g->mesh;
-    if (!m->x || !m->value || !m->tri || (p->rest && !m->rest)) return PAL_ERR_MEMORY;
-    memcpy(m->x, p->x, n);
-    memcpy(m->tri, p->tri, n_tri);
-    if (p->rest) memcpy(m->rest, p->rest, n);
+    pal_err err = PAL_ERR_OK;
+    size_t n = 3 * (size_t)p->n_vertex, n_tri = 3 * (size_t)p->n_tri;
+    *m = (pal_picture_mesh){.n_vertex = p->n_vertex, .n_tri = p->n_tri};
+    PAL_ARRAY(&err, m->x, n);
+    PAL_ARRAY(&err, m->value, p->n_vertex);
+    PAL_ARRAY(&err, m->tri, n_tri);
+    if (p->rest) PAL_ARRAY(&err, m->rest, n);
+    if (err) return err;
+    memcpy(m->x, p->x, n * sizeof *m->x);
+    memcpy(m->tri, p->tri, n_tri * sizeof *m->tri);
+    if (p->rest) memcpy(m->rest, p->rest, n * sizeof *m->rest);
     for (int i = 0; i < p->n_vertex; i++) {
         double t = g->ranged ? (scaled(p, p->value[i]) - g->from) / (g->to - g->from) : NAN;
         m->value[i] = isfinite(t) ? fmin(2, fmax(-1, t)) : NAN;
@@ -181,11 +174,14 @@ static pal_err copy_mesh(panel *g)
     return PAL_ERR_OK;
 }
 
-static void take_in(panel *g, const double x[3])
+static void take_in(sheet *page, const double x[3])
 {
     double at[3];
-    pal_picture_project(&g->axes, x, at);
-    for (int k = 0; k < 2; k++) g->low[k] = fmin(g->low[k], at[k]), g->high[k] = fmax(g->high[k], at[k]);
+    pal_picture_project(&page->axes, x, at);
+    for (int k = 0; k < 2; k++) {
+        page->low[k] = fmin(page->low[k], at[k]);
+        page->high[k] = fmax(page->high[k], at[k]);
+    }
 }
 
 /* loads are thinned evenly */
@@ -204,76 +200,47 @@ static void arrow_ends(const sheet *page, const panel *g, int load, double from[
     bool pushes = pal_dot3(inward, along) > 0.3 * pal_norm3(inward) * pal_norm3(along);
     pal_copy3(from, at);
     pal_copy3(to, at);
-    pal_axpy3(pushes ? from : to, pushes ? -g->span_m : g->span_m, along);
+    pal_axpy3(pushes ? from : to, pushes ? -page->span_m : page->span_m, along);
 }
 
-static void frame_body(panel *g)
+/* one frame and scale that hold the bodies and arrows of all pictures */
+static void settle_frame(sheet *page)
 {
-    const pal_body_picture *p = g->p;
-    g->low[0] = g->low[1] = INFINITY, g->high[0] = g->high[1] = -INFINITY;
-    for (int i = 0; i < 3 * p->n_tri; i++) {
-        const int32_t v = p->tri[i];
-        take_in(g, p->x + 3 * v);
-        if (p->rest) take_in(g, p->rest + 3 * v);
-        pal_axpy3(g->middle, 1.0 / (3 * p->n_tri), p->x + 3 * v);
-    }
-}
-
-static void frame_loads(const sheet *page, panel *g)
-{
-    for (int i = 0; i < g->p->n_load && page->load_max_N > 0; i += load_step(g->p)) {
-        double from[3], to[3];
-        arrow_ends(page, g, i, from, to);
-        take_in(g, from);
-        take_in(g, to);
-    }
-}
-
-/* pictures from the same side share the frame that holds them all */
-static void share_frames(sheet *page)
-{
-    double low[PAL_BODY_PICTURES][2], high[PAL_BODY_PICTURES][2];
-    for (int i = 0; i < page->n; i++)
-        for (int k = 0; k < 2; k++) low[i][k] = page->panel[i].low[k], high[i][k] = page->panel[i].high[k];
-    for (int i = 0; i < page->n; i++) {
-        panel *g = &page->panel[i];
-        for (int j = 0; j < page->n; j++)
-            for (int k = 0; k < 2 && same_side(g, &page->panel[j]); k++)
-                g->low[k] = fmin(g->low[k], low[j][k]), g->high[k] = fmax(g->high[k], high[j][k]);
-    }
-}
-
-static void settle_frames(sheet *page)
-{
-    for (int i = 0; i < page->n; i++) {
-        const pal_body_picture *p = page->panel[i].p;
-        frame_body(&page->panel[i]);
+    page->low[0] = page->low[1] = INFINITY, page->high[0] = page->high[1] = -INFINITY;
+    for (int k = 0; k < page->n; k++) {
+        panel *g = &page->panel[k];
+        const pal_body_picture *p = g->p;
+        for (int i = 0; i < 3 * p->n_tri; i++) {
+            const int32_t v = p->tri[i];
+            take_in(page, p->x + 3 * v);
+            if (p->rest) take_in(page, p->rest + 3 * v);
+            pal_axpy3(g->middle, 1.0 / (3 * p->n_tri), p->x + 3 * v);
+        }
         for (int l = 0; l < p->n_load; l += load_step(p))
             page->load_max_N = fmax(page->load_max_N, pal_norm3(p->load_N + 3 * l));
     }
-    share_frames(page);
-    for (int i = 0; i < page->n; i++) {
-        panel *g = &page->panel[i];
-        g->span_m = hypot(g->high[0] - g->low[0], g->high[1] - g->low[1]);
-        frame_loads(page, g);
+    page->span_m = hypot(page->high[0] - page->low[0], page->high[1] - page->low[1]);
+    for (int k = 0; k < page->n; k++) {
+        const panel *g = &page->panel[k];
+        for (int l = 0; l < g->p->n_load && page->load_max_N > 0; l += load_step(g->p)) {
+            double from[3], to[3];
+            arrow_ends(page, g, l, from, to);
+            take_in(page, from);
+            take_in(page, to);
+        }
     }
-    share_frames(page);
-    page->tall = LOWEST;
-    for (int i = 0; i < page->n; i++) {
-        panel *g = &page->panel[i];
-        double wide = fmax(g->high[0] - g->low[0], 1e-12), tall = fmax(g->high[1] - g->low[1], 1e-12);
-        g->px_m = fmin((WIDE - 2 * PAD) / wide, (TALLEST - 2 * PAD) / tall);
-        page->tall = fmax(page->tall, tall * g->px_m + 2 * PAD);
-    }
+    double wide = fmax(page->high[0] - page->low[0], 1e-12), tall = fmax(page->high[1] - page->low[1], 1e-12);
+    page->px_m = fmin((WIDE - 2 * PAD) / wide, (TALLEST - 2 * PAD) / tall);
+    page->tall = fmax(LOWEST, tall * page->px_m + 2 * PAD);
 }
 
 /* ---- drawing ---- */
 
 /* tenths of a pixel within the drawing */
-static void place(const sheet *page, const panel *g, const double at[2], int out[2])
+static void place(const sheet *page, const double at[2], int out[2])
 {
-    double x = WIDE / 2.0 + g->px_m * (at[0] - (g->low[0] + g->high[0]) / 2);
-    double y = page->tall / 2 - g->px_m * (at[1] - (g->low[1] + g->high[1]) / 2);
+    double x = WIDE / 2.0 + page->px_m * (at[0] - (page->low[0] + page->high[0]) / 2);
+    double y = page->tall / 2 - page->px_m * (at[1] - (page->low[1] + page->high[1]) / 2);
     out[0] = (int)lround(10 * x), out[1] = (int)lround(10 * y);
 }
 
@@ -312,7 +279,7 @@ static void pen_down(path_pen *pen, int ink)
 static void draw_piece(const sheet *page, const panel *g, path_pen *pen, const pal_picture_piece *piece)
 {
     int at[3][2];
-    for (int k = 0; k < 3; k++) place(page, g, piece->at[k], at[k]);
+    for (int k = 0; k < 3; k++) place(page, piece->at[k], at[k]);
     int class = g->p->value ? piece->colour : PAL_PICTURE_CLASSES;
     pen_down(pen, (class - PAL_PICTURE_GREY) * PAL_PICTURE_SHADES + piece->shade);
     fprintf(pen->to, "M%d %dl%d %d %d %dz", at[0][0], at[0][1], at[1][0] - at[0][0], at[1][1] - at[0][1],
@@ -333,7 +300,7 @@ typedef struct dot {
 static int by_depth(const void *a, const void *b)
 {
     const dot *p = a, *q = b;
-    return p->depth < q->depth ? -1 : p->depth > q->depth;
+    return PAL_COMPARE(p->depth, q->depth);
 }
 
 /* the held vertices, a little towards the eye, so that their own triangles do not hide them; NULL: no memory */
@@ -344,9 +311,9 @@ static dot *make_dots(const sheet *page, const panel *g, int *n)
     for (int i = 0; i < p->n_vertex && p->fixed && d; i++) {
         if (!p->fixed[i]) continue;
         double at[3];
-        pal_picture_project(&g->axes, p->x + 3 * i, at);
-        d[*n].depth = at[2] + 0.04 * g->span_m;
-        place(page, g, at, d[(*n)++].at);
+        pal_picture_project(&page->axes, p->x + 3 * i, at);
+        d[*n].depth = at[2] + 0.04 * page->span_m;
+        place(page, at, d[(*n)++].at);
     }
     if (d) qsort(d, (size_t)*n, sizeof *d, by_depth);
     return d;
@@ -358,8 +325,8 @@ static void draw_ghost(const sheet *page, const panel *g, const char *more, FILE
     fprintf(to, "<path class=\"rest\"%s d=\"", more);
     for (int i = 0; i < g->n_ghost; i++) {
         int a[2], b[2];
-        place(page, g, g->ghost[i].from, a);
-        place(page, g, g->ghost[i].to, b);
+        place(page, g->ghost[i].from, a);
+        place(page, g->ghost[i].to, b);
         fprintf(to, "M%d %dL%d %d", a[0], a[1], b[0], b[1]);
     }
     fputs("\"/>\n", to);
@@ -417,10 +384,10 @@ static void draw_loads(const sheet *page, const panel *g, FILE *to)
             double from[3], to3[3], p[3], q[3];
             int a[2], b[2];
             arrow_ends(page, g, i, from, to3);
-            pal_picture_project(&g->axes, from, p);
-            pal_picture_project(&g->axes, to3, q);
-            place(page, g, p, a);
-            place(page, g, q, b);
+            pal_picture_project(&page->axes, from, p);
+            pal_picture_project(&page->axes, to3, q);
+            place(page, p, a);
+            place(page, q, b);
             if (hypot(b[0] - a[0], b[1] - a[1]) >= 40)
                 draw_arrow(to, a, b);
             else if (!halo && pal_norm3(g->p->load_N + 3 * i) > 0.05 * page->load_max_N)
@@ -444,11 +411,11 @@ static void draw_styles(FILE *to)
     fputs("</linearGradient>\n", to);
 }
 
-static void draw_axes(const panel *g, double x, double y, FILE *to)
+static void draw_axes(const sheet *page, double x, double y, FILE *to)
 {
     fputs("<g stroke=\"#555\" stroke-width=\"1.3\" font-size=\"11\">\n", to);
     for (int k = 0; k < 3; k++) {
-        double dx = 20 * g->axes.right[k], dy = -20 * g->axes.up[k], size = hypot(dx, dy);
+        double dx = 20 * page->axes.right[k], dy = -20 * page->axes.up[k], size = hypot(dx, dy);
         char name[2] = {(char)('x' + k), 0};
         if (size < 3) continue;
         fprintf(to, "<path d=\"M%.1f %.1fl%.1f %.1f\"/>\n", x, y, dx, dy);
@@ -515,7 +482,7 @@ static void draw_legend(const sheet *page, const panel *g, double y, FILE *to)
 
 static pal_err draw_panel(const sheet *page, const panel *g, FILE *to)
 {
-    double y = g->top;
+    double y = page->top;
     if (page->titled)
         pal_svg_text(to, g->left + WIDE / 2.0, MARGIN + 14, "middle", " font-size=\"15\" font-weight=\"600\"",
                      g->p->title, 50);
@@ -528,12 +495,12 @@ static pal_err draw_panel(const sheet *page, const panel *g, FILE *to)
     draw_loads(page, g, to);
     fputs("</g>\n", to);
     y += page->tall;
-    draw_axes(g, g->left + 42, y + FOOT / 2.0, to);
+    draw_axes(page, g->left + 42, y + FOOT / 2.0, to);
     if (g->ranged) draw_bar(g, g->left + 100, y + 24, WIDE - 130, to);
     return PAL_ERR_OK;
 }
 
-/* ---- the door ---- */
+/* ---- files ---- */
 
 static pal_err prepare(sheet *page)
 {
@@ -543,27 +510,24 @@ static pal_err prepare(sheet *page)
         page->titled |= p->title && p->title[0];
         page->legend |= p->fixed || p->n_load > 0 || p->rest;
         PAL_TRY(copy_mesh(g));
-        PAL_TRY(pal_picture_mesh_prepare(&g->mesh, &g->axes, PIECES_A_FILE / page->n));
-        PAL_TRY(pal_picture_pieces(&g->mesh, &g->axes, PIECES_A_FILE / page->n, &g->piece, &g->n_piece, &g->ghost,
+        PAL_TRY(pal_picture_mesh_prepare(&g->mesh, &page->axes, PIECES_A_FILE / page->n));
+        PAL_TRY(pal_picture_pieces(&g->mesh, &page->axes, PIECES_A_FILE / page->n, &g->piece, &g->n_piece, &g->ghost,
                                    &g->n_ghost));
         page->legend |= g->grey && p->value;
     }
-    for (int i = 0; i < page->n; i++) {
-        page->panel[i].left = MARGIN + i * (WIDE + MARGIN);
-        page->panel[i].top = MARGIN + (page->titled ? TITLE : 0) + (page->legend ? LEGEND : 0);
-    }
+    for (int i = 0; i < page->n; i++) page->panel[i].left = MARGIN + i * (WIDE + MARGIN);
+    page->top = MARGIN + (page->titled ? TITLE : 0) + (page->legend ? LEGEND : 0);
     return PAL_ERR_OK;
 }
 
 static pal_err draw(sheet *page, const char *path, pal_diagnostic *diag)
 {
     find_ranges(page);
-    settle_frames(page);
+    settle_frame(page);
     pal_err err = prepare(page);
     if (err) return pal_diagnostic_set(diag, err, "%s: no memory for a picture", path);
     pal_svg svg;
-    PAL_TRY(
-        pal_svg_begin(&svg, MARGIN + page->n * (WIDE + MARGIN), page->panel[0].top + page->tall + FOOT + MARGIN, diag));
+    PAL_TRY(pal_svg_begin(&svg, MARGIN + page->n * (WIDE + MARGIN), page->top + page->tall + FOOT + MARGIN, diag));
     draw_styles(svg.to);
     for (int i = 0; i < page->n && !err; i++) err = draw_panel(page, &page->panel[i], svg.to);
     if (err) {
@@ -582,17 +546,16 @@ pal_err pal_body_picture_write(const pal_body_picture *picture, int n_picture, c
     sheet *page = calloc(1, sizeof *page);
     if (!page) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for a picture", path);
     page->n = n_picture;
+    pal_picture_axes_set(&page->axes, picture[0].view);
     pal_err err = PAL_ERR_OK;
     for (int i = 0; i < n_picture && !err; i++) {
         page->panel[i].p = &picture[i];
-        pal_picture_axes_set(&page->panel[i].axes, picture[i].view, picture[i].up);
         err = check_picture(&picture[i], i, path, diag);
     }
     if (!err) err = draw(page, path, diag);
     for (int i = 0; i < n_picture; i++) {
         pal_picture_mesh_free(&page->panel[i].mesh);
-        free(page->panel[i].piece);
-        free(page->panel[i].ghost);
+        PAL_FREE(page->panel[i].piece, page->panel[i].ghost);
     }
     free(page);
     return err;

@@ -1,7 +1,7 @@
 /* Pictures of a body as SVG: a triangle surface seen from one side, without perspective, its values in the viewer's
  * colours with a colour bar, what holds it as blue dots, its loads as green arrows, the outline of its shape at rest.
- * Several pictures stand side by side in one file (paper B Fig 7, 13): those seen from the same side share their scale
- * and frame, those of the same quantity their range of colours, so that they can be compared.
+ * Several pictures stand side by side in one file (paper B Fig 7, 13): all are seen from the same side and share scale
+ * and frame, those of the same quantity share their range of colours, so that they can be compared.
  *
  * Hidden parts go by painter's order (picture_faces.h). A file stays below 1.5 MB: surfaces with more to see than
  * 16,000 triangles in all are drawn coarser. Thread: [load]. */
@@ -26,8 +26,8 @@ typedef struct pal_body_picture {
     const char *unit;        /* of the values as they are given; NULL or empty: none */
     bool log;                /* logarithmic colour map                               */
     double low, high;        /* values of the first and the last colour; low >= high: from the values */
-    double view[3];          /* from the body towards the eye; zero: from the front, right and above */
-    double up[3];            /* up on the paper; zero: z                             */
+    double view[3];          /* from the body towards the eye; zero: from the front, right and above. Read of the
+                              * first picture of a file; z is up on the paper */
     const uint8_t *fixed;    /* vertices that are held get a dot; NULL: none         [n_vertex]    */
     int n_load;              /* arrows; of more than 60 every so many are drawn      */
     const double *load_at;   /* m                                                    [n_load][3]   */

@@ -1,33 +1,29 @@
 /* From a surface to the pieces of its picture: edges with their triangles, what looks at the eye, pieces in order. */
 #include "server/figure/picture_faces.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
+#include "server/mesh/geometry/surface.h"
+#include "server/num/sort.h"
 
 enum { DIVIDE_MAX = 8, CLASSES_A_PIECE = 2 };
 static const double crease_cosine = 0.8; /* sharper than 37 degrees */
 
-/* an edge and the triangle it belongs to, corner `corner` and the next */
+/* an edge: its n sides in triangles */
 typedef struct edge {
-    int32_t low, high, tri;
-    int8_t corner;
-    int8_t turned; /* runs from high to low */
+    const pal_surface_side *side;
+    int n;
 } edge;
 
-void pal_picture_axes_set(pal_picture_axes *axes, const double eye[3], const double up[3])
+void pal_picture_axes_set(pal_picture_axes *axes, const double eye[3])
 {
-    static const double default_eye[3] = {0.5, -0.8, 0.35}, other[3][3] = {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}};
+    static const double default_eye[3] = {0.5, -0.8, 0.35}, up[2][3] = {{0, 0, 1}, {0, 1, 0}};
     double size = fmax(fabs(eye[0]), fmax(fabs(eye[1]), fabs(eye[2]))), scaled[3] = {0, 0, 0};
     if (pal_finite3(eye) && size > 0) pal_scale3(scaled, 1 / size, eye);
     if (!pal_unit3(axes->eye, scaled, 1e-9)) pal_unit3(axes->eye, default_eye, 0);
-    for (int k = -1; k < 3; k++) {
-        double side[3], try[3];
-        pal_copy3(try, k < 0 ? up : other[k]);
-        if (!pal_finite3(try) || !pal_unit3(try, try, 1e-150)) continue;
-        pal_cross3(side, try, axes->eye);
+    for (int k = 0; k < 2; k++) {
+        double side[3];
+        pal_cross3(side, up[k], axes->eye);
         if (pal_unit3(axes->right, side, 1e-6)) break;
     }
     pal_cross3(axes->up, axes->eye, axes->right);
@@ -35,20 +31,14 @@ void pal_picture_axes_set(pal_picture_axes *axes, const double eye[3], const dou
 
 void pal_picture_mesh_free(pal_picture_mesh *mesh)
 {
-    free(mesh->x);
-    free(mesh->rest);
-    free(mesh->value);
-    free(mesh->tri);
+    PAL_FREE(mesh->x, mesh->rest, mesh->value, mesh->tri);
     *mesh = (pal_picture_mesh){0};
 }
 
 /* twice the area times the normal */
 static void face_normal(const double *x, const int32_t tri[3], double normal[3])
 {
-    double a[3], b[3];
-    pal_sub3(a, x + 3 * tri[1], x + 3 * tri[0]);
-    pal_sub3(b, x + 3 * tri[2], x + 3 * tri[0]);
-    pal_cross3(normal, a, b);
+    pal_normal3(normal, x + 3 * tri[0], x + 3 * tri[1], x + 3 * tri[2]);
 }
 
 static double volume(const pal_picture_mesh *m)
@@ -74,47 +64,17 @@ static int count_seen(const pal_picture_mesh *m, const pal_picture_axes *axes)
     return n;
 }
 
-/* ---- edges ---- */
-
-static int by_ends(const void *a, const void *b)
+static pal_surface surface_of(const pal_picture_mesh *m)
 {
-    const edge *p = a, *q = b;
-    if (p->low != q->low) return p->low < q->low ? -1 : 1;
-    if (p->high != q->high) return p->high < q->high ? -1 : 1;
-    return p->tri < q->tri ? -1 : p->tri > q->tri;
-}
-
-/* [3 n_tri], those of equal ends together; NULL: no memory */
-static edge *make_edges(const pal_picture_mesh *m)
-{
-    edge *e = malloc(3 * sizeof *e * (size_t)m->n_tri);
-    if (!e) return NULL;
-    for (int t = 0; t < m->n_tri; t++)
-        for (int k = 0; k < 3; k++) {
-            int32_t a = m->tri[3 * t + k], b = m->tri[3 * t + (k + 1) % 3];
-            e[3 * t + k] = (edge){a < b ? a : b, a < b ? b : a, t, (int8_t)k, a > b};
-        }
-    qsort(e, 3 * (size_t)m->n_tri, sizeof *e, by_ends);
-    return e;
-}
-
-static int same_edge(const edge *e, int at, int n)
-{
-    int k = 1;
-    while (at + k < n && e[at + k].low == e[at].low && e[at + k].high == e[at].high) k++;
-    return k;
+    return (pal_surface){.n_vertex = m->n_vertex, .n_tri = m->n_tri, .x = m->x, .tri = m->tri};
 }
 
 static pal_err find_closed(pal_picture_mesh *m)
 {
-    edge *e = make_edges(m);
-    if (!e) return PAL_ERR_MEMORY;
-    m->closed = m->n_tri > 0;
-    for (int i = 0, k; i < 3 * m->n_tri && m->closed; i += k) {
-        k = same_edge(e, i, 3 * m->n_tri);
-        m->closed = k == 2 && e[i].turned != e[i + 1].turned;
-    }
-    free(e);
+    const pal_surface s = surface_of(m);
+    pal_surface_topology found;
+    PAL_TRY(pal_surface_check(&s, &found));
+    m->closed = found.closed && found.oriented && found.n_nonmanifold_edge == 0;
     return PAL_ERR_OK;
 }
 
@@ -128,20 +88,21 @@ typedef struct cell {
 static int by_key(const void *a, const void *b)
 {
     const cell *p = a, *q = b;
-    if (p->key != q->key) return p->key < q->key ? -1 : 1;
-    return p->vertex < q->vertex ? -1 : p->vertex > q->vertex;
+    return p->key != q->key ? PAL_COMPARE(p->key, q->key) : PAL_COMPARE(p->vertex, q->vertex);
 }
 
 /* vertices of one cell become their mean; triangles that lose a corner go */
 static pal_err join_cells(pal_picture_mesh *m, const double low[3], double size)
 {
     size_t n = (size_t)m->n_vertex;
-    cell *c = malloc(sizeof *c * n);
-    int32_t *to = malloc(sizeof *to * n);
-    if (!c || !to) {
-        free(c);
-        free(to);
-        return PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    cell *c;
+    int32_t *to;
+    PAL_ARRAY(&err, c, n);
+    PAL_ARRAY(&err, to, n);
+    if (err) {
+        PAL_FREE(c, to);
+        return err;
     }
     for (size_t i = 0; i < n; i++) {
         c[i] = (cell){0, (int32_t)i};
@@ -173,8 +134,7 @@ static pal_err join_cells(pal_picture_mesh *m, const double low[3], double size)
         m->tri[3 * kept] = a, m->tri[3 * kept + 1] = b, m->tri[3 * kept + 2] = d, kept++;
     }
     m->n_tri = kept;
-    free(c);
-    free(to);
+    PAL_FREE(c, to);
     return PAL_ERR_OK;
 }
 
@@ -189,20 +149,11 @@ pal_err pal_picture_mesh_prepare(pal_picture_mesh *m, const pal_picture_axes *ax
         }
     int seen = count_seen(m, axes);
     if (seen <= max) return PAL_ERR_OK;
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, span[3], area = 0;
-    for (int i = 0; i < m->n_vertex; i++)
-        for (int k = 0; k < 3; k++) {
-            low[k] = fmin(low[k], m->x[3 * i + k]);
-            high[k] = fmax(high[k], m->x[3 * i + k]);
-        }
-    pal_sub3(span, high, low);
-    for (int t = 0; t < m->n_tri; t++) {
-        double normal[3];
-        face_normal(m->x, m->tri + 3 * t, normal);
-        area += pal_norm3(normal) / 2;
-    }
+    double low[3], high[3];
+    const pal_surface s = surface_of(m);
+    pal_surface_box(&s, low, high);
     /* a cell that a surface crosses gives about two triangles; half of them are seen */
-    double size = fmax(sqrt(area / max) * (closed ? 0.7 : 1), 1e-6 * pal_norm3(span));
+    double size = fmax(sqrt(pal_surface_area(&s) / max) * (closed ? 0.7 : 1), 1e-6 * pal_dist3(low, high));
     for (; seen > max && size > 0; size *= 1.2) {
         PAL_TRY(join_cells(m, low, size));
         m->closed = closed; /* cells fold a closed surface but open none */
@@ -246,55 +197,61 @@ static void make_faces(const pal_picture_mesh *m, const pal_picture_axes *axes, 
     }
 }
 
-/* is the edge of these k triangles an outline of positions x seen from the eye: an end of the surface, or the border
- * between what looks at the eye and what does not? Not where joining vertices has folded the surface */
-static bool is_outline(const pal_picture_mesh *m, const double *x, const double eye[3], const edge *e, int k)
+/* the normals of the two triangles of an edge, the second reversed where both run the same way through it; false: it
+ * has not two */
+static bool edge_normals(const pal_picture_mesh *m, const double *x, const edge *e, double normal[2][3])
+{
+    if (e->n != 2) return false;
+    for (int i = 0; i < 2; i++) face_normal(x, m->tri + 3 * (e->side[i].corner / 3), normal[i]);
+    if (m->tri[e->side[0].corner] == m->tri[e->side[1].corner]) pal_scale3(normal[1], -1, normal[1]);
+    return true;
+}
+
+/* is the edge an outline of positions x seen from the eye: an end of the surface, or the border between what looks at
+ * the eye and what does not? Not where joining vertices has folded the surface */
+static bool is_outline(const pal_picture_mesh *m, const double *x, const double eye[3], const edge *e)
 {
     double normal[2][3];
-    if (k != 2) return !m->joined;
-    for (int i = 0; i < 2; i++) face_normal(x, m->tri + 3 * e[i].tri, normal[i]);
-    if (e[0].turned == e[1].turned) pal_scale3(normal[1], -1, normal[1]);
+    if (!edge_normals(m, x, e, normal)) return !m->joined;
     bool folded = pal_dot3(normal[0], normal[1]) < -0.3 * pal_norm3(normal[0]) * pal_norm3(normal[1]);
     return (pal_dot3(normal[0], eye) > 0) != (pal_dot3(normal[1], eye) > 0) && !(m->joined && folded);
 }
 
-static bool is_crease(const pal_picture_mesh *m, const edge *e, int k)
+static bool is_crease(const pal_picture_mesh *m, const edge *e)
 {
     double normal[2][3];
-    if (k != 2 || m->joined) return false;
-    for (int i = 0; i < 2; i++) {
-        face_normal(m->x, m->tri + 3 * e[i].tri, normal[i]);
-        if (!pal_unit3(normal[i], normal[i], 0)) return false;
-    }
-    double cosine = pal_dot3(normal[0], normal[1]);
-    return (e[0].turned == e[1].turned ? -cosine : cosine) < crease_cosine;
+    if (m->joined || !edge_normals(m, m->x, e, normal)) return false;
+    if (!pal_unit3(normal[0], normal[0], 0) || !pal_unit3(normal[1], normal[1], 0)) return false;
+    return pal_dot3(normal[0], normal[1]) < crease_cosine;
 }
 
 static pal_err mark_edges(const pal_picture_mesh *m, const pal_picture_axes *axes, face *f, pal_picture_line **ghost,
                           int *n_ghost)
 {
-    int n = 3 * m->n_tri;
-    edge *e = make_edges(m);
-    *ghost = m->rest ? malloc(sizeof **ghost * (size_t)n) : NULL;
-    if (!e || (m->rest && !*ghost)) {
-        free(e);
-        return PAL_ERR_MEMORY;
-    }
-    for (int i = 0, k; i < n; i += k) {
-        k = same_edge(e, i, n);
-        bool outline = is_outline(m, m->x, axes->eye, e + i, k), crease = !outline && is_crease(m, e + i, k);
-        for (int j = i; j < i + k; j++) {
-            if (outline) f[e[j].tri].outline |= (uint8_t)(1 << e[j].corner);
-            if (crease) f[e[j].tri].crease |= (uint8_t)(1 << e[j].corner);
+    const pal_surface s = surface_of(m);
+    int32_t *start;
+    pal_surface_side *side;
+    PAL_TRY(pal_surface_sides(&s, &start, &side));
+    pal_err err = PAL_ERR_OK;
+    if (m->rest) PAL_ARRAY(&err, *ghost, 3 * m->n_tri);
+    for (int32_t v = 0; v < m->n_vertex && !err; v++)
+        for (int32_t i = start[v], end = i; i < start[v + 1]; i = end) {
+            while (end < start[v + 1] && side[end].high == side[i].high) end++;
+            const edge e = {side + i, end - i};
+            bool outline = is_outline(m, m->x, axes->eye, &e), crease = !outline && is_crease(m, &e);
+            for (int k = i; k < end; k++) {
+                uint8_t bit = (uint8_t)(1 << side[k].corner % 3);
+                if (outline) f[side[k].corner / 3].outline |= bit;
+                if (crease) f[side[k].corner / 3].crease |= bit;
+            }
+            if (!m->rest || !is_outline(m, m->rest, axes->eye, &e)) continue;
+            double a[3], b[3];
+            pal_picture_project(axes, m->rest + 3 * v, a);
+            pal_picture_project(axes, m->rest + 3 * side[i].high, b);
+            (*ghost)[(*n_ghost)++] = (pal_picture_line){{a[0], a[1]}, {b[0], b[1]}};
         }
-        if (!m->rest || !is_outline(m, m->rest, axes->eye, e + i, k)) continue;
-        double a[3], b[3];
-        pal_picture_project(axes, m->rest + 3 * e[i].low, a);
-        pal_picture_project(axes, m->rest + 3 * e[i].high, b);
-        (*ghost)[(*n_ghost)++] = (pal_picture_line){{a[0], a[1]}, {b[0], b[1]}};
-    }
-    free(e);
-    return PAL_ERR_OK;
+    PAL_FREE(start, side);
+    return err;
 }
 
 /* parts of each edge, so that a part spans few colours */
@@ -343,8 +300,7 @@ static int put_face(const face *f, int parts, pal_picture_piece *out)
 static int by_depth(const void *a, const void *b)
 {
     const pal_picture_piece *p = a, *q = b;
-    if (p->depth != q->depth) return p->depth < q->depth ? -1 : 1;
-    return memcmp(p->at, q->at, sizeof p->at);
+    return p->depth != q->depth ? PAL_COMPARE(p->depth, q->depth) : memcmp(p->at, q->at, sizeof p->at);
 }
 
 pal_err pal_picture_pieces(const pal_picture_mesh *m, const pal_picture_axes *axes, int max, pal_picture_piece **piece,
@@ -352,10 +308,12 @@ pal_err pal_picture_pieces(const pal_picture_mesh *m, const pal_picture_axes *ax
 {
     *piece = NULL, *ghost = NULL;
     *n_piece = *n_ghost = 0;
-    face *f = malloc(sizeof *f * (size_t)(m->n_tri > 0 ? m->n_tri : 1));
-    if (!f) return PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    face *f;
+    PAL_ARRAY(&err, f, m->n_tri);
+    if (err) return err;
     make_faces(m, axes, f);
-    pal_err err = mark_edges(m, axes, f, ghost, n_ghost);
+    err = mark_edges(m, axes, f, ghost, n_ghost);
     int parts = DIVIDE_MAX + 1;
     long long n;
     do {
@@ -365,8 +323,7 @@ pal_err pal_picture_pieces(const pal_picture_mesh *m, const pal_picture_axes *ax
             n += d * d;
         }
     } while (n > max && parts > 1);
-    if (!err) *piece = malloc(sizeof **piece * (size_t)(n > 0 ? n : 1));
-    if (!err && !*piece) err = PAL_ERR_MEMORY;
+    PAL_ARRAY(&err, *piece, n);
     for (int t = 0; t < m->n_tri && !err; t++)
         if (f[t].seen) *n_piece += put_face(&f[t], divisions(&f[t], parts), *piece + *n_piece);
     if (!err) qsort(*piece, (size_t)*n_piece, sizeof **piece, by_depth);

@@ -14,8 +14,8 @@ enum { PAL_PICTURE_CLASSES = 64, PAL_PICTURE_SHADES = 16, PAL_PICTURE_GREY = -1 
 typedef struct pal_picture_axes {
     double right[3], up[3], eye[3];
 } pal_picture_axes;
-/* from the direction of the eye and the one that is up (taken as good as they allow) */
-void pal_picture_axes_set(pal_picture_axes *axes, const double eye[3], const double up[3]);
+/* From the direction of the eye (zero or not finite: a default); z is up, or y for an eye on the z axis. */
+void pal_picture_axes_set(pal_picture_axes *axes, const double eye[3]);
 static inline void pal_picture_project(const pal_picture_axes *a, const double x[3], double out[3])
 {
     const double *const row[3] = {a->right, a->up, a->eye};
@@ -32,7 +32,7 @@ typedef struct pal_picture_mesh {
     bool joined;      /* drawn coarser than it is: edges of folds are no outlines */
 } pal_picture_mesh;
 void pal_picture_mesh_free(pal_picture_mesh *mesh);
-/* joins vertices within cells until at most `most` triangles can be seen; finds closed and turns what is inside out */
+/* joins vertices within cells until at most `max` triangles can be seen; finds closed and turns what is inside out */
 pal_err pal_picture_mesh_prepare(pal_picture_mesh *mesh, const pal_picture_axes *axes, int max);
 
 typedef struct pal_picture_piece { /* a part of a triangle, of one colour */
@@ -45,7 +45,7 @@ typedef struct pal_picture_piece { /* a part of a triangle, of one colour */
 typedef struct pal_picture_line {
     double from[2], to[2];
 } pal_picture_line;
-/* *piece: heap, far to near, at most `most` unless the mesh itself has more to see; triangles whose corners are some
+/* *piece: heap, far to near, at most `max` unless the mesh itself has more to see; triangles whose corners are some
  * classes apart are divided. *ghost: heap, the outline of the rest shape, none without. MEMORY */
 pal_err pal_picture_pieces(const pal_picture_mesh *mesh, const pal_picture_axes *axes, int max,
                            pal_picture_piece **piece, int *n_piece, pal_picture_line **ghost, int *n_ghost);

@@ -2,8 +2,6 @@
  * order. A label goes to the first of some places around its point where it meets nothing that was drawn. */
 #include "server/figure/plot.h"
 
-#include "server/mesh/files/file_bytes.h"
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -53,27 +51,12 @@ static void settle(axis *a)
     a->low = step * floor(a->low / step + 1e-9), a->high = step * ceil(a->high / step - 1e-9);
 }
 
-static int ticks(const axis *a, double value[PAL_SVG_TICKS])
-{
-    return a->log ? pal_svg_log_ticks(a->low, a->high, value) : pal_svg_ticks(a->low, a->high, a->step, value);
-}
-
-static void label(FILE *to, double x, double y, const char *anchor, const char *more, const char *text)
-{
-    pal_svg_text(to, x, y, anchor, more, text, 0);
-}
-
 /* number of the curve's colour: dark ones do not count */
 static int colour_of(const pal_plot *plot, int k)
 {
     int number = 0;
     for (int i = 0; i < k; i++) number += !plot->curve[i].ink;
     return number;
-}
-
-static const char *ink_of(const pal_plot *plot, int k)
-{
-    return plot->curve[k].ink ? "#222" : colour[colour_of(plot, k) % N_COLOUR];
 }
 
 static int wide_of(const pal_plot *plot)
@@ -88,38 +71,30 @@ static int high_of(const pal_plot *plot)
 
 static void draw_axes(FILE *to, const pal_plot *plot, const axis *x, const axis *y)
 {
-    double value[PAL_SVG_TICKS];
-    char text[32];
-    int n = ticks(x, value);
-    for (int i = 0; i < n; i++) {
-        double p = place(x, value[i]);
-        fprintf(to, "<path d=\"M%.1f %.1fV%.1f\" stroke=\"#ddd\"/>\n", p, y->from, y->to);
-        snprintf(text, sizeof text, "%g", value[i]);
-        label(to, p, y->from + 18, "middle", "", text);
-    }
-    n = ticks(y, value);
-    for (int i = 0; i < n; i++) {
-        double p = place(y, value[i]);
-        fprintf(to, "<path d=\"M%.1f %.1fH%.1f\" stroke=\"#ddd\"/>\n", x->from, p, x->to);
-        snprintf(text, sizeof text, "%g", value[i]);
-        label(to, x->from - 8, p + 4, "end", "", text);
+    for (int vertical = 0; vertical < 2; vertical++) {
+        double value[PAL_SVG_TICKS];
+        const axis *a = vertical ? y : x;
+        int n = a->log ? pal_svg_log_ticks(a->low, a->high, value) : pal_svg_ticks(a->low, a->high, a->step, value);
+        for (int i = 0; i < n; i++) {
+            char text[32];
+            double p = place(a, value[i]);
+            snprintf(text, sizeof text, "%g", value[i]);
+            if (vertical) {
+                fprintf(to, "<path d=\"M%.1f %.1fH%.1f\" stroke=\"#ddd\"/>\n", x->from, p, x->to);
+                pal_svg_text(to, x->from - 8, p + 4, "end", "", text, 0);
+            } else {
+                fprintf(to, "<path d=\"M%.1f %.1fV%.1f\" stroke=\"#ddd\"/>\n", p, y->from, y->to);
+                pal_svg_text(to, p, y->from + 18, "middle", "", text, 0);
+            }
+        }
     }
     fprintf(to, "<rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" fill=\"none\" stroke=\"#333\"/>\n", x->from,
             y->to, x->to - x->from, y->from - y->to);
-    label(to, (x->from + x->to) / 2, high_of(plot) - 16, "middle", "", plot->x_label);
+    pal_svg_text(to, (x->from + x->to) / 2, high_of(plot) - 16, "middle", "", plot->x_label, 0);
     char more[64];
     snprintf(more, sizeof more, " transform=\"rotate(-90 22 %d)\"", (TOP + high_of(plot) - BOTTOM) / 2);
-    label(to, 22, (TOP + high_of(plot) - BOTTOM) / 2.0, "middle", more, plot->y_label);
-    label(to, (x->from + x->to) / 2, 26, "middle", " font-size=\"16\" font-weight=\"600\"", plot->title);
-}
-
-static void escape(FILE *to, const char *text)
-{
-    for (; *text; text++)
-        if (*text == '<' || *text == '>' || *text == '&')
-            fprintf(to, "&#%d;", *text);
-        else
-            fputc(*text, to);
+    pal_svg_text(to, 22, (TOP + high_of(plot) - BOTTOM) / 2.0, "middle", more, plot->y_label, 0);
+    pal_svg_text(to, (x->from + x->to) / 2, 26, "middle", " font-size=\"16\" font-weight=\"600\"", plot->title, 0);
 }
 
 /* tip NULL: none */
@@ -146,7 +121,7 @@ static void mark(FILE *to, int kind, bool hollow, const char *ink, double x, dou
         return;
     }
     fputs("><title>", to);
-    escape(to, tip);
+    pal_svg_escape(to, tip, strlen(tip));
     fprintf(to, "</title></%s>\n", tag[kind]);
 }
 
@@ -154,8 +129,8 @@ static void draw_curve(FILE *to, const pal_plot *plot, int k, const axis *x, con
 {
     const pal_curve *c = &plot->curve[k];
     const char *dash = c->dashed ? " stroke-dasharray=\"6 4\"" : "";
-    const char *width = c->thin ? "0.8\" stroke-opacity=\"0.6" : "2", *ink = ink_of(plot, k);
     int kind = colour_of(plot, k);
+    const char *width = c->thin ? "0.8\" stroke-opacity=\"0.6" : "2", *ink = c->ink ? "#222" : colour[kind % N_COLOUR];
     if (!c->dots) fprintf(to, "<path fill=\"none\" stroke-width=\"%s\" stroke=\"%s\"%s d=\"", width, ink, dash);
     bool pen = false;
     for (int i = 0; i < c->n && !c->dots; i++) {
@@ -171,7 +146,7 @@ static void draw_curve(FILE *to, const pal_plot *plot, int k, const axis *x, con
     if (!c->dots)
         fprintf(to, "<path stroke-width=\"%s\" stroke=\"%s\"%s d=\"M%.1f %.1fh28\"/>\n", width, ink, dash, from, at);
     if (!c->bare) mark(to, kind, c->hollow, ink, from + 14, at, NULL);
-    label(to, from + 36, at + 4, "start", "", c->name);
+    pal_svg_text(to, from + 36, at + 4, "start", "", c->name, 0);
 }
 
 /* ---- guides and labels ---- */
@@ -222,13 +197,13 @@ static void draw_guides(FILE *to, const pal_plot *plot, const axis *x, const axi
             /* the text on that side of the line which has the room */
             double from = at + 6 + wide < x->to ? at + 6 : at - 6 - wide;
             fprintf(to, "<path d=\"M%.1f %.1fV%.1f\" %s/>\n", at, y->from, y->to, dash);
-            label(to, from, y->to + 14, "start", small_text, g->text);
+            pal_svg_text(to, from, y->to + 14, "start", small_text, g->text, 0);
             take(all, box_of(from, y->to + 14, g->text));
             take(all, (box){{at - 1, y->to}, {at + 1, y->from}});
         } else {
             fprintf(to, "<path d=\"M%.1f %.1fH%.1f\" %s/>\n", x->from, at, x->to, dash);
             double base = at - 5 - 10 > y->to ? at - 5 : at + 13;
-            label(to, x->from + 6, base, "start", small_text, g->text);
+            pal_svg_text(to, x->from + 6, base, "start", small_text, g->text, 0);
             take(all, box_of(x->from + 6, base, g->text));
             take(all, (box){{x->from, at - 1}, {x->to, at + 1}});
         }
@@ -255,9 +230,9 @@ static void draw_label(FILE *to, const pal_plot_label *l, const axis *x, const a
                         ay);
             /* left of its point it ends there: the width is a guess */
             if (side[k][0] < 0)
-                label(to, ax, base, "end", small_text, l->text);
+                pal_svg_text(to, ax, base, "end", small_text, l->text, 0);
             else
-                label(to, from, base, "start", small_text, l->text);
+                pal_svg_text(to, from, base, "start", small_text, l->text, 0);
             return;
         }
 }
@@ -309,46 +284,46 @@ static bool find_range(const pal_plot *plot, axis *x, axis *y)
         for (int i = 0; i < plot->curve[k].n; i++) {
             const pal_curve *c = &plot->curve[k];
             if (!drawable(plot, c, i)) continue;
-            double sx = scaled(x, c->x[i]), sy = scaled(y, c->y[i]);
-            x->low = any ? fmin(x->low, sx) : sx, x->high = any ? fmax(x->high, sx) : sx;
-            y->low = any ? fmin(y->low, sy) : sy, y->high = any ? fmax(y->high, sy) : sy;
+            reach(x, c->x[i]);
+            reach(y, c->y[i]);
             any = true;
         }
+    for (int k = 0; k < plot->n_guide; k++) reach(plot->guide[k].vertical ? x : y, plot->guide[k].at);
     return any;
 }
 
-pal_err pal_plot_text(const pal_plot *plot, char **text, size_t *n_byte, pal_diagnostic *diag)
+static pal_err draw(const pal_plot *plot, pal_svg *svg, pal_diagnostic *diag)
 {
-    axis x = {.log = plot->log_x, .from = LEFT, .to = wide_of(plot) - RIGHT};
-    axis y = {.log = plot->log_y, .from = high_of(plot) - BOTTOM, .to = TOP};
+    axis x = {.log = plot->log_x, .low = INFINITY, .high = -INFINITY, .from = LEFT, .to = wide_of(plot) - RIGHT};
+    axis y = {.log = plot->log_y, .low = INFINITY, .high = -INFINITY, .from = high_of(plot) - BOTTOM, .to = TOP};
     if (!find_range(plot, &x, &y)) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is no point to draw");
-    for (int k = 0; k < plot->n_guide; k++) reach(plot->guide[k].vertical ? &x : &y, plot->guide[k].at);
     settle(&x);
     settle(&y);
     boxes *taken = calloc(1, sizeof *taken);
     if (!taken) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a drawing");
-    pal_svg svg;
-    pal_err err = pal_svg_begin(&svg, wide_of(plot), high_of(plot), diag);
+    pal_err err = pal_svg_begin(svg, wide_of(plot), high_of(plot), diag);
     if (!err) {
-        FILE *to = svg.to;
+        FILE *to = svg->to;
         draw_axes(to, plot, &x, &y);
         draw_guides(to, plot, &x, &y, taken);
         for (int k = 0; k < plot->n_curve; k++) draw_curve(to, plot, k, &x, &y);
         draw_labels(to, plot, &x, &y, taken);
-        err = pal_svg_end_text(&svg, text, n_byte, diag);
     }
     free(taken);
     return err;
 }
 
+pal_err pal_plot_text(const pal_plot *plot, char **text, size_t *n_byte, pal_diagnostic *diag)
+{
+    pal_svg svg;
+    PAL_TRY(draw(plot, &svg, diag));
+    return pal_svg_end_text(&svg, text, n_byte, diag);
+}
+
 pal_err pal_plot_write(const pal_plot *plot, const char *path, pal_diagnostic *diag)
 {
-    char *text = NULL;
-    size_t n_byte = 0;
+    pal_svg svg;
     pal_diagnostic reason = {""};
-    pal_err err = pal_plot_text(plot, &text, &n_byte, &reason);
-    if (err) return pal_diagnostic_set(diag, err, "%s: %s", path, reason.text);
-    err = pal_file_write(path, text, n_byte, diag);
-    free(text);
-    return err;
+    pal_err err = draw(plot, &svg, &reason);
+    return err ? pal_diagnostic_set(diag, err, "%s: %s", path, reason.text) : pal_svg_end(&svg, path, diag);
 }

@@ -46,14 +46,17 @@ pal_err pal_svg_end(pal_svg *svg, const char *path, pal_diagnostic *diag)
     return err;
 }
 
-static void put_character(FILE *to, const char *c, int n)
+void pal_svg_escape(FILE *to, const char *text, size_t n_byte)
 {
-    if (n == 1 && *c == '<')
-        fputs("&lt;", to);
-    else if (n == 1 && *c == '&')
-        fputs("&amp;", to);
-    else
-        fwrite(c, 1, (size_t)n, to);
+    for (; n_byte > 0; text++, n_byte--)
+        if (*text == '<')
+            fputs("&lt;", to);
+        else if (*text == '&')
+            fputs("&amp;", to);
+        else if (*text == '"')
+            fputs("&quot;", to);
+        else
+            fputc(*text, to);
 }
 
 void pal_svg_text(FILE *to, double x, double y, const char *anchor, const char *more, const char *text, int max)
@@ -68,7 +71,7 @@ void pal_svg_text(FILE *to, double x, double y, const char *anchor, const char *
             fputs("\u2026", to);
             break;
         }
-        put_character(to, shown ? text + at : "?", shown ? n : 1);
+        pal_svg_escape(to, shown ? text + at : "?", shown ? (size_t)n : 1);
         at += (size_t)(n > 0 ? n : 1);
     }
     fputs("</text>\n", to);

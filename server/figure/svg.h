@@ -19,11 +19,13 @@ pal_err pal_svg_end(pal_svg *svg, const char *path, pal_diagnostic *diag);
 /* ends it as text, which the caller frees; MEMORY */
 pal_err pal_svg_end_text(pal_svg *svg, char **text, size_t *n_byte, pal_diagnostic *diag);
 
-/* a text element; anchor: start, middle or end; more: further attributes, each after a blank; at most `most`
+/* n bytes of text with the characters that end an element or an attribute escaped; also for pages */
+void pal_svg_escape(FILE *to, const char *text, size_t n_byte);
+/* a text element; anchor: start, middle or end; more: further attributes, each after a blank; at most `max`
  * characters, then an ellipsis (0: all). NULL text is empty; bytes that are no shown UTF-8 become question marks */
 void pal_svg_text(FILE *to, double x, double y, const char *anchor, const char *more, const char *text, int max);
 
-/* 1, 2 or 5 times a power of ten, so that span holds at most `most` of them */
+/* 1, 2 or 5 times a power of ten, so that span holds at most `max` of them */
 double pal_svg_step(double span, int max);
 /* the multiples of step from low to high, at most PAL_SVG_TICKS; returns how many */
 int pal_svg_ticks(double low, double high, double step, double value[PAL_SVG_TICKS]);

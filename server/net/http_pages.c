@@ -46,7 +46,7 @@ static void get_health(pal_hub *hub, pal_reply *reply)
     if (all_alive(hub))
         reply_text(reply, 200, "text/plain; charset=utf-8", "ok\n", 3);
     else
-        reply_text(reply, 503, "text/plain; charset=utf-8", "a simulation stands\n", 20);
+        reply_text(reply, 503, "text/plain; charset=utf-8", "a simulation has stalled\n", 25);
 }
 
 /* assets are built before the first request */
@@ -94,7 +94,7 @@ static void one(page *p, const char *name, const char *type, const char *about, 
 
 static void add_sessions(page *p, const pal_hub *hub)
 {
-    double step_s = 0, late = 0, encode_s = 0, n_encode = 0, frame_byte = 0, patch_byte = 0;
+    double step_s = 0, late = 0, encode_s = 0, n_encode = 0, frame_byte = 0, delta_byte = 0;
     int role[3] = {0, 0, 0};
     for (int r = 0; r < hub->n_room; r++) {
         const pal_hub_room *room = &hub->room[r];
@@ -106,7 +106,7 @@ static void add_sessions(page *p, const pal_hub *hub)
         encode_s += (double)s->count.encode_ns * 1e-9;
         n_encode += (double)s->count.n_encode;
         frame_byte += (double)s->count.n_frame_byte;
-        for (int i = 0; i < s->n_part; i++) patch_byte += s->part[i].places ? (double)s->part[i].places->n_byte : 0;
+        for (int i = 0; i < s->n_part; i++) delta_byte += s->part[i].slots ? (double)s->part[i].slots->n_byte : 0;
     }
     one(p, "palpate_sessions", "gauge", "Sessions of this process.", hub->n_room);
     help(p, "palpate_clients", "gauge", "Members by role.");
@@ -117,7 +117,7 @@ static void add_sessions(page *p, const pal_hub *hub)
     one(p, "palpate_encode_seconds_total", "counter", "Time spent on encoding frames.", encode_s);
     one(p, "palpate_encodes_total", "counter", "Frames encoded.", n_encode);
     one(p, "palpate_frame_bytes_total", "counter", "Bytes of frames that differed from the one before.", frame_byte);
-    one(p, "palpate_patch_bytes_total", "counter", "Bytes of patches of triangles, each counted once.", patch_byte);
+    one(p, "palpate_topology_delta_bytes_total", "counter", "Bytes of topology deltas, each counted once.", delta_byte);
 }
 
 static void get_metrics(pal_hub *hub, pal_reply *reply)
@@ -128,18 +128,18 @@ static void get_metrics(pal_hub *hub, pal_reply *reply)
     help(&p, "palpate_build_info", "gauge", "Version of this program.");
     add(&p, "palpate_build_info{version=\"%s\"} 1\n", PAL_VERSION);
     add_sessions(&p, hub);
-    one(&p, "palpate_frames_sent_total", "counter", "Frames handed to clients.", (double)n->n_frame);
-    one(&p, "palpate_fields_sent_total", "counter", "Fields in colour handed to clients.", (double)n->n_field);
-    one(&p, "palpate_patches_sent_total", "counter", "Patches of triangles handed to clients.", (double)n->n_patch);
-    help(&p, "palpate_frames_skipped_total", "counter", "Cycles that clients have not been sent.");
+    one(&p, "palpate_frames_sent_total", "counter", "Frames sent to clients.", (double)n->n_frame);
+    one(&p, "palpate_fields_sent_total", "counter", "Fields sent to clients.", (double)n->n_field);
+    one(&p, "palpate_topology_deltas_sent_total", "counter", "Topology deltas sent to clients.", (double)n->n_delta);
+    help(&p, "palpate_frames_skipped_total", "counter", "Cycles not sent to clients.");
     add(&p, "palpate_frames_skipped_total{reason=\"credit\"} %llu\n", (unsigned long long)n->n_skipped);
-    one(&p, "palpate_send_bytes_total", "counter", "Bytes of messages handed to clients.", (double)n->n_byte);
+    one(&p, "palpate_send_bytes_total", "counter", "Bytes of messages sent to clients.", (double)n->n_byte);
     one(&p, "palpate_packet_bytes", "gauge", "Bytes of messages and files held.", (double)pal_packet_total());
     help(&p, "palpate_inputs_total", "counter", "Messages of clients.");
     add(&p, "palpate_inputs_total{kind=\"pose\"} %llu\n", (unsigned long long)n->n_pose);
     add(&p, "palpate_inputs_total{kind=\"ack\"} %llu\n", (unsigned long long)n->n_ack);
     add(&p, "palpate_inputs_total{kind=\"control\"} %llu\n", (unsigned long long)n->n_control);
-    help(&p, "palpate_inputs_rejected_total", "counter", "Messages of clients that were not taken.");
+    help(&p, "palpate_inputs_rejected_total", "counter", "Messages of clients that were rejected.");
     const struct {
         const char *reason;
         uint64_t n;

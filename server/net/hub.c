@@ -10,17 +10,13 @@
 #include "server/net/hub_peers.h"
 #include "server/net/hub_plan.h"
 #include "server/net/hub_subscriptions.h"
+#include "server/net/hub_verb.h"
 #include "server/net/transport/plain_text.h"
-#include "server/net/verb_table.h"
+#include "server/net/tuning.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define JOIN_NS        5000000000u
-#define STALL_NS       10000000000u
-#define TIER_WINDOW_NS 2000000000u
-#define TIER_CLEAN_NS  10000000000u
 
 /* ---- sending ---- */
 
@@ -40,9 +36,7 @@ static bool client_waiting(void *user, const pal_peer *peer)
 
 static pal_packet *members_message(pal_hub *hub, const pal_hub_room *room)
 {
-    pal_wire_members *m = &hub->control->members;
-    memset(hub->control, 0, sizeof *hub->control);
-    hub->control->type = PAL_CONTROL_MEMBERS;
+    pal_wire_members *m = &pal_hub_message(hub, PAL_CONTROL_MEMBERS)->members;
     for (int i = 0; i < PAL_MEMBER_LIST_MAX; i++) {
         const pal_member_entry *from = &room->members.member[i];
         if (!from->id) continue;
@@ -63,10 +57,8 @@ static pal_packet *status_message(pal_hub *hub, pal_client *c)
     const pal_frame *f = s->frame;
     if (!f && s->cycle) return NULL;
     uint64_t now = pal_loop_now_ns(hub->loop);
-    pal_wire_status *w = &hub->control->status;
+    pal_wire_status *w = &pal_hub_message(hub, PAL_CONTROL_STATUS)->status;
     pal_diagnostic diag = {""};
-    memset(hub->control, 0, sizeof *hub->control);
-    hub->control->type = PAL_CONTROL_STATUS;
     w->n_member = (uint32_t)c->room->members.n_member;
     w->rtt_ms = c->credit.rtt_s * 1e3;
     w->n_skipped = (uint32_t)c->n_skipped;
@@ -89,7 +81,7 @@ static pal_packet *status_message(pal_hub *hub, pal_client *c)
         for (int r = 0; r < f->n_row; r++) w->component_ms[r] = s->component_ms[r];
         pal_hub_status_plan(c->room, f, w);
         for (int p = 0; p < s->n_part; p++)
-            if (s->part[p].places)
+            if (s->part[p].slots)
                 w->active[w->n_active++] =
                     (pal_wire_active){(uint32_t)p, (uint32_t)f->part[p].n_active, (uint32_t)f->part[p].n_spring,
                                       (uint32_t)f->part[p].n_finest, (uint32_t)f->part[p].n_finest_spring};
@@ -100,17 +92,17 @@ static pal_packet *status_message(pal_hub *hub, pal_client *c)
 }
 
 /* queues the TOPOLOGY_DELTA for the newest frame of a part; false: not available now, so the frame waits too */
-static bool add_patch(pal_hub *hub, pal_client *c, int p)
+static bool add_topology_delta(pal_hub *hub, pal_client *c, int p)
 {
     const pal_stream_part *part = &c->room->stream->part[p];
-    if (!c->topology_deltas || !part->places || c->sent_change[p] == part->places->change) return true;
-    pal_packet *packet = part->frame_change[c->tier] == part->places->change
-                             ? pal_triangle_slots_delta(part->places, c->sent_change[p])
+    if (!c->topology_deltas || !part->slots || c->sent_change[p] == part->slots->change) return true;
+    pal_packet *packet = part->frame_change[c->tier] == part->slots->change
+                             ? pal_triangle_slots_delta(part->slots, c->sent_change[p])
                              : NULL;
     if (!packet) return false;
     c->out[c->n_out++] = packet;
-    c->sent_change[p] = part->places->change;
-    hub->count.n_patch++;
+    c->sent_change[p] = part->slots->change;
+    hub->count.n_delta++;
     return true;
 }
 
@@ -122,7 +114,7 @@ static void begin_cycle(pal_hub *hub, pal_client *c)
     for (int p = 0; p < s->n_part; p++) {
         const pal_stream_part *part = &s->part[p];
         if (!part->frame[c->tier] || (int32_t)(part->frame_seq[c->tier] - c->sent_frame[p]) <= 0) continue;
-        if (!add_patch(hub, c, p)) continue;
+        if (!add_topology_delta(hub, c, p)) continue;
         c->out[c->n_out++] = pal_packet_hold(part->frame[c->tier]);
         c->sent_frame[p] = part->frame_seq[c->tier];
         hub->count.n_frame++;
@@ -214,8 +206,7 @@ static void client_opened(void *user, pal_peer *peer, const char *session)
     c->peer = peer;
     c->room = room;
     c->opened_ns = now;
-    /* 600 per second, as in the protocol; a depth of half a second, so that a delay of the server closes no client */
-    pal_bucket_begin(&c->bucket, 600, 300, now);
+    pal_bucket_begin(&c->bucket, PAL_MESSAGES_1_S, PAL_MESSAGES_1_S / 2, now);
     pal_credit_begin(&c->credit, pal_stream_rate_hz(room->stream));
     peer->client = c;
     hub->n_client++;
@@ -252,12 +243,12 @@ static void hub_wake(void *user)
     uint64_t now = pal_loop_now_ns(hub->loop), apart = (uint64_t)(0.9e9 / PAL_STREAM_RATE_HZ), due = 0;
     for (int r = 0; r < hub->n_room; r++) {
         pal_hub_room *room = &hub->room[r];
-        bool used[PAL_STREAM_TIER];
+        bool used[PAL_STREAM_TIER_COUNT];
         uint64_t next = room->stream->cycle ? room->stream->cycle_ns + apart : now;
         if (now < next) {
             if (!due || next < due) due = next;
         } else {
-            for (int t = 0; t < PAL_STREAM_TIER; t++) used[t] = room->tier_users[t] > 0;
+            for (int t = 0; t < PAL_STREAM_TIER_COUNT; t++) used[t] = room->tier_users[t] > 0;
             if (pal_stream_update(room->stream, now, used, room->tool)) offer_cycle(hub, room);
         }
         next = pal_hub_make_fields(hub, room, now);
@@ -281,7 +272,7 @@ static void set_tier(pal_client *client, int tier)
 /* more than a quarter of the cycles skipped for 2 s: coarser frames; 10 s without a skip: finer ones */
 static void judge_tier(pal_client *c, uint64_t now)
 {
-    if (now - c->tier_ns < TIER_WINDOW_NS) return;
+    if (now - c->tier_ns < PAL_TIER_WINDOW_NS) return;
     uint64_t sent = c->n_cycle - c->tier_cycle, skipped = c->n_skipped - c->tier_skipped;
     bool first = c->tier_ns == 0;
     c->tier_ns = now;
@@ -289,9 +280,9 @@ static void judge_tier(pal_client *c, uint64_t now)
     c->tier_skipped = c->n_skipped;
     if (first || skipped > 0) c->clean_ns = now;
     if (first) return;
-    if (4 * skipped > sent + skipped && c->tier + 1 < PAL_STREAM_TIER)
+    if (4 * skipped > sent + skipped && c->tier + 1 < PAL_STREAM_TIER_COUNT)
         set_tier(c, c->tier + 1);
-    else if (c->tier > 0 && now - c->clean_ns >= TIER_CLEAN_NS) {
+    else if (c->tier > 0 && now - c->clean_ns >= PAL_TIER_CLEAN_NS) {
         set_tier(c, c->tier - 1);
         c->clean_ns = now;
     }
@@ -311,10 +302,10 @@ static void hub_tick(void *user)
         pal_client *c = &hub->client[i];
         if (!c->peer || c->peer->drop_code) continue;
         if (!c->id) {
-            if (now - c->opened_ns > JOIN_NS) pal_hub_drop(hub, c, PAL_WIRE_CLOSE_POLICY, "no join within 5 s");
+            if (now - c->opened_ns > PAL_ANSWER_NS) pal_hub_drop(hub, c, PAL_WIRE_CLOSE_POLICY, "no join within 5 s");
             continue;
         }
-        if (pal_credit_stalled(&c->credit, now, STALL_NS)) {
+        if (pal_credit_stalled(&c->credit, now, PAL_STALL_NS)) {
             hub->count.n_stalled++;
             pal_hub_drop(hub, c, PAL_WIRE_CLOSE_STALLED, "no acknowledgement for 10 s");
             continue;
@@ -327,19 +318,19 @@ static void hub_tick(void *user)
     }
 }
 
-pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_session **session, int n_session,
-                       pal_diagnostic *diag, pal_hub **out)
+pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_site *site, pal_session **session,
+                       int n_session, pal_diagnostic *diag, pal_hub **out)
 {
     pal_hub *hub = calloc(1, sizeof *hub);
     pal_err err = PAL_ERR_OK;
     if (!hub) return PAL_ERR_MEMORY;
     hub->loop = loop;
-    hub->site = options->site;
+    hub->site = site;
     hub->session = session;
     hub->error_m = options->error_m;
     hub->verb = options->verb ? options->verb : pal_verb_table;
     hub->n_verb = options->verb ? options->n_verb : pal_verb_count;
-    hub->max_clients = options->max_clients > 0 ? options->max_clients : 200;
+    hub->max_clients = options->max_clients > 0 ? options->max_clients : PAL_HUB_CLIENTS;
     hub->room = calloc((size_t)n_session, sizeof *hub->room);
     hub->client = calloc((size_t)hub->max_clients, sizeof *hub->client);
     hub->control = malloc(sizeof *hub->control);
@@ -350,14 +341,9 @@ pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_sessi
         const pal_scene *scene = pal_session_scene(session[i]);
         room->session = session[i];
         room->step_s = scene->step_s;
-        room->reference_m = NAN;
         pal_members_init(&room->members, scene->n_tool);
         for (int b = 0; b < scene->n_body; b++) room->material[b] = scene->body[b].material;
-        if (options->setting && options->n_configuration[i] > 0) {
-            room->setting = options->setting[i];
-            room->n_configuration = options->n_configuration[i], room->setting_body = options->setting_body[i];
-            if (options->reference_m) room->reference_m = options->reference_m[i];
-        }
+        if (options->study && options->study[i].n > 0) room->study = options->study[i];
         err = pal_stream_open(session[i], options->error_m, diag, &room->stream);
         if (!err) hub->n_room++;
     }

@@ -1,36 +1,31 @@
 /* The hub connects peers to sessions. It interprets messages, checks permissions, and chooses the next message to each
- * peer.
- *
- * Order of sending: control (hello, errors, pongs, members, status), contact models, then fields and cycles as far as
- * credit allows. Per client, at most 32 control messages, one contact model and the cycle in transmission are queued.
- * All else is encoded when the transport asks for it, from the newest data of the session's stream. Thread: [net]. */
+ * peer. At a wake or tick it updates the stream of each room (at most 120 times a second), fields and jobs, and calls
+ * `ready` of the peers (hub.c, hub_wake). server/README.md, "Sending", has their order. Per client, at most 32 control
+ * messages, one contact model and the cycle in transmission are queued. Frames, contact models and fields are encoded
+ * once, in that update; which of them a peer gets is chosen when its transport asks. Thread: [net]. */
 #ifndef PAL_NET_HUB_H
 #define PAL_NET_HUB_H
-#include "server/net/stream.h"
-#include "server/net/transport/site.h"
-#include "server/net/transport/transport.h"
-#include "server/sim/core/configuration.h"
+#include "server/net/hub_core.h"
 
-typedef struct pal_hub pal_hub;
-struct pal_verb;
-
-typedef struct pal_hub_options {
-    double error_m;
-    int max_clients;
-    pal_site *site; /* borrowed; NULL: no files */
-    /* configurations of a study of each session's scene, as in pal_server_options; borrowed; NULL: none */
-    const pal_measured_configuration *const *setting;
-    const int *n_configuration, *setting_body;
-    const double *reference_m;   /* NULL: unknown */
-    const struct pal_verb *verb; /* known commands [n_verb]; borrowed; NULL: pal_verb_table */
+typedef struct pal_server_options {
+    const char *listen;        /* "127.0.0.1"; any other address needs allow_remote                         */
+    int port;                  /* 8090; 0: any free port, see pal_server_port                               */
+    bool allow_remote;         /* also accepts any Host name (for a proxy), not only loopback names */
+    const char *viewer_folder; /* files served at /; NULL: none                                             */
+    const struct pal_transport_ops *transport; /* NULL: websockets */
+    /* of the hub */
+    double error_m;                 /* bound of streamed positions per axis; 0: 1/3000 of the box, at most 0.05 mm */
+    int max_clients;                /* 0: 200 */
+    const pal_session_study *study; /* [n_session], borrowed until close; NULL: none */
+    const pal_verb *verb;           /* commands that clients may give [n_verb], borrowed; NULL: pal_verb_table */
     int n_verb;
-} pal_hub_options;
+} pal_server_options;
 
 /* Builds the streams and listens to the loop. Borrows loop, sessions and their array. When a job replaces a session,
  * the hub closes it and sets its place in the array to NULL; the hub owns the new session and closes it in destroy.
- * [load] */
-pal_err pal_hub_create(pal_loop *loop, const pal_hub_options *options, pal_session **session, int n_session,
-                       pal_diagnostic *diag, pal_hub **out);
+ * site: borrowed; NULL: no files. [load] */
+pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_site *site, pal_session **session,
+                       int n_session, pal_diagnostic *diag, pal_hub **out);
 void pal_hub_destroy(pal_hub *hub);                      /* after its transports; NULL is fine. [load] */
 void pal_hub_events(pal_hub *hub, pal_peer_events *out); /* for pal_transport_ops.open */
 void pal_hub_goodbye(pal_hub *hub);                      /* drops every peer with code 1001 and accepts no new ones */

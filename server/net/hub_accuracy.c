@@ -7,6 +7,7 @@
 #include "server/net/hub_peers.h"
 #include "server/net/hub_subscriptions.h"
 #include "server/net/transport/plain_text.h"
+#include "server/net/tuning.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -26,18 +27,16 @@ static void method_text(const pal_configuration *s, char out[PAL_WIRE_METHOD_BYT
 static void send_study(pal_hub *hub, pal_client *c, int body)
 {
     const pal_hub_room *room = c->room;
-    pal_wire_study *study = &hub->control->study;
-    int n = room->setting_body == body ? room->n_configuration : 0, n_front = 0;
-    memset(hub->control, 0, sizeof *hub->control);
-    hub->control->type = PAL_CONTROL_STUDY;
+    pal_wire_study *study = &pal_hub_message(hub, PAL_CONTROL_STUDY)->study;
+    int n = room->study.body == body ? room->study.n : 0, n_front = 0;
     pal_plain_text(study->body, sizeof study->body, room->stream->part[body].info.name);
     study->step_ms = 1e3 * room->step_s;
-    study->reference_m = n > 0 ? room->reference_m : NAN;
-    for (int i = 0; i < n; i++) n_front += room->setting[i].front;
+    study->reference_m = n > 0 ? room->study.reference_m : NAN;
+    for (int i = 0; i < n; i++) n_front += room->study.configuration[i].front;
     /* as many as fit, Pareto-optimal points first */
     int room_left = PAL_WIRE_POINT_MAX - (n_front < PAL_WIRE_POINT_MAX ? n_front : PAL_WIRE_POINT_MAX);
     for (int i = 0; i < n && study->n_point < PAL_WIRE_POINT_MAX; i++) {
-        const pal_measured_configuration *p = &room->setting[i];
+        const pal_measured_configuration *p = &room->study.configuration[i];
         char text[PAL_CONFIGURATION_TEXT];
         if (!isfinite(p->ms) || !isfinite(p->error_m) || (!p->front && room_left == 0)) continue;
         room_left -= !p->front;
@@ -81,8 +80,8 @@ static int likeness(const pal_configuration *of, const pal_configuration *now)
 static double point_of(const pal_hub_room *room, int body, const pal_configuration *now)
 {
     int best = -1, best_same = -1;
-    for (int i = 0; i < room->n_configuration && room->setting_body == body; i++) {
-        int n_same = likeness(&room->setting[i].setting, now);
+    for (int i = 0; i < room->study.n && room->study.body == body; i++) {
+        int n_same = likeness(&room->study.configuration[i].setting, now);
         if (n_same > best_same) best = i, best_same = n_same;
     }
     return best < 0 ? NAN : (double)best;
@@ -92,7 +91,7 @@ static double point_of(const pal_hub_room *room, int body, const pal_configurati
 
 static double error_of(const pal_hub_room *room, double point)
 {
-    return isnan(point) ? NAN : room->setting[(int)point].error_m;
+    return isnan(point) ? NAN : room->study.configuration[(int)point].error_m;
 }
 
 static bool near(double a, double b)
@@ -193,7 +192,7 @@ static void report_far(pal_hub_room *room, const pal_wire_estimate *e)
 
 pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *c)
 {
-    pal_wire_estimate *out = &hub->control->estimate;
+    pal_wire_estimate *out = &pal_hub_message(hub, PAL_CONTROL_ESTIMATE)->estimate;
     pal_estimate estimate;
     pal_configuration now;
     char text[PAL_CONFIGURATION_TEXT];
@@ -201,8 +200,6 @@ pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *c)
     while (b < c->room->stream->n_part && !c->estimate_due[b]) b++;
     if (b == c->room->stream->n_part) return NULL;
     c->estimate_due[b] = false;
-    memset(hub->control, 0, sizeof *hub->control);
-    hub->control->type = PAL_CONTROL_ESTIMATE;
     pal_plain_text(out->body, sizeof out->body, c->room->stream->part[b].info.name);
     pal_configuration_of(pal_session_scene(c->room->session), b, &now);
     pal_plain_text(out->configuration, sizeof out->configuration, pal_configuration_text(&now, text));

@@ -4,9 +4,6 @@
 #define PAL_NET_HUB_ACCURACY_H
 #include "server/net/hub_verb.h"
 
-#define PAL_HUB_ESTIMATE_OLD_S 1.0 /* simulated seconds awake; an older estimate does not bound a switch */
-
-void pal_hub_run_estimate(pal_hub *hub, pal_client *client, const pal_verb *verb, const pal_wire_command *command);
 void pal_hub_estimates_due(pal_client *client); /* called at every tick */
 bool pal_hub_wants_estimate(const pal_client *client);
 pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *client); /* NULL: none is due */

@@ -7,9 +7,16 @@
 #include "server/net/transport/transport.h"
 #include "server/sim/core/configuration.h"
 
-enum { PAL_HUB_QUEUE = 32, PAL_HUB_OLD_ASSETS = 8 };
+enum { PAL_HUB_QUEUE = 32, PAL_HUB_OLD_ASSETS = 8, PAL_HUB_CLIENTS = 200 };
 
 struct pal_hub_room;
+
+/* study of a session's scene, for a live choice among its points */
+typedef struct pal_session_study {
+    const pal_measured_configuration *configuration; /* by ascending ms [n]; NULL: no study */
+    int n, body;
+    double reference_m; /* error of the study's reference itself; NaN: unknown */
+} pal_session_study;
 
 /* one connected peer; in a free entry, peer is NULL */
 typedef struct pal_client {
@@ -62,21 +69,19 @@ typedef struct pal_hub_room {
     pal_material material[PAL_BODY_MAX]; /* as last requested */
     /* steps without output for lack of observers; tick and OUTPUT runs at the last count */
     uint64_t n_unobserved, seen_tick, seen_output;
-    bool was_unobserved;                       /* no observers at the last count */
-    int n_estimate[PAL_BODY_MAX];              /* clients subscribed to an estimate */
-    bool estimate_requested[PAL_BODY_MAX];     /* the session has been asked for it */
-    double step_s;                             /* of the scene as opened: the reference of all costs */
-    const pal_measured_configuration *setting; /* of a study of body setting_body [n_configuration]; NULL: no study */
-    int n_configuration, setting_body;
-    double reference_m; /* error of the study's reference itself; NaN: unknown */
-    bool reported_far;  /* an estimate above the scene's tolerance has been reported */
-    int tier_users[PAL_STREAM_TIER];
-    int n_look[PAL_BODY_MAX][PAL_FIELD_COUNT];    /* clients subscribed to a field */
-    bool reported[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* the session has been asked for it */
+    bool was_unobserved;                   /* no observers at the last count */
+    int n_estimate[PAL_BODY_MAX];          /* clients subscribed to an estimate */
+    bool estimate_requested[PAL_BODY_MAX]; /* the session has been asked for it */
+    double step_s;                         /* of the scene as opened: the reference of all costs */
+    pal_session_study study;
+    bool reported_far; /* an estimate above the scene's tolerance has been reported */
+    int tier_users[PAL_STREAM_TIER_COUNT];
+    int n_subscriber[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* clients subscribed to a field */
+    bool reported[PAL_BODY_MAX][PAL_FIELD_COUNT];    /* the session has been asked for it */
 } pal_hub_room;
 
 typedef struct pal_hub_count {
-    uint64_t n_frame, n_field, n_patch, n_skipped, n_byte, n_joined, n_refused_join;
+    uint64_t n_frame, n_field, n_delta, n_skipped, n_byte, n_joined, n_refused_join;
     uint64_t n_pose, n_ack, n_control;
     uint64_t n_pose_ignored, n_pose_refused, n_malformed, n_flood, n_stalled, n_overflow;
 } pal_hub_count;

@@ -68,7 +68,7 @@ pal_packet *pal_hub_next_field(pal_hub *hub, pal_client *c)
 uint64_t pal_hub_make_fields(pal_hub *hub, pal_hub_room *room, uint64_t now)
 {
     uint64_t due = 0;
-    if (!pal_stream_fields(room->stream, now, room->n_look, &due)) return due;
+    if (!pal_stream_fields(room->stream, now, room->n_subscriber, &due)) return due;
     for (int i = 0; i < hub->max_clients; i++) {
         pal_client *c = &hub->client[i];
         if (c->peer && c->room == room && !c->peer->drop_code && pal_hub_wants_field(c)) c->peer->ops->ready(c->peer);

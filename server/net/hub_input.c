@@ -3,16 +3,14 @@
  * is answered with `error`. Poses of a tool that the sender does not hold are ignored. */
 #include "server/net/hub_input.h"
 
-#include "server/base/clock.h"
 #include "server/net/hub_fields.h"
 #include "server/net/hub_peers.h"
 #include "server/net/hub_plan.h"
 #include "server/net/hub_verb.h"
 #include "server/net/transport/plain_text.h"
+#include "server/net/tuning.h"
 
 #include <string.h>
-
-#define POSE_ERROR_INTERVAL_NS 1000000000u
 
 static void malformed(pal_hub *hub, pal_client *c, int refusal)
 {
@@ -21,14 +19,14 @@ static void malformed(pal_hub *hub, pal_client *c, int refusal)
 }
 
 /* takes a tool without notifying anyone */
-static pal_err take_tool(pal_client *c, int wanted)
+static pal_err take_tool(const pal_hub *hub, pal_client *c, int wanted)
 {
     pal_hub_room *room = c->room;
     int before = pal_members_find(&room->members, c->id)->tool, taken = -1;
     PAL_TRY(pal_members_take_tool(&room->members, c->id, wanted == PAL_WIRE_TOOL_ANY ? -1 : wanted, &taken));
     if (before == taken) return PAL_ERR_OK;
     if (before >= 0) pal_hub_release_tool(room, before);
-    room->tool[taken] = (pal_stream_tool){c->id, pal_hub_colour(c->id), pal_clock_ns()};
+    room->tool[taken] = (pal_stream_tool){c->id, pal_hub_colour(c->id), pal_loop_now_ns(hub->loop)};
     return PAL_ERR_OK;
 }
 
@@ -50,11 +48,9 @@ static void explain_take(pal_hub *hub, pal_client *c, int wanted, pal_err err)
 static void send_hello(pal_hub *hub, pal_client *c)
 {
     const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
-    pal_wire_hello *hello = &hub->control->hello;
-    memset(hub->control, 0, sizeof *hub->control);
-    hub->control->type = PAL_CONTROL_HELLO;
+    pal_wire_hello *hello = &pal_hub_message(hub, PAL_CONTROL_HELLO)->hello;
     pal_stream_hello(c->room->stream, hello);
-    pal_hub_hello_components(c->room, hello);
+    pal_hub_put_plan(c->room, &hello->plan);
     hello->estimates = true;
     hello->credit = (uint32_t)c->credit.max;
     hello->you_id = pal_stream_wire_id(m->id);
@@ -85,7 +81,8 @@ static void join(pal_hub *hub, pal_client *c, const pal_wire_join *wanted)
     if (room->tier_users[c->tier]++ == 0) pal_stream_begin_tier(room->stream, c->tier);
     /* hello names the granted tool; a refusal follows it */
     pal_err err = PAL_ERR_OK;
-    if (wanted->tool != PAL_WIRE_TOOL_NONE && wanted->role != PAL_WIRE_ROLE_VIEWER) err = take_tool(c, wanted->tool);
+    if (wanted->tool != PAL_WIRE_TOOL_NONE && wanted->role != PAL_WIRE_ROLE_VIEWER)
+        err = take_tool(hub, c, wanted->tool);
     send_hello(hub, c);
     if (err && c->id) explain_take(hub, c, wanted->tool, err);
     pal_hub_members_changed(hub, room);
@@ -93,7 +90,7 @@ static void join(pal_hub *hub, pal_client *c, const pal_wire_join *wanted)
 
 static void take(pal_hub *hub, pal_client *c, int tool)
 {
-    pal_err err = take_tool(c, tool);
+    pal_err err = take_tool(hub, c, tool);
     if (err)
         explain_take(hub, c, tool, err);
     else
@@ -142,9 +139,7 @@ static void control(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_
         pal_hub_subscribe_field(hub, c, &in.field_subscription);
         break;
     case PAL_CONTROL_PING:
-        memset(hub->control, 0, sizeof *hub->control);
-        hub->control->type = PAL_CONTROL_PONG;
-        hub->control->stamp_ms = in.stamp_ms;
+        pal_hub_message(hub, PAL_CONTROL_PONG)->stamp_ms = in.stamp_ms;
         pal_hub_send(hub, c, hub->control);
         break;
     default:
@@ -166,15 +161,14 @@ static void pose(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_byt
     const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
     if (m->tool < 0 || m->tool != w.tool) {
         hub->count.n_pose_ignored++;
-        if (m->role == PAL_MEMBER_VIEWER &&
-            (c->pose_error_ns == 0 || now - c->pose_error_ns > POSE_ERROR_INTERVAL_NS)) {
+        if (m->role == PAL_MEMBER_VIEWER && (c->pose_error_ns == 0 || now - c->pose_error_ns > PAL_POSE_ERROR_NS)) {
             c->pose_error_ns = now;
             pal_hub_send_error(hub, c, "role", "a viewer moves no tool");
         }
         return;
     }
     if (w.flags & PAL_WIRE_POSE_AWAY) {
-        (void)pal_session_put_pose(c->room->session, m->tool, NULL);
+        (void)pal_session_request_pose(c->room->session, m->tool, NULL);
         return;
     }
     pal_pose p = {.buttons = w.buttons & PAL_WIRE_GRASP, .seq = w.seq, .stamp_us = w.stamp_us};
@@ -183,7 +177,7 @@ static void pose(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_byt
         p.velocity_m_s[i] = w.velocity_m_s[i];
     }
     for (int i = 0; i < 4; i++) p.quat[i] = w.quaternion[i];
-    if (pal_session_put_pose(c->room->session, m->tool, &p)) hub->count.n_pose_refused++;
+    if (pal_session_request_pose(c->room->session, m->tool, &p)) hub->count.n_pose_refused++;
 }
 
 static void acknowledge(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_byte)

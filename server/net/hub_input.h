@@ -1,4 +1,5 @@
-/* Messages from clients. Thread: [net]. */
+/* Messages from clients. A pose of the sender's tool becomes a pal_pose, with PAL_WIRE_POSE_AWAY a release; other
+ * flags, angular velocity, force, torque, gripper and model are checked and dropped. Thread: [net]. */
 #ifndef PAL_NET_HUB_INPUT_H
 #define PAL_NET_HUB_INPUT_H
 #include "server/net/hub_core.h"

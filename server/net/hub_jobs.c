@@ -1,7 +1,6 @@
 /* The queue of commands before the job worker, and the commit of its results. */
 #include "server/net/hub_jobs.h"
 
-#include "server/base/clock.h"
 #include "server/net/hub_peers.h"
 #include "server/net/hub_plan.h"
 
@@ -77,11 +76,10 @@ static void send_topology(pal_hub *hub, pal_hub_room *room)
     for (int i = 0; i < hub->max_clients; i++) {
         pal_client *c = &hub->client[i];
         if (!c->peer || c->room != room || !c->id || c->peer->drop_code) continue;
-        memset(hub->control, 0, sizeof *hub->control);
-        hub->control->type = PAL_CONTROL_TOPOLOGY;
-        hub->control->topology.n_part = (uint32_t)room->stream->n_part;
-        for (int p = 0; p < room->stream->n_part; p++) hub->control->topology.part[p] = room->stream->part[p].info;
-        pal_hub_topology_components(room, &hub->control->topology);
+        pal_wire_topology *topology = &pal_hub_message(hub, PAL_CONTROL_TOPOLOGY)->topology;
+        topology->n_part = (uint32_t)room->stream->n_part;
+        for (int p = 0; p < room->stream->n_part; p++) topology->part[p] = room->stream->part[p].info;
+        pal_hub_put_plan(room, &topology->plan);
         memset(c->sent_change, 0, sizeof c->sent_change);
         memset(c->sent_field, 0, sizeof c->sent_field);
         pal_hub_send(hub, c, hub->control);
@@ -154,7 +152,7 @@ void pal_hub_jobs_enqueue(pal_hub *hub, pal_client *c, const pal_job_type *type,
         pal_hub_send_error(hub, c, "busy", "%s: %d commands wait already", command->verb, PAL_HUB_JOBS_PENDING);
         return;
     }
-    s->pending[s->n_pending++] = (pal_hub_pending_job){c->room, c->id, pal_clock_ns(), type, *command};
+    s->pending[s->n_pending++] = (pal_hub_pending_job){c->room, c->id, pal_loop_now_ns(hub->loop), type, *command};
     if (!pal_job_worker_busy(s->worker)) begin_next(hub, s);
 }
 

@@ -12,7 +12,7 @@
 void pal_hub_release_tool(pal_hub_room *room, int tool)
 {
     room->tool[tool] = (pal_stream_tool){0};
-    (void)pal_session_put_pose(room->session, tool, NULL);
+    (void)pal_session_request_pose(room->session, tool, NULL);
 }
 
 uint32_t pal_hub_colour(int id)
@@ -76,6 +76,13 @@ static void queue(pal_hub *hub, pal_client *c, pal_packet *packet)
     c->peer->ops->ready(c->peer);
 }
 
+pal_control *pal_hub_message(pal_hub *hub, pal_control_type type)
+{
+    memset(hub->control, 0, sizeof *hub->control);
+    hub->control->type = type;
+    return hub->control;
+}
+
 pal_packet *pal_hub_encode(pal_hub *hub, const pal_control *control)
 {
     size_t n = 0;
@@ -101,10 +108,9 @@ void pal_hub_send_error(pal_hub *hub, pal_client *client, const char *code, cons
     va_start(args, format);
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
-    memset(hub->control, 0, sizeof *hub->control);
-    hub->control->type = PAL_CONTROL_ERROR;
-    pal_plain_text(hub->control->error.code, sizeof hub->control->error.code, code);
-    pal_plain_text(hub->control->error.text, sizeof hub->control->error.text, text);
+    pal_wire_error *error = &pal_hub_message(hub, PAL_CONTROL_ERROR)->error;
+    pal_plain_text(error->code, sizeof error->code, code);
+    pal_plain_text(error->text, sizeof error->text, text);
     pal_hub_send(hub, client, hub->control);
 }
 

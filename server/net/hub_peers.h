@@ -3,6 +3,8 @@
 #define PAL_NET_HUB_PEERS_H
 #include "server/net/hub_core.h"
 
+/* the hub's scratch message, empty but for its type */
+pal_control *pal_hub_message(pal_hub *hub, pal_control_type type);
 pal_packet *pal_hub_encode(pal_hub *hub, const pal_control *control); /* NULL: encoding failed, logged */
 void pal_hub_send(pal_hub *hub, pal_client *client,
                   const pal_control *control); /* queues a message; overflow drops the client */

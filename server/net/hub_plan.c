@@ -2,13 +2,11 @@
  * or asleep. Commands disable components and reset single bodies (protocol/README.md, "Components and bodies"). */
 #include "server/net/hub_plan.h"
 
-#include "server/base/clock.h"
 #include "server/net/hub_peers.h"
 #include "server/net/transport/plain_text.h"
+#include "server/net/tuning.h"
 
 #include <string.h>
-
-static const uint64_t ASKED_NS = 5000000000u; /* time limit for the result of a command about a component */
 
 static int body_of(const pal_session *session, const char *name)
 {
@@ -18,33 +16,18 @@ static int body_of(const pal_session *session, const char *name)
     return -1;
 }
 
-/* components of the plan at open, as hello and topology name them */
-static uint32_t plan_rows(const pal_session *session, char (*name)[PAL_WIRE_NAME_BYTES], double *part,
-                          char (*reason)[PAL_WIRE_REASON_BYTES], double *fixed)
+void pal_hub_put_plan(const pal_hub_room *room, pal_wire_plan *out)
 {
-    int n = pal_session_component_count(session);
-    uint32_t n_row = 0;
-    for (int r = 0; r < n && r < PAL_WIRE_COMPONENT_MAX; r++, n_row++) {
-        pal_component_info row;
-        pal_session_component_info(session, r, &row);
-        pal_plain_text(name[r], PAL_WIRE_NAME_BYTES, row.name);
-        pal_plain_text(reason[r], PAL_WIRE_REASON_BYTES, row.reason);
-        part[r] = body_of(session, row.body);
-        fixed[r] = row.fixed || part[r] < 0;
+    int n = pal_session_component_count(room->session);
+    for (int r = 0; r < n && r < PAL_WIRE_COMPONENT_MAX; r++) {
+        pal_component_info component;
+        pal_session_component_info(room->session, r, &component);
+        pal_plain_text(out->component[r], PAL_WIRE_NAME_BYTES, component.name);
+        pal_plain_text(out->reason[r], PAL_WIRE_REASON_BYTES, component.reason);
+        out->part[r] = body_of(room->session, component.body);
+        out->required[r] = component.fixed || out->part[r] < 0;
+        out->n_component = out->n_part = out->n_reason = out->n_required = (uint32_t)r + 1;
     }
-    return n_row;
-}
-
-void pal_hub_hello_components(const pal_hub_room *room, pal_wire_hello *out)
-{
-    out->n_component = out->n_component_part = out->n_component_reason = out->n_component_required =
-        plan_rows(room->session, out->component, out->component_part, out->component_reason, out->component_required);
-}
-
-void pal_hub_topology_components(const pal_hub_room *room, pal_wire_topology *out)
-{
-    out->n_component = out->n_component_part = out->n_component_reason = out->n_component_required =
-        plan_rows(room->session, out->component, out->component_part, out->component_reason, out->component_required);
 }
 
 /* Components of the opened plan that the running plan lacks are disabled; the running plan may have others (fields,
@@ -54,15 +37,15 @@ static void report_components(const pal_hub_room *room, const pal_frame *f, pal_
     int n = pal_session_component_count(room->session), n_found = 0;
     bool same = n == f->n_row && !room->own;
     for (int r = 0, at = 0; r < n; r++) {
-        pal_component_info row;
+        pal_component_info component;
         int i = at;
-        pal_session_component_info(room->session, r, &row);
-        int body = body_of(room->session, row.body);
-        while (i < f->n_row && (strcmp(f->component_name[i], row.name) || f->component_body[i] != body)) i++;
+        pal_session_component_info(room->session, r, &component);
+        int body = body_of(room->session, component.body);
+        while (i < f->n_row && (strcmp(f->component_name[i], component.name) || f->component_body[i] != body)) i++;
         if (i < f->n_row) {
             at = i + 1, n_found++;
         } else if (w->n_disabled < PAL_WIRE_COMPONENT_MAX) {
-            pal_plain_text(w->disabled[w->n_disabled].component, PAL_WIRE_NAME_BYTES, row.name);
+            pal_plain_text(w->disabled[w->n_disabled].component, PAL_WIRE_NAME_BYTES, component.name);
             w->disabled[w->n_disabled++].part = body < 0 ? 0 : (uint32_t)body;
         }
     }
@@ -107,12 +90,11 @@ void pal_hub_count_unobserved(pal_hub_room *room)
     room->was_unobserved = room->members.n_member == 0;
 }
 
-/* The world answers between two steps, with a count of refusals and the last diagnostic. Its thread uses the machine's
- * clock, whatever the clock of the loop. */
-static void note_asked(pal_client *c)
+/* the world answers between two steps, with a count of refusals and the last diagnostic */
+static void note_asked(const pal_hub *hub, pal_client *c)
 {
     const pal_frame *f = c->room->stream->frame;
-    c->component_until_ns = pal_clock_ns() + ASKED_NS;
+    c->component_until_ns = pal_loop_now_ns(hub->loop) + PAL_ANSWER_NS;
     c->component_refused = f ? f->n_refused : 0;
 }
 
@@ -124,7 +106,7 @@ void pal_hub_component_result(pal_hub *hub, pal_client *c)
     bool refused = f->n_refused > c->component_refused;
     if (refused) pal_session_last_diagnostic(c->room->session, &diag);
     if (diag.text[0]) pal_hub_send_error(hub, c, "refused", "component: %s", diag.text);
-    if (refused || pal_clock_ns() > c->component_until_ns) c->component_until_ns = 0;
+    if (refused || pal_loop_now_ns(hub->loop) > c->component_until_ns) c->component_until_ns = 0;
 }
 
 void pal_hub_run_component(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
@@ -135,12 +117,12 @@ void pal_hub_run_component(pal_hub *hub, pal_client *c, const pal_verb *verb, co
         pal_hub_send_error(hub, c, "args", "component: part %g, wanted 0 to %d", part, c->room->stream->n_part - 1);
         return;
     }
-    if (strlen(command->target) >= sizeof order.row) {
+    if (strlen(command->target) >= sizeof order.component) {
         pal_hub_send_error(hub, c, "target", "there is no component %s", command->target);
         return;
     }
     order.body = (int)part;
-    strcpy(order.row, command->target);
-    note_asked(c);
+    strcpy(order.component, command->target);
+    note_asked(hub, c);
     pal_hub_session_command(hub, c, verb->name, &order);
 }

@@ -1,6 +1,6 @@
 /* Verbs for sculpting (protocol/README.md, "Sculpting"): edits go through hub_jobs.c, brushes and probes act at
  * once. */
-#include "server/net/hub_sculpt.h"
+#include "server/net/hub_verb.h"
 
 #include "server/base/vec3.h"
 #include "server/net/hub_jobs.h"
@@ -113,7 +113,7 @@ static bool read_paint(pal_hub *hub, pal_client *c, const pal_wire_command *comm
     if (!pick(hub, c, job->body, command, false, &at)) return false;
     job->command.kind = PAL_SCULPT_PAINT;
     job->command.stroke = (pal_stroke){.radius_m = pal_hub_arg(command, "radius_m", 0),
-                                       .soft = pal_hub_arg(command, "softness", PAL_BRUSH_SOFTNESS),
+                                       .softness = pal_hub_arg(command, "softness", PAL_BRUSH_SOFTNESS),
                                        .young_factor = pal_hub_arg(command, "young_factor", 1),
                                        .density_factor = pal_hub_arg(command, "density_factor", 1)};
     pal_copy3(job->command.stroke.at_m, at.rest_m);
@@ -274,7 +274,7 @@ void pal_hub_run_brush(pal_hub *hub, pal_client *c, const pal_verb *verb, const 
     pal_brush *b = &order.brush;
     b->kind = (pal_brush_kind)verb->detail;
     b->radius_m = pal_hub_arg(command, "radius_m", 0);
-    b->soft = pal_hub_arg(command, "softness", PAL_BRUSH_SOFTNESS);
+    b->softness = pal_hub_arg(command, "softness", PAL_BRUSH_SOFTNESS);
     b->pressure_Pa = pal_hub_arg(command, "pressure_Pa", 0);
     b->stiffness_N_m = pal_hub_arg(command, "stiffness_N_m", 0);
     pal_set3(b->lift_m, pal_hub_arg(command, "dx_m", 0), pal_hub_arg(command, "dy_m", 0),

@@ -1,5 +1,5 @@
 /* Verbs that control a session. */
-#include "server/net/hub_steering.h"
+#include "server/net/hub_verb.h"
 
 #include "server/net/hub_peers.h"
 

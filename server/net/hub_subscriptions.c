@@ -14,7 +14,7 @@ void pal_hub_update_subscriptions(pal_hub_room *room)
         request(room->session, room->n_estimate[b] > 0, &room->estimate_requested[b],
                 (pal_command){.kind = PAL_COMMAND_ESTIMATE, .body = b});
         for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++)
-            request(room->session, room->n_look[b][k] > 0, &room->reported[b][k],
+            request(room->session, room->n_subscriber[b][k] > 0, &room->reported[b][k],
                     (pal_command){.kind = PAL_COMMAND_FIELD, .body = b, .field = (pal_field)k});
     }
 }
@@ -23,8 +23,8 @@ void pal_hub_set_field(pal_client *c, int part, pal_field field)
 {
     pal_field before = (pal_field)c->view[part];
     if (field == before) return;
-    if (before != PAL_FIELD_NONE) c->room->n_look[part][before]--;
-    if (field != PAL_FIELD_NONE) c->room->n_look[part][field]++;
+    if (before != PAL_FIELD_NONE) c->room->n_subscriber[part][before]--;
+    if (field != PAL_FIELD_NONE) c->room->n_subscriber[part][field]++;
     c->view[part] = (uint8_t)field;
     c->sent_field[part] = 0;
 }

@@ -1,6 +1,6 @@
 /* Verbs that switch the configuration of a body (protocol/README.md, "Configurations") to a point of its study or to
  * other parameters. hub_jobs.c prepares and commits. */
-#include "server/net/hub_switch.h"
+#include "server/net/hub_verb.h"
 
 #include "server/net/hub_accuracy.h"
 #include "server/net/hub_jobs.h"
@@ -16,13 +16,13 @@ static int read_point(pal_hub *hub, pal_client *c, int body, const pal_wire_comm
 {
     const pal_hub_room *room = c->room;
     double index = pal_hub_arg(command, "index", -1);
-    if (!room->setting || body != room->setting_body) {
+    if (!room->study.configuration || body != room->study.body) {
         pal_hub_send_error(hub, c, "refused", "study_point: there is no study of %s here",
                            pal_session_scene(room->session)->body[body].name);
         return -1;
     }
-    if (!(index >= 0 && index < room->n_configuration && index == floor(index))) {
-        pal_hub_send_error(hub, c, "args", "study_point: index %g, wanted 0 to %d", index, room->n_configuration - 1);
+    if (!(index >= 0 && index < room->study.n && index == floor(index))) {
+        pal_hub_send_error(hub, c, "args", "study_point: index %g, wanted 0 to %d", index, room->study.n - 1);
         return -1;
     }
     return (int)index;
@@ -56,11 +56,11 @@ static bool read_parameters(pal_hub *hub, pal_client *c, int body, const pal_wir
 static bool read_switch(pal_hub *hub, pal_client *c, const pal_wire_command *command, pal_job *job)
 {
     bool by_point = pal_hub_has_arg(command, "index");
-    job->body = pal_hub_find_body(hub, c, command->target, c->room->setting ? c->room->setting_body : 0);
+    job->body = pal_hub_find_body(hub, c, command->target, c->room->study.configuration ? c->room->study.body : 0);
     if (job->body < 0) return false;
     int point = by_point ? read_point(hub, c, job->body, command) : -1;
     if (by_point ? point < 0 : !read_parameters(hub, c, job->body, command, &job->configuration)) return false;
-    if (by_point) job->configuration = c->room->setting[point].setting;
+    if (by_point) job->configuration = c->room->study.configuration[point].setting;
     pal_hub_shown_errors(c->room, job->body, point, &job->configuration, &job->error_now_m, &job->error_then_m);
     job->was = pal_hub_edits(hub, c->room, job->body)->base;
     if (job->was) return true;
@@ -84,7 +84,7 @@ static void transfer_switch(pal_job *job)
     pal_session_rehearse(job->next, job->session, pal_configuration_switch_snapshot, pal_configuration_switch_rehearse,
                          job->change);
     pal_session_transfer_begin(job->next, job->session, pal_configuration_switch_transfer, job->change);
-    pal_configuration_switch_get_report(job->change, &job->report);
+    job->report = *pal_configuration_switch_report(job->change);
 }
 
 static void commit_switch(pal_hub_body_edits *at, pal_job *job, pal_retired *retired)
@@ -98,7 +98,7 @@ static void commit_switch(pal_hub_body_edits *at, pal_job *job, pal_retired *ret
 /* adds the displacement caused by the switch, and its bound from the displayed errors */
 static void put_jump(const pal_hub *hub, const pal_job *job, double change, pal_wire_answer *a)
 {
-    const pal_configuration_switch_report *r = &job->report;
+    const pal_transfer_report *r = &job->report;
     double bound_m = job->error_now_m + job->error_then_m, frame_mm = 1e3 * r->frame_move_m,
            max_mm = 1e3 * r->max_move_m;
     bool far = r->max_move_m > bound_m + hub->error_m;
@@ -123,7 +123,7 @@ static void put_jump(const pal_hub *hub, const pal_job *job, double change, pal_
 
 static void answer_switch(pal_hub *hub, pal_client *c, const pal_job *job)
 {
-    const pal_configuration_switch_report *r = &job->report;
+    const pal_transfer_report *r = &job->report;
     char text[PAL_CONFIGURATION_TEXT];
     pal_configuration now;
     /* below this the energy of a body at rest is rounding, J */

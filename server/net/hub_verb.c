@@ -52,17 +52,12 @@ static bool check_args(pal_hub *hub, pal_client *c, const pal_verb *verb, const 
 
 static bool check_right(pal_hub *hub, pal_client *c, const pal_verb *verb)
 {
-    static const char *const who[PAL_RIGHT_COUNT] = {
-#define X(name, text) text,
-        PAL_RIGHT_TABLE(X)
-#undef X
-    };
     const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
     bool instructs = m->role == PAL_MEMBER_INSTRUCTOR;
     bool may = verb->right == PAL_RIGHT_EVERYBODY || instructs ||
                (verb->right == PAL_RIGHT_TRAINEE && m->role != PAL_MEMBER_VIEWER) ||
                (verb->right == PAL_RIGHT_TOOL && m->tool >= 0);
-    if (!may) pal_hub_send_error(hub, c, "role", "%s: only for %s", verb->name, who[verb->right]);
+    if (!may) pal_hub_send_error(hub, c, "role", "%s: only for %s", verb->name, pal_right_text(verb->right));
     return may;
 }
 
@@ -95,10 +90,9 @@ void pal_hub_answer_arg(pal_wire_answer *answer, const char *key, double value)
 
 pal_wire_answer *pal_hub_answer_begin(pal_hub *hub, const char *verb)
 {
-    memset(hub->control, 0, sizeof *hub->control);
-    hub->control->type = PAL_CONTROL_ANSWER;
-    pal_plain_text(hub->control->answer.verb, sizeof hub->control->answer.verb, verb);
-    return &hub->control->answer;
+    pal_wire_answer *answer = &pal_hub_message(hub, PAL_CONTROL_ANSWER)->answer;
+    pal_plain_text(answer->verb, sizeof answer->verb, verb);
+    return answer;
 }
 
 bool pal_hub_session_command(pal_hub *hub, pal_client *c, const char *verb, const pal_command *command)

@@ -2,6 +2,7 @@
  * line in verb_table.c and one function. Thread: [net]. */
 #ifndef PAL_NET_HUB_VERB_H
 #define PAL_NET_HUB_VERB_H
+#include "server/mesh/cells/cell_edits.h"
 #include "server/net/hub_core.h"
 
 /* X(right, who, in plain words) */
@@ -18,15 +19,31 @@ typedef enum pal_right {
         PAL_RIGHT_COUNT
 } pal_right;
 
+/* called after permission and keys are checked; sends an answer or an error */
+typedef void pal_verb_run(pal_hub *hub, pal_client *client, const pal_verb *verb, const pal_wire_command *command);
+
 struct pal_verb {
     const char *name;
     const char *args; /* argument keys; those behind the bar are optional: "x_m y_m z_m | scale" */
     pal_right right;
-    /* called after permission and keys are checked; sends an answer or an error */
-    void (*run)(pal_hub *hub, pal_client *client, const pal_verb *verb, const pal_wire_command *command);
+    pal_verb_run *run;
     int detail; /* distinguishes verbs that share a function */
     const char *about;
 };
+
+extern const pal_verb pal_verb_table[]; /* verb_table.c [pal_verb_count] */
+extern const int pal_verb_count;
+/* formats a table as text, one line per verb with tab-separated name, permission, arguments and description; returns
+ * the number of bytes of the whole text, as snprintf does. Thread: any */
+int pal_verb_describe(const pal_verb *verb, int n_verb, char *text, size_t cap);
+/* who may give a command, in words */
+const char *pal_right_text(pal_right right);
+
+/* functions of the table, in hub_steering.c, hub_plan.c, hub_accuracy.c, hub_switch.c and hub_sculpt.c */
+pal_verb_run pal_hub_run_steering, pal_hub_run_reset, pal_hub_run_material, pal_hub_run_component, pal_hub_run_estimate,
+    pal_hub_run_switch, pal_hub_run_edit, pal_hub_run_probe, pal_hub_run_brush;
+/* detail of a brush is a pal_brush_kind, of an edit a pal_cells_command_kind or one of these */
+enum { PAL_EDIT_PAINT = 100, PAL_EDIT_SET_REST, PAL_EDIT_CUT, PAL_EDIT_UNCUT, PAL_EDIT_UNDO, PAL_EDIT_REDO };
 
 /* finds the verb, checks permission and keys, and runs it; sends an error on failure */
 void pal_hub_execute(pal_hub *hub, pal_client *client, const pal_wire_command *command);

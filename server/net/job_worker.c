@@ -1,10 +1,8 @@
 /* The worker thread: sleeps until there is a job to run or an object to free. */
 #include "server/net/job_worker.h"
 
-#include "server/base/clock.h"
+#include "server/base/thread.h"
 
-#include <pthread.h>
-#include <signal.h>
 #include <stdlib.h>
 
 enum { RETIRED_MAX = 8 };
@@ -29,7 +27,7 @@ static void make(pal_job *job)
     if (!job->err) job->err = pal_session_open_after(job->session, scene, &job->diag, &job->next);
     if (!job->err) job->err = pal_stream_open(job->next, job->error_m, &job->diag, &job->stream);
     if (!job->err) job->type->transfer(job);
-    job->made_ns = pal_clock_ns();
+    job->made_ns = pal_clock_now_ns(pal_session_clock(job->session));
 }
 
 static void clear(pal_retired *w)
@@ -69,16 +67,10 @@ pal_err pal_job_worker_open(void (*wake)(void *user), void *user, pal_job_worker
 {
     pal_job_worker *s = calloc(1, sizeof *s);
     if (!s) return PAL_ERR_MEMORY;
-    sigset_t all, old;
     s->wake = wake, s->user = user;
     pthread_mutex_init(&s->lock, NULL);
     pthread_cond_init(&s->changed, NULL);
-    /* signals go to the thread that waits for them */
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &old);
-    int failed = pthread_create(&s->thread, NULL, run, s);
-    pthread_sigmask(SIG_SETMASK, &old, NULL);
-    if (failed) {
+    if (pal_thread_start(&s->thread, run, s)) {
         free(s);
         return PAL_ERR_MEMORY;
     }

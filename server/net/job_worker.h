@@ -54,7 +54,7 @@ struct pal_job {
     pal_body_def *base;               /* a copy of it when this is the first switch, else NULL; owned */
     double error_now_m, error_then_m; /* as displayed to clients; NaN: none */
     pal_configuration_switch *change;
-    pal_configuration_switch_report report;
+    pal_transfer_report report;
     /* result; on err there is none, and diag gives the reason */
     pal_err err;
     pal_diagnostic diag;

@@ -1,9 +1,7 @@
 /* The server puts loop, hub and transport together. */
 #include "server/net/server.h"
 
-#include "server/base/clock.h"
-#include "server/base/log.h"
-#include "server/net/hub.h"
+#include "server/net/tuning.h"
 
 #include <arpa/inet.h>
 #include <sched.h>
@@ -11,8 +9,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define GOODBYE_NS 500000000u
 
 /* users counts the threads inside wake: disconnecting waits for them, wake waits for nobody */
 struct pal_server_gate {
@@ -82,14 +78,13 @@ static pal_err make_url(const pal_server_options *options, char *url, size_t cap
     const char *listen = options->listen && options->listen[0] ? options->listen : "127.0.0.1";
     if (!strcmp(listen, "localhost")) listen = "127.0.0.1";
     if (!is_address(listen))
-        return pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED,
-            "--listen %.80s: wanted an IP address alone, as 127.0.0.1; a port is given with --port", listen);
+        return PAL_REFUSE(diag, "--listen %.80s: wanted an IP address alone, as 127.0.0.1; a port is given with --port",
+                          listen);
     if (!options->allow_remote && !is_loopback(listen))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "listening on %s lets other machines in, without password or encryption: add "
-                                  "--allow-remote if that is meant",
-                                  listen);
+        return PAL_REFUSE(diag,
+                          "listening on %s lets other machines in, without password or encryption: add "
+                          "--allow-remote if that is meant",
+                          listen);
     snprintf(url, cap, strchr(listen, ':') ? "ws://[%.80s]:%d%s" : "ws://%.80s:%d%s", listen, options->port,
              options->allow_remote ? "?hosts=any" : "");
     return PAL_ERR_OK;
@@ -99,19 +94,13 @@ static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_
                           pal_diagnostic *diag)
 {
     char url[160];
-    pal_hub_options hub = {.error_m = options->error_m,
-                           .max_clients = options->max_clients > 0 ? options->max_clients : 200};
     pal_peer_events events;
     PAL_TRY(make_url(options, url, sizeof url, diag));
     if (options->viewer_folder) PAL_TRY(pal_site_open(options->viewer_folder, diag, &s->site));
-    hub.site = s->site;
-    hub.setting = options->setting, hub.n_configuration = options->n_configuration,
-    hub.setting_body = options->setting_body;
-    hub.reference_m = options->reference_m;
-    hub.verb = options->verb, hub.n_verb = options->n_verb;
     /* besides the clients: page loads, and what lws needs itself */
-    PAL_TRY(pal_loop_create(s->ops == &pal_ws_transport, hub.max_clients + 128, diag, &s->loop));
-    PAL_TRY(pal_hub_create(s->loop, &hub, session, n_session, diag, &s->hub));
+    int max_socket = (options->max_clients > 0 ? options->max_clients : PAL_HUB_CLIENTS) + 128;
+    PAL_TRY(pal_loop_create(s->ops->sockets, max_socket, pal_session_clock(session[0]), diag, &s->loop));
+    PAL_TRY(pal_hub_create(s->loop, options, s->site, session, n_session, diag, &s->hub));
     pal_hub_events(s->hub, &events);
     return s->ops->open(s->loop, url, &events, diag, &s->transport);
 }
@@ -119,11 +108,10 @@ static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_
 pal_err pal_server_open(const pal_server_options *options, pal_session **session, int n_session, pal_diagnostic *diag,
                         pal_server **out)
 {
-    if (n_session < 1) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "a server needs a session");
+    if (n_session < 1) return PAL_REFUSE(diag, "a server needs a session");
     pal_server *s = calloc(1, sizeof *s);
     if (!s) return PAL_ERR_MEMORY;
-    s->ops = options->transport && !strcmp(options->transport, pal_mem_transport.scheme) ? &pal_mem_transport
-                                                                                         : &pal_ws_transport;
+    s->ops = options->transport ? options->transport : &pal_ws_transport;
     pal_err err = open_parts(s, options, session, n_session, diag);
     if (err) return pal_server_close(s), err;
     *out = s;
@@ -134,10 +122,10 @@ pal_err pal_server_run(pal_server *server)
 {
     pal_err err = pal_loop_run(server->loop);
     if (err) return err;
-    /* clients are told why; those that do not listen are left after GOODBYE_NS */
-    uint64_t end = pal_clock_ns() + GOODBYE_NS;
+    /* clients get the reason; those that do not read it within PAL_GOODBYE_NS are cut off */
+    uint64_t end = pal_loop_now_ns(server->loop) + PAL_GOODBYE_NS;
     pal_hub_goodbye(server->hub);
-    while (pal_hub_clients(server->hub) && pal_clock_ns() < end) pal_loop_step(server->loop, end);
+    while (pal_hub_clients(server->hub) && pal_loop_now_ns(server->loop) < end) pal_loop_step(server->loop, end);
     return PAL_ERR_OK;
 }
 
@@ -168,7 +156,7 @@ pal_transport *pal_server_transport(pal_server *server)
     return server->transport;
 }
 
-void pal_server_advance(pal_server *server, uint64_t now_ns)
+void pal_server_advance(pal_server *server)
 {
-    pal_loop_advance(server->loop, now_ns);
+    pal_loop_advance(server->loop);
 }

@@ -7,25 +7,25 @@
 #include "server/base/clock.h"
 #include "server/base/log.h"
 #include "server/net/transport/plain_text.h"
+#include "server/net/tuning.h"
+#include "server/session/tuning.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define STALE_NS 250000000u
-
-static const double tier_factor[PAL_STREAM_TIER] = {1, 2, 5};
+static const double tier_factor[PAL_STREAM_TIER_COUNT] = PAL_TIER_FACTORS;
 
 struct pal_stream_coder {
-    pal_frame_encoder *encoder[PAL_BODY_MAX][PAL_STREAM_TIER];
+    pal_frame_encoder *encoder[PAL_BODY_MAX][PAL_STREAM_TIER_COUNT];
     uint32_t seq[PAL_BODY_MAX]; /* per part, across all tiers */
     uint8_t *buffer;            /* [cap] */
     size_t cap;
     uint32_t haptic_seq;
     uint64_t field_seq;
     uint64_t rate_tick, rate_ns;
-    int n_row; /* of the last frame */
+    int n_component; /* of the last frame */
 };
 
 static pal_err refuse(pal_diagnostic *diag, int refusal, const char *part, const char *what)
@@ -54,7 +54,7 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
     if (refusal) return refuse(diag, refusal, shown->name, "no vertex order");
     refusal = pal_asset_encode(shown->rest_m, order, tri, (uint32_t)shown->n_tri, &bytes, &n_byte);
     if (refusal) err = refuse(diag, refusal, shown->name, "no asset");
-    for (int t = 0; !err && t < PAL_STREAM_TIER; t++) {
+    for (int t = 0; !err && t < PAL_STREAM_TIER_COUNT; t++) {
         refusal = pal_frame_encoder_create(shown->rest_m, order, &s->coder->encoder[index][t]);
         if (refusal) err = refuse(diag, refusal, shown->name, "no encoder");
     }
@@ -68,7 +68,7 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
         part->info.n_triangle = (uint32_t)shown->n_tri;
         part->info.is_adaptive = shown->is_adaptive;
         part->info.is_sculptable = shown->face != NULL;
-        if (shown->is_adaptive) err = pal_triangle_slots_make(index, part->info.epoch, shown, diag, &part->places);
+        if (shown->is_adaptive) err = pal_triangle_slots_make(index, part->info.epoch, shown, diag, &part->slots);
         for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++)
             if (pal_session_has_field(s->session, index, (pal_field)k))
                 pal_plain_text(part->info.field[part->info.n_field++], PAL_WIRE_FIELD_BYTES,
@@ -104,7 +104,8 @@ static pal_err open_parts(pal_stream *s, double error_m, pal_diagnostic *diag)
         if (s->part[p].info.n_vertex > max) max = s->part[p].info.n_vertex;
     }
     for (int c = 0; c < 3; c++) side = fmax(side, s->box_max_m[c] - s->box_min_m[c]);
-    s->error_m = error_m > 0 ? error_m : side > 0 ? fmin(5e-5, side / 3000) : 5e-5;
+    s->error_m = side > 0 ? fmin(PAL_POSITION_ERROR_M, side / PAL_POSITIONS_IN_LENGTH) : PAL_POSITION_ERROR_M;
+    if (error_m > 0) s->error_m = error_m;
     for (int p = 0; p < s->n_part; p++) s->part[p].info.error_m = s->error_m;
     s->coder->cap = pal_frame_bound(max);
     if (s->coder->cap < pal_field_bound(max)) s->coder->cap = pal_field_bound(max);
@@ -124,8 +125,8 @@ pal_err pal_stream_open(pal_session *session, double error_m, pal_diagnostic *di
     s->coder = calloc(1, sizeof *s->coder);
     pal_err err = s->part && s->coder ? PAL_ERR_OK : PAL_ERR_MEMORY;
     if (!err && (s->n_part < 1 || s->n_part > PAL_BODY_MAX))
-        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "session %s shows %d parts, 1 to %d can be streamed",
-                                 s->scene->name, s->n_part, PAL_BODY_MAX);
+        err = PAL_REFUSE(diag, "session %s shows %d parts, 1 to %d can be streamed", s->scene->name, s->n_part,
+                         PAL_BODY_MAX);
     if (!err) err = open_parts(s, error_m, diag);
     if (err) return pal_stream_close(s), err;
     *out = s;
@@ -137,9 +138,9 @@ void pal_stream_close(pal_stream *stream)
     if (!stream) return;
     for (int p = 0; stream->part && p < stream->n_part; p++) {
         pal_packet_drop(stream->part[p].asset);
-        pal_triangle_slots_free(stream->part[p].places);
+        pal_triangle_slots_free(stream->part[p].slots);
         for (int k = 0; k < PAL_FIELD_COUNT; k++) pal_packet_drop(stream->part[p].field[k]);
-        for (int t = 0; t < PAL_STREAM_TIER; t++) {
+        for (int t = 0; t < PAL_STREAM_TIER_COUNT; t++) {
             pal_packet_drop(stream->part[p].frame[t]);
             if (stream->coder && p < PAL_BODY_MAX) pal_frame_encoder_destroy(stream->coder->encoder[p][t]);
         }
@@ -164,7 +165,7 @@ void pal_stream_transfer(pal_stream *stream, const pal_stream *before)
     for (int p = 0; p < stream->n_part && p < before->n_part; p++) {
         pal_stream_part *part = &stream->part[p];
         part->info.epoch = before->part[p].info.epoch + 1;
-        if (part->places) part->places->epoch = part->info.epoch;
+        if (part->slots) part->slots->epoch = part->info.epoch;
         coder->seq[p] = before->coder->seq[p];
     }
 }
@@ -202,8 +203,8 @@ static void encode_part(pal_stream *s, int p, int tier, bool again)
                              .sim_time_us = time_us(s->frame),
                              .error_m = pal_stream_tier_error_m(s, tier),
                              .position_m = from->position_m,
-                             .hidden = part->places ? part->places->hidden : NULL};
-    uint32_t change = part->places ? part->places->change : 0;
+                             .hidden = part->slots ? part->slots->hidden : NULL};
+    uint32_t change = part->slots ? part->slots->change : 0;
     pal_frame_result result;
     if (from->n_vertex != (int)part->info.n_vertex) return;
     /* no observer; or, below, no new output: the body sleeps */
@@ -249,16 +250,15 @@ static bool echoes(const pal_frame_tool *f, const pal_stream_tool *t)
     return f->present && t->holder && f->pose_ns >= t->taken_ns && f->pose_ns;
 }
 
-static uint32_t hold_us(const pal_frame_tool *f, uint64_t clock_ns)
+static uint32_t hold_us(const pal_frame_tool *f, uint64_t now_ns)
 {
-    uint64_t us = clock_ns > f->pose_ns ? (clock_ns - f->pose_ns) / 1000 : 0;
+    uint64_t us = now_ns > f->pose_ns ? (now_ns - f->pose_ns) / 1000 : 0;
     return us > UINT32_MAX ? UINT32_MAX : (uint32_t)us;
 }
 
-static void put_tools(pal_stream *s, const pal_stream_tool tool[PAL_TOOL_MAX])
+static void put_tools(pal_stream *s, uint64_t now_ns, const pal_stream_tool tool[PAL_TOOL_MAX])
 {
     pal_wire_tools w = {.cycle = s->cycle, .n_tool = (uint32_t)s->frame->n_tool, .sim_time_us = time_us(s->frame)};
-    uint64_t clock_ns = pal_clock_ns();
     for (int i = 0; i < s->frame->n_tool; i++) {
         const pal_frame_tool *f = &s->frame->tool[i];
         pal_wire_tool *to = &w.tool[i];
@@ -266,7 +266,7 @@ static void put_tools(pal_stream *s, const pal_stream_tool tool[PAL_TOOL_MAX])
         to->colour = tool[i].holder ? tool[i].colour : 0;
         to->flags = (uint16_t)((tool[i].holder ? PAL_WIRE_TOOL_HELD : 0) | (f->touching ? PAL_WIRE_TOOL_CONTACT : 0) |
                                (f->holding ? PAL_WIRE_TOOL_GRASPS : 0) | (f->present ? 0 : PAL_WIRE_TOOL_AWAY) |
-                               (f->present && clock_ns > f->pose_ns + STALE_NS ? PAL_WIRE_TOOL_STALE : 0));
+                               (f->present && now_ns > f->pose_ns + PAL_LEASE_NS ? PAL_WIRE_TOOL_STALE : 0));
         to->radius_m = (float)f->radius_m;
         copy_f3(to->position_m, f->pose.position_m);
         copy_quat(to->quaternion, f->pose.quat);
@@ -274,7 +274,7 @@ static void put_tools(pal_stream *s, const pal_stream_tool tool[PAL_TOOL_MAX])
         if (!echoes(f, &tool[i])) continue;
         to->echo_seq = f->pose.seq;
         to->echo_stamp_us = f->pose.stamp_us;
-        to->hold_us = hold_us(f, clock_ns);
+        to->hold_us = hold_us(f, now_ns);
     }
     size_t n = pal_wire_put_tools(s->coder->buffer, s->coder->cap, &w);
     pal_packet *packet = n ? pal_packet_create(s->coder->buffer, n, false) : NULL;
@@ -300,10 +300,9 @@ static void copy_patch(pal_wire_contact_patch *to, const pal_contact_patch *from
 }
 
 /* contact model of a held tool (protocol/README.md, "HAPTIC"); relative to the tool position, so floats suffice */
-static void put_haptic(pal_stream *s, int i, const pal_stream_tool *tool)
+static void put_haptic(pal_stream *s, int i, uint64_t now_ns, const pal_stream_tool *tool)
 {
     const pal_frame_tool *f = &s->frame->tool[i];
-    uint64_t clock_ns = pal_clock_ns();
     bool frozen = false;
     for (int p = 0; p < s->n_part; p++) frozen |= s->frame->part[p].frozen;
     if (!f->present || !tool->holder) {
@@ -314,14 +313,14 @@ static void put_haptic(pal_stream *s, int i, const pal_stream_tool *tool)
                          .seq = ++s->coder->haptic_seq,
                          .flags =
                              (s->frame->paused ? PAL_WIRE_HAPTIC_FREEZE : 0) | (frozen ? PAL_WIRE_HAPTIC_FORCE_OFF : 0),
-                         .stamp_us = clock_ns / 1000,
+                         .stamp_us = now_ns / 1000,
                          .frame_us = (uint32_t)(1e6 / pal_stream_rate_hz(s)),
                          .has_grasp = f->has_grasp,
                          .grasp_b_N_s_m = (float)f->grasp_b_Ns_m};
     if (echoes(f, tool)) {
         w.echo_stamp_us = f->pose.stamp_us;
         w.echo_seq = f->pose.seq;
-        w.hold_us = hold_us(f, clock_ns);
+        w.hold_us = hold_us(f, now_ns);
     }
     double x0[3];
     for (int c = 0; c < 3; c++) {
@@ -339,7 +338,7 @@ static void put_haptic(pal_stream *s, int i, const pal_stream_tool *tool)
     pal_packet_replace(&s->haptic[i], n ? pal_packet_create(s->coder->buffer, n, false) : NULL);
 }
 
-bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_STREAM_TIER],
+bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_STREAM_TIER_COUNT],
                        const pal_stream_tool tool[PAL_TOOL_MAX])
 {
     const pal_frame *frame = pal_session_take_frame(stream->session);
@@ -349,16 +348,16 @@ bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_
     stream->cycle_ns = now_ns;
     for (int p = 0; p < stream->n_part; p++) {
         const pal_frame_part *part = &frame->part[p];
-        if (stream->part[p].places && part->n_slot == (int)stream->part[p].places->n_place)
-            pal_triangle_slots_update(stream->part[p].places, part->slot, part->revision);
-        for (int t = 0; t < PAL_STREAM_TIER; t++)
+        if (stream->part[p].slots && part->n_slot == (int)stream->part[p].slots->n_slot)
+            pal_triangle_slots_update(stream->part[p].slots, part->slot, part->revision);
+        for (int t = 0; t < PAL_STREAM_TIER_COUNT; t++)
             if (used[t]) encode_part(stream, p, t, false);
     }
-    put_tools(stream, tool);
-    for (int i = 0; i < frame->n_tool; i++) put_haptic(stream, i, &tool[i]);
+    put_tools(stream, now_ns, tool);
+    for (int i = 0; i < frame->n_tool; i++) put_haptic(stream, i, now_ns, &tool[i]);
     /* components have changed, so the entries have other meanings */
-    if (frame->n_row != stream->coder->n_row) memset(stream->component_ms, 0, sizeof stream->component_ms);
-    stream->coder->n_row = frame->n_row;
+    if (frame->n_row != stream->coder->n_component) memset(stream->component_ms, 0, sizeof stream->component_ms);
+    stream->coder->n_component = frame->n_row;
     for (int r = 0; r < frame->n_row; r++) {
         stream->component_ms[r] += 0.2 * (frame->component_ns[r] * 1e-6 - stream->component_ms[r]);
         /* below the clock resolution, the mean has decayed to zero */
@@ -392,7 +391,6 @@ static bool encode_field(pal_stream *s, int p, int k, uint64_t now_ns)
     pal_packet_replace(&part->field[k], packet);
     part->field_made[k] = ++s->coder->field_seq;
     s->count.n_field++;
-    s->count.n_field_byte += n_byte;
     return true;
 }
 
@@ -402,7 +400,8 @@ static void forget_field(pal_stream_part *part, int k)
     part->field_made[k] = part->field_revision[k] = 0;
 }
 
-bool pal_stream_fields(pal_stream *stream, uint64_t now_ns, int n_look[PAL_BODY_MAX][PAL_FIELD_COUNT], uint64_t *due_ns)
+bool pal_stream_fields(pal_stream *stream, uint64_t now_ns, int n_subscriber[PAL_BODY_MAX][PAL_FIELD_COUNT],
+                       uint64_t *due_ns)
 {
     bool any = false;
     *due_ns = 0;
@@ -410,7 +409,7 @@ bool pal_stream_fields(pal_stream *stream, uint64_t now_ns, int n_look[PAL_BODY_
         for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++) {
             pal_stream_part *part = &stream->part[p];
             const pal_frame_field *from = stream->frame ? &stream->frame->part[p].field[k] : NULL;
-            if (n_look[p][k] == 0) {
+            if (n_subscriber[p][k] == 0) {
                 if (part->field_revision[k]) forget_field(part, k);
                 continue;
             }

@@ -15,28 +15,26 @@
 #include "server/session/members.h"
 #include "server/session/session.h"
 
-enum { PAL_STREAM_TIER = 3 };     /* tolerances error_m, 2 error_m and 5 error_m */
-#define PAL_STREAM_RATE_HZ  120.0 /* maximum, cycles per second */
-#define PAL_STREAM_FIELD_HZ 10.0  /* maximum, values of a field per second */
+enum { PAL_STREAM_TIER_COUNT = 3 }; /* bounds of positions: error_m times PAL_TIER_FACTORS */
 
 typedef struct pal_stream_part {
     pal_wire_part_info info;
     pal_packet *asset;
-    pal_packet *frame[PAL_STREAM_TIER];       /* newest; NULL before the first */
-    uint32_t frame_seq[PAL_STREAM_TIER];      /* its number: increases per part, across all tiers */
-    uint32_t frame_cycle[PAL_STREAM_TIER];    /* cycle that it belongs to */
-    uint32_t frame_change[PAL_STREAM_TIER];   /* triangle table that it belongs to (pal_triangle_slots.change) */
-    uint64_t frame_output[PAL_STREAM_TIER];   /* pal_frame_part.n_output of the last encoding */
-    pal_triangle_slots *places;               /* of an adaptive part, else NULL */
-    pal_packet *field[PAL_FIELD_COUNT];       /* newest values; NULL: no subscriber or none yet */
-    uint64_t field_made[PAL_FIELD_COUNT];     /* a new number for every message */
-    uint64_t field_revision[PAL_FIELD_COUNT]; /* of the last encoding */
-    uint64_t field_due_ns[PAL_FIELD_COUNT];   /* earliest time of the next encoding */
+    pal_packet *frame[PAL_STREAM_TIER_COUNT];     /* newest; NULL before the first */
+    uint32_t frame_seq[PAL_STREAM_TIER_COUNT];    /* its number: increases per part, across all tiers */
+    uint32_t frame_cycle[PAL_STREAM_TIER_COUNT];  /* cycle that it belongs to */
+    uint32_t frame_change[PAL_STREAM_TIER_COUNT]; /* triangle table that it belongs to (pal_triangle_slots.change) */
+    uint64_t frame_output[PAL_STREAM_TIER_COUNT]; /* pal_frame_part.n_output of the last encoding */
+    pal_triangle_slots *slots;                    /* of an adaptive part, else NULL */
+    pal_packet *field[PAL_FIELD_COUNT];           /* newest values; NULL: no subscriber or none yet */
+    uint64_t field_made[PAL_FIELD_COUNT];         /* a new number for every message */
+    uint64_t field_revision[PAL_FIELD_COUNT];     /* of the last encoding */
+    uint64_t field_due_ns[PAL_FIELD_COUNT];       /* earliest time of the next encoding */
 } pal_stream_part;
 
 typedef struct pal_stream_count { /* totals for metrics */
     uint64_t n_encode, encode_ns, n_frame_byte, n_refused_frame;
-    uint64_t n_field, n_field_byte;
+    uint64_t n_field;
 } pal_stream_count;
 
 typedef struct pal_stream {
@@ -57,8 +55,8 @@ typedef struct pal_stream {
     struct pal_stream_coder *coder; /* encoders and their buffer */
 } pal_stream;
 
-/* Builds the assets (about 1 s for 50,000 displayed vertices) and the encoders. Borrows the session. error_m 0: 1/3000
- * of the longest side of the box, at most 0.05 mm. [load] */
+/* Builds the assets (about 0.2 s for 50,000 displayed vertices) and the encoders. Borrows the session. error_m 0:
+ * 1/3000 of the longest side of the box, at most 0.05 mm. [load] */
 pal_err pal_stream_open(pal_session *session, double error_m, pal_diagnostic *diag, pal_stream **out);
 void pal_stream_close(pal_stream *stream); /* NULL is fine. [load] */
 
@@ -70,18 +68,18 @@ void pal_stream_transfer(pal_stream *stream, const pal_stream *before);
 typedef struct pal_stream_tool {
     int holder; /* member id; 0: none */
     uint32_t colour;
-    uint64_t taken_ns; /* pal_clock_ns when the holder took it; older poses are not echoed */
+    uint64_t taken_ns; /* when the holder took it; older poses are not echoed */
 } pal_stream_tool;
 
 /* the 16-bit wire form of a member id, which grows without bound; 0 stays 0 */
 uint16_t pal_stream_wire_id(int member);
 /* Takes the session's newest frame and makes a cycle of it: encodes the tiers with used[] true, tools, and contact
- * models. false: no new frame. */
-bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_STREAM_TIER],
+ * models. now_ns: time of the session's clock. false: no new frame. */
+bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_STREAM_TIER_COUNT],
                        const pal_stream_tool tool[PAL_TOOL_MAX]);
-/* Encodes the newest values of every field with n_look > 0 clients and drops the others. true: new values; *due_ns:
- * time of the next call for values that came too early, 0: none. */
-bool pal_stream_fields(pal_stream *stream, uint64_t now_ns, int n_look[PAL_BODY_MAX][PAL_FIELD_COUNT],
+/* Encodes the newest values of every field with n_subscriber > 0 clients and drops the others. true: new values;
+ * *due_ns: time of the next call for values that came too early, 0: none. */
+bool pal_stream_fields(pal_stream *stream, uint64_t now_ns, int n_subscriber[PAL_BODY_MAX][PAL_FIELD_COUNT],
                        uint64_t *due_ns);
 /* Starts a tier for its first client: re-encodes its frames from the newest positions (same cycle). Their numbers
  * exceed those of every tier, because a client requires increasing numbers (protocol/README.md, "FRAME"). */

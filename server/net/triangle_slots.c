@@ -36,16 +36,16 @@ pal_err pal_triangle_slots_make(int part, uint32_t epoch, const pal_shown *shown
     if (!s) return PAL_ERR_MEMORY;
     s->part = (uint16_t)part;
     s->epoch = epoch;
-    s->n_place = (uint32_t)shown->n_tri;
+    s->n_slot = (uint32_t)shown->n_tri;
     s->n_vertex = (uint32_t)shown->n_vertex;
     s->revision = UINT64_MAX; /* the simulation may have changed the table since: compare the first frame */
-    s->tri = calloc(3 * (size_t)s->n_place + 1, sizeof *s->tri);
-    s->written = calloc((size_t)s->n_place + 1, sizeof *s->written);
+    s->tri = calloc(3 * (size_t)s->n_slot + 1, sizeof *s->tri);
+    s->written = calloc((size_t)s->n_slot + 1, sizeof *s->written);
     s->n_use = calloc((size_t)s->n_vertex + 1, sizeof *s->n_use);
     s->hidden = malloc((size_t)s->n_vertex + 1);
     if (!s->tri || !s->written || !s->n_use || !s->hidden) return pal_triangle_slots_free(s), PAL_ERR_MEMORY;
     memset(s->hidden, 1, s->n_vertex);
-    for (uint32_t i = 0; i < s->n_place; i++) {
+    for (uint32_t i = 0; i < s->n_slot; i++) {
         valid(s, shown->tri + 3 * (size_t)i, s->tri + 3 * (size_t)i);
         use(s, s->tri + 3 * (size_t)i, true);
     }
@@ -58,70 +58,72 @@ static void forget(pal_triangle_slots *s)
     for (int i = 0; i < PAL_TRIANGLE_DELTAS_KEPT; i++) pal_packet_replace(&s->made[i].packet, NULL);
 }
 
-void pal_triangle_slots_free(pal_triangle_slots *places)
+void pal_triangle_slots_free(pal_triangle_slots *slots)
 {
-    if (!places) return;
-    forget(places);
-    free(places->tri);
-    free(places->written);
-    free(places->n_use);
-    free(places->hidden);
-    free(places);
+    if (!slots) return;
+    forget(slots);
+    free(slots->tri);
+    free(slots->written);
+    free(slots->n_use);
+    free(slots->hidden);
+    free(slots);
 }
 
-bool pal_triangle_slots_update(pal_triangle_slots *places, const int32_t *slot, uint64_t revision)
+bool pal_triangle_slots_update(pal_triangle_slots *slots, const int32_t *slot, uint64_t revision)
 {
     bool changed = false;
-    if (revision == places->revision) return false;
-    places->revision = revision;
-    for (uint32_t i = 0; i < places->n_place; i++) {
-        uint32_t tri[3], *mine = places->tri + 3 * (size_t)i;
-        valid(places, slot + 3 * (size_t)i, tri);
+    if (revision == slots->revision) return false;
+    slots->revision = revision;
+    for (uint32_t i = 0; i < slots->n_slot; i++) {
+        uint32_t tri[3], *mine = slots->tri + 3 * (size_t)i;
+        valid(slots, slot + 3 * (size_t)i, tri);
         if (!memcmp(tri, mine, sizeof tri)) continue;
-        use(places, mine, false);
-        use(places, tri, true);
+        use(slots, mine, false);
+        use(slots, tri, true);
         memcpy(mine, tri, sizeof tri);
-        places->written[i] = places->change + 1;
+        slots->written[i] = slots->change + 1;
         changed = true;
     }
     if (!changed) return false;
-    places->change++;
-    places->changed_revision = revision;
-    forget(places);
+    slots->change++;
+    slots->changed_revision = revision;
+    forget(slots);
     return true;
 }
 
 /* encodes the n entries that changed after `from`; one allocation for entries, planes and the message */
 static pal_packet *encode(pal_triangle_slots *s, uint32_t from, uint32_t n)
 {
-    size_t n_place = (size_t)n * sizeof(uint32_t), n_work = PAL_TOPOLOGY_DELTA_WORK_BYTES(n),
+    size_t n_index = (size_t)n * sizeof(uint32_t), n_work = PAL_TOPOLOGY_DELTA_WORK_BYTES(n),
            cap = pal_topology_delta_bound(n), n_byte;
-    uint8_t *room = malloc(n_place + n_work + cap), *work = room + n_place, *dst = work + n_work;
+    uint8_t *room = malloc(n_index + n_work + cap), *work = room + n_index, *dst = work + n_work;
     if (!room) return NULL;
-    uint32_t *place = (uint32_t *)(void *)room, at = 0;
-    for (uint32_t i = 0; i < s->n_place; i++)
-        if (s->written[i] > from) place[at++] = i;
-    pal_topology_delta_head head = {
-        .part = s->part, .epoch = s->epoch, .n_place = n, .revision = s->changed_revision & (((uint64_t)1 << 53) - 1)};
-    int refusal = pal_topology_delta_put(place, s->tri, &head, work, dst, cap, &n_byte);
+    uint32_t *slot = (uint32_t *)(void *)room, at = 0;
+    for (uint32_t i = 0; i < s->n_slot; i++)
+        if (s->written[i] > from) slot[at++] = i;
+    pal_topology_delta_head head = {.part = s->part,
+                                    .epoch = s->epoch,
+                                    .n_changed = n,
+                                    .revision = s->changed_revision & (((uint64_t)1 << 53) - 1)};
+    int refusal = pal_topology_delta_put(slot, s->tri, &head, work, dst, cap, &n_byte);
     if (refusal) pal_log(PAL_LOG_ERROR, "patch", "part %d: %s", s->part, pal_refusal_text(refusal));
     pal_packet *packet = refusal ? NULL : pal_packet_create(dst, n_byte, false);
     free(room);
     return packet;
 }
 
-pal_packet *pal_triangle_slots_delta(pal_triangle_slots *places, uint32_t from)
+pal_packet *pal_triangle_slots_delta(pal_triangle_slots *slots, uint32_t from)
 {
     uint32_t n = 0;
     for (int i = 0; i < PAL_TRIANGLE_DELTAS_KEPT; i++)
-        if (places->made[i].packet && places->made[i].from == from) return pal_packet_hold(places->made[i].packet);
-    for (uint32_t i = 0; i < places->n_place; i++) n += places->written[i] > from;
-    pal_packet *packet = n ? encode(places, from, n) : NULL;
+        if (slots->made[i].packet && slots->made[i].from == from) return pal_packet_hold(slots->made[i].packet);
+    for (uint32_t i = 0; i < slots->n_slot; i++) n += slots->written[i] > from;
+    pal_packet *packet = n ? encode(slots, from, n) : NULL;
     if (!packet) return NULL;
-    places->n_patch++;
-    places->n_byte += packet->n_byte;
-    places->made[places->next].from = from;
-    pal_packet_replace(&places->made[places->next].packet, packet);
-    places->next = (places->next + 1) % PAL_TRIANGLE_DELTAS_KEPT;
+    slots->n_delta++;
+    slots->n_byte += packet->n_byte;
+    slots->made[slots->next].from = from;
+    pal_packet_replace(&slots->made[slots->next].packet, packet);
+    slots->next = (slots->next + 1) % PAL_TRIANGLE_DELTAS_KEPT;
     return pal_packet_hold(packet);
 }

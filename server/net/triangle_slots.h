@@ -15,9 +15,9 @@ enum { PAL_TRIANGLE_DELTAS_KEPT = 4 }; /* messages to the newest change that are
 typedef struct pal_triangle_slots {
     uint16_t part;
     uint32_t epoch;
-    uint32_t n_place, n_vertex;
-    uint32_t *tri;     /* current table [n_place][3] */
-    uint32_t *written; /* last change that wrote the entry; 0: none [n_place] */
+    uint32_t n_slot, n_vertex;
+    uint32_t *tri;     /* current table [n_slot][3] */
+    uint32_t *written; /* last change that wrote the entry; 0: none [n_slot] */
     uint32_t *n_use;   /* triangles at each vertex [n_vertex] */
     uint8_t *hidden;   /* 1: in no triangle [n_vertex] */
     uint32_t change;   /* number of the newest change */
@@ -28,17 +28,17 @@ typedef struct pal_triangle_slots {
         pal_packet *packet; /* NULL: none */
     } made[PAL_TRIANGLE_DELTAS_KEPT];
     int next;                 /* index in made of the next message */
-    uint64_t n_patch, n_byte; /* encoded so far */
+    uint64_t n_delta, n_byte; /* encoded so far */
 } pal_triangle_slots;
 
 /* copies the table of the displayed part, as in its asset. BUDGET: more entries than can be streamed; MEMORY */
 pal_err pal_triangle_slots_make(int part, uint32_t epoch, const pal_shown *shown, pal_diagnostic *diag,
                                 pal_triangle_slots **out);
-void pal_triangle_slots_free(pal_triangle_slots *places); /* NULL is fine */
-/* Applies the table of a frame [n_place][3]; skips the comparison when the revision is unchanged. true: the table
+void pal_triangle_slots_free(pal_triangle_slots *slots); /* NULL is fine */
+/* Applies the table of a frame [n_slot][3]; skips the comparison when the revision is unchanged. true: the table
  * changed. A triangle with a corner that is not a vertex counts as empty. */
-bool pal_triangle_slots_update(pal_triangle_slots *places, const int32_t *slot, uint64_t revision);
+bool pal_triangle_slots_update(pal_triangle_slots *slots, const int32_t *slot, uint64_t revision);
 /* the message with every entry changed after change `from`; the caller owns one reference. NULL: none, or out of
  * memory */
-pal_packet *pal_triangle_slots_delta(pal_triangle_slots *places, uint32_t from);
+pal_packet *pal_triangle_slots_delta(pal_triangle_slots *slots, uint32_t from);
 #endif

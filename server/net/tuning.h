@@ -1,5 +1,4 @@
-/* Constants of network policy: limits, rates, intervals. Each states its unit, its reason, and the test that bounds
- * it. */
+/* Policy of the network side. Each constant states its unit, its reason, and the test that bounds it. Thread: any. */
 #ifndef PAL_NET_TUNING_H
 #define PAL_NET_TUNING_H
 
@@ -8,4 +7,33 @@
 #define PAL_PICK_REACH 0.1
 /* default softness of a brush: the load falls off over half of the radius (test_sculpt_hub) */
 #define PAL_BRUSH_SOFTNESS 0.5
+/* ns: within this time a peer joins, and the world answers a command about a component (test_ws, test_plan_hub) */
+#define PAL_ANSWER_NS 5000000000u
+/* ns without an acknowledgement after which a client is closed (protocol/README.md, "Cycles and credit"; test_hub) */
+#define PAL_STALL_NS 10000000000u
+/* ns: a client that skips a quarter of the cycles in this time gets coarser frames, and finer ones after five such
+ * times without a skip, so that the tier does not oscillate (test_hub) */
+#define PAL_TIER_WINDOW_NS 2000000000u
+#define PAL_TIER_CLEAN_NS  (5ull * PAL_TIER_WINDOW_NS)
+/* bound of the positions of each tier over that of the finest (test_hub) */
+#define PAL_TIER_FACTORS                                                                                               \
+    {                                                                                                                  \
+        1, 2, 5                                                                                                        \
+    }
+/* 1/s: messages of a client (protocol/README.md, "Limits"); as many as in half a second at once, so that a delay of the
+ * server closes no client (test_ws) */
+#define PAL_MESSAGES_1_S 600
+/* ns between two errors about poses to one client: a pose comes 250 times a second (test_hub) */
+#define PAL_POSE_ERROR_NS 1000000000u
+/* ns that a closing server waits for its clients to take the reason (test_ws) */
+#define PAL_GOODBYE_NS 500000000u
+/* Hz, at most: cycles, which displays cannot show faster; values of a field, which are colours (test_hub) */
+#define PAL_STREAM_RATE_HZ  120.0
+#define PAL_STREAM_FIELD_HZ 10.0
+/* default bound of positions: m, below what a display resolves, and the number of such bounds in the longest side of
+ * the box of a smaller scene (test_hub) */
+#define PAL_POSITION_ERROR_M    5e-5
+#define PAL_POSITIONS_IN_LENGTH 3000
+/* simulated s awake after which an estimate does not bound a switch any more (test_switch_bound) */
+#define PAL_HUB_ESTIMATE_OLD_S 1.0
 #endif

@@ -1,11 +1,5 @@
 /* The table of verbs: a new command is one line here and one function. */
-#include "server/net/verb_table.h"
-
-#include "server/net/hub_accuracy.h"
-#include "server/net/hub_plan.h"
-#include "server/net/hub_sculpt.h"
-#include "server/net/hub_steering.h"
-#include "server/net/hub_switch.h"
+#include "server/net/hub_verb.h"
 
 #include <stdio.h>
 
@@ -14,7 +8,7 @@
 
 const pal_verb pal_verb_table[] = {
     {"pause", "", PAL_RIGHT_TRAINEE, pal_hub_run_steering, PAL_COMMAND_PAUSE, "stop the simulation between two steps"},
-    {"resume", "", PAL_RIGHT_TRAINEE, pal_hub_run_steering, PAL_COMMAND_RESUME, "let it run again"},
+    {"resume", "", PAL_RIGHT_TRAINEE, pal_hub_run_steering, PAL_COMMAND_RESUME, "resume the simulation"},
     {"step", "", PAL_RIGHT_TRAINEE, pal_hub_run_steering, PAL_COMMAND_STEP, "take one step while paused"},
     {"reset", "", PAL_RIGHT_EVERYBODY, pal_hub_run_reset, 0,
      "bring the body `target`, or the scene, back to rest; a viewer only a frozen body"},
@@ -42,9 +36,9 @@ const pal_verb pal_verb_table[] = {
      "make the present shape the rest shape"},
     {"cut", "nx ny nz offset_m", PAL_RIGHT_TOOL, pal_hub_run_edit, PAL_EDIT_CUT, "hide what lies beyond a plane"},
     {"uncut", "", PAL_RIGHT_TOOL, pal_hub_run_edit, PAL_EDIT_UNCUT, "show all of the body again"},
-    {"undo", "", PAL_RIGHT_TOOL, pal_hub_run_edit, PAL_EDIT_UNDO, "take the last edit back"},
-    {"redo", "", PAL_RIGHT_TOOL, pal_hub_run_edit, PAL_EDIT_REDO, "repeat the edit that was taken back"},
-    {"probe", AT, PAL_RIGHT_TRAINEE, pal_hub_run_probe, 0, "tell the material there"},
+    {"undo", "", PAL_RIGHT_TOOL, pal_hub_run_edit, PAL_EDIT_UNDO, "undo the last edit"},
+    {"redo", "", PAL_RIGHT_TOOL, pal_hub_run_edit, PAL_EDIT_REDO, "repeat the edit that was undone"},
+    {"probe", AT, PAL_RIGHT_TRAINEE, pal_hub_run_probe, 0, "report the material there"},
     {"inflate", AT " radius_m pressure_Pa | softness", PAL_RIGHT_TOOL, pal_hub_run_brush, PAL_BRUSH_INFLATE,
      "apply a pressure under a brush"},
     {"curve", FROM " radius_m stiffness_N_m dx_m dy_m dz_m | softness", PAL_RIGHT_TOOL, pal_hub_run_brush,
@@ -53,18 +47,23 @@ const pal_verb pal_verb_table[] = {
 };
 const int pal_verb_count = sizeof pal_verb_table / sizeof *pal_verb_table;
 
-int pal_verb_describe(const pal_verb *verb, int n_verb, char *text, size_t cap)
+const char *pal_right_text(pal_right right)
 {
     static const char *const who[PAL_RIGHT_COUNT] = {
 #define X(name, in_words) in_words,
         PAL_RIGHT_TABLE(X)
 #undef X
     };
+    return who[right];
+}
+
+int pal_verb_describe(const pal_verb *verb, int n_verb, char *text, size_t cap)
+{
     int n = 0;
     for (const pal_verb *v = verb; v < verb + n_verb; v++) {
         size_t used = (size_t)n < cap ? (size_t)n : cap;
-        n += snprintf(cap ? text + used : NULL, cap - used, "%s\t%s\t%s\t%s\n", v->name, who[v->right], v->args,
-                      v->about);
+        n += snprintf(cap ? text + used : NULL, cap - used, "%s\t%s\t%s\t%s\n", v->name, pal_right_text(v->right),
+                      v->args, v->about);
     }
     return n;
 }

@@ -2,15 +2,14 @@
  * own, of which counter 0 decides acceptance and the others draw the values. */
 #include "server/num/anneal.h"
 
+#include "server/base/heap.h"
 #include "server/num/random.h"
+#include "server/num/tuning.h"
 
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-static const double COLDEST = 1e-18; /* least T/T0 of the acceptance */
-enum { MAX_DRAW = 100 };
 
 typedef struct walk {
     const pal_anneal_options *o;
@@ -30,17 +29,11 @@ typedef struct walk {
 
 void pal_anneal_default(pal_anneal_options *options)
 {
-    *options = (pal_anneal_options){.n_start = 100,
-                                    .n_temperature_sample = 5,
-                                    .n_batch = 8,
-                                    .ratio_scale = 1e-5,
-                                    .anneal_scale = 100,
-                                    .cost_scale = 1,
-                                    .reanneal_accepted = 100,
-                                    .reanneal_generated = 10000,
-                                    .min_temperature_ratio = 1e-10,
-                                    .difference = 1e-3,
-                                    .enough = -DBL_MAX};
+    pal_anneal_options *o = options;
+    *o = (pal_anneal_options){.n_start = 100, .n_temperature_sample = 5, .n_batch = 8, .enough = -DBL_MAX};
+    o->ratio_scale = 1e-5, o->anneal_scale = 100, o->cost_scale = 1;
+    o->reanneal_accepted = 100, o->reanneal_generated = 10000;
+    o->min_temperature_ratio = 1e-10, o->difference = 1e-3;
 }
 
 static double rate(const pal_anneal_options *o)
@@ -72,7 +65,7 @@ double pal_anneal_jump(double temperature, double u)
 
 static double acceptance_temperature(const walk *w)
 {
-    return w->t0 * cool(w->o->cost_scale * rate(w->o), w->n, w->k_accept, COLDEST);
+    return w->t0 * cool(w->o->cost_scale * rate(w->o), w->n, w->k_accept, ANNEAL_COLDEST);
 }
 
 static bool has_value(double cost)
@@ -113,8 +106,8 @@ static void draw_candidate(const walk *w, int64_t number, int ahead, double *p)
         double t = cool(c, w->n, count_at(w, i, ahead), o->min_temperature_ratio), range = o->high[i] - o->low[i];
         int draw = 0;
         do p[i] = w->last[i] + range * pal_anneal_jump(t, pal_random_unit(key, counter++));
-        while (!(p[i] >= o->low[i] && p[i] <= o->high[i]) && ++draw < MAX_DRAW);
-        if (draw == MAX_DRAW) p[i] = uniform_point(w, i, pal_random_unit(key, counter++));
+        while (!(p[i] >= o->low[i] && p[i] <= o->high[i]) && ++draw < ANNEAL_MAX_DRAW);
+        if (draw == ANNEAL_MAX_DRAW) p[i] = uniform_point(w, i, pal_random_unit(key, counter++));
     }
 }
 
@@ -245,7 +238,7 @@ static pal_err reanneal(walk *w)
     w->t0 = fmin(w->t0, fmax(fmax(fabs(last), fabs(best)), apart));
     if (!(w->t0 > 0)) w->t0 = DBL_MIN;
     t = fmin(fmax(apart, t), w->t0);
-    w->k_accept = count_of(w->o->cost_scale * c, w->n, t / w->t0, COLDEST);
+    w->k_accept = count_of(w->o->cost_scale * c, w->n, t / w->t0, ANNEAL_COLDEST);
     w->r->n_reanneal++;
     return PAL_ERR_OK;
 }
@@ -307,19 +300,21 @@ static pal_err check_numbers(const pal_anneal_options *o, pal_diagnostic *diag)
             diag, PAL_ERR_REFUSED,
             "annealing: n_start %d, n_temper %d, n_batch %d, wanted 0, 1 and 1 at least, n_batch at most %d",
             o->n_start, o->n_temperature_sample, o->n_batch, (int)PAL_ANNEAL_MAX_BATCH);
-    if (!(o->ratio_scale > 0 && o->ratio_scale < 1))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "annealing: ratio_scale %g, wanted between 0 and 1",
-                                  o->ratio_scale);
-    if (!(o->anneal_scale > 0 && isfinite(o->anneal_scale) && rate(o) > 0 && isfinite(rate(o))))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "annealing: anneal_scale %g, wanted above 0", o->anneal_scale);
-    if (!(o->cost_scale > 0 && o->cost_scale * rate(o) > 0 && isfinite(o->cost_scale * rate(o))))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "annealing: cost_scale %g, wanted above 0", o->cost_scale);
-    if (!(o->min_temperature_ratio > 0 && o->min_temperature_ratio < 1))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "annealing: coldest %g, wanted between 0 and 1",
-                                  o->min_temperature_ratio);
-    if (!(o->difference > 0 && o->difference <= 0.5))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "annealing: difference %g, wanted above 0 and at most 0.5",
-                                  o->difference);
+    const double ratio = o->ratio_scale, scale = o->anneal_scale, c = rate(o), cost = o->cost_scale,
+                 coldest = o->min_temperature_ratio, h = o->difference;
+    const struct {
+        bool valid;
+        const char *name, *wanted;
+        double value;
+    } number[] = {{ratio > 0 && ratio < 1, "ratio_scale", "between 0 and 1", ratio},
+                  {scale > 0 && isfinite(scale) && c > 0 && isfinite(c), "anneal_scale", "above 0", scale},
+                  {cost > 0 && cost * c > 0 && isfinite(cost * c), "cost_scale", "above 0", cost},
+                  {coldest > 0 && coldest < 1, "coldest", "between 0 and 1", coldest},
+                  {h > 0 && h <= 0.5, "difference", "above 0 and at most 0.5", h}};
+    for (size_t k = 0; k < sizeof number / sizeof *number; k++)
+        if (!number[k].valid)
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "annealing: %s %g, wanted %s", number[k].name,
+                                      number[k].value, number[k].wanted);
     if (isnan(o->enough) || !o->evaluate)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
                                   "annealing: enough is no number, or there is nothing to evaluate");
@@ -365,7 +360,6 @@ pal_err pal_anneal(const pal_anneal_options *options, double *best_p, pal_anneal
         memcpy(best_p, w.best, sizeof(double) * n);
         result->temperature = result->best < DBL_MAX ? acceptance_temperature(&w) : 0;
     }
-    free(w.cost);
-    free(memory);
+    PAL_FREE(w.cost, memory);
     return err;
 }

@@ -15,16 +15,13 @@
  * T0_acc), and its count from it.
  *
  * Departures: the temperature of a parameter stays at min_temperature_ratio, where Ingber's program ends, because its
- * law leaves T = 1e-5 after 100 candidates and soon draws steps of size zero. 1e-10 finds the minima of Rastrigin and
- * Corana as fast as no bound; a smooth bent valley needs 1e-6 (Rosenbrock, 15,000 evaluations, the worst of 21 walks:
- * 4e-3 with 1e-10, 6e-7 with 1e-6, 4e-2 with 1e-18). Differences are evaluations of the walk and may become the best
- * point. All numbers are fractions of the ranges, so that a change of units changes nothing.
+ * law soon draws steps of size zero. 1e-10 finds the minima of Rastrigin and Corana as fast as no bound; a smooth bent
+ * valley needs 1e-6 (Rosenbrock). Differences are evaluations of the walk and may become the best point. All numbers
+ * are fractions of the ranges.
  *
  * Candidates are evaluated in batches, in parallel. Candidate number g takes its random numbers from (seed, g) and the
  * last accepted point; when one of a batch is accepted, those after it are discarded and drawn again from the new
- * point. The walk is therefore that of the serial method, number by number, for any batch size. A batch as large as the
- * team that evaluates it wastes no time; a larger one does while many points are accepted. Uses the heap while it runs;
- * thread: [load]. */
+ * point: the walk is that of the serial method for any batch size. Uses the heap while it runs; thread: [load]. */
 #ifndef PAL_NUM_ANNEAL_H
 #define PAL_NUM_ANNEAL_H
 #include "server/base/err.h"

@@ -3,8 +3,9 @@
  * looking at each pair of each clique. */
 #include "server/num/block_matrix.h"
 
-#include <stdlib.h>
-#include <string.h>
+#include "server/base/heap.h"
+
+#include <math.h>
 
 /* items that touch each node: item[start[i]..start[i + 1]) */
 typedef struct incidence {
@@ -84,14 +85,21 @@ pal_err pal_block_matrix_make(int n, const pal_cliques *list, int n_list, pal_ar
 {
     incidence in;
     PAL_TRY(find_items(n, list, n_list, &in));
-    int32_t *stamp = malloc(sizeof *stamp * ((size_t)n + 1));
-    int64_t *column = calloc((size_t)n + 1, sizeof *column);
-    pal_err err = stamp && column ? make_pattern(n, list, &in, stamp, column, arena, out) : PAL_ERR_MEMORY;
-    free(stamp);
-    free(column);
-    free(in.start);
-    free(in.item);
+    pal_err err = PAL_ERR_OK;
+    int32_t *stamp;
+    int64_t *column;
+    PAL_ARRAY(&err, stamp, n);
+    PAL_ZEROED(&err, column, n);
+    if (!err) err = make_pattern(n, list, &in, stamp, column, arena, out);
+    PAL_FREE(stamp, column, in.start, in.item);
     return err;
+}
+
+double pal_block_matrix_scale(double max)
+{
+    int e = 0;
+    if (max > 0 && isfinite(max)) (void)frexp(max, &e);
+    return ldexp(1, e > 1000 ? -1000 : e < -1000 ? 1000 : -e);
 }
 
 int pal_block_matrix_find(const pal_block_matrix *a, int i, int j)

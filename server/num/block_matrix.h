@@ -14,6 +14,9 @@ typedef struct pal_block_matrix {
     double *value;  /* A(3 row + r, 3 column + c) at [9 block + 3 r + c]     [start[n]][9]         */
 } pal_block_matrix;
 
+/* the power of two near 1 / max, the largest diagonal entry: scaled values fit single precision whatever the units */
+double pal_block_matrix_scale(double max);
+
 /* points that are coupled with one another, n_corner at a time (the elements of a component) */
 typedef struct pal_cliques {
     int n_item, n_corner;

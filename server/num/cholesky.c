@@ -11,13 +11,13 @@
  * spin on the processors that simulation threads need. */
 #include "server/num/cholesky.h"
 
+#include "server/base/heap.h"
+#include "server/base/thread.h"
 #include "server/num/panels.h"
 
 #include <cholmod.h>
 #include <dlfcn.h>
 #include <math.h>
-#include <pthread.h>
-#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -41,8 +41,6 @@ typedef struct factor {
     bool single, good;
 } factor;
 
-typedef enum work { WORK_NONE, WORK_BEGUN, WORK_DONE } work;
-
 struct pal_cholesky {
     int n, n_free;    /* points, free points */
     int32_t *place;   /* position of each point in the factor, -1: fixed  [n] */
@@ -53,33 +51,28 @@ struct pal_cholesky {
     void *y, *vector; /* working vectors of a solve */
     work_area own, spare;
     factor now, next;
-    /* the spare thread: all members below are its own while state is WORK_BEGUN, spare and next included */
-    bool threaded, quit;
+    bool threaded, refreshing; /* there is a spare thread; it was given values that are not adopted yet */
     pthread_t thread;
     pthread_mutex_t lock;
     pthread_cond_t changed;
-    work state;
+    bool quit, busy; /* under the lock. While busy, outcome, spare and next belong to the spare thread */
     pal_err outcome;
 };
+
+/* calls a function of a library, where that is loaded */
+static void call_loaded(const char *name, int value)
+{
+    void (*set)(int);
+    void *at = dlsym(RTLD_DEFAULT, name);
+    if (!at) return;
+    memcpy(&set, &at, sizeof set);
+    set(value);
+}
 
 /* BLAS libraries with threads of their own are limited to the calling thread; once per process */
 static void limit_blas_threads(void)
 {
-    void (*set)(int);
-    void *at = dlsym(RTLD_DEFAULT, "openblas_set_num_threads");
-    if (!at) return;
-    memcpy(&set, &at, sizeof set);
-    set(1);
-}
-
-/* for this thread: OpenMP regions inside CHOLMOD run on it alone */
-static void use_calling_thread(void)
-{
-    void (*set)(int);
-    void *at = dlsym(RTLD_DEFAULT, "omp_set_max_active_levels");
-    if (!at) return;
-    memcpy(&set, &at, sizeof set);
-    set(0);
+    call_loaded("openblas_set_num_threads", 1);
 }
 
 static pal_err error_of(const cholmod_common *common)
@@ -141,18 +134,10 @@ static int64_t lay_columns(const pal_block_matrix *a, const int32_t *number, int
 
 static cholmod_sparse sparse_of(int n, int64_t n_entry, int *start, int *row, double *value)
 {
-    return (cholmod_sparse){.nrow = (size_t)n,
-                            .ncol = (size_t)n,
-                            .nzmax = (size_t)n_entry,
-                            .p = start,
-                            .i = row,
-                            .x = value,
-                            .stype = -1,
-                            .itype = CHOLMOD_INT,
-                            .xtype = value ? CHOLMOD_REAL : CHOLMOD_PATTERN,
-                            .dtype = CHOLMOD_DOUBLE,
-                            .sorted = 1,
-                            .packed = 1};
+    cholmod_sparse a = {.nrow = (size_t)n, .ncol = (size_t)n, .nzmax = (size_t)n_entry, .sorted = 1, .packed = 1};
+    a.p = start, a.i = row, a.x = value, a.stype = -1;
+    a.itype = CHOLMOD_INT, a.dtype = CHOLMOD_DOUBLE, a.xtype = value ? CHOLMOD_REAL : CHOLMOD_PATTERN;
+    return a;
 }
 
 /* the order of points with the fewest entries of the factor, as an order of unknowns [3 n_free] */
@@ -161,8 +146,10 @@ static pal_err find_order(const pal_block_matrix *a, const int32_t *number, int 
     cholmod_common common;
     cholmod_factor *found = NULL;
     int64_t n_entry = lay_columns(a, number, 1, NULL, NULL);
-    int *start = malloc(sizeof *start * ((size_t)n_free + 1)), *row = malloc(sizeof *row * (size_t)n_entry);
-    pal_err err = start && row ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    int *start, *row;
+    PAL_ARRAY(&err, start, n_free + 1);
+    PAL_ARRAY(&err, row, n_entry);
     if (!err) {
         lay_columns(a, number, 1, start, row);
         cholmod_sparse points = sparse_of(n_free, n_entry, start, row, NULL);
@@ -183,8 +170,7 @@ static pal_err find_order(const pal_block_matrix *a, const int32_t *number, int 
         cholmod_free_factor(&found, &common);
         cholmod_finish(&common);
     }
-    free(start);
-    free(row);
+    PAL_FREE(start, row);
     return err;
 }
 
@@ -223,25 +209,25 @@ static pal_err make(pal_cholesky *c, const pal_block_matrix *a, const uint8_t *f
     static pthread_once_t once = PTHREAD_ONCE_INIT;
     static pthread_mutex_t one_at_a_time = PTHREAD_MUTEX_INITIALIZER;
     pthread_once(&once, limit_blas_threads);
-    c->place = malloc(sizeof *c->place * ((size_t)c->n + 1));
-    if (!c->place) return PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    PAL_ARRAY(&err, c->place, c->n);
+    if (err) return err;
     int32_t *number = c->place;
     for (int i = 0; i < c->n; i++) number[i] = fixed && fixed[i] ? -1 : c->n_free++;
     if (c->n_free == 0) return PAL_ERR_OK;
     c->n_entry = lay_columns(a, number, 3, NULL, NULL);
     if (c->n_entry > INT32_MAX || c->n_free > INT32_MAX / 3) return PAL_ERR_MEMORY;
-    c->start = malloc(sizeof *c->start * (3 * (size_t)c->n_free + 1));
-    c->row = malloc(sizeof *c->row * (size_t)c->n_entry);
-    if (!c->start || !c->row) return PAL_ERR_MEMORY;
+    PAL_ARRAY(&err, c->start, 3 * (size_t)c->n_free + 1);
+    PAL_ARRAY(&err, c->row, c->n_entry);
+    if (err) return err;
     lay_columns(a, number, 3, c->start, c->row);
     /* the graph partitioner below CHOLMOD keeps one random number generator for the process */
     pthread_mutex_lock(&one_at_a_time);
-    pal_err err = analyse(c, a, number);
+    err = analyse(c, a, number);
     pthread_mutex_unlock(&one_at_a_time);
     if (err) return err;
-    size_t n_work = (size_t)c->panels.max_row + PAL_PANEL_PADDING;
     c->y = calloc(3 * (size_t)c->n_free, sizeof(double));
-    c->vector = calloc(n_work, sizeof(double));
+    c->vector = calloc((size_t)c->panels.max_row + PAL_PANEL_PADDING, sizeof(double));
     return c->y && c->vector ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
@@ -276,14 +262,7 @@ void pal_cholesky_destroy(pal_cholesky *c)
     end_work_area(&c->own);
     end_work_area(&c->spare);
     pal_panels_free(&c->panels);
-    free(c->place);
-    free(c->start);
-    free(c->row);
-    free(c->y);
-    free(c->vector);
-    free(c->now.value);
-    free(c->next.value);
-    free(c);
+    PAL_FREE(c->place, c->start, c->row, c->y, c->vector, c->now.value, c->next.value, c);
 }
 
 /* copies the scaled values of the lower triangle of a without fixed points; reports whether they are finite */
@@ -296,9 +275,7 @@ static pal_err take_values(const pal_cholesky *c, const pal_block_matrix *a, wor
         const double *v = a->value + 9 * (size_t)a->start[j];
         if (c->place[j] >= 0) max = fmax(max, fmax(v[0], fmax(v[4], v[8])));
     }
-    int e = 0;
-    if (max > 0 && isfinite(max)) (void)frexp(max, &e);
-    b->scale = ldexp(1, e > 1000 ? -1000 : e < -1000 ? 1000 : -e);
+    b->scale = pal_block_matrix_scale(max);
     double *to = b->value;
     for (int j = 0; j < a->n; j++) {
         if (c->place[j] < 0) continue;
@@ -344,7 +321,7 @@ static pal_err factor_values(const pal_cholesky *c, work_area *b, bool single, f
 {
     if (!b->finite) return PAL_ERR_NUMERIC;
     if (!fits(c, b, single)) return PAL_ERR_MEMORY;
-    use_calling_thread();
+    call_loaded("omp_set_max_active_levels", 0); /* OpenMP regions inside CHOLMOD run on this thread alone */
     cholmod_sparse matrix = sparse_of(3 * c->n_free, c->n_entry, c->start, c->row, b->value);
     cholmod_factor *l = cholmod_copy_factor(b->pattern, &b->common);
     if (!l) return error_of(&b->common);
@@ -376,34 +353,13 @@ static pal_err factor_values(const pal_cholesky *c, work_area *b, bool single, f
 
 pal_err pal_cholesky_factor(pal_cholesky *c, const pal_block_matrix *a, bool single)
 {
-    if (pal_cholesky_refreshing(c)) return PAL_ERR_STATE;
+    if (c->refreshing) return PAL_ERR_STATE;
     if (c->n_free == 0) {
         c->now.good = true;
         return PAL_ERR_OK;
     }
     PAL_TRY(take_values(c, a, &c->own));
     return factor_values(c, &c->own, single, &c->now);
-}
-
-static void solve_panels(pal_cholesky *c, const double *b, double s, double *x)
-{
-    const pal_panels *p = &c->panels;
-    double t = c->now.scale / s;
-    if (c->now.single) {
-        float *y = c->y;
-        for (int i = 0; i < c->n; i++)
-            for (int k = 0; k < 3 && c->place[i] >= 0; k++) y[3 * c->place[i] + k] = (float)(s * b[3 * i + k]);
-        pal_panels_solve_single(p, c->now.value, y, c->vector);
-        for (int i = 0; i < c->n; i++)
-            for (int k = 0; k < 3; k++) x[3 * i + k] = c->place[i] < 0 ? 0 : t * (double)y[3 * c->place[i] + k];
-    } else {
-        double *y = c->y;
-        for (int i = 0; i < c->n; i++)
-            for (int k = 0; k < 3 && c->place[i] >= 0; k++) y[3 * c->place[i] + k] = s * b[3 * i + k];
-        pal_panels_solve_double(p, c->now.value, y, c->vector);
-        for (int i = 0; i < c->n; i++)
-            for (int k = 0; k < 3; k++) x[3 * i + k] = c->place[i] < 0 ? 0 : t * y[3 * c->place[i] + k];
-    }
 }
 
 pal_err pal_cholesky_solve(pal_cholesky *c, const double *b, double *x)
@@ -420,13 +376,15 @@ pal_err pal_cholesky_solve(pal_cholesky *c, const double *b, double *x)
         for (int i = 0; i < 3 * c->n; i++) x[i] = 0;
         return PAL_ERR_OK;
     }
-    int e;
-    (void)frexp(max, &e);
+    double s = pal_block_matrix_scale(max), t = c->now.scale / s;
 #ifdef __SSE2__
     unsigned mode = _mm_getcsr();
     _mm_setcsr(mode | 0x8040); /* flush to zero, denormals are zero */
 #endif
-    solve_panels(c, b, ldexp(1, e > 1000 ? -1000 : e < -1000 ? 1000 : -e), x);
+    if (c->now.single)
+        pal_panels_solve_single(&c->panels, c->now.value, c->n, c->place, s, b, t, x, c->y, c->vector);
+    else
+        pal_panels_solve_double(&c->panels, c->now.value, c->n, c->place, s, b, t, x, c->y, c->vector);
 #ifdef __SSE2__
     _mm_setcsr(mode);
 #endif
@@ -438,13 +396,13 @@ static void *spare_thread(void *self)
     pal_cholesky *c = self;
     pthread_mutex_lock(&c->lock);
     for (;;) {
-        while (!c->quit && c->state != WORK_BEGUN) pthread_cond_wait(&c->changed, &c->lock);
+        while (!c->quit && !c->busy) pthread_cond_wait(&c->changed, &c->lock);
         if (c->quit) break;
         pthread_mutex_unlock(&c->lock);
         pal_err err = factor_values(c, &c->spare, c->next.single, &c->next);
         pthread_mutex_lock(&c->lock);
         c->outcome = err;
-        c->state = WORK_DONE;
+        c->busy = false;
         pthread_cond_broadcast(&c->changed);
     }
     pthread_mutex_unlock(&c->lock);
@@ -458,57 +416,42 @@ static pal_err start_spare(pal_cholesky *c)
     if (!c->spare.pattern) c->spare.pattern = cholmod_copy_factor(c->own.pattern, &c->spare.common);
     if (!c->spare.pattern) return error_of(&c->spare.common);
     if (c->threaded) return PAL_ERR_OK;
-    sigset_t all, old; /* the main thread handles signals */
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &old);
-    c->threaded = pthread_create(&c->thread, NULL, spare_thread, c) == 0;
-    pthread_sigmask(SIG_SETMASK, &old, NULL);
+    c->threaded = pal_thread_start(&c->thread, spare_thread, c) == 0;
     return c->threaded ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 pal_err pal_cholesky_refresh(pal_cholesky *c, const pal_block_matrix *a)
 {
-    if (pal_cholesky_refreshing(c) || !c->now.good) return PAL_ERR_STATE;
+    if (c->refreshing || !c->now.good) return PAL_ERR_STATE;
     if (c->n_free > 0) {
         PAL_TRY(start_spare(c));
         PAL_TRY(take_values(c, a, &c->spare));
-        if (!c->next.value) c->next.single = c->now.single;
         if (c->next.single != c->now.single) {
             free(c->next.value);
             c->next = (factor){.single = c->now.single};
         }
+        pthread_mutex_lock(&c->lock);
+        c->busy = true;
+        pthread_cond_broadcast(&c->changed);
+        pthread_mutex_unlock(&c->lock);
     }
-    pthread_mutex_lock(&c->lock);
-    c->state = c->n_free > 0 ? WORK_BEGUN : WORK_DONE;
-    c->outcome = PAL_ERR_OK;
-    pthread_cond_broadcast(&c->changed);
-    pthread_mutex_unlock(&c->lock);
+    c->refreshing = true;
     return PAL_ERR_OK;
 }
 
-pal_err pal_cholesky_adopt(pal_cholesky *c, bool wait)
+pal_err pal_cholesky_adopt(pal_cholesky *c)
 {
+    if (!c->refreshing) return PAL_ERR_STATE;
+    c->refreshing = false;
     pthread_mutex_lock(&c->lock);
-    while (wait && c->state == WORK_BEGUN) pthread_cond_wait(&c->changed, &c->lock);
-    work state = c->state;
+    while (c->busy) pthread_cond_wait(&c->changed, &c->lock);
     pal_err err = c->outcome;
-    if (state == WORK_DONE) c->state = WORK_NONE;
     pthread_mutex_unlock(&c->lock);
-    if (state != WORK_DONE) return PAL_ERR_STATE;
     if (err || c->n_free == 0) return err;
     factor old = c->now;
     c->now = c->next;
     c->next = old;
     return PAL_ERR_OK;
-}
-
-bool pal_cholesky_refreshing(const pal_cholesky *c)
-{
-    pthread_mutex_t *lock = (pthread_mutex_t *)&c->lock;
-    pthread_mutex_lock(lock);
-    bool under_way = c->state != WORK_NONE;
-    pthread_mutex_unlock(lock);
-    return under_way;
 }
 
 int64_t pal_cholesky_nonzeros(const pal_cholesky *c)
@@ -519,15 +462,4 @@ int64_t pal_cholesky_nonzeros(const pal_cholesky *c)
 double pal_cholesky_flops(const pal_cholesky *c)
 {
     return c->flops;
-}
-
-size_t pal_cholesky_bytes(const pal_cholesky *c)
-{
-    size_t n_byte = 0;
-    bool single = c->now.single;
-    size_t one = (size_t)c->panels.n_value[single] * (single ? sizeof(float) : sizeof(double));
-    if (c->now.value) n_byte += one;
-    /* the next factor has the same precision; the spare thread owns it while that is at work */
-    if (c->spare.started) n_byte += one;
-    return n_byte;
 }

@@ -25,12 +25,9 @@ pal_err pal_cholesky_factor(pal_cholesky *c, const pal_block_matrix *a, bool sin
 pal_err pal_cholesky_solve(pal_cholesky *c, const double *b, double *x);
 /* a second factor on a spare thread: copies the values of a and returns at once. STATE: one is under way */
 pal_err pal_cholesky_refresh(pal_cholesky *c, const pal_block_matrix *a);
-/* Puts the factor of the spare thread into use. STATE: none was begun, or it is not ready and wait is false; NUMERIC,
- * MEMORY: it failed and the previous factor stays */
-pal_err pal_cholesky_adopt(pal_cholesky *c, bool wait);
-bool pal_cholesky_refreshing(const pal_cholesky *c); /* a refresh was begun and its factor is not yet adopted */
-
+/* Waits for the factor of the spare thread and puts it into use. STATE: none was begun; NUMERIC, MEMORY: it failed and
+ * the previous factor stays */
+pal_err pal_cholesky_adopt(pal_cholesky *c);
 int64_t pal_cholesky_nonzeros(const pal_cholesky *c); /* of the factor */
 double pal_cholesky_flops(const pal_cholesky *c); /* of one factorisation, from the analysis: equal on all machines */
-size_t pal_cholesky_bytes(const pal_cholesky *c); /* of all factors */
 #endif

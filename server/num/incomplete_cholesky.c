@@ -2,11 +2,11 @@
  * entry. */
 #include "server/num/incomplete_cholesky.h"
 
+#include "server/num/tuning.h"
+
 #include <math.h>
 #include <stdbool.h>
 #include <string.h>
-
-static const double first_shift = 1e-3, max_shift = 1e3, more_shift = 4, min_pivot = 1e-6;
 
 pal_err pal_incomplete_cholesky_make(const pal_block_matrix *pattern, const uint8_t *fixed, pal_arena *arena,
                                      pal_incomplete_cholesky *out)
@@ -22,14 +22,14 @@ static bool is_fixed(const pal_incomplete_cholesky *f, int i)
     return f->fixed && f->fixed[i];
 }
 
-/* of a symmetric block by cofactors; false: it is not positive definite, or its pivots have lost all but `min_pivot`
+/* of a symmetric block by cofactors; false: it is not positive definite, or its pivots have lost all but PIVOT_MIN
  * of the diagonal */
 static bool invert(const double *m, const double *diagonal, double *out)
 {
     const double d0 = m[0], d1 = m[4] - m[3] * m[3] / d0;
     const double c00 = m[4] * m[8] - m[7] * m[7], c10 = m[6] * m[7] - m[3] * m[8], c20 = m[3] * m[7] - m[4] * m[6];
     const double det = m[0] * c00 + m[3] * c10 + m[6] * c20, d2 = det / (d0 * d1), by = 1 / det;
-    if (!(d0 > min_pivot * diagonal[0] && d1 > min_pivot * diagonal[4] && d2 > min_pivot * diagonal[8])) return false;
+    if (!(d0 > PIVOT_MIN * diagonal[0] && d1 > PIVOT_MIN * diagonal[4] && d2 > PIVOT_MIN * diagonal[8])) return false;
     out[0] = by * c00, out[1] = out[3] = by * c10, out[2] = out[6] = by * c20;
     out[4] = by * (m[0] * m[8] - m[6] * m[6]), out[5] = out[7] = by * (m[6] * m[3] - m[0] * m[7]);
     out[8] = by * (m[0] * m[4] - m[3] * m[3]);
@@ -40,11 +40,9 @@ static bool invert(const double *m, const double *diagonal, double *out)
 static bool take(pal_incomplete_cholesky *f, const pal_block_matrix *a)
 {
     double max = 0, sum = 0;
-    int e = 0;
     for (int j = 0; j < a->n; j++)
         for (int c = 0; c < 9 && !is_fixed(f, j); c += 4) max = fmax(max, a->value[9 * (size_t)a->start[j] + c]);
-    if (max > 0 && isfinite(max)) (void)frexp(max, &e);
-    f->scale = ldexp(1, e > 1000 ? -1000 : e < -1000 ? 1000 : -e);
+    f->scale = pal_block_matrix_scale(max);
     for (int j = 0; j < a->n; j++)
         for (int k = a->start[j]; k < a->start[j + 1]; k++) {
             const bool off = is_fixed(f, j) || is_fixed(f, a->row[k]);
@@ -115,7 +113,7 @@ static bool factor(pal_incomplete_cholesky *f, const pal_block_matrix *a, double
 pal_err pal_incomplete_cholesky_factor(pal_incomplete_cholesky *f, const pal_block_matrix *a)
 {
     memset(f->inverse, 0, 9 * sizeof *f->inverse * (size_t)a->n);
-    for (double shift = 0; shift<max_shift; shift = shift> 0 ? more_shift * shift : first_shift) {
+    for (double shift = 0; shift < SHIFT_MAX; shift = fmax(SHIFT_GROWS * shift, SHIFT_FIRST)) {
         if (!take(f, a)) return PAL_ERR_NUMERIC;
         if (factor(f, a, shift)) return PAL_ERR_OK;
     }

@@ -1,6 +1,9 @@
 /* Sparse interpolation matrices: built row by row in a dense accumulator, multiplied, applied (paper A eq. 1). */
 #include "server/num/interpolation.h"
 
+#include "server/base/heap.h"
+#include "server/num/sort.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,9 +12,7 @@
 
 void pal_interpolation_free(pal_interpolation *rows)
 {
-    free(rows->start);
-    free(rows->point);
-    free(rows->weight);
+    PAL_FREE(rows->start, rows->point, rows->weight);
     memset(rows, 0, sizeof *rows);
 }
 
@@ -30,13 +31,12 @@ pal_err pal_interpolation_builder_begin(pal_interpolation_builder *b, int32_t n_
     b->max = max_entry < INT32_MAX ? max_entry : INT32_MAX;
     b->cap = 8 * (int64_t)n_row + 16;
     if (b->cap > b->max) b->cap = b->max;
-    b->rows.start = calloc((size_t)n_row + 1, sizeof *b->rows.start);
-    b->rows.point = malloc((size_t)b->cap * sizeof *b->rows.point + 1);
-    b->rows.weight = malloc((size_t)b->cap * sizeof *b->rows.weight + 1);
-    b->open = malloc((size_t)n_point * sizeof *b->open + 1);
-    b->sum = calloc((size_t)n_point + 1, sizeof *b->sum);
-    b->in = calloc((size_t)n_point + 1, 1);
-    if (!b->rows.start || !b->rows.point || !b->rows.weight || !b->open || !b->sum || !b->in) b->err = PAL_ERR_MEMORY;
+    PAL_ZEROED(&b->err, b->rows.start, (size_t)n_row + 1);
+    PAL_ARRAY(&b->err, b->rows.point, b->cap);
+    PAL_ARRAY(&b->err, b->rows.weight, b->cap);
+    PAL_ARRAY(&b->err, b->open, n_point);
+    PAL_ZEROED(&b->err, b->sum, n_point);
+    PAL_ZEROED(&b->err, b->in, n_point);
     return b->err;
 }
 
@@ -60,31 +60,14 @@ static void grow(pal_interpolation_builder *b, int64_t n)
         b->err = PAL_ERR_MEMORY;
 }
 
-static int ascending(const void *a, const void *b)
-{
-    int32_t i = *(const int32_t *)a, j = *(const int32_t *)b;
-    return i < j ? -1 : i > j;
-}
-
-static void sort(int32_t *item, int32_t n)
-{
-    if (n > 64) {
-        qsort(item, (size_t)n, sizeof *item, ascending);
-        return;
-    }
-    for (int32_t i = 1; i < n; i++) {
-        int32_t at = item[i], j = i;
-        for (; j > 0 && item[j - 1] > at; j--) item[j] = item[j - 1];
-        item[j] = at;
-    }
-}
+PAL_SORT(sort, int32_t, pal_compare_int32)
 
 void pal_interpolation_builder_end_row(pal_interpolation_builder *b)
 {
     PAL_ASSERT(b->rows.n_row < b->row_cap);
     if (!b->err) grow(b, b->n_open);
     if (b->err) return;
-    sort(b->open, b->n_open);
+    sort(b->open, (size_t)b->n_open);
     int32_t n = b->rows.start[b->rows.n_row];
     for (int32_t k = 0; k < b->n_open; k++) {
         int32_t i = b->open[k];
@@ -95,12 +78,16 @@ void pal_interpolation_builder_end_row(pal_interpolation_builder *b)
     b->rows.start[++b->rows.n_row] = n;
 }
 
+void pal_interpolation_builder_mean(pal_interpolation_builder *b, const int32_t *point, int32_t n)
+{
+    for (int32_t k = 0; k < n && !b->err; k++) pal_interpolation_builder_add(b, point[k], 1.0 / n);
+    pal_interpolation_builder_end_row(b);
+}
+
 pal_err pal_interpolation_builder_finish(pal_interpolation_builder *b, pal_interpolation *out)
 {
     pal_err err = b->err;
-    free(b->open);
-    free(b->sum);
-    free(b->in);
+    PAL_FREE(b->open, b->sum, b->in);
     if (err)
         pal_interpolation_free(&b->rows);
     else
@@ -115,27 +102,30 @@ pal_err pal_interpolation_identity(int32_t n, pal_interpolation *out)
 {
     pal_interpolation_builder b;
     pal_interpolation_builder_begin(&b, n, n, n);
-    for (int32_t i = 0; i < n && !b.err; i++) {
-        pal_interpolation_builder_add(&b, i, 1);
-        pal_interpolation_builder_end_row(&b);
-    }
+    for (int32_t i = 0; i < n; i++) pal_interpolation_builder_mean(&b, &i, 1);
     return pal_interpolation_builder_finish(&b, out);
+}
+
+void pal_interpolation_builder_product(pal_interpolation_builder *b, const pal_interpolation *outer,
+                                       const pal_interpolation *inner)
+{
+    PAL_ASSERT(!outer || outer->n_point == inner->n_row);
+    for (int32_t i = 0; i < (outer ? outer->n_row : inner->n_row) && !b->err; i++) {
+        for (int32_t k = outer ? outer->start[i] : i; k < (outer ? outer->start[i + 1] : i + 1); k++) {
+            int32_t mid = outer ? outer->point[k] : k;
+            for (int32_t m = inner->start[mid]; m < inner->start[mid + 1]; m++)
+                pal_interpolation_builder_add(b, inner->point[m], (outer ? outer->weight[k] : 1) * inner->weight[m]);
+        }
+        pal_interpolation_builder_end_row(b);
+    }
 }
 
 pal_err pal_interpolation_product(const pal_interpolation *outer, const pal_interpolation *inner, int64_t max_entry,
                                   pal_interpolation *out)
 {
-    PAL_ASSERT(outer->n_point == inner->n_row);
     pal_interpolation_builder b;
     pal_interpolation_builder_begin(&b, outer->n_row, inner->n_point, max_entry);
-    for (int32_t i = 0; i < outer->n_row && !b.err; i++) {
-        for (int32_t k = outer->start[i]; k < outer->start[i + 1]; k++) {
-            int32_t mid = outer->point[k];
-            for (int32_t m = inner->start[mid]; m < inner->start[mid + 1]; m++)
-                pal_interpolation_builder_add(&b, inner->point[m], outer->weight[k] * inner->weight[m]);
-        }
-        pal_interpolation_builder_end_row(&b);
-    }
+    pal_interpolation_builder_product(&b, outer, inner);
     return pal_interpolation_builder_finish(&b, out);
 }
 

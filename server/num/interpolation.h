@@ -50,6 +50,11 @@ static inline void pal_interpolation_builder_add(pal_interpolation_builder *b, i
 }
 /* ends the open row; entries that have cancelled are dropped */
 void pal_interpolation_builder_end_row(pal_interpolation_builder *b);
+/* adds the rows of outer inner; outer NULL: the identity */
+void pal_interpolation_builder_product(pal_interpolation_builder *b, const pal_interpolation *outer,
+                                       const pal_interpolation *inner);
+/* adds and ends a row: the mean of n points */
+void pal_interpolation_builder_mean(pal_interpolation_builder *b, const int32_t *point, int32_t n);
 /* moves the matrix out if there was no error; frees everything else in any case */
 pal_err pal_interpolation_builder_finish(pal_interpolation_builder *b, pal_interpolation *out);
 #endif

@@ -57,8 +57,8 @@ double pal_lanczos_run(pal_lanczos *l, double tolerance, int min, int max)
     beta = sqrt(pal_dot_product(l->n, l->w, l->z));
     if (beta == 0) return 0;
     while (l->done < max) {
-        double *q = l->basis + (size_t)l->done * n;
-        const double *before = l->done > 0 ? q - n : NULL;
+        double *q = l->basis + (size_t)(l->done % l->n_basis) * n;
+        const double *before = l->done > 0 ? l->basis + (size_t)((l->done - 1) % l->n_basis) * n : NULL;
         for (size_t i = 0; i < n; i++) q[i] = l->z[i] / beta, l->w[i] /= beta;
         if (!l->multiply(l->user, l->w, l->u)) return NAN;
         double alpha = pal_dot_product(l->n, l->u, l->w);
@@ -73,6 +73,6 @@ double pal_lanczos_run(pal_lanczos *l, double tolerance, int min, int max)
         if (!(beta > 1e-12 * fabs(l->ritz))) break;
         if (l->done >= min && l->residual <= tolerance * l->ritz) break;
     }
-    combine(l, s);
+    if (l->done <= l->n_basis) combine(l, s);
     return l->ritz + l->residual;
 }

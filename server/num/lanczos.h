@@ -15,7 +15,8 @@ typedef struct pal_lanczos {
     bool (*solve)(void *user, const double *b, double *out);    /* out ~ M^-1 b; false: give up */
     void *user;
     double *z;     /* in: M times the first vector, not 0; out: M times the Ritz vector, to start the next call [n] */
-    double *basis; /* work [most][n]                                                                               */
+    double *basis; /* work [n_basis][n]: as many as iterations, or 2 without a Ritz vector in z                   */
+    int n_basis;
     double *w, *u; /* work [n]                                                                                     */
     int done;      /* out: iterations                                                                              */
     double ritz, residual; /* out: the largest Ritz value, and the maximum distance of an eigenvalue from it */

@@ -22,8 +22,10 @@ typedef struct pal_mass_operator {
     double *scratch_kg_s;   /* [n_entry]     */
 } pal_mass_operator;
 
-/* out = M p; p and out [n_point][3] do not overlap */
-void pal_mass_operator_multiply(const pal_mass_operator *mass, const double *p, double *out);
+/* out = (a M + b D) p with D the damping, 0 at points where skip [n_point] is not 0 (NULL: none); p and out
+ * [n_point][3] do not overlap */
+void pal_mass_operator_multiply(const pal_mass_operator *mass, double a, double b, const uint8_t *skip, const double *p,
+                                double *out);
 /* v' M v / 2, J; v m/s [n_point][3] */
 double pal_mass_operator_kinetic_J(const pal_mass_operator *mass, const double *v);
 #endif

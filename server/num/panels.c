@@ -1,6 +1,8 @@
 /* The pattern of panels.h. */
 #include "server/num/panels.h"
 
+#include "server/base/heap.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -61,9 +63,6 @@ pal_err pal_panels_make(int n_super, const int *super, const int *pi, const int 
 
 void pal_panels_free(pal_panels *p)
 {
-    free(p->first);
-    free(p->start);
-    free(p->row);
-    free(p->width);
+    PAL_FREE(p->first, p->start, p->row, p->width);
     memset(p, 0, sizeof *p);
 }

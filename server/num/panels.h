@@ -35,8 +35,11 @@ void pal_panels_free(pal_panels *p);
 /* values from supernodes by columns, px [n_super] first value of each; into n_value[single] numbers */
 void pal_panels_fill_double(const pal_panels *p, const int *px, const double *x, double *value);
 void pal_panels_fill_single(const pal_panels *p, const int *px, const double *x, float *value);
-/* y = L^-T L^-1 y, y [3 n_point]; work: max_row + PAL_PANEL_PADDING finite numbers. value at a multiple of 32 bytes */
-void pal_panels_solve_double(const pal_panels *p, const double *value, double *y, double *work);
-void pal_panels_solve_single(const pal_panels *p, const float *value, float *y, float *work);
-
+/* x = t L^-T L^-1 s b for the n points of b and x [n][3], of which point i is point place[i] of the factor, or 0 where
+ * that is negative. y [3 n_point] and work, max_row + PAL_PANEL_PADDING finite numbers, are scratch. value at a
+ * multiple of 32 bytes */
+void pal_panels_solve_double(const pal_panels *p, const double *value, int n, const int32_t *place, double s,
+                             const double *b, double t, double *x, double *y, double *work);
+void pal_panels_solve_single(const pal_panels *p, const float *value, int n, const int32_t *place, double s,
+                             const double *b, double t, double *x, float *y, float *work);
 #endif

@@ -67,40 +67,18 @@ static inline int64_t panel_size(int k, int r)
     return 2 * (int64_t)k * chunks_of(k) + (int64_t)k * chunks_of(r);
 }
 
+/* a pass with its number of columns as a constant */
+#define WITH_CONSTANT(pass, k, r, l, t)                                                                                \
+    ((k) == 3 ? pass(3, r, l, t) : (k) == 6 ? pass(6, r, l, t) : (k) == 9 ? pass(9, r, l, t) : pass(12, r, l, t))
+
 static void forward_panel(int k, int r, const vec *l, REAL *t)
 {
-    switch (k) {
-    case 3:
-        forward(3, r, l, t);
-        break;
-    case 6:
-        forward(6, r, l, t);
-        break;
-    case 9:
-        forward(9, r, l, t);
-        break;
-    default:
-        forward(12, r, l, t);
-        break;
-    }
+    WITH_CONSTANT(forward, k, r, l, t);
 }
 
 static void backward_panel(int k, int r, const vec *l, REAL *t)
 {
-    switch (k) {
-    case 3:
-        backward(3, r, l, t);
-        break;
-    case 6:
-        backward(6, r, l, t);
-        break;
-    case 9:
-        backward(9, r, l, t);
-        break;
-    default:
-        backward(12, r, l, t);
-        break;
-    }
+    WITH_CONSTANT(backward, k, r, l, t);
 }
 
 static bool all_zero(const REAL *y, int n)
@@ -110,7 +88,16 @@ static bool all_zero(const REAL *y, int n)
     return true;
 }
 
-void NAME(pal_panels_solve)(const pal_panels *p, const REAL *value, REAL *y, REAL *work)
+/* the rows of a supernode */
+static void gather(const int32_t *row, int n_col, int n_row, const REAL *own, const REAL *y, REAL *work)
+{
+    memcpy(work, own, sizeof(REAL) * 3 * (size_t)n_col);
+    for (int i = n_col; i < n_row; i++)
+        for (int k = 0; k < 3; k++) work[3 * i + k] = y[3 * (size_t)row[i] + k];
+}
+
+/* y = L^-T L^-1 y */
+static void solve_all(const pal_panels *p, const REAL *value, REAL *y, REAL *work)
 {
     const vec *l = (const vec *)value;
     const uint8_t *width = p->width;
@@ -122,9 +109,7 @@ void NAME(pal_panels_solve)(const pal_panels *p, const REAL *value, REAL *y, REA
             for (int c = 0; c < n_col; c += *width++) l += panel_size(3 * *width, 3 * (n_row - c - *width));
             continue;
         }
-        memcpy(work, own, sizeof(REAL) * 3 * (size_t)n_col);
-        for (int i = n_col; i < n_row; i++)
-            for (int k = 0; k < 3; k++) work[3 * i + k] = y[3 * (size_t)row[i] + k];
+        gather(row, n_col, n_row, own, y, work);
         for (int c = 0, m; c < n_col; c += m) {
             m = *width++;
             forward_panel(3 * m, 3 * (n_row - c - m), l, work + 3 * c);
@@ -138,9 +123,7 @@ void NAME(pal_panels_solve)(const pal_panels *p, const REAL *value, REAL *y, REA
         const int32_t *row = p->row + p->start[s];
         int n_col = p->first[s + 1] - p->first[s], n_row = (int)(p->start[s + 1] - p->start[s]);
         REAL *own = y + 3 * (size_t)p->first[s];
-        memcpy(work, own, sizeof(REAL) * 3 * (size_t)n_col);
-        for (int i = n_col; i < n_row; i++)
-            for (int k = 0; k < 3; k++) work[3 * i + k] = y[3 * (size_t)row[i] + k];
+        gather(row, n_col, n_row, own, y, work);
         for (int c = n_col, m; c > 0; c -= m) {
             m = *--width;
             l -= panel_size(3 * m, 3 * (n_row - c));
@@ -148,6 +131,16 @@ void NAME(pal_panels_solve)(const pal_panels *p, const REAL *value, REAL *y, REA
         }
         memcpy(own, work, sizeof(REAL) * 3 * (size_t)n_col);
     }
+}
+
+void NAME(pal_panels_solve)(const pal_panels *p, const REAL *value, int n, const int32_t *place, double s,
+                            const double *b, double t, double *x, REAL *y, REAL *work)
+{
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < 3 && place[i] >= 0; k++) y[3 * place[i] + k] = (REAL)(s * b[3 * i + k]);
+    solve_all(p, value, y, work);
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < 3; k++) x[3 * i + k] = place[i] < 0 ? 0 : t * (double)y[3 * place[i] + k];
 }
 
 /* inverse of the lower triangle at x (columns ld apart), row-major k x k */

@@ -36,21 +36,11 @@ void pal_matrix_quat(const double r[9], double q[4])
     int k = 0;
     for (int i = 1; i < 4; i++)
         if (t[i] > t[k]) k = i;
-    double d[4];
-    switch (k) {
-    case 0:
-        d[0] = 1 + t[0], d[1] = r[7] - r[5], d[2] = r[2] - r[6], d[3] = r[3] - r[1];
-        break;
-    case 1:
-        d[0] = r[7] - r[5], d[1] = 1 + t[1], d[2] = r[1] + r[3], d[3] = r[2] + r[6];
-        break;
-    case 2:
-        d[0] = r[2] - r[6], d[1] = r[1] + r[3], d[2] = 1 + t[2], d[3] = r[5] + r[7];
-        break;
-    default:
-        d[0] = r[3] - r[1], d[1] = r[2] + r[6], d[2] = r[5] + r[7], d[3] = 1 + t[3];
-        break;
-    }
+    const double rows[4][4] = {{1 + t[0], r[7] - r[5], r[2] - r[6], r[3] - r[1]},
+                               {r[7] - r[5], 1 + t[1], r[1] + r[3], r[2] + r[6]},
+                               {r[2] - r[6], r[1] + r[3], 1 + t[2], r[5] + r[7]},
+                               {r[3] - r[1], r[2] + r[6], r[5] + r[7], 1 + t[3]}},
+                 *d = rows[k];
     double n = 1 / sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] + d[3] * d[3]);
     for (int i = 0; i < 4; i++) q[i] = n * d[i];
 }

@@ -1,13 +1,11 @@
-/* Shape functions, Gauss points and the stiffness of a cube.
+/* Shape functions and Gauss points.
  *
  * hex8: N_c = (1 + a x)(1 + b y)(1 + c z) / 8 with the corner's signs a, b, c. tet10: N_c = l_c (2 l_c - 1), middles
  * 4 l_a l_b. Gauss tables: hexahedron (1 / sqrt 3)^3; tetrahedron of degree 2 (Hammer and Stroud 1956), a = (5 + 3 sqrt
- * 5) / 20, b = (5 - sqrt 5) / 20; triangle of degree 4 with 6 points (Dunavant 1985). B-bar: the dilatation of the
- * whole cube is its mean (Hughes 1980), so that one number per cube resists a change of volume. */
+ * 5) / 20, b = (5 - sqrt 5) / 20; triangle of degree 4 with 6 points (Dunavant 1985). */
 #include "server/num/shape_functions.h"
 
 #include <stddef.h>
-#include <string.h>
 
 #define G 0.57735026918962576451
 #define A 0.58541019662496845446
@@ -53,41 +51,4 @@ void pal_tet10_shape(const double l[4], double n[10], double g[10][3])
         if (!g) continue;
         for (int k = 0; k < 3; k++) g[4 + e][k] = 4 * (l[a] * dl[b][k] + l[b] * dl[a][k]);
     }
-}
-
-/* shear += w sum over strain components of the two corners' rows; g: gradients in space */
-static void add_shear(double g[8][3], double w, double deviator, double *shear)
-{
-    for (int a = 0; a < 8; a++)
-        for (int b = 0; b < 8; b++) {
-            double dot = g[a][0] * g[b][0] + g[a][1] * g[b][1] + g[a][2] * g[b][2];
-            for (int i = 0; i < 3; i++)
-                for (int j = 0; j < 3; j++) {
-                    /* 2 e : e - (2/3) tr e tr e, e = sym(u g') */
-                    double k = g[a][j] * g[b][i] - deviator * g[a][i] * g[b][j] + (i == j ? dot : 0);
-                    shear[(3 * a + i) * 24 + 3 * b + j] += w * k;
-                }
-        }
-}
-
-void pal_hex_stiffness(int bbar, double shear[24 * 24], double volume[24 * 24])
-{
-    double g[8][3], mean[24] = {0};
-    memset(shear, 0, 576 * sizeof *shear);
-    memset(volume, 0, 576 * sizeof *volume);
-    for (int p = 0; p < 8; p++) {
-        pal_hex_shape(pal_hex_gauss[p], NULL, g);
-        double *flat = &g[0][0];
-        for (int i = 0; i < 24; i++) {
-            flat[i] *= 2; /* the edge is 1, local coordinates span 2 */
-            mean[i] += flat[i] / 8;
-        }
-        add_shear(g, 1.0 / 8, bbar ? 2.0 / 3 : 0, shear);
-        if (bbar) continue;
-        for (int i = 0; i < 24; i++)
-            for (int j = 0; j < 24; j++) volume[i * 24 + j] += flat[i] * flat[j] / 8;
-    }
-    if (!bbar) return;
-    for (int i = 0; i < 24; i++)
-        for (int j = 0; j < 24; j++) volume[i * 24 + j] = mean[i] * mean[j];
 }

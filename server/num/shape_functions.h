@@ -19,9 +19,4 @@ extern const double pal_hex_gauss[8][3];
 extern const double pal_tet_gauss[4][4];
 /* 6 points of a triangle, exact to degree 4: barycentric and weight (sum 1) */
 extern const double pal_tri_gauss[6][4];
-
-/* Stiffness of a cube of edge 1 split into its shear and its volume part: K = mu shear + lambda volume for full
- * integration, and with bbar (Hughes 1980) K = mu shear + kappa volume, where shear is that of the deviator and volume
- * that of the mean dilatation; [24][24] row-major, unknown 3 corner + axis. An edge length h multiplies K by h. */
-void pal_hex_stiffness(int bbar, double shear[24 * 24], double volume[24 * 24]);
 #endif

@@ -2,6 +2,9 @@
  * size of the grid does not matter. */
 #include "server/num/trilinear.h"
 
+#include "server/base/heap.h"
+#include "server/num/sort.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -48,8 +51,7 @@ double pal_trilinear_at(const pal_grid *grid, const double *value, const double 
 
 static int compare_node(const void *a, const void *b)
 {
-    int64_t x = *(const int64_t *)a, y = *(const int64_t *)b;
-    return (x > y) - (x < y);
+    return PAL_COMPARE(*(const int64_t *)a, *(const int64_t *)b);
 }
 
 /* entries of every point into entry [8 n_point], weights into out; what is met is counted in start */
@@ -75,15 +77,17 @@ pal_err pal_grid_weights_make(const pal_grid *grid, const double *x, int n_point
     size_t max = 8 * (size_t)n_point + 1;
     *out = (pal_grid_weights){.n_point = n_point};
     if (max > INT32_MAX) return PAL_ERR_MEMORY;
-    int64_t *entry = malloc(max * sizeof *entry);
-    out->start = malloc(((size_t)n_point + 1) * sizeof *out->start);
-    out->node = malloc(max * sizeof *out->node);
-    out->weight = malloc(max * sizeof *out->weight);
-    out->used = malloc(max * sizeof *out->used);
-    if (!entry || !out->start || !out->node || !out->weight || !out->used) {
+    pal_err err = PAL_ERR_OK;
+    int64_t *entry;
+    PAL_ARRAY(&err, entry, max);
+    PAL_ARRAY(&err, out->start, n_point + 1);
+    PAL_ARRAY(&err, out->node, max);
+    PAL_ARRAY(&err, out->weight, max);
+    PAL_ARRAY(&err, out->used, max);
+    if (err) {
         free(entry);
         pal_grid_weights_free(out);
-        return PAL_ERR_MEMORY;
+        return err;
     }
     list_entries(grid, x, entry, out);
     /* used nodes: the entries in order, each once */
@@ -102,20 +106,8 @@ pal_err pal_grid_weights_make(const pal_grid *grid, const double *x, int n_point
 
 void pal_grid_weights_free(pal_grid_weights *w)
 {
-    free(w->start);
-    free(w->node);
-    free(w->weight);
-    free(w->used);
+    PAL_FREE(w->start, w->node, w->weight, w->used);
     *w = (pal_grid_weights){0};
-}
-
-void pal_grid_weights_apply(const pal_grid_weights *w, const double *value, double *to)
-{
-    for (int i = 0; i < w->n_point; i++) {
-        double sum = 0;
-        for (int k = w->start[i]; k < w->start[i + 1]; k++) sum += w->weight[k] * value[w->node[k]];
-        to[i] = sum;
-    }
 }
 
 void pal_grid_weights_apply_transpose(const pal_grid_weights *w, const double *value, double *to)

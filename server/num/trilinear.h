@@ -30,8 +30,6 @@ typedef struct pal_grid_weights {
 /* x [n_point][3]; weights of exactly 0 are left out; MEMORY. Heap */
 pal_err pal_grid_weights_make(const pal_grid *grid, const double *x, int n_point, pal_grid_weights *out);
 void pal_grid_weights_free(pal_grid_weights *w);
-/* to [n_point] = W value [n_used] */
-void pal_grid_weights_apply(const pal_grid_weights *w, const double *value, double *to);
 /* to [n_used] += W' value [n_point] */
 void pal_grid_weights_apply_transpose(const pal_grid_weights *w, const double *value, double *to);
 #endif

@@ -1,29 +1,26 @@
-/* Robustness cases: disturbances known to break simulations, applied one at a time to a user's scene. Each case has
- * its own criterion. Examples: tools that jump or appear inside a body, a meganewton on a vertex, all nodes in one
- * plane or at one point, mirrored, shuffled or scaled up, steps that are too long, NaN and Inf as input, supports
- * that change while the body is deformed, stiffness times a thousand, an hour under load, random commands. Bullet
+/* Robustness cases: disturbances known to break simulations, applied one at a time to a user's scene: tools that jump
+ * or appear inside a body, a meganewton on a vertex, all nodes in one plane or at one point, steps that are too long,
+ * NaN and Inf as input, supports that change, stiffness times a thousand, an hour under load, random commands. Bullet
  * #3882, SOFA #4594 and #5751 and FleX #130 report such cases elsewhere.
  *
- * Every case starts from the scene's own rest state (under gravity, tools away). A case run alone therefore gives
- * the same result as in the full suite. The common criterion:
- *   finite  Every number is finite, and no body is stopped unless the case allows it.
- *   energy  At most the energy after the disturbance plus 1 %. Solver verlet 5 %, central_cg 30 %: their velocities
- *           lag their positions by half a sub-step, which appears as a ripple. A step in which hexahedra change to
- *           or from their split is not judged, because the two store different energies at the same shape.
- *   return  Within 0.1 % S of rest in RMS after release, where S is the box diagonal. A body without supports is
- *           compared after the best rigid motion.
+ * Every case starts from the scene's own rest state (under gravity, tools away), so that a case run alone gives the
+ * same result as in the full suite. Each case has its own criterion; common to all are finite  Every number is finite,
+ * and no body is stopped unless the case allows it. energy  At most the energy after the disturbance plus 1 %. Solver
+ * verlet 5 %, central_cg 30 %: their velocities lag their positions by half a sub-step, which appears as a ripple. A
+ * step in which hexahedra change to or from their split is not judged, because the two store different energies at the
+ * same shape. return  Within 0.1 % S of rest in RMS after release, where S is the box diagonal. A body without supports
+ * is compared after the best rigid motion.
  *
- * Springs (tet_springs) recover from inversion. Where they may not (model key recover false) or fail to, they may
- * stay inverted or be stopped, because a lattice of lengths and volumes has several rest states. They must then be
- * finite, bounded and within 0.1 % S of rest after a reset. The verdict is `collapsed`, which is not a failure.
- * This exception applies to each body of a scene separately. It does not apply to subdivision solids: one that
- * stays folded fails, and the report states whether a reset helps.
+ * Springs (tet_springs) recover from inversion. A body of springs that may not (model key recover false) or fails to
+ * may stay inverted or be stopped, because a lattice of lengths and volumes has several rest states; it must then be
+ * finite, bounded and within 0.1 % S of rest after a reset. The verdict is `collapsed`, which is not a failure. A
+ * subdivision solid that stays folded fails, and the report states whether a reset helps.
  *
- * A scene driven permanently by a moving support is compared with an undisturbed run beside it instead of with
- * rest. Its energy is not judged.
+ * A scene driven permanently by a moving support is compared with an undisturbed run beside it, and its energy is not
+ * judged.
  *
- * Time is simulated time. The result depends on the scene, the seed and the allowed processor time. A case that
- * runs out of time before it can be judged is `undecided`, which counts as not passed. Thread: [load]. */
+ * Time is simulated time. The result depends on the scene, the seed and the allowed processor time. A case that runs
+ * out of time before it can be judged is `undecided`, which counts as not passed. Thread: [load]. */
 #ifndef PAL_ROBUSTNESS_ROBUSTNESS_H
 #define PAL_ROBUSTNESS_ROBUSTNESS_H
 #include "server/sim/world/world.h"
@@ -81,9 +78,8 @@ typedef struct pal_robustness_report {
     pal_robustness_result result[PAL_ROBUSTNESS_CASES_MAX];
 } pal_robustness_report;
 
-int pal_robustness_case_count(void);              /* number of cases [any] */
-const char *pal_robustness_case_name(int index);  /* "teleport" ... [any] */
-const char *pal_robustness_case_about(int index); /* one sentence [any]   */
+/* "teleport" ...; NULL: there are fewer cases. *about (may be NULL): one sentence. [any] */
+const char *pal_robustness_case_name(int index, const char **about);
 
 /* Runs the cases. Errors: REFUSED: no such case; errors of pal_world_create; STATE: progress returned false;
  * MEMORY. */

@@ -1,49 +1,33 @@
 /* Cases that disturb shapes, stiffness, the step and loads. */
-#include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/robustness/trial.h"
 
-#include <math.h>
 #include <string.h>
 
-typedef enum shape { FLAT, POINT, MIRRORED, SHUFFLED, STRETCHED, BLOWN_UP } shape;
-
-static const double return_s = 10, blown_s = 25, springs_s = 4;
-
 /* moves one free point to its disturbed position */
-static void disturb_point(pal_trial *trial, shape how, const double low[3], const double high[3], int flat, double x[3])
+static void disturb_point(pal_trial *trial, pal_disturbance how, const double low[3], const double high[3], int flat,
+                          double x[3])
 {
     for (int c = 0; c < 3; c++) {
         double middle = 0.5 * (low[c] + high[c]);
-        if (how == FLAT && c == flat) x[c] = middle;
-        if (how == POINT) x[c] = low[c] + 0.3 * (high[c] - low[c]);
-        if (how == MIRRORED && c == flat) x[c] = low[c] + high[c] - x[c];
-        if (how == SHUFFLED) x[c] = low[c] + (high[c] - low[c]) * pal_trial_random(trial);
-        if (how == STRETCHED) x[c] = middle + 8 * (x[c] - middle);
-        if (how == BLOWN_UP) x[c] = middle + 100 * (x[c] - middle);
+        if (how == PAL_FLAT && c == flat) x[c] = middle;
+        if (how == PAL_POINT) x[c] = low[c] + 0.3 * (high[c] - low[c]);
+        if (how == PAL_MIRRORED && c == flat) x[c] = low[c] + high[c] - x[c];
+        if (how == PAL_SHUFFLED) x[c] = low[c] + (high[c] - low[c]) * pal_trial_random(trial);
+        if (how == PAL_STRETCHED) x[c] = middle + 8 * (x[c] - middle);
+        if (how == PAL_BLOWN_UP) x[c] = middle + 100 * (x[c] - middle);
     }
 }
 
-/* axis along which the body is thinnest */
-static int thinnest(const double low[3], const double high[3])
-{
-    int axis = 0;
-    for (int c = 1; c < 3; c++)
-        if (high[c] - low[c] < high[axis] - low[axis]) axis = c;
-    return axis;
-}
-
-static void spoil(pal_trial *trial, int b, shape how)
+static void disturb_body(pal_trial *trial, int b, pal_disturbance how)
 {
     pal_body *body = pal_world_body(trial->world, b);
     double low[3], high[3];
-    for (int c = 0; c < 3; c++) low[c] = INFINITY, high[c] = -INFINITY;
-    for (int k = 0; k < body->n_active; k++)
-        for (int c = 0; c < 3; c++) {
-            double at = body->x[3 * (size_t)pal_body_point(body, k) + (size_t)c];
-            low[c] = fmin(low[c], at), high[c] = fmax(high[c], at);
-        }
-    int flat = thinnest(low, high);
+    int flat = 0; /* axis along which the body is thinnest */
+    pal_box3_empty(low, high);
+    for (int k = 0; k < body->n_active; k++) pal_box3_add(low, high, body->x + 3 * (size_t)pal_body_point(body, k));
+    for (int c = 1; c < 3; c++)
+        if (high[c] - low[c] < high[flat] - low[flat]) flat = c;
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         if (!body->support[i]) disturb_point(trial, how, low, high, flat, body->x + 3 * (size_t)i);
@@ -51,18 +35,13 @@ static void spoil(pal_trial *trial, int b, shape how)
 }
 
 /* Number of inverted tetrahedra, over the bodies that have tetrahedra on their own points. */
-static int turned_over(const pal_trial *trial)
+static int count_inverted(const pal_trial *trial)
 {
     int n = 0;
     for (int b = 0; b < trial->scene->n_body; b++) {
         const pal_body *body = pal_world_body(trial->world, b);
-        for (int t = 0; body->tets && !body->interpolation && t < body->tets->n_tet; t++) {
-            const int32_t *c = body->tets->tet + 4 * (size_t)t;
-            double e[3][3], g[3];
-            for (int k = 0; k < 3; k++) pal_sub3(e[k], body->x + 3 * (size_t)c[k + 1], body->x + 3 * (size_t)c[0]);
-            pal_cross3(g, e[1], e[2]);
-            n += !(pal_dot3(e[0], g) > 0);
-        }
+        for (int t = 0; body->tets && !body->interpolation && t < body->tets->n_tet; t++)
+            n += !(pal_tet_volume(body->x, body->tets->tet + 4 * (size_t)t) > 0);
     }
     return n;
 }
@@ -78,66 +57,31 @@ static double extent(const pal_trial *trial)
     return max;
 }
 
-static bool guarded(const pal_trial *trial, int b)
+void pal_robustness_shape(pal_trial *trial)
 {
-    for (int i = 0; i < pal_world_component_count(trial->world); i++) {
-        pal_component_info info;
-        pal_world_component_info(trial->world, i, &info);
-        if (info.body == pal_world_body(trial->world, b)->name && !strcmp(info.name, "finite_guard")) return true;
-    }
-    return false;
-}
-
-static void shaped(pal_trial *trial, shape how)
-{
+    const pal_disturbance how = (pal_disturbance)trial->parameter;
     bool springs = true;
     for (int b = 0; b < trial->scene->n_body; b++) {
-        spoil(trial, b, how);
+        disturb_body(trial, b, how);
         /* beyond the reach of its safeguards a body with recovery is judged like any other */
         const bool recovers = pal_world_body(trial->world, b)->recovery != NULL,
-                   far = how == BLOWN_UP && guarded(trial, b);
-        trial->may_stay[b] = pal_trial_has_springs(trial, b) && !(recovers && far);
+                   far = how == PAL_BLOWN_UP && pal_world_find_component(trial->world, b, "finite_guard") >= 0;
+        trial->may_stay[b] = !strcmp(trial->scene->body[b].model.name, "tet_springs") && !(recovers && far);
         trial->may_stop[b] = trial->may_stay[b] || far;
         springs = springs && trial->may_stay[b] && !recovers;
     }
     double before = extent(trial);
-    pal_trial_positions_set(trial);
+    for (int b = 0; b < trial->scene->n_body; b++) pal_world_invalidate_limits(trial->world, b);
+    pal_trial_rebase(trial);
     /* springs without recovery need not return: long enough to see that they stay bounded */
-    pal_trial_relax(trial, springs ? springs_s : how == BLOWN_UP ? blown_s : return_s);
-    int n = turned_over(trial);
+    pal_trial_return(trial, (springs ? 0.4 : how == PAL_BLOWN_UP ? 2.5 : 1) * PAL_RETURN_TIME_S);
+    int n = count_inverted(trial);
     double after = extent(trial);
     if (!trial->out->finite || trial->out->frozen) return;
     if (!(after <= 1.5 * fmax(before, 1))) pal_trial_report(trial, PAL_VERDICT_FAILED, "grew to %.2g S", after);
-    if (trial->out->return_s < INFINITY)
-        pal_trial_report(trial, PAL_VERDICT_PASSED, "back after %.2g s", trial->out->return_s);
-    else
-        pal_trial_report(trial, PAL_VERDICT_PASSED, "%.2g %% S away after %.1f s, %d elements turned over",
+    if (!(trial->out->return_s < INFINITY))
+        pal_trial_report(trial, PAL_VERDICT_PASSED, "%.2g %% S away after %.1f s, %d elements inverted",
                          100 * trial->out->deviation_S, trial->out->simulated_s, n);
-}
-
-void pal_robustness_flat(pal_trial *trial)
-{
-    shaped(trial, FLAT);
-}
-void pal_robustness_point(pal_trial *trial)
-{
-    shaped(trial, POINT);
-}
-void pal_robustness_mirrored(pal_trial *trial)
-{
-    shaped(trial, MIRRORED);
-}
-void pal_robustness_shuffled(pal_trial *trial)
-{
-    shaped(trial, SHUFFLED);
-}
-void pal_robustness_stretched(pal_trial *trial)
-{
-    shaped(trial, STRETCHED);
-}
-void pal_robustness_blown_up(pal_trial *trial)
-{
-    shaped(trial, BLOWN_UP);
 }
 
 /* A NaN in the first body: only that body stops, and only it is reset. */
@@ -162,9 +106,7 @@ void pal_robustness_poisoned(pal_trial *trial)
         pal_trial_report(trial, PAL_VERDICT_FAILED, "a reset did not bring it back");
         return;
     }
-    pal_trial_relax(trial, return_s);
-    if (out->return_s < INFINITY)
-        pal_trial_report(trial, PAL_VERDICT_PASSED, "at rest %.2g s after its reset", out->return_s);
+    pal_trial_return(trial, PAL_RETURN_TIME_S);
 }
 
 /* ---- loads ---- */
@@ -180,14 +122,9 @@ static void load_all(pal_trial *trial, double force_N, bool of_cap)
     pal_trial_rebase(trial);
 }
 
-/* Removes all loads, because the loaded node of an adaptive body may no longer be in use. */
 static void unload_all(pal_trial *trial)
 {
-    for (int b = 0; b < trial->scene->n_body; b++) {
-        pal_body *body = pal_world_body(trial->world, b);
-        if (body->external_force) memset(body->external_force, 0, 3 * sizeof(double) * (size_t)body->n_node);
-    }
-    pal_world_wake(trial->world);
+    pal_trial_remove_loads(trial);
     pal_trial_rebase(trial);
 }
 
@@ -195,19 +132,18 @@ void pal_robustness_meganewton(pal_trial *trial)
 {
     load_all(trial, 1e6, false);
     bool good = pal_trial_run(trial, 1);
-    double away = pal_trial_deviation_S(trial);
+    pal_trial_report(trial, PAL_VERDICT_PASSED, "pulled %.2g S away in RMS", pal_trial_deviation_S(trial, false));
     unload_all(trial);
-    if (good) pal_trial_relax(trial, return_s);
-    pal_trial_report(trial, PAL_VERDICT_PASSED, "pulled %.2g S away in RMS", away);
-    if (isfinite(trial->out->return_s))
-        pal_trial_report(trial, PAL_VERDICT_PASSED, "back after %.2g s", trial->out->return_s);
+    if (good) pal_trial_return(trial, PAL_RETURN_TIME_S);
     if (isinf(trial->out->return_s)) pal_trial_report(trial, PAL_VERDICT_PASSED, "not back");
 }
 
 /* ---- steps that are too long ---- */
 
-static void long_steps(pal_trial *trial, double times, int n)
+/* in all some three seconds of steps of 1/60 s */
+void pal_robustness_long_step(pal_trial *trial)
 {
+    const int times = trial->parameter, n = times < 100 ? 18 : 3;
     const double *up = trial->scene->up;
     for (int b = 0; b < trial->scene->n_body; b++) {
         pal_body *body = pal_world_body(trial->world, b);
@@ -239,19 +175,7 @@ static void long_steps(pal_trial *trial, double times, int n)
         }
         if (!good) return;
     }
-    pal_trial_relax(trial, return_s);
-    if (trial->out->return_s < INFINITY)
-        pal_trial_report(trial, PAL_VERDICT_PASSED, "at rest after %.2g s", trial->out->return_s);
-}
-
-void pal_robustness_long_step(pal_trial *trial)
-{
-    long_steps(trial, 10, 18);
-}
-
-void pal_robustness_longer_step(pal_trial *trial)
-{
-    long_steps(trial, 100, 3);
+    pal_trial_return(trial, PAL_RETURN_TIME_S);
 }
 
 /* ---- stiffness ---- */
@@ -276,9 +200,7 @@ void pal_robustness_stiffer(pal_trial *trial)
         if (pal_world_material(trial->world, b, &trial->scene->body[b].material, &reason))
             pal_trial_report(trial, PAL_VERDICT_FAILED, "the old material was refused (%.90s)", reason.text);
     unload_all(trial);
-    if (good) pal_trial_relax(trial, return_s);
-    if (trial->out->return_s < INFINITY)
-        pal_trial_report(trial, PAL_VERDICT_PASSED, "back after %.2g s", trial->out->return_s);
+    if (good) pal_trial_return(trial, PAL_RETURN_TIME_S);
 }
 
 /* ---- an hour ---- */
@@ -294,53 +216,34 @@ static double drift_S(const pal_trial *trial)
     return max;
 }
 
-static void take_start(pal_trial *trial)
+/* kinetic energy of all bodies, and how many of them sleep and have implicit solvers */
+typedef struct activity {
+    double kinetic_J;
+    int n_asleep, n_implicit;
+} activity;
+
+static activity measure_activity(const pal_trial *trial)
 {
+    activity sum = {0};
     for (int b = 0; b < trial->scene->n_body; b++) {
         const pal_body *body = pal_world_body(trial->world, b);
-        memcpy(trial->start[b], body->x, 3 * sizeof(double) * (size_t)body->n_dof);
+        sum.kinetic_J += pal_body_kinetic_J(body);
+        sum.n_asleep += body->asleep, sum.n_implicit += body->implicit;
     }
-}
-
-static double kinetic_J(const pal_trial *trial)
-{
-    double sum = 0;
-    for (int b = 0; b < trial->scene->n_body; b++) sum += pal_body_kinetic_J(pal_world_body(trial->world, b));
     return sum;
-}
-
-static bool asleep(const pal_trial *trial)
-{
-    for (int b = 0; b < trial->scene->n_body; b++)
-        if (pal_world_body(trial->world, b)->asleep) return true;
-    return false;
-}
-
-static bool all_asleep(const pal_trial *trial)
-{
-    for (int b = 0; b < trial->scene->n_body; b++)
-        if (!pal_world_body(trial->world, b)->asleep) return false;
-    return true;
-}
-
-static bool implicit(const pal_trial *trial)
-{
-    for (int b = 0; b < trial->scene->n_body; b++)
-        if (!pal_world_body(trial->world, b)->implicit) return false;
-    return true;
 }
 
 /* runs until a quarter of a second moves nothing by more than 1e-8 S, for at most a minute */
 static bool settle_loaded(pal_trial *trial, double *ms)
 {
     const double step = trial->scene->step_s, begin = trial->out->simulated_s;
-    int n = (int)ceil(0.25 / step), all = 0;
-    double before = 1e-9 * (double)pal_clock_thread_ns(), late = before + 0.5 * (trial->deadline_s - before);
+    int n = (int)ceil(PAL_REST_HOLD_S / step), all = 0;
+    double before = pal_trial_cpu_s(), late = before + 0.5 * (trial->deadline_s - before);
     for (;;) {
-        take_start(trial);
+        pal_trial_save(trial, trial->start);
         for (int i = 0; i < n; i++, all++)
             if (!pal_trial_step(trial, step)) return false;
-        double now = 1e-9 * (double)pal_clock_thread_ns();
+        double now = pal_trial_cpu_s();
         *ms = 1e3 * (now - before) / all;
         if (drift_S(trial) <= 1e-8 || trial->out->simulated_s - begin > 60) return true;
         trial->late = now > late;
@@ -350,10 +253,10 @@ static bool settle_loaded(pal_trial *trial, double *ms)
 
 /* Steps while all bodies are asleep, up to ten seconds, without the monitor: the energy of thousands of springs
  * costs a hundred times such a step. False: a step was refused. */
-static bool doze(pal_trial *trial, double until_s)
+static bool step_asleep(pal_trial *trial, double until_s)
 {
     const double step = trial->scene->step_s, end = fmin(trial->out->simulated_s + 10, until_s - 2 * step);
-    while (all_asleep(trial) && trial->out->simulated_s < end) {
+    while (measure_activity(trial).n_asleep == trial->scene->n_body && trial->out->simulated_s < end) {
         if (pal_world_step(trial->world, step)) return false;
         pal_world_remove_idle(trial->world);
         trial->out->simulated_s += step;
@@ -367,32 +270,33 @@ void pal_robustness_hour(pal_trial *trial)
     const double max_drift = 1e-6, max_kinetic = 1e-9, max_plan_s = 8, step = trial->scene->step_s;
     double ms = 1, drift = 0, kinetic = 0, slept_s = NAN;
     if (trial->twin) {
-        pal_trial_report(trial, PAL_VERDICT_SKIPPED, "a moving support leads it: it never rests");
+        pal_trial_report(trial, PAL_VERDICT_SKIPPED, "a moving support drives it: it never rests");
         return;
     }
     load_all(trial, 0.1, true);
     if (!settle_loaded(trial, &ms)) return;
-    take_start(trial);
+    pal_trial_save(trial, trial->start);
     pal_trial_rebase(trial);
-    double room_s = trial->deadline_s - 1e-9 * (double)pal_clock_thread_ns(), begin = trial->out->simulated_s;
+    double room_s = trial->deadline_s - pal_trial_cpu_s(), begin = trial->out->simulated_s;
     /* implicit steps may be long: as many as the time allows, of at most ten seconds each */
     double n = fmax(1, 0.8e3 * fmin(max_plan_s, room_s) / ms),
-           dt = implicit(trial) ? fmin(10, fmax(step, HOUR_S / n)) : step;
-    double late_s = 1e-9 * (double)pal_clock_thread_ns() + 0.9 * room_s;
+           dt = measure_activity(trial).n_implicit == trial->scene->n_body ? fmin(10, fmax(step, HOUR_S / n)) : step;
+    double late_s = pal_trial_cpu_s() + 0.9 * room_s;
     while (trial->out->simulated_s - begin < HOUR_S) {
-        if (1e-9 * (double)pal_clock_thread_ns() > late_s) break;
-        if (!pal_trial_step(trial, dt) || !doze(trial, begin + HOUR_S)) break;
-        kinetic = fmax(kinetic, kinetic_J(trial));
+        if (pal_trial_cpu_s() > late_s) break;
+        if (!pal_trial_step(trial, dt) || !step_asleep(trial, begin + HOUR_S)) break;
+        const activity now = measure_activity(trial);
+        kinetic = fmax(kinetic, now.kinetic_J);
         drift = fmax(drift, drift_S(trial));
-        if (isnan(slept_s) && asleep(trial)) slept_s = trial->out->simulated_s - begin;
+        if (isnan(slept_s) && now.n_asleep > 0) slept_s = trial->out->simulated_s - begin;
     }
-    double watched = trial->out->simulated_s - begin, stored = fmax(trial->scale_J, 1e-300);
+    double monitored = trial->out->simulated_s - begin, stored = fmax(trial->scale_J, 1e-300);
     pal_trial_report(trial, PAL_VERDICT_PASSED,
-                     "%.0f s watched in steps of %.3g s: drift %.2g S, kinetic %.2g of what is stored", watched, dt,
+                     "%.0f s monitored in steps of %.3g s: drift %.2g S, kinetic %.2g of what is stored", monitored, dt,
                      drift, kinetic / stored);
     if (!isnan(slept_s)) pal_trial_report(trial, PAL_VERDICT_PASSED, "asleep from %.3g s on", slept_s);
-    if (watched < HOUR_S * (1 - 1e-9))
-        pal_trial_report(trial, PAL_VERDICT_UNDECIDED, "the time did not reach for the hour: give more --seconds");
+    if (monitored < HOUR_S * (1 - 1e-9))
+        pal_trial_report(trial, PAL_VERDICT_UNDECIDED, "the time did not suffice for the hour: give more --seconds");
     if (!(drift <= max_drift)) pal_trial_report(trial, PAL_VERDICT_FAILED, "it drifts");
-    if (!(kinetic <= max_kinetic * stored)) pal_trial_report(trial, PAL_VERDICT_FAILED, "it does not stand still");
+    if (!(kinetic <= max_kinetic * stored)) pal_trial_report(trial, PAL_VERDICT_FAILED, "it does not come to rest");
 }

@@ -1,26 +1,15 @@
 /* Runs a robustness case: rest, monitored steps, return to rest, verdict. */
-#include "server/robustness/robustness.h"
 
-#include "server/base/clock.h"
+#include "server/robustness/trial.h"
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
 #include "server/num/random.h"
-#include "server/robustness/trial.h"
 #include "server/sim/elements/elastic_hex.h"
-#include "server/sim/surface/adaptive_surface.h"
 
-#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-static const double back_S = 1e-3, slack = 0.01, central_slack = 0.3, verlet_slack = 0.05;
-static const double still_S_s = 1e-5; /* RMS speed that counts as rest */
-static const double min_s = 60,
-                    typical_s = 500; /* default of --seconds: its minimum, and the simulated time it should cover */
-/* energy below this share of the body's weight (or its node load cap) times S is not judged */
-static const double nothing_share = 1e-9;
 
 #define ENERGY_RULE "+ 1 % (verlet 5 %, central_cg 30 %)"
 #define REST_LIMIT  "10 s or ten of its slowest periods (at most 120 s)"
@@ -36,45 +25,37 @@ static const char rule_long[] = "finite, not stopped, energy no more than put in
 static const char rule_refused[] = "refused, not a bit of the state changed";
 
 static const pal_robustness_case cases[] = {
-    {"teleport", "a tool jumps by S through the body in one step and back", rule_back, pal_robustness_teleport},
-    {"inside", "a tool appears in the middle of the body", rule_back, pal_robustness_inside},
-    {"pressed", "two tools press the body against each other", rule_back, pal_robustness_pressed},
-    {"meganewton", "1e6 N on one vertex for 1 s, then gone", rule_back, pal_robustness_meganewton},
-    {"flat", "all free nodes in one plane", rule_shape, pal_robustness_flat},
-    {"point", "all free nodes on one point", rule_shape, pal_robustness_point},
-    {"mirrored", "all free nodes mirrored", rule_shape, pal_robustness_mirrored},
-    {"shuffled", "all free nodes anywhere in the box", rule_shape, pal_robustness_shuffled},
-    {"blown_up", "all free nodes a hundred times as far apart", rule_blown, pal_robustness_blown_up},
-    {"stretched", "all free nodes eight times as far apart", rule_shape, pal_robustness_stretched},
-    {"dt_x10", "steps ten times as long after a blow", rule_long, pal_robustness_long_step},
-    {"dt_x100", "steps a hundred times as long after a blow", rule_long, pal_robustness_longer_step},
-    {"numbers", "poses, loads, materials and steps of NaN, Inf and 1e300", rule_refused, pal_robustness_numbers},
-    {"poisoned", "a NaN in the state of one body", "that body alone stops, says which node, and is reset alone",
-     pal_robustness_poisoned},
-    {"supports", "what is held is let go and held elsewhere while deformed, then back",
-     "energy rises by at most 1 % at a switch, stands still within " REST_LIMIT, pal_robustness_supports},
+    {"teleport", "a tool jumps by S through the body in one step and back", rule_back, pal_robustness_one_tool, 1},
+    {"inside", "a tool appears in the middle of the body", rule_back, pal_robustness_one_tool, 0},
+    {"pressed", "two tools press the body against each other", rule_back, pal_robustness_pressed, 0},
+    {"meganewton", "1e6 N on one vertex for 1 s, then gone", rule_back, pal_robustness_meganewton, 0},
+    {"flat", "all free nodes in one plane", rule_shape, pal_robustness_shape, PAL_FLAT},
+    {"point", "all free nodes on one point", rule_shape, pal_robustness_shape, PAL_POINT},
+    {"mirrored", "all free nodes mirrored", rule_shape, pal_robustness_shape, PAL_MIRRORED},
+    {"shuffled", "all free nodes anywhere in the box", rule_shape, pal_robustness_shape, PAL_SHUFFLED},
+    {"blown_up", "all free nodes a hundred times as far apart", rule_blown, pal_robustness_shape, PAL_BLOWN_UP},
+    {"stretched", "all free nodes eight times as far apart", rule_shape, pal_robustness_shape, PAL_STRETCHED},
+    {"dt_x10", "steps ten times as long after a blow", rule_long, pal_robustness_long_step, 10},
+    {"dt_x100", "steps a hundred times as long after a blow", rule_long, pal_robustness_long_step, 100},
+    {"numbers", "poses, loads, materials and steps of NaN, Inf and 1e300", rule_refused, pal_robustness_numbers, 0},
+    {"poisoned", "a NaN in the state of one body", "only that body stops, reports the node, and is reset alone",
+     pal_robustness_poisoned, 0},
+    {"supports", "supports are released and placed elsewhere while deformed, then restored",
+     "energy rises by at most 1 % at a switch, at rest within " REST_LIMIT, pal_robustness_supports, 0},
     {"stiffer", "stiffness times a thousand while loaded, then back", "finite, not stopped, rest within 0.1 % S",
-     pal_robustness_stiffer},
-    {"random", "300 steps of random poses, grabs, loads, materials and brushes, good and bad",
-     "finite, not stopped, rest within 0.1 % S", pal_robustness_random},
+     pal_robustness_stiffer, 0},
+    {"random", "300 steps of random poses, grasps, loads, materials and brushes, good and bad",
+     "finite, not stopped, rest within 0.1 % S", pal_robustness_random, 0},
     {"hour", "an hour at rest under load",
-     "all 3,600 s watched, drift below 1e-6 S, kinetic energy below 1e-9 of what is stored", pal_robustness_hour},
+     "all 3,600 s monitored, drift below 1e-6 S, kinetic energy below 1e-9 of what is stored", pal_robustness_hour, 0},
 };
 enum { N_CASE = sizeof cases / sizeof cases[0] };
 
-int pal_robustness_case_count(void)
+const char *pal_robustness_case_name(int index, const char **about)
 {
-    return N_CASE;
-}
-
-const char *pal_robustness_case_name(int index)
-{
+    if (index >= N_CASE) return NULL;
+    if (about) *about = cases[index].what;
     return cases[index].name;
-}
-
-const char *pal_robustness_case_about(int index)
-{
-    return cases[index].what;
 }
 
 const char *pal_verdict_name(pal_verdict verdict)
@@ -110,42 +91,29 @@ double pal_trial_random(pal_trial *trial)
 
 /* ---- measures ---- */
 
-/* Points present in every state of a body: for an adaptive body, those of its coarsest level. */
-static int common_points(const pal_body *body)
+/* RMS distance from rest over S, of a body without supports after the best rigid motion */
+static double body_deviation_S(const pal_trial *trial, int body_index)
 {
-    return body->active ? body->dofs.levels->n_vertex[0] : body->n_dof;
-}
-
-static bool is_free(const pal_body *body)
-{
-    for (int i = 0; i < body->n_dof; i++)
-        if (body->support[i]) return false;
-    return true;
-}
-
-static double held_rms(const pal_body *body, const double *rest)
-{
-    int n = common_points(body);
+    const pal_body *body = pal_world_body(trial->world, body_index);
+    const double *rest = trial->rest[body_index];
+    /* points present in every state of the body: of an adaptive one those of its coarsest level */
+    const int n = body->active ? body->dofs.levels->n_vertex[0] : body->n_dof;
+    double c[3] = {0, 0, 0}, o[3] = {0, 0, 0}, f[9] = {0}, q[4] = {1, 0, 0, 0}, r[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     double sum = 0;
-    for (int i = 0; i < 3 * n; i++) sum += (body->x[i] - rest[i]) * (body->x[i] - rest[i]);
-    return sqrt(sum / n);
-}
-
-/* RMS distance after the best rigid motion */
-static double free_rms(const pal_body *body, const double *rest)
-{
-    int n = common_points(body);
-    double c[3] = {0, 0, 0}, o[3] = {0, 0, 0}, f[9] = {0}, q[4] = {1, 0, 0, 0}, r[9], sum = 0;
-    for (int i = 0; i < n; i++) {
+    bool free = true;
+    for (int i = 0; i < body->n_dof; i++) free = free && !body->support[i];
+    for (int i = 0; i < n && free; i++) {
         pal_axpy3(c, 1.0 / n, body->x + 3 * (size_t)i);
         pal_axpy3(o, 1.0 / n, rest + 3 * (size_t)i);
     }
-    for (int i = 0; i < n; i++)
+    for (int i = 0; i < n && free; i++)
         for (int a = 0; a < 3; a++)
             for (int b = 0; b < 3; b++)
                 f[3 * a + b] += (body->x[3 * (size_t)i + (size_t)a] - c[a]) * (rest[3 * (size_t)i + (size_t)b] - o[b]);
-    pal_polar_rotation(f, q, 100);
-    pal_quat_matrix(q, r);
+    if (free) {
+        pal_polar_rotation(f, q, 100);
+        pal_quat_matrix(q, r);
+    }
     for (int i = 0; i < n; i++) {
         double from[3], to[3];
         pal_sub3(from, rest + 3 * (size_t)i, o);
@@ -153,7 +121,7 @@ static double free_rms(const pal_body *body, const double *rest)
         pal_add3(to, to, c);
         sum += pow(pal_dist3(to, body->x + 3 * (size_t)i), 2);
     }
-    return sqrt(sum / n);
+    return sqrt(sum / n) / body->length_scale_m;
 }
 
 /* Springs whose shape was destroyed, and bodies stopped by their safeguards where the case allows it, need not
@@ -163,28 +131,11 @@ static bool excused(const pal_trial *trial, int b)
     return trial->may_stay[b] || (trial->may_stop[b] && trial->stopped[b]);
 }
 
-static double body_left(const pal_trial *trial, int b)
-{
-    const pal_body *body = pal_world_body(trial->world, b);
-    return (is_free(body) ? free_rms(body, trial->rest[b]) : held_rms(body, trial->rest[b])) / body->length_scale_m;
-}
-
-double pal_trial_deviation_S(const pal_trial *trial)
+double pal_trial_deviation_S(const pal_trial *trial, bool required)
 {
     double max = 0;
     for (int b = 0; b < trial->scene->n_body; b++) {
-        double left = body_left(trial, b);
-        if (!(left <= max)) max = left;
-    }
-    return max;
-}
-
-/* largest deviation of the bodies that must return */
-static double asked_left(const pal_trial *trial)
-{
-    double max = 0;
-    for (int b = 0; b < trial->scene->n_body; b++) {
-        double left = excused(trial, b) ? 0 : body_left(trial, b);
+        double left = required && excused(trial, b) ? 0 : body_deviation_S(trial, b);
         if (!(left <= max)) max = left;
     }
     return max;
@@ -196,10 +147,10 @@ static double work_J(const pal_body *body)
     double sum = 0;
     for (int k = 0; k < pal_body_nodes(body) && body->external_force; k++) {
         size_t i = 3 * (size_t)pal_body_point(body, k);
-        double size = pal_norm3(body->external_force + i), way[3];
+        double size = pal_norm3(body->external_force + i), move[3];
         if (!(size > 0)) continue;
-        pal_sub3(way, body->d + i, body->node_rest + i);
-        sum += fmin(1, pal_body_node_load_cap_N(body, (int)(i / 3)) / size) * pal_dot3(body->external_force + i, way);
+        pal_sub3(move, body->d + i, body->node_rest + i);
+        sum += fmin(1, pal_body_node_load_cap_N(body, (int)(i / 3)) / size) * pal_dot3(body->external_force + i, move);
     }
     return sum;
 }
@@ -216,8 +167,8 @@ static double shape_energy(const pal_trial *trial)
 {
     double now = pal_trial_energy(trial);
     for (int i = 0; i < pal_world_component_count(trial->world); i++) {
-        const pal_component *row = pal_world_component(trial->world, i);
-        pal_elastic_hexes *hex = strcmp(row->effect->name, "hex_elastic") ? NULL : row->self;
+        const pal_component *component = pal_world_component(trial->world, i);
+        pal_elastic_hexes *hex = strcmp(component->effect->name, "hex_elastic") ? NULL : component->self;
         if (!hex || !hex->split) continue;
         hex->has_inversion = !hex->has_inversion;
         now = fmax(now, pal_trial_energy(trial));
@@ -245,12 +196,6 @@ void pal_trial_rebase(pal_trial *trial)
     trial->scale_J = fmax(trial->scale_J, fabs(pal_world_energy_J(trial->world) - trial->rest_J));
 }
 
-void pal_trial_positions_set(pal_trial *trial)
-{
-    for (int b = 0; b < trial->scene->n_body; b++) pal_world_invalidate_limits(trial->world, b);
-    pal_trial_rebase(trial);
-}
-
 void pal_trial_exclude_rise(pal_trial *trial, double energy_J)
 {
     if (!(energy_J > trial->base_J)) return;
@@ -258,9 +203,14 @@ void pal_trial_exclude_rise(pal_trial *trial, double energy_J)
     trial->base_J = energy_J;
 }
 
-bool pal_trial_has_springs(const pal_trial *trial, int b)
+void pal_trial_remove_loads(pal_trial *trial)
 {
-    return !strcmp(trial->scene->body[b].model.name, "tet_springs");
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        pal_body *body = pal_world_body(trial->world, b);
+        /* all nodes, because the loaded one of an adaptive body may no longer be in use */
+        if (body->external_force) memset(body->external_force, 0, 3 * sizeof(double) * (size_t)body->n_node);
+    }
+    pal_world_wake(trial->world);
 }
 
 double pal_trial_load_cap_N(const pal_trial *trial, int b)
@@ -283,8 +233,8 @@ int pal_trial_far_node(const pal_trial *trial, int b)
     if (n > 0) pal_scale3(from, 1.0 / n, from);
     for (int k = 0; k < pal_body_nodes(body); k++) {
         int i = pal_body_point(body, k);
-        double way = pal_dist3(body->node_rest + 3 * (size_t)i, from);
-        if (way > max) max = way, far = i;
+        double move = pal_dist3(body->node_rest + 3 * (size_t)i, from);
+        if (move > max) max = move, far = i;
     }
     return far;
 }
@@ -292,15 +242,15 @@ int pal_trial_far_node(const pal_trial *trial, int b)
 void pal_trial_box(const pal_trial *trial, int b, double low_m[3], double high_m[3])
 {
     const pal_body *body = pal_world_body(trial->world, b);
-    for (int c = 0; c < 3; c++) low_m[c] = INFINITY, high_m[c] = -INFINITY;
-    for (int k = 0; k < pal_body_nodes(body); k++)
-        for (int c = 0; c < 3; c++) {
-            double at = body->d[3 * (size_t)pal_body_point(body, k) + (size_t)c] + body->offset_m[c];
-            low_m[c] = fmin(low_m[c], at), high_m[c] = fmax(high_m[c], at);
-        }
+    pal_box3_empty(low_m, high_m);
+    for (int k = 0; k < pal_body_nodes(body); k++) {
+        double x[3];
+        pal_add3(x, body->d + 3 * (size_t)pal_body_point(body, k), body->offset_m);
+        pal_box3_add(low_m, high_m, x);
+    }
 }
 
-/* ---- watched steps ---- */
+/* ---- monitored steps ---- */
 
 /* records every n-th step; when the buffer is full, drops every second sample */
 static void sample(pal_trial *trial)
@@ -318,7 +268,7 @@ static void sample(pal_trial *trial)
     out->energy_J[out->n_sample++] = pal_world_energy_J(trial->world) - trial->rest_J;
 }
 
-static void look(pal_trial *trial)
+static void monitor(pal_trial *trial)
 {
     pal_robustness_result *out = trial->out;
     for (int b = 0; b < trial->scene->n_body; b++) {
@@ -357,8 +307,8 @@ bool pal_trial_step(pal_trial *trial, double dt_s)
     if (err == PAL_ERR_BUDGET || err == PAL_ERR_REFUSED) return false;
     trial->out->simulated_s += dt_s;
     if (!pal_trial_step_twin(trial, dt_s)) trial->rests = false;
-    look(trial);
-    trial->late = 1e-9 * (double)pal_clock_thread_ns() > trial->deadline_s;
+    monitor(trial);
+    trial->late = pal_trial_cpu_s() > trial->deadline_s;
     return trial->out->finite && !halted(trial) && !trial->late;
 }
 
@@ -370,27 +320,36 @@ bool pal_trial_run(pal_trial *trial, double seconds)
     return true;
 }
 
-void pal_trial_relax(pal_trial *trial, double seconds)
+/* sets deviation_S and return_s */
+static void relax(pal_trial *trial, double seconds)
 {
     pal_robustness_result *out = trial->out;
-    double begin = out->simulated_s, hold_s = 0.25, rest_time_s = 0;
-    int n = (int)ceil((seconds < 10 ? seconds : fmax(seconds, trial->return_time_s)) / trial->scene->step_s);
+    double begin = out->simulated_s, rest_time_s = 0;
+    int n =
+        (int)ceil((seconds < PAL_RETURN_TIME_S ? seconds : fmax(seconds, trial->return_time_s)) / trial->scene->step_s);
     out->return_s = INFINITY;
     trial->needs_rest = true, trial->has_returned = false;
     for (int i = 0; i < n && out->finite && !halted(trial) && !trial->late; i++) {
         if (!pal_trial_step(trial, trial->scene->step_s)) break;
-        double left = pal_trial_deviation_S(trial), now = out->simulated_s - begin;
-        if (!(left <= back_S))
+        double left = pal_trial_deviation_S(trial, false), now = out->simulated_s - begin;
+        if (!(left <= PAL_RETURN_S))
             out->return_s = INFINITY;
         else if (isinf(out->return_s))
             out->return_s = now;
-        if (now - out->return_s >= hold_s) break;
+        if (now - out->return_s >= PAL_REST_HOLD_S) break;
         /* what no longer moves will not return either */
-        rest_time_s = pal_trial_speed_S_s(trial) <= still_S_s ? rest_time_s + trial->scene->step_s : 0;
-        if (rest_time_s > 2 * hold_s) break;
+        rest_time_s = pal_trial_speed_S_s(trial) <= PAL_REST_SPEED_S_S ? rest_time_s + trial->scene->step_s : 0;
+        if (rest_time_s > 2 * PAL_REST_HOLD_S) break;
     }
-    out->deviation_S = pal_trial_deviation_S(trial);
-    trial->has_returned = out->return_s < INFINITY || asked_left(trial) <= back_S;
+    out->deviation_S = pal_trial_deviation_S(trial, false);
+    trial->has_returned = out->return_s < INFINITY || pal_trial_deviation_S(trial, true) <= PAL_RETURN_S;
+}
+
+void pal_trial_return(pal_trial *trial, double seconds)
+{
+    relax(trial, seconds);
+    if (trial->out->return_s < INFINITY)
+        pal_trial_report(trial, PAL_VERDICT_PASSED, "back after %.2g s", trial->out->return_s);
 }
 
 /* ---- verdicts ---- */
@@ -408,19 +367,9 @@ static void sum_safeguards(pal_trial *trial)
 
 static double energy_limit(const pal_trial *trial)
 {
-    double limit = slack;
-    for (int i = 0; i < pal_world_component_count(trial->world); i++) {
-        const char *name = pal_world_component(trial->world, i)->effect->name;
-        if (!strcmp(name, "verlet")) limit = fmax(limit, verlet_slack);
-        if (!strcmp(name, "central_cg")) limit = central_slack;
-    }
-    return limit;
-}
-
-/* a smaller energy input is rounding, and a share of it is meaningless */
-static double nothing_J(const pal_trial *trial, int b)
-{
-    return nothing_share * pal_trial_load_cap_N(trial, b) * pal_world_body(trial->world, b)->length_scale_m;
+    return pal_world_find_component(trial->world, -1, "central_cg") >= 0 ? PAL_ENERGY_SLACK_CENTRAL
+           : pal_world_find_component(trial->world, -1, "verlet") >= 0   ? PAL_ENERGY_SLACK_VERLET
+                                                                         : PAL_ENERGY_SLACK;
 }
 
 static void judge(pal_trial *trial)
@@ -428,7 +377,10 @@ static void judge(pal_trial *trial)
     pal_robustness_result *out = trial->out;
     /* a driving support does work continuously */
     bool judged = !isnan(out->energy) && trial->scale_J > 0 && !trial->twin;
-    for (int b = 0; b < trial->scene->n_body; b++) trial->scale_J = fmax(trial->scale_J, nothing_J(trial, b));
+    /* a smaller energy input is rounding, and a share of it is meaningless */
+    for (int b = 0; b < trial->scene->n_body; b++)
+        trial->scale_J = fmax(trial->scale_J, PAL_NO_ENERGY * pal_trial_load_cap_N(trial, b) *
+                                                  pal_world_body(trial->world, b)->length_scale_m);
     out->limit = energy_limit(trial);
     out->energy = judged ? trial->excess_J / trial->scale_J : (double)NAN;
     out->excluded_rise = judged ? trial->excluded_rise_J / trial->scale_J : (double)NAN;
@@ -449,22 +401,21 @@ static void judge(pal_trial *trial)
     else if (trial->needs_rest && !trial->rests && !trial->twin)
         pal_trial_report(trial, PAL_VERDICT_UNDECIDED, "not judged, the scene does not come to rest by itself");
     else if (trial->needs_rest && !trial->has_returned)
-        pal_trial_report(trial, PAL_VERDICT_FAILED, "%.2g %% S from rest at the end", 100 * asked_left(trial));
+        pal_trial_report(trial, PAL_VERDICT_FAILED, "%.2g %% S from rest at the end",
+                         100 * pal_trial_deviation_S(trial, true));
 }
 
 /* A body that was stopped or stayed away must be at rest after a reset. Keeps the figures of the case. */
 static void check_reset(pal_trial *trial, double seconds)
 {
-    const double max_cpu_s = 10;
     pal_robustness_result *out = trial->out, was = *out;
-    const double now = 1e-9 * (double)pal_clock_thread_ns();
     pal_world_reset(trial->world);
     if (trial->twin) pal_world_reset(trial->twin);
     out->frozen = false, out->n_sample = 0, trial->late = false;
     memset(trial->stopped, 0, sizeof trial->stopped);
     memset(trial->may_stay, 0, sizeof trial->may_stay);
-    trial->deadline_s = fmax(trial->deadline_s, now + 0.5 * seconds);
-    pal_trial_relax(trial, max_cpu_s);
+    trial->deadline_s = fmax(trial->deadline_s, pal_trial_cpu_s() + 0.5 * seconds);
+    relax(trial, PAL_RETURN_TIME_S);
     const double left = out->deviation_S;
     const bool stopped = out->frozen || !out->finite, back = trial->has_returned;
     memcpy(was.diag, out->diag, sizeof was.diag);
@@ -474,37 +425,14 @@ static void check_reset(pal_trial *trial, double seconds)
     else if (trial->rests && !back && trial->late)
         pal_trial_report(trial, PAL_VERDICT_UNDECIDED, "not judged after its reset: give more --seconds");
     else if (trial->rests && !back)
-        pal_trial_report(trial, PAL_VERDICT_FAILED, "%.2g %% S from rest %.0f s after a reset", 100 * left, max_cpu_s);
-}
-
-/* A folded subdivision solid has other rest states, as elements with one rotation each do; reports what helps. */
-static bool is_folded(const pal_trial *trial)
-{
-    bool away = trial->out->verdict == PAL_VERDICT_FAILED && trial->needs_rest && !trial->has_returned && !trial->late;
-    for (int b = 0; b < trial->scene->n_body && away; b++)
-        if (pal_world_body(trial->world, b)->interpolation && !(body_left(trial, b) <= back_S)) return true;
-    return false;
-}
-
-static void advise(pal_trial *trial)
-{
-    bool central = energy_limit(trial) == central_slack;
-    pal_trial_report(trial, PAL_VERDICT_PASSED, "a reset brings it back%s",
-                     central ? ", solver implicit_euler comes back from more" : "");
-}
-
-/* springs whose shape was destroyed and that did not recover it by themselves */
-static bool has_collapsed(const pal_trial *trial)
-{
-    for (int b = 0; b < trial->scene->n_body; b++)
-        if (trial->may_stay[b] && (trial->stopped[b] || !(body_left(trial, b) <= back_S))) return true;
-    return false;
+        pal_trial_report(trial, PAL_VERDICT_FAILED, "%.2g %% S from rest %.0f s after a reset", 100 * left,
+                         PAL_RETURN_TIME_S);
 }
 
 static void run_one(pal_trial *trial, const pal_robustness_case *which, double seconds)
 {
     pal_robustness_result *out = trial->out;
-    double begin = 1e-9 * (double)pal_clock_thread_ns();
+    double begin = pal_trial_cpu_s();
     *out = (pal_robustness_result){.name = which->name,
                                    .what = which->what,
                                    .criterion = which->criterion,
@@ -524,40 +452,48 @@ static void run_one(pal_trial *trial, const pal_robustness_case *which, double s
     }
     pal_trial_rebase(trial);
     sample(trial);
+    trial->parameter = which->parameter;
     which->run(trial);
     sum_safeguards(trial);
     judge(trial);
-    const bool folded = is_folded(trial), collapsed = has_collapsed(trial);
-    bool reset = out->frozen || folded;
-    for (int b = 0; b < trial->scene->n_body; b++) reset = reset || (trial->may_stay[b] && !(out->return_s < INFINITY));
+    /* a folded subdivision solid has other rest states, as elements with one rotation each do; springs whose shape was
+     * destroyed may not recover it by themselves */
+    const bool failed = out->verdict == PAL_VERDICT_FAILED && trial->needs_rest && !trial->has_returned && !trial->late;
+    bool folded = false, collapsed = false, reset = out->frozen;
+    for (int b = 0; b < trial->scene->n_body; b++) {
+        const bool away = !(body_deviation_S(trial, b) <= PAL_RETURN_S);
+        folded |= failed && away && pal_world_body(trial->world, b)->interpolation;
+        collapsed |= trial->may_stay[b] && (trial->stopped[b] || away);
+        reset |= trial->may_stay[b] && !(out->return_s < INFINITY);
+    }
+    reset |= folded;
     if (out->verdict != PAL_VERDICT_SKIPPED && reset) check_reset(trial, seconds);
-    if (folded && trial->has_returned) advise(trial);
+    if (folded && trial->has_returned)
+        pal_trial_report(
+            trial, PAL_VERDICT_PASSED, "a reset brings it back%s",
+            energy_limit(trial) == PAL_ENERGY_SLACK_CENTRAL ? ", solver implicit_euler comes back from more" : "");
     if (collapsed && out->verdict == PAL_VERDICT_PASSED) {
         out->verdict = PAL_VERDICT_COLLAPSED;
         pal_trial_report(trial, PAL_VERDICT_PASSED, "a reset brings it back");
     }
-    out->took_s = 1e-9 * (double)pal_clock_thread_ns() - begin;
+    out->took_s = pal_trial_cpu_s() - begin;
 }
 
 /* ---- all cases ---- */
 
-static void look_at_rows(pal_trial *trial)
+static void find_components(pal_trial *trial)
 {
-    bool first = true;
-    for (int i = 0; i < pal_world_component_count(trial->world); i++) {
-        const char *name = pal_world_component(trial->world, i)->effect->name;
-        trial->again |= !strcmp(name, "moving_support") || !strcmp(name, "inflate");
-        if (strcmp(name, "tool_push")) continue;
-        pal_component_info info;
-        pal_world_component_info(trial->world, i, &info);
-        for (int b = 0; b < trial->scene->n_body && first; b++)
-            if (info.body == pal_world_body(trial->world, b)->name) trial->body = b, first = false;
+    trial->settles_each = pal_world_find_component(trial->world, -1, "moving_support") >= 0 ||
+                          pal_world_find_component(trial->world, -1, "inflate") >= 0;
+    for (int b = trial->scene->n_body - 1; b >= 0; b--) {
+        trial->settles_each |= pal_world_body(trial->world, b)->active != NULL;
+        if (pal_world_find_component(trial->world, b, "tool_push") < 0) continue;
         trial->touches = true;
+        trial->body = b;
     }
-    for (int b = 0; b < trial->scene->n_body; b++) trial->again |= pal_world_body(trial->world, b)->active != NULL;
 }
 
-static pal_err open_rig(pal_trial *trial, const pal_scene *scene)
+static pal_err open_trial(pal_trial *trial, const pal_scene *scene)
 {
     trial->scene = malloc(sizeof *trial->scene);
     if (!trial->scene) return PAL_ERR_MEMORY;
@@ -574,11 +510,11 @@ static pal_err open_rig(pal_trial *trial, const pal_scene *scene)
         trial->start[b] = calloc(n3 + 1, sizeof(double));
         if (!trial->rest[b] || !trial->start[b]) return PAL_ERR_MEMORY;
     }
-    look_at_rows(trial);
+    find_components(trial);
     return PAL_ERR_OK;
 }
 
-static void close_rig(pal_trial *trial)
+static void close_trial(pal_trial *trial)
 {
     pal_world_destroy(trial->world);
     pal_world_destroy(trial->twin);
@@ -586,52 +522,46 @@ static void close_rig(pal_trial *trial)
     free(trial->scene);
 }
 
-static void count(pal_robustness_report *out)
-{
-    for (int i = 0; i < out->n; i++) {
-        pal_verdict verdict = out->result[i].verdict;
-        out->n_passed += verdict == PAL_VERDICT_PASSED, out->n_failed += verdict == PAL_VERDICT_FAILED;
-        out->n_collapsed += verdict == PAL_VERDICT_COLLAPSED;
-        out->n_undecided += verdict == PAL_VERDICT_UNDECIDED, out->n_skipped += verdict == PAL_VERDICT_SKIPPED;
-    }
-}
-
 /* processor time of all cases, from the cost of a step in the rest state */
 static double enough_s(pal_trial *trial)
 {
     enum { PROBE = 10 };
-    double before = 1e-9 * (double)pal_clock_thread_ns();
+    double before = pal_trial_cpu_s();
     for (int i = 0; i < PROBE; i++) {
         for (int b = 0; b < trial->scene->n_body; b++) (void)pal_world_invalidate_limits(trial->world, b);
         (void)pal_world_step(trial->world, trial->scene->step_s);
     }
-    double step_s = (1e-9 * (double)pal_clock_thread_ns() - before) / PROBE;
-    return fmin(1800, fmax(min_s, typical_s / trial->scene->step_s * step_s));
+    double step_s = (pal_trial_cpu_s() - before) / PROBE;
+    return fmin(1800, fmax(PAL_ROBUSTNESS_CPU_S, PAL_ROBUSTNESS_SIMULATED_S / trial->scene->step_s * step_s));
 }
 
 static pal_err run_all(pal_trial *trial, pal_robustness_report *out)
 {
     const pal_robustness_options *o = trial->options;
-    double begin = 1e-9 * (double)pal_clock_thread_ns();
-    trial->deadline_s = begin + (o->max_cpu_s > 0 ? 0.5 * o->max_cpu_s : min_s);
+    double begin = pal_trial_cpu_s();
+    trial->deadline_s = begin + (o->max_cpu_s > 0 ? 0.5 * o->max_cpu_s : PAL_ROBUSTNESS_CPU_S);
     if (o->progress && !o->progress("rest", 0, o->user)) return PAL_ERR_STATE;
     out->rests = trial->rests = pal_trial_settle(trial, &out->settle_s);
-    if (!trial->rests && !trial->late) out->led = pal_trial_make_twin(trial);
+    /* a scene that did not come to rest because a support drives it is compared with an undisturbed run */
+    if (!trial->rests && !trial->late && pal_world_find_component(trial->world, -1, "moving_support") >= 0)
+        out->led = !pal_world_create(trial->scene, NULL, &trial->twin);
     pal_trial_save(trial, trial->rest);
+    trial->rest_J = pal_world_energy_J(trial->world);
     trial->return_time_s = pal_trial_return_time_s(trial);
     const double max_cpu_s = o->max_cpu_s > 0 ? o->max_cpu_s : enough_s(trial);
     for (int k = 0; k < N_CASE; k++) {
         if (o->only && strcmp(o->only, cases[k].name)) continue;
         if (o->progress && !o->progress(cases[k].name, (double)k / N_CASE, o->user))
             return pal_diagnostic_set(trial->diag, PAL_ERR_STATE, "stopped before the case %s", cases[k].name);
-        double left = begin + max_cpu_s - 1e-9 * (double)pal_clock_thread_ns();
+        double left = begin + max_cpu_s - pal_trial_cpu_s();
         /* short cases leave their time to the others; none takes more than a third of the remainder */
         int n_left = o->only ? 1 : N_CASE - k;
         trial->out = &out->result[out->n++];
         run_one(trial, &cases[k], fmax(0.2, n_left > 3 ? fmin(left / 3, 3 * left / n_left) : left / n_left));
     }
-    count(out);
-    out->took_s = 1e-9 * (double)pal_clock_thread_ns() - begin;
+    int *const n[] = {&out->n_passed, &out->n_failed, &out->n_undecided, &out->n_skipped, &out->n_collapsed};
+    for (int i = 0; i < out->n; i++) ++*n[out->result[i].verdict];
+    out->took_s = pal_trial_cpu_s() - begin;
     return PAL_ERR_OK;
 }
 
@@ -643,10 +573,10 @@ pal_err pal_robustness_run(const pal_scene *scene, const pal_robustness_options 
     if (!known) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is no case \"%.60s\"", options->only);
     pal_trial trial = {.options = options, .diag = diag};
     pal_robustness_report *report = calloc(1, sizeof *report);
-    pal_err err = report ? open_rig(&trial, scene) : PAL_ERR_MEMORY;
+    pal_err err = report ? open_trial(&trial, scene) : PAL_ERR_MEMORY;
     if (!err) err = run_all(&trial, report);
     if (!err) *out = *report;
-    close_rig(&trial);
+    close_trial(&trial);
     free(report);
     return err;
 }

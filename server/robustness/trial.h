@@ -2,7 +2,9 @@
  * private to it. */
 #ifndef PAL_ROBUSTNESS_TRIAL_H
 #define PAL_ROBUSTNESS_TRIAL_H
+#include "server/base/clock.h"
 #include "server/robustness/robustness.h"
+#include "server/robustness/tuning.h"
 
 typedef struct pal_trial {
     pal_scene *scene;        /* the user's, with at least two tools if tools can touch it; heap */
@@ -13,11 +15,12 @@ typedef struct pal_trial {
     double *start[PAL_BODY_MAX]; /* scratch: present positions [n_dof][3] */
     double rest_J;
     double return_time_s; /* time allowed for the return */
-    bool again;           /* rest cannot be restored from positions: it is found again for every case */
+    bool settles_each;    /* rest cannot be restored from positions: it is found again for every case */
     bool touches;         /* a body has a component that tools push */
     int body;             /* the first such body, else 0                                              */
     double deadline_s;    /* processor time at which this case ends */
     bool late;            /* it was reached */
+    int parameter;        /* of the case */
     pal_robustness_result *out;
     /* Energy less the work of sustained loads. It may only fall after the last change of those loads. */
     double base_J, scale_J, excess_J, allowed_J;
@@ -31,25 +34,30 @@ typedef struct pal_trial {
     pal_err err;
 } pal_trial;
 
+static inline double pal_trial_cpu_s(void) /* processor time of this thread */
+{
+    return 1e-9 * (double)pal_clock_thread_ns();
+}
+
 /* Makes one monitored step. False: stop (a value that is not finite, frozen, deadline reached, step refused). */
 bool pal_trial_step(pal_trial *trial, double dt_s);
 bool pal_trial_run(pal_trial *trial, double seconds); /* steps of the scene */
 /* Runs until all bodies have been within 0.1 % S of rest for half a second, at most `seconds` (if that is 10 or
- * more: at least return_time_s). Sets deviation_S and return_s. */
-void pal_trial_relax(pal_trial *trial, double seconds);
+ * more: at least return_time_s). Sets deviation_S and return_s and reports how long it took. */
+void pal_trial_return(pal_trial *trial, double seconds);
 /* trial_rest.c */
+/* allowed for the return: ten of the slowest periods, at least 10 s, at most two minutes */
 double pal_trial_return_time_s(const pal_trial *trial);
-double pal_trial_speed_S_s(const pal_trial *trial);
-bool pal_trial_settle(pal_trial *trial, double *took_s);
-void pal_trial_save(pal_trial *trial, double **to);
+double pal_trial_speed_S_s(const pal_trial *trial);       /* largest RMS speed of a body over its S */
+bool pal_trial_settle(pal_trial *trial, double *took_s);  /* runs until nothing moves; false: it still does */
+void pal_trial_save(const pal_trial *trial, double **to); /* present positions of all bodies */
 bool pal_trial_back_to_rest(pal_trial *trial);
-bool pal_trial_make_twin(pal_trial *trial);
 bool pal_trial_step_twin(pal_trial *trial, double dt_s);
-double pal_trial_deviation_S(const pal_trial *trial); /* largest RMS from rest of any body over its S */
-double pal_trial_energy(const pal_trial *trial);      /* energy less the work of lasting loads */
+/* largest RMS from rest of any body over its S; required: of those that must return */
+double pal_trial_deviation_S(const pal_trial *trial, bool required);
+double pal_trial_energy(const pal_trial *trial); /* energy less the work of lasting loads */
 /* Takes the present energy as the new reference, after loads or shapes were changed from outside. */
 void pal_trial_rebase(pal_trial *trial);
-void pal_trial_positions_set(pal_trial *trial); /* the same after positions were set */
 /* Adds a sentence to the diagnostic. A verdict of failed or does not apply is kept. PASSED changes no verdict. */
 void pal_trial_report(pal_trial *trial, pal_verdict verdict, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
@@ -58,32 +66,35 @@ void pal_trial_exclude_rise(pal_trial *trial, double energy_J);
 double pal_trial_random(pal_trial *trial);                /* in (0, 1) */
 int pal_trial_far_node(const pal_trial *trial, int body); /* in use and farthest from the fixed nodes */
 void pal_trial_box(const pal_trial *trial, int body, double low_m[3],
-                   double high_m[3]);                         /* of the present nodes, scene frame */
-bool pal_trial_has_springs(const pal_trial *trial, int body); /* it is of model tet_springs */
+                   double high_m[3]);          /* of the present nodes, scene frame */
+void pal_trial_remove_loads(pal_trial *trial); /* lasting loads of all bodies */
 double pal_trial_load_cap_N(const pal_trial *trial,
                             int body); /* load_cap_N, or the weight of the body if that is smaller */
+
+typedef enum pal_disturbance {
+    PAL_FLAT,
+    PAL_POINT,
+    PAL_MIRRORED,
+    PAL_SHUFFLED,
+    PAL_STRETCHED,
+    PAL_BLOWN_UP
+} pal_disturbance;
 
 typedef struct pal_robustness_case {
     const char *name, *what, *criterion;
     void (*run)(pal_trial *trial);
+    int parameter; /* a disturbance, how much longer the steps are, whether the tool jumps */
 } pal_robustness_case;
 
 /* robustness_shapes.c */
-void pal_robustness_flat(pal_trial *trial);
-void pal_robustness_point(pal_trial *trial);
-void pal_robustness_mirrored(pal_trial *trial);
-void pal_robustness_shuffled(pal_trial *trial);
-void pal_robustness_blown_up(pal_trial *trial);
-void pal_robustness_stretched(pal_trial *trial);
+void pal_robustness_shape(pal_trial *trial);
 void pal_robustness_poisoned(pal_trial *trial);
 void pal_robustness_meganewton(pal_trial *trial);
 void pal_robustness_long_step(pal_trial *trial);
-void pal_robustness_longer_step(pal_trial *trial);
 void pal_robustness_stiffer(pal_trial *trial);
 void pal_robustness_hour(pal_trial *trial);
 /* robustness_tools.c */
-void pal_robustness_teleport(pal_trial *trial);
-void pal_robustness_inside(pal_trial *trial);
+void pal_robustness_one_tool(pal_trial *trial);
 void pal_robustness_pressed(pal_trial *trial);
 void pal_robustness_numbers(pal_trial *trial);
 void pal_robustness_supports(pal_trial *trial);

@@ -1,19 +1,11 @@
 /* The rest state of a trial's scene, and the undisturbed run that replaces it for a driven scene. */
-#include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/robustness/trial.h"
 #include "server/solve/preflight.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const double still_S_s = 1e-5; /* RMS speed that counts as rest */
-static const double settle_max_s = 30;
-static const double return_s = 10, longest_s = 120, n_period = 10;
-static const double lead_s = 0.5; /* time that a driven scene runs before a case */
-
-/* largest RMS speed of a body over its S, 1/s */
 double pal_trial_speed_S_s(const pal_trial *trial)
 {
     double max = 0;
@@ -32,38 +24,35 @@ double pal_trial_speed_S_s(const pal_trial *trial)
 
 /* ---- rest ---- */
 
-/* Time allowed for the return, s: ten of the slowest periods, at least 10 s, at most two minutes. */
 double pal_trial_return_time_s(const pal_trial *trial)
 {
     double max = 0;
-    pal_preflight *look = malloc(sizeof *look);
-    if (look && !pal_preflight_run(trial->scene, PAL_PREFLIGHT_FULL, look, NULL))
-        for (int b = 0; b < look->n_body; b++) max = fmax(max, look->body[b].slowest_period_s); /* fmax ignores NaN */
-    free(look);
-    return fmax(return_s, fmin(longest_s, n_period * max));
+    pal_preflight *preflight = malloc(sizeof *preflight);
+    if (preflight && !pal_preflight_run(trial->scene, PAL_PREFLIGHT_FULL, preflight, NULL))
+        for (int b = 0; b < preflight->n_body; b++)
+            max = fmax(max, preflight->body[b].slowest_period_s); /* fmax ignores NaN */
+    free(preflight);
+    return fmax(PAL_RETURN_TIME_S, fmin(12 * PAL_RETURN_TIME_S, 10 * max));
 }
 
-/* Runs until nothing moves. False: it still does. */
 bool pal_trial_settle(pal_trial *trial, double *took_s)
 {
     const double step = trial->scene->step_s;
     double rest_time_s = 0, t = 0;
-    for (; t < settle_max_s && rest_time_s < 0.25; t += step) {
-        if (pal_world_step(trial->world, step) || 1e-9 * (double)pal_clock_thread_ns() > trial->deadline_s)
-            return false;
-        rest_time_s = pal_trial_speed_S_s(trial) <= still_S_s ? rest_time_s + step : 0;
+    for (; t < 3 * PAL_RETURN_TIME_S && rest_time_s < PAL_REST_HOLD_S; t += step) {
+        if (pal_world_step(trial->world, step) || pal_trial_cpu_s() > trial->deadline_s) return false;
+        rest_time_s = pal_trial_speed_S_s(trial) <= PAL_REST_SPEED_S_S ? rest_time_s + step : 0;
     }
     *took_s = t;
-    return rest_time_s >= 0.25;
+    return rest_time_s >= PAL_REST_HOLD_S;
 }
 
-void pal_trial_save(pal_trial *trial, double **to)
+void pal_trial_save(const pal_trial *trial, double **to)
 {
     for (int b = 0; b < trial->scene->n_body; b++) {
         const pal_body *body = pal_world_body(trial->world, b);
         memcpy(to[b], body->x, 3 * sizeof(double) * (size_t)body->n_dof);
     }
-    trial->rest_J = pal_world_energy_J(trial->world);
 }
 
 /* ---- a driven scene ---- */
@@ -89,19 +78,10 @@ static bool begin_twin(pal_trial *trial)
     if (pal_world_create(trial->scene, NULL, &twin)) return false;
     pal_world_destroy(trial->twin);
     trial->twin = twin;
-    for (double t = 0; t < lead_s; t += trial->scene->step_s)
+    for (double t = 0; t < 2 * PAL_REST_HOLD_S; t += trial->scene->step_s)
         if (pal_world_step(trial->world, trial->scene->step_s) || !pal_trial_step_twin(trial, trial->scene->step_s))
             return false;
     return true;
-}
-
-/* If the scene did not come to rest because a support drives it, makes an undisturbed run as the reference. */
-bool pal_trial_make_twin(pal_trial *trial)
-{
-    bool led = false;
-    for (int i = 0; i < pal_world_component_count(trial->world); i++)
-        led |= !strcmp(pal_world_component(trial->world, i)->effect->name, "moving_support");
-    return led && !pal_world_create(trial->scene, NULL, &trial->twin);
 }
 
 /* Restores the scene at rest in a new world, because solvers keep factors of earlier states. */
@@ -113,10 +93,11 @@ bool pal_trial_back_to_rest(pal_trial *trial)
     pal_world_destroy(trial->world);
     trial->world = fresh;
     if (trial->twin) return begin_twin(trial);
-    if (trial->again) {
-        bool still = pal_trial_settle(trial, &took_s);
-        if (still) pal_trial_save(trial, trial->rest);
-        return still;
+    if (trial->settles_each) {
+        if (!pal_trial_settle(trial, &took_s)) return false;
+        pal_trial_save(trial, trial->rest);
+        trial->rest_J = pal_world_energy_J(trial->world);
+        return true;
     }
     for (int b = 0; b < trial->scene->n_body; b++) {
         pal_body *body = pal_world_body(trial->world, b);

@@ -11,6 +11,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* path of a key of the object at path; "" is the root, or the object itself */
+static void join(char out[PAL_JSON_PATH], const char *path, const char *key)
+{
+    if (snprintf(out, PAL_JSON_PATH, "%s%s%.40s", path, *path && *key ? "." : "", key) < 0) out[0] = 0;
+}
+
 static int line_of(const char *text, size_t at)
 {
     int line = 1;
@@ -27,8 +33,7 @@ static pal_err check_text(const pal_json *json, const char *text, size_t n_byte)
         uint32_t code;
         int n = pal_utf8_next(text + k, n_byte - k, &code);
         if (n == 0 || code == 0)
-            return pal_diagnostic_set(json->diag, PAL_ERR_REFUSED, "%s: line %d: byte %zu is not UTF-8 text",
-                                      json->file, line_of(text, k), k);
+            return PAL_REFUSE(json->diag, "%s: line %d: byte %zu is not UTF-8 text", json->file, line_of(text, k), k);
         if (quoted && code == '\\')
             k++;
         else if (code == '"')
@@ -38,56 +43,80 @@ static pal_err check_text(const pal_json *json, const char *text, size_t n_byte)
         else if (!quoted && (code == ']' || code == '}'))
             depth--;
         if (depth > PAL_JSON_DEPTH)
-            return pal_diagnostic_set(json->diag, PAL_ERR_REFUSED, "%s: line %d: nested deeper than %d", json->file,
-                                      line_of(text, k), PAL_JSON_DEPTH);
+            return PAL_REFUSE(json->diag, "%s: line %d: nested deeper than %d", json->file, line_of(text, k),
+                              PAL_JSON_DEPTH);
         k += (size_t)n;
     }
     return PAL_ERR_OK;
 }
 
-pal_err pal_json_parse(const pal_json *json, const char *text, size_t n_byte, cJSON **out)
+pal_err pal_json_parse(pal_json *json, const char *text, size_t n_byte, cJSON **tree)
 {
     if (n_byte > PAL_JSON_MAX_BYTES)
-        return pal_diagnostic_set(json->diag, PAL_ERR_REFUSED, "%s: %zu bytes, more than %d", json->file, n_byte,
-                                  PAL_JSON_MAX_BYTES);
+        return PAL_REFUSE(json->diag, "%s: %zu bytes, more than %d", json->file, n_byte, PAL_JSON_MAX_BYTES);
     PAL_TRY(check_text(json, text, n_byte));
     const char *end = text;
     cJSON *root = n_byte ? cJSON_ParseWithLengthOpts(text, n_byte, &end, false) : NULL;
     size_t at = end && end >= text ? (size_t)(end - text) : 0;
     if (!root)
-        return pal_diagnostic_set(json->diag, PAL_ERR_REFUSED, "%s: line %d: not JSON", json->file,
-                                  line_of(text, at < n_byte ? at : n_byte));
+        return PAL_REFUSE(json->diag, "%s: line %d: not JSON", json->file, line_of(text, at < n_byte ? at : n_byte));
     while (at < n_byte && strchr(" \t\r\n", text[at])) at++;
     if (at < n_byte || !cJSON_IsObject(root)) {
         cJSON_Delete(root);
-        return pal_diagnostic_set(json->diag, PAL_ERR_REFUSED, "%s: line %d: %s", json->file,
-                                  at < n_byte ? line_of(text, at) : 1,
-                                  at < n_byte ? "more text behind the end" : "not a JSON object");
+        return PAL_REFUSE(json->diag, "%s: line %d: %s", json->file, at < n_byte ? line_of(text, at) : 1,
+                          at < n_byte ? "more text behind the end" : "not a JSON object");
     }
-    *out = root;
+    json->value = *tree = root;
     return PAL_ERR_OK;
 }
 
-pal_err pal_json_refuse(const pal_json *json, const char *path, const char *format, ...)
+static pal_err refuse(const pal_json *at, const char *key, const char *format, va_list args)
 {
-    char sentence[384];
+    char sentence[384], path[PAL_JSON_PATH];
+    vsnprintf(sentence, sizeof sentence, format, args);
+    join(path, at->path, key);
+    return PAL_REFUSE(at->diag, "%s: %s%s%s", at->file, path, *path ? ": " : "", sentence);
+}
+
+pal_err pal_json_refuse(const pal_json *at, const char *format, ...)
+{
     va_list args;
     va_start(args, format);
-    vsnprintf(sentence, sizeof sentence, format, args);
+    pal_err err = refuse(at, "", format, args);
     va_end(args);
-    return pal_diagnostic_set(json->diag, PAL_ERR_REFUSED, "%s: %s%s%s", json->file, path, *path ? ": " : "", sentence);
+    return err;
 }
 
-const char *pal_json_key(char out[PAL_JSON_PATH], const char *path, const char *key)
+pal_err pal_json_refuse_key(const pal_json *at, const char *key, const char *format, ...)
 {
-    snprintf(out, PAL_JSON_PATH, "%s%s%.40s", path, *path ? "." : "", key);
-    return out;
+    va_list args;
+    va_start(args, format);
+    pal_err err = refuse(at, key, format, args);
+    va_end(args);
+    return err;
 }
 
-const char *pal_json_entry(char out[PAL_JSON_PATH], const char *path, int index)
+pal_err pal_json_forward(const pal_json *at, const char *key, pal_err err, const pal_diagnostic *reason)
 {
-    snprintf(out, PAL_JSON_PATH, "%s[%d]", path, index);
-    return out;
+    char path[PAL_JSON_PATH];
+    join(path, at->path, key);
+    return err ? pal_diagnostic_set(at->diag, err, "%s: %s: %s", at->file, path, reason->text) : PAL_ERR_OK;
+}
+
+pal_json pal_json_at(const pal_json *at, const char *key)
+{
+    pal_json child = *at;
+    child.value = cJSON_GetObjectItemCaseSensitive(at->value, key);
+    join(child.path, at->path, key);
+    return child;
+}
+
+pal_json pal_json_entry(const pal_json *list, int index, const cJSON *value)
+{
+    pal_json entry = *list;
+    entry.value = value;
+    if (snprintf(entry.path, sizeof entry.path, "%s[%d]", list->path, index) < 0) entry.path[0] = 0;
+    return entry;
 }
 
 /* "a, b, c" of the known keys, for the sentence about an unknown one */
@@ -108,111 +137,126 @@ static void clean_key(const char *key, char out[64])
     out[n] = 0;
 }
 
-pal_err pal_json_object(const pal_json *json, const cJSON *object, const char *path, const char *const *known)
+pal_err pal_json_object(const pal_json *at, const char *const *known)
 {
-    char at[PAL_JSON_PATH], list[256], key[64];
-    if (!cJSON_IsObject(object)) return pal_json_refuse(json, path, "is not an object {...}");
-    if (cJSON_GetArraySize(object) > PAL_JSON_KEYS)
-        return pal_json_refuse(json, path, "more than %d keys", PAL_JSON_KEYS);
-    for (const cJSON *child = object->child; child; child = child->next) {
+    char list[256], key[64];
+    if (!cJSON_IsObject(at->value)) return pal_json_refuse(at, "is not an object {...}");
+    if (cJSON_GetArraySize(at->value) > PAL_JSON_KEYS) return pal_json_refuse(at, "more than %d keys", PAL_JSON_KEYS);
+    PAL_JSON_EACH(child, at)
+    {
         bool found = !known;
         for (int k = 0; known && known[k] && !found; k++) found = !strcmp(child->string, known[k]);
         clean_key(child->string, key);
         if (!found) {
             list_known(known, list, sizeof list);
-            return pal_json_refuse(json, pal_json_key(at, path, key), "unknown key; known are %s", list);
+            return pal_json_refuse_key(at, key, "unknown key; known are %s", list);
         }
-        for (const cJSON *other = object->child; other != child; other = other->next)
-            if (!strcmp(other->string, child->string))
-                return pal_json_refuse(json, pal_json_key(at, path, key), "the key is there twice");
+        for (const cJSON *other = at->value->child; other != child; other = other->next)
+            if (!strcmp(other->string, child->string)) return pal_json_refuse_key(at, key, "the key is there twice");
     }
     return PAL_ERR_OK;
 }
 
-pal_err pal_json_number(const pal_json *json, const cJSON *object, const char *path, const char *key, double low,
-                        double high, double *out)
+bool pal_json_has(const pal_json *at, const char *key)
 {
-    char at[PAL_JSON_PATH];
-    const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
+    return cJSON_GetObjectItemCaseSensitive(at->value, key) != NULL;
+}
+
+pal_err pal_json_need(const pal_json *at, const char *key)
+{
+    return pal_json_has(at, key) ? PAL_ERR_OK : pal_json_refuse_key(at, key, "is missing");
+}
+
+pal_err pal_json_number(const pal_json *at, const char *key, double low, double high, double *out)
+{
+    const cJSON *item = cJSON_GetObjectItemCaseSensitive(at->value, key);
     if (!item) return PAL_ERR_OK;
-    if (!cJSON_IsNumber(item)) return pal_json_refuse(json, pal_json_key(at, path, key), "is not a number");
+    if (!cJSON_IsNumber(item)) return pal_json_refuse_key(at, key, "is not a number");
     if (!(item->valuedouble >= low && item->valuedouble <= high))
-        return pal_json_refuse(json, pal_json_key(at, path, key), "%g is outside %g .. %g", item->valuedouble, low,
-                               high);
+        return pal_json_refuse_key(at, key, "%g is outside %g .. %g", item->valuedouble, low, high);
     *out = item->valuedouble;
     return PAL_ERR_OK;
 }
 
-pal_err pal_json_count(const pal_json *json, const cJSON *object, const char *path, const char *key, int low, int high,
-                       int *out)
+pal_err pal_json_count(const pal_json *at, const char *key, int low, int high, int *out)
 {
-    char at[PAL_JSON_PATH];
     double number = *out;
-    PAL_TRY(pal_json_number(json, object, path, key, low, high, &number));
-    if (number != floor(number)) return pal_json_refuse(json, pal_json_key(at, path, key), "%g is not whole", number);
+    PAL_TRY(pal_json_number(at, key, low, high, &number));
+    if (number != floor(number)) return pal_json_refuse_key(at, key, "%g is not whole", number);
     *out = (int)number;
     return PAL_ERR_OK;
 }
 
-pal_err pal_json_bool(const pal_json *json, const cJSON *object, const char *path, const char *key, bool *out)
+pal_err pal_json_bool(const pal_json *at, const char *key, bool *out)
 {
-    char at[PAL_JSON_PATH];
-    const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
-    if (item && !cJSON_IsBool(item)) return pal_json_refuse(json, pal_json_key(at, path, key), "is not true or false");
+    const cJSON *item = cJSON_GetObjectItemCaseSensitive(at->value, key);
+    if (item && !cJSON_IsBool(item)) return pal_json_refuse_key(at, key, "is not true or false");
     if (item) *out = cJSON_IsTrue(item);
     return PAL_ERR_OK;
 }
 
-pal_err pal_json_vector(const pal_json *json, const cJSON *object, const char *path, const char *key, double out[3])
+pal_err pal_json_vector(const pal_json *at, const char *key, double out[3])
 {
-    char at[PAL_JSON_PATH];
     double number[3];
-    const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
+    const cJSON *item = cJSON_GetObjectItemCaseSensitive(at->value, key);
     if (!item) return PAL_ERR_OK;
     const cJSON *child = cJSON_IsArray(item) ? item->child : NULL;
     for (int k = 0; k < 3; k++, child = child->next) {
         if (!child || !cJSON_IsNumber(child) || !isfinite(child->valuedouble))
-            return pal_json_refuse(json, pal_json_key(at, path, key), "is not a list of three numbers");
+            return pal_json_refuse_key(at, key, "is not a list of three numbers");
         number[k] = child->valuedouble;
     }
-    if (child) return pal_json_refuse(json, pal_json_key(at, path, key), "is not a list of three numbers");
+    if (child) return pal_json_refuse_key(at, key, "is not a list of three numbers");
     memcpy(out, number, sizeof number);
     return PAL_ERR_OK;
 }
 
-pal_err pal_json_text(const pal_json *json, const cJSON *object, const char *path, const char *key, bool may_be_empty,
-                      char *out, size_t n_byte)
+pal_err pal_json_box(const pal_json *at, const char *low_key, const char *high_key, double low[3], double high[3])
 {
-    char at[PAL_JSON_PATH];
+    PAL_TRY(pal_json_need(at, low_key));
+    PAL_TRY(pal_json_need(at, high_key));
+    PAL_TRY(pal_json_vector(at, low_key, low));
+    PAL_TRY(pal_json_vector(at, high_key, high));
+    for (int c = 0; c < 3; c++)
+        if (low[c] > high[c])
+            return pal_json_refuse(at, "%s[%d] %g is above %s[%d] %g", low_key, c, low[c], high_key, c, high[c]);
+    return PAL_ERR_OK;
+}
+
+pal_err pal_json_text(const pal_json *at, const char *key, bool may_be_empty, char *out, size_t n_byte)
+{
     uint32_t code;
-    const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
+    const cJSON *item = cJSON_GetObjectItemCaseSensitive(at->value, key);
     if (!item) return PAL_ERR_OK;
-    pal_json_key(at, path, key);
-    if (!cJSON_IsString(item)) return pal_json_refuse(json, at, "is not a text");
+    if (!cJSON_IsString(item)) return pal_json_refuse_key(at, key, "is not a text");
     size_t n = strlen(item->valuestring);
-    if (n >= n_byte) return pal_json_refuse(json, at, "%zu bytes of text, more than %zu", n, n_byte - 1);
-    if (n == 0 && !may_be_empty) return pal_json_refuse(json, at, "is empty");
+    if (n >= n_byte) return pal_json_refuse_key(at, key, "%zu bytes of text, more than %zu", n, n_byte - 1);
+    if (n == 0 && !may_be_empty) return pal_json_refuse_key(at, key, "is empty");
     for (size_t k = 0; k < n;) {
         int size = pal_utf8_next(item->valuestring + k, n - k, &code);
-        if (size == 0 || !pal_utf8_printable(code)) return pal_json_refuse(json, at, "has a control character");
+        if (size == 0 || !pal_utf8_printable(code)) return pal_json_refuse_key(at, key, "has a control character");
         k += (size_t)size;
     }
     memcpy(out, item->valuestring, n + 1);
     return PAL_ERR_OK;
 }
 
-pal_err pal_json_list(const pal_json *json, const cJSON *object, const char *path, const char *key, int max,
-                      const cJSON **out)
+pal_err pal_json_file_name(const pal_json *at, const char *key, char *out, size_t n_byte)
 {
-    char at[PAL_JSON_PATH];
-    const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, key);
-    *out = NULL;
-    if (!item) return PAL_ERR_OK;
-    if (!cJSON_IsArray(item)) return pal_json_refuse(json, pal_json_key(at, path, key), "is not a list [...]");
-    int n = cJSON_GetArraySize(item);
-    if (n > max) return pal_json_refuse(json, pal_json_key(at, path, key), "%d entries, more than %d", n, max);
-    *out = item;
-    return PAL_ERR_OK;
+    char name[512] = "";
+    PAL_TRY(pal_json_text(at, key, false, name, sizeof name));
+    int n = name[0] == '/' ? snprintf(out, n_byte, "%s", name) : snprintf(out, n_byte, "%s/%s", at->folder, name);
+    if (n >= 0 && (size_t)n < n_byte) return PAL_ERR_OK;
+    return pal_json_refuse_key(at, key, "with its folder longer than %zu bytes", n_byte - 1);
+}
+
+pal_err pal_json_list(const pal_json *at, const char *key, int max, pal_json *out)
+{
+    *out = pal_json_at(at, key);
+    if (!out->value) return PAL_ERR_OK;
+    if (!cJSON_IsArray(out->value)) return pal_json_refuse(out, "is not a list [...]");
+    int n = cJSON_GetArraySize(out->value);
+    return n > max ? pal_json_refuse(out, "%d entries, more than %d", n, max) : PAL_ERR_OK;
 }
 
 enum { DIGITS = 32 };
@@ -252,15 +296,18 @@ cJSON *pal_json_exact_list(const double *number, int n)
     return list;
 }
 
+bool pal_json_folder(const char *path, char *out, size_t n_byte)
+{
+    const char *slash = strrchr(path, '/');
+    int n = slash ? slash > path ? (int)(slash - path) : 1 : 1;
+    int size = snprintf(out, n_byte, "%.*s", n, slash ? path : ".");
+    return size >= 0 && (size_t)size < n_byte;
+}
+
 pal_err pal_json_read(const char *path, char *folder, size_t n_folder, char **text, size_t *n_byte,
                       pal_diagnostic *diag)
 {
-    const char *slash = strrchr(path, '/');
-    int n = slash == path ? snprintf(folder, n_folder, "/")
-            : slash       ? snprintf(folder, n_folder, "%.*s", (int)(slash - path), path)
-                          : snprintf(folder, n_folder, ".");
-    if (n < 0 || (size_t)n >= n_folder)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.100s...: the path is too long", path);
+    if (!pal_json_folder(path, folder, n_folder)) return PAL_REFUSE(diag, "%.100s...: the path is too long", path);
     uint8_t *bytes;
     PAL_TRY(pal_file_read(path, PAL_JSON_MAX_BYTES, &bytes, n_byte, diag));
     *text = (char *)bytes;

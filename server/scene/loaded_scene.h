@@ -38,8 +38,9 @@ typedef struct pal_surface_scene {
     double up[3];          /* unit, away from the ground; 0 0 0: (0, 0, 1)            */
     double hold;           /* lowest part of the height held in place; 0: 0.05, of cells
                             * more where that is not an eighth of the control vertices     */
-    bool gravity;      /* add the effect; a shape as scanned carries its own weight already, so the default is none */
-    bool area_springs; /* add the row face_area; without it edges and volumes bear its share */
+    bool
+        gravity; /* add the effect; a scanned shape is in equilibrium with its weight already, so the default is none */
+    bool area_springs; /* add the component face_area; without it edges and volumes take its share */
     /* model fem in place of springs */
     bool fem;
     const char *element, *law, *solver; /* NULL: hex8_bbar, corotational, implicit_euler */
@@ -47,7 +48,7 @@ typedef struct pal_surface_scene {
     bool adaptive;
     int n_level;        /* 0: 2                                                           */
     double thickness_m; /* 0: 0.003                                                       */
-    double inflate_Pa;  /* not 0: the row inflate with this pressure; closed surfaces only */
+    double inflate_Pa;  /* not 0: the component inflate with this pressure; closed surfaces only */
     const char *shape;  /* of pal_scene_procedural: "organ" (NULL), "stomach", "sphere", "sheet" */
     void (*progress)(const char *what, double fraction, void *user); /* may be NULL */
     void *user;
@@ -58,7 +59,7 @@ typedef struct pal_surface_scene_report {
     pal_prepare_report prepare;
     double unit_m;
     const char *unit_name; /* "mm", "m", "given", ... */
-    bool unit_guessed;     /* nobody said it: taken from the size */
+    bool unit_guessed;     /* not given: derived from the size */
     double read_s;
     int resolution;
     int label;   /* of a label volume, -1: a surface                */

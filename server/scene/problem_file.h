@@ -54,4 +54,6 @@ pal_err pal_problem_parse(const char *name, const char *json, size_t n_byte, con
 /* the case or reference of a name; NULL: none. `--case ID` takes either: a reference names its load case */
 const pal_problem_case *pal_problem_case_find(const pal_problem *problem, const char *id);
 const pal_problem_reference *pal_problem_reference_find(const pal_problem *problem, const char *id);
+/* REFUSED: "FILE: FLAG: there is no load case or reference ...", with those there are; id NULL: "FLAG is missing" */
+pal_err pal_problem_refuse_case(const pal_problem *problem, const char *flag, const char *id, pal_diagnostic *diag);
 #endif

@@ -1,20 +1,17 @@
-/* Bodies of model adaptive_springs: a surface as it is, its levels told and checked once, and the procedural shapes of
- * paper C (Table I, Figs. 8-13) with what holds them. */
+/* Bodies of model adaptive_springs: the surface itself, its levels checked once and reported, and the procedural shapes
+ * of paper C (Table I, Figs. 8-13) with what holds them. */
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/decimate.h"
 #include "server/mesh/geometry/stomach.h"
 #include "server/scene/scene_import.h"
+#include "server/scene/tuning.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { LEVELS = 2, SHEET = 17 };
-/* a coarsest level of more triangles would hardly keep real time: nobody asked for it, so it becomes coarser */
-enum { MANY_TRI = 3000, WANTED_TRI = 1500 };
-static const double thickness_m = 0.003;
+enum { SHEET = 17 }; /* vertices on a side of the sheet of paper C */
 static const double sphere_m = 0.05, sheet_m = 0.2;
-static const double opening_m = 0.003; /* around an opening's vertices, so that the midpoints between them are held */
 
 /* ---- surfaces ---- */
 
@@ -62,7 +59,7 @@ pal_err pal_scene_adaptive_prepare(const pal_surface *surface, const pal_surface
     pal_surface own = {0};
     pal_err err = pal_surface_copy(surface, &own);
     if (!err && options->largest_only) err = keep_largest(&own, diag);
-    int target = options->target_tri ? options->target_tri : own.n_tri > MANY_TRI ? WANTED_TRI : own.n_tri;
+    int target = options->target_tri ? options->target_tri : own.n_tri > PAL_MANY_TRI ? PAL_COARSE_TRI : own.n_tri;
     pal_surface_topology facts = {.manifold = false};
     if (!err) err = pal_surface_check(&own, &facts);
     /* what is not manifold keeps its triangles, for the sentence that refuses it */
@@ -78,7 +75,7 @@ pal_err pal_scene_adaptive_inspect(const pal_surface *surface, const pal_surface
                                    pal_surface_scene_report *report, pal_diagnostic *diag)
 {
     pal_levels levels;
-    const pal_levels_options wanted = {.n_level = options->n_level ? options->n_level : LEVELS};
+    const pal_levels_options wanted = {.n_level = options->n_level ? options->n_level : PAL_ADAPTIVE_LEVELS};
     PAL_TRY(pal_levels_make(surface, &wanted, &levels, diag));
     report->n_level = levels.n_level;
     report->n_piece = levels.n_component;
@@ -92,11 +89,11 @@ pal_err pal_scene_adaptive_inspect(const pal_surface *surface, const pal_surface
     report->area_m2 = pal_surface_area(surface);
     report->volume_m3 = levels.closed ? fabs(pal_surface_volume(surface)) : 0;
     report->mass_kg = options->material.density_kg_m3 * report->area_m2 *
-                      (options->thickness_m > 0 ? options->thickness_m : thickness_m);
+                      (options->thickness_m > 0 ? options->thickness_m : PAL_WALL_M);
     pal_levels_free(&levels);
     if (options->inflate_Pa != 0 && report->n_open_edge > 0)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "pressure is asked for, but the surface has %d open edge%s",
-                                  report->n_open_edge, report->n_open_edge == 1 ? "" : "s");
+        return PAL_REFUSE(diag, "pressure is asked for, but the surface has %d open edge%s", report->n_open_edge,
+                          report->n_open_edge == 1 ? "" : "s");
     return PAL_ERR_OK;
 }
 
@@ -104,9 +101,10 @@ pal_err pal_scene_adaptive_defaults(pal_body_def *body, const pal_surface_scene 
                                     const pal_surface_scene_report *report, pal_diagnostic *diag)
 {
     pal_entry_init(&body->model, "bodies[0].model", "adaptive_springs");
-    PAL_TRY(pal_entry_put_number(&body->model, "levels", options->n_level ? options->n_level : LEVELS, diag));
+    PAL_TRY(
+        pal_entry_put_number(&body->model, "levels", options->n_level ? options->n_level : PAL_ADAPTIVE_LEVELS, diag));
     PAL_TRY(pal_entry_put_number(&body->model, "thickness_m",
-                                 options->thickness_m > 0 ? options->thickness_m : thickness_m, diag));
+                                 options->thickness_m > 0 ? options->thickness_m : PAL_WALL_M, diag));
     pal_entry_init(&body->output, "bodies[0].output", "surface_output");
     if (report->n_open_edge > 0 && !(options->hold > 0)) body->support[0] = (pal_support_def){.rim = true};
     if (options->inflate_Pa == 0) return PAL_ERR_OK;
@@ -127,7 +125,7 @@ static pal_support_def around(const pal_surface *surface, const int32_t ring[PAL
             double x = surface->x[3 * (size_t)ring[k] + (size_t)c];
             box.low_m[c] = fmin(box.low_m[c], x), box.high_m[c] = fmax(box.high_m[c], x);
         }
-        box.low_m[c] -= opening_m, box.high_m[c] += opening_m;
+        box.low_m[c] -= PAL_OPENING_M, box.high_m[c] += PAL_OPENING_M;
     }
     return box;
 }
@@ -159,8 +157,7 @@ pal_err pal_scene_shape_make(const char *name, pal_scene_shape *out, pal_diagnos
         err = pal_sheet_make(SHEET, SHEET, sheet_m, sheet_m, &out->surface, diag);
         out->title = "Sheet of fabric", out->n_support = 1, out->support[0] = (pal_support_def){.rim = true};
     } else {
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "there is no shape \"%.40s\": known are organ, stomach, sphere, sheet", name);
+        return PAL_REFUSE(diag, "there is no shape \"%.40s\": known are organ, stomach, sphere, sheet", name);
     }
     return err ? pal_diagnostic_set(diag, err, "the shape %s: %s", name, pal_err_text(err)) : PAL_ERR_OK;
 }

@@ -22,8 +22,7 @@ static pal_err load(const char *word, const pal_surface_scene *options, pal_load
     if (!folder && cells) return pal_scene_from_cells(word, options ? options : &plain, out, diag);
     if (!folder && !json) return pal_scene_from_surface(word, options ? options : &plain, out, report, diag);
     int size = snprintf(path, sizeof path, folder ? "%s/scene.json" : "%s", word);
-    if (size < 0 || (size_t)size >= sizeof path)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.80s...: the path is too long", word);
+    if (size < 0 || (size_t)size >= sizeof path) return PAL_REFUSE(diag, "%.80s...: the path is too long", word);
     return pal_scene_load(path, out, diag);
 }
 

@@ -7,7 +7,7 @@
 
 /* at most 1 MiB of JSON, depth 16; *out is freed with pal_scene_free. IO, REFUSED, BUDGET, MEMORY */
 pal_err pal_scene_load(const char *path, pal_loaded_scene **out, pal_diagnostic *diag);
-/* folder: where relative mesh names are looked up; name: used in messages */
+/* folder: the folder of relative mesh names; name: used in messages */
 pal_err pal_scene_parse(const char *name, const char *json, size_t n_byte, const char *folder, pal_loaded_scene **out,
                         pal_diagnostic *diag);
 /* writes DIR/scene.json, DIR/NAME.palmesh (NAME.palcells) for every body and NAME_regionK.nii for every label region,

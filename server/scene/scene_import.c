@@ -15,6 +15,7 @@
 #include "server/mesh/geometry/organ.h"
 #include "server/mesh/scan/label_volume.h"
 #include "server/scene/subdivision_file.h"
+#include "server/scene/tuning.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -24,16 +25,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-enum {
-    WANTED_VOXELS = 2600,
-    WANTED_NODES = 2500,
-    WANTED_TRI = 50000,
-    COARSE_TRI = 1500,
-    LABELS = 64,
-    WANTED_ELEMENTS = 2000
-};
-static const double border_factor = 1.1; /* border voxels per A/h^2, from spheres */
-static const double fem_min_fill = 0.1;
+enum { LABELS = 64 };
 
 static void report_progress(const pal_surface_scene *options, const char *what, double fraction)
 {
@@ -95,7 +87,7 @@ static int first_resolution(const pal_surface *surface)
     double few = 1, many = 512;
     for (int k = 0; k < 60; k++) {
         double n = 0.5 * (few + many), f = n / longest;
-        *(volume * f * f * f + border_factor * area * f * f < WANTED_VOXELS ? &few : &many) = n;
+        *(volume * f * f * f + PAL_BORDER_FACTOR * area * f * f < PAL_WANTED_VOXELS ? &few : &many) = n;
     }
     return (int)lround(few);
 }
@@ -110,10 +102,10 @@ static pal_voxel_options voxel_options(const pal_surface_scene *options)
     return (pal_voxel_options){.resolution = options->resolution,
                                .border = true,
                                .largest_only = options->largest_only,
-                               .min_fill = options->fem ? fem_min_fill : 0};
+                               .min_fill = options->fem ? PAL_FEM_MIN_FILL : 0};
 }
 
-/* corners of kept voxels, or 0 when there is no memory to tell */
+/* corners of kept voxels, or 0 without memory to count them */
 static double count_nodes(const pal_voxels *v)
 {
     int64_t nx = v->n[0] + 1, ny = v->n[1] + 1, nz = v->n[2] + 1, n = 0;
@@ -148,7 +140,8 @@ static pal_err choose_resolution(const pal_surface *surface, const pal_surface_s
         }
         if (err && best == 0) return err;
         if (err) break;
-        double kept = (double)(voxels.n_inside + voxels.n_border), want = requested->fem ? WANTED_NODES : WANTED_VOXELS;
+        double kept = (double)(voxels.n_inside + voxels.n_border),
+               want = requested->fem ? PAL_WANTED_NODES : PAL_WANTED_VOXELS;
         if (requested->fem) kept = fmax(1, count_nodes(&voxels));
         double miss = fabs(log(kept / want));
         pal_voxels_free(&voxels);
@@ -173,11 +166,10 @@ static pal_err read_volume(const char *path, const pal_surface_scene *options, p
     report_progress(options, "label", 0);
     int n = pal_label_volume_list(&volume, count, LABELS);
     snprintf(report->surface.place, sizeof report->surface.place, "byte %lld", (long long)volume.first_byte);
-    pal_err err = n == 0 ? pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s: the volume holds no label but 0", path,
-                                              report->surface.place)
-                         : PAL_ERR_OK;
+    pal_err err =
+        n > 0 ? PAL_ERR_OK : PAL_REFUSE(diag, "%s: %s: the volume holds no label but 0", path, report->surface.place);
     if (!err) {
-        int wanted = options->adaptive ? COARSE_TRI : WANTED_TRI;
+        int wanted = options->adaptive ? PAL_COARSE_TRI : PAL_WANTED_TRI;
         pal_label_surface_options surface = {
             .blur_m = -1, .smooth_rounds = -1, .target_tri = options->target_tri ? options->target_tri : wanted};
         pal_diagnostic reason = {""};
@@ -185,11 +177,9 @@ static pal_err read_volume(const char *path, const pal_surface_scene *options, p
         report->label = options->label >= 0 ? options->label : count[0].label;
         err = pal_label_volume_surface(&volume, report->label, &surface, out, &reason);
         if (err) pal_diagnostic_set(diag, err, "%s: %s: %s", path, report->surface.place, reason.text);
-    }
-    if (!err) {
         snprintf(report->surface.format, sizeof report->surface.format, "%s", volume.format);
-        report->surface.n_vertex_read = out->n_vertex;
-        report->surface.n_tri_read = out->n_tri;
+        report->surface.n_vertex_read = err ? 0 : out->n_vertex;
+        report->surface.n_tri_read = err ? 0 : out->n_tri;
     }
     pal_label_volume_free(&volume);
     return err;
@@ -204,17 +194,16 @@ static pal_err read_any(const char *path, const pal_surface_scene *options, pal_
     report->label = -1;
     /* a pipe or device would be waited for */
     if (stat(path, &facts)) return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s", path, strerror(errno));
-    if (!S_ISREG(facts.st_mode)) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: not a file", path);
+    if (!S_ISREG(facts.st_mode)) return PAL_REFUSE(diag, "%s: not a file", path);
     pal_err err;
     if (pal_label_volume_is(path)) {
         if (options->unit_m > 0 && options->unit_m != 1e-3)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: a scan is in mm, no other unit can be given", path);
+            return PAL_REFUSE(diag, "%s: a scan is in mm, no other unit can be given", path);
         report->unit_m = 1e-3;
         report->unit_name = "mm";
         err = read_volume(path, options, out, report, diag);
     } else if (options->label > 0) {
-        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: label %d is wanted, but this is not a label volume", path,
-                                 options->label);
+        err = PAL_REFUSE(diag, "%s: label %d is wanted, but this is not a label volume", path, options->label);
     } else {
         pal_mesh_file_options file = {.unit_m = options->unit_m, .weld = PAL_MESH_WELD};
         report->unit_guessed = options->unit_m == 0;
@@ -258,10 +247,6 @@ pal_err pal_scene_prepare_file(const char *path, const pal_surface_scene *option
 
 /* ---- scenes ---- */
 
-/* short steps: a pose waits for one on its way into the picture */
-#define LIVE_STEP_S (1.0 / 120)
-#define FEM_STEP_S  (1.0 / 60) /* an implicit step costs more: no shorter than it is shown */
-
 /* A shape that was scanned, or drawn as it lies, is in balance with its weight: pulling it down once more would count
  * gravity twice (and let 5 kPa tissue sag by a third of its height). */
 static void leave_gravity_out(pal_body_def *body)
@@ -270,12 +255,6 @@ static void leave_gravity_out(pal_body_def *body)
     for (int k = 0; k < body->n_effect; k++)
         if (strcmp(body->effect[k].name, "gravity")) body->effect[kept++] = body->effect[k];
     body->n_effect = kept;
-}
-
-/* a body that nobody touches costs nothing once it rests */
-static void let_sleep(pal_body_def *body)
-{
-    pal_entry_init(&body->effect[body->n_effect++], "", "sleep");
 }
 
 /* model and solver as asked for */
@@ -294,43 +273,80 @@ static pal_err choose_model(pal_body_def *body, const pal_surface_scene *options
     return PAL_ERR_OK;
 }
 
-/* one body with defaults around the prepared mesh in mesh[0] */
-static pal_err dress(pal_loaded_scene *loaded, const char *name, const pal_surface_scene *options,
-                     const pal_surface_scene_report *report, pal_diagnostic *diag)
+static int by_height(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* a solid that stands on a thin part, as a kidney on its ureter, would sway on it for half a minute: what is held is
+ * the part of the height that has an eighth of the control vertices */
+static pal_err hold_an_eighth(const pal_cells *cells, const double up[3], double *fraction)
+{
+    int n = cells->n_vertex;
+    double *height = malloc(sizeof(double) * (size_t)n);
+    if (!height) return PAL_ERR_MEMORY;
+    for (int i = 0; i < n; i++) height[i] = pal_dot3(cells->x + 3 * (size_t)i, up);
+    qsort(height, (size_t)n, sizeof(double), by_height);
+    double part = (height[(n - 1) / 8] - height[0]) / (height[n - 1] - height[0]);
+    *fraction = fmax(*fraction, part);
+    free(height);
+    return PAL_ERR_OK;
+}
+
+/* as many levels as run in real time; cells that are no hexahedra need one */
+static int choose_levels(const pal_cells *cells)
+{
+    return cells->n_cell <= PAL_WANTED_ELEMENTS / 64 ? 2 : 1;
+}
+
+/* one body with defaults around the prepared mesh in mesh[0], or, where report is NULL, the control cells in cells[0]
+ */
+static pal_err make_body(pal_loaded_scene *loaded, const char *name, const pal_surface_scene *options,
+                         const pal_surface_scene_report *report, pal_diagnostic *diag)
 {
     pal_scene *scene = &loaded->scene;
+    pal_body_def *body = &scene->body[0];
+    const pal_cells *cells = report ? NULL : &loaded->cells[0];
     char plain[PAL_NAME];
+    double low[3], high[3];
     pal_scene_plain_name(name, plain);
     loaded->n_mesh = 1;
     pal_scene_default(scene);
-    scene->step_s = options->fem ? FEM_STEP_S : LIVE_STEP_S;
+    scene->step_s = options->fem && !cells ? PAL_FEM_STEP_S : PAL_LIVE_STEP_S;
     snprintf(scene->name, sizeof scene->name, "%s", plain);
-    pal_body_default(&scene->body[0], plain, &loaded->mesh[0]);
-    if (!options->gravity) leave_gravity_out(&scene->body[0]);
-    PAL_TRY(choose_model(&scene->body[0], options, report, diag));
-    let_sleep(&scene->body[0]);
-    for (int k = 0; k < scene->body[0].n_effect; k++)
-        snprintf(scene->body[0].effect[k].path, PAL_ENTRY_TEXT, "bodies[0].effects[%d]", k);
-    if (options->material.young_Pa > 0) scene->body[0].material = options->material;
+    if (cells)
+        pal_body_default_cells(body, plain, &loaded->mesh[0], cells);
+    else
+        pal_body_default(body, plain, &loaded->mesh[0]);
+    if (!options->gravity) leave_gravity_out(body);
+    if (cells)
+        PAL_TRY(pal_entry_put_number(&body->model, "levels", options->n_level ? options->n_level : choose_levels(cells),
+                                     diag));
+    else
+        PAL_TRY(choose_model(body, options, report, diag));
+    /* a body at rest costs nothing until it is touched */
+    pal_entry_init(&body->effect[body->n_effect++], "", "sleep");
+    for (int k = 0; k < body->n_effect; k++) snprintf(body->effect[k].path, PAL_ENTRY_TEXT, "bodies[0].effects[%d]", k);
+    if (options->material.young_Pa > 0) body->material = options->material;
     scene->n_body = 1;
     if (pal_norm3(options->up) > 0) pal_copy3(scene->up, options->up);
-    if (options->hold > 0) scene->body[0].support[0].fraction = options->hold;
+    if (options->hold > 0)
+        body->support[0].fraction = options->hold;
+    else if (cells)
+        PAL_TRY(hold_an_eighth(cells, scene->up, &body->support[0].fraction));
     pal_tools_default(scene, 3);
-    double low[3], high[3];
     pal_surface_box(&loaded->mesh[0].surface, low, high);
-    for (int t = 0; t < scene->n_tool; t++) scene->tool[t].radius_m = 0.025 * pal_dist3(low, high);
+    for (int t = 0; t < scene->n_tool; t++) scene->tool[t].radius_m = PAL_TOOL_RADIUS_S * pal_dist3(low, high);
     return pal_scene_check(scene, diag);
 }
 
 static pal_err check_shown(const char *what, const char *text, size_t n_byte, pal_diagnostic *diag)
 {
     char shown[256];
-    if (strlen(text) >= n_byte)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %zu bytes, more than %zu", what, strlen(text),
-                                  n_byte - 1);
+    if (strlen(text) >= n_byte) return PAL_REFUSE(diag, "%s: %zu bytes, more than %zu", what, strlen(text), n_byte - 1);
     shown_text(text, shown, sizeof shown);
-    if (strcmp(text, shown))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: has characters that cannot be shown", what);
+    if (strcmp(text, shown)) return PAL_REFUSE(diag, "%s: has characters that cannot be shown", what);
     return PAL_ERR_OK;
 }
 
@@ -341,8 +357,7 @@ pal_err pal_scene_rename(pal_loaded_scene *loaded, const char *name, const char 
     char plain[PAL_NAME];
     pal_scene_plain_name(name ? name : scene->name, plain);
     if (name && strcmp(plain, name))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "name: wanted at most %d of the characters a-z 0-9 _ -",
-                                  PAL_NAME - 1);
+        return PAL_REFUSE(diag, "name: wanted at most %d of the characters a-z 0-9 _ -", PAL_NAME - 1);
     if (title) PAL_TRY(check_shown("title", title, sizeof scene->title, diag));
     if (source) PAL_TRY(check_shown("source", source, sizeof scene->source, diag));
     snprintf(scene->name, sizeof scene->name, "%s", plain);
@@ -352,7 +367,25 @@ pal_err pal_scene_rename(pal_loaded_scene *loaded, const char *name, const char 
     return PAL_ERR_OK;
 }
 
-/* leaves out what nothing holds, and puts right what the report says of the mesh */
+/* title and source from a file's name; or, after an error, nothing is left of the scene */
+static pal_err finish(pal_loaded_scene *loaded, const char *path, const char *stem, int label, pal_err err,
+                      pal_loaded_scene **out)
+{
+    pal_scene *scene = &loaded->scene;
+    char shown[100];
+    const char *slash = strrchr(path, '/');
+    if (err) {
+        pal_scene_free(loaded);
+        return err;
+    }
+    shown_text(stem, shown, sizeof shown);
+    snprintf(scene->title, sizeof scene->title, label >= 0 ? "%s, label %d" : "%s", shown, label);
+    shown_text(slash ? slash + 1 : path, scene->source, sizeof scene->source);
+    *out = loaded;
+    return PAL_ERR_OK;
+}
+
+/* drops components without a support, and corrects the report of the mesh */
 static pal_err drop_loose(pal_loaded_scene *loaded, const pal_surface_scene *options, pal_surface_scene_report *report,
                           pal_diagnostic *diag)
 {
@@ -388,117 +421,36 @@ pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *option
     if (!report) report = &own;
     pal_loaded_scene *loaded = begin(report, path, diag);
     if (!loaded) return PAL_ERR_MEMORY;
-    char stem[256], shown[100];
-    const char *slash = strrchr(path, '/');
+    char stem[256];
     pal_scene_stem(path, stem, sizeof stem);
     pal_err err = pal_scene_prepare_file(path, options, &loaded->mesh[0], report, diag);
     pal_diagnostic reason = {""};
     report_progress(options, "levels", 0);
     if (!err && options->adaptive) err = pal_scene_adaptive_inspect(&loaded->mesh[0].surface, options, report, &reason);
-    if (!err) err = dress(loaded, stem, options, report, &reason);
+    if (!err) err = make_body(loaded, stem, options, report, &reason);
     if (!err) err = drop_loose(loaded, options, report, &reason);
     if (err && reason.text[0]) pal_diagnostic_set(diag, err, "%s: %s: %s", path, report->surface.place, reason.text);
-    if (err) {
-        pal_scene_free(loaded);
-        return err;
-    }
-    pal_scene *scene = &loaded->scene;
-    shown_text(stem, shown, sizeof shown);
-    if (report->label >= 0)
-        snprintf(scene->title, sizeof scene->title, "%s, label %d", shown, report->label);
-    else
-        snprintf(scene->title, sizeof scene->title, "%s", shown);
-    shown_text(slash ? slash + 1 : path, scene->source, sizeof scene->source);
-    *out = loaded;
-    return PAL_ERR_OK;
-}
-
-/* so many levels that the elements are about as many as real time bears; what is no hexahedron needs one */
-static int choose_levels(const pal_cells *cells)
-{
-    return cells->n_cell <= WANTED_ELEMENTS / 64 ? 2 : 1;
-}
-
-static int by_height(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* a solid that stands on a thin thing, as a kidney on its ureter, would sway on it for half a minute: what is held is
- * the part of the height that has an eighth of the control vertices */
-static pal_err hold_an_eighth(const pal_cells *cells, const double up[3], double *fraction)
-{
-    int n = cells->n_vertex;
-    double *height = malloc(sizeof(double) * (size_t)n);
-    if (!height) return PAL_ERR_MEMORY;
-    for (int i = 0; i < n; i++) height[i] = pal_dot3(cells->x + 3 * (size_t)i, up);
-    qsort(height, (size_t)n, sizeof(double), by_height);
-    double part = (height[(n - 1) / 8] - height[0]) / (height[n - 1] - height[0]);
-    *fraction = fmax(*fraction, part);
-    free(height);
-    return PAL_ERR_OK;
-}
-
-/* name, body and tools of control cells in cells[0] with their boundary in mesh[0] */
-static pal_err dress_cells(pal_loaded_scene *loaded, const char *name, const pal_surface_scene *options,
-                           pal_diagnostic *diag)
-{
-    pal_scene *scene = &loaded->scene;
-    pal_body_def *body = &scene->body[0];
-    char plain[PAL_NAME];
-    double low[3], high[3];
-    pal_scene_plain_name(name, plain);
-    loaded->n_mesh = 1;
-    pal_scene_default(scene);
-    scene->step_s = LIVE_STEP_S;
-    snprintf(scene->name, sizeof scene->name, "%s", plain);
-    pal_body_default_cells(body, plain, &loaded->mesh[0], &loaded->cells[0]);
-    PAL_TRY(pal_entry_put_number(&body->model, "levels",
-                                 options->n_level ? options->n_level : choose_levels(&loaded->cells[0]), diag));
-    if (!options->gravity) leave_gravity_out(body);
-    let_sleep(body);
-    for (int k = 0; k < body->n_effect; k++) snprintf(body->effect[k].path, PAL_ENTRY_TEXT, "bodies[0].effects[%d]", k);
-    if (options->material.young_Pa > 0) body->material = options->material;
-    if (pal_norm3(options->up) > 0) pal_copy3(scene->up, options->up);
-    if (options->hold > 0)
-        body->support[0].fraction = options->hold;
-    else
-        PAL_TRY(hold_an_eighth(&loaded->cells[0], scene->up, &body->support[0].fraction));
-    scene->n_body = 1;
-    pal_tools_default(scene, 3);
-    pal_surface_box(&loaded->mesh[0].surface, low, high);
-    for (int t = 0; t < scene->n_tool; t++) scene->tool[t].radius_m = 0.025 * pal_dist3(low, high);
-    return pal_scene_check(scene, diag);
+    return finish(loaded, path, stem, report->label, err, out);
 }
 
 pal_err pal_scene_from_cells(const char *path, const pal_surface_scene *options, pal_loaded_scene **out,
                              pal_diagnostic *diag)
 {
     pal_surface_scene_report unused;
-    char stem[256], shown[100];
-    const char *slash = strrchr(path, '/');
+    char stem[256];
     pal_diagnostic reason = {""};
     pal_loaded_scene *loaded = begin(&unused, path, diag);
     if (!loaded) return PAL_ERR_MEMORY;
     pal_scene_stem(path, stem, sizeof stem);
     pal_err err = pal_subdivision_load(path, options->unit_m > 0 ? options->unit_m : 1, NULL, loaded, 0, diag);
-    if (!err) err = dress_cells(loaded, stem, options, &reason);
+    if (!err) err = make_body(loaded, stem, options, NULL, &reason);
     if (!err) err = pal_scene_drop_loose(loaded, 0, options->largest_only, &reason);
     if (err && reason.text[0]) pal_diagnostic_set(diag, err, "%s: %s", path, reason.text);
-    if (err) {
-        pal_scene_free(loaded);
-        return err;
-    }
-    shown_text(stem, shown, sizeof shown);
-    snprintf(loaded->scene.title, sizeof loaded->scene.title, "%s", shown);
-    shown_text(slash ? slash + 1 : path, loaded->scene.source, sizeof loaded->scene.source);
-    *out = loaded;
-    return PAL_ERR_OK;
+    return finish(loaded, path, stem, -1, err, out);
 }
 
 /* the shape's own supports and anchors in place of the defaults; what is asked for still wins */
-static pal_err dress_shape(pal_scene *scene, const pal_scene_shape *shape, const pal_surface_scene *options,
+static pal_err apply_shape(pal_scene *scene, const pal_scene_shape *shape, const pal_surface_scene *options,
                            pal_diagnostic *diag)
 {
     pal_body_def *body = &scene->body[0];
@@ -515,7 +467,7 @@ static pal_err make_procedural(const pal_surface_scene *options, pal_scene_shape
 {
     if (options->shape && strcmp(options->shape, "organ") != 0) return pal_scene_shape_make(options->shape, out, diag);
     *out = (pal_scene_shape){.name = "organ", .title = "Procedural organ"};
-    pal_err err = pal_organ_make(options->target_tri ? options->target_tri : WANTED_TRI, &out->surface);
+    pal_err err = pal_organ_make(options->target_tri ? options->target_tri : PAL_WANTED_TRI, &out->surface);
     if (err) pal_diagnostic_set(diag, err, "the procedural organ: %s", pal_err_text(err));
     return err;
 }
@@ -544,8 +496,8 @@ pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene 
     if (!err && options->adaptive) err = pal_scene_adaptive_inspect(&loaded->mesh[0].surface, options, report, &reason);
     if (err && reason.text[0]) pal_diagnostic_set(diag, err, "%s: %s", name, reason.text);
     pal_surface_free(&shape.surface);
-    if (!err) err = dress(loaded, shape.name, options, report, diag);
-    if (!err) err = dress_shape(&loaded->scene, &shape, options, diag);
+    if (!err) err = make_body(loaded, shape.name, options, report, diag);
+    if (!err) err = apply_shape(&loaded->scene, &shape, options, diag);
     if (!err) err = drop_loose(loaded, options, report, diag);
     if (err) {
         pal_scene_free(loaded);

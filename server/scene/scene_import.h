@@ -4,7 +4,7 @@
 #include "server/scene/loaded_scene.h"
 
 /* any surface file or label volume -> default scene: material, lowest 5 % held, three tools; with model
- * adaptive_springs the open edges are held in place of the lowest part when there are some and nobody asked for `hold`.
+ * adaptive_springs the open edges are held in place of the lowest part when there are some and `hold` is 0.
  * REFUSED also for a surface that this model cannot take, naming the first offender, BUDGET with both numbers when its
  * levels do not fit into 512 MiB. report may be NULL */
 pal_err pal_scene_from_surface(const char *path, const pal_surface_scene *options, pal_loaded_scene **out,
@@ -29,14 +29,15 @@ pal_err pal_scene_rename(pal_loaded_scene *scene, const char *name, const char *
 pal_err pal_scene_prepare_file(const char *path, const pal_surface_scene *options, pal_prepared *out,
                                pal_surface_scene_report *report, pal_diagnostic *diag);
 /* Leaves out what of body `index` nothing holds (scene_loose.c, mesh/volume/loose_components.h), once its supports and
- * effects are there, and says in loaded->loose what that was. Model adaptive_springs keeps all pieces. Errors name the
+ * effects are there, and records it in loaded->loose. Model adaptive_springs keeps all pieces. Errors name the
  * body */
 pal_err pal_scene_drop_loose(pal_loaded_scene *loaded, int index, bool largest_only, pal_diagnostic *diag);
 /* Model adaptive_springs (scene_adaptive.c). The surface alone, or its largest piece, as a prepared mesh; errors have
  * no file's name */
 pal_err pal_scene_adaptive_prepare(const pal_surface *surface, const pal_surface_scene *options, pal_prepared *out,
                                    pal_diagnostic *diag);
-/* makes its levels once, to refuse what the model would and to tell what they have; mass by the density in options */
+/* makes its levels once, to refuse what the model would refuse and to report their sizes; mass by the density in
+ * options */
 pal_err pal_scene_adaptive_inspect(const pal_surface *surface, const pal_surface_scene *options,
                                    pal_surface_scene_report *report, pal_diagnostic *diag);
 /* model, output and supports of a body with defaults */

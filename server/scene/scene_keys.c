@@ -1,7 +1,5 @@
 #include "server/scene/scene_keys.h"
 
-#include <stddef.h>
-
 static const struct {
     const char *path, *const key[24];
 } objects[PAL_KEYS_OBJECTS] = {
@@ -26,7 +24,7 @@ static const struct {
                               {"n", "low_m", "high_m", "k_distance_J", "k_area_J", "k_volume_J"}},
     [PAL_KEYS_SUPPORT] = {"bodies[].supports[].", {"lowest", "box", "boundary"}},
     [PAL_KEYS_SUPPORT_BOX] = {"bodies[].supports[].box.", {"low_m", "high_m"}},
-    [PAL_KEYS_STROKE] = {"bodies[].strokes[].", {"at_m", "radius_m", "soft", "young_factor", "density_factor"}},
+    [PAL_KEYS_STROKE] = {"bodies[].strokes[].", {"at_m", "radius_m", "softness", "young_factor", "density_factor"}},
     [PAL_KEYS_CUT] = {"bodies[].cut.", {"normal", "offset_m"}},
 };
 

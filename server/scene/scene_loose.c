@@ -1,4 +1,4 @@
-/* What of a body's components nothing holds, left out once the scene says what is held. */
+/* Drops the components of a body that have no support. */
 #include "server/scene/scene_import.h"
 #include "server/scene/subdivision_file.h"
 

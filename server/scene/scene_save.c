@@ -8,11 +8,10 @@
 #include "server/scene/scene_import.h"
 #include "server/scene/subdivision_file.h"
 
-#include <cjson/cJSON.h>
 #include <errno.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -42,82 +41,48 @@ static void mesh_name(const pal_scene *scene, int body, char out[MESH_NAME])
     snprintf(out + n, MESH_NAME - n, scene->body[body].cells ? ".palcells" : ".palmesh");
 }
 
-static void add_number(cJSON *object, const char *key, double number)
+static cJSON *entry_json(const pal_config_entry *item)
 {
-    cJSON_AddItemToObject(object, key, pal_json_exact(number));
-}
-
-static cJSON *add_item(cJSON *parent, const char *key, const pal_config_entry *item)
-{
-    cJSON *object = key ? cJSON_AddObjectToObject(parent, key) : cJSON_CreateObject();
-    if (!key) cJSON_AddItemToArray(parent, object);
-    cJSON_AddStringToObject(object, "name", item->name);
+    cJSON *object = PAL_JSON({"name", JSON_TEXT(item->name)});
     for (int k = 0; k < item->n_value; k++) {
         const pal_config_value *v = &item->value[k];
-        switch (v->kind) {
-        case PAL_VALUE_NUMBER:
-            add_number(object, v->key, v->number[0]);
-            break;
-        case PAL_VALUE_BOOL:
-            cJSON_AddBoolToObject(object, v->key, v->flag);
-            break;
-        case PAL_VALUE_TEXT:
-            cJSON_AddStringToObject(object, v->key, v->text);
-            break;
-        case PAL_VALUE_NUMBERS:
-            cJSON_AddItemToObject(object, v->key, pal_json_exact_list(v->number, v->n_number));
-            break;
-        }
+        cJSON *value = v->kind == PAL_VALUE_NUMBER ? pal_json_exact(v->number[0])
+                       : v->kind == PAL_VALUE_BOOL ? JSON_BOOL(v->flag)
+                       : v->kind == PAL_VALUE_TEXT ? JSON_TEXT(v->text)
+                                                   : pal_json_exact_list(v->number, v->n_number);
+        cJSON_AddItemToObject(object, v->key, value);
     }
     return object;
 }
 
-static void add_supports(cJSON *object, const pal_body_def *body)
+static cJSON *support_json(const pal_support_def *s)
 {
-    cJSON *list = cJSON_AddArrayToObject(object, "supports");
-    for (int k = 0; k < body->n_support; k++) {
-        const pal_support_def *s = &body->support[k];
-        cJSON *entry = cJSON_CreateObject();
-        cJSON_AddItemToArray(list, entry);
-        if (s->rim) {
-            cJSON_AddBoolToObject(entry, "boundary", true);
-            continue;
-        }
-        if (s->lowest) {
-            add_number(entry, "lowest", s->fraction);
-            continue;
-        }
-        cJSON *box = cJSON_AddObjectToObject(entry, "box");
-        cJSON_AddItemToObject(box, "low_m", pal_json_exact_list(s->low_m, 3));
-        cJSON_AddItemToObject(box, "high_m", pal_json_exact_list(s->high_m, 3));
-    }
+    if (s->rim) return PAL_JSON({"boundary", JSON_BOOL(true)});
+    if (s->lowest) return PAL_JSON({"lowest", pal_json_exact(s->fraction)});
+    return PAL_JSON(
+        {"box", PAL_JSON({"low_m", pal_json_exact_list(s->low_m, 3)}, {"high_m", pal_json_exact_list(s->high_m, 3)})});
 }
 
-static void add_body(cJSON *list, const pal_scene *scene, int index)
+static cJSON *body_json(const pal_scene *scene, int index)
 {
     const pal_body_def *body = &scene->body[index];
+    const pal_material *m = &body->material;
     char name[MESH_NAME];
-    cJSON *object = cJSON_CreateObject();
-    cJSON_AddItemToArray(list, object);
+    cJSON *supports = cJSON_CreateArray(), *effects = cJSON_CreateArray(), *model = entry_json(&body->model);
+    for (int k = 0; k < body->n_support; k++) cJSON_AddItemToArray(supports, support_json(&body->support[k]));
+    for (int k = 0; k < body->n_effect; k++) cJSON_AddItemToArray(effects, entry_json(&body->effect[k]));
+    pal_spring_grid_append(model, &body->spring_grid);
     mesh_name(scene, index, name);
-    cJSON_AddStringToObject(object, "name", body->name);
-    if (body->cells)
-        pal_subdivision_append(object, body, name);
-    else
-        cJSON_AddStringToObject(object, "mesh", name);
-    cJSON *material = cJSON_AddObjectToObject(object, "material");
-    add_number(material, "young_Pa", body->material.young_Pa);
-    add_number(material, "poisson", body->material.poisson);
-    add_number(material, "density_kg_m3", body->material.density_kg_m3);
-    add_number(material, "damping_1_s", body->material.damping_1_s);
+    cJSON *object = PAL_JSON({"name", JSON_TEXT(body->name)}, {"mesh", body->cells ? NULL : JSON_TEXT(name)});
+    if (body->cells) pal_subdivision_append(object, body, name);
+    PAL_JSON_ADD(object, {"material",
+                          PAL_JSON({"young_Pa", pal_json_exact(m->young_Pa)}, {"poisson", pal_json_exact(m->poisson)},
+                                   {"density_kg_m3", pal_json_exact(m->density_kg_m3)},
+                                   {"damping_1_s", pal_json_exact(m->damping_1_s)})});
     stem_of(scene, index, name);
     pal_region_append(object, body, name);
-    pal_spring_grid_append(add_item(object, "model", &body->model), &body->spring_grid);
-    if (body->solver.name[0]) add_item(object, "solver", &body->solver);
-    add_item(object, "output", &body->output);
-    add_supports(object, body);
-    cJSON *effects = cJSON_AddArrayToObject(object, "effects");
-    for (int k = 0; k < body->n_effect; k++) add_item(effects, NULL, &body->effect[k]);
+    return PAL_JSON_ADD(object, {"model", model}, {"solver", body->solver.name[0] ? entry_json(&body->solver) : NULL},
+                        {"output", entry_json(&body->output)}, {"supports", supports}, {"effects", effects});
 }
 
 /* millimetres that are read as exactly these metres, when they came from millimetres */
@@ -128,41 +93,26 @@ static double in_mm(double metres)
     return mm;
 }
 
-/* "accuracy" and "budget" as they were asked for */
-static void add_requests(cJSON *root, const pal_scene *scene)
-{
-    if (scene->max_error_m > 0) {
-        cJSON *accuracy = cJSON_AddObjectToObject(root, "accuracy");
-        add_number(accuracy, "max_error_mm", in_mm(scene->max_error_m));
-        if (scene->accuracy[0]) cJSON_AddStringToObject(accuracy, "text", scene->accuracy);
-    } else if (scene->accuracy[0]) {
-        cJSON_AddStringToObject(root, "accuracy", scene->accuracy);
-    }
-    if (scene->budget_ms > 0) add_number(cJSON_AddObjectToObject(root, "budget"), "step_ms", scene->budget_ms);
-}
-
 /* the scene as text, or NULL; the caller frees it */
 static char *scene_text(const pal_scene *scene)
 {
-    cJSON *root = cJSON_CreateObject();
-    cJSON_AddStringToObject(root, "name", scene->name);
-    cJSON_AddStringToObject(root, "title", scene->title);
-    cJSON_AddStringToObject(root, "source", scene->source);
-    add_requests(root, scene);
-    add_number(root, "step_s", scene->step_s);
-    cJSON_AddItemToObject(root, "up", pal_json_exact_list(scene->up, 3));
-    add_number(root, "gravity_m_s2", scene->gravity_m_s2);
-    add_number(root, "max_substep", scene->max_substep);
-    cJSON *bodies = cJSON_AddArrayToObject(root, "bodies");
-    for (int k = 0; k < scene->n_body; k++) add_body(bodies, scene, k);
-    cJSON *tools = cJSON_AddArrayToObject(root, "tools");
+    cJSON *accuracy = scene->accuracy[0] ? JSON_TEXT(scene->accuracy) : NULL, *budget = NULL;
+    cJSON *bodies = cJSON_CreateArray(), *tools = cJSON_CreateArray();
+    if (scene->max_error_m > 0)
+        accuracy = PAL_JSON({"max_error_mm", pal_json_exact(in_mm(scene->max_error_m))}, {"text", accuracy});
+    if (scene->budget_ms > 0) budget = PAL_JSON({"step_ms", pal_json_exact(scene->budget_ms)});
+    for (int k = 0; k < scene->n_body; k++) cJSON_AddItemToArray(bodies, body_json(scene, k));
     for (int k = 0; k < scene->n_tool; k++) {
-        cJSON *tool = cJSON_CreateObject();
-        cJSON_AddItemToArray(tools, tool);
-        cJSON_AddStringToObject(tool, "name", scene->tool[k].name);
-        add_number(tool, "radius_m", scene->tool[k].radius_m);
-        add_number(tool, "force_cap_N", scene->tool[k].force_cap_N);
+        const pal_tool_def *tool = &scene->tool[k];
+        cJSON_AddItemToArray(tools,
+                             PAL_JSON({"name", JSON_TEXT(tool->name)}, {"radius_m", pal_json_exact(tool->radius_m)},
+                                      {"force_cap_N", pal_json_exact(tool->force_cap_N)}));
     }
+    cJSON *root = PAL_JSON({"name", JSON_TEXT(scene->name)}, {"title", JSON_TEXT(scene->title)},
+                           {"source", JSON_TEXT(scene->source)}, {"accuracy", accuracy}, {"budget", budget},
+                           {"step_s", pal_json_exact(scene->step_s)}, {"up", pal_json_exact_list(scene->up, 3)},
+                           {"gravity_m_s2", pal_json_exact(scene->gravity_m_s2)},
+                           {"max_substep", pal_json_exact(scene->max_substep)}, {"bodies", bodies}, {"tools", tools});
     char *text = cJSON_Print(root);
     cJSON_Delete(root);
     return text;
@@ -172,8 +122,7 @@ pal_err pal_scene_make_folder(const char *folder, pal_diagnostic *diag)
 {
     char path[PATH];
     int n = snprintf(path, sizeof path, "%s", folder);
-    if (n < 1 || (size_t)n >= sizeof path)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.80s: not a folder's name", folder);
+    if (n < 1 || (size_t)n >= sizeof path) return PAL_REFUSE(diag, "%.80s: not a folder's name", folder);
     for (char *at = path + 1;; at++) {
         char end = *at;
         if (end != '/' && end != 0) continue;
@@ -189,68 +138,61 @@ pal_err pal_scene_make_folder(const char *folder, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
-/* mesh and label volumes of a body; what was written is counted in *n_file */
-static pal_err save_body(const pal_scene *scene, int index, const char *folder, int *n_file, pal_diagnostic *diag)
+/* meshes and label volumes of all bodies, of which the first n_file are written, or removed again; *n_done: how many
+ * were before an error */
+static pal_err each_file(const pal_scene *scene, const char *folder, bool written, int n_file, int *n_done,
+                         pal_diagnostic *diag)
 {
-    const pal_body_def *body = &scene->body[index];
-    const int *n = body->spring_grid.n;
     char name[MESH_NAME], volume[MESH_NAME + 32], path[PATH];
-    if ((double)n[0] * n[1] * n[2] > PAL_GRID_NODES_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" model.grid.n: %g nodes, more than %d", body->name,
-                                  (double)n[0] * n[1] * n[2], PAL_GRID_NODES_MAX);
-    mesh_name(scene, index, name);
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    if (body->cells)
-        PAL_TRY(pal_cell_file_save(body->cells, path, diag));
-    else
-        PAL_TRY(pal_prepared_save(body->mesh, path, diag));
-    ++*n_file;
-    stem_of(scene, index, name);
-    for (int k = 0; k < body->n_region; k++) {
-        if (body->region[k].kind != PAL_REGION_LABEL) continue;
-        pal_region_volume(name, k, volume, sizeof volume);
-        snprintf(path, sizeof path, "%s/%s", folder, volume);
-        PAL_TRY(pal_region_write(body, k, path, diag));
-        ++*n_file;
+    *n_done = 0;
+    for (int b = 0; b < scene->n_body; b++) {
+        const pal_body_def *body = &scene->body[b];
+        for (int k = -1; k < body->n_region; k++) {
+            if (k >= 0 && body->region[k].kind != PAL_REGION_LABEL) continue;
+            if (*n_done == n_file) return PAL_ERR_OK;
+            stem_of(scene, b, name);
+            pal_region_volume(name, k, volume, sizeof volume);
+            if (k < 0) mesh_name(scene, b, name);
+            snprintf(path, sizeof path, "%s/%s", folder, k < 0 ? name : volume);
+            if (!written)
+                unlink(path);
+            else if (k >= 0)
+                PAL_TRY(pal_region_write(body, k, path, diag));
+            else if (body->cells)
+                PAL_TRY(pal_cell_file_save(body->cells, path, diag));
+            else
+                PAL_TRY(pal_prepared_save(body->mesh, path, diag));
+            ++*n_done;
+        }
     }
     return PAL_ERR_OK;
 }
 
-/* takes back the first n_file files that save_body wrote */
-static void remove_files(const pal_scene *scene, const char *folder, int n_file)
+static pal_err check_grids(const pal_scene *scene, pal_diagnostic *diag)
 {
-    char name[MESH_NAME], volume[MESH_NAME + 32], path[PATH];
-    for (int b = 0; b < scene->n_body && n_file > 0; b++) {
-        const pal_body_def *body = &scene->body[b];
-        mesh_name(scene, b, name);
-        snprintf(path, sizeof path, "%s/%s", folder, name);
-        unlink(path);
-        n_file--;
-        stem_of(scene, b, name);
-        for (int k = 0; k < body->n_region && n_file > 0; k++) {
-            if (body->region[k].kind != PAL_REGION_LABEL) continue;
-            pal_region_volume(name, k, volume, sizeof volume);
-            snprintf(path, sizeof path, "%s/%s", folder, volume);
-            unlink(path);
-            n_file--;
-        }
+    for (int b = 0; b < scene->n_body; b++) {
+        const int *n = scene->body[b].spring_grid.n;
+        double count = (double)n[0] * n[1] * n[2];
+        if (count > PAL_GRID_NODES_MAX)
+            return PAL_REFUSE(diag, "body \"%s\" model.grid.n: %g nodes, more than %d", scene->body[b].name, count,
+                              PAL_GRID_NODES_MAX);
     }
+    return PAL_ERR_OK;
 }
 
 /* meshes into the folder, then the scene's text to path, which lies in it */
 static pal_err save_to(const pal_scene *scene, const char *folder, const char *path, pal_diagnostic *diag)
 {
-    int n_file = 0;
-    pal_err err = PAL_ERR_OK;
-    for (int b = 0; b < scene->n_body && !err; b++) err = save_body(scene, b, folder, &n_file, diag);
+    int n_file = 0, n_removed;
+    PAL_TRY(check_grids(scene, diag));
+    pal_err err = each_file(scene, folder, true, INT_MAX, &n_file, diag);
     char *text = err ? NULL : scene_text(scene);
     if (!err && !text) err = pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for its text", path);
     if (!err && strlen(text) > PAL_JSON_MAX_BYTES)
-        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: would have %zu bytes, more than %d", path, strlen(text),
-                                 PAL_JSON_MAX_BYTES);
+        err = PAL_REFUSE(diag, "%s: would have %zu bytes, more than %d", path, strlen(text), PAL_JSON_MAX_BYTES);
     if (!err) err = pal_file_write(path, text, strlen(text), diag);
     cJSON_free(text);
-    if (err) remove_files(scene, folder, n_file);
+    if (err) each_file(scene, folder, false, n_file, &n_removed, NULL);
     return err;
 }
 
@@ -266,10 +208,7 @@ pal_err pal_scene_save_file(const pal_loaded_scene *loaded, const char *path, pa
 {
     char folder[PATH];
     const char *slash = strrchr(path, '/');
-    int n = slash == path ? snprintf(folder, sizeof folder, "/")
-            : slash       ? snprintf(folder, sizeof folder, "%.*s", (int)(slash - path), path)
-                          : snprintf(folder, sizeof folder, ".");
-    if (n < 0 || (size_t)n >= sizeof folder || strlen(path) >= PATH || !path[0] || (slash && !slash[1]))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.80s: not the name of a file", path);
+    if (!pal_json_folder(path, folder, sizeof folder) || strlen(path) >= PATH || !path[0] || (slash && !slash[1]))
+        return PAL_REFUSE(diag, "%.80s: not the name of a file", path);
     return save_to(&loaded->scene, folder, path, diag);
 }

@@ -9,7 +9,6 @@
 #include "server/scene/scene_keys.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -57,8 +56,8 @@ pal_err pal_subdivision_load(const char *file, double unit_m, const double *orig
         pal_sub3(cells->x + 3 * (size_t)i, cells->x + 3 * (size_t)i, origin);
     /* far from its origin a solid may have lost its shape to rounding */
     if (!pal_cells_shape_valid(cells, NULL, &fault))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: cell %d has no volume left about (%g, %g, %g) m", file,
-                                  fault.cell + 1, origin[0], origin[1], origin[2]);
+        return PAL_REFUSE(diag, "%s: cell %d has no volume left about (%g, %g, %g) m", file, fault.cell + 1, origin[0],
+                          origin[1], origin[2]);
     scene->scene.body[index].cells = cells;
     pal_err err = make_mesh(cells, origin, &scene->mesh[index]);
     return err ? pal_diagnostic_set(diag, err, "%s: no memory for its boundary", file) : PAL_ERR_OK;
@@ -75,32 +74,26 @@ pal_err pal_subdivision_update_surface(pal_loaded_scene *scene, int index, pal_d
     return PAL_ERR_OK;
 }
 
-pal_err pal_subdivision_read(const pal_json *json, const cJSON *body, const char *path, const char *folder,
-                             pal_loaded_scene *scene, int index)
+pal_err pal_subdivision_read(const pal_json *at, pal_loaded_scene *scene, int index)
 {
     static const char *const others[] = {"mesh", "surface", "resolution", "label", "triangles"};
     const pal_body_def *def = &scene->scene.body[index];
-    char at[PAL_JSON_PATH], name[512] = "", units[16] = "", file[PATH];
+    char units[16] = "", file[PATH];
     double origin_m[3] = {0}, unit_m = 1;
-    bool about = cJSON_GetObjectItemCaseSensitive(body, "origin_m") != NULL;
+    bool about = pal_json_has(at, "origin_m");
     for (size_t k = 0; k < sizeof others / sizeof others[0]; k++)
-        if (cJSON_GetObjectItemCaseSensitive(body, others[k]))
-            return pal_json_refuse(json, pal_json_key(at, path, others[k]), "does not go with cells");
-    PAL_TRY(pal_json_text(json, body, path, "cells", false, name, sizeof name));
+        if (pal_json_has(at, others[k])) return pal_json_refuse_key(at, others[k], "does not go with cells");
+    PAL_TRY(pal_json_file_name(at, "cells", file, sizeof file));
     if (strcmp(def->model.name, "subdivision_fem") != 0)
-        return pal_json_refuse(json, pal_json_key(at, path, "cells"),
-                               "model \"%s\" does not take control cells; \"subdivision_fem\" does", def->model.name);
-    PAL_TRY(pal_json_text(json, body, path, "units", false, units, sizeof units));
+        return pal_json_refuse_key(at, "cells", "model \"%s\" does not take control cells; \"subdivision_fem\" does",
+                                   def->model.name);
+    PAL_TRY(pal_json_text(at, "units", false, units, sizeof units));
     if (*units && !((unit_m = pal_mesh_unit_named(units)) > 0))
-        return pal_json_refuse(json, pal_json_key(at, path, "units"), "is not m, cm, mm, um or in");
-    PAL_TRY(pal_json_vector(json, body, path, "origin_m", origin_m));
-    pal_json_key(at, path, "cells");
-    int n =
-        name[0] == '/' ? snprintf(file, sizeof file, "%s", name) : snprintf(file, sizeof file, "%s/%s", folder, name);
-    if (n < 0 || (size_t)n >= sizeof file) return pal_json_refuse(json, at, "the path is too long");
+        return pal_json_refuse_key(at, "units", "is not m, cm, mm, um or in");
+    PAL_TRY(pal_json_vector(at, "origin_m", origin_m));
     pal_diagnostic reason = {""};
     pal_err err = pal_subdivision_load(file, unit_m, about ? origin_m : NULL, scene, index, &reason);
-    return err ? pal_diagnostic_set(json->diag, err, "%s: %s: %s", json->file, at, reason.text) : PAL_ERR_OK;
+    return pal_json_forward(at, "cells", err, &reason);
 }
 
 void pal_subdivision_unload(pal_loaded_scene *scene, int index)
@@ -112,63 +105,58 @@ void pal_subdivision_unload(pal_loaded_scene *scene, int index)
 
 /* ---- strokes ---- */
 
-static pal_err read_stroke(const pal_json *json, const cJSON *object, const char *path, pal_stroke *out)
+static pal_err read_stroke(const pal_json *at, pal_stroke *out)
 {
     const char *const *known = pal_scene_keys(PAL_KEYS_STROKE, NULL);
-    char at[PAL_JSON_PATH];
     pal_diagnostic reason = {""};
-    *out = (pal_stroke){.soft = 0.5, .young_factor = 1, .density_factor = 1};
-    PAL_TRY(pal_json_object(json, object, path, known));
-    for (int k = 0; k < 2; k++)
-        if (!cJSON_GetObjectItemCaseSensitive(object, known[k]))
-            return pal_json_refuse(json, pal_json_key(at, path, known[k]), "is missing");
-    PAL_TRY(pal_json_vector(json, object, path, "at_m", out->at_m));
+    *out = (pal_stroke){.softness = 0.5, .young_factor = 1, .density_factor = 1};
+    PAL_TRY(pal_json_object(at, known));
+    for (int k = 0; k < 2; k++) PAL_TRY(pal_json_need(at, known[k]));
+    PAL_TRY(pal_json_vector(at, "at_m", out->at_m));
     /* ranges are pal_stroke_check's: any number will do here */
-    PAL_TRY(pal_json_number(json, object, path, "radius_m", -INFINITY, INFINITY, &out->radius_m));
-    PAL_TRY(pal_json_number(json, object, path, "soft", -INFINITY, INFINITY, &out->soft));
-    PAL_TRY(pal_json_number(json, object, path, "young_factor", -INFINITY, INFINITY, &out->young_factor));
-    PAL_TRY(pal_json_number(json, object, path, "density_factor", -INFINITY, INFINITY, &out->density_factor));
+    PAL_TRY(pal_json_number(at, "radius_m", -INFINITY, INFINITY, &out->radius_m));
+    PAL_TRY(pal_json_number(at, "softness", -INFINITY, INFINITY, &out->softness));
+    PAL_TRY(pal_json_number(at, "young_factor", -INFINITY, INFINITY, &out->young_factor));
+    PAL_TRY(pal_json_number(at, "density_factor", -INFINITY, INFINITY, &out->density_factor));
     if (!pal_stroke_check(out, &reason)) return PAL_ERR_OK;
-    return pal_diagnostic_set(json->diag, PAL_ERR_REFUSED, "%s: %s.%s", json->file, path, reason.text);
+    return PAL_REFUSE(at->diag, "%s: %s.%s", at->file, at->path, reason.text);
 }
 
-pal_err pal_strokes_read(const pal_json *json, const cJSON *body, const char *path, pal_loaded_scene *scene, int index)
+pal_err pal_strokes_read(const pal_json *body, pal_loaded_scene *scene, int index)
 {
-    char at[PAL_JSON_PATH], entry[PAL_JSON_PATH];
     pal_body_def *def = &scene->scene.body[index];
-    const cJSON *list;
-    PAL_TRY(pal_json_list(json, body, path, "strokes", PAL_STROKE_MAX, &list));
-    if (!list || !list->child) return PAL_ERR_OK;
-    pal_json_key(at, path, "strokes");
-    if (!cJSON_GetObjectItemCaseSensitive(body, "cells"))
-        return pal_json_refuse(json, at, "model \"%s\" cannot be painted; \"subdivision_fem\" can", def->model.name);
-    pal_stroke *stroke = calloc((size_t)cJSON_GetArraySize(list), sizeof *stroke);
-    if (!stroke) return pal_diagnostic_set(json->diag, PAL_ERR_MEMORY, "%s: no memory for %s", json->file, at);
+    pal_json list;
+    PAL_TRY(pal_json_list(body, "strokes", PAL_STROKE_MAX, &list));
+    if (!list.value || !list.value->child) return PAL_ERR_OK;
+    if (!pal_json_has(body, "cells"))
+        return pal_json_refuse(&list, "model \"%s\" cannot be painted; \"subdivision_fem\" can", def->model.name);
+    pal_stroke *stroke = calloc((size_t)cJSON_GetArraySize(list.value), sizeof *stroke);
+    if (!stroke) return pal_diagnostic_set(body->diag, PAL_ERR_MEMORY, "%s: no memory for %s", body->file, list.path);
     scene->stroke[index] = stroke;
     def->stroke = stroke;
-    for (const cJSON *child = list->child; child; child = child->next, def->n_stroke++)
-        PAL_TRY(read_stroke(json, child, pal_json_entry(entry, at, def->n_stroke), &stroke[def->n_stroke]));
+    PAL_JSON_EACH(child, &list)
+    {
+        const pal_json at = pal_json_entry(&list, def->n_stroke, child);
+        PAL_TRY(read_stroke(&at, &stroke[def->n_stroke++]));
+    }
     return PAL_ERR_OK;
 }
 
 /* ---- the cut ---- */
 
-pal_err pal_cut_read(const pal_json *json, const cJSON *body, const char *path, pal_body_def *def)
+pal_err pal_cut_read(const pal_json *body, pal_body_def *def)
 {
     const char *const *known = pal_scene_keys(PAL_KEYS_CUT, NULL);
-    char at[PAL_JSON_PATH], inner[PAL_JSON_PATH];
-    const cJSON *cut = cJSON_GetObjectItemCaseSensitive(body, "cut");
-    if (!cut) return PAL_ERR_OK;
-    pal_json_key(at, path, "cut");
-    if (!cJSON_GetObjectItemCaseSensitive(body, "cells"))
-        return pal_json_refuse(json, at, "model \"%s\" cannot be cut away; \"subdivision_fem\" can", def->model.name);
-    PAL_TRY(pal_json_object(json, cut, at, known));
-    pal_json_key(inner, at, known[0]);
-    if (!cJSON_GetObjectItemCaseSensitive(cut, known[0])) return pal_json_refuse(json, inner, "is missing");
-    PAL_TRY(pal_json_vector(json, cut, at, known[0], def->cut_normal));
-    PAL_TRY(pal_json_number(json, cut, at, known[1], -1e9, 1e9, &def->cut_m));
+    const pal_json at = pal_json_at(body, "cut");
+    if (!at.value) return PAL_ERR_OK;
+    if (!pal_json_has(body, "cells"))
+        return pal_json_refuse(&at, "model \"%s\" cannot be cut away; \"subdivision_fem\" can", def->model.name);
+    PAL_TRY(pal_json_object(&at, known));
+    PAL_TRY(pal_json_need(&at, known[0]));
+    PAL_TRY(pal_json_vector(&at, known[0], def->cut_normal));
+    PAL_TRY(pal_json_number(&at, known[1], -1e9, 1e9, &def->cut_m));
     double length = sqrt(pal_dot3(def->cut_normal, def->cut_normal));
-    if (!(length > 1e-12 && length < 1e12)) return pal_json_refuse(json, inner, "has no direction");
+    if (!(length > 1e-12 && length < 1e12)) return pal_json_refuse_key(&at, known[0], "has no direction");
     /* what was saved keeps its bits */
     if (fabs(length - 1) > 1e-15) pal_scale3(def->cut_normal, 1 / length, def->cut_normal);
     def->cut = true;
@@ -179,23 +167,16 @@ pal_err pal_cut_read(const pal_json *json, const cJSON *body, const char *path, 
 
 void pal_subdivision_append(cJSON *object, const pal_body_def *body, const char *file)
 {
-    cJSON_AddStringToObject(object, "cells", file);
-    cJSON_AddItemToObject(object, "origin_m", pal_json_exact_list(body->mesh->surface.origin_m, 3));
-    if (body->cut) {
-        cJSON *cut = cJSON_AddObjectToObject(object, "cut");
-        cJSON_AddItemToObject(cut, "normal", pal_json_exact_list(body->cut_normal, 3));
-        cJSON_AddItemToObject(cut, "offset_m", pal_json_exact(body->cut_m));
-    }
-    if (body->n_stroke == 0) return;
-    cJSON *list = cJSON_AddArrayToObject(object, "strokes");
+    cJSON *list = body->n_stroke > 0 ? cJSON_CreateArray() : NULL, *cut = NULL;
+    if (body->cut)
+        cut = PAL_JSON({"normal", pal_json_exact_list(body->cut_normal, 3)}, {"offset_m", pal_json_exact(body->cut_m)});
     for (int k = 0; k < body->n_stroke; k++) {
         const pal_stroke *s = &body->stroke[k];
-        cJSON *entry = cJSON_CreateObject();
-        cJSON_AddItemToArray(list, entry);
-        cJSON_AddItemToObject(entry, "at_m", pal_json_exact_list(s->at_m, 3));
-        cJSON_AddItemToObject(entry, "radius_m", pal_json_exact(s->radius_m));
-        cJSON_AddItemToObject(entry, "soft", pal_json_exact(s->soft));
-        cJSON_AddItemToObject(entry, "young_factor", pal_json_exact(s->young_factor));
-        cJSON_AddItemToObject(entry, "density_factor", pal_json_exact(s->density_factor));
+        cJSON_AddItemToArray(
+            list, PAL_JSON({"at_m", pal_json_exact_list(s->at_m, 3)}, {"radius_m", pal_json_exact(s->radius_m)},
+                           {"softness", pal_json_exact(s->softness)}, {"young_factor", pal_json_exact(s->young_factor)},
+                           {"density_factor", pal_json_exact(s->density_factor)}));
     }
+    PAL_JSON_ADD(object, {"cells", JSON_TEXT(file)}, {"origin_m", pal_json_exact_list(body->mesh->surface.origin_m, 3)},
+                 {"cut", cut}, {"strokes", list});
 }

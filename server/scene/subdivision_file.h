@@ -10,15 +10,14 @@
  * box. unit_m: of the file's positions. Errors as of pal_cell_file_load */
 pal_err pal_subdivision_load(const char *file, double unit_m, const double *origin_m, pal_loaded_scene *scene,
                              int index, pal_diagnostic *diag);
-/* makes mesh [index] anew from the boundary of cells [index], about the same origin; MEMORY */
+/* makes mesh [index] again from the boundary of cells [index], about the same origin; MEMORY */
 pal_err pal_subdivision_update_surface(pal_loaded_scene *scene, int index, pal_diagnostic *diag);
-/* the keys "cells", "units" and "origin_m" of a body; folder: where a relative name is looked up */
-pal_err pal_subdivision_read(const pal_json *json, const cJSON *body, const char *path, const char *folder,
-                             pal_loaded_scene *scene, int index);
+/* the keys "cells", "units" and "origin_m" of a body */
+pal_err pal_subdivision_read(const pal_json *body, pal_loaded_scene *scene, int index);
 /* the list "strokes" of a body */
-pal_err pal_strokes_read(const pal_json *json, const cJSON *body, const char *path, pal_loaded_scene *scene, int index);
+pal_err pal_strokes_read(const pal_json *body, pal_loaded_scene *scene, int index);
 /* the key "cut" of a body: {"normal": [..], "offset_m": 0} */
-pal_err pal_cut_read(const pal_json *json, const cJSON *body, const char *path, pal_body_def *def);
+pal_err pal_cut_read(const pal_json *body, pal_body_def *def);
 /* frees what a body owns of this */
 void pal_subdivision_unload(pal_loaded_scene *scene, int index);
 /* adds "cells" with this file's name, "origin_m", and "cut" and "strokes" where there are such, to a body's object */

@@ -1,6 +1,8 @@
 /* Live switches: a scene from pal_configuration_make, and the transfer of the running state to it. */
 #include "server/session/configuration_switch.h"
 
+#include "server/session/tuning.h"
+
 #include <stdlib.h>
 
 struct pal_configuration_switch {
@@ -16,8 +18,7 @@ static pal_err prepare(const pal_scene *scene, const pal_body_def *base, int bod
                        pal_diagnostic *diag, pal_configuration_switch *s)
 {
     pal_configuration now, next;
-    if (body < 0 || body >= scene->n_body)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is no body %d to be switched", body);
+    if (body < 0 || body >= scene->n_body) return PAL_REFUSE(diag, "there is no body %d to be switched", body);
     s->body = body;
     s->from = *scene;
     if (base) {
@@ -31,8 +32,8 @@ static pal_err prepare(const pal_scene *scene, const pal_body_def *base, int bod
     pal_configuration_of(&s->set->scene, body, &next);
     if (pal_configuration_equal(&now, &next)) {
         char text[PAL_CONFIGURATION_TEXT];
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" is as wanted already: %s", scene->body[body].name,
-                                  pal_configuration_text(&now, text));
+        return PAL_REFUSE(diag, "body \"%s\" is as wanted already: %s", scene->body[body].name,
+                          pal_configuration_text(&now, text));
     }
     return pal_transfer_make(scene, &s->set->scene, body, diag, &s->transfer);
 }
@@ -70,29 +71,23 @@ void pal_configuration_switch_rehearse(void *change, pal_world *next)
     s->has_rehearsed = true;
 }
 
-static _Thread_local uint64_t n_carried;
+static _Thread_local uint64_t n_transfer;
 
 uint64_t pal_configuration_switch_transfer_count(void)
 {
-    return n_carried;
+    return n_transfer;
 }
 
 void pal_configuration_switch_transfer(void *change, pal_world *next, const pal_world *before)
 {
     pal_configuration_switch *s = change;
-    n_carried++;
+    n_transfer++;
     pal_transfer_apply(s->transfer, next, before, &s->report);
 }
 
-void pal_configuration_switch_get_report(const pal_configuration_switch *change, pal_configuration_switch_report *out)
+const pal_transfer_report *pal_configuration_switch_report(const pal_configuration_switch *change)
 {
-    const pal_transfer_report *r = &change->report;
-    *out = (pal_configuration_switch_report){.energy_before_J = r->energy_before_J,
-                                             .energy_after_J = r->energy_after_J,
-                                             .max_move_m = r->max_move_m,
-                                             .body_move_m = r->body_move_m,
-                                             .frame_move_m = r->frame_move_m,
-                                             .scale = r->scale};
+    return &change->report;
 }
 
 void pal_configuration_switch_free(pal_configuration_switch *change)

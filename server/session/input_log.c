@@ -3,18 +3,19 @@
 #include "server/session/input_log.h"
 
 #include "server/base/clock.h"
+#include "server/base/hash.h"
+#include "server/base/thread.h"
+#include "server/session/tuning.h"
 
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
-#include <pthread.h>
-#include <signal.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-enum { VERSION = 4, OLDEST = 1, RING_DEFAULT = 4 << 20, FLUSH_NS = 20000000 };
+enum { VERSION = 4, OLDEST = 1, RING_DEFAULT = 4 << 20 };
 static const char magic[8] = {'p', 'a', 'l', 'i', 'n', 'l', 'o', 'g'};
 
 struct pal_input_log {
@@ -39,56 +40,69 @@ static uint64_t get_u(const uint8_t **at, int n_byte)
     for (int k = 0; k < n_byte; k++) value |= (uint64_t) * (*at)++ << 8 * k;
     return value;
 }
-static void put_f(uint8_t **at, const double *number, int n)
+static uint64_t load(const uint8_t *from, size_t size)
 {
-    for (int k = 0; k < n; k++) {
-        uint64_t bits;
-        memcpy(&bits, &number[k], 8);
-        put_u(at, bits, 8);
-    }
+    uint32_t u32;
+    uint64_t u64;
+    if (size == 1) return *from;
+    if (size == 4) return memcpy(&u32, from, size), u32;
+    return memcpy(&u64, from, size), u64;
 }
-static void get_f(const uint8_t **at, double *number, int n)
+static void store(uint8_t *to, uint64_t value, size_t size)
 {
-    for (int k = 0; k < n; k++) {
-        uint64_t bits = get_u(at, 8);
-        memcpy(&number[k], &bits, 8);
-    }
+    const uint8_t u8 = (uint8_t)value;
+    const uint32_t u32 = (uint32_t)value;
+    memcpy(to, size == 1 ? (const void *)&u8 : size == 4 ? (const void *)&u32 : &value, size);
 }
 
+/* payload of each kind, in order: a member, of numbers of `size` bytes each */
+static const struct field {
+    pal_input_kind kind;
+    size_t size, offset, n_byte;
+} fields[] = {
+#define FIELD(kind, size, member)                                                                                      \
+    PAL_INPUT_##kind, size, offsetof(pal_input_record, member), sizeof(((pal_input_record *)0)->member)
+    {FIELD(POSE, 8, pose.position_m)},
+    {FIELD(POSE, 8, pose.quat)},
+    {FIELD(POSE, 8, pose.velocity_m_s)},
+    {FIELD(POSE, 4, pose.buttons)},
+    {FIELD(POSE, 4, pose.seq)},
+    {FIELD(MATERIAL, 8, material.young_Pa)},
+    {FIELD(MATERIAL, 8, material.poisson)},
+    {FIELD(MATERIAL, 8, material.density_kg_m3)},
+    {FIELD(MATERIAL, 8, material.damping_1_s)},
+    {FIELD(BRUSH, 4, slot)},
+    {FIELD(BRUSH, 4, brush.kind)},
+    {FIELD(BRUSH, 8, brush.at_m)},
+    {FIELD(BRUSH, 8, brush.to_m)},
+    {FIELD(BRUSH, 8, brush.radius_m)},
+    {FIELD(BRUSH, 8, brush.softness)},
+    {FIELD(BRUSH, 8, brush.pressure_Pa)},
+    {FIELD(BRUSH, 8, brush.lift_m)},
+    {FIELD(BRUSH, 8, brush.stiffness_N_m)},
+    {FIELD(COMPONENT, 4, wanted)},
+    {FIELD(COMPONENT, 1, component)},
+    {FIELD(HASH, 8, hash)},
+    {FIELD(END, 8, hash)},
+    {FIELD(END, 8, n_dropped)},
+#undef FIELD
+};
+enum { N_FIELD = sizeof fields / sizeof *fields };
+_Static_assert(sizeof(pal_brush_kind) == 4 && sizeof(int) == 4, "members have the size of the log's numbers");
+
+/* -1: no such kind */
 static int payload_of(pal_input_kind kind)
 {
-    switch (kind) {
-    case PAL_INPUT_POSE:
-        return 88;
-    case PAL_INPUT_MATERIAL:
-        return 32;
-    case PAL_INPUT_BRUSH:
-        return 112;
-    case PAL_INPUT_COMPONENT:
-        return 4 + PAL_NAME;
-    case PAL_INPUT_HASH:
-        return 8;
-    case PAL_INPUT_END:
-        return 16;
-    case PAL_INPUT_RELEASE:
-    case PAL_INPUT_RESET:
-    case PAL_INPUT_RESET_BODY:
-        return 0;
-    }
-    return -1;
+    size_t n_byte = 0;
+    for (int i = 0; i < N_FIELD; i++) n_byte += fields[i].kind == kind ? fields[i].n_byte : 0;
+    return kind < PAL_INPUT_POSE || kind > PAL_INPUT_COMPONENT ? -1 : (int)n_byte;
 }
 
 /* ---- fingerprint: FNV-1a over 64-bit words and bytes ---- */
 
-static uint64_t mix_bytes(uint64_t h, const void *bytes, size_t n)
-{
-    const uint8_t *b = bytes;
-    for (size_t k = 0; k < n; k++) h = (h ^ b[k]) * 0x100000001b3u;
-    return h;
-}
 static uint64_t mix_text(uint64_t h, const char *text)
 {
-    return mix_bytes(h, text, strlen(text) + 1);
+    return pal_hash_bytes(h, text, strlen(text) + 1);
 }
 static uint64_t mix_item(uint64_t h, const pal_config_entry *item)
 {
@@ -97,29 +111,30 @@ static uint64_t mix_item(uint64_t h, const pal_config_entry *item)
         const pal_config_value *v = &item->value[k];
         int facts[3] = {(int)v->kind, v->flag, v->n_number};
         h = mix_text(h, v->key);
-        h = mix_bytes(h, facts, sizeof facts);
+        h = pal_hash_bytes(h, facts, sizeof facts);
         h = mix_text(h, v->kind == PAL_VALUE_TEXT ? v->text : "");
-        if (v->kind == PAL_VALUE_NUMBER) h = mix_bytes(h, v->number, sizeof v->number[0]);
-        if (v->kind == PAL_VALUE_NUMBERS) h = mix_bytes(h, v->number, (size_t)v->n_number * sizeof v->number[0]);
+        if (v->kind == PAL_VALUE_NUMBER) h = pal_hash_bytes(h, v->number, sizeof v->number[0]);
+        if (v->kind == PAL_VALUE_NUMBERS) h = pal_hash_bytes(h, v->number, (size_t)v->n_number * sizeof v->number[0]);
     }
     return h;
 }
 static uint64_t mix_material(uint64_t h, const pal_material *m)
 {
     double number[4] = {m->young_Pa, m->poisson, m->density_kg_m3, m->damping_1_s};
-    return mix_bytes(h, number, sizeof number);
+    return pal_hash_bytes(h, number, sizeof number);
 }
 static uint64_t mix_mesh(uint64_t h, const pal_prepared *mesh)
 {
     if (!mesh) return h;
     int count[4] = {mesh->tets.n_node, mesh->tets.n_tet, mesh->surface.n_vertex, mesh->surface.n_tri};
-    h = mix_bytes(h, count, sizeof count);
-    h = mix_bytes(h, mesh->tets.x, (size_t)mesh->tets.n_node * 3 * sizeof(double));
-    h = mix_bytes(h, mesh->tets.tet, (size_t)mesh->tets.n_tet * 4 * sizeof(int32_t));
-    h = mix_bytes(h, mesh->surface.x, (size_t)mesh->surface.n_vertex * 3 * sizeof(double));
+    h = pal_hash_bytes(h, count, sizeof count);
+    h = pal_hash_bytes(h, mesh->tets.x, (size_t)mesh->tets.n_node * 3 * sizeof(double));
+    h = pal_hash_bytes(h, mesh->tets.tet, (size_t)mesh->tets.n_tet * 4 * sizeof(int32_t));
+    h = pal_hash_bytes(h, mesh->surface.x, (size_t)mesh->surface.n_vertex * 3 * sizeof(double));
     /* a mesh with tetrahedra is simulated by them alone, so its surface triangles do not count */
-    if (mesh->tets.n_tet == 0) h = mix_bytes(h, mesh->surface.tri, (size_t)mesh->surface.n_tri * 3 * sizeof(int32_t));
-    return mix_bytes(h, mesh->tets.origin_m, sizeof mesh->tets.origin_m);
+    if (mesh->tets.n_tet == 0)
+        h = pal_hash_bytes(h, mesh->surface.tri, (size_t)mesh->surface.n_tri * 3 * sizeof(int32_t));
+    return pal_hash_bytes(h, mesh->tets.origin_m, sizeof mesh->tets.origin_m);
 }
 
 /* control cells, their sharp features and paint */
@@ -128,33 +143,33 @@ static uint64_t mix_cells(uint64_t h, const pal_body_def *def)
     const pal_cells *c = def->cells;
     if (!c) return h;
     int count[4] = {c->n_vertex, c->n_cell, c->n_edge_use, def->n_stroke};
-    h = mix_bytes(h, count, sizeof count);
-    h = mix_bytes(h, c->x, (size_t)c->n_vertex * 3 * sizeof(double));
-    h = mix_bytes(h, c->vertex_sharpness, (size_t)c->n_vertex * sizeof(float));
-    h = mix_bytes(h, c->cell_use, ((size_t)c->n_cell + 1) * sizeof(int32_t));
-    for (int32_t i = 0; i < c->n_face_use; i++) h = mix_bytes(h, &c->face_use[i].first_use, sizeof(int32_t));
-    for (int32_t i = 0; i < c->n_edge_use; i++) h = mix_bytes(h, &c->edge_use[i].vertex, sizeof(int32_t));
-    for (int32_t i = 0; i < c->n_edge; i++) h = mix_bytes(h, &c->edge[i].sharp, sizeof(float));
-    for (int32_t i = 0; i < c->n_face; i++) h = mix_bytes(h, &c->face[i].sharp, sizeof(float));
+    h = pal_hash_bytes(h, count, sizeof count);
+    h = pal_hash_bytes(h, c->x, (size_t)c->n_vertex * 3 * sizeof(double));
+    h = pal_hash_bytes(h, c->vertex_sharpness, (size_t)c->n_vertex * sizeof(float));
+    h = pal_hash_bytes(h, c->cell_use, ((size_t)c->n_cell + 1) * sizeof(int32_t));
+    for (int32_t i = 0; i < c->n_face_use; i++) h = pal_hash_bytes(h, &c->face_use[i].first_use, sizeof(int32_t));
+    for (int32_t i = 0; i < c->n_edge_use; i++) h = pal_hash_bytes(h, &c->edge_use[i].vertex, sizeof(int32_t));
+    for (int32_t i = 0; i < c->n_edge; i++) h = pal_hash_bytes(h, &c->edge[i].sharp, sizeof(float));
+    for (int32_t i = 0; i < c->n_face; i++) h = pal_hash_bytes(h, &c->face[i].sharp, sizeof(float));
     /* removed tissue has no contact */
     const double cut[4] = {def->cut_normal[0], def->cut_normal[1], def->cut_normal[2], def->cut_m};
-    if (def->cut) h = mix_bytes(h, cut, sizeof cut);
+    if (def->cut) h = pal_hash_bytes(h, cut, sizeof cut);
     for (int i = 0; i < def->n_stroke; i++) {
         const pal_stroke *s = &def->stroke[i];
-        double number[7] = {s->at_m[0], s->at_m[1],      s->at_m[2],       s->radius_m,
-                            s->soft,    s->young_factor, s->density_factor};
-        h = mix_bytes(h, number, sizeof number);
+        double number[7] = {s->at_m[0],  s->at_m[1],      s->at_m[2],       s->radius_m,
+                            s->softness, s->young_factor, s->density_factor};
+        h = pal_hash_bytes(h, number, sizeof number);
     }
     return h;
 }
 
 uint64_t pal_scene_fingerprint(const pal_scene *scene)
 {
-    uint64_t h = 0xcbf29ce484222325u;
-    h = mix_bytes(h, &scene->step_s, sizeof scene->step_s);
-    h = mix_bytes(h, scene->up, sizeof scene->up);
-    h = mix_bytes(h, &scene->gravity_m_s2, sizeof scene->gravity_m_s2);
-    h = mix_bytes(h, &scene->max_substep, sizeof scene->max_substep);
+    uint64_t h = PAL_HASH_START;
+    h = pal_hash_bytes(h, &scene->step_s, sizeof scene->step_s);
+    h = pal_hash_bytes(h, scene->up, sizeof scene->up);
+    h = pal_hash_bytes(h, &scene->gravity_m_s2, sizeof scene->gravity_m_s2);
+    h = pal_hash_bytes(h, &scene->max_substep, sizeof scene->max_substep);
     for (int b = 0; b < scene->n_body; b++) {
         const pal_body_def *def = &scene->body[b];
         h = mix_mesh(h, def->mesh);
@@ -166,13 +181,13 @@ uint64_t pal_scene_fingerprint(const pal_scene *scene)
             double number[8] = {s->rim ? 2 : s->lowest, s->lowest ? s->fraction : 0};
             if (!s->lowest && !s->rim)
                 memcpy(number + 2, s->low_m, sizeof s->low_m), memcpy(number + 5, s->high_m, sizeof s->high_m);
-            h = mix_bytes(h, number, sizeof number);
+            h = pal_hash_bytes(h, number, sizeof number);
         }
         for (int k = 0; k < def->n_effect; k++) h = mix_item(h, &def->effect[k]);
     }
     for (int t = 0; t < scene->n_tool; t++) {
         double number[2] = {scene->tool[t].radius_m, scene->tool[t].force_cap_N};
-        h = mix_bytes(h, number, sizeof number);
+        h = pal_hash_bytes(h, number, sizeof number);
     }
     return h;
 }
@@ -196,9 +211,9 @@ static void drain(pal_input_log *log)
     uint64_t out = atomic_load_explicit(&log->out, memory_order_relaxed);
     uint64_t filled = atomic_load_explicit(&log->filled, memory_order_acquire);
     while (out < filled) {
-        size_t place = (size_t)out & (log->n_ring - 1), n = (size_t)(filled - out);
-        if (n > log->n_ring - place) n = log->n_ring - place;
-        if (!atomic_load(&log->failed) && !write_all(log->file, log->ring + place, n)) atomic_store(&log->failed, true);
+        size_t begin = (size_t)out & (log->n_ring - 1), n = (size_t)(filled - out);
+        if (n > log->n_ring - begin) n = log->n_ring - begin;
+        if (!atomic_load(&log->failed) && !write_all(log->file, log->ring + begin, n)) atomic_store(&log->failed, true);
         out += n;
         atomic_store_explicit(&log->out, out, memory_order_release);
     }
@@ -210,7 +225,7 @@ static void *writer(void *user)
     uint64_t when = pal_clock_ns();
     while (!atomic_load(&log->stop)) {
         drain(log);
-        when += FLUSH_NS;
+        when += PAL_LOG_FLUSH_NS;
         pal_clock_sleep_until_ns(when);
     }
     drain(log);
@@ -223,7 +238,7 @@ static bool write_header(pal_input_log *log, const pal_scene *scene)
     memcpy(at, magic, sizeof magic), at += sizeof magic;
     put_u(&at, VERSION, 4);
     put_u(&at, PAL_INPUT_HASH_STEPS, 4);
-    put_f(&at, &scene->step_s, 1);
+    put_u(&at, load((const uint8_t *)&scene->step_s, 8), 8);
     put_u(&at, pal_scene_fingerprint(scene), 8);
     put_u(&at, (uint64_t)scene->n_body, 4);
     put_u(&at, (uint64_t)scene->n_tool, 4);
@@ -243,13 +258,9 @@ pal_err pal_input_log_open(const char *path, const pal_scene *scene, size_t ring
     }
     log->n_ring = n_ring;
     log->file = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-    sigset_t all, old;
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &old);
-    bool good = log->file >= 0 && write_header(log, scene) && pthread_create(&log->thread, NULL, writer, log) == 0;
-    int reason = errno;
-    pthread_sigmask(SIG_SETMASK, &old, NULL);
+    bool good = log->file >= 0 && write_header(log, scene) && !(errno = pal_thread_start(&log->thread, writer, log));
     if (!good) {
+        int reason = errno;
         if (log->file >= 0) close(log->file);
         free(log->ring);
         free(log);
@@ -267,31 +278,9 @@ static size_t encode(const pal_input_record *record, uint8_t bytes[PAL_INPUT_HEA
     put_u(&at, (uint64_t)payload_of(record->kind), 2);
     put_u(&at, 0, 4);
     put_u(&at, record->step, 8);
-    if (record->kind == PAL_INPUT_POSE) {
-        put_f(&at, record->pose.position_m, 3);
-        put_f(&at, record->pose.quat, 4);
-        put_f(&at, record->pose.velocity_m_s, 3);
-        put_u(&at, record->pose.buttons, 4);
-        put_u(&at, record->pose.seq, 4);
-    } else if (record->kind == PAL_INPUT_MATERIAL) {
-        const pal_material *m = &record->material;
-        put_f(&at, (double[4]){m->young_Pa, m->poisson, m->density_kg_m3, m->damping_1_s}, 4);
-    } else if (record->kind == PAL_INPUT_BRUSH) {
-        const pal_brush *b = &record->brush;
-        put_u(&at, (uint64_t)record->slot, 4);
-        put_u(&at, (uint64_t)b->kind, 4);
-        put_f(&at, b->at_m, 3);
-        put_f(&at, b->to_m, 3);
-        put_f(&at, (double[3]){b->radius_m, b->soft, b->pressure_Pa}, 3);
-        put_f(&at, b->lift_m, 3);
-        put_f(&at, &b->stiffness_N_m, 1);
-    } else if (record->kind == PAL_INPUT_COMPONENT) {
-        put_u(&at, record->wanted, 4);
-        memcpy(at, record->row, PAL_NAME), at += PAL_NAME;
-    } else if (record->kind == PAL_INPUT_HASH || record->kind == PAL_INPUT_END) {
-        put_u(&at, record->hash, 8);
-        if (record->kind == PAL_INPUT_END) put_u(&at, record->n_dropped, 8);
-    }
+    for (const struct field *f = fields; f < fields + N_FIELD; f++)
+        for (size_t k = 0; f->kind == record->kind && k < f->n_byte; k += f->size)
+            put_u(&at, load((const uint8_t *)record + f->offset + k, f->size), (int)f->size);
     return (size_t)(at - bytes);
 }
 
@@ -336,21 +325,20 @@ pal_err pal_input_get_header(const char *name, const uint8_t *bytes, size_t n_by
 {
     const uint8_t *from = bytes + sizeof magic;
     if (n_byte < sizeof magic || memcmp(bytes, magic, sizeof magic) != 0)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte 0: not an input log", name);
-    if (n_byte < PAL_INPUT_HEADER)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %zu: the log is cut in its header", name, n_byte);
+        return PAL_REFUSE(diag, "%s: byte 0: not an input log", name);
+    if (n_byte < PAL_INPUT_HEADER) return PAL_REFUSE(diag, "%s: byte %zu: the log is cut in its header", name, n_byte);
     uint64_t version = get_u(&from, 4);
     if (version < OLDEST || version > VERSION)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte 8: log version %llu, this program reads %d to %d",
-                                  name, (unsigned long long)version, OLDEST, VERSION);
+        return PAL_REFUSE(diag, "%s: byte 8: log version %llu, this program reads %d to %d", name,
+                          (unsigned long long)version, OLDEST, VERSION);
     pal_input_header header = {.hash_steps = (uint32_t)get_u(&from, 4)};
-    get_f(&from, &header.step_s, 1);
+    store((uint8_t *)&header.step_s, get_u(&from, 8), 8);
     header.fingerprint = get_u(&from, 8);
     header.n_body = (uint32_t)get_u(&from, 4);
     header.n_tool = (uint32_t)get_u(&from, 4);
     if (header.hash_steps < 1 || header.hash_steps > PAL_INPUT_HASH_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte 12: %u steps between hashes are outside 1 .. %d",
-                                  name, header.hash_steps, PAL_INPUT_HASH_MAX);
+        return PAL_REFUSE(diag, "%s: byte 12: %u steps between hashes are outside 1 .. %d", name, header.hash_steps,
+                          PAL_INPUT_HASH_MAX);
     *out = header;
     *at = PAL_INPUT_HEADER;
     return PAL_ERR_OK;
@@ -360,8 +348,7 @@ pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_by
                              pal_diagnostic *diag)
 {
     if (n_byte - *at < PAL_INPUT_HEAD)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %zu: the log is cut: it has no end record", name,
-                                  *at);
+        return PAL_REFUSE(diag, "%s: byte %zu: the log is cut: it has no end record", name, *at);
     const uint8_t *from = bytes + *at;
     pal_input_record record = {.kind = (pal_input_kind)get_u(&from, 1)};
     record.index = (int)get_u(&from, 1);
@@ -369,45 +356,17 @@ pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_by
     uint64_t zero = get_u(&from, 4);
     record.step = get_u(&from, 8);
     if (payload_of(record.kind) != n || zero)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %zu: no record of kind %d has %d bytes", name, *at,
-                                  (int)record.kind, n);
+        return PAL_REFUSE(diag, "%s: byte %zu: no record of kind %d has %d bytes", name, *at, (int)record.kind, n);
     if (n_byte - *at - PAL_INPUT_HEAD < (size_t)n)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %zu: the log is cut in a record", name, *at);
-    if (record.kind == PAL_INPUT_POSE) {
-        get_f(&from, record.pose.position_m, 3);
-        get_f(&from, record.pose.quat, 4);
-        get_f(&from, record.pose.velocity_m_s, 3);
-        record.pose.buttons = (uint32_t)get_u(&from, 4);
-        record.pose.seq = (uint32_t)get_u(&from, 4);
-    } else if (record.kind == PAL_INPUT_MATERIAL) {
-        double number[4];
-        get_f(&from, number, 4);
-        record.material = (pal_material){number[0], number[1], number[2], number[3]};
-    } else if (record.kind == PAL_INPUT_BRUSH) {
-        pal_brush *b = &record.brush;
-        uint32_t slot = (uint32_t)get_u(&from, 4), kind = (uint32_t)get_u(&from, 4);
-        if (slot >= PAL_TOOL_MAX || kind >= PAL_BRUSH_COUNT)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %zu: there is no brush of kind %u on tool %u",
-                                      name, *at, kind, slot);
-        record.slot = (int)slot, b->kind = (pal_brush_kind)kind;
-        get_f(&from, b->at_m, 3);
-        get_f(&from, b->to_m, 3);
-        get_f(&from, &b->radius_m, 1);
-        get_f(&from, &b->soft, 1);
-        get_f(&from, &b->pressure_Pa, 1);
-        get_f(&from, b->lift_m, 3);
-        get_f(&from, &b->stiffness_N_m, 1);
-    } else if (record.kind == PAL_INPUT_COMPONENT) {
-        uint64_t on = get_u(&from, 4);
-        if (on > 1 || from[PAL_NAME - 1] != 0)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                      "%s: byte %zu: a row that is neither on nor off, or no name", name, *at);
-        record.wanted = on == 1;
-        memcpy(record.row, from, PAL_NAME);
-    } else if (record.kind == PAL_INPUT_HASH || record.kind == PAL_INPUT_END) {
-        record.hash = get_u(&from, 8);
-        if (record.kind == PAL_INPUT_END) record.n_dropped = get_u(&from, 8);
-    }
+        return PAL_REFUSE(diag, "%s: byte %zu: the log is cut in a record", name, *at);
+    for (const struct field *f = fields; f < fields + N_FIELD; f++)
+        for (size_t k = 0; f->kind == record.kind && k < f->n_byte; k += f->size)
+            store((uint8_t *)&record + f->offset + k, get_u(&from, (int)f->size), f->size);
+    if (record.slot < 0 || record.slot >= PAL_TOOL_MAX || (unsigned)record.brush.kind >= PAL_BRUSH_COUNT)
+        return PAL_REFUSE(diag, "%s: byte %zu: there is no brush of kind %u on tool %u", name, *at,
+                          (unsigned)record.brush.kind, (unsigned)record.slot);
+    if (record.wanted > 1 || record.component[PAL_NAME - 1] != 0)
+        return PAL_REFUSE(diag, "%s: byte %zu: a component that is neither on nor off, or no name", name, *at);
     *at += PAL_INPUT_HEAD + (size_t)n;
     *out = record;
     return PAL_ERR_OK;

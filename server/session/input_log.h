@@ -11,7 +11,7 @@
  *   RESET     0       0
  *   RESET_BODY body   0                                  (version 3)
  *   MATERIAL  body   32  f64 young_Pa, poisson, density_kg_m3, damping_1_s
- *   BRUSH     body  112  u32 tool, u32 kind, f64 at_m[3], to_m[3], radius_m, soft, pressure_Pa, lift_m[3],
+ *   BRUSH     body  112  u32 tool, u32 kind, f64 at_m[3], to_m[3], radius_m, softness, pressure_Pa, lift_m[3],
  *                        stiffness_N_m (version 2)
  *   COMPONENT body   52  u32 on, name[48], zero-padded (version 4)
  *   HASH      0       8  u64 world hash, at least every `hash interval` steps
@@ -53,8 +53,8 @@ typedef struct pal_input_record {
     uint64_t hash, n_dropped;
     int slot; /* BRUSH: tool */
     pal_brush brush;
-    bool wanted; /* COMPONENT */
-    char row[PAL_NAME];
+    uint32_t wanted; /* COMPONENT: 0 or 1 */
+    char component[PAL_NAME];
 } pal_input_record;
 
 /* hash of everything in a scene that decides the simulation: steps, meshes, materials, entries; texts are excluded */

@@ -47,18 +47,18 @@ static bool name_taken(const pal_member_list *members, const char *name)
 
 pal_err pal_members_join(pal_member_list *members, pal_member_role role, const char *name, int *id)
 {
-    pal_member_entry *place = NULL;
-    for (int k = 0; k < PAL_MEMBER_LIST_MAX && !place; k++)
-        if (!members->member[k].id) place = &members->member[k];
-    if (!place) return PAL_ERR_FULL;
+    pal_member_entry *entry = NULL;
+    for (int k = 0; k < PAL_MEMBER_LIST_MAX && !entry; k++)
+        if (!members->member[k].id) entry = &members->member[k];
+    if (!entry) return PAL_ERR_FULL;
     char plain[PAL_MEMBER_NAME], full[PAL_MEMBER_NAME + 12];
     clean_name(name, plain);
     snprintf(full, sizeof full, "%s", plain);
     for (int number = 2; name_taken(members, full); number++) snprintf(full, sizeof full, "%s %d", plain, number);
-    *place = (pal_member_entry){.id = members->next_id++, .role = role, .tool = -1};
-    snprintf(place->name, sizeof place->name, "%.*s", PAL_MEMBER_NAME - 1, full);
+    *entry = (pal_member_entry){.id = members->next_id++, .role = role, .tool = -1};
+    snprintf(entry->name, sizeof entry->name, "%.*s", PAL_MEMBER_NAME - 1, full);
     members->n_member++;
-    *id = place->id;
+    *id = entry->id;
     return PAL_ERR_OK;
 }
 

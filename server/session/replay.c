@@ -16,15 +16,15 @@ static pal_err check(const char *name, const uint8_t *bytes, size_t n_byte, pal_
     PAL_TRY(pal_input_get_header(name, bytes, n_byte, header, &at, diag));
     for (;;) {
         pal_input_record record;
-        size_t place = at;
+        size_t begin = at;
         PAL_TRY(pal_input_get_record(name, bytes, n_byte, &at, &record, diag));
         /* END first: a log with dropped records may have gaps, and the drop is the better diagnostic */
         if (record.kind == PAL_INPUT_END && record.n_dropped)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %llu records were lost while the log was written",
-                                      name, (unsigned long long)record.n_dropped);
+            return PAL_REFUSE(diag, "%s: %llu records were lost while the log was written", name,
+                              (unsigned long long)record.n_dropped);
         if (record.step < step || record.step > hash_step + header->hash_steps)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %zu: step %llu does not follow step %llu", name,
-                                      place, (unsigned long long)record.step, (unsigned long long)step);
+            return PAL_REFUSE(diag, "%s: byte %zu: step %llu does not follow step %llu", name, begin,
+                              (unsigned long long)record.step, (unsigned long long)step);
         step = record.step;
         if (record.kind == PAL_INPUT_HASH) hash_step = step;
         bool tool = record.kind == PAL_INPUT_POSE || record.kind == PAL_INPUT_RELEASE;
@@ -32,12 +32,11 @@ static pal_err check(const char *name, const uint8_t *bytes, size_t n_byte, pal_
             ((record.kind == PAL_INPUT_MATERIAL || record.kind == PAL_INPUT_BRUSH ||
               record.kind == PAL_INPUT_RESET_BODY || record.kind == PAL_INPUT_COMPONENT) &&
              record.index >= (int)header->n_body))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %zu: the scene has no %s %d", name, place,
-                                      tool ? "tool" : "body", record.index);
+            return PAL_REFUSE(diag, "%s: byte %zu: the scene has no %s %d", name, begin, tool ? "tool" : "body",
+                              record.index);
         if (record.kind != PAL_INPUT_END) continue;
         if (at != n_byte)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %zu: %zu bytes after the end record", name, at,
-                                      n_byte - at);
+            return PAL_REFUSE(diag, "%s: byte %zu: %zu bytes after the end record", name, at, n_byte - at);
         return PAL_ERR_OK;
     }
 }
@@ -51,9 +50,8 @@ static pal_err apply(pal_world *world, const pal_scene *scene, const pal_input_r
     case PAL_INPUT_POSE:
         report->n_pose++;
         if (pal_world_pose(world, record->index, &record->pose))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                      "step %llu: the world refuses a pose that the log says it took",
-                                      (unsigned long long)record->step);
+            return PAL_REFUSE(diag, "step %llu: the world refuses a pose that the log says it took",
+                              (unsigned long long)record->step);
         break;
     case PAL_INPUT_RELEASE:
         return pal_world_pose(world, record->index, NULL);
@@ -71,7 +69,7 @@ static pal_err apply(pal_world *world, const pal_scene *scene, const pal_input_r
         return pal_world_brush(world, record->index, record->slot, &record->brush, diag);
     case PAL_INPUT_COMPONENT:
         report->n_command++;
-        return pal_world_switch_component(world, scene, record->index, record->row, record->wanted, diag);
+        return pal_world_switch_component(world, scene, record->index, record->component, record->wanted, diag);
     case PAL_INPUT_HASH:
     case PAL_INPUT_END:
         hash = pal_world_hash(world);
@@ -116,11 +114,10 @@ pal_err pal_replay_parse(const char *name, const uint8_t *bytes, size_t n_byte, 
     if (scene) {
         if (header.fingerprint != pal_scene_fingerprint(scene) || (int)header.n_tool != scene->n_tool ||
             (int)header.n_body != scene->n_body)
-            return pal_diagnostic_set(
-                diag, PAL_ERR_REFUSED,
-                "%s: recorded from another scene or another state of it (mesh, material or entries "
-                "differ)",
-                name);
+            return PAL_REFUSE(diag,
+                              "%s: recorded from another scene or another state of it (mesh, material or entries "
+                              "differ)",
+                              name);
         pal_world *world;
         PAL_TRY(pal_world_create(scene, diag, &world));
         pal_err err = run(name, bytes, n_byte, scene, world, &report, diag);

@@ -27,11 +27,11 @@ struct pal_sculptor {
 struct pal_sculpt_edit {
     pal_sculpt_kind kind;
     int body;
-    const pal_cells *from;   /* the sculptor's, until commit */
-    shape to;                /* after the command; moved to the sculptor by commit */
-    pal_cells_edit edit;     /* CELLS: origin of the new points */
-    double *x, *v;           /* replaced state [points before] */
-    double *next_x, *next_v; /* new state [points after] */
+    const pal_cells *from;     /* the sculptor's, until commit */
+    shape to;                  /* after the command; moved to the sculptor by commit */
+    pal_cells_edit cells_edit; /* CELLS: origin of the new points */
+    double *x, *v;             /* replaced state [points before] */
+    double *next_x, *next_v;   /* new state [points after] */
     int n_before;
     bool cut;
     double cut_normal[3], cut_m;
@@ -84,7 +84,7 @@ static void push(shape *list, int *n, const shape *s)
 pal_err pal_sculptor_create(const pal_scene *scene, int body, pal_diagnostic *diag, pal_sculptor **out)
 {
     if (body < 0 || body >= scene->n_body || !scene->body[body].cells)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body %d is no solid of control cells", body);
+        return PAL_REFUSE(diag, "body %d is no solid of control cells", body);
     pal_sculptor *s = calloc(1, sizeof *s);
     if (!s) return PAL_ERR_MEMORY;
     const pal_body_def *def = &scene->body[body];
@@ -132,8 +132,7 @@ static pal_err paint(const pal_sculptor *s, const pal_stroke *stroke, shape *to,
 {
     PAL_TRY(pal_stroke_check(stroke, diag));
     if (s->now.n_stroke >= PAL_STROKE_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there are %d strokes already, the most there may be",
-                                  s->now.n_stroke);
+        return PAL_REFUSE(diag, "there are %d strokes already, the most there may be", s->now.n_stroke);
     PAL_TRY(copy_shape(&s->now, to));
     pal_stroke *more = realloc(to->stroke, sizeof *more * (size_t)(to->n_stroke + 1));
     if (!more) return PAL_ERR_MEMORY;
@@ -147,104 +146,100 @@ static pal_err keep(const pal_sculptor *s, const pal_sculpt *command, shape *to,
     const pal_cells *cells = &s->now.cells;
     pal_cells_fault fault;
     if (!command->point_m || command->n_point != cells->n_vertex)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d points of the shape to be kept, wanted %d",
-                                  command->n_point, cells->n_vertex);
+        return PAL_REFUSE(diag, "%d points of the shape to be kept, wanted %d", command->n_point, cells->n_vertex);
     for (int i = 0; i < 3 * command->n_point; i++)
         if (!(fabs(command->point_m[i]) <= 1e9))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "point %d of the shape to be kept is at %g m", i / 3,
-                                      command->point_m[i]);
+            return PAL_REFUSE(diag, "point %d of the shape to be kept is at %g m", i / 3, command->point_m[i]);
     if (!pal_cells_shape_valid(cells, command->point_m, &fault))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "the shape as it is cannot be kept: control cell %d is folded over (%s %g)",
-                                  fault.cell, fault.face_use < 0 ? "volume" : "area", fault.measure);
+        return PAL_REFUSE(diag, "the shape as it is cannot be kept: control cell %d is folded over (%s %g)", fault.cell,
+                          fault.face_use < 0 ? "volume" : "area", fault.measure);
     PAL_TRY(copy_shape(&s->now, to));
     memcpy(to->cells.x, command->point_m, 3 * sizeof(double) * (size_t)cells->n_vertex);
     return PAL_ERR_OK;
 }
 
 /* undo or redo: the shape with the state at its replacement */
-static pal_err turn_to(const shape *list, int n, const char *what, pal_sculpt_edit *turn, pal_diagnostic *diag)
+static pal_err restore_shape(const shape *list, int n, const char *what, pal_sculpt_edit *edit, pal_diagnostic *diag)
 {
-    if (n == 0) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is nothing to %s", what);
+    if (n == 0) return PAL_REFUSE(diag, "there is nothing to %s", what);
     const shape *from = &list[n - 1];
     size_t n_byte = 3 * sizeof(double) * (size_t)from->cells.n_vertex;
-    PAL_TRY(copy_shape(from, &turn->to));
+    PAL_TRY(copy_shape(from, &edit->to));
     if (!from->x) return PAL_ERR_OK;
-    turn->next_x = copied(from->x, n_byte);
-    turn->next_v = copied(from->v, n_byte);
-    return turn->next_x && turn->next_v ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    edit->next_x = copied(from->x, n_byte);
+    edit->next_v = copied(from->v, n_byte);
+    return edit->next_x && edit->next_v ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-static pal_err set_cut(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt_edit *turn, pal_diagnostic *diag)
+static pal_err set_cut(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt_edit *edit, pal_diagnostic *diag)
 {
     double length = pal_norm3(command->cut_normal);
-    turn->cut = command->cut;
+    edit->cut = command->cut;
     if (command->cut && !(length > 1e-12 && length < 1e12 && fabs(command->cut_m) <= 1e9))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "a cut has a direction and a place: %g %g %g at %g m",
-                                  command->cut_normal[0], command->cut_normal[1], command->cut_normal[2],
-                                  command->cut_m);
-    if (command->cut) pal_scale3(turn->cut_normal, 1 / length, command->cut_normal);
-    turn->cut_m = command->cut_m;
-    return copy_shape(&s->now, &turn->to);
+        return PAL_REFUSE(diag, "a cut has a direction and an offset: %g %g %g at %g m", command->cut_normal[0],
+                          command->cut_normal[1], command->cut_normal[2], command->cut_m);
+    if (command->cut) pal_scale3(edit->cut_normal, 1 / length, command->cut_normal);
+    edit->cut_m = command->cut_m;
+    return copy_shape(&s->now, &edit->to);
 }
 
-static pal_err execute(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt_edit *turn, pal_diagnostic *diag)
+static pal_err execute(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt_edit *edit, pal_diagnostic *diag)
 {
     switch (command->kind) {
     case PAL_SCULPT_CELLS:
-        PAL_TRY(pal_cells_apply(&s->now.cells, &command->cells, &turn->edit, diag));
-        turn->to.stroke = copied(s->now.stroke, sizeof *turn->to.stroke * (size_t)s->now.n_stroke);
-        turn->to.n_stroke = s->now.n_stroke;
-        PAL_TRY(turn->to.stroke ? PAL_ERR_OK : PAL_ERR_MEMORY);
-        return pal_cells_copy(&turn->edit.cells, &turn->to.cells);
+        PAL_TRY(pal_cells_apply(&s->now.cells, &command->cells, &edit->cells_edit, diag));
+        edit->to.stroke = copied(s->now.stroke, sizeof *edit->to.stroke * (size_t)s->now.n_stroke);
+        edit->to.n_stroke = s->now.n_stroke;
+        PAL_TRY(edit->to.stroke ? PAL_ERR_OK : PAL_ERR_MEMORY);
+        return pal_cells_copy(&edit->cells_edit.cells, &edit->to.cells);
     case PAL_SCULPT_PAINT:
-        return paint(s, &command->stroke, &turn->to, diag);
+        return paint(s, &command->stroke, &edit->to, diag);
     case PAL_SCULPT_SET_REST:
-        return keep(s, command, &turn->to, diag);
+        return keep(s, command, &edit->to, diag);
     case PAL_SCULPT_CUT:
-        return set_cut(s, command, turn, diag);
+        return set_cut(s, command, edit, diag);
     case PAL_SCULPT_UNDO:
-        return turn_to(s->past, s->n_old_asset, "undo", turn, diag);
+        return restore_shape(s->past, s->n_old_asset, "undo", edit, diag);
     case PAL_SCULPT_REDO:
-        return turn_to(s->future, s->n_future, "redo", turn, diag);
+        return restore_shape(s->future, s->n_future, "redo", edit, diag);
     case PAL_SCULPT_KINDS:
         break;
     }
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is no way of sculpting %d", (int)command->kind);
+    return PAL_REFUSE(diag, "there is no sculpting command %d", (int)command->kind);
 }
 
 /* ---- edits ---- */
 
 /* builds the scene with the body's new shape; the edit owns all that the body borrows */
-static pal_err make_scene(const pal_sculptor *s, const pal_scene *scene, pal_sculpt_edit *turn)
+static pal_err make_scene(const pal_sculptor *s, const pal_scene *scene, pal_sculpt_edit *edit)
 {
     pal_surface surface = {0};
-    turn->scene = *scene;
-    pal_body_def *def = &turn->scene.body[s->body];
-    PAL_TRY(pal_cells_copy(&turn->to.cells, &turn->cells));
-    turn->stroke = copied(turn->to.stroke, sizeof *turn->stroke * (size_t)turn->to.n_stroke);
-    if (!turn->stroke) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_cells_boundary(&turn->cells, &surface, NULL, NULL));
+    edit->scene = *scene;
+    pal_body_def *def = &edit->scene.body[s->body];
+    PAL_TRY(pal_cells_copy(&edit->to.cells, &edit->cells));
+    edit->stroke = copied(edit->to.stroke, sizeof *edit->stroke * (size_t)edit->to.n_stroke);
+    if (!edit->stroke) return PAL_ERR_MEMORY;
+    PAL_TRY(pal_cells_boundary(&edit->cells, &surface, NULL, NULL));
     /* the body's frame does not move */
     pal_copy3(surface.origin_m, s->origin_m);
-    pal_err err = pal_prepared_surface(&surface, &turn->mesh);
+    pal_err err = pal_prepared_surface(&surface, &edit->mesh);
     pal_surface_free(&surface);
-    def->cells = &turn->cells;
-    def->stroke = turn->stroke, def->n_stroke = turn->to.n_stroke;
-    def->mesh = &turn->mesh;
-    def->cut = turn->cut, def->cut_m = turn->cut_m;
-    pal_copy3(def->cut_normal, turn->cut_normal);
+    def->cells = &edit->cells;
+    def->stroke = edit->stroke, def->n_stroke = edit->to.n_stroke;
+    def->mesh = &edit->mesh;
+    def->cut = edit->cut, def->cut_m = edit->cut_m;
+    pal_copy3(def->cut_normal, edit->cut_normal);
     return err;
 }
 
-static pal_err make_room(const pal_sculptor *s, pal_sculpt_edit *turn)
+static pal_err make_room(const pal_sculptor *s, pal_sculpt_edit *edit)
 {
     size_t before = 3 * sizeof(double) * (size_t)s->now.cells.n_vertex;
-    size_t after = 3 * sizeof(double) * (size_t)turn->to.cells.n_vertex;
-    turn->n_before = s->now.cells.n_vertex;
-    turn->x = malloc(before), turn->v = malloc(before);
-    if (!turn->next_x) turn->next_x = calloc(1, after), turn->next_v = calloc(1, after);
-    bool all = turn->x && turn->v && turn->next_x && turn->next_v;
+    size_t after = 3 * sizeof(double) * (size_t)edit->to.cells.n_vertex;
+    edit->n_before = s->now.cells.n_vertex;
+    edit->x = malloc(before), edit->v = malloc(before);
+    if (!edit->next_x) edit->next_x = calloc(1, after), edit->next_v = calloc(1, after);
+    bool all = edit->x && edit->v && edit->next_x && edit->next_v;
     return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
@@ -252,71 +247,71 @@ pal_err pal_sculptor_prepare(const pal_sculptor *sculptor, const pal_scene *scen
                              pal_diagnostic *diag, pal_sculpt_edit **out)
 {
     const pal_sculptor *s = sculptor;
-    pal_sculpt_edit *turn = calloc(1, sizeof *turn);
-    if (!turn) return PAL_ERR_MEMORY;
-    turn->kind = command->kind;
-    turn->from = &s->now.cells;
-    turn->body = s->body;
-    turn->cut = s->cut, turn->cut_m = s->cut_m;
-    pal_copy3(turn->cut_normal, s->cut_normal);
-    pal_err err = execute(s, command, turn, diag);
-    if (!err) err = make_room(s, turn);
-    if (!err) err = make_scene(s, scene, turn);
+    pal_sculpt_edit *edit = calloc(1, sizeof *edit);
+    if (!edit) return PAL_ERR_MEMORY;
+    edit->kind = command->kind;
+    edit->from = &s->now.cells;
+    edit->body = s->body;
+    edit->cut = s->cut, edit->cut_m = s->cut_m;
+    pal_copy3(edit->cut_normal, s->cut_normal);
+    pal_err err = execute(s, command, edit, diag);
+    if (!err) err = make_room(s, edit);
+    if (!err) err = make_scene(s, scene, edit);
     if (err)
-        pal_sculpt_edit_free(turn);
+        pal_sculpt_edit_free(edit);
     else
-        *out = turn;
+        *out = edit;
     return err;
 }
 
-const pal_scene *pal_sculpt_edit_scene(const pal_sculpt_edit *turn)
+const pal_scene *pal_sculpt_edit_scene(const pal_sculpt_edit *edit)
 {
-    return &turn->scene;
+    return &edit->scene;
 }
 
 /* current positions and velocities of an edit's points */
-static void carry_points(pal_sculpt_edit *turn)
+static void carry_points(pal_sculpt_edit *edit)
 {
-    const pal_cells_edit *edit = &turn->edit;
-    pal_cells_edit_positions(edit, turn->from, turn->x, turn->next_x);
-    pal_interpolation_apply(&edit->rows, turn->v, turn->next_v);
+    const pal_cells_edit *cells_edit = &edit->cells_edit;
+    pal_cells_edit_positions(cells_edit, edit->from, edit->x, edit->next_x);
+    pal_interpolation_apply(&cells_edit->rows, edit->v, edit->next_v);
 }
 
 void pal_sculpt_transfer(void *user, pal_world *next, const pal_world *before)
 {
-    pal_sculpt_edit *turn = user;
-    const pal_body *from = pal_world_body((pal_world *)(uintptr_t)before, turn->body);
-    size_t n_byte = 3 * sizeof(double) * (size_t)turn->n_before;
-    memcpy(turn->x, from->x, n_byte);
-    memcpy(turn->v, from->v, n_byte);
-    bool back = turn->kind == PAL_SCULPT_UNDO || turn->kind == PAL_SCULPT_REDO;
-    if (turn->kind == PAL_SCULPT_CELLS) {
-        carry_points(turn);
+    pal_sculpt_edit *edit = user;
+    const pal_body *from = pal_world_body((pal_world *)(uintptr_t)before, edit->body);
+    size_t n_byte = 3 * sizeof(double) * (size_t)edit->n_before;
+    memcpy(edit->x, from->x, n_byte);
+    memcpy(edit->v, from->v, n_byte);
+    bool back = edit->kind == PAL_SCULPT_UNDO || edit->kind == PAL_SCULPT_REDO;
+    if (edit->kind == PAL_SCULPT_CELLS) {
+        carry_points(edit);
     } else if (!back) {
-        memcpy(turn->next_x, turn->x, n_byte);
-        memcpy(turn->next_v, turn->v, n_byte);
+        memcpy(edit->next_x, edit->x, n_byte);
+        memcpy(edit->next_v, edit->v, n_byte);
     }
-    pal_world_transfer(next, before, turn->body, turn->next_x, turn->next_v);
-    pal_world_transfer_loads(next, turn->body, before);
+    pal_world_transfer(next, before, edit->body, edit->next_x, edit->next_v);
+    pal_world_transfer_loads(next, edit->body, from, NULL);
 }
 
-void pal_sculptor_commit(pal_sculptor *sculptor, pal_sculpt_edit *turn)
+void pal_sculptor_commit(pal_sculptor *sculptor, pal_sculpt_edit *edit)
 {
     pal_sculptor *s = sculptor;
-    s->cut = turn->cut, s->cut_m = turn->cut_m;
-    pal_copy3(s->cut_normal, turn->cut_normal);
-    if (turn->kind == PAL_SCULPT_CUT) return;
+    s->cut = edit->cut, s->cut_m = edit->cut_m;
+    pal_copy3(s->cut_normal, edit->cut_normal);
+    if (edit->kind == PAL_SCULPT_CUT) return;
     shape left = s->now;
-    left.x = turn->x, left.v = turn->v;
-    turn->x = turn->v = NULL;
-    s->now = turn->to;
-    turn->to = (shape){.n_stroke = 0};
-    if (turn->kind == PAL_SCULPT_UNDO) {
+    left.x = edit->x, left.v = edit->v;
+    edit->x = edit->v = NULL;
+    s->now = edit->to;
+    edit->to = (shape){.n_stroke = 0};
+    if (edit->kind == PAL_SCULPT_UNDO) {
         free_shape(&s->past[--s->n_old_asset]);
         push(s->future, &s->n_future, &left);
         return;
     }
-    if (turn->kind == PAL_SCULPT_REDO) {
+    if (edit->kind == PAL_SCULPT_REDO) {
         free_shape(&s->future[--s->n_future]);
     } else {
         while (s->n_future > 0) free_shape(&s->future[--s->n_future]);
@@ -324,16 +319,16 @@ void pal_sculptor_commit(pal_sculptor *sculptor, pal_sculpt_edit *turn)
     push(s->past, &s->n_old_asset, &left);
 }
 
-void pal_sculpt_edit_free(pal_sculpt_edit *turn)
+void pal_sculpt_edit_free(pal_sculpt_edit *edit)
 {
-    if (!turn) return;
-    free_shape(&turn->to);
-    pal_cells_edit_free(&turn->edit);
-    free(turn->x), free(turn->v), free(turn->next_x), free(turn->next_v);
-    pal_cells_free(&turn->cells);
-    free(turn->stroke);
-    pal_prepared_free(&turn->mesh);
-    free(turn);
+    if (!edit) return;
+    free_shape(&edit->to);
+    pal_cells_edit_free(&edit->cells_edit);
+    free(edit->x), free(edit->v), free(edit->next_x), free(edit->next_v);
+    pal_cells_free(&edit->cells);
+    free(edit->stroke);
+    pal_prepared_free(&edit->mesh);
+    free(edit);
 }
 
 /* ---- picking ---- */

@@ -2,7 +2,7 @@
  * Only for bodies of model subdivision_fem.
  *
  * Every command produces a complete new scene (pal_sculptor_prepare: slow, allocates). Its world is built while the
- * old one runs, and replaces it between two steps through pal_session_transfer and pal_sculpt_transfer. Existing
+ * old one runs, and replaces it between two steps through pal_session_transfer_begin and pal_sculpt_transfer. Existing
  * points keep position and velocity; the weights of the edit place new ones. A refused command changes nothing. Undo
  * restores cells, paint and the mechanical state bit for bit. Thread: one at a time. */
 #ifndef PAL_SESSION_SCULPT_H
@@ -48,14 +48,14 @@ int pal_sculptor_redo_count(const pal_sculptor *sculptor);
 pal_err pal_sculptor_prepare(const pal_sculptor *sculptor, const pal_scene *scene, const pal_sculpt *command,
                              pal_diagnostic *diag, pal_sculpt_edit **out);
 /* for building a world or session; lives as long as the edit */
-const pal_scene *pal_sculpt_edit_scene(const pal_sculpt_edit *turn);
+const pal_scene *pal_sculpt_edit_scene(const pal_sculpt_edit *edit);
 /* pal_session_transfer_fn; user: a pal_sculpt_edit. Transfers the state of `before` to `next` and stores the state of
  * before for undo, in memory that prepare has allocated. */
-void pal_sculpt_transfer(void *turn, pal_world *next, const pal_world *before);
+void pal_sculpt_transfer(void *edit, pal_world *next, const pal_world *before);
 /* makes the edit the sculptor's current state and the previous one its undo entry; once, after pal_sculpt_transfer */
-void pal_sculptor_commit(pal_sculptor *sculptor, pal_sculpt_edit *turn);
+void pal_sculptor_commit(pal_sculptor *sculptor, pal_sculpt_edit *edit);
 /* frees an edit and its scene: one that was not committed, or one whose scene no world uses any more; NULL is fine */
-void pal_sculpt_edit_free(pal_sculpt_edit *turn);
+void pal_sculpt_edit_free(pal_sculpt_edit *edit);
 
 /* control edge or vertex of a control face nearest to a rest position, body frame; -1: no such face */
 int32_t pal_sculptor_nearest_edge(const pal_sculptor *sculptor, int32_t face, const double at_m[3]);

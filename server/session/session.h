@@ -5,7 +5,7 @@
  * n_late, the number of steps that began a tenth of a step or more after their due time. Input does not accumulate:
  * the newest pose of a tool wins, and at most 64 commands are taken before a step. While paused, a command or a pose
  * publishes a frame, in which tools follow their holders. A tool without a pose for lease_s is released; its force
- * ramps out over 10 steps.
+ * ramps out over PAL_BLEND_S (server/sim/core/blend.h).
  *
  * Threads exchange data through triple buffers (poses, frames), a command queue and the wake callback. A lock guards
  * only the diagnostic of pal_session_last_diagnostic and the materials. Between open and close the session neither
@@ -14,6 +14,7 @@
  * and estimates are not input: the input log does not record them and they change no hash. Brushes are input. */
 #ifndef PAL_SESSION_SESSION_H
 #define PAL_SESSION_SESSION_H
+#include "server/base/clock.h"
 #include "server/estimate/estimator.h"
 #include "server/sim/core/effect.h"
 #include "server/sim/world/world.h"
@@ -32,8 +33,8 @@ typedef enum pal_command_kind {
     PAL_COMMAND_ESTIMATE,   /* body, wanted: adds or removes a subscriber to the body's estimate; the estimator
                                (estimator.h), with its own thread and worlds, exists while there is one */
     PAL_COMMAND_RESET_BODY, /* body: that body alone back to rest and unfrozen (pal_world_reset_body) */
-    PAL_COMMAND_COMPONENT,  /* body, row, wanted: disables or enables a component of the plan (world.h); recorded, kept
-                               by a transfer; pal_session_last_diagnostic gives the reason of a refusal */
+    PAL_COMMAND_COMPONENT,  /* body, component, wanted: disables or enables a component of the plan (world.h); recorded,
+                               kept  by a transfer; pal_session_last_diagnostic gives the reason of a refusal */
     PAL_COMMAND_COUNT
 } pal_command_kind;
 
@@ -45,18 +46,19 @@ typedef struct pal_command {
     bool wanted;
     int slot;
     pal_brush brush;
-    char row[PAL_NAME];
+    char component[PAL_NAME];
 } pal_command;
 
 typedef struct pal_session_options {
     double lease_s; /* time without a pose after which a tool is released; 0: 0.25 */
     bool start_paused;
-    bool hold;                /* the thread does not start; pal_session_transfer starts it */
+    bool hold;                /* the thread does not start; pal_session_transfer_end starts it */
     bool only_observed;       /* computes the displayed surfaces only while pal_session_observe has observers */
     bool unpaced;             /* steps as fast as possible (tests, replay); the newest frame still wins */
     void (*wake)(void *user); /* [sim] called after a frame is published; must not block; NULL: none */
     void *user;
     const char *record_path; /* path of the input log to write (replay.h); NULL: none */
+    const pal_clock *clock;  /* of pacing, leases, arrival times and estimates; NULL: pal_clock_monotonic */
 } pal_session_options;
 
 /* builds the world and starts the thread; borrows the scene and its meshes until close. [load] */
@@ -69,37 +71,36 @@ pal_err pal_session_open_after(const pal_session *before, const pal_scene *scene
 /* Replaces the running session `before` with `next`, which was opened with hold, in two phases.
  *
  * transfer_begin stops the thread of before between two steps and transfers subscriptions, disabled components and the
- * state of the world (carry; what it leaves out stays at rest). It takes as long as carry and at most one step.
+ * state of the world (transfer; what it leaves out stays at rest). It takes as long as that and at most one step.
  * transfer_end transfers poses, commands and counters, and starts the thread of next; it is short. The pause between
  * the phases counts for no lease. Disabled components stay disabled.
  *
  * A tool's holder sends poses and commands to before until transfer_end, and to next from then on. before keeps its
  * last frame, its record ends, and after transfer_end it can only be closed. INTERNAL: the thread could not be
  * started; before then continues. transfer_begin: [any], while others use before as usual and nobody uses next;
- * transfer_end: [net]; pal_session_transfer runs both where the time allows it. */
+ * transfer_end: [net]. */
 typedef void pal_session_transfer_fn(void *user, pal_world *next, const pal_world *before);
-void pal_session_transfer_begin(pal_session *next, pal_session *before, pal_session_transfer_fn *carry, void *user);
+void pal_session_transfer_begin(pal_session *next, pal_session *before, pal_session_transfer_fn *transfer, void *user);
 pal_err pal_session_transfer_end(pal_session *next, pal_session *before, pal_diagnostic *diag);
-pal_err pal_session_transfer(pal_session *next, pal_session *before, pal_session_transfer_fn *carry, void *user,
-                             pal_diagnostic *diag);
-/* Shortens the transfer that follows. The thread of before stops between two steps for `look`, which copies what it
+/* Shortens the transfer that follows. The thread of before stops between two steps for `snapshot`, which copies what it
  * needs from the world; before then continues while `rehearse` brings the world of next as close as it can. This
- * repeats while look returns true, at most PAL_SESSION_REHEARSALS_MAX times; the first look decides whether to
+ * repeats while snapshot returns true, at most PAL_SESSION_REHEARSALS_MAX times; the first one decides whether to
  * rehearse at all. [any], but not the thread of transfer_end, while others use before as usual and nobody uses next */
 enum { PAL_SESSION_REHEARSALS_MAX = 3 };
 typedef bool pal_session_snapshot_fn(void *user, const pal_world *before);
 typedef void pal_session_rehearse_fn(void *user, pal_world *next);
-void pal_session_rehearse(pal_session *next, pal_session *before, pal_session_snapshot_fn *look,
+void pal_session_rehearse(pal_session *next, pal_session *before, pal_session_snapshot_fn *snapshot,
                           pal_session_rehearse_fn *rehearse, void *user);
 /* of a session that has replaced another: longest pause of its predecessor, s, and the number of rehearsals */
 double pal_session_pause_s(const pal_session *session, int *n_rehearsed);
 void pal_session_close(pal_session *session); /* stops and joins the thread; NULL is fine. [load] */
 
 const pal_scene *pal_session_scene(const pal_session *session); /* [any] */
+const pal_clock *pal_session_clock(const pal_session *session); /* [any] */
 /* The plan at open and the displayed parts; constant while the session lives. Frames name the current components,
  * including those of fields. [any] */
 int pal_session_component_count(const pal_session *session);
-void pal_session_component_info(const pal_session *session, int row,
+void pal_session_component_info(const pal_session *session, int component,
                                 pal_component_info *out); /* spent_ns is 0: see frames */
 int pal_session_part_count(const pal_session *session);
 void pal_session_shown(const pal_session *session, int part, pal_shown *out);
@@ -107,7 +108,7 @@ bool pal_session_has_field(const pal_session *session, int body, pal_field field
 
 /* Newest pose of a tool; the latest wins, never waits; NULL releases the tool. REFUSED: not finite, out of reach, no
  * such tool. One thread at a time per tool. [net] */
-pal_err pal_session_put_pose(pal_session *session, int tool, const pal_pose *pose);
+pal_err pal_session_request_pose(pal_session *session, int tool, const pal_pose *pose);
 /* Queues a command, taken between two steps. FULL: 64 are pending; REFUSED: unknown kind, body, material, field, tool
  * or brush. pal_session_last_diagnostic reports what only the world can refuse (nothing within reach of a brush).
  * [any] */
@@ -117,7 +118,7 @@ const pal_frame *pal_session_take_frame(pal_session *session);
 /* Adds (true) or removes an observer of frames. Counts only with the option only_observed, which begins with none:
  * displayed surfaces, skins above all, are then not computed, and frames repeat the last positions (n_output of a part
  * does not grow). The first observer gets an up-to-date frame within a step, paused or not. [any] */
-void pal_session_observe(pal_session *session, bool looks);
+void pal_session_observe(pal_session *session, bool observes);
 /* did the thread tick within the last second, or is it paused? for /healthz [any] */
 bool pal_session_is_alive(const pal_session *session);
 /* current material of a body: of the scene, or the last one accepted; copies. [any] */

@@ -13,20 +13,20 @@
 
 enum { N_COMMAND = 64, N_MARK = 16, SECOND_NS = 1000000000 };
 
-typedef struct pose_slot {
+typedef struct requested_pose {
     pal_pose pose;
     uint64_t arrived_ns;
     bool present;
-} pose_slot;
+} requested_pose;
 
-typedef struct tool_place {
+typedef struct session_tool {
     pal_triple_buffer triple_buffer;
-    pose_slot slot[3];
+    requested_pose slot[3];
     /* the simulation thread's own */
     pal_pose pose;
     uint64_t arrived_ns;
     bool present, brushes; /* brushes: a brush began since the last release */
-} tool_place;
+} session_tool;
 
 /* a time and the number of steps taken until then */
 typedef struct mark {
@@ -35,12 +35,12 @@ typedef struct mark {
 
 struct pal_session {
     const pal_scene *scene;
-    pal_session_options options; /* owns record_path */
+    pal_session_options options; /* owns record_path; clock is not NULL */
     pal_world *world;
     double reach_m;
     uint64_t step_ns, lease_ns;
-    pal_component_info *row;
-    int n_row;
+    pal_component_info *component;
+    int n_component;
     pal_disabled_components off; /* inherited from earlier sessions */
     pal_shown part[PAL_BODY_MAX];
     bool gives[PAL_BODY_MAX][PAL_FIELD_COUNT];
@@ -49,7 +49,7 @@ struct pal_session {
     bool running; /* the thread exists: for the thread that opens, transfers and closes */
 
     /* crossing points */
-    tool_place tool[PAL_TOOL_MAX];
+    session_tool tool[PAL_TOOL_MAX];
     pal_command_queue *command;
     pal_frame *frame[3];
     pal_triple_buffer frames;
@@ -57,27 +57,32 @@ struct pal_session {
     _Atomic bool replaced; /* another session is about to replace this one */
     _Atomic uint64_t beat_ns, n_refused;
     _Atomic int n_observer; /* observers of frames; used with only_observed */
-    pthread_mutex_t note_lock;
+    pthread_mutex_t lock;
     pal_diagnostic diag;
-    pal_material material[PAL_BODY_MAX]; /* guarded by note_lock */
-    pal_estimator_set watch;             /* subscribers to estimates */
+    pal_material material[PAL_BODY_MAX]; /* guarded by lock */
+    pal_estimator_set estimators;        /* subscribers to estimates */
 
     /* the simulation thread's own */
     pal_input_log *log;
-    bool paused, watched;
+    bool paused, observed;
     int single;                    /* single steps requested while paused */
     uint64_t step;                 /* taken since open; resets do not count */
     uint64_t n_late;               /* steps that began late */
     uint64_t work_ns;              /* processor time of the last step */
-    uint64_t carried_ns;           /* after a transfer: when the predecessor was asked to stop */
+    uint64_t transferred_ns;       /* after a transfer: when the predecessor was asked to stop */
     uint64_t stopped_ns, pause_ns; /* when the predecessor had stopped, and the longest time that neither ran; for the
                                       thread that opens and transfers */
     int n_rehearsed;
     uint64_t end_ns;
-    uint32_t n_look[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* subscribers to a field */
-    mark marks[N_MARK + 2];                         /* ring buffer, oldest at first */
+    uint32_t n_subscriber[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* subscribers to a field */
+    mark marks[N_MARK + 2];                               /* ring buffer, oldest at first */
     int first, n_marks;
 };
+
+static inline uint64_t session_now_ns(const pal_session *s)
+{
+    return pal_clock_now_ns(s->options.clock);
+}
 
 /* for the thread that opens, transfers and closes; INTERNAL: the thread could not be started */
 pal_err pal_session_start(pal_session *session, pal_diagnostic *diag);

@@ -5,29 +5,30 @@
  * Slowdown is real time over simulated time since a mark that is 1 to 1 + 1/16 s old. */
 #include "server/session/session_core.h"
 
-#include "server/base/clock.h"
 #include "server/base/log.h"
+#include "server/base/thread.h"
+#include "server/session/tuning.h"
 
 #include <math.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const double reach_sizes = 100;   /* maximum distance of a pose from the origin, in body sizes */
-static const double late_part = 0.1;     /* a step is late when it begins this fraction of a step after its due time */
-static const double young_max_Pa = 1e12; /* above any solid */
-
 /* ---- the thread ---- */
 
-static void log_diagnostic(pal_session *s, const pal_diagnostic *diag)
+static void put_diagnostic(pal_session *s, const pal_diagnostic *diag)
 {
-    pthread_mutex_lock(&s->note_lock);
+    pthread_mutex_lock(&s->lock);
     s->diag = *diag;
-    pthread_mutex_unlock(&s->note_lock);
+    pthread_mutex_unlock(&s->lock);
 }
 
-static void forget_pace(pal_session *s)
+static void count_refusal(pal_session *s)
+{
+    atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
+}
+
+static void reset_pace(pal_session *s)
 {
     s->first = s->n_marks = 0;
 }
@@ -70,12 +71,12 @@ static void publish(pal_session *s)
     frame->n_late = s->n_late;
     frame->n_refused = atomic_load_explicit(&s->n_refused, memory_order_relaxed);
     for (int t = 0; t < frame->n_tool; t++) {
-        tool_place *place = &s->tool[t];
-        frame->tool[t].pose_ns = place->arrived_ns;
+        session_tool *tool = &s->tool[t];
+        frame->tool[t].pose_ns = tool->arrived_ns;
         /* while paused, tools are displayed at their poses but exert no force */
-        if (s->paused && place->present) {
+        if (s->paused && tool->present) {
             frame->tool[t].present = true;
-            frame->tool[t].pose = place->pose;
+            frame->tool[t].pose = tool->pose;
         }
     }
     pal_triple_buffer_publish(&s->frames);
@@ -87,23 +88,23 @@ static bool take_poses(pal_session *s, uint64_t now)
 {
     bool changed = false;
     for (int t = 0; t < s->scene->n_tool; t++) {
-        tool_place *place = &s->tool[t];
-        const pose_slot *slot = pal_triple_buffer_take(&place->triple_buffer);
-        bool gone = place->present && now > place->arrived_ns && now - place->arrived_ns > s->lease_ns;
+        session_tool *tool = &s->tool[t];
+        const requested_pose *slot = pal_triple_buffer_take(&tool->triple_buffer);
+        bool gone = tool->present && now > tool->arrived_ns && now - tool->arrived_ns > s->lease_ns;
         pal_input_record record = {.index = t, .step = s->step};
         if (slot && slot->present && (now < slot->arrived_ns || now - slot->arrived_ns <= s->lease_ns)) {
             if (pal_world_pose(s->world, t, &slot->pose)) {
-                atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
+                count_refusal(s);
                 continue;
             }
-            place->pose = slot->pose;
-            place->arrived_ns = slot->arrived_ns;
-            place->present = true;
+            tool->pose = slot->pose;
+            tool->arrived_ns = slot->arrived_ns;
+            tool->present = true;
             record.kind = PAL_INPUT_POSE;
             record.pose = slot->pose;
-        } else if ((place->present && (slot || gone)) || (place->brushes && slot && !slot->present)) {
+        } else if ((tool->present && (slot || gone)) || (tool->brushes && slot && !slot->present)) {
             pal_world_pose(s->world, t, NULL);
-            place->present = place->brushes = false;
+            tool->present = tool->brushes = false;
             record.kind = PAL_INPUT_RELEASE;
         } else {
             continue;
@@ -114,66 +115,54 @@ static bool take_poses(pal_session *s, uint64_t now)
     return changed;
 }
 
+/* the end of a command: records an accepted one, counts a refused one */
+static void conclude(pal_session *s, pal_err err, pal_diagnostic *diag, pal_input_record record)
+{
+    record.step = s->step;
+    if (err)
+        count_refusal(s);
+    else
+        diag->text[0] = 0, pal_input_log_put(s->log, &record);
+    put_diagnostic(s, diag);
+}
+
 /* the first subscriber creates the component, the last removes it; creation that failed is retried by the next
  * subscriber */
-static void look(pal_session *s, const pal_command *command)
+static void subscribe(pal_session *s, const pal_command *command)
 {
-    uint32_t *n = &s->n_look[command->body][command->field];
+    uint32_t *n = &s->n_subscriber[command->body][command->field];
     pal_diagnostic diag = {""};
     if (!command->wanted && *n == 0) return;
     *n = command->wanted ? *n + 1 : *n - 1;
     if (!command->wanted && *n > 0) return;
-    if (pal_world_field(s->world, command->body, command->field, command->wanted, &diag)) {
-        atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
-        log_diagnostic(s, &diag);
-    }
+    if (!pal_world_field(s->world, command->body, command->field, command->wanted, &diag)) return;
+    count_refusal(s);
+    put_diagnostic(s, &diag);
 }
 
-static void brush(pal_session *s, const pal_command *command)
+/* true: observation began, so display data must be computed */
+static bool update_observed(pal_session *s)
 {
-    pal_diagnostic diag = {""};
-    if (pal_world_brush(s->world, command->body, command->slot, &command->brush, &diag)) {
-        atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
-    } else {
-        s->tool[command->slot].brushes |= command->brush.kind != PAL_BRUSH_NONE;
-        pal_input_log_put(s->log, &(pal_input_record){.kind = PAL_INPUT_BRUSH,
-                                                      .index = command->body,
-                                                      .step = s->step,
-                                                      .slot = command->slot,
-                                                      .brush = command->brush});
-        diag.text[0] = 0;
-    }
-    log_diagnostic(s, &diag);
+    bool observed = !s->options.only_observed || atomic_load_explicit(&s->n_observer, memory_order_relaxed) > 0;
+    if (observed == s->observed) return false;
+    s->observed = observed;
+    pal_world_watch(s->world, observed);
+    return observed;
 }
 
-static void switch_row(pal_session *s, const pal_command *command)
+static void put_material(pal_session *s, int body, const pal_material *material)
 {
-    pal_diagnostic diag = {""};
-    if (pal_world_switch_component(s->world, s->scene, command->body, command->row, command->wanted, &diag)) {
-        atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
-    } else {
-        pal_input_record record = {
-            .kind = PAL_INPUT_COMPONENT, .index = command->body, .step = s->step, .wanted = command->wanted};
-        memcpy(record.row, command->row, sizeof record.row);
-        pal_input_log_put(s->log, &record);
-        diag.text[0] = 0;
-    }
-    log_diagnostic(s, &diag);
-}
-
-/* updates the observed state; true: observation began, so display data must be computed */
-static bool look_around(pal_session *s)
-{
-    bool watched = !s->options.only_observed || atomic_load_explicit(&s->n_observer, memory_order_relaxed) > 0;
-    if (watched == s->watched) return false;
-    s->watched = watched;
-    pal_world_watch(s->world, watched);
-    return watched;
+    pthread_mutex_lock(&s->lock);
+    s->material[body] = *material;
+    pthread_mutex_unlock(&s->lock);
 }
 
 static void execute(pal_session *s, const pal_command *command)
 {
     pal_diagnostic diag = {""};
+    pal_input_record record;
+    pal_err err;
+    int body = command->body;
     switch (command->kind) {
     case PAL_COMMAND_PAUSE:
         s->paused = true;
@@ -186,42 +175,37 @@ static void execute(pal_session *s, const pal_command *command)
         break;
     case PAL_COMMAND_RESET:
         pal_world_reset(s->world);
-        log_diagnostic(s, &diag);
         for (int t = 0; t < s->scene->n_tool; t++) s->tool[t].present = s->tool[t].brushes = false;
-        pal_input_log_put(s->log, &(pal_input_record){.kind = PAL_INPUT_RESET, .step = s->step});
+        conclude(s, PAL_ERR_OK, &diag, (pal_input_record){.kind = PAL_INPUT_RESET});
         break;
     case PAL_COMMAND_RESET_BODY:
-        (void)pal_world_reset_body(s->world, command->body);
-        log_diagnostic(s, &diag);
-        pal_input_log_put(s->log,
-                          &(pal_input_record){.kind = PAL_INPUT_RESET_BODY, .index = command->body, .step = s->step});
+        (void)pal_world_reset_body(s->world, body);
+        conclude(s, PAL_ERR_OK, &diag, (pal_input_record){.kind = PAL_INPUT_RESET_BODY, .index = body});
         break;
     case PAL_COMMAND_MATERIAL:
-        if (pal_world_material(s->world, command->body, &command->material, &diag)) {
-            atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
-        } else {
-            pal_input_log_put(s->log, &(pal_input_record){.kind = PAL_INPUT_MATERIAL,
-                                                          .index = command->body,
-                                                          .step = s->step,
-                                                          .material = command->material});
-            diag.text[0] = 0;
-            pthread_mutex_lock(&s->note_lock);
-            s->material[command->body] = command->material;
-            pthread_mutex_unlock(&s->note_lock);
-        }
-        log_diagnostic(s, &diag);
+        err = pal_world_material(s->world, body, &command->material, &diag);
+        if (!err) put_material(s, body, &command->material);
+        conclude(s, err, &diag,
+                 (pal_input_record){.kind = PAL_INPUT_MATERIAL, .index = body, .material = command->material});
         break;
     case PAL_COMMAND_FIELD:
-        look(s, command);
+        subscribe(s, command);
         break;
     case PAL_COMMAND_BRUSH:
-        brush(s, command);
+        err = pal_world_brush(s->world, body, command->slot, &command->brush, &diag);
+        if (!err) s->tool[command->slot].brushes |= command->brush.kind != PAL_BRUSH_NONE;
+        conclude(
+            s, err, &diag,
+            (pal_input_record){.kind = PAL_INPUT_BRUSH, .index = body, .slot = command->slot, .brush = command->brush});
         break;
     case PAL_COMMAND_ESTIMATE:
-        pal_estimator_set_request(&s->watch, command->body, command->wanted);
+        pal_estimator_set_request(&s->estimators, body, command->wanted);
         break;
     case PAL_COMMAND_COMPONENT:
-        switch_row(s, command);
+        err = pal_world_switch_component(s->world, s->scene, body, command->component, command->wanted, &diag);
+        record = (pal_input_record){.kind = PAL_INPUT_COMPONENT, .index = body, .wanted = command->wanted};
+        memcpy(record.component, command->component, sizeof record.component);
+        conclude(s, err, &diag, record);
         break;
     case PAL_COMMAND_COUNT:
         break;
@@ -234,7 +218,7 @@ static bool take_commands(pal_session *s)
     bool any = false, was_paused = s->paused;
     /* bounded, so that a flood of commands cannot delay the step */
     for (int k = 0; k < N_COMMAND && pal_command_queue_get(s->command, &command); k++, any = true) execute(s, &command);
-    if (was_paused != s->paused) forget_pace(s);
+    if (was_paused != s->paused) reset_pace(s);
     return any;
 }
 
@@ -249,17 +233,17 @@ static void report_error(pal_session *s, pal_err err)
         if (body->frozen)
             (void)snprintf(diag.text + used, sizeof diag.text - used, "; %s: %s", body->name, body->reason);
     }
-    log_diagnostic(s, &diag);
+    put_diagnostic(s, &diag);
 }
 
 static void step(pal_session *s)
 {
-    if (s->n_marks == 0) mark_pace(s, pal_clock_ns());
+    if (s->n_marks == 0) mark_pace(s, session_now_ns(s));
     uint64_t before = pal_clock_thread_ns();
     pal_err err = pal_world_step(s->world, s->scene->step_s);
     pal_world_remove_idle(s->world);
     s->work_ns = pal_clock_thread_ns() - before;
-    s->end_ns = pal_clock_ns();
+    s->end_ns = session_now_ns(s);
     s->step++;
     mark_pace(s, s->end_ns);
     if (s->log && s->step % PAL_INPUT_HASH_STEPS == 0)
@@ -272,40 +256,40 @@ static void estimate(pal_session *s, bool stepped)
 {
     pal_diagnostic diag = {""};
     double step_ms = stepped ? 1e-6 * (double)s->work_ns : (double)NAN;
-    if (pal_estimator_set_step(&s->watch, s->world, step_ms, &diag)) log_diagnostic(s, &diag);
+    if (pal_estimator_set_step(&s->estimators, s->world, step_ms, &diag)) put_diagnostic(s, &diag);
 }
 
-/* waits for the due time; a step at least one whole step late is due now, and the missed ones are dropped */
-static void pace(pal_session *s, uint64_t *due)
+static bool is_stopped(const pal_session *s)
 {
-    *due += s->step_ns;
-    uint64_t now = pal_clock_ns();
-    if (s->options.unpaced && !s->paused) {
-        *due = now;
-        return;
-    }
-    if (now < *due) {
-        pal_clock_sleep_until_ns(*due);
-        now = pal_clock_ns();
-    }
-    if (!s->paused && now > *due + (uint64_t)(late_part * (double)s->step_ns)) s->n_late++;
+    return atomic_load_explicit(&s->stop, memory_order_acquire);
+}
+
+/* Waits for the due time; a step at least one whole step late is due now, and the missed ones are dropped. false: the
+ * thread is to end */
+static bool pace(pal_session *s, uint64_t *due)
+{
+    const pal_clock *clock = s->options.clock;
+    uint64_t now = session_now_ns(s);
+    *due = s->options.unpaced && !s->paused ? now : *due + s->step_ns;
+    for (; now < *due && !is_stopped(s); now = session_now_ns(s)) clock->sleep_until_ns(clock->user, *due);
+    if (!s->paused && now > *due + (uint64_t)(PAL_LATE_PART * (double)s->step_ns)) s->n_late++;
     if (now > *due + s->step_ns) *due = now;
+    return !is_stopped(s);
 }
 
 static void *simulate(void *user)
 {
     pal_session *s = user;
-    uint64_t due = pal_clock_ns();
+    uint64_t due = session_now_ns(s);
     s->end_ns = due;
-    look_around(s);
+    update_observed(s);
     publish(s);
-    while (!atomic_load_explicit(&s->stop, memory_order_acquire)) {
-        pace(s, &due);
+    while (pace(s, &due)) {
         bool changed = take_commands(s);
-        uint64_t now = pal_clock_ns();
+        uint64_t now = session_now_ns(s);
         atomic_store_explicit(&s->beat_ns, now, memory_order_relaxed);
         changed = take_poses(s, now) || changed;
-        changed = look_around(s) || changed;
+        changed = update_observed(s) || changed;
         bool moves = !s->paused || s->single > 0;
         if (moves) {
             step(s);
@@ -322,19 +306,19 @@ static void *simulate(void *user)
 
 static pal_err copy_plan(pal_session *s)
 {
-    s->n_row = pal_world_component_count(s->world);
-    s->row = calloc((size_t)s->n_row + 1, sizeof *s->row);
-    if (!s->row) return PAL_ERR_MEMORY;
-    for (int k = 0; k < s->n_row; k++) {
-        pal_world_component_info(s->world, k, &s->row[k]);
-        s->row[k].spent_ns = s->row[k].n_run = 0;
+    s->n_component = pal_world_component_count(s->world);
+    s->component = calloc((size_t)s->n_component + 1, sizeof *s->component);
+    if (!s->component) return PAL_ERR_MEMORY;
+    for (int k = 0; k < s->n_component; k++) {
+        pal_world_component_info(s->world, k, &s->component[k]);
+        s->component[k].spent_ns = s->component[k].n_run = 0;
     }
-    s->n_part = pal_world_part_count(s->world);
+    s->n_part = pal_world_body_count(s->world);
     for (int k = 0; k < s->n_part; k++) pal_world_shown(s->world, k, &s->part[k]);
     for (int b = 0; b < pal_world_body_count(s->world); b++)
         for (int k = 0; k < PAL_FIELD_COUNT; k++) s->gives[b][k] = pal_world_has_field(s->world, b, (pal_field)k);
     for (int b = 0; b < pal_world_body_count(s->world); b++)
-        s->reach_m = fmax(s->reach_m, reach_sizes * pal_world_body(s->world, b)->length_scale_m);
+        s->reach_m = fmax(s->reach_m, PAL_POSE_REACH * pal_world_body(s->world, b)->length_scale_m);
     return PAL_ERR_OK;
 }
 
@@ -356,12 +340,7 @@ static pal_err prepare(pal_session *s, pal_diagnostic *diag)
 
 pal_err pal_session_start(pal_session *s, pal_diagnostic *diag)
 {
-    /* signals go to the thread that waits for them */
-    sigset_t all, old;
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &old);
-    s->running = !pthread_create(&s->thread, NULL, simulate, s);
-    pthread_sigmask(SIG_SETMASK, &old, NULL);
+    s->running = !pal_thread_start(&s->thread, simulate, s);
     return s->running ? PAL_ERR_OK
                       : pal_diagnostic_set(diag, PAL_ERR_INTERNAL, "the simulation thread cannot be started");
 }
@@ -369,6 +348,7 @@ pal_err pal_session_start(pal_session *s, pal_diagnostic *diag)
 void pal_session_stop(pal_session *s)
 {
     atomic_store_explicit(&s->stop, true, memory_order_release);
+    pal_clock_wake(s->options.clock);
     if (s->running) pthread_join(s->thread, NULL);
     s->running = false;
 }
@@ -378,10 +358,10 @@ static void release(pal_session *s)
     for (int k = 0; k < 3; k++) pal_frame_destroy(s->frame[k]);
     pal_command_queue_destroy(s->command);
     pal_world_destroy(s->world);
-    pal_estimator_set_close(&s->watch);
-    pthread_mutex_destroy(&s->note_lock);
+    pal_estimator_set_close(&s->estimators);
+    pthread_mutex_destroy(&s->lock);
     free((void *)(uintptr_t)s->options.record_path);
-    free(s->row);
+    free(s->component);
     free(s);
 }
 
@@ -390,17 +370,18 @@ pal_err pal_session_open(const pal_scene *scene, const pal_session_options *opti
 {
     pal_session *s = calloc(1, sizeof *s);
     if (!s) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a session");
-    pthread_mutex_init(&s->note_lock, NULL);
-    pal_estimator_set_init(&s->watch, scene);
+    pthread_mutex_init(&s->lock, NULL);
     s->scene = scene;
     if (options) s->options = *options;
+    if (!s->options.clock) s->options.clock = &pal_clock_monotonic;
+    pal_estimator_set_init(&s->estimators, scene, s->options.clock);
     if (s->options.record_path) s->options.record_path = strdup(s->options.record_path);
     for (int b = 0; b < scene->n_body && b < PAL_BODY_MAX; b++) s->material[b] = scene->body[b].material;
     s->step_ns = (uint64_t)(scene->step_s * SECOND_NS + 0.5);
-    s->lease_ns = (uint64_t)((s->options.lease_s > 0 ? s->options.lease_s : 0.25) * SECOND_NS);
+    s->lease_ns = s->options.lease_s > 0 ? (uint64_t)(s->options.lease_s * SECOND_NS) : PAL_LEASE_NS;
     s->paused = s->options.start_paused;
-    s->watched = true;
-    atomic_init(&s->beat_ns, pal_clock_ns());
+    s->observed = true;
+    atomic_init(&s->beat_ns, session_now_ns(s));
     pal_err err = prepare(s, diag);
     if (!err && !s->options.hold) err = pal_session_start(s, diag);
     if (err) {
@@ -443,15 +424,21 @@ const pal_scene *pal_session_scene(const pal_session *s)
     return s->scene;
 }
 
-int pal_session_component_count(const pal_session *s)
+const pal_clock *pal_session_clock(const pal_session *s)
 {
-    return s->n_row;
+    return s->options.clock;
 }
 
-void pal_session_component_info(const pal_session *s, int row, pal_component_info *out)
+int pal_session_component_count(const pal_session *s)
 {
-    *out = row >= 0 && row < s->n_row ? s->row[row]
-                                      : (pal_component_info){.name = "", .body = "", .stage = "", .reason = ""};
+    return s->n_component;
+}
+
+void pal_session_component_info(const pal_session *s, int component, pal_component_info *out)
+{
+    *out = component >= 0 && component < s->n_component
+               ? s->component[component]
+               : (pal_component_info){.name = "", .body = "", .stage = "", .reason = ""};
 }
 
 int pal_session_part_count(const pal_session *s)
@@ -472,53 +459,58 @@ bool pal_session_has_field(const pal_session *s, int body, pal_field field)
 
 static pal_err refuse(pal_session *s)
 {
-    atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
+    count_refusal(s);
     return PAL_ERR_REFUSED;
 }
 
-pal_err pal_session_put_pose(pal_session *s, int tool, const pal_pose *pose)
+pal_err pal_session_request_pose(pal_session *s, int tool, const pal_pose *pose)
 {
     if (tool < 0 || tool >= s->scene->n_tool || (pose && !pal_pose_ok(pose, s->reach_m))) return refuse(s);
-    pose_slot *slot = pal_triple_buffer_slot(&s->tool[tool].triple_buffer);
+    requested_pose *slot = pal_triple_buffer_slot(&s->tool[tool].triple_buffer);
     slot->present = pose != NULL;
     if (pose) slot->pose = *pose;
-    slot->arrived_ns = pal_clock_ns();
+    slot->arrived_ns = session_now_ns(s);
     pal_triple_buffer_publish(&s->tool[tool].triple_buffer);
     return PAL_ERR_OK;
 }
 
-static bool material_ok(const pal_material *m)
+static bool is_valid(const pal_session *s, const pal_command *command)
 {
-    return m->young_Pa > 0 && m->young_Pa <= young_max_Pa && m->poisson > -1 && m->poisson < 0.5 &&
-           m->density_kg_m3 > 0 && isfinite(m->density_kg_m3) && m->damping_1_s >= 0 && isfinite(m->damping_1_s);
+    bool has_body = command->body >= 0 && command->body < s->scene->n_body;
+    pal_material material = command->material; /* the check may clamp it */
+    switch (command->kind) {
+    case PAL_COMMAND_PAUSE:
+    case PAL_COMMAND_RESUME:
+    case PAL_COMMAND_STEP:
+    case PAL_COMMAND_RESET:
+        return true;
+    case PAL_COMMAND_MATERIAL:
+        return has_body && !pal_material_check(&material, NULL);
+    case PAL_COMMAND_FIELD:
+        return pal_session_has_field(s, command->body, command->field);
+    case PAL_COMMAND_BRUSH:
+        return has_body && command->slot >= 0 && command->slot < s->scene->n_tool &&
+               (command->brush.kind == PAL_BRUSH_NONE || !pal_brush_check(&command->brush, NULL));
+    case PAL_COMMAND_ESTIMATE:
+    case PAL_COMMAND_RESET_BODY:
+        return has_body;
+    case PAL_COMMAND_COMPONENT:
+        return has_body && memchr(command->component, 0, sizeof command->component);
+    case PAL_COMMAND_COUNT:
+        break;
+    }
+    return false;
 }
 
 pal_err pal_session_command(pal_session *s, const pal_command *command)
 {
-    if ((int)command->kind < 0 || command->kind >= PAL_COMMAND_COUNT) return refuse(s);
-    if (command->kind == PAL_COMMAND_MATERIAL &&
-        (command->body < 0 || command->body >= s->scene->n_body || !material_ok(&command->material)))
-        return refuse(s);
-    if (command->kind == PAL_COMMAND_RESET_BODY && (command->body < 0 || command->body >= s->scene->n_body))
-        return refuse(s);
-    if (command->kind == PAL_COMMAND_FIELD && !pal_session_has_field(s, command->body, command->field))
-        return refuse(s);
-    if (command->kind == PAL_COMMAND_BRUSH &&
-        (command->body < 0 || command->body >= s->scene->n_body || command->slot < 0 ||
-         command->slot >= s->scene->n_tool ||
-         (command->brush.kind != PAL_BRUSH_NONE && pal_brush_check(&command->brush, NULL))))
-        return refuse(s);
-    if (command->kind == PAL_COMMAND_ESTIMATE && (command->body < 0 || command->body >= s->scene->n_body))
-        return refuse(s);
-    if (command->kind == PAL_COMMAND_COMPONENT &&
-        (command->body < 0 || command->body >= s->scene->n_body || !memchr(command->row, 0, sizeof command->row)))
-        return refuse(s);
+    if (!is_valid(s, command)) return refuse(s);
     return pal_command_queue_put(s->command, command);
 }
 
 bool pal_session_estimate(pal_session *s, int body, pal_estimate *out)
 {
-    return pal_estimator_set_read(&s->watch, body, out);
+    return pal_estimator_set_read(&s->estimators, body, out);
 }
 
 const pal_frame *pal_session_take_frame(pal_session *s)
@@ -526,27 +518,27 @@ const pal_frame *pal_session_take_frame(pal_session *s)
     return pal_triple_buffer_take(&s->frames);
 }
 
-void pal_session_observe(pal_session *s, bool looks)
+void pal_session_observe(pal_session *s, bool observes)
 {
-    atomic_fetch_add_explicit(&s->n_observer, looks ? 1 : -1, memory_order_relaxed);
+    atomic_fetch_add_explicit(&s->n_observer, observes ? 1 : -1, memory_order_relaxed);
 }
 
 bool pal_session_is_alive(const pal_session *s)
 {
-    uint64_t beat = atomic_load_explicit(&s->beat_ns, memory_order_relaxed), now = pal_clock_ns();
+    uint64_t beat = atomic_load_explicit(&s->beat_ns, memory_order_relaxed), now = session_now_ns(s);
     return now < beat || now - beat < SECOND_NS || atomic_load_explicit(&s->replaced, memory_order_relaxed);
 }
 
 void pal_session_material(pal_session *s, int body, pal_material *out)
 {
-    pthread_mutex_lock(&s->note_lock);
+    pthread_mutex_lock(&s->lock);
     *out = s->material[body];
-    pthread_mutex_unlock(&s->note_lock);
+    pthread_mutex_unlock(&s->lock);
 }
 
 void pal_session_last_diagnostic(pal_session *s, pal_diagnostic *out)
 {
-    pthread_mutex_lock(&s->note_lock);
+    pthread_mutex_lock(&s->lock);
     *out = s->diag;
-    pthread_mutex_unlock(&s->note_lock);
+    pthread_mutex_unlock(&s->lock);
 }

@@ -1,7 +1,6 @@
 /* Transfer of one session to another that replaces it (session.h). */
 #include "server/session/session_core.h"
 
-#include "server/base/clock.h"
 #include "server/base/log.h"
 
 #include <string.h>
@@ -12,14 +11,14 @@ static uint64_t later(uint64_t ns, uint64_t by_ns, uint64_t max_ns)
 }
 
 /* transfers tool poses, including poses not yet taken; the away_ns during which no thread ran count for no lease */
-static void hand_tools(pal_session *to, pal_session *from, uint64_t now_ns)
+static void transfer_tools(pal_session *to, pal_session *from, uint64_t now_ns)
 {
-    uint64_t away_ns = now_ns - to->carried_ns;
+    uint64_t away_ns = now_ns - to->transferred_ns;
     for (int t = 0; t < to->scene->n_tool && t < from->scene->n_tool; t++) {
-        tool_place *a = &to->tool[t], *b = &from->tool[t];
-        const pose_slot *slot = pal_triple_buffer_take(&b->triple_buffer);
+        session_tool *a = &to->tool[t], *b = &from->tool[t];
+        const requested_pose *slot = pal_triple_buffer_take(&b->triple_buffer);
         if (slot) {
-            pose_slot *kept = pal_triple_buffer_slot(&a->triple_buffer);
+            requested_pose *kept = pal_triple_buffer_slot(&a->triple_buffer);
             *kept = *slot;
             kept->arrived_ns = later(slot->arrived_ns, away_ns, now_ns);
             pal_triple_buffer_publish(&a->triple_buffer);
@@ -30,85 +29,79 @@ static void hand_tools(pal_session *to, pal_session *from, uint64_t now_ns)
 }
 
 /* transfers the state of the simulation thread, before the world's state */
-static void hand_over(pal_session *to, pal_session *from)
+static void transfer_state(pal_session *to, pal_session *from)
 {
     to->paused = from->paused, to->single = from->single;
     to->step = from->step, to->n_late = from->n_late, to->work_ns = from->work_ns;
-    pal_disabled_components_transfer(&to->off, &from->off, from->row, from->n_row, from->world, to->world, to->scene);
-    memcpy(to->n_look, from->n_look, sizeof to->n_look);
+    pal_disabled_components_transfer(&to->off, &from->off, from->component, from->n_component, from->world, to->world,
+                                     to->scene);
+    memcpy(to->n_subscriber, from->n_subscriber, sizeof to->n_subscriber);
     memcpy(to->material, from->material, sizeof to->material); /* neither thread runs */
     for (int b = 0; b < to->scene->n_body; b++)
         for (int k = 0; k < PAL_FIELD_COUNT; k++)
-            if (to->n_look[b][k] > 0) (void)pal_world_field(to->world, b, (pal_field)k, true, NULL);
+            if (to->n_subscriber[b][k] > 0) (void)pal_world_field(to->world, b, (pal_field)k, true, NULL);
 }
 
 /* transfers what other threads may have changed, and pending commands */
-static void hand_orders(pal_session *to, pal_session *from)
+static void transfer_commands(pal_session *to, pal_session *from)
 {
     atomic_store_explicit(&to->n_refused, atomic_load_explicit(&from->n_refused, memory_order_relaxed),
                           memory_order_relaxed);
     atomic_store_explicit(&to->n_observer, atomic_load_explicit(&from->n_observer, memory_order_relaxed),
                           memory_order_relaxed);
-    pal_estimator_set_transfer(&to->watch, &from->watch);
+    pal_estimator_set_transfer(&to->estimators, &from->estimators);
     pal_command command;
     for (int k = 0; k < N_COMMAND && pal_command_queue_get(from->command, &command); k++)
         (void)pal_command_queue_put(to->command, &command);
 }
 
-static void stood(pal_session *next, uint64_t since_ns)
+static void measure_pause(pal_session *next, uint64_t since_ns)
 {
-    uint64_t ns = pal_clock_ns() - since_ns;
+    uint64_t ns = session_now_ns(next) - since_ns;
     if (ns > next->pause_ns) next->pause_ns = ns;
 }
 
-void pal_session_rehearse(pal_session *next, pal_session *before, pal_session_snapshot_fn *look,
+void pal_session_rehearse(pal_session *next, pal_session *before, pal_session_snapshot_fn *snapshot,
                           pal_session_rehearse_fn *rehearse, void *user)
 {
     for (int k = 0; k < PAL_SESSION_REHEARSALS_MAX; k++) {
         pal_session_stop(before);
-        uint64_t stopped_ns = pal_clock_ns();
-        bool wanted = look(user, before->world);
+        uint64_t stopped_ns = session_now_ns(next);
+        bool wanted = snapshot(user, before->world);
         atomic_store_explicit(&before->stop, false, memory_order_release);
         pal_err err = pal_session_start(before, NULL);
-        stood(next, stopped_ns);
-        /* if the thread did not start, the session stands still until the transfer, which reports it */
+        measure_pause(next, stopped_ns);
+        /* if the thread did not start, the session stays stopped until the transfer, which reports it */
         if (err || !wanted) return;
         rehearse(user, next->world);
         next->n_rehearsed++;
     }
 }
 
-void pal_session_transfer_begin(pal_session *next, pal_session *before, pal_session_transfer_fn *carry, void *user)
+void pal_session_transfer_begin(pal_session *next, pal_session *before, pal_session_transfer_fn *transfer, void *user)
 {
-    next->carried_ns = pal_clock_ns();
+    next->transferred_ns = session_now_ns(next);
     atomic_store_explicit(&before->replaced, true, memory_order_relaxed);
     pal_session_stop(before);
-    next->stopped_ns = pal_clock_ns();
-    hand_over(next, before);
-    carry(user, next->world, before->world);
+    next->stopped_ns = session_now_ns(next);
+    transfer_state(next, before);
+    transfer(user, next->world, before->world);
 }
 
 pal_err pal_session_transfer_end(pal_session *next, pal_session *before, pal_diagnostic *diag)
 {
-    hand_orders(next, before);
-    hand_tools(next, before, pal_clock_ns());
+    transfer_commands(next, before);
+    transfer_tools(next, before, session_now_ns(next));
     pal_err err = pal_session_start(next, diag);
-    stood(next, next->stopped_ns);
+    measure_pause(next, next->stopped_ns);
     if (!err && before->log)
-        pal_log(PAL_LOG_WARN, "record", "%s: ends at step %llu: another session goes on with a changed scene",
+        pal_log(PAL_LOG_WARN, "record", "%s: ends at step %llu: another session continues with a changed scene",
                 before->options.record_path, (unsigned long long)before->step);
     if (!err) return PAL_ERR_OK;
     atomic_store_explicit(&before->stop, false, memory_order_release);
     atomic_store_explicit(&before->replaced, false, memory_order_relaxed);
     (void)pal_session_start(before, NULL);
     return err;
-}
-
-pal_err pal_session_transfer(pal_session *next, pal_session *before, pal_session_transfer_fn *carry, void *user,
-                             pal_diagnostic *diag)
-{
-    pal_session_transfer_begin(next, before, carry, user);
-    return pal_session_transfer_end(next, before, diag);
 }
 
 double pal_session_pause_s(const pal_session *session, int *n_rehearsed)

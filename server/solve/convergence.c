@@ -7,7 +7,6 @@
 
 #include "server/base/vec3.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -96,7 +95,7 @@ pal_err pal_convergence(const pal_problem *problem, const pal_problem_case *load
         pal_solution *s = NULL;
         pal_solve_options now = *options;
         out[done] = (pal_convergence_point){.resolution = resolution[done]};
-        now.resolution = resolution[done];
+        now.voxel.resolution = resolution[done];
         err = pal_solve(problem, load_case, surface, &now, &s, &out[done].result, diag);
         if (err) break;
         compare(s, x, n_point, samples, done ? u[(done + 1) & 1] : NULL, u[done & 1], &out[done]);

@@ -13,15 +13,11 @@
 #include "server/base/vec3.h"
 #include "server/mesh/volume/loose_components.h"
 #include "server/num/shape_functions.h"
+#include "server/solve/tuning.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* fill below which cut voxels are dropped; the largest volume that may be lost by it; the limits otherwise; and
- * without fill */
-static const double drop_fill = 0.25, max_missing = 0.025, keep_fill = 0.02, whole_fill = 0.5;
 
 pal_box_text pal_box_describe(const pal_box *box)
 {
@@ -39,6 +35,21 @@ bool pal_box_contains(const pal_box *box, const double x[3], double slack)
     for (int c = 0; c < 3; c++)
         if (x[c] < box->low_m[c] - slack || x[c] > box->high_m[c] + slack) return false;
     return true;
+}
+
+const pal_problem_material *pal_case_material_at(const pal_problem *problem, const double x[3])
+{
+    const pal_problem_material *found = NULL;
+    for (int k = 0; k < problem->n_material; k++)
+        if (pal_box_contains(&problem->material[k].region, x, 0)) found = &problem->material[k];
+    return found;
+}
+
+const pal_problem_material *pal_case_material_of(const pal_problem *problem, const pal_tets *t, int tet, double x[3])
+{
+    pal_copy3(x, t->origin_m);
+    for (int k = 0; k < 4; k++) pal_axpy3(x, 0.25, t->x + 3 * t->tet[4 * tet + k]);
+    return pal_case_material_at(problem, x);
 }
 
 double pal_case_tolerance_m(const pal_tets *tets)
@@ -103,12 +114,12 @@ pal_err pal_case_voxels(const pal_problem *problem, const pal_surface *surface, 
     pal_voxel_options voxel = {.resolution = how->resolution, .border = true, .min_fill = how->min_fill};
     pal_prepare_report report;
     bool chosen = !(how->min_fill > 0);
-    if (chosen) voxel.min_fill = how->fill ? drop_fill : whole_fill;
+    if (chosen) voxel.min_fill = how->fill ? PAL_DROP_FILL : 0.5;
     if (how->align) align(problem, how->resolution, surface, voxel.ahead);
     PAL_TRY(pal_prepared_make(surface, &voxel, out, &report, diag));
-    if (chosen && how->fill && missing(out) > max_missing) {
+    if (chosen && how->fill && missing(out) > PAL_MAX_MISSING) {
         pal_prepared_free(out);
-        voxel.min_fill = keep_fill;
+        voxel.min_fill = PAL_KEEP_FILL;
         PAL_TRY(pal_prepared_make(surface, &voxel, out, &report, diag));
     }
     if (report.voxel.n_component == 1) return PAL_ERR_OK;
@@ -240,23 +251,18 @@ static pal_err add_point(const job *j)
     return PAL_ERR_OK;
 }
 
-pal_err pal_case_force(const pal_problem *problem, const pal_problem_case *load_case, int load, const pal_body *body,
-                       const pal_locate *locate, const pal_surface *surface, double *force_N, double *area_m2,
-                       pal_diagnostic *diag)
-{
-    const pal_problem_load *l = &load_case->load[load];
-    job j = {problem, load_case, load, body, locate, surface, force_N, diag};
-    if (l->kind == PAL_LOAD_TRACTION) return add_traction(&j, area_m2);
-    if (l->kind == PAL_LOAD_POINT) return add_point(&j);
-    for (int i = 0; i < body->n_node; i++) pal_axpy3(force_N + 3 * i, body->mass_kg[i], l->gravity_m_s2);
-    return PAL_ERR_OK;
-}
-
-pal_err pal_case_forces(const pal_problem *problem, const pal_problem_case *load_case, const pal_body *body,
+pal_err pal_case_forces(const pal_problem *problem, const pal_problem_case *load_case, int load, const pal_body *body,
                         const pal_locate *locate, const pal_surface *surface, double *force_N, double *area_m2,
                         pal_diagnostic *diag)
 {
-    for (int k = 0; k < load_case->n_load; k++)
-        PAL_TRY(pal_case_force(problem, load_case, k, body, locate, surface, force_N, area_m2, diag));
+    for (int k = 0; k < load_case->n_load; k++) {
+        const pal_problem_load *l = &load_case->load[k];
+        const job j = {problem, load_case, k, body, locate, surface, force_N, diag};
+        if (load >= 0 && k != load) continue;
+        if (l->kind == PAL_LOAD_TRACTION) PAL_TRY(add_traction(&j, area_m2));
+        if (l->kind == PAL_LOAD_POINT) PAL_TRY(add_point(&j));
+        if (l->kind == PAL_LOAD_TRACTION || l->kind == PAL_LOAD_POINT) continue;
+        for (int i = 0; i < body->n_node; i++) pal_axpy3(force_N + 3 * i, body->mass_kg[i], l->gravity_m_s2);
+    }
     return PAL_ERR_OK;
 }

@@ -29,6 +29,11 @@ typedef struct pal_box_text {
 pal_box_text pal_box_describe(const pal_box *box);
 /* Is x (frame of the problem) in the box, or within `slack` of it? */
 bool pal_box_contains(const pal_box *box, const double x[3], double slack);
+/* Material at x (frame of the problem), and at the centroid x of a tetrahedron: the last one whose region contains it;
+ * NULL: none. */
+const pal_problem_material *pal_case_material_at(const pal_problem *problem, const double x[3]);
+const pal_problem_material *pal_case_material_of(const pal_problem *problem, const pal_tets *tets, int tet,
+                                                 double x[3]);
 /* Tolerance that includes a node on the border of a region, whatever the rounding. */
 double pal_case_tolerance_m(const pal_tets *tets);
 
@@ -36,16 +41,12 @@ double pal_case_tolerance_m(const pal_tets *tets);
 pal_err pal_case_supports(const pal_problem *problem, const pal_tets *tets, pal_support_def out[PAL_PROBLEM_REGIONS],
                           pal_diagnostic *diag);
 
-/* Adds the forces of every load, N [n_node][3], on the nodes of the body's elements (no elements: its tetrahedra).
- * area_m2 [n_load] of tractions, may be NULL. locate must be of the same mesh, surface the body's own. Errors:
- * REFUSED (names a load that meets no surface or lies outside); MEMORY. */
-pal_err pal_case_forces(const pal_problem *problem, const pal_problem_case *load_case, const pal_body *body,
+/* Adds the forces of a load (-1: of all), N [n_node][3], on the nodes of the body's elements (no elements: its
+ * tetrahedra). area_m2 [n_load] of tractions, may be NULL. locate must be of the same mesh, surface the body's own.
+ * Errors: REFUSED (names a load that meets no surface or lies outside); MEMORY. */
+pal_err pal_case_forces(const pal_problem *problem, const pal_problem_case *load_case, int load, const pal_body *body,
                         const pal_locate *locate, const pal_surface *surface, double *force_N, double *area_m2,
                         pal_diagnostic *diag);
-/* The same for one load. */
-pal_err pal_case_force(const pal_problem *problem, const pal_problem_case *load_case, int load, const pal_body *body,
-                       const pal_locate *locate, const pal_surface *surface, double *force_N, double *area_m2,
-                       pal_diagnostic *diag);
 
 /* Shape functions of an element of a body at local coordinates of pal_locate_point. Returns the number of corners;
  * *node points to their nodes. */

@@ -2,17 +2,18 @@
  * every component counts, whatever its kind. */
 #include "server/solve/preflight.h"
 
-#include "server/base/vec3.h"
+#include "server/base/clock.h"
 #include "server/num/conjugate_gradient.h"
 #include "server/num/lanczos.h"
+#include "server/sim/implicit/system.h"
+#include "server/sim/implicit/tuning.h"
 #include "server/sim/springs/spring_constraint.h"
+#include "server/solve/tuning.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const double min_shape = 0.1, min_edge_S = 1e-6, min_fill = 0.05, min_mass = 1e-3;
 enum { MAX_LANCZOS = 24 };
 
 typedef struct probe {
@@ -20,9 +21,11 @@ typedef struct probe {
     pal_body *body;
     pal_component force[32];
     int n_force;
-    double way_m; /* displacement of the differences */
+    double step_m; /* displacement of the differences */
     double *x, *low;
     bool failed;
+    uint64_t spent_ns; /* in the components, in n_run evaluations of all of them */
+    int n_run;
     int max_cg; /* iterations for each axis of the slowest motion */
 } probe;
 
@@ -35,15 +38,15 @@ static void weak(pal_weak_spot *w, int index, double value, const double at[3], 
     pal_add3(w->at_m, at, body->offset_m);
 }
 
-static void middle(const double *x, const int32_t *corner, int n, double at[3])
+static void find_centroid(const double *x, const int32_t *corner, int n, double at[3])
 {
     pal_set3(at, 0, 0, 0);
     for (int c = 0; c < n; c++) pal_axpy3(at, 1.0 / n, x + 3 * (size_t)corner[c]);
 }
 
 /* edges of an element of n corners, all connected to each other */
-static void look_at_edges(const pal_body *body, const double *x, const int32_t *corner, int n, pal_preflight_body *out,
-                          double *mean2)
+static void check_edges(const pal_body *body, const double *x, const int32_t *corner, int n, pal_preflight_body *out,
+                        double *mean2)
 {
     int n_edge = 0;
     *mean2 = 0;
@@ -51,7 +54,7 @@ static void look_at_edges(const pal_body *body, const double *x, const int32_t *
         for (int b = 0; b < a; b++, n_edge++) {
             double length = pal_dist3(x + 3 * (size_t)corner[a], x + 3 * (size_t)corner[b]);
             *mean2 += length * length;
-            if (length < min_edge_S * body->length_scale_m)
+            if (length < PAL_WEAK_EDGE_S * body->length_scale_m)
                 weak(&out->edge, corner[a], length, x + 3 * (size_t)corner[a], body);
             if (corner[a] == out->limit_node || corner[b] == out->limit_node)
                 out->limit_edge_m = fmin(out->limit_edge_m, length);
@@ -73,7 +76,7 @@ static double shape_of(const double *x, const int32_t *corner, int n, double mea
 }
 
 /* volumes: the body has springs that preserve the volume of tetrahedra */
-static void look_at_elements(const pal_body *body, bool volumes, pal_preflight_body *out)
+static void check_elements(const pal_body *body, bool volumes, pal_preflight_body *out)
 {
     const pal_tets *tets = body->interpolation ? NULL : body->tets;
     const int n = tets ? 4 : 3, n_simplex = tets ? tets->n_tet : body->active ? body->dofs.levels->first_face[1] : 0;
@@ -81,72 +84,51 @@ static void look_at_elements(const pal_body *body, bool volumes, pal_preflight_b
     for (int e = 0; e < n_simplex; e++) {
         const int32_t *corner = simplex + (size_t)n * (size_t)e;
         double mean2, at[3];
-        look_at_edges(body, body->x_rest, corner, n, out, &mean2);
+        check_edges(body, body->x_rest, corner, n, out, &mean2);
         double shape = shape_of(body->x_rest, corner, n, mean2);
-        middle(body->x_rest, corner, n, at);
-        if (shape < min_shape) weak(&out->flat, e, shape, at, body);
+        find_centroid(body->x_rest, corner, n, at);
+        if (shape < PAL_WEAK_SHAPE) weak(&out->flat, e, shape, at, body);
         if (tets && volumes) out->n_sliver += shape < PAL_SPRING_SLIVER;
     }
     int n_corner = body->element ? body->n_corner : 4, n_fill = body->element ? body->n_element : n_simplex;
     const int32_t *element = body->element ? body->element : simplex;
     for (int e = 0; body->fill && element && !body->interpolation && e < n_fill; e++) {
         double at[3];
-        middle(body->x_rest, element + (size_t)e * (size_t)n_corner, n_corner, at);
-        if ((double)body->fill[e] < min_fill) weak(&out->thin, e, (double)body->fill[e], at, body);
+        find_centroid(body->x_rest, element + (size_t)e * (size_t)n_corner, n_corner, at);
+        if ((double)body->fill[e] < PAL_WEAK_FILL) weak(&out->thin, e, (double)body->fill[e], at, body);
     }
     out->n_element = body->element         ? body->n_element
                      : body->dofs.n_clique ? pal_dofs_element_count(&body->dofs)
                                            : n_simplex;
 }
 
-static void look_at_masses(const pal_body *body, pal_preflight_body *out)
+static void check_masses(const pal_body *body, pal_preflight_body *out)
 {
     double mass = 0;
     for (int k = 0; k < body->n_active; k++) mass += body->mass_kg[pal_body_point(body, k)];
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         out->n_fixed += body->support[i] != 0;
-        if (!body->support[i] && body->mass_kg[i] < min_mass * mass / body->n_active)
+        if (!body->support[i] && body->mass_kg[i] < PAL_WEAK_MASS * mass / body->n_active)
             weak(&out->light, i, body->mass_kg[i], body->x_rest + 3 * (size_t)i, body);
     }
 }
 
-/* finds the node that requires the shortest sub-step, by the bounds of the components */
-static bool find_limit_node(const probe *p, pal_preflight_body *out)
-{
-    const pal_body *body = p->body;
-    double *bound = calloc((size_t)body->n_dof + 1, sizeof *bound), max = 0;
-    if (!bound) return false;
-    for (int i = 0; i < p->n_force && !body->interpolation; i++)
-        if (p->force[i].effect->stiffness) p->force[i].effect->stiffness(p->force[i].self, body, bound);
-    for (int k = 0; k < body->n_active; k++) {
-        int i = pal_body_point(body, k);
-        if (body->support[i] || !(bound[i] > max * body->mass_kg[i])) continue;
-        max = bound[i] / body->mass_kg[i];
-        out->limit_node = i, out->limit_mass_kg = body->mass_kg[i];
-        pal_add3(out->limit_at_m, body->x_rest + 3 * (size_t)i, body->offset_m);
-    }
-    free(bound);
-    return true;
-}
-
 /* ---- conditioning ---- */
 
-/* forces of the components at rest + way_m v, assembled to the points */
-static void force_at(probe *p, const double *v, double way_m, double *out)
+/* forces of the components at rest + step_m v, assembled to the points */
+static void force_at(probe *p, const double *v, double step_m, double *out)
 {
     pal_body *body = p->body;
-    for (int i = 0; i < 3 * body->n_dof; i++) body->x[i] = p->x[i] + way_m * v[i];
+    for (int i = 0; i < 3 * body->n_dof; i++) body->x[i] = p->x[i] + step_m * v[i];
     pal_body_update_nodes(body);
     memset(body->f, 0, 3 * sizeof(double) * (size_t)body->n_node);
-    pal_step step = {.body = body, .force = p->force, .n_force = p->n_force, .dt_s = 1e-3, .n_sub = 1};
-    for (int i = 0; i < p->n_force; i++) p->failed |= p->force[i].effect->run(p->force[i].self, &step) != PAL_ERR_OK;
-    if (body->interpolation) {
-        memset(out, 0, 3 * sizeof(double) * (size_t)body->n_dof);
-        pal_interpolation_apply_transpose(body->interpolation, body->f, out);
-    } else {
-        memcpy(out, body->f, 3 * sizeof(double) * (size_t)body->n_dof);
-    }
+    pal_step at = {.body = body, .force = p->force, .n_force = p->n_force, .dt_s = 1e-3, .n_sub = 1};
+    const uint64_t before = pal_clock_thread_ns();
+    for (int i = 0; i < p->n_force; i++) p->failed |= p->force[i].effect->run(p->force[i].self, &at) != PAL_ERR_OK;
+    p->spent_ns += pal_clock_thread_ns() - before;
+    p->n_run++;
+    pal_system_restrict(body, body->f, out);
 }
 
 /* out = K v at the free points */
@@ -156,12 +138,12 @@ static void apply(void *user, const double *v, double *out)
     const pal_body *body = p->body;
     double max = 0;
     for (int i = 0; i < 3 * body->n_dof; i++) max = fmax(max, fabs(v[i]));
-    double way = max > 0 ? p->way_m / max : 0;
-    force_at(p, v, -way, p->low);
-    force_at(p, v, way, out);
+    double step = max > 0 ? p->step_m / max : 0;
+    force_at(p, v, -step, p->low);
+    force_at(p, v, step, out);
     for (int i = 0; i < 3 * body->n_dof; i++) {
         bool moves = body->mass_kg[i / 3] > 0 && !body->support[i / 3];
-        out[i] = moves && way > 0 ? (p->low[i] - out[i]) / (2 * way) : 0;
+        out[i] = moves && step > 0 ? (p->low[i] - out[i]) / (2 * step) : 0;
     }
 }
 
@@ -184,7 +166,7 @@ static void precondition(void *user, const double *r, double *out)
     (void)over_mass(user, r, out);
 }
 
-static double fast(probe *p, double *room)
+static double find_fastest(probe *p, double *room)
 {
     const pal_body *body = p->body;
     int n = 3 * body->n_dof;
@@ -196,6 +178,7 @@ static double fast(probe *p, double *room)
                      .user = p,
                      .z = room,
                      .basis = basis,
+                     .n_basis = MAX_LANCZOS,
                      .w = room + n,
                      .u = room + 2 * (size_t)n};
     uint64_t seed = 7;
@@ -209,7 +192,7 @@ static double fast(probe *p, double *room)
 }
 
 /* smallest Rayleigh quotient of the shapes under a weight along each axis */
-static double slow(probe *p, double *room)
+static double find_slowest(probe *p, double *room)
 {
     const pal_body *body = p->body;
     size_t n = 3 * (size_t)body->n_dof;
@@ -236,17 +219,17 @@ static double slow(probe *p, double *room)
     return sqrt(min);
 }
 
-static bool look_at_modes(probe *p, pal_preflight_body *out)
+static bool find_modes(probe *p, pal_preflight_body *out)
 {
     pal_body *body = p->body;
     size_t n = 3 * (size_t)body->n_dof;
     double *room = calloc(8 * n + 1, sizeof *room);
     if (!room) return false;
     p->x = room + 6 * n, p->low = room + 7 * n;
-    p->way_m = 1e-5 * body->edge_m;
+    p->step_m = PAL_DIFFERENCE_H * body->edge_m;
     memcpy(p->x, body->x, n * sizeof(double));
-    out->omega_max_1_s = out->n_fixed < body->n_active ? fast(p, room) : (double)NAN;
-    out->omega_min_1_s = out->n_fixed > 0 && out->n_fixed < body->n_active ? slow(p, room) : (double)NAN;
+    out->omega_max_1_s = out->n_fixed < body->n_active ? find_fastest(p, room) : (double)NAN;
+    out->omega_min_1_s = out->n_fixed > 0 && out->n_fixed < body->n_active ? find_slowest(p, room) : (double)NAN;
     /* anchors also restrain a body, but without fixed nodes omega_min and the condition stay unknown */
     out->condition = out->omega_max_1_s * out->omega_max_1_s / (out->omega_min_1_s * out->omega_min_1_s);
     out->slowest_period_s = 2 * M_PI / out->omega_min_1_s;
@@ -258,56 +241,30 @@ static bool look_at_modes(probe *p, pal_preflight_body *out)
 
 /* ---- cost ---- */
 
-/* ns of a component for one evaluation, measured by `palpate bench` on the machine of README's tables; NaN: unknown */
-static double component_ns(const pal_body *body, const char *name)
-{
-    const double n_tet = body->tets ? body->tets->n_tet : 0, n_spring = body->dofs.n_spring;
-    const double n_cell = pal_dofs_element_count(&body->dofs);
-    const struct {
-        const char *name;
-        double ns;
-    } cost[] = {{"edge_distance", 3.1 * n_tet},  {"face_area", 7.7 * n_tet},
-                {"tet_volume", 3.1 * n_tet},     {"edge_spring", 3.5 * n_spring},
-                {"shape_spring", 1 * n_spring},  {"hex_elastic", 90.0 * body->n_element},
-                {"tet_elastic", 20 * n_tet},     {"cell_elastic", 170 * n_cell},
-                {"viscous", 0.5 * body->n_node}, {"gravity", 1.0 * body->n_node}};
-    for (size_t k = 0; k < sizeof cost / sizeof cost[0]; k++)
-        if (!strcmp(name, cost[k].name)) return cost[k].ns;
-    return NAN;
-}
-
-/* A step under load. Explicit: forces and one pass over the points for every sub-step, four of each with rk4, the
- * conjugate gradients of the mass matrix with central_cg. Implicit: four iterations, each with one application of
- * the components and two passes through the factor, plus forces, stiffness and energy. */
+/* A step under load. The forces cost what they took on average in the evaluations for the modes, whatever components
+ * they are; the rest is counted, with ns measured by `palpate bench` on the machine of README's tables. Explicit:
+ * forces and one pass over the points for every sub-step, four of each with rk4, the conjugate gradients of the mass
+ * matrix with central_cg. Implicit: four iterations, each with one application of the components and two passes through
+ * the factor, plus forces, stiffness and energy. */
 static double predict_ms(const probe *p, const pal_body *body, int n_sub, int b)
 {
-    double forces = 0, solve = 0;
-    const char *solver = "";
+    const double forces = (double)p->spent_ns / p->n_run;
     pal_solve_report report;
-    for (int i = 0; i < p->n_force; i++) forces += component_ns(body, p->force[i].effect->name);
-    for (int i = 0; i < pal_world_component_count(p->world); i++) {
-        pal_component_info info;
-        pal_world_component_info(p->world, i, &info);
-        if (info.body == body->name && !strcmp(info.stage, "solve")) solver = info.name;
-    }
-    if (!(forces > 0) || !strcmp(solver, "static_newton")) return NAN;
+    if (p->n_run == 0 || pal_world_find_component(p->world, b, "static_newton") >= 0) return NAN;
     (void)pal_world_solve_report(p->world, b, &report);
-    double shown = (body->skin ? 11.6 : 1.0) * body->n_shown, min = 1500;
+    double shown = (body->display.skin ? 11.6 : 1.0) * body->display.n_shown, min = 1500;
     if (body->implicit) {
         const double iterations = 4, factor = 0.9 * (double)report.factor_nonzeros;
         return 1e-6 * (forces * (5 + iterations) + iterations * (factor + 30.0 * body->n_dof) + shown);
     }
-    int evaluations = !strcmp(solver, "rk4") ? 4 : 1;
-    solve = (!strcmp(solver, "central_cg") ? 200.0 : 12.0) * body->n_active;
+    const int evaluations = pal_world_find_component(p->world, b, "rk4") >= 0 ? 4 : 1;
+    const double solve = (pal_world_find_component(p->world, b, "central_cg") >= 0 ? 200.0 : 12.0) * body->n_active;
     return 1e-6 * (n_sub * (evaluations * (forces + solve) + min) + shown + 2 * min);
 }
 
 /* ---- elements that lock ---- */
 
-/* Poisson's ratio; with less, full integration is within some percent (tests/stability, case poisson_static) */
-static const double locks_above = 0.47;
-
-static void look_for_locking(const pal_body_def *def, pal_preflight_body *out)
+static void find_locking(const pal_body_def *def, pal_preflight_body *out)
 {
     if (strcmp(def->model.name, "fem")) return;
     const char *element = def->mesh->hexes.n_hex > 0 ? "hex8_bbar" : "tet4";
@@ -318,43 +275,44 @@ static void look_for_locking(const pal_body_def *def, pal_preflight_body *out)
         const pal_region *region = &def->region[r];
         const int n =
             region->kind == PAL_REGION_GRID && region->grid_poisson ? region->n[0] * region->n[1] * region->n[2] : 0;
-        if (region->poisson > out->poisson) out->poisson = region->poisson;
-        for (int i = 0; i < n; i++)
-            if (region->grid_poisson[i] > out->poisson) out->poisson = region->grid_poisson[i];
+        out->poisson = fmax(out->poisson, region->poisson);
+        for (int i = 0; i < n; i++) out->poisson = fmax(out->poisson, region->grid_poisson[i]);
     }
     const bool hex = !strcmp(element, "hex8"), tet = !strcmp(element, "tet4");
-    if ((!hex && !tet) || !(out->poisson > locks_above)) return;
+    if ((!hex && !tet) || !(out->poisson > PAL_LOCKING_POISSON)) return;
     out->locks = hex ? "hex8" : "tet4";
     out->instead = def->mesh->hexes.n_hex > 0 ? "hex8_bbar" : "tet10";
 }
 
 /* ---- whole scene ---- */
 
-static pal_err look_at_body(pal_world *world, const pal_scene *scene, int b, int max_cg, pal_preflight_body *out)
+static pal_err check_body(pal_world *world, const pal_scene *scene, int b, int max_cg, pal_preflight_body *out)
 {
     pal_body *body = pal_world_body(world, b);
     probe p = {.world = world, .body = body, .max_cg = max_cg};
-    bool volumes = false;
     for (int i = 0; i < pal_world_component_count(world); i++) {
-        const pal_component *row = pal_world_component(world, i);
+        const pal_component *component = pal_world_component(world, i);
         pal_component_info info;
         pal_world_component_info(world, i, &info);
-        if (info.body != body->name || row->effect->stage != PAL_STAGE_FORCE || p.n_force == 32) continue;
-        p.force[p.n_force++] = *row;
-        volumes = volumes || !strcmp(info.name, "tet_volume");
+        if (info.body != body->name || component->effect->stage != PAL_STAGE_FORCE || p.n_force == 32) continue;
+        p.force[p.n_force++] = *component;
     }
     *out = (pal_preflight_body){.name = scene->body[b].name,
                                 .n_point = body->n_dof,
                                 .n_node = body->n_node,
                                 .limit_s = body->dt_limit_s,
-                                .limit_node = -1,
                                 .limit_edge_m = INFINITY};
     out->n_sub = isfinite(out->limit_s) ? (int)ceil(scene->step_s / out->limit_s * (1 - 1e-12)) : 1;
-    if (!find_limit_node(&p, out)) return PAL_ERR_MEMORY;
-    look_at_elements(body, volumes, out);
-    look_at_masses(body, out);
-    look_for_locking(&scene->body[b], out);
-    if (!look_at_modes(&p, out)) return PAL_ERR_MEMORY;
+    double omega2;
+    out->limit_node = pal_world_limit_node(world, b, &omega2);
+    if (out->limit_node >= 0) {
+        out->limit_mass_kg = body->mass_kg[out->limit_node];
+        pal_add3(out->limit_at_m, body->x_rest + 3 * (size_t)out->limit_node, body->offset_m);
+    }
+    check_elements(body, pal_world_find_component(world, b, "tet_volume") >= 0, out);
+    check_masses(body, out);
+    find_locking(&scene->body[b], out);
+    if (!find_modes(&p, out)) return PAL_ERR_MEMORY;
     out->predicted_ms = predict_ms(&p, body, out->n_sub, b);
     return PAL_ERR_OK;
 }
@@ -367,7 +325,7 @@ pal_err pal_preflight_run(const pal_scene *scene, int max_cg, pal_preflight *out
     out->n_byte = pal_world_bytes(world);
     pal_err err = PAL_ERR_OK;
     for (int b = 0; b < scene->n_body && !err; b++) {
-        err = look_at_body(world, scene, b, max_cg, &out->body[b]);
+        err = check_body(world, scene, b, max_cg, &out->body[b]);
         out->predicted_ms += out->body[b].predicted_ms;
     }
     pal_world_destroy(world);

@@ -37,7 +37,8 @@ typedef struct pal_preflight_body {
      * locks */
     const char *locks, *instead;
     double poisson;
-    double predicted_ms; /* of a step under load, on the machine of README's tables; NaN: unknown for its components */
+    /* of a step under load: its forces as measured here, the rest from counts; NaN: a static solver */
+    double predicted_ms;
 } pal_preflight_body;
 
 typedef struct pal_preflight {

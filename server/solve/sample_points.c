@@ -5,12 +5,11 @@
 #include "server/base/vec3.h"
 #include "server/mesh/files/file_bytes.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { COLUMNS = 6, WORD = 64, ROW = 6 * 32 };
+enum { COLUMNS = 6, WORD = 64 };
 static const char *const column_name[COLUMNS] = {"x", "y", "z", "ux", "uy", "uz"};
 
 typedef struct csv {
@@ -65,31 +64,19 @@ static const char *shown(char word[WORD])
     return word;
 }
 
-static pal_err read_header(csv *c)
-{
-    char word[WORD];
-    for (int k = 0; k < COLUMNS; k++) {
-        if (!next_cell(c, word))
-            return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: %d columns, wanted 6: x,y,z,ux,uy,uz",
-                                      c->name, c->line, k);
-        if (strcmp(word, column_name[k]))
-            return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED,
-                                      "%s: line %d: column %d is \"%s\", wanted \"%s\" (x,y,z,ux,uy,uz)", c->name,
-                                      c->line, k + 1, shown(word), column_name[k]);
-    }
-    if (next_cell(c, word))
-        return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: column 7, \"%s\", is one too many", c->name,
-                                  c->line, shown(word));
-    return PAL_ERR_OK;
-}
-
-static pal_err read_row(csv *c, double out[COLUMNS])
+/* the names of the columns (out NULL), or their numbers */
+static pal_err read_cells(csv *c, double *out)
 {
     char word[WORD], *end;
     for (int k = 0; k < COLUMNS; k++) {
         if (!next_cell(c, word))
-            return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: %d columns, wanted 6", c->name, c->line,
-                                      k);
+            return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: %d columns, wanted 6: x,y,z,ux,uy,uz",
+                                      c->name, c->line, k);
+        if (!out && strcmp(word, column_name[k]))
+            return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED,
+                                      "%s: line %d: column %d is \"%s\", wanted \"%s\" (x,y,z,ux,uy,uz)", c->name,
+                                      c->line, k + 1, shown(word), column_name[k]);
+        if (!out) continue;
         out[k] = strtod(word, &end);
         if (end == word || *end || !isfinite(out[k]))
             return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: column %d (%s): \"%s\" is not a number",
@@ -108,12 +95,11 @@ static pal_err read_all(csv *c, const char *text, const char *last, pal_samples 
     while (next_line(c, &text, last)) {
         double row[COLUMNS];
         if (c->at == c->end) continue;
+        PAL_TRY(read_cells(c, header ? row : NULL));
         if (!header) {
-            PAL_TRY(read_header(c));
             header = true;
             continue;
         }
-        PAL_TRY(read_row(c, row));
         if ((size_t)out->n == cap) {
             cap = cap ? 2 * cap : 256;
             double *x = realloc(out->x, 3 * cap * sizeof *x);
@@ -161,18 +147,14 @@ pal_err pal_samples_read(const char *path, pal_samples *out, pal_diagnostic *dia
 
 pal_err pal_samples_write(const pal_samples *samples, const char *path, pal_diagnostic *diag)
 {
-    size_t max = 32 + (size_t)samples->n * ROW, n = 0;
-    char *text = malloc(max);
-    if (!text) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for %d samples", path, samples->n);
-    n += (size_t)snprintf(text, max, "x,y,z,ux,uy,uz\n");
+    pal_file_out out;
+    PAL_TRY(pal_file_begin(&out, path, diag));
+    fprintf(out.file, "x,y,z,ux,uy,uz\n");
     for (int i = 0; i < samples->n; i++) {
         const double *x = samples->x + 3 * i, *u = samples->u + 3 * i;
-        n += (size_t)snprintf(text + n, max - n, "%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n", x[0], x[1], x[2], u[0], u[1],
-                              u[2]);
+        fprintf(out.file, "%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n", x[0], x[1], x[2], u[0], u[1], u[2]);
     }
-    pal_err err = pal_file_write(path, text, n, diag);
-    free(text);
-    return err;
+    return pal_file_end(&out, PAL_ERR_OK, diag);
 }
 
 void pal_samples_free(pal_samples *samples)

@@ -8,19 +8,15 @@
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/mesh/files/vtk_file.h"
-#include "server/mesh/volume/locate.h"
-#include "server/num/shape_functions.h"
 #include "server/sim/world/world.h"
-#include "server/solve/load_case.h"
 #include "server/solve/voxel_refinement.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { NEWTON_A_STEP = 4, MAX_NEWTON = 400, MAX_RAMP = 40 };
-static const double lab_step_s = 1.0 / 60; /* not used by a static solver */
+static const double step_s = 1.0 / 60; /* not used by a static solver */
 
 struct pal_solution {
     pal_prepared mesh;
@@ -89,47 +85,23 @@ static pal_err set_materials(const job *j, pal_body_def *body)
         pal_sub3(r->low_m, p->material[k].region.low_m, origin);
         pal_sub3(r->high_m, p->material[k].region.high_m, origin);
     }
-    return PAL_ERR_OK;
-}
-
-/* every voxel must have a material */
-static pal_err check_covered(const job *j)
-{
-    const pal_problem *p = j->problem;
+    /* every voxel must have a material */
     const pal_tets *t = &j->s->mesh.tets;
-    if (p->material[0].region.all) return PAL_ERR_OK;
-    for (int e = 0; e < t->n_tet; e++) {
-        double middle[3] = {t->origin_m[0], t->origin_m[1], t->origin_m[2]};
-        bool found = false;
-        for (int k = 0; k < 4; k++) pal_axpy3(middle, 0.25, t->x + 3 * t->tet[4 * e + k]);
-        for (int k = 0; k < p->n_material && !found; k++) found = pal_box_contains(&p->material[k].region, middle, 0);
-        if (!found)
+    double x[3];
+    for (int e = 0; e < t->n_tet && !p->material[0].region.all; e++)
+        if (!pal_case_material_of(p, t, e, x))
             return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "materials: none of the %d regions holds (%g, %g, %g)",
-                                      p->n_material, middle[0], middle[1], middle[2]);
-    }
+                                      p->n_material, x[0], x[1], x[2]);
     return PAL_ERR_OK;
 }
 
-static pal_err set_supports(const job *j, pal_body_def *body)
-{
-    const pal_problem *p = j->problem;
-    body->n_support = 0;
-    if (p->n_support == 0 && !j->options->inertia_relief)
-        return pal_diagnostic_set(
-            j->diag, PAL_ERR_REFUSED,
-            "supports: none, so the body is free and nothing holds it against its loads (inertia relief "
-            "balances them by its mass)");
-    body->n_support = p->n_support;
-    return pal_case_supports(p, &j->s->mesh.tets, body->support, j->diag);
-}
-
-static pal_err set_items(const job *j, pal_body_def *body)
+static pal_err set_entries(const job *j, pal_body_def *body)
 {
     const pal_solve_options *o = j->options;
     pal_entry_init(&body->model, "model", "fem");
     PAL_TRY(pal_entry_put_text(&body->model, "element", o->element, j->diag));
     PAL_TRY(pal_entry_put_text(&body->model, "law", o->law, j->diag));
-    PAL_TRY(pal_entry_put_bool(&body->model, "fill", o->fill, j->diag));
+    PAL_TRY(pal_entry_put_bool(&body->model, "fill", o->voxel.fill, j->diag));
     pal_entry_init(&body->solver, "solver", "static_newton");
     PAL_TRY(pal_entry_put_number(&body->solver, "tolerance", o->tolerance > 0 ? o->tolerance : 1e-8, j->diag));
     PAL_TRY(pal_entry_put_number(&body->solver, "newton", NEWTON_A_STEP, j->diag));
@@ -141,11 +113,16 @@ static pal_err set_items(const job *j, pal_body_def *body)
 
 static pal_err make_world(const job *j)
 {
+    if (j->problem->n_support == 0 && !j->options->inertia_relief)
+        return pal_diagnostic_set(
+            j->diag, PAL_ERR_REFUSED,
+            "supports: none, so the body is free and nothing holds it against its loads (inertia relief "
+            "balances them by its mass)");
     pal_scene *scene = calloc(1, sizeof *scene);
     if (!scene) return pal_diagnostic_set(j->diag, PAL_ERR_MEMORY, "no memory for the scene");
     pal_scene_default(scene);
     pal_body_def *body = &scene->body[0];
-    scene->step_s = lab_step_s;
+    scene->step_s = step_s;
     scene->n_tool = 0;
     scene->n_body = 1;
     pal_body_default(body, "body", &j->s->mesh);
@@ -153,9 +130,9 @@ static pal_err make_world(const job *j)
     body->output.name[0] = 0;
     pal_err err = set_materials(j, body);
     body->material.damping_1_s = 0;
-    if (!err) err = check_covered(j);
-    if (!err) err = set_supports(j, body);
-    if (!err) err = set_items(j, body);
+    body->n_support = j->problem->n_support;
+    if (!err) err = pal_case_supports(j->problem, &j->s->mesh.tets, body->support, j->diag);
+    if (!err) err = set_entries(j, body);
     if (!err) err = pal_world_create(scene, j->diag, &j->s->world);
     free(scene);
     if (err) return err;
@@ -171,7 +148,7 @@ static pal_err set_loads(const job *j)
     double *f = calloc(3 * (size_t)b->n_node, sizeof *f);
     if (!f) return pal_diagnostic_set(j->diag, PAL_ERR_MEMORY, "no memory for the loads");
     pal_err err =
-        pal_case_forces(j->problem, j->load_case, b, s->locate, &s->mesh.surface, f, j->result->area_m2, j->diag);
+        pal_case_forces(j->problem, j->load_case, -1, b, s->locate, &s->mesh.surface, f, j->result->area_m2, j->diag);
     for (int i = 0; i < b->n_node && !err; i++) {
         pal_add3(j->result->load_N, j->result->load_N, f + 3 * i);
         err = pal_world_load(s->world, 0, i, f + 3 * i);
@@ -200,14 +177,6 @@ static void move_supports(const job *j, double share)
     pal_world_invalidate_limits(j->s->world, 0);
 }
 
-static int count_ramp(const job *j)
-{
-    double max = 0;
-    for (int k = 0; k < j->problem->n_support; k++) max = fmax(max, pal_norm3(j->problem->support[k].move_m));
-    double n = ceil(max / (0.5 * j->s->body->edge_m));
-    return n > MAX_RAMP ? MAX_RAMP : (int)n;
-}
-
 /* steps the world until its solver meets the tolerance */
 static pal_err converge(const job *j, double fraction)
 {
@@ -215,7 +184,7 @@ static pal_err converge(const job *j, double fraction)
     for (;;) {
         char what[80];
         pal_solve_report report;
-        pal_err err = pal_world_step(j->s->world, lab_step_s);
+        pal_err err = pal_world_step(j->s->world, step_s);
         pal_world_solve_report(j->s->world, 0, &report);
         j->result->n_newton += report.n_newton;
         j->result->n_cg += report.n_cg;
@@ -237,7 +206,9 @@ static pal_err converge(const job *j, double fraction)
 
 static pal_err solve(const job *j)
 {
-    int ramp = count_ramp(j);
+    double max_m = 0;
+    for (int k = 0; k < j->problem->n_support; k++) max_m = fmax(max_m, pal_norm3(j->problem->support[k].move_m));
+    const int ramp = (int)fmin(MAX_RAMP, ceil(max_m / (0.5 * j->s->body->edge_m)));
     if (ramp == 0) return converge(j, 0);
     for (int k = 1; k <= ramp; k++) {
         move_supports(j, (double)k / ramp);
@@ -279,10 +250,7 @@ static double volume_of(const pal_solution *s)
     double sum = 0, cube = b->edge_m * b->edge_m * b->edge_m;
     for (int e = 0; e < b->n_element; e++) {
         const int32_t *node = b->element + (size_t)b->n_corner * (size_t)e;
-        double edge[3][3], normal[3];
-        for (int k = 0; k < 3; k++) pal_sub3(edge[k], b->x_rest + 3 * node[k + 1], b->x_rest + 3 * node[0]);
-        pal_cross3(normal, edge[0], edge[1]);
-        sum += (b->fill ? (double)b->fill[e] : 1) * (s->hex ? cube : pal_dot3(normal, edge[2]) / 6);
+        sum += (b->fill ? (double)b->fill[e] : 1) * (s->hex ? cube : pal_tet_volume(b->x_rest, node));
     }
     return sum;
 }
@@ -291,8 +259,7 @@ static pal_err prepare(const job *j, const pal_surface *surface)
 {
     const pal_solve_options *o = j->options;
     pal_solution *s = j->s;
-    pal_case_voxel_options voxels = {o->resolution, o->fill, o->min_fill, o->align};
-    PAL_TRY(pal_case_voxels(j->problem, surface, &voxels, &s->mesh, j->diag));
+    PAL_TRY(pal_case_voxels(j->problem, surface, &o->voxel, &s->mesh, j->diag));
     if (o->split > 1) PAL_TRY(pal_refine_voxels(&s->mesh, o->split, j->diag));
     PAL_TRY(make_world(j));
     const pal_body *b = s->body;
@@ -382,12 +349,13 @@ pal_err pal_solution_csv(const pal_solution *s, const char *path, pal_diagnostic
 }
 
 /* von Mises stress at the nodes: volume-weighted mean over the elements around a node */
-static void measure(const pal_solution *s, double *stress_Pa, double *volume_m3)
+static void measure_stress(const pal_solution *s, double *stress_Pa, double *volume_m3)
 {
     const pal_body *b = s->body;
     for (int r = 0; r < pal_world_component_count(s->world); r++) {
-        const pal_component *row = pal_world_component(s->world, r);
-        if (row->effect->measure) row->effect->measure(row->self, b, PAL_FIELD_VON_MISES_PA, stress_Pa, volume_m3);
+        const pal_component *c = pal_world_component(s->world, r);
+        if (c->effect->inspect.measure)
+            c->effect->inspect.measure(c->self, b, PAL_FIELD_VON_MISES_PA, stress_Pa, volume_m3);
     }
     for (int i = 0; i < b->n_node; i++) stress_Pa[i] = volume_m3[i] > 0 ? stress_Pa[i] / volume_m3[i] : 0;
 }
@@ -417,7 +385,7 @@ pal_err pal_solution_vtk(const pal_solution *s, const char *path, pal_diagnostic
     pal_err err = stress && volume && moved
                       ? PAL_ERR_OK
                       : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for %d nodes", path, b->n_node);
-    if (!err) measure(s, stress, volume);
+    if (!err) measure_stress(s, stress, volume);
     for (size_t k = 0; k < 3 * n && !err; k++) moved[k] = b->x[k] - b->x_rest[k];
     if (!err) err = write_vtk(s, path, moved, stress, diag);
     free(moved);

@@ -2,19 +2,13 @@
  */
 #ifndef PAL_SOLVE_SOLVE_H
 #define PAL_SOLVE_SOLVE_H
-#include "server/sim/core/problem.h"
+#include "server/solve/load_case.h"
 #include "server/solve/sample_points.h"
 
 typedef struct pal_solve_options {
     const char *element; /* "hex8_bbar" | "hex8" | "tet4" | "tet10"                       */
     const char *law;     /* "linear" | "corotational" | "neo_hookean"                     */
-    int resolution;      /* voxels on the longest axis */
-    /* scale cut voxels by their filled share; false: keep voxels at least half filled, as full ones */
-    bool fill;
-    /* cut voxels with a smaller share are dropped; 0: with fill 0.25, or 0.02 where that would lose 2.5 % of the
-     * volume; without fill 0.5 */
-    double min_fill;
-    bool align; /* shift the voxels so that their faces lie on the border of a support that cuts the body */
+    pal_case_voxel_options voxel;
     /* each voxel is solved as split^3 voxels of its fill, which separates the element error from the border's; 0: 1 */
     int split;
     double tolerance;         /* of the residual, relative to the loads; 0: 1e-8 */

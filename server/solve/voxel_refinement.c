@@ -1,14 +1,15 @@
 /* Splits voxels into equal parts on the grid they came from. */
 #include "server/solve/voxel_refinement.h"
 
-#include <math.h>
+#include "server/base/vec3.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 enum { MAX_HEXAHEDRA = 20 * 1000 * 1000 };
 
 /* lowest corner of hexahedron e, in voxels from low */
-static void place_of(const pal_tets *tets, const pal_hexes *hexes, int e, const double low[3], double h, int at[3])
+static void lattice_of(const pal_tets *tets, const pal_hexes *hexes, int e, const double low[3], double h, int at[3])
 {
     const double *x = tets->x + 3 * (size_t)hexes->node[8 * (size_t)e];
     for (int c = 0; c < 3; c++) at[c] = (int)floor((x[c] - low[c]) / h + 0.5);
@@ -20,13 +21,12 @@ static size_t cell(const int n[3], int x, int y, int z)
 }
 
 /* voxel lattice with an empty layer around it; fill [n2][n1][n0], 0 where there is no voxel */
-static pal_err lay_coarse(const pal_prepared *mesh, double low[3], int n[3], float **fill)
+static pal_err make_coarse(const pal_prepared *mesh, double low[3], int n[3], float **fill)
 {
     const pal_tets *t = &mesh->tets;
     double high[3];
-    for (int c = 0; c < 3; c++) low[c] = INFINITY, high[c] = -INFINITY;
-    for (int i = 0; i < 3 * t->n_node; i++)
-        low[i % 3] = fmin(low[i % 3], t->x[i]), high[i % 3] = fmax(high[i % 3], t->x[i]);
+    pal_box3_empty(low, high);
+    for (int i = 0; i < t->n_node; i++) pal_box3_add(low, high, t->x + 3 * (size_t)i);
     for (int c = 0; c < 3; c++) {
         n[c] = (int)floor((high[c] - low[c]) / t->edge_m + 0.5) + 2;
         low[c] -= t->edge_m;
@@ -35,15 +35,15 @@ static pal_err lay_coarse(const pal_prepared *mesh, double low[3], int n[3], flo
     if (!*fill) return PAL_ERR_MEMORY;
     for (int e = 0; e < mesh->hexes.n_hex; e++) {
         int at[3];
-        place_of(t, &mesh->hexes, e, low, t->edge_m, at);
+        lattice_of(t, &mesh->hexes, e, low, t->edge_m, at);
         (*fill)[cell(n, at[0], at[1], at[2])] = fmaxf(mesh->hexes.fill[e], 1e-6f);
     }
     return PAL_ERR_OK;
 }
 
 /* the fine grid, with voxels where the coarse one has them */
-static pal_err lay_fine(const pal_prepared *mesh, const double low[3], const int n[3], const float *fill, int split,
-                        pal_voxels *out)
+static pal_err make_fine(const pal_prepared *mesh, const double low[3], const int n[3], const float *fill, int split,
+                         pal_voxels *out)
 {
     size_t n_cell = 1;
     *out = (pal_voxels){.edge_m = mesh->tets.edge_m / split,
@@ -76,13 +76,13 @@ pal_err pal_refine_voxels(pal_prepared *mesh, int split, pal_diagnostic *diag)
     if ((double)n_hex * split * split * split > MAX_HEXAHEDRA)
         return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "%d voxels split by %d on each axis are more than %d", n_hex,
                                   split, MAX_HEXAHEDRA);
-    pal_err err = lay_coarse(mesh, low, n, &fill);
-    if (!err) err = lay_fine(mesh, low, n, fill, split, &fine);
+    pal_err err = make_coarse(mesh, low, n, &fill);
+    if (!err) err = make_fine(mesh, low, n, fill, split, &fine);
     if (!err) err = pal_voxels_split(&fine, &tets);
     if (!err) err = pal_hexes_find(&tets, &hexes, diag);
     for (int e = 0; e < hexes.n_hex && !err; e++) {
         int at[3];
-        place_of(&tets, &hexes, e, low, fine.edge_m, at);
+        lattice_of(&tets, &hexes, e, low, fine.edge_m, at);
         hexes.fill[e] = fill[cell(n, at[0] / split, at[1] / split, at[2] / split)];
     }
     free(fill);

@@ -40,35 +40,10 @@ void pal_study_accuracy_text(const pal_study *study, double error_m, char *out, 
     if (reference[0] && strlen(reference) <= left) snprintf(out + n, n_byte - (size_t)n, "%s%s", of, reference);
 }
 
-static bool is_measured(const pal_study_point *p)
-{
-    return !p->err && isfinite(p->measured.ms) && isfinite(p->measured.error_m);
-}
-
-/* Copy of the study in which other methods count as not measured; indices are kept. NULL: out of memory. */
-static pal_study *only(const pal_study *study, const char *methods)
-{
-    pal_study *out = malloc(sizeof *out);
-    if (!out) return NULL;
-    *out = *study;
-    for (int k = 0; k < out->n_point; k++) {
-        pal_study_point *p = &out->point[k];
-        if (is_measured(p) && pal_study_method_in(methods, p->measured.setting.model)) continue;
-        p->measured.ms = p->measured.error_m = NAN;
-        p->measured.front = false;
-    }
-    return out;
-}
-
 int pal_study_pick_target(const pal_study *study, const char *methods, const pal_accuracy_target *target)
 {
-    pal_study *some = only(study, methods);
-    if (!some) return -1;
-    int picked = pal_study_pick(some, target->max_error_m > 0 ? target->max_error_m : NAN,
-                                target->budget_ms > 0 ? target->budget_ms : NAN);
-    if (picked >= 0 && isnan(some->point[picked].measured.ms)) picked = -1;
-    free(some);
-    return picked;
+    return pal_study_pick(study, methods, target->max_error_m > 0 ? target->max_error_m : NAN,
+                          target->budget_ms > 0 ? target->budget_ms : NAN);
 }
 
 /* Is a closer to the target than b? By error within the budget, otherwise by time. */
@@ -90,7 +65,7 @@ void pal_study_describe_miss(const pal_study *study, const char *methods, const 
     int n = 0;
     for (int k = 0; k < study->n_point; k++) {
         const pal_study_point *p = &study->point[k];
-        if (!is_measured(p) || !pal_study_method_in(methods, p->measured.setting.model)) continue;
+        if (!pal_study_measured(p) || !pal_study_method_in(methods, p->measured.setting.model)) continue;
         n++;
         if (!best || is_nearer(p, best, target)) best = p;
     }
@@ -185,7 +160,7 @@ pal_err pal_studied_scene_open(const char *word, const pal_scene *scene, pal_stu
                  out->file->study.machine, machine);
     else if (!out->file->whole)
         snprintf(out->warn, sizeof out->warn, "%.150s: was broken off after %d of %d settings", path,
-                 out->file->study.n_point, out->file->n_finest);
+                 out->file->study.n_point, out->file->n_total);
     return wanted ? pick(word, path, scene, &target, out, diag) : PAL_ERR_OK;
 }
 

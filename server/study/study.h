@@ -1,31 +1,21 @@
 /* The cost of accuracy: one body under the same loads in many configurations, each with its error against a
- * converged reference and its milliseconds per live step. README.md explains loads, reference and measures; this
- * header adds the figures. [load]
+ * converged reference and its milliseconds per live step. README.md explains loads, reference and measures, tuning.h
+ * gives their figures.
  *
- * Loads. Presses move the body by 2 % of its diagonal, within a factor of 1.5. Their strength comes from a linear
- * estimate and then from the reference's own equilibrium. A load without a reference equilibrium is halved, up to
- * four times. The dynamic run applies half of the first load at once at rest, so that the overshoot reaches about
- * the displacement of the full static load. Runs of more than 1.5e9 nodes times sub-steps are timed and marked as
- * not followed.
- * Reference. It runs with sdirk2 and 1/960 s (quick: 1/480 s), or a quarter (a half) of the scene's step if that is
- * shorter. Changes between its meshes that do not shrink are attributed to the scatter of cut voxels; the error is
- * then 1.25 times the larger one. A quick reference is refined, up to 12,000 nodes, until its error is below 15 %
- * of the largest displacement. Samples of the caller may replace the reference.
+ * The strength of a press comes from a linear estimate and then from the reference's own equilibrium; a load without
+ * one is halved, up to four times. Every method and size runs with the scene's step, a quarter and a half of it, twice
+ * it up to 1/60 s, and 1/1000 s; a run that takes too long is timed and marked as not followed. All results except
+ * milliseconds and seconds are deterministic.
  *
- * Every method and size runs with the scene's step, a quarter and a half of it, twice it up to 1/60 s, and 1/1000
- * s. A run repeats until its steps have taken 50 ms in total (at most 1,200 steps). All results except milliseconds
- * and seconds are deterministic.
- *
- * Each configuration on the Pareto front runs two robustness cases (study_robustness.c). One that fails without
- * being stopped by its safeguards leaves the front, and `reason` reports it. Calibrated springs keep at least a
- * tenth of the material's volume stiffness. With a single load, `reason` states that they are judged by the load
- * they were fitted to. */
+ * A configuration on the Pareto front that fails a robustness case without being stopped by its safeguards leaves the
+ * front, and `reason` reports it; so do springs that are judged by the only load they were fitted to. [load] */
 #ifndef PAL_STUDY_STUDY_H
 #define PAL_STUDY_STUDY_H
 #include "server/sim/core/configuration.h"
 #include "server/sim/core/problem.h"
 #include "server/solve/sample_points.h"
 
+#include <math.h>
 #include <stdint.h>
 
 enum { PAL_STUDY_POINTS = 256, PAL_STUDY_LOADS = 4, PAL_STUDY_TRAJECTORY = 512 };
@@ -85,7 +75,7 @@ typedef struct pal_study_options {
     bool (*recall)(uint64_t key, pal_study_answer *answer, double *value, int n, void *user);
     void (*remember)(uint64_t key, const pal_study_answer *answer, const double *value, int n, void *user);
     /* [load] Called after every point with the study so far, to store it. May be NULL. False stops with STATE. */
-    bool (*done)(const pal_study *study, int n_finest, void *user);
+    bool (*done)(const pal_study *study, int n_total, void *user);
     bool (*progress)(const char *what, double fraction, void *user); /* may be NULL; false stops with STATE */
     bool (*may_continue)(void *user); /* polled between steps; may be NULL; false stops with STATE */
     void *user;
@@ -101,23 +91,27 @@ pal_err pal_study_problem(const pal_problem *problem, const pal_problem_case *lo
 pal_err pal_study_problem_scene(const pal_problem *problem, const pal_surface *surface, pal_diagnostic *diag,
                                 pal_configured_scene **out);
 
-/* largest error of the reference, as a share of max_m, at which the reference is trusted */
-#define PAL_STUDY_TRUST 0.3
+/* Are its time and its error known? [any] */
+static inline bool pal_study_measured(const pal_study_point *p)
+{
+    return !p->err && isfinite(p->measured.ms) && isfinite(p->measured.error_m);
+}
 /* Is the error of the reference small enough? [any] */
 bool pal_study_trusted(const pal_study *study);
 /* Marks the Pareto front again: the points that no other beats in both ms and error. An error below that of the
  * reference counts as the reference's. The front is empty if the reference is not trusted. */
 void pal_study_mark_front(pal_study *study);
-/* Picks the cheapest point whose error_m plus the reference's own error is at most max_error_m, or the most
- * accurate one with ms at most budget_ms (among those closer than the reference's error: the cheapest). NaN: no
- * such limit. With both limits: the cheapest that meets both. -1: none qualifies, or the reference is not trusted. */
-int pal_study_pick(const pal_study *study, double max_error_m, double budget_ms);
-/* Predicts cost and error of a configuration between the measured ones, without the point leave_out (-1: use all).
- * Fits ms = a + b n^c and error = d size^-p along the sizes of configurations that are equal otherwise, or else
- * what each parameter of the model adds to the logarithms. False: too few points of the model, or none with this
- * element, law, solver, step. */
-bool pal_study_predict_configuration(const pal_study *study, const pal_configuration *setting, int leave_out,
-                                     double *ms, double *error_m);
+/* Of the points of these methods, picks the cheapest whose error_m plus the reference's own error is at most
+ * max_error_m, or the most accurate one with ms at most budget_ms (among those closer than the reference's error: the
+ * cheapest). NaN: no such limit. With both limits: the cheapest that meets both. -1: none qualifies, or the reference
+ * is not trusted. */
+int pal_study_pick(const pal_study *study, const char *methods, double max_error_m, double budget_ms);
+/* Is the model among the comma-separated methods ("": all)? */
+bool pal_study_method_in(const char *methods, const char *model);
+/* Predicts the error of a configuration between the measured ones, without the point leave_out (-1: use all). Fits
+ * error = d size^-p along the sizes of configurations that are equal otherwise, or else what each parameter of the
+ * model adds to the logarithm. False: too few points of the model, or none with this element, law, solver, step. */
+bool pal_study_predict_error(const pal_study *study, const pal_configuration *setting, int leave_out, double *error_m);
 /* Predicts the cost of a configuration that is made but has not run, from n_node nodes, n_element elements,
  * n_substep sub-steps of one of its steps at rest (body.h, pal_world_substeps) and the read time of its factor
  * (pal_study_point). It also uses the measured times of the other points of its model, without leave_out (-1: use

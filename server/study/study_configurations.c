@@ -1,15 +1,13 @@
 /* The configurations of a study: one parameter at a time varied from a base, at several sizes, so that the effect
  * of each parameter is measured at each size. The base has the scene's step. */
 #include "server/study/study_job.h"
+#include "server/study/tuning.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 enum { BASE_LEVELS = 3 };
-static const double base_tolerance = 1e-2, frame_s = 1.0 / 60, haptic_s = 1.0 / 1000;
-/* ratio of the reference's size to the finest size of the sweep */
-static const double below_reference = 1.4;
 
 typedef struct list {
     const pal_study_job *job;
@@ -55,21 +53,22 @@ int pal_study_size(const pal_study_job *job, int compact)
     return pal_study_fit_size(job, compact * job->slender);
 }
 
-int pal_study_sizes(const pal_study_job *job, int out[16])
+/* the sizes of the sweep, ascending; returns the count */
+static int sweep_sizes(const pal_study_job *job, int out[16])
 {
     static const int whole[] = {8, 11, 16, 22, 30, 40}, quick[] = {6, 8, 12};
     const int *size = job->options->quick ? quick : whole;
-    int n = 0, n_finest = job->options->quick ? 3 : 6;
-    for (int i = 0; i < n_finest; i++) {
+    int n = 0, n_size = job->options->quick ? 3 : 6;
+    for (int i = 0; i < n_size; i++) {
         int fitted = pal_study_size(job, size[i]);
-        if (fitted * below_reference <= job->reference && (n == 0 || fitted > out[n - 1])) out[n++] = fitted;
+        if (fitted * PAL_REFERENCE_FINER <= job->reference && (n == 0 || fitted > out[n - 1])) out[n++] = fitted;
     }
     return n;
 }
 
 static pal_configuration fem_base(const pal_study_job *job, int size)
 {
-    pal_configuration s = {.size = size, .step_s = job->scene->step_s, .tolerance = base_tolerance};
+    pal_configuration s = {.size = size, .step_s = job->scene->step_s, .tolerance = PAL_STUDY_TOLERANCE};
     put(s.model, "fem"), put(s.element, "hex8_bbar"), put(s.law, job->law), put(s.solver, "implicit_euler");
     return s;
 }
@@ -80,8 +79,8 @@ static int other_steps(double own_s, double out[4])
 {
     int n = 0;
     out[n++] = own_s / 4, out[n++] = own_s / 2;
-    if (own_s / 4 > 1.5 * haptic_s) out[n++] = haptic_s;
-    if (2 * own_s <= frame_s * (1 + 1e-9)) out[n++] = 2 * own_s;
+    if (own_s / 4 > 1.5 * PAL_STUDY_HAPTIC_S) out[n++] = PAL_STUDY_HAPTIC_S;
+    if (2 * own_s <= PAL_STUDY_FRAME_S * (1 + 1e-9)) out[n++] = 2 * own_s;
     return n;
 }
 
@@ -108,7 +107,7 @@ static void add_fem(list *l)
 {
     static const char *const element[] = {"tet4", "hex8", "tet10"};
     static const char *const law[] = {"corotational", "neo_hookean", "linear"};
-    int size[16], n = pal_study_sizes(l->job, size);
+    int size[16], n = sweep_sizes(l->job, size);
     for (int i = 0; i < n; i++) {
         bool quick = l->job->options->quick, star = quick ? i == n - 2 || n == 1 : i < 4;
         pal_configuration base = fem_base(l->job, size[i]), s;
@@ -128,7 +127,7 @@ static void add_fem(list *l)
 
 static void add_springs(list *l)
 {
-    int size[16], n = pal_study_sizes(l->job, size);
+    int size[16], n = sweep_sizes(l->job, size);
     bool quick = l->job->options->quick;
     for (int i = quick && n > 1 ? n - 2 : 0; i < n && i < (quick ? (n > 1 ? n - 1 : 1) : 4); i++)
         for (int calibrate = 0; calibrate < 2; calibrate++) {
@@ -159,7 +158,7 @@ static void add_solids(list *l)
         for (int k = 0; k < 2; k++) {
             pal_configuration s = {.size = levels[i], .step_s = l->job->scene->step_s};
             put(s.model, "subdivision_fem"), put(s.solver, solver[k]);
-            if (k == 1) s.tolerance = base_tolerance;
+            if (k == 1) s.tolerance = PAL_STUDY_TOLERANCE;
             add(l, &s, false);
         }
 }

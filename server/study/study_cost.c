@@ -8,20 +8,15 @@
  *   q  time to read the solver's factor on this machine (slower for data that exceeds the caches)
  *   r  time of an element in a sub-step; its logarithm is a sum of the effects of each parameter and of growth with
  *      the nodes
- * Counts elements instead of nodes, because a slender body has twice as many nodes per element. Bodies without
- * elements (springs) count nodes. a, c, t and the sum are fitted to the other configurations by least squares of
- * logarithms. The residual of those close in parameters and nodes is then subtracted. */
+ * Bodies without elements (springs) count nodes. a, c, t and the sum are fitted to the other configurations by least
+ * squares of logarithms; the residual of those close in parameters and nodes is then subtracted. */
 #include "server/study/study_job.h"
+#include "server/study/tuning.h"
 
 #include <math.h>
 #include <string.h>
 
 enum { MIN = 3, FEATURES = 18, GRID = 24, GOLDEN = 40, RATES = 16, ROUNDS = 4, ROUGH = 6 };
-/* ridge weight of "no effect" for each parameter, given as many configurations as are enough; weight of "no
- * residual" beside neighbours */
-static const double ridge = 3e-2, enough = 30, trust = 0.1;
-/* this many different parameters are as distant as a factor e in nodes */
-static const double parameters_per_e = 4, whole_nodes = 1000;
 
 typedef struct seen {
     const pal_configuration *setting;
@@ -39,7 +34,7 @@ static void features(const pal_configuration *s, double n_node, double f[FEATURE
 {
     static const char *const word[] = {"hex8",        "tet4",   "tet10",      "refined",       "linear",
                                        "neo_hookean", "sdirk2", "central_cg", "implicit_euler"};
-    double n = log(n_node / whole_nodes), step = log(fmax(s->step_s, 1e-4) * 60);
+    double n = log(n_node / 1e3), step = log(fmax(s->step_s, 1e-4) * 60);
     double tolerance = s->tolerance > 0 ? log(s->tolerance / 1e-2) : 0;
     memset(f, 0, FEATURES * sizeof *f);
     f[0] = 1, f[1] = n, f[2] = 0.3 * n * n, f[3] = step, f[4] = tolerance, f[5] = s->k_distance_J > 0;
@@ -54,23 +49,7 @@ static void features(const pal_configuration *s, double n_node, double f[FEATURE
 /* With few configurations the parameters are poorly determined, and elements times sub-steps predict best. */
 static double hold_of(int n)
 {
-    return ridge * fmax(1, pow(enough / n, 2));
-}
-
-/* Solves (F'F + hold) w = F'y by elimination; the constant term is not regularised. */
-static void solve(double A[FEATURES][FEATURES + 1], double hold, double w[FEATURES])
-{
-    for (int i = 0; i < FEATURES; i++) A[i][i] += i == 0 ? 1e-12 : hold;
-    for (int i = 0; i < FEATURES; i++)
-        for (int r = i + 1; r < FEATURES; r++) {
-            double share = A[r][i] / A[i][i];
-            for (int c = i; c <= FEATURES && share != 0; c++) A[r][c] -= share * A[i][c];
-        }
-    for (int i = FEATURES - 1; i >= 0; i--) {
-        double sum = A[i][FEATURES];
-        for (int c = i + 1; c < FEATURES; c++) sum -= A[i][c] * w[c];
-        w[i] = sum / A[i][i];
-    }
+    return PAL_COST_RIDGE * fmax(1, pow(PAL_COST_ENOUGH / n, 2));
 }
 
 /* Features that scale the element work but not the read time of a factor, whose entries are counted: element types,
@@ -110,7 +89,7 @@ static cost_law fit(const seen *p, int n, double a, double c)
                 A[r][FEATURES] += slope[r] * y;
             }
         }
-        solve(A, hold_of(n), law.w);
+        pal_study_ridge(A[0], FEATURES, hold_of(n), law.w);
     }
     for (int i = 0; i < n; i++) {
         double off = log((a + work_ms(&law, &p[i], NULL)) / p[i].ms);
@@ -230,11 +209,7 @@ static double nodes_in_use(const pal_study *study, int leave_out, const pal_conf
 
 static double distance(const seen *p, const pal_configuration *s, double n_node)
 {
-    const pal_configuration *q = p->setting;
-    int parameters = !pal_study_is(q->element, s->element) + !pal_study_is(q->law, s->law) +
-                     !pal_study_is(q->solver, s->solver) + (q->step_s != s->step_s) + (q->tolerance != s->tolerance) +
-                     ((q->k_distance_J > 0) != (s->k_distance_J > 0));
-    return parameters + parameters_per_e * fabs(log(p->n_node / n_node));
+    return pal_study_differences(p->setting, s) + PAL_COST_PER_E * fabs(log(p->n_node / n_node));
 }
 
 static bool has_words(const seen *p, int n, const pal_configuration *s)
@@ -261,7 +236,7 @@ bool pal_study_predict_cost(const pal_study *study, const pal_configuration *s, 
 {
     seen p[PAL_STUDY_POINTS];
     int n = 0;
-    double nodes = is_adaptive(s) ? nodes_in_use(study, leave_out, s) : n_node, off = 0, weight = trust;
+    double nodes = is_adaptive(s) ? nodes_in_use(study, leave_out, s) : n_node, off = 0, weight = PAL_COST_NEIGHBOUR;
     double substeps = is_adaptive(s) ? finest_substeps(study, leave_out, s) : n_substep;
     const bool by_element = n_element > 0 && are_counted(study, leave_out, s);
     if (!(nodes > 0) || !(substeps >= 1) || !(s->step_s > 0) || !(study->step_s > 0)) return false;

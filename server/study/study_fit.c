@@ -3,14 +3,13 @@
 #include "server/base/vec3.h"
 #include "server/calibrate/calibrate.h"
 #include "server/study/study_job.h"
+#include "server/study/tuning.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { MAX_EVALUATIONS = 60 };
-/* share of the material's volume stiffness: without it, inverted tetrahedra stay inverted (palpate robustness) */
-static const double min_volume_ratio = 0.1;
 
 /* the reference's equilibrium under a load, in the frame of the problem */
 static pal_err take_samples(const pal_study_job *job, int load, pal_samples *out)
@@ -20,11 +19,11 @@ static pal_err take_samples(const pal_study_job *job, int load, pal_samples *out
     *out = (pal_samples){job->n_probe, malloc(n * sizeof(double)), malloc(n * sizeof(double))};
     if (!out->x || !out->u) return PAL_ERR_MEMORY;
     for (int i = 0; i < job->n_probe; i++) pal_add3(out->x + 3 * i, job->probe + 3 * i, mesh->surface.origin_m);
-    memcpy(out->u, job->still[load], n * sizeof(double));
+    memcpy(out->u, job->static_u[load], n * sizeof(double));
     return PAL_ERR_OK;
 }
 
-static bool look(void *user, const pal_fit_step *step)
+static bool may_continue(void *user, const pal_fit_step *step)
 {
     (void)step;
     return pal_study_continues(user);
@@ -35,7 +34,7 @@ static pal_err fit(pal_study_job *job, const pal_calibration *calibration, pal_c
 {
     pal_calibration_info info;
     pal_fit_result result;
-    const pal_fit_options options = {.max_evaluation = MAX_EVALUATIONS, .step = look, .user = job};
+    const pal_fit_options options = {.max_evaluation = MAX_EVALUATIONS, .step = may_continue, .user = job};
     pal_calibration_info_of(calibration, &info);
     double *theta = malloc(sizeof *theta * (size_t)info.n_parameter);
     if (!theta) return PAL_ERR_MEMORY;
@@ -59,7 +58,7 @@ pal_err pal_study_fit(pal_study_job *job, pal_configuration *setting, pal_diagno
     pal_err err = PAL_ERR_OK;
     pal_calibrate_default(&options);
     options.voxel.resolution = setting->size;
-    options.without_area = true, options.min_volume_ratio = min_volume_ratio;
+    options.without_area = true, options.min_volume_ratio = PAL_MIN_VOLUME_RATIO;
     int n_fit = job->n_load > 1 ? job->n_load - 1 : 1;
     for (int k = 0; k < n_fit && !err; k++) {
         err = take_samples(job, k, &samples[k]);

@@ -20,24 +20,12 @@ static bool is_problem(const char *word)
     cJSON *root = NULL;
     if (n <= 5 || strcmp(word + n - 5, ".json") != 0 || pal_file_read(word, PAL_JSON_MAX_BYTES, &bytes, &n_byte, NULL))
         return false;
-    const pal_json json = {word, NULL};
+    pal_json json = {.file = word};
     bool found = !pal_json_parse(&json, (const char *)bytes, n_byte, &root) &&
                  cJSON_GetObjectItemCaseSensitive(root, "format") != NULL;
     cJSON_Delete(root);
     free(bytes);
     return found;
-}
-
-static pal_err no_case(const pal_problem *p, const char *id, pal_diagnostic *diag)
-{
-    char list[320] = "";
-    size_t n = 0;
-    for (int k = 0; k < p->n_case + p->n_reference && n < sizeof list; k++)
-        n += (size_t)snprintf(list + n, sizeof list - n, "%s%s", k ? ", " : "",
-                              k < p->n_case ? p->load_case[k].id : p->reference[k - p->n_case].id);
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                              "%s: --case: there is no load case or reference \"%.40s\"; known are %s", p->path, id,
-                              list);
 }
 
 static pal_err open_problem(const pal_study_request *q, pal_study_input *out, const char **samples,
@@ -51,7 +39,7 @@ static pal_err open_problem(const pal_study_request *q, pal_study_input *out, co
     out->load_case = named          ? pal_problem_case_find(p, named->load_case)
                      : q->load_case ? pal_problem_case_find(p, q->load_case)
                                     : &p->load_case[0];
-    if (!out->load_case) return no_case(p, q->load_case, diag);
+    if (!out->load_case) return pal_problem_refuse_case(p, "--case", q->load_case, diag);
     if (named && !*samples) *samples = named->file;
     pal_mesh_file_options file = {.unit_m = p->unit_m, .weld = PAL_MESH_WELD};
     PAL_TRY(pal_mesh_file_read(p->surface, &file, &out->surface, &report, NULL, NULL, diag));
@@ -99,23 +87,6 @@ void pal_study_input_close(pal_study_input *input)
 
 /* ---- identity of the study ---- */
 
-static uint64_t add_numbers(uint64_t sum, const double *value, size_t n)
-{
-    return pal_study_digest(sum, value, n * sizeof *value);
-}
-
-static uint64_t add_load(uint64_t sum, const pal_problem_load *l)
-{
-    const double kind[] = {l->kind, l->region.all, l->has_normal, l->has_traction, l->has_total};
-    sum = add_numbers(sum, kind, sizeof kind / sizeof *kind);
-    if (l->kind == PAL_LOAD_POINT) return add_numbers(add_numbers(sum, l->point_m, 3), l->force_N, 3);
-    if (l->kind == PAL_LOAD_GRAVITY) return add_numbers(sum, l->gravity_m_s2, 3);
-    if (!l->region.all) sum = add_numbers(add_numbers(sum, l->region.low_m, 3), l->region.high_m, 3);
-    if (l->has_normal) sum = add_numbers(sum, l->normal, 3);
-    if (l->has_traction) sum = add_numbers(sum, l->traction_Pa, 3);
-    return l->has_total ? add_numbers(sum, l->total_N, 3) : sum;
-}
-
 void pal_study_loads_read(const char *loads, double *seconds, bool *quick, char load_case[PAL_NAME])
 {
     static const char named[] = "load case ";
@@ -132,15 +103,16 @@ void pal_study_input_describe(const pal_study_input *in, const pal_study_request
 {
     const pal_scene *scene = in->scene;
     /* everything that the reference depends on besides the body itself */
-    uint64_t sum = add_numbers(add_numbers(0, &scene->step_s, 1), scene->up, 3);
+    uint64_t sum = pal_study_digest_numbers(pal_study_digest_numbers(PAL_HASH_START, &scene->step_s, 1), scene->up, 3);
     pal_configuration now;
     pal_configuration_of(scene, in->body, &now);
-    sum = add_numbers(pal_study_digest(sum, now.law, strlen(now.law)), &scene->gravity_m_s2, 1);
+    sum = pal_study_digest_numbers(pal_hash_bytes(sum, now.law, strlen(now.law)), &scene->gravity_m_s2, 1);
     char loads[80] = "three presses and a pull";
     if (in->problem) snprintf(loads, sizeof loads, "load case %s", in->load_case->id);
-    for (int k = 0; in->problem && k < in->load_case->n_load; k++) sum = add_load(sum, &in->load_case->load[k]);
-    if (in->has_samples) sum = add_numbers(sum, in->samples.x, 3 * (size_t)in->samples.n);
-    if (in->has_samples) sum = add_numbers(sum, in->samples.u, 3 * (size_t)in->samples.n);
+    for (int k = 0; in->problem && k < in->load_case->n_load; k++)
+        sum = pal_study_digest_load(sum, &in->load_case->load[k]);
+    if (in->has_samples) sum = pal_study_digest_numbers(sum, in->samples.x, 3 * (size_t)in->samples.n);
+    if (in->has_samples) sum = pal_study_digest_numbers(sum, in->samples.u, 3 * (size_t)in->samples.n);
     snprintf(file->study.name, sizeof file->study.name, "%s", scene->name);
     snprintf(file->body, sizeof file->body, "%s", scene->body[in->body].name);
     file->index = in->body;

@@ -31,7 +31,6 @@ typedef struct pal_study_request {
  * name; errors of the readers. Close with pal_study_input_close, also after an error. */
 pal_err pal_study_input_open(const pal_study_request *request, pal_study_input *out, pal_diagnostic *diag);
 void pal_study_input_close(pal_study_input *input);
-#define PAL_STUDY_SECONDS 0.5 /* default duration of the dynamic run */
 /* Parses the repeatable parts of the loads text of pal_study_input_describe: seconds (0: absent), quick, load case
  * ("": none). */
 void pal_study_loads_read(const char *loads, double *seconds, bool *quick, char load_case[PAL_NAME]);

@@ -5,6 +5,7 @@
 #include "server/base/vec3.h"
 #include "server/solve/load_case.h"
 #include "server/study/study_job.h"
+#include "server/study/tuning.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -12,12 +13,11 @@
 #include <string.h>
 
 enum { SCENE_VOXELS = 16, FINEST_SCENE = 64, COARSE = 10, SOFTER = 3 };
-static const double usual_s = 0.5, hair = 1e-7; /* share of the diagonal by which supports are extended */
 
 static void free_job(pal_study_job *job)
 {
-    for (int k = 0; k < PAL_STUDY_LOADS; k++) free(job->still[k]);
-    free(job->probe), free(job->now), free(job->way), free(job->own);
+    for (int k = 0; k < PAL_STUDY_LOADS; k++) free(job->static_u[k]);
+    free(job->probe), free(job->now), free(job->trajectory), free(job->own_trajectory);
     free(job->scene), free(job->problem);
 }
 
@@ -28,26 +28,27 @@ bool pal_study_continues(const pal_study_job *job)
 
 /* ---- probes ---- */
 
-static pal_err take_room(pal_study_job *job, int n_probe)
+static pal_err allocate(pal_study_job *job, int n_probe)
 {
     size_t n = 3 * sizeof(double) * (size_t)n_probe;
     job->n_probe = n_probe;
     job->probe = malloc(n), job->now = malloc(n);
     bool made = job->probe && job->now;
     for (int k = 0; k < PAL_STUDY_LOADS; k++) {
-        job->still[k] = calloc(1, n);
-        made = made && job->still[k];
+        job->static_u[k] = calloc(1, n);
+        made = made && job->static_u[k];
     }
-    job->seconds = job->options->seconds > 0 ? job->options->seconds : usual_s;
+    job->seconds = job->options->seconds > 0 ? job->options->seconds : PAL_STUDY_SECONDS;
     job->n_trajectory = (int)fmax(1, floor(job->seconds / PAL_STUDY_FRAME_S + 1e-9));
-    job->way = calloc((size_t)job->n_trajectory, sizeof *job->way),
-    job->own = calloc((size_t)job->n_trajectory, sizeof *job->own);
-    return made && job->way && job->own ? PAL_ERR_OK
-                                        : pal_diagnostic_set(job->diag, PAL_ERR_MEMORY, "no memory for a study");
+    job->trajectory = calloc((size_t)job->n_trajectory, sizeof *job->trajectory),
+    job->own_trajectory = calloc((size_t)job->n_trajectory, sizeof *job->own_trajectory);
+    return made && job->trajectory && job->own_trajectory
+               ? PAL_ERR_OK
+               : pal_diagnostic_set(job->diag, PAL_ERR_MEMORY, "no memory for a study");
 }
 
 /* evenly picked vertices of the displayed surface, or the points of the samples */
-static pal_err take_probes(pal_study_job *job)
+static pal_err choose_probes(pal_study_job *job)
 {
     const pal_samples *samples = job->options->samples;
     pal_study_world w;
@@ -59,7 +60,7 @@ static pal_err take_probes(pal_study_job *job)
     double low[3], high[3];
     pal_surface_box(surface, low, high);
     job->out->length_scale_m = pal_dist3(low, high);
-    pal_err err = take_room(job, max);
+    pal_err err = allocate(job, max);
     for (int i = 0; i < max && !err; i++) {
         if (samples)
             pal_sub3(job->probe + 3 * i, samples->x + 3 * i, surface->origin_m);
@@ -154,7 +155,7 @@ static pal_err study(pal_study_job *job)
     if (!err && n == 0)
         err = pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "no method of those asked for fits the body");
     if (whole) transfer_results(job->out, before);
-    if (!err && !whole) err = take_probes(job);
+    if (!err && !whole) err = choose_probes(job);
     if (!err && !whole) err = job->n_load == 0 ? press(job) : pal_study_reference(job);
     if (!err) err = sweep(job, entry, n);
     if (!err && !whole) err = pal_study_time_repeat(job);
@@ -265,9 +266,9 @@ static pal_err problem_voxels(const pal_problem *p, const pal_surface *surface, 
     return err;
 }
 
-static pal_err dress(const pal_problem *p, const pal_surface *surface, pal_configured_scene *set, pal_diagnostic *diag)
+static pal_err fill_scene(const pal_problem *p, const pal_surface *surface, pal_configured_scene *set,
+                          pal_diagnostic *diag)
 {
-    static const char *const effects[] = {"tool_push", "tool_grasp", "finite_guard"};
     pal_scene *scene = &set->scene;
     double low[3], high[3];
     pal_surface_box(surface, low, high);
@@ -279,16 +280,12 @@ static pal_err dress(const pal_problem *p, const pal_surface *surface, pal_confi
     if (p->name[0]) snprintf(scene->title, sizeof scene->title, "%s", p->name);
     pal_entry_init(&body->model, "bodies[0].model", "fem");
     pal_entry_init(&body->solver, "bodies[0].solver", "implicit_euler");
-    body->n_effect = 3;
-    for (int k = 0; k < 3; k++) {
-        char path[PAL_ENTRY_TEXT];
-        snprintf(path, sizeof path, "bodies[0].effects[%d]", k);
-        pal_entry_init(&body->effect[k], path, effects[k]);
-    }
+    /* the default effects without gravity */
+    memmove(body->effect, body->effect + 1, (size_t)--body->n_effect * sizeof *body->effect);
     PAL_TRY(set_materials(p, surface->origin_m, body, diag));
     body->n_support = p->n_support;
     PAL_TRY(pal_case_supports(p, &set->mesh.tets, body->support, diag));
-    double slack = hair * pal_dist3(low, high);
+    double slack = PAL_SUPPORT_MARGIN * pal_dist3(low, high);
     for (int k = 0; k < p->n_support; k++)
         for (int c = 0; c < 3; c++) {
             body->support[k].low_m[c] = p->support[k].region.low_m[c] - surface->origin_m[c] - slack;
@@ -312,7 +309,7 @@ pal_err pal_study_problem_scene(const pal_problem *problem, const pal_surface *s
     pal_configured_scene *set = calloc(1, sizeof *set);
     if (!set) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a scene");
     pal_err err = problem_voxels(problem, surface, &set->mesh, diag);
-    if (!err) err = dress(problem, surface, set, diag);
+    if (!err) err = fill_scene(problem, surface, set, diag);
     if (err)
         pal_configured_scene_free(set);
     else

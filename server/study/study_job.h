@@ -45,21 +45,19 @@ typedef struct pal_study_job {
     pal_study *out;
     pal_diagnostic *diag;
     int n_probe;
-    double *probe;                  /* body frame, m [n_probe][3]                       */
-    double *still[PAL_STUDY_LOADS]; /* static displacement of the reference [n_probe][3] */
-    double *now;                    /* scratch [n_probe][3] */
-    int tip;                        /* the probe that the first load moves most */
+    double *probe;                     /* body frame, m [n_probe][3]                       */
+    double *static_u[PAL_STUDY_LOADS]; /* static displacement of the reference [n_probe][3] */
+    double *now;                       /* scratch [n_probe][3] */
+    int tip;                           /* the probe that the first load moves most */
     int n_trajectory;
-    double (*way)[3]; /* displacement of the tip, every PAL_STUDY_FRAME_S [n_trajectory] */
-    double (*own)[3]; /* scratch [n_trajectory] */
+    double (*trajectory)[3];     /* displacement of the tip, every PAL_STUDY_FRAME_S [n_trajectory] */
+    double (*own_trajectory)[3]; /* scratch [n_trajectory] */
     double seconds;
     pal_study_rest rest;
     int reference, n_reference; /* its size, its nodes */
     double box_m[3];            /* side lengths if the body fills its box; else 0 */
     double slender;             /* factor on sizes, relative to a compact body */
 } pal_study_job;
-
-#define PAL_STUDY_FRAME_S (1.0 / 60)
 
 static inline bool pal_study_is(const char *a, const char *b)
 {
@@ -74,11 +72,9 @@ int pal_study_list(const pal_study_job *job, pal_study_entry out[PAL_STUDY_POINT
  * elements. */
 int pal_study_fit_size(const pal_study_job *job, double wanted);
 int pal_study_size(const pal_study_job *job, int compact);
-/* Lists the sizes of the sweep, ascending; returns the count. */
-int pal_study_sizes(const pal_study_job *job, int out[16]);
 
-/* study_world.c. still: for statics, without tools, safeguards and damping. Frees on error. */
-pal_err pal_study_open(const pal_study_job *job, const pal_configuration *setting, bool still, pal_study_world *out,
+/* study_world.c. statics: for statics, without tools, safeguards and damping. Frees on error. */
+pal_err pal_study_open(const pal_study_job *job, const pal_configuration *setting, bool statics, pal_study_world *out,
                        pal_diagnostic *diag);
 void pal_study_close(pal_study_world *world);
 /* Nodal forces of a load [n_node][3] on the body of `world`. */
@@ -94,11 +90,9 @@ pal_err pal_study_displacement(const pal_study_world *world, const double *x, in
 pal_err pal_study_static(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load, double *u,
                          int *n_node, pal_diagnostic *diag);
 
-/* study_cache.c: the same, and the trajectory of the tip, for the reference; taken from the cache if present. */
+/* study_reference.c: the same for the reference, from the cache if present. */
 pal_err pal_study_cached_static(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load,
                                 double *u, int *n_node, pal_diagnostic *diag);
-pal_err pal_study_cached_trajectory(pal_study_job *job, const pal_configuration *setting, double (*way)[3],
-                                    pal_diagnostic *diag);
 
 /* study_loads.c: three presses and a pull, for a scene without load cases */
 pal_err pal_study_presses(pal_study_job *job);
@@ -118,7 +112,7 @@ pal_err pal_study_reference(pal_study_job *job);
 /* study_run.c: measures one point, whose configuration and errors are set. Only STATE is an error. */
 pal_err pal_study_measure(pal_study_job *job, const pal_study_entry *entry, pal_study_point *out);
 /* Trajectory of the tip under the first load, every PAL_STUDY_FRAME_S. ms [max] receives step times unless NULL. */
-pal_err pal_study_trajectory(pal_study_job *job, const pal_configuration *setting, double (*way)[3], double *ms,
+pal_err pal_study_trajectory(pal_study_job *job, const pal_configuration *setting, double (*trajectory)[3], double *ms,
                              int max, int *n_ms, pal_study_point *facts, pal_diagnostic *diag);
 
 /* study_run.c: times every configuration again later and keeps the smallest median, because the load of the machine
@@ -131,4 +125,9 @@ pal_err pal_study_check_robustness(pal_study_job *job);
 
 /* study_pick.c: predicts every point from the others */
 void pal_study_predict(pal_study *study);
+/* Solves (F'F + hold) w = F'y by elimination. A [n][n + 1]: F'F beside F'y, is destroyed. The first unknown, a
+ * constant term, is not regularised. */
+void pal_study_ridge(double *A, int n, double hold, double *w);
+/* Number of parameters, other than model and size, in which two configurations differ. */
+int pal_study_differences(const pal_configuration *a, const pal_configuration *b);
 #endif

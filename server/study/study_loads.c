@@ -1,26 +1,17 @@
 /* Presses and a pull for a scene without load cases: their positions and strengths. */
 #include "server/base/vec3.h"
 #include "server/study/study_job.h"
+#include "server/study/tuning.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 enum { PRESSES = 3, PULL = PRESSES, COARSE = 10, ROUNDS = 4 };
-/* of the reference's size, at least COARSE: a thin tip is too stiff in fewer voxels */
-static const double coarse_share = 0.6;
-/* shares of the body's diagonal: half the side of a loaded area, depth of a press, first trial displacement */
-static const double patch_share = 0.1, press_share = 0.02, first_share = 1e-3;
-/* The same for the pull: half width of a grasp; largest displacement by the linear estimate, half of it for an
- * adaptive surface, which folds; sideways component; default force cap. */
-static const double grasp_share = 0.06, pull_share = 0.1, wall_share = 0.05, aslant = 0.7, usual_cap_N = 15;
-/* accepted factor between the reference's displacement and the wanted one */
-static const double wide_of = 1.5;
 
 static double pull_of(const pal_study_job *job)
 {
-    return job->adaptive ? wall_share : pull_share;
+    return job->adaptive ? PAL_WALL_DEPTH : PAL_PULL_DEPTH;
 }
 
 static double diagonal(const pal_surface *s, double low[3])
@@ -31,7 +22,7 @@ static double diagonal(const pal_surface *s, double low[3])
 }
 
 /* probes farthest from the supports and from each other */
-static pal_err choose_places(const pal_study_job *job, const pal_study_world *w, int out[PRESSES])
+static pal_err choose_press_points(const pal_study_job *job, const pal_study_world *w, int out[PRESSES])
 {
     double *far = malloc(sizeof *far * (size_t)job->n_probe);
     if (!far) return PAL_ERR_MEMORY;
@@ -57,14 +48,12 @@ static void inward(const pal_surface *s, const double at[3], double half, double
     double sum[3] = {0, 0, 0};
     for (int t = 0; t < s->n_tri; t++) {
         const double *x[3];
-        double e[2][3], n[3];
+        double n[3];
         bool near = false;
         for (int c = 0; c < 3; c++) x[c] = s->x + 3 * (size_t)s->tri[3 * t + c];
         for (int c = 0; c < 3; c++) near = near || pal_dist3(x[c], at) < half;
         if (!near) continue;
-        pal_sub3(e[0], x[1], x[0]);
-        pal_sub3(e[1], x[2], x[0]);
-        pal_cross3(n, e[0], e[1]);
+        pal_normal3(n, x[0], x[1], x[2]);
         pal_add3(sum, sum, n);
     }
     double size = pal_norm3(sum);
@@ -80,7 +69,7 @@ static void turn_to_pull(double n[3])
     if (fabs(n[2]) < fabs(n[min])) min = 2;
     axis[min] = 1;
     pal_cross3(side, n, axis);
-    pal_scale3(side, aslant / fmax(pal_norm3(side), 1e-30), side);
+    pal_scale3(side, PAL_PULL_ASLANT / fmax(pal_norm3(side), 1e-30), side);
     for (int c = 0; c < 3; c++) n[c] = side[c] - n[c];
     pal_scale3(n, 1 / pal_norm3(n), n);
 }
@@ -113,7 +102,7 @@ static void place_load(pal_study_job *job, int index, const pal_surface *s, cons
 
 static pal_configuration coarse(const pal_study_job *job)
 {
-    int size = (int)(coarse_share * job->reference);
+    int size = (int)(PAL_COARSE_SIZE * job->reference);
     pal_configuration s = {.size = job->adaptive ? 1 : size > COARSE ? size : COARSE, .step_s = PAL_STUDY_FRAME_S};
     snprintf(s.model, PAL_NAME, "%s", job->adaptive ? "adaptive_springs" : "fem");
     snprintf(s.law, PAL_NAME, "%s", job->adaptive ? "" : "linear");
@@ -126,22 +115,21 @@ static pal_err scale_load(pal_study_job *job, int index, double length_scale_m)
 {
     pal_configuration s = coarse(job);
     double *total = job->problem->load_case[index].load[0].total_N;
-    const double share[2] = {job->adaptive ? first_share : press_share, press_share};
+    const double share[2] = {job->adaptive ? PAL_TRIAL_DEPTH : PAL_PRESS_DEPTH, PAL_PRESS_DEPTH};
     /* a linear body needs one solve; the guess follows from the stiffness */
-    double guess = job->scene->body[0].material.young_Pa * first_share * length_scale_m * length_scale_m *
+    double guess = job->scene->body[0].material.young_Pa * PAL_TRIAL_DEPTH * length_scale_m * length_scale_m *
                    (job->adaptive ? 1e-3 : 1);
     pal_scale3(total, guess, total);
     for (int round = 0; round < (job->adaptive ? 2 : 1); round++) {
         int n_node;
         PAL_TRY(pal_study_cached_static(job, &s, job->load[index], job->now, &n_node, job->diag));
-        double moved = 0;
-        for (int i = 0; i < job->n_probe; i++) moved = fmax(moved, pal_norm3(job->now + 3 * i));
+        double moved = pal_max_norm3(job->now, job->n_probe);
         if (!(moved > 0) || !isfinite(moved))
             return pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "%s of %g N moves nothing", job->load[index]->id,
                                       pal_norm3(total));
         double wanted = share[round] * length_scale_m / moved, size_N = pal_norm3(total);
         /* limited by the tool's force cap and by the deformation that the body can bear */
-        double cap_N = job->scene->n_tool > 0 ? job->scene->tool[0].force_cap_N : usual_cap_N;
+        double cap_N = job->scene->n_tool > 0 ? job->scene->tool[0].force_cap_N : PAL_PULL_N;
         if (index == PULL) wanted = fmin(cap_N / size_N, pull_of(job) * length_scale_m / moved);
         pal_scale3(total, wanted, total);
     }
@@ -151,14 +139,14 @@ static pal_err scale_load(pal_study_job *job, int index, double length_scale_m)
 bool pal_study_press_adjust(pal_study_job *job, int index, pal_err err)
 {
     if (index >= job->n_press || job->round[index] >= ROUNDS) return false;
-    double *total = job->problem->load_case[index].load[0].total_N, moved = 0, times = 1;
+    double *total = job->problem->load_case[index].load[0].total_N, times = 1;
+    double moved = err ? 0 : pal_max_norm3(job->static_u[index], job->n_probe);
     bool none = err == PAL_ERR_NUMERIC || err == PAL_ERR_FROZEN;
-    for (int i = 0; i < job->n_probe && !err; i++) moved = fmax(moved, pal_norm3(job->still[index] + 3 * i));
     if (none) times = 0.5;
-    if (!err && moved > 0) times = press_share * job->out->length_scale_m / moved;
+    if (!err && moved > 0) times = PAL_PRESS_DEPTH * job->out->length_scale_m / moved;
     if (!err && index == PULL)
-        times = moved > 0 ? fmin(wide_of * pull_of(job) * job->out->length_scale_m / moved, 1) : 1;
-    if (!none && times <= wide_of && times >= (index == PULL ? 1 : 1 / wide_of)) return false;
+        times = moved > 0 ? fmin(PAL_PRESS_RANGE * pull_of(job) * job->out->length_scale_m / moved, 1) : 1;
+    if (!none && times <= PAL_PRESS_RANGE && times >= (index == PULL ? 1 : 1 / PAL_PRESS_RANGE)) return false;
     job->round[index]++;
     pal_scale3(total, times, total);
     return true;
@@ -168,7 +156,7 @@ pal_err pal_study_presses(pal_study_job *job)
 {
     pal_study_world w;
     pal_configuration s = coarse(job);
-    int place[PRESSES], n_fixed = 0;
+    int probe[PRESSES], n_fixed = 0;
     double low[3];
     PAL_TRY(pal_study_open(job, &s, true, &w, job->diag));
     for (int i = 0; i < w.body->n_dof; i++) n_fixed += w.body->support[i] != 0;
@@ -176,13 +164,13 @@ pal_err pal_study_presses(pal_study_job *job)
     if (n_fixed == 0 && !job->adaptive)
         err = pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "body \"%s\": nothing holds it, so a press has no rest",
                                  job->scene->body[0].name);
-    if (!err) err = choose_places(job, &w, place);
+    if (!err) err = choose_press_points(job, &w, probe);
     const pal_surface *surface = &w.set->scene.body[0].mesh->surface;
     double length_scale_m = diagonal(surface, low);
     for (int k = 0; k < PRESSES && !err; k++)
-        place_load(job, k, surface, job->probe + 3 * place[k], patch_share * length_scale_m);
-    /* where it moves most: at the place farthest from the supports */
-    if (!err) place_load(job, PULL, surface, job->probe + 3 * place[0], grasp_share * length_scale_m);
+        place_load(job, k, surface, job->probe + 3 * probe[k], PAL_PRESS_HALF * length_scale_m);
+    /* where it moves most: at the probe farthest from the supports */
+    if (!err) place_load(job, PULL, surface, job->probe + 3 * probe[0], PAL_GRASP_HALF * length_scale_m);
     pal_study_close(&w);
     job->n_load = job->n_press = job->problem->n_case = PULL + 1;
     for (int k = 0; k <= PULL && !err; k++) err = scale_load(job, k, length_scale_m);

@@ -5,12 +5,14 @@
 #include "server/mesh/files/file_bytes.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { METHODS = 12, FRONT_LABELS = 40, TIP = 2 * PAL_CONFIGURATION_TEXT };
 
-const char *pal_study_method(const pal_configuration *setting, char out[PAL_CONFIGURATION_TEXT])
+/* "fem hex8_bbar", "tet_springs calibrated": the methods with separate markers */
+static const char *method_of(const pal_configuration *setting, char out[PAL_CONFIGURATION_TEXT])
 {
     bool calibrated = setting->k_distance_J > 0;
     snprintf(out, PAL_CONFIGURATION_TEXT, "%s%s%s%s", setting->model, setting->element[0] ? " " : "", setting->element,
@@ -18,19 +20,14 @@ const char *pal_study_method(const pal_configuration *setting, char out[PAL_CONF
     return out;
 }
 
-static bool is_measured(const pal_study_point *p)
-{
-    return !p->err && isfinite(p->measured.ms) && isfinite(p->measured.error_m);
-}
-
 static double step_of(const pal_study *study, const pal_study_point *p)
 {
     return p->measured.setting.step_s > 0 ? p->measured.setting.step_s : study->step_s;
 }
 
-bool pal_study_is_live(const pal_study *study, const pal_study_point *p)
+static bool is_live(const pal_study *study, const pal_study_point *p)
 {
-    return is_measured(p) && 1e-3 * p->measured.ms <= study->step_s;
+    return pal_study_measured(p) && 1e-3 * p->measured.ms <= study->step_s;
 }
 
 /* as the command writes its loads (study_input.c) */
@@ -41,22 +38,63 @@ static bool is_quick(const pal_study_file *file)
 
 /* ---- table ---- */
 
-/* a cell of the table; "-" for an unknown number */
-static void print_cell(FILE *to, int width, const char *format, double value)
+typedef enum column_kind { NUMBER, COUNT, LIVE } column_kind;
+/* a column of figures; printed: heading and width on the terminal, 0: on the page only */
+typedef struct column {
+    const char *name, *printed;
+    int width;
+    column_kind kind;
+    size_t at;
+    double scale;
+    bool of_max; /* per cent of the largest displacement */
+    const char *format;
+} column;
+#define AT(member) offsetof(pal_study_point, member)
+static const column columns[] = {
+    {"ms", "ms", 8, NUMBER, AT(measured.ms), 1, false, "%.3f"},
+    {"ms p95", "p95", 8, NUMBER, AT(ms_p95), 1, false, "%.3f"},
+    {"live", "live", 5, LIVE, 0, 1, false, ""},
+    {"error mm", "", 0, NUMBER, AT(measured.error_m), 1e3, false, "%.4f"},
+    {"rest RMS mm", "rest RMS", 9, NUMBER, AT(static_rms_m), 1e3, false, "%.4f"},
+    {"rest mm", "max mm", 9, NUMBER, AT(static_max_m), 1e3, false, "%.4f"},
+    {"rest RMS %", "RMS %", 7, NUMBER, AT(static_rms_m), 1e2, true, "%.2f"},
+    {"rest %", "max %", 7, NUMBER, AT(static_max_m), 1e2, true, "%.2f"},
+    {"path RMS mm", "", 0, NUMBER, AT(trajectory_rms_m), 1e3, false, "%.4f"},
+    {"path mm", "path mm", 9, NUMBER, AT(trajectory_max_m), 1e3, false, "%.4f"},
+    {"nodes", "nodes", 8, COUNT, AT(n_node), 1, false, "%.0f"},
+    {"sub-steps", "steps", 6, COUNT, AT(n_substep), 1, false, "%.0f"},
+    {"made in s", "", 0, NUMBER, AT(prepare_s), 1, false, "%.2f"},
+    {"predicted ms", "", 0, NUMBER, AT(predicted_ms), 1, false, "%.3f"},
+    {"predicted mm", "", 0, NUMBER, AT(predicted_m), 1e3, false, "%.4f"},
+};
+enum { N_COLUMN = sizeof columns / sizeof *columns };
+
+/* text of a cell; an unknown number becomes `unknown` */
+static const char *cell_text(const pal_study *s, const pal_study_point *p, const column *c, const char *unknown,
+                             char out[32])
 {
-    char text[32] = "-";
-    if (isfinite(value)) snprintf(text, sizeof text, format, value);
-    fprintf(to, " %*s", width, text);
+    const void *at = (const char *)p + c->at;
+    if (c->kind == LIVE) return !pal_study_measured(p) ? "" : is_live(s, p) ? "yes" : "no";
+    double value = c->scale * (c->kind == COUNT ? *(const int *)at : *(const double *)at);
+    if (c->of_max) value /= s->max_m;
+    if (!isfinite(value)) return unknown;
+    snprintf(out, 32, c->format, value);
+    return out;
+}
+
+static const char *reason_of(const pal_study_point *p)
+{
+    return p->reason[0] ? p->reason : pal_err_text(p->err);
 }
 
 void pal_study_print(const pal_study_file *file, FILE *to)
 {
     const pal_study *s = &file->study;
-    int order[PAL_STUDY_POINTS], n_bad = 0;
-    char text[PAL_CONFIGURATION_TEXT];
+    int order[PAL_STUDY_POINTS];
+    char text[PAL_CONFIGURATION_TEXT], cell[32];
     fprintf(to, "%s: %s on %s\n", s->name, file->loads, s->machine);
-    fprintf(to, "against %s, itself within %.3g mm; the most that moves %.4g mm\n", s->reference, 1e3 * s->reference_m,
-            1e3 * s->max_m);
+    fprintf(to, "against %s, itself within %.3g mm; the largest displacement %.4g mm\n", s->reference,
+            1e3 * s->reference_m, 1e3 * s->max_m);
     if (!pal_study_trusted(s))
         fprintf(to,
                 "So much that no setting is named: hold more of the body (palpate prepare --hold 20, with --up as "
@@ -66,38 +104,30 @@ void pal_study_print(const pal_study_file *file, FILE *to)
         fprintf(to,
                 "Quick: a coarse reference, so errors below that are of chance, and few settings; for figures to be "
                 "used run it without --quick.\n");
-    fprintf(to, "%1s %3s %8s %8s %5s %9s %9s %7s %7s %9s %8s %6s  %s\n", "", "row", "ms", "p95", "live", "rest RMS",
-            "most mm", "RMS %", "most %", "way mm", "nodes", "steps", "setting");
+    fprintf(to, "%1s %3s", "", "row");
+    for (int c = 0; c < N_COLUMN; c++)
+        if (columns[c].width > 0) fprintf(to, " %*s", columns[c].width, columns[c].printed);
+    fprintf(to, "  setting\n");
     pal_study_order(s, order);
     for (int k = 0; k < s->n_point; k++) {
         const pal_study_point *p = &s->point[order[k]];
-        if (!is_measured(p)) {
-            n_bad++;
-            continue;
-        }
+        if (!pal_study_measured(p)) continue;
         fprintf(to, "%1s %3d", p->measured.front ? "*" : "", k + 1);
-        print_cell(to, 8, "%.3f", p->measured.ms);
-        print_cell(to, 8, "%.3f", p->ms_p95);
-        fprintf(to, " %5s", pal_study_is_live(s, p) ? "yes" : "no");
-        print_cell(to, 9, "%.4f", 1e3 * p->static_rms_m);
-        print_cell(to, 9, "%.4f", 1e3 * p->static_max_m);
-        print_cell(to, 7, "%.2f", 1e2 * p->static_rms_m / s->max_m);
-        print_cell(to, 7, "%.2f", 1e2 * p->static_max_m / s->max_m);
-        print_cell(to, 9, "%.4f", 1e3 * p->trajectory_max_m);
-        fprintf(to, " %8d %6d  %s%s%s\n", p->n_node, p->n_substep, pal_configuration_text(&p->measured.setting, text),
-                p->reason[0] ? "; " : "", p->reason);
+        for (int c = 0; c < N_COLUMN; c++)
+            if (columns[c].width > 0) fprintf(to, " %*s", columns[c].width, cell_text(s, p, &columns[c], "-", cell));
+        fprintf(to, "  %s%s%s\n", pal_configuration_text(&p->measured.setting, text), p->reason[0] ? "; " : "",
+                p->reason);
     }
     fprintf(to,
             "* the front: nothing else is both cheaper and nearer; an error below the reference's own counts as that. "
-            "ms: for %.3g ms of the body's time, with shorter "
-            "steps so "
-            "many of them.\nLive: no more than that. Steps: sub-steps of one.\n",
+            "ms: for %.3g ms of the body's time, with shorter steps so many of them.\n"
+            "Live: no more than that. Steps: sub-steps of one.\n",
             1e3 * s->step_s);
-    for (int k = 0; k < s->n_point && n_bad > 0; k++) {
+    for (int k = 0; k < s->n_point; k++) {
         const pal_study_point *p = &s->point[order[k]];
-        if (!is_measured(p))
+        if (!pal_study_measured(p))
             fprintf(to, "not measured: %d, %s: %s\n", k + 1, pal_configuration_text(&p->measured.setting, text),
-                    p->reason[0] ? p->reason : pal_err_text(p->err));
+                    reason_of(p));
     }
 }
 
@@ -159,7 +189,7 @@ static void add_point(series *s, const pal_study *study, const pal_study_point *
     char name[PAL_CONFIGURATION_TEXT];
     int k = 0;
     bool apart = p->reason[0] != 0;
-    pal_study_method(&p->measured.setting, name);
+    method_of(&p->measured.setting, name);
     while (k < s->n_method && (strcmp(s->name[k], name) != 0 || s->apart[k] != apart)) k++;
     if (k == s->n_method) {
         if (s->n_method == METHODS) return;
@@ -181,7 +211,7 @@ static void add_point(series *s, const pal_study *study, const pal_study_point *
     s->n_label++;
 }
 
-pal_err pal_study_draw(const pal_study_file *file, char **svg, size_t *n_byte, pal_diagnostic *diag)
+static pal_err draw(const pal_study_file *file, char **svg, size_t *n_byte, pal_diagnostic *diag)
 {
     const pal_study *study = &file->study;
     int order[PAL_STUDY_POINTS];
@@ -190,7 +220,7 @@ pal_err pal_study_draw(const pal_study_file *file, char **svg, size_t *n_byte, p
     pal_study_order(study, order);
     s->usual = usual_tolerance(study);
     for (int k = 0; k < study->n_point; k++)
-        if (is_measured(&study->point[order[k]])) add_point(s, study, &study->point[order[k]]);
+        if (pal_study_measured(&study->point[order[k]])) add_point(s, study, &study->point[order[k]]);
     snprintf(s->title, sizeof s->title, "%s: what accuracy costs", study->name);
     snprintf(s->live, sizeof s->live, "real time, %.3g ms", 1e3 * study->step_s);
     snprintf(s->x_label, sizeof s->x_label, "milliseconds of computing for %.3g ms of the body's time, median",
@@ -233,17 +263,7 @@ pal_err pal_study_draw(const pal_study_file *file, char **svg, size_t *n_byte, p
 
 static void put_text(FILE *to, const char *text)
 {
-    for (; *text; text++)
-        if (*text == '<')
-            fputs("&lt;", to);
-        else if (*text == '>')
-            fputs("&gt;", to);
-        else if (*text == '&')
-            fputs("&amp;", to);
-        else if (*text == '"')
-            fputs("&quot;", to);
-        else
-            fputc(*text, to);
+    pal_svg_escape(to, text, strlen(text));
 }
 
 static void put_fact(FILE *to, const char *name, const char *text)
@@ -251,13 +271,6 @@ static void put_fact(FILE *to, const char *name, const char *text)
     fprintf(to, "<dt>%s</dt><dd>", name);
     put_text(to, text);
     fputs("</dd>\n", to);
-}
-
-static void put_number(FILE *to, const char *form, double value)
-{
-    fputs("<td class=\"n\">", to);
-    if (isfinite(value)) fprintf(to, form, value);
-    fputs("</td>", to);
 }
 
 /* End of a word of a command, which may be quoted; returns the start of the next word. */
@@ -299,9 +312,8 @@ static void put_order(FILE *to, const pal_study_file *file, int row)
 
 static void put_row(FILE *to, const pal_study_file *file, const pal_study_point *p, int row)
 {
-    const pal_study *s = &file->study;
-    char text[PAL_CONFIGURATION_TEXT];
-    bool measured = is_measured(p);
+    char text[PAL_CONFIGURATION_TEXT], cell[32];
+    bool measured = pal_study_measured(p);
     fprintf(to, "<tr%s><td>%s</td><td class=\"n\">",
             p->measured.front ? " class=\"front\""
             : measured        ? ""
@@ -312,23 +324,11 @@ static void put_row(FILE *to, const pal_study_file *file, const pal_study_point 
     if (p->measured.front) put_order(to, file, row);
     if (!measured || p->reason[0]) {
         fputs("<br>", to);
-        put_text(to, p->reason[0] ? p->reason : pal_err_text(p->err));
+        put_text(to, reason_of(p));
     }
     fputs("</td>", to);
-    put_number(to, "%.3f", p->measured.ms);
-    put_number(to, "%.3f", p->ms_p95);
-    fprintf(to, "<td>%s</td>", !measured ? "" : pal_study_is_live(s, p) ? "yes" : "no");
-    put_number(to, "%.4f", 1e3 * p->measured.error_m);
-    put_number(to, "%.4f", 1e3 * p->static_rms_m);
-    put_number(to, "%.4f", 1e3 * p->static_max_m);
-    put_number(to, "%.2f", 1e2 * p->static_rms_m / s->max_m);
-    put_number(to, "%.2f", 1e2 * p->static_max_m / s->max_m);
-    put_number(to, "%.4f", 1e3 * p->trajectory_rms_m);
-    put_number(to, "%.4f", 1e3 * p->trajectory_max_m);
-    fprintf(to, "<td class=\"n\">%d</td><td class=\"n\">%d</td>", p->n_node, p->n_substep);
-    put_number(to, "%.2f", p->prepare_s);
-    put_number(to, "%.3f", p->predicted_ms);
-    put_number(to, "%.4f", 1e3 * p->predicted_m);
+    for (int c = 0; c < N_COLUMN; c++)
+        fprintf(to, "<td class=\"n\">%s</td>", cell_text(&file->study, p, &columns[c], "", cell));
     fputs("</tr>\n", to);
 }
 
@@ -366,10 +366,6 @@ static const char sorting[] =
 
 static void put_page(FILE *to, const pal_study_file *file, const char *svg)
 {
-    static const char *const column[] = {"",          "row",          "setting",     "ms",      "ms p95",
-                                         "live",      "error mm",     "rest RMS mm", "rest mm", "rest RMS %",
-                                         "rest %",    "way RMS mm",   "way mm",      "nodes",   "sub-steps",
-                                         "made in s", "predicted ms", "predicted mm"};
     const pal_study *s = &file->study;
     char text[200];
     int order[PAL_STUDY_POINTS];
@@ -380,28 +376,29 @@ static void put_page(FILE *to, const pal_study_file *file, const char *svg)
     fputs(": what accuracy costs</h1>\n<dl>\n", to);
     put_fact(to, "machine", s->machine);
     put_fact(to, "reference", s->reference);
-    snprintf(text, sizeof text, "%.3g mm; the most that moves %.4g mm, the body %.4g mm across", 1e3 * s->reference_m,
-             1e3 * s->max_m, 1e3 * s->length_scale_m);
+    snprintf(text, sizeof text, "%.3g mm; the largest displacement %.4g mm, the body %.4g mm across",
+             1e3 * s->reference_m, 1e3 * s->max_m, 1e3 * s->length_scale_m);
     put_fact(to, "its own error", text);
     if (is_quick(file)) put_fact(to, "quick", "a coarse reference: errors below its own are of chance");
     put_fact(to, "loads", file->loads);
-    snprintf(text, sizeof text, "%d of %d%s", s->n_point, file->n_finest, file->whole ? "" : ", broken off");
+    snprintf(text, sizeof text, "%d of %d%s", s->n_point, file->n_total, file->whole ? "" : ", broken off");
     put_fact(to, "settings", text);
     put_fact(to, "made by", file->command);
     fputs("</dl>\n", to);
     fputs(svg ? "<div class=\"wide\">" : "", to);
     fputs(svg ? svg : "<p>Nothing was measured, so there is nothing to draw.</p>\n", to);
     if (svg) fputs("</div>\n", to);
-    fprintf(to,
-            "<p>&#9733; the front: nothing else is both cheaper and nearer. ms: for %.3g ms of the body's time, with "
-            "shorter steps so many of them; live: no more than that. Error: the largest distance from the reference, "
-            "at rest or on the way. Point at a mark for its setting. A row's button copies the command that writes its "
-            "scene; under one of the front it stands as well.</p>\n",
-            1e3 * s->step_s);
+    fprintf(
+        to,
+        "<p>&#9733; the front: nothing else is both cheaper and nearer. ms: for %.3g ms of the body's time, with "
+        "shorter steps so many of them; live: no more than that. Error: the largest distance from the reference, "
+        "at rest or along the path. Point at a mark for its setting. A row's button copies the command that writes its "
+        "scene; under one of the front it is shown as well.</p>\n",
+        1e3 * s->step_s);
     fputs("<p id=\"copied\" data-study=\"", to);
     put_study(to, file);
-    fputs("\"></p>\n<div class=\"wide\"><table><thead><tr>", to);
-    for (size_t k = 0; k < sizeof column / sizeof *column; k++) fprintf(to, "<th>%s</th>", column[k]);
+    fputs("\"></p>\n<div class=\"wide\"><table><thead><tr><th></th><th>row</th><th>setting</th>", to);
+    for (int c = 0; c < N_COLUMN; c++) fprintf(to, "<th>%s</th>", columns[c].name);
     fputs("</tr></thead><tbody>\n", to);
     pal_study_order(s, order);
     for (int k = 0; k < s->n_point; k++) put_row(to, file, &s->point[order[k]], k + 1);
@@ -410,33 +407,22 @@ static void put_page(FILE *to, const pal_study_file *file, const char *svg)
     fputs("</body></html>\n", to);
 }
 
-static pal_err write_page(const pal_study_file *file, const char *svg, const char *path, pal_diagnostic *diag)
-{
-    char *bytes = NULL;
-    size_t n_byte = 0;
-    FILE *to = open_memstream(&bytes, &n_byte);
-    if (!to) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for a page", path);
-    put_page(to, file, svg);
-    bool whole = !ferror(to);
-    whole = fclose(to) == 0 && whole;
-    pal_err err = whole ? pal_file_write(path, bytes, n_byte, diag)
-                        : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for a page", path);
-    free(bytes);
-    return err;
-}
-
 pal_err pal_study_publish(const pal_study_file *file, const char *stem, pal_diagnostic *diag)
 {
     char path[PAL_STUDY_PATH + 8], *svg = NULL;
     size_t n_byte = 0;
     snprintf(path, sizeof path, "%s.csv", stem);
     PAL_TRY(pal_study_file_csv(file, path, diag));
-    pal_err err = pal_study_draw(file, &svg, &n_byte, diag);
+    pal_err err = draw(file, &svg, &n_byte, diag);
     if (err && err != PAL_ERR_REFUSED) return err;
     snprintf(path, sizeof path, "%s.svg", stem);
     err = svg ? pal_file_write(path, svg, n_byte, diag) : PAL_ERR_OK;
     snprintf(path, sizeof path, "%s.html", stem);
-    if (!err) err = write_page(file, svg, path, diag);
+    pal_file_out page;
+    if (!err && !(err = pal_file_begin(&page, path, diag))) {
+        put_page(page.file, file, svg);
+        err = pal_file_end(&page, PAL_ERR_OK, diag);
+    }
     free(svg);
     return err;
 }

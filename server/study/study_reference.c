@@ -3,32 +3,93 @@
 #include "server/base/vec3.h"
 #include "server/solve/convergence.h"
 #include "server/study/study_job.h"
+#include "server/study/study_store.h"
+#include "server/study/tuning.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { WHOLE_NODES = 30000, QUICK_NODES = 4000, QUICK_MAX = 12000, COUNTED = 12 };
-/* largest step, and largest share of the scene's step: about as short as any in the sweep, and of second order */
-static const double whole_step_s = 1.0 / 960, quick_step_s = 1.0 / 480, whole_share = 0.25, quick_share = 0.5,
-                    reference_tolerance = 1e-4, full_share = 0.95, min_order = 1, scatter = 1.25;
-/* a quick reference with a larger share of error is refined by this factor */
-static const double quick_enough = 0.15, finer = 1.42;
+enum { COUNTED = 12 }; /* size at which nodes are counted */
 
 static pal_configuration reference_setting(const pal_study_job *job, int size)
 {
     bool quick = job->options->quick;
     pal_configuration s = {.size = size};
-    s.step_s = fmin(quick ? quick_step_s : whole_step_s, job->scene->step_s * (quick ? quick_share : whole_share));
+    s.step_s = (quick ? 2 : 1) * fmin(PAL_REFERENCE_STEP_S, PAL_REFERENCE_STEP_SHARE * job->scene->step_s);
     bool adaptive = job->adaptive;
     snprintf(s.model, PAL_NAME, "%s", adaptive ? "adaptive_springs" : "fem");
     snprintf(s.element, PAL_NAME, "%s", adaptive ? "refined" : "hex8_bbar");
     snprintf(s.law, PAL_NAME, "%s", adaptive ? "" : job->law);
     snprintf(s.solver, PAL_NAME, "%s", adaptive ? "rk4" : "sdirk2");
-    s.tolerance = adaptive ? 0 : reference_tolerance;
+    s.tolerance = adaptive ? 0 : PAL_REFERENCE_TOLERANCE;
     return s;
 }
+
+/* ---- cache ---- */
+
+/* includes the terminators, so that words do not run together */
+static uint64_t add_word(uint64_t sum, const char *word)
+{
+    return pal_hash_bytes(sum, word, strlen(word) + 1);
+}
+
+/* Hash of everything that an answer depends on (kind, configuration, load, points) except the body. */
+static uint64_t sum_of(const pal_study_job *job, const char *what, const pal_configuration *s,
+                       const pal_problem_case *load)
+{
+    const double number[] = {s->size,       s->step_s,    s->tolerance, s->k_distance_J, s->k_area_J,
+                             s->k_volume_J, job->seconds, job->tip,     job->n_probe};
+    bool moves = !strcmp(what, "trajectory");
+    uint64_t sum = add_word(PAL_HASH_START, what);
+    sum = add_word(add_word(add_word(add_word(sum, s->model), s->element), s->law), s->solver);
+    sum = pal_study_digest_numbers(sum, number, 6);
+    if (moves) sum = pal_study_digest_numbers(sum, number + 6, 2);
+    for (int k = 0; k < load->n_load; k++) sum = pal_study_digest_load(sum, &load->load[k]);
+    return pal_study_digest_numbers(pal_study_digest_numbers(sum, number + 8, 1), job->probe, 3 * (size_t)job->n_probe);
+}
+
+static bool recall(const pal_study_job *job, uint64_t key, pal_study_answer *answer, double *value, int n)
+{
+    const pal_study_options *o = job->options;
+    return o->recall && o->recall(key, answer, value, n, o->user);
+}
+
+/* an answer cut short by a stop or by lack of memory is not stored */
+static void remember(const pal_study_job *job, uint64_t key, const pal_study_answer *answer, const double *value, int n)
+{
+    const pal_study_options *o = job->options;
+    bool whole = !answer->err || answer->err == PAL_ERR_NUMERIC || answer->err == PAL_ERR_FROZEN;
+    if (o->remember && whole) o->remember(key, answer, value, n, o->user);
+}
+
+/* A static solution under `load`, or the trajectory under the first load (load NULL): value [n][3] from the cache, else
+ * computed and stored. */
+static pal_err cached(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load,
+                      double (*value)[3], int n, int *n_node, pal_diagnostic *diag)
+{
+    uint64_t key = sum_of(job, load ? "rest" : "trajectory", setting, load ? load : job->load[0]);
+    pal_study_answer answer = {.n_node = 0};
+    pal_diagnostic reason = {{0}};
+    if (!recall(job, key, &answer, value[0], 3 * n)) {
+        answer.err = load ? pal_study_static(job, setting, load, value[0], &answer.n_node, &reason)
+                          : pal_study_trajectory(job, setting, value, NULL, 0, NULL, NULL, &reason);
+        snprintf(answer.reason, sizeof answer.reason, "%.*s", PAL_CONFIGURATION_TEXT - 1, reason.text);
+        if (answer.err) memset(value, 0, sizeof *value * (size_t)n);
+        remember(job, key, &answer, value[0], 3 * n);
+    }
+    *n_node = answer.n_node;
+    return answer.err ? pal_diagnostic_set(diag, answer.err, "%s", answer.reason) : PAL_ERR_OK;
+}
+
+pal_err pal_study_cached_static(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load,
+                                double *u, int *n_node, pal_diagnostic *diag)
+{
+    return cached(job, setting, load, (double(*)[3])u, job->n_probe, n_node, diag);
+}
+
+/* ---- size ---- */
 
 /* longest over shortest side, a quarter of it, 1 to 3; the sides of a box-shaped body */
 static void take_sides(pal_study_job *job, const pal_surface *surface)
@@ -39,7 +100,7 @@ static void take_sides(pal_study_job *job, const pal_surface *surface)
         side[c] = high[c] - low[c], volume *= side[c];
         longest = fmax(longest, side[c]), shortest = fmin(shortest, side[c]);
     }
-    bool full = fabs(pal_surface_volume(surface)) > full_share * volume;
+    bool full = fabs(pal_surface_volume(surface)) > PAL_BOX_FILL * volume;
     for (int c = 0; c < 3; c++) job->box_m[c] = full ? side[c] : 0;
     job->slender = shortest > 0 ? fmin(fmax(longest / shortest / 4, 1), 3) : 1;
 }
@@ -50,7 +111,7 @@ pal_err pal_study_reference_size(pal_study_job *job)
     static const int whole[] = {80, 64, 56, 48, 40, 34, 28, 24, 20, 16, 12}, quick[] = {20, 18, 16, 14, 12, 10};
     const int *size = job->options->quick ? quick : whole;
     int n = job->options->quick ? 6 : 11;
-    double max = job->options->quick ? QUICK_NODES : WHOLE_NODES;
+    double max = job->options->quick ? PAL_QUICK_NODES : PAL_REFERENCE_NODES;
     pal_study_world w;
     if (job->adaptive) {
         job->reference = job->options->quick ? 3 : 4;
@@ -68,20 +129,6 @@ pal_err pal_study_reference_size(pal_study_job *job)
     return PAL_ERR_OK;
 }
 
-static double max_of(const double *u, int n)
-{
-    double max = 0;
-    for (int i = 0; i < n; i++) max = fmax(max, pal_norm3(u + 3 * i));
-    return max;
-}
-
-static double max_between(const double *a, const double *b, int n)
-{
-    double max = 0;
-    for (int i = 0; i < n; i++) max = fmax(max, pal_dist3(a + 3 * i, b + 3 * i));
-    return max;
-}
-
 /* Remaining error of one load from its equilibria at two coarser sizes: the sum of the expected further changes
  * (Richardson, of order 1 to 2). */
 static pal_err estimate_load(pal_study_job *job, int load, const int size[3], double *u[2], double *out)
@@ -93,18 +140,21 @@ static pal_err estimate_load(pal_study_job *job, int load, const int size[3], do
         PAL_TRY(pal_study_cached_static(job, &s, job->load[load], u[k], &n_node, job->diag));
     }
     for (int k = 0; k < 3; k++) h[k] = job->adaptive ? exp2(-size[k]) : 1.0 / size[k];
-    double first = max_between(u[0], u[1], job->n_probe), last = max_between(u[1], job->still[load], job->n_probe);
+    double first = pal_max_dist3(u[0], u[1], job->n_probe),
+           last = pal_max_dist3(u[1], job->static_u[load], job->n_probe);
     double order = pal_richardson_order(h, first, last);
-    /* changes that shrink more slowly than first order are scatter of cut voxels: takes the largest, with a margin */
-    *out = order >= min_order ? last / (pow(h[1] / h[2], fmin(order, 2)) - 1) : scatter * fmax(first, last);
+    /* changes that shrink more slowly than first order are PAL_SCATTER_MARGIN of cut voxels: takes the largest, with a
+     * margin */
+    *out =
+        order >= PAL_MIN_ORDER ? last / (pow(h[1] / h[2], fmin(order, 2)) - 1) : PAL_SCATTER_MARGIN * fmax(first, last);
     return PAL_ERR_OK;
 }
 
 /* largest error over the loads */
 static pal_err estimate(pal_study_job *job, double *out)
 {
-    int size[3] = {pal_study_fit_size(job, job->reference / 2.0), pal_study_fit_size(job, job->reference / 1.42),
-                   job->reference};
+    int size[3] = {pal_study_fit_size(job, job->reference / 2.0),
+                   pal_study_fit_size(job, job->reference / PAL_REFERENCE_RATIO), job->reference};
     if (job->adaptive) size[0] = job->reference - 2, size[1] = job->reference - 1;
     if (size[1] >= size[2]) size[1] = size[2] - 1;
     if (size[0] >= size[1]) size[0] = size[1] - 1;
@@ -126,16 +176,19 @@ static pal_err estimate(pal_study_job *job, double *out)
     return err;
 }
 
-static bool report_progress(const pal_study_job *job, const char *what, double fraction)
+/* reports progress; STATE: the user asked to stop */
+static pal_err report_progress(const pal_study_job *job, const char *what, double n_done)
 {
-    return !job->options->progress || job->options->progress(what, fraction, job->options->user);
+    const pal_study_options *o = job->options;
+    if (!o->progress || o->progress(what, n_done / (job->n_load + 2), o->user)) return PAL_ERR_OK;
+    return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped at the reference");
 }
 
 static pal_err given(pal_study_job *job)
 {
-    memcpy(job->still[0], job->options->samples->u, 3 * sizeof(double) * (size_t)job->n_probe);
-    snprintf(job->out->reference, sizeof job->out->reference, "%d displacements that were given, at rest; %s, the way",
-             job->n_probe, "fem hex8_bbar");
+    memcpy(job->static_u[0], job->options->samples->u, 3 * sizeof(double) * (size_t)job->n_probe);
+    snprintf(job->out->reference, sizeof job->out->reference,
+             "%d displacements that were given, at rest; %s, the trajectory", job->n_probe, "fem hex8_bbar");
     job->out->reference_m = 0;
     return PAL_ERR_OK;
 }
@@ -146,16 +199,14 @@ static pal_err made(pal_study_job *job)
     char name[PAL_CONFIGURATION_TEXT];
     int n_node = 0;
     for (int k = 0; k < job->n_load; k++) {
-        if (!report_progress(job, "reference at rest", (double)k / (job->n_load + 2)))
-            return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped at the reference");
+        PAL_TRY(report_progress(job, "reference at rest", k));
         pal_err err;
-        do err = pal_study_cached_static(job, &s, job->load[k], job->still[k], &n_node, job->diag);
+        do err = pal_study_cached_static(job, &s, job->load[k], job->static_u[k], &n_node, job->diag);
         while (pal_study_press_adjust(job, k, err));
         PAL_TRY(err);
     }
     job->n_reference = n_node;
-    if (!report_progress(job, "reference, its own error", (double)job->n_load / (job->n_load + 2)))
-        return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped at the reference");
+    PAL_TRY(report_progress(job, "reference, its own error", job->n_load));
     PAL_TRY(estimate(job, &job->out->reference_m));
     s.tolerance = 0;
     snprintf(job->out->reference, sizeof job->out->reference, "%s, %d nodes", pal_configuration_text(&s, name), n_node);
@@ -166,7 +217,8 @@ static pal_err at_rest(pal_study_job *job)
 {
     PAL_TRY(job->options->samples ? given(job) : made(job));
     job->out->max_m = 0;
-    for (int k = 0; k < job->n_load; k++) job->out->max_m = fmax(job->out->max_m, max_of(job->still[k], job->n_probe));
+    for (int k = 0; k < job->n_load; k++)
+        job->out->max_m = fmax(job->out->max_m, pal_max_norm3(job->static_u[k], job->n_probe));
     return PAL_ERR_OK;
 }
 
@@ -174,16 +226,17 @@ pal_err pal_study_reference(pal_study_job *job)
 {
     PAL_TRY(at_rest(job));
     while (job->options->quick && !job->adaptive && !job->options->samples &&
-           job->out->reference_m > quick_enough * job->out->max_m && job->n_reference * pow(finer, 3) <= QUICK_MAX) {
-        job->reference = pal_study_fit_size(job, finer * job->reference);
+           job->out->reference_m > PAL_STUDY_TRUST / 2 * job->out->max_m &&
+           job->n_reference * pow(PAL_REFERENCE_RATIO, 3) <= PAL_QUICK_REFINED_NODES) {
+        job->reference = pal_study_fit_size(job, PAL_REFERENCE_RATIO * job->reference);
         PAL_TRY(at_rest(job));
     }
     if (!(job->out->max_m > 0))
         return pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "the loads move nothing: there is nothing to compare");
     for (int i = 0; i < job->n_probe; i++)
-        if (pal_norm3(job->still[0] + 3 * i) > pal_norm3(job->still[0] + 3 * job->tip)) job->tip = i;
-    if (!report_progress(job, "reference in motion", (double)(job->n_load + 1) / (job->n_load + 2)))
-        return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped at the reference");
+        if (pal_norm3(job->static_u[0] + 3 * i) > pal_norm3(job->static_u[0] + 3 * job->tip)) job->tip = i;
+    PAL_TRY(report_progress(job, "reference in motion", job->n_load + 1));
     pal_configuration s = reference_setting(job, job->reference);
-    return pal_study_cached_trajectory(job, &s, job->way, job->diag);
+    int n_node;
+    return cached(job, &s, NULL, job->trajectory, job->n_trajectory, &n_node, job->diag);
 }

@@ -3,7 +3,9 @@
  * damping; Cundall 1976). */
 #include "server/base/vec3.h"
 #include "server/calibrate/equilibrium.h"
+#include "server/sim/core/effect_list.h"
 #include "server/study/study_job.h"
+#include "server/study/tuning.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -11,9 +13,6 @@
 #include <string.h>
 
 enum { MAX_NEWTON = 120, MAX_RELAX = 4000, QUIET = 3, RAMPS = 4 };
-static const double rest_tolerance = 1e-6, relax_change = 1e-4;
-/* largest work of running finite elements to rest after Newton's method failed */
-static const double safeguard_work = 1e6;
 
 /* ---- finite elements ---- */
 
@@ -39,11 +38,11 @@ static pal_err converge(const pal_study_job *job, pal_study_world *w, pal_diagno
 static pal_err newton(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load, double *u,
                       int *n_node, pal_diagnostic *diag)
 {
-    pal_configuration still = *setting;
+    pal_configuration statics = *setting;
     pal_study_world w;
-    snprintf(still.solver, sizeof still.solver, "static_newton");
-    still.tolerance = rest_tolerance, still.step_s = PAL_STUDY_FRAME_S;
-    PAL_TRY(pal_study_open(job, &still, true, &w, diag));
+    snprintf(statics.solver, sizeof statics.solver, "static_newton");
+    statics.tolerance = PAL_REST_TOLERANCE, statics.step_s = PAL_STUDY_FRAME_S;
+    PAL_TRY(pal_study_open(job, &statics, true, &w, diag));
     *n_node = w.body->n_node;
     pal_err err = pal_study_apply_load(job, &w, load, 1, diag);
     if (!err) err = converge(job, &w, diag);
@@ -121,12 +120,10 @@ static void add_gravity(const pal_study_world *w, double *f)
 
 static pal_err balance(springs *s, double *x, pal_diagnostic *diag)
 {
-    pal_equilibrium_options options;
+    const pal_equilibrium_options options = {.tolerance = PAL_REST_TOLERANCE};
     pal_equilibrium_report report;
     const double *const k[PAL_SPRING_KINDS] = {s->k[0], s->k[1], s->k[2]};
     size_t n = 3 * (size_t)s->lattice.n_node;
-    pal_equilibrium_default(&options);
-    options.tolerance = rest_tolerance;
     memcpy(x, s->lattice.x_rest, n * sizeof *x);
     pal_err err = pal_equilibrium(s->workspace, k, s->force, &options, x, &report, diag);
     if (err != PAL_ERR_NUMERIC) return err;
@@ -144,10 +141,10 @@ static pal_err lattice(pal_study_job *job, const pal_configuration *setting, con
 {
     pal_study_world w;
     springs s = {.workspace = NULL};
-    pal_configuration still = *setting;
+    pal_configuration statics = *setting;
     /* the shortest step: stiff springs must come to rest at any cost */
-    still.step_s = 1e-4, still.solver[0] = 0;
-    PAL_TRY(pal_study_open(job, &still, true, &w, diag));
+    statics.step_s = 1e-4, statics.solver[0] = 0;
+    PAL_TRY(pal_study_open(job, &statics, true, &w, diag));
     *n_node = w.body->n_node;
     pal_err err = take_springs(setting, &w, &s, diag);
     if (!err) err = pal_study_forces(job, &w, load, s.force, diag);
@@ -161,23 +158,11 @@ static pal_err lattice(pal_study_job *job, const pal_configuration *setting, con
 
 /* ---- by running ---- */
 
-static double change(double *before, const double *u, int n, double *max)
-{
-    double largest = 0;
-    *max = 0;
-    for (int i = 0; i < n; i++) {
-        largest = fmax(largest, pal_dist3(before + 3 * i, u + 3 * i));
-        *max = fmax(*max, pal_norm3(u + 3 * i));
-    }
-    memcpy(before, u, 3 * sizeof *u * (size_t)n);
-    return largest;
-}
-
 /* steps until several successive peaks show no significant change */
 static pal_err relax_world(pal_study_job *job, pal_study_world *w, int max_step, double *before, double *u,
                            pal_diagnostic *diag)
 {
-    double last = 0, max = 0;
+    double last = 0;
     int quiet = 0;
     for (int step = 1; step <= max_step; step++) {
         if (!pal_study_continues(job)) return pal_diagnostic_set(diag, PAL_ERR_STATE, "stopped");
@@ -192,7 +177,9 @@ static pal_err relax_world(pal_study_job *job, pal_study_world *w, int max_step,
         memset(w->body->v, 0, 3 * sizeof(double) * (size_t)w->body->n_dof);
         last = 0;
         PAL_TRY(pal_study_displacement(w, job->probe, job->n_probe, u, diag));
-        quiet = change(before, u, job->n_probe, &max) <= relax_change * max ? quiet + 1 : 0;
+        double change = pal_max_dist3(before, u, job->n_probe);
+        quiet = change <= PAL_REST_CHANGE * pal_max_norm3(u, job->n_probe) ? quiet + 1 : 0;
+        memcpy(before, u, 3 * sizeof *u * (size_t)job->n_probe);
         if (quiet == QUIET) return PAL_ERR_OK;
     }
     return pal_diagnostic_set(diag, PAL_ERR_NUMERIC, "not at rest after %d steps", max_step);
@@ -203,10 +190,10 @@ static pal_err relax(pal_study_job *job, const pal_configuration *setting, const
                      int *n_node, double max_work, pal_diagnostic *diag)
 {
     pal_study_world w;
-    pal_configuration still = *setting;
+    pal_configuration statics = *setting;
     /* with a step much shorter than a period, slow motion does not mean rest */
-    still.step_s = PAL_STUDY_FRAME_S;
-    PAL_TRY(pal_study_open(job, &still, true, &w, diag));
+    statics.step_s = PAL_STUDY_FRAME_S;
+    PAL_TRY(pal_study_open(job, &statics, true, &w, diag));
     *n_node = pal_body_nodes(w.body);
     double *before = calloc(3 * (size_t)job->n_probe, sizeof *before);
     pal_err err = before ? pal_study_apply_load(job, &w, load, 1, diag) : PAL_ERR_MEMORY;
@@ -219,13 +206,14 @@ static pal_err relax(pal_study_job *job, const pal_configuration *setting, const
     return err;
 }
 
-/* components whose forces depend on the shape, which the lattice equilibrium ignores */
+/* Does anything but gravity, drag and tools act? The lattice equilibrium ignores it. */
 static bool only_gravity(const pal_body_def *body)
 {
     for (int k = 0; k < body->n_effect; k++) {
-        const char *name = body->effect[k].name;
-        if (pal_study_is(name, "inflate") || pal_study_is(name, "penalty") || pal_study_is(name, "moving_support"))
-            return false;
+        const pal_effect *e = pal_effect_find(body->effect[k].name);
+        bool acts =
+            e && ((e->stage == PAL_STAGE_FORCE && !e->drag) || (e->stage == PAL_STAGE_CONTACT && !e->sleep.reach_m));
+        if (acts && !pal_study_is(e->name, "gravity")) return false;
     }
     return true;
 }
@@ -237,7 +225,7 @@ pal_err pal_study_static(pal_study_job *job, const pal_configuration *setting, c
     if (pal_study_is(setting->model, "fem") || pal_study_is(setting->model, "subdivision_fem")) {
         pal_err err = newton(job, setting, load, u, n_node, diag);
         pal_diagnostic other = {{0}};
-        if (err != PAL_ERR_NUMERIC || relax(job, setting, load, u, n_node, safeguard_work, &other)) return err;
+        if (err != PAL_ERR_NUMERIC || relax(job, setting, load, u, n_node, PAL_RELAX_WORK, &other)) return err;
         return PAL_ERR_OK;
     }
     if (pal_study_is(setting->model, "tet_springs") && only_gravity(&job->scene->body[0]))

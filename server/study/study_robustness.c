@@ -3,12 +3,10 @@
  * reported and reset, whereas one that silently stays away from rest is not. */
 #include "server/robustness/robustness.h"
 #include "server/study/study_job.h"
+#include "server/study/tuning.h"
 
 #include <stdio.h>
 #include <stdlib.h>
-
-/* processor time of one case on one configuration */
-static const double max_cpu_s = 1;
 
 static bool keeps_on(const char *what, double fraction, void *user)
 {
@@ -31,7 +29,7 @@ static const char *failed(pal_study_job *job, const pal_configuration *setting)
     for (size_t k = 0; k < sizeof name / sizeof *name && !found; k++) {
         pal_robustness_options o;
         pal_robustness_default(&o);
-        o.only = name[k], o.max_cpu_s = max_cpu_s, o.progress = keeps_on, o.user = job;
+        o.only = name[k], o.max_cpu_s = PAL_CASE_CPU_S, o.progress = keeps_on, o.user = job;
         if (!pal_robustness_run(&set->scene, &o, report, &reason) && report->n_failed > 0 && !report->result[0].frozen)
             found = name[k];
     }
@@ -42,18 +40,18 @@ static const char *failed(pal_study_job *job, const pal_configuration *setting)
 
 pal_err pal_study_check_robustness(pal_study_job *job)
 {
-    bool looked[PAL_STUDY_POINTS] = {false};
+    bool checked[PAL_STUDY_POINTS] = {false};
     const pal_study_options *o = job->options;
     for (int i = 0; i < job->out->n_point;) {
         pal_study_point *p = &job->out->point[i];
-        if (!p->measured.front || looked[i]) {
+        if (!p->measured.front || checked[i]) {
             i++;
             continue;
         }
         bool go = !o->progress || o->progress("robustness of the front", (double)i / job->out->n_point, o->user);
         if (!go || !pal_study_continues(job))
             return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped at the front");
-        looked[i] = true;
+        checked[i] = true;
         const char *name = failed(job, &p->measured.setting);
         if (!name) continue;
         snprintf(p->reason, sizeof p->reason, "fails %s of palpate robustness: not named", name);

@@ -2,7 +2,9 @@
 #include "server/base/clock.h"
 #include "server/base/machine.h"
 #include "server/base/vec3.h"
+#include "server/num/median.h"
 #include "server/study/study_job.h"
+#include "server/study/tuning.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -10,12 +12,6 @@
 #include <string.h>
 
 enum { MAX_TIMES = 1200, WARM = 3, MIN_TIMES = 30, ROUNDS = 2 };
-/* the trajectory repeats until its steps have taken this long: a median of some microseconds is unreliable */
-static const double min_ms = 50;
-/* sub-steps times nodes of a trajectory: above this it is only timed */
-static const double max_work = 1.5e9, timed_s = 2;
-/* of the first load: applied at once, its overshoot reaches about the static displacement of the whole load */
-static const double way_share = 0.5;
 
 /* ---- at rest ---- */
 
@@ -36,7 +32,7 @@ static void find_rest(pal_study_job *job, const pal_configuration *setting, int 
     for (int k = 0; k < job->n_load && !r->err; k++) {
         r->err = pal_study_static(job, setting, job->load[k], job->now, n_node, &reason);
         for (int i = 0; i < job->n_probe && !r->err; i++) {
-            double off = pal_dist3(job->now + 3 * i, job->still[k] + 3 * i);
+            double off = pal_dist3(job->now + 3 * i, job->static_u[k] + 3 * i);
             sum += off * off;
             r->max_m = fmax(r->max_m, off);
         }
@@ -46,17 +42,6 @@ static void find_rest(pal_study_job *job, const pal_configuration *setting, int 
 }
 
 /* ---- in motion ---- */
-
-static double quantile(const double *times, int n, double share)
-{
-    return n > 0 ? times[(int)(share * (n - 1) + 0.5)] : NAN;
-}
-
-static int compare(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 /* one timed step; an error: it cannot continue */
 static pal_err timed_step(pal_study_world *w, double *ms, int max, int *n_ms, pal_diagnostic *diag)
@@ -75,13 +60,13 @@ static pal_err timed_step(pal_study_world *w, double *ms, int max, int *n_ms, pa
 static pal_err only_time(pal_study_world *w, double *ms, int max, int *n_ms, pal_diagnostic *diag)
 {
     double start = pal_clock_s();
-    while (*n_ms < MIN_TIMES + WARM && (*n_ms <= 2 * WARM || pal_clock_s() - start < timed_s))
+    while (*n_ms < MIN_TIMES + WARM && (*n_ms <= 2 * WARM || pal_clock_s() - start < PAL_ONLY_TIMED_S))
         PAL_TRY(timed_step(w, ms, max, n_ms, diag));
     return PAL_ERR_OK;
 }
 
-/* Frames lie between steps and are interpolated linearly. way NULL: timing only. */
-static pal_err follow(pal_study_job *job, pal_study_world *w, double (*way)[3], double *ms, int max, int *n_ms,
+/* Frames lie between steps and are interpolated linearly. trajectory NULL: timing only. */
+static pal_err follow(pal_study_job *job, pal_study_world *w, double (*trajectory)[3], double *ms, int max, int *n_ms,
                       pal_diagnostic *diag)
 {
     double last[3] = {0}, now[3], time = 0, step_s = w->set->scene.step_s;
@@ -90,13 +75,13 @@ static pal_err follow(pal_study_job *job, pal_study_world *w, double (*way)[3], 
         pal_err err = timed_step(w, ms, max, n_ms, diag);
         if (err == PAL_ERR_FROZEN) return pal_diagnostic_set(diag, err, "diverged and froze after %.2f s", time);
         PAL_TRY(err);
-        if (way) PAL_TRY(pal_study_displacement(w, job->probe + 3 * job->tip, 1, now, diag));
+        if (trajectory) PAL_TRY(pal_study_displacement(w, job->probe + 3 * job->tip, 1, now, diag));
         time += step_s;
         for (; frame < job->n_trajectory && (frame + 1) * PAL_STUDY_FRAME_S <= time + 1e-9; frame++) {
             double share = fmin(fmax(1 - (time - (frame + 1) * PAL_STUDY_FRAME_S) / step_s, 0), 1);
-            for (int c = 0; c < 3 && way; c++) way[frame][c] = (1 - share) * last[c] + share * now[c];
+            for (int c = 0; c < 3 && trajectory; c++) trajectory[frame][c] = (1 - share) * last[c] + share * now[c];
         }
-        if (way) pal_copy3(last, now);
+        if (trajectory) pal_copy3(last, now);
     }
     return PAL_ERR_OK;
 }
@@ -108,9 +93,9 @@ static pal_err repeat(pal_study_job *job, pal_study_world *w, double *ms, int ma
     for (;;) {
         double sum = 0;
         for (int i = 0; i < *n_ms; i++) sum += ms[i];
-        if (err || sum >= min_ms || *n_ms >= max) return err;
+        if (err || sum >= PAL_MIN_TIMED_MS || *n_ms >= max) return err;
         pal_world_reset(w->world);
-        err = pal_study_apply_load(job, w, job->load[0], way_share, diag);
+        err = pal_study_apply_load(job, w, job->load[0], PAL_SUDDEN_LOAD, diag);
         if (!err) err = follow(job, w, NULL, ms, max, n_ms, diag);
     }
 }
@@ -125,20 +110,21 @@ static double read_ms(const pal_world *world)
     return pal_machine_read_ms(all) * 2 * factor / all;
 }
 
-pal_err pal_study_trajectory(pal_study_job *job, const pal_configuration *setting, double (*way)[3], double *ms,
+pal_err pal_study_trajectory(pal_study_job *job, const pal_configuration *setting, double (*trajectory)[3], double *ms,
                              int max, int *n_ms, pal_study_point *facts, pal_diagnostic *diag)
 {
     pal_study_world w;
     PAL_TRY(pal_study_open(job, setting, false, &w, diag));
     int n_substep = pal_world_substeps(w.world);
     double work = (double)n_substep * w.body->n_node * job->seconds / w.set->scene.step_s;
-    pal_err err = pal_study_apply_load(job, &w, job->load[0], way_share, diag);
+    pal_err err = pal_study_apply_load(job, &w, job->load[0], PAL_SUDDEN_LOAD, diag);
     /* the reference is always followed */
-    if (!err && facts && work > max_work) {
+    if (!err && facts && work > PAL_MAX_WORK) {
         err = only_time(&w, ms, max, n_ms, diag);
-        if (!err) err = pal_diagnostic_set(diag, PAL_ERR_BUDGET, "way not followed: %d sub-steps a step", n_substep);
+        if (!err)
+            err = pal_diagnostic_set(diag, PAL_ERR_BUDGET, "trajectory not followed: %d sub-steps a step", n_substep);
     } else if (!err) {
-        err = follow(job, &w, way, ms, max, n_ms, diag);
+        err = follow(job, &w, trajectory, ms, max, n_ms, diag);
         if (facts) facts->n_node = pal_body_nodes(w.body);
         if (!err && ms) err = only_time(&w, ms, max, n_ms, diag);
         if (!err && ms) err = repeat(job, &w, ms, max, n_ms, diag);
@@ -155,12 +141,12 @@ pal_err pal_study_trajectory(pal_study_job *job, const pal_configuration *settin
     return err;
 }
 
-static void compare_ways(const pal_study_job *job, pal_study_point *out)
+static void compare_trajectories(const pal_study_job *job, pal_study_point *out)
 {
     double sum = 0;
     out->trajectory_max_m = 0;
     for (int i = 0; i < job->n_trajectory; i++) {
-        double off = pal_dist3(job->own[i], job->way[i]);
+        double off = pal_dist3(job->own_trajectory[i], job->trajectory[i]);
         sum += off * off;
         out->trajectory_max_m = fmax(out->trajectory_max_m, off);
     }
@@ -170,25 +156,25 @@ static void compare_ways(const pal_study_job *job, pal_study_point *out)
 /* ---- both ---- */
 
 /* times the trajectory; keeps the result if it is the first or the fastest */
-static pal_err time_way(pal_study_job *job, pal_study_point *out, double (*way)[3], pal_diagnostic *diag)
+static pal_err time_trajectory(pal_study_job *job, pal_study_point *out, double (*trajectory)[3], pal_diagnostic *diag)
 {
     double *ms = calloc(MAX_TIMES, sizeof *ms);
     int n_ms = 0;
     pal_study_point facts = *out;
-    pal_err err = !ms ? PAL_ERR_MEMORY
-                      : pal_study_trajectory(job, &out->measured.setting, way, ms, MAX_TIMES, &n_ms, &facts, diag);
+    pal_err err =
+        !ms ? PAL_ERR_MEMORY
+            : pal_study_trajectory(job, &out->measured.setting, trajectory, ms, MAX_TIMES, &n_ms, &facts, diag);
     /* the read rate also depends on other load of the machine */
-    double read = way ? facts.read_ms : fmin(out->read_ms, facts.read_ms);
-    if (way) *out = facts;
+    double read = trajectory ? facts.read_ms : fmin(out->read_ms, facts.read_ms);
+    if (trajectory) *out = facts;
     out->read_ms = read;
     if (n_ms > 2 * WARM) {
-        qsort(ms + WARM, (size_t)(n_ms - WARM), sizeof *ms, compare);
         /* shorter steps are more steps in the same time: compares the cost per step of the scene */
         double share = job->out->step_s / out->measured.setting.step_s;
-        double median = share * quantile(ms + WARM, n_ms - WARM, 0.5);
+        double median = share * pal_median(ms + WARM, n_ms - WARM);
         if (!(out->measured.ms <= median)) {
             out->measured.ms = median;
-            out->ms_p95 = share * quantile(ms + WARM, n_ms - WARM, 0.95);
+            out->ms_p95 = share * ms[WARM + (int)(0.95 * (n_ms - WARM - 1) + 0.5)];
         }
     }
     free(ms);
@@ -205,7 +191,7 @@ pal_err pal_study_time_repeat(pal_study_job *job)
         pal_diagnostic reason = {{0}};
         if (go && !(p->measured.ms > 0)) continue;
         /* it succeeded before: an error here can only be a stop */
-        if (go) (void)time_way(job, p, NULL, &reason);
+        if (go) (void)time_trajectory(job, p, NULL, &reason);
         if (!go || !pal_study_continues(job))
             return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped while settings were timed again");
     }
@@ -216,8 +202,8 @@ pal_err pal_study_time_repeat(pal_study_job *job)
 static void run(pal_study_job *job, pal_study_point *out)
 {
     pal_diagnostic reason = {{0}};
-    pal_err err = time_way(job, out, job->own, &reason);
-    if (!err) compare_ways(job, out);
+    pal_err err = time_trajectory(job, out, job->own_trajectory, &reason);
+    if (!err) compare_trajectories(job, out);
     if (err && !out->err) {
         out->err = err;
         snprintf(out->reason, sizeof out->reason, "%.*s", PAL_CONFIGURATION_TEXT - 1, reason.text);

@@ -3,6 +3,7 @@
 
 #include "server/mesh/files/file_bytes.h"
 #include "server/scene/json_reader.h"
+#include "server/sim/core/effect_list.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -14,126 +15,149 @@
 
 static const char format[] = "palpate-study-1";
 
-/* numbers of a point, with their accepted range; may be null where `hole` */
-typedef struct number_key {
+/* A member of a struct as JSON. COUNT: int; CODE: pal_err by name; the others: double. null is NaN where allowed.
+ * Studies stored before an optional key existed read as 0. */
+typedef enum field_kind { TEXT, TEXT_OR_EMPTY, COUNT, FLAG, CODE, NUMBER, NUMBER_OR_NULL, NUMBER_OPTIONAL } field_kind;
+typedef struct field {
     const char *key;
-    size_t at;
-    double low, high;
-    bool hole;
-    bool late; /* studies stored before it existed read as 0 */
-} number_key;
-#define AT(field) offsetof(pal_study_point, field)
-static const number_key number[] = {
-    {"step_s", AT(measured.setting.step_s), 0, 0.1, false, false},
-    {"tolerance", AT(measured.setting.tolerance), 0, 1, false, false},
-    {"k_distance_J", AT(measured.setting.k_distance_J), 0, 1e300, false, false},
-    {"k_area_J", AT(measured.setting.k_area_J), -1, 1e300, false, false},
-    {"k_volume_J", AT(measured.setting.k_volume_J), 0, 1e300, false, false},
-    {"ms", AT(measured.ms), 0, 1e12, true, false},
-    {"error_m", AT(measured.error_m), 0, 1e300, true, false},
-    {"ms_p95", AT(ms_p95), 0, 1e12, true, false},
-    {"static_rms_m", AT(static_rms_m), 0, 1e300, true, false},
-    {"static_max_m", AT(static_max_m), 0, 1e300, true, false},
-    {"trajectory_rms_m", AT(trajectory_rms_m), 0, 1e300, true, false},
-    {"trajectory_max_m", AT(trajectory_max_m), 0, 1e300, true, false},
-    {"prepare_s", AT(prepare_s), 0, 1e12, true, false},
-    {"elements", AT(n_element), 0, 1e12, false, true},
-    {"read_ms", AT(read_ms), 0, 1e12, false, true},
-    {"predicted_ms", AT(predicted_ms), 0, 1e300, true, false},
-    {"predicted_m", AT(predicted_m), 0, 1e300, true, false},
-};
-typedef struct text_key {
-    const char *key;
+    field_kind kind;
     size_t at, n_byte;
-    bool may_be_empty;
-} text_key;
-static const text_key text[] = {
-    {"model", AT(measured.setting.model), PAL_NAME, false},
-    {"element", AT(measured.setting.element), PAL_NAME, true},
-    {"law", AT(measured.setting.law), PAL_NAME, true},
-    {"solver", AT(measured.setting.solver), PAL_NAME, true},
-    {"reason", AT(reason), sizeof((pal_study_point *)0)->reason, true},
+    double low, high; /* accepted range of a number */
+} field;
+#define AT(type, member) offsetof(type, member), sizeof((type *)0)->member
+#define POINT(member)    AT(pal_study_point, member)
+#define FILE_AT(member)  AT(pal_study_file, member)
+/* in the order of the table's columns */
+static const field point_field[] = {
+    {"model", TEXT, POINT(measured.setting.model), 0, 0},
+    {"element", TEXT_OR_EMPTY, POINT(measured.setting.element), 0, 0},
+    {"law", TEXT_OR_EMPTY, POINT(measured.setting.law), 0, 0},
+    {"solver", TEXT_OR_EMPTY, POINT(measured.setting.solver), 0, 0},
+    {"reason", TEXT_OR_EMPTY, POINT(reason), 0, 0},
+    {"err", CODE, POINT(err), 0, 0},
+    {"size", COUNT, POINT(measured.setting.size), -1, 1024},
+    {"nodes", COUNT, POINT(n_node), 0, 1 << 30},
+    {"substeps", COUNT, POINT(n_substep), 0, 1 << 30},
+    {"front", FLAG, POINT(measured.front), 0, 0},
+    {"step_s", NUMBER, POINT(measured.setting.step_s), 0, 0.1},
+    {"tolerance", NUMBER, POINT(measured.setting.tolerance), 0, 1},
+    {"k_distance_J", NUMBER, POINT(measured.setting.k_distance_J), 0, 1e300},
+    {"k_area_J", NUMBER, POINT(measured.setting.k_area_J), -1, 1e300},
+    {"k_volume_J", NUMBER, POINT(measured.setting.k_volume_J), 0, 1e300},
+    {"ms", NUMBER_OR_NULL, POINT(measured.ms), 0, 1e12},
+    {"error_m", NUMBER_OR_NULL, POINT(measured.error_m), 0, 1e300},
+    {"ms_p95", NUMBER_OR_NULL, POINT(ms_p95), 0, 1e12},
+    {"static_rms_m", NUMBER_OR_NULL, POINT(static_rms_m), 0, 1e300},
+    {"static_max_m", NUMBER_OR_NULL, POINT(static_max_m), 0, 1e300},
+    {"trajectory_rms_m", NUMBER_OR_NULL, POINT(trajectory_rms_m), 0, 1e300},
+    {"trajectory_max_m", NUMBER_OR_NULL, POINT(trajectory_max_m), 0, 1e300},
+    {"prepare_s", NUMBER_OR_NULL, POINT(prepare_s), 0, 1e12},
+    {"elements", NUMBER_OPTIONAL, POINT(n_element), 0, 1e12},
+    {"read_ms", NUMBER_OPTIONAL, POINT(read_ms), 0, 1e12},
+    {"predicted_ms", NUMBER_OR_NULL, POINT(predicted_ms), 0, 1e300},
+    {"predicted_m", NUMBER_OR_NULL, POINT(predicted_m), 0, 1e300},
 };
-enum { N_NUMBER = sizeof number / sizeof *number, N_TEXT = sizeof text / sizeof *text };
-
-static const double *number_at(const pal_study_point *p, int k)
-{
-    return (const double *)(const void *)((const char *)p + number[k].at);
-}
-
-static const char *text_at(const pal_study_point *p, int k)
-{
-    return (const char *)p + text[k].at;
-}
+static const field subject_field[] = {
+    {"body", TEXT_OR_EMPTY, FILE_AT(body), 0, 0},
+    {"index", COUNT, FILE_AT(index), 0, PAL_BODY_MAX - 1},
+    {"shape", TEXT, FILE_AT(shape), 0, 0},
+    {"loads", TEXT_OR_EMPTY, FILE_AT(loads), 0, 0},
+    {"digest", TEXT_OR_EMPTY, FILE_AT(digest), 0, 0},
+    {"methods", TEXT_OR_EMPTY, FILE_AT(methods), 0, 0},
+};
+static const field file_field[] = {
+    {"name", TEXT_OR_EMPTY, FILE_AT(study.name), 0, 0},
+    {"machine", TEXT_OR_EMPTY, FILE_AT(study.machine), 0, 0},
+    {"reference", TEXT_OR_EMPTY, FILE_AT(study.reference), 0, 0},
+    {"reference_m", NUMBER_OR_NULL, FILE_AT(study.reference_m), 0, 1e300},
+    {"max_m", NUMBER_OR_NULL, FILE_AT(study.max_m), 0, 1e300},
+    {"length_scale_m", NUMBER_OR_NULL, FILE_AT(study.length_scale_m), 0, 1e300},
+    {"step_s", NUMBER, FILE_AT(study.step_s), 0, 0.1},
+    {"command", TEXT_OR_EMPTY, FILE_AT(command), 0, 0},
+    {"n_total", COUNT, FILE_AT(n_total), 0, PAL_STUDY_POINTS},
+    {"complete", FLAG, FILE_AT(whole), 0, 0},
+};
+enum {
+    N_POINT = sizeof point_field / sizeof *point_field,
+    N_SUBJECT = sizeof subject_field / sizeof *subject_field,
+    N_FILE = sizeof file_field / sizeof *file_field
+};
 
 /* ---- identity of the study ---- */
 
-uint64_t pal_study_digest(uint64_t before, const void *bytes, size_t n_byte)
+uint64_t pal_study_digest_numbers(uint64_t sum, const double *value, size_t n)
 {
-    const unsigned char *at = bytes;
-    uint64_t sum = before ? before : 0xcbf29ce484222325u;
-    for (size_t i = 0; i < n_byte; i++) sum = (sum ^ at[i]) * 0x100000001b3u;
-    return sum;
-}
-
-static uint64_t add_numbers(uint64_t sum, const double *value, size_t n)
-{
-    return value ? pal_study_digest(sum, value, n * sizeof *value) : pal_study_digest(sum, "-", 1);
+    return value ? pal_hash_bytes(sum, value, n * sizeof *value) : pal_hash_bytes(sum, "-", 1);
 }
 
 static uint64_t add_region(uint64_t sum, const pal_region *r)
 {
     const double own[] = {r->kind, r->is, r->young_Pa, r->poisson, r->density_kg_m3, r->n[0], r->n[1], r->n[2]};
     size_t n = (size_t)r->n[0] * (size_t)r->n[1] * (size_t)r->n[2];
-    sum = add_numbers(sum, own, sizeof own / sizeof *own);
-    if (r->kind != PAL_REGION_LABEL) sum = add_numbers(add_numbers(sum, r->low_m, 3), r->high_m, 3);
+    sum = pal_study_digest_numbers(sum, own, sizeof own / sizeof *own);
+    if (r->kind != PAL_REGION_LABEL)
+        sum = pal_study_digest_numbers(pal_study_digest_numbers(sum, r->low_m, 3), r->high_m, 3);
     if (r->kind == PAL_REGION_LABEL) {
-        sum = add_numbers(add_numbers(sum, r->low_m, 3), r->spacing_m, 3);
-        if (r->label) sum = pal_study_digest(sum, r->label, n);
+        sum = pal_study_digest_numbers(pal_study_digest_numbers(sum, r->low_m, 3), r->spacing_m, 3);
+        if (r->label) sum = pal_hash_bytes(sum, r->label, n);
     }
     if (r->kind != PAL_REGION_GRID) return sum;
-    sum = add_numbers(add_numbers(sum, r->grid_young_Pa, n), r->grid_poisson, n);
-    return add_numbers(sum, r->grid_density_kg_m3, n);
+    sum = pal_study_digest_numbers(pal_study_digest_numbers(sum, r->grid_young_Pa, n), r->grid_poisson, n);
+    return pal_study_digest_numbers(sum, r->grid_density_kg_m3, n);
 }
 
-/* effects that move an untouched body: gravity, inflate, penalty */
+uint64_t pal_study_digest_load(uint64_t sum, const pal_problem_load *l)
+{
+    const double kind[] = {l->kind, l->region.all, l->has_normal, l->has_traction, l->has_total};
+    sum = pal_study_digest_numbers(sum, kind, sizeof kind / sizeof *kind);
+    if (l->kind == PAL_LOAD_POINT)
+        return pal_study_digest_numbers(pal_study_digest_numbers(sum, l->point_m, 3), l->force_N, 3);
+    if (l->kind == PAL_LOAD_GRAVITY) return pal_study_digest_numbers(sum, l->gravity_m_s2, 3);
+    if (!l->region.all)
+        sum = pal_study_digest_numbers(pal_study_digest_numbers(sum, l->region.low_m, 3), l->region.high_m, 3);
+    if (l->has_normal) sum = pal_study_digest_numbers(sum, l->normal, 3);
+    if (l->has_traction) sum = pal_study_digest_numbers(sum, l->traction_Pa, 3);
+    return l->has_total ? pal_study_digest_numbers(sum, l->total_N, 3) : sum;
+}
+
+/* all effects but guards and tools, which do not move an untouched body */
 static uint64_t add_effect(uint64_t sum, const pal_config_entry *item)
 {
-    static const char *const quiet[] = {"tool_push", "tool_grasp", "finite_guard", "sleep"};
-    for (size_t k = 0; k < sizeof quiet / sizeof *quiet; k++)
-        if (!strcmp(item->name, quiet[k])) return sum;
-    sum = pal_study_digest(sum, item->name, strlen(item->name));
+    const pal_effect *effect = pal_effect_find(item->name);
+    if (effect && (effect->stage == PAL_STAGE_GUARD || effect->sleep.reach_m)) return sum;
+    sum = pal_hash_bytes(sum, item->name, strlen(item->name));
     for (int k = 0; k < item->n_value; k++) {
         const pal_config_value *v = &item->value[k];
-        sum = pal_study_digest(pal_study_digest(sum, v->key, strlen(v->key)), v->text, strlen(v->text));
-        sum = add_numbers(sum, v->number, (size_t)(v->kind == PAL_VALUE_NUMBER ? 1 : v->n_number));
-        sum = add_numbers(sum, &(double){v->flag}, 1);
+        sum = pal_hash_bytes(pal_hash_bytes(sum, v->key, strlen(v->key)), v->text, strlen(v->text));
+        sum = pal_study_digest_numbers(sum, v->number, (size_t)(v->kind == PAL_VALUE_NUMBER ? 1 : v->n_number));
+        sum = pal_study_digest_numbers(sum, &(double){v->flag}, 1);
     }
     return sum;
 }
 
 const char *pal_study_shape(const pal_body_def *body, char out[PAL_STUDY_SHAPE])
 {
-    uint64_t sum = 0;
+    uint64_t sum = PAL_HASH_START;
     const pal_material *m = &body->material;
     const double own[] = {m->young_Pa,    m->poisson,      m->density_kg_m3, m->damping_1_s,
                           body->n_region, body->n_support, body->n_stroke};
     const pal_surface *s = &body->mesh->surface;
-    sum = add_numbers(sum, own, sizeof own / sizeof *own);
-    sum = pal_study_digest(sum, s->tri, 3 * (size_t)s->n_tri * sizeof *s->tri);
-    sum = pal_study_digest(sum, s->x, 3 * (size_t)s->n_vertex * sizeof *s->x);
-    if (body->cells) sum = add_numbers(sum, body->cells->x, 3 * (size_t)body->cells->n_vertex);
+    sum = pal_study_digest_numbers(sum, own, sizeof own / sizeof *own);
+    sum = pal_hash_bytes(sum, s->tri, 3 * (size_t)s->n_tri * sizeof *s->tri);
+    sum = pal_hash_bytes(sum, s->x, 3 * (size_t)s->n_vertex * sizeof *s->x);
+    if (body->cells) sum = pal_study_digest_numbers(sum, body->cells->x, 3 * (size_t)body->cells->n_vertex);
     for (int k = 0; k < body->n_region; k++) sum = add_region(sum, &body->region[k]);
     for (int k = 0; k < body->n_support; k++) {
         const pal_support_def *p = &body->support[k];
         const double kind[] = {p->lowest, p->rim, p->lowest ? p->fraction : 0};
-        sum = add_numbers(sum, kind, 3);
-        if (!p->lowest && !p->rim) sum = add_numbers(add_numbers(sum, p->low_m, 3), p->high_m, 3);
+        sum = pal_study_digest_numbers(sum, kind, 3);
+        if (!p->lowest && !p->rim)
+            sum = pal_study_digest_numbers(pal_study_digest_numbers(sum, p->low_m, 3), p->high_m, 3);
     }
     for (int k = 0; k < body->n_stroke; k++) {
         const pal_stroke *p = &body->stroke[k];
-        const double kind[] = {p->radius_m, p->soft, p->young_factor, p->density_factor};
-        sum = add_numbers(add_numbers(sum, p->at_m, 3), kind, 4);
+        const double kind[] = {p->radius_m, p->softness, p->young_factor, p->density_factor};
+        sum = pal_study_digest_numbers(pal_study_digest_numbers(sum, p->at_m, 3), kind, 4);
     }
     for (int k = 0; k < body->n_effect; k++) sum = add_effect(sum, &body->effect[k]);
     snprintf(out, PAL_STUDY_SHAPE, "%016" PRIx64, sum);
@@ -162,48 +186,33 @@ pal_err pal_study_stem(const char *word, const char *folder, char out[PAL_STUDY_
 
 /* ---- writing ---- */
 
-static void put_number(cJSON *object, const char *key, double value)
+static void put_fields(cJSON *object, const field *f, int n, const void *from)
 {
-    cJSON_AddItemToObject(object, key, pal_json_exact(value));
-}
-
-static void put_point(cJSON *list, const pal_study_point *p)
-{
-    cJSON *o = cJSON_CreateObject();
-    cJSON_AddItemToArray(list, o);
-    for (int k = 0; k < N_TEXT; k++) cJSON_AddStringToObject(o, text[k].key, text_at(p, k));
-    for (int k = 0; k < N_NUMBER; k++) put_number(o, number[k].key, *number_at(p, k));
-    put_number(o, "size", p->measured.setting.size);
-    put_number(o, "nodes", p->n_node);
-    put_number(o, "substeps", p->n_substep);
-    cJSON_AddBoolToObject(o, "front", p->measured.front);
-    cJSON_AddStringToObject(o, "err", pal_err_name(p->err));
+    for (int k = 0; k < n; k++, f++) {
+        const void *at = (const char *)from + f->at;
+        if (f->kind >= NUMBER)
+            cJSON_AddItemToObject(object, f->key, pal_json_exact(*(const double *)at));
+        else if (f->kind == COUNT)
+            cJSON_AddItemToObject(object, f->key, pal_json_exact(*(const int *)at));
+        else if (f->kind == FLAG)
+            cJSON_AddBoolToObject(object, f->key, *(const bool *)at);
+        else
+            cJSON_AddStringToObject(object, f->key, f->kind == CODE ? pal_err_name(*(const pal_err *)at) : at);
+    }
 }
 
 cJSON *pal_study_file_tree(const pal_study_file *file)
 {
-    const pal_study *s = &file->study;
-    cJSON *root = cJSON_CreateObject(), *of;
+    cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "format", format);
-    cJSON_AddStringToObject(root, "name", s->name);
-    cJSON_AddStringToObject(root, "machine", s->machine);
-    cJSON_AddStringToObject(root, "reference", s->reference);
-    put_number(root, "reference_m", s->reference_m);
-    put_number(root, "max_m", s->max_m);
-    put_number(root, "length_scale_m", s->length_scale_m);
-    put_number(root, "step_s", s->step_s);
-    of = cJSON_AddObjectToObject(root, "subject");
-    cJSON_AddStringToObject(of, "body", file->body);
-    put_number(of, "index", file->index);
-    cJSON_AddStringToObject(of, "shape", file->shape);
-    cJSON_AddStringToObject(of, "loads", file->loads);
-    cJSON_AddStringToObject(of, "digest", file->digest);
-    cJSON_AddStringToObject(of, "methods", file->methods);
-    cJSON_AddStringToObject(root, "command", file->command);
-    put_number(root, "n_finest", file->n_finest);
-    cJSON_AddBoolToObject(root, "complete", file->whole);
+    put_fields(root, file_field, N_FILE, file);
+    put_fields(cJSON_AddObjectToObject(root, "subject"), subject_field, N_SUBJECT, file);
     cJSON *points = cJSON_AddArrayToObject(root, "points");
-    for (int k = 0; k < s->n_point; k++) put_point(points, &s->point[k]);
+    for (int k = 0; k < file->study.n_point; k++) {
+        cJSON *point = cJSON_CreateObject();
+        cJSON_AddItemToArray(points, point);
+        put_fields(point, point_field, N_POINT, &file->study.point[k]);
+    }
     return root;
 }
 
@@ -235,176 +244,128 @@ static void put_cell(FILE *to, const char *word)
 
 static void put_row(FILE *to, const pal_study_point *p)
 {
-    for (int k = 0; k < N_TEXT; k++) {
-        put_cell(to, text_at(p, k));
-        fputc(',', to);
-    }
-    fprintf(to, "%s,%d,%d,%d,%d", pal_err_name(p->err), p->measured.setting.size, p->n_node, p->n_substep,
-            p->measured.front);
-    for (int k = 0; k < N_NUMBER; k++) {
-        double value = *number_at(p, k);
-        if (isfinite(value))
-            fprintf(to, ",%.17g", value);
-        else
-            fputc(',', to);
+    for (int k = 0; k < N_POINT; k++) {
+        const field *f = &point_field[k];
+        const void *at = (const char *)p + f->at;
+        if (k > 0) fputc(',', to);
+        if (f->kind == TEXT || f->kind == TEXT_OR_EMPTY)
+            put_cell(to, at);
+        else if (f->kind == CODE)
+            fputs(pal_err_name(*(const pal_err *)at), to);
+        else if (f->kind == COUNT)
+            fprintf(to, "%d", *(const int *)at);
+        else if (f->kind == FLAG)
+            fprintf(to, "%d", *(const bool *)at);
+        else if (isfinite(*(const double *)at))
+            fprintf(to, "%.17g", *(const double *)at);
     }
     fputc('\n', to);
 }
 
 pal_err pal_study_file_csv(const pal_study_file *file, const char *path, pal_diagnostic *diag)
 {
-    char *bytes = NULL;
-    size_t n_byte = 0;
     int order[PAL_STUDY_POINTS];
-    FILE *to = open_memstream(&bytes, &n_byte);
-    if (!to) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for a table", path);
-    for (int k = 0; k < N_TEXT; k++) fprintf(to, "%s,", text[k].key);
-    fputs("err,size,nodes,substeps,front", to);
-    for (int k = 0; k < N_NUMBER; k++) fprintf(to, ",%s", number[k].key);
-    fputc('\n', to);
+    pal_file_out out;
+    PAL_TRY(pal_file_begin(&out, path, diag));
+    for (int k = 0; k < N_POINT; k++) fprintf(out.file, "%s%s", k ? "," : "", point_field[k].key);
+    fputc('\n', out.file);
     pal_study_order(&file->study, order);
-    for (int k = 0; k < file->study.n_point; k++) put_row(to, &file->study.point[order[k]]);
-    bool whole = !ferror(to);
-    whole = fclose(to) == 0 && whole;
-    pal_err err = whole ? pal_file_write(path, bytes, n_byte, diag)
-                        : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for a table", path);
-    free(bytes);
-    return err;
+    for (int k = 0; k < file->study.n_point; k++) put_row(out.file, &file->study.point[order[k]]);
+    return pal_file_end(&out, PAL_ERR_OK, diag);
 }
 
 /* ---- reading ---- */
 
-static pal_err need(const pal_json *json, const cJSON *object, const char *path, const char *key)
+static pal_err need(const pal_json *object, const char *key)
 {
-    char at[PAL_JSON_PATH];
-    if (cJSON_GetObjectItemCaseSensitive(object, key)) return PAL_ERR_OK;
-    return pal_json_refuse(json, pal_json_key(at, path, key), "is not there");
+    return pal_json_has(object, key) ? PAL_ERR_OK : pal_json_refuse_key(object, key, "is not there");
 }
 
-/* null is NaN where allowed */
-static pal_err get_number(const pal_json *json, const cJSON *object, const char *path, const number_key *k, void *out)
+static pal_err get_code(const pal_json *object, const char *key, pal_err *out)
 {
-    double value = k->late ? 0 : (double)NAN;
-    if (!k->late) PAL_TRY(need(json, object, path, k->key));
-    if (!k->hole || !cJSON_IsNull(cJSON_GetObjectItemCaseSensitive(object, k->key)))
-        PAL_TRY(pal_json_number(json, object, path, k->key, k->low, k->high, &value));
-    memcpy(out, &value, sizeof value);
-    return PAL_ERR_OK;
-}
-
-static pal_err get_count(const pal_json *json, const cJSON *object, const char *path, const char *key, int low,
-                         int high, int *out)
-{
-    PAL_TRY(need(json, object, path, key));
-    return pal_json_count(json, object, path, key, low, high, out);
-}
-
-static pal_err get_text(const pal_json *json, const cJSON *object, const char *path, const char *key, bool may_be_empty,
-                        char *out, size_t n_byte)
-{
-    PAL_TRY(need(json, object, path, key));
-    return pal_json_text(json, object, path, key, may_be_empty, out, n_byte);
-}
-
-static pal_err get_bool(const pal_json *json, const cJSON *object, const char *path, const char *key, bool *out)
-{
-    PAL_TRY(need(json, object, path, key));
-    return pal_json_bool(json, object, path, key, out);
-}
-
-static pal_err get_err(const pal_json *json, const cJSON *object, const char *path, pal_err *out)
-{
-    char at[PAL_JSON_PATH], word[32] = "";
-    PAL_TRY(get_text(json, object, path, "err", false, word, sizeof word));
+    char word[32] = "";
+    PAL_TRY(pal_json_text(object, key, false, word, sizeof word));
     for (int k = 0; k < PAL_ERR_COUNT; k++)
         if (!strcmp(word, pal_err_name((pal_err)k))) {
             *out = (pal_err)k;
             return PAL_ERR_OK;
         }
-    return pal_json_refuse(json, pal_json_key(at, path, "err"), "\"%s\" is no error code", word);
+    return pal_json_refuse_key(object, key, "\"%s\" is no error code", word);
 }
 
-static pal_err get_point(const pal_json *json, const cJSON *object, const char *path, pal_study_point *out)
+static pal_err get_field(const pal_json *object, const field *f, void *at)
 {
-    const char *known[N_TEXT + N_NUMBER + 6] = {"size", "nodes", "substeps", "front", "err"};
-    char at[PAL_JSON_PATH];
-    for (int k = 0; k < N_TEXT; k++) known[5 + k] = text[k].key;
-    for (int k = 0; k < N_NUMBER; k++) known[5 + N_TEXT + k] = number[k].key;
-    PAL_TRY(pal_json_object(json, object, path, known));
-    for (int k = 0; k < N_TEXT; k++)
-        PAL_TRY(
-            get_text(json, object, path, text[k].key, text[k].may_be_empty, (char *)out + text[k].at, text[k].n_byte));
-    for (int k = 0; k < N_NUMBER; k++) PAL_TRY(get_number(json, object, path, &number[k], (char *)out + number[k].at));
-    PAL_TRY(get_count(json, object, path, "size", -1, 1024, &out->measured.setting.size));
-    PAL_TRY(get_count(json, object, path, "nodes", 0, 1 << 30, &out->n_node));
-    PAL_TRY(get_count(json, object, path, "substeps", 0, 1 << 30, &out->n_substep));
-    PAL_TRY(get_bool(json, object, path, "front", &out->measured.front));
-    PAL_TRY(get_err(json, object, path, &out->err));
-    bool measured = isfinite(out->measured.ms) && isfinite(out->measured.error_m);
-    if (out->measured.front && !measured)
-        return pal_json_refuse(json, pal_json_key(at, path, "front"), "is true of a setting that was not measured");
+    if (f->kind != NUMBER_OPTIONAL) PAL_TRY(need(object, f->key));
+    switch (f->kind) {
+    case CODE:
+        return get_code(object, f->key, at);
+    case COUNT:
+        return pal_json_count(object, f->key, (int)f->low, (int)f->high, at);
+    case FLAG:
+        return pal_json_bool(object, f->key, at);
+    case TEXT:
+    case TEXT_OR_EMPTY:
+        return pal_json_text(object, f->key, f->kind == TEXT_OR_EMPTY, at, f->n_byte);
+    default:
+        if (f->kind != NUMBER_OR_NULL || !cJSON_IsNull(pal_json_at(object, f->key).value))
+            return pal_json_number(object, f->key, f->low, f->high, at);
+        *(double *)at = NAN;
+        return PAL_ERR_OK;
+    }
+}
+
+/* reads the fields of an object, whose other keys, NULL-terminated, are read elsewhere */
+static pal_err get_fields(const pal_json *object, const char *const *other, const field *f, int n, void *out)
+{
+    const char *known[PAL_JSON_KEYS] = {0};
+    int n_known = 0;
+    for (; *other; other++) known[n_known++] = *other;
+    for (int k = 0; k < n; k++) known[n_known++] = f[k].key;
+    PAL_TRY(pal_json_object(object, known));
+    for (int k = 0; k < n; k++) PAL_TRY(get_field(object, &f[k], (char *)out + f[k].at));
     return PAL_ERR_OK;
 }
 
-static pal_err get_of(const pal_json *json, const cJSON *root, pal_study_file *file)
+static pal_err get_points(const pal_json *root, pal_study *s)
 {
-    static const char *const known[] = {"body", "index", "shape", "loads", "digest", "methods", NULL};
-    PAL_TRY(need(json, root, "", "subject"));
-    const cJSON *of = cJSON_GetObjectItemCaseSensitive(root, "subject");
-    PAL_TRY(pal_json_object(json, of, "subject", known));
-    PAL_TRY(get_text(json, of, "subject", "body", true, file->body, sizeof file->body));
-    PAL_TRY(get_count(json, of, "subject", "index", 0, PAL_BODY_MAX - 1, &file->index));
-    PAL_TRY(get_text(json, of, "subject", "shape", false, file->shape, sizeof file->shape));
-    PAL_TRY(get_text(json, of, "subject", "loads", true, file->loads, sizeof file->loads));
-    PAL_TRY(get_text(json, of, "subject", "digest", true, file->digest, sizeof file->digest));
-    return get_text(json, of, "subject", "methods", true, file->methods, sizeof file->methods);
-}
-
-static pal_err get_points(const pal_json *json, const cJSON *root, pal_study *s)
-{
-    char path[PAL_JSON_PATH];
-    const cJSON *list;
-    PAL_TRY(need(json, root, "", "points"));
-    PAL_TRY(pal_json_list(json, root, "", "points", PAL_STUDY_POINTS, &list));
-    for (const cJSON *child = list->child; child; child = child->next, s->n_point++)
-        PAL_TRY(get_point(json, child, pal_json_entry(path, "points", s->n_point), &s->point[s->n_point]));
+    static const char *const none[] = {NULL};
+    pal_json list;
+    PAL_TRY(need(root, "points"));
+    PAL_TRY(pal_json_list(root, "points", PAL_STUDY_POINTS, &list));
+    PAL_JSON_EACH(child, &list)
+    {
+        pal_study_point *p = &s->point[s->n_point];
+        const pal_json at = pal_json_entry(&list, s->n_point, child);
+        PAL_TRY(get_fields(&at, none, point_field, N_POINT, p));
+        if (p->measured.front && !(isfinite(p->measured.ms) && isfinite(p->measured.error_m)))
+            return pal_json_refuse_key(&at, "front", "is true of a setting that was not measured");
+        s->n_point++;
+    }
     return PAL_ERR_OK;
 }
 
-static pal_err get_file(const pal_json *json, const cJSON *root, pal_study_file *file)
+static pal_err get_file(const pal_json *root, pal_study_file *file)
 {
-    static const char *const known[] = {"format",   "name",           "machine", "reference", "reference_m",
-                                        "max_m",    "length_scale_m", "step_s",  "subject",   "command",
-                                        "n_finest", "complete",       "points",  NULL};
-    static const number_key own[] = {{"reference_m", offsetof(pal_study, reference_m), 0, 1e300, true, false},
-                                     {"max_m", offsetof(pal_study, max_m), 0, 1e300, true, false},
-                                     {"length_scale_m", offsetof(pal_study, length_scale_m), 0, 1e300, true, false},
-                                     {"step_s", offsetof(pal_study, step_s), 0, 0.1, false, false}};
-    pal_study *s = &file->study;
+    static const char *const other[] = {"format", "subject", "points", NULL}, *const none[] = {NULL};
+    const pal_json subject = pal_json_at(root, "subject");
     char word[32] = "";
-    PAL_TRY(pal_json_object(json, root, "", known));
-    PAL_TRY(get_text(json, root, "", "format", false, word, sizeof word));
-    if (strcmp(word, format) != 0) return pal_json_refuse(json, "format", "is \"%s\", wanted \"%s\"", word, format);
-    PAL_TRY(get_text(json, root, "", "name", true, s->name, sizeof s->name));
-    PAL_TRY(get_text(json, root, "", "machine", true, s->machine, sizeof s->machine));
-    PAL_TRY(get_text(json, root, "", "reference", true, s->reference, sizeof s->reference));
-    for (size_t k = 0; k < sizeof own / sizeof *own; k++)
-        PAL_TRY(get_number(json, root, "", &own[k], (char *)s + own[k].at));
-    PAL_TRY(get_of(json, root, file));
-    PAL_TRY(get_text(json, root, "", "command", true, file->command, sizeof file->command));
-    PAL_TRY(get_count(json, root, "", "n_finest", 0, PAL_STUDY_POINTS, &file->n_finest));
-    PAL_TRY(get_bool(json, root, "", "complete", &file->whole));
-    return get_points(json, root, s);
+    PAL_TRY(get_fields(root, other, file_field, N_FILE, file));
+    PAL_TRY(need(root, "format"));
+    PAL_TRY(pal_json_text(root, "format", false, word, sizeof word));
+    if (strcmp(word, format) != 0) return pal_json_refuse_key(root, "format", "is \"%s\", wanted \"%s\"", word, format);
+    PAL_TRY(need(root, "subject"));
+    PAL_TRY(get_fields(&subject, none, subject_field, N_SUBJECT, file));
+    return get_points(root, &file->study);
 }
 
 pal_err pal_study_file_parse(const char *name, const char *bytes, size_t n_byte, pal_study_file **out,
                              pal_diagnostic *diag)
 {
-    pal_json json = {name, diag};
+    pal_json json = {.file = name, .diag = diag};
     cJSON *root;
     PAL_TRY(pal_json_parse(&json, bytes, n_byte, &root));
     pal_study_file *file = calloc(1, sizeof *file);
-    pal_err err = file ? get_file(&json, root, file) : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory", name);
+    pal_err err = file ? get_file(&json, file) : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory", name);
     cJSON_Delete(root);
     if (err)
         free(file);
@@ -447,7 +408,7 @@ int pal_study_configurations(const pal_study *study, pal_measured_configuration 
     pal_study_order(study, order);
     for (int k = 0; k < study->n_point; k++) {
         const pal_study_point *p = &study->point[order[k]];
-        if (p->err || !isfinite(p->measured.ms) || !isfinite(p->measured.error_m)) continue;
+        if (!pal_study_measured(p)) continue;
         out[n] = p->measured;
         if (out[n].setting.step_s == 0) out[n].setting.step_s = study->step_s;
         n++;

@@ -7,7 +7,7 @@
  *    "subject": {"body": "liver", "index": 0, "shape": "16 hex digits",
  *    "loads": "three presses and a pull, 0.5 s", "digest": "16 hex digits", "methods": "fem"},
  *    "command": "palpate study liver/scene.json",
- *    "n_finest": 48, "complete": true,
+ *    "n_total": 48, "complete": true,
  *    "points": [{"model": "fem", "element": .., "law": .., "solver": .., "size": 16, "step_s": .., "tolerance": ..,
  *    "k_distance_J": .., "k_area_J": .., "k_volume_J": .., "ms": .., "error_m": .., "front": true, "err": "OK",
  *    "reason": "", "nodes": .., "substeps": .., "ms_p95": .., "static_rms_m": .., "static_max_m": ..,
@@ -20,6 +20,7 @@
  * (.svg) and a page (.html) of the same name may stand beside it. Thread: [load]. */
 #ifndef PAL_STUDY_STUDY_STORE_H
 #define PAL_STUDY_STUDY_STORE_H
+#include "server/base/hash.h"
 #include "server/study/study.h"
 
 #include <cjson/cJSON.h>
@@ -37,15 +38,17 @@ typedef struct pal_study_file {
     char digest[PAL_STUDY_SHAPE];    /* of the loads' numbers and of samples that replace the reference; may be "" */
     char methods[200];               /* words of --methods, comma-separated; "": all that apply */
     char command[PAL_STUDY_COMMAND]; /* as typed */
-    int n_finest;                    /* number of configurations of the complete study */
+    int n_total;                     /* number of configurations of the complete study */
     bool whole;
 } pal_study_file;
 
 /* Hash of the properties of a body that a study depends on: shape, material, regions, strokes, supports and
  * damping; not model, solver, mesh and step. 16 hexadecimal digits; not cryptographic. */
 const char *pal_study_shape(const pal_body_def *body, char out[PAL_STUDY_SHAPE]);
-/* Hash of bytes, continued from another hash (0: start). */
-uint64_t pal_study_digest(uint64_t before, const void *bytes, size_t n_byte);
+/* Hash of numbers, or of their absence (NULL), continued from `hash` (hash.h). */
+uint64_t pal_study_digest_numbers(uint64_t hash, const double *value, size_t n);
+/* Hash of one load, continued likewise. */
+uint64_t pal_study_digest_load(uint64_t hash, const pal_problem_load *load);
 /* Path of the study files without ending: "liver/scene.json", "liver" or "liver.stl" -> "liver/study",
  * "liver_study". If folder is not NULL: "study" in it. REFUSED: too long. */
 pal_err pal_study_stem(const char *word, const char *folder, char out[PAL_STUDY_PATH], pal_diagnostic *diag);
@@ -66,6 +69,4 @@ pal_err pal_study_file_csv(const pal_study_file *file, const char *path, pal_dia
 void pal_study_order(const pal_study *study, int *out);
 /* The measured points by ascending ms, with step_s set; out [PAL_STUDY_POINTS]. Returns the count. */
 int pal_study_configurations(const pal_study *study, pal_measured_configuration *out);
-/* Is the model among the comma-separated methods ("": all)? */
-bool pal_study_method_in(const char *methods, const char *model);
 #endif

@@ -1,6 +1,7 @@
 /* A body in a configuration: its world, its nodal loads, its points. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
+#include "server/sim/core/effect_list.h"
 #include "server/solve/load_case.h"
 #include "server/study/study_job.h"
 
@@ -21,11 +22,12 @@ void pal_study_close(pal_study_world *w)
 
 static bool is_tool(const char *name)
 {
-    return pal_study_is(name, "tool_push") || pal_study_is(name, "tool_grasp") || pal_study_is(name, "finite_guard");
+    const pal_effect *effect = pal_effect_find(name);
+    return (effect && effect->sleep.reach_m) || pal_study_is(name, "finite_guard");
 }
 
 /* Removes what statics do not need; few Newton iterations per step, so that progress can be observed. */
-static pal_err make_still(pal_body_def *body, pal_diagnostic *diag)
+static pal_err prepare_statics(pal_body_def *body, pal_diagnostic *diag)
 {
     int kept = 0;
     for (int k = 0; k < body->n_effect; k++)
@@ -40,18 +42,18 @@ static pal_err find_points(const pal_study_job *job, pal_study_world *w)
 {
     const pal_body *b = w->body;
     if (b->tets && !b->interpolation) return pal_locate_create(b->tets, b->n_corner == 8 ? b->hexes : NULL, &w->locate);
-    w->surface = job->adaptive ? &job->scene->body[0].mesh->surface : b->surface;
-    w->node = job->adaptive ? NULL : b->shown_node;
+    w->surface = job->adaptive ? &job->scene->body[0].mesh->surface : b->display.surface;
+    w->node = job->adaptive ? NULL : b->display.shown_node;
     return w->surface ? PAL_ERR_OK : PAL_ERR_INTERNAL;
 }
 
-pal_err pal_study_open(const pal_study_job *job, const pal_configuration *setting, bool still, pal_study_world *out,
+pal_err pal_study_open(const pal_study_job *job, const pal_configuration *setting, bool statics, pal_study_world *out,
                        pal_diagnostic *diag)
 {
     *out = (pal_study_world){.set = NULL};
     double start = pal_clock_s();
     pal_err err = pal_configuration_make(job->scene, 0, setting, diag, &out->set);
-    if (!err && still) err = make_still(&out->set->scene.body[0], diag);
+    if (!err && statics) err = prepare_statics(&out->set->scene.body[0], diag);
     if (!err) err = pal_world_create(&out->set->scene, diag, &out->world);
     if (!err) {
         out->prepare_s = pal_clock_s() - start;
@@ -150,8 +152,8 @@ pal_err pal_study_forces(const pal_study_job *job, const pal_study_world *w, con
 {
     memset(force_N, 0, 3 * sizeof *force_N * (size_t)w->body->n_node);
     if (!w->locate) return surface_forces(w, load, force_N, diag);
-    return pal_case_forces(job->problem, load, w->body, w->locate, &w->set->scene.body[0].mesh->surface, force_N, NULL,
-                           diag);
+    return pal_case_forces(job->problem, load, -1, w->body, w->locate, &w->set->scene.body[0].mesh->surface, force_N,
+                           NULL, diag);
 }
 
 pal_err pal_study_apply_load(const pal_study_job *job, const pal_study_world *w, const pal_problem_case *load,

@@ -103,7 +103,8 @@ static bool prepare(const subject *s, int resolution, const char *solver, solved
     to->load = calloc(3 * (size_t)to->body->n_node, sizeof *to->load);
     bool hex = to->body->n_corner == 8;
     return to->load && !pal_locate_create(&to->mesh.tets, hex ? &to->mesh.hexes : NULL, &to->locate) &&
-           !pal_case_forces(s->problem, s->load_case, to->body, to->locate, &to->mesh.surface, to->load, NULL, NULL);
+           !pal_case_forces(s->problem, s->load_case, -1, to->body, to->locate, &to->mesh.surface, to->load, NULL,
+                            NULL);
 }
 
 static bool solve(const subject *s, int resolution, solved *to)
@@ -202,7 +203,7 @@ static void compare_stress(void *user, const pal_stress_point *p)
 static const pal_component *stress_row(const solved *s)
 {
     int i = 0;
-    while (!pal_world_component(s->world, i)->effect->stress) i++;
+    while (!pal_world_component(s->world, i)->effect->inspect.stress) i++;
     return pal_world_component(s->world, i);
 }
 
@@ -213,8 +214,8 @@ static double stress_off(const solved *coarse, const solved *fine)
     const pal_component *a = stress_row(coarse), *b = stress_row(fine);
     t.coarse_stress = calloc((size_t)coarse->body->n_element, sizeof *t.coarse_stress);
     if (!t.coarse_stress) return NAN;
-    a->effect->stress(a->self, coarse->body, keep_stress, &t);
-    b->effect->stress(b->self, fine->body, compare_stress, &t);
+    a->effect->inspect.stress(a->self, coarse->body, keep_stress, &t);
+    b->effect->inspect.stress(b->self, fine->body, compare_stress, &t);
     free(t.coarse_stress);
     return 100 * sqrt(t.error2 / t.solution2);
 }

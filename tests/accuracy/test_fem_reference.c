@@ -43,9 +43,9 @@ static void check_row(const pal_problem *problem, const pal_surface *surface, co
     REQUIRE(reference);
     pal_solve_options options = {.element = r->element,
                                  .law = r->law,
-                                 .resolution = r->resolution,
-                                 .fill = true,
-                                 .align = true,
+                                 .voxel.resolution = r->resolution,
+                                 .voxel.fill = true,
+                                 .voxel.align = true,
                                  .split = r->split,
                                  .young_Pa = reference->young_Pa,
                                  .poisson = reference->poisson};

@@ -16,9 +16,9 @@ static double *solve(const char *path, const char *load_case, const pal_samples 
     pal_mesh_file_options file = {.unit_m = 1, .weld = PAL_MESH_WELD};
     pal_solve_options options = {.element = "hex8_bbar",
                                  .law = "linear",
-                                 .resolution = RESOLUTION,
-                                 .fill = true,
-                                 .align = true,
+                                 .voxel.resolution = RESOLUTION,
+                                 .voxel.fill = true,
+                                 .voxel.align = true,
                                  .young_Pa = NAN,
                                  .poisson = NAN};
     pal_solution *solution = NULL;

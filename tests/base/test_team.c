@@ -2,7 +2,6 @@
 #include "server/base/team.h"
 #include "tests/check.h"
 
-#include <dirent.h>
 #include <errno.h>
 #include <limits.h>
 #include <pthread.h>
@@ -11,7 +10,6 @@
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdint.h>
-#include <time.h>
 
 enum { MAX_PIECE = 4096 };
 
@@ -25,6 +23,42 @@ int __wrap_pthread_create(pthread_t *thread, const pthread_attr_t *attr, void *(
     if (threads_left <= 0) return EAGAIN;
     threads_left--;
     return __real_pthread_create(thread, attr, run, user);
+}
+
+/* threads that wait for a condition of the team */
+static pthread_mutex_t asleep_lock = PTHREAD_MUTEX_INITIALIZER;
+static sem_t asleep_changed;
+static int n_asleep;
+
+int __real_pthread_cond_wait(pthread_cond_t *condition, pthread_mutex_t *lock);
+int __wrap_pthread_cond_wait(pthread_cond_t *condition, pthread_mutex_t *lock);
+
+static void count_asleep(int by)
+{
+    pthread_mutex_lock(&asleep_lock);
+    n_asleep += by;
+    pthread_mutex_unlock(&asleep_lock);
+    sem_post(&asleep_changed);
+}
+
+int __wrap_pthread_cond_wait(pthread_cond_t *condition, pthread_mutex_t *lock)
+{
+    count_asleep(1);
+    int result = __real_pthread_cond_wait(condition, lock);
+    count_asleep(-1);
+    return result;
+}
+
+/* until n threads wait; a team whose threads never sleep never gets there */
+static void wait_asleep(int n)
+{
+    for (;;) {
+        pthread_mutex_lock(&asleep_lock);
+        bool reached = n_asleep == n;
+        pthread_mutex_unlock(&asleep_lock);
+        if (reached) return;
+        while (sem_wait(&asleep_changed)) continue;
+    }
 }
 
 typedef struct board {
@@ -111,11 +145,8 @@ static void meet(void *user, int worker, int i)
     (void)worker;
     meeting *m = user;
     for (int k = 0; k < 2; k++) sem_post(&m->come[i]);
-    struct timespec until;
-    clock_gettime(CLOCK_REALTIME, &until);
-    until.tv_sec += 20; /* only for a team that is none */
     for (int k = 1; k < 3; k++)
-        if (sem_timedwait(&m->come[(i + k) % 3], &until)) return;
+        while (sem_wait(&m->come[(i + k) % 3])) continue;
     atomic_fetch_add(&m->met, 1);
 }
 
@@ -133,37 +164,16 @@ static void works_side_by_side(void)
     for (int i = 0; i < 3; i++) sem_destroy(&m.come[i]);
 }
 
-/* threads of this process that are not asleep, without the one that asks */
-static int count_awake(void)
-{
-    DIR *dir = opendir("/proc/self/task");
-    if (!dir) return -1;
-    int n = 0;
-    for (struct dirent *e; (e = readdir(dir));) {
-        char path[320], line[512] = "";
-        if (e->d_name[0] == '.' || atoi(e->d_name) == getpid()) continue;
-        snprintf(path, sizeof path, "/proc/self/task/%s/stat", e->d_name);
-        FILE *file = fopen(path, "r");
-        if (!file) continue;
-        if (!fgets(line, sizeof line, file)) line[0] = 0;
-        fclose(file);
-        const char *end = strrchr(line, ')');
-        n += !end || end[2] != 'S';
-    }
-    closedir(dir);
-    return n;
-}
-
 static void sleeps_between_runs(void)
 {
     pal_team *team = NULL;
-    int count[6] = {0}, awake = -1;
+    int count[6] = {0};
     REQUIRE(pal_team_create(6, &team) == PAL_ERR_OK);
-    pal_team_run(team, 6, add_one, count);
-    for (int wait = 0; wait < 30000 && (awake = count_awake()) > 0; wait++) usleep(1000);
-    CHECK_INT(awake, 0);
-    pal_team_run(team, 6, add_one, count);
-    for (int i = 0; i < 6; i++) CHECK_INT(count[i], 2);
+    for (int run = 1; run <= 20; run++) {
+        pal_team_run(team, 6, add_one, count);
+        wait_asleep(5);
+    }
+    for (int i = 0; i < 6; i++) CHECK_INT(count[i], 20);
     pal_team_destroy(team);
 }
 
@@ -245,6 +255,7 @@ static void leaves_signals_to_the_program(void)
 
 int main(void)
 {
+    sem_init(&asleep_changed, 0, 0);
     RUN(does_every_piece_once_and_one_at_a_time_per_worker);
     RUN(hands_over_thousands_of_short_runs);
     RUN(works_side_by_side);

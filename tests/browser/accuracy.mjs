@@ -305,7 +305,12 @@ await run(async () => {
         );
         const kept = await until(
             () => colours(ben),
-            (c) => c.field === "displacement" && c.values && c.component && c.options.includes("stiffness") === springs,
+            (c) =>
+                c.field === "displacement" &&
+                c.legend &&
+                c.values &&
+                c.component &&
+                c.options.includes("stiffness") === springs,
         );
         check(
             "the second browser keeps a field of both methods",
@@ -314,7 +319,7 @@ await run(async () => {
                 kept.values &&
                 kept.component &&
                 kept.options.includes("stiffness") === springs,
-            kept.options.join(),
+            JSON.stringify(kept),
         );
     }
     for (const page of [ada, ben]) await choose(page, "none");
@@ -332,7 +337,6 @@ await run(async () => {
         const before = await until(
             () => shown(ada),
             (s) => left(s) && !s.busy,
-            40000,
         );
         const near = left(before);
         if (!near) break;
@@ -366,7 +370,7 @@ await run(async () => {
             !p.dirty &&
             [...p.organ, ...p.hint].every((x) => x >= p.free[0] - 1 && x <= p.free[1] + 1) &&
             p.free[1] < width;
-        const at = await until(() => extents(ada), within, 20000);
+        const at = await until(() => extents(ada), within);
         check(`${width} pixels wide, the organ and the hint are between the panels`, within(at), JSON.stringify(at));
     }
     await ada.setViewportSize({ width: 1200, height: 800 });

@@ -7,7 +7,9 @@ import {
     check,
     checkConsoles,
     displacement,
+    drag,
     launch,
+    nextFrame,
     open,
     palpate,
     pictures,
@@ -123,7 +125,7 @@ await run(async () => {
     await ada.mouse.down();
     for (let i = 0; i < 10; i++) {
         await ada.mouse.wheel(0, -20); // deeper
-        await new Promise((r) => setTimeout(r, 60));
+        await nextFrame(ada);
     }
     const fine = await until(
         () => shown(ada),
@@ -218,10 +220,7 @@ await run(async () => {
     await ada.click("#mode-pull");
     await ada.mouse.move(pixel.x, pixel.y);
     await ada.mouse.down();
-    for (let i = 1; i <= 10; i++) {
-        await ada.mouse.move(pixel.x - 8 * i, pixel.y - 2 * i);
-        await new Promise((r) => setTimeout(r, 60));
-    }
+    await drag(ada, pixel, -8, -2, 10);
     const pulled = await until(
         async () => ({ ...(await shown(ada)), far: await displacement(ada) }),
         (s) => s.far > 0.01 && s.triangles > rest.triangles && agrees(s),

@@ -7,6 +7,7 @@ import {
     check,
     checkConsoles,
     displacement,
+    drag,
     launch,
     open,
     organPixel,
@@ -56,14 +57,10 @@ await run(async () => {
     check("the body is at rest", rest < 1e-4, `${1000 * rest} mm`);
     await page.mouse.move(pixel.x, pixel.y);
     await page.mouse.down();
-    for (let i = 1; i <= 12; i++) {
-        await page.mouse.move(pixel.x + 8 * i, pixel.y - 4 * i);
-        await new Promise((r) => setTimeout(r, 60));
-    }
+    await drag(page, pixel, 8, -4, 12);
     const max = await until(
         () => displacement(page),
         (m) => m > 0.02,
-        90000,
     );
     check("the body follows the tool", max > 0.02 && max < 3, `${1000 * max} mm`);
     await page.screenshot({ path: join(pictures, "calibrated.png") });

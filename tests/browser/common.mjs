@@ -119,7 +119,7 @@ export async function launch() {
 /** a page that shows the organ */
 export async function open(browser, address, name, viewport) {
     const page = await browser.newPage({ viewport });
-    page.setDefaultTimeout(180000);
+    page.setDefaultTimeout(300000);
     page.on("console", (m) => m.type() === "error" && consoleErrors.push(`${name}: ${m.text()}`));
     page.on("pageerror", (e) => consoleErrors.push(`${name}: ${e.message}`));
     await page.goto(`${address}?name=${name}`);
@@ -146,12 +146,40 @@ export const organPixel = (page) =>
         return null;
     });
 
-/** waits until test(await read()) holds or the time is over and returns the last value; long, for busy machines */
-export async function until(read, test = Boolean, ms = 90000) {
+const openPage = () => browsers.flatMap((b) => b.contexts().flatMap((c) => c.pages())).find((p) => !p.isClosed());
+/** the next picture of a page */
+export const nextFrame = (page) => page.evaluate(() => new Promise(requestAnimationFrame));
+
+/**
+ * waits until test(await read()) holds, from picture to picture of any page, and returns the last value; the limit only
+ * ends what hangs
+ */
+export async function until(read, test = Boolean, ms = 300000) {
     const end = Date.now() + ms;
     for (;;) {
         const value = await read();
         if (test(value) || Date.now() > end) return value;
-        await new Promise((r) => setTimeout(r, 60));
+        await nextFrame(openPage());
+    }
+}
+
+/** displacement, once it changes by less than tolerance(m) over so many seconds of the session */
+export async function settled(page, tolerance, seconds) {
+    let last = { time: -Infinity, m: NaN };
+    const now = await until(async () => {
+        const time = await page.evaluate(() => window.palpate.state.status.sim_time_s);
+        if (time < last.time + seconds) return null;
+        const before = last;
+        last = { time, m: await displacement(page) };
+        return Math.abs(last.m - before.m) < tolerance(last.m) ? last : null;
+    });
+    return now?.m ?? NaN;
+}
+
+/** moves the pressed mouse from a pixel in steps, a picture each */
+export async function drag(page, pixel, dx, dy, steps) {
+    for (let i = 1; i <= steps; i++) {
+        await page.mouse.move(pixel.x + dx * i, pixel.y + dy * i);
+        await nextFrame(page);
     }
 }

@@ -6,6 +6,7 @@ import {
     checkConsoles,
     consoleErrors,
     displacement,
+    drag,
     launch,
     open,
     organPixel,
@@ -14,6 +15,7 @@ import {
     prepare,
     run,
     serve,
+    settled,
     until,
 } from "./common.mjs";
 
@@ -41,29 +43,14 @@ await run(async () => {
     );
 
     // the organ settles under its weight
-    let last = NaN;
-    const before = await until(
-        async () => {
-            last = await displacement(ben);
-            await new Promise((r) => setTimeout(r, 1500));
-            return displacement(ben);
-        },
-        (m) => Math.abs(m - last) < 0.0005,
-    );
-    check(
-        "the organ comes to rest",
-        Math.abs(before - last) < 0.0005 && before < 0.03,
-        `${(1000 * before).toFixed(2)} mm`,
-    );
+    const before = await settled(ben, () => 0.0005, 1.5);
+    check("the organ comes to rest", before < 0.03, `${(1000 * before).toFixed(2)} mm`);
 
     const pixel = await organPixel(ada);
     check("the organ is visible", !!pixel);
     await ada.mouse.move(pixel.x, pixel.y);
     await ada.mouse.down();
-    for (let i = 1; i <= 12; i++) {
-        await ada.mouse.move(pixel.x + 7 * i, pixel.y - 8 * i);
-        await new Promise((r) => setTimeout(r, 40));
-    }
+    await drag(ada, pixel, 7, -8, 12);
     const pulled = await until(
         () => displacement(ben),
         (m) => m > before + 0.01,
@@ -91,7 +78,7 @@ await run(async () => {
     );
     check("the tool of the other member is shown with its name", label.includes("Ada"), label.join(" "));
     await ada.keyboard.press("p"); // the panel, while the drag goes on
-    await new Promise((r) => setTimeout(r, 1500));
+    await ada.locator("#panel").waitFor();
     await ada.screenshot({ path: join(pictures, "pull_ada.png") });
     await ben.screenshot({ path: join(pictures, "pull_ben_phone.png") });
     await ada.mouse.up();

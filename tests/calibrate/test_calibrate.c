@@ -424,7 +424,7 @@ static void a_study_fits_springs_that_keep_a_tenth_of_their_volume_stiffness(voi
     for (int i = 0; i < s[0].n; i++)
         for (int c = 0; c < 3; c++) job->probe[3 * i + c] -= mesh.surface.origin_m[c];
     /* the last one is not fitted to */
-    for (int k = 0; k < 4; k++) job->load[k] = &truth.problem.load_case[k % 3], job->still[k] = s[k % 3].u;
+    for (int k = 0; k < 4; k++) job->load[k] = &truth.problem.load_case[k % 3], job->static_u[k] = s[k % 3].u;
     CHECK_INT(pal_study_fit(job, &setting, &diag), 0);
     const double start[2] = {exp(truth.info.start[0]), exp(truth.info.start[1])};
     printf("  edges %.3g, volumes %.3g of the material's\n", setting.k_distance_J / start[0],

@@ -109,8 +109,7 @@ static void bench_close(bench *b)
 
 static pal_err rest(bench *b, bool linear, double tolerance, double *x, pal_equilibrium_report *report)
 {
-    pal_equilibrium_options o;
-    pal_equilibrium_default(&o);
+    pal_equilibrium_options o = {.linear = false};
     o.linear = linear;
     if (tolerance > 0) o.tolerance = tolerance;
     diag.text[0] = 0;
@@ -308,11 +307,10 @@ static void slopes_are_those_of_differences(void)
     for (int turn = 0; turn < 2; turn++) {
         bench b;
         double *slope[PAL_SPRING_KINDS];
-        pal_equilibrium_options o;
+        pal_equilibrium_options o = {.linear = false};
         REQUIRE(bench_bar(&b, "volume"));
         vary(&b);
         load_end(&b, 0.01);
-        pal_equilibrium_default(&o);
         o.linear = turn == 0;
         double *dJ_du = b.f + 3 * b.lattice.n_node;
         for (int k = 0; k < PAL_SPRING_KINDS; k++)

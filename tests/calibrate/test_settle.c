@@ -37,9 +37,8 @@ static bool find_rest(beam *b)
 {
     const double factor = young * h * h * h;
     pal_equilibrium_workspace *workspace;
-    pal_equilibrium_options o;
+    pal_equilibrium_options o = {.linear = false};
     double *k[PAL_SPRING_KINDS];
-    pal_equilibrium_default(&o);
     memcpy(b->u, b->lattice.x_rest, 3 * sizeof(double) * (size_t)b->n);
     if (pal_equilibrium_workspace_create(&b->lattice, &workspace)) return false;
     for (int s = 0; s < PAL_SPRING_KINDS; s++) {

@@ -6,14 +6,9 @@ bin=$1
 make_scene
 start_server --port 0
 
-# once more where the servo loop was late and forces were off for that (servo_thread.c)
-for try in 1 2 3 4; do
-    timeout 60 "$bin/palpate-bridge" --server "$url" --device virtual:premium --seconds 4.5 --json >"$work/hold" 2>/dev/null
-    code=$?
-    holds "$(json force_max_N "$work/hold")" '>' 0.1 || ! late "$work/hold" || [ $try -eq 4 ] || continue
-    break
-done
-check "a bridge that presses and holds ends well" $code == 0
+timeout 110 "$bin/palpate-bridge" --server "$url" --device "$(device premium)" --seconds 100 \
+    --until models=11,poses=101,force_N=0.11 --json >"$work/hold" 2>"$work/hold.err"
+check "a bridge that presses and holds ends well" $? == 0
 check "it holds a tool" "$(json tool "$work/hold")" '>=' 0
 check "models come" "$(json models "$work/hold")" '>' 10
 check "none of them is refused" "$(json not_finite "$work/hold")" == 0
@@ -22,31 +17,33 @@ check "and never more than the cap" "$(json force_max_N "$work/hold")" '<=' 3
 check "poses go out" "$(json poses "$work/hold")" '>' 100
 echo "     largest step of force at a model: $(json jump_max_N "$work/hold") N"
 
-# emergency stop by signal while it presses
-for try in 1 2 3 4; do
-    timeout 60 "$bin/palpate-bridge" --server "$url" --device virtual:touch --seconds 50 --json >"$work/stop" 2>/dev/null &
+# presses NAME [flags]: a bridge in the background, until it presses; its pid in $job
+presses() {
+    name=$1
+    shift
+    timeout 110 "$bin/palpate-bridge" --server "$url" --device "$(device touch)" --seconds 100 "$@" >"$work/$name" 2>"$work/$name.err" &
     job=$!
-    members 1
-    sleep $((2 + 2 * try)) # more where the hand came too late
-    kill -USR1 "$(ps -o pid= --ppid "$job" | head -1)"
-    sleep 0.5
-    stop $job
-    holds "$(json force_max_N "$work/stop")" '>' 0.05 && break
-done
-check "an emergency stop is latched" "$([ "$(json state "$work/stop")" = estop ] && echo 1)" == 1
-check "it had pressed before" "$(json force_max_N "$work/stop")" '>' 0.05
+    shows "$work/$name.err" $job 'info touch: '
+}
+
+# emergency stop by signal while it presses
+presses stop
+check "a second one presses" $? == 0
+kill -USR1 "$(ps -o pid= --ppid "$job" | head -1)"
+shows "$work/stop.err" $job 'emergency stop'
+check "an emergency stop is reported" $? == 0
+stop $job
+check "and latched" "$(grep -c 'state estop;' "$work/stop")" == 1
 
 # the server goes while it presses: models stale, force gone
-timeout 60 "$bin/palpate-bridge" --server "$url" --seconds 50 --json >"$work/gone" 2>/dev/null &
-job=$!
-members 1
-sleep 3
+presses gone --until stale=1,free=1
+check "a third one presses" $? == 0
 kill "$server_job"
 wait "$server_job" 2>/dev/null
-sleep 2
-stop $job
-check "without a server models are stale" "$(json stale "$work/gone")" '>=' 1
-check "and the device is free again" "$([ "$(json state "$work/gone")" = free ] && echo 1)" == 1
+wait $job
+check "it ends well" $? == 0
+check "without a server models are stale" "$(sed -n 's/.* \([0-9]*\) times stale/\1/p' "$work/gone")" '>=' 1
+check "and the device is free again" "$(grep -c 'state free;' "$work/gone")" == 1
 
 timeout 20 "$bin/palpate-bridge" --server "$url" --seconds 1 --json >"$work/nobody" 2>"$work/nobody.err"
 check "nobody at the address is a failure" $? == 1

@@ -58,7 +58,7 @@ static palpate_haptic_model_t a_model(palpate_contact_patch_t *patch, int n)
                                     .frame_us = 16667,
                                     .origin = {1, 2, 3},
                                     .f_ref = {0, 0, 1},
-                                    .npatch = (int8_t)n,
+                                    .n_patch = (int8_t)n,
                                     .patch = patch};
 }
 
@@ -134,7 +134,7 @@ static void walk_refuses_lying_counts_and_strings(void)
     size_t n[8];
     const lcm_type_info_t *type[8];
     all_messages(bytes, n, type);
-    /* haptic_model: npatch stands at 137 */
+    /* haptic_model: n_patch stands at 137 */
     CHECK_INT(bytes[1][137], 4);
     bytes[1][137] = 0x80;
     CHECK_INT(pal_lcm_walk(type[1], bytes[1], n[1]), PAL_WALK_NUMBER);
@@ -281,7 +281,7 @@ static void haptic_model_survives_the_way_to_lcm_and_back(void)
     CHECK_NEAR(back.origin_m[2], 0.3, 0);
     /* nine patches are more than a bridge takes */
     palpate_contact_patch_t nine[9] = {{0}};
-    model.patch = nine, model.npatch = 9;
+    model.patch = nine, model.n_patch = 9;
     n = encoded(palpate_haptic_model_t_get_type_info(), &model, bytes, sizeof bytes);
     CHECK_INT(pal_lcm_walk(palpate_haptic_model_t_get_type_info(), bytes, n), PAL_WALK_OK);
     CHECK_INT(pal_lcm_to_haptic(bytes, n, &back), PAL_ERR_REFUSED);
@@ -307,7 +307,6 @@ static void states_of_many_tools_come_through_the_memory_bus(void)
     static const pal_lcm_events events = {on_message, on_refused};
     pal_lcm_link *link = NULL;
     REQUIRE(pal_lcm_link_open(NULL, "memq://", &events, NULL, NULL, &link) == PAL_ERR_OK);
-    CHECK(pal_lcm_link_is_up(link));
     CHECK_INT(pal_lcm_link_subscribe(link, "PALPATE1/.*/TOOL/.*", palpate_tool_state_t_get_type_info()), PAL_ERR_OK);
     for (int tool = 0; tool < 8; tool++) {
         palpate_tool_state_t state = a_state();

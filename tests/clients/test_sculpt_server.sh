@@ -38,7 +38,7 @@ press=$!
 timeout 120 "$bin/palpate-client" "$url" --json --script idle --seconds 110 --name looks --field displacement \
     --until topologies=11,cycles_of_it=20,fields=3 >"$work/look" 2>"$work/look.err" &
 look=$!
-timeout 120 "$bin/palpate-bridge" --server "$url" --device virtual:premium --options depth=4 --seconds 115 \
+timeout 120 "$bin/palpate-bridge" --server "$url" --device "$(device premium)" --options depth=4 --seconds 115 \
     --json >"$work/bridge" 2>"$work/bridge.err" &
 bridge=$!
 members 3

@@ -138,6 +138,22 @@ static void stale_model_fades_out_in_100_and_500_ms_and_comes_back_slowly(void)
     rig_close(&r);
 }
 
+/* the network thread is another one: its stamp may lie after the time with which the tick began */
+static void model_that_comes_during_the_tick_is_fresh(void)
+{
+    trial r;
+    REQUIRE(rig_open(&r, "premium,script=press-hold,clock=virtual", 300));
+    rig_run(&r, 4);
+    r.model.seq = ++r.seq;
+    pal_servo_put_model(r.servo, &r.model, r.generation, r.now_ns + 5000);
+    rig_tick(&r);
+    CHECK_INT(r.view.model_seq, r.seq);
+    CHECK_INT(r.view.model_age_us, 0);
+    CHECK_INT(r.view.n_stale, 0);
+    CHECK_NEAR(r.view.fade, 1, 0);
+    rig_close(&r);
+}
+
 static void emergency_stop_takes_force_away_within_two_ticks_and_stays(void)
 {
     trial r;
@@ -312,6 +328,7 @@ int main(void)
 {
     RUN(press_and_hold_on_a_plane_is_stable_and_feels_its_stiffness);
     RUN(stale_model_fades_out_in_100_and_500_ms_and_comes_back_slowly);
+    RUN(model_that_comes_during_the_tick_is_fresh);
     RUN(emergency_stop_takes_force_away_within_two_ticks_and_stays);
     RUN(force_keeps_its_cap_and_rises_no_faster_than_the_cap_in_10_ms);
     RUN(continuous_rating_scales_a_long_push_down);

@@ -1,36 +1,36 @@
-/* A client's table of triangles: patches before the asset and after it give the same, hostile ones nothing. */
+/* A client's table of triangles: deltas before the asset and after it give the same, hostile ones nothing. */
 #include "clients/link/triangle_table.h"
 #include "tests/check.h"
 
-enum { PLACES = 60, VERTICES = 40 };
+enum { SLOTS = 60, VERTICES = 40 };
 
-static uint32_t load_tri[PLACES][3];
+static uint32_t load_tri[SLOTS][3];
 static float rest[VERTICES][3];
 static pal_frame_order order = {.n_vertex = VERTICES};
-static const pal_asset asset = {PLACES, rest[0], load_tri[0], &order};
+static const pal_asset asset = {SLOTS, rest[0], load_tri[0], &order};
 static uint8_t bytes[4096];
 
-/* a patch that writes `value` into every step-th place */
+/* a patch that writes `value` into every step-th slot */
 static size_t patch(uint32_t first, uint32_t step, uint32_t value, uint64_t revision)
 {
-    static uint32_t table[PLACES][3];
-    static uint8_t work[PAL_TOPOLOGY_DELTA_WORK_BYTES(PLACES)];
-    uint32_t place[PLACES], n = 0;
+    static uint32_t table[SLOTS][3];
+    static uint8_t work[PAL_TOPOLOGY_DELTA_WORK_BYTES(SLOTS)];
+    uint32_t slot[SLOTS], n = 0;
     size_t n_byte = 0;
-    for (uint32_t p = first; p < PLACES; p += step) {
+    for (uint32_t p = first; p < SLOTS; p += step) {
         for (uint32_t c = 0; c < 3; c++) table[p][c] = value ? (value + c) % VERTICES : 0;
-        place[n++] = p;
+        slot[n++] = p;
     }
-    pal_topology_delta_head head = {.part = 1, .epoch = 2, .n_place = n, .revision = revision};
-    CHECK_INT(pal_topology_delta_put(place, table[0], &head, work, bytes, sizeof bytes, &n_byte), 0);
+    pal_topology_delta_head head = {.part = 1, .epoch = 2, .n_changed = n, .revision = revision};
+    CHECK_INT(pal_topology_delta_put(slot, table[0], &head, work, bytes, sizeof bytes, &n_byte), 0);
     return n_byte;
 }
 
 static void begin(pal_triangle_table *t)
 {
-    for (uint32_t i = 0; i < PLACES; i++)
+    for (uint32_t i = 0; i < SLOTS; i++)
         for (uint32_t c = 0; c < 3; c++) load_tri[i][c] = i % 4 ? 0 : (i + c) % VERTICES;
-    CHECK_INT(pal_triangle_table_init(t, PLACES, VERTICES), PAL_ERR_OK);
+    CHECK_INT(pal_triangle_table_init(t, SLOTS, VERTICES), PAL_ERR_OK);
 }
 
 static void patches_before_the_asset_count_as_much_as_after_it(void)
@@ -40,7 +40,7 @@ static void patches_before_the_asset_count_as_much_as_after_it(void)
     begin(&early);
     begin(&late);
     CHECK_INT(pal_triangle_table_set_base(&late, &asset), PAL_ERR_OK);
-    CHECK_INT(pal_triangle_table_count(&late), PLACES / 4);
+    CHECK_INT(pal_triangle_table_count(&late), SLOTS / 4);
     for (uint64_t k = 1; k < 6; k++) {
         size_t n = patch((uint32_t)k, 7 * (uint32_t)k, k % 2 ? (uint32_t)k : 0, 10 * k);
         CHECK_INT(pal_triangle_table_apply(&early, bytes, n, &head), 0);
@@ -78,12 +78,12 @@ static void what_does_not_fit_leaves_the_table_alone(void)
     CHECK_INT(pal_triangle_table_apply(&t, bytes, n, &head), PAL_REFUSAL_ORDER);
     pal_triangle_table_free(&t);
     /* another asset than hello spoke of */
-    CHECK_INT(pal_triangle_table_init(&t, PLACES + 1, VERTICES), PAL_ERR_OK);
+    CHECK_INT(pal_triangle_table_init(&t, SLOTS + 1, VERTICES), PAL_ERR_OK);
     CHECK_INT(pal_triangle_table_set_base(&t, &asset), PAL_ERR_REFUSED);
     CHECK_INT(pal_triangle_table_count(&t), 0);
     pal_triangle_table_free(&t);
     CHECK_INT(pal_triangle_table_init(&t, PAL_TRIANGLE_SLOT_MAX + 1, VERTICES), PAL_ERR_REFUSED);
-    CHECK_INT(pal_triangle_table_init(&t, PLACES, PAL_WIRE_VERTEX_MAX + 1), PAL_ERR_REFUSED);
+    CHECK_INT(pal_triangle_table_init(&t, SLOTS, PAL_WIRE_VERTEX_MAX + 1), PAL_ERR_REFUSED);
     pal_triangle_table_free(&t);
 }
 

@@ -8,16 +8,13 @@ bin=$1
 . "$(dirname "$0")/rig.sh"
 own_network "$@"
 bus='udpm://239.255.76.67:7667?ttl=0'
-tries=4 # of what a bridge whose servo loop was late is allowed
 make_scene
 start_server --port 8090 --lcm "$bus" --log info
-await 30 grep -q lcm_joined "$work/serve.err"
+shows "$work/serve.err" $server_job lcm_joined
 check "palpate-lcm has joined" $? == 0
 
 # how many messages of that channel the record has
 heard() { grep -ao "PALPATE1/ball/$1" "$work/record" 2>/dev/null | wc -l; }
-# has the record so many of that channel?
-has() { [ "$(heard "$1")" -ge "$2" ]; }
 begin() { # NAME PROGRAM [flags]: in the background, at most two minutes; sets $job
     name=$1 program=$2
     shift 2
@@ -25,44 +22,28 @@ begin() { # NAME PROGRAM [flags]: in the background, at most two minutes; sets $
     job=$!
     pids="$pids $job"
 }
-# felt NAME: did the bridge feel force?
-felt() { holds "$(json force_max_N "$work/$1")" '>' 0.05; }
-again() { # NAME...: is one of them to be tried again? says so
-    for name in "$@"; do
-        felt "$name" && continue
-        late "$work/$name" || return 1
-        echo "     the servo loop of $name was late: $(json forces "$work/$name"), once more"
-        return 0
-    done
-    return 1
-}
 
 # it listens when the first message is in the record: what is said but once at the start is heard
 timeout 240 lcm-logger --lcm-url="$bus" -f "$work/record" >/dev/null 2>&1 &
 logger=$!
 pids="$pids $logger"
-await 30 has STATUS 1
+shows "$work/record" $logger PALPATE1/ball/STATUS
 check "lcm-logger records" $? == 0
 
 begin one palpate-client "$url" --script press --depth 0.006 --seconds 110 --tool 2 --name one
 one=$job
 begin two palpate-client "$url" --script idle --seconds 110 --name two
 two=$job
-for try in $(seq $tries); do
-    wanted=$(($(heard HMODEL/0) + 300)) # at 60 Hz five seconds of touch
-    begin lcm palpate-bridge --server "$bus" --session ball --tool 0 --origin 0,0,0.048 --device virtual:touch
-    by_lcm=$job
-    begin ws palpate-bridge --server "$url" --tool 1 --device virtual:premium --script cycle
-    by_ws=$job
-    sleep 7
-    await 30 has HMODEL/0 $wanted
-    stop $by_lcm
-    lcm_code=$?
-    stop $by_ws
-    ws_code=$?
-    [ $try -lt $tries ] && again lcm ws || break
-    sleep 1.5 # a sender that is silent for a second may begin to count anew
-done
+# at 60 Hz five seconds of touch
+begin lcm palpate-bridge --server "$bus" --session ball --tool 0 --origin 0,0,0.048 --device "$(device touch)" \
+    --until models=300,force_N=0.06
+by_lcm=$job
+begin ws palpate-bridge --server "$url" --tool 1 --device "$(device premium)" --script cycle --until models=11,force_N=0.06
+by_ws=$job
+wait $by_lcm
+lcm_code=$?
+wait $by_ws
+ws_code=$?
 for each in one two; do
     eval "stop \$$each"
     check "trainee $each passes every check of every frame" $? == 0
@@ -87,14 +68,16 @@ done
 
 # without any server the record alone makes a bridge feel
 stop "$server_job"
-for try in $(seq $tries); do
-    begin replay palpate-bridge --server "$bus" --session ball --tool 0 --origin 0,0,0.048 --device virtual:touch
-    replay=$job
-    timeout 100 lcm-logplayer -l "$bus" -e 'PALPATE1/ball/HMODEL/0' "$work/record" >/dev/null 2>&1
-    stop $replay
-    replay_code=$?
-    [ $try -lt $tries ] && again replay || break
-done
+begin replay palpate-bridge --server "$bus" --session ball --tool 0 --origin 0,0,0.048 --device "$(device touch)" \
+    --until models=11,force_N=0.06
+replay=$job
+# slowly, so that a slow device has touched before the record ends
+timeout 100 lcm-logplayer -s 0.25 -l "$bus" -e 'PALPATE1/ball/HMODEL/0' "$work/record" >/dev/null 2>&1 &
+player=$!
+pids="$pids $player"
+wait $replay
+replay_code=$?
+stop $player
 check "a bridge fed by lcm-logplayer ends well" $replay_code == 0
 check "it has models" "$(json models "$work/replay")" '>' 10
 check "it feels force (N)" "$(json force_max_N "$work/replay")" '>' 0.05

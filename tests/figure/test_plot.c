@@ -209,7 +209,7 @@ static void labels_keep_off_lines_and_marks_have_tips(void)
             double px = left + (900 - 210 - left) * t, py = top + high * t;
             CHECK(px <= box[a][0] || px >= box[a][2] || py <= box[a][1] || py >= box[a][3]);
         }
-    CHECK(strstr(text, "<title>a &#60; b</title>") && strstr(text, "<title>5</title>"));
+    CHECK(strstr(text, "<title>a &lt; b</title>") && strstr(text, "<title>5</title>"));
     CHECK(strstr(text, "fill=\"#fff\" stroke=\"#0072b2\"") != NULL);
     free(text);
 }

@@ -1,23 +1,24 @@
-/* Whatever a client says, in any order: the hub behind it, with a real session, over mem://.
+/* Whatever a client says, in any order: the hub behind it, with a real session and peers inside the process.
  * Input: records of one byte what (1: text, else binary; 2: pull messages after it; 4: a turn of the loop after it),
  * two bytes length (little endian) and the message. The first record is preceded by a valid join when its byte has
  * bit 7. */
+#include "server/net/server.h"
+#include "tests/fixtures/manual_clock.h"
 #include "tests/net/hub_scene.h"
 #include "tests/net/mem_client.h"
-
-#include "server/net/server.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte);
 
 static pal_server *server;
-static uint64_t now_ns;
+static manual_clock clock_;
 
 static bool begin(void)
 {
     static small_scene organ;
     static pal_session *session;
-    pal_session_options options = {.start_paused = true};
-    pal_server_options net = {.transport = "mem"};
+    pal_session_options options = {.start_paused = true, .clock = &clock_.clock};
+    pal_server_options net = {.transport = &pal_mem_transport};
+    manual_clock_init(&clock_, 1);
     return small_scene_make(&organ, "small") && !pal_session_open(&organ.scene, &options, NULL, &session) &&
            !pal_server_open(&net, &session, 1, NULL, &server);
 }
@@ -36,7 +37,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
         if (n > n_byte - at) n = n_byte - at;
         pal_mem_send(peer, bytes + at, n, what & 1);
         at += n;
-        if (what & 4) pal_server_advance(server, now_ns += 16666667);
+        if (what & 4) {
+            manual_clock_advance(&clock_, 16666667);
+            pal_server_advance(server);
+        }
         for (int i = 0; i < 8 && what & 2; i++)
             if (!pal_mem_receive(peer)) break;
     }

@@ -14,7 +14,7 @@ enum { SLOTS = 108, VERTICES = 56, CAP = 8192 };
 static void one(const uint8_t *bytes, size_t n_byte)
 {
     static uint8_t work[PAL_TOPOLOGY_DELTA_WORK_BYTES(SLOTS)], packed[CAP];
-    uint32_t table[SLOTS][3], again[SLOTS][3], place[SLOTS], n = 0;
+    uint32_t table[SLOTS][3], again[SLOTS][3], slot[SLOTS], n = 0;
     pal_topology_delta_head head, back;
     size_t n_packed = 0;
     memset(table, 0xFF, sizeof table);
@@ -24,11 +24,11 @@ static void one(const uint8_t *bytes, size_t n_byte)
         if (!memcmp(table[p], again[p], sizeof table[p])) continue;
         for (int c = 0; c < 3; c++)
             if (table[p][c] >= VERTICES) abort();
-        place[n++] = p;
+        slot[n++] = p;
     }
-    if (n != (refusal ? 0 : head.n_place)) abort();
+    if (n != (refusal ? 0 : head.n_changed)) abort();
     if (refusal) return;
-    if (pal_topology_delta_put(place, table[0], &head, work, packed, sizeof packed, &n_packed)) abort();
+    if (pal_topology_delta_put(slot, table[0], &head, work, packed, sizeof packed, &n_packed)) abort();
     if (pal_topology_delta_get(packed, n_packed, SLOTS, VERTICES, work, &back, again[0])) abort();
     if (memcmp(table, again, sizeof table) || back.revision != head.revision) abort();
 }

@@ -15,7 +15,8 @@ const floors = [
     ["server/mesh/scan", "server/mesh/cells"],
     ["server/mesh/volume"],
     ["server/sim/core"],
-    ["server/sim/springs", "server/sim/elements", "server/sim/surface", "server/sim/recovery"],
+    ["server/sim/recovery"],
+    ["server/sim/springs", "server/sim/elements", "server/sim/surface"],
     ["server/sim/subdivision", "server/sim/contact"],
     ["server/sim/implicit"],
     ["server/sim/solvers", "server/sim/models", "server/sim/effects"],
@@ -113,8 +114,7 @@ for (const file of files) {
         !/^server\/(commands|bench|cli)$/.test(room) &&
         !/^server\/base\/(err|log)\.c$/.test(file);
     const prints = text.match(/(?<!\w)(?:printf|puts|putchar|perror|_?exit|abort)\(|fprintf\(std(?:out|err)\b/);
-    if (quiet && prints && file !== "server/calibrate/calibrate_report.c")
-        fault(file, `${prints[0]}: a room below commands neither prints nor exits`);
+    if (quiet && prints) fault(file, `${prints[0]}: a room below commands neither prints nor exits`);
     const lines = text.split("\n").length - 1;
     if (lines > 700) fault(file, `${lines} lines, more than 700`);
 }

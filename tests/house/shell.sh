@@ -1,5 +1,6 @@
 # Shared by the shell tests of commands: a temporary folder, named checks, output of a run. Sourced; the test defines
 # `run ARGS...`, which leaves the files out and err and the variable code.
+. "$(dirname "$0")/../fixtures/wait_for.sh"
 passed=0 failed=0 skipped=0 bad=0
 problems=$(realpath "$(dirname "$0")/../../deploy/problems")
 dir=$(mktemp -d) || exit 2

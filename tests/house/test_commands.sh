@@ -198,13 +198,8 @@ end
 begin "what serve records replays to the same hashes, and not against another scene"
 "$palpate" serve scene --port 0 --record rec.bin >serve.out 2>serve.err &
 server=$!
-tries=0
-while ! grep -qs "http://" serve.out serve.err && [ "$tries" -lt 100 ]; do
-    tries=$((tries + 1))
-    sleep 0.1
-done
-check "serve did not start" [ "$tries" -lt 100 ]
-sleep 1
+check "serve did not start" shows serve.out "$server" "http://"
+check "nothing is recorded" grows rec.bin "$server" 1000
 kill -TERM "$server"
 wait "$server"
 code=$?
@@ -294,7 +289,7 @@ bad 's/"min": \[0.319999,/"min": [0.3201,/'
 run solve bad.json --case tip
 refused 1 "bad.json: load_cases\[0\].loads\[0\]: the region (0.3201, -0.03, -0.03) .. (0.33, 0.03, 0.03) meets no surface"
 run solve good.json --case tipp
-refused 1 'good.json: there is no load case or reference "tipp"; known are tip, tip_far, hang, timoshenko'
+refused 1 'good.json: --case: there is no load case or reference "tipp"; known are tip, tip_far, hang, timoshenko'
 run solve good.json
 refused 1 "good.json: --case is missing; known are tip"
 run solve good.json --case tip --nu 0.5

@@ -31,7 +31,7 @@ for scene in fem springs; do
     check "counts" has out "^18 passed, 0 failed, 0 undecided, 0 do not apply"
     check "it says that the scene rests" has out "comes to rest by itself"
     check "the poisoned body names its node" has out "poisoned .*beam stopped: node [0-9]* of .* at (.*) mm: its position"
-    check "the hour was simulated whole" has out "hour  *passed .*3600 s watched"
+    check "the hour was simulated whole" has out "hour  *passed .*3600 s monitored"
     check "it says since when it slept" has out "hour .*asleep from [0-9.e+-]* s on"
     check "a picture" has picture.svg "</svg>"
     check "of well-formed text" has picture.svg "start\" font-size="

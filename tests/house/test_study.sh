@@ -58,9 +58,10 @@ begin "Ctrl-C keeps what was measured and says how to go on"
 # signal came is begun anew
 for _ in 1 2 3 4 5; do
     rm -rf o
+    mkdir o
     setsid sh -c 'trap - INT; exec "$@"' sh "$palpate" study "$beam" --quick --out o --json >out 2>err </dev/null &
     child=$!
-    while [ ! -s o/study.json ] && kill -0 "$child" 2>/dev/null; do :; done
+    shows o/study.json "$child" '"model"'
     kill -INT "$child" 2>/dev/null
     wait "$child"
     code=$?
@@ -204,11 +205,14 @@ if long "killed at random moments, also while its reference is made, it ends wit
     begin "$name"
     errors_of o/study.csv >once.txt
     kills=0
+    mkdir k
     for try in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16; do
         setsid "$palpate" study "$beam" --quick --out k --quiet >out 2>err </dev/null &
         child=$!
-        # from some milliseconds to about two seconds, ever longer so that it ends
-        sleep "$(awk "BEGIN { srand($try); printf \"%.3f\", (0.01 + 0.06 * rand()) * $try }" </dev/null)"
+        # somewhere while it writes answers of the reference, then points; ever later so that it ends
+        file=k/study.reference
+        if [ -s $file ]; then file=k/study.json; fi
+        grows $file "$child" "$(awk "BEGIN { srand($try); print 1 + int(200 * rand() * $try) }" </dev/null)"
         if kill -KILL "$child" 2>/dev/null; then kills=$((kills + 1)); fi
         wait "$child" 2>/dev/null
         if [ -s k/study.json ] && has k/study.json '"complete":[[:space:]]*true'; then break; fi
@@ -235,17 +239,13 @@ check "exit code $code" code_is 0
 check "plan does not say which" has out "picked of the .* settings of near/study.json (within"
 run plan near --json
 check "no setting in JSON" has out '"picked":{"body":'
-: >out # or what plan said is taken for the server's words, which is then killed before it is there
+: >out # or what plan said is taken for the server's words
 timeout 60 "$palpate" serve near --port 0 --json >out 2>err </dev/null &
 child=$!
-for _ in $(seq 300); do
-    if [ -s out ]; then break; fi
-    sleep 0.1
-done
+check "serve did not start" shows out "$child" '"port":'
 kill "$child"
 wait "$child"
 check "serve does not say which" has err "picked of the .* settings of near/study.json"
-check "serve did not start" has out '"port":'
 end
 refuse 1 "is in the folder of the source" study near --quick --within 1mm -o near
 refuse 1 "is in the folder of the source" study near/scene.json --quick --within 1mm -o ./near/../near/other.json

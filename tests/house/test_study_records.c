@@ -38,7 +38,7 @@ static void cost_and_error_are_predicted_from_the_other_configurations(void)
             double ms, error_m;
             if (p->err) continue;
             n++;
-            if (!pal_study_predict_configuration(s, &p->measured.setting, i, &ms, &error_m)) continue;
+            if (!pal_study_predict_error(s, &p->measured.setting, i, &error_m)) continue;
             CHECK(pal_study_predict_cost(s, &p->measured.setting, p->n_node, p->n_element, p->n_substep, p->read_ms, i,
                                          &ms));
             /* as it stands in the record */
@@ -66,7 +66,7 @@ static void the_front_and_what_is_picked_are_of_these_numbers(void)
         /* fitted to the load that judges it */
         if (s->point[i].measured.setting.k_distance_J > 0) CHECK(!was[i]);
     }
-    int near = pal_study_pick(s, 1e-4, NAN), fast = pal_study_pick(s, NAN, 0.05);
+    int near = pal_study_pick(s, "", 1e-4, NAN), fast = pal_study_pick(s, "", NAN, 0.05);
     REQUIRE(near >= 0 && fast >= 0);
     const pal_measured_configuration *p = &s->point[near].measured, *q = &s->point[fast].measured;
     CHECK(p->front && p->error_m + s->reference_m <= 1e-4 && q->ms <= 0.05);
@@ -76,7 +76,7 @@ static void the_front_and_what_is_picked_are_of_these_numbers(void)
         CHECK(o->measured.error_m + s->reference_m > 1e-4 || o->measured.ms >= p->ms);
         CHECK(o->measured.ms > 0.05 || o->measured.error_m >= q->error_m);
     }
-    CHECK_INT(pal_study_pick(s, 1e-6, NAN), -1);
+    CHECK_INT(pal_study_pick(s, "", 1e-6, NAN), -1);
     free(file);
 }
 

@@ -39,7 +39,7 @@ static pal_study_file *random_file(int n)
     snprintf(f->digest, sizeof f->digest, "fedcba9876543210");
     snprintf(f->methods, sizeof f->methods, "fem,tet_springs");
     snprintf(f->command, sizeof f->command, "palpate study 'a b' --quick");
-    f->index = 3, f->n_finest = 200, f->whole = false;
+    f->index = 3, f->n_total = 200, f->whole = false;
     s->n_point = n;
     for (int k = 0; k < n; k++) {
         pal_study_point *p = &s->point[k];
@@ -127,9 +127,9 @@ static void what_is_no_study_is_refused_by_its_place(void)
     } bad[] = {
         {"palpate-study-1", "palpate-study-2", "s.json: format: is \"palpate-study-2\", wanted \"palpate-study-1\""},
         {"\"format\"", "\"formed\"", "s.json: formed: unknown key; known are format"},
-        {"\"n_finest\":\t200,", "", "s.json: n_finest: is not there"},
-        {"\"n_finest\":\t200", "\"n_finest\": 257", "n_finest: 257 is outside 0 .. 256"},
-        {"\"n_finest\":\t200", "\"n_finest\": 1.5", "n_finest: 1.5 is not whole"},
+        {"\"n_total\":\t200,", "", "s.json: n_total: is not there"},
+        {"\"n_total\":\t200", "\"n_total\": 257", "n_total: 257 is outside 0 .. 256"},
+        {"\"n_total\":\t200", "\"n_total\": 1.5", "n_total: 1.5 is not whole"},
         {"\"complete\":\tfalse", "\"complete\": 0", "complete: is not true or false"},
         {"\"index\":\t3", "\"index\": 8", "subject.index: 8 is outside 0 .. 7"},
         {"0123456789abcdef", "0123456789abcdef0", "subject.shape: 17 bytes of text, more than 16"},

@@ -41,15 +41,19 @@ const terms = {
     "felt firm": "haptic_stiffness, contact_stiffness",
     complaint: "error",
 };
+// the files of the session, the wire and the clients in which a tool has a holder: the member who moves it
+const member_with_tool =
+    /^(protocol\/wire|server\/(session\/(members|session)|net\/(stream|hub_(input|peers|jobs|verb)|http_pages))\.|clients\/(viewer|scripted_client)\/|tests\/(protocol|session|net|browser)\/)/;
 // uses that are right: the identifier, or the file, matches
 const right = {
     trainee: /^(.*role.*|PAL_(MEMBER|RIGHT)_TRAINEE|trainee)$/i, // a role of a member
     trainees: /role/i,
     relief: /inertia_?relief/i,
-    zz: /zz_?(estimator|energy)/i,
-    holder: /^(protocol|clients|server\/(session|net)|tests\/(protocol|session|net|clients|browser))\//, // a member with a tool
-    holders: /^(protocol|clients|server\/(session|net)|tests\/(protocol|session|net|clients|browser))\//,
-    grip: /^(protocol|clients|tests\/(protocol|clients))\//, // of a stylus; opening of a gripper, a field of LCM messages
+    zz: /zz_?(estimator|energy)|^server\/sim\/(core|elements|surface)\//i, // there the z-z component of a tensor
+    holder: member_with_tool,
+    holders: member_with_tool,
+    // of a stylus; the opening of a gripper, a field of LCM messages
+    grip: /^(protocol\/wire|clients\/(haptic_bridge\/(device|servo|bridge_net)|link\/lcm_convert)|tests\/(protocol\/|clients\/test_lcm))/,
     most: /almost/i,
 };
 // words that are right in a sentence, which a name of five words or more is (tests are named so)

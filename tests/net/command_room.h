@@ -1,4 +1,5 @@
-/* A session served on mem://, and clients that give it orders and wait for answers: for the tests of switches. */
+/* A session served inside the process, and clients that give it orders and wait for answers: for the tests of switches.
+ */
 #ifndef TESTS_NET_ORDER_ROOM_H
 #define TESTS_NET_ORDER_ROOM_H
 #include "protocol/asset.h"
@@ -7,14 +8,12 @@
 /* of body 0 */
 static inline void order_begin(const pal_scene *scene, const pal_measured_configuration *point, int n_point)
 {
-    static const pal_measured_configuration *list[1];
-    static int n[1], body[1];
-    list[0] = point, n[0] = n_point, body[0] = 0;
-    served_begin(scene, (pal_session_options){0},
-                 (pal_server_options){.setting = point ? list : NULL, .n_configuration = n, .setting_body = body});
+    static pal_session_study study;
+    study = (pal_session_study){.configuration = point, .n = n_point, .reference_m = NAN};
+    served_begin(scene, (pal_session_options){0}, (pal_server_options){.study = point ? &study : NULL});
 }
 
-/* the loop goes on by a little; others read too, or their queues would fill */
+/* the loop goes on by a little; others read too, or their queues would fill. Not while a job is under way */
 static inline void turn(mem_client *a, mem_client *b)
 {
     served_turn(FRAME_NS / 4, a, b);
@@ -27,7 +26,7 @@ static inline int n_answer(const mem_client *c)
 
 static inline void until_answers(mem_client *c, mem_client *other, int n)
 {
-    for (int i = 0; i < 20000 && n_answer(c) < n; i++) turn(c, other);
+    WAIT_UNTIL(n_answer(c) >= n, c, other);
     CHECK_INT(n_answer(c), n);
 }
 
@@ -63,8 +62,7 @@ static inline const char *trouble(const mem_client *c)
 /* waits for a frame of the epoch that the client has */
 static inline void until_frame(mem_client *c)
 {
-    for (int i = 0; i < 20000 && (c->frame.epoch != c->epoch || c->n_tools == 0); i++) turn(c, NULL);
-    CHECK_INT(c->frame.epoch, c->epoch);
+    WAIT_UNTIL(c->frame.epoch == c->epoch && c->n_tools > 0, c, NULL);
     CHECK_INT(c->n_bad, 0);
 }
 

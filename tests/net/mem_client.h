@@ -6,8 +6,8 @@
 #include "protocol/field_codec.h"
 #include "protocol/frame_codec.h"
 #include "protocol/topology_delta_codec.h"
-#include "server/net/transport/mem_transport.h"
 #include "tests/check.h"
+#include "tests/net/mem_transport.h"
 
 typedef struct mem_client {
     pal_transport *transport;

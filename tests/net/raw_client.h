@@ -1,5 +1,5 @@
-/* A TCP client of a few lines for tests: it says exactly the bytes it is told to, well-formed or not, and reads
- * websocket frames one by one. Reading waits at most 5 s. */
+/* A TCP client of a few lines for tests: it sends exactly the bytes given, well-formed or not, and reads websocket
+ * frames one by one. Reading waits until there is something or the connection ends. */
 #ifndef TESTS_NET_RAW_CLIENT_H
 #define TESTS_NET_RAW_CLIENT_H
 #include "tests/check.h"
@@ -7,12 +7,11 @@
 #include <arpa/inet.h>
 #include <errno.h>
 #include <netinet/tcp.h>
-#include <poll.h>
 #include <stdint.h>
 #include <sys/socket.h>
 
 typedef struct raw_frame {
-    int opcode; /* 1 text, 2 binary, 8 close, 9 ping, 10 pong; -1: connection ended or nothing in time */
+    int opcode; /* 1 text, 2 binary, 8 close, 9 ping, 10 pong; -1: connection ended */
     size_t n;
     uint8_t bytes[1 << 20];
 } raw_frame;
@@ -31,15 +30,17 @@ static inline int raw_connect(int port)
     return fd;
 }
 
-static inline void raw_put(int fd, const void *bytes, size_t n)
+/* false: the connection has ended */
+static inline bool raw_put(int fd, const void *bytes, size_t n)
 {
     const char *at = bytes;
     while (n > 0) {
         ssize_t m = send(fd, at, n, MSG_NOSIGNAL);
-        if (m <= 0) return;
+        if (m <= 0) return false;
         at += m;
         n -= (size_t)m;
     }
+    return true;
 }
 
 static inline void raw_send_text(int fd, const char *text)
@@ -47,13 +48,11 @@ static inline void raw_send_text(int fd, const char *text)
     raw_put(fd, text, strlen(text));
 }
 
-/* up to n bytes; fewer at the end of the connection or after 5 s of silence */
+/* up to n bytes; fewer at the end of the connection */
 static inline size_t raw_get(int fd, void *bytes, size_t n)
 {
     size_t at = 0;
     while (at < n) {
-        struct pollfd p = {.fd = fd, .events = POLLIN};
-        if (poll(&p, 1, 5000) <= 0) break;
         ssize_t m = recv(fd, (char *)bytes + at, n - at, 0);
         if (m <= 0) break;
         at += (size_t)m;
@@ -61,13 +60,11 @@ static inline size_t raw_get(int fd, void *bytes, size_t n)
     return at;
 }
 
-/* is the connection ended by the other side within 5 s? reads what is left */
+/* reads what is left; true: the other side has ended the connection */
 static inline bool raw_ended(int fd)
 {
     char sink[4096];
     for (;;) {
-        struct pollfd p = {.fd = fd, .events = POLLIN};
-        if (poll(&p, 1, 15000) <= 0) return false;
         ssize_t m = recv(fd, sink, sizeof sink, 0);
         if (m == 0 || (m < 0 && errno == ECONNRESET)) return true;
         if (m < 0) return false;
@@ -119,7 +116,7 @@ static inline int raw_upgrade(int port, const char *path, const char *extra, cha
 }
 
 /* a websocket frame with a payload shorter than 64 KiB; masked as a client must, or not */
-static inline void raw_send(int fd, int first_byte, const void *bytes, size_t n, bool masked)
+static inline bool raw_send(int fd, int first_byte, const void *bytes, size_t n, bool masked)
 {
     static const uint8_t mask[4] = {0x12, 0x34, 0x56, 0x78};
     uint8_t *out = malloc(n + 16);
@@ -134,13 +131,14 @@ static inline void raw_send(int fd, int first_byte, const void *bytes, size_t n,
     }
     if (masked) memcpy(out + at, mask, 4), at += 4;
     for (size_t i = 0; i < n; i++) out[at++] = ((const uint8_t *)bytes)[i] ^ (masked ? mask[i & 3] : 0);
-    raw_put(fd, out, at);
+    bool sent = raw_put(fd, out, at);
     free(out);
+    return sent;
 }
 
-static inline void raw_text(int fd, const char *text)
+static inline bool raw_text(int fd, const char *text)
 {
-    raw_send(fd, 0x81, text, strlen(text), true);
+    return raw_send(fd, 0x81, text, strlen(text), true);
 }
 
 static inline raw_frame *raw_receive(int fd)

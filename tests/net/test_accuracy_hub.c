@@ -1,4 +1,5 @@
-/* What accuracy costs over mem://: the study and the estimates come to those who ask, and are there only for them. */
+/* What accuracy costs, as clients see it: the study and the estimates come to those who ask, and are there only for
+ * them. */
 #include "server/estimate/estimator.h"
 #include "tests/net/hub_scene.h"
 #include "tests/net/server_fixture.h"
@@ -25,26 +26,20 @@ static void make_points(void)
 
 static void begin(bool with_study)
 {
-    static const pal_measured_configuration *list[1];
-    static int n_configuration[1] = {POINTS}, body[1] = {0};
-    static double reference_m[1] = {3e-4};
-    list[0] = setting;
-    pal_server_options net = {.setting = with_study ? list : NULL,
-                              .n_configuration = n_configuration,
-                              .setting_body = body,
-                              .reference_m = reference_m};
+    static const pal_session_study study = {.configuration = setting, .n = POINTS, .reference_m = 3e-4};
+    pal_server_options net = {.study = with_study ? &study : NULL};
     served_begin(&organ.scene, (pal_session_options){0}, net);
 }
 
-/* half a second of the hub's time, so that every turn is a tick */
+/* half a second, so that every turn is a tick of the hub */
 static void turn(mem_client *a, mem_client *b)
 {
     served_turn(500000000ull, a, b);
 }
 
-#define LOOK(on) "{\"type\":\"command\",\"verb\":\"estimate\",\"target\":\"organ\",\"args\":{\"enabled\":" #on "}}"
+#define ESTIMATE(on) "{\"type\":\"command\",\"verb\":\"estimate\",\"target\":\"organ\",\"args\":{\"enabled\":" #on "}}"
 
-static void nothing_is_estimated_while_nobody_looks(void)
+static void nothing_is_estimated_without_subscribers(void)
 {
     mem_client ada;
     uint64_t made = pal_estimator_count();
@@ -66,8 +61,8 @@ static void who_asks_sees_study_and_estimate_until_the_last_has_gone(void)
     mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
     mem_join(&bo, transport, "Bo", PAL_WIRE_ROLE_VIEWER, PAL_WIRE_TOOL_NONE);
     turn(&ada, &bo);
-    mem_text(&ada, LOOK(1));
-    mem_text(&ada, LOOK(1)); /* twice is once */
+    mem_text(&ada, ESTIMATE(1));
+    mem_text(&ada, ESTIMATE(1)); /* twice is once */
     UNTIL(ada.n_text[PAL_CONTROL_ESTIMATE] > 2, &ada, &bo);
     CHECK_INT(bo.n_text[PAL_CONTROL_STUDY] + bo.n_text[PAL_CONTROL_ESTIMATE], 0);
     CHECK_INT(ada.n_text[PAL_CONTROL_STUDY], 1);
@@ -83,21 +78,21 @@ static void who_asks_sees_study_and_estimate_until_the_last_has_gone(void)
     CHECK_TEXT(e->body, "organ");
     CHECK_INT(e->study_point, 2);
     CHECK(strstr(e->configuration, "tet_springs"));
-    UNTIL(e->cost_ms > 0, &ada, &bo);
-    UNTIL(pal_estimator_threads() == 1, &ada, &bo);
+    WAIT_UNTIL(e->cost_ms > 0, &ada, &bo);
+    CHECK_INT(pal_estimator_threads(), 1);
 
-    /* who may do nothing else may look all the same; one estimator serves both */
-    mem_text(&bo, LOOK(1));
+    /* a viewer may subscribe as well; one estimator serves both */
+    mem_text(&bo, ESTIMATE(1));
     UNTIL(bo.n_text[PAL_CONTROL_ESTIMATE] > 0 && bo.n_text[PAL_CONTROL_STUDY] == 1, &ada, &bo);
     CHECK_INT(pal_estimator_threads(), 1);
-    mem_text(&ada, LOOK(0));
+    mem_text(&ada, ESTIMATE(0));
     for (int i = 0; i < 3; i++) turn(&ada, &bo);
     int n_ada = ada.n_text[PAL_CONTROL_ESTIMATE], n_bo = bo.n_text[PAL_CONTROL_ESTIMATE];
     UNTIL(bo.n_text[PAL_CONTROL_ESTIMATE] > n_bo + 2, &ada, &bo);
     CHECK_INT(ada.n_text[PAL_CONTROL_ESTIMATE], n_ada);
     CHECK_INT(pal_estimator_threads(), 1);
     mem_end(&bo); /* gone without a word */
-    UNTIL(pal_estimator_threads() == 0, &ada, NULL);
+    WAIT_UNTIL(pal_estimator_threads() == 0, &ada, NULL);
     CHECK_INT(ada.n_bad, 0);
     mem_end(&ada);
     end();
@@ -108,7 +103,7 @@ static void without_a_study_there_is_the_estimate_alone(void)
     mem_client ada;
     begin(false);
     mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
-    mem_text(&ada, LOOK(1));
+    mem_text(&ada, ESTIMATE(1));
     UNTIL(ada.n_text[PAL_CONTROL_ESTIMATE] > 0, &ada, NULL);
     CHECK_INT(ada.n_text[PAL_CONTROL_STUDY], 1);
     CHECK_INT(ada.last[PAL_CONTROL_STUDY].study.n_point, 0);
@@ -131,9 +126,9 @@ static void neighbours_are_measured_once(void)
     pal_entry_init(&def->solver, "solver", "implicit_euler");
     begin(false);
     mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_TRAINEE, PAL_WIRE_TOOL_ANY);
-    mem_text(&ada, LOOK(1));
+    mem_text(&ada, ESTIMATE(1));
     const pal_wire_estimate *e = &ada.last[PAL_CONTROL_ESTIMATE].estimate;
-    UNTIL(e->n_neighbour >= 2 && e->cost_ms > 0, &ada, NULL);
+    WAIT_UNTIL(e->n_neighbour >= 2 && e->cost_ms > 0, &ada, NULL);
     double step_ms = 1e3 * organ.scene.step_s;
     pal_configuration_of(&organ.scene, 0, &now);
     for (uint32_t i = 0; i < e->n_neighbour; i++) {
@@ -170,7 +165,7 @@ static void calibrated_springs_keep_their_size(void)
                  "{\"type\":\"command\",\"verb\":\"configure\",\"args\":{\"size\":%d,\"step_ms\":%.9g}}",
                  now.size + (k == 0), 1e3 * now.step_s);
         mem_text(&ada, text);
-        UNTIL(ada.n_text[PAL_CONTROL_ERROR] + ada.n_text[PAL_CONTROL_ANSWER] == k + 1, &ada, NULL);
+        WAIT_UNTIL(ada.n_text[PAL_CONTROL_ERROR] + ada.n_text[PAL_CONTROL_ANSWER] == k + 1, &ada, NULL);
     }
     snprintf(summary, sizeof summary, "calibrated for %d voxels", now.size);
     CHECK(strstr(ada.last[PAL_CONTROL_ERROR].error.text, summary) != NULL);
@@ -208,7 +203,7 @@ int main(void)
 {
     if (!small_scene_make(&organ, "small")) return 1;
     make_points();
-    RUN(nothing_is_estimated_while_nobody_looks);
+    RUN(nothing_is_estimated_without_subscribers);
     RUN(who_asks_sees_study_and_estimate_until_the_last_has_gone);
     RUN(without_a_study_there_is_the_estimate_alone);
     RUN(neighbours_are_measured_once);

@@ -1,4 +1,5 @@
-/* Rows and bodies over mem://: what clients are told of the plan, who switches rows, who brings a stopped body back. */
+/* Components and bodies as clients see them: what they are told of the plan, who switches components, who resets a
+ * frozen body. */
 #include "server/estimate/estimator.h"
 #include "tests/net/hub_scene.h"
 #include "tests/net/server_fixture.h"
@@ -16,8 +17,10 @@ static void begin_hurt(void)
     pal_session *first = session;
     pal_diagnostic diag = {""};
     if (pal_session_open_after(first, &organ.scene, &diag, &session)) CHECK_FAIL("no session: %s", diag.text);
-    if (pal_session_transfer(session, first, hurt, NULL, &diag)) CHECK_FAIL("does not follow: %s", diag.text);
+    pal_session_transfer_begin(session, first, hurt, NULL);
+    if (pal_session_transfer_end(session, first, &diag)) CHECK_FAIL("does not follow: %s", diag.text);
     pal_session_close(first);
+    manual_clock_settle(&served_clock, 1);
 }
 
 static void begin(bool hurts)
@@ -27,7 +30,7 @@ static void begin(bool hurts)
     served_open((pal_server_options){0});
 }
 
-/* half a second of the hub's time, so that every turn is a tick */
+/* half a second, so that every turn is a tick of the hub */
 static void turn(mem_client *a, mem_client *b)
 {
     served_turn(500000000ull, a, b);
@@ -40,38 +43,38 @@ static int find(uint32_t n, char (*row)[PAL_WIRE_NAME_BYTES], const char *name)
     return -1;
 }
 
-#define ROW(name, on)                                                                                                  \
+#define COMPONENT(name, on)                                                                                            \
     "{\"type\":\"command\",\"verb\":\"component\",\"target\":\"" name "\",\"args\":{\"part\":0,\"enabled\":" #on "}}"
 
-static void rows_say_whose_they_are_and_what_called_for_them(void)
+static void components_name_their_part_and_reason(void)
 {
     mem_client ada;
     begin(false);
     mem_join(&ada, transport, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
     UNTIL(ada.n_text[PAL_CONTROL_STATUS] > 2, &ada, NULL);
     const pal_wire_hello *h = &ada.last[PAL_CONTROL_HELLO].hello;
-    CHECK(h->n_component > 3 && h->n_component_part == h->n_component && h->n_component_reason == h->n_component);
-    for (uint32_t r = 0; r < h->n_component; r++) CHECK(h->component_part[r] == 0 && h->component_reason[r][0]);
-    /* what moves and shows the body stays, elastic rows may go while there is another */
+    CHECK(h->plan.n_component > 3 && h->plan.n_part == h->plan.n_component && h->plan.n_reason == h->plan.n_component);
+    for (uint32_t r = 0; r < h->plan.n_component; r++) CHECK(h->plan.part[r] == 0 && h->plan.reason[r][0]);
+    /* what moves and shows the body stays, an elastic component may go while there is another */
     static const char *const stays[] = {"verlet", "skin_output"}, *const goes[] = {"tet_volume", "edge_distance",
                                                                                    "gravity"};
-    CHECK_INT(h->n_component_required, h->n_component);
+    CHECK_INT(h->plan.n_required, h->plan.n_component);
     for (int i = 0; i < 2; i++) {
-        int r = find(h->n_component, (char(*)[PAL_WIRE_NAME_BYTES])h->component, stays[i]);
-        CHECK(r >= 0 && h->component_required[r] == 1);
+        int r = find(h->plan.n_component, (char(*)[PAL_WIRE_NAME_BYTES])h->plan.component, stays[i]);
+        CHECK(r >= 0 && h->plan.required[r] == 1);
     }
     for (int i = 0; i < 3; i++) {
-        int r = find(h->n_component, (char(*)[PAL_WIRE_NAME_BYTES])h->component, goes[i]);
-        CHECK(r < 0 || h->component_required[r] == 0);
+        int r = find(h->plan.n_component, (char(*)[PAL_WIRE_NAME_BYTES])h->plan.component, goes[i]);
+        CHECK(r >= 0 && h->plan.required[r] == 0);
     }
     const pal_wire_status *s = &ada.last[PAL_CONTROL_STATUS].status;
     CHECK(s->n_component_name == 0 && s->n_disabled == 0 && s->n_state == 0);
-    CHECK_INT(s->n_component, h->n_component);
+    CHECK_INT(s->n_component, h->plan.n_component);
     mem_end(&ada);
     end();
 }
 
-static void an_instructor_switches_a_row_off_and_on_and_all_hear_of_it(void)
+static void an_instructor_switches_a_component_and_all_are_told(void)
 {
     static mem_client ada, bo;
     begin(false);
@@ -80,36 +83,36 @@ static void an_instructor_switches_a_row_off_and_on_and_all_hear_of_it(void)
     UNTIL(ada.n_text[PAL_CONTROL_STATUS] > 2 && bo.n_text[PAL_CONTROL_STATUS] > 0, &ada, &bo);
     pal_wire_hello *h = &ada.last[PAL_CONTROL_HELLO].hello;
     const pal_wire_status *a = &ada.last[PAL_CONTROL_STATUS].status, *b = &bo.last[PAL_CONTROL_STATUS].status;
-    REQUIRE(find(h->n_component, h->component, "tet_volume") >= 0);
+    REQUIRE(find(h->plan.n_component, h->plan.component, "tet_volume") >= 0);
 
-    mem_text(&ada, ROW("tet_volume", 0));
+    mem_text(&ada, COMPONENT("tet_volume", 0));
     UNTIL(a->n_disabled == 1 && b->n_disabled == 1, &ada, &bo);
     CHECK_TEXT(a->disabled[0].component, "tet_volume");
     CHECK_INT(a->disabled[0].part, 0);
-    CHECK_INT(a->n_component, h->n_component - 1);
-    CHECK_INT(a->n_component_name, h->n_component - 1);
+    CHECK_INT(a->n_component, h->plan.n_component - 1);
+    CHECK_INT(a->n_component_name, h->plan.n_component - 1);
     CHECK_INT(a->n_component_part, a->n_component_name);
     CHECK(find(a->n_component_name, (char(*)[PAL_WIRE_NAME_BYTES])a->component, "tet_volume") < 0);
 
-    mem_text(&ada, ROW("tet_volume", 1));
+    mem_text(&ada, COMPONENT("tet_volume", 1));
     UNTIL(a->n_disabled == 0 && b->n_disabled == 0, &ada, &bo);
-    CHECK_INT(a->n_component, h->n_component);
+    CHECK_INT(a->n_component, h->plan.n_component);
     CHECK_INT(a->n_component_name, 0); /* the plan of hello again */
 
     /* what the world refuses changes nothing and is said in the status, and to who asked as an error */
     uint64_t n_refused = a->n_refused;
     int n_error = ada.n_text[PAL_CONTROL_ERROR], n_other = bo.n_text[PAL_CONTROL_ERROR];
-    mem_text(&ada, ROW("no_such_row", 0));
+    mem_text(&ada, COMPONENT("no_such_component", 0));
     UNTIL(a->n_refused == n_refused + 1 && a->diag[0], &ada, &bo);
-    CHECK(strstr(a->diag, "no_such_row"));
+    CHECK(strstr(a->diag, "no_such_component"));
     UNTIL(ada.n_text[PAL_CONTROL_ERROR] == n_error + 1, &ada, &bo);
     CHECK_TEXT(ada.last[PAL_CONTROL_ERROR].error.code, "refused");
-    CHECK(strstr(ada.last[PAL_CONTROL_ERROR].error.text, "no_such_row"));
-    mem_text(&ada, ROW("skin_output", 0));
+    CHECK(strstr(ada.last[PAL_CONTROL_ERROR].error.text, "no_such_component"));
+    mem_text(&ada, COMPONENT("skin_output", 0));
     UNTIL(ada.n_text[PAL_CONTROL_ERROR] == n_error + 2, &ada, &bo);
     CHECK(strstr(ada.last[PAL_CONTROL_ERROR].error.text, "cannot be switched off"));
     CHECK_INT(bo.n_text[PAL_CONTROL_ERROR], n_other);
-    CHECK_INT(a->n_component, h->n_component);
+    CHECK_INT(a->n_component, h->plan.n_component);
     mem_end(&ada), mem_end(&bo);
     end();
 }
@@ -117,7 +120,7 @@ static void an_instructor_switches_a_row_off_and_on_and_all_hear_of_it(void)
 static void others_do_not_and_bad_orders_are_refused(void)
 {
     static const char *const bad[] = {
-        ROW("tet_volume", 0), "{\"type\":\"command\",\"verb\":\"component\",\"target\":\"tet_volume\"}",
+        COMPONENT("tet_volume", 0), "{\"type\":\"command\",\"verb\":\"component\",\"target\":\"tet_volume\"}",
         "{\"type\":\"command\",\"verb\":\"component\",\"target\":\"a\",\"args\":{\"part\":1,\"enabled\":0}}",
         "{\"type\":\"command\",\"verb\":\"reset\",\"target\":\"liver\"}"};
     static const char *const summary[] = {"component: only for instructors", "component: part is missing",
@@ -172,7 +175,7 @@ static double counter(const char *name)
     return value;
 }
 
-/* at rest, with somebody who looks on: no row runs, nothing is encoded and nothing estimated; a touch wakes it */
+/* at rest, with a client: no component runs, nothing is encoded and nothing estimated; a touch wakes it */
 static void a_body_asleep_is_neither_stepped_nor_encoded(void)
 {
     static mem_client ada;
@@ -211,8 +214,8 @@ static void a_body_asleep_is_neither_stepped_nor_encoded(void)
 int main(void)
 {
     if (!small_scene_make(&organ, "small")) return 1;
-    RUN(rows_say_whose_they_are_and_what_called_for_them);
-    RUN(an_instructor_switches_a_row_off_and_on_and_all_hear_of_it);
+    RUN(components_name_their_part_and_reason);
+    RUN(an_instructor_switches_a_component_and_all_are_told);
     RUN(others_do_not_and_bad_orders_are_refused);
     RUN(a_body_asleep_is_neither_stepped_nor_encoded);
     RUN(everybody_resets_what_was_stopped_and_a_viewer_nothing_else);

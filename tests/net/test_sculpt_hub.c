@@ -1,4 +1,4 @@
-/* Sculpting over the wire: commands of clients on mem:// to a real session that runs, the topology that comes of them,
+/* Sculpting over the wire: commands of clients to a real session that runs, the topology that comes of them,
  * frames that fit it, answers, refusals, and who goes in the middle. */
 #include "tests/net/command_room.h"
 #include "tests/session/sculpt_body.h"
@@ -43,9 +43,8 @@ static void a_cell_grows_and_the_frames_are_of_the_new_epoch(void)
     CHECK_INT(part(&c)->n_triangle, before.n_triangle + 32);
     uint64_t time_us = c.tools.sim_time_us;
     until_frame(&c);
-    CHECK_LE(moved(&c), 1e-4); /* at rest, as the block was */
-    for (int i = 0; i < 2000 && c.tools.sim_time_us < time_us + 50000; i++) turn(&c, NULL);
-    CHECK(c.tools.sim_time_us >= time_us + 50000); /* time goes on where it was */
+    CHECK_LE(moved(&c), 1e-4);                               /* at rest, as the block was */
+    UNTIL(c.tools.sim_time_us >= time_us + 50000, &c, NULL); /* time goes on where it was */
     /* the topology of before, and its very asset */
     CHECK(order(&c, "undo", ""));
     CHECK_INT(part(&c)->epoch, 3);
@@ -322,8 +321,7 @@ static void the_tool_stays_held_and_its_poses_go_on(void)
         const double at[3] = {0, 0, 0.12 + 0.01 * round};
         mem_pose(&c, 0, ++seq, at);
         if (round == 1) CHECK(order(&c, "extrude", SIDE ",\"distance_m\":0.02"));
-        for (int i = 0; i < 20000 && c.tools.tool[0].echo_seq != seq; i++) turn(&c, NULL);
-        CHECK_INT(c.tools.tool[0].echo_seq, seq);
+        UNTIL(c.tools.tool[0].echo_seq == seq, &c, NULL);
         CHECK(c.tools.tool[0].flags & PAL_WIRE_TOOL_HELD);
         CHECK(!(c.tools.tool[0].flags & PAL_WIRE_TOOL_AWAY));
         CHECK_NEAR((double)c.tools.tool[0].position_m[2], at[2], 1e-6);
@@ -331,8 +329,7 @@ static void the_tool_stays_held_and_its_poses_go_on(void)
     }
     CHECK_INT(part(&c)->epoch, 2);
     int n_haptic = c.n_haptic;
-    for (int i = 0; i < 2000 && c.n_haptic == n_haptic; i++) turn(&c, NULL);
-    CHECK(c.n_haptic > n_haptic); /* models of contact still come */
+    UNTIL(c.n_haptic > n_haptic, &c, NULL); /* models of contact still come */
     CHECK_INT(c.n_bad, 0);
     mem_end(&c);
     end();
@@ -344,11 +341,10 @@ static void a_field_that_is_looked_at_goes_on_with_the_new_vertices(void)
     begin();
     join(&c, "Ada", PAL_WIRE_ROLE_INSTRUCTOR, PAL_WIRE_TOOL_NONE);
     mem_text(&c, "{\"type\":\"subscribe_field\",\"part\":0,\"field\":\"displacement\"}");
-    for (int i = 0; i < 20000 && c.n_field == 0; i++) turn(&c, NULL);
+    UNTIL(c.n_field > 0, &c, NULL);
     CHECK_INT(c.field.epoch, 1);
     CHECK(order(&c, "extrude", TOP ",\"distance_m\":0.02"));
-    for (int i = 0; i < 20000 && c.field.epoch != 2; i++) turn(&c, NULL);
-    CHECK_INT(c.field.epoch, 2);
+    UNTIL(c.field.epoch == 2, &c, NULL);
     CHECK_INT(c.field.n_vertex, part(&c)->n_vertex);
     CHECK_INT(c.n_bad, 0);
     mem_end(&c);
@@ -366,8 +362,7 @@ static void who_asks_and_goes_leaves_the_others_a_session_that_works(void)
     mem_end(&goes);
     CHECK(order(&stays, "probe", TOP));
     /* what was under way is done for all, what waited went with who wanted it */
-    for (int i = 0; i < 20000 && stays.epoch != 2; i++) turn(&stays, NULL);
-    CHECK_INT(stays.epoch, 2);
+    WAIT_UNTIL(stays.epoch == 2, &stays, NULL);
     CHECK(order(&stays, "undo", ""));
     CHECK_INT(part(&stays)->epoch, 3);
     until_frame(&stays);
@@ -385,7 +380,7 @@ static void a_server_that_ends_in_the_middle_ends(void)
         if (k & 1) CHECK(order(&c, "divide", TOP)); /* with a session of the hub's own */
         send(&c, "extrude", TOP ",\"distance_m\":0.02");
         send(&c, "undo", "");
-        if (k & 2) turn(&c, NULL); /* later: while it is made, or when it is done */
+        if (k & 2) served_serve(&c, NULL); /* later: while it is made, or when it is done */
         CHECK(pal_mem_code(c.peer) == 0);
         pal_mem_leave(c.peer);
         c.peer = NULL;

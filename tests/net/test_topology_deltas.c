@@ -1,5 +1,5 @@
-/* A body that adapts, from a real session to clients on mem://: who is told of its triangles, when, and that what they
- * have is the world's. */
+/* A body that adapts, from a real session to clients inside the process: who is told of its triangles, when, and that
+ * what they have is the world's. */
 #include "server/net/stream.h"
 #include "server/net/transport/credit.h"
 #include "tests/net/adaptive_scene.h"
@@ -8,33 +8,21 @@
 static adaptive_scene low_gravity, storm, weightless;
 static void begin(const adaptive_scene *which)
 {
-    served_begin(&which->scene, (pal_session_options){.start_paused = true, .unpaced = true}, (pal_server_options){0});
+    served_begin(&which->scene, (pal_session_options){.start_paused = true}, (pal_server_options){0});
 }
 
-static void nap(void)
+/* a frame time on: a client that keeps up has read all that there is */
+static void turn(mem_client *a, mem_client *b)
 {
-    nanosleep(&(struct timespec){0, 100000}, NULL);
+    served_turn(FRAME_NS, a, b);
 }
 
-/* a frame time on; then the client, which keeps up, waits for its cycle, so that a slow machine changes nothing */
-static void next_cycle(mem_client *c)
-{
-    int before = c->n_tools;
-    now_ns += FRAME_NS;
-    for (int i = 0; i < 50000 && c->n_tools == before; i++) {
-        pal_server_advance(server, now_ns);
-        mem_pull(c, 1000);
-        if (c->n_tools == before) nap();
-    }
-    CHECK(c->n_tools > before);
-}
-
-/* one step of the paused session, seen by the client, who asks for it */
+/* one step of the paused session, seen by the client, who asks for it; the cycle before it may be the first */
 static void step(mem_client *c)
 {
     uint64_t before = c->tools.sim_time_us;
     mem_text(c, "{\"type\":\"command\",\"verb\":\"step\"}");
-    for (int i = 0; i < 50 && c->tools.sim_time_us <= before; i++) next_cycle(c);
+    turn(c, NULL);
     CHECK(c->tools.sim_time_us > before);
 }
 
@@ -87,16 +75,10 @@ static void hello_tells_which_parts_adapt_and_the_asset_holds_the_finest_level(v
     CHECK_INT(c.asset->order->n_vertex, ADAPTIVE_VERTICES);
     CHECK_INT(c.asset->n_triangle, ADAPTIVE_PLACES);
     CHECK_INT(shown_vertices(&c), ADAPTIVE_NODES); /* level 0 at load */
-    next_cycle(&c);
+    turn(&c, NULL);
     CHECK_INT(c.n_patch, 0); /* nothing has changed yet */
-    /* a status that was made before the first frame came from the session's thread has nothing to tell yet */
     const pal_wire_status *s = &c.last[PAL_CONTROL_STATUS].status;
-    for (int i = 0; i < 2000 && !(c.n_text[PAL_CONTROL_STATUS] && s->n_active); i++) {
-        now_ns += FRAME_NS;
-        pal_server_advance(server, now_ns);
-        mem_pull(&c, 1000);
-        nap();
-    }
+    UNTIL(c.n_text[PAL_CONTROL_STATUS] > 0, &c, NULL);
     CHECK_INT(s->n_active, 1);
     CHECK(s->active[0].part == 0 && s->active[0].n_node == ADAPTIVE_NODES && s->active[0].n_spring == 336);
     CHECK(s->active[0].n_finest_node == ADAPTIVE_VERTICES && s->active[0].n_finest_spring == ADAPTIVE_SPRINGS);
@@ -105,50 +87,46 @@ static void hello_tells_which_parts_adapt_and_the_asset_holds_the_finest_level(v
     end();
 }
 
-/* the stream alone: its own copy and that of clients who look now and then are the frame's */
+/* the stream alone: its own copy and that of clients that take a cycle now and then are the frame's */
 static void tables_are_the_worlds_after_many_changes(void)
 {
-    enum { LOOKERS = 4 };
-    static uint32_t mine[LOOKERS][ADAPTIVE_PLACES][3];
+    enum { CLIENTS = 4 };
+    static uint32_t mine[CLIENTS][ADAPTIVE_PLACES][3];
     static uint8_t work[PAL_TOPOLOGY_DELTA_WORK_BYTES(ADAPTIVE_PLACES)];
-    uint32_t has[LOOKERS] = {0};
+    uint32_t has[CLIENTS] = {0};
     pal_stream *s = NULL;
-    bool used[PAL_STREAM_TIER] = {true, true, false};
+    bool used[PAL_STREAM_TIER_COUNT] = {true, true, false};
     pal_stream_tool tool[PAL_TOOL_MAX] = {{0}};
-    pal_session_options options = {.unpaced = true};
-    REQUIRE(pal_session_open(&storm.scene, &options, NULL, &session) == PAL_ERR_OK);
+    served_session(&storm.scene, (pal_session_options){0});
     REQUIRE(pal_stream_open(session, 0, NULL, &s) == PAL_ERR_OK);
     pal_stream_part *part = &s->part[0];
     pal_asset *asset = NULL;
     pal_frame_decoder *decoder = NULL;
-    REQUIRE(part->places && !pal_asset_decode(part->asset->bytes, part->asset->n_byte, &asset));
+    REQUIRE(part->slots && !pal_asset_decode(part->asset->bytes, part->asset->n_byte, &asset));
     REQUIRE(!pal_frame_decoder_create(asset, &decoder));
     float *x = malloc(sizeof(float) * 3 * ADAPTIVE_VERTICES);
-    for (int k = 0; k < LOOKERS; k++) memcpy(mine[k], asset->triangle, sizeof mine[k]);
-    int n_cycle = 0, n_changed = 0;
-    for (int i = 0; i < 200000 && n_cycle < CHECK_REPEATS(120, 40); i++) {
-        uint32_t change = part->places->change;
-        if (!pal_stream_update(s, (uint64_t)i, used, tool)) {
-            nap();
-            continue;
-        }
-        n_cycle++;
-        n_changed += change != part->places->change;
+    for (int k = 0; k < CLIENTS; k++) memcpy(mine[k], asset->triangle, sizeof mine[k]);
+    int n_changed = 0;
+    for (int n_cycle = 1; n_cycle <= CHECK_REPEATS(120, 40); n_cycle++) {
+        uint32_t change = part->slots->change;
+        manual_clock_steps(&served_clock, 1, served_step_ns, 1);
+        REQUIRE(pal_stream_update(s, served_clock.now_ns, used, tool));
+        n_changed += change != part->slots->change;
         const pal_frame_part *from = &s->frame->part[0];
         CHECK_INT(from->n_slot, ADAPTIVE_PLACES);
-        CHECK(memcmp(part->places->tri, from->slot, sizeof mine[0]) == 0);
-        CHECK_INT(part->places->change == 0 ? 0 : part->frame_change[0], part->places->change);
-        for (int k = 0; k < LOOKERS; k++) {
+        CHECK(memcmp(part->slots->tri, from->slot, sizeof mine[0]) == 0);
+        CHECK_INT(part->slots->change == 0 ? 0 : part->frame_change[0], part->slots->change);
+        for (int k = 0; k < CLIENTS; k++) {
             pal_topology_delta_head head;
             if (n_cycle % (3 * k + 1)) continue;
-            pal_packet *p = pal_triangle_slots_delta(part->places, has[k]);
-            CHECK_INT(p != NULL, has[k] != part->places->change);
+            pal_packet *p = pal_triangle_slots_delta(part->slots, has[k]);
+            CHECK_INT(p != NULL, has[k] != part->slots->change);
             if (p)
                 CHECK_INT(pal_topology_delta_get(p->bytes, p->n_byte, ADAPTIVE_PLACES, ADAPTIVE_VERTICES, work, &head,
                                                  mine[k][0]),
                           0);
             pal_packet_drop(p);
-            has[k] = part->places->change;
+            has[k] = part->slots->change;
             CHECK(memcmp(mine[k], from->slot, sizeof mine[k]) == 0);
         }
         /* what is shown is where the world has it */
@@ -158,21 +136,22 @@ static void tables_are_the_worlds_after_many_changes(void)
             int n_shown = 0;
             REQUIRE(!pal_frame_get(decoder, part->frame[t]->bytes, part->frame[t]->n_byte, &head, x));
             for (int v = 0; v < ADAPTIVE_VERTICES; v++) {
-                n_shown += !part->places->hidden[v];
-                for (int c = 0; c < 3 && !part->places->hidden[v]; c++)
+                n_shown += !part->slots->hidden[v];
+                for (int c = 0; c < 3 && !part->slots->hidden[v]; c++)
                     worst = fmax(worst, fabs((double)x[3 * v + c] - (double)from->position_m[3 * v + c]));
             }
             CHECK_INT(n_shown, from->n_active);
             CHECK_LE(worst, pal_stream_tier_error_m(s, t));
         }
     }
-    printf("  %d of %d frames brought other triangles\n", n_changed, n_cycle);
+    printf("  %d frames brought other triangles\n", n_changed);
     CHECK(n_changed > 4);
     free(x);
     pal_frame_decoder_destroy(decoder);
     pal_asset_destroy(asset);
     pal_stream_close(s);
     pal_session_close(session);
+    pal_server_gate_destroy(gate);
 }
 
 static void who_skips_cycles_gets_one_patch_with_all_of_it(void)
@@ -181,7 +160,7 @@ static void who_skips_cycles_gets_one_patch_with_all_of_it(void)
     begin(&storm);
     join(&fast, "fast", true);
     join(&slow, "slow", true);
-    next_cycle(&fast);
+    turn(&fast, NULL);
     mem_pull(&slow, 1000);
     for (int i = 0; i < 12; i++) step(&fast); /* the slow one reads nothing meanwhile */
     REQUIRE(fast.n_patch > 3);
@@ -220,7 +199,7 @@ static void who_comes_late_gets_all_of_it_before_the_first_frame(void)
     begin(&storm);
     join(&early, "early", true);
     join(&old, "old", false);
-    next_cycle(&early);
+    turn(&early, NULL);
     for (int i = 0; i < 10; i++) {
         step(&early);
         mem_pull(&old, 1000);
@@ -239,7 +218,8 @@ static void who_comes_late_gets_all_of_it_before_the_first_frame(void)
     CHECK_INT(early.n_bad + late.n_bad + old.n_bad, 0);
     /* a reset brings back the table of load, for all alike */
     mem_text(&early, "{\"type\":\"command\",\"verb\":\"reset\"}");
-    for (int i = 0; i < 50 && early.tools.sim_time_us; i++) next_cycle(&early);
+    turn(&early, NULL);
+    CHECK_INT(early.tools.sim_time_us, 0);
     mem_pull(&late, 1000);
     REQUIRE(early.asset);
     CHECK(memcmp(early.tri, early.asset->triangle, (size_t)early.asset->n_triangle * 12) == 0);
@@ -257,7 +237,7 @@ static void a_change_of_accuracy_loses_no_triangle(void)
     begin(&storm);
     join(&fast, "fast", true);
     join(&coarse, "coarse", true);
-    next_cycle(&fast);
+    turn(&fast, NULL);
     mem_pull(&coarse, 1000);
     /* two clean seconds, then it takes one cycle in four, until it is given larger steps, then all of them again */
     float q = fast.frame.q_m, max = 0;
@@ -266,7 +246,7 @@ static void a_change_of_accuracy_loses_no_triangle(void)
             step(&fast);
         else {
             mem_text(&fast, "{\"type\":\"command\",\"verb\":\"step\"}");
-            next_cycle(&fast);
+            turn(&fast, NULL);
         }
         if (i % 7 == 6) {
             mem_pull(&coarse, 1000);
@@ -292,7 +272,7 @@ static void triangles_that_change_while_nothing_moves_come_with_a_frame(void)
     mem_client c, late;
     begin(&weightless);
     join(&c, "Ada", true);
-    next_cycle(&c);
+    turn(&c, NULL);
     REQUIRE(c.asset);
     CHECK_INT(shown_vertices(&c), ADAPTIVE_VERTICES);
     for (int i = 0; i < 120 && shown_vertices(&c) > ADAPTIVE_NODES; i++) {
@@ -317,11 +297,11 @@ static void at_rest_nothing_is_sent(void)
     mem_client c;
     begin(&low_gravity);
     join(&c, "Ada", true);
-    next_cycle(&c);
+    turn(&c, NULL);
     mem_text(&c, "{\"type\":\"command\",\"verb\":\"resume\"}");
     int quiet = 0, n_frame = 0, n_patch = 0;
     for (int i = 0; i < 4000 && quiet < 60; i++) {
-        next_cycle(&c);
+        turn(&c, NULL);
         quiet = c.n_frame == n_frame && c.n_patch == n_patch ? quiet + 1 : 0;
         n_frame = c.n_frame, n_patch = c.n_patch;
     }

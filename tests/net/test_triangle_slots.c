@@ -99,7 +99,7 @@ static void hidden_are_the_vertices_of_no_triangle(void)
     pal_triangle_slots_free(p);
 }
 
-static void what_did_not_change_makes_no_patch(void)
+static void what_did_not_change_makes_no_delta(void)
 {
     pal_triangle_slots *p = NULL;
     fill();
@@ -131,15 +131,15 @@ static void clients_at_the_same_change_share_one_packet(void)
                *c = pal_triangle_slots_delta(p, 0);
     REQUIRE(a && b && c);
     CHECK(a == b && a->n_user == 3 && c != a);
-    CHECK_INT(p->n_patch, 2);
+    CHECK_INT(p->n_delta, 2);
     CHECK(c->n_byte > a->n_byte);
     /* a few are kept for each table, not all there ever were */
     for (uint32_t from = 1; from < 8; from++) pal_packet_drop(pal_triangle_slots_delta(p, from));
-    CHECK_INT(p->n_patch, 9);
+    CHECK_INT(p->n_delta, 9);
     pal_packet_drop(pal_triangle_slots_delta(p, 7));
-    CHECK_INT(p->n_patch, 9);
+    CHECK_INT(p->n_delta, 9);
     pal_packet_drop(pal_triangle_slots_delta(p, 8));
-    CHECK_INT(p->n_patch, 10);
+    CHECK_INT(p->n_delta, 10);
     pal_packet_drop(a);
     pal_packet_drop(b);
     pal_packet_drop(c);
@@ -170,7 +170,7 @@ int main(void)
 {
     RUN(clients_that_come_and_skip_as_they_like_have_the_newest_table);
     RUN(hidden_are_the_vertices_of_no_triangle);
-    RUN(what_did_not_change_makes_no_patch);
+    RUN(what_did_not_change_makes_no_delta);
     RUN(clients_at_the_same_change_share_one_packet);
     RUN(a_corner_that_is_no_vertex_empties_its_place);
     return check_report();

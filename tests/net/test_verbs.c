@@ -1,6 +1,6 @@
 /* The table of verbs: a command is one line and one function. */
 #include "server/net/hub_peers.h"
-#include "server/net/verb_table.h"
+#include "server/net/hub_verb.h"
 #include "tests/net/hub_scene.h"
 #include "tests/net/server_fixture.h"
 

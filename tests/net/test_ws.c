@@ -35,7 +35,7 @@ static void begin(void)
 {
     pal_diagnostic diag = {""};
     gate = pal_server_gate_create();
-    pal_session_options options = {.wake = pal_server_gate_wake, .user = gate};
+    pal_session_options options = {.lease_s = 60, .wake = pal_server_gate_wake, .user = gate};
     pal_server_options net_options = {.port = 0, .viewer_folder = folder};
     if (pal_session_open(&organ.scene, &options, &diag, &session)) CHECK_FAIL("no session: %s", diag.text);
     if (pal_server_open(&net_options, &session, 1, &diag, &server)) {
@@ -342,10 +342,8 @@ static void flood_closes_the_flooder_alone(void)
     static char body[32768];
     size_t n = 0;
     int good = joined(WATCH), fd = joined(JOIN);
-    for (int i = 0; i < 2000; i++) raw_text(fd, "{\"type\":\"release_tool\"}");
-    /* the code may be lost when the kernel resets a connection whose input nobody reads */
-    int code = raw_close_code(fd);
-    CHECK(code == PAL_WIRE_CLOSE_RATE || code == 0);
+    /* the kernel resets a connection whose input nobody reads, which may lose the code of the close: test_hub has it */
+    while (raw_text(fd, "{\"type\":\"release_tool\"}")) continue;
     close(fd);
     CHECK_INT(get("/metrics", "", body, sizeof body - 1, &n), 200);
     body[n] = 0;

@@ -39,7 +39,7 @@ static pal_lanczos begin(chain *c, room *r, double stiff, double m)
     for (int i = 0; i < N; i++) {
         r->z[i] = random_signed(&seed);
     }
-    return (pal_lanczos){N, multiply, solve, c, r->z, r->basis, r->w, r->u, 0, 0, 0};
+    return (pal_lanczos){N, multiply, solve, c, r->z, r->basis, PAL_LANCZOS_MAX, r->w, r->u, 0, 0, 0};
 }
 
 static void it_bounds_the_largest_eigenvalue_from_above_and_closely(void)

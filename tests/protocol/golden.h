@@ -146,9 +146,8 @@ static inline void golden_hello(pal_wire_hello *h)
                           .up = {0, 0.6, 0.8},
                           .n_part = 2,
                           .n_tool = 1,
-                          .n_component = 3,
                           .tool = {{"probe", 0.01}},
-                          .component = {"gravity", "edge_distance", "verlet"},
+                          .plan = {.n_component = 3, .component = {"gravity", "edge_distance", "verlet"}},
                           .you_id = 7,
                           .you_role = PAL_WIRE_ROLE_TRAINEE,
                           .you_name = "Ada",
@@ -161,16 +160,16 @@ static inline void golden_accuracy(pal_wire_hello *h)
     snprintf(h->accuracy, sizeof h->accuracy, "2.1 %% RMS of finite elements \"hex8\" \xC2\xB1");
 }
 
-/* changed places of the golden asset's table of 108 triangles: emptied, filled, turned; ends of the table */
-enum { GOLDEN_PATCH_PLACES = 8 };
-static const uint32_t golden_place[GOLDEN_PATCH_PLACES] = {0, 1, 5, 6, 7, 50, 51, 107};
-static const uint32_t golden_corner[GOLDEN_PATCH_PLACES][3] = {{0, 0, 0},    {3, 2, 1},    {55, 54, 0},  {0, 0, 0},
-                                                               {17, 40, 23}, {23, 40, 41}, {41, 17, 23}, {55, 1, 30}};
+/* changed slots of the golden asset's table of 108 triangles: emptied, filled, turned; ends of the table */
+enum { GOLDEN_DELTA_SLOTS = 8 };
+static const uint32_t golden_slot[GOLDEN_DELTA_SLOTS] = {0, 1, 5, 6, 7, 50, 51, 107};
+static const uint32_t golden_corner[GOLDEN_DELTA_SLOTS][3] = {{0, 0, 0},    {3, 2, 1},    {55, 54, 0},  {0, 0, 0},
+                                                              {17, 40, 23}, {23, 40, 41}, {41, 17, 23}, {55, 1, 30}};
 
 static inline pal_topology_delta_head golden_topology_delta(void)
 {
     return (pal_topology_delta_head){
-        .part = 2, .epoch = 5, .n_place = GOLDEN_PATCH_PLACES, .revision = 4503599627370497};
+        .part = 2, .epoch = 5, .n_changed = GOLDEN_DELTA_SLOTS, .revision = 4503599627370497};
 }
 
 /* lines of control.jsonl behind one of each type: what servers and clients of before did not say */
@@ -332,15 +331,14 @@ static inline void golden_line(int line, pal_control *c)
     if (line == PAL_CONTROL_COUNT + 4) c->hello.part[0].is_sculptable = true;
     if (line == PAL_CONTROL_COUNT + 5) {
         c->hello.estimates = true;
-        golden_rows(3, &c->hello.n_component_part, c->hello.component_part, &c->hello.n_component_reason,
-                    c->hello.component_reason);
+        golden_rows(3, &c->hello.plan.n_part, c->hello.plan.part, &c->hello.plan.n_reason, c->hello.plan.reason);
     }
     if (line == PAL_CONTROL_COUNT + 6) {
-        c->topology.n_component = 2;
+        c->topology.plan.n_component = 2;
         for (int i = 0; i < 2; i++)
-            snprintf(c->topology.component[i], PAL_WIRE_NAME_BYTES, i ? "verlet" : "edge_distance");
-        golden_rows(2, &c->topology.n_component_part, c->topology.component_part, &c->topology.n_component_reason,
-                    c->topology.component_reason);
+            snprintf(c->topology.plan.component[i], PAL_WIRE_NAME_BYTES, i ? "verlet" : "edge_distance");
+        golden_rows(2, &c->topology.plan.n_part, c->topology.plan.part, &c->topology.plan.n_reason,
+                    c->topology.plan.reason);
     }
     if (line == PAL_CONTROL_COUNT + 7) golden_status(&c->status);
     if (line == PAL_CONTROL_COUNT + 8) golden_study(&c->study);

@@ -147,19 +147,19 @@ static void make_patch(const pal_asset *asset)
     uint32_t *table = malloc(n_corner * sizeof *table), *again = malloc(n_corner * sizeof *again);
     memcpy(table, asset->triangle, n_corner * sizeof *table);
     memcpy(again, asset->triangle, n_corner * sizeof *again);
-    for (int i = 0; i < GOLDEN_PATCH_PLACES; i++)
-        memcpy(table + 3 * (size_t)golden_place[i], golden_corner[i], sizeof golden_corner[i]);
+    for (int i = 0; i < GOLDEN_DELTA_SLOTS; i++)
+        memcpy(table + 3 * (size_t)golden_slot[i], golden_corner[i], sizeof golden_corner[i]);
     pal_topology_delta_head head = golden_topology_delta();
-    need(!pal_topology_delta_put(golden_place, table, &head, work, bytes, sizeof bytes, &n), "patch");
+    need(!pal_topology_delta_put(golden_slot, table, &head, work, bytes, sizeof bytes, &n), "patch");
     need(!pal_topology_delta_get(bytes, n, asset->n_triangle, asset->order->n_vertex, work, &head, again),
          "patch back");
     need(!memcmp(table, again, n_corner * sizeof *table), "patched table");
     save("topology_delta.bin", bytes, n);
-    fprintf(expected, "\"topology_delta\":{\"part\":%u,\"epoch\":%u,\"revision\":%llu,\"n\":%u,\"places\":[", head.part,
-            head.epoch, (unsigned long long)head.revision, head.n_place);
-    for (int i = 0; i < GOLDEN_PATCH_PLACES; i++) fprintf(expected, "%s%u", i ? "," : "", golden_place[i]);
+    fprintf(expected, "\"topology_delta\":{\"part\":%u,\"epoch\":%u,\"revision\":%llu,\"n\":%u,\"slots\":[", head.part,
+            head.epoch, (unsigned long long)head.revision, head.n_changed);
+    for (int i = 0; i < GOLDEN_DELTA_SLOTS; i++) fprintf(expected, "%s%u", i ? "," : "", golden_slot[i]);
     fprintf(expected, "],\"corners\":[");
-    for (int i = 0; i < 3 * GOLDEN_PATCH_PLACES; i++)
+    for (int i = 0; i < 3 * GOLDEN_DELTA_SLOTS; i++)
         fprintf(expected, "%s%u", i ? "," : "", golden_corner[i / 3][i % 3]);
     fprintf(expected, "],\n\"triangles\":[");
     for (size_t i = 0; i < n_corner; i++) fprintf(expected, "%s%u", i ? "," : "", table[i]);

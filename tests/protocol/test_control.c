@@ -146,7 +146,7 @@ static void reads_messages_of_before_fields(void)
     CHECK(c.status.n_unobserved == 0);
     static const char topology[] = "{\"type\":\"topology\",\"parts\":[]}";
     CHECK_INT(pal_control_get(topology, sizeof topology - 1, true, &c), 0);
-    CHECK_INT(c.topology.n_component, 0);
+    CHECK_INT(c.topology.plan.n_component, 0);
 }
 
 /* a number that nobody knows is NaN here and not there on the wire; what is required is never left out */
@@ -237,17 +237,15 @@ static void largest_messages_fit_their_limit(void)
     memset(full.hello.accuracy, '"', PAL_WIRE_TEXT_BYTES - 1);
     full.hello.n_part = PAL_WIRE_PART_MAX;
     full.hello.n_tool = PAL_WIRE_TOOL_MAX;
-    full.hello.n_component = PAL_WIRE_COMPONENT_MAX;
+    full.hello.plan.n_component = PAL_WIRE_COMPONENT_MAX;
     golden_parts(full.hello.part, PAL_WIRE_PART_MAX);
-    for (int i = 0; i < PAL_WIRE_COMPONENT_MAX; i++) memset(full.hello.component[i], 'r', PAL_WIRE_NAME_BYTES - 1);
-    full.hello.n_component_part = full.hello.n_component_reason = full.hello.n_component_required =
-        PAL_WIRE_COMPONENT_MAX;
-    for (int i = 0; i < PAL_WIRE_COMPONENT_MAX; i++)
-        memset(full.hello.component_reason[i], '"', PAL_WIRE_REASON_BYTES - 1);
+    for (int i = 0; i < PAL_WIRE_COMPONENT_MAX; i++) memset(full.hello.plan.component[i], 'r', PAL_WIRE_NAME_BYTES - 1);
+    full.hello.plan.n_part = full.hello.plan.n_reason = full.hello.plan.n_required = PAL_WIRE_COMPONENT_MAX;
+    for (int i = 0; i < PAL_WIRE_COMPONENT_MAX; i++) memset(full.hello.plan.reason[i], '"', PAL_WIRE_REASON_BYTES - 1);
     for (int i = 0; i < PAL_WIRE_TOOL_MAX; i++) memset(full.hello.tool[i].name, '\\', PAL_WIRE_NAME_BYTES - 1);
     CHECK_INT(pal_control_put(text, sizeof text, &full, &n), 0);
     CHECK_INT(pal_control_get(text, n, true, &again), 0);
-    CHECK_INT(again.hello.n_component, PAL_WIRE_COMPONENT_MAX);
+    CHECK_INT(again.hello.plan.n_component, PAL_WIRE_COMPONENT_MAX);
     CHECK_TEXT(again.hello.tool[31].name, full.hello.tool[31].name);
 
     memset(&full, 0, sizeof full);

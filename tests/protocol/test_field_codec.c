@@ -141,13 +141,11 @@ static void decoder_refuses_bad_kinds_ranges_and_blocks(void)
 
 static void names_and_numbers_agree(void)
 {
-    for (int f = 0; f < PAL_WIRE_FIELD_COUNT; f++)
-        CHECK_INT(pal_wire_field_find(pal_wire_field_name((pal_wire_field)f)), f);
+    static const char *const name[] = {"none",      "displacement", "von_mises", "energy",
+                                       "stiffness", "strain",       "distortion"};
+    for (int f = 0; f < PAL_WIRE_FIELD_COUNT; f++) CHECK_INT(pal_wire_field_find(name[f]), f);
     CHECK_INT(pal_wire_field_find("stress"), PAL_WIRE_FIELD_COUNT);
     CHECK_INT(pal_wire_field_find(""), PAL_WIRE_FIELD_COUNT);
-    CHECK_TEXT(pal_wire_field_name(PAL_WIRE_FIELD_VON_MISES_PA), "von_mises");
-    CHECK_INT(pal_wire_field_find("stiffness"), 4);
-    CHECK_TEXT(pal_wire_field_name((pal_wire_field)77), "none");
 }
 
 int main(void)

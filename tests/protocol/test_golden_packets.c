@@ -177,10 +177,10 @@ static void topology_delta_is_read_and_written_as_committed(void)
     CHECK_NEAR(h.part, number(e, "part"), 0);
     CHECK_NEAR(h.epoch, number(e, "epoch"), 0);
     CHECK_NEAR((double)h.revision, number(e, "revision"), 0);
-    CHECK_INT(h.n_place, number(e, "n"));
-    for (int i = 0; i < GOLDEN_PATCH_PLACES; i++) CHECK_INT(golden_place[i], element(e, "places", i));
+    CHECK_INT(h.n_changed, number(e, "n"));
+    for (int i = 0; i < GOLDEN_DELTA_SLOTS; i++) CHECK_INT(golden_slot[i], element(e, "slots", i));
     for (int i = 0; i < 3 * (int)asset->n_triangle; i++) CHECK_INT(asset->triangle[i], element(e, "triangles", i));
-    CHECK_INT(pal_topology_delta_put(golden_place, asset->triangle, &wanted, work, again, sizeof again, &n_again), 0);
+    CHECK_INT(pal_topology_delta_put(golden_slot, asset->triangle, &wanted, work, again, sizeof again, &n_again), 0);
     CHECK_INT(n_again, n);
     CHECK(memcmp(again, bytes, n) == 0);
     pal_asset_destroy(asset);
@@ -256,8 +256,8 @@ static void control_lines_are_read_and_written_as_committed(void)
         if (kind == PAL_CONTROL_STATUS) CHECK_INT(c.status.n_active, at == PAL_CONTROL_COUNT + 2 ? 2 : 0);
         if (kind == PAL_CONTROL_JOIN) CHECK_INT(c.join.topology_deltas, at == PAL_CONTROL_COUNT + 3);
         if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.estimates, at == PAL_CONTROL_COUNT + 5);
-        if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.n_component_part, at == PAL_CONTROL_COUNT + 5 ? 3 : 0);
-        if (kind == PAL_CONTROL_TOPOLOGY) CHECK_INT(c.topology.n_component_reason, at == PAL_CONTROL_COUNT + 6 ? 2 : 0);
+        if (kind == PAL_CONTROL_HELLO) CHECK_INT(c.hello.plan.n_part, at == PAL_CONTROL_COUNT + 5 ? 3 : 0);
+        if (kind == PAL_CONTROL_TOPOLOGY) CHECK_INT(c.topology.plan.n_reason, at == PAL_CONTROL_COUNT + 6 ? 2 : 0);
         if (kind == PAL_CONTROL_STATUS) CHECK_INT(c.status.state[0].n_safeguard, at == PAL_CONTROL_COUNT + 7 ? 17 : 0);
         if (kind == PAL_CONTROL_STATUS) CHECK_INT(c.status.n_disabled, at == PAL_CONTROL_COUNT + 7);
         if (kind == PAL_CONTROL_STUDY) CHECK_INT(c.study.point[1].pareto_optimal, at == PAL_CONTROL_COUNT + 8);

@@ -225,11 +225,10 @@ static void sha256_gives_the_vectors_of_the_standard(void)
     free(million);
 }
 
-static void every_refusal_has_name_and_sentence(void)
+static void every_refusal_has_a_sentence(void)
 {
-    for (int r = 0; r < PAL_REFUSAL_END; r++) CHECK(strlen(pal_refusal_name(r)) > 0 && strlen(pal_refusal_text(r)) > 0);
-    CHECK_TEXT(pal_refusal_name(PAL_REFUSAL_EPOCH), "EPOCH");
-    CHECK_TEXT(pal_refusal_name(-1), "UNKNOWN");
+    for (int r = 0; r < PAL_REFUSAL_END; r++) CHECK(strlen(pal_refusal_text(r)) > 0);
+    CHECK_TEXT(pal_refusal_text(-1), "unknown refusal");
 }
 
 int main(void)
@@ -242,6 +241,6 @@ int main(void)
     RUN(refuses_contact_patches_that_are_not_passive);
     RUN(refuses_lying_counts);
     RUN(sha256_gives_the_vectors_of_the_standard);
-    RUN(every_refusal_has_name_and_sentence);
+    RUN(every_refusal_has_a_sentence);
     return check_report();
 }

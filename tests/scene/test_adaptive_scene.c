@@ -234,7 +234,7 @@ static void a_stomach_is_held_at_both_ends_with_the_midpoints_between(void)
         const int32_t *end = levels->edge[e].vertex;
         if (body->support[end[0]] && body->support[end[1]]) CHECK(body->support[pal_levels_edge_midpoint(levels, e)]);
     }
-    pal_stomach_free(&s);
+    pal_surface_free(&s.surface);
     pal_world_destroy(world);
     pal_scene_free(loaded);
 }

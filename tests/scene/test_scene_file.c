@@ -168,7 +168,7 @@ static void every_bad_body_has_its_sentence(void)
         {"{\"bodies\": [{\"supports\": [{}]}]}", "bodies[0].supports[0]: needs either lowest, box or boundary"},
         {"{\"bodies\": [{\"supports\": [{\"lowest\": 2}]}]}", "bodies[0].supports[0].lowest: 2 is outside 0 .. 1"},
         {"{\"bodies\": [{\"supports\": [{\"box\": {\"low_m\": [0,0,0]}}]}]}",
-         "bodies[0].supports[0].box: needs low_m and high_m"},
+         "bodies[0].supports[0].box.high_m: is missing"},
         {"{\"bodies\": [{\"supports\": [{\"box\": {\"low_m\": [0,2,0], \"high_m\": [1,1,1]}}]}]}",
          "bodies[0].supports[0].box: low_m[1] 2 is above high_m[1] 1"},
         {"{\"bodies\": [{\"supports\": [{\"lowest\":0},{\"lowest\":0},{\"lowest\":0},{\"lowest\":0},{\"lowest\":0},"

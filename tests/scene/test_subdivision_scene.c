@@ -119,7 +119,7 @@ static const char whole[] =
     " \"regions\": [{\"box\": {\"low_m\": [0, 0, 0], \"high_m\": [1, 1, 1]}, \"young_Pa\": 9000}],"
     " \"cut\": {\"normal\": [1, 2, -0.3], \"offset_m\": 0.012345678901234567},"
     " \"strokes\": [{\"at_m\": [0.01, 0.1, -0.2], \"radius_m\": 0.03, \"young_factor\": 10},"
-    "  {\"at_m\": [0.3, 1e-7, 0.1], \"radius_m\": 0.1, \"soft\": 0.123456789012345678, \"young_factor\": 0.3,"
+    "  {\"at_m\": [0.3, 1e-7, 0.1], \"radius_m\": 0.1, \"softness\": 0.123456789012345678, \"young_factor\": 0.3,"
     "   \"density_factor\": 1.1}]}]}";
 
 static void what_is_saved_loads_to_the_same_bits(void)
@@ -145,7 +145,7 @@ static void what_is_saved_loads_to_the_same_bits(void)
         CHECK_INT(q->n_stroke, 2);
         for (int i = 0; i < 2 && q->n_stroke == 2; i++) {
             CHECK(!memcmp(p->stroke[i].at_m, q->stroke[i].at_m, sizeof p->stroke[i].at_m));
-            CHECK(p->stroke[i].radius_m == q->stroke[i].radius_m && p->stroke[i].soft == q->stroke[i].soft);
+            CHECK(p->stroke[i].radius_m == q->stroke[i].radius_m && p->stroke[i].softness == q->stroke[i].softness);
             CHECK(p->stroke[i].young_factor == q->stroke[i].young_factor);
             CHECK(p->stroke[i].density_factor == q->stroke[i].density_factor);
         }
@@ -157,7 +157,7 @@ static void what_is_saved_loads_to_the_same_bits(void)
         CHECK_INT(q->n_region, 1);
         CHECK_NEAR(q->support[0].high_m[0], -0.03, 0);
     }
-    CHECK_NEAR(a->scene.body[0].stroke[0].soft, 0.5, 0);
+    CHECK_NEAR(a->scene.body[0].stroke[0].softness, 0.5, 0);
     CHECK_NEAR(a->scene.body[0].cut_normal[1], 2 / sqrt(5.09), 1e-15);
     CHECK(a->scene.body[0].cut_m == 0.012345678901234567);
     pal_scene_free(a), pal_scene_free(b), pal_scene_free(c);
@@ -270,7 +270,8 @@ static void what_does_not_fit_is_refused_in_a_sentence(void)
     expect(CELLS ", \"strokes\": [{\"at_m\": [0, 0, 0]}]", "bodies[0].strokes[0].radius_m: is missing");
     expect(CELLS ", \"strokes\": [{" STROKE "}, {" STROKE ", \"colour\": 1}]",
            "bodies[0].strokes[1].colour: unknown key");
-    expect(CELLS ", \"strokes\": [{" STROKE ", \"soft\": 1.5}]", "bodies[0].strokes[0].soft: 1.5, wanted 0 to 1");
+    expect(CELLS ", \"strokes\": [{" STROKE ", \"softness\": 1.5}]",
+           "bodies[0].strokes[0].softness: 1.5, wanted 0 to 1");
     expect(CELLS ", \"strokes\": [{" STROKE ", \"young_factor\": 0}]",
            "bodies[0].strokes[0].young_factor: 0, wanted 1e-6 to 1e6");
     expect(CELLS ", \"strokes\": [{" STROKE ", \"density_factor\": 1e7}]",

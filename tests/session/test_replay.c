@@ -1,10 +1,10 @@
 /* Input logs: what a live session recorded gives the same hashes again; a log that is broken, cut, foreign or not whole
  * is refused with one sentence. */
-#include "server/base/clock.h"
 #include "server/session/input_log.h"
 #include "server/session/replay.h"
 #include "tests/check.h"
 #include "tests/session/session_scene.h"
+#include "tests/session/stepped_session.h"
 
 #include <stddef.h>
 #include <sys/stat.h>
@@ -14,6 +14,7 @@ static pal_prepared mesh;
 static char path[] = "/tmp/palpate_replay_XXXXXX";
 static uint8_t whole[1 << 20]; /* the log of the live session */
 static size_t n_whole;
+enum { STEPS = 300 };
 
 static size_t slurp(const char *name, uint8_t *bytes, size_t cap)
 {
@@ -23,8 +24,8 @@ static size_t slurp(const char *name, uint8_t *bytes, size_t cap)
     return n;
 }
 
-/* a few hundred steps with presses, a grab, a material edit, a reset, a tool that falls silent, brushes: one of a tool
- * that is let go without ever having been there, one of the tool that falls silent, one that ends by itself */
+/* 300 steps with presses, a grasp, a material edit, resets, a tool that falls silent, brushes: one of a tool that is
+ * let go without ever having been there, one of the tool that falls silent, one that ends by itself */
 static bool record(void)
 {
     const pal_brush blow = {.kind = PAL_BRUSH_INFLATE, .at_m = {0, 0, 0.05}, .radius_m = 0.03, .pressure_Pa = 400};
@@ -32,40 +33,34 @@ static bool record(void)
                             .at_m = {-0.02, 0, 0.045},
                             .to_m = {0.02, 0, 0.045},
                             .radius_m = 0.02,
-                            .soft = 0.5,
+                            .softness = 0.5,
                             .lift_m = {0, 0, 0.005},
                             .stiffness_N_m = 20};
-    pal_session *s;
-    pal_diagnostic diag = {""};
-    pal_session_options options = {.record_path = path, .lease_s = 0.1};
-    if (pal_session_open(&scene, &options, &diag, &s)) return false;
-    uint64_t tick = 0, seq = 0;
-    for (const pal_frame *f; tick < 150;) {
-        f = pal_session_take_frame(s);
-        if (!f) {
-            usleep(200);
-            continue;
-        }
-        tick = f->tick;
-        seq++;
-        pal_pose pose = {.position_m = {0.001 * (double)(seq % 40), 0, 0.055 - 0.0005 * (double)(seq % 30)},
+    const struct {
+        int step;
+        pal_command command;
+    } order[] = {{20, {.kind = PAL_COMMAND_RESET_BODY, .body = 0}},
+                 {40, {.kind = PAL_COMMAND_MATERIAL, .material = {3000, 0.4, 900, 2}}},
+                 {70, {.kind = PAL_COMMAND_RESET}},
+                 {82, {.kind = PAL_COMMAND_BRUSH, .slot = 1, .brush = blow}},
+                 {90, {.kind = PAL_COMMAND_BRUSH, .slot = 0, .brush = lift}},
+                 {100, {.kind = PAL_COMMAND_COMPONENT, .component = "gravity"}},
+                 {120, {.kind = PAL_COMMAND_COMPONENT, .component = "gravity", .wanted = true}},
+                 {130, {.kind = PAL_COMMAND_BRUSH, .slot = 1, .brush = lift}},
+                 {140, {.kind = PAL_COMMAND_BRUSH, .slot = 1}}};
+    pal_session *s = stepped_open(&scene, (pal_session_options){.record_path = path, .lease_s = 0.1});
+    if (!s) return false;
+    for (int step = 1; step <= STEPS; step++) {
+        pal_pose pose = {.position_m = {0.001 * (step % 40), 0, 0.055 - 0.0005 * (step % 30)},
                          .quat = {1, 0, 0, 0},
-                         .buttons = seq % 50 > 20,
-                         .seq = (uint32_t)seq};
-        if (seq % 60 < 45) pal_session_put_pose(s, 0, &pose);
-        if (seq == 40)
-            pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_MATERIAL, .material = {3000, 0.4, 900, 2}});
-        if (seq == 70) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_RESET}), tick = 0;
-        if (seq == 82) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_BRUSH, .slot = 1, .brush = blow});
-        if (seq == 90) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_BRUSH, .slot = 0, .brush = lift});
-        if (seq == 20) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_RESET_BODY, .body = 0});
-        if (seq == 96) pal_session_put_pose(s, 1, NULL);
-        if (seq == 130) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_BRUSH, .slot = 1, .brush = lift});
-        if (seq == 100 || seq == 120)
-            pal_session_command(s,
-                                &(pal_command){.kind = PAL_COMMAND_COMPONENT, .row = "gravity", .wanted = seq == 120});
-        if (seq == 140) pal_session_command(s, &(pal_command){.kind = PAL_COMMAND_BRUSH, .slot = 1});
-        if (seq < 150) tick = 0;
+                         .buttons = step % 50 > 20,
+                         .seq = (uint32_t)step};
+        if (step % 60 < 38)
+            CHECK(!pal_session_request_pose(s, 0, &pose)); /* 22 steps of silence: longer than the lease */
+        if (step == 96) CHECK(!pal_session_request_pose(s, 1, NULL));
+        for (size_t k = 0; k < sizeof order / sizeof *order; k++)
+            if (order[k].step == step) CHECK(!pal_session_command(s, &order[k].command));
+        stepped_steps(s, 1);
     }
     pal_session_close(s);
     return true;
@@ -80,10 +75,10 @@ static void a_recorded_session_gives_the_same_hashes_again(void)
     REQUIRE(n_whole > 1000 && n_whole < sizeof whole);
     pal_err err = pal_replay_run(path, &scene, &report, &diag);
     if (err) CHECK_FAIL("%s", diag.text);
-    CHECK(report.n_tick > 200);
-    CHECK(report.n_pose > 10);
+    CHECK_INT(report.n_tick, STEPS);
+    CHECK_INT(report.n_pose, 5 * 38);
     CHECK_INT(report.n_command, 9);
-    CHECK(report.n_hash > 3);
+    CHECK_INT(report.n_hash, STEPS / PAL_INPUT_HASH_STEPS + 1); /* one at the end */
     CHECK_INT(report.n_hash_equal, report.n_hash);
     CHECK(report.first_difference == UINT64_MAX);
     CHECK(report.last_hash != 0);
@@ -240,8 +235,8 @@ static void records_survive_the_round_trip_bit_by_bit(void)
          .step = 1ull << 42,
          .slot = 5,
          .brush = {PAL_BRUSH_CURVE, {1, 2, 3}, {4, 5, -0.0}, 0.1, 0.5, -7e200, {1e-300, 8, 9}, 10}},
-        {.kind = PAL_INPUT_COMPONENT, .index = 2, .step = 1ull << 43, .wanted = true, .row = "tet_volume"},
-        {.kind = PAL_INPUT_COMPONENT, .step = 1ull << 44, .row = "gravity"},
+        {.kind = PAL_INPUT_COMPONENT, .index = 2, .step = 1ull << 43, .wanted = true, .component = "tet_volume"},
+        {.kind = PAL_INPUT_COMPONENT, .step = 1ull << 44, .component = "gravity"},
         {.kind = PAL_INPUT_HASH, .step = 1ull << 63, .hash = 0xfedcba9876543210u}};
     const int n_in = sizeof in / sizeof in[0];
     for (int k = 0; k < n_in; k++) pal_input_log_put(log, &in[k]);
@@ -259,7 +254,7 @@ static void records_survive_the_round_trip_bit_by_bit(void)
         CHECK(!memcmp(&out.pose, &in[k].pose, sizeof out.pose));
         CHECK(!memcmp(&out.material, &in[k].material, sizeof out.material));
         CHECK(out.wanted == in[k].wanted);
-        CHECK_TEXT(out.row, in[k].row);
+        CHECK_TEXT(out.component, in[k].component);
         CHECK(out.slot == in[k].slot && out.brush.kind == in[k].brush.kind);
         CHECK(!memcmp(out.brush.at_m, in[k].brush.at_m, sizeof(pal_brush) - offsetof(pal_brush, at_m)));
     }

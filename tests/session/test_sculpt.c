@@ -3,6 +3,7 @@
 #include "server/num/random.h"
 #include "server/session/sculpt.h"
 #include "server/sim/subdivision/subdivision_solid.h"
+#include "tests/fixtures/body_sums.h"
 #include "tests/fixtures/cell_check.h"
 #include "tests/session/sculpt_body.h"
 
@@ -277,19 +278,19 @@ static void paint_makes_heavier_and_stiffer_where_it_is(void)
 {
     studio s;
     REQUIRE(studio_open(&s));
-    double kg = pal_subdivision_solid_mass_kg(pal_world_body(s.world, 0)->model.solid);
+    double kg = solid_mass_kg(pal_world_body(s.world, 0)->model.solid);
     double litre = pal_subdivision_solid_volume_m3(pal_world_body(s.world, 0)->model.solid);
     CHECK_NEAR(kg, 1000 * litre, 1e-9 * kg);
     /* a hard brush over all of it */
     pal_stroke all = {{0, 0, 0}, 1, 0, 2, 5};
     CHECK_INT(studio_do(&s, &(pal_sculpt){.kind = PAL_SCULPT_PAINT, .stroke = all}), 0);
-    CHECK_NEAR(pal_subdivision_solid_mass_kg(pal_world_body(s.world, 0)->model.solid), 5 * kg, 1e-6 * kg);
+    CHECK_NEAR(solid_mass_kg(pal_world_body(s.world, 0)->model.solid), 5 * kg, 1e-6 * kg);
     CHECK_NEAR(pal_world_body(s.world, 0)->model.solid->samples[PAL_CELL_HEX].young_Pa[17], 10000, 1e-2);
     static const struct {
         pal_stroke stroke;
         const char *expected;
     } bad[] = {{{{0, 0, 0}, 0, 0, 1, 1}, "radius_m: 0"},     {{{0, 0, 0}, NAN, 0, 1, 1}, "radius_m: nan"},
-               {{{0, 0, 0}, 1, 2, 1, 1}, "soft: 2"},         {{{0, NAN, 0}, 1, 0, 1, 1}, "at_m[1]"},
+               {{{0, 0, 0}, 1, 2, 1, 1}, "softness: 2"},     {{{0, NAN, 0}, 1, 0, 1, 1}, "at_m[1]"},
                {{{0, 0, 0}, 1, 0, 0, 1}, "young_factor: 0"}, {{{0, 0, 0}, 1, 0, 1, INFINITY}, "density_factor: inf"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         CHECK_INT(studio_do(&s, &(pal_sculpt){.kind = PAL_SCULPT_PAINT, .stroke = bad[i].stroke}), PAL_ERR_REFUSED);
@@ -350,7 +351,7 @@ static void check_solid(const studio *s)
     const pal_subdivision_solid *solid = pal_world_body(s->world, 0)->model.solid;
     const pal_body *body = pal_world_body(s->world, 0);
     if (cells_check(pal_sculptor_cells(s->sculptor), NULL, &diag)) CHECK_FAIL("%s", diag.text);
-    double kg = pal_subdivision_solid_mass_kg(solid), sum = 0;
+    double kg = solid_mass_kg(solid), sum = 0;
     CHECK(pal_subdivision_solid_volume_m3(solid) > 0);
     for (int i = 0; i < body->n_node; i++) sum += body->node_mass_kg[i];
     CHECK_NEAR(sum, kg, 1e-9 * kg);

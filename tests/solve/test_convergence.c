@@ -87,7 +87,7 @@ static void beam_problem(pal_problem *p)
 }
 
 static const pal_solve_options beam_options = {
-    .element = "hex8_bbar", .law = "linear", .fill = true, .young_Pa = NAN, .poisson = NAN};
+    .element = "hex8_bbar", .law = "linear", .voxel.fill = true, .young_Pa = NAN, .poisson = NAN};
 
 static void a_beam_converges_and_richardson_knows_by_how_much(void)
 {
@@ -117,7 +117,7 @@ static void a_beam_converges_and_richardson_knows_by_how_much(void)
     pal_solve_result r;
     double x[24], u[24];
     pal_samples samples = {.n = 8, .x = x, .u = u};
-    o.resolution = 32;
+    o.voxel.resolution = 32;
     REQUIRE(!pal_solve(&p, &p.load_case[0], &beam, &o, &s, &r, &diag));
     for (int i = 0; i < 24; i++) x[i] = beam.x[i] + beam.origin_m[i % 3];
     for (int i = 0; i < 8; i++) pal_solution_at(s, x + 3 * i, u + 3 * i);

@@ -50,9 +50,9 @@ static pal_solve_options options_of(const char *element, const char *law)
 {
     return (pal_solve_options){.element = element,
                                .law = law,
-                               .resolution = 8,
-                               .fill = true,
-                               .align = true,
+                               .voxel.resolution = 8,
+                               .voxel.fill = true,
+                               .voxel.align = true,
                                .tolerance = 1e-11,
                                .young_Pa = NAN,
                                .poisson = NAN};

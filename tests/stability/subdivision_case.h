@@ -72,7 +72,7 @@ static inline void solid_momentum(const pal_body *body, double linear[3], double
     double *q = calloc(3 * (size_t)body->n_dof, sizeof *q), c[3], middle[3] = {0, 0, 0}, mass = 0;
     if (!q) abort();
     pal_set3(linear, 0, 0, 0), pal_set3(angular, 0, 0, 0);
-    pal_mass_operator_multiply(body->mass_operator, body->v, q);
+    pal_mass_operator_multiply(body->mass_operator, 1, 0, NULL, body->v, q);
     for (int i = 0; i < body->n_dof; i++) {
         pal_add3(linear, linear, q + 3 * i);
         pal_cross3(c, body->x + 3 * i, q + 3 * i);

@@ -3,6 +3,7 @@
  * to some models. */
 #include "server/mesh/cells/cell_edits.h"
 #include "server/num/polar.h"
+#include "tests/fixtures/body_sums.h"
 #include "tests/fixtures/random.h"
 #include "tests/stability/four_models.h"
 #include "tests/stability/hard_case.h"
@@ -74,10 +75,10 @@ static void springs_keep_momentum_for_ten_thousand_steps(void)
     REQUIRE(four_open(&s));
     shake(&s, 0.001, 0.1);
     for (int i = 0; i < s.body->n_dof; i++) s.body->v[3 * i] += 0.2;
-    pal_body_momentum(s.body, before);
+    body_momentum(s.body, before);
     const double dt_s = 0.9 * pal_world_limit_s(s.world), first = pal_world_energy_J(s.world);
     for (int i = 0; i < CHECK_REPEATS(10000, 1000); i++) REQUIRE(four_step(&s, 1, dt_s));
-    pal_body_momentum(s.body, after);
+    body_momentum(s.body, after);
     HARD_CASE("momentum", "tet_springs", "drift of momentum", pal_dist3(before, after) / pal_norm3(before), 1e-4,
               "in 10,000 steps");
     CHECK_LE(pal_world_energy_J(s.world), 1.02 * first);
@@ -284,7 +285,7 @@ static void of_two_pieces_the_held_one_stands_and_the_other_falls(void)
             pal_cells_edit edit;
             free(s.scene), pal_prepared_free(&s.mesh), pal_cells_free(&s.cells);
             REQUIRE(!pal_cells_block(size, (const double[3]){0.02, 0.02, 0.06}, &three, &diag));
-            REQUIRE(!pal_cells_delete(&three, 1, &edit, &diag));
+            REQUIRE(!pal_cells_apply(&three, &(pal_cells_command){.kind = PAL_CELLS_DELETE, .cell = 1}, &edit, &diag));
             s.cells = edit.cells;
             memset(&edit.cells, 0, sizeof edit.cells);
             pal_cells_edit_free(&edit);

@@ -393,7 +393,7 @@ static void a_body_that_is_no_number_freezes_and_the_other_goes_on(void)
     for (int i = 0; i < 60 && !err; i++) err = pal_world_step(b.world, 1.0 / 60);
     CHECK_INT(err, PAL_ERR_FROZEN);
     CHECK(b.body->frozen);
-    for (int i = 0; i < 3 * b.body->n_shown; i++) REQUIRE(isfinite(b.body->shown[i]));
+    for (int i = 0; i < 3 * b.body->display.n_shown; i++) REQUIRE(isfinite(b.body->display.shown[i]));
     box_bench_close(&b);
 }
 

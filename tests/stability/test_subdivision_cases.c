@@ -175,7 +175,7 @@ static void deleting_a_cell_leaves_the_others_where_they_were(void)
             if (a.body->node_rest[3 * i + 2] > 0.11) (void)pal_world_load(a.world, 0, i, (double[3]){2e-4, 0, 0});
         REQUIRE(solid_scene_step(&a, 60, solid_step_s));
         CHECK(solid_rms(a.body) > 1e-3 * a.body->length_scale_m);
-        REQUIRE(!pal_cells_delete(&a.cells, 5, &edit, &diag));
+        REQUIRE(!pal_cells_apply(&a.cells, &(pal_cells_command){.kind = PAL_CELLS_DELETE, .cell = 5}, &edit, &diag));
         double *x = calloc(3 * (size_t)edit.cells.n_vertex, sizeof *x), *v = calloc(3 * (size_t)edit.cells.n_vertex, 8);
         pal_cells_edit_positions(&edit, &a.cells, a.body->x, x);
         pal_interpolation_apply(&edit.rows, a.body->v, v);
@@ -214,8 +214,11 @@ static void the_same_force_moves_painted_mass_otherwise(void)
     double first[3], turn_s[3];
     for (int q = 0; q < 3; q++) {
         solid_scene s;
-        const pal_stroke stroke = {
-            .at_m = {0.01, 0.01, 0.08}, .radius_m = 0.045, .soft = 0.2, .young_factor = 1, .density_factor = factor[q]};
+        const pal_stroke stroke = {.at_m = {0.01, 0.01, 0.08},
+                                   .radius_m = 0.045,
+                                   .softness = 0.2,
+                                   .young_factor = 1,
+                                   .density_factor = factor[q]};
         solid_make(&s, &solid_kinds[SOLID_EXPLICIT], 1, 1, 4, true);
         s.def->n_stroke = 1, s.def->stroke = &stroke;
         s.def->material.damping_1_s = 0.2, s.def->material.young_Pa = 2e4;

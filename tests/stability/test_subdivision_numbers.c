@@ -102,7 +102,7 @@ static void a_contrast_of_a_million_costs_few_iterations(void)
     int max = 0;
     double hard = 0, soft = 0;
     const pal_stroke stroke = {
-        .at_m = {0.02, 0.02, 0}, .radius_m = 0.045, .soft = 0, .young_factor = 1e6, .density_factor = 1};
+        .at_m = {0.02, 0.02, 0}, .radius_m = 0.045, .softness = 0, .young_factor = 1e6, .density_factor = 1};
     solid_make(&s, &solid_kinds[SOLID_IMPLICIT], 2, 2, 4, true);
     s.def->n_stroke = 1, s.def->stroke = &stroke;
     pal_entry_put_number(&s.def->solver, "tolerance", 1e-6, NULL);

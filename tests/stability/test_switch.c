@@ -580,7 +580,7 @@ static void handles_hold_on(void)
                                   .at_m = {0.13, 0.025, WIDTH},
                                   .to_m = {0.19, 0.025, WIDTH},
                                   .radius_m = 0.02,
-                                  .soft = 0.5,
+                                  .softness = 0.5,
                                   .lift_m = {0, 0, 0.02},
                                   .stiffness_N_m = 60};
         beam b;

@@ -14,14 +14,14 @@ static void watch(pal_world *next, double step_s, double from_m, seen *out)
 {
     const pal_body *to = pal_world_body(next, 0);
     const pal_tool *tool = &pal_world_tools(next)->tool[0];
-    const size_t n_byte = 3 * sizeof(float) * (size_t)to->n_shown;
+    const size_t n_byte = 3 * sizeof(float) * (size_t)to->display.n_shown;
     float *last = malloc(n_byte);
     if (!last) abort();
     *out = (seen){.frame_m = from_m, .min_N = INFINITY};
     for (int k = 0; k < AFTER; k++) {
-        memcpy(last, to->shown, n_byte);
+        memcpy(last, to->display.shown, n_byte);
         step(next, step_s, 1);
-        out->frame_m = fmax(out->frame_m, check_farthest(last, to->shown, to->n_shown));
+        out->frame_m = fmax(out->frame_m, check_farthest(last, to->display.shown, to->display.n_shown));
         double now_N = pal_norm3(tool->mean_force_N);
         out->min_N = fmin(out->min_N, now_N), out->max_N = fmax(out->max_N, now_N);
         if (table) printf(k < 16 ? " %.2f" : "", now_N);
@@ -41,9 +41,9 @@ static void check_pair(int i, int j, pal_world *before, double bound_m)
     pal_transfer *x = carry(i, j, before, next, &r);
     seen s;
     /* the frame of the switch shows what was shown */
-    double first_m = check_farthest(from->shown, to->shown, to->n_shown);
+    double first_m = check_farthest(from->display.shown, to->display.shown, to->display.n_shown);
     CHECK_LE(first_m, 1e-7);
-    CHECK(to->display_offset_m != NULL && r.frame_move_m > 0);
+    CHECK(to->display.offset_m != NULL && r.frame_move_m > 0);
     CHECK_NEAR(r.frame_move_m, r.max_move_m * set[j]->scene.step_s * 6, 1e-12);
     if (table) printf("  %d -> %d: N", i, j);
     watch(next, set[j]->scene.step_s, first_m, &s);
@@ -55,7 +55,7 @@ static void check_pair(int i, int j, pal_world *before, double bound_m)
               "");
     HARD_CASE("switch", list[j].model, "under a press: force beyond those at rest before and after",
               100 * fmax(s.max_N / fmax(was_N, s.is_N) - 1, 1 - s.min_N / fmin(was_N, s.is_N)), 20, "%");
-    CHECK(to->display_offset_m == NULL && pal_body_finite(to) && !to->frozen);
+    CHECK(to->display.offset_m == NULL && pal_body_finite(to) && !to->frozen);
     pal_world_destroy(next);
     pal_transfer_free(x);
 }
@@ -74,10 +74,10 @@ static void every_pair_under_a_press(void)
         for (int j = 0; j < N; j++) {
             const pal_body *a = pal_world_body(w[i], 0), *b = pal_world_body(w[j], 0);
             if (i == j || CHECK_REPEATS(false, (i + j) % 3 != 1)) continue;
-            REQUIRE(a->n_shown == best->n_shown && b->n_shown == best->n_shown);
+            REQUIRE(a->display.n_shown == best->display.n_shown && b->display.n_shown == best->display.n_shown);
             check_pair(i, j, w[i],
-                       check_farthest(a->shown, best->shown, best->n_shown) +
-                           check_farthest(b->shown, best->shown, best->n_shown));
+                       check_farthest(a->display.shown, best->display.shown, best->display.n_shown) +
+                           check_farthest(b->display.shown, best->display.shown, best->display.n_shown));
         }
     for (int i = 0; i <= N; i++) pal_world_destroy(w[i]);
     unmake();

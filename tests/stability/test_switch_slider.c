@@ -56,7 +56,7 @@ static double longest_edge(const pal_world *w)
             size_t i = 3 * (size_t)shown.tri[3 * t + c], j = 3 * (size_t)shown.tri[3 * t + (c + 1) % 3];
             double now = 0, rest = 0;
             for (size_t k = 0; k < 3; k++) {
-                now += pow((double)b->shown[i + k] - (double)b->shown[j + k], 2);
+                now += pow((double)b->display.shown[i + k] - (double)b->display.shown[j + k], 2);
                 rest += pow((double)shown.rest_m[i + k] - (double)shown.rest_m[j + k], 2);
             }
             max = fmax(max, sqrt(now / rest));
@@ -74,8 +74,8 @@ static double find_errors(pulled *p)
         pal_world *w = open_world(&p->set[i]->scene);
         const pal_body *a = pal_world_view_body(w, 0), *b = pal_world_view_body(right, 0);
         pull(p, w, p->set[i]->scene.step_s);
-        if (a->n_shown != b->n_shown) abort();
-        p->error_m[i] = check_farthest(a->shown, b->shown, b->n_shown);
+        if (a->display.n_shown != b->display.n_shown) abort();
+        p->error_m[i] = check_farthest(a->display.shown, b->display.shown, b->display.n_shown);
         longest = fmax(longest, longest_edge(w));
         if (table) printf("  setting %d: off by %.2f mm\n", i, 1e3 * p->error_m[i]);
         pal_world_destroy(w);
@@ -105,10 +105,10 @@ static void watch(const pulled *p, pal_world *w, double step_s, int n, double bo
         pull_to(p, w, *part);
         step(w, step_s, 1);
         if (k == 0) out->first_J = pal_body_kinetic_J(b);
-        out->frame = fmax(out->frame, check_farthest(last, b->shown, b->n_shown) / bound_m);
+        out->frame = fmax(out->frame, check_farthest(last, b->display.shown, b->display.n_shown) / bound_m);
         out->edge = fmax(out->edge, longest_edge(w));
         out->min_N = fmin(out->min_N, pal_norm3(force_N)), out->max_N = fmax(out->max_N, pal_norm3(force_N));
-        memcpy(last, b->shown, 3 * sizeof *last * (size_t)b->n_shown);
+        memcpy(last, b->display.shown, 3 * sizeof *last * (size_t)b->display.n_shown);
         CHECK(pal_world_tools(w)->tool[0].holding && !b->frozen);
     }
 }
@@ -185,10 +185,10 @@ static worst slide(pulled *p, uint64_t seed)
     worst all = {0};
     pal_world *w = open_world(&p->set[0]->scene);
     pull(p, w, p->set[0]->scene.step_s);
-    const size_t n_byte = 3 * sizeof(float) * (size_t)pal_world_view_body(w, 0)->n_shown;
+    const size_t n_byte = 3 * sizeof(float) * (size_t)pal_world_view_body(w, 0)->display.n_shown;
     float *last = malloc(n_byte);
     if (!last) abort();
-    memcpy(last, pal_world_view_body(w, 0)->shown, n_byte);
+    memcpy(last, pal_world_view_body(w, 0)->display.shown, n_byte);
     for (uint64_t k = 0; k < SWITCHES; k++) {
         int to = (at_setting + 1 + (int)(pal_random_unit(seed, 3 * k) * (SETTINGS - 1))) % SETTINGS;
         int n = 2 + (int)(12 * pal_random_unit(seed, 3 * k + 1));
@@ -197,7 +197,9 @@ static worst slide(pulled *p, uint64_t seed)
         seen s = {.min_N = before_N, .max_N = before_N};
         double bound_m = sweep ? 1 : p->error_m[at_setting] + p->error_m[to];
         w = change(p, at_setting, to, pal_random_unit(seed, 3 * k + 2) < 0.5, w, &r);
-        CHECK_LE(check_farthest(last, pal_world_view_body(w, 0)->shown, pal_world_view_body(w, 0)->n_shown), 1e-6);
+        CHECK_LE(
+            check_farthest(last, pal_world_view_body(w, 0)->display.shown, pal_world_view_body(w, 0)->display.n_shown),
+            1e-6);
         watch(p, w, p->set[to]->scene.step_s, n, bound_m, last, &part, &s);
         double energy = r.energy_after_J / r.energy_before_J - 1;
         if (table)

@@ -46,10 +46,10 @@ static void remember(uint64_t key, const pal_study_answer *answer, const double 
     memcpy(to->value, value, sizeof *value * (size_t)n);
 }
 
-static bool done(const pal_study *study, int n_finest, void *user)
+static bool done(const pal_study *study, int n_total, void *user)
 {
     run *r = user;
-    (void)n_finest;
+    (void)n_total;
     *r->so_far = *study;
     return true;
 }

@@ -106,7 +106,7 @@ static void a_full_organ_is_pressed(void)
     }
     CHECK(fine < coarse && (CHECK_REPEATS(false, true) || fitted < plain));
     int n_sprung = 0;
-    CHECK(pal_study_pick(s, NAN, 1e9) >= 0);
+    CHECK(pal_study_pick(s, "", NAN, 1e9) >= 0);
     for (int i = 0; i < s->n_point; i++) {
         const pal_configuration *q = &s->point[i].measured.setting;
         if (!(q->k_distance_J > 0)) continue;

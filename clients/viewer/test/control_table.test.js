@@ -10,7 +10,7 @@ import { hello, part } from "./fixtures/messages.js";
 /** @param {string} name */
 const source = (name) => readFileSync(new URL(`../../../protocol/${name}`, import.meta.url), "utf8");
 
-/** kinds of this table by the field types of the C table; fixed: three numbers, not counted */
+/** kinds of this table by the field types of the C table */
 const KINDS = {
     U16: "u16",
     U32: "u32",
@@ -34,14 +34,14 @@ const KINDS = {
 function parseTables() {
     /** @type {Record<string, Table>} */
     const tables = {};
-    for (const [, name, body] of source("control_table.c").matchAll(/(\w+)_fields\[\] = \{([\s\S]*?)END\}/g)) {
+    for (const [, name, body] of source("control_table.c").matchAll(/(\w+)_fields\[\] = \{([\s\S]*?)\{0\}\}/g)) {
         /** @type {Table} */
         const table = {};
         for (const [, key, type, required, rest] of body.matchAll(/\{"(\w+)", (\w+), (true|false), ([^{}]*)\}/g)) {
             const subtable = rest.match(/(\w+)_fields\s*$/)?.[1] ?? "";
             const kind = /** @type {Record<string, string>} */ (KINDS)[type];
             const nested = type === "OBJECTS" ? [tables[subtable]] : type === "OBJECT" ? tables[subtable] : null;
-            const value = nested ?? (rest.includes("FIXED, 3") ? "vector" : kind);
+            const value = nested ?? (rest.startsWith("ARRAY(") ? "vector" : kind);
             assert.ok(value, `${name}.${key} has the type ${type}`);
             table[required === "true" ? key : `${key}?`] = value;
         }
@@ -52,13 +52,10 @@ function parseTables() {
 
 /** messages of control.h: type, direction, name of the table @returns {{type: string, server: boolean, table: string}[]} */
 function parseMessages() {
-    const tables = new Map();
-    for (const [, id, table] of source("control_table.c").matchAll(/#define FIELDS_(\w+)\s+(\w+)_fields/g))
-        tables.set(id, table);
-    return [...source("control.h").matchAll(/X\((\w+), "(\w+)", (true|false)\)/g)].map(([, id, type, server]) => ({
+    return [...source("control.h").matchAll(/X\((\w+), "(\w+)", (true|false)\)/g)].map(([, table, type, server]) => ({
         type,
         server: server === "true",
-        table: tables.get(id),
+        table,
     }));
 }
 

@@ -99,8 +99,8 @@ test("applies the golden topology delta to the table of the golden asset", () =>
     const head = applyTopologyDelta(load("topology_delta.bin"), triangles, rest.length / 3);
     same(head, { part: wanted.part, epoch: wanted.epoch, revision: wanted.revision, n: wanted.n }, "topology_delta");
     assert.deepEqual([...triangles], wanted.triangles);
-    wanted.places.forEach((/** @type {number} */ place, /** @type {number} */ i) =>
-        before.set(wanted.corners.slice(3 * i, 3 * i + 3), 3 * place),
+    wanted.slots.forEach((/** @type {number} */ slot, /** @type {number} */ i) =>
+        before.set(wanted.corners.slice(3 * i, 3 * i + 3), 3 * slot),
     );
     assert.deepEqual(triangles, before);
 });

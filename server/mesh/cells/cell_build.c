@@ -4,17 +4,17 @@
  * A cell is a ball when its surface is connected, closed, oriented and V - E + F = 2. Cells fill the neighbourhood of a
  * vertex when its edges, faces and cells satisfy V - E + F = 2 (inside) or 1 (boundary) as points, arcs and patches of
  * a small sphere about it; vertices where sheets of the boundary touch are only marked. */
+#include "server/base/heap.h"
 #include "server/mesh/cells/cells.h"
 
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/tuning.h"
+#include "server/num/random.h"
 
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define MAX_ITEMS (INT32_MAX / 4)
 
 typedef struct builder {
     const pal_cell_loops *in;
@@ -28,20 +28,6 @@ typedef struct builder {
 
 /* ---- messages ---- */
 
-/* cell of a loop; for messages only */
-static int32_t cell_of_loop(const pal_cell_loops *in, int32_t loop)
-{
-    int32_t low = 0, high = in->n_cell - 1;
-    while (low < high) {
-        int32_t mid = low + (high - low + 1) / 2;
-        if (in->cell[mid] <= loop)
-            low = mid;
-        else
-            high = mid - 1;
-    }
-    return low;
-}
-
 /* number n as messages show it */
 static int file_number(const builder *b, int32_t n)
 {
@@ -49,42 +35,49 @@ static int file_number(const builder *b, int32_t n)
 }
 
 /* "line N", or "cells" when there are no lines */
-typedef struct place {
+typedef struct where {
     char text[32];
-} place;
+} where;
 
-static place place_of(const int64_t *line, int32_t i)
+static where line_of(const int64_t *line, int32_t i)
 {
-    place at = {"cells"};
+    where at = {"cells"};
     if (line) snprintf(at.text, sizeof at.text, "line %lld", (long long)line[i]);
     return at;
+}
+
+/* about a loop, or a whole cell (loop -1) */
+static pal_err refuse_at(const builder *b, int32_t cell, int32_t loop, const char *format, va_list list)
+{
+    char sentence[320], face[32] = "";
+    const pal_cell_loops *in = b->in;
+    vsnprintf(sentence, sizeof sentence, format, list);
+    if (loop >= 0) snprintf(face, sizeof face, ", face %d:", file_number(b, loop - in->cell[cell]));
+    return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: cell %d%s %s",
+                              line_of(in->line, loop >= 0 ? loop : in->cell[cell]).text, file_number(b, cell), face,
+                              sentence);
 }
 
 static pal_err __attribute__((format(printf, 3, 4)))
 refuse_loop(const builder *b, int32_t loop, const char *format, ...)
 {
-    if (!b->diag) return PAL_ERR_REFUSED;
-    char sentence[320];
+    int32_t cell = 0;
     va_list list;
     va_start(list, format);
-    vsnprintf(sentence, sizeof sentence, format, list);
+    while (b->in->cell[cell + 1] <= loop) cell++;
+    pal_err err = refuse_at(b, cell, loop, format, list);
     va_end(list);
-    int32_t cell = cell_of_loop(b->in, loop);
-    return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: cell %d, face %d: %s", place_of(b->in->line, loop).text,
-                              file_number(b, cell), file_number(b, loop - b->in->cell[cell]), sentence);
+    return err;
 }
 
 static pal_err __attribute__((format(printf, 3, 4)))
 refuse_cell(const builder *b, int32_t cell, const char *format, ...)
 {
-    if (!b->diag) return PAL_ERR_REFUSED;
-    char sentence[320];
     va_list list;
     va_start(list, format);
-    vsnprintf(sentence, sizeof sentence, format, list);
+    pal_err err = refuse_at(b, cell, -1, format, list);
     va_end(list);
-    return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: cell %d %s", place_of(b->in->line, b->in->cell[cell]).text,
-                              file_number(b, cell), sentence);
+    return err;
 }
 
 /* ---- checks of the input ---- */
@@ -93,23 +86,18 @@ static pal_err check_counts(const builder *b)
 {
     const pal_cell_loops *in = b->in;
     pal_diagnostic *diag = b->diag;
-    if (in->n_vertex < 1 || in->n_cell < 1 || in->n_vertex > MAX_ITEMS || in->n_cell > MAX_ITEMS)
+    if (in->n_vertex < 1 || in->n_cell < 1 || in->n_vertex > CELL_MAX_ITEM || in->n_cell > CELL_MAX_ITEM)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "cells: %d vertices and %d cells, each must be 1 to %d",
-                                  in->n_vertex, in->n_cell, MAX_ITEMS);
+                                  in->n_vertex, in->n_cell, CELL_MAX_ITEM);
     for (int32_t c = 0; c < in->n_cell; c++)
-        if (in->cell[0] != 0 || in->cell[c + 1] <= in->cell[c] || in->cell[c + 1] > MAX_ITEMS)
+        if (in->cell[0] != 0 || in->cell[c + 1] <= in->cell[c] || in->cell[c + 1] > CELL_MAX_ITEM)
             return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "cells: cell %d has no faces", file_number(b, c));
     for (int32_t l = 0; l < in->cell[in->n_cell]; l++) {
         int64_t n = (int64_t)in->loop[l + 1] - in->loop[l];
-        if (in->loop[0] != 0 || n < 3 || n > PAL_CELL_LOOP_MAX || in->loop[l + 1] > MAX_ITEMS)
+        if (in->loop[0] != 0 || n < 3 || n > PAL_CELL_LOOP_MAX || in->loop[l + 1] > CELL_MAX_ITEM)
             return refuse_loop(b, l, "%lld corners, must be 3 to %d", (long long)n, PAL_CELL_LOOP_MAX);
     }
     return PAL_ERR_OK;
-}
-
-static bool in_reach(const double x[3])
-{
-    return fabs(x[0]) <= MAX_COORDINATE_M && fabs(x[1]) <= MAX_COORDINATE_M && fabs(x[2]) <= MAX_COORDINATE_M;
 }
 
 /* corners in range and once in a loop, every vertex used, positions finite */
@@ -118,10 +106,10 @@ static pal_err check_corners(const builder *b)
     const pal_cell_loops *in = b->in;
     for (int32_t v = 0; v < in->n_vertex; v++) {
         const double *x = in->x + 3 * (size_t)v;
-        if (!in_reach(x))
+        if (!(fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2]))) <= MAX_COORDINATE_M && pal_finite3(x)))
             return pal_diagnostic_set(
                 b->diag, PAL_ERR_REFUSED, "%s: vertex %d is at %g %g %g m, must be within %g m of the origin",
-                place_of(in->vertex_line, v).text, file_number(b, v), x[0], x[1], x[2], MAX_COORDINATE_M);
+                line_of(in->vertex_line, v).text, file_number(b, v), x[0], x[1], x[2], MAX_COORDINATE_M);
         b->stamp[v] = -1;
     }
     for (int32_t l = 0; l < in->cell[in->n_cell]; l++)
@@ -135,7 +123,7 @@ static pal_err check_corners(const builder *b)
     for (int32_t v = 0; v < in->n_vertex; v++)
         if (b->stamp[v] < 0)
             return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: vertex %d belongs to no cell",
-                                      place_of(in->vertex_line, v).text, file_number(b, v));
+                                      line_of(in->vertex_line, v).text, file_number(b, v));
     return PAL_ERR_OK;
 }
 
@@ -148,27 +136,23 @@ static bool sharpness_valid(float s)
 
 static pal_err get_memory(builder *b)
 {
-    const pal_cell_loops *in = b->in;
     pal_cells *c = b->c;
-    size_t n_loop = (size_t)c->n_face_use, n_corner = (size_t)c->n_edge_use, n_vertex = (size_t)c->n_vertex;
-    for (b->mask = 16; b->mask < 2 * n_corner; b->mask *= 2) {
+    pal_err err = PAL_ERR_OK;
+    for (b->mask = 16; b->mask < 2 * (size_t)c->n_edge_use; b->mask *= 2) {
     }
-    b->table = malloc(b->mask * sizeof *b->table);
+    PAL_ARRAY(&err, b->table, b->mask);
     b->mask--;
-    b->last = malloc(n_corner * sizeof *b->last);
-    c->x = malloc(n_vertex * 3 * sizeof *c->x);
-    c->vertex_sharpness = calloc(n_vertex, sizeof *c->vertex_sharpness);
-    c->vertex_boundary = calloc(n_vertex, sizeof *c->vertex_boundary);
-    c->vertex_pinched = calloc(n_vertex, sizeof *c->vertex_pinched);
-    c->edge = malloc(n_corner * sizeof *c->edge);
-    c->face = malloc(n_loop * sizeof *c->face);
-    c->cell_use = malloc(((size_t)in->n_cell + 1) * sizeof *c->cell_use);
-    c->face_use = malloc((n_loop + 1) * sizeof *c->face_use);
-    c->edge_use = malloc(n_corner * sizeof *c->edge_use);
-    return b->table && b->last && c->x && c->vertex_sharpness && c->vertex_boundary && c->vertex_pinched && c->edge &&
-                   c->face && c->cell_use && c->face_use && c->edge_use
-               ? PAL_ERR_OK
-               : PAL_ERR_MEMORY;
+    PAL_ARRAY(&err, b->last, c->n_edge_use);
+    PAL_ARRAY(&err, c->x, 3 * (size_t)c->n_vertex);
+    PAL_ZEROED(&err, c->vertex_sharpness, c->n_vertex);
+    PAL_ZEROED(&err, c->vertex_boundary, c->n_vertex);
+    PAL_ZEROED(&err, c->vertex_pinched, c->n_vertex);
+    PAL_ARRAY(&err, c->edge, c->n_edge_use);
+    PAL_ARRAY(&err, c->face, c->n_face_use);
+    PAL_ARRAY(&err, c->cell_use, c->n_cell + 1);
+    PAL_ARRAY(&err, c->face_use, c->n_face_use + 1);
+    PAL_ARRAY(&err, c->edge_use, c->n_edge_use);
+    return err;
 }
 
 static void copy_loops(builder *b)
@@ -188,13 +172,6 @@ static void copy_loops(builder *b)
 }
 
 /* ---- faces and edges ---- */
-
-static uint64_t mix_bits(uint64_t z)
-{
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-    return z ^ (z >> 31);
-}
 
 typedef enum loop_relation { OTHER, OPPOSITE, EQUAL, SHUFFLED } loop_relation;
 
@@ -249,8 +226,8 @@ static pal_err find_faces(builder *b)
     memset(b->table, 0, (b->mask + 1) * sizeof *b->table);
     for (int32_t l = 0; l < c->n_face_use; l++) {
         uint64_t key = 0;
-        for (int32_t k = in->loop[l]; k < in->loop[l + 1]; k++) key += mix_bits((uint64_t)in->corner[k] + 1);
-        size_t at = mix_bits(key) & b->mask;
+        for (int32_t k = in->loop[l]; k < in->loop[l + 1]; k++) key += pal_random_bits(0, (uint64_t)in->corner[k]);
+        size_t at = pal_random_bits(key, 0) & b->mask;
         loop_relation like = OTHER;
         for (; b->table[at]; at = (at + 1) & b->mask) {
             like = compare_loops(in, c->face[b->table[at] - 1].use[0], l);
@@ -272,7 +249,7 @@ static size_t edge_place(const builder *b, int32_t v, int32_t w)
 {
     const pal_cell_edge *edge = b->c->edge;
     uint32_t low = (uint32_t)(v < w ? v : w), high = (uint32_t)(v < w ? w : v);
-    size_t at = mix_bits(((uint64_t)high << 32 | low) + 1) & b->mask;
+    size_t at = pal_random_bits(0, (uint64_t)high << 32 | low) & b->mask;
     for (; b->table[at]; at = (at + 1) & b->mask) {
         const pal_cell_edge *e = &edge[b->table[at] - 1];
         if ((e->vertex[0] == v && e->vertex[1] == w) || (e->vertex[0] == w && e->vertex[1] == v)) break;
@@ -370,8 +347,8 @@ static int32_t list_corners(builder *b)
     memset(b->stamp, -1, (size_t)c->n_vertex * sizeof *b->stamp);
     for (int32_t i = 0; i < c->n_cell; i++) {
         if (c->cell_vertex.start) c->cell_vertex.start[i] = n;
-        int32_t end = c->face_use[c->cell_use[i + 1]].first_use;
-        for (int32_t u = c->face_use[c->cell_use[i]].first_use; u < end; u++) {
+        int32_t end;
+        for (int32_t u = pal_cells_cell_loops(c, i, &end); u < end; u++) {
             int32_t v = c->edge_use[u].vertex;
             if (b->stamp[v] == i) continue;
             b->stamp[v] = i;
@@ -386,14 +363,13 @@ static int32_t list_corners(builder *b)
 static pal_err find_corners(builder *b)
 {
     pal_cells *c = b->c;
-    size_t n = (size_t)list_corners(b);
-    int32_t *start = malloc(((size_t)c->n_cell + 1) * sizeof *start);
-    c->cell_vertex.item = malloc(n * sizeof *c->cell_vertex.item);
-    c->corner_use = malloc(n * sizeof *c->corner_use);
-    c->cell_vertex.start = start;
-    if (!start || !c->cell_vertex.item || !c->corner_use) return PAL_ERR_MEMORY;
-    list_corners(b);
-    return PAL_ERR_OK;
+    pal_err err = PAL_ERR_OK;
+    int32_t n = list_corners(b);
+    PAL_ARRAY(&err, c->cell_vertex.start, c->n_cell + 1);
+    PAL_ARRAY(&err, c->cell_vertex.item, n);
+    PAL_ARRAY(&err, c->corner_use, n);
+    if (!err) list_corners(b);
+    return err;
 }
 
 static pal_err find_cells(builder *b)
@@ -420,9 +396,10 @@ static pal_err find_cells(builder *b)
 static pal_err transpose_lists(const pal_cell_rows *from, int32_t n_from, int32_t n_to, pal_cell_rows *to)
 {
     int32_t n = from->start[n_from];
-    to->start = calloc((size_t)n_to + 2, sizeof *to->start);
-    to->item = malloc((n > 0 ? (size_t)n : 1) * sizeof *to->item);
-    if (!to->start || !to->item) return PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    PAL_ZEROED(&err, to->start, n_to + 2);
+    PAL_ARRAY(&err, to->item, n);
+    if (err) return err;
     for (int32_t k = 0; k < n; k++) to->start[from->item[k] + 2]++;
     for (int32_t i = 1; i <= n_to; i++) to->start[i + 1] += to->start[i];
     for (int32_t a = 0; a < n_from; a++)
@@ -430,21 +407,14 @@ static pal_err transpose_lists(const pal_cell_rows *from, int32_t n_from, int32_
     return PAL_ERR_OK;
 }
 
-/* transposes of: vertices of edges, vertices and edges of faces, edges of cells */
-static pal_err find_incidence(builder *b)
+/* transposes of: vertices of edges, vertices and edges of faces, edges of cells; rows is scratch */
+static pal_err transpose_all(pal_cells *c, pal_cell_rows rows)
 {
-    pal_cells *c = b->c;
-    int32_t max = c->n_edge > c->n_face ? c->n_edge : c->n_face;
-    if (c->n_cell > max) max = c->n_cell;
-    int32_t n_item = c->n_edge_use > 2 * c->n_edge ? c->n_edge_use : 2 * c->n_edge, n = 0;
-    pal_cell_rows rows = {malloc(((size_t)max + 1) * sizeof(int32_t)), malloc((size_t)n_item * sizeof(int32_t))};
-    pal_err err = rows.start && rows.item ? PAL_ERR_OK : PAL_ERR_MEMORY;
-    if (!err) {
-        for (int32_t e = 0; e <= c->n_edge; e++) rows.start[e] = 2 * e;
-        for (int32_t e = 0; e < 2 * c->n_edge; e++) rows.item[e] = c->edge[e / 2].vertex[e % 2];
-        err = transpose_lists(&rows, c->n_edge, c->n_vertex, &c->vertex_edge);
-    }
-    for (int edges = 0; edges < 2 && !err; edges++) {
+    int32_t n = 0, end;
+    for (int32_t e = 0; e <= c->n_edge; e++) rows.start[e] = 2 * e;
+    for (int32_t e = 0; e < 2 * c->n_edge; e++) rows.item[e] = c->edge[e / 2].vertex[e % 2];
+    PAL_TRY(transpose_lists(&rows, c->n_edge, c->n_vertex, &c->vertex_edge));
+    for (int edges = 0; edges < 2; edges++) {
         n = 0;
         for (int32_t f = 0; f < c->n_face; f++) {
             int32_t first, m = pal_cells_face_loop(c, f, &first);
@@ -453,23 +423,29 @@ static pal_err find_incidence(builder *b)
                 rows.item[n++] = edges ? c->edge_use[u].edge : c->edge_use[u].vertex;
         }
         rows.start[c->n_face] = n;
-        err =
-            transpose_lists(&rows, c->n_face, edges ? c->n_edge : c->n_vertex, edges ? &c->edge_face : &c->vertex_face);
+        PAL_TRY(transpose_lists(&rows, c->n_face, edges ? c->n_edge : c->n_vertex,
+                                edges ? &c->edge_face : &c->vertex_face));
     }
-    if (!err) {
-        n = 0;
-        for (int32_t i = 0; i < c->n_cell; i++) {
-            rows.start[i] = n;
-            int32_t end = c->face_use[c->cell_use[i + 1]].first_use;
-            for (int32_t u = c->face_use[c->cell_use[i]].first_use; u < end; u++)
-                if (u < c->edge_use[u].radial) rows.item[n++] = c->edge_use[u].edge;
-        }
-        rows.start[c->n_cell] = n;
-        err = transpose_lists(&rows, c->n_cell, c->n_edge, &c->edge_cell);
+    n = 0;
+    for (int32_t i = 0; i < c->n_cell; i++) {
+        rows.start[i] = n;
+        for (int32_t u = pal_cells_cell_loops(c, i, &end); u < end; u++)
+            if (u < c->edge_use[u].radial) rows.item[n++] = c->edge_use[u].edge;
     }
-    if (!err) err = transpose_lists(&c->cell_vertex, c->n_cell, c->n_vertex, &c->vertex_cell);
-    free(rows.start);
-    free(rows.item);
+    rows.start[c->n_cell] = n;
+    PAL_TRY(transpose_lists(&rows, c->n_cell, c->n_edge, &c->edge_cell));
+    return transpose_lists(&c->cell_vertex, c->n_cell, c->n_vertex, &c->vertex_cell);
+}
+
+static pal_err find_incidence(pal_cells *c)
+{
+    pal_cell_rows rows;
+    pal_err err = PAL_ERR_OK;
+    /* no complex has more edges, faces or cells than edge uses */
+    PAL_ARRAY(&err, rows.start, c->n_edge_use + 1);
+    PAL_ARRAY(&err, rows.item, 2 * (size_t)c->n_edge_use);
+    if (!err) err = transpose_all(c, rows);
+    PAL_FREE(rows.start, rows.item);
     return err;
 }
 
@@ -574,7 +550,7 @@ static pal_err set_sharpness(builder *b)
         c->vertex_sharpness[v] = in->vertex_sharpness[v];
         if (!sharpness_valid(in->vertex_sharpness[v]))
             return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: vertex %d has sharpness %g, must be 0 to %g",
-                                      place_of(in->vertex_line, v).text, file_number(b, v),
+                                      line_of(in->vertex_line, v).text, file_number(b, v),
                                       (double)in->vertex_sharpness[v], (double)PAL_SHARPNESS_MAX);
     }
     memset(b->table, 0, (b->mask + 1) * sizeof *b->table);
@@ -586,7 +562,7 @@ static pal_err set_sharpness(builder *b)
         if (e < 0 || !sharpness_valid(tag->sharp))
             return pal_diagnostic_set(
                 b->diag, PAL_ERR_REFUSED, "%s: sharpness %g of an edge of vertices %lld and %lld: %s",
-                place_of(in->tag_line, k).text, (double)tag->sharp, (long long)tag->a + in->count_from,
+                line_of(in->tag_line, k).text, (double)tag->sharp, (long long)tag->a + in->count_from,
                 (long long)tag->b + in->count_from, e < 0 ? "no cell has it" : "must be 0 to 1000000");
         c->edge[e].sharp = fmaxf(c->edge[e].sharp, tag->sharp);
     }
@@ -606,14 +582,6 @@ static pal_err set_sharpness(builder *b)
 
 /* ---- the whole ---- */
 
-static void trim(pal_cells *c)
-{
-    pal_cell_edge *edge = realloc(c->edge, (size_t)c->n_edge * sizeof *edge);
-    if (edge) c->edge = edge;
-    pal_cell_face *face = realloc(c->face, (size_t)c->n_face * sizeof *face);
-    if (face) c->face = face;
-}
-
 static pal_err build(builder *b)
 {
     PAL_TRY(check_counts(b));
@@ -628,10 +596,13 @@ static pal_err build(builder *b)
     copy_loops(b);
     PAL_TRY(find_faces(b));
     find_edges(b);
-    trim(c);
+    pal_cell_edge *edge = realloc(c->edge, (size_t)c->n_edge * sizeof *edge);
+    if (edge) c->edge = edge;
+    pal_cell_face *face = realloc(c->face, (size_t)c->n_face * sizeof *face);
+    if (face) c->face = face;
     join_mates(c);
     PAL_TRY(find_cells(b));
-    PAL_TRY(find_incidence(b));
+    PAL_TRY(find_incidence(c));
     find_boundary(c);
     find_pinched(b);
     PAL_TRY(check_neighbourhoods(b));
@@ -658,9 +629,7 @@ pal_err pal_cells_make(const pal_cell_loops *loops, pal_cells *out, pal_diagnost
     builder b = {.in = loops, .c = &cells, .diag = diag};
     pal_err err = build(&b);
     if (!err) err = check_shape(&b);
-    free(b.table);
-    free(b.stamp);
-    free(b.last);
+    PAL_FREE(b.table, b.stamp, b.last);
     if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "cells: no memory for %d cells", loops->n_cell);
     if (err)
         pal_cells_free(&cells);

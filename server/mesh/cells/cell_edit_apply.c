@@ -1,12 +1,9 @@
 /* Edits of control cells (paper A section 4.1): delete, sharpen and move; commands; transfer of deformed positions. */
-#include "server/mesh/cells/cell_edit_work.h"
-
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
+#include "server/mesh/cells/cell_edit_work.h"
 #include "server/mesh/geometry/tuning.h"
 #include "server/num/polar.h"
-
-#include <stdlib.h>
-#include <string.h>
 
 /* ---- delete ---- */
 
@@ -17,136 +14,75 @@ static pal_err add_kept(pal_edit_work *w, int32_t cell, bool *keep, int32_t *kep
     keep[cell] = false;
     PAL_TRY(pal_cells_loops(c, &w->to));
     PAL_TRY(pal_cell_loops_keep(&w->to, keep, kept));
-    PAL_TRY(pal_edit_reserve_rows(w, w->to.n_vertex, w->to.n_cell));
-    for (int32_t i = 0; i < w->to.n_vertex; i++) {
-        pal_interpolation_builder_add(&w->rows, kept[i], 1);
-        pal_interpolation_builder_end_row(&w->rows);
-    }
-    for (int32_t i = 0; i < w->to.n_cell; i++) w->cell_from[i] = i + (i >= cell);
+    PAL_TRY(pal_edit_reserve(w, w->to.n_vertex, w->to.n_cell));
+    for (int32_t i = 0; i < w->to.n_vertex; i++) pal_interpolation_builder_mean(&w->rows, &kept[i], 1);
+    for (int32_t i = cell; i < w->to.n_cell; i++) w->cell_from[i]++;
     return PAL_ERR_OK;
 }
 
-pal_err pal_cells_delete(const pal_cells *from, int32_t cell, pal_cells_edit *out, pal_diagnostic *diag)
+static pal_err delete_cell(pal_edit_work *w, int32_t cell)
 {
-    pal_edit_work w = pal_edit_begin(from, "delete cell %d", cell);
-    memset(out, 0, sizeof *out);
-    PAL_TRY(pal_edit_check_number(&w, "cell", cell, from->n_cell, diag));
-    if (from->n_cell == 1)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: it is the last one, a solid needs a cell", w.what);
-    bool *keep = malloc((size_t)from->n_cell);
-    int32_t *kept = malloc((size_t)from->n_vertex * sizeof *kept);
-    pal_err err = keep && kept ? add_kept(&w, cell, keep, kept) : PAL_ERR_MEMORY;
-    free(keep);
-    free(kept);
-    return pal_edit_finish(&w, err, out, diag);
+    pal_err err = pal_edit_check_number(w, "cell", cell, w->from->n_cell);
+    bool *keep;
+    int32_t *kept;
+    if (!err && w->from->n_cell == 1) err = pal_edit_refuse(w, "it is the last one, a solid needs a cell");
+    PAL_ARRAY(&err, keep, w->from->n_cell);
+    PAL_ARRAY(&err, kept, w->from->n_vertex);
+    if (!err) err = add_kept(w, cell, keep, kept);
+    PAL_FREE(keep, kept);
+    return err;
 }
 
-/* ---- sharpen, move: the same loops ---- */
+/* ---- sharpen, move: the same complex ---- */
 
 /* the complex as it is, every vertex and cell itself */
-static pal_err copy_all(const pal_cells *from, pal_cells_edit *out)
+static pal_err copy_all(const pal_edit_work *w, pal_cells_edit *out)
 {
-    pal_cells_edit edit = {.face = -1, .rotated_face = -1};
-    edit.offset = calloc(3 * (size_t)from->n_vertex, sizeof *edit.offset);
-    edit.cell_from = malloc((size_t)from->n_cell * sizeof *edit.cell_from);
-    pal_err err = edit.offset && edit.cell_from ? pal_cells_copy(from, &edit.cells) : PAL_ERR_MEMORY;
-    if (!err) err = pal_interpolation_identity(from->n_vertex, &edit.rows);
-    if (err) {
-        pal_cells_edit_free(&edit);
-        return err;
-    }
-    for (int32_t i = 0; i < from->n_cell; i++) edit.cell_from[i] = i;
-    *out = edit;
-    return PAL_ERR_OK;
+    const pal_cells *c = w->from;
+    *out = (pal_cells_edit){.face = -1, .rotated_face = -1};
+    pal_err err = pal_cells_copy(c, &out->cells);
+    PAL_ZEROED(&err, out->offset, 3 * (size_t)c->n_vertex);
+    PAL_ARRAY(&err, out->cell_from, c->n_cell);
+    if (!err) err = pal_interpolation_identity(c->n_vertex, &out->rows);
+    for (int32_t i = 0; i < c->n_cell && !err; i++) out->cell_from[i] = i;
+    return err ? pal_diagnostic_set(w->diag, err, "%s: no memory", w->what) : PAL_ERR_OK;
 }
 
-pal_err pal_cells_sharpen(const pal_cells *from, pal_cells_command_kind kind, int32_t item, float sharp,
-                          pal_cells_edit *out, pal_diagnostic *diag)
+/* element: 0 a vertex, 1 an edge, 2 a face */
+static pal_err sharpen(const pal_edit_work *w, int element, int32_t item, float sharp, pal_cells_edit *out)
 {
-    const char *name = pal_cells_command_name(kind);
-    pal_edit_work w = pal_edit_begin(from, "%s %d", name ? name : "sharpen", item);
-    memset(out, 0, sizeof *out);
-    if (kind == PAL_CELLS_SHARPEN_VERTEX)
-        PAL_TRY(pal_edit_check_number(&w, "vertex", item, from->n_vertex, diag));
-    else if (kind == PAL_CELLS_SHARPEN_EDGE)
-        PAL_TRY(pal_edit_check_number(&w, "edge", item, from->n_edge, diag));
-    else if (kind == PAL_CELLS_SHARPEN_FACE)
-        PAL_TRY(pal_edit_check_number(&w, "face", item, from->n_face, diag));
-    else
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: kind %d sets no sharpness", w.what, (int)kind);
+    static const char *const what[] = {"vertex", "edge", "face"};
+    const int32_t n[] = {w->from->n_vertex, w->from->n_edge, w->from->n_face};
+    PAL_TRY(pal_edit_check_number(w, what[element], item, n[element]));
     if (!(sharp >= 0 && sharp <= PAL_SHARPNESS_MAX))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: sharpness is %g, must be 0 to %g", w.what, (double)sharp,
-                                  (double)PAL_SHARPNESS_MAX);
-    pal_err err = copy_all(from, out);
-    if (err) return pal_diagnostic_set(diag, err, "%s: no memory", w.what);
-    if (kind == PAL_CELLS_SHARPEN_VERTEX)
-        out->cells.vertex_sharpness[item] = sharp;
-    else if (kind == PAL_CELLS_SHARPEN_EDGE)
-        out->cells.edge[item].sharp = sharp;
-    else
-        out->cells.face[item].sharp = sharp;
+        return pal_edit_refuse(w, "sharpness is %g, must be 0 to %g", (double)sharp, (double)PAL_SHARPNESS_MAX);
+    PAL_TRY(copy_all(w, out));
+    pal_cells *c = &out->cells;
+    *(element == 0 ? &c->vertex_sharpness[item] : element == 1 ? &c->edge[item].sharp : &c->face[item].sharp) = sharp;
     return PAL_ERR_OK;
 }
 
-/* numbers in range, each once, positions within MAX_COORDINATE_M; seen [n_vertex] is all false */
-static pal_err check_moves(const pal_edit_work *w, int32_t n, const int32_t *vertex, const double *x, bool *seen,
-                           pal_diagnostic *diag)
+static pal_err move(pal_edit_work *w, int32_t vertex, const double to_m[3], pal_cells_edit *out)
 {
-    for (int32_t i = 0; i < n; i++) {
-        const double *to = x + 3 * (size_t)i;
-        PAL_TRY(pal_edit_check_number(w, "vertex", vertex[i], w->from->n_vertex, diag));
-        if (seen[vertex[i]])
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: vertex %d is given twice", w->what, vertex[i]);
-        seen[vertex[i]] = true;
-        if (!(fabs(to[0]) <= MAX_COORDINATE_M && fabs(to[1]) <= MAX_COORDINATE_M && fabs(to[2]) <= MAX_COORDINATE_M))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                      "%s: vertex %d to %g %g %g m, must be within %g m of the origin", w->what,
-                                      vertex[i], to[0], to[1], to[2], MAX_COORDINATE_M);
-    }
-    return PAL_ERR_OK;
-}
-
-/* moves the vertices and checks faces and cells */
-static pal_err move_all(pal_edit_work *w, int32_t n, const int32_t *vertex, const double *x, pal_cells_edit *edit,
-                        pal_diagnostic *diag)
-{
-    pal_cells *c = &edit->cells;
+    pal_cells *c = &out->cells;
     pal_cells_fault fault;
-    for (int32_t i = 0; i < n; i++) {
-        size_t at = 3 * (size_t)vertex[i];
-        pal_sub3(edit->offset + at, x + 3 * (size_t)i, c->x + at);
-        pal_copy3(c->x + at, x + 3 * (size_t)i);
+    PAL_TRY(pal_edit_check_number(w, "vertex", vertex, w->from->n_vertex));
+    for (int k = 0; k < 3; k++)
+        if (!(fabs(to_m[k]) <= MAX_COORDINATE_M))
+            return pal_edit_refuse(w, "vertex %d to %g %g %g m, must be within %g m of the origin", vertex, to_m[0],
+                                   to_m[1], to_m[2], MAX_COORDINATE_M);
+    PAL_TRY(copy_all(w, out));
+    pal_sub3(out->offset + 3 * (size_t)vertex, to_m, c->x + 3 * (size_t)vertex);
+    pal_copy3(c->x + 3 * (size_t)vertex, to_m);
+    if (pal_cells_shape_valid(c, NULL, &fault)) {
+        w->cell_from = out->cell_from;
+        return pal_edit_check_folds(w, c);
     }
-    if (!pal_cells_shape_valid(c, NULL, &fault)) {
-        if (fault.face_use >= 0)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: face %d has no area (%.3g m^2, longest edge %.3g m)",
-                                      w->what, c->face_use[fault.face_use].face, fault.measure, fault.length_scale_m);
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: cell %d has no positive volume (%.3g m^3, %.3g m across)",
-                                  w->what, fault.cell, fault.measure, fault.length_scale_m);
-    }
-    w->cell_from = edit->cell_from;
-    return pal_edit_check_folds(w, c, diag);
-}
-
-pal_err pal_cells_move(const pal_cells *from, int32_t n, const int32_t *vertex, const double *x, pal_cells_edit *out,
-                       pal_diagnostic *diag)
-{
-    pal_edit_work w = pal_edit_begin(from, "move");
-    pal_cells_edit edit = {0};
-    memset(out, 0, sizeof *out);
-    if (n < 0 || n > from->n_vertex)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %d vertices, there are %d", w.what, n, from->n_vertex);
-    bool *seen = calloc((size_t)from->n_vertex + 1, sizeof *seen);
-    pal_err err = seen ? check_moves(&w, n, vertex, x, seen, diag) : PAL_ERR_MEMORY;
-    free(seen);
-    if (!err) err = copy_all(from, &edit);
-    if (!err) err = move_all(&w, n, vertex, x, &edit, diag);
-    if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "%s: no memory", w.what);
-    if (err)
-        pal_cells_edit_free(&edit);
-    else
-        *out = edit;
-    return err;
+    if (fault.face_use >= 0)
+        return pal_edit_refuse(w, "face %d has no area (%.3g m^2, longest edge %.3g m)",
+                               c->face_use[fault.face_use].face, fault.measure, fault.length_scale_m);
+    return pal_edit_refuse(w, "cell %d has no positive volume (%.3g m^3, %.3g m across)", fault.cell, fault.measure,
+                           fault.length_scale_m);
 }
 
 /* ---- commands ---- */
@@ -162,42 +98,45 @@ const char *pal_cells_command_name(pal_cells_command_kind kind)
     return (unsigned)kind < PAL_CELLS_COMMAND_KINDS ? names[kind] : NULL;
 }
 
-pal_cells_command_kind pal_cells_command_find(const char *name)
-{
-    int kind = 0;
-    while (kind < PAL_CELLS_COMMAND_KINDS && strcmp(names[kind], name) != 0) kind++;
-    return (pal_cells_command_kind)kind;
-}
-
 pal_err pal_cells_apply(const pal_cells *from, const pal_cells_command *command, pal_cells_edit *out,
                         pal_diagnostic *diag)
 {
     const pal_cells_command *k = command;
+    const char *name = pal_cells_command_name(k->kind);
+    const int32_t item[] = {k->vertex, k->edge, k->face};
+    int element = (int)k->kind - PAL_CELLS_SHARPEN_VERTEX;
+    pal_err err = PAL_ERR_OK;
+    pal_edit_work w;
+    memset(out, 0, sizeof *out);
+    if (!name)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "edit: kind %d, there are %d", (int)k->kind,
+                                  PAL_CELLS_COMMAND_KINDS);
     switch (k->kind) {
     case PAL_CELLS_DELETE:
-        return pal_cells_delete(from, k->cell, out, diag);
+        w = pal_edit_begin(from, diag, "delete cell %d", k->cell);
+        return pal_edit_finish(&w, delete_cell(&w, k->cell), out);
     case PAL_CELLS_EXTRUDE:
-        return pal_cells_extrude(from, k->face, k->distance_m, k->scale, out, diag);
+        w = pal_edit_begin(from, diag, "extrude face %d", k->face);
+        return pal_edit_finish(&w, pal_edit_extrude(&w, k->face, k->distance_m, k->scale), out);
     case PAL_CELLS_MERGE:
-        return pal_cells_merge(from, k->face, k->other_face, out, diag);
+        w = pal_edit_begin(from, diag, "merge faces %d and %d", k->face, k->other_face);
+        return pal_edit_finish(&w, pal_edit_merge(&w, k->face, k->other_face), out);
     case PAL_CELLS_BRIDGE:
-        return pal_cells_bridge(from, k->face, k->other_face, out, diag);
+        w = pal_edit_begin(from, diag, "bridge faces %d and %d", k->face, k->other_face);
+        return pal_edit_finish(&w, pal_edit_bridge(&w, k->face, k->other_face), out);
     case PAL_CELLS_DIVIDE:
-        return pal_cells_divide_near(from, k->cell, k->rings, out, diag);
-    case PAL_CELLS_SHARPEN_VERTEX:
-        return pal_cells_sharpen(from, k->kind, k->vertex, k->sharp, out, diag);
-    case PAL_CELLS_SHARPEN_EDGE:
-        return pal_cells_sharpen(from, k->kind, k->edge, k->sharp, out, diag);
-    case PAL_CELLS_SHARPEN_FACE:
-        return pal_cells_sharpen(from, k->kind, k->face, k->sharp, out, diag);
+        w = pal_edit_begin(from, diag, "divide cell %d", k->cell);
+        return pal_edit_divide_near(&w, k->cell, k->rings, out);
     case PAL_CELLS_MOVE:
-        return pal_cells_move(from, 1, &k->vertex, k->to_m, out, diag);
-    case PAL_CELLS_COMMAND_KINDS:
+        w = pal_edit_begin(from, diag, "move");
+        err = move(&w, k->vertex, k->to_m, out);
         break;
+    default:
+        w = pal_edit_begin(from, diag, "%s %d", name, item[element]);
+        err = sharpen(&w, element, item[element], k->sharp, out);
     }
-    memset(out, 0, sizeof *out);
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "edit: kind %d, there are %d", (int)k->kind,
-                              PAL_CELLS_COMMAND_KINDS);
+    if (err) pal_cells_edit_free(out);
+    return err;
 }
 
 /* ---- deformed states ---- */

@@ -5,14 +5,11 @@
  * vertices between lie at midpoints; a hanging vertex is the midpoint of the only two vertices that its cell joins it
  * to. Such a cell is divided as if it had not been cut, with the existing vertices, so that dividing all cells one
  * after the other gives the same complex as a level of subdivision. A cell that is cut twice is divided as it is. */
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/cells/cell_edit_work.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
-#define NEAR_MIDDLE 1e-9 /* of the distance to the corners */
+#include "server/mesh/geometry/tuning.h"
+#include "server/num/sort.h"
 
 enum role { CORNER, HANGING, CENTRE };
 
@@ -33,35 +30,22 @@ typedef struct division {
     float *sharp;    /* of the face at each corner                    */
 } division;
 
-static void division_free(division *s)
-{
-    free(s->edge);
-    free(s->face);
-    free(s->role);
-    free(s->order);
-    free(s->start);
-    free(s->corner);
-    free(s->mid);
-    free(s->centre);
-    free(s->sharp);
-}
-
 static pal_err division_reserve(const pal_cells *c, int32_t cell, division *s)
 {
-    size_t n_use = (size_t)(c->face_use[c->cell_use[cell + 1]].first_use - c->face_use[c->cell_use[cell]].first_use);
+    pal_err err = PAL_ERR_OK;
+    int32_t after, n_use = pal_cells_cell_loops(c, cell, &after);
+    n_use = after - n_use;
     *s = (division){.c = c, .cell = cell, .n_vertex = c->cell_vertex.start[cell + 1] - c->cell_vertex.start[cell]};
-    s->edge = malloc((size_t)c->n_edge * sizeof *s->edge);
-    s->face = malloc((size_t)c->n_face * sizeof *s->face);
-    s->role = calloc((size_t)c->n_vertex, sizeof *s->role);
-    s->order = malloc((size_t)s->n_vertex * sizeof *s->order);
-    s->start = malloc((n_use + 1) * sizeof *s->start);
-    s->corner = malloc(n_use * sizeof *s->corner);
-    s->mid = malloc(n_use * sizeof *s->mid);
-    s->centre = malloc(n_use * sizeof *s->centre);
-    s->sharp = malloc(n_use * sizeof *s->sharp);
-    return s->edge && s->face && s->role && s->order && s->start && s->corner && s->mid && s->centre && s->sharp
-               ? PAL_ERR_OK
-               : PAL_ERR_MEMORY;
+    PAL_ARRAY(&err, s->edge, c->n_edge);
+    PAL_ARRAY(&err, s->face, c->n_face);
+    PAL_ZEROED(&err, s->role, c->n_vertex);
+    PAL_ARRAY(&err, s->order, s->n_vertex);
+    PAL_ARRAY(&err, s->start, n_use + 1);
+    PAL_ARRAY(&err, s->corner, n_use);
+    PAL_ARRAY(&err, s->mid, n_use);
+    PAL_ARRAY(&err, s->centre, n_use);
+    PAL_ARRAY(&err, s->sharp, n_use);
+    return err;
 }
 
 /* ---- existing cuts ---- */
@@ -76,7 +60,7 @@ static bool is_midpoint(const pal_cells *c, int32_t v, int32_t a, int32_t b)
     double d[3];
     pal_add3(d, at(c, a), at(c, b));
     pal_scale3(d, 0.5, d);
-    return pal_dist3(d, at(c, v)) <= NEAR_MIDDLE * pal_dist3(at(c, a), at(c, b));
+    return pal_dist3(d, at(c, v)) <= CELL_NEAR_MIDDLE * pal_dist3(at(c, a), at(c, b));
 }
 
 static int32_t opposite_corner(const pal_cells *c, int32_t use)
@@ -106,7 +90,7 @@ static bool is_centre(const division *s, int32_t use)
     pal_scale3(mean, 1.0 / n, mean);
     const double *x = at(c, c->edge_use[use].vertex);
     size = pal_dist3(x, at(c, opposite_corner(c, use)));
-    return n >= 3 && pal_dist3(mean, x) <= NEAR_MIDDLE * size;
+    return n >= 3 && pal_dist3(mean, x) <= CELL_NEAR_MIDDLE * size;
 }
 
 /* the edge use of the cell that starts at one of its vertices */
@@ -168,8 +152,7 @@ static bool remove_conflicting_roles(division *s)
 
 static int descending(const void *a, const void *b)
 {
-    int32_t i = *(const int32_t *)a, j = *(const int32_t *)b;
-    return i > j ? -1 : i < j;
+    return pal_compare_int32(b, a);
 }
 
 /* roles of the vertices, later ones first: of two cuts, the finer one */
@@ -251,52 +234,44 @@ static int32_t edge_between(const division *s, int32_t a, int32_t b)
 /* new vertices after the old: edges, faces, the middle, each with its row, the mean of its corners */
 static void add_midpoints(pal_edit_work *w, division *s)
 {
-    const pal_cells *c = s->c;
-    int32_t n = c->n_vertex, n_corner = 0;
-    for (int32_t i = 0; i < s->start[s->n_side]; i++) {
-        if (s->mid[i] >= 0) continue;
-        int32_t side = 0, next;
-        while (s->start[side + 1] <= i) side++;
-        next = s->corner[i + 1 < s->start[side + 1] ? i + 1 : s->start[side]];
-        int32_t e = edge_between(s, s->corner[i], next);
-        if (s->edge[e] < 0) {
-            s->edge[e] = n++;
-            pal_interpolation_builder_add(&w->rows, s->corner[i], 0.5);
-            pal_interpolation_builder_add(&w->rows, next, 0.5);
-            pal_interpolation_builder_end_row(&w->rows);
+    int32_t n = s->c->n_vertex, n_corner = 0;
+    for (int32_t side = 0; side < s->n_side; side++)
+        for (int32_t i = s->start[side]; i < s->start[side + 1]; i++) {
+            int32_t end[2] = {s->corner[i], s->corner[i + 1 < s->start[side + 1] ? i + 1 : s->start[side]]};
+            if (s->mid[i] >= 0) continue;
+            int32_t e = edge_between(s, end[0], end[1]);
+            if (s->edge[e] < 0) {
+                s->edge[e] = n++;
+                pal_interpolation_builder_mean(&w->rows, end, 2);
+            }
+            s->mid[i] = s->edge[e];
         }
-        s->mid[i] = s->edge[e];
-    }
     for (int32_t side = 0; side < s->n_side; side++) {
-        int32_t first = s->start[side], after = s->start[side + 1];
         if (s->centre[side] >= 0) continue;
         s->face[-2 - s->centre[side]] = n;
         s->centre[side] = n++;
-        for (int32_t i = first; i < after; i++)
-            pal_interpolation_builder_add(&w->rows, s->corner[i], 1.0 / (after - first));
-        pal_interpolation_builder_end_row(&w->rows);
+        pal_interpolation_builder_mean(&w->rows, s->corner + s->start[side], s->start[side + 1] - s->start[side]);
     }
     s->middle = n;
-    for (int32_t i = 0; i < s->n_vertex; i++) n_corner += s->role[s->order[i]] == CORNER;
+    /* the order is not needed again */
     for (int32_t i = 0; i < s->n_vertex; i++)
-        if (s->role[s->order[i]] == CORNER) pal_interpolation_builder_add(&w->rows, s->order[i], 1.0 / n_corner);
-    pal_interpolation_builder_end_row(&w->rows);
+        if (s->role[s->order[i]] == CORNER) s->order[n_corner++] = s->order[i];
+    pal_interpolation_builder_mean(&w->rows, s->order, n_corner);
 }
 
 /* ---- the new cells ---- */
 
-static void add_quad(pal_edit_work *w, const int32_t vertex[4], float sharp)
+static void add_quad(pal_edit_work *w, float sharp, int32_t a, int32_t b, int32_t c, int32_t d)
 {
-    for (int k = 0; k < 4; k++) pal_edit_corner(w, vertex[k]);
-    pal_edit_end_loop(w, sharp);
+    pal_cell_loops_face(&w->to, sharp);
+    pal_cell_loops_corners(&w->to, (const int32_t[]){a, b, c, d}, 4);
 }
 
 /* the quad of a side at its corner i; reversed: as the neighbour sees it */
 static void add_outer_vertices(pal_edit_work *w, const division *s, int32_t side, int32_t i, bool reversed)
 {
     int32_t before = s->mid[i > s->start[side] ? i - 1 : s->start[side + 1] - 1], after = s->mid[i];
-    const int32_t quad[4] = {s->corner[i], reversed ? before : after, s->centre[side], reversed ? after : before};
-    add_quad(w, quad, s->sharp[i]);
+    add_quad(w, s->sharp[i], s->corner[i], reversed ? before : after, s->centre[side], reversed ? after : before);
 }
 
 /* middle of the side that runs to a corner over the edge of vertex mid */
@@ -311,20 +286,20 @@ static int32_t centre_across(const division *s, int32_t corner, int32_t mid)
 /* the part at a corner: outer quads lie in the sides, inner ones cross the edges from it */
 static void add_part(pal_edit_work *w, const division *s, int32_t corner)
 {
+    pal_cell_loops_cell(&w->to);
     for (int32_t side = 0; side < s->n_side; side++)
         for (int32_t i = s->start[side]; i < s->start[side + 1]; i++) {
             if (s->corner[i] != corner) continue;
-            const int32_t inner[4] = {s->mid[i], centre_across(s, corner, s->mid[i]), s->middle, s->centre[side]};
             add_outer_vertices(w, s, side, i, false);
-            add_quad(w, inner, 0);
+            add_quad(w, 0, s->mid[i], centre_across(s, corner, s->mid[i]), s->middle, s->centre[side]);
         }
-    pal_edit_end_cell(w, s->cell);
 }
 
 /* a cell that is not divided, with the parts of its faces and edges that are cut */
 static void add_neighbour(pal_edit_work *w, const division *s, int32_t cell)
 {
     const pal_cells *c = w->from;
+    pal_cell_loops_cell(&w->to);
     for (int32_t f = c->cell_use[cell]; f < c->cell_use[cell + 1]; f++) {
         int32_t centre = s->face[c->face_use[f].face], side = 0;
         if (centre >= 0) {
@@ -332,13 +307,12 @@ static void add_neighbour(pal_edit_work *w, const division *s, int32_t cell)
             for (int32_t i = s->start[side]; i < s->start[side + 1]; i++) add_outer_vertices(w, s, side, i, true);
             continue;
         }
+        pal_cell_loops_face(&w->to, c->face[c->face_use[f].face].sharp);
         for (int32_t u = c->face_use[f].first_use; u < c->face_use[f + 1].first_use; u++) {
-            pal_edit_corner(w, c->edge_use[u].vertex);
-            if (s->edge[c->edge_use[u].edge] >= 0) pal_edit_corner(w, s->edge[c->edge_use[u].edge]);
+            const int32_t vertex[2] = {c->edge_use[u].vertex, s->edge[c->edge_use[u].edge]};
+            pal_cell_loops_corners(&w->to, vertex, 1 + (vertex[1] >= 0));
         }
-        pal_edit_end_loop(w, c->face[c->face_use[f].face].sharp);
     }
-    pal_edit_end_cell(w, cell);
 }
 
 static void add_divided(pal_edit_work *w, const division *s)
@@ -353,67 +327,43 @@ static void add_divided(pal_edit_work *w, const division *s)
         else
             add_neighbour(w, s, i);
     }
-    for (int32_t i = first + 1; i < s->n_vertex; i++)
-        if (s->role[vertex[i]] == CORNER) add_part(w, s, vertex[i]);
+    for (int32_t i = first + 1; i < s->n_vertex; i++) {
+        if (s->role[vertex[i]] != CORNER) continue;
+        w->cell_from[w->to.n_cell] = s->cell;
+        add_part(w, s, vertex[i]);
+    }
     for (int32_t e = 0; e < c->n_edge; e++) {
         const int32_t *end = c->edge[e].vertex, mid = s->edge[e];
-        pal_edit_tag(w, end[0], mid < 0 ? end[1] : mid, c->edge[e].sharp);
-        if (mid >= 0) pal_edit_tag(w, mid, end[1], c->edge[e].sharp);
+        pal_cell_loops_edge(&w->to, end[0], mid < 0 ? end[1] : mid, c->edge[e].sharp);
+        if (mid >= 0) pal_cell_loops_edge(&w->to, mid, end[1], c->edge[e].sharp);
     }
-    memcpy(w->to.vertex_sharpness, c->vertex_sharpness, (size_t)c->n_vertex * sizeof *c->vertex_sharpness);
 }
 
-static int32_t count_corners(const division *s)
-{
-    int32_t n = 0;
-    for (int32_t i = 0; i < s->n_vertex; i++) n += s->role[s->order[i]] == CORNER;
-    return n;
-}
-
-/* space for the result: a quad in each side and one inside for every use, and the extra vertices of the neighbours'
- * loops */
-static pal_err reserve_division(pal_edit_work *w, const division *s, pal_diagnostic *diag)
+static pal_err divide(pal_edit_work *w, int32_t cell, division *s)
 {
     const pal_cells *c = w->from;
-    int64_t n_use = s->start[s->n_side], n_more = 0, n_new = 1;
-    for (int32_t side = 0; side < s->n_side; side++) n_new += s->centre[side] < 0;
-    int32_t first = c->face_use[c->cell_use[s->cell]].first_use;
-    int32_t end = c->face_use[c->cell_use[s->cell + 1]].first_use;
-    for (int32_t u = first; u < end; u++) {
-        int32_t e = c->edge_use[u].edge;
-        n_more += c->edge_cell.start[e + 1] - c->edge_cell.start[e];
-    }
-    int32_t whole = 0;
-    for (int32_t i = 0; i < s->start[s->n_side]; i++) whole += s->mid[i] < 0;
-    return pal_edit_reserve(w, c->n_vertex + whole / 2 + n_new, (int64_t)c->n_cell + count_corners(s) - 1,
-                            c->n_face_use + 3 * n_use, c->n_edge_use + n_more + 12 * n_use, diag);
+    PAL_TRY(pal_edit_check_number(w, "cell", cell, c->n_cell));
+    int32_t n = c->cell_vertex.start[cell + 1] - c->cell_vertex.start[cell];
+    if (n > PAL_DIVIDE_CORNERS_MAX)
+        return pal_edit_refuse(w, "it has %d corners, %d is the most", n, PAL_DIVIDE_CORNERS_MAX);
+    PAL_TRY(division_reserve(c, cell, s));
+    find_roles(s);
+    list_sides(s);
+    /* at most a vertex in the middle of each edge and side and of the cell, and a cell for each corner */
+    PAL_TRY(pal_edit_reserve(w, c->n_vertex + s->start[s->n_side] + s->n_side + 1, c->n_cell + n));
+    pal_edit_keep_vertices(w);
+    add_midpoints(w, s);
+    add_divided(w, s);
+    return PAL_ERR_OK;
 }
 
 static pal_err divide_one(const pal_cells *from, int32_t cell, pal_cells_edit *out, pal_diagnostic *diag)
 {
-    pal_edit_work w = pal_edit_begin(from, "divide cell %d", cell);
+    pal_edit_work w = pal_edit_begin(from, diag, "divide cell %d", cell);
     division s = {0};
-    PAL_TRY(pal_edit_check_number(&w, "cell", cell, from->n_cell, diag));
-    int32_t n = from->cell_vertex.start[cell + 1] - from->cell_vertex.start[cell];
-    if (n > PAL_DIVIDE_CORNERS_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: it has %d corners, %d is the most", w.what, n,
-                                  PAL_DIVIDE_CORNERS_MAX);
-    pal_err err = division_reserve(from, cell, &s);
-    if (!err) {
-        find_roles(&s);
-        list_sides(&s);
-        err = reserve_division(&w, &s, diag);
-    }
-    if (!err) {
-        for (int32_t v = 0; v < from->n_vertex; v++) {
-            pal_interpolation_builder_add(&w.rows, v, 1);
-            pal_interpolation_builder_end_row(&w.rows);
-        }
-        add_midpoints(&w, &s);
-        add_divided(&w, &s);
-    }
-    division_free(&s);
-    return pal_edit_finish(&w, err, out, diag);
+    pal_err err = divide(&w, cell, &s);
+    PAL_FREE(s.edge, s.face, s.role, s.order, s.start, s.corner, s.mid, s.centre, s.sharp);
+    return pal_edit_finish(&w, err, out);
 }
 
 /* ---- many cells ---- */
@@ -435,15 +385,13 @@ static pal_err join_edits(pal_cells_edit *edit, pal_cells_edit *next)
 }
 
 /* listed [n_cell] is all false */
-static pal_err check_list(const pal_cells *from, int32_t n, const int32_t *cell, bool *listed, pal_diagnostic *diag)
+static pal_err check_list(const pal_edit_work *w, int32_t n, const int32_t *cell, bool *listed)
 {
-    pal_edit_work w = pal_edit_begin(from, "divide");
-    int32_t max = from->n_cell < PAL_DIVIDE_CELLS_MAX ? from->n_cell : PAL_DIVIDE_CELLS_MAX;
-    if (n < 1 || n > max) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "divide: %d cells, must be 1 to %d", n, max);
+    int32_t n_cell = w->from->n_cell, max = n_cell < PAL_DIVIDE_CELLS_MAX ? n_cell : PAL_DIVIDE_CELLS_MAX;
+    if (n < 1 || n > max) return pal_edit_refuse(w, "%d cells, must be 1 to %d", n, max);
     for (int32_t i = 0; i < n; i++) {
-        PAL_TRY(pal_edit_check_number(&w, "cell", cell[i], from->n_cell, diag));
-        if (listed[cell[i]])
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "divide: cell %d is given twice", cell[i]);
+        PAL_TRY(pal_edit_check_number(w, "cell", cell[i], n_cell));
+        if (listed[cell[i]]) return pal_edit_refuse(w, "cell %d is given twice", cell[i]);
         listed[cell[i]] = true;
     }
     return PAL_ERR_OK;
@@ -452,42 +400,34 @@ static pal_err check_list(const pal_cells *from, int32_t n, const int32_t *cell,
 pal_err pal_cells_divide(const pal_cells *from, int32_t n, const int32_t *cell, pal_cells_edit *out,
                          pal_diagnostic *diag)
 {
-    pal_cells_edit edit = {0}, next = {0};
+    pal_edit_work w = pal_edit_begin(from, diag, "divide");
+    pal_cells_edit next = {0};
+    pal_err err = PAL_ERR_OK;
+    bool *listed;
     memset(out, 0, sizeof *out);
-    bool *listed = calloc((size_t)from->n_cell + 1, sizeof *listed);
-    pal_err err = listed ? check_list(from, n, cell, listed, diag) : PAL_ERR_MEMORY;
+    PAL_ZEROED(&err, listed, from->n_cell);
+    if (!err) err = check_list(&w, n, cell, listed);
     free(listed);
-    if (!err) err = divide_one(from, cell[0], &edit, diag);
+    if (!err) err = divide_one(from, cell[0], out, diag);
     /* the cells that are still to be divided keep their numbers */
     for (int32_t i = 1; i < n && !err; i++) {
-        err = divide_one(&edit.cells, cell[i], &next, diag);
-        if (err)
-            pal_cells_edit_free(&edit);
-        else
-            err = join_edits(&edit, &next);
+        err = divide_one(&out->cells, cell[i], &next, diag);
+        if (!err) err = join_edits(out, &next);
     }
     if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "divide: no memory");
-    if (err) return err;
-    pal_interpolation_apply(&edit.rows, from->x, edit.cells.x);
-    *out = edit;
-    return PAL_ERR_OK;
+    if (err)
+        pal_cells_edit_free(out);
+    else
+        pal_interpolation_apply(&out->rows, from->x, out->cells.x);
+    return err;
 }
 
-pal_err pal_cells_divide_near(const pal_cells *from, int32_t cell, int32_t rings, pal_cells_edit *out,
-                              pal_diagnostic *diag)
+/* the cells at most `rings` steps over vertices from the first of the list [n_cell]; returns how many */
+static int32_t list_near(const pal_cells *c, int32_t rings, int32_t *list, bool *listed)
 {
-    const pal_cells *c = from;
-    pal_edit_work w = pal_edit_begin(from, "divide cell %d", cell);
-    memset(out, 0, sizeof *out);
-    PAL_TRY(pal_edit_check_number(&w, "cell", cell, from->n_cell, diag));
-    if (rings < 0 || rings > PAL_DIVIDE_RINGS_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %d rings, must be 0 to %d", w.what, rings,
-                                  PAL_DIVIDE_RINGS_MAX);
-    int32_t *list = malloc((size_t)c->n_cell * sizeof *list), n = 1, first = 0;
-    bool *listed = calloc((size_t)c->n_cell, sizeof *listed);
-    pal_err err = list && listed ? PAL_ERR_OK : PAL_ERR_MEMORY;
-    if (!err) list[0] = cell, listed[cell] = true;
-    for (int32_t r = 0; r < rings && !err; r++)
+    int32_t n = 1, first = 0;
+    listed[list[0]] = true;
+    for (int32_t r = 0; r < rings; r++)
         for (int32_t after = n; first < after; first++)
             for (int32_t k = c->cell_vertex.start[list[first]]; k < c->cell_vertex.start[list[first] + 1]; k++) {
                 int32_t v = c->cell_vertex.item[k];
@@ -496,8 +436,24 @@ pal_err pal_cells_divide_near(const pal_cells *from, int32_t cell, int32_t rings
                     if (!listed[near]) listed[near] = true, list[n++] = near;
                 }
             }
-    err = err ? pal_diagnostic_set(diag, err, "%s: no memory", w.what) : pal_cells_divide(from, n, list, out, diag);
-    free(list);
-    free(listed);
+    return n;
+}
+
+pal_err pal_edit_divide_near(pal_edit_work *w, int32_t cell, int32_t rings, pal_cells_edit *out)
+{
+    const pal_cells *c = w->from;
+    pal_err err = PAL_ERR_OK;
+    int32_t *list;
+    bool *listed;
+    PAL_TRY(pal_edit_check_number(w, "cell", cell, c->n_cell));
+    if (rings < 0 || rings > PAL_DIVIDE_RINGS_MAX)
+        return pal_edit_refuse(w, "%d rings, must be 0 to %d", rings, PAL_DIVIDE_RINGS_MAX);
+    PAL_ARRAY(&err, list, c->n_cell);
+    PAL_ZEROED(&err, listed, c->n_cell);
+    if (!err) {
+        list[0] = cell;
+        err = pal_cells_divide(c, list_near(c, rings, list, listed), list, out, w->diag);
+    }
+    PAL_FREE(list, listed);
     return err;
 }

@@ -17,7 +17,18 @@
 #define PAL_EXTRUDE_SCALE_MAX 1000.0
 enum { PAL_DIVIDE_CORNERS_MAX = 1024, PAL_DIVIDE_RINGS_MAX = 1000, PAL_DIVIDE_CELLS_MAX = 512 };
 
-/* name of each kind and the numbers that it reads */
+/* name of each kind and the numbers that it reads:
+ *
+ *   delete   removes a cell, but not the last one. What remains may be in pieces.
+ *   extrude  adds a cell on a boundary face, along the vector area of the face; its outer face is the face scaled about
+ *            the mean of its corners. distance_m above 0, scale above 0 up to PAL_EXTRUDE_SCALE_MAX.
+ *   merge    joins two boundary faces to one inner face, corners at the means of pairs. The faces have equally many
+ *            corners, none in common, and no edge between them; corners are paired in loop order so that the sum of
+ *            squared distances is smallest.
+ *   bridge   the same pairs, but nothing moves and a new cell, a prism, fills the space between
+ *   divide   pal_cells_divide of the cell and those that share a vertex with it, repeated `rings` times
+ *   sharpen  sets a sharpness, 0 to PAL_SHARPNESS_MAX
+ *   move     sets the rest position of a vertex */
 #define PAL_CELLS_COMMAND_TABLE(X)                                                                                     \
     X(DELETE, "delete")                 /* cell                      */                                                \
     X(EXTRUDE, "extrude")               /* face, distance_m, scale   */                                                \
@@ -47,65 +58,32 @@ typedef struct pal_cells_command {
 
 typedef struct pal_cells_edit {
     pal_cells cells;
-    pal_interpolation
-        rows; /* each new vertex from the old ones: itself, the base it was extruded from, the mean of what was merged
-                 or divided                       [cells.n_vertex rows of the old vertices] */
+    /* each new vertex from the old ones: itself, its base, the mean of what was joined or cut [cells.n_vertex rows] */
+    pal_interpolation rows;
     double *offset; /* new rest position minus the interpolated one, m                           [cells.n_vertex][3] */
     int32_t *cell_from;   /* old cell that each cell is, is part of or grew from                    [cells.n_cell] */
     int32_t face;         /* where to continue: the outer face of an extrusion, the joined one of a merge; else -1 */
     int32_t rotated_face; /* old face whose rotation the offsets of an extrusion follow; -1: none */
 } pal_cells_edit;
 
-/* All edits. REFUSED with one sentence that names the kind and the number: a number that is out of range or NaN, a
- * result that is no complex (pal_cells_make), a face without area, a cell without volume, or a fold: a cell whose faces
- * can all be seen from its centroid must remain one, and a new cell must be one. MEMORY. After an error *from is
- * unchanged and *out zero. */
-
-/* Removes a cell. Refused for the last one. Pieces that are joined by an edge or vertex only, or not at all, may
- * remain. */
-pal_err pal_cells_delete(const pal_cells *from, int32_t cell, pal_cells_edit *out, pal_diagnostic *diag);
-/* Adds a cell on a boundary face, along the vector area of the face; its outer face is the face scaled about the mean
- * of its corners. distance_m above 0, scale above 0 up to PAL_EXTRUDE_SCALE_MAX. */
-pal_err pal_cells_extrude(const pal_cells *from, int32_t face, double distance_m, double scale, pal_cells_edit *out,
-                          pal_diagnostic *diag);
-/* Joins two boundary faces to one inner face, corners at the means of pairs. The faces have equally many corners, none
- * in common, and no edge between them; corners are paired in loop order so that the sum of squared distances is
- * smallest. */
-pal_err pal_cells_merge(const pal_cells *from, int32_t face, int32_t other_face, pal_cells_edit *out,
-                        pal_diagnostic *diag);
-/* The same pairs, but nothing moves and a new cell, a prism, fills the space between. */
-pal_err pal_cells_bridge(const pal_cells *from, int32_t face, int32_t other_face, pal_cells_edit *out,
-                         pal_diagnostic *diag);
-/* Cuts each of n cells in place as a level of subdivision would, into one for each of its corners; nothing moves. The
- * first part keeps the number of the cell. Neighbours are not cut, but their faces and edges are: they become polyhedra
- * of more corners. Vertices that a divided neighbour has already put on an edge or face are reused, so that the order
- * affects numbers only, and dividing all cells is a level of subdivision. Keeps the volume where faces are flat. After
- * subdivision, cells with a vertex in the middle of a bent edge may give inverted elements (det J below 0), so the
- * caller must check the solid. Refused for a cell of more than PAL_DIVIDE_CORNERS_MAX corners, the same cell twice,
- * more than PAL_DIVIDE_CELLS_MAX cells (each takes time linear in the size of all). */
-pal_err pal_cells_divide(const pal_cells *from, int32_t n, const int32_t *cell, pal_cells_edit *out,
-                         pal_diagnostic *diag);
-/* the same for a cell and those that share a vertex with it, repeated `rings` times */
-pal_err pal_cells_divide_near(const pal_cells *from, int32_t cell, int32_t rings, pal_cells_edit *out,
-                              pal_diagnostic *diag);
-/* Sets a sharpness (kind PAL_CELLS_SHARPEN_*), 0 to PAL_SHARPNESS_MAX; nothing else changes. */
-pal_err pal_cells_sharpen(const pal_cells *from, pal_cells_command_kind kind, int32_t item, float sharp,
-                          pal_cells_edit *out, pal_diagnostic *diag);
-/* Sets the rest positions x [n][3] of vertices [n], each at most once. To take a deformed shape as the rest shape,
- * transfer x by the interpolation alone. */
-pal_err pal_cells_move(const pal_cells *from, int32_t n, const int32_t *vertex, const double *x, pal_cells_edit *out,
-                       pal_diagnostic *diag);
-
-/* dispatches a command to one of the above; an unknown kind is REFUSED */
+/* An edit. REFUSED with one sentence that names the kind and the number: a kind or number that is out of range or NaN,
+ * a result that is no complex (pal_cells_make), or a fold: a cell whose faces can all be seen from its centroid must
+ * remain one, and a new cell must be one. MEMORY. After an error *from is unchanged and *out zero. */
 pal_err pal_cells_apply(const pal_cells *from, const pal_cells_command *command, pal_cells_edit *out,
                         pal_diagnostic *diag);
-/* name of a kind; NULL: none. And back: PAL_CELLS_COMMAND_KINDS: no such name */
+/* Cuts each of n cells in place as a level of subdivision would, into one for each of its corners; nothing moves. The
+ * first part keeps the number of the cell. Faces and edges of neighbours are cut: they become polyhedra of more
+ * corners, and reuse these vertices when they are divided, so that the order affects numbers only. After subdivision,
+ * cells with a vertex in the middle of a bent edge may give inverted elements (det J below 0): the caller must check
+ * the solid. Refused for a cell of more than PAL_DIVIDE_CORNERS_MAX corners, the same cell twice, more than
+ * PAL_DIVIDE_CELLS_MAX cells (each takes time linear in the size of all). */
+pal_err pal_cells_divide(const pal_cells *from, int32_t n, const int32_t *cell, pal_cells_edit *out,
+                         pal_diagnostic *diag);
+/* name of a kind; NULL: none */
 const char *pal_cells_command_name(pal_cells_command_kind kind);
-pal_cells_command_kind pal_cells_command_find(const char *name);
 
-/* Positions to [cells.n_vertex][3] of the new vertices from positions x [n of from][3] of the old ones, which do not
- * overlap: interpolation of x + offset, offsets of an extrusion rotated as its face is rotated against its rest shape.
- */
+/* Positions to [cells.n_vertex][3] from those of the old vertices, x [n of from][3], which do not overlap:
+ * interpolation of x + offset, offsets of an extrusion rotated as its face is rotated against its rest shape. */
 void pal_cells_edit_positions(const pal_cells_edit *edit, const pal_cells *from, const double *x, double *to);
 /* frees the arrays and zeroes the struct; a zeroed struct is fine */
 void pal_cells_edit_free(pal_cells_edit *edit);

@@ -5,10 +5,12 @@
  * face transfers h, so that the axes of the 27 cells of a regular neighbourhood agree. The eight cells that touch the
  * cell in a corner only have two vertices along each axis, and together exactly the 64.
  *
- * Errata: A12, 56 other vertices, not 58. A13: a vertex is regular with 8 cells and 6 edges, and an edge of the cell
- * with 4 cells. With that the 26 neighbours are those of a lattice; that they are hexahedra is checked for the cells at
- * the eight corners. Departure: the 64 nodes must differ, which excludes three cells in a ring. */
+ * Errata A12 and A13. In a regular neighbourhood the 26 neighbours are those of a lattice; that they are hexahedra is
+ * checked for the cells at the eight corners. Departure: the 64 nodes must differ, which excludes three cells in a
+ * ring. */
 #include "server/mesh/cells/cell_elements.h"
+
+#include "server/base/heap.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -156,36 +158,29 @@ static pal_err add_virtual_node(const pal_cells *c, pal_cell_elements *e)
     const pal_cell_rows *r = &c->cell_vertex;
     pal_interpolation_builder b;
     pal_interpolation_builder_begin(&b, e->n_virtual, c->n_vertex, r->start[c->n_cell]);
-    for (int32_t i = 0; i < e->n_virtual && !b.err; i++) {
+    for (int32_t i = 0; i < e->n_virtual; i++) {
         int32_t first = r->start[e->virtual_cell[i]], after = r->start[e->virtual_cell[i] + 1];
-        for (int32_t k = first; k < after; k++) pal_interpolation_builder_add(&b, r->item[k], 1.0 / (after - first));
-        pal_interpolation_builder_end_row(&b);
+        pal_interpolation_builder_mean(&b, r->item + first, after - first);
     }
     return pal_interpolation_builder_finish(&b, &e->virtual_rows);
-}
-
-/* room for n elements of a kind */
-static pal_err allocate(pal_cell_elements *e, pal_cell_kind kind, int32_t n)
-{
-    e->node[kind] = malloc((size_t)n * (size_t)pal_cell_kind_nodes(kind) * sizeof *e->node[kind] + 1);
-    e->cell[kind] = malloc((size_t)n * sizeof *e->cell[kind] + 1);
-    return e->node[kind] && e->cell[kind] ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 /* space for the largest possible number of each kind, a pyramid for each face of the cells that are no hexahedra */
 static pal_err allocate_all(const pal_cells *c, const bool *hex, pal_cell_elements *e, pal_diagnostic *diag)
 {
-    int32_t n_hex = 0, n_cubic = 0, n_pyramid = 0;
+    int32_t n[PAL_CELL_KINDS] = {0};
+    pal_err err = PAL_ERR_OK;
     for (int32_t i = 0; i < c->n_cell; i++) {
         if (!hex[i]) PAL_TRY(check_quads(c, i, diag));
-        n_hex += hex[i], n_cubic += is_cubic(c, hex, i);
-        n_pyramid += hex[i] ? 0 : c->cell_use[i + 1] - c->cell_use[i];
+        n[PAL_CELL_HEX] += hex[i], n[PAL_CELL_CUBIC] += is_cubic(c, hex, i);
+        n[PAL_CELL_PYRAMID] += hex[i] ? 0 : c->cell_use[i + 1] - c->cell_use[i];
     }
-    PAL_TRY(allocate(e, PAL_CELL_CUBIC, n_cubic));
-    PAL_TRY(allocate(e, PAL_CELL_HEX, n_hex));
-    PAL_TRY(allocate(e, PAL_CELL_PYRAMID, n_pyramid));
-    e->virtual_cell = malloc((size_t)(c->n_cell - n_hex) * sizeof *e->virtual_cell + 1);
-    return e->virtual_cell ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    for (int kind = 0; kind < PAL_CELL_KINDS; kind++) {
+        PAL_ARRAY(&err, e->node[kind], (size_t)n[kind] * (size_t)pal_cell_kind_nodes((pal_cell_kind)kind));
+        PAL_ARRAY(&err, e->cell[kind], n[kind]);
+    }
+    PAL_ARRAY(&err, e->virtual_cell, c->n_cell - n[PAL_CELL_HEX]);
+    return err;
 }
 
 static void fill(const pal_cells *c, const bool *hex, int32_t *stamp, pal_cell_elements *e)
@@ -209,17 +204,18 @@ static void fill(const pal_cells *c, const bool *hex, int32_t *stamp, pal_cell_e
 pal_err pal_cell_elements_make(const pal_cells *cells, pal_cell_elements *out, pal_diagnostic *diag)
 {
     pal_cell_elements e = {.n_vertex = cells->n_vertex};
-    bool *hex = malloc((size_t)cells->n_cell + 1);
-    int32_t *stamp = calloc((size_t)cells->n_vertex + 1, sizeof *stamp);
-    pal_err err = hex && stamp ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    bool *hex;
+    int32_t *stamp;
+    PAL_ARRAY(&err, hex, cells->n_cell);
+    PAL_ZEROED(&err, stamp, cells->n_vertex);
     for (int32_t i = 0; i < cells->n_cell && !err; i++) hex[i] = is_hex(cells, i);
     if (!err) err = allocate_all(cells, hex, &e, diag);
     if (!err) {
         fill(cells, hex, stamp, &e);
         err = add_virtual_node(cells, &e);
     }
-    free(hex);
-    free(stamp);
+    PAL_FREE(hex, stamp);
     if (err)
         pal_cell_elements_free(&e);
     else
@@ -230,8 +226,7 @@ pal_err pal_cell_elements_make(const pal_cells *cells, pal_cell_elements *out, p
 void pal_cell_elements_free(pal_cell_elements *e)
 {
     for (int kind = 0; kind < PAL_CELL_KINDS; kind++) {
-        free(e->node[kind]);
-        free(e->cell[kind]);
+        PAL_FREE(e->node[kind], e->cell[kind]);
     }
     free(e->virtual_cell);
     pal_interpolation_free(&e->virtual_rows);
@@ -244,23 +239,9 @@ pal_err pal_cell_elements_interpolation(const pal_cell_elements *e, const pal_in
                                         pal_interpolation *out)
 {
     PAL_ASSERT(vertices->n_row == e->n_vertex);
-    pal_interpolation extra = {0}, all = {.n_row = e->n_vertex + e->n_virtual, .n_point = vertices->n_point};
-    PAL_TRY(pal_interpolation_product(&e->virtual_rows, vertices, INT32_MAX - vertices->start[e->n_vertex], &extra));
-    size_t n = (size_t)vertices->start[e->n_vertex], more = (size_t)extra.start[e->n_virtual];
-    all.start = malloc(((size_t)all.n_row + 1) * sizeof *all.start);
-    all.point = malloc((n + more) * sizeof *all.point);
-    all.weight = malloc((n + more) * sizeof *all.weight);
-    pal_err err = all.start && all.point && all.weight ? PAL_ERR_OK : PAL_ERR_MEMORY;
-    if (!err) {
-        memcpy(all.point, vertices->point, n * sizeof *all.point);
-        memcpy(all.point + n, extra.point, more * sizeof *all.point);
-        memcpy(all.weight, vertices->weight, n * sizeof *all.weight);
-        memcpy(all.weight + n, extra.weight, more * sizeof *all.weight);
-        memcpy(all.start, vertices->start, (size_t)e->n_vertex * sizeof *all.start);
-        for (int32_t i = 0; i <= e->n_virtual; i++) all.start[e->n_vertex + i] = (int32_t)n + extra.start[i];
-        *out = all;
-    } else
-        pal_interpolation_free(&all);
-    pal_interpolation_free(&extra);
-    return err;
+    pal_interpolation_builder b;
+    pal_interpolation_builder_begin(&b, e->n_vertex + e->n_virtual, vertices->n_point, INT32_MAX);
+    pal_interpolation_builder_product(&b, NULL, vertices);
+    pal_interpolation_builder_product(&b, &e->virtual_rows, vertices);
+    return pal_interpolation_builder_finish(&b, out);
 }

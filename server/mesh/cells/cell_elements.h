@@ -3,10 +3,9 @@
  *   cubic    64 nodes, uniform tricubic B-spline (3.4.1, 3.4.4): a hexahedron away from the boundary in a regular
  *            neighbourhood. Node m = 16 j + 4 k + l has the shape function B_j(u) B_k(v) B_l(w); the cell's own corners
  *            have j, k, l in {1, 2}.
- *   hex      8 nodes, trilinear (3.4.2): all other hexahedra. Corner c at bits 0, 1, 2 for u, v, w, as in
- * num/shape_functions.h. pyramid  5 nodes (3.4.3): one for each quad of any other cell. Its base counter-clockwise seen
- * from the apex, then the apex, a virtual node in the mean of the cell's vertices: a hex of corners 0, 1, 3, 2 whose
- * corners 4 .. 7 have become one.
+ *   hex      8 nodes, trilinear (3.4.2): all other hexahedra. Corner c at bits 0, 1, 2 for u, v, w
+ *   pyramid  5 nodes (3.4.3): one for each quad of any other cell. Its base counter-clockwise seen from the apex, then
+ *            the apex, a virtual node in the mean of the cell's vertices (num/spline.h)
  *
  * (u, v, w) is right-handed: det of d(x,y,z)/d(u,v,w) is positive in a cell that is not inside out. Its origin is the
  * cell's first vertex, u runs along the first edge use there. Nodes up to n_vertex - 1 are vertices of the complex,

@@ -2,16 +2,13 @@
  * specified in cell_file.h. */
 #include "server/mesh/cells/cell_file.h"
 
+#include "server/base/heap.h"
 #include "server/mesh/cells/cell_reader.h"
 #include "server/mesh/files/file_bytes.h"
+#include "server/mesh/geometry/tuning.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-#define MAX_BYTES ((size_t)256 << 20)
-#define MAX_ITEMS ((size_t)1 << 29)
-
-/* ---- growing arrays ---- */
 
 pal_err pal_cell_reader_refuse(const pal_cell_reader *reader, const char *format, ...)
 {
@@ -22,59 +19,34 @@ pal_err pal_cell_reader_refuse(const pal_cell_reader *reader, const char *format
     return err;
 }
 
-pal_err pal_cell_reader_grow(const pal_cell_reader *reader, void **array, size_t n, size_t *cap, size_t size)
+/* keeps the line of item n */
+static void add_line(pal_cell_reader *r, int64_t **line, int32_t n, int64_t number)
 {
-    if (n < *cap) return PAL_ERR_OK;
-    if (n >= MAX_ITEMS)
-        return pal_diagnostic_set(reader->diag, PAL_ERR_BUDGET, "%s: line %lld: more than %zu items", reader->name,
-                                  (long long)reader->scan.line, MAX_ITEMS);
-    size_t more = *cap ? 2 * *cap : 16;
-    void *bigger = realloc(*array, more * size);
-    if (!bigger)
-        return pal_diagnostic_set(reader->diag, PAL_ERR_MEMORY, "%s: no memory for %zu bytes", reader->name,
-                                  more * size);
-    *array = bigger, *cap = more;
-    return PAL_ERR_OK;
+    if (!r->l.err && !PAL_GROW(*line, n)) r->l.err = PAL_ERR_MEMORY;
+    if (!r->l.err) (*line)[n] = number;
 }
 
-#define GROW(field, n, cap) PAL_TRY(pal_cell_reader_grow(r, (void **)&r->field, (n), &r->cap, sizeof *r->field))
-
-pal_err pal_cell_reader_vertex(pal_cell_reader *reader, const double x[3])
+void pal_cell_reader_vertex(pal_cell_reader *reader, const double x[3])
 {
-    pal_cell_reader *r = reader;
-    size_t n = (size_t)r->l.n_vertex;
-    PAL_TRY(pal_cell_reader_grow(r, (void **)&r->l.x, n, &r->cap_x, 3 * sizeof *r->l.x));
-    GROW(l.vertex_line, n, cap_vertex_line);
-    memcpy(r->l.x + 3 * n, x, 3 * sizeof *x);
-    r->l.vertex_line[n] = r->scan.line;
-    r->l.n_vertex++;
-    return PAL_ERR_OK;
+    add_line(reader, &reader->l.vertex_line, reader->l.n_vertex, reader->scan.line);
+    pal_cell_loops_vertex(&reader->l, x, 0);
 }
 
-/* starts reserve one entry more than they use, for the end */
-pal_err pal_cell_reader_cell(pal_cell_reader *reader)
+void pal_cell_reader_face(pal_cell_reader *reader, int64_t line)
 {
-    pal_cell_reader *r = reader;
-    GROW(l.cell, (size_t)r->l.n_cell + 1, cap_cell);
-    r->l.cell[r->l.n_cell++] = (int32_t)r->n_loop;
-    return PAL_ERR_OK;
+    add_line(reader, &reader->l.line, reader->l.n_loop, line);
+    pal_cell_loops_face(&reader->l, 0);
 }
 
-pal_err pal_cell_reader_loop(pal_cell_reader *reader, int64_t line)
+pal_err pal_cell_reader_sharp(pal_cell_reader *reader, float *out)
 {
-    pal_cell_reader *r = reader;
-    GROW(l.loop, r->n_loop + 1, cap_loop);
-    GROW(l.line, r->n_loop, cap_line);
-    r->l.line[r->n_loop] = line;
-    r->l.loop[r->n_loop++] = (int32_t)r->n_corner;
-    return PAL_ERR_OK;
-}
-
-pal_err pal_cell_reader_corner(pal_cell_reader *reader, int32_t vertex)
-{
-    pal_cell_reader *r = reader;
-    GROW(l.corner, r->n_corner, cap_corner);
-    r->l.corner[r->n_corner++] = vertex;
+    double sharp;
+    if (!pal_text_double(&reader->scan, &sharp))
+        return pal_cell_reader_refuse(reader, "a sharpness must be a number, found %s",
+                                      pal_text_excerpt_at(&reader->scan).text);
+    if (!(sharp >= 0 && sharp <= (double)PAL_SHARPNESS_MAX))
+        return pal_cell_reader_refuse(reader, "sharpness %g, must be 0 to %g", sharp, (double)PAL_SHARPNESS_MAX);
+    *out = (float)sharp;
     return PAL_ERR_OK;
 }
 
@@ -93,7 +65,7 @@ static pal_err read_vertex(pal_cell_reader *r)
         if (!pal_text_double(&r->scan, &x[a]))
             return pal_cell_reader_refuse(r, "a position needs three numbers, found %s",
                                           pal_text_excerpt_at(&r->scan).text);
-    PAL_TRY(pal_cell_reader_vertex(r, x));
+    pal_cell_reader_vertex(r, x);
     return end_line(r);
 }
 
@@ -110,42 +82,30 @@ static pal_err read_number(pal_cell_reader *r, const char *what, int64_t max, in
     return PAL_ERR_OK;
 }
 
-static pal_err read_loop(pal_cell_reader *r)
+static pal_err read_face(pal_cell_reader *r)
 {
     if (r->l.n_cell == 0) return pal_cell_reader_refuse(r, "a face before the first cell");
-    PAL_TRY(pal_cell_reader_loop(r, r->scan.line));
+    pal_cell_reader_face(r, r->scan.line);
     while (pal_text_more(&r->scan)) {
         int32_t v = 0;
         PAL_TRY(read_number(r, "vertex", r->l.n_vertex, &v));
-        PAL_TRY(pal_cell_reader_corner(r, v));
+        pal_cell_loops_corners(&r->l, &v, 1);
     }
     return PAL_ERR_OK;
 }
 
-static pal_err read_sharp(pal_cell_reader *r, float *out)
-{
-    double sharp;
-    if (!pal_text_double(&r->scan, &sharp))
-        return pal_cell_reader_refuse(r, "a sharpness must be a number, found %s", pal_text_excerpt_at(&r->scan).text);
-    if (!(sharp >= 0 && sharp <= (double)PAL_SHARPNESS_MAX))
-        return pal_cell_reader_refuse(r, "sharpness %g, must be 0 to %g", sharp, (double)PAL_SHARPNESS_MAX);
-    *out = (float)sharp;
-    return end_line(r);
-}
-
-/* sharpnesses of vertices up to the last one named, 0 for those between */
-static pal_err read_vertex_sharp(pal_cell_reader *r, size_t *cap)
+static pal_err read_vertex_sharp(pal_cell_reader *r)
 {
     int32_t v = 0;
-    float sharp = 0;
     PAL_TRY(read_number(r, "vertex", r->l.n_vertex, &v));
-    PAL_TRY(read_sharp(r, &sharp));
-    while (r->n_sharp <= (size_t)v) {
-        PAL_TRY(
-            pal_cell_reader_grow(r, (void **)&r->l.vertex_sharpness, r->n_sharp, cap, sizeof *r->l.vertex_sharpness));
-        r->l.vertex_sharpness[r->n_sharp++] = 0;
-    }
-    r->l.vertex_sharpness[v] = sharp;
+    return pal_cell_reader_sharp(r, &r->l.vertex_sharpness[v]);
+}
+
+/* also one of sharpness 0, so that an edge that no cell has is refused */
+static pal_err add_tag(pal_cell_tag **list, int32_t *n, pal_cell_tag tag)
+{
+    if (!PAL_GROW(*list, *n)) return PAL_ERR_MEMORY;
+    (*list)[(*n)++] = tag;
     return PAL_ERR_OK;
 }
 
@@ -154,12 +114,9 @@ static pal_err read_edge_sharp(pal_cell_reader *r)
     pal_cell_tag tag = {0};
     PAL_TRY(read_number(r, "vertex", r->l.n_vertex, &tag.a));
     PAL_TRY(read_number(r, "vertex", r->l.n_vertex, &tag.b));
-    PAL_TRY(read_sharp(r, &tag.sharp));
-    GROW(l.edge_tag, (size_t)r->l.n_edge_tag, cap_edge_tag);
-    GROW(l.tag_line, (size_t)r->l.n_edge_tag, cap_tag_line);
-    r->l.tag_line[r->l.n_edge_tag] = r->scan.line;
-    r->l.edge_tag[r->l.n_edge_tag++] = tag;
-    return PAL_ERR_OK;
+    PAL_TRY(pal_cell_reader_sharp(r, &tag.sharp));
+    add_line(r, &r->l.tag_line, r->l.n_edge_tag, r->scan.line);
+    return add_tag(&r->l.edge_tag, &r->l.n_edge_tag, tag);
 }
 
 static pal_err read_face_sharp(pal_cell_reader *r)
@@ -167,74 +124,64 @@ static pal_err read_face_sharp(pal_cell_reader *r)
     pal_cell_tag tag = {0};
     int32_t cell = 0, face = 0;
     PAL_TRY(read_number(r, "cell", r->l.n_cell, &cell));
-    int32_t first = r->l.cell[cell], end = cell + 1 < r->l.n_cell ? r->l.cell[cell + 1] : (int32_t)r->n_loop;
-    PAL_TRY(read_number(r, "face", end - first, &face));
-    PAL_TRY(read_sharp(r, &tag.sharp));
-    tag.a = first + face;
-    GROW(l.face_tag, (size_t)r->l.n_face_tag, cap_face_tag);
-    r->l.face_tag[r->l.n_face_tag++] = tag;
-    return PAL_ERR_OK;
+    PAL_TRY(read_number(r, "face", r->l.cell[cell + 1] - r->l.cell[cell], &face));
+    PAL_TRY(pal_cell_reader_sharp(r, &tag.sharp));
+    tag.a = r->l.cell[cell] + face;
+    return add_tag(&r->l.face_tag, &r->l.n_face_tag, tag);
 }
 
-static pal_err read_line(pal_cell_reader *r, size_t *cap_sharp)
+static pal_err read_line(pal_cell_reader *r)
 {
+    static const struct {
+        const char *word;
+        pal_err (*read)(pal_cell_reader *r);
+    } numbers[] = {{"sv", read_vertex_sharp}, {"se", read_edge_sharp}, {"sf", read_face_sharp}};
     pal_text_scan *scan = &r->scan;
     if (pal_text_is(scan, "v")) return read_vertex(r);
-    if (pal_text_is(scan, "f")) return read_loop(r);
-    if (pal_text_is(scan, "sv")) return read_vertex_sharp(r, cap_sharp);
-    if (pal_text_is(scan, "se")) return read_edge_sharp(r);
-    if (pal_text_is(scan, "sf")) return read_face_sharp(r);
-    if (pal_text_is(scan, "c")) {
-        PAL_TRY(end_line(r));
-        if (r->l.n_cell > 0 && (size_t)r->l.cell[r->l.n_cell - 1] == r->n_loop)
-            return pal_cell_reader_refuse(r, "cell %d has no faces", r->l.n_cell);
-        return pal_cell_reader_cell(r);
+    if (pal_text_is(scan, "f")) return read_face(r);
+    for (int k = 0; k < 3; k++) {
+        if (!pal_text_is(scan, numbers[k].word)) continue;
+        PAL_TRY(numbers[k].read(r));
+        return end_line(r);
     }
-    return pal_cell_reader_refuse(r, "a line begins with %s, known are v, c, f, sv, se, sf",
-                                  pal_text_excerpt_at(scan).text);
+    if (!pal_text_is(scan, "c"))
+        return pal_cell_reader_refuse(r, "a line begins with %s, known are v, c, f, sv, se, sf",
+                                      pal_text_excerpt_at(scan).text);
+    PAL_TRY(end_line(r));
+    if (r->l.n_cell > 0 && r->l.cell[r->l.n_cell - 1] == r->l.n_loop)
+        return pal_cell_reader_refuse(r, "cell %d has no faces", r->l.n_cell);
+    pal_cell_loops_cell(&r->l);
+    return PAL_ERR_OK;
 }
 
 static pal_err read_palcells(pal_cell_reader *r)
 {
-    size_t cap_sharp = 0;
     int64_t version;
     r->scan.hash = true;
     if (!pal_text_is(&r->scan, "palcells") || !pal_text_int(&r->scan, &version) || version != 1)
         return pal_cell_reader_refuse(r, "the first line must be 'palcells 1'");
     PAL_TRY(end_line(r));
-    while (pal_text_next_line(&r->scan))
-        if (pal_text_more(&r->scan)) PAL_TRY(read_line(r, &cap_sharp));
-    /* room for the vertices after the last one named */
-    while (r->n_sharp > 0 && r->n_sharp < (size_t)r->l.n_vertex) {
-        PAL_TRY(pal_cell_reader_grow(r, (void **)&r->l.vertex_sharpness, r->n_sharp, &cap_sharp,
-                                     sizeof *r->l.vertex_sharpness));
-        r->l.vertex_sharpness[r->n_sharp++] = 0;
-    }
+    while (!r->l.err && pal_text_next_line(&r->scan))
+        if (pal_text_more(&r->scan)) PAL_TRY(read_line(r));
     r->l.count_from = 1;
     return PAL_ERR_OK;
 }
 
 /* ---- reading ---- */
 
-static bool starts_with(const uint8_t *bytes, size_t n_byte, const char *text)
-{
-    size_t n = strlen(text);
-    return n_byte >= n && !memcmp(bytes, text, n);
-}
-
-/* completes the loops and builds the complex; the builder's message follows the file's name */
+/* builds the complex from the loops; the builder's message follows the file's name */
 static pal_err finish(pal_cell_reader *r, bool vtk, pal_cells *out)
 {
+    pal_err err = r->l.err;
+    if (err) return pal_diagnostic_set(r->diag, err, "%s: no memory for its %d cells", r->name, r->l.n_cell);
     if (r->l.n_vertex == 0 || r->l.n_cell == 0)
         return pal_cell_reader_refuse(r, "the file ends with %d vertices and %d cells", r->l.n_vertex, r->l.n_cell);
-    if (r->n_loop == 0) return pal_cell_reader_refuse(r, "the file ends without a face");
-    r->l.cell[r->l.n_cell] = (int32_t)r->n_loop;
-    r->l.loop[r->n_loop] = (int32_t)r->n_corner;
-    if (r->n_corner == 0) return pal_cell_reader_refuse(r, "the file ends without a corner");
+    if (r->l.n_loop == 0) return pal_cell_reader_refuse(r, "the file ends without a face");
+    if (r->l.n_corner == 0) return pal_cell_reader_refuse(r, "the file ends without a corner");
     if (vtk) PAL_TRY(pal_cell_loops_keep(&r->l, NULL, NULL));
     pal_diagnostic inner = {""};
-    pal_err err = pal_cells_make(&r->l, out, &inner);
-    const char *text = inner.text + (starts_with((const uint8_t *)inner.text, strlen(inner.text), "cells: ") ? 7 : 0);
+    err = pal_cells_make(&r->l, out, &inner);
+    const char *text = inner.text + (strncmp(inner.text, "cells: ", 7) ? 0 : 7);
     return err ? pal_diagnostic_set(r->diag, err, "%s: %.360s", r->name, text) : PAL_ERR_OK;
 }
 
@@ -242,12 +189,12 @@ pal_err pal_cell_file_parse(const char *name, const uint8_t *bytes, size_t n_byt
 {
     char shown[128];
     pal_file_printable_name(shown, name);
-    pal_cell_reader r = {
-        .name = shown, .diag = diag, .scan = {.at = bytes, .end = bytes + n_byte, .line = 1}, .l = {.count_from = 0}};
-    bool vtk = starts_with(bytes, n_byte, "# vtk");
+    pal_cell_reader r = {.name = shown, .diag = diag, .scan = {.at = bytes, .end = bytes + n_byte, .line = 1}};
+    bool vtk = n_byte >= 5 && !memcmp(bytes, "# vtk", 5);
     pal_err err = PAL_ERR_OK;
-    if (n_byte > MAX_BYTES)
-        err = pal_diagnostic_set(diag, PAL_ERR_BUDGET, "%s: %zu bytes, at most %zu are read", shown, n_byte, MAX_BYTES);
+    if (n_byte > CELL_MAX_BYTE)
+        err = pal_diagnostic_set(diag, PAL_ERR_BUDGET, "%s: %zu bytes, at most %zu are read", shown, n_byte,
+                                 CELL_MAX_BYTE);
     else if (vtk)
         err = pal_cell_vtk_read(&r);
     else
@@ -261,7 +208,7 @@ pal_err pal_cell_file_load(const char *path, pal_cells *out, pal_diagnostic *dia
 {
     uint8_t *bytes;
     size_t n_byte;
-    PAL_TRY(pal_file_read(path, MAX_BYTES, &bytes, &n_byte, diag));
+    PAL_TRY(pal_file_read(path, CELL_MAX_BYTE, &bytes, &n_byte, diag));
     pal_err err = pal_cell_file_parse(path, bytes, n_byte, out, diag);
     free(bytes);
     return err;
@@ -269,25 +216,12 @@ pal_err pal_cell_file_load(const char *path, pal_cells *out, pal_diagnostic *dia
 
 /* ---- writing ---- */
 
-void pal_cell_write_number(FILE *file, double value)
-{
-    char text[40];
-    snprintf(text, sizeof text, "%.17g", value);
-    for (char *c = text; *c; c++)
-        if (*c == ',') *c = '.'; /* the decimal point of the locale */
-    fputs(text, file);
-}
-
 static void write_palcells(const pal_cells *c, FILE *file)
 {
     fputs("palcells 1\n", file);
     for (int32_t v = 0; v < c->n_vertex; v++) {
-        fputc('v', file);
-        for (int a = 0; a < 3; a++) {
-            fputc(' ', file);
-            pal_cell_write_number(file, c->x[3 * (size_t)v + (size_t)a]);
-        }
-        fputc('\n', file);
+        fputs("v ", file);
+        pal_file_put_line(file, c->x + 3 * (size_t)v, 3);
     }
     for (int32_t i = 0; i < c->n_cell; i++) {
         fputs("c\n", file);
@@ -298,22 +232,22 @@ static void write_palcells(const pal_cells *c, FILE *file)
             fputc('\n', file);
         }
     }
+    double sharp;
     for (int32_t v = 0; v < c->n_vertex; v++)
-        if (c->vertex_sharpness[v] > 0)
-            fprintf(file, "sv %d ", v + 1), pal_cell_write_number(file, (double)c->vertex_sharpness[v]),
-                fputc('\n', file);
+        if ((sharp = (double)c->vertex_sharpness[v]) > 0) {
+            fprintf(file, "sv %d ", v + 1);
+            pal_file_put_line(file, &sharp, 1);
+        }
     for (int32_t e = 0; e < c->n_edge; e++)
-        if (c->edge[e].sharp > 0) {
+        if ((sharp = (double)c->edge[e].sharp) > 0) {
             fprintf(file, "se %d %d ", c->edge[e].vertex[0] + 1, c->edge[e].vertex[1] + 1);
-            pal_cell_write_number(file, (double)c->edge[e].sharp);
-            fputc('\n', file);
+            pal_file_put_line(file, &sharp, 1);
         }
     for (int32_t f = 0; f < c->n_face; f++)
-        if (c->face[f].sharp > 0) {
+        if ((sharp = (double)c->face[f].sharp) > 0) {
             const pal_face_use *use = &c->face_use[c->face[f].use[0]];
             fprintf(file, "sf %d %d ", use->cell + 1, c->face[f].use[0] - c->cell_use[use->cell] + 1);
-            pal_cell_write_number(file, (double)c->face[f].sharp);
-            fputc('\n', file);
+            pal_file_put_line(file, &sharp, 1);
         }
 }
 
@@ -339,8 +273,8 @@ pal_err pal_cell_file_bytes(const pal_cells *cells, bool vtk, uint8_t **bytes, s
 
 pal_err pal_cell_file_save(const pal_cells *cells, const char *path, pal_diagnostic *diag)
 {
-    size_t n = strlen(path), n_byte;
-    bool vtk = n >= 4 && !strcmp(path + n - 4, ".vtk"), ours = n >= 9 && !strcmp(path + n - 9, ".palcells");
+    size_t n_byte;
+    bool vtk = pal_file_ends_with(path, ".vtk"), ours = pal_file_ends_with(path, ".palcells");
     char shown[128];
     uint8_t *bytes;
     pal_file_printable_name(shown, path);

@@ -15,9 +15,12 @@
 typedef struct pal_cell_lattice {
     int32_t n[3];
     bool round;             /* the first direction closes in itself                                              */
-    const char *const *row; /* layers from low z, rows from low y, a letter for each x; the last letter stands for
-                             * those that are missing                                            [n[2] n[1]] */
-    void (*place)(const double at[3], double x[3]); /* from lattice numbers, corners being whole, to metres */
+    const char *const *row; /* NULL: bricks everywhere, vertices in rows, x fastest. Layers from low z, rows from low y,
+                             * a letter for each x; the last letter stands for those that are missing [n[2] n[1]] */
+    /* from lattice numbers, corners being whole, to metres; NULL: equal steps from low to high, of round ones clockwise
+     * about z, from inner to outer radius and along z */
+    void (*place)(const double at[3], double x[3]);
+    double low[3], high[3];
 } pal_cell_lattice;
 
 /* INTERNAL for an unknown letter; what pal_cells_make refuses; MEMORY */

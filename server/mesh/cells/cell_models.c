@@ -3,12 +3,9 @@
 #include "server/mesh/cells/cell_models.h"
 
 #include "server/mesh/cells/cell_lattice.h"
-#include "server/mesh/cells/cell_shapes.h"
 
 #include <math.h>
 #include <string.h>
-
-#define PI 3.141592653589793
 
 /* the length of a table's line t, straight between lines and beyond the ends */
 static double line_at(const double *line, int n_line, double t)
@@ -30,6 +27,12 @@ static void turn(double x[3], int axis, const double centre[3], double angle)
 static double clamp(double x, double low, double high)
 {
     return fmax(low, fmin(high, x));
+}
+
+/* takes what lies beyond the cube |u| <= 1 off u */
+static void take_excess(double u[3], double more[3])
+{
+    for (int a = 0; a < 3; a++) more[a] = u[a] - clamp(u[a], -1, 1), u[a] -= more[a];
 }
 
 /* 0 before from, 1 after to, smooth between */
@@ -124,11 +127,11 @@ static void place_monster(const double at[3], double x[3])
     double t = clamp(at[0], 0, LINES - 1), place[2] = {-0.12, 0};
     /* the spine by its angle in the middle of each step */
     for (int i = 0; i < t; i++) {
-        double part = fmin(1, t - i), a = PI / 180 * 0.5 * (angle_deg[i] + angle_deg[i + 1]);
+        double part = fmin(1, t - i), a = M_PI / 180 * 0.5 * (angle_deg[i] + angle_deg[i + 1]);
         place[0] += part * step[i] * cos(a), place[1] += part * step[i] * sin(a);
     }
     /* what stands out further stands more upright than the spine's back */
-    double a = PI / 180 * LINE(angle_deg, t), b = t < 16 ? 0.3 * a : a, side = at[2] - 1.5;
+    double a = M_PI / 180 * LINE(angle_deg, t), b = t < 16 ? 0.3 * a : a, side = at[2] - 1.5;
     double sign = side < 0 ? -1 : 1, near = fmin(0.5, fabs(side)), up = sign * 2 * near * LINE(half, t);
     double more = sign * 0.017 * (fabs(side) - near);
     x[0] = place[0] - up * sin(a) - more * sin(b), x[1] = 2 * (at[1] - 1.5) * LINE(wide, t);
@@ -187,7 +190,7 @@ static void place_head(const double at[3], double x[3])
     static const double depth[] = {-1.75, -1.4, -1, -0.5, 0, 0.5, 1};
     static const double height[] = {-1.55, -1, -0.62, -0.40, 0.02, 0.42, 1};
     double u[3] = {LINE(across, at[0]), LINE(depth, at[1]), LINE(height, at[2])}, more[3];
-    for (int a = 0; a < 3; a++) more[a] = u[a] - clamp(u[a], -1, 1), u[a] -= more[a];
+    take_excess(u, more);
     swell(u, 0.9);
     for (int a = 0; a < 3; a++) u[a] += more[a];
     /* a chin that is narrower than the crown */
@@ -244,7 +247,7 @@ static void place_nozzle(const double at[3], double x[3])
 {
     static const double inner[] = {0.034, 0.034, 0.032, 0.026, 0.018, 0.018, 0.024, 0.031, 0.037, 0.041};
     static const double height[] = {0, 0.016, 0.034, 0.050, 0.066, 0.082, 0.098, 0.115, 0.132, 0.15};
-    double angle = 2 * PI * at[0] / 9, r = LINE(inner, at[2]) + 0.012 * at[1];
+    double angle = 2 * M_PI * at[0] / 9, r = LINE(inner, at[2]) + 0.012 * at[1];
     x[0] = -r * cos(angle), x[1] = r * sin(angle), x[2] = LINE(height, at[2]);
 }
 
@@ -265,7 +268,7 @@ static void place_kidney(const double at[3], double x[3])
 {
     static const double height[] = {-2.1, -1.5, -1, -0.62, -0.26, 0, 0.26, 0.62, 1};
     double u[3] = {(at[0] - 4) / 2, (at[1] - 2) / 2, LINE(height, at[2])}, more[3];
-    for (int a = 0; a < 3; a++) more[a] = u[a] - clamp(u[a], -1, 1), u[a] -= more[a];
+    take_excess(u, more);
     swell(u, 0.7);
     double bean = 0.024 * u[2] * u[2];
     for (int a = 0; a < 3; a++) u[a] += more[a];
@@ -287,15 +290,15 @@ const pal_cell_model pal_cell_model_list[PAL_CELL_MODELS] = {
 };
 
 static const pal_cell_lattice lattice_list[PAL_CELL_MODELS] = {
-    {{9, 4, 7}, false, soccer_row, place_soccer},
-    {{22, 3, 4}, false, monster_row, place_monster},
-    {{3, 3, 3}, false, NULL, NULL},
-    {{5, 4, 9}, false, chair_row, place_chair},
-    {{4, 4, 4}, false, NULL, NULL},
-    {{7, 6, 6}, false, head_row, place_head},
-    {{20, 3, 6}, false, bridge_row, place_bridge},
-    {{9, 3, 9}, true, nozzle_row, place_nozzle},
-    {{6, 4, 8}, false, kidney_row, place_kidney},
+    {{9, 4, 7}, false, soccer_row, place_soccer, {0}, {0}},
+    {{22, 3, 4}, false, monster_row, place_monster, {0}, {0}},
+    {{3, 3, 3}, false, NULL, NULL, {-0.05, -0.05, -0.05}, {0.05, 0.05, 0.05}},
+    {{5, 4, 9}, false, chair_row, place_chair, {0}, {0}},
+    {{4, 4, 4}, false, NULL, NULL, {-0.05, -0.05, -0.05}, {0.05, 0.05, 0.05}},
+    {{7, 6, 6}, false, head_row, place_head, {0}, {0}},
+    {{20, 3, 6}, false, bridge_row, place_bridge, {0}, {0}},
+    {{9, 3, 9}, true, nozzle_row, place_nozzle, {0}, {0}},
+    {{6, 4, 8}, false, kidney_row, place_kidney, {0}, {0}},
 };
 
 const pal_cell_model *pal_cell_model_find(const char *name)
@@ -307,7 +310,5 @@ const pal_cell_model *pal_cell_model_find(const char *name)
 
 pal_err pal_cell_model_make(const pal_cell_model *model, pal_cells *out, pal_diagnostic *diag)
 {
-    const pal_cell_lattice *lattice = &lattice_list[model - pal_cell_model_list];
-    const double cube_m[3] = {0.1, 0.1, 0.1};
-    return lattice->row ? pal_cell_lattice_make(lattice, out, diag) : pal_cells_block(lattice->n, cube_m, out, diag);
+    return pal_cell_lattice_make(&lattice_list[model - pal_cell_model_list], out, diag);
 }

@@ -1,67 +1,11 @@
-/* Control cells of plain solids: numbered hexahedra that share one table of loops and so one orientation. */
+/* Control cells of plain solids: lattices of bricks, and the torus. */
 #include "server/mesh/cells/cell_shapes.h"
+
+#include "server/base/heap.h"
+#include "server/mesh/cells/cell_lattice.h"
 
 #include <math.h>
 #include <stdlib.h>
-
-#define TWO_PI 6.283185307179586
-
-/* loops of a hexahedron with corner c at bits 0, 1, 2 for the first, second and third direction, which are right-handed
- */
-static const int32_t HEX_LOOP[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
-                                       {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
-
-static pal_err reserve(int64_t n_vertex, int64_t n_cell, pal_cell_loops *l, pal_diagnostic *diag)
-{
-    if (n_cell > PAL_CELL_SHAPE_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "cells: a shape of %lld cells, at most %d are made",
-                                  (long long)n_cell, PAL_CELL_SHAPE_MAX);
-    *l = (pal_cell_loops){.n_vertex = (int32_t)n_vertex, .n_cell = (int32_t)n_cell};
-    l->x = malloc((size_t)n_vertex * 3 * sizeof *l->x);
-    l->cell = malloc(((size_t)n_cell + 1) * sizeof *l->cell);
-    l->loop = malloc(((size_t)n_cell * 6 + 1) * sizeof *l->loop);
-    l->corner = malloc((size_t)n_cell * 24 * sizeof *l->corner);
-    if (!l->x || !l->cell || !l->loop || !l->corner) {
-        pal_cell_loops_free(l);
-        return PAL_ERR_MEMORY;
-    }
-    for (int32_t c = 0; c <= l->n_cell; c++) l->cell[c] = 6 * c;
-    for (int32_t f = 0; f <= 6 * l->n_cell; f++) l->loop[f] = 4 * f;
-    return PAL_ERR_OK;
-}
-
-static void add_hex(pal_cell_loops *l, int32_t cell, const int32_t vertex[8])
-{
-    for (int f = 0; f < 6; f++)
-        for (int k = 0; k < 4; k++) l->corner[24 * (size_t)cell + (size_t)(4 * f + k)] = vertex[HEX_LOOP[f][k]];
-}
-
-static void add_vertex(pal_cell_loops *l, int64_t v, double x, double y, double z)
-{
-    double *to = l->x + 3 * (size_t)v;
-    to[0] = x, to[1] = y, to[2] = z;
-}
-
-/* a cylinder's grid is one of bricks whose first direction may close in itself */
-static void add_grid(pal_cell_loops *l, const int32_t n[3], bool closed)
-{
-    int32_t row = closed ? n[0] : n[0] + 1, cell = 0;
-    for (int32_t k = 0; k < n[2]; k++)
-        for (int32_t j = 0; j < n[1]; j++)
-            for (int32_t i = 0; i < n[0]; i++) {
-                int32_t vertex[8];
-                for (int c = 0; c < 8; c++)
-                    vertex[c] = (i + (c & 1)) % row + row * (j + (c >> 1 & 1) + (n[1] + 1) * (k + (c >> 2)));
-                add_hex(l, cell++, vertex);
-            }
-}
-
-static pal_err finish(pal_cell_loops *l, pal_cells *out, pal_diagnostic *diag)
-{
-    pal_err err = pal_cells_make(l, out, diag);
-    pal_cell_loops_free(l);
-    return err;
-}
 
 static pal_err check_count(const char *name, int32_t n, int32_t min, pal_diagnostic *diag)
 {
@@ -84,11 +28,13 @@ static double step_at(int32_t i, int32_t n, double low, double high)
     return i == n ? high : low + (high - low) * i / n;
 }
 
-/* cells of three counts; the product cannot overflow while it is within the budget */
-static int64_t count_cells(const int32_t n[3])
+/* BUDGET: more cells than are made, `times` for each of three counts */
+static pal_err check_cells(const int32_t n[3], int times, pal_diagnostic *diag)
 {
-    int64_t two = (int64_t)n[0] * n[1];
-    return two > PAL_CELL_SHAPE_MAX ? two : two * n[2];
+    double n_cell = (double)times * n[0] * n[1] * n[2];
+    if (n_cell <= PAL_CELL_SHAPE_MAX) return PAL_ERR_OK;
+    return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "cells: a shape of %.0f cells, at most %d are made", n_cell,
+                              PAL_CELL_SHAPE_MAX);
 }
 
 pal_err pal_cells_block(const int32_t n[3], const double length_scale_m[3], pal_cells *out, pal_diagnostic *diag)
@@ -96,44 +42,29 @@ pal_err pal_cells_block(const int32_t n[3], const double length_scale_m[3], pal_
     static const char *const count[3] = {"number of cells along x", "number of cells along y",
                                          "number of cells along z"};
     static const char *const size[3] = {"size along x", "size along y", "size along z"};
-    pal_cell_loops l;
+    pal_cell_lattice lattice = {.n = {n[0], n[1], n[2]}};
     for (int a = 0; a < 3; a++) {
         PAL_TRY(check_count(count[a], n[a], 1, diag));
         PAL_TRY(check_length(size[a], length_scale_m[a], 0, diag));
+        lattice.low[a] = -length_scale_m[a] / 2, lattice.high[a] = length_scale_m[a] / 2;
     }
-    int64_t v = 0, n_cell = count_cells(n);
-    PAL_TRY(reserve((int64_t)(n[0] + 1) * (n[1] + 1) * (n_cell > PAL_CELL_SHAPE_MAX ? 1 : n[2] + 1), n_cell, &l, diag));
-    for (int32_t k = 0; k <= n[2]; k++)
-        for (int32_t j = 0; j <= n[1]; j++)
-            for (int32_t i = 0; i <= n[0]; i++)
-                add_vertex(&l, v++, step_at(i, n[0], -length_scale_m[0] / 2, length_scale_m[0] / 2),
-                           step_at(j, n[1], -length_scale_m[1] / 2, length_scale_m[1] / 2),
-                           step_at(k, n[2], -length_scale_m[2] / 2, length_scale_m[2] / 2));
-    add_grid(&l, n, false);
-    return finish(&l, out, diag);
+    PAL_TRY(check_cells(n, 1, diag));
+    return pal_cell_lattice_make(&lattice, out, diag);
 }
 
 pal_err pal_cells_tube(const int32_t n[3], double inner_m, double outer_m, double length_m, pal_cells *out,
                        pal_diagnostic *diag)
 {
-    pal_cell_loops l;
     PAL_TRY(check_count("number of cells around", n[0], 3, diag));
     PAL_TRY(check_count("number of cells through the wall", n[1], 1, diag));
     PAL_TRY(check_count("number of cells along the tube", n[2], 1, diag));
     PAL_TRY(check_length("inner radius", inner_m, 0, diag));
     PAL_TRY(check_length("outer radius", outer_m, inner_m, diag));
     PAL_TRY(check_length("length", length_m, 0, diag));
-    int64_t v = 0, n_cell = count_cells(n);
-    PAL_TRY(reserve((int64_t)n[0] * (n[1] + 1) * (n_cell > PAL_CELL_SHAPE_MAX ? 1 : n[2] + 1), n_cell, &l, diag));
-    /* around, outward, along is a left-handed set of directions when around is counter-clockwise */
-    for (int32_t k = 0; k <= n[2]; k++)
-        for (int32_t j = 0; j <= n[1]; j++)
-            for (int32_t i = 0; i < n[0]; i++) {
-                double a = -TWO_PI * i / n[0], r = step_at(j, n[1], inner_m, outer_m);
-                add_vertex(&l, v++, r * cos(a), r * sin(a), step_at(k, n[2], -length_m / 2, length_m / 2));
-            }
-    add_grid(&l, n, true);
-    return finish(&l, out, diag);
+    PAL_TRY(check_cells(n, 1, diag));
+    const pal_cell_lattice lattice = {
+        .n = {n[0], n[1], n[2]}, .round = true, .low = {0, inner_m, -length_m / 2}, .high = {0, outer_m, length_m / 2}};
+    return pal_cell_lattice_make(&lattice, out, diag);
 }
 
 pal_err pal_cells_ring(int32_t n, double radius_m, double thick_m, pal_cells *out, pal_diagnostic *diag)
@@ -164,7 +95,7 @@ static void section_place(int32_t m, int32_t ring, int32_t i, double out[2])
 {
     static const int turn[4][4] = {{1, 0, 0, 1}, {0, -1, 1, 0}, {-1, 0, 0, -1}, {0, 1, -1, 0}};
     const int *t = turn[i / m];
-    double s = 2.0 * (i % m) / m - 1, angle = TWO_PI * (-3.0 / 8 + (double)i / (4 * m)), w = (double)ring / m;
+    double s = 2.0 * (i % m) / m - 1, angle = 2 * M_PI * (-3.0 / 8 + (double)i / (4 * m)), w = (double)ring / m;
     double h = 0.5 * sqrt(0.5), square[2] = {h * (t[0] * s - t[1]), h * (t[2] * s - t[3])};
     out[0] = (1 - w) * square[0] + w * cos(angle);
     out[1] = (1 - w) * square[1] + w * sin(angle);
@@ -199,35 +130,32 @@ static void section_cell(int32_t m, int32_t k, int32_t corner[4])
 
 pal_err pal_cells_torus(int32_t n, int32_t m, double radius_m, double tube_m, pal_cells *out, pal_diagnostic *diag)
 {
-    pal_cell_loops l;
     PAL_TRY(check_count("number of cells around", n, 3, diag));
     PAL_TRY(check_count("number of cells across the middle", m, 1, diag));
     PAL_TRY(check_length("radius of the tube", tube_m, 0, diag));
     PAL_TRY(check_length("radius", radius_m, tube_m, diag));
     const int32_t count[3] = {n, m, m};
-    int64_t n_cell = 5 * count_cells(count), n_place = (int64_t)(m + 1) * (m + 1) + 4LL * m * m;
-    PAL_TRY(reserve(n_cell > PAL_CELL_SHAPE_MAX ? 1 : n_place * n, n_cell, &l, diag));
-    double *place = malloc((size_t)n_place * 2 * sizeof *place);
-    if (!place) {
-        pal_cell_loops_free(&l);
-        return PAL_ERR_MEMORY;
-    }
-    add_section(m, place);
+    PAL_TRY(check_cells(count, 5, diag));
+    int32_t n_place = (m + 1) * (m + 1) + 4 * m * m;
+    pal_cell_loops l = {0};
+    double *place;
+    PAL_ARRAY(&l.err, place, 2 * (size_t)n_place);
+    if (place) add_section(m, place);
     /* the section lies in the plane of the radius and z; going round clockwise is its third direction */
     for (int32_t s = 0; s < n; s++) {
-        double a = -TWO_PI * s / n;
-        int32_t here = (int32_t)n_place * s, there = (int32_t)n_place * ((s + 1) % n);
-        for (int32_t v = 0; v < n_place; v++) {
-            double r = radius_m + tube_m * place[2 * v];
-            add_vertex(&l, here + v, r * cos(a), r * sin(a), tube_m * place[2 * v + 1]);
+        double a = -2 * M_PI * s / n;
+        int32_t here = n_place * s, there = n_place * ((s + 1) % n);
+        for (int32_t v = 0; v < n_place && !l.err; v++) {
+            double r = radius_m + tube_m * place[2 * v], x[3] = {r * cos(a), r * sin(a), tube_m * place[2 * v + 1]};
+            pal_cell_loops_vertex(&l, x, 0);
         }
         for (int32_t k = 0; k < 5 * m * m; k++) {
             int32_t corner[4], vertex[8];
             section_cell(m, k, corner);
             for (int c = 0; c < 8; c++) vertex[c] = corner[c & 3] + (c & 4 ? there : here);
-            add_hex(&l, s * 5 * m * m + k, vertex);
+            pal_cell_loops_hex(&l, vertex);
         }
     }
     free(place);
-    return finish(&l, out, diag);
+    return pal_cell_loops_finish(&l, out, diag);
 }

@@ -3,8 +3,10 @@
  * The corner orders are those of VTK. There the first triangle of a wedge faces outward, but writers disagree, so every
  * cell with negative volume is reversed. Cells that are no tetrahedron, hexahedron, wedge or pyramid are written as
  * polyhedra. */
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/cells/cell_reader.h"
+#include "server/mesh/files/file_bytes.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -27,39 +29,28 @@ static const kind KINDS[4] = {
     {PYRAMID, 5, 5, {{0, 3, 2, 1, -1}, {0, 1, 4, -1}, {1, 2, 4, -1}, {2, 3, 4, -1}, {3, 0, 4, -1}}},
 };
 
-static const kind *find_kind(int64_t type)
-{
-    for (size_t k = 0; k < sizeof KINDS / sizeof *KINDS; k++)
-        if (KINDS[k].type == type) return &KINDS[k];
-    return NULL;
-}
-
 /* ---- reading ---- */
 
 /* the numbers of CELLS, cell after cell, and where each cell's begin */
 typedef struct lists {
     int32_t *item, *start;
     int64_t *line;
-    size_t n_item, n_cell, cap_item, cap_start, cap_line;
+    size_t n_item, n_cell;
 } lists;
 
-/* a number from least to most, on this line or a later one */
+static pal_err refuse_number(const pal_cell_reader *r, const char *what)
+{
+    if (r->scan.at == r->scan.end) return pal_cell_reader_refuse(r, "the file ends where %s should be", what);
+    return pal_cell_reader_refuse(r, "%s must be a number, found %s", what, pal_text_excerpt_at(&r->scan).text);
+}
+
+/* a number from min to max, on this line or a later one */
 static pal_err take_int(pal_cell_reader *r, const char *what, int64_t min, int64_t max, int64_t *out)
 {
-    if (!pal_text_seek(&r->scan)) return pal_cell_reader_refuse(r, "the file ends where %s should be", what);
-    if (!pal_text_int(&r->scan, out))
-        return pal_cell_reader_refuse(r, "%s must be a number, found %s", what, pal_text_excerpt_at(&r->scan).text);
+    if (!pal_text_seek(&r->scan) || !pal_text_int(&r->scan, out)) return refuse_number(r, what);
     if (*out < min || *out > max)
         return pal_cell_reader_refuse(r, "%s is %lld, must be %lld to %lld", what, (long long)*out, (long long)min,
                                       (long long)max);
-    return PAL_ERR_OK;
-}
-
-static pal_err take_double(pal_cell_reader *r, const char *what, double *out)
-{
-    if (!pal_text_seek(&r->scan)) return pal_cell_reader_refuse(r, "the file ends where %s should be", what);
-    if (!pal_text_double(&r->scan, out))
-        return pal_cell_reader_refuse(r, "%s must be a number, found %s", what, pal_text_excerpt_at(&r->scan).text);
     return PAL_ERR_OK;
 }
 
@@ -101,8 +92,9 @@ static pal_err read_points(pal_cell_reader *r)
     if (pal_text_word(&r->scan) == 0) return pal_cell_reader_refuse(r, "POINTS must say float or double");
     for (int64_t i = 0; i < n; i++) {
         double x[3];
-        for (int a = 0; a < 3; a++) PAL_TRY(take_double(r, "a coordinate", &x[a]));
-        PAL_TRY(pal_cell_reader_vertex(r, x));
+        for (int a = 0; a < 3; a++)
+            if (!pal_text_seek(&r->scan) || !pal_text_double(&r->scan, &x[a])) return refuse_number(r, "a coordinate");
+        pal_cell_reader_vertex(r, x);
     }
     return PAL_ERR_OK;
 }
@@ -115,15 +107,15 @@ static pal_err read_lists(pal_cell_reader *r, lists *at)
     PAL_TRY(take_int(r, "the count of numbers", n, max_numbers(r), &n_number));
     for (int64_t i = 0; i < n; i++) {
         PAL_TRY(take_int(r, "the length of a cell", 1, n_number, &left));
-        PAL_TRY(pal_cell_reader_grow(r, (void **)&at->start, at->n_cell + 1, &at->cap_start, sizeof *at->start));
-        PAL_TRY(pal_cell_reader_grow(r, (void **)&at->line, at->n_cell, &at->cap_line, sizeof *at->line));
+        if ((i == 0 && !PAL_GROW(at->start, 0)) || !PAL_GROW(at->start, i + 1) || !PAL_GROW(at->line, i))
+            return PAL_ERR_MEMORY;
         at->line[at->n_cell] = r->scan.line;
         at->start[at->n_cell++] = (int32_t)at->n_item;
         n_number -= left + 1;
         if (n_number < 0) return pal_cell_reader_refuse(r, "cells have more numbers than CELLS says");
         for (; left > 0; left--) {
             PAL_TRY(take_int(r, "a corner", 0, INT32_MAX, &value));
-            PAL_TRY(pal_cell_reader_grow(r, (void **)&at->item, at->n_item, &at->cap_item, sizeof *at->item));
+            if (!PAL_GROW(at->item, at->n_item)) return PAL_ERR_MEMORY;
             at->item[at->n_item++] = (int32_t)value;
         }
     }
@@ -147,8 +139,9 @@ static pal_err add_polyhedron(pal_cell_reader *r, const lists *at, size_t i)
         if (item == end || *item > end - item - 1)
             return refuse_cell(r, at, i, "a polyhedron whose numbers end within face", f);
         int32_t n = *item++;
-        PAL_TRY(pal_cell_reader_loop(r, at->line[i]));
-        for (int32_t k = 0; k < n; k++) PAL_TRY(pal_cell_reader_corner(r, *item++));
+        pal_cell_reader_face(r, at->line[i]);
+        pal_cell_loops_corners(&r->l, item, n);
+        item += n;
     }
     if (item != end) return refuse_cell(r, at, i, "a polyhedron with numbers left after faces", n_face);
     return PAL_ERR_OK;
@@ -158,60 +151,47 @@ static pal_err add_cell(pal_cell_reader *r, const lists *at, size_t i, int64_t t
 {
     const int32_t *item = at->item + at->start[i];
     const int32_t n = at->start[i + 1] - at->start[i];
-    const kind *k = find_kind(type);
-    PAL_TRY(pal_cell_reader_cell(r));
+    const kind *k = NULL;
+    for (size_t m = 0; m < sizeof KINDS / sizeof *KINDS; m++)
+        if (KINDS[m].type == type) k = &KINDS[m];
+    pal_cell_loops_cell(&r->l);
     if (type == POLYHEDRON) return add_polyhedron(r, at, i);
     if (!k) return refuse_cell(r, at, i, "types 10, 12, 13, 14 and 42 are read, not", type);
     if (n != k->n_corner) return refuse_cell(r, at, i, "its type does not go with this number of corners:", n);
     for (int f = 0; f < k->n_face; f++) {
-        PAL_TRY(pal_cell_reader_loop(r, at->line[i]));
-        for (int c = 0; k->face[f][c] >= 0; c++) PAL_TRY(pal_cell_reader_corner(r, item[k->face[f][c]]));
+        pal_cell_reader_face(r, at->line[i]);
+        for (int c = 0; k->face[f][c] >= 0; c++) pal_cell_loops_corners(&r->l, &item[k->face[f][c]], 1);
     }
     return PAL_ERR_OK;
 }
 
-/* reverses the loops of the last cell when its volume is negative; the builder checks the range of corners */
+/* reverses the loops of the last cell when its volume is negative */
 static void reverse_cell(pal_cell_reader *r)
 {
-    size_t first = (size_t)r->l.cell[r->l.n_cell - 1];
+    const pal_cell_loops *l = &r->l;
+    const int32_t *corner = l->corner;
+    int32_t first = l->cell[l->n_cell - 1];
     double sum = 0;
-    for (size_t l = first; l < r->n_loop; l++) {
-        size_t from = (size_t)r->l.loop[l], end = l + 1 < r->n_loop ? (size_t)r->l.loop[l + 1] : r->n_corner;
-        for (size_t k = from; k < end; k++)
-            if (r->l.corner[k] >= r->l.n_vertex) return;
-    }
-    if (first == r->n_loop || (size_t)r->l.loop[first] == r->n_corner) return;
-    const double *o = r->l.x + 3 * (size_t)r->l.corner[r->l.loop[first]];
-    for (size_t l = first; l < r->n_loop; l++) {
-        size_t from = (size_t)r->l.loop[l], end = l + 1 < r->n_loop ? (size_t)r->l.loop[l + 1] : r->n_corner;
-        double centre[3] = {0, 0, 0}, p[3], q[3], n[3];
-        for (size_t k = from; k < end; k++) {
-            pal_sub3(p, r->l.x + 3 * (size_t)r->l.corner[k], o);
+    if (first == l->n_loop || l->loop[first] == l->n_corner) return;
+    const double *o = l->x + 3 * (size_t)corner[l->loop[first]];
+    for (int32_t i = first; i < l->n_loop; i++) {
+        int32_t from = l->loop[i], end = l->loop[i + 1];
+        double centre[3] = {0, 0, 0}, p[3], n[3];
+        for (int32_t k = from; k < end; k++) {
+            pal_sub3(p, l->x + 3 * (size_t)corner[k], o);
             pal_axpy3(centre, 1.0 / (double)(end - from), p);
         }
-        for (size_t k = from; k < end; k++) {
-            pal_sub3(p, r->l.x + 3 * (size_t)r->l.corner[k], o);
-            pal_sub3(q, r->l.x + 3 * (size_t)r->l.corner[k + 1 < end ? k + 1 : from], o);
-            pal_cross3(n, p, q);
+        for (int32_t k = from; k < end; k++) {
+            pal_normal3(n, o, l->x + 3 * (size_t)corner[k], l->x + 3 * (size_t)corner[k + 1 < end ? k + 1 : from]);
             sum += pal_dot3(n, centre);
         }
     }
     if (!(sum < 0)) return;
-    for (size_t l = first; l < r->n_loop; l++) {
-        size_t from = (size_t)r->l.loop[l], end = l + 1 < r->n_loop ? (size_t)r->l.loop[l + 1] : r->n_corner;
-        for (size_t a = from, b = end; a + 1 < b; a++) {
-            int32_t keep = r->l.corner[a];
-            r->l.corner[a] = r->l.corner[--b], r->l.corner[b] = keep;
+    for (int32_t i = first; i < l->n_loop; i++)
+        for (int32_t a = l->loop[i], b = l->loop[i + 1]; a + 1 < b; a++) {
+            int32_t kept = corner[a];
+            l->corner[a] = corner[--b], l->corner[b] = kept;
         }
-    }
-}
-
-/* the builder checks corners too, but only after unused points are gone */
-static pal_err check_corners(const pal_cell_reader *r, const lists *at, size_t i, size_t first)
-{
-    for (size_t k = first; k < r->n_corner; k++)
-        if (r->l.corner[k] >= r->l.n_vertex) return refuse_cell(r, at, i, "there is no point", r->l.corner[k]);
-    return PAL_ERR_OK;
 }
 
 static pal_err read_types(pal_cell_reader *r, const lists *at)
@@ -220,10 +200,13 @@ static pal_err read_types(pal_cell_reader *r, const lists *at)
     PAL_TRY(take_word(r, "CELL_TYPES"));
     PAL_TRY(take_int(r, "the number of cell types", (int64_t)at->n_cell, (int64_t)at->n_cell, &n));
     for (size_t i = 0; i < at->n_cell; i++) {
-        size_t first = r->n_corner;
+        int32_t first = r->l.n_corner;
         PAL_TRY(take_int(r, "a cell type", 0, 255, &type));
         PAL_TRY(add_cell(r, at, i, type));
-        PAL_TRY(check_corners(r, at, i, first));
+        PAL_TRY(r->l.err);
+        /* the builder checks corners too, but only after unused points are gone */
+        for (int32_t k = first; k < r->l.n_corner; k++)
+            if (r->l.corner[k] >= r->l.n_vertex) return refuse_cell(r, at, i, "there is no point", r->l.corner[k]);
         reverse_cell(r);
     }
     return PAL_ERR_OK;
@@ -247,14 +230,9 @@ static pal_err read_sharp(pal_cell_reader *r)
     if (pal_text_more(&r->scan)) PAL_TRY(take_int(r, "the number of components", 1, 1, &n));
     PAL_TRY(take_word(r, "LOOKUP_TABLE"));
     pal_text_next_line(&r->scan);
-    r->l.vertex_sharpness = calloc((size_t)r->l.n_vertex, sizeof *r->l.vertex_sharpness);
-    if (!r->l.vertex_sharpness) return PAL_ERR_MEMORY;
     for (int32_t v = 0; v < r->l.n_vertex; v++) {
-        double sharp;
-        PAL_TRY(take_double(r, "a sharpness", &sharp));
-        if (!(sharp >= 0 && sharp <= (double)PAL_SHARPNESS_MAX))
-            return pal_cell_reader_refuse(r, "sharpness %g, must be 0 to %g", sharp, (double)PAL_SHARPNESS_MAX);
-        r->l.vertex_sharpness[v] = (float)sharp;
+        if (!pal_text_seek(&r->scan)) return pal_cell_reader_refuse(r, "the file ends where a sharpness should be");
+        PAL_TRY(pal_cell_reader_sharp(r, &r->l.vertex_sharpness[v]));
     }
     return PAL_ERR_OK;
 }
@@ -266,9 +244,7 @@ pal_err pal_cell_vtk_read(pal_cell_reader *reader)
     if (!err) err = read_points(reader);
     if (!err) err = read_lists(reader, &at);
     if (!err) err = read_types(reader, &at);
-    free(at.item);
-    free(at.start);
-    free(at.line);
+    PAL_FREE(at.item, at.start, at.line);
     return err ? err : read_sharp(reader);
 }
 
@@ -332,10 +308,7 @@ void pal_cell_vtk_write(const pal_cells *cells, FILE *file)
     bool sharp = false;
     fprintf(file, "# vtk DataFile Version 3.0\ncells\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS %d double\n",
             c->n_vertex);
-    for (size_t i = 0; i < 3 * (size_t)c->n_vertex; i++) {
-        pal_cell_write_number(file, c->x[i]);
-        fputc(i % 3 < 2 ? ' ' : '\n', file);
-    }
+    for (size_t i = 0; i < (size_t)c->n_vertex; i++) pal_file_put_line(file, c->x + 3 * i, 3);
     for (int32_t i = 0; i < c->n_cell; i++) {
         const kind *k = list_corners(c, i, corner);
         n_number += 1 + (k ? k->n_corner : polyhedron_numbers(c, i));
@@ -359,8 +332,5 @@ void pal_cell_vtk_write(const pal_cells *cells, FILE *file)
     for (int32_t v = 0; v < c->n_vertex; v++) sharp |= c->vertex_sharpness[v] > 0;
     if (!sharp) return;
     fprintf(file, "POINT_DATA %d\nSCALARS sharp double 1\nLOOKUP_TABLE default\n", c->n_vertex);
-    for (int32_t v = 0; v < c->n_vertex; v++) {
-        pal_cell_write_number(file, (double)c->vertex_sharpness[v]);
-        fputc('\n', file);
-    }
+    for (int32_t v = 0; v < c->n_vertex; v++) pal_file_put_line(file, (const double[]){c->vertex_sharpness[v]}, 1);
 }

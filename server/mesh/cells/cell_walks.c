@@ -1,4 +1,5 @@
 /* Walks over a polyhedral complex: its pieces, boundary sheets and holes, and its boundary as triangles. */
+#include "server/base/heap.h"
 #include "server/mesh/cells/cells.h"
 
 #include "server/base/vec3.h"
@@ -9,11 +10,13 @@
 
 /* ---- pieces and holes ---- */
 
-static int32_t count_roots(const int32_t *parent, int32_t n)
+int32_t pal_cells_label(const pal_cells *c, int32_t *label)
 {
-    int32_t count = 0;
-    for (int32_t i = 0; i < n; i++) count += parent[i] == i;
-    return count;
+    pal_union_find_init(label, c->n_cell);
+    for (int32_t f = 0; f < c->n_face; f++)
+        if (!pal_cells_face_boundary(c, f))
+            pal_union_find_join(label, c->face_use[c->face[f].use[0]].cell, c->face_use[c->face[f].use[1]].cell);
+    return pal_union_find_label(label, c->n_cell);
 }
 
 /* sheets of the boundary, and V - E + F summed over them; parent [n_face], seen [n_edge_use] are scratch */
@@ -33,7 +36,7 @@ static void walk_sheets(const pal_cells *c, int32_t *parent, bool *seen, pal_cel
             at = pal_cells_across_edge(c, pal_cells_prev(c, at));
         } while (at != u);
     }
-    out->n_sheet = count_roots(parent, c->n_face);
+    for (int32_t f = 0; f < c->n_face; f++) out->n_sheet += parent[f] == f;
     out->sheet_euler = n_vertex - n_half / 2 + c->n_boundary_face;
 }
 
@@ -42,52 +45,40 @@ pal_err pal_cells_find_topology(const pal_cells *cells, pal_cells_topology *out)
     const pal_cells *c = cells;
     pal_cells_topology t = {.euler = (int64_t)c->n_vertex - c->n_edge + c->n_face - c->n_cell};
     size_t n = (size_t)(c->n_face > c->n_cell ? c->n_face : c->n_cell);
-    int32_t *parent = malloc((n + 1) * sizeof *parent);
-    bool *seen = calloc((size_t)c->n_edge_use + 1, sizeof *seen);
-    if (!parent || !seen) {
-        free(parent);
-        free(seen);
-        return PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    int32_t *parent;
+    bool *seen;
+    PAL_ARRAY(&err, parent, n);
+    PAL_ZEROED(&err, seen, c->n_edge_use);
+    if (!err) {
+        t.n_piece = pal_cells_label(c, parent);
+        walk_sheets(c, parent, seen, &t);
+        t.n_cavity = t.n_sheet - t.n_piece;
+        t.genus = (int32_t)(t.n_sheet - t.sheet_euler / 2);
+        *out = t;
     }
-    pal_union_find_init(parent, c->n_cell);
-    for (int32_t f = 0; f < c->n_face; f++)
-        if (!pal_cells_face_boundary(c, f))
-            pal_union_find_join(parent, c->face_use[c->face[f].use[0]].cell, c->face_use[c->face[f].use[1]].cell);
-    t.n_piece = count_roots(parent, c->n_cell);
-    walk_sheets(c, parent, seen, &t);
-    t.n_cavity = t.n_sheet - t.n_piece;
-    t.genus = (int32_t)(t.n_sheet - t.sheet_euler / 2);
-    free(parent);
-    free(seen);
-    *out = t;
-    return PAL_ERR_OK;
+    PAL_FREE(parent, seen);
+    return err;
 }
 
 /* ---- the boundary as triangles ---- */
-
-/* area of the triangle of three corners of a loop along the direction of the face's area */
-static double next_boundary_edge(const pal_cells *c, int32_t first, int i, int j, int k, const double area[3])
-{
-    const double *a = c->x + 3 * (size_t)c->edge_use[first + i].vertex;
-    double p[3], q[3], n[3];
-    pal_sub3(p, c->x + 3 * (size_t)c->edge_use[first + j].vertex, a);
-    pal_sub3(q, c->x + 3 * (size_t)c->edge_use[first + k].vertex, a);
-    pal_cross3(n, p, q);
-    return pal_dot3(n, area);
-}
 
 /* the corner from which a fan of triangles covers the face best */
 static int fan_corner(const pal_cells *c, int32_t face)
 {
     int32_t first, n = pal_cells_face_loop(c, face, &first);
-    double area[3], best = -INFINITY;
+    double area[3], part[3], best = -INFINITY;
     int corner = 0;
     if (n == 3) return 0;
     pal_cells_face_area(c, NULL, face, area);
     for (int i = 0; i < n; i++) {
         double worst = INFINITY;
-        for (int k = 1; k + 1 < n; k++)
-            worst = fmin(worst, next_boundary_edge(c, first, i, (i + k) % n, (i + k + 1) % n, area));
+        for (int k = 1; k + 1 < n; k++) {
+            pal_normal3(part, c->x + 3 * (size_t)c->edge_use[first + i].vertex,
+                        c->x + 3 * (size_t)c->edge_use[first + (i + k) % n].vertex,
+                        c->x + 3 * (size_t)c->edge_use[first + (i + k + 1) % n].vertex);
+            worst = fmin(worst, pal_dot3(part, area));
+        }
         if (n == 4 && worst > 0) {
             /* of the two best cuts of a quad, the shorter diagonal */
             const double *x = c->x;
@@ -124,12 +115,14 @@ pal_err pal_cells_boundary(const pal_cells *cells, pal_surface *out, int32_t **v
         int32_t first;
         if (pal_cells_face_boundary(c, f)) s.n_tri += pal_cells_face_loop(c, f, &first) - 2;
     }
-    s.x = malloc(((size_t)s.n_vertex + 1) * 3 * sizeof *s.x);
-    s.tri = malloc(((size_t)s.n_tri + 1) * 3 * sizeof *s.tri);
-    int32_t *number = malloc(((size_t)c->n_vertex + 1) * sizeof *number);
-    int32_t *old = malloc(((size_t)s.n_vertex + 1) * sizeof *old), *of = malloc(((size_t)s.n_tri + 1) * sizeof *of);
-    bool ok = s.x && s.tri && number && old && of;
-    if (ok) {
+    pal_err err = PAL_ERR_OK;
+    int32_t *number, *old, *of;
+    PAL_ARRAY(&err, s.x, 3 * (size_t)s.n_vertex);
+    PAL_ARRAY(&err, s.tri, 3 * (size_t)s.n_tri);
+    PAL_ARRAY(&err, number, c->n_vertex);
+    PAL_ARRAY(&err, old, s.n_vertex);
+    PAL_ARRAY(&err, of, s.n_tri);
+    if (!err) {
         int32_t n = 0;
         for (int32_t v = 0; v < c->n_vertex; v++) {
             number[v] = c->vertex_boundary[v] ? n : -1;
@@ -144,8 +137,6 @@ pal_err pal_cells_boundary(const pal_cells *cells, pal_surface *out, int32_t **v
     } else {
         pal_surface_free(&s);
     }
-    free(number);
-    free(old);
-    free(of);
-    return ok ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    PAL_FREE(number, old, of);
+    return err;
 }

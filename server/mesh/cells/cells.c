@@ -1,12 +1,10 @@
 /* Polyhedral complexes: memory, conversion to loops, measures (paper A section 3.4.4). */
 #include "server/mesh/cells/cells.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
-
-#include <stdlib.h>
-#include <string.h>
-
-#define MIN_SHAPE 1e-12
+#include "server/mesh/geometry/tuning.h"
+#include "server/num/sort.h"
 
 /* ---- arrays ---- */
 
@@ -64,72 +62,124 @@ pal_err pal_cells_copy(const pal_cells *from, pal_cells *to)
 {
     pal_cells copy = *from;
     array list[N_ARRAY];
-    bool ok = true;
+    pal_err err = PAL_ERR_OK;
     int n = list_arrays(&copy, list);
     for (int k = 0; k < n; k++) {
-        size_t byte = list[k].n * list[k].size;
         const void *old = *list[k].at;
-        *list[k].at = malloc(byte ? byte : 1);
-        if (*list[k].at && old)
-            memcpy(*list[k].at, old, byte);
-        else
-            ok = false;
+        *list[k].at = pal_heap_array(&err, list[k].n, list[k].size, false);
+        if (!err) memcpy(*list[k].at, old, list[k].n * list[k].size);
     }
-    if (ok) {
-        *to = copy;
-        return PAL_ERR_OK;
-    }
-    for (int k = 0; k < n; k++) free(*list[k].at);
-    return PAL_ERR_MEMORY;
+    for (int k = 0; err && k < n; k++) free(*list[k].at);
+    if (!err) *to = copy;
+    return err;
 }
 
 /* ---- loops ---- */
 
 void pal_cell_loops_free(pal_cell_loops *loops)
 {
-    void *all[] = {loops->x,        loops->cell,     loops->loop, loops->corner,      loops->vertex_sharpness,
-                   loops->edge_tag, loops->face_tag, loops->line, loops->vertex_line, loops->tag_line};
-    for (size_t k = 0; k < sizeof all / sizeof *all; k++) free(all[k]);
+    PAL_FREE(loops->x, loops->cell, loops->loop, loops->corner, loops->vertex_sharpness, loops->edge_tag,
+             loops->face_tag, loops->line, loops->vertex_line, loops->tag_line);
     memset(loops, 0, sizeof *loops);
 }
 
-static void put_loops(const pal_cells *c, pal_cell_loops *l)
+/* room for item n of an array of loops */
+static bool room(pal_cell_loops *l, void *pointer, int32_t n, size_t size)
 {
-    memcpy(l->x, c->x, (size_t)c->n_vertex * 3 * sizeof *l->x);
-    memcpy(l->vertex_sharpness, c->vertex_sharpness, (size_t)c->n_vertex * sizeof *l->vertex_sharpness);
-    memcpy(l->cell, c->cell_use, ((size_t)c->n_cell + 1) * sizeof *l->cell);
-    for (int32_t i = 0; i <= c->n_face_use; i++) l->loop[i] = c->face_use[i].first_use;
-    for (int32_t u = 0; u < c->n_edge_use; u++) l->corner[u] = c->edge_use[u].vertex;
-    for (int32_t e = 0; e < c->n_edge; e++)
-        if (c->edge[e].sharp > 0)
-            l->edge_tag[l->n_edge_tag++] = (pal_cell_tag){c->edge[e].vertex[0], c->edge[e].vertex[1], c->edge[e].sharp};
-    for (int32_t f = 0; f < c->n_face; f++)
-        for (int side = 0; side < 2; side++)
-            if (c->face[f].sharp > 0 && c->face[f].use[side] >= 0)
-                l->face_tag[l->n_face_tag++] = (pal_cell_tag){c->face[f].use[side], 0, c->face[f].sharp};
+    if (!l->err && n >= CELL_MAX_ITEM) l->err = PAL_ERR_BUDGET;
+    if (!l->err && !pal_heap_grow(pointer, (size_t)n, size)) l->err = PAL_ERR_MEMORY;
+    return !l->err;
+}
+#define ROOM(l, field, n) room((l), &(l)->field, (n), sizeof *(l)->field)
+
+int32_t pal_cell_loops_vertex(pal_cell_loops *l, const double x[3], float sharp)
+{
+    int32_t v = l->n_vertex;
+    if (!room(l, &l->x, v, 3 * sizeof *l->x) || !ROOM(l, vertex_sharpness, v)) return 0;
+    pal_copy3(l->x + 3 * (size_t)v, x);
+    l->vertex_sharpness[v] = sharp;
+    return l->n_vertex++;
+}
+
+/* starts have one entry more than there are cells and loops: where the last one ends so far */
+void pal_cell_loops_cell(pal_cell_loops *l)
+{
+    if ((l->n_cell == 0 && !ROOM(l, cell, 0)) || !ROOM(l, cell, l->n_cell + 1)) return;
+    l->cell[l->n_cell++] = l->n_loop;
+    l->cell[l->n_cell] = l->n_loop;
+}
+
+void pal_cell_loops_face(pal_cell_loops *l, float sharp)
+{
+    if ((l->n_loop == 0 && !ROOM(l, loop, 0)) || !ROOM(l, loop, l->n_loop + 1)) return;
+    if (sharp > 0 && ROOM(l, face_tag, l->n_face_tag))
+        l->face_tag[l->n_face_tag++] = (pal_cell_tag){l->n_loop, 0, sharp};
+    l->loop[l->n_loop++] = l->n_corner;
+    l->loop[l->n_loop] = l->n_corner;
+    l->cell[l->n_cell] = l->n_loop;
+}
+
+void pal_cell_loops_corners(pal_cell_loops *l, const int32_t *vertex, int n)
+{
+    for (int k = 0; k < n && ROOM(l, corner, l->n_corner); k++) {
+        l->corner[l->n_corner++] = vertex[k];
+        l->loop[l->n_loop] = l->n_corner;
+    }
+}
+
+void pal_cell_loops_edge(pal_cell_loops *l, int32_t a, int32_t b, float sharp)
+{
+    if (sharp > 0 && ROOM(l, edge_tag, l->n_edge_tag)) l->edge_tag[l->n_edge_tag++] = (pal_cell_tag){a, b, sharp};
+}
+
+const int32_t pal_cell_hex_loop[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
+                                         {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+
+void pal_cell_loops_hex(pal_cell_loops *l, const int32_t vertex[8])
+{
+    pal_cell_loops_cell(l);
+    for (int f = 0; f < 6; f++) {
+        pal_cell_loops_face(l, 0);
+        for (int k = 0; k < 4; k++) pal_cell_loops_corners(l, &vertex[pal_cell_hex_loop[f][k]], 1);
+    }
+}
+
+void pal_cell_loops_append(pal_cell_loops *l, const pal_cells *c, const int32_t *map)
+{
+    for (int32_t i = 0; i < c->n_cell; i++) {
+        pal_cell_loops_cell(l);
+        for (int32_t f = c->cell_use[i]; f < c->cell_use[i + 1]; f++) {
+            pal_cell_loops_face(l, c->face[c->face_use[f].face].sharp);
+            for (int32_t u = c->face_use[f].first_use; u < c->face_use[f + 1].first_use; u++)
+                pal_cell_loops_corners(l, map ? &map[c->edge_use[u].vertex] : &c->edge_use[u].vertex, 1);
+        }
+    }
+    for (int32_t e = 0; e < c->n_edge; e++) {
+        const int32_t *end = c->edge[e].vertex;
+        pal_cell_loops_edge(l, map ? map[end[0]] : end[0], map ? map[end[1]] : end[1], c->edge[e].sharp);
+    }
+}
+
+pal_err pal_cell_loops_finish(pal_cell_loops *l, pal_cells *out, pal_diagnostic *diag)
+{
+    pal_err err = l->err ? pal_diagnostic_set(diag, l->err, "cells: no memory for %d cells", l->n_cell)
+                         : pal_cells_make(l, out, diag);
+    pal_cell_loops_free(l);
+    return err;
 }
 
 pal_err pal_cells_loops(const pal_cells *cells, pal_cell_loops *out)
 {
-    const pal_cells *c = cells;
-    pal_cell_loops l = {.n_vertex = c->n_vertex, .n_cell = c->n_cell};
-    size_t n_edge_tag = 0, n_face_tag = 0;
-    for (int32_t e = 0; e < c->n_edge; e++) n_edge_tag += c->edge[e].sharp > 0;
-    for (int32_t f = 0; f < c->n_face; f++) n_face_tag += c->face[f].sharp > 0;
-    l.x = malloc((size_t)c->n_vertex * 3 * sizeof *l.x);
-    l.vertex_sharpness = malloc((size_t)c->n_vertex * sizeof *l.vertex_sharpness);
-    l.cell = malloc(((size_t)c->n_cell + 1) * sizeof *l.cell);
-    l.loop = malloc(((size_t)c->n_face_use + 1) * sizeof *l.loop);
-    l.corner = malloc((size_t)c->n_edge_use * sizeof *l.corner);
-    l.edge_tag = malloc((n_edge_tag + 1) * sizeof *l.edge_tag);
-    l.face_tag = malloc((2 * n_face_tag + 1) * sizeof *l.face_tag);
-    if (!l.x || !l.vertex_sharpness || !l.cell || !l.loop || !l.corner || !l.edge_tag || !l.face_tag) {
+    pal_cell_loops l = {0};
+    for (int32_t v = 0; v < cells->n_vertex; v++)
+        pal_cell_loops_vertex(&l, cells->x + 3 * (size_t)v, cells->vertex_sharpness[v]);
+    pal_cell_loops_append(&l, cells, NULL);
+    pal_err err = l.err;
+    if (err)
         pal_cell_loops_free(&l);
-        return PAL_ERR_MEMORY;
-    }
-    put_loops(c, &l);
-    *out = l;
-    return PAL_ERR_OK;
+    else
+        *out = l;
+    return err;
 }
 
 typedef struct side {
@@ -139,7 +189,7 @@ typedef struct side {
 static int compare_sides(const void *a, const void *b)
 {
     const side *p = a, *q = b;
-    return p->low != q->low ? (p->low > q->low) - (p->low < q->low) : (p->high > q->high) - (p->high < q->high);
+    return p->low != q->low ? PAL_COMPARE(p->low, q->low) : PAL_COMPARE(p->high, q->high);
 }
 
 static side make_side(int32_t v, int32_t w)
@@ -197,12 +247,14 @@ pal_err pal_cell_loops_keep(pal_cell_loops *loops, const bool *keep, int32_t *ke
     pal_cell_loops *l = loops;
     size_t n_loop = (size_t)l->cell[l->n_cell], n_number = (size_t)l->n_vertex + 1;
     if (n_loop + 1 > n_number) n_number = n_loop + 1;
-    int32_t *number = calloc(n_number, sizeof *number);
-    side *sides = malloc(((size_t)l->loop[n_loop] + 1) * sizeof *sides);
-    if (!number || !sides) {
-        free(number);
-        free(sides);
-        return PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    int32_t *number;
+    side *sides;
+    PAL_ZEROED(&err, number, n_number);
+    PAL_ARRAY(&err, sides, l->loop[n_loop]);
+    if (err) {
+        PAL_FREE(number, sides);
+        return err;
     }
     if (keep) keep_cells(l, keep, number);
     keep_edge_tags(l, sides);
@@ -221,14 +273,13 @@ pal_err pal_cell_loops_keep(pal_cell_loops *loops, const bool *keep, int32_t *ke
     for (int32_t t = 0; t < l->n_edge_tag; t++)
         l->edge_tag[t].a = number[l->edge_tag[t].a], l->edge_tag[t].b = number[l->edge_tag[t].b];
     l->n_vertex = n;
-    free(number);
-    free(sides);
+    PAL_FREE(number, sides);
     return PAL_ERR_OK;
 }
 
 /* ---- measures ---- */
 
-static void use_centre(const pal_cells *c, const double *x, int32_t face_use, double out[3])
+void pal_cells_use_centre(const pal_cells *c, const double *x, int32_t face_use, double out[3])
 {
     int32_t first = c->face_use[face_use].first_use, end = c->face_use[face_use + 1].first_use;
     pal_set3(out, 0, 0, 0);
@@ -238,7 +289,7 @@ static void use_centre(const pal_cells *c, const double *x, int32_t face_use, do
 
 void pal_cells_face_centre(const pal_cells *cells, const double *x, int32_t face, double out[3])
 {
-    use_centre(cells, x ? x : cells->x, cells->face[face].use[0], out);
+    pal_cells_use_centre(cells, x ? x : cells->x, cells->face[face].use[0], out);
 }
 
 void pal_cells_cell_centre(const pal_cells *cells, const double *x, int32_t cell, double out[3])
@@ -255,15 +306,13 @@ static double use_area(const pal_cells *c, const double *x, int32_t face_use, do
 {
     int32_t first = c->face_use[face_use].first_use, end = c->face_use[face_use + 1].first_use;
     const double *o = x + 3 * (size_t)c->edge_use[first].vertex;
-    double longest = 0, d[3], p[3], q[3], a[3];
+    double longest = 0, d[3], a[3];
     pal_set3(out, 0, 0, 0);
     for (int32_t u = first; u < end; u++) {
         const double *v = x + 3 * (size_t)c->edge_use[u].vertex;
         const double *w = x + 3 * (size_t)c->edge_use[u + 1 < end ? u + 1 : first].vertex;
-        pal_sub3(p, v, o);
-        pal_sub3(q, w, o);
         pal_sub3(d, w, v);
-        pal_cross3(a, p, q);
+        pal_normal3(a, o, v, w);
         pal_axpy3(out, 0.5, a);
         longest = fmax(longest, pal_dot3(d, d));
     }
@@ -279,13 +328,12 @@ void pal_cells_face_area(const pal_cells *cells, const double *x, int32_t face, 
 static double cone(const pal_cells *c, const double *x, int32_t face_use, const double o[3])
 {
     int32_t first = c->face_use[face_use].first_use, end = c->face_use[face_use + 1].first_use;
-    double centre[3], p[3], q[3], n[3], sum = 0;
-    use_centre(c, x, face_use, centre);
+    double centre[3], n[3], sum = 0;
+    pal_cells_use_centre(c, x, face_use, centre);
     pal_sub3(centre, centre, o);
     for (int32_t u = first; u < end; u++) {
-        pal_sub3(p, x + 3 * (size_t)c->edge_use[u].vertex, o);
-        pal_sub3(q, x + 3 * (size_t)c->edge_use[u + 1 < end ? u + 1 : first].vertex, o);
-        pal_cross3(n, p, q);
+        pal_normal3(n, o, x + 3 * (size_t)c->edge_use[u].vertex,
+                    x + 3 * (size_t)c->edge_use[u + 1 < end ? u + 1 : first].vertex);
         sum += pal_dot3(n, centre);
     }
     return sum;
@@ -307,17 +355,6 @@ double pal_cells_volume(const pal_cells *cells, const double *x)
     return sum;
 }
 
-static double cell_diagonal(const pal_cells *c, const double *x, int32_t cell)
-{
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (int32_t k = c->cell_vertex.start[cell]; k < c->cell_vertex.start[cell + 1]; k++)
-        for (int a = 0; a < 3; a++) {
-            double v = x[3 * (size_t)c->cell_vertex.item[k] + (size_t)a];
-            low[a] = fmin(low[a], v), high[a] = fmax(high[a], v);
-        }
-    return pal_dist3(low, high);
-}
-
 bool pal_cells_shape_valid(const pal_cells *cells, const double *x, pal_cells_fault *fault)
 {
     const pal_cells *c = cells;
@@ -330,7 +367,11 @@ bool pal_cells_shape_valid(const pal_cells *cells, const double *x, pal_cells_fa
         f = (pal_cells_fault){c->face_use[use].cell, use, pal_norm3(area), sqrt(longest)};
     }
     for (int32_t i = 0; i < c->n_cell && f.cell < 0; i++) {
-        double volume = pal_cells_cell_volume(c, p, i), d = cell_diagonal(c, p, i);
+        double volume = pal_cells_cell_volume(c, p, i), low[3], high[3];
+        pal_box3_empty(low, high);
+        for (int32_t k = c->cell_vertex.start[i]; k < c->cell_vertex.start[i + 1]; k++)
+            pal_box3_add(low, high, p + 3 * (size_t)c->cell_vertex.item[k]);
+        double d = pal_dist3(low, high);
         if (volume > MIN_SHAPE * d * d * d) continue;
         f = (pal_cells_fault){i, -1, volume, d};
     }

@@ -3,20 +3,17 @@
  * A cell is a ball bounded by faces; a face is a loop of three or more vertices that one cell (boundary) or two cells
  * have; an edge joins two vertices. Each appearance is a use of its own:
  *
- *   face use  a face as one cell sees it, counter-clockwise from outside that cell. Those of cell c stand one after the
- *             other in c->cell_use[c] .. c->cell_use[c+1]-1, in the order in which the cell was given.
- *   edge use  an edge as one face use runs along it. Those of face use u stand in loop order in
- *             c->face_use[u].first_use .. c->face_use[u+1].first_use-1.
+ *   face use  a face as one cell sees it, counter-clockwise from outside that cell, in the order of the cell's loops
+ *   edge use  an edge as one face use runs along it, in loop order
  *
  * From an edge use, next and prev walk round its face, mate is the same edge on the other side of the same face (-1 at
  * the boundary), radial the same edge in the neighbouring face inside the same cell. Mate and radial undo themselves
  * and run along the edge the other way. radial, mate, radial, mate ... visits the cells round an edge; radial of prev
  * (pal_cells_next_around) visits the faces of one cell round a vertex.
  *
- * Numbers: vertices and cells as given, faces and edges in the order of their first use, so that the same input gives
- * the same complex to the bit. An edit is: pal_cells_loops, change the loops, pal_cells_make, in linear time.
- * A pal_cells owns its arrays (heap). x and the sharpnesses may be written; the rest is constant once made.
- * Thread: [load] to make, [any] to read. */
+ * Numbers: vertices and cells as given, faces and edges in the order of their first use. A pal_cells owns its arrays
+ * (heap). x and the sharpnesses may be written; the rest is constant once made. Thread: [load] to make, [any] to read.
+ */
 #ifndef PAL_MESH_CELLS_CELLS_H
 #define PAL_MESH_CELLS_CELLS_H
 #include "server/mesh/geometry/surface.h"
@@ -48,6 +45,9 @@ typedef struct pal_cell_loops {
     int64_t *vertex_line; /* [n_vertex]              */
     int64_t *tag_line;    /* of edge_tag             */
     int32_t count_from;   /* what messages call vertex, cell and face 0: 1 in files that count from 1         */
+    /* of loops that are added one by one (below): loops and corners so far, the first error */
+    int32_t n_loop, n_corner;
+    pal_err err;
 } pal_cell_loops;
 
 typedef struct pal_cell_edge {
@@ -114,12 +114,27 @@ pal_err pal_cells_copy(const pal_cells *from, pal_cells *to);
  * each of its loops, so that a loop may be removed), lines NULL; MEMORY */
 pal_err pal_cells_loops(const pal_cells *cells, pal_cell_loops *out);
 void pal_cell_loops_free(pal_cell_loops *loops);
+/* Loops one by one, from a zeroed struct: a vertex, whose number is returned; the next cell; its next face with its
+ * sharpness; the face's next corners; the sharpness of an edge, unless it is 0. The arrays grow. The first error is
+ * kept in err (MEMORY, BUDGET: too many), after which nothing is added. */
+int32_t pal_cell_loops_vertex(pal_cell_loops *loops, const double x[3], float sharp);
+void pal_cell_loops_cell(pal_cell_loops *loops);
+void pal_cell_loops_face(pal_cell_loops *loops, float sharp);
+void pal_cell_loops_corners(pal_cell_loops *loops, const int32_t *vertex, int n);
+void pal_cell_loops_edge(pal_cell_loops *loops, int32_t a, int32_t b, float sharp);
+/* the faces of a hexahedron with corner c at bits 0, 1, 2 of three right-handed directions, as the next cell; loop 2 a
+ * + s is its side s of direction a */
+extern const int32_t pal_cell_hex_loop[6][4];
+void pal_cell_loops_hex(pal_cell_loops *loops, const int32_t vertex[8]);
+/* all cells and edges of a complex, vertices renumbered by map [n_vertex] (NULL: unchanged) */
+void pal_cell_loops_append(pal_cell_loops *loops, const pal_cells *cells, const int32_t *map);
+/* builds the complex from them unless there was an error, and frees them in any case */
+pal_err pal_cell_loops_finish(pal_cell_loops *loops, pal_cells *out, pal_diagnostic *diag);
 /* Removes the cells with keep [n_cell] false (NULL: none), then unused vertices and tags; in place. kept [n_vertex
  * before] (may be NULL) receives the old number of each vertex that stays. MEMORY */
 pal_err pal_cell_loops_keep(pal_cell_loops *loops, const bool *keep, int32_t *kept);
 
-/* the first face without area (its vector area is below 1e-12 of its longest edge squared) or cell without positive
- * volume (below 1e-12 of its box's diagonal cubed) */
+/* the first face without area or cell without positive volume, relative to its size */
 typedef struct pal_cells_fault {
     int32_t cell, face_use;         /* face_use: the face without area; -1: the cell is at fault */
     double measure, length_scale_m; /* area, m^2, and longest edge, or volume, m^3, and diagonal */
@@ -131,10 +146,14 @@ bool pal_cells_shape_valid(const pal_cells *cells, const double *x, pal_cells_fa
  * its corners' mean, so that cells fill the solid exactly. */
 void pal_cells_face_centre(const pal_cells *cells, const double *x, int32_t face, double out[3]); /* corners' mean */
 void pal_cells_cell_centre(const pal_cells *cells, const double *x, int32_t cell, double out[3]); /* vertices' mean */
+void pal_cells_use_centre(const pal_cells *cells, const double *x, int32_t face_use, double out[3]); /* x not NULL */
 /* vector area, m^2, out of the face's first cell */
 void pal_cells_face_area(const pal_cells *cells, const double *x, int32_t face, double out[3]);
 double pal_cells_cell_volume(const pal_cells *cells, const double *x, int32_t cell); /* m^3 */
 double pal_cells_volume(const pal_cells *cells, const double *x);
+
+/* piece of each cell, label [n_cell]; number of pieces */
+int32_t pal_cells_label(const pal_cells *cells, int32_t *label);
 
 /* Pieces and holes. Sheets that touch in a pinched vertex or edge count as separate. */
 typedef struct pal_cells_topology {
@@ -170,10 +189,6 @@ static inline int32_t pal_cells_end_vertex(const pal_cells *c, int32_t use)
     const pal_cell_edge *e = &c->edge[c->edge_use[use].edge];
     return e->vertex[e->vertex[0] == c->edge_use[use].vertex];
 }
-static inline int32_t pal_cells_cell_of(const pal_cells *c, int32_t use)
-{
-    return c->face_use[c->edge_use[use].face_use].cell;
-}
 static inline int32_t pal_cells_face_of(const pal_cells *c, int32_t use)
 {
     return c->face_use[c->edge_use[use].face_use].face;
@@ -187,6 +202,12 @@ static inline int32_t pal_cells_next_around(const pal_cells *c, int32_t use)
 static inline bool pal_cells_face_boundary(const pal_cells *c, int32_t face)
 {
     return c->face[face].use[1] < 0;
+}
+/* edge uses of a cell: first .. after - 1 */
+static inline int32_t pal_cells_cell_loops(const pal_cells *c, int32_t cell, int32_t *after)
+{
+    *after = c->face_use[c->cell_use[cell + 1]].first_use;
+    return c->face_use[c->cell_use[cell]].first_use;
 }
 /* corners of a face, and their edge uses from the first cell's side: first .. first + n - 1 */
 static inline int32_t pal_cells_face_loop(const pal_cells *c, int32_t face, int32_t *first)

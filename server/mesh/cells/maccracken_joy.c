@@ -1,15 +1,5 @@
-/* MacCracken-Joy subdivision (paper A section 3.1), after MacCracken, Joy, "Free-form deformations with lattices of
- * arbitrary topology" (SIGGRAPH 1996). All weights are on the old vertices; C = mean of a cell's vertices, F = mean of
- * a face's corners, M = midpoint of an edge, P = the vertex, (..) = mean over all those at the place:
- *
- *            inside                                  boundary (Catmull, Clark 1978)         sharp
- *   cell     C
- *   face     (C0 + 2 F + C1)/4                       F                                      F
- *   edge     ((C) + 2 (F) + (n-3) M)/n, n faces      (P1 + P2 + F1 + F2)/4                  M
- *   vertex   ((C) + 3 (F) + 3 (M) + P)/8             ((F) + 2 (M) + (n-3) P)/n, n faces     crease (P1 + 6 P + P2)/8,
- *                                                                                           corner P
- *
- * PAL_SUBDIVISION_AVERAGING (Bajaj, Schaefer, Warren, Xu 2002) replaces the first two columns: mean of the centroids of
+/* MacCracken-Joy subdivision (paper A section 3.1; the table of rules is in server/mesh/README.md). All weights are on
+ * the old vertices. PAL_SUBDIVISION_AVERAGING replaces the rules inside and on the boundary: mean of the centroids of
  * the new cells, or of the new quads of the boundary, at the place, when the cells are cut without moving anything.
  *
  * The paper gives no rules ("in the interest of brevity") and only names "local changes to the subdivision rules".
@@ -18,6 +8,7 @@
  * sharpness, so that nothing jumps when an edge begins to be sharpened. Equal sharpnesses give the same. */
 #include "server/mesh/cells/maccracken_joy.h"
 
+#include "server/base/heap.h"
 #include "server/mesh/geometry/tuning.h"
 
 #include <math.h>
@@ -288,140 +279,53 @@ static float after(float s)
     return s >= PAL_SHARPNESS_MAX ? PAL_SHARPNESS_MAX : s > 1 ? s - 1 : 0;
 }
 
-/* loops, origins of the cells and of the loops (a control face, or -1); the tags come after */
-static void fill_loops(const pal_cells *c, pal_cell_loops *to, const int32_t *cell_from, const int32_t *face_from,
-                       int32_t *cell_origin, int32_t *loop_origin)
+static void add_part_quad(pal_cell_loops *to, float sharp, int32_t a, int32_t b, int32_t c, int32_t d)
 {
+    pal_cell_loops_face(to, sharp);
+    pal_cell_loops_corners(to, (const int32_t[]){a, b, c, d}, 4);
+}
+
+/* The level's loops but for positions, with both halves of sharp edges and all parts of sharp faces, and the origins of
+ * the cells and of the loops (a control face, or -1) */
+static void add_loops(const pal_subdivision *from, pal_cell_loops *to, int32_t *cell_origin, int32_t *loop_origin)
+{
+    const pal_cells *c = &from->cells;
     const level l = level_of(c);
-    int32_t n_loop = 0, n_corner = 0;
     for (int32_t cell = 0, k = 0; cell < c->n_cell; cell++)
         for (; k < c->cell_vertex.start[cell + 1]; k++) {
-            int32_t first = c->corner_use[k], use = first, v = c->cell_vertex.item[k], *loop;
-            to->cell[k] = n_loop;
-            cell_origin[k] = cell_from[cell];
+            int32_t first = c->corner_use[k], use = first, v = c->cell_vertex.item[k];
+            pal_cell_loops_cell(to);
+            cell_origin[k] = from->cell_origin[cell];
             /* the outer quads lie in the old faces, from the vertex along each edge */
             do {
                 int32_t before = pal_cells_prev(c, use), f = pal_cells_face_of(c, use);
-                loop = to->corner + n_corner;
-                loop[0] = v, loop[1] = l.first_edge + c->edge_use[use].edge;
-                loop[2] = l.first_face + f, loop[3] = l.first_edge + c->edge_use[before].edge;
-                loop_origin[n_loop] = face_from[f];
-                to->loop[n_loop++] = n_corner, n_corner += 4;
+                loop_origin[to->n_loop] = from->face_origin[f];
+                add_part_quad(to, after(c->face[f].sharp), v, l.first_edge + c->edge_use[use].edge, l.first_face + f,
+                              l.first_edge + c->edge_use[before].edge);
                 use = pal_cells_next_around(c, use);
             } while (use != first);
             /* the inner quads cross the edges: from the face on their left to the one on their right */
             do {
                 int32_t right = pal_cells_face_of(c, c->edge_use[use].radial), f = pal_cells_face_of(c, use);
-                loop = to->corner + n_corner;
-                loop[0] = l.first_edge + c->edge_use[use].edge, loop[1] = l.first_face + right;
-                loop[2] = l.first_cell + cell, loop[3] = l.first_face + f;
-                loop_origin[n_loop] = -1;
-                to->loop[n_loop++] = n_corner, n_corner += 4;
+                loop_origin[to->n_loop] = -1;
+                add_part_quad(to, 0, l.first_edge + c->edge_use[use].edge, l.first_face + right, l.first_cell + cell,
+                              l.first_face + f);
                 use = pal_cells_next_around(c, use);
             } while (use != first);
         }
-    to->cell[to->n_cell] = n_loop;
-    to->loop[n_loop] = n_corner;
-}
-
-/* both halves of sharp edges, all parts of sharp faces; returns how many of each, to may have no room yet */
-static void fill_tags(const pal_cells *c, pal_cell_loops *to)
-{
-    const level l = level_of(c);
-    to->n_edge_tag = to->n_face_tag = 0;
     for (int32_t e = 0; e < c->n_edge; e++)
-        for (int end = 0; end < 2 && after(c->edge[e].sharp) > 0; end++, to->n_edge_tag++)
-            if (to->edge_tag)
-                to->edge_tag[to->n_edge_tag] =
-                    (pal_cell_tag){c->edge[e].vertex[end], l.first_edge + e, after(c->edge[e].sharp)};
-    /* the outer quad of a corner: loops of new cells stand 2 k a corner, in the order of turn */
-    for (int32_t k = 0; k < c->cell_vertex.start[c->n_cell]; k++) {
-        int32_t use = c->corner_use[k], n = 0;
-        do {
-            int32_t f = pal_cells_face_of(c, use);
-            bool own = c->face[f].use[0] == c->edge_use[use].face_use;
-            if (own && after(c->face[f].sharp) > 0) {
-                if (to->face_tag)
-                    to->face_tag[to->n_face_tag] = (pal_cell_tag){to->cell[k] + n, 0, after(c->face[f].sharp)};
-                to->n_face_tag++;
-            }
-            n++, use = pal_cells_next_around(c, use);
-        } while (use != c->corner_use[k]);
-    }
-    if (to->vertex_sharpness)
-        for (int32_t v = 0; v < c->n_vertex; v++) to->vertex_sharpness[v] = after(c->vertex_sharpness[v]);
-}
-
-/* arrays of the level's loops, filled but for positions; loop_origin [4 n_face_use .. all loops], cell_origin */
-static pal_err make_loops(const pal_cells *c, const pal_subdivision *from, pal_cell_loops *to, int32_t **cell_origin,
-                          int32_t **loop_origin)
-{
-    size_t n_corner = 8 * (size_t)c->n_edge_use, n_loop = 2 * (size_t)c->n_edge_use;
-    memset(to, 0, sizeof *to);
-    to->n_vertex = level_of(c).n_vertex, to->n_cell = c->cell_vertex.start[c->n_cell];
-    to->x = malloc(3 * (size_t)to->n_vertex * sizeof *to->x);
-    to->cell = malloc(((size_t)to->n_cell + 1) * sizeof *to->cell);
-    to->loop = malloc((n_loop + 1) * sizeof *to->loop);
-    to->corner = malloc(n_corner * sizeof *to->corner);
-    to->vertex_sharpness = calloc((size_t)to->n_vertex, sizeof *to->vertex_sharpness);
-    *cell_origin = malloc((size_t)to->n_cell * sizeof **cell_origin);
-    *loop_origin = malloc(n_loop * sizeof **loop_origin);
-    if (!to->x || !to->cell || !to->loop || !to->corner || !to->vertex_sharpness || !*cell_origin || !*loop_origin)
-        return PAL_ERR_MEMORY;
-    fill_loops(c, to, from->cell_origin, from->face_origin, *cell_origin, *loop_origin);
-    fill_tags(c, to);
-    to->edge_tag = malloc((size_t)to->n_edge_tag * sizeof *to->edge_tag + 1);
-    to->face_tag = malloc((size_t)to->n_face_tag * sizeof *to->face_tag + 1);
-    if (!to->edge_tag || !to->face_tag) return PAL_ERR_MEMORY;
-    fill_tags(c, to);
-    return PAL_ERR_OK;
+        for (int end = 0; end < 2; end++)
+            pal_cell_loops_edge(to, c->edge[e].vertex[end], l.first_edge + e, after(c->edge[e].sharp));
+    for (int32_t v = 0; v < c->n_vertex; v++) to->vertex_sharpness[v] = after(c->vertex_sharpness[v]);
 }
 
 /* ---- level after level ---- */
 
-/* sizes of a complex; corner: of all faces, each once */
-typedef struct sizes {
-    double vertex, edge, face, cell, face_use, edge_use, corner, cell_vertex;
-} sizes;
-
-static sizes sizes_of(const pal_cells *c)
+/* memory of a complex of so many edge uses, about: that of bricks inside a solid, and half as much more for loops,
+ * origins and tables while it is made */
+static double bytes_of(double n_edge_use, bool made)
 {
-    return (sizes){c->n_vertex,
-                   c->n_edge,
-                   c->n_face,
-                   c->n_cell,
-                   c->n_face_use,
-                   c->n_edge_use,
-                   c->vertex_face.start[c->n_vertex],
-                   c->cell_vertex.start[c->n_cell]};
-}
-
-static sizes sizes_after(const sizes *s)
-{
-    sizes n = {.vertex = s->vertex + s->edge + s->face + s->cell, .cell = s->cell_vertex};
-    n.edge = 2 * s->edge + s->corner + s->face_use;
-    n.face = s->corner + s->edge_use / 2;
-    n.face_use = 2 * s->edge_use, n.edge_use = 8 * s->edge_use;
-    n.corner = 4 * n.face;
-    /* a part with 2 k quads has 2 k + 2 vertices, and the k sum to the edge uses */
-    n.cell_vertex = 2 * s->edge_use + 2 * n.cell;
-    return n;
-}
-
-/* memory of a complex of these sizes */
-static double bytes_of(const sizes *s)
-{
-    double edge_use = sizeof(pal_edge_use) + sizeof(int32_t);
-    double incidence = 2 * s->edge + 2 * s->corner + 2 * s->cell_vertex + s->edge_use / 2 + 2 * s->vertex;
-    return s->vertex * (6 * sizeof(double) + 16) + s->edge * (sizeof(pal_cell_edge) + 8) +
-           s->face * (sizeof(pal_cell_face) + 4) + s->face_use * (sizeof(pal_face_use) + 8) + s->edge_use * edge_use +
-           s->cell * 16 + incidence * sizeof(int32_t);
-}
-
-/* and while it is made: loops, origins, tables */
-static double making_bytes_of(const sizes *s)
-{
-    return bytes_of(s) + 40 * s->edge_use + 8 * s->face_use + 24 * s->vertex;
+    return n_edge_use * (made ? 52 : 96);
 }
 
 static double rows_bytes(double entries)
@@ -431,36 +335,47 @@ static double rows_bytes(double entries)
 
 static pal_err refuse(double byte, double budget, int at, const pal_subdivision_options *o, pal_diagnostic *diag)
 {
-    return pal_diagnostic_set(
-        diag, PAL_ERR_BUDGET,
-        "subdivision: level %d of %d needs %.4g MiB, the budget is %.4g MiB: ask for fewer levels", at, o->n_level,
-        byte / 1048576, budget / 1048576);
+    static const char format[] = "subdivision: level %d of %d needs %.4g MiB, the budget is %.4g MiB: ask for fewer "
+                                 "levels";
+    return pal_diagnostic_set(diag, PAL_ERR_BUDGET, format, at, o->n_level, byte / 1048576, budget / 1048576);
 }
 
-/* control face of each face of the new complex, whose loops' are known */
-static pal_err name_faces(const pal_cells *c, const int32_t *loop_origin, int32_t **out)
+/* the next level from its vertices' rows */
+static pal_err make_level(const pal_subdivision *s, const pal_interpolation *step, pal_subdivision *next,
+                          pal_diagnostic *diag)
 {
-    int32_t *origin = malloc((size_t)c->n_face * sizeof *origin);
-    if (!origin) return PAL_ERR_MEMORY;
-    for (int32_t u = 0; u < c->n_face_use; u++) origin[c->face_use[u].face] = loop_origin[u];
-    *out = origin;
-    return PAL_ERR_OK;
+    const pal_cells *c = &s->cells;
+    pal_cell_loops loops = {.n_vertex = step->n_row};
+    pal_diagnostic reason = {""};
+    int32_t *loop_origin;
+    PAL_ARRAY(&loops.err, loops.x, 3 * (size_t)loops.n_vertex);
+    PAL_ZEROED(&loops.err, loops.vertex_sharpness, loops.n_vertex);
+    PAL_ARRAY(&loops.err, next->cell_origin, c->cell_vertex.start[c->n_cell]);
+    PAL_ARRAY(&loops.err, loop_origin, 2 * (size_t)c->n_edge_use);
+    if (!loops.err) {
+        add_loops(s, &loops, next->cell_origin, loop_origin);
+        pal_interpolation_apply(step, c->x, loops.x);
+    }
+    pal_err err = pal_cell_loops_finish(&loops, &next->cells, &reason);
+    if (err) pal_diagnostic_set(diag, err, "subdivision: level %d: %s", next->n_level, reason.text);
+    PAL_ARRAY(&err, next->face_origin, next->cells.n_face);
+    for (int32_t u = 0; !err && u < next->cells.n_face_use; u++)
+        next->face_origin[next->cells.face_use[u].face] = loop_origin[u];
+    free(loop_origin);
+    return err;
 }
 
 /* replaces s by its next level; s is unchanged on failure */
 static pal_err refine(pal_subdivision *s, const pal_subdivision_options *o, double budget, pal_diagnostic *diag)
 {
     pal_subdivision next = {.n_level = s->n_level + 1};
-    pal_cell_loops loops = {0};
     pal_interpolation step = {0};
-    int32_t *loop_origin = NULL;
-    pal_diagnostic reason = {""};
-    sizes now = sizes_of(&s->cells), then = sizes_after(&now);
     /* a lower bound: the rows of a level have at least one entry each; the rest is counted as they are made */
-    double byte = bytes_of(&now) + making_bytes_of(&then), rows = rows_bytes(s->rows.start[s->rows.n_row]);
-    if (byte + rows + 2 * rows_bytes(then.vertex) > budget || then.edge_use > INT32_MAX || then.edge > INT32_MAX / 4)
-        return refuse(byte + rows + 2 * rows_bytes(then.vertex), budget, next.n_level, o, diag);
-    double room = (budget - byte - rows) / rows_bytes(1);
+    double n_use = 8.0 * s->cells.n_edge_use, rows = rows_bytes(s->rows.start[s->rows.n_row]);
+    double byte = bytes_of(s->cells.n_edge_use, true) + bytes_of(n_use, false) + rows;
+    double min_bytes = byte + 2 * rows_bytes(level_of(&s->cells).n_vertex);
+    if (min_bytes > budget || n_use > CELL_MAX_ITEM) return refuse(min_bytes, budget, next.n_level, o, diag);
+    double room = (budget - byte) / rows_bytes(1);
     pal_err err = make_rows(&s->cells, o->rule == PAL_SUBDIVISION_AVERAGING, (int64_t)room, &step);
     if (!err) {
         room -= step.start[step.n_row];
@@ -469,39 +384,29 @@ static pal_err refine(pal_subdivision *s, const pal_subdivision_options *o, doub
     if (err == PAL_ERR_BUDGET)
         pal_diagnostic_set(diag, err, "subdivision: level %d of %d needs more than %.4g MiB", next.n_level, o->n_level,
                            budget / 1048576);
-    if (!err) err = make_loops(&s->cells, s, &loops, &next.cell_origin, &loop_origin);
-    if (!err) {
-        pal_interpolation_apply(&step, s->cells.x, loops.x);
-        err = pal_cells_make(&loops, &next.cells, &reason);
-        if (err && reason.text[0])
-            pal_diagnostic_set(diag, err, "subdivision: level %d: %s", next.n_level, reason.text);
-    }
-    if (!err) err = name_faces(&next.cells, loop_origin, &next.face_origin);
+    if (!err) err = make_level(s, &step, &next, diag);
     pal_interpolation_free(&step);
-    pal_cell_loops_free(&loops);
-    free(loop_origin);
     if (err) {
         pal_subdivision_free(&next);
         return err;
     }
     pal_subdivision_free(s);
     *s = next;
-    s->n_byte = (size_t)bytes_of(&then) + pal_interpolation_bytes(&s->rows);
+    s->n_byte = (size_t)bytes_of(n_use, true) + pal_interpolation_bytes(&s->rows);
     return PAL_ERR_OK;
 }
 
 /* level 0: the control cells, each its own origin */
 static pal_err begin(const pal_cells *control, pal_subdivision *s)
 {
-    PAL_TRY(pal_cells_copy(control, &s->cells));
-    PAL_TRY(pal_interpolation_identity(control->n_vertex, &s->rows));
-    s->cell_origin = malloc((size_t)control->n_cell * sizeof *s->cell_origin);
-    s->face_origin = malloc((size_t)control->n_face * sizeof *s->face_origin);
-    if (!s->cell_origin || !s->face_origin) return PAL_ERR_MEMORY;
+    pal_err err = pal_cells_copy(control, &s->cells);
+    if (!err) err = pal_interpolation_identity(control->n_vertex, &s->rows);
+    PAL_ARRAY(&err, s->cell_origin, control->n_cell);
+    PAL_ARRAY(&err, s->face_origin, control->n_face);
+    if (err) return err;
     for (int32_t c = 0; c < control->n_cell; c++) s->cell_origin[c] = c;
     for (int32_t f = 0; f < control->n_face; f++) s->face_origin[f] = f;
-    sizes size = sizes_of(control);
-    s->n_byte = (size_t)bytes_of(&size) + pal_interpolation_bytes(&s->rows);
+    s->n_byte = (size_t)bytes_of(control->n_edge_use, true) + pal_interpolation_bytes(&s->rows);
     return PAL_ERR_OK;
 }
 
@@ -514,8 +419,8 @@ pal_err pal_subdivision_make(const pal_cells *control, const pal_subdivision_opt
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "subdivision: %d levels asked for, 0 to %d are made",
                                   options->n_level, PAL_SUBDIVISION_MAX);
     if (control->n_cell < 1) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "subdivision: there is no cell");
-    sizes size = sizes_of(control);
-    if (bytes_of(&size) > budget) return refuse(bytes_of(&size), budget, 0, options, diag);
+    double byte = bytes_of(control->n_edge_use, true);
+    if (byte > budget) return refuse(byte, budget, 0, options, diag);
     pal_err err = begin(control, &s);
     while (!err && s.n_level < options->n_level) err = refine(&s, options, budget, diag);
     if (!err) pal_interpolation_apply(&s.rows, control->x, s.cells.x);
@@ -530,7 +435,6 @@ void pal_subdivision_free(pal_subdivision *s)
 {
     pal_cells_free(&s->cells);
     pal_interpolation_free(&s->rows);
-    free(s->cell_origin);
-    free(s->face_origin);
+    PAL_FREE(s->cell_origin, s->face_origin);
     memset(s, 0, sizeof *s);
 }

@@ -3,9 +3,9 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -83,6 +83,29 @@ pal_err pal_file_write(const char *path, const void *bytes, size_t n_byte, pal_d
     PAL_TRY(pal_file_begin(&out, path, diag));
     if (n_byte) fwrite(bytes, 1, n_byte, out.file);
     return pal_file_end(&out, PAL_ERR_OK, diag);
+}
+
+void pal_file_put_number(FILE *file, double value)
+{
+    char text[40];
+    snprintf(text, sizeof text, "%.17g", value);
+    for (char *c = text; *c; c++)
+        if (*c == ',') *c = '.';
+    fputs(text, file);
+}
+
+void pal_file_put_line(FILE *file, const double *value, int n)
+{
+    for (int k = 0; k < n; k++) {
+        pal_file_put_number(file, value[k]);
+        fputc(k + 1 < n ? ' ' : '\n', file);
+    }
+}
+
+bool pal_file_ends_with(const char *name, const char *tail)
+{
+    size_t n = strlen(name), m = strlen(tail);
+    return n >= m && strcasecmp(name + n - m, tail) == 0;
 }
 
 void pal_file_printable_name(char out[128], const char *name)

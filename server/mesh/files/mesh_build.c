@@ -1,11 +1,8 @@
 /* Growing arrays, polygon fans and located refusals of the surface readers. */
 #include "server/mesh/files/mesh_build.h"
 
+#include "server/base/heap.h"
 #include "server/mesh/files/file_bytes.h"
-
-#include <stdarg.h>
-#include <stdlib.h>
-#include <string.h>
 
 /* three corners of this many triangles still count in an int32 */
 static const size_t max_piece = 700000000;
@@ -19,47 +16,37 @@ pal_err pal_mesh_refuse(pal_mesh_build *build, int64_t at, const char *format, .
     return err;
 }
 
-/* array with room for n + more pieces of size bytes, at least half as many again when it moves */
-static pal_err grow(pal_mesh_build *build, void **array, size_t *cap, size_t n, size_t more, size_t size)
+/* room for one more piece of three numbers; pointer: address of the array's pointer */
+static pal_err grow(pal_mesh_build *build, void *pointer, size_t n, size_t size)
 {
-    if (more <= *cap - n) return PAL_ERR_OK;
-    if (more > max_piece || n + more > max_piece)
+    if (n >= max_piece)
         return pal_diagnostic_set(build->diag, PAL_ERR_BUDGET, "%s: more than %zu pieces", build->name, max_piece);
-    size_t wanted = n + more > *cap + *cap / 2 ? n + more : *cap + *cap / 2;
-    if (wanted < 64) wanted = 64;
-    void *moved = realloc(*array, wanted * size);
-    if (!moved)
-        return pal_diagnostic_set(build->diag, PAL_ERR_MEMORY, "%s: no memory for %zu pieces", build->name, wanted);
-    *array = moved;
-    *cap = wanted;
-    return PAL_ERR_OK;
-}
-
-pal_err pal_mesh_reserve(pal_mesh_build *build, size_t n_vertex, size_t n_tri)
-{
-    void *x = build->x, *tri = build->tri;
-    pal_err err = grow(build, &x, &build->cap_vertex, build->n_vertex, n_vertex, 3 * sizeof(double));
-    build->x = x;
-    if (err) return err;
-    err = grow(build, &tri, &build->cap_tri, build->n_tri, n_tri, 3 * sizeof(int32_t));
-    build->tri = tri;
-    return err;
+    if (pal_heap_grow(pointer, n, 3 * size)) return PAL_ERR_OK;
+    return pal_diagnostic_set(build->diag, PAL_ERR_MEMORY, "%s: no memory for more than %zu pieces", build->name, n);
 }
 
 pal_err pal_mesh_vertex(pal_mesh_build *build, const double p[3])
 {
-    if (build->n_vertex == build->cap_vertex) PAL_TRY(pal_mesh_reserve(build, 1, 0));
+    PAL_TRY(grow(build, &build->x, build->n_vertex, sizeof *build->x));
     memcpy(build->x + 3 * build->n_vertex++, p, 3 * sizeof *p);
     return PAL_ERR_OK;
 }
 
+pal_err pal_mesh_position(pal_mesh_build *build, pal_text_scan *scan, const char *what)
+{
+    double p[3];
+    for (int a = 0; a < 3; a++)
+        if (!pal_text_double(scan, &p[a]))
+            return pal_mesh_refuse(build, scan->line, "%s needs three numbers, found %s", what,
+                                   pal_text_excerpt_at(scan).text);
+    return pal_mesh_vertex(build, p);
+}
+
 static pal_err add_triangle(pal_mesh_build *build, int64_t a, int64_t b, int64_t c)
 {
-    if (build->n_tri == build->cap_tri) PAL_TRY(pal_mesh_reserve(build, 0, 1));
+    PAL_TRY(grow(build, &build->tri, build->n_tri, sizeof *build->tri));
     int32_t *tri = build->tri + 3 * build->n_tri++;
-    tri[0] = (int32_t)a;
-    tri[1] = (int32_t)b;
-    tri[2] = (int32_t)c;
+    tri[0] = (int32_t)a, tri[1] = (int32_t)b, tri[2] = (int32_t)c;
     build->fan_n_tri++;
     return PAL_ERR_OK;
 }

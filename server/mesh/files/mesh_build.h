@@ -3,21 +3,18 @@
 #ifndef PAL_MESH_FILES_MESH_BUILD_H
 #define PAL_MESH_FILES_MESH_BUILD_H
 #include "server/base/err.h"
-
-#include <stdbool.h>
-#include <stdint.h>
+#include "server/mesh/files/text_scan.h"
 
 typedef struct pal_mesh_build {
     const char *name; /* file name for messages                                          */
     const uint8_t *bytes;
     size_t n_byte;
     pal_diagnostic *diag;
-    const char *format;     /* for the report                                                  */
-    bool binary;            /* places are byte offsets, else line numbers                      */
-    double *x;              /* [n_vertex][3]                                                   */
-    int32_t *tri;           /* [n_tri][3], indices not yet checked against n_vertex            */
-    size_t n_vertex, n_tri; /* in use                                                          */
-    size_t cap_vertex, cap_tri;
+    const char *format; /* for the report                                                  */
+    bool binary;        /* places are byte offsets, else line numbers                      */
+    double *x;          /* [n_vertex][3]                                                   */
+    int32_t *tri;       /* [n_tri][3], indices not yet checked against n_vertex            */
+    size_t n_vertex, n_tri;
     int64_t max_index, max_index_at; /* largest index of any face (-1 at first) and its place      */
     int64_t first_at;                /* place of the first face, 0: none yet                       */
     int64_t fan_first, fan_last;     /* the open polygon                                           */
@@ -28,9 +25,10 @@ typedef struct pal_mesh_build {
 pal_err pal_mesh_refuse(pal_mesh_build *build, int64_t at, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
-/* room for n more vertices or triangles; n must come from bytes that are there, never from a claimed count. MEMORY */
-pal_err pal_mesh_reserve(pal_mesh_build *build, size_t n_vertex, size_t n_tri);
+/* BUDGET, MEMORY */
 pal_err pal_mesh_vertex(pal_mesh_build *build, const double p[3]);
+/* the position at the scan; what names it in the message. REFUSED, BUDGET, MEMORY */
+pal_err pal_mesh_position(pal_mesh_build *build, pal_text_scan *scan, const char *what);
 
 /* a polygon: begin, its corners (indices from 0, REFUSED when negative or beyond 2^31 - 2), end. One or two corners
  * make a degenerate triangle, so that cleaning counts them. */

@@ -8,18 +8,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
-
 /* no file is read beyond this */
 static const size_t max_byte = (size_t)4 << 30;
 
 typedef pal_err reader(pal_mesh_build *build);
-
-static bool ends_with(const char *name, const char *tail)
-{
-    size_t n = strlen(name), m = strlen(tail);
-    return n >= m && strcasecmp(name + n - m, tail) == 0;
-}
 
 /* by content first, by name second; NULL: neither is known */
 static reader *choose(const char *name, const uint8_t *bytes, size_t n_byte)
@@ -27,9 +19,9 @@ static reader *choose(const char *name, const uint8_t *bytes, size_t n_byte)
     if (n_byte >= 4 && memcmp(bytes, "ply", 3) == 0 && bytes[3] <= ' ') return pal_ply_parse;
     if (pal_stl_is(bytes, n_byte)) return pal_stl_parse;
     if (pal_off_is(bytes, n_byte)) return pal_off_parse;
-    if (ends_with(name, ".obj")) return pal_obj_parse;
-    if (ends_with(name, ".stl")) return pal_stl_parse;
-    if (ends_with(name, ".off")) return pal_off_parse;
+    if (pal_file_ends_with(name, ".obj")) return pal_obj_parse;
+    if (pal_file_ends_with(name, ".stl")) return pal_stl_parse;
+    if (pal_file_ends_with(name, ".off")) return pal_off_parse;
     return pal_obj_is(bytes, n_byte) ? pal_obj_parse : NULL;
 }
 
@@ -46,13 +38,6 @@ static pal_err parse(pal_mesh_build *build)
     return PAL_ERR_OK;
 }
 
-/* file units to metres */
-static void scale(pal_surface *s, double unit_m)
-{
-    for (size_t i = 0; i < 3 * (size_t)s->n_vertex; i++) s->x[i] *= unit_m;
-    pal_scale3(s->origin_m, unit_m, s->origin_m);
-}
-
 /* cleans and scales what was read */
 static pal_err finish(pal_mesh_build *build, const pal_mesh_file_options *options, pal_surface *s,
                       pal_surface_report *report, double *unit_m, const char **unit_name)
@@ -67,7 +52,8 @@ static pal_err finish(pal_mesh_build *build, const pal_mesh_file_options *option
     const char *word = "given";
     pal_surface_box(s, low, high);
     if (!(unit > 0)) unit = pal_mesh_unit_guess(pal_dist3(low, high), &word);
-    scale(s, unit);
+    for (size_t i = 0; i < 3 * (size_t)s->n_vertex; i++) s->x[i] *= unit;
+    pal_scale3(s->origin_m, unit, s->origin_m);
     if (unit_m) *unit_m = unit;
     if (unit_name) *unit_name = word;
     return PAL_ERR_OK;
@@ -114,14 +100,12 @@ double pal_mesh_unit_guess(double diagonal, const char **name)
 {
     const char *word = "scaled";
     double unit = 1;
-    if (diagonal >= 3 && diagonal <= 3000) {
-        word = "mm";
-        unit = 1e-3;
-    } else if (diagonal >= 0.003 && diagonal < 3) {
+    if (diagonal >= 3 && diagonal <= 3000)
+        word = "mm", unit = 1e-3;
+    else if (diagonal >= 0.003 && diagonal < 3)
         word = "m";
-    } else if (diagonal > 0 && isfinite(diagonal)) {
+    else if (diagonal > 0 && isfinite(diagonal))
         unit = 0.2 / diagonal;
-    }
     if (name) *name = word;
     return unit;
 }

@@ -1,7 +1,6 @@
-/* Surfaces from files: OBJ, STL, PLY, OFF, recognised by content first, by name second. The bytes are untrusted.
- *
- * Every refusal is one sentence with the file's name and the line (text) or byte offset (binary). Memory is bounded by
- * a small multiple of the file's size, whatever counts it claims. Thread: [load]. */
+/* Surfaces from files: OBJ, STL, PLY, OFF, recognised by content first, by name second. The bytes are untrusted: every
+ * refusal is one sentence with the file's name and the line or byte, and memory is bounded by a small multiple of the
+ * file's size. Thread: [load]. */
 #ifndef PAL_MESH_FILES_MESH_FILE_H
 #define PAL_MESH_FILES_MESH_FILE_H
 #include "server/mesh/geometry/surface.h"
@@ -16,11 +15,8 @@ typedef struct pal_mesh_file_options {
     double weld;   /* relative tolerance of pal_surface_clean; < 0: do not clean at all */
 } pal_mesh_file_options;
 
-/* Reads path (its name appears in every message), cleans it, scales it to metres. OBJ: n-gons as fans, negative
- * indices, v/vt/vn forms, any line ending, continuation lines. STL: binary, ASCII, binary beginning with "solid". PLY:
- * ascii and both binary orders, any scalar types, list properties, triangle strips, elements in any order. OFF: OFF,
- * COFF, NOFF headers, comments. unit_name out ("m", "mm", "scaled", or "given" for options' own) and unit_m out may be
- * NULL. IO, REFUSED, MEMORY. */
+/* Reads path, cleans it, scales it to metres; each reader's file says what it takes. unit_name out ("m", "mm",
+ * "scaled", or "given" for options' own) and unit_m out may be NULL. IO, REFUSED, MEMORY. */
 pal_err pal_mesh_file_read(const char *path, const pal_mesh_file_options *options, pal_surface *out,
                            pal_surface_report *report, double *unit_m, const char **unit_name, pal_diagnostic *diag);
 /* the same from memory: name is used in messages only */
@@ -35,13 +31,8 @@ double pal_mesh_unit_guess(double diagonal, const char **name);
 /* "m" | "cm" | "mm" | "um" | "in" -> metres, 0: unknown word */
 double pal_mesh_unit_named(const char *word);
 
-/* binary little-endian PLY, float32 metres (positions + origin), int32 lists; whole file written or none; IO */
-pal_err pal_mesh_file_write_ply(const char *path, const pal_surface *surface, pal_diagnostic *diag);
-/* text OBJ, metres with all digits of a double; whole file written or none; IO */
-pal_err pal_mesh_file_write_obj(const char *path, const pal_surface *surface, pal_diagnostic *diag);
-/* binary STL, float32 metres; whole file written or none; IO */
-pal_err pal_mesh_file_write_stl(const char *path, const pal_surface *surface, pal_diagnostic *diag);
-/* one of the three by the end of the path, .ply, .obj or .stl; REFUSED (another ending), IO */
+/* Positions with the origin, in metres, by the end of the path: .ply (binary little-endian, float32, int32 lists), .obj
+ * (text, all digits of a double) or .stl (binary, float32); whole file written or none; REFUSED (another ending), IO */
 pal_err pal_mesh_file_write(const char *path, const pal_surface *surface, pal_diagnostic *diag);
 
 /* TetGen files STEM.node, STEM.ele, STEM.face: 1-based, positions in m with origin added, boundary marker 1 on surface

@@ -7,7 +7,7 @@
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "files are written in the host's order");
 
-pal_err pal_mesh_file_write_ply(const char *path, const pal_surface *surface, pal_diagnostic *diag)
+static pal_err write_ply(const char *path, const pal_surface *surface, pal_diagnostic *diag)
 {
     pal_file_out out;
     PAL_TRY(pal_file_begin(&out, path, diag));
@@ -92,7 +92,7 @@ static void write_corners(FILE *file, const int32_t *corner, int n_row, size_t n
     }
 }
 
-pal_err pal_mesh_file_write_obj(const char *path, const pal_surface *surface, pal_diagnostic *diag)
+static pal_err write_obj(const char *path, const pal_surface *surface, pal_diagnostic *diag)
 {
     pal_file_out out;
     char row[160];
@@ -113,7 +113,7 @@ pal_err pal_mesh_file_write_obj(const char *path, const pal_surface *surface, pa
     return pal_file_end(&out, PAL_ERR_OK, diag);
 }
 
-pal_err pal_mesh_file_write_stl(const char *path, const pal_surface *surface, pal_diagnostic *diag)
+static pal_err write_stl(const char *path, const pal_surface *surface, pal_diagnostic *diag)
 {
     pal_file_out out;
     PAL_TRY(pal_file_begin(&out, path, diag));
@@ -122,12 +122,11 @@ pal_err pal_mesh_file_write_stl(const char *path, const pal_surface *surface, pa
     fwrite(head, sizeof head, 1, out.file);
     fwrite(&n_tri, sizeof n_tri, 1, out.file);
     for (size_t t = 0; t < (size_t)surface->n_tri; t++) {
-        double side[2][3], normal[3];
+        double normal[3];
         float row[12];
         const double *corner[3];
         for (size_t k = 0; k < 3; k++) corner[k] = surface->x + 3 * (size_t)surface->tri[3 * t + k];
-        for (size_t k = 0; k < 2; k++) pal_sub3(side[k], corner[k + 1], corner[0]);
-        pal_cross3(normal, side[0], side[1]);
+        pal_normal3(normal, corner[0], corner[1], corner[2]);
         if (!pal_unit3(normal, normal, 0)) pal_set3(normal, 0, 0, 0);
         for (size_t a = 0; a < 3; a++) {
             row[a] = (float)normal[a];
@@ -142,12 +141,10 @@ pal_err pal_mesh_file_write_stl(const char *path, const pal_surface *surface, pa
 
 pal_err pal_mesh_file_write(const char *path, const pal_surface *surface, pal_diagnostic *diag)
 {
-    size_t n = strlen(path);
-    const char *end = n > 4 ? path + n - 4 : "";
     char shown[128];
-    if (!strcmp(end, ".ply")) return pal_mesh_file_write_ply(path, surface, diag);
-    if (!strcmp(end, ".obj")) return pal_mesh_file_write_obj(path, surface, diag);
-    if (!strcmp(end, ".stl")) return pal_mesh_file_write_stl(path, surface, diag);
+    if (pal_file_ends_with(path, ".ply")) return write_ply(path, surface, diag);
+    if (pal_file_ends_with(path, ".obj")) return write_obj(path, surface, diag);
+    if (pal_file_ends_with(path, ".stl")) return write_stl(path, surface, diag);
     pal_file_printable_name(shown, path);
     return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: surfaces are written to .ply, .obj or .stl files", shown);
 }

@@ -1,7 +1,6 @@
-/* Wavefront OBJ: positions and faces; everything else is left out. */
+/* Wavefront OBJ: positions and faces (n-gons as fans, negative indices, v/vt/vn forms, continuation lines); everything
+ * else is left out. */
 #include "server/mesh/files/mesh_build.h"
-#include "server/mesh/files/text_scan.h"
-
 #include <string.h>
 
 static const char *const keywords[] = {"v", "vt", "vn", "vp", "f", "l", "p", "g", "o", "s", "usemtl", "mtllib", "#"};
@@ -17,16 +16,6 @@ bool pal_obj_is(const uint8_t *bytes, size_t n_byte)
         return false;
     } while (scan.line < 1000 && pal_text_next_line(&scan));
     return false;
-}
-
-static pal_err read_position(pal_mesh_build *build, pal_text_scan *scan)
-{
-    double p[3];
-    for (int a = 0; a < 3; a++)
-        if (!pal_text_double(scan, &p[a]))
-            return pal_mesh_refuse(build, scan->line, "a position needs three numbers, found %s",
-                                   pal_text_excerpt_at(scan).text);
-    return pal_mesh_vertex(build, p);
 }
 
 /* the position index of a corner v, v/vt, v//vn or v/vt/vn; false when the word is none of these */
@@ -81,7 +70,7 @@ pal_err pal_obj_parse(pal_mesh_build *build)
         .at = build->bytes, .end = build->bytes + build->n_byte, .line = 1, .hash = true, .joins = true};
     do {
         if (pal_text_is(&scan, "v"))
-            PAL_TRY(read_position(build, &scan));
+            PAL_TRY(pal_mesh_position(build, &scan, "a position"));
         else if (pal_text_is(&scan, "f"))
             PAL_TRY(read_face(build, &scan));
         else

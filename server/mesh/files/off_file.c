@@ -1,8 +1,8 @@
 /* Object File Format: OFF, with optional ST, C, N prefixes whose extra numbers are left out. Binary OFF and the four-
  * and n-dimensional kinds are refused. */
 #include "server/mesh/files/mesh_build.h"
-#include "server/mesh/files/text_scan.h"
 
+#include <stdio.h>
 #include <string.h>
 
 /* takes the header word; 1: a kind we read, -1: one we do not, 0: no OFF header */
@@ -47,16 +47,13 @@ static pal_err read_counts(pal_mesh_build *build, pal_text_scan *scan, int64_t n
 static pal_err read_vertices(pal_mesh_build *build, pal_text_scan *scan, int64_t n)
 {
     for (int64_t i = 0; i < n; i++) {
-        double p[3];
+        char what[40];
+        snprintf(what, sizeof what, "vertex %lld", (long long)i);
         pal_text_next_line(scan);
         if (!pal_text_seek(scan))
             return pal_mesh_refuse(build, scan->line, "the file ends after %lld of %lld vertices", (long long)i,
                                    (long long)n);
-        for (int a = 0; a < 3; a++)
-            if (!pal_text_double(scan, &p[a]))
-                return pal_mesh_refuse(build, scan->line, "vertex %lld needs three numbers, found %s", (long long)i,
-                                       pal_text_excerpt_at(scan).text);
-        PAL_TRY(pal_mesh_vertex(build, p));
+        PAL_TRY(pal_mesh_position(build, scan, what));
     }
     return PAL_ERR_OK;
 }

@@ -1,10 +1,7 @@
 /* PLY 1.0: ascii, binary little- and big-endian; vertex x y z of any scalar type, faces as lists and triangle strips;
- * any other element or property is skipped. Elements may come in any order.
- *
- * A claimed count is never trusted: memory is reserved for what the remaining bytes can hold. */
+ * any other element or property is skipped. Elements may come in any order. */
 #include "server/mesh/files/mesh_build.h"
 #include "server/mesh/files/scalar_bytes.h"
-#include "server/mesh/files/text_scan.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -79,14 +76,10 @@ static pal_err read_element(ply *p)
     if (p->n_element == MAX_ELEMENT) return refuse_header(p, "more than 32 elements");
     element *e = &p->elements[p->n_element++];
     *e = (element){.what = UNKNOWN, .first = p->n_property, .line = p->scan.line};
-    if (pal_text_is(&p->scan, "vertex"))
-        e->what = VERTEX;
-    else if (pal_text_is(&p->scan, "face"))
-        e->what = FACE;
-    else if (pal_text_is(&p->scan, "tristrips"))
-        e->what = STRIP;
-    else if (pal_text_word(&p->scan) == 0)
-        return refuse_header(p, "an element needs a name");
+    static const char *const name[] = {"vertex", "face", "tristrips"};
+    for (int k = 0; k < 3 && e->what == UNKNOWN; k++)
+        if (pal_text_is(&p->scan, name[k])) e->what = VERTEX + (unsigned)k;
+    if (e->what == UNKNOWN && pal_text_word(&p->scan) == 0) return refuse_header(p, "an element needs a name");
     if (!pal_text_int(&p->scan, &e->n_row) || e->n_row < 0)
         return refuse_header(p, "an element needs its number of rows");
     return PAL_ERR_OK;
@@ -102,14 +95,11 @@ static pal_err read_property(ply *p)
     if (q->list && (!take_type(&p->scan, &q->count_type) || q->count_type >= PAL_SCALAR_F32))
         return refuse_header(p, "a list needs a whole-number type for its length");
     if (!take_type(&p->scan, &q->type)) return refuse_header(p, "a property needs a known type");
+    static const char *const axis[] = {"x", "y", "z"};
+    for (int k = 0; k < 3 && e->what == VERTEX && !q->list; k++)
+        if (pal_text_is(&p->scan, axis[k])) q->use = X + (unsigned)k;
     bool face = e->what == FACE || e->what == STRIP;
-    if (e->what == VERTEX && !q->list && pal_text_is(&p->scan, "x"))
-        q->use = X;
-    else if (e->what == VERTEX && !q->list && pal_text_is(&p->scan, "y"))
-        q->use = Y;
-    else if (e->what == VERTEX && !q->list && pal_text_is(&p->scan, "z"))
-        q->use = Z;
-    else if (face && q->list && (pal_text_is(&p->scan, "vertex_indices") || pal_text_is(&p->scan, "vertex_index")))
+    if (face && q->list && (pal_text_is(&p->scan, "vertex_indices") || pal_text_is(&p->scan, "vertex_index")))
         q->use = INDICES;
     e->min += pal_scalar_size(q->list ? q->count_type : q->type);
     e->n++;
@@ -257,8 +247,6 @@ static pal_err read_rows(ply *p, const element *e)
     if (e->n_row > max)
         return pal_mesh_refuse(p->build, place(p), "the header claims %lld rows, but at most %lld fit in the rest",
                                (long long)e->n_row, (long long)max);
-    if (e->what == VERTEX) PAL_TRY(pal_mesh_reserve(p->build, (size_t)e->n_row, 0));
-    if (e->what == FACE) PAL_TRY(pal_mesh_reserve(p->build, 0, (size_t)e->n_row));
     for (int64_t row = 0; row < e->n_row; row++) PAL_TRY(read_row(p, e));
     return PAL_ERR_OK;
 }

@@ -45,30 +45,12 @@ static inline double pal_float_at(const uint8_t *p, bool big)
 /* 64-bit whole numbers beyond 2^53 are rounded */
 static inline double pal_scalar_at(const uint8_t *p, pal_scalar type, bool big)
 {
-    uint64_t word = pal_word_at(p, pal_scalar_size(type), big);
+    int n = pal_scalar_size(type), unused = 64 - 8 * n;
+    uint64_t word = pal_word_at(p, n, big);
     double d;
-    switch (type) {
-    case PAL_SCALAR_U8:
-        return (double)(uint8_t)word;
-    case PAL_SCALAR_I8:
-        return (double)(int8_t)word;
-    case PAL_SCALAR_U16:
-        return (double)(uint16_t)word;
-    case PAL_SCALAR_I16:
-        return (double)(int16_t)word;
-    case PAL_SCALAR_U32:
-        return (double)(uint32_t)word;
-    case PAL_SCALAR_I32:
-        return (double)(int32_t)word;
-    case PAL_SCALAR_U64:
-        return (double)word;
-    case PAL_SCALAR_I64:
-        return (double)(int64_t)word;
-    case PAL_SCALAR_F32:
-        return pal_float_at(p, big);
-    default:
-        memcpy(&d, &word, sizeof d);
-        return d;
-    }
+    memcpy(&d, &word, sizeof d);
+    if (type >= PAL_SCALAR_F32) return type == PAL_SCALAR_F32 ? pal_float_at(p, big) : d;
+    /* odd types are signed: the sign bit is moved to the top and back */
+    return type & 1 ? (double)((int64_t)(word << unused) >> unused) : (double)word;
 }
 #endif

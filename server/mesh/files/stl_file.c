@@ -2,15 +2,13 @@
  * first: a file whose size fits its triangle count is binary. Normals are ignored; the order of corners defines the
  * orientation. */
 #include "server/mesh/files/mesh_build.h"
-#include "server/mesh/files/text_scan.h"
-
-#include <string.h>
+#include "server/mesh/files/scalar_bytes.h"
 
 enum { HEAD = 84, RECORD = 50 };
 
 static uint32_t triangle_count(const uint8_t *bytes)
 {
-    return (uint32_t)bytes[80] | (uint32_t)bytes[81] << 8 | (uint32_t)bytes[82] << 16 | (uint32_t)bytes[83] << 24;
+    return (uint32_t)pal_word_at(bytes + 80, 4, false);
 }
 
 static bool size_fits(const uint8_t *bytes, size_t n_byte)
@@ -43,15 +41,14 @@ static pal_err parse_binary(pal_mesh_build *build)
     if (n_tri == 0) return pal_mesh_refuse(build, 80, "the file has no triangle");
     if (n_tri > room)
         return pal_mesh_refuse(build, 80, "claims %zu triangles, but the file ends after %zu", n_tri, room);
-    PAL_TRY(pal_mesh_reserve(build, 3 * n_tri, n_tri));
     for (size_t t = 0; t < n_tri; t++) {
         const uint8_t *record = build->bytes + HEAD + RECORD * t + 12;
         int64_t at = (int64_t)(HEAD + RECORD * t);
         pal_mesh_fan_begin(build, at);
         for (int k = 0; k < 3; k++) {
-            float f[3];
-            memcpy(f, record + 12 * k, sizeof f);
-            PAL_TRY(pal_mesh_vertex(build, (const double[3]){(double)f[0], (double)f[1], (double)f[2]}));
+            double p[3];
+            for (int a = 0; a < 3; a++) p[a] = pal_float_at(record + 12 * k + 4 * a, false);
+            PAL_TRY(pal_mesh_vertex(build, p));
             PAL_TRY(pal_mesh_fan_corner(build, at, (int64_t)build->n_vertex - 1));
         }
     }
@@ -63,12 +60,7 @@ static pal_err read_loop(pal_mesh_build *build, pal_text_scan *scan)
 {
     pal_mesh_fan_begin(build, scan->line);
     while (pal_text_seek(scan) && pal_text_is(scan, "vertex")) {
-        double p[3];
-        for (int a = 0; a < 3; a++)
-            if (!pal_text_double(scan, &p[a]))
-                return pal_mesh_refuse(build, scan->line, "a vertex needs three numbers, found %s",
-                                       pal_text_excerpt_at(scan).text);
-        PAL_TRY(pal_mesh_vertex(build, p));
+        PAL_TRY(pal_mesh_position(build, scan, "a vertex"));
         PAL_TRY(pal_mesh_fan_corner(build, scan->line, (int64_t)build->n_vertex - 1));
     }
     if (!pal_text_is(scan, "endloop"))

@@ -117,14 +117,12 @@ static bool read_decimal(const uint8_t *p, const uint8_t *end, decimal *out)
     }
     if (n_digit == 0) return false;
     if (p < end && (*p == 'e' || *p == 'E')) {
-        p++;
-        bool negative = false;
-        int64_t power = 0;
-        if (p < end && (*p == '-' || *p == '+')) negative = *p++ == '-';
+        int64_t power = 0, sign = 1;
+        if (++p < end && (*p == '-' || *p == '+')) sign = *p++ == '-' ? -1 : 1;
         if (p == end) return false;
         for (; p < end && *p >= '0' && *p <= '9'; p++)
             if (power < 100000) power = 10 * power + (*p - '0');
-        d.power += negative ? -power : power;
+        d.power += sign * power;
     }
     *out = d;
     return p == end;
@@ -179,17 +177,16 @@ bool pal_text_double(pal_text_scan *scan, double *out)
 bool pal_text_int(pal_text_scan *scan, int64_t *out)
 {
     if (!pal_text_more(scan)) return false;
-    const uint8_t *p = scan->at, *end = word_end(scan);
-    bool negative = false;
+    const uint8_t *first = scan->at, *p = first, *end = word_end(scan);
     int64_t value = 0;
-    if (*p == '-' || *p == '+') negative = *p++ == '-';
+    p += *p == '-' || *p == '+';
     if (p == end || end - p > 18) return false;
     for (; p < end; p++) {
         if (*p < '0' || *p > '9') return false;
         value = 10 * value + (*p - '0');
     }
     scan->at = end;
-    *out = negative ? -value : value;
+    *out = *first == '-' ? -value : value;
     return true;
 }
 

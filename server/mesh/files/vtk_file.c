@@ -4,28 +4,14 @@
  * places; its quadratic tetrahedron has the middles of edges 01 12 20 03 13 23, as num/shape_functions.h has. */
 #include "server/mesh/files/vtk_file.h"
 
+#include "server/base/vec3.h"
 #include "server/mesh/files/file_bytes.h"
-
-#include <stdbool.h>
 
 static const uint8_t HEX_ORDER[8] = {0, 1, 3, 2, 4, 5, 7, 6};
 
 static int cell_type(int n_corner)
 {
     return n_corner == 8 ? 12 : n_corner == 4 ? 10 : n_corner == 10 ? 24 : 0;
-}
-
-/* n numbers on a line */
-static void write_row(FILE *file, const double *value, const double *shift, int n)
-{
-    for (int k = 0; k < n; k++) {
-        char text[40];
-        snprintf(text, sizeof text, "%.17g", value[k] + (shift ? shift[k] : 0));
-        for (char *c = text; *c; c++)
-            if (*c == ',') *c = '.'; /* the decimal point of the locale */
-        fputs(text, file);
-        fputc(k + 1 < n ? ' ' : '\n', file);
-    }
 }
 
 /* a word without blanks, or the title's line */
@@ -48,7 +34,7 @@ static void write_fields(FILE *file, const char *where, const pal_vtk_field *fie
         write_word(file, field[f].name, false);
         fputs(vector ? " double\n" : " double 1\nLOOKUP_TABLE default\n", file);
         for (size_t i = 0; i < (size_t)n; i++)
-            write_row(file, field[f].value + i * (vector ? 3 : 1), NULL, vector ? 3 : 1);
+            pal_file_put_line(file, field[f].value + i * (vector ? 3 : 1), vector ? 3 : 1);
     }
 }
 
@@ -86,7 +72,12 @@ pal_err pal_mesh_write_vtk(const char *path, const pal_vtk_grid *grid, pal_diagn
     fputs("# vtk DataFile Version 3.0\n", out.file);
     write_word(out.file, g->title ? g->title : "mesh", true);
     fprintf(out.file, "\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS %d double\n", g->n_node);
-    for (size_t i = 0; i < (size_t)g->n_node; i++) write_row(out.file, g->x + 3 * i, g->origin_m, 3);
+    for (size_t i = 0; i < (size_t)g->n_node; i++) {
+        double x[3];
+        pal_copy3(x, g->x + 3 * i);
+        if (g->origin_m) pal_add3(x, x, g->origin_m);
+        pal_file_put_line(out.file, x, 3);
+    }
     write_cells(out.file, g);
     write_fields(out.file, "POINT_DATA", g->point, g->n_point, g->n_node);
     write_fields(out.file, "CELL_DATA", g->cell, g->n_cell, g->n_element);

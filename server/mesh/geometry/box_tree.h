@@ -1,5 +1,5 @@
-/* AABB tree over the triangles of a surface: segment hits, nearest point, triangles in a box, winding number.
- * The tree borrows the surface. Thread: [load] to build, then read-only by any. */
+/* AABB tree over the triangles of a surface: its winding number. The tree borrows the surface. Thread: [load] to build,
+ * then read-only by any. */
 #ifndef PAL_MESH_GEOMETRY_BOX_TREE_H
 #define PAL_MESH_GEOMETRY_BOX_TREE_H
 #include "server/mesh/geometry/surface.h"
@@ -9,12 +9,6 @@ typedef struct pal_box_tree pal_box_tree;
 pal_err pal_box_tree_create(const pal_surface *surface, pal_box_tree **out); /* borrows surface; MEMORY */
 void pal_box_tree_destroy(pal_box_tree *tree);
 
-/* does the open segment a-b cross a triangle? tri out (the first found) may be NULL */
-bool pal_box_tree_segment(const pal_box_tree *tree, const double a[3], const double b[3], int *tri);
-/* first hit of the ray from a in unit direction d within length: distance, or a negative number for none */
-double pal_box_tree_ray(const pal_box_tree *tree, const double a[3], const double d[3], double length, int *tri);
-/* nearest surface point; returns the distance */
-double pal_box_tree_nearest(const pal_box_tree *tree, const double p[3], double nearest[3], int *tri);
 /* solid angle of the surface at p over 4 pi (fast winding number, Barill et al. 2018): 1 inside, 0 outside */
 double pal_box_tree_winding(const pal_box_tree *tree, const double p[3]);
 #endif

@@ -2,39 +2,27 @@
  * with arbitrary topology" (SIGGRAPH 1996) and, for the boundary, Zorin, Schroeder, "Subdivision for modeling and
  * animation" (SIGGRAPH 2000 course notes, modified butterfly).
  *
- *   edge                                               midpoint
- *   boundary                                           four points of the boundary, (-1, 9, 9, -1)/16
- *   both ends regular (6 faces; 3 at the boundary)     eq. 3, eight points
- *   one end not regular                                the rule of that end
- *   both ends not regular, both inner or both boundary mean of their rules
- *   not regular, inner and boundary                    mean of their rules
- *   an end is a corner of the boundary                 straight: half of each end
- *
- * Rules of ends: inner, K faces: eq. 5 with 3/4 of the vertex; boundary, k faces: the crease weights of the course
- * notes, which are exact for linear functions on k equal angles of a half plane.
- *
- * Departures: eq. 4 lacks the centre (errata C2), the boundary weight -9/16 is +9/16 (C3). The paper is silent about
- * stencils that leave the mesh: a missing point of eq. 3 is the reflection p* = a + b - opposite across boundary edge
- * a b, which keeps the rule exact for linear functions on a regular grid. At corners the boundary ends: the missing
+ * server/mesh/README.md has the weights, errata and reflections. An end on the boundary is regular with 3 faces; else
+ * it has the crease weights of the course notes, which are exact for linear functions on k equal angles of a half
+ * plane. An edge with an end at a corner of the boundary is halved straight. At corners the boundary ends: the missing
  * fourth point is 2 c - p, so that a sheet keeps its corners and straight sides. */
 #include "server/mesh/geometry/butterfly.h"
 
-#include <math.h>
-#include <stdlib.h>
+#include "server/num/sort.h"
 
-#define PI 3.14159265358979323846
+#include <math.h>
 
 double pal_butterfly_ring(int K, int i)
 {
     if (K == 3) return i == 0 ? 5.0 / 12 : -1.0 / 12;
     if (K == 4) return i == 0 ? 3.0 / 8 : i == 2 ? -1.0 / 8 : 0;
-    double a = 2 * PI * i / K;
+    double a = 2 * M_PI * i / K;
     return (0.25 + cos(a) + 0.5 * cos(2 * a)) / K;
 }
 
 double pal_butterfly_boundary(int k, int i, int j)
 {
-    double a = PI / k;
+    double a = M_PI / k;
     if (j < 0) return 1 - sin(a) * sin(i * a) / (k * (1 - cos(a)));
     if (j > 0 && j < k) return (sin(i * a) * sin(j * a) + 0.5 * sin(2 * i * a) * sin(2 * j * a)) / k;
     double end = 0.25 * cos(i * a) - sin(2 * a) * sin(2 * i * a) / (4 * k * (cos(a) - cos(2 * a)));
@@ -71,39 +59,26 @@ static bool is_regular(const fan *f)
     return f->n_edge == (f->rim ? 4 : 6);
 }
 
-int pal_butterfly_max_entries(const pal_winged_mesh *wings, int32_t e)
-{
-    int n = 8;
-    for (int end = 0; end < 2 && wings->edge[e].face[1] >= 0; end++) {
-        fan f = fan_of(wings, e, wings->edge[e].vertex[end]);
-        if (!is_regular(&f)) n += f.n_edge + 1;
-    }
-    return n;
-}
-
-/* entries as they are found: an index may come more than once */
+/* entries as they are found: a vertex may come more than once */
 typedef struct entries {
     int n;
-    int32_t *index;
-    double *weight;
+    pal_stencil_entry *item;
 } entries;
 
-static void set_entry(entries *to, int32_t index, double weight)
+static void set_entry(entries *to, int32_t vertex, double weight)
 {
-    if (weight == 0) return;
-    to->index[to->n] = index;
-    to->weight[to->n++] = weight;
+    if (weight != 0) to->item[to->n++] = (pal_stencil_entry){vertex, weight};
 }
 
-/* adds to the entry of this index, for the few of the short rules */
-static void add(entries *to, int32_t index, double weight)
+/* adds to the entry of this vertex, for the few of the short rules */
+static void add(entries *to, int32_t vertex, double weight)
 {
     int k = 0;
-    while (k < to->n && to->index[k] != index) k++;
+    while (k < to->n && to->item[k].vertex != vertex) k++;
     if (k == to->n)
-        set_entry(to, index, weight);
+        set_entry(to, vertex, weight);
     else
-        to->weight[k] += weight;
+        to->item[k].weight += weight;
 }
 
 /* third vertex of the face on one side of an edge */
@@ -171,57 +146,31 @@ static void boundary_rule(const pal_winged_mesh *w, int32_t e, entries *to)
     }
 }
 
-typedef struct entry {
-    int32_t index;
-    double weight;
-} entry;
-
-static int by_index(const void *a, const void *b)
+static int by_vertex(const void *a, const void *b)
 {
-    int32_t i = ((const entry *)a)->index, j = ((const entry *)b)->index;
-    return i < j ? -1 : i > j;
+    return PAL_COMPARE(((const pal_stencil_entry *)a)->vertex, ((const pal_stencil_entry *)b)->vertex);
 }
 
-/* sorts by index; few entries, except around vertices of hundreds of faces */
-static void sort(entries *to)
-{
-    entry *heap = to->n > 64 ? malloc((size_t)to->n * sizeof *heap) : NULL;
-    if (heap) {
-        for (int k = 0; k < to->n; k++) heap[k] = (entry){to->index[k], to->weight[k]};
-        qsort(heap, (size_t)to->n, sizeof *heap, by_index);
-        for (int k = 0; k < to->n; k++) to->index[k] = heap[k].index, to->weight[k] = heap[k].weight;
-        free(heap);
-        return;
-    }
-    for (int i = 1; i < to->n; i++) {
-        int32_t index = to->index[i];
-        double weight = to->weight[i];
-        int j = i;
-        for (; j > 0 && to->index[j - 1] > index; j--)
-            to->index[j] = to->index[j - 1], to->weight[j] = to->weight[j - 1];
-        to->index[j] = index, to->weight[j] = weight;
-    }
-}
+PAL_SORT(sort_entries, pal_stencil_entry, by_vertex)
 
-/* merges equal indices and drops entries that have cancelled */
-static void merge(entries *to)
+/* merges entries of the same vertex and drops those that have cancelled; returns how many are left */
+static int merge(entries *to)
 {
     int n = 0;
-    sort(to);
+    sort_entries(to->item, (size_t)to->n);
     for (int k = 0; k < to->n; n++) {
-        int32_t index = to->index[k];
-        double weight = 0;
-        for (; k < to->n && to->index[k] == index; k++) weight += to->weight[k];
-        to->index[n] = index, to->weight[n] = weight;
-        if (fabs(weight) < 1e-15) n--;
+        pal_stencil_entry sum = {to->item[k].vertex, 0};
+        for (; k < to->n && to->item[k].vertex == sum.vertex; k++) sum.weight += to->item[k].weight;
+        to->item[n] = sum;
+        if (fabs(sum.weight) < 1e-15) n--;
     }
-    to->n = n;
+    return n;
 }
 
-int pal_butterfly_stencil(const pal_winged_mesh *wings, int32_t e, int32_t *index, double *weight)
+int pal_butterfly_stencil(const pal_winged_mesh *wings, int32_t e, pal_stencil_entry *entry)
 {
     const pal_winged_edge *at = &wings->edge[e];
-    entries to = {0, index, weight};
+    entries to = {0, entry};
     int32_t a = at->vertex[0], b = at->vertex[1];
     if (at->face[1] < 0)
         boundary_rule(wings, e, &to);
@@ -235,6 +184,5 @@ int pal_butterfly_stencil(const pal_winged_mesh *wings, int32_t e, int32_t *inde
         if (odd_a) end_rule(wings, e, a, odd_b ? 0.5 : 1, &to);
         if (odd_b) end_rule(wings, e, b, odd_a ? 0.5 : 1, &to);
     }
-    merge(&to);
-    return to.n;
+    return merge(&to);
 }

@@ -52,9 +52,11 @@ double pal_butterfly_ring(int K, int i);
  * on ring vertex j of 0..k; j = -1: on the vertex itself. */
 double pal_butterfly_boundary(int k, int i, int j);
 
-/* maximum number of entries of the stencil of edge e; usually 8 */
-int pal_butterfly_max_entries(const pal_winged_mesh *wings, int32_t e);
-/* Indices, ascending and each once, and weights of the midpoint of edge e; returns their number. Weights sum to 1.
- * index and weight have room for pal_butterfly_max_entries entries. */
-int pal_butterfly_stencil(const pal_winged_mesh *wings, int32_t e, int32_t *index, double *weight);
+typedef struct pal_stencil_entry {
+    int32_t vertex;
+    double weight;
+} pal_stencil_entry;
+/* The stencil of the midpoint of edge e, vertices ascending and each once; returns the number of entries. Weights sum
+ * to 1. entry has room for 8 and for K + 1 more of each end of K edges that is irregular. */
+int pal_butterfly_stencil(const pal_winged_mesh *wings, int32_t e, pal_stencil_entry *entry);
 #endif

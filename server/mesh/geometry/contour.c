@@ -1,15 +1,11 @@
-/* Marching tetrahedra on a body-centred cubic lattice.
- *
- * Lattice points are the corners and centres of cubic cells. Two centres on either side of a face form a tetrahedron
+/* Lattice points are the corners and centres of cubic cells. Two centres on either side of a face form a tetrahedron
  * with each of the face's four edges; all tetrahedra are congruent, so the triangles have no preferred direction. A
  * crossing stays 1e-4 of its edge away from both ends, which keeps vertices apart and does not change the topology. */
 #include "server/mesh/geometry/contour.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/tuning.h"
-
-#include <stdlib.h>
-#include <string.h>
 
 static const double end_gap = 1e-4;
 
@@ -23,17 +19,8 @@ typedef struct lattice {
     size_t n_slot;
     double *x;
     int32_t *tri;
-    size_t n_vertex, cap_vertex, n_tri, cap_tri;
+    size_t n_vertex, n_tri;
 } lattice;
-
-static void lattice_free(lattice *l)
-{
-    free(l->value);
-    free(l->key);
-    free(l->crossing);
-    free(l->x);
-    free(l->tri);
-}
 
 static int64_t corner_id(const lattice *l, const int64_t c[3])
 {
@@ -76,17 +63,6 @@ static void sample(lattice *l, pal_contour_field *field, const void *self, bool 
             }
 }
 
-static bool reserve(void **array, size_t *cap, size_t n, size_t size)
-{
-    if (n < *cap) return true;
-    size_t wanted = *cap ? 2 * *cap : 4096;
-    void *moved = realloc(*array, wanted * size);
-    if (!moved) return false;
-    *array = moved;
-    *cap = wanted;
-    return true;
-}
-
 static size_t slot_of(const lattice *l, uint64_t key)
 {
     size_t slot = (size_t)((key * 0x9E3779B97F4A7C15u) >> 20) & (l->n_slot - 1);
@@ -99,14 +75,12 @@ static bool rehash(lattice *l)
 {
     lattice old = *l;
     l->n_slot = old.n_slot ? 2 * old.n_slot : 1 << 14;
-    l->key = calloc(l->n_slot, sizeof *l->key);
-    l->crossing = malloc(l->n_slot * sizeof *l->crossing);
-    if (!l->key || !l->crossing) {
-        free(l->key);
-        free(l->crossing);
-        l->key = old.key;
-        l->crossing = old.crossing;
-        l->n_slot = old.n_slot;
+    pal_err err = PAL_ERR_OK;
+    PAL_ZEROED(&err, l->key, l->n_slot);
+    PAL_ARRAY(&err, l->crossing, l->n_slot);
+    if (err) {
+        PAL_FREE(l->key, l->crossing);
+        *l = old;
         return false;
     }
     for (size_t s = 0; s < old.n_slot; s++) {
@@ -115,8 +89,7 @@ static bool rehash(lattice *l)
         l->key[slot] = old.key[s];
         l->crossing[slot] = old.crossing[s];
     }
-    free(old.key);
-    free(old.crossing);
+    PAL_FREE(old.key, old.crossing);
     return true;
 }
 
@@ -128,10 +101,7 @@ static int32_t edge_vertex(lattice *l, int64_t a, int64_t b)
     uint64_t key = (uint64_t)low << 32 | (uint64_t)(high + 1);
     size_t slot = slot_of(l, key);
     if (l->key[slot]) return l->crossing[slot];
-    void *x = l->x;
-    bool fits = reserve(&x, &l->cap_vertex, l->n_vertex, 3 * sizeof(double));
-    l->x = x;
-    if (!fits) return -1;
+    if (!pal_heap_grow(&l->x, l->n_vertex, 3 * sizeof *l->x)) return -1;
     double p[3], q[3], fp = (double)l->value[low], fq = (double)l->value[high], t = fp / (fp - fq);
     t = t > end_gap ? t : end_gap;
     t = t < 1 - end_gap ? t : 1 - end_gap;
@@ -145,20 +115,10 @@ static int32_t edge_vertex(lattice *l, int64_t a, int64_t b)
 
 static bool add_triangle(lattice *l, int32_t a, int32_t b, int32_t c)
 {
-    void *tri = l->tri;
-    bool fits = reserve(&tri, &l->cap_tri, l->n_tri, 3 * sizeof(int32_t));
-    l->tri = tri;
-    if (!fits || a < 0 || b < 0 || c < 0) return false;
+    if (a < 0 || b < 0 || c < 0 || !pal_heap_grow(&l->tri, l->n_tri, 3 * sizeof *l->tri)) return false;
     int32_t *t = l->tri + 3 * l->n_tri++;
     t[0] = a, t[1] = b, t[2] = c;
     return true;
-}
-
-static double distance2(const lattice *l, int32_t a, int32_t b)
-{
-    double d[3];
-    pal_sub3(d, l->x + 3 * (size_t)a, l->x + 3 * (size_t)b);
-    return pal_dot3(d, d);
 }
 
 /* the surface in one tetrahedron of positive volume */
@@ -174,7 +134,10 @@ static bool march(lattice *l, const int64_t id[4], int mask)
         int32_t ac = edge_vertex(l, id[o[0]], id[o[2]]), ad = edge_vertex(l, id[o[0]], id[o[3]]),
                 bd = edge_vertex(l, id[o[1]], id[o[3]]), bc = edge_vertex(l, id[o[1]], id[o[2]]);
         if (ac < 0 || ad < 0 || bd < 0 || bc < 0) return false;
-        if (distance2(l, ac, bd) <= distance2(l, ad, bc))
+        double one[3], other[3];
+        pal_sub3(one, l->x + 3 * (size_t)ac, l->x + 3 * (size_t)bd);
+        pal_sub3(other, l->x + 3 * (size_t)ad, l->x + 3 * (size_t)bc);
+        if (pal_dot3(one, one) <= pal_dot3(other, other))
             return add_triangle(l, ac, ad, bd) && add_triangle(l, ac, bd, bc);
         return add_triangle(l, ad, bd, bc) && add_triangle(l, ad, bc, ac);
     }
@@ -188,19 +151,11 @@ static bool march(lattice *l, const int64_t id[4], int mask)
 /* the four tetrahedra of the face at the low end of cell c along axis d */
 static bool march_face(lattice *l, const int64_t c[3], int d)
 {
-    int u = (d + 1) % 3, v = (d + 2) % 3;
-    int64_t at[3] = {c[0], c[1], c[2]}, id[6];
-    id[5] = centre_id(l, at);
-    at[d]--;
-    id[4] = centre_id(l, at);
-    at[d]++;
-    id[0] = corner_id(l, at);
-    at[u]++;
-    id[1] = corner_id(l, at);
-    at[v]++;
-    id[2] = corner_id(l, at);
-    at[u]--;
-    id[3] = corner_id(l, at);
+    /* the face's corners in order, then the centres on both sides */
+    int64_t step[3] = {1, l->n[0] + 1, (l->n[0] + 1) * (l->n[1] + 1)}, before[3] = {c[0], c[1], c[2]};
+    int64_t u = step[(d + 1) % 3], v = step[(d + 2) % 3], first = corner_id(l, c);
+    before[d]--;
+    const int64_t id[6] = {first, first + u, first + u + v, first + v, centre_id(l, before), centre_id(l, c)};
     int inside[6], sum = 0;
     for (int k = 0; k < 6; k++) sum += inside[k] = l->value[id[k]] > 0;
     if (sum == 0 || sum == 6) return true;
@@ -245,16 +200,13 @@ pal_err pal_contour(pal_contour_field *field, const void *self, const pal_contou
         sample(&l, field, self, true);
         good = march_all(&l);
     }
-    if (!good || l.n_tri == 0) {
-        bool empty = good;
-        lattice_free(&l);
-        return empty ? pal_diagnostic_set(diag, PAL_ERR_REFUSED, "contour of a field that is positive nowhere")
-                     : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a contour of %.3g points", n_point);
+    PAL_FREE(l.value, l.key, l.crossing);
+    if (good && l.n_tri > 0) {
+        *out = (pal_surface){.n_vertex = (int)l.n_vertex, .n_tri = (int)l.n_tri, .x = l.x, .tri = l.tri};
+        pal_surface_recentre(out);
+        return PAL_ERR_OK;
     }
-    *out = (pal_surface){.n_vertex = (int)l.n_vertex, .n_tri = (int)l.n_tri, .x = l.x, .tri = l.tri};
-    l.x = NULL;
-    l.tri = NULL;
-    lattice_free(&l);
-    pal_surface_recentre(out);
-    return PAL_ERR_OK;
+    PAL_FREE(l.x, l.tri);
+    return good ? pal_diagnostic_set(diag, PAL_ERR_REFUSED, "contour of a field that is positive nowhere")
+                : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a contour of %.3g points", n_point);
 }

@@ -8,11 +8,9 @@
  * edge. */
 #include "server/mesh/geometry/decimate.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/tuning.h"
-
-#include <stdlib.h>
-#include <string.h>
 
 enum { MAX_RING = 24, MAX_DEGREE = 12 };
 
@@ -71,21 +69,14 @@ static void find_quadrics(const pal_surface *s, quadric *all)
     for (size_t t = 0; t < (size_t)s->n_tri; t++) {
         const int32_t *c = s->tri + 3 * t;
         const double *p = s->x + 3 * (size_t)c[0];
-        double u[3], v[3], n[3];
-        pal_sub3(u, s->x + 3 * (size_t)c[1], p);
-        pal_sub3(v, s->x + 3 * (size_t)c[2], p);
-        pal_cross3(n, u, v);
+        double n[3];
+        pal_normal3(n, p, s->x + 3 * (size_t)c[1], s->x + 3 * (size_t)c[2]);
         double area = pal_norm3(n) / 2;
         if (!pal_unit3(n, n, 0)) continue;
         double d = -pal_dot3(n, p);
-        quadric q = {.a = {n[0] * n[0], n[0] * n[1], n[0] * n[2], n[1] * n[1], n[1] * n[2], n[2] * n[2]},
-                     .b = {d * n[0], d * n[1], d * n[2]},
-                     .c = d * d,
-                     .area = 1};
-        for (int k = 0; k < 6; k++) q.a[k] *= area;
-        for (int k = 0; k < 3; k++) q.b[k] *= area;
-        q.c *= area;
-        q.area = area;
+        quadric q = {.c = d * d * area, .area = area};
+        for (int k = 0; k < 3; k++) q.b[k] = d * n[k] * area;
+        for (int k = 0; k < 6; k++) q.a[k] = n[k < 3 ? 0 : k < 5 ? 1 : 2] * n[k < 3 ? k : k < 5 ? k - 2 : 2] * area;
         for (int k = 0; k < 3; k++) quadric_add(&all[c[k]], &q);
     }
 }
@@ -309,17 +300,6 @@ static bool flip(pass *p, int32_t t)
     return true;
 }
 
-/* one round of flips; false: no memory */
-static bool flip_all(pass *p)
-{
-    if (pal_surface_fans(p->s, &p->start, &p->item)) return false;
-    memset(p->locked, 0, (size_t)p->s->n_vertex);
-    for (int32_t t = 0; t < p->s->n_tri; t++) flip(p, t);
-    free(p->start);
-    free(p->item);
-    return true;
-}
-
 /* renames corners and drops triangles that shrank to an edge */
 static void apply_remap(pass *p)
 {
@@ -336,7 +316,11 @@ static void apply_remap(pass *p)
 /* one pass; limited: only collapses about as cheap as the ones needed. Number of collapses, -1: no memory */
 static int run_pass(pass *p, int n_tri, bool limited, uint32_t *spare)
 {
-    if (!flip_all(p) || pal_surface_fans(p->s, &p->start, &p->item)) return -1;
+    if (pal_surface_fans(p->s, &p->start, &p->item)) return -1;
+    memset(p->locked, 0, (size_t)p->s->n_vertex);
+    for (int32_t t = 0; t < p->s->n_tri; t++) flip(p, t);
+    PAL_FREE(p->start, p->item);
+    if (pal_surface_fans(p->s, &p->start, &p->item)) return -1;
     for (int i = 0; i < p->s->n_vertex; i++) p->remap[i] = i;
     memset(p->locked, 0, (size_t)p->s->n_vertex);
     p->n_left = p->s->n_tri;
@@ -350,39 +334,22 @@ static int run_pass(pass *p, int n_tri, bool limited, uint32_t *spare)
         if (!p->locked[e[0]] && !p->locked[e[1]]) n += collapse(p, e[0], e[1]);
     }
     apply_remap(p);
-    free(p->start);
-    free(p->item);
+    PAL_FREE(p->start, p->item);
     return n;
-}
-
-/* drops vertices of no triangle, keeping the order of the others */
-static void drop_unused(pal_surface *s, int32_t *map)
-{
-    for (int i = 0; i < s->n_vertex; i++) map[i] = -1;
-    for (size_t c = 0; c < 3 * (size_t)s->n_tri; c++) map[s->tri[c]] = 0;
-    int n = 0;
-    for (int i = 0; i < s->n_vertex; i++) {
-        if (map[i] < 0) continue;
-        map[i] = n;
-        memmove(s->x + 3 * (size_t)n++, s->x + 3 * (size_t)i, 3 * sizeof(double));
-    }
-    s->n_vertex = n;
-    for (size_t c = 0; c < 3 * (size_t)s->n_tri; c++) s->tri[c] = map[s->tri[c]];
 }
 
 pal_err pal_surface_decimate(pal_surface *surface, int n_tri)
 {
-    size_t n_vertex = (size_t)surface->n_vertex + 1, n_edge = 3 * (size_t)surface->n_tri + 1;
+    size_t n_vertex = (size_t)surface->n_vertex, n_edge = 3 * (size_t)surface->n_tri;
     pal_surface work = {0};
     pass p = {.s = &work};
-    p.q = malloc(n_vertex * sizeof *p.q);
-    p.remap = malloc(n_vertex * sizeof *p.remap);
-    p.locked = malloc(n_vertex);
-    p.edge = malloc(2 * n_edge * sizeof *p.edge);
-    p.cost = malloc(n_edge * sizeof *p.cost);
-    p.order = malloc(2 * n_edge * sizeof *p.order);
     pal_err err = pal_surface_copy(surface, &work);
-    if (!p.q || !p.remap || !p.locked || !p.edge || !p.cost || !p.order) err = PAL_ERR_MEMORY;
+    PAL_ARRAY(&err, p.q, n_vertex);
+    PAL_ARRAY(&err, p.remap, n_vertex);
+    PAL_ARRAY(&err, p.locked, n_vertex);
+    PAL_ARRAY(&err, p.edge, 2 * n_edge);
+    PAL_ARRAY(&err, p.cost, n_edge);
+    PAL_ARRAY(&err, p.order, 2 * n_edge);
     if (!err) find_quadrics(&work, p.q);
     bool limited = true;
     while (!err && work.n_tri > n_tri) {
@@ -392,17 +359,12 @@ pal_err pal_surface_decimate(pal_surface *surface, int n_tri)
         limited = n > work.n_tri / 1000;
     }
     if (!err) {
-        drop_unused(&work, p.remap);
+        pal_surface_drop_unused(&work, p.remap);
         pal_surface_free(surface);
         *surface = work;
     } else {
         pal_surface_free(&work);
     }
-    free(p.q);
-    free(p.remap);
-    free(p.locked);
-    free(p.edge);
-    free(p.cost);
-    free(p.order);
+    PAL_FREE(p.q, p.remap, p.locked, p.edge, p.cost, p.order);
     return err;
 }

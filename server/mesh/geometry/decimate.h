@@ -1,4 +1,4 @@
-/* Fewer triangles for the same shape: edge collapse by quadric error (Garland and Heckbert 1997). Thread: [load]. */
+/* Fewer triangles for the same shape: edge collapse by quadric error (Garland and Heckbert 1997). Thread: [load] */
 #ifndef PAL_MESH_GEOMETRY_DECIMATE_H
 #define PAL_MESH_GEOMETRY_DECIMATE_H
 #include "server/mesh/geometry/surface.h"

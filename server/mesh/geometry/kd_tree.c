@@ -1,12 +1,11 @@
-/* kd-tree of points: the k nearest, deterministic (ties by smaller index).
- *
- * The order of the points is the tree: the middle point of a range splits it along the range's longest side, and the
+/* The order of the points is the tree: the middle point of a range splits it along the range's longest side, and the
  * two halves are the subtrees; ranges of up to LEAF points are searched linearly. No node structs, no pointers. */
 #include "server/mesh/geometry/kd_tree.h"
 
+#include "server/base/heap.h"
+#include "server/base/vec3.h"
+
 #include <stdbool.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { LEAF = 8 };
 
@@ -17,80 +16,68 @@ struct pal_kd_tree {
     uint8_t *axis;  /* split axis at middle points [n]    */
 };
 
-static void swap_points(pal_kd_tree *tree, int a, int b)
+static bool before(const double *x, int32_t a, int32_t b, int axis)
 {
-    int32_t i = tree->index[a];
-    tree->index[a] = tree->index[b];
-    tree->index[b] = i;
-    for (int k = 0; k < 3; k++) {
-        double d = tree->x[3 * (size_t)a + k];
-        tree->x[3 * (size_t)a + k] = tree->x[3 * (size_t)b + k];
-        tree->x[3 * (size_t)b + k] = d;
-    }
+    double p = x[3 * (size_t)a + (size_t)axis], q = x[3 * (size_t)b + (size_t)axis];
+    return p < q || (p == q && a < b);
 }
 
-static bool before(const pal_kd_tree *tree, int a, int b, int axis)
+int pal_kd_split(const double *x, int32_t *item, int n, int middle)
 {
-    double p = tree->x[3 * (size_t)a + axis], q = tree->x[3 * (size_t)b + axis];
-    return p < q || (p == q && tree->index[a] < tree->index[b]);
-}
-
-/* quickselect with a median-of-three pivot: moves the point of rank middle to its position, smaller ones before it */
-static void select_middle(pal_kd_tree *tree, int low, int high, int middle, int axis)
-{
-    while (low < high) {
-        int a = low + (high - low) / 2;
-        if (before(tree, a, low, axis)) swap_points(tree, a, low);
-        if (before(tree, high, low, axis)) swap_points(tree, high, low);
-        if (before(tree, high, a, axis)) swap_points(tree, high, a);
-        swap_points(tree, a, high); /* pivot to the end */
-        int place = low;
-        for (int i = low; i < high; i++)
-            if (before(tree, i, high, axis)) swap_points(tree, i, place++);
-        swap_points(tree, place, high);
-        if (place == middle) return;
-        if (place < middle)
-            low = place + 1;
-        else
-            high = place - 1;
-    }
-}
-
-/* low..high inclusive; depth is log2 n because the middle is exact */
-static void build(pal_kd_tree *tree, int low, int high)
-{
-    if (high - low < LEAF) return;
     double min[3], max[3];
-    memcpy(min, tree->x + 3 * (size_t)low, sizeof min);
-    memcpy(max, min, sizeof max);
-    for (int i = low + 1; i <= high; i++)
-        for (int k = 0; k < 3; k++) {
-            double v = tree->x[3 * (size_t)i + k];
-            if (v < min[k]) min[k] = v;
-            if (v > max[k]) max[k] = v;
-        }
-    int axis = 0, middle = low + (high - low) / 2;
+    int axis = 0, low = 0, high = n - 1;
+    pal_box3_empty(min, max);
+    for (int i = 0; i < n; i++) pal_box3_add(min, max, x + 3 * (size_t)item[i]);
     for (int k = 1; k < 3; k++)
         if (max[k] - min[k] > max[axis] - min[axis]) axis = k;
-    select_middle(tree, low, high, middle, axis);
-    tree->axis[middle] = (uint8_t)axis;
-    build(tree, low, middle - 1);
-    build(tree, middle + 1, high);
+    /* quickselect */
+    while (low < high) {
+        int32_t pivot = item[low + (high - low) / 2];
+        int i = low, j = high;
+        while (i <= j) {
+            while (before(x, item[i], pivot, axis)) i++;
+            while (before(x, pivot, item[j], axis)) j--;
+            if (i > j) break;
+            int32_t swap = item[i];
+            item[i++] = item[j];
+            item[j--] = swap;
+        }
+        if (middle <= j)
+            high = j;
+        else if (middle >= i)
+            low = i;
+        else
+            break;
+    }
+    return axis;
+}
+
+/* n points from `first` on; depth is log2 n because the middle is exact */
+static void build(pal_kd_tree *tree, const double *x, int first, int n)
+{
+    int half = (n - 1) / 2;
+    if (n <= LEAF) return;
+    tree->axis[first + half] = (uint8_t)pal_kd_split(x, tree->index + first, n, half);
+    build(tree, x, first, half);
+    build(tree, x, first + half + 1, n - half - 1);
 }
 
 pal_err pal_kd_tree_create(const double *x, int n_point, pal_kd_tree **out)
 {
-    size_t n = n_point > 0 ? (size_t)n_point : 0, room = n ? n : 1;
+    pal_err err = PAL_ERR_OK;
     pal_kd_tree *tree = calloc(1, sizeof *tree);
     if (!tree) return PAL_ERR_MEMORY;
-    *tree = (pal_kd_tree){(int)n, malloc(room * 3 * sizeof(double)), malloc(room * sizeof(int32_t)), calloc(room, 1)};
-    if (!tree->x || !tree->index || !tree->axis) {
+    tree->n = n_point;
+    PAL_ARRAY(&err, tree->x, 3 * (size_t)n_point);
+    PAL_ARRAY(&err, tree->index, n_point);
+    PAL_ZEROED(&err, tree->axis, n_point);
+    if (err) {
         pal_kd_tree_destroy(tree);
-        return PAL_ERR_MEMORY;
+        return err;
     }
-    if (n) memcpy(tree->x, x, n * 3 * sizeof *x);
-    for (size_t i = 0; i < n; i++) tree->index[i] = (int32_t)i;
-    build(tree, 0, (int)n - 1);
+    for (int i = 0; i < n_point; i++) tree->index[i] = i;
+    build(tree, x, 0, n_point);
+    for (int i = 0; i < n_point; i++) pal_copy3(tree->x + 3 * (size_t)i, x + 3 * (size_t)tree->index[i]);
     *out = tree;
     return PAL_ERR_OK;
 }
@@ -98,10 +85,7 @@ pal_err pal_kd_tree_create(const double *x, int n_point, pal_kd_tree **out)
 void pal_kd_tree_destroy(pal_kd_tree *tree)
 {
     if (!tree) return;
-    free(tree->x);
-    free(tree->index);
-    free(tree->axis);
-    free(tree);
+    PAL_FREE(tree->x, tree->index, tree->axis, tree);
 }
 
 typedef struct query {
@@ -154,11 +138,8 @@ static void descend(query *q, int low, int high)
 
 int pal_kd_tree_nearest(const pal_kd_tree *kd_tree, const double p[3], int k, int32_t *index, double *distance2)
 {
-    enum { LOCAL = 64 };
-    double local[LOCAL];
-    if (k > LOCAL && !distance2) k = LOCAL;
     if (k <= 0) return 0;
-    query q = {kd_tree, p, k, 0, index, distance2 ? distance2 : local};
+    query q = {kd_tree, p, k, 0, index, distance2};
     descend(&q, 0, kd_tree->n - 1);
     return q.found;
 }

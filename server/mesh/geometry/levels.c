@@ -1,10 +1,8 @@
-/* Detail levels: checks, edges of the coarse surface, then split by split (paper C, pre-processing phase).
- *
- * Departures: the paper stores pointers to parents and children; here they follow from the numbering. It takes any
- * mesh; here meshes without winged edges or stencils are refused with the reason, and the corners of the boundary,
- * which the four-point rule would round off, are found by their angle at rest. */
+/* Detail levels: checks, edges of the coarse surface, then split by split (paper C, pre-processing phase). Departure:
+ * the corners of the boundary, which the four-point rule would round off, are found by their angle at rest. */
 #include "server/mesh/geometry/levels.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/tuning.h"
 
@@ -15,9 +13,8 @@
 
 void pal_levels_free(pal_levels *l)
 {
-    void *all[] = {l->x,          l->edge,  l->face,   l->face_edge,     l->vertex_level,   l->edge_level,
-                   l->face_level, l->spoke, l->corner, l->stencil_start, l->stencil_vertex, l->stencil_weight};
-    for (size_t k = 0; k < sizeof all / sizeof *all; k++) free(all[k]);
+    PAL_FREE(l->x, l->edge, l->face, l->face_edge, l->vertex_level, l->edge_level, l->face_level, l->spoke, l->corner,
+             l->stencil_start, l->stencil_vertex, l->stencil_weight);
     memset(l, 0, sizeof *l);
 }
 
@@ -33,12 +30,10 @@ static pal_err check_face(const pal_surface *s, int t, pal_diagnostic *diag)
         if (c[k] == c[(k + 1) % 3])
             return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: triangle %d has vertex %d twice", t, c[k]);
     }
-    double longest = 0, u[3], v[3], n[3];
+    double longest = 0, n[3];
     for (int k = 0; k < 3; k++)
         longest = fmax(longest, pal_dist3(s->x + 3 * (size_t)c[k], s->x + 3 * (size_t)c[(k + 1) % 3]));
-    pal_sub3(u, s->x + 3 * (size_t)c[1], s->x + 3 * (size_t)c[0]);
-    pal_sub3(v, s->x + 3 * (size_t)c[2], s->x + 3 * (size_t)c[0]);
-    pal_cross3(n, u, v);
+    pal_normal3(n, s->x + 3 * (size_t)c[0], s->x + 3 * (size_t)c[1], s->x + 3 * (size_t)c[2]);
     if (pal_norm3(n) > LEVEL_FLAT * longest * longest) return PAL_ERR_OK;
     return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
                               "levels: triangle %d (vertices %d, %d, %d) has no area: clean the surface", t, c[0], c[1],
@@ -69,50 +64,26 @@ static pal_err check_input(const pal_surface *s, const pal_levels_options *o, pa
 
 /* ---- edges of the coarse surface ---- */
 
-/* side k of a triangle t as 3 t + k; the smaller and the larger of its vertices */
-static void side_ends(const pal_surface *s, int32_t side, int32_t *low, int32_t *high)
+/* one edge of a vertex from its n sides; the first gives its direction */
+static pal_err make_edge(const pal_surface *s, int32_t low, const pal_surface_side *side, int n, int32_t e,
+                         pal_winged_edge *edge, int32_t *face_edge, pal_diagnostic *diag)
 {
-    int32_t a = s->tri[side], b = s->tri[side % 3 == 2 ? side - 2 : side + 1];
-    *low = a < b ? a : b, *high = a < b ? b : a;
-}
-
-/* sides in the order of their larger (of = 1) or smaller (of = 0) vertex, equal ones in the order they came in */
-static void order_sides(const pal_surface *s, int of, const int32_t *from, int32_t *to, int32_t *count)
-{
-    int32_t n = 3 * s->n_tri, end[2];
-    memset(count, 0, ((size_t)s->n_vertex + 1) * sizeof *count);
-    for (int32_t i = 0; i < n; i++) {
-        side_ends(s, i, &end[0], &end[1]);
-        count[end[of] + 1]++;
-    }
-    for (int v = 0; v < s->n_vertex; v++) count[v + 1] += count[v];
-    for (int32_t i = 0; i < n; i++) {
-        int32_t side = from ? from[i] : i;
-        side_ends(s, side, &end[0], &end[1]);
-        to[count[end[of]]++] = side;
-    }
-}
-
-/* one edge from its n sides; the first gives its direction */
-static pal_err make_edge(const pal_surface *s, const int32_t *side, int n, int32_t e, pal_winged_edge *edge,
-                         int32_t *face_edge, pal_diagnostic *diag)
-{
-    int32_t low, high, a = s->tri[side[0]];
-    side_ends(s, side[0], &low, &high);
+    int32_t high = side->high, a = s->tri[side->corner];
     if (n > 2)
         return pal_diagnostic_set(
             diag, PAL_ERR_REFUSED,
             "levels: %d triangles (%d, %d, %d%s) share the edge of vertices %d and %d, a surface has two "
             "at most; " OFFER,
-            n, side[0] / 3, side[1] / 3, side[2] / 3, n > 3 ? ", ..." : "", low, high);
-    if (n == 2 && s->tri[side[1]] == a)
+            n, side[0].corner / 3, side[1].corner / 3, side[2].corner / 3, n > 3 ? ", ..." : "", low, high);
+    if (n == 2 && s->tri[side[1].corner] == a)
         return pal_diagnostic_set(
             diag, PAL_ERR_REFUSED,
             "levels: triangles %d and %d run the same way through the edge of vertices %d and %d: turn "
             "one over, or " OFFER,
-            side[0] / 3, side[1] / 3, low, high);
-    edge[e] = (pal_winged_edge){{a, a == low ? high : low}, {side[0] / 3, n == 2 ? side[1] / 3 : -1}, {0, 0}, {0, 0}};
-    for (int k = 0; k < n; k++) face_edge[side[k]] = e;
+            side[0].corner / 3, side[1].corner / 3, low, high);
+    edge[e] = (pal_winged_edge){.vertex = {a, a == low ? high : low},
+                                .face = {side[0].corner / 3, n == 2 ? side[1].corner / 3 : -1}};
+    for (int k = 0; k < n; k++) face_edge[side[k].corner] = e;
     return PAL_ERR_OK;
 }
 
@@ -120,26 +91,17 @@ static pal_err make_edge(const pal_surface *s, const int32_t *side, int n, int32
 static pal_err find_edges(const pal_surface *s, pal_winged_edge *edge, int32_t *face_edge, int32_t *n_edge,
                           pal_diagnostic *diag)
 {
-    size_t n = 3 * (size_t)s->n_tri;
-    int32_t *order = malloc(2 * n * sizeof *order), *count = malloc(((size_t)s->n_vertex + 1) * sizeof *count);
-    pal_err err = order && count ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    int32_t *start;
+    pal_surface_side *side;
+    pal_err err = pal_surface_sides(s, &start, &side);
+    if (err) return err;
     *n_edge = 0;
-    if (!err) {
-        order_sides(s, 1, NULL, order, count);
-        order_sides(s, 0, order, order + n, count);
-    }
-    const int32_t *side = order + n;
-    for (size_t i = 0, many; !err && i < n; i += many) {
-        int32_t low, high, l, h;
-        side_ends(s, side[i], &low, &high);
-        for (many = 1; i + many < n; many++) {
-            side_ends(s, side[i + many], &l, &h);
-            if (l != low || h != high) break;
+    for (int32_t v = 0; v < s->n_vertex; v++)
+        for (int32_t i = start[v], end = i; !err && i < start[v + 1]; i = end) {
+            while (end < start[v + 1] && side[end].high == side[i].high) end++;
+            err = make_edge(s, v, side + i, end - i, (*n_edge)++, edge, face_edge, diag);
         }
-        err = make_edge(s, side + i, many < 1000 ? (int)many : 1000, (*n_edge)++, edge, face_edge, diag);
-    }
-    free(order);
-    free(count);
+    PAL_FREE(start, side);
     return err;
 }
 
@@ -269,26 +231,26 @@ static pal_err refuse_budget(double byte, size_t budget, const pal_levels *l, pa
 static pal_err get_memory(pal_levels *l)
 {
     int last = l->n_level - 1;
-    size_t v = (size_t)l->n_vertex[last], e = (size_t)l->first_edge[last + 1], f = (size_t)l->first_face[last + 1];
-    l->x = malloc(v * 3 * sizeof *l->x);
-    l->edge = malloc(e * sizeof *l->edge);
-    l->face = malloc(f * 3 * sizeof *l->face);
-    l->face_edge = malloc(f * 3 * sizeof *l->face_edge);
-    l->vertex_level = malloc(v);
-    l->edge_level = malloc(e);
-    l->face_level = malloc(f);
-    l->spoke = malloc((size_t)l->first_spoke[last + 1] * sizeof *l->spoke);
-    l->stencil_start = calloc(v - (size_t)l->n_vertex[0] + 1, sizeof *l->stencil_start);
-    l->corner = calloc((size_t)l->n_vertex[0], 1);
-    bool ok = l->x && l->edge && l->face && l->face_edge && l->vertex_level && l->edge_level && l->face_level &&
-              l->spoke && l->stencil_start && l->corner;
-    for (int k = 0; ok && k <= last; k++) {
+    int32_t v = l->n_vertex[last], e = l->first_edge[last + 1];
+    size_t f = (size_t)l->first_face[last + 1];
+    pal_err err = PAL_ERR_OK;
+    PAL_ARRAY(&err, l->x, 3 * (size_t)v);
+    PAL_ARRAY(&err, l->edge, e);
+    PAL_ARRAY(&err, l->face, 3 * f);
+    PAL_ARRAY(&err, l->face_edge, 3 * f);
+    PAL_ARRAY(&err, l->vertex_level, v);
+    PAL_ARRAY(&err, l->edge_level, e);
+    PAL_ARRAY(&err, l->face_level, f);
+    PAL_ARRAY(&err, l->spoke, l->first_spoke[last + 1]);
+    PAL_ZEROED(&err, l->stencil_start, v - l->n_vertex[0] + 1);
+    PAL_ZEROED(&err, l->corner, l->n_vertex[0]);
+    for (int k = 0; !err && k <= last; k++) {
         int32_t from = k ? l->n_vertex[k - 1] : 0;
         memset(l->vertex_level + from, k, (size_t)(l->n_vertex[k] - from));
         memset(l->edge_level + l->first_edge[k], k, (size_t)pal_levels_n_edge(l, k));
         memset(l->face_level + l->first_face[k], k, (size_t)pal_levels_n_face(l, k));
     }
-    return ok ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    return err;
 }
 
 /* rows of stencils are written one after another: room for the most there can be, 8 for an edge with regular ends and,
@@ -298,9 +260,10 @@ static pal_err get_entries(pal_levels *l, int64_t irregular, size_t budget, pal_
     double n = 8.0 * l->first_edge[l->n_level - 1] + (double)(l->n_level - 1) * (double)irregular;
     double byte = (double)plain_bytes(l) + n * (double)ENTRY_BYTES;
     if (byte > (double)budget || n > INT32_MAX) return refuse_budget(byte, budget, l, diag);
-    l->stencil_vertex = malloc(((size_t)n + 1) * sizeof *l->stencil_vertex);
-    l->stencil_weight = malloc(((size_t)n + 1) * sizeof *l->stencil_weight);
-    return l->stencil_vertex && l->stencil_weight ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    PAL_ARRAY(&err, l->stencil_vertex, n);
+    PAL_ARRAY(&err, l->stencil_weight, n);
+    return err;
 }
 
 /* returns the memory that the stencils did not need */
@@ -316,14 +279,16 @@ static void trim_entries(pal_levels *l)
 
 /* ---- splitting ---- */
 
-static void place_midpoints(pal_levels *l, int level)
+/* entry: room for the largest stencil */
+static void place_midpoints(pal_levels *l, int level, pal_stencil_entry *entry)
 {
     pal_winged_mesh wings = {l->edge, l->corner, l->n_vertex[0]};
     int32_t v = l->n_vertex[level];
     for (int32_t e = l->first_edge[level]; e < l->first_edge[level + 1]; e++, v++) {
-        int32_t *start = l->stencil_start + (v - l->n_vertex[0]);
-        start[1] =
-            start[0] + pal_butterfly_stencil(&wings, e, l->stencil_vertex + start[0], l->stencil_weight + start[0]);
+        int32_t *start = l->stencil_start + (v - l->n_vertex[0]), n = pal_butterfly_stencil(&wings, e, entry);
+        for (int32_t k = 0; k < n; k++)
+            l->stencil_vertex[start[0] + k] = entry[k].vertex, l->stencil_weight[start[0] + k] = entry[k].weight;
+        start[1] = start[0] + n;
         pal_levels_midpoint(l, v, l->x, l->x + 3 * (size_t)v);
     }
 }
@@ -346,7 +311,7 @@ static void split_face(pal_levels *l, int32_t f)
         l->face[3 * (size_t)middle + (size_t)k] = mid[k];
         /* the middle face runs from midpoint k - 1 to k along inner edge k */
         l->face_edge[3 * (size_t)middle + (size_t)before] = inner[k];
-        l->edge[inner[k]] = (pal_winged_edge){{mid[before], mid[k]}, {0, 0}, {0, 0}, {0, 0}};
+        l->edge[inner[k]] = (pal_winged_edge){.vertex = {mid[before], mid[k]}};
     }
 }
 
@@ -356,8 +321,8 @@ static void split_level(pal_levels *l, int level)
     for (int32_t e = l->first_edge[level]; e < l->first_edge[level + 1]; e++) {
         pal_winged_edge from = l->edge[e], *half = &l->edge[pal_levels_edge_half(l, e, 0)];
         int32_t mid = pal_levels_edge_midpoint(l, e), right = from.face[1] < 0 ? -1 : 0;
-        half[0] = (pal_winged_edge){{from.vertex[0], mid}, {0, right}, {0, 0}, {0, 0}};
-        half[1] = (pal_winged_edge){{mid, from.vertex[1]}, {0, right}, {0, 0}, {0, 0}};
+        half[0] = (pal_winged_edge){.vertex = {from.vertex[0], mid}, .face = {0, right}};
+        half[1] = (pal_winged_edge){.vertex = {mid, from.vertex[1]}, .face = {0, right}};
     }
     for (int32_t f = l->first_face[level]; f < l->first_face[level + 1]; f++) split_face(l, f);
 }
@@ -400,8 +365,9 @@ static pal_err take_coarse(const pal_surface *s, pal_levels *l, const pal_winged
     return err;
 }
 
+/* scratch: edge and face_edge [3 n_tri]; entry [6 n_tri + 16], since no vertex has more edges than 3 n_tri */
 static pal_err make_levels(const pal_surface *s, const pal_levels_options *o, pal_levels *l, pal_winged_edge *edge,
-                           int32_t *face_edge, pal_diagnostic *diag)
+                           int32_t *face_edge, pal_stencil_entry *entry, pal_diagnostic *diag)
 {
     size_t budget = o->budget_byte ? o->budget_byte : HIERARCHY_BUDGET_BYTE;
     int32_t n_edge;
@@ -416,7 +382,7 @@ static pal_err make_levels(const pal_surface *s, const pal_levels_options *o, pa
     PAL_TRY(get_entries(l, irregular, budget, diag));
     for (int k = 0; k + 1 < l->n_level; k++) {
         int32_t none;
-        place_midpoints(l, k);
+        place_midpoints(l, k, entry);
         split_level(l, k);
         if (!link_level(l, k + 1, &none)) return PAL_ERR_INTERNAL;
     }
@@ -432,11 +398,15 @@ pal_err pal_levels_make(const pal_surface *surface, const pal_levels_options *op
     PAL_TRY(check_input(surface, options, diag));
     pal_levels l = {.n_level = options->n_level};
     size_t n_corner = 3 * (size_t)surface->n_tri;
-    pal_winged_edge *edge = malloc(n_corner * sizeof *edge);
-    int32_t *face_edge = malloc(n_corner * sizeof *face_edge);
-    pal_err err = edge && face_edge ? make_levels(surface, options, &l, edge, face_edge, diag) : PAL_ERR_MEMORY;
-    free(edge);
-    free(face_edge);
+    pal_err err = PAL_ERR_OK;
+    pal_winged_edge *edge;
+    int32_t *face_edge;
+    pal_stencil_entry *entry;
+    PAL_ARRAY(&err, edge, n_corner);
+    PAL_ARRAY(&err, face_edge, n_corner);
+    PAL_ARRAY(&err, entry, 2 * n_corner + 16);
+    if (!err) err = make_levels(surface, options, &l, edge, face_edge, entry, diag);
+    PAL_FREE(edge, face_edge, entry);
     if (err) {
         pal_levels_free(&l);
         return err;

@@ -1,10 +1,6 @@
-/* All detail levels of a triangle surface, made once before a session (paper C, spatial adaptation).
- *
- * Each level splits every face of the level before into four (1 to 4), with the midpoint of each edge placed by
- * modified butterfly subdivision (butterfly.h). The scheme interpolates: vertices of a level stay vertices of every
- * finer level, so that level l's vertices are the first n_vertex[l] of one array. Edges and faces differ from level to
- * level; theirs stand level after level in one array each, level l's in first_edge[l] .. first_edge[l+1]-1. All numbers
- * (vertices, edges, faces) are global, and the family tree follows from them:
+/* All detail levels of a triangle surface (paper C; server/mesh/README.md, levels of a surface). Level l's vertices are
+ * the first n_vertex[l] of one array; edges and faces stand level after level in one array each. All numbers are
+ * global, and the family tree follows from them:
  *
  *   midpoint of edge e of level l   n_vertex[l] + i                      with i = e - first_edge[l]
  *   its halves                      first_edge[l+1] + 2 i + {0, 1}       start to midpoint, midpoint to end
@@ -13,12 +9,11 @@
  *
  * Child k < 3 keeps corner k and has it as corner k; child 3 is the middle one, its corner k being the midpoint of the
  * face's edge k (from corner k to k + 1). Inner edge k cuts off corner k; child 3 lies on its left, child k on its
- * right. Counts: V' = V + E, E' = 2 E + 3 F (4 E when closed), F' = 4 F.
+ * right.
  *
  * The edges' adjacency is winged (butterfly.h) within each level; pal_levels_spoke and pal_wing_next_around walk the
  * edges and faces of any level around a vertex. A pal_levels owns its arrays (heap); it is constant once made and may
- * be shared. Memory: about 330 bytes per finest vertex of a mesh with few irregular vertices; n_byte says it. Thread:
- * [load] to make, [any] to read. */
+ * be shared. Memory: about 330 bytes per finest vertex. Thread: [load] to make, [any] to read. */
 #ifndef PAL_MESH_GEOMETRY_LEVELS_H
 #define PAL_MESH_GEOMETRY_LEVELS_H
 #include "server/mesh/geometry/butterfly.h"
@@ -96,14 +91,6 @@ static inline int32_t pal_levels_edge_parent(const pal_levels *l, int32_t e)
     if (level == 0) return -1;
     int32_t i = e - l->first_edge[level];
     return i < 2 * pal_levels_n_edge(l, level - 1) ? l->first_edge[level - 1] + i / 2 : -1;
-}
-/* the face that e is an inner edge of; -1: of level 0, or half of an edge */
-static inline int32_t pal_levels_edge_parent_face(const pal_levels *l, int32_t e)
-{
-    int level = l->edge_level[e];
-    if (level == 0) return -1;
-    int32_t i = e - l->first_edge[level] - 2 * pal_levels_n_edge(l, level - 1);
-    return i >= 0 ? l->first_face[level - 1] + i / 3 : -1;
 }
 
 /* parents and children of a face */

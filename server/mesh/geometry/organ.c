@@ -6,6 +6,7 @@
 #include "server/mesh/geometry/contour.h"
 #include "server/mesh/geometry/decimate.h"
 #include "server/mesh/geometry/smooth.h"
+#include "server/mesh/geometry/tuning.h"
 
 /* about the signed distance to an ellipsoid, positive inside: exact at the surface to first order */
 static double ellipsoid(const double p[3], const double middle[3], const double axis[3])
@@ -41,12 +42,12 @@ static double liver(const void *self, const double p[3])
 pal_err pal_organ_make(int n_tri_about, pal_surface *out)
 {
     int n = n_tri_about < 500 ? 500 : n_tri_about > 500000 ? 500000 : n_tri_about;
-    /* about 0.065 m^2 of surface at 9 triangles per squared spacing, three times as many as wanted */
+    /* about 0.065 m^2 of surface */
     pal_contour_box box = {{-0.13, -0.09, -0.08}, {0.13, 0.09, 0.08}, 0};
-    box.spacing_m = fmin(sqrt(9 * 0.065 / (3.0 * n)), 0.006);
+    box.spacing_m = fmin(sqrt(CONTOUR_TRI_PER_SPACING2 * 0.065 / (CONTOUR_SURPLUS * n)), 0.006);
     pal_surface organ;
     PAL_TRY(pal_contour(liver, NULL, &box, &organ, NULL));
-    pal_err err = pal_surface_smooth(&organ, 5);
+    pal_err err = pal_surface_smooth(&organ, 5, NULL);
     if (!err) err = pal_surface_decimate(&organ, n);
     if (err) {
         pal_surface_free(&organ);

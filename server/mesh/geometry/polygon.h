@@ -18,8 +18,10 @@ static inline void pal_polygon_add(pal_polygon *p, const double x[3])
     p->n++;
 }
 
-/* height [n] of the corners over the plane; low takes what lies below, high what lies above (either may be NULL) */
-static inline void pal_polygon_cut(const pal_polygon *p, const double *height, pal_polygon *low, pal_polygon *high)
+/* height [n] of the corners over the plane; low takes what lies below, high what lies above (either may be NULL). axis
+ * not negative: the plane where this coordinate is `at`, so that corners of the cut lie on it to the bit */
+static inline void pal_polygon_cut(const pal_polygon *p, const double *height, int axis, double at, pal_polygon *low,
+                                   pal_polygon *high)
 {
     if (low) low->n = 0;
     if (high) high->n = 0;
@@ -30,29 +32,17 @@ static inline void pal_polygon_cut(const pal_polygon *p, const double *height, p
         if (a >= 0 && high) pal_polygon_add(high, p->x[i]);
         if (!((a < 0 && b > 0) || (a > 0 && b < 0))) continue;
         double t = a / (a - b);
-        for (int k = 0; k < 3; k++) q[k] = p->x[i][k] + t * (p->x[j][k] - p->x[i][k]);
+        for (int k = 0; k < 3; k++) q[k] = k == axis ? at : p->x[i][k] + t * (p->x[j][k] - p->x[i][k]);
         if (low) pal_polygon_add(low, q);
         if (high) pal_polygon_add(high, q);
     }
 }
 
-/* the same by the plane where coordinate axis is `at`: corners of the cut lie on it to the bit */
 static inline void pal_polygon_cut_axis(const pal_polygon *p, int axis, double at, pal_polygon *low, pal_polygon *high)
 {
-    if (low) low->n = 0;
-    if (high) high->n = 0;
-    for (int i = 0; i < p->n; i++) {
-        int j = i + 1 == p->n ? 0 : i + 1;
-        double a = p->x[i][axis] - at, b = p->x[j][axis] - at, q[3];
-        if (a <= 0 && low) pal_polygon_add(low, p->x[i]);
-        if (a >= 0 && high) pal_polygon_add(high, p->x[i]);
-        if (!((a < 0 && b > 0) || (a > 0 && b < 0))) continue;
-        double t = a / (a - b);
-        for (int k = 0; k < 3; k++) q[k] = p->x[i][k] + t * (p->x[j][k] - p->x[i][k]);
-        q[axis] = at;
-        if (low) pal_polygon_add(low, q);
-        if (high) pal_polygon_add(high, q);
-    }
+    double height[PAL_POLYGON_MAX];
+    for (int i = 0; i < p->n; i++) height[i] = p->x[i][axis] - at;
+    pal_polygon_cut(p, height, axis, at, low, high);
 }
 
 static inline void pal_polygon_range(const pal_polygon *p, int axis, double *min, double *max)

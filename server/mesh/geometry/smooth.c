@@ -1,13 +1,9 @@
-/* Taubin smoothing with equal weights: "A signal processing approach to fair surface design", 1995. The pass band ends
- * at k = 1/0.5 - 1/0.53 = 0.11, so shapes longer than about ten edges keep their size. */
+/* Taubin smoothing with equal weights: "A signal processing approach to fair surface design", 1995. */
 #include "server/mesh/geometry/smooth.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
-
-#include <stdlib.h>
-#include <string.h>
-
-static const double there = 0.5, back = -0.53;
+#include "server/mesh/geometry/tuning.h"
 
 /* one step: x += factor (mean of neighbours - x), sums [n_vertex][3] and degree [n_vertex] as scratch; on an oriented
  * closed surface every neighbour is the next corner of exactly one triangle */
@@ -58,42 +54,32 @@ static void limit_displacement(pal_surface *s, const double *start, const double
     }
 }
 
-/* relaxes when there is a reach, else smooths without shrinkage */
-static pal_err run(pal_surface *surface, int rounds, const double *reach_m)
+pal_err pal_surface_smooth(pal_surface *surface, int rounds, const double *reach_m)
 {
-    size_t n = (size_t)surface->n_vertex + 1;
-    double *sum = malloc(3 * n * sizeof *sum);
-    int32_t *degree = malloc(n * sizeof *degree);
-    int64_t *balance = malloc(n * sizeof *balance);
-    uint8_t *fixed = malloc(n);
-    double *start = malloc(6 * n * sizeof *start), *normal = start ? start + 3 * n : NULL;
-    pal_err err = sum && degree && balance && fixed && start ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    size_t n = (size_t)surface->n_vertex;
+    pal_err err = PAL_ERR_OK;
+    double *sum, *start, *normal;
+    int32_t *degree;
+    int64_t *balance;
+    uint8_t *fixed;
+    PAL_ARRAY(&err, sum, 3 * n);
+    PAL_ARRAY(&err, start, 3 * n);
+    PAL_ARRAY(&err, normal, 3 * n);
+    PAL_ARRAY(&err, degree, n);
+    PAL_ARRAY(&err, balance, n);
+    PAL_ARRAY(&err, fixed, n);
     if (!err) {
-        memcpy(start, surface->x, 3 * (size_t)surface->n_vertex * sizeof *start);
+        memcpy(start, surface->x, 3 * n * sizeof *start);
         pal_surface_normals(surface, normal);
         find_fixed(surface, degree, balance, fixed);
         for (int k = 0; k < rounds; k++) {
-            step(surface, there, sum, degree, fixed);
+            step(surface, SMOOTH_STEP, sum, degree, fixed);
             if (reach_m)
                 limit_displacement(surface, start, normal, reach_m);
             else
-                step(surface, back, sum, degree, fixed);
+                step(surface, SMOOTH_BACK, sum, degree, fixed);
         }
     }
-    free(start);
-    free(sum);
-    free(degree);
-    free(balance);
-    free(fixed);
+    PAL_FREE(sum, start, normal, degree, balance, fixed);
     return err;
-}
-
-pal_err pal_surface_smooth(pal_surface *surface, int rounds)
-{
-    return run(surface, rounds, NULL);
-}
-
-pal_err pal_surface_relax(pal_surface *surface, int rounds, const double *reach_m)
-{
-    return run(surface, rounds, reach_m);
 }

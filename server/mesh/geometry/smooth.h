@@ -4,10 +4,8 @@
 #define PAL_MESH_GEOMETRY_SMOOTH_H
 #include "server/mesh/geometry/surface.h"
 
-/* rounds of one step there (0.5) and back (-0.53), in place; vertices of open edges stay; MEMORY */
-pal_err pal_surface_smooth(pal_surface *surface, int rounds);
-/* Rounds of the step towards the neighbours' mean alone, but vertex i stays within reach_m[i] of its start along its
- * normal and within twice that tangentially: removes all waves that the reach covers, long ones too; in place; vertices
- * of open edges stay; MEMORY */
-pal_err pal_surface_relax(pal_surface *surface, int rounds, const double *reach_m);
+/* Rounds of one step there (0.5) and back (-0.53), in place; vertices of open edges stay. With reach_m [n_vertex] (may
+ * be NULL) rounds of the step there alone, but vertex i stays within reach_m[i] of its start along its normal and
+ * within twice that tangentially: removes all waves that the reach covers, long ones too. MEMORY */
+pal_err pal_surface_smooth(pal_surface *surface, int rounds, const double *reach_m);
 #endif

@@ -2,21 +2,17 @@
  * function, distributed evenly along it and flipped to a Delaunay triangulation. Counts are those of the rings. */
 #include "server/mesh/geometry/stomach.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 
-#include <stdlib.h>
-#include <string.h>
-
-#define PI       3.14159265358979323846
 #define WIDE_COS 0.766 /* cosine of 40 degrees: larger angles are not changed */
 
 /* distance-like: positive inside, zero at the surface */
 typedef double (*shape)(const double p[3]);
 
 typedef struct ring {
-    int n;        /* vertices, 1: a pole */
+    int n;        /* vertices, 1: a pole on the spine */
     double along; /* place on the spine, in nodes */
-    double swell; /* radius, of the spine's there */
     bool fixed;   /* stays as it is made */
 } ring;
 
@@ -38,14 +34,12 @@ typedef struct hollow {
 
 static void spine_at(const node *spine, int n, double along, node *out, double axis[3])
 {
-    int i = (int)along;
-    if (i > n - 2) i = n - 2;
+    int i = along < n - 2 ? (int)along : n - 2;
     double t = along - i;
-    for (int a = 0; a < 3; a++) {
-        out->x[a] = spine[i].x[a] + t * (spine[i + 1].x[a] - spine[i].x[a]);
-        axis[a] = spine[i + 1].x[a] - spine[i].x[a];
-    }
-    out->r = spine[i].r + t * (spine[i + 1].r - spine[i].r);
+    *out = spine[i];
+    pal_sub3(axis, spine[i + 1].x, spine[i].x);
+    pal_axpy3(out->x, t, axis);
+    out->r += t * (spine[i + 1].r - spine[i].r);
     pal_unit3(axis, axis, 0);
 }
 
@@ -57,7 +51,7 @@ static void ring_vertices(const ring *r, const node *at, const double axis[3], d
     if (!pal_unit3(up, up, 1e-6)) pal_set3(up, 1, 0, 0);
     pal_cross3(side, axis, up);
     for (int i = 0; i < r->n; i++) {
-        double angle = 2 * PI * i / r->n, radius = r->n == 1 ? 0 : at->r * r->swell;
+        double angle = 2 * M_PI * i / r->n, radius = r->n == 1 ? 0 : at->r;
         pal_copy3(x + 3 * i, at->x);
         pal_axpy3(x + 3 * i, radius * cos(angle), up);
         pal_axpy3(x + 3 * i, radius * sin(angle), side);
@@ -75,10 +69,7 @@ static int zip(int n_a, int32_t a, int n_b, int32_t b, int32_t *tri)
         int32_t p = a + i % n_a, q = b + j % n_b;
         int32_t face[3] = {p, on_a ? a + (i + 1) % n_a : b + (j + 1) % n_b, q};
         memcpy(tri + 3 * n++, face, sizeof face);
-        if (on_a)
-            i++;
-        else
-            j++;
+        i += on_a, j += !on_a;
     }
     return n;
 }
@@ -123,12 +114,12 @@ static void gradient(shape inside, const double p[3], double g[3])
 static void count_around(hollow *body)
 {
     const pal_surface *s = body->s;
-    size_t n = (size_t)s->n_vertex;
-    memset(body->owner, -1, n * n * sizeof *body->owner);
-    memset(body->valence, 0, n);
+    int32_t n = s->n_vertex;
+    memset(body->owner, -1, (size_t)(n * n) * sizeof *body->owner);
+    memset(body->valence, 0, (size_t)n);
     for (int c = 0; c < 3 * s->n_tri; c++) {
         int32_t a = s->tri[c], b = s->tri[c % 3 == 2 ? c - 2 : c + 1];
-        body->owner[(size_t)a * n + (size_t)b] = c / 3;
+        body->owner[a * n + b] = c / 3;
         body->valence[a]++;
     }
 }
@@ -148,48 +139,35 @@ static int32_t third(const int32_t *tri, int32_t a, int32_t b)
     return tri[0] != a && tri[0] != b ? tri[0] : tri[1] != a && tri[1] != b ? tri[1] : tri[2];
 }
 
-static void face_normal(const double *x, int32_t a, int32_t b, int32_t c, double n[3])
-{
-    double u[3], v[3];
-    pal_sub3(u, x + 3 * b, x + 3 * a);
-    pal_sub3(v, x + 3 * c, x + 3 * a);
-    pal_cross3(n, u, v);
-}
-
 /* do c d b and d c a have the orientation of a b c and b a d? */
-static bool stays_flat(const double *x, int32_t a, int32_t b, int32_t c, int32_t d)
+static bool stays_flat(const double *a, const double *b, const double *c, const double *d)
 {
-    double n[3], m[3];
-    face_normal(x, a, b, c, n);
-    face_normal(x, b, a, d, m);
+    double n[3], m[3], left[3], right[3];
+    pal_normal3(n, a, b, c);
+    pal_normal3(m, b, a, d);
     pal_add3(n, n, m);
-    face_normal(x, c, d, b, m);
-    if (!(pal_dot3(n, m) > 0)) return false;
-    face_normal(x, d, c, a, m);
-    return pal_dot3(n, m) > 0;
+    pal_normal3(left, c, d, b);
+    pal_normal3(right, d, c, a);
+    return pal_dot3(n, left) > 0 && pal_dot3(n, right) > 0;
 }
 
 /* flips the edge a b of two faces to c d when its opposite angles sum to more than 180 degrees */
 static void flip_edge(hollow *body, int32_t a, int32_t b)
 {
     const pal_surface *s = body->s;
-    size_t n = (size_t)s->n_vertex;
-    int32_t left = body->owner[(size_t)a * n + (size_t)b], right = body->owner[(size_t)b * n + (size_t)a];
+    int32_t n = s->n_vertex, *owner = body->owner, left = owner[a * n + b], right = owner[b * n + a];
     int32_t *tl = s->tri + 3 * left, *tr = s->tri + 3 * right, c = third(tl, a, b), d = third(tr, a, b);
-    const double *x = s->x;
+    const double *xa = s->x + 3 * a, *xb = s->x + 3 * b, *xc = s->x + 3 * c, *xd = s->x + 3 * d;
     if (body->fixed[a] && body->fixed[b]) return;
     if (body->valence[a] < 5 || body->valence[b] < 5 || body->valence[c] > 6 || body->valence[d] > 6) return;
-    if (body->owner[(size_t)c * n + (size_t)d] >= 0 || body->owner[(size_t)d * n + (size_t)c] >= 0) return;
-    if (cotangent(x + 3 * c, x + 3 * a, x + 3 * b) + cotangent(x + 3 * d, x + 3 * a, x + 3 * b) > -1e-3) return;
-    if (!stays_flat(x, a, b, c, d)) return;
+    if (owner[c * n + d] >= 0 || owner[d * n + c] >= 0) return;
+    if (cotangent(xc, xa, xb) + cotangent(xd, xa, xb) > -1e-3 || !stays_flat(xa, xb, xc, xd)) return;
     int32_t one[3] = {c, d, b}, two[3] = {d, c, a};
     memcpy(tl, one, sizeof one);
     memcpy(tr, two, sizeof two);
-    body->owner[(size_t)a * n + (size_t)b] = body->owner[(size_t)b * n + (size_t)a] = -1;
-    body->owner[(size_t)c * n + (size_t)d] = body->owner[(size_t)d * n + (size_t)b] =
-        body->owner[(size_t)b * n + (size_t)c] = left;
-    body->owner[(size_t)d * n + (size_t)c] = body->owner[(size_t)c * n + (size_t)a] =
-        body->owner[(size_t)a * n + (size_t)d] = right;
+    owner[a * n + b] = owner[b * n + a] = -1;
+    owner[c * n + d] = owner[d * n + b] = owner[b * n + c] = left;
+    owner[d * n + c] = owner[c * n + a] = owner[a * n + d] = right;
     body->valence[a]--, body->valence[b]--, body->valence[c]++, body->valence[d]++;
 }
 
@@ -213,7 +191,7 @@ static void smooth_tangentially(hollow *body, double share)
     for (int t = 0; t < s->n_tri; t++) {
         const int32_t *c = s->tri + 3 * t;
         double n[3];
-        face_normal(s->x, c[0], c[1], c[2], n);
+        pal_normal3(n, s->x + 3 * c[0], s->x + 3 * c[1], s->x + 3 * c[2]);
         double area = pal_norm3(n);
         for (int k = 0; k < 9; k++) pal_axpy3(body->move + 4 * c[k / 3], area / 3, s->x + 3 * c[k % 3]);
         for (int k = 0; k < 3; k++) body->move[4 * c[k] + 3] += area;
@@ -270,8 +248,8 @@ static void widen(hollow *body, int32_t v, double step)
     for (int k = 0; k < WAYS && best > WIDE_COS; k++) {
         double to[3];
         pal_copy3(to, from);
-        pal_axpy3(to, step * cos(2 * PI * k / WAYS), side);
-        pal_axpy3(to, step * sin(2 * PI * k / WAYS), up);
+        pal_axpy3(to, step * cos(2 * M_PI * k / WAYS), side);
+        pal_axpy3(to, step * sin(2 * M_PI * k / WAYS), up);
         to_surface(body, to);
         double now = min_cosine(s->x, to, around, n);
         if (now < best) best = now, pal_copy3(x, to);
@@ -284,11 +262,12 @@ static pal_err make_hollow_body(const ring *rings, int n_ring, const node *spine
 {
     enum { MAX_VERTEX = 256, STEPS = 500, WIDENINGS = 40 };
     uint8_t valence[MAX_VERTEX], fixed[MAX_VERTEX];
-    pal_surface s;
-    hollow body = {&s,      inside, malloc(MAX_VERTEX * MAX_VERTEX * sizeof(int32_t)),
-                   valence, fixed,  malloc(MAX_VERTEX * 4 * sizeof(double)),
-                   reach};
-    pal_err err = body.owner && body.move ? make_tube(rings, n_ring, spine, n_node, &body) : PAL_ERR_MEMORY;
+    pal_surface s = {0};
+    pal_err err = PAL_ERR_OK;
+    hollow body = {.s = &s, .inside = inside, .valence = valence, .fixed = fixed, .reach = reach};
+    PAL_ARRAY(&err, body.owner, MAX_VERTEX * MAX_VERTEX);
+    PAL_ARRAY(&err, body.move, 4 * MAX_VERTEX);
+    if (!err) err = make_tube(rings, n_ring, spine, n_node, &body);
     for (int step = 0; !err && step < STEPS; step++) {
         count_around(&body);
         for (int32_t a = 0; a < s.n_vertex; a++)
@@ -299,8 +278,7 @@ static pal_err make_hollow_body(const ring *rings, int n_ring, const node *spine
     for (int step = 0; !err && step < WIDENINGS; step++)
         for (int32_t v = 0; v < s.n_vertex; v++)
             if (!body.fixed[v]) widen(&body, v, reach / (2 + step));
-    free(body.owner);
-    free(body.move);
+    PAL_FREE(body.owner, body.move);
     if (err)
         pal_surface_free(&s);
     else
@@ -317,9 +295,9 @@ static double unit_ball(const double p[3])
 
 pal_err pal_sphere_make(double radius_m, pal_surface *out)
 {
-    static const ring rings[] = {{1, 0, 0, false},    {6, 0.35, 1, false}, {12, 0.7, 1, false},  {18, 1.05, 1, false},
-                                 {20, 1.4, 1, false}, {20, 1.6, 1, false}, {18, 1.95, 1, false}, {12, 2.3, 1, false},
-                                 {6, 2.65, 1, false}, {1, 3, 0, false}};
+    static const ring rings[] = {{1, 0, false},    {6, 0.35, false}, {12, 0.7, false},  {18, 1.05, false},
+                                 {20, 1.4, false}, {20, 1.6, false}, {18, 1.95, false}, {12, 2.3, false},
+                                 {6, 2.65, false}, {1, 3, false}};
     static const node spine[] = {{{0, 0, -1}, 0.02}, {{0, 0, -0.5}, 0.8}, {{0, 0, 0.5}, 0.8}, {{0, 0, 1}, 0.02}};
     if (!(radius_m > 0) || !isfinite(radius_m)) return PAL_ERR_REFUSED;
     PAL_TRY(make_hollow_body(rings, sizeof rings / sizeof *rings, spine, 4, unit_ball, 0.1, out));
@@ -365,10 +343,10 @@ static double stomach(const double p[3])
 
 pal_err pal_stomach_make(pal_stomach *out)
 {
-    static const ring rings[] = {{1, 0, 0, true},     {6, 0, 1, true},     {6, 0.3, 1, false},  {8, 0.6, 1, false},
-                                 {12, 0.9, 1, false}, {17, 1.3, 1, false}, {20, 1.7, 1, false}, {22, 2.2, 1, false},
-                                 {22, 2.6, 1, false}, {20, 3.1, 1, false}, {18, 3.6, 1, false}, {14, 4.3, 1, false},
-                                 {9, 5.1, 1, false},  {6, 5.8, 1, false},  {6, 7.0, 1, true},   {1, 7.0, 0, true}};
+    static const ring rings[] = {{1, 0, true},     {6, 0, true},     {6, 0.3, false},  {8, 0.6, false},
+                                 {12, 0.9, false}, {17, 1.3, false}, {20, 1.7, false}, {22, 2.2, false},
+                                 {22, 2.6, false}, {20, 3.1, false}, {18, 3.6, false}, {14, 4.3, false},
+                                 {9, 5.1, false},  {6, 5.8, false},  {6, 7.0, true},   {1, 7.0, true}};
     pal_stomach made = {.oesophagus_cap = 0, .duodenum_cap = PAL_STOMACH_VERTEX - 1};
     PAL_TRY(make_hollow_body(rings, sizeof rings / sizeof *rings, gut, N_GUT, stomach, 0.003, &made.surface));
     for (int k = 0; k < PAL_STOMACH_RING; k++) {
@@ -377,11 +355,6 @@ pal_err pal_stomach_make(pal_stomach *out)
     }
     *out = made;
     return PAL_ERR_OK;
-}
-
-void pal_stomach_free(pal_stomach *stomach)
-{
-    pal_surface_free(&stomach->surface);
 }
 
 pal_err pal_sheet_make(int n, int m, double width_m, double height_m, pal_surface *out, pal_diagnostic *diag)
@@ -393,11 +366,12 @@ pal_err pal_sheet_make(int n, int m, double width_m, double height_m, pal_surfac
     if (!(width_m > 0 && width_m <= 1e6 && height_m > 0 && height_m <= 1e6))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "sheet: a size of %g x %g m", width_m, height_m);
     pal_surface s = {.n_vertex = n * m, .n_tri = 2 * (n - 1) * (m - 1)};
-    s.x = malloc((size_t)s.n_vertex * 3 * sizeof *s.x);
-    s.tri = malloc((size_t)s.n_tri * 3 * sizeof *s.tri);
-    if (!s.x || !s.tri) {
+    pal_err err = PAL_ERR_OK;
+    PAL_ARRAY(&err, s.x, 3 * (size_t)s.n_vertex);
+    PAL_ARRAY(&err, s.tri, 3 * (size_t)s.n_tri);
+    if (err) {
         pal_surface_free(&s);
-        return PAL_ERR_MEMORY;
+        return err;
     }
     int32_t *to = s.tri;
     for (int j = 0; j < m; j++)

@@ -16,7 +16,6 @@ typedef struct pal_stomach {
 
 /* 188 vertices, 558 edges, 372 faces; angles above 25 degrees, 4 to 8 edges in each vertex; MEMORY */
 pal_err pal_stomach_make(pal_stomach *out);
-void pal_stomach_free(pal_stomach *stomach);
 
 /* 114 vertices, 336 edges, 224 faces, all vertices at radius_m from zero, 4 to 8 edges in each; REFUSED: radius <= 0 or
  * not finite; MEMORY */

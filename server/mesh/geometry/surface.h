@@ -26,10 +26,8 @@ typedef struct pal_surface_report {
     int64_t n_degenerate, n_duplicate; /* triangles dropped: repeated corner or no area; same three corners      */
     int64_t n_nonfinite;               /* triangles dropped because a corner is NaN or infinite                  */
     int64_t n_unused;                  /* vertices of no triangle, dropped                                       */
-    int64_t n_folded; /* triangles dropped, besides n_duplicate, because their doubles have the other orientation: fins
-                         that enclose nothing */
-    int64_t n_repaired; /* triangles without area between three corners: not dropped, which would leave a slit, but
-                           repaired by splitting their neighbour */
+    int64_t n_folded;   /* triangles dropped besides because their doubles have the other orientation: fins  */
+    int64_t n_repaired; /* triangles without area between three corners, repaired by splitting a neighbour   */
 } pal_surface_report;
 
 /* frees the arrays and zeroes the struct; a zeroed struct is fine */
@@ -38,8 +36,8 @@ void pal_surface_free(pal_surface *surface);
 pal_err pal_surface_copy(const pal_surface *from, pal_surface *to);
 
 /* Joins vertices closer than tolerance (relative to the bounding-box diagonal; 0: equal positions only), drops
- * degenerate, duplicate and non-finite triangles and unused vertices, recentres on the box centre, and adds the counts
- * to report. In place. REFUSED when no triangle is left, MEMORY. */
+ * degenerate, duplicate and non-finite triangles and unused vertices, recentres, and adds the counts to report (may be
+ * NULL). In place. REFUSED when no triangle is left, MEMORY. */
 pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_report *report, pal_diagnostic *diag);
 
 /* moves the box centre to zero and adds it to origin_m */
@@ -52,6 +50,17 @@ double pal_surface_volume(const pal_surface *surface); /* signed, m^3: meaningfu
 
 /* triangles around each vertex as sparse rows: start [n_vertex+1], item [3 n_tri]; the caller frees both; MEMORY */
 pal_err pal_surface_fans(const pal_surface *surface, int32_t **start, int32_t **item);
+
+/* a side of a triangle in the row of the smaller of its vertices */
+typedef struct pal_surface_side {
+    int32_t high, corner; /* larger vertex; 3 t + k for the side from corner k to corner k + 1 of triangle t */
+} pal_surface_side;
+/* all sides by their smaller, then their larger vertex, then by corner, so that the sides of an edge lie side by side:
+ * start [n_vertex+1], side [3 n_tri]; the caller frees both; MEMORY */
+pal_err pal_surface_sides(const pal_surface *surface, int32_t **start, pal_surface_side **side);
+
+/* drops vertices of no triangle and keeps the order of the others; map [n_vertex] is scratch */
+void pal_surface_drop_unused(pal_surface *surface, int32_t *map);
 
 /* edge-connected components: label of each triangle [n_tri] (caller's memory), number out; MEMORY */
 pal_err pal_surface_components(const pal_surface *surface, int32_t *label, int *n_component);

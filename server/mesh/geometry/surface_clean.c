@@ -2,9 +2,11 @@
  *
  * Welding joins a vertex to the first earlier kept vertex within the tolerance. Kept vertices are farther apart than
  * the tolerance, so a cell of four tolerances holds a bounded number of them for any file. */
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/surface.h"
 #include "server/mesh/geometry/tuning.h"
+#include "server/num/sort.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -17,7 +19,7 @@ typedef struct cleaner {
     int32_t *next;     /* next vertex of the same bucket, -1: last                [n_vertex]   */
     int32_t *bucket;   /* first vertex or triangle of each bucket                 [n_bucket]   */
     uint64_t n_bucket; /* a power of two                                                       */
-    pal_surface_report count;
+    pal_surface_report *count;
 } cleaner;
 
 static uint64_t mix(uint64_t h, uint64_t word)
@@ -26,26 +28,17 @@ static uint64_t mix(uint64_t h, uint64_t word)
     return h ^ (h >> 29);
 }
 
-static uint64_t cell_bucket(const cleaner *k, const int64_t cell[3])
+static uint64_t bucket_of(const cleaner *k, const int64_t key[3])
 {
-    return mix(mix(mix(1, (uint64_t)cell[0]), (uint64_t)cell[1]), (uint64_t)cell[2]) & (k->n_bucket - 1);
+    return mix(mix(mix(1, (uint64_t)key[0]), (uint64_t)key[1]), (uint64_t)key[2]) & (k->n_bucket - 1);
 }
 
 static uint64_t point_bucket(const cleaner *k, const double p[3])
 {
-    uint64_t h = 1;
-    for (int a = 0; a < 3; a++) {
-        double x = p[a] + 0.0; /* minus zero becomes zero */
-        uint64_t bits;
-        memcpy(&bits, &x, sizeof bits);
-        h = mix(h, bits);
-    }
-    return h & (k->n_bucket - 1);
-}
-
-static bool usable(const double p[3])
-{
-    return fabs(p[0]) <= COORDINATE_LIMIT && fabs(p[1]) <= COORDINATE_LIMIT && fabs(p[2]) <= COORDINATE_LIMIT;
+    double x[3] = {p[0] + 0.0, p[1] + 0.0, p[2] + 0.0}; /* minus zero becomes zero */
+    int64_t bits[3];
+    memcpy(bits, x, sizeof bits);
+    return bucket_of(k, bits);
 }
 
 /* drops triangles with a corner that is not finite, and marks vertices of no triangle (map -1, else 0) */
@@ -58,14 +51,14 @@ static void drop_nonfinite(cleaner *k)
         int32_t c[3];
         memcpy(c, s->tri + 3 * (size_t)t, sizeof c);
         bool good = true;
-        for (int a = 0; a < 3; a++) good &= usable(s->x + 3 * (size_t)c[a]);
+        for (int a = 0; a < 9; a++) good &= fabs(s->x[3 * (size_t)c[a / 3] + (size_t)(a % 3)]) <= COORDINATE_LIMIT;
         if (!good) continue;
         for (int a = 0; a < 3; a++) k->map[c[a]] = 0;
         memcpy(s->tri + 3 * (size_t)n++, c, sizeof c);
     }
-    k->count.n_nonfinite += s->n_tri - n;
+    k->count->n_nonfinite += s->n_tri - n;
     s->n_tri = n;
-    for (int i = 0; i < s->n_vertex; i++) k->count.n_unused += k->map[i] < 0;
+    for (int i = 0; i < s->n_vertex; i++) k->count->n_unused += k->map[i] < 0;
 }
 
 /* the kept vertex of one bucket within the tolerance of p with the smallest index, if smaller than best */
@@ -93,18 +86,18 @@ static void weld_vertex(cleaner *k, int32_t i)
             high[a] = (int64_t)floor((x + k->eps) / size);
             own[a] = (int64_t)floor(x / size);
         }
-        home = cell_bucket(k, own);
+        home = bucket_of(k, own);
         for (cell[2] = low[2]; cell[2] <= high[2]; cell[2]++)
             for (cell[1] = low[1]; cell[1] <= high[1]; cell[1]++)
                 for (cell[0] = low[0]; cell[0] <= high[0]; cell[0]++)
-                    partner = weld_partner(k, cell_bucket(k, cell), p, partner);
+                    partner = weld_partner(k, bucket_of(k, cell), p, partner);
     } else {
         home = point_bucket(k, p);
         partner = weld_partner(k, home, p, -1);
     }
     if (partner >= 0) {
         k->map[i] = partner;
-        k->count.n_welded++;
+        k->count->n_welded++;
         return;
     }
     k->map[i] = i;
@@ -121,34 +114,32 @@ static void weld(cleaner *k)
     for (size_t c = 0; c < 3 * (size_t)s->n_tri; c++) s->tri[c] = k->map[s->tri[c]];
 }
 
+static bool repeats_corner(const int32_t *c)
+{
+    return c[0] == c[1] || c[1] == c[2] || c[2] == c[0];
+}
+
 static bool has_area(const pal_surface *s, const int32_t c[3])
 {
-    if (c[0] == c[1] || c[1] == c[2] || c[2] == c[0]) return false;
+    if (repeats_corner(c)) return false;
     double u[3], v[3], w[3], n[3];
     pal_sub3(u, s->x + 3 * (size_t)c[1], s->x + 3 * (size_t)c[0]);
     pal_sub3(v, s->x + 3 * (size_t)c[2], s->x + 3 * (size_t)c[0]);
     pal_sub3(w, v, u);
     pal_cross3(n, u, v);
     double longest2 = fmax(pal_dot3(u, u), fmax(pal_dot3(v, v), pal_dot3(w, w)));
-    return pal_norm3(n) > HEIGHT_LIMIT * longest2;
+    return pal_norm3(n) > MIN_SHAPE * longest2;
 }
 
 static void drop_degenerate(cleaner *k)
 {
     pal_surface *s = k->surface;
     int n = 0;
-    for (int t = 0; t < s->n_tri; t++) {
-        int32_t c[3];
-        memcpy(c, s->tri + 3 * (size_t)t, sizeof c);
-        if (has_area(s, c)) memcpy(s->tri + 3 * (size_t)n++, c, sizeof c);
-    }
-    k->count.n_degenerate += s->n_tri - n;
+    for (int t = 0; t < s->n_tri; t++)
+        if (has_area(s, s->tri + 3 * (size_t)t))
+            memmove(s->tri + 3 * (size_t)n++, s->tri + 3 * (size_t)t, 3 * sizeof *s->tri);
+    k->count->n_degenerate += s->n_tri - n;
     s->n_tri = n;
-}
-
-static bool repeats_corner(const int32_t *c)
-{
-    return c[0] == c[1] || c[1] == c[2] || c[2] == c[0];
 }
 
 /* the only other triangle at the edge of corners a and b of triangle t, -1: none or several */
@@ -195,8 +186,14 @@ static bool split_neighbour(cleaner *k, const int32_t *start, const int32_t *ite
     k->next[to] = k->next[from] = k->next[b] = k->next[d] = 1;
     memcpy(c, one, sizeof one);
     memcpy(e, two, sizeof two);
-    k->count.n_repaired++;
+    k->count->n_repaired++;
     return true;
+}
+
+static bool is_flat(const pal_surface *s, int t)
+{
+    const int32_t *c = s->tri + 3 * (size_t)t;
+    return !repeats_corner(c) && !has_area(s, c);
 }
 
 /* repairs flat triangles in rounds; a vertex takes part once in a round, so that its fan is still valid */
@@ -204,32 +201,18 @@ static pal_err repair_flat(cleaner *k)
 {
     pal_surface *s = k->surface;
     for (int round = 0, n = 1; round < 16 && n > 0; round++) {
-        int n_flat = 0;
-        for (int t = 0; t < s->n_tri; t++) {
-            const int32_t *c = s->tri + 3 * (size_t)t;
-            n_flat += !repeats_corner(c) && !has_area(s, c);
-        }
-        if (n_flat == 0) return PAL_ERR_OK;
+        int first = 0;
+        while (first < s->n_tri && !is_flat(s, first)) first++;
+        if (first == s->n_tri) return PAL_ERR_OK;
         int32_t *start, *item;
         PAL_TRY(pal_surface_fans(s, &start, &item));
         memset(k->next, 0, (size_t)s->n_vertex * sizeof *k->next);
         n = 0;
-        for (int t = 0; t < s->n_tri; t++) {
-            const int32_t *c = s->tri + 3 * (size_t)t;
-            if (!repeats_corner(c) && !has_area(s, c)) n += split_neighbour(k, start, item, t);
-        }
-        free(start);
-        free(item);
+        for (int t = first; t < s->n_tri; t++)
+            if (is_flat(s, t)) n += split_neighbour(k, start, item, t);
+        PAL_FREE(start, item);
     }
     return PAL_ERR_OK;
-}
-
-static void sort_corners(int32_t r[3], const int32_t c[3])
-{
-    int32_t low = c[0] < c[1] ? c[0] : c[1], high = c[0] < c[1] ? c[1] : c[0];
-    r[0] = c[2] < low ? c[2] : low;
-    r[2] = c[2] > high ? c[2] : high;
-    r[1] = (int32_t)((int64_t)c[0] + c[1] + c[2] - r[0] - r[2]);
 }
 
 /* 1 or -1: parity of the corners against their sorted order */
@@ -253,7 +236,7 @@ static pal_err drop_folded(cleaner *k, const int8_t *balance)
     if (!err) err = pal_surface_check(&rest, &without);
     if (!err && rest.n_tri > 0 && rest.n_tri < s->n_tri && without.n_open_edge <= with.n_open_edge) {
         memcpy(s->tri, rest.tri, 3 * (size_t)rest.n_tri * sizeof *rest.tri);
-        k->count.n_folded += s->n_tri - rest.n_tri;
+        k->count->n_folded += s->n_tri - rest.n_tri;
         s->n_tri = rest.n_tri;
     }
     free(rest.tri);
@@ -271,10 +254,10 @@ static pal_err drop_duplicate(cleaner *k)
     for (int t = 0; t < s->n_tri; t++) {
         int32_t c[3], key[3], other[3];
         memcpy(c, s->tri + 3 * (size_t)t, sizeof c);
-        sort_corners(key, c);
-        uint64_t b = mix(mix(mix(1, (uint64_t)key[0]), (uint64_t)key[1]), (uint64_t)key[2]) & (k->n_bucket - 1);
+        pal_sort3(key, c);
+        uint64_t b = bucket_of(k, (const int64_t[3]){key[0], key[1], key[2]});
         for (; k->bucket[b] >= 0; b = (b + 1) & (k->n_bucket - 1)) {
-            sort_corners(other, s->tri + 3 * (size_t)k->bucket[b]);
+            pal_sort3(other, s->tri + 3 * (size_t)k->bucket[b]);
             if (memcmp(key, other, sizeof key) == 0) break;
         }
         int32_t first = k->bucket[b];
@@ -288,7 +271,7 @@ static pal_err drop_duplicate(cleaner *k)
         memcpy(s->tri + 3 * (size_t)n++, c, sizeof c);
     }
     bool again = n < s->n_tri;
-    k->count.n_duplicate += s->n_tri - n;
+    k->count->n_duplicate += s->n_tri - n;
     s->n_tri = n;
     pal_err err = again ? drop_folded(k, balance) : PAL_ERR_OK;
     free(balance);
@@ -299,51 +282,32 @@ static pal_err drop_duplicate(cleaner *k)
 static void compact(cleaner *k)
 {
     pal_surface *s = k->surface;
-    for (int i = 0; i < s->n_vertex; i++) k->map[i] = k->map[i] == i ? -2 : -1;
-    for (size_t c = 0; c < 3 * (size_t)s->n_tri; c++) k->map[s->tri[c]] = 0;
-    int n = 0;
-    for (int i = 0; i < s->n_vertex; i++) {
-        k->count.n_unused += k->map[i] == -2;
-        if (k->map[i] < 0) continue;
-        k->map[i] = n;
-        memmove(s->x + 3 * (size_t)n++, s->x + 3 * (size_t)i, 3 * sizeof(double));
-    }
-    s->n_vertex = n;
-    for (size_t c = 0; c < 3 * (size_t)s->n_tri; c++) s->tri[c] = k->map[s->tri[c]];
+    for (int i = 0; i < s->n_vertex; i++) k->count->n_unused += k->map[i] == i;
+    pal_surface_drop_unused(s, k->map);
+    k->count->n_unused -= s->n_vertex;
     pal_surface_recentre(s);
 }
 
 /* box of the usable vertices in use: the welding distance and the cells' corner */
 static void measure(cleaner *k, double tolerance)
 {
-    double low[3] = {0, 0, 0}, high[3] = {0, 0, 0};
-    bool first = true;
-    for (int i = 0; i < k->surface->n_vertex; i++) {
-        if (k->map[i] < 0) continue;
-        for (int a = 0; a < 3; a++) {
-            double x = k->surface->x[3 * (size_t)i + (size_t)a];
-            if (first || x < low[a]) low[a] = x;
-            if (first || x > high[a]) high[a] = x;
-        }
-        first = false;
-    }
-    pal_copy3(k->low, low);
-    k->eps = tolerance >= 1e-15 ? fmin(tolerance, 1) * pal_dist3(low, high) : 0;
+    double high[3];
+    pal_box3_empty(k->low, high);
+    for (int i = 0; i < k->surface->n_vertex; i++)
+        if (k->map[i] >= 0) pal_box3_add(k->low, high, k->surface->x + 3 * (size_t)i);
+    k->eps = tolerance >= 1e-15 ? fmin(tolerance, 1) * pal_dist3(k->low, high) : 0;
 }
 
 pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_report *report, pal_diagnostic *diag)
 {
-    size_t n_vertex = (size_t)surface->n_vertex, max = n_vertex;
-    if ((size_t)surface->n_tri > max) max = (size_t)surface->n_tri;
-    cleaner k = {.surface = surface, .n_bucket = 16};
-    while (k.n_bucket < 2 * max) k.n_bucket *= 2;
-    k.map = malloc((n_vertex + 1) * sizeof *k.map);
-    k.next = malloc((n_vertex + 1) * sizeof *k.next);
-    k.bucket = malloc(k.n_bucket * sizeof *k.bucket);
+    pal_surface_report unused = {0};
+    cleaner k = {.surface = surface, .n_bucket = 16, .count = report ? report : &unused};
     pal_err err = PAL_ERR_OK;
-    if (!k.map || !k.next || !k.bucket) {
-        err = pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory to clean %d triangles", surface->n_tri);
-    } else {
+    while (k.n_bucket < 2 * (uint64_t)surface->n_vertex || k.n_bucket < 2 * (uint64_t)surface->n_tri) k.n_bucket *= 2;
+    PAL_ARRAY(&err, k.map, surface->n_vertex);
+    PAL_ARRAY(&err, k.next, surface->n_vertex);
+    PAL_ARRAY(&err, k.bucket, k.n_bucket);
+    if (!err) {
         drop_nonfinite(&k);
         measure(&k, tolerance);
         weld(&k);
@@ -351,23 +315,12 @@ pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_re
         drop_degenerate(&k);
         if (!err) err = drop_duplicate(&k);
         compact(&k);
-        if (err) pal_diagnostic_set(diag, err, "no memory to clean %d triangles", surface->n_tri);
-        if (!err && surface->n_tri == 0)
-            err = pal_diagnostic_set(
-                diag, PAL_ERR_REFUSED, "no triangle is left: %lld without area, %lld doubled, %lld not finite",
-                (long long)k.count.n_degenerate, (long long)k.count.n_duplicate, (long long)k.count.n_nonfinite);
     }
-    if (report) {
-        report->n_welded += k.count.n_welded;
-        report->n_degenerate += k.count.n_degenerate;
-        report->n_duplicate += k.count.n_duplicate;
-        report->n_nonfinite += k.count.n_nonfinite;
-        report->n_unused += k.count.n_unused;
-        report->n_folded += k.count.n_folded;
-        report->n_repaired += k.count.n_repaired;
-    }
-    free(k.map);
-    free(k.next);
-    free(k.bucket);
+    if (err) pal_diagnostic_set(diag, err, "no memory to clean %d triangles", surface->n_tri);
+    if (!err && surface->n_tri == 0)
+        err = pal_diagnostic_set(
+            diag, PAL_ERR_REFUSED, "no triangle is left: %lld without area, %lld doubled, %lld not finite",
+            (long long)k.count->n_degenerate, (long long)k.count->n_duplicate, (long long)k.count->n_nonfinite);
+    PAL_FREE(k.map, k.next, k.bucket);
     return err;
 }

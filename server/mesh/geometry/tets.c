@@ -5,15 +5,14 @@
  * hostile mesh whose tets all meet in one node takes n log n. */
 #include "server/mesh/geometry/tets.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
+#include "server/mesh/geometry/surface.h"
+#include "server/num/sort.h"
 #include "server/num/union_find.h"
-
-#include <stdlib.h>
-#include <string.h>
 
 /* face opposite to each corner, counter-clockwise from outside of a tet of positive volume */
 static const uint8_t OPPOSITE[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
-enum { SHORT = 96 };
 static const uint8_t EDGE[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
 /* one face in the bucket of its smallest node */
@@ -29,80 +28,42 @@ typedef struct sides {
 
 void pal_tets_free(pal_tets *tets)
 {
-    free(tets->x);
-    free(tets->tet);
-    free(tets->face);
-    free(tets->on_surface);
+    PAL_FREE(tets->x, tets->tet, tets->face, tets->on_surface);
     memset(tets, 0, sizeof *tets);
 }
 
-static double tet_volume(const pal_tets *tets, int t)
+double pal_tet_volume(const double *x, const int32_t *corner)
 {
-    const int32_t *corner = tets->tet + 4 * (size_t)t;
-    double e[3][3], c[3];
-    for (int k = 0; k < 3; k++) pal_sub3(e[k], tets->x + 3 * (size_t)corner[k + 1], tets->x + 3 * (size_t)corner[0]);
-    pal_cross3(c, e[1], e[2]);
-    return pal_dot3(e[0], c) / 6;
+    double e[3], n[3];
+    const double *o = x + 3 * (size_t)corner[0];
+    pal_sub3(e, x + 3 * (size_t)corner[1], o);
+    pal_normal3(n, o, x + 3 * (size_t)corner[2], x + 3 * (size_t)corner[3]);
+    return pal_dot3(e, n) / 6;
 }
 
 double pal_tets_volume(const pal_tets *tets)
 {
     double sum = 0;
-    for (int t = 0; t < tets->n_tet; t++) sum += tet_volume(tets, t);
+    for (int t = 0; t < tets->n_tet; t++) sum += pal_tet_volume(tets->x, tets->tet + 4 * (size_t)t);
     return sum;
 }
 
 static int compare_sides(const void *a, const void *b)
 {
     const side *s = a, *t = b;
-    if (s->middle != t->middle) return s->middle < t->middle ? -1 : 1;
-    if (s->largest != t->largest) return s->largest < t->largest ? -1 : 1;
-    return s->from < t->from ? -1 : s->from > t->from;
+    if (s->middle != t->middle) return PAL_COMPARE(s->middle, t->middle);
+    if (s->largest != t->largest) return PAL_COMPARE(s->largest, t->largest);
+    return PAL_COMPARE(s->from, t->from);
 }
 
-static int compare_nodes(const void *a, const void *b)
-{
-    int32_t s = *(const int32_t *)a, t = *(const int32_t *)b;
-    return s < t ? -1 : s > t;
-}
-
-/* buckets are short: insertion sort, and qsort for long ones */
-static void sort_nodes(int32_t *node, int64_t n)
-{
-    if (n > SHORT) {
-        qsort(node, (size_t)n, sizeof *node, compare_nodes);
-        return;
-    }
-    for (int64_t a = 1; a < n; a++) {
-        int32_t moved = node[a];
-        int64_t b = a;
-        for (; b > 0 && moved < node[b - 1]; b--) node[b] = node[b - 1];
-        node[b] = moved;
-    }
-}
-
-static void sort_sides(side *s, int64_t n)
-{
-    if (n > SHORT) {
-        qsort(s, (size_t)n, sizeof *s, compare_sides);
-        return;
-    }
-    for (int64_t a = 1; a < n; a++) {
-        side moved = s[a];
-        int64_t b = a;
-        for (; b > 0 && compare_sides(&moved, &s[b - 1]) < 0; b--) s[b] = s[b - 1];
-        s[b] = moved;
-    }
-}
+PAL_SORT(sort_nodes, int32_t, pal_compare_int32)
+PAL_SORT(sort_sides, side, compare_sides)
 
 /* smallest, middle, largest node of a face */
 static void sort_face(const int32_t *corner, int opposite, int32_t node[3])
 {
-    int32_t a = corner[OPPOSITE[opposite][0]], b = corner[OPPOSITE[opposite][1]], c = corner[OPPOSITE[opposite][2]];
-    int32_t low = a < b ? a : b, high = a < b ? b : a;
-    node[0] = c < low ? c : low;
-    node[2] = c > high ? c : high;
-    node[1] = c < low ? low : c > high ? high : c;
+    const uint8_t *o = OPPOSITE[opposite];
+    pal_sort3(node, (const int32_t[3]){corner[o[0]], corner[o[1]], corner[o[2]]});
 }
 
 /* turns counts at start[i + 1] into starts */
@@ -120,19 +81,20 @@ static void restore_starts(int64_t *start, int n)
 
 static void sides_free(sides *s)
 {
-    free(s->start);
-    free(s->item);
+    PAL_FREE(s->start, s->item);
 }
 
 static pal_err sides_make(const pal_tets *tets, sides *out)
 {
     size_t n_node = (size_t)tets->n_node, n_tet = (size_t)tets->n_tet;
-    int64_t *start = calloc(n_node + 1, sizeof *start);
-    side *item = malloc((n_tet ? 4 * n_tet : 1) * sizeof *item);
-    if (!start || !item) {
-        free(start);
-        free(item);
-        return PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    int64_t *start;
+    side *item;
+    PAL_ZEROED(&err, start, n_node + 1);
+    PAL_ARRAY(&err, item, 4 * n_tet);
+    if (err) {
+        PAL_FREE(start, item);
+        return err;
     }
     int32_t node[3];
     for (size_t t = 0; t < n_tet; t++)
@@ -148,7 +110,7 @@ static pal_err sides_make(const pal_tets *tets, sides *out)
         }
     restore_starts(start, tets->n_node);
 
-    for (size_t i = 0; i < n_node; i++) sort_sides(item + start[i], start[i + 1] - start[i]);
+    for (size_t i = 0; i < n_node; i++) sort_sides(item + start[i], (size_t)(start[i + 1] - start[i]));
     *out = (sides){start, item};
     return PAL_ERR_OK;
 }
@@ -169,9 +131,12 @@ pal_err pal_tets_find_boundary(pal_tets *tets)
     /* a face of one tet only is boundary; mark it by its tet and opposite corner, so that the faces come out in the
      * order of the tets */
     size_t n_side = 4 * (size_t)tets->n_tet, n_face = 0;
-    uint8_t *alone = calloc(n_side ? n_side : 1, 1);
-    uint8_t *on_surface = calloc(tets->n_node ? (size_t)tets->n_node : 1, 1);
-    if (alone && on_surface)
+    pal_err err = PAL_ERR_OK;
+    uint8_t *alone, *on_surface;
+    int32_t *face;
+    PAL_ZEROED(&err, alone, n_side);
+    PAL_ZEROED(&err, on_surface, tets->n_node);
+    if (!err)
         for (int i = 0; i < tets->n_node; i++)
             for (int64_t a = s.start[i], n; a < s.start[i + 1]; a += n) {
                 n = same_sides(&s, a, s.start[i + 1]);
@@ -180,12 +145,10 @@ pal_err pal_tets_find_boundary(pal_tets *tets)
                 n_face++;
             }
     sides_free(&s);
-    int32_t *face = malloc((n_face ? n_face : 1) * 3 * sizeof *face);
-    if (!alone || !on_surface || !face) {
-        free(alone);
-        free(on_surface);
-        free(face);
-        return PAL_ERR_MEMORY;
+    PAL_ARRAY(&err, face, 3 * n_face);
+    if (err) {
+        PAL_FREE(alone, on_surface, face);
+        return err;
     }
     int32_t *to = face;
     for (size_t from = 0; from < n_side; from++)
@@ -194,9 +157,7 @@ pal_err pal_tets_find_boundary(pal_tets *tets)
                 *to = tets->tet[(from & ~(size_t)3) + OPPOSITE[from & 3][k]];
                 on_surface[*to] = 1;
             }
-    free(alone);
-    free(tets->face);
-    free(tets->on_surface);
+    PAL_FREE(alone, tets->face, tets->on_surface);
     tets->face = face;
     tets->on_surface = on_surface;
     tets->n_face = (int)n_face;
@@ -206,12 +167,14 @@ pal_err pal_tets_find_boundary(pal_tets *tets)
 pal_err pal_tets_edges(const pal_tets *tets, int32_t **out, int *n_edge)
 {
     size_t n_node = (size_t)tets->n_node, n_tet = (size_t)tets->n_tet;
-    int64_t *start = calloc(n_node + 1, sizeof *start);
-    int32_t *end = malloc((n_tet ? 6 * n_tet : 1) * sizeof *end);
-    if (!start || !end) {
-        free(start);
-        free(end);
-        return PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    int64_t *start;
+    int32_t *end;
+    PAL_ZEROED(&err, start, n_node + 1);
+    PAL_ARRAY(&err, end, 6 * n_tet);
+    if (err) {
+        PAL_FREE(start, end);
+        return err;
     }
     for (int pass = 0; pass < 2; pass++) {
         for (size_t t = 0; t < n_tet; t++)
@@ -231,7 +194,7 @@ pal_err pal_tets_edges(const pal_tets *tets, int32_t **out, int *n_edge)
     int64_t n_kept = 0;
     for (size_t i = 0; i < n_node; i++) {
         int64_t a = start[i], b = start[i + 1];
-        sort_nodes(end + a, b - a);
+        sort_nodes(end + a, (size_t)(b - a));
         start[i] = n_kept;
         for (int64_t k = a; k < b; k++)
             if (k == a || end[k] != end[k - 1]) end[n_kept++] = end[k];
@@ -244,8 +207,7 @@ pal_err pal_tets_edges(const pal_tets *tets, int32_t **out, int *n_edge)
                 edge[2 * k] = (int32_t)i;
                 edge[2 * k + 1] = end[k];
             }
-    free(start);
-    free(end);
+    PAL_FREE(start, end);
     if (!edge) return PAL_ERR_MEMORY;
     *out = edge;
     *n_edge = (int)n_kept;
@@ -296,20 +258,19 @@ pal_err pal_tets_components(const pal_tets *tets, int32_t *label, int *n_compone
     return PAL_ERR_OK;
 }
 
-/* what pal_tets_check counts */
+/* a kind of fault: how many there are, and what the message says of the first */
 typedef struct faults {
-    int64_t bad_index, repeated, flat, crowded, open, unused;
-    int first_index, first_repeated, first_flat, first_crowded, first_unused;
-    int32_t crowded_node[3];
+    long long n;
+    int first;
 } faults;
 
-static void count_first(int64_t *count, int *first, int i)
+static void count_fault(faults *f, int i)
 {
-    if ((*count)++ == 0) *first = i;
+    if (f->n++ == 0) f->first = i;
 }
 
 /* indices out of range, repeated corners */
-static void check_corners(const pal_tets *tets, faults *f)
+static void check_corners(const pal_tets *tets, faults *index, faults *repeated)
 {
     for (int t = 0; t < tets->n_tet; t++) {
         const int32_t *c = tets->tet + 4 * (size_t)t;
@@ -318,18 +279,14 @@ static void check_corners(const pal_tets *tets, faults *f)
             in &= c[k] >= 0 && c[k] < tets->n_node;
             for (int l = 0; l < k; l++) twice |= c[k] == c[l];
         }
-        if (!in)
-            count_first(&f->bad_index, &f->first_index, t);
-        else if (twice)
-            count_first(&f->repeated, &f->first_repeated, t);
+        if (!in || twice) count_fault(in ? repeated : index, t);
     }
     for (size_t k = 0; k < 3 * (size_t)tets->n_face; k++)
-        if (tets->face[k] < 0 || tets->face[k] >= tets->n_node)
-            count_first(&f->bad_index, &f->first_index, (int)(k / 3));
+        if (tets->face[k] < 0 || tets->face[k] >= tets->n_node) count_fault(index, (int)(k / 3));
 }
 
-/* faces of more than two tets */
-static pal_err check_sides(const pal_tets *tets, faults *f)
+/* faces of more than two tets, and the nodes of the first */
+static pal_err check_sides(const pal_tets *tets, faults *f, int32_t node[3])
 {
     sides s;
     PAL_TRY(sides_make(tets, &s));
@@ -337,44 +294,27 @@ static pal_err check_sides(const pal_tets *tets, faults *f)
         for (int64_t a = s.start[i], n; a < s.start[i + 1]; a += n) {
             n = same_sides(&s, a, s.start[i + 1]);
             if (n <= 2) continue;
-            if (f->crowded == 0) {
-                f->crowded_node[0] = i;
-                f->crowded_node[1] = s.item[a].middle;
-                f->crowded_node[2] = s.item[a].largest;
-            }
-            count_first(&f->crowded, &f->first_crowded, (int)(s.item[a].from >> 2));
+            if (f->n == 0) node[0] = i, node[1] = s.item[a].middle, node[2] = s.item[a].largest;
+            count_fault(f, 0);
         }
     sides_free(&s);
     return PAL_ERR_OK;
 }
 
-static int compare_pairs(const void *a, const void *b)
-{
-    const int32_t *s = a, *t = b;
-    for (int k = 0; k < 2; k++)
-        if (s[k] != t[k]) return s[k] < t[k] ? -1 : 1;
-    return s[2] < t[2] ? -1 : s[2] > t[2];
-}
-
 /* every boundary edge must be run through equally often in both directions */
-static pal_err check_boundary(const pal_tets *tets, faults *f)
+static pal_err check_boundary(const pal_tets *tets, long long *n_open)
 {
-    size_t n = 3 * (size_t)tets->n_face;
-    int32_t *run = malloc((n ? n : 1) * 3 * sizeof *run);
-    if (!run) return PAL_ERR_MEMORY;
-    for (size_t i = 0; i < n; i++) {
-        int32_t a = tets->face[i], b = tets->face[i % 3 == 2 ? i - 2 : i + 1];
-        run[3 * i] = a < b ? a : b;
-        run[3 * i + 1] = a < b ? b : a;
-        run[3 * i + 2] = a < b ? 1 : -1;
-    }
-    qsort(run, n, 3 * sizeof *run, compare_pairs);
-    for (size_t a = 0, b; a < n; a = b) {
-        int sum = 0;
-        for (b = a; b < n && run[3 * b] == run[3 * a] && run[3 * b + 1] == run[3 * a + 1]; b++) sum += run[3 * b + 2];
-        f->open += sum != 0;
-    }
-    free(run);
+    const pal_surface boundary = {.n_vertex = tets->n_node, .n_tri = tets->n_face, .tri = tets->face};
+    int32_t *start;
+    pal_surface_side *run;
+    PAL_TRY(pal_surface_sides(&boundary, &start, &run));
+    for (int32_t i = 0; i < tets->n_node; i++)
+        for (int32_t a = start[i], b = a; a < start[i + 1]; a = b) {
+            int sum = 0;
+            for (; b < start[i + 1] && run[b].high == run[a].high; b++) sum += tets->face[run[b].corner] == i ? 1 : -1;
+            *n_open += sum != 0;
+        }
+    PAL_FREE(start, run);
     return PAL_ERR_OK;
 }
 
@@ -384,39 +324,41 @@ static pal_err check_unused(const pal_tets *tets, faults *f)
     if (!used) return PAL_ERR_MEMORY;
     for (size_t k = 0; k < 4 * (size_t)tets->n_tet; k++) used[tets->tet[k]] = 1;
     for (int i = 0; i < tets->n_node; i++)
-        if (!used[i]) count_first(&f->unused, &f->first_unused, i);
+        if (!used[i]) count_fault(f, i);
     free(used);
     return PAL_ERR_OK;
 }
 
 pal_err pal_tets_check(const pal_tets *tets, pal_diagnostic *diag)
 {
-    faults f = {0};
-    check_corners(tets, &f);
-    if (f.bad_index)
+    faults index = {0}, repeated = {0}, flat = {0}, crowded = {0}, unused = {0};
+    long long n_open = 0;
+    int32_t node[3] = {0};
+    check_corners(tets, &index, &repeated);
+    if (index.n)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "%lld index%s out of range of %d nodes, the first in element %d",
-                                  (long long)f.bad_index, f.bad_index > 1 ? "es" : "", tets->n_node, f.first_index);
-    if (f.repeated)
+                                  "%lld index%s out of range of %d nodes, the first in element %d", index.n,
+                                  index.n > 1 ? "es" : "", tets->n_node, index.first);
+    if (repeated.n)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%lld tetrahedra with a corner used twice, the first is %d",
-                                  (long long)f.repeated, f.first_repeated);
+                                  repeated.n, repeated.first);
     for (int t = 0; t < tets->n_tet; t++)
-        if (!(tet_volume(tets, t) > 0)) count_first(&f.flat, &f.first_flat, t);
-    if (f.flat)
+        if (!(pal_tet_volume(tets->x, tets->tet + 4 * (size_t)t) > 0)) count_fault(&flat, t);
+    if (flat.n)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%lld tetrahedra without positive volume, the first is %d",
-                                  (long long)f.flat, f.first_flat);
-    PAL_TRY(check_sides(tets, &f));
-    if (f.crowded)
+                                  flat.n, flat.first);
+    PAL_TRY(check_sides(tets, &crowded, node));
+    if (crowded.n)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "%lld faces of more than two tetrahedra, the first has nodes %d %d %d",
-                                  (long long)f.crowded, f.crowded_node[0], f.crowded_node[1], f.crowded_node[2]);
-    PAL_TRY(check_boundary(tets, &f));
-    if (f.open)
+                                  "%lld faces of more than two tetrahedra, the first has nodes %d %d %d", crowded.n,
+                                  node[0], node[1], node[2]);
+    PAL_TRY(check_boundary(tets, &n_open));
+    if (n_open)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "the boundary is not closed: %lld edges without a partner",
-                                  (long long)f.open);
-    PAL_TRY(check_unused(tets, &f));
-    if (f.unused)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%lld nodes of no tetrahedron, the first is %d",
-                                  (long long)f.unused, f.first_unused);
+                                  n_open);
+    PAL_TRY(check_unused(tets, &unused));
+    if (unused.n)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%lld nodes of no tetrahedron, the first is %d", unused.n,
+                                  unused.first);
     return PAL_ERR_OK;
 }

@@ -18,6 +18,8 @@ typedef struct pal_tets {
 } pal_tets;
 
 void pal_tets_free(pal_tets *tets);
+/* of the tetrahedron of four nodes, m^3 */
+double pal_tet_volume(const double *x, const int32_t *corner);
 double pal_tets_volume(const pal_tets *tets); /* m^3 */
 
 /* boundary faces and on_surface from tet alone (outward); replaces earlier ones; MEMORY */

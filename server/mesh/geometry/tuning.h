@@ -21,9 +21,11 @@
 
 /* ---- surfaces ---- */
 
-/* fraction of the longest side below which the height of a triangle is 0 (geometry/test_surface) */
-#define HEIGHT_LIMIT 1e-12
-/* flat triangles at a vertex of more triangles than this are dropped, not repaired, so that the time stays linear */
+/* of the square or cube of its size: a triangle or face has no area, a cell no volume or folds below it; what rounding
+ * leaves of flat ones is 1e-15 (geometry/test_surface, cells/test_cells, cells/test_cell_edits) */
+#define MIN_SHAPE 1e-12
+/* flat triangles at a vertex of more triangles than this are dropped, not repaired, so that the time stays linear
+ * (geometry/test_surface) */
 #define MAX_FAN 64
 /* radii beyond which a box of the tree counts as a dipole; the winding number then errs by at most 0.03
  * (geometry/test_box_tree) */
@@ -38,7 +40,12 @@
 #define THIN_SHAPE    0.12
 #define FLIP_SHAPE    0.3
 #define THIN_INCREASE 0.1
-/* weight of the edge's midpoint, of the quadric's area: spreads vertices evenly where the surface is flat */
+/* fractions of the way to the neighbours' mean in a step there and back (Taubin 1995): the pass band ends at 1/0.5 -
+ * 1/0.53 = 0.11, so that shapes longer than about ten edges keep their size (geometry/test_contour) */
+#define SMOOTH_STEP 0.5
+#define SMOOTH_BACK (-0.53)
+/* weight of the edge's midpoint, of the quadric's area: spreads vertices evenly where the surface is flat
+ * (geometry/test_contour) */
 #define MIDPOINT_WEIGHT 1e-3
 
 /* ---- voxels (voxel/test_voxels) ---- */
@@ -68,7 +75,27 @@
 #define SKIN_MIN_NORMAL 0.5
 #define SKIN_COLLAPSED  0.5
 
+/* ---- cells ---- */
+
+/* vertices, cells, loops or corners: sums of a few counts stay within an int32 (cells/test_cells) */
+#define CELL_MAX_ITEM (INT32_MAX / 4)
+/* bytes of a file of cells (cells/test_cell_file) */
+#define CELL_MAX_BYTE ((size_t)256 << 20)
+/* of the distance to the corners: a vertex this near to the middle was put there by a division
+ * (cells/test_cell_edit_runs) */
+#define CELL_NEAR_MIDDLE 1e-9
+
 /* ---- scans (scan/test_label_volume) ---- */
+
+/* triangles of the lattice for each squared spacing, and of the contour for each that is asked for
+ * (also geometry/test_contour) */
+#define CONTOUR_TRI_PER_SPACING2 9.0
+#define CONTOUR_SURPLUS          3.0
+/* rounds of smoothing within the reach, and without one after it */
+#define SMOOTH_ROUNDS      60
+#define SMOOTH_LAST_ROUNDS 5
+/* the margin of the blur may not cost more than 16 times the label's box and this many voxels */
+#define BLUR_SPARE_VOXEL ((size_t)1 << 24)
 
 /* of a voxel: displacement of a vertex along its normal by smoothing. Half a voxel is the uncertainty of the scan, the
  * rest the displacement by the blur */

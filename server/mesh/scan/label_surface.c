@@ -1,12 +1,9 @@
-/* From a label volume to the smooth closed surface of one label.
- *
- * Crop; keep the largest 6-connected part and fill its cavities; blur the 0/1 field; contour it at the level that
- * encloses the label's voxel volume; smooth; decimate; move all vertices along their normals by the small distance that
- * makes the volume exact.
+/* From a label volume to the smooth closed surface of one label (server/mesh/README.md, scans).
  *
  * A surface that is nearly parallel to the slices is a staircase of terraces one voxel high and many wide, which no
  * small blur removes. Smoothing here is therefore long, and bounded only by the voxels: no vertex moves farther than
  * three quarters of a voxel's extent along its normal (after Gibson's constrained elastic nets, 1998). */
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/contour.h"
 #include "server/mesh/geometry/decimate.h"
@@ -14,15 +11,11 @@
 #include "server/mesh/geometry/tuning.h"
 #include "server/mesh/scan/label_volume.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#include "server/num/sort.h"
 
-enum { DEFAULT_ROUNDS = 60, LAST_ROUNDS = 5, N_BIN = 1 << 16, MAX_RADIUS = 64 };
-/* triangles of the contour for each requested one, and of the lattice for each squared spacing */
-static const double surplus = 3, per_spacing2 = 9;
-/* the blur's margin may not cost more than 16 times the label's box and this many voxels */
-static const size_t spare_voxel = (size_t)1 << 24;
+#include <stdio.h>
+
+enum { N_BIN = 1 << 16, MAX_RADIUS = 64 };
 
 typedef struct crop {
     int low[3], n[3]; /* voxels of the volume [low, low + n), one layer of others around the label */
@@ -40,8 +33,9 @@ typedef struct blurred {
 
 static double determinant(const double m[12])
 {
-    return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
-           m[2] * (m[4] * m[9] - m[5] * m[8]);
+    double cross[3];
+    pal_cross3(cross, m + 4, m + 8);
+    return pal_dot3(m, cross);
 }
 
 typedef struct tally {
@@ -52,8 +46,7 @@ typedef struct tally {
 static int tally_order(const void *a, const void *b)
 {
     const tally *s = a, *t = b;
-    if (s->n != t->n) return s->n > t->n ? -1 : 1;
-    return s->label < t->label ? -1 : s->label > t->label;
+    return s->n != t->n ? PAL_COMPARE(t->n, s->n) : PAL_COMPARE(s->label, t->label);
 }
 
 static tally *tally_slot(tally *table, size_t n_slot, int32_t label)
@@ -245,10 +238,10 @@ static void blur_axis(const int n[3], int axis, const float *kernel, int radius,
 static int make_kernel(double sigma, float kernel[2 * MAX_RADIUS + 1])
 {
     int radius = (int)fmin(ceil(3 * sigma), MAX_RADIUS);
-    double sum = 0;
-    for (int k = -radius; k <= radius; k++) sum += sigma > 0 ? exp(-k * k / (2 * sigma * sigma)) : k == 0;
+    double sum = 0, weight[2 * MAX_RADIUS + 1];
     for (int k = -radius; k <= radius; k++)
-        kernel[k + radius] = (float)((sigma > 0 ? exp(-k * k / (2 * sigma * sigma)) : k == 0) / sum);
+        sum += weight[k + radius] = sigma > 0 ? exp(-k * k / (2 * sigma * sigma)) : k == 0;
+    for (int k = 0; k <= 2 * radius; k++) kernel[k] = (float)(weight[k] / sum);
     return radius;
 }
 
@@ -283,10 +276,11 @@ static void invert(const double m[12], const int low[3], double out[12])
         out[4 * r + 3] = -(out[4 * r] * m[3] + out[4 * r + 1] * m[7] + out[4 * r + 2] * m[11]) - low[r];
 }
 
-static double axis_length(const double m[12], int axis)
+/* the extent of a voxel along each axis, m; returns the largest */
+static double axis_lengths(const double m[12], double length[3])
 {
-    const double e[3] = {m[axis], m[4 + axis], m[8 + axis]};
-    return pal_norm3(e);
+    for (int a = 0; a < 3; a++) length[a] = sqrt(m[a] * m[a] + m[4 + a] * m[4 + a] + m[8 + a] * m[8 + a]);
+    return fmax(length[0], fmax(length[1], length[2]));
 }
 
 /* the mask as a blurred field with a margin in which it falls to zero */
@@ -295,21 +289,25 @@ static pal_err blur_mask(const crop *c, const double to_m[12], double sigma_m, b
     float kernel[3][2 * MAX_RADIUS + 1];
     int radius[3], low[3];
     size_t n = 1;
+    double length[3];
+    axis_lengths(to_m, length);
     for (int a = 0; a < 3; a++) {
-        radius[a] = make_kernel(sigma_m / axis_length(to_m, a), kernel[a]);
+        radius[a] = make_kernel(sigma_m / length[a], kernel[a]);
         low[a] = c->low[a] - radius[a];
         b->n[a] = c->n[a] + 2 * radius[a];
         n *= (size_t)b->n[a];
     }
-    if (n > 16 * c->n_voxel + spare_voxel)
-        return pal_diagnostic_set(
-            diag, PAL_ERR_BUDGET, "voxels of %.3g x %.3g x %.3g mm are too unequal to blur by %.3g mm",
-            1e3 * axis_length(to_m, 0), 1e3 * axis_length(to_m, 1), 1e3 * axis_length(to_m, 2), 1e3 * sigma_m);
-    float *other = malloc(n * sizeof *other);
-    b->value = calloc(n, sizeof *b->value);
-    if (!other || !b->value) {
+    if (n > 16 * c->n_voxel + BLUR_SPARE_VOXEL)
+        return pal_diagnostic_set(diag, PAL_ERR_BUDGET,
+                                  "voxels of %.3g x %.3g x %.3g mm are too unequal to blur by %.3g mm", 1e3 * length[0],
+                                  1e3 * length[1], 1e3 * length[2], 1e3 * sigma_m);
+    pal_err err = PAL_ERR_OK;
+    float *other;
+    PAL_ARRAY(&err, other, n);
+    PAL_ZEROED(&err, b->value, n);
+    if (err) {
         free(other);
-        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory to blur %zu voxels", n);
+        return pal_diagnostic_set(diag, err, "no memory to blur %zu voxels", n);
     }
     const uint8_t *m = c->mask;
     for (int z = 0; z < c->n[2]; z++)
@@ -369,9 +367,9 @@ static pal_contour_box box_of(const crop *c, const double m[12], int target_tri)
             box.high_m[r] += fmax(first, last);
         }
     }
-    double coarse = fmax(axis_length(m, 0), fmax(axis_length(m, 1), axis_length(m, 2)));
-    double fine = cbrt(fabs(determinant(m))), wanted = coarse;
-    if (target_tri > 0) wanted = sqrt(per_spacing2 * face_area(c, m) / 1.5 / (surplus * target_tri));
+    double length[3], coarse = axis_lengths(m, length), fine = cbrt(fabs(determinant(m))), wanted = coarse;
+    if (target_tri > 0)
+        wanted = sqrt(CONTOUR_TRI_PER_SPACING2 * face_area(c, m) / 1.5 / (CONTOUR_SURPLUS * target_tri));
     box.spacing_m = fmax(fmin(wanted, 1.5 * coarse), fine);
     return box;
 }
@@ -379,11 +377,13 @@ static pal_contour_box box_of(const crop *c, const double m[12], int target_tri)
 /* keeps the component with the most triangles */
 static pal_err keep_largest_component(pal_surface *s)
 {
-    int32_t *label = malloc(((size_t)s->n_tri + 1) * sizeof *label);
+    pal_err err = PAL_ERR_OK;
+    int32_t *label;
     int n = 0, best = 0;
-    pal_err err = label ? pal_surface_components(s, label, &n) : PAL_ERR_MEMORY;
-    int64_t *count = err ? NULL : calloc((size_t)n + 1, sizeof *count);
-    if (!err && !count) err = PAL_ERR_MEMORY;
+    PAL_ARRAY(&err, label, s->n_tri);
+    if (!err) err = pal_surface_components(s, label, &n);
+    int64_t *count;
+    PAL_ZEROED(&err, count, n);
     for (int t = 0; !err && t < s->n_tri; t++) count[label[t]]++;
     for (int k = 1; !err && k < n; k++)
         if (count[k] > count[best]) best = k;
@@ -391,8 +391,7 @@ static pal_err keep_largest_component(pal_surface *s)
     for (size_t t = 0; !err && n > 1 && t < (size_t)s->n_tri; t++)
         if (label[t] == best) memmove(s->tri + 3 * kept++, s->tri + 3 * t, 3 * sizeof *s->tri);
     if (!err && n > 1) s->n_tri = (int)kept;
-    free(label);
-    free(count);
+    PAL_FREE(label, count);
     return err;
 }
 
@@ -410,9 +409,9 @@ static pal_err smooth_within_voxels(pal_surface *s, const double m[12], int roun
             reach[i] = fmax(reach[i], SMOOTH_MAX_VOXEL * fabs(pal_dot3(normal + 3 * i, e)));
         }
     }
-    pal_err err = pal_surface_relax(s, rounds, reach);
+    pal_err err = pal_surface_smooth(s, rounds, reach);
     free(normal);
-    return err ? err : pal_surface_smooth(s, rounds > 0 ? LAST_ROUNDS : 0);
+    return err ? err : pal_surface_smooth(s, rounds > 0 ? SMOOTH_LAST_ROUNDS : 0, NULL);
 }
 
 /* moves all vertices along their normals until the volume is the wanted one */
@@ -435,7 +434,7 @@ static pal_err shape_surface(pal_surface *s, const double m[12], const pal_label
     if (!o->all_components) PAL_TRY(keep_largest_component(s));
     /* smoothing takes less time on fewer, larger triangles */
     if (o->target_tri > 0) PAL_TRY(pal_surface_decimate(s, 2 * o->target_tri));
-    PAL_TRY(smooth_within_voxels(s, m, o->smooth_rounds < 0 ? DEFAULT_ROUNDS : o->smooth_rounds));
+    PAL_TRY(smooth_within_voxels(s, m, o->smooth_rounds < 0 ? SMOOTH_ROUNDS : o->smooth_rounds));
     PAL_TRY(pal_surface_decimate(s, o->target_tri > 0 ? o->target_tri : s->n_tri));
     PAL_TRY(set_volume(s, wanted_m3));
     pal_surface_recentre(s);
@@ -451,7 +450,7 @@ pal_err pal_label_volume_surface(const pal_label_volume *volume, int32_t label,
     blurred b = {0};
     pal_surface s = {0};
     const double *m = volume->to_m;
-    double coarse = fmax(axis_length(m, 0), fmax(axis_length(m, 1), axis_length(m, 2)));
+    double length[3], coarse = axis_lengths(m, length);
     pal_err err = crop_label(volume, label, &c, diag);
     if (!err && !o->all_components) err = keep_largest(&c, diag);
     if (!err) err = blur_mask(&c, m, o->blur_m < 0 ? coarse : o->blur_m, &b, diag);
@@ -459,13 +458,10 @@ pal_err pal_label_volume_surface(const pal_label_volume *volume, int32_t label,
         pal_contour_box box = box_of(&c, m, o->target_tri);
         err = pal_contour(field_at, &b, &box, &s, diag);
         /* a few voxels may fall between the lattice points */
-        for (int k = 0; k < 4 && err == PAL_ERR_REFUSED; k++) {
-            box.spacing_m /= 2;
-            err = pal_contour(field_at, &b, &box, &s, diag);
-        }
+        for (int k = 0; k < 4 && err == PAL_ERR_REFUSED; k++)
+            box.spacing_m /= 2, err = pal_contour(field_at, &b, &box, &s, diag);
     }
-    free(b.value);
-    free(c.mask);
+    PAL_FREE(b.value, c.mask);
     if (!err) {
         err = shape_surface(&s, m, o, (double)c.n_label * fabs(determinant(m)));
         if (err) pal_diagnostic_set(diag, err, "no memory for the surface of label %d", label);

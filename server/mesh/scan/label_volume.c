@@ -15,7 +15,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <zlib.h>
 
 static const int64_t max_voxel = (int64_t)1 << 29;
@@ -41,10 +40,8 @@ typedef struct source {
     bool packed;
 } source;
 
-static pal_err refuse(const source *s, const char *unit, int64_t at, const char *format, ...)
-    __attribute__((format(printf, 4, 5)));
-
-static pal_err refuse(const source *s, const char *unit, int64_t at, const char *format, ...)
+static pal_err __attribute__((format(printf, 4, 5)))
+refuse(const source *s, const char *unit, int64_t at, const char *format, ...)
 {
     va_list list;
     va_start(list, format);
@@ -76,11 +73,6 @@ static pal_err unpack_begin(unpacker *u, const source *s)
     *u = (unpacker){.s = s};
     if (s->packed && inflateInit2(&u->z, 15 + 16) != Z_OK) return no_memory(s, sizeof u->z);
     return PAL_ERR_OK;
-}
-
-static void unpack_end(unpacker *u)
-{
-    if (u->s->packed) inflateEnd(&u->z);
 }
 
 static pal_err inflate_next(unpacker *u, uint8_t *to, size_t max, size_t *n_out)
@@ -153,17 +145,17 @@ static void nifti_axes(const uint8_t *b, bool big, double m[12])
 /* finite, not flat, and voxels between a nanometre and a kilometre */
 static bool axes_usable(const double m[12])
 {
-    double x[3] = {m[0], m[4], m[8]}, y[3] = {m[1], m[5], m[9]}, z[3] = {m[2], m[6], m[10]}, n[3];
+    double e[3][3], n[3], size = 1;
     for (int k = 0; k < 12; k++)
         if (!(fabs(m[k]) < 1e6)) return false;
-    pal_cross3(n, x, y);
-    double size = pal_norm3(x) * pal_norm3(y) * pal_norm3(z);
-    bool sane = true;
     for (int a = 0; a < 3; a++) {
-        const double *e = a == 0 ? x : a == 1 ? y : z;
-        sane &= pal_norm3(e) > 1e-9 && pal_norm3(e) < 1e3;
+        pal_set3(e[a], m[a], m[4 + a], m[8 + a]);
+        double length = pal_norm3(e[a]);
+        if (!(length > 1e-9 && length < 1e3)) return false;
+        size *= length;
     }
-    return sane && fabs(pal_dot3(n, z)) > 1e-6 * size;
+    pal_cross3(n, e[0], e[1]);
+    return fabs(pal_dot3(n, e[2])) > 1e-6 * size;
 }
 
 static bool is_nifti(const uint8_t *b, size_t n)
@@ -271,11 +263,7 @@ static pal_err inr_check(const source *s, const inr_words *w, header *h)
     if (w->type == FLOATING && (w->bits == 32 || w->bits == 64))
         h->type = w->bits == 32 ? PAL_SCALAR_F32 : PAL_SCALAR_F64;
     else if (fixed && (w->bits == 8 || w->bits == 16 || w->bits == 32 || w->bits == 64))
-        h->type = (pal_scalar)((w->bits == 8    ? PAL_SCALAR_U8
-                                : w->bits == 16 ? PAL_SCALAR_U16
-                                : w->bits == 32 ? PAL_SCALAR_U32
-                                                : PAL_SCALAR_U64) +
-                               (w->type == SIGNED));
+        h->type = (pal_scalar)(2 * __builtin_ctzll((uint64_t)w->bits / 8) + (w->type == SIGNED));
     else
         return refuse(s, "line", w->type_line, "TYPE and PIXSIZE do not name a voxel type (%lld bits)",
                       (long long)w->bits);
@@ -361,7 +349,7 @@ static pal_err read_voxels(const source *s, const header *h, pal_label_volume *o
     PAL_TRY(unpack_begin(&u, s));
     size_t need = h->offset + (size_t)n * (size_t)pal_scalar_size(h->type);
     pal_err err = copy_voxels(s, h, &u, (size_t)n, need, &label);
-    unpack_end(&u);
+    if (s->packed) inflateEnd(&u.z);
     if (err) {
         free(label);
         return err;
@@ -373,13 +361,13 @@ static pal_err read_voxels(const source *s, const header *h, pal_label_volume *o
     return PAL_ERR_OK;
 }
 
-/* the beginning of the volume, at most `max` bytes, in the file itself or in `room` */
+/* the beginning of the volume, at most max bytes, in the file itself or in room */
 static pal_err view_head(const source *s, uint8_t *room, size_t max, const uint8_t **head, size_t *n_head)
 {
     unpacker u;
     PAL_TRY(unpack_begin(&u, s));
     pal_err err = unpack_next(&u, room, max, head, n_head);
-    unpack_end(&u);
+    if (s->packed) inflateEnd(&u.z);
     return err;
 }
 
@@ -423,11 +411,8 @@ void pal_label_volume_free(pal_label_volume *volume)
 bool pal_label_volume_is(const char *path)
 {
     static const char *const tail[] = {".nii", ".nii.gz", ".inr", ".inr.gz"};
-    size_t n = strlen(path);
-    for (size_t k = 0; k < sizeof tail / sizeof *tail; k++) {
-        size_t m = strlen(tail[k]);
-        if (n >= m && strcasecmp(path + n - m, tail[k]) == 0) return true;
-    }
+    for (size_t k = 0; k < sizeof tail / sizeof *tail; k++)
+        if (pal_file_ends_with(path, tail[k])) return true;
     uint8_t bytes[4096], room[512];
     const uint8_t *head;
     FILE *file = fopen(path, "rb");

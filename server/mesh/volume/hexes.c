@@ -5,6 +5,7 @@
  * cube of edge edge_m along the axes, and when their volumes, each positive, sum to that of the cube. */
 #include "server/mesh/volume/hexes.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/voxel/voxel_fraction.h"
 
@@ -16,18 +17,8 @@
 
 void pal_hexes_free(pal_hexes *hexes)
 {
-    free(hexes->node);
-    free(hexes->fill);
+    PAL_FREE(hexes->node, hexes->fill);
     memset(hexes, 0, sizeof *hexes);
-}
-
-/* six times the volume of a tetrahedron */
-static double six_volumes(const pal_tets *tets, const int32_t *c)
-{
-    double e[3][3], cross[3];
-    for (int k = 0; k < 3; k++) pal_sub3(e[k], tets->x + 3 * (size_t)c[k + 1], tets->x + 3 * (size_t)c[0]);
-    pal_cross3(cross, e[1], e[2]);
-    return pal_dot3(e[0], cross);
 }
 
 /* The corners when the five are in the order of the splitter and the voxel is a cube: then their volumes are right. The
@@ -56,9 +47,9 @@ static bool read_pattern(const pal_tets *tets, const int32_t *five, int32_t node
 /* corner bits of each node from its position in the box of the twenty corners; false when one is at no corner */
 static bool find_corners(const pal_tets *tets, const int32_t *five, int32_t node[8])
 {
-    double low[3] = {INFINITY, INFINITY, INFINITY}, h = tets->edge_m;
-    for (int i = 0; i < 20; i++)
-        for (int k = 0; k < 3; k++) low[k] = fmin(low[k], tets->x[3 * (size_t)five[i] + (size_t)k]);
+    double low[3], high[3], h = tets->edge_m;
+    pal_box3_empty(low, high);
+    for (int i = 0; i < 20; i++) pal_box3_add(low, high, tets->x + 3 * (size_t)five[i]);
     for (int c = 0; c < 8; c++) node[c] = -1;
     for (int i = 0; i < 20; i++) {
         int corner = 0;
@@ -74,11 +65,11 @@ static bool find_corners(const pal_tets *tets, const int32_t *five, int32_t node
         if (node[c] < 0) return false;
     double sum = 0;
     for (int t = 0; t < 5; t++) {
-        double six = six_volumes(tets, five + 4 * t);
-        if (!(six > 0)) return false;
-        sum += six;
+        double volume = pal_tet_volume(tets->x, five + 4 * t);
+        if (!(volume > 0)) return false;
+        sum += volume;
     }
-    return fabs(sum - 6 * h * h * h) <= 60 * AWAY * h * h * h;
+    return fabs(sum - h * h * h) <= 10 * AWAY * h * h * h;
 }
 
 pal_err pal_hexes_find(const pal_tets *tets, pal_hexes *out, pal_diagnostic *diag)
@@ -108,13 +99,9 @@ pal_err pal_hexes_find(const pal_tets *tets, pal_hexes *out, pal_diagnostic *dia
 static pal_err find_grid(const pal_hexes *hexes, const pal_tets *tets, const pal_surface *surface, pal_voxels *grid,
                          pal_diagnostic *diag)
 {
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, h = tets->edge_m;
-    for (size_t i = 0; i < 8 * (size_t)hexes->n_hex; i++)
-        for (size_t k = 0; k < 3; k++) {
-            double x = tets->x[3 * (size_t)hexes->node[i] + k];
-            low[k] = fmin(low[k], x);
-            high[k] = fmax(high[k], x);
-        }
+    double low[3], high[3], h = tets->edge_m;
+    pal_box3_empty(low, high);
+    for (size_t i = 0; i < 8 * (size_t)hexes->n_hex; i++) pal_box3_add(low, high, tets->x + 3 * (size_t)hexes->node[i]);
     grid->edge_m = h;
     for (int k = 0; k < 3; k++) {
         double n = (high[k] - low[k]) / h;
@@ -161,26 +148,23 @@ static void deal_layers(filler *f, const pal_hexes *hexes, const pal_tets *tets,
     }
 }
 
-pal_err pal_hexes_fill(pal_hexes *hexes, const pal_tets *tets, const pal_surface *surface, int n_sub,
-                       pal_diagnostic *diag)
+pal_err pal_hexes_fill(pal_hexes *hexes, const pal_tets *tets, const pal_surface *surface, pal_diagnostic *diag)
 {
     pal_voxels grid = {0};
     if (hexes->n_hex == 0) return PAL_ERR_OK;
     PAL_TRY(find_grid(hexes, tets, surface, &grid, diag));
     filler f = {.grid = &grid, .fill = hexes->fill};
-    f.place = malloc((size_t)hexes->n_hex * 2 * sizeof *f.place);
-    f.start = calloc((size_t)grid.n[2] + 2, sizeof *f.start);
-    pal_err err = PAL_ERR_MEMORY;
-    if (f.place && f.start) {
+    pal_err err = PAL_ERR_OK;
+    PAL_ARRAY(&err, f.place, 2 * (size_t)hexes->n_hex);
+    PAL_ZEROED(&err, f.start, grid.n[2] + 2);
+    if (!err) {
         double shift[3];
         pal_sub3(shift, tets->origin_m, surface->origin_m);
         deal_layers(&f, hexes, tets, shift);
-        err = pal_voxels_fraction(surface, &grid, NULL, n_sub, set_layer, &f, NULL, diag);
+        err = pal_voxels_fraction(surface, &grid, set_layer, &f, diag);
     }
-    if (!err) hexes->measured = true;
-    free(f.place);
-    free(f.start);
-    return err == PAL_ERR_MEMORY
-               ? pal_diagnostic_set(diag, err, "out of memory for the fill of %d voxels", hexes->n_hex)
-               : err;
+    hexes->measured |= !err;
+    PAL_FREE(f.place, f.start);
+    if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "out of memory for the fill of %d voxels", hexes->n_hex);
+    return err;
 }

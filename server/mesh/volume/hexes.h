@@ -17,9 +17,7 @@ void pal_hexes_free(pal_hexes *hexes);
 /* Finds the cubes of edge tets->edge_m that the tetrahedra of a voxel split fill (five each, consecutive, in any order
  * within the five); fill 1; REFUSED when the mesh is no such split; MEMORY */
 pal_err pal_hexes_find(const pal_tets *tets, pal_hexes *out, pal_diagnostic *diag);
-/* Fill of every voxel, 0..1: exact to rounding for a closed surface that does not overlap itself, else by n_sub^3
- * samples a voxel (0: 6, fewer where the grid would grow too large). Exactly 1 for voxels wholly inside, exactly 0 for
- * voxels that the surface only touches. REFUSED: nothing is inside, or not the surface of this mesh; BUDGET, MEMORY */
-pal_err pal_hexes_fill(pal_hexes *hexes, const pal_tets *tets, const pal_surface *surface, int n_sub,
-                       pal_diagnostic *diag);
+/* Fill of every voxel, 0..1, as pal_voxels_fraction measures it. REFUSED: nothing is inside, or not the surface of this
+ * mesh; BUDGET, MEMORY */
+pal_err pal_hexes_fill(pal_hexes *hexes, const pal_tets *tets, const pal_surface *surface, pal_diagnostic *diag);
 #endif

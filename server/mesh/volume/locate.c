@@ -1,11 +1,10 @@
-/* Points in the elements of a mesh at rest.
- *
- * Cells list the elements whose boxes, shrunk by a small margin, overlap them; a point searches all cells within that
+/* Cells list the elements whose boxes, shrunk by a small margin, overlap them; a point searches all cells within that
  * margin, so that points on faces are found without listing every element in the cells of its neighbours too. Outside,
  * layers of cells grow around the projection q of the point p on the box of the grid until none farther out can be
  * nearer: for y in the box |p - y|^2 >= |p - q|^2 + |q - y|^2. */
 #include "server/mesh/volume/locate.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 
 #include <stdlib.h>
@@ -28,9 +27,7 @@ struct pal_locate {
 void pal_locate_destroy(pal_locate *locate)
 {
     if (!locate) return;
-    free(locate->start);
-    free(locate->element);
-    free(locate);
+    PAL_FREE(locate->start, locate->element, locate);
 }
 
 const pal_tets *pal_locate_mesh(const pal_locate *locate, bool *hex)
@@ -48,15 +45,8 @@ static const double *corner(const pal_locate *l, int element, int c)
 
 static void find_box(const pal_locate *l, int element, double low[3], double high[3])
 {
-    int last = l->hexes ? 7 : 3;
-    pal_copy3(low, corner(l, element, 0));
-    pal_copy3(high, low);
-    for (int c = 1; c <= last; c++)
-        for (int k = 0; k < 3; k++) {
-            double x = corner(l, element, c)[k];
-            low[k] = fmin(low[k], x);
-            high[k] = fmax(high[k], x);
-        }
+    pal_box3_empty(low, high);
+    for (int c = 0; c < (l->hexes ? 8 : 4); c++) pal_box3_add(low, high, corner(l, element, c));
 }
 
 static int cell_along(const pal_locate *l, int k, double x)
@@ -104,14 +94,10 @@ static void fill_cells(pal_locate *l, int64_t *start)
 /* grid over all corners; cells of one voxel edge, larger where the body fills little of its box */
 static void make_cells(pal_locate *l)
 {
-    double high[3] = {-INFINITY, -INFINITY, -INFINITY},
-           max = (double)MAX_CELL_PER_ELEMENT * l->n_element + MAX_CELL_MORE;
-    for (int k = 0; k < 3; k++) l->low[k] = INFINITY;
-    for (int e = 0; e < l->n_element; e++) {
-        double a[3], b[3];
-        find_box(l, e, a, b);
-        for (int k = 0; k < 3; k++) l->low[k] = fmin(l->low[k], a[k]), high[k] = fmax(high[k], b[k]);
-    }
+    double high[3], max = (double)MAX_CELL_PER_ELEMENT * l->n_element + MAX_CELL_MORE;
+    pal_box3_empty(l->low, high);
+    for (int e = 0; e < l->n_element; e++)
+        for (int c = 0; c < (l->hexes ? 8 : 4); c++) pal_box3_add(l->low, high, corner(l, e, c));
     l->cell_m = l->tets->edge_m;
     for (;; l->cell_m *= 1.25) {
         double n[3];
@@ -155,17 +141,15 @@ static void hex_local(const pal_locate *l, int element, const double x[3], doubl
 
 static void tet_local(const pal_locate *l, int element, const double x[3], double local[4])
 {
-    double e[3][3], d[3], cross[3];
+    double e[3][3], d[3], cross[3], six = 0;
     const double *origin = corner(l, element, 0);
     for (int k = 0; k < 3; k++) pal_sub3(e[k], corner(l, element, k + 1), origin);
     pal_sub3(d, x, origin);
-    pal_cross3(cross, e[1], e[2]);
-    double six = pal_dot3(e[0], cross);
-    local[1] = pal_dot3(d, cross) / six;
-    pal_cross3(cross, e[2], e[0]);
-    local[2] = pal_dot3(d, cross) / six;
-    pal_cross3(cross, e[0], e[1]);
-    local[3] = pal_dot3(d, cross) / six;
+    for (int k = 0; k < 3; k++) {
+        pal_cross3(cross, e[(k + 1) % 3], e[(k + 2) % 3]);
+        if (k == 0) six = pal_dot3(e[0], cross);
+        local[k + 1] = pal_dot3(d, cross) / six;
+    }
     local[0] = 1 - local[1] - local[2] - local[3];
 }
 

@@ -3,13 +3,11 @@
  * Triangles are cut by the box, then by the planes of the voxel lattice, whose pieces lie in one hexahedron each. In
  * tetrahedra a piece is peeled: the element around its centre takes the part within its four planes, and the rest, in
  * convex pieces, is treated likewise. Cuts lose no area, so areas sum exactly. */
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/polygon.h"
 #include "server/mesh/volume/locate.h"
 #include "server/num/shape_functions.h"
-
-#include <stdlib.h>
-#include <string.h>
 
 /* cosine of the largest angle to the given normal; pieces smaller than this fraction of their triangle are rounding;
  * barycentric coordinates within this of 0 lie on the face */
@@ -26,7 +24,7 @@ typedef struct cutter {
     double normal[3]; /* of the triangle at hand */
     double crumb_m2;
     pal_quadrature_point *piece;
-    size_t n, cap;
+    size_t n;
     bool full; /* out of memory */
 } cutter;
 
@@ -34,28 +32,11 @@ static double area_of(const cutter *c, const pal_polygon *p)
 {
     double sum = 0;
     for (int i = 1; i + 1 < p->n; i++) {
-        double a[3], b[3], cross[3];
-        pal_sub3(a, p->x[i], p->x[0]);
-        pal_sub3(b, p->x[i + 1], p->x[0]);
-        pal_cross3(cross, a, b);
+        double cross[3];
+        pal_normal3(cross, p->x[0], p->x[i], p->x[i + 1]);
         sum += pal_dot3(cross, c->normal) / 2;
     }
     return sum;
-}
-
-static pal_quadrature_point *next_piece(cutter *c)
-{
-    if (c->n == c->cap) {
-        size_t cap = c->cap ? 2 * c->cap : 256;
-        pal_quadrature_point *piece = cap <= INT32_MAX ? realloc(c->piece, cap * sizeof *piece) : NULL;
-        if (!piece) {
-            c->full = true;
-            return NULL;
-        }
-        c->piece = piece;
-        c->cap = cap;
-    }
-    return &c->piece[c->n++];
 }
 
 /* a polygon within an element, as a fan of triangles with six points each */
@@ -63,17 +44,16 @@ static void add_points(cutter *c, const pal_polygon *p, int element)
 {
     for (int i = 1; i + 1 < p->n && !c->full; i++) {
         const double *corner[3] = {p->x[0], p->x[i], p->x[i + 1]};
-        double a[3], b[3], cross[3];
-        pal_sub3(a, corner[1], corner[0]);
-        pal_sub3(b, corner[2], corner[0]);
-        pal_cross3(cross, a, b);
+        double cross[3];
+        pal_normal3(cross, corner[0], corner[1], corner[2]);
         double area = pal_dot3(cross, c->normal) / 2;
         if (!(area > 0)) continue;
         for (int q = 0; q < 6; q++) {
             double x[3] = {0};
             for (int k = 0; k < 3; k++) pal_axpy3(x, pal_tri_gauss[q][k], corner[k]);
-            pal_quadrature_point *piece = next_piece(c);
-            if (!piece) return;
+            c->full = c->n == INT32_MAX || !PAL_GROW(c->piece, c->n);
+            if (c->full) return;
+            pal_quadrature_point *piece = &c->piece[c->n++];
             piece->element = element;
             piece->area_m2 = area * pal_tri_gauss[q][3];
             pal_copy3(piece->normal, c->normal);
@@ -111,7 +91,7 @@ static void peel(cutter *c, pal_polygon *p, int depth)
     for (int f = 0; f < 4 && depth < MAX_PEEL && outside == 0; f++) {
         pal_polygon off, on;
         if (!find_heights(c, p, element, f, height)) continue;
-        pal_polygon_cut(p, height, &off, &on);
+        pal_polygon_cut(p, height, -1, 0, &off, &on);
         peel(c, &off, depth + 1);
         *p = on;
     }
@@ -147,14 +127,12 @@ static void add_triangle(cutter *c, const pal_surface *surface, size_t t, const 
                          const double *normal)
 {
     pal_polygon p = {.n = 3}, cut;
-    double a[3], b[3], cross[3];
+    double cross[3];
     for (int k = 0; k < 3; k++)
         for (int d = 0; d < 3; d++)
             p.x[k][d] = surface->x[3 * (size_t)surface->tri[3 * t + (size_t)k] + (size_t)d] + surface->origin_m[d] -
                         c->tets->origin_m[d];
-    pal_sub3(a, p.x[1], p.x[0]);
-    pal_sub3(b, p.x[2], p.x[0]);
-    pal_cross3(cross, a, b);
+    pal_normal3(cross, p.x[0], p.x[1], p.x[2]);
     if (!pal_unit3(c->normal, cross, 0)) return;
     if (normal && pal_dot3(c->normal, normal) < COS_OFF) return;
     c->crumb_m2 = CRUMB * pal_norm3(cross) / 2;
@@ -165,23 +143,16 @@ static void add_triangle(cutter *c, const pal_surface *surface, size_t t, const 
     cut_lattice(c, &p, 0);
 }
 
-/* lowest corner of the mesh, where the lattice of a voxel split begins */
-static void find_low(cutter *c)
-{
-    for (int k = 0; k < 3; k++) {
-        c->low[k] = INFINITY;
-        for (size_t i = 0; i < (size_t)c->tets->n_node; i++) c->low[k] = fmin(c->low[k], c->tets->x[3 * i + (size_t)k]);
-    }
-}
-
 pal_err pal_locate_surface(const pal_locate *locate, const pal_surface *surface, const double low[3],
                            const double high[3], const double *normal, pal_quadrature_point **out, int *n_piece)
 {
-    double unit[3];
+    double unit[3], top[3];
     cutter c = {.locate = locate};
     c.tets = pal_locate_mesh(locate, &c.hex);
     c.h = c.tets->edge_m;
-    find_low(&c);
+    /* the lattice of a voxel split begins at the lowest corner of the mesh */
+    pal_box3_empty(c.low, top);
+    for (size_t i = 0; i < (size_t)c.tets->n_node; i++) pal_box3_add(c.low, top, c.tets->x + 3 * i);
     if (normal && !pal_unit3(unit, normal, 0)) normal = NULL;
     for (size_t t = 0; t < (size_t)surface->n_tri && !c.full; t++)
         add_triangle(&c, surface, t, low, high, normal ? unit : NULL);

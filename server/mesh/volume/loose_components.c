@@ -1,9 +1,9 @@
 /* Components that nothing holds: one rule for tetrahedra and control cells. */
 #include "server/mesh/volume/loose_components.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/tuning.h"
-#include "server/num/union_find.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -70,15 +70,10 @@ void pal_loose_components_describe(const pal_loose_components *parts, const char
 
 static void add_tet(const pal_tets *tets, const uint8_t *fixed, const int32_t *corner, component *to)
 {
-    const double *x[4];
-    double e[3][3], cross[3];
-    for (int c = 0; c < 4; c++) x[c] = tets->x + 3 * (size_t)corner[c];
-    for (int k = 0; k < 3; k++) pal_sub3(e[k], x[k + 1], x[0]);
-    pal_cross3(cross, e[1], e[2]);
-    double volume = pal_dot3(e[0], cross) / 6;
+    double volume = pal_tet_volume(tets->x, corner);
     to->volume_m3 += volume;
     for (int c = 0; c < 4; c++) {
-        pal_axpy3(to->moment, volume / 4, x[c]);
+        pal_axpy3(to->moment, volume / 4, tets->x + 3 * (size_t)corner[c]);
         to->fixed |= fixed[corner[c]] != 0;
     }
 }
@@ -87,12 +82,12 @@ static void add_tet(const pal_tets *tets, const uint8_t *fixed, const int32_t *c
 static pal_err keep_tets(const pal_tets *from, const int32_t *label, const component *part, int32_t *number,
                          pal_tets *to)
 {
-    *to = *from;
-    to->n_tet = to->n_node = to->n_face = 0;
-    to->face = NULL, to->on_surface = NULL;
-    to->x = malloc(3 * (size_t)from->n_node * sizeof *to->x);
-    to->tet = malloc(4 * (size_t)from->n_tet * sizeof *to->tet);
-    if (!to->x || !to->tet) return PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    *to = (pal_tets){.edge_m = from->edge_m};
+    pal_copy3(to->origin_m, from->origin_m);
+    PAL_ARRAY(&err, to->x, 3 * (size_t)from->n_node);
+    PAL_ARRAY(&err, to->tet, 4 * (size_t)from->n_tet);
+    if (err) return err;
     for (int i = 0; i < from->n_node; i++) number[i] = -1;
     for (size_t t = 0; t < (size_t)from->n_tet; t++)
         for (size_t c = 0; part[label[t]].keep && c < 4; c++) number[from->tet[4 * t + c]] = 0;
@@ -114,10 +109,11 @@ static pal_err keep_hexes(const pal_hexes *from, const int32_t *label, const com
                           pal_hexes *to)
 {
     if (from->n_hex == 0) return PAL_ERR_OK;
+    pal_err err = PAL_ERR_OK;
     to->measured = from->measured;
-    to->node = malloc(8 * (size_t)from->n_hex * sizeof *to->node);
-    to->fill = malloc((size_t)from->n_hex * sizeof *to->fill);
-    if (!to->node || !to->fill) return PAL_ERR_MEMORY;
+    PAL_ARRAY(&err, to->node, 8 * (size_t)from->n_hex);
+    PAL_ARRAY(&err, to->fill, from->n_hex);
+    if (err) return err;
     for (size_t e = 0; e < (size_t)from->n_hex; e++) {
         if (!part[label[5 * e]].keep) continue;
         for (size_t c = 0; c < 8; c++) to->node[8 * (size_t)to->n_hex + c] = number[from->node[8 * e + c]];
@@ -153,30 +149,21 @@ pal_err pal_loose_components_drop(const char *name, const uint8_t *fixed, bool l
     int n = 0;
     *out = (pal_loose_components){0};
     if (tets->n_tet == 0) return PAL_ERR_OK;
-    int32_t *label = malloc((size_t)tets->n_tet * sizeof *label);
-    pal_err err = label ? pal_tets_components(tets, label, &n) : PAL_ERR_MEMORY;
-    component *part = err ? NULL : calloc((size_t)n, sizeof *part);
-    if (!err && !part) err = PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    int32_t *label;
+    component *part;
+    PAL_ARRAY(&err, label, tets->n_tet);
+    if (!err) err = pal_tets_components(tets, label, &n);
+    PAL_ZEROED(&err, part, n);
     for (int t = 0; !err && t < tets->n_tet; t++) add_tet(tets, fixed, tets->tet + 4 * (size_t)t, &part[label[t]]);
     if (!err) err = choose(name, largest_only, part, n, out, diag);
     if (!err && out->n_dropped > 0) err = keep_mesh(mesh, label, part);
     if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "body \"%.60s\": no memory to find its components", name);
-    free(label);
-    free(part);
+    PAL_FREE(label, part);
     return err;
 }
 
 /* ---- control cells ---- */
-
-static int label_cells(const pal_cells *cells, int32_t *label)
-{
-    pal_union_find_init(label, cells->n_cell);
-    for (int32_t f = 0; f < cells->n_face; f++)
-        if (!pal_cells_face_boundary(cells, f))
-            pal_union_find_join(label, cells->face_use[cells->face[f].use[0]].cell,
-                                cells->face_use[cells->face[f].use[1]].cell);
-    return pal_union_find_label(label, cells->n_cell);
-}
 
 static pal_err keep_cells(pal_cells *cells, const int32_t *label, const component *part)
 {
@@ -199,7 +186,7 @@ pal_err pal_loose_cells_drop(const char *name, const uint8_t *fixed, bool larges
                              pal_loose_components *out, pal_diagnostic *diag)
 {
     int32_t *label = malloc((size_t)cells->n_cell * sizeof *label);
-    int n = label ? label_cells(cells, label) : 0;
+    int n = label ? pal_cells_label(cells, label) : 0;
     component *part = label ? calloc((size_t)n, sizeof *part) : NULL;
     pal_err err = part ? PAL_ERR_OK : PAL_ERR_MEMORY;
     *out = (pal_loose_components){0};
@@ -215,7 +202,6 @@ pal_err pal_loose_cells_drop(const char *name, const uint8_t *fixed, bool larges
     if (!err) err = choose(name, largest_only, part, n, out, diag);
     if (!err && out->n_dropped > 0) err = keep_cells(cells, label, part);
     if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "body \"%.60s\": no memory to find its components", name);
-    free(label);
-    free(part);
+    PAL_FREE(label, part);
     return err;
 }

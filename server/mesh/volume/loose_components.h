@@ -1,20 +1,16 @@
 /* Components of a body that nothing holds.
  *
- * A component is connected through faces: tetrahedra, voxels or control cells that share only an edge or a corner are
- * of two components. A component without a fixed point has six rigid motions that no force restores, so any load moves
- * it without bound; it is not part of what the scene describes. With the fraction of a component being its volume over
- * that of the largest one:
+ * A component is connected through faces. One without a fixed point has six rigid motions that no force restores, so
+ * any load moves it without bound. With the fraction of a component being its volume over that of the largest one:
  *
  *   - with `largest_only` the largest component stays and the others are dropped;
  *   - a component with a fixed point stays;
  *   - one without is dropped when its fraction is below 1 %: voxels of a thin tip whose neighbours are not in the grid;
- *   - a larger one without is refused when another one is fixed: the scene says that the body is held, and whether this
- *     component is to be held or left out cannot be guessed;
- *   - with no fixed point at all the body is free, which is a scene of its own: components of at least 1 % stay.
+ *   - a larger one without is refused when another one is fixed: it may be meant to be held, or to be left out;
+ *   - with no fixed point at all the body is free: components of at least 1 % stay.
  *
- * A component that is to move freely beside a fixed one is a body of its own. The rule applies where scenes are
- * prepared; a world simulates every component of its mesh. Components of an adaptive surface have anchors, which leave
- * no rigid motion: they all stay. Thread: [load]. */
+ * The rule applies where scenes are prepared; a world simulates every component of its mesh. Components of an adaptive
+ * surface have anchors, which leave no rigid motion: they all stay. Thread: [load]. */
 #ifndef PAL_MESH_VOLUME_LOOSE_COMPONENTS_H
 #define PAL_MESH_VOLUME_LOOSE_COMPONENTS_H
 #include "server/mesh/cells/cells.h"

@@ -1,11 +1,10 @@
 /* The prepared mesh: made from a surface, saved, loaded.
  *
- * File, little-endian: "PALPREP1", u32 version, u32 sections, u64 bytes of the file, u64 checksum of all that follows;
- * then eight u64 counts and four doubles (origin, h); then per section u32 number, u32 item bytes, u64 items, u64
- * offset (a multiple of 64); then the sections. The counts alone fix every section's size, so a file is either whole or
- * refused, and no more is taken from the heap than the file has bytes. Of the hexahedra only a measured fill is kept:
- * their corners follow from the tetrahedra. A mesh without skin frames binds no vertex to any, so that a surface alone
- * has counts of 0 but its own. Version 2 has no fill, hence one count and one section less. */
+ * File, little-endian: head; eight u64 counts and four doubles (origin, h); an entry for each section; the sections,
+ * each at a multiple of 64. The checksum is of all that follows the head. The counts alone fix every section's size, so
+ * a file is either whole or refused, and no more is taken from the heap than the file has bytes. Of the hexahedra only
+ * a measured fill is kept: their corners follow from the tetrahedra. A mesh without skin frames binds no vertex to any,
+ * so that a surface alone has counts of 0 but its own. Version 2 has no fill, hence one count and one section less. */
 #include "server/mesh/volume/prepared.h"
 
 #include "server/base/clock.h"
@@ -20,9 +19,23 @@
 #error "the prepared file is copied from memory: a big-endian machine needs a swap here"
 #endif
 
-enum { VERSION = 3, N_COUNT = 8, N_SECTION = 15, HEAD = 32, ENTRY = 24 };
+enum { VERSION = 3, N_COUNT = 8, N_SECTION = 15 };
 enum { VERSION_2 = 2, N_COUNT_2 = 7, N_SECTION_2 = 14 };
 static const char MAGIC[8] = "PALPREP1";
+
+typedef struct head {
+    char magic[8];
+    uint32_t version, n_section;
+    uint64_t n_byte, checksum;
+} head;
+
+typedef struct entry {
+    uint32_t number, item_byte;
+    uint64_t n, at;
+} entry;
+
+enum { HEAD = sizeof(head), ENTRY = sizeof(entry) };
+_Static_assert(HEAD == 32 && ENTRY == 24, "the file has no padding");
 
 /* what differs between versions */
 typedef struct layout {
@@ -48,37 +61,30 @@ static void list_sections(pal_prepared *p, const uint64_t count[N_COUNT], sectio
     uint64_t n_vertex = count[0], n_tri = count[1], n_node = count[2], n_tet = count[3], n_face = count[4],
              n_frame = count[5], n_fan = count[6], n_fill = count[7],
              n_near = n_frame ? PAL_SKIN_NEIGHBOURS * n_vertex : 0;
-    const section all[N_SECTION] = {
-        {&p->surface.x, 8, 3 * n_vertex},
-        {&p->surface.tri, 4, 3 * n_tri},
-        {&p->tets.x, 8, 3 * n_node},
-        {&p->tets.tet, 4, 4 * n_tet},
-        {&p->tets.face, 4, 3 * n_face},
-        {&p->tets.on_surface, 1, n_node},
-        {&p->skin.frame, 4, n_frame},
-        {&p->skin.frame_edge, 4, 2 * n_frame},
-        {&p->skin.frame_rotation, 4, 2 * n_frame},
-        {&p->skin.frame_rest, 4, 3 * n_frame},
-        {&p->skin.fan_start, 4, n_frame + 1},
-        {&p->skin.fan, 4, 2 * n_fan},
-        {&p->skin.near, 4, n_near},
-        {&p->skin.coef, 4, 4 * n_near},
-        {&p->hexes.fill, 4, n_fill},
-    };
+    const section all[N_SECTION] = {{&p->surface.x, 8, 3 * n_vertex},
+                                    {&p->surface.tri, 4, 3 * n_tri},
+                                    {&p->tets.x, 8, 3 * n_node},
+                                    {&p->tets.tet, 4, 4 * n_tet},
+                                    {&p->tets.face, 4, 3 * n_face},
+                                    {&p->tets.on_surface, 1, n_node},
+                                    {&p->skin.frame, 4, n_frame},
+                                    {&p->skin.frame_edge, 4, 2 * n_frame},
+                                    {&p->skin.frame_rotation, 4, 2 * n_frame},
+                                    {&p->skin.frame_rest, 4, 3 * n_frame},
+                                    {&p->skin.fan_start, 4, n_frame + 1},
+                                    {&p->skin.fan, 4, 2 * n_fan},
+                                    {&p->skin.near, 4, n_near},
+                                    {&p->skin.coef, 4, 4 * n_near},
+                                    {&p->hexes.fill, 4, n_fill}};
     memcpy(out, all, sizeof all);
 }
 
 static void get_counts(const pal_prepared *p, uint64_t count[N_COUNT])
 {
     const int32_t *fan_start = p->skin.fan_start;
-    const int n[N_COUNT] = {p->surface.n_vertex,
-                            p->surface.n_tri,
-                            p->tets.n_node,
-                            p->tets.n_tet,
-                            p->tets.n_face,
-                            p->skin.n_frame,
-                            fan_start ? fan_start[p->skin.n_frame] : 0,
-                            p->hexes.measured ? p->hexes.n_hex : 0};
+    const int n_fan = fan_start ? fan_start[p->skin.n_frame] : 0, n_fill = p->hexes.measured ? p->hexes.n_hex : 0;
+    const int n[N_COUNT] = {p->surface.n_vertex, p->surface.n_tri, p->tets.n_node, p->tets.n_tet,
+                            p->tets.n_face,      p->skin.n_frame,  n_fan,          n_fill};
     for (int k = 0; k < N_COUNT; k++) count[k] = (uint64_t)n[k];
 }
 
@@ -101,15 +107,6 @@ void pal_prepared_free(pal_prepared *prepared)
     pal_hexes_free(&prepared->hexes);
 }
 
-/* the hexahedra of a split, their fill when it is asked for or decided what was kept */
-static pal_err make_hexes(const pal_surface *surface, const pal_voxel_options *options, pal_prepared *p,
-                          pal_diagnostic *diag)
-{
-    PAL_TRY(pal_hexes_find(&p->tets, &p->hexes, diag));
-    if (!options->fill && !(options->min_fill > 0)) return PAL_ERR_OK;
-    return pal_hexes_fill(&p->hexes, &p->tets, surface, 0, diag);
-}
-
 pal_err pal_prepared_make(const pal_surface *surface, const pal_voxel_options *options, pal_prepared *out,
                           pal_prepare_report *report, pal_diagnostic *diag)
 {
@@ -125,7 +122,9 @@ pal_err pal_prepared_make(const pal_surface *surface, const pal_voxel_options *o
         return pal_diagnostic_set(diag, err, "cannot split %lld voxels into tetrahedra", (long long)result.n_voxel);
     double split = pal_clock_s();
     result.split_s = split - began;
-    if ((err = make_hexes(surface, options, &p, diag))) {
+    err = pal_hexes_find(&p.tets, &p.hexes, diag);
+    if (!err && (options->fill || options->min_fill > 0)) err = pal_hexes_fill(&p.hexes, &p.tets, surface, diag);
+    if (err) {
         pal_prepared_free(&p);
         return err;
     }
@@ -186,30 +185,6 @@ static size_t round_up(size_t n)
     return (n + 63) / 64 * 64;
 }
 
-static void put_u32(uint8_t *to, uint32_t v)
-{
-    memcpy(to, &v, 4);
-}
-
-static void put_u64(uint8_t *to, uint64_t v)
-{
-    memcpy(to, &v, 8);
-}
-
-static uint32_t get_u32(const uint8_t *from)
-{
-    uint32_t v;
-    memcpy(&v, from, 4);
-    return v;
-}
-
-static uint64_t get_u64(const uint8_t *from)
-{
-    uint64_t v;
-    memcpy(&v, from, 8);
-    return v;
-}
-
 pal_err pal_prepared_bytes(const pal_prepared *prepared, uint8_t **bytes_out, size_t *n_byte_out)
 {
     pal_prepared p = *prepared;
@@ -223,27 +198,23 @@ pal_err pal_prepared_bytes(const pal_prepared *prepared, uint8_t **bytes_out, si
     uint8_t *bytes = calloc(n_byte, 1);
     if (!bytes) return PAL_ERR_MEMORY;
 
-    memcpy(bytes, MAGIC, 8);
-    put_u32(bytes + 8, VERSION);
-    put_u32(bytes + 12, N_SECTION);
-    put_u64(bytes + 16, n_byte);
-    for (int k = 0; k < N_COUNT; k++) put_u64(bytes + HEAD + 8 * k, count[k]);
+    head h = {.version = VERSION, .n_section = N_SECTION, .n_byte = n_byte};
+    memcpy(h.magic, MAGIC, sizeof h.magic);
+    memcpy(bytes + HEAD, count, sizeof count);
     memcpy(bytes + HEAD + 8 * N_COUNT, p.tets.origin_m, 24);
     memcpy(bytes + HEAD + 8 * N_COUNT + 24, &p.tets.edge_m, 8);
     size_t at = round_up(l.table + ENTRY * N_SECTION);
     for (int k = 0; k < N_SECTION; k++) {
-        uint8_t *entry = bytes + l.table + (size_t)ENTRY * (size_t)k;
-        put_u32(entry, (uint32_t)k + 1);
-        put_u32(entry + 4, (uint32_t)s[k].n_byte);
-        put_u64(entry + 8, s[k].n);
-        put_u64(entry + 16, at);
+        entry e = {(uint32_t)k + 1, (uint32_t)s[k].n_byte, s[k].n, at};
+        memcpy(bytes + l.table + (size_t)ENTRY * (size_t)k, &e, ENTRY);
         void *array;
         memcpy(&array, s[k].pointer, sizeof array);
         /* fans of no frame are one 0, which a mesh without skin need not hold */
         if (s[k].n && array) memcpy(bytes + at, array, s[k].n * s[k].n_byte);
         at += round_up(s[k].n * s[k].n_byte);
     }
-    put_u64(bytes + 24, pal_prepared_checksum(bytes, n_byte));
+    h.checksum = pal_prepared_checksum(bytes, n_byte);
+    memcpy(bytes, &h, HEAD);
     *bytes_out = bytes;
     *n_byte_out = n_byte;
     return PAL_ERR_OK;
@@ -294,15 +265,6 @@ static bool all_finite_float(const float *item, uint64_t n)
     return finite;
 }
 
-static bool fans_are_rows(const pal_skin *skin, uint64_t n_fan)
-{
-    const int32_t *start = skin->fan_start;
-    if (start[0] != 0 || (uint64_t)(int64_t)start[skin->n_frame] != n_fan) return false;
-    for (int f = 0; f < skin->n_frame; f++)
-        if (start[f + 1] < start[f]) return false;
-    return true;
-}
-
 /* the first fault of a mesh, or NULL; every index is checked before it is used */
 static const char *find_fault(const pal_prepared *p, const uint64_t count[N_COUNT])
 {
@@ -318,9 +280,12 @@ static const char *find_fault(const pal_prepared *p, const uint64_t count[N_COUN
     if (!all_within(tets->face, 3 * count[4], 0, n_node)) return "a boundary face's corner is out of range";
     if (!all_within(skin->frame, n_frame, 0, n_node)) return "a skin frame's node is out of range";
     if (!all_within(skin->frame_edge, 2 * n_frame, -1, n_node)) return "a skin frame's edge is out of range";
-    for (uint64_t f = 0; f < n_frame; f++)
+    bool rows = skin->fan_start[0] == 0 && (uint64_t)(int64_t)skin->fan_start[n_frame] == count[6];
+    for (uint64_t f = 0; f < n_frame; f++) {
         if (skin->frame_edge[2 * f] < 0) return "a skin frame has no edge";
-    if (!fans_are_rows(skin, count[6])) return "the skin's fans are not ascending rows";
+        rows &= skin->fan_start[f + 1] >= skin->fan_start[f];
+    }
+    if (!rows) return "the skin's fans are not ascending rows";
     if (!all_within(skin->fan, 2 * count[6], 0, n_node)) return "a skin fan's corner is out of range";
     uint64_t n_near = n_frame ? PAL_SKIN_NEIGHBOURS * count[0] : 0;
     if (!all_within(skin->near, n_near, 0, n_frame)) return "a vertex's skin frame is out of range";
@@ -337,27 +302,27 @@ static const char *find_fault(const pal_prepared *p, const uint64_t count[N_COUN
 static pal_err read_head(const char *name, const uint8_t *bytes, size_t n_byte, layout *l, uint64_t count[N_COUNT],
                          pal_diagnostic *diag)
 {
-    if (n_byte < HEAD || memcmp(bytes, MAGIC, 8))
+    head h = {0};
+    if (n_byte >= HEAD) memcpy(&h, bytes, HEAD);
+    if (memcmp(h.magic, MAGIC, sizeof h.magic))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte 0: not a prepared mesh", name);
-    uint32_t version = get_u32(bytes + 8);
-    *l = layout_of(version);
-    if ((version != VERSION && version != VERSION_2) || get_u32(bytes + 12) != (uint32_t)l->n_section)
+    *l = layout_of(h.version);
+    if ((h.version != VERSION && h.version != VERSION_2) || h.n_section != (uint32_t)l->n_section)
         return pal_diagnostic_set(
             diag, PAL_ERR_REFUSED,
-            "%s: byte 8: version %u with %u sections, this program reads %d with %d and %d with %d", name, version,
-            get_u32(bytes + 12), VERSION, N_SECTION, VERSION_2, N_SECTION_2);
-    if (get_u64(bytes + 16) != n_byte || n_byte < l->table + ENTRY * (size_t)l->n_section)
+            "%s: byte 8: version %u with %u sections, this program reads %d with %d and %d with %d", name, h.version,
+            h.n_section, VERSION, N_SECTION, VERSION_2, N_SECTION_2);
+    if (h.n_byte != n_byte || n_byte < l->table + ENTRY * (size_t)l->n_section)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte 16: %llu bytes announced, %zu are there", name,
-                                  (unsigned long long)get_u64(bytes + 16), n_byte);
-    if (get_u64(bytes + 24) != pal_prepared_checksum(bytes, n_byte))
+                                  (unsigned long long)h.n_byte, n_byte);
+    if (h.checksum != pal_prepared_checksum(bytes, n_byte))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte 24: the checksum does not fit the content", name);
-    for (int k = 0; k < N_COUNT; k++) count[k] = 0;
-    for (int k = 0; k < l->n_count; k++) {
-        count[k] = get_u64(bytes + HEAD + 8 * k);
+    memset(count, 0, N_COUNT * sizeof *count);
+    memcpy(count, bytes + HEAD, (size_t)l->n_count * sizeof *count);
+    for (int k = 0; k < l->n_count; k++)
         if (count[k] > INT32_MAX / 8)
             return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %d: count %llu is too large", name, HEAD + 8 * k,
                                       (unsigned long long)count[k]);
-    }
     return PAL_ERR_OK;
 }
 
@@ -367,18 +332,20 @@ static pal_err read_sections(const char *name, const uint8_t *bytes, size_t n_by
 {
     uint64_t end = l->table + ENTRY * (size_t)l->n_section;
     for (int k = 0; k < l->n_section; k++) {
-        const uint8_t *entry = bytes + l->table + (size_t)ENTRY * (size_t)k;
-        uint64_t at = get_u64(entry + 16), size = s[k].n * s[k].n_byte;
-        if (get_u32(entry) != (uint32_t)k + 1 || get_u32(entry + 4) != s[k].n_byte || get_u64(entry + 8) != s[k].n ||
-            at < end || at % 64 || at > n_byte || size > n_byte - at)
+        size_t place = l->table + (size_t)ENTRY * (size_t)k;
+        uint64_t size = s[k].n * s[k].n_byte;
+        entry e;
+        memcpy(&e, bytes + place, ENTRY);
+        if (e.number != (uint32_t)k + 1 || e.item_byte != s[k].n_byte || e.n != s[k].n || e.at < end || e.at % 64 ||
+            e.at > n_byte || size > n_byte - e.at)
             return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                      "%s: byte %zu: section %d does not fit the counts or the file", name,
-                                      l->table + (size_t)ENTRY * (size_t)k, k + 1);
-        end = at + size;
+                                      "%s: byte %zu: section %d does not fit the counts or the file", name, place,
+                                      k + 1);
+        end = e.at + size;
         void *array = malloc(size ? size : 1);
         memcpy(s[k].pointer, &array, sizeof array);
         if (!array) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: out of memory for section %d", name, k + 1);
-        if (size) memcpy(array, bytes + at, size);
+        if (size) memcpy(array, bytes + e.at, size);
     }
     return PAL_ERR_OK;
 }

@@ -1,6 +1,5 @@
 /* The prepared mesh: everything about a body that is computed once from its surface and read at every start. For a body
- * that is simulated on the surface itself (model adaptive_springs) it is the surface alone. One file, little-endian,
- * sections with counts and a checksum; loading never trusts a count or an index. Thread: [load]. */
+ * that is simulated on the surface itself (model adaptive_springs) it is the surface alone. Thread: [load]. */
 #ifndef PAL_MESH_VOLUME_PREPARED_H
 #define PAL_MESH_VOLUME_PREPARED_H
 #include "server/mesh/geometry/surface.h"

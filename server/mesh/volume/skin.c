@@ -5,6 +5,7 @@
  * stored times their weight, so a vertex is the sum of 5 x 4 scaled columns of 4 floats. */
 #include "server/mesh/volume/skin.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/kd_tree.h"
 #include "server/mesh/geometry/tuning.h"
@@ -19,14 +20,8 @@ typedef float column __attribute__((vector_size(16), aligned(4)));
 
 void pal_skin_free(pal_skin *skin)
 {
-    free(skin->frame);
-    free(skin->frame_edge);
-    free(skin->frame_rotation);
-    free(skin->frame_rest);
-    free(skin->fan_start);
-    free(skin->fan);
-    free(skin->near);
-    free(skin->coef);
+    PAL_FREE(skin->frame, skin->frame_edge, skin->frame_rotation, skin->frame_rest, skin->fan_start, skin->fan,
+             skin->near, skin->coef);
     memset(skin, 0, sizeof *skin);
 }
 
@@ -70,27 +65,20 @@ static double unit_or_less(double a[3], double rest)
 /* boundary faces around every node, as sparse rows of their other two corners; MEMORY */
 static pal_err node_fans(const pal_tets *tets, int32_t **start_out, int32_t **fan_out)
 {
-    size_t n_corner = 3 * (size_t)tets->n_face;
-    int32_t *start = calloc((size_t)tets->n_node + 2, sizeof *start);
-    int32_t *fan = malloc((n_corner ? n_corner : 1) * 2 * sizeof *fan);
-    if (!start || !fan) {
-        free(start);
-        free(fan);
-        return PAL_ERR_MEMORY;
-    }
-    /* starts are shifted by one while filling, which leaves them in place */
-    for (size_t i = 0; i < n_corner; i++) start[tets->face[i] + 2]++;
-    for (int i = 0; i < tets->n_node; i++) start[i + 2] += start[i + 1];
-    for (size_t f = 0; f < (size_t)tets->n_face; f++)
-        for (int k = 0; k < 3; k++) {
-            const int32_t *corner = tets->face + 3 * f;
-            int32_t *to = fan + 2 * (size_t)start[corner[k] + 1]++;
-            to[0] = corner[(k + 1) % 3];
-            to[1] = corner[(k + 2) % 3];
+    const pal_surface boundary = {.n_vertex = tets->n_node, .n_tri = tets->n_face, .tri = tets->face};
+    int32_t *start, *face, *fan;
+    pal_err err = pal_surface_fans(&boundary, &start, &face);
+    if (err) return err;
+    PAL_ARRAY(&err, fan, 6 * (size_t)tets->n_face);
+    for (int32_t i = 0; i < tets->n_node && !err; i++)
+        for (int32_t k = start[i]; k < start[i + 1]; k++) {
+            const int32_t *c = tets->face + 3 * (size_t)face[k];
+            int at = c[0] == i ? 0 : c[1] == i ? 1 : 2;
+            fan[2 * k] = c[(at + 1) % 3], fan[2 * k + 1] = c[(at + 2) % 3];
         }
-    *start_out = start;
-    *fan_out = fan;
-    return PAL_ERR_OK;
+    free(face);
+    *start_out = start, *fan_out = fan;
+    return err;
 }
 
 /* nodes that can carry a frame: on the surface, with a defined normal; all surface nodes if there are none */
@@ -251,9 +239,7 @@ pal_err pal_skin_bind(const pal_tets *tets, const double *x, int n_vertex, pal_s
     }
     if (!err) err = make_frames(tets, start, fan, candidate, &skin);
     if (!err) err = store_offsets(tets, x, &skin);
-    free(start);
-    free(fan);
-    free(candidate);
+    PAL_FREE(start, fan, candidate);
     if (err)
         pal_skin_free(&skin);
     else

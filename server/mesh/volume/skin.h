@@ -1,16 +1,6 @@
 /* Skinning: binds a displayed surface to the surface nodes of a tetrahedral mesh (paper B section 4.2 with errata
- * B6-B8, B15, server/mesh/README.md).
- *
- * Each used surface node has a frame: X = unit sum of the normals of its boundary faces, Y = a chosen surface edge made
- * normal to X, Z = X x Y. Each displayed vertex stores, for its 5 nearest surface nodes, the offset in their frames and
- * inverse squared distance weights (sum 1; a vertex that lies on a node belongs to it alone). Errata: the position of
- * the node is added to the rotated offset (B6); weights sum over the neighbours (B7); the third row is Z (B8); the edge
- * is the one with the largest tangential part at rest, with another as fallback (B15), whose angle to the first is
- * stored, so that the fallback gives the same axes.
- *
- * Frames depend on the current positions only. Where a neighbourhood has collapsed (its normal sum or its edge is less
- * than half of its rest length) the axes shrink in proportion instead of flipping, so the surface closes in on the
- * nodes, passes smoothly through flat and inverted states and stays finite. Elsewhere the axes are unit vectors.
+ * B6-B8, B15; server/mesh/README.md gives frames, weights and collapse). A vertex that lies on a node belongs to it
+ * alone. Frames depend on the current positions only.
  *
  * Binding is [load]; evaluation is [sim], without heap use. One pal_skin may serve several threads; each needs its own
  * frames buffer. */

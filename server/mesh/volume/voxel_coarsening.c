@@ -1,9 +1,9 @@
 /* Voxels of twice the edge, by way of a grid. */
 #include "server/mesh/volume/voxel_coarsening.h"
 
+#include "server/base/vec3.h"
 #include "server/mesh/geometry/tuning.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -31,9 +31,8 @@ static void middle(const pal_tets *tets, const pal_hexes *hexes, int e, double x
 static pal_err make_grid(const pal_tets *tets, const pal_hexes *hexes, const int shift[3], grid *g)
 {
     double high[3], h = tets->edge_m;
-    for (int c = 0; c < 3; c++) g->low[c] = INFINITY, high[c] = -INFINITY;
-    for (int i = 0; i < 3 * tets->n_node; i++)
-        g->low[i % 3] = fmin(g->low[i % 3], tets->x[i]), high[i % 3] = fmax(high[i % 3], tets->x[i]);
+    pal_box3_empty(g->low, high);
+    for (size_t i = 0; i < (size_t)tets->n_node; i++) pal_box3_add(g->low, high, tets->x + 3 * i);
     g->edge_m = 2 * h;
     size_t n_cell = 1;
     for (int c = 0; c < 3; c++) {

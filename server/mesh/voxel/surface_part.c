@@ -5,6 +5,7 @@
  * take that of the patches. */
 #include "server/mesh/voxel/surface_part.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/num/union_find.h"
 
@@ -57,13 +58,8 @@ static void add_edge(finder *f, int32_t tri, uint64_t key, int sign)
     size_t at = key & f->mask;
     while (f->table[at].key && f->table[at].key != key) at = (at + 1) & f->mask;
     edge_entry *e = &f->table[at];
-    if (e->n < 2) {
-        e->key = key;
-        e->tri[e->n] = tri;
-        e->sign[e->n] = (int8_t)sign;
-    }
+    if (e->n < 2) e->key = key, e->tri[e->n] = tri, e->sign[e->n] = (int8_t)sign;
     if (e->n < 3) e->n++;
-    if (e->n == 1) return;
     pal_union_find_join(f->joined, tri, e->tri[0]);
 }
 
@@ -79,37 +75,27 @@ static void join_patches(finder *f)
             if ((reversed_a ^ reversed_b) != differ) f->inconsistent[a] = 1;
             continue;
         }
-        if (b < a) {
-            int32_t swap = a;
-            a = b, b = swap;
-        }
-        f->patch[b] = a;
-        f->reversed_of[b] = reversed_a ^ reversed_b ^ differ;
-        f->inconsistent[a] |= f->inconsistent[b];
+        int32_t low = a < b ? a : b, high = a < b ? b : a;
+        f->patch[high] = low;
+        f->reversed_of[high] = reversed_a ^ reversed_b ^ differ;
+        f->inconsistent[low] |= f->inconsistent[high];
     }
-}
-
-static void finder_free(finder *f)
-{
-    free(f->table);
-    free(f->joined);
-    free(f->patch);
-    free(f->reversed_of);
-    free(f->inconsistent);
 }
 
 static pal_err find_edges(finder *f)
 {
-    size_t n = (size_t)f->scan->n_tri, room = n ? n : 1, cap = 16;
+    size_t n = (size_t)f->scan->n_tri, cap = 16;
     while (cap < 5 * n) cap *= 2;
     f->mask = cap - 1;
-    f->table = calloc(cap, sizeof *f->table);
-    f->joined = malloc(room * sizeof *f->joined);
-    f->patch = malloc(room * sizeof *f->patch);
-    f->reversed_of = calloc(room, 1);
-    f->inconsistent = calloc(room, 1);
-    if (!f->table || !f->joined || !f->patch || !f->reversed_of || !f->inconsistent) return PAL_ERR_MEMORY;
-    for (int32_t t = 0; t < f->scan->n_tri; t++) f->joined[t] = f->patch[t] = t;
+    pal_err err = PAL_ERR_OK;
+    PAL_ZEROED(&err, f->table, cap);
+    PAL_ARRAY(&err, f->joined, n);
+    PAL_ARRAY(&err, f->patch, n);
+    PAL_ZEROED(&err, f->reversed_of, n);
+    PAL_ZEROED(&err, f->inconsistent, n);
+    if (err) return err;
+    pal_union_find_init(f->joined, f->scan->n_tri);
+    pal_union_find_init(f->patch, f->scan->n_tri);
     for (int32_t t = 0; t < f->scan->n_tri; t++)
         for (int k = 0; k < 3; k++) {
             int sign;
@@ -155,39 +141,31 @@ static double triple_product(const double a[3], const double b[3], const double 
     return pal_dot3(a, cross);
 }
 
-/* six times the volume of the triangle and the part's centre */
-static double fan_volume(const pal_scan_surface *scan, int32_t tri, const double o[3])
-{
-    double p[3][3];
-    for (int k = 0; k < 3; k++)
-        for (int d = 0; d < 3; d++) p[k][d] = corner(scan, tri, k)[d] - o[d];
-    return triple_product(p[0], p[1], p[2]);
-}
-
 /* an open edge, from a to b in its triangle's sense */
 typedef struct open_edge {
     int32_t tri, a, b; /* vertices by number: holes of unwelded triangles do not join, and stay open */
 } open_edge;
 
-/* corners that belong to the same hole: union-find, and the sum of its corners at the root */
-typedef struct hole_corner {
-    int32_t up, n;
+/* sum and number of the corners of a hole */
+typedef struct hole {
+    int32_t n;
     double sum[3];
-} hole_corner;
+} hole;
 
-static int32_t find_hole(hole_corner *corner_of, int32_t i)
+/* the open edges in the current orientation of their triangles; returns how many */
+static size_t list_open(const finder *f, open_edge *out)
 {
-    while (corner_of[i].up != i) i = corner_of[i].up = corner_of[corner_of[i].up].up;
-    return i;
-}
-
-/* the open edge of a table entry in the current orientation of its triangle */
-static open_edge open_edge_of(const pal_scan_surface *scan, const edge_entry *e)
-{
-    const int32_t *c = scan->tri + 3 * (size_t)e->tri[0];
-    int k = 0, sign;
-    while (k < 2 && pal_scan_edge(corner(scan, e->tri[0], k), corner(scan, e->tri[0], k + 1), &sign) != e->key) k++;
-    return (open_edge){e->tri[0], c[k], c[(k + 1) % 3]};
+    size_t n = 0;
+    for (size_t i = 0; i <= f->mask; i++) {
+        const edge_entry *e = &f->table[i];
+        int32_t t = e->tri[0];
+        const int32_t *c = f->scan->tri + 3 * (size_t)t;
+        int k = 0, sign;
+        if (e->n != 1) continue;
+        while (k < 2 && pal_scan_edge(corner(f->scan, t, k), corner(f->scan, t, k + 1), &sign) != e->key) k++;
+        out[n++] = (open_edge){t, c[k], c[(k + 1) % 3]};
+    }
+    return n;
 }
 
 /* adds the volumes between the fans that close the holes and the centre of each part to the volumes of the parts;
@@ -195,42 +173,44 @@ static open_edge open_edge_of(const pal_scan_surface *scan, const edge_entry *e)
 static pal_err close_holes(const finder *f, chain *chains)
 {
     const pal_scan_surface *scan = f->scan;
-    size_t n_vertex = 0, n_open = 0;
+    int n_vertex = 0;
+    size_t n_open = 0;
+    pal_err err = PAL_ERR_OK;
     for (size_t i = 0; i < 3 * (size_t)scan->n_tri; i++)
-        if ((size_t)scan->tri[i] >= n_vertex) n_vertex = (size_t)scan->tri[i] + 1;
+        if (scan->tri[i] >= n_vertex) n_vertex = scan->tri[i] + 1;
     for (size_t i = 0; i <= f->mask; i++) n_open += f->table[i].n == 1;
     if (n_open == 0) return PAL_ERR_OK;
-    hole_corner *hole = calloc(n_vertex, sizeof *hole);
-    if (!hole) return PAL_ERR_MEMORY;
-    for (size_t v = 0; v < n_vertex; v++) hole[v].up = (int32_t)v;
-    for (size_t i = 0; i <= f->mask; i++) {
-        if (f->table[i].n != 1) continue;
-        open_edge e = open_edge_of(scan, &f->table[i]);
-        hole[find_hole(hole, e.a)].up = find_hole(hole, e.b);
+    open_edge *open;
+    int32_t *root;
+    hole *holes; /* at their roots */
+    PAL_ARRAY(&err, open, n_open);
+    PAL_ARRAY(&err, root, n_vertex);
+    PAL_ZEROED(&err, holes, n_vertex);
+    if (!err) {
+        list_open(f, open);
+        pal_union_find_init(root, n_vertex);
     }
-    for (size_t i = 0; i <= f->mask; i++) {
-        if (f->table[i].n != 1) continue;
-        open_edge e = open_edge_of(scan, &f->table[i]);
-        hole_corner *root = &hole[find_hole(hole, e.a)];
-        root->n += 2;
-        for (int d = 0; d < 3; d++)
-            root->sum[d] += (double)scan->point[3 * (size_t)e.a + (size_t)d] + scan->point[3 * (size_t)e.b + (size_t)d];
+    for (size_t i = 0; i < n_open && !err; i++) pal_union_find_join(root, open[i].a, open[i].b);
+    for (size_t i = 0; i < n_open && !err; i++) {
+        hole *h = &holes[pal_union_find_root(root, open[i].a)];
+        const int32_t *a = scan->point + 3 * (size_t)open[i].a, *b = scan->point + 3 * (size_t)open[i].b;
+        h->n += 2;
+        for (int d = 0; d < 3; d++) h->sum[d] += (double)a[d] + b[d];
     }
-    for (size_t i = 0; i <= f->mask; i++) {
-        if (f->table[i].n != 1) continue;
-        open_edge e = open_edge_of(scan, &f->table[i]);
-        const hole_corner *root = &hole[find_hole(hole, e.a)];
-        chain *c = &chains[scan->part[e.tri]];
+    for (size_t i = 0; i < n_open && !err; i++) {
+        const hole *h = &holes[pal_union_find_root(root, open[i].a)];
+        const int32_t *a = scan->point + 3 * (size_t)open[i].a, *b = scan->point + 3 * (size_t)open[i].b;
+        chain *c = &chains[scan->part[open[i].tri]];
         double p[3][3];
         for (int d = 0; d < 3; d++) {
-            p[0][d] = scan->point[3 * (size_t)e.b + (size_t)d] - c->centre[d];
-            p[1][d] = scan->point[3 * (size_t)e.a + (size_t)d] - c->centre[d];
-            p[2][d] = root->sum[d] / root->n - c->centre[d];
+            p[0][d] = b[d] - c->centre[d];
+            p[1][d] = a[d] - c->centre[d];
+            p[2][d] = h->sum[d] / h->n - c->centre[d];
         }
         c->volume += triple_product(p[0], p[1], p[2]) / 6;
     }
-    free(hole);
-    return PAL_ERR_OK;
+    PAL_FREE(open, root, holes);
+    return err;
 }
 
 /* determines the kind of each part and orients its triangles consistently, then outward; MEMORY */
@@ -254,7 +234,10 @@ static pal_err orient(pal_scan_surface *scan, finder *f, pal_parts *parts, chain
         chain *c = &chains[scan->part[t]];
         find_patch(f, t, &reversed);
         if (reversed && c->sum != 0 && !c->inconsistent) reverse_triangle(scan->tri + 3 * (size_t)t);
-        c->volume += fan_volume(scan, t, c->centre) / 6;
+        double p[3][3];
+        for (int k = 0; k < 3; k++)
+            for (int d = 0; d < 3; d++) p[k][d] = corner(scan, t, k)[d] - c->centre[d];
+        c->volume += triple_product(p[0], p[1], p[2]) / 6;
     }
     PAL_TRY(close_holes(f, chains));
     for (int32_t t = 0; t < scan->n_tri; t++)
@@ -275,13 +258,11 @@ pal_err pal_parts_find(pal_scan_surface *scan, pal_parts *out)
     if (!err) {
         parts.n = pal_union_find_label(f.joined, scan->n_tri);
         scan->part = f.joined, f.joined = NULL;
-        size_t room = parts.n ? (size_t)parts.n : 1;
-        parts.part = calloc(room, sizeof *parts.part);
-        chains = calloc(room, sizeof *chains);
-        err = parts.part && chains ? orient(scan, &f, &parts, chains) : PAL_ERR_MEMORY;
+        PAL_ZEROED(&err, parts.part, parts.n);
+        PAL_ZEROED(&err, chains, parts.n);
+        if (!err) err = orient(scan, &f, &parts, chains);
     }
-    finder_free(&f);
-    free(chains);
+    PAL_FREE(f.table, f.joined, f.patch, f.reversed_of, f.inconsistent, chains);
     if (err)
         pal_parts_free(&parts);
     else
@@ -305,14 +286,14 @@ struct pal_parts_work {
 
 pal_parts_work *pal_parts_work_create(const pal_parts *parts)
 {
-    size_t n = parts->n ? (size_t)parts->n : 1;
+    pal_err err = PAL_ERR_OK;
     pal_parts_work *w = calloc(1, sizeof *w);
     if (!w) return NULL;
-    w->winding = calloc(n, sizeof *w->winding);
-    w->count = calloc(n, sizeof *w->count);
-    w->entered = calloc(n, sizeof *w->entered);
-    w->open = calloc(n, sizeof *w->open);
-    if (w->winding && w->count && w->entered && w->open) return w;
+    PAL_ZEROED(&err, w->winding, parts->n);
+    PAL_ZEROED(&err, w->count, parts->n);
+    PAL_ZEROED(&err, w->entered, parts->n);
+    PAL_ZEROED(&err, w->open, parts->n);
+    if (!err) return w;
     pal_parts_work_destroy(w);
     return NULL;
 }
@@ -320,20 +301,10 @@ pal_parts_work *pal_parts_work_create(const pal_parts *parts)
 void pal_parts_work_destroy(pal_parts_work *work)
 {
     if (!work) return;
-    free(work->winding);
-    free(work->count);
-    free(work->entered);
-    free(work->open);
-    free(work);
+    PAL_FREE(work->winding, work->count, work->entered, work->open, work);
 }
 
-/* are the row's crossings with a part consistent? */
-static bool is_consistent(const pal_part *part, int32_t winding, int32_t count)
-{
-    if (count & 1) return false;
-    return winding == 0 || part->kind == PAL_PART_EVEN || (part->kind == PAL_PART_OPEN && !part->coherent);
-}
-
+/* is a voxel inside the part where a row has crossed it an odd number of times? */
 static bool by_parity(const pal_part *part)
 {
     return part->kind == PAL_PART_EVEN || (part->kind == PAL_PART_OPEN && !part->coherent);
@@ -352,7 +323,7 @@ static bool begin_row(const pal_parts *parts, pal_parts_work *w, const pal_cross
     for (int64_t i = 0; i < n; i++) {
         int32_t part = item[i].part;
         if (w->count[part] <= 0) continue;
-        bool good = is_consistent(&parts->part[part], w->winding[part], w->count[part]);
+        bool good = w->count[part] % 2 == 0 && (w->winding[part] == 0 || by_parity(&parts->part[part]));
         w->count[part] = good ? 0 : INCONSISTENT;
         w->winding[part] = 0;
         clean &= good;
@@ -444,24 +415,24 @@ static int32_t outermost(const pal_parts *parts, const pal_parts_work *w, const 
 pal_err pal_parts_nest(pal_parts *parts, const pal_crossings *rows)
 {
     pal_parts_work *w = pal_parts_work_create(parts);
-    int64_t *votes = calloc(parts->n ? (size_t)parts->n : 1, sizeof *votes);
-    if (w && votes)
-        for (int row = 0; row < rows->n_row; row++) {
-            const pal_crossing *item = rows->item + rows->start[row];
-            int64_t n = rows->start[row + 1] - rows->start[row];
-            begin_row(parts, w, item, n);
-            for (int64_t i = 0; i < n; i++) {
-                if (w->count[item[i].part] == INCONSISTENT) continue;
-                int32_t around = outermost(parts, w, &item[i], item + n);
-                bool opposed = around >= 0 && parts->part[around].inward != parts->part[item[i].part].inward;
-                votes[item[i].part] += opposed ? 1 : -1;
-                cross(parts, w, &item[i]);
-            }
-            end_row(w, item, n);
+    pal_err err = w ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    int64_t *votes;
+    PAL_ZEROED(&err, votes, parts->n);
+    for (int row = 0; row < rows->n_row && !err; row++) {
+        const pal_crossing *item = rows->item + rows->start[row];
+        int64_t n = rows->start[row + 1] - rows->start[row];
+        begin_row(parts, w, item, n);
+        for (int64_t i = 0; i < n; i++) {
+            if (w->count[item[i].part] == INCONSISTENT) continue;
+            int32_t around = outermost(parts, w, &item[i], item + n);
+            bool opposed = around >= 0 && parts->part[around].inward != parts->part[item[i].part].inward;
+            votes[item[i].part] += opposed ? 1 : -1;
+            cross(parts, w, &item[i]);
         }
-    bool ok = w && votes;
-    for (int i = 0; ok && i < parts->n; i++) parts->part[i].cavity = votes[i] > 0;
+        end_row(w, item, n);
+    }
+    for (int i = 0; !err && i < parts->n; i++) parts->part[i].cavity = votes[i] > 0;
     pal_parts_work_destroy(w);
     free(votes);
-    return ok ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    return err;
 }

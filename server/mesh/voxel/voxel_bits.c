@@ -4,15 +4,13 @@
  * which are found by walking both rows in parallel. */
 #include "server/mesh/voxel/voxel_bits.h"
 
+#include "server/base/heap.h"
 #include "server/num/union_find.h"
-
-#include <stdlib.h>
-#include <string.h>
 
 pal_err pal_bits_create(const int n[3], pal_bits *out)
 {
     pal_bits bits = {.n = {n[0], n[1], n[2]}, .n_word = (n[0] + 63) / 64};
-    bits.word = calloc((size_t)bits.n_word * (size_t)n[1] * (size_t)n[2], sizeof *bits.word);
+    bits.word = calloc(pal_bits_words(&bits), sizeof *bits.word);
     if (!bits.word) return PAL_ERR_MEMORY;
     *out = bits;
     return PAL_ERR_OK;
@@ -24,45 +22,24 @@ void pal_bits_free(pal_bits *bits)
     memset(bits, 0, sizeof *bits);
 }
 
-/* words of a row touched by from..to-1, with the mask of the first and last */
-static uint64_t mask_from(int from)
+/* the bits from..to-1 of a row as a mask for word w, which holds some of them */
+static inline uint64_t run_mask(int w, int from, int to)
 {
-    return ~(uint64_t)0 << (from & 63);
-}
-
-static uint64_t mask_to(int to)
-{
-    return ~(uint64_t)0 >> (63 - ((to - 1) & 63));
+    uint64_t mask = ~(uint64_t)0;
+    if (w == from >> 6) mask &= ~(uint64_t)0 << (from & 63);
+    if (w == (to - 1) >> 6) mask &= ~(uint64_t)0 >> (63 - ((to - 1) & 63));
+    return mask;
 }
 
 void pal_bits_set_run(uint64_t *row, int from, int to)
 {
-    if (from >= to) return;
-    int a = from >> 6, b = (to - 1) >> 6;
-    if (a == b) {
-        row[a] |= mask_from(from) & mask_to(to);
-        return;
-    }
-    row[a] |= mask_from(from);
-    for (int w = a + 1; w < b; w++) row[w] = ~(uint64_t)0;
-    row[b] |= mask_to(to);
-}
-
-static void clear_run(uint64_t *row, int from, int to)
-{
-    for (int w = from >> 6; w <= (to - 1) >> 6; w++) {
-        uint64_t mask = ~(uint64_t)0;
-        if (w == from >> 6) mask &= mask_from(from);
-        if (w == (to - 1) >> 6) mask &= mask_to(to);
-        row[w] &= ~mask;
-    }
+    for (int w = from >> 6; from < to && w <= (to - 1) >> 6; w++) row[w] |= run_mask(w, from, to);
 }
 
 int64_t pal_bits_count(const pal_bits *bits)
 {
-    size_t n = (size_t)bits->n_word * (size_t)bits->n[1] * (size_t)bits->n[2];
     int64_t sum = 0;
-    for (size_t i = 0; i < n; i++) sum += __builtin_popcountll(bits->word[i]);
+    for (size_t i = 0; i < pal_bits_words(bits); i++) sum += __builtin_popcountll(bits->word[i]);
     return sum;
 }
 
@@ -71,20 +48,14 @@ typedef struct run {
 } run;
 
 typedef struct runs {
-    int64_t n, cap;
+    int64_t n;
     run *item;
     int64_t *start; /* first run of each row [n_row+1] */
 } runs;
 
-static bool runs_push(runs *r, int from, int to)
+static bool add_run(runs *r, int from, int to)
 {
-    if (r->n == r->cap) {
-        int64_t cap = r->cap ? 2 * r->cap : 1024;
-        run *item = realloc(r->item, (size_t)cap * sizeof *item);
-        if (!item) return false;
-        r->item = item;
-        r->cap = cap;
-    }
+    if (!PAL_GROW(r->item, r->n)) return false;
     r->item[r->n++] = (run){from, to};
     return true;
 }
@@ -101,15 +72,11 @@ static bool runs_of_row(runs *r, const uint64_t *row, int n_word)
             uint64_t rest = (open < 0 ? left : ~left) >> at;
             if (rest == 0) break;
             at += __builtin_ctzll(rest);
-            if (open < 0) {
-                open = base + at;
-            } else {
-                if (!runs_push(r, open, base + at)) return false;
-                open = -1;
-            }
+            if (open >= 0 && !add_run(r, open, base + at)) return false;
+            open = open < 0 ? base + at : -1;
         }
     }
-    return open < 0 || runs_push(r, open, 64 * n_word);
+    return open < 0 || add_run(r, open, 64 * n_word);
 }
 
 /* joins overlapping runs of two rows */
@@ -119,10 +86,7 @@ static void join_rows(const runs *r, int32_t *parent, int64_t row, int64_t other
     while (i < r->start[row + 1] && j < r->start[other + 1]) {
         if (r->item[i].from < r->item[j].to && r->item[j].from < r->item[i].to)
             pal_union_find_join(parent, (int32_t)i, (int32_t)j);
-        if (r->item[i].to < r->item[j].to)
-            i++;
-        else
-            j++;
+        *(r->item[i].to < r->item[j].to ? &i : &j) += 1;
     }
 }
 
@@ -132,32 +96,35 @@ static void clear_smaller(pal_bits *bits, const runs *r, int32_t *parent, const 
     for (int64_t i = 0; i < r->n; i++)
         if (parent[i] == i && size[i] > size[best]) best = i;
     for (int64_t row = 0; row < n_row; row++)
-        for (int64_t i = r->start[row]; i < r->start[row + 1]; i++)
-            if (pal_union_find_root(parent, (int32_t)i) != best)
-                clear_run(bits->word + (size_t)bits->n_word * (size_t)row, r->item[i].from, r->item[i].to);
+        for (int64_t i = r->start[row]; i < r->start[row + 1]; i++) {
+            uint64_t *word = bits->word + (size_t)bits->n_word * (size_t)row;
+            int from = r->item[i].from, to = r->item[i].to;
+            if (pal_union_find_root(parent, (int32_t)i) == best) continue;
+            for (int w = from >> 6; w <= (to - 1) >> 6; w++) word[w] &= ~run_mask(w, from, to);
+        }
 }
 
-static bool find_runs(const pal_bits *bits, runs *r)
+static pal_err find_runs(const pal_bits *bits, runs *r)
 {
+    pal_err err = PAL_ERR_OK;
     size_t n_row = (size_t)bits->n[1] * (size_t)bits->n[2];
-    r->start = malloc((n_row + 1) * sizeof *r->start);
-    if (!r->start) return false;
-    r->start[0] = 0;
-    for (size_t row = 0; row < n_row; row++) {
-        if (!runs_of_row(r, bits->word + (size_t)bits->n_word * row, bits->n_word)) return false;
+    PAL_ZEROED(&err, r->start, n_row + 1);
+    for (size_t row = 0; row < n_row && !err; row++) {
+        if (!runs_of_row(r, bits->word + (size_t)bits->n_word * row, bits->n_word)) err = PAL_ERR_MEMORY;
         r->start[row + 1] = r->n;
     }
-    return r->n < INT32_MAX;
+    return r->n < INT32_MAX ? err : PAL_ERR_MEMORY;
 }
 
 pal_err pal_bits_components(pal_bits *bits, bool largest_only, int *n_component)
 {
     runs r = {0};
-    bool ok = find_runs(bits, &r);
-    int32_t *parent = ok ? malloc((r.n ? (size_t)r.n : 1) * sizeof *parent) : NULL;
-    int64_t *size = ok ? calloc(r.n ? (size_t)r.n : 1, sizeof *size) : NULL;
-    ok = parent && size;
-    if (ok) {
+    int32_t *parent;
+    int64_t *size;
+    pal_err err = find_runs(bits, &r);
+    PAL_ARRAY(&err, parent, r.n);
+    PAL_ZEROED(&err, size, r.n);
+    if (!err) {
         pal_union_find_init(parent, (int)r.n);
         int64_t row = 0;
         for (int z = 0; z < bits->n[2]; z++)
@@ -174,9 +141,6 @@ pal_err pal_bits_components(pal_bits *bits, bool largest_only, int *n_component)
         if (largest_only && n > 1) clear_smaller(bits, &r, parent, size);
         *n_component = n;
     }
-    free(r.item);
-    free(r.start);
-    free(parent);
-    free(size);
-    return ok ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    PAL_FREE(r.item, r.start, parent, size);
+    return err;
 }

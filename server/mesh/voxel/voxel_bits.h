@@ -19,6 +19,10 @@ static inline uint64_t *pal_bits_row(const pal_bits *bits, int y, int z)
 {
     return bits->word + (size_t)bits->n_word * ((size_t)z * (size_t)bits->n[1] + (size_t)y);
 }
+static inline size_t pal_bits_words(const pal_bits *bits) /* of all rows */
+{
+    return (size_t)bits->n_word * (size_t)bits->n[1] * (size_t)bits->n[2];
+}
 void pal_bits_set_run(uint64_t *row, int from, int to); /* bits from..to-1 */
 static inline bool pal_bits_get(const pal_bits *bits, int x, int y, int z)
 {

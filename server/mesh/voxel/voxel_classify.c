@@ -1,20 +1,14 @@
-/* Classification of voxels as inside or outside.
- *
- * scanline: for a closed surface (or one whose edges all have an even number of triangles). One axis suffices, since
- * crossings are exact and all axes agree. If some row does not enter and leave alternately, the connected parts of the
- * surface are classified: a voxel is inside a part where the winding number of that part is not 0; copies and overlaps
- * merge, inward shells within are cavities. vote: for an open surface. Each axis votes where its row is consistent; two
- * unopposed votes decide a voxel. Where few voxels remain, the majority decides. winding: where many remain (large
- * openings), the winding number decides them. flood: the method of the paper, in voxel_flood.c, on request. */
+/* Classification of voxels as inside or outside (server/mesh/README.md, from a surface to voxels): by scanline for a
+ * closed surface, or one whose edges all have an even number of triangles; by vote for an open one; by winding where
+ * the vote leaves many voxels undecided. */
 #include "server/mesh/voxel/voxel_classify.h"
 
 #include "server/base/clock.h"
+#include "server/base/vec3.h"
 #include "server/mesh/geometry/box_tree.h"
 #include "server/mesh/geometry/tuning.h"
 #include "server/mesh/voxel/surface_part.h"
-#include "server/mesh/voxel/voxel_flood.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -55,12 +49,6 @@ typedef struct decision {
     int64_t n_sure, n_claimed; /* see SURE_FRACTION */
 } decision;
 
-static void clear_inside(decision *d)
-{
-    size_t n = (size_t)d->inside->n_word * (size_t)d->inside->n[1] * (size_t)d->inside->n[2];
-    memset(d->inside->word, 0, n * sizeof *d->inside->word);
-}
-
 /* crossings along one axis of the parts, cavities found along the first */
 static pal_err scan_parts(decision *d, int axis, pal_crossings *rows)
 {
@@ -75,20 +63,29 @@ static void set_word_run(void *self, int from, int to)
     pal_bits_set_run(self, from, to);
 }
 
-/* every part closed or even */
-static pal_err by_scanline(decision *d)
+/* calls take for the n crossings of each row along an axis that has any */
+static pal_err each_row(decision *d, int axis, uint8_t *vote,
+                        void (*take)(decision *d, int axis, uint8_t *vote, pal_parts_work *work, int row,
+                                     const pal_crossing *item, int64_t n))
 {
     pal_crossings rows;
-    PAL_TRY(scan_parts(d, 0, &rows));
+    PAL_TRY(scan_parts(d, axis, &rows));
     pal_parts_work *work = pal_parts_work_create(&d->parts);
-    for (int row = 0; work && row < rows.n_row; row++)
-        pal_parts_row(&d->parts, work, rows.item + rows.start[row], rows.start[row + 1] - rows.start[row], set_word_run,
-                      d->inside->word + (size_t)d->inside->n_word * (size_t)row);
-    strcpy(d->report->method, "scanline");
+    for (int row = 0; work && row < rows.n_row; row++) {
+        int64_t n = rows.start[row + 1] - rows.start[row];
+        if (n > 0) take(d, axis, vote, work, row, rows.item + rows.start[row], n);
+    }
     pal_err err = work ? PAL_ERR_OK : PAL_ERR_MEMORY;
     pal_parts_work_destroy(work);
     pal_crossings_free(&rows);
     return err;
+}
+
+static void fill_row(decision *d, int axis, uint8_t *vote, pal_parts_work *work, int row, const pal_crossing *item,
+                     int64_t n)
+{
+    (void)axis, (void)vote;
+    pal_parts_row(&d->parts, work, item, n, set_word_run, d->inside->word + (size_t)d->inside->n_word * (size_t)row);
 }
 
 /* votes of the three axes: low four bits inside, high four abstained; the rest say outside */
@@ -107,34 +104,18 @@ static void vote_run(void *self, int from, int to)
 
 /* An inconsistent row abstains on every voxel that its consistent parts do not claim: it abstains on all, then the
  * claim revokes that */
-static void vote_row(const pal_parts *parts, pal_parts_work *work, const pal_crossing *item, int64_t n, ballot *b)
-{
-    b->amount = 1;
-    if (pal_parts_row(parts, work, item, n, vote_run, b)) return;
-    b->amount = 16;
-    vote_run(b, 0, b->n);
-    b->amount = (uint8_t)-16;
-    pal_parts_row(parts, work, item, n, vote_run, b);
-}
-
-static pal_err vote_axis(decision *d, int axis, uint8_t *vote)
+static void vote_row(decision *d, int axis, uint8_t *vote, pal_parts_work *work, int row, const pal_crossing *item,
+                     int64_t n_item)
 {
     const int *n = d->grid->n;
     size_t step[3] = {1, (size_t)n[0], (size_t)n[0] * (size_t)n[1]};
     int p = axis == 0 ? 1 : 0, q = axis == 2 ? 1 : 2;
-    pal_crossings rows;
-    PAL_TRY(scan_parts(d, axis, &rows));
-    pal_parts_work *work = pal_parts_work_create(&d->parts);
-    for (int row = 0; work && row < rows.n_row; row++) {
-        int64_t n_item = rows.start[row + 1] - rows.start[row];
-        if (n_item == 0) continue;
-        ballot b = {vote, step[axis], step[p] * (size_t)(row % n[p]) + step[q] * (size_t)(row / n[p]), n[axis], 0};
-        vote_row(&d->parts, work, rows.item + rows.start[row], n_item, &b);
-    }
-    pal_err err = work ? PAL_ERR_OK : PAL_ERR_MEMORY;
-    pal_parts_work_destroy(work);
-    pal_crossings_free(&rows);
-    return err;
+    ballot b = {vote, step[axis], step[p] * (size_t)(row % n[p]) + step[q] * (size_t)(row / n[p]), n[axis], 1};
+    if (pal_parts_row(&d->parts, work, item, n_item, vote_run, &b)) return;
+    b.amount = 16;
+    vote_run(&b, 0, b.n);
+    b.amount = (uint8_t)-16;
+    pal_parts_row(&d->parts, work, item, n_item, vote_run, &b);
 }
 
 /* the surface with its parts oriented, and its tree; parts that have no orientation (Moebius) have no winding number */
@@ -160,19 +141,20 @@ static pal_err build_tree(decision *d)
     return err;
 }
 
-static double winding_at(decision *d, int x, int y, int z)
+static void set_inside(decision *d, int x, int y, int z)
+{
+    pal_bits_row(d->inside, y, z)[x >> 6] |= (uint64_t)1 << (x & 63);
+}
+
+static void decide_by_winding(decision *d, int x, int y, int z)
 {
     const pal_voxels *g = d->grid;
     double p[3] = {g->low_m[0] + g->edge_m * (x + 0.5), g->low_m[1] + g->edge_m * (y + 0.5),
                    g->low_m[2] + g->edge_m * (z + 0.5)};
     double w = pal_box_tree_winding(d->tree, p);
     if (w > d->max_winding) d->max_winding = w;
-    return w;
-}
-
-static void set_inside(decision *d, int x, int y, int z)
-{
-    pal_bits_row(d->inside, y, z)[x >> 6] |= (uint64_t)1 << (x & 63);
+    if (w >= 0.5) set_inside(d, x, y, z);
+    d->n_sure += w >= SURE_WINDING;
 }
 
 /* joint verdict of the three axes */
@@ -190,13 +172,10 @@ static verdict judge(uint8_t vote)
 static void settle(decision *d, uint8_t vote, bool by_winding, int x, int y, int z)
 {
     int in = vote & 15, out = 3 - in - (vote >> 4);
-    if (!by_winding && in != out) {
-        if (in > out) set_inside(d, x, y, z), d->n_sure++;
-        return;
-    }
-    double w = winding_at(d, x, y, z);
-    if (w >= 0.5) set_inside(d, x, y, z);
-    d->n_sure += w >= SURE_WINDING;
+    if (by_winding || in == out)
+        decide_by_winding(d, x, y, z);
+    else if (in > out)
+        set_inside(d, x, y, z), d->n_sure++;
 }
 
 static pal_err count_votes(decision *d, const uint8_t *vote)
@@ -234,7 +213,7 @@ static pal_err by_vote(decision *d)
     const int *n = d->grid->n;
     uint8_t *vote = calloc((size_t)n[0] * (size_t)n[1] * (size_t)n[2], 1);
     pal_err err = vote ? PAL_ERR_OK : PAL_ERR_MEMORY;
-    for (int axis = 0; !err && axis < 3; axis++) err = vote_axis(d, axis, vote);
+    for (int axis = 0; !err && axis < 3; axis++) err = each_row(d, axis, vote, vote_row);
     if (!err) err = count_votes(d, vote);
     free(vote);
     return err;
@@ -249,23 +228,9 @@ static pal_err by_winding(decision *d)
     PAL_TRY(build_tree(d));
     for (int z = 1; z < d->grid->n[2] - 1; z++)
         for (int y = 1; y < d->grid->n[1] - 1; y++)
-            for (int x = 1; x < d->grid->n[0] - 1; x++) {
-                double w = winding_at(d, x, y, z);
-                if (w >= 0.5) set_inside(d, x, y, z);
-                d->n_sure += w >= SURE_WINDING;
-            }
+            for (int x = 1; x < d->grid->n[0] - 1; x++) decide_by_winding(d, x, y, z);
     strcpy(d->report->method, "winding");
     return PAL_ERR_OK;
-}
-
-static pal_err by_flood(decision *d)
-{
-    double began = pal_clock_s();
-    pal_err err = pal_box_tree_create(d->surface, &d->tree);
-    d->report->tree_s = pal_clock_s() - began;
-    if (err) return err;
-    strcpy(d->report->method, "flood");
-    return pal_voxels_flood(d->surface, d->tree, d->grid, d->inside, d->diag);
 }
 
 /* |sum of area normals| over the area */
@@ -274,19 +239,14 @@ static double one_sidedness(const decision *d, double *area_out)
     double sum[3] = {0}, area = 0;
     for (size_t t = 0; t < (size_t)d->scan->n_tri; t++) {
         const int32_t *c = d->scan->tri + 3 * t;
-        const double *a = d->surface->x + 3 * (size_t)c[0], *b = d->surface->x + 3 * (size_t)c[1],
-                     *e = d->surface->x + 3 * (size_t)c[2];
-        double u[3], v[3], normal[3];
-        for (int k = 0; k < 3; k++) u[k] = b[k] - a[k], v[k] = e[k] - a[k];
-        for (int k = 0; k < 3; k++) {
-            int i = (k + 1) % 3, j = (k + 2) % 3;
-            normal[k] = (u[i] * v[j] - u[j] * v[i]) / 2;
-            sum[k] += normal[k];
-        }
-        area += sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+        const double *x = d->surface->x;
+        double normal[3];
+        pal_normal3(normal, x + 3 * (size_t)c[0], x + 3 * (size_t)c[1], x + 3 * (size_t)c[2]);
+        pal_axpy3(sum, 0.5, normal);
+        area += 0.5 * pal_norm3(normal);
     }
     *area_out = area;
-    return area > 0 ? sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]) / area : 1;
+    return area > 0 ? pal_norm3(sum) / area : 1;
 }
 
 /* volume of the parts, cavities taken off */
@@ -332,28 +292,28 @@ static pal_err check_encloses(decision *d, bool open, int resolution)
 }
 
 /* the requested method, or the first that applies */
-static pal_err run_method(decision *d, const char *method, bool *open)
+static pal_err run_method(decision *d, pal_voxel_method method, bool *open)
 {
-    bool any = !method;
+    bool any = method == PAL_VOXELS_CHOOSE;
     pal_crossings rows;
     double volume = fabs(pal_surface_volume(d->surface));
     d->report->surface_volume_m3 = d->scan->closed && isfinite(volume) ? volume : 0;
-    if (!any && !strcmp(method, "flood")) return by_flood(d);
-    if (d->scan->closed && (any || !strcmp(method, "scanline"))) {
+    if (d->scan->closed && (any || method == PAL_VOXELS_SCANLINE)) {
         PAL_TRY(pal_scan_axis(d->scan, d->grid->n, 0, &rows));
         bool plain = pal_scan_plain(&rows, d->inside);
         pal_crossings_free(&rows);
         strcpy(d->report->method, "scanline");
         if (plain) return PAL_ERR_OK;
-        clear_inside(d);
+        memset(d->inside->word, 0, pal_bits_words(d->inside) * sizeof *d->inside->word);
     }
     PAL_TRY(pal_scan_drop_copies(d->scan, d->surface->n_vertex));
     PAL_TRY(pal_parts_find(d->scan, &d->parts));
     pal_err err;
     bool even = d->scan->even;
-    if (any ? even : !strcmp(method, "scanline"))
-        err = by_scanline(d);
-    else if (!any && !strcmp(method, "winding"))
+    if (any ? even : method == PAL_VOXELS_SCANLINE) {
+        strcpy(d->report->method, "scanline");
+        err = each_row(d, 0, NULL, fill_row);
+    } else if (method == PAL_VOXELS_WINDING)
         err = by_winding(d);
     else
         err = by_vote(d);
@@ -364,20 +324,9 @@ static pal_err run_method(decision *d, const char *method, bool *open)
     return err;
 }
 
-static bool known_method(const char *method)
-{
-    static const char *const KNOWN[] = {"flood", "scanline", "vote", "winding"};
-    for (int k = 0; k < 4; k++)
-        if (!strcmp(method, KNOWN[k])) return true;
-    return false;
-}
-
 pal_err pal_voxels_classify(const pal_surface *surface, const pal_voxel_options *options, const pal_voxels *grid,
                             pal_bits *inside, pal_voxel_report *report, pal_diagnostic *diag)
 {
-    if (options->method && !known_method(options->method))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "method \"%.40s\" is none of flood, scanline, vote, winding",
-                                  options->method);
     pal_scan_surface scan;
     PAL_TRY(pal_scan_snap(surface, grid->low_m, grid->edge_m, &scan));
     decision d = {.surface = surface, .grid = grid, .scan = &scan, .inside = inside, .report = report, .diag = diag};

@@ -5,33 +5,16 @@
 #include "server/mesh/voxel/voxels.h"
 
 #include "server/base/clock.h"
+#include "server/base/heap.h"
+#include "server/base/vec3.h"
 #include "server/mesh/geometry/tuning.h"
 #include "server/mesh/voxel/voxel_classify.h"
 #include "server/mesh/voxel/voxel_fraction.h"
-
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 void pal_voxels_free(pal_voxels *voxels)
 {
     free(voxels->kind);
     memset(voxels, 0, sizeof *voxels);
-}
-
-/* box of the finite corners of triangles (vertices of no triangle do not count); false when there is none */
-static bool find_box(const pal_surface *surface, const uint8_t *used, double low[3], double high[3])
-{
-    for (int k = 0; k < 3; k++) low[k] = INFINITY, high[k] = -INFINITY;
-    for (size_t v = 0; v < (size_t)surface->n_vertex; v++) {
-        const double *x = surface->x + 3 * v;
-        if (!used[v] || !isfinite(x[0]) || !isfinite(x[1]) || !isfinite(x[2])) continue;
-        for (int k = 0; k < 3; k++) {
-            low[k] = x[k] < low[k] ? x[k] : low[k];
-            high[k] = x[k] > high[k] ? x[k] : high[k];
-        }
-    }
-    return low[0] <= high[0];
 }
 
 static pal_err make_grid(const pal_surface *surface, const pal_voxel_options *options, pal_voxels *grid,
@@ -41,12 +24,13 @@ static pal_err make_grid(const pal_surface *surface, const pal_voxel_options *op
     if (options->resolution < 1 || options->resolution > MAX_RESOLUTION)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "resolution %d is not within 1..%d", options->resolution,
                                   MAX_RESOLUTION);
-    uint8_t *used = calloc(surface->n_vertex ? (size_t)surface->n_vertex : 1, 1);
-    if (!used) return PAL_ERR_MEMORY;
-    for (size_t i = 0; i < 3 * (size_t)surface->n_tri; i++) used[surface->tri[i]] = 1;
-    bool any = find_box(surface, used, low, high);
-    free(used);
-    if (!any)
+    /* the box of the finite corners of triangles: vertices of no triangle do not count */
+    pal_box3_empty(low, high);
+    for (size_t i = 0; i < 3 * (size_t)surface->n_tri; i++) {
+        const double *x = surface->x + 3 * (size_t)surface->tri[i];
+        if (pal_finite3(x)) pal_box3_add(low, high, x);
+    }
+    if (!(low[0] <= high[0]))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
                                   "no volume (reason 1): none of %d triangles has finite corners", surface->n_tri);
     for (int k = 0; k < 3; k++) longest = fmax(longest, high[k] - low[k]);
@@ -88,8 +72,7 @@ static void find_border(const pal_bits *inside, pal_bits *border)
                 above[w] |= b;
             }
         }
-    size_t n = (size_t)n_word * (size_t)inside->n[1] * (size_t)inside->n[2];
-    for (size_t i = 0; i < n; i++) border->word[i] &= ~inside->word[i];
+    for (size_t i = 0; i < pal_bits_words(inside); i++) border->word[i] &= ~inside->word[i];
 }
 
 /* bits to bytes: one table look-up turns 8 bits into 8 bytes */
@@ -117,14 +100,24 @@ static void write_kind(const pal_bits *inside, const pal_bits *border, uint8_t *
     }
 }
 
-/* number of face-connected components, border voxels included; the border is unchanged */
-static pal_err count_pieces(const pal_bits *inside, pal_bits *border, int *n_component)
+/* border voxels of which less than min lies inside are dropped */
+typedef struct dropper {
+    pal_bits *border;
+    double min;
+} dropper;
+
+static void drop_layer(void *self, int z, const double *fraction)
 {
-    size_t n = (size_t)inside->n_word * (size_t)inside->n[1] * (size_t)inside->n[2];
-    for (size_t i = 0; i < n; i++) border->word[i] |= inside->word[i];
-    pal_err err = pal_bits_components(border, false, n_component);
-    for (size_t i = 0; i < n; i++) border->word[i] &= ~inside->word[i];
-    return err;
+    dropper *d = self;
+    for (int y = 0; y < d->border->n[1]; y++) {
+        uint64_t *row = pal_bits_row(d->border, y, z);
+        for (int w = 0; w < d->border->n_word; w++)
+            for (uint64_t left = row[w]; left; left &= left - 1) {
+                int x = 64 * w + __builtin_ctzll(left);
+                if (fraction[(size_t)y * (size_t)d->border->n[0] + (size_t)x] < d->min)
+                    row[w] &= ~((uint64_t)1 << (x & 63));
+            }
+    }
 }
 
 /* border, dropped border voxels, components, counts, budget, bytes */
@@ -135,26 +128,27 @@ static pal_err keep_voxels(const pal_surface *surface, const pal_bits *inside, c
     pal_err err = PAL_ERR_OK;
     PAL_TRY(pal_bits_create(inside->n, &border));
     if (options->border) find_border(inside, &border);
-    if (options->border && options->min_fill > 0)
-        err = pal_voxels_drop(surface, options, voxels, inside, &border, report, diag);
-    if (!err) err = count_pieces(inside, &border, &report->n_component);
-    if (err) {
-        pal_bits_free(&border);
-        return err;
+    if (options->border && options->min_fill > 0) {
+        dropper d = {&border, options->min_fill};
+        report->n_dropped = pal_bits_count(&border);
+        err = pal_voxels_fraction(surface, voxels, drop_layer, &d, diag);
+        report->n_dropped -= pal_bits_count(&border);
     }
+    /* components of all kept voxels */
+    for (size_t i = 0; i < pal_bits_words(inside); i++) border.word[i] |= inside->word[i];
+    if (!err) err = pal_bits_components(&border, false, &report->n_component);
+    for (size_t i = 0; i < pal_bits_words(inside); i++) border.word[i] &= ~inside->word[i];
     voxels->n_inside = pal_bits_count(inside);
     voxels->n_border = pal_bits_count(&border);
     int64_t max = options->max_voxel > 0 ? options->max_voxel : MAX_VOXEL;
-    if (voxels->n_inside + voxels->n_border > max) {
-        pal_bits_free(&border);
-        return pal_diagnostic_set(
-            diag, PAL_ERR_BUDGET, "resolution %d makes %lld voxels, the limit is %lld: ask for less",
-            options->resolution, (long long)(voxels->n_inside + voxels->n_border), (long long)max);
-    }
-    voxels->kind = calloc((size_t)voxels->n[0] * (size_t)voxels->n[1] * (size_t)voxels->n[2], 1);
-    if (voxels->kind) write_kind(inside, &border, voxels->kind);
+    if (!err && voxels->n_inside + voxels->n_border > max)
+        err =
+            pal_diagnostic_set(diag, PAL_ERR_BUDGET, "resolution %d makes %lld voxels, the limit is %lld: ask for less",
+                               options->resolution, (long long)(voxels->n_inside + voxels->n_border), (long long)max);
+    PAL_ZEROED(&err, voxels->kind, (size_t)voxels->n[0] * (size_t)voxels->n[1] * (size_t)voxels->n[2]);
+    if (!err) write_kind(inside, &border, voxels->kind);
     pal_bits_free(&border);
-    return voxels->kind ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    return err;
 }
 
 pal_err pal_voxels_fill(const pal_surface *surface, const pal_voxel_options *options, pal_voxels *out,

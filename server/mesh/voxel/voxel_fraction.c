@@ -1,26 +1,22 @@
 /* The fraction of a voxel that lies inside a surface.
  *
  * A point lies inside a closed outward surface when a ray from it along +x leaves once more often than it enters.
- * Integrated over a voxel: every piece of a triangle, cut by the voxel planes, adds its projected area times its
- * distance from the low side of the voxel, and its projected area to each voxel before it in the row. This is the
- * divergence theorem for each voxel, and exact for triangles; samples would err by up to half a sample layer at every
- * flat face.
+ * Integrated over a voxel this is the divergence theorem (server/mesh/README.md, fill), exact for triangles.
  *
  * Where the winding number may differ from 0 and 1 (overlapping or doubled parts) or has no meaning (open surfaces),
  * samples on a finer grid are classified as the voxels are, and counted. */
 #include "server/mesh/voxel/voxel_fraction.h"
 
+#include "server/base/heap.h"
 #include "server/mesh/geometry/polygon.h"
 #include "server/mesh/voxel/voxel_classify.h"
 
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 /* fractions within this of 0 or 1 are rounding */
 #define ROUNDING 1e-6
 /* limits of the samples per axis and in total */
-enum { MAX_SAMPLE_AXIS = 2040, MAX_SAMPLE = 1 << 28 };
+enum { SUBSAMPLES = 6, MAX_SAMPLE_AXIS = 2040, MAX_SAMPLE = 1 << 28 };
 /* largest coordinate that exact crossings allow, grid units (voxel_scanline.c) */
 enum { MAX_PLACE = 1 << 27 };
 
@@ -116,8 +112,8 @@ static void add_triangle(const sweep *s, size_t t, int z)
 /* first and last layer of a triangle; false when it is parallel to the rows or outside the grid */
 static bool find_layers(const sweep *s, size_t t, int *from, int *to)
 {
-    const int32_t *c = s->scan->tri + 3 * t, *a = s->scan->point + 3 * (size_t)c[0],
-                  *b = s->scan->point + 3 * (size_t)c[1], *e = s->scan->point + 3 * (size_t)c[2];
+    const int32_t *c = s->scan->tri + 3 * t, *p = s->scan->point;
+    const int32_t *a = p + 3 * (size_t)c[0], *b = p + 3 * (size_t)c[1], *e = p + 3 * (size_t)c[2];
     if (((int64_t)b[1] - a[1]) * ((int64_t)e[2] - a[2]) == ((int64_t)b[2] - a[2]) * ((int64_t)e[1] - a[1]))
         return false;
     int32_t min = a[2] < b[2] ? a[2] : b[2], max = a[2] < b[2] ? b[2] : a[2];
@@ -179,21 +175,17 @@ static void sweep_layers(const sweep *s, pal_fraction_layer take, void *self)
 static pal_err fractions_exactly(const pal_scan_surface *scan, const pal_voxels *grid, double sign,
                                  pal_fraction_layer take, void *self)
 {
-    size_t n_plane = (size_t)grid->n[0] * (size_t)grid->n[1], n_tri = scan->n_tri ? (size_t)scan->n_tri : 1;
+    size_t n_plane = (size_t)grid->n[0] * (size_t)grid->n[1];
     sweep s = {.scan = scan, .n = grid->n, .sign = sign};
-    s.tri = malloc(n_tri * sizeof *s.tri);
-    s.live = malloc(n_tri * sizeof *s.live);
-    s.from = calloc((size_t)grid->n[2] + 2, sizeof *s.from);
-    s.own = malloc(n_plane * sizeof *s.own);
-    s.pass = malloc((n_plane + (size_t)grid->n[1]) * sizeof *s.pass);
-    bool ok = s.tri && s.live && s.from && s.own && s.pass;
-    if (ok) sweep_layers(&s, take, self);
-    free(s.tri);
-    free(s.live);
-    free(s.from);
-    free(s.own);
-    free(s.pass);
-    return ok ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    PAL_ARRAY(&err, s.tri, scan->n_tri);
+    PAL_ARRAY(&err, s.live, scan->n_tri);
+    PAL_ZEROED(&err, s.from, grid->n[2] + 2);
+    PAL_ARRAY(&err, s.own, n_plane);
+    PAL_ARRAY(&err, s.pass, n_plane + (size_t)grid->n[1]);
+    if (!err) sweep_layers(&s, take, self);
+    PAL_FREE(s.tri, s.live, s.from, s.own, s.pass);
+    return err;
 }
 
 /* volume of a closed surface in grid units */
@@ -244,18 +236,18 @@ static void count_samples(const pal_bits *sample, const int n[3], int n_sub, int
 }
 
 /* a grid on which the surface is refused (a sheet that encloses few samples) is replaced by a coarser one */
-static pal_err fractions_by_samples(const pal_surface *surface, const pal_voxels *grid, const char *method, int n_sub,
-                                    pal_fraction_layer take, void *self, pal_diagnostic *diag)
+static pal_err fractions_by_samples(const pal_surface *surface, const pal_voxels *grid, pal_fraction_layer take,
+                                    void *self, pal_diagnostic *diag)
 {
     const int *n = grid->n;
     double n_cell = (double)n[0] * n[1] * n[2];
-    int longest = n[0] > n[1] ? n[0] : n[1];
+    int n_sub = SUBSAMPLES, longest = n[0] > n[1] ? n[0] : n[1];
     longest = n[2] > longest ? n[2] : longest;
     while (n_sub > 1 && (n_sub * longest > MAX_SAMPLE_AXIS || n_cell * pow(n_sub, 3) > MAX_SAMPLE)) n_sub--;
     double *fraction = malloc((size_t)n[0] * (size_t)n[1] * sizeof *fraction);
     pal_err err = fraction ? PAL_ERR_REFUSED : PAL_ERR_MEMORY;
     for (; err == PAL_ERR_REFUSED && n_sub > 0; n_sub--) {
-        pal_voxel_options options = {.resolution = n_sub * longest, .method = method};
+        pal_voxel_options options = {.resolution = n_sub * longest};
         pal_voxel_report report = {0};
         pal_voxels fine = {.n = {n_sub * n[0], n_sub * n[1], n_sub * n[2]}, .edge_m = grid->edge_m / n_sub};
         pal_bits sample;
@@ -285,8 +277,8 @@ static bool fits(const pal_surface *surface, const pal_voxels *grid)
     return true;
 }
 
-pal_err pal_voxels_fraction(const pal_surface *surface, const pal_voxels *grid, const char *method, int n_sub,
-                            pal_fraction_layer take, void *self, bool *exact, pal_diagnostic *diag)
+pal_err pal_voxels_fraction(const pal_surface *surface, const pal_voxels *grid, pal_fraction_layer take, void *self,
+                            pal_diagnostic *diag)
 {
     pal_scan_surface scan;
     bool plain = false;
@@ -297,63 +289,5 @@ pal_err pal_voxels_fraction(const pal_surface *surface, const pal_voxels *grid, 
     pal_err err = find_plain(&scan, grid, &plain);
     if (!err && plain) err = fractions_exactly(&scan, grid, closed_volume(&scan) < 0 ? -1 : 1, take, self);
     pal_scan_surface_free(&scan);
-    if (exact) *exact = plain;
-    if (err || plain) return err;
-    return fractions_by_samples(surface, grid, method, n_sub > 0 ? n_sub : PAL_FRACTION_SUBSAMPLES, take, self, diag);
-}
-
-typedef struct dropper {
-    pal_bits *border;
-    double min;
-    int64_t n_dropped;
-} dropper;
-
-static void drop_layer(void *self, int z, const double *fraction)
-{
-    dropper *d = self;
-    for (int y = 0; y < d->border->n[1]; y++) {
-        uint64_t *row = pal_bits_row(d->border, y, z);
-        for (int w = 0; w < d->border->n_word; w++)
-            for (uint64_t left = row[w]; left; left &= left - 1) {
-                int x = 64 * w + __builtin_ctzll(left);
-                if (fraction[(size_t)y * (size_t)d->border->n[0] + (size_t)x] >= d->min) continue;
-                row[w] &= ~((uint64_t)1 << (x & 63));
-                d->n_dropped++;
-            }
-    }
-}
-
-/* lattice edges with two diagonally opposite kept voxels and no other */
-static int64_t count_edge_only(const pal_bits *inside, const pal_bits *border)
-{
-    int64_t count = 0;
-    int n_word = inside->n_word;
-    for (int z = 1; z < inside->n[2]; z++)
-        for (int y = 1; y < inside->n[1]; y++) {
-            uint64_t before[4] = {0};
-            for (int w = 0; w < n_word; w++) {
-                uint64_t k[4], l[4];
-                for (int i = 0; i < 4; i++) {
-                    int at_y = y - (i & 1), at_z = z - (i >> 1);
-                    k[i] = pal_bits_row(inside, at_y, at_z)[w] | pal_bits_row(border, at_y, at_z)[w];
-                    l[i] = k[i] << 1 | before[i] >> 63;
-                    before[i] = k[i];
-                }
-                uint64_t along_x = (k[0] & k[3] & ~k[1] & ~k[2]) | (k[1] & k[2] & ~k[0] & ~k[3]);
-                uint64_t along_y = (k[0] & l[2] & ~k[2] & ~l[0]) | (k[2] & l[0] & ~k[0] & ~l[2]);
-                uint64_t along_z = (k[0] & l[1] & ~k[1] & ~l[0]) | (k[1] & l[0] & ~k[0] & ~l[1]);
-                count += __builtin_popcountll(along_x) + __builtin_popcountll(along_y) + __builtin_popcountll(along_z);
-            }
-        }
-    return count;
-}
-
-pal_err pal_voxels_drop(const pal_surface *surface, const pal_voxel_options *options, const pal_voxels *grid,
-                        const pal_bits *inside, pal_bits *border, pal_voxel_report *report, pal_diagnostic *diag)
-{
-    dropper d = {.border = border, .min = options->min_fill};
-    PAL_TRY(pal_voxels_fraction(surface, grid, options->method, 0, drop_layer, &d, NULL, diag));
-    report->n_dropped = d.n_dropped;
-    report->n_edge_only = count_edge_only(inside, border);
-    return PAL_ERR_OK;
+    return err || plain ? err : fractions_by_samples(surface, grid, take, self, diag);
 }

@@ -5,11 +5,11 @@
  * edge rule in the plane of the row's ends and its continuation along the row. */
 #include "server/mesh/voxel/voxel_scanline.h"
 
+#include "server/base/heap.h"
 #include "server/mesh/geometry/tuning.h"
+#include "server/num/sort.h"
 
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 __extension__ typedef __int128 wide;
 
@@ -21,9 +21,7 @@ static const int ACROSS[3][2] = {{1, 2}, {0, 2}, {0, 1}};
 
 void pal_scan_surface_free(pal_scan_surface *scan)
 {
-    free(scan->point);
-    free(scan->tri);
-    free(scan->part);
+    PAL_FREE(scan->point, scan->tri, scan->part);
     memset(scan, 0, sizeof *scan);
 }
 
@@ -79,22 +77,22 @@ typedef struct numbered {
 static int compare_numbered(const void *a, const void *b)
 {
     const numbered *s = a, *t = b;
-    if (s->key != t->key) return s->key < t->key ? -1 : 1;
-    return s->tri < t->tri ? -1 : s->tri > t->tri;
+    return s->key != t->key ? PAL_COMPARE(s->key, t->key) : PAL_COMPARE(s->tri, t->tri);
 }
 
 pal_err pal_scan_drop_copies(pal_scan_surface *scan, int n_vertex)
 {
     size_t n = (size_t)scan->n_tri;
     pal_scan_surface fewer = *scan;
-    fewer.tri = malloc((n ? n : 1) * 3 * sizeof *fewer.tri);
-    uint64_t *hash = malloc((n_vertex ? (size_t)n_vertex : 1) * sizeof *hash);
-    numbered *list = malloc((n ? n : 1) * sizeof *list);
-    if (!fewer.tri || !hash || !list) {
-        free(fewer.tri);
-        free(hash);
-        free(list);
-        return PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    uint64_t *hash;
+    numbered *list;
+    PAL_ARRAY(&err, fewer.tri, 3 * n);
+    PAL_ARRAY(&err, hash, n_vertex);
+    PAL_ARRAY(&err, list, n);
+    if (err) {
+        PAL_FREE(fewer.tri, hash, list);
+        return err;
     }
     for (size_t v = 0; v < (size_t)n_vertex; v++) hash[v] = hash_point(scan->point + 3 * v);
     for (size_t t = 0; t < n; t++) {
@@ -115,9 +113,7 @@ pal_err pal_scan_drop_copies(pal_scan_surface *scan, int n_vertex)
     fewer.n_tri = (int)n_kept;
     find_closed(&fewer, hash);
     bool better = fewer.even || !scan->even;
-    free(hash);
-    free(list);
-    free(better ? scan->tri : fewer.tri);
+    PAL_FREE(hash, list, better ? scan->tri : fewer.tri);
     if (better) *scan = fewer;
     return PAL_ERR_OK;
 }
@@ -126,13 +122,15 @@ pal_err pal_scan_snap(const pal_surface *surface, const double low[3], double h,
 {
     size_t n_vertex = (size_t)surface->n_vertex, n_tri = (size_t)surface->n_tri;
     pal_scan_surface scan = {.n_tri = 0};
-    scan.point = malloc((n_vertex ? n_vertex : 1) * 3 * sizeof *scan.point);
-    scan.tri = malloc((n_tri ? n_tri : 1) * 3 * sizeof *scan.tri);
-    uint64_t *hash = malloc((n_vertex ? n_vertex : 1) * sizeof *hash);
-    if (!scan.point || !scan.tri || !hash) {
+    pal_err err = PAL_ERR_OK;
+    uint64_t *hash;
+    PAL_ARRAY(&err, scan.point, 3 * n_vertex);
+    PAL_ARRAY(&err, scan.tri, 3 * n_tri);
+    PAL_ARRAY(&err, hash, n_vertex);
+    if (err) {
         free(hash);
         pal_scan_surface_free(&scan);
-        return PAL_ERR_MEMORY;
+        return err;
     }
     double scale = PAL_SCAN_ONE / h;
     for (size_t v = 0; v < n_vertex; v++) {
@@ -159,35 +157,16 @@ pal_err pal_scan_snap(const pal_surface *surface, const double low[3], double h,
 }
 
 /* crossings in the order they are found, with their rows */
+typedef struct found {
+    pal_crossing crossing;
+    int32_t row;
+} found;
+
 typedef struct scanner {
     int n_p, n_q, n_place, axis; /* n_place: voxels along the axis */
-    int64_t n, cap, max;         /* crossings, room, budget */
-    pal_crossing *item;
-    int32_t *row;
+    int64_t n, max;              /* crossings and their budget */
+    found *item;
 } scanner;
-
-static bool scanner_grow(scanner *s)
-{
-    int64_t cap = s->cap ? 2 * s->cap : 4096;
-    if (cap > s->max) cap = s->max;
-    if (cap <= s->n) return false;
-    pal_crossing *item = realloc(s->item, (size_t)cap * sizeof *item);
-    if (!item) return false;
-    s->item = item;
-    int32_t *row = realloc(s->row, (size_t)cap * sizeof *row);
-    if (!row) return false;
-    s->row = row;
-    s->cap = cap;
-    return true;
-}
-
-/* room for one more crossing, in the given row; NULL: out of memory or beyond the budget */
-static inline pal_crossing *scanner_next(scanner *s, int32_t row)
-{
-    if (s->n == s->cap && !scanner_grow(s)) return NULL;
-    s->row[s->n] = row;
-    return &s->item[s->n++];
-}
 
 /* does the shifted centre lie behind a crossing exactly at the centre? The surface near there moves along the axis by
  * -(normal across . shift) / normal along */
@@ -252,21 +231,11 @@ static void narrow(const edge_rule *e, int64_t *from, int64_t *to)
     }
 }
 
-static int32_t min3(int32_t a, int32_t b, int32_t c)
+/* first and last centre within the range of three coordinates, within 0..n-1 */
+static bool centre_range(int32_t a, int32_t b, int32_t c, int n, int *from, int *to)
 {
-    int32_t m = a < b ? a : b;
-    return m < c ? m : c;
-}
-
-static int32_t max3(int32_t a, int32_t b, int32_t c)
-{
-    int32_t m = a > b ? a : b;
-    return m > c ? m : c;
-}
-
-/* first and last centre in low..high, within 0..n-1 */
-static bool centre_range(int32_t low, int32_t high, int n, int *from, int *to)
-{
+    int32_t low = a < b ? a : b, high = a < b ? b : a;
+    low = c < low ? c : low, high = c > high ? c : high;
     *from = (low - PAL_SCAN_HALF + PAL_SCAN_ONE - 1) >> 16;
     *to = (high - PAL_SCAN_HALF) >> 16;
     if (*from < 0) *from = 0;
@@ -277,8 +246,8 @@ static bool centre_range(int32_t low, int32_t high, int n, int *from, int *to)
 static bool scan_triangle(scanner *s, const int32_t *a, const int32_t *b, const int32_t *c, int32_t part)
 {
     int p = ACROSS[s->axis][0], q = ACROSS[s->axis][1], p0, p1, q0, q1;
-    if (!centre_range(min3(a[p], b[p], c[p]), max3(a[p], b[p], c[p]), s->n_p, &p0, &p1)) return true;
-    if (!centre_range(min3(a[q], b[q], c[q]), max3(a[q], b[q], c[q]), s->n_q, &q0, &q1)) return true;
+    if (!centre_range(a[p], b[p], c[p], s->n_p, &p0, &p1)) return true;
+    if (!centre_range(a[q], b[q], c[q], s->n_q, &q0, &q1)) return true;
     int64_t area = ((int64_t)b[p] - a[p]) * ((int64_t)c[q] - a[q]) - ((int64_t)b[q] - a[q]) * ((int64_t)c[p] - a[p]);
     if (area == 0) return true;
 
@@ -304,12 +273,12 @@ static bool scan_triangle(scanner *s, const int32_t *a, const int32_t *b, const 
                 value_ca = ca.at - from * ca.dq * PAL_SCAN_ONE;
         for (int64_t i = p0 + from; i <= p0 + to; i++) {
             if (((value_ab + ab.bias) | (value_bc + bc.bias) | (value_ca + ca.bias)) >= 0) {
-                pal_crossing *c_out = scanner_next(s, (int32_t)(j * (int64_t)s->n_p + i));
-                if (!c_out) return false;
-                int32_t place = find_index(a, b, c, s->axis, value_ca, value_ab, area, &c_out->depth);
-                c_out->place = place < 0 ? 0 : place > s->n_place ? s->n_place : place;
-                c_out->part = part;
-                c_out->sign = sign;
+                if (s->n == s->max || !PAL_GROW(s->item, s->n)) return false;
+                found *f = &s->item[s->n++];
+                int32_t place = find_index(a, b, c, s->axis, value_ca, value_ab, area, &f->crossing.depth);
+                f->crossing.place = place < 0 ? 0 : place > s->n_place ? s->n_place : place;
+                f->crossing.part = part, f->crossing.sign = sign;
+                f->row = (int32_t)(j * (int64_t)s->n_p + i);
             }
             value_ab -= ab.dq * PAL_SCAN_ONE;
             value_bc -= bc.dq * PAL_SCAN_ONE;
@@ -322,48 +291,34 @@ static bool scan_triangle(scanner *s, const int32_t *a, const int32_t *b, const 
     return true;
 }
 
-static bool comes_before(const pal_crossing *a, const pal_crossing *b)
-{
-    if (a->place != b->place) return a->place < b->place;
-    if (a->depth != b->depth) return a->depth < b->depth;
-    if (a->part != b->part) return a->part < b->part;
-    return a->sign < b->sign;
-}
-
 static int compare_crossings(const void *a, const void *b)
 {
-    return comes_before(a, b) ? -1 : comes_before(b, a);
+    const pal_crossing *c = a, *d = b;
+    if (c->place != d->place) return PAL_COMPARE(c->place, d->place);
+    if (c->depth != d->depth) return PAL_COMPARE(c->depth, d->depth);
+    if (c->part != d->part) return PAL_COMPARE(c->part, d->part);
+    return PAL_COMPARE(c->sign, d->sign);
 }
 
-static void sort_row(pal_crossing *item, int64_t n)
-{
-    if (n > 64) {
-        qsort(item, (size_t)n, sizeof *item, compare_crossings);
-        return;
-    }
-    for (int64_t i = 1; i < n; i++) {
-        pal_crossing moved = item[i];
-        int64_t k = i;
-        for (; k > 0 && comes_before(&moved, &item[k - 1]); k--) item[k] = item[k - 1];
-        item[k] = moved;
-    }
-}
+PAL_SORT(sort_row, pal_crossing, compare_crossings)
 
 /* distributes the crossings to their rows and sorts each row */
 static pal_err sort_rows(const scanner *s, pal_crossings *out)
 {
     int n_row = s->n_p * s->n_q;
-    int64_t *start = calloc((size_t)n_row + 2, sizeof *start);
-    pal_crossing *item = malloc((s->n ? (size_t)s->n : 1) * sizeof *item);
-    if (!start || !item) {
-        free(start);
-        free(item);
-        return PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    int64_t *start;
+    pal_crossing *item;
+    PAL_ZEROED(&err, start, n_row + 2);
+    PAL_ARRAY(&err, item, s->n);
+    if (err) {
+        PAL_FREE(start, item);
+        return err;
     }
-    for (int64_t i = 0; i < s->n; i++) start[s->row[i] + 2]++;
+    for (int64_t i = 0; i < s->n; i++) start[s->item[i].row + 2]++;
     for (int i = 0; i < n_row; i++) start[i + 2] += start[i + 1];
-    for (int64_t i = 0; i < s->n; i++) item[start[s->row[i] + 1]++] = s->item[i];
-    for (int i = 0; i < n_row; i++) sort_row(item + start[i], start[i + 1] - start[i]);
+    for (int64_t i = 0; i < s->n; i++) item[start[s->item[i].row + 1]++] = s->item[i].crossing;
+    for (int i = 0; i < n_row; i++) sort_row(item + start[i], (size_t)(start[i + 1] - start[i]));
     *out = (pal_crossings){n_row, start, item};
     return PAL_ERR_OK;
 }
@@ -380,13 +335,11 @@ pal_err pal_scan_axis(const pal_scan_surface *scan, const int n[3], int axis, pa
     }
     pal_err err = ok ? sort_rows(&s, out) : s.n == s.max ? PAL_ERR_BUDGET : PAL_ERR_MEMORY;
     free(s.item);
-    free(s.row);
     return err;
 }
 
 void pal_crossings_free(pal_crossings *crossings)
 {
-    free(crossings->start);
-    free(crossings->item);
+    PAL_FREE(crossings->start, crossings->item);
     memset(crossings, 0, sizeof *crossings);
 }

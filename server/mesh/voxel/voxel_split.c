@@ -1,14 +1,9 @@
-/* From voxels to tetrahedra (paper B section 2.2): five per voxel, in two mirrored patterns by the parity of i + j + k,
- * so that the diagonals of neighbours match (the paper does not mention it).
- *
- * Departure: vertices are shared through two planes of node numbers that move up with the voxels, not through a hash. A
- * first pass counts, so every array is allocated once at its size. */
+/* From voxels to tetrahedra (paper B section 2.2; server/mesh/README.md). */
 #include "server/mesh/voxel/voxels.h"
 
+#include "server/base/heap.h"
 #include "server/mesh/voxel/voxel_bits.h"
 
-#include <stdlib.h>
-#include <string.h>
 #include <sys/mman.h>
 
 /* corner bits x = 1, y = 2, z = 4; every tetrahedron has positive volume */
@@ -19,17 +14,13 @@ const uint8_t pal_voxel_tets[2][5][4] = {
 /* faces of a tetrahedron of positive volume, counter-clockwise from outside */
 static const uint8_t FACE[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
 
-/* the two triangles of each side of the voxel (-x +x -y +y -z +z) in both patterns */
-typedef struct side_table {
-    uint8_t corner[2][6][6];
-} side_table;
-
-/* the faces of the five tetrahedra whose corners all lie on one side */
-static void find_sides(side_table *table)
+/* the two triangles of each side of the voxel (-x +x -y +y -z +z) in both patterns: the faces of the five tetrahedra
+ * whose corners all lie on that side */
+static void find_sides(uint8_t corner[2][6][6])
 {
     for (int parity = 0; parity < 2; parity++)
         for (int side = 0; side < 6; side++) {
-            uint8_t *to = table->corner[parity][side];
+            uint8_t *to = corner[parity][side];
             for (int t = 0; t < 5; t++)
                 for (int f = 0; f < 4; f++) {
                     int on = 0;
@@ -84,7 +75,7 @@ typedef struct splitter {
     pal_bits kept;     /* one voxel wider than the grid in x, so that nodes fit its words */
     uint64_t *empty;   /* a row of zeros                            [n_word]     */
     int32_t *plane[2]; /* node numbers below and above the voxels   [n1+1][n0+1] */
-    side_table sides;
+    uint8_t sides[2][6][6];
     pal_tets *tets;
     int64_t n_node, n_tet, n_face; /* counted first, then written so far */
 } splitter;
@@ -113,20 +104,10 @@ static void rows_around(const splitter *s, int y, int z, const uint64_t *row[4])
 static inline uint64_t exposed_word(const splitter *s, int y, int z, int w, int side)
 {
     const uint64_t *row = kept_row(s, y, z);
-    switch (side) {
-    case 0:
-        return row[w] & ~from_left(row, w);
-    case 1:
-        return row[w] & ~from_right(row, w, s->kept.n_word);
-    case 2:
-        return row[w] & ~kept_row(s, y - 1, z)[w];
-    case 3:
-        return row[w] & ~kept_row(s, y + 1, z)[w];
-    case 4:
-        return row[w] & ~kept_row(s, y, z - 1)[w];
-    default:
-        return row[w] & ~kept_row(s, y, z + 1)[w];
-    }
+    int step = side & 1 ? 1 : -1;
+    if (side == 0) return row[w] & ~from_left(row, w);
+    if (side == 1) return row[w] & ~from_right(row, w, s->kept.n_word);
+    return row[w] & ~kept_row(s, side < 4 ? y + step : y, side < 4 ? z : z + step)[w];
 }
 
 static void count_all(splitter *s)
@@ -199,7 +180,7 @@ static void write_faces(splitter *s, int y, int z)
         for (int side = 0; side < 6; side++)
             for (uint64_t left = exposed_word(s, y, z, w, side); left; left &= left - 1) {
                 int x = 64 * w + __builtin_ctzll(left);
-                const uint8_t *corner = s->sides.corner[(x + y + z) & 1][side];
+                const uint8_t *corner = s->sides[(x + y + z) & 1][side];
                 int32_t *to = s->tets->face + 3 * (size_t)s->n_face;
                 corners(s, x, y, z, node);
                 for (int k = 0; k < 6; k++) {
@@ -223,9 +204,10 @@ static pal_err split(splitter *s)
     t->x = pal_voxels_array((size_t)s->n_node * 3 * sizeof *t->x);
     t->tet = pal_voxels_array((size_t)s->n_tet * 4 * sizeof *t->tet);
     t->face = pal_voxels_array((size_t)s->n_face * 3 * sizeof *t->face);
-    t->on_surface = calloc(s->n_node ? (size_t)s->n_node : 1, 1);
-    for (int k = 0; k < 2; k++) s->plane[k] = malloc(n_plane * sizeof *s->plane[k]);
-    if (!t->x || !t->tet || !t->face || !t->on_surface || !s->plane[0] || !s->plane[1]) return PAL_ERR_MEMORY;
+    pal_err err = t->x && t->tet && t->face ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    PAL_ZEROED(&err, t->on_surface, s->n_node);
+    for (int k = 0; k < 2; k++) PAL_ARRAY(&err, s->plane[k], n_plane);
+    if (err) return err;
 
     s->n_node = s->n_tet = s->n_face = 0;
     write_nodes(s, 0);
@@ -247,14 +229,12 @@ pal_err pal_voxels_split(const pal_voxels *voxels, pal_tets *out)
     pal_err err = pal_bits_create(wider, &s.kept);
     if (!err) {
         s.empty = calloc((size_t)s.kept.n_word, sizeof *s.empty);
-        find_sides(&s.sides);
+        find_sides(s.sides);
         read_kind(voxels, &s.kept);
         err = s.empty ? split(&s) : PAL_ERR_MEMORY;
     }
     pal_bits_free(&s.kept);
-    free(s.empty);
-    free(s.plane[0]);
-    free(s.plane[1]);
+    PAL_FREE(s.empty, s.plane[0], s.plane[1]);
     if (err)
         pal_tets_free(&tets);
     else

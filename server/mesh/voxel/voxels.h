@@ -1,12 +1,6 @@
-/* From a surface to voxels and tetrahedra (paper B section 2.2): flood fill of the voxels whose centres lie inside, one
- * layer of border voxels outside, five tetrahedra per voxel with mirrored parity. server/mesh/README.md gives the
- * theory.
- *
- * Departures from the paper: seeds in every component, not one. A closed surface is filled by scanlines with exact
- * crossings, which find the voxels of a flood fill in less time. The connected parts of a surface are classified
- * separately, so that inside-out, doubled and overlapping parts count once and inward shells within others are
- * cavities. An open surface is decided by a vote of the three axes and, where they leave too much undecided, by the
- * winding number.
+/* From a surface to voxels and tetrahedra (paper B section 2.2): the voxels whose centres lie inside, one layer of
+ * border voxels outside, five tetrahedra per voxel with mirrored parity. server/mesh/README.md gives the theory and the
+ * departures from the paper.
  *
  * A refusal for want of a volume carries a number: reason 1, the surface has no extent; reason 2, it is closed but no
  * voxel centre lies inside (the message names a resolution that may do); reason 3, it is open and encloses nothing
@@ -16,17 +10,24 @@
 #include "server/mesh/geometry/surface.h"
 #include "server/mesh/geometry/tets.h"
 
+/* how inside is decided; tests force one */
+typedef enum pal_voxel_method {
+    PAL_VOXELS_CHOOSE,
+    PAL_VOXELS_SCANLINE,
+    PAL_VOXELS_VOTE,
+    PAL_VOXELS_WINDING
+} pal_voxel_method;
+
 typedef struct pal_voxel_options {
     int resolution;    /* voxels on the longest axis, 1..1024                                            */
     bool border;       /* keep the one layer of border voxels outside (paper B); false: inside only      */
     bool largest_only; /* keep only the largest face-connected component of inside voxels, and its border */
     int64_t max_voxel; /* BUDGET beyond this many kept voxels; 0: 50 million                             */
-    double
-        min_fill; /* border voxels with a smaller fraction inside the surface are dropped; 0: none, as in the paper */
-    bool fill;    /* pal_prepared_make only: measure the fill of every voxel (min_fill > 0 does so too) */
-    double ahead[3]; /* 0..1 per axis: the grid begins this fraction of a voxel before the box of the surface, so that
-                        its planes pass through a chosen place (the border of a support); 0: at the box */
-    const char *method; /* NULL: choose; "flood" | "scanline" | "vote" | "winding" force one (tests, bench) */
+    double min_fill;   /* border voxels with a smaller fraction inside the surface are dropped; 0: none       */
+    bool fill;         /* pal_prepared_make only: measure the fill of every voxel (min_fill > 0 does so too)  */
+    double ahead[3];   /* 0..1 per axis: the grid begins this fraction of a voxel before the box of the surface, so that
+                          its planes pass through a chosen place (the border of a support); 0: at the box */
+    pal_voxel_method method;
 } pal_voxel_options;
 
 typedef struct pal_voxels {
@@ -39,14 +40,12 @@ typedef struct pal_voxels {
 } pal_voxels;
 
 typedef struct pal_voxel_report {
-    char method[16];          /* how inside was decided: "scanline" | "flood" | "vote" | "winding" */
+    char method[16];          /* how inside was decided: "scanline" | "vote" | "winding" */
     int n_component;          /* face-connected components of the kept voxels, the border included */
     int64_t n_disagree;       /* voxels that no two axes settle unopposed */
     int64_t n_dropped;        /* border voxels that min_fill dropped                          */
-    int64_t n_edge_only;      /* with min_fill: voxel edges where two kept voxels meet and no third joins them */
     bool open;                /* some edge has an odd number of triangles                           */
-    double surface_volume_m3; /* by the divergence theorem, cavities subtracted, holes closed by fans from the centre of
-                                 their boundary; 0: unknown (open, and flood was asked for) */
+    double surface_volume_m3; /* by the divergence theorem, cavities subtracted, holes closed by fans     */
     double inside_volume_m3;  /* inside voxels                                                     */
     double tree_s, fill_s;    /* time for the box tree (0: not built) and for the fill             */
 } pal_voxel_report;

@@ -54,7 +54,7 @@ bool pal_credit_acknowledge(pal_credit *credit, uint32_t cycle, uint64_t now_ns)
 {
     int n = 0;
     while (n < credit->n_flight && (int32_t)(credit->cycle[n] - cycle) <= 0) n++;
-    /* older acknowledgements say nothing new; one of a cycle that is still to come is a lie */
+    /* older acknowledgements are repeats; one of a future cycle is malformed */
     if (n == 0) return credit->acknowledged && (int32_t)(cycle - credit->acknowledged) <= 0;
     if (credit->cycle[n - 1] != cycle) return false;
     learn(credit, (double)(now_ns - credit->sent_ns[n - 1]) * 1e-9, n == 1 && credit->first_alone, now_ns);

@@ -3,7 +3,6 @@
  * protocol of every vhost; a timer callback runs before the sleep of the next lws_service call. */
 #include "server/net/transport/loop.h"
 
-#include "server/base/clock.h"
 #include "server/base/log.h"
 
 #include <libwebsockets.h>
@@ -16,7 +15,8 @@ struct pal_loop {
     lws_sorted_usec_list_t tick_timer, due_timer;
     pal_loop_events events;
     _Atomic bool woken, stopped;
-    uint64_t now_ns, due_ns, tick_ns; /* without sockets; due_ns 0: none */
+    const pal_clock *clock;
+    uint64_t due_ns, tick_ns; /* without sockets; due_ns 0: none */
 };
 
 static pal_loop *loop_of(struct lws *wsi)
@@ -84,10 +84,11 @@ static pal_err open_context(pal_loop *loop, int max_socket, pal_diagnostic *diag
     return PAL_ERR_OK;
 }
 
-pal_err pal_loop_create(bool sockets, int max_socket, pal_diagnostic *diag, pal_loop **out)
+pal_err pal_loop_create(bool sockets, int max_socket, const pal_clock *clock, pal_diagnostic *diag, pal_loop **out)
 {
     pal_loop *loop = calloc(1, sizeof *loop);
     if (!loop) return PAL_ERR_MEMORY;
+    loop->clock = clock;
     if (sockets) {
         pal_err err = open_context(loop, max_socket, diag);
         if (err) return pal_loop_destroy(loop), err;
@@ -119,7 +120,7 @@ void pal_loop_listen(pal_loop *loop, const pal_loop_events *events)
 
 uint64_t pal_loop_now_ns(const pal_loop *loop)
 {
-    return loop->context ? pal_clock_ns() : loop->now_ns;
+    return pal_clock_now_ns(loop->clock);
 }
 
 void pal_loop_set_due(pal_loop *loop, uint64_t when_ns)
@@ -133,7 +134,11 @@ void pal_loop_set_due(pal_loop *loop, uint64_t when_ns)
 
 void pal_loop_wake(pal_loop *loop)
 {
-    if (!atomic_exchange(&loop->woken, true) && loop->context) lws_cancel_service(loop->context);
+    if (atomic_exchange(&loop->woken, true)) return;
+    if (loop->context)
+        lws_cancel_service(loop->context);
+    else
+        pal_clock_wake(loop->clock);
 }
 
 void pal_loop_stop(pal_loop *loop)
@@ -157,10 +162,10 @@ pal_err pal_loop_step(pal_loop *loop, uint64_t until_ns)
     return lws_service(loop->context, 0) < 0 ? PAL_ERR_IO : PAL_ERR_OK;
 }
 
-void pal_loop_advance(pal_loop *loop, uint64_t now_ns)
+void pal_loop_advance(pal_loop *loop)
 {
     PAL_ASSERT(!loop->context);
-    loop->now_ns = now_ns;
+    uint64_t now_ns = pal_loop_now_ns(loop);
     if (loop->due_ns && loop->due_ns <= now_ns) {
         loop->due_ns = 0;
         atomic_store(&loop->woken, true);

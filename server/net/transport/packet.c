@@ -36,10 +36,10 @@ void pal_packet_drop(pal_packet *packet)
     free(packet);
 }
 
-void pal_packet_replace(pal_packet **place, pal_packet *taken)
+void pal_packet_replace(pal_packet **owner, pal_packet *taken)
 {
-    pal_packet_drop(*place);
-    *place = taken;
+    pal_packet_drop(*owner);
+    *owner = taken;
 }
 
 size_t pal_packet_total(void)

@@ -23,7 +23,7 @@ typedef struct pal_packet {
 pal_packet *pal_packet_create(const void *bytes, size_t n_byte, bool text);
 pal_packet *pal_packet_hold(pal_packet *packet); /* adds a reference; NULL is fine */
 void pal_packet_drop(pal_packet *packet);        /* removes a reference, the last one frees; NULL is fine */
-/* drops *place and moves `taken` there, which may be NULL */
-void pal_packet_replace(pal_packet **place, pal_packet *taken);
+/* drops *owner and moves `taken` there, which may be NULL */
+void pal_packet_replace(pal_packet **owner, pal_packet *taken);
 size_t pal_packet_total(void); /* bytes in all live packets, for metrics and tests */
 #endif

@@ -45,8 +45,8 @@ typedef struct pal_peer_events {
 } pal_peer_events;
 
 struct pal_transport_ops {
-    const char *scheme; /* "ws" | "mem"; LCM peers use clients/lcm_bridge, which speaks ws */
-    /* url: "ws://127.0.0.1:8090" (port 0: any) | "mem://"; copies events. REFUSED: names address and reason. [load] */
+    bool sockets; /* needs a loop with sockets */
+    /* url: "ws://127.0.0.1:8090" (port 0: any); copies events. REFUSED: names address and reason. [load] */
     pal_err (*open)(pal_loop *loop, const char *url, const pal_peer_events *events, pal_diagnostic *diag,
                     pal_transport **out);
     int (*port)(const pal_transport *transport); /* 0: none */
@@ -55,7 +55,9 @@ struct pal_transport_ops {
     void (*close)(pal_transport *transport);     /* after pal_loop_shut; closes the remaining peers. [load] */
 };
 
-extern const pal_transport_ops pal_ws_transport, pal_mem_transport;
+/* websockets; LCM peers use clients/lcm_bridge, which speaks ws. Tests have one without sockets
+ * (tests/net/mem_transport.h) */
+extern const pal_transport_ops pal_ws_transport;
 
 /* marks a peer for closing with a websocket close code and a reason of at most 123 bytes; the first mark wins */
 void pal_peer_drop(pal_peer *peer, int code, const char *format, ...) __attribute__((format(printf, 3, 4)));

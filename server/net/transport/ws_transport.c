@@ -375,8 +375,7 @@ static pal_err open_socket(pal_transport *t, const char *url, pal_diagnostic *di
     struct sockaddr_storage address;
     socklen_t n = 0;
     int on = 1;
-    if (!parse_url(url, &address, &n, &t->any_host))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s is not an address to listen on", url);
+    if (!parse_url(url, &address, &n, &t->any_host)) return PAL_REFUSE(diag, "%s is not an address to listen on", url);
     t->spare_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
     t->listen_fd = socket(address.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (t->listen_fd < 0) return pal_diagnostic_set(diag, PAL_ERR_IO, "no socket: %s", strerror(errno));
@@ -384,12 +383,10 @@ static pal_err open_socket(pal_transport *t, const char *url, pal_diagnostic *di
     int n_text = (int)strcspn(url, "?");
     if (bind(t->listen_fd, (struct sockaddr *)&address, n) || listen(t->listen_fd, BACKLOG)) {
         if (errno == EADDRINUSE)
-            return pal_diagnostic_set(
-                diag, PAL_ERR_REFUSED,
-                "%.*s is in use by another program; choose another port with --port (0: any free one)", n_text - 5,
-                url + 5);
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "cannot listen on %.*s: %s", n_text - 5, url + 5,
-                                  strerror(errno));
+            return PAL_REFUSE(diag,
+                              "%.*s is in use by another program; choose another port with --port (0: any free one)",
+                              n_text - 5, url + 5);
+        return PAL_REFUSE(diag, "cannot listen on %.*s: %s", n_text - 5, url + 5, strerror(errno));
     }
     n = sizeof address;
     if (getsockname(t->listen_fd, (struct sockaddr *)&address, &n)) return PAL_ERR_IO;
@@ -456,4 +453,4 @@ static void ws_drop(pal_peer *peer)
     lws_callback_on_writable(c->wsi);
 }
 
-const pal_transport_ops pal_ws_transport = {"ws", ws_open, ws_port, ws_ready, ws_drop, ws_close};
+const pal_transport_ops pal_ws_transport = {true, ws_open, ws_port, ws_ready, ws_drop, ws_close};

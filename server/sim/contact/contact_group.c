@@ -50,11 +50,8 @@ bool pal_contact_group_near(const double centre[3], double radius_m, double near
             bool seen = false;
             for (int b = 0; b < n_earlier && !seen; b++)
                 seen = pal_dot3(out, earlier[b].normal) >= (earlier[b].force_N > 0 ? 0 : GROUP_COSINE);
-            if (seen) continue;
-            if (pass == 0)
-                nearest_m = fmin(nearest_m, distance);
-            else
-                pal_axpy3(sum, nearest_m + NEAREST_RADII * radius_m - distance, out);
+            if (!seen && pass == 0) nearest_m = fmin(nearest_m, distance);
+            if (!seen && pass == 1) pal_axpy3(sum, nearest_m + NEAREST_RADII * radius_m - distance, out);
         }
     if (!(nearest_m < INFINITY)) return false;
     *group = (pal_contact_group){.gap_m = fmax(0, nearest_m - radius_m)};

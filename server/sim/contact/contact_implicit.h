@@ -1,17 +1,15 @@
 /* The contact of one tool with tissue in a sub-step of an implicit solver.
  *
- * Each point near the tool has a contact spring of stiffness k along `away`. A point in contact is active: its load at
- * the start of the sub-step is k d, the solver reduces it by k m as tissue moves by m along `away`, and the force is
- * k (d - m). Springs that pull at the end should not have been active, and points that came through the sphere should:
- * where that is a noticeable part of the forces, they are chosen again and the solver solves again, at most twice;
- * after that only where contact would pull as a whole. Coulomb friction is two more springs across the mean direction,
- * as stiff as all contacts together, on the mean of the points weighted by their loads; where they would pass friction
- * times the normal force they are that constant force.
+ * Each point near the tool has a spring of stiffness k along `away`. In contact it is active: its load begins at k d,
+ * tissue that moves by m along `away` reduces it by k m, and the force is k (d - m). Active springs that pull, and
+ * points that came through the sphere, are exchanged and the solver solves again where they bear a noticeable part of
+ * the forces, at most twice; after that only where contact would pull as a whole. Coulomb friction is two more springs
+ * across the mean direction, as stiff as all contacts together, on the load-weighted mean of the points; beyond
+ * friction times the normal force they become that constant force.
  *
- * Caps. When the solve leaves more than the caps (tool_force.h), all springs of the tool become constant forces
- * shortened to the caps and the solver solves once more (pal_tangent.settle); tissue then moves less than before, so
- * never past the proxy, whose depth is limited. So a sub-step ends on the forces that it was solved with, and the tool
- * feels those. Thread: [sim], pal_contact_implicit_make [load]. */
+ * Where the solve leaves more than the caps (tool_force.h), all springs of the tool become constant forces shortened to
+ * the caps and the solver solves once more (pal_tangent.settle). Tissue then moves less than before, so never past the
+ * proxy. A sub-step ends on the forces that it was solved with, and the tool feels those. Thread: [sim]. */
 #ifndef PAL_SIM_CONTACT_CONTACT_IMPLICIT_H
 #define PAL_SIM_CONTACT_CONTACT_IMPLICIT_H
 #include "server/sim/contact/contact_spring.h"
@@ -21,38 +19,38 @@
 enum { PAL_CONTACT_IMPLICIT_MAX = 512 };
 
 typedef struct pal_contact_implicit {
-    int first, n_contact;   /* rows of the contacts in pal_contact_springs                                  */
-    int across;             /* first of the two rows of friction, -1: none                       */
-    double friction_N_m;    /* their stiffness while they stick                                  */
-    double *force_N;        /* of the loads now in body->load, by row from `first` [PAL_CONTACT_IMPLICIT_MAX + 2] */
-    double *share;          /* scratch [PAL_CONTACT_IMPLICIT_MAX]                                          */
-    double t[2][3];         /* unit directions across                                            */
-    bool constant;          /* the loads stay as they are whatever tissue does                   */
-    uint8_t *active;        /* active contacts [PAL_CONTACT_IMPLICIT_MAX]                                */
-    int round;              /* solves of this sub-step that were settled, while springs give way    */
-    bool staged;            /* the solver has several stages                                     */
-    pal_solved_force force; /* on the tool */
-    double uncapped_N;      /* what it was before caps                                           */
-    double allowed_N;       /* what caps leave of it, or would                                   */
-    bool capped;            /* it was more                                                       */
-    /* friction: how far its spring is stretched at the start and end of the sub-step, tool minus tissue, m */
+    /* of this sub-step, borrowed */
+    pal_contact_springs *springs;
+    pal_body *body;
+    pal_contact *contact; /* [n_contact] */
+    double friction;
+    int first, n_contact; /* rows of the contacts in pal_contact_springs              */
+    int across;           /* first of the two rows of friction; -1: none              */
+    double friction_N_m;  /* their stiffness while they stick                         */
+    double t[2][3];       /* their directions, unit                                   */
+    int round;            /* solves of this sub-step settled so far                   */
+    bool constant;        /* the loads are constant forces                            */
+    bool staged;          /* the solver has several stages                            */
+    bool capped;          /* the caps left less than uncapped_N                       */
+    double total_N[3];    /* on the tool, counted in its force                        */
+    double uncapped_N;    /* its size before caps                                     */
+    double allowed_N;     /* the size that the caps allow                             */
+    /* stretch of the friction springs at the start and end of the sub-step, tool minus tissue, m */
     double slip_m[3], next_slip_m[3], tool_move_m[3], normal_N;
     bool slides, next_slides;
+    double force_N[PAL_CONTACT_IMPLICIT_MAX + 2]; /* of the loads in body->load, by row from `first` */
+    double share[PAL_CONTACT_IMPLICIT_MAX];       /* scratch */
+    uint8_t active[PAL_CONTACT_IMPLICIT_MAX];     /* of the contacts */
 } pal_contact_implicit;
 
-pal_err pal_contact_implicit_make(pal_arena *arena, pal_contact_implicit *out);
-void pal_contact_implicit_reset(pal_contact_implicit *solve);
 /* keeps at most PAL_CONTACT_IMPLICIT_MAX contacts, stiffer for those left out; returns how many */
 int pal_contact_implicit_thin(pal_contact *contact, int n);
 /* springs for n contacts with k_N_m and depth_m (below 0: only near); the loads of those in contact go to body->load.
  * move_m: displacement of the tool in this sub-step (for friction) */
-void pal_contact_implicit_begin(pal_contact_implicit *solve, pal_contact_springs *springs, pal_contact_points *points,
-                                pal_body *body, const pal_contact *contact, int n, double friction,
-                                const double move_m[3]);
+void pal_contact_implicit_begin(pal_contact_implicit *solve, pal_contact_springs *springs, pal_body *body,
+                                pal_contact *contact, int n, double friction, const double move_m[3]);
 /* after a stage that is not the last, springs->motion_m set. True: beyond a cap, loads changed */
-bool pal_contact_implicit_cap(pal_contact_implicit *solve, pal_contact_springs *springs, pal_body *body, pal_tool *tool,
-                              pal_contact *contact);
+bool pal_contact_implicit_cap(pal_contact_implicit *solve, pal_tool *tool);
 /* after the last stage: force of every contact, total on the tool. True: loads changed */
-bool pal_contact_implicit_settle(pal_contact_implicit *solve, pal_contact_springs *springs, pal_body *body,
-                                 pal_tool *tool, pal_contact *contact, double friction);
+bool pal_contact_implicit_settle(pal_contact_implicit *solve, pal_tool *tool);
 #endif

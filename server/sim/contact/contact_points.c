@@ -4,51 +4,43 @@
 #include "server/base/vec3.h"
 #include "server/sim/contact/tuning.h"
 
-#include <math.h>
 #include <string.h>
 
-static pal_err allocate(const pal_body *body, pal_arena *arena, pal_contact_points *t)
+pal_err pal_contact_points_make(const pal_body *body, double spacing_m, int max_sample, pal_arena *arena,
+                                pal_contact_points *t)
 {
-    size_t n_vertex = (size_t)body->n_shown, n_node = (size_t)body->n_node;
-    size_t n_frame = body->skin ? (size_t)body->skin->n_frame : 0, n_slot = body->skin ? n_frame : n_node;
+    *t = (pal_contact_points){0};
+    PAL_TRY(pal_contact_samples_make(body, spacing_m, max_sample, arena, &t->sample));
+    size_t n_vertex = (size_t)body->display.n_shown, n_node = (size_t)body->n_node;
+    size_t n_frame = body->display.skin ? (size_t)body->display.skin->n_frame : 0,
+           n_slot = body->display.skin ? n_frame : n_node;
     t->live = PAL_NEW(arena, int32_t, n_vertex);
     t->frame = PAL_NEW(arena, int32_t, n_frame);
     t->live_mark = PAL_NEW(arena, uint32_t, n_vertex);
     t->frame_mark = PAL_NEW(arena, uint32_t, n_frame);
     t->seen = PAL_NEW(arena, uint32_t, n_vertex);
-    t->x = PAL_NEW(arena, double, 3 * n_vertex);
-    t->v = PAL_NEW(arena, double, 3 * n_vertex);
+
     t->slot = PAL_NEW(arena, int32_t, n_slot);
     t->node = PAL_NEW(arena, int32_t, n_node);
     t->slot_mark = PAL_NEW(arena, uint32_t, n_slot);
     t->node_mark = PAL_NEW(arena, uint32_t, n_node);
     t->tool_mark = PAL_NEW(arena, uint32_t, n_slot);
-    t->turning = PAL_NEW(arena, pal_frame_spin, n_frame);
+    t->spin = PAL_NEW(arena, pal_frame_spin, n_frame);
     t->spin_mark = PAL_NEW(arena, uint32_t, n_frame);
-    t->slot_force = PAL_NEW(arena, double, 3 * n_slot);
-    t->slot_torque = PAL_NEW(arena, double, 3 * n_slot);
+    t->face = PAL_NEW(arena, pal_frame_face, body->display.skin ? body->display.skin->fan_start[n_frame] : 0);
+    t->state = PAL_NEW(arena, double, 6 * n_slot);
     t->force = PAL_NEW(arena, double, 3 * n_node);
-    bool all = t->live && t->frame && t->live_mark && t->frame_mark && t->seen && t->x && t->v && t->slot && t->node &&
-               t->slot_mark && t->node_mark && t->tool_mark && t->turning && t->spin_mark && t->slot_force &&
-               t->slot_torque && t->force;
+    bool all = PAL_NEW_DOUBLES(arena, 3 * n_vertex, &t->x, &t->v) && t->live && t->frame && t->live_mark &&
+               t->frame_mark && t->seen && t->slot && t->node && t->slot_mark && t->node_mark && t->tool_mark &&
+               t->spin && t->spin_mark && t->face && t->state && t->force;
     return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
-}
-
-pal_err pal_contact_points_make(const pal_body *body, double spacing_m, int max_sample, pal_arena *arena,
-                                pal_contact_points *out)
-{
-    pal_contact_points t = {0};
-    PAL_TRY(pal_contact_samples_make(body, spacing_m, max_sample, arena, &t.sample));
-    PAL_TRY(allocate(body, arena, &t));
-    *out = t;
-    return PAL_ERR_OK;
 }
 
 void pal_contact_points_begin(pal_contact_points *points)
 {
     points->mark++;
     points->n_live = points->n_frame = 0;
-    pal_contact_samples_begin(&points->sample);
+    points->sample.mark++, points->sample.n_point = points->sample.n_fixed;
 }
 
 static void make_live(pal_contact_points *points, const pal_body *body, int vertex)
@@ -56,8 +48,8 @@ static void make_live(pal_contact_points *points, const pal_body *body, int vert
     if (points->live_mark[vertex] == points->mark) return;
     points->live_mark[vertex] = points->mark;
     points->live[points->n_live++] = vertex;
-    if (!body->skin) return;
-    const int32_t *near = body->skin->near + PAL_SKIN_NEIGHBOURS * (size_t)vertex;
+    if (!body->display.skin) return;
+    const int32_t *near = body->display.skin->near + PAL_SKIN_NEIGHBOURS * (size_t)vertex;
     for (int k = 0; k < PAL_SKIN_NEIGHBOURS; k++)
         if (points->frame_mark[near[k]] != points->mark) {
             points->frame_mark[near[k]] = points->mark;
@@ -82,8 +74,8 @@ static int next_run(const pal_contact_points *points, const pal_body *body, cons
 {
     for (; run < points->sample.n_run; run++) {
         const int32_t *corner = points->sample.corner + 3 * (size_t)points->sample.run[run];
-        const float *p = body->shown + 3 * (size_t)corner[0], *q = body->shown + 3 * (size_t)corner[1],
-                    *r = body->shown + 3 * (size_t)corner[2];
+        const float *p = body->display.shown + 3 * (size_t)corner[0], *q = body->display.shown + 3 * (size_t)corner[1],
+                    *r = body->display.shown + 3 * (size_t)corner[2];
         bool meets = true;
         for (int c = 0; c < 3; c++)
             meets &= fminf(p[c], fminf(q[c], r[c])) <= high[c] && fmaxf(p[c], fmaxf(q[c], r[c])) >= low[c];
@@ -108,12 +100,11 @@ int pal_contact_points_collect(pal_contact_points *points, const pal_body *body,
     int n_vertex = body->active ? body->n_active : points->sample.n_vertex;
     for (int k = 0; k < n_vertex; k++) {
         int i = body->active ? body->active[k] : k;
-        const float *s = body->shown + 3 * (size_t)i;
+        const float *s = body->display.shown + 3 * (size_t)i;
         if (!((s[0] >= low[0]) & (s[0] <= high[0]) & (s[1] >= low[1]) & (s[1] <= high[1]) & (s[2] >= low[2]) &
               (s[2] <= high[2])))
             continue;
-        double p[3] = {(double)s[0], (double)s[1], (double)s[2]}, d2 = distance2(p, a, ab, per_ab2);
-        if (!(d2 <= reach2)) continue;
+        if (!(distance2((double[3]){(double)s[0], (double)s[1], (double)s[2]}, a, ab, per_ab2) <= reach2)) continue;
         make_live(points, body, i);
         list[n++] = i;
     }
@@ -127,9 +118,8 @@ int pal_contact_points_collect(pal_contact_points *points, const pal_body *body,
         double p[3] = {0};
         for (int k = 0; k < 3; k++)
             for (int c = 0; c < 3; c++)
-                p[c] += (double)share[k] * (double)body->shown[3 * (size_t)corner[k] + (size_t)c];
-        double d2 = distance2(p, a, ab, per_ab2);
-        if (!(d2 <= reach2)) continue;
+                p[c] += (double)share[k] * (double)body->display.shown[3 * (size_t)corner[k] + (size_t)c];
+        if (!(distance2(p, a, ab, per_ab2) <= reach2)) continue;
         for (int k = 0; k < 3; k++) make_live(points, body, corner[k]);
         list[n++] = i;
     }
@@ -138,12 +128,12 @@ int pal_contact_points_collect(pal_contact_points *points, const pal_body *body,
 
 int pal_contact_points_nodes(const pal_body *body, int vertex, int32_t *node, double *weight)
 {
-    if (!body->skin) {
-        node[0] = body->shown_node[vertex];
+    if (!body->display.skin) {
+        node[0] = body->display.shown_node[vertex];
         weight[0] = 1;
         return 1;
     }
-    const pal_skin *skin = body->skin;
+    const pal_skin *skin = body->display.skin;
     double sum = 0;
     int n = 0;
     for (size_t k = PAL_SKIN_NEIGHBOURS * (size_t)vertex; k < PAL_SKIN_NEIGHBOURS * ((size_t)vertex + 1); k++) {
@@ -155,41 +145,25 @@ int pal_contact_points_nodes(const pal_body *body, int vertex, int32_t *node, do
     return n;
 }
 
-void pal_contact_points_reset(pal_contact_points *points)
-{
-    points->sub_step += 2;
-}
-
-/* what is shown is touched, also while a change of method is blended in */
-static void add_display_offset(const pal_body *body, int vertex, double x[3])
-{
-    for (size_t c = 0; c < 3 && body->display_offset_m; c++)
-        x[c] += body->display_offset_part * (double)body->display_offset_m[3 * (size_t)vertex + c];
-}
-
 void pal_contact_points_update(pal_contact_points *points, const pal_body *body, double dt_s)
 {
+    const pal_display *display = &body->display;
     uint32_t before = points->sub_step++;
-    for (int i = 0; i < points->n_live && body->active; i++) {
-        size_t at = 3 * (size_t)points->live[i];
-        pal_copy3(points->x + at, body->d + at);
-        pal_copy3(points->v + at, body->dv + at);
-        add_display_offset(body, points->live[i], points->x + at);
-    }
-    if (body->active) return;
-    if (body->skin) pal_skin_frames_of(body->skin, body->d, points->frame, points->n_frame, body->skin_axes);
+    if (display->skin) pal_skin_frames_of(display->skin, body->d, points->frame, points->n_frame, display->skin_axes);
     for (int i = 0; i < points->n_live; i++) {
         int vertex = points->live[i];
         double *x = points->x + 3 * (size_t)vertex, *v = points->v + 3 * (size_t)vertex, was[3];
         int32_t node[PAL_SKIN_NEIGHBOURS];
         double weight[PAL_SKIN_NEIGHBOURS];
         pal_copy3(was, x);
-        if (body->skin)
-            pal_skin_vertex(body->skin, body->d, body->skin_axes, vertex, x);
+        if (display->skin)
+            pal_skin_vertex(display->skin, body->d, display->skin_axes, vertex, x);
         else
-            pal_copy3(x, body->d + 3 * (size_t)body->shown_node[vertex]);
-        add_display_offset(body, vertex, x);
-        bool followed = points->seen[vertex] == before && before > 0;
+            pal_copy3(x, body->d + 3 * (size_t)display->shown_node[vertex]);
+        /* what is shown is touched, also while a change of method is blended in */
+        for (size_t c = 0; c < 3 && display->offset_m; c++)
+            x[c] += display->offset_part * (double)display->offset_m[3 * (size_t)vertex + c];
+        bool followed = points->seen[vertex] == before && before > 0 && !body->active;
         points->seen[vertex] = points->sub_step;
         if (followed) {
             for (int c = 0; c < 3; c++) v[c] = (x[c] - was[c]) / points->dt_s;
@@ -202,26 +176,26 @@ void pal_contact_points_update(pal_contact_points *points, const pal_body *body,
     points->dt_s = dt_s;
 }
 
-static void blend(const pal_contact_points *points, int point, const double *from, double out[3])
+static void interpolate(const pal_contact_points *points, int point, const double *from, double out[3])
 {
     int32_t vertex[3];
-    double share[3], sum[3] = {0};
+    double share[3];
     int n = pal_contact_samples_corners(&points->sample, point, vertex, share);
-    for (int k = 0; k < n; k++) pal_axpy3(sum, share[k], from + 3 * (size_t)vertex[k]);
-    pal_copy3(out, sum);
+    pal_set3(out, 0, 0, 0);
+    for (int k = 0; k < n; k++) pal_axpy3(out, share[k], from + 3 * (size_t)vertex[k]);
 }
 
 void pal_contact_points_position(const pal_contact_points *points, int point, double x[3])
 {
-    blend(points, point, points->x, x);
+    interpolate(points, point, points->x, x);
 }
 
 void pal_contact_points_velocity(const pal_contact_points *points, int point, double v[3])
 {
-    blend(points, point, points->v, v);
+    interpolate(points, point, points->v, v);
 }
 
-/* a point of body->shown, vertex or sample */
+/* a point of display.shown, vertex or sample */
 static void shown_point(const pal_contact_points *points, const pal_body *body, int point, double p[3])
 {
     int32_t vertex[3];
@@ -229,244 +203,168 @@ static void shown_point(const pal_contact_points *points, const pal_body *body, 
     int n = pal_contact_samples_corners(&points->sample, point, vertex, share);
     pal_set3(p, 0, 0, 0);
     for (int k = 0; k < n; k++)
-        for (int c = 0; c < 3; c++) p[c] += share[k] * (double)body->shown[3 * (size_t)vertex[k] + (size_t)c];
+        for (int c = 0; c < 3; c++) p[c] += share[k] * (double)body->display.shown[3 * (size_t)vertex[k] + (size_t)c];
 }
 
 static void add_normal(const float *shown, const int32_t *corner, double sum[3])
 {
-    double a[3][3];
-    for (int k = 0; k < 3; k++)
-        for (int c = 0; c < 3; c++) a[k][c] = (double)shown[3 * (size_t)corner[k] + (size_t)c];
-    pal_sub3(a[1], a[1], a[0]);
-    pal_sub3(a[2], a[2], a[0]);
-    pal_cross3(a[1], a[1], a[2]);
-    pal_add3(sum, sum, a[1]);
+    double a[3][3], n[3];
+    for (int k = 0; k < 9; k++) a[k / 3][k % 3] = (double)shown[3 * (size_t)corner[k / 3] + (size_t)k % 3];
+    pal_normal3(n, a[0], a[1], a[2]);
+    pal_add3(sum, sum, n);
 }
 
-bool pal_contact_points_nearest(const pal_contact_points *points, const pal_body *body, const double p[3],
-                                double place[3], double normal[3])
+bool pal_contact_points_nearest(const pal_contact_points *points, const pal_body *body, const double p[3], double at[3],
+                                double normal[3])
 {
-    double best = INFINITY, at[3], sum[3] = {0};
+    double best = INFINITY, off[3], sum[3] = {0};
     int nearest = -1;
     int n_vertex = body->active ? body->n_active : points->sample.n_vertex;
     for (int k = 0; k < n_vertex + points->sample.n_fixed - points->sample.n_vertex; k++) {
         int i = k >= n_vertex ? k - n_vertex + points->sample.n_vertex : body->active ? body->active[k] : k;
         shown_point(points, body, i, at);
-        pal_sub3(at, at, p);
-        double d2 = pal_dot3(at, at);
+        pal_sub3(off, at, p);
+        double d2 = pal_dot3(off, off);
         if (d2 < best) best = d2, nearest = i;
     }
     if (nearest < 0) return false;
-    shown_point(points, body, nearest, place);
+    shown_point(points, body, nearest, at);
     if (nearest >= points->sample.n_vertex)
-        add_normal(body->shown, points->sample.corner + 3 * (size_t)(nearest - points->sample.n_vertex), sum);
+        add_normal(body->display.shown, points->sample.corner + 3 * (size_t)(nearest - points->sample.n_vertex), sum);
     else
         for (int k = points->sample.fan_start[nearest]; k < points->sample.fan_end[nearest]; k++)
-            add_normal(body->shown, body->surface->tri + 3 * (size_t)points->sample.fan[k], sum);
+            add_normal(body->display.shown, body->display.surface->tri + 3 * (size_t)points->sample.fan[k], sum);
     return pal_unit3(normal, sum, 0);
 }
 
-/* slots that bear a shown vertex and their weights, sum 1; returns how many */
-static int slots_of(const pal_body *body, int vertex, int32_t *slot, double *weight)
-{
-    if (!body->skin) return pal_contact_points_nodes(body, vertex, slot, weight);
-    const float *coef = body->skin->coef + 4 * PAL_SKIN_NEIGHBOURS * (size_t)vertex;
-    double sum = 0;
-    for (int k = 0; k < PAL_SKIN_NEIGHBOURS; k++) sum += weight[k] = (double)coef[4 * k + 3];
-    for (int k = 0; k < PAL_SKIN_NEIGHBOURS; k++) {
-        slot[k] = body->skin->near[PAL_SKIN_NEIGHBOURS * (size_t)vertex + (size_t)k];
-        weight[k] /= sum;
-    }
-    return PAL_SKIN_NEIGHBOURS;
-}
+/* ---- slots ---- */
 
 int pal_contact_points_slot_node(const pal_body *body, int slot)
 {
-    return body->skin ? body->skin->frame[slot] : slot;
+    return body->display.skin ? body->display.skin->frame[slot] : slot;
 }
 
-/* R_i w_i o_i, the lever of a skinned vertex in frame k of its five */
-static void lever(const pal_body *body, int vertex, int k, double arm[3])
-{
-    size_t i = PAL_SKIN_NEIGHBOURS * (size_t)vertex + (size_t)k;
-    const float *axes = (const float *)(const void *)body->skin_axes + 16 * (size_t)body->skin->near[i];
-    const float *coef = body->skin->coef + 4 * i;
-    for (int c = 0; c < 3; c++)
-        arm[c] = (double)coef[0] * (double)axes[c] + (double)coef[1] * (double)axes[4 + c] +
-                 (double)coef[2] * (double)axes[8 + c];
-}
-
-int pal_contact_points_slots(const pal_contact_points *points, const pal_body *body, int point, int32_t *slot,
-                             double *weight, double (*arm)[3])
+int pal_contact_points_slots(const pal_contact_points *points, const pal_body *body, int point, pal_contact_slot *out)
 {
     int32_t vertex[3];
     double share[3];
     int n = pal_contact_samples_corners(&points->sample, point, vertex, share), m = 0;
     for (int c = 0; c < n; c++) {
-        int n_slot = slots_of(body, vertex[c], slot + m, weight + m);
-        for (int k = 0; k < n_slot; k++, m++) {
-            weight[m] *= share[c];
-            pal_set3(arm[m], 0, 0, 0);
-            if (!body->skin) continue;
-            lever(body, vertex[c], k, arm[m]);
-            pal_scale3(arm[m], share[c], arm[m]);
+        if (!body->display.skin) {
+            out[m++] = (pal_contact_slot){.slot = body->display.shown_node[vertex[c]], .weight = share[c]};
+            continue;
+        }
+        const float *coef = body->display.skin->coef + 4 * PAL_SKIN_NEIGHBOURS * (size_t)vertex[c];
+        const int32_t *near = body->display.skin->near + PAL_SKIN_NEIGHBOURS * (size_t)vertex[c];
+        double sum = 0;
+        for (int k = 0; k < PAL_SKIN_NEIGHBOURS; k++) sum += (double)coef[4 * k + 3];
+        for (int k = 0; k < PAL_SKIN_NEIGHBOURS; k++, m++) {
+            const float *axes = (const float *)(const void *)body->display.skin_axes + 16 * (size_t)near[k],
+                        *w = coef + 4 * k;
+            out[m] = (pal_contact_slot){.slot = near[k], .weight = (double)w[3] / sum * share[c]};
+            for (int d = 0; d < 3; d++)
+                out[m].arm[d] = share[c] * ((double)w[0] * (double)axes[d] + (double)w[1] * (double)axes[4 + d] +
+                                            (double)w[2] * (double)axes[8 + d]);
         }
     }
     return m;
 }
 
-void pal_contact_points_force_begin(pal_contact_points *points)
+void pal_contact_points_begin_slots(pal_contact_points *points)
 {
     points->turn++;
     points->n_slot = points->n_node = 0;
 }
 
-void pal_contact_points_add_force(pal_contact_points *points, const pal_body *body, int point, const double force_N[3])
+static void use_node(pal_contact_points *points, int node)
 {
-    int32_t vertex[3], slot[PAL_SKIN_NEIGHBOURS];
-    double share[3], weight[PAL_SKIN_NEIGHBOURS];
-    int n = pal_contact_samples_corners(&points->sample, point, vertex, share);
-    for (int c = 0; c < n; c++) {
-        int m = slots_of(body, vertex[c], slot, weight);
-        for (int k = 0; k < m; k++) {
-            double *f = points->slot_force + 3 * (size_t)slot[k], *t = points->slot_torque + 3 * (size_t)slot[k];
-            if (points->slot_mark[slot[k]] != points->turn) {
-                points->slot_mark[slot[k]] = points->turn;
-                pal_set3(f, 0, 0, 0);
-                pal_set3(t, 0, 0, 0);
-                points->slot[points->n_slot++] = slot[k];
-            }
-            pal_axpy3(f, share[c] * weight[k], force_N);
-            if (!body->skin) continue;
-            double arm[3], moment[3];
-            lever(body, vertex[c], k, arm);
-            pal_cross3(moment, arm, force_N);
-            pal_axpy3(t, share[c], moment);
-        }
-    }
+    if (points->node_mark[node] == points->turn) return;
+    points->node_mark[node] = points->turn;
+    pal_set3(points->force + 3 * (size_t)node, 0, 0, 0);
+    points->node[points->n_node++] = node;
 }
 
-static void add_force(pal_contact_points *points, int node, double scale, const double force_N[3])
+void pal_contact_points_use_slot(pal_contact_points *points, const pal_body *body, int slot)
 {
-    double *f = points->force + 3 * (size_t)node;
-    if (points->node_mark[node] != points->turn) {
-        points->node_mark[node] = points->turn;
-        pal_set3(f, 0, 0, 0);
-        points->node[points->n_node++] = node;
-    }
-    pal_axpy3(f, scale, force_N);
-}
-
-const pal_frame_spin *pal_contact_points_frame_spin(pal_contact_points *points, const pal_body *body, int slot)
-{
-    pal_frame_spin *t = &points->turning[slot];
-    if (points->spin_mark[slot] == points->sub_step) return t;
+    if (points->slot_mark[slot] == points->turn) return;
+    points->slot_mark[slot] = points->turn;
+    points->slot[points->n_slot++] = slot;
+    memset(points->state + 6 * (size_t)slot, 0, 6 * sizeof *points->state);
+    use_node(points, pal_contact_points_slot_node(body, slot));
+    if (!body->display.skin) return;
+    pal_frame_spin *spin = &points->spin[slot];
+    if (points->spin_mark[slot] != points->sub_step)
+        pal_frame_spin_find(body, slot, points->face + body->display.skin->fan_start[slot], spin);
     points->spin_mark[slot] = points->sub_step;
-    pal_frame_spin_find(body, slot, t);
-    return t;
-}
-
-/* The torque on a frame as forces on the nodes around it: the transpose of its spin. With
- *     spin = X x X' + (Y'.Z) X,  X' = (1 - X X^T) N' / |N|,  Y'.Z = (Z.e' - (e.X) Z.X') / |e_t|
- * the torque's work is (t x X).X' + (t.X) Y'.Z. */
-static void turn_frame(pal_contact_points *points, const pal_body *body, int slot, const double torque[3])
-{
-    const pal_frame_spin *t = pal_contact_points_frame_spin(points, body, slot);
-    if (!t->turns) return;
-    const pal_skin *skin = body->skin;
-    int node = skin->frame[slot];
-    const double *o = body->d + 3 * (size_t)node;
-    double twist = t->part * pal_dot3(torque, t->X), h[3], f[3], sum[3];
-    /* the edge's own part of the twist about X */
-    pal_scale3(sum, -twist * t->per_reach, t->Z);
-    add_force(points, t->end, twist * t->per_reach, t->Z);
-    /* the rest tilts the normal */
-    pal_cross3(h, torque, t->X);
-    pal_scale3(h, t->part, h);
-    pal_axpy3(h, -twist * t->rise, t->Z);
-    pal_axpy3(h, -pal_dot3(h, t->X), t->X);
-    pal_scale3(h, t->per_normal, h);
-    for (size_t i = (size_t)skin->fan_start[slot]; i < (size_t)skin->fan_start[slot + 1]; i++) {
-        double a[3], b[3];
-        pal_sub3(a, body->d + 3 * (size_t)skin->fan[2 * i], o);
-        pal_sub3(b, body->d + 3 * (size_t)skin->fan[2 * i + 1], o);
-        pal_cross3(f, b, h);
-        add_force(points, skin->fan[2 * i], 1, f);
-        pal_sub3(sum, sum, f);
-        pal_cross3(f, h, a);
-        add_force(points, skin->fan[2 * i + 1], 1, f);
-        pal_sub3(sum, sum, f);
+    if (!spin->turns) return;
+    use_node(points, spin->end);
+    for (int i = 0; i < spin->n_face; i++) {
+        use_node(points, spin->face[i].a);
+        use_node(points, spin->face[i].b);
     }
-    add_force(points, node, 1, sum);
 }
 
-/* spin of a frame when its nodes move with v = force / mass, held nodes not at all */
-static void spin_frame(pal_contact_points *points, const pal_body *body, int slot, const double *v, double spin[3])
-{
-    const pal_frame_spin *t = pal_contact_points_frame_spin(points, body, slot);
-    pal_set3(spin, 0, 0, 0);
-    if (!t->turns) return;
-    const pal_skin *skin = body->skin;
-    size_t node = (size_t)skin->frame[slot];
-    const double *o = body->d + 3 * node, *ov = v + 3 * node;
-    double N[3] = {0}, e[3];
-    for (size_t i = (size_t)skin->fan_start[slot]; i < (size_t)skin->fan_start[slot + 1]; i++) {
-        double a[3], b[3], av[3], bv[3];
-        pal_sub3(a, body->d + 3 * (size_t)skin->fan[2 * i], o);
-        pal_sub3(b, body->d + 3 * (size_t)skin->fan[2 * i + 1], o);
-        pal_sub3(av, v + 3 * (size_t)skin->fan[2 * i], ov);
-        pal_sub3(bv, v + 3 * (size_t)skin->fan[2 * i + 1], ov);
-        pal_cross3(av, av, b);
-        pal_cross3(bv, a, bv);
-        pal_add3(N, N, av);
-        pal_add3(N, N, bv);
-    }
-    pal_axpy3(N, -pal_dot3(N, t->X), t->X);
-    pal_scale3(N, t->per_normal, N);
-    pal_sub3(e, v + 3 * (size_t)t->end, ov);
-    pal_cross3(spin, t->X, N);
-    pal_axpy3(spin, pal_dot3(t->Z, e) * t->per_reach - t->rise * pal_dot3(t->Z, N), t->X);
-    pal_scale3(spin, t->part, spin);
-}
-
-static void to_nodes(pal_contact_points *points, const pal_body *body)
+void pal_contact_points_to_slots(pal_contact_points *points, const pal_body *body, const double *u)
 {
     for (int i = 0; i < points->n_slot; i++) {
         int slot = points->slot[i];
-        add_force(points, pal_contact_points_slot_node(body, slot), 1, points->slot_force + 3 * (size_t)slot);
-        if (body->skin) turn_frame(points, body, slot, points->slot_torque + 3 * (size_t)slot);
+        double *state = points->state + 6 * (size_t)slot;
+        pal_copy3(state, u + 3 * (size_t)pal_contact_points_slot_node(body, slot));
+        if (body->display.skin) pal_frame_spin_of(&points->spin[slot], u, state + 3);
     }
+}
+
+void pal_contact_points_from_slots(const pal_contact_points *points, const pal_body *body, double *out)
+{
+    for (int i = 0; i < points->n_slot; i++) {
+        int slot = points->slot[i];
+        double *to = out + 3 * (size_t)pal_contact_points_slot_node(body, slot), own[3];
+        pal_copy3(own, points->state + 6 * (size_t)slot);
+        if (body->display.skin)
+            pal_frame_spin_add_torque(&points->spin[slot], points->state + 6 * (size_t)slot + 3, own, out);
+        pal_add3(to, to, own);
+    }
+}
+
+/* ---- forces ---- */
+
+void pal_contact_points_add_force(pal_contact_points *points, const pal_body *body, int point, const double force_N[3])
+{
+    pal_contact_slot part[PAL_CONTACT_POINT_SLOTS];
+    int n = pal_contact_points_slots(points, body, point, part);
+    for (int k = 0; k < n; k++) {
+        double *state = points->state + 6 * (size_t)part[k].slot, moment[3];
+        pal_contact_points_use_slot(points, body, part[k].slot);
+        pal_axpy3(state, part[k].weight, force_N);
+        pal_cross3(moment, part[k].arm, force_N);
+        pal_add3(state + 3, state + 3, moment);
+    }
+}
+
+double pal_contact_points_max_force_N(const pal_contact_points *points)
+{
+    double max = 0;
+    for (int i = 0; i < points->n_node; i++) max = fmax(max, pal_norm3(points->force + 3 * (size_t)points->node[i]));
+    return max;
 }
 
 double pal_contact_points_assemble(pal_contact_points *points, const pal_body *body)
 {
-    double max2 = 0;
-    to_nodes(points, body);
-    for (int i = 0; i < points->n_node; i++) {
-        const double *f = points->force + 3 * (size_t)points->node[i];
-        max2 = fmax(max2, pal_dot3(f, f));
-    }
-    return sqrt(max2);
+    pal_contact_points_from_slots(points, body, points->force);
+    return pal_contact_points_max_force_N(points);
 }
 
-/* motion of a point along `away` when the nodes move with v and the frames with the spins in slot_torque */
-static double point_motion(const pal_contact_points *points, const pal_body *body, const pal_contact *contact,
-                           const double *v)
+/* motion of a point along `away` when the slots move as in `state` */
+static double point_motion(const pal_contact_points *points, const pal_body *body, const pal_contact *contact)
 {
-    int32_t vertex[3], slot[PAL_SKIN_NEIGHBOURS];
-    double share[3], weight[PAL_SKIN_NEIGHBOURS], sum = 0;
-    int n = pal_contact_samples_corners(&points->sample, contact->point, vertex, share);
-    for (int c = 0; c < n; c++) {
-        int m = slots_of(body, vertex[c], slot, weight);
-        for (int k = 0; k < m; k++) {
-            double arm[3], turned[3];
-            sum += share[c] * weight[k] *
-                   pal_dot3(contact->away, v + 3 * (size_t)pal_contact_points_slot_node(body, slot[k]));
-            if (!body->skin) continue;
-            lever(body, vertex[c], k, arm);
-            pal_cross3(turned, points->slot_torque + 3 * (size_t)slot[k], arm);
-            sum += share[c] * pal_dot3(contact->away, turned);
-        }
+    pal_contact_slot part[PAL_CONTACT_POINT_SLOTS];
+    int n = pal_contact_points_slots(points, body, contact->point, part);
+    double sum = 0, rotation[3];
+    for (int k = 0; k < n; k++) {
+        const double *state = points->state + 6 * (size_t)part[k].slot;
+        pal_cross3(rotation, state + 3, part[k].arm);
+        sum += part[k].weight * pal_dot3(contact->away, state);
+        sum += pal_dot3(contact->away, rotation);
     }
     return sum;
 }
@@ -478,7 +376,7 @@ double pal_contact_points_bound(const pal_contact_points *points, const pal_body
     double share[3], rate = 0;
     int n = pal_contact_samples_corners(&points->sample, point, vertex, share);
     for (int c = 0; c < n; c++) {
-        int32_t node = body->shown_node[vertex[c]];
+        int32_t node = body->display.shown_node[vertex[c]];
         if (bound_N_m) bound_N_m[node] += k_N_m * share[c];
         rate += k_N_m * share[c] * pal_body_inverse_mass_1_kg(body, node);
     }
@@ -490,38 +388,33 @@ double pal_contact_points_max_eigenvalue(pal_contact_points *points, const pal_b
 {
     /* a patch of very many points is judged by a part of them, each standing for several */
     int stride = (n + EIGENVALUE_POINTS - 1) / EIGENVALUE_POINTS, m = 0;
-    double motion[EIGENVALUE_POINTS], rate = 0, k_step = stride;
+    double motion[EIGENVALUE_POINTS], rate = 0;
     for (int i = 0; i < n; i += stride) motion[m++] = 1;
     for (int pass = 0; pass < EIGENVALUE_PASSES && m > 0; pass++) {
         double with = 0, before = 0, f[3];
         /* forces of the present motion, then accelerations */
-        pal_contact_points_force_begin(points);
+        pal_contact_points_begin_slots(points);
         for (int i = 0; i < m; i++) {
             const pal_contact *c = &contact[i * stride];
-            pal_scale3(f, k_step * c->k_N_m * motion[i], c->away);
+            pal_scale3(f, stride * c->k_N_m * motion[i], c->away);
             pal_contact_points_add_force(points, body, c->point, f);
         }
-        to_nodes(points, body);
+        pal_contact_points_from_slots(points, body, points->force);
         for (int i = 0; i < points->n_node; i++) {
-            int node = points->node[i];
-            pal_scale3(points->force + 3 * (size_t)node, body->support[node] ? 0 : 1 / body->mass_kg[node],
-                       points->force + 3 * (size_t)node);
+            double *at = points->force + 3 * (size_t)points->node[i];
+            pal_scale3(at, body->support[points->node[i]] ? 0 : 1 / body->mass_kg[points->node[i]], at);
         }
-        for (int i = 0; i < points->n_slot && body->skin; i++) {
-            int slot = points->slot[i];
-            spin_frame(points, body, slot, points->force, points->slot_torque + 3 * (size_t)slot);
-        }
-        /* what the points do then: a Rayleigh quotient in the norm of k */
+        pal_contact_points_to_slots(points, body, points->force);
+        /* the points' motion then: a Rayleigh quotient in the norm of k */
         for (int i = 0; i < m; i++) {
             const pal_contact *c = &contact[i * stride];
-            double next = point_motion(points, body, c, points->force);
+            double next = point_motion(points, body, c);
             with += c->k_N_m * next * next;
             before += c->k_N_m * motion[i] * motion[i];
             motion[i] = next;
         }
         rate = before > 0 ? sqrt(with / before) : 0;
-        double scale = rate > 0 ? 1 / rate : 0;
-        for (int i = 0; i < m; i++) motion[i] *= scale;
+        for (int i = 0; i < m; i++) motion[i] *= rate > 0 ? 1 / rate : 0;
     }
     return rate;
 }
@@ -535,7 +428,7 @@ pal_err pal_contact_points_young(const pal_contact_points *points, const pal_bod
     if (!*out) return PAL_ERR_MEMORY;
     for (int i = 0; i < points->sample.n_vertex; i++) {
         pal_material at;
-        pal_material_painted(def, body->surface->x + 3 * (size_t)i, &at);
+        pal_material_painted(def, body->display.surface->x + 3 * (size_t)i, &at);
         if (at.young_Pa != def->material.young_Pa) (*out)[i] = (float)at.young_Pa;
     }
     return PAL_ERR_OK;
@@ -544,28 +437,15 @@ pal_err pal_contact_points_young(const pal_contact_points *points, const pal_bod
 bool pal_contact_points_overlap(pal_contact_points *points, const pal_body *body, const pal_contact *a, int n_a,
                                 const pal_contact *b, int n_b)
 {
-    int32_t vertex[3], slot[PAL_SKIN_NEIGHBOURS];
-    double share[3], weight[PAL_SKIN_NEIGHBOURS];
+    pal_contact_slot part[PAL_CONTACT_POINT_SLOTS];
     points->turn++;
-    for (int pass = 0; pass < 2; pass++)
-        for (int i = 0; i < (pass ? n_b : n_a); i++) {
-            int n = pal_contact_samples_corners(&points->sample, (pass ? b : a)[i].point, vertex, share);
-            for (int c = 0; c < n; c++) {
-                int m = slots_of(body, vertex[c], slot, weight);
-                for (int k = 0; k < m; k++)
-                    if (pass == 0)
-                        points->tool_mark[slot[k]] = points->turn;
-                    else if (points->tool_mark[slot[k]] == points->turn)
-                        return true;
-            }
-        }
-    return false;
-}
-
-void pal_contact_points_apply(const pal_contact_points *points, pal_body *body, double scale)
-{
-    for (int i = 0; i < points->n_node; i++) {
-        int32_t node = points->node[i];
-        pal_axpy3(body->load + 3 * (size_t)node, scale, points->force + 3 * (size_t)node);
+    for (int i = 0; i < n_a + n_b; i++) {
+        int n = pal_contact_points_slots(points, body, (i < n_a ? a + i : b + i - n_a)->point, part);
+        for (int k = 0; k < n; k++)
+            if (i < n_a)
+                points->tool_mark[part[k].slot] = points->turn;
+            else if (points->tool_mark[part[k].slot] == points->turn)
+                return true;
     }
+    return false;
 }

@@ -1,10 +1,8 @@
-/* Which points of a body's shown surface a tool can touch.
- *
- * The points are all shown vertices and, where a triangle is longer than `spacing_m`, samples inside it, so that a
- * sphere never slips through a coarse mesh: fixed samples for triangles that are long at rest, and in each step passing
- * samples for triangles near a tool that are stretched. On an adaptive surface only active vertices are points; fixed
- * samples, fans and areas are made again when body->revision changes, at the cost of what is drawn then.
- * Memory: the world's arena. Thread: [sim], pal_contact_samples_make [load]. */
+/* Which points of a body's shown surface a tool can touch: all shown vertices and samples inside triangles longer than
+ * `spacing_m`, so that a sphere never slips through a coarse mesh. Fixed samples are in triangles that are long at
+ * rest, passing samples in triangles near a tool that are stretched in this step. On an adaptive surface only active
+ * vertices are points, and fixed samples, fans and areas are made again when display.revision changes. Memory: the
+ * component's arena. Thread: [sim], pal_contact_samples_make [load]. */
 #ifndef PAL_SIM_CONTACT_CONTACT_SAMPLES_H
 #define PAL_SIM_CONTACT_CONTACT_SAMPLES_H
 #include "server/sim/core/body.h"
@@ -29,8 +27,6 @@ pal_err pal_contact_samples_make(const pal_body *body, double spacing_m, int max
                                  pal_contact_samples *out);
 /* takes the triangles as the body draws them now, before a step; false: they have not changed */
 bool pal_contact_samples_update_topology(pal_contact_samples *t, const pal_body *body);
-/* a new step: no passing samples */
-void pal_contact_samples_begin(pal_contact_samples *t);
 /* passing samples for triangles at the vertices list [n] that were short at rest and are long now */
 void pal_contact_samples_add_stretched(pal_contact_samples *t, const pal_body *body, const int32_t *list, int n);
 /* shown vertices [3] of a point and their shares [3]; returns how many: 1 or 3 */

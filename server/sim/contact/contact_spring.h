@@ -3,61 +3,40 @@
  * began: m_i = J_i u,   K = sum k_i J_i' J_i,   loads sum f_i J_i' .
  *
  * J_i is the exact derivative of the skinned point at the start of the sub-step, rotation of its frames included
- * (contact_points.h, frame_spin.h), so loads, stiffness and the motion that settles a force belong together: total
- * force and torque are those of the contact, and K is symmetric and positive semi-definite whatever is left out. It is
- * applied in two halves, nodes -> velocity and spin of each slot in use -> points, which costs 6 products a slot and
- * point instead of 3 for each of the 20 to 60 nodes around.
- *
- * Fixed room: max_row rows; beyond max_frame slots a row is refused, beyond max_face faces a frame does not rotate.
- * Memory: the world's arena. Thread: [sim], pal_contact_springs_make [load]. */
+ * (contact_points.h), so total force and torque are those of the contact, and K is symmetric and positive
+ * semi-definite. It is applied in two halves, nodes -> velocity and spin of each slot in use -> points, at 6 products a
+ * slot and point instead of 3 for each of the 20 to 60 nodes around.
+ * Memory: the component's arena, for max_row rows. Thread: [sim], pal_contact_springs_make [load]. */
 #ifndef PAL_SIM_CONTACT_CONTACT_SPRING_H
 #define PAL_SIM_CONTACT_CONTACT_SPRING_H
 #include "server/sim/contact/contact_points.h"
 
 /* a slot's part in a row: motion += linear . v_slot + angular . spin_slot */
 typedef struct pal_contact_spring_part {
-    int32_t slot; /* index into pal_contact_springs.frame */
+    int32_t slot;
     double linear[3], angular[3];
 } pal_contact_spring_part;
 
-/* a slot in use: its node, and how it spins when the nodes around it move */
-typedef struct pal_contact_spring_frame {
-    int32_t slot, node, end, first_face, n_face; /* end -1: it does not turn */
-    double tilt[9], twist[3], Z[3];              /* spin = tilt sum(a' x b + a x b') + twist (Z . e') */
-} pal_contact_spring_frame;
-
-typedef struct pal_contact_spring_face {
-    int32_t a, b;
-    double to_a[3], to_b[3]; /* from the frame's node */
-} pal_contact_spring_face;
-
 typedef struct pal_contact_springs {
-    int n_row, n_part, n_frame, n_face, n_node;
-    int max_row, max_part, max_frame, max_face;
-    int32_t *start;   /* first part of each row [max_row + 1]             */
-    double *k_N_m;    /* [max_row]                                        */
-    double *motion_m; /* J u of the last pal_contact_springs_motion [max_row]        */
+    pal_contact_points *points; /* borrowed: slots and nodes in use */
+    const pal_body *body;       /* borrowed */
+    int n_row, n_part, max_row;
+    int32_t *start;   /* first part of each row [max_row + 1]                     */
+    double *k_N_m;    /* [max_row]                                                */
+    double *motion_m; /* J u of the last pal_contact_springs_motion [max_row]     */
     pal_contact_spring_part *part;
-    pal_contact_spring_frame *frame;
-    pal_contact_spring_face *face;
-    double *state; /* v and spin, or force and torque, of frames in use [max_frame][6] */
-    int32_t *local;
-    uint32_t *local_mark, *node_mark, turn; /* by slot, by node                                       */
-    int32_t *node;                          /* nodes that any row touches [body n_node]               */
-    double *force;                          /* scratch of pal_contact_springs_max_force_N, by node [body n_node][3]  */
 } pal_contact_springs;
 
-/* room for max_row rows in all; MEMORY */
-pal_err pal_contact_springs_make(const pal_body *body, int max_row, pal_arena *arena, pal_contact_springs *out);
+/* room for max_row rows in all, between tools and the points of a body; MEMORY */
+pal_err pal_contact_springs_make(pal_contact_points *points, const pal_body *body, int max_row, pal_arena *arena,
+                                 pal_contact_springs *out);
 /* a new sub-step: no rows */
 void pal_contact_springs_begin(pal_contact_springs *springs);
 /* one point along a unit direction, at the state of the last pal_contact_points_update; its row, -1: no room */
-int pal_contact_springs_add(pal_contact_springs *springs, pal_contact_points *points, const pal_body *body, int point,
-                            const double direction[3], double k_N_m);
+int pal_contact_springs_add(pal_contact_springs *springs, int point, const double direction[3], double k_N_m);
 /* the mean of n contacts' points, weights [n] with sum 1 */
-int pal_contact_springs_add_mean(pal_contact_springs *springs, pal_contact_points *points, const pal_body *body,
-                                 const pal_contact *contact, const double *weight, int n, const double direction[3],
-                                 double k_N_m);
+int pal_contact_springs_add_mean(pal_contact_springs *springs, const pal_contact *contact, const double *weight, int n,
+                                 const double direction[3], double k_N_m);
 /* motion_m of every row for displacements u [n_node][3] */
 void pal_contact_springs_motion(pal_contact_springs *springs, const double *u);
 /* out += s K u; u, out [n_node][3] */
@@ -70,9 +49,8 @@ double pal_contact_springs_max_force_N(pal_contact_springs *springs, const doubl
 
 /* Tangent stiffness that a tool feels which moves rows[i] by share[i] for each metre it goes itself, the tissue behind
  * them answering statically: share' (1/k + J W J')^-1 share,  W = body->compliance.
- * `passes` steps of conjugate gradients with k as preconditioner, one back-substitution each; every pass comes closer
- * from below (the first is the answer of an even pressure, 8 % low under a round contact). scratch: 2 [n_node][3] and 4
- * [n]. answer [n_node][3], may be NULL: how tissue moves for each metre. 0: not known */
-double pal_contact_springs_stiffness(pal_contact_springs *springs, const pal_body *body, const int32_t *rows,
-                                     const double *share, int n, int passes, double *answer, pal_arena *scratch);
+ * `passes` steps of conjugate gradients with k as preconditioner, one solve with the factor each. answer [n_node][3], may
+ * be NULL: displacement of tissue for each metre. 0: not known. scratch: 2 [n_node][3] and 4 [n] */
+double pal_contact_springs_stiffness(pal_contact_springs *springs, const int32_t *rows, const double *share, int n,
+                                     int passes, double *answer, pal_arena *scratch);
 #endif

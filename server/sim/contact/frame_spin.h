@@ -1,20 +1,29 @@
-/* How a frame of a skin turns when the nodes around it move. Thread: [sim].
+/* How a frame of a skin rotates when the nodes around it move. Thread: [sim].
  *
  * A frame has X, the unit vector of N (the sum of its fan's normals), Y, the unit part of one edge e normal to X, and
- * Z = X x Y (server/mesh/volume/skin.h). With v the velocities of the nodes its spin is
- *     spin = X x X' + (Y'.Z) X,   X' = (1 - X X^T) N' / |N|,   Y'.Z = (Z.e' - (e.X) Z.X') / |e - X (X.e)| . */
+ * Z = X x Y (server/mesh/volume/skin.h). With u the velocities of the nodes its spin is
+ *     spin = X x X' + (Y'.Z) X,   X' = (1 - X X^T) N' / |N|,   Y'.Z = (Z.e' - (e.X) Z.X') / |e - X (X.e)|
+ * which is linear in N' and e':  spin = tilt N' + twist (Z.e'). */
 #ifndef PAL_SIM_CONTACT_FRAME_SPIN_H
 #define PAL_SIM_CONTACT_FRAME_SPIN_H
 #include "server/sim/core/body.h"
 
+typedef struct pal_frame_face {
+    int32_t a, b;
+    double to_a[3], to_b[3]; /* from the frame's node, m */
+} pal_frame_face;
+
 typedef struct pal_frame_spin {
-    bool turns; /* false: the fan is too flat or folded to say how the frame turns */
-    int end;    /* other end of e                                                  */
-    double X[3], Z[3];
-    double part;                        /* how much of the turning counts */
-    double per_normal, per_reach, rise; /* 1/|N|, 1/|e - X (X.e)|, X.e / |e - X (X.e)| */
+    bool turns; /* false: the fan is too flat or folded to define a rotation */
+    int node, end, n_face;
+    const pal_frame_face *face; /* the fan [n_face] */
+    double tilt[9], twist[3], Z[3];
 } pal_frame_spin;
 
-/* frame `slot` of body->skin at the present positions */
-void pal_frame_spin_find(const pal_body *body, int slot, pal_frame_spin *out);
+/* frame `slot` of display.skin at the present positions; face: memory for the fan, kept */
+void pal_frame_spin_find(const pal_body *body, int slot, pal_frame_face *face, pal_frame_spin *out);
+/* the spin when the nodes move with u [n_node][3] */
+void pal_frame_spin_of(const pal_frame_spin *frame, const double *u, double spin[3]);
+/* the transpose: a torque on the frame as forces, added to `own` at its node and to out [n_node][3] elsewhere */
+void pal_frame_spin_add_torque(const pal_frame_spin *frame, const double torque[3], double own[3], double *out);
 #endif

@@ -1,5 +1,5 @@
-/* Grasps with explicit solvers. k and c are kept below the limits alpha m_i / dt^2 and beta m_i / dt of every free
- * node, m_i being shared by the tools that hold it; where nodes are interpolated, alpha and beta times what the tissue
+/* Grasps with explicit solvers. k and c are kept below the limits alpha m_i / dt^2 and alpha m_i / dt of every free
+ * node, m_i being shared by the tools that hold it; where nodes are interpolated, alpha times what the tissue
  * held weighs at least. */
 #include "server/base/vec3.h"
 #include "server/sim/contact/grasp.h"
@@ -23,15 +23,15 @@ void pal_grasp_act_explicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *to
 {
     pal_body *body = step->body;
     double y[3], v[3], goal[3], damper[3], scaled[3], mass = min_mass_kg(grasps, g, body);
-    g->k_max_N_m = GRASP_ALPHA * mass / (step->dt_s * step->dt_s);
-    g->c_max_Ns_m = GRASP_BETA * mass / step->dt_s;
+
     pal_grasp_mean(g, body->d, y);
     pal_grasp_mean(g, body->dv, v);
-    double k = fmin(pal_grasp_stiffness_N_m(grasps, pal_grasp_reach_m(grasps, tool)), g->k_max_N_m);
-    double c = fmin(k * grasps->damping_s, g->c_max_Ns_m);
+    double k = fmin(pal_grasp_stiffness_N_m(grasps, pal_grasp_reach_m(grasps, tool)),
+                    GRASP_SHARE * mass / (step->dt_s * step->dt_s));
+    double c = fmin(k * grasps->damping_s, GRASP_SHARE * mass / step->dt_s);
     for (int d = 0; d < 3; d++) damper[d] = c * (tool->velocity_m_s[d] - v[d]), scaled[d] = tool->ramp * damper[d];
     pal_grasp_find_goal(g, tool, step, tool->ramp * k, scaled, goal);
-    if (g->adaptive) pal_adaptive_grasp_goal(g->adaptive, tool->next.quat, y, v, k, step->dt_s, goal);
+    if (g->adaptive) pal_adaptive_grasp_goal(g->adaptive, tool->requested.quat, y, v, k, step->dt_s, goal);
     for (int d = 0; d < 3; d++) g->force[d] = -tool->ramp * (k * (goal[d] - y[d]) + damper[d]);
     if (!pal_finite3(g->force)) {
         pal_set3(g->force, 0, 0, 0);

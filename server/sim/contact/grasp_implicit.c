@@ -1,8 +1,8 @@
 /* Grasps with implicit solvers. Nothing limits k, c is 0 as the step itself damps, the solver takes the spring
- * implicitly, and the forces are those of the end of the sub-step. The spring stretches by at most GRASP_STRETCH more
- * than at the end of the last sub-step (a tool that jumps) and by no more than brings the force to BELOW_CAP of the
- * caps once the tissue has followed, as far as its compliance is known, so that tissue follows a faster tool late.
- * Where caps leave less than the spring's force, it becomes a constant force and the solver solves once more. */
+ * implicitly, and the forces are those of the end of the sub-step. The spring stretches by at most GRASP_STRETCH
+ * more than at the end of the last sub-step (a tool that jumps) and by no more than brings the force to 1 - FORCE_SHARE
+ * of the caps once the tissue has followed, as far as its compliance is known, so that tissue follows a faster tool
+ * late. Where caps leave less than the spring's force, it becomes a constant force and the solver solves once more. */
 #include "server/base/vec3.h"
 #include "server/sim/contact/grasp.h"
 #include "server/sim/contact/tuning.h"
@@ -19,13 +19,13 @@ void pal_grasp_act_implicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *to
     pal_sub3(goal, goal, y);
     double cap = tool->force_cap_N * tool->ramp, stretch = pal_norm3(goal);
     if (body->load_cap_N > 0) cap = fmin(cap, body->load_cap_N / pal_grasp_max_weight(g));
-    double kept = fmin(implicit->stretch_m, BELOW_CAP * cap / k);
+    double kept = fmin(implicit->stretch_m, (1 - FORCE_SHARE) * cap / k);
     double lead = pal_grasp_compliance_along(&implicit->compliance, k, fmin(k, g->fit.k_N_m), goal);
-    double max_m = kept + fmin(rise, (BELOW_CAP * cap - k * kept) / lead);
+    double max_m = kept + fmin(rise, ((1 - FORCE_SHARE) * cap - k * kept) / lead);
     if (stretch > max_m) pal_scale3(goal, max_m / stretch, goal);
     implicit->pulls = pal_finite3(goal);
     implicit->constant = implicit->found = false;
-    implicit->force = (pal_solved_force){.counted = false};
+    pal_set3(implicit->total_N, 0, 0, 0);
     pal_set3(g->force, 0, 0, 0);
     if (!implicit->pulls) return;
     pal_scale3(implicit->pull, k, goal);
@@ -70,13 +70,13 @@ static bool keep_caps(pal_grasp *g, const pal_tool *tool, pal_body *body, const 
 static bool settle_tool(pal_grasp *g, pal_tool *tool, pal_body *body, const double *moved)
 {
     pal_grasp_implicit *implicit = g->implicit;
-    pal_solved_force_remove(&implicit->force, tool);
+    pal_sub3(tool->force_N, tool->force_N, implicit->total_N);
     bool capped = keep_caps(g, tool, body, moved);
     pal_scale3(g->force, -1, implicit->load);
     /* the stretch that this force would keep */
     implicit->stretch_m = implicit->k_N_m > 0 ? pal_norm3(implicit->load) / implicit->k_N_m : 0;
-    pal_copy3(implicit->force.total_N, g->force);
-    pal_solved_force_add(&implicit->force, tool);
+    pal_copy3(implicit->total_N, g->force);
+    pal_add3(tool->force_N, tool->force_N, g->force);
     tool->holding = true;
     return capped;
 }
@@ -100,7 +100,7 @@ bool pal_grasp_settle(void *self, pal_step *step, const double *moved, bool last
         implicit->found = true;
         for (int k = 0; k < n_find; k++)
             pal_grasp_compliance_update(&implicit->compliance, step->body, g->node, g->weight, g->n_node, tool->here_m,
-                                        step->scratch);
+                                        SHALLOW_RADII * tool->radius_m, step->scratch);
         pal_grasp_publish(g, tool, implicit->k_N_m, implicit->k_N_m * grasps->damping_s);
     }
     return again;

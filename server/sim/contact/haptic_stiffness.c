@@ -1,18 +1,44 @@
-/* Rendered stiffness from the solver's static compliance (haptic_stiffness.h). */
+/* Rendered stiffness (haptic_stiffness.h). */
 #include "server/sim/contact/haptic_stiffness.h"
 
 #include "server/base/vec3.h"
 #include "server/sim/contact/contact_implicit.h"
 #include "server/sim/contact/tuning.h"
 
-#include <math.h>
+/* ---- least squares ---- */
 
-/* ---- answers that are kept ---- */
+void pal_stiffness_fit_start(pal_stiffness_fit *fit, double k_start_N_m)
+{
+    *fit = (pal_stiffness_fit){.last_m = {INFINITY}, .k_N_m = k_start_N_m, .k_start_N_m = k_start_N_m};
+}
+
+void pal_stiffness_fit_add(pal_stiffness_fit *fit, const double x_m[3], const double f_N[3], double radius_m)
+{
+    const double length_m = SHALLOW_RADII * radius_m, prior_m = 0.1 * length_m;
+    /* the first sample has all the weight, as the one before it is infinitely far */
+    const double old = exp(-pal_dist3(x_m, fit->last_m) / length_m), new = 1 - old;
+    pal_copy3(fit->last_m, x_m);
+    for (int c = 0; c < 3; c++) {
+        fit->x[c] = old * fit->x[c] + new *x_m[c];
+        fit->f[c] = old * fit->f[c] + new *f_N[c];
+    }
+    fit->xx = old * fit->xx + new *pal_dot3(x_m, x_m);
+    fit->xf = old * fit->xf + new *pal_dot3(x_m, f_N);
+    double variance = fit->xx - pal_dot3(fit->x, fit->x), with = fit->xf - pal_dot3(fit->x, fit->f);
+    fit->k_N_m = (with + fit->k_start_N_m * prior_m * prior_m) / (variance + prior_m * prior_m);
+}
+
+double pal_haptic_stiffness_clamp(double k_N_m)
+{
+    return fmin(fmax(k_N_m, MIN_STIFFNESS_N_M), MAX_STIFFNESS_N_M);
+}
+
+/* ---- kept answers ---- */
 
 static int find_entry(const pal_haptic_stiffness *known, const pal_contact_group *group)
 {
     int best = -1;
-    double cosine = SAME_COSINE;
+    double cosine = M_SQRT1_2;
     for (int i = 0; i < PAL_CONTACT_PATCH_MAX; i++) {
         const pal_haptic_stiffness_entry *e = &known->entry[i];
         if (!e->used || e->contact != (group->force_N > 0)) continue;
@@ -26,13 +52,15 @@ bool pal_haptic_stiffness_find(const pal_haptic_stiffness *known, pal_contact_gr
                                double min_m)
 {
     int i = find_entry(known, group);
-    group->k_N_m = 0;
+    const pal_haptic_stiffness_entry *e = &known->entry[i < 0 ? 0 : i];
+    double change[3];
+    group->k_N_m = i < 0 ? 0 : e->k_N_m;
     if (i < 0) return true;
-    const pal_haptic_stiffness_entry *e = &known->entry[i];
-    group->k_N_m = e->k_N_m;
-    if (known->step - e->step < STIFFNESS_STEPS) return false;
-    return pal_dist3(e->at_m, at_m) > min_m || fabs(group->force_N - e->force_N) > STIFFNESS_FORCE * e->force_N ||
-           fabs(group->gap_m - e->gap_m) > min_m || pal_dot3(e->normal, group->normal) < STIFFNESS_COSINE;
+    pal_scale3(change, group->force_N, group->normal);
+    pal_axpy3(change, -e->force_N, e->normal);
+    if (known->time_s - e->time_s < STIFFNESS_S * (1 - 1e-9)) return false;
+    return pal_dist3(e->at_m, at_m) > min_m || pal_norm3(change) > FORCE_SHARE * e->force_N ||
+           fabs(group->gap_m - e->gap_m) > min_m;
 }
 
 double pal_haptic_stiffness_max(const pal_haptic_stiffness *known, double k_N_m)
@@ -51,7 +79,7 @@ static void keep(pal_haptic_stiffness *known, pal_contact_group *group, const do
     group->k_N_m = k_N_m;
     pal_haptic_stiffness_entry *e = &known->entry[i];
     *e = (pal_haptic_stiffness_entry){.used = true,
-                                      .step = known->step,
+                                      .time_s = known->time_s,
                                       .contact = group->force_N > 0,
                                       .force_N = group->force_N,
                                       .gap_m = group->gap_m,
@@ -62,17 +90,16 @@ static void keep(pal_haptic_stiffness *known, pal_contact_group *group, const do
 
 /* ---- contact ---- */
 
-/* what the normal force loses for each metre because contacts turn: tissue moves with `answer` for each metre that the
- * tool goes against the normal */
+/* loss of normal force for each metre against the normal, as tissue moves with `answer` and the contact turns */
 static double turned_N_m(const pal_contact_points *points, const pal_body *body, const pal_contact *contact,
                          double radius_m, const double normal[3], const double *answer)
 {
-    int32_t slot[PAL_CONTACT_POINT_SLOTS];
-    double weight[PAL_CONTACT_POINT_SLOTS], arm[PAL_CONTACT_POINT_SLOTS][3], r[3];
-    int n = pal_contact_points_slots(points, body, contact->point, slot, weight, arm);
+    pal_contact_slot part[PAL_CONTACT_POINT_SLOTS];
+    double r[3];
+    int n = pal_contact_points_slots(points, body, contact->point, part);
     pal_copy3(r, normal);
     for (int k = 0; k < n; k++)
-        pal_axpy3(r, weight[k], answer + 3 * (size_t)pal_contact_points_slot_node(body, slot[k]));
+        pal_axpy3(r, part[k].weight, answer + 3 * (size_t)pal_contact_points_slot_node(body, part[k].slot));
     pal_axpy3(r, -pal_dot3(r, contact->away), contact->away);
     return pal_norm3(contact->force) * pal_dot3(r, normal) / (radius_m - contact->depth_m);
 }
@@ -94,11 +121,11 @@ void pal_haptic_stiffness_contact(pal_haptic_stiffness *known, pal_contact_group
         share[m] = pal_dot3(contact[i].away, inward);
         row[m++] = first + i;
     }
-    double k = pal_contact_springs_stiffness(springs, body, row, share, m, STIFFNESS_PASSES, answer, scratch);
+    double k = pal_contact_springs_stiffness(springs, row, share, m, STIFFNESS_PASSES, answer, scratch);
     for (int i = 0; i < m && answer && k > 0; i++)
         lost += turned_N_m(points, body, &contact[row[i] - first], radius_m, group->normal, answer);
     pal_arena_rewind(scratch, used);
-    keep(known, group, at_m, fmax(MIN_TURNED * k, k - lost));
+    keep(known, group, at_m, k > 0 ? fmax(MIN_STIFFNESS_N_M, k - lost) : 0);
 }
 
 /* ---- a weighted mean of nodes ---- */
@@ -108,8 +135,8 @@ static bool solve_mean(const pal_body *body, const int32_t *node, const double *
                        const double direction[3], double mean_m_N[3], pal_arena *scratch)
 {
     size_t used = pal_arena_used(scratch), n3 = 3 * (size_t)body->n_node;
-    double *load = PAL_NEW(scratch, double, n3), *move = PAL_NEW(scratch, double, n3);
-    bool known = load && move && body->compliance;
+    double *load, *move;
+    bool known = PAL_NEW_DOUBLES(scratch, n3, &load, &move) && body->compliance;
     for (int i = 0; i < n && known; i++) pal_axpy3(load + 3 * (size_t)(node ? node[i] : i), weight[i], direction);
     known = known && body->compliance->solve(body->compliance->self, body, load, move);
     pal_set3(mean_m_N, 0, 0, 0);
@@ -124,11 +151,10 @@ void pal_haptic_stiffness_near(pal_haptic_stiffness *known, pal_contact_group *g
 {
     size_t used = pal_arena_used(scratch);
     double *sum = PAL_NEW(scratch, double, body->n_node), inward[3], mean[3], give = 0;
-    int32_t slot[PAL_CONTACT_POINT_SLOTS];
-    double share[PAL_CONTACT_POINT_SLOTS], arm[PAL_CONTACT_POINT_SLOTS][3];
+    pal_contact_slot part[PAL_CONTACT_POINT_SLOTS];
     for (int i = 0; i < n && sum; i++) {
-        int m = pal_contact_points_slots(points, body, point[i], slot, share, arm);
-        for (int k = 0; k < m; k++) sum[pal_contact_points_slot_node(body, slot[k])] += weight[i] * share[k];
+        int m = pal_contact_points_slots(points, body, point[i], part);
+        for (int k = 0; k < m; k++) sum[pal_contact_points_slot_node(body, part[k].slot)] += weight[i] * part[k].weight;
     }
     /* as contact presses: the solver starts from the answer to a load that is alike */
     pal_scale3(inward, -1, group->normal);
@@ -141,11 +167,11 @@ void pal_haptic_stiffness_near(pal_haptic_stiffness *known, pal_contact_group *g
 /* ---- grasp ---- */
 
 void pal_grasp_compliance_update(pal_grasp_compliance *w, const pal_body *body, const int32_t *node,
-                                 const double *weight, int n, const double at_m[3], pal_arena *scratch)
+                                 const double *weight, int n, const double at_m[3], double min_m, pal_arena *scratch)
 {
     double unit[3] = {0}, mean[3];
     int axis = w->next;
-    if (!body->compliance || (w->n_known == 3 && axis == 0 && pal_dist3(w->at_m, at_m) < MIN_MOVE_M)) return;
+    if (!body->compliance || (w->n_known == 3 && axis == 0 && pal_dist3(w->at_m, at_m) < min_m)) return;
     unit[axis] = 1;
     if (!solve_mean(body, node, weight, n, unit, mean, scratch)) return;
     pal_copy3(w->column_m_N[axis], mean);
@@ -172,8 +198,8 @@ bool pal_grasp_compliance_series(const pal_grasp_compliance *w, double k_N_m, do
         }
     double det = pal_dot3(c[0], minor[0]);
     if (!(det > 0) || !(c[0][0] > 0) || !(minor[2][2] > 0)) return false;
-    const int place[6][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}};
-    for (int i = 0; i < 6; i++) K[i] = minor[place[i][0]][place[i][1]] / det;
+    for (int i = 0, k = 0; i < 3; i++)
+        for (int j = i; j < 3; j++) K[k++] = minor[i][j] / det;
     return isfinite(det);
 }
 

@@ -4,14 +4,12 @@
 #include "server/base/vec3.h"
 #include "server/sim/contact/tuning.h"
 
-/* shifts the centre until the point is `core` away: straight from the point, or along the remembered normal when the
- * point has come round to the far side */
+/* shifts the centre until the point is `core` away: straight from it, or along the normal from its far side */
 static void push_from(pal_proxy *proxy, const double p[3], double core)
 {
-    double w[3], distance;
+    double w[3];
     pal_sub3(w, proxy->x, p);
-    distance = pal_norm3(w);
-    double along = pal_dot3(w, proxy->normal);
+    double distance = pal_norm3(w), along = pal_dot3(w, proxy->normal);
     if (distance > 1e-9 * core && along >= 0) {
         pal_axpy3(proxy->x, (core - distance) / distance, w);
         return;
@@ -21,14 +19,14 @@ static void push_from(pal_proxy *proxy, const double p[3], double core)
     pal_axpy3(proxy->x, -along + sqrt(fmax(root, 0)), proxy->normal);
 }
 
-/* tissue that came closer than allowed moves the proxy, but no faster than the proxy may move tissue: one stray point
- * must not throw it off the organ */
+/* tissue that came too close moves the proxy by at most max_m: one stray point must not throw it off the organ */
 static void push_out(pal_proxy *proxy, const double *p, int n, const double *core, double max_m)
 {
     double start[3], move[3];
     pal_copy3(start, proxy->x);
-    for (int pass = 0; pass < PROXY_PUSHES; pass++) {
-        bool moved = false;
+    bool moved = true;
+    for (int pass = 0; pass < PROXY_PUSHES && moved; pass++) {
+        moved = false;
         for (int i = 0; i < n; i++) {
             double w[3];
             pal_sub3(w, proxy->x, p + 3 * i);
@@ -36,7 +34,6 @@ static void push_out(pal_proxy *proxy, const double *p, int n, const double *cor
             push_from(proxy, p + 3 * i, core[i]);
             moved = true;
         }
-        if (!moved) break;
     }
     pal_sub3(move, proxy->x, start);
     double length = pal_norm3(move);

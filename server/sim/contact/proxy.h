@@ -1,11 +1,10 @@
-/* The side a tool is on: a sphere that follows the tool but never sinks into tissue by more than `deepest`.
+/* The side a tool is on: a sphere that follows the tool and never sinks into tissue by more than max_depth_m.
  *
- * The tool's own centre may be anywhere, deep inside or beyond the organ, where a penetration has no direction. The
- * proxy (god-object of Zilles & Salisbury) stays on the side it came from: it moves to the tool along the straight
- * line, stops where a contact point would come closer than allowed, and slides along. Every contact point allows a
- * depth of at most `deepest`, and in one sub-step at most `rise` more than it has now: that is the clamp on penetration
- * correction, and because points block a swept sphere no tool passes through at any speed.
- * Thread: [sim]. */
+ * The tool's own centre may be deep inside or beyond the organ, where a penetration has no direction. The proxy
+ * (god-object of Zilles & Salisbury) stays on the side it came from: it moves to the tool along the straight line,
+ * stops where a contact point would come closer than allowed, and slides along. Every contact point allows a depth of
+ * at most max_depth_m, and in one sub-step at most max_rise_m more than it has now: that clamps the correction of
+ * penetration, and because points block a swept sphere no tool passes through at any speed. Thread: [sim]. */
 #ifndef PAL_SIM_CONTACT_PROXY_H
 #define PAL_SIM_CONTACT_PROXY_H
 #include <stdbool.h>

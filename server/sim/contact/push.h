@@ -1,10 +1,10 @@
-/* The component tool_push of one body: what it knows of the body and of each tool, and the regime of contact, which is
- * chosen at load by the solver (effects/tool_push.c):
- *     explicit       contact forces at every sub-step                               push_explicit.c
- *     held load      the solver holds loads over a sub-step (rk4, adaptive bodies)  push_held_load.c
- *     interpolated   nodes are interpolated from dofs (central_cg)                 push_interpolated.c
- *     implicit       the solver takes contact springs implicitly                    push_implicit.c
- * Memory: the world's arena, but for what a transfer leaves (tool_contact.h). Thread: [sim]. */
+/* The component tool_push of one body: its state, that of each tool, and the regime of contact, which the solver
+ * determines at load (effects/tool_push.c):
+ *     explicit       contact forces at every sub-step                                push_explicit.c
+ *     held load      the solver holds loads over a sub-step (rk4, adaptive bodies)   push_explicit.c
+ *     interpolated   nodes are interpolated from dofs (central_cg)                   push_explicit.c
+ *     implicit       the solver takes contact springs implicitly                     push_implicit.c
+ * Memory: the component's arena, but for what a transfer leaves (tool_contact.h). Thread: [sim]. */
 #ifndef PAL_SIM_CONTACT_PUSH_H
 #define PAL_SIM_CONTACT_PUSH_H
 #include "server/sim/contact/tool_contact.h"
@@ -12,21 +12,18 @@
 typedef struct pal_push pal_push;
 
 typedef struct pal_push_regime {
-    double reach_radii; /* points within so many radii of the proxy's centre become contacts */
     /* stiffness per area at a contact point */
     double (*pressure_Pa_m)(const pal_push *push, const pal_body *body, int point, double radius_m);
-    /* where the proxy shall go instead of the tool's place here_m (body frame, changed); NULL: to the tool */
+    /* moves the proxy's target here_m (body frame) out of the tissue; NULL: the target is the tool */
     void (*hold_back)(pal_tool_contact *t, double here_m[3]);
     /* forces of all tools in this sub-step, their contacts found */
     void (*act)(pal_push *push, int n_tool, pal_step *step);
 
     /* explicit regimes: largest contact stiffness over mass times dt^2, damping time over dt, a bound of the
-     * eigenvalues of M^-1 K of contact, 1/s^2, and, after other triangles were drawn, what the force is shortened to
-     * (NULL: never)
-     */
+     * eigenvalues of M^-1 K of contact, 1/s^2; after other triangles were drawn the force does not rise */
     double stiffness_limit, damping_steps;
     double (*eigenvalue_1_s2)(pal_contact_points *points, const pal_body *body, const pal_contact *contact, int n);
-    double (*limit_rise)(pal_tool_contact *t, double sum_N[3]);
+    bool limits_rise;
 } pal_push_regime;
 
 extern const pal_push_regime pal_push_explicit, pal_push_held_load, pal_push_interpolated, pal_push_implicit;
@@ -37,13 +34,13 @@ struct pal_push {
     int n_tool, body_index;
     pal_tool_contact tool[PAL_TOOL_MAX];
     double asked_Pa_m, friction, clamp_S, asked_near_m, slip_S, slip_s; /* keys */
-    double young_Pa, poisson, damping_1_s, density_kg_m3;               /* of the body's material */
-    float *point_Pa; /* Young's modulus at shown vertices where it is another one, else 0 [n_vertex]; NULL: nowhere */
-    pal_contact_springs *springs; /* implicit only                                                  */
-    int n_stiffness, n_step;      /* stiffnesses found in this step; steps                          */
+    pal_material material;        /* the body's, Poisson's ratio at most PAL_POISSON_CLAMP                */
+    float *point_Pa;              /* pal_contact_points_young                                             */
+    pal_contact_springs *springs; /* implicit only                                                        */
+    int n_stiffness, n_step;      /* stiffnesses found in this step; steps, to give each tool its turn    */
 };
 
-/* 200 E / radius, or what the scene says */
+/* EXPLICIT_PRESSURE E / radius, or what the scene says */
 double pal_push_pressure_of_radius(const pal_push *push, const pal_body *body, int point, double radius_m);
 /* a multiple of the tissue's own stiffness under a contact half a radius wide, or what the scene says */
 double pal_push_pressure_of_tissue(const pal_push *push, const pal_body *body, int point, double radius_m);
@@ -51,12 +48,10 @@ double pal_push_pressure_of_tissue(const pal_push *push, const pal_body *body, i
 double pal_push_punch_N_m(const pal_push *push, double radius_m);
 /* m from a tool's surface within which patches are published */
 double pal_push_near_m(const pal_push *push, double radius_m);
-/* the side that the tool is on follows its force slowly, from where it was */
-void pal_push_follow_side(pal_tool_contact *t, const double side_before[3]);
+/* the side that the tool is on follows its force with a time constant, from where it was */
+void pal_push_follow_side(pal_tool_contact *t, const double side_before[3], double dt_s);
 
-/* explicit regimes: act */
-void pal_push_act_explicit(pal_push *push, int n_tool, pal_step *step);
-/* interpolated: the stiffness that the points near a tool will want, as pal_effect.wanted */
+/* interpolated: the stiffness that the points near a tool will want, as pal_effect.bounds.wanted */
 void pal_push_want(pal_push *push, const pal_body *body, double *bound_N_m);
 /* implicit: memory beside; pal_tangent.settle */
 pal_err pal_push_make_implicit(pal_push *push, pal_build *build);

@@ -2,14 +2,24 @@
  *
  * A contact at depth d is pushed away from the proxy's centre with f = k (d - gamma dt v_away), v_away the tissue's own
  * speed. A common factor on k keeps the largest eigenvalue of contact stiffness over mass below alpha / dt^2. With a
- * and b the ratios of stiffness and damping to m / dt^2 and m / dt, symplectic steps are stable for a + 2 b < 4: the
- * solver's own limit leaves a <= 1 to the tissue, contact adds a <= alpha = 1.2 and b <= gamma alpha = 0.6. */
+ * and b the ratios of stiffness and damping to m / dt^2 and m / dt:
+ *
+ * explicit: symplectic steps are stable for a + 2 b < 4. The solver's own limit leaves a <= 1 to the tissue; contact
+ *     adds a <= alpha and b <= gamma alpha = alpha / 2, so that alpha < 1.5.
+ * held load (rk4 of adaptive bodies): loads lag by dt/2. With gamma = 1, the nodes' own velocity and alpha = 0.5, b = a
+ *     exceeds a/2, which makes up for the lag, and a + b <= 1: tissue is stopped and not thrown back. Where other
+ *     triangles are drawn, as a finer surface bulges, the ramp of the contact falls so far that the force does not rise
+ *     at that moment, and rises again.
+ * interpolated (central_cg): contact is as stiff as with implicit solvers, and the solver is told before its sub-steps
+ *     begin what stiffness the points near a tool will need. Beyond that alpha is 0.5; the eigenvalue is bounded by the
+ *     sum of the points' own. */
 #include "server/base/vec3.h"
 #include "server/sim/contact/push.h"
 #include "server/sim/contact/tuning.h"
+#include "server/sim/core/blend.h"
 
-/* Coulomb friction: the tool's displacement across the tissue it presses stretches a spring as stiff as the contact,
- * which slips at friction times the normal force; shared out like the normal force */
+/* Coulomb friction: the tool's displacement across the tissue stretches a spring as stiff as the contact, which slips
+ * at friction times the normal force; shared out like the normal force */
 static void add_friction(pal_push *push, pal_tool_contact *t, const double sum[3], double stiffness, double dt_s)
 {
     double size = pal_norm3(sum), drift[3], along[3], total = 0;
@@ -35,8 +45,7 @@ static void find_share(pal_push *push, pal_tool_contact *t, int n_tool, pal_step
     int n_share = 1;
     if (t->n_contact == 0) return;
     for (const pal_tool_contact *other = push->tool; other < push->tool + n_tool; other++)
-        if (other != t && other->n_contact > 0 &&
-            pal_dist3(other->proxy.x, t->proxy.x) <= SHARE_DISTANCE * step->body->length_scale_m)
+        if (other != t && other->n_contact > 0)
             n_share += pal_contact_points_overlap(&push->points, step->body, t->contact, t->n_contact, other->contact,
                                                   other->n_contact);
     double rate = EIGENVALUE_SAFETY * n_share *
@@ -44,7 +53,20 @@ static void find_share(pal_push *push, pal_tool_contact *t, int n_tool, pal_step
     double max_rate =
         fmax(push->regime->stiffness_limit / (step->dt_s * step->dt_s), EIGENVALUE_SAFETY * n_share * t->wanted_1_s2);
     double share = rate > max_rate ? max_rate / rate : 1;
-    t->share = share < t->share ? share : fmin(share, t->share * (1 + step->dt_s / SHARE_RISE_S));
+    t->share = share < t->share ? share : fmin(share, t->share * (1 + step->dt_s / PAL_BLEND_S));
+}
+
+/* after other triangles were drawn the force begins at that of before; returns the part of it */
+static double limit_rise(pal_tool_contact *t, double sum[3])
+{
+    double size = pal_norm3(sum), part = t->retriangulated && size > t->uncapped_N ? t->uncapped_N / size : 1;
+    t->retriangulated = false;
+    t->uncapped_N = part * size;
+    if (part == 1) return 1;
+    t->ramp *= part;
+    pal_scale3(sum, part, sum);
+    for (int i = 0; i < t->n_contact; i++) pal_scale3(t->contact[i].force, part, t->contact[i].force);
+    return part;
 }
 
 /* forces of one tool to the nodes and back */
@@ -66,26 +88,29 @@ static void press(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_step 
         pal_add3(sum, sum, c->force);
         stiffness += k;
     }
-    if (push->regime->limit_rise) stiffness *= push->regime->limit_rise(t, sum);
+    if (push->regime->limits_rise) stiffness *= limit_rise(t, sum);
     if (!pal_finite3(sum) || pal_dot3(sum, sum) == 0) return;
     add_friction(push, t, sum, stiffness, step->dt_s);
     pal_set3(sum, 0, 0, 0);
-    pal_contact_points_force_begin(&push->points);
+    pal_contact_points_begin_slots(&push->points);
     for (int i = 0; i < t->n_contact; i++) {
         pal_contact_points_add_force(&push->points, body, t->contact[i].point, t->contact[i].force);
         pal_sub3(sum, sum, t->contact[i].force);
     }
     double share = pal_tool_force_share(body, tool, sum, pal_contact_points_assemble(&push->points, body));
-    pal_contact_points_apply(&push->points, body, share);
+    for (int i = 0; i < push->points.n_node; i++) {
+        const size_t at = 3 * (size_t)push->points.node[i];
+        pal_axpy3(body->load + at, share, push->points.force + at);
+    }
     pal_scale3(t->total, share, sum);
     for (int i = 0; i < t->n_contact; i++) pal_scale3(t->contact[i].force, share, t->contact[i].force);
     pal_add3(tool->force_N, tool->force_N, t->total);
     pal_add3(t->total, t->total, t->hold.now_N);
     tool->touching = true;
-    pal_push_follow_side(t, t->proxy.normal);
+    pal_push_follow_side(t, t->proxy.normal, step->dt_s);
 }
 
-void pal_push_act_explicit(pal_push *push, int n_tool, pal_step *step)
+static void act(pal_push *push, int n_tool, pal_step *step)
 {
     for (int t = 0; t < n_tool; t++) find_share(push, &push->tool[t], n_tool, step);
     for (int t = 0; t < n_tool; t++) press(push, &push->tool[t], &step->tools->tool[t], step);
@@ -93,9 +118,49 @@ void pal_push_act_explicit(pal_push *push, int n_tool, pal_step *step)
         pal_push_publish(push, &push->tool[t], &step->tools->tool[t], step);
 }
 
-const pal_push_regime pal_push_explicit = {.reach_radii = 1,
-                                           .pressure_Pa_m = pal_push_pressure_of_radius,
-                                           .act = pal_push_act_explicit,
+const pal_push_regime pal_push_explicit = {.pressure_Pa_m = pal_push_pressure_of_radius,
+                                           .act = act,
                                            .stiffness_limit = EXPLICIT_ALPHA,
-                                           .damping_steps = EXPLICIT_GAMMA,
+                                           .damping_steps = 0.5,
                                            .eigenvalue_1_s2 = pal_contact_points_max_eigenvalue};
+
+const pal_push_regime pal_push_held_load = {.pressure_Pa_m = pal_push_pressure_of_radius,
+                                            .act = act,
+                                            .stiffness_limit = 0.5,
+                                            .damping_steps = 1,
+                                            .eigenvalue_1_s2 = pal_contact_points_max_eigenvalue,
+                                            .limits_rise = true};
+
+/* ---- interpolated ---- */
+
+void pal_push_want(pal_push *push, const pal_body *body, double *bound_N_m)
+{
+    for (int i = 0; i < push->n_tool; i++) {
+        pal_tool_contact *t = &push->tool[i];
+        double radius = t->limits.radius_m, x[3];
+        t->wanted_1_s2 = 0;
+        for (int k = 0; k < t->n_list && t->active; k++) {
+            int point = t->list[k];
+            pal_contact_points_position(&push->points, point, x);
+            if (!(pal_dist3(x, t->proxy.x) < (1 + 0.5 * MAX_DEPTH_RADII) * radius)) continue;
+            double stiffness =
+                push->regime->pressure_Pa_m(push, body, point, radius) * push->points.sample.area_m2[point];
+            /* damping over dt/2 takes as much of a step's stability as the stiffness */
+            t->wanted_1_s2 += 0.5 * pal_contact_points_bound(&push->points, body, point, 2 * stiffness, bound_N_m);
+        }
+    }
+}
+
+/* the sum of the eigenvalues is no less than the largest, and a point between nodes moves no more than their mean */
+static double eigenvalue_1_s2(pal_contact_points *points, const pal_body *body, const pal_contact *contact, int n)
+{
+    double sum = 0;
+    for (int i = 0; i < n; i++) sum += pal_contact_points_bound(points, body, contact[i].point, contact[i].k_N_m, NULL);
+    return sum;
+}
+
+const pal_push_regime pal_push_interpolated = {.pressure_Pa_m = pal_push_pressure_of_tissue,
+                                               .act = act,
+                                               .stiffness_limit = 0.5,
+                                               .damping_steps = 0.5,
+                                               .eigenvalue_1_s2 = eigenvalue_1_s2};

@@ -1,21 +1,21 @@
 /* Contact that an implicit solver takes implicitly (contact_implicit.h): a sub-step is the whole step, and nothing
- * limits the stiffness but the solver's iterations. There is no damping term, as the step itself damps, and forces are
- * those of the end of the sub-step; patches are published after the solve. */
+ * limits the stiffness but the solver's iterations. There is no damping term, as the step itself damps; patches are
+ * published after the solve. */
 #include "server/base/vec3.h"
 #include "server/sim/contact/push.h"
 #include "server/sim/contact/tuning.h"
+#include "server/sim/core/blend.h"
 
 pal_err pal_push_make_implicit(pal_push *push, pal_build *build)
 {
     pal_body *body = build->body;
     push->springs = PAL_NEW(build->arena, pal_contact_springs, 1);
     if (!push->springs) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_contact_springs_make(body, push->n_tool * (PAL_CONTACT_IMPLICIT_MAX + 2), build->arena, push->springs));
+    PAL_TRY(pal_contact_springs_make(&push->points, body, push->n_tool * (PAL_CONTACT_IMPLICIT_MAX + 2), build->arena,
+                                     push->springs));
     for (int t = 0; t < push->n_tool; t++) {
-        pal_tool_contact_implicit *implicit = PAL_NEW(build->arena, pal_tool_contact_implicit, 1);
-        push->tool[t].implicit = implicit;
-        if (!implicit) return PAL_ERR_MEMORY;
-        PAL_TRY(pal_contact_implicit_make(build->arena, &implicit->solve));
+        push->tool[t].implicit = PAL_NEW(build->arena, pal_tool_contact_implicit, 1);
+        if (!push->tool[t].implicit) return PAL_ERR_MEMORY;
     }
     body->wants_compliance = true;
     size_t scratch = pal_haptic_stiffness_scratch(body) + (size_t)push->points.sample.max_point * 4 * sizeof(double) +
@@ -24,8 +24,7 @@ pal_err pal_push_make_implicit(pal_push *push, pal_build *build)
     return PAL_ERR_OK;
 }
 
-/* where the proxy shall go: to the tool, or as far out from it as caps ask for; it stays when the tool goes deeper and
- * is caught up with when the tool comes out */
+/* the target is as far out from the tool as caps ask for, and stays when the tool goes deeper */
 static void hold_back(pal_tool_contact *t, double here[3])
 {
     pal_tool_contact_implicit *implicit = t->implicit;
@@ -37,8 +36,8 @@ static void hold_back(pal_tool_contact *t, double here[3])
     pal_axpy3(here, implicit->back_m, t->proxy.normal);
 }
 
-/* after the solve: back so far that contact itself gives BELOW_CAP of what caps allow. Constant forces alone, shared
- * out again in each step, would let a tool at its cap wander */
+/* after the solve: back so far that contact itself gives 1 - FORCE_SHARE of what caps allow, because constant forces
+ * alone, shared out again in each step, would let a tool at its cap wander */
 static void find_back(const pal_push *push, pal_tool_contact *t, const pal_tool *tool)
 {
     pal_tool_contact_implicit *implicit = t->implicit;
@@ -47,7 +46,7 @@ static void find_back(const pal_push *push, pal_tool_contact *t, const pal_tool 
     implicit->back_m = implicit->old_back_m;
     if (solve->capped || implicit->back_m > 0)
         implicit->back_m =
-            fmax(0, implicit->back_m + BACK_GAIN * (solve->uncapped_N - BELOW_CAP * solve->allowed_N) / k);
+            fmax(0, implicit->back_m + BACK_GAIN * (solve->uncapped_N - (1 - FORCE_SHARE) * solve->allowed_N) / k);
 }
 
 /* A proxy that cannot go deeper is moved by tissue in each step, which makes contact explicit again and trembles at 60
@@ -57,10 +56,10 @@ static void find_stiffening(pal_tool_contact *t, const pal_tool *tool, const pal
     double here[3], depth = 0, radius = tool->radius_m;
     pal_sub3(here, tool->here_m, body->offset_m);
     for (int i = 0; i < t->n_contact; i++) depth = fmax(depth, t->contact[i].depth_m);
-    if (depth > KEPT_DEPTH * t->limits.max_depth_m && pal_dist3(here, t->proxy.x) > REST_RADII * radius)
-        t->share = fmin(MAX_STIFFENING, t->share * (1 + STIFFEN * (dt_s / FRAME_S)));
+    if (depth > t->limits.max_depth_m - SHALLOW_RADII * radius && pal_dist3(here, t->proxy.x) > SHALLOW_RADII * radius)
+        t->share = fmin(MAX_STIFFENING, t->share * (1 + dt_s / STIFFNESS_S));
     else if (depth < SHALLOW_RADII * radius)
-        t->share = fmax(1, t->share * fmax(0, 1 - SOFTEN * (dt_s / FRAME_S)));
+        t->share = fmax(1, t->share * fmax(0, 1 - dt_s / PAL_BLEND_S));
 }
 
 /* springs of one tool, and the loads they begin with */
@@ -80,8 +79,8 @@ static void begin(pal_push *push, pal_tool_contact *t, const pal_tool *tool, pal
     }
     (void)pal_tool_contact_friction(t, t->proxy.normal, stiffness, implicit->solve.next_slip_m);
     pal_scale3(move, step->dt_s, t->proxy.v);
-    pal_contact_implicit_begin(&implicit->solve, push->springs, &push->points, step->body, t->contact, t->n_contact,
-                               push->friction, move);
+    pal_contact_implicit_begin(&implicit->solve, push->springs, step->body, t->contact, t->n_contact, push->friction,
+                               move);
     t->n_contact = implicit->solve.n_contact;
 }
 
@@ -103,13 +102,12 @@ bool pal_push_settle(pal_push *push, pal_step *step, const double *moved, bool l
         pal_tool *tool = &tools->tool[i];
         if (!t->active) continue;
         if (!last) {
-            again |= pal_contact_implicit_cap(&t->implicit->solve, push->springs, step->body, tool, t->contact);
+            again |= pal_contact_implicit_cap(&t->implicit->solve, tool);
             continue;
         }
-        again |= pal_contact_implicit_settle(&t->implicit->solve, push->springs, step->body, tool, t->contact,
-                                             push->friction);
-        pal_add3(t->total, t->implicit->solve.force.total_N, t->hold.now_N);
-        pal_push_follow_side(t, t->implicit->old_side);
+        again |= pal_contact_implicit_settle(&t->implicit->solve, tool);
+        pal_add3(t->total, t->implicit->solve.total_N, t->hold.now_N);
+        pal_push_follow_side(t, t->implicit->old_side, step->dt_s);
         find_back(push, t, tool);
     }
     /* each tool in turn is the first to have its patches' stiffness found */
@@ -129,4 +127,4 @@ bool pal_push_settle(pal_push *push, pal_step *step, const double *moved, bool l
 }
 
 const pal_push_regime pal_push_implicit = {
-    .reach_radii = 2, .pressure_Pa_m = pal_push_pressure_of_tissue, .hold_back = hold_back, .act = act};
+    .pressure_Pa_m = pal_push_pressure_of_tissue, .hold_back = hold_back, .act = act};

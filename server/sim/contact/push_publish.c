@@ -1,4 +1,4 @@
-/* Stiffness of contact, and what a haptic bridge needs to know of it (contact_patch.h). */
+/* Stiffness of contact, and its patches for a haptic bridge (contact_patch.h). */
 #include "server/base/vec3.h"
 #include "server/sim/contact/push.h"
 #include "server/sim/contact/tuning.h"
@@ -6,29 +6,29 @@
 double pal_push_pressure_of_radius(const pal_push *push, const pal_body *body, int point, double radius_m)
 {
     (void)body, (void)point;
-    return push->asked_Pa_m > 0 ? push->asked_Pa_m : EXPLICIT_PRESSURE * push->young_Pa / radius_m;
+    return push->asked_Pa_m > 0 ? push->asked_Pa_m : EXPLICIT_PRESSURE * push->material.young_Pa / radius_m;
 }
 
 static double young_at(const pal_push *push, int point)
 {
     const pal_contact_samples *sample = &push->points.sample;
-    if (!push->point_Pa) return push->young_Pa;
+    if (!push->point_Pa) return push->material.young_Pa;
     if (point >= sample->n_vertex) point = sample->corner[3 * (size_t)(point - sample->n_vertex)];
-    return push->point_Pa[point] > 0 ? (double)push->point_Pa[point] : push->young_Pa;
+    return push->point_Pa[point] > 0 ? (double)push->point_Pa[point] : push->material.young_Pa;
 }
 
-/* IMPLICIT_STIFFNESS times 2 E b / (1 - nu^2) over the area of a contact half a radius wide, b its half-width or that
- * of an element */
+/* IMPLICIT_STIFFNESS 2 E b / (1 - nu^2) over the area of a contact of half-width a, b at least half an element */
 double pal_push_pressure_of_tissue(const pal_push *push, const pal_body *body, int point, double radius_m)
 {
     if (push->asked_Pa_m > 0) return push->asked_Pa_m;
     double a = 0.5 * radius_m, b = fmax(a, 0.5 * body->edge_m);
-    return IMPLICIT_STIFFNESS * 2 * young_at(push, point) * b / ((1 - push->poisson * push->poisson) * M_PI * a * a);
+    return IMPLICIT_STIFFNESS * 2 * young_at(push, point) * b /
+           ((1 - push->material.poisson * push->material.poisson) * M_PI * a * a);
 }
 
 double pal_push_punch_N_m(const pal_push *push, double radius_m)
 {
-    return 2 * push->young_Pa * radius_m / (1 - push->poisson * push->poisson);
+    return 2 * push->material.young_Pa * radius_m / (1 - push->material.poisson * push->material.poisson);
 }
 
 double pal_push_near_m(const pal_push *push, double radius_m)
@@ -36,17 +36,17 @@ double pal_push_near_m(const pal_push *push, double radius_m)
     return push->asked_near_m > 0 ? push->asked_near_m : fmax(radius_m, NEAR_M);
 }
 
-void pal_push_follow_side(pal_tool_contact *t, const double side_before[3])
+void pal_push_follow_side(pal_tool_contact *t, const double side_before[3], double dt_s)
 {
     double side[3];
     if (!pal_unit3(side, t->total, 0)) return;
-    pal_axpy3(side, SIDE_STEPS, side_before);
+    pal_axpy3(side, 1 / expm1(dt_s / SIDE_S), side_before);
     pal_unit3(t->proxy.normal, side, 1e-9);
 }
 
 /* ---- patches ---- */
 
-/* stiffness of a group without contact: of what the sphere would lie on, were it NEAR_RADII nearer */
+/* stiffness of a group without contact: of what the sphere would lie on, were it NEAREST_RADII nearer */
 static void find_near(pal_push *push, pal_tool_contact *t, const double here[3], pal_step *step, const double *x,
                       pal_contact_group *group)
 {
@@ -60,7 +60,7 @@ static void find_near(pal_push *push, pal_tool_contact *t, const double here[3],
             double along = pal_dot3(out, group->normal), distance = pal_norm3(out);
             if (along < 0.5 * distance || area <= 0) continue;
             if (pass == 0) nearest = fmin(nearest, distance);
-            if (pass == 0 || distance > nearest + NEAR_RADII * radius) continue;
+            if (pass == 0 || distance > nearest + NEAREST_RADII * radius) continue;
             point[n] = t->list[i];
             k += area * push->regime->pressure_Pa_m(push, step->body, point[n], radius);
             sum += weight[n++] = area;
@@ -70,16 +70,15 @@ static void find_near(pal_push *push, pal_tool_contact *t, const double here[3],
                               step->scratch);
 }
 
-/* k1 of a group from the solver's compliance: as it is known, found again when it has changed and the step's budget
- * allows; x [n_list][3] are the points */
+/* k1 of a group from the solver's compliance, found again when it has changed, within the step's budget */
 static void find_stiffness(pal_push *push, pal_tool_contact *t, const pal_tool *tool, pal_step *step, const double *x,
                            pal_contact_group *group)
 {
     pal_tool_contact_implicit *implicit = t->implicit;
     double here[3], radius = tool->radius_m;
     pal_sub3(here, tool->here_m, step->body->offset_m);
-    implicit->stiffness.step = push->n_step;
-    if (!pal_haptic_stiffness_find(&implicit->stiffness, group, here, REST_RADII * radius)) return;
+    implicit->stiffness.time_s = step->time_s;
+    if (!pal_haptic_stiffness_find(&implicit->stiffness, group, here, SHALLOW_RADII * radius)) return;
     if (push->n_stiffness >= STIFFNESS_BUDGET || (group->force_N > 0 && implicit->solve.constant)) return;
     push->n_stiffness++;
     if (group->force_N > 0)
@@ -99,7 +98,7 @@ void pal_push_publish(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_s
     uint8_t *grouped = PAL_NEW(step->scratch, uint8_t, t->n_contact);
     if (x && grouped) {
         while (n < PAL_CONTACT_PATCH_MAX && pal_contact_group_next(t->contact, t->n_contact, grouped, &group[n])) n++;
-        /* while the force of before is released it is all of one patch */
+        /* while a transferred force is released there is one patch */
         if (t->hold.share > 0 && pal_unit3(group[0].normal, t->total, 0)) {
             group[0].force_N = pal_norm3(t->total), group[0].gap_m = 0;
             n = 1;
@@ -112,11 +111,12 @@ void pal_push_publish(pal_push *push, pal_tool_contact *t, pal_tool *tool, pal_s
             find_stiffness(push, t, tool, step, x, &group[b]);
     }
     pal_arena_rewind(step->scratch, used);
-    double k = fmin(fmax(pal_push_punch_N_m(push, radius), MIN_STIFFNESS_N_M), MAX_STIFFNESS_N_M);
+    double k = pal_haptic_stiffness_clamp(pal_push_punch_N_m(push, radius));
     pal_contact_patch_options options = {.radius_m = radius,
                                          .k_start_N_m = k,
-                                         .b_s = push->damping_1_s * DRAG_VOLUME * push->density_kg_m3 * radius *
-                                                radius * radius / k,
+                                         .b_s = push->material.damping_1_s * 4.0 / 3 * M_PI *
+                                                push->material.density_kg_m3 * radius * radius * radius / k,
+                                         .sideways = 2 * (1 - push->material.poisson) / (2 - push->material.poisson),
                                          .friction = push->friction};
     pal_contact_patches_update(&t->patches, &options, group, n, tool);
 }

@@ -21,21 +21,18 @@ void pal_tool_contact_free(pal_tool_contact *h)
     h->hold = (pal_contact_blend){.acts = false};
 }
 
-/* ---- the force of before ---- */
-
-/* old nodes' forces to the new nodes that lie there */
+/* a force on an old node to the new nodes at its place */
 static void add_node(const pal_interpolation *place, int32_t node, double scale, const double force_N[3], double *sum)
 {
-    if (!place) pal_axpy3(sum + 3 * (size_t)node, scale, force_N);
-    for (int32_t k = place ? place->start[node] : 0; place && k < place->start[node + 1]; k++)
+    for (int32_t k = place->start[node]; k < place->start[node + 1]; k++)
         pal_axpy3(sum + 3 * (size_t)place->point[k], scale * place->weight[k], force_N);
 }
 
-/* sum [body n_node][3] of the contacts' forces, and of what was held itself */
+/* sum [body n_node][3] of the contacts' forces and of a transferred force that still acts */
 static void sum_nodes(const pal_tool_contact *from, const pal_body *old, pal_contact_points *points,
                       const pal_interpolation *place, double *sum)
 {
-    pal_contact_points_force_begin(points);
+    pal_contact_points_begin_slots(points);
     for (int i = 0; i < from->n_contact; i++)
         pal_contact_points_add_force(points, old, from->contact[i].point, from->contact[i].force);
     (void)pal_contact_points_assemble(points, old);
@@ -53,9 +50,8 @@ static bool keep_nodes(pal_contact_blend *hold, const double *sum, int n_node)
     hold->force_N = malloc(3 * sizeof *hold->force_N * (size_t)(n + 1));
     if (!hold->node || !hold->force_N) return false;
     for (int i = 0; i < n_node; i++) {
-        const double *f = sum + 3 * (size_t)i;
-        if (!(pal_dot3(f, f) > 0)) continue;
-        pal_copy3(hold->force_N + 3 * (size_t)hold->n_node, f);
+        if (!(pal_dot3(sum + 3 * (size_t)i, sum + 3 * (size_t)i) > 0)) continue;
+        pal_copy3(hold->force_N + 3 * (size_t)hold->n_node, sum + 3 * (size_t)i);
         hold->node[hold->n_node++] = i;
     }
     return true;
@@ -78,7 +74,7 @@ static void take_force(pal_tool_contact *to, const pal_body *body, const pal_too
     pal_copy3(to->total, to->hold.total_N);
 }
 
-/* the same body in another world: nothing to be let go */
+/* the same body in another world */
 static void keep_state(pal_tool_contact *to, const pal_tool_contact *from)
 {
     to->share = from->share;
@@ -106,10 +102,8 @@ void pal_tool_contact_transfer(pal_tool_contact *to, const pal_body *body, const
         pal_copy3(to->implicit->last_m, from->implicit ? from->implicit->last_m : from->limits.b);
         to->implicit->back_m = from->implicit ? from->implicit->back_m : 0;
     }
-    if (!place) {
-        keep_state(to, from);
-        return;
-    }
+    if (!place) keep_state(to, from);
+    if (!place) return;
     pal_copy3(to->hold.at_m, from->implicit ? from->implicit->last_m : from->limits.b);
     to->hold.k_N_m = k_N_m;
     take_force(to, body, from, old, points, place);
@@ -121,11 +115,9 @@ void pal_tool_contact_blend(pal_tool_contact *h, pal_step *step, pal_tool *tool,
     double back[3], size = pal_norm3(hold->total_N);
     if (!hold->acts) return;
     if (!hold->begun) hold->ramp = tool->ramp, hold->share = 1, hold->begun = true;
-    hold->share = pal_blend_toward(hold->share, 0, step->dt_s, PAL_BLEND_TRANSFER_S);
-    if (hold->share == 0) {
-        pal_tool_contact_end_blend(h);
-        return;
-    }
+    hold->share = pal_blend_toward(hold->share, 0, step->dt_s, PAL_BLEND_S);
+    if (hold->share == 0) pal_tool_contact_end_blend(h);
+    if (!hold->acts) return;
     pal_sub3(back, here_m, hold->at_m);
     double less_N = hold->k_N_m * fmax(0, pal_dot3(back, hold->total_N) / size);
     hold->part = hold->share * fmax(0, 1 - less_N / size) * (hold->ramp > 0 ? fmin(1, tool->ramp / hold->ramp) : 0);

@@ -1,11 +1,11 @@
 /* The contact of one tool with one body, and its transfer to another body that takes that one's place between two steps
  * (transfer.h).
  *
- * A transfer keeps the proxy, its side, what friction holds, and the force F: the new tissue is pressed at first by F,
- * on the nodes at the same place, and F is released over PAL_BLEND_TRANSFER_S while contact comes in by as much: force
- * = s F + (1 - s) contact,   s = 1 -> 0, so that what is felt does not pass through zero (a proxy that starts again has
- * no depth) nor through a force that belongs to the other body's contact stiffness. Under a tool that withdraws F falls
- * by k a metre, k the tissue's stiffness under half a radius. Memory: the world's arena; F is heap. Thread: [sim]. */
+ * A transfer keeps the proxy, its side, the stretch of friction, and the force F: the new tissue is pressed at first by
+ * F, on the nodes at the same place, and F is released over PAL_BLEND_S while contact rises: force = s F + (1
+ * - s) contact,   s = 1 -> 0, so that the force felt does not pass through zero (a proxy that starts again has no
+ * depth) nor through one of the other body's contact stiffness. Under a tool that withdraws F falls by k a metre, k the
+ * tissue's stiffness under half a radius. Memory: the component's arena; F heap. Thread: [sim]. */
 #ifndef PAL_SIM_CONTACT_TOOL_CONTACT_H
 #define PAL_SIM_CONTACT_TOOL_CONTACT_H
 #include "server/sim/contact/contact_implicit.h"
@@ -14,7 +14,7 @@
 #include "server/sim/contact/proxy.h"
 #include "server/sim/core/effect.h"
 
-/* what an implicit solver needs beside */
+/* additional state with an implicit solver */
 typedef struct pal_tool_contact_implicit {
     pal_contact_implicit solve;
     pal_haptic_stiffness stiffness;
@@ -69,8 +69,7 @@ void pal_tool_contact_transfer(pal_tool_contact *to, const pal_body *body, const
                                double k_N_m);
 /* before contact in a sub-step: s F to body->load and the tool. here_m: the tool, body frame */
 void pal_tool_contact_blend(pal_tool_contact *h, pal_step *step, pal_tool *tool, const double here_m[3]);
-/* friction's spring as the force across that was transferred stretches it, once; stiffness of all contacts at the
- * present share. True: slip_m is it */
+/* stretch of friction by the transferred force across, once; stiffness of all contacts now. True: slip_m is set */
 bool pal_tool_contact_friction(pal_tool_contact *h, const double along[3], double stiffness_N_m, double slip_m[3]);
 void pal_tool_contact_end_blend(pal_tool_contact *h); /* contact is alone again */
 void pal_tool_contact_free(pal_tool_contact *h);      /* heap memory */

@@ -19,24 +19,33 @@ void pal_best_rotation(const double s[9], double turn[9])
             turn[3 * i + j] = u[3 * i] * v[3 * j] + u[3 * i + 1] * v[3 * j + 1] + u[3 * i + 2] * v[3 * j + 2];
 }
 
+int pal_sum_pairs(int n, const uint8_t *mask, const double *x, const double *y, double s[9])
+{
+    double from[3] = {0, 0, 0}, to[3] = {0, 0, 0};
+    int n_used = 0;
+    for (int i = 0; i < 9; i++) s[i] = 0;
+    for (int i = 0; i < n; i++) {
+        if (mask && !mask[i]) continue;
+        pal_add3(from, from, y + 3 * (size_t)i), pal_add3(to, to, x + 3 * (size_t)i), n_used++;
+    }
+    if (n_used == 0) return 0;
+    pal_scale3(from, 1.0 / n_used, from), pal_scale3(to, 1.0 / n_used, to);
+    for (int i = 0; i < n; i++) {
+        double a[3], b[3];
+        if (mask && !mask[i]) continue;
+        pal_sub3(a, x + 3 * (size_t)i, to), pal_sub3(b, y + 3 * (size_t)i, from);
+        pal_add_outer(s, 1, a, b);
+    }
+    return n_used;
+}
+
 bool pal_support_rotation(const pal_body *body, double turn[9])
 {
-    double from[3] = {0, 0, 0}, to[3] = {0, 0, 0}, s[9] = {0}, rest[9] = {0}, width[3], axes[9];
-    int n = 0;
-    for (int i = 0; i < body->n_dof; i++) {
-        if (!body->support[i]) continue;
-        pal_add3(from, from, body->x_rest + 3 * (size_t)i), pal_add3(to, to, body->x + 3 * (size_t)i), n++;
-    }
-    if (n < 3) return false;
-    pal_scale3(from, 1.0 / n, from), pal_scale3(to, 1.0 / n, to);
-    for (int i = 0; i < body->n_dof; i++) {
-        double x[3], y[3];
-        if (!body->support[i]) continue;
-        pal_sub3(x, body->x + 3 * (size_t)i, to), pal_sub3(y, body->x_rest + 3 * (size_t)i, from);
-        pal_add_outer(s, 1, x, y), pal_add_outer(rest, 1, y, y);
-    }
+    double s[9], rest[9], width[3], axes[9];
+    if (pal_sum_pairs(body->n_dof, body->support, body->x_rest, body->x_rest, rest) < 3) return false;
     pal_eigen3(rest, width, axes);
     if (!(width[1] > 1e-6 * body->length_scale_m * body->length_scale_m)) return false;
+    pal_sum_pairs(body->n_dof, body->support, body->x, body->x_rest, s);
     pal_best_rotation(s, turn);
     return true;
 }

@@ -30,38 +30,35 @@ const char *pal_field_title(pal_field field)
     return title[(unsigned)field < PAL_FIELD_COUNT ? field : PAL_FIELD_NONE];
 }
 
+/* n numbers each; false: no memory */
+static bool allocate(pal_arena *arena, size_t n, double **const *to, int n_to)
+{
+    bool all = true;
+    for (int i = 0; i < n_to; i++) all = (*to[i] = PAL_NEW(arena, double, n)) && all;
+    return all;
+}
+
 pal_err pal_body_allocate(pal_body *body, pal_arena *arena, int n_node)
 {
-    size_t n3 = 3 * (size_t)n_node;
-    double *x = PAL_NEW(arena, double, n3), *v = PAL_NEW(arena, double, n3), *f = PAL_NEW(arena, double, n3);
-    double *load = PAL_NEW(arena, double, n3), *rest = PAL_NEW(arena, double, n3);
-    double *mass = PAL_NEW(arena, double, n_node);
-    uint8_t *fixed = PAL_NEW(arena, uint8_t, n_node);
-    if (!x || !v || !f || !load || !rest || !mass || !fixed) return PAL_ERR_MEMORY;
+    double **const vectors[] = {&body->x, &body->v, &body->f, &body->load, &body->x_rest};
+    body->mass_kg = PAL_NEW(arena, double, n_node);
+    body->support = PAL_NEW(arena, uint8_t, n_node);
+    if (!allocate(arena, 3 * (size_t)n_node, vectors, 5) || !body->mass_kg || !body->support) return PAL_ERR_MEMORY;
     body->n_dof = body->n_node = body->n_active = n_node;
-    body->x = body->d = x;
-    body->v = body->dv = v;
-    body->f = body->g = f;
-    body->load = load;
-    body->x_rest = rest;
-    body->mass_kg = body->node_mass_kg = mass;
-    body->node_rest = rest;
-    body->support = fixed;
+    body->d = body->x;
+    body->dv = body->v;
+    body->g = body->f;
+    body->node_mass_kg = body->mass_kg;
+    body->node_rest = body->x_rest;
     return PAL_ERR_OK;
 }
 
 pal_err pal_body_allocate_interpolated(pal_body *body, pal_arena *arena, const pal_interpolation *rows)
 {
-    size_t n3 = 3 * (size_t)rows->n_row;
+    double **const vectors[] = {&body->d, &body->dv, &body->f, &body->load, &body->node_rest};
     PAL_TRY(pal_body_allocate(body, arena, rows->n_point));
-    body->d = PAL_NEW(arena, double, n3);
-    body->dv = PAL_NEW(arena, double, n3);
-    body->f = PAL_NEW(arena, double, n3);
-    body->load = PAL_NEW(arena, double, n3);
-    body->node_rest = PAL_NEW(arena, double, n3);
     body->node_mass_kg = PAL_NEW(arena, double, rows->n_row);
-    if (!body->d || !body->dv || !body->f || !body->load || !body->node_rest || !body->node_mass_kg)
-        return PAL_ERR_MEMORY;
+    if (!allocate(arena, 3 * (size_t)rows->n_row, vectors, 5) || !body->node_mass_kg) return PAL_ERR_MEMORY;
     body->n_node = rows->n_row;
     body->interpolation = rows;
     return PAL_ERR_OK;
@@ -86,16 +83,6 @@ double pal_body_kinetic_J(const pal_body *body)
     return sum;
 }
 
-void pal_body_momentum(const pal_body *body, double momentum_kg_m_s[3])
-{
-    double sum[3] = {0, 0, 0};
-    for (int k = 0; k < body->n_active; k++) {
-        int i = pal_body_point(body, k);
-        for (int c = 0; c < 3; c++) sum[c] += body->mass_kg[i] * body->v[3 * i + c];
-    }
-    for (int c = 0; c < 3; c++) momentum_kg_m_s[c] = sum[c];
-}
-
 bool pal_body_finite(const pal_body *body)
 {
     /* 0 * x is 0 for finite x and NaN otherwise, so one sum tells; in lanes, as no addition then waits for another */
@@ -115,11 +102,11 @@ bool pal_body_finite(const pal_body *body)
 
 void pal_body_add_display_offset(pal_body *body)
 {
-    float part = (float)body->display_offset_part;
+    float part = (float)body->display.offset_part;
     /* of a body that adapts, the OUTPUT component writes the active dofs each time, the others stay */
-    int n = !body->display_offset_m ? 0 : body->active ? body->n_active : body->n_shown;
+    int n = !body->display.offset_m ? 0 : body->active ? body->n_active : body->display.n_shown;
     for (int k = 0; k < n; k++) {
         size_t i = 3 * (size_t)(body->active ? body->active[k] : k);
-        for (size_t c = i; c < i + 3; c++) body->shown[c] += part * body->display_offset_m[c];
+        for (size_t c = i; c < i + 3; c++) body->display.shown[c] += part * body->display.offset_m[c];
     }
 }

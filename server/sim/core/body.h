@@ -17,8 +17,8 @@
 
 struct pal_body;
 
-/* The static answer of the body to a load at its present shape, as far as the solver's factor knows it. Published by an
- * implicit solver that holds a static factor (implicit/compliance.h). */
+/* The static answer of the body to a load at its present shape, from an implicit solver with a static factor
+ * (implicit/compliance.h) */
 typedef struct pal_compliance {
     void *self;
     /* displacement [n_node][3] that the forces [n_node][3] (N, zero at most nodes) would cause once all is at rest
@@ -52,6 +52,26 @@ typedef struct pal_shown_field {
 /* who moves a dof: the solver, nobody, or a component that gives its velocity */
 typedef enum pal_support { PAL_FREE, PAL_FIXED, PAL_PRESCRIBED } pal_support;
 
+/* what is shown of a body, set by the OUTPUT component in make; read by tools, output and broadcast */
+typedef struct pal_display {
+    const pal_surface *surface; /* shown surface at rest                                                           */
+    const pal_skin *skin;       /* of the surface on nodes; NULL: shown vertices are nodes                         */
+    double *skin_axes;          /* current frames of the skin                                         [n_frame][9] */
+    int n_shown;                /* shown vertices; 0: nothing is shown                                             */
+    float *shown;               /* m, body frame                                                      [n_shown][3] */
+    const int32_t *shown_node;  /* node of each shown vertex when skin is NULL                           [n_shown] */
+    const int32_t *shown_face;  /* of solids: control face of each shown triangle, -1: inside a cut; NULL: another
+                                   body                                                                    [n_tri] */
+    /* while a change of method is blended in: the surface shown before less the present one, of which offset_part is
+     * added to what is shown and to every point that tools touch; NULL: no blend */
+    const float *offset_m;                         /* m, body frame                                   [n_shown][3] */
+    double offset_part;                            /* 1 at the change, falls to 0                                  */
+    uint64_t n_output;                             /* times the OUTPUT components ran since load                   */
+    uint64_t revision;                             /* grows with every change of the shown topology                */
+    const pal_shown_field *field[PAL_FIELD_COUNT]; /* NULL: no client asks for it                                  */
+    uint64_t field_revision;                       /* sets of values computed so far, of all fields                */
+} pal_display;
+
 typedef struct pal_body {
     const char *name;
 
@@ -73,8 +93,9 @@ typedef struct pal_body {
      * contact [n_node] */
     double *node_inverse_mass_1_kg;
     /* active dofs: those of `active`, or all when it is NULL: for (k < n_active) i = pal_body_point(body, k). A body
-     * that adapts has arrays for its finest level; inactive dofs stand at x_rest with v, f, load and mass 0, so that a
-     * loop over all dofs is right and one over the active ones is fast */
+     * that adapts has arrays for its finest level; inactive dofs are at x_rest with v, f, load and mass 0, so that a
+     * sum over all dofs is right and one over the active ones fast. Forces are added at active nodes only, since f is
+     * cleared there only */
     const int32_t *active; /* [n_active] */
     int n_active;
     pal_dofs dofs; /* what else differs from model to model (dofs.h) */
@@ -95,7 +116,7 @@ typedef struct pal_body {
     double edge_m;          /* typical edge of an element, "h" in comments                                     */
     double offset_m[3];     /* scene frame = body frame + offset_m; the scene frame is the first body's        */
     double full_corner_kg;  /* mass of a corner of a full voxel, or of a solid's mean cell; 0: another model   */
-    double spring_young_Pa; /* E for which springs with given constants stand; 0: the material's               */
+    double spring_young_Pa; /* E for which springs have their given constants; 0: the material's               */
     const pal_tets *tets;   /* its nodes are the body's first ones                                             */
     const pal_hexes *hexes; /* the same nodes as cubes                                                         */
     /* elements of model fem, for evaluation through shape functions; corners as in num/shape_functions.h
@@ -122,26 +143,10 @@ typedef struct pal_body {
     pal_safeguards safeguards;    /* since the last reset                                              */
     char reason[PAL_REASON_TEXT]; /* one sentence while frozen, else empty                             */
 
-    /* ---- display, set by the OUTPUT component in make ---- */
-    const pal_surface *surface; /* shown surface at rest */
-    const pal_skin *skin; /* of the surface on nodes; NULL: shown vertices are nodes                             */
-    double *skin_axes;    /* current frames of the skin                                              [n_frame][9] */
-    int n_shown;          /* shown vertices; 0: nothing is shown                                                 */
-    float *shown;         /* m, body frame                                                           [n_shown][3] */
-    const int32_t *shown_node; /* node of each shown vertex when skin is NULL                             [n_shown] */
-    const int32_t
-        *shown_face; /* of solids: control face of each shown triangle, -1: inside a cut; NULL: another body [n_tri] */
-    /* while a change of method is blended in: distance of the surface shown before from the present one.
-     * display_offset_part of it is added to what is shown and to every point that tools touch; NULL: no blend */
-    const float *display_offset_m;                 /* m, body frame                            [n_shown][3] */
-    double display_offset_part;                    /* 1 at the change, falls to 0                            */
-    uint64_t n_output;                             /* times the OUTPUT components ran since load             */
-    uint64_t revision;                             /* grows with every change of the shown topology          */
-    const pal_shown_field *field[PAL_FIELD_COUNT]; /* NULL: no client asks for it                            */
-    uint64_t field_revision;                       /* sets of values computed so far, of all fields          */
+    pal_display display;
 } pal_body;
 
-/* the k-th active dof */
+/* the k-th active dof; k of a body with interpolation, for dofs and for nodes */
 static inline int pal_body_point(const pal_body *body, int k)
 {
     return body->active ? body->active[k] : k;
@@ -181,7 +186,6 @@ void pal_body_update_nodes(pal_body *body);
 void pal_body_add_display_offset(pal_body *body);
 /* sums over the body. [sim] */
 double pal_body_kinetic_J(const pal_body *body);
-void pal_body_momentum(const pal_body *body, double momentum_kg_m_s[3]);
 bool pal_body_finite(const pal_body *body); /* are x and v? */
 /* Freezes the body with one sentence as its reason; a frozen body keeps its first reason. dof: named in the sentence
  * together with the smallest element around it and its place at rest (scene frame, mm); -1: none. No heap. [sim] */

@@ -2,7 +2,7 @@
  * set and ended between steps (brush_components.h, world.h). All brushes of a body are one CONTACT component, `brush`,
  * with memory of its own.
  *
- * Force, pressure and lift begin, follow a change and end over PAL_BLEND_BRUSH_S (blend.h) each. A body has brushes
+ * Force, pressure and lift begin, follow a change and end over PAL_BLEND_S (blend.h) each. A body has brushes
  * when its shown vertices are nodes and its topology is constant. Thread: [sim]; heap only in set and destroy. */
 #ifndef PAL_SIM_CORE_BRUSH_H
 #define PAL_SIM_CORE_BRUSH_H
@@ -12,7 +12,7 @@ typedef enum pal_brush_kind {
     PAL_BRUSH_NONE,    /* ends the slot's brush */
     PAL_BRUSH_INFLATE, /* pressure along the present normals of the shown triangles, on at most twice their area at
                           rest, times the weight of their middle at rest: that of a stroke (pal_stroke) of at_m,
-                          radius_m, soft */
+                          radius_m, softness */
     PAL_BRUSH_CURVE, /* a handle from at_m to to_m (fig. 9a): springs pull the shown nodes within radius_m of it at rest
                         to where they were at its begin, plus lift 4 t (1 - t), t = 0 to 1 along it */
     PAL_BRUSH_COUNT
@@ -20,11 +20,11 @@ typedef enum pal_brush_kind {
 
 typedef struct pal_brush {
     pal_brush_kind kind;
-    double at_m[3], to_m[3]; /* on the surface at rest, body frame; INFLATE: at_m alone             */
-    double radius_m, soft;   /* of the weight 0..1, as of a stroke                                  */
-    double pressure_Pa;      /* INFLATE; < 0 deflates                                               */
-    double lift_m[3];        /* CURVE: displacement of the handle's middle                         */
-    double stiffness_N_m;    /* CURVE: of the whole handle, spread over its nodes by their weight   */
+    double at_m[3], to_m[3];   /* on the surface at rest, body frame; INFLATE: at_m alone             */
+    double radius_m, softness; /* of the weight 0..1, as of a stroke                                  */
+    double pressure_Pa;        /* INFLATE; < 0 deflates                                               */
+    double lift_m[3];          /* CURVE: displacement of the handle's middle                         */
+    double stiffness_N_m;      /* CURVE: of the whole handle, spread over its nodes by their weight   */
 } pal_brush;
 
 /* checks that hold for any body; REFUSED names the number out of range [any] */

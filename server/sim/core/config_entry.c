@@ -5,11 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static const char *kind_name(pal_config_value_kind kind)
-{
-    static const char *const names[] = {"a number", "true or false", "a text", "a list of numbers"};
-    return names[kind];
-}
+static const char *const kind_name[] = {"a number", "true or false", "a text", "a list of numbers"};
 
 void pal_entry_init(pal_config_entry *item, const char *path, const char *name)
 {
@@ -18,10 +14,10 @@ void pal_entry_init(pal_config_entry *item, const char *path, const char *name)
     snprintf(item->name, sizeof item->name, "%s", name);
 }
 
-static pal_config_value *find(const pal_config_entry *item, const char *key)
+const pal_config_value *pal_entry_find(const pal_config_entry *item, const char *key)
 {
     for (int i = 0; i < item->n_value; i++)
-        if (!strcmp(item->value[i].key, key)) return (pal_config_value *)&item->value[i];
+        if (!strcmp(item->value[i].key, key)) return &item->value[i];
     return NULL;
 }
 
@@ -29,12 +25,10 @@ static pal_err put(pal_config_entry *item, const char *key, pal_config_value_kin
                    pal_diagnostic *diag)
 {
     if (!*key || strlen(key) >= PAL_ENTRY_TEXT)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: key of %zu characters, wanted 1 to %d", item->path,
-                                  strlen(key), PAL_ENTRY_TEXT - 1);
-    if (find(item, key))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: key \"%s\" is there twice", item->path, key);
-    if (item->n_value == PAL_ENTRY_KEYS)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: more than %d keys", item->path, PAL_ENTRY_KEYS);
+        return PAL_REFUSE(diag, "%s: key of %zu characters, wanted 1 to %d", item->path, strlen(key),
+                          PAL_ENTRY_TEXT - 1);
+    if (pal_entry_has(item, key)) return PAL_REFUSE(diag, "%s: key \"%s\" is there twice", item->path, key);
+    if (item->n_value == PAL_ENTRY_KEYS) return PAL_REFUSE(diag, "%s: more than %d keys", item->path, PAL_ENTRY_KEYS);
     pal_config_value *v = &item->value[item->n_value++];
     memset(v, 0, sizeof *v);
     snprintf(v->key, sizeof v->key, "%s", key);
@@ -63,8 +57,8 @@ pal_err pal_entry_put_bool(pal_config_entry *item, const char *key, bool flag, p
 pal_err pal_entry_put_text(pal_config_entry *item, const char *key, const char *text, pal_diagnostic *diag)
 {
     if (strlen(text) >= PAL_ENTRY_TEXT)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.%s: text of %zu characters, at most %d", item->path, key,
-                                  strlen(text), PAL_ENTRY_TEXT - 1);
+        return PAL_REFUSE(diag, "%s.%s: text of %zu characters, at most %d", item->path, key, strlen(text),
+                          PAL_ENTRY_TEXT - 1);
     pal_config_value *v;
     PAL_TRY(put(item, key, PAL_VALUE_TEXT, &v, diag));
     snprintf(v->text, sizeof v->text, "%s", text);
@@ -75,8 +69,7 @@ pal_err pal_entry_put_numbers(pal_config_entry *item, const char *key, const dou
                               pal_diagnostic *diag)
 {
     if (n < 0 || n > PAL_ENTRY_NUMBERS)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.%s: list of %d numbers, at most %d", item->path, key, n,
-                                  PAL_ENTRY_NUMBERS);
+        return PAL_REFUSE(diag, "%s.%s: list of %d numbers, at most %d", item->path, key, n, PAL_ENTRY_NUMBERS);
     pal_config_value *v;
     PAL_TRY(put(item, key, PAL_VALUE_NUMBERS, &v, diag));
     if (n > 0) memcpy(v->number, number, (size_t)n * sizeof *number);
@@ -84,21 +77,15 @@ pal_err pal_entry_put_numbers(pal_config_entry *item, const char *key, const dou
     return PAL_ERR_OK;
 }
 
-bool pal_entry_has(const pal_config_entry *item, const char *key)
-{
-    return find(item, key) != NULL;
-}
-
 /* *out is NULL when the key is absent */
 static pal_err take(pal_config_entry *item, const char *key, pal_config_value_kind kind, pal_config_value **out,
                     pal_diagnostic *diag)
 {
-    pal_config_value *v = find(item, key);
+    pal_config_value *v = (pal_config_value *)pal_entry_find(item, key);
     *out = v;
     if (!v) return PAL_ERR_OK;
     if (v->kind != kind)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.%s: is %s, wanted %s", item->path, key, kind_name(v->kind),
-                                  kind_name(kind));
+        return PAL_REFUSE(diag, "%s.%s: is %s, wanted %s", item->path, key, kind_name[v->kind], kind_name[kind]);
     v->used = true;
     return PAL_ERR_OK;
 }
@@ -110,8 +97,7 @@ pal_err pal_entry_read_number(pal_config_entry *item, const char *key, double lo
     PAL_TRY(take(item, key, PAL_VALUE_NUMBER, &v, diag));
     if (!v) return PAL_ERR_OK;
     if (!(v->number[0] >= low && v->number[0] <= high))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.%s: %g is outside [%g, %g]", item->path, key, v->number[0],
-                                  low, high);
+        return PAL_REFUSE(diag, "%s.%s: %g is outside [%g, %g]", item->path, key, v->number[0], low, high);
     *out = v->number[0];
     return PAL_ERR_OK;
 }
@@ -120,8 +106,7 @@ pal_err pal_entry_read_count(pal_config_entry *item, const char *key, int low, i
 {
     double number = *out;
     PAL_TRY(pal_entry_read_number(item, key, low, high, &number, diag));
-    if (number != floor(number))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.%s: %g is not a whole number", item->path, key, number);
+    if (number != floor(number)) return PAL_REFUSE(diag, "%s.%s: %g is not a whole number", item->path, key, number);
     *out = (int)number;
     return PAL_ERR_OK;
 }
@@ -142,17 +127,32 @@ pal_err pal_entry_read_text(pal_config_entry *item, const char *key, const char 
     return PAL_ERR_OK;
 }
 
+pal_err pal_entry_read_choice(pal_config_entry *item, const char *key, const char *const *word, int n, int *out,
+                              pal_diagnostic *diag)
+{
+    const char *text = word[*out];
+    char list[128];
+    size_t used = 0;
+    PAL_TRY(pal_entry_read_text(item, key, &text, diag));
+    for (int i = 0; i < n; i++) {
+        if (!strcmp(text, word[i])) {
+            *out = i;
+            return PAL_ERR_OK;
+        }
+        const char *before = i == 0 ? "" : i == n - 1 ? " or " : ", ";
+        if (used < sizeof list) used += (size_t)snprintf(list + used, sizeof list - used, "%s\"%s\"", before, word[i]);
+    }
+    return PAL_REFUSE(diag, "%s.%s: \"%s\", wanted %s", item->path, key, text, list);
+}
+
 pal_err pal_entry_read_numbers(pal_config_entry *item, const char *key, int n, double *out, pal_diagnostic *diag)
 {
     pal_config_value *v;
     PAL_TRY(take(item, key, PAL_VALUE_NUMBERS, &v, diag));
     if (!v) return PAL_ERR_OK;
-    if (v->n_number != n)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.%s: %d numbers, wanted %d", item->path, key, v->n_number,
-                                  n);
+    if (v->n_number != n) return PAL_REFUSE(diag, "%s.%s: %d numbers, wanted %d", item->path, key, v->n_number, n);
     for (int i = 0; i < n; i++)
-        if (!isfinite(v->number[i]))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.%s: number %d is not finite", item->path, key, i + 1);
+        if (!isfinite(v->number[i])) return PAL_REFUSE(diag, "%s.%s: number %d is not finite", item->path, key, i + 1);
     memcpy(out, v->number, (size_t)n * sizeof *out);
     return PAL_ERR_OK;
 }
@@ -161,7 +161,6 @@ pal_err pal_entry_check_unused(const pal_config_entry *item, pal_diagnostic *dia
 {
     for (int i = 0; i < item->n_value; i++)
         if (!item->value[i].used)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s (%s): unknown key \"%s\"", item->path, item->name,
-                                      item->value[i].key);
+            return PAL_REFUSE(diag, "%s (%s): unknown key \"%s\"", item->path, item->name, item->value[i].key);
     return PAL_ERR_OK;
 }

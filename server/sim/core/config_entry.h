@@ -6,6 +6,10 @@
 #include "server/base/err.h"
 
 #include <stdbool.h>
+#include <stddef.h>
+
+/* the sentence of a refusal: return PAL_REFUSE(diag, "...", ...); */
+#define PAL_REFUSE(diag, ...) pal_diagnostic_set(diag, PAL_ERR_REFUSED, __VA_ARGS__)
 
 enum { PAL_ENTRY_KEYS = 32, PAL_ENTRY_NUMBERS = 16, PAL_ENTRY_TEXT = 64 };
 
@@ -41,7 +45,11 @@ pal_err pal_entry_put_text(pal_config_entry *item, const char *key, const char *
 pal_err pal_entry_put_numbers(pal_config_entry *item, const char *key, const double *number, int n,
                               pal_diagnostic *diag);
 
-bool pal_entry_has(const pal_config_entry *item, const char *key);
+const pal_config_value *pal_entry_find(const pal_config_entry *item, const char *key); /* NULL: it has no such key */
+static inline bool pal_entry_has(const pal_config_entry *item, const char *key)
+{
+    return pal_entry_find(item, key) != NULL;
+}
 /* read a key into *out, which keeps its value (the default) when the key is absent; REFUSED for another kind, a number
  * that is not finite or outside [low, high], or a list of another length than n */
 pal_err pal_entry_read_number(pal_config_entry *item, const char *key, double low, double high, double *out,
@@ -51,6 +59,9 @@ pal_err pal_entry_read_count(pal_config_entry *item, const char *key, int low, i
 pal_err pal_entry_read_bool(pal_config_entry *item, const char *key, bool *out, pal_diagnostic *diag);
 pal_err pal_entry_read_text(pal_config_entry *item, const char *key, const char **out,
                             pal_diagnostic *diag); /* borrows from item */
+/* one of n words; *out keeps its index when the key is absent */
+pal_err pal_entry_read_choice(pal_config_entry *item, const char *key, const char *const *word, int n, int *out,
+                              pal_diagnostic *diag);
 pal_err pal_entry_read_numbers(pal_config_entry *item, const char *key, int n, double *out, pal_diagnostic *diag);
 /* REFUSED with the first key that nobody read */
 pal_err pal_entry_check_unused(const pal_config_entry *item, pal_diagnostic *diag);

@@ -4,6 +4,7 @@
 #include "server/mesh/volume/loose_components.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,10 +12,6 @@
 enum { MIN_VOXELS = 2, MAX_VOXELS = 400, MAX_LEVELS = 10, MAX_CUTS = 8, MAX_KEPT_VOXELS = 4000000 };
 /* subdivisions of control cells whose boundary is filled with voxels: as shown, or finer */
 enum { FINE_LEVELS = 3 };
-
-/* cut voxels with less inside are dropped, unless more than max_missing of the volume would go; then those below
- * keep_fill (solve/load_case.c has the same numbers) */
-static const double drop_fill = 0.25, max_missing = 0.025, keep_fill = 0.02;
 
 static bool is(const char *a, const char *b)
 {
@@ -33,26 +30,65 @@ static bool is_voxels(const char *model)
     return is(model, "fem") || is(model, "tet_springs");
 }
 
-/* ---- reading ---- */
+/* ---- keys ---- */
 
-static const pal_config_value *find(const pal_config_entry *item, const char *key)
-{
-    for (int i = 0; i < item->n_value; i++)
-        if (is(item->value[i].key, key)) return &item->value[i];
-    return NULL;
-}
+/* keys of an entry `of` a model, or of any solver ("solver"), that a configuration has: a text, "" where it is absent,
+ * or a number */
+static const struct key {
+    const char *of, *key;
+    size_t at;
+    bool text;
+    double absent;
+} keys[] = {{"fem", "element", offsetof(pal_configuration, element), true, 0},
+            {"fem", "law", offsetof(pal_configuration, law), true, 0},
+            {"tet_springs", "k_distance_J", offsetof(pal_configuration, k_distance_J), false, 0},
+            {"tet_springs", "k_area_J", offsetof(pal_configuration, k_area_J), false, -1},
+            {"tet_springs", "k_volume_J", offsetof(pal_configuration, k_volume_J), false, 0},
+            {"solver", "tolerance", offsetof(pal_configuration, tolerance), false, 0}};
+enum { KEYS = sizeof keys / sizeof *keys };
 
 static double number(const pal_config_entry *item, const char *key, double absent)
 {
-    const pal_config_value *v = find(item, key);
+    const pal_config_value *v = pal_entry_find(item, key);
     return v && v->kind == PAL_VALUE_NUMBER ? v->number[0] : absent;
 }
 
-static void text(const pal_config_entry *item, const char *key, char out[PAL_NAME])
+static void read_keys(const pal_config_entry *item, const char *of, pal_configuration *out)
 {
-    const pal_config_value *v = find(item, key);
-    snprintf(out, PAL_NAME, "%.*s", PAL_NAME - 1, v && v->kind == PAL_VALUE_TEXT ? v->text : "");
+    for (const struct key *k = keys; k < keys + KEYS; k++) {
+        const pal_config_value *v = pal_entry_find(item, k->key);
+        if (!is(k->of, of)) continue;
+        if (k->text)
+            snprintf((char *)out + k->at, PAL_NAME, "%.*s", PAL_NAME - 1,
+                     v && v->kind == PAL_VALUE_TEXT ? v->text : "");
+        else
+            *(double *)(void *)((char *)out + k->at) = number(item, k->key, k->absent);
+    }
 }
+
+static void drop_key(pal_config_entry *item, const char *key)
+{
+    int kept = 0;
+    for (int i = 0; i < item->n_value; i++)
+        if (!is(item->value[i].key, key)) item->value[kept++] = item->value[i];
+    item->n_value = kept;
+}
+
+static pal_err put_keys(const pal_configuration *from, const char *of, pal_config_entry *item, pal_diagnostic *diag)
+{
+    for (const struct key *k = keys; k < keys + KEYS; k++) {
+        const char *word = (const char *)from + k->at;
+        if (!is(k->of, of)) continue;
+        drop_key(item, k->key);
+        if (k->text && word[0]) PAL_TRY(pal_entry_put_text(item, k->key, word, diag));
+        if (k->text) continue;
+        const double value = *(const double *)(const void *)word;
+        if (value > k->absent) PAL_TRY(pal_entry_put_number(item, k->key, value, diag));
+    }
+    return PAL_ERR_OK;
+}
+
+/* ---- reading ---- */
 
 static double longest_side(const pal_surface *surface)
 {
@@ -73,39 +109,27 @@ static int voxels_of(const pal_prepared *mesh)
 
 static bool is_refined(const pal_config_entry *model)
 {
-    const pal_config_value *refine = find(model, "refine");
+    const pal_config_value *refine = pal_entry_find(model, "refine");
     double levels = number(model, "levels", 2);
     return refine && refine->kind == PAL_VALUE_BOOL && !refine->flag && number(model, "start_level", 0) == levels - 1;
-}
-
-static void read_model(const pal_body_def *body, pal_configuration *out)
-{
-    const pal_config_entry *model = &body->model;
-    snprintf(out->model, sizeof out->model, "%.*s", PAL_NAME - 1, model->name);
-    if (is_voxels(model->name)) out->size = voxels_of(body->mesh);
-    if (is(model->name, "fem")) text(model, "element", out->element), text(model, "law", out->law);
-    if (is(model->name, "adaptive_springs")) {
-        out->size = (int)number(model, "levels", 2);
-        if (is_refined(model)) snprintf(out->element, sizeof out->element, "refined");
-    }
-    if (is(model->name, "subdivision_fem")) {
-        int levels = (int)number(model, "levels", 2);
-        out->size = levels > 0 ? levels : -1;
-    }
-    if (is(model->name, "tet_springs")) {
-        out->k_distance_J = number(model, "k_distance_J", 0);
-        out->k_area_J = number(model, "k_area_J", -1);
-        out->k_volume_J = number(model, "k_volume_J", 0);
-    }
 }
 
 void pal_configuration_of(const pal_scene *scene, int body, pal_configuration *out)
 {
     const pal_body_def *def = &scene->body[body];
+    const pal_config_entry *model = &def->model;
+    int levels = (int)number(model, "levels", 2);
     memset(out, 0, sizeof *out);
-    read_model(def, out);
+    snprintf(out->model, sizeof out->model, "%.*s", PAL_NAME - 1, model->name);
+    read_keys(model, model->name, out);
+    if (is_voxels(model->name)) out->size = voxels_of(def->mesh);
+    if (is(model->name, "adaptive_springs")) {
+        out->size = levels;
+        if (is_refined(model)) snprintf(out->element, sizeof out->element, "refined");
+    }
+    if (is(model->name, "subdivision_fem")) out->size = levels > 0 ? levels : -1;
     snprintf(out->solver, sizeof out->solver, "%.*s", PAL_NAME - 1, def->solver.name);
-    out->tolerance = number(&def->solver, "tolerance", 0);
+    read_keys(&def->solver, "solver", out);
     out->step_s = scene->step_s;
 }
 
@@ -142,16 +166,16 @@ bool pal_configuration_equal(const pal_configuration *a, const pal_configuration
 pal_err pal_configuration_check_model(const pal_body_def *body, const char *model, pal_diagnostic *diag)
 {
     static const char *const known[] = {"fem", "tet_springs", "adaptive_springs", "subdivision_fem", NULL};
-    const char *has = body->cells                   ? "control cells, which take subdivision_fem and fem"
-                      : body->mesh->tets.n_node < 1 ? "a surface alone, which takes adaptive_springs"
-                                                    : "full, which takes tet_springs and fem";
-    if (!in_list(model, known)) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is no model \"%.40s\"", model);
-    bool fits = body->cells                   ? is(model, "subdivision_fem") || is(model, "fem")
-                : body->mesh->tets.n_node < 1 ? is(model, "adaptive_springs")
-                                              : is_voxels(model);
-    if (fits) return PAL_ERR_OK;
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" does not take model \"%s\": it is %s", body->name,
-                              model, has);
+    static const struct {
+        const char *is;
+        const char *model[3];
+    } shape[] = {{"control cells, which take subdivision_fem and fem", {"subdivision_fem", "fem"}},
+                 {"a surface alone, which takes adaptive_springs", {"adaptive_springs"}},
+                 {"full, which takes tet_springs and fem", {"tet_springs", "fem"}}};
+    const int k = body->cells ? 0 : body->mesh->tets.n_node < 1 ? 1 : 2;
+    if (!in_list(model, known)) return PAL_REFUSE(diag, "there is no model \"%.40s\"", model);
+    if (in_list(model, shape[k].model)) return PAL_ERR_OK;
+    return PAL_REFUSE(diag, "body \"%s\" does not take model \"%s\": it is %s", body->name, model, shape[k].is);
 }
 
 static pal_err check_words(const pal_configuration *s, pal_diagnostic *diag)
@@ -162,11 +186,10 @@ static pal_err check_words(const pal_configuration *s, pal_diagnostic *diag)
                                          "rk4", "central_cg",     "static_newton", NULL};
     bool fem = is(s->model, "fem"), adaptive = is(s->model, "adaptive_springs");
     if (fem ? !in_list(s->element, element) : s->element[0] && !(adaptive && is(s->element, "refined")))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "model \"%s\" has no element \"%.40s\"", s->model, s->element);
+        return PAL_REFUSE(diag, "model \"%s\" has no element \"%.40s\"", s->model, s->element);
     if (fem ? !in_list(s->law, law) : s->law[0] != 0)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "model \"%s\" has no law \"%.40s\"", s->model, s->law);
-    if (!in_list(s->solver, solver))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is no solver \"%.40s\"", s->solver);
+        return PAL_REFUSE(diag, "model \"%s\" has no law \"%.40s\"", s->model, s->law);
+    if (!in_list(s->solver, solver)) return PAL_REFUSE(diag, "there is no solver \"%.40s\"", s->solver);
     return PAL_ERR_OK;
 }
 
@@ -185,22 +208,20 @@ static pal_err check_numbers(const pal_configuration *s, pal_diagnostic *diag)
     bool voxels = is_voxels(s->model), solid = is(s->model, "subdivision_fem");
     int min = voxels ? MIN_VOXELS : solid ? -1 : 1, max = voxels ? MAX_VOXELS : solid ? MAX_CUTS : MAX_LEVELS;
     if (s->size != 0 && (s->size < min || s->size > max))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "size: %d %s, wanted %d to %d", s->size,
-                                  voxels ? "voxels" : "levels", min, max);
+        return PAL_REFUSE(diag, "size: %d %s, wanted %d to %d", s->size, voxels ? "voxels" : "levels", min, max);
     if (s->step_s != 0 && !(s->step_s >= 1e-4 && s->step_s <= 0.1))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "step_s: %g is outside [1e-4, 0.1]", s->step_s);
+        return PAL_REFUSE(diag, "step_s: %g is outside [1e-4, 0.1]", s->step_s);
     if (s->tolerance != 0 && !(s->tolerance >= 1e-14 && s->tolerance <= 0.5))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "tolerance: %g is outside [1e-14, 0.5]", s->tolerance);
+        return PAL_REFUSE(diag, "tolerance: %g is outside [1e-14, 0.5]", s->tolerance);
     if (s->tolerance != 0 && !in_list(solver_of(s), iterative))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "tolerance: %g, but solver \"%s\" of model \"%s\" takes none",
-                                  s->tolerance, s->solver, s->model);
+        return PAL_REFUSE(diag, "tolerance: %g, but solver \"%s\" of model \"%s\" takes none", s->tolerance, s->solver,
+                          s->model);
     const double k[3] = {s->k_distance_J, s->k_volume_J, s->k_area_J};
     const char *const key[3] = {"k_distance_J", "k_volume_J", "k_area_J"};
     for (int i = 0; i < 3; i++)
         if (!(k[i] == 0 || (i == 2 && k[i] == -1) || (k[i] > 0 && k[i] <= 1e60)) ||
             (!is(s->model, "tet_springs") && k[i] != 0))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %g is no constant of springs of model \"%s\"", key[i],
-                                      k[i], s->model);
+            return PAL_REFUSE(diag, "%s: %g is no constant of springs of model \"%s\"", key[i], k[i], s->model);
     return PAL_ERR_OK;
 }
 
@@ -246,7 +267,7 @@ static void box_supports(const pal_scene *from, int body, pal_body_def *to)
 
 /* Moves the grid so that its planes pass through the border of the first box that cuts the body on an axis, just within
  * the box, so that rounding does not put nodes outside. */
-static double ahead_of(double low, double high, double h, double box_low, double box_high)
+static double grid_shift(double low, double high, double h, double box_low, double box_high)
 {
     const double hair = 1e-6, plane[2] = {(box_low - low) / h + hair, (box_high - low) / h - hair};
     for (int side = 0; side < 2; side++) {
@@ -266,11 +287,11 @@ static void align(const pal_body_def *body, const pal_surface *surface, int size
         double at = -1;
         for (int k = 0; k < body->n_support && at < 0; k++) {
             const pal_support_def *s = &body->support[k];
-            if (!s->lowest && !s->rim) at = ahead_of(low[c], high[c], h, s->low_m[c], s->high_m[c]);
+            if (!s->lowest && !s->rim) at = grid_shift(low[c], high[c], h, s->low_m[c], s->high_m[c]);
         }
         for (int k = 0; k < body->n_region && at < 0; k++) {
             const pal_region *r = &body->region[k];
-            if (r->kind == PAL_REGION_BOX) at = ahead_of(low[c], high[c], h, r->low_m[c], r->high_m[c]);
+            if (r->kind == PAL_REGION_BOX) at = grid_shift(low[c], high[c], h, r->low_m[c], r->high_m[c]);
         }
         ahead[c] = at < 0 ? 0 : at;
     }
@@ -301,13 +322,17 @@ static pal_err fill_voxels(const pal_body_def *body, const double up[3], const p
 {
     pal_prepare_report report;
     pal_diagnostic reason = {{0}};
-    pal_voxel_options voxel = {
-        .resolution = size, .border = true, .min_fill = drop_fill, .fill = true, .max_voxel = MAX_KEPT_VOXELS};
+    pal_voxel_options voxel = {.resolution = size,
+                               .border = true,
+                               .min_fill = PAL_VOXEL_DROP_FILL,
+                               .fill = true,
+                               .max_voxel = MAX_KEPT_VOXELS};
     align(body, surface, size, voxel.ahead);
     pal_err err = pal_prepared_make(surface, &voxel, out, &report, &reason);
-    if (!err && missing(out) > max_missing) {
+    /* thin parts consist of voxels with little inside */
+    if (!err && missing(out) > PAL_VOXEL_MAX_MISSING) {
         pal_prepared_free(out);
-        voxel.min_fill = keep_fill;
+        voxel.min_fill = PAL_FILL_MIN;
         err = pal_prepared_make(surface, &voxel, out, &report, &reason);
     }
     if (!err && report.voxel.n_component > 1 && (err = drop_loose(body, up, out, &reason))) pal_prepared_free(out);
@@ -341,11 +366,10 @@ static pal_err make_mesh(const pal_body_def *body, const double up[3], int size,
                          pal_diagnostic *diag)
 {
     if (size < 1)
-        return pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED,
-            "body \"%s\": as many voxels as it has are wanted, and it was not made of voxels: say how "
-            "many",
-            body->name);
+        return PAL_REFUSE(diag,
+                          "body \"%s\": as many voxels as it has are wanted, and it was not made of voxels: say how "
+                          "many",
+                          body->name);
     if (!body->cells) return fill_voxels(body, up, &body->mesh->surface, size, out, diag);
     pal_surface surface = {0};
     PAL_TRY(cells_surface(body, &surface, diag));
@@ -356,48 +380,28 @@ static pal_err make_mesh(const pal_body_def *body, const double up[3], int size,
 
 /* ---- making ---- */
 
-/* the entry's keys but those named */
-static void drop_keys(pal_config_entry *item, const char *const *keys)
-{
-    int kept = 0;
-    for (int i = 0; i < item->n_value; i++)
-        if (!in_list(item->value[i].key, keys)) item->value[kept++] = item->value[i];
-    item->n_value = kept;
-}
-
-static pal_err put_text(pal_config_entry *item, const char *key, const char *word, pal_diagnostic *diag)
-{
-    return word[0] ? pal_entry_put_text(item, key, word, diag) : PAL_ERR_OK;
-}
-
 static pal_err put_springs(const pal_configuration *now, const pal_configuration *to, pal_config_entry *item,
                            pal_diagnostic *diag)
 {
-    static const char *const keys[] = {"k_distance_J", "k_area_J", "k_volume_J", NULL};
-    static const char *const weights[] = {"weights", NULL};
     bool same =
         is(now->model, to->model) && near(now->k_distance_J, to->k_distance_J) && near(now->k_volume_J, to->k_volume_J);
-    drop_keys(item, keys);
-    if (!same) drop_keys(item, weights);
+    if (!same) drop_key(item, "weights");
     if (!same && to->k_distance_J > 0) PAL_TRY(pal_entry_put_text(item, "weights", "volume", diag));
-    if (to->k_distance_J > 0) PAL_TRY(pal_entry_put_number(item, "k_distance_J", to->k_distance_J, diag));
-    if (to->k_area_J >= 0) PAL_TRY(pal_entry_put_number(item, "k_area_J", to->k_area_J, diag));
-    return to->k_volume_J > 0 ? pal_entry_put_number(item, "k_volume_J", to->k_volume_J, diag) : PAL_ERR_OK;
+    return put_keys(to, "tet_springs", item, diag);
 }
 
 static pal_err put_levels(const pal_configuration *now, const pal_configuration *to, pal_config_entry *item,
                           pal_diagnostic *diag)
 {
-    static const char *const levels[] = {"levels", NULL}, *const refine[] = {"start_level", "refine", NULL};
     bool refined = is(to->element, "refined"), same = is(to->model, now->model);
     int size = to->size != 0 ? to->size : same ? now->size : 0, n = size > 0 ? size : 0;
     if (same && size == now->size && is(to->element, now->element)) return PAL_ERR_OK;
     if (to->size != 0) {
-        drop_keys(item, levels);
+        drop_key(item, "levels");
         PAL_TRY(pal_entry_put_number(item, "levels", n, diag));
     }
     if (is(to->model, "subdivision_fem")) return PAL_ERR_OK;
-    drop_keys(item, refine);
+    drop_key(item, "start_level"), drop_key(item, "refine");
     if (!refined) return PAL_ERR_OK;
     PAL_TRY(pal_entry_put_number(item, "start_level", n - 1, diag));
     return pal_entry_put_bool(item, "refine", false, diag);
@@ -406,7 +410,6 @@ static pal_err put_levels(const pal_configuration *now, const pal_configuration 
 static pal_err put_model(const pal_configuration *now, const pal_configuration *to, pal_config_entry *item,
                          pal_diagnostic *diag)
 {
-    static const char *const fem_keys[] = {"element", "law", NULL};
     if (!is(now->model, to->model)) {
         char path[PAL_ENTRY_TEXT];
         memcpy(path, item->path, sizeof path);
@@ -415,15 +418,12 @@ static pal_err put_model(const pal_configuration *now, const pal_configuration *
     }
     if (is(to->model, "tet_springs")) return put_springs(now, to, item, diag);
     if (!is(to->model, "fem")) return put_levels(now, to, item, diag);
-    drop_keys(item, fem_keys);
-    PAL_TRY(put_text(item, "element", to->element, diag));
-    return put_text(item, "law", to->law, diag);
+    return put_keys(to, "fem", item, diag);
 }
 
 static pal_err put_solver(const pal_configuration *now, const pal_configuration *to, pal_config_entry *item,
                           pal_diagnostic *diag)
 {
-    static const char *const keys[] = {"tolerance", NULL};
     const char *name = solver_of(to);
     if (!is(name, now->solver) || !is(now->model, to->model)) {
         char path[PAL_ENTRY_TEXT];
@@ -431,8 +431,7 @@ static pal_err put_solver(const pal_configuration *now, const pal_configuration 
         pal_entry_init(item, path, name);
     }
     if (near(to->tolerance, now->tolerance) && is(item->name, now->solver)) return PAL_ERR_OK;
-    drop_keys(item, keys);
-    return to->tolerance > 0 ? pal_entry_put_number(item, "tolerance", to->tolerance, diag) : PAL_ERR_OK;
+    return put_keys(to, "solver", item, diag);
 }
 
 /* can the present voxels be used? */
@@ -468,16 +467,14 @@ static pal_err change(const pal_scene *from, const pal_configuration *now, const
 
 static pal_err check(const pal_scene *from, int body, const pal_configuration *to, pal_diagnostic *diag)
 {
-    if (body < 0 || body >= from->n_body)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body %d: the scene has %d", body, from->n_body);
+    if (body < 0 || body >= from->n_body) return PAL_REFUSE(diag, "body %d: the scene has %d", body, from->n_body);
     const pal_body_def *def = &from->body[body];
     PAL_TRY(pal_configuration_check_model(def, to->model, diag));
     PAL_TRY(check_words(to, diag));
     PAL_TRY(check_numbers(to, diag));
     if (def->n_stroke > 0 && !is(to->model, "subdivision_fem"))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "body \"%s\" is painted (%d strokes), and model \"%s\" cannot be painted", def->name,
-                                  def->n_stroke, to->model);
+        return PAL_REFUSE(diag, "body \"%s\" is painted (%d strokes), and model \"%s\" cannot be painted", def->name,
+                          def->n_stroke, to->model);
     return PAL_ERR_OK;
 }
 
@@ -533,6 +530,6 @@ pal_err pal_configuration_check_live(const pal_scene *scene, int body, const pal
     PAL_TRY(check(scene, body, to, diag));
     double n_node = pal_configuration_estimate_nodes(scene, body, to);
     if (n_node <= PAL_CONFIGURATION_LIVE_NODES) return PAL_ERR_OK;
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "size: %d makes about %.2g nodes, a live switch takes %d at most",
-                              to->size, n_node, PAL_CONFIGURATION_LIVE_NODES);
+    return PAL_REFUSE(diag, "size: %d makes about %.2g nodes, a live switch takes %d at most", to->size, n_node,
+                      PAL_CONFIGURATION_LIVE_NODES);
 }

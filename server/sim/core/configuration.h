@@ -54,10 +54,9 @@ bool pal_configuration_support_box(const pal_scene *scene, int body, int support
 /* Makes the scene of a configuration. It keeps material, supports, regions, effects, tools and the keys of model and
  * solver that a configuration does not have. Voxels are prepared again from the body's shown surface when the size
  * differs, or when finite elements replace another model and there is no measured fill: cut voxels count by their
- * filled share, those less than a quarter full are dropped unless more than 2.5 % of the volume would go with them, and
- * the planes of the voxels pass through the border of the first support or region that cuts the body
- * (solve/load_case.h). A support of the lowest part becomes a box. *out: heap, pal_configured_scene_free; borrows from
- * `from`, which outlives it. REFUSED: a model that does not fit the body, an unknown word, a size or number out of
+ * filled share (PAL_VOXEL_DROP_FILL), and the planes of the voxels pass through the border of the first support or
+ * region that cuts the body. A support of the lowest part becomes a box. *out: heap, pal_configured_scene_free; borrows
+ * from `from`, which outlives it. REFUSED: a model that does not fit the body, an unknown word, a size or number out of
  * range; BUDGET, MEMORY */
 pal_err pal_configuration_make(const pal_scene *from, int body, const pal_configuration *to, pal_diagnostic *diag,
                                pal_configured_scene **out);

@@ -67,8 +67,8 @@ pal_err pal_material_check(pal_material *material, pal_diagnostic *diag)
                  {"damping_1_s", material->damping_1_s, 0, PAL_DAMPING_MAX_1_S}};
     for (size_t i = 0; i < sizeof range / sizeof range[0]; i++)
         if (!(range[i].value >= range[i].low && range[i].value <= range[i].high))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "material.%s: %g is outside [%g, %g]", range[i].key,
-                                      range[i].value, range[i].low, range[i].high);
+            return PAL_REFUSE(diag, "material.%s: %g is outside [%g, %g]", range[i].key, range[i].value, range[i].low,
+                              range[i].high);
     if (material->poisson > PAL_POISSON_CLAMP) {
         pal_diagnostic_set(diag, PAL_ERR_OK, "material.poisson: %g taken as %g", material->poisson, PAL_POISSON_CLAMP);
         material->poisson = PAL_POISSON_CLAMP;
@@ -124,20 +124,18 @@ static pal_err check_support(const pal_body_def *body, int index, pal_diagnostic
 {
     const pal_support_def *s = &body->support[index];
     if (s->lowest && s->rim)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" supports[%d]: both lowest and rim", body->name,
-                                  index);
+        return PAL_REFUSE(diag, "body \"%s\" supports[%d]: both lowest and rim", body->name, index);
     if (s->rim && strcmp(body->model.name, "adaptive_springs") != 0)
-        return pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED,
-            "body \"%s\" supports[%d].boundary: only goes with model \"adaptive_springs\", not \"%s\"", body->name,
-            index, body->model.name);
+        return PAL_REFUSE(diag,
+                          "body \"%s\" supports[%d].boundary: only goes with model \"adaptive_springs\", not \"%s\"",
+                          body->name, index, body->model.name);
     if (s->lowest && !(s->fraction >= 0 && s->fraction <= 1))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" supports[%d]: fraction %g is outside [0, 1]",
-                                  body->name, index, s->fraction);
+        return PAL_REFUSE(diag, "body \"%s\" supports[%d]: fraction %g is outside [0, 1]", body->name, index,
+                          s->fraction);
     for (int c = 0; c < 3 && !s->lowest && !s->rim; c++)
         if (!(s->low_m[c] <= s->high_m[c]))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" supports[%d]: box from %g to %g", body->name,
-                                      index, s->low_m[c], s->high_m[c]);
+            return PAL_REFUSE(diag, "body \"%s\" supports[%d]: box from %g to %g", body->name, index, s->low_m[c],
+                              s->high_m[c]);
     return PAL_ERR_OK;
 }
 
@@ -149,31 +147,26 @@ pal_err pal_spring_grid_check(const pal_body_def *def, pal_diagnostic *diag)
     double count = 1;
     if (!g->n[0] && !g->n[1] && !g->n[2] && !g->k_J[0] && !g->k_J[1] && !g->k_J[2]) return PAL_ERR_OK;
     if (strcmp(def->model.name, "tet_springs") != 0)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "body \"%s\" model.grid: model \"%s\" has no springs; \"tet_springs\" takes a grid",
-                                  name, def->model.name);
+        return PAL_REFUSE(diag, "body \"%s\" model.grid: model \"%s\" has no springs; \"tet_springs\" takes a grid",
+                          name, def->model.name);
     for (int c = 0; c < 3; c++) {
         if (g->n[c] < 1)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" model.grid.n[%d]: %d nodes, wanted 1 or more",
-                                      name, c, g->n[c]);
+            return PAL_REFUSE(diag, "body \"%s\" model.grid.n[%d]: %d nodes, wanted 1 or more", name, c, g->n[c]);
         if (!isfinite(g->low_m[c]) || !isfinite(g->high_m[c]) || (g->n[c] > 1 && !(g->high_m[c] > g->low_m[c])))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                      "body \"%s\" model.grid: low_m[%d] %g is not below high_m[%d] %g", name, c,
-                                      g->low_m[c], c, g->high_m[c]);
+            return PAL_REFUSE(diag, "body \"%s\" model.grid: low_m[%d] %g is not below high_m[%d] %g", name, c,
+                              g->low_m[c], c, g->high_m[c]);
         count *= g->n[c];
     }
     if (count > PAL_SPRING_GRID_NODES_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" model.grid.n: %g nodes, at most %d", name, count,
-                                  PAL_SPRING_GRID_NODES_MAX);
+        return PAL_REFUSE(diag, "body \"%s\" model.grid.n: %g nodes, at most %d", name, count,
+                          PAL_SPRING_GRID_NODES_MAX);
     if (!g->k_J[0] && !g->k_J[1] && !g->k_J[2])
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "body \"%s\" model.grid: gives neither k_distance_J, k_area_J nor k_volume_J", name);
+        return PAL_REFUSE(diag, "body \"%s\" model.grid: gives neither k_distance_J, k_area_J nor k_volume_J", name);
     for (int k = 0; k < 3; k++)
         for (int i = 0; g->k_J[k] && i < (int)count; i++)
             if (!(g->k_J[k][i] >= 1e-60 && g->k_J[k][i] <= 1e60))
-                return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                          "body \"%s\" model.grid.%s[%d]: %g is outside [1e-60, 1e+60]", name, list[k],
-                                          i, g->k_J[k][i]);
+                return PAL_REFUSE(diag, "body \"%s\" model.grid.%s[%d]: %g is outside [1e-60, 1e+60]", name, list[k], i,
+                                  g->k_J[k][i]);
     return PAL_ERR_OK;
 }
 
@@ -183,90 +176,77 @@ static pal_err check_cells(const pal_body_def *body, pal_diagnostic *diag)
     bool solid = !strcmp(body->model.name, "subdivision_fem");
     pal_diagnostic reason = {{0}};
     if (solid && (!body->cells || body->cells->n_cell < 1))
-        return pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED,
-            "body \"%s\" model: \"subdivision_fem\" works on control cells, and the body has none", body->name);
+        return PAL_REFUSE(diag, "body \"%s\" model: \"subdivision_fem\" works on control cells, and the body has none",
+                          body->name);
     if (!solid && body->cells)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "body \"%s\" model: \"%s\" does not take control cells; \"subdivision_fem\" does",
-                                  body->name, body->model.name);
+        return PAL_REFUSE(diag, "body \"%s\" model: \"%s\" does not take control cells; \"subdivision_fem\" does",
+                          body->name, body->model.name);
     if (body->n_stroke < 0 || body->n_stroke > PAL_STROKE_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": %d strokes, at most %d", body->name,
-                                  body->n_stroke, PAL_STROKE_MAX);
+        return PAL_REFUSE(diag, "body \"%s\": %d strokes, at most %d", body->name, body->n_stroke, PAL_STROKE_MAX);
     if (!solid && body->n_stroke > 0)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "body \"%s\" strokes: model \"%s\" cannot be painted; \"subdivision_fem\" can",
-                                  body->name, body->model.name);
+        return PAL_REFUSE(diag, "body \"%s\" strokes: model \"%s\" cannot be painted; \"subdivision_fem\" can",
+                          body->name, body->model.name);
     for (int i = 0; i < body->n_stroke; i++)
         if (pal_stroke_check(&body->stroke[i], &reason))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" strokes[%d].%s", body->name, i, reason.text);
+            return PAL_REFUSE(diag, "body \"%s\" strokes[%d].%s", body->name, i, reason.text);
     return PAL_ERR_OK;
 }
 
 static pal_err check_body(const pal_scene *scene, int index, pal_diagnostic *diag)
 {
     const pal_body_def *body = &scene->body[index];
-    if (!body->name[0]) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "bodies[%d]: no name", index);
+    if (!body->name[0]) return PAL_REFUSE(diag, "bodies[%d]: no name", index);
     for (int i = 0; i < index; i++)
         if (!strcmp(scene->body[i].name, body->name))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "bodies[%d]: the name \"%s\" is there twice", index,
-                                      body->name);
+            return PAL_REFUSE(diag, "bodies[%d]: the name \"%s\" is there twice", index, body->name);
     bool adaptive = !strcmp(body->model.name, "adaptive_springs");
     if (!body->mesh || (body->mesh->tets.n_node < 1 && body->mesh->surface.n_tri < 1))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": no mesh", body->name);
+        return PAL_REFUSE(diag, "body \"%s\": no mesh", body->name);
     if (adaptive && body->mesh->surface.n_tri < 1)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "body \"%s\" model: \"adaptive_springs\" works on the surface, and the mesh has none",
-                                  body->name);
+        return PAL_REFUSE(diag, "body \"%s\" model: \"adaptive_springs\" works on the surface, and the mesh has none",
+                          body->name);
     PAL_TRY(check_cells(body, diag));
     if (!adaptive && !body->cells && body->mesh->tets.n_node < 1)
-        return pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED,
-            "body \"%s\" model: \"%s\" works on tetrahedra, and the mesh is a surface alone (made for "
-            "\"adaptive_springs\")",
-            body->name, body->model.name);
+        return PAL_REFUSE(diag,
+                          "body \"%s\" model: \"%s\" works on tetrahedra, and the mesh is a surface alone (made for "
+                          "\"adaptive_springs\")",
+                          body->name, body->model.name);
     if (body->n_support < 0 || body->n_support > PAL_SUPPORT_MAX || body->n_effect < 0 ||
         body->n_effect > PAL_ENTRIES_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": %d supports, %d effects, at most %d and %d",
-                                  body->name, body->n_support, body->n_effect, PAL_SUPPORT_MAX, PAL_ENTRIES_MAX);
+        return PAL_REFUSE(diag, "body \"%s\": %d supports, %d effects, at most %d and %d", body->name, body->n_support,
+                          body->n_effect, PAL_SUPPORT_MAX, PAL_ENTRIES_MAX);
     if (body->n_region < 0 || body->n_region > PAL_REGION_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": %d regions, at most %d", body->name,
-                                  body->n_region, PAL_REGION_MAX);
+        return PAL_REFUSE(diag, "body \"%s\": %d regions, at most %d", body->name, body->n_region, PAL_REGION_MAX);
     for (int i = 0; i < body->n_support; i++) PAL_TRY(check_support(body, i, diag));
     for (int i = 0; i < body->n_region; i++) PAL_TRY(pal_region_check(body, i, diag));
     PAL_TRY(pal_spring_grid_check(body, diag));
     pal_material material = body->material;
     pal_diagnostic reason = {{0}};
-    if (pal_material_check(&material, &reason))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" %s", body->name, reason.text);
+    if (pal_material_check(&material, &reason)) return PAL_REFUSE(diag, "body \"%s\" %s", body->name, reason.text);
     return PAL_ERR_OK;
 }
 
 pal_err pal_scene_check(const pal_scene *scene, pal_diagnostic *diag)
 {
     if (!(scene->step_s >= 1e-4 && scene->step_s <= 0.1))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "step_s: %g is outside [1e-4, 0.1]", scene->step_s);
+        return PAL_REFUSE(diag, "step_s: %g is outside [1e-4, 0.1]", scene->step_s);
     double up2 = scene->up[0] * scene->up[0] + scene->up[1] * scene->up[1] + scene->up[2] * scene->up[2];
-    if (!(fabs(up2 - 1) < 1e-3))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "up: length %g, wanted a unit vector", sqrt(up2));
+    if (!(fabs(up2 - 1) < 1e-3)) return PAL_REFUSE(diag, "up: length %g, wanted a unit vector", sqrt(up2));
     if (!(fabs(scene->gravity_m_s2) <= 1e4))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "gravity_m_s2: %g is outside [-1e4, 1e4]",
-                                  scene->gravity_m_s2);
+        return PAL_REFUSE(diag, "gravity_m_s2: %g is outside [-1e4, 1e4]", scene->gravity_m_s2);
     if (scene->max_substep < 1 || scene->max_substep > 1000000)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "max_substep: %d is outside [1, 1000000]", scene->max_substep);
+        return PAL_REFUSE(diag, "max_substep: %d is outside [1, 1000000]", scene->max_substep);
     if (scene->n_body < 1 || scene->n_body > PAL_BODY_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "bodies: %d, wanted 1 to %d", scene->n_body, PAL_BODY_MAX);
+        return PAL_REFUSE(diag, "bodies: %d, wanted 1 to %d", scene->n_body, PAL_BODY_MAX);
     if (scene->n_tool < 0 || scene->n_tool > PAL_TOOL_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "tools: %d, wanted 0 to %d", scene->n_tool, PAL_TOOL_MAX);
+        return PAL_REFUSE(diag, "tools: %d, wanted 0 to %d", scene->n_tool, PAL_TOOL_MAX);
     for (int i = 0; i < scene->n_body; i++) PAL_TRY(check_body(scene, i, diag));
     for (int i = 0; i < scene->n_tool; i++) {
         const pal_tool_def *tool = &scene->tool[i];
         if (!(tool->radius_m >= 0 && tool->radius_m <= PAL_LENGTH_MAX_M))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "tools[%d].radius_m: %g is not a radius", i,
-                                      tool->radius_m);
+            return PAL_REFUSE(diag, "tools[%d].radius_m: %g is not a radius", i, tool->radius_m);
         if (!(tool->force_cap_N > 0 && tool->force_cap_N <= 1e9))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "tools[%d].force_cap_N: %g is outside (0, 1e9]", i,
-                                      tool->force_cap_N);
+            return PAL_REFUSE(diag, "tools[%d].force_cap_N: %g is outside (0, 1e9]", i, tool->force_cap_N);
     }
     return PAL_ERR_OK;
 }

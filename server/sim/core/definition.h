@@ -53,11 +53,11 @@ typedef struct pal_support_def {
 } pal_support_def;
 
 /* A stroke of a soft brush over the material at rest (painting, paper A section 4.1; model subdivision_fem). Within
- * radius_m of at_m, Young's modulus and density are multiplied by factor^w; w is 1 up to (1 - soft) radius_m and falls
- * smoothly to 0 at radius_m. Strokes multiply. Ranges: factors PAL_STROKE_FACTOR_MIN to _MAX, soft 0 to 1, radius_m
- * above 0 */
+ * radius_m of at_m, Young's modulus and density are multiplied by factor^w; w is 1 up to (1 - softness) radius_m and
+ * falls smoothly to 0 at radius_m. Strokes multiply. Ranges: factors PAL_STROKE_FACTOR_MIN to _MAX, softness 0 to 1,
+ * radius_m above 0 */
 typedef struct pal_stroke {
-    double at_m[3], radius_m, soft; /* body frame, rest shape */
+    double at_m[3], radius_m, softness; /* body frame, rest shape */
     double young_factor, density_factor;
 } pal_stroke;
 enum { PAL_STROKE_MAX = 4096 };

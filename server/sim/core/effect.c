@@ -5,6 +5,21 @@
 
 #include <string.h>
 
+pal_err pal_run_forces(pal_step *step, bool packed)
+{
+    uint64_t before = pal_clock_ns();
+    for (int i = 0; i < step->n_force; i++) {
+        pal_component *component = &step->force[i];
+        if (step->drag_separate && component->effect->drag) continue;
+        component->n_run++;
+        PAL_TRY((packed ? component->effect->compute_forces : component->effect->run)(component->self, step));
+        uint64_t now = pal_clock_ns();
+        component->spent_ns += now - before;
+        before = now;
+    }
+    return PAL_ERR_OK;
+}
+
 pal_err pal_assemble_forces(pal_step *step)
 {
     pal_body *body = step->body;
@@ -14,16 +29,7 @@ pal_err pal_assemble_forces(pal_step *step)
     }
     pal_body_update_nodes(body);
     if (!body->active) memcpy(body->f, body->load, 3 * sizeof(double) * (size_t)body->n_node);
-    uint64_t before = pal_clock_ns();
-    for (int i = 0; i < step->n_force; i++) {
-        pal_component *row = &step->force[i];
-        if (step->drag_separate && row->effect->drag) continue;
-        row->n_run++;
-        PAL_TRY(row->effect->run(row->self, step));
-        uint64_t now = pal_clock_ns();
-        row->spent_ns += now - before;
-        before = now;
-    }
+    PAL_TRY(pal_run_forces(step, false));
     if (body->interpolation) {
         memset(body->g, 0, 3 * sizeof(double) * (size_t)body->n_dof);
         pal_interpolation_apply_transpose(body->interpolation, body->f, body->g);

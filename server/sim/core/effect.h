@@ -2,11 +2,9 @@
  * The plan is the ordered list of components that a scene calls for; what a scene does not call for has no component,
  * memory or branch.
  *
- * A step runs, in every sub-step, the CONTACT components and then SOLVE, which calls pal_assemble_forces, and that the
- * FORCE components, as often as it needs; then, once, the ADAPT, GUARD and OUTPUT components. The number of sub-steps
- * is ceil(step / limit of the SOLVE components), so that a step may be of any length; when the limit falls within a
- * step, the rest of the step is divided again. An effect file includes this header and headers of lower rooms, never
- * world.h and never another effect. */
+ * A step runs, in every sub-step, the CONTACT components and then SOLVE, which runs the FORCE components as often as it
+ * needs (pal_assemble_forces); then, once, the ADAPT, GUARD and OUTPUT components. The number of sub-steps is
+ * ceil(step / limit of the SOLVE components); when the limit falls within a step, the rest of it is divided again. */
 #ifndef PAL_SIM_CORE_EFFECT_H
 #define PAL_SIM_CORE_EFFECT_H
 #include "server/num/block_matrix.h"
@@ -44,8 +42,8 @@ typedef struct pal_step {
     double dt_s;        /* length of this sub-step; of the whole step in ADAPT, GUARD, OUTPUT                     */
     double time_s;      /* at its end                                                                            */
     int sub, n_sub;     /* number of this sub-step, and how many; n_sub may grow in a step with large deformation */
-    bool heavy; /* the budget of sub-steps is used up and dt_s is above the limit: the solver adds mass to the nodes
-                   that need it instead of letting them diverge */
+    bool adds_mass; /* the budget of sub-steps is used up and dt_s is above the limit: the solver adds mass where needed
+                     */
 } pal_step;
 
 /* what `make` may use: everything that exists at load */
@@ -62,40 +60,43 @@ typedef struct pal_build {
 } pal_build;
 
 /* What implicit solvers ask of FORCE and CONTACT components: stiffness K = -df/dx and damping C = -df/dv, symmetric,
- * evaluated by `linearise` and constant until the next one. K is positive semi-definite or is made so. [sim] unless
- * stated */
+ * evaluated by `linearise` and constant until the next one. K is positive semi-definite or is made so. FORCE components
+ * have linearise and multiply; every other member may be NULL. [sim] unless stated */
 typedef struct pal_tangent {
-    /* nodes that the component couples, for the pattern of an assembled matrix; false: none, it is applied by multiply
-     * only, as contact is. [load], after make */
+    /* nodes that the component couples, for the pattern of an assembled matrix, to which assemble adds; NULL or false:
+     * it is applied by multiply only, as contact is. [load], after make */
     bool (*couple)(void *self, pal_cliques *out);
     /* evaluates K and C at the body's current d and, for CONTACT, at the loads given in this sub-step */
     void (*linearise)(void *self, const pal_body *body);
     /* out += (k K + c C) p, p and out [n_node][3] */
     void (*multiply)(void *self, const pal_body *body, double k, double c, const double *p, double *out);
-    /* to += k K + c C, in the pattern made with couple */
+    /* to += k K + c C, in the pattern made with couple; not called for a body with interpolation */
     void (*assemble)(void *self, const pal_body *body, double k, double c, pal_block_matrix *to);
-    /* turn [n_node][9] += rotation of the material around each node at the last linearise, weighted by stiffness. The
-     * solver takes the polar part of the sum; with weights by volume, a preconditioner turned by the rotations of soft
-     * material would stretch stiff material next to it. NULL: no rotations */
+    /* turn [n_node][9] += rotation of the material around each node at the last linearise, weighted by stiffness (by
+     * volume, a preconditioner turned with soft material would stretch stiff material next to it). NULL: no rotations
+     */
     void (*rotate)(void *self, const pal_body *body, double *turn);
     /* CONTACT, after a stage that moved the nodes by `moved` [n_node][3], m, since the loads were given (fixed and
      * prescribed nodes too). last: the stage ends the sub-step, and the forces on the tools become those it was solved
      * with; before that, only the caps are enforced. True: contact pulled where it can only push, or exceeded a cap, so
-     * that its loads in body->load and its stiffness have changed: the sub-step is to be solved again from where it
-     * began. A component asks for that a bounded number of times, seldom more than three, and a solver always complies,
-     * so that no sub-step ends on loads that it was not solved with */
+     * that its loads in body->load and its stiffness have changed: the solver solves the sub-step again from where it
+     * began. A component asks for that a bounded number of times */
     bool (*settle)(void *self, pal_step *step, const double *moved, bool last);
 } pal_tangent;
 
-/* progress of a solver, for status, studies and panel */
+/* Progress of a solver, for status, studies and panel. Every number has one meaning for all solvers; what does not
+ * apply to a solver is 0 */
 typedef struct pal_solve_report {
-    int n_newton, n_cg; /* iterations in the last step; conjugate gradients summed over its Newton iterations */
-    double residual;    /* of the last Newton iteration, relative to the loads                                */
-    double step_size;   /* last step of the line search, 1: full                                              */
-    bool converged;     /* the tolerance was met                                                              */
+    int n_newton, n_cg; /* iterations of the last step, summed over its sub-steps and repeated solves */
+    /* of the last solve of the last sub-step */
+    double residual;  /* relative to the loads */
+    double step_size; /* of the line search, 1: full */
+    bool converged;   /* the tolerance was met */
     int64_t factor_nonzeros;
-    int n_factor; /* factorisations since load                                                                */
-    double analyse_s, assemble_s, factor_s, solve_s; /* time spent since load                                 */
+    int n_factor; /* factorisations since load */
+    /* time spent since load on the simulation thread: analysis of patterns, assembly of matrices, factorisation (but
+     * for factors refreshed on another thread) and linear solves of the motion */
+    double analyse_s, assemble_s, factor_s, solve_s;
 } pal_solve_report;
 
 /* stress at a quadrature point of an element; one call for each point, element by element */
@@ -111,7 +112,7 @@ typedef void pal_stress_take(void *user, const pal_stress_point *point);
 
 /* answer of `recover`; 0: no element is inverted */
 enum {
-    PAL_INVERTED = 1,          /* part of the body runs on its recovery: ask again in the coming step */
+    PAL_INVERTED = 1,          /* part of the body runs on its recovery: check again in the next step */
     PAL_INVERSION_CHANGED = 2, /* forces and stiffness have changed                                   */
     PAL_INVERSION_AT_REST = 4  /* with PAL_INVERTED: the motion has next to no energy of the recovery */
 };
@@ -137,79 +138,93 @@ typedef struct pal_effect {
     pal_err (*make)(pal_config_entry *item, pal_build *build, void **self);
     void (*destroy)(void *self); /* frees what make took beside the arena (threads, factors); NULL: nothing. [load] */
     void (*reset)(void *self, const pal_body *body); /* the body is back at rest                                    */
-    /* live edit: constants that the scene does not give are derived again. REFUSED: nothing has changed */
+    /* live edit: constants that the scene does not give are derived again. REFUSED: nothing has changed. NULL: none
+     * are; a SOLVE component is reset */
     pal_err (*material)(void *self, const pal_body *body, const pal_material *material, pal_diagnostic *diag);
     /* CONTACT, ADAPT: continues where the component `before` of the same effect on another body is. Both bodies are
      * between steps */
     void (*transfer)(void *self, const pal_body *body, const void *before, const pal_component_transfer *by);
     bool keeps_components; /* SOLVE: holds pointers to or patterns of the body's components, so it is made again when
                               they change */
-    bool implicit; /* SOLVE: takes stiffness and contact implicitly; sets body->implicit before other components are
-                      made       */
+    bool implicit; /* SOLVE: an implicit solver, which takes stiffness and contact by tangents; sets body->implicit
+                      before other components are made       */
 
     /* ---- force ---- */
     /* FORCE components add to body->f, CONTACT components to body->load and to the forces on tools. [sim] */
     pal_err (*run)(void *self, pal_step *step);
-    /* FORCE, optional: the same on body->active_nodes, which make has made (active_nodes.h). [sim] */
+    /* FORCE, optional: the same on body->active_nodes, which make has made (active_nodes.h); rk4 uses it when every
+     * FORCE component has it. [sim] */
     pal_err (*compute_forces)(void *self, pal_step *step);
-    double (*energy)(void *self, const pal_body *body); /* J; run = minus its gradient (tested)                      */
-    bool internal; /* FORCE: zero at rest, no net force, no net torque, whatever the deformation (tested)            */
+    double (*energy)(void *self, const pal_body *body); /* J; run = minus its gradient */
+    bool internal; /* FORCE: zero at rest, no net force, no net torque, whatever the deformation */
     /* FORCE: the component is -m rate v and nothing else; the rate, 1/s, for solvers that apply it implicitly */
     double (*drag)(void *self);
 
-    /* ---- limits of explicit steps ---- */
-    /* FORCE, CONTACT: += Gershgorin row sums of stiffness and of explicit damping at the current state [n_dof] */
-    void (*stiffness)(void *self, const pal_body *body, double *bound_N_m);
-    void (*damping)(void *self, const pal_body *body, double *bound_Ns_m);
-    /* CONTACT, bodies with interpolation: += row sums at nodes of the stiffness that the component asks for in the
-     * coming step; central_cg makes its sub-steps short enough for it [n_node] */
-    void (*wanted)(void *self, const pal_body *body, double *bound_N_m);
-    /* SOLVE: largest stable sub-step at the current state, s; NaN: the state is not finite. Asked before every
-     * sub-step, so it is cheap while little has moved. [sim] */
-    double (*limit)(void *self, pal_step *step);
+    /* limits of explicit steps */
+    struct {
+        /* FORCE, CONTACT: += Gershgorin row sums of stiffness and of explicit damping at the current state. Without
+         * `stiffness` of a FORCE component central_cg finds it by differences of forces [n_node] */
+        void (*stiffness)(void *self, const pal_body *body, double *bound_N_m);
+        void (*damping)(void *self, const pal_body *body, double *bound_Ns_m);
+        /* CONTACT, bodies with interpolation: += row sums at nodes of the stiffness that the component asks for in the
+         * coming step; central_cg makes its sub-steps short enough for it [n_node] */
+        void (*wanted)(void *self, const pal_body *body, double *bound_N_m);
+        /* SOLVE: largest stable sub-step at the current state, s; NaN: the state is not finite. Asked before every
+         * sub-step, so it is cheap while little has moved. [sim] */
+        double (*limit)(void *self, pal_step *step);
+    } bounds;
 
-    /* ---- tangent ---- */
-    const pal_tangent
-        *tangent; /* for implicit solvers; a body with one refuses `internal` components without a tangent */
+    /* for implicit solvers; a body with one refuses `internal` components without a tangent */
+    const pal_tangent *tangent;
 
-    /* ---- recovery from inversion ---- */
-    struct pal_spring_set *(*springs)(void *self); /* FORCE: the springs of the component (spring_recovery.h) */
-    /* FORCE: looks for inverted elements and chooses what they run on from now on. Solvers ask between sub-steps, not
-     * within */
-    unsigned (*recover)(void *self, pal_step *step);
+    /* recovery from inversion */
+    struct {
+        struct pal_spring_set *(*springs)(void *self); /* FORCE: the springs of the component (spring_recovery.h) */
+        /* FORCE: looks for inverted elements and chooses what they run on from now on. Springs and control cells have
+         * it; solvers call it at the begin of a sub-step. hex_elastic and tet_elastic decide in `linearise` instead,
+         * hex_elastic in explicit steps with every force (sim/README.md, "Recovery from element inversion") */
+        unsigned (*recover)(void *self, pal_step *step);
+    } recovery;
 
-    /* ---- sleep ---- */
-    /* time after which the force of the component, or of ADAPT the nodes of the body, no longer change by themselves,
-     * s; INFINITY: never. NULL: they never change */
-    double (*settled_s)(const void *self);
-    /* CONTACT: distance from the tool's centre within which the component acts or looks, m; INFINITY while a tool holds
-     * or presses the body through it; NULL: it knows no tools */
-    double (*reach_m)(const void *self, const pal_tool *tool);
-    /* GUARD of a sleeping body: does it wake in the step that begins? step is that of the first sub-step, tools with
-     * their targets */
-    bool (*wakes)(void *self, pal_step *step);
+    /* sleep of a body at rest */
+    struct {
+        /* time after which the force of the component, or of ADAPT the nodes of the body, no longer change by
+         * themselves, s; INFINITY: never. NULL: they never change */
+        double (*settled_s)(const void *self);
+        /* CONTACT: distance from the tool's centre within which the component acts or looks, m; INFINITY while a tool
+         * holds or presses the body through it; NULL: it knows no tools */
+        double (*reach_m)(const void *self, const pal_tool *tool);
+        /* GUARD of a sleeping body: does it wake in the step that begins? step is that of the first sub-step, tools
+         * with their targets */
+        bool (*wakes)(void *self, pal_step *step);
+    } sleep;
 
-    /* ---- inspection ---- */
-    /* FORCE: sum [n_node] += field times volume, volume_m3 [n_node] += volume at rest */
-    void (*measure)(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3);
-    unsigned fields; /* what measure gives, 1 << pal_field each */
-    /* FORCE: the stress of every element at the body's d, as the forces have it; no memory (zz_estimator.h). NULL: not
-     * known */
-    void (*stress)(void *self, const pal_body *body, pal_stress_take *take, void *user);
-    void (*report)(const void *self, pal_solve_report *out); /* SOLVE */
+    /* display, estimates, reports */
+    struct {
+        /* FORCE: sum [n_node] += field times volume, volume_m3 [n_node] += volume at rest */
+        void (*measure)(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3);
+        unsigned fields; /* what measure gives, 1 << pal_field each */
+        /* FORCE: the stress of every element at the body's d, as the forces have it; no memory (zz_estimator.h). NULL:
+         * not known */
+        void (*stress)(void *self, const pal_body *body, pal_stress_take *take, void *user);
+        void (*report)(const void *self, pal_solve_report *out); /* SOLVE */
+    } inspect;
 } pal_effect;
 
 struct pal_component {
     const pal_effect *effect;
     void *self;
-    uint64_t spent_ns;  /* in the last step; FORCE components within SOLVE are counted apart from SOLVE */
+    uint64_t spent_ns;  /* in the last step. FORCE: `run` alone; linearise, multiply and energy count to SOLVE */
     size_t n_byte;      /* memory taken at load                                                       */
     uint64_t n_run;     /* runs since load                                                            */
     const char *reason; /* what in the scene calls for it; memory of the body, never NULL in a plan   */
     pal_arena *arena;   /* its own memory; NULL: somebody else's                                      */
 };
 
-/* d = A x; f = load plus every FORCE component (without drag when drag_separate is set); g = A' f. Fixed dofs have
- * forces too: what their support bears. Adds to each component's spent_ns. [sim] */
+/* Runs every FORCE component, without drag when drag_separate is set: compute_forces when packed (active_nodes.h), else
+ * run. Adds to each component's spent_ns. [sim] */
+pal_err pal_run_forces(pal_step *step, bool packed);
+/* d = A x; f = load plus the forces of all components; g = A' f. Fixed dofs have forces too: what their support bears.
+ * [sim] */
 pal_err pal_assemble_forces(pal_step *step);
 #endif

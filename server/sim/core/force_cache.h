@@ -1,8 +1,7 @@
-/* Forces and energy that an elastic component computed in one pass, valid until the body moves. An implicit step
- * evaluates the energy where it ends and the next step begins with the forces there, so that one pass over the elements
- * serves both, and the energy check costs little more than sums (`palpate bench guards`). Valid at the very same
- * positions, bit by bit; whoever changes what forces depend on besides positions (material, reset) invalidates it. A
- * cache that was not made never holds anything. Memory: the world's arena. Thread: make [load], else [sim]. */
+/* Forces and energy that an elastic component computed in one pass. An implicit step evaluates the energy where it ends
+ * and the next step begins with the forces there, so that one pass over the elements serves both (`palpate bench
+ * guards`). Valid at the very same positions, bit by bit; whoever changes material or rotations invalidates it. A cache
+ * that was not made never holds anything. Memory: the component's arena. Thread: make [load], else [sim]. */
 #ifndef PAL_SIM_CORE_FORCE_CACHE_H
 #define PAL_SIM_CORE_FORCE_CACHE_H
 #include "server/base/arena.h"

@@ -60,10 +60,10 @@ void pal_material_at(const pal_body_def *def, const double x[3], pal_material *o
 
 double pal_stroke_weight(const pal_stroke *stroke, const double x[3])
 {
-    double r = pal_dist3(x, stroke->at_m) / stroke->radius_m, core = 1 - stroke->soft;
+    double r = pal_dist3(x, stroke->at_m) / stroke->radius_m, core = 1 - stroke->softness;
     if (!(r < 1)) return 0;
     if (r <= core) return 1;
-    double t = (1 - r) / stroke->soft;
+    double t = (1 - r) / stroke->softness;
     return t * t * (3 - 2 * t);
 }
 
@@ -82,15 +82,14 @@ pal_err pal_stroke_check(const pal_stroke *s, pal_diagnostic *diag)
 {
     for (int c = 0; c < 3; c++)
         if (!(fabs(s->at_m[c]) <= PAL_LENGTH_MAX_M))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "at_m[%d]: %g, wanted -1e9 to 1e9", c, s->at_m[c]);
+            return PAL_REFUSE(diag, "at_m[%d]: %g, wanted -1e9 to 1e9", c, s->at_m[c]);
     if (!(s->radius_m > 0 && s->radius_m <= PAL_LENGTH_MAX_M))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "radius_m: %g, wanted more than 0", s->radius_m);
-    if (!(s->soft >= 0 && s->soft <= 1))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "soft: %g, wanted 0 to 1", s->soft);
+        return PAL_REFUSE(diag, "radius_m: %g, wanted more than 0", s->radius_m);
+    if (!(s->softness >= 0 && s->softness <= 1)) return PAL_REFUSE(diag, "softness: %g, wanted 0 to 1", s->softness);
     if (!(s->young_factor >= PAL_STROKE_FACTOR_MIN && s->young_factor <= PAL_STROKE_FACTOR_MAX))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "young_factor: %g, wanted 1e-6 to 1e6", s->young_factor);
+        return PAL_REFUSE(diag, "young_factor: %g, wanted 1e-6 to 1e6", s->young_factor);
     if (!(s->density_factor >= PAL_STROKE_FACTOR_MIN && s->density_factor <= PAL_STROKE_FACTOR_MAX))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "density_factor: %g, wanted 1e-6 to 1e6", s->density_factor);
+        return PAL_REFUSE(diag, "density_factor: %g, wanted 1e-6 to 1e6", s->density_factor);
     return PAL_ERR_OK;
 }
 
@@ -99,8 +98,7 @@ pal_err pal_stroke_check(const pal_stroke *s, pal_diagnostic *diag)
 static pal_err refuse(const pal_body_def *def, int index, pal_diagnostic *diag, const char *key, double value,
                       const char *wanted)
 {
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" regions[%d].%s: %g, wanted %s", def->name, index, key,
-                              value, wanted);
+    return PAL_REFUSE(diag, "body \"%s\" regions[%d].%s: %g, wanted %s", def->name, index, key, value, wanted);
 }
 
 /* a constant, or the values of a grid; NaN: not given */
@@ -152,10 +150,10 @@ pal_err pal_region_check(const pal_body_def *def, int index, pal_diagnostic *dia
     const double *young = grid ? r->grid_young_Pa : NULL, *poisson = grid ? r->grid_poisson : NULL,
                  *density = grid ? r->grid_density_kg_m3 : NULL;
     if (!young && !poisson && !density && isnan(r->young_Pa) && isnan(r->poisson) && isnan(r->density_kg_m3))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "body \"%s\" regions[%d]: gives neither young_Pa, poisson nor "
-                                  "density_kg_m3",
-                                  def->name, index);
+        return PAL_REFUSE(diag,
+                          "body \"%s\" regions[%d]: gives neither young_Pa, poisson nor "
+                          "density_kg_m3",
+                          def->name, index);
     PAL_TRY(check_number(def, index, "young_Pa", r->young_Pa, young, PAL_YOUNG_MIN_PA, PAL_YOUNG_MAX_PA, diag));
     PAL_TRY(check_number(def, index, "poisson", r->poisson, poisson, PAL_POISSON_MIN, PAL_POISSON_MAX, diag));
     return check_number(def, index, "density_kg_m3", r->density_kg_m3, density, PAL_DENSITY_MIN_KG_M3,

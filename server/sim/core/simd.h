@@ -1,6 +1,5 @@
-/* Vectors of 8 lanes for the spring kernels. Only files compiled with the room's options include this: where the
- * processor has no such vectors, the compiler splits them and the calling convention differs (-Wno-psabi), so that
- * everything here is inlined. Thread: [sim]. */
+/* Vectors of 8 lanes for the spring kernels. Where the processor has no such vectors, the compiler splits them and the
+ * calling convention differs (hence -Wno-psabi), so that everything here is inlined. Thread: [sim]. */
 #ifndef PAL_SIM_CORE_SIMD_H
 #define PAL_SIM_CORE_SIMD_H
 #include "server/sim/core/simd_blocks.h"
@@ -69,15 +68,60 @@ PAL_INLINE pal_v8 pal_length8(const pal_v8 a[3])
     return pal_sqrt8(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
 }
 
+/* slots of a loose block */
+PAL_INLINE const int32_t *pal_block_nodes(const pal_simd_blocks *blocks, int b)
+{
+    return blocks->node + blocks->n_corner * PAL_LANES * (b - blocks->n_strip);
+}
 /* coordinates of a loose block's corners, slots node [n_corner][8] */
-PAL_INLINE void pal_loose_load(const pal_node_order *node_order, const int32_t *node, int n_corner,
+PAL_INLINE void pal_loose_load(const pal_node_order *order, const int32_t *node, int n_corner,
                                double at[][3][PAL_LANES])
 {
     for (int c = 0; c < n_corner; c++)
         for (int d = 0; d < 3; d++)
-            for (int l = 0; l < PAL_LANES; l++)
-                at[c][d][l] = node_order->x[d * node_order->n_slot + node[c * PAL_LANES + l]];
+            for (int l = 0; l < PAL_LANES; l++) at[c][d][l] = order->x[d * order->n_slot + node[c * PAL_LANES + l]];
 }
+/* pointers p [n_corner][3] to 8 lanes of the coordinates of a block's corners: in a strip the slots, in a loose block
+ * copies in `loose`; true: loose */
+PAL_INLINE bool pal_block_points(const pal_simd_blocks *blocks, const pal_node_order *order, int b, int n_corner,
+                                 double loose[][3][PAL_LANES], const double *p[][3])
+{
+    const bool is_loose = b >= blocks->n_strip;
+    const int32_t *base = blocks->base + n_corner * b;
+    if (is_loose) pal_loose_load(order, pal_block_nodes(blocks, b), n_corner, loose);
+    for (int c = 0; c < n_corner; c++)
+        for (int d = 0; d < 3; d++) p[c][d] = is_loose ? loose[c][d] : order->x + d * order->n_slot + base[c];
+    return is_loose;
+}
+
+/* 8 elements: pointers to the coordinates of their corners and to the forces on them, which a kernel adds to */
+enum { PAL_VIEW_CORNERS = 10 };
+typedef struct pal_block_view {
+    const double *x[PAL_VIEW_CORNERS][3];
+    double *f[PAL_VIEW_CORNERS][3];
+    double x_loose[PAL_VIEW_CORNERS][3][PAL_LANES], f_loose[PAL_VIEW_CORNERS][3][PAL_LANES];
+} pal_block_view;
+PAL_INLINE void pal_block_open(const pal_simd_blocks *blocks, const pal_node_order *order, int b, int n_corner,
+                               pal_block_view *v)
+{
+    const bool loose = pal_block_points(blocks, order, b, n_corner, v->x_loose, v->x);
+    for (int c = 0; c < n_corner; c++)
+        for (int d = 0; d < 3; d++) {
+            v->f[c][d] = loose ? v->f_loose[c][d] : order->f + (v->x[c][d] - order->x);
+            for (int l = 0; l < PAL_LANES && loose; l++) v->f_loose[c][d][l] = 0;
+        }
+}
+/* adds the forces of a loose block to the slots */
+PAL_INLINE void pal_block_close(const pal_simd_blocks *blocks, const pal_node_order *order, int b, int n_corner,
+                                const pal_block_view *v)
+{
+    const int32_t *node = pal_block_nodes(blocks, b);
+    for (int c = 0; c < n_corner && b >= blocks->n_strip; c++)
+        for (int d = 0; d < 3; d++)
+            for (int l = 0; l < PAL_LANES; l++)
+                order->f[(size_t)d * (size_t)order->n_slot + (size_t)node[c * PAL_LANES + l]] += v->f_loose[c][d][l];
+}
+
 /* the forces on corners 1, 2, 3 into slots->f, minus their sum on corner 0, lane by lane */
 PAL_INLINE void pal_loose_add(pal_node_order *node_order, const int32_t *node, int n_corner, pal_v8 f[][3])
 {

@@ -1,5 +1,5 @@
-/* Elements in blocks of 8 whose corners lie side by side in memory, so that a kernel loads, computes and adds whole
- * vectors instead of gathering and scattering node by node (`palpate bench springs` measures both).
+/* Elements in blocks of 8 whose corners are side by side in memory, so that a kernel loads, computes and adds whole
+ * vectors instead of gathering and scattering node by node.
  *
  * Each node of a voxel mesh has a slot: rows along the longest axis, the even nodes of a row before the odd ones,
  * because the five-tetrahedra split repeats every second voxel. Elements of one shape (equal slot differences between

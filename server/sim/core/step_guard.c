@@ -13,7 +13,7 @@ unsigned pal_guard_recover(pal_step *step)
     unsigned seen = 0;
     for (int i = 0; i < step->n_force; i++) {
         const pal_component *force = &step->force[i];
-        if (force->effect->recover) seen |= force->effect->recover(force->self, step);
+        if (force->effect->recovery.recover) seen |= force->effect->recovery.recover(force->self, step);
     }
     return seen;
 }
@@ -30,14 +30,14 @@ void pal_guard_add_bounds(const pal_component *components, int n, const pal_body
 {
     for (int i = 0; i < n; i++) {
         const pal_effect *effect = components[i].effect;
-        if (effect->stiffness) effect->stiffness(components[i].self, body, stiff);
-        if (effect->damping && !effect->drag) effect->damping(components[i].self, body, damp);
+        if (effect->bounds.stiffness) effect->bounds.stiffness(components[i].self, body, stiff);
+        if (effect->bounds.damping && !effect->drag) effect->bounds.damping(components[i].self, body, damp);
     }
 }
 
 bool pal_guard_has_bounds(const pal_component *components, int n)
 {
     for (int i = 0; i < n; i++)
-        if (components[i].effect->stiffness || components[i].effect->damping) return true;
+        if (components[i].effect->bounds.stiffness || components[i].effect->bounds.damping) return true;
     return false;
 }

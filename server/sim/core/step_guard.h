@@ -6,12 +6,11 @@
 #define PAL_SIM_CORE_STEP_GUARD_H
 #include "server/sim/core/effect.h"
 
-/* box diagonals. The longest move of a node in a sub-step or a Newton iteration: beyond it elements are passed over and
- * a linearisation means nothing; a tool that jumps by a body's size is followed in five sub-steps. Exercised by the
- * cases of tests/stability that blow a body up a hundredfold */
+/* Part of a length that a node may move before what was computed for it no longer holds. Of the box diagonal, in a
+ * sub-step or a Newton iteration: beyond it elements are passed over and a linearisation means nothing; a tool that
+ * jumps by a body's size is followed in five sub-steps (cases of tests/stability that blow a body up a hundredfold). Of
+ * an element's edge, or a control cell's: bounds of stiffness hold until then (tests/sim/world/test_world.c) */
 #define PAL_GUARD_MOVE 0.2
-/* element edges (control cells of a subdivision solid). Bounds of stiffness hold until a node may have moved so far */
-#define PAL_GUARD_RECHECK 0.2
 
 /* m, of a body */
 static inline double pal_guard_max_move_m(const pal_body *body)

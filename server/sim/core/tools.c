@@ -21,7 +21,7 @@ bool pal_pose_ok(const pal_pose *pose, double limit_m)
 void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose, double dt_s)
 {
     if (pose) {
-        tool->next = *pose;
+        tool->requested = *pose;
         /* a tool that appears is where it is: its way there touches nothing, and its forces begin at zero */
         if (!tool->present) {
             tool->ramp = 0;
@@ -29,12 +29,12 @@ void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose, double dt_s)
             memcpy(tool->here_m, pose->position_m, sizeof tool->here_m);
         }
     } else {
-        /* a tool that was let go stays where it is while its forces fade */
-        tool->next = tool->last;
+        /* a released tool stays where it is while its forces fade */
+        tool->requested = tool->last;
     }
-    tool->ramp = pal_blend_toward(tool->ramp, pose ? 1 : 0, dt_s, PAL_BLEND_TOOL_S);
+    tool->ramp = pal_blend_toward(tool->ramp, pose ? 1 : 0, dt_s, PAL_BLEND_S);
     tool->present = pose != NULL;
-    tool->grasp = tool->present && (tool->next.buttons & 1);
+    tool->grasp = tool->present && (tool->requested.buttons & 1);
     tool->grasped_before = tool->holding;
     tool->touching = tool->holding = false;
     tool->n_patch = 0;
@@ -48,7 +48,7 @@ void pal_tools_begin_substep(pal_tools *tools, int sub, int n_sub, double dt_s)
         pal_tool *tool = &tools->tool[t];
         for (int c = 0; c < 3; c++) {
             /* the rest of the way in equal parts; the last part ends on the pose exactly */
-            double from = tool->here_m[c], to = tool->next.position_m[c];
+            double from = tool->here_m[c], to = tool->requested.position_m[c];
             double here = sub >= n_sub - 1 ? to : from + (to - from) / (n_sub - sub);
             tool->velocity_m_s[c] = (here - from) / dt_s;
             tool->here_m[c] = here;
@@ -64,6 +64,6 @@ void pal_tools_end_step(pal_tools *tools, int n_sub)
         pal_tool *tool = &tools->tool[t];
         for (int c = 0; c < 3; c++)
             tool->mean_force_N[c] = (tool->mean_force_N[c] + tool->force_N[c]) / (n_sub > 0 ? n_sub : 1);
-        tool->last = tool->next;
+        tool->last = tool->requested;
     }
 }

@@ -1,4 +1,4 @@
-/* Tools: poses in, forces and contact patches out. A tool is a sphere moved by one member. SI, world frame. Forces are
+/* Tools: poses in, forces and contact patches out. A tool is a sphere moved by one member. SI, scene frame. Forces are
  * those on the tool, and so on the hand; tissue receives the opposite. Thread: [sim]. */
 #ifndef PAL_SIM_CORE_TOOLS_H
 #define PAL_SIM_CORE_TOOLS_H
@@ -34,21 +34,21 @@ typedef struct pal_contact_patch {
     double radius_m; /* validity                                                               */
 } pal_contact_patch;
 
-/* One tool during a step. here_m moves linearly from `last` to `next` over the sub-steps, so that a fast tool sweeps
- * its path */
+/* One tool during a step. here_m moves linearly from `last` to `requested` over the sub-steps, so that a fast tool
+ * sweeps its path */
 typedef struct pal_tool {
     double radius_m, force_cap_N;
     bool present; /* a member holds it                                              */
-    double ramp;  /* 0 to 1, scales its forces: rises over PAL_BLEND_TOOL_S once the tool appears, falls when it is
+    double ramp;  /* 0 to 1, scales its forces: rises over PAL_BLEND_S once the tool appears, falls when it is
                      released */
-    pal_pose next, last;    /* requested pose at the end of this step, pose at the end of the last one      */
-    double here_m[3];       /* position at the end of the current sub-step                                  */
-    double velocity_m_s[3]; /* of `here`                                                                    */
-    bool grasp;             /* bit 0 of next.buttons while present                                          */
-    double force_N[3];      /* on the tool, this sub-step; CONTACT components add                              */
-    double mean_force_N[3]; /* mean over the step's sub-steps                                               */
-    bool grasped_before;    /* it held tissue in the last step: it does not push what it holds */
-    bool touching, holding; /* presses tissue, holds tissue in this step                                    */
+    pal_pose requested, last; /* at the end of this step, of the last one */
+    double here_m[3];         /* position at the end of the current sub-step                                  */
+    double velocity_m_s[3];   /* of `here`                                                                    */
+    bool grasp;               /* bit 0 of requested.buttons while present                                          */
+    double force_N[3];        /* on the tool, this sub-step; CONTACT components add                              */
+    double mean_force_N[3];   /* mean over the step's sub-steps                                               */
+    bool grasped_before;      /* it held tissue in the last step: it does not push what it holds */
+    bool touching, holding;   /* presses tissue, holds tissue in this step                                    */
     int n_patch;
     pal_contact_patch patch[PAL_CONTACT_PATCH_MAX]; /* written by CONTACT components in the last sub-step */
     bool has_grasp; /* bilateral part: f = f0 - k (x - x0) - b v                              */
@@ -68,6 +68,6 @@ bool pal_pose_ok(const pal_pose *pose, double limit_m);
 void pal_tool_begin_step(pal_tool *tool, const pal_pose *pose, double dt_s);
 /* before sub-step `sub` of `n_sub`: sets here_m and velocity, clears the force */
 void pal_tools_begin_substep(pal_tools *tools, int sub, int n_sub, double dt_s);
-/* after the step: mean force, last = next */
+/* after the step: mean force, last = requested */
 void pal_tools_end_step(pal_tools *tools, int n_sub);
 #endif

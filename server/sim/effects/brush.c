@@ -1,21 +1,15 @@
 /* Component brush (brush.h): the action of sculpting tools on the shown nodes of a body.
  *
  * INFLATE: a triangle with corners x and weight w gives each corner p w / 6 (x1 - x0) x (x2 - x0). With w = 1 over a
- * closed surface that is p times the gradient of its volume: no net force, no net moment. The area that the pressure
- * acts on is capped at twice the triangle's rest area; a load that grows with the area it inflates has no
- * equilibrium from about E/3 on. A follower pressure has no energy; its stiffness is not symmetric and is left out
- * of the tangent.
+ * closed surface that is p times the gradient of its volume: no net force, no net moment. A follower pressure has no
+ * energy; its stiffness is not symmetric and is left out of the tangent.
  * CURVE: f_i = k_i (begin_i + 4 t_i (1 - t_i) lift - d_i), k_i = stiffness w_i / sum w; energy sum k_i/2 |..|^2. */
 #include "server/sim/core/brush.h"
 
 #include "server/base/vec3.h"
 #include "server/sim/core/blend.h"
-
-#include <math.h>
-#include <string.h>
-
-/* max loaded area over a triangle's rest area */
-static const double max_area = 2;
+#include "server/sim/effects/pressure_bound.h"
+#include "server/sim/effects/tuning.h"
 
 /* an active brush; `now` is its present value, which ramps to `to` */
 typedef struct slot {
@@ -32,18 +26,10 @@ typedef struct slot {
     bool ending;
 } slot;
 
-typedef struct brush_row {
-    const pal_body *body;
+typedef struct brushes {
     slot slot[PAL_TOOL_MAX];
     double step_s; /* of the last step; 0: none yet */
-} brush_row;
-
-/* ---- numbers ---- */
-
-static bool within(double value, double low, double high)
-{
-    return value >= low && value <= high;
-}
+} brushes;
 
 static bool same3(const double a[3], const double b[3])
 {
@@ -57,15 +43,17 @@ pal_err pal_brush_check(const pal_brush *b, pal_diagnostic *diag)
     bool curve = b->kind == PAL_BRUSH_CURVE;
     if (!pal_finite3(b->at_m) || (curve && (!pal_finite3(b->to_m) || !pal_finite3(b->lift_m))))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: a place or lift_m is no number");
-    if (!within(b->radius_m, 1e-9, 1e9))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: radius_m %g, wanted 1e-9 to 1e9", b->radius_m);
-    if (!within(b->soft, 0, 1))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: soft %g, wanted 0 to 1", b->soft);
-    if (!curve && !within(b->pressure_Pa, -1e9, 1e9))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: pressure_Pa %g, wanted -1e9 to 1e9", b->pressure_Pa);
-    if (curve && !within(b->stiffness_N_m, 1e-9, 1e9))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: stiffness_N_m %g, wanted 1e-9 to 1e9",
-                                  b->stiffness_N_m);
+    const struct {
+        const char *name, *wanted;
+        double value, low, high;
+    } range[] = {{"radius_m", "1e-9 to 1e9", b->radius_m, 1e-9, 1e9},
+                 {"softness", "0 to 1", b->softness, 0, 1},
+                 {"pressure_Pa", "-1e9 to 1e9", curve ? 0 : b->pressure_Pa, -1e9, 1e9},
+                 {"stiffness_N_m", "1e-9 to 1e9", curve ? b->stiffness_N_m : 1, 1e-9, 1e9}};
+    for (int i = 0; i < 4; i++)
+        if (!(range[i].value >= range[i].low && range[i].value <= range[i].high))
+            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: %s %g, wanted %s", range[i].name, range[i].value,
+                                      range[i].wanted);
     if (curve && same3(b->at_m, b->to_m))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: both ends of the curve are at %g %g %g m", b->at_m[0],
                                   b->at_m[1], b->at_m[2]);
@@ -76,7 +64,7 @@ pal_err pal_brush_check(const pal_brush *b, pal_diagnostic *diag)
 
 static double weight_at(const pal_brush *b, const double middle[3], const double x[3])
 {
-    pal_stroke stroke = {.radius_m = b->radius_m, .soft = b->soft};
+    pal_stroke stroke = {.radius_m = b->radius_m, .softness = b->softness};
     pal_copy3(stroke.at_m, middle);
     return pal_stroke_weight(&stroke, x);
 }
@@ -84,18 +72,23 @@ static double weight_at(const pal_brush *b, const double middle[3], const double
 /* the parameter t = 0..1 of the handle's point nearest to x */
 static double along(const pal_brush *b, const double x[3], double at[3])
 {
-    double way[3], off[3];
-    pal_sub3(way, b->to_m, b->at_m);
+    double axis[3], off[3];
+    pal_sub3(axis, b->to_m, b->at_m);
     pal_sub3(off, x, b->at_m);
-    double t = fmin(1, fmax(0, pal_dot3(off, way) / pal_dot3(way, way)));
+    double t = fmin(1, fmax(0, pal_dot3(off, axis) / pal_dot3(axis, axis)));
     pal_copy3(at, b->at_m);
-    pal_axpy3(at, t, way);
+    pal_axpy3(at, t, axis);
     return t;
+}
+
+static int32_t corner_node(const pal_body *body, int t, int c)
+{
+    return body->display.shown_node[body->display.surface->tri[3 * (size_t)t + (size_t)c]];
 }
 
 static const double *corner_at(const pal_body *body, const double *x, int t, int c)
 {
-    return x + 3 * (size_t)body->shown_node[body->surface->tri[3 * (size_t)t + (size_t)c]];
+    return x + 3 * (size_t)corner_node(body, t, c);
 }
 
 /* weight of triangle or shown vertex i, and for a node of a handle its t and position */
@@ -106,7 +99,7 @@ static double reach(const pal_body *body, const pal_brush *b, int i, double *t)
         for (int c = 0; c < 3; c++) pal_axpy3(at, 1.0 / 3, corner_at(body, body->node_rest, i, c));
         return weight_at(b, b->at_m, at);
     }
-    const double *x = body->node_rest + 3 * (size_t)body->shown_node[i];
+    const double *x = body->node_rest + 3 * (size_t)body->display.shown_node[i];
     *t = along(b, x, at);
     return weight_at(b, at, x);
 }
@@ -115,7 +108,7 @@ static double reach(const pal_body *body, const pal_brush *b, int i, double *t)
 static pal_err fill(const pal_body *body, const pal_brush *b, slot *s, pal_diagnostic *diag)
 {
     const bool curve = b->kind == PAL_BRUSH_CURVE;
-    const int n = curve ? body->n_shown : body->surface->n_tri;
+    const int n = curve ? body->display.n_shown : body->display.surface->n_tri;
     double t = 0, sum = 0, max = 0;
     for (int i = 0; i < n; i++) s->n += reach(body, b, i, &t) > 0;
     if (s->n == 0)
@@ -130,7 +123,7 @@ static pal_err fill(const pal_body *body, const pal_brush *b, slot *s, pal_diagn
         double w = reach(body, b, i, &t);
         if (!(w > 0)) continue;
         s->weight[k] = w, sum += w, max = fmax(max, w);
-        s->item[k] = curve ? body->shown_node[i] : i;
+        s->item[k] = curve ? body->display.shown_node[i] : i;
         if (curve) pal_copy3(s->begin + 3 * (size_t)k, body->d + 3 * (size_t)s->item[k]), s->bow[k] = 4 * t * (1 - t);
         k++;
     }
@@ -157,31 +150,30 @@ static bool acts(const slot *s)
     return s->arena && !(s->ending && s->share == 0);
 }
 
+/* the same brush but for its pressure or lift */
 static bool may_continue(const slot *s, const pal_brush *b)
 {
-    if (!s->arena || s->ending || s->brush.kind != b->kind || !same3(s->brush.at_m, b->at_m)) return false;
-    if (s->brush.radius_m != b->radius_m || s->brush.soft != b->soft) return false;
-    return b->kind == PAL_BRUSH_INFLATE ||
-           (same3(s->brush.to_m, b->to_m) && s->brush.stiffness_N_m == b->stiffness_N_m);
+    const pal_brush *a = &s->brush;
+    return s->arena && !s->ending && a->kind == b->kind && same3(a->at_m, b->at_m) && a->radius_m == b->radius_m &&
+           a->softness == b->softness &&
+           (b->kind == PAL_BRUSH_INFLATE || (same3(a->to_m, b->to_m) && a->stiffness_N_m == b->stiffness_N_m));
 }
 
 pal_err pal_brush_make(const pal_body *body, pal_arena *arena, pal_diagnostic *diag, void **self)
 {
-    if (body->active || body->skin || !body->surface || !body->shown_node || body->n_shown == 0)
+    if (body->active || body->display.skin || !body->display.surface || !body->display.shown_node ||
+        body->display.n_shown == 0)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\" has no brushes: %s", body->name,
-                                  body->active ? "its surface adapts"
-                                  : body->skin ? "it is shown by a skin; take output \"surface_output\""
-                                               : "it shows nothing");
-    brush_row *row = PAL_NEW(arena, brush_row, 1);
-    if (!row) return PAL_ERR_MEMORY;
-    row->body = body;
-    *self = row;
-    return PAL_ERR_OK;
+                                  body->active         ? "its surface adapts"
+                                  : body->display.skin ? "it is shown by a skin; take output \"surface_output\""
+                                                       : "it shows nothing");
+    *self = PAL_NEW(arena, brushes, 1);
+    return *self ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 pal_err pal_brush_set(void *self, const pal_body *body, int slot_index, const pal_brush *b, pal_diagnostic *diag)
 {
-    slot *s = &((brush_row *)self)->slot[slot_index], fresh = {.brush = *b};
+    slot *s = &((brushes *)self)->slot[slot_index], fresh = {.brush = *b};
     PAL_TRY(pal_brush_check(b, diag));
     if (b->kind == PAL_BRUSH_CURVE && !(pal_norm3(b->lift_m) <= 10 * body->length_scale_m))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "brush: lift_m of %g m, body \"%s\" takes up to %g",
@@ -193,16 +185,14 @@ pal_err pal_brush_set(void *self, const pal_body *body, int slot_index, const pa
                                   b->pressure_Pa, body->name, max_Pa);
     if (may_continue(s, b)) {
         s->brush = *b;
-        s->left_s = PAL_BLEND_BRUSH_S;
+        s->left_s = PAL_BLEND_S;
         return PAL_ERR_OK;
     }
     fresh.arena = pal_arena_create(4096, true);
     pal_err err = fresh.arena ? fill(body, b, &fresh, diag) : PAL_ERR_MEMORY;
-    if (err) {
-        pal_arena_destroy(fresh.arena);
-        return err == PAL_ERR_MEMORY ? pal_diagnostic_set(diag, err, "no memory for a brush on body \"%s\"", body->name)
-                                     : err;
-    }
+    if (err) pal_arena_destroy(fresh.arena);
+    if (err == PAL_ERR_MEMORY) return pal_diagnostic_set(diag, err, "no memory for a brush on body \"%s\"", body->name);
+    PAL_TRY(err);
     goal(b, fresh.now);
     pal_arena_destroy(s->arena);
     *s = fresh;
@@ -212,15 +202,15 @@ pal_err pal_brush_set(void *self, const pal_body *body, int slot_index, const pa
 /* ---- transfer to another body ---- */
 
 /* displacement of a handle's nodes since its start near a rest position: the distance-weighted mean */
-static void way_back(const slot *s, const pal_body *from, const double x[3], double out[3])
+static void displacement_back(const slot *s, const pal_body *from, const double x[3], double out[3])
 {
     double sum = 0, near2 = 1e-6 * s->brush.radius_m * s->brush.radius_m;
     pal_set3(out, 0, 0, 0);
     for (int k = 0; k < s->n; k++) {
         const size_t i = 3 * (size_t)s->item[k];
-        double way[3], far = pal_dist3(from->node_rest + i, x), weight = 1 / pow(far * far + near2, 2);
-        pal_sub3(way, s->begin + 3 * (size_t)k, from->d + i);
-        pal_axpy3(out, weight, way);
+        double back[3], far = pal_dist3(from->node_rest + i, x), weight = 1 / pow(far * far + near2, 2);
+        pal_sub3(back, s->begin + 3 * (size_t)k, from->d + i);
+        pal_axpy3(out, weight, back);
         sum += weight;
     }
     pal_scale3(out, 1 / sum, out);
@@ -229,9 +219,9 @@ static void way_back(const slot *s, const pal_body *from, const double x[3], dou
 void pal_brush_hand(void *self, const pal_body *body, const void *before, const pal_body *from)
 {
     for (int i = 0; i < PAL_TOOL_MAX; i++) {
-        const slot *was = &((const brush_row *)before)->slot[i];
-        slot *s = &((brush_row *)self)->slot[i], fresh = {.brush = was->brush};
-        double way[3];
+        const slot *was = &((const brushes *)before)->slot[i];
+        slot *s = &((brushes *)self)->slot[i], fresh = {.brush = was->brush};
+        double back[3];
         if (!acts(was) || !(fresh.arena = pal_arena_create(4096, true))) continue;
         if (fill(body, &was->brush, &fresh, NULL)) {
             pal_arena_destroy(fresh.arena);
@@ -239,8 +229,8 @@ void pal_brush_hand(void *self, const pal_body *body, const void *before, const 
         }
         for (int k = 0; k < fresh.n && was->brush.kind == PAL_BRUSH_CURVE; k++) {
             const size_t node = 3 * (size_t)fresh.item[k];
-            way_back(was, from, body->node_rest + node, way);
-            pal_add3(fresh.begin + 3 * (size_t)k, body->d + node, way);
+            displacement_back(was, from, body->node_rest + node, back);
+            pal_add3(fresh.begin + 3 * (size_t)k, body->d + node, back);
         }
         pal_copy3(fresh.now, was->now);
         fresh.left_s = was->left_s, fresh.share = was->share, fresh.ending = was->ending;
@@ -251,20 +241,19 @@ void pal_brush_hand(void *self, const pal_body *body, const void *before, const 
 
 void pal_brush_end(void *self, int slot_index)
 {
-    ((brush_row *)self)->slot[slot_index].ending = true;
+    ((brushes *)self)->slot[slot_index].ending = true;
 }
 
 bool pal_brush_gone(const void *self)
 {
-    const brush_row *row = self;
-    bool any = false;
-    for (int i = 0; i < PAL_TOOL_MAX; i++) any = any || acts(&row->slot[i]);
-    return !any;
+    int n = 0;
+    for (int i = 0; i < PAL_TOOL_MAX; i++) n += acts(&((const brushes *)self)->slot[i]);
+    return n == 0;
 }
 
 size_t pal_brush_bytes(const void *self)
 {
-    const brush_row *row = self;
+    const brushes *row = self;
     size_t n_byte = 0;
     for (int i = 0; i < PAL_TOOL_MAX; i++)
         if (row->slot[i].arena) n_byte += pal_arena_used(row->slot[i].arena);
@@ -273,7 +262,7 @@ size_t pal_brush_bytes(const void *self)
 
 static void destroy(void *self)
 {
-    brush_row *row = self;
+    brushes *row = self;
     for (int i = 0; i < PAL_TOOL_MAX; i++) pal_arena_destroy(row->slot[i].arena);
 }
 
@@ -283,7 +272,7 @@ static void destroy(void *self)
 static void advance(slot *s, double step_s)
 {
     double to[3], left[3];
-    s->share = pal_blend_toward(s->share, s->ending ? 0 : 1, step_s, PAL_BLEND_BRUSH_S);
+    s->share = pal_blend_toward(s->share, s->ending ? 0 : 1, step_s, PAL_BLEND_S);
     goal(&s->brush, to);
     pal_sub3(left, s->now, to);
     pal_scale3(left, pal_blend_release(&s->left_s, step_s), left);
@@ -293,10 +282,7 @@ static void advance(slot *s, double step_s)
 /* twice the area vector of a triangle at nodes x */
 static void area2(const pal_body *body, const double *x, int t, double n[3])
 {
-    double p[3], q[3];
-    pal_sub3(p, corner_at(body, x, t, 1), corner_at(body, x, t, 0));
-    pal_sub3(q, corner_at(body, x, t, 2), corner_at(body, x, t, 0));
-    pal_cross3(n, p, q);
+    pal_normal3(n, corner_at(body, x, t, 0), corner_at(body, x, t, 1), corner_at(body, x, t, 2));
 }
 
 static void inflate(const slot *s, const pal_body *body, double *load)
@@ -305,10 +291,9 @@ static void inflate(const slot *s, const pal_body *body, double *load)
         const int t = s->item[k];
         double n[3], rest[3], force = s->share * s->now[0] * s->weight[k] / 6;
         area2(body, body->d, t, n), area2(body, body->node_rest, t, rest);
-        const double now2 = pal_dot3(n, n), max2 = max_area * max_area * pal_dot3(rest, rest);
+        const double now2 = pal_dot3(n, n), max2 = MAX_AREA * MAX_AREA * pal_dot3(rest, rest);
         if (now2 > max2) force *= sqrt(max2 / now2);
-        for (int c = 0; c < 3; c++)
-            pal_axpy3(load + 3 * (size_t)body->shown_node[body->surface->tri[3 * (size_t)t + (size_t)c]], force, n);
+        for (int c = 0; c < 3; c++) pal_axpy3(load + 3 * (size_t)corner_node(body, t, c), force, n);
     }
 }
 
@@ -326,7 +311,7 @@ static double spring(const slot *s, int k)
 
 static pal_err run(void *self, pal_step *step)
 {
-    brush_row *row = self;
+    brushes *row = self;
     pal_body *body = step->body;
     if (step->sub == 0) row->step_s = step->dt_s * step->n_sub;
     for (int i = 0; i < PAL_TOOL_MAX; i++) {
@@ -346,7 +331,7 @@ static pal_err run(void *self, pal_step *step)
 /* of handles alone */
 static double energy(void *self, const pal_body *body)
 {
-    const brush_row *row = self;
+    const brushes *row = self;
     double sum = 0;
     for (int i = 0; i < PAL_TOOL_MAX; i++) {
         const slot *s = &row->slot[i];
@@ -359,48 +344,41 @@ static double energy(void *self, const pal_body *body)
     return sum;
 }
 
-/* the edge opposite corner c couples its ends by p w |vector from c to its middle| / 6, as in component inflate,
- * with the ramp at the end of the next step */
+/* with the ramp at the end of the next step */
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
-    const brush_row *row = self;
+    const brushes *row = self;
     for (int i = 0; i < PAL_TOOL_MAX; i++) {
         const slot *s = &row->slot[i];
         if (!acts(s)) continue;
-        const double soon = row->step_s > 0 ? pal_blend_toward(s->share, 1, row->step_s, PAL_BLEND_BRUSH_S) : 1;
+        const double soon = row->step_s > 0 ? pal_blend_toward(s->share, 1, row->step_s, PAL_BLEND_S) : 1;
         for (int k = 0; k < s->n && s->brush.kind == PAL_BRUSH_CURVE; k++)
             bound_N_m[s->item[k]] += soon * s->brush.stiffness_N_m * s->weight[k];
         const double p = soon * fmax(fabs(s->now[0]), fabs(s->brush.pressure_Pa)) / 6;
         for (int k = 0; k < 3 * s->n && s->brush.kind == PAL_BRUSH_INFLATE; k++) {
-            const int32_t *tri = body->surface->tri + 3 * (size_t)s->item[k / 3];
-            const int32_t a = body->shown_node[tri[(k + 1) % 3]], b = body->shown_node[tri[(k + 2) % 3]];
-            double middle[3];
-            pal_add3(middle, body->d + 3 * (size_t)a, body->d + 3 * (size_t)b);
-            pal_scale3(middle, 0.5, middle);
-            double bound = p * s->weight[k / 3] * pal_dist3(corner_at(body, body->d, s->item[k / 3], k % 3), middle);
-            bound_N_m[a] += bound, bound_N_m[b] += bound;
+            const int t = s->item[k / 3];
+            const int32_t node[3] = {corner_node(body, t, k % 3), corner_node(body, t, (k + 1) % 3),
+                                     corner_node(body, t, (k + 2) % 3)};
+            pal_pressure_bound(body->d, node, p * s->weight[k / 3], bound_N_m);
         }
     }
 }
 
 static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
 {
-    const brush_row *row = self;
+    const brushes *row = self;
     (void)body, (void)c;
     for (int i = 0; i < PAL_TOOL_MAX; i++) {
         const slot *s = &row->slot[i];
-        if (!acts(s) || s->brush.kind != PAL_BRUSH_CURVE) continue;
-        for (int n = 0; n < s->n; n++) {
-            const size_t at = 3 * (size_t)s->item[n];
-            pal_axpy3(out + at, k * spring(s, n), p + at);
-        }
+        for (int n = 0; n < s->n && acts(s) && s->brush.kind == PAL_BRUSH_CURVE; n++)
+            pal_axpy3(out + 3 * (size_t)s->item[n], k * spring(s, n), p + 3 * (size_t)s->item[n]);
     }
 }
 
 /* the body was reset: no brush acts on it */
 static void reset(void *self, const pal_body *body)
 {
-    brush_row *row = self;
+    brushes *row = self;
     (void)body;
     for (int i = 0; i < PAL_TOOL_MAX; i++) row->slot[i].ending = true, row->slot[i].share = 0;
 }
@@ -418,8 +396,8 @@ const pal_effect pal_effect_brush = {.name = "brush",
                                      .stage = PAL_STAGE_CONTACT,
                                      .run = run,
                                      .energy = energy,
-                                     .stiffness = stiffness,
+                                     .bounds.stiffness = stiffness,
                                      .reset = reset,
                                      .tangent = &tangent,
-                                     .settled_s = settled_s,
+                                     .sleep.settled_s = settled_s,
                                      .destroy = destroy};

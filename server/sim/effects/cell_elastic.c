@@ -5,11 +5,9 @@
  * "edges": changes of edge lengths and angles as in the paper, corrected; its forces have no energy, and `energy`
  * gives 1/2 d^' K d^).
  *
- * Acts on nodes: reads body->d against solid->node_rest, adds forces to body->f. Moduli are those of solid->samples;
- * when these change (painting, a live material edit), the constants are recomputed before their next use. Inverted
- * elements use the edges of their cells (cell_recovery.c) and are counted and timed in body->safeguards. There is no
- * bound of stiffness, because nodes are not dofs; solvers that need a limit find it by differences of forces. For
- * the same reason the tangent is given by products only. */
+ * Acts on nodes. Moduli are those of solid->samples; when these change, the constants are recomputed before their next
+ * use. Inverted elements use the edges of their cells (cell_recovery.c). Because nodes are not dofs there is no bound
+ * of stiffness (solvers find it by differences of forces), and the tangent is given by products only. */
 #include "server/base/clock.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/elements/elastic_law.h"
@@ -17,27 +15,23 @@
 #include "server/sim/subdivision/cell_kernel.h"
 
 #include <math.h>
-#include <string.h>
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     const pal_subdivision_solid *solid = build->body->model.solid;
-    const char *name = "polar";
+    static const char *const names[] = {[PAL_CELL_POLAR] = "polar", [PAL_CELL_EDGES] = "edges"};
+    int operator_kind = PAL_CELL_POLAR;
     if (!solid)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model subdivision_fem",
                                   item->path, item->name);
-    PAL_TRY(pal_entry_read_text(item, "operator", &name, build->diag));
-    if (strcmp(name, "polar") != 0 && strcmp(name, "edges") != 0)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s.operator: \"%s\" is neither polar nor edges",
-                                  item->path, name);
+    PAL_TRY(pal_entry_read_choice(item, "operator", names, 2, &operator_kind, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     pal_cells_elastic *row = PAL_NEW(build->arena, pal_cells_elastic, 1);
     if (!row) return PAL_ERR_MEMORY;
     *self = row;
-    bool polar = strcmp(name, "polar") == 0;
-    PAL_TRY(pal_cells_elastic_make(solid, polar ? PAL_CELL_POLAR : PAL_CELL_EDGES, build->arena, row, build->diag));
-    return polar && build->body->implicit ? pal_force_cache_make(build->body->n_node, build->arena, &row->force_cache)
-                                          : PAL_ERR_OK;
+    PAL_TRY(pal_cells_elastic_make(solid, (pal_cell_operator)operator_kind, build->arena, row, build->diag));
+    const bool cached = operator_kind == PAL_CELL_POLAR && build->body->implicit;
+    return cached ? pal_force_cache_make(build->body->n_node, build->arena, &row->force_cache) : PAL_ERR_OK;
 }
 
 static pal_err run(void *self, pal_step *step)
@@ -72,8 +66,8 @@ static void reset(void *self, const pal_body *body)
     pal_cells_elastic_reset(self);
 }
 
-/* A sparsity pattern over nodes would be mostly full, because elements overlap far beyond the neighbours of their
- * control points. Where volumes are those of control cells, control points move nodes beyond the elements' own */
+/* no pattern over nodes: elements overlap far beyond the neighbours of their control points. Volumes of control cells
+ * couple control points beyond the elements' own */
 static bool couple(void *self, pal_cliques *out)
 {
     const pal_cells_elastic *row = self;
@@ -81,7 +75,7 @@ static bool couple(void *self, pal_cliques *out)
     return row->volume.n > 0;
 }
 
-/* true: a lasting force acts on the body: lasting loads or a component with external energy, such as weight */
+/* true: lasting loads or a component with external energy, such as weight, act on the body */
 static bool is_loaded(const pal_step *step)
 {
     const pal_body *body = step->body;
@@ -95,7 +89,7 @@ static unsigned recover(void *self, pal_step *step)
 {
     pal_cells_elastic *row = self;
     pal_cells_elastic_refresh(row);
-    const bool changed = pal_cell_recovery_update(&row->recovery, row, step->body, is_loaded(step));
+    const bool changed = pal_cell_recovery_update(&row->recovery, row, step->body, step->time_s, is_loaded(step));
     if (changed) pal_force_cache_invalidate(&row->force_cache);
     if (row->recovery.stiffened_J > 0) pal_stiffening_damper_hold(step->body, row->recovery.stiffened_J);
     const unsigned now = row->recovery.at_rest ? PAL_INVERTED | PAL_INVERSION_AT_REST : PAL_INVERTED;
@@ -159,7 +153,7 @@ const pal_effect pal_effect_cell_elastic = {.name = "cell_elastic",
                                             .run = run,
                                             .energy = energy,
                                             .reset = reset,
-                                            .recover = recover,
+                                            .recovery.recover = recover,
                                             .tangent = &tangent,
-                                            .measure = measure,
-                                            .fields = PAL_ELASTIC_FIELDS};
+                                            .inspect.measure = measure,
+                                            .inspect.fields = PAL_ELASTIC_FIELDS};

@@ -5,12 +5,10 @@
  * rest direction, so that a body collapsed to a plane or a point opens again. Near inverted tetrahedra the edges are
  * restored as vectors (spring_recovery.h); those forces and that energy belong to this component. */
 #include "server/sim/core/effect_list.h"
+#include "server/sim/effects/tuning.h"
 #include "server/sim/springs/spring_recovery.h"
 
 #include <stdlib.h>
-
-/* smallest (l/l0)^2 that gives a direction */
-#define MIN_Q 1e-18
 
 typedef struct edge_distance {
     pal_spring_set row; /* first: see pal_spring_set_material */
@@ -85,7 +83,7 @@ static void reopen(const pal_spring_set *row, const pal_body *body)
 
 static pal_spring_set *springs(void *self)
 {
-    return &((edge_distance *)self)->row;
+    return self;
 }
 
 static pal_err run(void *self, pal_step *step)
@@ -157,8 +155,7 @@ static void measure_regions(const pal_spring_set *row, double *sum, double *volu
     }
 }
 
-/* the constant as the scene gives it, before the springs' weights, which differ between edges of a lattice and would
- * make a uniform body look chequered */
+/* the constant before the springs' weights, which differ between edges of a lattice */
 static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)
 {
     const edge_distance *e = self;
@@ -179,12 +176,12 @@ const pal_effect pal_effect_edge_distance = {.name = "edge_distance",
                                              .make = make,
                                              .run = run,
                                              .energy = energy,
-                                             .settled_s = settled_s,
-                                             .stiffness = stiffness,
-                                             .damping = damping,
-                                             .springs = springs,
-                                             .recover = pal_spring_recover,
+                                             .sleep.settled_s = settled_s,
+                                             .bounds.stiffness = stiffness,
+                                             .bounds.damping = damping,
+                                             .recovery.springs = springs,
+                                             .recovery.recover = pal_spring_recover,
                                              .reset = reset,
                                              .material = edit,
-                                             .measure = measure,
-                                             .fields = 1u << PAL_FIELD_STIFFNESS_J};
+                                             .inspect.measure = measure,
+                                             .inspect.fields = 1u << PAL_FIELD_STIFFNESS_J};

@@ -6,21 +6,16 @@
  * body's E. Constants that are not given follow the material: k = sqrt(3)/2 E thickness, c = 0.02 sqrt(k m_0).
  * spring_ramp multiplies k.
  *
- * Departures: a spring shorter than 1e-9 of its rest length takes its rest direction, without damping, so that a
+ * Departure: a spring shorter than 1e-9 of its rest length takes its rest direction, without damping, so that a
  * collapsed surface opens again.
  *
  * The list of active springs is rebuilt when the revision of the surface changes. Their ends are indices into
- * body->active_nodes in the order of shell->node, so position and velocity of an end are one load, and a force is
- * one load and one store. */
+ * body->active_nodes, so position and velocity of an end are one load, and a force is one load and one store. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
+#include "server/sim/effects/tuning.h"
 #include "server/sim/surface/active_nodes.h"
 #include "server/sim/surface/adaptive_surface.h"
-
-#include <math.h>
-
-/* smallest (l/l0)^2 that gives a direction */
-#define MIN_Q 1e-18
 
 /* springs per batch, so that the processor has several blocks in flight */
 enum { BATCH = 8 };
@@ -64,18 +59,13 @@ static pal_err find_young(edge_spring *e, const pal_build *build)
     base.young_Pa = NAN;
     for (int32_t i = 0; i < n_edge; i++) {
         const int32_t *vertex = levels->edge[i].vertex;
-        const double *a = levels->x + 3 * (size_t)vertex[0], *b = levels->x + 3 * (size_t)vertex[1];
-        double middle[3] = {0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])};
+        double middle[3];
+        pal_add3(middle, levels->x + 3 * (size_t)vertex[0], levels->x + 3 * (size_t)vertex[1]);
+        pal_scale3(middle, 0.5, middle);
         pal_material_overlay(build->def, &base, middle, &at);
         e->young[i] = (float)at.young_Pa;
     }
     return PAL_ERR_OK;
-}
-
-/* E at the middle of an edge over the body's */
-static double young_ratio(const edge_spring *e, int32_t edge)
-{
-    return e->young && !isnan(e->young[edge]) ? (double)e->young[edge] / e->young_Pa : 1;
 }
 
 static pal_err allocate(edge_spring *e, pal_arena *arena)
@@ -86,10 +76,9 @@ static pal_err allocate(edge_spring *e, pal_arena *arena)
     size_t n_lane = ((size_t)pal_levels_n_edge(levels, finest) + PAL_LANES - 1) / PAL_LANES * PAL_LANES;
     e->place = PAL_NEW(arena, int32_t, n_vertex);
     e->end = PAL_NEW(arena, uint32_t, 2 * n_lane);
-    e->w2 = PAL_NEW(arena, double, n_lane);
-    e->q = PAL_NEW(arena, double, n_lane);
     e->bound = PAL_NEW(arena, double, n_vertex);
-    return e->place && e->end && e->w2 && e->q && e->bound ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    const bool all = PAL_NEW_DOUBLES(arena, n_lane, &e->w2, &e->q) && e->place && e->end && e->bound;
+    return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
@@ -119,8 +108,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     return PAL_ERR_OK;
 }
 
-/* the active springs, distributed over blocks so that adjacent springs of the list share no end, whose force update
- * the next would have to wait for */
+/* the active springs, distributed over blocks so that successive springs share no end and need not wait */
 static void take_springs(edge_spring *e)
 {
     const pal_adaptive_surface *adaptive = e->adaptive;
@@ -145,7 +133,8 @@ static void take_springs(edge_spring *e)
         pal_sub3(d, x + 3 * (size_t)b, x + 3 * (size_t)a);
         end[0] = PAL_LANES * (uint32_t)e->place[a], end[PAL_LANES] = PAL_LANES * (uint32_t)e->place[b];
         e->w2[s] = 1 / pal_dot3(d, d);
-        e->q[s] = (double)adaptive->spring_share[k] * young_ratio(e, edge);
+        double young = e->young && !isnan(e->young[edge]) ? (double)e->young[edge] : e->young_Pa;
+        e->q[s] = (double)adaptive->spring_share[k] * (young / e->young_Pa);
         e->bound[e->place[a]] += 2 * e->q[s];
         e->bound[e->place[b]] += 2 * e->q[s];
     }
@@ -216,30 +205,18 @@ static double run_springs(const edge_spring *e, const pal_active_nodes *pack, do
     return min[0];
 }
 
-/* false: the lane has no spring */
-static bool spring_ends(const edge_spring *e, int s, int place[2], int32_t vertex[2])
-{
-    const uint32_t *end = e->end + 2 * (s / PAL_LANES * PAL_LANES) + s % PAL_LANES;
-    for (int k = 0; k < 2; k++) {
-        place[k] = (int)(end[k * PAL_LANES] / PAL_LANES);
-        vertex[k] = e->adaptive->node[place[k]];
-    }
-    return e->w2[s] > 0;
-}
-
 /* adds what the SIMD kernel omits: springs without length push their ends apart along the rest direction */
 static void reopen(const edge_spring *e, const pal_active_nodes *pack, double k)
 {
     for (int s = 0; s < PAL_LANES * e->n_block; s++) {
-        int32_t vertex[2];
-        int place[2];
-        if (!spring_ends(e, s, place, vertex)) continue;
-        pal_quad d = pal_v8_low(pack->xv[place[1]]) - pal_v8_low(pack->xv[place[0]]);
-        if (pal_quad_dot(d, d) * e->w2[s] >= MIN_Q) continue;
-        d = pack->rest[place[1]] - pack->rest[place[0]];
+        const uint32_t *end = e->end + 2 * (s / PAL_LANES * PAL_LANES) + s % PAL_LANES;
+        const uint32_t a = end[0] / PAL_LANES, b = end[PAL_LANES] / PAL_LANES;
+        pal_quad d = pal_v8_low(pack->xv[b]) - pal_v8_low(pack->xv[a]);
+        if (!(e->w2[s] > 0) || pal_quad_dot(d, d) * e->w2[s] >= MIN_Q) continue;
+        d = pack->rest[b] - pack->rest[a];
         d[3] = 0;
-        pack->f[place[1]] += k * e->q[s] * d;
-        pack->f[place[0]] -= k * e->q[s] * d;
+        pack->f[b] += k * e->q[s] * d;
+        pack->f[a] -= k * e->q[s] * d;
     }
 }
 
@@ -311,6 +288,6 @@ const pal_effect pal_effect_edge_spring = {.name = "edge_spring",
                                            .run = run,
                                            .compute_forces = compute_forces,
                                            .energy = energy,
-                                           .stiffness = stiffness,
-                                           .damping = damping,
+                                           .bounds.stiffness = stiffness,
+                                           .bounds.damping = damping,
                                            .material = material};

@@ -2,14 +2,11 @@
  * f_a = -(k C + c C') n x (x_c - x_b)/(2 A0) and cyclic, n the unit normal (paper B section 4.1, F_A).
  *
  * Departures: errata B2, B3, B5 (true gradients: the paper's sign pushes away from A0 and its equal magnitudes create
- * momentum). Below 1e-12 of its rest area a triangle has no normal and its force fades to nothing. */
-#include "server/sim/core/effect_list.h"
-#include "server/sim/springs/spring_recovery.h"
+ * momentum). Below 1e-9 of its rest area a triangle has no normal and its force fades to nothing. */
+#include "server/sim/effects/spring_effect.h"
+#include "server/sim/effects/tuning.h"
 
 #include <stdlib.h>
-
-/* smallest (A/A0)^2 that gives a normal */
-#define MIN_Q 1e-24
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
@@ -61,48 +58,4 @@ PAL_INLINE void bound_kernel(const double *p[][3], pal_v8 w, pal_v8 kq, bool ben
     for (int c = 0; c < 3; c++) bound[c] = along * length[c] * sum + flat;
 }
 
-static pal_spring_set *springs(void *self)
-{
-    return self;
-}
-
-static pal_err run(void *self, pal_step *step)
-{
-    const pal_spring_set *row = self;
-    pal_body *body = step->body;
-    pal_node_order_load(body->node_order, body->d);
-    pal_spring_run(row, body->node_order, kernel, 3);
-    pal_node_order_add(body->node_order, body->f);
-    if (row->spring.c_Js > 0) pal_spring_damp(row, body, PAL_SPRING_AREA);
-    return PAL_ERR_OK;
-}
-
-static double energy(void *self, const pal_body *body)
-{
-    return pal_spring_energy(self, body, PAL_SPRING_AREA);
-}
-
-static void stiffness(void *self, const pal_body *body, double *bound_N_m)
-{
-    const pal_spring_set *row = self;
-    pal_spring_bound(row, body->node_order, body->d, bound_kernel, 3, row->spring.k_J, true, bound_N_m);
-}
-
-static void damping(void *self, const pal_body *body, double *bound_Ns_m)
-{
-    const pal_spring_set *row = self;
-    if (row->spring.c_Js > 0)
-        pal_spring_bound(row, body->node_order, body->d, bound_kernel, 3, row->spring.c_Js, false, bound_Ns_m);
-}
-
-const pal_effect pal_effect_face_area = {.name = "face_area",
-                                         .stage = PAL_STAGE_FORCE,
-                                         .internal = true,
-                                         .make = make,
-                                         .run = run,
-                                         .energy = energy,
-                                         .stiffness = stiffness,
-                                         .damping = damping,
-                                         .springs = springs,
-                                         .recover = pal_spring_recover,
-                                         .material = pal_spring_set_material};
+PAL_SPRING_EFFECT(face_area, PAL_SPRING_AREA, 3)

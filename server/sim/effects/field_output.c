@@ -1,20 +1,16 @@
-/* Component field_output: a field shown in colour at the shown vertices: displacement, von Mises stress, strain
- * energy density, edge stiffness, largest strain or volume distortion. It exists while an observer asks for it
- * (pal_world_field) or where the scene has an entry for it. The simulation does not depend on it.
+/* Component field_output: a field shown in colour at the shown vertices. It exists while an observer asks for it
+ * (pal_world_field) or where the scene has an entry for it; the simulation does not depend on it.
  *
- * All but displacement: every FORCE component that can measure adds its value times volume, and the volume, to the
- * nodes of its elements; a node shows the quotient, the volume-weighted mean of its elements. A shown vertex takes
- * the mean of the nodes it is skinned to, with the skin's weights (mesh/volume/skin.h), or is a node itself.
- * Displacement is the distance of a shown vertex from its rest position. A non-finite number is shown as 0; the
- * finite guard reports divergence.
- *
- * An adaptive body (adaptive_surface.h) shows 0 at inactive vertices.
+ * Every FORCE component that can measure adds its value times volume, and the volume, to the nodes of its elements; a
+ * node shows the quotient, and a skinned vertex the mean of its nodes with the skin's weights. Displacement is the
+ * distance of a shown vertex from its rest position. A number that is not finite is shown as 0, as are inactive
+ * vertices of an adaptive body.
  *
  * Keys: field ("displacement" | "von_mises" | "energy" | "stiffness" | "strain" | "distortion"), rate_hz (10:
  * updates per simulated second). */
+#include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 
-#include <math.h>
 #include <string.h>
 
 typedef struct field_output {
@@ -40,23 +36,17 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
             build->diag, PAL_ERR_REFUSED,
             "%s: there is no field \"%s\" (displacement, von_mises, energy, stiffness, strain, distortion)", item->path,
             name);
-    if (body->n_shown == 0 || !body->surface)
+    if (body->display.n_shown == 0 || !body->display.surface)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: the body shows nothing that could be coloured",
                                   item->path);
     field_output *out = PAL_NEW(build->arena, field_output, 1);
-    float *value = PAL_NEW(build->arena, float, body->n_shown);
+    float *value = PAL_NEW(build->arena, float, body->display.n_shown);
     if (!out || !value) return PAL_ERR_MEMORY;
-    out->kind = kind;
-    out->shown.value = value;
-    out->period_s = 1 / rate_hz;
-    out->next_s = -INFINITY;
-    out->body = body;
-    if (kind != PAL_FIELD_DISPLACEMENT_M) {
-        out->sum = PAL_NEW(build->arena, double, body->n_node);
-        out->volume_m3 = PAL_NEW(build->arena, double, body->n_node);
-        if (!out->sum || !out->volume_m3) return PAL_ERR_MEMORY;
-    }
-    body->field[kind] = &out->shown;
+    *out =
+        (field_output){.kind = kind, .shown.value = value, .period_s = 1 / rate_hz, .next_s = -INFINITY, .body = body};
+    if (kind != PAL_FIELD_DISPLACEMENT_M && !PAL_NEW_DOUBLES(build->arena, body->n_node, &out->sum, &out->volume_m3))
+        return PAL_ERR_MEMORY;
+    body->display.field[kind] = &out->shown;
     *self = out;
     return PAL_ERR_OK;
 }
@@ -69,25 +59,21 @@ static float finite_or_0(double value)
 
 static void displacement(const pal_body *body, float *value)
 {
-    const double *rest = body->surface->x;
-    int n = body->active ? body->n_active : body->n_shown;
+    const double *rest = body->display.surface->x;
+    int n = body->active ? body->n_active : body->display.n_shown;
     for (int k = 0; k < n; k++) {
         int i = body->active ? body->active[k] : k;
-        double sum = 0;
-        for (int c = 0; c < 3; c++) {
-            double moved = (double)body->shown[3 * (size_t)i + (size_t)c] - rest[3 * (size_t)i + (size_t)c];
-            sum += moved * moved;
-        }
-        value[i] = finite_or_0(sqrt(sum));
+        const float *x = body->display.shown + 3 * (size_t)i;
+        value[i] = finite_or_0(pal_dist3((double[3]){(double)x[0], (double)x[1], (double)x[2]}, rest + 3 * (size_t)i));
     }
 }
 
 /* nodal means to shown vertices */
 static void spread(const pal_body *body, const double *nodal, float *value)
 {
-    const pal_skin *skin = body->skin;
-    for (int i = 0; i < body->n_shown && !skin; i++) value[i] = finite_or_0(nodal[body->shown_node[i]]);
-    for (int i = 0; i < body->n_shown && skin; i++) {
+    const pal_skin *skin = body->display.skin;
+    for (int i = 0; i < body->display.n_shown && !skin; i++) value[i] = finite_or_0(nodal[body->display.shown_node[i]]);
+    for (int i = 0; i < body->display.n_shown && skin; i++) {
         const int32_t *near = skin->near + PAL_SKIN_NEIGHBOURS * (size_t)i;
         const float *coef = skin->coef + 4 * PAL_SKIN_NEIGHBOURS * (size_t)i;
         double sum = 0;
@@ -103,8 +89,9 @@ static void measured(field_output *out, const pal_step *step)
     memset(out->sum, 0, n_byte);
     memset(out->volume_m3, 0, n_byte);
     for (int i = 0; i < step->n_force; i++) {
-        const pal_component *row = &step->force[i];
-        if (row->effect->measure) row->effect->measure(row->self, body, out->kind, out->sum, out->volume_m3);
+        const pal_effect *effect = step->force[i].effect;
+        if (effect->inspect.measure)
+            effect->inspect.measure(step->force[i].self, body, out->kind, out->sum, out->volume_m3);
     }
     for (int i = 0; i < body->n_node; i++) out->sum[i] = out->volume_m3[i] > 0 ? out->sum[i] / out->volume_m3[i] : 0;
     spread(body, out->sum, out->shown.value);
@@ -115,13 +102,14 @@ static pal_err run(void *self, pal_step *step)
     field_output *out = self;
     /* update in the step nearest to the due time, so that a period of whole steps stays one */
     if (step->time_s + 0.5 * step->dt_s < out->next_s) return PAL_ERR_OK;
-    if (out->revision != step->body->revision) memset(out->shown.value, 0, sizeof(float) * (size_t)step->body->n_shown);
-    out->revision = step->body->revision;
+    if (out->revision != step->body->display.revision)
+        memset(out->shown.value, 0, sizeof(float) * (size_t)step->body->display.n_shown);
+    out->revision = step->body->display.revision;
     if (out->kind == PAL_FIELD_DISPLACEMENT_M)
         displacement(step->body, out->shown.value);
     else
         measured(out, step);
-    out->shown.revision = ++out->body->field_revision;
+    out->shown.revision = ++out->body->display.field_revision;
     out->shown.time_s = step->time_s;
     out->next_s += out->period_s;
     if (!(out->next_s > step->time_s)) out->next_s = step->time_s + out->period_s;
@@ -138,7 +126,7 @@ static void reset(void *self, const pal_body *body)
 static void destroy(void *self)
 {
     field_output *out = self;
-    if (out->body->field[out->kind] == &out->shown) out->body->field[out->kind] = NULL;
+    if (out->body->display.field[out->kind] == &out->shown) out->body->display.field[out->kind] = NULL;
 }
 
 const pal_effect pal_effect_field_output = {

@@ -2,18 +2,13 @@
  *
  * A body diverges when a position or velocity is not finite, a node is farther than `reach` box diagonals from its
  * rest position, or the root mean square speed exceeds `speed_m_s`. The guard restores the last good positions
- * (copied every step) with zero velocity, and the body stays frozen until reset. body->frozen marks it (the world's
- * step reports it); body->reason names the point, the element and the number.
- * Of a body whose nodes are interpolated from control points (body.interpolation) the control points are checked and
- * restored; the speed is that of the nodes. Of an adaptive body (adaptive_surface.h) the active points are checked
- * and copied. The set of active points is not restored: a point that became active since the last good state is
- * placed between the ends of its edge. */
+ * (copied every step) with zero velocity, and the body stays frozen until reset; body->reason names the point, the
+ * element and the number.
+ * Dofs are checked and restored (of an adaptive body the active ones), but the speed is that of the nodes. The set of
+ * active points is not restored: a point that became active since is placed between the ends of its edge. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect.h"
 #include "server/sim/core/sums.h"
-
-#include <math.h>
-#include <string.h>
 
 typedef struct finite_guard {
     pal_body *body;
@@ -36,41 +31,23 @@ static double auto_speed(const finite_guard *guard, const pal_material *material
 static void keep(finite_guard *guard, const pal_body *body)
 {
     guard->turn++;
-    for (int k = 0; k < body->n_active && guard->kept; k++) {
-        size_t i = 3 * (size_t)body->active[k];
-        pal_copy3(guard->x + i, body->x + i);
-        guard->kept[body->active[k]] = guard->turn;
+    for (int k = 0; k < body->n_active; k++) {
+        int i = pal_body_point(body, k);
+        pal_copy3(guard->x + 3 * (size_t)i, body->x + 3 * (size_t)i);
+        if (guard->kept) guard->kept[i] = guard->turn;
     }
-    if (guard->kept) return;
-    memcpy(guard->x, body->x, 3 * sizeof(double) * (size_t)body->n_dof);
 }
 
 /* position of a point of an adaptive body in the last good state; interpolated if it was inactive */
 static void last_place(const finite_guard *guard, const pal_levels *levels, int32_t i, double x[3])
 {
-    int32_t edge = pal_levels_vertex_parent(levels, i);
-    if (guard->kept[i] == guard->turn || edge < 0) {
-        pal_copy3(x, guard->x + 3 * (size_t)i);
-        return;
-    }
+    int32_t edge = levels ? pal_levels_vertex_parent(levels, i) : -1;
     double end[3];
+    pal_copy3(x, guard->x + 3 * (size_t)i);
+    if (edge < 0 || guard->kept[i] == guard->turn) return;
     last_place(guard, levels, levels->edge[edge].vertex[0], x);
     last_place(guard, levels, levels->edge[edge].vertex[1], end);
     for (int c = 0; c < 3; c++) x[c] = 0.5 * (x[c] + end[c]);
-}
-
-static void put_back(finite_guard *guard, pal_body *body)
-{
-    size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
-    for (int k = 0; k < body->n_active && guard->kept; k++) {
-        int32_t i = body->active[k];
-        last_place(guard, body->dofs.levels, i, body->x + 3 * (size_t)i);
-        pal_set3(body->v + 3 * (size_t)i, 0, 0, 0);
-    }
-    if (guard->kept) return;
-    memcpy(body->x, guard->x, n_byte);
-    memset(body->v, 0, n_byte);
-    pal_body_update_nodes(body);
 }
 
 static pal_err material(void *self, const pal_body *body, const pal_material *mat, pal_diagnostic *diag)
@@ -90,13 +67,14 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     finite_guard *guard = PAL_NEW(build->arena, finite_guard, 1);
     if (!guard) return PAL_ERR_MEMORY;
-    guard->x = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
-    if (body->active) guard->kept = PAL_NEW(build->arena, uint32_t, body->n_dof);
+    *guard = (finite_guard){.body = body,
+                            .x = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof),
+                            .kept = body->active ? PAL_NEW(build->arena, uint32_t, body->n_dof) : NULL,
+                            .reach = reach,
+                            .gravity_m_s2 = fabs(build->scene->gravity_m_s2),
+                            .asked_speed_m_s = speed,
+                            .speed_m_s = speed};
     if (!guard->x || (body->active && !guard->kept)) return PAL_ERR_MEMORY;
-    guard->body = body;
-    guard->reach = reach;
-    guard->gravity_m_s2 = fabs(build->scene->gravity_m_s2);
-    guard->asked_speed_m_s = guard->speed_m_s = speed;
     if (speed == 0) guard->speed_m_s = auto_speed(guard, &build->def->material);
     for (int i = 0; i < body->n_node; i++) guard->mass_kg += body->node_mass_kg[i];
     keep(guard, body);
@@ -125,8 +103,7 @@ static bool sound(const finite_guard *guard, const pal_body *body)
     return far == 0 && energy <= guard->mass_kg * guard->speed_m_s * guard->speed_m_s;
 }
 
-/* describes the violation: a non-finite number, the farthest point, or the fastest point with the mean speed that is
- * tested */
+/* names a non-finite number, the farthest point, or the fastest point with the mean speed that is tested */
 static void report_stop(const finite_guard *guard, pal_body *body)
 {
     double far_m = 0, fast_m_s = 0, limit = guard->reach * body->length_scale_m;
@@ -161,7 +138,12 @@ static pal_err run(void *self, pal_step *step)
         return PAL_ERR_OK;
     }
     report_stop(guard, body);
-    put_back(guard, body);
+    for (int k = 0; k < body->n_active; k++) {
+        int32_t i = pal_body_point(body, k);
+        last_place(guard, body->dofs.levels, i, body->x + 3 * (size_t)i);
+        pal_set3(body->v + 3 * (size_t)i, 0, 0, 0);
+    }
+    pal_body_update_nodes(body);
     return PAL_ERR_OK;
 }
 

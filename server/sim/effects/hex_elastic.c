@@ -2,26 +2,22 @@
  *
  * Keys: element ("hex8_bbar": mean dilatation, the default | "hex8": full integration), law ("corotational" |
  * "linear" | "neo_hookean"), fill (true: the stiffness of a voxel is scaled by its fraction inside the surface, at
- * least 0.02), recover (true: while a corner is inverted the body uses its five-tetrahedra split, and a persistent
- * inversion is straightened, elastic_tet.h; not for linear).
+ * least PAL_FILL_MIN), recover (true: while a corner is inverted the body uses its five-tetrahedra split, and a
+ * persistent inversion is straightened, elastic_tet.h; not for linear).
  *
- * The tangent and the decision on inversion recovery are taken at linearise; without an implicit solver the decision
- * is taken at every evaluation of forces. */
+ * The decision on inversion recovery is taken at linearise; without an implicit solver at every evaluation of forces.
+ */
 #include "server/base/clock.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/elements/elastic_hex.h"
 
-#include <string.h>
-
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     pal_hex_options options = {.law = PAL_LAW_COROTATIONAL, .element = PAL_HEX_BBAR, .fill = true, .recover = true};
-    const char *element = "hex8_bbar";
-    PAL_TRY(pal_entry_read_text(item, "element", &element, build->diag));
-    options.element = strcmp(element, "hex8_bbar") ? PAL_HEX_FULL : PAL_HEX_BBAR;
-    if (options.element == PAL_HEX_FULL && strcmp(element, "hex8"))
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s.element: \"%s\" is neither hex8_bbar nor hex8",
-                                  item->path, element);
+    static const char *const elements[] = {"hex8_bbar", "hex8"};
+    int element = 0;
+    PAL_TRY(pal_entry_read_choice(item, "element", elements, 2, &element, build->diag));
+    if (element) options.element = PAL_HEX_FULL;
     PAL_TRY(pal_elastic_law_read(item, &options.law, build->diag));
     PAL_TRY(pal_entry_read_bool(item, "fill", &options.fill, build->diag));
     PAL_TRY(pal_entry_read_bool(item, "recover", &options.recover, build->diag));
@@ -43,18 +39,13 @@ static pal_err run(void *self, pal_step *step)
         uint64_t before = pal_clock_ns();
         pal_elastic_tets_force(row->split, body->d, body->f);
         body->safeguards.ns += pal_clock_ns() - before;
-        return PAL_ERR_OK;
-    }
-    if (pal_force_cache_matches(&row->force_cache, body->d)) {
+    } else if (pal_force_cache_matches(&row->force_cache, body->d)) {
         pal_force_cache_add(&row->force_cache, body->f);
-        return PAL_ERR_OK;
+    } else {
+        pal_node_order_load(body->node_order, body->d);
+        (row->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_run : pal_hex_corot_run)(row, body->node_order, PAL_RUN_FORCE);
+        pal_node_order_add(body->node_order, body->f);
     }
-    pal_node_order_load(body->node_order, body->d);
-    if (row->law == PAL_LAW_NEO_HOOKEAN)
-        pal_hex_neo_force(row, body->node_order);
-    else
-        pal_hex_corot_force(row, body->node_order);
-    pal_node_order_add(body->node_order, body->f);
     return PAL_ERR_OK;
 }
 
@@ -65,8 +56,9 @@ static double energy(void *self, const pal_body *body)
     if (pal_force_cache_matches(&row->force_cache, body->d)) return row->force_cache.energy_J;
     pal_node_order_load(body->node_order, body->d);
     double *forces = pal_force_cache_begin(&row->force_cache, body->d);
-    double sum = row->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_energy(row, body->node_order, forces)
-                                                 : pal_hex_corot_energy(row, body->node_order, forces);
+    const pal_element_run what = forces ? PAL_RUN_BOTH : PAL_RUN_ENERGY;
+    double sum = row->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_run(row, body->node_order, what)
+                                                 : pal_hex_corot_run(row, body->node_order, what);
     if (forces) pal_node_order_add(body->node_order, forces);
     return pal_force_cache_commit(&row->force_cache, sum);
 }
@@ -74,16 +66,13 @@ static double energy(void *self, const pal_body *body)
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
     pal_elastic_hexes *row = self;
-    if (row->has_inversion) {
+    if (row->has_inversion)
         pal_elastic_tets_bound(row->split, body->d, bound_N_m);
-        return;
-    }
-    if (row->law == PAL_LAW_NEO_HOOKEAN) {
+    else if (row->law == PAL_LAW_NEO_HOOKEAN)
         pal_hex_neo_bound(row, body, bound_N_m);
-        return;
-    }
-    for (int e = 0; e < row->n_hex; e++)
-        for (int c = 0; c < 8; c++) bound_N_m[row->hexes->node[8 * e + c]] += row->bound[row->simd_blocks.place[e]];
+    else
+        for (int i = 0; i < 8 * row->n_hex; i++)
+            bound_N_m[row->hexes->node[i]] += row->bound[row->simd_blocks.place[i / 8]];
 }
 
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
@@ -116,10 +105,7 @@ static void linearise(void *self, const pal_body *body)
         return;
     }
     pal_node_order_load(body->node_order, body->d);
-    if (row->law == PAL_LAW_NEO_HOOKEAN)
-        pal_hex_neo_linearise(row, body->node_order);
-    else
-        pal_hex_corot_linearise(row, body->node_order);
+    (row->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_linearise : pal_hex_corot_linearise)(row, body->node_order);
 }
 
 static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
@@ -131,10 +117,7 @@ static void multiply(void *self, const pal_body *body, double k, double c, const
         return;
     }
     pal_node_order_load(body->node_order, p);
-    if (row->law == PAL_LAW_NEO_HOOKEAN)
-        pal_hex_neo_multiply(row, body->node_order, k);
-    else
-        pal_hex_corot_multiply(row, body->node_order, k);
+    (row->law == PAL_LAW_NEO_HOOKEAN ? pal_hex_neo_multiply : pal_hex_corot_multiply)(row, body->node_order, k);
     pal_node_order_add(body->node_order, out);
 }
 
@@ -185,10 +168,10 @@ const pal_effect pal_effect_hex_elastic = {.name = "hex_elastic",
                                            .make = make,
                                            .run = run,
                                            .energy = energy,
-                                           .stiffness = stiffness,
+                                           .bounds.stiffness = stiffness,
                                            .material = material,
                                            .reset = reset,
                                            .tangent = &tangent,
-                                           .measure = measure,
-                                           .fields = PAL_ELASTIC_FIELDS,
-                                           .stress = stress};
+                                           .inspect.measure = measure,
+                                           .inspect.fields = PAL_ELASTIC_FIELDS,
+                                           .inspect.stress = stress};

@@ -4,25 +4,23 @@
  *
  * With s = V/V_rest, both of the triangles drawn now, so that a switch of level does not change s:
  *   kind "pressure"  p = pressure_Pa
- *   kind "gas"       p = pressure_Pa + absolute_Pa (1/s - 1), isothermal: p_absolute V = const. Below s = 1/11
- *                    (squeezed flat or everted) the second part stays at 10 absolute_Pa: finite, and reinflating
- *   kind "fluid"     p = pressure_Pa + bulk_Pa (1 - s), the second part within +-10 bulk_Pa
+ *   kind "gas"       p = pressure_Pa + absolute_Pa (1/s - 1), isothermal: p_absolute V = const; the second part at most
+ *                    PAL_LOAD_CAP_FACTOR absolute_Pa (squeezed flat or everted): finite, and reinflating
+ *   kind "fluid"     p = pressure_Pa + bulk_Pa (1 - s), the second part within +-PAL_LOAD_CAP_FACTOR bulk_Pa
  * The energy is -V_0 times the integral of p over s from 1, where V_0 is the rest volume of the finest level; forces
- * are its gradient. A coarse level has a slightly smaller volume, gets a slightly larger pressure and does the same
- * work. pressure_Pa > 0 inflates, < 0 deflates; it ramps up over the first ramp_s of simulated time, again after a
- * reset.
+ * are its gradient, so a coarse level, of slightly smaller volume, gets a slightly larger pressure. pressure_Pa > 0
+ * inflates, < 0 deflates; it ramps up over the first ramp_s of simulated time, again after a reset.
  *
  * Disconnected parts share one volume. A surface whose faces point inwards is reversed.
  * Keys: kind ("pressure"), pressure_Pa (0), absolute_Pa (101325, gas), bulk_Pa (20000, fluid), ramp_s (0.5). */
 #include "server/base/vec3.h"
 #include "server/sim/core/blend.h"
 #include "server/sim/core/effect_list.h"
+#include "server/sim/effects/pressure_bound.h"
 #include "server/sim/surface/adaptive_surface.h"
 
+#include <float.h>
 #include <string.h>
-
-/* min rest volume over S^3 */
-#define MIN_FILL 1e-9
 
 typedef enum filling { PRESSURE, GAS, FLUID } filling;
 
@@ -36,18 +34,12 @@ typedef struct inflate {
     double *gradient; /* dV/dx_i, m^2, of the active nodes [n_node][3] */
 } inflate;
 
-/* max of the stiff part of the pressure over stiff_Pa */
-static const double max = 10;
-
 static pal_err read_keys(inflate *row, pal_config_entry *item, pal_diagnostic *diag)
 {
     static const char *const names[] = {"pressure", "gas", "fluid"};
-    const char *kind = names[PRESSURE];
-    PAL_TRY(pal_entry_read_text(item, "kind", &kind, diag));
-    while (row->kind <= FLUID && strcmp(kind, names[row->kind]) != 0) row->kind++;
-    if (row->kind > FLUID)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.kind: \"%s\", wanted \"pressure\", \"gas\" or \"fluid\"",
-                                  item->path, kind);
+    int kind = PRESSURE;
+    PAL_TRY(pal_entry_read_choice(item, "kind", names, 3, &kind, diag));
+    row->kind = (filling)kind;
     row->ramp_s = 0.5;
     row->stiff_Pa = row->kind == GAS ? 101325 : row->kind == FLUID ? 20000 : 0;
     PAL_TRY(pal_entry_read_number(item, "pressure_Pa", -1e12, 1e12, &row->pressure_Pa, diag));
@@ -57,19 +49,16 @@ static pal_err read_keys(inflate *row, pal_config_entry *item, pal_diagnostic *d
     return pal_entry_check_unused(item, diag);
 }
 
-/* 6 V of a triangle and a point */
-static double six_volumes(const double *x, const int32_t *tri, const double from[3])
-{
-    double e[3][3], n[3];
-    for (int c = 0; c < 3; c++) pal_sub3(e[c], x + 3 * (size_t)tri[c], from);
-    pal_cross3(n, e[1], e[2]);
-    return pal_dot3(e[0], n);
-}
-
+/* from the first corner, so that a distant origin costs no accuracy */
 static double volume(const double *x, const int32_t *tri, int n_tri)
 {
     double sum = 0;
-    for (int t = 0; t < n_tri; t++) sum += six_volumes(x, tri + 3 * (size_t)t, x + 3 * (size_t)tri[0]);
+    for (int t = 0; t < n_tri; t++) {
+        double e[3][3], n[3];
+        for (int c = 0; c < 3; c++) pal_sub3(e[c], x + 3 * (size_t)tri[3 * t + c], x + 3 * (size_t)tri[0]);
+        pal_cross3(n, e[1], e[2]);
+        sum += pal_dot3(e[0], n);
+    }
     return sum / 6;
 }
 
@@ -88,7 +77,8 @@ static pal_err check_surface(inflate *row, const pal_config_entry *item, const p
                                   item->name, n_open);
     row->fine_m3 =
         volume(levels->x, levels->face + 3 * (size_t)levels->first_face[last], pal_levels_n_face(levels, last));
-    double size = build->body->length_scale_m, min_m3 = MIN_FILL * size * size * size;
+    double size = build->body->length_scale_m,
+           min_m3 = DBL_EPSILON * pal_levels_n_face(levels, last) * size * size * size;
     if (!(fabs(row->fine_m3) > min_m3))
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
                                   "%s: the surface encloses %g m3, which cannot be told from nothing", item->path,
@@ -111,7 +101,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 }
 
 /* V_rest of the drawn triangles; if they enclose almost nothing, that of the finest level */
-static void follow(inflate *row, const pal_adaptive_surface *adaptive)
+static void update_rest_volume(inflate *row, const pal_adaptive_surface *adaptive)
 {
     if (row->revision == adaptive->revision) return;
     row->revision = adaptive->revision;
@@ -130,11 +120,8 @@ static double measure_volume(inflate *row, const pal_body *body)
         memset(row->gradient + 3 * (size_t)pal_body_point(body, k), 0, 3 * sizeof(double));
     for (int t = 0; t < adaptive->n_tri; t++) {
         const int32_t *tri = adaptive->tri + 3 * (size_t)t;
-        const double *a = body->d + 3 * (size_t)tri[0];
-        double p[3], q[3], n[3];
-        pal_sub3(p, body->d + 3 * (size_t)tri[1], a);
-        pal_sub3(q, body->d + 3 * (size_t)tri[2], a);
-        pal_cross3(n, p, q);
+        double n[3];
+        pal_normal3(n, body->d + 3 * (size_t)tri[0], body->d + 3 * (size_t)tri[1], body->d + 3 * (size_t)tri[2]);
         for (int c = 0; c < 3; c++) pal_axpy3(row->gradient + 3 * (size_t)tri[c], 1.0 / 6, n);
     }
     for (int k = 0; k < body->n_active; k++) {
@@ -151,32 +138,21 @@ typedef struct answer {
     double value, slope, sum;
 } answer;
 
-static answer answer_gas(double s)
+static answer answer_to(const inflate *row, double s)
 {
-    double low = 1 / (1 + max), min = fmax(s, low);
-    answer a = {.value = 1 / min - 1, .slope = s > low ? 1 / (s * s) : 0, .sum = log(min) - (min - 1)};
-    a.sum += a.value * (s - min);
-    return a;
-}
-
-static answer answer_fluid(double s)
-{
-    double at = fmin(fmax(s, 1 - max), 1 + max);
-    answer a = {.value = 1 - at, .slope = s == at ? 1 : 0, .sum = -0.5 * (1 - at) * (1 - at)};
+    const double low = row->kind == GAS ? 1 / (1.0 + PAL_LOAD_CAP_FACTOR) : 1 - PAL_LOAD_CAP_FACTOR;
+    const double at = fmin(fmax(s, low), row->kind == GAS ? INFINITY : 1 + PAL_LOAD_CAP_FACTOR);
+    answer a = {0};
+    if (row->kind == GAS) a = (answer){1 / at - 1, s > low ? 1 / (s * s) : 0, log(at) - (at - 1)};
+    if (row->kind == FLUID) a = (answer){1 - at, s == at ? 1 : 0, -0.5 * (1 - at) * (1 - at)};
     a.sum += a.value * (s - at);
     return a;
 }
 
-static answer answer_to(const inflate *row, double s)
-{
-    return row->kind == GAS ? answer_gas(s) : row->kind == FLUID ? answer_fluid(s) : (answer){0};
-}
-
-/* returns p V_0/V_rest, the factor of row->gradient in the force; also sets s and the gradient at the present
- * positions */
+/* sets s and the gradient at the present positions; returns p V_0/V_rest, the factor of the gradient in the force */
 static double push(inflate *row, const pal_body *body, double *s)
 {
-    follow(row, body->model.adaptive);
+    update_rest_volume(row, body->model.adaptive);
     *s = measure_volume(row, body) / row->rest_m3;
     double p = row->share * row->pressure_Pa + row->stiff_Pa * answer_to(row, *s).value;
     return p * fabs(row->fine_m3) / row->rest_m3;
@@ -186,8 +162,8 @@ static pal_err run(void *self, pal_step *step)
 {
     inflate *row = self;
     pal_body *body = step->body;
-    double s, t = step->time_s;
-    row->share = pal_blend_toward(0, 1, t, row->ramp_s);
+    double s;
+    row->share = pal_blend_toward(0, 1, step->time_s, row->ramp_s);
     double p = push(row, body, &s);
     for (int k = 0; k < body->n_active; k++) {
         size_t i = 3 * (size_t)pal_body_point(body, k);
@@ -206,8 +182,7 @@ static double energy(void *self, const pal_body *body)
 }
 
 /* Two parts. The change of p adds stiffness along g = dV/dx only: k g g', whose largest w^2, k times the sum of
- * g.g/m over the free nodes, is applied at every node. At constant p the edge (i, j) between corners k and l couples
- * its ends by p |x_k - x_l|/6, at most the distances from both to its middle */
+ * g.g/m over the free nodes, is applied at every node; and the stiffness at constant p (pressure_bound.h) */
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
     inflate *row = self;
@@ -229,14 +204,8 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
     }
     for (int t = 0; t < adaptive->n_tri && p != 0; t++) {
         const int32_t *tri = adaptive->tri + 3 * (size_t)t;
-        for (int c = 0; c < 3; c++) {
-            int32_t a = tri[(c + 1) % 3], b = tri[(c + 2) % 3];
-            double middle[3];
-            pal_add3(middle, body->d + 3 * (size_t)a, body->d + 3 * (size_t)b);
-            pal_scale3(middle, 0.5, middle);
-            double bound = p / 6 * pal_dist3(body->d + 3 * (size_t)tri[c], middle);
-            bound_N_m[a] += bound, bound_N_m[b] += bound;
-        }
+        for (int c = 0; c < 3; c++)
+            pal_pressure_bound(body->d, (int32_t[3]){tri[c], tri[(c + 1) % 3], tri[(c + 2) % 3]}, p / 6, bound_N_m);
     }
 }
 
@@ -256,6 +225,6 @@ const pal_effect pal_effect_inflate = {.name = "inflate",
                                        .make = make,
                                        .run = run,
                                        .energy = energy,
-                                       .stiffness = stiffness,
+                                       .bounds.stiffness = stiffness,
                                        .reset = reset,
-                                       .settled_s = settled_s};
+                                       .sleep.settled_s = settled_s};

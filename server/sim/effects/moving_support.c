@@ -3,9 +3,8 @@
  * A node at X at rest is at  c + R(s angle) (X - c) + s shift  at time t, where c is the centroid of the nodes at
  * rest and R the rotation about `turn_axis`. s rises smoothly from 0 to 1 within rise_s, (1 - cos(pi t / rise)) / 2,
  * but no faster than in one step of the scene, and stays 1; with period_s it is multiplied by (1 - cos(2 pi t /
- * period)) / 2. In each sub-step the nodes get the velocity that brings them to their position at its end; solvers
- * do not change it (PAL_PRESCRIBED). The path depends on time only, so a restart or another sub-step gives the same
- * positions.
+ * period)) / 2. In each sub-step the nodes get the velocity that brings them to their position at its end
+ * (PAL_PRESCRIBED), which depends on time only.
  *
  * Keys: those of rest_region.h, shift_m (0 0 0), turn_axis (0 0 1), turn_deg (0), rise_s (0), period_s (0: s stays
  * 1). */
@@ -40,18 +39,18 @@ static pal_err read_keys(moving_support *m, pal_config_entry *entry, pal_diagnos
 static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
 {
     pal_body *body = build->body;
-    pal_rest_region region;
+    uint8_t *held;
     moving_support *m = PAL_NEW(build->arena, moving_support, 1);
     if (!m) return PAL_ERR_MEMORY;
     m->axis[2] = 1;
-    PAL_TRY(pal_rest_region_read(entry, body->x_rest, body->n_dof, build->scene->up, &region, build->diag));
+    PAL_TRY(pal_rest_region_find(entry, body->x_rest, body->n_dof, build, &held));
     PAL_TRY(read_keys(m, entry, build->diag));
     m->rise_s = fmax(m->rise_s, build->scene->step_s);
     m->node = PAL_NEW(build->arena, int32_t, body->n_dof);
     if (!m->node) return PAL_ERR_MEMORY;
     for (int i = 0; i < body->n_dof; i++) {
         const double *x = body->x_rest + 3 * (size_t)i;
-        if (!pal_rest_region_has(&region, x)) continue;
+        if (!held[i]) continue;
         body->support[i] = PAL_PRESCRIBED;
         pal_add3(m->centre, m->centre, x);
         m->node[m->n_node++] = i;
@@ -64,18 +63,13 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
     return PAL_ERR_OK;
 }
 
-/* s at a time */
-static double progress(const moving_support *m, double time_s)
-{
-    double t = time_s / m->rise_s, s = t >= 1 ? 1 : 0.5 * (1 - cos(M_PI * t));
-    return m->period_s > 0 ? s * 0.5 * (1 - cos(2 * M_PI * time_s / m->period_s)) : s;
-}
-
 static pal_err run(void *self, pal_step *step)
 {
     const moving_support *m = self;
     pal_body *body = step->body;
-    double s = progress(m, step->time_s), half = 0.5 * s * m->angle;
+    double t = step->time_s / m->rise_s, s = t >= 1 ? 1 : 0.5 * (1 - cos(M_PI * t));
+    if (m->period_s > 0) s *= 0.5 * (1 - cos(2 * M_PI * step->time_s / m->period_s));
+    double half = 0.5 * s * m->angle;
     double quat[4] = {cos(half), sin(half) * m->axis[0], sin(half) * m->axis[1], sin(half) * m->axis[2]};
     for (int i = 0; i < m->n_node; i++) {
         size_t k = 3 * (size_t)m->node[i];
@@ -99,4 +93,4 @@ static double settled_s(const void *self)
 }
 
 const pal_effect pal_effect_moving_support = {
-    .name = "moving_support", .stage = PAL_STAGE_CONTACT, .make = make, .run = run, .settled_s = settled_s};
+    .name = "moving_support", .stage = PAL_STAGE_CONTACT, .make = make, .run = run, .sleep.settled_s = settled_s};

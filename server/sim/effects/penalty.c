@@ -6,11 +6,10 @@
  * k is the stiffness against a translation of all nodes: under a force f they move by f / k. Explicit solvers derive
  * their step from it: a stiffer component needs more sub-steps.
  *
- * Keys: those of rest_region.h, k_N_m (100 E S, S the box diagonal). A k that is not given follows a live material
- * edit. */
+ * Keys: those of rest_region.h, k_N_m (100 E S, S the box diagonal: a body's weight moves it by less than 0.1 % of its
+ * size). A k that is not given follows a live material edit. */
 #include "server/base/vec3.h"
 #include "server/sim/contact/rest_region.h"
-#include "server/sim/contact/tuning.h"
 #include "server/sim/core/effect_list.h"
 
 typedef struct penalty {
@@ -24,11 +23,11 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
 {
     const pal_body *body = build->body;
     double mass = 0;
-    pal_rest_region region;
+    uint8_t *held;
     penalty *p = PAL_NEW(build->arena, penalty, 1);
     if (!p) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_rest_region_read(entry, body->node_rest, body->n_node, build->scene->up, &region, build->diag));
-    p->per_young = pal_entry_has(entry, "k_N_m") ? 0 : PENALTY_STIFFNESS * body->length_scale_m;
+    PAL_TRY(pal_rest_region_find(entry, body->node_rest, body->n_node, build, &held));
+    p->per_young = pal_entry_has(entry, "k_N_m") ? 0 : 100 * body->length_scale_m;
     p->k_N_m = p->per_young * build->def->material.young_Pa;
     PAL_TRY(pal_entry_read_number(entry, "k_N_m", 1e-12, 1e60, &p->k_N_m, build->diag));
     PAL_TRY(pal_entry_check_unused(entry, build->diag));
@@ -40,7 +39,7 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
     if (!p->node || !p->share) return PAL_ERR_MEMORY;
     for (int i = 0; i < body->n_node; i++) {
         /* virtual nodes have no mass */
-        if (!(body->node_mass_kg[i] > 0) || !pal_rest_region_has(&region, body->node_rest + 3 * (size_t)i)) continue;
+        if (!(body->node_mass_kg[i] > 0) || !held[i]) continue;
         p->node[p->n_node] = i;
         p->share[p->n_node++] = body->node_mass_kg[i];
         mass += body->node_mass_kg[i];
@@ -113,6 +112,6 @@ const pal_effect pal_effect_penalty = {.name = "penalty",
                                        .make = make,
                                        .run = run,
                                        .energy = energy,
-                                       .stiffness = stiffness,
+                                       .bounds.stiffness = stiffness,
                                        .material = material,
                                        .tangent = &tangent};

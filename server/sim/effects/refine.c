@@ -1,6 +1,5 @@
 /* Component refine: splits the faces of an adaptive surface where it is pressed, moves or bends, and joins them
- * where it is quiet (paper C, criterion for refinement and simplification, fig. 2). Once in every_s of simulated
- * time
+ * where it is quiet (paper C, criterion for refinement and simplification, fig. 2). Once in every_s of simulated time
  *
  *   split   every leaf that has a node beyond a threshold, as a corner or hanging on a side, by one level
  *   join    every face whose children are leaves if all their corners are below half of every threshold and the
@@ -10,33 +9,31 @@
  * Thresholds are of external force, speed relative to the rigid motion, and change of curvature (refine_measure.h).
  *
  * Departures. The paper has one threshold for both directions and flickers at it. Here a face keeps its state for
- * dwell_s, also where a finer neighbour would have it split; that split is deferred, so that a face switches at most
- * 1/dwell_s times a second. A face that was joined too early waits up to 8 times as long the next time. A node with
- * a lasting load is not removed. New nodes first relax towards equilibrium with the others fixed, while they store
- * more energy than there was before: a bent coarse face has no strain, but its finer springs would.
+ * dwell_s, also where a finer neighbour would have it split, so that it switches at most 1/dwell_s times a second. A
+ * face that was joined too early waits up to 8 times as long the next time. A node with a lasting load is not removed.
+ * New nodes first relax towards equilibrium with the others fixed, while they store more energy than there was before:
+ * a bent coarse face has no strain, but its finer springs would.
  * The changes of one evaluation are one switch, which conserves energy, momentum and angular momentum. The stiffness
- * of springs and of anchors gets one factor each that keeps their energies (where the change exceeds 0.25 % of the
- * total energy without rigid motion) and returns to 1 in ramp_s. The velocities of the changed region (new nodes and
- * those of changed mass) get a rigid motion that restores both momenta of the free nodes, and their deviations from
- * the region's rigid motion are scaled to restore the total energy; where the region is too small, those of the
- * whole body are. Velocities are scaled by 1/2 to 2, stiffness by 1/4 to 2.
+ * of springs and of anchors gets one factor each that keeps their energies and returns to 1 in ramp_s. The velocities
+ * of the changed region (new nodes and those of changed mass), or of the whole body where it is too small, get a rigid
+ * motion that restores both momenta, and their deviations from it are scaled to restore the total energy.
  *
  * Keys: force_N (default: 0.005 k_0 h_0; k_0 the spring constant and h_0 the mean edge of level 0), speed_m_s
  * (default: 0.05 h_0 sqrt(k_0/m_0)), curvature_1_m (default: 0.3/h_0); 0 disables a criterion, and with all three
- * disabled nothing ever changes. dwell_s (0.2), every_s (1/120), max_node (0: no limit), ramp_s (0.15; 0: no
+ * disabled nothing ever changes. dwell_s (0.2), every_s (1/120), most_node (0: no limit), ramp_s (0.15; 0: no
  * factors). A body unchanged since the last evaluation is evaluated again only after dwell_s; until that finds no
  * present or deferred change, the body does not sleep (component sleep). */
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
 #include "server/sim/core/blend.h"
 #include "server/sim/core/effect_list.h"
+#include "server/sim/effects/tuning.h"
 #include "server/sim/surface/refine_measure.h"
 
 #include <limits.h>
 #include <string.h>
 
 enum { NOTHING, SPLIT, JOIN };
-static const double still_h = 1e-4; /* of the mean edge of level 0 */
 
 typedef struct refine {
     pal_adaptive_surface *adaptive;
@@ -49,26 +46,29 @@ typedef struct refine {
     double dwell_s, every_s, ramp_s;
     int max_node;
 
-    double clock_s, wait_s;           /* simulated since reset; until the next evaluation              */
-    double seen_s, seen_load2, way_m; /* clock and sum of squared loads at the last one; no node went farther since */
-    bool put_off;                     /* it had requests deferred by dwell_s */
-    bool seen_twice;                  /* nothing had moved since the one before, and it changed nothing      */
-    uint64_t seen_revision;           /* 0: there was none                                             */
-    uint8_t *backoff;                 /* log2 of the factor on a face's waiting time before it is joined [n faces] */
-    double *switched_s;               /* time of a face's last switch [n faces] */
-    uint8_t *action;                  /* request of each leaf of the list, or of its parent [n_slot] */
-    double *mass_was;                 /* values before the switch, valid where `seen` is its number [n_vertex] */
-    uint64_t *seen;                   /* [n_vertex]                                                     */
-    double *still, *bound_N_m;        /* zero velocities [n_vertex][3]; stiffness of the components [n_vertex] */
-    double spring_s, shape_s;         /* remaining blend of each factor to 1 */
-    double inner_J;                   /* kinetic energy without the rigid motion, before the switch */
+    struct {
+        double clock_s, wait_s;    /* simulated since reset; until the next evaluation              */
+        double seen_s, seen_load2; /* clock and sum of squared loads at the last one                */
+        double moved_m;            /* bound of the displacement since then                          */
+        double spring_s, shape_s;  /* remaining blend of each factor to 1                           */
+    } time;
+    bool deferred;                /* the last evaluation had requests deferred by dwell_s                */
+    bool seen_twice;              /* nothing had moved since the one before, and it changed nothing      */
+    uint64_t seen_revision;       /* 0: there was no evaluation                                    */
+    uint8_t *backoff;             /* log2 of the factor on a face's waiting time before it is joined [n faces] */
+    double *switched_s;           /* time of a face's last switch [n faces] */
+    uint8_t *action;              /* request of each leaf of the list, or of its parent [n_slot] */
+    double *mass_was;             /* values before the switch, valid where `seen` is its number [n_vertex] */
+    uint64_t *seen;               /* [n_vertex]                                                     */
+    double *zero_m_s, *bound_N_m; /* velocities [n_vertex][3]; stiffness of the components [n_vertex] */
+    double inner_J;               /* kinetic energy without the rigid motion, before the switch */
     pal_refine_history report;
 } refine;
 
-/* fractions: of the mass, of the energy, of the largest inertia */
-static const double mass_changed = 1e-3, ramp_from = 2.5e-3, min_inertia = 1e-6;
-static const double max_factor = 2, min_ramp = 0.25, max_ramp = 2;
-enum { MAX_BACKOFF = 3, LET_DOWN_MAX = 8 };
+/* of a sum; masses and inertias are sums over triangles and nodes */
+static const double ROUNDING = 1e-9;
+
+enum { MAX_BACKOFF = 3, MAX_RELAX = 8 };
 
 /* ---- load ---- */
 
@@ -79,13 +79,12 @@ static void clear(refine *row)
         row->switched_s[f] = -INFINITY;
         row->backoff[f] = 0;
     }
-    row->clock_s = row->wait_s = row->spring_s = row->shape_s = row->way_m = 0;
+    memset(&row->time, 0, sizeof row->time);
     row->seen_revision = 0;
-    row->put_off = row->seen_twice = false;
-    for (int32_t i = 0; i < levels->n_vertex[levels->n_level - 1]; i++) row->seen[i] = 0;
+    row->deferred = row->seen_twice = false;
+    memset(row->seen, 0, sizeof *row->seen * (size_t)levels->n_vertex[levels->n_level - 1]);
     row->report = (pal_refine_history){0};
-    pal_set3(row->measure.frame.quat + 1, 0, 0, 0);
-    row->measure.frame.quat[0] = 1;
+    memcpy(row->measure.frame.quat, (double[4]){1}, sizeof row->measure.frame.quat);
 }
 
 /* defaults of the thresholds */
@@ -146,12 +145,10 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     row->switched_s = PAL_NEW(build->arena, double, levels->first_face[levels->n_level]);
     row->backoff = PAL_NEW(build->arena, uint8_t, levels->first_face[levels->n_level]);
     row->action = PAL_NEW(build->arena, uint8_t, adaptive->n_slot);
-    row->mass_was = PAL_NEW(build->arena, double, n_vertex);
     row->seen = PAL_NEW(build->arena, uint64_t, n_vertex);
-    row->still = PAL_NEW(build->arena, double, 3 * n_vertex);
-    row->bound_N_m = PAL_NEW(build->arena, double, n_vertex);
-    if (!row->switched_s || !row->backoff || !row->action || !row->mass_was || !row->seen || !row->still ||
-        !row->bound_N_m)
+    row->zero_m_s = PAL_NEW(build->arena, double, 3 * n_vertex);
+    if (!PAL_NEW_DOUBLES(build->arena, n_vertex, &row->mass_was, &row->bound_N_m) || !row->switched_s ||
+        !row->backoff || !row->action || !row->seen || !row->zero_m_s)
         return PAL_ERR_MEMORY;
     clear(row);
     *self = row;
@@ -171,18 +168,16 @@ static pal_err material(void *self, const pal_body *body, const pal_material *to
 static bool settled(const refine *row, int32_t face)
 {
     bool split = row->adaptive->face_state[face] == PAL_FACE_SPLIT;
-    return row->clock_s - row->switched_s[face] >= ldexp(row->dwell_s, split ? row->backoff[face] : 0) * (1 - 1e-9);
+    return row->time.clock_s - row->switched_s[face] >=
+           ldexp(row->dwell_s, split ? row->backoff[face] : 0) * (1 - 1e-9);
 }
 
-/* true: the face is split and was joined too early */
+/* a split soon after a join doubles the face's waiting time */
 static void note_split(refine *row, int32_t face)
 {
-    bool early = row->clock_s - row->switched_s[face] < ldexp(row->dwell_s, MAX_BACKOFF);
-    if (!early)
-        row->backoff[face] = 0;
-    else if (row->backoff[face] < MAX_BACKOFF)
-        row->backoff[face]++;
-    row->switched_s[face] = row->clock_s;
+    const bool early = row->time.clock_s - row->switched_s[face] < ldexp(row->dwell_s, MAX_BACKOFF);
+    row->backoff[face] = early ? (uint8_t)fmin(row->backoff[face] + 1, MAX_BACKOFF) : 0;
+    row->switched_s[face] = row->time.clock_s;
 }
 
 /* true: the leaf may be split, with the coarser neighbours that the 2:1 rule requires */
@@ -205,14 +200,14 @@ static bool wants_split(const refine *row, int32_t leaf)
     const pal_adaptive_surface *adaptive = row->adaptive;
     const pal_levels *levels = &adaptive->levels;
     if (levels->face_level[leaf] + 1 >= levels->n_level) return false;
-    for (int k = 0; k < 3; k++) {
+    bool any = false;
+    for (int k = 0; k < 3 && !any; k++) {
         int32_t edge = levels->face_edge[3 * (size_t)leaf + k];
-        if (row->measure.mark[levels->face[3 * (size_t)leaf + k]] == PAL_REFINE_REQUESTED) return true;
-        if (adaptive->edge_split[edge] > 0 &&
-            row->measure.mark[pal_levels_edge_midpoint(levels, edge)] == PAL_REFINE_REQUESTED)
-            return true;
+        any = row->measure.mark[levels->face[3 * (size_t)leaf + k]] == PAL_REFINE_REQUESTED ||
+              (adaptive->edge_split[edge] > 0 &&
+               row->measure.mark[pal_levels_edge_midpoint(levels, edge)] == PAL_REFINE_REQUESTED);
     }
-    return false;
+    return any;
 }
 
 /* true: the edge's midpoint is where the coarse edge places it, up to a deflection far below the threshold */
@@ -230,40 +225,36 @@ static bool is_straight(const refine *row, const pal_body *body, int32_t edge)
 static bool wants_join(const refine *row, const pal_body *body, int32_t face)
 {
     const pal_levels *levels = &row->adaptive->levels;
-    for (int k = 0; k < 3; k++) {
-        int32_t middle = pal_levels_edge_midpoint(levels, levels->face_edge[3 * (size_t)face + k]);
-        if (row->measure.mark[levels->face[3 * (size_t)face + k]] != PAL_REFINE_QUIET) return false;
-        if (row->measure.mark[middle] != PAL_REFINE_QUIET) return false;
-        if (!is_straight(row, body, levels->face_edge[3 * (size_t)face + k])) return false;
-        if (body->external_force &&
-            pal_dot3(body->external_force + 3 * (size_t)middle, body->external_force + 3 * (size_t)middle) > 0)
-            return false;
+    bool all = true;
+    for (int k = 0; k < 3 && all; k++) {
+        const int32_t edge = levels->face_edge[3 * (size_t)face + k], middle = pal_levels_edge_midpoint(levels, edge);
+        all = row->measure.mark[levels->face[3 * (size_t)face + k]] == PAL_REFINE_QUIET &&
+              row->measure.mark[middle] == PAL_REFINE_QUIET && is_straight(row, body, edge) &&
+              !(body->external_force && pal_norm3(body->external_force + 3 * (size_t)middle) > 0);
     }
-    return true;
-}
-
-/* the first child represents its parent */
-static int32_t parent_of_first(const pal_levels *levels, int32_t leaf)
-{
-    int level = levels->face_level[leaf];
-    return level > 0 && (leaf - levels->first_face[level]) % 4 == 0 ? pal_levels_face_parent(levels, leaf) : -1;
+    return all;
 }
 
 /* sets the requests of the leaves of the list; false: none */
-static bool take_options(refine *row, const pal_body *body)
+static bool find_requests(refine *row, const pal_body *body)
 {
     const pal_adaptive_surface *adaptive = row->adaptive;
+    const pal_levels *levels = &adaptive->levels;
     bool any = false;
-    row->put_off = false;
+    row->deferred = false;
     for (int k = 0; k < adaptive->n_leaf; k++) {
-        int32_t leaf = adaptive->leaf[k], parent = parent_of_first(&adaptive->levels, leaf);
+        const int32_t leaf = adaptive->leaf[k];
+        const int level = levels->face_level[leaf];
+        /* the first child represents its parent */
+        const bool first = level > 0 && (leaf - levels->first_face[level]) % 4 == 0;
+        const int32_t parent = first ? pal_levels_face_parent(levels, leaf) : -1;
         int action = NOTHING;
         if (wants_split(row, leaf))
             action = SPLIT;
         else if (parent >= 0 && pal_adaptive_can_join(adaptive, parent) && wants_join(row, body, parent))
             action = JOIN;
         const bool now = action == SPLIT ? may_split(row, leaf) : action == NOTHING || settled(row, parent);
-        row->put_off |= !now;
+        row->deferred |= !now;
         row->action[k] = (uint8_t)(now ? action : NOTHING);
         any |= row->action[k] != NOTHING;
     }
@@ -272,7 +263,7 @@ static bool take_options(refine *row, const pal_body *body)
 
 /* ---- a switch ---- */
 
-static bool grant_options(refine *row, pal_body *body)
+static bool execute_requests(refine *row, pal_body *body)
 {
     pal_adaptive_surface *adaptive = row->adaptive;
     uint64_t n_split = 0, n_join = 0;
@@ -286,7 +277,7 @@ static bool grant_options(refine *row, pal_body *body)
         if (row->action[k] != JOIN) continue;
         int32_t parent = pal_levels_face_parent(&adaptive->levels, adaptive->leaf[k]);
         if (!pal_adaptive_can_join(adaptive, parent) || !pal_adaptive_join(adaptive, body, parent)) continue;
-        row->switched_s[parent] = row->clock_s;
+        row->switched_s[parent] = row->time.clock_s;
         n_join++;
     }
     row->report.n_split += n_split, row->report.n_join += n_join;
@@ -302,22 +293,20 @@ static double elastic_J(const pal_step *step)
     return sum;
 }
 
-/* one step of Jacobi's for the new nodes alone, to the balance of the components' forces at rest; f is left as it comes
- */
-static bool let_down_once(refine *row, pal_step *step)
+/* one Jacobi iteration for the new nodes alone, towards the balance of the components' forces at rest; changes f */
+static bool relax_once(refine *row, pal_step *step)
 {
     pal_body *body = step->body;
     /* v as well: the frame of anchors is fitted to it */
     double *v = body->v, *dv = body->dv;
-    body->v = body->dv = row->still;
+    body->v = body->dv = row->zero_m_s;
     bool done = pal_assemble_forces(step) == PAL_ERR_OK;
     body->v = v, body->dv = dv;
     for (int k = 0; k < body->n_active && done; k++) {
         const size_t i = (size_t)pal_body_point(body, k);
         if (row->seen[i] == row->report.n_switch || body->support[i] || !(row->bound_N_m[i] > 0)) continue;
         double move[3];
-        for (int c = 0; c < 3; c++)
-            move[c] = (body->f[3 * i + (size_t)c] - body->load[3 * i + (size_t)c]) / row->bound_N_m[i];
+        for (size_t c = 0; c < 3; c++) move[c] = (body->f[3 * i + c] - body->load[3 * i + c]) / row->bound_N_m[i];
         done = isfinite(pal_norm3(move));
         if (done) pal_add3(body->x + 3 * i, body->x + 3 * i, move);
     }
@@ -325,17 +314,17 @@ static bool let_down_once(refine *row, pal_step *step)
 }
 
 /* relaxes new nodes while springs, anchors and similar components store more energy than before the switch */
-static void let_down(refine *row, pal_step *step)
+static void relax(refine *row, pal_step *step)
 {
     const pal_body *body = step->body;
     const pal_refine_balance *before = &row->report.before;
-    const double was = pal_refine_balance_total_J(before) - before->kinetic_J, min = ramp_from * (was + row->inner_J);
+    const double was = pal_refine_balance_total_J(before) - before->kinetic_J, min = RAMP_FROM * (was + row->inner_J);
     for (int k = 0; k < body->n_active; k++) row->bound_N_m[pal_body_point(body, k)] = 0;
     for (int i = 0; i < step->n_force; i++)
-        if (step->force[i].effect->stiffness)
-            step->force[i].effect->stiffness(step->force[i].self, body, row->bound_N_m);
-    for (int turn = 0; turn < LET_DOWN_MAX && elastic_J(step) - was > min; turn++)
-        if (!let_down_once(row, step)) return;
+        if (step->force[i].effect->bounds.stiffness)
+            step->force[i].effect->bounds.stiffness(step->force[i].self, body, row->bound_N_m);
+    for (int turn = 0; turn < MAX_RELAX && elastic_J(step) - was > min; turn++)
+        if (!relax_once(row, step)) return;
 }
 
 /* true: free and of the changed region, unless that is the whole body */
@@ -343,33 +332,21 @@ static bool in_region(const refine *row, const pal_body *body, bool whole, int i
 {
     if (body->support[i]) return false;
     if (whole || row->seen[i] != row->report.n_switch) return true;
-    return fabs(body->mass_kg[i] - row->mass_was[i]) > mass_changed * row->mass_was[i];
+    return fabs(body->mass_kg[i] - row->mass_was[i]) > ROUNDING * row->mass_was[i];
 }
 
-/* the factor that restores the energy `now`, J; 1 where it is negligible beside `other`, J */
-static double ramp_after(double ramp, double was, double now, double other)
+/* restores the energy of springs or anchors by their ramp; returns it, J */
+static double keep_elastic(const refine *row, double was_J, double now_J, double other_J, double *ramp, double *left_s)
 {
-    if (!(was > 1e-9 * other) || !(now > 1e-9 * other)) return ramp;
-    return fmin(fmax(ramp * was / now, min_ramp), max_ramp);
-}
-
-/* sets the ramps; returns the remaining increase of the energy of springs and anchors, J */
-static double keep_elastic(refine *row)
-{
-    const pal_refine_balance *before = &row->report.before, *raw = &row->report.raw;
-    pal_adaptive_surface *adaptive = row->adaptive;
-    double was[2] = {adaptive->spring_ramp, adaptive->shape_ramp};
-    double min = ramp_from * (row->inner_J + before->spring_J + before->shape_J);
-    if (row->ramp_s > 0 && fabs(raw->spring_J - before->spring_J) > min) {
-        adaptive->spring_ramp = ramp_after(was[0], before->spring_J, raw->spring_J, raw->shape_J);
-        row->spring_s = row->ramp_s;
+    const pal_refine_balance *before = &row->report.before;
+    const double was = *ramp, min = RAMP_FROM * (row->inner_J + before->spring_J + before->shape_J);
+    if (row->ramp_s > 0 && fabs(now_J - was_J) > min) {
+        /* negligible beside the other's energy: as it is */
+        if (was_J > 1e-9 * other_J && now_J > 1e-9 * other_J)
+            *ramp = fmin(fmax(was * was_J / now_J, 1 / (MAX_FACTOR * MAX_FACTOR)), MAX_FACTOR);
+        *left_s = row->ramp_s;
     }
-    if (row->ramp_s > 0 && fabs(raw->shape_J - before->shape_J) > min) {
-        adaptive->shape_ramp = ramp_after(was[1], before->shape_J, raw->shape_J, raw->spring_J);
-        row->shape_s = row->ramp_s;
-    }
-    return raw->spring_J * adaptive->spring_ramp / was[0] - before->spring_J +
-           raw->shape_J * adaptive->shape_ramp / was[1] - before->shape_J;
+    return now_J * *ramp / was;
 }
 
 /* rigid part of the motion of the region's free nodes: V + Omega x (x - centre) */
@@ -377,12 +354,12 @@ typedef struct region {
     double mass, centre[3], V[3], turn[3], inertia_axis[9], inertia[3], inner_J;
 } region;
 
-/* I^-1 L; no rotation about an axis without inertia */
+/* I^-1 L; no rotation about an axis whose inertia is rounding */
 static void spin_of(const region *r, const double turn[3], double Omega[3])
 {
     pal_set3(Omega, 0, 0, 0);
     for (int k = 0; k < 3; k++)
-        if (r->inertia[k] > min_inertia * r->inertia[2])
+        if (r->inertia[k] > ROUNDING * r->inertia[2])
             pal_axpy3(Omega, pal_dot3(r->inertia_axis + 3 * k, turn) / r->inertia[k], r->inertia_axis + 3 * k);
 }
 
@@ -433,8 +410,7 @@ static bool find_region(const refine *row, const pal_body *body, bool whole, reg
 }
 
 /* Restores both momenta of the free nodes, and the kinetic energy less `gained`, J, by the velocities of the changed
- * region or of the whole body. false: the region is too small and nothing was changed, which never happens with the
- * whole body */
+ * region or of the whole body. false: the region is too small and nothing was changed */
 static bool keep_motion(const refine *row, pal_body *body, double gained_J, bool whole)
 {
     const pal_refine_balance *before = &row->report.before, *raw = &row->report.raw;
@@ -454,9 +430,9 @@ static bool keep_motion(const refine *row, pal_body *body, double gained_J, bool
                       0.5 * (r.mass * pal_dot3(V, V) + pal_dot3(spin, turn));
     /* nothing to scale where the region moves rigidly */
     double scale = r.inner_J > 1e-12 * raw->kinetic_J ? sqrt(fmax(wanted_J, 0) / r.inner_J) : 1;
-    bool enough = scale >= 1 / max_factor && scale <= max_factor && r.inertia[0] > min_inertia * r.inertia[2];
+    bool enough = scale >= 1 / MAX_FACTOR && scale <= MAX_FACTOR && r.inertia[0] > ROUNDING * r.inertia[2];
     if (!enough && !whole) return false;
-    scale = fmin(fmax(scale, 1 / max_factor), max_factor);
+    scale = fmin(fmax(scale, 1 / MAX_FACTOR), MAX_FACTOR);
     for (int k = 0; k < body->n_active; k++) {
         const int i = pal_body_point(body, k);
         if (!in_region(row, body, whole, i)) continue;
@@ -485,16 +461,21 @@ static void change(refine *row, pal_step *step)
         row->mass_was[i] = body->mass_kg[i];
         row->seen[i] = report->n_switch;
     }
-    if (!grant_options(row, body)) {
+    if (!execute_requests(row, body)) {
         report->n_switch--;
         return;
     }
     pal_adaptive_update(row->adaptive, body);
-    report->time_s = row->clock_s;
+    report->time_s = row->time.clock_s;
     report->before = before;
-    if (row->ramp_s > 0) let_down(row, step);
+    if (row->ramp_s > 0) relax(row, step);
     pal_refine_balance_compute(&report->raw, step);
-    double gained_J = keep_elastic(row);
+    const pal_refine_balance *raw = &report->raw;
+    const double spring_J = keep_elastic(row, before.spring_J, raw->spring_J, raw->shape_J, &row->adaptive->spring_ramp,
+                                         &row->time.spring_s);
+    const double shape_J =
+        keep_elastic(row, before.shape_J, raw->shape_J, raw->spring_J, &row->adaptive->shape_ramp, &row->time.shape_s);
+    const double gained_J = spring_J - before.spring_J + shape_J - before.shape_J;
     if (!keep_motion(row, body, gained_J, false)) keep_motion(row, body, gained_J, true);
     pal_refine_balance_compute(&report->after, step);
 }
@@ -510,9 +491,9 @@ static bool is_still(refine *row, const pal_body *body, double dt_s, double *loa
         max2 = v2 > max2 ? v2 : max2;
         *load2 += pal_dot3(body->load + i, body->load + i);
     }
-    row->way_m += dt_s * sqrt(max2);
-    return row->seen_revision == body->revision + 1 && row->way_m < still_h * row->edge_m &&
-           fabs(*load2 - row->seen_load2) <= 1e-6 * *load2;
+    row->time.moved_m += dt_s * sqrt(max2);
+    return row->seen_revision == body->display.revision + 1 && row->time.moved_m < STILL_EDGES * row->edge_m &&
+           fabs(*load2 - row->time.seen_load2) <= 1e-6 * *load2;
 }
 
 static bool evaluates(const refine *row)
@@ -524,22 +505,22 @@ static pal_err run(void *self, pal_step *step)
 {
     refine *row = self;
     pal_adaptive_surface *adaptive = row->adaptive;
-    row->clock_s += step->dt_s;
-    row->wait_s -= step->dt_s;
-    adaptive->spring_ramp = 1 + (adaptive->spring_ramp - 1) * pal_blend_release(&row->spring_s, step->dt_s);
-    adaptive->shape_ramp = 1 + (adaptive->shape_ramp - 1) * pal_blend_release(&row->shape_s, step->dt_s);
+    row->time.clock_s += step->dt_s;
+    row->time.wait_s -= step->dt_s;
+    adaptive->spring_ramp = 1 + (adaptive->spring_ramp - 1) * pal_blend_release(&row->time.spring_s, step->dt_s);
+    adaptive->shape_ramp = 1 + (adaptive->shape_ramp - 1) * pal_blend_release(&row->time.shape_s, step->dt_s);
     double load2;
-    const bool still = is_still(row, step->body, step->dt_s, &load2);
-    if (row->wait_s > 1e-9 * row->every_s) return PAL_ERR_OK;
-    row->wait_s = fmax(row->wait_s + row->every_s, 0);
+    const bool same = is_still(row, step->body, step->dt_s, &load2);
+    if (row->time.wait_s > 1e-9 * row->every_s) return PAL_ERR_OK;
+    row->time.wait_s = fmax(row->time.wait_s + row->every_s, 0);
     if (!evaluates(row)) return PAL_ERR_OK;
-    if (still && row->clock_s - row->seen_s < row->dwell_s) return PAL_ERR_OK;
-    row->seen_revision = step->body->revision + 1, row->seen_s = row->clock_s;
-    row->seen_load2 = load2, row->way_m = 0;
+    if (same && row->time.clock_s - row->time.seen_s < row->dwell_s) return PAL_ERR_OK;
+    row->seen_revision = step->body->display.revision + 1, row->time.seen_s = row->time.clock_s;
+    row->time.seen_load2 = load2, row->time.moved_m = 0;
     pal_refine_mark_nodes(&row->measure, adaptive, step->body, &row->limits);
     const uint64_t n_switch = row->report.n_switch;
-    if (take_options(row, step->body)) change(row, step);
-    row->seen_twice = still && row->report.n_switch == n_switch;
+    if (find_requests(row, step->body)) change(row, step);
+    row->seen_twice = same && row->report.n_switch == n_switch;
     return PAL_ERR_OK;
 }
 
@@ -547,8 +528,8 @@ static pal_err run(void *self, pal_step *step)
 static double settled_s(const void *self)
 {
     const refine *row = self;
-    const bool blended = row->spring_s == 0 && row->shape_s == 0;
-    return !evaluates(row) || (row->seen_twice && !row->put_off && blended) ? 0 : INFINITY;
+    const bool blended = row->time.spring_s == 0 && row->time.shape_s == 0;
+    return !evaluates(row) || (row->seen_twice && !row->deferred && blended) ? 0 : INFINITY;
 }
 
 /* the body was reset, but may have another level than at load */
@@ -561,8 +542,7 @@ static void reset(void *self, const pal_body *body)
     clear(row);
 }
 
-/* transfers times, waiting factors and stiffness factors of the same surface in another world; with another number
- * of levels they start again */
+/* continues times and factors of the same surface in another world; with another number of levels they start again */
 static void transfer(void *self, const pal_body *body, const void *before, const pal_component_transfer *by)
 {
     refine *row = self;
@@ -572,10 +552,8 @@ static void transfer(void *self, const pal_body *body, const void *before, const
     const size_t n_face = (size_t)levels->first_face[levels->n_level];
     memcpy(row->switched_s, was->switched_s, n_face * sizeof *row->switched_s);
     memcpy(row->backoff, was->backoff, n_face * sizeof *row->backoff);
-    row->clock_s = was->clock_s, row->wait_s = was->wait_s, row->way_m = was->way_m;
-    row->spring_s = was->spring_s, row->shape_s = was->shape_s;
-    row->seen_s = was->seen_s, row->seen_load2 = was->seen_load2;
-    row->seen_revision = was->seen_revision == by->from->revision + 1 ? body->revision + 1 : 0;
+    row->time = was->time;
+    row->seen_revision = was->seen_revision == by->from->display.revision + 1 ? body->display.revision + 1 : 0;
     memcpy(row->measure.frame.quat, was->measure.frame.quat, sizeof row->measure.frame.quat);
 }
 
@@ -591,4 +569,4 @@ const pal_effect pal_effect_refine = {.name = "refine",
                                       .material = material,
                                       .reset = reset,
                                       .transfer = transfer,
-                                      .settled_s = settled_s};
+                                      .sleep.settled_s = settled_s};

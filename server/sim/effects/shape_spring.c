@@ -1,14 +1,12 @@
 /* Component shape_spring: a spring pulls every node to its position in the rest shape (paper C, eq. 10, the
  * shape-preserving springs). f_i = -(m_i/m_0) [k' (x_i - R (X_i - C) - c) + c' (v_i - V - Omega x (x_i - c))], where
- * X_i is the rest position, m_0 the mass of a node of level 0, and k' and c' the constants of such a node. Because
- * these springs are proportional to mass, their sum does not depend on refinement and they act on every level alike:
- * a translation has w^2 = k'/m_0.
+ * X_i is the rest position, m_0 the mass of a node of level 0, and k' and c' the constants of such a node. In
+ * proportion to mass they act on every level alike: a translation has w^2 = k'/m_0.
  *
  * frame "world": the rest positions themselves, R = 1, V = Omega = 0; the reaction acts on the ground.
  * frame "body": the best-fitting rigid frame (adaptive_surface.h), so that the body may move freely. The fit has the
- * same mass weights; R, C, c then minimise the energy sum k'_i/2 |x_i - R (X_i - C) - c|^2. The force is its exact
- * gradient although the frame follows the body (envelope theorem), and neither force nor damping has a resultant or
- * a moment.
+ * same mass weights, so R, C, c minimise the energy sum k'_i/2 |x_i - R (X_i - C) - c|^2, the force is its exact
+ * gradient (envelope theorem), and neither force nor damping has a resultant or a moment.
  *
  * Departures: errata C7 (the paper divides the damping by the spring's length, which is 0 at rest, and its anchors
  * block rigid motion) and C6 (its constant does not depend on the level: refinement stiffens 4 times per level).
@@ -34,8 +32,6 @@ typedef struct hold {
     double R[9], shift[3], V[3], Omega[3], k, c;
 } hold;
 
-static const double anchor_share = 0.3, damping_share = 0.6;
-
 /* k' of the model's keys, and its ratio to E */
 static pal_err derive(shape_spring *row, pal_build *build)
 {
@@ -43,26 +39,16 @@ static pal_err derive(shape_spring *row, pal_build *build)
     double thickness_m = 0.003, k_0 = -1, young_Pa = build->def->material.young_Pa;
     PAL_TRY(pal_entry_read_number(&model, "thickness_m", 1e-9, 1e9, &thickness_m, build->diag));
     PAL_TRY(pal_entry_read_number(&model, "k_spring_N_m", 0, 1e60, &k_0, build->diag));
-    row->per_young = k_0 < 0 ? anchor_share * sqrt(0.75) * thickness_m : 0;
-    row->k_N_m = k_0 < 0 ? row->per_young * young_Pa : anchor_share * k_0;
+    row->per_young = k_0 < 0 ? 0.3 * sqrt(0.75) * thickness_m : 0;
+    row->k_N_m = k_0 < 0 ? row->per_young * young_Pa : 0.3 * k_0;
     return PAL_ERR_OK;
-}
-
-static void turn_back(shape_spring *row)
-{
-    row->frame = (pal_rigid_fit){.quat = {1, 0, 0, 0}};
-}
-
-static bool is_held(const pal_body *body)
-{
-    for (int i = 0; i < body->n_dof; i++)
-        if (body->support[i]) return true;
-    return false;
 }
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    const char *frame = is_held(build->body) ? "world" : "body";
+    static const char *const frames[] = {"body", "world"};
+    int world = 0;
+    for (int i = 0; i < build->body->n_dof; i++) world |= build->body->support[i] != PAL_FREE;
     if (!build->body->model.adaptive)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model adaptive_springs",
                                   item->path, item->name);
@@ -72,13 +58,10 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     if (!pal_entry_has(item, "k_N_m")) PAL_TRY(derive(row, build));
     PAL_TRY(pal_entry_read_number(item, "k_N_m", 0, 1e60, &row->k_N_m, build->diag));
     PAL_TRY(pal_entry_read_number(item, "c_Ns_m", 0, 1e60, &row->c_Ns_m, build->diag));
-    PAL_TRY(pal_entry_read_text(item, "frame", &frame, build->diag));
+    PAL_TRY(pal_entry_read_choice(item, "frame", frames, 2, &world, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
-    if (strcmp(frame, "body") != 0 && strcmp(frame, "world") != 0)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s.frame: \"%s\", wanted \"body\" or \"world\"",
-                                  item->path, frame);
-    row->world = frame[0] == 'w';
-    turn_back(row);
+    row->world = world;
+    row->frame.quat[0] = 1;
     PAL_TRY(pal_active_nodes_make(build->body, build->body_arena ? build->body_arena : build->arena));
     *self = row;
     return PAL_ERR_OK;
@@ -93,7 +76,7 @@ static double stiff_1_s2(const shape_spring *row, const pal_adaptive_surface *ad
 static double damp_1_s(const shape_spring *row, const pal_adaptive_surface *adaptive)
 {
     double m = adaptive->level_mass_kg[0];
-    return row->c_Ns_m < 0 ? damping_share * sqrt(row->k_N_m / m) : row->c_Ns_m / m;
+    return row->c_Ns_m < 0 ? 0.6 * sqrt(row->k_N_m / m) : row->c_Ns_m / m;
 }
 
 /* frame: start from the last fit, and the new one; packed: of body->active_nodes */
@@ -173,19 +156,15 @@ static double energy(void *self, const pal_body *body)
 static void stiffness(void *self, const pal_body *body, double *bound_N_m)
 {
     double k = stiff_1_s2(self, body->model.adaptive);
-    for (int n = 0; n < body->n_active; n++) {
-        int i = pal_body_point(body, n);
-        bound_N_m[i] += k * body->mass_kg[i];
-    }
+    for (int n = 0; n < body->n_active; n++)
+        bound_N_m[pal_body_point(body, n)] += k * body->mass_kg[pal_body_point(body, n)];
 }
 
 static void damping(void *self, const pal_body *body, double *bound_Ns_m)
 {
     double c = damp_1_s(self, body->model.adaptive);
-    for (int n = 0; n < body->n_active; n++) {
-        int i = pal_body_point(body, n);
-        bound_Ns_m[i] += c * body->mass_kg[i];
-    }
+    for (int n = 0; n < body->n_active; n++)
+        bound_Ns_m[pal_body_point(body, n)] += c * body->mass_kg[pal_body_point(body, n)];
 }
 
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
@@ -199,7 +178,7 @@ static pal_err material(void *self, const pal_body *body, const pal_material *to
 static void reset(void *self, const pal_body *body)
 {
     (void)body;
-    turn_back(self);
+    ((shape_spring *)self)->frame = (pal_rigid_fit){.quat = {1}};
 }
 
 const pal_effect pal_effect_shape_spring = {.name = "shape_spring",
@@ -208,7 +187,7 @@ const pal_effect pal_effect_shape_spring = {.name = "shape_spring",
                                             .run = run,
                                             .compute_forces = compute_forces,
                                             .energy = energy,
-                                            .stiffness = stiffness,
-                                            .damping = damping,
+                                            .bounds.stiffness = stiffness,
+                                            .bounds.damping = damping,
                                             .material = material,
                                             .reset = reset};

@@ -5,10 +5,6 @@
 
 #include <string.h>
 
-typedef struct skin_output {
-    pal_body *body;
-} skin_output;
-
 static size_t axes_count(const pal_skin *skin)
 {
     return (pal_skin_frames_bytes(skin) + sizeof(double) - 1) / sizeof(double);
@@ -16,29 +12,27 @@ static size_t axes_count(const pal_skin *skin)
 
 static void evaluate(pal_body *body)
 {
-    pal_skin_frames(body->skin, body->d, body->skin_axes);
-    pal_skin_evaluate(body->skin, body->d, body->skin_axes, body->shown);
+    pal_skin_frames(body->display.skin, body->d, body->display.skin_axes);
+    pal_skin_evaluate(body->display.skin, body->d, body->display.skin_axes, body->display.shown);
 }
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     PAL_TRY(pal_entry_check_unused(item, build->diag));
     pal_body *body = build->body;
-    if (!body->skin || !body->surface || body->skin->n_vertex != body->surface->n_vertex ||
-        body->skin->n_node > body->n_node)
+    if (!body->display.skin || !body->display.surface ||
+        body->display.skin->n_vertex != body->display.surface->n_vertex || body->display.skin->n_node > body->n_node)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: the body has no skin that fits its mesh",
                                   item->path);
-    skin_output *out = PAL_NEW(build->arena, skin_output, 1);
-    double *axes = PAL_NEW(build->arena, double, axes_count(body->skin));
-    float *shown = PAL_NEW(build->arena, float, 3 * (size_t)body->skin->n_vertex);
-    if (!out || !axes || !shown) return PAL_ERR_MEMORY;
-    out->body = body;
-    body->skin_axes = axes;
-    body->n_shown = body->skin->n_vertex;
-    body->shown = shown;
-    body->shown_node = NULL;
+    double *axes = PAL_NEW(build->arena, double, axes_count(body->display.skin));
+    float *shown = PAL_NEW(build->arena, float, 3 * (size_t)body->display.skin->n_vertex);
+    if (!axes || !shown) return PAL_ERR_MEMORY;
+    body->display.skin_axes = axes;
+    body->display.n_shown = body->display.skin->n_vertex;
+    body->display.shown = shown;
+    body->display.shown_node = NULL;
     evaluate(body);
-    *self = out;
+    *self = body;
     return PAL_ERR_OK;
 }
 
@@ -52,9 +46,9 @@ static pal_err run(void *self, pal_step *step)
 static void reset(void *self, const pal_body *body)
 {
     /* resets frames that were kept through a flat neighbourhood */
-    pal_body *own = ((skin_output *)self)->body;
+    pal_body *own = self;
     (void)body;
-    memset(own->skin_axes, 0, axes_count(own->skin) * sizeof(double));
+    memset(own->display.skin_axes, 0, axes_count(own->display.skin) * sizeof(double));
     evaluate(own);
 }
 

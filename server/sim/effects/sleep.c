@@ -1,26 +1,21 @@
 /* Component sleep: a body at rest costs almost nothing until something comes near.
  *
- * Conditions to fall asleep: for `rest_time_s` of simulated time no point was faster than speed_1_s S, the triangles
- * were unchanged, no tool was near, no component's force changed with time and refinement had nothing left to do;
- * and the residual forces would then move the body by less than rest_1_s2 S in s^2, as a mass-weighted mean (S: the
- * body's box diagonal). Velocities are then 0, positions stay the same to the bit, and none of the body's components
- * runs. CONTACT components forget their tool state, as after a reset.
+ * A body falls asleep when for `rest_time_s` of simulated time no point was faster than speed_1_s S, the triangles
+ * were unchanged, no tool was near, no component's force changed with time and refinement had nothing left to do; and
+ * the residual forces would then move the body by less than rest_1_s2 S in s^2, as a mass-weighted mean (S: the body's
+ * box diagonal). Speed alone is not enough: a body that creeps against a large drag is slow but not at rest.
+ * Velocities are then 0, positions stay the same to the bit, and none of the body's components runs. CONTACT components
+ * forget their tool state, as after a reset.
  *
  * The body wakes in the step in which a tool, swept along its path and before contact, comes within reach of the
- * CONTACT components (their hook reach_m). It also wakes at a change from the world: a load, a material, a brush, a
- * switched component, a reset. Two kinds of tool keep a body awake. One is near while the shown surface is farther
- * away than one triangle edge, so that a distance to vertices suffices. The other grasps or presses the body,
- * wherever it is: tissue follows no farther than the tool's force cap pulls, and must return when it is released.
- *
- * A speed threshold alone is not enough: a body that creeps against a drag of 1e6 times the critical one is slow but
- * not at rest. Hence the test of forces.
+ * CONTACT components (their hook reach_m), and at a change from the world: a load, a material, a brush, a switched
+ * component, a reset. Two kinds of tool keep a body awake: one that is near while the shown surface is farther away
+ * than one triangle edge, so that a distance to vertices suffices, and one that grasps or presses the body, wherever it
+ * is: tissue follows no farther than the tool's force cap pulls, and must return when it is released.
  *
  * Keys: rest_time_s (0.5), speed_1_s (1e-4), rest_1_s2 (1e-4). */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect.h"
-
-#include <math.h>
-#include <string.h>
 
 typedef struct sleeper {
     double rest_time_s, speed_1_s, rest_1_s2;
@@ -59,30 +54,30 @@ static bool slow(const sleeper *row, const pal_body *body)
 static bool changes(const pal_component *row, int n, double time_s)
 {
     for (int i = 0; i < n; i++)
-        if (row[i].effect->settled_s && !(time_s >= row[i].effect->settled_s(row[i].self))) return true;
+        if (row[i].effect->sleep.settled_s && !(time_s >= row[i].effect->sleep.settled_s(row[i].self))) return true;
     return false;
 }
 
 static const float *shown_vertex(const pal_body *body, int k)
 {
-    return body->shown + 3 * (size_t)(body->active ? body->active[k] : k);
+    return body->display.shown + 3 * (size_t)(body->active ? body->active[k] : k);
 }
 
 /* computes the box of the shown surface and its longest edge */
 static void measure(sleeper *row, const pal_body *body)
 {
-    const int32_t *tri = body->surface->tri;
-    int n_tri = body->surface->n_tri;
-    int n_shown = body->active ? body->n_active : body->n_shown;
+    const int32_t *tri = body->display.surface->tri;
+    int n_tri = body->display.surface->n_tri;
+    int n_shown = body->active ? body->n_active : body->display.n_shown;
     double edge2 = 0;
-    for (int c = 0; c < 3; c++) row->low[c] = INFINITY, row->high[c] = -INFINITY;
-    for (int k = 0; k < n_shown; k++)
-        for (int c = 0; c < 3; c++) {
-            row->low[c] = fmin(row->low[c], (double)shown_vertex(body, k)[c]);
-            row->high[c] = fmax(row->high[c], (double)shown_vertex(body, k)[c]);
-        }
+    pal_box3_empty(row->low, row->high);
+    for (int k = 0; k < n_shown; k++) {
+        const float *s = shown_vertex(body, k);
+        pal_box3_add(row->low, row->high, (double[3]){(double)s[0], (double)s[1], (double)s[2]});
+    }
     for (int i = 0; i < 3 * n_tri; i++) {
-        const float *a = body->shown + 3 * (size_t)tri[i], *b = body->shown + 3 * (size_t)tri[i - i % 3 + (i + 1) % 3];
+        const float *a = body->display.shown + 3 * (size_t)tri[i],
+                    *b = body->display.shown + 3 * (size_t)tri[i - i % 3 + (i + 1) % 3];
         double x = (double)a[0] - (double)b[0], y = (double)a[1] - (double)b[1], z = (double)a[2] - (double)b[2];
         edge2 = fmax(edge2, x * x + y * y + z * z);
     }
@@ -102,15 +97,15 @@ static bool passes_box(const sleeper *row, const double a[3], const double b[3],
 /* true: the path comes within reach of a vertex */
 static bool passes_vertex(const pal_body *body, const double a[3], const double b[3], double reach)
 {
-    int n_shown = body->active ? body->n_active : body->n_shown;
-    double way[3], reach2 = reach * reach;
-    pal_sub3(way, b, a);
-    double way2 = pal_dot3(way, way);
+    int n_shown = body->active ? body->n_active : body->display.n_shown;
+    double path[3], reach2 = reach * reach;
+    pal_sub3(path, b, a);
+    double path2 = pal_dot3(path, path);
     for (int k = 0; k < n_shown; k++) {
         const float *s = shown_vertex(body, k);
         double from[3] = {(double)s[0] - a[0], (double)s[1] - a[1], (double)s[2] - a[2]};
-        double t = way2 > 0 ? fmin(fmax(pal_dot3(from, way) / way2, 0), 1) : 0;
-        pal_axpy3(from, -t, way);
+        double t = path2 > 0 ? fmin(fmax(pal_dot3(from, path) / path2, 0), 1) : 0;
+        pal_axpy3(from, -t, path);
         if (pal_dot3(from, from) <= reach2) return true;
     }
     return false;
@@ -126,7 +121,7 @@ static bool tool_near(sleeper *row, const pal_step *step)
         if (!tool->present && tool->ramp <= 0) continue;
         for (int i = 0; i < step->n_contact; i++) {
             const pal_component *of = &step->contact[i];
-            if (of->effect->reach_m) reach = fmax(reach, of->effect->reach_m(of->self, tool));
+            if (of->effect->sleep.reach_m) reach = fmax(reach, of->effect->sleep.reach_m(of->self, tool));
         }
         if (reach == 0) continue;
         if (isinf(reach)) return true; /* the tool grasps or presses the body */
@@ -134,7 +129,7 @@ static bool tool_near(sleeper *row, const pal_step *step)
         /* no point of a triangle is farther from its nearest corner */
         reach += row->edge_m * 0.57735026918962573;
         pal_sub3(a, tool->last.position_m, body->offset_m);
-        pal_sub3(b, tool->next.position_m, body->offset_m);
+        pal_sub3(b, tool->requested.position_m, body->offset_m);
         if (passes_box(row, a, b, reach) && passes_vertex(body, a, b, reach)) return true;
     }
     return false;
@@ -171,8 +166,8 @@ static pal_err run(void *self, pal_step *step)
 {
     sleeper *row = self;
     pal_body *body = step->body;
-    bool same = row->revision == body->revision;
-    row->revision = body->revision;
+    bool same = row->revision == body->display.revision;
+    row->revision = body->display.revision;
     row->boxed = false;
     bool at_rest = same && !body->frozen && slow(row, body) && !changes(step->force, step->n_force, step->time_s) &&
                    !changes(step->contact, step->n_contact, step->time_s) &&
@@ -200,4 +195,4 @@ static void reset(void *self, const pal_body *body)
 }
 
 const pal_effect pal_effect_sleep = {
-    .name = "sleep", .stage = PAL_STAGE_GUARD, .make = make, .run = run, .reset = reset, .wakes = wakes};
+    .name = "sleep", .stage = PAL_STAGE_GUARD, .make = make, .run = run, .reset = reset, .sleep.wakes = wakes};

@@ -1,60 +1,42 @@
-/* Component tet_elastic: elastic tetrahedra of four or ten nodes; the implementation is in elastic_tet.h.
+/* Component tet_elastic: elastic tetrahedra of four or ten nodes (elastic_tet.h).
  *
  * Keys: element ("tet4" or "tet10"; default by the body's elements), law ("corotational", "linear", "neo_hookean"),
  * fill (true: stiffness by the fraction of material in each element where the body has it), recover (true).
  *
  * Inversion recovery extends the rule of elastic_tet.h, which alone left bodies with ten-node elements or the
  * neo-Hookean law inverted permanently. Under an implicit solver the whole body uses its split while any piece is
- * inverted: tetrahedra of four nodes (eight in one of ten), corotational, with the rule, Poisson ratios above 0.3
- * replaced by 0.3. Pieces are checked when the tangent is taken. A body counts as inverted when in a piece det F <=
- * 0 (corotational tet4) or det F < 0.05 (tet10 and neo_hookean); for neo_hookean also when det F > 30, where its
- * energy, which grows with the square of det F, outweighs everything else. It counts as recovered when every piece
- * is above 0.5 (neo_hookean: and below 2). A body that rests folded on the split, as a few shuffled bodies in a
- * hundred do, is straightened (elastic_tet.h).
+ * inverted: tetrahedra of four nodes (eight in one of ten), corotational, with the rule and Poisson ratios of at most
+ * PAL_SPLIT_POISSON_MAX. Pieces are checked when the tangent is taken, against det F <= 0 (corotational tet4) or the
+ * ratios PAL_INVERTED_LOW and, for neo_hookean, _HIGH; the body has recovered when every piece is within
+ * PAL_TET_RECOVERED_LOW and, for neo_hookean, _HIGH. A body that rests folded on the split is straightened.
  *
  * `internal` is true for corotational and neo_hookean. The linear law has no net force, but a torque under rotation,
- * as every linear model has. Ten-node corotational elements also have a torque while an element is almost completely
- * crushed (elastic_tet.h). */
+ * and ten-node corotational elements have a torque while an element is almost completely crushed (elastic_tet.h). */
 #include "server/base/clock.h"
-#include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/core/force_cache.h"
 #include "server/sim/elements/elastic_tet.h"
 
-#include <string.h>
-
-static pal_err read_element(pal_config_entry *item, const pal_build *build, int *n_corner)
-{
-    const char *text = build->body->n_corner == 10 ? "tet10" : "tet4";
-    PAL_TRY(pal_entry_read_text(item, "element", &text, build->diag));
-    if (strcmp(text, "tet4") && strcmp(text, "tet10"))
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s.element: \"%s\" is not tet4 or tet10", item->path,
-                                  text);
-    *n_corner = strcmp(text, "tet4") ? 10 : 4;
-    return PAL_ERR_OK;
-}
+#include <math.h>
 
 typedef struct tet_row {
     pal_elastic_tets whole;         /* first member: tests read it */
     pal_elastic_tets *split;        /* NULL: no inversion recovery by the split */
-    double *rest;                   /* six times the volume of each piece at rest [n_piece] */
-    double min_volume_m3;           /* of the pieces that are checked, times six */
+    double *rest_m3;                /* volume of each piece at rest [n_piece] */
+    double min_volume_m3;           /* of the pieces that are checked */
     bool has_inversion, cheap;      /* cheap: whole.n_inverted shows that the body is inverted */
     uint64_t n_inversion, n_switch; /* since run, which has the body */
     pal_force_cache force_cache;    /* under an implicit solver: of `whole` while nothing is inverted */
 } tet_row;
 
-/* outside the first pair a body is inverted, inside the second it is recovered */
-static const double max_poisson = 0.3, inverted_det[2] = {0.05, 30}, whole_det[2] = {0.5, 2};
-
-/* tetrahedra of four nodes on the body's own, eight in one of ten */
+/* the split: eight tetrahedra of four nodes in one of ten */
 static pal_err cut(const tet_row *row, pal_arena *arena, pal_elastic_tets_options *to)
 {
     static const int piece[8][4] = {{0, 4, 6, 7}, {4, 1, 5, 8}, {6, 5, 2, 9}, {7, 8, 9, 3},
                                     {6, 8, 4, 5}, {6, 8, 5, 9}, {6, 8, 9, 7}, {6, 8, 7, 4}};
     const pal_elastic_tets_options *from = &row->whole.options;
     *to = *from;
-    to->law = PAL_LAW_COROTATIONAL, to->recover = true, to->max_poisson = max_poisson;
+    to->law = PAL_LAW_COROTATIONAL, to->recover = true, to->max_poisson = PAL_LOCK_FREE_POISSON;
     if (from->n_corner == 4) return PAL_ERR_OK;
     to->n_corner = 4, to->n_tet = 8 * from->n_tet;
     int32_t *tet = PAL_NEW(arena, int32_t, 4 * (size_t)to->n_tet);
@@ -68,42 +50,35 @@ static pal_err cut(const tet_row *row, pal_arena *arena, pal_elastic_tets_option
     return PAL_ERR_OK;
 }
 
-static double six_volumes(const double *x, const int32_t *node)
-{
-    double e[3][3], n[3];
-    for (int k = 0; k < 3; k++) pal_sub3(e[k], x + 3 * node[k + 1], x + 3 * node[0]);
-    pal_cross3(n, e[1], e[2]);
-    return pal_dot3(e[0], n);
-}
-
 static pal_err make_split(tet_row *row, pal_build *build)
 {
     const pal_elastic_tets_options *whole = &row->whole.options;
+    const double h = build->body->edge_m;
     pal_elastic_tets_options options;
     PAL_TRY(cut(row, build->arena, &options));
     row->split = PAL_NEW(build->arena, pal_elastic_tets, 1);
     if (!row->split) return PAL_ERR_MEMORY;
     PAL_TRY(pal_elastic_tets_make(&options, build, row->split));
     row->cheap = whole->n_corner == 4 && whole->law == PAL_LAW_COROTATIONAL;
-    double h = build->body->edge_m;
     /* skip slivers: they invert at any contact and say nothing about the body */
-    row->min_volume_m3 = 1e-3 * h * h * h;
-    row->rest = PAL_NEW(build->arena, double, options.n_tet);
-    if (!row->rest) return PAL_ERR_MEMORY;
-    for (int i = 0; i < options.n_tet; i++) row->rest[i] = six_volumes(build->body->x_rest, options.tet + 4 * i);
+    row->min_volume_m3 = 1e-3 / 6 * h * h * h;
+    row->rest_m3 = PAL_NEW(build->arena, double, options.n_tet);
+    if (!row->rest_m3) return PAL_ERR_MEMORY;
+    for (int i = 0; i < options.n_tet; i++) row->rest_m3[i] = pal_tet_volume(build->body->x_rest, options.tet + 4 * i);
     return PAL_ERR_OK;
 }
 
 static bool is_inverted(const tet_row *row, const double *x)
 {
     if (row->cheap && !row->has_inversion) return row->whole.n_inverted > 0;
-    const double *limit = row->has_inversion ? whole_det : inverted_det;
+    const double low = row->has_inversion ? PAL_TET_RECOVERED_LOW : PAL_INVERTED_LOW,
+                 high = row->has_inversion ? PAL_TET_RECOVERED_HIGH : PAL_INVERTED_HIGH;
     bool neo = row->whole.options.law == PAL_LAW_NEO_HOOKEAN;
     const pal_elastic_tets_options *pieces = &row->split->options;
     for (int i = 0; i < pieces->n_tet; i++) {
-        if (fabs(row->rest[i]) < row->min_volume_m3) continue;
-        double det = six_volumes(x, pieces->tet + 4 * i) / row->rest[i];
-        if (det < limit[0] || (neo && det > limit[1])) return true;
+        if (fabs(row->rest_m3[i]) < row->min_volume_m3) continue;
+        double det = pal_tet_volume(x, pieces->tet + 4 * i) / row->rest_m3[i];
+        if (det < low || (neo && det > high)) return true;
     }
     return false;
 }
@@ -112,9 +87,12 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     const pal_body *body = build->body;
     pal_elastic_tets_options options = {.recover = true};
+    static const char *const elements[] = {"tet4", "tet10"};
+    int quadratic = body->n_corner == 10;
     bool fill = true;
     PAL_TRY(pal_elastic_law_read(item, &options.law, build->diag));
-    PAL_TRY(read_element(item, build, &options.n_corner));
+    PAL_TRY(pal_entry_read_choice(item, "element", elements, 2, &quadratic, build->diag));
+    options.n_corner = quadratic ? 10 : 4;
     PAL_TRY(pal_entry_read_bool(item, "fill", &fill, build->diag));
     PAL_TRY(pal_entry_read_bool(item, "recover", &options.recover, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
@@ -145,12 +123,11 @@ static pal_err run(void *self, pal_step *step)
     tet_row *row = self;
     step->body->safeguards.n_inversion += row->n_inversion, step->body->safeguards.n_split += row->n_switch;
     row->n_inversion = row->n_switch = 0;
-    if (!row->has_inversion && pal_force_cache_matches(&row->force_cache, step->body->d)) {
+    const uint64_t before = row->has_inversion ? pal_clock_ns() : 0;
+    if (!row->has_inversion && pal_force_cache_matches(&row->force_cache, step->body->d))
         pal_force_cache_add(&row->force_cache, step->body->f);
-        return PAL_ERR_OK;
-    }
-    uint64_t before = row->has_inversion ? pal_clock_ns() : 0;
-    pal_elastic_tets_force(acting(self), step->body->d, step->body->f);
+    else
+        pal_elastic_tets_force(acting(self), step->body->d, step->body->f);
     if (row->has_inversion) step->body->safeguards.ns += pal_clock_ns() - before;
     return PAL_ERR_OK;
 }
@@ -203,9 +180,8 @@ static void stress(void *self, const pal_body *body, pal_stress_take *take, void
 
 static bool couple(void *self, pal_cliques *out)
 {
-    const pal_elastic_tets *whole = &((tet_row *)self)->whole;
-    *out =
-        (pal_cliques){.n_item = whole->options.n_tet, .n_corner = whole->options.n_corner, .node = whole->options.tet};
+    const pal_elastic_tets_options *of = &((tet_row *)self)->whole.options;
+    *out = (pal_cliques){.n_item = of->n_tet, .n_corner = of->n_corner, .node = of->tet};
     return true;
 }
 
@@ -220,8 +196,7 @@ static void linearise(void *self, const pal_body *body)
     row->n_switch += row->has_inversion != before;
     if (row->has_inversion && !before) pal_elastic_tets_reset(row->split);
     if (row->split) row->n_switch += pal_elastic_tets_check_rest(row->split, body, row->has_inversion);
-    if (!row->has_inversion) return;
-    pal_elastic_tets_linearise(row->split, body->d);
+    if (row->has_inversion) pal_elastic_tets_linearise(row->split, body->d);
 }
 
 static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
@@ -251,10 +226,10 @@ const pal_effect pal_effect_tet_elastic = {.name = "tet_elastic",
                                            .make = make,
                                            .run = run,
                                            .energy = energy,
-                                           .stiffness = stiffness,
+                                           .bounds.stiffness = stiffness,
                                            .material = material,
                                            .reset = reset,
                                            .tangent = &tangent,
-                                           .measure = measure,
-                                           .fields = PAL_ELASTIC_FIELDS,
-                                           .stress = stress};
+                                           .inspect.measure = measure,
+                                           .inspect.fields = PAL_ELASTIC_FIELDS,
+                                           .inspect.stress = stress};

@@ -6,10 +6,11 @@
  * 0.01 of the volume of a regular one with its edges: its negligible volume would set the sub-step of the whole
  * body, and it would invert at any contact. The edges of omitted tetrahedra stay; a preflight check counts and names
  * them. */
-#include "server/sim/core/effect_list.h"
-#include "server/sim/springs/spring_recovery.h"
+
+#include "server/sim/effects/spring_effect.h"
 
 #include <stdlib.h>
+
 #include <string.h>
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
@@ -18,19 +19,16 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
     const pal_tets *tets = build->body->tets;
     pal_spring_set *row = PAL_NEW(build->arena, pal_spring_set, 1);
     int32_t *tet = malloc(4 * sizeof *tet * ((size_t)tets->n_tet + 1));
-    if (!row || !tet) {
-        free(tet);
-        return PAL_ERR_MEMORY;
-    }
     int n = 0;
-    for (int t = 0; t < tets->n_tet; t++) {
+    for (int t = 0; t < tets->n_tet && row && tet; t++) {
         const double *x[PAL_CORNERS];
         for (int c = 0; c < 4; c++) x[c] = build->body->x_rest + 3 * (size_t)tets->tet[4 * t + c];
         if (pal_spring_tet_quality(x) < PAL_SPRING_SLIVER) continue;
         memcpy(tet + 4 * (size_t)n++, tets->tet + 4 * (size_t)t, 4 * sizeof *tet);
     }
     double h = build->body->edge_m;
-    pal_err err = pal_spring_set_make(PAL_SPRING_VOLUME, item, build, tet, n, 6e-6 * h * h * h, row);
+    pal_err err = row && tet ? pal_spring_set_make(PAL_SPRING_VOLUME, item, build, tet, n, 6e-6 * h * h * h, row)
+                             : PAL_ERR_MEMORY;
     free(tet);
     *self = row;
     return err;
@@ -76,48 +74,4 @@ PAL_INLINE void bound_kernel(const double *p[][3], pal_v8 w, pal_v8 kq, bool ben
     bound[3] += c * (length[0] + length[1] + length[3]);
 }
 
-static pal_spring_set *springs(void *self)
-{
-    return self;
-}
-
-static pal_err run(void *self, pal_step *step)
-{
-    const pal_spring_set *row = self;
-    pal_body *body = step->body;
-    pal_node_order_load(body->node_order, body->d);
-    pal_spring_run(row, body->node_order, kernel, 4);
-    pal_node_order_add(body->node_order, body->f);
-    if (row->spring.c_Js > 0) pal_spring_damp(row, body, PAL_SPRING_VOLUME);
-    return PAL_ERR_OK;
-}
-
-static double energy(void *self, const pal_body *body)
-{
-    return pal_spring_energy(self, body, PAL_SPRING_VOLUME);
-}
-
-static void stiffness(void *self, const pal_body *body, double *bound_N_m)
-{
-    const pal_spring_set *row = self;
-    pal_spring_bound(row, body->node_order, body->d, bound_kernel, 4, row->spring.k_J, true, bound_N_m);
-}
-
-static void damping(void *self, const pal_body *body, double *bound_Ns_m)
-{
-    const pal_spring_set *row = self;
-    if (row->spring.c_Js > 0)
-        pal_spring_bound(row, body->node_order, body->d, bound_kernel, 4, row->spring.c_Js, false, bound_Ns_m);
-}
-
-const pal_effect pal_effect_tet_volume = {.name = "tet_volume",
-                                          .stage = PAL_STAGE_FORCE,
-                                          .internal = true,
-                                          .make = make,
-                                          .run = run,
-                                          .energy = energy,
-                                          .stiffness = stiffness,
-                                          .damping = damping,
-                                          .springs = springs,
-                                          .recover = pal_spring_recover,
-                                          .material = pal_spring_set_material};
+PAL_SPRING_EFFECT(tet_volume, PAL_SPRING_VOLUME, 4)

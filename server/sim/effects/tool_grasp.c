@@ -8,18 +8,13 @@
  *
  * Transfer to another body: if it shows the same surface, the grasp keeps its vertices with the new skin; otherwise
  * it takes the vertices around the rest position at which it closed. The offset changes with the rest position of
- * the grasped tissue, so that repeated transfers cause no drift; the force does not jump (grasp_transfer.h).
- *
- * A haptic bridge receives the bilateral part f0 - K (x - x0) - b v. K comes from the compliance of the grasped
- * tissue if the solver provides one (haptic_stiffness.h), otherwise it is k 1 by least squares (stiffness_fit.h),
- * starting at this spring in series with the tissue, 2 E R / (1 - nu^2).
+ * the grasped tissue, so that repeated transfers cause no drift; the force does not jump (grasp.h).
  *
  * Keys: stiffness_N_m (0: 16 E reach), damping_s (0.01: c over k), reach_m (0: 2 tool radii). */
 #include "server/base/vec3.h"
 #include "server/sim/contact/grasp.h"
 #include "server/sim/contact/tuning.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -32,7 +27,7 @@ static pal_err material(void *self, const pal_body *body, const pal_material *ma
     return PAL_ERR_OK;
 }
 
-static void let_go(pal_grasps *grasps, pal_grasp *g)
+static void release(pal_grasps *grasps, pal_grasp *g)
 {
     for (int i = 0; i < g->n_node; i++) grasps->sum_weight[g->node[i]] -= g->weight[i];
     g->n_node = 0;
@@ -50,23 +45,21 @@ static void destroy(void *self)
 static void reset(void *self, const pal_body *body)
 {
     pal_grasps *grasps = self;
-    for (int t = 0; t < grasps->n_tool; t++) {
-        grasps->grasp[t].closed = grasps->grasp[t].button = false;
-        grasps->grasp[t].n_node = 0;
-    }
+    for (int t = 0; t < grasps->n_tool; t++)
+        grasps->grasp[t].closed = grasps->grasp[t].button = false, grasps->grasp[t].n_node = 0;
     memset(grasps->sum_weight, 0, sizeof(double) * (size_t)body->n_node);
 }
 
 static pal_err make_grasp(pal_grasp *g, const pal_body *body, pal_arena *arena)
 {
-    size_t n_node = (size_t)body->n_node;
-    g->node = PAL_NEW(arena, int32_t, n_node);
-    g->weight = PAL_NEW(arena, double, n_node);
-    if (!g->node || !g->weight) return PAL_ERR_MEMORY;
-    if (body->implicit && !(g->implicit = PAL_NEW(arena, pal_grasp_implicit, 1))) return PAL_ERR_MEMORY;
-    if (body->active && !(g->adaptive = PAL_NEW(arena, pal_adaptive_grasp, 1))) return PAL_ERR_MEMORY;
-    g->share = PAL_NEW(arena, uint16_t, (size_t)body->n_shown);
-    return g->share ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    g->node = PAL_NEW(arena, int32_t, body->n_node);
+    g->weight = PAL_NEW(arena, double, body->n_node);
+    if (body->implicit) g->implicit = PAL_NEW(arena, pal_grasp_implicit, 1);
+    if (body->active) g->adaptive = PAL_NEW(arena, pal_adaptive_grasp, 1);
+    g->share = PAL_NEW(arena, uint16_t, body->display.n_shown);
+    const bool all =
+        g->node && g->weight && g->share && (g->implicit || !body->implicit) && (g->adaptive || !body->active);
+    return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
@@ -78,7 +71,7 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
     PAL_TRY(pal_entry_read_number(entry, "damping_s", 0, 10, &grasps->damping_s, build->diag));
     PAL_TRY(pal_entry_read_number(entry, "reach_m", 0, 10, &grasps->asked_reach_m, build->diag));
     PAL_TRY(pal_entry_check_unused(entry, build->diag));
-    if (build->body->n_shown == 0)
+    if (build->body->display.n_shown == 0)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: tool_grasp needs a body with a shown surface",
                                   entry->path);
     size_t n_node = (size_t)build->body->n_node, scratch = 6 * sizeof(double) * n_node + 256;
@@ -88,10 +81,9 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
     }
     grasps->act = build->body->implicit ? pal_grasp_act_implicit : pal_grasp_act_explicit;
     grasps->n_tool = build->scene->n_tool;
-    grasps->sum_weight = PAL_NEW(build->arena, double, n_node);
-    grasps->gather = PAL_NEW(build->arena, double, n_node);
     grasps->grasp = PAL_NEW(build->arena, pal_grasp, grasps->n_tool);
-    if (!grasps->sum_weight || !grasps->gather || !grasps->grasp) return PAL_ERR_MEMORY;
+    if (!PAL_NEW_DOUBLES(build->arena, n_node, &grasps->sum_weight, &grasps->gather) || !grasps->grasp)
+        return PAL_ERR_MEMORY;
     for (int t = 0; t < grasps->n_tool; t++) PAL_TRY(make_grasp(&grasps->grasp[t], build->body, build->arena));
     material(grasps, build->body, &build->def->material, NULL);
     *self = grasps;
@@ -108,22 +100,20 @@ static void add_vertex(pal_grasps *grasps, const pal_body *body, int vertex, dou
 
 static void take_vertex(pal_grasps *grasps, pal_grasp *g, const pal_body *body, int vertex, double share)
 {
-    g->share[vertex] = (uint16_t)fmax(1, PAL_GRASP_WHOLE * share + 0.5);
+    g->share[vertex] = (uint16_t)fmax(1, UINT16_MAX * share + 0.5);
     if (!g->adaptive) add_vertex(grasps, body, vertex, share);
 }
 
-/* node weights of shown vertices (at shown, m) within reach of p, left in gather; of adaptive bodies in share only;
- * false: none in reach */
+/* weights of shown vertices (at shown, m) within reach of p, in gather; of adaptive bodies in share. false: none */
 static bool find_vertices(pal_grasps *grasps, pal_grasp *g, const pal_body *body, const float *shown, const double p[3],
                           double reach)
 {
     double nearest2 = 2.25 * reach * reach, sum = 0;
-    int nearest = -1;
-    int n_shown = body->active ? body->n_active : body->n_shown;
+    int nearest = -1, n_shown = body->active ? body->n_active : body->display.n_shown;
     g->by_vertex = true;
-    memset(g->share, 0, sizeof *g->share * (size_t)body->n_shown);
+    memset(g->share, 0, sizeof *g->share * (size_t)body->display.n_shown);
     for (int k = 0; k < n_shown; k++) {
-        int i = body->active ? body->active[k] : k;
+        int i = pal_body_point(body, k);
         const float *s = shown + 3 * (size_t)i;
         double x = (double)s[0] - p[0], y = (double)s[1] - p[1], z = (double)s[2] - p[2];
         double d2 = x * x + y * y + z * z, fall = 1 - d2 / (reach * reach);
@@ -132,9 +122,8 @@ static bool find_vertices(pal_grasps *grasps, pal_grasp *g, const pal_body *body
         take_vertex(grasps, g, body, i, fall * fall);
         sum += fall * fall;
     }
-    if (nearest < 0) return false;
-    if (sum == 0) take_vertex(grasps, g, body, nearest, 1);
-    return true;
+    if (nearest >= 0 && sum == 0) take_vertex(grasps, g, body, nearest, 1);
+    return nearest >= 0;
 }
 
 /* takes nodes and weights from gather and sets it to 0 */
@@ -159,7 +148,7 @@ static void close_grasp(pal_grasps *grasps, pal_grasp *g, const pal_tool *tool, 
 {
     double last[3], y[3], reach = pal_grasp_reach_m(grasps, tool);
     pal_sub3(last, tool->last.position_m, body->offset_m);
-    if (!find_vertices(grasps, g, body, body->shown, last, reach)) return;
+    if (!find_vertices(grasps, g, body, body->display.shown, last, reach)) return;
     if (g->adaptive) {
         pal_adaptive_grasp_begin(g->adaptive, body, tool->last.quat, g->share);
         pal_adaptive_grasp_weights(body, g->share, grasps->gather);
@@ -178,18 +167,15 @@ static void close_grasp(pal_grasps *grasps, pal_grasp *g, const pal_tool *tool, 
     double k = pal_grasp_stiffness_N_m(grasps, reach),
            tissue = 2 * grasps->young_Pa * reach / (1 - grasps->poisson * grasps->poisson);
     pal_stiffness_fit_start(&g->fit, fmax(MIN_STIFFNESS_N_M, k * tissue / (k + tissue)));
-    pal_stiffness_fit_add(&g->fit, tool->last.position_m, (double[3]){0}, FIT_PRIOR_RADII * tool->radius_m);
-    if (g->implicit) {
-        g->implicit->stretch_m = 0;
-        g->implicit->compliance = (pal_grasp_compliance){.n_known = 0};
-    }
+    pal_stiffness_fit_add(&g->fit, tool->last.position_m, (double[3]){0}, tool->radius_m);
+    if (g->implicit) *g->implicit = (pal_grasp_implicit){.pulls = false};
 }
 
 /* once per step: rebuilds the grasps on the active nodes */
-static void follow(pal_grasps *grasps, const pal_body *body)
+static void update_nodes(pal_grasps *grasps, const pal_body *body)
 {
-    if (!body->active || grasps->revision == body->revision) return;
-    grasps->revision = body->revision;
+    if (!body->active || grasps->revision == body->display.revision) return;
+    grasps->revision = body->display.revision;
     for (int t = 0; t < grasps->n_tool; t++) {
         pal_grasp *g = &grasps->grasp[t];
         double was[3], is[3];
@@ -209,7 +195,7 @@ static void begin_tool(pal_grasps *grasps, pal_grasp *g, const pal_tool *tool, c
     bool pressed = tool->grasp && !g->button;
     g->button = tool->grasp;
     /* an absent tool keeps its grasp while its ramp falls, so that its force fades */
-    if (g->closed && ((tool->present && !tool->grasp) || tool->ramp <= 0)) let_go(grasps, g);
+    if (g->closed && ((tool->present && !tool->grasp) || tool->ramp <= 0)) release(grasps, g);
     if (pressed && !g->closed) close_grasp(grasps, g, tool, body);
 }
 
@@ -225,9 +211,9 @@ static void transfer_nodes(pal_grasps *grasps, pal_grasp *g, const pal_body *bod
         take_gathered(grasps, g, body);
         return;
     }
-    for (int i = 0; i < body->n_shown && same; i++) g->share[i] = b->share[i];
-    for (int i = 0; i < body->n_shown && found; i++)
-        if (g->share[i] > 0) add_vertex(grasps, body, i, g->share[i] / PAL_GRASP_WHOLE);
+    for (int i = 0; i < body->display.n_shown && same; i++) g->share[i] = b->share[i];
+    for (int i = 0; i < body->display.n_shown && found; i++)
+        if (g->share[i] > 0) add_vertex(grasps, body, i, g->share[i] / (double)UINT16_MAX);
     if (!same && place) found = find_vertices(grasps, g, body, by->rest_m, b->at_m, b->reach_m);
     g->by_vertex = same || found;
     for (int i = 0; i < b->n_node && !found; i++) {
@@ -271,13 +257,13 @@ static void transfer(void *self, const pal_body *body, const void *before, const
 {
     pal_grasps *grasps = self;
     const pal_grasps *old = before;
-    grasps->revision = body->revision;
+    grasps->revision = body->display.revision;
     for (int t = 0; t < grasps->n_tool && t < old->n_tool; t++) {
         const pal_grasp *b = &old->grasp[t];
         pal_grasp *g = &grasps->grasp[t];
         if (!g->transfer && !(g->transfer = calloc(1, sizeof *g->transfer))) continue;
         pal_grasp_transfer *h = g->transfer;
-        let_go(grasps, g);
+        release(grasps, g);
         g->button = b->button;
         if (!b->closed) continue;
         transfer_nodes(grasps, g, body, b, by);
@@ -300,7 +286,7 @@ static pal_err run(void *self, pal_step *step)
     pal_grasps *grasps = self;
     pal_tools *tools = step->tools;
     int n_tool = tools->n_tool < grasps->n_tool ? tools->n_tool : grasps->n_tool;
-    if (step->sub == 0) follow(grasps, step->body);
+    if (step->sub == 0) update_nodes(grasps, step->body);
     for (int t = 0; t < n_tool; t++) {
         pal_grasp *g = &grasps->grasp[t];
         if (step->sub == 0) begin_tool(grasps, g, &tools->tool[t], step->body);
@@ -329,5 +315,5 @@ const pal_effect pal_effect_tool_grasp = {.name = "tool_grasp",
                                           .reset = reset,
                                           .transfer = transfer,
                                           .destroy = destroy,
-                                          .reach_m = reach_m,
+                                          .sleep.reach_m = reach_m,
                                           .tangent = &tangent};

@@ -1,9 +1,9 @@
 /* Component tool_push: penalty contact between the sphere of each tool and the shown surface, in every sub-step.
  *
- * Tools touch the shown surface, not the voxels below it (contact_points.h). A proxy of the tool stays on the side
- * it came from (proxy.h). A contact point at depth d within the proxy's sphere is pushed away from the proxy's
- * centre with f = k d, k = stiffness_Pa_m * area, and the opposite force acts on the tool. The contact regime sets k
- * and how a solver treats it (push.h). The sum is limited to the caps (tool_force.h) and scaled by the tool's ramp.
+ * A proxy of the tool stays on the side it came from (proxy.h). A contact point at depth d within the proxy's sphere is
+ * pushed away from the proxy's centre with f = k d, k = stiffness_Pa_m * area, and the opposite force acts on the tool.
+ * The contact regime sets k and how a solver treats it (push.h). The sum is limited to the caps (tool_force.h) and
+ * scaled by the tool's ramp.
  *
  * A tool that grasps tissue (tool_grasp) does not push it, because its sphere would act against its own grasp. A
  * tool that appears inside tissue starts at the nearest position outside. A proxy that stays farther than slip_S box
@@ -17,21 +17,14 @@
 #include "server/sim/contact/tuning.h"
 #include "server/sim/core/blend.h"
 
-#include <math.h>
 #include <string.h>
-
-static void take_material(pal_push *push, const pal_material *material)
-{
-    push->young_Pa = material->young_Pa;
-    push->poisson = fmin(material->poisson, PAL_POISSON_CLAMP);
-    push->damping_1_s = material->damping_1_s;
-    push->density_kg_m3 = material->density_kg_m3;
-}
 
 static pal_err material(void *self, const pal_body *body, const pal_material *mat, pal_diagnostic *diag)
 {
+    pal_push *push = self;
     (void)body, (void)diag;
-    take_material(self, mat);
+    push->material = *mat;
+    push->material.poisson = fmin(mat->poisson, PAL_POISSON_CLAMP);
     return PAL_ERR_OK;
 }
 
@@ -39,14 +32,13 @@ static void reset(void *self, const pal_body *body)
 {
     pal_push *push = self;
     (void)body;
-    pal_contact_points_reset(&push->points);
+    push->points.sub_step += 2; /* the body jumped: velocities start again */
     push->n_step = 0;
     for (int t = 0; t < push->n_tool; t++) {
         push->tool[t].active = false;
         push->tool[t].share = 1;
         pal_tool_contact_end_blend(&push->tool[t]);
-        pal_tool_contact_implicit *implicit = push->tool[t].implicit;
-        if (implicit) pal_contact_implicit_reset(&implicit->solve), implicit->stiffness = (pal_haptic_stiffness){0};
+        if (push->tool[t].implicit) *push->tool[t].implicit = (pal_tool_contact_implicit){.solve.across = -1};
         pal_contact_patches_reset(&push->tool[t].patches, push->body_index * 1024);
     }
 }
@@ -63,23 +55,16 @@ static pal_err read_keys(pal_push *push, pal_config_entry *entry, pal_diagnostic
     return pal_entry_check_unused(entry, diag);
 }
 
-static const pal_push_regime *regime_of(const pal_body *body)
-{
-    if (body->implicit) return &pal_push_implicit;
-    if (body->active) return &pal_push_held_load;
-    return body->interpolation ? &pal_push_interpolated : &pal_push_explicit;
-}
-
 static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
 {
     const pal_scene *scene = build->scene;
     pal_push *push = PAL_NEW(build->arena, pal_push, 1);
     if (!push) return PAL_ERR_MEMORY;
     PAL_TRY(read_keys(push, entry, build->diag));
-    if (build->body->n_shown == 0)
+    if (build->body->display.n_shown == 0)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: tool_push needs a body with a shown surface",
                                   entry->path);
-    take_material(push, &build->def->material);
+    PAL_TRY(material(push, build->body, &build->def->material, NULL));
     push->n_tool = scene->n_tool;
     push->body_index = (int)(build->def - scene->body);
     double low[3], high[3], min_m = INFINITY;
@@ -102,7 +87,10 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
     if (build->scratch_byte < scratch) build->scratch_byte = scratch;
     if (build->body->implicit || build->body->interpolation)
         PAL_TRY(pal_contact_points_young(&push->points, build->body, build->def, build->arena, &push->point_Pa));
-    push->regime = regime_of(build->body);
+    push->regime = build->body->implicit        ? &pal_push_implicit
+                   : build->body->active        ? &pal_push_held_load
+                   : build->body->interpolation ? &pal_push_interpolated
+                                                : &pal_push_explicit;
     if (build->body->implicit) PAL_TRY(pal_push_make_implicit(push, build));
     reset(push, build->body);
     *self = push;
@@ -139,7 +127,7 @@ static void begin_tool(pal_push *push, pal_tool_contact *h, const pal_tool *tool
         pal_contact_patches_reset(&h->patches, push->body_index * 1024);
         return;
     }
-    pal_sub3(next, tool->next.position_m, body->offset_m);
+    pal_sub3(next, tool->requested.position_m, body->offset_m);
     double behind = h->active ? pal_dist3(h->proxy.x, next) : 0;
     h->time_behind_s = behind > push->slip_S * body->length_scale_m ? h->time_behind_s + step_s : 0;
     if (!h->active) {
@@ -166,7 +154,8 @@ static void begin_tool(pal_push *push, pal_tool_contact *h, const pal_tool *tool
 /* contacts of the proxy at its present position; x [n_list][3] are the points */
 static void find_contacts(const pal_push *push, pal_tool_contact *h, const pal_body *body, const double *x)
 {
-    double radius = h->limits.radius_m, reach = push->regime->reach_radii * radius;
+    /* what an implicit solver may bring into contact in this sub-step is known to it */
+    double radius = h->limits.radius_m, reach = h->implicit ? 2 * radius : radius;
     h->n_contact = 0;
     for (int i = 0; i < h->n_list && h->n_contact < CONTACT_MAX; i++) {
         double w[3], area = push->points.sample.area_m2[h->list[i]];
@@ -175,7 +164,6 @@ static void find_contacts(const pal_push *push, pal_tool_contact *h, const pal_b
         if (!(d2 < reach * reach) || area <= 0) continue;
         pal_contact *c = &h->contact[h->n_contact++];
         c->point = h->list[i];
-        pal_copy3(c->x, x + 3 * i);
         if (!pal_unit3(c->away, w, 1e-9 * radius)) pal_scale3(c->away, -1, h->proxy.normal);
         c->depth_m = fmin(radius - sqrt(d2), h->limits.max_depth_m);
         c->k_N_m = push->regime->pressure_Pa_m(push, body, c->point, radius) * area;
@@ -192,7 +180,7 @@ static void approach(pal_push *push, pal_tool_contact *h, pal_tool *tool, pal_st
     pal_sub3(here, tool->here_m, step->body->offset_m);
     pal_tool_contact_blend(h, step, tool, here);
     pal_copy3(h->total, h->hold.now_N);
-    h->ramp = pal_blend_toward(h->ramp, 1, step->dt_s, PAL_BLEND_CONTACT_S);
+    h->ramp = pal_blend_toward(h->ramp, 1, step->dt_s, PAL_BLEND_S);
     h->limits.max_rise_m = push->clamp_S * step->body->length_scale_m * (step->dt_s / FRAME_S);
     h->limits.tool_move_length_m = pal_norm3(tool->velocity_m_s) * step->dt_s;
     if (push->regime->hold_back) push->regime->hold_back(h, here);
@@ -276,6 +264,6 @@ const pal_effect pal_effect_tool_push = {.name = "tool_push",
                                          .reset = reset,
                                          .transfer = transfer,
                                          .destroy = destroy,
-                                         .wanted = wanted,
-                                         .reach_m = reach_m,
+                                         .bounds.wanted = wanted,
+                                         .sleep.reach_m = reach_m,
                                          .tangent = &tangent};

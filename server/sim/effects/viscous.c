@@ -12,15 +12,12 @@ typedef struct viscous {
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    double rate = build->def->material.damping_1_s;
-    bool given = pal_entry_has(item, "rate_1_s");
-    PAL_TRY(pal_entry_read_number(item, "rate_1_s", 0, 1e9, &rate, build->diag));
-    PAL_TRY(pal_entry_check_unused(item, build->diag));
     viscous *row = PAL_NEW(build->arena, viscous, 1);
     if (!row) return PAL_ERR_MEMORY;
-    *row = (viscous){.rate_1_s = rate, .given = given};
+    *row = (viscous){.rate_1_s = build->def->material.damping_1_s, .given = pal_entry_has(item, "rate_1_s")};
     *self = row;
-    return PAL_ERR_OK;
+    PAL_TRY(pal_entry_read_number(item, "rate_1_s", 0, 1e9, &row->rate_1_s, build->diag));
+    return pal_entry_check_unused(item, build->diag);
 }
 
 static pal_err run(void *self, pal_step *step)
@@ -61,6 +58,6 @@ const pal_effect pal_effect_viscous = {.name = "viscous",
                                        .stage = PAL_STAGE_FORCE,
                                        .make = make,
                                        .run = run,
-                                       .damping = damping,
+                                       .bounds.damping = damping,
                                        .drag = drag,
                                        .material = material};

@@ -28,7 +28,6 @@ void pal_hex_reset(pal_elastic_hexes *cubes)
     pal_hex_recovery_reset(cubes);
     pal_force_cache_invalidate(&cubes->force_cache);
     cubes->n_inversion = cubes->n_switch = 0;
-    cubes->n_slow = 0;
     if (cubes->split) pal_elastic_tets_reset(cubes->split), cubes->split->n_single_rotation = 0;
 }
 
@@ -36,15 +35,13 @@ void pal_hex_reset(pal_elastic_hexes *cubes)
 static pal_err check_split(const pal_hexes *hexes, const pal_tets *tets, const char *path, pal_diagnostic *diag)
 {
     if (!tets || tets->n_tet != 5 * hexes->n_hex)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %d tetrahedra are no split of %d voxels", path,
-                                  tets ? tets->n_tet : 0, hexes->n_hex);
+        return PAL_REFUSE(diag, "%s: %d tetrahedra are no split of %d voxels", path, tets ? tets->n_tet : 0,
+                          hexes->n_hex);
     for (int i = 0; i < 4 * tets->n_tet; i++) {
         const int32_t *node = hexes->node + 8 * (i / 20);
         int c = 0;
         while (c < 8 && node[c] != tets->tet[i]) c++;
-        if (c == 8)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: tetrahedron %d is not part of voxel %d", path, i / 4,
-                                      i / 20);
+        if (c == 8) return PAL_REFUSE(diag, "%s: tetrahedron %d is not part of voxel %d", path, i / 4, i / 20);
     }
     return PAL_ERR_OK;
 }
@@ -59,7 +56,7 @@ static pal_err make_split(pal_elastic_hexes *cubes, pal_build *build, const char
     for (int t = 0; t < tets->n_tet; t++) cubes->split_fill[t] = (float)cubes->share[cubes->simd_blocks.place[t / 5]];
     const pal_elastic_tets_options options = {.law = PAL_LAW_COROTATIONAL,
                                               .recover = true,
-                                              .max_poisson = PAL_HEX_SPLIT_POISSON_MAX,
+                                              .max_poisson = PAL_LOCK_FREE_POISSON,
                                               .n_corner = 4,
                                               .n_tet = tets->n_tet,
                                               .tet = tets->tet,
@@ -93,7 +90,7 @@ pal_err pal_hex_make(const pal_hex_options *options, pal_build *build, const cha
 {
     pal_body *body = build->body;
     if (!body->hexes || body->hexes->n_hex < 1 || !body->tets)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"hex_elastic\" needs a body of voxels", path);
+        return PAL_REFUSE(build->diag, "%s: \"hex_elastic\" needs a body of voxels", path);
     *out = (pal_elastic_hexes){.law = options->law,
                                .element = options->element,
                                .fill = options->fill,
@@ -117,7 +114,7 @@ pal_err pal_hex_make(const pal_hex_options *options, pal_build *build, const cha
         int lane = out->simd_blocks.place[e];
         bool filled = !out->fill || !out->hexes->fill;
         out->hex[lane] = e;
-        out->share[lane] = filled ? 1 : fmax(PAL_HEX_SHARE_MIN, fmin(1, (double)out->hexes->fill[e]));
+        out->share[lane] = filled ? 1 : fmax(PAL_FILL_MIN, fmin(1, (double)out->hexes->fill[e]));
     }
     pal_hex_fill_reference(out);
     if (options->recover && options->law != PAL_LAW_LINEAR) PAL_TRY(make_split(out, build, path));

@@ -5,16 +5,14 @@
  * derivative of R is dropped). linear: R = I. neo_hookean: elastic_hex_neo.c. K is integrated in full or with the mean
  * dilatation (B-bar, Hughes 1980).
  *
- * Recovery from inversion (corotational and neo_hookean): with one rotation per cube a body has states of balance that
- * are not its shape at rest (mirrored, shuffled corners), and so has the neo-Hookean energy. While any corner's
- * determinant is below 0.05 h^3 or above 30 h^3 (blown up), the whole body takes its forces from the five-tetrahedra
- * split of the same nodes, corotational with the averaged rotation of elastic_tet.h. Poisson ratios above 0.3 are taken
- * as 0.3 there, since inverted voxels have no volume to conserve: of 720 shuffled bodies all recover, with 0.45 one in
- * a hundred does not (tests/sim/elements/test_hex_recovery.c). The body returns to cubes when all corners are between
- * 0.3 and 20 h^3. Where a lasting load inverts cubes but leaves the split whole, the two would alternate for ever:
- * cubes that inverted again soon after a return are tried again only when their corners are better than last time.
+ * Recovery from inversion (corotational and neo_hookean): while any corner's determinant is outside PAL_INVERTED_LOW
+ * h^3 to PAL_INVERTED_HIGH h^3, the whole body takes its forces from the five-tetrahedra split of the same nodes,
+ * corotational with the averaged rotation of elastic_tet.h and a Poisson ratio of PAL_LOCK_FREE_POISSON at most. It
+ * returns to cubes when all corners are within PAL_RECOVERED_LOW to _HIGH. Where a lasting load inverts cubes but
+ * leaves the split whole, the two would alternate for ever: cubes that inverted again soon after a return are tried
+ * again only when their corners are better than last time.
  *
- * Memory: the world's arena. Thread: [load] to make, then [sim]. */
+ * Memory: the component's arena. Thread: [load] to make, then [sim]. */
 #ifndef PAL_SIM_ELEMENTS_ELASTIC_HEX_H
 #define PAL_SIM_ELEMENTS_ELASTIC_HEX_H
 #include "server/sim/core/force_cache.h"
@@ -26,7 +24,7 @@ typedef struct pal_elastic_hexes {
     pal_elastic_law law;
     pal_hex_element element;
     bool fill, recover;
-    bool implicit; /* the solver linearises: inversion is looked for then, else with every force */
+    bool implicit; /* the solver linearises: inversion is checked then, else with every force */
     const pal_hexes *hexes;
     int n_hex, n_block;
     double edge_m;
@@ -41,8 +39,7 @@ typedef struct pal_elastic_hexes {
     double *bound;       /* largest eigenvalue of the cube's K, N/m          [n_block][8]    */
     double *q;           /* rotations as quaternions, warm start             [n_block][4][8] */
     double *turn;        /* rotations at the last linearise                  [n_block][9][8] */
-    double *tangent;     /* neo_hookean: K in modes at the last linearise    [n_block][231][8]; NULL: not force_cache */
-    int n_slow;          /* rotations of the last force or linearise that needed pal_polar_rotation */
+    double *tangent;     /* neo_hookean: K in modes at the last linearise    [n_block][231][8]; NULL: not kept */
     int32_t *entry;      /* implicit: blocks of the pattern last assembled into [n_hex][36], ~ where transposed */
     const int32_t *entry_row;
     const pal_block_matrix *entry_of;
@@ -50,7 +47,7 @@ typedef struct pal_elastic_hexes {
     pal_force_cache force_cache; /* implicit: of the cubes, not of the split */
 
     bool has_inversion;
-    int n_whole;          /* updates since the return to cubes, up to PAL_HEX_RETRY_UPDATES                           */
+    int n_whole;          /* updates since the return to cubes, up to PAL_RETRY_UPDATES                           */
     double tried, needed; /* smallest corner at that return; the one required for the next              */
     uint64_t n_inversion,
         n_switch;            /* updates with inversion; changes between cubes, split, single rotation; since reset */
@@ -86,18 +83,15 @@ void pal_hex_measure(pal_elastic_hexes *cubes, const pal_body *body, pal_field f
 void pal_hex_stress(pal_elastic_hexes *cubes, const pal_body *body, pal_stress_take *take, void *user);
 
 /* the laws: node_order->x holds positions (or p), forces (or products) are added to node_order->f */
-void pal_hex_corot_force(pal_elastic_hexes *cubes, pal_node_order *node_order);
+double pal_hex_corot_run(pal_elastic_hexes *cubes, pal_node_order *node_order, pal_element_run what);
 /* cubes->reference: K for mu = 1 and for lambda = 1 */
 void pal_hex_fill_reference(pal_elastic_hexes *cubes);
-/* with forces: added as by ..force too */
-double pal_hex_corot_energy(pal_elastic_hexes *cubes, pal_node_order *node_order, bool forces);
 void pal_hex_corot_linearise(pal_elastic_hexes *cubes, pal_node_order *node_order);
 void pal_hex_corot_multiply(const pal_elastic_hexes *cubes, pal_node_order *node_order, double k);
 /* the tangent's blocks of 8 elements, k K: to [36][9][8] */
 void pal_hex_corot_blocks(const pal_elastic_hexes *cubes, int block, double k, double *to);
 
-void pal_hex_neo_force(pal_elastic_hexes *cubes, pal_node_order *node_order);
-double pal_hex_neo_energy(pal_elastic_hexes *cubes, pal_node_order *node_order, bool forces);
+double pal_hex_neo_run(pal_elastic_hexes *cubes, pal_node_order *node_order, pal_element_run what);
 void pal_hex_neo_linearise(pal_elastic_hexes *cubes, pal_node_order *node_order);
 void pal_hex_neo_multiply(const pal_elastic_hexes *cubes, pal_node_order *node_order, double k);
 void pal_hex_neo_blocks(const pal_elastic_hexes *cubes, int block, double k, double *to);

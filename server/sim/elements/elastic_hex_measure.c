@@ -36,9 +36,7 @@ static void corot_points(cube *q)
     double e[8][9], mean = 0;
     for (int p = 0; p < 8; p++) {
         double m[9];
-        for (int i = 0; i < 9; i++)
-            m[i] = q->r[i / 3] * q->f[p][i % 3] + q->r[3 + i / 3] * q->f[p][3 + i % 3] +
-                   q->r[6 + i / 3] * q->f[p][6 + i % 3];
+        pal_elastic_mul(m, q->r, true, q->f[p]);
         for (int i = 0; i < 9; i++) e[p][i] = 0.5 * (m[i] + m[3 * (i % 3) + i / 3]) - (i % 4 == 0);
         mean += (e[p][0] + e[p][4] + e[p][8]) / 8;
     }
@@ -52,7 +50,7 @@ static void neo_points(cube *q)
     for (int p = 0; p < 8; p++) {
         double stress[9];
         pal_neo_stress(q->mu, k1, kappa * (mean - 1), q->f[p], stress);
-        for (int i = 0; i < 9; i++) q->stress[p][i] = pal_dot3(stress + 3 * (i / 3), q->f[p] + 3 * (i % 3));
+        pal_elastic_mult(q->stress[p], stress, q->f[p]);
         q->density[p] = pal_neo_energy(q->mu, k1, q->f[p]) + 0.5 * kappa * (mean - 1) * (mean - 1);
     }
 }
@@ -110,15 +108,6 @@ void pal_hex_measure(pal_elastic_hexes *cubes, const pal_body *body, pal_field f
     }
 }
 
-/* R s R' */
-static void turn_stress(const double r[9], const double s[9], double out[9])
-{
-    double half[9];
-    for (int i = 0; i < 9; i++)
-        half[i] = r[3 * (i / 3)] * s[i % 3] + r[3 * (i / 3) + 1] * s[3 + i % 3] + r[3 * (i / 3) + 2] * s[6 + i % 3];
-    for (int i = 0; i < 9; i++) out[i] = pal_dot3(half + 3 * (i / 3), r + 3 * (i % 3));
-}
-
 void pal_hex_stress(pal_elastic_hexes *cubes, const pal_body *body, pal_stress_take *take, void *user)
 {
     double grad[8][8][3], shape[8][8];
@@ -133,11 +122,11 @@ void pal_hex_stress(pal_elastic_hexes *cubes, const pal_body *body, pal_stress_t
                                .mu_Pa = at.mu,
                                .lambda_Pa = at.lambda};
         for (int p = 0; p < 8; p++) {
+            double half[9];
             to.shape = shape[p];
-            if (cubes->law == PAL_LAW_NEO_HOOKEAN)
-                memcpy(to.stress, at.stress[p], sizeof to.stress);
-            else
-                turn_stress(at.r, at.stress[p], to.stress);
+            memcpy(to.stress, at.stress[p], sizeof to.stress);
+            pal_elastic_mul(half, at.r, false, at.stress[p]);
+            if (cubes->law != PAL_LAW_NEO_HOOKEAN) pal_elastic_mult(to.stress, half, at.r);
             take(user, &to);
         }
     }

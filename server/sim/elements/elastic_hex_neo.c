@@ -6,14 +6,12 @@
  * element of linear elasticity. The tangent is the sum of the points' Hessians, each projected to positive
  * semi-definite with the mean's pressure kappa (Jm - 1) in it, and of the mean's own rank one kappa V grad Jm grad Jm'.
  *
- * Everything is force_cache in modes (elastic_hex_simd.h): F_ij at xi = sum over modes m with j of a_im xi^(m without
+ * Everything is in modes (elastic_hex_simd.h): F_ij at xi = sum over modes m with j of a_im xi^(m without
  * j), a = U / (4 h), so that sums over the points are Walsh transforms over their signs, and K of a cube is made from
  * the transform of the points' Hessians: K_(i,m)(k,n) = V sum_{j in m, l in n} H_ij,kl^ (m without j XOR n without l)
  * g^(|m| + |n| - 2) with g = 1/sqrt 3, where an axis in both exponents gives 1. 21 unknowns (translations are left
  * out), 231 numbers. */
 #include "server/sim/elements/elastic_hex_simd.h"
-
-static const double gauss = 0.57735026918962576451;
 
 /* mu, k1 and kappa of the mean dilatation, times share and h / 16 */
 PAL_INLINE void load_neo(const pal_elastic_hexes *cubes, int block, int l, pal_wide *mu, pal_wide *k1, pal_wide *kappa)
@@ -23,12 +21,13 @@ PAL_INLINE void load_neo(const pal_elastic_hexes *cubes, int block, int l, pal_w
     if (cubes->element == PAL_HEX_BBAR)
         *k1 = *mu * (1.0 / 3), *kappa = lambda + *mu * (2.0 / 3);
     else
-        *k1 = lambda + *mu, *kappa = wide_of(0);
+        *k1 = lambda + *mu, *kappa = pal_wide_of(0);
 }
 
 /* F at the Gauss points from the modes; point p at the signs of its bits */
 PAL_INLINE void gauss_gradients(double scale, pal_wide u[3][8], pal_wide f[8][9])
 {
+    const double gauss = sqrt(1.0 / 3);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
             const int self = 1 << j, a = 1 << (j + 1) % 3, b = 1 << (j + 2) % 3;
@@ -45,8 +44,9 @@ PAL_INLINE void gauss_gradients(double scale, pal_wide u[3][8], pal_wide f[8][9]
 /* the transposed: sums over the points of p_ij times the modes' gradients, modes 1..7 */
 PAL_INLINE void gauss_sums(double scale, pal_wide p[8][9], pal_wide u[3][8])
 {
+    const double gauss = sqrt(1.0 / 3);
     for (int i = 0; i < 3; i++) {
-        for (int m = 0; m < 8; m++) u[i][m] = wide_of(0);
+        for (int m = 0; m < 8; m++) u[i][m] = pal_wide_of(0);
         for (int j = 0; j < 3; j++) {
             const int self = 1 << j, a = 1 << (j + 1) % 3, b = 1 << (j + 2) % 3, ij = 3 * i + j;
             pal_wide s0 = p[0][ij] + p[self][ij], sa = p[a][ij] + p[a | self][ij];
@@ -60,32 +60,21 @@ PAL_INLINE void gauss_sums(double scale, pal_wide p[8][9], pal_wide u[3][8])
     }
 }
 
-/* cofactors c = dJ/dF; returns J */
-PAL_INLINE pal_wide cofactors(const pal_wide f[9], pal_wide c[9])
-{
-    c[0] = f[4] * f[8] - f[5] * f[7], c[1] = f[5] * f[6] - f[3] * f[8], c[2] = f[3] * f[7] - f[4] * f[6];
-    c[3] = f[2] * f[7] - f[1] * f[8], c[4] = f[0] * f[8] - f[2] * f[6], c[5] = f[1] * f[6] - f[0] * f[7];
-    c[6] = f[1] * f[5] - f[2] * f[4], c[7] = f[2] * f[3] - f[0] * f[5], c[8] = f[0] * f[4] - f[1] * f[3];
-    return f[0] * c[0] + f[1] * c[1] + f[2] * c[2];
-}
-
 /* volume now over that at rest, - 1 */
 PAL_INLINE pal_wide mean_dilatation(pal_wide f[8][9])
 {
-    pal_wide sum = wide_of(-8), c[9];
-    for (int p = 0; p < 8; p++) sum += cofactors(f[p], c);
+    pal_wide sum = pal_wide_of(-8), c[9];
+    for (int p = 0; p < 8; p++) sum += pal_wide_cofactors(f[p], c);
     return 0.125 * sum;
 }
 
-enum { FORCE = 1, ENERGY = 2 };
-
 /* forces are added, the energy is returned */
-PAL_INLINE double all_blocks(const pal_elastic_hexes *cubes, pal_node_order *node_order, int what)
+PAL_INLINE double all_blocks(const pal_elastic_hexes *cubes, pal_node_order *node_order, pal_element_run what)
 {
     pal_wide sum = {0};
     for (int b = 0; b < cubes->n_block; b++) {
-        hex_view v;
-        hex_open(cubes, node_order, b, &v);
+        pal_block_view v;
+        pal_block_open(&cubes->simd_blocks, node_order, b, 8, &v);
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             pal_wide u[3][8], f[8][9], c[9], mu, k1, kappa, e = {0};
             load_neo(cubes, b, l, &mu, &k1, &kappa);
@@ -93,32 +82,30 @@ PAL_INLINE double all_blocks(const pal_elastic_hexes *cubes, pal_node_order *nod
             gauss_gradients(1 / (4 * cubes->edge_m), u, f);
             pal_wide mean = mean_dilatation(f), pressure = kappa * mean - mu - k1;
             for (int p = 0; p < 8; p++) {
-                pal_wide det = cofactors(f[p], c), j1 = det - 1, square = wide_of(-3), t = det * k1 + pressure;
-                for (int i = 0; i < 9 && (what & ENERGY); i++) square += f[p][i] * f[p][i];
-                if (what & ENERGY) e += 0.5 * mu * square - mu * j1 + 0.5 * k1 * j1 * j1;
-                for (int i = 0; i < 9 && (what & FORCE); i++) f[p][i] = mu * f[p][i] + t * c[i];
+                pal_wide det = pal_wide_cofactors(f[p], c), j1 = det - 1, square = pal_wide_of(-3),
+                         t = det * k1 + pressure;
+                for (int i = 0; i < 9 && (what & PAL_RUN_ENERGY); i++) square += f[p][i] * f[p][i];
+                if (what & PAL_RUN_ENERGY) e += 0.5 * mu * square - mu * j1 + 0.5 * k1 * j1 * j1;
+                for (int i = 0; i < 9 && (what & PAL_RUN_FORCE); i++) f[p][i] = mu * f[p][i] + t * c[i];
             }
             e = 0.125 * e + 0.5 * kappa * mean * mean;
-            if (what & ENERGY) sum += pal_wide_select(mu > 0, e, wide_of(0));
-            if (!(what & FORCE)) continue;
+            if (what & PAL_RUN_ENERGY) sum += pal_wide_select(mu > 0, e, pal_wide_of(0));
+            if (!(what & PAL_RUN_FORCE)) continue;
             gauss_sums(-0.5 * cubes->edge_m, f, u);
             hex_add(&v, l, u);
         }
-        if (what & FORCE) hex_close(cubes, node_order, b, &v);
+        if (what & PAL_RUN_FORCE) pal_block_close(&cubes->simd_blocks, node_order, b, 8, &v);
     }
     double all = 0;
     for (int l = 0; l < PAL_WIDE; l++) all += sum[l];
     return 16 * cubes->edge_m * cubes->edge_m * all;
 }
 
-void pal_hex_neo_force(pal_elastic_hexes *cubes, pal_node_order *node_order)
+double pal_hex_neo_run(pal_elastic_hexes *cubes, pal_node_order *node_order, pal_element_run what)
 {
-    all_blocks(cubes, node_order, FORCE);
-}
-
-double pal_hex_neo_energy(pal_elastic_hexes *cubes, pal_node_order *node_order, bool forces)
-{
-    return forces ? all_blocks(cubes, node_order, FORCE | ENERGY) : all_blocks(cubes, node_order, ENERGY);
+    return what == PAL_RUN_FORCE    ? all_blocks(cubes, node_order, PAL_RUN_FORCE)
+           : what == PAL_RUN_ENERGY ? all_blocks(cubes, node_order, PAL_RUN_ENERGY)
+                                    : all_blocks(cubes, node_order, PAL_RUN_BOTH);
 }
 
 /* place of (r, s), r >= s, in the packed K; unknown 7 axis + mode - 1 */
@@ -131,8 +118,8 @@ PAL_INLINE int packed(int r, int s)
  */
 PAL_INLINE void store_tangent(double *to, pal_wide h[45][8], pal_wide kappa, pal_wide mean[3][8])
 {
-    static const double power[5] = {0.125, 0.125 * 0.57735026918962576451, 0.125 / 3,
-                                    0.125 / 3 * 0.57735026918962576451, 0.125 / 9};
+    const double gauss = sqrt(1.0 / 3);
+    const double power[5] = {0.125, 0.125 * gauss, 0.125 / 3, 0.125 / 3 * gauss, 0.125 / 9};
     /* the axes of each mode */
     static const int size_of[8] = {0, 1, 1, 2, 1, 2, 2, 3};
     static const int axis_of[8][3] = {{0}, {0}, {1}, {0, 1}, {2}, {0, 2}, {1, 2}, {0, 1, 2}};
@@ -141,7 +128,7 @@ PAL_INLINE void store_tangent(double *to, pal_wide h[45][8], pal_wide kappa, pal
         const pal_wide own = kappa * mean[i][m];
         for (int s = 0; s <= r; s++) {
             const int k = s / 7, n = s % 7 + 1;
-            pal_wide sum = wide_of(0);
+            pal_wide sum = pal_wide_of(0);
             for (int a = 0; a < size_of[m]; a++)
                 for (int b = 0; b < size_of[n]; b++) {
                     const int j = axis_of[m][a], q = axis_of[n][b], x = 3 * i + j, y = 3 * k + q;
@@ -149,36 +136,6 @@ PAL_INLINE void store_tangent(double *to, pal_wide h[45][8], pal_wide kappa, pal
                 }
             pal_wide_store(to + packed(r, s) * PAL_LANES, power[size_of[m] + size_of[n] - 2] * sum + own * mean[k][n]);
         }
-    }
-}
-
-/* one Jacobi rotation of the symmetric a (xx yy zz yz xz xy) in the plane p, q; columns of v turn along */
-PAL_INLINE void jacobi_turn(pal_wide a[6], pal_wide v[9], int p, int q)
-{
-    const int o = 3 - p - q;
-    pal_wide *app = a + p, *aqq = a + q, *apq = a + 3 + o, *apo = a + 3 + q, *aqo = a + 3 + p;
-    pal_wide d = *aqq - *app, twice = 2 * *apq, sum = d * d + twice * twice;
-    pal_wide_mask turned = sum > 1e-280, down = d < 0;
-    pal_wide root = wide_root(sum) + pal_wide_select(down, -d, d);
-    pal_wide t = pal_wide_select(down, -twice, twice) / pal_wide_select(turned, root, wide_of(1));
-    pal_wide c = 1 / wide_root(1 + t * t), s = t * c;
-    *app -= t * *apq, *aqq += t * *apq, *apq = wide_of(0);
-    pal_wide x = *apo, y = *aqo;
-    *apo = c * x - s * y, *aqo = s * x + c * y;
-    for (int i = 0; i < 3; i++) {
-        pal_wide b = v[3 * i + p], e = v[3 * i + q];
-        v[3 * i + p] = c * b - s * e, v[3 * i + q] = s * b + c * e;
-    }
-}
-
-/* eigenvalues a[0..2] and eigenvectors, columns of v, of a symmetric matrix (xx yy zz yz xz xy) */
-PAL_INLINE void jacobi(pal_wide a[6], pal_wide v[9])
-{
-    for (int i = 0; i < 9; i++) v[i] = wide_of(i % 4 == 0);
-    for (int sweep = 0; sweep < 6; sweep++) {
-        pal_wide off = a[3] * a[3] + a[4] * a[4] + a[5] * a[5], on = a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
-        if (!wide_any(off > 1e-18 * on)) break;
-        jacobi_turn(a, v, 0, 1), jacobi_turn(a, v, 0, 2), jacobi_turn(a, v, 1, 2);
     }
 }
 
@@ -224,19 +181,19 @@ static void raise_stretches(pal_wide mu, pal_wide c, pal_wide k1, const pal_wide
     pal_wide min = 1e-13 * (a[0] + a[1] + a[2]), x = a[0] + min, y = a[1] + min, z = a[2] + min;
     pal_wide minor = x * y - a[5] * a[5];
     pal_wide det = z * minor - x * a[3] * a[3] - y * a[4] * a[4] + 2 * a[3] * a[4] * a[5];
-    if (!wide_any(~((minor > 0) & (det > 0)))) return;
-    jacobi(a, n);
+    if (!pal_wide_any(~((minor > 0) & (det > 0)))) return;
+    pal_wide_jacobi(a, n);
     for (int k = 0; k < 3; k++) {
-        if (!wide_any(a[k] < 0)) continue;
+        if (!pal_wide_any(a[k] < 0)) continue;
         for (int i = 0; i < 9; i++) {
-            e[i] = wide_of(0);
+            e[i] = pal_wide_of(0);
             for (int m = 0; m < 3; m++) e[i] += n[3 * m + k] * u[3 * (i / 3) + m] * v[3 * (i % 3) + m];
         }
-        add_mode(h, pal_wide_select(a[k] < 0, -a[k], wide_of(0)), e);
+        add_mode(h, pal_wide_select(a[k] < 0, -a[k], pal_wide_of(0)), e);
     }
 }
 
-/* the Hessian of one point, projected to positive semi-definite as pal_neo_modes_compute does it: F = R S, S = v
+/* the Hessian of one point, projected to positive semi-definite: F = R S, S = v
  * diag(s) v', u = R v; the eigenvalues are those of the stretches and mu + c s_k (twist), mu - c s_k (flip) of the
  * pairs. r: in, a rotation that makes R'F symmetric */
 PAL_INLINE void point_hessian(pal_wide mu, pal_wide c, pal_wide k1, const pal_wide f[9], const pal_wide g[9],
@@ -249,63 +206,56 @@ PAL_INLINE void point_hessian(pal_wide mu, pal_wide c, pal_wide k1, const pal_wi
         const int i = row_of[n], j = column_of[n];
         a[n] = r[i] * f[j] + r[3 + i] * f[3 + j] + r[6 + i] * f[6 + j];
     }
-    jacobi(a, v);
-    for (int i = 0; i < 9; i++) {
-        const int cubes = 3 * (i / 3), k = i % 3;
-        u[i] = r[cubes] * v[k] + r[cubes + 1] * v[3 + k] + r[cubes + 2] * v[6 + k];
-    }
+    pal_wide_jacobi(a, v);
+    pal_wide_mul(u, r, v);
     for (int k = 0; k < 3; k++) {
         const int i = (k + 1) % 3, j = (k + 2) % 3;
         pal_wide twist = mu + c * a[k], flip = mu - c * a[k];
         for (int sign = -1; sign <= 1; sign += 2) {
             pal_wide value = sign < 0 ? twist : flip;
-            if (!wide_any(value < 0)) continue;
+            if (!pal_wide_any(value < 0)) continue;
             for (int n = 0; n < 9; n++)
                 e[n] = u[n / 3 * 3 + i] * v[n % 3 * 3 + j] + sign * u[n / 3 * 3 + j] * v[n % 3 * 3 + i];
-            add_mode(h, pal_wide_select(value < 0, -0.5 * value, wide_of(0)), e);
+            add_mode(h, pal_wide_select(value < 0, -0.5 * value, pal_wide_of(0)), e);
         }
     }
     raise_stretches(mu, c, k1, a, u, v, h);
 }
 
-/* projected Hessians of all points into h [45][point], the mean's gradient into mean; returns how many rotations took
- * the slow way */
-static int all_hessians(const pal_elastic_hexes *cubes, int block, int l, const pal_wide q0[4], pal_wide f[8][9],
-                        pal_wide h[45][8], pal_wide mean[3][8])
+/* projected Hessians of all points into h [45][point], the mean's gradient into mean */
+static void all_hessians(const pal_elastic_hexes *cubes, int block, int l, const pal_wide q0[4], pal_wide f[8][9],
+                         pal_wide h[45][8], pal_wide mean[3][8])
 {
-    pal_wide mu, k1, kappa, g[8][9], q[4], r[9], one[45];
-    int n_slow = 0;
+    pal_wide mu, k1, kappa, g[8][9], q[4], r[9], m[9], one[45];
     load_neo(cubes, block, l, &mu, &k1, &kappa);
     pal_wide pressure = kappa * mean_dilatation(f) - mu - k1;
     for (int p = 0; p < 8; p++) {
-        pal_wide c = cofactors(f[p], g[p]) * k1 + pressure;
+        pal_wide c = pal_wide_cofactors(f[p], g[p]) * k1 + pressure;
         memcpy(q, q0, sizeof q);
-        n_slow += hex_turn(f[p], mu > 0, q, r);
+        pal_wide_polar(f[p], mu > 0, q, r, m);
         point_hessian(mu, c, k1, f[p], g[p], r, one);
         for (int i = 0; i < 45; i++) h[i][p] = one[i];
     }
     gauss_sums(0.125, g, mean);
-    return n_slow;
 }
 
 void pal_hex_neo_linearise(pal_elastic_hexes *cubes, pal_node_order *node_order)
 {
-    cubes->n_slow = 0;
     for (int b = 0; b < cubes->n_block && cubes->tangent; b++) {
-        hex_view v;
-        hex_open(cubes, node_order, b, &v);
+        pal_block_view v;
+        pal_block_open(&cubes->simd_blocks, node_order, b, 8, &v);
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             pal_wide u[3][8], f[8][9], r[9], q[4], mu, k1, kappa, h[45][8];
             hex_modes(&v, l, u);
-            cubes->n_slow += hex_turn_block(cubes, b, l, u, r);
-            for (int i = 0; i < 9; i++) pal_wide_store(cubes->turn + (9 * b + i) * PAL_LANES + l, r[i]);
-            for (int i = 0; i < 4; i++) q[i] = pal_wide_load(cubes->q + (4 * b + i) * PAL_LANES + l);
+            hex_turn_block(cubes, b, l, u, r);
+            pal_wide_store_n(cubes->turn + 9 * b * PAL_LANES + l, 9, r);
+            pal_wide_load_n(cubes->q + 4 * b * PAL_LANES + l, 4, q);
             gauss_gradients(1 / (4 * cubes->edge_m), u, f);
             load_neo(cubes, b, l, &mu, &k1, &kappa);
             /* lanes without an element may read anything */
             for (int i = 0; i < 72; i++)
-                f[i / 9][i % 9] = pal_wide_select(mu > 0, f[i / 9][i % 9], wide_of(i % 9 % 4 == 0));
-            cubes->n_slow += all_hessians(cubes, b, l, q, f, h, u);
+                f[i / 9][i % 9] = pal_wide_select(mu > 0, f[i / 9][i % 9], pal_wide_of(i % 9 % 4 == 0));
+            all_hessians(cubes, b, l, q, f, h, u);
             for (int i = 0; i < 45; i++) walsh(h[i]);
             store_tangent(cubes->tangent + 231 * PAL_LANES * b + l, h, kappa, u);
         }
@@ -315,8 +265,8 @@ void pal_hex_neo_linearise(pal_elastic_hexes *cubes, pal_node_order *node_order)
 void pal_hex_neo_multiply(const pal_elastic_hexes *cubes, pal_node_order *node_order, double k)
 {
     for (int b = 0; b < cubes->n_block && cubes->tangent; b++) {
-        hex_view v;
-        hex_open(cubes, node_order, b, &v);
+        pal_block_view v;
+        pal_block_open(&cubes->simd_blocks, node_order, b, 8, &v);
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             const double *a = cubes->tangent + 231 * PAL_LANES * b + l;
             pal_wide u[3][8], x[21], y[21];
@@ -334,7 +284,7 @@ void pal_hex_neo_multiply(const pal_elastic_hexes *cubes, pal_node_order *node_o
             for (int r = 0; r < 21; r++) u[r / 7][r % 7 + 1] = y[r];
             hex_add(&v, l, u);
         }
-        hex_close(cubes, node_order, b, &v);
+        pal_block_close(&cubes->simd_blocks, node_order, b, 8, &v);
     }
 }
 

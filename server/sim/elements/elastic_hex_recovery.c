@@ -4,13 +4,13 @@
 void pal_hex_recovery_reset(pal_elastic_hexes *cubes)
 {
     cubes->has_inversion = false;
-    cubes->n_whole = PAL_HEX_RETRY_UPDATES, cubes->needed = cubes->tried = PAL_HEX_LEAVE_LOW;
+    cubes->n_whole = PAL_RETRY_UPDATES, cubes->needed = cubes->tried = PAL_RECOVERED_LOW;
 }
 
 /* smallest and largest determinant of the three edges at a corner */
-PAL_INLINE void range_of_corners(const hex_view *v, int l, pal_wide *low, pal_wide *high)
+PAL_INLINE void range_of_corners(const pal_block_view *v, int l, pal_wide *low, pal_wide *high)
 {
-    pal_wide x[8][3], min = wide_of(INFINITY), max = wide_of(-INFINITY);
+    pal_wide x[8][3], min = pal_wide_of(INFINITY), max = pal_wide_of(-INFINITY);
     for (int c = 0; c < 8; c++)
         for (int d = 0; d < 3; d++) x[c][d] = pal_wide_load(v->x[c][d] + l);
     for (int c = 0; c < 8; c++) {
@@ -32,11 +32,11 @@ PAL_INLINE void range_of_corners(const hex_view *v, int l, pal_wide *low, pal_wi
 static void corner_range(const pal_elastic_hexes *cubes, const pal_body *body, double *low, double *high)
 {
     const double volume = cubes->edge_m * cubes->edge_m * cubes->edge_m;
-    pal_wide min = wide_of(INFINITY), max = wide_of(-INFINITY);
+    pal_wide min = pal_wide_of(INFINITY), max = pal_wide_of(-INFINITY);
     pal_node_order_load(body->node_order, body->d);
     for (int b = 0; b < cubes->n_block; b++) {
-        hex_view v;
-        hex_open(cubes, body->node_order, b, &v);
+        pal_block_view v;
+        pal_block_open(&cubes->simd_blocks, body->node_order, b, 8, &v);
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             pal_wide small, large;
             range_of_corners(&v, l, &small, &large);
@@ -63,16 +63,16 @@ bool pal_hex_recover(pal_elastic_hexes *cubes, const pal_body *body)
     corner_range(cubes, body, &low, &high);
     const bool before = cubes->has_inversion;
     if (before) {
-        cubes->has_inversion = low < cubes->needed || high > PAL_HEX_LEAVE_HIGH;
+        cubes->has_inversion = low < cubes->needed || high > PAL_RECOVERED_HIGH;
         if (!cubes->has_inversion) cubes->n_whole = 0, cubes->tried = low;
     } else {
-        cubes->has_inversion = low < PAL_HEX_INVERTED_LOW || high > PAL_HEX_INVERTED_HIGH;
-        if (cubes->n_whole < PAL_HEX_RETRY_UPDATES) cubes->n_whole++;
+        cubes->has_inversion = low < PAL_INVERTED_LOW || high > PAL_INVERTED_HIGH;
+        if (cubes->n_whole < PAL_RETRY_UPDATES) cubes->n_whole++;
     }
     if (cubes->has_inversion && !before) {
-        cubes->needed = cubes->n_whole < PAL_HEX_RETRY_UPDATES
-                            ? fmin(fmax(cubes->needed, cubes->tried) + PAL_HEX_RETRY_STEP, PAL_HEX_RETRY_MAX)
-                            : PAL_HEX_LEAVE_LOW;
+        cubes->needed = cubes->n_whole < PAL_RETRY_UPDATES
+                            ? fmin(fmax(cubes->needed, cubes->tried) + PAL_INVERTED_LOW, 1 - PAL_INVERTED_LOW)
+                            : PAL_RECOVERED_LOW;
         pal_elastic_tets_reset(cubes->split);
     }
     cubes->n_inversion += cubes->has_inversion;

@@ -1,6 +1,4 @@
-/* Elastic laws. The eigenvalues of d2W/dF2 follow Smith, de Goes, Kim 2018 (Stable neo-Hookean flesh simulation,
- * section 4.5) for a W of F:F and J: in the frame of F = U diag(s) V', d2J/dF2 couples the stretches by the third one
- * and each pair of shears by s_k, with eigenvalues -s_k (flip) and s_k (twist). */
+/* Elastic laws. */
 #include "server/sim/elements/elastic_law.h"
 
 #include "server/base/vec3.h"
@@ -11,15 +9,10 @@
 pal_err pal_elastic_law_read(pal_config_entry *item, pal_elastic_law *out, pal_diagnostic *diag)
 {
     static const char *const names[] = {"corotational", "linear", "neo_hookean"};
-    const char *text = names[0];
-    PAL_TRY(pal_entry_read_text(item, "law", &text, diag));
-    for (int i = 0; i < 3; i++)
-        if (!strcmp(text, names[i])) {
-            *out = (pal_elastic_law)i;
-            return PAL_ERR_OK;
-        }
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.law: \"%s\" is not corotational, linear or neo_hookean",
-                              item->path, text);
+    int law = PAL_LAW_COROTATIONAL;
+    PAL_TRY(pal_entry_read_choice(item, "law", names, 3, &law, diag));
+    *out = (pal_elastic_law)law;
+    return PAL_ERR_OK;
 }
 
 void pal_lame(double young_Pa, double poisson, double *mu_Pa, double *lambda_Pa)
@@ -40,35 +33,31 @@ void pal_linear_stress(double mu, double lambda, const double a[9], double p[9])
 {
     double pressure = lambda * (a[0] + a[4] + a[8]);
     double xy = mu * (a[1] + a[3]), xz = mu * (a[2] + a[6]), yz = mu * (a[5] + a[7]);
-    double xx = 2 * mu * a[0] + pressure, yy = 2 * mu * a[4] + pressure, zz_estimator = 2 * mu * a[8] + pressure;
-    p[0] = xx, p[4] = yy, p[8] = zz_estimator;
+    double sxx = 2 * mu * a[0] + pressure, syy = 2 * mu * a[4] + pressure, szz = 2 * mu * a[8] + pressure;
+    p[0] = sxx, p[4] = syy, p[8] = szz;
     p[1] = p[3] = xy, p[2] = p[6] = xz, p[5] = p[7] = yz;
 }
 
-/* r = a b, r = a' b, r = a b'; r apart from a and b */
-static void mul(double r[9], const double a[9], const double b[9])
+void pal_elastic_mul(double r[9], const double a[9], bool transposed, const double b[9])
 {
+    const int row = transposed ? 1 : 3, column = transposed ? 3 : 1;
     for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) r[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
+        for (int j = 0; j < 3; j++)
+            r[3 * i + j] = a[row * i] * b[j] + a[row * i + column] * b[3 + j] + a[row * i + 2 * column] * b[6 + j];
 }
-static void tmul(double r[9], const double a[9], const double b[9])
+
+void pal_elastic_mult(double r[9], const double a[9], const double b[9])
 {
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) r[3 * i + j] = a[i] * b[j] + a[3 + i] * b[3 + j] + a[6 + i] * b[6 + j];
-}
-static void mult(double r[9], const double a[9], const double b[9])
-{
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) r[3 * i + j] = pal_dot3(a + 3 * i, b + 3 * j);
+    for (int i = 0; i < 9; i++) r[i] = pal_dot3(a + 3 * (i / 3), b + 3 * (i % 3));
 }
 
 double pal_corotational_stress(double mu, double lambda, const double f[9], const double r[9], double p[9])
 {
     double e[9], sigma[9], sum = 0;
-    tmul(e, r, f);
+    pal_elastic_mul(e, r, true, f);
     for (int i = 0; i < 9; i += 4) e[i] -= 1;
     pal_linear_stress(mu, lambda, e, sigma);
-    mul(p, r, sigma);
+    pal_elastic_mul(p, r, false, sigma);
     for (int i = 0; i < 9; i++) sum += sigma[i] * e[i];
     return 0.5 * sum;
 }
@@ -114,78 +103,6 @@ void pal_neo_stress(double mu, double k1, double pressure, const double f[9], do
     pal_cofactor3(f, c);
     double j = f[0] * c[0] + f[1] * c[1] + f[2] * c[2], s = -mu + k1 * (j - 1) + pressure;
     for (int i = 0; i < 9; i++) p[i] = mu * f[i] + s * c[i];
-}
-
-void pal_neo_hessian(double mu, double k1, double pressure, const double f[9], double h[81])
-{
-    double c[9];
-    pal_cofactor3(f, c);
-    double j = f[0] * c[0] + f[1] * c[1] + f[2] * c[2], s = -mu + k1 * (j - 1) + pressure;
-    for (int a = 0; a < 9; a++)
-        for (int b = 0; b < 9; b++) h[9 * a + b] = mu * (a == b) + k1 * c[a] * c[b];
-    /* d2J / dF_ri dF_sj = e_rst e_ijk F_tk */
-    static const int perm[6][4] = {{0, 1, 2, 1},  {1, 2, 0, 1},  {2, 0, 1, 1},
-                                   {0, 2, 1, -1}, {2, 1, 0, -1}, {1, 0, 2, -1}};
-    for (int m = 0; m < 6; m++)
-        for (int n = 0; n < 6; n++)
-            h[9 * (3 * perm[m][0] + perm[n][0]) + 3 * perm[m][1] + perm[n][1]] +=
-                s * perm[m][3] * perm[n][3] * f[3 * perm[m][2] + perm[n][2]];
-}
-
-void pal_neo_modes_compute(double mu, double k1, double pressure, const double f[9], pal_neo_modes *out)
-{
-    double s[3];
-    pal_svd3(f, out->u, s, out->v);
-    double g[3] = {s[1] * s[2], s[2] * s[0], s[0] * s[1]}, j = s[0] * g[0];
-    double c = -mu + k1 * (j - 1) + pressure;
-    out->projected = false;
-    for (int k = 0; k < 3; k++) {
-        double twist = mu + c * s[k], flip = mu - c * s[k];
-        out->projected |= twist < 0 || flip < 0;
-        twist = fmax(twist, 0), flip = fmax(flip, 0);
-        out->same[k] = 0.5 * (flip + twist);
-        out->cross[k] = 0.5 * (flip - twist);
-    }
-    double a[9];
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++) a[3 * i + k] = k1 * g[i] * g[k] + (i == k ? mu : c * s[3 - i - k]);
-    double w[3], v[9], p[9];
-    pal_eigen3(a, w, v);
-    if (w[0] < 0) {
-        out->projected = true;
-        memset(p, 0, sizeof p);
-        for (int m = 0; m < 3; m++)
-            for (int i = 0; i < 9; i++) p[i] += fmax(w[m], 0) * v[3 * m + i / 3] * v[3 * m + i % 3];
-        memcpy(a, p, sizeof p);
-    }
-    double stretch[6] = {a[0], a[4], a[8], a[5], a[2], a[1]};
-    memcpy(out->stretch, stretch, sizeof stretch);
-}
-
-void pal_neo_modes_apply(const pal_neo_modes *m, const double df[9], double dp[9])
-{
-    double a[9], b[9];
-    const double *s = m->stretch, *e = m->same, *c = m->cross;
-    mul(a, df, m->v);
-    tmul(b, m->u, a);
-    a[0] = s[0] * b[0] + s[5] * b[4] + s[4] * b[8];
-    a[4] = s[5] * b[0] + s[1] * b[4] + s[3] * b[8];
-    a[8] = s[4] * b[0] + s[3] * b[4] + s[2] * b[8];
-    a[5] = e[0] * b[5] + c[0] * b[7], a[7] = e[0] * b[7] + c[0] * b[5];
-    a[2] = e[1] * b[2] + c[1] * b[6], a[6] = e[1] * b[6] + c[1] * b[2];
-    a[1] = e[2] * b[1] + c[2] * b[3], a[3] = e[2] * b[3] + c[2] * b[1];
-    mul(b, m->u, a);
-    mult(dp, b, m->v);
-}
-
-void pal_neo_modes_hessian(const pal_neo_modes *m, double h[81])
-{
-    for (int j = 0; j < 9; j++) {
-        double df[9] = {0}, dp[9];
-        df[j] = 1;
-        pal_neo_modes_apply(m, df, dp);
-        for (int i = 0; i < 9; i++) h[9 * i + j] = dp[i];
-    }
 }
 
 pal_err pal_elastic_regions_make(const pal_build *build, const int32_t *element, int n_element, int n_corner,

@@ -8,6 +8,7 @@
 #ifndef PAL_SIM_ELEMENTS_ELASTIC_LAW_H
 #define PAL_SIM_ELEMENTS_ELASTIC_LAW_H
 #include "server/sim/core/effect.h"
+#include "server/sim/elements/tuning.h"
 
 /* fields that elements measure */
 enum {
@@ -15,12 +16,17 @@ enum {
         1 << PAL_FIELD_VON_MISES_PA | 1 << PAL_FIELD_ENERGY_J_M3 | 1 << PAL_FIELD_STRAIN | 1 << PAL_FIELD_DISTORTION
 };
 
+/* what a pass over elements computes: forces are added, the energy is returned */
+typedef enum pal_element_run { PAL_RUN_FORCE = 1, PAL_RUN_ENERGY = 2, PAL_RUN_BOTH = 3 } pal_element_run;
 typedef enum pal_elastic_law { PAL_LAW_COROTATIONAL, PAL_LAW_LINEAR, PAL_LAW_NEO_HOOKEAN } pal_elastic_law;
 
 /* key "law": corotational (default), linear or neo_hookean; REFUSED names another. [load] */
 pal_err pal_elastic_law_read(pal_config_entry *item, pal_elastic_law *out, pal_diagnostic *diag);
 void pal_lame(double young_Pa, double poisson, double *mu_Pa, double *lambda_Pa);
 
+/* r = a b (transposed: a' b); r = a b'; r apart from a and b */
+void pal_elastic_mul(double r[9], const double a[9], bool transposed, const double b[9]);
+void pal_elastic_mult(double r[9], const double a[9], const double b[9]);
 /* dJ/dF: det F F^-T, for singular F too */
 void pal_cofactor3(const double f[9], double c[9]);
 /* p = mu (A + A') + lambda tr A I with A = a; stress of a displacement gradient, small strain */
@@ -35,22 +41,6 @@ double pal_von_mises(const double stress[9]);
 
 double pal_neo_energy(double mu, double k1, const double f[9]); /* J/m^3 */
 void pal_neo_stress(double mu, double k1, double pressure, const double f[9], double p[9]);
-/* d2W/dF2 as it is, which may be indefinite */
-void pal_neo_hessian(double mu, double k1, double pressure, const double f[9], double h[81]);
-
-/* The same projected to positive semi-definite in closed form: F = u diag(s) v'; in the frame of u and v the Hessian
- * is a 3x3 matrix on the diagonal (stretches) and a 2x2 on each pair (twist and flip), whose eigenvalues are raised to
- * 0 at least. */
-typedef struct pal_neo_modes {
-    double u[9], v[9]; /* rotations                                                  */
-    double stretch[6]; /* xx yy zz yz zx xy, projected                               */
-    double same[3];    /* pair (i, j) without k: dP_ij = same[k] dF_ij + cross[k] dF_ji */
-    double cross[3];
-    bool projected; /* an eigenvalue was negative                                 */
-} pal_neo_modes;
-void pal_neo_modes_compute(double mu, double k1, double pressure, const double f[9], pal_neo_modes *out);
-void pal_neo_modes_apply(const pal_neo_modes *m, const double df[9], double dp[9]);
-void pal_neo_modes_hessian(const pal_neo_modes *m, double h[81]);
 
 /* E and nu of each element that a region gives (NaN: the body's), which a live edit of the body's material keeps */
 typedef struct pal_elastic_regions {

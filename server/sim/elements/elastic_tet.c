@@ -8,14 +8,6 @@
 
 #include <string.h>
 
-static const double min_volume_h3 = 1e-6;
-
-static double *lane_at(double *array, int width, int place, int k)
-{
-    return &array[(size_t)(place / PAL_LANES) * (size_t)width * PAL_LANES + (size_t)k * PAL_LANES +
-                  (size_t)(place % PAL_LANES)];
-}
-
 static int entries(int n_corner)
 {
     return n_corner * (n_corner + 1) / 2;
@@ -62,7 +54,7 @@ static pal_err make_lanes(pal_elastic_tets *t, pal_build *build)
     return PAL_ERR_OK;
 }
 
-/* inverse of the edges at rest, and volume; 0 for a degenerate element */
+/* inverse of the edges at rest, and volume; 0 for an element of less than 1e-6 h^3 */
 static void take_rest(pal_elastic_tets *t, double edge_m)
 {
     for (int e = 0; e < t->options.n_tet; e++) {
@@ -71,9 +63,9 @@ static void take_rest(pal_elastic_tets *t, double edge_m)
         for (int c = 0; c < 3; c++) pal_sub3(a[c], t->x_rest + 3 * node[c + 1], t->x_rest + 3 * node[0]);
         for (int c = 0; c < 3; c++) pal_cross3(inverse[c], a[(c + 1) % 3], a[(c + 2) % 3]);
         double det = pal_dot3(a[0], inverse[0]);
-        if (!(fabs(det) > 6 * min_volume_h3 * edge_m * edge_m * edge_m)) continue;
-        for (int i = 0; i < 9; i++) *lane_at(t->inverse, 9, t->place[e], i) = inverse[i / 3][i % 3] / det;
-        *lane_at(t->volume_m3, 1, t->place[e], 0) = fabs(det) / 6 * (t->options.fill ? (double)t->options.fill[e] : 1);
+        if (!(fabs(det) > 6e-6 * edge_m * edge_m * edge_m)) continue;
+        for (int i = 0; i < 9; i++) *pal_lane(t->inverse, 9, t->place[e], i) = inverse[i / 3][i % 3] / det;
+        *pal_lane(t->volume_m3, 1, t->place[e], 0) = fabs(det) / 6 * (t->options.fill ? (double)t->options.fill[e] : 1);
     }
 }
 
@@ -113,37 +105,38 @@ void pal_elastic_tets_reset(pal_elastic_tets *t)
     memset(t->turn, 0, 4 * sizeof(double) * PAL_LANES * (size_t)t->n_block);
     for (int b = 0; b < t->n_block; b++)
         for (int l = 0; l < PAL_LANES; l++) t->turn[(size_t)b * 4 * PAL_LANES + (size_t)l] = 1;
-    t->n_inverted = t->n_slow = t->n_still = 0;
+    t->n_inverted = t->n_still = 0;
     t->single_rotation = false;
 }
 
-/* gradients of the shape functions, dN_a/dX, turned by r (NULL: as at rest) */
-static void gradients(const pal_elastic_tets *t, int e, int point, const double *r, double g[][3])
+/* dN_a/dl at a Gauss point times m: gradients by X for m = dl/dX */
+static void gradients_by(const pal_elastic_tets *t, int point, const double m[9], double g[][3])
 {
-    double inverse[9], turned[9];
-    for (int i = 0; i < 9; i++) inverse[i] = *lane_at(t->inverse, 9, t->place[e], i);
-    for (int c = 0; c < 3; c++)
-        if (r)
-            pal_mul33(turned + 3 * c, r, inverse + 3 * c);
-        else
-            pal_copy3(turned + 3 * c, inverse + 3 * c);
     for (int a = 0; a < t->options.n_corner; a++)
-        for (int m = 0; m < 3; m++) {
-            g[a][m] = 0;
-            for (int c = 0; c < 3; c++) g[a][m] += t->shape[point][a][c] * turned[3 * c + m];
+        for (int i = 0; i < 3; i++) {
+            g[a][i] = 0;
+            for (int c = 0; c < 3; c++) g[a][i] += t->shape[point][a][c] * m[3 * c + i];
         }
+}
+
+static void gradients(const pal_elastic_tets *t, int e, int point, double g[][3])
+{
+    double inverse[9];
+    for (int i = 0; i < 9; i++) inverse[i] = *pal_lane(t->inverse, 9, t->place[e], i);
+    gradients_by(t, point, inverse, g);
 }
 
 /* |K_ab| <= mu (|g_a.g_b| + |g_a||g_b|) + lambda |g_a||g_b|, whatever the rotation */
 static void bound_at_rest(pal_elastic_tets *t, int e, double *bound)
 {
     int n = t->options.n_corner;
-    double mu = *lane_at(t->stiff, 2, t->place[e], 0) / t->n_point,
-           lambda = *lane_at(t->stiff, 2, t->place[e], 1) / t->n_point;
+    double mu, lambda;
+    pal_tet_stiffness(t, e, &mu, &lambda);
+    mu /= t->n_point, lambda /= t->n_point;
     const int32_t *node = t->corner + (size_t)n * (size_t)e;
     for (int p = 0; p < t->n_point; p++) {
         double g[PAL_TET10_CORNERS][3];
-        gradients(t, e, p, NULL, g);
+        gradients(t, e, p, g);
         for (int a = 0; a < n; a++)
             for (int b = 0; b < n; b++) {
                 double both = pal_norm3(g[a]) * pal_norm3(g[b]);
@@ -157,11 +150,11 @@ void pal_elastic_tets_material(pal_elastic_tets *t, const pal_material *material
     const double nu = t->options.max_poisson;
     memset(t->bound, 0, sizeof(double) * (size_t)t->n_node);
     for (int e = 0; e < t->options.n_tet; e++) {
-        double mu, lambda, volume = *lane_at(t->volume_m3, 1, t->place[e], 0);
+        double mu, lambda, volume = *pal_lane(t->volume_m3, 1, t->place[e], 0);
         pal_elastic_regions_lame(&t->parts, material, e, &mu, &lambda);
         if (nu > 0) lambda = fmin(lambda, 2 * mu * nu / (1 - 2 * nu));
-        *lane_at(t->stiff, 2, t->place[e], 0) = volume * mu;
-        *lane_at(t->stiff, 2, t->place[e], 1) = volume * lambda;
+        *pal_lane(t->stiff, 2, t->place[e], 0) = volume * mu;
+        *pal_lane(t->stiff, 2, t->place[e], 1) = volume * lambda;
         bound_at_rest(t, e, t->bound);
     }
 }
@@ -170,12 +163,13 @@ void pal_elastic_tets_material(pal_elastic_tets *t, const pal_material *material
 static void bound_neo(const pal_elastic_tets *t, int e, const double *d, double *bound)
 {
     int n = t->options.n_corner;
-    double mu = *lane_at(t->stiff, 2, t->place[e], 0) / t->n_point,
-           k1 = mu + *lane_at(t->stiff, 2, t->place[e], 1) / t->n_point;
+    double mu, lambda;
+    pal_tet_stiffness(t, e, &mu, &lambda);
+    const double k1 = (mu /= t->n_point) + lambda / t->n_point;
     const int32_t *node = t->corner + (size_t)n * (size_t)e;
     for (int p = 0; p < t->n_point; p++) {
         double g[PAL_TET10_CORNERS][3], cg[PAL_TET10_CORNERS][3], f[9], c[9];
-        gradients(t, e, p, NULL, g);
+        gradients(t, e, p, g);
         pal_elastic_tets_gradient(t, e, p, d, f);
         pal_cofactor3(f, c);
         double s = fabs(-mu + k1 * (pal_det3(f) - 1));
@@ -220,17 +214,13 @@ static void assemble_gradients(const pal_elastic_tets *t, int e, double k, pal_b
     int n = t->options.n_corner;
     const int32_t *entry = t->entry + (size_t)entries(n) * (size_t)e;
     double r[9], g[4][PAL_TET10_CORNERS][3];
-    double mu = k * *lane_at(t->stiff, 2, t->place[e], 0) / t->n_point,
-           lambda = k * *lane_at(t->stiff, 2, t->place[e], 1) / t->n_point;
+    double mu, lambda;
+    pal_tet_stiffness(t, e, &mu, &lambda);
+    mu = k * mu / t->n_point, lambda = k * lambda / t->n_point;
     const int32_t *node = t->corner + (size_t)n * (size_t)e;
     /* tangent holds D R' */
-    for (int c = 0; c < 9; c++) r[c] = *lane_at(t->tangent, 9, t->place[e], c);
-    for (int p = 0; p < t->n_point; p++)
-        for (int a = 0; a < n; a++)
-            for (int m = 0; m < 3; m++) {
-                g[p][a][m] = 0;
-                for (int c = 0; c < 3; c++) g[p][a][m] += t->shape[p][a][c] * r[3 * c + m];
-            }
+    for (int c = 0; c < 9; c++) r[c] = *pal_lane(t->tangent, 9, t->place[e], c);
+    for (int p = 0; p < t->n_point; p++) gradients_by(t, p, r, g[p]);
     for (int a = 0; a < n; a++)
         for (int b = 0; b <= a; b++) {
             int row = node[a] > node[b] ? a : b, column = a + b - row;
@@ -269,19 +259,17 @@ static void assemble_modes(const pal_elastic_tets *t, int e, double k, pal_block
     const int32_t *node = t->corner + (size_t)n * (size_t)e;
     for (int p = 0; p < t->n_point; p++) {
         double m[PAL_TET_MODES], g[PAL_TET10_CORNERS][3];
-        const double *u = m, *dv = m + 9;
+        const double *u = m;
         const int32_t *entry = t->entry + (size_t)entries(n) * (size_t)e;
-        for (int i = 0; i < PAL_TET_MODES; i++) m[i] = *lane_at(t->tangent, width, t->place[e], PAL_TET_MODES * p + i);
-        for (int a = 0; a < n; a++)
-            for (int i = 0; i < 3; i++)
-                g[a][i] = t->shape[p][a][0] * dv[i] + t->shape[p][a][1] * dv[3 + i] + t->shape[p][a][2] * dv[6 + i];
+        for (int i = 0; i < PAL_TET_MODES; i++) m[i] = *pal_lane(t->tangent, width, t->place[e], PAL_TET_MODES * p + i);
+        gradients_by(t, p, m + 9, g);
         for (int a = 0; a < n; a++)
             for (int b = 0; b <= a; b++) {
                 int row = node[a] > node[b] ? a : b, column = a + b - row;
                 double *at = to->value + 9 * (size_t)*entry++, block[9], half[9];
                 modes_block(m + 18, m + 24, m + 27, g[row], g[column], block);
                 /* u block u' */
-                for (int i = 0; i < 9; i++) half[i] = pal_dot3(block + 3 * (i / 3), u + 3 * (i % 3));
+                pal_elastic_mult(half, block, u);
                 for (int i = 0; i < 3; i++)
                     for (int j = 0; j < 3; j++)
                         at[3 * i + j] +=
@@ -295,7 +283,7 @@ void pal_elastic_tets_assemble(pal_elastic_tets *t, double k, pal_block_matrix *
     if (t->entry_row != to->row || t->entry_of != to) find_entries(t, to);
     if (t->single_rotation) k *= t->soft;
     for (int e = 0; e < t->options.n_tet; e++) {
-        if (*lane_at(t->volume_m3, 1, t->place[e], 0) <= 0) continue;
+        if (*pal_lane(t->volume_m3, 1, t->place[e], 0) <= 0) continue;
         if (t->options.law == PAL_LAW_NEO_HOOKEAN)
             assemble_modes(t, e, k, to);
         else
@@ -306,7 +294,7 @@ void pal_elastic_tets_assemble(pal_elastic_tets *t, double k, pal_block_matrix *
 void pal_elastic_tets_rotate(const pal_elastic_tets *t, double *turn)
 {
     for (int e = 0; e < t->options.n_tet; e++) {
-        double r[9], weight = *lane_at(t->stiff, 2, t->place[e], 0);
+        double r[9], weight = *pal_lane(t->stiff, 2, t->place[e], 0);
         pal_elastic_tets_rotation(t, e, r);
         const int32_t *node = t->corner + (size_t)t->options.n_corner * (size_t)e;
         for (int c = 0; c < t->options.n_corner; c++)
@@ -318,8 +306,10 @@ void pal_elastic_tets_rotate(const pal_elastic_tets *t, double *turn)
  * von Mises as that in the element's; energy density; strain and distortion. At one Gauss point */
 static double field_at(const pal_elastic_tets *t, int e, int point, const double *d, pal_field field)
 {
-    double volume = *lane_at(t->volume_m3, 1, t->place[e], 0);
-    double mu = *lane_at(t->stiff, 2, t->place[e], 0) / volume, lambda = *lane_at(t->stiff, 2, t->place[e], 1) / volume;
+    double volume = *pal_lane(t->volume_m3, 1, t->place[e], 0);
+    double mu, lambda;
+    pal_tet_stiffness(t, e, &mu, &lambda);
+    mu /= volume, lambda /= volume;
     double f[9], r[9], p[9], s[9];
     pal_elastic_tets_gradient(t, e, point, d, f);
     if (field == PAL_FIELD_STRAIN) return pal_largest_strain(f);
@@ -327,15 +317,13 @@ static double field_at(const pal_elastic_tets *t, int e, int point, const double
     if (t->options.law == PAL_LAW_NEO_HOOKEAN) {
         if (field == PAL_FIELD_ENERGY_J_M3) return pal_neo_energy(mu, mu + lambda, f);
         pal_neo_stress(mu, mu + lambda, 0, f, p);
-        for (int i = 0; i < 3; i++)
-            for (int j = 0; j < 3; j++) s[3 * i + j] = pal_dot3(p + 3 * i, f + 3 * j);
+        pal_elastic_mult(s, p, f);
         return pal_von_mises(s) / fmax(fabs(pal_det3(f)), 1e-6);
     }
     pal_elastic_tets_rotation(t, e, r);
     double energy = pal_corotational_stress(mu, lambda, f, r, p);
     if (field == PAL_FIELD_ENERGY_J_M3) return energy;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) s[3 * i + j] = pal_dot3(p + 3 * i, r + 3 * j);
+    pal_elastic_mult(s, p, r);
     return pal_von_mises(s);
 }
 
@@ -344,7 +332,7 @@ void pal_elastic_tets_measure(pal_elastic_tets *t, const double *d, pal_field fi
     if (!(PAL_ELASTIC_FIELDS >> field & 1)) return;
     int n = t->options.n_corner;
     for (int e = 0; e < t->options.n_tet; e++) {
-        double share = *lane_at(t->volume_m3, 1, t->place[e], 0) / n, value = 0;
+        double share = *pal_lane(t->volume_m3, 1, t->place[e], 0) / n, value = 0;
         if (share <= 0) continue;
         for (int p = 0; p < t->n_point; p++) value += field_at(t, e, p, d, field) / t->n_point;
         const int32_t *node = t->corner + (size_t)n * (size_t)e;
@@ -362,14 +350,14 @@ void pal_elastic_tets_stress(pal_elastic_tets *t, const double *d, pal_stress_ta
     double shape[4][10];
     for (int p = 0; p < t->n_point && n == 10; p++) pal_tet10_shape(pal_tet_gauss[p], shape[p], NULL);
     for (int e = 0; e < t->options.n_tet; e++) {
-        double volume = *lane_at(t->volume_m3, 1, t->place[e], 0), f[9], r[9], p[9];
+        double volume = *pal_lane(t->volume_m3, 1, t->place[e], 0), f[9], r[9], p[9];
         if (volume <= 0) continue;
         pal_stress_point to = {.element = e,
                                .n_corner = n,
                                .node = t->corner + (size_t)n * (size_t)e,
                                .volume_m3 = volume / t->n_point,
-                               .mu_Pa = *lane_at(t->stiff, 2, t->place[e], 0) / volume,
-                               .lambda_Pa = *lane_at(t->stiff, 2, t->place[e], 1) / volume};
+                               .mu_Pa = *pal_lane(t->stiff, 2, t->place[e], 0) / volume,
+                               .lambda_Pa = *pal_lane(t->stiff, 2, t->place[e], 1) / volume};
         bool neo = t->options.law == PAL_LAW_NEO_HOOKEAN;
         pal_elastic_tets_rotation(t, e, r);
         for (int k = 0; k < t->n_point; k++) {
@@ -378,7 +366,7 @@ void pal_elastic_tets_stress(pal_elastic_tets *t, const double *d, pal_stress_ta
                 pal_neo_stress(to.mu_Pa, to.mu_Pa + to.lambda_Pa, 0, f, p);
             else
                 pal_corotational_stress(to.mu_Pa, to.lambda_Pa, f, r, p);
-            for (int i = 0; i < 9; i++) to.stress[i] = pal_dot3(p + 3 * (i / 3), (neo ? f : r) + 3 * (i % 3));
+            pal_elastic_mult(to.stress, p, neo ? f : r);
             to.shape = n == 10 ? shape[k] : centre;
             take(user, &to);
         }

@@ -11,13 +11,12 @@
  * where there are none. While an element is inverted, small forces on all nodes balance the net torque of the averaged
  * rotations, so that a free body does not turn itself.
  *
- * Single rotation (corotational, elastic_tet_single_rotation.c): with one rotation per element a body has states of
- * balance that are not its shape at rest, where a fold would stay for good. A body that pal_elastic_tets_check_rest
- * finds there takes one rotation for all elements, that of the supports (of all nodes without supports): the energy is
- * then quadratic with no other minimum than the shape at rest. Moduli are lowered so that the energy does not jump.
+ * Single rotation (corotational, elastic_tet_single_rotation.c): a body that pal_elastic_tets_check_rest finds in a
+ * fold takes one rotation for all elements, that of the supports (of all nodes without supports): the energy is then
+ * quadratic with no other minimum than the shape at rest. Moduli are lowered so that the energy does not jump.
  *
- * An element with less than 1e-6 h^3 of volume at rest is left out. Memory: the world's arena. Thread: [load] to make,
- * then [sim]. */
+ * An element with less than 1e-6 h^3 of volume at rest is left out. Memory: the component's arena. Thread: [load] to
+ * make, then [sim]. */
 #ifndef PAL_SIM_ELEMENTS_ELASTIC_TET_H
 #define PAL_SIM_ELEMENTS_ELASTIC_TET_H
 #include "server/sim/elements/elastic_law.h"
@@ -33,7 +32,7 @@ typedef struct pal_elastic_tets_options {
 } pal_elastic_tets_options;
 
 /* PAL_TET_CENTRE: index of the centre among the Gauss points. PAL_TET_MODES: numbers of a neo-Hookean tangent at a
- * Gauss point: u 9, D v 9, stretch 6, same 3, cross 3 (pal_neo_modes) */
+ * Gauss point: u 9, D v 9, stretch 6, same 3, cross 3 (elastic_tet_modes.c) */
 enum { PAL_TET_CENTRE = 4, PAL_TET_MODES = 30 };
 
 typedef struct pal_elastic_tets {
@@ -70,16 +69,26 @@ typedef struct pal_elastic_tets {
     int n_single_rotation; /* times with a single rotation since the body was last free of inversion for long */
     int n_whole;           /* updates without inversion                                                  */
     int n_inverted;
-    int n_slow; /* rotations of the last force or linearise that needed pal_polar_rotation */
 } pal_elastic_tets;
+
+/* number k of `width` of the element in lane `place` */
+static inline double *pal_lane(double *array, int width, int place, int k)
+{
+    return &array[((size_t)(place / PAL_LANES) * (size_t)width + (size_t)k) * PAL_LANES + (size_t)(place % PAL_LANES)];
+}
+/* mu and lambda of an element, times its volume at rest */
+static inline void pal_tet_stiffness(const pal_elastic_tets *t, int e, double *mu, double *lambda)
+{
+    *mu = *pal_lane(t->stiff, 2, t->place[e], 0), *lambda = *pal_lane(t->stiff, 2, t->place[e], 1);
+}
 
 /* At rest. With 4 corners it uses body->node_order, which is made when NULL; regions and material from build->def */
 pal_err pal_elastic_tets_make(const pal_elastic_tets_options *options, pal_build *build, pal_elastic_tets *out);
 void pal_elastic_tets_material(pal_elastic_tets *t, const pal_material *material);
 void pal_elastic_tets_reset(pal_elastic_tets *t); /* rotations become the identity */
 /* Before a linearise of a body under an implicit solver. Gives all elements a single rotation when the body is
- * inverted, has not moved for long and nothing loads it; true: from now on. A body that is inverted again soon after
- * two such times rests so under its loads and is left alone */
+ * inverted, has not moved by 0.001 S in 64 calls and bears no load above a hundredth of load_cap_N; true: from now on.
+ * A body that is inverted again soon after two such times rests so under its loads and is left alone */
 bool pal_elastic_tets_check_rest(pal_elastic_tets *t, const pal_body *body, bool has_inversion);
 /* f += forces at positions d, both [n_node][3]; updates the rotations */
 void pal_elastic_tets_force(pal_elastic_tets *t, const double *d, double *f);
@@ -96,9 +105,8 @@ void pal_elastic_tets_rotate(const pal_elastic_tets *t, double *turn);
 /* one element: its rotation; F at d at Gauss point `point` or PAL_TET_CENTRE */
 void pal_elastic_tets_rotation(const pal_elastic_tets *t, int e, double r[9]);
 void pal_elastic_tets_gradient(const pal_elastic_tets *t, int e, int point, const double *d, double f[9]);
-/* effect.h measure: von Mises of the Cauchy stress (corotational, linear: of the rotated small-strain stress), energy
+/* effect.h measure, stress; von Mises of the Cauchy stress (corotational, linear: of the rotated small-strain stress)
  */
 void pal_elastic_tets_measure(pal_elastic_tets *t, const double *d, pal_field field, double *sum, double *volume_m3);
-/* effect.h stress */
 void pal_elastic_tets_stress(pal_elastic_tets *t, const double *d, pal_stress_take *take, void *user);
 #endif

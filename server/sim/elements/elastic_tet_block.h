@@ -8,49 +8,13 @@
 
 #include <string.h>
 
-enum { PAL_TET_ROTATION_STEPS = 8 }; /* Newton steps for a rotation before pal_polar_rotation */
-
-/* 8 elements: pointers to the coordinates of their corners and to their forces */
-typedef struct pal_tet_block {
-    const double *x[PAL_TET10_CORNERS][3];
-    double *f[PAL_TET10_CORNERS][3];
-    double x_loose[PAL_TET10_CORNERS][3][PAL_LANES], f_loose[PAL_TET10_CORNERS][3][PAL_LANES];
-} pal_tet_block;
-
-/* tet4: from slots, strips in place, loose blocks gathered */
-PAL_INLINE void pal_tet_load_block(const pal_elastic_tets *t, int b, pal_tet_block *to)
+/* tet4: from slots; tet10: from nodes x [n_node][3], where lanes without an element repeat the first one's nodes */
+PAL_INLINE void pal_tet_open(const pal_elastic_tets *t, int n_corner, int b, const double *x, pal_block_view *to)
 {
-    const pal_node_order *s = t->node_order;
-    bool strip = b < t->simd_blocks.n_strip;
-    const int32_t *node = t->simd_blocks.node + (size_t)(b - t->simd_blocks.n_strip) * 4 * PAL_LANES;
-    for (int c = 0; c < 4; c++)
-        for (int d = 0; d < 3; d++) {
-            const double *x = s->x + (size_t)d * (size_t)s->n_slot;
-            if (strip) {
-                to->x[c][d] = x + t->simd_blocks.base[4 * b + c];
-                to->f[c][d] = s->f + (size_t)d * (size_t)s->n_slot + t->simd_blocks.base[4 * b + c];
-                continue;
-            }
-            for (int l = 0; l < PAL_LANES; l++) to->x_loose[c][d][l] = x[node[c * PAL_LANES + l]];
-            memset(to->f_loose[c][d], 0, sizeof to->f_loose[c][d]);
-            to->x[c][d] = to->x_loose[c][d];
-            to->f[c][d] = to->f_loose[c][d];
-        }
-}
-PAL_INLINE void pal_tet_store_block(const pal_elastic_tets *t, int b, const pal_tet_block *from)
-{
-    if (b < t->simd_blocks.n_strip) return;
-    const int32_t *node = t->simd_blocks.node + (size_t)(b - t->simd_blocks.n_strip) * 4 * PAL_LANES;
-    for (int c = 0; c < 4; c++)
-        for (int l = 0; l < PAL_LANES; l++)
-            for (int d = 0; d < 3; d++)
-                t->node_order->f[(size_t)d * (size_t)t->node_order->n_slot + (size_t)node[c * PAL_LANES + l]] +=
-                    from->f_loose[c][d][l];
-}
-
-/* tet10: from nodes [n_node][3]; lanes without an element repeat the first one's nodes */
-PAL_INLINE void pal_tet10_load_block(const pal_elastic_tets *t, int b, const double *x, pal_tet_block *to)
-{
+    if (n_corner == 4) {
+        pal_block_open(&t->simd_blocks, t->node_order, b, 4, to);
+        return;
+    }
     for (int l = 0; l < PAL_LANES; l++) {
         int e = t->owner[PAL_LANES * b + l];
         const int32_t *node = t->corner + (size_t)PAL_TET10_CORNERS * (size_t)(e < 0 ? PAL_LANES * b : e);
@@ -61,19 +25,19 @@ PAL_INLINE void pal_tet10_load_block(const pal_elastic_tets *t, int b, const dou
     for (int c = 0; c < PAL_TET10_CORNERS; c++)
         for (int d = 0; d < 3; d++) to->x[c][d] = to->x_loose[c][d], to->f[c][d] = to->f_loose[c][d];
 }
-PAL_INLINE void pal_tet10_store_block(const pal_elastic_tets *t, int b, const pal_tet_block *from, double *f)
+PAL_INLINE void pal_tet_close(const pal_elastic_tets *t, int n_corner, int b, const pal_block_view *from, double *f)
 {
-    for (int l = 0; l < PAL_LANES; l++) {
+    if (n_corner == 4) pal_block_close(&t->simd_blocks, t->node_order, b, 4, from);
+    for (int l = 0; l < PAL_LANES && n_corner != 4; l++) {
         int e = t->owner[PAL_LANES * b + l];
-        if (e < 0) continue;
         const int32_t *node = t->corner + (size_t)PAL_TET10_CORNERS * (size_t)e;
-        for (int c = 0; c < PAL_TET10_CORNERS; c++)
+        for (int c = 0; c < PAL_TET10_CORNERS && e >= 0; c++)
             for (int d = 0; d < 3; d++) f[3 * node[c] + d] += from->f_loose[c][d][l];
     }
 }
 
 /* h = sum of x_a (dN_a/dl)' at a point */
-PAL_INLINE void pal_tet_local_gradient(const pal_elastic_tets *t, int n_corner, int point, const pal_tet_block *at,
+PAL_INLINE void pal_tet_local_gradient(const pal_elastic_tets *t, int n_corner, int point, const pal_block_view *at,
                                        int lane, pal_wide h[9])
 {
     for (int d = 0; d < 3; d++) {
@@ -92,7 +56,7 @@ PAL_INLINE void pal_tet_local_gradient(const pal_elastic_tets *t, int n_corner, 
 }
 
 /* force of -s, s = stress times volume times dl/dX [3][3], on the corners */
-PAL_INLINE void pal_tet_add_force(const pal_elastic_tets *t, int n_corner, int point, pal_tet_block *at, int lane,
+PAL_INLINE void pal_tet_add_force(const pal_elastic_tets *t, int n_corner, int point, pal_block_view *at, int lane,
                                   const pal_wide s[9])
 {
     for (int d = 0; d < 3; d++) {
@@ -108,21 +72,13 @@ PAL_INLINE void pal_tet_add_force(const pal_elastic_tets *t, int n_corner, int p
     }
 }
 
-PAL_INLINE void pal_tet_load9(const double *at, int n, pal_wide *r)
+/* constants of half a block: dl/dX, mu and lambda at a Gauss point */
+PAL_INLINE void pal_tet_constants(const pal_elastic_tets *t, int b, int lane, double share, pal_wide inverse[9],
+                                  pal_wide stiff[2])
 {
-    for (int i = 0; i < n; i++) r[i] = pal_wide_load(at + (size_t)i * PAL_LANES);
-}
-
-/* number k of `width` of the element at `place` */
-static inline double pal_lane_get(const double *array, int width, int place, int k)
-{
-    return array[(size_t)(place / PAL_LANES) * (size_t)width * PAL_LANES + (size_t)k * PAL_LANES +
-                 (size_t)(place % PAL_LANES)];
-}
-static inline void pal_lane_set(double *array, int width, int place, int k, double value)
-{
-    array[(size_t)(place / PAL_LANES) * (size_t)width * PAL_LANES + (size_t)k * PAL_LANES +
-          (size_t)(place % PAL_LANES)] = value;
+    pal_wide_load_n(t->inverse + (size_t)b * 9 * PAL_LANES + lane, 9, inverse);
+    pal_wide_load_n(t->stiff + (size_t)b * 2 * PAL_LANES + lane, 2, stiff);
+    stiff[0] *= share, stiff[1] *= share;
 }
 
 /* neo_hookean: the tangent at d. [sim] */

@@ -1,24 +1,18 @@
 /* Static compliance. */
 #include "server/sim/implicit/compliance.h"
 
+#include "server/sim/implicit/tuning.h"
+
 #include <math.h>
 #include <string.h>
 
-/* residual over the force at which the answer is good enough, and the most iterations for it in one call */
-static const double enough = 1e-2;
+/* of one call; the next ones continue from its result */
 enum { MAX_ITERATIONS = 3 };
-/* an earlier answer serves as first guess when its force points the same way */
-static const double alike = 0.5;
-
-static size_t bytes3(const pal_body *body)
-{
-    return 3 * sizeof(double) * (size_t)body->n_dof;
-}
 
 static void multiply(void *user, const double *p, double *out)
 {
-    pal_compliance_solver *answer = user;
-    pal_system_true_stiffness(answer->system, answer->x, answer->low, p, out);
+    pal_compliance_solver *solver = user;
+    pal_system_true_stiffness(solver->system, solver->x, solver->low, p, out);
 }
 
 static void precondition(void *user, const double *r, double *z)
@@ -27,15 +21,15 @@ static void precondition(void *user, const double *r, double *z)
 }
 
 /* the earlier answer to the force most like r; the one unused for longest when none is; *share: how much of it fits */
-static pal_compliance_entry *find_known(pal_compliance_solver *answer, double size2, double *share)
+static pal_compliance_entry *find_known(pal_compliance_solver *solver, double size2, double *share)
 {
-    pal_compliance_entry *best = NULL, *oldest = &answer->known[0];
-    double nearest = alike * alike;
+    pal_compliance_entry *best = NULL, *oldest = &solver->known[0];
+    double nearest = PAL_COMPLIANCE_COSINE * PAL_COMPLIANCE_COSINE;
     for (int k = 0; k < PAL_COMPLIANCE_CACHE; k++) {
-        pal_compliance_entry *known = &answer->known[k];
+        pal_compliance_entry *known = &solver->known[k];
         if (known->used < oldest->used) oldest = known;
         if (known->size2 == 0) continue;
-        double dot = pal_dot_product(answer->cg.n, known->force, answer->cg.r);
+        double dot = pal_dot_product(solver->cg.n, known->force, solver->cg.r);
         double cosine2 = dot > 0 ? dot / known->size2 * (dot / size2) : 0;
         if (!(cosine2 > nearest)) continue;
         nearest = cosine2;
@@ -47,88 +41,77 @@ static pal_compliance_entry *find_known(pal_compliance_solver *answer, double si
 }
 
 /* force and move are of points; body->f and g are overwritten */
-static bool solve_points(pal_compliance_solver *answer, const pal_body *body, double *move_m)
+static bool solve_points(pal_compliance_solver *solver, const pal_body *body, double *move_m)
 {
-    int n = answer->cg.n;
-    double *r = answer->cg.r, share;
-    for (int i = 0; i < n; i++)
-        if (body->support[i / 3]) r[i] = 0;
-    memset(move_m, 0, bytes3(body));
+    int n = solver->cg.n;
+    double *r = solver->cg.r, share;
+    pal_system_clear_supported(body, r);
+    memset(move_m, 0, pal_body_bytes3(body));
     double size2 = pal_dot_product(n, r, r);
     if (!(size2 > 0)) return size2 == 0;
-    memcpy(answer->x, body->x, bytes3(body));
-    pal_compliance_entry *known = find_known(answer, size2, &share);
-    memcpy(known->force, r, bytes3(body));
+    memcpy(solver->x, body->x, pal_body_bytes3(body));
+    pal_compliance_entry *known = find_known(solver, size2, &share);
+    memcpy(known->force, r, pal_body_bytes3(body));
     known->size2 = size2;
-    known->used = ++answer->n_call;
+    known->used = ++solver->n_call;
     if (share != 0) {
         for (int i = 0; i < n; i++) move_m[i] = share * known->move[i];
-        multiply(answer, move_m, answer->cg.q);
-        for (int i = 0; i < n; i++) r[i] = body->support[i / 3] ? 0 : r[i] - answer->cg.q[i];
+        multiply(solver, move_m, solver->cg.q);
+        for (int i = 0; i < n; i++) r[i] = body->support[i / 3] ? 0 : r[i] - solver->cg.q[i];
     }
-    (void)pal_conjugate_gradient_run(&answer->cg, move_m, enough * sqrt(size2), share == 0, MAX_ITERATIONS);
-    memcpy(known->move, move_m, bytes3(body));
-    if (!isfinite(answer->cg.residual)) known->size2 = 0;
-    return isfinite(answer->cg.residual);
+    (void)pal_conjugate_gradient_run(&solver->cg, move_m, PAL_SOLVER_TOLERANCE * sqrt(size2), share == 0,
+                                     MAX_ITERATIONS);
+    memcpy(known->move, move_m, pal_body_bytes3(body));
+    if (!isfinite(solver->cg.residual)) known->size2 = 0;
+    return isfinite(solver->cg.residual);
 }
 
 static bool solve(void *self, const pal_body *body, const double *force_N, double *move_m)
 {
-    pal_compliance_solver *answer = self;
-    pal_body *own = answer->system->body;
+    pal_compliance_solver *solver = self;
+    pal_body *own = solver->system->body;
     size_t node_bytes = 3 * sizeof(double) * (size_t)body->n_node;
-    memcpy(answer->f, own->f, node_bytes);
-    if (body->interpolation) {
-        memset(answer->cg.r, 0, bytes3(body));
-        pal_interpolation_apply_transpose(body->interpolation, force_N, answer->cg.r);
-    } else {
-        memcpy(answer->cg.r, force_N, node_bytes);
-    }
-    bool done = solve_points(answer, body, body->interpolation ? answer->move : move_m);
-    if (body->interpolation) pal_interpolation_apply(body->interpolation, answer->move, move_m);
-    memcpy(own->f, answer->f, node_bytes);
+    memcpy(solver->f, own->f, node_bytes);
+    pal_system_restrict(body, force_N, solver->cg.r);
+    bool done = solve_points(solver, body, body->interpolation ? solver->move : move_m);
+    if (body->interpolation) pal_interpolation_apply(body->interpolation, solver->move, move_m);
+    memcpy(own->f, solver->f, node_bytes);
     return done;
 }
 
-void pal_compliance_solver_reset(pal_compliance_solver *answer)
+void pal_compliance_solver_reset(pal_compliance_solver *solver)
 {
-    for (int k = 0; k < PAL_COMPLIANCE_CACHE; k++) answer->known[k].size2 = 0;
+    for (int k = 0; k < PAL_COMPLIANCE_CACHE; k++) solver->known[k].size2 = 0;
 }
 
-static pal_err make_arrays(pal_compliance_solver *answer, pal_arena *arena)
+static pal_err make_arrays(pal_compliance_solver *solver, pal_arena *arena)
 {
-    const pal_body *body = answer->system->body;
+    const pal_body *body = solver->system->body;
+    pal_conjugate_gradient *cg = &solver->cg;
     size_t n3 = 3 * (size_t)body->n_dof;
-    double **const array[] = {&answer->x,    &answer->move, &answer->low, &answer->cg.r,
-                              &answer->cg.z, &answer->cg.p, &answer->cg.q};
-    for (size_t i = 0; i < sizeof array / sizeof array[0]; i++) {
-        *array[i] = PAL_NEW(arena, double, n3);
-        if (!*array[i]) return PAL_ERR_MEMORY;
-    }
-    if (!(answer->f = PAL_NEW(arena, double, 3 * (size_t)body->n_node))) return PAL_ERR_MEMORY;
-    for (int k = 0; k < PAL_COMPLIANCE_CACHE; k++) {
-        answer->known[k].force = PAL_NEW(arena, double, n3);
-        answer->known[k].move = PAL_NEW(arena, double, n3);
-        if (!answer->known[k].force || !answer->known[k].move) return PAL_ERR_MEMORY;
-    }
-    answer->cg.n = (int)n3;
-    answer->cg.multiply = multiply;
-    answer->cg.precondition = precondition;
-    answer->cg.user = answer;
-    return PAL_ERR_OK;
+    bool made = PAL_NEW_DOUBLES(arena, n3, &solver->x, &solver->move, &solver->low, &cg->r, &cg->z, &cg->p, &cg->q) &&
+                PAL_NEW_DOUBLES(arena, 3 * (size_t)body->n_node, &solver->f);
+    for (int k = 0; k < PAL_COMPLIANCE_CACHE && made; k++)
+        made = PAL_NEW_DOUBLES(arena, n3, &solver->known[k].force, &solver->known[k].move);
+    cg->n = (int)n3;
+    cg->multiply = multiply, cg->precondition = precondition, cg->user = solver;
+    return made ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-pal_err pal_compliance_solver_factor(pal_compliance_solver *answer, pal_system *system, pal_block_matrix *blocks)
+pal_err pal_compliance_solver_factor(pal_compliance_solver *solver, pal_block_matrix *blocks, bool later)
 {
+    pal_system *system = solver->system;
     double mass = system->mass, stiff = system->stiff, damp = system->damp;
-    pal_compliance_solver_reset(answer);
+    pal_compliance_solver_reset(solver);
     system->mass = 0, system->stiff = 1, system->damp = 0;
     pal_system_assemble(system, blocks);
     system->mass = mass, system->stiff = stiff, system->damp = damp;
-    return pal_warp_factor(&answer->warp, blocks);
+    if (!later) return pal_warp_factor(&solver->warp, blocks);
+    (void)pal_warp_refresh(&solver->warp, blocks, true);
+    return PAL_ERR_OK;
 }
 
-pal_err pal_compliance_solver_make(pal_system *system, const pal_node_rotations *turns, pal_block_matrix *blocks,
+pal_err pal_compliance_solver_make(pal_system *system, const pal_node_rotations *rotations, pal_block_matrix *blocks,
                                    pal_arena *arena, pal_compliance_solver *out)
 {
     pal_body *body = system->body;
@@ -139,17 +122,28 @@ pal_err pal_compliance_solver_make(pal_system *system, const pal_node_rotations 
     if (supports.n_unsupported > 0) return PAL_ERR_OK;
     out->system = system;
     PAL_TRY(make_arrays(out, arena));
-    PAL_TRY(pal_warp_make(blocks, body, turns, true, arena, &out->warp));
-    pal_err err = pal_compliance_solver_factor(out, system, blocks);
+    PAL_TRY(pal_warp_make(blocks, body, rotations, true, arena, &out->warp));
+    pal_err err = pal_compliance_solver_factor(out, blocks, false);
     if (err == PAL_ERR_MEMORY) return err;
     /* not positive definite: there is no answer to give */
     if (err) return PAL_ERR_OK;
-    out->door = (pal_compliance){.self = out, .solve = solve};
-    body->compliance = &out->door;
+    out->hook = (pal_compliance){.self = out, .solve = solve};
+    body->compliance = &out->hook;
     return PAL_ERR_OK;
 }
 
-void pal_compliance_solver_destroy(pal_compliance_solver *answer)
+void pal_compliance_solver_report(const pal_compliance_solver *solver, const pal_system *system, const pal_warp *warp,
+                                  pal_solve_report *out)
 {
-    pal_warp_destroy(&answer->warp);
+    out->assemble_s = system->assemble_s;
+    if (!warp->factor) return;
+    out->factor_nonzeros = pal_cholesky_nonzeros(warp->factor);
+    out->n_factor = warp->n_factor;
+    out->analyse_s = warp->analyse_s + solver->warp.analyse_s;
+    out->factor_s = warp->factor_s + solver->warp.factor_s;
+}
+
+void pal_compliance_solver_destroy(pal_compliance_solver *solver)
+{
+    pal_warp_destroy(&solver->warp);
 }

@@ -3,10 +3,10 @@
  * (The solvers' tangents omit the terms that make them indefinite; on a beam bent by half its length these are a
  * quarter to a half of the displacement.) The preconditioner is the factor of the stiffness at rest, warped by the
  * present rotations (warp.h).
- * A call starts from the displacement under a similar load and makes at most three iterations, each one
- * back-substitution and two evaluations of forces. Near rest this is accurate; on a strongly bent body it converges
- * within a few calls, which a contact of several steps makes anyway.
- * Built only where a CONTACT component asks for it. Thread: [load] to make, then [sim]. */
+ * A call starts from the displacement under a similar load and makes at most three iterations, each one solve with the
+ * factor and two evaluations of forces. Near rest this is accurate; on a strongly bent body it converges within a few
+ * calls, which a contact of several steps makes anyway. Built only where a CONTACT component asks for it. Thread:
+ * [load] to make, then [sim]. */
 #ifndef PAL_SIM_IMPLICIT_COMPLIANCE_H
 #define PAL_SIM_IMPLICIT_COMPLIANCE_H
 #include "server/num/conjugate_gradient.h"
@@ -21,7 +21,7 @@ typedef struct pal_compliance_entry {
 } pal_compliance_entry;
 
 typedef struct pal_compliance_solver {
-    pal_compliance door; /* interface that the body publishes */
+    pal_compliance hook; /* what the body publishes */
     pal_warp warp;
     pal_system *system;
     pal_conjugate_gradient cg;
@@ -33,10 +33,13 @@ typedef struct pal_compliance_solver {
 
 /* The components are linearised at rest. blocks: work space with K's pattern. Nothing is published when no component
  * wants it or when the supports leave a rigid motion free. MEMORY. [load] */
-pal_err pal_compliance_solver_make(pal_system *system, const pal_node_rotations *turns, pal_block_matrix *blocks,
+pal_err pal_compliance_solver_make(pal_system *system, const pal_node_rotations *rotations, pal_block_matrix *blocks,
                                    pal_arena *arena, pal_compliance_solver *out);
-/* factors the components' present linearisation at rest, after a material edit */
-pal_err pal_compliance_solver_factor(pal_compliance_solver *answer, pal_system *system, pal_block_matrix *blocks);
-void pal_compliance_solver_reset(pal_compliance_solver *answer); /* the body is back at rest */
-void pal_compliance_solver_destroy(pal_compliance_solver *answer);
+/* factors the components' present linearisation at rest, after a material edit; later: on a spare thread (warp.h) */
+pal_err pal_compliance_solver_factor(pal_compliance_solver *solver, pal_block_matrix *blocks, bool later);
+void pal_compliance_solver_reset(pal_compliance_solver *solver); /* the body is back at rest */
+/* sets sizes and times of a report: of the solver's factor, and times of the factor here as well */
+void pal_compliance_solver_report(const pal_compliance_solver *solver, const pal_system *system, const pal_warp *warp,
+                                  pal_solve_report *out);
+void pal_compliance_solver_destroy(pal_compliance_solver *solver);
 #endif

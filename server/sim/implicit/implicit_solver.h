@@ -9,7 +9,7 @@
  * above, so a single iteration (newton 1, the default) seldom gains energy. Where it does, up to 7 more iterations
  * follow, each with a line search on the incremental potential, until the energy is no more than at the beginning of
  * the sub-step. A body that gains energy in spite of them for a total of half a second, without an interval of half
- * a second free of gains, is in a cycle, as crushed elements with fallback rotations are. From then on each such
+ * a second free of gains, is in a cycle, as crushed elements with averaged rotations are. From then on each such
  * sub-step is undone and the velocity set to zero, so that the energy cannot rise.
  *
  * Contact gives its loads at the beginning of the sub-step; its stiffness and damping act on the motion since then,
@@ -22,15 +22,13 @@
  * several steps; refresh and refresh_iterations have no effect. Thread: [load] to make, then [sim]. */
 #ifndef PAL_SIM_IMPLICIT_IMPLICIT_SOLVER_H
 #define PAL_SIM_IMPLICIT_IMPLICIT_SOLVER_H
-#include "server/num/conjugate_gradient.h"
 #include "server/sim/implicit/compliance.h"
-#include "server/sim/implicit/warp.h"
 
 /* keys of both solvers, with their defaults */
 typedef struct pal_implicit_options {
     double tolerance;       /* 1e-2: residual of the stage's equations over |M v* + tau f|, Euclidean norm */
     int iterations, newton; /* 60: max conjugate gradient iterations per Newton iteration; 1: Newton iterations */
-    double substep_s;       /* 0: the scene's step                                                         */
+    double substep_s;       /* 0: no limit below the scene's step */
     int refresh_iterations; /* 12: a solve that takes more starts a new factor, if ... */
     bool refresh;           /* ... true                                                                    */
     bool warp;              /* true: the factor rotates with the body (false for comparison) */
@@ -41,9 +39,9 @@ typedef struct pal_implicit {
     pal_implicit_options options;
     pal_system system;
     pal_block_matrix blocks; /* pattern of K; values are work space */
-    pal_node_rotations turns;
+    pal_node_rotations rotations;
     pal_warp warp;
-    pal_compliance_solver answer; /* static compliance; answer.door.solve NULL: not wanted or not available */
+    pal_compliance_solver compliance; /* compliance.hook.solve NULL: not wanted or not available */
     pal_conjugate_gradient cg;
     double *x0, *v0; /* at the beginning of the sub-step [n_dof][3] */
     double *xs, *vs; /* x*, v* of the stage, filled by the solver [n_dof][3] */
@@ -62,14 +60,13 @@ typedef struct pal_implicit {
     int max_cg;       /* max iterations in one solve of this sub-step */
     uint64_t sampled; /* material revision of the body at the factor (dofs.h) */
     bool probing;     /* the matrices of an interpolated body are being rebuilt */
+    double probes;    /* columns that may be found now */
     pal_solve_report report;
 } pal_implicit;
 
-/* reads the keys; substep_s 0 becomes the scene's step. [load] */
-pal_err pal_implicit_read(pal_config_entry *item, const pal_build *build, pal_implicit_options *out);
-/* share: tau over the sub-step. REFUSED: no positive definite matrix at rest; MEMORY. [load] */
-pal_err pal_implicit_make(const pal_implicit_options *options, pal_build *build, double share, pal_implicit **out);
-void pal_implicit_destroy(void *self);
+/* Reads the keys and makes the solver. share: tau over the sub-step. REFUSED: a key, or no positive definite matrix at
+ * rest; MEMORY. [load] */
+pal_err pal_implicit_make(pal_config_entry *item, pal_build *build, double share, void **self);
 
 /* false: nothing to solve (every node is fixed; prescribed nodes have moved) or the state is not finite
  * (body->frozen is set) */
@@ -84,9 +81,14 @@ bool pal_implicit_settle(pal_implicit *core, pal_step *step, bool last);
  * factor */
 void pal_implicit_end(pal_implicit *core, pal_step *step);
 
-/* hooks of pal_effect that both solvers share */
+/* members of pal_effect that both solvers share */
+void pal_implicit_destroy(void *self);
 double pal_implicit_limit(void *self, pal_step *step);
 pal_err pal_implicit_material(void *self, const pal_body *body, const pal_material *material, pal_diagnostic *diag);
 void pal_implicit_reset(void *self, const pal_body *body);
 void pal_implicit_report(const void *self, pal_solve_report *out);
+#define PAL_IMPLICIT_HOOKS                                                                                             \
+    .stage = PAL_STAGE_SOLVE, .implicit = true, .keeps_components = true, .destroy = pal_implicit_destroy,             \
+    .bounds.limit = pal_implicit_limit, .material = pal_implicit_material, .reset = pal_implicit_reset,                \
+    .inspect.report = pal_implicit_report
 #endif

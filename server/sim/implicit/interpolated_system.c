@@ -1,11 +1,10 @@
-/* The matrix of an embedded body in numbers. */
+/* The matrix of an interpolated body in numbers. */
 #include "server/sim/implicit/interpolated_system.h"
+
+#include "server/sim/implicit/tuning.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-/* moves times nodes */
-static const double max_work = 2e7;
 
 /* ---- pattern ---- */
 
@@ -22,56 +21,40 @@ static void free_cliques(clique_list *l)
     *l = (clique_list){0};
 }
 
-/* points that carry n nodes, each once; to may be NULL; mark [n_dof] is below turn everywhere */
-static int find_points(const pal_interpolation *rows, const int32_t *node, int n, int32_t *mark, int32_t turn,
+/* points that carry n nodes, each once; to may be NULL; mark [n_dof] is below stamp everywhere */
+static int find_points(const pal_interpolation *A, const int32_t *node, int n, int32_t *mark, int32_t stamp,
                        int32_t *to)
 {
     int found = 0;
     for (int c = 0; c < n; c++)
-        for (int32_t k = rows->start[node[c]]; k < rows->start[node[c] + 1]; k++) {
-            if (mark[rows->point[k]] == turn) continue;
-            mark[rows->point[k]] = turn;
-            if (to) to[found] = rows->point[k];
+        for (int32_t k = A->start[node[c]]; k < A->start[node[c] + 1]; k++) {
+            if (mark[A->point[k]] == stamp) continue;
+            mark[A->point[k]] = stamp;
+            if (to) to[found] = A->point[k];
             found++;
         }
     return found;
 }
 
 /* the cliques `from` of nodes as cliques of points: all as long as the longest, filled up with their first point */
-static pal_err add_cliques(clique_list *l, const pal_interpolation *rows, const pal_cliques *from)
+static pal_err add_cliques(clique_list *l, const pal_interpolation *A, const pal_cliques *from)
 {
     size_t n_item = (size_t)from->n_item, wide = (size_t)from->n_corner;
-    int32_t *mark = calloc((size_t)rows->n_point + 1, sizeof *mark), turn = 0, *point = NULL;
+    int32_t *mark = calloc((size_t)A->n_point + 1, sizeof *mark), stamp = 0, *point = NULL;
     int max = 1;
     for (size_t i = 0; i < n_item && mark; i++) {
-        int n = find_points(rows, from->node + wide * i, from->n_corner, mark, ++turn, NULL);
+        int n = find_points(A, from->node + wide * i, from->n_corner, mark, ++stamp, NULL);
         max = n > max ? n : max;
     }
     if (mark) point = malloc(sizeof *point * (n_item * (size_t)max + 1));
     for (size_t i = 0; i < n_item && point; i++) {
         int32_t *to = point + i * (size_t)max;
-        int n = find_points(rows, from->node + wide * i, from->n_corner, mark, ++turn, to);
+        int n = find_points(A, from->node + wide * i, from->n_corner, mark, ++stamp, to);
         for (; n < max; n++) to[n] = n > 0 ? to[0] : 0;
     }
     free(mark);
     if (!point) return PAL_ERR_MEMORY;
     l->list[l->n++] = (pal_cliques){.n_item = (int)n_item, .n_corner = max, .node = point};
-    return PAL_ERR_OK;
-}
-
-static pal_err add_elements(clique_list *l, const pal_body *body)
-{
-    for (int k = 0; k < body->dofs.n_clique; k++)
-        if (body->dofs.clique[k].n_item > 0) PAL_TRY(add_cliques(l, body->interpolation, &body->dofs.clique[k]));
-    return PAL_ERR_OK;
-}
-
-static pal_err add_all(clique_list *l, int n)
-{
-    int32_t *point = malloc(sizeof *point * (size_t)n);
-    if (!point) return PAL_ERR_MEMORY;
-    for (int32_t i = 0; i < n; i++) point[i] = i;
-    l->list[l->n++] = (pal_cliques){.n_item = 1, .n_corner = n, .node = point};
     return PAL_ERR_OK;
 }
 
@@ -89,8 +72,15 @@ static pal_err list_cliques(const pal_body *body, const pal_component *force, in
         else
             silent = true;
     }
-    if (!silent) return PAL_ERR_OK;
-    return body->dofs.n_clique ? add_elements(l, body) : add_all(l, body->n_dof);
+    for (int k = 0; k < body->dofs.n_clique && silent; k++)
+        if (body->dofs.clique[k].n_item > 0) PAL_TRY(add_cliques(l, body->interpolation, &body->dofs.clique[k]));
+    if (!silent || body->dofs.n_clique) return PAL_ERR_OK;
+    /* all points are coupled */
+    int32_t *point = malloc(sizeof *point * (size_t)body->n_dof);
+    if (!point) return PAL_ERR_MEMORY;
+    for (int32_t i = 0; i < body->n_dof; i++) point[i] = i;
+    l->list[l->n++] = (pal_cliques){.n_item = 1, .n_corner = body->n_dof, .node = point};
+    return PAL_ERR_OK;
 }
 
 /* ---- groups ---- */
@@ -166,33 +156,21 @@ static pal_err make_groups(pal_interpolated_system *e, const pal_body *body, pal
 
 /* ---- making ---- */
 
-/* an inner row with damping of its own, not drag */
-static bool damps(const pal_component *force, int n_force)
-{
-    for (int i = 0; i < n_force; i++)
-        if (force[i].effect->tangent && force[i].effect->damping && !force[i].effect->drag) return true;
-    return false;
-}
-
 static pal_err make_arrays(pal_interpolated_system *e, const pal_body *body, bool with_damping, pal_arena *arena)
 {
     size_t node3 = 3 * (size_t)body->n_node, dof3 = 3 * (size_t)body->n_dof;
-    e->p = PAL_NEW(arena, double, node3);
-    e->q = PAL_NEW(arena, double, node3);
-    e->turn = PAL_NEW(arena, double, 3 * node3);
-    e->unit = PAL_NEW(arena, double, dof3);
-    e->answer = PAL_NEW(arena, double, dof3);
-    if (!e->p || !e->q || !e->turn || !e->unit || !e->answer) return PAL_ERR_MEMORY;
-    if (!with_damping) return PAL_ERR_OK;
-    e->damping = PAL_NEW(arena, double, 9 * (size_t)e->rest.start[e->rest.n]);
-    return e->damping ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    size_t entry9 = with_damping ? 9 * (size_t)e->rest.start[e->rest.n] : 0;
+    bool made = PAL_NEW_DOUBLES(arena, node3, &e->p, &e->q) && PAL_NEW_DOUBLES(arena, 3 * node3, &e->turn) &&
+                PAL_NEW_DOUBLES(arena, dof3, &e->unit, &e->product) &&
+                (!with_damping || PAL_NEW_DOUBLES(arena, entry9, &e->damping));
+    return made ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 /* at least `n_group` groups are needed: points with a common neighbour, which those of a clique are, go alone */
 static pal_err check_work(const pal_body *body, int n_group, bool damped, pal_diagnostic *diag)
 {
     double moves = 3.0 * n_group * (damped ? 2 : 1);
-    if (moves * body->n_node <= max_work) return PAL_ERR_OK;
+    if (moves * body->n_node <= PAL_PROBE_WORK_MAX) return PAL_ERR_OK;
     return pal_diagnostic_set(
         diag, PAL_ERR_BUDGET,
         "body \"%s\": an implicit solver finds the matrix of its %d control points by %.0f or more "
@@ -205,8 +183,10 @@ pal_err pal_interpolated_system_make(const pal_body *body, const pal_component *
 {
     pal_interpolated_system *e = PAL_NEW(arena, pal_interpolated_system, 1);
     if (!e) return PAL_ERR_MEMORY;
-    bool damped = damps(force, n_force);
+    bool damped = false; /* by an internal component, not by drag */
     int clique = 0;
+    for (int i = 0; i < n_force; i++)
+        damped |= force[i].effect->tangent && force[i].effect->bounds.damping && !force[i].effect->drag;
     clique_list cliques = {0};
     pal_err err = list_cliques(body, force, n_force, &cliques);
     for (int i = 0; i < cliques.n; i++) clique = cliques.list[i].n_corner > clique ? cliques.list[i].n_corner : clique;
@@ -222,18 +202,11 @@ pal_err pal_interpolated_system_make(const pal_body *body, const pal_component *
     return PAL_ERR_OK;
 }
 
-/* ---- probing ---- */
-
-void pal_interpolated_system_invalidate(pal_interpolated_system *e)
+void pal_interpolated_system_restrict9(const pal_interpolation *A, const double *from, double *to)
 {
-    e->next = 0;
-}
-
-void pal_interpolated_system_restrict9(const pal_interpolation *rows, const double *from, double *to)
-{
-    for (int32_t i = 0; i < rows->n_row; i++)
-        for (int32_t k = rows->start[i]; k < rows->start[i + 1]; k++) {
-            double *at = to + 9 * (size_t)rows->point[k], w = rows->weight[k];
+    for (int32_t i = 0; i < A->n_row; i++)
+        for (int32_t k = A->start[i]; k < A->start[i + 1]; k++) {
+            double *at = to + 9 * (size_t)A->point[k], w = A->weight[k];
             for (size_t c = 0; c < 9; c++) at[c] += w * from[9 * (size_t)i + c];
         }
 }

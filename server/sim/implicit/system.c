@@ -1,14 +1,32 @@
 /* Rows as a system of equations. */
 #include "server/sim/implicit/system.h"
 
+#include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/num/conjugate_gradient.h"
 #include "server/num/union_find.h"
 #include "server/sim/core/step_guard.h"
+#include "server/sim/implicit/tuning.h"
 #include "server/sim/subdivision/subdivision_mass.h"
 
 #include <stdlib.h>
 #include <string.h>
+
+void pal_system_restrict(const pal_body *body, const double *f, double *out)
+{
+    if (!body->interpolation) {
+        memcpy(out, f, pal_body_bytes3(body));
+        return;
+    }
+    memset(out, 0, pal_body_bytes3(body));
+    pal_interpolation_apply_transpose(body->interpolation, f, out);
+}
+
+void pal_system_clear_supported(const pal_body *body, double *r)
+{
+    for (int i = 0; i < body->n_dof; i++)
+        if (body->support[i]) pal_set3(r + 3 * i, 0, 0, 0);
+}
 
 pal_err pal_system_make(const pal_build *build, pal_system *out)
 {
@@ -17,11 +35,11 @@ pal_err pal_system_make(const pal_build *build, pal_system *out)
     out->force = PAL_NEW(build->arena, pal_component, build->n_made);
     if (!out->force) return PAL_ERR_MEMORY;
     for (int i = 0; i < build->n_made; i++) {
-        const pal_component *row = &build->made[i];
-        if (row->effect->stage != PAL_STAGE_FORCE) continue;
-        out->force[out->n_force++] = (pal_component){.effect = row->effect, .self = row->self};
-        if (!row->effect->drag && !row->effect->energy) out->has_energy = false;
-        if (row->effect->tangent && row->effect->tangent->rotate) out->has_rotation = true;
+        const pal_component *component = &build->made[i];
+        if (component->effect->stage != PAL_STAGE_FORCE) continue;
+        out->force[out->n_force++] = (pal_component){.effect = component->effect, .self = component->self};
+        if (!component->effect->drag && !component->effect->energy) out->has_energy = false;
+        if (component->effect->tangent && component->effect->tangent->rotate) out->has_rotation = true;
     }
     for (int i = 0; i < body->n_dof; i++) out->n_free += !body->support[i];
     if (!body->interpolation) return PAL_ERR_OK;
@@ -35,9 +53,9 @@ static pal_cliques *list_cliques(const pal_system *system, int *n_list)
     pal_cliques *list = calloc((size_t)system->n_force + 1, sizeof *list);
     *n_list = 0;
     for (int i = 0; i < system->n_force && list; i++) {
-        const pal_component *row = &system->force[i];
-        if (row->effect->tangent && row->effect->tangent->couple &&
-            row->effect->tangent->couple(row->self, &list[*n_list]))
+        const pal_component *component = &system->force[i];
+        if (component->effect->tangent && component->effect->tangent->couple &&
+            component->effect->tangent->couple(component->self, &list[*n_list]))
             ++*n_list;
     }
     return list;
@@ -61,8 +79,8 @@ pal_err pal_system_pattern(const pal_system *system, pal_arena *arena, pal_block
 void pal_system_linearise(const pal_system *system)
 {
     for (int i = 0; i < system->n_force; i++) {
-        const pal_component *row = &system->force[i];
-        if (row->effect->tangent) row->effect->tangent->linearise(row->self, system->body);
+        const pal_component *component = &system->force[i];
+        if (component->effect->tangent) component->effect->tangent->linearise(component->self, system->body);
     }
 }
 
@@ -72,10 +90,10 @@ void pal_system_linearise_contact(pal_system *system, const pal_step *step)
     system->n_contact = step->n_contact;
     system->has_contact = false;
     for (int i = 0; i < step->n_contact; i++) {
-        const pal_component *row = &step->contact[i];
-        if (!row->effect->tangent) continue;
-        if (row->effect->tangent->linearise) row->effect->tangent->linearise(row->self, system->body);
-        system->has_contact |= row->effect->tangent->multiply != NULL;
+        const pal_component *component = &step->contact[i];
+        if (!component->effect->tangent) continue;
+        if (component->effect->tangent->linearise) component->effect->tangent->linearise(component->self, system->body);
+        system->has_contact |= component->effect->tangent->multiply != NULL;
     }
 }
 
@@ -94,24 +112,26 @@ static void probe(pal_interpolated_system *e, const pal_system *system, int move
     const int axis = move % 3, group = move / 3;
     const int32_t *point = e->point + e->start[group], n = e->start[group + 1] - e->start[group];
     memset(e->unit, 0, 3 * sizeof(double) * (size_t)e->rest.n);
-    memset(e->answer, 0, 3 * sizeof(double) * (size_t)e->rest.n);
+    memset(e->product, 0, 3 * sizeof(double) * (size_t)e->rest.n);
     for (int32_t i = 0; i < n; i++) e->unit[3 * point[i] + axis] = 1;
-    pal_system_multiply_stiffness(system, value != e->damping, value == e->damping, e->unit, e->answer);
+    pal_system_multiply_stiffness(system, value != e->damping, value == e->damping, e->unit, e->product);
     for (int32_t i = 0; i < n; i++)
         for (int32_t k = e->rest.start[point[i]]; k < e->rest.start[point[i] + 1]; k++)
             for (int c = 0; c < 3; c++)
-                value[9 * (size_t)k + (size_t)(3 * c + axis)] = e->answer[3 * e->rest.row[k] + c];
+                value[9 * (size_t)k + (size_t)(3 * c + axis)] = e->product[3 * e->rest.row[k] + c];
 }
 
-bool pal_system_probe(const pal_system *system, int max)
+bool pal_system_probe(pal_system *system, int max)
 {
     pal_interpolated_system *e = system->interpolated_system;
     if (!e || e->next == e->n_move) return true;
+    double before = pal_clock_s();
     pal_system_linearise_rest(system);
     for (; max > 0 && e->next < e->n_move; max--, e->next++) {
         bool second = e->next >= 3 * e->n_group;
         probe(e, system, second ? e->next - 3 * e->n_group : e->next, second ? e->damping : e->rest.value);
     }
+    system->assemble_s += pal_clock_s() - before;
     return e->next == e->n_move;
 }
 
@@ -127,8 +147,9 @@ void pal_system_rotate(const pal_system *system, double *turn)
     double *to = system->interpolated_system ? system->interpolated_system->turn : turn;
     memset(to, 0, 9 * sizeof(double) * (size_t)body->n_node);
     for (int i = 0; i < system->n_force; i++) {
-        const pal_component *row = &system->force[i];
-        if (row->effect->tangent && row->effect->tangent->rotate) row->effect->tangent->rotate(row->self, body, to);
+        const pal_component *component = &system->force[i];
+        if (component->effect->tangent && component->effect->tangent->rotate)
+            component->effect->tangent->rotate(component->self, body, to);
     }
     if (!system->interpolated_system) return;
     memset(turn, 0, 9 * sizeof(double) * (size_t)body->n_dof);
@@ -137,7 +158,7 @@ void pal_system_rotate(const pal_system *system, double *turn)
 
 /* ---- products ---- */
 
-static void multiply_rows(const pal_system *system, const pal_component *row, int n_row, double k, double c,
+static void multiply_rows(const pal_system *system, const pal_component *component, int n_row, double k, double c,
                           const double *p, double *out)
 {
     const pal_body *body = system->body;
@@ -147,8 +168,9 @@ static void multiply_rows(const pal_system *system, const pal_component *row, in
         memset(e->q, 0, 3 * sizeof(double) * (size_t)body->n_node);
     }
     for (int i = 0; i < n_row; i++) {
-        const pal_tangent *tangent = row[i].effect->tangent;
-        if (tangent && tangent->multiply) tangent->multiply(row[i].self, body, k, c, e ? e->p : p, e ? e->q : out);
+        const pal_tangent *tangent = component[i].effect->tangent;
+        if (tangent && tangent->multiply)
+            tangent->multiply(component[i].self, body, k, c, e ? e->p : p, e ? e->q : out);
     }
     if (e) pal_interpolation_apply_transpose(body->interpolation, e->q, out);
 }
@@ -163,24 +185,14 @@ void pal_system_multiply_contact(const pal_system *system, double k, double c, c
     if (system->has_contact) multiply_rows(system, system->contact, system->n_contact, k, c, p, out);
 }
 
-/* mass + damp times the entries' damping, row i: sum to the point */
-static void between(const pal_mass_operator *m, int i, double mass, double damp, const double *p, double sum[3])
-{
-    pal_set3(sum, 0, 0, 0);
-    for (int32_t k = m->start[i]; k < m->start[i + 1]; k++) {
-        double w = mass * m->mass_kg[k] + (m->damping_kg_s ? damp * m->damping_kg_s[k] : 0);
-        pal_axpy3(sum, w, p + 3 * (size_t)m->point[k]);
-    }
-}
-
 void pal_system_multiply_inertia(const pal_system *system, double mass, double damp, const double *p, double *out)
 {
     const pal_body *body = system->body;
+    if (body->mass_operator) {
+        pal_mass_operator_multiply(body->mass_operator, mass, damp, NULL, p, out);
+        return;
+    }
     for (int i = 0; i < body->n_dof; i++) {
-        if (body->mass_operator) {
-            between(body->mass_operator, i, mass, damp, p, out + 3 * i);
-            continue;
-        }
         double m = mass * body->mass_kg[i];
         for (int c = 0; c < 3; c++) out[3 * i + c] = m * p[3 * i + c];
     }
@@ -188,24 +200,17 @@ void pal_system_multiply_inertia(const pal_system *system, double mass, double d
 
 double pal_system_inertia_norm2(const pal_system *system, double mass, double damp, const double *p)
 {
-    const pal_body *body = system->body;
-    double sum = 0, part[3];
-    for (int i = 0; i < body->n_dof; i++) {
-        pal_scale3(part, mass * body->mass_kg[i], p + 3 * i);
-        if (body->mass_operator) between(body->mass_operator, i, mass, damp, p, part);
-        sum += pal_dot3(p + 3 * i, part);
-    }
-    return sum;
+    double *product = system->interpolated_system->product;
+    pal_system_multiply_inertia(system, mass, damp, p, product);
+    return pal_dot_product(3 * system->body->n_dof, p, product);
 }
 
 void pal_system_multiply(const pal_system *system, const double *p, double *out)
 {
-    const pal_body *body = system->body;
     pal_system_multiply_inertia(system, system->mass, system->damp, p, out);
     pal_system_multiply_stiffness(system, system->stiff, system->damp, p, out);
     pal_system_multiply_contact(system, system->stiff, system->damp, p, out);
-    for (int i = 0; i < body->n_dof; i++)
-        if (body->support[i]) pal_set3(out + 3 * i, 0, 0, 0);
+    pal_system_clear_supported(system->body, out);
 }
 
 double pal_system_work(const pal_system *system, const double *p)
@@ -225,9 +230,7 @@ static void find_inner_forces(const pal_system *system)
     memset(body->f, 0, 3 * sizeof(double) * (size_t)body->n_node);
     for (int i = 0; i < system->n_force; i++)
         if (system->force[i].effect->internal) (void)system->force[i].effect->run(system->force[i].self, &step);
-    if (!body->interpolation) return;
-    memset(body->g, 0, 3 * sizeof(double) * (size_t)body->n_dof);
-    pal_interpolation_apply_transpose(body->interpolation, body->f, body->g);
+    if (body->interpolation) pal_system_restrict(body, body->f, body->g);
 }
 
 void pal_system_true_stiffness(const pal_system *system, const double *x, double *low, const double *p, double *out)
@@ -236,7 +239,7 @@ void pal_system_true_stiffness(const pal_system *system, const double *x, double
     const int n = 3 * body->n_dof;
     double longest = 0;
     for (int i = 0; i < n; i++) longest = fmax(longest, fabs(p[i]));
-    double part = longest > 0 ? 1e-5 * body->edge_m / longest : 0;
+    double part = longest > 0 ? PAL_DIFFERENCE_H * body->edge_m / longest : 0;
     for (int side = -1; side <= 1; side += 2) {
         for (int i = 0; i < n; i++) body->x[i] = x[i] + side * part * p[i];
         find_inner_forces(system);
@@ -249,7 +252,7 @@ void pal_system_true_stiffness(const pal_system *system, const double *x, double
     pal_system_interpolate(system);
 }
 
-/* rest and damping of an embedded body, and its masses */
+/* rest and damping of an interpolated body, and its masses */
 static void assemble_interpolated(const pal_system *system, pal_block_matrix *to)
 {
     const pal_body *body = system->body;
@@ -270,30 +273,51 @@ static void assemble_interpolated(const pal_system *system, pal_block_matrix *to
     }
 }
 
-void pal_system_assemble(const pal_system *system, pal_block_matrix *to)
+static void assemble_nodes(const pal_system *system, pal_block_matrix *to)
 {
     const pal_body *body = system->body;
-    if (system->interpolated_system) {
-        assemble_interpolated(system, to);
-        return;
-    }
     pal_block_matrix_zero(to);
     for (int i = 0; i < body->n_node; i++)
         for (int c = 0; c < 3; c++)
             to->value[9 * (size_t)to->start[i] + 4 * (size_t)c] = system->mass * body->mass_kg[i];
     for (int i = 0; i < system->n_force; i++) {
-        const pal_component *row = &system->force[i];
-        if (row->effect->tangent && row->effect->tangent->assemble)
-            row->effect->tangent->assemble(row->self, body, system->stiff, system->damp, to);
+        const pal_component *component = &system->force[i];
+        if (component->effect->tangent && component->effect->tangent->assemble)
+            component->effect->tangent->assemble(component->self, body, system->stiff, system->damp, to);
     }
+}
+
+void pal_system_assemble(pal_system *system, pal_block_matrix *to)
+{
+    double before = pal_clock_s();
+    if (system->interpolated_system)
+        assemble_interpolated(system, to);
+    else
+        assemble_nodes(system, to);
+    system->assemble_s += pal_clock_s() - before;
+}
+
+bool pal_system_settle_contact(const pal_system *system, pal_step *step, const double *x0, double *moved,
+                               double *node_moved, bool last)
+{
+    const pal_body *body = system->body;
+    bool again = false;
+    for (int i = 0; i < 3 * body->n_dof; i++) moved[i] = body->x[i] - x0[i];
+    if (body->interpolation) pal_interpolation_apply(body->interpolation, moved, node_moved);
+    for (int i = 0; i < step->n_contact; i++) {
+        const pal_component *component = &step->contact[i];
+        if (component->effect->tangent && component->effect->tangent->settle)
+            again |= component->effect->tangent->settle(component->self, step, node_moved, last);
+    }
+    return again;
 }
 
 double pal_system_energy(const pal_system *system)
 {
     double sum = 0;
     for (int i = 0; i < system->n_force; i++) {
-        const pal_component *row = &system->force[i];
-        if (row->effect->energy) sum += row->effect->energy(row->self, system->body);
+        const pal_component *component = &system->force[i];
+        if (component->effect->energy) sum += component->effect->energy(component->self, system->body);
     }
     return sum;
 }
@@ -305,37 +329,11 @@ double pal_system_drag(const pal_system *system)
 
 /* ---- supports ---- */
 
-static void join_parts(const pal_cliques *list, int n_list, int32_t *parent)
-{
-    for (int l = 0; l < n_list; l++)
-        for (int e = 0; e < list[l].n_item; e++) {
-            const int32_t *node = list[l].node + (size_t)list[l].n_corner * (size_t)e;
-            for (int c = 1; c < list[l].n_corner; c++) pal_union_find_join(parent, node[0], node[c]);
-        }
-}
-
 /* the fixed nodes of one part span a plane: three of them off a line. first, far: -1 as long as there is none */
 typedef struct span {
     int32_t first, far;
     double far_m, off_m; /* from first; from the line through first and far */
 } span;
-
-static void take_far(const pal_body *body, span *s, int32_t node)
-{
-    if (s->first < 0) s->first = node;
-    double way = pal_dist3(body->x_rest + 3 * s->first, body->x_rest + 3 * node);
-    if (way > s->far_m) s->far_m = way, s->far = node;
-}
-
-static void take_off(const pal_body *body, span *s, int32_t node)
-{
-    double line[3], to[3], across[3];
-    if (s->far < 0) return;
-    pal_sub3(line, body->x_rest + 3 * s->far, body->x_rest + 3 * s->first);
-    pal_sub3(to, body->x_rest + 3 * node, body->x_rest + 3 * s->first);
-    pal_cross3(across, line, to);
-    s->off_m = fmax(s->off_m, pal_norm3(across) / s->far_m);
-}
 
 static void count_parts(const pal_body *body, int32_t *parent, span *s, pal_support_report *out)
 {
@@ -343,9 +341,19 @@ static void count_parts(const pal_body *body, int32_t *parent, span *s, pal_supp
     *out = (pal_support_report){.unsupported_node = -1};
     for (int i = 0; i < n; i++) s[i] = (span){.first = -1, .far = -1};
     for (int i = 0; i < n; i++)
-        if (body->support[i]) take_far(body, &s[pal_union_find_root(parent, i)], i);
-    for (int i = 0; i < n; i++)
-        if (body->support[i]) take_off(body, &s[pal_union_find_root(parent, i)], i);
+        if (body->support[i]) {
+            span *t = &s[pal_union_find_root(parent, i)];
+            if (t->first < 0) t->first = i;
+            double distance = pal_dist3(body->x_rest + 3 * t->first, body->x_rest + 3 * i);
+            if (distance > t->far_m) t->far_m = distance, t->far = i;
+        }
+    for (int i = 0; i < n; i++) {
+        span *t = &s[pal_union_find_root(parent, i)];
+        double area2[3]; /* of the triangle first, far, i */
+        if (!body->support[i] || t->far < 0) continue;
+        pal_normal3(area2, body->x_rest + 3 * t->first, body->x_rest + 3 * t->far, body->x_rest + 3 * i);
+        t->off_m = fmax(t->off_m, pal_norm3(area2) / t->far_m);
+    }
     for (int i = 0; i < n; i++) {
         if (parent[i] != i) continue;
         out->n_part++;
@@ -366,7 +374,11 @@ pal_err pal_system_find_supports(const pal_system *system, pal_support_report *o
     bool all = list && parent && s;
     if (all) {
         for (int32_t i = 0; i < n; i++) parent[i] = i;
-        if (!a) join_parts(list, n_list, parent);
+        for (int l = 0; l < n_list && !a; l++)
+            for (int e = 0; e < list[l].n_item; e++) {
+                const int32_t *node = list[l].node + (size_t)list[l].n_corner * (size_t)e;
+                for (int c = 1; c < list[l].n_corner; c++) pal_union_find_join(parent, node[0], node[c]);
+            }
         for (int32_t j = 0; a && j < n; j++)
             for (int32_t k = a->start[j]; k < a->start[j + 1]; k++)
                 parent[pal_union_find_root(parent, a->row[k])] = pal_union_find_root(parent, j);

@@ -1,5 +1,5 @@
 /* The FORCE and CONTACT components of one body as one system of equations, which implicit solvers multiply, assemble
- * and search along. The operator is A = mass M + stiff K + damp C. K and C are those of the components' last
+ * and search along. The operator is mass M + stiff K + damp C. K and C are those of the components' last
  * linearise. M is the mass matrix, lumped or between control points (num/mass_operator.h, whose damping between
  * control points is part of C). Rows and columns of fixed dofs are omitted. Vectors are over dofs, [n_dof][3]. Where
  * nodes are interpolated from control points, a displacement is interpolated to the nodes and the result restricted.
@@ -18,8 +18,19 @@ typedef struct pal_system {
     bool has_energy;          /* every FORCE component except drag reports its energy */
     bool has_rotation;        /* some component reports rotations */
     bool has_contact;         /* some CONTACT component has a tangent */
-    double mass, stiff, damp; /* factors of M, K, C                        */
+    double mass, stiff, damp; /* coefficients of M, K, C */
+    double assemble_s;        /* time in pal_system_assemble and pal_system_probe */
 } pal_system;
+
+/* memory of a vector over dofs */
+static inline size_t pal_body_bytes3(const pal_body *body)
+{
+    return 3 * sizeof(double) * (size_t)body->n_dof;
+}
+/* out [n_dof][3] = A' f of forces on nodes; without interpolation f itself */
+void pal_system_restrict(const pal_body *body, const double *f, double *out);
+/* r [n_dof][3] = 0 at fixed and prescribed dofs */
+void pal_system_clear_supported(const pal_body *body, double *r);
 
 /* from the FORCE components made so far; BUDGET: see interpolated_system.h; MEMORY. [load] */
 pal_err pal_system_make(const pal_build *build, pal_system *out);
@@ -31,11 +42,11 @@ void pal_system_linearise(const pal_system *system); /* linearises the FORCE com
 void pal_system_linearise_contact(pal_system *system, const pal_step *step);
 /* turn [n_dof][9] = sum of the components' rotations */
 void pal_system_rotate(const pal_system *system, double *turn);
-/* out = A p; p may be nonzero at fixed dofs, where out is 0 */
+/* out = (mass M + stiff K + damp C) p; p may be nonzero at fixed dofs, where out is 0 */
 void pal_system_multiply(const pal_system *system, const double *p, double *out);
 /* out = (mass M + damp D) p, with D the damping between control points */
 void pal_system_multiply_inertia(const pal_system *system, double mass, double damp, const double *p, double *out);
-/* p' (mass M + damp D) p */
+/* p' (mass M + damp D) p of an interpolated body */
 double pal_system_inertia_norm2(const pal_system *system, double mass, double damp, const double *p);
 /* out += (k K + c C) p of the FORCE components alone */
 void pal_system_multiply_stiffness(const pal_system *system, double k, double c, const double *p, double *out);
@@ -44,17 +55,21 @@ void pal_system_multiply_contact(const pal_system *system, double k, double c, c
 /* out = -df/dx p of the internal forces at x by central difference: the true stiffness, which may be indefinite.
  * Sets body->x to x, overwrites body->f and g; low is work space; out is 0 at fixed dofs */
 void pal_system_true_stiffness(const pal_system *system, const double *x, double *low, const double *p, double *out);
-/* A without contact, fixed dofs included; for an interpolated body with K and C at rest (pal_system_probe) and fixed
- * dofs omitted */
-void pal_system_assemble(const pal_system *system, pal_block_matrix *to);
+/* the operator without contact, fixed dofs included; for an interpolated body with K and C at rest (pal_system_probe)
+ * and fixed dofs omitted */
+void pal_system_assemble(pal_system *system, pal_block_matrix *to);
 /* finds K and C of an interpolated body at rest, whatever its present state, by at most `max` products; true:
  * complete. Leaves the components linearised at rest unless there was nothing to do. Without interpolation: does
  * nothing, returns true. No heap */
-bool pal_system_probe(const pal_system *system, int max);
+bool pal_system_probe(pal_system *system, int max);
 /* linearises at rest, whatever the present state */
 void pal_system_linearise_rest(const pal_system *system);
-/* d = E x; does nothing without interpolation */
+/* d = A x; does nothing without interpolation */
 void pal_system_interpolate(const pal_system *system);
+/* After a solve that began at x0: contact components adapt to the displacement since then (pal_tangent.settle), which
+ * is written to moved, of dofs, and node_moved, of nodes (the same without interpolation). true: solve again */
+bool pal_system_settle_contact(const pal_system *system, pal_step *step, const double *x0, double *moved,
+                               double *node_moved, bool last);
 /* work of the nodal loads along a displacement p, J */
 double pal_system_work(const pal_system *system, const double *p);
 double pal_system_energy(const pal_system *system); /* J, of the FORCE components at body->d   */

@@ -1,15 +1,14 @@
-/* Model adaptive_springs: a triangle surface as mass points on springs whose level of detail follows what happens
- * (paper C; adaptive_surface.h has the masses, the stiffness laws and the active part).
+/* Model adaptive_springs: a triangle surface as mass points on springs that refine where the surface is pressed, moves
+ * or bends (paper C; adaptive_surface.h has the masses, the stiffness laws and the active part).
  *
  * Keys: levels (2; 1 to 10), start_level (0, below levels), thickness_m (0.003), mass_kg (absent: density * thickness *
  * area of the coarse triangles, the density of regions at their middles), k_spring_N_m (of a spring of level 0; absent:
  * sqrt(3)/2 E thickness), c_spring_Ns_m (absent: 0.02 sqrt(k_0 m_0); 0: none), law ("membrane" | "paper"), mass
- * ("faces" | "nodes"), place
- * ("linear" | "butterfly"), k_shape_N_m (anchor of a node of level 0; absent: 0.3 k_0; 0: no such component),
- * c_shape_Ns_m (absent: 0.6 sqrt(k'_0 m_0), a damping ratio of 0.3), frame ("body": anchors hang on the best-fit rigid
- * frame, "world": on the rest place as in the paper; absent: world where something is held, else body), refine (true;
- * false: no such component), memory_MB (512; MiB that the body may take on its finest level with its rows, tools and
- * what is shown of it). m_0 is the mass of a node of level 0.
+ * ("faces" | "nodes"), place ("linear" | "butterfly"), k_shape_N_m (anchor of a node of level 0; absent: 0.3 k_0; 0: no
+ * such component), c_shape_Ns_m (absent: 0.6 sqrt(k'_0 m_0), a damping ratio of 0.3), frame ("body": anchors on the
+ * best-fit rigid frame, "world": on the rest position as in the paper; absent: world where a node is fixed, else body),
+ * refine (true; false: no such component), memory_MB (512; MiB of the body on its finest level with its components,
+ * tools and display). m_0 is the mass of a node of level 0.
  *
  * Departure: the paper gives spring constants as numbers. A triangular lattice of springs k has Young's modulus 2 k /
  * sqrt(3) in its plane (per length, Poisson ratio 1/3), so that a sheet of that thickness stretches as its material. */
@@ -26,21 +25,11 @@ typedef struct keys {
     bool refine;
 } keys;
 
-/* one of two words; *second tells which */
-static pal_err read_choice(pal_config_entry *item, const char *key, const char *a, const char *b, bool *second,
-                           pal_diagnostic *diag)
-{
-    const char *text = a;
-    PAL_TRY(pal_entry_read_text(item, key, &text, diag));
-    *second = !strcmp(text, b);
-    if (*second || !strcmp(text, a)) return PAL_ERR_OK;
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.%s: \"%s\", wanted \"%s\" or \"%s\"", item->path, key, text, a,
-                              b);
-}
-
 static pal_err read_keys(pal_config_entry *item, keys *out, pal_diagnostic *diag)
 {
-    bool paper, nodes, butterfly, world;
+    static const char *const laws[] = {"membrane", "paper"}, *const masses[] = {"faces", "nodes"};
+    static const char *const places[] = {"linear", "butterfly"}, *const frames[] = {"body", "world"};
+    int paper = 0, nodes = 0, butterfly = 0, frame = 0;
     double memory_MB = 512;
     *out = (keys){.adaptive = {.n_level = 2},
                   .thickness_m = 0.003,
@@ -59,20 +48,19 @@ static pal_err read_keys(pal_config_entry *item, keys *out, pal_diagnostic *diag
     PAL_TRY(pal_entry_read_number(item, "mass_kg", 1e-30, 1e30, &adaptive->mass_kg, diag));
     PAL_TRY(pal_entry_read_number(item, "k_spring_N_m", 1e-30, 1e60, &out->k_spring_N_m, diag));
     PAL_TRY(pal_entry_read_number(item, "c_spring_Ns_m", 0, 1e60, &out->c_spring_Ns_m, diag));
-    PAL_TRY(read_choice(item, "law", "membrane", "paper", &paper, diag));
-    PAL_TRY(read_choice(item, "mass", "faces", "nodes", &nodes, diag));
-    PAL_TRY(read_choice(item, "place", "linear", "butterfly", &butterfly, diag));
+    PAL_TRY(pal_entry_read_choice(item, "law", laws, 2, &paper, diag));
+    PAL_TRY(pal_entry_read_choice(item, "mass", masses, 2, &nodes, diag));
+    PAL_TRY(pal_entry_read_choice(item, "place", places, 2, &butterfly, diag));
     PAL_TRY(pal_entry_read_number(item, "k_shape_N_m", 0, 1e60, &out->k_shape_N_m, diag));
     PAL_TRY(pal_entry_read_number(item, "c_shape_Ns_m", 0, 1e60, &out->c_shape_Ns_m, diag));
-    PAL_TRY(read_choice(item, "frame", "body", "world", &world, diag));
-    bool given = pal_entry_has(item, "frame");
+    PAL_TRY(pal_entry_read_choice(item, "frame", frames, 2, &frame, diag));
     PAL_TRY(pal_entry_read_bool(item, "refine", &out->refine, diag));
     PAL_TRY(pal_entry_read_number(item, "memory_MB", 1, 1e6, &memory_MB, diag));
     adaptive->law = paper ? PAL_ADAPTIVE_PAPER : PAL_ADAPTIVE_MEMBRANE;
     adaptive->mass = nodes ? PAL_MASS_BY_NODES : PAL_MASS_BY_FACES;
     adaptive->place = butterfly ? PAL_MIDPOINT_BUTTERFLY : PAL_MIDPOINT_LINEAR;
     adaptive->budget_byte = (size_t)(memory_MB * 1048576);
-    out->frame = !given ? NULL : world ? "world" : "body";
+    out->frame = pal_entry_has(item, "frame") ? frames[frame] : NULL;
     return pal_entry_check_unused(item, diag);
 }
 
@@ -82,13 +70,11 @@ static double surface_mass(const pal_body_def *def, double thickness_m)
     double sum = 0;
     for (int t = 0; t < surface->n_tri; t++) {
         const double *x[3];
-        double e[2][3], n[3], middle[3];
+        double n[3], middle[3];
+        pal_material at;
         for (int c = 0; c < 3; c++) x[c] = surface->x + 3 * (size_t)surface->tri[3 * t + c];
         for (int c = 0; c < 3; c++) middle[c] = (x[0][c] + x[1][c] + x[2][c]) / 3;
-        pal_sub3(e[0], x[1], x[0]);
-        pal_sub3(e[1], x[2], x[0]);
-        pal_cross3(n, e[0], e[1]);
-        pal_material at;
+        pal_normal3(n, x[0], x[1], x[2]);
         pal_material_at(def, middle, &at);
         sum += at.density_kg_m3 * pal_norm3(n) / 2;
     }
@@ -111,8 +97,8 @@ static pal_err check_surface(const pal_body_def *def, const char *path, pal_diag
     return PAL_ERR_OK;
 }
 
-/* the levels' own sentence, and another way out where the surface is not one that can be split */
-static pal_err make_shell(const keys *k, const char *path, pal_build *build)
+/* a refusal names another model where the surface cannot be split */
+static pal_err make_surface(const keys *k, const char *path, pal_build *build)
 {
     const pal_surface *surface = &build->def->mesh->surface;
     pal_adaptive_surface *adaptive;
@@ -131,45 +117,38 @@ static void put(pal_config_entry *row, const char *key, double number)
     if (number >= 0) pal_entry_put_number(row, key, number, NULL);
 }
 
-static pal_err list_rows(const keys *k, const pal_config_entry *item, pal_build *build, pal_recipe *out)
+/* the components derive what the scene does not give, so that it follows a live material edit */
+static pal_err list(pal_config_entry *item, pal_build *build, pal_component_list *out)
 {
     const pal_body_def *def = build->def;
-    /* the rows derive what the scene does not give, so that it follows a live material edit */
     pal_config_entry *row = out->row;
+    keys k;
+    PAL_TRY(read_keys(item, &k, build->diag));
     pal_entry_init(row, item->path, "edge_spring");
-    put(row, "k_N_m", k->k_spring_N_m);
-    put(row++, "c_Ns_m", k->c_spring_Ns_m);
-    if (k->k_shape_N_m != 0) {
+    put(row, "k_N_m", k.k_spring_N_m);
+    put(row++, "c_Ns_m", k.c_spring_Ns_m);
+    if (k.k_shape_N_m != 0) {
         pal_entry_init(row, item->path, "shape_spring");
-        put(row, "k_N_m", k->k_shape_N_m);
-        put(row, "c_Ns_m", k->c_shape_Ns_m);
-        if (k->frame) PAL_TRY(pal_entry_put_text(row, "frame", k->frame, build->diag));
+        put(row, "k_N_m", k.k_shape_N_m);
+        put(row, "c_Ns_m", k.c_shape_Ns_m);
+        if (k.frame) PAL_TRY(pal_entry_put_text(row, "frame", k.frame, build->diag));
         row++;
     }
     if (def->material.damping_1_s > 0) pal_entry_init(row++, item->path, "viscous");
-    if (k->refine && k->adaptive.n_level > 1) pal_entry_init(row++, item->path, "refine");
+    if (k.refine && k.adaptive.n_level > 1) pal_entry_init(row++, item->path, "refine");
     if (!def->solver.name[0]) pal_entry_init(row++, item->path, "rk4");
     out->n_row = (int)(row - out->row);
     return PAL_ERR_OK;
 }
 
-static pal_err build(pal_config_entry *item, pal_build *build, pal_recipe *out)
-{
-    const pal_body_def *def = build->def;
-    keys k;
-    out->n_row = 0;
-    PAL_TRY(read_keys(item, &k, build->diag));
-    PAL_TRY(check_surface(def, item->path, build->diag));
-    if (k.adaptive.mass_kg == 0) k.adaptive.mass_kg = surface_mass(def, k.thickness_m);
-    PAL_TRY(make_shell(&k, item->path, build));
-    return list_rows(&k, item, build, out);
-}
-
-static pal_err list(pal_config_entry *item, pal_build *build, pal_recipe *out)
+static pal_err build(pal_config_entry *item, pal_build *build, pal_component_list *out)
 {
     keys k;
     PAL_TRY(read_keys(item, &k, build->diag));
-    return list_rows(&k, item, build, out);
+    PAL_TRY(check_surface(build->def, item->path, build->diag));
+    if (k.adaptive.mass_kg == 0) k.adaptive.mass_kg = surface_mass(build->def, k.thickness_m);
+    PAL_TRY(make_surface(&k, item->path, build));
+    return list(item, build, out);
 }
 
 const pal_model pal_model_adaptive_springs = {.name = "adaptive_springs", .build = build, .list = list};

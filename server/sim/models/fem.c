@@ -1,19 +1,19 @@
 /* Model fem: linear or quadratic tetrahedra, or one hexahedron per voxel, on the nodes of a prepared mesh.
  *
- * Keys: element ("hex8_bbar" | "hex8" | "tet4" | "tet10"; hex8_bbar where the prepared mesh has hexahedra, tet4 where
- * it has none), law (the row's: "corotational" | "linear" | "neo_hookean"), fill (true: mass and stiffness of a voxel
- * that the surface cuts are scaled by its filled share, at least 0.02 of it).
+ * Keys: element ("hex8_bbar" | "hex8" | "tet4" | "tet10"; hex8_bbar where the prepared mesh has hexahedra, else tet4),
+ * law ("corotational" | "linear" | "neo_hookean"), fill (true: mass and stiffness of a voxel that the surface cuts are
+ * scaled by its filled share, at least PAL_FILL_MIN).
  *
  * Components: hex_elastic or tet_elastic with the same keys, viscous where the material has damping, solver
- * implicit_euler. Under static_newton a neo_hookean body never recovers on its split, which is another material
- * (corotational, nu 0.3 at most): a corner inverted at a clamped edge is part of the discrete rest state, and the law
- * is sound there. Masses are lumped: equal shares to the corners; tet10 by Hinton, Rock and Zienkiewicz (1976), 1/36 of
- * an element to a corner and 4/27 to a middle node, which are all positive. tet10 puts the middle nodes behind the
- * mesh's own nodes, so that what speaks of the mesh's nodes (skin, slots, supports) stays true. */
+ * implicit_euler. Under static_newton a neo_hookean body never recovers on its split, which is another material: a
+ * corner inverted at a clamped edge is part of the discrete rest state. Masses are lumped: equal shares to the corners;
+ * tet10 by Hinton, Rock and Zienkiewicz (1976), 1/36 of an element to a corner and 4/27 to a middle node, which are all
+ * positive. tet10 has its middle nodes behind the mesh's own, whose numbers (skin, supports) stay true. */
 #include "server/base/vec3.h"
 #include "server/num/shape_functions.h"
 #include "server/sim/core/effect_list.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -23,24 +23,18 @@ typedef struct fem_choice {
     int n_corner;
 } fem_choice;
 
-static const float min_fill = 0.02f;
-
 static pal_err read_keys(pal_config_entry *item, const pal_build *build, fem_choice *to)
 {
     static const char *const names[] = {"hex8_bbar", "hex8", "tet4", "tet10"};
     static const int corners[] = {8, 8, 4, 10};
     const pal_prepared *mesh = build->def->mesh;
-    *to = (fem_choice){.element = mesh->hexes.n_hex > 0 ? "hex8_bbar" : "tet4", .fill = true};
-    PAL_TRY(pal_entry_read_text(item, "element", &to->element, build->diag));
+    int kind = mesh->hexes.n_hex > 0 ? 0 : 2;
+    *to = (fem_choice){.fill = true};
+    PAL_TRY(pal_entry_read_choice(item, "element", names, 4, &kind, build->diag));
     PAL_TRY(pal_entry_read_text(item, "law", &to->law, build->diag));
     PAL_TRY(pal_entry_read_bool(item, "fill", &to->fill, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
-    for (int i = 0; i < 4; i++)
-        if (!strcmp(to->element, names[i])) to->n_corner = corners[i];
-    if (to->n_corner == 0)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
-                                  "body \"%s\" %s.element: \"%s\" is none of hex8_bbar, hex8, tet4, tet10",
-                                  build->body->name, item->path, to->element);
+    to->element = names[kind], to->n_corner = corners[kind];
     to->hex = to->n_corner == 8;
     if (to->hex && mesh->hexes.n_hex == 0)
         return pal_diagnostic_set(
@@ -51,24 +45,24 @@ static pal_err read_keys(pal_config_entry *item, const pal_build *build, fem_cho
     return PAL_ERR_OK;
 }
 
-static pal_err list_rows(const pal_config_entry *item, const pal_build *build, const fem_choice *choice,
-                         pal_recipe *out)
+static pal_err list(pal_config_entry *item, pal_build *build, pal_component_list *out)
 {
-    out->n_row = 0;
-    pal_config_entry *row = &out->row[out->n_row++];
-    pal_entry_init(row, item->path, choice->hex ? "hex_elastic" : "tet_elastic");
-    PAL_TRY(pal_entry_put_text(row, "element", choice->element, build->diag));
-    if (choice->law) PAL_TRY(pal_entry_put_text(row, "law", choice->law, build->diag));
-    PAL_TRY(pal_entry_put_bool(row, "fill", choice->fill, build->diag));
-    bool own_law =
-        choice->law && !strcmp(choice->law, "neo_hookean") && !strcmp(build->def->solver.name, "static_newton");
+    pal_config_entry *row = out->row;
+    fem_choice k;
+    PAL_TRY(read_keys(item, build, &k));
+    pal_entry_init(row, item->path, k.hex ? "hex_elastic" : "tet_elastic");
+    PAL_TRY(pal_entry_put_text(row, "element", k.element, build->diag));
+    if (k.law) PAL_TRY(pal_entry_put_text(row, "law", k.law, build->diag));
+    PAL_TRY(pal_entry_put_bool(row, "fill", k.fill, build->diag));
+    const bool own_law = k.law && !strcmp(k.law, "neo_hookean") && !strcmp(build->def->solver.name, "static_newton");
     if (own_law) PAL_TRY(pal_entry_put_bool(row, "recover", false, build->diag));
-    if (build->def->material.damping_1_s > 0) pal_entry_init(&out->row[out->n_row++], item->path, "viscous");
-    if (!build->def->solver.name[0]) pal_entry_init(&out->row[out->n_row++], item->path, "implicit_euler");
+    if (build->def->material.damping_1_s > 0) pal_entry_init(++row, item->path, "viscous");
+    if (!build->def->solver.name[0]) pal_entry_init(++row, item->path, "implicit_euler");
+    out->n_row = (int)(row - out->row) + 1;
     return PAL_ERR_OK;
 }
 
-/* the tets with a middle node on every edge, numbered behind the corners; edges ascend by their first node */
+/* ten-node elements; edges ascend by their first node */
 static pal_err add_middles(const pal_tets *tets, const int32_t *edge, int n_edge, pal_arena *arena, int32_t **out)
 {
     int32_t *element = PAL_NEW(arena, int32_t, 10 * (size_t)tets->n_tet);
@@ -147,21 +141,20 @@ static pal_err make_fill(const pal_build *build, const fem_choice *choice)
     if (!choice->fill || !mesh->hexes.fill || !five_each(&mesh->tets, &mesh->hexes)) return PAL_ERR_OK;
     float *fill = PAL_NEW(build->arena, float, body->n_element);
     if (!fill) return PAL_ERR_MEMORY;
-    for (int e = 0; e < body->n_element; e++) {
-        float share = mesh->hexes.fill[choice->hex ? e : e / 5];
-        fill[e] = share > min_fill ? share : min_fill;
-    }
+    for (int e = 0; e < body->n_element; e++)
+        fill[e] = fmaxf(mesh->hexes.fill[choice->hex ? e : e / 5], (float)PAL_FILL_MIN);
     body->fill = fill;
     return PAL_ERR_OK;
 }
 
 static double element_volume(const pal_body *body, const int32_t *c)
 {
-    double e[3][3], n[3];
-    const int far[3] = {1, 2, body->n_corner == 8 ? 4 : 3};
-    for (int k = 0; k < 3; k++) pal_sub3(e[k], body->x_rest + 3 * c[far[k]], body->x_rest + 3 * c[0]);
-    pal_cross3(n, e[1], e[2]);
-    return pal_dot3(e[0], n) / (body->n_corner == 8 ? 1 : 6);
+    const double *x = body->x_rest, *o = x + 3 * c[0];
+    double e[3], n[3];
+    if (body->n_corner != 8) return pal_tet_volume(x, c);
+    pal_sub3(e, x + 3 * c[1], o);
+    pal_normal3(n, o, x + 3 * c[2], x + 3 * c[4]);
+    return pal_dot3(e, n);
 }
 
 static pal_err lump_mass(const pal_build *build)
@@ -185,27 +178,20 @@ static pal_err lump_mass(const pal_build *build)
     return PAL_ERR_OK;
 }
 
-static pal_err list(pal_config_entry *item, pal_build *build, pal_recipe *out)
-{
-    fem_choice choice;
-    PAL_TRY(read_keys(item, build, &choice));
-    return list_rows(item, build, &choice, out);
-}
-
-static pal_err build(pal_config_entry *item, pal_build *build, pal_recipe *out)
+static pal_err build(pal_config_entry *item, pal_build *build, pal_component_list *out)
 {
     const pal_prepared *mesh = build->def->mesh;
     pal_body *body = build->body;
     fem_choice choice;
     PAL_TRY(read_keys(item, build, &choice));
-    PAL_TRY(list_rows(item, build, &choice, out));
+    PAL_TRY(list(item, build, out));
     PAL_TRY(make_nodes(build, &choice));
     PAL_TRY(make_fill(build, &choice));
     PAL_TRY(lump_mass(build));
     body->tets = &mesh->tets;
     body->hexes = mesh->hexes.n_hex > 0 ? &mesh->hexes : NULL;
-    body->surface = &mesh->surface;
-    body->skin = mesh->skin.n_vertex > 0 ? &mesh->skin : NULL;
+    body->display.surface = &mesh->surface;
+    body->display.skin = mesh->skin.n_vertex > 0 ? &mesh->skin : NULL;
     body->edge_m = mesh->tets.edge_m;
     double lattice_m = choice.n_corner == 10 ? 0.5 * body->edge_m : body->edge_m;
     return pal_node_order_make(body->x_rest, body->n_node, lattice_m, build->arena, &body->node_order);

@@ -1,15 +1,11 @@
-/* Model subdivision_fem: control cells, subdivided into cubic, hexahedral and pyramidal finite elements whose nodes are
- * carried by the control points (paper A; subdivision_solid.h has the elements and the material at their Gauss points).
+/* Model subdivision_fem: control cells, subdivided into cubic, hexahedral and pyramidal finite elements (paper A;
+ * subdivision_solid.h has the elements and the material at their Gauss points). The solver moves the control points p;
+ * nodes are at d = A p (paper A, eq. 1). Supports fix control points, which are then no unknowns (paper A section 3.3).
+ * The boundary of the subdivided cells, without those behind a cut, is shown and touched. Above nu 0.3 at load, whole
+ * control cells conserve a part of the volume instead of each element (cell_volume.c).
  *
- * The solver moves the control points p; nodes stand at d = A p (paper A, eq. 1). Supports hold control points: those
- * inside a box or of the lowest part of the control cells, and what they hold is no unknown (paper A section 3.3). What
- * is shown and touched is the boundary of the subdivided cells; without the cells behind a cut where the body is cut.
- *
- * Elements that are inverted become patches until they are not (cell_recovery.c). Above nu 0.3, of what there is at
- * load, whole control cells keep a part of the volume instead of each element (cell_volume.c).
- *
- * Keys: levels (2; 0 to 8) of subdivision, rule ("maccracken_joy" | "averaging"), operator ("polar" | "edges", of the
- * row cell_elastic), memory_MB (512; of the solid).
+ * Keys: levels (2; 0 to 8) of subdivision, rule ("maccracken_joy" | "averaging"), operator ("polar" | "edges", of
+ * cell_elastic), memory_MB (512; of the solid).
  * Components: cell_elastic, viscous where the material has damping, solver central_cg. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
@@ -17,33 +13,27 @@
 #include "server/sim/subdivision/subdivision_mass.h"
 #include "server/sim/subdivision/subdivision_solid.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 typedef struct keys {
     pal_subdivision_options subdivision;
-    const char *operator; /* NULL: the row's own */
+    const char *operator; /* NULL: the component's default */
     double memory_MB;
 } keys;
 
 static pal_err read_keys(pal_config_entry *item, keys *out, pal_diagnostic *diag)
 {
     static const char *const rule[] = {"maccracken_joy", "averaging"}, *const operator[] = {"polar", "edges"};
-    const char *asked = rule[0];
+    int rule_kind = 0, operator_kind = 0;
     *out = (keys){.subdivision = {.n_level = 2}, .memory_MB = 512};
     PAL_TRY(pal_entry_read_count(item, "levels", 0, PAL_SUBDIVISION_MAX, &out->subdivision.n_level, diag));
-    PAL_TRY(pal_entry_read_text(item, "rule", &asked, diag));
-    PAL_TRY(pal_entry_read_text(item, "operator", &out->operator, diag));
+    PAL_TRY(pal_entry_read_choice(item, "rule", rule, 2, &rule_kind, diag));
+    PAL_TRY(pal_entry_read_choice(item, "operator", operator, 2, &operator_kind, diag));
     PAL_TRY(pal_entry_read_number(item, "memory_MB", 1, 1e6, &out->memory_MB, diag));
     PAL_TRY(pal_entry_check_unused(item, diag));
-    if (strcmp(asked, rule[0]) != 0 && strcmp(asked, rule[1]) != 0)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.rule: \"%s\", wanted \"%s\" or \"%s\"", item->path, asked,
-                                  rule[0], rule[1]);
-    if (out->operator&& strcmp(out->operator, operator[0]) != 0 && strcmp(out->operator, operator[1]) != 0)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s.operator: \"%s\", wanted \"%s\" or \"%s\"", item->path,
-                                  out->operator, operator[0], operator[1]);
-    out->subdivision.rule = strcmp(asked, rule[0]) ? PAL_SUBDIVISION_AVERAGING : PAL_SUBDIVISION_MACCRACKEN_JOY;
+    if (pal_entry_has(item, "operator")) out->operator= operator[operator_kind];
+    out->subdivision.rule = rule_kind ? PAL_SUBDIVISION_AVERAGING : PAL_SUBDIVISION_MACCRACKEN_JOY;
     out->subdivision.budget_byte = (size_t)(out->memory_MB * 1048576);
     return PAL_ERR_OK;
 }
@@ -85,24 +75,17 @@ static pal_err keep_boundary(const boundary *from, pal_build *build)
     memcpy(x, from->surface.x, 3 * n * sizeof *x);
     memcpy(tri, from->surface.tri, 3 * m * sizeof *tri);
     memcpy(node, from->node, n * sizeof *node);
-    /* control faces between two cells are no part of the control cells' boundary, where faces are taken hold of */
+    /* a face between two control cells cannot be grasped */
     for (size_t t = 0; t < m; t++) {
         int32_t control = origin[from->face[t]];
         face[t] = control >= 0 && pal_cells_face_boundary(build->def->cells, control) ? control : -1;
     }
     *surface = (pal_surface){.n_vertex = from->surface.n_vertex, .n_tri = from->surface.n_tri, .x = x, .tri = tri};
     memcpy(surface->origin_m, build->def->mesh->surface.origin_m, sizeof surface->origin_m);
-    build->body->surface = surface;
-    build->body->shown_node = node;
-    build->body->shown_face = face;
+    build->body->display.surface = surface;
+    build->body->display.shown_node = node;
+    build->body->display.shown_face = face;
     return PAL_ERR_OK;
-}
-
-static bool cut_away(const pal_body_def *def, const pal_cells *cells, int32_t cell)
-{
-    double middle[3];
-    pal_cells_cell_centre(cells, NULL, cell, middle);
-    return pal_dot3(def->cut_normal, middle) > def->cut_m;
 }
 
 /* triangles of a face as the cell of one use sees it, quads cut by their shorter diagonal, others as fans */
@@ -110,10 +93,9 @@ static void add_face(const pal_cells *cells, int32_t use, boundary *b)
 {
     const pal_edge_use *corner = cells->edge_use + cells->face_use[use].first_use;
     int n = cells->face_use[use + 1].first_use - cells->face_use[use].first_use, from = 0;
-    const double *x = cells->x;
-    if (n == 4 && pal_dist3(x + 3 * (size_t)corner[1].vertex, x + 3 * (size_t)corner[3].vertex) <
-                      pal_dist3(x + 3 * (size_t)corner[0].vertex, x + 3 * (size_t)corner[2].vertex))
-        from = 1;
+    const double *x[4];
+    for (int k = 0; k < 4 && n == 4; k++) x[k] = cells->x + 3 * (size_t)corner[k].vertex;
+    if (n == 4 && pal_dist3(x[1], x[3]) < pal_dist3(x[0], x[2])) from = 1;
     for (int k = 1; k + 1 < n; k++) {
         int32_t *tri = b->surface.tri + 3 * (size_t)b->surface.n_tri;
         for (int c = 0; c < 3; c++) tri[c] = corner[(from + (c == 0 ? 0 : k + c - 1)) % n].vertex;
@@ -144,7 +126,11 @@ static pal_err find_cut(const pal_cells *cells, const pal_body_def *def, boundar
     b->node = malloc(sizeof(int32_t) * (size_t)cells->n_vertex);
     b->face = malloc(sizeof(int32_t) * (size_t)cells->n_edge_use);
     bool made = place && away && b->surface.x && b->surface.tri && b->node && b->face;
-    for (int32_t c = 0; c < cells->n_cell && made; c++) away[c] = cut_away(def, cells, c);
+    for (int32_t c = 0; c < cells->n_cell && made; c++) {
+        double middle[3];
+        pal_cells_cell_centre(cells, NULL, c, middle);
+        away[c] = pal_dot3(def->cut_normal, middle) > def->cut_m;
+    }
     for (int32_t f = 0; f < cells->n_face && made; f++) {
         const int32_t *use = cells->face[f].use;
         bool left[2] = {!away[cells->face_use[use[0]].cell], use[1] >= 0 && !away[cells->face_use[use[1]].cell]};
@@ -155,7 +141,6 @@ static pal_err find_cut(const pal_cells *cells, const pal_body_def *def, boundar
     return made ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
-/* virtual nodes stand inside cells and are never shown */
 static pal_err show_boundary(const pal_config_entry *item, pal_build *build)
 {
     boundary b = {.node = NULL};
@@ -171,7 +156,7 @@ static pal_err show_boundary(const pal_config_entry *item, pal_build *build)
     return err;
 }
 
-/* points as given, nodes carried by them; masses follow once what is held is known (subdivision_body.h) */
+/* masses follow once the fixed points are known (subdivision_body.h) */
 static pal_err make_body(const pal_config_entry *item, pal_build *build)
 {
     pal_body *body = build->body;
@@ -192,11 +177,13 @@ static pal_err make_body(const pal_config_entry *item, pal_build *build)
     return show_boundary(item, build);
 }
 
-static pal_err list_rows(const keys *k, const pal_config_entry *item, pal_build *build, pal_recipe *out)
+static pal_err list(pal_config_entry *item, pal_build *build, pal_component_list *out)
 {
     pal_config_entry *row = out->row;
+    keys k;
+    PAL_TRY(read_keys(item, &k, build->diag));
     pal_entry_init(row, item->path, "cell_elastic");
-    if (k->operator) PAL_TRY(pal_entry_put_text(row, "operator", k->operator, build->diag));
+    if (k.operator) PAL_TRY(pal_entry_put_text(row, "operator", k.operator, build->diag));
     row++;
     if (build->def->material.damping_1_s > 0) pal_entry_init(row++, item->path, "viscous");
     if (!build->def->solver.name[0]) pal_entry_init(row++, item->path, "central_cg");
@@ -204,20 +191,13 @@ static pal_err list_rows(const keys *k, const pal_config_entry *item, pal_build 
     return PAL_ERR_OK;
 }
 
-static pal_err build(pal_config_entry *item, pal_build *build, pal_recipe *out)
+static pal_err build(pal_config_entry *item, pal_build *build, pal_component_list *out)
 {
     keys k;
     PAL_TRY(read_keys(item, &k, build->diag));
     PAL_TRY(make_solid(&k, item, build));
     PAL_TRY(make_body(item, build));
-    return list_rows(&k, item, build, out);
-}
-
-static pal_err list(pal_config_entry *item, pal_build *build, pal_recipe *out)
-{
-    keys k;
-    PAL_TRY(read_keys(item, &k, build->diag));
-    return list_rows(&k, item, build, out);
+    return list(item, build, out);
 }
 
 const pal_model pal_model_subdivision_fem = {.name = "subdivision_fem", .build = build, .list = list};

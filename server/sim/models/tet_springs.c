@@ -2,40 +2,34 @@
  * volumes (paper B section 4.1, corrected: README of sim).
  *
  * Keys: k_distance_J, k_area_J, k_volume_J (absent: derived from E, nu and h; 0: no such component), c_distance_Js,
- * c_area_Js, c_volume_Js (damping of the constraint, default 0), weights ("equal": every spring of a row has its
- * constant, "volume": in proportion to the volume and size it stands for, spring_law.h; absent: equal where constants
- * are given, volume where they are derived), fill (true: where the surface cuts voxels and the mesh knows their filled
- * shares, weights by volume and masses count only what is inside, as model fem has it), recover (true: what is turned
- * over comes back, spring_recovery.h; false: it may rest so).
+ * c_area_Js, c_volume_Js (damping of the constraint, 0), weights ("equal": every spring of a kind has its constant,
+ * "volume": in proportion to its volume and size, spring_law.h; absent: equal where constants are given, volume where
+ * they are derived), fill (true: where the surface cuts voxels of known filled shares, weights by volume and masses
+ * count the part inside), recover (true: recovery from inversion, spring_recovery.h; not with gravity).
  *
- * Regions of the body: what follows from the material, derived constants and masses, is of each tetrahedron's own
- * (spring_law.h); constants that are given stand for all of them.
- *
- * Constants that vary over the body stand on the body's spring_grid (paper B section 3.5) in place of their keys; with
- * a grid there are area springs only when it, or the key, gives their constant. Where k_area_J is 0 the derived
- * constants of edges and volumes give the same moduli without it: a row less, about half the time. The row `viscous`
- * exists when the material's damping rate is given. */
+ * Derived constants and masses follow the regions of the body, given ones hold for all of them. Constants that vary
+ * over the body are on its spring_grid (paper B section 3.5) in place of their keys; with a grid there are area springs
+ * only when it, or the key, gives their constant. With k_area_J 0 the derived constants of edges and volumes give the
+ * same moduli without area springs, in about half the time. */
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/springs/spring_recovery.h"
 
-#include <math.h>
 #include <string.h>
 
-static const float min_fill = 0.02F;
-
-/* quarter of each tetrahedron's mass to its corners, of the material at its centre; fill [n_tet] may be NULL */
+/* a quarter of each tetrahedron's mass, of the material at its centre, to each corner; fill [n_tet] may be NULL */
 static void lump_mass(const pal_body_def *def, const pal_tets *tets, const float *fill, double *mass_kg)
 {
     for (int t = 0; t < tets->n_tet; t++) {
         const int32_t *c = tets->tet + 4 * t;
-        double e[3][3], n[3], centre[3] = {0};
+        const double *x = tets->x, *o = x + 3 * c[0];
+        double e[3], n[3], centre[3] = {0};
         pal_material at;
-        for (int k = 0; k < 4; k++) pal_axpy3(centre, 0.25, tets->x + 3 * c[k]);
+        for (int k = 0; k < 4; k++) pal_axpy3(centre, 0.25, x + 3 * c[k]);
         pal_material_at(def, centre, &at);
-        for (int k = 0; k < 3; k++) pal_sub3(e[k], tets->x + 3 * c[k + 1], tets->x + 3 * c[0]);
-        pal_cross3(n, e[1], e[2]);
-        double quarter = at.density_kg_m3 * pal_dot3(e[0], n) / 24 * (fill ? (double)fill[t] : 1);
+        pal_sub3(e, x + 3 * c[1], o);
+        pal_normal3(n, o, x + 3 * c[2], x + 3 * c[3]);
+        double quarter = at.density_kg_m3 * pal_dot3(e, n) / 24 * (fill ? (double)fill[t] : 1);
         for (int k = 0; k < 4; k++) mass_kg[c[k]] += quarter;
     }
 }
@@ -44,7 +38,6 @@ static const char *const effect_name[3] = {"edge_distance", "face_area", "tet_vo
                          *const k_key[3] = {"k_distance_J", "k_area_J", "k_volume_J"},
                          *const c_key[3] = {"c_distance_Js", "c_area_Js", "c_volume_Js"};
 
-/* no area springs: the others bear their share */
 static pal_err is_without_area(pal_config_entry *item, const pal_spring_grid *grid, bool *out, pal_diagnostic *diag)
 {
     bool on_grid = grid->k_J[PAL_SPRING_DISTANCE] || grid->k_J[PAL_SPRING_AREA] || grid->k_J[PAL_SPRING_VOLUME];
@@ -54,8 +47,8 @@ static pal_err is_without_area(pal_config_entry *item, const pal_spring_grid *gr
     return PAL_ERR_OK;
 }
 
-static pal_err add_spring(pal_config_entry *item, pal_spring_kind kind, const pal_spring_grid *grid, pal_recipe *out,
-                          pal_diagnostic *diag)
+static pal_err add_spring(pal_config_entry *item, pal_spring_kind kind, const pal_spring_grid *grid,
+                          pal_component_list *out, pal_diagnostic *diag)
 {
     double k_J = -1, c_Js = 0;
     bool without_area = false;
@@ -77,7 +70,7 @@ static pal_err add_spring(pal_config_entry *item, pal_spring_kind kind, const pa
     return PAL_ERR_OK;
 }
 
-/* weights by volume count a cut voxel by its filled share; constants that are equal for all know nothing of shares */
+/* the filled shares, for weights by volume alone */
 static pal_err take_fill(pal_config_entry *item, pal_build *build)
 {
     const pal_prepared *mesh = build->def->mesh;
@@ -96,12 +89,12 @@ static pal_err take_fill(pal_config_entry *item, pal_build *build)
     float *share = PAL_NEW(build->arena, float, mesh->tets.n_tet);
     if (!share) return PAL_ERR_MEMORY;
     /* a voxel that is only touched keeps a floor, so that no node is without mass */
-    for (int t = 0; t < mesh->tets.n_tet; t++) share[t] = fmaxf(mesh->hexes.fill[t / 5], min_fill);
+    for (int t = 0; t < mesh->tets.n_tet; t++) share[t] = fmaxf(mesh->hexes.fill[t / 5], (float)PAL_FILL_MIN);
     build->body->fill = share;
     return PAL_ERR_OK;
 }
 
-static pal_err list(pal_config_entry *item, pal_build *build, pal_recipe *out)
+static pal_err list(pal_config_entry *item, pal_build *build, pal_component_list *out)
 {
     out->n_row = 0;
     for (int kind = PAL_SPRING_DISTANCE; kind <= PAL_SPRING_VOLUME; kind++)
@@ -111,14 +104,14 @@ static pal_err list(pal_config_entry *item, pal_build *build, pal_recipe *out)
     return PAL_ERR_OK;
 }
 
-static pal_err build(pal_config_entry *item, pal_build *build, pal_recipe *out)
+static pal_err build(pal_config_entry *item, pal_build *build, pal_component_list *out)
 {
     const pal_prepared *mesh = build->def->mesh;
     pal_body *body = build->body;
     PAL_TRY(pal_spring_grid_check(build->def, build->diag));
     PAL_TRY(list(item, build, out));
     PAL_TRY(take_fill(item, build));
-    /* patches are softer than springs: what hangs by its weight would be drawn out; and explicit solvers look */
+    /* regions are softer than springs, so weight would stretch them; explicit solvers alone look for inversions */
     const char *solver = build->def->solver.name;
     bool can = !solver[0] || !strcmp(solver, "verlet") || !strcmp(solver, "rk4");
     for (int i = 0; i < build->def->n_effect; i++) can = can && strcmp(build->def->effect[i].name, "gravity") != 0;
@@ -138,8 +131,8 @@ static pal_err build(pal_config_entry *item, pal_build *build, pal_recipe *out)
             return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "body \"%s\": node %d has mass %g kg", body->name,
                                       i, body->mass_kg[i]);
     body->tets = &mesh->tets;
-    body->surface = &mesh->surface;
-    body->skin = mesh->skin.n_vertex > 0 ? &mesh->skin : NULL;
+    body->display.surface = &mesh->surface;
+    body->display.skin = mesh->skin.n_vertex > 0 ? &mesh->skin : NULL;
     body->edge_m = mesh->tets.edge_m;
     if (recover) PAL_TRY(pal_spring_recovery_make(body->n_node, build->arena, &body->recovery));
     return pal_node_order_make(body->x_rest, body->n_node, body->edge_m, build->arena, &body->node_order);

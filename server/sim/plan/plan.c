@@ -4,9 +4,7 @@
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/plan/plan_requests.h"
-#include "server/sim/subdivision/subdivision_body.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -24,27 +22,6 @@ static pal_err fix_rim(pal_body *body, int index, pal_diagnostic *diag)
     for (int i = 0; i < body->n_dof; i++)
         if (pal_levels_on_boundary(levels, i)) body->support[i] = PAL_FIXED;
     return PAL_ERR_OK;
-}
-
-static pal_err hold(pal_body *body, const pal_body_def *def, const double up[3], pal_diagnostic *diag)
-{
-    for (int s = 0; s < def->n_support; s++) {
-        if (def->support[s].rim) PAL_TRY(fix_rim(body, s, diag));
-        pal_support_mark_fixed(&def->support[s], up, body->x_rest, body->n_dof, body->support);
-    }
-    return PAL_ERR_OK;
-}
-
-static double box_diagonal(const pal_body *body)
-{
-    double low[3], high[3];
-    for (int c = 0; c < 3; c++) low[c] = INFINITY, high[c] = -INFINITY;
-    for (int i = 0; i < body->n_node; i++)
-        for (int c = 0; c < 3; c++) {
-            low[c] = fmin(low[c], body->node_rest[3 * i + c]);
-            high[c] = fmax(high[c], body->node_rest[3 * i + c]);
-        }
-    return pal_dist3(low, high);
 }
 
 static const double *mesh_origin(const pal_prepared *mesh)
@@ -67,10 +44,16 @@ static pal_err build_body(pal_plan_requests *s, const pal_scene *scene)
                                   def->model.name);
     pal_config_entry *own = s->own;
     *own = def->model;
-    PAL_TRY(model->build(own, &s->build, &s->recipe));
-    PAL_TRY(hold(body, def, scene->up, s->build.diag));
+    PAL_TRY(model->build(own, &s->build, &s->from_model));
+    for (int k = 0; k < def->n_support; k++) {
+        if (def->support[k].rim) PAL_TRY(fix_rim(body, k, s->build.diag));
+        pal_support_mark_fixed(&def->support[k], scene->up, body->x_rest, body->n_dof, body->support);
+    }
     if (body->dofs.update_mass) body->dofs.update_mass(body);
-    body->length_scale_m = box_diagonal(body);
+    double low[3], high[3];
+    pal_box3_empty(low, high);
+    for (int i = 0; i < body->n_node; i++) pal_box3_add(low, high, body->node_rest + 3 * (size_t)i);
+    body->length_scale_m = pal_dist3(low, high);
     body->load_cap_N = pal_body_load_cap_N(body, def->material.young_Pa);
     if (body->tets || body->interpolation)
         body->full_corner_kg = def->material.density_kg_m3 * pow(body->edge_m, 3) / 8;
@@ -80,8 +63,8 @@ static pal_err build_body(pal_plan_requests *s, const pal_scene *scene)
     return pal_plan_requests_collect(s);
 }
 
-/* the sentences of a body's rows, in one piece of memory */
-static pal_err explain(const pal_plan_requests *s, pal_component *row, int n_row, const char **reason)
+/* the sentences of the components of a body, in one piece of memory */
+static pal_err explain(const pal_plan_requests *s, pal_component *list, int n_component, const char **reason)
 {
     size_t n_byte = 0, used = 0;
     for (int i = 0; i < s->n_request; i++) n_byte += pal_plan_request_reason(s, &s->request[i], NULL, 0) + 1;
@@ -90,22 +73,16 @@ static pal_err explain(const pal_plan_requests *s, pal_component *row, int n_row
     *reason = text;
     for (int i = 0; i < s->n_request; i++) {
         size_t n = pal_plan_request_reason(s, &s->request[i], text + used, n_byte - used);
-        for (int k = 0; k < n_row; k++)
-            if (row[k].effect == s->request[i].effect) row[k].reason = text + used;
+        for (int k = 0; k < n_component; k++)
+            if (list[k].effect == s->request[i].effect) list[k].reason = text + used;
         used += n + 1;
     }
     return PAL_ERR_OK;
 }
 
-/* does the row say what the body shows? */
-static bool shows(const pal_plan_request *request)
+static pal_err make_components(pal_plan_requests *s, pal_component *list, int *n_component)
 {
-    return request->effect->stage == PAL_STAGE_OUTPUT && strcmp(request->effect->name, "field_output") != 0;
-}
-
-static pal_err make_rows(pal_plan_requests *s, pal_component *row, int *n_row)
-{
-    int n_solve = 0, first = *n_row;
+    int n_solve = 0, first = *n_component;
     const char *name = s->build.body->name;
     for (int i = 0; i < s->n_request; i++) s->build.body->implicit |= s->request[i].effect->implicit;
     for (int i = 0; i < s->n_request; i++) {
@@ -121,10 +98,11 @@ static pal_err make_rows(pal_plan_requests *s, pal_component *row, int *n_row)
         for (int i = 0; i < s->n_request; i++) {
             pal_stage stage = s->request[i].effect->stage;
             if (pass != (stage == PAL_STAGE_OUTPUT ? 0 : stage == PAL_STAGE_SOLVE ? 2 : 1)) continue;
-            s->build.made = row + first, s->build.n_made = *n_row - first;
-            pal_component *r = &row[(*n_row)++];
-            /* what a body shows stays with it, its other rows may be switched off */
-            PAL_TRY(pal_plan_requests_make(s, &s->request[i], shows(&s->request[i]), r));
+            s->build.made = list + first, s->build.n_made = *n_component - first;
+            pal_component *r = &list[(*n_component)++];
+            /* what a body shows is never switched off: it shares the body's memory */
+            const bool shown = stage == PAL_STAGE_OUTPUT && strcmp(s->request[i].effect->name, "field_output") != 0;
+            PAL_TRY(pal_plan_requests_make(s, &s->request[i], shown, r));
             n_solve += r->effect->stage == PAL_STAGE_SOLVE;
         }
     if (n_solve != 1)
@@ -132,16 +110,16 @@ static pal_err make_rows(pal_plan_requests *s, pal_component *row, int *n_row)
     return PAL_ERR_OK;
 }
 
-/* rows made body by body -> by stage, then body */
-static void sort_rows(pal_plan *plan, const pal_component *made, const int *made_body)
+/* components made body by body -> by stage, then body */
+static void sort_components(pal_plan *plan, const pal_component *made, const int *made_body)
 {
     int n = 0;
     for (int stage = 0; stage < PAL_STAGE_COUNT; stage++)
         for (int b = 0; b < plan->n_body; b++) {
             plan->first[stage][b] = n;
-            for (int i = 0; i < plan->n_row; i++)
+            for (int i = 0; i < plan->n_component; i++)
                 if (made_body[i] == b && made[i].effect->stage == (pal_stage)stage) {
-                    plan->row[n] = made[i];
+                    plan->component[n] = made[i];
                     plan->component_body[n++] = b;
                 }
             plan->n_of[stage][b] = n - plan->first[stage][b];
@@ -174,30 +152,28 @@ static pal_err build_all(const pal_scene *scene, pal_arena *arena, pal_diagnosti
     for (int b = 0; b < scene->n_body; b++) {
         s->build =
             (pal_build){.scene = scene, .def = &scene->body[b], .body = &out->body[b], .arena = arena, .diag = diag};
-        int before = out->n_row;
+        int before = out->n_component;
         size_t before_byte = pal_arena_used(arena);
         PAL_TRY(build_body(s, scene));
-        PAL_TRY(make_rows(s, made, &out->n_row));
-        PAL_TRY(explain(s, made + before, out->n_row - before, &out->reason[b]));
-        size_t row_byte = 0;
-        for (int i = before; i < out->n_row; i++) row_byte += made[i].arena ? made[i].n_byte : 0;
-        PAL_TRY(check_memory(s, pal_arena_used(arena) - before_byte + row_byte));
-        for (int i = before; i < out->n_row; i++) made_body[i] = b;
-        /* rows of springs have said by now what they stand for */
+        PAL_TRY(make_components(s, made, &out->n_component));
+        PAL_TRY(explain(s, made + before, out->n_component - before, &out->reason[b]));
+        size_t component_byte = 0;
+        for (int i = before; i < out->n_component; i++) component_byte += made[i].arena ? made[i].n_byte : 0;
+        PAL_TRY(check_memory(s, pal_arena_used(arena) - before_byte + component_byte));
+        for (int i = before; i < out->n_component; i++) made_body[i] = b;
+        /* springs have set the modulus that they stand for */
         out->body[b].load_cap_N = pal_body_load_cap_N(&out->body[b], scene->body[b].material.young_Pa);
         if (s->build.scratch_byte > out->scratch_byte) out->scratch_byte = s->build.scratch_byte;
     }
-    out->row = PAL_NEW(arena, pal_component, out->n_row);
-    out->component_body = PAL_NEW(arena, int, out->n_row);
-    if (!out->row || !out->component_body) return PAL_ERR_MEMORY;
-    sort_rows(out, made, made_body);
-    out->n_load = out->n_row;
-    out->load_component = out->row;
-    out->load_component_body = out->component_body;
+    out->n_max = out->n_component + PAL_PLAN_INSERTED_MAX * out->n_body;
+    out->component = PAL_NEW(arena, pal_component, out->n_max);
+    out->component_body = PAL_NEW(arena, int, out->n_max);
+    if (!out->component || !out->component_body) return PAL_ERR_MEMORY;
+    sort_components(out, made, made_body);
     return PAL_ERR_OK;
 }
 
-/* what bodies own beside the arena */
+/* frees what bodies own beside the arena */
 static void free_models(pal_plan *plan)
 {
     for (int b = 0; b < plan->n_body && plan->body; b++)
@@ -211,8 +187,8 @@ pal_err pal_plan_build(const pal_scene *scene, pal_arena *arena, pal_diagnostic 
     *out = (pal_plan){0};
     pal_component made[PAL_BODY_MAX * PAL_PLAN_REQUEST_MAX] = {{0}};
     pal_err err = build_all(scene, arena, diag, s, made, out);
-    /* rows that were made before something was refused */
-    for (int i = 0; err && i < out->n_row; i++) pal_plan_destroy_component(&made[i]);
+    /* components that were made before something was refused */
+    for (int i = 0; err && i < out->n_component; i++) pal_plan_destroy_component(&made[i]);
     if (err) {
         free_models(out);
         *out = (pal_plan){0};
@@ -223,9 +199,7 @@ pal_err pal_plan_build(const pal_scene *scene, pal_arena *arena, pal_diagnostic 
 
 void pal_plan_free(pal_plan *plan)
 {
-    for (int i = 0; i < plan->n_row; i++) pal_plan_destroy_component(&plan->row[i]);
-    plan->n_row = 0;
-    if (plan->row != plan->load_component) free(plan->row);
-    plan->row = plan->load_component = NULL;
+    for (int i = 0; i < plan->n_component; i++) pal_plan_destroy_component(&plan->component[i]);
+    plan->n_component = 0;
     free_models(plan);
 }

@@ -16,7 +16,8 @@ static pal_err add_request(pal_plan_requests *s, pal_config_entry *item, bool re
     for (int i = 0; i < s->n_request; i++) {
         bool solver = effect->stage == PAL_STAGE_SOLVE && s->request[i].effect->stage == PAL_STAGE_SOLVE;
         if (s->request[i].effect != effect && !solver) continue;
-        bool models = s->request[i].item >= s->recipe.row && s->request[i].item < s->recipe.row + PAL_ENTRIES_MAX;
+        bool models =
+            s->request[i].item >= s->from_model.row && s->request[i].item < s->from_model.row + PAL_ENTRIES_MAX;
         if (!replaces || !models)
             return pal_diagnostic_set(s->build.diag, PAL_ERR_REFUSED, "body \"%s\" %s: a second row of \"%s\"", body,
                                       item->path, item->name);
@@ -42,23 +43,17 @@ static pal_err add_named(pal_plan_requests *s, pal_config_entry *own, const pal_
     return PAL_ERR_OK;
 }
 
-/* an adaptive body is its own surface, a solid shows its boundary: what skin_output, the default, would put between
- * them is not there */
-static void choose_output(const pal_body *body, pal_config_entry *output)
-{
-    if ((body->active || body->interpolation) && !strcmp(output->name, "skin_output"))
-        snprintf(output->name, sizeof output->name, "surface_output");
-}
-
 pal_err pal_plan_requests_collect(pal_plan_requests *s)
 {
     const pal_body_def *def = s->build.def;
     pal_config_entry *own = s->own;
     s->n_request = 0;
-    for (int i = 0; i < s->recipe.n_row; i++) PAL_TRY(add_request(s, &s->recipe.row[i], false));
+    for (int i = 0; i < s->from_model.n_row; i++) PAL_TRY(add_request(s, &s->from_model.row[i], false));
     /* what is shown comes before the entries, so that a component field_output finds it */
     pal_config_entry output = def->output;
-    choose_output(s->build.body, &output);
+    /* an adaptive body is its own surface and a solid shows its boundary: they have no skin */
+    if ((s->build.body->active || s->build.body->interpolation) && !strcmp(output.name, "skin_output"))
+        snprintf(output.name, sizeof output.name, "surface_output");
     PAL_TRY(add_named(s, ++own, &output, PAL_STAGE_OUTPUT));
     for (int i = 0; i < def->n_effect; i++) {
         *++own = def->effect[i];
@@ -67,40 +62,38 @@ pal_err pal_plan_requests_collect(pal_plan_requests *s)
     return add_named(s, ++own, &def->solver, PAL_STAGE_SOLVE);
 }
 
-/* a row's own memory begins with a block of this size and grows by such */
-enum { ROW_BLOCK = 4096 };
-
-pal_err pal_plan_requests_make(pal_plan_requests *s, const pal_plan_request *request, bool shared, pal_component *row)
+pal_err pal_plan_requests_make(pal_plan_requests *s, const pal_plan_request *request, bool shared,
+                               pal_component *component)
 {
     pal_arena *body_arena = s->build.arena;
-    pal_arena *own = shared ? NULL : pal_arena_create(ROW_BLOCK, true);
+    pal_arena *own = shared ? NULL : pal_arena_create(PAL_COMPONENT_BLOCK, true);
     if (!shared && !own) return PAL_ERR_MEMORY;
     size_t before = shared ? pal_arena_used(body_arena) : 0;
-    *row = (pal_component){.effect = request->effect, .arena = own, .reason = ""};
+    *component = (pal_component){.effect = request->effect, .arena = own, .reason = ""};
     s->build.body_arena = body_arena;
     s->build.arena = own ? own : body_arena;
-    pal_err err = request->effect->make(request->item, &s->build, &row->self);
-    row->n_byte = pal_arena_used(s->build.arena) - before;
+    pal_err err = request->effect->make(request->item, &s->build, &component->self);
+    component->n_byte = pal_arena_used(s->build.arena) - before;
     s->build.arena = body_arena;
     return err;
 }
 
-void pal_plan_destroy_component(pal_component *row)
+void pal_plan_destroy_component(pal_component *component)
 {
-    if (row->self && row->effect->destroy) row->effect->destroy(row->self);
-    pal_arena_destroy(row->arena);
-    row->self = NULL, row->arena = NULL;
+    if (component->self && component->effect->destroy) component->effect->destroy(component->self);
+    pal_arena_destroy(component->arena);
+    component->self = NULL, component->arena = NULL;
 }
 
-/* where a request comes from: the model's recipe, the solver or output of the scene, or an effect of it */
+/* where a request comes from: the model's components, the solver or output of the scene, or an effect of it */
 size_t pal_plan_request_reason(const pal_plan_requests *s, const pal_plan_request *request, char *text, size_t n_byte)
 {
     const pal_config_entry *model = &s->own[0], *item = request->item;
     const pal_body_def *def = s->build.def;
-    bool recipe = item >= s->recipe.row && item < s->recipe.row + PAL_ENTRIES_MAX;
-    if (recipe && request->effect->drag)
+    bool from_model = item >= s->from_model.row && item < s->from_model.row + PAL_ENTRIES_MAX;
+    if (from_model && request->effect->drag)
         return (size_t)snprintf(text, n_byte, "material.damping_1_s %g of body \"%s\"", def->material.damping_1_s,
                                 def->name);
-    if (recipe) return (size_t)snprintf(text, n_byte, "%s \"%s\"", model->path, model->name);
+    if (from_model) return (size_t)snprintf(text, n_byte, "%s \"%s\"", model->path, model->name);
     return (size_t)snprintf(text, n_byte, "%s \"%s\"", item->path, item->name);
 }

@@ -2,13 +2,9 @@
 #include "server/sim/recovery/stiffening_damper.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/recovery/tuning.h"
 
 #include <math.h>
-
-/* the damper begins when the energy rises more than tenfold and would move the body by more than its length scale in a
- * second; it lasts 8 times 1/w, when exp(-8) of the motion is left, or 0.1 s after the last increase
- * (tests/sim/recovery/test_stiffening_damper.c) */
-static const double min_speed_S_s = 1, min_rise = 10, still_periods = 8, hold_s = 0.1;
 
 /* sum m u^2 of the free dofs, and their mass */
 static double displacement_kg_m2(const pal_body *body, double *mass_kg)
@@ -28,13 +24,13 @@ static double displacement_kg_m2(const pal_body *body, double *mass_kg)
 void pal_stiffening_damper_begin(pal_body *body, double before_J, double after_J)
 {
     double mass, sum = displacement_kg_m2(body, &mass);
-    double max = min_speed_S_s * body->length_scale_m, work = after_J - before_J;
-    if (!(after_J > min_rise * before_J * (1 + 1e-9))) return;
+    double max = body->length_scale_m, work = after_J - before_J;
+    if (!(after_J > PAL_STIFFENING_RISE * before_J * (1 + 1e-9))) return;
     if (!(2 * work > max * max * mass) || !(sum > 0) || !isfinite(work)) return;
     double w = sqrt(2 * after_J / sum);
     /* a damper at work continues, with the larger constant and the longer time */
     body->stiffening_damping_1_s = fmax(body->stiffening_damping_1_s, 2 * w);
-    body->stiffening_damping_s = fmax(body->stiffening_damping_s, still_periods / w);
+    body->stiffening_damping_s = fmax(body->stiffening_damping_s, PAL_STIFFENING_PERIODS / w);
 }
 
 void pal_stiffening_damper_hold(pal_body *body, double stored_J)
@@ -42,6 +38,7 @@ void pal_stiffening_damper_hold(pal_body *body, double stored_J)
     double mass, sum = displacement_kg_m2(body, &mass);
     if (!(sum > 0) || !isfinite(stored_J)) return;
     const double c = 2 * sqrt(2 * stored_J / sum);
-    body->stiffening_damping_1_s = body->stiffening_damping_s > hold_s ? fmax(body->stiffening_damping_1_s, c) : c;
-    body->stiffening_damping_s = fmax(body->stiffening_damping_s, hold_s);
+    body->stiffening_damping_1_s =
+        body->stiffening_damping_s > PAL_STIFFENING_HOLD_S ? fmax(body->stiffening_damping_1_s, c) : c;
+    body->stiffening_damping_s = fmax(body->stiffening_damping_s, PAL_STIFFENING_HOLD_S);
 }

@@ -23,22 +23,25 @@
  * nodes add their largest eigenvalues at the beginning of every step. Rows of fixed points are omitted; prescribed
  * points keep their velocity and act on their neighbours by its change. step_guard.h limits displacements; where it
  * does so, the stiffness is not the one the limit was computed for, so sub-steps are halved up to three times and
- * then grow by 2 % of the reduction per sub-step. While elements are inverted sub-steps are 0.6 times as long,
- * unless the body is at rest. Where the world cannot afford the sub-steps (step->heavy), all masses are scaled so
- * that the limit is met. */
+ * then return over PAL_BLEND_S. While elements are inverted sub-steps are half as long (the
+ * displaced corner is the fastest mode, and near its limit shows up to twice its energy), unless the body is at rest.
+ * Where the world cannot afford the sub-steps (step->adds_mass), all masses are scaled so that the limit is met. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
 #include "server/num/conjugate_gradient.h"
 #include "server/num/envelope.h"
 #include "server/num/lanczos.h"
+#include "server/sim/core/blend.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/core/step_guard.h"
+#include "server/sim/implicit/tuning.h"
+#include "server/sim/solvers/tuning.h"
 #include "server/sim/subdivision/subdivision_mass.h"
 
 #include <string.h>
 
 typedef struct central {
-    const pal_interpolation *rows;
+    const pal_interpolation *A;
     const pal_mass_operator *mass;
     double safety, tolerance;
     double dt_s; /* previous sub-step; 0: none, v is that at p */
@@ -55,171 +58,95 @@ typedef struct central {
 
     /* ---- the limit ---- */
     pal_lanczos lanczos;
-    double limit_s, rows2;        /* upper bound of omega^2 of the FORCE components, 1/s^2 */
+    double limit_s, omega2;       /* upper bound of omega^2 of the FORCE components, 1/s^2 */
     double cell_m;                /* approximate edge of a control cell */
-    double way_m;                 /* upper bound of relative motion since the bound was computed */
+    double moved_m;               /* upper bound of relative motion since the bound was computed */
     bool has_inversion;           /* inverted elements use their fallback */
-    int n_unseen;                 /* sub-steps since the last check for inversion */
+    int n_unchecked;              /* sub-steps since the last check for inversion */
     int n_since, pause;           /* sub-steps since the last bound; min interval */
-    bool known;                   /* rows2 is valid except for motion */
+    bool known;                   /* omega2 is valid except for motion */
     double backoff;               /* divides the limit: 1, more after points were clamped */
     double contact2, contact_1_s; /* largest eigenvalues of contact's stiffness and of explicit damping over mass */
     pal_step *step;               /* that requests the limit */
     const double *x;              /* the body's own                                                       */
-    double *at, *still, *g, *g0;  /* saved x, v, g of the body during the iteration; g at the state itself [n_dof][3] */
+    double *at, *zero, *g, *g0;   /* saved x, v, g of the body during the iteration; g at the state itself [n_dof][3] */
     double *d, *dv, *f;           /* saved d, dv, f [n_node][3] */
     double *bound;                /* of CONTACT components                                           [n_node]    */
 } central;
 
-/* back-off of the sub-step after a clamped displacement, and its decay per sub-step without one */
-static const double max_backoff = 8, backoff_decay = 0.98;
-/* of omega^2 while elements are inverted: the displaced corner is the fastest mode, which near its limit shows up to
- * twice its energy, as velocities are those of half a sub-step before */
-static const double inverted2 = 3;
-/* of a move in elements, as forces may be of single precision; of omega^2 and of its solves */
-static const double small_h = 1e-4, near = 0.02, exact = 1e-6;
-enum { PAUSE = 12, MAX_PAUSE = 96 };
-/* approximate sub-steps between checks for inversion */
-enum { UNSEEN = 16 };
+/* sub-steps, which are a fixed part of the period of the fastest mode: between bounds, at least and at most, and
+ * between checks for inversion */
+enum { PAUSE = 12, MAX_PAUSE = 96, UNCHECKED = 16 };
 /* max iterations per sub-step; first and later ones of Lanczos; max entries of a factor */
 enum { MAX_CG = 300, FIRST = 24, AGAIN = 6, MAX_ENTRY = 1 << 22 };
-
-/* ---- load ---- */
-
-/* allocates n arrays of count numbers; false: no memory */
-static bool take(pal_arena *arena, size_t count, double **to[], int n)
-{
-    for (int i = 0; i < n; i++)
-        if (!(*to[i] = PAL_NEW(arena, double, count))) return false;
-    return true;
-}
-
-static void multiply(void *user, const double *p, double *out);
-static void precondition(void *user, const double *r, double *out);
-static bool multiply_stiffness(void *user, const double *v, double *out);
-static bool solve_mass(void *user, const double *b, double *out);
-
-static pal_err allocate(central *row, const pal_body *body, pal_arena *arena)
-{
-    const size_t n3 = 3 * (size_t)body->n_dof;
-    double **of_dof[] = {&row->cg.r,      &row->cg.z,      &row->cg.p,      &row->cg.q,   &row->change,
-                         &row->was,       &row->at,        &row->still,     &row->g,      &row->g0,
-                         &row->lanczos.z, &row->lanczos.w, &row->lanczos.u, &row->inverse};
-    double **of_node[] = {&row->d, &row->dv, &row->f, &row->bound};
-    row->fixed = PAL_NEW(arena, uint8_t, body->n_dof);
-    row->lanczos.basis = PAL_NEW(arena, double, FIRST *n3);
-    if (!row->fixed || !row->lanczos.basis || !take(arena, n3, of_dof, 14) ||
-        !take(arena, 3 * (size_t)body->n_node, of_node, 4))
-        return PAL_ERR_MEMORY;
-    row->cg.n = row->lanczos.n = (int)n3;
-    row->cg.multiply = multiply, row->cg.precondition = precondition, row->cg.user = row;
-    row->lanczos.multiply = multiply_stiffness, row->lanczos.solve = solve_mass, row->lanczos.user = row;
-    return PAL_ERR_OK;
-}
-
-static pal_err make(pal_config_entry *item, pal_build *build, void **self)
-{
-    double safety = 0.9, tolerance = 1e-4;
-    const char *preconditioner = "factor";
-    const pal_body *body = build->body;
-    PAL_TRY(pal_entry_read_number(item, "safety", 0.01, 0.98, &safety, build->diag));
-    PAL_TRY(pal_entry_read_number(item, "tolerance", 1e-14, 0.1, &tolerance, build->diag));
-    PAL_TRY(pal_entry_read_text(item, "preconditioner", &preconditioner, build->diag));
-    PAL_TRY(pal_entry_check_unused(item, build->diag));
-    bool factor = !strcmp(preconditioner, "factor");
-    if (!factor && strcmp(preconditioner, "diagonal"))
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s.preconditioner: \"%s\", known are factor, diagonal",
-                                  item->path, preconditioner);
-    if (!body->interpolation || !body->mass_operator)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model subdivision_fem",
-                                  item->path, item->name);
-    central *row = PAL_NEW(build->arena, central, 1);
-    if (!row) return PAL_ERR_MEMORY;
-    row->rows = body->interpolation, row->mass = body->mass_operator;
-    row->n_unseen = UNSEEN;
-    row->safety = safety, row->tolerance = tolerance, row->backoff = 1;
-    row->cell_m = body->dofs.spacing_m;
-    PAL_TRY(allocate(row, body, build->arena));
-    if (factor) {
-        pal_err err = pal_envelope_make(row->mass->n_point, row->mass->start, row->mass->point, MAX_ENTRY, build->arena,
-                                        &row->envelope);
-        if (err && err != PAL_ERR_BUDGET) return err;
-    }
-    *self = row;
-    return PAL_ERR_OK;
-}
 
 /* ---- the left side ---- */
 
 static void multiply(void *user, const double *p, double *out)
 {
-    const central *row = user;
-    const pal_mass_operator *m = row->mass;
-    for (int i = 0; i < m->n_point; i++) {
-        double x = 0, y = 0, z = 0, *to = out + 3 * (size_t)i;
-        for (int32_t k = m->start[i]; k < m->start[i + 1] && !row->fixed[i]; k++) {
-            const double *q = p + 3 * (size_t)m->point[k];
-            double w = row->a * m->mass_kg[k];
-            if (row->b != 0) w += row->b * m->damping_kg_s[k];
-            x += w * q[0], y += w * q[1], z += w * q[2];
-        }
-        to[0] = x, to[1] = y, to[2] = z;
-    }
+    const central *solver = user;
+    pal_mass_operator_multiply(solver->mass, solver->a, solver->b, solver->fixed, p, out);
 }
 
 static void precondition(void *user, const double *r, double *out)
 {
-    central *row = user;
-    if (row->factored) {
-        pal_envelope_solve(&row->envelope, r, out);
+    central *solver = user;
+    if (solver->factored) {
+        pal_envelope_solve(&solver->envelope, r, out);
         return;
     }
-    for (int i = 0; i < row->mass->n_point; i++) pal_scale3(out + 3 * (size_t)i, row->inverse[i], r + 3 * (size_t)i);
+    for (int i = 0; i < solver->mass->n_point; i++)
+        pal_scale3(out + 3 * (size_t)i, solver->inverse[i], r + 3 * (size_t)i);
 }
 
 /* rebuilds the preconditioner when masses or supports have changed; true: rebuilt */
-static bool renew(central *row, const pal_body *body)
+static bool update_preconditioner(central *solver, const pal_body *body)
 {
-    const pal_mass_operator *m = row->mass;
-    if (row->sampled == pal_dofs_material_revision(&body->dofs) &&
-        !memcmp(row->fixed, body->support, (size_t)body->n_dof))
+    const pal_mass_operator *m = solver->mass;
+    if (solver->sampled == pal_dofs_material_revision(&body->dofs) &&
+        !memcmp(solver->fixed, body->support, (size_t)body->n_dof))
         return false;
-    row->sampled = pal_dofs_material_revision(&body->dofs);
-    memcpy(row->fixed, body->support, (size_t)body->n_dof);
+    solver->sampled = pal_dofs_material_revision(&body->dofs);
+    memcpy(solver->fixed, body->support, (size_t)body->n_dof);
     for (int i = 0; i < m->n_point; i++) {
         int32_t k = m->start[i];
         while (m->point[k] != i) k++;
-        row->inverse[i] = row->fixed[i] || !(m->mass_kg[k] > 0) ? 0 : 1 / m->mass_kg[k];
+        solver->inverse[i] = solver->fixed[i] || !(m->mass_kg[k] > 0) ? 0 : 1 / m->mass_kg[k];
     }
-    row->factored =
-        row->envelope.n > 0 && !pal_envelope_factor(&row->envelope, m->start, m->point, m->mass_kg, row->fixed);
+    solver->factored = solver->envelope.n > 0 &&
+                       !pal_envelope_factor(&solver->envelope, m->start, m->point, m->mass_kg, solver->fixed);
     return true;
 }
 
-/* x += A^-1 r with r in cg.r, until |r| <= target; rows of fixed points are omitted */
-static void solve(central *row, double *x, double target)
+static void clear_fixed(central *solver)
 {
-    for (int i = 0; i < row->mass->n_point; i++)
-        if (row->fixed[i]) pal_set3(row->cg.r + 3 * (size_t)i, 0, 0, 0);
-    row->report.n_cg += pal_conjugate_gradient_run(&row->cg, x, target, 0, MAX_CG);
+    for (int i = 0; i < solver->mass->n_point; i++)
+        if (solver->fixed[i]) pal_set3(solver->cg.r + 3 * (size_t)i, 0, 0, 0);
+}
+
+/* x += A^-1 r with r in cg.r, until |r| <= target; rows of fixed points are omitted */
+static void solve(central *solver, double *x, double target)
+{
+    clear_fixed(solver);
+    solver->report.n_cg += pal_conjugate_gradient_run(&solver->cg, x, target, 0, MAX_CG);
 }
 
 /* ---- the limit ---- */
 
 static bool solve_mass(void *user, const double *b, double *out)
 {
-    central *row = user;
-    const size_t n_byte = sizeof(double) * (size_t)row->cg.n;
-    memcpy(row->cg.r, b, n_byte);
+    central *solver = user;
+    const size_t n_byte = sizeof(double) * (size_t)solver->cg.n;
+    memcpy(solver->cg.r, b, n_byte);
     memset(out, 0, n_byte);
-    row->a = 1, row->b = 0;
-    solve(row, out, exact * sqrt(pal_dot_product(row->cg.n, b, b)));
+    solver->a = 1, solver->b = 0;
+    solve(solver, out, PAL_SOLVER_TOLERANCE * PAL_SOLVER_TOLERANCE * sqrt(pal_dot_product(solver->cg.n, b, b)));
     return true;
 }
 
-static bool gather(central *row)
+static bool assemble_forces(central *solver)
 {
-    pal_step *step = row->step;
+    pal_step *step = solver->step;
     const size_t used = step->scratch ? pal_arena_used(step->scratch) : 0;
     const bool good = !pal_assemble_forces(step);
     if (step->scratch) pal_arena_rewind(step->scratch, used);
@@ -229,167 +156,166 @@ static bool gather(central *row)
 /* out = K~ v of the FORCE components, by the difference of forces over a small displacement along v */
 static bool multiply_stiffness(void *user, const double *v, double *out)
 {
-    central *row = user;
-    const int n = row->cg.n;
+    central *solver = user;
+    const int n = solver->cg.n;
     double max = 0;
     for (int i = 0; i < n; i++) max = fmax(max, fabs(v[i]));
-    const double small = max > 0 ? small_h * row->step->body->edge_m / max : 0, per = max > 0 ? 1 / small : 0;
-    for (int i = 0; i < n; i++) row->at[i] = row->x[i] + small * v[i];
-    if (!gather(row)) return false;
-    for (int i = 0; i < n; i++) out[i] = row->fixed[i / 3] ? 0 : per * (row->g0[i] - row->g[i]);
+    const double small = max > 0 ? PAL_DIFFERENCE_H * solver->step->body->edge_m / max : 0,
+                 per = max > 0 ? 1 / small : 0;
+    for (int i = 0; i < n; i++) solver->at[i] = solver->x[i] + small * v[i];
+    if (!assemble_forces(solver)) return false;
+    for (int i = 0; i < n; i++) out[i] = solver->fixed[i / 3] ? 0 : per * (solver->g0[i] - solver->g[i]);
     return true;
 }
 
 /* out = A' bound A v, with one number of bound per node */
 static bool multiply_bound(void *user, const double *v, double *out)
 {
-    central *row = user;
-    const pal_interpolation *rows = row->rows;
-    pal_interpolation_apply(rows, v, row->f);
-    for (int i = 0; i < rows->n_row; i++) pal_scale3(row->f + 3 * (size_t)i, row->bound[i], row->f + 3 * (size_t)i);
-    memset(out, 0, sizeof *out * (size_t)row->cg.n);
-    pal_interpolation_apply_transpose(rows, row->f, out);
-    for (int i = 0; i < row->cg.n; i++) out[i] *= !row->fixed[i / 3];
+    central *solver = user;
+    pal_interpolation_apply(solver->A, v, solver->f);
+    for (int i = 0; i < solver->A->n_row; i++)
+        pal_scale3(solver->f + 3 * (size_t)i, solver->bound[i], solver->f + 3 * (size_t)i);
+    memset(out, 0, sizeof *out * (size_t)solver->cg.n);
+    pal_interpolation_apply_transpose(solver->A, solver->f, out);
+    for (int i = 0; i < solver->cg.n; i++) out[i] *= !solver->fixed[i / 3];
     return true;
 }
 
 /* adds arbitrary signs at the free points, of length `share` of the vector's norm, or 1 if it is zero */
-static void add_any(const central *row, double share, double *z)
+static void add_any(const central *solver, double share, double *z)
 {
-    const double norm = sqrt(pal_dot_product(row->cg.n, z, z)), each = share * norm / sqrt(row->cg.n);
-    for (int i = 0; i < row->cg.n; i++) {
+    const double norm = sqrt(pal_dot_product(solver->cg.n, z, z)), each = share * norm / sqrt(solver->cg.n);
+    for (int i = 0; i < solver->cg.n; i++) {
         uint64_t bits = ((uint64_t)(uint32_t)i + 1) * 0x9e3779b97f4a7c15u;
         bits ^= bits >> 29, bits *= 0xbf58476d1ce4e5b9u, bits ^= bits >> 32;
-        if (!row->fixed[i / 3]) z[i] += (norm > 0 ? each : 1) * ((double)(bits >> 11) * 0x1p-52 - 1);
+        if (!solver->fixed[i / 3]) z[i] += (norm > 0 ? each : 1) * ((double)(bits >> 11) * 0x1p-52 - 1);
     }
 }
 
 /* omega^2 of the FORCE components at the present position with zero velocity; restores all arrays of the body */
-static double find_rows2(central *row, pal_step *step)
+static double find_rows2(central *solver, pal_step *step)
 {
     pal_body *body = step->body;
-    const pal_body kept = *body;
-    const bool apart = step->drag_separate;
-    const int n_cg = row->report.n_cg;
+    const pal_body saved = *body;
+    const bool drag_separate = step->drag_separate;
+    const int n_cg = solver->report.n_cg;
     double max = NAN;
-    row->step = step, row->x = body->x;
-    memcpy(row->at, body->x, sizeof(double) * (size_t)row->cg.n);
-    body->x = row->at, body->v = row->still, body->g = row->g;
-    body->d = row->d, body->dv = row->dv, body->f = row->f;
+    solver->step = step, solver->x = body->x;
+    memcpy(solver->at, body->x, sizeof(double) * (size_t)solver->cg.n);
+    body->x = solver->at, body->v = solver->zero, body->g = solver->g;
+    body->d = solver->d, body->dv = solver->dv, body->f = solver->f;
     step->drag_separate = true;
-    if (gather(row)) {
-        memcpy(row->g0, row->g, sizeof(double) * (size_t)row->cg.n);
-        if (!row->known) memset(row->lanczos.z, 0, sizeof(double) * (size_t)row->cg.n);
-        add_any(row, 0.1, row->lanczos.z);
-        row->lanczos.multiply = multiply_stiffness;
-        max = pal_lanczos_run(&row->lanczos, near, row->known ? 3 : 8, row->known ? AGAIN : FIRST);
+    if (assemble_forces(solver)) {
+        memcpy(solver->g0, solver->g, sizeof(double) * (size_t)solver->cg.n);
+        if (!solver->known) memset(solver->lanczos.z, 0, sizeof(double) * (size_t)solver->cg.n);
+        add_any(solver, 0.1, solver->lanczos.z);
+        solver->lanczos.multiply = multiply_stiffness;
+        max = pal_lanczos_run(&solver->lanczos, PAL_SOLVER_TOLERANCE, solver->known ? 3 : 8,
+                              solver->known ? AGAIN : FIRST);
     }
-    step->drag_separate = apart;
-    body->x = kept.x, body->v = kept.v, body->g = kept.g;
-    body->d = kept.d, body->dv = kept.dv, body->f = kept.f;
-    row->report.n_cg = n_cg;
+    step->drag_separate = drag_separate;
+    body->x = saved.x, body->v = saved.v, body->g = saved.g;
+    body->d = saved.d, body->dv = saved.dv, body->f = saved.f;
+    solver->report.n_cg = n_cg;
     return max > 0 || isnan(max) ? max : 0;
 }
 
-/* the largest eigenvalue of row->bound over mass */
-static double find_bound(central *row)
+/* the largest eigenvalue of solver->bound over mass */
+static double find_bound(central *solver)
 {
     /* keep the Ritz vector of the FORCE components */
-    double *z = row->lanczos.z, sum = 0;
-    const int n_cg = row->report.n_cg;
-    for (int i = 0; i < row->rows->n_row; i++) sum += row->bound[i];
+    double *z = solver->lanczos.z, sum = 0;
+    const int n_cg = solver->report.n_cg;
+    for (int i = 0; i < solver->A->n_row; i++) sum += solver->bound[i];
     if (sum == 0) return 0;
-    row->lanczos.z = row->at;
-    memset(row->at, 0, sizeof(double) * (size_t)row->cg.n);
-    add_any(row, 0, row->at);
-    multiply_bound(row, row->at, row->g);
-    memcpy(row->at, row->g, sizeof(double) * (size_t)row->cg.n);
-    row->lanczos.multiply = multiply_bound;
-    const double max = pal_lanczos_run(&row->lanczos, near, 2, AGAIN);
-    row->lanczos.z = z;
-    row->report.n_cg = n_cg;
+    solver->lanczos.z = solver->at;
+    memset(solver->at, 0, sizeof(double) * (size_t)solver->cg.n);
+    add_any(solver, 0, solver->at);
+    multiply_bound(solver, solver->at, solver->g);
+    memcpy(solver->at, solver->g, sizeof(double) * (size_t)solver->cg.n);
+    solver->lanczos.multiply = multiply_bound;
+    const double max = pal_lanczos_run(&solver->lanczos, PAL_SOLVER_TOLERANCE, 2, AGAIN);
+    solver->lanczos.z = z;
+    solver->report.n_cg = n_cg;
     return max;
 }
 
-static void clear_bound(central *row)
-{
-    memset(row->bound, 0, sizeof(double) * (size_t)row->rows->n_row);
-}
-
 /* contact changes between steps without motion of any point */
-static void find_contact(central *row, const pal_step *step)
+static void find_contact(central *solver, const pal_step *step)
 {
-    clear_bound(row);
+    const size_t n_byte = sizeof(double) * (size_t)solver->A->n_row;
+    memset(solver->bound, 0, n_byte);
     for (int i = 0; i < step->n_contact; i++) {
         const pal_effect *effect = step->contact[i].effect;
-        if (effect->stiffness) effect->stiffness(step->contact[i].self, step->body, row->bound);
-        if (effect->wanted) effect->wanted(step->contact[i].self, step->body, row->bound);
-        if (effect->wanted) effect->wanted(step->contact[i].self, step->body, row->bound);
+        if (effect->bounds.stiffness) effect->bounds.stiffness(step->contact[i].self, step->body, solver->bound);
+        if (effect->bounds.wanted) effect->bounds.wanted(step->contact[i].self, step->body, solver->bound);
+        if (effect->bounds.wanted) effect->bounds.wanted(step->contact[i].self, step->body, solver->bound);
     }
-    row->contact2 = find_bound(row);
-    clear_bound(row);
+    solver->contact2 = find_bound(solver);
+    memset(solver->bound, 0, n_byte);
     for (int i = 0; i < step->n_contact + step->n_force; i++) {
         const pal_component *of = i < step->n_contact ? &step->contact[i] : &step->force[i - step->n_contact];
-        if (of->effect->damping && !of->effect->drag) of->effect->damping(of->self, step->body, row->bound);
+        if (of->effect->bounds.damping && !of->effect->drag)
+            of->effect->bounds.damping(of->self, step->body, solver->bound);
     }
-    row->contact_1_s = find_bound(row);
+    solver->contact_1_s = find_bound(solver);
 }
 
-static void look(central *row, pal_step *step)
+static void update_omega2(central *solver, pal_step *step)
 {
-    const double before = row->known ? row->rows2 : 0;
-    row->rows2 = find_rows2(row, step);
-    bool same = fabs(row->rows2 - before) <= near * before;
-    row->pause = !same ? PAUSE : row->pause < MAX_PAUSE ? 2 * row->pause : MAX_PAUSE;
-    row->known = true;
-    row->way_m = 0;
-    row->n_since = 0;
+    const double before = solver->known ? solver->omega2 : 0;
+    solver->omega2 = find_rows2(solver, step);
+    bool same = fabs(solver->omega2 - before) <= PAL_SOLVER_TOLERANCE * before;
+    solver->pause = !same ? PAUSE : solver->pause < MAX_PAUSE ? 2 * solver->pause : MAX_PAUSE;
+    solver->known = true;
+    solver->moved_m = 0;
+    solver->n_since = 0;
 }
 
 /* true: elements were found inverted and use their fallback from now on */
-static bool recover(central *row, pal_step *step)
+static bool recover(central *solver, pal_step *step)
 {
     pal_body *body = step->body;
     double *d = body->d;
-    if (row->n_unseen < (step->sub == 0 ? UNSEEN / 2 : UNSEEN)) return false;
-    row->n_unseen = 0;
-    pal_interpolation_apply(body->interpolation, body->x, row->d);
-    body->d = row->d;
+    if (solver->n_unchecked < (step->sub == 0 ? UNCHECKED / 2 : UNCHECKED)) return false;
+    solver->n_unchecked = 0;
+    pal_interpolation_apply(body->interpolation, body->x, solver->d);
+    body->d = solver->d;
     const unsigned seen = pal_guard_recover(step);
     body->d = d;
     /* half a sub-step of the previous length with the forces of another law would be an impulse */
-    if (seen & PAL_INVERSION_CHANGED) row->dt_s = 0;
-    row->has_inversion = (seen & PAL_INVERTED) && !(seen & PAL_INVERSION_AT_REST);
+    if (seen & PAL_INVERSION_CHANGED) solver->dt_s = 0;
+    solver->has_inversion = (seen & PAL_INVERTED) && !(seen & PAL_INVERSION_AT_REST);
     return seen & PAL_INVERSION_CHANGED;
 }
 
 /* with lambda the largest omega^2 and c that of damping, symplectic steps are stable for dt^2 lambda + 2 dt c < 4 */
 static double limit(void *self, pal_step *step)
 {
-    central *row = self;
+    central *solver = self;
     const pal_body *body = step->body;
     if (!pal_body_finite(body)) return NAN;
-    if (renew(row, body) || recover(row, step)) row->known = false;
-    if (!row->known || (row->n_since >= row->pause && !(row->way_m <= PAL_GUARD_RECHECK * row->cell_m)))
-        look(row, step);
-    if (step->sub == 0) find_contact(row, step);
-    const double rows2 = row->has_inversion ? inverted2 * row->rows2 : row->rows2, lambda = rows2 + row->contact2,
-                 c = row->contact_1_s;
-    row->limit_s = row->safety * 4 / (c + sqrt(c * c + 4 * lambda)) / row->backoff;
-    return row->limit_s;
+    if (update_preconditioner(solver, body) || recover(solver, step)) solver->known = false;
+    if (!solver->known || (solver->n_since >= solver->pause && !(solver->moved_m <= PAL_GUARD_MOVE * solver->cell_m)))
+        update_omega2(solver, step);
+    if (step->sub == 0) find_contact(solver, step);
+    const double omega2 = solver->has_inversion ? 4 * solver->omega2 : solver->omega2,
+                 lambda = omega2 + solver->contact2, c = solver->contact_1_s;
+    solver->limit_s = solver->safety * 4 / (c + sqrt(c * c + 4 * lambda)) / solver->backoff;
+    return solver->limit_s;
 }
 
 /* ---- a sub-step ---- */
 
 /* applies the known change of velocity of fixed points; `was` is v before the change. True: it is not 0 */
-static bool begin_change(central *row, const pal_body *body)
+static bool begin_change(central *solver, const pal_body *body)
 {
     bool any = false;
-    memset(row->change, 0, sizeof(double) * (size_t)row->cg.n);
+    memset(solver->change, 0, sizeof(double) * (size_t)solver->cg.n);
     for (int i = 0; i < body->n_dof; i++) {
-        double *was = row->was + 3 * (size_t)i, *change = row->change + 3 * (size_t)i;
+        double *was = solver->was + 3 * (size_t)i, *change = solver->change + 3 * (size_t)i;
         const double *v = body->v + 3 * (size_t)i;
-        if (body->support[i] == PAL_PRESCRIBED && row->dt_s > 0)
+        if (body->support[i] == PAL_PRESCRIBED && solver->dt_s > 0)
             pal_sub3(change, v, was);
         else
             pal_copy3(was, v);
@@ -400,61 +326,62 @@ static bool begin_change(central *row, const pal_body *body)
 }
 
 /* r -= (a M~ + b D~)(s was + t change); z and q are free */
-static void take_away(central *row, double a, double b, double s, double t)
+static void subtract_product(central *solver, double a, double b, double s, double t)
 {
-    for (int i = 0; i < row->cg.n; i++) row->cg.z[i] = s * row->was[i] + t * row->change[i];
-    row->a = a, row->b = b;
-    multiply(row, row->cg.z, row->cg.q);
-    for (int i = 0; i < row->cg.n; i++) row->cg.r[i] -= row->cg.q[i];
+    for (int i = 0; i < solver->cg.n; i++) solver->cg.z[i] = s * solver->was[i] + t * solver->change[i];
+    solver->a = a, solver->b = b;
+    multiply(solver, solver->cg.z, solver->cg.q);
+    for (int i = 0; i < solver->cg.n; i++) solver->cg.r[i] -= solver->cg.q[i];
 }
 
-static void find_change(central *row, const pal_step *step)
+static void find_change(central *solver, const pal_step *step)
 {
     const pal_body *body = step->body;
-    const double dt = step->dt_s, k = 0.5 * (dt + row->dt_s),
+    const double dt = step->dt_s, k = 0.5 * (dt + solver->dt_s),
                  rate = body->stiffening_damping_1_s + pal_guard_drag_1_s(step->force, step->n_force),
-                 over = row->limit_s > 0 ? dt / row->limit_s : 0;
-    const double scale = step->heavy && over > 1 ? over * over : 1;
-    const bool varies = row->mass->damping_kg_s != NULL, moves = begin_change(row, body);
-    const double max = k * (rate + (varies ? row->mass->damping_max_1_s : 0));
-    double theta = row->dt_s / (dt + row->dt_s);
+                 over = solver->limit_s > 0 ? dt / solver->limit_s : 0;
+    const double scale = step->adds_mass && over > 1 ? over * over : 1;
+    const bool varies = solver->mass->damping_kg_s != NULL, moves = begin_change(solver, body);
+    const double max = k * (rate + (varies ? solver->mass->damping_max_1_s : 0));
+    double theta = solver->dt_s / (dt + solver->dt_s);
     if (max > 0) theta = fmax(theta, 1 - 1 / max);
     const double a = scale + theta * k * rate, b = varies ? theta * k : 0;
-    for (int i = 0; i < row->cg.n; i++) row->cg.r[i] = k * body->g[i];
-    if (rate > 0 || moves) take_away(row, 1, 0, k * rate, a);
-    if (varies) take_away(row, 0, 1, k, b);
-    row->a = a, row->b = b;
-    for (int i = 0; i < row->cg.n; i++)
-        if (row->fixed[i / 3]) row->cg.r[i] = 0;
-    const double norm = sqrt(pal_dot_product(row->cg.n, row->cg.r, row->cg.r));
-    if (step->sub == 0) row->report.n_cg = 0;
-    solve(row, row->change, row->tolerance * norm);
+    for (int i = 0; i < solver->cg.n; i++) solver->cg.r[i] = k * body->g[i];
+    if (rate > 0 || moves) subtract_product(solver, 1, 0, k * rate, a);
+    if (varies) subtract_product(solver, 0, 1, k, b);
+    solver->a = a, solver->b = b;
+    clear_fixed(solver);
+    const double norm = sqrt(pal_dot_product(solver->cg.n, solver->cg.r, solver->cg.r));
+    if (step->sub == 0) solver->report.n_cg = 0;
+    const double before = pal_clock_s();
+    solve(solver, solver->change, solver->tolerance * norm);
+    solver->report.solve_s += pal_clock_s() - before;
     /* non-finite forces give non-finite velocities */
-    for (int i = 0; i < row->cg.n && !isfinite(norm); i++) row->change[i] = NAN;
-    row->report.residual = norm > 0 ? row->cg.residual / norm : 0;
-    row->report.converged = row->cg.residual <= row->tolerance * norm;
+    for (int i = 0; i < solver->cg.n && !isfinite(norm); i++) solver->change[i] = NAN;
+    solver->report.residual = norm > 0 ? solver->cg.residual / norm : 0;
+    solver->report.converged = solver->cg.residual <= solver->tolerance * norm;
 }
 
 /* computes v+ and p+; returns the largest relative displacement of a point, not finite when a velocity is not */
-static double move(central *row, pal_body *body, double dt)
+static double move(central *solver, pal_body *body, double dt)
 {
     const double max_m = pal_guard_max_move_m(body);
     const uint64_t n_clamped = body->safeguards.n_clamped;
-    double mean[3] = {0, 0, 0}, max2 = 0, poison = 0;
+    double mean[3] = {0, 0, 0}, max2 = 0, non_finite = 0;
     for (int i = 0; i < body->n_dof; i++) {
         double *v = body->v + 3 * (size_t)i;
         /* prescribed points already have theirs */
         if (body->support[i] == PAL_FIXED) pal_set3(v, 0, 0, 0);
-        if (!body->support[i]) pal_add3(v, v, row->change + 3 * (size_t)i);
-        const double way = pal_norm3(v) * dt;
-        poison += 0 * way;
-        if (way > max_m) {
+        if (!body->support[i]) pal_add3(v, v, solver->change + 3 * (size_t)i);
+        const double move_m = pal_norm3(v) * dt;
+        non_finite += 0 * move_m;
+        if (move_m > max_m) {
             uint64_t before = pal_clock_ns();
-            pal_scale3(v, pal_guard_shorten(body, way, max_m), v);
+            pal_scale3(v, pal_guard_shorten(body, move_m, max_m), v);
             body->safeguards.ns += pal_clock_ns() - before;
         }
         pal_axpy3(body->x + 3 * (size_t)i, dt, v);
-        pal_copy3(row->was + 3 * (size_t)i, v);
+        pal_copy3(solver->was + 3 * (size_t)i, v);
         pal_axpy3(mean, 1.0 / body->n_dof, v);
     }
     for (int i = 0; i < body->n_dof; i++) {
@@ -462,34 +389,85 @@ static double move(central *row, pal_body *body, double dt)
         pal_sub3(from, body->v + 3 * (size_t)i, mean);
         max2 = fmax(max2, pal_dot3(from, from));
     }
-    row->backoff = body->safeguards.n_clamped > n_clamped ? fmin(2 * row->backoff, max_backoff)
-                                                          : 1 + backoff_decay * (row->backoff - 1);
-    return dt * sqrt(max2) + poison;
+    solver->backoff = body->safeguards.n_clamped > n_clamped
+                          ? fmin(2 * solver->backoff, PAL_BACKOFF_MAX)
+                          : pal_blend_toward(solver->backoff, 1, (PAL_BACKOFF_MAX - 1) * dt, PAL_BLEND_S);
+    return dt * sqrt(max2) + non_finite;
 }
 
 static pal_err run(void *self, pal_step *step)
 {
-    central *row = self;
+    central *solver = self;
     step->drag_separate = true;
     PAL_TRY(pal_assemble_forces(step));
-    renew(row, step->body);
-    find_change(row, step);
-    row->way_m += move(row, step->body, step->dt_s);
-    row->dt_s = step->dt_s;
-    row->n_since += row->n_since < MAX_PAUSE;
-    row->n_unseen++;
+    update_preconditioner(solver, step->body);
+    find_change(solver, step);
+    solver->moved_m += move(solver, step->body, step->dt_s);
+    solver->dt_s = step->dt_s;
+    solver->n_since += solver->n_since < MAX_PAUSE;
+    solver->n_unchecked++;
+    return PAL_ERR_OK;
+}
+
+/* ---- hooks ---- */
+
+static pal_err allocate(central *solver, const pal_body *body, pal_arena *arena)
+{
+    const size_t n3 = 3 * (size_t)body->n_dof;
+    pal_conjugate_gradient *cg = &solver->cg;
+    pal_lanczos *lanczos = &solver->lanczos;
+    solver->fixed = PAL_NEW(arena, uint8_t, body->n_dof);
+    const bool made =
+        solver->fixed && PAL_NEW_DOUBLES(arena, FIRST * n3, &lanczos->basis) &&
+        PAL_NEW_DOUBLES(arena, n3, &cg->r, &cg->z, &cg->p, &cg->q, &solver->change, &solver->was, &solver->at,
+                        &solver->zero, &solver->g, &solver->g0, &lanczos->z, &lanczos->w, &lanczos->u,
+                        &solver->inverse) &&
+        PAL_NEW_DOUBLES(arena, 3 * (size_t)body->n_node, &solver->d, &solver->dv, &solver->f, &solver->bound);
+    cg->n = lanczos->n = (int)n3;
+    lanczos->n_basis = FIRST;
+    cg->multiply = multiply, cg->precondition = precondition, cg->user = solver;
+    lanczos->multiply = multiply_stiffness, lanczos->solve = solve_mass, lanczos->user = solver;
+    return made ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
+{
+    double safety = 0.9, tolerance = 1e-4;
+    static const char *const preconditioner[] = {"factor", "diagonal"};
+    int kind = 0;
+    const pal_body *body = build->body;
+    PAL_TRY(pal_entry_read_number(item, "safety", 0.01, 0.98, &safety, build->diag));
+    PAL_TRY(pal_entry_read_number(item, "tolerance", 1e-14, 0.1, &tolerance, build->diag));
+    PAL_TRY(pal_entry_read_choice(item, "preconditioner", preconditioner, 2, &kind, build->diag));
+    PAL_TRY(pal_entry_check_unused(item, build->diag));
+    if (!body->interpolation || !body->mass_operator)
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model subdivision_fem",
+                                  item->path, item->name);
+    central *solver = PAL_NEW(build->arena, central, 1);
+    if (!solver) return PAL_ERR_MEMORY;
+    solver->A = body->interpolation, solver->mass = body->mass_operator;
+    solver->n_unchecked = UNCHECKED;
+    solver->safety = safety, solver->tolerance = tolerance, solver->backoff = 1;
+    solver->cell_m = body->dofs.spacing_m;
+    PAL_TRY(allocate(solver, body, build->arena));
+    if (kind == 0) {
+        pal_err err = pal_envelope_make(solver->mass->n_point, solver->mass->start, solver->mass->point, MAX_ENTRY,
+                                        build->arena, &solver->envelope);
+        if (err && err != PAL_ERR_BUDGET) return err;
+    }
+    *self = solver;
     return PAL_ERR_OK;
 }
 
 static void reset(void *self, const pal_body *body)
 {
-    central *row = self;
+    central *solver = self;
     (void)body;
-    row->dt_s = 0;
-    row->backoff = 1;
-    row->has_inversion = false;
-    row->known = false;
-    row->n_unseen = UNSEEN;
+    solver->dt_s = 0;
+    solver->backoff = 1;
+    solver->has_inversion = false;
+    solver->known = false;
+    solver->n_unchecked = UNCHECKED;
 }
 
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
@@ -501,16 +479,16 @@ static pal_err material(void *self, const pal_body *body, const pal_material *to
 
 static void report(const void *self, pal_solve_report *out)
 {
-    const central *row = self;
-    *out = row->report;
-    out->factor_nonzeros = row->factored ? row->envelope.start[row->envelope.n] : 0;
+    const central *solver = self;
+    *out = solver->report;
+    out->factor_nonzeros = solver->factored ? solver->envelope.start[solver->envelope.n] : 0;
 }
 
 const pal_effect pal_effect_central_cg = {.name = "central_cg",
                                           .stage = PAL_STAGE_SOLVE,
                                           .make = make,
                                           .run = run,
-                                          .limit = limit,
+                                          .bounds.limit = limit,
                                           .material = material,
                                           .reset = reset,
-                                          .report = report};
+                                          .inspect.report = report};

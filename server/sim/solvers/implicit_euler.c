@@ -11,19 +11,14 @@
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    pal_implicit_options options;
-    pal_implicit *core = NULL;
-    PAL_TRY(pal_implicit_read(item, build, &options));
-    pal_err err = pal_implicit_make(&options, build, 1, &core);
-    *self = core;
-    return err;
+    return pal_implicit_make(item, build, 1, self);
 }
 
 static pal_err run(void *self, pal_step *step)
 {
     pal_implicit *core = self;
     pal_body *body = step->body;
-    size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
+    const size_t n_byte = pal_body_bytes3(body);
     if (!pal_implicit_begin(core, step)) return PAL_ERR_OK;
     memcpy(core->xs, core->x0, n_byte);
     memcpy(core->vs, core->v0, n_byte);
@@ -35,14 +30,4 @@ static pal_err run(void *self, pal_step *step)
     return PAL_ERR_OK;
 }
 
-const pal_effect pal_effect_implicit_euler = {.name = "implicit_euler",
-                                              .stage = PAL_STAGE_SOLVE,
-                                              .make = make,
-                                              .run = run,
-                                              .limit = pal_implicit_limit,
-                                              .material = pal_implicit_material,
-                                              .reset = pal_implicit_reset,
-                                              .implicit = true,
-                                              .report = pal_implicit_report,
-                                              .keeps_components = true,
-                                              .destroy = pal_implicit_destroy};
+const pal_effect pal_effect_implicit_euler = {.name = "implicit_euler", .make = make, .run = run, PAL_IMPLICIT_HOOKS};

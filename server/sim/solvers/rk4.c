@@ -16,18 +16,20 @@
  * Runge-Kutta method of Cox and Matthews (2002, eq. 26-29). It equals the classical method for r = 0, has order 4
  * for every r, is stable for all r where the classical one is stable without drag, and creeps as v = f/(m r) for
  * very large r. Fixed nodes do not move; prescribed ones keep their velocity. step_guard.h limits displacements.
- * Where the world cannot afford the sub-steps (step->heavy), nodes that break the limit get the mass that meets it.
+ * Where the world cannot afford the sub-steps (step->adds_mass), nodes that break the limit get the mass that meets it.
  * Components check for inverted elements whenever the bounds are computed, and in every step while there are any. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
+#include "server/num/lanczos.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/core/step_guard.h"
+#include "server/sim/implicit/tuning.h"
 #include "server/sim/surface/active_nodes.h"
 
 #include <string.h>
 
 /* Data of a node between the stages, as position and velocity: the start of its next stage, and the sum of rates. In
- * Lanczos iteration: position and q, forces at the state itself and the previous q */
+ * Lanczos iteration: position and forces at the state itself */
 typedef struct memory {
     pal_v8 from, sum;
 } memory;
@@ -46,11 +48,11 @@ typedef struct rk4 {
     memory *memory;
     pal_quad *load;
     double *inverse_kg;
-    uint8_t *led;
-    bool pulls;           /* all FORCE components support active_nodes */
+    uint8_t *prescribed;
+    bool packed;          /* all FORCE components support active_nodes */
     double safety, reach; /* of the stability limit; safety times the radius 2.7 */
     double limit_s;
-    double way_m; /* upper bound of motion since the bounds were computed */
+    double moved_m; /* upper bound of motion since the bounds were computed */
     /* of the body when they were computed */
     uint64_t revision;
     double ramp[2];
@@ -63,66 +65,30 @@ typedef struct rk4 {
     int n_since;
     bool sharp_known;
     double step_s; /* the last whole step; 0: none yet */
-    double over;   /* max overestimate of omega by row sums */
-    double *at, *still,
+    double over;   /* overestimate of omega by row sums as last measured; infinite: not yet */
+    pal_lanczos lanczos;
+    pal_step *step; /* that requests the bound */
+    double *at, *zero,
         *force; /* saved x, v and f of the body during the iteration [n_dof][3]; NULL: no adaptive surface */
 } rk4;
 
-static const double radius = 2.7;
-/* row sums are rarely more than `max_over` times too high, or `more` times more so than last time */
-static const double max_over = 1.6, more = 1.05;
 /* sub-steps between Lanczos bounds, and iterations for one, each an evaluation of forces */
 enum { PAUSE = 12, LANCZOS = 10 };
-
-static pal_err make(pal_config_entry *item, pal_build *build, void **self)
-{
-    double safety = 0.9;
-    PAL_TRY(pal_entry_read_number(item, "safety", 0.01, 0.96, &safety, build->diag));
-    PAL_TRY(pal_entry_check_unused(item, build->diag));
-    if (build->body->interpolation)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
-                                  "%s: \"rk4\" moves nodes, those of this body are carried by control points; take "
-                                  "\"central_cg\" or \"implicit_euler\"",
-                                  item->path);
-    const pal_body *body = build->body;
-    rk4 *row = PAL_NEW(build->arena, rk4, 1);
-    if (!row) return PAL_ERR_MEMORY;
-    row->stiff = PAL_NEW(build->arena, double, body->n_dof);
-    row->damp = PAL_NEW(build->arena, double, body->n_dof);
-    row->memory = PAL_NEW(build->arena, memory, body->n_dof);
-    row->load = PAL_NEW(build->arena, pal_quad, body->n_dof);
-    row->inverse_kg = PAL_NEW(build->arena, double, body->n_dof);
-    row->led = PAL_NEW(build->arena, uint8_t, body->n_dof);
-    if (!row->stiff || !row->damp || !row->memory || !row->load || !row->inverse_kg || !row->led) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_active_nodes_make(build->body, build->body_arena ? build->body_arena : build->arena));
-    if (body->active) {
-        row->at = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
-        row->still = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
-        row->force = PAL_NEW(build->arena, double, 3 * (size_t)body->n_dof);
-        if (!row->at || !row->still || !row->force) return PAL_ERR_MEMORY;
-    }
-    row->n_since = PAUSE;
-    row->over = max_over;
-    row->safety = safety;
-    row->reach = safety * radius;
-    *self = row;
-    return PAL_ERR_OK;
-}
 
 /* ---- forces ---- */
 
 /* the body's state and its loads */
-static void take_body(rk4 *row, const pal_step *step)
+static void load_state(rk4 *solver, const pal_step *step)
 {
     const pal_body *body = step->body;
     pal_active_nodes_load(body);
-    row->pulls = pal_active_nodes_complete(step);
-    for (int k = 0; k < body->n_active && row->pulls; k++)
-        row->load[k] = pal_quad_load(body->load + 3 * (size_t)pal_body_point(body, k));
+    solver->packed = pal_active_nodes_complete(step);
+    for (int k = 0; k < body->n_active && solver->packed; k++)
+        solver->load[k] = pal_quad_load(body->load + 3 * (size_t)pal_body_point(body, k));
 }
 
 /* copies positions and velocities of active_nodes to the body */
-static void give_motion(const pal_body *body)
+static void store_motion(const pal_body *body)
 {
     for (int k = 0; k < body->n_active; k++) {
         size_t i = 3 * (size_t)pal_body_point(body, k);
@@ -132,14 +98,14 @@ static void give_motion(const pal_body *body)
 }
 
 /* forces at the positions and velocities of active_nodes, into active_nodes */
-static pal_err find_forces(const rk4 *row, pal_step *step)
+static pal_err find_forces(const rk4 *solver, pal_step *step)
 {
     pal_body *body = step->body;
-    if (row->pulls) {
-        memcpy(body->active_nodes->f, row->load, sizeof *row->load * (size_t)body->n_active);
-        return pal_active_nodes_assemble(step);
+    if (solver->packed) {
+        memcpy(body->active_nodes->f, solver->load, sizeof *solver->load * (size_t)body->n_active);
+        return pal_run_forces(step, true);
     }
-    give_motion(body);
+    store_motion(body);
     PAL_TRY(pal_assemble_forces(step));
     for (int k = 0; k < body->n_active; k++)
         body->active_nodes->f[k] = pal_quad_load(body->g + 3 * (size_t)pal_body_point(body, k));
@@ -149,230 +115,174 @@ static pal_err find_forces(const rk4 *row, pal_step *step)
 /* ---- the limit ---- */
 
 /* true: the last bound is still valid */
-static bool still_known(const rk4 *row, const pal_step *step)
+static bool is_known(const rk4 *solver, const pal_step *step)
 {
     const pal_body *body = step->body;
     /* a non-finite bound is unknown */
-    if (!row->known || row->revision != body->revision || !(row->way_m <= PAL_GUARD_RECHECK * body->edge_m))
+    if (!solver->known || solver->revision != body->display.revision ||
+        !(solver->moved_m <= PAL_GUARD_MOVE * body->edge_m))
         return false;
-    if (body->active && (row->ramp[0] != *body->dofs.ramp[0] || row->ramp[1] != *body->dofs.ramp[1])) return false;
-    if (body->active && !row->sharp_known && row->n_since >= PAUSE) return false;
+    if (body->active && (solver->ramp[0] != *body->dofs.ramp[0] || solver->ramp[1] != *body->dofs.ramp[1]))
+        return false;
+    if (body->active && !solver->sharp_known && solver->n_since >= PAUSE) return false;
     return step->sub != 0 || !pal_guard_has_bounds(step->contact, step->n_contact);
 }
 
 /* max over free nodes of row sums of stiffness over mass */
-static double max_stiff(const rk4 *row, const pal_body *body)
+static double max_stiff(const rk4 *solver, const pal_body *body)
 {
     double max = 0;
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        double omega2 = row->stiff[i] / body->mass_kg[i];
+        double omega2 = solver->stiff[i] / body->mass_kg[i];
         if (!body->support[i] && omega2 > max) max = omega2;
     }
     return max;
 }
 
 /* 1 for a state and row sums that are finite, else NaN */
-static double one_if_finite(const rk4 *row, const pal_body *body)
+static double one_if_finite(const rk4 *solver, const pal_body *body)
 {
     double sum = 0;
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         const double *x = body->x + 3 * (size_t)i, *v = body->v + 3 * (size_t)i;
-        sum += 0 * row->stiff[i] + 0 * row->damp[i];
+        sum += 0 * solver->stiff[i] + 0 * solver->damp[i];
         for (int q = 0; q < 3; q++) sum += 0 * x[q] + 0 * v[q];
     }
     return 1 + sum;
 }
 
-/* ---- Lanczos' iteration; vectors are sqrt(m) times displacements, A q replaces the forces ---- */
+/* ---- the Lanczos bound; vectors are displacements of active nodes [n_active][3] ---- */
 
-/* the first vector: arbitrary signs, weighted by row sums over mass, because fast modes are where nodes are stiffest */
-static void begin_lanczos(rk4 *row, const pal_body *body)
+/* out = K v by the difference of forces over a small displacement */
+static bool multiply_stiffness(void *user, const double *v, double *out)
 {
-    double norm2 = 0;
+    rk4 *solver = user;
+    pal_body *body = solver->step->body;
+    pal_active_nodes *nodes = body->active_nodes;
+    double max2 = 0;
+    for (int k = 0; k < body->n_active; k++) max2 = fmax(max2, pal_dot3(v + 3 * (size_t)k, v + 3 * (size_t)k));
+    double small = max2 > 0 ? PAL_DIFFERENCE_H * body->edge_m / sqrt(max2) : 0, per = max2 > 0 ? 1 / small : 0;
+    for (int k = 0; k < body->n_active; k++) {
+        pal_quad move = small * pal_quad_load(v + 3 * (size_t)k);
+        nodes->xv[k] = pal_v8_join(pal_v8_low(solver->memory[k].from) + move, (pal_quad){0});
+    }
+    if (find_forces(solver, solver->step)) return false;
+    for (int k = 0; k < body->n_active; k++) {
+        double free = body->support[pal_body_point(body, k)] ? 0 : per;
+        pal_quad_store(out + 3 * (size_t)k, free * (pal_v8_low(solver->memory[k].sum) - nodes->f[k]));
+    }
+    return true;
+}
+
+static bool solve_mass(void *user, const double *b, double *out)
+{
+    const rk4 *solver = user;
+    const pal_body *body = solver->step->body;
+    for (int k = 0; k < body->n_active; k++)
+        pal_scale3(out + 3 * (size_t)k, 1 / body->mass_kg[pal_body_point(body, k)], b + 3 * (size_t)k);
+    return true;
+}
+
+/* Lanczos bound on omega^2 of the FORCE components. The first vector has arbitrary signs, weighted by row sums over
+ * mass, because fast modes are where nodes are stiffest */
+static double run_lanczos(rk4 *solver, pal_step *step)
+{
+    const pal_body *body = step->body;
+    solver->step = step;
+    load_state(solver, step);
+    if (find_forces(solver, step)) return NAN;
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        double weight = row->stiff[i] / body->mass_kg[i];
+        double *z = solver->lanczos.z + 3 * (size_t)k, weight = solver->stiff[i] / sqrt(body->mass_kg[i]);
         uint64_t bits = ((uint64_t)(uint32_t)i + 1) * 0x9e3779b97f4a7c15u;
-        pal_quad q = {0};
-        row->inverse_kg[k] = body->support[i] ? 0 : 1 / sqrt(body->mass_kg[i]);
-        for (int c = 0; c < 3 && !body->support[i]; c++) {
+        for (int c = 0; c < 3; c++) {
             bits ^= bits >> 29, bits *= 0xbf58476d1ce4e5b9u;
-            q[c] = weight * ((double)(bits >> 11) * 0x1p-52 - 1);
+            z[c] = body->support[i] ? 0 : weight * ((double)(bits >> 11) * 0x1p-52 - 1);
         }
-        norm2 += pal_quad_dot(q, q);
-        row->memory[k].from = pal_v8_join(pal_v8_low(body->active_nodes->xv[k]), q);
-        row->memory[k].sum = pal_v8_join(body->active_nodes->f[k], (pal_quad){0});
+        solver->memory[k] = (memory){.from = body->active_nodes->xv[k]};
+        solver->memory[k].sum = pal_v8_join(body->active_nodes->f[k], (pal_quad){0});
     }
-    const pal_quad one = {1, 1, 1, 1};
-    const pal_v8 scale = pal_v8_join(one, norm2 > 0 ? one / sqrt(norm2) : 0 * one);
-    for (int k = 0; k < body->n_active; k++) row->memory[k].from *= scale;
-}
-
-/* A q by the difference of forces over a displacement of 1e-6 of an element; returns q A q */
-static pal_err apply_stiffness(rk4 *row, pal_step *step, double *along)
-{
-    pal_body *body = step->body;
-    pal_active_nodes *pack = body->active_nodes;
-    double max2 = 0;
-    for (int k = 0; k < body->n_active; k++) {
-        pal_quad q = row->inverse_kg[k] * pal_v8_high(row->memory[k].from);
-        double q2 = pal_quad_dot(q, q);
-        max2 = q2 > max2 ? q2 : max2;
-    }
-    double small = max2 > 0 ? 1e-6 * body->edge_m / sqrt(max2) : 0, per = max2 > 0 ? 1 / small : 0;
-    for (int k = 0; k < body->n_active; k++) {
-        pal_quad move = small * row->inverse_kg[k] * pal_v8_high(row->memory[k].from);
-        pack->xv[k] = pal_v8_join(pal_v8_low(row->memory[k].from) + move, (pal_quad){0});
-    }
-    PAL_TRY(find_forces(row, step));
-    *along = 0;
-    for (int k = 0; k < body->n_active; k++) {
-        pack->f[k] = per * row->inverse_kg[k] * (pal_v8_low(row->memory[k].sum) - pack->f[k]);
-        *along += pal_quad_dot(pack->f[k], pal_v8_high(row->memory[k].from));
-    }
-    return PAL_ERR_OK;
-}
-
-/* the next vector from A q - alpha q - beta q'; returns its norm before normalisation */
-static double next_lanczos(rk4 *row, const pal_body *body, double alpha, double beta)
-{
-    double norm2 = 0;
-    for (int k = 0; k < body->n_active; k++) {
-        memory *m = &row->memory[k];
-        pal_quad q = pal_v8_high(m->from), next = body->active_nodes->f[k] - (alpha * q + beta * pal_v8_high(m->sum));
-        norm2 += pal_quad_dot(next, next);
-        m->sum = pal_v8_join(pal_v8_low(m->sum), q);
-        m->from = pal_v8_join(pal_v8_low(m->from), next);
-    }
-    const pal_quad one = {1, 1, 1, 1};
-    const double norm = sqrt(norm2);
-    const pal_v8 scale = pal_v8_join(one, norm > 0 ? one / norm : 0 * one);
-    for (int k = 0; k < body->n_active; k++) row->memory[k].from *= scale;
-    return norm;
-}
-
-/* largest eigenvalue of the tridiagonal matrix with diagonal a and off-diagonal b, plus the residual from b[n - 1].
- * Bisection below `max`, an upper bound, by the signs of leading minors */
-static double largest_of(const double *a, const double *b, int n, double max)
-{
-    double low = a[0], high = max;
-    for (int turn = 0; turn < 30 && low < high; turn++) {
-        double middle = 0.5 * (low + high), d = middle - a[0];
-        bool above = d > 0;
-        for (int i = 1; i < n && above; i++) {
-            d = middle - a[i] - b[i - 1] * b[i - 1] / d;
-            above = d > 0;
-        }
-        *(above ? &high : &low) = middle;
-    }
-    /* its eigenvector, from the first entry on */
-    double last = 0, s = 1, sum = 1;
-    for (int i = 0; i + 1 < n; i++) {
-        double next = ((high - a[i]) * s - (i > 0 ? b[i - 1] * last : 0)) / b[i];
-        last = s, s = next, sum += s * s;
-    }
-    return high + fabs(b[n - 1] * s) / sqrt(sum);
-}
-
-/* Lanczos bound on omega^2 of the FORCE components; above `max`: no better bound */
-static pal_err run_lanczos(rk4 *row, pal_step *step, double max, double *out)
-{
-    double a[LANCZOS], b[LANCZOS];
-    int n = 0;
-    take_body(row, step);
-    PAL_TRY(find_forces(row, step));
-    begin_lanczos(row, step->body);
-    while (n < LANCZOS) {
-        PAL_TRY(apply_stiffness(row, step, &a[n]));
-        b[n] = next_lanczos(row, step->body, a[n], n > 0 ? b[n - 1] : 0);
-        if (!(b[n++] > 1e-6 * max)) break;
-    }
-    *out = largest_of(a, b, n, 1.01 * max);
-    return PAL_ERR_OK;
+    solver->lanczos.n = 3 * body->n_active;
+    return pal_lanczos_run(&solver->lanczos, PAL_SOLVER_TOLERANCE, LANCZOS, LANCZOS);
 }
 
 /* the same at zero velocity; restores all arrays of the body */
-static void find_sharp(rk4 *row, pal_step *step, double max)
+static void find_sharp(rk4 *solver, pal_step *step, double max)
 {
     pal_body *body = step->body;
-    const pal_body kept = *body;
-    const bool apart = step->drag_separate;
+    const pal_body saved = *body;
+    const bool drag_separate = step->drag_separate;
     for (int k = 0; k < body->n_active; k++) {
         size_t i = 3 * (size_t)pal_body_point(body, k);
-        pal_copy3(row->at + i, body->x + i);
+        pal_copy3(solver->at + i, body->x + i);
     }
-    body->x = body->d = row->at;
-    body->v = body->dv = row->still;
-    body->f = body->g = row->force;
+    body->x = body->d = solver->at;
+    body->v = body->dv = solver->zero;
+    body->f = body->g = solver->force;
     step->drag_separate = true;
-    double sharp2 = NAN;
-    row->sharp_known = !run_lanczos(row, step, max, &sharp2) && sharp2 == sharp2;
-    row->sharp2 = sharp2;
-    row->over = more * fmax(1, sqrt(max / row->sharp2));
-    step->drag_separate = apart;
-    body->x = kept.x, body->d = kept.d, body->v = kept.v, body->dv = kept.dv, body->f = kept.f, body->g = kept.g;
-    row->sharp_ramp[0] = *body->dofs.ramp[0], row->sharp_ramp[1] = *body->dofs.ramp[1];
-    row->n_since = 0;
-}
-
-/* true: a longer limit would save a sub-step */
-static bool would_help(const rk4 *row, double max)
-{
-    double n = row->step_s * sqrt(max) / row->reach;
-    return !(row->step_s > 0) || ceil(n / row->over) < ceil(n);
+    solver->sharp2 = run_lanczos(solver, step);
+    solver->sharp_known = solver->sharp2 == solver->sharp2;
+    solver->over = fmax(1, sqrt(max / solver->sharp2));
+    step->drag_separate = drag_separate;
+    body->x = saved.x, body->d = saved.d, body->v = saved.v, body->dv = saved.dv, body->f = saved.f, body->g = saved.g;
+    solver->sharp_ramp[0] = *body->dofs.ramp[0], solver->sharp_ramp[1] = *body->dofs.ramp[1];
+    solver->n_since = 0;
 }
 
 /* omega^2 of the FORCE components: at most the largest row sum `max`. If the common factors have grown for only part of
  * the stiffness, scaling all of it gives an upper bound */
-static double bound_force(rk4 *row, pal_step *step, double max)
+static double bound_force(rk4 *solver, pal_step *step, double max)
 {
     const pal_body *body = step->body;
     /* called from outside without motion: the world asks at rest, with positions that are not the body's */
     if (!body->active || body->x == body->x_rest) return max;
-    bool moved = row->revision != body->revision || !(row->way_m <= PAL_GUARD_RECHECK * body->edge_m);
-    row->sharp_known &= !moved;
-    if (!row->sharp_known && row->n_since >= PAUSE) {
-        if (would_help(row, max))
-            find_sharp(row, step, max);
+    bool moved = solver->revision != body->display.revision || !(solver->moved_m <= PAL_GUARD_MOVE * body->edge_m);
+    solver->sharp_known &= !moved;
+    if (!solver->sharp_known && solver->n_since >= PAUSE) {
+        /* only where a longer limit saves a sub-step */
+        double n = solver->step_s * sqrt(max) / solver->reach;
+        if (!(solver->step_s > 0) || fmax(1, ceil(n / solver->over)) < ceil(n))
+            find_sharp(solver, step, max);
         else
-            row->n_since = 0;
+            solver->n_since = 0;
     }
-    if (!row->sharp_known) return max;
-    double grown = fmax(1, fmax(*body->dofs.ramp[0] / row->sharp_ramp[0], *body->dofs.ramp[1] / row->sharp_ramp[1]));
-    return fmin(max, grown * row->sharp2);
+    if (!solver->sharp_known) return max;
+    double grown =
+        fmax(1, fmax(*body->dofs.ramp[0] / solver->sharp_ramp[0], *body->dofs.ramp[1] / solver->sharp_ramp[1]));
+    return fmin(max, grown * solver->sharp2);
 }
 
 static double limit(void *self, pal_step *step)
 {
-    rk4 *row = self;
+    rk4 *solver = self;
     const pal_body *body = step->body;
-    if (!(step->sub == 0 && row->has_inversion) && still_known(row, step)) return row->limit_s;
-    row->has_inversion = pal_guard_recover(step) & PAL_INVERTED;
+    if (!(step->sub == 0 && solver->has_inversion) && is_known(solver, step)) return solver->limit_s;
+    solver->has_inversion = pal_guard_recover(step) & PAL_INVERTED;
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        row->stiff[i] = row->damp[i] = 0;
+        solver->stiff[i] = solver->damp[i] = 0;
     }
-    pal_guard_add_bounds(step->contact, step->n_contact, body, row->stiff, row->damp);
-    double contact2 = max_stiff(row, body);
-    pal_guard_add_bounds(step->force, step->n_force, body, row->stiff, row->damp);
+    pal_guard_add_bounds(step->contact, step->n_contact, body, solver->stiff, solver->damp);
+    double contact2 = max_stiff(solver, body);
+    pal_guard_add_bounds(step->force, step->n_force, body, solver->stiff, solver->damp);
     /* the largest of omega^2 and c */
-    double max2 = max_stiff(row, body), max = 0;
-    row->limit_s = one_if_finite(row, body);
-    if (row->limit_s == 1) max2 = fmin(max2, bound_force(row, step, max2) + contact2);
+    double max2 = max_stiff(solver, body), max = 0;
+    solver->limit_s = one_if_finite(solver, body);
+    if (solver->limit_s == 1) max2 = fmin(max2, bound_force(solver, step, max2) + contact2);
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
-        double c = row->damp[i] / body->mass_kg[i];
+        double c = solver->damp[i] / body->mass_kg[i];
         if (!body->support[i] && c > max) max = c;
     }
     max = fmax(sqrt(max2), max);
-    row->limit_s *= max > 0 ? row->reach / max : INFINITY;
-    if (!row->sharp_known || row->n_since == 0) row->way_m = 0;
-    row->revision = body->revision;
-    for (int k = 0; k < 2 && body->active; k++) row->ramp[k] = *body->dofs.ramp[k];
-    row->known = true;
-    return row->limit_s;
+    solver->limit_s *= max > 0 ? solver->reach / max : INFINITY;
+    if (!solver->sharp_known || solver->n_since == 0) solver->moved_m = 0;
+    solver->revision = body->display.revision;
+    for (int k = 0; k < 2 && body->active; k++) solver->ramp[k] = *body->dofs.ramp[k];
+    solver->known = true;
+    return solver->limit_s;
 }
 
 /* ---- a sub-step ---- */
@@ -398,10 +308,10 @@ static void find_phi(double z, double phi[4])
     }
 }
 
-static pal_v8 both(double place, double velocity)
+static pal_v8 both(double position, double velocity)
 {
     const pal_quad one = {1, 1, 1, 1};
-    return pal_v8_join(place * one, velocity * one);
+    return pal_v8_join(position * one, velocity * one);
 }
 
 static rates find_rates(double dt_s, double rate)
@@ -426,155 +336,174 @@ static rates find_rates(double dt_s, double rate)
 }
 
 /* inverse masses: fixed nodes have no acceleration, and those that do not move no velocity */
-static void take_masses(rk4 *row, const pal_body *body, const rates *r, bool heavy)
+static void find_inverse_masses(rk4 *solver, const pal_body *body, const rates *r, bool adds_mass)
 {
-    double t = r->dt / row->reach;
+    double t = r->dt / solver->reach;
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         double mass = body->mass_kg[i];
-        if (heavy) mass = fmax(mass, fmax(t * t * row->stiff[i], t * row->damp[i]));
-        row->inverse_kg[k] = body->support[i] ? 0 : 1 / mass;
-        row->led[k] = body->support[i] == PAL_PRESCRIBED;
+        if (adds_mass) mass = fmax(mass, fmax(t * t * solver->stiff[i], t * solver->damp[i]));
+        solver->inverse_kg[k] = body->support[i] ? 0 : 1 / mass;
+        solver->prescribed[k] = body->support[i] == PAL_PRESCRIBED;
         if (body->support[i] == PAL_FIXED)
             body->active_nodes->xv[k] = pal_v8_join(pal_v8_low(body->active_nodes->xv[k]), (pal_quad){0});
     }
 }
 
 /* velocity and acceleration of an active node */
-PAL_INLINE pal_v8 rate_of(const rk4 *row, const pal_active_nodes *pack, int k)
+PAL_INLINE pal_v8 rate_of(const rk4 *solver, const pal_active_nodes *nodes, int k)
 {
-    return pal_v8_join(pal_v8_high(pack->xv[k]), row->inverse_kg[k] * pack->f[k]);
+    return pal_v8_join(pal_v8_high(nodes->xv[k]), solver->inverse_kg[k] * nodes->f[k]);
 }
 
 /* the state at the start, and the second stage's */
-static void stage_first(rk4 *row, const pal_body *body, const rates *r)
+static void stage_first(rk4 *solver, const pal_body *body, const rates *r)
 {
-    pal_active_nodes *pack = body->active_nodes;
+    pal_active_nodes *nodes = body->active_nodes;
     for (int k = 0; k < body->n_active; k++) {
-        memory *m = &row->memory[k];
-        const pal_v8 y = pack->xv[k], rate = rate_of(row, pack, k);
+        memory *m = &solver->memory[k];
+        const pal_v8 y = nodes->xv[k], rate = rate_of(solver, nodes, k);
         m->from = y;
-        m->sum = r->whole[row->led[k]] * y + r->weight[0] * rate;
-        pack->xv[k] = r->half[row->led[k]] * y + r->grow * rate;
+        m->sum = r->whole[solver->prescribed[k]] * y + r->weight[0] * rate;
+        nodes->xv[k] = r->half[solver->prescribed[k]] * y + r->grow * rate;
     }
 }
 
 /* the third stage's state from the second stage's forces. The fourth stage's velocity continues from the second's
  * after drag, less the contribution of the first acceleration */
-static void stage_second(rk4 *row, const pal_body *body, const rates *r)
+static void stage_second(rk4 *solver, const pal_body *body, const rates *r)
 {
-    pal_active_nodes *pack = body->active_nodes;
+    pal_active_nodes *nodes = body->active_nodes;
     for (int k = 0; k < body->n_active; k++) {
-        memory *m = &row->memory[k];
-        const pal_v8 y = pack->xv[k], rate = rate_of(row, pack, k), half = r->half[row->led[k]];
-        const pal_v8 kept = half * m->from, next = half * y - (y - kept);
+        memory *m = &solver->memory[k];
+        const pal_v8 y = nodes->xv[k], rate = rate_of(solver, nodes, k), half = r->half[solver->prescribed[k]];
+        const pal_v8 saved = half * m->from, next = half * y - (y - saved);
         m->sum += r->weight[1] * rate;
         m->from = pal_v8_join(pal_v8_low(m->from), pal_v8_high(next));
-        pack->xv[k] = kept + r->grow * rate;
+        nodes->xv[k] = saved + r->grow * rate;
     }
 }
 
 /* the fourth stage's state from the third stage's forces */
-static void stage_third(rk4 *row, const pal_body *body, const rates *r)
+static void stage_third(rk4 *solver, const pal_body *body, const rates *r)
 {
-    pal_active_nodes *pack = body->active_nodes;
+    pal_active_nodes *nodes = body->active_nodes;
     for (int k = 0; k < body->n_active; k++) {
-        memory *m = &row->memory[k];
-        const pal_v8 rate = rate_of(row, pack, k);
+        memory *m = &solver->memory[k];
+        const pal_v8 rate = rate_of(solver, nodes, k);
         m->sum += r->weight[1] * rate;
-        pack->xv[k] = m->from + r->last * rate;
+        nodes->xv[k] = m->from + r->last * rate;
     }
 }
 
 /* the final state from the fourth stage's forces; returns the square of the largest displacement, NaN if one is NaN */
-static double stage_last(rk4 *row, const pal_body *body, const rates *r)
+static double stage_last(rk4 *solver, const pal_body *body, const rates *r)
 {
-    pal_active_nodes *pack = body->active_nodes;
+    pal_active_nodes *nodes = body->active_nodes;
     const double dt2 = r->dt * r->dt;
-    double max2 = 0, poison = 0;
+    double max2 = 0, non_finite = 0;
     for (int k = 0; k < body->n_active; k++) {
-        const memory *m = &row->memory[k];
-        const pal_v8 sum = m->sum + r->weight[2] * rate_of(row, pack, k), square = sum * sum;
-        double way2 = square[0] + square[1] + square[2], v2 = dt2 * (square[4] + square[5] + square[6]);
-        pack->xv[k] = pal_v8_join(pal_v8_low(m->from) + pal_v8_low(sum), pal_v8_high(sum));
-        poison += 0 * way2 + 0 * v2;
-        way2 = v2 > way2 ? v2 : way2;
-        max2 = way2 > max2 ? way2 : max2;
+        const memory *m = &solver->memory[k];
+        const pal_v8 sum = m->sum + r->weight[2] * rate_of(solver, nodes, k), square = sum * sum;
+        double move2 = square[0] + square[1] + square[2], v2 = dt2 * (square[4] + square[5] + square[6]);
+        nodes->xv[k] = pal_v8_join(pal_v8_low(m->from) + pal_v8_low(sum), pal_v8_high(sum));
+        non_finite += 0 * move2 + 0 * v2;
+        move2 = v2 > move2 ? v2 : move2;
+        max2 = move2 > max2 ? move2 : max2;
     }
-    return max2 + poison;
+    return max2 + non_finite;
 }
 
 /* limits displacements to max_m, and velocities that would cause longer ones */
-static void clamp_moves(const rk4 *row, pal_body *body, double dt_s, double max_m)
+static void clamp_moves(const rk4 *solver, pal_body *body, double dt_s, double max_m)
 {
     for (int k = 0; k < body->n_active; k++) {
         pal_v8 *to = &body->active_nodes->xv[k];
-        pal_quad from = pal_v8_low(row->memory[k].from), move = pal_v8_low(*to) - from, v = pal_v8_high(*to);
-        double way = sqrt(pal_quad_dot(move, move)), speed = sqrt(pal_quad_dot(v, v)) * dt_s;
-        if (way > max_m) move *= max_m / way;
+        pal_quad from = pal_v8_low(solver->memory[k].from), move = pal_v8_low(*to) - from, v = pal_v8_high(*to);
+        double move_m = sqrt(pal_quad_dot(move, move)), speed = sqrt(pal_quad_dot(v, v)) * dt_s;
+        if (move_m > max_m) move *= max_m / move_m;
         if (speed > max_m) v *= max_m / speed;
-        if (way > max_m || speed > max_m) *to = pal_v8_join(from + move, v);
-        body->safeguards.n_clamped += way > max_m || speed > max_m;
+        if (move_m > max_m || speed > max_m) *to = pal_v8_join(from + move, v);
+        body->safeguards.n_clamped += move_m > max_m || speed > max_m;
     }
-}
-
-/* forces of the fourth stage, for support reactions */
-static void give_forces(const rk4 *row, const pal_body *body)
-{
-    for (int k = 0; k < body->n_active && row->pulls; k++)
-        pal_quad_store(body->f + 3 * (size_t)pal_body_point(body, k), body->active_nodes->f[k]);
 }
 
 static pal_err run(void *self, pal_step *step)
 {
-    rk4 *row = self;
+    rk4 *solver = self;
     pal_body *body = step->body;
     const rates r = find_rates(step->dt_s, pal_guard_drag_1_s(step->force, step->n_force));
     step->drag_separate = true;
-    take_body(row, step);
-    take_masses(row, body, &r, step->heavy);
-    PAL_TRY(find_forces(row, step));
-    stage_first(row, body, &r);
-    PAL_TRY(find_forces(row, step));
-    stage_second(row, body, &r);
-    PAL_TRY(find_forces(row, step));
-    stage_third(row, body, &r);
-    PAL_TRY(find_forces(row, step));
-    double way = sqrt(stage_last(row, body, &r)), max = pal_guard_max_move_m(body);
-    if (way > max) {
+    load_state(solver, step);
+    find_inverse_masses(solver, body, &r, step->adds_mass);
+    PAL_TRY(find_forces(solver, step));
+    stage_first(solver, body, &r);
+    PAL_TRY(find_forces(solver, step));
+    stage_second(solver, body, &r);
+    PAL_TRY(find_forces(solver, step));
+    stage_third(solver, body, &r);
+    PAL_TRY(find_forces(solver, step));
+    double move_m = sqrt(stage_last(solver, body, &r)), max = pal_guard_max_move_m(body);
+    if (move_m > max) {
         uint64_t before = pal_clock_ns();
-        clamp_moves(row, body, step->dt_s, max);
+        clamp_moves(solver, body, step->dt_s, max);
         body->safeguards.ns += pal_clock_ns() - before;
     }
-    give_motion(body);
-    give_forces(row, body);
-    row->way_m += way > max ? max : way;
-    row->n_since += row->n_since < PAUSE;
-    if (step->sub == 0) row->step_s = step->dt_s * step->n_sub;
+    store_motion(body);
+    /* forces of the fourth stage, for support reactions */
+    for (int k = 0; k < body->n_active && solver->packed; k++)
+        pal_quad_store(body->f + 3 * (size_t)pal_body_point(body, k), body->active_nodes->f[k]);
+    solver->moved_m += move_m > max ? max : move_m;
+    solver->n_since += solver->n_since < PAUSE;
+    if (step->sub == 0) solver->step_s = step->dt_s * step->n_sub;
     return PAL_ERR_OK;
 }
+
+/* ---- hooks ---- */
 
 static void reset(void *self, const pal_body *body)
 {
-    rk4 *row = self;
+    rk4 *solver = self;
     (void)body;
-    row->known = row->sharp_known = false;
-    row->n_since = PAUSE;
-    row->step_s = 0;
-    row->over = max_over;
+    solver->known = solver->sharp_known = false;
+    solver->n_since = PAUSE;
+    solver->step_s = 0;
+    solver->over = INFINITY;
 }
 
-static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
+static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    (void)to, (void)diag;
-    reset(self, body);
+    double safety = 0.9;
+    PAL_TRY(pal_entry_read_number(item, "safety", 0.01, 0.96, &safety, build->diag));
+    PAL_TRY(pal_entry_check_unused(item, build->diag));
+    if (build->body->interpolation)
+        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
+                                  "%s: \"rk4\" moves nodes, those of this body are carried by control points; take "
+                                  "\"central_cg\" or \"implicit_euler\"",
+                                  item->path);
+    const pal_body *body = build->body;
+    rk4 *solver = PAL_NEW(build->arena, rk4, 1);
+    if (!solver) return PAL_ERR_MEMORY;
+    solver->memory = PAL_NEW(build->arena, memory, body->n_dof);
+    solver->load = PAL_NEW(build->arena, pal_quad, body->n_dof);
+    solver->prescribed = PAL_NEW(build->arena, uint8_t, body->n_dof);
+    if (!solver->memory || !solver->load || !solver->prescribed ||
+        !PAL_NEW_DOUBLES(build->arena, body->n_dof, &solver->stiff, &solver->damp, &solver->inverse_kg))
+        return PAL_ERR_MEMORY;
+    PAL_TRY(pal_active_nodes_make(build->body, build->body_arena ? build->body_arena : build->arena));
+    pal_lanczos *lanczos = &solver->lanczos;
+    const size_t n3 = 3 * (size_t)body->n_dof;
+    lanczos->multiply = multiply_stiffness, lanczos->solve = solve_mass, lanczos->user = solver, lanczos->n_basis = 2;
+    if (body->active && (!PAL_NEW_DOUBLES(build->arena, n3, &solver->at, &solver->zero, &solver->force, &lanczos->z,
+                                          &lanczos->w, &lanczos->u) ||
+                         !PAL_NEW_DOUBLES(build->arena, 2 * n3, &lanczos->basis)))
+        return PAL_ERR_MEMORY;
+    solver->safety = safety;
+    solver->reach = safety * 2.7;
+    *self = solver;
+    reset(solver, body);
     return PAL_ERR_OK;
 }
 
-const pal_effect pal_effect_rk4 = {.name = "rk4",
-                                   .stage = PAL_STAGE_SOLVE,
-                                   .make = make,
-                                   .run = run,
-                                   .limit = limit,
-                                   .material = material,
-                                   .reset = reset};
+const pal_effect pal_effect_rk4 = {
+    .name = "rk4", .stage = PAL_STAGE_SOLVE, .make = make, .run = run, .bounds.limit = limit, .reset = reset};

@@ -20,46 +20,29 @@
 
 #include <string.h>
 
-static const double gamma_share = 0.29289321881345248;
+#define GAMMA (1 - M_SQRT1_2)
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    pal_implicit_options options;
-    pal_implicit *core = NULL;
-    PAL_TRY(pal_implicit_read(item, build, &options));
-    pal_err err = pal_implicit_make(&options, build, gamma_share, &core);
-    *self = core;
-    return err;
+    return pal_implicit_make(item, build, GAMMA, self);
 }
 
 /* x* and v* of the second stage from the first one's V, which body->v holds */
 static void open_second(pal_implicit *core, const pal_body *body, double dt)
 {
-    const double g = gamma_share, *v1 = body->v;
+    const double g = GAMMA, *v1 = body->v;
     for (int i = 0; i < 3 * body->n_dof; i++) {
         core->xs[i] = core->x0[i] + (1 - g) * dt * v1[i];
         core->vs[i] = core->v0[i] + (1 - g) / g * (v1[i] - core->v0[i]);
     }
 }
 
-/* forces on the tools at the first stage, then their mean over both */
-static void keep_forces(const pal_tools *tools, double first_N[][3])
-{
-    for (int t = 0; t < tools->n_tool; t++) pal_copy3(first_N[t], tools->tool[t].force_N);
-}
-
-static void mean_forces(pal_tools *tools, double first_N[][3])
-{
-    for (int t = 0; t < tools->n_tool; t++)
-        for (int c = 0; c < 3; c++)
-            tools->tool[t].force_N[c] += (1 - gamma_share) * (first_N[t][c] - tools->tool[t].force_N[c]);
-}
-
 static pal_err run(void *self, pal_step *step)
 {
     pal_implicit *core = self;
     pal_body *body = step->body;
-    size_t n_byte = 3 * sizeof(double) * (size_t)body->n_dof;
+    pal_tools *tools = step->tools;
+    const size_t n_byte = pal_body_bytes3(body);
     double first_N[PAL_TOOL_MAX][3];
     bool two_stages = false;
     if (!pal_implicit_begin(core, step)) return PAL_ERR_OK;
@@ -71,27 +54,20 @@ static pal_err run(void *self, pal_step *step)
         if (!two_stages) { /* backward Euler over the whole step, see above */
             PAL_TRY(pal_implicit_stage(core, step, step->dt_s));
         } else {
-            PAL_TRY(pal_implicit_stage(core, step, gamma_share * step->dt_s));
+            PAL_TRY(pal_implicit_stage(core, step, GAMMA * step->dt_s));
             if (pal_implicit_settle(core, step, false)) continue;
-            keep_forces(step->tools, first_N);
+            for (int t = 0; t < tools->n_tool; t++) pal_copy3(first_N[t], tools->tool[t].force_N);
             open_second(core, body, step->dt_s);
-            PAL_TRY(pal_implicit_stage(core, step, gamma_share * step->dt_s));
+            PAL_TRY(pal_implicit_stage(core, step, GAMMA * step->dt_s));
         }
         again = pal_implicit_settle(core, step, true);
     }
-    if (two_stages) mean_forces(step->tools, first_N);
+    /* the mean force of both stages */
+    for (int t = 0; t < tools->n_tool && two_stages; t++)
+        for (int c = 0; c < 3; c++)
+            tools->tool[t].force_N[c] += (1 - GAMMA) * (first_N[t][c] - tools->tool[t].force_N[c]);
     pal_implicit_end(core, step);
     return PAL_ERR_OK;
 }
 
-const pal_effect pal_effect_sdirk2 = {.name = "sdirk2",
-                                      .stage = PAL_STAGE_SOLVE,
-                                      .make = make,
-                                      .run = run,
-                                      .limit = pal_implicit_limit,
-                                      .material = pal_implicit_material,
-                                      .reset = pal_implicit_reset,
-                                      .implicit = true,
-                                      .report = pal_implicit_report,
-                                      .keeps_components = true,
-                                      .destroy = pal_implicit_destroy};
+const pal_effect pal_effect_sdirk2 = {.name = "sdirk2", .make = make, .run = run, PAL_IMPLICIT_HOOKS};

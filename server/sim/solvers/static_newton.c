@@ -1,10 +1,9 @@
 /* Solver static_newton: static equilibrium under the loads, by Newton's method with a line search on the total
  * energy.
  *
- * Each world step continues from the present shape with zero velocities and makes at most `newton` iterations, so
- * that a caller may show the progress with few per step. The linear systems K d = r (K as the components have it:
- * the corotational law omits the derivative of the rotations, which costs iterations but keeps the energy falling at
- * full steps) are solved
+ * Each world step continues from the present shape with zero velocities and makes at most `newton` iterations. The
+ * linear systems K d = r (K as the components have it: the corotational law omits the derivative of the rotations,
+ * which costs iterations but keeps the energy falling at full steps) are solved
  *   direct: by a factor of the present K, rebuilt in every iteration (once for the linear law),
  *   pcg:    by conjugate gradients with the warped factor of K at rest (warp.h),
  *   auto:   as pcg, but after a solve that took more iterations than a factor is worth by its operation count, the
@@ -15,10 +14,8 @@
  *           nearly incompressible and for thin bodies.
  * After an iteration that left more than a tenth of the residual, the next solves for the true stiffness
  * (differences of forces along each direction, system.h) by conjugate gradients with the same factor (truncated
- * Newton; Nash 2000): half the iterations or fewer on a bent beam. If that meets a direction of non-positive
- * curvature too early, its result is discarded and K is used. Far from equilibrium a nearly incompressible body has
- * spurious pressures and an indefinite true stiffness, and truncated directions made no progress for a body of nu
- * 0.499.
+ * Newton; Nash 2000): half the iterations or fewer on a bent beam. If that meets a direction of non-positive curvature
+ * too early, as far from equilibrium in a nearly incompressible body, its result is discarded and K is used.
  *
  * The line search requires a decrease of the energy; where the expected decrease is below the energy's rounding, it
  * tests the slope at the trial point (approximate Wolfe condition; Hager & Zhang 2005).
@@ -28,8 +25,8 @@
  * `load_steps` equal parts, each solved before the next.
  *
  * A body whose supports leave a rigid motion free is refused at load (free "refuse"). If it is a single part without
- * fixed nodes it can be solved by inertia relief (free "inertia_relief"): inertia_relief.h balances the loads, K +
- * eps M is solved, and rigid motion is removed from every d.
+ * fixed nodes it can be solved by inertia relief (free "inertia_relief"): core/rigid_motion.h balances the
+ * loads, K + eps M is solved, and rigid motion is removed from every d.
  *
  * A body whose nodes are interpolated from control points (body.h, interpolation) is solved for the control points
  * by pcg, with a factor of the matrix at rest from interpolated_system.h; `direct`, `incomplete` and inertia relief
@@ -40,13 +37,15 @@
  * Departure from the rules of a step: `direct` and `auto` take heap memory for factors. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
-#include "server/num/conjugate_gradient.h"
 #include "server/num/incomplete_cholesky.h"
 #include "server/sim/core/effect_list.h"
+#include "server/sim/core/rigid_motion.h"
 #include "server/sim/core/step_guard.h"
 #include "server/sim/implicit/compliance.h"
-#include "server/sim/implicit/inertia_relief.h"
+#include "server/sim/implicit/tuning.h"
+#include "server/sim/solvers/tuning.h"
 
+#include <float.h>
 #include <limits.h>
 #include <string.h>
 
@@ -59,19 +58,17 @@ typedef struct static_newton {
     bool relieved, constant; /* inertia relief; K never changes (linear law) */
     pal_system system;
     pal_block_matrix blocks;
-    pal_node_rotations turns;
+    pal_node_rotations rotations;
     pal_warp warp;
     pal_incomplete_cholesky incomplete; /* replaces the warp's factor */
-    pal_compliance_solver answer;
+    pal_compliance_solver compliance;
     pal_conjugate_gradient cg;
-    pal_inertia_relief inertia_relief;
     double *x0, *external_force; /* at the beginning of the step; external loads [n_dof][3] */
     double *force, *move;        /* residual and d of the iteration                       [n_dof][3] */
     double *now, *low;           /* work space of the true stiffness [n_dof][3] */
     double *inertia;             /* inertia forces that balance the loads; NULL: no relief [n_dof][3] */
-    double *node_displacement_m; /* displacement of interpolated nodes; NULL: none [n_node][3] */
+    double *node_displacement_m; /* displacement of nodes; `move` without interpolation [n_node][3] */
     uint64_t sampled;            /* pal_dofs_material_revision(&body->dofs) at the factor   */
-    double shift_1_s2;           /* eps                                           */
     bool has_factor, stale;      /* a factor exists; its last solve took too many iterations */
     bool eager;                  /* the factor was stale at its second solve: rebuild it in every iteration */
     int age;                     /* solves with the factor */
@@ -82,60 +79,32 @@ typedef struct static_newton {
     pal_solve_report report;
 } static_newton;
 
-static const double inertia_relief_share = 1e-8, flops_per_nonzero = 20;
-/* an iteration that leaves more of the residual is slow */
-static const double slow = 0.1;
-/* max residual of conjugate gradients on the true stiffness where they are truncated */
-static const double enough = 0.1;
-/* relative energy difference that counts as equal (Hager & Zhang 2005); displacement over a voxel's edge that counts
- * as small */
-static const double level_share = 1e-6, short_h = 1e-4;
 /* iterations with the tangent alone after the true stiffness failed */
 enum { BACKOFF = 4 };
 
-static size_t bytes3(const static_newton *row)
-{
-    return 3 * sizeof(double) * (size_t)row->system.body->n_dof;
-}
-
 /* ---- load ---- */
 
-static pal_err read_choice(pal_config_entry *item, const pal_build *build, const char *key, const char *const *names,
-                           int n, int *out)
+static pal_err read_keys(pal_config_entry *item, const pal_build *build, static_newton *solver)
 {
-    const char *text = names[*out];
-    PAL_TRY(pal_entry_read_text(item, key, &text, build->diag));
-    for (int i = 0; i < n; i++)
-        if (!strcmp(text, names[i])) {
-            *out = i;
-            return PAL_ERR_OK;
-        }
-    return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s.%s: \"%s\" is none of %s, %s%s%s%s%s", item->path, key,
-                              text, names[0], names[1], n > 2 ? ", " : "", n > 2 ? names[2] : "", n > 3 ? ", " : "",
-                              n > 3 ? names[3] : "");
-}
-
-static pal_err read_keys(pal_config_entry *item, const pal_build *build, static_newton *row)
-{
-    static const char *const linear[] = {"auto", "direct", "pcg", "incomplete"}, *const rigid[] = {"refuse",
-                                                                                                   "inertia_relief"};
+    static const char *const linear[] = {"auto", "direct", "pcg", "incomplete"};
+    static const char *const rigid[] = {"refuse", "inertia_relief"};
     int kind = 0, relieved = 0;
-    row->tolerance = 1e-8, row->cg_tolerance = 1e-3;
-    row->newton = 50, row->load_steps = 1, row->iterations = 500;
-    PAL_TRY(pal_entry_read_number(item, "tolerance", 1e-15, 0.5, &row->tolerance, build->diag));
-    PAL_TRY(pal_entry_read_number(item, "cg_tolerance", 1e-14, 0.5, &row->cg_tolerance, build->diag));
-    PAL_TRY(pal_entry_read_count(item, "newton", 1, 100000, &row->newton, build->diag));
-    PAL_TRY(pal_entry_read_count(item, "load_steps", 1, 10000, &row->load_steps, build->diag));
-    PAL_TRY(pal_entry_read_count(item, "iterations", 1, 100000, &row->iterations, build->diag));
-    PAL_TRY(read_choice(item, build, "linear", linear, 4, &kind));
-    PAL_TRY(read_choice(item, build, "free", rigid, 2, &relieved));
+    solver->tolerance = 1e-8, solver->cg_tolerance = 1e-3;
+    solver->newton = 50, solver->load_steps = 1, solver->iterations = 500;
+    PAL_TRY(pal_entry_read_number(item, "tolerance", 1e-15, 0.5, &solver->tolerance, build->diag));
+    PAL_TRY(pal_entry_read_number(item, "cg_tolerance", 1e-14, 0.5, &solver->cg_tolerance, build->diag));
+    PAL_TRY(pal_entry_read_count(item, "newton", 1, 100000, &solver->newton, build->diag));
+    PAL_TRY(pal_entry_read_count(item, "load_steps", 1, 10000, &solver->load_steps, build->diag));
+    PAL_TRY(pal_entry_read_count(item, "iterations", 1, 100000, &solver->iterations, build->diag));
+    PAL_TRY(pal_entry_read_choice(item, "linear", linear, 4, &kind, build->diag));
+    PAL_TRY(pal_entry_read_choice(item, "free", rigid, 2, &relieved, build->diag));
     PAL_TRY(pal_entry_check_unused(item, build->diag));
-    row->linear = (linear_kind)kind;
-    row->relieved = relieved;
+    solver->linear = (linear_kind)kind;
+    solver->relieved = relieved;
     const char *law = "";
     pal_config_entry model = build->def->model;
     if (pal_entry_has(&model, "law")) PAL_TRY(pal_entry_read_text(&model, "law", &law, build->diag));
-    row->constant = !strcmp(law, "linear");
+    solver->constant = !strcmp(law, "linear");
     return PAL_ERR_OK;
 }
 
@@ -144,105 +113,89 @@ static void multiply(void *user, const double *p, double *out)
     pal_system_multiply(&((static_newton *)user)->system, p, out);
 }
 
-/* the true stiffness at row->now; with contact and, for relief, eps M */
+/* the true stiffness at solver->now; with contact and, for relief, eps M */
 static void multiply_true(void *user, const double *p, double *out)
 {
-    static_newton *row = user;
-    const pal_body *body = row->system.body;
-    pal_system_true_stiffness(&row->system, row->now, row->low, p, out);
-    if (row->system.has_contact) pal_system_multiply_contact(&row->system, 1, 0, p, out);
-    for (int i = 0; i < row->cg.n; i++)
-        out[i] = body->support[i / 3] ? 0 : out[i] + row->system.mass * body->mass_kg[i / 3] * p[i];
+    static_newton *solver = user;
+    const pal_body *body = solver->system.body;
+    pal_system_true_stiffness(&solver->system, solver->now, solver->low, p, out);
+    if (solver->system.has_contact) pal_system_multiply_contact(&solver->system, 1, 0, p, out);
+    for (int i = 0; i < solver->cg.n; i++)
+        out[i] = body->support[i / 3] ? 0 : out[i] + solver->system.mass * body->mass_kg[i / 3] * p[i];
 }
 
 static void precondition(void *user, const double *r, double *z)
 {
-    static_newton *row = user;
-    if (row->linear == LINEAR_INCOMPLETE)
-        pal_incomplete_cholesky_solve(&row->incomplete, r, z);
+    static_newton *solver = user;
+    if (solver->linear == LINEAR_INCOMPLETE)
+        pal_incomplete_cholesky_solve(&solver->incomplete, r, z);
     else
-        pal_warp_solve(&row->warp, r, z);
+        pal_warp_solve(&solver->warp, r, z);
 }
 
-static pal_err make_arrays(static_newton *row, pal_arena *arena)
+static pal_err make_arrays(static_newton *solver, pal_arena *arena)
 {
-    const pal_body *body = row->system.body;
+    const pal_body *body = solver->system.body;
+    pal_conjugate_gradient *cg = &solver->cg;
     size_t n3 = 3 * (size_t)body->n_dof;
-    double **const array[] = {&row->x0,  &row->external_force, &row->force, &row->move, &row->now,
-                              &row->low, &row->cg.r,           &row->cg.z,  &row->cg.p, &row->cg.q};
-    for (size_t i = 0; i < sizeof array / sizeof array[0]; i++) {
-        *array[i] = PAL_NEW(arena, double, n3);
-        if (!*array[i]) return PAL_ERR_MEMORY;
-    }
-    if (body->interpolation && !(row->node_displacement_m = PAL_NEW(arena, double, 3 * (size_t)body->n_node)))
-        return PAL_ERR_MEMORY;
-    if (row->relieved && !(row->inertia = PAL_NEW(arena, double, n3))) return PAL_ERR_MEMORY;
-    row->cg.n = (int)n3;
-    row->cg.multiply = multiply;
-    row->cg.precondition = precondition;
-    row->cg.user = row;
+    bool made = PAL_NEW_DOUBLES(arena, n3, &solver->x0, &solver->external_force, &solver->force, &solver->move,
+                                &solver->now, &solver->low, &cg->r, &cg->z, &cg->p, &cg->q);
+    solver->node_displacement_m = solver->move;
+    if (made && body->interpolation)
+        made = PAL_NEW_DOUBLES(arena, 3 * (size_t)body->n_node, &solver->node_displacement_m);
+    if (made && solver->relieved) made = PAL_NEW_DOUBLES(arena, n3, &solver->inertia);
+    cg->n = (int)n3;
+    cg->multiply = multiply, cg->precondition = precondition, cg->user = solver;
+    return made ? PAL_ERR_OK : PAL_ERR_MEMORY;
+}
+
+/* of an interpolated body: finds its matrix at rest, whatever its present linearisation, which is restored */
+static void probe(static_newton *solver)
+{
+    solver->sampled = pal_dofs_material_revision(&solver->system.body->dofs);
+    pal_interpolated_system_invalidate(solver->system.interpolated_system);
+    (void)pal_system_probe(&solver->system, INT_MAX);
+    pal_system_linearise(&solver->system);
+}
+
+static pal_err factor(static_newton *solver)
+{
+    if (solver->system.interpolated_system) probe(solver);
+    pal_system_assemble(&solver->system, &solver->blocks);
+    PAL_TRY(solver->linear == LINEAR_INCOMPLETE ? pal_incomplete_cholesky_factor(&solver->incomplete, &solver->blocks)
+                                                : pal_warp_factor(&solver->warp, &solver->blocks));
+    if (solver->system.interpolated_system) pal_warp_set_rest(&solver->warp);
+    solver->has_factor = true;
+    solver->stale = false;
+    solver->age = 0;
     return PAL_ERR_OK;
 }
 
-/* of the components' present linearisation */
-static void assemble(static_newton *row)
+/* eps: the square root of rounding, times K over mass */
+static void choose_shift(static_newton *solver)
 {
-    double before = pal_clock_s();
-    pal_system_assemble(&row->system, &row->blocks);
-    row->report.assemble_s += pal_clock_s() - before;
-}
-
-/* of an interpolated body: at rest, rebuilt after a change of its samples; then restores the present linearisation */
-static void probe(static_newton *row)
-{
-    const pal_body *body = row->system.body;
-    double before = pal_clock_s();
-    row->sampled = pal_dofs_material_revision(&body->dofs);
-    pal_interpolated_system_invalidate(row->system.interpolated_system);
-    (void)pal_system_probe(&row->system, INT_MAX);
-    pal_system_linearise(&row->system);
-    row->report.assemble_s += pal_clock_s() - before;
-}
-
-static pal_err factor(static_newton *row)
-{
-    if (row->system.interpolated_system) probe(row);
-    assemble(row);
-    PAL_TRY(row->linear == LINEAR_INCOMPLETE ? pal_incomplete_cholesky_factor(&row->incomplete, &row->blocks)
-                                             : pal_warp_factor(&row->warp, &row->blocks));
-    if (row->system.interpolated_system) pal_warp_set_rest(&row->warp);
-    row->has_factor = true;
-    row->stale = false;
-    row->age = 0;
-    return PAL_ERR_OK;
-}
-
-/* eps: a small fraction of K over mass */
-static void choose_shift(static_newton *row)
-{
-    const pal_body *body = row->system.body;
+    const pal_body *body = solver->system.body;
     double stiff = 0, mass = 0;
-    assemble(row);
+    pal_system_assemble(&solver->system, &solver->blocks);
     for (int i = 0; i < body->n_dof; i++) {
-        const double *block = row->blocks.value + 9 * (size_t)row->blocks.start[i];
+        const double *block = solver->blocks.value + 9 * (size_t)solver->blocks.start[i];
         stiff += (block[0] + block[4] + block[8]) / 3;
         mass += body->mass_kg[i];
     }
-    row->shift_1_s2 = inertia_relief_share * stiff / mass;
-    row->system.mass = row->shift_1_s2;
+    solver->system.mass = sqrt(DBL_EPSILON) * stiff / mass;
 }
 
-static pal_err check_supports(static_newton *row, const pal_build *build)
+static pal_err check_supports(static_newton *solver, const pal_build *build)
 {
     const pal_body *body = build->body;
     pal_support_report s;
-    PAL_TRY(pal_system_find_supports(&row->system, &s));
+    PAL_TRY(pal_system_find_supports(&solver->system, &s));
     if (s.n_unsupported == 0) {
-        row->relieved = false;
+        solver->relieved = false;
         return PAL_ERR_OK;
     }
     const double *x = body->x_rest + 3 * s.unsupported_node;
-    if (!row->relieved)
+    if (!solver->relieved)
         return pal_diagnostic_set(
             build->diag, PAL_ERR_REFUSED,
             "body \"%s\": %d of its %d parts (the one at (%g, %g, %g) m) has fewer than three held nodes "
@@ -253,34 +206,36 @@ static pal_err check_supports(static_newton *row, const pal_build *build)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
                                   "body \"%s\": inertia_relief is for bodies of nodes, this one has control points",
                                   body->name);
-    if (s.n_part > 1 || row->system.n_free < body->n_node)
+    if (s.n_part > 1 || solver->system.n_free < body->n_node)
         return pal_diagnostic_set(
             build->diag, PAL_ERR_REFUSED,
             "body \"%s\": inertia_relief is for one part without held nodes, this body has %d parts and "
             "%d held nodes",
-            body->name, s.n_part, body->n_node - row->system.n_free);
+            body->name, s.n_part, body->n_node - solver->system.n_free);
     return PAL_ERR_OK;
 }
 
-static pal_err make_factors(static_newton *row, pal_build *build)
+static pal_err make_factors(static_newton *solver, pal_build *build)
 {
     pal_body *body = build->body;
-    if (body->interpolation && (row->linear == LINEAR_DIRECT || row->linear == LINEAR_INCOMPLETE))
+    if (body->interpolation && (solver->linear == LINEAR_DIRECT || solver->linear == LINEAR_INCOMPLETE))
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
                                   "body \"%s\": static_newton with linear \"%s\" is for bodies of nodes, this one has "
                                   "control points; take \"pcg\"",
-                                  body->name, row->linear == LINEAR_DIRECT ? "direct" : "incomplete");
-    if (body->interpolation) row->linear = LINEAR_PCG;
-    PAL_TRY(pal_system_pattern(&row->system, build->arena, &row->blocks));
-    PAL_TRY(pal_node_rotations_make(&row->system, build->arena, &row->turns));
-    if (row->linear == LINEAR_INCOMPLETE)
-        PAL_TRY(pal_incomplete_cholesky_make(&row->blocks, body->support, build->arena, &row->incomplete));
+                                  body->name, solver->linear == LINEAR_DIRECT ? "direct" : "incomplete");
+    if (body->interpolation) solver->linear = LINEAR_PCG;
+    PAL_TRY(pal_system_pattern(&solver->system, build->arena, &solver->blocks));
+    PAL_TRY(pal_node_rotations_make(&solver->system, build->arena, &solver->rotations));
+    if (solver->linear == LINEAR_INCOMPLETE)
+        PAL_TRY(pal_incomplete_cholesky_make(&solver->blocks, body->support, build->arena, &solver->incomplete));
     else
-        PAL_TRY(pal_warp_make(&row->blocks, body, &row->turns, false, build->arena, &row->warp));
-    pal_system_linearise(&row->system);
-    if (row->relieved) choose_shift(row);
-    pal_err err = row->linear == LINEAR_DIRECT ? PAL_ERR_OK : factor(row);
-    if (!err) err = pal_compliance_solver_make(&row->system, &row->turns, &row->blocks, build->arena, &row->answer);
+        PAL_TRY(pal_warp_make(&solver->blocks, body, &solver->rotations, false, build->arena, &solver->warp));
+    pal_system_linearise(&solver->system);
+    if (solver->relieved) choose_shift(solver);
+    pal_err err = solver->linear == LINEAR_DIRECT ? PAL_ERR_OK : factor(solver);
+    if (!err)
+        err = pal_compliance_solver_make(&solver->system, &solver->rotations, &solver->blocks, build->arena,
+                                         &solver->compliance);
     if (err == PAL_ERR_NUMERIC)
         return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
                                   "body \"%s\": its stiffness at rest is not positive definite", body->name);
@@ -289,28 +244,28 @@ static pal_err make_factors(static_newton *row, pal_build *build)
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
-    static_newton *row = PAL_NEW(build->arena, static_newton, 1);
-    if (!row) return PAL_ERR_MEMORY;
-    *self = row;
-    PAL_TRY(read_keys(item, build, row));
-    PAL_TRY(pal_system_make(build, &row->system));
-    row->system.mass = 0, row->system.stiff = 1, row->system.damp = 0;
-    PAL_TRY(make_arrays(row, build->arena));
-    if (row->system.n_free == 0) return PAL_ERR_OK;
-    PAL_TRY(check_supports(row, build));
-    return make_factors(row, build);
+    static_newton *solver = PAL_NEW(build->arena, static_newton, 1);
+    if (!solver) return PAL_ERR_MEMORY;
+    *self = solver;
+    PAL_TRY(read_keys(item, build, solver));
+    PAL_TRY(pal_system_make(build, &solver->system));
+    solver->system.mass = 0, solver->system.stiff = 1, solver->system.damp = 0;
+    PAL_TRY(make_arrays(solver, build->arena));
+    if (solver->system.n_free == 0) return PAL_ERR_OK;
+    PAL_TRY(check_supports(solver, build));
+    return make_factors(solver, build);
 }
 
 static void destroy(void *self)
 {
-    static_newton *row = self;
-    pal_warp_destroy(&row->warp);
-    pal_compliance_solver_destroy(&row->answer);
+    static_newton *solver = self;
+    pal_warp_destroy(&solver->warp);
+    pal_compliance_solver_destroy(&solver->compliance);
 }
 
 /* ---- forces and energy ---- */
 
-static pal_err run_rows(pal_step *step, bool internal)
+static pal_err run_components(pal_step *step, bool internal)
 {
     uint64_t before = pal_clock_ns();
     for (int i = 0; i < step->n_force; i++) {
@@ -326,53 +281,50 @@ static pal_err run_rows(pal_step *step, bool internal)
 }
 
 /* external loads at the beginning of the step */
-static pal_err find_outer(static_newton *row, pal_step *step)
+static pal_err find_external_force(static_newton *solver, pal_step *step)
 {
-    pal_body *body = row->system.body;
+    pal_body *body = solver->system.body;
     memcpy(body->f, body->load, 3 * sizeof(double) * (size_t)body->n_node);
-    PAL_TRY(run_rows(step, false));
-    if (!body->interpolation) {
-        memcpy(row->external_force, body->f, bytes3(row));
-        return PAL_ERR_OK;
-    }
-    memset(row->external_force, 0, bytes3(row));
-    pal_interpolation_apply_transpose(body->interpolation, body->f, row->external_force);
+    PAL_TRY(run_components(step, false));
+    pal_system_restrict(body, body->f, solver->external_force);
     return PAL_ERR_OK;
 }
 
-static double share(const static_newton *row)
+/* positions about which internal forces have no moment */
+static const double *moment_positions(const static_newton *solver)
 {
-    return (double)row->part / row->load_steps;
+    return solver->constant ? solver->system.body->x_rest : solver->system.body->x;
 }
 
 /* body->g = all forces at body->x; cg.r = those at free nodes; returns |r|. The tolerance's scale too */
-static pal_err find_residual(static_newton *row, pal_step *step, double *size)
+static pal_err find_residual(static_newton *solver, pal_step *step, double *size)
 {
-    pal_body *body = row->system.body;
-    double part = share(row), loads = 0, reactions = 0, *r = row->cg.r, *p = row->cg.p;
-    pal_system_interpolate(&row->system);
+    pal_body *body = solver->system.body;
+    double part = (double)solver->part / solver->load_steps, loads = 0, reactions = 0, *r = solver->cg.r,
+           *p = solver->cg.p;
+    pal_system_interpolate(&solver->system);
     if (body->interpolation) memset(body->f, 0, 3 * sizeof(double) * (size_t)body->n_node);
-    for (int i = 0; i < row->cg.n; i++) body->g[i] = part * row->external_force[i];
-    PAL_TRY(run_rows(step, true));
+    for (int i = 0; i < solver->cg.n; i++) body->g[i] = part * solver->external_force[i];
+    PAL_TRY(run_components(step, true));
     if (body->interpolation) pal_interpolation_apply_transpose(body->interpolation, body->f, body->g);
-    memcpy(r, body->g, bytes3(row));
-    if (row->system.has_contact) {
-        for (int i = 0; i < row->cg.n; i++) p[i] = body->x[i] - row->x0[i];
-        pal_system_multiply_contact(&row->system, -1, 0, p, r);
+    memcpy(r, body->g, pal_body_bytes3(solver->system.body));
+    if (solver->system.has_contact) {
+        for (int i = 0; i < solver->cg.n; i++) p[i] = body->x[i] - solver->x0[i];
+        pal_system_multiply_contact(&solver->system, -1, 0, p, r);
     }
     for (int i = 0; i < body->n_dof; i++) {
-        loads += pal_norm3(row->external_force + 3 * i);
+        loads += pal_norm3(solver->external_force + 3 * i);
         if (!body->support[i]) continue;
         reactions += pal_norm3(r + 3 * i);
         pal_set3(r + 3 * i, 0, 0, 0);
     }
-    if (row->relieved && pal_inertia_relief_make(body, row->constant ? body->x_rest : body->x, &row->inertia_relief)) {
-        memcpy(row->inertia, r, bytes3(row));
-        pal_inertia_relief_balance(&row->inertia_relief, body, r);
-        for (int i = 0; i < row->cg.n; i++) row->inertia[i] = r[i] - row->inertia[i];
+    if (solver->relieved) {
+        memcpy(solver->inertia, r, pal_body_bytes3(solver->system.body));
+        pal_rigid_motion_remove(body->n_dof, body->mass_kg, moment_positions(solver), true, r);
+        for (int i = 0; i < solver->cg.n; i++) solver->inertia[i] = r[i] - solver->inertia[i];
     }
-    row->scale_N = fmax(loads, reactions);
-    *size = sqrt(pal_dot_product(row->cg.n, r, r));
+    solver->scale_N = fmax(loads, reactions);
+    *size = sqrt(pal_dot_product(solver->cg.n, r, r));
     return PAL_ERR_OK;
 }
 
@@ -388,24 +340,25 @@ static void add_energy(energy *to, double part_J)
 }
 
 /* energy of the components less the work of loads since x0; inertia relief as of the last residual */
-static energy potential(static_newton *row)
+static energy potential(static_newton *solver)
 {
-    const pal_body *body = row->system.body;
+    const pal_body *body = solver->system.body;
     energy all = {0};
-    double *p = row->cg.p, *q = row->cg.q;
-    pal_system_interpolate(&row->system);
-    for (int i = 0; i < row->system.n_force; i++) {
-        const pal_component *force = &row->system.force[i];
+    double *p = solver->cg.p, *q = solver->cg.q;
+    pal_system_interpolate(&solver->system);
+    for (int i = 0; i < solver->system.n_force; i++) {
+        const pal_component *force = &solver->system.force[i];
         if (force->effect->internal && force->effect->energy)
             add_energy(&all, force->effect->energy(force->self, body));
     }
-    for (int i = 0; i < row->cg.n; i++) p[i] = body->x[i] - row->x0[i];
-    add_energy(&all, -share(row) * pal_dot_product(row->cg.n, row->external_force, p));
-    if (row->relieved) add_energy(&all, -pal_dot_product(row->cg.n, row->inertia, p));
-    if (row->system.has_contact) {
-        memset(q, 0, bytes3(row));
-        pal_system_multiply_contact(&row->system, 1, 0, p, q);
-        add_energy(&all, 0.5 * pal_dot_product(row->cg.n, p, q));
+    for (int i = 0; i < solver->cg.n; i++) p[i] = body->x[i] - solver->x0[i];
+    const double part = (double)solver->part / solver->load_steps;
+    add_energy(&all, -part * pal_dot_product(solver->cg.n, solver->external_force, p));
+    if (solver->relieved) add_energy(&all, -pal_dot_product(solver->cg.n, solver->inertia, p));
+    if (solver->system.has_contact) {
+        memset(q, 0, pal_body_bytes3(solver->system.body));
+        pal_system_multiply_contact(&solver->system, 1, 0, p, q);
+        add_energy(&all, 0.5 * pal_dot_product(solver->cg.n, p, q));
     }
     return all;
 }
@@ -414,203 +367,194 @@ static energy potential(static_newton *row)
 
 /* conjugate gradients on the true stiffness from move = 0; 0: a direction of non-positive curvature, move and cg.r
  * are unchanged */
-static int run_true(static_newton *row, double target, double size)
+static int run_true(static_newton *solver, double target, double size)
 {
-    memcpy(row->now, row->system.body->x, bytes3(row));
-    row->cg.multiply = multiply_true;
-    int n = pal_conjugate_gradient_run(&row->cg, row->move, target, 1, row->iterations);
-    row->cg.multiply = multiply;
-    row->report.n_cg += n;
-    if (n == row->iterations || row->cg.residual <= fmax(target, enough * size)) return n;
-    memcpy(row->cg.r, row->force, bytes3(row));
-    memset(row->move, 0, bytes3(row));
-    row->exact = false;
-    row->backoff = BACKOFF;
+    memcpy(solver->now, solver->system.body->x, pal_body_bytes3(solver->system.body));
+    solver->cg.multiply = multiply_true;
+    int n = pal_conjugate_gradient_run(&solver->cg, solver->move, target, 1, solver->iterations);
+    solver->cg.multiply = multiply;
+    solver->report.n_cg += n;
+    if (n == solver->iterations || solver->cg.residual <= fmax(target, PAL_NEWTON_SLOW * size)) return n;
+    memcpy(solver->cg.r, solver->force, pal_body_bytes3(solver->system.body));
+    memset(solver->move, 0, pal_body_bytes3(solver->system.body));
+    solver->exact = false;
+    solver->backoff = BACKOFF;
     return 0;
 }
 
 /* conjugate gradients on K, or on the true stiffness if that is positive */
-static void run_gradients(static_newton *row, double size)
+static void run_gradients(static_newton *solver, double size)
 {
-    double target = 0.3 * row->tolerance * row->scale_N;
-    if (!row->constant) target = fmax(target, row->cg_tolerance * size);
-    int n = row->exact ? run_true(row, target, size) : 0;
+    double target = 0.3 * solver->tolerance * solver->scale_N;
+    if (!solver->constant) target = fmax(target, solver->cg_tolerance * size);
+    int n = solver->exact ? run_true(solver, target, size) : 0;
     if (n == 0) {
-        n = pal_conjugate_gradient_run(&row->cg, row->move, target, 1, row->iterations);
-        row->report.n_cg += n;
+        n = pal_conjugate_gradient_run(&solver->cg, solver->move, target, 1, solver->iterations);
+        solver->report.n_cg += n;
     }
-    if (row->linear == LINEAR_INCOMPLETE) return;
-    double worth = pal_cholesky_flops(row->warp.factor) /
-                   (flops_per_nonzero * (double)(pal_cholesky_nonzeros(row->warp.factor) + 1));
-    row->stale = n > fmin(fmax(worth, 10), 100);
-    row->eager |= ++row->age == 2 && row->stale;
+    if (solver->linear == LINEAR_INCOMPLETE) return;
+    double worth = pal_cholesky_flops(solver->warp.factor) /
+                   (PAL_FACTOR_FLOPS_PER_ENTRY * (double)(pal_cholesky_nonzeros(solver->warp.factor) + 1));
+    solver->stale = n > fmin(fmax(worth, 10), 100);
+    solver->eager |= ++solver->age == 2 && solver->stale;
 }
 
 /* move = K^-1 r */
-static pal_err solve_linear(static_newton *row, double size)
+static pal_err solve_linear(static_newton *solver, double size)
 {
-    bool fresh = (row->linear == LINEAR_DIRECT || row->linear == LINEAR_INCOMPLETE) && !row->constant;
-    bool direct = row->linear == LINEAR_DIRECT && !row->system.has_contact && !row->exact;
-    memset(row->move, 0, bytes3(row));
-    if (!row->has_factor || fresh || (row->linear == LINEAR_AUTO && (row->stale || row->eager))) PAL_TRY(factor(row));
-    if (row->warp.factor) pal_warp_rotate(&row->warp, &row->turns);
+    bool fresh = (solver->linear == LINEAR_DIRECT || solver->linear == LINEAR_INCOMPLETE) && !solver->constant;
+    bool direct = solver->linear == LINEAR_DIRECT && !solver->system.has_contact && !solver->exact;
+    memset(solver->move, 0, pal_body_bytes3(solver->system.body));
+    if (!solver->has_factor || fresh || (solver->linear == LINEAR_AUTO && (solver->stale || solver->eager)))
+        PAL_TRY(factor(solver));
+    if (solver->warp.factor) pal_warp_rotate(&solver->warp, &solver->rotations);
     double before = pal_clock_s();
     if (direct)
-        pal_warp_solve(&row->warp, row->cg.r, row->move);
+        pal_warp_solve(&solver->warp, solver->cg.r, solver->move);
     else
-        run_gradients(row, size);
-    if (row->relieved) pal_inertia_relief_remove_rigid(&row->inertia_relief, row->system.body, row->move);
-    row->report.solve_s += pal_clock_s() - before;
+        run_gradients(solver, size);
+    if (solver->relieved) {
+        const pal_body *body = solver->system.body;
+        pal_rigid_motion_remove(body->n_dof, body->mass_kg, moment_positions(solver), false, solver->move);
+    }
+    solver->report.solve_s += pal_clock_s() - before;
     return PAL_ERR_OK;
 }
 
 /* from x, along move */
-typedef struct way {
+typedef struct direction {
     energy energy;    /* at x                          */
     double size_N;    /* |residual| there              */
     double slope_J;   /* predicted decrease of the energy along move; the decrease at full step is half of it */
     double longest_m; /* move of a node                */
-} way;
+} direction;
 
 /* tests the trial point x + move by forces where energies cannot decide */
-static bool is_flat(static_newton *row, pal_step *step, const way *from, double rise_J)
+static bool is_flat(static_newton *solver, pal_step *step, const direction *from, double rise_J)
 {
-    const pal_body *body = row->system.body;
-    bool level = fabs(rise_J) <= level_share * from->energy.size_J;
-    bool short_way = from->longest_m <= short_h * body->edge_m;
+    const pal_body *body = solver->system.body;
     double size;
-    if (!level && !short_way) return false;
-    if (row->relieved) memcpy(row->now, row->inertia, bytes3(row));
-    bool found = !find_residual(row, step, &size) &&
-                 fabs(pal_dot_product(row->cg.n, row->cg.r, row->move)) <= 0.8 * from->slope_J && size <= from->size_N;
-    if (row->relieved && !found) memcpy(row->inertia, row->now, bytes3(row));
+    if (fabs(rise_J) > PAL_SOLVER_FLOOR * from->energy.size_J && from->longest_m > 10 * PAL_DIFFERENCE_H * body->edge_m)
+        return false;
+    if (solver->relieved) memcpy(solver->now, solver->inertia, pal_body_bytes3(solver->system.body));
+    bool found = !find_residual(solver, step, &size) &&
+                 fabs(pal_dot_product(solver->cg.n, solver->cg.r, solver->move)) <= 0.8 * from->slope_J &&
+                 size <= from->size_N;
+    if (solver->relieved && !found) memcpy(solver->inertia, solver->now, pal_body_bytes3(solver->system.body));
     return found;
 }
 
 /* x += step move with the largest step of 1, 1/2, 1/4 ... that decreases the energy sufficiently (Armijo); false:
  * none */
-static bool search(static_newton *row, pal_step *at, const way *from)
+static bool search(static_newton *solver, pal_step *at, const direction *from)
 {
-    pal_body *body = row->system.body;
+    pal_body *body = solver->system.body;
     double step = 1, done = 0, noise = 1e-12 * from->energy.size_J;
-    bool found = !row->system.has_energy || row->constant;
+    bool found = !solver->system.has_energy || solver->constant;
     for (;; step *= 0.5) {
-        for (int i = 0; i < row->cg.n; i++) body->x[i] += (step - done) * row->move[i];
+        for (int i = 0; i < solver->cg.n; i++) body->x[i] += (step - done) * solver->move[i];
         done = step;
         if (found) break;
-        double rise = potential(row).sum_J - from->energy.sum_J;
-        found = rise <= noise - 1e-4 * step * from->slope_J || (step == 1 && is_flat(row, at, from, rise));
+        double rise = potential(solver).sum_J - from->energy.sum_J;
+        found = rise <= noise - 1e-4 * step * from->slope_J || (step == 1 && is_flat(solver, at, from, rise));
         if (found || step < 1e-4) break;
     }
-    for (int i = 0; i < row->cg.n && !found; i++) body->x[i] -= done * row->move[i];
-    row->report.step_size = step;
+    for (int i = 0; i < solver->cg.n && !found; i++) body->x[i] -= done * solver->move[i];
+    solver->report.step_size = step;
     return found;
 }
 
-static pal_err iterate(static_newton *row, pal_step *step, double size, bool *moved)
+static pal_err iterate(static_newton *solver, pal_step *step, double size, bool *moved)
 {
-    const pal_body *body = row->system.body;
-    way from = {.size_N = size};
-    memcpy(row->force, row->cg.r, bytes3(row));
+    const pal_body *body = solver->system.body;
+    direction from = {.size_N = size};
+    memcpy(solver->force, solver->cg.r, pal_body_bytes3(solver->system.body));
     /* before linearising, which energies may disturb */
-    if (!row->constant) from.energy = potential(row);
-    pal_system_linearise(&row->system);
-    pal_node_rotations_update(&row->turns, &row->system);
-    PAL_TRY(solve_linear(row, size));
-    from.slope_J = pal_dot_product(row->cg.n, row->force, row->move);
-    for (int i = 0; i < body->n_dof; i++) from.longest_m = fmax(from.longest_m, pal_norm3(row->move + 3 * i));
-    row->report.n_newton++;
+    if (!solver->constant) from.energy = potential(solver);
+    pal_system_linearise(&solver->system);
+    pal_node_rotations_update(&solver->rotations, &solver->system);
+    PAL_TRY(solve_linear(solver, size));
+    from.slope_J = pal_dot_product(solver->cg.n, solver->force, solver->move);
+    for (int i = 0; i < body->n_dof; i++) from.longest_m = fmax(from.longest_m, pal_norm3(solver->move + 3 * i));
+    solver->report.n_newton++;
     /* where the true stiffness is nearly singular, the displacement is long and unreliable */
     double max = pal_guard_max_move_m(body);
-    if (row->exact && from.longest_m > max) {
-        for (int i = 0; i < row->cg.n; i++) row->move[i] *= max / from.longest_m;
+    if (solver->exact && from.longest_m > max) {
+        for (int i = 0; i < solver->cg.n; i++) solver->move[i] *= max / from.longest_m;
         from.slope_J *= max / from.longest_m;
         from.longest_m = max;
     }
-    *moved = search(row, step, &from) && from.longest_m > 1e-15 * body->length_scale_m;
+    *moved = search(solver, step, &from) && from.longest_m > 1e-15 * body->length_scale_m;
     return PAL_ERR_OK;
 }
 
 /* iterates to the tolerance or to the step's iteration limit */
-static pal_err find_rest(static_newton *row, pal_step *step)
+static pal_err find_rest(static_newton *solver, pal_step *step)
 {
-    pal_solve_report *to = &row->report;
-    to->n_newton = to->n_cg = 0;
+    pal_solve_report *to = &solver->report;
     double before = INFINITY;
-    row->exact = row->eager = false;
-    row->backoff = 0;
+    const int max = to->n_newton + solver->newton;
+    solver->exact = solver->eager = false;
+    solver->backoff = 0;
     for (bool moved = true;;) {
         double size;
-        PAL_TRY(find_residual(row, step, &size));
-        to->residual = row->scale_N > 0 ? size / row->scale_N : 0;
-        to->converged = size <= row->tolerance * row->scale_N;
-        if (to->converged && row->part < row->load_steps) {
-            row->part++;
+        PAL_TRY(find_residual(solver, step, &size));
+        to->residual = solver->scale_N > 0 ? size / solver->scale_N : 0;
+        to->converged = size <= solver->tolerance * solver->scale_N;
+        if (to->converged && solver->part < solver->load_steps) {
+            solver->part++;
             before = INFINITY;
             continue;
         }
-        if (!moved && row->exact) moved = true, row->backoff = BACKOFF;
-        row->exact = !row->constant && row->backoff == 0 && size > slow * before;
-        row->backoff -= row->backoff > 0;
-        if (size <= slow * before) row->eager = false;
+        if (!moved && solver->exact) moved = true, solver->backoff = BACKOFF;
+        solver->exact = !solver->constant && solver->backoff == 0 && size > PAL_NEWTON_SLOW * before;
+        solver->backoff -= solver->backoff > 0;
+        if (size <= PAL_NEWTON_SLOW * before) solver->eager = false;
         before = size;
-        if (to->converged || !moved || !isfinite(size) || to->n_newton == row->newton) return PAL_ERR_OK;
-        PAL_TRY(iterate(row, step, size, &moved));
+        if (to->converged || !moved || !isfinite(size) || to->n_newton == max) return PAL_ERR_OK;
+        PAL_TRY(iterate(solver, step, size, &moved));
     }
-}
-
-/* true: contact has changed its loads */
-static bool settle(static_newton *row, pal_step *step)
-{
-    bool again = false;
-    const pal_body *body = row->system.body;
-    double *moved = body->interpolation ? row->node_displacement_m : row->move;
-    for (int i = 0; i < row->cg.n; i++) row->move[i] = body->x[i] - row->x0[i];
-    if (body->interpolation) pal_interpolation_apply(body->interpolation, row->move, moved);
-    for (int i = 0; i < step->n_contact; i++) {
-        const pal_component *contact = &step->contact[i];
-        if (contact->effect->tangent && contact->effect->tangent->settle)
-            again |= contact->effect->tangent->settle(contact->self, step, moved, true);
-    }
-    return again;
 }
 
 /* solves for equilibrium under the present loads; *bad: not finite, the initial state was restored */
-static pal_err solve(static_newton *row, pal_step *step, bool *bad)
+static pal_err solve(static_newton *solver, pal_step *step, bool *bad)
 {
-    pal_body *body = row->system.body;
-    PAL_TRY(find_outer(row, step));
-    if (row->system.n_free == 0) {
+    pal_body *body = solver->system.body;
+    PAL_TRY(find_external_force(solver, step));
+    if (solver->system.n_free == 0) {
         pal_body_update_nodes(body);
-        row->report.converged = true;
+        solver->report.converged = true;
         return PAL_ERR_OK;
     }
-    if (row->sampled != pal_dofs_material_revision(&body->dofs)) row->has_factor = false;
-    if (row->part == 0) row->part = 1;
-    PAL_TRY(find_rest(row, step));
-    if (row->answer.door.solve) pal_warp_rotate(&row->answer.warp, &row->turns);
+    if (solver->sampled != pal_dofs_material_revision(&body->dofs)) solver->has_factor = false;
+    if (solver->part == 0) solver->part = 1;
+    PAL_TRY(find_rest(solver, step));
+    if (solver->compliance.hook.solve) pal_warp_rotate(&solver->compliance.warp, &solver->rotations);
     *bad = !pal_guard_check_finite(body);
-    if (*bad) memcpy(body->x, row->x0, bytes3(row));
+    if (*bad) memcpy(body->x, solver->x0, pal_body_bytes3(solver->system.body));
     pal_body_update_nodes(body);
     return PAL_ERR_OK;
 }
 
 static pal_err run(void *self, pal_step *step)
 {
-    static_newton *row = self;
-    pal_body *body = row->system.body;
+    static_newton *solver = self;
+    pal_body *body = solver->system.body;
     if (!pal_guard_check_finite(body)) return PAL_ERR_OK;
-    memcpy(row->x0, body->x, bytes3(row));
+    if (step->sub == 0) solver->report.n_newton = solver->report.n_cg = 0;
+    memcpy(solver->x0, body->x, pal_body_bytes3(solver->system.body));
     for (int i = 0; i < body->n_dof; i++) {
         if (body->support[i])
             pal_axpy3(body->x + 3 * i, step->dt_s, body->v + 3 * i);
         else
             pal_set3(body->v + 3 * i, 0, 0, 0);
     }
-    pal_system_linearise_contact(&row->system, step);
+    pal_system_linearise_contact(&solver->system, step);
     bool bad = false;
-    do PAL_TRY(solve(row, step, &bad));
-    while (row->system.n_free > 0 && !bad && settle(row, step));
+    do PAL_TRY(solve(solver, step, &bad));
+    while (
+        solver->system.n_free > 0 && !bad &&
+        pal_system_settle_contact(&solver->system, step, solver->x0, solver->move, solver->node_displacement_m, true));
     return PAL_ERR_OK;
 }
 
@@ -624,29 +568,25 @@ static double limit(void *self, pal_step *step)
 
 static void reset(void *self, const pal_body *body)
 {
-    static_newton *row = self;
+    static_newton *solver = self;
     (void)body;
-    row->part = 0;
-    if (row->system.n_free == 0) return;
-    pal_node_rotations_reset(&row->turns);
+    solver->part = 0;
+    if (solver->system.n_free == 0) return;
+    pal_node_rotations_reset(&solver->rotations);
     /* the factor is of another state: rebuild it when it is needed */
-    if (row->linear != LINEAR_PCG && row->warp.n_factor > 1) row->has_factor = false;
+    if (solver->linear != LINEAR_PCG && solver->warp.n_factor > 1) solver->has_factor = false;
 }
 
 static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
 {
-    static_newton *row = self;
-    pal_body *own = row->system.body;
+    static_newton *solver = self;
     (void)to;
-    row->has_factor = false;
-    if (!row->answer.door.solve) return PAL_ERR_OK;
-    double *x = own->x, *d = own->d;
-    own->x = own->x_rest, own->d = own->node_rest;
-    if (own->interpolation) probe(row);
-    pal_node_rotations_reset(&row->turns);
-    pal_system_linearise(&row->system);
-    pal_err err = pal_compliance_solver_factor(&row->answer, &row->system, &row->blocks);
-    own->x = x, own->d = d;
+    solver->has_factor = false;
+    if (!solver->compliance.hook.solve) return PAL_ERR_OK;
+    if (solver->system.interpolated_system) probe(solver);
+    pal_node_rotations_reset(&solver->rotations);
+    pal_system_linearise_rest(&solver->system);
+    pal_err err = pal_compliance_solver_factor(&solver->compliance, &solver->blocks, false);
     if (err == PAL_ERR_NUMERIC)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": its stiffness at rest is not positive definite",
                                   body->name);
@@ -655,23 +595,19 @@ static pal_err material(void *self, const pal_body *body, const pal_material *to
 
 static void report(const void *self, pal_solve_report *out)
 {
-    const static_newton *row = self;
-    *out = row->report;
-    if (!row->warp.factor) return;
-    out->factor_nonzeros = pal_cholesky_nonzeros(row->warp.factor);
-    out->n_factor = row->warp.n_factor;
-    out->analyse_s = row->warp.analyse_s;
-    out->factor_s = row->warp.factor_s;
+    const static_newton *solver = self;
+    *out = solver->report;
+    pal_compliance_solver_report(&solver->compliance, &solver->system, &solver->warp, out);
 }
 
 const pal_effect pal_effect_static_newton = {.name = "static_newton",
                                              .stage = PAL_STAGE_SOLVE,
                                              .make = make,
                                              .run = run,
-                                             .limit = limit,
+                                             .bounds.limit = limit,
                                              .material = material,
                                              .reset = reset,
                                              .implicit = true,
-                                             .report = report,
+                                             .inspect.report = report,
                                              .keeps_components = true,
                                              .destroy = destroy};

@@ -5,7 +5,7 @@
  * (key, 0.5) of the stability limit by Gershgorin's bound: with K and C the row sums of stiffness and explicit
  * damping, dt = safety * 2 t where t is the largest with t^2 K + t C <= m at every free node. The bound is
  * recomputed when a node may have moved a fifth of an element. Prescribed nodes keep their velocity. step_guard.h
- * limits displacements. Where the budget of sub-steps is exhausted (step->heavy), mass is added to the nodes that
+ * limits displacements. Where the budget of sub-steps is exhausted (step->adds_mass), mass is added to the nodes that
  * break the inequality. Changes of added mass would add energy, so such a node loses up to a hundredth of its
  * velocity per sub-step. Components check for inverted elements whenever the bound is computed, and in every step
  * while there are any. */
@@ -13,6 +13,7 @@
 #include "server/base/vec3.h"
 #include "server/sim/core/effect_list.h"
 #include "server/sim/core/step_guard.h"
+#include "server/sim/solvers/tuning.h"
 
 #include <string.h>
 
@@ -20,13 +21,10 @@ typedef struct verlet {
     double *stiff, *damp; /* Gershgorin row sums, N/m and Ns/m [n_dof] */
     double safety;        /* of the stability limit             */
     double limit_s;
-    double way_m;       /* upper bound of motion since the bound was computed */
+    double moved_m;     /* upper bound of motion since the bound was computed */
     bool known;         /* limit_s holds                                       */
     bool has_inversion; /* bounds must be computed again in the coming step */
 } verlet;
-
-/* velocity loss per sub-step, times the fraction of added mass */
-static const double heavy_loss = 0.01;
 
 static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
@@ -38,52 +36,51 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
                                   "%s: \"verlet\" moves nodes, those of this body are carried by control points; take "
                                   "\"central_cg\" or \"implicit_euler\"",
                                   item->path);
-    verlet *row = PAL_NEW(build->arena, verlet, 1);
-    if (!row) return PAL_ERR_MEMORY;
-    row->stiff = PAL_NEW(build->arena, double, build->body->n_dof);
-    row->damp = PAL_NEW(build->arena, double, build->body->n_dof);
-    if (!row->stiff || !row->damp) return PAL_ERR_MEMORY;
-    row->safety = safety;
-    *self = row;
+    verlet *solver = PAL_NEW(build->arena, verlet, 1);
+    if (!solver) return PAL_ERR_MEMORY;
+    if (!PAL_NEW_DOUBLES(build->arena, build->body->n_dof, &solver->stiff, &solver->damp)) return PAL_ERR_MEMORY;
+    solver->safety = safety;
+    *self = solver;
     return PAL_ERR_OK;
 }
 
 /* the smallest over free nodes of 2 safety t, t the positive root of t^2 K + t C = m */
 static double limit(void *self, pal_step *step)
 {
-    verlet *row = self;
+    verlet *solver = self;
     const pal_body *body = step->body;
     bool contact = step->sub == 0 && pal_guard_has_bounds(step->contact, step->n_contact);
-    bool has_inversion = step->sub == 0 && row->has_inversion;
-    if (row->known && !contact && !has_inversion && row->way_m <= PAL_GUARD_RECHECK * body->edge_m) return row->limit_s;
-    row->has_inversion = pal_guard_recover(step) & PAL_INVERTED;
+    bool has_inversion = step->sub == 0 && solver->has_inversion;
+    if (solver->known && !contact && !has_inversion && solver->moved_m <= PAL_GUARD_MOVE * body->edge_m)
+        return solver->limit_s;
+    solver->has_inversion = pal_guard_recover(step) & PAL_INVERTED;
     size_t n_byte = sizeof(double) * (size_t)body->n_dof;
-    memset(row->stiff, 0, n_byte);
-    memset(row->damp, 0, n_byte);
-    pal_guard_add_bounds(step->force, step->n_force, body, row->stiff, row->damp);
-    pal_guard_add_bounds(step->contact, step->n_contact, body, row->stiff, row->damp);
+    memset(solver->stiff, 0, n_byte);
+    memset(solver->damp, 0, n_byte);
+    pal_guard_add_bounds(step->force, step->n_force, body, solver->stiff, solver->damp);
+    pal_guard_add_bounds(step->contact, step->n_contact, body, solver->stiff, solver->damp);
     double min = INFINITY, sum = 0;
     for (int i = 0; i < body->n_dof; i++) {
-        double k = row->stiff[i], c = row->damp[i], m = body->mass_kg[i];
+        double k = solver->stiff[i], c = solver->damp[i], m = body->mass_kg[i];
         sum += 0 * k + 0 * c;
         if (body->support[i] || k + c == 0) continue;
-        double dt = row->safety * 4 * m / (c + sqrt(c * c + 4 * k * m));
+        double dt = solver->safety * 4 * m / (c + sqrt(c * c + 4 * k * m));
         if (dt < min) min = dt;
     }
-    row->limit_s = sum == 0 ? min : NAN;
-    row->way_m = 0;
-    row->known = true;
-    return row->limit_s;
+    solver->limit_s = sum == 0 ? min : NAN;
+    solver->moved_m = 0;
+    solver->known = true;
+    return solver->limit_s;
 }
 
 static pal_err run(void *self, pal_step *step)
 {
-    verlet *row = self;
+    verlet *solver = self;
     pal_body *body = step->body;
     double dt = step->dt_s,
            keep = 1 / (1 + dt * (pal_guard_drag_1_s(step->force, step->n_force) + body->stiffening_damping_1_s)),
-           max2 = 0, poison = 0;
-    double root = dt / (2 * row->safety);
+           max2 = 0, non_finite = 0;
+    double root = dt / (2 * solver->safety);
     step->drag_separate = true;
     PAL_TRY(pal_assemble_forces(step));
 
@@ -92,17 +89,17 @@ static pal_err run(void *self, pal_step *step)
         double *v = body->v + 3 * i, m = body->mass_kg[i];
         const double *g = body->g + 3 * i;
         double s = body->support[i] ? 0 : dt / m, k = !body->support[i] ? keep : body->support[i] == 2 ? 1 : 0;
-        if (step->heavy && !body->support[i]) {
-            double heavy = fmax(m, root * (root * row->stiff[i] + row->damp[i]));
-            s = dt / heavy, k *= 1 - heavy_loss * (1 - m / heavy);
+        if (step->adds_mass && !body->support[i]) {
+            double heavy = fmax(m, root * (root * solver->stiff[i] + solver->damp[i]));
+            s = dt / heavy, k *= 1 - PAL_HEAVY_LOSS * (1 - m / heavy);
         }
         for (int c = 0; c < 3; c++) v[c] = k * (v[c] + s * g[c]);
         double v2 = pal_dot3(v, v);
         max2 = v2 > max2 ? v2 : max2;
-        poison += 0 * v2;
+        non_finite += 0 * v2;
     }
-    double way = sqrt(max2) * dt, max = pal_guard_max_move_m(body);
-    if (way > max) {
+    double move_m = sqrt(max2) * dt, max = pal_guard_max_move_m(body);
+    if (move_m > max) {
         uint64_t before = pal_clock_ns();
         for (int i = 0; i < body->n_dof; i++) {
             double *v = body->v + 3 * i;
@@ -111,7 +108,7 @@ static pal_err run(void *self, pal_step *step)
         body->safeguards.ns += pal_clock_ns() - before;
     }
     /* a non-finite velocity makes the displacement, and so the next limit, non-finite */
-    row->way_m += (way < max ? way : max) + poison;
+    solver->moved_m += (move_m < max ? move_m : max) + non_finite;
 
     /* positions */
     for (int i = 0; i < 3 * body->n_dof; i++) body->x[i] += dt * body->v[i];
@@ -124,17 +121,5 @@ static void reset(void *self, const pal_body *body)
     ((verlet *)self)->known = false;
 }
 
-static pal_err material(void *self, const pal_body *body, const pal_material *to, pal_diagnostic *diag)
-{
-    (void)to, (void)diag;
-    reset(self, body);
-    return PAL_ERR_OK;
-}
-
-const pal_effect pal_effect_verlet = {.name = "verlet",
-                                      .stage = PAL_STAGE_SOLVE,
-                                      .make = make,
-                                      .run = run,
-                                      .limit = limit,
-                                      .material = material,
-                                      .reset = reset};
+const pal_effect pal_effect_verlet = {
+    .name = "verlet", .stage = PAL_STAGE_SOLVE, .make = make, .run = run, .bounds.limit = limit, .reset = reset};

@@ -6,10 +6,12 @@
 #define PAL_SIM_SPRINGS_SPRING_CONSTRAINT_H
 #include "server/base/vec3.h"
 #include "server/sim/core/simd_blocks.h"
-#include "server/sim/springs/spring_law.h"
+#include "server/sim/springs/tuning.h"
 
 #include <math.h>
 #include <string.h>
+
+typedef enum pal_spring_kind { PAL_SPRING_DISTANCE, PAL_SPRING_AREA, PAL_SPRING_VOLUME } pal_spring_kind;
 
 /* C and its gradient at each corner, 1/m; only the kind's own corners are set */
 typedef struct pal_constraint {
@@ -33,6 +35,12 @@ PAL_INLINE void pal_spring_tet_edges(const double *const x[PAL_CORNERS], double 
     for (int c = 0; c < 3; c++) pal_sub3(e[c], x[c + 1], x[0]);
 }
 
+/* positions of a spring's n corners; what is beyond them repeats the first */
+PAL_INLINE void pal_spring_points(const double *x, const int32_t *node, int n, const double *to[PAL_CORNERS])
+{
+    for (int c = 0; c < PAL_CORNERS; c++) to[c] = x + 3 * node[c < n ? c : 0];
+}
+
 /* the measure whose inverse at rest is w: l m, 2A m^2, 6V m^3 (signed) */
 PAL_INLINE double pal_spring_measure(pal_spring_kind kind, const double *const x[PAL_CORNERS])
 {
@@ -47,9 +55,6 @@ PAL_INLINE double pal_spring_measure(pal_spring_kind kind, const double *const x
     return pal_dot3(e[0], n);
 }
 
-/* quality below which a tetrahedron has no volume spring: its gradients are so long that they would set the sub-step
- * (effects/tet_volume.c, tests/sim/springs/test_springs.c) */
-#define PAL_SPRING_SLIVER 0.01
 /* quality of a tetrahedron: 1 for a regular one, 0 for a flat one */
 PAL_INLINE double pal_spring_tet_quality(const double *const x[PAL_CORNERS])
 {

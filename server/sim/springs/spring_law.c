@@ -1,7 +1,6 @@
 /* Spring constants from E, nu and the mesh. */
 #include "server/sim/springs/spring_law.h"
 
-#include "server/base/vec3.h"
 #include "server/num/trilinear.h"
 
 #include <stdlib.h>
@@ -27,25 +26,18 @@ static double derived_J(const pal_spring *spring, const pal_material *material, 
 pal_err pal_spring_read(pal_spring_kind kind, pal_config_entry *item, const pal_build *build, pal_spring *out)
 {
     bool on_grid = build->def->spring_grid.k_J[kind] != NULL, given = on_grid || pal_entry_has(item, "k_J");
-    const char *weights = given ? "equal" : "volume";
+    static const char *const weights[] = {"equal", "volume"};
+    int by = given ? 0 : 1;
     *out = (pal_spring){.kind = kind, .given = given, .on_grid = on_grid};
     if (on_grid && pal_entry_has(item, "k_J"))
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s.k_J: stands beside a grid that gives the same",
-                                  item->path);
-    PAL_TRY(pal_entry_read_text(item, "weights", &weights, build->diag));
-    if (strcmp(weights, "equal") != 0 && strcmp(weights, "volume") != 0)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s.weights: \"%s\", wanted \"equal\" or \"volume\"",
-                                  item->path, weights);
-    out->by_volume = weights[0] == 'v';
+        return PAL_REFUSE(build->diag, "%s.k_J: stands beside a grid that gives the same", item->path);
+    PAL_TRY(pal_entry_read_choice(item, "weights", weights, 2, &by, build->diag));
+    out->by_volume = by == 1;
     PAL_TRY(pal_entry_read_bool(item, "without_area", &out->without_area, build->diag));
     out->k_J = on_grid ? 1 : derived_J(out, &build->def->material, build->body->edge_m);
     PAL_TRY(pal_entry_read_number(item, "k_J", 0, 1e60, &out->k_J, build->diag));
     PAL_TRY(pal_entry_read_number(item, "c_Js", 0, 1e60, &out->c_Js, build->diag));
-    PAL_TRY(pal_entry_check_unused(item, build->diag));
-    if (!build->body->tets || !build->body->node_order)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of tetrahedra", item->path,
-                                  item->name);
-    return PAL_ERR_OK;
+    return pal_entry_check_unused(item, build->diag);
 }
 
 void pal_spring_material(pal_spring *spring, const pal_body *body, const pal_material *material)
@@ -53,18 +45,11 @@ void pal_spring_material(pal_spring *spring, const pal_body *body, const pal_mat
     if (!spring->given) spring->k_J = derived_J(spring, material, body->edge_m);
 }
 
-static double tet_volume(const pal_tets *tets, int t)
-{
-    const int32_t *c = tets->tet + 4 * t;
-    double e[3][3], n[3];
-    for (int k = 0; k < 3; k++) pal_sub3(e[k], tets->x + 3 * c[k + 1], tets->x + 3 * c[0]);
-    pal_cross3(n, e[1], e[2]);
-    return fabs(pal_dot3(e[0], n)) / 6;
-}
-
 static double inside_m3(const pal_body *body, int t)
 {
-    return tet_volume(body->tets, t) * (body->fill ? (double)body->fill[t] : 1);
+    const double *x[PAL_CORNERS];
+    pal_spring_points(body->tets->x, body->tets->tet + 4 * t, 4, x);
+    return fabs(pal_spring_measure(PAL_SPRING_VOLUME, x)) / 6 * (body->fill ? (double)body->fill[t] : 1);
 }
 
 double pal_spring_volume_m3(const pal_body *body)
@@ -127,11 +112,6 @@ static double mean_square_edge(const double *x, const int32_t *node, int n)
     return 2 * sum / (n * (n - 1));
 }
 
-static void clear(double *out, int n)
-{
-    for (int i = 0; i < n; i++) out[i] = 0;
-}
-
 /* volumes around springs by their share -> out, over all of it where weights are equal */
 static pal_err sum_volumes(const pal_spring *spring, const pal_body *body, const double *share, const int32_t *item,
                            int n_item, int n_corner, double *out)
@@ -143,7 +123,7 @@ static pal_err sum_volumes(const pal_spring *spring, const pal_body *body, const
         table[i].item = i;
     }
     qsort(table, (size_t)n_item, sizeof *table, compare_known);
-    clear(out, n_item);
+    memset(out, 0, sizeof *out * (size_t)n_item);
     add_volumes(body, share, table, (size_t)n_item, n_corner, out);
     double *all = spring->by_volume ? NULL : calloc((size_t)n_item + 1, sizeof *all);
     if (all) {

@@ -3,10 +3,12 @@
  * A scene that gives k_J gives every spring of a kind that constant, as the paper does. Otherwise spring i receives
  * k_i = factor E V_i l_i^2/h^2: V_i the volume of the tetrahedra around it (of cut voxels the part inside, body->fill),
  * l_i^2 the mean square of its edges (volume springs: V_i alone). Given constants take the same weights V_i l_i^2/h^5
- * with weights "volume", derived ones none with "equal". With these weights the five-tetrahedra lattice is isotropic;
- * with equal constants its shear modulus along the grid is 0.4 of the one across, and thin bodies are too stiff. Moduli
- * of the lattice, per E, by summation over a periodic cell: shear  G = 2/3 f_d + 4/9 f_a        bulk  K = 10/9 f_d +
- * 80/27 f_a + f_v f_a takes half of the bulk modulus that edges alone lack (they have K = 5/3 G, nu = 0.25), at most
+ * with weights "volume", derived ones none with "equal". With these weights the five-tetrahedra lattice is isotropic.
+ * Moduli of the lattice, per E, by summation over a periodic cell:
+ *
+ *     shear G = 2/3 f_d + 4/9 f_a        bulk K = 10/9 f_d + 80/27 f_a + f_v
+ *
+ * f_a takes half of the bulk modulus that edges alone lack (they have K = 5/3 G, nu = 0.25), at most
  * half of the shear modulus; f_v takes the rest. A body without area springs has f_a = 0: the same moduli from two
  * kinds. Ratios below 0.26 are simulated as 0.26.
  *
@@ -19,8 +21,7 @@
 #ifndef PAL_SIM_SPRINGS_SPRING_LAW_H
 #define PAL_SIM_SPRINGS_SPRING_LAW_H
 #include "server/sim/core/effect.h"
-
-typedef enum pal_spring_kind { PAL_SPRING_DISTANCE, PAL_SPRING_AREA, PAL_SPRING_VOLUME } pal_spring_kind;
+#include "server/sim/springs/spring_constraint.h"
 
 /* constants of one kind of springs: E_i = q_i k/2 C^2, f = -q_i (k C + c dC/dt) grad C with the dimensionless
  * constraint C; q_i is 1 or V_i l_i^2/h^5 (by_volume), times the spring's own constant with a grid, where k_J is 1 */

@@ -2,21 +2,10 @@
 #include "server/sim/springs/spring_recovery.h"
 
 #include "server/base/clock.h"
-#include "server/num/polar.h"
 #include "server/num/union_find.h"
-#include "server/sim/core/best_rotation.h"
+#include "server/sim/springs/tuning.h"
 
 #include <math.h>
-
-/* largest energy of springs that return, as a part of the sum of their constants: with more they would fly apart */
-static const double max_energy_share = 0.02;
-/* tau, as a part of the time that edges permit an explicit step */
-static const double damp_share = 0.25;
-/* energy that the return of a body at rest may add, as a part of what is stored */
-static const double little_share = 2e-3;
-/* time at rest after which a region is released; period of growth of one that does not recover; tolerance for rounding
- * of both */
-static const double loose_after_s = 2, grow_every_s = 0.5, nearly = 1 - 1e-9;
 
 /* a body's sets of springs by kind; NULL: none */
 typedef struct sets {
@@ -30,8 +19,8 @@ pal_err pal_spring_recovery_make(int n_node, pal_arena *arena, pal_spring_recove
     t->n_node = n_node;
     t->region = PAL_NEW(arena, int32_t, n_node);
     t->root = PAL_NEW(arena, int32_t, n_node);
-    t->room = PAL_NEW(arena, double, n_node);
-    if (!t->region || !t->root || !t->room) return PAL_ERR_MEMORY;
+    t->node_sum = PAL_NEW(arena, double, n_node);
+    if (!t->region || !t->root || !t->node_sum) return PAL_ERR_MEMORY;
     for (int i = 0; i < n_node; i++) t->region[i] = -1;
     *out = t;
     return PAL_ERR_OK;
@@ -58,7 +47,7 @@ static sets find_sets(const pal_step *step)
     sets r = {{NULL, NULL, NULL}};
     for (int i = 0; i < step->n_force; i++) {
         const pal_effect *effect = step->force[i].effect;
-        pal_spring_set *set = effect->springs ? effect->springs(step->force[i].self) : NULL;
+        pal_spring_set *set = effect->recovery.springs ? effect->recovery.springs(step->force[i].self) : NULL;
         if (set && set->all) r.of[set->spring.kind] = set;
     }
     return r;
@@ -78,115 +67,30 @@ static int region_of(const pal_spring_recovery *t, const pal_spring_set *set, in
     return -1;
 }
 
-/* ---- regions ---- */
-
-static void edge_vectors(const int32_t *node, const pal_body *body, double x[3], double y[3])
+static double edge_N_m(const void *self, int i)
 {
-    const size_t a = 3 * (size_t)node[0], b = 3 * (size_t)node[1];
-    pal_sub3(x, body->d + b, body->d + a);
-    pal_sub3(y, body->x_rest + b, body->x_rest + a);
-}
-
-/* relative velocity of the ends without the spin */
-static void edge_rate(const pal_spring_region *region, const int32_t *node, const pal_body *body, const double x[3],
-                      double out[3])
-{
-    double turn[3];
-    pal_sub3(out, body->dv + 3 * (size_t)node[1], body->dv + 3 * (size_t)node[0]);
-    pal_cross3(turn, region->spin_1_s, x);
-    pal_sub3(out, out, turn);
-}
-
-static double edge_N_m(const pal_spring_set *set, int i)
-{
+    const pal_spring_set *set = self;
     const int lane = set->simd_blocks.place[i];
     return set->spring.k_J * set->all[lane] * set->w[lane] * set->w[lane];
 }
 
-/* best-fit rotations of the regions that have one of their own */
-static void find_turns(pal_spring_recovery *t, const pal_spring_set *set, const pal_body *body)
+static double regions_energy(pal_spring_recovery *t, const pal_spring_set *edges, const pal_body *body, double *f)
 {
-    for (int p = 0; p < t->n_region; p++) memset(t->of[p].sum, 0, sizeof t->of[p].sum);
-    for (int k = 0; k < set->n_off; k++) {
-        const int i = set->off[k];
-        double x[3], y[3];
-        pal_spring_region *region = &t->of[region_of(t, set, i)];
-        if (region->fixed) continue;
-        edge_vectors(corners(set, i), body, x, y);
-        pal_add_outer(region->sum, edge_N_m(set, i), x, y);
-    }
-    for (int p = 0; p < t->n_region; p++)
-        if (!t->of[p].fixed) pal_best_rotation(t->of[p].sum, t->of[p].turn);
+    const pal_region_edges in_regions = {edges->n_off, edges->edge, edge_N_m, edges, body->x_rest};
+    pal_regions_fit(t->of, t->n_region, &in_regions, body->d);
+    return pal_regions_energy(t->of, t->n_region, &in_regions, body->d, body->dv, t->damp_s, f);
 }
 
-/* w = A^-1 sum k x x v, A = sum k (x.x I - x x'); about an axis on which all nodes lie, w is zero */
-static void find_spins(pal_spring_recovery *t, const pal_spring_set *set, const pal_body *body)
-{
-    for (int p = 0; p < t->n_region; p++) {
-        memset(t->of[p].sum, 0, sizeof t->of[p].sum);
-        pal_set3(t->of[p].spin_1_s, 0, 0, 0);
-    }
-    for (int k = 0; k < set->n_off; k++) {
-        const int i = set->off[k];
-        pal_spring_region *region = &t->of[region_of(t, set, i)];
-        const int32_t *node = corners(set, i);
-        const double stiff = edge_N_m(set, i);
-        double x[3], v[3], moment[3];
-        pal_sub3(x, body->d + 3 * (size_t)node[1], body->d + 3 * (size_t)node[0]);
-        pal_sub3(v, body->dv + 3 * (size_t)node[1], body->dv + 3 * (size_t)node[0]);
-        pal_add_outer(region->sum, -stiff, x, x);
-        for (int a = 0; a < 3; a++) region->sum[4 * a] += stiff * pal_dot3(x, x);
-        pal_cross3(moment, x, v);
-        pal_axpy3(region->spin_1_s, stiff, moment);
-    }
-    for (int p = 0; p < t->n_region; p++) {
-        double size[3], axis[9], spin[3] = {0, 0, 0};
-        pal_eigen3(t->of[p].sum, size, axis);
-        for (int a = 0; a < 3; a++)
-            if (size[a] > 1e-12 * size[2])
-                pal_axpy3(spin, pal_dot3(t->of[p].spin_1_s, axis + 3 * a) / size[a], axis + 3 * a);
-        pal_copy3(t->of[p].spin_1_s, spin);
-    }
-}
-
-/* energy of an edge without s; f += s times its force */
-static double edge_energy(const pal_spring_recovery *t, const pal_spring_set *set, int i, const pal_body *body,
-                          double *f)
-{
-    const int32_t *node = corners(set, i);
-    const pal_spring_region *region = &t->of[region_of(t, set, i)];
-    const double k = edge_N_m(set, i);
-    double x[3], y[3], u[3];
-    edge_vectors(node, body, x, y);
-    pal_mul33(u, region->turn, y);
-    pal_sub3(u, x, u);
-    const double energy = 0.5 * k * pal_dot3(u, u);
-    if (f) {
-        double rate[3];
-        edge_rate(region, node, body, x, rate);
-        pal_axpy3(u, t->damp_s, rate);
-        pal_axpy3(f + 3 * (size_t)node[0], region->scale * k, u);
-        pal_axpy3(f + 3 * (size_t)node[1], -region->scale * k, u);
-    }
-    return energy;
-}
-
-void pal_spring_recovery_force(pal_spring_recovery *t, const pal_spring_set *set, pal_body *body)
+void pal_spring_recovery_force(pal_spring_recovery *t, const pal_spring_set *edges, pal_body *body)
 {
     const uint64_t before = pal_clock_ns();
-    find_turns(t, set, body);
-    find_spins(t, set, body);
-    for (int k = 0; k < set->n_off; k++) (void)edge_energy(t, set, set->off[k], body, body->f);
+    (void)regions_energy(t, edges, body, body->f);
     body->safeguards.ns += pal_clock_ns() - before;
 }
 
-double pal_spring_recovery_energy(pal_spring_recovery *t, const pal_spring_set *set, const pal_body *body)
+double pal_spring_recovery_energy(pal_spring_recovery *t, const pal_spring_set *edges, const pal_body *body)
 {
-    double sum = 0;
-    find_turns(t, set, body);
-    for (int k = 0; k < set->n_off; k++)
-        sum += t->of[region_of(t, set, set->off[k])].scale * edge_energy(t, set, set->off[k], body, NULL);
-    return sum;
+    return regions_energy(t, edges, body, NULL);
 }
 
 /* ---- detection ---- */
@@ -219,41 +123,30 @@ static void weigh(pal_spring_recovery *t, const sets *r, const pal_body *body)
 {
     const pal_spring_set *edges = r->of[PAL_SPRING_DISTANCE], *tets = r->of[PAL_SPRING_VOLUME];
     for (int p = 0; p < t->n_region; p++) {
-        pal_spring_region *region = &t->of[p];
-        region->region_J = region->spring_J = region->size_J = region->kinetic_J = 0;
+        pal_inverted_region *region = &t->of[p];
+        region->region_J = region->element_J = region->size_J = region->kinetic_J = 0;
         region->bad = region->pressed = false, region->n = 0;
     }
-    find_turns(t, edges, body);
-    for (int k = 0; k < edges->n_off; k++) {
-        const int i = edges->off[k];
-        pal_spring_region *region = &t->of[region_of(t, edges, i)];
-        region->region_J += region->scale * edge_energy(t, edges, i, body, NULL);
-        region->size_J += edges->spring.k_J * edges->all[edges->simd_blocks.place[i]];
-    }
+    (void)regions_energy(t, edges, body, NULL);
+    for (int k = 0; k < edges->n_off; k++)
+        t->of[edges->edge[k].region].size_J += edges->spring.k_J * edges->all[edges->simd_blocks.place[edges->off[k]]];
     for (int kind = 0; kind < 3; kind++)
         for (int k = 0; r->of[kind] && k < r->of[kind]->n_off; k++) {
             const int i = r->of[kind]->off[k];
-            t->of[region_of(t, r->of[kind], i)].spring_J += spring_J(r->of[kind], i, body);
+            t->of[region_of(t, r->of[kind], i)].element_J += spring_J(r->of[kind], i, body);
         }
     for (int k = 0; k < tets->n_off; k++) {
         const double ratio = volume_ratio(tets, tets->off[k], body->d);
-        t->of[region_of(t, tets, tets->off[k])].bad |= !(ratio > PAL_SPRING_LEAVE_LOW && ratio < PAL_SPRING_LEAVE_HIGH);
+        t->of[region_of(t, tets, tets->off[k])].bad |= !(ratio > PAL_RECOVERED_LOW && ratio < PAL_RECOVERED_HIGH);
     }
     for (int i = 0; i < t->n_node; i++) {
         if (t->region[i] < 0) continue;
-        pal_spring_region *region = &t->of[t->region[i]];
+        pal_inverted_region *region = &t->of[t->region[i]];
         const double *v = body->dv + 3 * (size_t)i;
         region->n++;
         region->pressed |= loaded(body, i);
         region->kinetic_J += 0.5 * body->mass_kg[i] * pal_dot3(v, v);
     }
-}
-
-static double regions(const pal_spring_recovery *t)
-{
-    double sum = 0;
-    for (int p = 0; p < t->n_region; p++) sum += t->of[p].region_J;
-    return sum;
 }
 
 static double springs(const sets *r, const pal_body *body)
@@ -262,26 +155,6 @@ static double springs(const sets *r, const pal_body *body)
     for (int kind = 0; kind < 3; kind++)
         if (r->of[kind]) sum += pal_spring_energy(r->of[kind], body, (pal_spring_kind)kind);
     return sum;
-}
-
-/* chooses the regions that become springs again; true: any */
-static bool leave(pal_spring_recovery *t, double spare_J, double little_J, double still_J, double passed_s)
-{
-    bool any = false;
-    for (int p = 0; p < t->n_region; p++) {
-        pal_spring_region *region = &t->of[p];
-        const double rise = region->spring_J - region->region_J;
-        region->grow_s += passed_s;
-        region->loose_s = region->bad || !(region->kinetic_J < still_J) ? 0 : region->loose_s + passed_s;
-        const bool fits = rise <= spare_J && region->spring_J <= max_energy_share * region->size_J;
-        if (region->bad || (!fits && (region->loose_s < nearly * loose_after_s || rise > little_J))) continue;
-        spare_J -= rise;
-        region->n = 0;
-        any = true;
-    }
-    for (int i = 0; i < t->n_node && any; i++)
-        if (t->region[i] >= 0 && t->of[t->region[i]].n == 0) t->region[i] = -1;
-    return any;
 }
 
 enum { NOT = -1, NEW = -2 };
@@ -298,7 +171,7 @@ static void join(pal_spring_recovery *t, const pal_spring_set *edges)
 
 /* no new region while a load acts: regions are softer than springs, so that a load would draw them out, and a tool that
  * inverts tetrahedra must feel springs. True: new nodes stay in */
-static bool leave_pressed(pal_spring_recovery *t, const pal_body *body)
+static bool drop_new_if_loaded(pal_spring_recovery *t, const pal_body *body)
 {
     bool pressed = false;
     for (int i = 0; i < t->n_node && !pressed; i++) pressed = loaded(body, i);
@@ -314,7 +187,7 @@ static bool enter(pal_spring_recovery *t, const sets *r, const pal_body *body)
     bool any = false, grows = false;
     for (int i = 0; i < tets->n_item; i++) {
         const double ratio = volume_ratio(tets, i, body->d);
-        if (!(ratio < PAL_SPRING_INVERTED_LOW || ratio > PAL_SPRING_INVERTED_HIGH)) continue;
+        if (!(ratio < PAL_SPRING_INVERTED_LOW || ratio > PAL_INVERTED_HIGH)) continue;
         for (int c = 0; c < 4; c++) {
             int32_t *to = &t->region[corners(tets, i)[c]];
             any |= *to == NOT;
@@ -322,11 +195,8 @@ static bool enter(pal_spring_recovery *t, const sets *r, const pal_body *body)
         }
     }
     for (int p = 0; p < t->n_region; p++) {
-        pal_spring_region *region = &t->of[p];
-        const bool due = region->grow_s >= nearly * grow_every_s;
-        if (due) region->grow_s = fmax(0, fmin(region->grow_s - grow_every_s, grow_every_s));
-        region->bad = due && region->n > 0 && region->bad && !region->pressed;
-        grows |= region->bad;
+        t->of[p].bad = pal_region_grows(&t->of[p], t->of[p].pressed);
+        grows |= t->of[p].bad;
     }
     for (int i = 0; i < edges->n_item && grows; i++)
         for (int c = 0; c < 2; c++) {
@@ -335,13 +205,13 @@ static bool enter(pal_spring_recovery *t, const sets *r, const pal_body *body)
             t->region[node[1 - c]] = NEW;
             any = true;
         }
-    return any && leave_pressed(t, body);
+    return any && drop_new_if_loaded(t, body);
 }
 
 /* numbers the connected regions. A region that has not changed keeps its clocks and s */
 static void number(pal_spring_recovery *t, const pal_spring_set *edges)
 {
-    pal_spring_region old[PAL_SPRING_REGIONS_MAX];
+    pal_inverted_region old[PAL_SPRING_REGIONS_MAX];
     int home[PAL_SPRING_REGIONS_MAX]; /* the old region of all of its nodes; NOT: they are of several, or new */
     memcpy(old, t->of, sizeof *old * (size_t)t->n_region);
     join(t, edges);
@@ -356,10 +226,10 @@ static void number(pal_spring_recovery *t, const pal_spring_set *edges)
             if (t->n_region < PAL_SPRING_REGIONS_MAX)
                 home[t->n_region] = was,
                 t->of[t->n_region++] =
-                    (pal_spring_region){.turn = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .scale = 1, .loose_s = INFINITY};
+                    (pal_inverted_region){.turn = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .scale = 1, .loose_s = INFINITY};
             t->region[i] = t->n_region - 1;
         }
-        pal_spring_region *region = &t->of[t->region[i]];
+        pal_inverted_region *region = &t->of[t->region[i]];
         region->n++;
         if (home[t->region[i]] != was) home[t->region[i]] = NOT;
         region->grow_s = fmax(region->grow_s, was >= 0 ? old[was].grow_s : 0);
@@ -374,7 +244,7 @@ static void number(pal_spring_recovery *t, const pal_spring_set *edges)
 /* the time that edges alone give to an explicit step: the least sqrt(m / K) of free nodes, K their row sums */
 static double edge_time_s(pal_spring_recovery *t, const pal_spring_set *edges, const pal_body *body)
 {
-    double min = INFINITY, *sum = t->room;
+    double min = INFINITY, *sum = t->node_sum;
     memset(sum, 0, sizeof *sum * (size_t)t->n_node);
     for (int i = 0; i < edges->n_item; i++)
         for (int c = 0; c < 2; c++) sum[corners(edges, i)[c]] += 2 * edge_N_m(edges, i);
@@ -394,6 +264,9 @@ static void switch_sets(const pal_spring_recovery *t, sets *r)
             const int lane = set->simd_blocks.place[i];
             const bool off = region_of(t, set, i) >= 0;
             set->q[lane] = off ? 0 : set->all[lane];
+            if (off && kind == PAL_SPRING_DISTANCE)
+                set->edge[set->n_off] =
+                    (pal_region_edge){{corners(set, i)[0], corners(set, i)[1]}, region_of(t, set, i), i};
             if (off) set->off[set->n_off++] = i;
         }
     }
@@ -402,21 +275,16 @@ static void switch_sets(const pal_spring_recovery *t, sets *r)
 /* chooses G of each region, and s of changed ones such that there is no more energy than before_J */
 static void begin(pal_spring_recovery *t, const sets *r, const pal_body *body, double before_J)
 {
-    double fixed[9];
     int n_free = 0;
-    const bool has_rotation = pal_support_rotation(body, fixed);
     for (int i = 0; i < t->n_node; i++) n_free += !body->support[i];
-    for (int p = 0; p < t->n_region; p++) {
-        t->of[p].fixed = has_rotation && 2 * t->of[p].n > n_free;
-        if (t->of[p].fixed) memcpy(t->of[p].turn, fixed, sizeof fixed);
-    }
+    pal_regions_fix(t->of, t->n_region, body, n_free > 0 ? n_free : 1);
     t->k_J = r->of[PAL_SPRING_DISTANCE]->spring.k_J;
-    t->damp_s = damp_share * edge_time_s(t, r->of[PAL_SPRING_DISTANCE], body);
+    t->damp_s = PAL_SPRING_DAMP_SHARE * edge_time_s(t, r->of[PAL_SPRING_DISTANCE], body);
     weigh(t, r, body);
     double new_J = 0, left_J = before_J - springs(r, body), scale = 1;
     for (int p = 0; p < t->n_region; p++)
         *(t->of[p].stays ? &left_J : &new_J) += (t->of[p].stays ? -1 : 1) * t->of[p].region_J;
-    if (new_J > left_J) scale = left_J > PAL_REGION_SCALE_MIN * new_J ? left_J / new_J : PAL_REGION_SCALE_MIN;
+    if (new_J > left_J) scale = left_J > PAL_FILL_MIN * new_J ? left_J / new_J : PAL_FILL_MIN;
     for (int p = 0; p < t->n_region; p++) {
         if (t->of[p].stays) continue;
         t->of[p].scale = scale;
@@ -425,18 +293,13 @@ static void begin(pal_spring_recovery *t, const sets *r, const pal_body *body, d
 }
 
 /* supports may have moved or gone, and constants may have changed since regions began */
-static void keep_up(pal_spring_recovery *t, const pal_spring_set *edges, const pal_body *body)
+static void update_constants(pal_spring_recovery *t, const pal_spring_set *edges, const pal_body *body)
 {
-    double fixed[9];
-    const bool has_rotation = pal_support_rotation(body, fixed);
-    for (int p = 0; p < t->n_region; p++) {
-        t->of[p].fixed = t->of[p].fixed && has_rotation;
-        if (t->of[p].fixed) memcpy(t->of[p].turn, fixed, sizeof fixed);
-    }
+    pal_regions_fix(t->of, t->n_region, body, 0);
     if (edges->spring.k_J == t->k_J) return;
     t->first_J *= edges->spring.k_J / t->k_J;
     t->k_J = edges->spring.k_J;
-    t->damp_s = damp_share * edge_time_s(t, edges, body);
+    t->damp_s = PAL_SPRING_DAMP_SHARE * edge_time_s(t, edges, body);
 }
 
 /* the regions have changed; before_J: energy of springs and regions before */
@@ -466,7 +329,7 @@ static unsigned update(pal_spring_recovery *t, pal_step *step)
     if (!r.of[PAL_SPRING_DISTANCE] || !r.of[PAL_SPRING_VOLUME] || body->d == body->x_rest) return seen(t, stale);
     double ratio[2] = {1, 1};
     if (t->n_region == 0) pal_spring_volume_range(r.of[PAL_SPRING_VOLUME], body->node_order, body->d, ratio);
-    if (t->n_region == 0 && !(ratio[0] < PAL_SPRING_INVERTED_LOW || ratio[1] > PAL_SPRING_INVERTED_HIGH))
+    if (t->n_region == 0 && !(ratio[0] < PAL_SPRING_INVERTED_LOW || ratio[1] > PAL_INVERTED_HIGH))
         return seen(t, stale);
     if (!pal_body_finite(body)) return seen(t, stale);
     const uint64_t began = pal_clock_ns();
@@ -474,18 +337,22 @@ static unsigned update(pal_spring_recovery *t, pal_step *step)
     bool changed = false;
     double before_J = 0;
     if (!first) {
-        keep_up(t, r.of[PAL_SPRING_DISTANCE], body);
+        update_constants(t, r.of[PAL_SPRING_DISTANCE], body);
         weigh(t, &r, body);
         const double kinetic_J = pal_body_kinetic_J(body);
-        before_J = springs(&r, body) + regions(t);
-        changed = leave(t, t->first_J - kinetic_J - before_J, little_share * before_J,
-                        PAL_REGION_REST_SHARE * regions(t), fmax(0, step->time_s - t->seen_s));
+        before_J = springs(&r, body) + pal_regions_sum_J(t->of, t->n_region);
+        changed = pal_regions_leave(t->of, t->n_region, t->first_J - kinetic_J - before_J, PAL_REGION_LEAVE_SHARE,
+                                    PAL_REST_SHARE * before_J, PAL_REST_SHARE * pal_regions_sum_J(t->of, t->n_region),
+                                    fmax(0, step->time_s - t->seen_s));
+        for (int i = 0; i < t->n_node && changed; i++)
+            if (t->region[i] >= 0 && t->of[t->region[i]].n == 0) t->region[i] = -1;
     }
     t->seen_s = step->time_s;
     changed |= enter(t, &r, body);
     if (first && changed) before_J = springs(&r, body);
     if (changed) change(t, &r, body, before_J);
-    if (first && changed) t->first_J = pal_body_kinetic_J(body) + springs(&r, body) + regions(t);
+    if (first && changed)
+        t->first_J = pal_body_kinetic_J(body) + springs(&r, body) + pal_regions_sum_J(t->of, t->n_region);
     body->safeguards.n_split += changed;
     body->safeguards.n_inversion += changed || t->n_region > 0;
     body->safeguards.ns += pal_clock_ns() - began;
@@ -495,6 +362,7 @@ static unsigned update(pal_spring_recovery *t, pal_step *step)
 unsigned pal_spring_recover(void *self, pal_step *step)
 {
     for (int i = 0; i < step->n_force && step->body->recovery; i++)
-        if (step->force[i].effect->springs) return step->force[i].self == self ? update(step->body->recovery, step) : 0;
+        if (step->force[i].effect->recovery.springs)
+            return step->force[i].self == self ? update(step->body->recovery, step) : 0;
     return 0;
 }

@@ -2,20 +2,16 @@
 #include "server/sim/springs/spring_set.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/recovery/inverted_regions.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-static void corners_at(const double *x, const int32_t *node, int n, const double *to[PAL_CORNERS])
-{
-    for (int c = 0; c < PAL_CORNERS; c++) to[c] = x + 3 * node[c < n ? c : 0];
-}
-
 /* ---- regions ---- */
 
 /* weights of the body's material as it is; those of regions keep what they give. What is off stays so until the next
- * look */
+ * update */
 static void weigh(pal_spring_set *set, const pal_material *material)
 {
     double *q = set->all ? set->all : set->q;
@@ -51,7 +47,7 @@ static bool shares(const pal_spring_set *set, const pal_build *build, double *sh
     return any;
 }
 
-/* weight [n_item]: room */
+/* weight [n_item]: scratch */
 static pal_err take_regions(pal_spring_set *set, const pal_build *build, double *weight)
 {
     const pal_body *body = build->body;
@@ -91,7 +87,7 @@ static pal_err fill(pal_spring_set *set, const pal_build *build, double *weight)
     if (!set->w || !set->q) return PAL_ERR_MEMORY;
     for (int i = 0; i < set->n_item; i++) {
         const double *x[PAL_CORNERS];
-        corners_at(body->x_rest, set->item + set->n_corner * i, set->n_corner, x);
+        pal_spring_points(body->x_rest, set->item + set->n_corner * i, set->n_corner, x);
         set->w[set->simd_blocks.place[i]] = 1 / pal_spring_measure(set->spring.kind, x);
         set->q[set->simd_blocks.place[i]] = weight[i];
     }
@@ -102,7 +98,8 @@ static pal_err keep_all(pal_spring_set *set, pal_arena *arena)
 {
     set->all = PAL_NEW(arena, double, set->simd_blocks.n_lane);
     set->off = PAL_NEW(arena, int32_t, set->n_item);
-    if (!set->all || !set->off) return PAL_ERR_MEMORY;
+    if (set->spring.kind == PAL_SPRING_DISTANCE) set->edge = PAL_NEW(arena, pal_region_edge, set->n_item);
+    if (!set->all || !set->off || (set->spring.kind == PAL_SPRING_DISTANCE && !set->edge)) return PAL_ERR_MEMORY;
     set->fresh = true;
     memcpy(set->all, set->q, sizeof *set->q * (size_t)set->simd_blocks.n_lane);
     return PAL_ERR_OK;
@@ -110,9 +107,8 @@ static pal_err keep_all(pal_spring_set *set, pal_arena *arena)
 
 pal_err pal_spring_set_check(const pal_config_entry *entry, const pal_build *build)
 {
-    if (build->body->tets && build->body->tets->n_tet > 0) return PAL_ERR_OK;
-    return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of tetrahedra", entry->path,
-                              entry->name);
+    if (build->body->tets && build->body->tets->n_tet > 0 && build->body->node_order) return PAL_ERR_OK;
+    return PAL_REFUSE(build->diag, "%s: \"%s\" needs a body of tetrahedra", entry->path, entry->name);
 }
 
 pal_err pal_spring_set_make(pal_spring_kind kind, pal_config_entry *entry, pal_build *build, int32_t *item, int n_item,
@@ -124,7 +120,7 @@ pal_err pal_spring_set_make(pal_spring_kind kind, pal_config_entry *entry, pal_b
     out->n_corner = n_corner;
     for (int i = 0; i < n_item; i++) {
         const double *x[PAL_CORNERS];
-        corners_at(body->x_rest, item + n_corner * i, n_corner, x);
+        pal_spring_points(body->x_rest, item + n_corner * i, n_corner, x);
         if (!(fabs(pal_spring_measure(kind, x)) > min)) continue;
         memmove(item + n_corner * out->n_item++, item + n_corner * i, sizeof *item * (size_t)n_corner);
     }

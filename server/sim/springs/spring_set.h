@@ -4,10 +4,10 @@
 #ifndef PAL_SIM_SPRINGS_SPRING_SET_H
 #define PAL_SIM_SPRINGS_SPRING_SET_H
 #include "server/sim/core/simd.h"
-#include "server/sim/springs/spring_constraint.h"
+#include "server/sim/springs/spring_law.h"
 
 /* 8 springs with constants k q: p [n_corner][3] points to the coordinates of the corners, 8 lanes each; f [n_corner -
- * 1][3] receives the forces on corners 1, 2, 3 (corner 0 gets minus their sum); the kernel may lower `least` to the
+ * 1][3] receives the forces on corners 1, 2, 3 (corner 0 gets minus their sum); the kernel may lower `min` to the
  * minimum of a quantity of its own */
 typedef void (*pal_spring_kernel)(const double *p[][3], pal_v8 w, pal_v8 kq, pal_v8 f[][3], pal_v8 *min);
 
@@ -28,6 +28,7 @@ typedef struct pal_spring_set {
      * has no recovery [n_lane], [n_item] */
     double *all;
     int32_t *off;
+    struct pal_region_edge *edge; /* of an edge set: the springs that are off, with their region [n_off] */
     int n_off;
     bool fresh; /* made since recovery last chose what is off */
 } pal_spring_set;
@@ -35,7 +36,7 @@ typedef struct pal_spring_set {
 /* REFUSED: the body is not made of tetrahedra */
 pal_err pal_spring_set_check(const pal_config_entry *entry, const pal_build *build);
 /* Reads the keys (pal_spring_read) and keeps the springs of item [n_item][corners of the kind] with a measure above
- * `least`, w = 1 / measure; item is reordered */
+ * `min`, w = 1 / measure; item is reordered */
 pal_err pal_spring_set_make(pal_spring_kind kind, pal_config_entry *entry, pal_build *build, int32_t *item, int n_item,
                             double min, pal_spring_set *out);
 /* smallest and largest of 1 and the ratios of volume to volume at rest, whichever springs are off; d [n_node][3] */
@@ -48,7 +49,7 @@ pal_err pal_spring_set_material(void *self, const pal_body *body, const pal_mate
 
 PAL_INLINE void pal_spring_corners(const pal_spring_set *set, const double *x, int i, const double *to[PAL_CORNERS])
 {
-    for (int c = 0; c < PAL_CORNERS; c++) to[c] = x + 3 * set->item[set->n_corner * i + (c < set->n_corner ? c : 0)];
+    pal_spring_points(x, set->item + set->n_corner * i, set->n_corner, to);
 }
 
 PAL_INLINE double pal_spring_energy(const pal_spring_set *set, const pal_body *body, pal_spring_kind kind)
@@ -125,25 +126,21 @@ PAL_INLINE double pal_spring_run(const pal_spring_set *set, pal_node_order *node
 PAL_INLINE void pal_spring_bound(const pal_spring_set *set, pal_node_order *node_order, const double *at,
                                  pal_bound_kernel kernel, int n_corner, double k, bool bend, double *bound)
 {
-    const int n_strip = set->simd_blocks.n_strip, n_slot = node_order->n_slot;
-    const double *p[PAL_CORNERS][3];
+    const pal_simd_blocks *blocks = &set->simd_blocks;
     pal_v8 b8[PAL_CORNERS];
     pal_node_order_load(node_order, at);
-    for (int b = 0; b < n_strip + set->simd_blocks.n_loose; b++) {
-        bool loose = b >= n_strip;
-        const int32_t *base = set->simd_blocks.base + n_corner * b;
-        const int32_t *node = set->simd_blocks.node + n_corner * PAL_LANES * (b - n_strip);
-        double x[PAL_CORNERS][3][PAL_LANES];
-        if (loose) pal_loose_load(node_order, node, n_corner, x);
-        for (int c = 0; c < n_corner; c++)
-            for (int d = 0; d < 3; d++) p[c][d] = loose ? x[c][d] : node_order->x + d * n_slot + base[c];
+    for (int b = 0; b < blocks->n_strip + blocks->n_loose; b++) {
+        double loose[PAL_CORNERS][3][PAL_LANES];
+        const double *p[PAL_CORNERS][3];
+        const bool is_loose = pal_block_points(blocks, node_order, b, n_corner, loose, p);
+        const int32_t *node = pal_block_nodes(blocks, b);
         kernel(p, pal_load8(set->w + PAL_LANES * b), k * pal_load8(set->q + PAL_LANES * b), bend, b8);
         for (int c = 0; c < n_corner; c++) {
-            if (!loose) pal_add8(node_order->f + base[c], b8[c]);
-            for (int l = 0; l < PAL_LANES && loose; l++) node_order->f[node[c * PAL_LANES + l]] += b8[c][l];
+            if (!is_loose) pal_add8(node_order->f + blocks->base[n_corner * b + c], b8[c]);
+            for (int l = 0; l < PAL_LANES && is_loose; l++) node_order->f[node[c * PAL_LANES + l]] += b8[c][l];
         }
     }
     for (int i = 0; i < node_order->n_node; i++) bound[i] += node_order->f[node_order->slot[i]];
-    memset(node_order->f, 0, sizeof(double) * (size_t)n_slot);
+    memset(node_order->f, 0, sizeof(double) * (size_t)node_order->n_slot);
 }
 #endif

@@ -4,17 +4,13 @@
 void pal_spring_volume_range(const pal_spring_set *set, pal_node_order *node_order, const double *d, double out[2])
 {
     const pal_v8 one = 1 - (pal_v8){0};
-    const int n_strip = set->simd_blocks.n_strip, n_slot = node_order->n_slot;
+    const pal_simd_blocks *blocks = &set->simd_blocks;
     pal_v8 min = one, max = one;
-    const double *p[PAL_CORNERS][3];
     pal_node_order_load(node_order, d);
-    for (int b = 0; b < n_strip + set->simd_blocks.n_loose; b++) {
-        double x[PAL_CORNERS][3][PAL_LANES];
-        const bool loose = b >= n_strip;
-        if (loose) pal_loose_load(node_order, set->simd_blocks.node + 4 * PAL_LANES * (b - n_strip), 4, x);
-        for (int c = 0; c < 4; c++)
-            for (int k = 0; k < 3; k++)
-                p[c][k] = loose ? x[c][k] : node_order->x + k * n_slot + set->simd_blocks.base[4 * b + c];
+    for (int b = 0; b < blocks->n_strip + blocks->n_loose; b++) {
+        double loose[PAL_CORNERS][3][PAL_LANES];
+        const double *p[PAL_CORNERS][3];
+        (void)pal_block_points(blocks, node_order, b, 4, loose, p);
         pal_v8 e[3][3], w = pal_load8(set->w + PAL_LANES * b);
         for (int c = 0; c < 3; c++)
             for (int k = 0; k < 3; k++) e[c][k] = pal_load8(p[c + 1][k]) - pal_load8(p[0][k]);

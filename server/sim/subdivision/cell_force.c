@@ -52,11 +52,24 @@ PAL_INLINE void add_turn(const pal_cell_group *group, int block, int lane, int n
         world[2] += g[0][m] * y[1][m] - g[1][m] * y[0][m];
     }
     for (int i = 0; i < 3; i++) t[i] = r[i] * world[0] + r[3 + i] * world[1] + r[6 + i] * world[2];
-    cell_load(group->frame + (size_t)block * 9 * PAL_LANES + lane, 9, frame);
+    pal_wide_load_n(group->frame + (size_t)block * 9 * PAL_LANES + lane, 9, frame);
     cell_turn_stress(r, s, t, frame, w);
     for (int m = 0; m < n_node; m++)
         for (int i = 0; i < 3; i++)
             for (int j = 0; j < 3; j++) g[i][m] += w[3 * i + j] * group->middle[m][j];
+}
+
+/* u = d^ of the operator from nodes y, which are overwritten for PAL_CELL_EDGES */
+PAL_INLINE void displace(const pal_cells_elastic *c, const pal_cell_group *group, int n_node, int block, int lane,
+                         const pal_wide r[9], pal_wide (*y)[PAL_CELL_MAX_NODES], pal_wide (*u)[PAL_CELL_MAX_NODES])
+{
+    const double *rest = group->rest + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane;
+    if (c->op == PAL_CELL_EDGES) {
+        pal_cell_edges_displaced(rest, n_node, r, y, u);
+        return;
+    }
+    cell_turn(r, true, n_node, y, u);
+    cell_minus_rest(rest, n_node, u);
 }
 
 /* one half of a block */
@@ -69,11 +82,9 @@ PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_
     if (n_live == 0 || (!(what & LINEARISE) && cell_recovering(c, group, block, lane, n_live))) return 0;
     cell_gather(node, n_node, d, y);
     cell_rotation(group, block, lane, y, n_node, r, s);
-    if (what & LINEARISE)
-        for (int i = 0; i < 9; i++) pal_wide_store(group->turn + ((size_t)block * 9 + i) * PAL_LANES + lane, r[i]);
+    if (what & LINEARISE) pal_wide_store_n(group->turn + (size_t)block * 9 * PAL_LANES + lane, 9, r);
     if (!(what & (FORCE | ENERGY | SWELL))) return 0;
-    cell_unturn(r, n_node, y, u);
-    cell_minus_rest(group->rest + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane, n_node, u);
+    displace(c, group, n_node, block, lane, r, y, u);
     const bool apart = c->volume.n > 0;
     const int32_t *home = group->home + block * PAL_LANES + lane;
     const double *swell = swell_at(group, n_node, block, lane);
@@ -95,8 +106,8 @@ PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_
     if (!(what & FORCE)) return sum;
     pal_wide minus[9];
     for (int i = 0; i < 9; i++) minus[i] = -r[i];
-    cell_turn(minus, n_node, u, u);
-    add_turn(group, block, lane, n_node, r, s, y, u);
+    cell_turn(minus, false, n_node, u, u);
+    if (c->op == PAL_CELL_POLAR) add_turn(group, block, lane, n_node, r, s, y, u);
     cell_scatter(node, n_node, n_live, u, f);
     return sum;
 }
@@ -105,10 +116,16 @@ PAL_INLINE double all_blocks(pal_cells_elastic *c, pal_cell_kind kind, int n_nod
 {
     pal_cell_group *group = &c->group[kind];
     double sum = 0;
-    group->n_slow = 0;
     for (int b = 0; b < group->n_block; b++)
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) sum += half_block(c, group, n_node, what, b, l, d, f);
     return sum;
+}
+
+PAL_INLINE double all_kinds(pal_cells_elastic *c, int what, const double *d, double *f)
+{
+    double sum = all_blocks(c, PAL_CELL_CUBIC, 64, what, d, f);
+    sum += all_blocks(c, PAL_CELL_HEX, 8, what, d, f);
+    return sum + all_blocks(c, PAL_CELL_PYRAMID, 5, what, d, f);
 }
 
 /* change of volume of each control cell */
@@ -116,9 +133,7 @@ static void swell_all(pal_cells_elastic *c, const double *d)
 {
     if (c->volume.n == 0) return;
     memset(c->volume.sum, 0, sizeof(double) * (size_t)c->volume.n);
-    all_blocks(c, PAL_CELL_CUBIC, 64, SWELL, d, NULL);
-    all_blocks(c, PAL_CELL_HEX, 8, SWELL, d, NULL);
-    all_blocks(c, PAL_CELL_PYRAMID, 5, SWELL, d, NULL);
+    all_kinds(c, SWELL, d, NULL);
     find_push(c);
 }
 
@@ -126,98 +141,81 @@ void pal_cells_elastic_force(pal_cells_elastic *c, const double *d, double *f)
 {
     swell_all(c, d);
     if (c->recovery.n_recovering > 0) (void)pal_cell_recovery_force(&c->recovery, c->solid, d, f);
-    if (c->op == PAL_CELL_EDGES) {
-        pal_cells_edges_force(c, d, f);
-        return;
-    }
-    all_blocks(c, PAL_CELL_CUBIC, 64, FORCE, d, f);
-    all_blocks(c, PAL_CELL_HEX, 8, FORCE, d, f);
-    all_blocks(c, PAL_CELL_PYRAMID, 5, FORCE, d, f);
-}
-
-PAL_INLINE double all_kinds(pal_cells_elastic *c, int what, const double *d, double *f)
-{
-    return all_blocks(c, PAL_CELL_CUBIC, 64, what, d, f) + all_blocks(c, PAL_CELL_HEX, 8, what, d, f) +
-           all_blocks(c, PAL_CELL_PYRAMID, 5, what, d, f);
+    all_kinds(c, FORCE, d, f);
 }
 
 double pal_cells_elastic_energy(pal_cells_elastic *c, const double *d, double *f)
 {
+    const bool forces = f && c->op == PAL_CELL_POLAR, regions = c->recovery.n_recovering > 0 && !c->recovery.weighs;
     swell_all(c, d);
-    double regions =
-        c->recovery.n_recovering > 0 && !c->recovery.weighs ? pal_cell_recovery_force(&c->recovery, c->solid, d, f) : 0;
-    if (c->op == PAL_CELL_EDGES) return regions + pal_cells_edges_energy(c, d);
-    return regions + (f ? all_kinds(c, FORCE | ENERGY, d, f) : all_kinds(c, ENERGY, d, NULL));
+    double sum = regions ? pal_cell_recovery_force(&c->recovery, c->solid, d, f) : 0;
+    return sum + (forces ? all_kinds(c, FORCE | ENERGY, d, f) : all_kinds(c, ENERGY, d, NULL));
 }
 
 void pal_cells_elastic_linearise(pal_cells_elastic *c, const double *d)
 {
-    all_blocks(c, PAL_CELL_CUBIC, 64, LINEARISE, d, NULL);
-    all_blocks(c, PAL_CELL_HEX, 8, LINEARISE, d, NULL);
-    all_blocks(c, PAL_CELL_PYRAMID, 5, LINEARISE, d, NULL);
+    all_kinds(c, LINEARISE, d, NULL);
 }
 
-PAL_INLINE void multiply_all(const pal_cells_elastic *c, pal_cell_kind kind, int n_node, double k, const double *p,
-                             double *out)
+/* a motion p at the last linearisation: changes of volume of the control cells, or products with the tangent */
+PAL_INLINE void move_blocks(const pal_cells_elastic *c, pal_cell_kind kind, int n_node, bool swells, double k,
+                            const double *p, double *out)
 {
     const pal_cell_group *group = &c->group[kind];
     const pal_wide zero = {0};
     for (int b = 0; b < group->n_block; b++)
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             const int n_live = cell_live(group, b, l);
-            const int32_t *node = group->node + (size_t)b * (size_t)n_node * PAL_LANES + l;
+            const int32_t *node = group->node + (size_t)b * (size_t)n_node * PAL_LANES + l,
+                          *home = group->home + b * PAL_LANES + l;
+            const double *swell = swell_at(group, n_node, b, l);
             pal_wide u[3][PAL_CELL_MAX_NODES], r[9];
             if (n_live == 0 || (!c->recovery.off && cell_recovering(c, group, b, l, n_live))) continue;
             cell_gather(node, n_node, p, u);
-            cell_load(group->turn + (size_t)b * 9 * PAL_LANES + l, 9, r);
-            cell_unturn(r, n_node, u, u);
+            pal_wide_load_n(group->turn + (size_t)b * 9 * PAL_LANES + l, 9, r);
+            cell_turn(r, true, n_node, u, u);
+            if (swells) {
+                take_swelling(c, home, n_live, swelling(swell, n_node, u));
+                continue;
+            }
             cell_stiffness(&c->line, group, b, l, n_node, u, NULL);
-            if (c->volume.n > 0)
-                add_swelling(swell_at(group, n_node, b, l), n_node, give_swelling(c, group->home + b * PAL_LANES + l),
-                             u);
+            if (c->volume.n > 0) add_swelling(swell, n_node, give_swelling(c, home), u);
             const pal_wide by = c->recovery.n_recovering > 0 && !c->recovery.off
                                     ? k * pal_wide_load(group->here + b * PAL_LANES + l)
                                     : k + zero;
             for (int i = 0; i < 9; i++) r[i] *= by;
-            cell_turn(r, n_node, u, u);
+            cell_turn(r, false, n_node, u, u);
             cell_scatter(node, n_node, n_live, u, out);
         }
 }
-
-PAL_INLINE void swell_kind(const pal_cells_elastic *c, pal_cell_kind kind, int n_node, const double *p)
+PAL_INLINE void move_kinds(const pal_cells_elastic *c, bool swells, double k, const double *p, double *out)
 {
-    const pal_cell_group *group = &c->group[kind];
-    for (int b = 0; b < group->n_block; b++)
-        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
-            const int n_live = cell_live(group, b, l);
-            pal_wide u[3][PAL_CELL_MAX_NODES], r[9];
-            if (n_live == 0 || (!c->recovery.off && cell_recovering(c, group, b, l, n_live))) continue;
-            cell_gather(group->node + (size_t)b * (size_t)n_node * PAL_LANES + l, n_node, p, u);
-            cell_load(group->turn + (size_t)b * 9 * PAL_LANES + l, 9, r);
-            cell_unturn(r, n_node, u, u);
-            take_swelling(c, group->home + b * PAL_LANES + l, n_live,
-                          swelling(swell_at(group, n_node, b, l), n_node, u));
-        }
-}
-
-/* the same of a motion p, at the last linearisation */
-static void swell_move(const pal_cells_elastic *c, const double *p)
-{
-    if (c->volume.n == 0) return;
-    memset(c->volume.sum, 0, sizeof(double) * (size_t)c->volume.n);
-    swell_kind(c, PAL_CELL_CUBIC, 64, p);
-    swell_kind(c, PAL_CELL_HEX, 8, p);
-    swell_kind(c, PAL_CELL_PYRAMID, 5, p);
-    find_push(c);
+    move_blocks(c, PAL_CELL_CUBIC, 64, swells, k, p, out);
+    move_blocks(c, PAL_CELL_HEX, 8, swells, k, p, out);
+    move_blocks(c, PAL_CELL_PYRAMID, 5, swells, k, p, out);
 }
 
 void pal_cells_elastic_multiply(const pal_cells_elastic *c, double k, const double *p, double *out)
 {
-    swell_move(c, p);
-    multiply_all(c, PAL_CELL_CUBIC, 64, k, p, out);
-    multiply_all(c, PAL_CELL_HEX, 8, k, p, out);
-    multiply_all(c, PAL_CELL_PYRAMID, 5, k, p, out);
-    if (c->recovery.n_recovering > 0 && !c->recovery.off) pal_cell_recovery_multiply(&c->recovery, c->solid, k, p, out);
+    if (c->volume.n > 0) {
+        memset(c->volume.sum, 0, sizeof(double) * (size_t)c->volume.n);
+        move_kinds(c, true, k, p, NULL);
+        find_push(c);
+    }
+    move_kinds(c, false, k, p, out);
+    if (c->recovery.n_recovering > 0 && !c->recovery.off) pal_cell_recovery_multiply(&c->recovery, k, p, out);
+}
+
+void pal_cells_elastic_displaced(pal_cells_elastic *c, const double *d, pal_cell_kind kind, int element, double *out)
+{
+    pal_cell_group *group = &c->group[kind];
+    const int n_node = group->n_node, block = element / PAL_LANES, lane = element % PAL_LANES / PAL_WIDE * PAL_WIDE;
+    pal_wide y[3][PAL_CELL_MAX_NODES], u[3][PAL_CELL_MAX_NODES], r[9], s[9];
+    cell_gather(group->node + (size_t)block * (size_t)n_node * PAL_LANES + lane, n_node, d, y);
+    cell_rotation(group, block, lane, y, n_node, r, s);
+    displace(c, group, n_node, block, lane, r, y, u);
+    for (int m = 0; m < n_node; m++)
+        for (int i = 0; i < 3; i++) out[3 * m + i] = u[i][m][element % PAL_WIDE];
 }
 
 void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *turn)

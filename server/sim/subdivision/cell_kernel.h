@@ -19,6 +19,7 @@
 #include "server/num/block_matrix.h"
 #include "server/sim/core/body.h"
 #include "server/sim/core/force_cache.h"
+#include "server/sim/recovery/inverted_regions.h"
 #include "server/sim/subdivision/subdivision_solid.h"
 
 typedef enum pal_cell_operator {
@@ -51,7 +52,6 @@ typedef struct pal_cell_group {
     double *energy_J;    /* of each element at the last energy                     [n_block][8] */
     int32_t *home;       /* control cell of each element (pal_cell_volume)            [n_block][8] */
     double *swell;       /* int kappa grad N dV, J/m, kappa of pal_cell_volume   [n_block][n_node][3][8] */
-    int n_slow;          /* rotations of the last call that needed pal_polar_rotation */
 } pal_cell_group;
 
 /* part of the bulk modulus that acts on the mean change of volume of a control cell (cell_volume.c); n 0: none */
@@ -63,17 +63,6 @@ typedef struct pal_cell_volume {
     pal_cliques couple;
 } pal_cell_volume;
 
-typedef struct pal_cell_region {
-    bool fixed;                          /* G is the rotation of the supports */
-    double scale;                        /* s */
-    double turn[9];                      /* G of the last update, force or energy */
-    double sum[9];                       /* sum_ij k (x_i - x_j)(X_i - X_j)', which G fits best */
-    double region_J, element_J, shear_J; /* at the last update: its energy, that of its elements, mu V */
-    int n;          /* elements                                                                     */
-    int age, loose; /* updates since it grew; in a row without inversion or motion                 */
-    bool bad;       /* an element is not fit to leave                                              */
-} pal_cell_region;
-
 typedef struct pal_cell_recovery {
     int n_cell, n_node, first[PAL_CELL_KINDS]; /* elements of all kinds, and where each kind begins          */
     double *k_N_m;                             /* of an element's edges                             [n_cell] */
@@ -82,8 +71,10 @@ typedef struct pal_cell_recovery {
     double *element_J;                         /* energy as an element                              [n_cell] */
     int32_t *region, *before;                  /* of each element, -1: none                         [n_cell] */
     int32_t *root;                             /* of connected nodes in regions                     [n_node] */
-    pal_cell_region *of, *old;                 /*                                                   [n_cell] */
-    int n_region, n_recovering;                /* regions, elements in them                                  */
+    pal_inverted_region *of, *old;             /*                                                   [n_cell] */
+    pal_region_edge *edge;                     /* edges of the elements in regions                  [n_edge] */
+    int n_region, n_recovering, n_edge;        /* regions, elements in them                                  */
+    double time_s;      /* simulated time of the last update                                          */
     double first_J;     /* of motion and elements when regions first appeared: the bound for leaving */
     double stiffened_J; /* at the last update, of regions whose s has grown                           */
     bool at_rest; /* the body's motion has next to no energy                                                     */
@@ -108,6 +99,9 @@ static inline double pal_cell_own_lambda(double mu, double lambda)
 {
     return lambda < mu ? lambda : mu;
 }
+/* Lame constants of an element's material at a Gauss point */
+void pal_cell_lame(const pal_subdivision_solid *solid, pal_cell_kind kind, int element, int point, double *mu_Pa,
+                   double *lambda_Pa);
 static inline int pal_cell_pairs(int n_node)
 {
     return (n_node - 1) * n_node / 2;
@@ -139,10 +133,7 @@ void pal_cells_elastic_ratios(pal_cells_elastic *c, const double *d);
 /* turn [n][9] += Q by the elements' stiffness, mu V, at their nodes */
 void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *turn);
 
-/* forces and energy of PAL_CELL_EDGES (cell_operator.c) */
-void pal_cells_edges_force(pal_cells_elastic *c, const double *d, double *f);
-double pal_cells_edges_energy(pal_cells_elastic *c, const double *d);
-/* d^ of one element in its own axes, as the operator of c has it [n_node][3]: for tests and views */
+/* d^ of one element in its own axes, as the operator of c has it [n_node][3] */
 void pal_cells_elastic_displaced(pal_cells_elastic *c, const double *d, pal_cell_kind kind, int element, double *out);
 
 /* quantities at the Gauss points of one element; small strain and stress in the element's axes */
@@ -163,25 +154,12 @@ typedef double pal_cell_value(const pal_cell_points *points, int p);
 void pal_cells_elastic_measure(const pal_cells_elastic *c, const double *d, pal_cell_value *value, double *sum,
                                double *volume_m3);
 
-/* ---- recovery from inversion (cell_recovery.c) ----
+/* ---- recovery from inversion (cell_recovery.c, recovery/inverted_regions.h) ----
  *
- * Elements with one rotation each have states of balance that are not the body's shape at rest: folded, mirrored,
- * crumpled. Where the volume of an element at one of 8 points falls below 0.05 of that at rest, or rises above 30 of
- * it, it and its neighbours form a region, whose elements are replaced by a spring in space along each edge of their
- * cells:
- *
- *     E = s min_G 1/2 sum_ij k |(x_i - x_j) - G (X_i - X_j)|^2,   k = 3 mu V / (n sum of |X_ij|^2 / n),
- *
- * n edges of an element of volume V: the Dirichlet energy of x - G X, one rotation G for a region. For a given G it is
- * convex; at the best one its gradient is the one with G fixed (envelope theorem), so that forces are the exact
- * gradient without resultant or torque, and the balance of the region is X turned by G. A region of more than half of
- * the body takes the rotation of the supports, where they have one.
- *
- * s <= 1 makes a region begin with no more energy than its elements had. It becomes elements again when none of them is
- * below 0.3 (above 20), they store at most 0.1 mu V, and body and elements then have no more energy than when regions
- * first appeared, or after 120 updates in a row with the body at rest (loads hold it). A region that does not recover
- * takes in its neighbours every 30 updates, unless a lasting load or weight pulls at the body: then s returns to 1, by
- * a quarter every 4 updates, since what hangs by a soft region is drawn out by 1 / s. The stiffening damper takes away
+ * Where the volume of an element at one of 8 points falls below PAL_INVERTED_LOW of that at rest, or rises above
+ * PAL_INVERTED_HIGH of it, it and its neighbours form a region. An element of volume V with n edges has k = 3 mu V /
+ * sum of |X_ij|^2, so that E is the Dirichlet energy of x - G X. Under a lasting load or weight no region grows; s
+ * returns to 1 instead, since what hangs by a soft region is drawn out by 1 / s, and the stiffening damper takes away
  * what that adds (stiffened_J). Half blocks with all elements in regions are skipped, except for their energies in an
  * update and to linearise. */
 /* MEMORY */
@@ -189,13 +167,13 @@ pal_err pal_cell_recovery_make(const pal_subdivision_solid *solid, pal_arena *ar
 /* constants for changed samples */
 void pal_cell_recovery_refresh(pal_cell_recovery *t, const pal_cells_elastic *c);
 void pal_cell_recovery_reset(pal_cell_recovery *t, pal_cells_elastic *c);
-/* Examines all elements; loaded: a lasting load pulls at the body. True: the elements in regions, or the s of one, have
- * changed. No heap */
-bool pal_cell_recovery_update(pal_cell_recovery *t, pal_cells_elastic *c, const pal_body *body, bool loaded);
+/* Examines all elements at the time time_s; loaded: a lasting load pulls at the body. True: the elements in regions, or
+ * the s of one, have changed. No heap */
+bool pal_cell_recovery_update(pal_cell_recovery *t, pal_cells_elastic *c, const pal_body *body, double time_s,
+                              bool loaded);
 
 /* of all regions, at nodes d: energy, J; forces are added to f [n_node][3] where it is not NULL */
 double pal_cell_recovery_force(pal_cell_recovery *t, const pal_subdivision_solid *solid, const double *d, double *f);
 /* out += k s sum_ij k_ij (p_i - p_j) */
-void pal_cell_recovery_multiply(const pal_cell_recovery *t, const pal_subdivision_solid *solid, double k,
-                                const double *p, double *out);
+void pal_cell_recovery_multiply(const pal_cell_recovery *t, double k, const double *p, double *out);
 #endif

@@ -82,7 +82,6 @@ static void middle_turn(const pal_cell_group *group, const double *d, const int3
 void pal_cells_elastic_points(const pal_cells_elastic *c, const double *d, pal_cell_kind kind, int element,
                               pal_cell_points *out)
 {
-    const pal_material_samples *samples = &c->solid->samples[kind];
     const int32_t *node = pal_subdivision_solid_nodes(c->solid, kind, element);
     const pal_cell_group *group = &c->group[kind];
     double now[PAL_CELL_GAUSS_POINTS][9], rest[PAL_CELL_GAUSS_POINTS][9];
@@ -90,19 +89,15 @@ void pal_cells_elastic_points(const pal_cells_elastic *c, const double *d, pal_c
     gradients(group->n_node, d, node, now);
     gradients(group->n_node, c->solid->node_rest, node, rest);
     for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
-        const size_t sample = (size_t)element * PAL_CELL_GAUSS_POINTS + (size_t)p;
         double f[9], h[9], stress[9], at[3], mu, lambda, *e = out->strain[p];
         out->volume_m3[p] = pal_cell_gauss_point(p, at) * deformation(now[p], rest[p], f);
         out->det_f[p] = pal_det3(f);
         out->stretch[p] = pal_largest_strain(f);
-        for (int i = 0; i < 3; i++)
-            for (int j = 0; j < 3; j++) {
-                h[3 * i + j] = -(i == j);
-                for (int k = 0; k < 3; k++) h[3 * i + j] += out->turn[3 * k + i] * f[3 * k + j];
-            }
+        pal_elastic_mul(h, out->turn, true, f);
+        for (int i = 0; i < 9; i += 4) h[i] -= 1;
         e[0] = h[0], e[1] = h[4], e[2] = h[8];
         e[3] = 0.5 * (h[5] + h[7]), e[4] = 0.5 * (h[2] + h[6]), e[5] = 0.5 * (h[1] + h[3]);
-        pal_lame((double)samples->young_Pa[sample], fmin((double)samples->poisson[sample], 0.4999), &mu, &lambda);
+        pal_cell_lame(c->solid, kind, element, p, &mu, &lambda);
         pal_linear_stress(mu, lambda, h, stress);
         out->von_mises_Pa[p] = pal_von_mises(stress);
         double trace = e[0] + e[1] + e[2], square = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
@@ -116,13 +111,8 @@ void pal_cells_elastic_measure(const pal_cells_elastic *c, const double *d, pal_
 {
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
         const int n_node = c->group[kind].n_node;
-        double shape[PAL_CELL_GAUSS_POINTS][PAL_CELL_MAX_NODES];
-        if (c->group[kind].n == 0) continue;
-        for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
-            double at[3];
-            pal_cell_gauss_point(p, at);
-            pal_cell_shape(n_node, at, shape[p], NULL);
-        }
+        pal_cell_shapes shapes;
+        pal_cell_shapes_fill(kind, &shapes);
         for (int e = 0; e < c->group[kind].n; e++) {
             const int32_t *node = pal_subdivision_solid_nodes(c->solid, kind, e);
             pal_cell_points points;
@@ -130,7 +120,7 @@ void pal_cells_elastic_measure(const pal_cells_elastic *c, const double *d, pal_
             pal_cells_elastic_points(c, d, kind, e, &points);
             for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
                 const double volume = points.volume_m3[p], of = value(&points, p) * volume;
-                for (int m = 0; m < n_node; m++) share[m] += shape[p][m] * volume, part[m] += shape[p][m] * of;
+                for (int m = 0; m < n_node; m++) share[m] += shapes.n[p][m] * volume, part[m] += shapes.n[p][m] * of;
             }
             for (int m = 0; m < n_node; m++) sum[node[m]] += part[m], volume_m3[node[m]] += share[m];
         }

@@ -15,8 +15,6 @@
  * force, but a net torque, and no energy. */
 #include "server/sim/subdivision/cell_simd.h"
 
-#include <math.h>
-
 /* relative vectors of the lattice's edges, at their first node [direction][node][component] */
 typedef struct edge_vectors {
     pal_wide at[3][PAL_CELL_MAX_NODES][3];
@@ -40,12 +38,6 @@ PAL_INLINE pal_wide dot(const pal_wide a[3], const pal_wide b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
-PAL_INLINE pal_wide root(pal_wide q)
-{
-    for (int l = 0; l < PAL_WIDE; l++) q[l] = sqrt(q[l]);
-    return q;
-}
-
 /* a - a' and b - b' at node `at` of ends a and b; x now, y at rest */
 PAL_INLINE void corner(pal_wide (*x)[PAL_CELL_MAX_NODES], pal_wide (*y)[PAL_CELL_MAX_NODES], const pal_wide r[9],
                        int at, int a, int b, pal_wide va[3], pal_wide vb[3])
@@ -56,14 +48,14 @@ PAL_INLINE void corner(pal_wide (*x)[PAL_CELL_MAX_NODES], pal_wide (*y)[PAL_CELL
     cross(s1, s2, axis), cross(r1, r2, rest);
     pal_wide sn2 = dot(axis, axis), cs = dot(s1, s2), h2 = sn2 + cs * cs;
     pal_wide rest2 = dot(rest, rest), cs0 = dot(r1, r2), h02 = rest2 + cs0 * cs0, both = h2 * h02;
-    pal_wide sn = root(sn2), sn0 = root(rest2);
+    pal_wide sn = pal_wide_sqrt(sn2), sn0 = pal_wide_sqrt(rest2);
     pal_wide_mask there = (both > 0) & (rest2 > tiny2 * h02), seen = sn2 > tiny2 * h2;
-    pal_wide over = pal_wide_select(there, 1 + zero, zero) / pal_wide_select(there, root(both), 1 + zero);
+    pal_wide over = pal_wide_select(there, 1 + zero, zero) / pal_wide_select(there, pal_wide_sqrt(both), 1 + zero);
     pal_wide cosine = (cs * cs0 + sn * sn0) * over, sine = (sn * cs0 - cs * sn0) * over;
     /* half of delta, which stays short of half a turn by the smaller of both angles at rest: sh = sin, less = 1 - cos,
      * by = sin / |s1 x s2| with one division for all */
     pal_wide half2 = 0.5 + 0.5 * cosine;
-    pal_wide ch = root(pal_wide_select(half2 > 1e-16, half2, zero + 1e-16)),
+    pal_wide ch = pal_wide_sqrt(pal_wide_select(half2 > 1e-16, half2, zero + 1e-16)),
              length = pal_wide_select(seen, sn, 1 + zero);
     pal_wide inverse = 1 / (ch * length * (1 + ch)), by = 0.5 * sine * (1 + ch) * inverse;
     pal_wide sh = by * length, less = sh * sh * ch * length * inverse;
@@ -107,7 +99,7 @@ PAL_INLINE void stretches(const lattice *g, pal_wide (*x)[PAL_CELL_MAX_NODES], p
             pal_wide s[3], t[3];
             if (m / g->step[a] % g->n == g->n - 1) continue;
             from_to(x, m, m + g->step[a], s), from_to(y, m, m + g->step[a], t);
-            pal_wide l = root(dot(s, s)), l0 = root(dot(t, t));
+            pal_wide l = pal_wide_sqrt(dot(s, s)), l0 = pal_wide_sqrt(dot(t, t));
             pal_wide_mask there = l > 0;
             pal_wide by = pal_wide_select(there, l - l0, zero) / pal_wide_select(there, l, 1 + zero);
             for (int i = 0; i < 3; i++) e->at[a][m][i] = by * s[i];
@@ -181,88 +173,20 @@ PAL_INLINE void displaced(const double *rest, int n_node, const pal_wide r[9], p
         pal_wide top = 0.25 * (u[i][4] + u[i][5] + u[i][6] + u[i][7]), swap = u[i][2];
         u[i][2] = u[i][3], u[i][3] = swap, u[i][4] = top;
     }
-    cell_unturn(r, n_node, u, u);
+    cell_turn(r, true, n_node, u, u);
     for (int i = 0; i < 3 && !cubic; i++) {
         pal_wide from = u[i][0];
         for (int m = 0; m < n_node; m++) u[i][m] -= from;
     }
 }
 
-/* forces of half a block where f is given, else its energy */
-PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_node, int block, int lane,
-                             const double *d, double *f)
+void pal_cell_edges_displaced(const double *rest, int n_node, const pal_wide r[9], pal_wide (*y)[PAL_CELL_MAX_NODES],
+                              pal_wide (*u)[PAL_CELL_MAX_NODES])
 {
-    const int n_live = cell_live(group, block, lane);
-    const int32_t *node = group->node + (size_t)block * (size_t)n_node * PAL_LANES + lane;
-    const double *rest = group->rest + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane;
-    pal_wide y[3][PAL_CELL_MAX_NODES], u[3][PAL_CELL_MAX_NODES], r[9], s[9], energy = {0};
-    if (n_live == 0 || cell_recovering(c, group, block, lane, n_live)) return 0;
-    cell_gather(node, n_node, d, y);
-    cell_rotation(group, block, lane, y, n_node, r, s);
-    displaced(rest, n_node, r, y, u);
-    cell_stiffness(&c->line, group, block, lane, n_node, u, f ? NULL : &energy);
-    if (!f) pal_wide_store(group->energy_J + block * PAL_LANES + lane, energy);
-    if (c->recovery.n_recovering > 0) {
-        const pal_wide here = pal_wide_load(group->here + block * PAL_LANES + lane);
-        energy *= here;
-        for (int m = 0; m < n_node; m++) u[0][m] *= here, u[1][m] *= here, u[2][m] *= here;
-    }
-    if (!f) return cell_sum(energy, n_live);
-    for (int i = 0; i < 9; i++) r[i] = -r[i];
-    cell_turn(r, n_node, u, u);
-    cell_scatter(node, n_node, n_live, u, f);
-    return 0;
-}
-
-PAL_INLINE double all_blocks(pal_cells_elastic *c, pal_cell_kind kind, int n_node, const double *d, double *f)
-{
-    pal_cell_group *group = &c->group[kind];
-    double sum = 0;
-    group->n_slow = 0;
-    for (int b = 0; b < group->n_block; b++)
-        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) sum += half_block(c, group, n_node, b, l, d, f);
-    return sum;
-}
-
-void pal_cells_edges_force(pal_cells_elastic *c, const double *d, double *f)
-{
-    all_blocks(c, PAL_CELL_CUBIC, 64, d, f);
-    all_blocks(c, PAL_CELL_HEX, 8, d, f);
-    all_blocks(c, PAL_CELL_PYRAMID, 5, d, f);
-}
-
-double pal_cells_edges_energy(pal_cells_elastic *c, const double *d)
-{
-    return all_blocks(c, PAL_CELL_CUBIC, 64, d, NULL) + all_blocks(c, PAL_CELL_HEX, 8, d, NULL) +
-           all_blocks(c, PAL_CELL_PYRAMID, 5, d, NULL);
-}
-
-/* d^ of the half block that an element stands in */
-PAL_INLINE void one_displaced(pal_cells_elastic *c, pal_cell_kind kind, int n_node, const double *d, int element,
-                              double *out)
-{
-    pal_cell_group *group = &c->group[kind];
-    const int block = element / PAL_LANES, lane = element % PAL_LANES / PAL_WIDE * PAL_WIDE;
-    const double *rest = group->rest + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane;
-    pal_wide y[3][PAL_CELL_MAX_NODES], u[3][PAL_CELL_MAX_NODES], r[9], s[9];
-    cell_gather(group->node + (size_t)block * (size_t)n_node * PAL_LANES + lane, n_node, d, y);
-    cell_rotation(group, block, lane, y, n_node, r, s);
-    if (c->op == PAL_CELL_EDGES) {
-        displaced(rest, n_node, r, y, u);
-    } else {
-        cell_unturn(r, n_node, y, u);
-        cell_minus_rest(rest, n_node, u);
-    }
-    for (int m = 0; m < n_node; m++)
-        for (int i = 0; i < 3; i++) out[3 * m + i] = u[i][m][element % PAL_WIDE];
-}
-
-void pal_cells_elastic_displaced(pal_cells_elastic *c, const double *d, pal_cell_kind kind, int element, double *out)
-{
-    if (kind == PAL_CELL_CUBIC)
-        one_displaced(c, kind, 64, d, element, out);
-    else if (kind == PAL_CELL_HEX)
-        one_displaced(c, kind, 8, d, element, out);
+    if (n_node == PAL_CUBIC_NODES)
+        displaced(rest, PAL_CUBIC_NODES, r, y, u);
+    else if (n_node == PAL_PYRAMID_NODES)
+        displaced(rest, PAL_PYRAMID_NODES, r, y, u);
     else
-        one_displaced(c, kind, 5, d, element, out);
+        displaced(rest, 8, r, y, u);
 }

@@ -2,19 +2,14 @@
 
 #include "server/base/vec3.h"
 #include "server/num/union_find.h"
-#include "server/sim/core/best_rotation.h"
 #include "server/sim/elements/elastic_law.h"
 #include "server/sim/subdivision/cell_kernel.h"
+#include "server/sim/subdivision/tuning.h"
 
 #include <math.h>
 #include <string.h>
 
-/* largest energy of elements that return, as a part of mu V: with more they would fly apart. Operator edges, whose
- * forces have no energy, adds energy to larger motions */
-static const double leave_share[] = {[PAL_CELL_POLAR] = 0.1, [PAL_CELL_EDGES] = 1e-3};
-enum { LEAVE_UPDATES = 120, GROW_UPDATES = 30, STIFFEN_UPDATES = 4, EDGES_MAX = 12 };
-/* factor on s of a region under a lasting load, every STIFFEN_UPDATES updates */
-static const double stiffen_factor = 1.25;
+enum { EDGES_MAX = 12 };
 
 /* ---- load ---- */
 
@@ -32,10 +27,11 @@ pal_err pal_cell_recovery_make(const pal_subdivision_solid *solid, pal_arena *ar
     out->region = PAL_NEW(arena, int32_t, n);
     out->before = PAL_NEW(arena, int32_t, n);
     out->root = PAL_NEW(arena, int32_t, out->n_node);
-    out->of = PAL_NEW(arena, pal_cell_region, n);
-    out->old = PAL_NEW(arena, pal_cell_region, n);
+    out->of = PAL_NEW(arena, pal_inverted_region, n);
+    out->old = PAL_NEW(arena, pal_inverted_region, n);
+    out->edge = PAL_NEW(arena, pal_region_edge, EDGES_MAX * n);
     bool all = out->k_N_m && out->shear_J && out->ratio[0] && out->ratio[1] && out->element_J && out->region &&
-               out->before && out->root && out->of && out->old;
+               out->before && out->root && out->of && out->old && out->edge;
     return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
@@ -81,13 +77,11 @@ void pal_cell_recovery_refresh(pal_cell_recovery *t, const pal_cells_elastic *c)
         int e, n;
         int32_t edge[EDGES_MAX][2];
         const pal_cell_kind kind = kind_of(t, cell, &e);
-        const size_t at = (size_t)e * PAL_CELL_GAUSS_POINTS;
         double sum = 0, square = 0;
-        for (size_t p = at; p < at + PAL_CELL_GAUSS_POINTS; p++) {
+        for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
             double mu, lambda;
-            pal_lame((double)solid->samples[kind].young_Pa[p], fmin((double)solid->samples[kind].poisson[p], 0.4999),
-                     &mu, &lambda);
-            sum += mu * solid->samples[kind].volume_m3[p];
+            pal_cell_lame(solid, kind, e, p, &mu, &lambda);
+            sum += mu * solid->samples[kind].volume_m3[e * PAL_CELL_GAUSS_POINTS + p];
         }
         n = edges(t, solid, cell, edge);
         for (int i = 0; i < n; i++)
@@ -98,12 +92,18 @@ void pal_cell_recovery_refresh(pal_cell_recovery *t, const pal_cells_elastic *c)
     }
 }
 
-static void show(const pal_cell_recovery *t, pal_cells_elastic *c)
+/* the regions are known: which elements act, and the edges of the others */
+static void show(pal_cell_recovery *t, pal_cells_elastic *c)
 {
+    t->n_edge = 0;
     for (int cell = 0; cell < t->n_cell; cell++) {
         int e;
+        int32_t edge[EDGES_MAX][2];
+        const int region = t->region[cell];
         const pal_cell_kind kind = kind_of(t, cell, &e);
-        c->group[kind].here[e] = t->region[cell] < 0;
+        c->group[kind].here[e] = region < 0;
+        for (int i = region < 0 ? -1 : edges(t, c->solid, cell, edge) - 1; i >= 0; i--)
+            t->edge[t->n_edge++] = (pal_region_edge){{edge[i][0], edge[i][1]}, region, cell};
     }
 }
 
@@ -117,69 +117,27 @@ void pal_cell_recovery_reset(pal_cell_recovery *t, pal_cells_elastic *c)
 
 /* ---- regions ---- */
 
-static inline void edge_vector(const double *d, const int32_t edge[2], double out[3])
+static double edge_N_m(const void *self, int cell)
 {
-    pal_sub3(out, d + 3 * (size_t)edge[1], d + 3 * (size_t)edge[0]);
-}
-
-/* best-fit rotations at d of the regions that have one of their own */
-static void find_turns(pal_cell_recovery *t, const pal_subdivision_solid *solid, const double *d)
-{
-    for (int p = 0; p < t->n_region; p++) memset(t->of[p].sum, 0, sizeof t->of[p].sum);
-    for (int cell = 0; cell < t->n_cell; cell++) {
-        int32_t edge[EDGES_MAX][2];
-        if (t->region[cell] < 0 || t->of[t->region[cell]].fixed) continue;
-        for (int i = edges(t, solid, cell, edge) - 1; i >= 0; i--) {
-            double x[3], y[3];
-            edge_vector(d, edge[i], x), edge_vector(solid->node_rest, edge[i], y);
-            pal_add_outer(t->of[t->region[cell]].sum, t->k_N_m[cell], x, y);
-        }
-    }
-    for (int p = 0; p < t->n_region; p++)
-        if (!t->of[p].fixed) pal_best_rotation(t->of[p].sum, t->of[p].turn);
-}
-
-/* energy of a cell's edges, J, without s; f += forces with s */
-static double cell_edges(const pal_cell_recovery *t, const pal_subdivision_solid *solid, int cell, const double *d,
-                         double *f)
-{
-    const pal_cell_region *region = &t->of[t->region[cell]];
-    const double k = t->k_N_m[cell], force = region->scale * k;
-    int32_t edge[EDGES_MAX][2];
-    double sum = 0;
-    for (int i = edges(t, solid, cell, edge) - 1; i >= 0; i--) {
-        double x[3], y[3], u[3];
-        edge_vector(d, edge[i], x), edge_vector(solid->node_rest, edge[i], y);
-        pal_mul33(u, region->turn, y);
-        pal_sub3(u, x, u);
-        sum += 0.5 * k * pal_dot3(u, u);
-        if (!f) continue;
-        pal_axpy3(f + 3 * (size_t)edge[i][0], force, u), pal_axpy3(f + 3 * (size_t)edge[i][1], -force, u);
-    }
-    return sum;
+    return ((const pal_cell_recovery *)self)->k_N_m[cell];
 }
 
 double pal_cell_recovery_force(pal_cell_recovery *t, const pal_subdivision_solid *solid, const double *d, double *f)
 {
-    double sum = 0;
-    find_turns(t, solid, d);
-    for (int cell = 0; cell < t->n_cell; cell++)
-        if (t->region[cell] >= 0) sum += t->of[t->region[cell]].scale * cell_edges(t, solid, cell, d, f);
-    return sum;
+    const pal_region_edges in_regions = {t->n_edge, t->edge, edge_N_m, t, solid->node_rest};
+    pal_regions_fit(t->of, t->n_region, &in_regions, d);
+    return pal_regions_energy(t->of, t->n_region, &in_regions, d, NULL, 0, f);
 }
 
-void pal_cell_recovery_multiply(const pal_cell_recovery *t, const pal_subdivision_solid *solid, double k,
-                                const double *p, double *out)
+void pal_cell_recovery_multiply(const pal_cell_recovery *t, double k, const double *p, double *out)
 {
-    for (int cell = 0; cell < t->n_cell; cell++) {
-        int32_t edge[EDGES_MAX][2];
-        if (t->region[cell] < 0) continue;
-        const double by = k * t->of[t->region[cell]].scale * t->k_N_m[cell];
-        for (int i = edges(t, solid, cell, edge) - 1; i >= 0; i--) {
-            double x[3];
-            edge_vector(p, edge[i], x);
-            pal_axpy3(out + 3 * (size_t)edge[i][0], -by, x), pal_axpy3(out + 3 * (size_t)edge[i][1], by, x);
-        }
+    for (int i = 0; i < t->n_edge; i++) {
+        const pal_region_edge *e = &t->edge[i];
+        const size_t from = 3 * (size_t)e->end[0], to = 3 * (size_t)e->end[1];
+        const double by = k * t->of[e->region].scale * t->k_N_m[e->owner];
+        double x[3];
+        pal_sub3(x, p + to, p + from);
+        pal_axpy3(out + from, -by, x), pal_axpy3(out + to, by, x);
     }
 }
 
@@ -187,66 +145,38 @@ void pal_cell_recovery_multiply(const pal_cell_recovery *t, const pal_subdivisio
 
 static bool is_bad(const pal_cell_recovery *t, int cell)
 {
-    return t->ratio[0][cell] < PAL_CELL_INVERTED_LOW || t->ratio[1][cell] > PAL_CELL_INVERTED_HIGH;
+    return t->ratio[0][cell] < PAL_INVERTED_LOW || t->ratio[1][cell] > PAL_INVERTED_HIGH;
 }
 static bool is_good(const pal_cell_recovery *t, int cell)
 {
-    return t->ratio[0][cell] > PAL_CELL_LEAVE_LOW && t->ratio[1][cell] < PAL_CELL_LEAVE_HIGH;
+    return t->ratio[0][cell] > PAL_RECOVERED_LOW && t->ratio[1][cell] < PAL_RECOVERED_HIGH;
 }
 
 /* energies of the regions and of their elements at d */
 static void weigh(pal_cell_recovery *t, const pal_cells_elastic *c, const double *d)
 {
     for (int p = 0; p < t->n_region; p++) {
-        pal_cell_region *region = &t->of[p];
-        region->region_J = region->element_J = region->shear_J = 0, region->bad = false, region->n = 0;
+        pal_inverted_region *region = &t->of[p];
+        region->region_J = region->element_J = region->size_J = 0, region->bad = false, region->n = 0;
     }
-    find_turns(t, c->solid, d);
+    (void)pal_cell_recovery_force(t, c->solid, d, NULL);
     for (int cell = 0; cell < t->n_cell; cell++) {
         if (t->region[cell] < 0) continue;
-        pal_cell_region *region = &t->of[t->region[cell]];
-        region->region_J += region->scale * cell_edges(t, c->solid, cell, d, NULL);
+        pal_inverted_region *region = &t->of[t->region[cell]];
         region->element_J += t->element_J[cell];
-        region->shear_J += t->shear_J[cell];
+        region->size_J += t->shear_J[cell];
         region->bad |= !is_good(t, cell);
         region->n++;
     }
 }
 
-static double regions(const pal_cell_recovery *t)
-{
-    double sum = 0;
-    for (int p = 0; p < t->n_region; p++) sum += t->of[p].region_J;
-    return sum;
-}
-
 /* energy of the body's motion and elements; the energies of regions are known */
 static double whole(const pal_cell_recovery *t, double kinetic_J)
 {
-    double sum = kinetic_J + regions(t);
+    double sum = kinetic_J + pal_regions_sum_J(t->of, t->n_region);
     for (int cell = 0; cell < t->n_cell; cell++)
         if (t->region[cell] < 0) sum += t->element_J[cell];
     return sum;
-}
-
-/* chooses the regions that become elements again; true: any */
-static bool leave(pal_cell_recovery *t, double spare_J, double max_energy_share, bool at_rest)
-{
-    bool any = false;
-    for (int p = 0; p < t->n_region; p++) {
-        pal_cell_region *region = &t->of[p];
-        const double rise = region->element_J - region->region_J;
-        region->age++;
-        region->loose = region->bad || !at_rest ? 0 : region->loose + 1;
-        const bool fits = rise <= spare_J && region->element_J <= max_energy_share * region->shear_J;
-        if (region->bad || (!fits && region->loose < LEAVE_UPDATES)) continue;
-        spare_J -= rise;
-        region->n = 0;
-        any = true;
-    }
-    for (int cell = 0; cell < t->n_cell && any; cell++)
-        if (t->region[cell] >= 0 && t->of[t->region[cell]].n == 0) t->region[cell] = -1;
-    return any;
 }
 
 enum { NOT = -1, NEW = -2 };
@@ -257,12 +187,10 @@ static bool enter(pal_cell_recovery *t, const pal_subdivision_solid *solid, bool
 {
     bool any = false;
     memset(t->root, 0, sizeof *t->root * (size_t)t->n_node);
+    for (int p = 0; p < t->n_region; p++) t->of[p].bad = pal_region_grows(&t->of[p], loaded);
     for (int cell = 0; cell < t->n_cell; cell++) {
         int32_t node[8];
-        const pal_cell_region *region = t->region[cell] >= 0 ? &t->of[t->region[cell]] : NULL;
-        const bool grows =
-            region && region->bad && !loaded && region->age >= GROW_UPDATES && region->age % GROW_UPDATES == 0;
-        if (region ? !grows : !is_bad(t, cell)) continue;
+        if (t->region[cell] >= 0 ? !t->of[t->region[cell]].bad : !is_bad(t, cell)) continue;
         for (int k = corners(t, solid, cell, node) - 1; k >= 0; k--) t->root[node[k]] = 1;
     }
     for (int cell = 0; cell < t->n_cell; cell++) {
@@ -309,7 +237,7 @@ static void number(pal_cell_recovery *t, const pal_subdivision_solid *solid)
         corners(t, solid, cell, node);
         int at = t->root[node[0]] >= 0 ? t->root[node[0]] : node[0];
         if (t->root[at] >= 0) {
-            t->of[t->n_region] = (pal_cell_region){.scale = 1};
+            t->of[t->n_region] = (pal_inverted_region){.scale = 1};
             t->root[at] = -1 - t->n_region++;
         }
         t->region[cell] = -1 - t->root[at];
@@ -320,14 +248,9 @@ static void number(pal_cell_recovery *t, const pal_subdivision_solid *solid)
 /* chooses G and s of changed regions */
 static void begin(pal_cell_recovery *t, pal_cells_elastic *c, const pal_body *body)
 {
-    double fixed[9];
-    const bool has_rotation = pal_support_rotation(body, fixed);
     for (int cell = 0; cell < t->n_cell; cell++)
         if (t->region[cell] >= 0) t->of[t->region[cell]].n++;
-    for (int p = 0; p < t->n_region; p++) {
-        t->of[p].fixed = has_rotation && 2 * t->of[p].n > t->n_cell;
-        if (t->of[p].fixed) memcpy(t->of[p].turn, fixed, sizeof fixed);
-    }
+    pal_regions_fix(t->of, t->n_region, body, t->n_cell);
     weigh(t, c, body->d);
     for (int p = 0; p < t->n_region; p++) t->of[p].element_J = 0;
     for (int cell = 0; cell < t->n_cell; cell++) {
@@ -337,31 +260,36 @@ static void begin(pal_cell_recovery *t, pal_cells_elastic *c, const pal_body *bo
         t->of[t->region[cell]].element_J += was >= 0 ? t->old[was].region_J / t->old[was].n : t->element_J[cell];
     }
     for (int p = 0; p < t->n_region; p++) {
-        pal_cell_region *region = &t->of[p];
+        pal_inverted_region *region = &t->of[p];
         if (region->region_J > region->element_J)
-            region->scale = fmax(PAL_REGION_SCALE_MIN, region->element_J / region->region_J);
+            region->scale = fmax(PAL_FILL_MIN, region->element_J / region->region_J);
         region->region_J *= region->scale;
     }
 }
 
 /* tissue under a lasting load would hang by a region that began soft, and be drawn out by 1 / s: s returns to 1. True:
  * one has changed */
-static bool stiffen(pal_cell_recovery *t)
+static bool stiffen(pal_cell_recovery *t, double passed_s)
 {
     bool any = false;
     for (int p = 0; p < t->n_region; p++) {
-        pal_cell_region *region = &t->of[p];
-        if (region->scale >= 1 || region->age == 0 || region->age % STIFFEN_UPDATES != 0) continue;
-        region->scale = fmin(1, stiffen_factor * region->scale);
-        t->stiffened_J += stiffen_factor * region->region_J;
+        pal_inverted_region *region = &t->of[p];
+        if (region->scale >= 1 ||
+            floor(region->grow_s / PAL_CELL_STIFFEN_S) <= floor((region->grow_s - passed_s) / PAL_CELL_STIFFEN_S))
+            continue;
+        region->scale = fmin(1, PAL_CELL_STIFFEN_FACTOR * region->scale);
+        t->stiffened_J += PAL_CELL_STIFFEN_FACTOR * region->region_J;
         any = true;
     }
     return any;
 }
 
-bool pal_cell_recovery_update(pal_cell_recovery *t, pal_cells_elastic *c, const pal_body *body, bool loaded)
+bool pal_cell_recovery_update(pal_cell_recovery *t, pal_cells_elastic *c, const pal_body *body, double time_s,
+                              bool loaded)
 {
     bool bad = t->n_region > 0;
+    const double passed_s = fmax(0, time_s - t->time_s);
+    t->time_s = time_s;
     t->stiffened_J = 0;
     pal_cells_elastic_ratios(c, body->d);
     for (int cell = 0; cell < t->n_cell; cell++) bad |= is_bad(t, cell);
@@ -378,17 +306,23 @@ bool pal_cell_recovery_update(pal_cell_recovery *t, pal_cells_elastic *c, const 
     weigh(t, c, body->d);
     memcpy(t->old, t->of, sizeof *t->of * (size_t)t->n_region);
     const bool first = t->n_region == 0;
-    const double kinetic_J = pal_body_kinetic_J(body);
-    t->at_rest = kinetic_J < PAL_REGION_REST_SHARE * regions(t);
-    bool changed = leave(t, first ? 0 : t->first_J - whole(t, kinetic_J), leave_share[c->op], t->at_rest);
+    const double kinetic_J = pal_body_kinetic_J(body), rest_J = PAL_REST_SHARE * pal_regions_sum_J(t->of, t->n_region);
+    /* forces of operator edges have no energy, and it adds energy to larger motions */
+    const double max_share = c->op == PAL_CELL_EDGES ? PAL_REST_SHARE : PAL_REGION_LEAVE_SHARE;
+    t->at_rest = kinetic_J < rest_J;
+    for (int p = 0; p < t->n_region; p++) t->of[p].kinetic_J = kinetic_J;
+    bool changed = pal_regions_leave(t->of, t->n_region, first ? 0 : t->first_J - whole(t, kinetic_J), max_share,
+                                     INFINITY, rest_J, passed_s);
+    for (int cell = 0; cell < t->n_cell && changed; cell++)
+        if (t->region[cell] >= 0 && t->of[t->region[cell]].n == 0) t->region[cell] = NOT;
     memcpy(t->before, t->region, sizeof *t->region * (size_t)t->n_cell);
     changed |= enter(t, c->solid, loaded);
     if (changed && c->volume.n > 0) enter_whole_cells(t, c);
-    if (!changed) return loaded && stiffen(t);
+    if (!changed) return loaded && stiffen(t, passed_s);
     number(t, c->solid);
+    show(t, c);
     begin(t, c, body);
     if (first) t->first_J = whole(t, kinetic_J);
     t->n_change++;
-    show(t, c);
     return true;
 }

@@ -12,7 +12,6 @@
 #include "server/sim/subdivision/cell_kernel.h"
 
 typedef float cell_floats __attribute__((vector_size(sizeof(float) * PAL_WIDE), aligned(4), may_alias));
-enum { CELL_TURNS = 8, CELL_SLOW_TURNS = 200 };
 
 PAL_INLINE pal_wide cell_load_float(const float *at)
 {
@@ -54,26 +53,11 @@ PAL_INLINE void cell_scatter(const int32_t *node, int n_node, int n_live, pal_wi
         }
 }
 
-/* u = R' y and u = R y; u may be y */
-PAL_INLINE void cell_unturn(const pal_wide r[9], int n_node, pal_wide (*y)[PAL_CELL_MAX_NODES],
-                            pal_wide (*u)[PAL_CELL_MAX_NODES])
-{
-    for (int m = 0; m < n_node; m++) {
-        pal_wide a = y[0][m], b = y[1][m], c = y[2][m];
-        u[0][m] = r[0] * a + r[3] * b + r[6] * c;
-        u[1][m] = r[1] * a + r[4] * b + r[7] * c;
-        u[2][m] = r[2] * a + r[5] * b + r[8] * c;
-    }
-}
-PAL_INLINE void cell_turn(const pal_wide r[9], int n_node, pal_wide (*y)[PAL_CELL_MAX_NODES],
+/* u = R y (transposed: u = R' y); u may be y */
+PAL_INLINE void cell_turn(const pal_wide r[9], bool transposed, int n_node, pal_wide (*y)[PAL_CELL_MAX_NODES],
                           pal_wide (*u)[PAL_CELL_MAX_NODES])
 {
-    for (int m = 0; m < n_node; m++) {
-        pal_wide a = y[0][m], b = y[1][m], c = y[2][m];
-        u[0][m] = r[0] * a + r[1] * b + r[2] * c;
-        u[1][m] = r[3] * a + r[4] * b + r[5] * c;
-        u[2][m] = r[6] * a + r[7] * b + r[8] * c;
-    }
+    pal_wide_turn(r, transposed, 0, n_node, PAL_CELL_MAX_NODES, y[0], u[0]);
 }
 PAL_INLINE void cell_minus_rest(const double *rest, int n_node, pal_wide (*u)[PAL_CELL_MAX_NODES])
 {
@@ -83,45 +67,19 @@ PAL_INLINE void cell_minus_rest(const double *rest, int n_node, pal_wide (*u)[PA
 
 /* ---- rotation ---- */
 
-PAL_INLINE void cell_load(const double *at, int n, pal_wide *to)
-{
-    for (int i = 0; i < n; i++) to[i] = pal_wide_load(at + i * PAL_LANES);
-}
-
-/* lanes that vectors left to pal_polar_rotation */
-static __attribute__((noinline, unused)) void cell_settle_slowly(const pal_wide f[9], unsigned left, double *q)
-{
-    for (int l = 0; l < PAL_WIDE; l++) {
-        if (!(left >> l & 1)) continue;
-        double g[9], p[4];
-        for (int i = 0; i < 9; i++) g[i] = f[i][l];
-        for (int i = 0; i < 4; i++) p[i] = q[i * PAL_LANES + l];
-        pal_polar_rotation(g, p, CELL_SLOW_TURNS);
-        for (int i = 0; i < 4; i++) q[i * PAL_LANES + l] = p[i];
-    }
-}
-
 /* r = Q and s = Q'F of F in the middle; at: block and lane */
 PAL_INLINE void cell_rotation(pal_cell_group *group, int block, int lane, pal_wide (*y)[PAL_CELL_MAX_NODES], int n_node,
                               pal_wide r[9], pal_wide s[9])
 {
     const pal_wide zero = {0};
-    pal_wide h[9] = {zero, zero, zero, zero, zero, zero, zero, zero, zero}, frame[9], f[9], q[4];
+    pal_wide h[9] = {zero, zero, zero, zero, zero, zero, zero, zero, zero}, frame[9], f[9];
     for (int m = 0; m < n_node; m++)
         for (int i = 0; i < 3; i++)
             for (int j = 0; j < 3; j++) h[3 * i + j] += y[i][m] * group->middle[m][j];
-    cell_load(group->frame + (size_t)block * 9 * PAL_LANES + lane, 9, frame);
+    pal_wide_load_n(group->frame + (size_t)block * 9 * PAL_LANES + lane, 9, frame);
     pal_wide_mul(f, h, frame);
     double *turn = group->q + (size_t)block * 4 * PAL_LANES + lane;
-    cell_load(turn, 4, q);
-    unsigned left = pal_wide_polar(f, ~(pal_wide_mask){0}, CELL_TURNS, q, r, s);
-    for (int i = 0; i < 4; i++) pal_wide_store(turn + i * PAL_LANES, q[i]);
-    if (!left) return;
-    group->n_slow += __builtin_popcount(left);
-    cell_settle_slowly(f, left, turn);
-    cell_load(turn, 4, q);
-    pal_wide_rotation(q, r);
-    pal_wide_tmul(s, r, f);
+    pal_wide_take_rotation(turn, ~(pal_wide_mask){0}, f, r, s);
 }
 
 /* w = Q [z] J^-T, what node m bears times its grad N in the middle; s = Q'F, t as in cell_kernel.h */
@@ -129,25 +87,14 @@ PAL_INLINE void cell_turn_stress(const pal_wide r[9], const pal_wide s[9], const
                                  pal_wide w[9])
 {
     const pal_wide zero = {0};
-    pal_wide axx = s[4] + s[8], ayy = s[0] + s[8], azz = s[0] + s[4];
-    pal_wide axy = -0.5 * (s[1] + s[3]), axz = -0.5 * (s[2] + s[6]), ayz = -0.5 * (s[5] + s[7]);
-    pal_wide cxx = ayy * azz - ayz * ayz, cxy = axz * ayz - axy * azz, cxz = axy * ayz - axz * ayy;
-    pal_wide cyy = axx * azz - axz * axz, cyz = axy * axz - axx * ayz, czz = axx * ayy - axy * axy;
-    pal_wide det = axx * cxx + axy * cxy + axz * cxz, sum = axx + ayy + azz, min = 1e-3 * sum * sum * sum;
-    /* beyond the least it fades with det, which is where the rotation is hardly known */
+    pal_wide c[6], sum, z[3], det = pal_wide_spin_cofactors(s, c, &sum), min = 1e-3 * sum * sum * sum;
+    /* below `min` it fades with det, where the rotation is nearly undefined */
     pal_wide_mask some = (det > 0) & (sum > 1e-30);
     pal_wide weak = pal_wide_select(det < min, det / pal_wide_select(some, min, 1 + zero), 1 + zero);
     pal_wide one =
         pal_wide_select(some, weak, zero) / pal_wide_select(some, pal_wide_select(det < min, min, det), 1 + zero);
-    pal_wide x = one * (cxx * t[0] + cxy * t[1] + cxz * t[2]), y = one * (cxy * t[0] + cyy * t[1] + cyz * t[2]),
-             z = one * (cxz * t[0] + cyz * t[1] + czz * t[2]);
-    pal_wide p[9];
-    for (int i = 0; i < 3; i++) {
-        p[3 * i] = r[3 * i + 1] * z - r[3 * i + 2] * y;
-        p[3 * i + 1] = r[3 * i + 2] * x - r[3 * i] * z;
-        p[3 * i + 2] = r[3 * i] * y - r[3 * i + 1] * x;
-    }
-    pal_wide_mult(w, p, frame);
+    pal_wide_spin_solve(c, one, t, z);
+    pal_wide_spin_stress(r, z, frame, w);
 }
 
 /* ---- K of cubic elements ---- */
@@ -291,6 +238,10 @@ PAL_INLINE void cell_stiffness(const pal_cell_line *line, const pal_cell_group *
     else
         cell_stored_stiffness(group->k + b * 9 * (size_t)pal_cell_pairs(n_node) + l, n_node, u, energy);
 }
+
+/* u = d^ of operator PAL_CELL_EDGES in half a block (cell_operator.c): y nodes now, from one of them, overwritten */
+void pal_cell_edges_displaced(const double *rest, int n_node, const pal_wide r[9], pal_wide (*y)[PAL_CELL_MAX_NODES],
+                              pal_wide (*u)[PAL_CELL_MAX_NODES]);
 
 /* elements of a block that are there, from lane on */
 PAL_INLINE int cell_live(const pal_cell_group *group, int block, int lane)

@@ -8,9 +8,6 @@
 #include <math.h>
 #include <string.h>
 
-/* gradients of the trilinear shape functions at the Gauss points */
-typedef double point_gradients[PAL_CELL_GAUSS_POINTS][8][3];
-
 /* ---- tables ---- */
 
 static void make_line(pal_cell_line *line)
@@ -43,24 +40,12 @@ static void make_line(pal_cell_line *line)
     }
 }
 
-static void trilinear_gradients(int n_node, point_gradients g)
-{
-    for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
-        double at[3];
-        pal_cell_gauss_point(p, at);
-        pal_cell_shape(n_node, at, NULL, g[p]);
-    }
-}
-
 /* inverse by cofactors; returns the determinant */
 static double invert3(const double a[9], double inverse[9])
 {
-    double det = pal_det3(a);
-    inverse[0] = (a[4] * a[8] - a[5] * a[7]) / det, inverse[1] = (a[2] * a[7] - a[1] * a[8]) / det;
-    inverse[2] = (a[1] * a[5] - a[2] * a[4]) / det, inverse[3] = (a[5] * a[6] - a[3] * a[8]) / det;
-    inverse[4] = (a[0] * a[8] - a[2] * a[6]) / det, inverse[5] = (a[2] * a[3] - a[0] * a[5]) / det;
-    inverse[6] = (a[3] * a[7] - a[4] * a[6]) / det, inverse[7] = (a[1] * a[6] - a[0] * a[7]) / det;
-    inverse[8] = (a[0] * a[4] - a[1] * a[3]) / det;
+    double cofactor[9], det = pal_det3(a);
+    pal_cofactor3(a, cofactor);
+    for (int i = 0; i < 9; i++) inverse[i] = cofactor[i % 3 * 3 + i / 3] / det;
     return det;
 }
 
@@ -97,27 +82,18 @@ static int element_of(const pal_cell_group *g, int block, int lane)
     return e < g->n ? e : g->n - 1;
 }
 
-/* sqrt(dV) J^-1 at the points and the volume of a cubic element */
-static double take_points(const double *x, const int32_t *node, double (*g)[PAL_CELL_MAX_NODES][3], float *scale)
+/* volume of an element; scale: sqrt(dV) J^-1 at the points of a cubic one */
+static double take_points(const double *x, const int32_t *node, int n_node, pal_cell_shapes *shapes, float *scale)
 {
     double volume = 0;
     for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
-        double at[3], J[9], inverse[9], weight = pal_cell_gauss_point(p, at);
-        double dv = weight * pal_subdivision_solid_jacobian(x, node, PAL_CUBIC_NODES, g[p], J);
+        double J[9], inverse[9];
+        double dv = shapes->weight[p] * pal_subdivision_solid_jacobian(x, node, n_node, shapes->g[p], J);
+        volume += dv;
+        if (!scale) continue;
         invert3(J, inverse);
         double root = sqrt(dv);
         for (int i = 0; i < 9; i++) scale[(size_t)(9 * p + i) * PAL_LANES] = (float)(root * inverse[i]);
-        volume += dv;
-    }
-    return volume;
-}
-
-static double trilinear_volume(const double *x, const int32_t *node, int n_node, point_gradients g)
-{
-    double volume = 0;
-    for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
-        double at[3], J[9], weight = pal_cell_gauss_point(p, at);
-        volume += weight * pal_subdivision_solid_jacobian(x, node, n_node, g[p], J);
     }
     return volume;
 }
@@ -143,32 +119,22 @@ static bool take_lane(const pal_subdivision_solid *solid, pal_cell_kind kind, pa
 static pal_err make_group(const pal_subdivision_solid *solid, pal_cell_kind kind, pal_arena *arena, pal_cell_group *g,
                           pal_diagnostic *diag)
 {
-    double middle[3] = {0.5, 0.5, 0.5}, shape[PAL_CELL_GAUSS_POINTS][PAL_CELL_MAX_NODES][3];
-    point_gradients trilinear;
+    double middle[3] = {0.5, 0.5, 0.5};
+    pal_cell_shapes shapes;
     g->n_node = pal_cell_kind_nodes(kind), g->n = solid->elements.n[kind];
     g->n_block = (g->n + PAL_LANES - 1) / PAL_LANES;
     if (g->n == 0) return PAL_ERR_OK;
     PAL_TRY(allocate(g, arena));
     pal_cell_shape(g->n_node, middle, NULL, g->middle);
-    if (kind != PAL_CELL_CUBIC) trilinear_gradients(g->n_node, trilinear);
-    for (int p = 0; p < PAL_CELL_GAUSS_POINTS && kind == PAL_CELL_CUBIC; p++) {
-        double at[3];
-        pal_cell_gauss_point(p, at);
-        pal_cell_shape(g->n_node, at, NULL, shape[p]);
+    pal_cell_shapes_fill(kind, &shapes);
+    for (int i = 0; i < g->n_block * PAL_LANES; i++) {
+        const int b = i / PAL_LANES, l = i % PAL_LANES, e = element_of(g, b, l);
+        if (!take_lane(solid, kind, g, b, l))
+            return PAL_REFUSE(diag, "cell %d of the subdivided solid is folded over in its middle",
+                              solid->elements.cell[kind][e]);
+        g->volume[i] = take_points(solid->node_rest, pal_subdivision_solid_nodes(solid, kind, e), g->n_node, &shapes,
+                                   g->scale ? g->scale + (size_t)b * 64 * 9 * PAL_LANES + l : NULL);
     }
-    for (int b = 0; b < g->n_block; b++)
-        for (int l = 0; l < PAL_LANES; l++) {
-            int e = element_of(g, b, l);
-            const int32_t *node = pal_subdivision_solid_nodes(solid, kind, e);
-            if (!take_lane(solid, kind, g, b, l))
-                return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                          "cell %d of the subdivided solid is folded over in its middle",
-                                          solid->elements.cell[kind][e]);
-            g->volume[b * PAL_LANES + l] =
-                kind == PAL_CELL_CUBIC
-                    ? take_points(solid->node_rest, node, shape, g->scale + (size_t)b * 64 * 9 * PAL_LANES + l)
-                    : trilinear_volume(solid->node_rest, node, g->n_node, trilinear);
-        }
     return PAL_ERR_OK;
 }
 
@@ -176,13 +142,12 @@ static pal_err make_group(const pal_subdivision_solid *solid, pal_cell_kind kind
 
 /* Lame constants of the lanes of half a block at a point; of what is not shared with the control cell (cell_volume.c)
  */
-static void lame_lanes(const pal_material_samples *s, const pal_cell_group *g, bool shared, int block, int lane,
-                       int point, pal_wide *mu, pal_wide *lambda)
+static void lame_lanes(const pal_subdivision_solid *solid, pal_cell_kind kind, const pal_cell_group *g, bool shared,
+                       int block, int lane, int point, pal_wide *mu, pal_wide *lambda)
 {
     for (int l = 0; l < PAL_WIDE; l++) {
-        size_t at = (size_t)element_of(g, block, lane + l) * PAL_CELL_GAUSS_POINTS + (size_t)point;
         double m, la;
-        pal_lame((double)s->young_Pa[at], fmin((double)s->poisson[at], 0.4999), &m, &la);
+        pal_cell_lame(solid, kind, element_of(g, block, lane + l), point, &m, &la);
         (*mu)[l] = m, (*lambda)[l] = shared ? pal_cell_own_lambda(m, la) : la;
     }
 }
@@ -194,7 +159,7 @@ static void fill_cubic(const pal_subdivision_solid *solid, bool shared, pal_cell
             for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
                 float *to = g->stiff + ((size_t)b * PAL_CELL_GAUSS_POINTS + (size_t)p) * 2 * PAL_LANES + l;
                 pal_wide mu, lambda;
-                lame_lanes(&solid->samples[PAL_CELL_CUBIC], g, shared, b, l, p, &mu, &lambda);
+                lame_lanes(solid, PAL_CELL_CUBIC, g, shared, b, l, p, &mu, &lambda);
                 cell_store_float(to, mu), cell_store_float(to + PAL_LANES, lambda);
             }
 }
@@ -209,13 +174,7 @@ static inline pal_wide rest_gradients(const double *rest, int n_node, double (*d
             pal_wide x = pal_wide_load(rest + (3 * m + i) * PAL_LANES);
             for (int j = 0; j < 3; j++) J[3 * i + j] += x * dn[m][j];
         }
-    /* cofactors: J^-T = c / det */
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            int a = (i + 1) % 3, b = (i + 2) % 3, p = (j + 1) % 3, q = (j + 2) % 3;
-            c[3 * i + j] = J[3 * a + p] * J[3 * b + q] - J[3 * a + q] * J[3 * b + p];
-        }
-    pal_wide det = J[0] * c[0] + J[1] * c[1] + J[2] * c[2];
+    pal_wide det = pal_wide_cofactors(J, c); /* J^-T = c / det */
     for (int m = 1; m < n_node; m++)
         for (int i = 0; i < 3; i++)
             g[m][i] = (c[3 * i] * dn[m][0] + c[3 * i + 1] * dn[m][1] + c[3 * i + 2] * dn[m][2]) / det;
@@ -225,8 +184,8 @@ static inline pal_wide rest_gradients(const double *rest, int n_node, double (*d
 /* K_ab = int mu (g_b g_a' + g_a.g_b I - 2/3 g_a g_b') dV + k_a k_b' / int kappa dV, k_a = int kappa g_a dV, kappa =
  * lambda + 2/3 mu, of half a block: the mean dilatation (B-bar; Hughes 1980), which locks less as nu goes to 1/2. Not
  * `mean`: K of paper A section 3.2, int B' C B dV */
-static void fill_half(const pal_subdivision_solid *solid, pal_cell_kind kind, pal_cell_group *group, point_gradients dn,
-                      bool mean, bool shared, int block, int lane)
+static void fill_half(const pal_subdivision_solid *solid, pal_cell_kind kind, pal_cell_group *group,
+                      pal_cell_shapes *shapes, bool mean, bool shared, int block, int lane)
 {
     const int n_node = group->n_node, n_pair = pal_cell_pairs(n_node);
     const double *rest = group->rest + (size_t)block * (size_t)n_node * 3 * PAL_LANES + lane;
@@ -235,16 +194,14 @@ static void fill_half(const pal_subdivision_solid *solid, pal_cell_kind kind, pa
     for (int i = 0; i < 9 * n_pair; i++) k[i / 9][i % 9] = (pal_wide){0};
     for (int i = 0; i < 3 * n_node; i++) swell[i / 3][i % 3] = (pal_wide){0};
     for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
-        double at[3], weight = pal_cell_gauss_point(p, at);
-        pal_wide volume = rest_gradients(rest, n_node, dn[p], weight, g);
-        lame_lanes(&solid->samples[kind], group, shared, block, lane, p, &mu, &lambda);
+        pal_wide volume = rest_gradients(rest, n_node, shapes->g[p], shapes->weight[p], g);
+        lame_lanes(solid, kind, group, shared, block, lane, p, &mu, &lambda);
         mu *= volume;
-        pal_wide kappa = lambda * volume + mu * (2.0 / 3), external_force = mean ? mu * (-2.0 / 3) : lambda * volume;
+        pal_wide kappa = lambda * volume + mu * (2.0 / 3), outer = mean ? mu * (-2.0 / 3) : lambda * volume;
         all += kappa;
         for (int a = 1, pair = 0; a < n_node; a++) {
             pal_wide m[3], la[3];
-            for (int i = 0; i < 3; i++)
-                m[i] = mu * g[a][i], la[i] = external_force * g[a][i], swell[a][i] += kappa * g[a][i];
+            for (int i = 0; i < 3; i++) m[i] = mu * g[a][i], la[i] = outer * g[a][i], swell[a][i] += kappa * g[a][i];
             for (int b = 1; b <= a; b++, pair++) {
                 pal_wide dot = m[0] * g[b][0] + m[1] * g[b][1] + m[2] * g[b][2];
                 for (int i = 0; i < 3; i++)
@@ -265,10 +222,10 @@ static void fill_half(const pal_subdivision_solid *solid, pal_cell_kind kind, pa
 static void fill_stored(const pal_subdivision_solid *solid, pal_cell_kind kind, pal_cell_group *group, bool mean,
                         bool shared)
 {
-    point_gradients dn;
-    trilinear_gradients(group->n_node, dn);
+    pal_cell_shapes shapes;
+    pal_cell_shapes_fill(kind, &shapes);
     for (int b = 0; b < group->n_block; b++)
-        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) fill_half(solid, kind, group, dn, mean, shared, b, l);
+        for (int l = 0; l < PAL_LANES; l += PAL_WIDE) fill_half(solid, kind, group, &shapes, mean, shared, b, l);
 }
 
 void pal_cells_elastic_refresh(pal_cells_elastic *c)

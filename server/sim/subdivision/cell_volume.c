@@ -2,8 +2,9 @@
  *
  * A subdivision solid has few control points for its many elements (125 for 512 in a cube of 4 cells a side). They
  * cannot conserve the volume of each element, and the solid locks: by 8 % for a bent beam of two cells across at nu
- * 0.45. Above nu = 0.3 a part of the bulk modulus therefore acts on the mean over all elements of a control cell, as
- * the mean dilatation of one element does on its points (Hughes 1980), each element's strain in its own frame:
+ * 0.45. Above PAL_LOCK_FREE_POISSON a part of the bulk modulus therefore acts on the mean over all elements of a
+ * control cell, as the mean dilatation of one element does on its points (Hughes 1980), each element's strain in its
+ * own frame:
  *
  *     E_c = 1/2 (sum_e b_e.d^_e)^2 / int kappa dV,   b_e = int kappa grad N dV,   kappa = lambda - min(lambda, mu),
  *
@@ -20,8 +21,13 @@
 #include <math.h>
 #include <string.h>
 
-/* a body with a larger ratio somewhere shares its changes of volume; float, as samples are */
-static const float from_poisson = 0.3f;
+void pal_cell_lame(const pal_subdivision_solid *solid, pal_cell_kind kind, int element, int point, double *mu_Pa,
+                   double *lambda_Pa)
+{
+    const pal_material_samples *s = &solid->samples[kind];
+    const size_t at = (size_t)element * PAL_CELL_GAUSS_POINTS + (size_t)point;
+    pal_lame((double)s->young_Pa[at], fmin((double)s->poisson[at], PAL_POISSON_CLAMP), mu_Pa, lambda_Pa);
+}
 
 static bool asked(const pal_cells_elastic *c)
 {
@@ -29,7 +35,7 @@ static bool asked(const pal_cells_elastic *c)
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
         for (size_t i = 0; i < (size_t)c->solid->elements.n[kind] * PAL_CELL_GAUSS_POINTS; i++)
             max = fmaxf(max, c->solid->samples[kind].poisson[i]);
-    return c->op == PAL_CELL_POLAR && max > from_poisson;
+    return c->op == PAL_CELL_POLAR && max > (float)PAL_LOCK_FREE_POISSON;
 }
 
 static int32_t home_of(const pal_subdivision_solid *solid, pal_cell_kind kind, int element)
@@ -42,29 +48,27 @@ static pal_err couple(pal_cells_elastic *c, pal_arena *arena)
 {
     const pal_subdivision_solid *solid = c->solid;
     const int n = c->volume.n;
-    int32_t *count = PAL_NEW(arena, int32_t, n), *node;
-    int max = 1;
+    int32_t *count = PAL_NEW(arena, int32_t, n), *node = NULL;
+    size_t max = 1;
     if (!count) return PAL_ERR_MEMORY;
-    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
-        for (int e = 0; e < solid->elements.n[kind]; e++) {
-            int32_t *to = &count[home_of(solid, kind, e)];
-            *to += pal_cell_kind_nodes(kind);
-            max = *to > max ? *to : max;
-        }
-    node = PAL_NEW(arena, int32_t, (size_t)n * (size_t)max);
-    if (!node) return PAL_ERR_MEMORY;
-    memset(count, 0, sizeof *count * (size_t)n);
-    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
-        for (int e = 0; e < solid->elements.n[kind]; e++) {
-            const int32_t home = home_of(solid, kind, e);
-            const int n_node = pal_cell_kind_nodes(kind);
-            memcpy(node + (size_t)home * (size_t)max + count[home], pal_subdivision_solid_nodes(solid, kind, e),
-                   sizeof *node * (size_t)n_node);
-            count[home] += n_node;
-        }
+    /* once to count, once to fill */
+    for (int pass = 0; pass < 2; pass++) {
+        memset(count, 0, sizeof *count * (size_t)n);
+        for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
+            for (int e = 0; e < solid->elements.n[kind]; e++) {
+                const int32_t home = home_of(solid, kind, e);
+                const int n_node = pal_cell_kind_nodes(kind);
+                if (pass)
+                    memcpy(node + (size_t)home * max + count[home], pal_subdivision_solid_nodes(solid, kind, e),
+                           sizeof *node * (size_t)n_node);
+                count[home] += n_node;
+                if ((size_t)count[home] > max) max = (size_t)count[home];
+            }
+        if (pass == 0 && !(node = PAL_NEW(arena, int32_t, (size_t)n * max))) return PAL_ERR_MEMORY;
+    }
     for (int i = 0; i < n; i++)
-        for (int k = count[i]; k < max; k++) node[(size_t)i * (size_t)max + (size_t)k] = node[(size_t)i * (size_t)max];
-    c->volume.couple = (pal_cliques){.n_item = n, .n_corner = max, .node = node};
+        for (size_t k = (size_t)count[i]; k < max; k++) node[(size_t)i * max + k] = node[(size_t)i * max];
+    c->volume.couple = (pal_cliques){.n_item = n, .n_corner = (int)max, .node = node};
     return PAL_ERR_OK;
 }
 
@@ -94,25 +98,24 @@ pal_err pal_cell_volume_make(pal_cells_elastic *c, pal_arena *arena)
 }
 
 /* b of one element; returns int kappa dV */
-static double swell_of(const pal_subdivision_solid *solid, pal_cell_kind kind, int element,
-                       double (*dn)[PAL_CELL_MAX_NODES][3], double b[PAL_CELL_MAX_NODES][3])
+static double swell_of(const pal_subdivision_solid *solid, pal_cell_kind kind, int element, pal_cell_shapes *shapes,
+                       double b[PAL_CELL_MAX_NODES][3])
 {
     const int32_t *node = pal_subdivision_solid_nodes(solid, kind, element);
     const int n_node = pal_cell_kind_nodes(kind);
-    const size_t first = (size_t)element * PAL_CELL_GAUSS_POINTS;
+    const double *volume_m3 = solid->samples[kind].volume_m3 + (size_t)element * PAL_CELL_GAUSS_POINTS;
     double all = 0;
     memset(b, 0, sizeof *b * PAL_CELL_MAX_NODES);
-    for (size_t p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
-        const pal_material_samples *s = &solid->samples[kind];
+    for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
         double J[9], cofactor[9], mu, lambda;
-        const double det = pal_subdivision_solid_jacobian(solid->node_rest, node, n_node, dn[p], J);
+        const double det = pal_subdivision_solid_jacobian(solid->node_rest, node, n_node, shapes->g[p], J);
         pal_cofactor3(J, cofactor);
-        pal_lame((double)s->young_Pa[first + p], fmin((double)s->poisson[first + p], PAL_POISSON_CLAMP), &mu, &lambda);
-        const double kappa_J = (lambda - pal_cell_own_lambda(mu, lambda)) * s->volume_m3[first + p];
+        pal_cell_lame(solid, kind, element, p, &mu, &lambda);
+        const double kappa_J = (lambda - pal_cell_own_lambda(mu, lambda)) * volume_m3[p];
         all += kappa_J;
         /* J^-T = cofactor / det */
         for (int m = 0; m < n_node; m++)
-            for (int i = 0; i < 3; i++) b[m][i] += kappa_J / det * pal_dot3(cofactor + 3 * i, dn[p][m]);
+            for (int i = 0; i < 3; i++) b[m][i] += kappa_J / det * pal_dot3(cofactor + 3 * i, shapes->g[p][m]);
     }
     return all;
 }
@@ -123,14 +126,11 @@ void pal_cell_volume_refresh(pal_cells_elastic *c)
     memset(c->volume.share, 0, sizeof(double) * (size_t)c->volume.n);
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
         const pal_cell_group *g = &c->group[kind];
-        double dn[PAL_CELL_GAUSS_POINTS][PAL_CELL_MAX_NODES][3], b[PAL_CELL_MAX_NODES][3];
-        for (int p = 0; p < PAL_CELL_GAUSS_POINTS && g->n > 0; p++) {
-            double at[3];
-            pal_cell_gauss_point(p, at);
-            pal_cell_shape(g->n_node, at, NULL, dn[p]);
-        }
+        pal_cell_shapes shapes;
+        double b[PAL_CELL_MAX_NODES][3];
+        pal_cell_shapes_fill(kind, &shapes);
         for (int i = 0; i < g->n_block * PAL_LANES; i++) {
-            const double all = swell_of(c->solid, kind, i < g->n ? i : g->n - 1, dn, b);
+            const double all = swell_of(c->solid, kind, i < g->n ? i : g->n - 1, &shapes, b);
             double *to = g->swell + (size_t)(i / PAL_LANES) * (size_t)g->n_node * 3 * PAL_LANES + i % PAL_LANES;
             for (int k = 0; k < 3 * g->n_node; k++) to[(size_t)k * PAL_LANES] = b[k / 3][k % 3];
             if (i < g->n) c->volume.share[g->home[i]] += all;

@@ -9,8 +9,6 @@
 
 /* beyond so many free points mobility is bounded, not computed: its dense factor takes their number squared */
 enum { FACTOR_MAX = 1000 };
-/* D^-1 M~ with D its diagonal has no eigenvalue below the cube of 1/2 (trilinear), 0.1126 (cubic B-spline) */
-static const double max_hex = 8, max_cubic = 701;
 
 typedef struct mobility {
     int n_free;
@@ -66,12 +64,13 @@ static double inverse_mass_of(const mobility *m, const pal_interpolation *rows, 
     return sum;
 }
 
-/* an upper bound of it, by the diagonal of M~ */
+/* An upper bound of it, by the diagonal D of M~: D^-1 M~ has no eigenvalue below the cube of 1/2 (trilinear) or 0.1126
+ * (cubic B-spline) */
 static double bound_of(const mobility *m, const pal_body *body, int node)
 {
     const pal_interpolation *rows = body->interpolation;
     const pal_mass_operator *mass = body->mass_operator;
-    double sum = 0, max = body->model.solid->subdivision.n_level > 0 ? max_cubic : max_hex;
+    double sum = 0, max = body->model.solid->subdivision.n_level > 0 ? 701 : 8;
     for (int32_t k = rows->start[node]; k < rows->start[node + 1]; k++) {
         int32_t i = rows->point[k], at = mass->start[i];
         if (m->place && m->place[i] < 0) continue;
@@ -87,8 +86,8 @@ static void find_mobility(pal_body *body)
     for (int i = 0; i < body->n_dof && m.place; i++) m.place[i] = body->support[i] ? -1 : m.n_free++;
     m.y = malloc(sizeof *m.y * (size_t)m.n_free + 1);
     bool found = m.place && m.y && factorise(body->mass_operator, &m);
-    for (int i = 0; i < body->surface->n_vertex; i++) {
-        int node = body->shown_node[i];
+    for (int i = 0; i < body->display.surface->n_vertex; i++) {
+        int node = body->display.shown_node[i];
         body->node_inverse_mass_1_kg[node] =
             found ? inverse_mass_of(&m, body->interpolation, node) : bound_of(&m, body, node);
     }

@@ -26,8 +26,8 @@ static void fill_table(kind_table *t, pal_cell_kind kind)
 }
 
 /* mass at the Gauss points of an element, kg, and damping there, kg/s */
-static void weigh(const pal_subdivision_solid *solid, pal_cell_kind kind, int element,
-                  double mass[PAL_CELL_GAUSS_POINTS], double damping[PAL_CELL_GAUSS_POINTS])
+static void sample_masses(const pal_subdivision_solid *solid, pal_cell_kind kind, int element,
+                          double mass[PAL_CELL_GAUSS_POINTS], double damping[PAL_CELL_GAUSS_POINTS])
 {
     const pal_material_samples *s = &solid->samples[kind];
     const size_t first = (size_t)element * PAL_CELL_GAUSS_POINTS;
@@ -54,7 +54,7 @@ static int gather_points(const pal_subdivision_solid *solid, pal_cell_kind kind,
     return n;
 }
 
-static void forget_points(int n, const int32_t *list, int32_t *local)
+static void clear_local(int n, const int32_t *list, int32_t *local)
 {
     for (int i = 0; i < n; i++) local[list[i]] = -1;
 }
@@ -69,16 +69,16 @@ typedef struct element_points {
 
 static pal_err list_points(const pal_subdivision_solid *solid, int32_t *list, int32_t *local, element_points *out)
 {
-    int64_t room = 0;
+    int64_t capacity = 0;
     out->start = calloc((size_t)pal_cell_elements_count(&solid->elements) + 1, sizeof *out->start);
     if (!out->start) return PAL_ERR_MEMORY;
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
         for (int e = 0; e < solid->elements.n[kind]; e++) {
             int n = gather_points(solid, kind, e, list, local);
-            forget_points(n, list, local);
-            if (out->n_finest + n > room) {
-                room = 2 * (out->n_finest + n);
-                int32_t *point = realloc(out->point, (size_t)room * sizeof *point);
+            clear_local(n, list, local);
+            if (out->n_finest + n > capacity) {
+                capacity = 2 * (out->n_finest + n);
+                int32_t *point = realloc(out->point, (size_t)capacity * sizeof *point);
                 if (!point) return PAL_ERR_MEMORY;
                 out->point = point;
             }
@@ -96,13 +96,13 @@ static int ascending(const void *a, const void *b)
 }
 
 /* elements of every point: element[start[i]] .. element[start[i + 1] - 1] */
-static void turn_round(const element_points *from, int n_point, int64_t *start, int32_t *element)
+static void invert_lists(const element_points *from, int n_point, int64_t *start, int32_t *element)
 {
     for (int64_t k = 0; k < from->n_finest; k++) start[from->point[k] + 1]++;
     for (int i = 0; i < n_point; i++) start[i + 1] += start[i];
     for (int e = from->n_element; e-- > 0;)
         for (int64_t k = from->start[e]; k < from->start[e + 1]; k++) element[--start[from->point[k] + 1]] = e;
-    /* every start has moved to that of its own row, which stands one place too far */
+    /* every start has moved to that of its own row, which is one entry too far */
     for (int i = 0; i < n_point; i++) start[i] = start[i + 1];
     start[n_point] = from->n_finest;
 }
@@ -117,7 +117,7 @@ static int couple(const element_points *of, const int64_t *start, const int32_t 
             int32_t point = of->point[k];
             if (local[point] < 0) local[point] = n, list[n++] = point;
         }
-    forget_points(n, list, local);
+    clear_local(n, list, local);
     qsort(list, (size_t)n, sizeof *list, ascending);
     return n;
 }
@@ -128,7 +128,7 @@ static pal_err make_pattern(const element_points *of, int32_t *list, pal_arena *
     int64_t *start = calloc((size_t)n_point + 2, sizeof *start), n_entry = 0;
     int32_t *element = malloc((size_t)of->n_finest * sizeof *element + 1);
     pal_err err = start && element ? PAL_ERR_OK : PAL_ERR_MEMORY;
-    if (!err) turn_round(of, n_point, start, element);
+    if (!err) invert_lists(of, n_point, start, element);
     for (int i = 0; i < n_point && !err; i++) n_entry += couple(of, start, element, i, list, out->local);
     if (n_entry > INT32_MAX) err = PAL_ERR_MEMORY;
     out->n_entry = err ? 0 : (int)n_entry;
@@ -250,14 +250,14 @@ void pal_subdivision_mass_fill(const pal_subdivision_solid *solid, pal_mass_oper
         for (int e = 0; e < solid->elements.n[kind]; e++) {
             double at[PAL_CELL_GAUSS_POINTS], damping[PAL_CELL_GAUSS_POINTS];
             int n = find_shapes(solid, &table, kind, e, mass);
-            weigh(solid, kind, e, at, damping);
+            sample_masses(solid, kind, e, at, damping);
             scale_shapes(mass, n, at, NULL);
             add_products(mass, n, mass->mass_kg);
             if (mass->damping_kg_s) {
                 scale_shapes(mass, n, damping, at);
                 add_products(mass, n, mass->damping_kg_s);
             }
-            forget_points(n, mass->element_point, mass->local);
+            clear_local(n, mass->element_point, mass->local);
         }
     }
     mirror(mass, mass->mass_kg);
@@ -275,7 +275,7 @@ void pal_subdivision_mass_lump(const pal_subdivision_solid *solid, double *point
         for (int e = 0; e < solid->elements.n[kind]; e++) {
             const int32_t *node = pal_subdivision_solid_nodes(solid, kind, e);
             double at[PAL_CELL_GAUSS_POINTS], damping[PAL_CELL_GAUSS_POINTS];
-            weigh(solid, kind, e, at, damping);
+            sample_masses(solid, kind, e, at, damping);
             for (int m = 0; m < table.n_node; m++) {
                 double kg = pal_dot_product(PAL_CELL_GAUSS_POINTS, table.n[m], at);
                 if (node_kg) node_kg[node[m]] += kg;

@@ -19,13 +19,7 @@ double pal_subdivision_solid_jacobian(const double *x, const int32_t *node, int 
     return a[0] * (a[4] * a[8] - a[5] * a[7]) - a[1] * (a[3] * a[8] - a[5] * a[6]) + a[2] * (a[3] * a[7] - a[4] * a[6]);
 }
 
-/* shape functions of a kind at the 64 points */
-typedef struct shapes {
-    double n[PAL_CELL_GAUSS_POINTS][PAL_CELL_MAX_NODES], g[PAL_CELL_GAUSS_POINTS][PAL_CELL_MAX_NODES][3];
-    double weight[PAL_CELL_GAUSS_POINTS];
-} shapes;
-
-static void find_shapes(pal_cell_kind kind, shapes *out)
+void pal_cell_shapes_fill(pal_cell_kind kind, pal_cell_shapes *out)
 {
     for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
         double at[3];
@@ -50,8 +44,8 @@ static void sample_kind(pal_subdivision_solid *s, pal_cell_kind kind, const pal_
     const int n_node = pal_cell_kind_nodes(kind);
     const bool varies = def->n_region > 0 || def->n_stroke > 0;
     size_t i = 0;
-    shapes f;
-    find_shapes(kind, &f);
+    pal_cell_shapes f;
+    pal_cell_shapes_fill(kind, &f);
     for (int e = 0; e < s->elements.n[kind]; e++) {
         const int32_t *node = pal_subdivision_solid_nodes(s, kind, e);
         for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++, i++) {
@@ -77,10 +71,10 @@ void pal_subdivision_solid_sample(pal_subdivision_solid *solid, const pal_body_d
  * apex, but at every point */
 static int32_t find_volumes(pal_subdivision_solid *s, double *folded_m3)
 {
-    shapes f;
+    pal_cell_shapes f;
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
         double *volume = s->samples[kind].volume_m3;
-        find_shapes(kind, &f);
+        pal_cell_shapes_fill(kind, &f);
         for (int e = 0; e < s->elements.n[kind]; e++) {
             const int32_t *node = pal_subdivision_solid_nodes(s, kind, e);
             for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++, volume++) {
@@ -102,17 +96,6 @@ double pal_subdivision_solid_volume_m3(const pal_subdivision_solid *solid)
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++)
         for (size_t i = 0; i < (size_t)solid->elements.n[kind] * PAL_CELL_GAUSS_POINTS; i++)
             sum += solid->samples[kind].volume_m3[i];
-    return sum;
-}
-
-double pal_subdivision_solid_mass_kg(const pal_subdivision_solid *solid)
-{
-    double sum = 0;
-    for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
-        const pal_material_samples *s = &solid->samples[kind];
-        for (size_t i = 0; i < (size_t)solid->elements.n[kind] * PAL_CELL_GAUSS_POINTS; i++)
-            sum += s->volume_m3[i] * (double)s->density_kg_m3[i];
-    }
     return sum;
 }
 
@@ -146,11 +129,10 @@ static pal_err make(const pal_body_def *def, const pal_subdivision_options *opti
     double folded_m3 = 0;
     int32_t folded = find_volumes(s, &folded_m3);
     if (folded >= 0)
-        return pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED,
-            "control cell %d: its part %d is folded over after %d levels (a point of it has volume %g "
-            "m^3)",
-            s->subdivision.cell_origin[folded], folded, options->n_level, folded_m3);
+        return PAL_REFUSE(diag,
+                          "control cell %d: its part %d is folded over after %d levels (a point of it has volume %g "
+                          "m^3)",
+                          s->subdivision.cell_origin[folded], folded, options->n_level, folded_m3);
     pal_subdivision_solid_sample(s, def);
     return PAL_ERR_OK;
 }

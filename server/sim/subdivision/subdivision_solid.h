@@ -4,7 +4,7 @@
  *
  * Nodes are the vertices of the subdivided cells, then the virtual nodes in the middle of cells that are no hexahedra.
  * A cubic element's nodes are control points of its spline: its material passes near them, not through them.
- * One heap object per body (pal_body.solid), made by the model, freed with the world. Rest shape and material are
+ * One heap object per body (pal_body.model.solid), made by the model, freed with the world. Rest shape and material are
  * constant between edits. Thread: make, sample [load]; reading [sim]. */
 #ifndef PAL_SIM_SUBDIVISION_SUBDIVISION_SOLID_H
 #define PAL_SIM_SUBDIVISION_SUBDIVISION_SOLID_H
@@ -31,6 +31,14 @@ typedef struct pal_subdivision_solid {
     size_t n_byte;    /* memory of all arrays, about */
 } pal_subdivision_solid;
 
+/* shape functions of the nodes of one kind of element and their gradients at the Gauss points, and the points' weights
+ */
+typedef struct pal_cell_shapes {
+    double n[PAL_CELL_GAUSS_POINTS][PAL_CELL_MAX_NODES], g[PAL_CELL_GAUSS_POINTS][PAL_CELL_MAX_NODES][3];
+    double weight[PAL_CELL_GAUSS_POINTS];
+} pal_cell_shapes;
+void pal_cell_shapes_fill(pal_cell_kind kind, pal_cell_shapes *out);
+
 /* Subdivides, chooses elements, takes the samples. REFUSED as pal_subdivision_make and pal_cell_elements_make do, or an
  * element that is folded over at a Gauss point (det J <= 0), with its cell; BUDGET, MEMORY */
 pal_err pal_subdivision_solid_make(const pal_body_def *def, const pal_subdivision_options *options,
@@ -48,7 +56,6 @@ static inline const int32_t *pal_subdivision_solid_nodes(const pal_subdivision_s
 /* d(x, y, z)/d(u, v, w) of an element with nodes at x, row-major J[3 a + b] = dx_a/du_b, from gradients of
  * pal_cell_shape; returns its determinant */
 double pal_subdivision_solid_jacobian(const double *x, const int32_t *node, int n_node, double (*g)[3], double J[9]);
-/* volume at rest by quadrature, m^3, and mass, kg */
+/* volume at rest by quadrature, m^3 */
 double pal_subdivision_solid_volume_m3(const pal_subdivision_solid *solid);
-double pal_subdivision_solid_mass_kg(const pal_subdivision_solid *solid);
 #endif

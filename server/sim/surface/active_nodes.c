@@ -1,8 +1,6 @@
 /* Packing of a body's active dofs, and FORCE components on them. */
 #include "server/sim/surface/active_nodes.h"
 
-#include "server/base/clock.h"
-
 pal_err pal_active_nodes_make(pal_body *body, pal_arena *arena)
 {
     if (body->active_nodes) return PAL_ERR_OK;
@@ -35,21 +33,6 @@ bool pal_active_nodes_complete(const pal_step *step)
         if (!effect->compute_forces && !(step->drag_separate && effect->drag)) return false;
     }
     return !step->body->interpolation;
-}
-
-pal_err pal_active_nodes_assemble(pal_step *step)
-{
-    uint64_t before = pal_clock_ns();
-    for (int i = 0; i < step->n_force; i++) {
-        pal_component *row = &step->force[i];
-        if (step->drag_separate && row->effect->drag) continue;
-        row->n_run++;
-        PAL_TRY(row->effect->compute_forces(row->self, step));
-        uint64_t now = pal_clock_ns();
-        row->spent_ns += now - before;
-        before = now;
-    }
-    return PAL_ERR_OK;
 }
 
 pal_err pal_active_nodes_run(void *self, pal_step *step, pal_err (*pull)(void *self, pal_step *step))

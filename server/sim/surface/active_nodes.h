@@ -29,10 +29,8 @@ PAL_INLINE pal_v8 pal_v8_join(pal_quad first, pal_quad second)
 pal_err pal_active_nodes_make(pal_body *body, pal_arena *arena);
 /* xv and rest from the body's x, v, x_rest and mass_kg */
 void pal_active_nodes_load(const pal_body *body);
-/* can pal_active_nodes_assemble run every FORCE component? */
+/* can pal_run_forces run every FORCE component on packed dofs? */
 bool pal_active_nodes_complete(const pal_step *step);
-/* compute_forces of every FORCE component, without drag when drag_separate. Adds to each component's spent_ns */
-pal_err pal_active_nodes_assemble(pal_step *step);
 /* `run` of a component with compute_forces: packs the body, computes, adds to the body's f */
 pal_err pal_active_nodes_run(void *self, pal_step *step, pal_err (*pull)(void *self, pal_step *step));
 #endif

@@ -18,18 +18,18 @@ typedef struct walk {
     bool changed;
 } walk;
 
-static void write_place(pal_adaptive_surface *s, int32_t place, const int32_t tri[3])
+static void write_slot(pal_adaptive_surface *s, int32_t slot, const int32_t tri[3])
 {
-    int32_t *at = s->slot + 3 * (size_t)place;
+    int32_t *at = s->slot + 3 * (size_t)slot;
     if (at[0] == tri[0] && at[1] == tri[1] && at[2] == tri[2]) return;
     memcpy(at, tri, 3 * sizeof *at);
-    s->log[s->n_log++ % (uint64_t)s->n_log_room] = place;
+    s->log[s->n_log++ % (uint64_t)s->n_log_room] = slot;
 }
 
 void pal_adaptive_clear_slots(pal_adaptive_surface *s, int32_t first, int32_t n)
 {
     static const int32_t none[3];
-    for (int32_t k = 0; k < n; k++) write_place(s, first + k, none);
+    for (int32_t k = 0; k < n; k++) write_slot(s, first + k, none);
 }
 
 int pal_adaptive_triangles(const pal_adaptive_surface *s, int32_t leaf, int32_t tri[4][3])
@@ -97,12 +97,12 @@ static void add_springs(walk *w, int32_t f, int level)
 
 static void add_triangles(pal_adaptive_surface *s, int32_t f, int level)
 {
-    /* a leaf has as many places as it can have triangles, so all of them fit into the list */
+    /* a leaf has as many slots as it can have triangles, so all of them fit into the list */
     int32_t(*tri)[3] = (int32_t(*)[3])(s->tri + 3 * (size_t)s->n_tri);
     int n = pal_adaptive_triangles(s, f, tri), up = 2 * (s->levels.n_level - 1 - level);
     int32_t first = (f - s->levels.first_face[level]) << up;
     s->n_tri += n;
-    for (int k = 0; k < n; k++) write_place(s, first + k, tri[k]);
+    for (int k = 0; k < n; k++) write_slot(s, first + k, tri[k]);
     if (up) pal_adaptive_clear_slots(s, first + n, 4 - n);
 }
 
@@ -224,6 +224,6 @@ bool pal_adaptive_update(pal_adaptive_surface *s, pal_body *body)
     pal_adaptive_fill_dofs(s, body);
     if (!w.changed && n_leaf == s->n_leaf) return false;
     s->revision++;
-    body->revision++;
+    body->display.revision++;
     return true;
 }

@@ -11,16 +11,11 @@
 #include "server/sim/surface/adaptive_surface.h"
 
 #include "server/base/vec3.h"
+#include "server/sim/surface/tuning.h"
 
 #include <math.h>
 #include <string.h>
 
-#define BUDGET ((size_t)512 << 20)
-#define MEBI   1048576.0
-/* a finest vertex takes more than this in components (edge_spring, rk4) and display, whatever the body */
-#define ROW_BYTE 400
-#define LOG_MIN  1024
-#define LOG_MAX  65536
 /* a face of level l asks for two of level l - 1 at most, and level 0 for none */
 enum { CHAIN = 1 << (PAL_LEVELS_MAX - 1), FRESH = 3 * CHAIN };
 
@@ -119,7 +114,7 @@ static pal_err make_body(pal_adaptive_surface *s, pal_body *body, pal_arena *are
     s->surface = (pal_surface){.n_vertex = (int)n, .x = s->levels.x, .tri = s->tri};
     pal_copy3(s->surface.origin_m, l->origin_m);
     body->model.adaptive = s;
-    body->surface = &s->surface;
+    body->display.surface = &s->surface;
     body->active = s->node;
     body->edge_m = mean_edge(l, s->options.start_level);
     return PAL_ERR_OK;
@@ -131,19 +126,19 @@ static pal_err refuse_bytes(int n_level, const char *what, size_t n_byte, size_t
         diag, PAL_ERR_BUDGET,
         "adaptive surface: %d levels need %s%.4g MiB, the budget is %.4g MiB: ask for fewer levels or a coarser "
         "surface",
-        n_level, what, (double)n_byte / MEBI, (double)budget / MEBI);
+        n_level, what, (double)n_byte / (1 << 20), (double)budget / (1 << 20));
 }
 
 pal_err pal_adaptive_make(const pal_surface *surface, const pal_adaptive_options *options, pal_body *body,
                           pal_arena *arena, pal_diagnostic *diag, pal_adaptive_surface **out)
 {
     PAL_TRY(check_options(options, diag));
-    size_t budget = options->budget_byte ? options->budget_byte : BUDGET;
+    size_t budget = options->budget_byte ? options->budget_byte : BUDGET_BYTES;
     pal_levels levels = {0};
     PAL_TRY(pal_levels_make(surface, &(pal_levels_options){.n_level = options->n_level, .budget_byte = budget}, &levels,
                             diag));
     room r = room_of(&levels);
-    size_t n_byte = levels.n_byte + state_bytes(&r), min = n_byte + ROW_BYTE * r.vertex;
+    size_t n_byte = levels.n_byte + state_bytes(&r), min = n_byte + COMPONENT_BYTES * r.vertex;
     if (min > budget) {
         pal_levels_free(&levels);
         return refuse_bytes(options->n_level, "at least ", min, budget, diag);
@@ -163,12 +158,6 @@ pal_err pal_adaptive_make(const pal_surface *surface, const pal_adaptive_options
     pal_adaptive_fill_dofs(s, body);
     *out = s;
     return PAL_ERR_OK;
-}
-
-size_t pal_adaptive_node_bytes(const pal_adaptive_surface *adaptive)
-{
-    size_t n = (size_t)adaptive->levels.n_vertex[adaptive->levels.n_level - 1];
-    return (adaptive->n_byte + n - 1) / n;
 }
 
 pal_err pal_adaptive_check_bytes(const pal_adaptive_surface *adaptive, size_t n_byte, pal_diagnostic *diag)
@@ -302,17 +291,17 @@ static void place(const pal_adaptive_surface *s, pal_body *body, int32_t e)
     const double *ra = body->x_rest + 3 * (size_t)end[0], *rb = body->x_rest + 3 * (size_t)end[1];
     const double *va = body->v + 3 * (size_t)end[0], *vb = body->v + 3 * (size_t)end[1];
     double *x = body->x + 3 * (size_t)v, *rest = body->x_rest + 3 * (size_t)v;
-    bool stands = body->support[v] == PAL_FIXED, supported[2] = {body->support[end[0]] > 0, body->support[end[1]] > 0};
-    for (int c = 0; c < 3; c++) body->v[3 * (size_t)v + (size_t)c] = stands ? 0 : 0.5 * va[c] + 0.5 * vb[c];
+    bool at_rest = body->support[v] == PAL_FIXED, supported[2] = {body->support[end[0]] > 0, body->support[end[1]] > 0};
+    for (int c = 0; c < 3; c++) body->v[3 * (size_t)v + (size_t)c] = at_rest ? 0 : 0.5 * va[c] + 0.5 * vb[c];
     /* an edge at rest keeps every bit; a fixed midpoint takes the mean only when both ends are fixed, else the
      * displacement of the fixed end */
-    if (stands && supported[0] != supported[1]) {
+    if (at_rest && supported[0] != supported[1]) {
         for (int c = 0; c < 3; c++) x[c] = rest[c] + (supported[0] ? xa[c] - ra[c] : xb[c] - rb[c]);
         return;
     }
-    if (stands) stands = !supported[0];
-    if (!memcmp(xa, ra, 3 * sizeof *xa) && !memcmp(xb, rb, 3 * sizeof *xb)) stands = true;
-    if (stands) {
+    if (at_rest) at_rest = !supported[0];
+    if (!memcmp(xa, ra, 3 * sizeof *xa) && !memcmp(xb, rb, 3 * sizeof *xb)) at_rest = true;
+    if (at_rest) {
         pal_copy3(x, rest);
         return;
     }
@@ -381,7 +370,7 @@ bool pal_adaptive_join(pal_adaptive_surface *s, pal_body *body, int32_t face)
         retire(body, pal_levels_edge_midpoint(l, e));
         s->n_live--;
     }
-    /* the face writes its own first four places, where the triangles of child 0 stood, with the next lists */
+    /* the face writes its own first four slots, those of child 0, with the next lists */
     for (int k = 1; k < 4 && own >= 4; k++) pal_adaptive_clear_slots(s, pal_adaptive_triangle_slot(s, child + k), 4);
     s->stale = true;
     return true;

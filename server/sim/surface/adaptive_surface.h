@@ -5,20 +5,23 @@
  * its four children leaves, joining undoes it. Two leaves with a common edge differ by at most one level (2:1).
  * Everything else follows from that state alone, so that a state that returns does so bit by bit:
  *
- *   nodes     vertices of level 0 and the midpoints of edges beside a split face. All others stand at x_rest with v, f,
- * load and mass 0 springs   edges of leaves that are not split themselves. Where a face is split and its neighbour is
- * not, the halves of their edge replace it (hanging nodes; paper C fig. 3) masses    by nodes: M_l = M / N_l at a node
- * of level l; at mixed nodes the mean over the levels of its springs (paper C eq. 6, 7). By faces: a leaf of level l
- * has M / F_l, divided among its triangles and their corners. A change of level then moves mass only where it happens,
- * nodes with many springs are heavier (so they ask for no shorter steps), those on an open edge lighter. Both are
- * scaled so that the sum is M to rounding (erratum C5) triangles a leaf is drawn as one triangle, or 2, 3, 4 where 1,
- * 2, 3 of its edges have a hanging node (paper C, types 1 to 4)
+ *   nodes     vertices of level 0 and the midpoints of edges beside a split face. All others are at x_rest with v, f,
+ *             load and mass 0
+ *   springs   edges of leaves that are not split themselves. Where a face is split and its neighbour is not, the
+ *             halves of their edge replace it (hanging nodes; paper C fig. 3)
+ *   masses    by nodes: M_l = M / N_l at a node of level l; at mixed nodes the mean over the levels of its springs
+ *             (paper C eq. 6, 7). By faces: a leaf of level l has M / F_l, divided among its triangles and their
+ *             corners. A change of level then moves mass only where it happens, nodes with many springs are heavier
+ *             (so they ask for no shorter steps), those on an open edge lighter. Both are scaled so that the sum is M
+ *             to rounding (erratum C5)
+ *   triangles a leaf is drawn as one triangle, or 2, 3, 4 where 1, 2, 3 of its edges have a hanging node (paper C,
+ *             types 1 to 4)
  *
  * Laws for the stiffness of springs, relative to the constant k_0 of level 0:
  *   membrane  each face at a spring adds k_0/2; the side of a face one level coarser adds k_0 (its halves replace a
- * spring of twice the length), a hole adds nothing. Any piecewise linear stretch then has the same energy on every
- * mixture of levels: refinement changes neither stiffness nor wave speed (erratum C4) paper     2^l m_l/m_0 for a
- * spring of level l (paper C eq. 8), about 2^-l: a membrane softens by 2 a level
+ *             spring of twice the length), a hole adds nothing. Any piecewise linear stretch then has the same energy
+ *             on every mixture of levels: refinement changes neither stiffness nor wave speed (erratum C4)
+ *   paper     2^l m_l/m_0 for a spring of level l (paper C eq. 8), about 2^-l: a membrane softens by 2 a level
  *
  * Functions that change the state take the body, whose x and v of new nodes they set; pal_adaptive_update follows the
  * last of them, before anything else reads the body. Thread: make [load], the others [sim]; no heap in [sim]. */
@@ -51,7 +54,7 @@ typedef struct pal_adaptive_surface {
 
     uint8_t *face_state; /* pal_face_state                                         [n faces] */
     uint8_t *edge_split; /* split faces beside the edge, 0..2; > 0: its midpoint is a node [n edges] */
-    uint64_t revision;   /* grows with every update that changes something, and body->revision with it */
+    uint64_t revision;   /* grows with every update that changes something, and display.revision with it */
     double level_mass_kg[PAL_LEVELS_MAX];
 
     /* lists of the present state, in an order that depends on the state alone */
@@ -71,9 +74,9 @@ typedef struct pal_adaptive_surface {
      * 4^(L-1-l) slots from pal_adaptive_triangle_slot(s, f) on; empty ones are 0 0 0 */
     int n_slot;          /* finest faces */
     int32_t *slot;       /* [n_slot][3] */
-    int n_tri;           /* the triangles without the empty slots, for body->surface */
+    int n_tri;           /* the triangles without the empty slots, for display.surface */
     int32_t *tri;        /* [n_tri][3] */
-    pal_surface surface; /* n_vertex finest vertices, x at rest, tri; body->surface */
+    pal_surface surface; /* n_vertex finest vertices, x at rest, tri; display.surface */
     /* slots changed so far, the oldest overwritten: entry i of n_log is log[i % n_log_room] */
     uint64_t n_log;
     int n_log_room;
@@ -93,9 +96,7 @@ typedef struct pal_adaptive_surface {
  * [load] */
 pal_err pal_adaptive_make(const pal_surface *surface, const pal_adaptive_options *options, pal_body *body,
                           pal_arena *arena, pal_diagnostic *diag, pal_adaptive_surface **out);
-/* memory of surface and body for each node of the finest level, rounded up, for messages and plan */
-size_t pal_adaptive_node_bytes(const pal_adaptive_surface *adaptive);
-/* does a body that takes n_byte in all keep its budget? BUDGET with both numbers. [load] */
+/* pal_dofs.check_memory */
 pal_err pal_adaptive_check_bytes(const pal_adaptive_surface *adaptive, size_t n_byte, pal_diagnostic *diag);
 
 /* Splits a leaf, after coarser neighbours where 2:1 requires it. Returns the number of faces split: 0 when it is no

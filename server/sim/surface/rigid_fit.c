@@ -7,11 +7,11 @@
 
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
+#include "server/sim/core/rigid_motion.h"
 #include "server/sim/surface/active_nodes.h"
+#include "server/sim/surface/tuning.h"
 
 #include <math.h>
-
-#define SMALL 1e-10 /* of its size at rest: no more than rounding */
 
 typedef struct sums {
     double mass, x[3], v[3]; /* x about the first node     */
@@ -37,17 +37,6 @@ PAL_INLINE void add_node(sums *t, const double from[3], const double c[3], doubl
     t->turn[0] += my * v[2] - mz * v[1], t->turn[1] += mz * v[0] - mx * v[2], t->turn[2] += mx * v[1] - my * v[0];
 }
 
-/* I^-1 L; zero about an axis without inertia (a line, a point) */
-static void spin(const double inertia[9], const double moment[3], double min_kg_m2, double omega[3])
-{
-    double w[3], axis[9];
-    pal_set3(omega, 0, 0, 0);
-    pal_eigen3(inertia, w, axis);
-    for (int k = 0; k < 3; k++)
-        if (w[k] > 1e-9 * w[2] && w[k] > min_kg_m2)
-            pal_axpy3(omega, pal_dot3(axis + 3 * k, moment) / w[k], axis + 3 * k);
-}
-
 static void fit(const pal_adaptive_surface *s, const double from[3], sums t, pal_rigid_fit *frame)
 {
     double *q = frame->quat, length = 0, c[3], moment[3], arm[3], size = 0;
@@ -63,11 +52,10 @@ static void fit(const pal_adaptive_surface *s, const double from[3], sums t, pal
     pal_copy3(frame->rest_centre_m, s->rest_centre_m);
     pal_cross3(arm, c, t.v);
     pal_sub3(moment, t.turn, arm);
-    double xx = t.square[0] - c[0] * t.x[0], yy = t.square[1] - c[1] * t.x[1],
-           zz_estimator = t.square[2] - c[2] * t.x[2];
+    double xx = t.square[0] - c[0] * t.x[0], yy = t.square[1] - c[1] * t.x[1], zz = t.square[2] - c[2] * t.x[2];
     double xy = t.square[3] - c[0] * t.x[1], xz = t.square[4] - c[0] * t.x[2], yz = t.square[5] - c[1] * t.x[2];
-    const double inertia[9] = {yy + zz_estimator, -xy, -xz, -xy, xx + zz_estimator, -yz, -xz, -yz, xx + yy};
-    spin(inertia, moment, SMALL * SMALL * s->rest_kg_m2, frame->Omega_1_s);
+    const double inertia[9] = {yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy};
+    pal_rigid_spin(inertia, moment, SMALL * SMALL * s->rest_kg_m2, frame->Omega_1_s);
 }
 
 void pal_adaptive_fit_rigid(const pal_adaptive_surface *s, const pal_body *body, pal_rigid_fit *frame)

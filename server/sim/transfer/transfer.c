@@ -11,8 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define MAX_ENTRY ((int64_t)1 << 28)
-
 /* a body by its model alone, without rows and supports */
 typedef struct bare {
     pal_arena *arena;
@@ -38,37 +36,26 @@ static pal_err make_bare(const pal_scene *scene, int index, pal_diagnostic *diag
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": there is no model \"%s\"", def->name,
                                   def->model.name);
     out->arena = pal_arena_create(1 << 16, true);
-    pal_recipe *recipe = malloc(sizeof *recipe);
+    pal_component_list *list = malloc(sizeof *list);
     pal_config_entry item = def->model;
     pal_build build = {.scene = scene, .def = def, .body = &out->body, .arena = out->arena, .diag = diag};
     out->body.name = def->name;
-    pal_err err = out->arena && recipe ? model->build(&item, &build, recipe) : PAL_ERR_MEMORY;
-    free(recipe);
+    pal_err err = out->arena && list ? model->build(&item, &build, list) : PAL_ERR_MEMORY;
+    free(list);
     pal_copy3(out->origin_m, def->mesh->tets.n_node > 0 ? def->mesh->tets.origin_m : def->mesh->surface.origin_m);
     return err;
 }
 
-/* ---- elements to look in ---- */
+/* ---- elements that hold points ---- */
 
-static double six_volumes(const double *x, const int32_t *c)
-{
-    double e[3][3], n[3];
-    for (int k = 0; k < 3; k++) pal_sub3(e[k], x + 3 * (size_t)c[k + 1], x + 3 * (size_t)c[0]);
-    pal_cross3(n, e[1], e[2]);
-    return pal_dot3(e[0], n);
-}
-
-/* one more tetrahedron, turned the right way; a flat one holds no point */
+/* one more tetrahedron, of positive volume; a flat one holds no point */
 static void add_tet(bare *b, const int32_t *node, const int corner[4])
 {
     int32_t *c = b->tets.tet + 4 * (size_t)b->tets.n_tet;
     for (int k = 0; k < 4; k++) c[k] = node[corner[k]];
-    double six = six_volumes(b->tets.x, c), h = b->body.edge_m;
+    double six = 6 * pal_tet_volume(b->tets.x, c), h = b->body.edge_m;
     if (!(fabs(six) > 1e-9 * h * h * h)) return;
-    if (six < 0) {
-        int32_t swap = c[2];
-        c[2] = c[3], c[3] = swap;
-    }
+    if (six < 0) c[2] = node[corner[3]], c[3] = node[corner[2]];
     b->tets.n_tet++;
 }
 
@@ -128,7 +115,7 @@ static void hold_near(int n_corner, double local[4])
     for (int k = 0; k < 4; k++) local[k] = 0.25 + share * (local[k] - 0.25);
 }
 
-/* the row of a point that is in no one's rows yet */
+/* adds the row of a point */
 static void add_point(const bare *in, const double x[3], pal_interpolation_builder *rows)
 {
     const pal_body *body = &in->body;
@@ -153,7 +140,7 @@ static void add_point(const bare *in, const double x[3], pal_interpolation_build
 static pal_err make_rows(const bare *of, const bare *in, pal_interpolation *out)
 {
     pal_interpolation_builder rows;
-    pal_interpolation_builder_begin(&rows, of->body.n_node, in->body.n_node, MAX_ENTRY);
+    pal_interpolation_builder_begin(&rows, of->body.n_node, in->body.n_node, INT32_MAX);
     for (int i = 0; i < of->body.n_node && !rows.err; i++) {
         double x[3];
         for (int c = 0; c < 3; c++) x[c] = of->body.node_rest[3 * i + c] + of->origin_m[c] - in->origin_m[c];
@@ -177,16 +164,15 @@ static bool same_surface(const pal_surface *a, const pal_surface *b)
            !memcmp(a->tri, b->tri, 3 * sizeof *a->tri * (size_t)a->n_tri);
 }
 
-static pal_err take_room(pal_transfer *t)
+static pal_err allocate(pal_transfer *t)
 {
-    size_t dof = 3 * (size_t)t->n_dof + 1, to = 3 * (size_t)t->n_to + 1, from = 3 * (size_t)t->n_from + 1;
-    bool all = (t->x = calloc(dof, sizeof(double))) && (t->v = calloc(dof, sizeof(double))) &&
-               (t->place = calloc(to, sizeof(double))) && (t->rate = calloc(to, sizeof(double))) &&
-               (t->pull = calloc(to, sizeof(double))) && (t->bound = calloc(to, sizeof(double))) &&
-               (t->old = calloc(from, sizeof(double))) && (t->load = calloc(from, sizeof(double))) &&
-               (t->moving = calloc(from, sizeof(double)));
-    for (int k = 0; k < 5; k++) all = (t->work[k] = calloc(dof, sizeof(double))) && all;
-    return all ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    size_t dof = 3 * (size_t)t->n_dof, to = 3 * (size_t)t->n_to, from = 3 * (size_t)t->n_from;
+    t->arena = pal_arena_create(1 << 16, true);
+    bool made = t->arena &&
+                PAL_NEW_DOUBLES(t->arena, dof, &t->x, &t->v, &t->work[0], &t->work[1], &t->work[2], &t->work[3]) &&
+                PAL_NEW_DOUBLES(t->arena, to, &t->node_x, &t->node_v, &t->force, &t->bound) &&
+                PAL_NEW_DOUBLES(t->arena, from, &t->old, &t->load, &t->unbalanced);
+    return made ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 static pal_err make(const pal_scene *from, const pal_scene *to, int body, pal_diagnostic *diag, bare *a, bare *b,
@@ -204,12 +190,12 @@ static pal_err make(const pal_scene *from, const pal_scene *to, int body, pal_di
                                   from->body[body].name);
     if (t->adaptive && !same_surface(&from->body[body].mesh->surface, &to->body[body].mesh->surface))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": another surface", from->body[body].name);
-    PAL_TRY(take_room(t));
+    PAL_TRY(allocate(t));
     if (t->adaptive) return PAL_ERR_OK;
     PAL_TRY(make_locate(a, diag));
     PAL_TRY(make_locate(b, diag));
-    PAL_TRY(make_rows(b, a, &t->in));
-    return make_rows(a, b, &t->back);
+    PAL_TRY(make_rows(b, a, &t->A_new));
+    return make_rows(a, b, &t->A_old);
 }
 
 pal_err pal_transfer_make(const pal_scene *from, const pal_scene *to, int body, pal_diagnostic *diag,
@@ -231,12 +217,9 @@ pal_err pal_transfer_make(const pal_scene *from, const pal_scene *to, int body, 
 void pal_transfer_free(pal_transfer *t)
 {
     if (!t) return;
-    pal_interpolation_free(&t->in);
-    pal_interpolation_free(&t->back);
-    for (int k = 0; k < 5; k++) free(t->work[k]);
-    free(t->x), free(t->v), free(t->place), free(t->rate), free(t->pull), free(t->bound), free(t->old), free(t->load),
-        free(t->moving);
-    free(t->fix), free(t->snapshot_room);
-    pal_interpolation_free(&t->spread);
+    pal_interpolation_free(&t->A_new);
+    pal_interpolation_free(&t->A_old);
+    pal_interpolation_free(&t->A_force);
+    pal_arena_destroy(t->arena);
     free(t);
 }

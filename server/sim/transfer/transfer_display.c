@@ -1,26 +1,21 @@
-/* What of a carry is snapshot (transfer.h): how far points go, and a surface that does not jump. */
+/* What a transfer shows (transfer.h): how far points move, and the display offset that is blended out. */
 #include "server/sim/transfer/transfer.h"
 
 #include "server/base/vec3.h"
 #include "server/sim/core/blend.h"
 #include "server/sim/transfer/transfer_core.h"
-#include "server/sim/world/world_core.h"
 
+#include <float.h>
 #include <stdlib.h>
 
-/* rest places of shown vertices are the same when they differ by less than this part of the body's size */
-#define SAME_PLACE 1e-6
-
 /* does a point lie within the element whose nodes have these weights? Quadratic shape functions are as low as -1/8 */
-static bool is_inside(const pal_interpolation *rows, int i)
+static bool is_inside(const pal_interpolation *A, int i)
 {
-    for (int32_t k = rows->start[i]; k < rows->start[i + 1]; k++)
-        if (rows->weight[k] < -0.13) return false;
+    for (int32_t k = A->start[i]; k < A->start[i + 1]; k++)
+        if (A->weight[k] < -0.13) return false;
     return true;
 }
 
-/* farthest that a node of before within the new elements is from where it was; of adaptive surfaces a vertex of both
- */
 double pal_transfer_body_move(const pal_transfer *t, const pal_body *from, const pal_body *to)
 {
     double max = 0;
@@ -30,10 +25,10 @@ double pal_transfer_body_move(const pal_transfer *t, const pal_body *from, const
             max = fmax(max, pal_dist3(from->x + 3 * i, to->x + 3 * i));
     for (int i = 0; i < from->n_node && !t->adaptive; i++) {
         double move[3] = {0, 0, 0};
-        if (!is_inside(&t->back, i)) continue;
-        for (int32_t k = t->back.start[i]; k < t->back.start[i + 1]; k++) {
-            const size_t j = 3 * (size_t)t->back.point[k];
-            for (size_t c = 0; c < 3; c++) move[c] += t->back.weight[k] * (to->d[j + c] - to->node_rest[j + c]);
+        if (!is_inside(&t->A_old, i)) continue;
+        for (int32_t k = t->A_old.start[i]; k < t->A_old.start[i + 1]; k++) {
+            const size_t j = 3 * (size_t)t->A_old.point[k];
+            for (size_t c = 0; c < 3; c++) move[c] += t->A_old.weight[k] * (to->d[j + c] - to->node_rest[j + c]);
         }
         for (int c = 0; c < 3; c++) move[c] -= from->d[3 * i + c] - from->node_rest[3 * i + c];
         max = fmax(max, pal_norm3(move));
@@ -45,19 +40,20 @@ double pal_transfer_body_move(const pal_transfer *t, const pal_body *from, const
 
 bool pal_transfer_same_shown(const pal_world *next, const pal_world *before, int body)
 {
-    const pal_world_part *a = &before->part[body], *b = &next->part[body];
+    const pal_shown *a = &before->part[body], *b = &next->part[body];
     double length_scale_m = next->plan.body[body].length_scale_m;
     if (a->n_vertex != b->n_vertex) return false;
     for (int i = 0; i < 3 * a->n_vertex; i++)
-        if (!(fabs((double)a->rest_m[i] - (double)b->rest_m[i]) <= SAME_PLACE * length_scale_m)) return false;
+        if (!(fabs((double)a->rest_m[i] - (double)b->rest_m[i]) <= 8 * (double)FLT_EPSILON * length_scale_m))
+            return false;
     return true;
 }
 
 /* where a vertex of surface `names` was shown: itself, or between the ends of its edge */
 static void add_shown(const pal_body *from, const pal_levels *names, int32_t i, double weight, double out[3])
 {
-    if (i < from->n_shown && pal_dofs_has(&from->dofs, i)) {
-        for (int c = 0; c < 3; c++) out[c] += weight * (double)from->shown[3 * (size_t)i + (size_t)c];
+    if (i < from->display.n_shown && pal_dofs_has(&from->dofs, i)) {
+        for (int c = 0; c < 3; c++) out[c] += weight * (double)from->display.shown[3 * (size_t)i + (size_t)c];
         return;
     }
     const int32_t *end = names->edge[pal_levels_vertex_parent(names, i)].vertex;
@@ -65,7 +61,7 @@ static void add_shown(const pal_body *from, const pal_levels *names, int32_t i, 
 }
 
 /* where the new body's shown vertex i was shown, for a body whose vertices are nodes: within the old elements at rest
- * as the old nodes carry it; t->place has the new nodes so */
+ * as the old nodes carry it; t->node_x has the new nodes so */
 static void old_position(const pal_transfer *t, const pal_body *from, const pal_body *to, bool same, int i,
                          double out[3])
 {
@@ -73,21 +69,23 @@ static void old_position(const pal_transfer *t, const pal_body *from, const pal_
     if (t->adaptive && pal_dofs_has(&to->dofs, i))
         add_shown(from, to->dofs.levels, i, 1, out);
     else if (same || t->adaptive)
-        for (int c = 0; c < 3; c++) out[c] = (double)(t->adaptive ? to : from)->shown[3 * (size_t)i + (size_t)c];
+        for (int c = 0; c < 3; c++)
+            out[c] = (double)(t->adaptive ? to : from)->display.shown[3 * (size_t)i + (size_t)c];
     else
-        pal_copy3(out, t->place + 3 * (size_t)to->shown_node[i]);
+        pal_copy3(out, t->node_x + 3 * (size_t)to->display.shown_node[i]);
 }
 
-/* the other bodies of the world, where a switch of theirs is still being let in */
+/* offsets of other bodies that are being blended out */
 static void transfer_other_offsets(const pal_transfer *t, pal_world *next, const pal_world *before)
 {
     for (int b = 0; b < next->plan.n_body && b < before->plan.n_body; b++) {
         const pal_body *from = &before->plan.body[b];
-        if (b == t->body || !from->display_offset_m || from->n_shown != next->plan.body[b].n_shown) continue;
-        size_t n = 3 * (size_t)from->n_shown;
+        if (b == t->body || !from->display.offset_m || from->display.n_shown != next->plan.body[b].display.n_shown)
+            continue;
+        size_t n = 3 * (size_t)from->display.n_shown;
         float *offset_m = malloc(sizeof *offset_m * n);
         for (size_t i = 0; i < n && offset_m; i++)
-            offset_m[i] = (float)(from->display_offset_part * (double)from->display_offset_m[i]);
+            offset_m[i] = (float)(from->display.offset_part * (double)from->display.offset_m[i]);
         if (offset_m) (void)pal_world_blend_display(next, b, offset_m);
         free(offset_m);
     }
@@ -99,15 +97,15 @@ void pal_transfer_display(pal_transfer *t, pal_world *next, const pal_world *bef
     bool same = pal_transfer_same_shown(next, before, t->body) && !t->adaptive;
     out->max_move_m = out->frame_move_m = out->body_move_m;
     transfer_other_offsets(t, next, before);
-    if (to->n_shown == 0 || from->n_shown == 0 || (!same && !t->adaptive && to->skin)) return;
-    float *offset_m = malloc(3 * sizeof *offset_m * (size_t)to->n_shown);
+    if (to->display.n_shown == 0 || from->display.n_shown == 0 || (!same && !t->adaptive && to->display.skin)) return;
+    float *offset_m = malloc(3 * sizeof *offset_m * (size_t)to->display.n_shown);
     double max = 0;
-    if (!same && !t->adaptive) pal_transfer_place_nodes(t, from, to);
-    for (int i = 0; i < to->n_shown && offset_m; i++) {
+    if (!same && !t->adaptive) pal_transfer_interpolate_nodes(t, from, to);
+    for (int i = 0; i < to->display.n_shown && offset_m; i++) {
         double was[3];
         old_position(t, from, to, same, i, was);
         for (int c = 0; c < 3; c++) {
-            was[c] -= (double)to->shown[3 * (size_t)i + (size_t)c];
+            was[c] -= (double)to->display.shown[3 * (size_t)i + (size_t)c];
             offset_m[3 * (size_t)i + (size_t)c] = (float)was[c];
         }
         max = fmax(max, pal_norm3(was));
@@ -116,5 +114,5 @@ void pal_transfer_display(pal_transfer *t, pal_world *next, const pal_world *bef
     free(offset_m);
     /* other vertices are shown: what the body itself moves says more */
     if (same) out->max_move_m = max;
-    if (offset_set) out->frame_move_m = max * fmin(1, next->step_s / PAL_BLEND_TRANSFER_S);
+    if (offset_set) out->frame_move_m = max * fmin(1, next->step_s / PAL_BLEND_S);
 }

@@ -2,17 +2,13 @@
 #include "server/sim/transfer/transfer_core.h"
 
 #include "server/base/vec3.h"
-#include "server/sim/world/world_core.h"
+#include "server/sim/implicit/system.h"
+#include "server/sim/transfer/tuning.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/* of an old node's mass: new nodes that depend on it with less take as much less of its force */
-#define MIN_SHARE 0.25
-/* times a new node's mass that old ones may weigh which accelerate it by their whole force */
-#define HEAVIER 2.0
-
-/* entries of t->in by old nodes: new nodes that depend on old node i and by how much, who[first[i]..first[i+1]-1] */
+/* entries of t->A_new by old nodes: new nodes that depend on old node i and by how much, who[first[i]..first[i+1]-1] */
 typedef struct dependents {
     int32_t *first, *who;
     double *weight;
@@ -37,17 +33,17 @@ static bool find_dependents(const pal_interpolation *in, int n_from, dependents 
 }
 
 /* old node i's force goes to the new nodes that depend on it, over their masses as they do; the remainder (of nodes
- * that hardly any new one depends on) by place */
+ * that hardly any new one depends on) by interpolation */
 static void add_spread(const pal_transfer *t, const pal_body *from, const pal_body *to, const dependents *l, int i,
                        pal_interpolation_builder *rows)
 {
-    double sum = 0, min = MIN_SHARE * from->node_mass_kg[i];
+    double sum = 0, min = from->node_mass_kg[i] / PAL_TRANSFER_MASS_RATIO;
     for (int32_t k = l->first[i]; k < l->first[i + 1]; k++) sum += l->weight[k] * to->node_mass_kg[l->who[k]];
     double part = sum >= min ? 1 : sum > 0 ? sum / min : 0;
     for (int32_t k = l->first[i]; k < l->first[i + 1] && part > 0; k++)
         pal_interpolation_builder_add(rows, l->who[k], part / sum * l->weight[k] * to->node_mass_kg[l->who[k]]);
-    for (int32_t k = t->back.start[i]; k < t->back.start[i + 1] && part < 1; k++)
-        pal_interpolation_builder_add(rows, t->back.point[k], (1 - part) * t->back.weight[k]);
+    for (int32_t k = t->A_old.start[i]; k < t->A_old.start[i + 1] && part < 1; k++)
+        pal_interpolation_builder_add(rows, t->A_old.point[k], (1 - part) * t->A_old.weight[k]);
     pal_interpolation_builder_end_row(rows);
 }
 
@@ -55,7 +51,7 @@ static void add_spread(const pal_transfer *t, const pal_body *from, const pal_bo
  * be thrown by what their heavy neighbours bear with ease */
 static void add_by_mass(const pal_transfer *t, const pal_body *to, int i, pal_interpolation_builder *rows)
 {
-    const pal_interpolation *back = &t->back;
+    const pal_interpolation *back = &t->A_old;
     double sum = 0;
     for (int32_t k = back->start[i]; k < back->start[i + 1]; k++)
         sum += fmax(0, back->weight[k]) * to->node_mass_kg[back->point[k]];
@@ -66,16 +62,15 @@ static void add_by_mass(const pal_transfer *t, const pal_body *to, int i, pal_in
     pal_interpolation_builder_end_row(rows);
 }
 
-/* t->spread: forces at old nodes -> at new ones, no net force is lost, by masses. To those around; where points carry
- * the nodes (forces between them are no forces on the body) or the new mesh is the finer one, to all new nodes that
- * depend on the old one, so that they do not gather in few: of equal meshes' masses that is as accelerations */
+/* where control points carry the nodes or the new mesh is the finer one, a force is distributed over all new nodes that
+ * depend on the old one, so that it does not concentrate in few */
 void pal_transfer_make_force_map(pal_transfer *t, const pal_body *from, const pal_body *to)
 {
     bool lumped = !from->interpolation && from->n_node >= to->n_node;
     dependents l = {0};
     pal_interpolation_builder rows;
-    if (t->adaptive || t->spread.n_row > 0) return;
-    if (lumped || find_dependents(&t->in, from->n_node, &l)) {
+    if (t->adaptive || t->A_force.n_row > 0) return;
+    if (lumped || find_dependents(&t->A_new, from->n_node, &l)) {
         pal_interpolation_builder_begin(&rows, from->n_node, to->n_node, INT32_MAX);
         for (int i = 0; i < from->n_node && !rows.err; i++) {
             if (lumped)
@@ -83,46 +78,42 @@ void pal_transfer_make_force_map(pal_transfer *t, const pal_body *from, const pa
             else
                 add_spread(t, from, to, &l, i, &rows);
         }
-        (void)pal_interpolation_builder_finish(&rows, &t->spread);
+        (void)pal_interpolation_builder_finish(&rows, &t->A_force);
     }
     free(l.first), free(l.who), free(l.weight);
 }
 
-/* how forces at old nodes go to new ones; without memory for a better way by place */
 const pal_interpolation *pal_transfer_force_map(const pal_transfer *t)
 {
-    return t->spread.n_row > 0 ? &t->spread : &t->back;
+    return t->A_force.n_row > 0 ? &t->A_force : &t->A_old;
 }
 
 /* What accelerates old nodes goes over as (twice the) acceleration where the new ones weigh less than half (springs
  * count voxels at the rim whole, finite elements by their share of material): as a force it would throw them. What
  * holds a load goes whole. Old bodies of an explicit solver only: of others loads are not known as they were at the end
  * of the step */
-static void lighten(pal_transfer *t, const pal_body *from, const pal_body *to)
+static void limit_acceleration(pal_transfer *t, const pal_body *from, const pal_body *to)
 {
-    const pal_interpolation *rows = pal_transfer_force_map(t);
-    double *mass = t->bound, *moving = t->rate;
+    const pal_interpolation *A = pal_transfer_force_map(t);
+    double *mass = t->bound, *unbalanced = t->node_v;
     if (from->interpolation || from->implicit || t->adaptive) return;
     memset(mass, 0, sizeof *mass * (size_t)to->n_node);
-    memset(moving, 0, 3 * sizeof *moving * (size_t)to->n_node);
+    memset(unbalanced, 0, 3 * sizeof *unbalanced * (size_t)to->n_node);
+    pal_system_clear_supported(from, t->unbalanced);
+    pal_interpolation_apply_transpose(A, t->unbalanced, unbalanced);
     for (int i = 0; i < from->n_node; i++)
-        if (from->support[i]) pal_set3(t->moving + 3 * (size_t)i, 0, 0, 0);
-    pal_interpolation_apply_transpose(rows, t->moving, moving);
-    for (int i = 0; i < from->n_node; i++)
-        for (int32_t k = rows->start[i]; k < rows->start[i + 1]; k++)
-            mass[rows->point[k]] += rows->weight[k] * from->node_mass_kg[i];
+        for (int32_t k = A->start[i]; k < A->start[i + 1]; k++)
+            mass[A->point[k]] += A->weight[k] * from->node_mass_kg[i];
     for (int j = 0; j < to->n_node; j++) {
-        double part = HEAVIER * to->node_mass_kg[j] / mass[j];
-        if (part < 1) pal_axpy3(t->pull + 3 * (size_t)j, part - 1, moving + 3 * (size_t)j);
+        double part = PAL_TRANSFER_MASS_RATIO * to->node_mass_kg[j] / mass[j];
+        if (part < 1) pal_axpy3(t->force + 3 * (size_t)j, part - 1, unbalanced + 3 * (size_t)j);
     }
 }
 
-/* t->pull: what shall pull on the new nodes for them to be as fast in a moment as the old ones would be, by f and g of
- * before as it stands, whose g goes */
 void pal_transfer_forces(pal_transfer *t, const pal_body *from, const pal_body *to)
 {
     size_t n = 3 * (size_t)from->n_node;
-    memset(t->pull, 0, 3 * sizeof(double) * (size_t)to->n_node);
+    memset(t->force, 0, 3 * sizeof(double) * (size_t)to->n_node);
     if (from->interpolation) {
         double *a = from->g;
         for (int i = 0; i < from->n_dof; i++)
@@ -131,17 +122,8 @@ void pal_transfer_forces(pal_transfer *t, const pal_body *from, const pal_body *
         for (int i = 0; i < from->n_node; i++) pal_scale3(t->old + 3 * i, from->node_mass_kg[i], t->old + 3 * i);
     } else {
         memcpy(t->old, from->f, n * sizeof *t->old);
-        for (int i = 0; i < from->n_node; i++)
-            if (from->support[i]) pal_set3(t->old + 3 * i, 0, 0, 0);
+        pal_system_clear_supported(from, t->old);
     }
-    pal_interpolation_apply_transpose(pal_transfer_force_map(t), t->old, t->pull);
-    lighten(t, from, to);
-}
-
-void pal_transfer_loads(const pal_transfer *t, const pal_body *from, pal_world *next)
-{
-    double *to = from->external_force ? pal_world_external_force(next, t->body) : NULL;
-    if (!to) return;
-    memset(to, 0, 3 * sizeof *to * (size_t)t->n_to);
-    pal_interpolation_apply_transpose(&t->back, from->external_force, to);
+    pal_interpolation_apply_transpose(pal_transfer_force_map(t), t->old, t->force);
+    limit_acceleration(t, from, to);
 }

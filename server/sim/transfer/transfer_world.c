@@ -1,45 +1,37 @@
 /* Transfer of a world (transfer_world.h). */
 #include "server/sim/transfer/transfer_world.h"
 
-#include "server/base/vec3.h"
 #include "server/sim/springs/spring_recovery.h"
 #include "server/sim/world/world_core.h"
 
 #include <string.h>
 
-/* lasting loads of the same body in both worlds; without memory it has none */
-static void copy_loads(pal_world *w, int b, const pal_body *from)
+/* the node nearest at rest to x, body frame; guess: the node of the same number */
+static int nearest_node(const pal_body *body, const double x[3], int guess)
 {
-    double *to = from->external_force ? pal_world_external_force(w, b) : NULL;
-    if (to) memcpy(to, from->external_force, 3 * sizeof *to * (size_t)from->n_node);
-}
-
-/* the node nearest to a place at rest, scene frame */
-static int nearest_node(const pal_body *body, const double at_m[3])
-{
-    double x[3], min = INFINITY;
-    int best = 0;
-    pal_sub3(x, at_m, body->offset_m);
-    for (int i = 0; i < body->n_node; i++) {
-        double far = pal_dist3(body->node_rest + 3 * (size_t)i, x);
-        if (far < min) min = far, best = i;
+    int best = guess < body->n_node ? guess : 0;
+    double min = pal_dist3(body->node_rest + 3 * (size_t)best, x);
+    for (int i = 0; i < body->n_node && min > 0; i++) {
+        double distance = pal_dist3(body->node_rest + 3 * (size_t)i, x);
+        if (distance < min) min = distance, best = i;
     }
     return best;
 }
 
-void pal_world_transfer_loads(pal_world *w, int b, const pal_world *before)
+void pal_world_transfer_loads(pal_world *w, int b, const pal_body *from, const pal_interpolation *A)
 {
-    const pal_body *from = &before->plan.body[b];
     const pal_body *to = &w->plan.body[b];
-    double *load = from->external_force && to->n_node > 0 ? pal_world_external_force(w, b) : NULL;
+    double *load = from->external_force && to->n_node > 0 ? pal_world_external_force(w, b) : NULL, shift[3];
     if (!load) return;
     memset(load, 0, 3 * sizeof *load * (size_t)to->n_node);
-    for (int i = 0; i < from->n_node; i++) {
+    pal_sub3(shift, from->offset_m, to->offset_m);
+    if (A) pal_interpolation_apply_transpose(A, from->external_force, load);
+    for (int i = 0; i < from->n_node && !A; i++) {
         const double *force = from->external_force + 3 * (size_t)i;
-        double at[3];
+        double x[3];
         if (pal_dot3(force, force) == 0) continue;
-        pal_add3(at, from->node_rest + 3 * (size_t)i, from->offset_m);
-        double *sum = load + 3 * (size_t)nearest_node(to, at);
+        pal_add3(x, from->node_rest + 3 * (size_t)i, shift);
+        double *sum = load + 3 * (size_t)nearest_node(to, x, i);
         pal_add3(sum, sum, force);
     }
 }
@@ -50,19 +42,17 @@ static bool same_surface(const pal_body *a, const pal_body *b)
            a->dofs.n_slot == b->dofs.n_slot;
 }
 
-/* an adaptive surface takes over refinement, state and what its ADAPT components know */
-static void transfer_surface(pal_world *w, int b, const pal_world *before)
+void pal_transfer_components(pal_world *next, int b, const pal_world *before, pal_stage stage,
+                             const pal_component_transfer *by)
 {
-    const pal_body *from = &before->plan.body[b];
-    pal_body *to = &w->plan.body[b];
-    to->dofs.transfer(to, from, w->plan.n_of[PAL_STAGE_ADAPT][b] > 0, to->x, to->v);
-    for (int k = 0; k < 2; k++) *to->dofs.ramp[k] = *from->dofs.ramp[k];
-    for (int i = 0; i < w->plan.n_of[PAL_STAGE_ADAPT][b] && i < before->plan.n_of[PAL_STAGE_ADAPT][b]; i++) {
-        const pal_component *row = &w->plan.row[w->plan.first[PAL_STAGE_ADAPT][b] + i];
-        const pal_component *was = &before->plan.row[before->plan.first[PAL_STAGE_ADAPT][b] + i];
-        if (row->effect == was->effect && row->effect->transfer)
-            row->effect->transfer(row->self, to, was->self, &(pal_component_transfer){.from = from});
-    }
+    const pal_plan *to = &next->plan, *from = &before->plan;
+    for (int i = to->first[stage][b]; i < to->first[stage][b] + to->n_of[stage][b]; i++)
+        for (int k = from->first[stage][b]; k < from->first[stage][b] + from->n_of[stage][b]; k++) {
+            const pal_effect *effect = to->component[i].effect;
+            if (effect != from->component[k].effect || !effect->transfer) continue;
+            effect->transfer(to->component[i].self, &to->body[b], from->component[k].self, by);
+            break;
+        }
 }
 
 void pal_transfer_set_state(pal_body *body, const double *x, const double *v)
@@ -94,7 +84,7 @@ void pal_world_transfer(pal_world *world, const pal_world *before, int edited, c
     pal_world *w = world;
     w->time_s = before->time_s, w->tick = before->tick, w->end_ns = before->end_ns;
     w->tools = before->tools;
-    memcpy(w->asked, before->asked, sizeof w->asked);
+    memcpy(w->requested_pose, before->requested_pose, sizeof w->requested_pose);
     memcpy(w->has_requested_pose, before->has_requested_pose, sizeof w->has_requested_pose);
     memcpy(w->pose_ns, before->pose_ns, sizeof w->pose_ns);
     for (int b = 0; b < w->plan.n_body && b < before->plan.n_body; b++) {
@@ -104,8 +94,13 @@ void pal_world_transfer(pal_world *world, const pal_world *before, int edited, c
             (void)pal_world_material(w, b, &before->material[b], NULL);
         bool other = b != edited, adaptive = other && same_surface(&w->plan.body[b], from),
              same = other && !w->plan.body[b].active && w->plan.body[b].n_dof == from->n_dof;
-        if (adaptive) transfer_surface(w, b, before);
-        if (adaptive || same) copy_loads(w, b, from);
+        if (adaptive) { /* refinement, state and what its ADAPT components know */
+            pal_body *to = &w->plan.body[b];
+            to->dofs.transfer(to, from, w->plan.n_of[PAL_STAGE_ADAPT][b] > 0, to->x, to->v);
+            for (int k = 0; k < 2; k++) *to->dofs.ramp[k] = *from->dofs.ramp[k];
+            pal_transfer_components(w, b, before, PAL_STAGE_ADAPT, &(pal_component_transfer){.from = from});
+        }
+        if (adaptive || same) pal_world_transfer_loads(w, b, from, NULL);
         transfer_body(w, b, from, same ? from->x : other ? NULL : x, same ? from->v : other ? NULL : v);
     }
     pal_world_show_all(w);

@@ -1,9 +1,9 @@
-/* Compensates a sudden change of a running body and releases the compensation over PAL_BLEND_TRANSFER_S.
+/* Compensates a sudden change of a running body and releases the compensation over PAL_BLEND_S.
  * Forces: when another body replaces it (transfer.h) or its supports change, the difference between the forces
  * before and after acts as a load on its nodes that decays to zero. On an adaptive surface the load is stored per
  * mass, so that a face that is split meanwhile does not leave the load of a coarse vertex on a fine one.
  * Display: the surface of another body is skinned to other nodes and lies at slightly different positions. The
- * offset from there to where it was shown is added to what is shown and touched (body.display_offset_m).
+ * offset from there to where it was shown is added to what is shown and touched (pal_display.offset_m).
  * One CONTACT component per body, `blend`, present only during the blend (world.h, pal_world_blend_force and
  * pal_world_blend_display); scenes have no entry for it. Thread: [sim]; heap only in set and remove. */
 #ifndef PAL_SIM_WORLD_BLEND_COMPONENT_H
@@ -14,7 +14,6 @@ extern const pal_effect pal_effect_blend;
 
 /* the blend components, by body; zeroed: none */
 typedef struct pal_blend_components {
-    pal_arena *arena[PAL_BODY_MAX]; /* memory of each component, NULL: none */
     void *self[PAL_BODY_MAX];
 } pal_blend_components;
 
@@ -28,8 +27,6 @@ pal_err pal_blend_components_set_display(pal_blend_components *rows, pal_plan *p
                                          const float *display_offset_m);
 /* adds scale times the load of the next step, if one acts, to load [n_node][3] */
 void pal_blend_components_add(const pal_blend_components *rows, int body, double scale, double *load);
-void pal_blend_components_remove_idle(pal_blend_components *rows,
-                                      pal_plan *plan);      /* removes components whose release has ended */
-void pal_blend_components_free(pal_blend_components *rows); /* memory only: after pal_plan_free */
-size_t pal_blend_components_bytes(const pal_blend_components *rows);
+/* removes components whose release has ended */
+void pal_blend_components_remove_idle(pal_blend_components *rows, pal_plan *plan);
 #endif

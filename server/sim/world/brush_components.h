@@ -7,7 +7,6 @@
 
 /* by body; zeroed: none */
 typedef struct pal_brush_components {
-    pal_arena *arena[PAL_BODY_MAX]; /* memory of each component, NULL: none */
     void *self[PAL_BODY_MAX];
 } pal_brush_components;
 
@@ -21,6 +20,5 @@ void pal_brush_components_transfer(pal_brush_components *rows, pal_plan *plan, c
 void pal_brush_components_end(pal_brush_components *rows,
                               int slot); /* ends the slot's brushes on all bodies; no heap call */
 void pal_brush_components_remove_idle(pal_brush_components *rows, pal_plan *plan); /* removes idle components */
-void pal_brush_components_free(pal_brush_components *rows); /* memory only: after pal_plan_free */
-size_t pal_brush_components_bytes(const pal_brush_components *rows);
+size_t pal_brush_components_bytes(const pal_brush_components *rows); /* heap memory beside the components' arenas */
 #endif

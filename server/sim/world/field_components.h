@@ -6,7 +6,6 @@
 
 /* the inserted components, by body and field; zeroed: none */
 typedef struct pal_field_components {
-    pal_arena *arena[PAL_BODY_MAX][PAL_FIELD_COUNT]; /* memory of each component, NULL: none */
     void *self[PAL_BODY_MAX][PAL_FIELD_COUNT];
 } pal_field_components;
 
@@ -18,8 +17,6 @@ pal_err pal_field_components_check(const pal_plan *plan, pal_diagnostic *diag);
  * available; MEMORY */
 pal_err pal_field_components_add(pal_field_components *rows, pal_plan *plan, int body, pal_field field, pal_step *step,
                                  pal_diagnostic *diag);
-void pal_field_components_remove(pal_field_components *rows, pal_plan *plan, int body,
-                                 pal_field field);          /* does nothing if it does not exist */
-void pal_field_components_free(pal_field_components *rows); /* memory only: after pal_plan_free */
-size_t pal_field_components_bytes(const pal_field_components *rows);
+/* does nothing if it does not exist */
+void pal_field_components_remove(pal_field_components *rows, pal_plan *plan, int body, pal_field field);
 #endif

@@ -5,23 +5,25 @@
 
 #include <stdlib.h>
 
-/* allocates the triangles of an adaptive part; no table copied yet */
-static bool make_slots(pal_frame_part *part, const pal_dofs *dofs)
+/* arrays of a part; no table of triangles copied yet */
+static bool make_part(pal_frame_part *part, const pal_body *body, int n_vertex)
 {
-    const pal_levels *levels = dofs->levels;
-    part->n_slot = dofs->n_slot;
-    part->slot = calloc(3 * (size_t)part->n_slot + 1, sizeof *part->slot);
-    part->slot_log = UINT64_MAX;
-    part->n_finest = levels->n_vertex[levels->n_level - 1];
-    part->n_finest_spring = pal_levels_n_edge(levels, levels->n_level - 1);
-    return part->slot != NULL;
-}
-
-static bool make_points(pal_frame_part *part, const pal_body *body)
-{
-    part->n_point = body->n_dof;
-    part->point_m = calloc(3 * (size_t)part->n_point + 1, sizeof *part->point_m);
-    return part->point_m != NULL;
+    const pal_levels *levels = body->dofs.levels;
+    const bool adapts = body->active && n_vertex > 0;
+    part->n_vertex = n_vertex;
+    part->position_m = calloc(3 * (size_t)n_vertex + 1, sizeof(float));
+    if (adapts) {
+        part->n_slot = body->dofs.n_slot;
+        part->slot = calloc(3 * (size_t)part->n_slot + 1, sizeof *part->slot);
+        part->slot_log = UINT64_MAX;
+        part->n_finest = levels->n_vertex[levels->n_level - 1];
+        part->n_finest_spring = pal_levels_n_edge(levels, levels->n_level - 1);
+    }
+    if (body->interpolation) {
+        part->n_point = body->n_dof;
+        part->point_m = calloc(3 * (size_t)part->n_point + 1, sizeof *part->point_m);
+    }
+    return part->position_m && (!adapts || part->slot) && (!body->interpolation || part->point_m);
 }
 
 pal_frame *pal_frame_create(const pal_world *world)
@@ -30,14 +32,7 @@ pal_frame *pal_frame_create(const pal_world *world)
     if (!frame) return NULL;
     frame->slowdown = 1;
     for (int i = 0; i < world->plan.n_body; i++) {
-        const pal_body *body = &world->plan.body[i];
-        pal_frame_part *part = &frame->part[frame->n_part++];
-        part->n_vertex = world->part[i].n_vertex;
-        part->position_m = calloc(3 * (size_t)part->n_vertex + 1, sizeof(float));
-        bool adapts = body->active && part->n_vertex > 0;
-        bool made = part->position_m && (!adapts || make_slots(part, &body->dofs)) &&
-                    (!body->interpolation || make_points(part, body));
-        if (!made) {
+        if (!make_part(&frame->part[frame->n_part++], &world->plan.body[i], world->part[i].n_vertex)) {
             pal_frame_destroy(frame);
             return NULL;
         }
@@ -65,11 +60,11 @@ pal_err pal_frame_fit(pal_frame *frame, const pal_world *world)
         pal_frame_part *part = &frame->part[i];
         for (int k = 0; k < PAL_FIELD_COUNT; k++) {
             pal_frame_field *field = &part->field[k];
-            if ((body->field[k] != NULL) == (field->value != NULL)) continue;
+            if ((body->display.field[k] != NULL) == (field->value != NULL)) continue;
             free(field->value);
             *field = (pal_frame_field){0};
-            if (body->field[k]) field->value = calloc((size_t)part->n_vertex + 1, sizeof(float));
-            if (body->field[k] && !field->value) err = PAL_ERR_MEMORY;
+            if (body->display.field[k]) field->value = calloc((size_t)part->n_vertex + 1, sizeof(float));
+            if (body->display.field[k] && !field->value) err = PAL_ERR_MEMORY;
         }
     }
     return err;

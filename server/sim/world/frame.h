@@ -1,6 +1,6 @@
-/* A frame: what one step shows, copied out of the world as float metres in the scene frame, so that another thread
- * can read it. Allocated once (pal_frame_create) for the world's sizes; filling it makes no heap call. pal_frame_fit
- * allocates and frees the arrays of fields, so pointers to them are valid until the frame is fitted again. */
+/* A frame: what one step shows of all bodies (a FRAME of protocol/frame_codec.h is one body of it), copied for another
+ * thread as float metres in the scene frame. Allocated once (pal_frame_create) for the world's sizes; filling it makes
+ * no heap call. pal_frame_fit allocates and frees the arrays of fields, so pointers to them are valid until then. */
 #ifndef PAL_SIM_WORLD_FRAME_H
 #define PAL_SIM_WORLD_FRAME_H
 #include "server/sim/core/body.h"
@@ -47,7 +47,7 @@ typedef struct pal_frame_part {
 typedef struct pal_frame_tool {
     bool present, touching, holding;
     pal_pose pose;     /* latest pose used, with its seq and stamp */
-    uint64_t pose_ns;  /* pal_clock_ns when that pose arrived */
+    uint64_t pose_ns;  /* of the session's clock, when that pose arrived */
     double force_N[3]; /* on the tool, mean over the step                */
     double radius_m;
     int n_patch;
@@ -59,7 +59,7 @@ typedef struct pal_frame_tool {
 typedef struct pal_frame {
     uint64_t tick;    /* steps since create or reset; equal ticks may differ in tools or status */
     double time_s;    /* simulated                                                              */
-    uint64_t end_ns;  /* pal_clock_ns at the end of the step                                     */
+    uint64_t end_ns;  /* of the session's clock, at the end of the step */
     uint64_t step_ns; /* processor time of the step                                              */
     int n_substep;
     bool watched; /* positions are of this tick; false: there are no observers, and positions may be older */

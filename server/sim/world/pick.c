@@ -4,7 +4,7 @@
 
 #include "server/base/vec3.h"
 
-#include <math.h>
+#include <stddef.h>
 
 static double on_edge(const double a[3], const double b[3], const double p[3], double *t)
 {

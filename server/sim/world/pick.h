@@ -2,7 +2,7 @@
  * heap. */
 #ifndef PAL_SIM_WORLD_PICK_H
 #define PAL_SIM_WORLD_PICK_H
-#include "server/sim/world/world.h"
+#include "server/sim/world/shown_surface.h"
 
 typedef struct pal_pick {
     int triangle;

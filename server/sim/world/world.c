@@ -3,13 +3,9 @@
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
-#include "server/sim/plan/plan.h"
 #include "server/sim/recovery/stiffening_damper.h"
-#include "server/sim/subdivision/subdivision_body.h"
-#include "server/sim/world/field_components.h"
 #include "server/sim/world/world_core.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -21,25 +17,24 @@ pal_step pal_world_body_step(pal_world *w, int b)
     return (pal_step){.body = &p->body[b],
                       .tools = &w->tools,
                       .scratch = w->scratch,
-                      .force = p->row + p->first[PAL_STAGE_FORCE][b],
+                      .force = p->component + p->first[PAL_STAGE_FORCE][b],
                       .n_force = p->n_of[PAL_STAGE_FORCE][b],
-                      .contact = p->row + p->first[PAL_STAGE_CONTACT][b],
+                      .contact = p->component + p->first[PAL_STAGE_CONTACT][b],
                       .n_contact = p->n_of[PAL_STAGE_CONTACT][b],
-                      .adapt = p->row + p->first[PAL_STAGE_ADAPT][b],
+                      .adapt = p->component + p->first[PAL_STAGE_ADAPT][b],
                       .n_adapt = p->n_of[PAL_STAGE_ADAPT][b],
                       .time_s = w->time_s};
 }
 
-/* smallest limit of all bodies that move, infinite when nothing limits; a body whose limit is not finite is frozen */
 double pal_world_find_limit(pal_world *w, int sub)
 {
     double min = INFINITY;
     for (int b = 0; b < w->plan.n_body; b++) {
         pal_step step = pal_world_body_step(w, b);
         step.sub = sub;
-        const pal_component *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
-        if (step.body->frozen || step.body->asleep || !solve->effect->limit) continue;
-        double limit = solve->effect->limit(solve->self, &step);
+        const pal_component *solve = &w->plan.component[w->plan.first[PAL_STAGE_SOLVE][b]];
+        if (step.body->frozen || step.body->asleep || !solve->effect->bounds.limit) continue;
+        double limit = solve->effect->bounds.limit(solve->self, &step);
         step.body->dt_limit_s = limit;
         if (!(limit > 0))
             pal_body_stop_bad(step.body, "its forces allow no stable step");
@@ -64,11 +59,11 @@ static bool refines(const pal_world *w, int b)
 
 /* Clears what FORCE components cached with the last forces (rotations of elements), so that a new world equals a
  * reset one */
-static void forget_forces(pal_world *w, int b)
+static void reset_forces(pal_world *w, int b)
 {
     for (int i = 0; i < w->plan.n_of[PAL_STAGE_FORCE][b]; i++) {
-        const pal_component *row = &w->plan.row[w->plan.first[PAL_STAGE_FORCE][b] + i];
-        if (row->effect->reset) row->effect->reset(row->self, &w->plan.body[b]);
+        const pal_component *component = &w->plan.component[w->plan.first[PAL_STAGE_FORCE][b] + i];
+        if (component->effect->reset) component->effect->reset(component->self, &w->plan.body[b]);
     }
 }
 
@@ -79,21 +74,21 @@ static double find_rest_limit(pal_world *w)
     double min = INFINITY, limit_s = w->limit_s;
     for (int b = 0; b < w->plan.n_body; b++) {
         pal_body *body = &w->plan.body[b];
-        const pal_component *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
-        if (!solve->effect->limit) continue;
+        const pal_component *solve = &w->plan.component[w->plan.first[PAL_STAGE_SOLVE][b]];
+        if (!solve->effect->bounds.limit) continue;
         double *x = body->x, *d = body->d;
         body->x = body->x_rest;
         if (!body->interpolation) body->d = body->x_rest;
         pal_body_update_nodes(body);
         pal_step step = pal_world_body_step(w, b);
         step.n_contact = 0;
-        double limit = solve->effect->limit(solve->self, &step);
+        double limit = solve->effect->bounds.limit(solve->self, &step);
         body->x = x, body->d = d;
         pal_body_update_nodes(body);
         /* refinement may reach the finest level; each level halves the step approximately (paper C, eq. 9) */
         if (refines(w, b)) limit = ldexp(limit, body->dofs.finest + 1 - body->dofs.levels->n_level);
         if (solve->effect->reset) solve->effect->reset(solve->self, body);
-        if (body->interpolation) forget_forces(w, b);
+        if (body->interpolation) reset_forces(w, b);
         if (!(limit >= min)) min = limit;
     }
     w->limit_s = limit_s;
@@ -120,61 +115,53 @@ pal_err pal_world_check_budget(pal_world *w, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
-/* the two parent vertices of each midpoint of an adaptive body, for encoders and renderers */
-static pal_err make_parents(pal_world *w, const pal_levels *levels, pal_world_part *p)
+/* the refinement hierarchy of an adaptive body, for encoders and renderers */
+static pal_err make_hierarchy(pal_world *w, const pal_levels *levels, pal_shown *p)
 {
     int n_coarse = levels->n_vertex[0];
-    p->parent = PAL_NEW(w->arena, int32_t, 2 * (size_t)(p->n_vertex - n_coarse) + 2);
-    if (!p->parent) return PAL_ERR_MEMORY;
-    for (int i = n_coarse; i < p->n_vertex; i++) {
-        const pal_winged_edge *edge = &levels->edge[pal_levels_vertex_parent(levels, i)];
-        for (int k = 0; k < 2; k++) p->parent[2 * (size_t)(i - n_coarse) + (size_t)k] = edge->vertex[k];
-    }
+    int32_t *parent = PAL_NEW(w->arena, int32_t, 2 * (size_t)(p->n_vertex - n_coarse) + 2);
+    if (!parent) return PAL_ERR_MEMORY;
+    p->is_adaptive = true;
+    p->n_coarse = n_coarse, p->parent = parent;
+    p->n_coarse_tri = levels->first_face[1], p->coarse_tri = levels->face;
+    for (int i = n_coarse; i < p->n_vertex; i++, parent += 2)
+        memcpy(parent, levels->edge[pal_levels_vertex_parent(levels, i)].vertex, 2 * sizeof *parent);
     return PAL_ERR_OK;
 }
 
 static pal_err make_part(pal_world *w, int b)
 {
     const pal_body *body = &w->plan.body[b];
-    pal_world_part *p = &w->part[b];
-    const double *x = body->skin ? body->surface->x : body->node_rest;
-    if (body->n_shown == 0) return PAL_ERR_OK;
-    const int32_t *tri = body->active ? body->dofs.slot : body->surface->tri;
-    p->n_vertex = body->n_shown;
-    p->n_tri = body->active ? body->dofs.n_slot : body->surface->n_tri;
-    p->rest_m = PAL_NEW(w->arena, float, 3 * (size_t)p->n_vertex);
-    p->tri = PAL_NEW(w->arena, int32_t, 3 * (size_t)p->n_tri);
-    if (!p->rest_m || !p->tri) return PAL_ERR_MEMORY;
+    const pal_display *display = &body->display;
+    pal_shown *p = &w->part[b];
+    p->name = body->name;
+    if (display->n_shown == 0) return PAL_ERR_OK;
+    p->n_vertex = display->n_shown;
+    p->n_tri = body->active ? body->dofs.n_slot : display->surface->n_tri;
+    float *rest_m = PAL_NEW(w->arena, float, 3 * (size_t)p->n_vertex);
+    int32_t *tri = PAL_NEW(w->arena, int32_t, 3 * (size_t)p->n_tri);
+    if (!rest_m || !tri) return PAL_ERR_MEMORY;
+    const double *x = display->skin ? display->surface->x : body->node_rest;
     for (int i = 0; i < p->n_vertex; i++) {
-        int from = body->skin ? i : body->shown_node[i];
-        for (int c = 0; c < 3; c++) p->rest_m[3 * i + c] = (float)(x[3 * from + c] + body->offset_m[c]);
+        int from = display->skin ? i : display->shown_node[i];
+        for (int c = 0; c < 3; c++) rest_m[3 * i + c] = (float)(x[3 * from + c] + body->offset_m[c]);
     }
-    memcpy(p->tri, tri, 3 * sizeof *tri * (size_t)p->n_tri);
-    return body->active ? make_parents(w, body->dofs.levels, p) : PAL_ERR_OK;
-}
-
-/* tools with the defaults that depend on bodies */
-static void make_tools(pal_world *w, const pal_scene *scene)
-{
-    w->tools.n_tool = scene->n_tool;
-    for (int t = 0; t < scene->n_tool; t++) {
-        double radius = scene->tool[t].radius_m;
-        w->tools.tool[t].radius_m = radius > 0 ? radius : 0.04 * w->plan.body[0].length_scale_m;
-        w->tools.tool[t].force_cap_N = scene->tool[t].force_cap_N;
-    }
+    memcpy(tri, body->active ? body->dofs.slot : display->surface->tri, 3 * sizeof *tri * (size_t)p->n_tri);
+    p->rest_m = rest_m, p->tri = tri;
+    return body->active ? make_hierarchy(w, body->dofs.levels, p) : PAL_ERR_OK;
 }
 
 void pal_world_show(pal_world *w, int b)
 {
     pal_step step = pal_world_body_step(w, b);
     for (int i = 0; i < w->plan.n_of[PAL_STAGE_OUTPUT][b]; i++) {
-        pal_component *row = &w->plan.row[w->plan.first[PAL_STAGE_OUTPUT][b] + i];
-        row->n_run++;
-        (void)row->effect->run(row->self, &step);
+        pal_component *component = &w->plan.component[w->plan.first[PAL_STAGE_OUTPUT][b] + i];
+        component->n_run++;
+        (void)component->effect->run(component->self, &step);
     }
     pal_body_add_display_offset(step.body);
     pal_arena_reset(w->scratch);
-    step.body->n_output++;
+    step.body->display.n_output++;
     step.body->stale = false;
 }
 
@@ -193,7 +180,12 @@ static pal_err create(pal_world *w, const pal_scene *scene, pal_diagnostic *diag
     PAL_TRY(pal_plan_build(scene, w->arena, diag, &w->plan));
     w->scratch = pal_arena_create(w->plan.scratch_byte + 64, false);
     if (!w->scratch) return PAL_ERR_MEMORY;
-    make_tools(w, scene);
+    w->tools.n_tool = scene->n_tool;
+    for (int t = 0; t < scene->n_tool; t++) {
+        const double radius_m = scene->tool[t].radius_m;
+        w->tools.tool[t].radius_m = radius_m > 0 ? radius_m : 0.04 * w->plan.body[0].length_scale_m;
+        w->tools.tool[t].force_cap_N = scene->tool[t].force_cap_N;
+    }
     for (int b = 0; b < w->plan.n_body; b++) {
         w->material[b] = scene->body[b].material;
         PAL_TRY(pal_material_check(&w->material[b], diag));
@@ -222,9 +214,6 @@ void pal_world_destroy(pal_world *world)
 {
     if (!world) return;
     pal_plan_free(&world->plan);
-    pal_field_components_free(&world->fields);
-    pal_brush_components_free(&world->brushes);
-    pal_blend_components_free(&world->blends);
     pal_arena_destroy(world->scratch);
     pal_arena_destroy(world->arena);
     free(world);
@@ -232,14 +221,13 @@ void pal_world_destroy(pal_world *world)
 
 /* ---- a step ---- */
 
-/* energy stored in the components of a body */
 double pal_world_component_energy_J(const pal_world *w, int b)
 {
     double sum = 0;
-    for (int i = 0; i < w->plan.n_row; i++) {
-        const pal_component *row = &w->plan.row[i];
-        if (w->plan.component_body[i] == b && row->effect->energy)
-            sum += row->effect->energy(row->self, &w->plan.body[b]);
+    for (int i = 0; i < w->plan.n_component; i++) {
+        const pal_component *component = &w->plan.component[i];
+        if (w->plan.component_body[i] == b && component->effect->energy)
+            sum += component->effect->energy(component->self, &w->plan.body[b]);
     }
     return sum;
 }
@@ -254,10 +242,10 @@ pal_err pal_world_assemble_forces(pal_world *world, int body)
 }
 
 /* a component that fails freezes only its body; true: it has failed */
-static bool fails(pal_world *w, pal_body *body, const pal_component *row, pal_err err)
+static bool fails(pal_world *w, pal_body *body, const pal_component *component, pal_err err)
 {
     if (!err) return false;
-    pal_body_stop(body, -1, "row %s: %s", row->effect->name, pal_err_text(err));
+    pal_body_stop(body, -1, "row %s: %s", component->effect->name, pal_err_text(err));
     if (!w->component_err) w->component_err = err;
     return true;
 }
@@ -270,11 +258,11 @@ static void run_contact(pal_world *w, pal_step *step, int b)
     pal_body_begin_loads(body);
     if (body->external_force) pal_body_cap_loads(body, true);
     for (int i = 0; i < step->n_contact; i++) {
-        pal_component *row = &w->plan.row[w->plan.first[PAL_STAGE_CONTACT][b] + i];
+        pal_component *component = &w->plan.component[w->plan.first[PAL_STAGE_CONTACT][b] + i];
         uint64_t before = pal_clock_ns();
-        row->n_run++;
-        if (fails(w, body, row, row->effect->run(row->self, step))) return;
-        row->spent_ns += pal_clock_ns() - before;
+        component->n_run++;
+        if (fails(w, body, component, component->effect->run(component->self, step))) return;
+        component->spent_ns += pal_clock_ns() - before;
     }
     if (!body->implicit && step->n_contact > 0) pal_body_cap_loads(body, false);
 }
@@ -294,10 +282,10 @@ static void run_substep(pal_world *w, pal_step *shared)
         step.body->stale = true;
         step.dt_s = shared->dt_s, step.sub = shared->sub, step.n_sub = shared->n_sub;
         step.time_s = shared->time_s;
-        step.heavy = shared->heavy && step.body->dt_limit_s < step.dt_s;
-        step.body->safeguards.n_mass_scaled += step.heavy;
+        step.adds_mass = shared->adds_mass && step.body->dt_limit_s < step.dt_s;
+        step.body->safeguards.n_mass_scaled += step.adds_mass;
         run_contact(w, &step, b);
-        pal_component *solve = &w->plan.row[w->plan.first[PAL_STAGE_SOLVE][b]];
+        pal_component *solve = &w->plan.component[w->plan.first[PAL_STAGE_SOLVE][b]];
         uint64_t before = pal_clock_ns(), forces = force_ns(&step);
         solve->n_run++;
         if (!step.body->frozen) (void)fails(w, step.body, solve, solve->effect->run(solve->self, &step));
@@ -305,7 +293,7 @@ static void run_substep(pal_world *w, pal_step *shared)
         if (step.n_contact > 0 || step.sub == step.n_sub - 1) pal_body_update_nodes(step.body);
         uint64_t took = pal_clock_ns() - before;
         solve->spent_ns += took - (force_ns(&step) - forces);
-        if (step.heavy) step.body->safeguards.ns += took;
+        if (step.adds_mass) step.body->safeguards.ns += took;
         pal_arena_reset(w->scratch);
     }
 }
@@ -323,20 +311,20 @@ static void run_stage(pal_world *w, pal_stage stage, double dt_s)
         if (skips || (output && step.body->asleep && !step.body->stale)) continue;
         int n_run = 0;
         for (int i = 0; i < w->plan.n_of[stage][b]; i++) {
-            pal_component *row = &w->plan.row[w->plan.first[stage][b] + i];
+            pal_component *component = &w->plan.component[w->plan.first[stage][b] + i];
             /* a frozen body is shown where it stopped, if that is finite; its guard may restore it */
             if (step.body->frozen && stage == PAL_STAGE_ADAPT) continue;
             if (step.body->frozen && stage == PAL_STAGE_OUTPUT && !pal_body_finite(step.body)) continue;
             uint64_t before = pal_clock_ns();
-            row->n_run++;
-            if (fails(w, step.body, row, row->effect->run(row->self, &step))) break;
-            row->spent_ns += pal_clock_ns() - before;
+            component->n_run++;
+            if (fails(w, step.body, component, component->effect->run(component->self, &step))) break;
+            component->spent_ns += pal_clock_ns() - before;
             n_run++;
         }
         pal_arena_reset(w->scratch);
         if (!output) continue;
         if (n_run > 0) pal_body_add_display_offset(step.body);
-        step.body->n_output++, step.body->stale = false;
+        step.body->display.n_output++, step.body->stale = false;
     }
 }
 
@@ -350,8 +338,9 @@ static void begin_step(pal_world *w, double dt_s)
         pal_step step = pal_world_body_step(w, b);
         step.dt_s = dt_s, step.n_sub = 1;
         for (int i = 0; i < w->plan.n_of[PAL_STAGE_GUARD][b] && step.body->asleep; i++) {
-            const pal_component *row = &w->plan.row[w->plan.first[PAL_STAGE_GUARD][b] + i];
-            if (row->effect->wakes && row->effect->wakes(row->self, &step)) step.body->asleep = false;
+            const pal_component *component = &w->plan.component[w->plan.first[PAL_STAGE_GUARD][b] + i];
+            if (component->effect->sleep.wakes && component->effect->sleep.wakes(component->self, &step))
+                step.body->asleep = false;
         }
         bool touched = fixed && step.n_contact > 0 && !step.body->frozen && !step.body->asleep;
         if (w->unobserved && touched && step.body->stale) pal_world_show(w, b);
@@ -369,7 +358,7 @@ static void run_substeps(pal_world *w, double dt_s)
         int budget = w->max_substep - sub;
         if (sub == 0 || step.dt_s > limit) {
             int n = count_substeps(w, left_s, limit);
-            step.heavy = n > budget;
+            step.adds_mass = n > budget;
             n_sub = sub + (n > budget ? (budget > 0 ? budget : 1) : n);
             step.dt_s = left_s / (n_sub - sub);
         }
@@ -397,9 +386,9 @@ pal_err pal_world_step(pal_world *world, double dt_s)
     if (count_substeps(w, dt_s, w->rest_limit_s) > w->max_substep) return PAL_ERR_BUDGET;
     uint64_t began = pal_clock_thread_ns();
     int frozen = count_frozen(w);
-    for (int i = 0; i < w->plan.n_row; i++) w->plan.row[i].spent_ns = 0;
+    for (int i = 0; i < w->plan.n_component; i++) w->plan.component[i].spent_ns = 0;
     for (int t = 0; t < w->tools.n_tool; t++)
-        pal_tool_begin_step(&w->tools.tool[t], w->has_requested_pose[t] ? &w->asked[t] : NULL, dt_s);
+        pal_tool_begin_step(&w->tools.tool[t], w->has_requested_pose[t] ? &w->requested_pose[t] : NULL, dt_s);
     w->component_err = PAL_ERR_OK;
     begin_step(w, dt_s);
     run_substeps(w, dt_s);
@@ -437,9 +426,8 @@ double pal_world_energy_J(const pal_world *world)
 
 size_t pal_world_bytes(const pal_world *world)
 {
-    return sizeof *world + pal_arena_used(world->arena) + world->plan.scratch_byte +
-           pal_field_components_bytes(&world->fields) + pal_brush_components_bytes(&world->brushes) +
-           pal_blend_components_bytes(&world->blends) + pal_plan_bytes(&world->plan);
+    return sizeof *world + pal_arena_used(world->arena) + world->plan.scratch_byte + pal_plan_bytes(&world->plan) +
+           pal_brush_components_bytes(&world->brushes);
 }
 
 int pal_world_body_count(const pal_world *world)
@@ -459,8 +447,8 @@ const pal_tools *pal_world_tools(const pal_world *world)
 
 bool pal_world_solve_report(const pal_world *world, int body, pal_solve_report *out)
 {
-    const pal_component *solve = &world->plan.row[world->plan.first[PAL_STAGE_SOLVE][body]];
+    const pal_component *solve = &world->plan.component[world->plan.first[PAL_STAGE_SOLVE][body]];
     *out = (pal_solve_report){0};
-    if (solve->effect->report) solve->effect->report(solve->self, out);
-    return solve->effect->report != NULL;
+    if (solve->effect->inspect.report) solve->effect->inspect.report(solve->self, out);
+    return solve->effect->inspect.report != NULL;
 }

@@ -1,5 +1,8 @@
 /* The world: bodies, plan and one step function. No threads, no heap call in a step, no files. Deterministic: the
- * same scene, poses and commands at the same ticks give the same hash on any machine with IEEE doubles.
+ * same scene, poses and commands at the same ticks give the same hash on every run of a binary. Explicit solvers give
+ * it with every compiler, optimization and vector width on IEEE doubles (tests/replay); solvers with a factor
+ * (implicit, static, central_cg) only with the same binary, instruction set and BLAS library, whose products round
+ * differently.
  *
  * Scene frame: metres, origin at the mesh origin of the first body; other bodies are offset by the difference of
  * their meshes' origin_m. Poses and frames use it. */
@@ -8,6 +11,7 @@
 #include "server/sim/core/brush.h"
 #include "server/sim/core/effect.h"
 #include "server/sim/world/frame.h"
+#include "server/sim/world/shown_surface.h"
 
 typedef struct pal_world pal_world;
 
@@ -21,31 +25,12 @@ typedef struct pal_component_info {
     bool fixed;         /* pal_world_switch_component would refuse to switch it off now */
 } pal_component_info;
 
-/* shown surface of a part; pointers borrow from the world and its scene and are valid while revision is the same */
-typedef struct pal_shown {
-    const char *name;
-    int n_vertex, n_tri;
-    const float *rest_m; /* scene frame             [n_vertex][3] */
-    const int32_t *tri;  /* counter-clockwise, as at load; of an adaptive body the slot table, 0 0 0 in empty slots
-                            (pal_frame_part.slot brings its changes) [n_tri][3] */
-    uint64_t revision;
-    const int32_t
-        *face; /* control face of each triangle, -1: none (body.shown_face); NULL: no subdivision solid [n_tri] */
-    bool is_adaptive; /* triangles change at run time */
-    /* Refinement hierarchy of vertices beyond those of `tri`: vertex i >= n_coarse is the midpoint of the smaller
-     * vertices parent[2 (i - n_coarse)], parent[.. + 1]; NULL: no hierarchy */
-    int n_coarse;
-    const int32_t *parent;
-    int n_coarse_tri;
-    const int32_t *coarse_tri; /* triangles of the vertices below n_coarse [n_coarse_tri][3] */
-} pal_shown;
-
 pal_err pal_world_create(const pal_scene *scene, pal_diagnostic *diag,
                          pal_world **out); /* [load] borrows the scene's meshes, copies the rest */
 void pal_world_destroy(pal_world *world);  /* [load] */
 
-/* Sets the pose of a tool at the end of the next step; NULL: releases the tool. REFUSED (state unchanged): a number
- * is not finite, the position is farther than 100 body sizes away, or the tool does not exist. [sim] */
+/* Requests a pose, which the tool reaches at the end of the next step; NULL: releases it. REFUSED (state unchanged):
+ * not finite, farther than 100 body sizes away, no such tool. [sim] */
 pal_err pal_world_pose(pal_world *world, int tool, const pal_pose *pose);
 /* Advances by dt_s, split into sub-steps. REFUSED: dt_s is not a positive number. BUDGET: the step needs more than
  * scene->max_substep sub-steps even at rest with an adaptive body at its finest level. Both leave the world
@@ -80,38 +65,35 @@ bool pal_world_has_field(const pal_world *world, int body, pal_field field); /* 
  * its slot; a reset ends all. REFUSED (one sentence): no such body or slot, a body without brushes, an invalid
  * number, nothing within reach; MEMORY; both change nothing. Call between steps; allocates heap memory. [sim] */
 pal_err pal_world_brush(pal_world *world, int body, int slot, const pal_brush *brush, pal_diagnostic *diag);
-/* Sets a load on the nodes of a body, N, body axes [n_node][3], that is released over PAL_BLEND_TRANSFER_S
- * (blend_component.h). It compensates a change between two steps. It replaces one that still acts; a reset ends it.
- * REFUSED: no such body; MEMORY. Call between steps; allocates heap memory. [sim] */
+/* Sets a load on the nodes of a body, N, body axes [n_node][3], that compensates a change between two steps
+ * (blend_component.h). It replaces one that still acts; a reset ends it. REFUSED: no such body; MEMORY. Call between
+ * steps; allocates heap memory. [sim] */
 pal_err pal_world_blend_force(pal_world *world, int body, const double *force_N);
-/* Sets the offset from where a body's nodes place its surface to where it is shown now, m, body frame [n_shown][3].
- * It is added to what is shown and touched and released with the load of pal_world_blend_force over as many steps
- * (body.display_offset_m), so that a change between two steps moves no shown vertex by more than a tenth of the
- * offset per frame. Updates the shown surface at once. REFUSED: no such body; MEMORY. Call between steps; allocates
- * heap memory. [sim] */
+/* Sets the offset from where a body's nodes place its surface to where it is shown now, m, body frame [n_shown][3]. It
+ * is released together with the load of pal_world_blend_force. Updates the shown surface at once. Errors as there.
+ * [sim]
+ */
 pal_err pal_world_blend_display(pal_world *world, int body, const float *display_offset_m);
 /* Removes idle components of brushes and blends from the plan. Call it after every step of a world that must be
  * bit-reproducible, because sub-steps may depend on the component; frees heap memory. [sim] */
 void pal_world_remove_idle(pal_world *world);
 
 /* Switches a component off or on in the running world. Off: the component and its memory are removed from the plan,
- * as if the scene had no such entry. The motion continues from the present state: x, v and all else stay, and the
- * component's energy leaves the sum, so switching gravity off does work. On: the component is made again from the
- * scene's or the model's entry with the present material, at its old position in the plan; springs keep their rest
- * lengths. A solver that stores patterns of the components (the implicit ones) is rebuilt, which takes as long as at
- * load. A reset does not change which components are off.
+ * as if the scene had no such entry; x and v stay, and the component's energy leaves the sum. On: the component is made
+ * again from the scene's or the model's entry with the present material, at its old position in the plan; springs keep
+ * their rest lengths. A solver that stores patterns of the components (the implicit ones) is rebuilt, which takes as
+ * long as at load. A reset does not change which components are off.
  * scene: the one that the world was made from. OK without effect when the component is in that state already.
  * REFUSED (one sentence, nothing changed): no such body; no entry asks for the component; it is the body's solver,
  * its output, its last elastic component or a moving support. BUDGET: too stiff for the step; MEMORY. Call between
  * steps; allocates and frees heap memory. [sim] */
-pal_err pal_world_switch_component(pal_world *world, const pal_scene *scene, int body, const char *row, bool on,
+pal_err pal_world_switch_component(pal_world *world, const pal_scene *scene, int body, const char *component, bool on,
                                    pal_diagnostic *diag);
 
 /* Wakes sleeping bodies (component sleep) for the next step, to measure the cost of a step. [sim] */
 void pal_world_wake(pal_world *world);
-/* Tells the world whether it has observers (true after create). Without observers, OUTPUT components run only for
- * bodies that a tool may touch in the coming step. Motion and hash do not depend on it. true updates what is shown
- * at once. [sim] */
+/* Tells the world whether it has observers (true after create, updates what is shown). Without, OUTPUT components run
+ * only for bodies that a tool may touch in the coming step; motion and hash do not depend on it. [sim] */
 void pal_world_watch(pal_world *world, bool watched);
 
 void pal_world_frame(const pal_world *world, pal_frame *out); /* [sim] copies */
@@ -121,13 +103,17 @@ uint64_t pal_world_tick(const pal_world *world);                                
 double pal_world_time_s(const pal_world *world);                                      /* simulated time since then */
 void pal_world_current_material(const pal_world *world, int body, pal_material *out); /* with live edits; copies */
 int pal_world_component_count(const pal_world *world);
-void pal_world_component_info(const pal_world *world, int row, pal_component_info *out);
-int pal_world_part_count(const pal_world *world);
+void pal_world_component_info(const pal_world *world, int index, pal_component_info *out);
+/* index of the first component of this effect on a body (-1: on any); -1: none */
+int pal_world_find_component(const pal_world *world, int body, const char *name);
 void pal_world_shown(const pal_world *world, int part, pal_shown *out);
 double pal_world_limit_s(const pal_world *world);  /* largest stable sub-step at the end of the last step */
 int pal_world_substeps(const pal_world *world);    /* of the last step; before the first: of the scene's step at rest */
 double pal_world_energy_J(const pal_world *world); /* kinetic energy and that of every component that has one */
 size_t pal_world_bytes(const pal_world *world);    /* memory of the world's arenas           */
+/* dof of a body with the largest row sum of stiffness over mass by the bounds of its FORCE components, 1/s^2: it sets
+ * the limit of explicit steps; -1: none has bounds, or nodes are not dofs. Overwrites body->g. [sim] */
+int pal_world_limit_node(const pal_world *world, int body, double *omega2);
 /* access to the bodies, for tests, tools and studies [sim] */
 int pal_world_body_count(const pal_world *world);
 pal_body *pal_world_body(pal_world *world, int body);
@@ -138,7 +124,7 @@ pal_err pal_world_assemble_forces(pal_world *world, int body);
 void pal_world_invalidate_limits(pal_world *world,
                                  int body); /* call after x was set from outside: bounds are computed again */
 const pal_component *pal_world_component(const pal_world *world,
-                                         int row); /* the component itself, in the plan's order */
+                                         int index); /* the component itself, in the plan's order */
 const pal_tools *pal_world_tools(const pal_world *world);
 /* report of a body's solver; false: it gives none */
 bool pal_world_solve_report(const pal_world *world, int body, pal_solve_report *out);

@@ -5,25 +5,17 @@
 #include "server/sim/world/blend_component.h"
 #include "server/sim/world/brush_components.h"
 #include "server/sim/world/field_components.h"
+#include "server/sim/world/shown_surface.h"
 
-/* shown surface of a body as at load */
-typedef struct pal_world_part {
-    int n_vertex, n_tri;
-    float *rest_m;
-    int32_t *tri;
-    int32_t *parent; /* of midpoints, of an adaptive body; else NULL */
-} pal_world_part;
-
-typedef struct pal_world pal_world;
-struct pal_world {
+typedef struct pal_world {
     pal_arena *arena, *scratch;
     pal_plan plan;
     pal_tools tools;
-    pal_pose asked[PAL_TOOL_MAX];
+    pal_pose requested_pose[PAL_TOOL_MAX];
     bool has_requested_pose[PAL_TOOL_MAX];
     uint64_t pose_ns[PAL_TOOL_MAX];
     pal_material material[PAL_BODY_MAX];
-    pal_world_part part[PAL_BODY_MAX];
+    pal_shown part[PAL_BODY_MAX]; /* shown surfaces as at load; face and revision are those of the body */
     double step_s, time_s, limit_s, rest_limit_s;
     int max_substep, n_substep;
     bool unobserved; /* no observers: OUTPUT components run only where tools need them */
@@ -32,7 +24,7 @@ struct pal_world {
     pal_field_components fields; /* inserted at run time */
     pal_brush_components brushes;
     pal_blend_components blends;
-};
+} pal_world;
 
 /* what the components of body b may access, without times */
 pal_step pal_world_body_step(pal_world *world, int b);
@@ -41,14 +33,14 @@ pal_step pal_world_body_step(pal_world *world, int b);
 double pal_world_find_limit(pal_world *world, int sub);
 /* BUDGET: at rest, at the finest level, a step needs more sub-steps than the scene allows */
 pal_err pal_world_check_budget(pal_world *world, pal_diagnostic *diag);
-/* energy stored in the components of a body, J */
+/* energy stored in the components of a body */
 double pal_world_component_energy_J(const pal_world *world, int b);
 
 /* sets load [n_node][3] to the lasting loads */
 void pal_body_begin_loads(pal_body *body);
 /* Scales down loads above what nodes bear (pal_body_node_load_cap_N, load_cap_N) and counts them as safeguards.
  * lasting: other loads are not added yet, and nodes far from their rest positions bear less */
-void pal_body_cap_loads(pal_body *body, bool body_arena);
+void pal_body_cap_loads(pal_body *body, bool lasting);
 
 /* lasting loads of a body [n_node][3], N, allocated at the first call; NULL: no memory */
 double *pal_world_external_force(pal_world *w, int body);
@@ -58,8 +50,7 @@ void pal_world_show(pal_world *world, int b);
 void pal_world_show_all(pal_world *world);
 
 /* writes ", node 512 at (1, 2, 3) mm sets it": the node that determines the limit by the components' bounds. Writes
- * nothing without bounds or where the bounds are of nodes that are not dofs. Uses the force arrays, which are free
- * between steps */
+ * nothing without bounds or where nodes are interpolated from dofs. Overwrites the force arrays */
 void pal_world_describe_limit(const pal_world *world, char *text, size_t n_byte);
 
 #endif

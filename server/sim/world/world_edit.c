@@ -1,8 +1,6 @@
 /* Commands to a world between two steps: poses, resets, materials, fields, brushes, components. */
 #include "server/base/clock.h"
-#include "server/base/vec3.h"
 #include "server/sim/recovery/stiffening_damper.h"
-#include "server/sim/subdivision/subdivision_body.h"
 #include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
@@ -14,7 +12,7 @@ pal_err pal_world_pose(pal_world *world, int tool, const pal_pose *pose)
     if (pose && !pal_pose_ok(pose, 100 * world->plan.body[0].length_scale_m)) return PAL_ERR_REFUSED;
     world->has_requested_pose[tool] = pose != NULL;
     if (pose) {
-        world->asked[tool] = *pose;
+        world->requested_pose[tool] = *pose;
         world->pose_ns[tool] = pal_clock_ns();
     } else {
         pal_brush_components_end(&world->brushes, tool);
@@ -38,9 +36,9 @@ static void rest_body(pal_world *w, int b)
     body->stiffening_damping_1_s = body->stiffening_damping_s = 0;
     body->reason[0] = 0;
     body->safeguards = (pal_safeguards){0};
-    for (int i = 0; i < w->plan.n_row; i++) {
-        const pal_component *row = &w->plan.row[i];
-        if (w->plan.component_body[i] == b && row->effect->reset) row->effect->reset(row->self, body);
+    for (int i = 0; i < w->plan.n_component; i++) {
+        const pal_component *component = &w->plan.component[i];
+        if (w->plan.component_body[i] == b && component->effect->reset) component->effect->reset(component->self, body);
     }
 }
 
@@ -71,10 +69,13 @@ static pal_err apply_material(pal_world *w, int b, const pal_material *to, pal_d
 {
     pal_body *body = &w->plan.body[b];
     if (body->dofs.set_material) body->dofs.set_material(body, to);
-    for (int i = 0; i < w->plan.n_row; i++) {
-        const pal_component *row = &w->plan.row[i];
-        if (w->plan.component_body[i] != b || !row->effect->material) continue;
-        PAL_TRY(row->effect->material(row->self, body, to, diag));
+    for (int i = 0; i < w->plan.n_component; i++) {
+        const pal_component *component = &w->plan.component[i];
+        const pal_effect *effect = component->effect;
+        if (w->plan.component_body[i] != b) continue;
+        if (effect->material) PAL_TRY(effect->material(component->self, body, to, diag));
+        if (!effect->material && effect->stage == PAL_STAGE_SOLVE && effect->reset)
+            effect->reset(component->self, body);
     }
     double ratio = to->density_kg_m3 / w->material[b].density_kg_m3;
     for (int i = 0; i < body->n_dof && !body->dofs.set_material; i++) body->mass_kg[i] *= ratio;
@@ -127,19 +128,19 @@ pal_err pal_world_brush(pal_world *world, int body, int slot, const pal_brush *b
     return pal_brush_components_set(&world->brushes, &world->plan, body, slot, brush, diag);
 }
 
-pal_err pal_world_switch_component(pal_world *world, const pal_scene *scene, int body, const char *row, bool on,
+pal_err pal_world_switch_component(pal_world *world, const pal_scene *scene, int body, const char *component, bool on,
                                    pal_diagnostic *diag)
 {
     bool changed = false;
     const pal_material *now = body >= 0 && body < PAL_BODY_MAX ? &world->material[body] : NULL;
-    PAL_TRY(pal_plan_switch(&world->plan, scene, body, row, on, now, diag, &changed));
+    PAL_TRY(pal_plan_switch(&world->plan, scene, body, component, on, now, diag, &changed));
     if (!changed) return PAL_ERR_OK;
     /* the solver's limit belongs to the previous components */
     pal_world_invalidate_limits(world, body);
     pal_err err = pal_world_check_budget(world, diag);
     if (err) {
         /* the plan without the component was within the budget */
-        (void)pal_plan_switch(&world->plan, scene, body, row, false, now, NULL, &changed);
+        (void)pal_plan_switch(&world->plan, scene, body, component, false, now, NULL, &changed);
         pal_world_invalidate_limits(world, body);
         (void)pal_world_check_budget(world, NULL);
     }
@@ -183,7 +184,7 @@ void pal_world_remove_idle(pal_world *world)
 
 void pal_world_invalidate_limits(pal_world *world, int body)
 {
-    const pal_component *solve = &world->plan.row[world->plan.first[PAL_STAGE_SOLVE][body]];
+    const pal_component *solve = &world->plan.component[world->plan.first[PAL_STAGE_SOLVE][body]];
     world->plan.body[body].asleep = false;
     world->plan.body[body].stale = true;
     pal_body_update_nodes(&world->plan.body[body]);

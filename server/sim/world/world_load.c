@@ -1,6 +1,7 @@
 /* Lasting loads on nodes, and the caps of node loads. */
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
+#include "server/sim/world/tuning.h"
 #include "server/sim/world/world.h"
 #include "server/sim/world/world_core.h"
 
@@ -24,56 +25,44 @@ pal_err pal_world_load(pal_world *world, int body, int node, const double force_
     return PAL_ERR_OK;
 }
 
-/* Resets loads to the lasting ones. Inactive nodes have none (adaptive_surface.h) and keep theirs in external_force
- * until they are active again */
+/* inactive nodes have no load (adaptive_surface.h) and keep theirs in external_force until they are active again */
 void pal_body_begin_loads(pal_body *body)
 {
-    size_t n_byte = 3 * sizeof(double) * (size_t)body->n_node;
+    static const double none[3] = {0};
+    const double *lasting = body->external_force;
+    const size_t n_byte = 3 * sizeof(double) * (size_t)body->n_node;
     for (int k = 0; k < body->n_active && body->active; k++) {
-        double *load = body->load + 3 * (size_t)body->active[k];
-        if (body->external_force)
-            pal_copy3(load, body->external_force + 3 * (size_t)body->active[k]);
-        else
-            pal_set3(load, 0, 0, 0);
+        const size_t i = 3 * (size_t)body->active[k];
+        pal_copy3(body->load + i, lasting ? lasting + i : none);
     }
-    if (body->active) return;
-    if (body->external_force)
-        memcpy(body->load, body->external_force, n_byte);
-    else
-        memset(body->load, 0, n_byte);
+    if (!body->active && lasting) memcpy(body->load, lasting, n_byte);
+    if (!body->active && !lasting) memset(body->load, 0, n_byte);
 }
 
-/* smallest fraction of its cap that a node bears anywhere */
-static const double min_share = 0.01;
-
 /* A part of a supported body that many loads pull out, each within its cap, stretches by their sum and overshoots to
- * twice that. So the cap of lasting loads decreases beyond 2 S off the rest position, down to min_share at 4 S. An
+ * twice that. So the cap of lasting loads decreases beyond 2 S off the rest position, down to
+ * PAL_LOAD_FAR_SHARE at 4 S. An
  * unsupported body or one with prescribed nodes may be anywhere */
 static bool stays(const pal_body *body)
 {
-    bool fixed = false, led = false;
+    bool fixed = false, prescribed = false;
     for (int i = 0; i < body->n_dof; i++)
-        fixed |= body->support[i] == PAL_FIXED, led |= body->support[i] == PAL_PRESCRIBED;
-    return fixed && !led;
+        fixed |= body->support[i] == PAL_FIXED, prescribed |= body->support[i] == PAL_PRESCRIBED;
+    return fixed && !prescribed;
 }
 
-static double share_far_S(double far_S)
-{
-    return far_S > 2 ? fmax(min_share, 0.5 * (4 - far_S)) : 1;
-}
-
-void pal_body_cap_loads(pal_body *body, bool body_arena)
+void pal_body_cap_loads(pal_body *body, bool lasting)
 {
     int staying = -1; /* not computed yet */
     for (int k = 0; k < pal_body_nodes(body); k++) {
         int i = pal_body_point(body, k);
         double *load = body->load + 3 * i, load2 = pal_dot3(load, load);
         if (load2 == 0) continue;
-        double cap = body_arena ? pal_body_node_load_cap_N(body, i) : body->load_cap_N;
-        if (body_arena && load2 > min_share * min_share * cap * cap) {
+        double cap = lasting ? pal_body_node_load_cap_N(body, i) : body->load_cap_N;
+        if (lasting && load2 > PAL_LOAD_FAR_SHARE * PAL_LOAD_FAR_SHARE * cap * cap) {
             double far_S = pal_dist3(body->d + 3 * i, body->node_rest + 3 * i) / body->length_scale_m;
             if (far_S > 2 && staying < 0) staying = stays(body);
-            if (staying > 0) cap *= share_far_S(far_S);
+            if (far_S > 2 && staying > 0) cap *= fmax(PAL_LOAD_FAR_SHARE, 0.5 * (4 - far_S));
         }
         if (load2 <= cap * cap) continue;
         uint64_t before = pal_clock_ns();

@@ -1,12 +1,13 @@
 /* Recovery of stress at nodes, and the error estimate from it. */
 #include "server/sim/world/zz_estimator.h"
 
+#include "server/sim/world/tuning.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { MAX_MATERIAL = 16 };
-static const double same = 1.25;
 
 /* state of the passes over all stress points */
 typedef struct recovery {
@@ -31,7 +32,7 @@ static int material_of(recovery *r, const pal_stress_point *p)
         double off = fmax(apart(p->mu_Pa, r->mu[k]), apart(kappa, r->lambda[k] + 2 * r->mu[k] / 3));
         if (off < min) min = off, nearest = k;
     }
-    if (min <= same || r->n_material == MAX_MATERIAL) return nearest;
+    if (min <= PAL_SAME_MATERIAL || r->n_material == MAX_MATERIAL) return nearest;
     r->mu[r->n_material] = p->mu_Pa, r->lambda[r->n_material] = p->lambda_Pa;
     return r->n_material++;
 }
@@ -78,40 +79,34 @@ static void compare(void *user, const pal_stress_point *p)
     if (r->share) r->share[p->element] += error2;
 }
 
-static void recover(recovery *r, const pal_component *row, const pal_body *body)
+static void recover(recovery *r, const pal_component *component, const pal_body *body)
 {
     size_t n = (size_t)body->n_node;
-    (void)row->effect->energy(row->self, body); /* components update their rotations with it */
-    row->effect->stress(row->self, body, list_materials, r);
+    (void)component->effect->energy(component->self, body); /* components update their rotations with it */
+    component->effect->inspect.stress(component->self, body, list_materials, r);
     for (r->material = 0; r->material < r->n_material; r->material++) {
         memset(r->sum, 0, 9 * n * sizeof *r->sum);
         memset(r->volume, 0, n * sizeof *r->volume);
-        row->effect->stress(row->self, body, gather, r);
+        component->effect->inspect.stress(component->self, body, gather, r);
         for (size_t i = 0; i < 9 * n; i++)
             if (r->volume[i / 9] > 0) r->sum[i] /= r->volume[i / 9];
-        row->effect->stress(row->self, body, compare, r);
+        component->effect->inspect.stress(component->self, body, compare, r);
     }
-}
-
-/* the first component of the body that gives stress; NULL: none */
-static const pal_component *stress_row(const pal_world *world, const pal_body *body)
-{
-    for (int i = 0; i < pal_world_component_count(world); i++) {
-        pal_component_info info;
-        pal_world_component_info(world, i, &info);
-        if (info.body == body->name && pal_world_component(world, i)->effect->stress)
-            return pal_world_component(world, i);
-    }
-    return NULL;
 }
 
 pal_err pal_zz_estimator_estimate(const pal_world *world, int body, double *share_J, pal_zz_estimator_error *out,
                                   pal_diagnostic *diag)
 {
     const pal_body *at = pal_world_view_body(world, body);
-    const pal_component *row = stress_row(world, at);
+    const pal_component *found = NULL; /* the first one of the body that gives stress */
+    for (int i = 0; i < pal_world_component_count(world) && !found; i++) {
+        pal_component_info info;
+        pal_world_component_info(world, i, &info);
+        const pal_component *component = pal_world_component(world, i);
+        if (info.body == at->name && component->effect->inspect.stress) found = component;
+    }
     *out = (pal_zz_estimator_error){.error = NAN, .solution = NAN, .percent = NAN};
-    if (!row)
+    if (!found)
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": none of its rows gives stress in elements",
                                   at->name);
     recovery r = {.share = share_J};
@@ -120,7 +115,7 @@ pal_err pal_zz_estimator_estimate(const pal_world *world, int body, double *shar
     pal_err err =
         r.sum && r.volume ? PAL_ERR_OK : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory to recover stress");
     if (!err) {
-        recover(&r, row, at);
+        recover(&r, found, at);
         double all = r.error2 + r.solution2;
         *out = (pal_zz_estimator_error){.error = sqrt(r.error2),
                                         .solution = sqrt(r.solution2),

@@ -16,7 +16,7 @@ static void dividing_a_cell_keeps_the_volume_and_its_neighbours_whole(void)
     double before = pal_cells_volume(&c, NULL);
     for (int32_t i = 0; i < c.n_edge; i++) c.edge[i].sharp = i == solid_edge(&c, 21, 22) ? 2 : 0;
     pal_cells_edit e;
-    REQUIRE(!pal_cells_divide_near(&c, 13, 0, &e, &diag));
+    REQUIRE(!pal_cells_apply(&c, &(pal_cells_command){.kind = PAL_CELLS_DIVIDE, .cell = 13, .rings = 0}, &e, &diag));
     check_carrying(&e, &c);
     /* 12 halves more and 24 + 6 inside; 24 - 6 quads more and 12 inside */
     check_counts(&e.cells, 64 + 19, 144 + 12 + 24 + 6, 108 + 18 + 12, 27 + 7);
@@ -131,15 +131,17 @@ static void rings_take_the_neighbours_along(void)
 {
     pal_cells c = solid_block(5, 3, 3);
     pal_cells_edit e;
-    REQUIRE(!pal_cells_divide_near(&c, cell_near(&c, 0, 0, 0), 1, &e, &diag));
+    REQUIRE(!pal_cells_apply(
+        &c, &(pal_cells_command){.kind = PAL_CELLS_DIVIDE, .cell = cell_near(&c, 0, 0, 0), .rings = 1}, &e, &diag));
     CHECK_INT(e.cells.n_cell, 18 + 27 * 8);
     check_carrying(&e, &c);
     for (int level = 1; level <= 2; level++) CHECK_INT(quality(&e.cells, level, PAL_SUBDIVISION_MACCRACKEN_JOY), 2);
     pal_cells_edit_free(&e);
-    REQUIRE(!pal_cells_divide_near(&c, 0, 99, &e, &diag));
+    REQUIRE(!pal_cells_apply(&c, &(pal_cells_command){.kind = PAL_CELLS_DIVIDE, .cell = 0, .rings = 99}, &e, &diag));
     check_counts(&e.cells, 11 * 7 * 7, 10 * 49 + 2 * 11 * 6 * 7, 11 * 36 + 2 * 10 * 42, 360);
     pal_cells_edit_free(&e);
-    CHECK_INT(pal_cells_divide_near(&c, 0, -1, &e, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(pal_cells_apply(&c, &(pal_cells_command){.kind = PAL_CELLS_DIVIDE, .cell = 0, .rings = -1}, &e, &diag),
+              PAL_ERR_REFUSED);
     CHECK_TEXT(diag.text, "divide cell 0: -1 rings, must be 0 to 1000");
     const int32_t twice[2] = {4, 4};
     CHECK_INT(pal_cells_divide(&c, 2, twice, &e, &diag), PAL_ERR_REFUSED);
@@ -149,7 +151,8 @@ static void rings_take_the_neighbours_along(void)
     CHECK(!e.cells.x && !e.rows.start && !e.offset);
     pal_cells_free(&c);
     c = solid_block(9, 8, 8);
-    CHECK_INT(pal_cells_divide_near(&c, 0, 99, &e, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(pal_cells_apply(&c, &(pal_cells_command){.kind = PAL_CELLS_DIVIDE, .cell = 0, .rings = 99}, &e, &diag),
+              PAL_ERR_REFUSED);
     CHECK_TEXT(diag.text, "divide: 576 cells, must be 1 to 512");
     pal_cells_free(&c);
 }

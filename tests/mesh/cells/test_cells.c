@@ -65,7 +65,7 @@ static void radial_mate_radial_mate_visits_every_cell_round_an_edge_once(void)
         if (c.edge[e].boundary) continue;
         int u = first;
         do {
-            int cell = pal_cells_cell_of(&c, u);
+            int cell = cell_of_use(&c, u);
             for (int k = 0; k < n_seen; k++) CHECK(seen[k] != cell);
             seen[n_seen++] = cell;
             CHECK_INT(c.edge_use[u].edge, e);
@@ -448,14 +448,15 @@ static void what_is_no_complex_is_refused_in_a_sentence(void)
     l = open_block(1, 1, 1);
     l.vertex_sharpness[4] = -1;
     refused(l, "cells: vertex 4 has sharpness -1, must be 0 to 1e+06");
-    pal_cell_tag tag = {0, 7, 1};
     l = open_block(1, 1, 1);
-    l.edge_tag[0] = tag, l.n_edge_tag = 1;
+    pal_cell_loops_edge(&l, 0, 7, 1);
     refused(l, "cells: sharpness 1 of an edge of vertices 0 and 7: no cell has it");
     l = open_block(1, 1, 1);
-    l.edge_tag[0] = (pal_cell_tag){0, 1, (float)NAN}, l.n_edge_tag = 1;
+    pal_cell_loops_edge(&l, 0, 1, 1);
+    l.edge_tag[0].sharp = (float)NAN;
     refused(l, "of vertices 0 and 1: must be 0 to 1000000");
     l = open_block(1, 1, 1);
+    l.face_tag = malloc(sizeof *l.face_tag);
     l.face_tag[0] = (pal_cell_tag){6, 0, 1}, l.n_face_tag = 1;
     refused(l, "cells: sharpness of loop 6, there are 6");
 }

@@ -516,7 +516,7 @@ static void ply_and_tetgen_files_come_back_as_they_were(void)
     pal_surface s = {0}, back = {0};
     REQUIRE(parse("t.obj", obj, sizeof obj - 1, &s, NULL, NULL) == PAL_ERR_OK);
     snprintf(path, sizeof path, "%s/t.ply", folder);
-    REQUIRE(pal_mesh_file_write_ply(path, &s, NULL) == PAL_ERR_OK);
+    REQUIRE(pal_mesh_file_write(path, &s, NULL) == PAL_ERR_OK);
     REQUIRE(pal_mesh_file_read(path, &metres, &back, NULL, NULL, NULL, NULL) == PAL_ERR_OK);
     CHECK_INT(back.n_tri, 4);
     for (int k = 0; k < 12; k++) CHECK_NEAR(back.x[k] + back.origin_m[k % 3], s.x[k] + s.origin_m[k % 3], 1e-6);
@@ -573,7 +573,7 @@ static void ply_and_tetgen_files_come_back_as_they_were(void)
     }
     /* a file that cannot be written leaves nothing behind */
     pal_diagnostic diag = {{0}};
-    CHECK_INT(pal_mesh_file_write_ply("/nonexistent/t.ply", &s, &diag), PAL_ERR_IO);
+    CHECK_INT(pal_mesh_file_write("/nonexistent/t.ply", &s, &diag), PAL_ERR_IO);
     CHECK(rmdir(folder) == 0);
     pal_surface_free(&s);
     pal_surface_free(&back);

@@ -74,7 +74,7 @@ static void hexahedra_and_fields_read_back_equal(void)
     pal_hexes hexes;
     pal_diagnostic diag;
     REQUIRE(!pal_voxels_fill(&ball, &options, &voxels, &report, &diag) && !pal_voxels_split(&voxels, &tets));
-    REQUIRE(!pal_hexes_find(&tets, &hexes, &diag) && !pal_hexes_fill(&hexes, &tets, &ball, 0, &diag));
+    REQUIRE(!pal_hexes_find(&tets, &hexes, &diag) && !pal_hexes_fill(&hexes, &tets, &ball, &diag));
     double *u = malloc((size_t)tets.n_node * 24), *fill = malloc((size_t)hexes.n_hex * 8);
     uint64_t state = 4;
     for (int i = 0; i < 3 * tets.n_node; i++) u[i] = random_signed(&state) * pow(10, i % 20 - 10);

@@ -233,6 +233,14 @@ static void spokes_reach_every_face_of_a_vertex(void)
     }
 }
 
+/* the face that e is an inner edge of; -1: of level 0, or half of an edge */
+static int32_t parent_face(const pal_levels *l, int32_t e)
+{
+    int level = l->edge_level[e];
+    int32_t i = level ? e - l->first_edge[level] - 2 * pal_levels_n_edge(l, level - 1) : -1;
+    return i >= 0 ? l->first_face[level - 1] + i / 3 : -1;
+}
+
 static void children_and_parents_agree(void)
 {
     pal_surface s;
@@ -242,7 +250,7 @@ static void children_and_parents_agree(void)
         int faults = 0;
         for (int32_t e = 0; e < l.first_edge[l.n_level]; e++) {
             int32_t m = pal_levels_edge_midpoint(&l, e), p = pal_levels_edge_parent(&l, e);
-            int32_t pf = pal_levels_edge_parent_face(&l, e);
+            int32_t pf = parent_face(&l, e);
             int level = l.edge_level[e];
             faults += level == 0 ? p >= 0 || pf >= 0 : (p < 0) == (pf < 0);
             if (p >= 0) faults += pal_levels_edge_half(&l, p, 0) != e && pal_levels_edge_half(&l, p, 1) != e;

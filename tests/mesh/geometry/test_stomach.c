@@ -171,7 +171,7 @@ static void the_same_every_time(void)
     REQUIRE(!pal_stomach_make(&again));
     CHECK(!memcmp(again.surface.x, s->surface.x, 3 * PAL_STOMACH_VERTEX * sizeof(double)));
     CHECK(!memcmp(again.surface.tri, s->surface.tri, 3 * 372 * sizeof(int32_t)));
-    pal_stomach_free(&again);
+    pal_surface_free(&again.surface);
     CHECK(again.surface.x == NULL);
 }
 

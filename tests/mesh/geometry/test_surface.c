@@ -255,6 +255,33 @@ static void flat_triangles_are_mended_without_a_slit(void)
     pal_surface_free(&s);
 }
 
+/* a double pyramid with a corner in the middle of one edge at its tip and a flat triangle beside it */
+static void flat_triangles_at_a_crowded_vertex_are_dropped(void)
+{
+    for (int m = 20; m <= 80; m += 60) {
+        double *x = malloc(3 * sizeof *x * (size_t)(m + 3));
+        int32_t *tri = malloc(3 * sizeof *tri * (size_t)(2 * m + 2)), n = 0;
+        const double fixed[9] = {0, 0, 1, 0, 0, -1, 0.5, 0, 0.5};
+        memcpy(x, fixed, sizeof fixed);
+        for (int i = 0; i < m; i++) {
+            double a = 6.283185307179586 * i / m, ring[3] = {cos(a), sin(a), 0};
+            int32_t r = 3 + i, q = 3 + (i + 1) % m, up[2][3] = {{0, r, q}, {1, q, r}};
+            memcpy(x + 3 * r, ring, sizeof ring);
+            memcpy(tri + 3 * n, up, sizeof up);
+            n += 2;
+        }
+        const int32_t around[3][3] = {{0, 2, 4}, {2, 3, 4}, {0, 3, 2}};
+        memcpy(tri, around[0], sizeof around[0]);
+        memcpy(tri + 3 * n, around[1], 2 * sizeof around[1]);
+        pal_surface s = {.n_vertex = m + 3, .n_tri = n + 2, .x = x, .tri = tri};
+        pal_surface_report report = {0};
+        REQUIRE(!pal_surface_clean(&s, 0, &report, NULL));
+        CHECK_INT(report.n_repaired, m == 20);
+        CHECK_INT(report.n_degenerate, m == 80);
+        pal_surface_free(&s);
+    }
+}
+
 static void nothing_left_is_refused_with_counts(void)
 {
     pal_surface s = cube();
@@ -277,6 +304,7 @@ int main(void)
     RUN(welding_joins_triangle_soup_within_the_tolerance_only);
     RUN(a_fin_vanishes_but_a_body_drawn_twice_stays);
     RUN(flat_triangles_are_mended_without_a_slit);
+    RUN(flat_triangles_at_a_crowded_vertex_are_dropped);
     RUN(nothing_left_is_refused_with_counts);
     return check_report();
 }

@@ -99,7 +99,7 @@ static void a_box_fills_its_voxels_exactly(void)
     pal_voxel_options options = {.resolution = 32, .border = true};
     body b;
     REQUIRE(make_body(&box, &options, &b));
-    REQUIRE(!pal_hexes_fill(&b.hexes, &b.tets, &box, 0, NULL));
+    REQUIRE(!pal_hexes_fill(&b.hexes, &b.tets, &box, NULL));
     CHECK(b.hexes.measured);
     double h = b.tets.edge_m, worst = 0;
     int n_whole = 0, n_none = 0;
@@ -136,7 +136,7 @@ static void total_fill_is_the_volume_of_a_box_at_an_angle_and_of_a_ball(void)
         pal_voxel_options options = {.resolution = 20, .border = true};
         body b;
         REQUIRE(make_body(&s, &options, &b));
-        REQUIRE(!pal_hexes_fill(&b.hexes, &b.tets, &s, 0, NULL));
+        REQUIRE(!pal_hexes_fill(&b.hexes, &b.tets, &s, NULL));
         /* corners outside the border layer are missing from the sum */
         CHECK_NEAR(fill_volume(&b) / exact, 1, turn < 5 ? 0.002 : 0.002);
         if (turn == 5) CHECK_NEAR(fill_volume(&b) / (4 * SHAPE_PI / 3 * 1e-3), 1, 0.01);
@@ -153,7 +153,7 @@ static void overlapping_hollow_and_open_bodies_are_filled_too(void)
     pal_voxel_options options = {.resolution = 20, .border = true};
     body b;
     REQUIRE(make_body(&two, &options, &b));
-    REQUIRE(!pal_hexes_fill(&b.hexes, &b.tets, &two, 0, NULL));
+    REQUIRE(!pal_hexes_fill(&b.hexes, &b.tets, &two, NULL));
     CHECK_NEAR(fill_volume(&b), 0.6 * 0.16 + 0.4 * 0.04, 1e-5);
     free_body(&b);
     pal_surface_free(&two);
@@ -162,7 +162,7 @@ static void overlapping_hollow_and_open_bodies_are_filled_too(void)
     shape_invert(&hollow);
     hollow = shape_join(shape_cube(2), hollow);
     REQUIRE(make_body(&hollow, &options, &b));
-    REQUIRE(!pal_hexes_fill(&b.hexes, &b.tets, &hollow, 0, NULL));
+    REQUIRE(!pal_hexes_fill(&b.hexes, &b.tets, &hollow, NULL));
     CHECK_NEAR(fill_volume(&b), 8 - 0.729, 1e-3);
     free_body(&b);
     pal_surface_free(&hollow);
@@ -172,7 +172,7 @@ static void overlapping_hollow_and_open_bodies_are_filled_too(void)
     open.n_tri -= 6;
     REQUIRE(make_body(&open, &options, &b));
     CHECK(b.report.open);
-    REQUIRE(!pal_hexes_fill(&b.hexes, &b.tets, &open, 0, NULL));
+    REQUIRE(!pal_hexes_fill(&b.hexes, &b.tets, &open, NULL));
     CHECK_NEAR(fill_volume(&b) / whole, 1, 0.01);
     free_body(&b);
     pal_surface_free(&open);
@@ -188,10 +188,10 @@ static void a_surface_that_is_not_the_meshs_is_refused(void)
     pal_diagnostic diag;
     body b;
     REQUIRE(make_body(&cube, &options, &b));
-    CHECK_INT(pal_hexes_fill(&b.hexes, &b.tets, &sheet, 0, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(pal_hexes_fill(&b.hexes, &b.tets, &sheet, &diag), PAL_ERR_REFUSED);
     CHECK(!b.hexes.measured);
     sheet.x[0] = -1e4;
-    CHECK_INT(pal_hexes_fill(&b.hexes, &b.tets, &sheet, 0, &diag), PAL_ERR_REFUSED);
+    CHECK_INT(pal_hexes_fill(&b.hexes, &b.tets, &sheet, &diag), PAL_ERR_REFUSED);
     CHECK(strstr(diag.text, "beyond the mesh"));
     free_body(&b);
     pal_surface_free(&cube);
@@ -223,9 +223,8 @@ static void min_fill_leaves_the_voxels_of_the_reference_boxes(void)
         CHECK_INT(b.hexes.n_hex, wanted[k].n_voxel);
         CHECK_INT(b.tets.n_node, wanted[k].n_node);
         CHECK_INT(b.voxels.n_border, 0);
-        CHECK_INT(b.report.n_edge_only, 0);
         CHECK(b.report.n_dropped > 0);
-        REQUIRE(!pal_hexes_fill(&b.hexes, &b.tets, &s, 0, NULL));
+        REQUIRE(!pal_hexes_fill(&b.hexes, &b.tets, &s, NULL));
         for (int e = 0; e < b.hexes.n_hex; e++) CHECK(b.hexes.fill[e] == 1.0F);
         free_body(&b);
         pal_surface_free(&s);
@@ -241,10 +240,10 @@ static void min_fill_drops_border_voxels_only(void)
     body all, some;
     pal_voxel_options options = {.resolution = 20, .border = true};
     REQUIRE(make_body(&s, &options, &all));
-    REQUIRE(!pal_hexes_fill(&all.hexes, &all.tets, &s, 0, NULL));
+    REQUIRE(!pal_hexes_fill(&all.hexes, &all.tets, &s, NULL));
     options.min_fill = 0.3;
     REQUIRE(make_body(&s, &options, &some));
-    REQUIRE(!pal_hexes_fill(&some.hexes, &some.tets, &s, 0, NULL));
+    REQUIRE(!pal_hexes_fill(&some.hexes, &some.tets, &s, NULL));
     CHECK_INT(some.voxels.n_inside, all.voxels.n_inside);
     CHECK_INT(some.voxels.n_border + some.report.n_dropped, all.voxels.n_border);
     CHECK_INT(pal_tets_check(&some.tets, NULL), PAL_ERR_OK);
@@ -272,7 +271,6 @@ static void voxels_joined_by_an_edge_are_counted(void)
         body b;
         REQUIRE(make_body(&s, &options, &b));
         CHECK_INT(b.hexes.n_hex, 128);
-        CHECK_INT(b.report.n_edge_only, 4);
         CHECK_INT(b.report.n_component, 2);
         CHECK_INT(pal_tets_check(&b.tets, NULL), PAL_ERR_OK);
         free_body(&b);
@@ -311,9 +309,9 @@ static void a_surface_that_reaches_beyond_the_mesh_fills_it_alike(void)
         REQUIRE(make_body(&both, &options, &b));
         size_t n_byte = (size_t)b.hexes.n_hex * sizeof *b.hexes.fill;
         float *own = malloc(n_byte);
-        REQUIRE(own && !pal_hexes_fill(&b.hexes, &b.tets, &ball, 0, NULL));
+        REQUIRE(own && !pal_hexes_fill(&b.hexes, &b.tets, &ball, NULL));
         memcpy(own, b.hexes.fill, n_byte);
-        REQUIRE(!pal_hexes_fill(&b.hexes, &b.tets, &both, 0, NULL));
+        REQUIRE(!pal_hexes_fill(&b.hexes, &b.tets, &both, NULL));
         double worst = 0;
         for (int e = 0; e < b.hexes.n_hex; e++) worst = fmax(worst, fabs((double)(own[e] - b.hexes.fill[e])));
         CHECK_LE(worst, 1e-6);

@@ -1,19 +1,21 @@
-/* Voxels and their split: what is inside whatever the surface's faults, exact ties, sound tetrahedra, refusals. */
+/* Voxels: what is inside whatever the surface's faults, exact ties, refusals. */
 #include "server/mesh/geometry/tets.h"
 #include "server/mesh/voxel/voxels.h"
 #include "tests/check.h"
 #include "tests/fixtures/random.h"
 #include "tests/fixtures/shapes.h"
+#include "tests/mesh/voxel/flood.h"
 #include "tests/stability/hard_case.h"
-
-#include <malloc.h>
 
 static pal_diagnostic diag;
 static pal_voxel_report report;
 
 static pal_err fill(const pal_surface *s, int resolution, const char *method, pal_voxels *out)
 {
-    pal_voxel_options options = {.resolution = resolution, .border = true, .method = method};
+    static const char *const name[] = {"scanline", "vote", "winding"};
+    pal_voxel_options options = {.resolution = resolution, .border = true};
+    for (int k = 0; k < 3; k++)
+        if (method && !strcmp(method, name[k])) options.method = PAL_VOXELS_SCANLINE + (pal_voxel_method)k;
     return pal_voxels_fill(s, &options, out, &report, &diag);
 }
 
@@ -235,7 +237,7 @@ static void every_component_is_found(void)
     HARD_CASE_ALL("cavities", "tet_springs fem", "pieces found", report.n_component, 4);
     int64_t all = v.n_inside;
     pal_voxels_free(&v);
-    REQUIRE(!fill(&s, 60, "flood", &v));
+    REQUIRE(!flood_voxels(&s, 60, &v, &diag));
     CHECK_INT(v.n_inside, all);
     pal_voxels_free(&v);
     pal_voxel_options options = {.resolution = 60, .border = true, .largest_only = true};
@@ -280,7 +282,7 @@ static int64_t count_different(const pal_voxels *a, const pal_voxels *b)
 
 static void all_methods_agree_on_closed_shapes(void)
 {
-    static const char *const METHOD[] = {"scanline", "vote", "winding", "flood"};
+    static const char *const METHOD[] = {"scanline", "vote", "winding"};
     for (int shape = 0; shape < 3; shape++) {
         pal_surface s = shape == 0   ? shape_ball(0.1, 40, 20, 0.2)
                         : shape == 1 ? shape_torus(0.1, 0.04, 50, 24)
@@ -290,7 +292,7 @@ static void all_methods_agree_on_closed_shapes(void)
         pal_voxels first, v;
         REQUIRE(!fill(&s, 25, NULL, &first));
         for (int m = 0; m < 4; m++) {
-            REQUIRE(!fill(&s, 25, METHOD[m], &v));
+            REQUIRE(!(m < 3 ? fill(&s, 25, METHOD[m], &v) : flood_voxels(&s, 25, &v, &diag)));
             if (m < 3) CHECK_TEXT(report.method, m == 0 ? "scanline" : m == 1 ? "vote" : "winding");
             CHECK_INT(count_different(&first, &v), 0);
             pal_voxels_free(&v);
@@ -305,7 +307,7 @@ static void flood_reports_a_leak(void)
     pal_surface s = shape_cube(0.1);
     s.n_tri--;
     pal_voxels v;
-    CHECK_INT(fill(&s, 10, "flood", &v), PAL_ERR_REFUSED);
+    CHECK_INT(flood_voxels(&s, 10, &v, &diag), PAL_ERR_REFUSED);
     CHECK(strstr(diag.text, "leaks"));
     pal_surface_free(&s);
 }
@@ -540,7 +542,6 @@ static void options_out_of_range_are_refused(void)
     pal_voxels v;
     CHECK_INT(fill(&s, 0, NULL, &v), PAL_ERR_REFUSED);
     CHECK_INT(fill(&s, 1025, NULL, &v), PAL_ERR_REFUSED);
-    CHECK_INT(fill(&s, 10, "magic", &v), PAL_ERR_REFUSED);
     pal_voxel_options options = {.resolution = 50, .max_voxel = 1000};
     CHECK_INT(pal_voxels_fill(&s, &options, &v, &report, &diag), PAL_ERR_BUDGET);
     CHECK(strstr(diag.text, "125000"));
@@ -611,62 +612,6 @@ static void large_and_sliver_triangles_are_scanned_like_small_ones(void)
     }
 }
 
-static void split_gives_sound_tetrahedra(void)
-{
-    for (int shape = 0; shape < 3; shape++) {
-        pal_surface s = shape == 0   ? shape_cube(0.1)
-                        : shape == 1 ? shape_ball(0.1, 40, 20, 0.3)
-                                     : shape_torus(0.1, 0.03, 50, 20);
-        pal_voxels v;
-        pal_tets t;
-        REQUIRE(!fill(&s, 5 + 13 * shape, NULL, &v));
-        REQUIRE(!pal_voxels_split(&v, &t));
-        if (pal_tets_check(&t, &diag)) CHECK_FAIL("%s", diag.text);
-        CHECK_INT(t.n_tet, 5 * (v.n_inside + v.n_border));
-        CHECK_NEAR(pal_tets_volume(&t) / ((double)(v.n_inside + v.n_border) * pow(v.edge_m, 3)), 1, 1e-9);
-        /* one inner tetrahedron of a third, four corners of a sixth */
-        double volume = pow(v.edge_m, 3);
-        for (int k = 0; k < t.n_tet; k += 97) {
-            pal_tets one = {.n_tet = 1, .x = t.x, .tet = t.tet + 4 * k};
-            CHECK_NEAR(pal_tets_volume(&one) / volume, k % 5 == 4 ? 1.0 / 3 : 1.0 / 6, 1e-6);
-        }
-        /* the boundary it wrote is the boundary that its tetrahedra have */
-        pal_tets again = t;
-        again.face = NULL;
-        again.on_surface = NULL;
-        REQUIRE(!pal_tets_find_boundary(&again));
-        CHECK_INT(again.n_face, t.n_face);
-        CHECK(!memcmp(again.on_surface, t.on_surface, (size_t)t.n_node));
-        double enclosed[2] = {0, 0};
-        for (int which = 0; which < 2; which++) {
-            pal_surface hull = {.n_vertex = t.n_node, .n_tri = t.n_face, .x = t.x, .tri = which ? again.face : t.face};
-            enclosed[which] = pal_surface_volume(&hull);
-        }
-        CHECK_NEAR(enclosed[0] / pal_tets_volume(&t), 1, 1e-9);
-        CHECK_NEAR(enclosed[1] / pal_tets_volume(&t), 1, 1e-9);
-        free(again.face);
-        free(again.on_surface);
-        pal_tets_free(&t);
-        pal_voxels_free(&v);
-        pal_surface_free(&s);
-    }
-}
-
-static void split_takes_at_most_120_bytes_a_tetrahedron(void)
-{
-    pal_surface s = shape_sphere(0.1);
-    pal_voxels v;
-    pal_tets t;
-    REQUIRE(!fill(&s, 60, NULL, &v));
-    REQUIRE(!pal_voxels_split(&v, &t));
-    size_t kept = malloc_usable_size(v.kind) + malloc_usable_size(t.x) + malloc_usable_size(t.tet) +
-                  malloc_usable_size(t.face) + malloc_usable_size(t.on_surface);
-    CHECK_LE((double)kept / t.n_tet, 40);
-    pal_tets_free(&t);
-    pal_voxels_free(&v);
-    pal_surface_free(&s);
-}
-
 int main(void)
 {
     RUN(closed_shapes_have_their_volume);
@@ -695,7 +640,5 @@ int main(void)
     RUN(options_out_of_range_are_refused);
     RUN(noise_is_refused_within_a_budget);
     RUN(large_and_sliver_triangles_are_scanned_like_small_ones);
-    RUN(split_gives_sound_tetrahedra);
-    RUN(split_takes_at_most_120_bytes_a_tetrahedron);
     return check_report();
 }

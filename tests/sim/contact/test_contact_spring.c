@@ -1,6 +1,7 @@
 /* Springs between tools and tissue, as an implicit solver takes them. */
 #include "server/base/arena.h"
 #include "server/sim/contact/contact_spring.h"
+#include "server/sim/contact/tuning.h"
 #include "tests/fixtures/random.h"
 #include "tests/fixtures/tool_scene.h"
 
@@ -12,6 +13,7 @@ typedef struct spring_scene {
     pal_contact_points points;
     pal_contact_springs springs;
     pal_contact contact[MAX_CONTACTS];
+    double x[MAX_CONTACTS][3];
     int n;
     double centre[3];
 } spring_scene;
@@ -43,12 +45,13 @@ static bool open_springs(spring_scene *t, bool skinned)
     if (!out || out->effect->run(out->self, &step)) return false;
     t->arena = pal_arena_create(1 << 20, true);
     if (!t->arena || pal_contact_points_make(body, 0.006, 10000, t->arena, &t->points)) return false;
-    if (pal_contact_springs_make(body, MAX_CONTACTS + 2, t->arena, &t->springs)) return false;
+    if (pal_contact_springs_make(&t->points, body, MAX_CONTACTS + 2, t->arena, &t->springs)) return false;
     double top = -1;
-    for (int i = 0; i < body->n_shown; i++)
-        if ((double)body->shown[3 * i + 2] > top) {
-            top = (double)body->shown[3 * i + 2];
-            for (int c = 0; c < 3; c++) t->centre[c] = (double)body->shown[3 * i + c] + (c == 2 ? 0.008 : 0.001);
+    for (int i = 0; i < body->display.n_shown; i++)
+        if ((double)body->display.shown[3 * i + 2] > top) {
+            top = (double)body->display.shown[3 * i + 2];
+            for (int c = 0; c < 3; c++)
+                t->centre[c] = (double)body->display.shown[3 * i + c] + (c == 2 ? 0.008 : 0.001);
         }
     int32_t *list = PAL_NEW(t->arena, int32_t, t->points.sample.max_point);
     pal_contact_points_begin(&t->points);
@@ -58,12 +61,12 @@ static bool open_springs(spring_scene *t, bool skinned)
     for (int i = 0; i < n && t->n < MAX_CONTACTS; i++) {
         pal_contact *c = &t->contact[t->n];
         c->point = list[i];
-        pal_contact_points_position(&t->points, list[i], c->x);
-        pal_sub3(c->away, c->x, t->centre);
+        pal_contact_points_position(&t->points, list[i], t->x[t->n]);
+        pal_sub3(c->away, t->x[t->n], t->centre);
         c->depth_m = 0.02 - pal_norm3(c->away);
         c->k_N_m = 10 + i;
         if (!pal_unit3(c->away, c->away, 1e-6)) continue;
-        if (pal_contact_springs_add(&t->springs, &t->points, body, c->point, c->away, c->k_N_m) != t->n) return false;
+        if (pal_contact_springs_add(&t->springs, c->point, c->away, c->k_N_m) != t->n) return false;
         t->n++;
     }
     return t->n > 5;
@@ -90,7 +93,7 @@ static void measures_what_points_do(void)
                 pal_contact_points_update(&t.points, body, 1);
                 for (int i = 0; i < t.n; i++) {
                     pal_contact_points_position(&t.points, t.contact[i].point, x);
-                    pal_sub3(x, x, t.contact[i].x);
+                    pal_sub3(x, x, t.x[i]);
                     motion[i] = (side ? -0.5 : 0.5) * pal_dot3(x, t.contact[i].away) / step + (side ? motion[i] : 0);
                 }
             }
@@ -102,7 +105,7 @@ static void measures_what_points_do(void)
             free(u);
         }
         printf("  %s: %d springs on %d slots, motion up to %.3g, off by %.2g\n", skinned ? "ball" : "slab", t.n,
-               t.springs.n_frame, largest, worst);
+               t.points.n_slot, largest, worst);
         /* a skin's axes are single precision */
         CHECK(largest > 0.1);
         CHECK_LE(worst, (skinned ? 2e-3 : 1e-9) * largest);
@@ -153,7 +156,7 @@ static void loads_have_the_contacts_force_and_torque(void)
             double f[3];
             pal_scale3(f, 2 * force[i], t.contact[i].away);
             pal_sub3(sum, sum, f);
-            pal_cross3(m, t.contact[i].x, f);
+            pal_cross3(m, t.x[i], f);
             pal_sub3(torque, torque, m);
             size += 2 * force[i];
         }
@@ -175,29 +178,71 @@ static void mean_moves_as_its_points_do(void)
     int first = t.springs.n_row;
     for (int i = 0; i < t.n; i++) weight[i] = 1.0 / t.n;
     for (int c = 0; c < 2; c++)
-        CHECK_INT(pal_contact_springs_add_mean(&t.springs, &t.points, body, t.contact, weight, t.n, axis[c], 5),
-                  first + c);
+        CHECK_INT(pal_contact_springs_add_mean(&t.springs, t.contact, weight, t.n, axis[c], 5), first + c);
     pal_contact_springs_motion(&t.springs, u);
     double mean[2] = {t.springs.motion_m[first], t.springs.motion_m[first + 1]}, wanted[2] = {0};
     pal_contact_springs_begin(&t.springs);
     for (int c = 0; c < 2; c++)
         for (int i = 0; i < t.n / 2; i++)
-            CHECK(pal_contact_springs_add(&t.springs, &t.points, body, t.contact[i].point, axis[c], 1) >= 0);
+            CHECK(pal_contact_springs_add(&t.springs, t.contact[i].point, axis[c], 1) >= 0);
     pal_contact_springs_motion(&t.springs, u);
     for (int i = 0; i < t.springs.n_row; i++) wanted[i / (t.n / 2)] += t.springs.motion_m[i] / t.n;
     pal_contact_springs_begin(&t.springs);
     for (int c = 0; c < 2; c++)
         for (int i = t.n / 2; i < t.n; i++)
-            CHECK(pal_contact_springs_add(&t.springs, &t.points, body, t.contact[i].point, axis[c], 1) >= 0);
+            CHECK(pal_contact_springs_add(&t.springs, t.contact[i].point, axis[c], 1) >= 0);
     pal_contact_springs_motion(&t.springs, u);
     for (int i = 0; i < t.springs.n_row; i++) wanted[i / (t.n - t.n / 2)] += t.springs.motion_m[i] / t.n;
     for (int c = 0; c < 2; c++) CHECK_NEAR(mean[c], wanted[c], 1e-12);
     /* and no row beyond the room there is */
     while (t.springs.n_row < t.springs.max_row)
-        REQUIRE(pal_contact_springs_add(&t.springs, &t.points, body, t.contact[0].point, axis[0], 1) >= 0);
-    CHECK_INT(pal_contact_springs_add(&t.springs, &t.points, body, t.contact[0].point, axis[0], 1), -1);
+        REQUIRE(pal_contact_springs_add(&t.springs, t.contact[0].point, axis[0], 1) >= 0);
+    CHECK_INT(pal_contact_springs_add(&t.springs, t.contact[0].point, axis[0], 1), -1);
     free(u);
     close_springs(&t);
+}
+
+/* the largest eigenvalue of M^-1 K, 1/s^2, by many power iterations */
+static double eigenvalue_1_s2(spring_scene *t)
+{
+    const pal_body *body = t->s.body;
+    double *u = field(body, 3, 1), *ku = calloc(3 * (size_t)body->n_node, sizeof *ku), rate = 0;
+    for (int pass = 0; pass < 400; pass++) {
+        double u2 = 0, uku = 0;
+        memset(ku, 0, 3 * sizeof *ku * (size_t)body->n_node);
+        pal_contact_springs_multiply(&t->springs, 1, u, ku);
+        for (int i = 0; i < 3 * body->n_node; i++) {
+            double m = body->mass_kg[i / 3];
+            uku += u[i] * ku[i], u2 += m * u[i] * u[i];
+            ku[i] = body->support[i / 3] ? 0 : ku[i] / m;
+        }
+        rate = uku / u2;
+        for (int i = 0; i < 3 * body->n_node; i++) u[i] = ku[i] / rate;
+    }
+    free(u), free(ku);
+    return rate;
+}
+
+/* explicit contact divides by this safety, and must not be unstable for it */
+static void few_power_iterations_find_most_of_the_eigenvalue(void)
+{
+    for (int skinned = 0; skinned < 2; skinned++)
+        for (int n = 1; n < MAX_CONTACTS; n *= 3) {
+            spring_scene t;
+            REQUIRE(open_springs(&t, skinned));
+            if (n < t.n) t.n = n;
+            pal_contact_springs_begin(&t.springs);
+            for (int i = 0; i < t.n; i++)
+                REQUIRE(pal_contact_springs_add(&t.springs, t.contact[i].point, t.contact[i].away,
+                                                t.contact[i].k_N_m) == i);
+            double exact = eigenvalue_1_s2(&t);
+            double found = pal_contact_points_max_eigenvalue(&t.points, t.s.body, t.contact, t.n);
+            printf("  %s, %d contacts: %.4g of %.4g 1/s^2, %.3f\n", skinned ? "ball" : "slab", t.n, found, exact,
+                   exact / found);
+            CHECK_LE(found, exact * (1 + 1e-9));
+            CHECK_LE(exact, EIGENVALUE_SAFETY * found);
+            close_springs(&t);
+        }
 }
 
 /* springs to the ground instead of a body: the answer is known */
@@ -228,11 +273,11 @@ static void stiffness_is_that_of_springs_in_series_with_tissue(void)
     }
     REQUIRE(n > 3);
     ground_N_m = 50;
-    CHECK(pal_contact_springs_stiffness(&t.springs, t.s.body, row, share, n, 2, NULL, scratch) == 0);
+    CHECK(pal_contact_springs_stiffness(&t.springs, row, share, n, 2, NULL, scratch) == 0);
     t.s.body->compliance = &door;
-    double one = pal_contact_springs_stiffness(&t.springs, t.s.body, row, share, n, 1, NULL, scratch);
-    double two = pal_contact_springs_stiffness(&t.springs, t.s.body, row, share, n, 2, NULL, scratch);
-    double all = pal_contact_springs_stiffness(&t.springs, t.s.body, row, share, n, 12, NULL, scratch);
+    double one = pal_contact_springs_stiffness(&t.springs, row, share, n, 1, NULL, scratch);
+    double two = pal_contact_springs_stiffness(&t.springs, row, share, n, 2, NULL, scratch);
+    double all = pal_contact_springs_stiffness(&t.springs, row, share, n, 12, NULL, scratch);
     printf("  %d springs: %.6g, %.6g, %.9g N/m with 1, 2, 12 passes, wanted %.9g\n", n, one, two, all, wanted);
     CHECK_LE(one, two);
     CHECK_NEAR(two, wanted, 0.01 * wanted);
@@ -247,6 +292,7 @@ int main(void)
     RUN(stiffness_is_symmetric_and_sums_squares);
     RUN(loads_have_the_contacts_force_and_torque);
     RUN(mean_moves_as_its_points_do);
+    RUN(few_power_iterations_find_most_of_the_eigenvalue);
     RUN(stiffness_is_that_of_springs_in_series_with_tissue);
     return check_report();
 }

@@ -14,9 +14,9 @@ static void begins_without_a_jump_and_pulls_tissue_along(void)
     move_tool(&s, 0, 0, 0, 0.059, false);
     REQUIRE(step_world(&s, 12));
     int top = 0;
-    for (int i = 0; i < s.body->n_shown; i++)
-        if (s.body->shown[3 * i + 2] > s.body->shown[3 * top + 2]) top = i;
-    double before = (double)s.body->shown[3 * top + 2];
+    for (int i = 0; i < s.body->display.n_shown; i++)
+        if (s.body->display.shown[3 * i + 2] > s.body->display.shown[3 * top + 2]) top = i;
+    double before = (double)s.body->display.shown[3 * top + 2];
     move_tool(&s, 0, 0, 0, 0.059, true);
     REQUIRE(step_world(&s, 1));
     CHECK(tool_of(&s, 0)->holding);
@@ -28,7 +28,7 @@ static void begins_without_a_jump_and_pulls_tissue_along(void)
         sum_loads(s.body, load);
         for (int c = 0; c < 3; c++) CHECK_NEAR(load[c], -tool_of(&s, 0)->force_N[c], 1e-9);
     }
-    double moved = (double)s.body->shown[3 * top + 2] - before;
+    double moved = (double)s.body->display.shown[3 * top + 2] - before;
     const double *f = tool_of(&s, 0)->mean_force_N;
     printf("  tool 12 mm up, tissue %.3g mm, %.3g N\n", 1e3 * moved, pal_norm3(f));
     CHECK(moved > 0.006 && moved < 0.014);

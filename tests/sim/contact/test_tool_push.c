@@ -108,7 +108,10 @@ static void tells_the_bridge_where_the_surface_is_before_it_touches(void)
     CHECK_NEAR(pal_norm3(patch->point_m), 0.058, 4e-4);
     CHECK(patch->normal[1] > 0.995);
     CHECK_NEAR(patch->k1_N_m, 2 * 5000 * 0.008 / (1 - 0.45 * 0.45), 1e-6);
-    /* and nothing when the tool is farther than a radius or 10 mm */
+    /* 10 mm away although that is more than the radius, and not farther */
+    move_tool(&s, 0, 0, 0.067, 0, false);
+    REQUIRE(step_world(&s, 1));
+    CHECK_INT(tool_of(&s, 0)->n_patch, 1);
     move_tool(&s, 0, 0, 0.07, 0, false);
     REQUIRE(step_world(&s, 1));
     CHECK_INT(tool_of(&s, 0)->n_patch, 0);

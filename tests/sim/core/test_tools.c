@@ -81,7 +81,7 @@ static void forces_ramp_up_over_a_sixth_of_a_second_and_down_when_released(void)
         CHECK_NEAR(tools.tool[0].ramp, fmax(0, 1 - i / 10.0), 1e-12);
         CHECK(!tools.tool[0].present);
         CHECK(!tools.tool[0].grasp);
-        CHECK_NEAR(tools.tool[0].next.position_m[0], 0.1, 0);
+        CHECK_NEAR(tools.tool[0].requested.position_m[0], 0.1, 0);
         pal_tools_end_step(&tools, 1);
     }
     CHECK_NEAR(tools.tool[0].ramp, 0, 0);

@@ -45,18 +45,18 @@ static void close_body(tool_scene *s, pal_cells *cells, int which)
 static void top_of(const pal_body *body, double out[3])
 {
     double low[3], high[3];
-    pal_surface_box(body->surface, low, high);
+    pal_surface_box(body->display.surface, low, high);
     pal_set3(out, 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), high[2]);
 }
 
 static pal_brush everywhere(double pressure_Pa)
 {
-    return (pal_brush){.kind = PAL_BRUSH_INFLATE, .radius_m = 10, .soft = 0, .pressure_Pa = pressure_Pa};
+    return (pal_brush){.kind = PAL_BRUSH_INFLATE, .radius_m = 10, .softness = 0, .pressure_Pa = pressure_Pa};
 }
 
 static pal_brush handle(const pal_body *body, double lift_m)
 {
-    pal_brush b = {.kind = PAL_BRUSH_CURVE, .radius_m = 0.012, .soft = 0.5, .stiffness_N_m = 20};
+    pal_brush b = {.kind = PAL_BRUSH_CURVE, .radius_m = 0.012, .softness = 0.5, .stiffness_N_m = 20};
     top_of(body, b.at_m);
     pal_copy3(b.to_m, b.at_m);
     b.at_m[0] -= 0.018, b.to_m[0] += 0.018;
@@ -117,10 +117,11 @@ static void an_even_pressure_on_a_closed_surface_has_no_net_force(void)
         CHECK_NEAR(pal_norm3(force) / size, 0, 1e-12);
         CHECK_NEAR(pal_norm3(moment) / size, 0, 1e-12);
         /* sum x . f = 3 p V (divergence theorem) */
-        for (int t = 0; t < s.body->surface->n_tri; t++) {
+        for (int t = 0; t < s.body->display.surface->n_tri; t++) {
             const double *x[3];
             double n[3];
-            for (int c = 0; c < 3; c++) x[c] = s.body->d + 3 * s.body->shown_node[s.body->surface->tri[3 * t + c]];
+            for (int c = 0; c < 3; c++)
+                x[c] = s.body->d + 3 * s.body->display.shown_node[s.body->display.surface->tri[3 * t + c]];
             pal_cross3(n, x[1], x[2]);
             six += pal_dot3(x[0], n);
         }
@@ -179,20 +180,20 @@ static void a_soft_brush_pushes_only_what_it_reaches_along_the_normals(void)
 {
     tool_scene s;
     REQUIRE(open_body(&s, NULL, 0, true));
-    pal_brush b = {.kind = PAL_BRUSH_INFLATE, .radius_m = 0.012, .soft = 1, .pressure_Pa = 1000};
+    pal_brush b = {.kind = PAL_BRUSH_INFLATE, .radius_m = 0.012, .softness = 1, .pressure_Pa = 1000};
     top_of(s.body, b.at_m);
     REQUIRE(!pal_world_brush(s.world, 0, 1, &b, NULL));
     forces(&s, 10);
     double sum[3], wanted = 0;
     sum_loads(s.body, sum);
-    for (int t = 0; t < s.body->surface->n_tri; t++) {
+    for (int t = 0; t < s.body->display.surface->n_tri; t++) {
         double middle[3] = {0, 0, 0}, p[3], q[3], n[3];
-        const int32_t *tri = s.body->surface->tri + 3 * t;
-        for (int c = 0; c < 3; c++) pal_axpy3(middle, 1.0 / 3, s.body->surface->x + 3 * tri[c]);
-        pal_stroke stroke = {.radius_m = 0.012, .soft = 1};
+        const int32_t *tri = s.body->display.surface->tri + 3 * t;
+        for (int c = 0; c < 3; c++) pal_axpy3(middle, 1.0 / 3, s.body->display.surface->x + 3 * tri[c]);
+        pal_stroke stroke = {.radius_m = 0.012, .softness = 1};
         pal_copy3(stroke.at_m, b.at_m);
-        pal_sub3(p, s.body->surface->x + 3 * tri[1], s.body->surface->x + 3 * tri[0]);
-        pal_sub3(q, s.body->surface->x + 3 * tri[2], s.body->surface->x + 3 * tri[0]);
+        pal_sub3(p, s.body->display.surface->x + 3 * tri[1], s.body->display.surface->x + 3 * tri[0]);
+        pal_sub3(q, s.body->display.surface->x + 3 * tri[2], s.body->display.surface->x + 3 * tri[0]);
         pal_cross3(n, p, q);
         wanted += 1000 * pal_stroke_weight(&stroke, middle) * 0.5 * n[2];
     }
@@ -242,7 +243,7 @@ static void a_handle_is_a_spring_of_its_stiffness(void)
         double *p = calloc(3 * n, sizeof *p), *q = calloc(3 * n, sizeof *q), *bound = calloc(n, sizeof *bound), sum = 0;
         for (size_t i = 0; i < n; i++) p[3 * i + 1] = 1;
         row->effect->tangent->multiply(row->self, s.body, 1, 0, p, q);
-        row->effect->stiffness(row->self, s.body, bound);
+        row->effect->bounds.stiffness(row->self, s.body, bound);
         for (size_t i = 0; i < n; i++) {
             sum += q[3 * i + 1];
             CHECK_NEAR(bound[i], q[3 * i + 1], 1e-12);
@@ -358,18 +359,19 @@ static void a_curve_lifts_what_it_holds(void)
             REQUIRE(!pal_world_brush(s.world, 0, 0, &b, NULL));
             run_tidy(&s, 60);
             int near = 0;
-            for (int i = 0; i < s.body->n_shown; i++) {
-                const double *r = s.body->node_rest + 3 * s.body->shown_node[i];
-                const double *best = s.body->node_rest + 3 * s.body->shown_node[near];
+            for (int i = 0; i < s.body->display.n_shown; i++) {
+                const double *r = s.body->node_rest + 3 * s.body->display.shown_node[i];
+                const double *best = s.body->node_rest + 3 * s.body->display.shown_node[near];
                 if (pal_dist3(r, top) < pal_dist3(best, top)) near = i;
             }
-            rise = s.body->d[3 * s.body->shown_node[near] + 2] - s.body->node_rest[3 * s.body->shown_node[near] + 2];
+            rise = s.body->d[3 * s.body->display.shown_node[near] + 2] -
+                   s.body->node_rest[3 * s.body->display.shown_node[near] + 2];
             REQUIRE(!pal_world_brush(s.world, 0, 0, NULL, NULL) && !pal_world_brush(s.world, 0, 1, &all, NULL));
             run_tidy(&s, 60);
-            pal_surface_box(s.body->surface, low, high);
+            pal_surface_box(s.body->display.surface, low, high);
             blown = 0;
-            for (int i = 0; i < s.body->n_shown; i++)
-                blown = fmax(blown, s.body->d[3 * s.body->shown_node[i] + 2] - high[2]);
+            for (int i = 0; i < s.body->display.n_shown; i++)
+                blown = fmax(blown, s.body->d[3 * s.body->display.shown_node[i] + 2] - high[2]);
             hash[turn] = pal_world_hash(s.world);
             CHECK(!s.body->frozen);
             close_body(&s, &cells, which);
@@ -402,7 +404,7 @@ static void what_cannot_be_is_refused_and_changes_nothing(void)
     b = good, b.radius_m = NAN, expect(&s, 0, 0, b, "radius_m nan");
     b = good, b.at_m[1] = NAN, expect(&s, 0, 0, b, "is no number");
     b = good, b.lift_m[1] = INFINITY, expect(&s, 0, 0, b, "is no number");
-    b = good, b.soft = 1.5, expect(&s, 0, 0, b, "soft 1.5, wanted 0 to 1");
+    b = good, b.softness = 1.5, expect(&s, 0, 0, b, "softness 1.5, wanted 0 to 1");
     b = good, b.stiffness_N_m = 0, expect(&s, 0, 0, b, "stiffness_N_m 0, wanted");
     b = good, b.stiffness_N_m = 1e8, expect(&s, 0, 0, b, "takes up to");
     b = good, b.lift_m[0] = 5, expect(&s, 0, 0, b, "lift_m of 5 m");

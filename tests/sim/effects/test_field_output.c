@@ -29,8 +29,8 @@ static void make_measurable(pal_world *world, double (*value)(const double x[3])
         pal_component *row = (pal_component *)(uintptr_t)pal_world_component(world, i);
         if (row->effect->stage != PAL_STAGE_FORCE) continue;
         fake = *row->effect;
-        fake.measure = fake_measure;
-        fake.fields |= 1u << PAL_FIELD_VON_MISES_PA | 1u << PAL_FIELD_ENERGY_J_M3;
+        fake.inspect.measure = fake_measure;
+        fake.inspect.fields |= 1u << PAL_FIELD_VON_MISES_PA | 1u << PAL_FIELD_ENERGY_J_M3;
         row->effect = &fake;
         fake_value = value;
         return;
@@ -86,7 +86,8 @@ static void nobody_looks_nothing_is_there_and_looking_changes_no_bit(void)
             CHECK_INT(pal_world_component_count(b.world), rows + 4);
             CHECK_INT(rows_named(b.world, "field_output"), 4);
             CHECK(pal_world_bytes(b.world) > n_byte);
-            CHECK(b.body->field[PAL_FIELD_VON_MISES_PA] && b.body->field[PAL_FIELD_VON_MISES_PA]->revision > 0);
+            CHECK(b.body->display.field[PAL_FIELD_VON_MISES_PA] &&
+                  b.body->display.field[PAL_FIELD_VON_MISES_PA]->revision > 0);
         }
         /* out in another order than in, twice */
         if (i == 20) CHECK_INT(pal_world_field(b.world, 0, PAL_FIELD_VON_MISES_PA, false, &diag), 0);
@@ -101,7 +102,7 @@ static void nobody_looks_nothing_is_there_and_looking_changes_no_bit(void)
     }
     CHECK_INT(pal_world_component_count(b.world), rows);
     CHECK_INT(pal_world_bytes(b.world), n_byte);
-    for (int k = 0; k < PAL_FIELD_COUNT; k++) CHECK(b.body->field[k] == NULL);
+    for (int k = 0; k < PAL_FIELD_COUNT; k++) CHECK(b.body->display.field[k] == NULL);
     for (int i = 0; i < rows; i++) CHECK(pal_world_component(b.world, i)->effect->stage < PAL_STAGE_COUNT);
     /* a world that is destroyed while somebody looks loses nothing (leak check of the sanitizers) */
     CHECK_INT(pal_world_field(a.world, 0, PAL_FIELD_DISPLACEMENT_M, true, &diag), 0);
@@ -115,13 +116,13 @@ static void displacement_is_the_distance_from_rest(void)
     const double c = cos(0.4), n = sin(0.4), turn[9] = {c, -n, 0, n, c, 0, 0, 0, 1};
     REQUIRE(ball_scene(&s, 8, false, 1, 0.01, 15) && tool_scene_open(&s));
     REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_DISPLACEMENT_M, true, NULL));
-    const pal_shown_field *field = s.body->field[PAL_FIELD_DISPLACEMENT_M];
-    for (int i = 0; i < s.body->n_shown; i++) CHECK_LE((double)field->value[i], 1e-7);
+    const pal_shown_field *field = s.body->display.field[PAL_FIELD_DISPLACEMENT_M];
+    for (int i = 0; i < s.body->display.n_shown; i++) CHECK_LE((double)field->value[i], 1e-7);
     for (int i = 0; i < s.body->n_dof; i++) pal_mul33(s.body->x + 3 * (size_t)i, turn, s.body->x_rest + 3 * (size_t)i);
     for (int k = 0; k < 8; k++) CHECK_INT(pal_world_step(s.world, 1.0 / 60), 0);
     /* turned by 0.4 rad about z, a point moves by 2 sin(0.2) times its distance from the axis */
     double worst = 0;
-    for (int i = 0; i < s.body->n_shown; i++) {
+    for (int i = 0; i < s.body->display.n_shown; i++) {
         const double *x = s.mesh.surface.x + 3 * (size_t)i;
         worst = fmax(worst, fabs((double)field->value[i] - 2 * sin(0.2) * hypot(x[0], x[1])));
     }
@@ -136,16 +137,16 @@ static void measured_values_are_nodal_means_spread_by_the_skin(void)
     make_measurable(s.world, seven);
     REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_ENERGY_J_M3, true, NULL));
     REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_VON_MISES_PA, true, NULL));
-    for (int i = 0; i < s.body->n_shown; i++) {
-        CHECK_NEAR((double)s.body->field[PAL_FIELD_ENERGY_J_M3]->value[i], 7, 1e-5);
-        CHECK_NEAR((double)s.body->field[PAL_FIELD_VON_MISES_PA]->value[i], 70, 1e-4);
+    for (int i = 0; i < s.body->display.n_shown; i++) {
+        CHECK_NEAR((double)s.body->display.field[PAL_FIELD_ENERGY_J_M3]->value[i], 7, 1e-5);
+        CHECK_NEAR((double)s.body->display.field[PAL_FIELD_VON_MISES_PA]->value[i], 70, 1e-4);
     }
     /* a slope in space is followed to within the reach of a vertex's five nodes */
     fake_value = slope;
     pal_world_reset(s.world);
     double worst = 0;
-    for (int i = 0; i < s.body->n_shown; i++)
-        worst = fmax(worst, fabs((double)s.body->field[PAL_FIELD_ENERGY_J_M3]->value[i] -
+    for (int i = 0; i < s.body->display.n_shown; i++)
+        worst = fmax(worst, fabs((double)s.body->display.field[PAL_FIELD_ENERGY_J_M3]->value[i] -
                                  slope(s.mesh.surface.x + 3 * (size_t)i)));
     CHECK(worst > 1e-6);
     CHECK_LE(worst, 2 * s.body->edge_m * 30);
@@ -155,9 +156,9 @@ static void measured_values_are_nodal_means_spread_by_the_skin(void)
     REQUIRE(slab_scene(&s, 4, 3, 2, 0.01, 1, 0.01, 15) && tool_scene_open(&s));
     make_measurable(s.world, slope);
     REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_ENERGY_J_M3, true, NULL));
-    for (int i = 0; i < s.body->n_shown; i++)
-        CHECK_NEAR((double)s.body->field[PAL_FIELD_ENERGY_J_M3]->value[i],
-                   slope(s.body->x_rest + 3 * (size_t)s.body->shown_node[i]), 1e-6);
+    for (int i = 0; i < s.body->display.n_shown; i++)
+        CHECK_NEAR((double)s.body->display.field[PAL_FIELD_ENERGY_J_M3]->value[i],
+                   slope(s.body->x_rest + 3 * (size_t)s.body->display.shown_node[i]), 1e-6);
     tool_scene_close(&s);
 }
 
@@ -172,9 +173,9 @@ static void a_value_that_is_no_number_shows_as_zero(void)
     REQUIRE(slab_scene(&s, 4, 3, 2, 0.01, 1, 0.01, 15) && tool_scene_open(&s));
     make_measurable(s.world, not_a_number);
     REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_ENERGY_J_M3, true, NULL));
-    for (int i = 0; i < s.body->n_shown; i++) {
-        bool good = s.body->x_rest[3 * (size_t)s.body->shown_node[i]] < 0.015;
-        CHECK_NEAR((double)s.body->field[PAL_FIELD_ENERGY_J_M3]->value[i], good ? 2 : 0, 1e-6);
+    for (int i = 0; i < s.body->display.n_shown; i++) {
+        bool good = s.body->x_rest[3 * (size_t)s.body->display.shown_node[i]] < 0.015;
+        CHECK_NEAR((double)s.body->display.field[PAL_FIELD_ENERGY_J_M3]->value[i], good ? 2 : 0, 1e-6);
     }
     tool_scene_close(&s);
 }
@@ -187,7 +188,7 @@ static void values_are_taken_ten_times_a_second_without_heap_and_at_once_after_r
     pal_frame *frame = pal_frame_create(s.world);
     REQUIRE(frame && !pal_world_field(s.world, 0, PAL_FIELD_ENERGY_J_M3, true, NULL));
     REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_DISPLACEMENT_M, true, NULL) && !pal_frame_fit(frame, s.world));
-    const pal_shown_field *field = s.body->field[PAL_FIELD_ENERGY_J_M3];
+    const pal_shown_field *field = s.body->display.field[PAL_FIELD_ENERGY_J_M3];
     uint64_t seen = field->revision;
     int n_new = 0;
     long heap = n_heap_call;
@@ -202,13 +203,13 @@ static void values_are_taken_ten_times_a_second_without_heap_and_at_once_after_r
     CHECK_INT(n_heap_call, heap);
     CHECK_INT(n_new, 20);
     CHECK_NEAR(field->time_s, 2, 1e-9);
-    const float *moved = s.body->field[PAL_FIELD_DISPLACEMENT_M]->value;
+    const float *moved = s.body->display.field[PAL_FIELD_DISPLACEMENT_M]->value;
     double max = 0;
-    for (int i = 0; i < s.body->n_shown; i++) max = fmax(max, (double)moved[i]);
+    for (int i = 0; i < s.body->display.n_shown; i++) max = fmax(max, (double)moved[i]);
     CHECK(max > 1e-3);
     pal_world_reset(s.world);
     CHECK(field->revision != seen);
-    for (int i = 0; i < s.body->n_shown; i++) CHECK_LE((double)moved[i], 1e-8);
+    for (int i = 0; i < s.body->display.n_shown; i++) CHECK_LE((double)moved[i], 1e-8);
     pal_frame_destroy(frame);
     tool_scene_close(&s);
 }
@@ -235,20 +236,20 @@ static void frames_have_room_for_a_field_while_its_row_is_there(void)
         REQUIRE(step_world(&s, 1));
         pal_world_frame(s.world, frame);
     }
-    const pal_shown_field *field = s.body->field[PAL_FIELD_DISPLACEMENT_M];
+    const pal_shown_field *field = s.body->display.field[PAL_FIELD_DISPLACEMENT_M];
     REQUIRE(in->value);
     CHECK_INT(in->revision, field->revision);
     CHECK_NEAR(in->time_s, field->time_s, 0);
-    CHECK(memcmp(in->value, field->value, sizeof(float) * (size_t)s.body->n_shown) == 0);
+    CHECK(memcmp(in->value, field->value, sizeof(float) * (size_t)s.body->display.n_shown) == 0);
     REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_DISPLACEMENT_M, false, NULL));
     CHECK_INT(pal_frame_fit(frame, s.world), 0);
     CHECK(in->value == NULL && in->revision == 0);
     pal_world_frame(s.world, frame);
     CHECK_INT(frame->n_row, pal_world_component_count(s.world));
     /* another row of the same field does not pass for the one before */
-    uint64_t last = field ? s.body->field_revision : 0;
+    uint64_t last = field ? s.body->display.field_revision : 0;
     REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_DISPLACEMENT_M, true, NULL));
-    CHECK(s.body->field[PAL_FIELD_DISPLACEMENT_M]->revision > last);
+    CHECK(s.body->display.field[PAL_FIELD_DISPLACEMENT_M]->revision > last);
     pal_frame_destroy(frame);
     pal_frame_destroy(other);
     tool_scene_close(&s);
@@ -307,7 +308,7 @@ static void an_entry_of_the_scene_keeps_its_row(void)
     CHECK_INT(pal_world_bytes(s.world), n_byte);
     CHECK_INT(pal_world_field(s.world, 0, PAL_FIELD_DISPLACEMENT_M, false, NULL), 0);
     CHECK_INT(pal_world_component_count(s.world), rows);
-    const pal_shown_field *field = s.body->field[PAL_FIELD_DISPLACEMENT_M];
+    const pal_shown_field *field = s.body->display.field[PAL_FIELD_DISPLACEMENT_M];
     REQUIRE(field);
     uint64_t before = field->revision;
     REQUIRE(step_world(&s, 60));
@@ -354,7 +355,7 @@ static void rows_of_other_bodies_stay_theirs(void)
     CHECK_TEXT(now.body, "body");
     REQUIRE(!pal_world_field(s.world, 0, PAL_FIELD_DISPLACEMENT_M, false, NULL));
     REQUIRE(step_world(&s, 5));
-    CHECK(pal_world_body(s.world, 1)->field[PAL_FIELD_DISPLACEMENT_M] != NULL);
+    CHECK(pal_world_body(s.world, 1)->display.field[PAL_FIELD_DISPLACEMENT_M] != NULL);
     REQUIRE(!pal_world_field(s.world, 1, PAL_FIELD_DISPLACEMENT_M, false, NULL));
     CHECK_INT(pal_world_component_count(s.world), rows);
     for (int i = 0; i < rows; i++) {
@@ -399,8 +400,8 @@ static void close_fem(tool_scene *s)
 static double worst_error(const pal_body *body, pal_field field, double wanted)
 {
     double worst = 0;
-    for (int i = 0; i < body->n_shown; i++)
-        worst = fmax(worst, fabs((double)body->field[field]->value[i] / wanted - 1));
+    for (int i = 0; i < body->display.n_shown; i++)
+        worst = fmax(worst, fabs((double)body->display.field[field]->value[i] / wanted - 1));
     return worst;
 }
 
@@ -510,8 +511,8 @@ static void looking_at_a_live_body_of_elements_changes_no_bit(void)
             CHECK_INT(pal_world_step(quiet.world, 1.0 / 60), 0);
         }
         CHECK(pal_world_hash(s.world) == pal_world_hash(quiet.world));
-        for (int i = 0; i < s.body->n_shown; i++)
-            for (int k = 1; k < PAL_FIELD_STIFFNESS_J; k++) CHECK(s.body->field[k]->value[i] >= 0);
+        for (int i = 0; i < s.body->display.n_shown; i++)
+            for (int k = 1; k < PAL_FIELD_STIFFNESS_J; k++) CHECK(s.body->display.field[k]->value[i] >= 0);
         for (int k = 1; k < PAL_FIELD_STIFFNESS_J; k++)
             REQUIRE(!pal_world_field(s.world, 0, (pal_field)k, false, NULL));
         CHECK_INT(pal_world_component_count(s.world), rows);

@@ -14,8 +14,8 @@ static void check_frozen_and_back(tool_scene *s, const double *good)
     CHECK(pal_body_finite(s->body));
     CHECK(memcmp(s->body->x, good, 3 * sizeof(double) * (size_t)s->body->n_dof) == 0);
     CHECK(pal_body_kinetic_J(s->body) == 0);
-    for (int i = 0; i < s->body->n_shown; i++)
-        for (int c = 0; c < 3; c++) CHECK(isfinite(s->body->shown[3 * i + c]));
+    for (int i = 0; i < s->body->display.n_shown; i++)
+        for (int c = 0; c < 3; c++) CHECK(isfinite(s->body->display.shown[3 * i + c]));
     /* it stays, says so once only, and steps go on */
     CHECK_INT(pal_world_step(s->world, s->scene->step_s), 0);
     CHECK(s->body->frozen);

@@ -1,5 +1,6 @@
 /* Row penalty: its force is the gradient of its energy, it bears what supports bear, and gives way by f / k. */
 #include "server/sim/core/effect_list.h"
+#include "tests/fixtures/body_sums.h"
 #include "tests/fixtures/subdivision_scene.h"
 
 static const int32_t bricks[3] = {2, 2, 3};
@@ -81,7 +82,7 @@ static void it_bears_the_weight_under_both_solvers(void)
         REQUIRE(begin(&s, solver[k], 2000, true));
         for (int i = 0; i < 240; i++) CHECK_INT(pal_world_step(s.world, s.scene->step_s), 0);
         const pal_component *row = row_of(&s, "penalty");
-        double weight = 9.81 * pal_subdivision_solid_mass_kg(s.body->model.solid), borne[3] = {0, 0, 0}, lower = 0;
+        double weight = 9.81 * solid_mass_kg(s.body->model.solid), borne[3] = {0, 0, 0}, lower = 0;
         memset(s.body->f, 0, 3 * sizeof(double) * (size_t)s.body->n_node);
         pal_step step = {.body = s.body};
         pal_body_update_nodes(s.body);

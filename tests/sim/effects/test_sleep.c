@@ -85,9 +85,10 @@ static void a_tool_wakes_it_before_it_touches(void)
         REQUIRE(model_scene_open(&m));
         REQUIRE(steps_to_sleep(&m, 1200) > 0);
         double top = -1, woke_m = NAN, touched_m = NAN, force = 0;
-        const float *high = m.body->shown;
-        for (int i = 0; i < m.body->n_shown; i++)
-            if ((double)m.body->shown[3 * i + 2] > top) high = m.body->shown + 3 * (size_t)i, top = (double)high[2];
+        const float *high = m.body->display.shown;
+        for (int i = 0; i < m.body->display.n_shown; i++)
+            if ((double)m.body->display.shown[3 * i + 2] > top)
+                high = m.body->display.shown + 3 * (size_t)i, top = (double)high[2];
         const double at[3] = {(double)high[0], (double)high[1], top};
         for (int i = 0; i < 80; i++) {
             pal_pose pose = {.position_m = {at[0], at[1], at[2] + 0.2 - 0.005 * i}, .quat = {1, 0, 0, 0}};
@@ -183,8 +184,8 @@ static void a_field_is_shown_without_waking_it(void)
     REQUIRE(steps_to_sleep(&m, 1500) >= 0);
     CHECK_INT(pal_world_field(m.world, 0, PAL_FIELD_DISPLACEMENT_M, true, &diag), 0);
     double max = 0;
-    for (int i = 0; i < m.body->n_shown; i++)
-        max = fmax(max, (double)m.body->field[PAL_FIELD_DISPLACEMENT_M]->value[i]);
+    for (int i = 0; i < m.body->display.n_shown; i++)
+        max = fmax(max, (double)m.body->display.field[PAL_FIELD_DISPLACEMENT_M]->value[i]);
     CHECK(max > 1e-4);
     CHECK(model_scene_steps(&m, 5));
     CHECK(m.body->asleep);
@@ -203,11 +204,11 @@ static void frames_say_so_and_keep_their_positions(void)
     pal_world_frame(m.world, frame);
     uint64_t n_output = frame->part[0].n_output;
     CHECK(frame->part[0].asleep && n_output > 30);
-    for (int i = 0; i < m.body->n_shown; i++)
+    for (int i = 0; i < m.body->display.n_shown; i++)
         for (int c = 0; c < 3; c++)
-            if (frame->part[0].position_m[3 * i + c] != (float)m.body->x[3 * m.body->shown_node[i] + c]) {
+            if (frame->part[0].position_m[3 * i + c] != (float)m.body->x[3 * m.body->display.shown_node[i] + c]) {
                 CHECK_FAIL("vertex %d is not shown where it lies", i);
-                i = m.body->n_shown;
+                i = m.body->display.n_shown;
                 break;
             }
     CHECK(model_scene_steps(&m, 10));
@@ -287,11 +288,11 @@ static void what_a_far_tool_holds_or_presses_stays_awake(void)
         REQUIRE(steps_to_sleep(&m, 1200) > 0);
         double *x = malloc(3 * sizeof(double) * (size_t)m.body->n_dof), held_m = 0, left_m = 0;
         const int n_x = 3 * (m.body->model.adaptive ? m.body->model.adaptive->levels.n_vertex[0] : m.body->n_dof);
-        const float *high = m.body->shown;
+        const float *high = m.body->display.shown;
         REQUIRE(x);
         memcpy(x, m.body->x, 3 * sizeof(double) * (size_t)m.body->n_dof);
-        for (int i = 0; i < m.body->n_shown; i++)
-            if (m.body->shown[3 * i + 2] > high[2]) high = m.body->shown + 3 * (size_t)i;
+        for (int i = 0; i < m.body->display.n_shown; i++)
+            if (m.body->display.shown[3 * i + 2] > high[2]) high = m.body->display.shown + 3 * (size_t)i;
         const bool box = m.kind == SPRINGS || m.kind == FEM;
         const double at[3] = {box ? 0.04 : (double)high[0], box ? 0.03 : (double)high[1],
                               (double)high[2] + (grasp ? 0.002 : 0.02)};

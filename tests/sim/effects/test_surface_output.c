@@ -4,11 +4,12 @@
 static double worst_shown(const pal_body *body, const double *rest, const double turn[9], const double shift[3])
 {
     double worst = 0;
-    for (int i = 0; i < body->n_shown; i++) {
+    for (int i = 0; i < body->display.n_shown; i++) {
         double p[3];
         pal_mul33(p, turn, rest + 3 * (size_t)i);
         pal_add3(p, p, shift);
-        for (int c = 0; c < 3; c++) worst = fmax(worst, fabs(p[c] - (double)body->shown[3 * (size_t)i + (size_t)c]));
+        for (int c = 0; c < 3; c++)
+            worst = fmax(worst, fabs(p[c] - (double)body->display.shown[3 * (size_t)i + (size_t)c]));
     }
     return worst;
 }
@@ -30,7 +31,7 @@ static void skin_is_the_surface_at_rest_and_turns_with_the_body(void)
     const double c = cos(0.7), n = sin(0.7), turn[9] = {c, -n, 0, n, c, 0, 0, 0, 1}, shift[3] = {0.02, -0.01, 0.03};
     tool_scene s;
     REQUIRE(ball_scene(&s, 10, false, 1, 0.01, 15) && tool_scene_open(&s));
-    CHECK_INT(s.body->n_shown, s.mesh.surface.n_vertex);
+    CHECK_INT(s.body->display.n_shown, s.mesh.surface.n_vertex);
     CHECK_LE(worst_shown(s.body, s.mesh.surface.x, still, none), 1e-7);
     turn_and_show(&s, turn, shift);
     CHECK_LE(worst_shown(s.body, s.mesh.surface.x, turn, shift), 1e-6);
@@ -46,12 +47,12 @@ static void surface_is_the_boundary_nodes_themselves(void)
     REQUIRE(slab_scene(&s, 4, 3, 2, 0.01, 1, 0.01, 15));
     s.scene->body[0].n_support = 0;
     REQUIRE(tool_scene_open(&s));
-    CHECK_INT(s.body->n_shown, 5 * 4 * 3 - 3 * 2 * 1);
-    CHECK(s.body->skin == NULL && s.body->surface != NULL);
-    CHECK_INT(s.body->surface->n_vertex, s.body->n_shown);
-    CHECK_NEAR(pal_surface_volume(s.body->surface), 24e-6, 1e-12);
+    CHECK_INT(s.body->display.n_shown, 5 * 4 * 3 - 3 * 2 * 1);
+    CHECK(s.body->display.skin == NULL && s.body->display.surface != NULL);
+    CHECK_INT(s.body->display.surface->n_vertex, s.body->display.n_shown);
+    CHECK_NEAR(pal_surface_volume(s.body->display.surface), 24e-6, 1e-12);
     turn_and_show(&s, turn, shift);
-    CHECK_LE(worst_shown(s.body, s.body->surface->x, turn, shift), 1e-8);
+    CHECK_LE(worst_shown(s.body, s.body->display.surface->x, turn, shift), 1e-8);
     tool_scene_close(&s);
 }
 
@@ -66,8 +67,9 @@ static void frame_shows_what_the_body_shows(void)
         REQUIRE(step_world(&s, 1));
     }
     pal_world_frame(s.world, frame);
-    REQUIRE(frame->part[0].n_vertex == s.body->n_shown);
-    CHECK(memcmp(frame->part[0].position_m, s.body->shown, 3 * sizeof(float) * (size_t)s.body->n_shown) == 0);
+    REQUIRE(frame->part[0].n_vertex == s.body->display.n_shown);
+    CHECK(memcmp(frame->part[0].position_m, s.body->display.shown,
+                 3 * sizeof(float) * (size_t)s.body->display.n_shown) == 0);
     CHECK(frame->tool[0].touching && frame->tool[0].n_patch > 0);
     CHECK_NEAR(frame->tool[0].force_N[2], tool_of(&s, 0)->mean_force_N[2], 0);
     pal_frame_destroy(frame);

@@ -1,5 +1,7 @@
 /* Component hex_elastic: laws, tangents, patch tests, invariance. */
 #include "tests/fixtures/hex_bodies.h"
+#include "tests/fixtures/hex_stiffness.h"
+#include "tests/fixtures/neo_hessian.h"
 
 #include "server/base/vec3.h"
 #include "server/num/polar.h"
@@ -22,7 +24,7 @@ static void dense(int bbar, double young_Pa, double poisson, double edge_m, doub
 {
     double shear[576], volume[576], mu, lambda;
     pal_lame(young_Pa, poisson, &mu, &lambda);
-    pal_hex_stiffness(bbar, shear, volume);
+    hex_stiffness(bbar, shear, volume);
     for (int i = 0; i < 576; i++)
         k[i] = share * edge_m * (mu * shear[i] + (bbar ? lambda + 2 * mu / 3 : lambda) * volume[i]);
 }
@@ -286,12 +288,12 @@ static void plain_neo_product(const hex_body *b, int bbar, const int32_t *node, 
     for (int i = 0; i < 24; i++) along += mean[i] * p[3 * node[i / 3] + i % 3];
     for (int i = 0; i < 24; i++) out[3 * node[i / 3] + i % 3] += kappa * volume * along * mean[i];
     for (int g = 0; g < 8; g++) {
-        pal_neo_modes modes;
+        neo_modes modes;
         memset(df, 0, sizeof df);
-        pal_neo_modes_compute(mu, k1, kappa * (ratio - 1), f[g], &modes);
+        neo_modes_compute(mu, k1, kappa * (ratio - 1), f[g], &modes);
         for (int c = 0; c < 8; c++)
             for (int i = 0; i < 9; i++) df[i] += 2 / h * p[3 * node[c] + i / 3] * grad[g][c][i % 3];
-        pal_neo_modes_apply(&modes, df, dp);
+        neo_modes_apply(&modes, df, dp);
         for (int c = 0; c < 8; c++)
             for (int i = 0; i < 9; i++) out[3 * node[c] + i / 3] += volume / 8 * dp[i] * 2 / h * grad[g][c][i % 3];
     }
@@ -436,10 +438,10 @@ static void pulled_bar_has_its_modulus(void)
             CHECK_NEAR(end, want, 1e-5 * want);
             CHECK_LE(side, 1e-5 * want);
             double *sum = hex_zeros(n), *volume = hex_zeros(n), all = 0;
-            hex_effect->measure(b.row, &b.body, PAL_FIELD_VON_MISES_PA, sum, volume);
+            hex_effect->inspect.measure(b.row, &b.body, PAL_FIELD_VON_MISES_PA, sum, volume);
             for (int i = 0; i < n; i++) CHECK_NEAR(sum[i] / volume[i], young_Pa * e, 1e-4 * young_Pa * e);
             memset(sum, 0, sizeof *sum * (size_t)n), memset(volume, 0, sizeof *sum * (size_t)n);
-            hex_effect->measure(b.row, &b.body, PAL_FIELD_ENERGY_J_M3, sum, volume);
+            hex_effect->inspect.measure(b.row, &b.body, PAL_FIELD_ENERGY_J_M3, sum, volume);
             for (int i = 0; i < n; i++) all += volume[i];
             CHECK_NEAR(all, 24e-6, 1e-15);
             /* the neo-Hookean energy is a difference of numbers of order 1 */
@@ -461,7 +463,7 @@ static void measured_energy_is_the_energy(void)
             int n = b.body.n_node;
             hex_shake(&b, 0.15, 3);
             double *sum = hex_zeros(n), *volume = hex_zeros(n), all = 0;
-            hex_effect->measure(b.row, &b.body, PAL_FIELD_ENERGY_J_M3, sum, volume);
+            hex_effect->inspect.measure(b.row, &b.body, PAL_FIELD_ENERGY_J_M3, sum, volume);
             for (int i = 0; i < n; i++) all += sum[i];
             CHECK_NEAR(all, hex_energy(&b), 1e-10 * all);
             free(sum), free(volume);
@@ -590,7 +592,7 @@ static void edited_material_is_that_of_a_new_body(void)
         hex_shake(&b, 0.1, 2);
         e[edit] = hex_energy(&b);
         memset(bound[edit], 0, sizeof bound[edit]);
-        hex_effect->stiffness(b.row, &b.body, bound[edit]);
+        hex_effect->bounds.stiffness(b.row, &b.body, bound[edit]);
         /* nodes of the first and of the last voxel */
         CHECK(bound[edit][0] > 20 * bound[edit][b.hexes.node[8 * 3 + 1]]);
         hex_body_free(&b);
@@ -622,7 +624,7 @@ static void bounds_are_close_to_the_largest_eigenvalue(void)
                 value = hex_largest(q, n);
                 for (int i = 0; i < n; i++) p[i] = q[i] / value;
             }
-            hex_effect->stiffness(b.row, &b.body, bound);
+            hex_effect->bounds.stiffness(b.row, &b.body, bound);
             CHECK_LE(value, hex_largest(bound, b.body.n_node));
             CHECK_LE(hex_largest(bound, b.body.n_node), slack[law] * value);
             free(p), free(q), free(bound);

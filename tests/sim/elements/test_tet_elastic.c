@@ -316,7 +316,7 @@ static void uniaxial_strain_has_the_moduli(void)
         CHECK_NEAR(elastic_energy(&b) / (0.5 * young * e * e * area * 4 * b.body.edge_m), 1, 1e-6);
         for (int field = PAL_FIELD_VON_MISES_PA; field <= PAL_FIELD_ENERGY_J_M3; field++) {
             double *sum = calloc(2 * (size_t)b.n, sizeof *sum), volume = 0;
-            b.row.effect->measure(b.row.self, &b.body, (pal_field)field, sum, sum + b.n);
+            b.row.effect->inspect.measure(b.row.self, &b.body, (pal_field)field, sum, sum + b.n);
             for (int i = 0; i < b.n; i++) {
                 CHECK_NEAR(sum[i] / sum[b.n + i] / (field == PAL_FIELD_VON_MISES_PA ? young * e : 0.5 * young * e * e),
                            1, 1e-6);
@@ -381,7 +381,7 @@ static void stiffness_bounds_the_tangent(void)
         if (turn) elastic_shake(&b, 0.3);
         size_t n = 3 * (size_t)b.n;
         double *bound = calloc(n, sizeof *bound), *p = malloc(n * sizeof *p), *q = malloc(n * sizeof *q), value = 0;
-        b.row.effect->stiffness(b.row.self, &b.body, bound);
+        b.row.effect->bounds.stiffness(b.row.self, &b.body, bound);
         b.row.effect->tangent->linearise(b.row.self, &b.body);
         for (size_t i = 0; i < n; i++) p[i] = uniform();
         for (int k = 0; k < 100; k++) {
@@ -457,7 +457,7 @@ static void an_inverted_tetrahedron_takes_its_neighbours_rotation(void)
     }
     /* down the force */
     double *bound = calloc((size_t)b.n, sizeof *bound);
-    b.row.effect->stiffness(b.row.self, &b.body, bound);
+    b.row.effect->bounds.stiffness(b.row.self, &b.body, bound);
     for (int k = 0; k < 4000; k++) {
         elastic_force(&b);
         for (int i = 0; i < 3 * b.n; i++) b.body.x[i] += b.body.f[i] / bound[i / 3];
@@ -482,7 +482,7 @@ static void shuffled_bodies_recover(void)
             for (int i = 0; i < 300; i++) uniform();
             for (int i = 0; i < 3 * b.n; i++) b.body.x[i] = (0.5 + 0.5 * uniform()) * (i % 3 == 0 ? 0.03 : 0.02);
             double *bound = calloc((size_t)b.n, sizeof *bound);
-            b.row.effect->stiffness(b.row.self, &b.body, bound);
+            b.row.effect->bounds.stiffness(b.row.self, &b.body, bound);
             for (int k = 0; k < 2500; k++) {
                 elastic_force(&b);
                 for (int i = 0; i < 3 * b.n; i++) b.body.x[i] += b.body.f[i] / bound[i / 3];

@@ -144,7 +144,7 @@ static void momentum_of(const pal_body *body, double sum[3])
     double *q = calloc(3 * (size_t)body->n_dof, sizeof *q);
     pal_set3(sum, 0, 0, 0);
     if (!q) return;
-    pal_mass_operator_multiply(body->mass_operator, body->v, q);
+    pal_mass_operator_multiply(body->mass_operator, 1, 0, NULL, body->v, q);
     for (int i = 0; i < body->n_dof; i++) pal_add3(sum, sum, q + 3 * i);
     free(q);
 }

@@ -76,14 +76,14 @@ static void steps_without_the_heap_while_levels_switch(void)
     REQUIRE(frame);
     int max = 0, n_switch = 0, n_finest = frame->part[0].n_finest, min = s.body->n_active;
     for (int i = 0; i < 6 * STEP_HZ; i++) {
-        uint64_t revision = s.body->revision;
+        uint64_t revision = s.body->display.revision;
         press_front(&s, top, i, 0.02);
         counting = true;
         pal_err err = pal_world_step(s.world, 1.0 / STEP_HZ);
         pal_world_frame(s.world, frame);
         counting = false;
         CHECK_INT(err, 0);
-        n_switch += s.body->revision != revision;
+        n_switch += s.body->display.revision != revision;
         if (s.body->n_active > max) max = s.body->n_active;
     }
     printf("  %d to %d of %d nodes, %d switches\n", min, max, n_finest, n_switch);
@@ -95,7 +95,7 @@ static void steps_without_the_heap_while_levels_switch(void)
     CHECK_LE(shell_scene_rms(&s), 1e-4);
     for (int i = min; i < s.body->n_node; i++)
         for (int c = 0; c < 3; c++) {
-            CHECK(s.body->shown[3 * i + c] == (float)s.body->x_rest[3 * i + c]);
+            CHECK(s.body->display.shown[3 * i + c] == (float)s.body->x_rest[3 * i + c]);
             CHECK(s.body->x[3 * i + c] == s.body->x_rest[3 * i + c] && s.body->load[3 * i + c] == 0);
         }
     pal_frame_destroy(frame);
@@ -162,7 +162,7 @@ static void another_body_is_switched_and_this_one_goes_on(void)
     pal_stomach stomach;
     REQUIRE(!pal_stomach_make(&stomach));
     shell_scene_take(&s, &stomach.surface);
-    pal_stomach_free(&stomach);
+    pal_surface_free(&stomach.surface);
     shell_scene_number(&s, "levels", 3);
     s.scene->body[1] = s.scene->body[0];
     s.scene->n_body = 2;
@@ -240,7 +240,7 @@ static void frames_follow_the_table_of_triangles_whatever_they_skip(void)
         CHECK(same_table(each, adaptive));
         CHECK_INT(each->part[0].n_active, adaptive->n_node);
         CHECK_INT(each->part[0].n_spring, adaptive->n_spring);
-        CHECK(each->part[0].revision == s.body->revision);
+        CHECK(each->part[0].revision == s.body->display.revision);
         if (i % 7) continue;
         pal_world_frame(s.world, some);
         CHECK(same_table(some, adaptive));
@@ -282,7 +282,7 @@ static void a_pressed_surface_refines_under_the_tool_without_a_kick(void)
     bool switched = false;
     pal_copy3(top, s.body->x_rest + 3 * front(&s));
     for (int i = 0; i < 3 * PER_S; i++) {
-        uint64_t revision = s.body->revision;
+        uint64_t revision = s.body->display.revision;
         pal_copy3(p, top);
         p[2] += tool_radius_m - 0.015 * fmin(1, (double)i / (1.5 * PER_S));
         pose(&s, p, false);
@@ -293,7 +293,7 @@ static void a_pressed_surface_refines_under_the_tool_without_a_kick(void)
         pal_add3(sum, sum, tool_of(&s)->force_N);
         CHECK_LE(pal_norm3(sum), 1e-12);
         if (switched) rise = fmax(rise, force - was), fall = fmax(fall, was - force);
-        switched = s.body->revision != revision;
+        switched = s.body->display.revision != revision;
         n_switch += switched;
         was = force;
         max = fmax(max, force);
@@ -337,7 +337,7 @@ static void a_grasp_holds_while_tissue_is_pulled_and_refines(void)
     bool switched = false;
     pal_copy3(top, s.body->x_rest + 3 * front(&s));
     for (int i = 0; i < 2.4 * PER_S; i++) {
-        uint64_t revision = s.body->revision;
+        uint64_t revision = s.body->display.revision;
         pal_copy3(p, top);
         /* it takes hold where it just touches; out by 2 cm, wait, back again */
         double time_s = (double)i / PER_S;
@@ -348,13 +348,13 @@ static void a_grasp_holds_while_tissue_is_pulled_and_refines(void)
         /* nodes that went out of use after the last sub-step have lost their part already */
         sum_of_loads(s.body, sum);
         pal_add3(sum, sum, tool_of(&s)->force_N);
-        if (s.body->revision == revision) CHECK_LE(pal_norm3(sum), 1e-12);
+        if (s.body->display.revision == revision) CHECK_LE(pal_norm3(sum), 1e-12);
         CHECK(i < 1 || tool_of(&s)->holding);
         if (switched)
             jump = fmax(jump, change_N);
         else
             between = fmax(between, change_N);
-        switched = s.body->revision != revision;
+        switched = s.body->display.revision != revision;
         n_switch += switched;
         share = fmax(share, refined_share(&s));
         was = force;
@@ -434,7 +434,7 @@ static void displacement_in_colour_is_0_where_nothing_is_in_use(void)
     for (int i = 0; i < 3 * STEP_HZ; i++) {
         press_front(&s, top, i, 0.02);
         CHECK_INT(pal_world_step(s.world, 1.0 / STEP_HZ), 0);
-        const float *value = s.body->field[PAL_FIELD_DISPLACEMENT_M]->value;
+        const float *value = s.body->display.field[PAL_FIELD_DISPLACEMENT_M]->value;
         double max = 0;
         for (int k = 0; k < s.body->n_node; k++) {
             max = fmax(max, (double)value[k]);

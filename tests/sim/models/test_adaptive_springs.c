@@ -17,7 +17,7 @@ static void open_stomach(shell_scene *s)
     pal_stomach stomach = {0};
     if (pal_stomach_make(&stomach)) abort();
     shell_scene_take(s, &stomach.surface);
-    pal_stomach_free(&stomach);
+    pal_surface_free(&stomach.surface);
 }
 
 static void rows_are_those_that_the_keys_ask_for(void)
@@ -66,8 +66,8 @@ static void constants_follow_from_material_and_thickness(void)
     double k = sqrt(3) / 2 * 8000 * 0.004, m = mass / 188, bound[2] = {0}, want[2] = {0};
     double *sum = calloc(2 * (size_t)p.body->n_node, sizeof *sum), *damp = sum + p.body->n_node;
     const pal_component *row[2] = {shell_plan_row(&p, "edge_spring"), shell_plan_row(&p, "shape_spring")};
-    row[0]->effect->stiffness(row[0]->self, p.body, sum);
-    row[0]->effect->damping(row[0]->self, p.body, damp);
+    row[0]->effect->bounds.stiffness(row[0]->self, p.body, sum);
+    row[0]->effect->bounds.damping(row[0]->self, p.body, damp);
     for (int i = 0; i < p.body->n_node; i++) bound[0] += sum[i], bound[1] += damp[i];
     /* every spring counts 2 at both ends */
     want[0] = 4 * 558 * k, want[1] = 4 * 558 * 0.02 * sqrt(k * m);
@@ -106,8 +106,8 @@ static void entry_of_that_name_takes_the_place_of_the_models_row(void)
     REQUIRE(shell_plan_open(&p));
     const pal_component *row = shell_plan_row(&p, "edge_spring");
     double *bound = calloc(2 * (size_t)p.body->n_node, sizeof *bound), k = 0, c = 0;
-    row->effect->stiffness(row->self, p.body, bound);
-    row->effect->damping(row->self, p.body, bound + p.body->n_node);
+    row->effect->bounds.stiffness(row->self, p.body, bound);
+    row->effect->bounds.damping(row->self, p.body, bound + p.body->n_node);
     for (int i = 0; i < p.body->n_node; i++) k += bound[i], c += bound[p.body->n_node + i];
     /* derived with the model's thickness still */
     CHECK_NEAR(k / (4 * 336 * sqrt(3) / 2 * 5000 * 0.006), 1, 1e-6);
@@ -155,7 +155,7 @@ static void density_edits_reach_the_damping(void)
     CHECK_TEXT(row->effect->name, "edge_spring");
     for (int way = 0; way < 2; way++) {
         memset(sum, 0, sizeof *sum * (size_t)s.body->n_node);
-        row->effect->damping(row->self, s.body, sum);
+        row->effect->bounds.damping(row->self, s.body, sum);
         for (int i = 0; i < s.body->n_node; i++) bound[way] += sum[i];
         pal_material to = s.scene->body[0].material;
         to.density_kg_m3 *= 4;

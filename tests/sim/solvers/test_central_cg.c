@@ -199,7 +199,7 @@ static double fastest(solid_world *w, int n_round)
         solid_forces(w);
         for (int i = 0; i < n; i++) u[i] = b->support[i / 3] ? 0 : (g[i] - b->g[i]) / b->edge_m;
         for (int i = 0; i < n; i++) along += u[i] * v[i];
-        pal_mass_operator_multiply(m, v, b->g);
+        pal_mass_operator_multiply(m, 1, 0, NULL, v, b->g);
         for (int i = 0; i < n; i++) norm2 += v[i] * b->g[i];
         omega2 = along / norm2;
         pal_envelope_solve(&e, u, v);
@@ -347,9 +347,9 @@ static void push_damping(void *self, const pal_body *body, double *bound)
 
 /* by each of the three ways in which a row may say it */
 static const pal_effect pusher_effect[3] = {
-    {.name = "pusher", .stage = PAL_STAGE_CONTACT, .run = push, .stiffness = push_stiffness},
-    {.name = "wisher", .stage = PAL_STAGE_CONTACT, .run = push, .wanted = push_stiffness},
-    {.name = "brake", .stage = PAL_STAGE_CONTACT, .run = push, .damping = push_damping},
+    {.name = "pusher", .stage = PAL_STAGE_CONTACT, .run = push, .bounds.stiffness = push_stiffness},
+    {.name = "wisher", .stage = PAL_STAGE_CONTACT, .run = push, .bounds.wanted = push_stiffness},
+    {.name = "brake", .stage = PAL_STAGE_CONTACT, .run = push, .bounds.damping = push_damping},
 };
 
 static void limit_counts_what_contact_says(void)

@@ -379,7 +379,7 @@ static void heavy_steps_stay_bounded(void)
     pal_component *solve = shell_plan_row(&p, "rk4");
     for (int i = 0; i < 200; i++) {
         pal_step step = shell_plan_step(&p, 20 * limit);
-        step.heavy = true;
+        step.adds_mass = true;
         CHECK_INT(solve->effect->run(solve->self, &step), 0);
     }
     double after = shell_plan_row(&p, "edge_spring")->effect->energy(shell_plan_row(&p, "edge_spring")->self, p.body);

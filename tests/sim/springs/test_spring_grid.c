@@ -6,6 +6,7 @@
 #include "server/sim/springs/spring_law.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
+#include "tests/fixtures/body_sums.h"
 #include "tests/fixtures/boxes.h"
 #include "tests/fixtures/largest_frequency.h"
 #include "tests/fixtures/random.h"
@@ -79,8 +80,8 @@ static void bench_close(bench *b)
 
 static const pal_component *row_named(const bench *b, const char *name)
 {
-    for (int r = 0; r < b->plan.n_row; r++)
-        if (!strcmp(b->plan.row[r].effect->name, name)) return &b->plan.row[r];
+    for (int r = 0; r < b->plan.n_component; r++)
+        if (!strcmp(b->plan.component[r].effect->name, name)) return &b->plan.component[r];
     return NULL;
 }
 
@@ -100,7 +101,7 @@ static void shake(bench *b, double amount)
 }
 
 #define EACH_SPRING_ROW(b, row)                                                                                        \
-    for (const pal_component *row = (b).plan.row; row < (b).plan.row + (b).plan.n_row; row++)                          \
+    for (const pal_component *row = (b).plan.component; row < (b).plan.component + (b).plan.n_component; row++)        \
         if (row->effect->energy && row->effect->internal)
 
 static const char *const k_key[3] = {"k_distance_J", "k_area_J", "k_volume_J"}, *const c_key[3] = {"c_distance_Js",
@@ -124,12 +125,12 @@ static void a_grid_of_equal_values_is_the_homogeneous_body(void)
         for (int i = 0; i < 2 && by_volume; i++)
             pal_entry_put_text(&(i ? &b : &a)->def->model, "weights", "volume", NULL);
         REQUIRE(bench_plan(&a) && bench_plan(&b));
-        CHECK_INT(a.plan.n_row, b.plan.n_row);
+        CHECK_INT(a.plan.n_component, b.plan.n_component);
         shake(&a, 0.3);
         memcpy(b.body->x, a.body->x, 3 * sizeof(double) * (size_t)a.body->n_dof);
         memcpy(b.body->v, a.body->v, 3 * sizeof(double) * (size_t)a.body->n_dof);
-        for (int r = 0; r < a.plan.n_row; r++) {
-            const pal_component *row = &a.plan.row[r], *other = &b.plan.row[r];
+        for (int r = 0; r < a.plan.n_component; r++) {
+            const pal_component *row = &a.plan.component[r], *other = &b.plan.component[r];
             if (!row->effect->internal || row->effect->stage != PAL_STAGE_FORCE) continue;
             double max = 0, apart = 0, bound[2][128] = {{0}};
             run_row(&a, row), run_row(&b, other);
@@ -140,8 +141,8 @@ static void a_grid_of_equal_values_is_the_homogeneous_body(void)
             CHECK(max > 1e-6);
             CHECK_LE(apart, 1e-12 * max);
             REQUIRE(a.body->n_dof <= 128);
-            row->effect->damping(row->self, a.body, bound[0]);
-            other->effect->damping(other->self, b.body, bound[1]);
+            row->effect->bounds.damping(row->self, a.body, bound[0]);
+            other->effect->bounds.damping(other->self, b.body, bound[1]);
             for (int i = 0; i < a.body->n_dof; i++) CHECK_NEAR(bound[1][i], bound[0][i], 1e-12 * bound[0][i]);
         }
         bench_close(&a), bench_close(&b);
@@ -234,9 +235,9 @@ static void given_constants_may_have_the_weights_of_derived_ones(void)
     REQUIRE(bench_plan(&a) && bench_plan(&b));
     shake(&a, 0.3);
     memcpy(b.body->x, a.body->x, 3 * sizeof(double) * (size_t)a.body->n_dof);
-    for (int r = 0; r < a.plan.n_row; r++) {
-        if (!a.plan.row[r].effect->energy) continue;
-        run_row(&a, &a.plan.row[r]), run_row(&b, &b.plan.row[r]);
+    for (int r = 0; r < a.plan.n_component; r++) {
+        if (!a.plan.component[r].effect->energy) continue;
+        run_row(&a, &a.plan.component[r]), run_row(&b, &b.plan.component[r]);
         CHECK(memcmp(a.body->f, b.body->f, 3 * sizeof(double) * (size_t)a.body->n_dof) == 0);
     }
     bench_close(&a), bench_close(&b);
@@ -303,16 +304,17 @@ static void the_substep_is_half_the_stable_one_of_varied_springs_or_less(void)
     for (int by_volume = 0; by_volume < 2; by_volume++) {
         bench b;
         REQUIRE(bench_varied(&b, by_volume ? "volume" : "equal"));
-        const pal_component *solve = &b.plan.row[b.plan.first[PAL_STAGE_SOLVE][0]];
+        const pal_component *solve = &b.plan.component[b.plan.first[PAL_STAGE_SOLVE][0]];
         for (int turn = 0; turn < 3; turn++) {
             if (turn == 1) shake(&b, 0.2);
             for (int i = 0; i < 3 * b.body->n_dof && turn == 2; i++) b.body->x[i] = 1.8 * b.body->x_rest[i];
             memset(b.body->v, 0, 3 * sizeof(double) * (size_t)b.body->n_dof);
             pal_step step = {.body = b.body,
-                             .force = b.plan.row + b.plan.first[PAL_STAGE_FORCE][0],
+                             .force = b.plan.component + b.plan.first[PAL_STAGE_FORCE][0],
                              .n_force = b.plan.n_of[PAL_STAGE_FORCE][0]};
             solve->effect->reset(solve->self, b.body);
-            double chosen = solve->effect->limit(solve->self, &step), stable = 2 / sqrt(largest_w2(&b.plan, &seed));
+            double chosen = solve->effect->bounds.limit(solve->self, &step),
+                   stable = 2 / sqrt(largest_w2(&b.plan, &seed));
             printf("  chosen %.3g ms, stable %.3g ms, ratio %.2f\n", 1e3 * chosen, 1e3 * stable, chosen / stable);
             CHECK_LE(chosen, 0.5 * stable * 1.001);
             CHECK_LE(0.15 * stable, chosen);
@@ -334,9 +336,9 @@ static void a_varied_body_keeps_its_momentum_and_comes_back(void)
     double before[3], after[3], scale = 0;
     for (int i = 0; i < 3 * body->n_dof; i++) body->v[i] = 0.05 * uniform() + (i % 3 == 0 ? 0.1 : 0);
     for (int i = 0; i < body->n_dof; i++) scale += body->mass_kg[i] * pal_norm3(body->v + 3 * i);
-    pal_body_momentum(body, before);
+    body_momentum(body, before);
     for (int i = 0; i < 120; i++) REQUIRE(!pal_world_step(world, b.scene->step_s));
-    pal_body_momentum(body, after);
+    body_momentum(body, after);
     CHECK_LE(pal_dist3(before, after), 1e-11 * scale);
     CHECK(!body->frozen);
     pal_world_destroy(world);
@@ -368,9 +370,9 @@ static void a_material_edit_leaves_what_is_given(void)
     CHECK_NEAR(before[1], wanted, 1e-12 * wanted);
     pal_material stiffer = b.def->material;
     stiffer.young_Pa *= 3;
-    for (int r = 0; r < b.plan.n_row; r++)
-        if (b.plan.row[r].effect->material)
-            CHECK_INT(b.plan.row[r].effect->material(b.plan.row[r].self, b.body, &stiffer, &diag), 0);
+    for (int r = 0; r < b.plan.n_component; r++)
+        if (b.plan.component[r].effect->material)
+            CHECK_INT(b.plan.component[r].effect->material(b.plan.component[r].self, b.body, &stiffer, &diag), 0);
     CHECK_NEAR(energy_of(&b, "edge_distance"), before[0], 0);
     CHECK_NEAR(energy_of(&b, "tet_volume"), 3 * before[1], 1e-12 * before[1]);
     bench_close(&b);
@@ -391,12 +393,12 @@ static void nodes_show_their_constant_in_colour(void)
     bench b;
     REQUIRE(bench_varied(&b, "volume"));
     const pal_component *row = row_named(&b, "edge_distance");
-    REQUIRE(row && row->effect->measure);
+    REQUIRE(row && row->effect->inspect.measure);
     double sum[128] = {0}, volume[128] = {0};
     REQUIRE(b.body->n_dof == NODES);
-    row->effect->measure(row->self, b.body, PAL_FIELD_ENERGY_J_M3, sum, volume);
+    row->effect->inspect.measure(row->self, b.body, PAL_FIELD_ENERGY_J_M3, sum, volume);
     for (int i = 0; i < NODES; i++) CHECK_NEAR(volume[i] + sum[i], 0, 0);
-    row->effect->measure(row->self, b.body, PAL_FIELD_STIFFNESS_J, sum, volume);
+    row->effect->inspect.measure(row->self, b.body, PAL_FIELD_STIFFNESS_J, sum, volume);
     /* the grid's nodes are the body's */
     for (int i = 0; i < NODES; i++) CHECK_NEAR(sum[i] / volume[i], b.k_J[0][i], 1e-15);
     bench_close(&b);
@@ -408,12 +410,12 @@ static void nodes_show_their_constant_in_colour(void)
           !pal_world_has_field(world, 0, PAL_FIELD_ENERGY_J_M3));
     REQUIRE(!pal_world_field(world, 0, PAL_FIELD_STIFFNESS_J, true, &diag));
     pal_body *body = pal_world_body(world, 0);
-    const float *value = body->field[PAL_FIELD_STIFFNESS_J]->value;
+    const float *value = body->display.field[PAL_FIELD_STIFFNESS_J]->value;
     double factor[3];
     pal_spring_factors(b.def->material.poisson, false, factor);
     for (int turn = 0; turn < 2; turn++) {
         double wanted = (turn ? 3 : 1) * factor[0] * b.def->material.young_Pa * 1e-6;
-        for (int i = 0; i < body->n_shown; i++) CHECK_NEAR((double)value[i], wanted, 1e-6 * wanted);
+        for (int i = 0; i < body->display.n_shown; i++) CHECK_NEAR((double)value[i], wanted, 1e-6 * wanted);
         pal_material edit = b.def->material;
         edit.young_Pa *= 3;
         REQUIRE(!pal_world_material(world, 0, &edit, &diag));

@@ -266,8 +266,8 @@ static void nodes_show_the_constant_of_their_part(void)
     const double own = factor[0] * b.def->material.young_Pa * 1e-6;
     for (int r = 0; r < pal_world_component_count(b.world); r++) {
         const pal_component *row = pal_world_component(b.world, r);
-        if (row->effect->measure && !strcmp(row->effect->name, "edge_distance"))
-            row->effect->measure(row->self, b.body, PAL_FIELD_STIFFNESS_J, sum, n);
+        if (row->effect->inspect.measure && !strcmp(row->effect->name, "edge_distance"))
+            row->effect->inspect.measure(row->self, b.body, PAL_FIELD_STIFFNESS_J, sum, n);
     }
     for (int i = 0; i < b.body->n_dof; i++) {
         double x = b.body->x_rest[3 * i], k_J = sum[i] / n[i];

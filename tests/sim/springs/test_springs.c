@@ -5,6 +5,7 @@
 #include "server/sim/plan/plan.h"
 #include "server/sim/world/world.h"
 #include "tests/check.h"
+#include "tests/fixtures/body_sums.h"
 #include "tests/fixtures/boxes.h"
 #include "tests/fixtures/largest_frequency.h"
 #include "tests/fixtures/random.h"
@@ -48,7 +49,7 @@ static bool bench_open(bench *b, int nx, int ny, int nz, double damping_Js)
     /* whatever FORCE effect the plan has not got yet */
     for (int i = 0; i < PAL_EFFECT_COUNT; i++) {
         bool there = pal_effects[i]->stage != PAL_STAGE_FORCE;
-        for (int r = 0; r < b->plan.n_row; r++) there = there || b->plan.row[r].effect == pal_effects[i];
+        for (int r = 0; r < b->plan.n_component; r++) there = there || b->plan.component[r].effect == pal_effects[i];
         if (!there) printf("  left out: no row of %s\n", pal_effects[i]->name);
     }
     return true;
@@ -85,7 +86,7 @@ static double largest(const double *f, int n)
 }
 
 #define EACH_FORCE_ROW(b, row)                                                                                         \
-    for (const pal_component *row = (b).plan.row; row < (b).plan.row + (b).plan.n_row; row++)                          \
+    for (const pal_component *row = (b).plan.component; row < (b).plan.component + (b).plan.n_component; row++)        \
         if (row->effect->stage == PAL_STAGE_FORCE)
 
 static void internal_components_are_zero_at_rest(void)
@@ -162,16 +163,16 @@ static void chooses_half_the_stable_substep_or_less(void)
 {
     bench b;
     REQUIRE(bench_open(&b, 4, 3, 3, 0));
-    const pal_component *solve = &b.plan.row[b.plan.first[PAL_STAGE_SOLVE][0]];
+    const pal_component *solve = &b.plan.component[b.plan.first[PAL_STAGE_SOLVE][0]];
     for (int turn = 0; turn < 4; turn++) {
         if (turn == 1) shake(&b, 0.2, 0);
         for (int i = 0; i < 3 * b.body->n_dof && turn >= 2; i++)
             b.body->x[i] = b.body->x_rest[i] * (turn == 2 ? (i % 3 == 0 ? 2.5 : 1) : 1.8);
         pal_step step = {.body = b.body,
-                         .force = b.plan.row + b.plan.first[PAL_STAGE_FORCE][0],
+                         .force = b.plan.component + b.plan.first[PAL_STAGE_FORCE][0],
                          .n_force = b.plan.n_of[PAL_STAGE_FORCE][0]};
         solve->effect->reset(solve->self, b.body);
-        double chosen = solve->effect->limit(solve->self, &step), stable = 2 / sqrt(largest_w2(&b.plan, &seed));
+        double chosen = solve->effect->bounds.limit(solve->self, &step), stable = 2 / sqrt(largest_w2(&b.plan, &seed));
         printf("  chosen %.3g ms, stable %.3g ms, ratio %.2f\n", 1e3 * chosen, 1e3 * stable, chosen / stable);
         CHECK_LE(chosen, 0.5 * stable * 1.001);
         CHECK_LE(0.15 * stable, chosen);
@@ -234,8 +235,8 @@ static void a_scaled_tetrahedron_has_the_analytic_energy_and_virial(void)
     REQUIRE(!pal_plan_build(scene, arena, &diag, &plan));
     pal_body *body = &plan.body[0];
     for (int i = 0; i < 12; i++) body->x[i] *= s;
-    for (int r = 0; r < plan.n_row; r++) {
-        const pal_component *row = &plan.row[r];
+    for (int r = 0; r < plan.n_component; r++) {
+        const pal_component *row = &plan.component[r];
         if (!row->effect->energy) continue;
         int power = !strcmp(row->effect->name, "edge_distance") ? 1 : !strcmp(row->effect->name, "face_area") ? 2 : 3;
         int many = power == 1 ? 6 : power == 2 ? 4 : 1;
@@ -276,7 +277,7 @@ static void keeps_momentum_over_10000_substeps(void)
     REQUIRE(world);
     pal_body *body = pal_world_body(world, 0);
     double before[3], after[3], turn[2][3] = {{0}}, scale = 0, arm = 0, t[3];
-    pal_body_momentum(body, before);
+    body_momentum(body, before);
     for (int i = 0; i < body->n_dof; i++) {
         scale += body->mass_kg[i] * pal_norm3(body->v + 3 * i);
         pal_cross3(t, body->x + 3 * i, body->v + 3 * i);
@@ -288,7 +289,7 @@ static void keeps_momentum_over_10000_substeps(void)
         REQUIRE(!pal_world_step(world, scene->step_s));
         n += pal_world_substeps(world);
     }
-    pal_body_momentum(body, after);
+    body_momentum(body, after);
     for (int i = 0; i < body->n_dof; i++) {
         pal_cross3(t, body->x + 3 * i, body->v + 3 * i);
         pal_axpy3(turn[1], body->mass_kg[i], t);

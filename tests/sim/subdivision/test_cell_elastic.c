@@ -328,7 +328,7 @@ static void young_that_varies_inside_an_element_is_integrated_exactly(void)
 static void painting_takes_effect(void)
 {
     cell_body b;
-    pal_stroke stroke = {.radius_m = 100, .soft = 0.5, .young_factor = 10, .density_factor = 1};
+    pal_stroke stroke = {.radius_m = 100, .softness = 0.5, .young_factor = 10, .density_factor = 1};
     cell_nth(&b, 1);
     cell_map(&b, (double[9]){1.01, 0, 0, 0, 1, 0, 0, 0, 1}, 0);
     double was = cell_energy(&b);
@@ -487,14 +487,14 @@ static void measures_are_those_of_the_strain(void)
                 CHECK_NEAR(points.energy_J_m3[p], density_of((double[9]){0.02}, 1000, 0.3), 1e-6);
             }
         }
-        cell_effect->measure(b.row, &b.body, PAL_FIELD_VON_MISES_PA, sum, volume);
+        cell_effect->inspect.measure(b.row, &b.body, PAL_FIELD_VON_MISES_PA, sum, volume);
         for (int k = 0; k < n; k++) {
             CHECK_NEAR(sum[k] / volume[k], 2 * 1000 / 2.6 * 0.02, 1e-4);
             all += volume[k];
         }
         CHECK_NEAR(all / pal_subdivision_solid_volume_m3(b.solid), 1, 1e-12);
         memset(sum, 0, sizeof *sum * (size_t)n), all = 0;
-        cell_effect->measure(b.row, &b.body, PAL_FIELD_ENERGY_J_M3, sum, volume);
+        cell_effect->inspect.measure(b.row, &b.body, PAL_FIELD_ENERGY_J_M3, sum, volume);
         for (int k = 0; k < n; k++) all += sum[k];
         CHECK_NEAR(all / cell_energy(&b), 1, 1e-6);
         free(sum), free(volume);
@@ -509,7 +509,7 @@ static void refuses_what_it_cannot_be(void)
     cell_begin(&b, solid_block(1, 1, 1));
     CHECK_INT(pal_entry_put_text(&b.item, "operator", "cosine", &b.diag), PAL_ERR_OK);
     CHECK_INT(cell_make(&b, 0), PAL_ERR_REFUSED);
-    CHECK_TEXT(b.diag.text, "model.operator: \"cosine\" is neither polar nor edges");
+    CHECK_TEXT(b.diag.text, "model.operator: \"cosine\", wanted \"polar\" or \"edges\"");
     pal_body none = {0};
     pal_build build = {.body = &none, .arena = b.arena, .diag = &b.diag};
     pal_config_entry item;

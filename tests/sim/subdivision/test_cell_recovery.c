@@ -1,10 +1,13 @@
 /* Elements of subdivision solids that are inverted, and what they run on then: node by node, without a world. */
 #include "tests/fixtures/cell_bodies.h"
 
-/* as force and energy of a component, after an update */
+/* as force and energy of a component, after an update; a sixtieth of a second passes */
 static bool look(cell_body *b)
 {
-    return cell_effect->recover(b->row, &(pal_step){.body = &b->body}) & PAL_INVERSION_CHANGED;
+    static double time_s;
+    time_s += 1.0 / 60;
+    return cell_effect->recovery.recover(b->row, &(pal_step){.body = &b->body, .time_s = time_s}) &
+           PAL_INVERSION_CHANGED;
 }
 
 static double edge_m(const cell_body *b)
@@ -166,7 +169,7 @@ static void regions_have_no_other_rest(void)
             CHECK_INT(b.row->recovery.n_recovering, b.row->recovery.n_cell);
             CHECK_INT(b.row->recovery.n_region, 1);
             /* at G X with the G of the region there is no force */
-            const pal_cell_region *region = &b.row->recovery.of[0];
+            const pal_inverted_region *region = &b.row->recovery.of[0];
             CHECK_NEAR(fabs(region->turn[0] * (region->turn[4] * region->turn[8] - region->turn[5] * region->turn[7]) -
                             region->turn[1] * (region->turn[3] * region->turn[8] - region->turn[5] * region->turn[6]) +
                             region->turn[2] * (region->turn[3] * region->turn[7] - region->turn[4] * region->turn[6])),

@@ -141,7 +141,7 @@ static void regions_take_whole_control_cells(void)
     for (int m = 0; m < b.body.n_node; m++)
         if (b.body.d[3 * m] + b.body.d[3 * m + 1] > b.body.d[3 * far] + b.body.d[3 * far + 1]) far = m;
     b.body.d[3 * far] -= 2;
-    CHECK(cell_effect->recover(b.row, &(pal_step){.body = &b.body}) & PAL_INVERSION_CHANGED);
+    CHECK(cell_effect->recovery.recover(b.row, &(pal_step){.body = &b.body}) & PAL_INVERSION_CHANGED);
     int of[2] = {0, 0}, all[2] = {0, 0};
     for (int e = 0; e < b.row->recovery.n_cell; e++) {
         int kind = e >= b.row->recovery.first[PAL_CELL_HEX] ? PAL_CELL_HEX : PAL_CELL_CUBIC;

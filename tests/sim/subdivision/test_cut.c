@@ -71,7 +71,7 @@ static void a_cut_changes_no_bit_of_what_moves(void)
         for (int i = 0; i < 3 * c.body->n_dof; i++) moved = fmax(moved, fabs(c.body->x[i] - c.body->x_rest[i]));
         CHECK(moved > 1e-4);
         hash[k] = pal_world_hash(c.world);
-        n_shown[k] = c.body->n_shown;
+        n_shown[k] = c.body->display.n_shown;
         clay_close(&c);
     }
     CHECK(hash[1] == hash[0]);
@@ -88,9 +88,10 @@ static void inner_nodes_are_shown_where_they_are(void)
     cut_at(&c, 1, 0, 0, 0);
     REQUIRE(clay_start(&c));
     for (int i = 0; i < 6; i++) CHECK_INT(pal_world_step(c.world, 1.0 / 60), 0);
-    for (int i = 0; i < c.body->n_shown; i++) {
-        const double *d = c.body->d + 3 * c.body->shown_node[i], *rest = c.body->node_rest + 3 * c.body->shown_node[i];
-        for (int a = 0; a < 3; a++) CHECK(c.body->shown[3 * i + a] == (float)d[a]);
+    for (int i = 0; i < c.body->display.n_shown; i++) {
+        const double *d = c.body->d + 3 * c.body->display.shown_node[i],
+                     *rest = c.body->node_rest + 3 * c.body->display.shown_node[i];
+        for (int a = 0; a < 3; a++) CHECK(c.body->display.shown[3 * i + a] == (float)d[a]);
         n_inner += fabs(rest[0]) < 1e-9 && fabs(rest[1]) < 0.03 && fabs(rest[2]) < 0.03;
     }
     /* 9 x 9 nodes on the cut: those at least two elements (0.025 m) from the block's sides */
@@ -114,11 +115,11 @@ static void fields_colour_the_cut(void)
     }
     pal_world_invalidate_limits(c.world, 0);
     REQUIRE(!pal_world_field(c.world, 0, PAL_FIELD_ENERGY_J_M3, true, NULL));
-    const float *value = c.body->field[PAL_FIELD_ENERGY_J_M3]->value;
+    const float *value = c.body->display.field[PAL_FIELD_ENERGY_J_M3]->value;
     double low = 0, high = 0;
     int n_low = 0, n_high = 0;
-    for (int i = 0; i < c.body->n_shown; i++) {
-        const double *rest = c.body->node_rest + 3 * c.body->shown_node[i];
+    for (int i = 0; i < c.body->display.n_shown; i++) {
+        const double *rest = c.body->node_rest + 3 * c.body->display.shown_node[i];
         if (fabs(rest[0]) > 1e-9 || fabs(rest[1]) > 0.02) continue;
         if (fabs(rest[2]) < 1e-3) low += (double)value[i], n_low++;
         if (rest[2] > 0.02 && rest[2] < 0.03) high += (double)value[i], n_high++;

@@ -5,6 +5,7 @@
 #include "server/sim/subdivision/subdivision_mass.h"
 #include "server/sim/subdivision/subdivision_solid.h"
 #include "server/sim/world/world.h"
+#include "tests/fixtures/body_sums.h"
 #include "tests/fixtures/solids.h"
 #include "tests/heap_calls.h"
 
@@ -82,8 +83,8 @@ static void clay_close(clay *c)
 
 static const pal_component *clay_row(const clay *c, const char *name)
 {
-    for (int i = 0; i < c->plan.n_row; i++)
-        if (!strcmp(c->plan.row[i].effect->name, name)) return &c->plan.row[i];
+    for (int i = 0; i < c->plan.n_component; i++)
+        if (!strcmp(c->plan.component[i].effect->name, name)) return &c->plan.component[i];
     CHECK_FAIL("there is no row %s", name);
     return NULL;
 }
@@ -106,8 +107,8 @@ static void blocks_have_the_elements_of_the_paper(void)
         CHECK_INT(e->n[PAL_CELL_HEX], block[k].all - block[k].cubic);
         CHECK_NEAR(pal_cell_elements_percent(e, PAL_CELL_CUBIC), k ? 42 : 58, 0.5);
         CHECK_INT(c.body->n_dof, (block[k].n + 1) * (block[k].n + 1) * (block[k].n + 1));
-        CHECK_INT(c.body->n_shown, block[k].shown);
-        CHECK_INT(c.body->surface->n_tri, 2 * (block[k].shown - 2));
+        CHECK_INT(c.body->display.n_shown, block[k].shown);
+        CHECK_INT(c.body->display.surface->n_tri, 2 * (block[k].shown - 2));
         CHECK_NEAR(c.body->edge_m, cbrt(pal_subdivision_solid_volume_m3(c.body->model.solid) / block[k].all), 1e-15);
         clay_close(&c);
     }
@@ -127,8 +128,8 @@ static void components_are_those_that_the_material_asks_for(void)
         /* the default of other bodies, which needs a skin */
         if (k) pal_entry_init(&c.def->output, "output", "skin_output");
         REQUIRE(clay_plan(&c));
-        CHECK_INT(c.plan.n_row, 7 + k);
-        for (int i = 0; i < c.plan.n_row; i++) CHECK_TEXT(c.plan.row[i].effect->name, want[k][i]);
+        CHECK_INT(c.plan.n_component, 7 + k);
+        for (int i = 0; i < c.plan.n_component; i++) CHECK_TEXT(c.plan.component[i].effect->name, want[k][i]);
         clay_close(&c);
     }
 }
@@ -144,7 +145,7 @@ static void masses_of_points_and_of_nodes_sum_up_to_the_solids(void)
             clay_block(&c, 3, 0.1);
         c.def->material.density_kg_m3 = 1100;
         REQUIRE(clay_plan(&c));
-        double mass = pal_subdivision_solid_mass_kg(c.body->model.solid);
+        double mass = solid_mass_kg(c.body->model.solid);
         for (int i = 0; i < c.body->n_dof; i++) point += c.body->mass_kg[i];
         for (int i = 0; i < c.body->n_node; i++) node += c.body->node_mass_kg[i];
         for (int i = 0; i < c.body->mass_operator->n_entry; i++) entry += c.body->mass_operator->mass_kg[i];
@@ -189,18 +190,19 @@ static void the_surface_is_the_boundary_of_the_subdivided_cells(void)
             clay_block(&c, 3, 0.1);
         REQUIRE(clay_plan(&c));
         const pal_body *b = c.body;
-        CHECK(!pal_surface_check(b->surface, &facts));
+        CHECK(!pal_surface_check(b->display.surface, &facts));
         CHECK(facts.closed && facts.manifold && facts.oriented);
-        CHECK_NEAR(pal_surface_volume(b->surface) / pal_subdivision_solid_volume_m3(b->model.solid), 1, 0.01);
-        for (int i = 0; i < b->n_shown; i++) {
-            CHECK(b->shown_node[i] < b->model.solid->elements.n_vertex);
-            CHECK_NEAR(pal_dist3(b->surface->x + 3 * i, b->node_rest + 3 * b->shown_node[i]), 0, 1e-16);
-            for (int a = 0; a < 3; a++) CHECK(b->shown[3 * i + a] == (float)b->d[3 * b->shown_node[i] + a]);
+        CHECK_NEAR(pal_surface_volume(b->display.surface) / pal_subdivision_solid_volume_m3(b->model.solid), 1, 0.01);
+        for (int i = 0; i < b->display.n_shown; i++) {
+            CHECK(b->display.shown_node[i] < b->model.solid->elements.n_vertex);
+            CHECK_NEAR(pal_dist3(b->display.surface->x + 3 * i, b->node_rest + 3 * b->display.shown_node[i]), 0, 1e-16);
+            for (int a = 0; a < 3; a++)
+                CHECK(b->display.shown[3 * i + a] == (float)b->d[3 * b->display.shown_node[i] + a]);
         }
         /* every control face is shown, by as many triangles as the others of the block: 2 * 16 after two levels */
         int n_control[54] = {0}, n_face = 0;
-        for (int t = 0; t < b->surface->n_tri && !shape; t++) {
-            int32_t face = b->shown_face[t];
+        for (int t = 0; t < b->display.surface->n_tri && !shape; t++) {
+            int32_t face = b->display.shown_face[t];
             CHECK(face >= 0 && pal_cells_face_boundary(&c.cells, face));
             n_control[face % 54]++;
         }
@@ -222,12 +224,13 @@ static void a_cut_shows_what_it_hid(void)
     c.def->cut = true;
     c.def->cut_normal[0] = 1;
     REQUIRE(clay_plan(&c));
-    CHECK(!pal_surface_check(c.body->surface, &facts));
+    CHECK(!pal_surface_check(c.body->display.surface, &facts));
     CHECK(facts.closed && facts.manifold && facts.oriented);
-    CHECK_NEAR(pal_surface_volume(c.body->surface) / pal_subdivision_solid_volume_m3(c.body->model.solid), 0.5, 1e-3);
-    pal_surface_box(c.body->surface, low, high);
+    CHECK_NEAR(pal_surface_volume(c.body->display.surface) / pal_subdivision_solid_volume_m3(c.body->model.solid), 0.5,
+               1e-3);
+    pal_surface_box(c.body->display.surface, low, high);
     CHECK_NEAR(high[0], 0, 1e-6);
-    for (int t = 0; t < c.body->surface->n_tri; t++) n_inner += c.body->shown_face[t] < 0;
+    for (int t = 0; t < c.body->display.surface->n_tri; t++) n_inner += c.body->display.shown_face[t] < 0;
     /* 8 x 8 quads on the cut, all of them between two control cells */
     CHECK_INT(n_inner, 128);
     clay_close(&c);
@@ -258,7 +261,7 @@ static void gravity_pulls_with_the_bodys_weight(void)
         CHECK(!pal_assemble_forces(&step));
         for (int i = 0; i < c.body->n_dof; i++) pal_add3(sum, sum, c.body->g + 3 * i);
         for (int i = 0; i < c.body->n_node; i++) pal_add3(nodes, nodes, c.body->f + 3 * i);
-        double weight = 9.81 * pal_subdivision_solid_mass_kg(c.body->model.solid);
+        double weight = 9.81 * solid_mass_kg(c.body->model.solid);
         CHECK_NEAR(sum[2] / weight, -1, 1e-12);
         CHECK_NEAR(nodes[2] / weight, -1, 1e-12);
         CHECK_NEAR(fabs(sum[0]) + fabs(sum[1]), 0, 1e-15 * weight);
@@ -281,8 +284,8 @@ static void mobility_is_the_velocity_from_an_impulse(void)
     const pal_body *b = c.body;
     const pal_mass_operator *m = b->mass_operator;
     const int n = b->n_dof;
-    for (int k = 0; k < b->n_shown; k += 37) {
-        const int node = b->shown_node[k];
+    for (int k = 0; k < b->display.n_shown; k += 37) {
+        const int node = b->display.shown_node[k];
         double v[27] = {0}, r[27] = {0}, p[27], q[27], rr = 0, inverse_mass = 0;
         REQUIRE(n == 27);
         for (int32_t i = b->interpolation->start[node]; i < b->interpolation->start[node + 1]; i++)
@@ -304,7 +307,7 @@ static void mobility_is_the_velocity_from_an_impulse(void)
             inverse_mass += b->interpolation->weight[i] * v[b->interpolation->point[i]];
         CHECK_NEAR(b->node_inverse_mass_1_kg[node] / inverse_mass, 1, 1e-6);
         /* a node is never heavier than the body */
-        CHECK_LE(1 / pal_subdivision_solid_mass_kg(b->model.solid), inverse_mass * (1 + 1e-9));
+        CHECK_LE(1 / solid_mass_kg(b->model.solid), inverse_mass * (1 + 1e-9));
     }
     clay_close(&c);
 }
@@ -313,14 +316,13 @@ static void mobility_is_the_velocity_from_an_impulse(void)
 static void edits_of_material_reach_masses_and_samples(void)
 {
     static const pal_stroke stroke = {
-        .at_m = {0.05, 0.05, 0.05}, .radius_m = 0.05, .soft = 0.5, .young_factor = 10, .density_factor = 2};
+        .at_m = {0.05, 0.05, 0.05}, .radius_m = 0.05, .softness = 0.5, .young_factor = 10, .density_factor = 2};
     clay c;
     clay_block(&c, 2, 0.1);
     c.def->n_stroke = 1, c.def->stroke = &stroke;
     REQUIRE(clay_start(&c));
     const pal_subdivision_solid *solid = c.body->model.solid;
-    double mass = pal_subdivision_solid_mass_kg(solid),
-           inverse_mass = c.body->node_inverse_mass_1_kg[c.body->shown_node[0]];
+    double mass = solid_mass_kg(solid), inverse_mass = c.body->node_inverse_mass_1_kg[c.body->display.shown_node[0]];
     CHECK(mass > 1000 * pal_subdivision_solid_volume_m3(solid) * (1 + 1e-3));
     float young = 0;
     for (int e = 0; e < 64 * solid->elements.n[PAL_CELL_HEX]; e++)
@@ -329,8 +331,8 @@ static void edits_of_material_reach_masses_and_samples(void)
     pal_material to = c.def->material;
     to.young_Pa = 8000, to.density_kg_m3 = 1500;
     CHECK_INT(pal_world_material(c.world, 0, &to, &c.diag), 0);
-    CHECK_NEAR(pal_subdivision_solid_mass_kg(solid) / mass, 1.5, 1e-6);
-    CHECK_NEAR(c.body->node_inverse_mass_1_kg[c.body->shown_node[0]] * 1.5 / inverse_mass, 1, 1e-6);
+    CHECK_NEAR(solid_mass_kg(solid) / mass, 1.5, 1e-6);
+    CHECK_NEAR(c.body->node_inverse_mass_1_kg[c.body->display.shown_node[0]] * 1.5 / inverse_mass, 1, 1e-6);
     double sum = 0;
     for (int i = 0; i < c.body->n_dof; i++) sum += c.body->mass_kg[i];
     CHECK_NEAR(sum / mass, 1.5, 1e-6);
@@ -362,8 +364,9 @@ static void nodes_stand_where_points_carry_them_after_steps_and_resets(void)
         pal_interpolation_apply(c.body->interpolation, c.body->x, d);
         for (int i = 0; i < 3 * c.body->n_node; i++) max = fmax(max, fabs(d[i] - c.body->d[i]));
         CHECK(max == 0);
-        for (int i = 0; i < c.body->n_shown && way != 1; i++)
-            for (int a = 0; a < 3; a++) CHECK(c.body->shown[3 * i + a] == (float)d[3 * c.body->shown_node[i] + a]);
+        for (int i = 0; i < c.body->display.n_shown && way != 1; i++)
+            for (int a = 0; a < 3; a++)
+                CHECK(c.body->display.shown[3 * i + a] == (float)d[3 * c.body->display.shown_node[i] + a]);
     }
     CHECK(!memcmp(c.body->d, c.body->node_rest, 3 * sizeof *d * (size_t)c.body->n_node));
     free(d);
@@ -427,8 +430,9 @@ static void a_pressed_solid_pushes_back_calmly(void)
             CHECK_INT(pal_world_step(c.world, 1.0 / 60), 0);
             force[way] = tool->mean_force_N[2];
             if (i >= 50 && !way) change = fmax(change, fabs(force[way] - was));
-            for (int k = 0; k < c.body->n_shown && !way; k++)
-                deepest = fmax(deepest, 0.01 - pal_dist3(c.body->d + 3 * c.body->shown_node[k], pose.position_m));
+            for (int k = 0; k < c.body->display.n_shown && !way; k++)
+                deepest =
+                    fmax(deepest, 0.01 - pal_dist3(c.body->d + 3 * c.body->display.shown_node[k], pose.position_m));
         }
         CHECK_INT(c.body->safeguards.n_capped, 0);
         clay_close(&c);

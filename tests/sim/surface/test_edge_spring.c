@@ -260,8 +260,8 @@ static void paper_law_softens_by_level(void)
         double share = (1 << level) * 114.0 / n[level], sum = 0, damp = 0;
         double *bound = calloc(2 * (size_t)p.body->n_node, sizeof *bound), *c_bound = bound + p.body->n_node;
         const pal_component *row = shell_plan_row(&p, "edge_spring");
-        row->effect->stiffness(row->self, p.body, bound);
-        row->effect->damping(row->self, p.body, c_bound);
+        row->effect->bounds.stiffness(row->self, p.body, bound);
+        row->effect->bounds.damping(row->self, p.body, c_bound);
         for (int i = 0; i < p.body->n_node; i++) sum += bound[i], damp += c_bound[i];
         CHECK_NEAR(sum / (4 * 10 * p.adaptive->n_spring * share), 1, 1e-6);
         CHECK_NEAR(damp / (4 * 0.1 * p.adaptive->n_spring * share), 1, 1e-6);
@@ -279,7 +279,7 @@ static void stiffness_bounds_the_rows_of_the_hessian(void)
     size_t n = 3 * (size_t)p.body->n_node;
     double *bound = calloc(n, sizeof *bound), *sum = calloc(n, sizeof *sum), *up = calloc(n, sizeof *up);
     shell_plan_shake(&p, 0.05, 0);
-    row->effect->stiffness(row->self, p.body, bound);
+    row->effect->bounds.stiffness(row->self, p.body, bound);
     double step = 1e-7 * p.body->edge_m, tight = 0;
     for (int k = 0; k < p.body->n_active; k++)
         for (int c = 0; c < 3; c++) {

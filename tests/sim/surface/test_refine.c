@@ -1,6 +1,7 @@
 /* Component refine: where, when and how often levels switch, and what a switch keeps. */
 #include "server/sim/surface/refine_measure.h"
 #include "tests/fixtures/adaptive_worlds.h"
+#include "tests/fixtures/body_sums.h"
 #include "tests/stability/hard_case.h"
 
 static const double radius_m = 0.1;
@@ -571,12 +572,12 @@ static void a_change_of_level_under_a_wave_conserves_them_too(void)
     set_motion(&s, (double[3]){0.3, 0, -0.2}, (double[3]){1, -2, 1});
     pal_set3(s.body->v + 3 * shell_scene_nearest(&s, pole), 0, 0, -2);
     double P[2][3];
-    pal_body_momentum(s.body, P[0]);
+    body_momentum(s.body, P[0]);
     for (int i = 0; i < 60; i++) {
         steps(&s, 1.0 / 60);
         watch(&s, &seen, &w);
     }
-    pal_body_momentum(s.body, P[1]);
+    body_momentum(s.body, P[1]);
     printf(
         "  wave: %d switches; worst jump of energy %.2g as it comes (motion %.2g, springs and anchors %.2g), %.2g as "
         "kept; momentum %.1g, angular %.1g\n",

@@ -2,6 +2,7 @@
  * refined. */
 #include "tests/fixtures/adaptive_components.h"
 #include "tests/fixtures/adaptive_worlds.h"
+#include "tests/fixtures/body_sums.h"
 
 static const double k_N_m = 2.5, c_Ns_m = 0.03, no_move[3] = {0};
 
@@ -151,7 +152,7 @@ static void refinement_changes_neither_sum_nor_frequency_of_anchors(void)
         for (int c = 0; c < 3; c++) CHECK_NEAR(force[c], -total * u[c], 1e-12 * total * fabs(u[c]));
         double *sum = calloc((size_t)r.body.n_dof, sizeof *sum);
         REQUIRE(sum);
-        r.effect->stiffness(r.self, &r.body, sum);
+        r.effect->bounds.stiffness(r.self, &r.body, sum);
         for (int i = 0; i < r.body.n_dof; i++) bound += sum[i];
         free(sum);
         CHECK_NEAR(bound, total, 1e-12 * total);
@@ -345,7 +346,7 @@ static void a_body_flies_and_spins_freely_on_its_own_frame(void)
                 pal_axpy3(spin, body->mass_kg[i / 3], part);
             }
         }
-        pal_body_momentum(body, momentum);
+        body_momentum(body, momentum);
         pal_sub3(way, frame.centre_m, way);
         pal_axpy3(momentum, -body->model.adaptive->options.mass_kg, V);
         pal_sub3(way, way, V); /* of one second */
@@ -401,7 +402,7 @@ static void damping_is_a_ratio_of_three_tenths(void)
     REQUIRE(!shell_row_make(&r));
     double w = sqrt(k_N_m / r.adaptive->level_mass_kg[0]);
     shell_row_mix(&r, 10);
-    r.effect->damping(r.self, &r.body, sum);
+    r.effect->bounds.damping(r.self, &r.body, sum);
     for (int k = 0; k < r.body.n_active; k++) {
         int i = r.body.active[k];
         CHECK_NEAR(sum[i] / r.body.mass_kg[i], 0.6 * w, 1e-12 * w);

@@ -4,7 +4,7 @@
 
 static uint64_t outputs(const model_scene *m)
 {
-    return m->body->n_output;
+    return m->body->display.n_output;
 }
 
 /* steps at rest, then with tools, then without */
@@ -32,10 +32,10 @@ static void nobody_looks_and_all_moves_the_same(void)
         CHECK(model_scene_steps(&seen, 40) && model_scene_steps(&unseen, 40));
         CHECK(outputs(&unseen) < 40);
         CHECK(pal_world_hash(seen.world) == pal_world_hash(unseen.world));
-        size_t n_byte = 3 * sizeof(float) * (size_t)seen.body->n_shown;
-        CHECK(memcmp(seen.body->shown, unseen.body->shown, n_byte) != 0);
+        size_t n_byte = 3 * sizeof(float) * (size_t)seen.body->display.n_shown;
+        CHECK(memcmp(seen.body->display.shown, unseen.body->display.shown, n_byte) != 0);
         pal_world_watch(unseen.world, true);
-        CHECK(!memcmp(seen.body->shown, unseen.body->shown, n_byte));
+        CHECK(!memcmp(seen.body->display.shown, unseen.body->display.shown, n_byte));
         printf("  %s: shown %d times unseen, %d seen\n", model_kind_name[k], (int)outputs(&unseen),
                (int)outputs(&seen));
         model_scene_close(&seen), model_scene_close(&unseen);

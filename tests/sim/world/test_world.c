@@ -327,26 +327,18 @@ static void refuses_scenes_by_the_name_of_the_entry(void)
     box_free(&box);
 }
 
-static void prints_its_plan_in_the_order_of_a_step(void)
+static void orders_its_plan_as_a_step_runs(void)
 {
     pal_prepared box;
     REQUIRE(!box_make(2, 2, 2, 0.01, &box));
     pal_scene *scene = box_scene(&box, true, true);
     pal_arena *arena = pal_arena_create(1 << 16, true);
     pal_plan plan;
-    char text[2048], cut[10];
     REQUIRE(!pal_plan_build(scene, arena, &diag, &plan));
-    size_t wanted = pal_plan_print(&plan, text, sizeof text);
-    CHECK_INT(wanted, strlen(text));
-    CHECK_INT(pal_plan_print(&plan, cut, sizeof cut), wanted);
-    CHECK_INT(strlen(cut), sizeof cut - 1);
     const char *order[] = {"edge_distance", "face_area", "tet_volume",   "viscous",
                            "gravity",       "verlet",    "finite_guard", "surface_output"};
-    const char *at = text;
-    for (int i = 0; i < 8 && at; i++) {
-        at = strstr(at, order[i]);
-        CHECK(at);
-    }
+    CHECK_INT(plan.n_component, 8);
+    for (int i = 0; i < 8 && i < plan.n_component; i++) CHECK(!strcmp(plan.component[i].effect->name, order[i]));
     pal_plan_free(&plan);
     pal_arena_destroy(arena);
     free(scene);
@@ -542,7 +534,7 @@ int main(void)
     RUN(an_edited_material_is_that_of_a_world_made_with_it);
     RUN(refuses_poses_that_are_no_poses);
     RUN(refuses_scenes_by_the_name_of_the_entry);
-    RUN(prints_its_plan_in_the_order_of_a_step);
+    RUN(orders_its_plan_as_a_step_runs);
     RUN(shows_two_bodies_in_the_frame_of_the_first);
     RUN(sags_and_comes_to_rest_under_its_weight);
     RUN(has_rows_only_for_what_the_scene_calls_for);

@@ -1,0 +1,16 @@
+/* Policy of sessions. Each constant states its unit, its reason, and the test that bounds it. Thread: any. */
+#ifndef PAL_SESSION_TUNING_H
+#define PAL_SESSION_TUNING_H
+
+/* ns: default time without a pose after which a tool is released, and displayed as stale (test_session, test_hub) */
+#define PAL_LEASE_NS 250000000u
+/* body sizes: maximum distance of a pose from the origin, far beyond any device's workspace (test_session) */
+#define PAL_POSE_REACH 100
+/* fraction of a step: a step is late when it begins so long after its due time (test_session) */
+#define PAL_LATE_PART 0.1
+/* ns between two writes of the input log, and the longest wait of its closing (test_replay) */
+#define PAL_LOG_FLUSH_NS 20000000u
+/* fraction of a body's size: drift since the last snapshot above which a switch is rehearsed again
+ * (test_configuration_switch) */
+#define PAL_CONFIGURATION_SWITCH_MAX_DRIFT 0.005
+#endif

@@ -1,0 +1,18 @@
+/* Bound of the stiffness of a pressure on a triangle. At constant p the edge (i, j) between corners k and l couples its
+ * ends by p |x_k - x_l| / 6, at most the distances from both to its middle. */
+#ifndef PAL_SIM_EFFECTS_PRESSURE_BOUND_H
+#define PAL_SIM_EFFECTS_PRESSURE_BOUND_H
+#include "server/base/vec3.h"
+
+#include <stdint.h>
+
+/* bound_N_m of the ends of the edge opposite corner node[0] += its part for p / 6, Pa, positions x */
+static inline void pal_pressure_bound(const double *x, const int32_t node[3], double sixth_Pa, double *bound_N_m)
+{
+    double middle[3];
+    pal_add3(middle, x + 3 * node[1], x + 3 * node[2]);
+    pal_scale3(middle, 0.5, middle);
+    const double bound = sixth_Pa * pal_dist3(x + 3 * node[0], middle);
+    bound_N_m[node[1]] += bound, bound_N_m[node[2]] += bound;
+}
+#endif

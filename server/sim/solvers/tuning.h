@@ -1,0 +1,18 @@
+/* Constants of the solvers. */
+#ifndef PAL_SIM_SOLVERS_TUNING_H
+#define PAL_SIM_SOLVERS_TUNING_H
+
+/* central_cg after a clamped displacement: largest divisor of the limit, by halvings. It returns to 1 like a contact
+ * (PAL_BLEND_S) (tests/sim/solvers/test_central_cg.c, tests/stability/test_subdivision_cases.c) */
+#define PAL_BACKOFF_MAX 8.0
+/* verlet: loss of velocity in a sub-step times the share of added mass. The mass is chosen so that the sub-step is a
+ * fixed part of the node's period, so that this is a damping ratio of half a percent at every length of sub-step
+ * (tests/sim/world/test_world.c) */
+#define PAL_HEAVY_LOSS 0.01
+/* static_newton: operations of a factor per entry that are worth one iteration with it, a product and two triangular
+ * passes (tests/sim/solvers/test_fem_static.c) */
+#define PAL_FACTOR_FLOPS_PER_ENTRY 20.0
+/* static_newton: an iteration that leaves more of the residual is slow, and conjugate gradients on the true stiffness
+ * that leave more have failed (tests/sim/solvers/test_fem_static.c) */
+#define PAL_NEWTON_SLOW 0.1
+#endif

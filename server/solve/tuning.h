@@ -1,0 +1,19 @@
+/* Tuning constants of solve: limits of what preflight calls weak, and which cut voxels are kept. */
+#ifndef PAL_SOLVE_TUNING_H
+#define PAL_SOLVE_TUNING_H
+
+/* shape quality (1: regular) of an element, edge in S, filled share and mass over the mean, below which preflight
+ * reports a weak spot (tests/solve/test_preflight.c) */
+#define PAL_WEAK_SHAPE  0.1
+#define PAL_WEAK_EDGE_S 1e-6
+#define PAL_WEAK_FILL   0.05
+#define PAL_WEAK_MASS   1e-3
+/* Poisson's ratio above which full integration locks; with less it is within some percent (tests/stability, case
+ * poisson_static) */
+#define PAL_LOCKING_POISSON 0.47
+/* fill below which cut voxels are dropped, and the volume that may be lost by it; fill otherwise (load_case.c gives
+ * the measurements; tests/solve/test_solve.c) */
+#define PAL_DROP_FILL   0.25
+#define PAL_MAX_MISSING 0.025
+#define PAL_KEEP_FILL   0.02
+#endif
