@@ -8,8 +8,8 @@
 #include "server/base/clock.h"
 #include "server/bench/bench.h"
 #include "server/bench/bench_body.h"
-#include "server/num/median.h"
 #include "server/mesh/geometry/organ.h"
+#include "server/num/median.h"
 
 #include <math.h>
 

@@ -49,9 +49,9 @@ int pal_report_json(const pal_flag_common *common, cJSON *object)
 int pal_report_end(const pal_flag_common *common, pal_err err, const pal_diagnostic *diag, cJSON *object)
 {
     pal_report_progress(NULL, 0, (void *)(uintptr_t)common);
-    if (!err) return common->json ? pal_report_json(common, object) : 0;
+    if (!err && common->json) return pal_report_json(common, object);
     cJSON_Delete(object);
-    return pal_report_refusal(common, err, diag);
+    return err ? pal_report_refusal(common, err, diag) : 0;
 }
 
 void pal_report_progress(const char *what, double fraction, void *user)

@@ -3,8 +3,8 @@
 #ifndef PAL_NUM_TUNING_H
 #define PAL_NUM_TUNING_H
 
-/* least T/T0 of the acceptance, where differences of cost no longer count; draws of a value outside of the box before it
- * is drawn uniformly (test_anneal) */
+/* least T/T0 of the acceptance, where differences of cost no longer count; draws of a value outside of the box before
+ * it is drawn uniformly (test_anneal) */
 #define ANNEAL_COLDEST  1e-18
 #define ANNEAL_MAX_DRAW 100
 

@@ -134,11 +134,12 @@ void pal_loop_set_due(pal_loop *loop, uint64_t when_ns)
 
 void pal_loop_wake(pal_loop *loop)
 {
-    if (atomic_exchange(&loop->woken, true)) return;
-    if (loop->context)
-        lws_cancel_service(loop->context);
-    else
+    bool pending = atomic_exchange(&loop->woken, true);
+    /* without a context the loop is turned by who waits on the clock, which counts every wake */
+    if (!loop->context)
         pal_clock_wake(loop->clock);
+    else if (!pending)
+        lws_cancel_service(loop->context);
 }
 
 void pal_loop_stop(pal_loop *loop)
