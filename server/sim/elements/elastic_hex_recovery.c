@@ -71,7 +71,7 @@ bool pal_hex_recover(pal_elastic_hexes *cubes, const pal_body *body)
     }
     if (cubes->has_inversion && !before) {
         cubes->needed = cubes->n_whole < PAL_RETRY_UPDATES
-                            ? fmin(fmax(cubes->needed, cubes->tried) + PAL_INVERTED_LOW, 1 - PAL_INVERTED_LOW)
+                            ? fmin(fmax(cubes->needed, cubes->tried) + PAL_INVERTED_LOW, PAL_RETRY_MAX)
                             : PAL_RECOVERED_LOW;
         pal_elastic_tets_reset(cubes->split);
     }
