@@ -108,10 +108,10 @@ static pal_err try_neighbour(const pal_scene *scene, pal_world *world, neighbour
     pal_configuration_switch *change = NULL;
     pal_world *next = NULL;
     pal_estimate own = {.error_m = NAN};
-    if (pal_configuration_estimate_nodes(scene, 0, &r->predicted.setting) > MAX_NODE)
+    if (pal_configuration_estimate_nodes(scene, 0, &r->predicted.configuration) > MAX_NODE)
         return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "more than %d nodes", MAX_NODE);
     pal_err err = swing(world, scene);
-    if (!err) err = pal_configuration_switch_prepare(scene, NULL, 0, &r->predicted.setting, diag, &change);
+    if (!err) err = pal_configuration_switch_prepare(scene, NULL, 0, &r->predicted.configuration, diag, &change);
     if (!err) err = pal_world_create(pal_configuration_switch_scene(change), diag, &next);
     if (!err) {
         pal_configuration_switch_transfer(change, next, world);
@@ -170,7 +170,7 @@ static double cost_ratio(const result *c, const neighbour *r)
 
 static const char *configuration_text(const neighbour *r, char text[64])
 {
-    const pal_configuration *s = &r->predicted.setting;
+    const pal_configuration *s = &r->predicted.configuration;
     char tolerance[24] = "";
     if (s->tolerance > 0) snprintf(tolerance, sizeof tolerance, ", tolerance %.0e", s->tolerance);
     snprintf(text, 64, "%d voxels, %.3g ms%s", s->size, 1e3 * s->step_s, tolerance);

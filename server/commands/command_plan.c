@@ -157,8 +157,8 @@ static cJSON *picked_json(const pal_studied_scene *studied)
     if (studied->picked < 0) return NULL;
     const pal_measured_configuration *p = &studied->file->study.point[studied->picked].measured;
     return PAL_JSON({"body", JSON_TEXT(studied->scene->body[studied->body].name)},
-                    {"configuration", JSON_TEXT(pal_configuration_text(&p->setting, text))}, {"ms", JSON_NUMBER(p->ms)},
-                    {"error_m", JSON_NUMBER(p->error_m)});
+                    {"configuration", JSON_TEXT(pal_configuration_text(&p->configuration, text))},
+                    {"ms", JSON_NUMBER(p->ms)}, {"error_m", JSON_NUMBER(p->error_m)});
 }
 
 static cJSON *as_json(const pal_studied_scene *studied, pal_world *world, cost *c)

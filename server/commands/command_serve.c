@@ -161,7 +161,7 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
     char folder[PATH_MAX + 32];
     for (int i = 0; i < run->n; i++) {
         const pal_studied_scene *studied = &run->studied[i];
-        run->study[i] = (pal_session_study){.configuration = studied->setting,
+        run->study[i] = (pal_session_study){.configuration = studied->configuration,
                                             .n = studied->n_configuration,
                                             .body = studied->body,
                                             .reference_m = studied->file ? studied->file->study.reference_m : NAN};

@@ -236,7 +236,7 @@ static bool has_point(const pal_study *study, const pal_study_point *point)
 {
     for (int k = 0; k < study->n_point; k++) {
         const pal_study_point *p = &study->point[k];
-        if (p->err == point->err && pal_configuration_equal(&p->measured.setting, &point->measured.setting))
+        if (p->err == point->err && pal_configuration_equal(&p->measured.configuration, &point->measured.configuration))
             return true;
     }
     return false;
@@ -450,11 +450,11 @@ static pal_err write_scene(study_run *run, pal_diagnostic *diag)
 {
     const pal_study *study = &run->file->study;
     const pal_measured_configuration *p = &study->point[run->picked].measured;
-    pal_configuration setting = p->setting;
+    pal_configuration configuration = p->configuration;
     pal_configured_scene *set = NULL;
     pal_diagnostic reason = {""};
-    if (setting.step_s == 0) setting.step_s = study->step_s;
-    pal_err err = pal_configuration_make(run->input.scene, run->input.body, &setting, &reason, &set);
+    if (configuration.step_s == 0) configuration.step_s = study->step_s;
+    pal_err err = pal_configuration_make(run->input.scene, run->input.body, &configuration, &reason, &set);
     if (err) return pal_diagnostic_set(diag, err, "-o: %s", reason.text);
     pal_loaded_scene *loaded = calloc(1, sizeof *loaded);
     if (!loaded) {
@@ -486,7 +486,7 @@ static pal_err pick_row(study_run *run, pal_diagnostic *diag)
     const pal_study_point *p = &study->point[order[run->row - 1]];
     if (p->err || !isfinite(p->measured.ms) || !isfinite(p->measured.error_m))
         return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--pick %d: %s was not measured: %s", run->row,
-                                  pal_configuration_text(&p->measured.setting, text),
+                                  pal_configuration_text(&p->measured.configuration, text),
                                   p->reason[0] ? p->reason : pal_err_text(p->err));
     run->picked = order[run->row - 1];
     return run->scene ? write_scene(run, diag) : PAL_ERR_OK;
@@ -530,7 +530,7 @@ static void print(const study_run *run)
         const pal_measured_configuration *p = &point->measured;
         pal_accuracy_target_text(&run->target, asked);
         if (run->row) snprintf(asked, sizeof asked, "row %d", run->row);
-        printf("%s: %s, %s in %.3g ms%s%s\n", asked, pal_configuration_text(&p->setting, text),
+        printf("%s: %s, %s in %.3g ms%s%s\n", asked, pal_configuration_text(&p->configuration, text),
                pal_study_error_text(run->file, p->error_m, off), p->ms, point->reason[0] ? "; " : "", point->reason);
     }
     int n = n_files(run, file);
@@ -551,7 +551,7 @@ static cJSON *as_json(const study_run *run)
     const pal_measured_configuration *p = &run->file->study.point[run->picked].measured;
     return PAL_JSON_ADD(
         o, {"picked", PAL_JSON({"point", JSON_NUMBER(run->picked)}, {"row", run->row ? JSON_NUMBER(run->row) : NULL},
-                               {"configuration", JSON_TEXT(pal_configuration_text(&p->setting, text))},
+                               {"configuration", JSON_TEXT(pal_configuration_text(&p->configuration, text))},
                                {"ms", JSON_NUMBER(p->ms)}, {"error_m", JSON_NUMBER(p->error_m)})});
 }
 

@@ -41,10 +41,10 @@ static bool time_steps(pal_world *const world[2], double step_s, double out[2], 
 
 static void count(const pal_scene *scene, double limit_s, pal_prediction *out)
 {
-    pal_configuration at = out->setting;
+    pal_configuration at = out->configuration;
     double now = out->n_node, whole = out->rest_substeps, limit_times = scene->step_s / limit_s;
     for (int k = 0; k < 2; k++) {
-        at.size = k ? 2 * out->setting.size : out->setting.size / 2;
+        at.size = k ? 2 * out->configuration.size : out->configuration.size / 2;
         double n = at.size > 0 ? pal_configuration_estimate_nodes(scene, 0, &at) : 0;
         out->nodes[k] = n > 0 ? n / now : k ? 8 : 0.125;
         /* the limit of explicit solvers is proportional to the voxel edge */

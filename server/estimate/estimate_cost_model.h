@@ -10,8 +10,8 @@
 #include "server/estimate/estimate_predict.h"
 #include "server/sim/world/world.h"
 
-/* Fills nodes, substeps and work of `out`, whose setting and implicit must be set. work is NaN if the probe failed.
- * scene: the body alone; live: a world of it; small: a world of the same method on the coarse mesh. Both worlds
+/* Fills nodes, substeps and work of `out`, whose configuration and implicit must be set. work is NaN if the probe
+ * failed. scene: the body alone; live: a world of it; small: a world of the same method on the coarse mesh. Both worlds
  * bear the same loads; their final state is unspecified. */
 void pal_estimate_cost_model(const pal_scene *scene, pal_world *live, pal_world *small, pal_prediction *out);
 #endif

@@ -23,7 +23,7 @@ typedef struct sized {
 typedef struct family {
     const pal_scene *scene;
     const pal_body *body;
-    const pal_configuration *setting;
+    const pal_configuration *configuration;
     const pal_estimate_state *state;
     const _Atomic bool *stop;
     const pal_surface *surface;
@@ -36,7 +36,7 @@ typedef struct family {
 
 static double nodes_of(const family *f, int size)
 {
-    pal_configuration s = *f->setting;
+    pal_configuration s = *f->configuration;
     s.size = size;
     return pal_configuration_estimate_nodes(f->scene, 0, &s);
 }
@@ -44,7 +44,7 @@ static double nodes_of(const family *f, int size)
 /* the finest size available; 0: none fine enough */
 static int finest_size(const family *f)
 {
-    int s = f->setting->size, r = MAX_FINER * s;
+    int s = f->configuration->size, r = MAX_FINER * s;
     while (r >= PAL_MIN_APART * s && nodes_of(f, r) > MAX_NODES) r -= f->fits ? s : 1;
     return r >= PAL_MIN_APART * s && r <= MAX_SIZE && nodes_of(f, r) > 0 ? r : 0;
 }
@@ -73,9 +73,9 @@ static bool solve(family *f, int size, sized *m)
     if (stopped(f)) return false;
     f->n_mesh++;
     pal_err err = size == 0 ? pal_rest_solution_coarser(f->scene, f->body, NULL, "linear", NULL, &m->rest)
-                  : size == f->setting->size
+                  : size == f->configuration->size
                       ? pal_rest_solution_make(f->scene, f->body, NULL, "linear", NULL, &m->rest)
-                      : pal_rest_solution_sized(f->scene, f->body, f->setting, size, "linear", &m->rest);
+                      : pal_rest_solution_sized(f->scene, f->body, f->configuration, size, "linear", &m->rest);
     m->size = size;
     return !err && pal_rest_solution_find(&m->rest, f->state, f->body, NULL, f->stop) && probe(f, m);
 }
@@ -137,7 +137,7 @@ static double change(family *f, const sized *own, bool shown)
 static void measure(family *f, bool shown, pal_estimate_hierarchy *out)
 {
     sized finest = {.u = NULL}, own = {.u = NULL};
-    const int size = f->setting->size, r = finest_size(f);
+    const int size = f->configuration->size, r = finest_size(f);
     double error = 0, last = 0;
     out->known = false;
     if (r > 0 && solve(f, r, &finest)) {
@@ -185,15 +185,15 @@ static bool is_same(const family *f, const pal_estimate_hierarchy *of, const dou
            (!regions || now->young_Pa == of->material.young_Pa);
 }
 
-bool pal_estimate_hierarchy_refresh(const pal_scene *scene, const pal_body *body, const pal_configuration *setting,
-                                    const pal_estimate_state *state, bool shown, bool fits, const _Atomic bool *stop,
-                                    pal_estimate_hierarchy *out)
+bool pal_estimate_hierarchy_refresh(const pal_scene *scene, const pal_body *body,
+                                    const pal_configuration *configuration, const pal_estimate_state *state, bool shown,
+                                    bool fits, const _Atomic bool *stop, pal_estimate_hierarchy *out)
 {
     const pal_surface *surface = &scene->body[0].mesh->surface;
-    family f = {scene, body, setting, state, stop, surface, fits, 1 + surface->n_vertex / PROBES, 0, 0};
+    family f = {scene, body, configuration, state, stop, surface, fits, 1 + surface->n_vertex / PROBES, 0, 0};
     double began = pal_clock_s();
     f.n_probe = surface->n_vertex / f.stride;
-    if (setting->size < MIN_SIZE || f.n_probe < 1 || scene->body[0].cells) return false;
+    if (configuration->size < MIN_SIZE || f.n_probe < 1 || scene->body[0].cells) return false;
     double *now = malloc(3 * sizeof *now * (size_t)state->n_node);
     const bool loaded = now && take_loads(body, state, now), same = loaded && is_same(&f, out, now);
     if (!loaded || same || began < out->next_s) {

@@ -35,14 +35,14 @@ typedef struct pal_estimate_hierarchy {
 /* Measures on the first call, and again if the loads or Poisson's ratio change (for bodies with regions: also E),
  * after a wait of 20 times the duration of the last measurement. Returns true if the result matches the state,
  * false if it is older or unknown.
- * scene: one body of model fem, without tools; body: the running one, made from it; setting: its present
+ * scene: one body of model fem, without tools; body: the running one, made from it; configuration: its present
  * configuration; state: its loads; shown: `times` applies to changes at vertices of the displayed surface, else at
  * nodes; fits: the voxels fit the body, so only integer multiples of their number are used; out: zeroed before the
  * first call. The result stays unknown if no such meshes exist (no surface, finer ones too large, no equilibrium)
  * or the run was stopped. */
-bool pal_estimate_hierarchy_refresh(const pal_scene *scene, const pal_body *body, const pal_configuration *setting,
-                                    const pal_estimate_state *state, bool shown, bool fits, const _Atomic bool *stop,
-                                    pal_estimate_hierarchy *out);
+bool pal_estimate_hierarchy_refresh(const pal_scene *scene, const pal_body *body,
+                                    const pal_configuration *configuration, const pal_estimate_state *state, bool shown,
+                                    bool fits, const _Atomic bool *stop, pal_estimate_hierarchy *out);
 /* Writes one clause on the accuracy of the error for many cut voxels: within a factor of 3, as observed, without a
  * hierarchy. fresh: the return value of refresh. */
 void pal_estimate_hierarchy_describe(const pal_estimate_hierarchy *family, bool fresh, char *text, size_t n_byte);

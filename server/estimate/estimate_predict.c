@@ -9,7 +9,7 @@
 enum { MIN_SIZE = 4, MAX_SIZE = 400 };
 
 /* nodes, substeps: relative to the present */
-static void add(const pal_prediction *from, pal_estimate *out, const pal_configuration *setting, double ms,
+static void add(const pal_prediction *from, pal_estimate *out, const pal_configuration *configuration, double ms,
                 double change_m, double nodes, double substeps)
 {
     int n = out->n_neighbour;
@@ -18,7 +18,7 @@ static void add(const pal_prediction *from, pal_estimate *out, const pal_configu
     out->neighbour_nodes[n] = (int)lround(from->n_node * nodes);
     out->neighbour_substeps[n] = (int)lround(from->rest_substeps * substeps);
     out->neighbour[out->n_neighbour++] =
-        (pal_measured_configuration){.setting = *setting, .ms = ms, .error_m = error_m};
+        (pal_measured_configuration){.configuration = *configuration, .ms = ms, .error_m = error_m};
 }
 
 /* Would a switch accept it, with `more` times the sub-steps in a step? */
@@ -48,14 +48,14 @@ static void sizes(const pal_prediction *from, pal_estimate *out)
 {
     double left[2] = {from->left[0] > 0 ? from->left[0] : exp2(from->order),
                       from->left[1] > 0 ? from->left[1] : exp2(-from->order)};
-    pal_configuration to = from->setting;
+    pal_configuration to = from->configuration;
     /* calibrated constants are valid only for their own size */
-    if (!(from->setting.size > 0) || from->setting.k_distance_J > 0) return;
-    to.size = from->setting.size / 2;
+    if (!(from->configuration.size > 0) || from->configuration.k_distance_J > 0) return;
+    to.size = from->configuration.size / 2;
     if (to.size >= MIN_SIZE && taken(from, &to, 1))
         add(from, out, &to, out->ms * times(from, 0), out->discretisation_m * (left[0] - 1), from->nodes[0],
             from->substeps[0]);
-    to.size = from->setting.size * 2;
+    to.size = from->configuration.size * 2;
     if (to.size <= MAX_SIZE && taken(from, &to, from->implicit ? 1 : 2))
         add(from, out, &to, out->ms * times(from, 1), out->discretisation_m * (left[1] - 1), from->nodes[1],
             from->substeps[1]);
@@ -64,18 +64,18 @@ static void sizes(const pal_prediction *from, pal_estimate *out)
 static void steps(const pal_prediction *from, pal_estimate *out)
 {
     double shrink = exp2(-from->solver_order);
-    pal_configuration to = from->setting;
-    to.step_s = from->setting.step_s * 2;
+    pal_configuration to = from->configuration;
+    to.step_s = from->configuration.step_s * 2;
     if (to.step_s <= PAL_NEIGHBOUR_MAX_STEP_S && taken(from, &to, 2))
         add(from, out, &to, out->ms / 2, out->time_m * (1 / shrink - 1), 1, 1);
-    to.step_s = from->setting.step_s / 2;
+    to.step_s = from->configuration.step_s / 2;
     if (to.step_s >= PAL_NEIGHBOUR_MIN_STEP_S && taken(from, &to, 1))
         add(from, out, &to, out->ms * 2, out->time_m * (shrink - 1), 1, 1);
 }
 
 static void tolerances(const pal_prediction *from, pal_estimate *out)
 {
-    pal_configuration to = from->setting;
+    pal_configuration to = from->configuration;
     to.tolerance = from->tolerance * 10;
     if (to.tolerance <= PAL_NEIGHBOUR_MAX_TOLERANCE && taken(from, &to, 1))
         add(from, out, &to, out->ms / from->decade, out->algebraic_m * 9, 1, 1);

@@ -21,11 +21,11 @@
 typedef struct pal_prediction {
     const pal_scene *scene; /* scene of the body, as it is; NULL: every value is accepted */
     int body;
-    int n_substep;             /* of a present step, over all bodies; 0: unknown */
-    pal_configuration setting; /* present configuration */
-    int n_node, rest_substeps; /* present nodes; sub-steps of a step at rest, of this body alone */
-    double other_substeps;     /* sub-steps that other bodies need; 0: none */
-    double once, beside;       /* shares of a step's time: pal_estimate_cost */
+    int n_substep;                   /* of a present step, over all bodies; 0: unknown */
+    pal_configuration configuration; /* present configuration */
+    int n_node, rest_substeps;       /* present nodes; sub-steps of a step at rest, of this body alone */
+    double other_substeps;           /* sub-steps that other bodies need; 0: none */
+    double once, beside;             /* shares of a step's time: pal_estimate_cost */
     /* half and twice the size, relative to the present: predicted nodes, sub-steps, time of a sub-step; NaN:
      * unknown, so no neighbour in size */
     double nodes[2], substeps[2], work[2];

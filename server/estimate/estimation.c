@@ -164,7 +164,7 @@ static void discretise(pal_estimation *w, const pal_body *body, pal_estimate *ou
     double last = w->shown.n > 0 ? pal_display_error_change(&w->shown, PAL_DISPLAY_FINE, PAL_DISPLAY_COARSE)
                                  : change(&w->fine, &w->coarse);
     if ((w->cut || w->thin) && !w->springs)
-        fresh = pal_estimate_hierarchy_refresh(w->scene, body, &w->prediction.setting, &w->state, w->shown.n > 0,
+        fresh = pal_estimate_hierarchy_refresh(w->scene, body, &w->prediction.configuration, &w->state, w->shown.n > 0,
                                                !w->cut, w->stop, &w->family);
     const pal_estimate_hierarchy *f = &w->family;
     w->prediction.left[0] = f->known ? known(f->half) : 0, w->prediction.left[1] = f->known ? known(f->twice) : 0;
@@ -203,7 +203,7 @@ static void compare_fitted(pal_estimation *w, pal_estimate *out)
 static void compare_models(pal_estimation *w, const pal_body *body, pal_estimate *out)
 {
     int n = w->state.n_node;
-    if (w->springs && w->prediction.setting.k_distance_J > 0 && out->discretisation_m > 0)
+    if (w->springs && w->prediction.configuration.k_distance_J > 0 && out->discretisation_m > 0)
         compare_fitted(w, out);
     else if (w->springs) /* their present positions are the equilibrium under `borne` */
         out->model_m =

@@ -78,7 +78,7 @@ static pal_err make_live(pal_estimation *w, pal_diagnostic *diag)
     f->work[0] = f->work[1] = f->decade = NAN;
     f->n_node = pal_world_body(w->live, 0)->n_node, f->rest_substeps = pal_world_substeps(w->live);
     f->order = PAL_USUAL_ORDER;
-    f->tolerance = f->setting.tolerance > 0 ? f->setting.tolerance : PAL_TOLERANCE_LIVE;
+    f->tolerance = f->configuration.tolerance > 0 ? f->configuration.tolerance : PAL_TOLERANCE_LIVE;
     if (!implicit && !cg) return PAL_ERR_OK;
     w->exact_scene = malloc(sizeof *w->exact_scene);
     if (!w->exact_scene) return PAL_ERR_MEMORY;
@@ -208,7 +208,7 @@ static pal_err take_state(pal_estimation *w)
 static pal_err open_work(pal_estimation *w, const pal_scene *scene, int body, pal_diagnostic *diag)
 {
     PAL_TRY(make_scene(w, scene, body, diag));
-    pal_configuration_of(scene, body, &w->prediction.setting);
+    pal_configuration_of(scene, body, &w->prediction.configuration);
     w->prediction.scene = w->scene, w->prediction.body = 0;
     PAL_TRY(make_live(w, diag));
     if (pal_world_body(w->live, 0)->active)

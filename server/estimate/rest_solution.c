@@ -301,11 +301,11 @@ pal_err pal_rest_solution_coarser(const pal_scene *scene, const pal_body *body, 
     return err;
 }
 
-pal_err pal_rest_solution_sized(const pal_scene *scene, const pal_body *body, const pal_configuration *setting,
+pal_err pal_rest_solution_sized(const pal_scene *scene, const pal_body *body, const pal_configuration *configuration,
                                 int size, const char *law, pal_rest_solution *out)
 {
     pal_configured_scene *set = NULL;
-    pal_configuration to = *setting;
+    pal_configuration to = *configuration;
     *out = (pal_rest_solution){.n_node = body->n_node};
     to.size = size;
     PAL_TRY(pal_configuration_make(scene, 0, &to, NULL, &set));

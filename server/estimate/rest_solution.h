@@ -32,7 +32,7 @@ pal_err pal_rest_solution_coarser(const pal_scene *scene, const pal_body *body, 
 /* The same with `size` voxels on the longest axis, made as a configuration switch makes it (configuration.h); model
  * fem only. Above 4,000 nodes it uses conjugate gradients with an incomplete factor, which needs a tenth of the
  * memory and less time. REFUSED also if the body already has that mesh. */
-pal_err pal_rest_solution_sized(const pal_scene *scene, const pal_body *body, const pal_configuration *setting,
+pal_err pal_rest_solution_sized(const pal_scene *scene, const pal_body *body, const pal_configuration *configuration,
                                 int size, const char *law, pal_rest_solution *out);
 void pal_rest_solution_free(pal_rest_solution *rest); /* accepts a zeroed struct */
 /* Interpolates in the elements of a rest solution at every stride-th of the points x [n * stride][3] (body frame).

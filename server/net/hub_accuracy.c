@@ -43,8 +43,8 @@ static void send_study(pal_hub *hub, pal_client *c, int body)
         pal_wire_study_point *to = &study->point[study->n_point++];
         *to = (pal_wire_study_point){
             .index = (uint32_t)i, .cost_ms = p->ms, .error_m = p->error_m, .pareto_optimal = p->front};
-        method_text(&p->setting, to->method);
-        pal_plain_text(to->label, sizeof to->label, pal_configuration_text(&p->setting, text));
+        method_text(&p->configuration, to->method);
+        pal_plain_text(to->label, sizeof to->label, pal_configuration_text(&p->configuration, text));
     }
     pal_hub_send(hub, c, hub->control);
 }
@@ -81,7 +81,7 @@ static double point_of(const pal_hub_room *room, int body, const pal_configurati
 {
     int best = -1, best_same = -1;
     for (int i = 0; i < room->study.n && room->study.body == body; i++) {
-        int n_same = likeness(&room->study.configuration[i].setting, now);
+        int n_same = likeness(&room->study.configuration[i].configuration, now);
         if (n_same > best_same) best = i, best_same = n_same;
     }
     return best < 0 ? NAN : (double)best;
@@ -123,7 +123,7 @@ void pal_hub_shown_errors(const pal_hub_room *room, int body, int point, const p
     if (looked && is_old(&e)) return;
     *now_m = looked && isfinite(e.error_m) ? e.error_m : error_of(room, point_of(room, body, &now));
     for (int i = 0; looked && point < 0 && i < e.n_neighbour; i++)
-        if (is_neighbour(&e.neighbour[i].setting, to)) *then_m = e.neighbour[i].error_m;
+        if (is_neighbour(&e.neighbour[i].configuration, to)) *then_m = e.neighbour[i].error_m;
     if (!isfinite(*then_m)) *then_m = error_of(room, point < 0 ? point_of(room, body, to) : (double)point);
 }
 
@@ -144,7 +144,7 @@ static double step_cost_ms(const pal_hub_room *room, double ms, double step_s)
 static void put_neighbour(const pal_hub_room *room, const pal_measured_configuration *from,
                           const pal_configuration *now, pal_wire_neighbour *to)
 {
-    const pal_configuration *s = &from->setting;
+    const pal_configuration *s = &from->configuration;
     char text[PAL_CONFIGURATION_TEXT];
     bool step = s->step_s > 0 && fabs(s->step_s - now->step_s) > 1e-9;
     bool tolerance = s->tolerance > 0 && s->tolerance != now->tolerance;

@@ -60,7 +60,7 @@ static bool read_switch(pal_hub *hub, pal_client *c, const pal_wire_command *com
     if (job->body < 0) return false;
     int point = by_point ? read_point(hub, c, job->body, command) : -1;
     if (by_point ? point < 0 : !read_parameters(hub, c, job->body, command, &job->configuration)) return false;
-    if (by_point) job->configuration = c->room->study.configuration[point].setting;
+    if (by_point) job->configuration = c->room->study.configuration[point].configuration;
     pal_hub_shown_errors(c->room, job->body, point, &job->configuration, &job->error_now_m, &job->error_then_m);
     job->was = pal_hub_edits(hub, c->room, job->body)->base;
     if (job->was) return true;
@@ -104,8 +104,9 @@ static void put_jump(const pal_hub *hub, const pal_job *job, double change, pal_
     bool far = r->max_move_m > bound_m + hub->error_m;
     size_t n = strlen(a->text), room = sizeof a->text - n;
     if (isnan(bound_m))
-        snprintf(a->text + n, room, "moves %.3g mm, %.3g mm a frame (no bound: no error is shown of both settings)",
-                 max_mm, frame_mm);
+        snprintf(a->text + n, room,
+                 "moves %.3g mm, %.3g mm a frame (no bound: no error is shown of both configurations)", max_mm,
+                 frame_mm);
     else
         snprintf(a->text + n, room, "moves %.3g mm, %s the bound of %.3g mm, %.3g mm a frame", max_mm,
                  far ? "beyond" : "within", 1e3 * bound_m, frame_mm);

@@ -1,12 +1,12 @@
-/* Rotations of 3x3 matrices: polar turn, singular values, eigenvalues.
+/* Rotations of 3x3 matrices: polar rotation, singular values, eigenvalues.
  *
- * pal_polar_rotation follows Mueller et al. 2016 (A robust method to extract the rotational part of deformations): turn
- * R by R <- R exp(w) so that R : F grows, warm started. Departure: Mueller's w = g / |tr S|, g the axial vector of the
- * skew part of S = R' F, converges linearly at a third a turn near a rotation. Here w = A^-1 g with A = tr(S) I -
- * sym(S), the Newton turn of R : F (as in Kugelstadt et al. 2018), whose error is squared by each turn. Where A is not
- * clearly positive definite (more than a quarter turn off, saddles half a turn off, det F <= 0 near a flat state) the
- * answer is taken from the singular values: R = U V'; where it is not unique, the turn that is free is taken nearest to
- * q.
+ * pal_polar_rotation follows Mueller et al. 2016 (A robust method to extract the rotational part of deformations):
+ * rotate R by R <- R exp(w) so that R : F grows, warm started. Departure: Mueller's w = g / |tr S|, g the axial vector
+ * of the skew part of S = R' F, converges linearly at a third per iteration near a rotation. Here w = A^-1 g with A =
+ * tr(S) I - sym(S), the Newton step of R : F (as in Kugelstadt et al. 2018), whose error is squared by each step. Where
+ * A is not clearly positive definite (more than a quarter rotation off, saddles half a rotation off, det F <= 0 near a
+ * flat state) the answer is taken from the singular values: R = U V'; where it is not unique, the rotation that is free
+ * is taken nearest to q.
  *
  * pal_svd3 is one-sided Jacobi (Hestenes 1958), which keeps small singular values exact. */
 #include "server/num/polar.h"

@@ -65,13 +65,14 @@ void pal_study_describe_miss(const pal_study *study, const char *methods, const 
     int n = 0;
     for (int k = 0; k < study->n_point; k++) {
         const pal_study_point *p = &study->point[k];
-        if (!pal_study_measured(p) || !pal_study_method_in(methods, p->measured.setting.model)) continue;
+        if (!pal_study_measured(p) || !pal_study_method_in(methods, p->measured.configuration.model)) continue;
         n++;
         if (!best || is_nearer(p, best, target)) best = p;
     }
     if (!pal_study_trusted(study)) {
         snprintf(out, n_byte,
-                 "none of the settings is named, since the reference itself is only within %.3g mm where %.3g mm move: "
+                 "none of the configurations is named, since the reference itself is only within %.3g mm where %.3g mm "
+                 "move: "
                  "hold more of the body (palpate prepare --hold 20, with --up as it lies), study it without --quick",
                  1e3 * study->reference_m, 1e3 * study->max_m);
         return;
@@ -80,10 +81,10 @@ void pal_study_describe_miss(const pal_study *study, const char *methods, const 
     if (target->max_error_m > 0 && study->reference_m > 0)
         snprintf(own, sizeof own, " and %.2g of the reference's own", 1e3 * study->reference_m);
     if (!best)
-        snprintf(out, n_byte, "none of the settings was measured, so none is %s", asked);
+        snprintf(out, n_byte, "none of the configurations was measured, so none is %s", asked);
     else
-        snprintf(out, n_byte, "none of the %d settings is %s: the nearest is %s, %.3g mm%s in %.3g ms", n, asked,
-                 pal_configuration_text(&best->measured.setting, text), 1e3 * best->measured.error_m, own,
+        snprintf(out, n_byte, "none of the %d configurations is %s: the nearest is %s, %.3g mm%s in %.3g ms", n, asked,
+                 pal_configuration_text(&best->measured.configuration, text), 1e3 * best->measured.error_m, own,
                  best->measured.ms);
 }
 
@@ -118,16 +119,16 @@ static pal_err pick(const char *word, const char *path, const pal_scene *scene, 
                                   word);
     }
     const pal_measured_configuration *p = &study->point[out->picked].measured;
-    pal_configuration setting = p->setting;
+    pal_configuration configuration = p->configuration;
     pal_diagnostic reason = {""};
-    if (setting.step_s == 0) setting.step_s = study->step_s;
-    pal_err err = pal_configuration_make(scene, out->file->index, &setting, &reason, &out->set);
+    if (configuration.step_s == 0) configuration.step_s = study->step_s;
+    pal_err err = pal_configuration_make(scene, out->file->index, &configuration, &reason, &out->set);
     if (err)
-        return pal_diagnostic_set(diag, err, "%s: %s: %s", path, pal_configuration_text(&p->setting, text),
+        return pal_diagnostic_set(diag, err, "%s: %s: %s", path, pal_configuration_text(&p->configuration, text),
                                   reason.text);
     out->scene = &out->set->scene;
-    snprintf(out->summary, sizeof out->summary, "%s: %s, %s in %.3g ms, picked of the %d settings of %.160s (%s)",
-             scene->body[out->file->index].name, pal_configuration_text(&p->setting, text),
+    snprintf(out->summary, sizeof out->summary, "%s: %s, %s in %.3g ms, picked of the %d configurations of %.160s (%s)",
+             scene->body[out->file->index].name, pal_configuration_text(&p->configuration, text),
              pal_study_error_text(out->file, p->error_m, off), p->ms, out->n_configuration, path, asked);
     return PAL_ERR_OK;
 }
@@ -144,7 +145,7 @@ pal_err pal_studied_scene_open(const char *word, const pal_scene *scene, pal_stu
     pal_err err = find(path, scene, &out->file, &reason);
     if (!out->file && wanted)
         return pal_diagnostic_set(diag, err ? err : PAL_ERR_REFUSED,
-                                  "%s: asks for a setting %s, %s%s: run palpate study %s%s", word,
+                                  "%s: asks for a configuration %s, %s%s: run palpate study %s%s", word,
                                   pal_accuracy_target_text(&target, asked), err ? "and " : "but there is no ",
                                   err ? reason.text : path, word, err ? " --again" : "");
     if (!out->file) {
@@ -152,14 +153,14 @@ pal_err pal_studied_scene_open(const char *word, const pal_scene *scene, pal_stu
         return PAL_ERR_OK;
     }
     out->body = out->file->index;
-    out->setting = malloc(PAL_STUDY_POINTS * sizeof *out->setting);
-    if (!out->setting) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory", path);
-    out->n_configuration = pal_study_configurations(&out->file->study, out->setting);
+    out->configuration = malloc(PAL_STUDY_POINTS * sizeof *out->configuration);
+    if (!out->configuration) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory", path);
+    out->n_configuration = pal_study_configurations(&out->file->study, out->configuration);
     if (strcmp(pal_machine_name(machine), out->file->study.machine) != 0)
         snprintf(out->warn, sizeof out->warn, "%.150s: its milliseconds are of %.100s, this is %.100s", path,
                  out->file->study.machine, machine);
     else if (!out->file->whole)
-        snprintf(out->warn, sizeof out->warn, "%.150s: was broken off after %d of %d settings", path,
+        snprintf(out->warn, sizeof out->warn, "%.150s: was broken off after %d of %d configurations", path,
                  out->file->study.n_point, out->file->n_total);
     return wanted ? pick(word, path, scene, &target, out, diag) : PAL_ERR_OK;
 }
@@ -168,6 +169,6 @@ void pal_studied_scene_close(pal_studied_scene *studied)
 {
     pal_configured_scene_free(studied->set);
     free(studied->file);
-    free(studied->setting);
+    free(studied->configuration);
     *studied = (pal_studied_scene){0};
 }

@@ -20,8 +20,8 @@ void pal_study_accuracy_text(const pal_study *study, double error_m, char *out, 
 /* pal_study_pick restricted to the methods (comma-separated, "": all). Returns the index of the point, -1: none
  * qualifies. */
 int pal_study_pick_target(const pal_study *study, const char *methods, const pal_accuracy_target *target);
-/* For a study in which no point qualifies: writes "none of the 48 settings is within 1 mm: the nearest is fem ...,
- * 1.3 mm in 5.2 ms", or that the reference cannot be trusted and what to do. */
+/* For a study in which no point qualifies: writes "none of the 48 configurations is within 1 mm: the nearest is fem
+ * ..., 1.3 mm in 5.2 ms", or that the reference cannot be trusted and what to do. */
 void pal_study_describe_miss(const pal_study *study, const char *methods, const pal_accuracy_target *target, char *out,
                              size_t n_byte);
 
@@ -32,7 +32,7 @@ typedef struct pal_studied_scene {
     pal_configured_scene *set; /* NULL: runs as written */
     int picked;                /* point of the study; -1: none requested */
     int body, n_configuration; /* configurations that a session may switch to */
-    pal_measured_configuration *setting;
+    pal_measured_configuration *configuration;
     char summary[720]; /* the picked configuration and its study; "": none */
     char warn[400];    /* a study that was ignored, or made on another machine; "": no warning */
 } pal_studied_scene;

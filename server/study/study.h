@@ -111,7 +111,8 @@ bool pal_study_method_in(const char *methods, const char *model);
 /* Predicts the error of a configuration between the measured ones, without the point leave_out (-1: use all). Fits
  * error = d size^-p along the sizes of configurations that are equal otherwise, or else what each parameter of the
  * model adds to the logarithm. False: too few points of the model, or none with this element, law, solver, step. */
-bool pal_study_predict_error(const pal_study *study, const pal_configuration *setting, int leave_out, double *error_m);
+bool pal_study_predict_error(const pal_study *study, const pal_configuration *configuration, int leave_out,
+                             double *error_m);
 /* Predicts the cost of a configuration that is made but has not run, from n_node nodes, n_element elements,
  * n_substep sub-steps of one of its steps at rest (body.h, pal_world_substeps) and the read time of its factor
  * (pal_study_point). It also uses the measured times of the other points of its model, without leave_out (-1: use
@@ -120,6 +121,6 @@ bool pal_study_predict_error(const pal_study *study, const pal_configuration *se
  * refined share is not known before it runs: the share of the other levels and the sub-steps of its finest level
  * are used instead. False: fewer than three points of the model, none with this element, law or solver, or none
  * that adapts. */
-bool pal_study_predict_cost(const pal_study *study, const pal_configuration *setting, int n_node, double n_element,
-                            int n_substep, double read_ms, int leave_out, double *ms);
+bool pal_study_predict_cost(const pal_study *study, const pal_configuration *configuration, int n_node,
+                            double n_element, int n_substep, double read_ms, int leave_out, double *ms);
 #endif

@@ -20,9 +20,9 @@ static void put(char to[PAL_NAME], const char *word)
     snprintf(to, PAL_NAME, "%s", word);
 }
 
-static void add(list *l, const pal_configuration *setting, bool calibrate)
+static void add(list *l, const pal_configuration *configuration, bool calibrate)
 {
-    if (l->n < PAL_STUDY_POINTS) l->out[l->n++] = (pal_study_entry){*setting, calibrate};
+    if (l->n < PAL_STUDY_POINTS) l->out[l->n++] = (pal_study_entry){*configuration, calibrate};
 }
 
 static bool wants(const list *l, const char *model)

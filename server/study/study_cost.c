@@ -19,7 +19,7 @@
 enum { MIN = 3, FEATURES = 18, GRID = 24, GOLDEN = 40, RATES = 16, ROUNDS = 4, ROUGH = 6 };
 
 typedef struct seen {
-    const pal_configuration *setting;
+    const pal_configuration *configuration;
     double n_node, n_element, n_substep, ms; /* of one of its steps */
     double read_ms;
     double f[FEATURES];
@@ -155,7 +155,8 @@ static bool counts(const pal_study *study, int i, int leave_out, const pal_confi
 {
     const pal_study_point *p = &study->point[i];
     return i != leave_out && !p->err && p->measured.ms > 0 && isfinite(p->measured.ms) && p->n_node > 0 &&
-           p->n_substep > 0 && p->measured.setting.step_s > 0 && pal_study_is(p->measured.setting.model, s->model);
+           p->n_substep > 0 && p->measured.configuration.step_s > 0 &&
+           pal_study_is(p->measured.configuration.model, s->model);
 }
 
 /* Nodes of a fully refined adaptive body: as counted for that configuration, otherwise four times as many per
@@ -163,7 +164,7 @@ static bool counts(const pal_study *study, int i, int leave_out, const pal_confi
 static double refined_nodes(const pal_study *study, int leave_out, const pal_configuration *s, double coarse)
 {
     for (int i = 0; i < study->n_point; i++) {
-        const pal_configuration *q = &study->point[i].measured.setting;
+        const pal_configuration *q = &study->point[i].measured.configuration;
         if (counts(study, i, leave_out, s) && pal_study_is(q->element, "refined") && q->size == s->size)
             return study->point[i].n_node;
     }
@@ -177,7 +178,7 @@ static double finest_substeps(const pal_study *study, int leave_out, const pal_c
     double coarse = NAN;
     for (int i = 0; i < study->n_point; i++) {
         const pal_study_point *p = &study->point[i];
-        const pal_configuration *q = &p->measured.setting;
+        const pal_configuration *q = &p->measured.configuration;
         if (!counts(study, i, leave_out, s)) continue;
         /* sub-steps of its own step */
         double n = p->n_substep * s->step_s / q->step_s;
@@ -193,12 +194,12 @@ static double nodes_in_use(const pal_study *study, int leave_out, const pal_conf
     double coarse = NAN, share = 0;
     int n = 0;
     for (int i = 0; i < study->n_point; i++)
-        if (counts(study, i, leave_out, s) && study->point[i].measured.setting.size == 1)
+        if (counts(study, i, leave_out, s) && study->point[i].measured.configuration.size == 1)
             coarse = study->point[i].n_node;
     for (int i = 0; i < study->n_point; i++) {
         const pal_study_point *p = &study->point[i];
-        if (!counts(study, i, leave_out, s) || !is_adaptive(&p->measured.setting)) continue;
-        double full = refined_nodes(study, leave_out, &p->measured.setting, coarse);
+        if (!counts(study, i, leave_out, s) || !is_adaptive(&p->measured.configuration)) continue;
+        double full = refined_nodes(study, leave_out, &p->measured.configuration, coarse);
         share += (p->n_node - coarse) / (full - coarse);
         n++;
     }
@@ -209,15 +210,16 @@ static double nodes_in_use(const pal_study *study, int leave_out, const pal_conf
 
 static double distance(const seen *p, const pal_configuration *s, double n_node)
 {
-    return pal_study_differences(p->setting, s) + PAL_COST_PER_E * fabs(log(p->n_node / n_node));
+    return pal_study_differences(p->configuration, s) + PAL_COST_PER_E * fabs(log(p->n_node / n_node));
 }
 
 static bool has_words(const seen *p, int n, const pal_configuration *s)
 {
     bool element = false, law = false, solver = false;
     for (int i = 0; i < n; i++) {
-        element |= pal_study_is(p[i].setting->element, s->element), law |= pal_study_is(p[i].setting->law, s->law);
-        solver |= pal_study_is(p[i].setting->solver, s->solver);
+        element |= pal_study_is(p[i].configuration->element, s->element),
+            law |= pal_study_is(p[i].configuration->law, s->law);
+        solver |= pal_study_is(p[i].configuration->solver, s->solver);
     }
     return element && law && solver;
 }
@@ -243,13 +245,13 @@ bool pal_study_predict_cost(const pal_study *study, const pal_configuration *s, 
     for (int i = 0; i < study->n_point; i++) {
         const pal_study_point *q = &study->point[i];
         if (!counts(study, i, leave_out, s)) continue;
-        p[n] = (seen){.setting = &q->measured.setting,
+        p[n] = (seen){.configuration = &q->measured.configuration,
                       .n_node = q->n_node,
                       .n_element = by_element ? q->n_element : q->n_node,
                       .n_substep = q->n_substep,
                       .read_ms = q->read_ms};
-        p[n].ms = q->measured.ms * q->measured.setting.step_s / study->step_s;
-        features(p[n].setting, p[n].n_node, p[n].f);
+        p[n].ms = q->measured.ms * q->measured.configuration.step_s / study->step_s;
+        features(p[n].configuration, p[n].n_node, p[n].f);
         n++;
     }
     if (n < MIN || !has_words(p, n, s)) return false;
@@ -259,7 +261,7 @@ bool pal_study_predict_cost(const pal_study *study, const pal_configuration *s, 
         off += near * log((p[i].ms - law.a) / work_ms(&law, &p[i], NULL));
         weight += near;
     }
-    seen own = {.setting = s,
+    seen own = {.configuration = s,
                 .n_node = nodes,
                 .n_element = by_element ? n_element : nodes,
                 .n_substep = substeps,

@@ -29,7 +29,7 @@ static bool may_continue(void *user, const pal_fit_step *step)
     return pal_study_continues(user);
 }
 
-static pal_err fit(pal_study_job *job, const pal_calibration *calibration, pal_configuration *setting,
+static pal_err fit(pal_study_job *job, const pal_calibration *calibration, pal_configuration *configuration,
                    pal_diagnostic *diag)
 {
     pal_calibration_info info;
@@ -41,15 +41,15 @@ static pal_err fit(pal_study_job *job, const pal_calibration *calibration, pal_c
     memcpy(theta, info.start, sizeof *theta * (size_t)info.n_parameter);
     pal_err err = pal_fit_adjoint(calibration, &options, theta, &result, diag);
     for (int k = 0; k < info.n_kind && !err; k++) {
-        if (info.kind[k] == PAL_SPRING_DISTANCE) setting->k_distance_J = exp(theta[k]);
-        if (info.kind[k] == PAL_SPRING_AREA) setting->k_area_J = exp(theta[k]);
-        if (info.kind[k] == PAL_SPRING_VOLUME) setting->k_volume_J = exp(theta[k]);
+        if (info.kind[k] == PAL_SPRING_DISTANCE) configuration->k_distance_J = exp(theta[k]);
+        if (info.kind[k] == PAL_SPRING_AREA) configuration->k_area_J = exp(theta[k]);
+        if (info.kind[k] == PAL_SPRING_VOLUME) configuration->k_volume_J = exp(theta[k]);
     }
     free(theta);
     return err;
 }
 
-pal_err pal_study_fit(pal_study_job *job, pal_configuration *setting, pal_diagnostic *diag)
+pal_err pal_study_fit(pal_study_job *job, pal_configuration *configuration, pal_diagnostic *diag)
 {
     pal_samples samples[PAL_STUDY_LOADS] = {{0}};
     pal_calibrate_case cases[PAL_STUDY_LOADS];
@@ -57,7 +57,7 @@ pal_err pal_study_fit(pal_study_job *job, pal_configuration *setting, pal_diagno
     pal_calibration *calibration = NULL;
     pal_err err = PAL_ERR_OK;
     pal_calibrate_default(&options);
-    options.voxel.resolution = setting->size;
+    options.voxel.resolution = configuration->size;
     options.without_area = true, options.min_volume_ratio = PAL_MIN_VOLUME_RATIO;
     int n_fit = job->n_load > 1 ? job->n_load - 1 : 1;
     for (int k = 0; k < n_fit && !err; k++) {
@@ -70,7 +70,7 @@ pal_err pal_study_fit(pal_study_job *job, pal_configuration *setting, pal_diagno
     if (!err)
         err = pal_calibration_create(job->problem, &job->scene->body[0].mesh->surface, cases, n_fit, &options,
                                      &calibration, diag);
-    if (!err) err = fit(job, calibration, setting, diag);
+    if (!err) err = fit(job, calibration, configuration, diag);
     pal_calibration_destroy(calibration);
     for (int k = 0; k < n_fit; k++) pal_samples_free(&samples[k]);
     return err;

@@ -78,10 +78,10 @@ static const pal_study_point *known(const pal_study *before, const pal_study_ent
 {
     for (int i = 0; before && i < before->n_point; i++) {
         const pal_study_point *p = &before->point[i];
-        bool fitted = p->measured.setting.k_distance_J > 0 || !strncmp(p->reason, "calibration:", 12);
-        pal_configuration bare = p->measured.setting;
+        bool fitted = p->measured.configuration.k_distance_J > 0 || !strncmp(p->reason, "calibration:", 12);
+        pal_configuration bare = p->measured.configuration;
         bare.k_distance_J = bare.k_area_J = bare.k_volume_J = 0;
-        if (fitted == entry->calibrate && pal_configuration_equal(&bare, &entry->setting)) return p;
+        if (fitted == entry->calibrate && pal_configuration_equal(&bare, &entry->configuration)) return p;
     }
     return NULL;
 }
@@ -92,8 +92,9 @@ static pal_err sweep(pal_study_job *job, const pal_study_entry *entry, int n)
     for (int i = 0; i < n; i++) {
         char name[PAL_CONFIGURATION_TEXT];
         const pal_study_point *old = known(o->before, &entry[i]);
-        bool go = !o->progress || o->progress(pal_configuration_text(&entry[i].setting, name), (double)i / n, o->user);
-        if (!go) return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped after %d of %d settings", i, n);
+        bool go =
+            !o->progress || o->progress(pal_configuration_text(&entry[i].configuration, name), (double)i / n, o->user);
+        if (!go) return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped after %d of %d configurations", i, n);
         if (old)
             job->out->point[i] = *old;
         else
@@ -101,7 +102,7 @@ static pal_err sweep(pal_study_job *job, const pal_study_entry *entry, int n)
         job->out->n_point = i + 1;
         pal_study_mark_front(job->out);
         if (o->done && !o->done(job->out, n, o->user))
-            return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped after %d of %d settings", i + 1, n);
+            return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped after %d of %d configurations", i + 1, n);
     }
     return PAL_ERR_OK;
 }

@@ -9,7 +9,7 @@ enum { PAL_STUDY_PROBES = 1000 };
 
 /* a configuration to measure */
 typedef struct pal_study_entry {
-    pal_configuration setting;
+    pal_configuration configuration;
     bool calibrate; /* fit its spring constants first */
 } pal_study_entry;
 
@@ -74,8 +74,8 @@ int pal_study_fit_size(const pal_study_job *job, double wanted);
 int pal_study_size(const pal_study_job *job, int compact);
 
 /* study_world.c. statics: for statics, without tools, safeguards and damping. Frees on error. */
-pal_err pal_study_open(const pal_study_job *job, const pal_configuration *setting, bool statics, pal_study_world *out,
-                       pal_diagnostic *diag);
+pal_err pal_study_open(const pal_study_job *job, const pal_configuration *configuration, bool statics,
+                       pal_study_world *out, pal_diagnostic *diag);
 void pal_study_close(pal_study_world *world);
 /* Nodal forces of a load [n_node][3] on the body of `world`. */
 pal_err pal_study_forces(const pal_study_job *job, const pal_study_world *world, const pal_problem_case *load,
@@ -87,12 +87,12 @@ pal_err pal_study_apply_load(const pal_study_job *job, const pal_study_world *wo
 pal_err pal_study_displacement(const pal_study_world *world, const double *x, int n, double *u, pal_diagnostic *diag);
 
 /* study_rest.c: displacement of the probes [n_probe][3] in the equilibrium under a load. NUMERIC: there is none. */
-pal_err pal_study_static(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load, double *u,
-                         int *n_node, pal_diagnostic *diag);
+pal_err pal_study_static(pal_study_job *job, const pal_configuration *configuration, const pal_problem_case *load,
+                         double *u, int *n_node, pal_diagnostic *diag);
 
 /* study_reference.c: the same for the reference, from the cache if present. */
-pal_err pal_study_cached_static(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load,
-                                double *u, int *n_node, pal_diagnostic *diag);
+pal_err pal_study_cached_static(pal_study_job *job, const pal_configuration *configuration,
+                                const pal_problem_case *load, double *u, int *n_node, pal_diagnostic *diag);
 
 /* study_loads.c: three presses and a pull, for a scene without load cases */
 pal_err pal_study_presses(pal_study_job *job);
@@ -103,7 +103,7 @@ bool pal_study_press_adjust(pal_study_job *job, int index, pal_err err);
 /* study_job.c. False: the user asked to stop now. */
 bool pal_study_continues(const pal_study_job *job);
 /* Fits spring constants to the reference's equilibrium and writes them to the configuration. */
-pal_err pal_study_fit(pal_study_job *job, pal_configuration *setting, pal_diagnostic *diag);
+pal_err pal_study_fit(pal_study_job *job, pal_configuration *configuration, pal_diagnostic *diag);
 
 /* study_reference.c. Call reference_size first: the sweep depends on it. */
 pal_err pal_study_reference_size(pal_study_job *job);
@@ -112,8 +112,8 @@ pal_err pal_study_reference(pal_study_job *job);
 /* study_run.c: measures one point, whose configuration and errors are set. Only STATE is an error. */
 pal_err pal_study_measure(pal_study_job *job, const pal_study_entry *entry, pal_study_point *out);
 /* Trajectory of the tip under the first load, every PAL_STUDY_FRAME_S. ms [max] receives step times unless NULL. */
-pal_err pal_study_trajectory(pal_study_job *job, const pal_configuration *setting, double (*trajectory)[3], double *ms,
-                             int max, int *n_ms, pal_study_point *facts, pal_diagnostic *diag);
+pal_err pal_study_trajectory(pal_study_job *job, const pal_configuration *configuration, double (*trajectory)[3],
+                             double *ms, int max, int *n_ms, pal_study_point *facts, pal_diagnostic *diag);
 
 /* study_run.c: times every configuration again later and keeps the smallest median, because the load of the machine
  * varies. STATE: stopped. */

@@ -12,17 +12,17 @@
 enum { METHODS = 12, FRONT_LABELS = 40, TIP = 2 * PAL_CONFIGURATION_TEXT };
 
 /* "fem hex8_bbar", "tet_springs calibrated": the methods with separate markers */
-static const char *method_of(const pal_configuration *setting, char out[PAL_CONFIGURATION_TEXT])
+static const char *method_of(const pal_configuration *configuration, char out[PAL_CONFIGURATION_TEXT])
 {
-    bool calibrated = setting->k_distance_J > 0;
-    snprintf(out, PAL_CONFIGURATION_TEXT, "%s%s%s%s", setting->model, setting->element[0] ? " " : "", setting->element,
-             calibrated ? " calibrated" : "");
+    bool calibrated = configuration->k_distance_J > 0;
+    snprintf(out, PAL_CONFIGURATION_TEXT, "%s%s%s%s", configuration->model, configuration->element[0] ? " " : "",
+             configuration->element, calibrated ? " calibrated" : "");
     return out;
 }
 
 static double step_of(const pal_study *study, const pal_study_point *p)
 {
-    return p->measured.setting.step_s > 0 ? p->measured.setting.step_s : study->step_s;
+    return p->measured.configuration.step_s > 0 ? p->measured.configuration.step_s : study->step_s;
 }
 
 static bool is_live(const pal_study *study, const pal_study_point *p)
@@ -96,18 +96,20 @@ void pal_study_print(const pal_study_file *file, FILE *to)
     fprintf(to, "against %s, itself within %.3g mm; the largest displacement %.4g mm\n", s->reference,
             1e3 * s->reference_m, 1e3 * s->max_m);
     if (!pal_study_trusted(s))
-        fprintf(to,
-                "So much that no setting is named: hold more of the body (palpate prepare --hold 20, with --up as "
-                "it lies)%s.\n",
-                is_quick(file) ? ", or study it without --quick" : "");
+        fprintf(
+            to,
+            "So much that no configuration is named: hold more of the body (palpate prepare --hold 20, with --up as "
+            "it lies)%s.\n",
+            is_quick(file) ? ", or study it without --quick" : "");
     if (is_quick(file))
-        fprintf(to,
-                "Quick: a coarse reference, so errors below that are of chance, and few settings; for figures to be "
-                "used run it without --quick.\n");
+        fprintf(
+            to,
+            "Quick: a coarse reference, so errors below that are of chance, and few configurations; for figures to be "
+            "used run it without --quick.\n");
     fprintf(to, "%1s %3s", "", "row");
     for (int c = 0; c < N_COLUMN; c++)
         if (columns[c].width > 0) fprintf(to, " %*s", columns[c].width, columns[c].printed);
-    fprintf(to, "  setting\n");
+    fprintf(to, "  configuration\n");
     pal_study_order(s, order);
     for (int k = 0; k < s->n_point; k++) {
         const pal_study_point *p = &s->point[order[k]];
@@ -115,7 +117,7 @@ void pal_study_print(const pal_study_file *file, FILE *to)
         fprintf(to, "%1s %3d", p->measured.front ? "*" : "", k + 1);
         for (int c = 0; c < N_COLUMN; c++)
             if (columns[c].width > 0) fprintf(to, " %*s", columns[c].width, cell_text(s, p, &columns[c], "-", cell));
-        fprintf(to, "  %s%s%s\n", pal_configuration_text(&p->measured.setting, text), p->reason[0] ? "; " : "",
+        fprintf(to, "  %s%s%s\n", pal_configuration_text(&p->measured.configuration, text), p->reason[0] ? "; " : "",
                 p->reason);
     }
     fprintf(to,
@@ -126,7 +128,7 @@ void pal_study_print(const pal_study_file *file, FILE *to)
     for (int k = 0; k < s->n_point; k++) {
         const pal_study_point *p = &s->point[order[k]];
         if (!pal_study_measured(p))
-            fprintf(to, "not measured: %d, %s: %s\n", k + 1, pal_configuration_text(&p->measured.setting, text),
+            fprintf(to, "not measured: %d, %s: %s\n", k + 1, pal_configuration_text(&p->measured.configuration, text),
                     reason_of(p));
     }
 }
@@ -136,7 +138,7 @@ void pal_study_print(const pal_study_file *file, FILE *to)
 /* the parameters of a point on the front, as short as its marker allows */
 static void parameters_of(const pal_study *study, const pal_study_point *p, double usual, char *out, size_t n_byte)
 {
-    const pal_configuration *s = &p->measured.setting;
+    const pal_configuration *s = &p->measured.configuration;
     bool voxels = !strcmp(s->model, "fem") || !strcmp(s->model, "tet_springs");
     int n = s->size > 0 ? snprintf(out, n_byte, "%d %s", s->size,
                                    voxels         ? "voxels"
@@ -160,9 +162,9 @@ static double usual_tolerance(const pal_study *study)
     double usual = 0;
     int max = 0;
     for (int k = 0; k < study->n_point; k++) {
-        double t = study->point[k].measured.setting.tolerance;
+        double t = study->point[k].measured.configuration.tolerance;
         int n = 0;
-        for (int i = 0; i < study->n_point; i++) n += study->point[i].measured.setting.tolerance == t;
+        for (int i = 0; i < study->n_point; i++) n += study->point[i].measured.configuration.tolerance == t;
         if (t > 0 && n > max) max = n, usual = t;
     }
     return usual;
@@ -189,7 +191,7 @@ static void add_point(series *s, const pal_study *study, const pal_study_point *
     char name[PAL_CONFIGURATION_TEXT];
     int k = 0;
     bool apart = p->reason[0] != 0;
-    method_of(&p->measured.setting, name);
+    method_of(&p->measured.configuration, name);
     while (k < s->n_method && (strcmp(s->name[k], name) != 0 || s->apart[k] != apart)) k++;
     if (k == s->n_method) {
         if (s->n_method == METHODS) return;
@@ -197,8 +199,8 @@ static void add_point(series *s, const pal_study *study, const pal_study_point *
         memcpy(s->name[s->n_method++], name, sizeof name);
     }
     char *tip = s->tip_text[s->n_tip++], text[PAL_CONFIGURATION_TEXT];
-    snprintf(tip, TIP, "%s: %.3g ms, %.3g mm%s%s", pal_configuration_text(&p->measured.setting, text), p->measured.ms,
-             1e3 * p->measured.error_m, apart ? "; " : "", p->reason);
+    snprintf(tip, TIP, "%s: %.3g ms, %.3g mm%s%s", pal_configuration_text(&p->measured.configuration, text),
+             p->measured.ms, 1e3 * p->measured.error_m, apart ? "; " : "", p->reason);
     s->tip[k][s->n[k]] = tip;
     s->x[k][s->n[k]] = p->measured.ms;
     s->y[k][s->n[k]++] = 1e3 * p->measured.error_m;
@@ -320,7 +322,7 @@ static void put_row(FILE *to, const pal_study_file *file, const pal_study_point 
                               : " class=\"bad\"",
             p->measured.front ? "&#9733;" : "");
     fprintf(to, measured ? "<button>%d</button></td><td>" : "%d</td><td>", row);
-    put_text(to, pal_configuration_text(&p->measured.setting, text));
+    put_text(to, pal_configuration_text(&p->measured.configuration, text));
     if (p->measured.front) put_order(to, file, row);
     if (!measured || p->reason[0]) {
         fputs("<br>", to);
@@ -382,22 +384,22 @@ static void put_page(FILE *to, const pal_study_file *file, const char *svg)
     if (is_quick(file)) put_fact(to, "quick", "a coarse reference: errors below its own are of chance");
     put_fact(to, "loads", file->loads);
     snprintf(text, sizeof text, "%d of %d%s", s->n_point, file->n_total, file->whole ? "" : ", broken off");
-    put_fact(to, "settings", text);
+    put_fact(to, "configurations", text);
     put_fact(to, "made by", file->command);
     fputs("</dl>\n", to);
     fputs(svg ? "<div class=\"wide\">" : "", to);
     fputs(svg ? svg : "<p>Nothing was measured, so there is nothing to draw.</p>\n", to);
     if (svg) fputs("</div>\n", to);
-    fprintf(
-        to,
-        "<p>&#9733; the front: nothing else is both cheaper and nearer. ms: for %.3g ms of the body's time, with "
-        "shorter steps so many of them; live: no more than that. Error: the largest distance from the reference, "
-        "at rest or along the path. Point at a mark for its setting. A row's button copies the command that writes its "
-        "scene; under one of the front it is shown as well.</p>\n",
-        1e3 * s->step_s);
+    fprintf(to,
+            "<p>&#9733; the front: nothing else is both cheaper and nearer. ms: for %.3g ms of the body's time, with "
+            "shorter steps so many of them; live: no more than that. Error: the largest distance from the reference, "
+            "at rest or along the path. Point at a mark for its configuration. A row's button copies the command that "
+            "writes its "
+            "scene; under one of the front it is shown as well.</p>\n",
+            1e3 * s->step_s);
     fputs("<p id=\"copied\" data-study=\"", to);
     put_study(to, file);
-    fputs("\"></p>\n<div class=\"wide\"><table><thead><tr><th></th><th>row</th><th>setting</th>", to);
+    fputs("\"></p>\n<div class=\"wide\"><table><thead><tr><th></th><th>row</th><th>configuration</th>", to);
     for (int c = 0; c < N_COLUMN; c++) fprintf(to, "<th>%s</th>", columns[c].name);
     fputs("</tr></thead><tbody>\n", to);
     pal_study_order(s, order);

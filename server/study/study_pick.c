@@ -51,7 +51,7 @@ int pal_study_pick(const pal_study *study, const char *methods, double max_error
     double own = study->reference_m > 0 ? study->reference_m : 0;
     for (int i = 0; i < study->n_point; i++) {
         const pal_measured_configuration *p = &study->point[i].measured;
-        if (!judged(&study->point[i]) || !pal_study_method_in(methods, p->setting.model)) continue;
+        if (!judged(&study->point[i]) || !pal_study_method_in(methods, p->configuration.model)) continue;
         if (!isnan(max_error_m) && !(p->error_m + own <= max_error_m)) continue;
         if (!isnan(budget_ms) && !(p->ms <= budget_ms)) continue;
         if (best >= 0) {
@@ -107,8 +107,8 @@ static along find_law(const pal_study *study, const pal_configuration *s, int le
     along out = {.n_size = 0};
     for (int i = 0; i < study->n_point; i++) {
         const pal_study_point *p = &study->point[i];
-        if (i == leave_out || !pal_study_measured(p) || !same_but_size(&p->measured.setting, s)) continue;
-        x[n] = log(edges(&p->measured.setting));
+        if (i == leave_out || !pal_study_measured(p) || !same_but_size(&p->measured.configuration, s)) continue;
+        x[n] = log(edges(&p->measured.configuration));
         y[n] = log(fmax(p->measured.error_m, PAL_MIN_ERROR_M));
         bool fresh = true;
         for (int k = 0; k < n; k++) fresh = fresh && fabs(x[k] - x[n]) > 1e-9;
@@ -160,7 +160,7 @@ void pal_study_ridge(double *A, int n, double hold, double *w)
 static bool is_mate(const pal_study *study, int i, const pal_configuration *s, int leave_out)
 {
     const pal_study_point *p = &study->point[i];
-    return i != leave_out && pal_study_measured(p) && pal_study_is(p->measured.setting.model, s->model);
+    return i != leave_out && pal_study_measured(p) && pal_study_is(p->measured.configuration.model, s->model);
 }
 
 /* Parameters without data in the other points: a word that none of them has, a step or tolerance far from all of
@@ -169,7 +169,7 @@ static bool is_strange(const pal_study *study, const pal_configuration *s, int l
 {
     bool element = false, law = false, solver = false, fitted = false, step = false, tolerance = false;
     for (int i = 0; i < study->n_point; i++) {
-        const pal_configuration *q = &study->point[i].measured.setting;
+        const pal_configuration *q = &study->point[i].measured.configuration;
         if (!is_mate(study, i, s, leave_out)) continue;
         element |= pal_study_is(q->element, s->element), law |= pal_study_is(q->law, s->law);
         solver |= pal_study_is(q->solver, s->solver), fitted |= (q->k_distance_J > 0) == (s->k_distance_J > 0);
@@ -203,7 +203,7 @@ static bool fit_parameters(const pal_study *study, const pal_configuration *s, i
     for (int i = 0; i < study->n_point; i++) {
         const pal_measured_configuration *p = &study->point[i].measured;
         if (!is_mate(study, i, s, leave_out)) continue;
-        features(&p->setting, f);
+        features(&p->configuration, f);
         for (int r = 0; r < FEATURES; r++) {
             for (int c = 0; c < FEATURES; c++) A[r][c] += f[r] * f[c];
             A[r][FEATURES] += f[r] * log(fmax(p->error_m, PAL_MIN_ERROR_M));
@@ -214,9 +214,9 @@ static bool fit_parameters(const pal_study *study, const pal_configuration *s, i
     pal_study_ridge(A[0], FEATURES, PAL_ERROR_RIDGE, w);
     for (int i = 0; i < study->n_point; i++) {
         const pal_measured_configuration *p = &study->point[i].measured;
-        if (!is_mate(study, i, s, leave_out) || p->setting.size != s->size) continue;
-        double near = exp2(-2 * pal_study_differences(&p->setting, s));
-        features(&p->setting, f);
+        if (!is_mate(study, i, s, leave_out) || p->configuration.size != s->size) continue;
+        double near = exp2(-2 * pal_study_differences(&p->configuration, s));
+        features(&p->configuration, f);
         off += near * (log(fmax(p->error_m, PAL_MIN_ERROR_M)) - sum_of(w, f));
         weight += near;
         (*mates)++;
@@ -226,12 +226,13 @@ static bool fit_parameters(const pal_study *study, const pal_configuration *s, i
     return true;
 }
 
-bool pal_study_predict_error(const pal_study *study, const pal_configuration *setting, int leave_out, double *error_m)
+bool pal_study_predict_error(const pal_study *study, const pal_configuration *configuration, int leave_out,
+                             double *error_m)
 {
     double logarithm = 0;
     int mates = 0;
-    along law = find_law(study, setting, leave_out);
-    bool known = fit_parameters(study, setting, leave_out, &logarithm, &mates);
+    along law = find_law(study, configuration, leave_out);
+    bool known = fit_parameters(study, configuration, leave_out, &logarithm, &mates);
     if (!known && law.n_size < ALONG) return false;
     bool closely = law.n_size > ALONG && law.off < PAL_LAW_RMS;
     bool by_law = law.n_size >= ALONG && (closely || !known || mates == 0);
@@ -245,8 +246,8 @@ void pal_study_predict(pal_study *study)
         pal_study_point *p = &study->point[i];
         p->predicted_ms = p->predicted_m = NAN;
         if (!pal_study_measured(p)) continue;
-        pal_study_predict_error(study, &p->measured.setting, i, &p->predicted_m);
-        pal_study_predict_cost(study, &p->measured.setting, p->n_node, p->n_element, p->n_substep, p->read_ms, i,
+        pal_study_predict_error(study, &p->measured.configuration, i, &p->predicted_m);
+        pal_study_predict_cost(study, &p->measured.configuration, p->n_node, p->n_element, p->n_substep, p->read_ms, i,
                                &p->predicted_ms);
     }
 }

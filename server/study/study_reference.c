@@ -13,7 +13,7 @@
 
 enum { COUNTED = 12 }; /* size at which nodes are counted */
 
-static pal_configuration reference_setting(const pal_study_job *job, int size)
+static pal_configuration reference_configuration(const pal_study_job *job, int size)
 {
     bool quick = job->options->quick;
     pal_configuration s = {.size = size};
@@ -66,15 +66,15 @@ static void remember(const pal_study_job *job, uint64_t key, const pal_study_ans
 
 /* A static solution under `load`, or the trajectory under the first load (load NULL): value [n][3] from the cache, else
  * computed and stored. */
-static pal_err cached(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load,
+static pal_err cached(pal_study_job *job, const pal_configuration *configuration, const pal_problem_case *load,
                       double (*value)[3], int n, int *n_node, pal_diagnostic *diag)
 {
-    uint64_t key = sum_of(job, load ? "rest" : "trajectory", setting, load ? load : job->load[0]);
+    uint64_t key = sum_of(job, load ? "rest" : "trajectory", configuration, load ? load : job->load[0]);
     pal_study_answer answer = {.n_node = 0};
     pal_diagnostic reason = {{0}};
     if (!recall(job, key, &answer, value[0], 3 * n)) {
-        answer.err = load ? pal_study_static(job, setting, load, value[0], &answer.n_node, &reason)
-                          : pal_study_trajectory(job, setting, value, NULL, 0, NULL, NULL, &reason);
+        answer.err = load ? pal_study_static(job, configuration, load, value[0], &answer.n_node, &reason)
+                          : pal_study_trajectory(job, configuration, value, NULL, 0, NULL, NULL, &reason);
         snprintf(answer.reason, sizeof answer.reason, "%.*s", PAL_CONFIGURATION_TEXT - 1, reason.text);
         if (answer.err) memset(value, 0, sizeof *value * (size_t)n);
         remember(job, key, &answer, value[0], 3 * n);
@@ -83,10 +83,10 @@ static pal_err cached(pal_study_job *job, const pal_configuration *setting, cons
     return answer.err ? pal_diagnostic_set(diag, answer.err, "%s", answer.reason) : PAL_ERR_OK;
 }
 
-pal_err pal_study_cached_static(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load,
-                                double *u, int *n_node, pal_diagnostic *diag)
+pal_err pal_study_cached_static(pal_study_job *job, const pal_configuration *configuration,
+                                const pal_problem_case *load, double *u, int *n_node, pal_diagnostic *diag)
 {
-    return cached(job, setting, load, (double(*)[3])u, job->n_probe, n_node, diag);
+    return cached(job, configuration, load, (double(*)[3])u, job->n_probe, n_node, diag);
 }
 
 /* ---- size ---- */
@@ -118,7 +118,7 @@ pal_err pal_study_reference_size(pal_study_job *job)
         return PAL_ERR_OK;
     }
     take_sides(job, &job->scene->body[0].mesh->surface);
-    pal_configuration s = reference_setting(job, pal_study_size(job, COUNTED));
+    pal_configuration s = reference_configuration(job, pal_study_size(job, COUNTED));
     PAL_TRY(pal_study_open(job, &s, true, &w, job->diag));
     double count = w.body->n_node;
     pal_study_close(&w);
@@ -136,7 +136,7 @@ static pal_err estimate_load(pal_study_job *job, int load, const int size[3], do
     double h[3];
     for (int k = 0; k < 2; k++) {
         int n_node;
-        pal_configuration s = reference_setting(job, size[k]);
+        pal_configuration s = reference_configuration(job, size[k]);
         PAL_TRY(pal_study_cached_static(job, &s, job->load[load], u[k], &n_node, job->diag));
     }
     for (int k = 0; k < 3; k++) h[k] = job->adaptive ? exp2(-size[k]) : 1.0 / size[k];
@@ -195,7 +195,7 @@ static pal_err given(pal_study_job *job)
 
 static pal_err made(pal_study_job *job)
 {
-    pal_configuration s = reference_setting(job, job->reference);
+    pal_configuration s = reference_configuration(job, job->reference);
     char name[PAL_CONFIGURATION_TEXT];
     int n_node = 0;
     for (int k = 0; k < job->n_load; k++) {
@@ -236,7 +236,7 @@ pal_err pal_study_reference(pal_study_job *job)
     for (int i = 0; i < job->n_probe; i++)
         if (pal_norm3(job->static_u[0] + 3 * i) > pal_norm3(job->static_u[0] + 3 * job->tip)) job->tip = i;
     PAL_TRY(report_progress(job, "reference in motion", job->n_load + 1));
-    pal_configuration s = reference_setting(job, job->reference);
+    pal_configuration s = reference_configuration(job, job->reference);
     int n_node;
     return cached(job, &s, NULL, job->trajectory, job->n_trajectory, &n_node, job->diag);
 }

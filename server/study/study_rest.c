@@ -35,10 +35,10 @@ static pal_err converge(const pal_study_job *job, pal_study_world *w, pal_diagno
 }
 
 /* applies the whole load at once, or in parts if that fails */
-static pal_err newton(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load, double *u,
-                      int *n_node, pal_diagnostic *diag)
+static pal_err newton(pal_study_job *job, const pal_configuration *configuration, const pal_problem_case *load,
+                      double *u, int *n_node, pal_diagnostic *diag)
 {
-    pal_configuration statics = *setting;
+    pal_configuration statics = *configuration;
     pal_study_world w;
     snprintf(statics.solver, sizeof statics.solver, "static_newton");
     statics.tolerance = PAL_REST_TOLERANCE, statics.step_s = PAL_STUDY_FRAME_S;
@@ -77,25 +77,25 @@ static void free_springs(springs *s)
 }
 
 /* as in the live components: given, or from the material (spring_law.h) */
-static void constants_of(const pal_configuration *setting, const pal_body_def *def, double edge_m,
+static void constants_of(const pal_configuration *configuration, const pal_body_def *def, double edge_m,
                          double out[PAL_SPRING_KINDS])
 {
-    pal_spring_factors(def->material.poisson, setting->k_area_J == 0, out);
+    pal_spring_factors(def->material.poisson, configuration->k_area_J == 0, out);
     for (int k = 0; k < PAL_SPRING_KINDS; k++) out[k] *= def->material.young_Pa * edge_m * edge_m * edge_m;
-    if (setting->k_distance_J > 0) {
-        out[PAL_SPRING_DISTANCE] = setting->k_distance_J;
-        out[PAL_SPRING_VOLUME] = setting->k_volume_J;
-        if (setting->k_area_J >= 0) out[PAL_SPRING_AREA] = setting->k_area_J;
+    if (configuration->k_distance_J > 0) {
+        out[PAL_SPRING_DISTANCE] = configuration->k_distance_J;
+        out[PAL_SPRING_VOLUME] = configuration->k_volume_J;
+        if (configuration->k_area_J >= 0) out[PAL_SPRING_AREA] = configuration->k_area_J;
     }
 }
 
 /* Uses the weights of the scene. Gravity is the only other nodal force. */
-static pal_err take_springs(const pal_configuration *setting, const pal_study_world *w, springs *s,
+static pal_err take_springs(const pal_configuration *configuration, const pal_study_world *w, springs *s,
                             pal_diagnostic *diag)
 {
     double constant[PAL_SPRING_KINDS];
     PAL_TRY(pal_lattice_make(w->world, 0, &s->lattice, diag));
-    constants_of(setting, &w->set->scene.body[0], s->lattice.edge_m, constant);
+    constants_of(configuration, &w->set->scene.body[0], s->lattice.edge_m, constant);
     bool made = true;
     for (int k = 0; k < PAL_SPRING_KINDS; k++) {
         s->k[k] = malloc(sizeof(double) * ((size_t)s->lattice.kind[k].n_item + 1));
@@ -136,17 +136,17 @@ static pal_err balance(springs *s, double *x, pal_diagnostic *diag)
     return err;
 }
 
-static pal_err lattice(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load, double *u,
-                       int *n_node, pal_diagnostic *diag)
+static pal_err lattice(pal_study_job *job, const pal_configuration *configuration, const pal_problem_case *load,
+                       double *u, int *n_node, pal_diagnostic *diag)
 {
     pal_study_world w;
     springs s = {.workspace = NULL};
-    pal_configuration statics = *setting;
+    pal_configuration statics = *configuration;
     /* the shortest step: stiff springs must come to rest at any cost */
     statics.step_s = 1e-4, statics.solver[0] = 0;
     PAL_TRY(pal_study_open(job, &statics, true, &w, diag));
     *n_node = w.body->n_node;
-    pal_err err = take_springs(setting, &w, &s, diag);
+    pal_err err = take_springs(configuration, &w, &s, diag);
     if (!err) err = pal_study_forces(job, &w, load, s.force, diag);
     if (!err) add_gravity(&w, s.force);
     if (!err) err = balance(&s, w.body->x, diag);
@@ -186,11 +186,11 @@ static pal_err relax_world(pal_study_job *job, pal_study_world *w, int max_step,
 }
 
 /* max_work: steps times nodes; 0: unlimited */
-static pal_err relax(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load, double *u,
-                     int *n_node, double max_work, pal_diagnostic *diag)
+static pal_err relax(pal_study_job *job, const pal_configuration *configuration, const pal_problem_case *load,
+                     double *u, int *n_node, double max_work, pal_diagnostic *diag)
 {
     pal_study_world w;
-    pal_configuration statics = *setting;
+    pal_configuration statics = *configuration;
     /* with a step much shorter than a period, slow motion does not mean rest */
     statics.step_s = PAL_STUDY_FRAME_S;
     PAL_TRY(pal_study_open(job, &statics, true, &w, diag));
@@ -218,17 +218,17 @@ static bool only_gravity(const pal_body_def *body)
     return true;
 }
 
-pal_err pal_study_static(pal_study_job *job, const pal_configuration *setting, const pal_problem_case *load, double *u,
-                         int *n_node, pal_diagnostic *diag)
+pal_err pal_study_static(pal_study_job *job, const pal_configuration *configuration, const pal_problem_case *load,
+                         double *u, int *n_node, pal_diagnostic *diag)
 {
     *n_node = 0;
-    if (pal_study_is(setting->model, "fem") || pal_study_is(setting->model, "subdivision_fem")) {
-        pal_err err = newton(job, setting, load, u, n_node, diag);
+    if (pal_study_is(configuration->model, "fem") || pal_study_is(configuration->model, "subdivision_fem")) {
+        pal_err err = newton(job, configuration, load, u, n_node, diag);
         pal_diagnostic other = {{0}};
-        if (err != PAL_ERR_NUMERIC || relax(job, setting, load, u, n_node, PAL_RELAX_WORK, &other)) return err;
+        if (err != PAL_ERR_NUMERIC || relax(job, configuration, load, u, n_node, PAL_RELAX_WORK, &other)) return err;
         return PAL_ERR_OK;
     }
-    if (pal_study_is(setting->model, "tet_springs") && only_gravity(&job->scene->body[0]))
-        return lattice(job, setting, load, u, n_node, diag);
-    return relax(job, setting, load, u, n_node, 0, diag);
+    if (pal_study_is(configuration->model, "tet_springs") && only_gravity(&job->scene->body[0]))
+        return lattice(job, configuration, load, u, n_node, diag);
+    return relax(job, configuration, load, u, n_node, 0, diag);
 }

@@ -15,14 +15,14 @@ static bool keeps_on(const char *what, double fraction, void *user)
 }
 
 /* the first case that it fails; NULL: none that was decided */
-static const char *failed(pal_study_job *job, const pal_configuration *setting)
+static const char *failed(pal_study_job *job, const pal_configuration *configuration)
 {
     static const char *const name[] = {"meganewton", "flat"};
     pal_configured_scene *set = NULL;
     pal_diagnostic reason = {{0}};
     const char *found = NULL;
     pal_robustness_report *report = malloc(sizeof *report);
-    if (!report || pal_configuration_make(job->scene, 0, setting, &reason, &set)) {
+    if (!report || pal_configuration_make(job->scene, 0, configuration, &reason, &set)) {
         free(report);
         return NULL;
     }
@@ -52,7 +52,7 @@ pal_err pal_study_check_robustness(pal_study_job *job)
         if (!go || !pal_study_continues(job))
             return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped at the front");
         checked[i] = true;
-        const char *name = failed(job, &p->measured.setting);
+        const char *name = failed(job, &p->measured.configuration);
         if (!name) continue;
         snprintf(p->reason, sizeof p->reason, "fails %s of palpate robustness: not named", name);
         /* points that it dominated may be on the front now, also cheaper ones */

@@ -23,14 +23,14 @@ static bool same_rest(const pal_configuration *a, const pal_configuration *b)
     return pal_configuration_equal(&p, &q);
 }
 
-static void find_rest(pal_study_job *job, const pal_configuration *setting, int *n_node)
+static void find_rest(pal_study_job *job, const pal_configuration *configuration, int *n_node)
 {
     pal_study_rest *r = &job->rest;
     pal_diagnostic reason = {{0}};
     double sum = 0;
-    *r = (pal_study_rest){.known = true, .of = *setting};
+    *r = (pal_study_rest){.known = true, .of = *configuration};
     for (int k = 0; k < job->n_load && !r->err; k++) {
-        r->err = pal_study_static(job, setting, job->load[k], job->now, n_node, &reason);
+        r->err = pal_study_static(job, configuration, job->load[k], job->now, n_node, &reason);
         for (int i = 0; i < job->n_probe && !r->err; i++) {
             double off = pal_dist3(job->now + 3 * i, job->static_u[k] + 3 * i);
             sum += off * off;
@@ -110,11 +110,11 @@ static double read_ms(const pal_world *world)
     return pal_machine_read_ms(all) * 2 * factor / all;
 }
 
-pal_err pal_study_trajectory(pal_study_job *job, const pal_configuration *setting, double (*trajectory)[3], double *ms,
-                             int max, int *n_ms, pal_study_point *facts, pal_diagnostic *diag)
+pal_err pal_study_trajectory(pal_study_job *job, const pal_configuration *configuration, double (*trajectory)[3],
+                             double *ms, int max, int *n_ms, pal_study_point *facts, pal_diagnostic *diag)
 {
     pal_study_world w;
-    PAL_TRY(pal_study_open(job, setting, false, &w, diag));
+    PAL_TRY(pal_study_open(job, configuration, false, &w, diag));
     int n_substep = pal_world_substeps(w.world);
     double work = (double)n_substep * w.body->n_node * job->seconds / w.set->scene.step_s;
     pal_err err = pal_study_apply_load(job, &w, job->load[0], PAL_SUDDEN_LOAD, diag);
@@ -135,7 +135,7 @@ pal_err pal_study_trajectory(pal_study_job *job, const pal_configuration *settin
         if (facts->n_node == 0) facts->n_node = pal_body_nodes(w.body);
         facts->prepare_s = w.prepare_s;
         facts->read_ms = read_ms(w.world);
-        if (pal_study_is(setting->model, "fem")) facts->n_element = w.body->n_element;
+        if (pal_study_is(configuration->model, "fem")) facts->n_element = w.body->n_element;
     }
     pal_study_close(&w);
     return err;
@@ -163,14 +163,14 @@ static pal_err time_trajectory(pal_study_job *job, pal_study_point *out, double 
     pal_study_point facts = *out;
     pal_err err =
         !ms ? PAL_ERR_MEMORY
-            : pal_study_trajectory(job, &out->measured.setting, trajectory, ms, MAX_TIMES, &n_ms, &facts, diag);
+            : pal_study_trajectory(job, &out->measured.configuration, trajectory, ms, MAX_TIMES, &n_ms, &facts, diag);
     /* the read rate also depends on other load of the machine */
     double read = trajectory ? facts.read_ms : fmin(out->read_ms, facts.read_ms);
     if (trajectory) *out = facts;
     out->read_ms = read;
     if (n_ms > 2 * WARM) {
         /* shorter steps are more steps in the same time: compares the cost per step of the scene */
-        double share = job->out->step_s / out->measured.setting.step_s;
+        double share = job->out->step_s / out->measured.configuration.step_s;
         double median = share * pal_median(ms + WARM, n_ms - WARM);
         if (!(out->measured.ms <= median)) {
             out->measured.ms = median;
@@ -193,7 +193,7 @@ pal_err pal_study_time_repeat(pal_study_job *job)
         /* it succeeded before: an error here can only be a stop */
         if (go) (void)time_trajectory(job, p, NULL, &reason);
         if (!go || !pal_study_continues(job))
-            return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped while settings were timed again");
+            return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped while configurations were timed again");
     }
     pal_study_mark_front(job->out);
     return PAL_ERR_OK;
@@ -213,7 +213,7 @@ static void run(pal_study_job *job, pal_study_point *out)
 static pal_err fit(pal_study_job *job, pal_study_point *out)
 {
     pal_diagnostic reason = {{0}};
-    pal_err err = pal_study_fit(job, &out->measured.setting, &reason);
+    pal_err err = pal_study_fit(job, &out->measured.configuration, &reason);
     if (!err) return PAL_ERR_OK;
     out->err = err;
     snprintf(out->reason, sizeof out->reason, "calibration: %.*s", PAL_CONFIGURATION_TEXT - 16, reason.text);
@@ -223,14 +223,14 @@ static pal_err fit(pal_study_job *job, pal_study_point *out)
 pal_err pal_study_measure(pal_study_job *job, const pal_study_entry *entry, pal_study_point *out)
 {
     int n_node = 0;
-    *out = (pal_study_point){.measured = {.setting = entry->setting, .ms = NAN, .error_m = NAN}};
+    *out = (pal_study_point){.measured = {.configuration = entry->configuration, .ms = NAN, .error_m = NAN}};
     out->ms_p95 = out->static_rms_m = out->static_max_m = out->trajectory_rms_m = out->trajectory_max_m = NAN;
     out->predicted_ms = out->predicted_m = NAN;
     if (entry->calibrate && fit(job, out) && pal_study_continues(job)) return PAL_ERR_OK;
     if (entry->calibrate && job->n_load == 1)
         snprintf(out->reason, sizeof out->reason, "fitted to the load it is judged by");
-    if (!job->rest.known || !same_rest(&job->rest.of, &out->measured.setting))
-        find_rest(job, &out->measured.setting, &n_node);
+    if (!job->rest.known || !same_rest(&job->rest.of, &out->measured.configuration))
+        find_rest(job, &out->measured.configuration, &n_node);
     out->n_node = n_node;
     out->err = job->rest.err;
     if (out->err)
@@ -238,7 +238,7 @@ pal_err pal_study_measure(pal_study_job *job, const pal_study_entry *entry, pal_
     else
         out->static_rms_m = job->rest.rms_m, out->static_max_m = job->rest.max_m;
     if (pal_study_continues(job)) run(job, out);
-    if (!pal_study_continues(job)) return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped in a setting");
+    if (!pal_study_continues(job)) return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped in a configuration");
     if (!out->err) out->measured.error_m = fmax(out->static_max_m, out->trajectory_max_m);
     return PAL_ERR_OK;
 }

@@ -29,21 +29,21 @@ typedef struct field {
 #define FILE_AT(member)  AT(pal_study_file, member)
 /* in the order of the table's columns */
 static const field point_field[] = {
-    {"model", TEXT, POINT(measured.setting.model), 0, 0},
-    {"element", TEXT_OR_EMPTY, POINT(measured.setting.element), 0, 0},
-    {"law", TEXT_OR_EMPTY, POINT(measured.setting.law), 0, 0},
-    {"solver", TEXT_OR_EMPTY, POINT(measured.setting.solver), 0, 0},
+    {"model", TEXT, POINT(measured.configuration.model), 0, 0},
+    {"element", TEXT_OR_EMPTY, POINT(measured.configuration.element), 0, 0},
+    {"law", TEXT_OR_EMPTY, POINT(measured.configuration.law), 0, 0},
+    {"solver", TEXT_OR_EMPTY, POINT(measured.configuration.solver), 0, 0},
     {"reason", TEXT_OR_EMPTY, POINT(reason), 0, 0},
     {"err", CODE, POINT(err), 0, 0},
-    {"size", COUNT, POINT(measured.setting.size), -1, 1024},
+    {"size", COUNT, POINT(measured.configuration.size), -1, 1024},
     {"nodes", COUNT, POINT(n_node), 0, 1 << 30},
     {"substeps", COUNT, POINT(n_substep), 0, 1 << 30},
     {"front", FLAG, POINT(measured.front), 0, 0},
-    {"step_s", NUMBER, POINT(measured.setting.step_s), 0, 0.1},
-    {"tolerance", NUMBER, POINT(measured.setting.tolerance), 0, 1},
-    {"k_distance_J", NUMBER, POINT(measured.setting.k_distance_J), 0, 1e300},
-    {"k_area_J", NUMBER, POINT(measured.setting.k_area_J), -1, 1e300},
-    {"k_volume_J", NUMBER, POINT(measured.setting.k_volume_J), 0, 1e300},
+    {"step_s", NUMBER, POINT(measured.configuration.step_s), 0, 0.1},
+    {"tolerance", NUMBER, POINT(measured.configuration.tolerance), 0, 1},
+    {"k_distance_J", NUMBER, POINT(measured.configuration.k_distance_J), 0, 1e300},
+    {"k_area_J", NUMBER, POINT(measured.configuration.k_area_J), -1, 1e300},
+    {"k_volume_J", NUMBER, POINT(measured.configuration.k_volume_J), 0, 1e300},
     {"ms", NUMBER_OR_NULL, POINT(measured.ms), 0, 1e12},
     {"error_m", NUMBER_OR_NULL, POINT(measured.error_m), 0, 1e300},
     {"ms_p95", NUMBER_OR_NULL, POINT(ms_p95), 0, 1e12},
@@ -338,7 +338,7 @@ static pal_err get_points(const pal_json *root, pal_study *s)
         const pal_json at = pal_json_entry(&list, s->n_point, child);
         PAL_TRY(get_fields(&at, none, point_field, N_POINT, p));
         if (p->measured.front && !(isfinite(p->measured.ms) && isfinite(p->measured.error_m)))
-            return pal_json_refuse_key(&at, "front", "is true of a setting that was not measured");
+            return pal_json_refuse_key(&at, "front", "is true of a configuration that was not measured");
         s->n_point++;
     }
     return PAL_ERR_OK;
@@ -410,7 +410,7 @@ int pal_study_configurations(const pal_study *study, pal_measured_configuration 
         const pal_study_point *p = &study->point[order[k]];
         if (!pal_study_measured(p)) continue;
         out[n] = p->measured;
-        if (out[n].setting.step_s == 0) out[n].setting.step_s = study->step_s;
+        if (out[n].configuration.step_s == 0) out[n].configuration.step_s = study->step_s;
         n++;
     }
     return n;

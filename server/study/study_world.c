@@ -47,12 +47,12 @@ static pal_err find_points(const pal_study_job *job, pal_study_world *w)
     return w->surface ? PAL_ERR_OK : PAL_ERR_INTERNAL;
 }
 
-pal_err pal_study_open(const pal_study_job *job, const pal_configuration *setting, bool statics, pal_study_world *out,
-                       pal_diagnostic *diag)
+pal_err pal_study_open(const pal_study_job *job, const pal_configuration *configuration, bool statics,
+                       pal_study_world *out, pal_diagnostic *diag)
 {
     *out = (pal_study_world){.set = NULL};
     double start = pal_clock_s();
-    pal_err err = pal_configuration_make(job->scene, 0, setting, diag, &out->set);
+    pal_err err = pal_configuration_make(job->scene, 0, configuration, diag, &out->set);
     if (!err && statics) err = prepare_statics(&out->set->scene.body[0], diag);
     if (!err) err = pal_world_create(&out->set->scene, diag, &out->world);
     if (!err) {

@@ -129,7 +129,8 @@ static bool estimate(const body *at, double pull, pal_estimate *out)
 static double predicted(const pal_estimate *e, int size)
 {
     for (int i = 0; i < e->n_neighbour; i++)
-        if (e->neighbour[i].setting.size == size) return e->neighbour[i].error_m - e->error_m + e->discretisation_m;
+        if (e->neighbour[i].configuration.size == size)
+            return e->neighbour[i].error_m - e->error_m + e->discretisation_m;
     return NAN;
 }
 

@@ -408,7 +408,7 @@ static void a_study_fits_springs_that_keep_a_tenth_of_their_volume_stiffness(voi
     bench truth;
     pal_samples s[3] = {{0}};
     const pal_study_options options = {.quick = true};
-    pal_configuration setting = {.size = 4};
+    pal_configuration configuration = {.size = 4};
     bench_begin(&truth, 4, 3);
     truth.options.without_area = true;
     REQUIRE(bench_make(&truth));
@@ -425,12 +425,12 @@ static void a_study_fits_springs_that_keep_a_tenth_of_their_volume_stiffness(voi
         for (int c = 0; c < 3; c++) job->probe[3 * i + c] -= mesh.surface.origin_m[c];
     /* the last one is not fitted to */
     for (int k = 0; k < 4; k++) job->load[k] = &truth.problem.load_case[k % 3], job->static_u[k] = s[k % 3].u;
-    CHECK_INT(pal_study_fit(job, &setting, &diag), 0);
+    CHECK_INT(pal_study_fit(job, &configuration, &diag), 0);
     const double start[2] = {exp(truth.info.start[0]), exp(truth.info.start[1])};
-    printf("  edges %.3g, volumes %.3g of the material's\n", setting.k_distance_J / start[0],
-           setting.k_volume_J / start[1]);
-    CHECK_NEAR(setting.k_volume_J / start[1], 0.1, 1e-6);
-    CHECK_NEAR(setting.k_distance_J / start[0], 1, 0.5);
+    printf("  edges %.3g, volumes %.3g of the material's\n", configuration.k_distance_J / start[0],
+           configuration.k_volume_J / start[1]);
+    CHECK_NEAR(configuration.k_volume_J / start[1], 0.1, 1e-6);
+    CHECK_NEAR(configuration.k_distance_J / start[0], 1, 0.5);
     for (int k = 0; k < 3; k++) pal_samples_free(&s[k]);
     bench_close(&truth);
     free(scene), free(job);

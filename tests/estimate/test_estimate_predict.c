@@ -21,8 +21,8 @@ static pal_prediction prediction(int size, bool implicit)
                         .solver_order = 1,
                         .tolerance = 1e-2,
                         .decade = 1.3};
-    f.setting = (pal_configuration){.model = "fem", .element = "hex8_bbar", .size = size, .step_s = scene.step_s};
-    if (!implicit) f.setting = (pal_configuration){.model = "tet_springs", .size = size, .step_s = scene.step_s};
+    f.configuration = (pal_configuration){.model = "fem", .element = "hex8_bbar", .size = size, .step_s = scene.step_s};
+    if (!implicit) f.configuration = (pal_configuration){.model = "tet_springs", .size = size, .step_s = scene.step_s};
     return f;
 }
 
@@ -35,7 +35,7 @@ static void predict(const pal_prediction *f, pal_estimate *out)
 static bool offers(const pal_estimate *e, int size)
 {
     for (int i = 0; i < e->n_neighbour; i++)
-        if (e->neighbour[i].setting.size == size) return true;
+        if (e->neighbour[i].configuration.size == size) return true;
     return false;
 }
 
@@ -51,10 +51,10 @@ static void what_is_offered_is_taken_and_the_other_way_round(void)
         pal_configuration_switch *change = NULL;
         predict(&f, &e);
         for (int i = 0; i < e.n_neighbour; i++, n_offered++)
-            CHECK_INT(pal_configuration_check_live(&scene, 0, &e.neighbour[i].setting, &diag), PAL_ERR_OK);
+            CHECK_INT(pal_configuration_check_live(&scene, 0, &e.neighbour[i].configuration, &diag), PAL_ERR_OK);
         if (offers(&e, 2 * size)) continue;
-        f.setting.size = 2 * size;
-        CHECK_INT(pal_configuration_switch_prepare(&scene, NULL, 0, &f.setting, &diag, &change), PAL_ERR_REFUSED);
+        f.configuration.size = 2 * size;
+        CHECK_INT(pal_configuration_switch_prepare(&scene, NULL, 0, &f.configuration, &diag, &change), PAL_ERR_REFUSED);
         CHECK(!change && strstr(diag.text, "a live switch takes 100000 at most") != NULL);
         n_refused++;
     }
@@ -71,7 +71,7 @@ static void what_is_offered_can_be_made(void)
     for (int i = 0; i < e.n_neighbour; i++) {
         pal_diagnostic diag = {""};
         pal_configuration_switch *change = NULL;
-        if (pal_configuration_switch_prepare(&scene, NULL, 0, &e.neighbour[i].setting, &diag, &change))
+        if (pal_configuration_switch_prepare(&scene, NULL, 0, &e.neighbour[i].configuration, &diag, &change))
             CHECK_FAIL("%s", diag.text);
         pal_configuration_switch_free(change);
     }
@@ -89,7 +89,7 @@ static void sub_steps_that_are_not_allowed_are_not_offered(void)
     CHECK(offers(&e, 4) && !offers(&e, 16));
     predict(&fem, &e);
     CHECK(offers(&e, 4) && offers(&e, 16));
-    for (int i = 0; i < e.n_neighbour; i++) CHECK_LE(e.neighbour[i].setting.step_s, scene.step_s);
+    for (int i = 0; i < e.n_neighbour; i++) CHECK_LE(e.neighbour[i].configuration.step_s, scene.step_s);
     scene.max_substep = 32;
     predict(&springs, &e);
     CHECK(offers(&e, 16));

@@ -127,8 +127,8 @@ static void every_part_is_known_of_finite_elements_and_of_springs(void)
         /* eight voxels across, four, two: there is no order in what these change */
         CHECK_TEXT(e.diag, "discretisation: still grows from mesh to mesh, so more may be left");
         CHECK_INT(e.n_neighbour, k ? 2 : 6);
-        CHECK_INT(e.neighbour[0].setting.size, 4);
-        CHECK_INT(e.neighbour[1].setting.size, 16);
+        CHECK_INT(e.neighbour[0].configuration.size, 4);
+        CHECK_INT(e.neighbour[1].configuration.size, 16);
         CHECK(e.neighbour[0].ms < e.ms && e.neighbour[0].ms > 0.25 * e.ms);
         CHECK_LE((0.25 + 0.75 * 4) * e.ms, e.neighbour[1].ms);
         CHECK(e.neighbour[0].error_m > e.error_m && e.neighbour[1].error_m < e.error_m);
@@ -139,7 +139,7 @@ static void every_part_is_known_of_finite_elements_and_of_springs(void)
 
 static void neighbours_follow_the_models_of_cost_and_error(void)
 {
-    pal_prediction from = {.setting = {.model = "fem", .size = 20, .step_s = 0.01},
+    pal_prediction from = {.configuration = {.model = "fem", .size = 20, .step_s = 0.01},
                            .n_node = 1000,
                            .rest_substeps = 3,
                            .once = 0.25,
@@ -167,9 +167,9 @@ static void neighbours_follow_the_models_of_cost_and_error(void)
         CHECK_INT(e.neighbour_nodes[i], nodes[i]);
         CHECK_INT(e.neighbour_substeps[i], substeps[i]);
     }
-    CHECK_INT(e.neighbour[0].setting.size, 10);
-    CHECK_NEAR(e.neighbour[3].setting.step_s, 0.005, 1e-15);
-    CHECK_NEAR(e.neighbour[4].setting.tolerance, 0.1, 1e-15);
+    CHECK_INT(e.neighbour[0].configuration.size, 10);
+    CHECK_NEAR(e.neighbour[3].configuration.step_s, 0.005, 1e-15);
+    CHECK_NEAR(e.neighbour[4].configuration.tolerance, 0.1, 1e-15);
     /* another body needs four sub-steps anyway, so that they are four, four and six */
     from.other_substeps = 4;
     pal_estimate_predict(&from, &e);
@@ -179,7 +179,7 @@ static void neighbours_follow_the_models_of_cost_and_error(void)
     e.discretisation_m = NAN, from.work[0] = from.work[1] = NAN, from.decade = NAN;
     pal_estimate_predict(&from, &e);
     CHECK_INT(e.n_neighbour, 2);
-    CHECK_INT(e.neighbour[0].setting.size, 20);
+    CHECK_INT(e.neighbour[0].configuration.size, 20);
     /* what a choice costs is known without the error that it changes */
     e.error_m = NAN;
     pal_estimate_predict(&from, &e);
@@ -207,7 +207,7 @@ static void neighbours_are_what_a_switch_makes(void)
         REQUIRE(estimate_of(at, w, &e));
         CHECK_INT(e.n_neighbour, k ? 2 : 6);
         for (int i = 0; i < e.n_neighbour; i++) {
-            const pal_configuration *to = &e.neighbour[i].setting;
+            const pal_configuration *to = &e.neighbour[i].configuration;
             pal_configuration_switch *change = NULL;
             pal_world *next = NULL;
             pal_diagnostic diag = {""};
@@ -235,7 +235,7 @@ static void neighbours_are_what_a_switch_makes(void)
 /* constants of springs go with the cube of their edge */
 static void calibrated_springs_have_no_neighbour_in_size(void)
 {
-    pal_prediction from = {.setting = {.model = "tet_springs", .size = 20, .step_s = 0.01},
+    pal_prediction from = {.configuration = {.model = "tet_springs", .size = 20, .step_s = 0.01},
                            .nodes = {0.2, 6},
                            .substeps = {1, 1},
                            .work = {0.2, 7},
@@ -243,7 +243,7 @@ static void calibrated_springs_have_no_neighbour_in_size(void)
     pal_estimate e = {.ms = 2, .discretisation_m = 0.8, .model_m = 0.1, .error_m = 0.9};
     pal_estimate_predict(&from, &e);
     CHECK_INT(e.n_neighbour, 2);
-    from.setting.k_distance_J = 1e-3;
+    from.configuration.k_distance_J = 1e-3;
     pal_estimate_predict(&from, &e);
     CHECK_INT(e.n_neighbour, 0);
 }
@@ -452,7 +452,7 @@ static void what_rounding_moved_has_no_error(void)
     }
 }
 
-/* what a step costs asleep is not what its setting costs */
+/* what a step costs asleep is not what its configuration costs */
 static void a_sleeping_body_has_its_cost_awake(void)
 {
     pal_scene *fem = fem_scene();
@@ -499,8 +499,8 @@ static void other_sizes_are_measured_anew_where_the_answer_is_another(void)
     const pal_body *body = pal_world_view_body(w, 0);
     pal_estimation *work = NULL;
     pal_estimate_hierarchy f = {.known = false};
-    pal_configuration setting;
-    pal_configuration_of(fem, 0, &setting);
+    pal_configuration configuration;
+    pal_configuration_of(fem, 0, &configuration);
     REQUIRE(!pal_estimation_open(fem, 0, NULL, NULL, &work));
     pal_estimate_state *s = pal_estimation_state(work);
     REQUIRE(pal_estimate_copy(s, w, 0));
@@ -515,19 +515,19 @@ static void other_sizes_are_measured_anew_where_the_answer_is_another(void)
         s->material = is, f.next_s = 0;
         s->material.young_Pa *= edits[k].young, s->material.poisson *= edits[k].poisson;
         for (int i = 0; i < 3 * s->n_node; i++) s->borne[i] *= edits[k].load;
-        CHECK(pal_estimate_hierarchy_refresh(fem, body, &setting, s, false, false, NULL, &f));
+        CHECK(pal_estimate_hierarchy_refresh(fem, body, &configuration, s, false, false, NULL, &f));
         CHECK_INT(f.n_measured, edits[k].n);
         times[f.n_measured - 1] = f.times;
     }
     printf("  %d voxels against %d: error %.3g, then %.3g of the change; %d meshes in %d times, good to %.2g\n",
-           setting.size, f.finest, times[0], times[1], f.n_mesh, f.n_measured, f.uncertainty_factor);
+           configuration.size, f.finest, times[0], times[1], f.n_mesh, f.n_measured, f.uncertainty_factor);
     CHECK_LE(f.n_mesh, 5 * f.n_measured);
     CHECK(times[1] != times[0]);
     CHECK_NEAR(times[2] / times[0], 1, 1e-4);
     /* before it may be measured again, what is there is of something else, and said to be worse */
     char text[2][80];
     s->material.poisson *= 0.9, f.next_s = INFINITY;
-    CHECK(!pal_estimate_hierarchy_refresh(fem, body, &setting, s, false, false, NULL, &f));
+    CHECK(!pal_estimate_hierarchy_refresh(fem, body, &configuration, s, false, false, NULL, &f));
     CHECK_INT(f.n_measured, 3);
     f.uncertainty_factor = 2.4;
     pal_estimate_hierarchy_describe(&f, true, text[0], sizeof text[0]),
@@ -544,13 +544,13 @@ static void meshes_of_many_nodes_have_no_factor(void)
 {
     pal_scene *fem = fem_scene();
     pal_world *w = swinging(fem, 0);
-    pal_configuration setting;
-    pal_configuration_of(fem, 0, &setting);
+    pal_configuration configuration;
+    pal_configuration_of(fem, 0, &configuration);
     static const int size[] = {8, 20};
     for (int k = 0; k < 2; k++) {
         pal_rest_solution rest;
         pal_solve_report report;
-        REQUIRE(!pal_rest_solution_sized(fem, pal_world_view_body(w, 0), &setting, size[k], "linear", &rest));
+        REQUIRE(!pal_rest_solution_sized(fem, pal_world_view_body(w, 0), &configuration, size[k], "linear", &rest));
         pal_world_solve_report(rest.world, 0, &report);
         const int n_node = pal_world_view_body(rest.world, 0)->n_node;
         printf("  %d nodes: %lld numbers in a factor, %.1f MB\n", n_node, (long long)report.factor_nonzeros,

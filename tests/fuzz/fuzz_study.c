@@ -20,7 +20,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t n_byte)
         const pal_study_point *p = &s->point[k];
         if (p->measured.ms < 0 || isinf(p->measured.ms) || p->measured.error_m < 0 || isinf(p->measured.error_m))
             abort();
-        if (!p->measured.setting.model[0] || p->measured.setting.size < -1) abort();
+        if (!p->measured.configuration.model[0] || p->measured.configuration.size < -1) abort();
         if (order[k] < 0 || order[k] >= s->n_point) abort();
     }
     int n = pal_study_configurations(s, list);

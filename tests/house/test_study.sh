@@ -87,8 +87,8 @@ all=$(count '"model"' o/study.json)
 check "measured $(number measured out) of $all" [ "$(number measured out)" -eq "$((all - before))" ]
 check "it is not whole" has o/study.json '"complete":[[:space:]]*true'
 for file in study.json study.csv study.svg study.html; do check "no $file" [ -s o/$file ]; done
-check "the table has not a row a setting" lines_are o/study.csv "$((all + 1))"
-check "the page has not a row a setting" [ "$(count '<tr' o/study.html)" -eq "$((all + 1))" ]
+check "the table has not a row a configuration" lines_are o/study.csv "$((all + 1))"
+check "the page has not a row a configuration" [ "$(count '<tr' o/study.html)" -eq "$((all + 1))" ]
 check "the page asks for other files" [ "$(grep -c -E '(src|href)=' o/study.html)" -eq 0 ]
 check "the drawing is not in the page" has o/study.html "<svg "
 check "no real time" has o/study.svg "real time"
@@ -136,7 +136,7 @@ begin "the cheapest within an error is written as a scene that plan takes"
 run study "$beam" --quick --out o --within "$loose" -o near --json
 check "exit code $code" code_is 0
 check "nothing was measured" [ "$(number measured out)" = 0 ]
-check "no setting" has out '"picked":{"point":'
+check "no configuration" has out '"picked":{"point":'
 check "no scene" [ -s near/scene.json ]
 check "no study beside it" [ -s near/study.json ]
 check "does not say how far off it is" has near/scene.json '"accuracy":[[:space:]]*"within '
@@ -157,7 +157,7 @@ cheap=$(sed -n 's/.*"picked":{[^}]*"error_m":\([0-9.e+-]*\).*/\1/p' out)
 check "the cheapest ($cheap m) is nearer than the most accurate ($accurate m)" at_most "$accurate" "$cheap"
 end
 
-begin "which setting serves is asked of the study that is there, whatever its loads, and nothing else is said"
+begin "which configuration serves is asked of the study that is there, whatever its loads, and nothing else is said"
 run study "$beam" --out o --budget 1s
 check "exit code $code" code_is 0
 check "the answer does not say how far off, of what loads" has out "mm off.*under load case .*quick, that move it by up to"
@@ -199,7 +199,7 @@ refuse 1 "pick .* was not measured" study "$beam" --pick 4 --out o
 cp whole.json o/study.json
 
 # ---- killed anywhere ----
-# what a study says beside its times: settings, codes, nodes, sub-steps and errors of every setting
+# what a study says beside its times: configurations, codes, nodes, sub-steps and errors of every configuration
 errors_of() { cut -d , -f 1-4,6-9,11,17,19-22 "$1" | sort; }
 if long "killed at random moments, also while its reference is made, it ends with the same table"; then
     begin "$name"
@@ -233,25 +233,25 @@ ask() { # ask NUMBER: the scene with max_error_mm
     mv near/ask.json near/scene.json
 }
 ask "${loose%mm}"
-begin "a scene that asks for an accuracy is planned and served in the setting that the study gives"
+begin "a scene that asks for an accuracy is planned and served in the configuration that the study gives"
 run plan near
 check "exit code $code" code_is 0
-check "plan does not say which" has out "picked of the .* settings of near/study.json (within"
+check "plan does not say which" has out "picked of the .* configurations of near/study.json (within"
 run plan near --json
-check "no setting in JSON" has out '"picked":{"body":'
+check "no configuration in JSON" has out '"picked":{"body":'
 : >out # or what plan said is taken for the server's words
 timeout 60 "$palpate" serve near --port 0 --json >out 2>err </dev/null &
 child=$!
 check "serve did not start" shows out "$child" '"port":'
 kill "$child"
 wait "$child"
-check "serve does not say which" has err "picked of the .* settings of near/study.json"
+check "serve does not say which" has err "picked of the .* configurations of near/study.json"
 end
 refuse 1 "is in the folder of the source" study near --quick --within 1mm -o near
 refuse 1 "is in the folder of the source" study near/scene.json --quick --within 1mm -o ./near/../near/other.json
 ask 0.000001
 refuse 1 "palpate study near --again" plan near
-refuse 1 "none of the .* settings is within 1e-06 mm" serve near --port 0
+refuse 1 "none of the .* configurations is within 1e-06 mm" serve near --port 0
 mv near/study.json elsewhere.json
 refuse 1 "but there is no near/study.json: run palpate study near" plan near
 refuse 1 "but there is no near/study.json: run palpate study near" serve near --port 0

@@ -1,6 +1,6 @@
 /* The three studies of README as they were measured (tests/data/studies, the same files as the plots are drawn from):
- * what is foreseen for a setting from the others, against what was measured there; the front; what is picked. Recorded
- * milliseconds, so nothing here depends on the machine. */
+ * what is foreseen for a configuration from the others, against what was measured there; the front; what is picked.
+ * Recorded milliseconds, so nothing here depends on the machine. */
 #include "server/study/study_store.h"
 #include "tests/check.h"
 
@@ -8,7 +8,7 @@
 
 typedef struct record {
     const char *path;
-    int n, within;      /* settings measured; of them with cost foreseen within 30 %, at least */
+    int n, within;      /* configurations measured; of them with cost foreseen within 30 %, at least */
     double error_share; /* of those with an error foreseen within a factor of 2, at least */
 } record;
 
@@ -38,15 +38,16 @@ static void cost_and_error_are_predicted_from_the_other_configurations(void)
             double ms, error_m;
             if (p->err) continue;
             n++;
-            if (!pal_study_predict_error(s, &p->measured.setting, i, &error_m)) continue;
-            CHECK(pal_study_predict_cost(s, &p->measured.setting, p->n_node, p->n_element, p->n_substep, p->read_ms, i,
-                                         &ms));
+            if (!pal_study_predict_error(s, &p->measured.configuration, i, &error_m)) continue;
+            CHECK(pal_study_predict_cost(s, &p->measured.configuration, p->n_node, p->n_element, p->n_substep,
+                                         p->read_ms, i, &ms));
             /* as it stands in the record */
             CHECK_NEAR(p->predicted_ms, ms, 1e-6 * ms);
             cost += ms <= 1.3 * p->measured.ms && ms >= p->measured.ms / 1.3;
             error += error_m <= 2 * p->measured.error_m && error_m >= 0.5 * p->measured.error_m;
         }
-        printf("  %s: of %d settings cost within 30 %%: %d, error within a factor of 2: %d\n", s->name, n, cost, error);
+        printf("  %s: of %d configurations cost within 30 %%: %d, error within a factor of 2: %d\n", s->name, n, cost,
+               error);
         CHECK_INT(n, records[k].n);
         CHECK(cost >= records[k].within && error >= (int)(records[k].error_share * n));
         free(file);
@@ -64,7 +65,7 @@ static void the_front_and_what_is_picked_are_of_these_numbers(void)
     for (int i = 0; i < s->n_point; i++) {
         CHECK(was[i] == s->point[i].measured.front);
         /* fitted to the load that judges it */
-        if (s->point[i].measured.setting.k_distance_J > 0) CHECK(!was[i]);
+        if (s->point[i].measured.configuration.k_distance_J > 0) CHECK(!was[i]);
     }
     int near = pal_study_pick(s, "", 1e-4, NAN), fast = pal_study_pick(s, "", NAN, 0.05);
     REQUIRE(near >= 0 && fast >= 0);
@@ -92,8 +93,9 @@ static void elements_are_in_the_order_of_numerics(void)
         for (int i = 0; i < file->study.n_point; i++) {
             const pal_study_point *p = &file->study.point[i];
             for (int e = 0; e < 3; e++)
-                if (p->measured.setting.size == size[k] && !strcmp(p->measured.setting.element, element[e]) &&
-                    !strcmp(p->measured.setting.law, "corotational"))
+                if (p->measured.configuration.size == size[k] &&
+                    !strcmp(p->measured.configuration.element, element[e]) &&
+                    !strcmp(p->measured.configuration.law, "corotational"))
                     rms[e] = p->static_rms_m;
         }
         CHECK(4 * rms[0] < rms[1] && 2 * rms[1] < rms[2]);

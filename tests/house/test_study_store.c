@@ -1,5 +1,5 @@
 /* Studies kept in files: every number comes back with its bits, what is not one is refused by its place, and what a
- * study is of changes with the body and not with its setting. */
+ * study is of changes with the body and not with its configuration. */
 #include "server/mesh/volume/prepared.h"
 #include "server/study/studied_scene.h"
 #include "server/study/study_store.h"
@@ -43,14 +43,14 @@ static pal_study_file *random_file(int n)
     s->n_point = n;
     for (int k = 0; k < n; k++) {
         pal_study_point *p = &s->point[k];
-        snprintf(p->measured.setting.model, PAL_NAME, "%s", model[k % 3]);
-        if (k % 3 == 0) snprintf(p->measured.setting.element, PAL_NAME, "hex8_bbar");
-        if (k % 2) snprintf(p->measured.setting.solver, PAL_NAME, "sdirk2");
-        p->measured.setting.size = k;
-        p->measured.setting.step_s = k % 4 ? 0.1 * random01() : 0;
-        p->measured.setting.tolerance = random01();
-        p->measured.setting.k_distance_J = random_size(), p->measured.setting.k_area_J = random_size();
-        p->measured.setting.k_volume_J = random_size();
+        snprintf(p->measured.configuration.model, PAL_NAME, "%s", model[k % 3]);
+        if (k % 3 == 0) snprintf(p->measured.configuration.element, PAL_NAME, "hex8_bbar");
+        if (k % 2) snprintf(p->measured.configuration.solver, PAL_NAME, "sdirk2");
+        p->measured.configuration.size = k;
+        p->measured.configuration.step_s = k % 4 ? 0.1 * random01() : 0;
+        p->measured.configuration.tolerance = random01();
+        p->measured.configuration.k_distance_J = random_size(), p->measured.configuration.k_area_J = random_size();
+        p->measured.configuration.k_volume_J = random_size();
         bool measured = k % 7 != 0;
         p->measured.ms = measured ? 1e3 * random01() : NAN;
         p->measured.error_m = measured ? random_size() : NAN;
@@ -140,7 +140,7 @@ static void what_is_no_study_is_refused_by_its_place(void)
         {"\"step_s\":\t0,", "\"step_s\": null,", "points[0].step_s: is not a number"},
         {"\"ms\":\tnull", "\"ms\": -2", "points[0].ms: -2 is outside"},
         {"\"ms\":\tnull", "\"ms\": 1e999", "points[0].ms: inf is outside"},
-        {"\"front\":\tfalse", "\"front\": true", "points[0].front: is true of a setting that was not measured"},
+        {"\"front\":\tfalse", "\"front\": true", "points[0].front: is true of a configuration that was not measured"},
         {"\"err\":\t\"BUDGET\"", "\"err\": \"FINE\"", "points[0].err: \"FINE\" is no error code"},
         {"\"nodes\":\t100,", "", "points[1].nodes: is not there"},
         {"\"reason\":\t\"\",", "\"reason\": \"\", \"x\": 1,", "points[1].x: unknown key"},
@@ -182,7 +182,7 @@ static void points_are_listed_by_what_they_cost(void)
     CHECK_INT(pal_study_configurations(&f->study, list), measured);
     for (int k = 0; k < measured; k++) {
         CHECK(k == 0 || list[k].ms >= list[k - 1].ms);
-        CHECK(list[k].setting.step_s > 0);
+        CHECK(list[k].configuration.step_s > 0);
         CHECK_NEAR(list[k].error_m, f->study.point[order[k]].measured.error_m, 0);
     }
     /* the table has a row each, in that order */
@@ -196,7 +196,7 @@ static void points_are_listed_by_what_they_cost(void)
         if (row < 0) continue;
         char want[80];
         const pal_study_point *p = &f->study.point[order[row]];
-        snprintf(want, sizeof want, ",%s,%d,%d,%d,%d,", pal_err_name(p->err), p->measured.setting.size, p->n_node,
+        snprintf(want, sizeof want, ",%s,%d,%d,%d,%d,", pal_err_name(p->err), p->measured.configuration.size, p->n_node,
                  p->n_substep, p->measured.front);
         CHECK(strstr(line, want) != NULL);
     }
@@ -205,7 +205,7 @@ static void points_are_listed_by_what_they_cost(void)
     free(f);
 }
 
-static void a_study_is_of_a_body_whatever_its_setting(void)
+static void a_study_is_of_a_body_whatever_its_configuration(void)
 {
     double x[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
     int32_t tri[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
@@ -286,7 +286,7 @@ int main(void)
     RUN(every_number_comes_back_with_its_bits);
     RUN(what_is_no_study_is_refused_by_its_place);
     RUN(points_are_listed_by_what_they_cost);
-    RUN(a_study_is_of_a_body_whatever_its_setting);
+    RUN(a_study_is_of_a_body_whatever_its_configuration);
     RUN(files_have_their_place_beside_the_scene);
     RUN(a_written_scene_says_how_far_off_it_is_in_whole_words);
     unlink(path);

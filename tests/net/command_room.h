@@ -82,7 +82,7 @@ static inline const pal_wire_part_info *part(const mem_client *c)
 
 static inline void order_point(pal_measured_configuration *to, const char *model, const char *element, int size)
 {
-    pal_configuration *s = &to->setting;
+    pal_configuration *s = &to->configuration;
     snprintf(s->model, sizeof s->model, "%s", model);
     snprintf(s->element, sizeof s->element, "%s", element);
     s->size = size;

@@ -6,27 +6,27 @@
 
 static small_scene organ;
 enum { POINTS = 5 };
-static pal_measured_configuration setting[POINTS];
+static pal_measured_configuration configuration[POINTS];
 
 /* as a study keeps them, by ascending ms; point 2 is what the scene has, point 3 was not measured */
 static void make_points(void)
 {
     static const double ms[POINTS] = {0.1, 0.2, 0.4, 0.8, 3}, error_m[POINTS] = {4e-3, 5e-3, 2e-3, NAN, 1e-4};
-    memset(setting, 0, sizeof setting);
+    memset(configuration, 0, sizeof configuration);
     for (int i = 0; i < POINTS; i++) {
-        setting[i].ms = ms[i], setting[i].error_m = error_m[i];
-        setting[i].front = i != 1 && i != 3;
-        pal_configuration_of(&organ.scene, 0, &setting[i].setting);
-        setting[i].setting.size = 7 + 2 * i;
+        configuration[i].ms = ms[i], configuration[i].error_m = error_m[i];
+        configuration[i].front = i != 1 && i != 3;
+        pal_configuration_of(&organ.scene, 0, &configuration[i].configuration);
+        configuration[i].configuration.size = 7 + 2 * i;
     }
-    pal_configuration_of(&organ.scene, 0, &setting[2].setting);
-    snprintf(setting[4].setting.model, sizeof setting[4].setting.model, "fem");
-    snprintf(setting[4].setting.element, sizeof setting[4].setting.element, "hex8_bbar");
+    pal_configuration_of(&organ.scene, 0, &configuration[2].configuration);
+    snprintf(configuration[4].configuration.model, sizeof configuration[4].configuration.model, "fem");
+    snprintf(configuration[4].configuration.element, sizeof configuration[4].configuration.element, "hex8_bbar");
 }
 
 static void begin(bool with_study)
 {
-    static const pal_session_study study = {.configuration = setting, .n = POINTS, .reference_m = 3e-4};
+    static const pal_session_study study = {.configuration = configuration, .n = POINTS, .reference_m = 3e-4};
     pal_server_options net = {.study = with_study ? &study : NULL};
     served_begin(&organ.scene, (pal_session_options){0}, net);
 }

@@ -1,6 +1,6 @@
 /* What a switch promises, over the wire: a ball under its weight that a client presses goes from point to point of its
  * study and along its parameters, the energy within 2 %, no shown vertex farther in all than the errors that were shown
- * of both settings allow, and the answer says so. Estimates of errors under a press hold what they promise. The
+ * of both configurations allow, and the answer says so. Estimates of errors under a press hold what they promise. The
  * transfer is made by the worker, not by the loop. */
 #include "server/estimate/estimation.h"
 #include "server/session/configuration_switch.h"
@@ -63,10 +63,10 @@ static void make_study(void)
     order_point(&point[0], "tet_springs", "", 0);
     order_point(&point[1], "fem", "hex8_bbar", 6);
     order_point(&point[2], "fem", "tet4", 8);
-    point[0].setting.k_area_J = -1;
+    point[0].configuration.k_area_J = -1;
     float *best = find_rest(&right, &n_right, NULL);
     for (int i = 0; i < POINTS; i++) {
-        float *x = find_rest(i ? &point[i].setting : NULL, &n, &estimate_m[i]);
+        float *x = find_rest(i ? &point[i].configuration : NULL, &n, &estimate_m[i]);
         REQUIRE(n == n_right);
         point[i].error_m = check_farthest(x, best, n);
         free(x);
@@ -79,8 +79,8 @@ static void a_press_is_estimated_as_it_is_shown(void)
 {
     for (int i = 0; i < POINTS; i++) {
         double ratio = estimate_m[i] / point[i].error_m;
-        printf("  %s, %d voxels: off by %.3f mm, estimate %.3f mm: %.2f\n", point[i].setting.model,
-               point[i].setting.size, 1e3 * point[i].error_m, 1e3 * estimate_m[i], ratio);
+        printf("  %s, %d voxels: off by %.3f mm, estimate %.3f mm: %.2f\n", point[i].configuration.model,
+               point[i].configuration.size, 1e3 * point[i].error_m, 1e3 * estimate_m[i], ratio);
         CHECK(ratio >= 0.5 && ratio <= 3);
     }
 }

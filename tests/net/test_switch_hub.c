@@ -1,4 +1,4 @@
-/* Other settings over the wire: points of a study and parameters, asked for by clients of a real session that
+/* Other configurations over the wire: points of a study and parameters, asked for by clients of a real session that
  * runs; the topology that comes of them, answers, refusals, tools that stay with their holders; before and after
  * sculpting. */
 #include "tests/net/command_room.h"
@@ -16,7 +16,7 @@ static void begin(void)
     order_begin(&clay.scene, point, POINTS);
 }
 
-static void setting(int i, const char *model, const char *element, int size)
+static void configuration(int i, const char *model, const char *element, int size)
 {
     order_point(&point[i], model, element, size);
     point[i].ms = 1 + i, point[i].error_m = 0.001 / (1 + i);
@@ -207,9 +207,9 @@ static void a_server_that_ends_in_the_middle_ends(void)
 int main(void)
 {
     clay_make(&clay, 2, 0.1);
-    setting(0, "subdivision_fem", "", 1);
-    setting(1, "fem", "hex8_bbar", 8);
-    setting(2, "subdivision_fem", "", 2);
+    configuration(0, "subdivision_fem", "", 1);
+    configuration(1, "fem", "hex8_bbar", 8);
+    configuration(2, "subdivision_fem", "", 2);
     RUN_SERIAL(two_clients_see_a_point_of_the_study);
     RUN(tools_stay_with_who_holds_them);
     RUN_SERIAL(a_pressure_is_transferred);

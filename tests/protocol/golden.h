@@ -293,7 +293,7 @@ static inline void golden_control(pal_control_type type, pal_control *c)
     }
 }
 
-/* what came with settings, rescues and switches of rows */
+/* what came with configurations, rescues and switches of rows */
 static inline void golden_rows(uint32_t n, uint32_t *n_part, double *part, uint32_t *n_why,
                                char (*reason)[PAL_WIRE_REASON_BYTES])
 {

@@ -1,5 +1,5 @@
 /* Components without support where scenes are made ready: from a surface, a scene file, a prepared mesh, control cells,
- * another setting. What a scene holds and what it asks for decides. */
+ * another configuration. What a scene holds and what it asks for decides. */
 #include "server/mesh/cells/cell_file.h"
 #include "server/mesh/cells/cell_lattice.h"
 #include "server/scene/scene_file.h"
@@ -304,10 +304,10 @@ static void control_cells_are_treated_alike(void)
     pal_scene_free(loaded);
 }
 
-/* ---- other settings ---- */
+/* ---- other configurations ---- */
 
 /* voxels of another size are made while the server runs: what is loose in them goes by the same rule */
-static void another_setting_leaves_out_what_is_loose_in_its_voxels(void)
+static void another_configuration_leaves_out_what_is_loose_in_its_voxels(void)
 {
     pal_loaded_scene *loaded = NULL;
     pal_configured_scene *set = NULL;
@@ -343,7 +343,7 @@ int main(void)
     RUN(two_bodies_may_be_one_held_and_one_free);
     RUN(pieces_of_an_adaptive_surface_all_stay);
     RUN(control_cells_are_treated_alike);
-    RUN(another_setting_leaves_out_what_is_loose_in_its_voxels);
+    RUN(another_configuration_leaves_out_what_is_loose_in_its_voxels);
     char command[256];
     snprintf(command, sizeof command, "rm -r %s", folder);
     return check_report() || system(command) != 0;

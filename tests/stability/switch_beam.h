@@ -1,4 +1,4 @@
-/* A beam in many settings, for the tests of live switches (server/sim/transfer/transfer.h). */
+/* A beam in many configurations, for the tests of live switches (server/sim/transfer/transfer.h). */
 #ifndef TESTS_STABILITY_SWITCH_BEAM_H
 #define TESTS_STABILITY_SWITCH_BEAM_H
 #include "server/base/vec3.h"
@@ -26,7 +26,7 @@ static const pal_configuration full[] = {
     {.model = "tet_springs", .size = 12, .k_area_J = -1},
 };
 
-/* a beam, its settings and where each of them rests under its weight */
+/* a beam, its configurations and where each of them rests under its weight */
 typedef struct beam {
     pal_prepared mesh;
     pal_cells cells;
@@ -87,7 +87,7 @@ static inline void begin(beam *b, bool cells, bool fixed, double damping_1_s)
     for (int k = 0; k < 2; k++) b->scene->tool[k].radius_m = 0.015;
 }
 
-static inline void add_setting(beam *b, const pal_configuration *s)
+static inline void add_configuration(beam *b, const pal_configuration *s)
 {
     pal_diagnostic diag = {""};
     if (pal_configuration_make(b->scene, 0, s, &diag, &b->set[b->n])) CHECK_FAIL("%s", diag.text);

@@ -6,7 +6,7 @@
 
 enum { LEVELS_MAX_SWITCH = 24 };
 
-/* settings 0, 1 and 2: 1, 2 and 3 levels */
+/* configurations 0, 1 and 2: 1, 2 and 3 levels */
 static void begin_surface(beam *b, bool fixed, double young_Pa, double damping_1_s, pal_prepared *surface)
 {
     begin(b, false, fixed, damping_1_s);
@@ -16,7 +16,7 @@ static void begin_surface(beam *b, bool fixed, double young_Pa, double damping_1
     b->scene->body[0].material.young_Pa = young_Pa;
     pal_entry_init(&b->scene->body[0].model, "model", "adaptive_springs");
     pal_entry_put_number(&b->scene->body[0].model, "thickness_m", 0.01, NULL);
-    for (int i = 1; i <= 3; i++) add_setting(b, &(pal_configuration){.model = "adaptive_springs", .size = i});
+    for (int i = 1; i <= 3; i++) add_configuration(b, &(pal_configuration){.model = "adaptive_springs", .size = i});
 }
 
 /* farthest that a vertex in use is from x [n][3], NAN: it was not in use; x is then where they are */
@@ -34,11 +34,11 @@ static double farthest_vertex(pal_world *w, double *x, int n)
 }
 
 /* a tool closes at `from` and goes up by up_m in `lift` steps, and on by `creep` of that in each step; wait[k] steps in
- * setting[k], the last one `wait[n]`; turned: all of it a quarter about the x axis */
+ * configuration[k], the last one `wait[n]`; turned: all of it a quarter about the x axis */
 typedef struct pull_plan {
     bool turned;
     double from_m[3], up_m, creep;
-    int lift, n, setting[LEVELS_MAX_SWITCH + 1], wait[LEVELS_MAX_SWITCH + 1];
+    int lift, n, configuration[LEVELS_MAX_SWITCH + 1], wait[LEVELS_MAX_SWITCH + 1];
 } pull_plan;
 
 /* what was worst in rows of switches: energy; way of a vertex in a step, of what is shown; force in the step after a
@@ -91,7 +91,7 @@ static pal_world *change_levels(const beam *b, int from, int to, pal_world *w, p
 
 static void pull_and_switch(const beam *b, const pull_plan *p, pulled *out)
 {
-    pal_world *w = open_world(&b->set[p->setting[0]]->scene), *finest = open_world(&b->set[2]->scene);
+    pal_world *w = open_world(&b->set[p->configuration[0]]->scene), *finest = open_world(&b->set[2]->scene);
     int n = pal_world_view_body(finest, 0)->n_node, k = 0;
     double *x = calloc(3 * (size_t)n, sizeof *x);
     REQUIRE(x != NULL);
@@ -99,7 +99,7 @@ static void pull_and_switch(const beam *b, const pull_plan *p, pulled *out)
     if (p->turned) turn_body(w);
     for (int s = 0; s <= p->n; s++) {
         double was_N = grasp_N(w);
-        if (s > 0) w = change_levels(b, p->setting[s - 1], p->setting[s], w, out);
+        if (s > 0) w = change_levels(b, p->configuration[s - 1], p->configuration[s], w, out);
         (void)farthest_vertex(w, x, n);
         for (int i = 0; i < p->wait[s]; i++, k++) {
             pull_step(w, p, k);
@@ -114,10 +114,10 @@ static void pull_and_switch(const beam *b, const pull_plan *p, pulled *out)
     pal_world_destroy(w);
 }
 
-/* what a body pulls with in the end that was in the last setting from the start, N */
+/* what a body pulls with in the end that was in the last configuration from the start, N */
 static double pull_alone_N(const beam *b, const pull_plan *p)
 {
-    pal_world *w = open_world(&b->set[p->setting[p->n]]->scene);
+    pal_world *w = open_world(&b->set[p->configuration[p->n]]->scene);
     int n = 0;
     for (int s = 0; s <= p->n; s++) n += p->wait[s];
     for (int k = 0; k < n; k++) pull_step(w, p, k);
@@ -126,11 +126,11 @@ static double pull_alone_N(const beam *b, const pull_plan *p)
     return end_N;
 }
 
-/* settings as the text numbers them, every fourth step another one */
+/* configurations as the text numbers them, every fourth step another one */
 static void plan_of(const char *text, double up_m, int rest, pull_plan *out)
 {
     *out = (pull_plan){.from_m = {0.19, 0.025, WIDTH}, .up_m = up_m, .lift = 20};
-    for (int s = 0; text[s]; s++) out->setting[s] = text[s] - '0', out->wait[s] = 4, out->n = s;
+    for (int s = 0; text[s]; s++) out->configuration[s] = text[s] - '0', out->wait[s] = 4, out->n = s;
     out->wait[0] = 21;
     out->wait[out->n] = rest;
 }
@@ -139,9 +139,9 @@ static void plan_of(const char *text, double up_m, int rest, pull_plan *out)
 static void plan_at_random(uint64_t seed, double up_m, pull_plan *out)
 {
     *out = (pull_plan){.from_m = {0.19, 0.025, WIDTH}, .up_m = up_m, .lift = 30, .creep = 0.002, .n = 19};
-    out->setting[0] = 1, out->wait[0] = 90;
+    out->configuration[0] = 1, out->wait[0] = 90;
     for (int s = 1; s <= out->n; s++) {
-        out->setting[s] = (out->setting[s - 1] + 1 + (int)(2 * random_unit(&seed))) % 3;
+        out->configuration[s] = (out->configuration[s - 1] + 1 + (int)(2 * random_unit(&seed))) % 3;
         out->wait[s] = s == out->n ? 60 : 2 + (int)(12 * random_unit(&seed));
     }
 }

@@ -1,5 +1,5 @@
-/* A ball under its weight that a tool presses at its top, in several settings, for the tests of live switches under a
- * press (server/sim/transfer/transfer.h). */
+/* A ball under its weight that a tool presses at its top, in several configurations, for the tests of live switches
+ * under a press (server/sim/transfer/transfer.h). */
 #ifndef TESTS_STABILITY_SWITCH_PRESS_H
 #define TESTS_STABILITY_SWITCH_PRESS_H
 #include "tests/session/session_scene.h"

@@ -38,9 +38,9 @@ static void a_free_body_keeps_its_momentum(void)
     for (int k = 0; k < 2; k++) {
         pal_configuration exact = full[k];
         exact.tolerance = 1e-9;
-        add_setting(&b, &exact);
+        add_configuration(&b, &exact);
     }
-    add_setting(&b, &full[6]);
+    add_configuration(&b, &full[6]);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
             if (i == j) continue;
@@ -79,7 +79,7 @@ static void forces_are_released_over_a_sixth_of_a_second(void)
     beam b;
     double still[3], move[3], speed[3];
     begin(&b, false, true, 25);
-    add_setting(&b, &full[1]), add_setting(&b, &full[6]);
+    add_configuration(&b, &full[1]), add_configuration(&b, &full[6]);
     pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene);
     pal_transfer *x = make_transfer(&b, 0, 1);
     pal_transfer_report r;
@@ -121,7 +121,7 @@ static void the_same_switch_gives_the_same_hash(void)
     beam b;
     uint64_t hash[2][2];
     begin(&b, false, true, 2);
-    add_setting(&b, &full[5]), add_setting(&b, &full[1]);
+    add_configuration(&b, &full[5]), add_configuration(&b, &full[1]);
     for (int k = 0; k < 2; k++) {
         pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene);
         pal_transfer *x = make_transfer(&b, 0, 1);
@@ -143,7 +143,7 @@ static void go_round(int first, int second, int n, int rest, double drift)
 {
     beam b;
     begin(&b, false, true, 8);
-    add_setting(&b, &full[first]), add_setting(&b, &full[second]);
+    add_configuration(&b, &full[first]), add_configuration(&b, &full[second]);
     pal_transfer *x[2] = {make_transfer(&b, 0, 1), make_transfer(&b, 1, 0)};
     pal_world *w = open_world(&b.set[0]->scene);
     pal_transfer_report r;
@@ -184,7 +184,7 @@ static void tools_hold_on(void)
     for (int n = 0; n < 4; n++) {
         beam b;
         begin(&b, false, true, 20);
-        add_setting(&b, &full[pair[n][0]]), add_setting(&b, &full[pair[n][1]]);
+        add_configuration(&b, &full[pair[n][0]]), add_configuration(&b, &full[pair[n][1]]);
         pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene);
         pal_transfer *x = make_transfer(&b, 0, 1);
         pal_transfer_report r;
@@ -245,7 +245,7 @@ static void a_turning_grasp_is_transferred(void)
         begin(&b, false, false, 20);
         b.scene->body[0].n_support = 1;
         b.scene->body[0].support[0] = (pal_support_def){.low_m = {-1, -1e9, -1e9}, .high_m = {1e-3, 1e9, 1e9}};
-        add_setting(&b, &full[pair[n][0]]), add_setting(&b, &full[pair[n][1]]);
+        add_configuration(&b, &full[pair[n][0]]), add_configuration(&b, &full[pair[n][1]]);
         pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene),
                   *right = open_world(&b.set[1]->scene);
         pal_transfer *x = make_transfer(&b, 0, 1);
@@ -289,7 +289,7 @@ static void grasps_transfer_between_surfaces(void)
     beam b;
     begin(&b, true, false, 20);
     b.scene->body[0].n_support = 1;
-    for (int k = 0; k < 2; k++) add_setting(&b, &list[k]);
+    for (int k = 0; k < 2; k++) add_configuration(&b, &list[k]);
     pal_transfer *x[2] = {make_transfer(&b, 0, 1), make_transfer(&b, 1, 0)};
     pal_transfer_report r;
     for (int k = 0; k < 2; k++) {
@@ -326,7 +326,7 @@ static void friction_holds_on(void)
         beam b;
         begin(&b, false, true, 20);
         pal_entry_put_number(&b.scene->body[0].effect[1], "friction", 1, NULL);
-        add_setting(&b, &full[pair[n][0]]), add_setting(&b, &full[pair[n][1]]);
+        add_configuration(&b, &full[pair[n][0]]), add_configuration(&b, &full[pair[n][1]]);
         pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene);
         pal_transfer *x = make_transfer(&b, 0, 1);
         pal_transfer_report r;
@@ -358,7 +358,7 @@ static void lasting_loads_stay(void)
 {
     beam b;
     begin(&b, false, true, 25);
-    add_setting(&b, &full[0]), add_setting(&b, &full[1]);
+    add_configuration(&b, &full[0]), add_configuration(&b, &full[1]);
     pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene);
     pal_transfer *x = make_transfer(&b, 0, 1);
     pal_transfer_report r;
@@ -510,13 +510,13 @@ static void a_grasp_finds_its_fine_vertices_again(void)
                       .up_m = 0.001,
                       .lift = 10,
                       .n = 4,
-                      .setting = {3, 0, 3, 0, 3},
+                      .configuration = {3, 0, 3, 0, 3},
                       .wait = {12, 3, 3, 3, 35}};
     pulled worst = {0};
     beam b;
     pal_prepared surface;
     begin_surface(&b, false, 4e5, 20, &surface);
-    add_setting(&b, &(pal_configuration){.model = "adaptive_springs", .element = "refined", .size = 2});
+    add_configuration(&b, &(pal_configuration){.model = "adaptive_springs", .element = "refined", .size = 2});
     for (int i = 0; i < 4; i++) pal_entry_put_number(&b.set[i]->scene.body[0].effect[1], "reach_m", 0.004, NULL);
     pull_and_switch(&b, &plan, &worst);
     double alone_N = pull_alone_N(&b, &plan);
@@ -552,7 +552,7 @@ static void what_does_not_fit_is_refused(void)
 {
     beam b;
     begin(&b, false, true, 2);
-    add_setting(&b, &full[0]);
+    add_configuration(&b, &full[0]);
     pal_scene *other = malloc(sizeof *other);
     if (!other) abort();
     *other = b.set[0]->scene;
@@ -589,7 +589,7 @@ static void handles_hold_on(void)
         double tip[3], u[3], v[3];
         begin(&b, true, false, 20);
         b.scene->body[0].n_support = 1;
-        for (int k = 0; k < 2; k++) add_setting(&b, &s[(n + k) % 2]);
+        for (int k = 0; k < 2; k++) add_configuration(&b, &s[(n + k) % 2]);
         pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene);
         pal_transfer *x = make_transfer(&b, 0, 1);
         if (pal_world_brush(w, 0, 0, &handle, &diag)) CHECK_FAIL("%s", diag.text);
@@ -629,7 +629,7 @@ static void a_rehearsed_carry_takes_few_rounds(void)
         pal_transfer_report cold, warm;
         double first[3], then[3], speed[3];
         begin(&b, false, true, 2);
-        add_setting(&b, &full[pair[n][0]]), add_setting(&b, &full[pair[n][1]]);
+        add_configuration(&b, &full[pair[n][0]]), add_configuration(&b, &full[pair[n][1]]);
         pal_world *w = open_world(&b.set[0]->scene), *next = open_world(&b.set[1]->scene);
         pal_transfer *x = make_transfer(&b, 0, 1), *y = make_transfer(&b, 0, 1);
         (void)disturb(w, 1.0 / 60);

@@ -1,7 +1,7 @@
 /* Live switches between unlike meshes of one organ (server/sim/transfer/transfer.h): springs on whole voxels of the
  * border and finite elements on cut ones differ in mass, in how they are held and in where their nodes are. A ball
- * under its weight that a tool presses, at the first touch, while it moves and at rest: every pair of settings. --table
- * prints what every pair does. */
+ * under its weight that a tool presses, at the first touch, while it moves and at rest: every pair of configurations.
+ * --table prints what every pair does. */
 #include "tests/session/session_scene.h"
 #include "tests/stability/hard_case.h"
 #include "tests/stability/switch_beam.h"

@@ -1,5 +1,5 @@
 /* The state of a running body goes over to another method, element, law, solver or resolution
- * (server/sim/transfer/transfer.h): every pair of settings on a beam that bends, moves and is pressed by a tool.
+ * (server/sim/transfer/transfer.h): every pair of configurations on a beam that bends, moves and is pressed by a tool.
  * --table prints what every pair does. */
 #include "tests/stability/hard_case.h"
 #include "tests/stability/switch_beam.h"
@@ -16,8 +16,8 @@ static void make_all(beam *b, const pal_configuration *list, int n, bool cells)
     const pal_configuration fine = {.model = "fem", .element = "hex8_bbar", .size = cells ? 12 : 16};
     begin(b, cells, true, 2);
     b->scene->tool[0].force_cap_N = 3;
-    for (int i = 0; i < n; i++) add_setting(b, &list[i]);
-    add_setting(b, &fine);
+    for (int i = 0; i < n; i++) add_configuration(b, &list[i]);
+    add_configuration(b, &fine);
     for (int i = 0; i < n; i++) b->rest_m[i] = find_rest(&b->set[i]->scene);
     b->right_m = find_rest(&b->set[n]->scene);
     pal_configured_scene_free(b->set[--b->n]);
@@ -53,7 +53,7 @@ static void check_pair(const beam *b, int i, int j, pal_world *before)
     if (table) print_row(b, i, j, &r, (double[2]){u[2], to_u[2]});
     CHECK(pal_world_hash(before) == hash);
     const char *const model = b->set[j]->scene.body[0].model.name;
-    HARD_CASE("switch", model, "to it from every other setting: energy jumps by",
+    HARD_CASE("switch", model, "to it from every other configuration: energy jumps by",
               100 * fabs(r.energy_after_J / r.energy_before_J - 1), 2, "%");
     /* the shown bound: both methods' errors, as parts of what they bend by, and a hair for the shapes that differ */
     double bound = fabs(b->rest_m[i] - b->right_m) + fabs(b->rest_m[j] - b->right_m);

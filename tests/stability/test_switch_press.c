@@ -1,6 +1,6 @@
 /* A live switch (server/sim/transfer/transfer.h) while a tool presses: what is seen does not jump, and what is felt
- * goes from the force of before to that of after without a swing. Every pair of settings. --table prints what every
- * pair does. */
+ * goes from the force of before to that of after without a swing. Every pair of configurations. --table prints what
+ * every pair does. */
 #include "tests/stability/hard_case.h"
 #include "tests/stability/switch_press.h"
 

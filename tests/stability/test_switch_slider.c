@@ -1,9 +1,9 @@
 /* The slider moved at random while a tool pulls: twenty live switches (server/sim/transfer/transfer.h) of an organ and
  * of a beam, some rehearsed, some before the one before has been let in, the hand going on meanwhile. No frame tears:
- * no shown vertex goes farther in a frame than the errors of both settings allow, no edge that is shown is drawn out,
- * the grip holds and pulls without a jump, and at last pulls as if only the last setting had ever been there. --table
- * prints every switch, --sweep MM SEEDS the worst of an organ pulled by MM mm with each of so many seeds, and asserts
- * nothing. */
+ * no shown vertex goes farther in a frame than the errors of both configurations allow, no edge that is shown is drawn
+ * out, the grip holds and pulls without a jump, and at last pulls as if only the last configuration had ever been
+ * there. --table prints every switch, --sweep MM SEEDS the worst of an organ pulled by MM mm with each of so many
+ * seeds, and asserts nothing. */
 #include "server/mesh/geometry/organ.h"
 #include "server/num/random.h"
 #include "tests/stability/hard_case.h"
@@ -20,7 +20,7 @@ static const pal_configuration list[SETTINGS] = {
     {.model = "fem", .element = "hex8_bbar", .size = 10},
 };
 
-/* what is pulled, where and by how much, and how far each setting rests from the right one when it is */
+/* what is pulled, where and by how much, and how far each configuration rests from the right one when it is */
 typedef struct pulled {
     pal_scene *scene;
     pal_configured_scene *set[SETTINGS + 1]; /* the last is the right one */
@@ -64,7 +64,7 @@ static double longest_edge(const pal_world *w)
     return max;
 }
 
-/* where settings rest under the pull, and the longest edge of any */
+/* where configurations rest under the pull, and the longest edge of any */
 static double find_errors(pulled *p)
 {
     pal_world *right = open_world(&p->set[SETTINGS]->scene);
@@ -77,7 +77,7 @@ static double find_errors(pulled *p)
         if (a->display.n_shown != b->display.n_shown) abort();
         p->error_m[i] = check_farthest(a->display.shown, b->display.shown, b->display.n_shown);
         longest = fmax(longest, longest_edge(w));
-        if (table) printf("  setting %d: off by %.2f mm\n", i, 1e3 * p->error_m[i]);
+        if (table) printf("  configuration %d: off by %.2f mm\n", i, 1e3 * p->error_m[i]);
         pal_world_destroy(w);
     }
     pal_world_destroy(right);
@@ -130,16 +130,16 @@ static pal_world *change(const pulled *p, int from, int to, bool has_rehearsed, 
     return next;
 }
 
-/* what a world pulls with that stood in a setting from the start, or (as a dent that a tool pressed before it closed is
- * another one in each) went there at once, with the hand where it is after all switches */
-static double pull_of(const pulled *p, int setting, double part)
+/* what a world pulls with that stood in a configuration from the start, or (as a dent that a tool pressed before it
+ * closed is another one in each) went there at once, with the hand where it is after all switches */
+static double pull_of(const pulled *p, int configuration, double part)
 {
-    const int first = p->at_once ? setting : 0;
-    const double step_s = p->set[setting]->scene.step_s;
+    const int first = p->at_once ? configuration : 0;
+    const double step_s = p->set[configuration]->scene.step_s;
     pal_transfer_report r;
     pal_world *w = open_world(&p->set[first]->scene);
     pull(p, w, p->set[first]->scene.step_s);
-    if (setting != first) w = change(p, first, setting, false, w, &r);
+    if (configuration != first) w = change(p, first, configuration, false, w, &r);
     for (double t = 0, at = 1; t < 2; t += step_s) {
         at = fmin(part, at + 0.4 * step_s);
         pull_to(p, w, at);
@@ -150,7 +150,7 @@ static double pull_of(const pulled *p, int setting, double part)
     return force_N;
 }
 
-/* what one switch showed, against what the settings and the way pulled allow */
+/* what one switch showed, against what the configurations and the way pulled allow */
 static void judge(const pulled *p, int to, const seen *s, double bound_m, double longest, double energy_J)
 {
     HARD_CASE("switch", list[to].model,
@@ -168,11 +168,11 @@ static void judge(const pulled *p, int to, const seen *s, double bound_m, double
 
 /* no switch has taken anything from the pull for good: a second later, in which the body's own damping lets go what is
  * left, force over that of a world without the other switches, less 1 */
-static double force_left(const pulled *p, int setting, double part, pal_world *w)
+static double force_left(const pulled *p, int configuration, double part, pal_world *w)
 {
-    const double step_s = p->set[setting]->scene.step_s;
+    const double step_s = p->set[configuration]->scene.step_s;
     step(w, step_s, (int)(1 / step_s));
-    const double now_N = pal_norm3(pal_world_tools(w)->tool[0].mean_force_N), right_N = pull_of(p, setting, part);
+    const double now_N = pal_norm3(pal_world_tools(w)->tool[0].mean_force_N), right_N = pull_of(p, configuration, part);
     if (table) printf("  at last %.3f N, without the other switches %.3f N\n", now_N, right_N);
     return now_N / right_N - 1;
 }
@@ -180,7 +180,7 @@ static double force_left(const pulled *p, int setting, double part, pal_world *w
 static worst slide(pulled *p, uint64_t seed)
 {
     const double longest = sweep && !table ? 1 : find_errors(p);
-    int at_setting = 0;
+    int at_configuration = 0;
     double part = 1;
     worst all = {0};
     pal_world *w = open_world(&p->set[0]->scene);
@@ -190,13 +190,13 @@ static worst slide(pulled *p, uint64_t seed)
     if (!last) abort();
     memcpy(last, pal_world_view_body(w, 0)->display.shown, n_byte);
     for (uint64_t k = 0; k < SWITCHES; k++) {
-        int to = (at_setting + 1 + (int)(pal_random_unit(seed, 3 * k) * (SETTINGS - 1))) % SETTINGS;
+        int to = (at_configuration + 1 + (int)(pal_random_unit(seed, 3 * k) * (SETTINGS - 1))) % SETTINGS;
         int n = 2 + (int)(12 * pal_random_unit(seed, 3 * k + 1));
         pal_transfer_report r;
         double before_N = pal_norm3(pal_world_tools(w)->tool[0].mean_force_N);
         seen s = {.min_N = before_N, .max_N = before_N};
-        double bound_m = sweep ? 1 : p->error_m[at_setting] + p->error_m[to];
-        w = change(p, at_setting, to, pal_random_unit(seed, 3 * k + 2) < 0.5, w, &r);
+        double bound_m = sweep ? 1 : p->error_m[at_configuration] + p->error_m[to];
+        w = change(p, at_configuration, to, pal_random_unit(seed, 3 * k + 2) < 0.5, w, &r);
         CHECK_LE(
             check_farthest(last, pal_world_view_body(w, 0)->display.shown, pal_world_view_body(w, 0)->display.n_shown),
             1e-6);
@@ -205,17 +205,17 @@ static worst slide(pulled *p, uint64_t seed)
         if (table)
             printf("  %d -> %d, %2d steps: %.3f of %.2f mm in a frame, edges %.2f (%.2f), force %.2f, %.2f to %.2f N, "
                    "energy %+.2f %%, kinetic %.4f of all\n",
-                   at_setting, to, n, s.frame, 1e3 * bound_m, s.edge, longest, before_N, s.min_N, s.max_N, 100 * energy,
-                   s.first_J / r.energy_before_J);
+                   at_configuration, to, n, s.frame, 1e3 * bound_m, s.edge, longest, before_N, s.min_N, s.max_N,
+                   100 * energy, s.first_J / r.energy_before_J);
         if (!sweep) judge(p, to, &s, bound_m, longest, r.energy_before_J);
         all.frame_m = fmax(all.frame_m, s.frame * bound_m);
         all.energy = fmax(all.energy, fabs(energy)), all.n_energy += fabs(energy) > 0.02;
-        at_setting = to;
+        at_configuration = to;
     }
-    all.force = force_left(p, at_setting, part, w);
+    all.force = force_left(p, at_configuration, part, w);
     if (!sweep)
-        HARD_CASE("switch", list[at_setting].model, "slider under a pull: off the force without the other switches",
-                  100 * fabs(all.force), 5, "%");
+        HARD_CASE("switch", list[at_configuration].model,
+                  "slider under a pull: off the force without the other switches", 100 * fabs(all.force), 5, "%");
     free(last);
     pal_world_destroy(w);
     return all;

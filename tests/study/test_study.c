@@ -1,5 +1,5 @@
-/* Studies: the front and what it answers, what is foreseen, a beam swept in few settings, what is taken over from a
- * study before, presses on a scene's bodies, refusals. */
+/* Studies: the front and what it answers, what is foreseen, a beam swept in few configurations, what is taken over from
+ * a study before, presses on a scene's bodies, refusals. */
 #include "server/study/study.h"
 
 #include "server/base/vec3.h"
@@ -20,9 +20,9 @@ static pal_study_point *put(pal_study *s, const char *element, int size, double 
 {
     pal_study_point *p = &s->point[s->n_point++];
     p->measured =
-        (pal_measured_configuration){.setting = {.size = size, .step_s = 1.0 / 60}, .ms = ms, .error_m = error_m};
-    snprintf(p->measured.setting.model, PAL_NAME, "fem");
-    snprintf(p->measured.setting.element, PAL_NAME, "%s", element);
+        (pal_measured_configuration){.configuration = {.size = size, .step_s = 1.0 / 60}, .ms = ms, .error_m = error_m};
+    snprintf(p->measured.configuration.model, PAL_NAME, "fem");
+    snprintf(p->measured.configuration.element, PAL_NAME, "%s", element);
     return p;
 }
 
@@ -119,19 +119,19 @@ static void power_laws_are_predicted_exactly(void)
     }
     double error_m;
     for (int n = 6; n <= 48; n += 7) {
-        pal_configuration at = s->point[0].measured.setting;
+        pal_configuration at = s->point[0].measured.configuration;
         at.size = n;
         CHECK(pal_study_predict_error(s, &at, -1, &error_m));
         CHECK_NEAR(error_m / (0.3 * pow(n, -1.8)), 1, 1e-6);
     }
     /* a point that is left out is not looked at */
     s->point[4].measured.error_m *= 3;
-    CHECK(pal_study_predict_error(s, &s->point[4].measured.setting, 4, &error_m));
+    CHECK(pal_study_predict_error(s, &s->point[4].measured.configuration, 4, &error_m));
     CHECK_NEAR(error_m / (0.3 * pow(16, -1.8)), 1, 1e-6);
-    pal_configuration other = s->point[0].measured.setting;
+    pal_configuration other = s->point[0].measured.configuration;
     snprintf(other.model, PAL_NAME, "tet_springs");
     CHECK(!pal_study_predict_error(s, &other, -1, &error_m));
-    other = s->point[0].measured.setting;
+    other = s->point[0].measured.configuration;
     snprintf(other.element, PAL_NAME, "tet10");
     CHECK(!pal_study_predict_error(s, &other, -1, &error_m));
     free(s);
@@ -147,8 +147,8 @@ static void costs_proportional_to_the_count_are_predicted_exactly(void)
     uint64_t state = 5;
     for (int i = 0; i < 40; i++) {
         pal_study_point *p = put(s, "", 8 + i % 9, 0, 1e-3);
-        snprintf(p->measured.setting.model, PAL_NAME, "tet_springs");
-        p->measured.setting.step_s = own_s[i % 2];
+        snprintf(p->measured.configuration.model, PAL_NAME, "tet_springs");
+        p->measured.configuration.step_s = own_s[i % 2];
         p->n_node = 100 + (int)(3000 * random_unit(&state)), p->n_substep = 1 + (int)(60 * random_unit(&state));
         p->measured.ms = (overhead + node * p->n_node * p->n_substep) * s->step_s / own_s[i % 2];
     }
@@ -156,12 +156,12 @@ static void costs_proportional_to_the_count_are_predicted_exactly(void)
     s->point[7].measured.ms *= 5;
     for (int k = 0; k < 20; k++) {
         int nodes = 50 + 400 * k, substeps = 1 + 7 * k;
-        pal_configuration at = s->point[k % 2].measured.setting;
+        pal_configuration at = s->point[k % 2].measured.configuration;
         s->point[8].err = PAL_ERR_FROZEN;
         CHECK(pal_study_predict_cost(s, &at, nodes, 0, substeps, 0, 7, &ms));
         CHECK_NEAR(ms / ((overhead + node * nodes * substeps) * s->step_s / at.step_s), 1, 1e-4);
     }
-    pal_configuration at = s->point[0].measured.setting;
+    pal_configuration at = s->point[0].measured.configuration;
     CHECK(!pal_study_predict_cost(s, &at, 0, 0, 3, 0, -1, &ms) &&
           !pal_study_predict_cost(s, &at, 300, 0, 0, 0, -1, &ms));
     snprintf(at.element, PAL_NAME, "tet10");
@@ -181,16 +181,17 @@ static void steps_go_with_elements_where_they_are_counted(void)
         int k = i / 2 % 5;
         bool neo = i % 2;
         pal_study_point *p = put(s, "hex8_bbar", 16 + i / 10 + 8 * k, 0, 1e-3);
-        snprintf(p->measured.setting.law, PAL_NAME, neo ? "neo_hookean" : "corotational");
+        snprintf(p->measured.configuration.law, PAL_NAME, neo ? "neo_hookean" : "corotational");
         p->n_node = 150 << k, p->n_substep = 1, p->n_element = to_a_node[k] * p->n_node;
         p->measured.ms = (element + (neo ? tangent : 0)) * p->n_element;
     }
     for (int left_out = 0; left_out < 20; left_out++) {
         const pal_study_point *p = &s->point[left_out];
         double ms, twice;
-        CHECK(pal_study_predict_cost(s, &p->measured.setting, p->n_node, p->n_element, 1, 0, left_out, &ms));
+        CHECK(pal_study_predict_cost(s, &p->measured.configuration, p->n_node, p->n_element, 1, 0, left_out, &ms));
         CHECK_NEAR(ms / p->measured.ms, 1, 0.02);
-        CHECK(pal_study_predict_cost(s, &p->measured.setting, p->n_node, 2 * p->n_element, 1, 0, left_out, &twice));
+        CHECK(
+            pal_study_predict_cost(s, &p->measured.configuration, p->n_node, 2 * p->n_element, 1, 0, left_out, &twice));
         CHECK_NEAR(twice / ms, 2, 0.1);
     }
     free(s);
@@ -205,7 +206,7 @@ static void how_much_is_refined_is_seen_of_other_levels(void)
     const int size[] = {1, 2, 2, 3, 3}, nodes[] = {190, 248, 766, 478, 3070};
     for (int i = 0; i < 5; i++) {
         pal_study_point *p = put(s, i == 2 || i == 4 ? "refined" : "", size[i], 1e-4 * nodes[i] * (6 << size[i]), 1e-3);
-        snprintf(p->measured.setting.model, PAL_NAME, "adaptive_springs");
+        snprintf(p->measured.configuration.model, PAL_NAME, "adaptive_springs");
         p->n_node = nodes[i], p->n_substep = 6 << size[i];
     }
     double ms;
@@ -213,12 +214,12 @@ static void how_much_is_refined_is_seen_of_other_levels(void)
         for (int reported = 100; reported < 5000; reported += 2000) {
             bool is_adaptive = i == 1 || i == 3;
             const pal_study_point *p = &s->point[i];
-            CHECK(pal_study_predict_cost(s, &p->measured.setting, is_adaptive ? reported : p->n_node, 0,
+            CHECK(pal_study_predict_cost(s, &p->measured.configuration, is_adaptive ? reported : p->n_node, 0,
                                          is_adaptive ? reported / 100 : p->n_substep, 0, i, &ms));
             CHECK_NEAR(ms / p->measured.ms, 1, 0.01);
         }
     s->point[3].err = PAL_ERR_FROZEN;
-    CHECK(!pal_study_predict_cost(s, &s->point[1].measured.setting, 248, 0, 24, 0, 1, &ms));
+    CHECK(!pal_study_predict_cost(s, &s->point[1].measured.configuration, 248, 0, 24, 0, 1, &ms));
     free(s);
 }
 
@@ -279,7 +280,7 @@ static void check_errors(const pal_study *s, const pal_problem *p, const pal_sur
     if (at) reference = (int)strtol(at + 2, NULL, 10);
     CHECK_INT(reference, 40);
     for (int i = 0; i < s->n_point; i++) {
-        const pal_configuration *q = &s->point[i].measured.setting;
+        const pal_configuration *q = &s->point[i].measured.configuration;
         bool base = !strcmp(q->element, "hex8_bbar") && !strcmp(q->solver, "implicit_euler") && q->step_s > 0.016;
         if (!base) continue;
         double solved = between(p, beam, q->size, reference);
@@ -296,8 +297,8 @@ static void check_points(const pal_study *s)
         const pal_study_point *p = &s->point[i];
         CHECK(!p->err && p->measured.ms > 0 && p->ms_p95 >= p->measured.ms && p->n_node > 0 && p->prepare_s > 0);
         CHECK(p->measured.error_m == fmax(p->static_max_m, p->trajectory_max_m) && p->static_rms_m <= p->static_max_m);
-        bool fitted = p->measured.setting.k_distance_J > 0;
-        if (!strcmp(p->measured.setting.model, "tet_springs")) best[fitted] = fmin(best[fitted], p->static_max_m);
+        bool fitted = p->measured.configuration.k_distance_J > 0;
+        if (!strcmp(p->measured.configuration.model, "tet_springs")) best[fitted] = fmin(best[fitted], p->static_max_m);
     }
     /* calibration is what springs are worth something by: at rest from 18 % to a per mille of the tip's way */
     CHECK(best[0] > 0.1 * s->max_m && best[1] < 0.005 * s->max_m);
@@ -321,11 +322,11 @@ static void check_predicted(const pal_study *s)
     }
     CHECK(n >= 2 && n_cost > n);
     /* between the two sizes that were measured: errors between theirs, within a third */
-    pal_configuration between = s->point[0].measured.setting, last = between;
+    pal_configuration between = s->point[0].measured.configuration, last = between;
     double error_m, low = s->point[0].measured.error_m, high = low;
     for (int i = 0; i < s->n_point; i++) {
-        last.size = s->point[i].measured.setting.size;
-        if (!pal_configuration_equal(&last, &s->point[i].measured.setting)) continue;
+        last.size = s->point[i].measured.configuration.size;
+        if (!pal_configuration_equal(&last, &s->point[i].measured.configuration)) continue;
         low = fmin(low, s->point[i].measured.error_m), high = fmax(high, s->point[i].measured.error_m);
     }
     between.size = 20;
@@ -408,7 +409,7 @@ static void nearly_incompressible_and_against_samples(void)
     CHECK(s->n_point > 3 && s->reference_m == 0 && strstr(s->reference, "given"));
     for (int i = 0; i < s->n_point; i++) {
         const pal_study_point *q = &s->point[i];
-        bool locks = !strcmp(q->measured.setting.element, "tet4");
+        bool locks = !strcmp(q->measured.configuration.element, "tet4");
         CHECK(!q->err);
         CHECK(locks ? q->static_max_m > 0.2 * s->max_m : q->static_max_m < 0.05 * s->max_m);
     }

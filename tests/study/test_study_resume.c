@@ -93,11 +93,11 @@ static void check_same(const pal_study *a, const pal_study *b)
     CHECK(a->reference_m == b->reference_m && a->max_m == b->max_m && a->length_scale_m == b->length_scale_m);
     for (int i = 0; i < a->n_point; i++) {
         const pal_study_point *p = &a->point[i], *q = &b->point[i];
-        CHECK(pal_configuration_equal(&p->measured.setting, &q->measured.setting) && p->err == q->err);
+        CHECK(pal_configuration_equal(&p->measured.configuration, &q->measured.configuration) && p->err == q->err);
         CHECK(p->measured.error_m == q->measured.error_m && p->static_rms_m == q->static_rms_m);
         CHECK(p->trajectory_max_m == q->trajectory_max_m && p->trajectory_rms_m == q->trajectory_rms_m);
         CHECK(p->n_node == q->n_node && p->n_substep == q->n_substep);
-        CHECK(p->measured.setting.k_distance_J == q->measured.setting.k_distance_J);
+        CHECK(p->measured.configuration.k_distance_J == q->measured.configuration.k_distance_J);
     }
 }
 
@@ -121,7 +121,7 @@ static void ended_anywhere_it_goes_on_to_the_same_table(void)
         /* ever later, so that the longest answer is found as well */
         int max = n_look / 100 + n_look * k / 50;
         int left = 1 + (int)random_below(&state, (uint64_t)max);
-        /* with all settings measured once more: every time they are timed again */
+        /* with all configurations measured once more: every time they are timed again */
         if (parts.so_far->n_point == once->n_point && n_late++ > 0) left = -1;
         err = go(&parts, p, &beam, left, again);
         n_end += err == PAL_ERR_STATE;
@@ -136,8 +136,9 @@ static void ended_anywhere_it_goes_on_to_the_same_table(void)
         CHECK(!memcmp(parts.kept[k].value, all.kept[k].value, sizeof(double) * (size_t)all.kept[k].n));
     }
     check_same(again, once);
-    printf("  %d looks; ended %d times, %d of them before the first setting; %d answers taken from what was kept\n",
-           n_look, n_end, in_reference, parts.n_recalled);
+    printf(
+        "  %d looks; ended %d times, %d of them before the first configuration; %d answers taken from what was kept\n",
+        n_look, n_end, in_reference, parts.n_recalled);
     free(all.kept), free(all.so_far), free(parts.kept), free(parts.so_far);
     free(once), free(again), free(p);
     pal_surface_free(&beam);

@@ -56,19 +56,20 @@ static void show(const pal_study *s)
     printf("  %s: most %.3g mm, own error %.3g mm\n", s->reference, 1e3 * s->max_m, 1e3 * s->reference_m);
     for (int i = 0; i < s->n_point; i++)
         printf("  %c %s: %d nodes, %.3f ms, rest %.3g mm, way %.3g mm %s\n", s->point[i].measured.front ? '*' : ' ',
-               pal_configuration_text(&s->point[i].measured.setting, name), s->point[i].n_node, s->point[i].measured.ms,
-               1e3 * s->point[i].static_max_m, 1e3 * s->point[i].trajectory_max_m, s->point[i].reason);
+               pal_configuration_text(&s->point[i].measured.configuration, name), s->point[i].n_node,
+               s->point[i].measured.ms, 1e3 * s->point[i].static_max_m, 1e3 * s->point[i].trajectory_max_m,
+               s->point[i].reason);
 }
 
 /* what is named has to come back from being mistreated: fitted springs keep some of their volume stiffness, as without
  * it being laid flat leaves them elsewhere for good */
-static void check_survives(const organ *o, const pal_configuration *setting)
+static void check_survives(const organ *o, const pal_configuration *configuration)
 {
     static const char *const name[] = {"flat"};
     pal_configured_scene *set = NULL;
     pal_diagnostic diag = {{0}};
     pal_robustness_report *r = calloc(1, sizeof *r);
-    REQUIRE(r && !pal_configuration_make(o->scene, 0, setting, &diag, &set));
+    REQUIRE(r && !pal_configuration_make(o->scene, 0, configuration, &diag, &set));
     for (int k = 0; k < 1; k++) {
         pal_robustness_options options;
         pal_robustness_default(&options);
@@ -98,7 +99,7 @@ static void a_full_organ_is_pressed(void)
     double coarse = NAN, fine = NAN, fitted = NAN, plain = NAN;
     for (int i = 0; i < s->n_point; i++) {
         const pal_study_point *p = &s->point[i];
-        const pal_configuration *q = &p->measured.setting;
+        const pal_configuration *q = &p->measured.configuration;
         CHECK(!p->err && p->measured.ms > 0 && p->measured.error_m > 0 && p->measured.error_m < 0.6 * s->max_m);
         if (!strcmp(q->element, "hex8_bbar")) coarse = isnan(coarse) ? p->static_rms_m : coarse, fine = p->static_rms_m;
         if (!strcmp(q->model, "tet_springs") && q->k_distance_J > 0) fitted = p->static_rms_m;
@@ -108,7 +109,7 @@ static void a_full_organ_is_pressed(void)
     int n_sprung = 0;
     CHECK(pal_study_pick(s, "", NAN, 1e9) >= 0);
     for (int i = 0; i < s->n_point; i++) {
-        const pal_configuration *q = &s->point[i].measured.setting;
+        const pal_configuration *q = &s->point[i].measured.configuration;
         if (!(q->k_distance_J > 0)) continue;
         n_sprung++;
         CHECK(q->k_volume_J > 0.3 * q->k_distance_J);
@@ -172,7 +173,7 @@ static void a_hollow_organ_is_pressed_and_pulled(void)
     CHECK_INT(o.study->n_point, 3);
     for (int i = 0; i < o.study->n_point; i++) {
         const pal_study_point *p = &o.study->point[i];
-        CHECK(!p->err && !strcmp(p->measured.setting.model, "adaptive_springs") && p->measured.ms > 0);
+        CHECK(!p->err && !strcmp(p->measured.configuration.model, "adaptive_springs") && p->measured.ms > 0);
     }
     /* the finest that is swept, wholly refined, is nearer than the coarse surface */
     CHECK(o.study->point[2].static_max_m < o.study->point[0].static_max_m);
@@ -202,7 +203,7 @@ static void cells_are_pressed(void)
     free(study);
 }
 
-/* of every method and size that is swept one setting has the scene's own step, and all others are named of it */
+/* of every method and size that is swept one configuration has the scene's own step, and all others are named of it */
 static void the_step_of_the_scene_is_the_one_that_is_swept(void)
 {
     static const double own_s[] = {1.0 / 30, 1.0 / 60, 1.0 / 120, 1.0 / 250, 1.0 / 1000};
@@ -219,14 +220,14 @@ static void the_step_of_the_scene_is_the_one_that_is_swept(void)
             o.scene->step_s = own;
             int n = pal_study_list(&job, target), n_own = 0, n_other = 0;
             for (int i = 0; i < n; i++) {
-                const double times = target[i].setting.step_s / own;
+                const double times = target[i].configuration.step_s / own;
                 bool known = times == 1 || times == 0.25 || times == 0.5 || times == 2;
                 n_own += times == 1, n_other += times != 1;
-                CHECK(known || target[i].setting.step_s == 1e-3);
-                CHECK(times <= 1 || target[i].setting.step_s < 1.0001 / 60);
+                CHECK(known || target[i].configuration.step_s == 1e-3);
+                CHECK(times <= 1 || target[i].configuration.step_s < 1.0001 / 60);
                 for (int j = 0; j < i; j++)
                     CHECK(target[i].calibrate != target[j].calibrate ||
-                          !pal_configuration_equal(&target[i].setting, &target[j].setting));
+                          !pal_configuration_equal(&target[i].configuration, &target[j].configuration));
             }
             CHECK(n_own > 2 && (full ? n_other > 0 : n_other == 0) && n < PAL_STUDY_POINTS);
         }

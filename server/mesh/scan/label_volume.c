@@ -119,11 +119,11 @@ static void qform(const uint8_t *b, bool big, const double size[3], double unit,
 {
     double q[4] = {0, pal_float_at(b + 256, big), pal_float_at(b + 260, big), pal_float_at(b + 264, big)};
     q[0] = sqrt(fmax(0, 1 - q[1] * q[1] - q[2] * q[2] - q[3] * q[3]));
-    double turn = pal_float_at(b + 76, big) < 0 ? -1 : 1;
+    double sign = pal_float_at(b + 76, big) < 0 ? -1 : 1;
     for (int a = 0; a < 3; a++) {
         double e[3] = {a == 0, a == 1, a == 2}, r[3];
         pal_quat_rotate(r, q, e);
-        for (int k = 0; k < 3; k++) m[4 * k + a] = unit * size[a] * (a == 2 ? turn : 1) * r[k];
+        for (int k = 0; k < 3; k++) m[4 * k + a] = unit * size[a] * (a == 2 ? sign : 1) * r[k];
         m[4 * a + 3] = unit * pal_float_at(b + 268 + 4 * a, big);
     }
 }

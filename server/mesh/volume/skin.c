@@ -126,13 +126,13 @@ static pal_err find_near(const pal_tets *tets, const int32_t *candidate, int n_c
 }
 
 /* the two edges of a frame, the angle between them (B15) and the rest lengths */
-static void choose_edges(const double *x, int node, const int32_t *fan, int n_fan, int32_t edge[2], float turn[2],
+static void choose_edges(const double *x, int node, const int32_t *fan, int n_fan, int32_t edge[2], float angle[2],
                          float rest[3])
 {
     double normal[3], best = 0, second = 0, first_tangent[3] = {0}, second_tangent[3] = {0}, z[3];
     fan_normal(x, node, fan, n_fan, normal);
     edge[0] = fan[0], edge[1] = -1;
-    turn[0] = 1, turn[1] = 0;
+    angle[0] = 1, angle[1] = 0;
     rest[0] = (float)pal_norm3(normal);
     rest[1] = rest[2] = 0;
     if (!pal_unit3(normal, normal, 0)) return;
@@ -154,8 +154,8 @@ static void choose_edges(const double *x, int node, const int32_t *fan, int n_fa
     rest[1] = (float)best;
     if (edge[1] < 0) return;
     pal_cross3(z, normal, second_tangent);
-    turn[0] = (float)pal_dot3(first_tangent, second_tangent);
-    turn[1] = (float)pal_dot3(first_tangent, z);
+    angle[0] = (float)pal_dot3(first_tangent, second_tangent);
+    angle[1] = (float)pal_dot3(first_tangent, z);
     rest[2] = (float)second;
 }
 

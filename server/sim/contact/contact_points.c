@@ -272,22 +272,22 @@ int pal_contact_points_slots(const pal_contact_points *points, const pal_body *b
 
 void pal_contact_points_begin_slots(pal_contact_points *points)
 {
-    points->turn++;
+    points->stamp++;
     points->n_slot = points->n_node = 0;
 }
 
 static void use_node(pal_contact_points *points, int node)
 {
-    if (points->node_mark[node] == points->turn) return;
-    points->node_mark[node] = points->turn;
+    if (points->node_mark[node] == points->stamp) return;
+    points->node_mark[node] = points->stamp;
     pal_set3(points->force + 3 * (size_t)node, 0, 0, 0);
     points->node[points->n_node++] = node;
 }
 
 void pal_contact_points_use_slot(pal_contact_points *points, const pal_body *body, int slot)
 {
-    if (points->slot_mark[slot] == points->turn) return;
-    points->slot_mark[slot] = points->turn;
+    if (points->slot_mark[slot] == points->stamp) return;
+    points->slot_mark[slot] = points->stamp;
     points->slot[points->n_slot++] = slot;
     memset(points->state + 6 * (size_t)slot, 0, 6 * sizeof *points->state);
     use_node(points, pal_contact_points_slot_node(body, slot));
@@ -438,13 +438,13 @@ bool pal_contact_points_overlap(pal_contact_points *points, const pal_body *body
                                 const pal_contact *b, int n_b)
 {
     pal_contact_slot part[PAL_CONTACT_POINT_SLOTS];
-    points->turn++;
+    points->stamp++;
     for (int i = 0; i < n_a + n_b; i++) {
         int n = pal_contact_points_slots(points, body, (i < n_a ? a + i : b + i - n_a)->point, part);
         for (int k = 0; k < n; k++)
             if (i < n_a)
-                points->tool_mark[part[k].slot] = points->turn;
-            else if (points->tool_mark[part[k].slot] == points->turn)
+                points->tool_mark[part[k].slot] = points->stamp;
+            else if (points->tool_mark[part[k].slot] == points->stamp)
                 return true;
     }
     return false;

@@ -27,7 +27,7 @@ typedef struct pal_contact_points {
     /* slots (frames of the skin, or nodes without one) in use, and the nodes that their motion depends on */
     int n_slot, n_node;
     int32_t *slot, *node; /* in use [n_slot] [n_node] */
-    uint32_t *slot_mark, *node_mark, turn, *tool_mark;
+    uint32_t *slot_mark, *node_mark, stamp, *tool_mark;
     double *state;        /* force N and torque Nm, or velocity and spin, by slot [slots][6] */
     double *force;        /* N, by node [body n_node][3] */
     pal_frame_spin *spin; /* how a slot's frame rotates with its fan, at the present sub-step [frames of the skin] */

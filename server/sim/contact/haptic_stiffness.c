@@ -75,7 +75,7 @@ static void keep(pal_haptic_stiffness *known, pal_contact_group *group, const do
     int i = find_entry(known, group);
     for (int j = 0; j < PAL_CONTACT_PATCH_MAX && i < 0; j++)
         if (!known->entry[j].used) i = j;
-    if (i < 0) i = known->turn++ % PAL_CONTACT_PATCH_MAX;
+    if (i < 0) i = known->next++ % PAL_CONTACT_PATCH_MAX;
     group->k_N_m = k_N_m;
     pal_haptic_stiffness_entry *e = &known->entry[i];
     *e = (pal_haptic_stiffness_entry){.used = true,

@@ -33,7 +33,7 @@ typedef struct pal_haptic_stiffness_entry {
 } pal_haptic_stiffness_entry;
 typedef struct pal_haptic_stiffness {
     pal_haptic_stiffness_entry entry[PAL_CONTACT_PATCH_MAX];
-    int turn;      /* entry to be replaced next */
+    int next;      /* entry to be replaced next */
     double time_s; /* of the world */
 } pal_haptic_stiffness;
 

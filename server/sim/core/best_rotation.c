@@ -10,13 +10,13 @@ void pal_add_outer(double s[9], double k, const double x[3], const double y[3])
         for (int j = 0; j < 3; j++) s[3 * i + j] += k * x[i] * y[j];
 }
 
-void pal_best_rotation(const double s[9], double turn[9])
+void pal_best_rotation(const double s[9], double rotation[9])
 {
     double u[9], w[3], v[9];
     pal_svd3(s, u, w, v);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
-            turn[3 * i + j] = u[3 * i] * v[3 * j] + u[3 * i + 1] * v[3 * j + 1] + u[3 * i + 2] * v[3 * j + 2];
+            rotation[3 * i + j] = u[3 * i] * v[3 * j] + u[3 * i + 1] * v[3 * j + 1] + u[3 * i + 2] * v[3 * j + 2];
 }
 
 int pal_sum_pairs(int n, const uint8_t *mask, const double *x, const double *y, double s[9])
@@ -39,13 +39,13 @@ int pal_sum_pairs(int n, const uint8_t *mask, const double *x, const double *y, 
     return n_used;
 }
 
-bool pal_support_rotation(const pal_body *body, double turn[9])
+bool pal_support_rotation(const pal_body *body, double rotation[9])
 {
     double s[9], rest[9], width[3], axes[9];
     if (pal_sum_pairs(body->n_dof, body->support, body->x_rest, body->x_rest, rest) < 3) return false;
     pal_eigen3(rest, width, axes);
     if (!(width[1] > 1e-6 * body->length_scale_m * body->length_scale_m)) return false;
     pal_sum_pairs(body->n_dof, body->support, body->x, body->x_rest, s);
-    pal_best_rotation(s, turn);
+    pal_best_rotation(s, rotation);
     return true;
 }

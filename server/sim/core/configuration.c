@@ -196,7 +196,7 @@ static pal_err check_words(const pal_configuration *s, pal_diagnostic *diag)
 /* solvers that iterate to a residual */
 static const char *const iterative[] = {"implicit_euler", "sdirk2", "central_cg", "static_newton", NULL};
 
-/* the solver that a setting means; "": the model's own, which iterates to nothing */
+/* the solver that a configuration means; "": the model's own, which iterates to nothing */
 static const char *solver_of(const pal_configuration *s)
 {
     if (s->solver[0] || !(s->tolerance > 0)) return s->solver;

@@ -27,7 +27,7 @@ typedef struct pal_configuration {
 
 /* a configuration with its cost and error as a study measured them (study/study.h) */
 typedef struct pal_measured_configuration {
-    pal_configuration setting;
+    pal_configuration configuration;
     double ms; /* median time of a step of the studied scene under load on that machine; of a configuration with a step
                 * of its own, of as many as make one step of the scene: ms below the scene's step is real time */
     double error_m; /* largest distance from the reference in the study                */
@@ -39,7 +39,7 @@ void pal_configuration_of(const pal_scene *scene, int body, pal_configuration *o
 /* does the model fit the body? REFUSED with the reason in one sentence; so is a word that is no model */
 pal_err pal_configuration_check_model(const pal_body_def *body, const char *model, pal_diagnostic *diag);
 /* "fem hex8_bbar corotational, 16 voxels, implicit_euler, 16.7 ms": only what is given. Returns text. [any] */
-const char *pal_configuration_text(const pal_configuration *setting, char text[PAL_CONFIGURATION_TEXT]);
+const char *pal_configuration_text(const pal_configuration *configuration, char text[PAL_CONFIGURATION_TEXT]);
 bool pal_configuration_equal(const pal_configuration *a, const pal_configuration *b); /* [any] */
 
 /* a scene with one body in another configuration, and the mesh made for it */

@@ -72,10 +72,11 @@ typedef struct pal_tangent {
     void (*multiply)(void *self, const pal_body *body, double k, double c, const double *p, double *out);
     /* to += k K + c C, in the pattern made with couple; not called for a body with interpolation */
     void (*assemble)(void *self, const pal_body *body, double k, double c, pal_block_matrix *to);
-    /* turn [n_node][9] += rotation of the material around each node at the last linearise, weighted by stiffness (by
-     * volume, a preconditioner turned with soft material would stretch stiff material next to it). NULL: no rotations
+    /* rotation [n_node][9] += rotation of the material around each node at the last linearise, weighted by stiffness
+     * (by volume, a preconditioner turned with soft material would stretch stiff material next to it). NULL: no
+     * rotations
      */
-    void (*rotate)(void *self, const pal_body *body, double *turn);
+    void (*rotate)(void *self, const pal_body *body, double *rotation);
     /* CONTACT, after a stage that moved the nodes by `moved` [n_node][3], m, since the loads were given (fixed and
      * prescribed nodes too). last: the stage ends the sub-step, and the forces on the tools become those it was solved
      * with; before that, only the caps are enforced. True: contact pulled where it can only push, or exceeded a cap, so

@@ -26,11 +26,11 @@ void pal_rigid_momenta(int n, const double *mass_kg, const double *x, const doub
     pal_set3(momentum, 0, 0, 0);
     pal_set3(moment, 0, 0, 0);
     for (int i = 0; i < n; i++) {
-        double arm[3], turn[3], m = mass_kg ? mass_kg[i] : 1;
+        double arm[3], about[3], m = mass_kg ? mass_kg[i] : 1;
         pal_sub3(arm, x + 3 * i, c);
-        pal_cross3(turn, arm, q + 3 * i);
+        pal_cross3(about, arm, q + 3 * i);
         pal_axpy3(momentum, m, q + 3 * i);
-        pal_axpy3(moment, m, turn);
+        pal_axpy3(moment, m, about);
     }
 }
 

@@ -98,8 +98,8 @@ PAL_INLINE pal_wide pal_wide_cofactors(const pal_wide f[9], pal_wide c[9])
     return f[0] * c[0] + f[1] * c[1] + f[2] * c[2];
 }
 /* u = r y (transposed: u = r' y) for columns first to n - 1 of y and u [3][stride]; u may be y */
-PAL_INLINE void pal_wide_turn(const pal_wide r[9], bool transposed, int first, int n, int stride, const pal_wide *y,
-                              pal_wide *u)
+PAL_INLINE void pal_wide_rotate(const pal_wide r[9], bool transposed, int first, int n, int stride, const pal_wide *y,
+                                pal_wide *u)
 {
     const int row = transposed ? 1 : 3, column = transposed ? 3 : 1;
     for (int m = first; m < n; m++) {
@@ -139,7 +139,7 @@ PAL_INLINE void pal_wide_spin_solve(const pal_wide c[6], pal_wide s, const pal_w
     w[1] = s * (c[1] * t[0] + c[3] * t[1] + c[4] * t[2]);
     w[2] = s * (c[2] * t[0] + c[4] * t[1] + c[5] * t[2]);
 }
-/* s = r [w] d': stress of a turn w of r */
+/* s = r [w] d': stress of a rotation w of r */
 PAL_INLINE void pal_wide_spin_stress(const pal_wide r[9], const pal_wide w[3], const pal_wide d[9], pal_wide s[9])
 {
     pal_wide p[9];
@@ -150,7 +150,7 @@ PAL_INLINE void pal_wide_spin_stress(const pal_wide r[9], const pal_wide w[3], c
     pal_wide_mult(s, p, d);
 }
 
-/* One Newton turn of R : F (num/polar.c): q <- q (1, w), w = A^-1 g / 2, g the axial vector of m = R'F, which converges
+/* One Newton step of R : F (num/polar.c): q <- q (1, w), w = A^-1 g / 2, g the axial vector of m = R'F, which converges
  * cubically. settled: |w| was below 3e-5, so that 2e-13 rad are left (measured). stuck: A is not clearly positive
  * definite and q stays */
 PAL_INLINE void pal_wide_rotation_step(const pal_wide m[9], pal_wide q[4], pal_wide_mask *settled, pal_wide_mask *stuck)
@@ -170,7 +170,7 @@ PAL_INLINE void pal_wide_rotation_step(const pal_wide m[9], pal_wide q[4], pal_w
     *stuck = ~good;
 }
 
-/* Newton turns of a rotation before pal_polar_rotation, and steps of that */
+/* Newton steps of a rotation before pal_polar_rotation, and steps of that */
 enum { PAL_WIDE_TURNS = 8, PAL_POLAR_STEPS_MAX = 200 };
 
 /* pal_polar_rotation of the lanes whose bits are set */
@@ -205,18 +205,18 @@ PAL_INLINE void pal_wide_polar(const pal_wide f[9], pal_wide_mask live, pal_wide
     pal_wide_rotation(q, r);
     pal_wide_tmul(m, r, f);
 }
-/* the same from the quaternions at `turn` (in and out, PAL_LANES apart) */
-PAL_INLINE void pal_wide_take_rotation(double *turn, pal_wide_mask live, const pal_wide f[9], pal_wide r[9],
+/* the same from the quaternions at `rotation` (in and out, PAL_LANES apart) */
+PAL_INLINE void pal_wide_take_rotation(double *rotation, pal_wide_mask live, const pal_wide f[9], pal_wide r[9],
                                        pal_wide m[9])
 {
     pal_wide q[4];
-    pal_wide_load_n(turn, 4, q);
+    pal_wide_load_n(rotation, 4, q);
     pal_wide_polar(f, live, q, r, m);
-    pal_wide_store_n(turn, 4, q);
+    pal_wide_store_n(rotation, 4, q);
 }
 
 /* one rotation of Jacobi's method on the symmetric a (xx yy zz yz zx xy) in the plane p, q; columns of v turn along */
-PAL_INLINE void pal_wide_jacobi_turn(pal_wide a[6], pal_wide v[9], int p, int q)
+PAL_INLINE void pal_wide_jacobi_rotate(pal_wide a[6], pal_wide v[9], int p, int q)
 {
     const int o = 3 - p - q;
     pal_wide *app = a + p, *aqq = a + q, *apq = a + 3 + o, *apo = a + 3 + q, *aqo = a + 3 + p;
@@ -241,7 +241,7 @@ PAL_INLINE void pal_wide_jacobi(pal_wide a[6], pal_wide v[9])
     for (int sweep = 0; sweep < 6; sweep++) {
         pal_wide off = a[3] * a[3] + a[4] * a[4] + a[5] * a[5], on = a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
         if (!pal_wide_any(off > 1e-24 * on)) break;
-        pal_wide_jacobi_turn(a, v, 0, 1), pal_wide_jacobi_turn(a, v, 0, 2), pal_wide_jacobi_turn(a, v, 1, 2);
+        pal_wide_jacobi_rotate(a, v, 0, 1), pal_wide_jacobi_rotate(a, v, 0, 2), pal_wide_jacobi_rotate(a, v, 1, 2);
     }
 }
 #endif

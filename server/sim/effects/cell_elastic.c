@@ -111,10 +111,10 @@ static void multiply(void *self, const pal_body *body, double k, double c, const
     pal_cells_elastic_multiply(self, k, p, out);
 }
 
-static void rotate(void *self, const pal_body *body, double *turn)
+static void rotate(void *self, const pal_body *body, double *rotation)
 {
     (void)body;
-    pal_cells_elastic_rotate(self, turn);
+    pal_cells_elastic_rotate(self, rotation);
 }
 
 static double von_mises(const pal_cell_points *points, int p)

@@ -14,7 +14,7 @@ typedef struct finite_guard {
     pal_body *body;
     double *x;      /* last good positions [n_dof][3] */
     uint32_t *kept; /* step index of the last copy of a point, of an adaptive body; else NULL [n_dof] */
-    uint32_t turn;
+    uint32_t stamp;
     double reach;
     double speed_m_s, asked_speed_m_s; /* in use; as the scene gave it, 0: from the material */
     double gravity_m_s2, mass_kg;
@@ -30,11 +30,11 @@ static double auto_speed(const finite_guard *guard, const pal_material *material
 
 static void keep(finite_guard *guard, const pal_body *body)
 {
-    guard->turn++;
+    guard->stamp++;
     for (int k = 0; k < body->n_active; k++) {
         int i = pal_body_point(body, k);
         pal_copy3(guard->x + 3 * (size_t)i, body->x + 3 * (size_t)i);
-        if (guard->kept) guard->kept[i] = guard->turn;
+        if (guard->kept) guard->kept[i] = guard->stamp;
     }
 }
 
@@ -44,7 +44,7 @@ static void last_place(const finite_guard *guard, const pal_levels *levels, int3
     int32_t edge = levels ? pal_levels_vertex_parent(levels, i) : -1;
     double end[3];
     pal_copy3(x, guard->x + 3 * (size_t)i);
-    if (edge < 0 || guard->kept[i] == guard->turn) return;
+    if (edge < 0 || guard->kept[i] == guard->stamp) return;
     last_place(guard, levels, levels->edge[edge].vertex[0], x);
     last_place(guard, levels, levels->edge[edge].vertex[1], end);
     for (int c = 0; c < 3; c++) x[c] = 0.5 * (x[c] + end[c]);

@@ -131,14 +131,14 @@ static void assemble(void *self, const pal_body *body, double k, double c, pal_b
         pal_hex_assemble(row, k, to);
 }
 
-static void rotate(void *self, const pal_body *body, double *turn)
+static void rotate(void *self, const pal_body *body, double *rotation)
 {
     const pal_elastic_hexes *row = self;
     (void)body;
     if (row->has_inversion)
-        pal_elastic_tets_rotate(row->split, turn);
+        pal_elastic_tets_rotate(row->split, rotation);
     else
-        pal_hex_rotate(row, turn);
+        pal_hex_rotate(row, rotation);
 }
 
 static void measure(void *self, const pal_body *body, pal_field field, double *sum, double *volume_m3)

@@ -323,7 +323,7 @@ static void relax(refine *row, pal_step *step)
     for (int i = 0; i < step->n_force; i++)
         if (step->force[i].effect->bounds.stiffness)
             step->force[i].effect->bounds.stiffness(step->force[i].self, body, row->bound_N_m);
-    for (int turn = 0; turn < MAX_RELAX && elastic_J(step) - was > min; turn++)
+    for (int round = 0; round < MAX_RELAX && elastic_J(step) - was > min; round++)
         if (!relax_once(row, step)) return;
 }
 
@@ -351,16 +351,16 @@ static double keep_elastic(const refine *row, double was_J, double now_J, double
 
 /* rigid part of the motion of the region's free nodes: V + Omega x (x - centre) */
 typedef struct region {
-    double mass, centre[3], V[3], turn[3], inertia_axis[9], inertia[3], inner_J;
+    double mass, centre[3], V[3], angular[3], inertia_axis[9], inertia[3], inner_J;
 } region;
 
 /* I^-1 L; no rotation about an axis whose inertia is rounding */
-static void spin_of(const region *r, const double turn[3], double Omega[3])
+static void spin_of(const region *r, const double angular[3], double Omega[3])
 {
     pal_set3(Omega, 0, 0, 0);
     for (int k = 0; k < 3; k++)
         if (r->inertia[k] > ROUNDING * r->inertia[2])
-            pal_axpy3(Omega, pal_dot3(r->inertia_axis + 3 * k, turn) / r->inertia[k], r->inertia_axis + 3 * k);
+            pal_axpy3(Omega, pal_dot3(r->inertia_axis + 3 * k, angular) / r->inertia[k], r->inertia_axis + 3 * k);
 }
 
 /* velocity relative to the rigid motion, and position relative to the centre */
@@ -393,13 +393,13 @@ static bool find_region(const refine *row, const pal_body *body, bool whole, reg
         const double m = body->mass_kg[i];
         beside(r, none, body, i, arm, d);
         pal_cross3(cross, arm, d);
-        pal_axpy3(r->turn, m, cross);
+        pal_axpy3(r->angular, m, cross);
         s[0] += m * arm[0] * arm[0], s[1] += m * arm[1] * arm[1], s[2] += m * arm[2] * arm[2];
         s[3] += m * arm[0] * arm[1], s[4] += m * arm[0] * arm[2], s[5] += m * arm[1] * arm[2];
     }
     const double inertia[9] = {s[1] + s[2], -s[3], -s[4], -s[3], s[0] + s[2], -s[5], -s[4], -s[5], s[0] + s[1]};
     pal_eigen3(inertia, r->inertia, r->inertia_axis);
-    spin_of(r, r->turn, Omega);
+    spin_of(r, r->angular, Omega);
     for (int k = 0; k < body->n_active; k++) {
         const int i = pal_body_point(body, k);
         if (!in_region(row, body, whole, i)) continue;
@@ -415,19 +415,19 @@ static bool keep_motion(const refine *row, pal_body *body, double gained_J, bool
 {
     const pal_refine_balance *before = &row->report.before, *raw = &row->report.raw;
     region r;
-    double Omega[3], V[3], turn[3], spin[3], push[3], moment[3], arm[3], d[3], rigid[3];
+    double Omega[3], V[3], angular[3], spin[3], push[3], moment[3], arm[3], d[3], rigid[3];
     if (!find_region(row, body, whole, &r, Omega)) return whole;
     pal_sub3(push, before->momentum_kg_m_s, raw->momentum_kg_m_s);
-    pal_sub3(turn, before->turn_kg_m2_s, raw->turn_kg_m2_s);
+    pal_sub3(angular, before->angular_momentum_kg_m2_s, raw->angular_momentum_kg_m2_s);
     pal_cross3(moment, r.centre, push);
-    pal_sub3(turn, turn, moment);
-    pal_add3(turn, turn, r.turn);
-    spin_of(&r, turn, spin);
+    pal_sub3(angular, angular, moment);
+    pal_add3(angular, angular, r.angular);
+    spin_of(&r, angular, spin);
     pal_copy3(V, r.V);
     pal_axpy3(V, 1 / r.mass, push);
-    double rigid_J = 0.5 * (r.mass * pal_dot3(r.V, r.V) + pal_dot3(Omega, r.turn));
+    double rigid_J = 0.5 * (r.mass * pal_dot3(r.V, r.V) + pal_dot3(Omega, r.angular));
     double wanted_J = before->kinetic_J - gained_J - (raw->kinetic_J - rigid_J - r.inner_J) -
-                      0.5 * (r.mass * pal_dot3(V, V) + pal_dot3(spin, turn));
+                      0.5 * (r.mass * pal_dot3(V, V) + pal_dot3(spin, angular));
     /* nothing to scale where the region moves rigidly */
     double scale = r.inner_J > 1e-12 * raw->kinetic_J ? sqrt(fmax(wanted_J, 0) / r.inner_J) : 1;
     bool enough = scale >= 1 / MAX_FACTOR && scale <= MAX_FACTOR && r.inertia[0] > ROUNDING * r.inertia[2];

@@ -125,10 +125,10 @@ static pal_err compute_forces(void *self, pal_step *step)
     }
     for (int k = 0; k < body->n_active; k++) {
         const double *x = (const double *)&pack->xv[k], *v = x + 4, *rest = (const double *)&pack->rest[k];
-        double *f = (double *)&pack->f[k], u[3], turn[3];
+        double *f = (double *)&pack->f[k], u[3], rotation[3];
         strain(&h, x, rest, u);
-        pal_cross3(turn, h.Omega, x);
-        for (int c = 0; c < 3; c++) f[c] -= rest[3] * (h.k * u[c] + h.c * (v[c] - h.V[c] - turn[c]));
+        pal_cross3(rotation, h.Omega, x);
+        for (int c = 0; c < 3; c++) f[c] -= rest[3] * (h.k * u[c] + h.c * (v[c] - h.V[c] - rotation[c]));
     }
     return PAL_ERR_OK;
 }

@@ -211,10 +211,10 @@ static void assemble(void *self, const pal_body *body, double k, double c, pal_b
     if (k != 0) pal_elastic_tets_assemble(acting(self), k, to);
 }
 
-static void rotate(void *self, const pal_body *body, double *turn)
+static void rotate(void *self, const pal_body *body, double *rotation)
 {
     (void)body;
-    pal_elastic_tets_rotate(acting(self), turn);
+    pal_elastic_tets_rotate(acting(self), rotation);
 }
 
 static const pal_tangent tangent = {

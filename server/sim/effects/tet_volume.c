@@ -63,11 +63,11 @@ PAL_INLINE void bound_kernel(const double *p[][3], pal_v8 w, pal_v8 kq, bool ben
     if (!bend) return;
     pal_v8 g[3] = {e[1][1] * e[2][2] - e[1][2] * e[2][1], e[1][2] * e[2][0] - e[1][0] * e[2][2],
                    e[1][0] * e[2][1] - e[1][1] * e[2][0]};
-    pal_v8 c = ((e[0][0] * g[0] + e[0][1] * g[1] + e[0][2] * g[2]) * w - 1) * w, turn[3];
+    pal_v8 c = ((e[0][0] * g[0] + e[0][1] * g[1] + e[0][2] * g[2]) * w - 1) * w, third[3];
     c = kq * pal_select8(c < 0, zero - c, c);
     /* edges 01 02 03 12 13 23 */
-    for (int k = 0; k < 3; k++) length[k] = pal_length8(e[k]), turn[k] = e[2][k] - e[1][k];
-    length[3] = pal_length8(f[0]), length[4] = pal_length8(f[1]), length[5] = pal_length8(turn);
+    for (int k = 0; k < 3; k++) length[k] = pal_length8(e[k]), third[k] = e[2][k] - e[1][k];
+    length[3] = pal_length8(f[0]), length[4] = pal_length8(f[1]), length[5] = pal_length8(third);
     bound[0] += c * (length[3] + length[4] + length[5]);
     bound[1] += c * (length[1] + length[2] + length[5]);
     bound[2] += c * (length[0] + length[2] + length[4]);

@@ -23,7 +23,7 @@ void pal_hex_reset(pal_elastic_hexes *cubes)
     for (int b = 0; b < cubes->n_block; b++)
         for (int l = 0; l < PAL_LANES; l++) {
             for (int i = 0; i < 4; i++) cubes->q[(4 * b + i) * PAL_LANES + l] = i == 0;
-            for (int i = 0; i < 9; i++) cubes->turn[(9 * b + i) * PAL_LANES + l] = i % 4 == 0;
+            for (int i = 0; i < 9; i++) cubes->rotation[(9 * b + i) * PAL_LANES + l] = i % 4 == 0;
         }
     pal_hex_recovery_reset(cubes);
     pal_force_cache_invalidate(&cubes->force_cache);
@@ -73,10 +73,10 @@ static pal_err take_memory(pal_elastic_hexes *cubes, pal_arena *arena)
     cubes->lambda = PAL_NEW(arena, double, n);
     cubes->bound = PAL_NEW(arena, double, n);
     cubes->q = PAL_NEW(arena, double, 4 * n);
-    cubes->turn = PAL_NEW(arena, double, 9 * n);
+    cubes->rotation = PAL_NEW(arena, double, 9 * n);
     cubes->reference = pal_arena_array(arena, 36, sizeof *cubes->reference);
-    if (!cubes->hex || !cubes->share || !cubes->mu || !cubes->lambda || !cubes->bound || !cubes->q || !cubes->turn ||
-        !cubes->reference)
+    if (!cubes->hex || !cubes->share || !cubes->mu || !cubes->lambda || !cubes->bound || !cubes->q ||
+        !cubes->rotation || !cubes->reference)
         return PAL_ERR_MEMORY;
     if (!cubes->implicit) return PAL_ERR_OK;
     cubes->entry = PAL_NEW(arena, int32_t, 36 * (size_t)cubes->n_hex);
@@ -164,15 +164,15 @@ void pal_hex_assemble(pal_elastic_hexes *cubes, double k, pal_block_matrix *to)
     }
 }
 
-void pal_hex_rotate(const pal_elastic_hexes *cubes, double *turn)
+void pal_hex_rotate(const pal_elastic_hexes *cubes, double *rotation)
 {
     for (int e = 0; e < cubes->n_hex; e++) {
         int lane = cubes->simd_blocks.place[e];
-        const double *at = cubes->turn + 9 * (lane / PAL_LANES) * PAL_LANES + lane % PAL_LANES;
+        const double *at = cubes->rotation + 9 * (lane / PAL_LANES) * PAL_LANES + lane % PAL_LANES;
         double r[9];
         for (int i = 0; i < 9; i++) r[i] = cubes->mu[lane] * at[i * PAL_LANES];
         for (int c = 0; c < 8; c++) {
-            double *to = turn + 9 * cubes->hexes->node[8 * e + c];
+            double *to = rotation + 9 * cubes->hexes->node[8 * e + c];
             for (int i = 0; i < 9; i++) to[i] += r[i];
         }
     }

@@ -38,7 +38,7 @@ typedef struct pal_elastic_hexes {
     double *mu, *lambda; /* times share and h / 16, N/m                      [n_block][8]    */
     double *bound;       /* largest eigenvalue of the cube's K, N/m          [n_block][8]    */
     double *q;           /* rotations as quaternions, warm start             [n_block][4][8] */
-    double *turn;        /* rotations at the last linearise                  [n_block][9][8] */
+    double *rotation;    /* rotations at the last linearise                  [n_block][9][8] */
     double *tangent;     /* neo_hookean: K in modes at the last linearise    [n_block][231][8]; NULL: not kept */
     int32_t *entry;      /* implicit: blocks of the pattern last assembled into [n_hex][36], ~ where transposed */
     const int32_t *entry_row;
@@ -78,7 +78,7 @@ static inline int pal_hex_pair(int c, int d)
 
 /* effect.h assemble, rotate, measure, stress */
 void pal_hex_assemble(pal_elastic_hexes *cubes, double k, pal_block_matrix *to);
-void pal_hex_rotate(const pal_elastic_hexes *cubes, double *turn);
+void pal_hex_rotate(const pal_elastic_hexes *cubes, double *rotation);
 void pal_hex_measure(pal_elastic_hexes *cubes, const pal_body *body, pal_field field, double *sum, double *volume_m3);
 void pal_hex_stress(pal_elastic_hexes *cubes, const pal_body *body, pal_stress_take *take, void *user);
 

@@ -3,9 +3,9 @@
  *
  * R is the polar part of F at the centre, which does not make the energy E = 1/2 (R'x - X) K (R'x - X) stationary when
  * the cube bends: -R K (R'x - X) alone is not its gradient and has a net torque of second order in the bending. What
- * is missing is added (turn_force): with dE = t.w for a turn w of R, t = -sum x_m cross g_m over the bending modes,
- * and (tr S I - S) w = axial(R' dF - dF' R), S = sym(R'F), it is a skew pair of forces on the modes x, y, z. The forces
- * are the gradient of E then and no body turns itself. The tangent leaves it out. */
+ * is missing is added (rotation_force): with dE = t.w for a rotation w of R, t = -sum x_m cross g_m over the bending
+ * modes, and (tr S I - S) w = axial(R' dF - dF' R), S = sym(R'F), it is a skew pair of forces on the modes x, y, z. The
+ * forces are the gradient of E then and no body turns itself. The tangent leaves it out. */
 #include "server/sim/elements/elastic_hex_simd.h"
 
 /* coefficients of 8 lanes from l on */
@@ -17,7 +17,7 @@ PAL_INLINE void load_stiff(const pal_elastic_hexes *cubes, int block, int l, dou
 }
 
 /* g += the forces of the rotation's own change; x: coordinates in the frame of the cube, all but translation */
-PAL_INLINE void turn_force(pal_wide x[3][8], pal_wide g[3][8])
+PAL_INLINE void rotation_force(pal_wide x[3][8], pal_wide g[3][8])
 {
     static const int bent[4] = {3, 5, 6, 7}; /* modes that are not in F at the centre */
     const pal_wide zero = {0};
@@ -49,7 +49,7 @@ PAL_INLINE double all_blocks(pal_elastic_hexes *cubes, pal_node_order *node_orde
             hex_modes(&v, l, u);
             if (turned) {
                 hex_turn_block(cubes, b, l, u, r);
-                pal_wide_turn(r, true, 1, 8, 8, u[0], u[0]);
+                pal_wide_rotate(r, true, 1, 8, 8, u[0], u[0]);
             }
             memcpy(x, u, sizeof x);
             for (int i = 0; i < 3; i++) u[i][1 << i] -= 4 * cubes->edge_m;
@@ -63,8 +63,8 @@ PAL_INLINE double all_blocks(pal_elastic_hexes *cubes, pal_node_order *node_orde
             if (what & PAL_RUN_ENERGY) sum += pal_wide_select(stiff[0] < 0, e, pal_wide_of(0));
             if (!(what & PAL_RUN_FORCE)) continue;
             if (turned) {
-                turn_force(x, u);
-                pal_wide_turn(r, false, 1, 8, 8, u[0], u[0]);
+                rotation_force(x, u);
+                pal_wide_rotate(r, false, 1, 8, 8, u[0], u[0]);
             }
             hex_add(&v, l, u);
         }
@@ -98,7 +98,7 @@ void pal_hex_corot_linearise(pal_elastic_hexes *cubes, pal_node_order *node_orde
             pal_wide u[3][8], r[9];
             hex_modes(&v, l, u);
             hex_turn_block(cubes, b, l, u, r);
-            pal_wide_store_n(cubes->turn + 9 * b * PAL_LANES + l, 9, r);
+            pal_wide_store_n(cubes->rotation + 9 * b * PAL_LANES + l, 9, r);
         }
     }
 }
@@ -111,11 +111,11 @@ PAL_INLINE void multiply_all(const pal_elastic_hexes *cubes, pal_node_order *nod
         for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
             pal_wide u[3][8], r[9], stiff[3];
             hex_modes(&v, l, u);
-            if (turned) pal_wide_load_n(cubes->turn + 9 * b * PAL_LANES + l, 9, r);
-            if (turned) pal_wide_turn(r, true, 1, 8, 8, u[0], u[0]);
+            if (turned) pal_wide_load_n(cubes->rotation + 9 * b * PAL_LANES + l, 9, r);
+            if (turned) pal_wide_rotate(r, true, 1, 8, 8, u[0], u[0]);
             load_stiff(cubes, b, l, k, stiff);
             hex_stress(stiff[0], stiff[1], stiff[2], u);
-            if (turned) pal_wide_turn(r, false, 1, 8, 8, u[0], u[0]);
+            if (turned) pal_wide_rotate(r, false, 1, 8, 8, u[0], u[0]);
             hex_add(&v, l, u);
         }
         pal_block_close(&cubes->simd_blocks, node_order, b, 8, &v);
@@ -135,7 +135,7 @@ void pal_hex_corot_blocks(const pal_elastic_hexes *cubes, int block, double k, d
     for (int l = 0; l < PAL_LANES; l += PAL_WIDE) {
         pal_wide stiff[3], r[9];
         load_stiff(cubes, block, l, k, stiff);
-        pal_wide_load_n(cubes->turn + 9 * block * PAL_LANES + l, 9, r);
+        pal_wide_load_n(cubes->rotation + 9 * block * PAL_LANES + l, 9, r);
         for (int p = 0; p < 36; p++) {
             pal_wide a[9], t[9];
             for (int i = 0; i < 9; i++)

@@ -248,7 +248,7 @@ void pal_hex_neo_linearise(pal_elastic_hexes *cubes, pal_node_order *node_order)
             pal_wide u[3][8], f[8][9], r[9], q[4], mu, k1, kappa, h[45][8];
             hex_modes(&v, l, u);
             hex_turn_block(cubes, b, l, u, r);
-            pal_wide_store_n(cubes->turn + 9 * b * PAL_LANES + l, 9, r);
+            pal_wide_store_n(cubes->rotation + 9 * b * PAL_LANES + l, 9, r);
             pal_wide_load_n(cubes->q + 4 * b * PAL_LANES + l, 4, q);
             gauss_gradients(1 / (4 * cubes->edge_m), u, f);
             load_neo(cubes, b, l, &mu, &k1, &kappa);

@@ -72,8 +72,8 @@ double pal_largest_strain(const double f[9])
     mean = (e[0] + e[4] + e[8]) / 3;
     for (int i = 0; i < 3; i++) e[4 * i] -= mean;
     for (int i = 0; i < 9; i++) square += e[i] * e[i];
-    double p = sqrt(square / 6), turn = p > 0 ? 0.5 * pal_det3(e) / (p * p * p) : 1;
-    double max = mean + 2 * p * cos(acos(fmax(-1, fmin(1, turn))) / 3), stretch2 = fmax(0, 1 + 2 * max);
+    double p = sqrt(square / 6), rotation = p > 0 ? 0.5 * pal_det3(e) / (p * p * p) : 1;
+    double max = mean + 2 * p * cos(acos(fmax(-1, fmin(1, rotation))) / 3), stretch2 = fmax(0, 1 + 2 * max);
     return (stretch2 - 1) / (sqrt(stretch2) + 1);
 }
 

@@ -82,7 +82,7 @@ pal_err pal_elastic_tets_make(const pal_elastic_tets_options *options, pal_build
     out->inverse = PAL_NEW(build->arena, double, 9 * n_lane);
     out->volume_m3 = PAL_NEW(build->arena, double, n_lane);
     out->stiff = PAL_NEW(build->arena, double, 2 * n_lane);
-    out->turn = PAL_NEW(build->arena, double, 4 * n_lane);
+    out->rotation = PAL_NEW(build->arena, double, 4 * n_lane);
     out->tangent = PAL_NEW(build->arena, double, (size_t)n_keep *n_lane);
     out->bound = PAL_NEW(build->arena, double, body->n_node);
     out->inverted = PAL_NEW(build->arena, int32_t, n_lane);
@@ -90,7 +90,7 @@ pal_err pal_elastic_tets_make(const pal_elastic_tets_options *options, pal_build
     out->flag = PAL_NEW(build->arena, uint8_t, options->n_tet);
     if (options->recover) out->around = PAL_NEW(build->arena, double, 9 * body->n_node);
     if (options->recover) out->x_before = PAL_NEW(build->arena, double, 3 * body->n_node);
-    if (!out->inverse || !out->volume_m3 || !out->stiff || !out->turn || !out->tangent || !out->bound ||
+    if (!out->inverse || !out->volume_m3 || !out->stiff || !out->rotation || !out->tangent || !out->bound ||
         !out->inverted || !out->entry || !out->flag || (options->recover && (!out->around || !out->x_before)))
         return PAL_ERR_MEMORY;
     PAL_TRY(pal_elastic_regions_make(build, options->tet, options->n_tet, options->n_corner, 4, &out->parts));
@@ -102,9 +102,9 @@ pal_err pal_elastic_tets_make(const pal_elastic_tets_options *options, pal_build
 
 void pal_elastic_tets_reset(pal_elastic_tets *t)
 {
-    memset(t->turn, 0, 4 * sizeof(double) * PAL_LANES * (size_t)t->n_block);
+    memset(t->rotation, 0, 4 * sizeof(double) * PAL_LANES * (size_t)t->n_block);
     for (int b = 0; b < t->n_block; b++)
-        for (int l = 0; l < PAL_LANES; l++) t->turn[(size_t)b * 4 * PAL_LANES + (size_t)l] = 1;
+        for (int l = 0; l < PAL_LANES; l++) t->rotation[(size_t)b * 4 * PAL_LANES + (size_t)l] = 1;
     t->n_inverted = t->n_still = 0;
     t->single_rotation = false;
 }
@@ -291,14 +291,14 @@ void pal_elastic_tets_assemble(pal_elastic_tets *t, double k, pal_block_matrix *
     }
 }
 
-void pal_elastic_tets_rotate(const pal_elastic_tets *t, double *turn)
+void pal_elastic_tets_rotate(const pal_elastic_tets *t, double *rotation)
 {
     for (int e = 0; e < t->options.n_tet; e++) {
         double r[9], weight = *pal_lane(t->stiff, 2, t->place[e], 0);
         pal_elastic_tets_rotation(t, e, r);
         const int32_t *node = t->corner + (size_t)t->options.n_corner * (size_t)e;
         for (int c = 0; c < t->options.n_corner; c++)
-            for (int i = 0; i < 9; i++) turn[9 * node[c] + i] += weight * r[i];
+            for (int i = 0; i < 9; i++) rotation[9 * node[c] + i] += weight * r[i];
     }
 }
 

@@ -53,7 +53,7 @@ typedef struct pal_elastic_tets {
     double *inverse;      /* local from rest coordinates, dl/dX       [n_block][9][8]  */
     double *volume_m3;    /* fill times volume at rest, 0: left out   [n_block][8]     */
     double *stiff;        /* volume times mu and lambda               [n_block][2][8]  */
-    double *turn;         /* rotations as quaternions, warm start     [n_block][4][8]  */
+    double *rotation;     /* rotations as quaternions, warm start     [n_block][4][8]  */
     double *tangent;      /* tangent at the last linearise, by law    [n_block][..][8] */
     double *bound;        /* Gershgorin row sums at rest, N/m, independent of rotation [n_node] */
     double *around;       /* sums of rotations around nodes while an element is inverted [n_node][9] */
@@ -98,10 +98,10 @@ double pal_elastic_tets_energy(pal_elastic_tets *t, const double *d, double *f);
 void pal_elastic_tets_bound(pal_elastic_tets *t, const double *d, double *bound_N_m);
 /* evaluates tangent and rotations at d */
 void pal_elastic_tets_linearise(pal_elastic_tets *t, const double *d);
-/* at the last linearise: out += k K p; to += k K; turn [n_node][9] += mu V R at each corner */
+/* at the last linearise: out += k K p; to += k K; rotation [n_node][9] += mu V R at each corner */
 void pal_elastic_tets_multiply(const pal_elastic_tets *t, double k, const double *p, double *out);
 void pal_elastic_tets_assemble(pal_elastic_tets *t, double k, pal_block_matrix *to);
-void pal_elastic_tets_rotate(const pal_elastic_tets *t, double *turn);
+void pal_elastic_tets_rotate(const pal_elastic_tets *t, double *rotation);
 /* one element: its rotation; F at d at Gauss point `point` or PAL_TET_CENTRE */
 void pal_elastic_tets_rotation(const pal_elastic_tets *t, int e, double r[9]);
 void pal_elastic_tets_gradient(const pal_elastic_tets *t, int e, int point, const double *d, double f[9]);

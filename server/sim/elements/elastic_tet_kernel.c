@@ -50,9 +50,9 @@ PAL_INLINE pal_wide_mask note_inverted(pal_elastic_tets *t, int first_lane, pal_
 }
 
 /* s = R [y] D', y = A^-1 t, A = tr(m) I - m for symmetric m = R'F at the centre: what the change of the rotation adds
- * to the force when a turn w of R changes the energy by t.w */
-PAL_INLINE void turn_stress(const pal_wide r[9], const pal_wide m[9], const pal_wide t[3], const pal_wide inverse[9],
-                            pal_wide s[9])
+ * to the force when a rotation w of R changes the energy by t.w */
+PAL_INLINE void rotation_stress(const pal_wide r[9], const pal_wide m[9], const pal_wide t[3],
+                                const pal_wide inverse[9], pal_wide s[9])
 {
     const pal_wide zero = {0};
     pal_wide c[6], sum, y[3], det = pal_wide_spin_cofactors(m, c, &sum);
@@ -68,7 +68,7 @@ PAL_INLINE pal_wide rotated_stress(const pal_elastic_tets *t, int n_corner, bool
                                    const pal_wide centre[9], pal_wide inner[4][9], pal_block_view *at)
 {
     const pal_wide zero = {0};
-    pal_wide f[9], m[9], s[9], sum = zero, turn[3] = {zero, zero, zero};
+    pal_wide f[9], m[9], s[9], sum = zero, rotation[3] = {zero, zero, zero};
     int n_point = n_corner == 4 ? 1 : 4;
     for (int g = 0; g < n_point; g++) {
         memcpy(m, centre, sizeof m);
@@ -83,7 +83,7 @@ PAL_INLINE pal_wide rotated_stress(const pal_elastic_tets *t, int n_corner, bool
         if (!(what & PAL_RUN_FORCE)) continue;
         if (n_point > 1 && !linear) {
             pal_wide_mul(f, m, s);
-            turn[0] += f[7] - f[5], turn[1] += f[2] - f[6], turn[2] += f[3] - f[1];
+            rotation[0] += f[7] - f[5], rotation[1] += f[2] - f[6], rotation[2] += f[3] - f[1];
         }
         if (linear)
             memcpy(f, s, sizeof f);
@@ -93,7 +93,7 @@ PAL_INLINE pal_wide rotated_stress(const pal_elastic_tets *t, int n_corner, bool
         pal_tet_add_force(t, n_corner, g, at, lane, s);
     }
     if (n_point > 1 && !linear && (what & PAL_RUN_FORCE)) {
-        turn_stress(r, centre, turn, inverse, s);
+        rotation_stress(r, centre, rotation, inverse, s);
         pal_tet_add_force(t, n_corner, PAL_TET_CENTRE, at, lane, s);
     }
     return 0.5 * sum;
@@ -111,7 +111,7 @@ PAL_INLINE pal_wide corotational_half(pal_elastic_tets *t, int n_corner, bool li
     if (linear)
         memcpy(m, f, sizeof m);
     else
-        pal_wide_take_rotation(t->turn + (size_t)b * 4 * PAL_LANES + lane, live, f, r, m);
+        pal_wide_take_rotation(t->rotation + (size_t)b * 4 * PAL_LANES + lane, live, f, r, m);
     double share = n_corner == 4 ? 1 : 0.25;
     for (int i = 0; i < 2; i++) stiff[i] = share * pal_wide_select(asked, stiff[i], zero);
     return rotated_stress(t, n_corner, linear, what, lane, inverse, stiff[0], stiff[1], r, m, inner, at);
@@ -190,7 +190,7 @@ static double run_blocks(pal_elastic_tets *t, pal_element_run what, const double
 }
 
 /* rotations alone */
-static void turn_blocks(pal_elastic_tets *t, const double *x)
+static void rotate_blocks(pal_elastic_tets *t, const double *x)
 {
     pal_block_view at;
     t->n_inverted = 0;
@@ -203,7 +203,7 @@ static void turn_blocks(pal_elastic_tets *t, const double *x)
             pal_wide_mask live = stiff[0] > 0;
             note_inverted(t, PAL_LANES * b + lane, take_gradient(t, n_corner, &at, lane, inverse, f, inner), live);
             if (t->options.law != PAL_LAW_LINEAR)
-                pal_wide_take_rotation(t->turn + (size_t)b * 4 * PAL_LANES + lane, live, f, r, m);
+                pal_wide_take_rotation(t->rotation + (size_t)b * 4 * PAL_LANES + lane, live, f, r, m);
         }
     }
 }
@@ -212,7 +212,7 @@ static void turn_blocks(pal_elastic_tets *t, const double *x)
 void pal_elastic_tets_rotation(const pal_elastic_tets *t, int e, double r[9])
 {
     double q[4];
-    for (int i = 0; i < 4; i++) q[i] = *pal_lane(t->turn, 4, t->place[e], i);
+    for (int i = 0; i < 4; i++) q[i] = *pal_lane(t->rotation, 4, t->place[e], i);
     pal_quat_matrix(q, r);
 }
 
@@ -299,9 +299,9 @@ static void recover(pal_elastic_tets *t)
         }
         for (int i = 0; i < 9; i++) max = fmax(max, fabs(sum[i]));
         if (!(max > 1e-9)) continue;
-        for (int i = 0; i < 4; i++) q[i] = *pal_lane(t->turn, 4, t->place[e], i);
+        for (int i = 0; i < 4; i++) q[i] = *pal_lane(t->rotation, 4, t->place[e], i);
         pal_polar_rotation(sum, q, PAL_POLAR_STEPS_MAX);
-        for (int i = 0; i < 4; i++) *pal_lane(t->turn, 4, t->place[e], i) = q[i];
+        for (int i = 0; i < 4; i++) *pal_lane(t->rotation, 4, t->place[e], i) = q[i];
     }
 }
 
@@ -340,7 +340,7 @@ static void take_gradients(pal_elastic_tets *t)
     for (int b = 0; b < t->n_block; b++)
         for (int lane = 0; lane < PAL_LANES; lane += PAL_WIDE) {
             pal_wide q[4], r[9], inverse[9], g[9];
-            pal_wide_load_n(t->turn + (size_t)b * 4 * PAL_LANES + lane, 4, q);
+            pal_wide_load_n(t->rotation + (size_t)b * 4 * PAL_LANES + lane, 4, q);
             pal_wide_load_n(t->inverse + (size_t)b * 9 * PAL_LANES + lane, 9, inverse);
             pal_wide_rotation(q, r);
             pal_wide_mult(g, inverse, r);
@@ -354,7 +354,7 @@ void pal_elastic_tets_linearise(pal_elastic_tets *t, const double *d)
     if (t->single_rotation)
         pal_tet_fit_single_rotation(t, d);
     else
-        turn_blocks(t, d);
+        rotate_blocks(t, d);
     if (has_inversion(t) && !t->single_rotation) recover(t);
     if (t->options.law == PAL_LAW_NEO_HOOKEAN)
         pal_elastic_tets_modes(t, d);

@@ -43,7 +43,7 @@ PAL_INLINE void modes_half(pal_elastic_tets *t, int n_corner, int point, int b, 
     int n_point = n_corner == 4 ? 1 : 4;
     pal_wide h[9], f[9], r[9], m[9], q[4], inverse[9], v[9], out[12], stiff[2];
     pal_tet_constants(t, b, lane, 1.0 / n_point, inverse, stiff);
-    pal_wide_load_n(t->turn + (size_t)b * 4 * PAL_LANES + lane, 4, q);
+    pal_wide_load_n(t->rotation + (size_t)b * 4 * PAL_LANES + lane, 4, q);
     pal_tet_local_gradient(t, n_corner, point, at, lane, h);
     pal_wide_mul(f, h, inverse);
     pal_wide_polar(f, stiff[0] > 0, q, r, m);

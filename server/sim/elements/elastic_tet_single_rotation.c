@@ -25,7 +25,7 @@ void pal_tet_fit_single_rotation(pal_elastic_tets *t, const double *d)
     pal_sum_pairs(t->n_node, has_frame(t) ? t->fixed : NULL, d, t->x_rest, f);
     pal_polar_rotation(f, q, PAL_POLAR_STEPS_MAX);
     for (int e = 0; e < t->options.n_tet; e++)
-        for (int i = 0; i < 4; i++) *pal_lane(t->turn, 4, t->place[e], i) = q[i];
+        for (int i = 0; i < 4; i++) *pal_lane(t->rotation, 4, t->place[e], i) = q[i];
 }
 
 double pal_tet_single_rotation_force(const pal_elastic_tets *t, const double *d, double *f)

@@ -160,7 +160,7 @@ static pal_err make_arrays(pal_interpolated_system *e, const pal_body *body, boo
 {
     size_t node3 = 3 * (size_t)body->n_node, dof3 = 3 * (size_t)body->n_dof;
     size_t entry9 = with_damping ? 9 * (size_t)e->rest.start[e->rest.n] : 0;
-    bool made = PAL_NEW_DOUBLES(arena, node3, &e->p, &e->q) && PAL_NEW_DOUBLES(arena, 3 * node3, &e->turn) &&
+    bool made = PAL_NEW_DOUBLES(arena, node3, &e->p, &e->q) && PAL_NEW_DOUBLES(arena, 3 * node3, &e->rotation) &&
                 PAL_NEW_DOUBLES(arena, dof3, &e->unit, &e->product) &&
                 (!with_damping || PAL_NEW_DOUBLES(arena, entry9, &e->damping));
     return made ? PAL_ERR_OK : PAL_ERR_MEMORY;

@@ -13,7 +13,7 @@
 
 typedef struct pal_interpolated_system {
     double *p, *q;         /* a displacement and its product, at nodes [n_node][3] */
-    double *turn;          /* the components' rotations, at nodes [n_node][9] */
+    double *rotation;      /* the components' rotations, at nodes [n_node][9] */
     pal_block_matrix rest; /* A' K A of the components at rest */
     double *damping;       /* A' C A of the components at rest, in the same pattern; NULL: no damping */
     int n_group;           /* groups displaced together: point[start[g]] .. point[start[g + 1] - 1] */

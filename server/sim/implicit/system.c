@@ -141,10 +141,10 @@ void pal_system_interpolate(const pal_system *system)
         pal_interpolation_apply(system->body->interpolation, system->body->x, system->body->d);
 }
 
-void pal_system_rotate(const pal_system *system, double *turn)
+void pal_system_rotate(const pal_system *system, double *rotation)
 {
     const pal_body *body = system->body;
-    double *to = system->interpolated_system ? system->interpolated_system->turn : turn;
+    double *to = system->interpolated_system ? system->interpolated_system->rotation : rotation;
     memset(to, 0, 9 * sizeof(double) * (size_t)body->n_node);
     for (int i = 0; i < system->n_force; i++) {
         const pal_component *component = &system->force[i];
@@ -152,8 +152,8 @@ void pal_system_rotate(const pal_system *system, double *turn)
             component->effect->tangent->rotate(component->self, body, to);
     }
     if (!system->interpolated_system) return;
-    memset(turn, 0, 9 * sizeof(double) * (size_t)body->n_dof);
-    pal_interpolated_system_restrict9(body->interpolation, to, turn);
+    memset(rotation, 0, 9 * sizeof(double) * (size_t)body->n_dof);
+    pal_interpolated_system_restrict9(body->interpolation, to, rotation);
 }
 
 /* ---- products ---- */

@@ -40,8 +40,8 @@ pal_err pal_system_pattern(const pal_system *system, pal_arena *arena, pal_block
 void pal_system_linearise(const pal_system *system); /* linearises the FORCE components at body->d */
 /* linearises the CONTACT components at the beginning of the step, where they gave their loads */
 void pal_system_linearise_contact(pal_system *system, const pal_step *step);
-/* turn [n_dof][9] = sum of the components' rotations */
-void pal_system_rotate(const pal_system *system, double *turn);
+/* rotation [n_dof][9] = sum of the components' rotations */
+void pal_system_rotate(const pal_system *system, double *rotation);
 /* out = (mass M + stiff K + damp C) p; p may be nonzero at fixed dofs, where out is 0 */
 void pal_system_multiply(const pal_system *system, const double *p, double *out);
 /* out = (mass M + damp D) p, with D the damping between control points */

@@ -25,7 +25,7 @@ void pal_regions_fit(pal_inverted_region *of, int n, const pal_region_edges *edg
         pal_add_outer(of[e->region].sum, edges->stiffness(edges->self, e->owner), x, y);
     }
     for (int p = 0; p < n; p++)
-        if (!of[p].fixed) pal_best_rotation(of[p].sum, of[p].turn);
+        if (!of[p].fixed) pal_best_rotation(of[p].sum, of[p].rotation);
 }
 
 /* w = A^-1 sum k x x v, A = sum k (x.x I - x x') */
@@ -64,16 +64,16 @@ double pal_regions_energy(pal_inverted_region *of, int n, const pal_region_edges
         const double k = edges->stiffness(edges->self, e->owner), force = region->scale * k;
         double x[3], y[3], u[3];
         edge_vector(d, e, x), edge_vector(edges->rest, e, y);
-        pal_mul33(u, region->turn, y);
+        pal_mul33(u, region->rotation, y);
         pal_sub3(u, x, u);
         const double energy = region->scale * (0.5 * k * pal_dot3(u, u));
         region->region_J += energy, sum += energy;
         if (!f) continue;
         if (damp_s > 0) {
-            double rate[3], turn[3];
+            double rate[3], rotation[3];
             edge_vector(v, e, rate);
-            pal_cross3(turn, region->spin_1_s, x);
-            pal_sub3(rate, rate, turn);
+            pal_cross3(rotation, region->spin_1_s, x);
+            pal_sub3(rate, rate, rotation);
             pal_axpy3(u, damp_s, rate);
         }
         pal_axpy3(f + 3 * (size_t)e->end[0], force, u);
@@ -84,11 +84,11 @@ double pal_regions_energy(pal_inverted_region *of, int n, const pal_region_edges
 
 void pal_regions_fix(pal_inverted_region *of, int n, const pal_body *body, int n_all)
 {
-    double turn[9];
-    const bool has_rotation = pal_support_rotation(body, turn);
+    double rotation[9];
+    const bool has_rotation = pal_support_rotation(body, rotation);
     for (int p = 0; p < n; p++) {
         of[p].fixed = has_rotation && (n_all > 0 ? 2 * of[p].n > n_all : of[p].fixed);
-        if (of[p].fixed) memcpy(of[p].turn, turn, sizeof turn);
+        if (of[p].fixed) memcpy(of[p].rotation, rotation, sizeof rotation);
     }
 }
 

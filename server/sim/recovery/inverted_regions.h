@@ -21,7 +21,7 @@
 
 typedef struct pal_inverted_region {
     bool fixed;         /* G is the rotation of the supports                                      */
-    double turn[9];     /* G of the last fit                                                      */
+    double rotation[9]; /* G of the last fit                                                      */
     double spin_1_s[3]; /* best-fit spin of the velocities, for damping                           */
     double sum[9];      /* sum_ij k (x_i - x_j)(X_i - X_j)', which G fits best                    */
     double scale;       /* s                                                                      */

@@ -226,7 +226,7 @@ static void number(pal_spring_recovery *t, const pal_spring_set *edges)
             if (t->n_region < PAL_SPRING_REGIONS_MAX)
                 home[t->n_region] = was,
                 t->of[t->n_region++] =
-                    (pal_inverted_region){.turn = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .scale = 1, .loose_s = INFINITY};
+                    (pal_inverted_region){.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .scale = 1, .loose_s = INFINITY};
             t->region[i] = t->n_region - 1;
         }
         pal_inverted_region *region = &t->of[t->region[i]];

@@ -41,8 +41,8 @@ static void find_push(const pal_cells_elastic *c)
 }
 
 /* g (world axes, forces with Q fixed) += the part from the change of Q */
-PAL_INLINE void add_turn(const pal_cell_group *group, int block, int lane, int n_node, const pal_wide r[9],
-                         const pal_wide s[9], pal_wide (*y)[PAL_CELL_MAX_NODES], pal_wide (*g)[PAL_CELL_MAX_NODES])
+PAL_INLINE void add_rotation(const pal_cell_group *group, int block, int lane, int n_node, const pal_wide r[9],
+                             const pal_wide s[9], pal_wide (*y)[PAL_CELL_MAX_NODES], pal_wide (*g)[PAL_CELL_MAX_NODES])
 {
     const pal_wide zero = {0};
     pal_wide world[3] = {zero, zero, zero}, t[3], frame[9], w[9];
@@ -53,7 +53,7 @@ PAL_INLINE void add_turn(const pal_cell_group *group, int block, int lane, int n
     }
     for (int i = 0; i < 3; i++) t[i] = r[i] * world[0] + r[3 + i] * world[1] + r[6 + i] * world[2];
     pal_wide_load_n(group->frame + (size_t)block * 9 * PAL_LANES + lane, 9, frame);
-    cell_turn_stress(r, s, t, frame, w);
+    cell_rotation_stress(r, s, t, frame, w);
     for (int m = 0; m < n_node; m++)
         for (int i = 0; i < 3; i++)
             for (int j = 0; j < 3; j++) g[i][m] += w[3 * i + j] * group->middle[m][j];
@@ -68,7 +68,7 @@ PAL_INLINE void displace(const pal_cells_elastic *c, const pal_cell_group *group
         pal_cell_edges_displaced(rest, n_node, r, y, u);
         return;
     }
-    cell_turn(r, true, n_node, y, u);
+    cell_rotate(r, true, n_node, y, u);
     cell_minus_rest(rest, n_node, u);
 }
 
@@ -82,7 +82,7 @@ PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_
     if (n_live == 0 || (!(what & LINEARISE) && cell_recovering(c, group, block, lane, n_live))) return 0;
     cell_gather(node, n_node, d, y);
     cell_rotation(group, block, lane, y, n_node, r, s);
-    if (what & LINEARISE) pal_wide_store_n(group->turn + (size_t)block * 9 * PAL_LANES + lane, 9, r);
+    if (what & LINEARISE) pal_wide_store_n(group->rotation + (size_t)block * 9 * PAL_LANES + lane, 9, r);
     if (!(what & (FORCE | ENERGY | SWELL))) return 0;
     displace(c, group, n_node, block, lane, r, y, u);
     const bool apart = c->volume.n > 0;
@@ -106,8 +106,8 @@ PAL_INLINE double half_block(pal_cells_elastic *c, pal_cell_group *group, int n_
     if (!(what & FORCE)) return sum;
     pal_wide minus[9];
     for (int i = 0; i < 9; i++) minus[i] = -r[i];
-    cell_turn(minus, false, n_node, u, u);
-    if (c->op == PAL_CELL_POLAR) add_turn(group, block, lane, n_node, r, s, y, u);
+    cell_rotate(minus, false, n_node, u, u);
+    if (c->op == PAL_CELL_POLAR) add_rotation(group, block, lane, n_node, r, s, y, u);
     cell_scatter(node, n_node, n_live, u, f);
     return sum;
 }
@@ -172,8 +172,8 @@ PAL_INLINE void move_blocks(const pal_cells_elastic *c, pal_cell_kind kind, int 
             pal_wide u[3][PAL_CELL_MAX_NODES], r[9];
             if (n_live == 0 || (!c->recovery.off && cell_recovering(c, group, b, l, n_live))) continue;
             cell_gather(node, n_node, p, u);
-            pal_wide_load_n(group->turn + (size_t)b * 9 * PAL_LANES + l, 9, r);
-            cell_turn(r, true, n_node, u, u);
+            pal_wide_load_n(group->rotation + (size_t)b * 9 * PAL_LANES + l, 9, r);
+            cell_rotate(r, true, n_node, u, u);
             if (swells) {
                 take_swelling(c, home, n_live, swelling(swell, n_node, u));
                 continue;
@@ -184,7 +184,7 @@ PAL_INLINE void move_blocks(const pal_cells_elastic *c, pal_cell_kind kind, int 
                                     ? k * pal_wide_load(group->here + b * PAL_LANES + l)
                                     : k + zero;
             for (int i = 0; i < 9; i++) r[i] *= by;
-            cell_turn(r, false, n_node, u, u);
+            cell_rotate(r, false, n_node, u, u);
             cell_scatter(node, n_node, n_live, u, out);
         }
 }
@@ -218,7 +218,7 @@ void pal_cells_elastic_displaced(pal_cells_elastic *c, const double *d, pal_cell
         for (int i = 0; i < 3; i++) out[3 * m + i] = u[i][m][element % PAL_WIDE];
 }
 
-void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *turn)
+void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *rotation)
 {
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
         const pal_cell_group *group = &c->group[kind];
@@ -227,12 +227,12 @@ void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *turn)
         for (int e = 0; e < group->n; e++) {
             const int b = e / PAL_LANES, l = e % PAL_LANES;
             const int32_t *node = group->node + (size_t)b * (size_t)group->n_node * PAL_LANES + l;
-            for (int i = 0; i < 9; i++) r[i] = group->turn[((size_t)b * 9 + i) * PAL_LANES + l];
+            for (int i = 0; i < 9; i++) r[i] = group->rotation[((size_t)b * 9 + i) * PAL_LANES + l];
             const int region = c->recovery.region[c->recovery.first[kind] + e];
-            if (region >= 0 && !c->recovery.off) memcpy(r, c->recovery.of[region].turn, sizeof r);
+            if (region >= 0 && !c->recovery.off) memcpy(r, c->recovery.of[region].rotation, sizeof r);
             for (int m = 0; m < group->n_node; m++) {
                 double share = n[m] * c->recovery.shear_J[c->recovery.first[kind] + e];
-                for (int i = 0; i < 9; i++) turn[9 * (size_t)node[m * PAL_LANES] + i] += share * r[i];
+                for (int i = 0; i < 9; i++) rotation[9 * (size_t)node[m * PAL_LANES] + i] += share * r[i];
             }
         }
     }

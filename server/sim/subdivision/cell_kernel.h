@@ -5,8 +5,8 @@
  * at rest: d^ = Q' y - X,   E = 1/2 d^' K d^,   K = int B' C B dV over the rest shape, at 64 Gauss points, with
  * gradients J^-T grad N and dV = det J du dv dw (erratum A9), so that moduli are in Pa. Departure from the paper: in
  * trilinear elements and pyramids of operator polar the change of volume in K is the element's mean (B-bar). The force
- * is the exact gradient of E: with g = K d^, the change of Q with x adds a term. For a turn w of Q (dQ = Q [w]) dE =
- * t.w with t = -sum (Q'y) x g, and (tr S I - S) w = axial(Q'dF - dF'Q), S = Q'F; so dF receives Q [z], z = (tr S I -
+ * is the exact gradient of E: with g = K d^, the change of Q with x adds a term. For a rotation w of Q (dQ = Q [w]) dE
+ * = t.w with t = -sum (Q'y) x g, and (tr S I - S) w = axial(Q'dF - dF'Q), S = Q'F; so dF receives Q [z], z = (tr S I -
  * S)^-1 t, at the middle. E is invariant to rotations of the body, so forces have no resultant and no torque. Near a
  * flat or collapsed middle, where det(tr S I - S) is below 1e-3 of (tr)^3, z goes to 0 with that determinant.
  *
@@ -40,7 +40,7 @@ typedef struct pal_cell_group {
     double *rest;        /* X, m                          [n_block][n_node][3][8] */
     double *frame;       /* J^-1 in the middle, 1/m               [n_block][9][8] */
     double *q;           /* rotation, w x y z                     [n_block][4][8] */
-    double *turn;        /* Q of the last linearise               [n_block][9][8] */
+    double *rotation;    /* Q of the last linearise               [n_block][9][8] */
     double *volume;      /* m^3                                      [n_block][8] */
     double (*middle)[3]; /* grad N in the middle, d/d(u, v, w)           [n_node] */
     float *scale;        /* cubic: sqrt(dV) J^-1, row = u, v, w [n_block][64][9][8] */
@@ -130,8 +130,8 @@ void pal_cells_elastic_multiply(const pal_cells_elastic *c, double k, const doub
  * recovery.ratio; of cubic elements those of the trilinear cell between their own corners' control points */
 void pal_cells_corners_make(pal_cells_elastic *c);
 void pal_cells_elastic_ratios(pal_cells_elastic *c, const double *d);
-/* turn [n][9] += Q by the elements' stiffness, mu V, at their nodes */
-void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *turn);
+/* rotation [n][9] += Q by the elements' stiffness, mu V, at their nodes */
+void pal_cells_elastic_rotate(const pal_cells_elastic *c, double *rotation);
 
 /* d^ of one element in its own axes, as the operator of c has it [n_node][3] */
 void pal_cells_elastic_displaced(pal_cells_elastic *c, const double *d, pal_cell_kind kind, int element, double *out);
@@ -143,7 +143,7 @@ typedef struct pal_cell_points {
     double von_mises_Pa[PAL_CELL_GAUSS_POINTS], energy_J_m3[PAL_CELL_GAUSS_POINTS];
     double det_f[PAL_CELL_GAUSS_POINTS];   /* volume now over volume at rest      */
     double stretch[PAL_CELL_GAUSS_POINTS]; /* largest principal stretch less 1 */
-    double turn[9];                        /* Q                                   */
+    double rotation[9];                    /* Q                                   */
 } pal_cell_points;
 /* the same for both operators */
 void pal_cells_elastic_points(const pal_cells_elastic *c, const double *d, pal_cell_kind kind, int element,

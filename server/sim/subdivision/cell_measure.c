@@ -64,7 +64,8 @@ static double deformation(const double now[9], const double rest[9], double f[9]
 }
 
 /* Q of F in the middle, from the rotation that the last force left; which is not moved */
-static void middle_turn(const pal_cell_group *group, const double *d, const int32_t *node, int element, double turn[9])
+static void middle_turn(const pal_cell_group *group, const double *d, const int32_t *node, int element,
+                        double rotation[9])
 {
     const size_t block = (size_t)(element / PAL_LANES), lane = (size_t)(element % PAL_LANES);
     double J[9], f[9], q[4];
@@ -76,7 +77,7 @@ static void middle_turn(const pal_cell_group *group, const double *d, const int3
     }
     for (size_t i = 0; i < 4; i++) q[i] = group->q[(block * 4 + i) * PAL_LANES + lane];
     pal_polar_rotation(f, q, 200);
-    pal_quat_matrix(q, turn);
+    pal_quat_matrix(q, rotation);
 }
 
 void pal_cells_elastic_points(const pal_cells_elastic *c, const double *d, pal_cell_kind kind, int element,
@@ -85,7 +86,7 @@ void pal_cells_elastic_points(const pal_cells_elastic *c, const double *d, pal_c
     const int32_t *node = pal_subdivision_solid_nodes(c->solid, kind, element);
     const pal_cell_group *group = &c->group[kind];
     double now[PAL_CELL_GAUSS_POINTS][9], rest[PAL_CELL_GAUSS_POINTS][9];
-    middle_turn(group, d, node, element, out->turn);
+    middle_turn(group, d, node, element, out->rotation);
     gradients(group->n_node, d, node, now);
     gradients(group->n_node, c->solid->node_rest, node, rest);
     for (int p = 0; p < PAL_CELL_GAUSS_POINTS; p++) {
@@ -93,7 +94,7 @@ void pal_cells_elastic_points(const pal_cells_elastic *c, const double *d, pal_c
         out->volume_m3[p] = pal_cell_gauss_point(p, at) * deformation(now[p], rest[p], f);
         out->det_f[p] = pal_det3(f);
         out->stretch[p] = pal_largest_strain(f);
-        pal_elastic_mul(h, out->turn, true, f);
+        pal_elastic_mul(h, out->rotation, true, f);
         for (int i = 0; i < 9; i += 4) h[i] -= 1;
         e[0] = h[0], e[1] = h[4], e[2] = h[8];
         e[3] = 0.5 * (h[5] + h[7]), e[4] = 0.5 * (h[2] + h[6]), e[5] = 0.5 * (h[1] + h[3]);

@@ -173,7 +173,7 @@ PAL_INLINE void displaced(const double *rest, int n_node, const pal_wide r[9], p
         pal_wide top = 0.25 * (u[i][4] + u[i][5] + u[i][6] + u[i][7]), swap = u[i][2];
         u[i][2] = u[i][3], u[i][3] = swap, u[i][4] = top;
     }
-    cell_turn(r, true, n_node, u, u);
+    cell_rotate(r, true, n_node, u, u);
     for (int i = 0; i < 3 && !cubic; i++) {
         pal_wide from = u[i][0];
         for (int m = 0; m < n_node; m++) u[i][m] -= from;

@@ -210,13 +210,13 @@ static void enter_whole_cells(pal_cell_recovery *t, const pal_cells_elastic *c)
     /* sums and pushes are computed before each use */
     double *mark = c->volume.push;
     memset(mark, 0, sizeof *mark * (size_t)c->volume.n);
-    for (int turn = 0; turn < 2; turn++)
+    for (int pass = 0; pass < 2; pass++)
         for (int cell = 0; cell < t->n_cell; cell++) {
             int e;
             const pal_cell_kind kind = kind_of(t, cell, &e);
             const int32_t home = c->group[kind].home[e];
-            if (turn == 0 && t->region[cell] != NOT) mark[home] = 1;
-            if (turn == 1 && t->region[cell] == NOT && mark[home] > 0) t->region[cell] = NEW;
+            if (pass == 0 && t->region[cell] != NOT) mark[home] = 1;
+            if (pass == 1 && t->region[cell] == NOT && mark[home] > 0) t->region[cell] = NEW;
         }
 }
 

@@ -54,10 +54,10 @@ PAL_INLINE void cell_scatter(const int32_t *node, int n_node, int n_live, pal_wi
 }
 
 /* u = R y (transposed: u = R' y); u may be y */
-PAL_INLINE void cell_turn(const pal_wide r[9], bool transposed, int n_node, pal_wide (*y)[PAL_CELL_MAX_NODES],
-                          pal_wide (*u)[PAL_CELL_MAX_NODES])
+PAL_INLINE void cell_rotate(const pal_wide r[9], bool transposed, int n_node, pal_wide (*y)[PAL_CELL_MAX_NODES],
+                            pal_wide (*u)[PAL_CELL_MAX_NODES])
 {
-    pal_wide_turn(r, transposed, 0, n_node, PAL_CELL_MAX_NODES, y[0], u[0]);
+    pal_wide_rotate(r, transposed, 0, n_node, PAL_CELL_MAX_NODES, y[0], u[0]);
 }
 PAL_INLINE void cell_minus_rest(const double *rest, int n_node, pal_wide (*u)[PAL_CELL_MAX_NODES])
 {
@@ -78,13 +78,13 @@ PAL_INLINE void cell_rotation(pal_cell_group *group, int block, int lane, pal_wi
             for (int j = 0; j < 3; j++) h[3 * i + j] += y[i][m] * group->middle[m][j];
     pal_wide_load_n(group->frame + (size_t)block * 9 * PAL_LANES + lane, 9, frame);
     pal_wide_mul(f, h, frame);
-    double *turn = group->q + (size_t)block * 4 * PAL_LANES + lane;
-    pal_wide_take_rotation(turn, ~(pal_wide_mask){0}, f, r, s);
+    double *rotation = group->q + (size_t)block * 4 * PAL_LANES + lane;
+    pal_wide_take_rotation(rotation, ~(pal_wide_mask){0}, f, r, s);
 }
 
 /* w = Q [z] J^-T, what node m bears times its grad N in the middle; s = Q'F, t as in cell_kernel.h */
-PAL_INLINE void cell_turn_stress(const pal_wide r[9], const pal_wide s[9], const pal_wide t[3], const pal_wide frame[9],
-                                 pal_wide w[9])
+PAL_INLINE void cell_rotation_stress(const pal_wide r[9], const pal_wide s[9], const pal_wide t[3],
+                                     const pal_wide frame[9], pal_wide w[9])
 {
     const pal_wide zero = {0};
     pal_wide c[6], sum, z[3], det = pal_wide_spin_cofactors(s, c, &sum), min = 1e-3 * sum * sum * sum;

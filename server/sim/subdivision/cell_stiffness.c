@@ -58,14 +58,14 @@ static pal_err allocate(pal_cell_group *g, pal_arena *arena)
     g->rest = PAL_NEW(arena, double, n_lane *n_node * 3);
     g->frame = PAL_NEW(arena, double, n_lane * 9);
     g->q = PAL_NEW(arena, double, n_lane * 4);
-    g->turn = PAL_NEW(arena, double, n_lane * 9);
+    g->rotation = PAL_NEW(arena, double, n_lane * 9);
     g->volume = PAL_NEW(arena, double, n_lane);
     g->corner = PAL_NEW(arena, double, n_lane * 8);
     g->here = PAL_NEW(arena, double, n_lane);
     g->energy_J = PAL_NEW(arena, double, n_lane);
     g->middle = (double(*)[3])PAL_NEW(arena, double, 3 * n_node);
-    bool all = g->node && g->rest && g->frame && g->q && g->turn && g->volume && g->middle && g->corner && g->here &&
-               g->energy_J;
+    bool all = g->node && g->rest && g->frame && g->q && g->rotation && g->volume && g->middle && g->corner &&
+               g->here && g->energy_J;
     if (g->n_node == PAL_CUBIC_NODES) {
         g->scale = PAL_NEW(arena, float, n_lane *PAL_CELL_GAUSS_POINTS * 9);
         g->stiff = PAL_NEW(arena, float, n_lane *PAL_CELL_GAUSS_POINTS * 2);
@@ -248,7 +248,7 @@ void pal_cells_elastic_reset(pal_cells_elastic *c)
     for (pal_cell_kind kind = 0; kind < PAL_CELL_KINDS; kind++) {
         const pal_cell_group *g = &c->group[kind];
         for (int i = 0; i < 4 * PAL_LANES * g->n_block; i++) g->q[i] = i / PAL_LANES % 4 == 0;
-        for (int i = 0; i < 9 * PAL_LANES * g->n_block; i++) g->turn[i] = i / PAL_LANES % 9 % 4 == 0;
+        for (int i = 0; i < 9 * PAL_LANES * g->n_block; i++) g->rotation[i] = i / PAL_LANES % 9 % 4 == 0;
     }
 }
 

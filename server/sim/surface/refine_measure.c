@@ -141,10 +141,10 @@ void pal_refine_balance_compute(pal_refine_balance *side, const pal_step *step)
         side->mass_kg += m;
         side->kinetic_J += 0.5 * m * pal_dot3(v, v);
         if (body->support[i]) continue;
-        double turn[3];
-        pal_cross3(turn, body->x + 3 * (size_t)i, v);
+        double angular[3];
+        pal_cross3(angular, body->x + 3 * (size_t)i, v);
         pal_axpy3(side->momentum_kg_m_s, m, v);
-        pal_axpy3(side->turn_kg_m2_s, m, turn);
+        pal_axpy3(side->angular_momentum_kg_m2_s, m, angular);
     }
     for (int i = 0; i < step->n_force; i++) {
         const pal_effect *effect = step->force[i].effect;

@@ -47,9 +47,10 @@ void pal_refine_curvature(pal_refine_measure *measure, const pal_adaptive_surfac
 /* conserved quantities before or after a change of level */
 typedef struct pal_refine_balance {
     double mass_kg;
-    double momentum_kg_m_s[3], turn_kg_m2_s[3]; /* of the free nodes; angular momentum about the body frame's origin */
-    double kinetic_J, spring_J, shape_J;        /* springs and anchors with their ramps                              */
-    double other_J;                             /* FORCE components other than edge_spring and shape_spring          */
+    double momentum_kg_m_s[3],
+        angular_momentum_kg_m2_s[3];     /* of the free nodes; angular momentum about the body frame's origin */
+    double kinetic_J, spring_J, shape_J; /* springs and anchors with their ramps                              */
+    double other_J;                      /* FORCE components other than edge_spring and shape_spring          */
 } pal_refine_balance;
 static inline double pal_refine_balance_total_J(const pal_refine_balance *s)
 {

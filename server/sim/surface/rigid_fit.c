@@ -17,7 +17,7 @@ typedef struct sums {
     double mass, x[3], v[3]; /* x about the first node     */
     double a[9];             /* sum m x (x0 - c0)'         */
     double square[6];        /* sum m x x': xx yy zz xy xz yz */
-    double turn[3];          /* sum m x cross v            */
+    double angular[3];       /* sum m x cross v            */
 } sums;
 
 /* one node: mass, place, place at rest, velocity */
@@ -34,7 +34,8 @@ PAL_INLINE void add_node(sums *t, const double from[3], const double c[3], doubl
     t->a[6] += mz * r0, t->a[7] += mz * r1, t->a[8] += mz * r2;
     t->square[0] += mx * x, t->square[1] += my * y, t->square[2] += mz * z;
     t->square[3] += mx * y, t->square[4] += mx * z, t->square[5] += my * z;
-    t->turn[0] += my * v[2] - mz * v[1], t->turn[1] += mz * v[0] - mx * v[2], t->turn[2] += mx * v[1] - my * v[0];
+    t->angular[0] += my * v[2] - mz * v[1], t->angular[1] += mz * v[0] - mx * v[2],
+        t->angular[2] += mx * v[1] - my * v[0];
 }
 
 static void fit(const pal_adaptive_surface *s, const double from[3], sums t, pal_rigid_fit *frame)
@@ -51,7 +52,7 @@ static void fit(const pal_adaptive_surface *s, const double from[3], sums t, pal
     pal_add3(frame->centre_m, from, c);
     pal_copy3(frame->rest_centre_m, s->rest_centre_m);
     pal_cross3(arm, c, t.v);
-    pal_sub3(moment, t.turn, arm);
+    pal_sub3(moment, t.angular, arm);
     double xx = t.square[0] - c[0] * t.x[0], yy = t.square[1] - c[1] * t.x[1], zz = t.square[2] - c[2] * t.x[2];
     double xy = t.square[3] - c[0] * t.x[1], xz = t.square[4] - c[0] * t.x[2], yz = t.square[5] - c[1] * t.x[2];
     const double inertia[9] = {yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy};

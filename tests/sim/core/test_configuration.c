@@ -130,7 +130,7 @@ static void a_solid_body_runs_in_every_configuration(void)
     organ_free(&o);
 }
 
-/* keys that a setting does not speak of stay, those it does are replaced */
+/* keys that a configuration does not speak of stay, those it does are replaced */
 static void keys_outside_a_configuration_stay(void)
 {
     organ o;

@@ -18,10 +18,10 @@ static double edge_m(const cell_body *b)
 /* turned, and shaken so that elements are inverted */
 static void recovery(cell_body *b, int i, uint64_t seed)
 {
-    double turn[9];
+    double rotation[9];
     cell_nth(b, i);
-    cell_rotation(1.2, turn);
-    cell_map(b, turn, 0.3);
+    cell_rotation(1.2, rotation);
+    cell_map(b, rotation, 0.3);
     cell_shake(b, (i == 0 ? 3 : 0.9) * edge_m(b), seed);
 }
 
@@ -29,11 +29,11 @@ static void elements_without_inversion_stay_elements(void)
 {
     for (int i = 0; i < CELL_BODIES; i++) {
         cell_body b;
-        double turn[9];
+        double rotation[9];
         cell_nth(&b, i);
-        cell_rotation(2.2, turn);
-        turn[0] *= 1.2, turn[1] *= 1.2, turn[2] *= 1.2;
-        cell_map(&b, turn, 0.3);
+        cell_rotation(2.2, rotation);
+        rotation[0] *= 1.2, rotation[1] *= 1.2, rotation[2] *= 1.2;
+        cell_map(&b, rotation, 0.3);
         cell_shake(&b, 0.05 * edge_m(&b), 4);
         CHECK(!look(&b) && !look(&b));
         CHECK_INT(b.row->recovery.n_region, 0);
@@ -133,18 +133,18 @@ static void elements_return_when_nothing_is_inverted(void)
     for (int i = 0; i < CELL_BODIES; i++)
         for (int reset = 0; reset < 2; reset++) {
             cell_body b, same;
-            double turn[9];
+            double rotation[9];
             recovery(&b, i, 3);
             CHECK(look(&b));
-            cell_rotation(1.2, turn);
-            cell_map(&b, turn, 0.3);
+            cell_rotation(1.2, rotation);
+            cell_map(&b, rotation, 0.3);
             if (reset)
                 cell_effect->reset(b.row, &b.body);
             else
                 CHECK(look(&b));
             CHECK_INT(b.row->recovery.n_recovering, 0);
             cell_nth(&same, i);
-            cell_map(&same, turn, 0.3);
+            cell_map(&same, rotation, 0.3);
             cell_shake(&b, 0.05, 6), cell_shake(&same, 0.05, 6);
             const double *f = cell_force(&b), *g = cell_force(&same);
             double max = 0;
@@ -170,9 +170,12 @@ static void regions_have_no_other_rest(void)
             CHECK_INT(b.row->recovery.n_region, 1);
             /* at G X with the G of the region there is no force */
             const pal_inverted_region *region = &b.row->recovery.of[0];
-            CHECK_NEAR(fabs(region->turn[0] * (region->turn[4] * region->turn[8] - region->turn[5] * region->turn[7]) -
-                            region->turn[1] * (region->turn[3] * region->turn[8] - region->turn[5] * region->turn[6]) +
-                            region->turn[2] * (region->turn[3] * region->turn[7] - region->turn[4] * region->turn[6])),
+            CHECK_NEAR(fabs(region->rotation[0] * (region->rotation[4] * region->rotation[8] -
+                                                   region->rotation[5] * region->rotation[7]) -
+                            region->rotation[1] * (region->rotation[3] * region->rotation[8] -
+                                                   region->rotation[5] * region->rotation[6]) +
+                            region->rotation[2] * (region->rotation[3] * region->rotation[7] -
+                                                   region->rotation[4] * region->rotation[6])),
                        1, 1e-9);
             const double *f = cell_force(&b), first = cell_energy(&b);
             CHECK(k < 2 || first > 0);
@@ -181,7 +184,7 @@ static void regions_have_no_other_rest(void)
             for (int m = 0; m < n; m++)
                 for (int c = 0; c < 3; c++)
                     b.body.d[3 * m + c] =
-                        0.5 * (b.body.d[3 * m + c] + pal_dot3(region->turn + 3 * c, b.body.node_rest + 3 * m));
+                        0.5 * (b.body.d[3 * m + c] + pal_dot3(region->rotation + 3 * c, b.body.node_rest + 3 * m));
             CHECK_NEAR(cell_energy(&b) / first, 0.25, 1e-9);
             cell_free(&b);
         }
@@ -207,7 +210,7 @@ static void elements_in_regions_cost_nothing(void)
             const pal_cell_group *g = &b.row->group[kind];
             const size_t n_lane = (size_t)g->n_block * PAL_LANES;
             for (size_t k = 0; k < n_lane * (size_t)g->n_node * 3; k++) g->rest[k] = NAN;
-            for (size_t k = 0; k < n_lane * 9; k++) g->turn[k] = NAN;
+            for (size_t k = 0; k < n_lane * 9; k++) g->rotation[k] = NAN;
         }
         CHECK(!memcmp(f, cell_force(&b), sizeof *f * n));
         CHECK(cell_energy(&b) == energy_J);
@@ -223,21 +226,21 @@ static void elements_in_regions_cost_nothing(void)
 static void supports_give_the_rotation_of_a_large_region(void)
 {
     cell_body b;
-    double turn[9];
+    double rotation[9];
     cell_nth(&b, 1);
     pal_body *body = &b.body;
     body->length_scale_m = 5;
-    cell_rotation(2, turn);
+    cell_rotation(2, rotation);
     for (int i = 0; i < body->n_dof; i++) {
         pal_copy3(body->x_rest + 3 * i, b.cells.x + 3 * i);
-        for (int c = 0; c < 3; c++) body->x[3 * i + c] = pal_dot3(turn + 3 * c, b.cells.x + 3 * i);
+        for (int c = 0; c < 3; c++) body->x[3 * i + c] = pal_dot3(rotation + 3 * c, b.cells.x + 3 * i);
         body->support[i] = b.cells.x[3 * i] < 0.5;
     }
     cell_map(&b, (double[9]){0}, 0);
     CHECK(look(&b));
     CHECK_INT(b.row->recovery.n_region, 1);
     CHECK(b.row->recovery.of[0].fixed);
-    for (int i = 0; i < 9; i++) CHECK_NEAR(b.row->recovery.of[0].turn[i], turn[i], 1e-9);
+    for (int i = 0; i < 9; i++) CHECK_NEAR(b.row->recovery.of[0].rotation[i], rotation[i], 1e-9);
     cell_free(&b);
 }
 

@@ -522,7 +522,8 @@ static void watch(const shell_scene *s, uint64_t *seen, worst *w)
     w->kinetic_raw = fmax(w->kinetic_raw, fabs(raw->kinetic_J - b->kinetic_J) / total);
     w->elastic_raw = fmax(w->elastic_raw, fabs(raw->spring_J + raw->shape_J - b->spring_J - b->shape_J) / total);
     w->mass = fmax(w->mass, fabs(a->mass_kg / b->mass_kg - 1));
-    w->turn = fmax(w->turn, pal_dist3(a->turn_kg_m2_s, b->turn_kg_m2_s) / (unit * s->body->length_scale_m));
+    w->turn = fmax(w->turn, pal_dist3(a->angular_momentum_kg_m2_s, b->angular_momentum_kg_m2_s) /
+                                (unit * s->body->length_scale_m));
     w->momentum = fmax(w->momentum, pal_dist3(a->momentum_kg_m_s, b->momentum_kg_m_s) / unit);
     if (getenv("REFINE_VERBOSE"))
         printf("  %6.3f s  n %d  E %.3g = K %.3g S %.3g A %.3g  raw K %+.4f S %+.4f A %+.4f  after %+.5f  ramps %.4f "
