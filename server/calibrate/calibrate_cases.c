@@ -37,19 +37,18 @@ static pal_err add_case(job *j, const char *id, bool fit)
     const char *flag = fit ? "--case" : "--verify";
     for (int k = 0; k < s->n; k++)
         if (!strcmp(s->id[k], id))
-            return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "%s: \"%s\" %s", flag, id,
-                                      fit == s->list[k].fit
-                                          ? "stands there twice"
-                                          : "is fitted, so it can not verify what the fit did not see");
+            return PAL_REFUSE(j->diag, "%s: \"%s\" %s", flag, id,
+                              fit == s->list[k].fit ? "stands there twice"
+                                                    : "is fitted, so it can not verify what the fit did not see");
     if (s->n == PAL_CALIBRATE_CASES)
-        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "%s: \"%.40s\" is one too many, at most %d cases are taken",
-                                  flag, id, PAL_CALIBRATE_CASES);
+        return PAL_REFUSE(j->diag, "%s: \"%.40s\" is one too many, at most %d cases are taken", flag, id,
+                          PAL_CALIBRATE_CASES);
     const pal_problem_reference *named = pal_problem_reference_find(p, id);
     const pal_problem_case *load_case = pal_problem_case_find(p, named ? named->load_case : id);
     if (!load_case || strlen(id) >= PAL_NAME) return pal_problem_refuse_case(p, flag, id, j->diag);
     if (named && j->input->kinematics && named->finite != is(j->input->kinematics, "finite"))
-        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "%s: reference \"%s\" is %s, --kinematics says %s", flag,
-                                  id, named->finite ? "finite" : "linear", j->input->kinematics);
+        return PAL_REFUSE(j->diag, "%s: reference \"%s\" is %s, --kinematics says %s", flag, id,
+                          named->finite ? "finite" : "linear", j->input->kinematics);
     snprintf(s->id[s->n], PAL_NAME, "%s", id);
     j->reference[s->n] = named;
     j->named[s->n] = named != NULL;
@@ -90,9 +89,8 @@ static pal_err settle_material(job *j)
     for (int k = 1; k < s->n; k++) {
         material_of(j, k, &other_young, &other_poisson);
         if (same(other_young, young) && same(other_poisson, poisson)) continue;
-        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED,
-                                  "%s: \"%s\" is of E %g, nu %g and \"%s\" of E %g, nu %g: one body has one material",
-                                  s->problem->path, s->id[0], young, poisson, s->id[k], other_young, other_poisson);
+        return PAL_REFUSE(j->diag, "%s: \"%s\" is of E %g, nu %g and \"%s\" of E %g, nu %g: one body has one material",
+                          s->problem->path, s->id[0], young, poisson, s->id[k], other_young, other_poisson);
     }
     s->problem->material[0].young_Pa = young;
     s->problem->material[0].poisson = poisson;
@@ -127,9 +125,9 @@ static pal_err choose_reference(job *j, int index)
     }
     const pal_problem_reference *r = j->reference[index];
     if (!r)
-        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "%s: --truth: no reference answers load case \"%s\"%s%s",
-                                  p->path, s->id[index], j->input->kinematics ? " with kinematics " : "",
-                                  j->input->kinematics ? j->input->kinematics : "");
+        return PAL_REFUSE(j->diag, "%s: --truth: no reference answers load case \"%s\"%s%s", p->path, s->id[index],
+                          j->input->kinematics ? " with kinematics " : "",
+                          j->input->kinematics ? j->input->kinematics : "");
     c->linear = !r->finite;
     return PAL_ERR_OK;
 }
@@ -152,8 +150,7 @@ static pal_err choose_truths(job *j)
     int n_fit = 0;
     for (int k = 0; k < s->n; k++) n_fit += s->list[k].fit;
     if (file && n_fit != 1)
-        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "--truth: %.200s is one file, --case names %d cases", truth,
-                                  n_fit);
+        return PAL_REFUSE(j->diag, "--truth: %.200s is one file, --case names %d cases", truth, n_fit);
     for (int k = 0; k < s->n; k++) {
         PAL_TRY(choose_reference(j, k));
         const char *slash = file ? strrchr(truth, '/') : NULL;
@@ -181,10 +178,9 @@ static pal_err check_box(const job *j, int index)
         for (int c = 0; c < 3; c++) out = fmax(out, fmax(low[c] - x[c], x[c] - high[c]));
         if (out <= slack) continue;
         const double *at = samples->x + 3 * i;
-        return pal_diagnostic_set(
-            j->diag, PAL_ERR_REFUSED,
-            "truth \"%s\": point %d (%g, %g, %g) m is %.3g m outside of the body: is it of another one?",
-            s->truth_name[index], i + 1, at[0], at[1], at[2], out);
+        return PAL_REFUSE(j->diag,
+                          "truth \"%s\": point %d (%g, %g, %g) m is %.3g m outside of the body: is it of another one?",
+                          s->truth_name[index], i + 1, at[0], at[1], at[2], out);
     }
     return PAL_ERR_OK;
 }
@@ -221,11 +217,10 @@ static pal_err check_points(const pal_calibrate_cases *s, const pal_prepared *me
             max = fmax(max, out);
         }
         if (n_far > 0.01 * samples->n)
-            err =
-                pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                   "truth \"%s\": %d of %d points are more than a voxel outside of the body (by up to "
-                                   "%.3g m): is it of another one?",
-                                   s->truth_name[k], n_far, samples->n, max);
+            err = PAL_REFUSE(diag,
+                             "truth \"%s\": %d of %d points are more than a voxel outside of the body (by up to "
+                             "%.3g m): is it of another one?",
+                             s->truth_name[k], n_far, samples->n, max);
     }
     pal_locate_destroy(locate);
     return err;
@@ -262,9 +257,8 @@ static pal_err check_supports(const job *j)
     for (int k = 0; k < p->n_support; k++) {
         const double *move = p->support[k].move_m;
         if (p->support[k].moved && (move[0] != 0 || move[1] != 0 || move[2] != 0))
-            return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED,
-                                      "%s: supports[%d]: moves, springs are calibrated on supports that hold still",
-                                      p->path, k);
+            return PAL_REFUSE(j->diag, "%s: supports[%d]: moves, springs are calibrated on supports that hold still",
+                              p->path, k);
     }
     return PAL_ERR_OK;
 }

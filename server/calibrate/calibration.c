@@ -101,18 +101,16 @@ static pal_err check_hold(const job *j)
         widest = fmax(widest, pal_norm3(out) / longest);
     }
     if (widest > 1e-6 * l->edge_m) return PAL_ERR_OK;
-    return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED,
-                              "supports: held nodes: %d, all on one line, so the body turns and comes to no rest",
-                              n_fixed);
+    return PAL_REFUSE(j->diag, "supports: held nodes: %d, all on one line, so the body turns and comes to no rest",
+                      n_fixed);
 }
 
 static pal_err make_body(const job *j)
 {
     pal_calibration *c = j->c;
     if (c->problem->n_support == 0)
-        return pal_diagnostic_set(
-            j->diag, PAL_ERR_REFUSED,
-            "supports: none, so nothing holds the body against its loads and it comes to no rest");
+        return PAL_REFUSE(j->diag,
+                          "supports: none, so nothing holds the body against its loads and it comes to no rest");
     PAL_TRY(pal_case_voxels(c->problem, j->surface, &c->options.voxel, &c->mesh, j->diag));
     PAL_TRY(pal_case_supports(c->problem, &c->mesh.tets, c->support, j->diag));
     take_material(c);
@@ -152,21 +150,19 @@ static pal_err make_loads(const job *j, int index)
         sum_up(c, one, &all, &fixed);
         sum += all;
         if (load_case->load[k].kind != PAL_LOAD_GRAVITY && fixed > 0.5 * all)
-            err = pal_diagnostic_set(j->diag, PAL_ERR_REFUSED,
-                                     "load_cases[%d].loads[%d]: %.0f %% of it stands on nodes that a support holds",
-                                     (int)(load_case - c->problem->load_case), k, 100 * fixed / all);
+            err = PAL_REFUSE(j->diag, "load_cases[%d].loads[%d]: %.0f %% of it stands on nodes that a support holds",
+                             (int)(load_case - c->problem->load_case), k, 100 * fixed / all);
         for (size_t i = 0; i < n; i++) fit->force_N[i] += one[i];
     }
     if (err) return err;
     double left, fixed;
     sum_up(c, fit->force_N, &left, &fixed);
     if (!(sum > 0))
-        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "load case \"%s\": has no load, so there is nothing to fit",
-                                  load_case->id);
+        return PAL_REFUSE(j->diag, "load case \"%s\": has no load, so there is nothing to fit", load_case->id);
     if (left <= 1e-9 * sum)
-        return pal_diagnostic_set(
-            j->diag, PAL_ERR_REFUSED,
-            "load case \"%s\": its loads cancel each other at every node, so there is nothing to fit", load_case->id);
+        return PAL_REFUSE(j->diag,
+                          "load case \"%s\": its loads cancel each other at every node, so there is nothing to fit",
+                          load_case->id);
     return PAL_ERR_OK;
 }
 
@@ -243,8 +239,8 @@ static pal_err make_truth(const job *j, int index)
     PAL_TRY(k->samples ? truth_by_samples(j, index) : truth_by_elements(j, index));
     fit->max_m = pal_max_norm3(fit->u, fit->n_point);
     if (fit->max_m > 0) return PAL_ERR_OK;
-    return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "load case \"%s\": its truth (%s) moves nothing",
-                              k->load_case->id, k->truth_name ? k->truth_name : "finite elements");
+    return PAL_REFUSE(j->diag, "load case \"%s\": its truth (%s) moves nothing", k->load_case->id,
+                      k->truth_name ? k->truth_name : "finite elements");
 }
 
 /* ---- parameters ---- */
@@ -279,8 +275,7 @@ static pal_err make_grid(const job *j)
     if (n[0] <= 0) return PAL_ERR_OK;
     for (int a = 0; a < 3; a++) {
         if (n[a] < 1 || n[a] > 1024)
-            return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "grid: %d nodes along axis %d, wanted 1 to 1024", n[a],
-                                      a);
+            return PAL_REFUSE(j->diag, "grid: %d nodes along axis %d, wanted 1 to 1024", n[a], a);
         c->grid.n[a] = n[a];
         c->grid.low[a] = DBL_MAX;
         c->grid.high[a] = -DBL_MAX;
@@ -290,8 +285,8 @@ static pal_err make_grid(const job *j)
         }
     }
     if ((int64_t)n[0] * n[1] * n[2] * PAL_SPRING_KINDS > PAL_CALIBRATE_PARAMETERS)
-        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "grid: %d x %d x %d nodes are more than %d parameters",
-                                  n[0], n[1], n[2], PAL_CALIBRATE_PARAMETERS);
+        return PAL_REFUSE(j->diag, "grid: %d x %d x %d nodes are more than %d parameters", n[0], n[1], n[2],
+                          PAL_CALIBRATE_PARAMETERS);
     c->has_grid = true;
     if (pal_grid_weights_make(&c->grid, t->x, t->n_node, &c->weights)) return no_memory(j, "the grid's weights");
     c->info.n_used = c->weights.n_used;
@@ -395,14 +390,12 @@ pal_err pal_calibration_create(const pal_problem *problem, const pal_surface *su
     int n_fit = 0;
     for (int i = 0; i < n_case; i++) n_fit += cases[i].fit;
     if (n_case > PAL_CALIBRATE_CASES)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d load cases: at most %d are taken", n_case,
-                                  PAL_CALIBRATE_CASES);
-    if (n_fit == 0) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "no load case to fit");
+        return PAL_REFUSE(diag, "%d load cases: at most %d are taken", n_case, PAL_CALIBRATE_CASES);
+    if (n_fit == 0) return PAL_REFUSE(diag, "no load case to fit");
     for (int i = 0; i < n_case; i++)
         if (cases[i].load_case->n_load == 0)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                      "load case \"%s\": has no load, so there is nothing to fit",
-                                      cases[i].load_case->id);
+            return PAL_REFUSE(diag, "load case \"%s\": has no load, so there is nothing to fit",
+                              cases[i].load_case->id);
     pal_calibration *c = j.c = calloc(1, sizeof *c);
     if (!c) return no_memory(&j, "a calibration");
     *c = (pal_calibration){.options = *options, .problem = problem, .cases = cases, .n_case = n_case, .n_fit = n_fit};

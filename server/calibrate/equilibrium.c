@@ -108,12 +108,11 @@ pal_err pal_lattice_make(const pal_world *world, int body, pal_lattice *out, pal
     if (err)
         pal_diagnostic_set(diag, err, "body \"%s\": no memory for %d nodes", b->name, b->n_node);
     else if (out->kind[PAL_SPRING_DISTANCE].n_item == 0)
-        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": has no edge springs", b->name);
+        err = PAL_REFUSE(diag, "body \"%s\": has no edge springs", b->name);
     else if (out->n_free == out->n_node)
-        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": nothing holds it against its loads", b->name);
+        err = PAL_REFUSE(diag, "body \"%s\": nothing holds it against its loads", b->name);
     else if (out->n_free == 0)
-        err =
-            pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body \"%s\": all of its %d nodes are held", b->name, b->n_node);
+        err = PAL_REFUSE(diag, "body \"%s\": all of its %d nodes are held", b->name, b->n_node);
     if (err) pal_lattice_free(out);
     return err;
 }

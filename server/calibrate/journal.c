@@ -110,8 +110,7 @@ pal_err pal_journal_begin(pal_journal *j, uint64_t subject, pal_diagnostic *diag
         line[--n] = 0;
         if (number == 1) continue; /* the header */
         if (!is_sound(line, (size_t)n))
-            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: line %d is damaged: its check does not agree", j->path,
-                                     number);
+            err = PAL_REFUSE(diag, "%s: line %d is damaged: its check does not agree", j->path, number);
         else if (!strncmp(line, j->subject, DIGITS + 1) && (err = keep(j, line, (size_t)n)))
             pal_diagnostic_set(diag, err, "%s: no memory for line %d", j->path, number);
     }
@@ -154,8 +153,7 @@ pal_err pal_journal_open(const char *path, pal_journal **out, pal_diagnostic *di
                   ? pal_diagnostic_set(diag, PAL_ERR_STATE, "%s: another process is writing there", j->path)
                   : no_io(j, "cannot be locked", diag);
     else if (!read_head(j))
-        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                 "%s: is not a journal: it does not begin with \"palpate journal 1\"", j->path);
+        err = PAL_REFUSE(diag, "%s: is not a journal: it does not begin with \"palpate journal 1\"", j->path);
     if (err)
         pal_journal_close(j);
     else

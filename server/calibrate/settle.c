@@ -201,9 +201,8 @@ pal_err pal_settle_damping(const pal_scene *scene, const pal_settle_load *load, 
                            const pal_settle_options *options, pal_settle_report *out, pal_diagnostic *diag)
 {
     if (n_load < 1 || n_load > PAL_SETTLE_LOADS)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d loads, wanted 1 to %d", n_load, PAL_SETTLE_LOADS);
-    if (scene->n_body != 1)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "a scene of %d bodies, wanted one", scene->n_body);
+        return PAL_REFUSE(diag, "%d loads, wanted 1 to %d", n_load, PAL_SETTLE_LOADS);
+    if (scene->n_body != 1) return PAL_REFUSE(diag, "a scene of %d bodies, wanted one", scene->n_body);
     *out = (pal_settle_report){.damping_1_s = scene->body[0].material.damping_1_s, .seconds = NAN};
     for (int k = 0; k < PAL_SETTLE_STEPS; k++) out->rate_seconds[k] = NAN;
     for (int k = 0; k < PAL_SETTLE_LOADS; k++) out->load[k].difference_percent = NAN;

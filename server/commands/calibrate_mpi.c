@@ -275,9 +275,9 @@ static pal_err same_everywhere(job *j, const char *problem)
     uint64_t root = j->fingerprint;
     MPI_Bcast(&root, 1, MPI_UINT64_T, 0, MPI_COMM_WORLD);
     if (root == j->fingerprint) return PAL_ERR_OK;
-    return pal_diagnostic_set(
-        &j->diag, PAL_ERR_REFUSED,
-        "%s: rank %d makes another calibration of it than rank 0: the files or the machines differ", problem, j->rank);
+    return PAL_REFUSE(&j->diag,
+                      "%s: rank %d makes another calibration of it than rank 0: the files or the machines differ",
+                      problem, j->rank);
 }
 
 /* ---- results ---- */
@@ -318,8 +318,7 @@ static pal_err write_result(job *j, const char *problem, int seed, const cJSON *
     if (!j->folder) return PAL_ERR_OK;
     if (j->n_seed > 1) snprintf(tail, sizeof tail, "_%d", seed);
     int n = snprintf(path, sizeof path, "%.900s/%.*s%s.json", j->folder, dot ? (int)(dot - name) : 200, name, tail);
-    if (n < 0 || (size_t)n >= sizeof path)
-        return pal_diagnostic_set(&j->diag, PAL_ERR_REFUSED, "%.200s: too long", problem);
+    if (n < 0 || (size_t)n >= sizeof path) return PAL_REFUSE(&j->diag, "%.200s: too long", problem);
     char *text = result ? cJSON_Print(result) : NULL;
     if (!text) return pal_diagnostic_set(&j->diag, PAL_ERR_MEMORY, "%.200s: no memory for the result", path);
     pal_err err = pal_file_write(path, text, strlen(text), &j->diag);

@@ -113,15 +113,15 @@ static pal_err check_target(const char *flag, const char *path, pal_diagnostic *
     if (!path) return PAL_ERR_OK;
     const char *slash = strrchr(path, '/');
     if (!pal_json_folder(path, folder, sizeof folder) || !path[0] || (slash && !slash[1]))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: \"%.80s\" is not the name of a file", flag, path);
+        return PAL_REFUSE(diag, "%s: \"%.80s\" is not the name of a file", flag, path);
     if (stat(folder, &facts) || !S_ISDIR(facts.st_mode))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s: there is no folder %.200s", flag, path, folder);
+        return PAL_REFUSE(diag, "%s: %.200s: there is no folder %.200s", flag, path, folder);
     if (access(folder, W_OK | X_OK))
         return pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %.200s: cannot be written: %s", flag, path, strerror(errno));
     if (!stat(path, &facts) && S_ISDIR(facts.st_mode))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s is a folder, wanted a file in it", flag, path);
+        return PAL_REFUSE(diag, "%s: %.200s is a folder, wanted a file in it", flag, path);
     if (!stat(path, &facts) && !S_ISREG(facts.st_mode))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s exists and is not a file", flag, path);
+        return PAL_REFUSE(diag, "%s: %.200s exists and is not a file", flag, path);
     return PAL_ERR_OK;
 }
 
@@ -131,7 +131,7 @@ static pal_err check_source(const char *flag, const char *path, const char *sour
 {
     char own[PATH_MAX], other[PATH_MAX];
     if (path && source && realpath(path, own) && realpath(source, other) && !strcmp(own, other))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s is the %s itself", flag, path, what);
+        return PAL_REFUSE(diag, "%s: %.200s is the %s itself", flag, path, what);
     return PAL_ERR_OK;
 }
 
@@ -139,9 +139,8 @@ static pal_err check_targets(const pal_calibrate_run *run, pal_diagnostic *diag)
 {
     const int *grid = run->options.grid;
     if ((int64_t)grid[0] * grid[1] * grid[2] > MAX_GRID)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "--grid: %d x %d x %d nodes, more than the %d that a scene file holds", grid[0],
-                                  grid[1], grid[2], MAX_GRID);
+        return PAL_REFUSE(diag, "--grid: %d x %d x %d nodes, more than the %d that a scene file holds", grid[0],
+                          grid[1], grid[2], MAX_GRID);
     const char *const path[PAL_CALIBRATE_FILES] = {run->scene, run->trajectory, run->picture, run->vtk};
     for (int a = 0; a < PAL_CALIBRATE_FILES; a++) {
         PAL_TRY(check_target(target_flag[a], path[a], diag));
@@ -149,8 +148,8 @@ static pal_err check_targets(const pal_calibrate_run *run, pal_diagnostic *diag)
         PAL_TRY(check_source(target_flag[a], path[a], run->input.truth, "truth", diag));
         for (int b = 0; b < a && path[a]; b++)
             if (path[b] && is_same_file(path[a], path[b]))
-                return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.200s is the file of %s as well", target_flag[a],
-                                          path[a], target_flag[b]);
+                return PAL_REFUSE(diag, "%s: %.200s is the file of %s as well", target_flag[a], path[a],
+                                  target_flag[b]);
     }
     return PAL_ERR_OK;
 }

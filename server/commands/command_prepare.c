@@ -140,8 +140,7 @@ static pal_err save(const pal_loaded_scene *loaded, const arguments *args, outco
     int n_tet = loaded->mesh[0].tets.n_tet;
     bool tetgen = args->tetgen || (!args->no_tetgen && n_tet > 0 && n_tet <= TETGEN_MAX);
     int n = snprintf(stage, sizeof stage, "%s/.palpate-%ld", args->folder, (long)getpid());
-    if (n < 0 || (size_t)n >= sizeof stage)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.80s...: the path is too long", args->folder);
+    if (n < 0 || (size_t)n >= sizeof stage) return PAL_REFUSE(diag, "%.80s...: the path is too long", args->folder);
     /* a signal waits until all files are written or removed */
     sigset_t asked, old;
     sigemptyset(&asked);

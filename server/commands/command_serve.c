@@ -248,8 +248,7 @@ static pal_err find_lcm(serve_run *run, pal_diagnostic *diag)
     if (!program_folder(folder, sizeof folder))
         return pal_diagnostic_set(diag, PAL_ERR_IO, "/proc/self/exe cannot be read, so palpate-lcm is not found");
     snprintf(run->lcm_program, sizeof run->lcm_program, "%s/palpate-lcm", folder);
-    if (access(run->lcm_program, X_OK))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--lcm needs %s, which is not there", run->lcm_program);
+    if (access(run->lcm_program, X_OK)) return PAL_REFUSE(diag, "--lcm needs %s, which is not there", run->lcm_program);
     make_address(run, address, sizeof address);
     for (int i = 0; i < run->n; i++)
         snprintf(run->lcm[i].server, MAX_URL, "ws://%s/ws?session=%s", address, run->scene[i]->scene.name);
@@ -449,8 +448,7 @@ int command_serve(int argc, char **argv)
                                       .progress = pal_report_progress,
                                       .user = &run.common};
     pal_err err = PAL_ERR_OK;
-    if (unit && run.surface.unit_m == 0)
-        err = pal_diagnostic_set(&diag, PAL_ERR_REFUSED, "--units: \"%.20s\" is not a unit", unit);
+    if (unit && run.surface.unit_m == 0) err = PAL_REFUSE(&diag, "--units: \"%.20s\" is not a unit", unit);
     for (int i = 0; !err && i < (n_input ? n_input : 1); i++) err = load_input(&run, n_input ? input[i] : NULL, &diag);
     pal_report_progress(NULL, 0, &run.common);
     for (int i = 0; i < run.n; i++) make_unique(&run, i);

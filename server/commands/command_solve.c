@@ -62,7 +62,7 @@ static const char *const known[ELEMENTS] = {"hex8_bbar", "hex8", "tet4", "tet10"
 
 static bool wrong(pal_diagnostic *diag, const char *flag, const char *word, const char *what)
 {
-    pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.40s %s", flag, word[0] ? word : "\"\"", what);
+    PAL_REFUSE(diag, "%s: %.40s %s", flag, word[0] ? word : "\"\"", what);
     for (char *c = diag->text; *c; c++)
         if ((unsigned char)*c < 0x20 || *c == 0x7f) *c = ' ';
     return false;

@@ -162,11 +162,9 @@ static pal_err check_same(const study_run *run, const pal_study_file *old, bool 
     char other[sizeof now->loads + 8];
     snprintf(other, sizeof other, "%s, quick", now->loads);
     if (!strcmp(other, old->loads))
-        return pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED,
-            "%.200s: is of a quick study: --quick continues it, --again starts over, --out keeps it", run->path);
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.200s: is of %s (%.150s): --again starts over, --out keeps it",
-                              run->path, what, detail);
+        return PAL_REFUSE(
+            diag, "%.200s: is of a quick study: --quick continues it, --again starts over, --out keeps it", run->path);
+    return PAL_REFUSE(diag, "%.200s: is of %s (%.150s): --again starts over, --out keeps it", run->path, what, detail);
 }
 
 /* are all requested methods measured? */
@@ -196,8 +194,8 @@ static pal_err read_old(study_run *run, pal_diagnostic *diag)
     bool given = q->quick || q->seconds > 0 || q->load_case || q->samples;
     pal_diagnostic reason = {""};
     if (run->row && !exists)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--pick %d: there is no %.200s yet: run palpate study %.200s",
-                                  run->row, run->path, q->word);
+        return PAL_REFUSE(diag, "--pick %d: there is no %.200s yet: run palpate study %.200s", run->row, run->path,
+                          q->word);
     pal_err err = exists && !run->again ? pal_study_file_read(run->path, &run->old, &reason) : PAL_ERR_OK;
     if (err) return pal_diagnostic_set(diag, err, "%.400s: --again starts over", reason.text);
     if (run->old && asks && !given) {
@@ -422,11 +420,10 @@ static pal_err scene_path(study_run *run, pal_diagnostic *diag)
     bool json = n > 5 && !strcmp(run->scene + n - 5, ".json");
     int size = snprintf(run->written, sizeof run->written, json ? "%s" : "%s/scene.json", run->scene);
     if (size < 0 || (size_t)size >= PAL_STUDY_PATH - 16)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "-o: %.80s...: the path is too long", run->scene);
+        return PAL_REFUSE(diag, "-o: %.80s...: the path is too long", run->scene);
     if (is_beside_source(run, run->written))
-        return pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED,
-            "-o: %.300s is in the folder of the source, whose meshes it could replace: name another folder",
+        return PAL_REFUSE(
+            diag, "-o: %.300s is in the folder of the source, whose meshes it could replace: name another folder",
             run->written);
     return PAL_ERR_OK;
 }
@@ -480,14 +477,13 @@ static pal_err pick_row(study_run *run, pal_diagnostic *diag)
     int order[PAL_STUDY_POINTS];
     const pal_study *study = &run->file->study;
     if (run->row > study->n_point)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--pick %d: the table of %.200s has rows 1 to %d", run->row,
-                                  run->path, study->n_point);
+        return PAL_REFUSE(diag, "--pick %d: the table of %.200s has rows 1 to %d", run->row, run->path, study->n_point);
     pal_study_order(study, order);
     const pal_study_point *p = &study->point[order[run->row - 1]];
     if (p->err || !isfinite(p->measured.ms) || !isfinite(p->measured.error_m))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "--pick %d: %s was not measured: %s", run->row,
-                                  pal_configuration_text(&p->measured.configuration, text),
-                                  p->reason[0] ? p->reason : pal_err_text(p->err));
+        return PAL_REFUSE(diag, "--pick %d: %s was not measured: %s", run->row,
+                          pal_configuration_text(&p->measured.configuration, text),
+                          p->reason[0] ? p->reason : pal_err_text(p->err));
     run->picked = order[run->row - 1];
     return run->scene ? write_scene(run, diag) : PAL_ERR_OK;
 }
@@ -501,7 +497,7 @@ static pal_err answer(study_run *run, pal_diagnostic *diag)
     run->picked = pal_study_pick_target(study, run->methods, &run->target);
     if (run->picked >= 0) return run->scene ? write_scene(run, diag) : PAL_ERR_OK;
     pal_study_describe_miss(study, run->methods, &run->target, text, sizeof text);
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s", run->request.word, text);
+    return PAL_REFUSE(diag, "%s: %s", run->request.word, text);
 }
 
 /* ---- report ---- */

@@ -129,26 +129,24 @@ static void find_ranges(sheet *page)
 static pal_err check_picture(const pal_body_picture *p, int index, const char *path, pal_diagnostic *diag)
 {
     if (p->n_tri <= 0 || p->n_vertex <= 0 || !p->x || !p->tri)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: picture %d has nothing to draw", path, index + 1);
+        return PAL_REFUSE(diag, "%s: picture %d has nothing to draw", path, index + 1);
     if (p->n_tri > CORNERS_MAX || p->n_vertex > CORNERS_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "%s: picture %d has %d triangles of %d vertices, at most %d go", path, index + 1,
-                                  p->n_tri, p->n_vertex, CORNERS_MAX);
+        return PAL_REFUSE(diag, "%s: picture %d has %d triangles of %d vertices, at most %d go", path, index + 1,
+                          p->n_tri, p->n_vertex, CORNERS_MAX);
     for (int i = 0; i < 3 * p->n_tri; i++)
         if (p->tri[i] < 0 || p->tri[i] >= p->n_vertex)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: picture %d, triangle %d: no vertex %d among %d", path,
-                                      index + 1, i / 3, p->tri[i], p->n_vertex);
+            return PAL_REFUSE(diag, "%s: picture %d, triangle %d: no vertex %d among %d", path, index + 1, i / 3,
+                              p->tri[i], p->n_vertex);
     for (int i = 0; i < p->n_vertex; i++)
         for (int k = 0; k < 3; k++) {
             double x = p->x[3 * i + k], rest = p->rest ? p->rest[3 * i + k] : 0;
             if (!(fabs(x) < 1e12 && fabs(rest) < 1e12))
-                return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: picture %d, vertex %d is at %g m", path,
-                                          index + 1, i, fabs(x) < 1e12 ? rest : x);
+                return PAL_REFUSE(diag, "%s: picture %d, vertex %d is at %g m", path, index + 1, i,
+                                  fabs(x) < 1e12 ? rest : x);
         }
     for (int i = 0; i < 3 * p->n_load; i++)
         if (!(fabs(p->load_at[i]) < 1e12) || !isfinite(p->load_N[i]))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: picture %d, load %d is not finite", path, index + 1,
-                                      i / 3);
+            return PAL_REFUSE(diag, "%s: picture %d, load %d is not finite", path, index + 1, i / 3);
     return PAL_ERR_OK;
 }
 
@@ -541,8 +539,7 @@ static pal_err draw(sheet *page, const char *path, pal_diagnostic *diag)
 pal_err pal_body_picture_write(const pal_body_picture *picture, int n_picture, const char *path, pal_diagnostic *diag)
 {
     if (n_picture < 1 || n_picture > PAL_BODY_PICTURES)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %d pictures, 1 to %d go side by side", path, n_picture,
-                                  PAL_BODY_PICTURES);
+        return PAL_REFUSE(diag, "%s: %d pictures, 1 to %d go side by side", path, n_picture, PAL_BODY_PICTURES);
     sheet *page = calloc(1, sizeof *page);
     if (!page) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for a picture", path);
     page->n = n_picture;

@@ -296,7 +296,7 @@ static pal_err draw(const pal_plot *plot, pal_svg *svg, pal_diagnostic *diag)
 {
     axis x = {.log = plot->log_x, .low = INFINITY, .high = -INFINITY, .from = LEFT, .to = wide_of(plot) - RIGHT};
     axis y = {.log = plot->log_y, .low = INFINITY, .high = -INFINITY, .from = high_of(plot) - BOTTOM, .to = TOP};
-    if (!find_range(plot, &x, &y)) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there is no point to draw");
+    if (!find_range(plot, &x, &y)) return PAL_REFUSE(diag, "there is no point to draw");
     settle(&x);
     settle(&y);
     boxes *taken = calloc(1, sizeof *taken);

@@ -102,8 +102,7 @@ static pal_err find(const char *path, const pal_scene *scene, pal_study_file **o
     if (body < scene->n_body && !strcmp(pal_study_shape(&scene->body[body], shape), (*out)->shape)) return PAL_ERR_OK;
     free(*out);
     *out = NULL;
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: is of another body than this scene's, or of other material",
-                              path);
+    return PAL_REFUSE(diag, "%s: is of another body than this scene's, or of other material", path);
 }
 
 static pal_err pick(const char *word, const char *path, const pal_scene *scene, const pal_accuracy_target *target,
@@ -115,8 +114,7 @@ static pal_err pick(const char *word, const char *path, const pal_scene *scene, 
     out->picked = pal_study_pick_target(study, "", target);
     if (out->picked < 0) {
         pal_study_describe_miss(study, "", target, none, sizeof none);
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s; more of them: palpate study %s --again", path, none,
-                                  word);
+        return PAL_REFUSE(diag, "%s: %s; more of them: palpate study %s --again", path, none, word);
     }
     const pal_measured_configuration *p = &study->point[out->picked].measured;
     pal_configuration configuration = p->configuration;

@@ -65,8 +65,7 @@ pal_err pal_study_fit(pal_study_job *job, pal_configuration *configuration, pal_
         cases[k] = (pal_calibrate_case){
             .load_case = job->load[k], .samples = &samples[k], .truth_name = "reference", .fit = true};
     }
-    if (job->problem->n_support == 0)
-        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "its supports are no boxes of the problem's frame");
+    if (job->problem->n_support == 0) err = PAL_REFUSE(diag, "its supports are no boxes of the problem's frame");
     if (!err)
         err = pal_calibration_create(job->problem, &job->scene->body[0].mesh->surface, cases, n_fit, &options,
                                      &calibration, diag);

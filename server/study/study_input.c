@@ -32,7 +32,7 @@ static pal_err open_problem(const pal_study_request *q, pal_study_input *out, co
                             pal_diagnostic *diag)
 {
     pal_surface_report report = {0};
-    if (q->body) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: --body: a problem has one body", q->word);
+    if (q->body) return PAL_REFUSE(diag, "%s: --body: a problem has one body", q->word);
     PAL_TRY(pal_problem_read(q->word, &out->problem, diag));
     pal_problem *p = out->problem;
     const pal_problem_reference *named = q->load_case ? pal_problem_reference_find(p, q->load_case) : NULL;
@@ -53,15 +53,14 @@ static pal_err open_problem(const pal_study_request *q, pal_study_input *out, co
 static pal_err open_scene(const pal_study_request *q, pal_study_input *out, pal_diagnostic *diag)
 {
     if (q->load_case && !q->keeps_case)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: --case: a scene has no load cases, a problem has",
-                                  q->word);
+        return PAL_REFUSE(diag, "%s: --case: a scene has no load cases, a problem has", q->word);
     PAL_TRY(pal_scene_arg(q->word, q->options, &out->loaded, NULL, NULL, diag));
     const pal_scene *scene = out->scene = &out->loaded->scene;
     for (out->body = 0; q->body && out->body < scene->n_body; out->body++)
         if (!strcmp(scene->body[out->body].name, q->body)) return PAL_ERR_OK;
     if (!q->body) return PAL_ERR_OK;
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: --body: there is no \"%.40s\", the first is \"%s\"", q->word,
-                              q->body, scene->body[0].name);
+    return PAL_REFUSE(diag, "%s: --body: there is no \"%.40s\", the first is \"%s\"", q->word, q->body,
+                      scene->body[0].name);
 }
 
 pal_err pal_study_input_open(const pal_study_request *q, pal_study_input *out, pal_diagnostic *diag)

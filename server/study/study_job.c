@@ -153,8 +153,7 @@ static pal_err study(pal_study_job *job)
     int n = err ? 0 : pal_study_list(job, entry);
     /* with no point left to measure, the reference is used only if it costs nothing */
     bool whole = !err && !job->options->recall && all_known(job, entry, n);
-    if (!err && n == 0)
-        err = pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "no method of those asked for fits the body");
+    if (!err && n == 0) err = PAL_REFUSE(job->diag, "no method of those asked for fits the body");
     if (whole) transfer_results(job->out, before);
     if (!err && !whole) err = choose_probes(job);
     if (!err && !whole) err = job->n_load == 0 ? press(job) : pal_study_reference(job);
@@ -191,9 +190,9 @@ static pal_err begin(pal_study_job *job, const pal_scene *scene, int body)
     const pal_study_options *o = job->options;
     memset(out, 0, sizeof *out);
     if (body < 0 || body >= scene->n_body)
-        return pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "body %d: the scene has %d", body, scene->n_body);
+        return PAL_REFUSE(job->diag, "body %d: the scene has %d", body, scene->n_body);
     if (!(o->seconds >= 0 && o->seconds <= 60))
-        return pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "seconds: %g is outside [0, 60]", o->seconds);
+        return PAL_REFUSE(job->diag, "seconds: %g is outside [0, 60]", o->seconds);
     job->scene = malloc(sizeof *job->scene);
     job->problem = calloc(1, sizeof *job->problem);
     if (!job->scene || !job->problem) return pal_diagnostic_set(job->diag, PAL_ERR_MEMORY, "no memory for a study");
@@ -301,12 +300,10 @@ pal_err pal_study_problem_scene(const pal_problem *problem, const pal_surface *s
                                 pal_configured_scene **out)
 {
     *out = NULL;
-    if (problem->n_support == 0)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "supports: none, so a live body is held by nothing");
+    if (problem->n_support == 0) return PAL_REFUSE(diag, "supports: none, so a live body is held by nothing");
     for (int k = 0; k < problem->n_support; k++)
         if (problem->support[k].moved && pal_norm3(problem->support[k].move_m) > 0)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "supports[%d]: moves, a live body's support stands still",
-                                      k);
+            return PAL_REFUSE(diag, "supports[%d]: moves, a live body's support stands still", k);
     pal_configured_scene *set = calloc(1, sizeof *set);
     if (!set) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a scene");
     pal_err err = problem_voxels(problem, surface, &set->mesh, diag);
@@ -325,8 +322,7 @@ pal_err pal_study_problem(const pal_problem *problem, const pal_problem_case *lo
     pal_study_job job = {.options = options, .out = out, .diag = diag ? diag : &own};
     pal_configured_scene *set = NULL;
     memset(out, 0, sizeof *out);
-    if (load_case->n_load == 0)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "load case \"%s\": has no load", load_case->id);
+    if (load_case->n_load == 0) return PAL_REFUSE(diag, "load case \"%s\": has no load", load_case->id);
     PAL_TRY(pal_study_problem_scene(problem, surface, job.diag, &set));
     pal_err err = begin(&job, &set->scene, options->body);
     if (!err) {

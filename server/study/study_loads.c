@@ -125,8 +125,7 @@ static pal_err scale_load(pal_study_job *job, int index, double length_scale_m)
         PAL_TRY(pal_study_cached_static(job, &s, job->load[index], job->now, &n_node, job->diag));
         double moved = pal_max_norm3(job->now, job->n_probe);
         if (!(moved > 0) || !isfinite(moved))
-            return pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "%s of %g N moves nothing", job->load[index]->id,
-                                      pal_norm3(total));
+            return PAL_REFUSE(job->diag, "%s of %g N moves nothing", job->load[index]->id, pal_norm3(total));
         double wanted = share[round] * length_scale_m / moved, size_N = pal_norm3(total);
         /* limited by the tool's force cap and by the deformation that the body can bear */
         double cap_N = job->scene->n_tool > 0 ? job->scene->tool[0].force_cap_N : PAL_PULL_N;
@@ -162,8 +161,7 @@ pal_err pal_study_presses(pal_study_job *job)
     for (int i = 0; i < w.body->n_dof; i++) n_fixed += w.body->support[i] != 0;
     pal_err err = PAL_ERR_OK;
     if (n_fixed == 0 && !job->adaptive)
-        err = pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "body \"%s\": nothing holds it, so a press has no rest",
-                                 job->scene->body[0].name);
+        err = PAL_REFUSE(job->diag, "body \"%s\": nothing holds it, so a press has no rest", job->scene->body[0].name);
     if (!err) err = choose_press_points(job, &w, probe);
     const pal_surface *surface = &w.set->scene.body[0].mesh->surface;
     double length_scale_m = diagonal(surface, low);

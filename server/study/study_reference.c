@@ -231,8 +231,7 @@ pal_err pal_study_reference(pal_study_job *job)
         job->reference = pal_study_fit_size(job, PAL_REFERENCE_RATIO * job->reference);
         PAL_TRY(at_rest(job));
     }
-    if (!(job->out->max_m > 0))
-        return pal_diagnostic_set(job->diag, PAL_ERR_REFUSED, "the loads move nothing: there is nothing to compare");
+    if (!(job->out->max_m > 0)) return PAL_REFUSE(job->diag, "the loads move nothing: there is nothing to compare");
     for (int i = 0; i < job->n_probe; i++)
         if (pal_norm3(job->static_u[0] + 3 * i) > pal_norm3(job->static_u[0] + 3 * job->tip)) job->tip = i;
     PAL_TRY(report_progress(job, "reference in motion", job->n_load + 1));

@@ -180,7 +180,7 @@ pal_err pal_study_stem(const char *word, const char *folder, char out[PAL_STUDY_
         n = snprintf(out, PAL_STUDY_PATH, "%.*s_study", stem, word);
     /* room for a file ending */
     if (n < 0 || n + 8 >= PAL_STUDY_PATH)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%.80s...: the path is too long", folder ? folder : word);
+        return PAL_REFUSE(diag, "%.80s...: the path is too long", folder ? folder : word);
     return PAL_ERR_OK;
 }
 
@@ -224,8 +224,7 @@ pal_err pal_study_file_write(const pal_study_file *file, const char *path, pal_d
     if (!json) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for its text", path);
     size_t n = strlen(json);
     pal_err err = n > PAL_JSON_MAX_BYTES
-                      ? pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: would have %zu bytes, more than %d", path, n,
-                                           PAL_JSON_MAX_BYTES)
+                      ? PAL_REFUSE(diag, "%s: would have %zu bytes, more than %d", path, n, PAL_JSON_MAX_BYTES)
                       : pal_file_write(path, json, n, diag);
     cJSON_free(json);
     return err;

@@ -131,7 +131,7 @@ static pal_err surface_traction(const pal_study_world *w, const pal_problem_load
             f[3 * node_of(w, i) + c] +=
                 share[i] * (load->has_traction ? load->traction_Pa[c] : load->total_N[c] / area);
     free(share);
-    return area > 0 ? PAL_ERR_OK : pal_diagnostic_set(diag, PAL_ERR_REFUSED, "load \"%s\" meets no surface", name);
+    return area > 0 ? PAL_ERR_OK : PAL_REFUSE(diag, "load \"%s\" meets no surface", name);
 }
 
 static pal_err surface_forces(const pal_study_world *w, const pal_problem_case *load, double *f, pal_diagnostic *diag)
@@ -139,8 +139,7 @@ static pal_err surface_forces(const pal_study_world *w, const pal_problem_case *
     for (int k = 0; k < load->n_load; k++) {
         const pal_problem_load *l = &load->load[k];
         if (l->kind == PAL_LOAD_TRACTION) PAL_TRY(surface_traction(w, l, load->id, f, diag));
-        if (l->kind == PAL_LOAD_POINT)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "load \"%s\": stands on a point", load->id);
+        if (l->kind == PAL_LOAD_POINT) return PAL_REFUSE(diag, "load \"%s\": stands on a point", load->id);
         for (int i = 0; i < w->body->n_node && l->kind == PAL_LOAD_GRAVITY; i++)
             pal_axpy3(f + 3 * i, w->body->node_mass_kg[i], l->gravity_m_s2);
     }
