@@ -1,10 +1,11 @@
 /* `palpate-calibrate-mpi`: calibration by annealing whose evaluations run on many processes (MPI ranks), for studies of
  * many organs, load cases and seeds. Rank 0 anneals; every rank makes the same calibration from the same files and
- * evaluates what rank 0 sends, points in turn. The cost depends on theta alone and the annealing on the seed alone, so
+ * evaluates its share of each batch. The cost depends on theta alone and the annealing on the seed alone, so
  * the result is the same to the bit for any number of ranks and after an interruption: evaluations in the journal are
  * read instead of computed. */
 #include "server/base/clock.h"
 #include "server/base/hash.h"
+#include "server/base/heap.h"
 #include "server/base/team.h"
 #include "server/calibrate/calibrate_cases.h"
 #include "server/calibrate/journal.h"
@@ -18,11 +19,9 @@
 #include <math.h>
 #include <mpi.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <time.h>
 
-enum { MAX_PROBLEM = 256, MAX_SEED = 64, TAG_COUNT = 1, TAG_THETA, TAG_COST, COUNT_END = -1 };
+enum { MAX_PROBLEM = 256, MAX_SEED = 64, END = -1 };
 
 static const char about[] =
     "Calibrates springs as `palpate calibrate --method annealing` does, with evaluations distributed over MPI\n"
@@ -52,23 +51,20 @@ typedef struct job {
     pal_calibration_workspace *workspace[PAL_TEAM_MAX];
     uint64_t fingerprint; /* of the cost function */
     /* the current batch */
-    double *theta, *cost; /* [batch][n_parameter], [batch] */
-    bool no_memory;       /* in one of them */
+    double *theta, *cost; /* [batch][n_parameter], [batch], with room for equal shares of the ranks */
     int *missing;         /* points of the batch that are not in the journal [batch] */
     int64_t n_computed, n_taken;
     pal_diagnostic diag;
 } job;
 
-/* ---- messages ---- */
-
 /* waits for a message without keeping a core busy that another rank may need */
-static void wait_for(int from, int tag, MPI_Status *status)
+static void wait_for(MPI_Request *request)
 {
     int there = 0;
-    for (long us = 1;; us = us < 200 ? 2 * us : 200) {
-        MPI_Iprobe(from, tag, MPI_COMM_WORLD, &there, status);
-        if (there) return;
+    MPI_Test(request, &there, MPI_STATUS_IGNORE);
+    for (long us = 1; !there; us = us < 200 ? 2 * us : 200) {
         nanosleep(&(struct timespec){.tv_nsec = 1000 * us}, NULL);
+        MPI_Test(request, &there, MPI_STATUS_IGNORE);
     }
 }
 
@@ -117,92 +113,49 @@ static void evaluate_one(void *user, int worker, int index)
     j->cost[index] = err == PAL_ERR_MEMORY ? NAN : err ? DBL_MAX : v.error_percent;
 }
 
-/* every rank but 0: evaluates what rank 0 sends, until COUNT_END */
-static void serve(job *j)
+/* Evaluates rank 0's m points, which stand at the front of its j->theta, in equal shares on all ranks; their errors
+ * come into its j->cost. m is read on rank 0 only. False: it was END, no batch follows */
+static bool evaluate_shares(job *j, int m)
 {
-    for (;;) {
-        MPI_Status status;
-        int n;
-        wait_for(0, TAG_COUNT, &status);
-        MPI_Recv(&n, 1, MPI_INT, 0, TAG_COUNT, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
-        if (n == COUNT_END) return;
-        MPI_Recv(j->theta, n * j->info.n_parameter, MPI_DOUBLE, 0, TAG_THETA, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
-        pal_team_run(j->team, n, evaluate_one, j);
-        MPI_Send(j->cost, n, MPI_DOUBLE, 0, TAG_COST, MPI_COMM_WORLD);
-    }
+    MPI_Request request;
+    MPI_Ibcast(&m, 1, MPI_INT, 0, MPI_COMM_WORLD, &request);
+    wait_for(&request);
+    if (m == END) return false;
+    int share = (m + j->n_rank - 1) / j->n_rank, left = m - j->rank * share, n = share * j->info.n_parameter;
+    MPI_Scatter(j->theta, n, MPI_DOUBLE, j->rank ? j->theta : MPI_IN_PLACE, n, MPI_DOUBLE, 0, MPI_COMM_WORLD);
+    pal_team_run(j->team, left < 0 ? 0 : left < share ? left : share, evaluate_one, j);
+    MPI_Igather(j->rank ? j->cost : MPI_IN_PLACE, share, MPI_DOUBLE, j->cost, share, MPI_DOUBLE, 0, MPI_COMM_WORLD,
+                &request);
+    wait_for(&request);
+    return true;
 }
 
-static void end_ranks(const job *j)
-{
-    const int n = COUNT_END;
-    for (int r = 1; r < j->n_rank; r++) MPI_Send(&n, 1, MPI_INT, r, TAG_COUNT, MPI_COMM_WORLD);
-}
-
-/* the share of a rank in m points: the points rank, rank + n_rank ... */
-static int share_of(const job *j, int rank, int m)
-{
-    return rank < m ? (m - rank - 1) / j->n_rank + 1 : 0;
-}
-
-/* copies a rank's points of the batch to the front of j->theta */
-static int pick(job *j, int rank, const double *theta, int m)
-{
-    size_t n = (size_t)j->info.n_parameter;
-    int mine = share_of(j, rank, m);
-    for (int k = 0; k < mine; k++)
-        memcpy(j->theta + (size_t)k * n, theta + (size_t)j->missing[rank + k * j->n_rank] * n, n * sizeof *theta);
-    return mine;
-}
-
-/* a rank's errors, from j->cost, into the batch and the journal */
-static pal_err gather(job *j, int rank, const double *theta, int m, double *cost)
-{
-    pal_err err = PAL_ERR_OK;
-    int mine = share_of(j, rank, m);
-    for (int k = 0; k < mine; k++) {
-        int at = j->missing[rank + k * j->n_rank];
-        cost[at] = j->cost[k];
-        j->n_computed++;
-        if (isnan(cost[at]))
-            j->no_memory = true;
-        else if (!err)
-            err = store_evaluation(j, theta + (size_t)at * (size_t)j->info.n_parameter, cost[at]);
-    }
-    return err;
-}
-
-/* a batch of the walk: from the journal, else round robin over the ranks; on rank 0 */
+/* a batch of the walk, on rank 0: from the journal, else evaluated and written there */
 static pal_err evaluate(void *user, const double *theta, int n, double *cost)
 {
     job *j = user;
     size_t n_parameter = (size_t)j->info.n_parameter;
-    int m = 0, waiting = 0;
+    int m = 0;
+    bool no_memory = false;
+    pal_err err = PAL_ERR_OK;
     for (int i = 0; i < n; i++) {
-        if (find_evaluation(j, theta + (size_t)i * n_parameter, &cost[i]))
+        const double *point = theta + (size_t)i * n_parameter;
+        if (find_evaluation(j, point, &cost[i])) {
             j->n_taken++;
-        else
-            j->missing[m++] = i;
+            continue;
+        }
+        memcpy(j->theta + (size_t)m * n_parameter, point, n_parameter * sizeof *point);
+        j->missing[m++] = i;
     }
-    for (int r = 1; r < j->n_rank; r++) {
-        int share = pick(j, r, theta, m);
-        if (share == 0) continue;
-        MPI_Send(&share, 1, MPI_INT, r, TAG_COUNT, MPI_COMM_WORLD);
-        MPI_Send(j->theta, share * j->info.n_parameter, MPI_DOUBLE, r, TAG_THETA, MPI_COMM_WORLD);
-        waiting++;
+    if (m > 0) evaluate_shares(j, m);
+    j->n_computed += m;
+    for (int k = 0; k < m; k++) {
+        int at = j->missing[k];
+        cost[at] = j->cost[k];
+        no_memory |= isnan(cost[at]);
+        if (!err && !isnan(cost[at])) err = store_evaluation(j, theta + (size_t)at * n_parameter, cost[at]);
     }
-    int mine = pick(j, 0, theta, m);
-    pal_team_run(j->team, mine, evaluate_one, j);
-    pal_err err = gather(j, 0, theta, m, cost);
-    for (; waiting > 0; waiting--) {
-        MPI_Status status;
-        wait_for(MPI_ANY_SOURCE, TAG_COST, &status);
-        int from = status.MPI_SOURCE;
-        MPI_Recv(j->cost, share_of(j, from, m), MPI_DOUBLE, from, TAG_COST, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
-        pal_err next = gather(j, from, theta, m, cost);
-        if (!err) err = next;
-    }
-    if (!err && j->no_memory) err = pal_diagnostic_set(&j->diag, PAL_ERR_MEMORY, "no memory to evaluate constants");
-    return err;
+    return no_memory && !err ? pal_diagnostic_set(&j->diag, PAL_ERR_MEMORY, "no memory to evaluate constants") : err;
 }
 
 /* ---- a problem ---- */
@@ -239,14 +192,14 @@ static pal_err make(job *j, const char *problem)
     j->input.problem = problem;
     PAL_TRY(pal_calibrate_cases_read(&j->input, j->set, &j->diag));
     PAL_TRY(pal_calibrate_cases_make(j->set, &j->options, &j->c, &j->info, &j->diag));
-    size_t batch = (size_t)j->n_batch;
-    j->theta = malloc(batch * (size_t)j->info.n_parameter * sizeof *j->theta);
-    j->cost = malloc(batch * sizeof *j->cost);
-    j->missing = malloc(batch * sizeof *j->missing);
-    bool room = j->theta && j->cost && j->missing;
-    for (int w = 0; w < pal_team_size(j->team) && room; w++)
-        room = !pal_calibration_workspace_create(j->c, &j->workspace[w]);
-    if (!room) return pal_diagnostic_set(&j->diag, PAL_ERR_MEMORY, "%s: no memory for its evaluations", problem);
+    size_t batch = (size_t)(j->n_batch + j->n_rank);
+    pal_err err = PAL_ERR_OK;
+    PAL_ARRAY(&err, j->theta, batch * (size_t)j->info.n_parameter);
+    PAL_ARRAY(&err, j->cost, batch);
+    PAL_ARRAY(&err, j->missing, batch);
+    for (int w = 0; w < pal_team_size(j->team) && !err; w++)
+        err = pal_calibration_workspace_create(j->c, &j->workspace[w]);
+    if (err) return pal_diagnostic_set(&j->diag, PAL_ERR_MEMORY, "%s: no memory for its evaluations", problem);
     PAL_TRY(pal_calibration_evaluate(j->c, j->workspace[0], j->info.start, PAL_CALIBRATION_FIT, &v, NULL, &j->diag));
     j->fingerprint = fingerprint(j, v.error_percent);
     return PAL_ERR_OK;
@@ -254,19 +207,12 @@ static pal_err make(job *j, const char *problem)
 
 static void unmake(job *j)
 {
-    for (int w = 0; w < PAL_TEAM_MAX; w++) {
-        pal_calibration_workspace_destroy(j->workspace[w]);
-        j->workspace[w] = NULL;
-    }
+    for (int w = 0; w < PAL_TEAM_MAX; w++) pal_calibration_workspace_destroy(j->workspace[w]);
+    memset(j->workspace, 0, sizeof j->workspace);
     pal_calibration_destroy(j->c);
-    j->c = NULL;
     pal_calibrate_cases_free(j->set);
-    *j->set = (pal_calibrate_cases){0};
-    free(j->theta);
-    free(j->cost);
-    free(j->missing);
-    j->theta = j->cost = NULL;
-    j->missing = NULL;
+    PAL_FREE(j->theta, j->cost, j->missing);
+    j->c = NULL, j->theta = j->cost = NULL, j->missing = NULL;
 }
 
 /* is the calibration the same on every rank? */
@@ -382,10 +328,11 @@ static pal_err run_one(job *j, const char *problem, cJSON *results)
     pal_err err = agree(j, make(j, problem));
     if (!err) err = agree(j, same_everywhere(j, problem));
     if (!err) err = agree(j, j->journal ? pal_journal_begin(j->journal, j->fingerprint, &j->diag) : PAL_ERR_OK);
-    if (!err && j->rank > 0) serve(j);
+    bool serves = !err && j->rank > 0;
+    while (serves && evaluate_shares(j, 0)) continue;
     if (!err && j->rank == 0) {
         for (int s = 0; s < j->n_seed && !err; s++) err = fit(j, problem, j->seed[s], results);
-        end_ranks(j);
+        evaluate_shares(j, END);
     }
     err = agree(j, err);
     unmake(j);
