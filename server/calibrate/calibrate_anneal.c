@@ -11,14 +11,13 @@
 #include "server/calibrate/calibration.h"
 
 #include "server/base/clock.h"
+#include "server/base/heap.h"
 #include "server/base/team.h"
 #include "server/calibrate/tuning.h"
 #include "server/num/anneal.h"
 
 #include <float.h>
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { MAX_EVALUATION = 4000, MAX_STALL = 1500 };
 /* shares of a lattice's shear modulus, by kind (spring_law.h) */
@@ -181,15 +180,6 @@ static pal_err make(fit *f)
     return PAL_ERR_OK;
 }
 
-static void clean_up(fit *f)
-{
-    pal_team_destroy(f->team);
-    for (int i = 0; i < f->n_workspace && f->workspace; i++) pal_calibration_workspace_destroy(f->workspace[i]);
-    free(f->workspace);
-    free(f->err);
-    free(f->first);
-}
-
 pal_err pal_fit_anneal(const pal_calibration *calibration, const pal_fit_options *options, double *theta,
                        pal_fit_result *out, pal_diagnostic *diag)
 {
@@ -209,6 +199,8 @@ pal_err pal_fit_anneal(const pal_calibration *calibration, const pal_fit_options
         err = walk(&f, theta, diag);
     if (!err) err = pal_calibration_evaluate(c, f.workspace[0], theta, all, &out->value, NULL, diag);
     out->seconds = pal_clock_s() - f.begin_s;
-    clean_up(&f);
+    pal_team_destroy(f.team);
+    for (int i = 0; i < f.n_workspace && f.workspace; i++) pal_calibration_workspace_destroy(f.workspace[i]);
+    PAL_FREE(f.workspace, f.err, f.first);
     return err;
 }

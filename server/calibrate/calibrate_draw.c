@@ -106,11 +106,6 @@ static bool springs_at_nodes(const pal_calibrate_run *run, const double *theta, 
 
 /* ---- the displayed body ---- */
 
-/* one state of the surface [n_vertex] and the values drawn on it */
-typedef struct shape {
-    double *x, *value; /* [n_vertex][3], [n_vertex] */
-} shape;
-
 enum { REST, TRUTH, START, FOUND, N_SHAPE };
 
 typedef struct drawing {
@@ -118,8 +113,8 @@ typedef struct drawing {
     const pal_prepared *mesh;
     int n_vertex, n_node, index; /* index: of the case */
     pal_arena *arena;
-    double *node_u[N_SHAPE], *node_x, *value;
-    shape shape[N_SHAPE];
+    double *node_u[N_SHAPE], *node_x, *value; /* at the nodes */
+    double *x[N_SHAPE], *distance[N_SHAPE];   /* of the surface [n_vertex][3]; to the truth [n_vertex] */
     double *k_d, *young;
     uint8_t *fixed;
     double *load_at, *load_N;
@@ -136,9 +131,9 @@ static pal_err take_memory(drawing *d, pal_diagnostic *diag)
     bool made = true;
     for (int k = 0; k < N_SHAPE; k++) {
         d->node_u[k] = PAL_NEW(arena, double, 3 * n);
-        d->shape[k].x = PAL_NEW(arena, double, 3 * m);
-        d->shape[k].value = PAL_NEW(arena, double, m);
-        made = made && d->node_u[k] && d->shape[k].x && d->shape[k].value;
+        d->x[k] = PAL_NEW(arena, double, 3 * m);
+        d->distance[k] = PAL_NEW(arena, double, m);
+        made = made && d->node_u[k] && d->x[k] && d->distance[k];
     }
     double **const more[] = {&d->node_x, &d->value, &d->k_d, &d->young, &d->load_at, &d->load_N};
     const int size[] = {3 * n, n, m, m, 3 * n, 3 * n};
@@ -169,9 +164,9 @@ static void skin_shape(drawing *d, int which)
     for (int i = 0; i < 3 * d->n_node; i++) d->node_x[i] = t->x[i] + d->node_u[which][i];
     pal_skin_frames(&d->mesh->skin, d->node_x, d->frames);
     pal_skin_evaluate(&d->mesh->skin, d->node_x, d->frames, d->shown);
-    for (int i = 0; i < 3 * d->n_vertex; i++) d->shape[which].x[i] = (double)d->shown[i];
+    for (int i = 0; i < 3 * d->n_vertex; i++) d->x[which][i] = (double)d->shown[i];
     for (int i = 0; i < d->n_node; i++) d->value[i] = pal_dist3(d->node_u[which] + 3 * i, d->node_u[TRUTH] + 3 * i);
-    skin_value(d, d->value, d->shape[which].value);
+    skin_value(d, d->value, d->distance[which]);
 }
 
 static void take_loads(drawing *d)
@@ -211,77 +206,53 @@ static void take_vertices(drawing *d)
 static double length_unit(const drawing *d, const char **name)
 {
     double max = 0;
-    for (int v = 0; v < d->n_vertex; v++) max = fmax(max, fmax(d->shape[START].value[v], d->shape[FOUND].value[v]));
+    for (int v = 0; v < d->n_vertex; v++) max = fmax(max, fmax(d->distance[START][v], d->distance[FOUND][v]));
     *name = max >= 0.5 ? "m" : max >= 5e-4 ? "mm" : "um";
     return max >= 0.5 ? 1 : max >= 5e-4 ? 1e3 : 1e6;
 }
 
 /* ---- pictures ---- */
 
-static int add_shapes(drawing *d, pal_body_picture *to, char title[][TITLE])
+/* the body at rest with its loads, its truth, start and result */
+static void add_shapes(drawing *d, pal_body_picture *to, char title[][TITLE])
 {
     const pal_calibrate_run *run = d->run;
-    const pal_surface *s = &d->mesh->surface;
     const double percent[N_SHAPE] = {0, 0, run->start.case_percent[d->index], run->last.case_percent[d->index]};
-    const char *unit, *truth = run->set.list[d->index].truth_name, *id = run->set.id[d->index];
+    const char *unit, *truth = run->set.list[d->index].truth_name;
     double scale = length_unit(d, &unit);
-    snprintf(title[REST], TITLE, "at rest, load %.40s", id);
+    snprintf(title[REST], TITLE, "at rest, load %.40s", run->set.id[d->index]);
     snprintf(title[TRUTH], TITLE, "truth: %.40s", truth ? truth : "finite elements");
+    to[REST].n_load = d->n_load, to[REST].load_at = d->load_at, to[REST].load_N = d->load_N;
+    for (int k = TRUTH; k < N_SHAPE; k++) to[k].x = d->x[k], to[k].rest = d->x[REST];
     for (int k = START; k < N_SHAPE; k++) {
         const char *what = k == START ? "springs, default start" : "springs, calibrated";
         if (percent[k] < DBL_MAX)
             snprintf(title[k], TITLE, "%s: %.2g %% RMS", what, percent[k]);
         else
             snprintf(title[k], TITLE, "%s: no rest", what);
-        for (int v = 0; v < d->n_vertex; v++) d->shape[k].value[v] *= scale;
+        for (int v = 0; v < d->n_vertex; v++) d->distance[k][v] *= scale;
+        to[k].value = d->distance[k], to[k].value_title = "distance to the truth", to[k].unit = unit;
     }
-    for (int k = 0; k < N_SHAPE; k++) {
-        to[k] = (pal_body_picture){.title = title[k],
-                                   .n_vertex = d->n_vertex,
-                                   .n_tri = s->n_tri,
-                                   .x = d->shape[k].x,
-                                   .tri = s->tri,
-                                   .fixed = d->fixed};
-        if (k == REST) {
-            to[k].n_load = d->n_load, to[k].load_at = d->load_at, to[k].load_N = d->load_N;
-            continue;
-        }
-        to[k].rest = d->shape[REST].x;
-        if (k == TRUTH) continue;
-        to[k].value = d->shape[k].value;
-        to[k].value_title = "distance to the truth";
-        to[k].unit = unit;
-    }
-    return N_SHAPE;
 }
 
 /* the map of constants beside the material it should resemble */
-static int add_maps(const drawing *d, pal_body_picture *to, char title[][TITLE])
+static void add_maps(const drawing *d, pal_body_picture *to, char title[][TITLE])
 {
-    const pal_surface *s = &d->mesh->surface;
     const int *n = d->run->info.grid->n;
     snprintf(title[0], TITLE, "found on a grid of %d x %d x %d", n[0], n[1], n[2]);
     snprintf(title[1], TITLE, "stiffness of the material");
-    for (int k = 0; k < 2; k++) {
-        to[k] = (pal_body_picture){.title = title[k],
-                                   .n_vertex = d->n_vertex,
-                                   .n_tri = s->n_tri,
-                                   .x = d->shape[REST].x,
-                                   .tri = s->tri,
-                                   .fixed = d->fixed,
-                                   .value = k ? d->young : d->k_d,
-                                   .value_title = k ? "E" : "k_d of edges",
-                                   .unit = k ? "Pa" : "J",
-                                   .log = true};
-    }
-    return 2;
+    to[0].value = d->k_d, to[0].value_title = "k_d of edges", to[0].unit = "J";
+    to[1].value = d->young, to[1].value_title = "E", to[1].unit = "Pa";
+    to[0].log = to[1].log = true;
 }
 
 static pal_err draw(drawing *d, const char *path, pal_diagnostic *diag)
 {
     const pal_calibrate_run *run = d->run;
+    const pal_surface *s = &d->mesh->surface;
     char title[N_SHAPE + 2][TITLE];
     pal_body_picture picture[N_SHAPE + 2];
+    const int n = run->info.grid ? N_SHAPE + 2 : N_SHAPE;
     PAL_TRY(take_memory(d, diag));
     PAL_TRY(truth_at_nodes(run, d->index, d->node_u[TRUTH], diag));
     springs_at_nodes(run, run->info.start, d->index, d->node_u[START]);
@@ -289,8 +260,15 @@ static pal_err draw(drawing *d, const char *path, pal_diagnostic *diag)
     for (int k = 0; k < N_SHAPE; k++) skin_shape(d, k);
     take_loads(d);
     take_vertices(d);
-    int n = add_shapes(d, picture, title);
-    if (run->info.grid) n += add_maps(d, picture + n, title + n);
+    for (int k = 0; k < n; k++)
+        picture[k] = (pal_body_picture){.title = title[k],
+                                        .n_vertex = d->n_vertex,
+                                        .n_tri = s->n_tri,
+                                        .x = d->x[REST],
+                                        .tri = s->tri,
+                                        .fixed = d->fixed};
+    add_shapes(d, picture, title);
+    if (run->info.grid) add_maps(d, picture + N_SHAPE, title + N_SHAPE);
     return pal_body_picture_write(picture, n, path, diag);
 }
 
@@ -323,13 +301,11 @@ pal_err pal_calibrate_write_vtk(const pal_calibrate_run *run, const char *path, 
         n_field++;
     }
     pal_err err = PAL_ERR_OK;
-    for (int k = 0; k < run->set.n && !err; k++) {
-        err = truth_at_nodes(run, k, at, diag);
-        snprintf(name[n_field], sizeof name[0], "truth_%s_m", run->set.id[k]);
-        field[n_field] = (pal_vtk_field){.name = name[n_field], .n_component = 3, .value = at};
-        n_field++, at += 3 * n;
-        if (!springs_at_nodes(run, run->theta, k, at)) continue;
-        snprintf(name[n_field], sizeof name[0], "springs_%s_m", run->set.id[k]);
+    for (int k = 0; k < 2 * run->set.n && !err; k++) {
+        bool springs = k % 2;
+        if (springs && !springs_at_nodes(run, run->theta, k / 2, at)) continue;
+        if (!springs) err = truth_at_nodes(run, k / 2, at, diag);
+        snprintf(name[n_field], sizeof name[0], springs ? "springs_%s_m" : "truth_%s_m", run->set.id[k / 2]);
         field[n_field] = (pal_vtk_field){.name = name[n_field], .n_component = 3, .value = at};
         n_field++, at += 3 * n;
     }

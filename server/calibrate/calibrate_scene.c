@@ -2,6 +2,7 @@
 #include "server/calibrate/calibrate_run.h"
 
 #include "server/base/vec3.h"
+#include "server/scene/scene_import.h"
 #include "server/sim/world/world.h"
 
 #include <float.h>
@@ -40,24 +41,12 @@ double pal_calibrate_mean(const pal_calibrate_run *run, const pal_calibration_va
 /* "/a/Gear 2.json" -> "gear_2": a valid name for a scene and its mesh */
 static void name_of(const char *path, char out[PAL_NAME])
 {
-    const char *slash = strrchr(path, '/'), *from = slash ? slash + 1 : path, *dot = strrchr(from, '.');
-    size_t n = 0, length = dot && dot > from ? (size_t)(dot - from) : strlen(from);
-    for (size_t k = 0; k < length && n < PAL_NAME - 1; k++) {
-        char c = from[k];
-        if (c >= 'A' && c <= 'Z') c = (char)(c - 'A' + 'a');
-        bool fine = (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
-        if (fine || c == ' ' || c == '.') out[n++] = fine ? c : '_';
-    }
-    out[n] = 0;
-    if (n == 0) snprintf(out, PAL_NAME, "calibrated");
-}
-
-/* constants as keys of the model */
-static pal_err put_constants(const pal_calibrate_run *run, pal_config_entry *model, pal_diagnostic *diag)
-{
-    for (int k = 0; k < run->info.n_kind; k++)
-        PAL_TRY(pal_entry_put_number(model, pal_calibrate_key(run, k, false), exp(run->theta[k]), diag));
-    return PAL_ERR_OK;
+    char stem[PAL_CALIBRATE_PATH];
+    const char *slash = strrchr(path, '/');
+    snprintf(stem, sizeof stem, "%s", slash ? slash + 1 : path);
+    char *dot = strrchr(stem, '.');
+    if (dot && dot > stem) *dot = 0;
+    pal_scene_plain_name(stem, "calibrated", out);
 }
 
 /* constants at all nodes of the grid; nodes outside the body take the mean of the others */
@@ -87,7 +76,9 @@ static pal_err put_model(const pal_calibrate_run *run, pal_loaded_scene *scene, 
     pal_config_entry *model = &scene->scene.body[0].model;
     pal_entry_init(model, "bodies[0].model", "tet_springs");
     PAL_TRY(pal_entry_put_text(model, "weights", run->options.equal ? "equal" : "volume", diag));
-    PAL_TRY(run->info.grid ? put_grid(run, scene, diag) : put_constants(run, model, diag));
+    if (run->info.grid) PAL_TRY(put_grid(run, scene, diag));
+    for (int k = 0; k < run->info.n_kind && !run->info.grid; k++)
+        PAL_TRY(pal_entry_put_number(model, pal_calibrate_key(run, k, false), exp(run->theta[k]), diag));
     return run->options.without_area ? pal_entry_put_number(model, "k_area_J", 0, diag) : PAL_ERR_OK;
 }
 

@@ -168,11 +168,6 @@ static pal_err make_loads(const job *j, int index)
 
 /* ---- truths ---- */
 
-static bool report_progress(const pal_calibration *c, const char *what, double fraction)
-{
-    return !c->options.progress || c->options.progress(what, fraction, c->options.user);
-}
-
 static pal_err truth_by_elements(const job *j, int index)
 {
     pal_calibration *c = j->c;
@@ -234,7 +229,7 @@ static pal_err make_truth(const job *j, int index)
     pal_fit_case *fit = &c->fit[index];
     const pal_calibrate_case *k = &c->cases[index];
     fit->linear = k->linear;
-    if (!report_progress(c, "truth", (double)index / c->n_case))
+    if (c->options.progress && !c->options.progress("truth", (double)index / c->n_case, c->options.user))
         return pal_diagnostic_set(j->diag, PAL_ERR_STATE, "stopped before the truth of \"%s\"", k->load_case->id);
     PAL_TRY(k->samples ? truth_by_samples(j, index) : truth_by_elements(j, index));
     fit->max_m = pal_max_norm3(fit->u, fit->n_point);
@@ -293,14 +288,6 @@ static pal_err make_grid(const job *j)
     return make_edges(j);
 }
 
-/* mean weight of a kind's springs */
-static double mean_weight(const pal_springs *s)
-{
-    double sum = 0;
-    for (int i = 0; i < s->n_item; i++) sum += s->q[i];
-    return sum / s->n_item;
-}
-
 static pal_err make_parameters(const job *j)
 {
     static const double hand[PAL_SPRING_KINDS] = {0.2, 0.4, 1};
@@ -317,17 +304,14 @@ static pal_err make_parameters(const job *j)
     for (int k = 0; k < c->info.n_kind; k++) {
         const pal_springs *s = &c->lattice.kind[c->info.kind[k]];
         /* the derived law weights springs by volume: the total energy is the same when all springs are alike */
-        double f = factor[c->info.kind[k]], by_hand = hand[c->info.kind[k]] / mean_weight(s);
-        double start = log(scale * (c->options.equal ? hand[c->info.kind[k]] : f));
-        c->manual_theta[k] = log(scale * by_hand);
-        for (int i = 0; i < c->info.n_used; i++) {
-            c->theta[k * c->info.n_used + i] = start;
-            c->low[k * c->info.n_used + i] = start - range * log(10);
-            c->high[k * c->info.n_used + i] = start + range * log(10);
-            if (c->info.kind[k] == PAL_SPRING_VOLUME && c->options.min_volume_ratio > 0)
-                c->low[k * c->info.n_used + i] =
-                    fmax(c->low[k * c->info.n_used + i], start + log(c->options.min_volume_ratio));
-        }
+        double f = factor[c->info.kind[k]], by_hand = hand[c->info.kind[k]], sum = 0;
+        double start = log(scale * (c->options.equal ? by_hand : f)), low = start - range * log(10);
+        if (c->info.kind[k] == PAL_SPRING_VOLUME && c->options.min_volume_ratio > 0)
+            low = fmax(low, start + log(c->options.min_volume_ratio));
+        for (int i = 0; i < s->n_item; i++) sum += s->q[i];
+        c->manual_theta[k] = log(scale * (by_hand / (sum / s->n_item)));
+        for (int i = k * c->info.n_used; i < (k + 1) * c->info.n_used; i++)
+            c->theta[i] = start, c->low[i] = low, c->high[i] = start + range * log(10);
     }
     return PAL_ERR_OK;
 }

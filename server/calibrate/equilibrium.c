@@ -27,11 +27,6 @@ struct pal_equilibrium_workspace {
 
 /* ---- lattice ---- */
 
-static int pair_count(int n_corner)
-{
-    return n_corner * (n_corner + 1) / 2;
-}
-
 static pal_err copy_springs(const pal_spring_set *from, pal_lattice *to)
 {
     pal_springs *s = &to->kind[from->spring.kind];
@@ -41,7 +36,7 @@ static pal_err copy_springs(const pal_spring_set *from, pal_lattice *to)
                        .item = PAL_NEW(to->arena, int32_t, (size_t)n * (size_t)n_corner),
                        .w = PAL_NEW(to->arena, double, n),
                        .q = PAL_NEW(to->arena, double, n),
-                       .block = PAL_NEW(to->arena, int32_t, n * pair_count(n_corner))};
+                       .block = PAL_NEW(to->arena, int32_t, n * n_corner * (n_corner + 1) / 2)};
     if (!s->item || !s->w || !s->q || !s->block) return PAL_ERR_MEMORY;
     memcpy(s->item, from->item, sizeof *s->item * (size_t)n * (size_t)n_corner);
     for (int i = 0; i < n; i++) {
@@ -229,13 +224,6 @@ static void assemble(pal_equilibrium_workspace *workspace, const double *const k
         stiffness_of(&l->kind[k], (pal_spring_kind)k, k_J[k], x, which, &workspace->matrix);
 }
 
-/* adds a share of the diagonal to it */
-static void shift(pal_block_matrix *a, double share)
-{
-    for (int j = 0; j < a->n; j++)
-        for (int c = 0; c < 3; c++) a->value[9 * (size_t)a->start[j] + 4 * (size_t)c] *= 1 + share;
-}
-
 /* ---- Newton ---- */
 
 /* input of one search */
@@ -288,8 +276,11 @@ static pal_err factor_at(const search *s, const double *x)
     s->report->n_shift++;
     double share = 0;
     for (int k = 0; k < MAX_SHIFT && err == PAL_ERR_NUMERIC; k++) {
+        pal_block_matrix *a = &workspace->matrix;
         assemble(workspace, s->k_J, x, SAFE_HESSIAN);
-        if (share > 0) shift(&workspace->matrix, share);
+        /* adds a share of the diagonal to it */
+        for (int j = 0; j < a->n && share > 0; j++)
+            for (int c = 0; c < 3; c++) a->value[9 * (size_t)a->start[j] + 4 * (size_t)c] *= 1 + share;
         share = share > 0 ? 10 * share : 1e-8;
         err = pal_cholesky_factor(workspace->factor, &workspace->matrix, false);
     }

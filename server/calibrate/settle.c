@@ -15,11 +15,6 @@ void pal_settle_default(pal_settle_options *options)
     *options = (pal_settle_options){.max_simulated_s = 60, .max_work = 1.5e9};
 }
 
-static bool report_progress(const pal_settle_options *options, const char *what, double fraction)
-{
-    return !options->progress || options->progress(what, fraction, options->user);
-}
-
 /* A of settle.h */
 static double mean_gain(const pal_body *body, const double *force_N)
 {
@@ -94,7 +89,8 @@ pal_err pal_settle(pal_world *world, double step_s, const pal_settle_load *load,
             if (err) return pal_diagnostic_set(diag, err, "no memory for the loads of a live run");
         }
     while (!out->steady && time<options->max_simulated_s && * work> 0) {
-        if (!report_progress(options, "live body comes to rest", time / options->max_simulated_s))
+        const double share = time / options->max_simulated_s;
+        if (options->progress && !options->progress("live body comes to rest", share, options->user))
             return pal_diagnostic_set(diag, PAL_ERR_STATE, "stopped while the live body was coming to rest");
         if (pal_world_step(world, step_s) || body->frozen) break;
         time += step_s;

@@ -252,7 +252,7 @@ static pal_err read_scene(const pal_json *at, pal_loaded_scene *loaded)
     pal_scene_default(scene);
     PAL_TRY(pal_json_object(at, pal_scene_keys(PAL_KEYS_SCENE, NULL)));
     PAL_TRY(pal_json_text(at, "name", false, scene->name, sizeof scene->name));
-    pal_scene_plain_name(scene->name, plain);
+    pal_scene_plain_name(scene->name, "organ", plain);
     if (strcmp(plain, scene->name)) return pal_json_refuse_key(at, "name", "has other characters than a-z 0-9 _ -");
     PAL_TRY(pal_json_text(at, "title", true, scene->title, sizeof scene->title));
     PAL_TRY(pal_json_text(at, "source", true, scene->source, sizeof scene->source));

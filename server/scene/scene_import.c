@@ -46,7 +46,7 @@ void pal_scene_stem(const char *path, char *out, size_t n_byte)
     }
 }
 
-void pal_scene_plain_name(const char *text, char out[PAL_NAME])
+void pal_scene_plain_name(const char *text, const char *otherwise, char out[PAL_NAME])
 {
     size_t n = 0;
     for (; *text && n < PAL_NAME - 1; text++) {
@@ -55,7 +55,7 @@ void pal_scene_plain_name(const char *text, char out[PAL_NAME])
         if (fine || c == ' ' || c == '.') out[n++] = fine ? c : '_';
     }
     out[n] = 0;
-    if (n == 0) snprintf(out, PAL_NAME, "organ");
+    if (n == 0) snprintf(out, PAL_NAME, "%s", otherwise);
 }
 
 /* what of a file name may be shown to people */
@@ -310,7 +310,7 @@ static pal_err make_body(pal_loaded_scene *loaded, const char *name, const pal_s
     const pal_cells *cells = report ? NULL : &loaded->cells[0];
     char plain[PAL_NAME];
     double low[3], high[3];
-    pal_scene_plain_name(name, plain);
+    pal_scene_plain_name(name, "organ", plain);
     loaded->n_mesh = 1;
     pal_scene_default(scene);
     scene->step_s = options->fem && !cells ? PAL_FEM_STEP_S : PAL_LIVE_STEP_S;
@@ -355,7 +355,7 @@ pal_err pal_scene_rename(pal_loaded_scene *loaded, const char *name, const char 
 {
     pal_scene *scene = &loaded->scene;
     char plain[PAL_NAME];
-    pal_scene_plain_name(name ? name : scene->name, plain);
+    pal_scene_plain_name(name ? name : scene->name, "organ", plain);
     if (name && strcmp(plain, name))
         return PAL_REFUSE(diag, "name: wanted at most %d of the characters a-z 0-9 _ -", PAL_NAME - 1);
     if (title) PAL_TRY(check_shown("title", title, sizeof scene->title, diag));

@@ -23,6 +23,9 @@ pal_err pal_scene_procedural(const pal_surface_scene *options, pal_loaded_scene 
  * characters that a scene may not hold or too many of them, and then nothing changed */
 pal_err pal_scene_rename(pal_loaded_scene *scene, const char *name, const char *title, const char *source,
                          pal_diagnostic *diag);
+/* text -> [a-z0-9_-], at most PAL_NAME - 1 characters; otherwise: where none of them is there */
+void pal_scene_plain_name(const char *text, const char *otherwise, char out[PAL_NAME]);
+
 /* ---- private to this room ---- */
 
 /* reads, contours a label if it is a volume, chooses the resolution, makes tetrahedra and skin; report may be NULL */
@@ -54,8 +57,6 @@ typedef struct pal_scene_shape {
 } pal_scene_shape;
 pal_err pal_scene_shape_make(const char *name, pal_scene_shape *out, pal_diagnostic *diag);
 
-/* text -> [a-z0-9_-], at most PAL_NAME - 1 characters, never empty */
-void pal_scene_plain_name(const char *text, char out[PAL_NAME]);
 /* file name without folder and endings: "/a/liver.inr.gz" -> "liver" */
 void pal_scene_stem(const char *path, char *out, size_t n_byte);
 #endif

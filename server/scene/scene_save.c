@@ -23,9 +23,9 @@ static void stem_of(const pal_scene *scene, int body, char out[MESH_NAME])
 {
     char plain[PAL_NAME], other[PAL_NAME];
     bool twice = false;
-    pal_scene_plain_name(scene->body[body].name, plain);
+    pal_scene_plain_name(scene->body[body].name, "organ", plain);
     for (int k = 0; k < scene->n_body; k++) {
-        pal_scene_plain_name(scene->body[k].name, other);
+        pal_scene_plain_name(scene->body[k].name, "organ", other);
         twice = twice || (k != body && !strcmp(plain, other));
     }
     if (twice)
