@@ -7,7 +7,9 @@
 #include "server/cli/report.h"
 #include "server/scene/scene_file.h"
 
-enum { PAL_CALIBRATE_PATH = 1200, PAL_CALIBRATE_FILES = 4 };
+enum { PAL_CALIBRATE_PATH = 1200 };
+/* files to write */
+enum { PAL_CALIBRATE_SCENE, PAL_CALIBRATE_TRAJECTORY, PAL_CALIBRATE_PICTURE, PAL_CALIBRATE_VTK, PAL_CALIBRATE_FILES };
 
 typedef struct pal_calibrate_run {
     pal_flag_common common;
@@ -16,7 +18,7 @@ typedef struct pal_calibrate_run {
     pal_calibrate_options options;
     pal_fit_options fit;
     bool annealing;
-    const char *scene, *trajectory, *picture, *vtk; /* paths; all but the first may be NULL */
+    const char *path[PAL_CALIBRATE_FILES]; /* all but the scene's may be NULL */
     /* result */
     pal_calibrate_cases set;
     pal_calibration *calibration;
@@ -27,14 +29,12 @@ typedef struct pal_calibrate_run {
     pal_calibration_value start, hand, last;
     pal_fit_result result;
     double (*trail)[2]; /* error and best so far of every evaluation, per cent; DBL_MAX: no equilibrium [n_trail] */
-    int n_trail, max_trail;
+    int n_trail;
     bool settled; /* live is valid */
     pal_settle_report live;
     double damping_1_s; /* as written to the scene */
     int n_substep;      /* sub-steps of a step of the scene at rest */
     double settle_s, total_s;
-    char file[PAL_CALIBRATE_FILES][PAL_CALIBRATE_PATH];
-    int n_file;
 } pal_calibrate_run;
 
 /* ---- calibrate_scene.c ---- */

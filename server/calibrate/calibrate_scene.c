@@ -119,7 +119,7 @@ static pal_err fill(pal_calibrate_run *run, pal_loaded_scene *loaded, pal_diagno
     size_t n = 0;
     int n_support;
     pal_scene_default(scene);
-    name_of(run->scene, name);
+    name_of(run->path[PAL_CALIBRATE_SCENE], name);
     scene->n_body = 1;
     pal_body_default(body, name, run->info.mesh);
     /* for information, contact and mass */
@@ -148,7 +148,7 @@ pal_err pal_calibrate_scene(pal_calibrate_run *run, pal_loaded_scene **out, pal_
     pal_err err = fill(run, loaded, &reason);
     if (err) {
         pal_scene_free(loaded);
-        return pal_diagnostic_set(diag, err, "%s: %s", run->scene, reason.text);
+        return pal_diagnostic_set(diag, err, "%s: %s", run->path[PAL_CALIBRATE_SCENE], reason.text);
     }
     *out = loaded;
     return PAL_ERR_OK;

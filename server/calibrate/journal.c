@@ -2,12 +2,11 @@
 #include "server/calibrate/journal.h"
 
 #include "server/base/hash.h"
+#include "server/base/heap.h"
 
 #include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/file.h>
 #include <unistd.h>
 
@@ -17,7 +16,7 @@ static const char head[] = "palpate journal 1\n";
 struct pal_journal {
     FILE *file;
     char path[512], subject[DIGITS + 2]; /* subject: digits and a blank */
-    int n, max;
+    int n;
     char **record; /* "KEY = VALUE" [n] */
 };
 
@@ -31,12 +30,7 @@ static pal_err no_io(const pal_journal *j, const char *what, pal_diagnostic *dia
 /* keeps the result of a sound line of n bytes */
 static pal_err keep(pal_journal *j, const char *line, size_t n)
 {
-    if (j->n == j->max) {
-        int more = j->max > 0 ? 2 * j->max : 256;
-        char **record = realloc(j->record, (size_t)more * sizeof *record);
-        if (!record) return PAL_ERR_MEMORY;
-        j->record = record, j->max = more;
-    }
+    if (!PAL_GROW(j->record, j->n)) return PAL_ERR_MEMORY;
     j->record[j->n] = strndup(line + DIGITS + 1, n - 2 * DIGITS - 2);
     return j->record[j->n] && ++j->n ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }

@@ -1,6 +1,7 @@
 /* `palpate calibrate`: spring constants whose equilibrium is that of finite elements -> a scene for serve that states
  * its error (paper B section 3). */
 #include "server/base/clock.h"
+#include "server/base/heap.h"
 #include "server/calibrate/calibrate_run.h"
 #include "server/cli/flags.h"
 #include "server/commands/commands.h"
@@ -13,8 +14,6 @@
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -25,13 +24,11 @@ static const char about[] =
     "error is the RMS distance in per cent of the largest displacement of the truth, averaged over the fitted\n"
     "cases. Ctrl-C ends the search and writes the best result; a second Ctrl-C ends the process.\n";
 
-enum {
-    MANY_SUBSTEPS = 200,
-    MAX_GRID = 16000
-}; /* grid: three numbers of 20 characters each fit into the 1 MiB of a scene file */
+/* grid: three numbers of 20 characters each fit into the 1 MiB of a scene file */
+enum { MANY_SUBSTEPS = 200, MAX_GRID = 16000 };
 
 typedef struct arguments {
-    const char *problem, *grid, *method, *weights, *area;
+    const char *grid, *method, *weights, *area;
     double budget_s;
     int evaluations, seed;
 } arguments;
@@ -59,12 +56,7 @@ static void show_fit(pal_calibrate_run *run, const pal_fit_step *step)
 static bool record_step(void *user, const pal_fit_step *step)
 {
     pal_calibrate_run *run = user;
-    if (run->n_trail == run->max_trail) {
-        int more = run->max_trail > 0 ? 2 * run->max_trail : 256;
-        double(*trail)[2] = realloc(run->trail, (size_t)more * sizeof *trail);
-        if (trail) run->trail = trail, run->max_trail = more;
-    }
-    if (run->n_trail < run->max_trail) {
+    if (PAL_GROW(run->trail, run->n_trail)) {
         run->trail[run->n_trail][0] = step->error_percent;
         run->trail[run->n_trail++][1] = step->best_percent;
     }
@@ -76,7 +68,8 @@ static bool record_step(void *user, const pal_fit_step *step)
 static const char *read_arguments(pal_calibrate_run *run, const arguments *args)
 {
     if (!run->input.fit || !*run->input.fit) return "--case ID is missing";
-    if (!run->scene || !*run->scene) return "-o SCENE.json is missing";
+    const char *scene = run->path[PAL_CALIBRATE_SCENE];
+    if (!scene || !*scene) return "-o SCENE.json is missing";
     const char *wrong = args->grid ? pal_calibrate_grid(args->grid, run->options.grid) : NULL;
     if (wrong) return wrong;
     run->annealing = args->method && !strcmp(args->method, "annealing");
@@ -141,7 +134,7 @@ static pal_err check_targets(const pal_calibrate_run *run, pal_diagnostic *diag)
     if ((int64_t)grid[0] * grid[1] * grid[2] > MAX_GRID)
         return PAL_REFUSE(diag, "--grid: %d x %d x %d nodes, more than the %d that a scene file holds", grid[0],
                           grid[1], grid[2], MAX_GRID);
-    const char *const path[PAL_CALIBRATE_FILES] = {run->scene, run->trajectory, run->picture, run->vtk};
+    const char *const *path = run->path;
     for (int a = 0; a < PAL_CALIBRATE_FILES; a++) {
         PAL_TRY(check_target(target_flag[a], path[a], diag));
         PAL_TRY(check_source(target_flag[a], path[a], run->input.problem, "problem", diag));
@@ -157,12 +150,11 @@ static pal_err check_targets(const pal_calibrate_run *run, pal_diagnostic *diag)
 /* the same for the files that the problem names */
 static pal_err check_sources(const pal_calibrate_run *run, pal_diagnostic *diag)
 {
-    const char *const path[PAL_CALIBRATE_FILES] = {run->scene, run->trajectory, run->picture, run->vtk};
     const pal_problem *p = run->set.problem;
     for (int a = 0; a < PAL_CALIBRATE_FILES; a++) {
-        PAL_TRY(check_source(target_flag[a], path[a], p->surface, "problem's surface", diag));
+        PAL_TRY(check_source(target_flag[a], run->path[a], p->surface, "problem's surface", diag));
         for (int k = 0; k < p->n_reference; k++)
-            PAL_TRY(check_source(target_flag[a], path[a], p->reference[k].file, "problem's reference", diag));
+            PAL_TRY(check_source(target_flag[a], run->path[a], p->reference[k].file, "problem's reference", diag));
     }
     return PAL_ERR_OK;
 }
@@ -227,16 +219,14 @@ static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_diagn
     return err == PAL_ERR_STATE ? PAL_ERR_OK : err; /* stopped: the scene keeps its own damping */
 }
 
-static pal_err write_files(pal_calibrate_run *run, const pal_loaded_scene *scene, pal_diagnostic *diag)
+static pal_err write_files(const pal_calibrate_run *run, const pal_loaded_scene *scene, pal_diagnostic *diag)
 {
-    const char *const path[PAL_CALIBRATE_FILES] = {run->scene, run->trajectory, run->picture, run->vtk};
-    pal_err err = pal_scene_save_file(scene, run->scene, diag);
-    if (!err && run->trajectory) err = pal_calibrate_draw_trajectory(run, run->trajectory, diag);
-    if (!err && run->picture) err = pal_calibrate_draw_body(run, run->picture, diag);
-    if (!err && run->vtk) err = pal_calibrate_write_vtk(run, run->vtk, diag);
-    for (int k = 0; k < PAL_CALIBRATE_FILES && !err; k++)
-        if (path[k]) snprintf(run->file[run->n_file++], PAL_CALIBRATE_PATH, "%s", path[k]);
-    return err;
+    static pal_err (*const draw[])(const pal_calibrate_run *, const char *, pal_diagnostic *) = {
+        NULL, pal_calibrate_draw_trajectory, pal_calibrate_draw_body, pal_calibrate_write_vtk};
+    PAL_TRY(pal_scene_save_file(scene, run->path[PAL_CALIBRATE_SCENE], diag));
+    for (int k = PAL_CALIBRATE_TRAJECTORY; k < PAL_CALIBRATE_FILES; k++)
+        if (run->path[k]) PAL_TRY(draw[k](run, run->path[k], diag));
+    return PAL_ERR_OK;
 }
 
 static pal_err work(pal_calibrate_run *run, pal_diagnostic *diag)
@@ -303,12 +293,9 @@ static int count_bound(const pal_calibrate_run *run, int k)
 /* "12.34 %", or "no rest" */
 static const char *percent(char out[32], double value)
 {
-    if (isnan(value))
-        snprintf(out, 32, "-");
-    else if (value < DBL_MAX)
-        snprintf(out, 32, value < 0.0995 ? "%.2g %%" : value < 9.95 ? "%.2f %%" : "%.1f %%", value);
-    else
-        snprintf(out, 32, "no rest");
+    if (isnan(value)) return "-";
+    if (!(value < DBL_MAX)) return "no rest";
+    snprintf(out, 32, value < 0.0995 ? "%.2g %%" : value < 9.95 ? "%.2f %%" : "%.1f %%", value);
     return out;
 }
 
@@ -392,7 +379,8 @@ static void print(const pal_calibrate_run *run)
     print_live(run);
     printf("seconds: prepare %.2f, truth %.2f, search %.2f, live %.2f, total %.2f\n", i->prepare_s, i->truth_s,
            r->seconds, run->settle_s, run->total_s);
-    for (int k = 0; k < run->n_file; k++) printf("wrote %s\n", run->file[k]);
+    for (int k = 0; k < PAL_CALIBRATE_FILES; k++)
+        if (run->path[k]) printf("wrote %s\n", run->path[k]);
 }
 
 /* ---- report: JSON ---- */
@@ -455,7 +443,10 @@ static cJSON *as_json(const pal_calibrate_run *run)
     const pal_calibration_info *i = &run->info;
     const pal_fit_result *r = &run->result;
     int n_bound = 0;
+    cJSON *files = cJSON_CreateArray();
     for (int k = 0; k < i->n_kind; k++) n_bound += count_bound(run, k);
+    for (int k = 0; k < PAL_CALIBRATE_FILES; k++)
+        if (run->path[k]) cJSON_AddItemToArray(files, JSON_TEXT(run->path[k]));
     cJSON *seconds = PAL_JSON({"prepare", pal_json_or_null(i->prepare_s)}, {"truth", pal_json_or_null(i->truth_s)},
                               {"fit", pal_json_or_null(r->seconds)}, {"live", pal_json_or_null(run->settle_s)},
                               {"total", pal_json_or_null(run->total_s)});
@@ -476,8 +467,8 @@ static cJSON *as_json(const pal_calibrate_run *run)
                         {"area_springs", JSON_BOOL(!run->options.without_area)},
                         {"poisson_clamped", JSON_BOOL(i->clamped)}, {"damping_1_s", pal_json_or_null(run->damping_1_s)},
                         {"steady_s", pal_json_or_null(run->settled && run->live.steady ? run->live.seconds : NAN)},
-                        {"live", run->settled ? live_json(run) : cJSON_CreateNull()},
-                        {"files", pal_json_texts(run->file[0], PAL_CALIBRATE_PATH, run->n_file)}, {"seconds", seconds});
+                        {"live", run->settled ? live_json(run) : cJSON_CreateNull()}, {"files", files},
+                        {"seconds", seconds});
 }
 
 /* ---- the command ---- */
@@ -510,7 +501,8 @@ int command_calibrate(int argc, char **argv)
     const pal_flag flag[] = {
         {"--case", "ID[,ID...]", PAL_FLAG_TEXT, &run.input.fit, 0, 0, "load cases or references to fit"},
         {"--verify", "ID[,ID...]", PAL_FLAG_TEXT, &run.input.verify, 0, 0, "others, whose error is only reported"},
-        {"-o", "SCENE.json", PAL_FLAG_TEXT, &run.scene, 0, 0, "scene to write; its mesh is written beside it"},
+        {"-o", "SCENE.json", PAL_FLAG_TEXT, &run.path[PAL_CALIBRATE_SCENE], 0, 0,
+         "scene to write; its mesh is written beside it"},
         {"--grid", "NXxNYxNZ", PAL_FLAG_TEXT, &args.grid, 0, 0,
          "constants at the nodes of a grid over the body, trilinear between (one of each kind for the whole body)"},
         {"--method", "adjoint|annealing", PAL_FLAG_WORD, &args.method, 0, 0,
@@ -542,10 +534,11 @@ int command_calibrate(int argc, char **argv)
          "grid: weight of differences between neighbours, which smooths the map (0.1)"},
         {"--pull", "W", PAL_FLAG_NUMBER, &o->pull, 0, 1e9,
          "grid: weight of the deviation from the ratios of edges, faces and volumes at the start (0.1)"},
-        {"--trajectory", "FILE.svg", PAL_FLAG_TEXT, &run.trajectory, 0, 0, "plot the error of every evaluation"},
-        {"--picture", "FILE.svg", PAL_FLAG_TEXT, &run.picture, 0, 0,
+        {"--trajectory", "FILE.svg", PAL_FLAG_TEXT, &run.path[PAL_CALIBRATE_TRAJECTORY], 0, 0,
+         "plot the error of every evaluation"},
+        {"--picture", "FILE.svg", PAL_FLAG_TEXT, &run.path[PAL_CALIBRATE_PICTURE], 0, 0,
          "draw the body at rest, its truth, and the distance of start and result from it; constants on a grid"},
-        {"--vtk", "FILE", PAL_FLAG_TEXT, &run.vtk, 0, 0,
+        {"--vtk", "FILE", PAL_FLAG_TEXT, &run.path[PAL_CALIBRATE_VTK], 0, 0,
          "write a legacy VTK file with constants and the displacements of truth and springs"},
     };
     const pal_flag_table table = {.usage = "calibrate PROBLEM.json --case ID -o SCENE.json [flags]",
