@@ -66,13 +66,6 @@ static int sweep_sizes(const pal_study_job *job, int out[16])
     return n;
 }
 
-static pal_configuration fem_base(const pal_study_job *job, int size)
-{
-    pal_configuration s = {.size = size, .step_s = job->scene->step_s, .tolerance = PAL_STUDY_TOLERANCE};
-    put(s.model, "fem"), put(s.element, "hex8_bbar"), put(s.law, job->law), put(s.solver, "implicit_euler");
-    return s;
-}
-
 /* A quarter and a half of the scene's step, the step of a haptic device if different, and twice the scene's step up
  * to a frame's. Returns the count. */
 static int other_steps(double own_s, double out[4])
@@ -110,7 +103,13 @@ static void add_fem(list *l)
     int size[16], n = sweep_sizes(l->job, size);
     for (int i = 0; i < n; i++) {
         bool quick = l->job->options->quick, star = quick ? i == n - 2 || n == 1 : i < 4;
-        pal_configuration base = fem_base(l->job, size[i]), s;
+        pal_configuration s, base = {.model = "fem",
+                                     .element = "hex8_bbar",
+                                     .solver = "implicit_euler",
+                                     .size = size[i],
+                                     .step_s = l->job->scene->step_s,
+                                     .tolerance = PAL_STUDY_TOLERANCE};
+        put(base.law, l->job->law);
         add(l, &base, false);
         if (star || !quick) add_times(l, &base, star && !quick);
         for (int k = 0; k < (star ? (quick ? 1 : 3) : quick ? 0 : 1); k++) {
@@ -131,8 +130,8 @@ static void add_springs(list *l)
     bool quick = l->job->options->quick;
     for (int i = quick && n > 1 ? n - 2 : 0; i < n && i < (quick ? (n > 1 ? n - 1 : 1) : 4); i++)
         for (int calibrate = 0; calibrate < 2; calibrate++) {
-            pal_configuration s = {.size = size[i], .step_s = l->job->scene->step_s};
-            put(s.model, "tet_springs"), put(s.solver, "verlet");
+            pal_configuration s = {
+                .model = "tet_springs", .solver = "verlet", .size = size[i], .step_s = l->job->scene->step_s};
             add(l, &s, calibrate);
             s.step_s /= 4;
             if (!quick) add(l, &s, calibrate);
@@ -144,8 +143,9 @@ static void add_shells(list *l)
     int finest = l->job->options->quick ? BASE_LEVELS - 1 : BASE_LEVELS;
     for (int levels = 1; levels <= finest && levels < l->job->reference; levels++)
         for (int refined = 0; refined < (levels > 1 ? 2 : 1); refined++) {
-            pal_configuration s = {.size = levels, .step_s = l->job->scene->step_s};
-            put(s.model, "adaptive_springs"), put(s.solver, "rk4"), put(s.element, refined ? "refined" : "");
+            pal_configuration s = {
+                .model = "adaptive_springs", .solver = "rk4", .size = levels, .step_s = l->job->scene->step_s};
+            if (refined) put(s.element, "refined");
             add(l, &s, false);
         }
 }
@@ -156,8 +156,8 @@ static void add_solids(list *l)
     static const char *const solver[] = {"central_cg", "implicit_euler"};
     for (int i = 0; i < (l->job->options->quick ? 2 : 3); i++)
         for (int k = 0; k < 2; k++) {
-            pal_configuration s = {.size = levels[i], .step_s = l->job->scene->step_s};
-            put(s.model, "subdivision_fem"), put(s.solver, solver[k]);
+            pal_configuration s = {.model = "subdivision_fem", .size = levels[i], .step_s = l->job->scene->step_s};
+            put(s.solver, solver[k]);
             if (k == 1) s.tolerance = PAL_STUDY_TOLERANCE;
             add(l, &s, false);
         }

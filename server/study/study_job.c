@@ -1,6 +1,7 @@
 /* The sweep: body and loads, reference, then one point after the other. */
 #include "server/study/study.h"
 
+#include "server/base/heap.h"
 #include "server/base/machine.h"
 #include "server/base/vec3.h"
 #include "server/solve/load_case.h"
@@ -9,16 +10,13 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { SCENE_VOXELS = 16, FINEST_SCENE = 64, COARSE = 10, SOFTER = 3 };
 
 static void free_job(pal_study_job *job)
 {
     for (int k = 0; k < PAL_STUDY_LOADS; k++) free(job->static_u[k]);
-    free(job->probe), free(job->now), free(job->trajectory), free(job->own_trajectory);
-    free(job->scene), free(job->problem);
+    PAL_FREE(job->probe, job->now, job->trajectory, job->own_trajectory, job->scene, job->problem);
 }
 
 bool pal_study_continues(const pal_study_job *job)
@@ -30,21 +28,16 @@ bool pal_study_continues(const pal_study_job *job)
 
 static pal_err allocate(pal_study_job *job, int n_probe)
 {
-    size_t n = 3 * sizeof(double) * (size_t)n_probe;
+    pal_err err = PAL_ERR_OK;
     job->n_probe = n_probe;
-    job->probe = malloc(n), job->now = malloc(n);
-    bool made = job->probe && job->now;
-    for (int k = 0; k < PAL_STUDY_LOADS; k++) {
-        job->static_u[k] = calloc(1, n);
-        made = made && job->static_u[k];
-    }
+    PAL_ARRAY(&err, job->probe, 3 * n_probe);
+    PAL_ARRAY(&err, job->now, 3 * n_probe);
+    for (int k = 0; k < PAL_STUDY_LOADS; k++) PAL_ZEROED(&err, job->static_u[k], 3 * n_probe);
     job->seconds = job->options->seconds > 0 ? job->options->seconds : PAL_STUDY_SECONDS;
     job->n_trajectory = (int)fmax(1, floor(job->seconds / PAL_STUDY_FRAME_S + 1e-9));
-    job->trajectory = calloc((size_t)job->n_trajectory, sizeof *job->trajectory),
-    job->own_trajectory = calloc((size_t)job->n_trajectory, sizeof *job->own_trajectory);
-    return made && job->trajectory && job->own_trajectory
-               ? PAL_ERR_OK
-               : pal_diagnostic_set(job->diag, PAL_ERR_MEMORY, "no memory for a study");
+    PAL_ZEROED(&err, job->trajectory, job->n_trajectory);
+    PAL_ZEROED(&err, job->own_trajectory, job->n_trajectory);
+    return err ? pal_diagnostic_set(job->diag, err, "no memory for a study") : PAL_ERR_OK;
 }
 
 /* evenly picked vertices of the displayed surface, or the points of the samples */
@@ -52,8 +45,8 @@ static pal_err choose_probes(pal_study_job *job)
 {
     const pal_samples *samples = job->options->samples;
     pal_study_world w;
-    pal_configuration s = {.size = job->adaptive ? 0 : COARSE};
-    snprintf(s.model, PAL_NAME, "%s", job->adaptive ? "adaptive_springs" : "fem");
+    const pal_configuration s = job->adaptive ? (pal_configuration){.model = "adaptive_springs"}
+                                              : (pal_configuration){.model = "fem", .size = COARSE};
     PAL_TRY(pal_study_open(job, &s, true, &w, job->diag));
     const pal_surface *surface = &w.set->scene.body[0].mesh->surface;
     int n = surface->n_vertex, max = samples ? samples->n : n < PAL_STUDY_PROBES ? n : PAL_STUDY_PROBES;
@@ -107,30 +100,6 @@ static pal_err sweep(pal_study_job *job, const pal_study_entry *entry, int n)
     return PAL_ERR_OK;
 }
 
-static pal_err check_methods(const pal_study_job *job)
-{
-    const pal_study_options *o = job->options;
-    if (o->n_method == 0) return PAL_ERR_OK;
-    pal_err err = PAL_ERR_REFUSED;
-    for (int i = 0; i < o->n_method && err; i++)
-        err = pal_configuration_check_model(&job->scene->body[0], o->method[i], job->diag);
-    return err;
-}
-
-/* A continued sweep keeps its reference: it is not rebuilt if no point is left to measure. */
-static bool all_known(const pal_study_job *job, const pal_study_entry *entry, int n)
-{
-    for (int i = 0; i < n; i++)
-        if (!known(job->options->before, &entry[i])) return false;
-    return n > 0;
-}
-
-static void transfer_results(pal_study *to, const pal_study *from)
-{
-    memcpy(to->reference, from->reference, sizeof to->reference);
-    to->reference_m = from->reference_m, to->max_m = from->max_m, to->length_scale_m = from->length_scale_m;
-}
-
 /* Fine elements under the edge of a pressed area may have no equilibrium where the coarse estimate had one: halves
  * the load. */
 static pal_err press(pal_study_job *job)
@@ -151,10 +120,15 @@ static pal_err study(pal_study_job *job)
     const pal_study *before = job->options->before;
     pal_err err = pal_study_reference_size(job);
     int n = err ? 0 : pal_study_list(job, entry);
-    /* with no point left to measure, the reference is used only if it costs nothing */
-    bool whole = !err && !job->options->recall && all_known(job, entry, n);
+    /* a continued sweep keeps its reference: with no point left to measure it is made only if that costs nothing */
+    bool whole = n > 0 && !job->options->recall;
+    for (int i = 0; i < n && whole; i++) whole = known(before, &entry[i]) != NULL;
     if (!err && n == 0) err = PAL_REFUSE(job->diag, "no method of those asked for fits the body");
-    if (whole) transfer_results(job->out, before);
+    if (whole) {
+        pal_study *to = job->out;
+        memcpy(to->reference, before->reference, sizeof to->reference);
+        to->reference_m = before->reference_m, to->max_m = before->max_m, to->length_scale_m = before->length_scale_m;
+    }
     if (!err && !whole) err = choose_probes(job);
     if (!err && !whole) err = job->n_load == 0 ? press(job) : pal_study_reference(job);
     if (!err) err = sweep(job, entry, n);
@@ -209,7 +183,10 @@ static pal_err begin(pal_study_job *job, const pal_scene *scene, int body)
     snprintf(out->name, sizeof out->name, "%.*s", PAL_NAME - 1, scene->name);
     pal_machine_name(out->machine);
     out->step_s = scene->step_s;
-    return check_methods(job);
+    /* one method that suits the body is enough */
+    pal_err err = o->n_method > 0 ? PAL_ERR_REFUSED : PAL_ERR_OK;
+    for (int i = 0; i < o->n_method && err; i++) err = pal_configuration_check_model(def, o->method[i], job->diag);
+    return err;
 }
 
 pal_err pal_study_scene(const pal_scene *scene, const pal_study_options *options, pal_study *out, pal_diagnostic *diag)
@@ -254,18 +231,6 @@ static pal_err set_materials(const pal_problem *p, const double origin[3], pal_b
     return err ? pal_diagnostic_set(diag, err, "materials[0]: %s", reason.text) : PAL_ERR_OK;
 }
 
-static pal_err problem_voxels(const pal_problem *p, const pal_surface *surface, pal_prepared *out, pal_diagnostic *diag)
-{
-    pal_case_voxel_options entry = {.resolution = SCENE_VOXELS, .fill = true, .align = true};
-    pal_err err = pal_case_voxels(p, surface, &entry, out, diag);
-    /* the body is thinner than such voxels */
-    while (err == PAL_ERR_REFUSED && entry.resolution < FINEST_SCENE) {
-        entry.resolution *= 2;
-        err = pal_case_voxels(p, surface, &entry, out, diag);
-    }
-    return err;
-}
-
 static pal_err fill_scene(const pal_problem *p, const pal_surface *surface, pal_configured_scene *set,
                           pal_diagnostic *diag)
 {
@@ -306,7 +271,13 @@ pal_err pal_study_problem_scene(const pal_problem *problem, const pal_surface *s
             return PAL_REFUSE(diag, "supports[%d]: moves, a live body's support stands still", k);
     pal_configured_scene *set = calloc(1, sizeof *set);
     if (!set) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a scene");
-    pal_err err = problem_voxels(problem, surface, &set->mesh, diag);
+    pal_case_voxel_options voxel = {.resolution = SCENE_VOXELS, .fill = true, .align = true};
+    pal_err err;
+    /* refused: the body is thinner than such voxels */
+    for (;; voxel.resolution *= 2) {
+        err = pal_case_voxels(problem, surface, &voxel, &set->mesh, diag);
+        if (err != PAL_ERR_REFUSED || voxel.resolution >= FINEST_SCENE) break;
+    }
     if (!err) err = fill_scene(problem, surface, set, diag);
     if (err)
         pal_configured_scene_free(set);

@@ -103,10 +103,9 @@ static void place_load(pal_study_job *job, int index, const pal_surface *s, cons
 static pal_configuration coarse(const pal_study_job *job)
 {
     int size = (int)(PAL_COARSE_SIZE * job->reference);
-    pal_configuration s = {.size = job->adaptive ? 1 : size > COARSE ? size : COARSE, .step_s = PAL_STUDY_FRAME_S};
-    snprintf(s.model, PAL_NAME, "%s", job->adaptive ? "adaptive_springs" : "fem");
-    snprintf(s.law, PAL_NAME, "%s", job->adaptive ? "" : "linear");
-    return s;
+    if (job->adaptive) return (pal_configuration){.model = "adaptive_springs", .size = 1, .step_s = PAL_STUDY_FRAME_S};
+    return (pal_configuration){
+        .model = "fem", .law = "linear", .size = size > COARSE ? size : COARSE, .step_s = PAL_STUDY_FRAME_S};
 }
 
 /* Scales the load so that its largest displacement has the wanted share, from the nearly linear response of the

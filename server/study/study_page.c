@@ -20,16 +20,6 @@ static const char *method_of(const pal_configuration *configuration, char out[PA
     return out;
 }
 
-static double step_of(const pal_study *study, const pal_study_point *p)
-{
-    return p->measured.configuration.step_s > 0 ? p->measured.configuration.step_s : study->step_s;
-}
-
-static bool is_live(const pal_study *study, const pal_study_point *p)
-{
-    return pal_study_measured(p) && 1e-3 * p->measured.ms <= study->step_s;
-}
-
 /* as the command writes its loads (study_input.c) */
 static bool is_quick(const pal_study_file *file)
 {
@@ -74,7 +64,7 @@ static const char *cell_text(const pal_study *s, const pal_study_point *p, const
                              char out[32])
 {
     const void *at = (const char *)p + c->at;
-    if (c->kind == LIVE) return !pal_study_measured(p) ? "" : is_live(s, p) ? "yes" : "no";
+    if (c->kind == LIVE) return !pal_study_measured(p) ? "" : 1e-3 * p->measured.ms <= s->step_s ? "yes" : "no";
     double value = c->scale * (c->kind == COUNT ? *(const int *)at : *(const double *)at);
     if (c->of_max) value /= s->max_m;
     if (!isfinite(value)) return unknown;
@@ -96,16 +86,14 @@ void pal_study_print(const pal_study_file *file, FILE *to)
     fprintf(to, "against %s, itself within %.3g mm; the largest displacement %.4g mm\n", s->reference,
             1e3 * s->reference_m, 1e3 * s->max_m);
     if (!pal_study_trusted(s))
-        fprintf(
-            to,
-            "So much that no configuration is named: hold more of the body (palpate prepare --hold 20, with --up as "
-            "it lies)%s.\n",
-            is_quick(file) ? ", or study it without --quick" : "");
+        fprintf(to,
+                "So much that no configuration is named: hold more of the body (palpate prepare --hold 20, with --up "
+                "as it lies)%s.\n",
+                is_quick(file) ? ", or study it without --quick" : "");
     if (is_quick(file))
-        fprintf(
-            to,
-            "Quick: a coarse reference, so errors below that are of chance, and few configurations; for figures to be "
-            "used run it without --quick.\n");
+        fputs("Quick: a coarse reference, so errors below that are of chance, and few configurations; for figures to "
+              "be used run it without --quick.\n",
+              to);
     fprintf(to, "%1s %3s", "", "row");
     for (int c = 0; c < N_COLUMN; c++)
         if (columns[c].width > 0) fprintf(to, " %*s", columns[c].width, columns[c].printed);
@@ -149,7 +137,7 @@ static void parameters_of(const pal_study *study, const pal_study_point *p, doub
     if (refined) n += snprintf(out + n, n_byte - (size_t)n, " refined");
     bool law = s->law[0] && strcmp(s->law, "corotational") != 0, other = !strcmp(s->solver, "sdirk2");
     n += snprintf(out + n, n_byte - (size_t)n, "%s%s%s", law ? " " : "", law ? s->law : "", other ? " sdirk2" : "");
-    double step = step_of(study, p);
+    double step = s->step_s > 0 ? s->step_s : study->step_s;
     if ((size_t)n < n_byte && fabs(step - study->step_s) > 1e-9 && step > 0)
         n += snprintf(out + n, n_byte - (size_t)n, ", 1/%.4g s", 1 / step);
     if (s->tolerance > 0 && s->tolerance != usual && (size_t)n < n_byte)
@@ -304,14 +292,6 @@ static void put_study(FILE *to, const pal_study_file *file)
     }
 }
 
-/* the command that writes the scene of a row */
-static void put_order(FILE *to, const pal_study_file *file, int row)
-{
-    fputs("<br><code>", to);
-    put_study(to, file);
-    fprintf(to, "--pick %d -o NEW</code>", row);
-}
-
 static void put_row(FILE *to, const pal_study_file *file, const pal_study_point *p, int row)
 {
     char text[PAL_CONFIGURATION_TEXT], cell[32];
@@ -323,7 +303,12 @@ static void put_row(FILE *to, const pal_study_file *file, const pal_study_point 
             p->measured.front ? "&#9733;" : "");
     fprintf(to, measured ? "<button>%d</button></td><td>" : "%d</td><td>", row);
     put_text(to, pal_configuration_text(&p->measured.configuration, text));
-    if (p->measured.front) put_order(to, file, row);
+    /* the command that writes its scene */
+    if (p->measured.front) {
+        fputs("<br><code>", to);
+        put_study(to, file);
+        fprintf(to, "--pick %d -o NEW</code>", row);
+    }
     if (!measured || p->reason[0]) {
         fputs("<br>", to);
         put_text(to, reason_of(p));
@@ -387,15 +372,15 @@ static void put_page(FILE *to, const pal_study_file *file, const char *svg)
     put_fact(to, "configurations", text);
     put_fact(to, "made by", file->command);
     fputs("</dl>\n", to);
-    fputs(svg ? "<div class=\"wide\">" : "", to);
-    fputs(svg ? svg : "<p>Nothing was measured, so there is nothing to draw.</p>\n", to);
-    if (svg) fputs("</div>\n", to);
+    if (svg)
+        fprintf(to, "<div class=\"wide\">%s</div>\n", svg);
+    else
+        fputs("<p>Nothing was measured, so there is nothing to draw.</p>\n", to);
     fprintf(to,
             "<p>&#9733; the front: nothing else is both cheaper and nearer. ms: for %.3g ms of the body's time, with "
             "shorter steps so many of them; live: no more than that. Error: the largest distance from the reference, "
             "at rest or along the path. Point at a mark for its configuration. A row's button copies the command that "
-            "writes its "
-            "scene; under one of the front it is shown as well.</p>\n",
+            "writes its scene; under one of the front it is shown as well.</p>\n",
             1e3 * s->step_s);
     fputs("<p id=\"copied\" data-study=\"", to);
     put_study(to, file);

@@ -15,15 +15,15 @@ enum { COUNTED = 12 }; /* size at which nodes are counted */
 
 static pal_configuration reference_configuration(const pal_study_job *job, int size)
 {
-    bool quick = job->options->quick;
-    pal_configuration s = {.size = size};
-    s.step_s = (quick ? 2 : 1) * fmin(PAL_REFERENCE_STEP_S, PAL_REFERENCE_STEP_SHARE * job->scene->step_s);
-    bool adaptive = job->adaptive;
-    snprintf(s.model, PAL_NAME, "%s", adaptive ? "adaptive_springs" : "fem");
-    snprintf(s.element, PAL_NAME, "%s", adaptive ? "refined" : "hex8_bbar");
-    snprintf(s.law, PAL_NAME, "%s", adaptive ? "" : job->law);
-    snprintf(s.solver, PAL_NAME, "%s", adaptive ? "rk4" : "sdirk2");
-    s.tolerance = adaptive ? 0 : PAL_REFERENCE_TOLERANCE;
+    pal_configuration s = {
+        .model = "fem", .element = "hex8_bbar", .solver = "sdirk2", .tolerance = PAL_REFERENCE_TOLERANCE};
+    if (job->adaptive)
+        s = (pal_configuration){.model = "adaptive_springs", .element = "refined", .solver = "rk4"};
+    else
+        snprintf(s.law, PAL_NAME, "%s", job->law);
+    s.size = size;
+    s.step_s =
+        (job->options->quick ? 2 : 1) * fmin(PAL_REFERENCE_STEP_S, PAL_REFERENCE_STEP_SHARE * job->scene->step_s);
     return s;
 }
 
@@ -50,34 +50,23 @@ static uint64_t sum_of(const pal_study_job *job, const char *what, const pal_con
     return pal_study_digest_numbers(pal_study_digest_numbers(sum, number + 8, 1), job->probe, 3 * (size_t)job->n_probe);
 }
 
-static bool recall(const pal_study_job *job, uint64_t key, pal_study_answer *answer, double *value, int n)
-{
-    const pal_study_options *o = job->options;
-    return o->recall && o->recall(key, answer, value, n, o->user);
-}
-
-/* an answer cut short by a stop or by lack of memory is not stored */
-static void remember(const pal_study_job *job, uint64_t key, const pal_study_answer *answer, const double *value, int n)
-{
-    const pal_study_options *o = job->options;
-    bool whole = !answer->err || answer->err == PAL_ERR_NUMERIC || answer->err == PAL_ERR_FROZEN;
-    if (o->remember && whole) o->remember(key, answer, value, n, o->user);
-}
-
 /* A static solution under `load`, or the trajectory under the first load (load NULL): value [n][3] from the cache, else
  * computed and stored. */
 static pal_err cached(pal_study_job *job, const pal_configuration *configuration, const pal_problem_case *load,
                       double (*value)[3], int n, int *n_node, pal_diagnostic *diag)
 {
+    const pal_study_options *o = job->options;
     uint64_t key = sum_of(job, load ? "rest" : "trajectory", configuration, load ? load : job->load[0]);
     pal_study_answer answer = {.n_node = 0};
     pal_diagnostic reason = {{0}};
-    if (!recall(job, key, &answer, value[0], 3 * n)) {
+    if (!o->recall || !o->recall(key, &answer, value[0], 3 * n, o->user)) {
         answer.err = load ? pal_study_static(job, configuration, load, value[0], &answer.n_node, &reason)
                           : pal_study_trajectory(job, configuration, value, NULL, 0, NULL, NULL, &reason);
         snprintf(answer.reason, sizeof answer.reason, "%.*s", PAL_CONFIGURATION_TEXT - 1, reason.text);
         if (answer.err) memset(value, 0, sizeof *value * (size_t)n);
-        remember(job, key, &answer, value[0], 3 * n);
+        /* an answer cut short by a stop or by lack of memory is not stored */
+        bool whole = !answer.err || answer.err == PAL_ERR_NUMERIC || answer.err == PAL_ERR_FROZEN;
+        if (o->remember && whole) o->remember(key, &answer, value[0], 3 * n, o->user);
     }
     *n_node = answer.n_node;
     return answer.err ? pal_diagnostic_set(diag, answer.err, "%s", answer.reason) : PAL_ERR_OK;

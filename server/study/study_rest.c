@@ -1,6 +1,7 @@
 /* The equilibrium of a body under a load: by Newton's method where its components have tangents, by the lattice
  * equilibrium for springs, otherwise by running it and zeroing its velocity at each peak of kinetic energy (kinetic
  * damping; Cundall 1976). */
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/calibrate/equilibrium.h"
 #include "server/sim/core/effect_list.h"
@@ -9,8 +10,6 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { MAX_NEWTON = 120, MAX_RELAX = 4000, QUIET = 3, RAMPS = 4 };
 
@@ -68,14 +67,6 @@ typedef struct springs {
     double *force, *part;
 } springs;
 
-static void free_springs(springs *s)
-{
-    for (int k = 0; k < PAL_SPRING_KINDS; k++) free(s->k[k]);
-    free(s->force), free(s->part);
-    pal_equilibrium_workspace_destroy(s->workspace);
-    pal_lattice_free(&s->lattice);
-}
-
 /* as in the live components: given, or from the material (spring_law.h) */
 static void constants_of(const pal_configuration *configuration, const pal_body_def *def, double edge_m,
                          double out[PAL_SPRING_KINDS])
@@ -96,17 +87,15 @@ static pal_err take_springs(const pal_configuration *configuration, const pal_st
     double constant[PAL_SPRING_KINDS];
     PAL_TRY(pal_lattice_make(w->world, 0, &s->lattice, diag));
     constants_of(configuration, &w->set->scene.body[0], s->lattice.edge_m, constant);
-    bool made = true;
+    pal_err err = PAL_ERR_OK;
     for (int k = 0; k < PAL_SPRING_KINDS; k++) {
-        s->k[k] = malloc(sizeof(double) * ((size_t)s->lattice.kind[k].n_item + 1));
-        made = made && s->k[k];
-        for (int i = 0; s->k[k] && i < s->lattice.kind[k].n_item; i++) s->k[k][i] = constant[k];
+        PAL_ARRAY(&err, s->k[k], s->lattice.kind[k].n_item);
+        for (int i = 0; i < s->lattice.kind[k].n_item && !err; i++) s->k[k][i] = constant[k];
     }
-    size_t n = 3 * (size_t)s->lattice.n_node;
-    s->force = calloc(n, sizeof(double)), s->part = calloc(n, sizeof(double));
-    if (!made || !s->force || !s->part || pal_equilibrium_workspace_create(&s->lattice, &s->workspace))
-        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the rest of springs");
-    return PAL_ERR_OK;
+    PAL_ZEROED(&err, s->force, 3 * s->lattice.n_node);
+    PAL_ZEROED(&err, s->part, 3 * s->lattice.n_node);
+    if (!err) err = pal_equilibrium_workspace_create(&s->lattice, &s->workspace);
+    return err ? pal_diagnostic_set(diag, err, "no memory for the rest of springs") : PAL_ERR_OK;
 }
 
 static void add_gravity(const pal_study_world *w, double *f)
@@ -151,7 +140,9 @@ static pal_err lattice(pal_study_job *job, const pal_configuration *configuratio
     if (!err) add_gravity(&w, s.force);
     if (!err) err = balance(&s, w.body->x, diag);
     if (!err) err = pal_study_displacement(&w, job->probe, job->n_probe, u, diag);
-    free_springs(&s);
+    PAL_FREE(s.k[0], s.k[1], s.k[2], s.force, s.part);
+    pal_equilibrium_workspace_destroy(s.workspace);
+    pal_lattice_free(&s.lattice);
     pal_study_close(&w);
     return err;
 }

@@ -210,23 +210,17 @@ static void run(pal_study_job *job, pal_study_point *out)
     }
 }
 
-static pal_err fit(pal_study_job *job, pal_study_point *out)
-{
-    pal_diagnostic reason = {{0}};
-    pal_err err = pal_study_fit(job, &out->measured.configuration, &reason);
-    if (!err) return PAL_ERR_OK;
-    out->err = err;
-    snprintf(out->reason, sizeof out->reason, "calibration: %.*s", PAL_CONFIGURATION_TEXT - 16, reason.text);
-    return err;
-}
-
 pal_err pal_study_measure(pal_study_job *job, const pal_study_entry *entry, pal_study_point *out)
 {
     int n_node = 0;
     *out = (pal_study_point){.measured = {.configuration = entry->configuration, .ms = NAN, .error_m = NAN}};
     out->ms_p95 = out->static_rms_m = out->static_max_m = out->trajectory_rms_m = out->trajectory_max_m = NAN;
     out->predicted_ms = out->predicted_m = NAN;
-    if (entry->calibrate && fit(job, out) && pal_study_continues(job)) return PAL_ERR_OK;
+    pal_diagnostic reason = {{0}};
+    if (entry->calibrate && (out->err = pal_study_fit(job, &out->measured.configuration, &reason))) {
+        snprintf(out->reason, sizeof out->reason, "calibration: %.*s", PAL_CONFIGURATION_TEXT - 16, reason.text);
+        if (pal_study_continues(job)) return PAL_ERR_OK;
+    }
     if (entry->calibrate && job->n_load == 1)
         snprintf(out->reason, sizeof out->reason, "fitted to the load it is judged by");
     if (!job->rest.known || !same_rest(&job->rest.of, &out->measured.configuration))

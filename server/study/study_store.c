@@ -385,18 +385,16 @@ pal_err pal_study_file_read(const char *path, pal_study_file **out, pal_diagnost
 
 /* ---- lists ---- */
 
-static bool is_before(const pal_study_point *a, const pal_study_point *b)
-{
-    if (isnan(a->measured.ms) || isnan(b->measured.ms)) return !isnan(a->measured.ms) && isnan(b->measured.ms);
-    return a->measured.ms < b->measured.ms;
-}
-
 void pal_study_order(const pal_study *study, int *out)
 {
     /* insertion sort: equal elements keep their order */
     for (int k = 0; k < study->n_point; k++) {
         int at = k;
-        for (; at > 0 && is_before(&study->point[k], &study->point[out[at - 1]]); at--) out[at] = out[at - 1];
+        double ms = study->point[k].measured.ms;
+        for (; at > 0; out[at] = out[at - 1], at--) {
+            double before = study->point[out[at - 1]].measured.ms;
+            if (isnan(before) ? isnan(ms) : !(ms < before)) break;
+        }
         out[at] = k;
     }
 }

@@ -20,18 +20,15 @@ void pal_study_close(pal_study_world *w)
     *w = (pal_study_world){.set = NULL};
 }
 
-static bool is_tool(const char *name)
-{
-    const pal_effect *effect = pal_effect_find(name);
-    return (effect && effect->sleep.reach_m) || pal_study_is(name, "finite_guard");
-}
-
 /* Removes what statics do not need; few Newton iterations per step, so that progress can be observed. */
 static pal_err prepare_statics(pal_body_def *body, pal_diagnostic *diag)
 {
     int kept = 0;
-    for (int k = 0; k < body->n_effect; k++)
-        if (!is_tool(body->effect[k].name)) body->effect[kept++] = body->effect[k];
+    for (int k = 0; k < body->n_effect; k++) {
+        const pal_effect *effect = pal_effect_find(body->effect[k].name);
+        bool tool = effect && effect->sleep.reach_m;
+        if (!tool && !pal_study_is(body->effect[k].name, "finite_guard")) body->effect[kept++] = body->effect[k];
+    }
     body->n_effect = kept;
     body->material.damping_1_s = 0;
     if (!pal_study_is(body->solver.name, "static_newton")) return PAL_ERR_OK;
