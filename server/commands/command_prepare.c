@@ -223,45 +223,42 @@ static cJSON *as_json(const pal_loaded_scene *loaded, const arguments *args, con
                         {"welded", JSON_NUMBER(read->n_welded)}, {"seconds", seconds});
 }
 
-typedef struct volume_text {
-    char text[32];
-} volume_text;
-
-/* in the unit that gives one to four digits before the decimal point */
-static volume_text format_volume(double volume_m3)
+/* in the unit that gives one to four digits before the decimal point; returns out */
+static const char *volume_text(double volume_m3, char out[32])
 {
     static const struct {
         double m3;
         const char *unit;
     } unit[] = {{1, "m3"}, {1e-3, "l"}, {1e-6, "ml"}, {1e-9, "mm3"}};
-    volume_text out;
     size_t k = 0;
     while (k < 3 && volume_m3 < 5 * unit[k].m3) k++;
-    snprintf(out.text, sizeof out.text, "%.1f %s", volume_m3 / unit[k].m3, unit[k].unit);
+    snprintf(out, 32, "%.1f %s", volume_m3 / unit[k].m3, unit[k].unit);
     return out;
 }
 
 static void print_solid(const pal_prepared *mesh, const pal_surface_scene_report *r)
 {
     int n_component = r->prepare.voxel.n_component;
+    char known[32], whole[32];
     printf("%d tetrahedra, %d nodes from %lld voxels at resolution %d, %d component%s, inside by %s\n",
            mesh->tets.n_tet, mesh->tets.n_node, (long long)r->prepare.n_voxel, r->resolution, n_component,
            n_component == 1 ? "" : "s", r->prepare.voxel.method);
-    volume_text known = format_volume(r->prepare.voxel.surface_volume_m3), whole = format_volume(r->prepare.volume_m3);
-    printf("volume %s by the surface%s, %+.1f %% by the voxels inside, %s with the border layer\n", known.text,
+    printf("volume %s by the surface%s, %+.1f %% by the voxels inside, %s with the border layer\n",
+           volume_text(r->prepare.voxel.surface_volume_m3, known),
            r->prepare.voxel.open ? " (open: its holes count as closed)" : "", 100 * r->prepare.volume_error,
-           whole.text);
+           volume_text(r->prepare.volume_m3, whole));
 }
 
 static void print_levels(const pal_prepared *mesh, const arguments *args, const outcome *out)
 {
     const pal_surface_scene_report *r = &out->report;
+    char volume[32];
     for (int l = 0; l < r->n_level; l++) printf("level %d: %d nodes, %d springs\n", l, r->n_node[l], r->n_spring[l]);
     printf("%d component%s, ", r->n_piece, r->n_piece == 1 ? "" : "s");
     if (r->n_open_edge > 0)
         printf("open along %d edges", r->n_open_edge);
     else
-        printf("closed around %s", format_volume(r->volume_m3).text);
+        printf("closed around %s", volume_text(r->volume_m3, volume));
     printf(", wall of %.1f cm2 and %.1f g\n", 1e4 * r->area_m2, 1e3 * r->mass_kg);
     printf("memory %.1f MB, of it %.1f for the levels; %d sub-step%s a step at rest\n", 1e-6 * (double)out->world_byte,
            1e-6 * (double)r->level_byte, out->n_substep, out->n_substep == 1 ? "" : "s");

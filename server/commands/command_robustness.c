@@ -84,12 +84,6 @@ static const char *colour_of(pal_verdict verdict)
     return colour[verdict];
 }
 
-static void frame(FILE *to, double x, double y)
-{
-    fprintf(to, "<rect x=\"%g\" y=\"%g\" width=\"%d\" height=\"%d\" fill=\"none\" stroke=\"#999\"/>\n", x, y, PLOT_WIDE,
-            PLOT_HIGH);
-}
-
 /* the range of the samples; false: nothing moved */
 static bool range(const pal_robustness_result *r, double *seconds, double *low, double *high)
 {
@@ -108,7 +102,8 @@ static void curve(FILE *to, const pal_robustness_result *r, double x, double y)
 {
     double seconds, low, high;
     char text[40];
-    frame(to, x, y);
+    fprintf(to, "<rect x=\"%g\" y=\"%g\" width=\"%d\" height=\"%d\" fill=\"none\" stroke=\"#999\"/>\n", x, y, PLOT_WIDE,
+            PLOT_HIGH);
     if (!range(r, &seconds, &low, &high)) {
         pal_svg_text(to, x + 0.5 * PLOT_WIDE, y + 0.5 * PLOT_HIGH, "middle", " font-size=\"11\" fill=\"#777\"",
                      r->verdict == PAL_VERDICT_SKIPPED ? "does not apply"
@@ -150,20 +145,10 @@ static pal_err draw(const pal_robustness_report *report, const char *title, cons
     return pal_svg_end(&svg, path, diag);
 }
 
-/* ---- the command ---- */
-
-static void list_cases(char *text, size_t n_byte)
-{
-    size_t used = 0;
-    const char *name, *about;
-    for (int k = 0; (name = pal_robustness_case_name(k, &about)) && used < n_byte; k++)
-        used += (size_t)snprintf(text + used, n_byte - used, "  %-11s %s\n", name, about);
-}
-
 int command_robustness(int argc, char **argv)
 {
     static char about[4096];
-    const char *picture = NULL, *only = NULL;
+    const char *picture = NULL, *only = NULL, *name, *of_case;
     double seed = 1, seconds = 0;
     const pal_flag flag[] = {
         {"--only", "NAME", PAL_FLAG_TEXT, &only, 0, 0, "run this case alone"},
@@ -171,12 +156,13 @@ int command_robustness(int argc, char **argv)
         {"--seconds", "S", PAL_FLAG_NUMBER, &seconds, 0.1, 1e6,
          "processor time of all cases together (60, more where a step is expensive)"},
         {"--picture", "FILE.svg", PAL_FLAG_TEXT, &picture, 0, 0, "plot the energy over time, one plot for each case"}};
-    int head =
+    int used =
         snprintf(about, sizeof about,
                  "Runs the cases that are known to break simulations on a scene, one after another, and reports what\n"
                  "happened. Each case has a criterion: finite numbers, bounded energy, return to rest after release.\n"
                  "Exit code 1 when a case fails its criterion or cannot be judged in the time.\n\nCASES\n");
-    list_cases(about + head, sizeof about - (size_t)head);
+    for (int k = 0; (name = pal_robustness_case_name(k, &of_case)) && used < (int)sizeof about; k++)
+        used += snprintf(about + used, sizeof about - (size_t)used, "  %-11s %s\n", name, of_case);
     const pal_flag_table table = {.usage = "robustness SCENE [flags]",
                                   .about = about,
                                   .example = "palpate prepare --shape sphere --resolution 6 --model fem -o ball\n"
@@ -189,7 +175,6 @@ int command_robustness(int argc, char **argv)
     int n = 0, code = pal_flags_parse(&table, argc, argv, &common, word, &n);
     if (code >= 0) return code;
     bool known = !only;
-    const char *name;
     for (int k = 0; (name = pal_robustness_case_name(k, NULL)) && !known; k++) known = !strcmp(only, name);
     if (!known) return pal_flags_wrong(&common, "there is no case \"%.60s\"", only);
     pal_robustness_options options;

@@ -73,21 +73,15 @@ static bool program_folder(char *folder, size_t cap)
     return (size_t)snprintf(folder, cap, "%s", dirname(path)) < cap;
 }
 
-static bool has_index(const char *folder)
-{
-    char path[PATH_MAX + 64];
-    return (size_t)snprintf(path, sizeof path, "%s/index.html", folder) < sizeof path && access(path, R_OK) == 0;
-}
-
 /* the page's files: as configured, else beside the program (installed or in the build tree); NULL: none */
 static const char *viewer_folder(const pal_config *config, char *folder, size_t cap)
 {
-    char own[PATH_MAX];
+    char own[PATH_MAX], index[PATH_MAX + 64];
     if (config->viewer[0]) return config->viewer;
-    if (program_folder(own, sizeof own) && (size_t)snprintf(folder, cap, "%s/../share/palpate/viewer", own) < cap &&
-        has_index(folder))
-        return folder;
-    return NULL;
+    if (!program_folder(own, sizeof own) || (size_t)snprintf(folder, cap, "%s/../share/palpate/viewer", own) >= cap)
+        return NULL;
+    size_t n = (size_t)snprintf(index, sizeof index, "%s/index.html", folder);
+    return n < sizeof index && !access(index, R_OK) ? folder : NULL;
 }
 
 /* ---- scenes and sessions ---- */
@@ -385,15 +379,6 @@ static pal_err run_all(serve_run *run, pal_diagnostic *diag)
     return run->net_err;
 }
 
-static void close_all(serve_run *run)
-{
-    pal_server_close(run->server);
-    for (int i = 0; i < run->n; i++) pal_session_close(run->session[i]);
-    pal_server_gate_destroy(run->gate);
-    for (int i = 0; i < run->n; i++) pal_studied_scene_close(&run->studied[i]);
-    for (int i = 0; i < run->n; i++) pal_scene_free(run->scene[i]);
-}
-
 static const char about[] =
     "Serves every scene (.json), surface (.obj .stl .ply .off), label volume (.nii .nii.gz .inr .inr.gz) or solid\n"
     "of control cells (.palcells) as a session that browsers, haptic bridges and scripted clients share; without\n"
@@ -453,6 +438,10 @@ int command_serve(int argc, char **argv)
     pal_report_progress(NULL, 0, &run.common);
     for (int i = 0; i < run.n; i++) make_unique(&run, i);
     if (!err) err = run_all(&run, &diag);
-    close_all(&run);
+    pal_server_close(run.server);
+    for (int i = 0; i < run.n; i++) pal_session_close(run.session[i]);
+    pal_server_gate_destroy(run.gate);
+    for (int i = 0; i < run.n; i++) pal_studied_scene_close(&run.studied[i]);
+    for (int i = 0; i < run.n; i++) pal_scene_free(run.scene[i]);
     return err ? pal_report_refusal(&run.common, err, &diag) : 0;
 }

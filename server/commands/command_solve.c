@@ -184,25 +184,20 @@ static pal_err compare(study *s, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
-static pal_err write_one(study *s, const char *path, bool vtk, pal_diagnostic *diag)
-{
-    PAL_TRY(vtk ? pal_solution_vtk(s->solution, path, diag) : pal_solution_csv(s->solution, path, diag));
-    if (s->n_file < 2) snprintf(s->file[s->n_file++], PATH, "%s", path);
-    return PAL_ERR_OK;
-}
-
 static pal_err write_files(study *s, const arguments *args, pal_diagnostic *diag)
 {
-    char csv[PATH], vtk[PATH];
-    if (args->folder) {
-        PAL_TRY(pal_scene_make_folder(args->folder, diag));
-        snprintf(csv, sizeof csv, "%s/solution.csv", args->folder);
-        snprintf(vtk, sizeof vtk, "%s/solution.vtk", args->folder);
-        PAL_TRY(write_one(s, args->csv ? args->csv : csv, false, diag));
-        return write_one(s, args->vtk ? args->vtk : vtk, true, diag);
+    if (args->folder) PAL_TRY(pal_scene_make_folder(args->folder, diag));
+    for (int vtk = 0; vtk < 2; vtk++) {
+        const char *given = vtk ? args->vtk : args->csv, *path = given ? given : s->file[s->n_file];
+        if (!given && !args->folder) continue;
+        if (given)
+            snprintf(s->file[s->n_file], PATH, "%s", given);
+        else
+            snprintf(s->file[s->n_file], PATH, "%s/solution.%s", args->folder, vtk ? "vtk" : "csv");
+        PAL_TRY(vtk ? pal_solution_vtk(s->solution, path, diag) : pal_solution_csv(s->solution, path, diag));
+        s->n_file++;
     }
-    if (args->csv) PAL_TRY(write_one(s, args->csv, false, diag));
-    return args->vtk ? write_one(s, args->vtk, true, diag) : PAL_ERR_OK;
+    return PAL_ERR_OK;
 }
 
 static pal_err read_all(study *s, arguments *args, pal_diagnostic *diag)
@@ -306,19 +301,6 @@ static pal_err solve_all(const study *s, const arguments *args, series *out, pal
     return PAL_ERR_OK;
 }
 
-/* the plotted error, per cent */
-static double error_of(const study *s, const pal_convergence_point *p)
-{
-    return s->samples_file ? p->rms_percent : p->estimate_percent;
-}
-
-/* the second file's name: "_seconds" before ".svg" */
-static void seconds_path(const char *plot, char out[PATH])
-{
-    size_t n = strlen(plot), stem = n > 4 && !strcmp(plot + n - 4, ".svg") ? n - 4 : n;
-    snprintf(out, PATH, "%.*s_seconds%s", (int)stem, plot, plot + stem);
-}
-
 /* over nodes, or over seconds */
 static pal_err draw(const study *s, const arguments *args, const series *all, bool seconds, const char *path,
                     pal_diagnostic *diag)
@@ -337,7 +319,7 @@ static pal_err draw(const study *s, const arguments *args, const series *all, bo
         const series *one = &all[e];
         for (int k = 0; k < one->n; k++) {
             x[e][k] = seconds ? one->point[k].result.total_s : one->point[k].result.n_node;
-            y[e][k] = error_of(s, &one->point[k]);
+            y[e][k] = s->samples_file ? one->point[k].rms_percent : one->point[k].estimate_percent;
         }
         plot.curve[plot.n_curve++] = (pal_curve){.name = args->list.element[e], .n = one->n, .x = x[e], .y = y[e]};
     }
@@ -379,15 +361,6 @@ static cJSON *table_json(const study *s, const arguments *args, const series *al
                     {"files", cJSON_CreateStringArray(file, file[0] ? 2 : 0)});
 }
 
-/* a cell of the table; "-" when the number is not known */
-static void print_cell(int width, int digits, double number)
-{
-    if (isfinite(number))
-        printf(" %*.*f", width, digits, number);
-    else
-        printf(" %*s", width, "-");
-}
-
 static void print_table(const study *s, const arguments *args, const series *all, const char *const file[2])
 {
     printf("%s, load case %s, %s", s->problem->name, s->load_case->id, args->solve.law);
@@ -408,7 +381,10 @@ static void print_table(const study *s, const arguments *args, const series *all
                         {9, 3, p->change_percent},  {6, 2, p->change_order},  {10, 3, p->estimate_percent},
                         {9, 3, p->result.factor_s}, {9, 3, p->result.total_s}};
             for (size_t c = 0; c < sizeof cell / sizeof cell[0]; c++)
-                print_cell(cell[c].width, cell[c].digits, cell[c].number);
+                if (isfinite(cell[c].number))
+                    printf(" %*.*f", cell[c].width, cell[c].digits, cell[c].number);
+                else
+                    printf(" %*s", cell[c].width, "-");
             printf("\n");
         }
     for (int k = 0; k < 2 && file[k]; k++) printf("wrote %s\n", file[k]);
@@ -422,7 +398,9 @@ static int run_table(pal_flag_common *common, const study *s, const arguments *a
     const char *file[2] = {NULL, NULL};
     pal_err err = all ? solve_all(s, args, all, &diag) : PAL_ERR_MEMORY;
     if (args->plot && !err) {
-        seconds_path(args->plot, second);
+        /* "_seconds" before ".svg" */
+        size_t n = strlen(args->plot), stem = n > 4 && !strcmp(args->plot + n - 4, ".svg") ? n - 4 : n;
+        snprintf(second, PATH, "%.*s_seconds%s", (int)stem, args->plot, args->plot + stem);
         err = draw(s, args, all, false, args->plot, &diag);
         if (!err) err = draw(s, args, all, true, second, &diag);
         file[0] = args->plot, file[1] = second;

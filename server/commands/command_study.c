@@ -100,32 +100,28 @@ static bool read_methods(study_run *run)
     return true;
 }
 
-/* false: out is a sentence that quotes the fault */
-static bool read_arguments(study_run *run, const char *within, const char *budget, char *out, size_t n_byte)
+static pal_err read_arguments(study_run *run, const char *within, const char *budget, pal_diagnostic *diag)
 {
     if (within && !read_amount(within, length_unit, &run->target.max_error_m))
-        return !snprintf(out, n_byte,
-                         "--within: \"%.40s\" is not a length above 0 with its unit, mm, um, cm or m, as 1mm", within);
+        return PAL_REFUSE(diag, "--within: \"%.40s\" is not a length above 0 with its unit, mm, um, cm or m, as 1mm",
+                          within);
     if (budget && !read_amount(budget, time_unit, &run->target.budget_ms))
-        return !snprintf(out, n_byte, "--budget: \"%.40s\" is not a time above 0 with its unit, ms, us or s, as 4ms",
-                         budget);
+        return PAL_REFUSE(diag, "--budget: \"%.40s\" is not a time above 0 with its unit, ms, us or s, as 4ms", budget);
     if (run->scene && !within && !budget && !run->row)
-        return !snprintf(out, n_byte, "-o: needs --within, --budget or --pick, which name the configuration to write");
+        return PAL_REFUSE(diag, "-o: needs --within, --budget or --pick, which name the configuration to write");
+    const char *other = run->again ? "--again" : within ? "--within" : "--budget";
     if (run->row && (within || budget || run->again))
-        return !snprintf(out, n_byte, "--pick: names the configuration of a row, %s does not go with it",
-                         run->again ? "--again"
-                         : within   ? "--within"
-                                    : "--budget");
+        return PAL_REFUSE(diag, "--pick: names the configuration of a row, %s does not go with it", other);
     if (run->methods && strlen(run->methods) >= sizeof run->words)
-        return !snprintf(out, n_byte, "--methods: \"%.40s...\" is too long", run->methods);
-    if (run->methods && !run->methods[0]) return !snprintf(out, n_byte, "--methods: \"\" is empty");
+        return PAL_REFUSE(diag, "--methods: \"%.40s...\" is too long", run->methods);
+    if (run->methods && !run->methods[0]) return PAL_REFUSE(diag, "--methods: \"\" is empty");
     if (run->methods && !read_methods(run))
-        return !snprintf(out, n_byte,
-                         "--methods: \"%.80s\" contains a name that is not fem, tet_springs, adaptive_springs or "
-                         "subdivision_fem",
-                         run->methods);
+        return PAL_REFUSE(diag,
+                          "--methods: \"%.80s\" contains a name that is not fem, tet_springs, adaptive_springs or "
+                          "subdivision_fem",
+                          run->methods);
     if (!run->methods) run->methods = "";
-    return true;
+    return PAL_ERR_OK;
 }
 
 /* the command as it was typed, words with blanks in quotes */
@@ -176,15 +172,6 @@ static bool covers(const study_run *run)
     return all;
 }
 
-/* the study will have the stored methods and the requested ones */
-static void join_methods(pal_study_file *now, const pal_study_file *old)
-{
-    char both[2 * sizeof now->methods];
-    if (!old->whole || !now->methods[0]) return;
-    snprintf(both, sizeof both, "%s,%s", old->methods, now->methods);
-    if (strlen(both) < sizeof now->methods) memcpy(now->methods, both, strlen(both) + 1);
-}
-
 /* the stored study. A pick without load flags takes the loads from it */
 static pal_err read_old(study_run *run, pal_diagnostic *diag)
 {
@@ -220,10 +207,13 @@ static pal_err use_old(study_run *run, bool *whole, pal_diagnostic *diag)
     if (complete) {
         *run->file = *run->old;
         pal_study_mark_front(&run->file->study);
-    } else {
-        join_methods(run->file, run->old);
-        run->before = &run->old->study;
+        return PAL_ERR_OK;
     }
+    /* the study will have the stored methods and the requested ones */
+    char both[2 * sizeof run->file->methods], *methods = run->file->methods;
+    snprintf(both, sizeof both, "%s,%s", run->old->methods, methods);
+    if (run->old->whole && methods[0] && strlen(both) < sizeof run->file->methods) strcpy(methods, both);
+    run->before = &run->old->study;
     return PAL_ERR_OK;
 }
 
@@ -369,16 +359,15 @@ static pal_err measure(study_run *run, pal_diagnostic *diag)
                            .progress = show,
                            .may_continue = may_continue,
                            .user = run};
-    if (!out) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the study");
-    pal_err opened = open_journal(run, diag);
-    if (opened) {
+    pal_err err = out ? open_journal(run, diag) : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for the study");
+    if (err) {
         free(out);
-        return opened;
+        return err;
     }
     const pal_study_input *in = &run->input;
     pal_diagnostic reason = {""};
-    pal_err err = in->problem ? pal_study_problem(in->problem, in->load_case, &in->surface, &o, out, &reason)
-                              : pal_study_scene(in->scene, &o, out, &reason);
+    err = in->problem ? pal_study_problem(in->problem, in->load_case, &in->surface, &o, out, &reason)
+                      : pal_study_scene(in->scene, &o, out, &reason);
     if (!err || out->n_point > 0) merge_results(run, out);
     if (run->store_err) {
         err = run->store_err;
@@ -551,14 +540,6 @@ static cJSON *as_json(const study_run *run)
                                {"ms", JSON_NUMBER(p->ms)}, {"error_m", JSON_NUMBER(p->error_m)})});
 }
 
-/* draws the plot of a complete study again when its file is gone */
-static pal_err draw_again(const study_run *run, pal_diagnostic *diag)
-{
-    char path[PAL_STUDY_PATH + 8];
-    snprintf(path, sizeof path, "%s.svg", run->stem);
-    return access(path, F_OK) ? pal_study_publish(run->file, run->stem, diag) : PAL_ERR_OK;
-}
-
 /* ---- the command ---- */
 
 static pal_err work(study_run *run, int argc, char **argv, pal_diagnostic *diag)
@@ -597,7 +578,10 @@ static pal_err work(study_run *run, int argc, char **argv, pal_diagnostic *diag)
         if (err) return err;
         if (kept) return pal_diagnostic_set(diag, kept, "%s", reason.text);
     } else {
-        PAL_TRY(draw_again(run, diag));
+        /* draws the plot again when its file is gone */
+        char path[PAL_STUDY_PATH + 8];
+        snprintf(path, sizeof path, "%s.svg", run->stem);
+        if (access(path, F_OK)) PAL_TRY(pal_study_publish(run->file, run->stem, diag));
     }
     return answer(run, diag);
 }
@@ -659,11 +643,10 @@ int command_study(int argc, char **argv)
                                   .max_operand = 1};
     int n = 0, code = pal_flags_parse(&table, argc, argv, &run.common, &run.request.word, &n);
     if (code >= 0) return code;
-    char sentence[240] = "";
-    bool fine = read_arguments(&run, within, budget, sentence, sizeof sentence);
+    pal_diagnostic diag = {""};
+    if (read_arguments(&run, within, budget, &diag)) return pal_flags_wrong(&run.common, "%s", diag.text);
     surface.unit_m = unit ? pal_mesh_unit_named(unit) : 0;
-    if (fine && unit && surface.unit_m == 0)
-        fine = !snprintf(sentence, sizeof sentence, "--units: \"%.40s\" is not m, cm, mm, um or in", unit) && fine;
-    if (!fine) return pal_flags_wrong(&run.common, "%s", sentence);
+    if (unit && surface.unit_m == 0)
+        return pal_flags_wrong(&run.common, "--units: \"%.40s\" is not m, cm, mm, um or in", unit);
     return start(&run, argc, argv);
 }
