@@ -230,16 +230,6 @@ static pal_err run_table(const pressed *p, const double paper_s[KINDS], run out[
     return err;
 }
 
-/* the mass of what it encloses; pressed on a patch of a twelfth of its size */
-static void fill(pressed *body, double force_N)
-{
-    const pal_surface *surface = &body->loaded->mesh[0].surface;
-    double low[3], high[3];
-    pal_surface_box(surface, low, high);
-    body->mass_kg = 1000 * fabs(pal_surface_volume(surface));
-    body->radius_m = pal_dist3(low, high) / 12, body->force_N = force_N;
-}
-
 /* our own surface of each shape into drawn, then the shared one where it exists. The sphere is pressed at its equator,
  * where every vertex is regular */
 static pal_err run_tables(run drawn[2][KINDS], bench_report *r, pal_diagnostic *diag)
@@ -255,7 +245,14 @@ static pal_err run_tables(run drawn[2][KINDS], bench_report *r, pal_diagnostic *
         if (k & 1 && !path) continue;
         pressed body;
         err = take(shape_name[k / 2], path, axis[k / 2], &body, diag);
-        if (!err) fill(&body, force_N[k / 2]);
+        if (!err) {
+            /* the mass of what it encloses; pressed on a patch of a twelfth of its size */
+            const pal_surface *surface = &body.loaded->mesh[0].surface;
+            double low[3], high[3];
+            pal_surface_box(surface, low, high);
+            body.mass_kg = 1000 * fabs(pal_surface_volume(surface));
+            body.radius_m = pal_dist3(low, high) / 12, body.force_N = force_N[k / 2];
+        }
         if (!err) err = run_table(&body, paper_s[k / 2], k & 1 ? shared : drawn[k / 2], r, diag);
         pal_scene_free(body.loaded);
     }

@@ -14,7 +14,6 @@
 #include "server/session/configuration_switch.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 
 enum { N_CASE = 8, WARM = 12, ROUNDS = 6, MAX_SAMPLE = 1024, MAX_NODE = 30000 };
 static const double max_ratio = 1.3, round_s = 0.1;
@@ -23,8 +22,10 @@ static const double load_share = 0.001;
 
 typedef struct subject {
     const char *name;
-    pal_surface_scene options;
-    bool two; /* a second, equal body keeps its configuration */
+    int resolution;
+    bool fem;
+    const char *solver, *element; /* NULL: the default */
+    bool two;                     /* a second, equal body keeps its configuration */
 } subject;
 
 typedef struct neighbour {
@@ -36,7 +37,6 @@ typedef struct neighbour {
 } neighbour;
 
 typedef struct result {
-    int n_neighbour;
     pal_estimate estimate;
     neighbour neighbour[PAL_ESTIMATE_NEIGHBOURS];
 } result;
@@ -137,7 +137,13 @@ static pal_err measure(const subject *s, result *out, pal_diagnostic *diag)
     double ms[MAX_SAMPLE];
     int n = 0;
     *out = (result){0};
-    PAL_TRY(pal_scene_procedural(&s->options, &loaded, NULL, diag));
+    const pal_surface_scene options = {.label = -1,
+                                       .hold = 0.3,
+                                       .fem = s->fem,
+                                       .resolution = s->resolution,
+                                       .solver = s->solver,
+                                       .element = s->element};
+    PAL_TRY(pal_scene_procedural(&options, &loaded, NULL, diag));
     pal_scene *scene = &loaded->scene;
     if (s->two) {
         pal_body_def *other = &scene->body[scene->n_body++];
@@ -149,14 +155,11 @@ static pal_err measure(const subject *s, result *out, pal_diagnostic *diag)
     for (int k = 0; k < ROUNDS && !err; k++) err = timed(world, scene->step_s, ms, cost, &n);
     if (!err) err = swing(world, scene);
     if (!err) err = estimate(scene, world, cost, n, &out->estimate, diag);
-    if (!err) {
-        out->n_neighbour = out->estimate.n_neighbour;
-        for (int k = 0; k < out->n_neighbour; k++) {
-            neighbour *r = &out->neighbour[k];
-            r->predicted = out->estimate.neighbour[k];
-            pal_diagnostic reason = {""};
-            r->err = try_neighbour(scene, world, r, &reason);
-        }
+    for (int k = 0; k < out->estimate.n_neighbour && !err; k++) {
+        neighbour *r = &out->neighbour[k];
+        r->predicted = out->estimate.neighbour[k];
+        pal_diagnostic reason = {""};
+        r->err = try_neighbour(scene, world, r, &reason);
     }
     pal_world_destroy(world);
     pal_scene_free(loaded);
@@ -200,25 +203,20 @@ static void add_neighbour(bench_report *report, const subject *s, const result *
 
 pal_err bench_estimate(bench_report *r, pal_diagnostic *diag)
 {
-    static const subject subjects[N_CASE] = {
-        {.name = "fem hex8_bbar, 12 voxels", .options = {.label = -1, .hold = 0.3, .fem = true, .resolution = 12}},
-        {.name = "fem hex8_bbar, 18 voxels", .options = {.label = -1, .hold = 0.3, .fem = true, .resolution = 18}},
-        {.name = "fem hex8_bbar, 16 voxels, sdirk2",
-         .options = {.label = -1, .hold = 0.3, .fem = true, .resolution = 16, .solver = "sdirk2"}},
-        {.name = "fem tet4, 16 voxels",
-         .options = {.label = -1, .hold = 0.3, .fem = true, .resolution = 16, .element = "tet4"}},
-        {.name = "springs, 12 voxels", .options = {.label = -1, .hold = 0.3, .resolution = 12}},
-        {.name = "springs, 18 voxels", .options = {.label = -1, .hold = 0.3, .resolution = 18}},
-        {.name = "fem hex8_bbar, 12 voxels, twice",
-         .options = {.label = -1, .hold = 0.3, .fem = true, .resolution = 12},
-         .two = true},
-        {.name = "springs, 12 voxels, twice", .options = {.label = -1, .hold = 0.3, .resolution = 12}, .two = true}};
+    static const subject subjects[N_CASE] = {{"fem hex8_bbar, 12 voxels", 12, true, NULL, NULL, false},
+                                             {"fem hex8_bbar, 18 voxels", 18, true, NULL, NULL, false},
+                                             {"fem hex8_bbar, 16 voxels, sdirk2", 16, true, "sdirk2", NULL, false},
+                                             {"fem tet4, 16 voxels", 16, true, NULL, "tet4", false},
+                                             {"springs, 12 voxels", 12, false, NULL, NULL, false},
+                                             {"springs, 18 voxels", 18, false, NULL, NULL, false},
+                                             {"fem hex8_bbar, 12 voxels, twice", 12, true, NULL, NULL, true},
+                                             {"springs, 12 voxels, twice", 12, false, NULL, NULL, true}};
     static result c;
     int n = 0, within = 0;
     bench_list(r, "neighbours");
     for (int k = 0; k < N_CASE; k++) {
         PAL_TRY(measure(&subjects[k], &c, diag));
-        for (int i = 0; i < c.n_neighbour; i++) {
+        for (int i = 0; i < c.estimate.n_neighbour; i++) {
             if (c.neighbour[i].err) continue;
             n++, within += is_within(cost_ratio(&c, &c.neighbour[i]));
             add_neighbour(r, &subjects[k], &c, i);

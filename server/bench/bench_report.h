@@ -31,15 +31,9 @@ typedef struct bench_cell {
     double number;
     const char *text; /* NULL: a number */
 } bench_cell;
-#define NUMBER(key, head, width, digits, value)                                                                        \
-    {                                                                                                                  \
-        key, head, width, digits, value, NULL                                                                          \
-    }
-#define TEXT(key, head, width, text)                                                                                   \
-    {                                                                                                                  \
-        key, head, width, 0, 0, text                                                                                   \
-    }
-#define VALUE(key, value) NUMBER(key, NULL, 0, 0, value)
-#define BENCH_ROW(r, ...) bench_row(r, (const bench_cell[]){__VA_ARGS__, TEXT(NULL, NULL, 0, NULL)})
+#define NUMBER(key, head, width, digits, value) ((bench_cell){key, head, width, digits, value, NULL})
+#define TEXT(key, head, width, text)            ((bench_cell){key, head, width, 0, 0, text})
+#define VALUE(key, value)                       NUMBER(key, NULL, 0, 0, value)
+#define BENCH_ROW(r, ...)                       bench_row(r, (const bench_cell[]){__VA_ARGS__, TEXT(NULL, NULL, 0, NULL)})
 void bench_row(bench_report *r, const bench_cell *cell);
 #endif

@@ -15,12 +15,10 @@
 #include "server/sim/subdivision/subdivision_solid.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-enum { N_STEP = 401, N_FRAME = 41, OPERATORS = 2 };
+enum { N_STEP = 401, N_FRAME = 41 };
 static const double frame_s = 1.0 / 60;
-static const char *const operator_name[OPERATORS] = {"polar", "edges"};
 
 /* ms an iteration of Table 1 (MSPI) */
 static const struct {
@@ -88,35 +86,24 @@ static pal_err run_steps(body *b, int n, int n_warm, bool frames, run *out, pal_
 }
 
 typedef struct result {
-    int n_point, n_element;
-    double percent[PAL_CELL_KINDS];
-    double paper_ms;     /* NaN: not in the table */
-    run step[OPERATORS]; /* explicit, with the default preconditioner, a factor of M~ */
-    run diagonal;        /* with the paper's */
+    double paper_ms; /* NaN: not in the table */
+    run step[2];     /* explicit, of operators polar and edges, with the default preconditioner, a factor of M~ */
+    run diagonal;    /* with the paper's */
     run explicit_frame, implicit_frame;
     double make_ms; /* world with implicit_euler, its factor */
 } result;
 
-/* what a body is, before it is measured */
-static void describe(const pal_cell_model *model, const body *b, result *out)
+static void add_case(bench_report *r, const pal_cell_model *m, const body *b, const result *c)
 {
     const pal_body *of = pal_world_body(b->world, 0);
-    out->n_point = of->n_dof, out->n_element = pal_cell_elements_count(&of->model.solid->elements);
-    for (pal_cell_kind k = 0; k < PAL_CELL_KINDS; k++)
-        out->percent[k] = pal_cell_elements_percent(&of->model.solid->elements, k);
-    out->paper_ms = NAN;
-    for (size_t k = 0; k < sizeof paper / sizeof paper[0]; k++)
-        if (!strcmp(paper[k].name, model->name)) out->paper_ms = paper[k].ms;
-}
-
-static void add_case(bench_report *r, const pal_cell_model *m, int n_cell, const result *c)
-{
+    const pal_cell_elements *e = &of->model.solid->elements;
     BENCH_ROW(r, TEXT("name", "solid", -8, m->name), NUMBER("levels", "levels", 6, 0, m->n_level),
-              NUMBER("cells", "#CC", 4, 0, n_cell), VALUE("control_points", c->n_point),
-              NUMBER("elements", "#FE", 5, 0, c->n_element), NUMBER("paper_elements", "paper", 5, 0, m->n_element),
-              NUMBER("cubic_percent", "%cubic", 6, 0, c->percent[0]),
-              NUMBER("linear_percent", "%linear", 7, 0, c->percent[1]),
-              NUMBER("pyramid_percent", "%pyramid", 8, 0, c->percent[2]),
+              NUMBER("cells", "#CC", 4, 0, b->cells.n_cell), VALUE("control_points", of->n_dof),
+              NUMBER("elements", "#FE", 5, 0, pal_cell_elements_count(e)),
+              NUMBER("paper_elements", "paper", 5, 0, m->n_element),
+              NUMBER("cubic_percent", "%cubic", 6, 0, pal_cell_elements_percent(e, PAL_CELL_CUBIC)),
+              NUMBER("linear_percent", "%linear", 7, 0, pal_cell_elements_percent(e, PAL_CELL_HEX)),
+              NUMBER("pyramid_percent", "%pyramid", 8, 0, pal_cell_elements_percent(e, PAL_CELL_PYRAMID)),
               NUMBER("paper_ms", "paper ms", 8, 0, c->paper_ms),
               NUMBER("polar_ms", "polar ms", 8, 3, c->step[0].median_ms),
               NUMBER("edges_ms", "edges ms", 8, 3, c->step[1].median_ms),
@@ -139,22 +126,27 @@ static pal_err measure(const pal_cell_model *model, bench_report *r, pal_diagnos
 {
     static pal_scene scene;
     body b = {.scene = &scene};
-    result c = {0};
+    result c = {.paper_ms = NAN};
+    const struct {
+        const char *operator, * solver, *preconditioner;
+        int n, n_warm;
+        bool frames;
+        run *out;
+    } job[] = {{"polar", "central_cg", NULL, N_STEP, N_STEP / 10, false, &c.step[0]},
+               {"edges", "central_cg", NULL, N_STEP, N_STEP / 10, false, &c.step[1]},
+               {"polar", "central_cg", "diagonal", N_STEP / 8, N_STEP / 80, false, &c.diagonal},
+               {"polar", "central_cg", NULL, N_FRAME / 4, 2, true, &c.explicit_frame},
+               {"polar", "implicit_euler", NULL, N_FRAME, 2, true, &c.implicit_frame}};
+    for (size_t k = 0; k < sizeof paper / sizeof paper[0]; k++)
+        if (!strcmp(paper[k].name, model->name)) c.paper_ms = paper[k].ms;
     pal_err err = bench_solid(model, &b.cells, &b.mesh, diag);
-    for (int op = 0; op < OPERATORS && !err; op++) {
-        err = start(model, operator_name[op], "central_cg", NULL, &b, diag);
-        if (!err && op == 0) describe(model, &b, &c);
-        if (!err) err = run_steps(&b, N_STEP, N_STEP / 10, false, &c.step[op], diag);
+    for (size_t k = 0; k < sizeof job / sizeof job[0] && !err; k++) {
+        uint64_t began = pal_clock_thread_ns();
+        err = start(model, job[k].operator, job[k].solver, job[k].preconditioner, &b, diag);
+        c.make_ms = 1e-6 * (double)(pal_clock_thread_ns() - began);
+        if (!err) err = run_steps(&b, job[k].n, job[k].n_warm, job[k].frames, job[k].out, diag);
     }
-    if (!err) err = start(model, operator_name[0], "central_cg", "diagonal", &b, diag);
-    if (!err) err = run_steps(&b, N_STEP / 8, N_STEP / 80, false, &c.diagonal, diag);
-    if (!err) err = start(model, operator_name[0], "central_cg", NULL, &b, diag);
-    if (!err) err = run_steps(&b, N_FRAME / 4, 2, true, &c.explicit_frame, diag);
-    uint64_t began = pal_clock_thread_ns();
-    if (!err) err = start(model, operator_name[0], "implicit_euler", NULL, &b, diag);
-    c.make_ms = 1e-6 * (double)(pal_clock_thread_ns() - began);
-    if (!err) err = run_steps(&b, N_FRAME, 2, true, &c.implicit_frame, diag);
-    if (!err) add_case(r, model, b.cells.n_cell, &c);
+    if (!err) add_case(r, model, &b, &c);
     pal_world_destroy(b.world);
     pal_prepared_free(&b.mesh);
     pal_cells_free(&b.cells);

@@ -67,12 +67,6 @@ static bool same_text(const char *a, const char *b)
     return strcmp(a ? a : "", b ? b : "") == 0;
 }
 
-static bool same_quantity(const pal_body_picture *a, const pal_body_picture *b)
-{
-    return a->value && b->value && a->log == b->log && same_text(a->value_title, b->value_title) &&
-           same_text(a->unit, b->unit);
-}
-
 /* range of the values themselves; false: there is none */
 static bool value_range(panel *g)
 {
@@ -118,8 +112,12 @@ static void find_ranges(sheet *page)
     }
     for (int i = 0; i < page->n; i++) {
         panel *g = &page->panel[i];
-        for (int j = 0; j < page->n; j++)
-            if (same_quantity(g->p, page->panel[j].p)) g->from = fmin(g->from, from[j]), g->to = fmax(g->to, to[j]);
+        for (int j = 0; j < page->n; j++) {
+            const pal_body_picture *a = g->p, *b = page->panel[j].p;
+            bool same = a->value && b->value && a->log == b->log && same_text(a->value_title, b->value_title) &&
+                        same_text(a->unit, b->unit);
+            if (same) g->from = fmin(g->from, from[j]), g->to = fmax(g->to, to[j]);
+        }
         if (g->ranged) settle_range(g);
     }
 }

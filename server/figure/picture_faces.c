@@ -41,18 +41,6 @@ static void face_normal(const double *x, const int32_t tri[3], double normal[3])
     pal_normal3(normal, x + 3 * tri[0], x + 3 * tri[1], x + 3 * tri[2]);
 }
 
-static double volume(const pal_picture_mesh *m)
-{
-    double sum = 0;
-    for (int t = 0; t < m->n_tri; t++) {
-        double normal[3], from[3];
-        face_normal(m->x, m->tri + 3 * t, normal);
-        pal_sub3(from, m->x + 3 * m->tri[3 * t], m->x);
-        sum += pal_dot3(from, normal) / 6;
-    }
-    return sum;
-}
-
 static int count_seen(const pal_picture_mesh *m, const pal_picture_axes *axes)
 {
     int n = 0;
@@ -67,15 +55,6 @@ static int count_seen(const pal_picture_mesh *m, const pal_picture_axes *axes)
 static pal_surface surface_of(const pal_picture_mesh *m)
 {
     return (pal_surface){.n_vertex = m->n_vertex, .n_tri = m->n_tri, .x = m->x, .tri = m->tri};
-}
-
-static pal_err find_closed(pal_picture_mesh *m)
-{
-    const pal_surface s = surface_of(m);
-    pal_surface_topology found;
-    PAL_TRY(pal_surface_check(&s, &found));
-    m->closed = found.closed && found.oriented && found.n_nonmanifold_edge == 0;
-    return PAL_ERR_OK;
 }
 
 /* ---- fewer triangles ---- */
@@ -140,9 +119,11 @@ static pal_err join_cells(pal_picture_mesh *m, const double low[3], double size)
 
 pal_err pal_picture_mesh_prepare(pal_picture_mesh *m, const pal_picture_axes *axes, int max)
 {
-    PAL_TRY(find_closed(m));
-    bool closed = m->closed;
-    if (closed && volume(m) < 0)
+    const pal_surface s = surface_of(m);
+    pal_surface_topology found;
+    PAL_TRY(pal_surface_check(&s, &found));
+    const bool closed = m->closed = found.closed && found.oriented && found.n_nonmanifold_edge == 0;
+    if (closed && pal_surface_volume(&s) < 0)
         for (int t = 0; t < m->n_tri; t++) {
             int32_t other = m->tri[3 * t + 1];
             m->tri[3 * t + 1] = m->tri[3 * t + 2], m->tri[3 * t + 2] = other;
@@ -150,7 +131,6 @@ pal_err pal_picture_mesh_prepare(pal_picture_mesh *m, const pal_picture_axes *ax
     int seen = count_seen(m, axes);
     if (seen <= max) return PAL_ERR_OK;
     double low[3], high[3];
-    const pal_surface s = surface_of(m);
     pal_surface_box(&s, low, high);
     /* a cell that a surface crosses gives about two triangles; half of them are seen */
     double size = fmax(sqrt(pal_surface_area(&s) / max) * (closed ? 0.7 : 1), 1e-6 * pal_dist3(low, high));

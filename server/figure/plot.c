@@ -51,14 +51,6 @@ static void settle(axis *a)
     a->low = step * floor(a->low / step + 1e-9), a->high = step * ceil(a->high / step - 1e-9);
 }
 
-/* number of the curve's colour: dark ones do not count */
-static int colour_of(const pal_plot *plot, int k)
-{
-    int number = 0;
-    for (int i = 0; i < k; i++) number += !plot->curve[i].ink;
-    return number;
-}
-
 static int wide_of(const pal_plot *plot)
 {
     return plot->wide > 0 ? plot->wide : WIDE;
@@ -129,7 +121,8 @@ static void draw_curve(FILE *to, const pal_plot *plot, int k, const axis *x, con
 {
     const pal_curve *c = &plot->curve[k];
     const char *dash = c->dashed ? " stroke-dasharray=\"6 4\"" : "";
-    int kind = colour_of(plot, k);
+    int kind = 0; /* number of the curve's colour: dark ones do not count */
+    for (int i = 0; i < k; i++) kind += !plot->curve[i].ink;
     const char *width = c->thin ? "0.8\" stroke-opacity=\"0.6" : "2", *ink = c->ink ? "#222" : colour[kind % N_COLOUR];
     if (!c->dots) fprintf(to, "<path fill=\"none\" stroke-width=\"%s\" stroke=\"%s\"%s d=\"", width, ink, dash);
     bool pen = false;
