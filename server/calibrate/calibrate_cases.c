@@ -251,24 +251,17 @@ const char *pal_calibrate_grid(const char *text, int grid[3])
     return NULL;
 }
 
-static pal_err check_supports(const job *j)
-{
-    const pal_problem *p = j->set->problem;
-    for (int k = 0; k < p->n_support; k++) {
-        const double *move = p->support[k].move_m;
-        if (p->support[k].moved && (move[0] != 0 || move[1] != 0 || move[2] != 0))
-            return PAL_REFUSE(j->diag, "%s: supports[%d]: moves, springs are calibrated on supports that hold still",
-                              p->path, k);
-    }
-    return PAL_ERR_OK;
-}
-
 pal_err pal_calibrate_cases_read(const pal_calibrate_input *input, pal_calibrate_cases *out, pal_diagnostic *diag)
 {
     *out = (pal_calibrate_cases){0};
     job j = {.input = input, .set = out, .diag = diag};
     PAL_TRY(pal_problem_read(input->problem, &out->problem, diag));
-    PAL_TRY(check_supports(&j));
+    for (int k = 0; k < out->problem->n_support; k++) {
+        const pal_problem_support *s = &out->problem->support[k];
+        if (s->moved && (s->move_m[0] != 0 || s->move_m[1] != 0 || s->move_m[2] != 0))
+            return PAL_REFUSE(diag, "%s: supports[%d]: moves, springs are calibrated on supports that hold still",
+                              out->problem->path, k);
+    }
     PAL_TRY(add_list(&j, input->fit, true));
     PAL_TRY(add_list(&j, input->verify, false));
     PAL_TRY(settle_material(&j));

@@ -337,18 +337,6 @@ static pal_err make_starts(const job *j)
     return err;
 }
 
-static void complete_info(pal_calibration *c)
-{
-    pal_calibration_info *out = &c->info;
-    out->n_node = c->lattice.n_node, out->n_free = c->lattice.n_free, out->n_tet = c->mesh.tets.n_tet;
-    out->edge_m = c->lattice.edge_m;
-    out->mesh = &c->mesh;
-    out->grid = c->has_grid ? &c->grid : NULL, out->weights = c->has_grid ? &c->weights : NULL;
-    out->start = c->theta, out->low = c->low, out->high = c->high;
-    for (int k = 0; k < out->n_kind; k++) out->n_spring += c->lattice.kind[out->kind[k]].n_item;
-    for (int i = 0; i < c->n_case; i++) out->max_m[i] = c->fit[i].max_m, out->n_point[i] = c->fit[i].n_point;
-}
-
 static pal_err make(const job *j)
 {
     pal_calibration *c = j->c;
@@ -360,8 +348,15 @@ static pal_err make(const job *j)
     c->info.truth_s = pal_clock_s() - loaded;
     PAL_TRY(make_parameters(j));
     PAL_TRY(make_starts(j));
-    c->info.prepare_s += pal_clock_s() - begin - c->info.truth_s;
-    complete_info(c);
+    pal_calibration_info *out = &c->info;
+    out->prepare_s += pal_clock_s() - begin - out->truth_s;
+    out->n_node = c->lattice.n_node, out->n_free = c->lattice.n_free, out->n_tet = c->mesh.tets.n_tet;
+    out->edge_m = c->lattice.edge_m;
+    out->mesh = &c->mesh;
+    out->grid = c->has_grid ? &c->grid : NULL, out->weights = c->has_grid ? &c->weights : NULL;
+    out->start = c->theta, out->low = c->low, out->high = c->high;
+    for (int k = 0; k < out->n_kind; k++) out->n_spring += c->lattice.kind[out->kind[k]].n_item;
+    for (int i = 0; i < c->n_case; i++) out->max_m[i] = c->fit[i].max_m, out->n_point[i] = c->fit[i].n_point;
     return PAL_ERR_OK;
 }
 

@@ -105,25 +105,6 @@ pal_err pal_settle(pal_world *world, double step_s, const pal_settle_load *load,
 
 /* ---- search over the rates ---- */
 
-/* Runs all loads at one rate. *mean is NaN if one is not steady within `max` seconds of all together. */
-static pal_err try_rate(pal_world *world, double step_s, const pal_settle_load *load, int n_load, double max,
-                        pal_settle_options *options, double *work, pal_settle_run *run, double *mean,
-                        pal_diagnostic *diag)
-{
-    double left = max, longest = options->max_simulated_s;
-    *mean = NAN;
-    for (int k = 0; k < n_load; k++) {
-        options->max_simulated_s = fmin(longest, left);
-        pal_err err = pal_settle(world, step_s, &load[k], options, work, &run[k], diag);
-        options->max_simulated_s = longest;
-        if (err) return err;
-        left -= run[k].seconds;
-        if (!run[k].steady) return PAL_ERR_OK;
-    }
-    *mean = (max - left) / n_load;
-    return PAL_ERR_OK;
-}
-
 /* state of one search */
 typedef struct climb {
     pal_world *world;
@@ -136,18 +117,26 @@ typedef struct climb {
     pal_diagnostic *diag;
 } climb;
 
-/* tries one rate; *better: settles sooner than all before */
+/* Runs all loads at one rate, which ends once their mean cannot be the least. *better: settles sooner than all before
+ */
 static pal_err try_rung(climb *c, int rung, bool *better)
 {
     pal_settle_report *out = c->out;
     pal_settle_run run[PAL_SETTLE_LOADS] = {0};
+    pal_settle_options options = c->options;
     pal_material material = c->scene->body[0].material;
-    double mean, max = c->n_load * (out->steady ? out->seconds : c->options.max_simulated_s);
+    double max = c->n_load * (out->steady ? out->seconds : c->options.max_simulated_s), left = max;
+    bool steady = true;
     material.damping_1_s = pal_settle_rates_1_s[rung];
     PAL_TRY(pal_world_material(c->world, 0, &material, c->diag));
-    PAL_TRY(try_rate(c->world, c->scene->step_s, c->load, c->n_load, max, &c->options, &c->work, run, &mean, c->diag));
-    out->rate_seconds[rung] = mean;
-    *better = isfinite(mean) && (!out->steady || mean < out->seconds);
+    for (int k = 0; k < c->n_load && steady; k++) {
+        options.max_simulated_s = fmin(c->options.max_simulated_s, left);
+        PAL_TRY(pal_settle(c->world, c->scene->step_s, &c->load[k], &options, &c->work, &run[k], c->diag));
+        left -= run[k].seconds;
+        steady = run[k].steady;
+    }
+    double mean = out->rate_seconds[rung] = steady ? (max - left) / c->n_load : NAN;
+    *better = steady && (!out->steady || mean < out->seconds);
     /* a body that never rests reports its first run */
     for (int i = 0; i < c->n_load && (*better || (!out->steady && rung == c->first)); i++) out->load[i] = run[i];
     if (!*better) return PAL_ERR_OK;

@@ -272,14 +272,6 @@ static pal_err write_result(job *j, const char *problem, int seed, const cJSON *
     return err;
 }
 
-static void print(const job *j, const char *problem, int seed, const pal_fit_result *r)
-{
-    if (j->common.json || j->common.quiet) return;
-    printf("%s, seed %d: error %.4g %% (start %.4g %%), %lld evaluations, %s\n", problem, seed, r->value.error_percent,
-           r->start_percent, (long long)r->n_evaluation, r->ended);
-    fflush(stdout);
-}
-
 static bool show(void *user, const pal_fit_step *step)
 {
     job *j = user;
@@ -315,7 +307,10 @@ static pal_err fit(job *j, const char *problem, int seed, cJSON *results)
     } else {
         cJSON *one = as_json(j, seed, theta, &r);
         err = write_result(j, problem, seed, one);
-        print(j, problem, seed, &r);
+        if (!j->common.json && !j->common.quiet)
+            printf("%s, seed %d: error %.4g %% (start %.4g %%), %lld evaluations, %s\n", problem, seed,
+                   r.value.error_percent, r.start_percent, (long long)r.n_evaluation, r.ended);
+        fflush(stdout);
         cJSON_AddItemToArray(results, one);
     }
     free(theta);

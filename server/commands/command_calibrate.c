@@ -161,22 +161,17 @@ static pal_err check_sources(const pal_calibrate_run *run, pal_diagnostic *diag)
 
 /* ---- work ---- */
 
-static pal_err make(pal_calibrate_run *run, pal_diagnostic *diag)
-{
-    run->options.progress = pal_report_continue;
-    run->options.user = &run->common;
-    PAL_TRY(pal_calibrate_cases_make(&run->set, &run->options, &run->calibration, &run->info, diag));
-    run->theta = malloc(sizeof *run->theta * (size_t)run->info.n_parameter);
-    if (!run->theta || pal_calibration_workspace_create(run->calibration, &run->workspace))
-        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for %d constants", run->info.n_parameter);
-    return PAL_ERR_OK;
-}
-
 static pal_err search(pal_calibrate_run *run, pal_diagnostic *diag)
 {
     enum { ALL = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY };
+    run->options.progress = pal_report_continue;
+    run->options.user = &run->common;
+    PAL_TRY(pal_calibrate_cases_make(&run->set, &run->options, &run->calibration, &run->info, diag));
     const pal_calibration *c = run->calibration;
     size_t n = sizeof *run->theta * (size_t)run->info.n_parameter;
+    run->theta = malloc(n);
+    if (!run->theta || pal_calibration_workspace_create(c, &run->workspace))
+        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for %d constants", run->info.n_parameter);
     pal_calibration_manual_start(c, run->theta);
     PAL_TRY(pal_calibration_evaluate(c, run->workspace, run->theta, ALL, &run->hand, NULL, diag));
     memcpy(run->theta, run->info.start, n);
@@ -235,7 +230,6 @@ static pal_err work(pal_calibrate_run *run, pal_diagnostic *diag)
     PAL_TRY(check_targets(run, diag));
     PAL_TRY(pal_calibrate_cases_read(&run->input, &run->set, diag));
     PAL_TRY(check_sources(run, diag));
-    PAL_TRY(make(run, diag));
     PAL_TRY(search(run, diag));
     PAL_TRY(pal_calibrate_scene(run, &scene, diag));
     pal_err err = settle(run, scene, diag);

@@ -71,10 +71,7 @@ static const char *effect_words(const char *name, char text[128])
 {
     const pal_effect *effect = pal_effect_find(name);
     for (size_t i = 0; i < sizeof of_model / sizeof of_model[0]; i++)
-        if (!strcmp(of_model[i].name, name)) {
-            snprintf(text, 128, "%s", of_model[i].words);
-            return text;
-        }
+        if (!strcmp(of_model[i].name, name)) return of_model[i].words;
     if (effect && effect->stage == PAL_STAGE_SOLVE)
         snprintf(text, 128, "solver \"%s\"", name);
     else if (effect && effect->stage == PAL_STAGE_OUTPUT && strcmp(name, "field_output") != 0)
@@ -212,15 +209,6 @@ static void print_body(const pal_body_def *def, const pal_body *b)
     }
 }
 
-static void print_absent(const pal_world *world)
-{
-    char words[128];
-    printf("\n%-52s %s\n", "absent: no component, no memory, no time", "called for by");
-    for (int i = 0; i < PAL_EFFECT_COUNT; i++)
-        if (!has_component(world, pal_effects[i]->name))
-            printf("  %-50s %s\n", pal_effects[i]->name, effect_words(pal_effects[i]->name, words));
-}
-
 static void print(const pal_studied_scene *studied, pal_world *world, cost *c)
 {
     const pal_scene *scene = studied->scene;
@@ -234,7 +222,11 @@ static void print(const pal_studied_scene *studied, pal_world *world, cost *c)
         printf("%-9s %-16s %-16s %10.1f %10.4f  %s\n", info.stage, info.name, info.body, 1e-3 * (double)info.n_byte,
                component_ms(c, k), info.reason);
     }
-    print_absent(world);
+    char words[128];
+    printf("\n%-52s %s\n", "absent: no component, no memory, no time", "called for by");
+    for (int i = 0; i < PAL_EFFECT_COUNT; i++)
+        if (!has_component(world, pal_effects[i]->name))
+            printf("  %-50s %s\n", pal_effects[i]->name, effect_words(pal_effects[i]->name, words));
     double step_ms = pal_median(c->step_ms, c->n_step), limit_s = pal_world_limit_s(world);
     printf("\na step of %.3f ms in %d sub-step%s", 1e3 * scene->step_s, pal_world_substeps(world),
            pal_world_substeps(world) == 1 ? "" : "s");

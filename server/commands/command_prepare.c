@@ -124,23 +124,15 @@ static void remove_folder(const char *folder)
     rmdir(folder);
 }
 
-static pal_err write_files(const pal_loaded_scene *loaded, const char *stage, bool tetgen, pal_diagnostic *diag)
-{
-    char stem[PATH + 100];
-    PAL_TRY(pal_scene_save(loaded, stage, diag));
-    if (!tetgen) return PAL_ERR_OK;
-    snprintf(stem, sizeof stem, "%s/%s", stage, loaded->scene.body[0].name);
-    return pal_mesh_file_write_tetgen(stem, &loaded->mesh[0].tets, diag);
-}
-
 static pal_err save(const pal_loaded_scene *loaded, const arguments *args, outcome *out, pal_diagnostic *diag)
 {
-    char stage[PATH];
+    char stage[PATH], stem[PATH + 100];
     bool was_there = access(args->folder, F_OK) == 0;
     int n_tet = loaded->mesh[0].tets.n_tet;
     bool tetgen = args->tetgen || (!args->no_tetgen && n_tet > 0 && n_tet <= TETGEN_MAX);
     int n = snprintf(stage, sizeof stage, "%s/.palpate-%ld", args->folder, (long)getpid());
     if (n < 0 || (size_t)n >= sizeof stage) return PAL_REFUSE(diag, "%.80s...: the path is too long", args->folder);
+    snprintf(stem, sizeof stem, "%s/%s", stage, loaded->scene.body[0].name);
     /* a signal waits until all files are written or removed */
     sigset_t asked, old;
     sigemptyset(&asked);
@@ -149,7 +141,8 @@ static pal_err save(const pal_loaded_scene *loaded, const arguments *args, outco
     sigaddset(&asked, SIGHUP);
     sigprocmask(SIG_BLOCK, &asked, &old);
     pal_err err = pal_scene_make_folder(args->folder, diag);
-    if (!err) err = write_files(loaded, stage, tetgen, diag);
+    if (!err) err = pal_scene_save(loaded, stage, diag);
+    if (!err && tetgen) err = pal_mesh_file_write_tetgen(stem, &loaded->mesh[0].tets, diag);
     if (!err) err = move_up(stage, args->folder, out, diag);
     remove_folder(stage);
     if (err && !was_there) rmdir(args->folder);
@@ -311,24 +304,19 @@ static void print(const pal_loaded_scene *loaded, const arguments *args, const o
 
 /* ---- the command ---- */
 
-/* makes the world of an adaptive surface once, so that a scene that cannot be served is refused now */
-static pal_err try_world(const pal_loaded_scene *loaded, const char *name, outcome *out, pal_diagnostic *diag)
+/* Makes the world of an adaptive surface once, so that a scene that cannot be served is refused now. Where the finest
+ * level of the whole surface would take more than its share of a step, refinement is limited. */
+static pal_err limit_nodes(pal_loaded_scene *loaded, const char *name, outcome *out, pal_diagnostic *diag)
 {
+    pal_scene *scene = &loaded->scene;
     pal_world *world;
     pal_diagnostic reason = {""};
-    pal_err err = pal_world_create(&loaded->scene, &reason, &world);
+    pal_err err = pal_world_create(scene, &reason, &world);
     if (err) return pal_diagnostic_set(diag, err, "%s: %s", name, reason.text);
     out->world_byte = pal_world_bytes(world);
     out->n_substep = pal_world_substeps(world);
     out->limit_s = pal_world_limit_s(world);
     pal_world_destroy(world);
-    return PAL_ERR_OK;
-}
-
-/* Where the finest level of the whole surface would take more than its share of a step, refinement is limited. */
-static pal_err limit_nodes(pal_loaded_scene *loaded, outcome *out, pal_diagnostic *diag)
-{
-    pal_scene *scene = &loaded->scene;
     const pal_surface_scene_report *r = &out->report;
     int finest = r->n_level - 1, n = r->n_node[finest];
     double limit = n, pace = scene->step_s / PAL_NODE_S;
@@ -357,8 +345,7 @@ static int run(pal_flag_common *common, const char *in, arguments *args)
                       : pal_scene_from_surface(in, &args->scene, &loaded, &out.report, &diag);
     if (err) return pal_report_refusal(common, err, &diag);
     err = pal_scene_rename(loaded, args->name, args->title, args->source, &diag);
-    if (!err && args->scene.adaptive) err = try_world(loaded, in ? in : "procedural", &out, &diag);
-    if (!err && args->scene.adaptive) err = limit_nodes(loaded, &out, &diag);
+    if (!err && args->scene.adaptive) err = limit_nodes(loaded, in ? in : "procedural", &out, &diag);
     double before = pal_clock_s();
     pal_report_progress("write", 0, common);
     if (!err) err = save(loaded, args, &out, &diag);

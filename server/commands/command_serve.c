@@ -86,14 +86,6 @@ static const char *viewer_folder(const pal_config *config, char *folder, size_t 
 
 /* ---- scenes and sessions ---- */
 
-static void report_surface(const serve_run *run, const char *path, const pal_surface_scene_report *report)
-{
-    if (run->common.quiet || run->common.json) return;
-    printf("palpate: %s: %lld triangles, resolution %d, unit %s (%g m)%s\n", path,
-           (long long)report->surface.n_tri_read, report->resolution, report->unit_name, report->unit_m,
-           report->unit_guessed ? ", guessed from its size (--units overrides)" : "");
-}
-
 static pal_err load_input(serve_run *run, const char *path, pal_diagnostic *diag)
 {
     pal_surface_scene_report report;
@@ -103,7 +95,10 @@ static pal_err load_input(serve_run *run, const char *path, pal_diagnostic *diag
         PAL_TRY(pal_scene_arg(path, &run->surface, out, &is_surface, &report, diag));
     else
         PAL_TRY(pal_scene_procedural(&run->surface, out, &report, diag));
-    if (is_surface) report_surface(run, path, &report);
+    if (is_surface && !run->common.quiet && !run->common.json)
+        printf("palpate: %s: %lld triangles, resolution %d, unit %s (%g m)%s\n", path,
+               (long long)report.surface.n_tri_read, report.resolution, report.unit_name, report.unit_m,
+               report.unit_guessed ? ", guessed from its size (--units overrides)" : "");
     run->word[run->n++] = path;
     return PAL_ERR_OK;
 }
@@ -353,16 +348,6 @@ static void *net_main(void *user)
     return NULL;
 }
 
-static void wait_for_end(serve_run *run)
-{
-    uint64_t end_ns = run->seconds > 0 ? pal_clock_ns() + (uint64_t)(1e9 * run->seconds) : UINT64_MAX;
-    while (!stop_asked && pal_clock_ns() < end_ns) {
-        reap_lcm(run, PAL_LOG_WARN);
-        uint64_t next_ns = restart_lcm(run);
-        wait_until(next_ns < end_ns ? next_ns : end_ns);
-    }
-}
-
 static pal_err run_all(serve_run *run, pal_diagnostic *diag)
 {
     handle_signals();
@@ -372,7 +357,12 @@ static pal_err run_all(serve_run *run, pal_diagnostic *diag)
     PAL_TRY(find_lcm(run, diag));
     if (pal_thread_start(&run->net_thread, net_main, run)) return PAL_ERR_INTERNAL;
     if (announce(run)) run->net_err = PAL_ERR_IO;
-    wait_for_end(run);
+    uint64_t end_ns = run->seconds > 0 ? pal_clock_ns() + (uint64_t)(1e9 * run->seconds) : UINT64_MAX;
+    while (!stop_asked && pal_clock_ns() < end_ns) {
+        reap_lcm(run, PAL_LOG_WARN);
+        uint64_t next_ns = restart_lcm(run);
+        wait_until(next_ns < end_ns ? next_ns : end_ns);
+    }
     end_lcm(run);
     pal_server_stop(run->server);
     pthread_join(run->net_thread, NULL);
@@ -383,15 +373,6 @@ static const char about[] =
     "Serves every scene (.json), surface (.obj .stl .ply .off), label volume (.nii .nii.gz .inr .inr.gz) or solid\n"
     "of control cells (.palcells) as a session that browsers, haptic bridges and scripted clients share; without\n"
     "an input a computed organ. Prints the address to open. Ends on SIGINT or SIGTERM, or after --seconds.\n";
-
-static int print_protocol(void)
-{
-    static char text[8192];
-    int n = pal_verb_describe(pal_verb_table, pal_verb_count, text, sizeof text);
-    if (n >= (int)sizeof text) return 1;
-    fputs(text, stdout);
-    return 0;
-}
 
 int command_serve(int argc, char **argv)
 {
@@ -424,7 +405,12 @@ int command_serve(int argc, char **argv)
                                   .config = &run.config};
     int code = pal_flags_parse(&table, argc, argv, &run.common, input, &n_input);
     if (code >= 0) return code;
-    if (help_protocol) return print_protocol();
+    if (help_protocol) {
+        static char text[8192];
+        if (pal_verb_describe(pal_verb_table, pal_verb_count, text, sizeof text) >= (int)sizeof text) return 1;
+        fputs(text, stdout);
+        return 0;
+    }
     pal_log_set_level(run.common.quiet ? PAL_LOG_ERROR : pal_config_log_level(&run.config));
     run.surface = (pal_surface_scene){.resolution = resolution,
                                       .label = label,

@@ -51,16 +51,6 @@ static void settle(axis *a)
     a->low = step * floor(a->low / step + 1e-9), a->high = step * ceil(a->high / step - 1e-9);
 }
 
-static int wide_of(const pal_plot *plot)
-{
-    return plot->wide > 0 ? plot->wide : WIDE;
-}
-
-static int high_of(const pal_plot *plot)
-{
-    return plot->high > 0 ? plot->high : HIGH;
-}
-
 static void draw_axes(FILE *to, const pal_plot *plot, const axis *x, const axis *y)
 {
     for (int vertical = 0; vertical < 2; vertical++) {
@@ -82,10 +72,10 @@ static void draw_axes(FILE *to, const pal_plot *plot, const axis *x, const axis 
     }
     fprintf(to, "<rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" fill=\"none\" stroke=\"#333\"/>\n", x->from,
             y->to, x->to - x->from, y->from - y->to);
-    pal_svg_text(to, (x->from + x->to) / 2, high_of(plot) - 16, "middle", "", plot->x_label, 0);
+    pal_svg_text(to, (x->from + x->to) / 2, plot->high - 16, "middle", "", plot->x_label, 0);
     char more[64];
-    snprintf(more, sizeof more, " transform=\"rotate(-90 22 %d)\"", (TOP + high_of(plot) - BOTTOM) / 2);
-    pal_svg_text(to, 22, (TOP + high_of(plot) - BOTTOM) / 2.0, "middle", more, plot->y_label, 0);
+    snprintf(more, sizeof more, " transform=\"rotate(-90 22 %d)\"", (TOP + plot->high - BOTTOM) / 2);
+    pal_svg_text(to, 22, (TOP + plot->high - BOTTOM) / 2.0, "middle", more, plot->y_label, 0);
     pal_svg_text(to, (x->from + x->to) / 2, 26, "middle", " font-size=\"16\" font-weight=\"600\"", plot->title, 0);
 }
 
@@ -135,7 +125,7 @@ static void draw_curve(FILE *to, const pal_plot *plot, int k, const axis *x, con
     for (int i = 0; i < c->n && !c->bare; i++)
         if (drawable(plot, c, i))
             mark(to, kind, c->hollow, ink, place(x, c->x[i]), place(y, c->y[i]), c->tip ? c->tip[i] : NULL);
-    double at = TOP + 14 + 22.0 * k, from = wide_of(plot) - RIGHT + 16;
+    double at = TOP + 14 + 22.0 * k, from = plot->wide - RIGHT + 16;
     if (!c->dots)
         fprintf(to, "<path stroke-width=\"%s\" stroke=\"%s\"%s d=\"M%.1f %.1fh28\"/>\n", width, ink, dash, from, at);
     if (!c->bare) mark(to, kind, c->hollow, ink, from + 14, at, NULL);
@@ -285,16 +275,20 @@ static bool find_range(const pal_plot *plot, axis *x, axis *y)
     return any;
 }
 
-static pal_err draw(const pal_plot *plot, pal_svg *svg, pal_diagnostic *diag)
+static pal_err draw(const pal_plot *given, pal_svg *svg, pal_diagnostic *diag)
 {
-    axis x = {.log = plot->log_x, .low = INFINITY, .high = -INFINITY, .from = LEFT, .to = wide_of(plot) - RIGHT};
-    axis y = {.log = plot->log_y, .low = INFINITY, .high = -INFINITY, .from = high_of(plot) - BOTTOM, .to = TOP};
+    pal_plot sized = *given;
+    const pal_plot *plot = &sized;
+    if (sized.wide <= 0) sized.wide = WIDE;
+    if (sized.high <= 0) sized.high = HIGH;
+    axis x = {.log = plot->log_x, .low = INFINITY, .high = -INFINITY, .from = LEFT, .to = plot->wide - RIGHT};
+    axis y = {.log = plot->log_y, .low = INFINITY, .high = -INFINITY, .from = plot->high - BOTTOM, .to = TOP};
     if (!find_range(plot, &x, &y)) return PAL_REFUSE(diag, "there is no point to draw");
     settle(&x);
     settle(&y);
     boxes *taken = calloc(1, sizeof *taken);
     if (!taken) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a drawing");
-    pal_err err = pal_svg_begin(svg, wide_of(plot), high_of(plot), diag);
+    pal_err err = pal_svg_begin(svg, plot->wide, plot->high, diag);
     if (!err) {
         FILE *to = svg->to;
         draw_axes(to, plot, &x, &y);

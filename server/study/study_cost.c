@@ -208,11 +208,6 @@ static double nodes_in_use(const pal_study *study, int leave_out, const pal_conf
 
 /* ---- predicted ---- */
 
-static double distance(const seen *p, const pal_configuration *s, double n_node)
-{
-    return pal_study_differences(p->configuration, s) + PAL_COST_PER_E * fabs(log(p->n_node / n_node));
-}
-
 static bool has_words(const seen *p, int n, const pal_configuration *s)
 {
     bool element = false, law = false, solver = false;
@@ -257,7 +252,9 @@ bool pal_study_predict_cost(const pal_study *study, const pal_configuration *s, 
     if (n < MIN || !has_words(p, n, s)) return false;
     cost_law law = best_fit(p, n);
     for (int i = 0; i < n; i++) {
-        double near = exp2(-2 * distance(&p[i], s, nodes));
+        double distance =
+            pal_study_differences(p[i].configuration, s) + PAL_COST_PER_E * fabs(log(p[i].n_node / nodes));
+        double near = exp2(-2 * distance);
         off += near * log((p[i].ms - law.a) / work_ms(&law, &p[i], NULL));
         weight += near;
     }

@@ -106,8 +106,11 @@ static pal_err press(pal_study_job *job)
 {
     PAL_TRY(pal_study_presses(job));
     pal_err err = pal_study_reference(job);
-    for (int k = 0; k < SOFTER && (err == PAL_ERR_NUMERIC || err == PAL_ERR_FROZEN); k++) {
-        pal_study_press_halve(job);
+    for (int turn = 0; turn < SOFTER && (err == PAL_ERR_NUMERIC || err == PAL_ERR_FROZEN); turn++) {
+        for (int k = 0; k < job->n_load; k++) {
+            double *total = job->problem->load_case[k].load[0].total_N;
+            pal_scale3(total, 0.5, total);
+        }
         err = pal_study_reference(job);
     }
     return err;

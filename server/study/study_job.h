@@ -96,7 +96,6 @@ pal_err pal_study_cached_static(pal_study_job *job, const pal_configuration *con
 
 /* study_loads.c: three presses and a pull, for a scene without load cases */
 pal_err pal_study_presses(pal_study_job *job);
-void pal_study_press_halve(pal_study_job *job); /* halves their strength */
 /* Changes the strength of a press whose reference equilibrium is far from the wanted displacement or does not exist
  * (err). False: it is adequate, is not a press, or was changed the allowed number of times. */
 bool pal_study_press_adjust(pal_study_job *job, int index, pal_err err);

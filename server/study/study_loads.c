@@ -173,11 +173,3 @@ pal_err pal_study_presses(pal_study_job *job)
     for (int k = 0; k <= PULL && !err; k++) err = scale_load(job, k, length_scale_m);
     return err;
 }
-
-void pal_study_press_halve(pal_study_job *job)
-{
-    for (int k = 0; k < job->n_load; k++) {
-        double *total = job->problem->load_case[k].load[0].total_N;
-        pal_scale3(total, 0.5, total);
-    }
-}

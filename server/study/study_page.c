@@ -11,15 +11,6 @@
 
 enum { METHODS = 12, FRONT_LABELS = 40, TIP = 2 * PAL_CONFIGURATION_TEXT };
 
-/* "fem hex8_bbar", "tet_springs calibrated": the methods with separate markers */
-static const char *method_of(const pal_configuration *configuration, char out[PAL_CONFIGURATION_TEXT])
-{
-    bool calibrated = configuration->k_distance_J > 0;
-    snprintf(out, PAL_CONFIGURATION_TEXT, "%s%s%s%s", configuration->model, configuration->element[0] ? " " : "",
-             configuration->element, calibrated ? " calibrated" : "");
-    return out;
-}
-
 /* as the command writes its loads (study_input.c) */
 static bool is_quick(const pal_study_file *file)
 {
@@ -179,7 +170,10 @@ static void add_point(series *s, const pal_study *study, const pal_study_point *
     char name[PAL_CONFIGURATION_TEXT];
     int k = 0;
     bool apart = p->reason[0] != 0;
-    method_of(&p->measured.configuration, name);
+    /* "fem hex8_bbar", "tet_springs calibrated": the methods with separate markers */
+    const pal_configuration *c = &p->measured.configuration;
+    snprintf(name, sizeof name, "%s%s%s%s", c->model, c->element[0] ? " " : "", c->element,
+             c->k_distance_J > 0 ? " calibrated" : "");
     while (k < s->n_method && (strcmp(s->name[k], name) != 0 || s->apart[k] != apart)) k++;
     if (k == s->n_method) {
         if (s->n_method == METHODS) return;
@@ -187,17 +181,16 @@ static void add_point(series *s, const pal_study *study, const pal_study_point *
         memcpy(s->name[s->n_method++], name, sizeof name);
     }
     char *tip = s->tip_text[s->n_tip++], text[PAL_CONFIGURATION_TEXT];
-    snprintf(tip, TIP, "%s: %.3g ms, %.3g mm%s%s", pal_configuration_text(&p->measured.configuration, text),
-             p->measured.ms, 1e3 * p->measured.error_m, apart ? "; " : "", p->reason);
+    const double ms = p->measured.ms, error_mm = 1e3 * p->measured.error_m;
+    snprintf(tip, TIP, "%s: %.3g ms, %.3g mm%s%s", pal_configuration_text(c, text), ms, error_mm, apart ? "; " : "",
+             p->reason);
     s->tip[k][s->n[k]] = tip;
-    s->x[k][s->n[k]] = p->measured.ms;
-    s->y[k][s->n[k]++] = 1e3 * p->measured.error_m;
+    s->x[k][s->n[k]] = ms, s->y[k][s->n[k]++] = error_mm;
     if (!p->measured.front) return;
-    s->front_x[s->n_front] = p->measured.ms;
-    s->front_y[s->n_front++] = 1e3 * p->measured.error_m;
+    s->front_x[s->n_front] = ms, s->front_y[s->n_front++] = error_mm;
     if (s->n_label == FRONT_LABELS) return;
     parameters_of(study, p, s->usual, s->parameters[s->n_label], sizeof *s->parameters);
-    s->label[s->n_label] = (pal_plot_label){p->measured.ms, 1e3 * p->measured.error_m, s->parameters[s->n_label]};
+    s->label[s->n_label] = (pal_plot_label){ms, error_mm, s->parameters[s->n_label]};
     s->n_label++;
 }
 
