@@ -71,6 +71,9 @@ typedef struct pal_calibration_info {
     const pal_grid_weights *weights; /* grid -> nodes; NULL: homogeneous                                        */
     const double *start;             /* theta of the default constants, from E and nu [n_parameter] */
     const double *low, *high;        /* bounds [n_parameter] */
+    const double *force_N[PAL_CALIBRATE_CASES]; /* nodal forces of each case [n_node][3] */
+    int n_support;
+    const pal_support_def *support; /* of the problem, in the body frame [n_support] */
 } pal_calibration_info;
 void pal_calibration_info_of(const pal_calibration *calibration, pal_calibration_info *out);
 /* theta of equal constants as a first manual choice: 0.2, 0.4, 1 E h^3 on every spring (paper B section 3.4). Where
@@ -113,10 +116,6 @@ bool pal_calibration_displacement(const pal_calibration *calibration, const pal_
                                   int index, double *u);
 /* Truth at the nodes of the mesh [n_node][3]. False: it is given at other points. */
 bool pal_calibration_truth(const pal_calibration *calibration, int index, double *u);
-/* Nodal forces of a case, N [n_node][3]; borrowed from the calibration. */
-const double *pal_calibration_forces(const pal_calibration *calibration, int index);
-/* Supports of the problem in the body frame, *n of them; borrowed from the calibration. */
-const pal_support_def *pal_calibration_supports(const pal_calibration *calibration, int *n);
 
 /* ---- methods: calibrate_adjoint.c, calibrate_anneal.c ---- */
 

@@ -171,7 +171,7 @@ static void skin_shape(drawing *d, int which)
 
 static void take_loads(drawing *d)
 {
-    const double *f = pal_calibration_forces(d->run->calibration, d->index);
+    const double *f = d->run->info.force_N[d->index];
     for (int i = 0; i < d->n_node; i++) {
         if (!(pal_dot3(f + 3 * i, f + 3 * i) > 0)) continue;
         pal_copy3(d->load_at + 3 * d->n_load, d->mesh->tets.x + 3 * i);
@@ -183,15 +183,14 @@ static void take_vertices(drawing *d)
 {
     const pal_problem *p = d->run->set.problem;
     const pal_tets *t = &d->mesh->tets;
-    int n_support;
-    const pal_support_def *support = pal_calibration_supports(d->run->calibration, &n_support);
+    const pal_support_def *support = d->run->info.support;
     for (int v = 0; v < d->n_vertex; v++) {
         const double *at = d->mesh->surface.x + 3 * v;
         double x[3];
         pal_add3(x, at, t->origin_m);
         const pal_problem_material *m = pal_case_material_at(p, x);
         d->young[v] = m ? m->young_Pa : p->material[0].young_Pa;
-        for (int k = 0; k < n_support; k++) {
+        for (int k = 0; k < d->run->info.n_support; k++) {
             bool in = true;
             for (int c = 0; c < 3; c++) in = in && at[c] >= support[k].low_m[c] && at[c] <= support[k].high_m[c];
             d->fixed[v] |= in;

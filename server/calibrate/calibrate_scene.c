@@ -87,7 +87,7 @@ static void put_tools(const pal_calibrate_run *run, pal_scene *scene)
 {
     double max = 0;
     for (int k = 0; k < run->set.n; k++) {
-        const double *f = pal_calibration_forces(run->calibration, k);
+        const double *f = run->info.force_N[k];
         double sum = 0;
         for (int i = 0; i < run->info.n_node && run->set.list[k].fit; i++) sum += pal_norm3(f + 3 * i);
         max = fmax(max, sum);
@@ -117,7 +117,6 @@ static pal_err fill(pal_calibrate_run *run, pal_loaded_scene *loaded, pal_diagno
     pal_body_def *body = &scene->body[0];
     char name[PAL_NAME], source[sizeof scene->source], list[160] = "";
     size_t n = 0;
-    int n_support;
     pal_scene_default(scene);
     name_of(run->path[PAL_CALIBRATE_SCENE], name);
     scene->n_body = 1;
@@ -125,9 +124,8 @@ static pal_err fill(pal_calibrate_run *run, pal_loaded_scene *loaded, pal_diagno
     /* for information, contact and mass */
     body->material.young_Pa = run->info.mean_young_Pa, body->material.poisson = run->info.mean_poisson;
     body->material.density_kg_m3 = run->info.mean_density_kg_m3;
-    const pal_support_def *support = pal_calibration_supports(run->calibration, &n_support);
-    body->n_support = n_support;
-    memcpy(body->support, support, (size_t)n_support * sizeof *support);
+    body->n_support = run->info.n_support;
+    memcpy(body->support, run->info.support, (size_t)body->n_support * sizeof *body->support);
     /* the default effects without gravity */
     memmove(body->effect, body->effect + 1, (size_t)--body->n_effect * sizeof *body->effect);
     for (int k = 0; k < run->set.n; k++)

@@ -356,7 +356,11 @@ static pal_err make(const job *j)
     out->grid = c->has_grid ? &c->grid : NULL, out->weights = c->has_grid ? &c->weights : NULL;
     out->start = c->theta, out->low = c->low, out->high = c->high;
     for (int k = 0; k < out->n_kind; k++) out->n_spring += c->lattice.kind[out->kind[k]].n_item;
-    for (int i = 0; i < c->n_case; i++) out->max_m[i] = c->fit[i].max_m, out->n_point[i] = c->fit[i].n_point;
+    out->n_support = c->problem->n_support, out->support = c->support;
+    for (int i = 0; i < c->n_case; i++) {
+        const pal_fit_case *fit = &c->fit[i];
+        out->max_m[i] = fit->max_m, out->n_point[i] = fit->n_point, out->force_N[i] = fit->force_N;
+    }
     return PAL_ERR_OK;
 }
 
@@ -411,17 +415,6 @@ void pal_calibration_info_of(const pal_calibration *c, pal_calibration_info *out
 void pal_calibration_manual_start(const pal_calibration *c, double *theta)
 {
     for (int i = 0; i < c->info.n_parameter; i++) theta[i] = c->manual_theta[i / c->info.n_used];
-}
-
-const double *pal_calibration_forces(const pal_calibration *c, int index)
-{
-    return c->fit[index].force_N;
-}
-
-const pal_support_def *pal_calibration_supports(const pal_calibration *c, int *n)
-{
-    *n = c->problem->n_support;
-    return c->support;
 }
 
 bool pal_calibration_truth(const pal_calibration *c, int index, double *u)

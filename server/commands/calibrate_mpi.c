@@ -178,7 +178,7 @@ static uint64_t fingerprint(const job *j, double start_percent)
         const int what[3] = {one->fit, one->linear, j->info.n_point[k]};
         if (!one->fit) continue;
         sum = pal_hash_bytes(sum, what, sizeof what);
-        sum = pal_hash_bytes(sum, pal_calibration_forces(j->c, k), n);
+        sum = pal_hash_bytes(sum, j->info.force_N[k], n);
         sum = pal_hash_bytes(sum, &j->info.max_m[k], sizeof(double));
         if (one->samples) sum = pal_hash_bytes(sum, one->samples->x, 3 * sizeof(double) * (size_t)one->samples->n);
         if (one->samples) sum = pal_hash_bytes(sum, one->samples->u, 3 * sizeof(double) * (size_t)one->samples->n);

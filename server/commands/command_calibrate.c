@@ -201,8 +201,7 @@ static pal_err settle(pal_calibrate_run *run, pal_loaded_scene *scene, pal_diagn
     if (!u) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for %d loads", run->set.n);
     for (int k = 0; k < run->set.n; k++) {
         bool rests = pal_calibration_displacement(run->calibration, run->workspace, k, u + n * (size_t)k);
-        load[k] = (pal_settle_load){.force_N = pal_calibration_forces(run->calibration, k),
-                                    .u = rests ? u + n * (size_t)k : NULL};
+        load[k] = (pal_settle_load){.force_N = run->info.force_N[k], .u = rests ? u + n * (size_t)k : NULL};
     }
     pal_err err = pal_stop_asked() ? PAL_ERR_STATE
                                    : pal_settle_damping(&scene->scene, load, run->set.n, &options, &run->live, diag);

@@ -94,43 +94,32 @@ static bool has_component(const pal_world *world, const char *name)
 
 /* ---- report ---- */
 
-/* nodes and springs that are active, and of every level */
-static void add_levels(cJSON *body, const pal_adaptive_surface *adaptive)
-{
-    const pal_levels *levels = &adaptive->levels;
-    cJSON *list = cJSON_CreateArray();
-    for (int l = 0; l < levels->n_level; l++)
-        cJSON_AddItemToArray(list, PAL_JSON({"nodes", JSON_NUMBER(levels->n_vertex[l])},
-                                            {"springs", JSON_NUMBER(pal_levels_n_edge(levels, l))}));
-    PAL_JSON_ADD(body, {"nodes", JSON_NUMBER(adaptive->n_node)}, {"springs", JSON_NUMBER(adaptive->n_spring)},
-                 {"levels", list});
-}
-
-static void add_solid(cJSON *body, const pal_body_def *def, const pal_body *b)
-{
-    const pal_subdivision_solid *solid = b->model.solid;
-    const pal_cell_elements *e = &solid->elements;
-    PAL_JSON_ADD(body, {"control_cells", JSON_NUMBER(def->cells->n_cell)}, {"control_points", JSON_NUMBER(b->n_dof)},
-                 {"levels", JSON_NUMBER(solid->subdivision.n_level)},
-                 {"elements", JSON_NUMBER(pal_cell_elements_count(e))},
-                 {"cubic_percent", JSON_NUMBER(pal_cell_elements_percent(e, PAL_CELL_CUBIC))},
-                 {"hex_percent", JSON_NUMBER(pal_cell_elements_percent(e, PAL_CELL_HEX))},
-                 {"pyramid_percent", JSON_NUMBER(pal_cell_elements_percent(e, PAL_CELL_PYRAMID))},
-                 {"nodes", JSON_NUMBER(b->n_node)}, {"solid_bytes", JSON_NUMBER(solid->n_byte)});
-}
-
 static cJSON *body_json(const pal_body_def *def, const pal_body *b)
 {
-    int n_tri = b->model.solid ? b->display.surface->n_tri : def->mesh->surface.n_tri;
+    const pal_adaptive_surface *adaptive = b->model.adaptive;
+    const pal_subdivision_solid *solid = b->model.solid;
+    int n_tri = solid ? b->display.surface->n_tri : def->mesh->surface.n_tri;
     cJSON *body = PAL_JSON({"name", JSON_TEXT(def->name)}, {"triangles", JSON_NUMBER(n_tri)});
-    if (b->model.adaptive)
-        add_levels(body, b->model.adaptive);
-    else if (b->model.solid)
-        add_solid(body, def, b);
-    else
-        PAL_JSON_ADD(body, {"tets", JSON_NUMBER(def->mesh->tets.n_tet)},
-                     {"nodes", JSON_NUMBER(def->mesh->tets.n_node)});
-    return body;
+    if (adaptive) {
+        /* nodes and springs that are active, and of every level */
+        cJSON *list = cJSON_CreateArray();
+        for (int l = 0; l < adaptive->levels.n_level; l++)
+            cJSON_AddItemToArray(list, PAL_JSON({"nodes", JSON_NUMBER(adaptive->levels.n_vertex[l])},
+                                                {"springs", JSON_NUMBER(pal_levels_n_edge(&adaptive->levels, l))}));
+        return PAL_JSON_ADD(body, {"nodes", JSON_NUMBER(adaptive->n_node)},
+                            {"springs", JSON_NUMBER(adaptive->n_spring)}, {"levels", list});
+    }
+    if (!solid)
+        return PAL_JSON_ADD(body, {"tets", JSON_NUMBER(def->mesh->tets.n_tet)},
+                            {"nodes", JSON_NUMBER(def->mesh->tets.n_node)});
+    const pal_cell_elements *e = &solid->elements;
+    return PAL_JSON_ADD(body, {"control_cells", JSON_NUMBER(def->cells->n_cell)},
+                        {"control_points", JSON_NUMBER(b->n_dof)}, {"levels", JSON_NUMBER(solid->subdivision.n_level)},
+                        {"elements", JSON_NUMBER(pal_cell_elements_count(e))},
+                        {"cubic_percent", JSON_NUMBER(pal_cell_elements_percent(e, PAL_CELL_CUBIC))},
+                        {"hex_percent", JSON_NUMBER(pal_cell_elements_percent(e, PAL_CELL_HEX))},
+                        {"pyramid_percent", JSON_NUMBER(pal_cell_elements_percent(e, PAL_CELL_PYRAMID))},
+                        {"nodes", JSON_NUMBER(b->n_node)}, {"solid_bytes", JSON_NUMBER(solid->n_byte)});
 }
 
 /* the effects that no component of this scene is of */

@@ -390,27 +390,25 @@ static bool real_folder(const char *path, char out[PATH_MAX])
     return pal_json_folder(path, folder, sizeof folder) && realpath(folder, out) != NULL;
 }
 
-/* would the meshes of the new scene replace those of the source? */
-static bool is_beside_source(const study_run *run, const char *path)
+static bool is_json(const char *path)
 {
-    char own[PATH_MAX], other[PATH_MAX], source[MAX_PATH];
-    size_t n = strlen(run->request.word);
-    snprintf(source, sizeof source, "%s/scene.json", run->request.word);
-    bool folder = !access(source, F_OK);
-    bool json = n > 5 && !strcmp(run->request.word + n - 5, ".json");
-    if (!folder && !json) return false;
-    return real_folder(path, own) && real_folder(folder ? source : run->request.word, other) && !strcmp(own, other);
+    size_t n = strlen(path);
+    return n > 5 && !strcmp(path + n - 5, ".json");
 }
 
 /* "out.json" or a folder -> the file of the scene */
 static pal_err scene_path(study_run *run, pal_diagnostic *diag)
 {
-    size_t n = strlen(run->scene);
-    bool json = n > 5 && !strcmp(run->scene + n - 5, ".json");
-    int size = snprintf(run->written, sizeof run->written, json ? "%s" : "%s/scene.json", run->scene);
+    const char *word = run->request.word;
+    char own[PATH_MAX], other[PATH_MAX], source[MAX_PATH];
+    int size = snprintf(run->written, sizeof run->written, is_json(run->scene) ? "%s" : "%s/scene.json", run->scene);
     if (size < 0 || (size_t)size >= PAL_STUDY_PATH - 16)
         return PAL_REFUSE(diag, "-o: %.80s...: the path is too long", run->scene);
-    if (is_beside_source(run, run->written))
+    /* would its meshes replace those of the source? */
+    snprintf(source, sizeof source, "%s/scene.json", word);
+    bool folder = !access(source, F_OK);
+    if ((folder || is_json(word)) && real_folder(run->written, own) && real_folder(folder ? source : word, other) &&
+        !strcmp(own, other))
         return PAL_REFUSE(
             diag, "-o: %.300s is in the folder of the source, whose meshes it could replace: name another folder",
             run->written);
@@ -450,9 +448,8 @@ static pal_err write_scene(study_run *run, pal_diagnostic *diag)
     loaded->scene = set->scene;
     loaded->scene.max_error_m = loaded->scene.budget_ms = 0;
     pal_study_accuracy_text(study, p->error_m, loaded->scene.accuracy, sizeof loaded->scene.accuracy);
-    size_t n = strlen(run->scene);
-    bool json = n > 5 && !strcmp(run->scene + n - 5, ".json");
-    err = json ? pal_scene_save_file(loaded, run->scene, diag) : pal_scene_save(loaded, run->scene, diag);
+    err =
+        is_json(run->scene) ? pal_scene_save_file(loaded, run->scene, diag) : pal_scene_save(loaded, run->scene, diag);
     if (!err) err = copy_study(run, &set->scene, diag);
     free(loaded);
     pal_configured_scene_free(set);

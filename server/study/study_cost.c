@@ -219,15 +219,6 @@ static bool has_words(const seen *p, int n, const pal_configuration *s)
     return element && law && solver;
 }
 
-/* Are the elements of all points known? If not, nodes replace them (springs, studies stored before elements were
- * recorded). */
-static bool are_counted(const pal_study *study, int leave_out, const pal_configuration *s)
-{
-    for (int i = 0; i < study->n_point; i++)
-        if (counts(study, i, leave_out, s) && !(study->point[i].n_element > 0)) return false;
-    return true;
-}
-
 bool pal_study_predict_cost(const pal_study *study, const pal_configuration *s, int n_node, double n_element,
                             int n_substep, double read_ms, int leave_out, double *ms)
 {
@@ -235,7 +226,10 @@ bool pal_study_predict_cost(const pal_study *study, const pal_configuration *s, 
     int n = 0;
     double nodes = is_adaptive(s) ? nodes_in_use(study, leave_out, s) : n_node, off = 0, weight = PAL_COST_NEIGHBOUR;
     double substeps = is_adaptive(s) ? finest_substeps(study, leave_out, s) : n_substep;
-    const bool by_element = n_element > 0 && are_counted(study, leave_out, s);
+    /* where elements are not known of all points, nodes replace them: springs, studies stored before elements were */
+    bool by_element = n_element > 0;
+    for (int i = 0; i < study->n_point; i++)
+        if (counts(study, i, leave_out, s)) by_element = by_element && study->point[i].n_element > 0;
     if (!(nodes > 0) || !(substeps >= 1) || !(s->step_s > 0) || !(study->step_s > 0)) return false;
     for (int i = 0; i < study->n_point; i++) {
         const pal_study_point *q = &study->point[i];

@@ -173,15 +173,6 @@ static pal_err report_progress(const pal_study_job *job, const char *what, doubl
     return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped at the reference");
 }
 
-static pal_err given(pal_study_job *job)
-{
-    memcpy(job->static_u[0], job->options->samples->u, 3 * sizeof(double) * (size_t)job->n_probe);
-    snprintf(job->out->reference, sizeof job->out->reference,
-             "%d displacements that were given, at rest; %s, the trajectory", job->n_probe, "fem hex8_bbar");
-    job->out->reference_m = 0;
-    return PAL_ERR_OK;
-}
-
 static pal_err made(pal_study_job *job)
 {
     pal_configuration s = reference_configuration(job, job->reference);
@@ -204,7 +195,14 @@ static pal_err made(pal_study_job *job)
 
 static pal_err at_rest(pal_study_job *job)
 {
-    PAL_TRY(job->options->samples ? given(job) : made(job));
+    if (job->options->samples) {
+        memcpy(job->static_u[0], job->options->samples->u, 3 * sizeof(double) * (size_t)job->n_probe);
+        snprintf(job->out->reference, sizeof job->out->reference,
+                 "%d displacements that were given, at rest; fem hex8_bbar, the trajectory", job->n_probe);
+        job->out->reference_m = 0;
+    } else {
+        PAL_TRY(made(job));
+    }
     job->out->max_m = 0;
     for (int k = 0; k < job->n_load; k++)
         job->out->max_m = fmax(job->out->max_m, pal_max_norm3(job->static_u[k], job->n_probe));

@@ -43,13 +43,12 @@ static pal_err newton(pal_study_job *job, const pal_configuration *configuration
     statics.tolerance = PAL_REST_TOLERANCE, statics.step_s = PAL_STUDY_FRAME_S;
     PAL_TRY(pal_study_open(job, &statics, true, &w, diag));
     *n_node = w.body->n_node;
-    pal_err err = pal_study_apply_load(job, &w, load, 1, diag);
-    if (!err) err = converge(job, &w, diag);
-    if (err == PAL_ERR_NUMERIC) {
-        pal_world_reset(w.world);
+    pal_err err = PAL_ERR_NUMERIC;
+    for (int n_part = 1; n_part <= RAMPS && err == PAL_ERR_NUMERIC; n_part += RAMPS - 1) {
         err = PAL_ERR_OK;
-        for (int k = 1; k <= RAMPS && !err; k++) {
-            err = pal_study_apply_load(job, &w, load, (double)k / RAMPS, diag);
+        if (n_part > 1) pal_world_reset(w.world);
+        for (int k = 1; k <= n_part && !err; k++) {
+            err = pal_study_apply_load(job, &w, load, (double)k / n_part, diag);
             if (!err) err = converge(job, &w, diag);
         }
     }
@@ -107,20 +106,21 @@ static void add_gravity(const pal_study_world *w, double *f)
         pal_axpy3(f + 3 * i, -scene->gravity_m_s2 * w->body->mass_kg[i], scene->up);
 }
 
+/* likewise */
 static pal_err balance(springs *s, double *x, pal_diagnostic *diag)
 {
     const pal_equilibrium_options options = {.tolerance = PAL_REST_TOLERANCE};
     pal_equilibrium_report report;
     const double *const k[PAL_SPRING_KINDS] = {s->k[0], s->k[1], s->k[2]};
     size_t n = 3 * (size_t)s->lattice.n_node;
-    memcpy(x, s->lattice.x_rest, n * sizeof *x);
-    pal_err err = pal_equilibrium(s->workspace, k, s->force, &options, x, &report, diag);
-    if (err != PAL_ERR_NUMERIC) return err;
-    err = PAL_ERR_OK;
-    memcpy(x, s->lattice.x_rest, n * sizeof *x);
-    for (int part = 1; part <= RAMPS && !err; part++) {
-        for (size_t i = 0; i < n; i++) s->part[i] = s->force[i] * part / RAMPS;
-        err = pal_equilibrium(s->workspace, k, s->part, &options, x, &report, diag);
+    pal_err err = PAL_ERR_NUMERIC;
+    for (int n_part = 1; n_part <= RAMPS && err == PAL_ERR_NUMERIC; n_part += RAMPS - 1) {
+        err = PAL_ERR_OK;
+        memcpy(x, s->lattice.x_rest, n * sizeof *x);
+        for (int part = 1; part <= n_part && !err; part++) {
+            for (size_t i = 0; i < n; i++) s->part[i] = s->force[i] * part / n_part;
+            err = pal_equilibrium(s->workspace, k, s->part, &options, x, &report, diag);
+        }
     }
     return err;
 }

@@ -199,17 +199,6 @@ pal_err pal_study_time_repeat(pal_study_job *job)
     return PAL_ERR_OK;
 }
 
-static void run(pal_study_job *job, pal_study_point *out)
-{
-    pal_diagnostic reason = {{0}};
-    pal_err err = time_trajectory(job, out, job->own_trajectory, &reason);
-    if (!err) compare_trajectories(job, out);
-    if (err && !out->err) {
-        out->err = err;
-        snprintf(out->reason, sizeof out->reason, "%.*s", PAL_CONFIGURATION_TEXT - 1, reason.text);
-    }
-}
-
 pal_err pal_study_measure(pal_study_job *job, const pal_study_entry *entry, pal_study_point *out)
 {
     int n_node = 0;
@@ -231,7 +220,14 @@ pal_err pal_study_measure(pal_study_job *job, const pal_study_entry *entry, pal_
         memcpy(out->reason, job->rest.reason, sizeof out->reason);
     else
         out->static_rms_m = job->rest.rms_m, out->static_max_m = job->rest.max_m;
-    if (pal_study_continues(job)) run(job, out);
+    if (pal_study_continues(job)) {
+        pal_err err = time_trajectory(job, out, job->own_trajectory, &reason);
+        if (!err) compare_trajectories(job, out);
+        if (err && !out->err) {
+            out->err = err;
+            snprintf(out->reason, sizeof out->reason, "%.*s", PAL_CONFIGURATION_TEXT - 1, reason.text);
+        }
+    }
     if (!pal_study_continues(job)) return pal_diagnostic_set(job->diag, PAL_ERR_STATE, "stopped in a configuration");
     if (!out->err) out->measured.error_m = fmax(out->static_max_m, out->trajectory_max_m);
     return PAL_ERR_OK;

@@ -68,7 +68,7 @@ static double difference(const int grid[3], bool equal, bool without_area, pal_s
     if (!err && !pal_calibration_displacement(c, workspace, 0, u)) err = PAL_ERR_NUMERIC;
     if (!err) err = pal_scene_load(scene_path, &scene, &diag);
     if (!err) {
-        const pal_settle_load load = {.force_N = pal_calibration_forces(c, 0), .u = u};
+        const pal_settle_load load = {.force_N = info.force_N[0], .u = u};
         pal_settle_default(&how);
         err = pal_settle_damping(&scene->scene, &load, 1, &how, report, &diag);
         out = report->load[0].difference_percent;
