@@ -37,6 +37,13 @@ pal_err pal_diagnostic_set(pal_diagnostic *diag, pal_err err, const char *format
     return err;
 }
 
+pal_err pal_diagnostic_prefix(pal_diagnostic *diag, pal_err err, const char *name)
+{
+    if (!err || !diag) return err;
+    const pal_diagnostic own = *diag;
+    return pal_diagnostic_set(diag, err, "%s: %s", name, own.text[0] ? own.text : pal_err_text(err));
+}
+
 void pal_assert_failed(const char *condition, const char *file, int line)
 {
     fprintf(stderr, "%s:%d: assertion failed: %s\n", file, line, condition);

@@ -40,6 +40,10 @@ typedef struct pal_diagnostic {
 pal_err pal_diagnostic_set(pal_diagnostic *diag, pal_err err, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
+/* puts "name: " before the sentence of an error that diag holds, or before that of its code; returns err, which may be
+ * 0 */
+pal_err pal_diagnostic_prefix(pal_diagnostic *diag, pal_err err, const char *name);
+
 #define PAL_REFUSE(diag, ...) pal_diagnostic_set(diag, PAL_ERR_REFUSED, __VA_ARGS__)
 
 #define PAL_TRY(call)                                                                                                  \

@@ -134,7 +134,6 @@ static pal_err walk(fit *f, double *theta, pal_diagnostic *diag)
     const pal_calibration *c = f->c;
     pal_anneal_options a;
     pal_anneal_result r;
-    pal_diagnostic reason = {""};
     pal_anneal_default(&a);
     a.n_parameter = c->info.n_parameter;
     a.low = f->low, a.high = f->high, a.first = f->first;
@@ -147,7 +146,7 @@ static pal_err walk(fit *f, double *theta, pal_diagnostic *diag)
     a.step = report_step;
     a.user = f;
     make_box(f, theta);
-    pal_err err = pal_anneal(&a, f->shown, &r, &reason);
+    pal_err err = pal_anneal(&a, f->shown, &r, diag);
     if (r.best < DBL_MAX) to_theta(f, f->shown, theta);
     f->out->n_evaluation = r.n_evaluation;
     f->out->n_rejected = r.n_failed;
@@ -156,7 +155,7 @@ static pal_err walk(fit *f, double *theta, pal_diagnostic *diag)
     if (err == PAL_ERR_NUMERIC && r.best == DBL_MAX)
         return pal_diagnostic_set(diag, err, "none of %lld sets of constants comes to a stable rest under the loads",
                                   (long long)r.n_evaluation);
-    return err ? pal_diagnostic_set(diag, err, "%s", reason.text[0] ? reason.text : pal_err_text(err)) : err;
+    return err;
 }
 
 /* team and workspaces; one workspace, for the best point, if points are evaluated elsewhere */

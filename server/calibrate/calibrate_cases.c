@@ -230,10 +230,9 @@ pal_err pal_calibrate_cases_make(const pal_calibrate_cases *set, const pal_calib
                                  pal_calibration **out, pal_calibration_info *info, pal_diagnostic *diag)
 {
     pal_calibrate_options o = *options;
-    pal_diagnostic reason = {""};
-    pal_err err = o.voxel.resolution == 0 ? choose_resolution(set, &o.voxel, &reason) : PAL_ERR_OK;
-    if (!err) err = pal_calibration_create(set->problem, &set->surface, set->list, set->n, &o, out, &reason);
-    if (err) return pal_diagnostic_set(diag, err, "%s: %s", set->problem->path, reason.text);
+    pal_err err = o.voxel.resolution == 0 ? choose_resolution(set, &o.voxel, diag) : PAL_ERR_OK;
+    if (!err) err = pal_calibration_create(set->problem, &set->surface, set->list, set->n, &o, out, diag);
+    if (err) return pal_diagnostic_prefix(diag, err, set->problem->path);
     pal_calibration_info_of(*out, info);
     return check_points(set, info->mesh, diag);
 }

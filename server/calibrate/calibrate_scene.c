@@ -141,15 +141,13 @@ static pal_err fill(pal_calibrate_run *run, pal_loaded_scene *loaded, pal_diagno
 pal_err pal_calibrate_scene(pal_calibrate_run *run, pal_loaded_scene **out, pal_diagnostic *diag)
 {
     pal_loaded_scene *loaded = calloc(1, sizeof *loaded);
-    pal_diagnostic reason = {""};
     if (!loaded) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a scene");
-    pal_err err = fill(run, loaded, &reason);
-    if (err) {
+    pal_err err = fill(run, loaded, diag);
+    if (err)
         pal_scene_free(loaded);
-        return pal_diagnostic_set(diag, err, "%s: %s", run->path[PAL_CALIBRATE_SCENE], reason.text);
-    }
-    *out = loaded;
-    return PAL_ERR_OK;
+    else
+        *out = loaded;
+    return pal_diagnostic_prefix(diag, err, run->path[PAL_CALIBRATE_SCENE]);
 }
 
 /* ---- accuracy ---- */

@@ -178,10 +178,9 @@ static pal_err search(pal_calibrate_run *run, pal_diagnostic *diag)
     PAL_TRY(pal_calibration_evaluate(c, run->workspace, run->theta, ALL, &run->start, NULL, diag));
     run->fit.step = record_step;
     run->fit.user = run;
-    pal_diagnostic reason = {""};
-    pal_err err = run->annealing ? pal_fit_anneal(c, &run->fit, run->theta, &run->result, &reason)
-                                 : pal_fit_adjoint(c, &run->fit, run->theta, &run->result, &reason);
-    if (err) return pal_diagnostic_set(diag, err, "%s: %s", run->input.problem, reason.text);
+    pal_err err = run->annealing ? pal_fit_anneal(c, &run->fit, run->theta, &run->result, diag)
+                                 : pal_fit_adjoint(c, &run->fit, run->theta, &run->result, diag);
+    if (err) return pal_diagnostic_prefix(diag, err, run->input.problem);
     return pal_calibration_evaluate(c, run->workspace, run->theta, ALL, &run->last, NULL, diag);
 }
 

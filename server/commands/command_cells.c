@@ -129,11 +129,9 @@ static pal_err measure(outcome *o, pal_diagnostic *diag)
 static pal_err subdivide(outcome *o, int n_level, pal_subdivision_rule rule, pal_diagnostic *diag)
 {
     const pal_subdivision_options options = {.n_level = n_level, .rule = rule};
-    pal_diagnostic reason = {""};
-    pal_err err = pal_subdivision_make(&o->control, &options, &o->made, &reason);
-    if (!err) err = measure(o, &reason);
-    return err ? pal_diagnostic_set(diag, err, "%s: %s", o->name, reason.text[0] ? reason.text : pal_err_text(err))
-               : err;
+    pal_err err = pal_subdivision_make(&o->control, &options, &o->made, diag);
+    if (!err) err = measure(o, diag);
+    return pal_diagnostic_prefix(diag, err, o->name);
 }
 
 static cJSON *as_json(const outcome *o, const char *rule)

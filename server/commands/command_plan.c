@@ -243,15 +243,15 @@ int command_plan(int argc, char **argv)
     if (code >= 0) return code;
     pal_scene_input input = {0};
     pal_world *world = NULL;
-    pal_diagnostic diag = {""}, reason = {""};
+    pal_diagnostic diag = {""};
     static cost measured;
     pal_err err = pal_scene_input_open(word[0], &input, &diag);
     const pal_scene *scene = input.studied.scene;
     pal_preflight preflight = {0};
     if (!err) {
-        err = pal_world_create(scene, &reason, &world);
-        if (!err) err = pal_preflight_run(scene, PAL_PREFLIGHT_FULL, &preflight, &reason);
-        if (err) pal_diagnostic_set(&diag, err, "%s: %s", word[0], reason.text);
+        err = pal_world_create(scene, &diag, &world);
+        if (!err) err = pal_preflight_run(scene, PAL_PREFLIGHT_FULL, &preflight, &diag);
+        pal_diagnostic_prefix(&diag, err, word[0]);
     }
     pal_report_progress("measure", 0, &common);
     if (!err) err = measure(world, scene->step_s, &measured);

@@ -310,9 +310,7 @@ static pal_err limit_nodes(pal_loaded_scene *loaded, const char *name, outcome *
 {
     pal_scene *scene = &loaded->scene;
     pal_world *world;
-    pal_diagnostic reason = {""};
-    pal_err err = pal_world_create(scene, &reason, &world);
-    if (err) return pal_diagnostic_set(diag, err, "%s: %s", name, reason.text);
+    PAL_TRY(pal_diagnostic_prefix(diag, pal_world_create(scene, diag, &world), name));
     out->world_byte = pal_world_bytes(world);
     out->n_substep = pal_world_substeps(world);
     out->limit_s = pal_world_limit_s(world);

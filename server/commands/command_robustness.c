@@ -182,12 +182,11 @@ int command_robustness(int argc, char **argv)
     options.seed = (uint64_t)seed, options.max_cpu_s = seconds, options.only = only;
     options.progress = pal_report_continue, options.user = &common;
     pal_scene_input input = {0};
-    pal_diagnostic diag = {""}, reason = {""};
+    pal_diagnostic diag = {""};
     pal_robustness_report *report = calloc(1, sizeof *report);
     pal_err err = report ? pal_scene_input_open(word[0], &input, &diag) : PAL_ERR_MEMORY;
     const pal_scene *scene = input.studied.scene;
-    if (!err && (err = pal_robustness_run(scene, &options, report, &reason)))
-        pal_diagnostic_set(&diag, err, "%s: %s", word[0], reason.text);
+    if (!err) err = pal_diagnostic_prefix(&diag, pal_robustness_run(scene, &options, report, &diag), word[0]);
     pal_report_progress(NULL, 0, &common);
     if (!err && picture) err = draw(report, scene->title, picture, &diag);
     if (err) {

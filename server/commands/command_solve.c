@@ -212,9 +212,8 @@ static pal_err read_all(study *s, arguments *args, pal_diagnostic *diag)
 
 static pal_err work(study *s, const arguments *args, pal_diagnostic *diag)
 {
-    pal_diagnostic reason = {""};
-    pal_err err = pal_solve(s->problem, s->load_case, &s->surface, &args->solve, &s->solution, &s->result, &reason);
-    if (err) return pal_diagnostic_set(diag, err, "%s: %s", args->problem, reason.text);
+    pal_err err = pal_solve(s->problem, s->load_case, &s->surface, &args->solve, &s->solution, &s->result, diag);
+    if (err) return pal_diagnostic_prefix(diag, err, args->problem);
     PAL_TRY(compare(s, diag));
     return write_files(s, args, diag);
 }

@@ -365,15 +365,14 @@ static pal_err measure(study_run *run, pal_diagnostic *diag)
         return err;
     }
     const pal_study_input *in = &run->input;
-    pal_diagnostic reason = {""};
-    err = in->problem ? pal_study_problem(in->problem, in->load_case, &in->surface, &o, out, &reason)
-                      : pal_study_scene(in->scene, &o, out, &reason);
+    err = in->problem ? pal_study_problem(in->problem, in->load_case, &in->surface, &o, out, diag)
+                      : pal_study_scene(in->scene, &o, out, diag);
     if (!err || out->n_point > 0) merge_results(run, out);
     if (run->store_err) {
         err = run->store_err;
         *diag = run->store_diag;
-    } else if (err) {
-        pal_diagnostic_set(diag, err, "%s: %s", run->request.word, reason.text);
+    } else {
+        pal_diagnostic_prefix(diag, err, run->request.word);
     }
     run->file->n_total = err ? run->file->n_total : run->file->study.n_point;
     run->file->whole = !err;
@@ -436,10 +435,9 @@ static pal_err write_scene(study_run *run, pal_diagnostic *diag)
     const pal_measured_configuration *p = &study->point[run->picked].measured;
     pal_configuration configuration = p->configuration;
     pal_configured_scene *set = NULL;
-    pal_diagnostic reason = {""};
     if (configuration.step_s == 0) configuration.step_s = study->step_s;
-    pal_err err = pal_configuration_make(run->input.scene, run->input.body, &configuration, &reason, &set);
-    if (err) return pal_diagnostic_set(diag, err, "-o: %s", reason.text);
+    pal_err err = pal_configuration_make(run->input.scene, run->input.body, &configuration, diag, &set);
+    if (err) return pal_diagnostic_prefix(diag, err, "-o");
     pal_loaded_scene *loaded = calloc(1, sizeof *loaded);
     if (!loaded) {
         pal_configured_scene_free(set);

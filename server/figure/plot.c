@@ -310,7 +310,6 @@ pal_err pal_plot_text(const pal_plot *plot, char **text, size_t *n_byte, pal_dia
 pal_err pal_plot_write(const pal_plot *plot, const char *path, pal_diagnostic *diag)
 {
     pal_svg svg;
-    pal_diagnostic reason = {""};
-    pal_err err = draw(plot, &svg, &reason);
-    return err ? pal_diagnostic_set(diag, err, "%s: %s", path, reason.text) : pal_svg_end(&svg, path, diag);
+    pal_err err = draw(plot, &svg, diag);
+    return err ? pal_diagnostic_prefix(diag, err, path) : pal_svg_end(&svg, path, diag);
 }

@@ -38,10 +38,8 @@ pal_err pal_svg_end(pal_svg *svg, const char *path, pal_diagnostic *diag)
 {
     char *text = NULL;
     size_t n_byte = 0;
-    pal_diagnostic reason = {""};
-    pal_err err = pal_svg_end_text(svg, &text, &n_byte, &reason);
-    if (err) return pal_diagnostic_set(diag, err, "%s: %s", path, reason.text);
-    err = pal_file_write(path, text, n_byte, diag);
+    PAL_TRY(pal_diagnostic_prefix(diag, pal_svg_end_text(svg, &text, &n_byte, diag), path));
+    pal_err err = pal_file_write(path, text, n_byte, diag);
     free(text);
     return err;
 }

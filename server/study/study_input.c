@@ -43,9 +43,7 @@ static pal_err open_problem(const pal_study_request *q, pal_study_input *out, co
     if (named && !*samples) *samples = named->file;
     pal_mesh_file_options file = {.unit_m = p->unit_m, .weld = PAL_MESH_WELD};
     PAL_TRY(pal_mesh_file_read(p->surface, &file, &out->surface, &report, NULL, NULL, diag));
-    pal_diagnostic reason = {""};
-    pal_err err = pal_study_problem_scene(p, &out->surface, &reason, &out->made);
-    if (err) return pal_diagnostic_set(diag, err, "%s: %s", q->word, reason.text);
+    PAL_TRY(pal_diagnostic_prefix(diag, pal_study_problem_scene(p, &out->surface, diag, &out->made), q->word));
     out->scene = &out->made->scene;
     return PAL_ERR_OK;
 }

@@ -229,9 +229,7 @@ static pal_err set_materials(const pal_problem *p, const double origin[3], pal_b
         pal_sub3(r->low_m, m->region.low_m, origin);
         pal_sub3(r->high_m, m->region.high_m, origin);
     }
-    pal_diagnostic reason = {{0}};
-    pal_err err = pal_material_check(&body->material, &reason);
-    return err ? pal_diagnostic_set(diag, err, "materials[0]: %s", reason.text) : PAL_ERR_OK;
+    return pal_diagnostic_prefix(diag, pal_material_check(&body->material, diag), "materials[0]");
 }
 
 static pal_err fill_scene(const pal_problem *p, const pal_surface *surface, pal_configured_scene *set,
