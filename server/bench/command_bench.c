@@ -28,16 +28,11 @@ enum { BENCHES = sizeof bench_table / sizeof bench_table[0] };
 static int run_bench(int index, const char *argument, const pal_flag_common *common)
 {
     bench_report r = {.argument = argument, .json = common->json, .root = cJSON_CreateObject()};
-    pal_diagnostic diag = {""}, named = {""};
+    pal_diagnostic diag = {""};
     cJSON_AddBoolToObject(r.root, "ok", true);
     cJSON_AddStringToObject(r.root, "bench", bench_table[index].name);
-    pal_err err = bench_table[index].run(&r, &diag);
-    if (err)
-        pal_diagnostic_set(&named, err, "%s: %s", bench_table[index].name,
-                           diag.text[0] ? diag.text : pal_err_text(err));
-    if (r.json) return pal_report_end(common, err, &named, r.root);
-    cJSON_Delete(r.root);
-    return pal_report_end(common, err, &named, NULL);
+    pal_err err = pal_diagnostic_prefix(&diag, bench_table[index].run(&r, &diag), bench_table[index].name);
+    return pal_report_end(common, err, &diag, r.root);
 }
 
 int command_bench(int argc, char **argv)

@@ -201,15 +201,6 @@ static void take_vertices(drawing *d)
     skin_value(d, d->value, d->k_d);
 }
 
-/* a unit of length that suits the size of the body */
-static double length_unit(const drawing *d, const char **name)
-{
-    double max = 0;
-    for (int v = 0; v < d->n_vertex; v++) max = fmax(max, fmax(d->distance[START][v], d->distance[FOUND][v]));
-    *name = max >= 0.5 ? "m" : max >= 5e-4 ? "mm" : "um";
-    return max >= 0.5 ? 1 : max >= 5e-4 ? 1e3 : 1e6;
-}
-
 /* ---- pictures ---- */
 
 /* the body at rest with its loads, its truth, start and result */
@@ -217,8 +208,12 @@ static void add_shapes(drawing *d, pal_body_picture *to, char title[][TITLE])
 {
     const pal_calibrate_run *run = d->run;
     const double percent[N_SHAPE] = {0, 0, run->start.case_percent[d->index], run->last.case_percent[d->index]};
-    const char *unit, *truth = run->set.list[d->index].truth_name;
-    double scale = length_unit(d, &unit);
+    const char *truth = run->set.list[d->index].truth_name;
+    double max = 0;
+    for (int v = 0; v < d->n_vertex; v++) max = fmax(max, fmax(d->distance[START][v], d->distance[FOUND][v]));
+    /* a unit that suits the distances */
+    const char *unit = max >= 0.5 ? "m" : max >= 5e-4 ? "mm" : "um";
+    double scale = max >= 0.5 ? 1 : max >= 5e-4 ? 1e3 : 1e6;
     snprintf(title[REST], TITLE, "at rest, load %.40s", run->set.id[d->index]);
     snprintf(title[TRUTH], TITLE, "truth: %.40s", truth ? truth : "finite elements");
     to[REST].n_load = d->n_load, to[REST].load_at = d->load_at, to[REST].load_N = d->load_N;
@@ -280,8 +275,6 @@ pal_err pal_calibrate_draw_body(const pal_calibrate_run *run, const char *path, 
     pal_arena_destroy(d.arena);
     return err;
 }
-
-/* ---- vtk ---- */
 
 pal_err pal_calibrate_write_vtk(const pal_calibrate_run *run, const char *path, pal_diagnostic *diag)
 {

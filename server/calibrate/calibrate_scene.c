@@ -150,8 +150,6 @@ pal_err pal_calibrate_scene(pal_calibrate_run *run, pal_loaded_scene **out, pal_
     return pal_diagnostic_prefix(diag, err, run->path[PAL_CALIBRATE_SCENE]);
 }
 
-/* ---- accuracy ---- */
-
 /* Appends "0.52 % RMS of finite elements (twist)". False: no room. */
 static bool add_accuracy(const pal_calibrate_run *run, int index, char *out, size_t n_byte)
 {

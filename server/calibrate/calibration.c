@@ -5,7 +5,6 @@
 #include "server/base/vec3.h"
 #include "server/solve/solve.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -272,13 +271,9 @@ static pal_err make_grid(const job *j)
         if (n[a] < 1 || n[a] > 1024)
             return PAL_REFUSE(j->diag, "grid: %d nodes along axis %d, wanted 1 to 1024", n[a], a);
         c->grid.n[a] = n[a];
-        c->grid.low[a] = DBL_MAX;
-        c->grid.high[a] = -DBL_MAX;
-        for (int i = 0; i < t->n_node; i++) {
-            c->grid.low[a] = fmin(c->grid.low[a], t->x[3 * i + a]);
-            c->grid.high[a] = fmax(c->grid.high[a], t->x[3 * i + a]);
-        }
     }
+    pal_box3_empty(c->grid.low, c->grid.high);
+    for (int i = 0; i < t->n_node; i++) pal_box3_add(c->grid.low, c->grid.high, t->x + 3 * i);
     if ((int64_t)n[0] * n[1] * n[2] * PAL_SPRING_KINDS > PAL_CALIBRATE_PARAMETERS)
         return PAL_REFUSE(j->diag, "grid: %d x %d x %d nodes are more than %d parameters", n[0], n[1], n[2],
                           PAL_CALIBRATE_PARAMETERS);

@@ -164,8 +164,6 @@ void pal_journal_close(pal_journal *j)
     free(j);
 }
 
-/* ---- numbers ---- */
-
 char *pal_journal_text(const double *number, size_t n)
 {
     char *text = NULL;

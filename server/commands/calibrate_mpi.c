@@ -282,8 +282,7 @@ static bool show(void *user, const pal_fit_step *step)
     return true;
 }
 
-/* ---- one annealing run, on rank 0 ---- */
-
+/* one annealing run, on rank 0 */
 static pal_err fit(job *j, const char *problem, int seed, cJSON *results)
 {
     pal_fit_result r;
@@ -389,8 +388,6 @@ static int run(job *j)
     free(j->set);
     return code;
 }
-
-/* ---- flags ---- */
 
 /* "1,2,3"; NULL: fine */
 static const char *read_seeds(job *j)

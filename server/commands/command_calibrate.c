@@ -159,8 +159,6 @@ static pal_err check_sources(const pal_calibrate_run *run, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
-/* ---- work ---- */
-
 static pal_err search(pal_calibrate_run *run, pal_diagnostic *diag)
 {
     enum { ALL = PAL_CALIBRATION_FIT | PAL_CALIBRATION_VERIFY };
@@ -462,8 +460,6 @@ static cJSON *as_json(const pal_calibrate_run *run)
                         {"live", run->settled ? live_json(run) : cJSON_CreateNull()}, {"files", files},
                         {"seconds", seconds});
 }
-
-/* ---- the command ---- */
 
 static int start(pal_calibrate_run *run)
 {

@@ -191,8 +191,6 @@ static void print(const outcome *o, const char *rule)
            1e-6 * (double)o->made.n_byte);
 }
 
-/* ---- --list ---- */
-
 /* a row of paper A, Table 1: our figures, then those of the paper */
 static void print_row(const outcome *o)
 {
@@ -226,8 +224,6 @@ static int list_models(const pal_flag_common *common, pal_subdivision_rule rule,
     }
     return pal_report_end(common, err, &diag, PAL_JSON({"ok", JSON_BOOL(true)}, {"models", list}));
 }
-
-/* ---- the command ---- */
 
 static bool ends_in(const char *path, const char *const *end)
 {

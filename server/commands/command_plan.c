@@ -92,8 +92,6 @@ static bool has_component(const pal_world *world, const char *name)
     return false;
 }
 
-/* ---- report ---- */
-
 static cJSON *body_json(const pal_body_def *def, const pal_body *b)
 {
     const pal_adaptive_surface *adaptive = b->model.adaptive;

@@ -58,8 +58,6 @@ typedef struct outcome {
     int n_file;
 } outcome;
 
-/* ---- --list-labels ---- */
-
 static int list_labels(const pal_flag_common *common, const char *path)
 {
     pal_label_volume volume;
@@ -301,8 +299,6 @@ static void print(const pal_loaded_scene *loaded, const arguments *args, const o
     for (int k = 0; k < out->n_file; k++) printf(" %s", out->file[k]);
     printf(" to %s in %.2f s; now: palpate serve %s/scene.json\n", args->folder, out->total_s, args->folder);
 }
-
-/* ---- the command ---- */
 
 /* Makes the world of an adaptive surface once, so that a scene that cannot be served is refused now. Where the finest
  * level of the whole surface would take more than its share of a step, refinement is limited. */

@@ -213,14 +213,6 @@ static void on_signal(int number)
     sem_post(&woken);
 }
 
-static void handle_signals(void)
-{
-    struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_RESTART};
-    sem_init(&woken, 0, 0);
-    for (int k = 0; k < N_HANDLED; k++) sigaction(handled_signal[k], &action, NULL);
-    signal(SIGPIPE, SIG_IGN);
-}
-
 static void wait_until(uint64_t when_ns)
 {
     struct timespec when = {(time_t)(when_ns / 1000000000u), (long)(when_ns % 1000000000u)};
@@ -350,7 +342,10 @@ static void *net_main(void *user)
 
 static pal_err run_all(serve_run *run, pal_diagnostic *diag)
 {
-    handle_signals();
+    struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_RESTART};
+    sem_init(&woken, 0, 0);
+    for (int k = 0; k < N_HANDLED; k++) sigaction(handled_signal[k], &action, NULL);
+    signal(SIGPIPE, SIG_IGN);
     PAL_TRY(open_studies(run, diag));
     PAL_TRY(open_sessions(run, diag));
     PAL_TRY(open_server(run, diag));

@@ -171,8 +171,6 @@ static pal_err choose(study *s, arguments *args, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
-/* ---- work ---- */
-
 static pal_err compare(study *s, pal_diagnostic *diag)
 {
     if (!s->samples_file) return PAL_ERR_OK;
@@ -409,8 +407,6 @@ static int run_table(pal_flag_common *common, const study *s, const arguments *a
     free(all);
     return code;
 }
-
-/* ---- the command ---- */
 
 /* a table: several elements or resolutions, or a plot of them */
 static bool is_table(const arguments *args)

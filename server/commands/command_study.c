@@ -535,8 +535,6 @@ static cJSON *as_json(const study_run *run)
                                {"ms", JSON_NUMBER(p->ms)}, {"error_m", JSON_NUMBER(p->error_m)})});
 }
 
-/* ---- the command ---- */
-
 static pal_err work(study_run *run, int argc, char **argv, pal_diagnostic *diag)
 {
     bool whole;

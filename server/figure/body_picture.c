@@ -496,8 +496,6 @@ static pal_err draw_panel(const sheet *page, const panel *g, FILE *to)
     return PAL_ERR_OK;
 }
 
-/* ---- files ---- */
-
 static pal_err prepare(sheet *page)
 {
     for (int i = 0; i < page->n; i++) {

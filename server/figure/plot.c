@@ -252,8 +252,6 @@ static void draw_labels(FILE *to, const pal_plot *plot, const axis *x, const axi
     }
 }
 
-/* ---- the whole ---- */
-
 static void reach(axis *a, double value)
 {
     if (!isfinite(value) || (a->log && value <= 0)) return;

@@ -118,12 +118,10 @@ static pal_err pick(const char *word, const char *path, const pal_scene *scene, 
     }
     const pal_measured_configuration *p = &study->point[out->picked].measured;
     pal_configuration configuration = p->configuration;
-    pal_diagnostic reason = {""};
     if (configuration.step_s == 0) configuration.step_s = study->step_s;
-    pal_err err = pal_configuration_make(scene, out->file->index, &configuration, &reason, &out->set);
-    if (err)
-        return pal_diagnostic_set(diag, err, "%s: %s: %s", path, pal_configuration_text(&p->configuration, text),
-                                  reason.text);
+    pal_err err = pal_configuration_make(scene, out->file->index, &configuration, diag, &out->set);
+    pal_diagnostic_prefix(diag, err, pal_configuration_text(&p->configuration, text));
+    if (err) return pal_diagnostic_prefix(diag, err, path);
     out->scene = &out->set->scene;
     snprintf(out->summary, sizeof out->summary, "%s: %s, %s in %.3g ms, picked of the %d configurations of %.160s (%s)",
              scene->body[out->file->index].name, pal_configuration_text(&p->configuration, text),
