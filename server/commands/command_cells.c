@@ -276,14 +276,12 @@ static int make_control(const pal_flag_common *common, const char *shape, const 
         double count[3], size_m[3];
         memcpy(count, p->count, sizeof count);
         memcpy(size_m, p->size_m, sizeof size_m);
-        if (args->cells && !read_list(args->cells, p->n_count, true, count)) {
+        if (args->cells && !read_list(args->cells, p->n_count, true, count))
             return pal_flags_wrong(common, "--cells: \"%.40s\" is not %d whole number%s separated by commas (%s)",
                                    args->cells, p->n_count, plural(p->n_count), p->cells_are);
-        }
-        if (args->size && !read_list(args->size, p->n_size, false, size_m)) {
+        if (args->size && !read_list(args->size, p->n_size, false, size_m))
             return pal_flags_wrong(common, "--size-m: \"%.40s\" is not %d numbers separated by commas (%s)", args->size,
                                    p->n_size, p->sizes_are);
-        }
         err = make_primitive(p, count, size_m, &o->control, &diag);
     } else if (args->cells || args->size) {
         return pal_flags_wrong(common, "%s: only goes with block, ring, tube and torus",

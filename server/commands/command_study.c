@@ -58,8 +58,7 @@ typedef struct study_run {
     pal_journal *journal;                      /* stored solutions of the reference; NULL: nothing is measured */
     int n_before, n_new;
     double begin_s, first_s; /* clock at the begin of all, of the first new configuration */
-    char activity[160];
-    pal_err store_err; /* of the last write */
+    pal_err store_err;       /* of the last write */
     pal_diagnostic store_diag;
     int picked; /* -1: none */
     char written[MAX_PATH];
@@ -469,7 +468,7 @@ static pal_err pick_row(study_run *run, pal_diagnostic *diag)
                           pal_configuration_text(&p->measured.configuration, text),
                           p->reason[0] ? p->reason : pal_err_text(p->err));
     run->picked = order[run->row - 1];
-    return run->scene ? write_scene(run, diag) : PAL_ERR_OK;
+    return PAL_ERR_OK;
 }
 
 static pal_err answer(study_run *run, pal_diagnostic *diag)
@@ -479,7 +478,7 @@ static pal_err answer(study_run *run, pal_diagnostic *diag)
     if (run->row) return pick_row(run, diag);
     if (!(run->target.max_error_m > 0) && !(run->target.budget_ms > 0)) return PAL_ERR_OK;
     run->picked = pal_study_pick_target(study, run->methods, &run->target);
-    if (run->picked >= 0) return run->scene ? write_scene(run, diag) : PAL_ERR_OK;
+    if (run->picked >= 0) return PAL_ERR_OK;
     pal_study_describe_miss(study, run->methods, &run->target, text, sizeof text);
     return PAL_REFUSE(diag, "%s: %s", run->request.word, text);
 }
@@ -576,7 +575,8 @@ static pal_err work(study_run *run, int argc, char **argv, pal_diagnostic *diag)
         snprintf(path, sizeof path, "%s.svg", run->stem);
         if (access(path, F_OK)) PAL_TRY(pal_study_publish(run->file, run->stem, diag));
     }
-    return answer(run, diag);
+    PAL_TRY(answer(run, diag));
+    return run->scene ? write_scene(run, diag) : PAL_ERR_OK;
 }
 
 static int start(study_run *run, int argc, char **argv)

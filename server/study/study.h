@@ -18,7 +18,7 @@
 #include <math.h>
 #include <stdint.h>
 
-enum { PAL_STUDY_POINTS = 256, PAL_STUDY_LOADS = 4, PAL_STUDY_TRAJECTORY = 512 };
+enum { PAL_STUDY_POINTS = 256, PAL_STUDY_LOADS = 4 };
 
 typedef struct pal_study_point {
     pal_measured_configuration

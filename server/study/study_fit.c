@@ -40,11 +40,10 @@ static pal_err fit(pal_study_job *job, const pal_calibration *calibration, pal_c
     if (!theta) return PAL_ERR_MEMORY;
     memcpy(theta, info.start, sizeof *theta * (size_t)info.n_parameter);
     pal_err err = pal_fit_adjoint(calibration, &options, theta, &result, diag);
-    for (int k = 0; k < info.n_kind && !err; k++) {
-        if (info.kind[k] == PAL_SPRING_DISTANCE) configuration->k_distance_J = exp(theta[k]);
-        if (info.kind[k] == PAL_SPRING_AREA) configuration->k_area_J = exp(theta[k]);
-        if (info.kind[k] == PAL_SPRING_VOLUME) configuration->k_volume_J = exp(theta[k]);
-    }
+    double *const k_J[PAL_SPRING_KINDS] = {[PAL_SPRING_DISTANCE] = &configuration->k_distance_J,
+                                           [PAL_SPRING_AREA] = &configuration->k_area_J,
+                                           [PAL_SPRING_VOLUME] = &configuration->k_volume_J};
+    for (int k = 0; k < info.n_kind && !err; k++) *k_J[info.kind[k]] = exp(theta[k]);
     free(theta);
     return err;
 }
