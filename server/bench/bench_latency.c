@@ -7,38 +7,25 @@
 #include "server/scene/scene_file.h"
 #include "server/session/session.h"
 
-#include <pthread.h>
+#include <semaphore.h>
 
 enum { POSES = 300, WARM = 20 };
 
-typedef struct bell {
-    pthread_mutex_t lock;
-    pthread_cond_t rung;
-    uint64_t count;
-} bell;
-
 static void ring(void *user)
 {
-    bell *b = user;
-    pthread_mutex_lock(&b->lock);
-    b->count++;
-    pthread_cond_signal(&b->rung);
-    pthread_mutex_unlock(&b->lock);
+    sem_post(user);
 }
 
 /* milliseconds from the request of a pose to having the frame that used it */
-static double one(pal_session *session, bell *b, const pal_pose *pose)
+static double one(pal_session *session, sem_t *rung, const pal_pose *pose)
 {
-    uint64_t start = pal_clock_ns(), seen = 0;
+    uint64_t start = pal_clock_ns();
     pal_session_request_pose(session, 0, pose);
     for (;;) {
         const pal_frame *frame = pal_session_take_frame(session);
         if (frame && frame->tool[0].present && frame->tool[0].pose.seq == pose->seq)
             return 1e-6 * (double)(pal_clock_ns() - start);
-        pthread_mutex_lock(&b->lock);
-        while (b->count == seen) pthread_cond_wait(&b->rung, &b->lock);
-        seen = b->count;
-        pthread_mutex_unlock(&b->lock);
+        sem_wait(rung);
     }
 }
 
@@ -46,20 +33,22 @@ pal_err bench_latency(bench_report *r, pal_diagnostic *diag)
 {
     static double ms[POSES];
     const pal_surface_scene plain = {.label = -1};
-    bell b = {.lock = PTHREAD_MUTEX_INITIALIZER, .rung = PTHREAD_COND_INITIALIZER};
+    sem_t rung;
     pal_loaded_scene *loaded = NULL;
     pal_session *session = NULL;
-    pal_session_options options = {.lease_s = 5, .wake = ring, .user = &b};
+    pal_session_options options = {.lease_s = 5, .wake = ring, .user = &rung};
+    sem_init(&rung, 0, 0);
     pal_err err = pal_scene_procedural(&plain, &loaded, NULL, diag);
     if (!err) err = pal_session_open(&loaded->scene, &options, diag, &session);
     double step_ms = err ? 0 : 1e3 * loaded->scene.step_s;
     for (int k = -WARM; k < POSES && !err; k++) {
         pal_pose pose = {.position_m = {0.15, 0, 0.0001 * k}, .quat = {1, 0, 0, 0}, .seq = (uint32_t)(k + WARM + 1)};
         pal_clock_sleep_until_ns(pal_clock_ns() + (uint64_t)(1e6 * step_ms * (0.05 + 0.9 * (k & 31) / 32)));
-        double taken = one(session, &b, &pose);
+        double taken = one(session, &rung, &pose);
         if (k >= 0) ms[k] = taken;
     }
     pal_session_close(session);
+    sem_destroy(&rung);
     pal_scene_free(loaded);
     double median_ms = pal_median(ms, POSES);
     bench_note(r, "pose to frame inside the server; at most one step and 5 ms are wanted");

@@ -13,6 +13,7 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <ftw.h>
 #include <math.h>
 #include <signal.h>
 #include <stdint.h>
@@ -110,16 +111,10 @@ static pal_err move_up(const char *stage, const char *folder, outcome *out, pal_
     return PAL_ERR_OK;
 }
 
-static void remove_folder(const char *folder)
+static int remove_one(const char *path, const struct stat *facts, int kind, struct FTW *place)
 {
-    char path[PATH + 300];
-    DIR *list = opendir(folder);
-    for (struct dirent *entry; list && (entry = readdir(list));) {
-        snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
-        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0) unlink(path);
-    }
-    if (list) closedir(list);
-    rmdir(folder);
+    (void)facts, (void)kind, (void)place;
+    return remove(path);
 }
 
 static pal_err save(const pal_loaded_scene *loaded, const arguments *args, outcome *out, pal_diagnostic *diag)
@@ -142,7 +137,7 @@ static pal_err save(const pal_loaded_scene *loaded, const arguments *args, outco
     if (!err) err = pal_scene_save(loaded, stage, diag);
     if (!err && tetgen) err = pal_mesh_file_write_tetgen(stem, &loaded->mesh[0].tets, diag);
     if (!err) err = move_up(stage, args->folder, out, diag);
-    remove_folder(stage);
+    nftw(stage, remove_one, 4, FTW_DEPTH | FTW_PHYS);
     if (err && !was_there) rmdir(args->folder);
     sigprocmask(SIG_SETMASK, &old, NULL);
     return err;

@@ -154,14 +154,14 @@ static pal_err copy_mesh(panel *g)
     pal_picture_mesh *m = &g->mesh;
     pal_err err = PAL_ERR_OK;
     size_t n = 3 * (size_t)p->n_vertex, n_tri = 3 * (size_t)p->n_tri;
-    *m = (pal_picture_mesh){.n_vertex = p->n_vertex, .n_tri = p->n_tri};
-    PAL_ARRAY(&err, m->x, n);
+    *m = (pal_picture_mesh){.surface = {.n_vertex = p->n_vertex, .n_tri = p->n_tri}};
+    PAL_ARRAY(&err, m->surface.x, n);
     PAL_ARRAY(&err, m->value, p->n_vertex);
-    PAL_ARRAY(&err, m->tri, n_tri);
+    PAL_ARRAY(&err, m->surface.tri, n_tri);
     if (p->rest) PAL_ARRAY(&err, m->rest, n);
     if (err) return err;
-    memcpy(m->x, p->x, n * sizeof *m->x);
-    memcpy(m->tri, p->tri, n_tri * sizeof *m->tri);
+    memcpy(m->surface.x, p->x, n * sizeof *p->x);
+    memcpy(m->surface.tri, p->tri, n_tri * sizeof *p->tri);
     if (p->rest) memcpy(m->rest, p->rest, n * sizeof *m->rest);
     for (int i = 0; i < p->n_vertex; i++) {
         double t = g->ranged ? (scaled(p, p->value[i]) - g->from) / (g->to - g->from) : NAN;

@@ -3,7 +3,6 @@
 
 #include "server/base/heap.h"
 #include "server/base/vec3.h"
-#include "server/mesh/geometry/surface.h"
 #include "server/num/sort.h"
 
 enum { DIVIDE_MAX = 8, CLASSES_A_PIECE = 2 };
@@ -31,7 +30,8 @@ void pal_picture_axes_set(pal_picture_axes *axes, const double eye[3])
 
 void pal_picture_mesh_free(pal_picture_mesh *mesh)
 {
-    PAL_FREE(mesh->x, mesh->rest, mesh->value, mesh->tri);
+    pal_surface_free(&mesh->surface);
+    PAL_FREE(mesh->rest, mesh->value);
     *mesh = (pal_picture_mesh){0};
 }
 
@@ -44,17 +44,12 @@ static void face_normal(const double *x, const int32_t tri[3], double normal[3])
 static int count_seen(const pal_picture_mesh *m, const pal_picture_axes *axes)
 {
     int n = 0;
-    for (int t = 0; t < m->n_tri; t++) {
+    for (int t = 0; t < m->surface.n_tri; t++) {
         double normal[3];
-        face_normal(m->x, m->tri + 3 * t, normal);
+        face_normal(m->surface.x, m->surface.tri + 3 * t, normal);
         n += !m->closed || pal_dot3(normal, axes->eye) > 0;
     }
     return n;
-}
-
-static pal_surface surface_of(const pal_picture_mesh *m)
-{
-    return (pal_surface){.n_vertex = m->n_vertex, .n_tri = m->n_tri, .x = m->x, .tri = m->tri};
 }
 
 /* ---- fewer triangles ---- */
@@ -73,7 +68,7 @@ static int by_key(const void *a, const void *b)
 /* vertices of one cell become their mean; triangles that lose a corner go */
 static pal_err join_cells(pal_picture_mesh *m, const double low[3], double size)
 {
-    size_t n = (size_t)m->n_vertex;
+    size_t n = (size_t)m->surface.n_vertex;
     pal_err err = PAL_ERR_OK;
     cell *c;
     int32_t *to;
@@ -85,7 +80,8 @@ static pal_err join_cells(pal_picture_mesh *m, const double low[3], double size)
     }
     for (size_t i = 0; i < n; i++) {
         c[i] = (cell){0, (int32_t)i};
-        for (int k = 0; k < 3; k++) c[i].key = c[i].key << 21 | (uint64_t)((m->x[3 * i + (size_t)k] - low[k]) / size);
+        for (int k = 0; k < 3; k++)
+            c[i].key = c[i].key << 21 | (uint64_t)((m->surface.x[3 * i + (size_t)k] - low[k]) / size);
     }
     qsort(c, n, sizeof *c, by_key);
     int n_cell = 0;
@@ -97,43 +93,43 @@ static pal_err join_cells(pal_picture_mesh *m, const double low[3], double size)
         for (j = i + 1; j < n && c[j].key == c[i].key; j++) {
             int32_t v = c[j].vertex;
             to[v] = first;
-            pal_axpy3(m->x + 3 * first, 1, m->x + 3 * v);
+            pal_axpy3(m->surface.x + 3 * first, 1, m->surface.x + 3 * v);
             if (m->rest) pal_axpy3(m->rest + 3 * first, 1, m->rest + 3 * v);
             if (isfinite(m->value[v])) m->value[first] += m->value[v], some++;
         }
         to[first] = first;
-        pal_scale3(m->x + 3 * first, 1.0 / (double)(j - i), m->x + 3 * first);
+        pal_scale3(m->surface.x + 3 * first, 1.0 / (double)(j - i), m->surface.x + 3 * first);
         if (m->rest) pal_scale3(m->rest + 3 * first, 1.0 / (double)(j - i), m->rest + 3 * first);
         m->value[first] = some > 0 ? m->value[first] / some : NAN;
     }
     int kept = 0;
-    for (int t = 0; t < m->n_tri; t++) {
-        int32_t a = to[m->tri[3 * t]], b = to[m->tri[3 * t + 1]], d = to[m->tri[3 * t + 2]];
+    for (int t = 0; t < m->surface.n_tri; t++) {
+        int32_t a = to[m->surface.tri[3 * t]], b = to[m->surface.tri[3 * t + 1]], d = to[m->surface.tri[3 * t + 2]];
         if (a == b || b == d || d == a) continue;
-        m->tri[3 * kept] = a, m->tri[3 * kept + 1] = b, m->tri[3 * kept + 2] = d, kept++;
+        m->surface.tri[3 * kept] = a, m->surface.tri[3 * kept + 1] = b, m->surface.tri[3 * kept + 2] = d, kept++;
     }
-    m->n_tri = kept;
+    m->surface.n_tri = kept;
     PAL_FREE(c, to);
     return PAL_ERR_OK;
 }
 
 pal_err pal_picture_mesh_prepare(pal_picture_mesh *m, const pal_picture_axes *axes, int max)
 {
-    const pal_surface s = surface_of(m);
+    const pal_surface *s = &m->surface;
     pal_surface_topology found;
-    PAL_TRY(pal_surface_check(&s, &found));
+    PAL_TRY(pal_surface_check(s, &found));
     const bool closed = m->closed = found.closed && found.oriented && found.n_nonmanifold_edge == 0;
-    if (closed && pal_surface_volume(&s) < 0)
-        for (int t = 0; t < m->n_tri; t++) {
-            int32_t other = m->tri[3 * t + 1];
-            m->tri[3 * t + 1] = m->tri[3 * t + 2], m->tri[3 * t + 2] = other;
+    if (closed && pal_surface_volume(s) < 0)
+        for (int t = 0; t < m->surface.n_tri; t++) {
+            int32_t other = m->surface.tri[3 * t + 1];
+            m->surface.tri[3 * t + 1] = m->surface.tri[3 * t + 2], m->surface.tri[3 * t + 2] = other;
         }
     int seen = count_seen(m, axes);
     if (seen <= max) return PAL_ERR_OK;
     double low[3], high[3];
-    pal_surface_box(&s, low, high);
+    pal_surface_box(s, low, high);
     /* a cell that a surface crosses gives about two triangles; half of them are seen */
-    double size = fmax(sqrt(pal_surface_area(&s) / max) * (closed ? 0.7 : 1), 1e-6 * pal_dist3(low, high));
+    double size = fmax(sqrt(pal_surface_area(s) / max) * (closed ? 0.7 : 1), 1e-6 * pal_dist3(low, high));
     for (; seen > max && size > 0; size *= 1.2) {
         PAL_TRY(join_cells(m, low, size));
         m->closed = closed; /* cells fold a closed surface but open none */
@@ -158,9 +154,9 @@ static void make_faces(const pal_picture_mesh *m, const pal_picture_axes *axes, 
     double light[3];
     for (int k = 0; k < 3; k++) light[k] = axes->eye[k] + 0.40 * axes->up[k] - 0.28 * axes->right[k];
     pal_unit3(light, light, 0);
-    for (int t = 0; t < m->n_tri; t++) {
+    for (int t = 0; t < m->surface.n_tri; t++) {
         double normal[3];
-        face_normal(m->x, m->tri + 3 * t, normal);
+        face_normal(m->surface.x, m->surface.tri + 3 * t, normal);
         bool some = pal_unit3(normal, normal, 0);
         double facing = some ? pal_dot3(normal, axes->eye) : 0, lit = some ? pal_dot3(normal, light) : 1;
         if (!m->closed && facing < 0) facing = -facing, lit = -lit;
@@ -169,8 +165,8 @@ static void make_faces(const pal_picture_mesh *m, const pal_picture_axes *axes, 
         double shade = (PAL_PICTURE_SHADES - 1) * fmin(1, fmax(0, lit) / 0.87);
         f[t].shade = (uint8_t)lround(shade);
         for (int k = 0; k < 3; k++) {
-            int32_t v = m->tri[3 * t + k];
-            pal_picture_project(axes, m->x + 3 * v, f[t].p[k]);
+            int32_t v = m->surface.tri[3 * t + k];
+            pal_picture_project(axes, m->surface.x + 3 * v, f[t].p[k]);
             f[t].value[k] = m->value[v];
         }
         f[t].outline = f[t].crease = 0;
@@ -182,8 +178,8 @@ static void make_faces(const pal_picture_mesh *m, const pal_picture_axes *axes, 
 static bool edge_normals(const pal_picture_mesh *m, const double *x, const edge *e, double normal[2][3])
 {
     if (e->n != 2) return false;
-    for (int i = 0; i < 2; i++) face_normal(x, m->tri + 3 * (e->side[i].corner / 3), normal[i]);
-    if (m->tri[e->side[0].corner] == m->tri[e->side[1].corner]) pal_scale3(normal[1], -1, normal[1]);
+    for (int i = 0; i < 2; i++) face_normal(x, m->surface.tri + 3 * (e->side[i].corner / 3), normal[i]);
+    if (m->surface.tri[e->side[0].corner] == m->surface.tri[e->side[1].corner]) pal_scale3(normal[1], -1, normal[1]);
     return true;
 }
 
@@ -200,7 +196,7 @@ static bool is_outline(const pal_picture_mesh *m, const double *x, const double 
 static bool is_crease(const pal_picture_mesh *m, const edge *e)
 {
     double normal[2][3];
-    if (m->joined || !edge_normals(m, m->x, e, normal)) return false;
+    if (m->joined || !edge_normals(m, m->surface.x, e, normal)) return false;
     if (!pal_unit3(normal[0], normal[0], 0) || !pal_unit3(normal[1], normal[1], 0)) return false;
     return pal_dot3(normal[0], normal[1]) < crease_cosine;
 }
@@ -208,17 +204,16 @@ static bool is_crease(const pal_picture_mesh *m, const edge *e)
 static pal_err mark_edges(const pal_picture_mesh *m, const pal_picture_axes *axes, face *f, pal_picture_line **ghost,
                           int *n_ghost)
 {
-    const pal_surface s = surface_of(m);
     int32_t *start;
     pal_surface_side *side;
-    PAL_TRY(pal_surface_sides(&s, &start, &side));
+    PAL_TRY(pal_surface_sides(&m->surface, &start, &side));
     pal_err err = PAL_ERR_OK;
-    if (m->rest) PAL_ARRAY(&err, *ghost, 3 * m->n_tri);
-    for (int32_t v = 0; v < m->n_vertex && !err; v++)
+    if (m->rest) PAL_ARRAY(&err, *ghost, 3 * m->surface.n_tri);
+    for (int32_t v = 0; v < m->surface.n_vertex && !err; v++)
         for (int32_t i = start[v], end = i; i < start[v + 1]; i = end) {
             while (end < start[v + 1] && side[end].high == side[i].high) end++;
             const edge e = {side + i, end - i};
-            bool outline = is_outline(m, m->x, axes->eye, &e), crease = !outline && is_crease(m, &e);
+            bool outline = is_outline(m, m->surface.x, axes->eye, &e), crease = !outline && is_crease(m, &e);
             for (int k = i; k < end; k++) {
                 uint8_t bit = (uint8_t)(1 << side[k].corner % 3);
                 if (outline) f[side[k].corner / 3].outline |= bit;
@@ -290,7 +285,7 @@ pal_err pal_picture_pieces(const pal_picture_mesh *m, const pal_picture_axes *ax
     *n_piece = *n_ghost = 0;
     pal_err err = PAL_ERR_OK;
     face *f;
-    PAL_ARRAY(&err, f, m->n_tri);
+    PAL_ARRAY(&err, f, m->surface.n_tri);
     if (err) return err;
     make_faces(m, axes, f);
     err = mark_edges(m, axes, f, ghost, n_ghost);
@@ -298,13 +293,13 @@ pal_err pal_picture_pieces(const pal_picture_mesh *m, const pal_picture_axes *ax
     long long n;
     do {
         n = 0, parts--;
-        for (int t = 0; t < m->n_tri; t++) {
+        for (int t = 0; t < m->surface.n_tri; t++) {
             int d = f[t].seen ? divisions(&f[t], parts) : 0;
             n += d * d;
         }
     } while (n > max && parts > 1);
     PAL_ARRAY(&err, *piece, n);
-    for (int t = 0; t < m->n_tri && !err; t++)
+    for (int t = 0; t < m->surface.n_tri && !err; t++)
         if (f[t].seen) *n_piece += put_face(&f[t], divisions(&f[t], parts), *piece + *n_piece);
     if (!err) qsort(*piece, (size_t)*n_piece, sizeof **piece, by_depth);
     if (err) {

@@ -3,10 +3,7 @@
  * that look away are left out where the surface is closed; a closed surface inside out is turned. Thread: [load]. */
 #ifndef PAL_FIGURE_PICTURE_FACES_H
 #define PAL_FIGURE_PICTURE_FACES_H
-#include "server/base/err.h"
-
-#include <stdbool.h>
-#include <stdint.h>
+#include "server/mesh/geometry/surface.h"
 
 enum { PAL_PICTURE_CLASSES = 64, PAL_PICTURE_SHADES = 16, PAL_PICTURE_GREY = -1 };
 
@@ -24,12 +21,11 @@ static inline void pal_picture_project(const pal_picture_axes *a, const double x
 
 /* a surface of its own arrays; value: place in the colour map, 0 to 1, NaN: none. pal_picture_mesh_free frees it */
 typedef struct pal_picture_mesh {
-    int n_vertex, n_tri;
-    double *x, *rest; /* rest NULL: none [n_vertex][3] */
-    double *value;    /* [n_vertex]                   */
-    int32_t *tri;     /* [n_tri][3]                   */
-    bool closed;      /* every edge has two triangles */
-    bool joined;      /* drawn coarser than it is: edges of folds are no outlines */
+    pal_surface surface;
+    double *rest;  /* NULL: none [n_vertex][3]     */
+    double *value; /* [n_vertex]                   */
+    bool closed;   /* every edge has two triangles */
+    bool joined;   /* drawn coarser than it is: edges of folds are no outlines */
 } pal_picture_mesh;
 void pal_picture_mesh_free(pal_picture_mesh *mesh);
 /* joins vertices within cells until at most `max` triangles can be seen; finds closed and turns what is inside out */

@@ -75,15 +75,6 @@ static void corners(const pal_surface *s, int tri, const double *x[3])
     for (int c = 0; c < 3; c++) x[c] = s->x + 3 * (size_t)s->tri[3 * tri + c];
 }
 
-static bool box_meets(const double low[3], const double high[3], const double *x[3])
-{
-    for (int c = 0; c < 3; c++) {
-        double min = fmin(x[0][c], fmin(x[1][c], x[2][c])), max = fmax(x[0][c], fmax(x[1][c], x[2][c]));
-        if (min > high[c] || max < low[c]) return false;
-    }
-    return true;
-}
-
 /* Shares of the corners in the part of a triangle inside a box, by the midpoints of equal small triangles, m^2. */
 static void triangle_shares(const double *x[3], const double low[3], const double high[3], double share[3])
 {
@@ -118,8 +109,13 @@ static pal_err surface_traction(const pal_study_world *w, const pal_problem_load
     for (int t = 0; t < s->n_tri; t++) {
         const double *x[3];
         double part[3];
+        bool meets = true;
         corners(s, t, x);
-        if (!box_meets(low, high, x)) continue;
+        for (int c = 0; c < 3; c++) {
+            meets = meets && !(fmin(x[0][c], fmin(x[1][c], x[2][c])) > high[c]);
+            meets = meets && !(fmax(x[0][c], fmax(x[1][c], x[2][c])) < low[c]);
+        }
+        if (!meets) continue;
         triangle_shares(x, low, high, part);
         for (int c = 0; c < 3; c++) share[s->tri[3 * t + c]] += part[c], area += part[c];
     }
