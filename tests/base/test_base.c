@@ -29,6 +29,19 @@ static void diagnostic_is_cut_at_the_end_of_its_buffer(void)
     CHECK_INT(pal_diagnostic_set(NULL, PAL_ERR_IO, "%s", longer), PAL_ERR_IO);
 }
 
+static void prefix_stands_before_the_sentence_or_that_of_the_code(void)
+{
+    pal_diagnostic diag = {"no such file"};
+    CHECK_INT(pal_diagnostic_prefix(&diag, PAL_ERR_OK, "a.json"), PAL_ERR_OK);
+    CHECK_TEXT(diag.text, "no such file");
+    CHECK_INT(pal_diagnostic_prefix(&diag, PAL_ERR_IO, "a.json"), PAL_ERR_IO);
+    CHECK_TEXT(diag.text, "a.json: no such file");
+    diag.text[0] = 0;
+    CHECK_INT(pal_diagnostic_prefix(&diag, PAL_ERR_MEMORY, "a.json"), PAL_ERR_MEMORY);
+    CHECK_TEXT(diag.text, "a.json: out of memory, nothing changed");
+    CHECK_INT(pal_diagnostic_prefix(NULL, PAL_ERR_IO, "a.json"), PAL_ERR_IO);
+}
+
 static void arena_gives_zeroed_aligned_bytes_and_refuses_overflow(void)
 {
     pal_arena *arena = pal_arena_create(1000, true);
@@ -180,6 +193,7 @@ int main(void)
 {
     RUN(every_error_has_name_and_text);
     RUN(diagnostic_is_cut_at_the_end_of_its_buffer);
+    RUN(prefix_stands_before_the_sentence_or_that_of_the_code);
     RUN(arena_gives_zeroed_aligned_bytes_and_refuses_overflow);
     RUN(fixed_arena_refuses_beyond_its_size_and_empties);
     RUN(triple_buffer_passes_the_newest_value_whole_and_in_order);
