@@ -35,7 +35,7 @@ static void empty(pal_client *c)
 }
 
 /* a dropped member leaves at once, before its socket closes */
-void pal_hub_leave_room(pal_hub *hub, pal_client *c)
+void pal_hub_leave_room(pal_client *c)
 {
     pal_hub_room *room = c->room;
     empty(c);
@@ -48,10 +48,10 @@ void pal_hub_leave_room(pal_hub *hub, pal_client *c)
     room->tier_users[c->tier]--;
     pal_session_observe(room->session, false);
     c->id = 0;
-    pal_hub_members_changed(hub, room);
+    pal_hub_members_changed(room);
 }
 
-void pal_hub_drop(pal_hub *hub, pal_client *client, int code, const char *format, ...)
+void pal_hub_drop(pal_client *client, int code, const char *format, ...)
 {
     char reason[PAL_PEER_REASON];
     va_list args;
@@ -61,15 +61,15 @@ void pal_hub_drop(pal_hub *hub, pal_client *client, int code, const char *format
     va_end(args);
     pal_log(PAL_LOG_DEBUG, "drop", "a client is closed with %d: %s", code, reason);
     pal_peer_drop(client->peer, code, "%s", reason);
-    pal_hub_leave_room(hub, client);
+    pal_hub_leave_room(client);
 }
 
-static void queue(pal_hub *hub, pal_client *c, pal_packet *packet)
+static void queue(pal_client *c, pal_packet *packet)
 {
     if (c->n_queue == PAL_HUB_QUEUE || !packet) {
         pal_packet_drop(packet);
-        hub->count.n_overflow++;
-        pal_hub_drop(hub, c, PAL_WIRE_CLOSE_POLICY, "too many answers wait to be read");
+        c->hub->count.n_overflow++;
+        pal_hub_drop(c, PAL_WIRE_CLOSE_POLICY, "too many answers wait to be read");
         return;
     }
     c->queue[(c->queue_begin + c->n_queue++) % PAL_HUB_QUEUE] = packet;
@@ -83,42 +83,48 @@ pal_control *pal_hub_message(pal_hub *hub, pal_control_type type)
     return hub->control;
 }
 
-pal_packet *pal_hub_encode(pal_hub *hub, const pal_control *control)
+pal_packet *pal_hub_encode(pal_hub *hub)
 {
     size_t n = 0;
-    int refusal = pal_control_put(hub->text, PAL_CONTROL_OUT_MAX + 1, control, &n);
+    int refusal = pal_control_put(hub->text, PAL_CONTROL_OUT_MAX + 1, hub->control, &n);
     if (refusal) {
-        pal_log(PAL_LOG_ERROR, "control", "%s is not sent: %s", pal_control_name(control->type),
+        pal_log(PAL_LOG_ERROR, "control", "%s is not sent: %s", pal_control_name(hub->control->type),
                 pal_refusal_text(refusal));
         return NULL;
     }
     return pal_packet_create(hub->text, n, true);
 }
 
-void pal_hub_send(pal_hub *hub, pal_client *client, const pal_control *control)
+void pal_hub_send(pal_client *client)
 {
-    if (client->peer->drop_code) return;
-    queue(hub, client, pal_hub_encode(hub, control));
+    if (!client->peer->drop_code) queue(client, pal_hub_encode(client->hub));
 }
 
-void pal_hub_send_error(pal_hub *hub, pal_client *client, const char *code, const char *format, ...)
+bool pal_hub_refuse(pal_client *client, const char *code, const char *format, ...)
 {
     char text[512];
     va_list args;
     va_start(args, format);
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
-    pal_wire_error *error = &pal_hub_message(hub, PAL_CONTROL_ERROR)->error;
+    pal_wire_error *error = &pal_hub_message(client->hub, PAL_CONTROL_ERROR)->error;
     pal_plain_text(error->code, sizeof error->code, code);
     pal_plain_text(error->text, sizeof error->text, text);
-    pal_hub_send(hub, client, hub->control);
+    pal_hub_send(client);
+    return false;
 }
 
-void pal_hub_members_changed(pal_hub *hub, pal_hub_room *room)
+pal_client *pal_hub_next_member(const pal_hub_room *room, pal_client *after)
 {
-    for (int i = 0; i < hub->max_clients; i++) {
-        pal_client *c = &hub->client[i];
-        if (!c->peer || c->room != room || !c->id || c->peer->drop_code) continue;
+    pal_client *end = room->hub->client + room->hub->max_clients;
+    for (pal_client *c = after ? after + 1 : room->hub->client; c < end; c++)
+        if (c->peer && c->room == room && c->id && !c->peer->drop_code) return c;
+    return NULL;
+}
+
+void pal_hub_members_changed(const pal_hub_room *room)
+{
+    for (pal_client *c = NULL; (c = pal_hub_next_member(room, c));) {
         c->members_due = true;
         c->peer->ops->ready(c->peer);
     }

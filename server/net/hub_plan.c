@@ -90,39 +90,30 @@ void pal_hub_count_unobserved(pal_hub_room *room)
     room->was_unobserved = room->members.n_member == 0;
 }
 
-/* the world answers between two steps, with a count of refusals and the last diagnostic */
-static void note_asked(const pal_hub *hub, pal_client *c)
-{
-    const pal_frame *f = c->room->stream->frame;
-    c->component_until_ns = pal_loop_now_ns(hub->loop) + PAL_ANSWER_NS;
-    c->component_refused = f ? f->n_refused : 0;
-}
-
-void pal_hub_component_result(pal_hub *hub, pal_client *c)
+void pal_hub_component_result(pal_client *c)
 {
     const pal_frame *f = c->room->stream->frame;
     pal_diagnostic diag = {""};
     if (!c->component_until_ns || !f) return;
     bool refused = f->n_refused > c->component_refused;
     if (refused) pal_session_last_diagnostic(c->room->session, &diag);
-    if (diag.text[0]) pal_hub_send_error(hub, c, "refused", "component: %s", diag.text);
-    if (refused || pal_loop_now_ns(hub->loop) > c->component_until_ns) c->component_until_ns = 0;
+    if (diag.text[0]) pal_hub_refuse(c, "refused", "component: %s", diag.text);
+    if (refused || pal_loop_now_ns(c->hub->loop) > c->component_until_ns) c->component_until_ns = 0;
 }
 
-void pal_hub_run_component(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
+bool pal_hub_run_component(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
+    const pal_frame *f = c->room->stream->frame;
     double part = pal_hub_arg(command, "part", -1);
     pal_command order = {.kind = PAL_COMMAND_COMPONENT, .wanted = pal_hub_arg(command, "enabled", 0) != 0};
-    if (!(part >= 0 && part < c->room->stream->n_part)) {
-        pal_hub_send_error(hub, c, "args", "component: part %g, wanted 0 to %d", part, c->room->stream->n_part - 1);
-        return;
-    }
-    if (strlen(command->target) >= sizeof order.component) {
-        pal_hub_send_error(hub, c, "target", "there is no component %s", command->target);
-        return;
-    }
+    if (!(part >= 0 && part < c->room->stream->n_part))
+        return pal_hub_refuse(c, "args", "component: part %g, wanted 0 to %d", part, c->room->stream->n_part - 1);
+    if (strlen(command->target) >= sizeof order.component)
+        return pal_hub_refuse(c, "target", "there is no component %s", command->target);
     order.body = (int)part;
     strcpy(order.component, command->target);
-    note_asked(hub, c);
-    pal_hub_session_command(hub, c, verb->name, &order);
+    /* the world answers between two steps, with a count of refusals and the last diagnostic */
+    c->component_until_ns = pal_loop_now_ns(c->hub->loop) + PAL_ANSWER_NS;
+    c->component_refused = f ? f->n_refused : 0;
+    return pal_hub_session_command(c, verb->name, &order);
 }
