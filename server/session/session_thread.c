@@ -115,17 +115,6 @@ static bool take_poses(pal_session *s, uint64_t now)
     return changed;
 }
 
-/* the end of a command: records an accepted one, counts a refused one */
-static void conclude(pal_session *s, pal_err err, pal_diagnostic *diag, pal_input_record record)
-{
-    record.step = s->step;
-    if (err)
-        count_refusal(s);
-    else
-        diag->text[0] = 0, pal_input_log_put(s->log, &record);
-    put_diagnostic(s, diag);
-}
-
 /* the first subscriber creates the component, the last removes it; creation that failed is retried by the next
  * subscriber */
 static void subscribe(pal_session *s, const pal_command *command)
@@ -150,19 +139,42 @@ static bool update_observed(pal_session *s)
     return observed;
 }
 
-static void put_material(pal_session *s, int body, const pal_material *material)
+/* commands that are input, with their records; 0: others */
+static const pal_input_kind record_of[PAL_COMMAND_COUNT] = {[PAL_COMMAND_RESET] = PAL_INPUT_RESET,
+                                                            [PAL_COMMAND_RESET_BODY] = PAL_INPUT_RESET_BODY,
+                                                            [PAL_COMMAND_MATERIAL] = PAL_INPUT_MATERIAL,
+                                                            [PAL_COMMAND_BRUSH] = PAL_INPUT_BRUSH,
+                                                            [PAL_COMMAND_COMPONENT] = PAL_INPUT_COMPONENT};
+
+/* records an accepted input, counts a refused one */
+static void apply(pal_session *s, const pal_command *command)
 {
+    pal_diagnostic diag = {""};
+    pal_input_record record = {.kind = record_of[command->kind],
+                               .index = command->kind == PAL_COMMAND_RESET ? 0 : command->body,
+                               .step = s->step,
+                               .material = command->material,
+                               .slot = command->slot,
+                               .brush = command->brush,
+                               .wanted = command->wanted};
+    memcpy(record.component, command->component, sizeof record.component);
+    pal_err err = pal_input_apply(s->world, s->scene, &record, &diag);
+    if (err)
+        count_refusal(s);
+    else
+        diag.text[0] = 0, pal_input_log_put(s->log, &record);
+    for (int t = 0; t < s->scene->n_tool && command->kind == PAL_COMMAND_RESET; t++)
+        s->tool[t].present = s->tool[t].brushes = false;
+    if (!err && command->kind == PAL_COMMAND_BRUSH)
+        s->tool[command->slot].brushes |= command->brush.kind != PAL_BRUSH_NONE;
     pthread_mutex_lock(&s->lock);
-    s->material[body] = *material;
+    s->diag = diag;
+    if (!err && command->kind == PAL_COMMAND_MATERIAL) s->material[command->body] = command->material;
     pthread_mutex_unlock(&s->lock);
 }
 
 static void execute(pal_session *s, const pal_command *command)
 {
-    pal_diagnostic diag = {""};
-    pal_input_record record;
-    pal_err err;
-    int body = command->body;
     switch (command->kind) {
     case PAL_COMMAND_PAUSE:
         s->paused = true;
@@ -173,41 +185,14 @@ static void execute(pal_session *s, const pal_command *command)
     case PAL_COMMAND_STEP:
         if (s->paused) s->single++;
         break;
-    case PAL_COMMAND_RESET:
-        pal_world_reset(s->world);
-        for (int t = 0; t < s->scene->n_tool; t++) s->tool[t].present = s->tool[t].brushes = false;
-        conclude(s, PAL_ERR_OK, &diag, (pal_input_record){.kind = PAL_INPUT_RESET});
-        break;
-    case PAL_COMMAND_RESET_BODY:
-        (void)pal_world_reset_body(s->world, body);
-        conclude(s, PAL_ERR_OK, &diag, (pal_input_record){.kind = PAL_INPUT_RESET_BODY, .index = body});
-        break;
-    case PAL_COMMAND_MATERIAL:
-        err = pal_world_material(s->world, body, &command->material, &diag);
-        if (!err) put_material(s, body, &command->material);
-        conclude(s, err, &diag,
-                 (pal_input_record){.kind = PAL_INPUT_MATERIAL, .index = body, .material = command->material});
-        break;
     case PAL_COMMAND_FIELD:
         subscribe(s, command);
         break;
-    case PAL_COMMAND_BRUSH:
-        err = pal_world_brush(s->world, body, command->slot, &command->brush, &diag);
-        if (!err) s->tool[command->slot].brushes |= command->brush.kind != PAL_BRUSH_NONE;
-        conclude(
-            s, err, &diag,
-            (pal_input_record){.kind = PAL_INPUT_BRUSH, .index = body, .slot = command->slot, .brush = command->brush});
-        break;
     case PAL_COMMAND_ESTIMATE:
-        pal_estimator_set_request(&s->estimators, body, command->wanted);
+        pal_estimator_set_request(&s->estimators, command->body, command->wanted);
         break;
-    case PAL_COMMAND_COMPONENT:
-        err = pal_world_switch_component(s->world, s->scene, body, command->component, command->wanted, &diag);
-        record = (pal_input_record){.kind = PAL_INPUT_COMPONENT, .index = body, .wanted = command->wanted};
-        memcpy(record.component, command->component, sizeof record.component);
-        conclude(s, err, &diag, record);
-        break;
-    case PAL_COMMAND_COUNT:
+    default:
+        apply(s, command);
         break;
     }
 }
