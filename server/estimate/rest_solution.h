@@ -1,5 +1,5 @@
 /* Equilibria beside a running body: the same body with another mesh, law or model, under the same nodal loads,
- * solved by static_newton, with displacements at the nodes of the running body. Private to estimate_*.c. Allocates
+ * solved by static_newton, with displacements at the nodes of the running body. Private to this room. Allocates
  * heap memory; slow. Thread: one at a time. */
 #ifndef PAL_ESTIMATE_REST_SOLUTION_H
 #define PAL_ESTIMATE_REST_SOLUTION_H

@@ -9,7 +9,6 @@
 #include "server/net/hub_jobs.h"
 #include "server/net/hub_peers.h"
 #include "server/net/hub_plan.h"
-#include "server/net/hub_subscriptions.h"
 #include "server/net/hub_verb.h"
 #include "server/net/transport/plain_text.h"
 #include "server/net/tuning.h"
@@ -134,9 +133,8 @@ static pal_packet *take_next(pal_client *c)
 {
     pal_packet *p = NULL;
     if (c->n_queue) {
-        p = c->queue[c->queue_begin];
-        c->queue_begin = (c->queue_begin + 1) % PAL_HUB_QUEUE;
-        c->n_queue--;
+        p = c->queue[0];
+        memmove(c->queue, c->queue + 1, sizeof *c->queue * (size_t)--c->n_queue);
         return p;
     }
     if (c->members_due) {

@@ -5,7 +5,6 @@
 
 #include "server/base/log.h"
 #include "server/net/hub_peers.h"
-#include "server/net/hub_subscriptions.h"
 #include "server/net/transport/plain_text.h"
 #include "server/net/tuning.h"
 
@@ -190,15 +189,27 @@ static void report_far(pal_hub_room *room, const pal_wire_estimate *e)
             1e3 * e->error_m, 1e3 * e->max_displacement_m, 1e3 * asked);
 }
 
+/* first body whose estimate is due; -1: none */
+static int due_body(const pal_client *c)
+{
+    for (int b = 0; b < c->room->stream->n_part; b++)
+        if (c->estimate_due[b]) return b;
+    return -1;
+}
+
+bool pal_hub_wants_estimate(const pal_client *c)
+{
+    return due_body(c) >= 0;
+}
+
 pal_packet *pal_hub_next_estimate(pal_client *c)
 {
     pal_wire_estimate *out = &pal_hub_message(c->hub, PAL_CONTROL_ESTIMATE)->estimate;
     pal_estimate estimate;
     pal_configuration now;
     char text[PAL_CONFIGURATION_TEXT];
-    int b = 0;
-    while (b < c->room->stream->n_part && !c->estimate_due[b]) b++;
-    if (b == c->room->stream->n_part) return NULL;
+    int b = due_body(c);
+    if (b < 0) return NULL;
     c->estimate_due[b] = false;
     pal_plain_text(out->body, sizeof out->body, c->room->stream->part[b].info.name);
     pal_configuration_of(pal_session_scene(c->room->session), b, &now);
@@ -214,13 +225,6 @@ pal_packet *pal_hub_next_estimate(pal_client *c)
     if (pal_session_estimate(c->room->session, b, &estimate)) put_estimate(c->room, &estimate, &now, out);
     report_far(c->room, out);
     return pal_hub_encode(c->hub);
-}
-
-bool pal_hub_wants_estimate(const pal_client *c)
-{
-    for (int b = 0; b < c->room->stream->n_part; b++)
-        if (c->estimate_due[b]) return true;
-    return false;
 }
 
 void pal_hub_estimates_due(pal_client *c)

@@ -31,7 +31,7 @@ typedef struct pal_client {
     int tier;
     /* control messages: a queue, oldest first, and flags for messages encoded on demand */
     pal_packet *queue[PAL_HUB_QUEUE];
-    int queue_begin, n_queue;
+    int n_queue;
     bool members_due, status_due;
     pal_packet *haptic; /* newest contact model, unsent */
     /* cycle in transmission: per part a TOPOLOGY_DELTA if its triangles changed, and a FRAME; then TOOLS */
@@ -80,8 +80,8 @@ typedef struct pal_hub_room {
     pal_session *session;
     bool own; /* the hub created it, to replace the given session after an edit or a switch */
     pal_stream *stream;
-    pal_hub_old_asset past[PAL_HUB_OLD_ASSETS]; /* ring buffer, the oldest at n_old_asset */
-    int n_old_asset;
+    pal_hub_old_asset past[PAL_HUB_OLD_ASSETS]; /* ring buffer, the oldest at oldest_asset */
+    int oldest_asset;
     pal_hub_body_edits edits[PAL_BODY_MAX];
     pal_hub_tool_brush brush[PAL_TOOL_MAX];
     pal_member_list members;

@@ -5,7 +5,6 @@
 
 #include "protocol/field_codec.h"
 #include "server/net/hub_peers.h"
-#include "server/net/hub_subscriptions.h"
 
 /* names and numbers on the wire are those of the simulation */
 _Static_assert((int)PAL_WIRE_FIELD_DISPLACEMENT_M == (int)PAL_FIELD_DISPLACEMENT_M &&

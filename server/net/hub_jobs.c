@@ -171,10 +171,10 @@ static void keep_assets(pal_hub_room *room, const pal_stream *before)
     for (int p = 0; p < before->n_part; p++) {
         const pal_stream_part *part = &before->part[p];
         if (p < room->stream->n_part && !strcmp(part->info.asset, room->stream->part[p].info.asset)) continue;
-        pal_hub_old_asset *past = &room->past[room->n_old_asset];
+        pal_hub_old_asset *past = &room->past[room->oldest_asset];
         snprintf(past->path, sizeof past->path, "%s", part->info.asset);
         pal_packet_replace(&past->asset, pal_packet_hold(part->asset));
-        room->n_old_asset = (room->n_old_asset + 1) % PAL_HUB_OLD_ASSETS;
+        room->oldest_asset = (room->oldest_asset + 1) % PAL_HUB_OLD_ASSETS;
     }
 }
 

@@ -1,8 +1,7 @@
-/* Messages that the hub sends at once, and how a client leaves its room. */
+/* Messages that the hub sends at once, counts of subscribers, and how a client leaves its room. */
 #include "server/net/hub_peers.h"
 
 #include "server/base/log.h"
-#include "server/net/hub_subscriptions.h"
 #include "server/net/transport/plain_text.h"
 
 #include <stdarg.h>
@@ -22,25 +21,62 @@ uint32_t pal_hub_colour(int id)
     return colours[(unsigned)(id - 1) % (sizeof colours / sizeof *colours)];
 }
 
-static void empty(pal_client *c)
+static void request(pal_session *session, bool wanted, bool *requested, pal_command command)
 {
-    for (; c->n_queue; c->n_queue--) {
-        pal_packet_drop(c->queue[c->queue_begin]);
-        c->queue_begin = (c->queue_begin + 1) % PAL_HUB_QUEUE;
+    if (wanted == *requested) return;
+    command.wanted = wanted;
+    if (pal_session_command(session, &command) == PAL_ERR_OK) *requested = wanted;
+}
+
+void pal_hub_update_subscriptions(pal_hub_room *room)
+{
+    for (int b = 0; b < room->stream->n_part; b++) {
+        request(room->session, room->n_estimate[b] > 0, &room->estimate_requested[b],
+                (pal_command){.kind = PAL_COMMAND_ESTIMATE, .body = b});
+        for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++)
+            request(room->session, room->n_subscriber[b][k] > 0, &room->reported[b][k],
+                    (pal_command){.kind = PAL_COMMAND_FIELD, .body = b, .field = (pal_field)k});
     }
-    for (; c->out_begin < c->n_out; c->out_begin++) pal_packet_drop(c->out[c->out_begin]);
-    c->out_begin = c->n_out = 0;
-    pal_packet_replace(&c->haptic, NULL);
-    c->members_due = c->status_due = false;
+}
+
+void pal_hub_set_field(pal_client *c, int part, pal_field field)
+{
+    pal_field before = (pal_field)c->view[part];
+    if (field == before) return;
+    if (before != PAL_FIELD_NONE) c->room->n_subscriber[part][before]--;
+    if (field != PAL_FIELD_NONE) c->room->n_subscriber[part][field]++;
+    c->view[part] = (uint8_t)field;
+    c->sent_field[part] = 0;
+}
+
+void pal_hub_set_estimate(pal_client *c, int body, bool wanted)
+{
+    if (c->estimate[body] == wanted) return;
+    c->room->n_estimate[body] += wanted ? 1 : -1;
+    c->estimate[body] = wanted;
+    if (!wanted) c->estimate_due[body] = false;
+}
+
+static void unsubscribe_all(pal_client *c)
+{
+    for (int b = 0; b < c->room->stream->n_part; b++) {
+        pal_hub_set_field(c, b, PAL_FIELD_NONE);
+        pal_hub_set_estimate(c, b, false);
+    }
+    pal_hub_update_subscriptions(c->room);
 }
 
 /* a dropped member leaves at once, before its socket closes */
 void pal_hub_leave_room(pal_client *c)
 {
     pal_hub_room *room = c->room;
-    empty(c);
+    while (c->n_queue > 0) pal_packet_drop(c->queue[--c->n_queue]);
+    for (; c->out_begin < c->n_out; c->out_begin++) pal_packet_drop(c->out[c->out_begin]);
+    c->out_begin = c->n_out = 0;
+    pal_packet_replace(&c->haptic, NULL);
+    c->members_due = c->status_due = false;
     if (!c->id) return;
-    pal_hub_unsubscribe_all(c);
+    unsubscribe_all(c);
     pal_member_entry *member = pal_members_find(&room->members, c->id);
     int tool = member ? member->tool : -1;
     pal_members_leave(&room->members, c->id);
@@ -72,7 +108,7 @@ static void queue(pal_client *c, pal_packet *packet)
         pal_hub_drop(c, PAL_WIRE_CLOSE_POLICY, "too many answers wait to be read");
         return;
     }
-    c->queue[(c->queue_begin + c->n_queue++) % PAL_HUB_QUEUE] = packet;
+    c->queue[c->n_queue++] = packet;
     c->peer->ops->ready(c->peer);
 }
 

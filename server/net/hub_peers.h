@@ -1,4 +1,5 @@
-/* Operations on a client: send, refuse, drop. Thread: [net]. */
+/* Operations on a client: send, refuse, subscribe, drop. A session neither computes nor encodes a field or an estimate
+ * without a subscriber. Thread: [net]. */
 #ifndef PAL_NET_HUB_PEERS_H
 #define PAL_NET_HUB_PEERS_H
 #include "server/net/hub_core.h"
@@ -10,6 +11,11 @@ void pal_hub_send(pal_client *client);    /* queues the hub's message; overflow 
 /* queues an error; returns false, so that a function that refuses can return it */
 bool pal_hub_refuse(pal_client *client, const char *code, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
+/* field NONE: ends the subscription for this part */
+void pal_hub_set_field(pal_client *client, int part, pal_field field);
+void pal_hub_set_estimate(pal_client *client, int body, bool wanted);
+/* requests subscribed data from the session; retried at the next tick when its queue is full */
+void pal_hub_update_subscriptions(pal_hub_room *room);
 /* closes the connection; the member leaves its room at once, before the socket closes */
 void pal_hub_drop(pal_client *client, int code, const char *format, ...) __attribute__((format(printf, 3, 4)));
 void pal_hub_leave_room(pal_client *client);

@@ -52,11 +52,10 @@ static bool pick(pal_client *c, int body, const pal_wire_command *command, bool 
                           pal_hub_arg(command, second ? "y2_m" : "y_m", 0),
                           pal_hub_arg(command, second ? "z2_m" : "z_m", 0)};
     const pal_stream *s = c->room->stream;
-    pal_shown shown;
+    const pal_shown *shown = &pal_session_view_outline(c->room->session)->part[body];
     double origin[3], reach_m = PAL_PICK_REACH * pal_dist3(s->box_min_m, s->box_max_m);
-    pal_session_shown(c->room->session, body, &shown);
-    bool moved = s->frame && s->frame->part[body].n_vertex == shown.n_vertex;
-    bool found = shown.face && pal_pick_nearest(&shown, moved ? s->frame->part[body].position_m : NULL, at, out) &&
+    bool moved = s->frame && s->frame->part[body].n_vertex == shown->n_vertex;
+    bool found = shown->face && pal_pick_nearest(shown, moved ? s->frame->part[body].position_m : NULL, at, out) &&
                  out->distance_m <= reach_m;
     if (!found)
         return pal_hub_refuse(c, "refused", "%s: nothing of %s is at %g %g %g m", command->verb,
@@ -92,14 +91,11 @@ static bool read_cells(pal_client *c, int kind, const pal_wire_command *command,
     if (entity == 2) kind = PAL_CELLS_SHARPEN_FACE;
     job->command.kind = PAL_SCULPT_CELLS;
     job->command.cells = (pal_cells_command){.kind = (pal_cells_command_kind)kind,
-                                             .cell = pal_sculptor_cell(job->sculptor, a.face),
-                                             .face = a.face,
                                              .other_face = b.face,
-                                             .edge = pal_sculptor_nearest_edge(job->sculptor, a.face, a.rest_m),
-                                             .vertex = pal_sculptor_nearest_vertex(job->sculptor, a.face, a.rest_m),
                                              .distance_m = pal_hub_arg(command, "distance_m", 0),
                                              .scale = pal_hub_arg(command, "scale", 1),
                                              .sharp = (float)pal_hub_arg(command, "sharpness", 0)};
+    pal_sculptor_find(job->sculptor, a.face, a.rest_m, &job->command.cells);
     return true;
 }
 

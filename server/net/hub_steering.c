@@ -16,7 +16,7 @@ bool pal_hub_run_reset(pal_client *c, const pal_verb *verb, const pal_wire_comma
     bool whole = !command->target[0];
     int body = pal_hub_find_body(c, command->target, 0);
     if (body < 0) return false;
-    if (!pal_members_may_command(&c->room->members, c->id) &&
+    if (pal_members_find(&c->room->members, c->id)->role == PAL_MEMBER_VIEWER &&
         (whole || !f || body >= f->n_part || !f->part[body].frozen))
         return pal_hub_refuse(c, "role", "reset: a viewer resets nothing but a frozen body");
     return pal_hub_session_command(

@@ -51,8 +51,8 @@ static bool read_switch(pal_client *c, const pal_wire_command *command, pal_job 
     int point = -1;
     job->body = pal_hub_find_body(c, command->target, c->room->study.configuration ? c->room->study.body : 0);
     if (job->body < 0) return false;
-    if (pal_hub_has_arg(command, "index") ? !read_point(c, job->body, command, &point, &job->configuration)
-                                          : !read_parameters(c, job->body, command, &job->configuration))
+    if (!isnan(pal_hub_arg(command, "index", NAN)) ? !read_point(c, job->body, command, &point, &job->configuration)
+                                                   : !read_parameters(c, job->body, command, &job->configuration))
         return false;
     pal_hub_shown_errors(c->room, job->body, point, &job->configuration, &job->error_now_m, &job->error_then_m);
     job->was = c->room->edits[job->body].base;
@@ -67,7 +67,7 @@ static pal_err prepare_switch(pal_job *job, const pal_scene **scene)
 {
     PAL_TRY(pal_configuration_switch_prepare(job->scene, job->was, job->body, &job->configuration, &job->diag,
                                              &job->made.change));
-    *scene = pal_configuration_switch_scene(job->made.change);
+    *scene = &job->made.change->set->scene;
     return PAL_ERR_OK;
 }
 
@@ -76,7 +76,7 @@ static void transfer_switch(pal_job *job)
     pal_session_rehearse(job->made.session, job->session, pal_configuration_switch_snapshot,
                          pal_configuration_switch_rehearse, job->made.change);
     pal_session_transfer_begin(job->made.session, job->session, pal_configuration_switch_transfer, job->made.change);
-    job->report = *pal_configuration_switch_report(job->made.change);
+    job->report = job->made.change->report;
 }
 
 static void commit_switch(pal_hub_body_edits *at, pal_job *job, pal_job_products *retired)

@@ -20,11 +20,6 @@ double pal_hub_arg(const pal_wire_command *command, const char *key, double othe
     return arg ? arg->value : otherwise;
 }
 
-bool pal_hub_has_arg(const pal_wire_command *command, const char *key)
-{
-    return find_arg(command, key) != NULL;
-}
-
 /* are all required arguments present, and no unknown ones? */
 static bool check_args(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
@@ -55,7 +50,7 @@ static bool check_right(pal_client *c, const pal_verb *verb)
     bool may = verb->right == PAL_RIGHT_EVERYBODY || instructs ||
                (verb->right == PAL_RIGHT_TRAINEE && m->role != PAL_MEMBER_VIEWER) ||
                (verb->right == PAL_RIGHT_TOOL && m->tool >= 0);
-    return may || pal_hub_refuse(c, "role", "%s: only for %s", verb->name, pal_right_text(verb->right));
+    return may || pal_hub_refuse(c, "role", "%s: only for %s", verb->name, pal_right_text[verb->right]);
 }
 
 bool pal_hub_execute(pal_client *c, const pal_wire_command *command)
@@ -68,12 +63,9 @@ bool pal_hub_execute(pal_client *c, const pal_wire_command *command)
 
 int pal_hub_find_body(pal_client *c, const char *name, int otherwise)
 {
-    const pal_scene *scene = pal_session_scene(c->room->session);
-    if (!name[0]) return otherwise;
-    for (int b = 0; b < scene->n_body; b++)
-        if (!strcmp(scene->body[b].name, name)) return b;
-    pal_hub_refuse(c, "target", "there is no body %s", name);
-    return -1;
+    int body = name[0] ? pal_scene_find_body(pal_session_scene(c->room->session), name) : otherwise;
+    if (body < 0) pal_hub_refuse(c, "target", "there is no body %s", name);
+    return body;
 }
 
 void pal_hub_answer_arg(pal_wire_answer *answer, const char *key, double value)

@@ -32,21 +32,14 @@ struct pal_input_log {
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "logs are written in the host's order");
 
-typedef struct file_header {
-    char magic[8];
-    uint32_t version, hash_steps;
-    double step_s;
-    uint64_t fingerprint;
-    uint32_t n_body, n_tool;
-} file_header;
-
 typedef struct record_head {
     uint8_t kind, index;
     uint16_t n_byte;
     uint32_t zero;
     uint64_t step;
 } record_head;
-_Static_assert(sizeof(file_header) == PAL_INPUT_HEADER && sizeof(record_head) == PAL_INPUT_HEAD, "without padding");
+_Static_assert(sizeof(pal_input_header) == PAL_INPUT_HEADER && sizeof(record_head) == PAL_INPUT_HEAD,
+               "without padding");
 
 /* payload of each kind, in order: a member */
 static const struct field {
@@ -240,12 +233,12 @@ static void *writer(void *user)
 
 static bool write_header(pal_input_log *log, const pal_scene *scene)
 {
-    file_header header = {.version = VERSION,
-                          .hash_steps = PAL_INPUT_HASH_STEPS,
-                          .step_s = scene->step_s,
-                          .fingerprint = pal_scene_fingerprint(scene),
-                          .n_body = (uint32_t)scene->n_body,
-                          .n_tool = (uint32_t)scene->n_tool};
+    pal_input_header header = {.version = VERSION,
+                               .hash_steps = PAL_INPUT_HASH_STEPS,
+                               .step_s = scene->step_s,
+                               .fingerprint = pal_scene_fingerprint(scene),
+                               .n_body = (uint32_t)scene->n_body,
+                               .n_tool = (uint32_t)scene->n_tool};
     memcpy(header.magic, magic, sizeof magic);
     return write_all(log->file, (const uint8_t *)&header, sizeof header);
 }
@@ -330,7 +323,7 @@ pal_err pal_input_log_close(pal_input_log *log, uint64_t step, uint64_t hash)
 pal_err pal_input_get_header(const char *name, const uint8_t *bytes, size_t n_byte, pal_input_header *out, size_t *at,
                              pal_diagnostic *diag)
 {
-    file_header header;
+    pal_input_header header;
     if (n_byte < sizeof magic || memcmp(bytes, magic, sizeof magic) != 0)
         return PAL_REFUSE(diag, "%s: byte 0: not an input log", name);
     if (n_byte < PAL_INPUT_HEADER) return PAL_REFUSE(diag, "%s: byte %zu: the log is cut in its header", name, n_byte);
@@ -341,7 +334,7 @@ pal_err pal_input_get_header(const char *name, const uint8_t *bytes, size_t n_by
     if (header.hash_steps < 1 || header.hash_steps > PAL_INPUT_HASH_MAX)
         return PAL_REFUSE(diag, "%s: byte 12: %u steps between hashes are outside 1 .. %d", name, header.hash_steps,
                           PAL_INPUT_HASH_MAX);
-    *out = (pal_input_header){header.hash_steps, header.n_body, header.n_tool, header.step_s, header.fingerprint};
+    *out = header;
     *at = PAL_INPUT_HEADER;
     return PAL_ERR_OK;
 }

@@ -73,9 +73,11 @@ uint64_t pal_input_log_dropped(const pal_input_log *log);                   /* [
 pal_err pal_input_log_close(pal_input_log *log, uint64_t step, uint64_t hash);
 
 typedef struct pal_input_header {
-    uint32_t hash_steps, n_body, n_tool;
+    char magic[8];
+    uint32_t version, hash_steps;
     double step_s;
     uint64_t fingerprint;
+    uint32_t n_body, n_tool;
 } pal_input_header;
 /* bounds-checked; advance *at; REFUSED gives the byte offset */
 pal_err pal_input_get_header(const char *name, const uint8_t *bytes, size_t n_byte, pal_input_header *out, size_t *at,
