@@ -112,14 +112,14 @@ static pal_err try_neighbour(const pal_scene *scene, pal_world *world, neighbour
         return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "more than %d nodes", MAX_NODE);
     pal_err err = swing(world, scene);
     if (!err) err = pal_configuration_switch_prepare(scene, NULL, 0, &r->predicted.configuration, diag, &change);
-    if (!err) err = pal_world_create(pal_configuration_switch_scene(change), diag, &next);
+    if (!err) err = pal_world_create(&change->set->scene, diag, &next);
     if (!err) {
         pal_configuration_switch_transfer(change, next, world);
-        err = put_load(next, pal_configuration_switch_scene(change));
+        err = put_load(next, &change->set->scene);
     }
     if (!err) {
         r->n_node = pal_world_view_body(next, 0)->n_node;
-        const pal_scene *to = pal_configuration_switch_scene(change);
+        const pal_scene *to = &change->set->scene;
         err = estimate(to, next, NULL, 0, &own, diag);
         r->own_m = own.error_m;
         if (!err) err = step_alternately(world, scene->step_s, next, to->step_s, r);

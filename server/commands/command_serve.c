@@ -52,7 +52,7 @@ typedef struct serve_run {
     pal_preflight preflight[MAX_SESSIONS];
     pal_session *session[MAX_SESSIONS];
     pal_session_study study[MAX_SESSIONS]; /* borrowed by the server */
-    pal_server_gate *gate;
+    pal_server_gate gate;
     pal_server *server;
     lcm_child lcm[MAX_SESSIONS];
     char lcm_program[PATH_MAX];
@@ -133,11 +133,10 @@ static pal_err open_studies(serve_run *run, pal_diagnostic *diag)
 static pal_err open_sessions(serve_run *run, pal_diagnostic *diag)
 {
     char record[PAL_CONFIG_TEXT + PAL_NAME + 2];
-    if (!(run->gate = pal_server_gate_create())) return PAL_ERR_MEMORY;
     for (int i = 0; i < run->n; i++) {
         const pal_scene *scene = run->studied[i].scene;
         PAL_TRY(pal_preflight_run(scene, PAL_PREFLIGHT_QUICK, &run->preflight[i], diag));
-        pal_session_options options = {.wake = pal_server_gate_wake, .user = run->gate, .only_observed = true};
+        pal_session_options options = {.wake = pal_server_gate_wake, .user = &run->gate, .only_observed = true};
         snprintf(record, sizeof record, run->n > 1 ? "%s.%s" : "%s", run->config.record, scene->name);
         if (run->config.record[0]) options.record_path = record;
         PAL_TRY(pal_session_open(scene, &options, diag, &run->session[i]));
@@ -165,7 +164,7 @@ static pal_err open_server(serve_run *run, pal_diagnostic *diag)
     PAL_TRY(pal_server_open(&options, run->session, run->n, diag, &run->server));
     if (!options.viewer_folder)
         pal_log(PAL_LOG_WARN, "viewer", "no viewer to serve: neither beside the program nor given with --viewer");
-    pal_server_connect(run->server, run->gate);
+    pal_server_connect(run->server, &run->gate);
     /* last: a refusal prints nothing else */
     for (int i = 0; i < run->n; i++) pal_preflight_log(&run->preflight[i], run->studied[i].scene->name);
     return PAL_ERR_OK;
@@ -421,7 +420,6 @@ int command_serve(int argc, char **argv)
     if (!err) err = run_all(&run, &diag);
     pal_server_close(run.server);
     for (int i = 0; i < run.n; i++) pal_session_close(run.session[i]);
-    pal_server_gate_destroy(run.gate);
     for (int i = 0; i < run.n; i++) pal_studied_scene_close(&run.studied[i]);
     for (int i = 0; i < run.n; i++) pal_scene_free(run.scene[i]);
     return err ? pal_report_refusal(&run.common, err, &diag) : 0;

@@ -1,7 +1,7 @@
 /* Errors at the vertices of the displayed surface: its skin against the displacement field of the elements. Nodes alone
  * underestimate the error: meshes differ more between common nodes, for example where a tool presses, and the skin
  * rotates with its nodes but does not stretch with them (a press on a ball: 5 times the error at the nodes).
- * Private to estimate_*.c. Allocates heap memory. Thread: one at a time. */
+ * Private to this room. Allocates heap memory. Thread: one at a time. */
 #ifndef PAL_ESTIMATE_DISPLAY_ERROR_H
 #define PAL_ESTIMATE_DISPLAY_ERROR_H
 #include "server/estimate/rest_solution.h"

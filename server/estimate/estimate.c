@@ -6,15 +6,16 @@
 #include <math.h>
 #include <string.h>
 
-static bool has_component(const pal_world *world, int body, const char *name)
+pal_estimate pal_estimate_unknown(void)
 {
-    const char *of = pal_world_view_body(world, body)->name;
-    for (int i = 0; i < pal_world_component_count(world); i++) {
-        pal_component_info info;
-        pal_world_component_info(world, i, &info);
-        if (info.body == of && !strcmp(info.name, name)) return true;
-    }
-    return false;
+    return (pal_estimate){.max_m = NAN,
+                          .error_m = NAN,
+                          .discretisation_m = NAN,
+                          .algebraic_m = NAN,
+                          .time_m = NAN,
+                          .model_m = NAN,
+                          .energy_error_percent = NAN,
+                          .ms = NAN};
 }
 
 pal_err pal_estimate_match_components(const pal_estimate_state *state, pal_world *world, const pal_scene *scene,
@@ -22,12 +23,26 @@ pal_err pal_estimate_match_components(const pal_estimate_state *state, pal_world
 {
     const pal_body_def *def = &scene->body[0];
     for (int k = 0; k < state->n_component; k++) {
-        bool has = has_component(world, 0, state->component[k]), may = recipe || has;
+        bool has = pal_world_find_component(world, 0, state->component[k]) >= 0, may = recipe || has;
         for (int i = 0; i < def->n_effect; i++) may = may || !strcmp(def->effect[i].name, state->component[k]);
         if (has == state->component_enabled[k] || !may) continue;
         PAL_TRY(pal_world_switch_component(world, scene, 0, state->component[k], state->component_enabled[k], NULL));
         pal_world_body(world, 0)->load_cap_N = INFINITY;
     }
+    return PAL_ERR_OK;
+}
+
+pal_err pal_estimate_match(const pal_estimate_state *state, pal_world *world, const pal_scene *scene, bool recipe)
+{
+    pal_body *body = pal_world_body(world, 0);
+    pal_material now;
+    PAL_TRY(pal_estimate_match_components(state, world, scene, recipe));
+    pal_world_current_material(world, 0, &now);
+    if (memcmp(&now, &state->material, sizeof now)) {
+        PAL_TRY(pal_world_material(world, 0, &state->material, NULL));
+        body->load_cap_N = INFINITY;
+    }
+    body->frozen = false;
     return PAL_ERR_OK;
 }
 
@@ -96,6 +111,6 @@ bool pal_estimate_copy(pal_estimate_state *state, const pal_world *world, int bo
     state->asleep = from->asleep;
     pal_world_current_material(world, body, &state->material);
     for (int k = 0; k < state->n_component; k++)
-        state->component_enabled[k] = has_component(world, body, state->component[k]);
+        state->component_enabled[k] = pal_world_find_component(world, body, state->component[k]) >= 0;
     return true;
 }

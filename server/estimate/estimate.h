@@ -5,7 +5,15 @@
 #include "server/sim/core/configuration.h"
 #include "server/sim/world/world.h"
 
+#include <stdatomic.h>
+
 enum { PAL_ESTIMATE_NEIGHBOURS = 6 };
+
+/* stop: set by another thread; NULL: never */
+static inline bool pal_estimate_stopped(const _Atomic bool *stop)
+{
+    return stop && atomic_load_explicit(stop, memory_order_acquire);
+}
 
 typedef struct pal_estimate {
     uint64_t tick; /* tick of the observed state; 0: none yet */
@@ -30,6 +38,8 @@ typedef struct pal_estimate {
     char diag[160];
 } pal_estimate;
 
+/* every number that may be unknown is NaN, all others are 0 */
+pal_estimate pal_estimate_unknown(void);
 /* diagnostic of a sleeping body */
 #define PAL_ESTIMATE_ASLEEP "asleep: ms are those of a step awake"
 enum { PAL_ESTIMATE_STEPS = 256, PAL_ESTIMATE_COMPONENTS = 2 * PAL_ENTRIES_MAX };
@@ -74,4 +84,6 @@ pal_estimate_cost pal_estimate_cost_of(const pal_world *world, int body, double 
  * Allocates heap memory. */
 pal_err pal_estimate_match_components(const pal_estimate_state *state, pal_world *world, const pal_scene *scene,
                                       bool recipe);
+/* The same, and its material; unfreezes the body. */
+pal_err pal_estimate_match(const pal_estimate_state *state, pal_world *world, const pal_scene *scene, bool recipe);
 #endif

@@ -6,7 +6,6 @@
 #include "server/estimate/tuning.h"
 
 #include <math.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -62,15 +61,10 @@ static bool probe(const family *f, sized *m)
     return true;
 }
 
-static bool stopped(const family *f)
-{
-    return f->stop && atomic_load_explicit(f->stop, memory_order_acquire);
-}
-
 /* size 0: merged voxels; the configuration's size: the body's own mesh */
 static bool solve(family *f, int size, sized *m)
 {
-    if (stopped(f)) return false;
+    if (pal_estimate_stopped(f->stop)) return false;
     f->n_mesh++;
     pal_err err = size == 0 ? pal_rest_solution_coarser(f->scene, f->body, NULL, "linear", NULL, &m->rest)
                   : size == f->configuration->size
@@ -125,11 +119,7 @@ static double change(family *f, const sized *own, bool shown)
     double max = 0;
     const bool good = solve(f, 0, &merged);
     if (good && shown) max = pal_max_dist3(own->u, merged.u, f->n_probe);
-    if (good && !shown)
-        for (int k = 0; k < merged.rest.n_common; k++) {
-            size_t i = 3 * (size_t)merged.rest.common[k];
-            max = fmax(max, pal_dist3(own->rest.x + i, merged.rest.x + i));
-        }
+    if (good && !shown) max = pal_rest_solution_change(&own->rest, &merged.rest);
     sized_free(&merged);
     return max;
 }
@@ -155,7 +145,7 @@ static void measure(family *f, bool shown, pal_estimate_hierarchy *out)
         out->twice = left_in(f, 2 * size, &finest) / error;
         double seen = out->half > 0 ? 0.5 * (PAL_FAR_ORDER + log2(out->half)) : PAL_FAR_ORDER;
         out->twice = isnan(out->twice) ? exp2(-fmin(seen, PAL_HIERARCHY_ORDER)) : fmax(out->twice, PAL_MIN_TWICE);
-        out->finest = r, out->known = !stopped(f);
+        out->finest = r, out->known = !pal_estimate_stopped(f->stop);
     }
     out->n_measured++;
     out->n_mesh += f->n_mesh;

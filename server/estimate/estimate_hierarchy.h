@@ -11,7 +11,7 @@
  * extrapolated from half and the present size, no faster than h^2. Random errors of the finest mesh remain: for the
  * gear in 30 voxels the estimate was 0.44, 1.5 and 2 times the error with finest meshes of 42, 46 and none.
  *
- * Private to estimate_*.c. Allocates heap memory, up to 80 MB while it runs. Slow: half a second for an organ of 20
+ * Private to this room. Allocates heap memory, up to 80 MB while it runs. Slow: half a second for an organ of 20
  * voxels, three seconds if nearly incompressible. Thread: one at a time. */
 #ifndef PAL_ESTIMATE_ESTIMATE_HIERARCHY_H
 #define PAL_ESTIMATE_ESTIMATE_HIERARCHY_H

@@ -1,18 +1,302 @@
-/* The parts of the error of one body: from future steps (time, algebraic) and from equilibria (the other parts). */
+/* The parts of the error of one body: from future steps (time, algebraic) and from equilibria (the other parts). Before
+ * it, what they need: its own scene, live and nearly exact worlds, meshes for the equilibria. */
 #include "server/estimate/estimation.h"
 
 #include "server/base/clock.h"
 #include "server/base/vec3.h"
+#include "server/estimate/display_error.h"
+#include "server/estimate/estimate_hierarchy.h"
+#include "server/estimate/estimate_predict.h"
 #include "server/estimate/tuning.h"
 #include "server/num/median.h"
+#include "server/sim/core/effect_list.h"
 #include "server/sim/world/zz_estimator.h"
 
 #include <math.h>
 #include <stddef.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { MAX_AHEAD = 12, TIMED = 7 };
+
+struct pal_estimation {
+    const _Atomic bool *stop;
+    pal_scene *scene; /* the body alone, without tools and display */
+    pal_scene *exact_scene;
+    pal_estimate_state state;
+    pal_world *live;        /* the body as it runs */
+    pal_world *exact;       /* the same with PAL_TOLERANCE_EXACT; NULL: its method solves no system */
+    double *first, *second; /* [n_dof][3] */
+    /* springs: voxels for finite elements; n_hex 0: use those of the scene's mesh */
+    pal_prepared voxels;
+    bool springs, locks;
+    bool cut, thin;                                  /* many voxels are cut; the body is one or two voxels across */
+    bool skinned;                                    /* a skin displays the body */
+    pal_rest_solution fine, coarse, coarsest, model; /* world NULL: absent */
+    pal_display_error shown;                         /* n 0: no displayed vertices, or nodes are used */
+    pal_prediction prediction;
+    pal_estimate_hierarchy family; /* for cut voxels */
+    bool measured;                 /* the cost of more nodes is measured, or cannot be */
+    double awake_ms;               /* time of a step of a body never seen awake; 0: not measured yet */
+    char diag[160];
+};
+
+/* appends a clause to a diagnostic */
+static void remark(char diag[160], const char *text)
+{
+    size_t n = strlen(diag);
+    snprintf(diag + n, 160 - n, "%s%s", n > 0 ? "; " : "", text);
+}
+
+/* ---- own scene ---- */
+
+/* A moving support counts as stationary: its nodes are fixed and positioned with the state. */
+static void fix_moving_support(pal_body_def *def, const pal_config_entry *item)
+{
+    if (def->n_support == PAL_SUPPORT_MAX) return;
+    if (pal_support_of_effect(item, &def->support[def->n_support])) def->n_support++;
+}
+
+/* Keeps all force components except contact, which the loads of the state represent. */
+static void keep_forces(pal_body_def *def)
+{
+    int n = 0;
+    for (int i = 0; i < def->n_effect; i++) {
+        const pal_effect *effect = pal_effect_find(def->effect[i].name);
+        if (!strcmp(def->effect[i].name, "moving_support")) fix_moving_support(def, &def->effect[i]);
+        if (effect && effect->stage == PAL_STAGE_FORCE) def->effect[n++] = def->effect[i];
+    }
+    def->n_effect = n;
+}
+
+static pal_err make_scene(pal_estimation *w, const pal_scene *scene, int body, pal_diagnostic *diag)
+{
+    if (body < 0 || body >= scene->n_body)
+        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body %d does not exist: the scene has %d", body,
+                                  scene->n_body);
+    w->scene = malloc(sizeof *w->scene);
+    if (!w->scene) return PAL_ERR_MEMORY;
+    *w->scene = *scene;
+    w->scene->n_body = 1;
+    w->scene->n_tool = 0;
+    pal_body_def *def = &w->scene->body[0];
+    if (body > 0) *def = scene->body[body];
+    w->skinned = !strcmp(def->output.name, "skin_output");
+    def->output.name[0] = 0;
+    keep_forces(def);
+    return PAL_ERR_OK;
+}
+
+/* ---- worlds ---- */
+
+static const pal_component *solver_of(const pal_world *world)
+{
+    for (int i = 0; i < pal_world_component_count(world); i++)
+        if (pal_world_component(world, i)->effect->stage == PAL_STAGE_SOLVE) return pal_world_component(world, i);
+    return NULL;
+}
+
+static void put_number(pal_config_entry *item, const char *key, double number)
+{
+    pal_config_value *known = (pal_config_value *)(uintptr_t)pal_entry_find(item, key);
+    if (known)
+        known->number[0] = number;
+    else
+        (void)pal_entry_put_number(item, key, number, NULL);
+}
+
+static pal_err make_live(pal_estimation *w, pal_diagnostic *diag)
+{
+    PAL_TRY(pal_world_create(w->scene, diag, &w->live));
+    pal_world_body(w->live, 0)->load_cap_N = INFINITY;
+    const char *solver = solver_of(w->live)->effect->name;
+    bool implicit = !strcmp(solver, "implicit_euler") || !strcmp(solver, "sdirk2"), cg = !strcmp(solver, "central_cg");
+    pal_prediction *f = &w->prediction;
+    f->implicit = implicit;
+    f->solver_order = !strcmp(solver, "implicit_euler") ? 1 : !strcmp(solver, "rk4") ? 4 : 2;
+    f->work[0] = f->work[1] = f->decade = NAN;
+    f->n_node = pal_world_body(w->live, 0)->n_node, f->rest_substeps = pal_world_substeps(w->live);
+    f->order = PAL_USUAL_ORDER;
+    f->tolerance = f->configuration.tolerance > 0 ? f->configuration.tolerance : PAL_TOLERANCE_LIVE;
+    if (!implicit && !cg) return PAL_ERR_OK;
+    w->exact_scene = malloc(sizeof *w->exact_scene);
+    if (!w->exact_scene) return PAL_ERR_MEMORY;
+    *w->exact_scene = *w->scene;
+    pal_config_entry *item = &w->exact_scene->body[0].solver;
+    if (!item->name[0]) pal_entry_init(item, "solver", solver);
+    put_number(item, "tolerance", PAL_TOLERANCE_EXACT);
+    if (implicit) put_number(item, "iterations", 400);
+    PAL_TRY(pal_world_create(w->exact_scene, diag, &w->exact));
+    pal_world_body(w->exact, 0)->load_cap_N = INFINITY;
+    return PAL_ERR_OK;
+}
+
+/* ---- meshes for equilibria ---- */
+
+/* text value of a model key, or `otherwise` if the scene does not set it */
+static const char *model_text(const pal_body_def *def, const char *key, const char *otherwise)
+{
+    const pal_config_value *value = pal_entry_find(&def->model, key);
+    return value ? value->text : otherwise;
+}
+
+static bool nearly_incompressible(const pal_body_def *def)
+{
+    bool found = def->material.poisson > PAL_LOCKS_ABOVE;
+    for (int k = 0; k < def->n_region; k++) {
+        const pal_region *r = &def->region[k];
+        found = found || r->poisson > PAL_LOCKS_ABOVE;
+        for (int i = 0; r->kind == PAL_REGION_GRID && r->grid_poisson && i < r->n[0] * r->n[1] * r->n[2]; i++)
+            found = found || r->grid_poisson[i] > PAL_LOCKS_ABOVE;
+    }
+    return found;
+}
+
+/* Finds the hexahedra that a body of springs lacks; none if it has no voxels. */
+static void find_voxels(pal_estimation *w)
+{
+    pal_body_def *def = &w->scene->body[0];
+    w->voxels = *def->mesh;
+    memset(&w->voxels.hexes, 0, sizeof w->voxels.hexes);
+    if (def->mesh->hexes.n_hex == 0 && !pal_hexes_find(&def->mesh->tets, &w->voxels.hexes, NULL))
+        def->mesh = &w->voxels;
+}
+
+/* Share of the volume in cut voxels, whose error changes from mesh to mesh without a definite order. */
+static double cut_share(const pal_hexes *hexes)
+{
+    double cut = 0, all = 0;
+    for (int e = 0; e < hexes->n_hex; e++) {
+        all += (double)hexes->fill[e];
+        if ((double)hexes->fill[e] < PAL_WHOLE_FILL) cut += (double)hexes->fill[e];
+    }
+    return all > 0 ? cut / all : 0;
+}
+
+static bool is_thin(const pal_tets *tets)
+{
+    double min = INFINITY;
+    for (int c = 0; c < 3; c++) {
+        double low = INFINITY, high = -INFINITY;
+        for (int i = 0; i < tets->n_node; i++)
+            low = fmin(low, tets->x[3 * i + c]), high = fmax(high, tets->x[3 * i + c]);
+        min = fmin(min, high - low);
+    }
+    return min < PAL_FEW_ACROSS * tets->edge_m;
+}
+
+/* a mesh or law that is not available leaves its part of the error unknown */
+static pal_err make_rests(pal_estimation *w)
+{
+    const pal_body *body = pal_world_body(w->live, 0);
+    pal_body_def *def = &w->scene->body[0];
+    const char *element = NULL, *law = NULL;
+    pal_diagnostic diag = {""};
+    w->springs = !strcmp(def->model.name, "tet_springs");
+    if (!w->springs && strcmp(def->model.name, "fem")) {
+        remark(w->diag, "discretisation and model: not known of control cells");
+        return PAL_ERR_OK;
+    }
+    if (w->springs) find_voxels(w);
+    bool hexes = def->mesh->hexes.n_hex > 0;
+    if (w->springs) element = hexes ? "hex8_bbar" : "tet4", law = "corotational";
+    const char *is = element ? element : model_text(def, "element", hexes ? "hex8_bbar" : "tet4");
+    w->locks = (!strcmp(is, "tet4") || !strcmp(is, "hex8")) && nearly_incompressible(def);
+    pal_err err = pal_rest_solution_make(w->scene, body, element, law, &diag, &w->fine);
+    if (err) {
+        remark(w->diag, diag.text);
+        return err == PAL_ERR_MEMORY ? err : PAL_ERR_OK;
+    }
+    if (pal_estimate_stopped(w->stop)) return PAL_ERR_STATE;
+    err = pal_rest_solution_coarser(w->scene, body, element, law, &diag, &w->coarse);
+    if (err) remark(w->diag, diag.text);
+    if (pal_estimate_stopped(w->stop)) return PAL_ERR_STATE;
+    w->cut = !err && cut_share(&def->mesh->hexes) > PAL_MUCH_CUT;
+    w->thin = !err && hexes && is_thin(&def->mesh->tets);
+    /* without it the order is not tested */
+    if (!err) (void)pal_rest_solution_coarser(w->coarse.scene, body, NULL, NULL, NULL, &w->coarsest);
+    if (pal_estimate_stopped(w->stop)) return PAL_ERR_STATE;
+    if (w->skinned) PAL_TRY(pal_display_error_make(&w->fine, &w->coarse, &w->coarsest, &w->shown));
+    bool neo = !strcmp(model_text(def, "law", ""), "neo_hookean");
+    if (!w->springs && !neo && pal_rest_solution_make(w->scene, body, NULL, "neo_hookean", &diag, &w->model))
+        remark(w->diag, diag.text);
+    return PAL_ERR_OK;
+}
+
+static pal_err take_state(pal_estimation *w)
+{
+    const pal_body *body = pal_world_body(w->live, 0);
+    size_t n = 3 * (size_t)body->n_dof;
+    pal_estimate_state *s = &w->state;
+    *s = (pal_estimate_state){.n_dof = body->n_dof, .n_node = body->n_node};
+    s->x = malloc(n * sizeof(double)), s->v = malloc(n * sizeof(double));
+    s->load = malloc(3 * sizeof(double) * (size_t)body->n_node);
+    s->borne = malloc(3 * sizeof(double) * (size_t)body->n_node);
+    s->external_force = calloc(3 * (size_t)body->n_node, sizeof(double));
+    w->first = malloc(n * sizeof(double)), w->second = malloc(n * sizeof(double));
+    for (int i = 0; i < pal_world_component_count(w->live); i++) {
+        const pal_effect *effect = pal_world_component(w->live, i)->effect;
+        if (effect->stage != PAL_STAGE_FORCE || s->n_component == PAL_ESTIMATE_COMPONENTS) continue;
+        s->component[s->n_component] = effect->name;
+        s->component_enabled[s->n_component++] = true;
+    }
+    return s->x && s->v && s->load && s->external_force && s->borne && w->first && w->second ? PAL_ERR_OK
+                                                                                             : PAL_ERR_MEMORY;
+}
+
+static pal_err open_work(pal_estimation *w, const pal_scene *scene, int body, pal_diagnostic *diag)
+{
+    PAL_TRY(make_scene(w, scene, body, diag));
+    pal_configuration_of(scene, body, &w->prediction.configuration);
+    w->prediction.scene = w->scene, w->prediction.body = 0;
+    PAL_TRY(make_live(w, diag));
+    if (pal_world_body(w->live, 0)->active)
+        return pal_diagnostic_set(
+            diag, PAL_ERR_REFUSED,
+            "body \"%s\" is refined while it runs: its error is not estimated (`palpate study` measures "
+            "it against its finest level)",
+            w->scene->body[0].name);
+    PAL_TRY(take_state(w));
+    PAL_TRY(make_rests(w));
+    return pal_estimate_stopped(w->stop) ? PAL_ERR_STATE : PAL_ERR_OK;
+}
+
+pal_err pal_estimation_open(const pal_scene *scene, int body, const _Atomic bool *stop, pal_diagnostic *diag,
+                            pal_estimation **out)
+{
+    pal_estimation *w = calloc(1, sizeof *w);
+    if (!w) return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for an estimator");
+    w->stop = stop;
+    pal_err err = open_work(w, scene, body, diag);
+    if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "no memory for the worlds of an estimator");
+    if (err)
+        pal_estimation_close(w);
+    else
+        *out = w;
+    return err;
+}
+
+void pal_estimation_close(pal_estimation *w)
+{
+    if (!w) return;
+    pal_world_destroy(w->live);
+    pal_world_destroy(w->exact);
+    pal_rest_solution_free(&w->fine), pal_rest_solution_free(&w->coarse), pal_rest_solution_free(&w->coarsest);
+    pal_rest_solution_free(&w->model);
+    pal_display_error_free(&w->shown);
+    pal_hexes_free(&w->voxels.hexes);
+    free(w->scene), free(w->exact_scene);
+    free(w->state.x), free(w->state.v), free(w->state.load), free(w->state.external_force), free(w->state.borne);
+    free(w->first), free(w->second);
+    pal_estimate_hierarchy_free(&w->family);
+    free(w);
+}
+
+pal_estimate_state *pal_estimation_state(pal_estimation *work)
+{
+    return &work->state;
+}
 
 /* ---- one estimate ---- */
 
@@ -29,19 +313,12 @@ static pal_err set_state(const pal_estimation *w, pal_world *world)
 {
     const pal_estimate_state *s = &w->state;
     pal_body *body = pal_world_body(world, 0);
-    pal_material now;
-    PAL_TRY(pal_estimate_match_components(s, world, world == w->exact ? w->exact_scene : w->scene, true));
-    pal_world_current_material(world, 0, &now);
-    if (memcmp(&now, &s->material, sizeof now)) {
-        PAL_TRY(pal_world_material(world, 0, &s->material, NULL));
-        body->load_cap_N = INFINITY;
-    }
+    PAL_TRY(pal_estimate_match(s, world, world == w->exact ? w->exact_scene : w->scene, true));
     for (int i = 0; i < body->n_node; i++) PAL_TRY(pal_world_load(world, 0, i, s->load + 3 * (size_t)i));
     memcpy(body->x, s->x, 3 * sizeof(double) * (size_t)body->n_dof);
     memcpy(body->v, s->v, 3 * sizeof(double) * (size_t)body->n_dof);
     for (int i = 0; i < body->n_dof; i++)
         if (body->support[i]) pal_set3(body->v + 3 * i, 0, 0, 0);
-    body->frozen = false;
     pal_world_invalidate_limits(world, 0);
     return PAL_ERR_OK;
 }
@@ -52,7 +329,7 @@ static bool make_steps(const pal_estimation *w, pal_world *world, int n, double 
     const pal_body *body = pal_world_body(world, 0);
     bool good = !set_state(w, world);
     uint64_t began = pal_clock_thread_ns();
-    for (int i = 0; i < n && good; i++) good = !pal_estimate_stopped(w) && !pal_world_step(world, dt_s);
+    for (int i = 0; i < n && good; i++) good = !pal_estimate_stopped(w->stop) && !pal_world_step(world, dt_s);
     *ms = 1e-6 * (double)(pal_clock_thread_ns() - began) / n;
     memcpy(x, body->x, 3 * sizeof(double) * (size_t)body->n_dof);
     return good && pal_body_finite(body);
@@ -95,7 +372,7 @@ static void measure_size_cost(pal_estimation *w)
         body->load_cap_N = INFINITY;
         for (int i = 0; loaded->external_force && i < body->n_node && body->n_node == loaded->n_node; i++)
             (void)pal_world_load(small, 0, i, loaded->external_force + 3 * (size_t)i);
-        pal_estimate_cost_model(w->scene, w->live, small, &w->prediction);
+        pal_estimate_probe_cost(w->scene, w->live, small, &w->prediction);
     }
     pal_world_destroy(small);
     free(scene);
@@ -124,23 +401,12 @@ static double known(double part)
     return isnan(part) ? 0 : part;
 }
 
-/* largest distance between two rest solutions, at nodes of the running body that the coarser one has */
-static double change(const pal_rest_solution *rest, const pal_rest_solution *coarser)
-{
-    double max = 0;
-    for (int k = 0; k < coarser->n_common; k++) {
-        size_t i = 3 * (size_t)coarser->common[k];
-        max = fmax(max, pal_dist3(rest->x + i, coarser->x + i));
-    }
-    return max;
-}
-
 /* Is the last change at least as large as the previous one? */
 static bool changes_grow(pal_estimation *w, const pal_body *body, double last)
 {
     if (!w->coarsest.world || !pal_rest_solution_find(&w->coarsest, &w->state, body, NULL, w->stop)) return false;
     double first = w->shown.n > 0 ? pal_display_error_change(&w->shown, PAL_DISPLAY_COARSE, PAL_DISPLAY_COARSEST)
-                                  : change(&w->coarse, &w->coarsest);
+                                  : pal_rest_solution_change(&w->coarse, &w->coarsest);
     return first > 0 && last >= first;
 }
 
@@ -157,12 +423,11 @@ static void discretise(pal_estimation *w, const pal_body *body, pal_estimate *ou
     if (!pal_zz_estimator_estimate(w->fine.world, 0, NULL, &zz_estimator, NULL))
         out->energy_error_percent = zz_estimator.percent;
     if (!pal_rest_solution_find(&w->coarse, &w->state, body, NULL, w->stop)) {
-        if (w->coarse.world)
-            pal_estimate_remark(out->diag, "discretisation: the coarser mesh finds no rest under these loads");
+        if (w->coarse.world) remark(out->diag, "discretisation: the coarser mesh finds no rest under these loads");
         return;
     }
     double last = w->shown.n > 0 ? pal_display_error_change(&w->shown, PAL_DISPLAY_FINE, PAL_DISPLAY_COARSE)
-                                 : change(&w->fine, &w->coarse);
+                                 : pal_rest_solution_change(&w->fine, &w->coarse);
     if ((w->cut || w->thin) && !w->springs)
         fresh = pal_estimate_hierarchy_refresh(w->scene, body, &w->prediction.configuration, &w->state, w->shown.n > 0,
                                                !w->cut, w->stop, &w->family);
@@ -171,7 +436,7 @@ static void discretise(pal_estimation *w, const pal_body *body, pal_estimate *ou
     if (w->cut) {
         char text[80];
         pal_estimate_hierarchy_describe(f, fresh, text, sizeof text);
-        pal_estimate_remark(out->diag, text);
+        remark(out->diag, text);
     }
     if (f->known) {
         w->prediction.order = PAL_USUAL_ORDER;
@@ -180,7 +445,7 @@ static void discretise(pal_estimation *w, const pal_body *body, pal_estimate *ou
     }
     bool early = changes_grow(w, body, last);
     w->prediction.order = early ? PAL_EARLY_ORDER : PAL_USUAL_ORDER;
-    if (early) pal_estimate_remark(out->diag, "discretisation: still grows from mesh to mesh, so more may be left");
+    if (early) remark(out->diag, "discretisation: still grows from mesh to mesh, so more may be left");
     out->discretisation_m = last / (exp2(w->prediction.order) - 1) + skin_off(w);
 }
 
@@ -197,7 +462,7 @@ static void compare_fitted(pal_estimation *w, pal_estimate *out)
         max = fmax(max, pal_dist3(w->state.x + i, limit));
     }
     out->model_m = max, out->discretisation_m = 0;
-    pal_estimate_remark(out->diag, "fitted: the mesh's part is in the model's");
+    remark(out->diag, "fitted: the mesh's part is in the model's");
 }
 
 static void compare_models(pal_estimation *w, const pal_body *body, pal_estimate *out)
@@ -209,7 +474,7 @@ static void compare_models(pal_estimation *w, const pal_body *body, pal_estimate
         out->model_m =
             w->shown.n > 0 ? pal_display_error_skin(&w->shown, w->state.x, 0) : pal_max_dist3(w->state.x, w->fine.x, n);
     else if (!w->model.world)
-        out->model_m = !strcmp(pal_estimate_model_text(&w->scene->body[0], "law", ""), "neo_hookean") ? 0 : (double)NAN;
+        out->model_m = !strcmp(model_text(&w->scene->body[0], "law", ""), "neo_hookean") ? 0 : (double)NAN;
     else if (pal_rest_solution_find(&w->model, &w->state, body, w->fine.x, w->stop))
         out->model_m = pal_max_dist3(w->model.x, w->fine.x, n);
 }
@@ -231,17 +496,11 @@ static void find_rests(pal_estimation *w, pal_estimate *out)
     }
     if (!find_borne(w) || !pal_rest_solution_find(&w->fine, &w->state, body, w->state.x, w->stop)) {
         out->locking = false;
-        pal_estimate_remark(out->diag, "no rest was found under these loads");
+        remark(out->diag, "no rest was found under these loads");
         return;
     }
     discretise(w, body, out);
-    if (!pal_estimate_stopped(w)) compare_models(w, body, out);
-}
-
-static double largest_move(const pal_estimation *w)
-{
-    const pal_body *body = pal_world_body(w->live, 0);
-    return pal_max_dist3(w->state.x, body->x_rest, w->state.n_dof);
+    if (!pal_estimate_stopped(w->stop)) compare_models(w, body, out);
 }
 
 /* Without its dominant parts the sum must stay unknown: it would otherwise be compared with complete errors of a
@@ -260,7 +519,7 @@ static void report_sleep_cost(pal_estimation *w, pal_estimate *out)
     if (isnan(out->ms) && !w->awake_ms) (void)make_steps(w, w->live, TIMED, w->scene->step_s, w->first, &w->awake_ms);
     if (isnan(out->ms)) out->ms = w->awake_ms;
     out->asleep = true;
-    pal_estimate_remark(out->diag, PAL_ESTIMATE_ASLEEP);
+    remark(out->diag, PAL_ESTIMATE_ASLEEP);
 }
 
 /* the steps of a body at its initial shape contain only rounding */
@@ -274,26 +533,21 @@ static void drop_rounding(const pal_estimation *w, pal_estimate *out)
 
 bool pal_estimation_run(pal_estimation *w, pal_estimate *out)
 {
-    *out = (pal_estimate){.tick = w->state.tick,
-                          .time_s = w->state.time_s,
-                          .max_m = largest_move(w),
-                          .discretisation_m = NAN,
-                          .algebraic_m = NAN,
-                          .time_m = NAN,
-                          .model_m = NAN,
-                          .energy_error_percent = NAN,
-                          .ms = median_cost(&w->state, offsetof(pal_estimate_cost, ms))};
+    *out = pal_estimate_unknown();
+    out->tick = w->state.tick, out->time_s = w->state.time_s;
+    out->max_m = pal_max_dist3(w->state.x, pal_world_view_body(w->live, 0)->x_rest, w->state.n_dof);
+    out->ms = median_cost(&w->state, offsetof(pal_estimate_cost, ms));
     memcpy(out->diag, w->diag, sizeof out->diag);
     report_sleep_cost(w, out);
     find_time_parts(w, out);
     drop_rounding(w, out);
-    if (!pal_estimate_stopped(w)) find_rests(w, out);
+    if (!pal_estimate_stopped(w->stop)) find_rests(w, out);
     sum_up(w, out);
-    if (!pal_estimate_stopped(w)) measure_size_cost(w);
+    if (!pal_estimate_stopped(w->stop)) measure_size_cost(w);
     w->prediction.n_substep = w->state.n_substep;
     w->prediction.other_substeps = ceil(w->scene->step_s / w->state.other_limit_s * (1 - 1e-12));
     w->prediction.once = w->state.n_cost ? median_cost(&w->state, offsetof(pal_estimate_cost, once)) : 0;
     w->prediction.beside = w->state.n_cost ? median_cost(&w->state, offsetof(pal_estimate_cost, beside)) : 0;
     pal_estimate_predict(&w->prediction, out);
-    return !pal_estimate_stopped(w);
+    return !pal_estimate_stopped(w->stop);
 }

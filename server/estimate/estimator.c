@@ -69,22 +69,9 @@ static void publish(pal_estimator *e, const pal_estimate *estimate, bool refused
 /* an estimate with all values unknown, and the reason */
 static pal_estimate nothing(const char *reason)
 {
-    pal_estimate none = {.error_m = NAN,
-                         .discretisation_m = NAN,
-                         .algebraic_m = NAN,
-                         .time_m = NAN,
-                         .model_m = NAN,
-                         .energy_error_percent = NAN,
-                         .max_m = NAN,
-                         .ms = NAN};
+    pal_estimate none = pal_estimate_unknown();
     snprintf(none.diag, sizeof none.diag, "%.159s", reason);
     return none;
-}
-
-static void publish_refusal(pal_estimator *e, const pal_diagnostic *diag)
-{
-    pal_estimate none = nothing(diag->text);
-    publish(e, &none, true);
 }
 
 static bool wait_state(pal_estimator *e)
@@ -105,7 +92,10 @@ static void *estimate(void *user)
     (void)setpriority(PRIO_PROCESS, (id_t)syscall(SYS_gettid), niceness);
     pal_err err = pal_estimation_open(e->scene, e->body, &e->stop, &diag, &e->work);
     if (!err) e->state = pal_estimation_state(e->work);
-    if (err && err != PAL_ERR_STATE) publish_refusal(e, &diag);
+    if (err && err != PAL_ERR_STATE) {
+        pal_estimate none = nothing(diag.text);
+        publish(e, &none, true);
+    }
     while (!err && wait_state(e)) {
         pal_estimate out;
         uint64_t before = pal_clock_thread_ns();
@@ -119,15 +109,6 @@ static void *estimate(void *user)
     atomic_store_explicit(&e->gone, true, memory_order_release);
     pal_clock_wake(e->clock);
     return NULL;
-}
-
-static pal_err start(pal_estimator *e, pal_diagnostic *diag)
-{
-    atomic_fetch_add_explicit(&n_thread, 1, memory_order_relaxed);
-    int failed = pal_thread_start(&e->thread, estimate, e);
-    if (!failed) return PAL_ERR_OK;
-    atomic_fetch_sub_explicit(&n_thread, 1, memory_order_relaxed);
-    return pal_diagnostic_set(diag, PAL_ERR_INTERNAL, "the estimator's thread cannot be started");
 }
 
 static void release(pal_estimator *e)
@@ -149,12 +130,14 @@ pal_err pal_estimator_open(const pal_scene *scene, int body, const pal_clock *cl
     e->clock = clock ? clock : &pal_clock_monotonic;
     pthread_mutex_init(&e->lock, NULL);
     sem_init(&e->wake, 0, 0);
-    pal_err err = start(e, diag);
-    if (err)
+    atomic_fetch_add_explicit(&n_thread, 1, memory_order_relaxed);
+    if (pal_thread_start(&e->thread, estimate, e)) {
+        atomic_fetch_sub_explicit(&n_thread, 1, memory_order_relaxed);
         release(e);
-    else
-        *out = e;
-    return err;
+        return pal_diagnostic_set(diag, PAL_ERR_INTERNAL, "the estimator's thread cannot be started");
+    }
+    *out = e;
+    return PAL_ERR_OK;
 }
 
 void pal_estimator_request_stop(pal_estimator *e)

@@ -22,12 +22,10 @@ enum { NEWTON_A_STEP = 3, MAX_STEPS = 30, MIN_HEXES = 4, MORE_PRESSES = 2, MANY_
 
 static pal_err put_text(pal_config_entry *item, const char *key, const char *text, pal_diagnostic *diag)
 {
-    for (int i = 0; i < item->n_value; i++)
-        if (!strcmp(item->value[i].key, key)) {
-            snprintf(item->value[i].text, sizeof item->value[i].text, "%s", text);
-            return PAL_ERR_OK;
-        }
-    return pal_entry_put_text(item, key, text, diag);
+    pal_config_value *known = (pal_config_value *)(uintptr_t)pal_entry_find(item, key);
+    if (!known) return pal_entry_put_text(item, key, text, diag);
+    snprintf(known->text, sizeof known->text, "%s", text);
+    return PAL_ERR_OK;
 }
 
 static pal_err make_scene(const pal_scene *scene, const char *element, const char *law, pal_diagnostic *diag,
@@ -147,47 +145,27 @@ static pal_err choose_shift(const pal_tets *tets, const uint8_t *fixed, int shif
     return PAL_ERR_OK;
 }
 
-/* marks the nodes inside the support boxes */
-static void find_held(const pal_body_def *def, const pal_tets *tets, uint8_t *fixed)
-{
-    for (int i = 0; i < tets->n_node; i++) {
-        fixed[i] = 0;
-        for (int k = 0; k < def->n_support; k++) {
-            bool in = !def->support[k].lowest && !def->support[k].rim;
-            for (int c = 0; c < 3; c++)
-                in = in && tets->x[3 * i + c] >= def->support[k].low_m[c] &&
-                     tets->x[3 * i + c] <= def->support[k].high_m[c];
-            fixed[i] |= in;
-        }
-    }
-}
-
-static pal_err merge_once(const pal_body_def *def, const pal_tets *tets, const pal_hexes *hexes, pal_prepared *out,
-                          pal_diagnostic *diag)
-{
-    int shift[3];
-    uint8_t *fixed = malloc((size_t)tets->n_node);
-    if (!fixed) return PAL_ERR_MEMORY;
-    find_held(def, tets, fixed);
-    pal_err err = choose_shift(tets, fixed, shift);
-    free(fixed);
-    if (!err) err = pal_voxels_coarsen(tets, hexes, shift, PAL_MERGE_MIN_FILL, out, diag);
-    if (!err && out->hexes.n_hex < MIN_HEXES) {
-        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d voxels are too few for a coarser mesh", hexes->n_hex);
-        pal_prepared_free(out);
-    }
-    return err;
-}
-
 static pal_err merge(pal_rest_solution *r, const pal_prepared *mesh, pal_diagnostic *diag)
 {
-    pal_hexes own = {0};
+    const pal_body_def *def = &r->scene->body[0];
+    const pal_tets *tets = &mesh->tets;
     const pal_hexes *hexes = &mesh->hexes;
+    pal_hexes own = {0};
+    int shift[3];
     if (hexes->n_hex == 0) {
-        PAL_TRY(pal_hexes_find(&mesh->tets, &own, diag));
+        PAL_TRY(pal_hexes_find(tets, &own, diag));
         hexes = &own;
     }
-    pal_err err = merge_once(&r->scene->body[0], &mesh->tets, hexes, &r->mesh, diag);
+    uint8_t *fixed = calloc((size_t)tets->n_node, 1);
+    for (int k = 0; fixed && k < def->n_support; k++)
+        if (!def->support[k].lowest) pal_support_mark_fixed(&def->support[k], NULL, tets->x, tets->n_node, fixed);
+    pal_err err = fixed ? choose_shift(tets, fixed, shift) : PAL_ERR_MEMORY;
+    free(fixed);
+    if (!err) err = pal_voxels_coarsen(tets, hexes, shift, PAL_MERGE_MIN_FILL, &r->mesh, diag);
+    if (!err && r->mesh.hexes.n_hex < MIN_HEXES) {
+        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d voxels are too few for a coarser mesh", hexes->n_hex);
+        pal_prepared_free(&r->mesh);
+    }
     pal_hexes_free(&own);
     return err;
 }
@@ -336,6 +314,16 @@ void pal_rest_solution_free(pal_rest_solution *r)
 
 /* ---- rest ---- */
 
+double pal_rest_solution_change(const pal_rest_solution *rest, const pal_rest_solution *coarser)
+{
+    double max = 0;
+    for (int k = 0; k < coarser->n_common; k++) {
+        size_t i = 3 * (size_t)coarser->common[k];
+        max = fmax(max, pal_dist3(rest->x + i, coarser->x + i));
+    }
+    return max;
+}
+
 /* the part of the loads that is due to tools, including its share of the acceleration */
 static void touch_at(const pal_estimate_state *s, int i, double out[3])
 {
@@ -367,14 +355,7 @@ static pal_err put_loads(pal_rest_solution *r, const pal_estimate_state *state, 
 static pal_err put_state(pal_rest_solution *r, const pal_estimate_state *state, const double *from, double part)
 {
     pal_body *own = pal_world_body(r->world, 0);
-    pal_material now;
-    PAL_TRY(pal_estimate_match_components(state, r->world, r->scene, false));
-    pal_world_current_material(r->world, 0, &now);
-    if (memcmp(&now, &state->material, sizeof now)) {
-        PAL_TRY(pal_world_material(r->world, 0, &state->material, NULL));
-        own->load_cap_N = INFINITY;
-    }
-    own->frozen = false;
+    PAL_TRY(pal_estimate_match(state, r->world, r->scene, false));
     /* from rest after a failure, otherwise from the previous solution */
     if (!r->known) memcpy(own->x, own->x_rest, 3 * sizeof *own->x * (size_t)own->n_dof);
     for (int i = 0; i < own->n_node && r->by.n_row == 0; i++)
@@ -398,7 +379,7 @@ static bool converge(pal_rest_solution *r, double young_Pa, const _Atomic bool *
 {
     for (int k = 0; k < MAX_STEPS; k++) {
         pal_solve_report report;
-        if (stop && atomic_load_explicit(stop, memory_order_acquire)) return false;
+        if (pal_estimate_stopped(stop)) return false;
         if (pal_world_step(r->world, r->scene->step_s) || pal_world_view_body(r->world, 0)->frozen) return false;
         pal_world_solve_report(r->world, 0, &report);
         if (report.converged || nothing_acts(r, young_Pa)) return true;

@@ -1,12 +1,10 @@
 /* Equilibria beside a running body: the same body with another mesh, law or model, under the same nodal loads,
- * solved by static_newton, with displacements at the nodes of the running body. Private to estimate_*.c. Allocates
+ * solved by static_newton, with displacements at the nodes of the running body. Private to this room. Allocates
  * heap memory; slow. Thread: one at a time. */
 #ifndef PAL_ESTIMATE_REST_SOLUTION_H
 #define PAL_ESTIMATE_REST_SOLUTION_H
 #include "server/estimate/estimate.h"
 #include "server/num/interpolation.h"
-
-#include <stdatomic.h>
 
 typedef struct pal_rest_solution {
     pal_scene *scene;
@@ -22,7 +20,7 @@ typedef struct pal_rest_solution {
     bool known; /* x is valid */
 } pal_rest_solution;
 
-/* scene: one body, without tools (estimation_setup.c). element, law: NULL keeps those of the model; otherwise the
+/* scene: one body, without tools (estimation.c). element, law: NULL keeps those of the model; otherwise the
  * model becomes fem. body: the running one, made from `scene`. Errors: REFUSED, MEMORY. */
 pal_err pal_rest_solution_make(const pal_scene *scene, const pal_body *body, const char *element, const char *law,
                                pal_diagnostic *diag, pal_rest_solution *out);
@@ -41,6 +39,8 @@ pal_err pal_rest_solution_interpolation(const pal_rest_solution *rest, const dou
                                         pal_interpolation *out);
 /* Displacements there in the last equilibrium, m [n][3]. */
 void pal_rest_solution_displacement(const pal_rest_solution *rest, const pal_interpolation *by, double *u);
+/* Largest distance between two rest solutions at nodes of the running body that the coarser one has, m. */
+double pal_rest_solution_change(const pal_rest_solution *rest, const pal_rest_solution *coarser);
 /* Finds the equilibrium under the loads of the state and sets x and known. False: no equilibrium, or *stop is set.
  * from: initial positions of the running body's nodes; NULL, and on another mesh: the previous solution.
  * A tool keeps its position, so its force depends on the mesh. Tool loads are therefore scaled until they press as

@@ -2,29 +2,12 @@
  * metrics stay few: never names of sessions or members. */
 #include "server/net/http_pages.h"
 
+#include "server/base/json_members.h"
 #include "server/net/transport/plain_text.h"
 
-#include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
-
-enum { PAGE = 16384 };
-
-typedef struct page {
-    char text[PAGE];
-    size_t n;
-} page;
-
-static void add(page *p, const char *format, ...) __attribute__((format(printf, 2, 3)));
-static void add(page *p, const char *format, ...)
-{
-    va_list args;
-    if (p->n >= PAGE - 1) return;
-    va_start(args, format);
-    int n = vsnprintf(p->text + p->n, PAGE - p->n, format, args);
-    va_end(args);
-    if (n > 0) p->n = p->n + (size_t)n < PAGE ? p->n + (size_t)n : PAGE - 1;
-}
 
 static void reply_text(pal_reply *reply, int status, const char *type, const char *text, size_t n)
 {
@@ -34,68 +17,79 @@ static void reply_text(pal_reply *reply, int status, const char *type, const cha
     reply->body = pal_packet_create(text, n, true);
 }
 
-static bool all_alive(const pal_hub *hub)
+static void reply_plain(pal_reply *reply, int status, const char *text)
 {
-    for (int r = 0; r < hub->n_room; r++)
-        if (!pal_session_is_alive(hub->room[r].session)) return false;
-    return true;
+    reply_text(reply, status, "text/plain; charset=utf-8", text, strlen(text));
 }
 
 static void get_health(pal_hub *hub, pal_reply *reply)
 {
-    if (all_alive(hub))
-        reply_text(reply, 200, "text/plain; charset=utf-8", "ok\n", 3);
-    else
-        reply_text(reply, 503, "text/plain; charset=utf-8", "a simulation has stalled\n", 25);
+    bool alive = true;
+    for (int r = 0; r < hub->n_room; r++) alive = alive && pal_session_is_alive(hub->room[r].session);
+    reply_plain(reply, alive ? 200 : 503, alive ? "ok\n" : "a simulation has stalled\n");
 }
 
 /* assets are built before the first request */
 static void get_ready(pal_hub *hub, pal_reply *reply)
 {
-    if (!hub->leaving)
-        reply_text(reply, 200, "text/plain; charset=utf-8", "ready\n", 6);
-    else
-        reply_text(reply, 503, "text/plain; charset=utf-8", "ending\n", 7);
+    reply_plain(reply, hub->leaving ? 503 : 200, hub->leaving ? "ending\n" : "ready\n");
 }
 
 static void get_sessions(pal_hub *hub, pal_reply *reply)
 {
-    static page p; /* [net] only */
-    p.n = 0;
-    add(&p, "{\"sessions\":[");
+    cJSON *sessions = cJSON_CreateArray();
     for (int r = 0; r < hub->n_room; r++) {
         const pal_hub_room *room = &hub->room[r];
         const pal_scene *scene = pal_session_scene(room->session);
         char title[512], accuracy[512];
         int n_free = 0;
         for (int t = 0; t < room->members.n_tool; t++) n_free += room->members.holder[t] == 0;
-        pal_plain_json(title, sizeof title, scene->title);
-        pal_plain_json(accuracy, sizeof accuracy, scene->accuracy);
-        add(&p,
-            "%s{\"name\":\"%s\",\"title\":\"%s\",\"accuracy\":\"%s\",\"members\":%d,\"tools\":%d,\"free_tools\":%d,"
-            "\"parts\":%d}",
-            r ? "," : "", scene->name, title, accuracy, room->members.n_member, room->members.n_tool, n_free,
-            room->stream->n_part);
+        pal_plain_text(title, sizeof title, scene->title);
+        pal_plain_text(accuracy, sizeof accuracy, scene->accuracy);
+        cJSON *session =
+            PAL_JSON({"name", JSON_TEXT(scene->name)}, {"title", JSON_TEXT(title)}, {"accuracy", JSON_TEXT(accuracy)},
+                     {"members", JSON_NUMBER(room->members.n_member)}, {"tools", JSON_NUMBER(room->members.n_tool)},
+                     {"free_tools", JSON_NUMBER(n_free)}, {"parts", JSON_NUMBER(room->stream->n_part)});
+        cJSON_AddItemToArray(sessions, session);
     }
-    add(&p, "]}\n");
-    reply_text(reply, 200, "application/json", p.text, p.n);
+    cJSON *root = PAL_JSON({"sessions", sessions});
+    char *text = cJSON_PrintUnformatted(root);
+    cJSON_Delete(root);
+    size_t n = text ? strlen(text) : 0;
+    if (text) text[n++] = '\n'; /* the length ends it */
+    reply_text(reply, 200, "application/json", text, n);
+    free(text);
 }
 
-static void help(page *p, const char *name, const char *type, const char *about)
+/* one line of /metrics */
+typedef struct metric {
+    const char *name;  /* without the prefix palpate_; a counter's ends in _total. NULL: as the line before */
+    const char *about; /* help */
+    const char *label; /* NULL: none; a value with a label is a whole number */
+    double value;
+} metric;
+
+static void print_metrics(const metric *row, const metric *end, char *text, size_t cap)
 {
-    add(p, "# HELP %s %s\n# TYPE %s %s\n", name, about, name, type);
+    size_t n = 0;
+    for (const char *name = NULL; row < end && n < cap; row++) {
+        if (row->name) name = row->name;
+        const char *type = strstr(name, "_total") ? "counter" : "gauge";
+        if (row->name)
+            n += (size_t)snprintf(text + n, cap - n, "# HELP palpate_%s %s\n# TYPE palpate_%s %s\n", name, row->about,
+                                  name, type);
+        if (n < cap)
+            n += (size_t)snprintf(text + n, cap - n, row->label ? "palpate_%s{%s} %.0f\n" : "palpate_%s%s %.9g\n", name,
+                                  row->label ? row->label : "", row->value);
+    }
 }
 
-static void one(page *p, const char *name, const char *type, const char *about, double value)
+static void get_metrics(pal_hub *hub, pal_reply *reply)
 {
-    help(p, name, type, about);
-    add(p, "%s %.9g\n", name, value);
-}
-
-static void add_sessions(page *p, const pal_hub *hub)
-{
+    static char text[16384]; /* [net] only */
+    const pal_hub_count *n = &hub->count;
     double step_s = 0, late = 0, encode_s = 0, n_encode = 0, frame_byte = 0, delta_byte = 0;
-    int role[3] = {0, 0, 0};
+    int role[PAL_WIRE_ROLE_COUNT] = {0};
     for (int r = 0; r < hub->n_room; r++) {
         const pal_hub_room *room = &hub->room[r];
         const pal_stream *s = room->stream;
@@ -108,51 +102,38 @@ static void add_sessions(page *p, const pal_hub *hub)
         frame_byte += (double)s->count.n_frame_byte;
         for (int i = 0; i < s->n_part; i++) delta_byte += s->part[i].slots ? (double)s->part[i].slots->n_byte : 0;
     }
-    one(p, "palpate_sessions", "gauge", "Sessions of this process.", hub->n_room);
-    help(p, "palpate_clients", "gauge", "Members by role.");
-    for (int i = 0; i < 3; i++)
-        add(p, "palpate_clients{role=\"%s\",transport=\"ws\"} %d\n", pal_wire_role_name((pal_wire_role)i), role[i]);
-    one(p, "palpate_sim_step_seconds", "gauge", "Smoothed time of a step, slowest session.", step_s);
-    one(p, "palpate_sim_overruns_total", "counter", "Steps that began late.", late);
-    one(p, "palpate_encode_seconds_total", "counter", "Time spent on encoding frames.", encode_s);
-    one(p, "palpate_encodes_total", "counter", "Frames encoded.", n_encode);
-    one(p, "palpate_frame_bytes_total", "counter", "Bytes of frames that differed from the one before.", frame_byte);
-    one(p, "palpate_topology_delta_bytes_total", "counter", "Bytes of topology deltas, each counted once.", delta_byte);
-}
-
-static void get_metrics(pal_hub *hub, pal_reply *reply)
-{
-    static page p; /* [net] only */
-    const pal_hub_count *n = &hub->count;
-    p.n = 0;
-    help(&p, "palpate_build_info", "gauge", "Version of this program.");
-    add(&p, "palpate_build_info{version=\"%s\"} 1\n", PAL_VERSION);
-    add_sessions(&p, hub);
-    one(&p, "palpate_frames_sent_total", "counter", "Frames sent to clients.", (double)n->n_frame);
-    one(&p, "palpate_fields_sent_total", "counter", "Fields sent to clients.", (double)n->n_field);
-    one(&p, "palpate_topology_deltas_sent_total", "counter", "Topology deltas sent to clients.", (double)n->n_delta);
-    help(&p, "palpate_frames_skipped_total", "counter", "Cycles not sent to clients.");
-    add(&p, "palpate_frames_skipped_total{reason=\"credit\"} %llu\n", (unsigned long long)n->n_skipped);
-    one(&p, "palpate_send_bytes_total", "counter", "Bytes of messages sent to clients.", (double)n->n_byte);
-    one(&p, "palpate_packet_bytes", "gauge", "Bytes of messages and files held.", (double)pal_packet_total());
-    help(&p, "palpate_inputs_total", "counter", "Messages of clients.");
-    add(&p, "palpate_inputs_total{kind=\"pose\"} %llu\n", (unsigned long long)n->n_pose);
-    add(&p, "palpate_inputs_total{kind=\"ack\"} %llu\n", (unsigned long long)n->n_ack);
-    add(&p, "palpate_inputs_total{kind=\"control\"} %llu\n", (unsigned long long)n->n_control);
-    help(&p, "palpate_inputs_rejected_total", "counter", "Messages of clients that were rejected.");
-    const struct {
-        const char *reason;
-        uint64_t n;
-    } rejected[] = {{"not_holder", n->n_pose_ignored}, {"out_of_reach", n->n_pose_refused},
-                    {"malformed", n->n_malformed},     {"rate", n->n_flood},
-                    {"stalled", n->n_stalled},         {"overflow", n->n_overflow}};
-    for (size_t i = 0; i < sizeof rejected / sizeof *rejected; i++)
-        add(&p, "palpate_inputs_rejected_total{reason=\"%s\"} %llu\n", rejected[i].reason,
-            (unsigned long long)rejected[i].n);
-    help(&p, "palpate_handshakes_total", "counter", "Clients that joined or were turned away.");
-    add(&p, "palpate_handshakes_total{result=\"joined\"} %llu\n", (unsigned long long)n->n_joined);
-    add(&p, "palpate_handshakes_total{result=\"refused\"} %llu\n", (unsigned long long)n->n_refused_join);
-    reply_text(reply, 200, "text/plain; version=0.0.4", p.text, p.n);
+    const metric rows[] = {
+        {"build_info", "Version of this program.", "version=\"" PAL_VERSION "\"", 1},
+        {"sessions", "Sessions of this process.", NULL, hub->n_room},
+        {"clients", "Members by role.", "role=\"viewer\",transport=\"ws\"", role[PAL_MEMBER_VIEWER]},
+        {.label = "role=\"trainee\",transport=\"ws\"", .value = role[PAL_MEMBER_TRAINEE]},
+        {.label = "role=\"instructor\",transport=\"ws\"", .value = role[PAL_MEMBER_INSTRUCTOR]},
+        {"sim_step_seconds", "Smoothed time of a step, slowest session.", NULL, step_s},
+        {"sim_overruns_total", "Steps that began late.", NULL, late},
+        {"encode_seconds_total", "Time spent on encoding frames.", NULL, encode_s},
+        {"encodes_total", "Frames encoded.", NULL, n_encode},
+        {"frame_bytes_total", "Bytes of frames that differed from the one before.", NULL, frame_byte},
+        {"topology_delta_bytes_total", "Bytes of topology deltas, each counted once.", NULL, delta_byte},
+        {"frames_sent_total", "Frames sent to clients.", NULL, (double)n->n_frame},
+        {"fields_sent_total", "Fields sent to clients.", NULL, (double)n->n_field},
+        {"topology_deltas_sent_total", "Topology deltas sent to clients.", NULL, (double)n->n_delta},
+        {"frames_skipped_total", "Cycles not sent to clients.", "reason=\"credit\"", (double)n->n_skipped},
+        {"send_bytes_total", "Bytes of messages sent to clients.", NULL, (double)n->n_byte},
+        {"packet_bytes", "Bytes of messages and files held.", NULL, (double)pal_packet_total()},
+        {"inputs_total", "Messages of clients.", "kind=\"pose\"", (double)n->n_pose},
+        {.label = "kind=\"ack\"", .value = (double)n->n_ack},
+        {.label = "kind=\"control\"", .value = (double)n->n_control},
+        {"inputs_rejected_total", "Messages of clients that were rejected.", "reason=\"not_holder\"",
+         (double)n->n_pose_ignored},
+        {.label = "reason=\"out_of_reach\"", .value = (double)n->n_pose_refused},
+        {.label = "reason=\"malformed\"", .value = (double)n->n_malformed},
+        {.label = "reason=\"rate\"", .value = (double)n->n_flood},
+        {.label = "reason=\"stalled\"", .value = (double)n->n_stalled},
+        {.label = "reason=\"overflow\"", .value = (double)n->n_overflow},
+        {"handshakes_total", "Clients that joined or were turned away.", "result=\"joined\"", (double)n->n_joined},
+        {.label = "result=\"refused\"", .value = (double)n->n_refused_join}};
+    print_metrics(rows, rows + sizeof rows / sizeof *rows, text, sizeof text);
+    reply_text(reply, 200, "text/plain; version=0.0.4", text, strlen(text));
 }
 
 static pal_packet *find_asset(const pal_hub_room *room, const char *path)
@@ -185,21 +166,12 @@ void pal_hub_get(void *user, const char *path, pal_reply *reply)
     } pages[] = {
         {"/healthz", get_health}, {"/readyz", get_ready}, {"/sessions", get_sessions}, {"/metrics", get_metrics}};
     pal_hub *hub = user;
-    pal_site_file file;
     memset(reply, 0, sizeof *reply);
     for (size_t i = 0; i < sizeof pages / sizeof *pages; i++)
         if (!strcmp(path, pages[i].path)) {
             pages[i].get(hub, reply);
             return;
         }
-    if (get_asset(hub, path, reply)) return;
-    if (hub->site && pal_site_get(hub->site, path, &file)) {
-        reply->status = 200;
-        reply->type = file.type;
-        reply->caching = "no-cache";
-        snprintf(reply->etag, sizeof reply->etag, "%s", file.etag);
-        reply->body = pal_packet_hold(file.bytes);
-        return;
-    }
-    reply_text(reply, 404, "text/plain; charset=utf-8", "not found\n", 10);
+    if (!get_asset(hub, path, reply) && !(hub->site && pal_site_get(hub->site, path, reply)))
+        reply_plain(reply, 404, "not found\n");
 }

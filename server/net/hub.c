@@ -9,7 +9,6 @@
 #include "server/net/hub_jobs.h"
 #include "server/net/hub_peers.h"
 #include "server/net/hub_plan.h"
-#include "server/net/hub_subscriptions.h"
 #include "server/net/hub_verb.h"
 #include "server/net/transport/plain_text.h"
 #include "server/net/tuning.h"
@@ -34,8 +33,9 @@ static bool client_waiting(void *user, const pal_peer *peer)
            pal_hub_wants_estimate(c) || pal_hub_wants_field(c) || wants_cycle(c);
 }
 
-static pal_packet *members_message(pal_hub *hub, const pal_hub_room *room)
+static pal_packet *members_message(const pal_hub_room *room)
 {
+    pal_hub *hub = room->hub;
     pal_wire_members *m = &pal_hub_message(hub, PAL_CONTROL_MEMBERS)->members;
     for (int i = 0; i < PAL_MEMBER_LIST_MAX; i++) {
         const pal_member_entry *from = &room->members.member[i];
@@ -47,12 +47,13 @@ static pal_packet *members_message(pal_hub *hub, const pal_hub_room *room)
         to->colour = pal_hub_colour(from->id);
         pal_plain_text(to->name, sizeof to->name, from->name);
     }
-    return pal_hub_encode(hub, hub->control);
+    return pal_hub_encode(hub);
 }
 
 /* NULL: a replaced session has no frame yet, and its simulated time continues with the first */
-static pal_packet *status_message(pal_hub *hub, pal_client *c)
+static pal_packet *status_message(pal_client *c)
 {
+    pal_hub *hub = c->hub;
     const pal_stream *s = c->room->stream;
     const pal_frame *f = s->frame;
     if (!f && s->cycle) return NULL;
@@ -88,11 +89,11 @@ static pal_packet *status_message(pal_hub *hub, pal_client *c)
         w->n_late = f->n_late;
         w->n_refused = f->n_refused;
     }
-    return pal_hub_encode(hub, hub->control);
+    return pal_hub_encode(hub);
 }
 
 /* queues the TOPOLOGY_DELTA for the newest frame of a part; false: not available now, so the frame waits too */
-static bool add_topology_delta(pal_hub *hub, pal_client *c, int p)
+static bool add_topology_delta(pal_client *c, int p)
 {
     const pal_stream_part *part = &c->room->stream->part[p];
     if (!c->topology_deltas || !part->slots || c->sent_change[p] == part->slots->change) return true;
@@ -102,72 +103,71 @@ static bool add_topology_delta(pal_hub *hub, pal_client *c, int p)
     if (!packet) return false;
     c->out[c->n_out++] = packet;
     c->sent_change[p] = part->slots->change;
-    hub->count.n_delta++;
+    c->hub->count.n_delta++;
     return true;
 }
 
 /* queues the newest messages that this client lacks, as one cycle */
-static void begin_cycle(pal_hub *hub, pal_client *c)
+static void begin_cycle(pal_client *c)
 {
     const pal_stream *s = c->room->stream;
     c->out_begin = c->n_out = 0;
     for (int p = 0; p < s->n_part; p++) {
         const pal_stream_part *part = &s->part[p];
         if (!part->frame[c->tier] || (int32_t)(part->frame_seq[c->tier] - c->sent_frame[p]) <= 0) continue;
-        if (!add_topology_delta(hub, c, p)) continue;
+        if (!add_topology_delta(c, p)) continue;
         c->out[c->n_out++] = pal_packet_hold(part->frame[c->tier]);
         c->sent_frame[p] = part->frame_seq[c->tier];
-        hub->count.n_frame++;
+        c->hub->count.n_frame++;
     }
     c->out[c->n_out++] = pal_packet_hold(s->tools);
     if (c->n_cycle && s->cycle > c->sent_cycle + 1) {
         c->n_skipped += s->cycle - c->sent_cycle - 1;
-        hub->count.n_skipped += s->cycle - c->sent_cycle - 1;
+        c->hub->count.n_skipped += s->cycle - c->sent_cycle - 1;
     }
     c->n_cycle++;
     c->out_cycle = c->sent_cycle = s->cycle;
 }
 
-static pal_packet *take_next(pal_hub *hub, pal_client *c)
+static pal_packet *take_next(pal_client *c)
 {
     pal_packet *p = NULL;
     if (c->n_queue) {
-        p = c->queue[c->queue_begin];
-        c->queue_begin = (c->queue_begin + 1) % PAL_HUB_QUEUE;
-        c->n_queue--;
+        p = c->queue[0];
+        memmove(c->queue, c->queue + 1, sizeof *c->queue * (size_t)--c->n_queue);
         return p;
     }
     if (c->members_due) {
         c->members_due = false;
-        if ((p = members_message(hub, c->room))) return p;
+        if ((p = members_message(c->room))) return p;
     }
     if (c->status_due) {
         c->status_due = false;
-        if ((p = status_message(hub, c))) return p;
+        if ((p = status_message(c))) return p;
     }
-    if ((p = pal_hub_next_estimate(hub, c))) return p;
+    if ((p = pal_hub_next_estimate(c))) return p;
     if (c->haptic) {
         p = c->haptic;
         c->haptic = NULL;
         return p;
     }
-    if ((p = pal_hub_next_field(hub, c))) return p;
-    if (c->out_begin == c->n_out && wants_cycle(c)) begin_cycle(hub, c);
+    if ((p = pal_hub_next_field(c))) return p;
+    if (c->out_begin == c->n_out && wants_cycle(c)) begin_cycle(c);
     if (c->out_begin == c->n_out) return NULL;
     p = c->out[c->out_begin++];
-    if (c->out_begin == c->n_out) pal_credit_sent(&c->credit, c->out_cycle, pal_loop_now_ns(hub->loop));
+    if (c->out_begin == c->n_out) pal_credit_sent(&c->credit, c->out_cycle, pal_loop_now_ns(c->hub->loop));
     return p;
 }
 
 static pal_packet *client_next(void *user, pal_peer *peer)
 {
-    pal_hub *hub = user;
     pal_client *c = peer->client;
+    (void)user;
     if (!c || peer->drop_code) return NULL;
-    pal_packet *p = take_next(hub, c);
+    pal_packet *p = take_next(c);
     if (!p) return NULL;
     c->n_byte += p->n_byte;
-    hub->count.n_byte += p->n_byte;
+    c->hub->count.n_byte += p->n_byte;
     return p;
 }
 
@@ -186,26 +186,20 @@ static void client_opened(void *user, pal_peer *peer, const char *session)
     pal_hub *hub = user;
     pal_hub_room *room = find_room(hub, session);
     int i = 0;
-    if (hub->leaving || !room) {
-        hub->count.n_refused_join++;
-        if (hub->leaving)
-            pal_peer_drop(peer, PAL_WIRE_CLOSE_GOING_AWAY, "the server ends");
-        else
-            pal_peer_drop(peer, PAL_WIRE_CLOSE_NO_SESSION, "there is no session of that name");
-        return;
-    }
     while (i < hub->max_clients && hub->client[i].peer) i++;
-    if (i == hub->max_clients) {
-        hub->count.n_refused_join++;
+    if (hub->leaving)
+        pal_peer_drop(peer, PAL_WIRE_CLOSE_GOING_AWAY, "the server ends");
+    else if (!room)
+        pal_peer_drop(peer, PAL_WIRE_CLOSE_NO_SESSION, "there is no session of that name");
+    else if (i == hub->max_clients)
         pal_peer_drop(peer, PAL_WIRE_CLOSE_FULL, "the server has its %d clients", hub->max_clients);
+    if (peer->drop_code) {
+        hub->count.n_refused_join++;
         return;
     }
     pal_client *c = &hub->client[i];
     uint64_t now = pal_loop_now_ns(hub->loop);
-    memset(c, 0, sizeof *c);
-    c->peer = peer;
-    c->room = room;
-    c->opened_ns = now;
+    *c = (pal_client){.hub = hub, .peer = peer, .room = room, .opened_ns = now};
     pal_bucket_begin(&c->bucket, PAL_MESSAGES_1_S, PAL_MESSAGES_1_S / 2, now);
     pal_credit_begin(&c->credit, pal_stream_rate_hz(room->stream));
     peer->client = c;
@@ -214,26 +208,24 @@ static void client_opened(void *user, pal_peer *peer, const char *session)
 
 static void client_closed(void *user, pal_peer *peer)
 {
-    pal_hub *hub = user;
     pal_client *c = peer->client;
+    (void)user;
     if (!c) return;
-    pal_hub_leave_room(hub, c);
+    pal_hub_leave_room(c);
     peer->client = NULL;
     c->peer = NULL;
-    hub->n_client--;
+    c->hub->n_client--;
 }
 
 /* ---- frames and housekeeping ---- */
 
-static void offer_cycle(pal_hub *hub, pal_hub_room *room)
+static void offer_cycle(pal_hub_room *room)
 {
-    for (int i = 0; i < hub->max_clients; i++) {
-        pal_client *c = &hub->client[i];
-        if (!c->peer || c->room != room || !c->id || c->peer->drop_code) continue;
+    for (pal_client *c = NULL; (c = pal_hub_next_member(room, c));) {
         pal_member_entry *m = pal_members_find(&room->members, c->id);
         if (m && m->tool >= 0 && room->stream->haptic[m->tool])
             pal_packet_replace(&c->haptic, pal_packet_hold(room->stream->haptic[m->tool]));
-        if (client_waiting(hub, c->peer)) c->peer->ops->ready(c->peer);
+        if (client_waiting(NULL, c->peer)) c->peer->ops->ready(c->peer);
     }
 }
 
@@ -249,9 +241,9 @@ static void hub_wake(void *user)
             if (!due || next < due) due = next;
         } else {
             for (int t = 0; t < PAL_STREAM_TIER_COUNT; t++) used[t] = room->tier_users[t] > 0;
-            if (pal_stream_update(room->stream, now, used, room->tool)) offer_cycle(hub, room);
+            if (pal_stream_update(room->stream, now, used, room->tool)) offer_cycle(room);
         }
-        next = pal_hub_make_fields(hub, room, now);
+        next = pal_hub_make_fields(room, now);
         if (next && (!due || next < due)) due = next;
     }
     pal_hub_jobs_update(hub);
@@ -302,16 +294,16 @@ static void hub_tick(void *user)
         pal_client *c = &hub->client[i];
         if (!c->peer || c->peer->drop_code) continue;
         if (!c->id) {
-            if (now - c->opened_ns > PAL_ANSWER_NS) pal_hub_drop(hub, c, PAL_WIRE_CLOSE_POLICY, "no join within 5 s");
+            if (now - c->opened_ns > PAL_ANSWER_NS) pal_hub_drop(c, PAL_WIRE_CLOSE_POLICY, "no join within 5 s");
             continue;
         }
         if (pal_credit_stalled(&c->credit, now, PAL_STALL_NS)) {
             hub->count.n_stalled++;
-            pal_hub_drop(hub, c, PAL_WIRE_CLOSE_STALLED, "no acknowledgement for 10 s");
+            pal_hub_drop(c, PAL_WIRE_CLOSE_STALLED, "no acknowledgement for 10 s");
             continue;
         }
         judge_tier(c, now);
-        pal_hub_component_result(hub, c);
+        pal_hub_component_result(c);
         c->status_due = true;
         pal_hub_estimates_due(c);
         c->peer->ops->ready(c->peer);
@@ -339,6 +331,7 @@ pal_err pal_hub_create(pal_loop *loop, const pal_server_options *options, pal_si
     for (int i = 0; !err && i < n_session; i++) {
         pal_hub_room *room = &hub->room[i];
         const pal_scene *scene = pal_session_scene(session[i]);
+        room->hub = hub;
         room->session = session[i];
         room->step_s = scene->step_s;
         pal_members_init(&room->members, scene->n_tool);
@@ -358,8 +351,16 @@ void pal_hub_destroy(pal_hub *hub)
     if (!hub) return;
     pal_hub_jobs_end(hub);
     for (int i = 0; i < hub->n_room; i++) {
-        pal_stream_close(hub->room[i].stream);
-        for (int k = 0; k < PAL_HUB_OLD_ASSETS; k++) pal_packet_drop(hub->room[i].past[k].asset);
+        pal_hub_room *room = &hub->room[i];
+        pal_stream_close(room->stream);
+        if (room->own) pal_session_close(room->session);
+        for (int k = 0; k < PAL_HUB_OLD_ASSETS; k++) pal_packet_drop(room->past[k].asset);
+        for (int b = 0; b < PAL_BODY_MAX; b++) {
+            pal_sculptor_destroy(room->edits[b].sculptor);
+            pal_sculpt_edit_free(room->edits[b].edit);
+            pal_configuration_switch_free(room->edits[b].change);
+            free(room->edits[b].base);
+        }
     }
     free(hub->room);
     free(hub->client);
@@ -383,7 +384,7 @@ void pal_hub_goodbye(pal_hub *hub)
 {
     hub->leaving = true;
     for (int i = 0; i < hub->max_clients; i++)
-        if (hub->client[i].peer) pal_hub_drop(hub, &hub->client[i], PAL_WIRE_CLOSE_GOING_AWAY, "the server ends");
+        if (hub->client[i].peer) pal_hub_drop(&hub->client[i], PAL_WIRE_CLOSE_GOING_AWAY, "the server ends");
 }
 
 int pal_hub_clients(const pal_hub *hub)

@@ -5,7 +5,6 @@
 
 #include "server/base/log.h"
 #include "server/net/hub_peers.h"
-#include "server/net/hub_subscriptions.h"
 #include "server/net/transport/plain_text.h"
 #include "server/net/tuning.h"
 
@@ -24,10 +23,10 @@ static void method_text(const pal_configuration *s, char out[PAL_WIRE_METHOD_BYT
     pal_plain_text(out, PAL_WIRE_METHOD_BYTES, text);
 }
 
-static void send_study(pal_hub *hub, pal_client *c, int body)
+static void send_study(pal_client *c, int body)
 {
     const pal_hub_room *room = c->room;
-    pal_wire_study *study = &pal_hub_message(hub, PAL_CONTROL_STUDY)->study;
+    pal_wire_study *study = &pal_hub_message(c->hub, PAL_CONTROL_STUDY)->study;
     int n = room->study.body == body ? room->study.n : 0, n_front = 0;
     pal_plain_text(study->body, sizeof study->body, room->stream->part[body].info.name);
     study->step_ms = 1e3 * room->step_s;
@@ -46,7 +45,7 @@ static void send_study(pal_hub *hub, pal_client *c, int body)
         method_text(&p->configuration, to->method);
         pal_plain_text(to->label, sizeof to->label, pal_configuration_text(&p->configuration, text));
     }
-    pal_hub_send(hub, c, hub->control);
+    pal_hub_send(c);
 }
 
 /* ---- position in the study ---- */
@@ -190,15 +189,27 @@ static void report_far(pal_hub_room *room, const pal_wire_estimate *e)
             1e3 * e->error_m, 1e3 * e->max_displacement_m, 1e3 * asked);
 }
 
-pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *c)
+/* first body whose estimate is due; -1: none */
+static int due_body(const pal_client *c)
 {
-    pal_wire_estimate *out = &pal_hub_message(hub, PAL_CONTROL_ESTIMATE)->estimate;
+    for (int b = 0; b < c->room->stream->n_part; b++)
+        if (c->estimate_due[b]) return b;
+    return -1;
+}
+
+bool pal_hub_wants_estimate(const pal_client *c)
+{
+    return due_body(c) >= 0;
+}
+
+pal_packet *pal_hub_next_estimate(pal_client *c)
+{
+    pal_wire_estimate *out = &pal_hub_message(c->hub, PAL_CONTROL_ESTIMATE)->estimate;
     pal_estimate estimate;
     pal_configuration now;
     char text[PAL_CONFIGURATION_TEXT];
-    int b = 0;
-    while (b < c->room->stream->n_part && !c->estimate_due[b]) b++;
-    if (b == c->room->stream->n_part) return NULL;
+    int b = due_body(c);
+    if (b < 0) return NULL;
     c->estimate_due[b] = false;
     pal_plain_text(out->body, sizeof out->body, c->room->stream->part[b].info.name);
     pal_configuration_of(pal_session_scene(c->room->session), b, &now);
@@ -213,14 +224,7 @@ pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *c)
         out->model_m = out->energy_error_percent = NAN;
     if (pal_session_estimate(c->room->session, b, &estimate)) put_estimate(c->room, &estimate, &now, out);
     report_far(c->room, out);
-    return pal_hub_encode(hub, hub->control);
-}
-
-bool pal_hub_wants_estimate(const pal_client *c)
-{
-    for (int b = 0; b < c->room->stream->n_part; b++)
-        if (c->estimate_due[b]) return true;
-    return false;
+    return pal_hub_encode(c->hub);
 }
 
 void pal_hub_estimates_due(pal_client *c)
@@ -228,15 +232,16 @@ void pal_hub_estimates_due(pal_client *c)
     for (int b = 0; b < c->room->stream->n_part; b++) c->estimate_due[b] = c->estimate[b];
 }
 
-void pal_hub_run_estimate(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
+bool pal_hub_run_estimate(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
     (void)verb;
-    int body = pal_hub_find_body(hub, c, command->target, 0);
-    if (body < 0) return;
+    int body = pal_hub_find_body(c, command->target, 0);
+    if (body < 0) return false;
     bool wanted = pal_hub_arg(command, "enabled", 0) != 0, before = c->estimate[body];
     pal_hub_set_estimate(c, body, wanted);
     pal_hub_update_subscriptions(c->room);
-    if (wanted && !before) send_study(hub, c, body);
+    if (wanted && !before) send_study(c, body);
     c->estimate_due[body] = wanted;
     c->peer->ops->ready(c->peer);
+    return true;
 }

@@ -6,7 +6,7 @@
 
 void pal_hub_estimates_due(pal_client *client); /* called at every tick */
 bool pal_hub_wants_estimate(const pal_client *client);
-pal_packet *pal_hub_next_estimate(pal_hub *hub, pal_client *client); /* NULL: none is due */
+pal_packet *pal_hub_next_estimate(pal_client *client); /* NULL: none is due */
 /* Errors displayed to clients for the current configuration of a body (from its estimate, else its study) and for the
  * configuration `to` (point: index in the study; -1: the neighbour's point, else the study's). NaN: none is displayed.
  * Both are NaN for a body whose estimate is older than PAL_HUB_ESTIMATE_OLD_S of its steps, or that has woken since. */

@@ -5,11 +5,12 @@
 #include "server/net/transport/credit.h"
 #include "server/net/transport/site.h"
 #include "server/net/transport/transport.h"
-#include "server/sim/core/configuration.h"
+#include "server/session/configuration_switch.h"
+#include "server/session/sculpt.h"
 
 enum { PAL_HUB_QUEUE = 32, PAL_HUB_OLD_ASSETS = 8, PAL_HUB_CLIENTS = 200 };
 
-struct pal_hub_room;
+typedef struct pal_hub pal_hub;
 
 /* study of a session's scene, for a live choice among its points */
 typedef struct pal_session_study {
@@ -20,6 +21,7 @@ typedef struct pal_session_study {
 
 /* one connected peer; in a free entry, peer is NULL */
 typedef struct pal_client {
+    pal_hub *hub;
     pal_peer *peer;
     struct pal_hub_room *room;
     int id; /* member id; 0: not joined */
@@ -29,7 +31,7 @@ typedef struct pal_client {
     int tier;
     /* control messages: a queue, oldest first, and flags for messages encoded on demand */
     pal_packet *queue[PAL_HUB_QUEUE];
-    int queue_begin, n_queue;
+    int n_queue;
     bool members_due, status_due;
     pal_packet *haptic; /* newest contact model, unsent */
     /* cycle in transmission: per part a TOPOLOGY_DELTA if its triangles changed, and a FRAME; then TOOLS */
@@ -57,13 +59,31 @@ typedef struct pal_hub_old_asset {
     pal_packet *asset; /* NULL: none */
 } pal_hub_old_asset;
 
+/* edits and switches of one body of a room */
+typedef struct pal_hub_body_edits {
+    pal_sculptor *sculptor;
+    pal_sculpt_edit *edit;            /* edit that made the body's control cells; NULL: the original ones */
+    pal_configuration_switch *change; /* switch that made the body's mesh; NULL: the original, or that of edit */
+    pal_body_def *base;               /* owned: the body before its first switch; NULL: as it is now */
+} pal_hub_body_edits;
+
+/* the last brush requested by a tool's holder */
+typedef struct pal_hub_tool_brush {
+    int member, body;
+    double asked_m[6]; /* positions as received */
+    pal_brush brush;   /* kind NONE: none     */
+} pal_hub_tool_brush;
+
 /* one session, as the hub sees it */
 typedef struct pal_hub_room {
+    pal_hub *hub;
     pal_session *session;
     bool own; /* the hub created it, to replace the given session after an edit or a switch */
     pal_stream *stream;
-    pal_hub_old_asset past[PAL_HUB_OLD_ASSETS]; /* ring buffer, the oldest at n_old_asset */
-    int n_old_asset;
+    pal_hub_old_asset past[PAL_HUB_OLD_ASSETS]; /* ring buffer, the oldest at oldest_asset */
+    int oldest_asset;
+    pal_hub_body_edits edits[PAL_BODY_MAX];
+    pal_hub_tool_brush brush[PAL_TOOL_MAX];
     pal_member_list members;
     pal_stream_tool tool[PAL_TOOL_MAX];
     pal_material material[PAL_BODY_MAX]; /* as last requested */
@@ -89,7 +109,7 @@ typedef struct pal_hub_count {
 typedef struct pal_hub_jobs pal_hub_jobs;
 typedef struct pal_verb pal_verb;
 
-typedef struct pal_hub {
+struct pal_hub {
     pal_loop *loop;
     pal_session **session; /* the caller's array [n_room] */
     pal_hub_jobs *jobs;    /* NULL until a command needs it */
@@ -104,5 +124,5 @@ typedef struct pal_hub {
     pal_control *control; /* scratch, too large for the stack */
     char *text;           /* scratch [PAL_CONTROL_OUT_MAX] */
     pal_hub_count count;
-} pal_hub;
+};
 #endif

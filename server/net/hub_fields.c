@@ -5,7 +5,6 @@
 
 #include "protocol/field_codec.h"
 #include "server/net/hub_peers.h"
-#include "server/net/hub_subscriptions.h"
 
 /* names and numbers on the wire are those of the simulation */
 _Static_assert((int)PAL_WIRE_FIELD_DISPLACEMENT_M == (int)PAL_FIELD_DISPLACEMENT_M &&
@@ -17,27 +16,21 @@ _Static_assert((int)PAL_WIRE_FIELD_DISPLACEMENT_M == (int)PAL_FIELD_DISPLACEMENT
                    (int)PAL_WIRE_FIELD_COUNT == (int)PAL_FIELD_COUNT,
                "fields are numbered alike");
 
-void pal_hub_subscribe_field(pal_hub *hub, pal_client *c, const pal_wire_field_subscription *view)
+bool pal_hub_subscribe_field(pal_client *c, const pal_wire_field_subscription *view)
 {
     const pal_stream *s = c->room->stream;
     pal_wire_field field = pal_wire_field_find(view->field);
-    if (view->part >= (uint32_t)s->n_part) {
-        pal_hub_send_error(hub, c, "part", "there is no part %u, the scene has %d", view->part, s->n_part);
-        return;
-    }
+    if (view->part >= (uint32_t)s->n_part)
+        return pal_hub_refuse(c, "part", "there is no part %u, the scene has %d", view->part, s->n_part);
     int part = (int)view->part;
-    if (field == PAL_WIRE_FIELD_COUNT) {
-        pal_hub_send_error(hub, c, "field", "there is no field %s", view->field);
-        return;
-    }
-    if (field != PAL_WIRE_FIELD_NONE && !pal_session_has_field(c->room->session, part, (pal_field)field)) {
-        pal_hub_send_error(hub, c, "field", "%s gives no %s: its model has no finite elements", s->part[part].info.name,
-                           pal_field_title((pal_field)field));
-        return;
-    }
+    if (field == PAL_WIRE_FIELD_COUNT) return pal_hub_refuse(c, "field", "there is no field %s", view->field);
+    if (field != PAL_WIRE_FIELD_NONE && !pal_session_has_field(c->room->session, part, (pal_field)field))
+        return pal_hub_refuse(c, "field", "%s gives no %s: its model has no finite elements", s->part[part].info.name,
+                              pal_field_title((pal_field)field));
     pal_hub_set_field(c, part, (pal_field)field);
     pal_hub_update_subscriptions(c->room);
     c->peer->ops->ready(c->peer); /* other clients may already subscribe to it */
+    return true;
 }
 
 /* the first part with values that this client lacks; -1: none */
@@ -55,23 +48,21 @@ bool pal_hub_wants_field(const pal_client *c)
     return c->id && c->out_begin == c->n_out && pal_credit_free(&c->credit) && lacking(c) >= 0;
 }
 
-pal_packet *pal_hub_next_field(pal_hub *hub, pal_client *c)
+pal_packet *pal_hub_next_field(pal_client *c)
 {
     if (!pal_hub_wants_field(c)) return NULL;
     int p = lacking(c);
     const pal_stream_part *part = &c->room->stream->part[p];
     c->sent_field[p] = part->field_made[c->view[p]];
-    hub->count.n_field++;
+    c->hub->count.n_field++;
     return pal_packet_hold(part->field[c->view[p]]);
 }
 
-uint64_t pal_hub_make_fields(pal_hub *hub, pal_hub_room *room, uint64_t now)
+uint64_t pal_hub_make_fields(pal_hub_room *room, uint64_t now)
 {
     uint64_t due = 0;
     if (!pal_stream_fields(room->stream, now, room->n_subscriber, &due)) return due;
-    for (int i = 0; i < hub->max_clients; i++) {
-        pal_client *c = &hub->client[i];
-        if (c->peer && c->room == room && !c->peer->drop_code && pal_hub_wants_field(c)) c->peer->ops->ready(c->peer);
-    }
+    for (pal_client *c = NULL; (c = pal_hub_next_member(room, c));)
+        if (pal_hub_wants_field(c)) c->peer->ops->ready(c->peer);
     return due;
 }

@@ -12,43 +12,36 @@
 
 #include <string.h>
 
-static void malformed(pal_hub *hub, pal_client *c, int refusal)
-{
-    hub->count.n_malformed++;
-    pal_hub_drop(hub, c, PAL_WIRE_CLOSE_PROTOCOL, "%s", pal_refusal_text(refusal));
-}
-
 /* takes a tool without notifying anyone */
-static pal_err take_tool(const pal_hub *hub, pal_client *c, int wanted)
+static pal_err take_tool(const pal_client *c, int wanted)
 {
     pal_hub_room *room = c->room;
     int before = pal_members_find(&room->members, c->id)->tool, taken = -1;
     PAL_TRY(pal_members_take_tool(&room->members, c->id, wanted == PAL_WIRE_TOOL_ANY ? -1 : wanted, &taken));
     if (before == taken) return PAL_ERR_OK;
     if (before >= 0) pal_hub_release_tool(room, before);
-    room->tool[taken] = (pal_stream_tool){c->id, pal_hub_colour(c->id), pal_loop_now_ns(hub->loop)};
+    room->tool[taken] = (pal_stream_tool){c->id, pal_hub_colour(c->id), pal_loop_now_ns(c->hub->loop)};
     return PAL_ERR_OK;
 }
 
-static void explain_take(pal_hub *hub, pal_client *c, int wanted, pal_err err)
+static void explain_take(pal_client *c, int wanted, pal_err err)
 {
     pal_member_list *members = &c->room->members;
     int holder = wanted >= 0 && wanted < members->n_tool ? members->holder[wanted] : 0;
     if (err == PAL_ERR_STATE && holder)
-        pal_hub_send_error(hub, c, "tool_taken", "tool %d is held by %s", wanted,
-                           pal_members_find(members, holder)->name);
+        pal_hub_refuse(c, "tool_taken", "tool %d is held by %s", wanted, pal_members_find(members, holder)->name);
     else if (err == PAL_ERR_STATE)
-        pal_hub_send_error(hub, c, "tool_taken", "no tool is free");
+        pal_hub_refuse(c, "tool_taken", "no tool is free");
     else if (pal_members_find(members, c->id)->role == PAL_MEMBER_VIEWER)
-        pal_hub_send_error(hub, c, "role", "a viewer holds no tool");
+        pal_hub_refuse(c, "role", "a viewer holds no tool");
     else
-        pal_hub_send_error(hub, c, "tool", "there is no tool %d", wanted);
+        pal_hub_refuse(c, "tool", "there is no tool %d", wanted);
 }
 
-static void send_hello(pal_hub *hub, pal_client *c)
+static void send_hello(pal_client *c)
 {
     const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
-    pal_wire_hello *hello = &pal_hub_message(hub, PAL_CONTROL_HELLO)->hello;
+    pal_wire_hello *hello = &pal_hub_message(c->hub, PAL_CONTROL_HELLO)->hello;
     pal_stream_hello(c->room->stream, hello);
     pal_hub_put_plan(c->room, &hello->plan);
     hello->estimates = true;
@@ -57,47 +50,46 @@ static void send_hello(pal_hub *hub, pal_client *c)
     hello->you_role = (pal_wire_role)m->role;
     hello->you_tool = m->tool >= 0 ? m->tool : PAL_WIRE_TOOL_NONE;
     pal_plain_text(hello->you_name, sizeof hello->you_name, m->name);
-    pal_hub_send(hub, c, hub->control);
+    pal_hub_send(c);
 }
 
-static void join(pal_hub *hub, pal_client *c, const pal_wire_join *wanted)
+static void join(pal_client *c, const pal_wire_join *wanted)
 {
     static const pal_member_role roles[PAL_WIRE_ROLE_COUNT] = {PAL_MEMBER_VIEWER, PAL_MEMBER_TRAINEE,
                                                                PAL_MEMBER_INSTRUCTOR};
     pal_hub_room *room = c->room;
     if (c->id) {
-        pal_hub_send_error(hub, c, "joined", "you have joined already");
+        pal_hub_refuse(c, "joined", "you have joined already");
         return;
     }
     if (pal_members_join(&room->members, roles[wanted->role], wanted->name, &c->id)) {
         c->id = 0;
-        hub->count.n_refused_join++;
-        pal_hub_drop(hub, c, PAL_WIRE_CLOSE_FULL, "the session has its %d members", PAL_MEMBER_LIST_MAX);
+        c->hub->count.n_refused_join++;
+        pal_hub_drop(c, PAL_WIRE_CLOSE_FULL, "the session has its %d members", PAL_MEMBER_LIST_MAX);
         return;
     }
-    hub->count.n_joined++;
+    c->hub->count.n_joined++;
     c->topology_deltas = wanted->topology_deltas;
     pal_session_observe(room->session, true);
     if (room->tier_users[c->tier]++ == 0) pal_stream_begin_tier(room->stream, c->tier);
     /* hello names the granted tool; a refusal follows it */
     pal_err err = PAL_ERR_OK;
-    if (wanted->tool != PAL_WIRE_TOOL_NONE && wanted->role != PAL_WIRE_ROLE_VIEWER)
-        err = take_tool(hub, c, wanted->tool);
-    send_hello(hub, c);
-    if (err && c->id) explain_take(hub, c, wanted->tool, err);
-    pal_hub_members_changed(hub, room);
+    if (wanted->tool != PAL_WIRE_TOOL_NONE && wanted->role != PAL_WIRE_ROLE_VIEWER) err = take_tool(c, wanted->tool);
+    send_hello(c);
+    if (err && c->id) explain_take(c, wanted->tool, err);
+    pal_hub_members_changed(room);
 }
 
-static void take(pal_hub *hub, pal_client *c, int tool)
+static void take(pal_client *c, int tool)
 {
-    pal_err err = take_tool(hub, c, tool);
+    pal_err err = take_tool(c, tool);
     if (err)
-        explain_take(hub, c, tool, err);
+        explain_take(c, tool, err);
     else
-        pal_hub_members_changed(hub, c->room);
+        pal_hub_members_changed(c->room);
 }
 
-static void leave(pal_hub *hub, pal_client *c)
+static void leave(pal_client *c)
 {
     pal_member_entry *m = pal_members_find(&c->room->members, c->id);
     int tool = m->tool;
@@ -105,71 +97,62 @@ static void leave(pal_hub *hub, pal_client *c)
     pal_members_release_tool(&c->room->members, c->id);
     pal_hub_release_tool(c->room, tool);
     pal_packet_replace(&c->haptic, NULL);
-    pal_hub_members_changed(hub, c->room);
+    pal_hub_members_changed(c->room);
 }
 
-static void control(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_byte)
+/* control, pose and acknowledge return why a message is malformed; 0: it is not */
+static int control(pal_client *c, const uint8_t *bytes, size_t n_byte)
 {
     /* decoded into a separate struct, because answers use hub->control */
     static pal_control in; /* about 30 KiB; [net] only */
     int refusal = pal_control_get((const char *)bytes, n_byte, false, &in);
-    hub->count.n_control++;
-    if (refusal) {
-        malformed(hub, c, refusal);
-        return;
-    }
+    c->hub->count.n_control++;
+    if (refusal) return refusal;
     if (!c->id && in.type != PAL_CONTROL_JOIN && in.type != PAL_CONTROL_PING) {
-        pal_hub_drop(hub, c, PAL_WIRE_CLOSE_POLICY, "join comes first");
-        return;
+        pal_hub_drop(c, PAL_WIRE_CLOSE_POLICY, "join comes first");
+        return 0;
     }
     switch (in.type) {
     case PAL_CONTROL_JOIN:
-        join(hub, c, &in.join);
+        join(c, &in.join);
         break;
     case PAL_CONTROL_TAKE_TOOL:
-        take(hub, c, in.tool);
+        take(c, in.tool);
         break;
     case PAL_CONTROL_RELEASE_TOOL:
-        leave(hub, c);
+        leave(c);
         break;
     case PAL_CONTROL_COMMAND:
-        pal_hub_execute(hub, c, &in.command);
+        pal_hub_execute(c, &in.command);
         break;
     case PAL_CONTROL_SUBSCRIBE_FIELD:
-        pal_hub_subscribe_field(hub, c, &in.field_subscription);
+        pal_hub_subscribe_field(c, &in.field_subscription);
         break;
     case PAL_CONTROL_PING:
-        pal_hub_message(hub, PAL_CONTROL_PONG)->stamp_ms = in.stamp_ms;
-        pal_hub_send(hub, c, hub->control);
+        pal_hub_message(c->hub, PAL_CONTROL_PONG)->stamp_ms = in.stamp_ms;
+        pal_hub_send(c);
         break;
     default:
-        malformed(hub, c, PAL_REFUSAL_KIND);
-        break;
+        return PAL_REFUSAL_KIND;
     }
+    return 0;
 }
 
-static void pose(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_byte)
+static int pose(pal_client *c, const uint8_t *bytes, size_t n_byte)
 {
     pal_wire_pose w;
-    uint64_t now = pal_loop_now_ns(hub->loop);
+    uint64_t now = pal_loop_now_ns(c->hub->loop);
     int refusal = pal_wire_get_pose(bytes, n_byte, &w);
-    hub->count.n_pose++;
-    if (refusal) {
-        malformed(hub, c, refusal);
-        return;
-    }
+    c->hub->count.n_pose++;
+    if (refusal) return refusal;
     const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
     if (m->tool < 0 || m->tool != w.tool) {
-        hub->count.n_pose_ignored++;
+        c->hub->count.n_pose_ignored++;
         if (m->role == PAL_MEMBER_VIEWER && (c->pose_error_ns == 0 || now - c->pose_error_ns > PAL_POSE_ERROR_NS)) {
             c->pose_error_ns = now;
-            pal_hub_send_error(hub, c, "role", "a viewer moves no tool");
+            pal_hub_refuse(c, "role", "a viewer moves no tool");
         }
-        return;
-    }
-    if (w.flags & PAL_WIRE_POSE_AWAY) {
-        (void)pal_session_request_pose(c->room->session, m->tool, NULL);
-        return;
+        return 0;
     }
     pal_pose p = {.buttons = w.buttons & PAL_WIRE_GRASP, .seq = w.seq, .stamp_us = w.stamp_us};
     for (int i = 0; i < 3; i++) {
@@ -177,45 +160,44 @@ static void pose(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_byt
         p.velocity_m_s[i] = w.velocity_m_s[i];
     }
     for (int i = 0; i < 4; i++) p.quat[i] = w.quaternion[i];
-    if (pal_session_request_pose(c->room->session, m->tool, &p)) hub->count.n_pose_refused++;
+    /* a release is never refused */
+    if (pal_session_request_pose(c->room->session, m->tool, w.flags & PAL_WIRE_POSE_AWAY ? NULL : &p))
+        c->hub->count.n_pose_refused++;
+    return 0;
 }
 
-static void acknowledge(pal_hub *hub, pal_client *c, const uint8_t *bytes, size_t n_byte)
+static int acknowledge(pal_client *c, const uint8_t *bytes, size_t n_byte)
 {
     pal_wire_ack ack;
     int refusal = pal_wire_get_ack(bytes, n_byte, &ack);
-    hub->count.n_ack++;
-    if (!refusal && !pal_credit_acknowledge(&c->credit, ack.cycle, pal_loop_now_ns(hub->loop)))
-        refusal = PAL_REFUSAL_RANGE;
-    if (refusal)
-        malformed(hub, c, refusal);
-    else
-        c->peer->ops->ready(c->peer);
+    c->hub->count.n_ack++;
+    if (refusal) return refusal;
+    if (!pal_credit_acknowledge(&c->credit, ack.cycle, pal_loop_now_ns(c->hub->loop))) return PAL_REFUSAL_RANGE;
+    c->peer->ops->ready(c->peer);
+    return 0;
 }
 
 void pal_hub_received(void *user, pal_peer *peer, const uint8_t *bytes, size_t n_byte, bool text)
 {
-    pal_hub *hub = user;
     pal_client *c = peer->client;
     pal_wire_head head;
+    (void)user;
     if (!c || peer->drop_code) return;
-    if (!pal_bucket_take(&c->bucket, pal_loop_now_ns(hub->loop))) {
-        hub->count.n_flood++;
-        pal_hub_drop(hub, c, PAL_WIRE_CLOSE_RATE, "more than 600 messages a second");
+    if (!pal_bucket_take(&c->bucket, pal_loop_now_ns(c->hub->loop))) {
+        c->hub->count.n_flood++;
+        pal_hub_drop(c, PAL_WIRE_CLOSE_RATE, "more than 600 messages a second");
         return;
     }
-    if (text) {
-        control(hub, c, bytes, n_byte);
-        return;
+    int refusal = text ? control(c, bytes, n_byte) : pal_wire_get_head(bytes, n_byte, &head);
+    if (!text && !refusal) {
+        if (head.kind != PAL_WIRE_POSE && head.kind != PAL_WIRE_ACK)
+            refusal = PAL_REFUSAL_KIND;
+        else if (!c->id)
+            pal_hub_drop(c, PAL_WIRE_CLOSE_POLICY, "join comes first");
+        else
+            refusal = head.kind == PAL_WIRE_POSE ? pose(c, bytes, n_byte) : acknowledge(c, bytes, n_byte);
     }
-    int refusal = pal_wire_get_head(bytes, n_byte, &head);
-    if (!refusal && head.kind != PAL_WIRE_POSE && head.kind != PAL_WIRE_ACK) refusal = PAL_REFUSAL_KIND;
-    if (refusal)
-        malformed(hub, c, refusal);
-    else if (!c->id)
-        pal_hub_drop(hub, c, PAL_WIRE_CLOSE_POLICY, "join comes first");
-    else if (head.kind == PAL_WIRE_POSE)
-        pose(hub, c, bytes, n_byte);
-    else
-        acknowledge(hub, c, bytes, n_byte);
+    if (!refusal) return;
+    c->hub->count.n_malformed++;
+    pal_hub_drop(c, PAL_WIRE_CLOSE_PROTOCOL, "%s", pal_refusal_text(refusal));
 }

@@ -1,6 +1,8 @@
-/* The queue of commands before the job worker, and the commit of its results. */
+/* The queue of commands, the background thread that sleeps until there is a job to run or an object to free, and the
+ * commit of its results. */
 #include "server/net/hub_jobs.h"
 
+#include "server/base/thread.h"
 #include "server/net/hub_peers.h"
 #include "server/net/hub_plan.h"
 
@@ -8,14 +10,159 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* NULL: has left */
-static pal_client *requester(pal_hub *hub, const pal_hub_pending_job *w)
+enum { PENDING_MAX = 16, RETIRED_MAX = 8 };
+
+typedef struct pending_job {
+    pal_hub_room *room;
+    int member;
+    uint64_t asked_ns;
+    const pal_job_type *type;
+    pal_wire_command command;
+} pending_job;
+
+struct pal_hub_jobs {
+    pal_loop *loop;                   /* woken when a job is done */
+    pending_job pending[PENDING_MAX]; /* oldest first */
+    int n_pending;
+    pending_job current; /* in progress, no longer pending */
+    bool busy;           /* a job is in progress or done */
+    pthread_t thread;
+    pthread_mutex_t lock; /* guards what follows */
+    pthread_cond_t changed;
+    pal_job job; /* the thread's own while it is SUBMITTED */
+    enum { IDLE, SUBMITTED, DONE } state;
+    pal_job_products retired[RETIRED_MAX];
+    int n_retired;
+    bool leaving;
+};
+
+/* ---- the background thread ---- */
+
+static void make(pal_job *job)
 {
-    for (int i = 0; i < hub->max_clients; i++) {
-        pal_client *c = &hub->client[i];
-        if (c->peer && c->room == w->room && c->id == w->member && !c->peer->drop_code) return c;
+    const pal_scene *scene = NULL;
+    job->err = job->type->prepare(job, &scene);
+    if (!job->err) job->err = pal_session_open_after(job->session, scene, &job->diag, &job->made.session);
+    if (!job->err) job->err = pal_stream_open(job->made.session, job->error_m, &job->diag, &job->made.stream);
+    if (!job->err) job->type->transfer(job);
+    job->made_ns = pal_clock_now_ns(pal_session_clock(job->session));
+}
+
+static void free_products(const pal_job_products *p)
+{
+    pal_stream_close(p->stream);
+    pal_session_close(p->session);
+    pal_sculpt_edit_free(p->edit);
+    pal_configuration_switch_free(p->change);
+}
+
+static void free_job(pal_job *job)
+{
+    free_products(&job->made);
+    free(job->scene);
+    free(job->base);
+    free(job->point_m);
+    *job = (pal_job){.err = PAL_ERR_OK};
+}
+
+static void *run(void *user)
+{
+    pal_hub_jobs *s = user;
+    pthread_mutex_lock(&s->lock);
+    while (!s->leaving || s->n_retired > 0) {
+        if (s->n_retired > 0) {
+            pal_job_products retired = s->retired[--s->n_retired];
+            pthread_mutex_unlock(&s->lock);
+            free_products(&retired);
+            pthread_mutex_lock(&s->lock);
+        } else if (s->state == SUBMITTED) {
+            pthread_mutex_unlock(&s->lock);
+            make(&s->job);
+            pthread_mutex_lock(&s->lock);
+            s->state = DONE;
+            pal_loop_wake(s->loop);
+        } else {
+            pthread_cond_wait(&s->changed, &s->lock);
+        }
     }
+    pthread_mutex_unlock(&s->lock);
     return NULL;
+}
+
+/* gives the job with its owned parts to the thread */
+static void submit(pal_hub_jobs *s, const pal_job *job)
+{
+    s->busy = true;
+    pthread_mutex_lock(&s->lock);
+    s->job = *job;
+    s->state = SUBMITTED;
+    pthread_cond_signal(&s->changed);
+    pthread_mutex_unlock(&s->lock);
+}
+
+/* takes the finished job back; false: none yet */
+static bool collect(pal_hub_jobs *s, pal_job *out)
+{
+    pthread_mutex_lock(&s->lock);
+    bool done = s->state == DONE;
+    if (done) {
+        *out = s->job;
+        s->job = (pal_job){.err = PAL_ERR_OK};
+        s->state = IDLE;
+        s->busy = false;
+    }
+    pthread_mutex_unlock(&s->lock);
+    return done;
+}
+
+/* closes and frees on the thread, before the next job */
+static void retire(pal_hub_jobs *s, const pal_job_products *retired)
+{
+    pthread_mutex_lock(&s->lock);
+    bool room = s->n_retired < RETIRED_MAX;
+    if (room) s->retired[s->n_retired++] = *retired;
+    pthread_cond_signal(&s->changed);
+    pthread_mutex_unlock(&s->lock);
+    if (!room) free_products(retired);
+}
+
+/* at the first command; NULL: out of memory */
+static pal_hub_jobs *begin_jobs(pal_loop *loop)
+{
+    pal_hub_jobs *s = calloc(1, sizeof *s);
+    if (!s) return NULL;
+    s->loop = loop;
+    pthread_mutex_init(&s->lock, NULL);
+    pthread_cond_init(&s->changed, NULL);
+    if (!pal_thread_start(&s->thread, run, s)) return s;
+    free(s);
+    return NULL;
+}
+
+void pal_hub_jobs_end(pal_hub *hub)
+{
+    pal_hub_jobs *s = hub->jobs;
+    if (!s) return;
+    pthread_mutex_lock(&s->lock);
+    s->leaving = true;
+    pthread_cond_signal(&s->changed);
+    pthread_mutex_unlock(&s->lock);
+    pthread_join(s->thread, NULL);
+    free_job(&s->job);
+    pthread_mutex_destroy(&s->lock);
+    pthread_cond_destroy(&s->changed);
+    free(s);
+    hub->jobs = NULL;
+}
+
+/* ---- the queue and the results ---- */
+
+/* NULL: has left */
+static pal_client *requester(const pending_job *w)
+{
+    pal_client *c = NULL;
+    while ((c = pal_hub_next_member(w->room, c)) && c->id != w->member) continue;
+    return c;
 }
 
 /* keeps replaced assets for a while, because clients may be about to fetch them */
@@ -24,20 +171,20 @@ static void keep_assets(pal_hub_room *room, const pal_stream *before)
     for (int p = 0; p < before->n_part; p++) {
         const pal_stream_part *part = &before->part[p];
         if (p < room->stream->n_part && !strcmp(part->info.asset, room->stream->part[p].info.asset)) continue;
-        pal_hub_old_asset *past = &room->past[room->n_old_asset];
+        pal_hub_old_asset *past = &room->past[room->oldest_asset];
         snprintf(past->path, sizeof past->path, "%s", part->info.asset);
         pal_packet_replace(&past->asset, pal_packet_hold(part->asset));
-        room->n_old_asset = (room->n_old_asset + 1) % PAL_HUB_OLD_ASSETS;
+        room->oldest_asset = (room->oldest_asset + 1) % PAL_HUB_OLD_ASSETS;
     }
 }
 
 /* Repeats the brushes of the replaced session in the new one, where the job type keeps them. Returns the number
  * ended. */
-static int begin_brushes(pal_hub_tool_brush *brush, pal_hub_room *room, const pal_job_type *type)
+static int begin_brushes(pal_hub_room *room, const pal_job_type *type)
 {
     int n_ended = 0;
     for (int t = 0; t < PAL_TOOL_MAX; t++) {
-        pal_hub_tool_brush *h = &brush[t];
+        pal_hub_tool_brush *h = &room->brush[t];
         if (h->brush.kind == PAL_BRUSH_NONE) continue;
         const pal_member_entry *m = pal_members_find(&room->members, h->member);
         pal_command command = {.kind = PAL_COMMAND_BRUSH, .body = h->body, .slot = t, .brush = h->brush};
@@ -53,52 +200,49 @@ static int begin_brushes(pal_hub_tool_brush *brush, pal_hub_room *room, const pa
 }
 
 /* replaces the running session by the result; false: it continues unchanged, diag gives the reason */
-static bool commit(pal_hub *hub, pal_hub_jobs *s, pal_job *job)
+static bool commit(pal_hub_room *room, pal_job *job)
 {
-    pal_hub_room *room = s->current.room;
-    pal_retired retired = {.stream = room->stream, .session = room->session};
-    job->err = pal_session_transfer_end(job->next, room->session, &job->diag);
+    pal_job_products retired = {.stream = room->stream, .session = room->session};
+    job->err = pal_session_transfer_end(job->made.session, room->session, &job->diag);
     if (job->err) return false;
-    pal_stream_transfer(job->stream, room->stream);
-    room->stream = job->stream, room->session = job->next;
-    job->next = NULL, job->stream = NULL;
-    job->type->commit(pal_hub_edits(hub, room, job->body), job, &retired);
-    job->n_brush_ended = begin_brushes(s->brush[room - hub->room], room, job->type);
+    pal_stream_transfer(job->made.stream, room->stream);
+    room->stream = job->made.stream, room->session = job->made.session;
+    job->made.session = NULL, job->made.stream = NULL;
+    job->type->commit(&room->edits[job->body], job, &retired);
+    job->n_brush_ended = begin_brushes(room, job->type);
     keep_assets(room, retired.stream);
-    hub->session[room - hub->room] = NULL;
+    room->hub->session[room - room->hub->room] = NULL;
     room->own = true;
-    pal_job_worker_retire(s->worker, &retired);
+    retire(room->hub->jobs, &retired);
     return true;
 }
 
-static void send_topology(pal_hub *hub, pal_hub_room *room)
+static void send_topology(pal_hub_room *room)
 {
-    for (int i = 0; i < hub->max_clients; i++) {
-        pal_client *c = &hub->client[i];
-        if (!c->peer || c->room != room || !c->id || c->peer->drop_code) continue;
-        pal_wire_topology *topology = &pal_hub_message(hub, PAL_CONTROL_TOPOLOGY)->topology;
+    for (pal_client *c = NULL; (c = pal_hub_next_member(room, c));) {
+        pal_wire_topology *topology = &pal_hub_message(room->hub, PAL_CONTROL_TOPOLOGY)->topology;
         topology->n_part = (uint32_t)room->stream->n_part;
         for (int p = 0; p < room->stream->n_part; p++) topology->part[p] = room->stream->part[p].info;
         pal_hub_put_plan(room, &topology->plan);
         memset(c->sent_change, 0, sizeof c->sent_change);
         memset(c->sent_field, 0, sizeof c->sent_field);
-        pal_hub_send(hub, c, hub->control);
+        pal_hub_send(c);
     }
 }
 
-static void finish(pal_hub *hub, pal_hub_jobs *s, pal_job *job)
+static void finish(pal_hub_jobs *s, pal_job *job)
 {
     pal_hub_room *room = s->current.room;
-    pal_client *c = requester(hub, &s->current);
-    if (!job->err && commit(hub, s, job)) {
-        send_topology(hub, room);
-        if (c) job->type->answer(hub, c, job);
+    pal_client *c = requester(&s->current);
+    if (!job->err && commit(room, job)) {
+        send_topology(room);
+        if (c) job->type->answer(c, job);
     } else if (c) {
         const char *reason = job->diag.text[0] ? job->diag.text : pal_err_text(job->err);
         bool named = !strncmp(reason, job->verb, strlen(job->verb)); /* cell edits name the verb */
-        pal_hub_send_error(hub, c, "refused", named ? "%s%s" : "%s: %s", named ? "" : job->verb, reason);
+        pal_hub_refuse(c, "refused", named ? "%s%s" : "%s: %s", named ? "" : job->verb, reason);
     }
-    pal_job_free(job);
+    free_job(job);
 }
 
 /* copy of the running scene with the current materials; NULL: out of memory */
@@ -112,48 +256,39 @@ static pal_scene *scene_now(const pal_hub_room *room)
 }
 
 /* submits the next command; one that cannot be parsed was answered and is dropped */
-static void begin_next(pal_hub *hub, pal_hub_jobs *s)
+static void begin_next(pal_hub_jobs *s)
 {
     /* picking and undo need the displayed state, so a new session must have its first frame */
-    while (s->n_pending > 0 && s->pending[0].room->stream->frame) {
+    while (!s->busy && s->n_pending > 0 && s->pending[0].room->stream->frame) {
         s->current = s->pending[0];
         memmove(s->pending, s->pending + 1, sizeof *s->pending * (size_t)--s->n_pending);
-        pal_client *c = requester(hub, &s->current);
-        pal_hub_room *room = s->current.room;
-        pal_job job = {.type = s->current.type,
-                       .session = room->session,
-                       .error_m = hub->error_m,
-                       .asked_ns = s->current.asked_ns};
+        pal_client *c = requester(&s->current);
         if (!c) continue; /* the requester has left */
+        pal_job job = {.type = s->current.type,
+                       .session = c->room->session,
+                       .error_m = c->hub->error_m,
+                       .asked_ns = s->current.asked_ns};
         memcpy(job.verb, s->current.command.verb, sizeof job.verb);
-        bool good = job.type->read(hub, c, &s->current.command, &job);
-        if (good && !(job.scene = scene_now(room))) {
-            pal_hub_send_error(hub, c, "refused", "%s: %s", job.verb, pal_err_text(PAL_ERR_MEMORY));
-            good = false;
-        }
-        if (good) {
-            pal_job_worker_submit(s->worker, &job);
-            return;
-        }
-        pal_job_free(&job);
+        bool good = job.type->read(c, &s->current.command, &job);
+        if (good && !(job.scene = scene_now(c->room)))
+            good = pal_hub_refuse(c, "refused", "%s: %s", job.verb, pal_err_text(PAL_ERR_MEMORY));
+        if (good)
+            submit(s, &job);
+        else
+            free_job(&job);
     }
 }
 
-pal_hub_body_edits *pal_hub_edits(pal_hub *hub, const pal_hub_room *room, int body)
+bool pal_hub_jobs_enqueue(pal_client *c, const pal_job_type *type, const pal_wire_command *command)
 {
-    return &hub->jobs->edits[room - hub->room][body];
-}
-
-void pal_hub_jobs_enqueue(pal_hub *hub, pal_client *c, const pal_job_type *type, const pal_wire_command *command)
-{
-    if (!pal_hub_jobs_create(hub, c, command->verb)) return;
-    pal_hub_jobs *s = hub->jobs;
-    if (s->n_pending == PAL_HUB_JOBS_PENDING) {
-        pal_hub_send_error(hub, c, "busy", "%s: %d commands wait already", command->verb, PAL_HUB_JOBS_PENDING);
-        return;
-    }
-    s->pending[s->n_pending++] = (pal_hub_pending_job){c->room, c->id, pal_loop_now_ns(hub->loop), type, *command};
-    if (!pal_job_worker_busy(s->worker)) begin_next(hub, s);
+    if (!c->hub->jobs) c->hub->jobs = begin_jobs(c->hub->loop);
+    pal_hub_jobs *s = c->hub->jobs;
+    if (!s) return pal_hub_refuse(c, "refused", "%s: %s", command->verb, pal_err_text(PAL_ERR_MEMORY));
+    if (s->n_pending == PENDING_MAX)
+        return pal_hub_refuse(c, "busy", "%s: %d commands wait already", command->verb, PENDING_MAX);
+    s->pending[s->n_pending++] = (pending_job){c->room, c->id, pal_loop_now_ns(c->hub->loop), type, *command};
+    begin_next(s);
+    return true;
 }
 
 void pal_hub_jobs_update(pal_hub *hub)
@@ -161,57 +296,6 @@ void pal_hub_jobs_update(pal_hub *hub)
     pal_hub_jobs *s = hub->jobs;
     pal_job job;
     if (!s) return;
-    if (pal_job_worker_collect(s->worker, &job)) finish(hub, s, &job);
-    if (!pal_job_worker_busy(s->worker)) begin_next(hub, s);
-}
-
-static void wake_loop(void *user)
-{
-    pal_loop_wake(user);
-}
-
-static void free_jobs(pal_hub_jobs *s)
-{
-    free(s->edits);
-    free(s->brush);
-    free(s);
-}
-
-bool pal_hub_jobs_create(pal_hub *hub, pal_client *c, const char *verb)
-{
-    if (hub->jobs) return true;
-    pal_hub_jobs *s = calloc(1, sizeof *s);
-    if (s) s->edits = calloc((size_t)hub->n_room, sizeof *s->edits);
-    if (s) s->brush = calloc((size_t)hub->n_room, sizeof *s->brush);
-    if (s && s->edits && s->brush && !pal_job_worker_open(wake_loop, hub->loop, &s->worker)) {
-        hub->jobs = s;
-        return true;
-    }
-    if (s) free_jobs(s);
-    pal_hub_send_error(hub, c, "refused", "%s: %s", verb, pal_err_text(PAL_ERR_MEMORY));
-    return false;
-}
-
-void pal_hub_jobs_end(pal_hub *hub)
-{
-    pal_hub_jobs *s = hub->jobs;
-    if (!s) return;
-    pal_job_worker_close(s->worker);
-    for (int r = 0; r < hub->n_room; r++) {
-        pal_hub_room *room = &hub->room[r];
-        if (room->own) {
-            pal_stream_close(room->stream);
-            pal_session_close(room->session);
-            room->stream = NULL, room->session = NULL;
-        }
-        for (int b = 0; b < PAL_BODY_MAX; b++) {
-            pal_hub_body_edits *at = &s->edits[r][b];
-            pal_sculptor_destroy(at->sculptor);
-            pal_sculpt_edit_free(at->edit);
-            pal_configuration_switch_free(at->change);
-            free(at->base);
-        }
-    }
-    free_jobs(s);
-    hub->jobs = NULL;
+    if (collect(s, &job)) finish(s, &job);
+    begin_next(s);
 }

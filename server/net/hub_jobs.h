@@ -1,48 +1,64 @@
-/* Commands that produce another scene: the queue before the job worker, and its results. A pending command is parsed
- * when its turn comes, so that it applies to the result of its predecessors. Thread: [net]. */
+/* Commands that produce another scene. They wait in a queue; a pending command is parsed when its turn comes, so that
+ * it applies to the result of its predecessors. While the session runs, a background thread prepares the scene, world
+ * and stream that the command leads to, which is slow and allocates. It then stops that session and transfers its
+ * state, while other sessions and the loop continue, and frees what was replaced. One job at a time. Thread: [net]
+ * unless noted. */
 #ifndef PAL_NET_HUB_JOBS_H
 #define PAL_NET_HUB_JOBS_H
-#include "server/net/job_worker.h"
+#include "server/net/hub_core.h"
 
-enum { PAL_HUB_JOBS_PENDING = 16 };
+typedef struct pal_job pal_job;
 
-typedef struct pal_hub_pending_job {
-    pal_hub_room *room;
-    int member;
-    uint64_t asked_ns;
+/* what a job makes, or what it replaces; each may be NULL; closed and freed in this order */
+typedef struct pal_job_products {
+    pal_stream *stream;
+    pal_session *session;
+    pal_sculpt_edit *edit;
+    pal_configuration_switch *change;
+} pal_job_products;
+
+/* a kind of job: how it is parsed, prepared, transferred, committed and answered */
+typedef struct pal_job_type {
+    /* [net] parses the command against the current state; false: an error was sent */
+    bool (*read)(pal_client *client, const pal_wire_command *command, pal_job *job);
+    /* [job] builds the scene of the next session; it lives as long as the job's product */
+    pal_err (*prepare)(pal_job *job, const pal_scene **scene);
+    void (*transfer)(pal_job *job); /* [job] transfers the state of the running session to the next one */
+    /* [net] the next session runs: stores the job's product, moves what it replaces to *retired */
+    void (*commit)(pal_hub_body_edits *edits, pal_job *job, pal_job_products *retired);
+    void (*answer)(pal_client *client, const pal_job *job); /* [net] */
+    bool keeps_brushes;                                     /* brushes continue in the next session */
+} pal_job_type;
+
+/* One job and its result. The background thread borrows sculptor, session and was; nobody changes or closes them
+ * meanwhile. A finished job without err has a running session in `made`, with the state transferred. */
+struct pal_job {
     const pal_job_type *type;
-    pal_wire_command command;
-} pal_hub_pending_job;
-
-/* edits and switches of one body of a room */
-typedef struct pal_hub_body_edits {
+    pal_session *session; /* the running session */
+    pal_scene *scene;     /* its scene with current materials; owned */
+    int body;
+    double error_m;
+    char verb[32];
+    uint64_t asked_ns, made_ns;
+    /* edit */
     pal_sculptor *sculptor;
-    pal_sculpt_edit *edit;            /* edit that made the body's control cells; NULL: the original ones */
-    pal_configuration_switch *change; /* switch that made the body's mesh; NULL: the original, or that of edit */
-    pal_body_def *base;               /* owned: the body before its first switch; NULL: as it is now */
-} pal_hub_body_edits;
-
-/* the last brush requested by a tool's holder */
-typedef struct pal_hub_tool_brush {
-    int member, body;
-    double asked_m[6]; /* positions as received */
-    pal_brush brush;   /* kind NONE: none     */
-} pal_hub_tool_brush;
-
-struct pal_hub_jobs {
-    pal_job_worker *worker;
-    pal_hub_pending_job pending[PAL_HUB_JOBS_PENDING]; /* oldest first */
-    int n_pending;
-    pal_hub_pending_job current;               /* in progress, no longer pending */
-    pal_hub_body_edits (*edits)[PAL_BODY_MAX]; /* [n_room] */
-    pal_hub_tool_brush (*brush)[PAL_TOOL_MAX]; /* [n_room] */
+    pal_sculpt command;
+    double *point_m; /* points of the command, or NULL; owned */
+    /* configuration switch */
+    pal_configuration configuration;
+    const pal_body_def *was;          /* the body before its first switch */
+    pal_body_def *base;               /* a copy of it when this is the first switch, else NULL; owned */
+    double error_now_m, error_then_m; /* as displayed to clients; NaN: none */
+    pal_transfer_report report;
+    /* result; on err there is none, and diag gives the reason */
+    pal_err err;
+    pal_diagnostic diag;
+    pal_job_products made;
+    int n_brush_ended;
 };
 
-/* creates hub->jobs at the first command that needs it; false: out of memory, an error was sent */
-bool pal_hub_jobs_create(pal_hub *hub, pal_client *client, const char *verb);
-/* appends a command; sends an error when the queue is full */
-void pal_hub_jobs_enqueue(pal_hub *hub, pal_client *client, const pal_job_type *type, const pal_wire_command *command);
-pal_hub_body_edits *pal_hub_edits(pal_hub *hub, const pal_hub_room *room, int body);
-void pal_hub_jobs_update(pal_hub *hub); /* collects the finished job and starts the next command */
-void pal_hub_jobs_end(pal_hub *hub);    /* closes the sessions created by the hub */
+/* appends a command; false: the queue is full or out of memory, an error was sent */
+bool pal_hub_jobs_enqueue(pal_client *client, const pal_job_type *type, const pal_wire_command *command);
+void pal_hub_jobs_update(pal_hub *hub); /* commits and answers the finished job, and starts the next command */
+void pal_hub_jobs_end(pal_hub *hub);    /* waits for the job in progress and frees it; the thread ends */
 #endif

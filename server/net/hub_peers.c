@@ -1,8 +1,7 @@
-/* Messages that the hub sends at once, and how a client leaves its room. */
+/* Messages that the hub sends at once, counts of subscribers, and how a client leaves its room. */
 #include "server/net/hub_peers.h"
 
 #include "server/base/log.h"
-#include "server/net/hub_subscriptions.h"
 #include "server/net/transport/plain_text.h"
 
 #include <stdarg.h>
@@ -22,25 +21,62 @@ uint32_t pal_hub_colour(int id)
     return colours[(unsigned)(id - 1) % (sizeof colours / sizeof *colours)];
 }
 
-static void empty(pal_client *c)
+static void request(pal_session *session, bool wanted, bool *requested, pal_command command)
 {
-    for (; c->n_queue; c->n_queue--) {
-        pal_packet_drop(c->queue[c->queue_begin]);
-        c->queue_begin = (c->queue_begin + 1) % PAL_HUB_QUEUE;
+    if (wanted == *requested) return;
+    command.wanted = wanted;
+    if (pal_session_command(session, &command) == PAL_ERR_OK) *requested = wanted;
+}
+
+void pal_hub_update_subscriptions(pal_hub_room *room)
+{
+    for (int b = 0; b < room->stream->n_part; b++) {
+        request(room->session, room->n_estimate[b] > 0, &room->estimate_requested[b],
+                (pal_command){.kind = PAL_COMMAND_ESTIMATE, .body = b});
+        for (int k = PAL_FIELD_NONE + 1; k < PAL_FIELD_COUNT; k++)
+            request(room->session, room->n_subscriber[b][k] > 0, &room->reported[b][k],
+                    (pal_command){.kind = PAL_COMMAND_FIELD, .body = b, .field = (pal_field)k});
     }
+}
+
+void pal_hub_set_field(pal_client *c, int part, pal_field field)
+{
+    pal_field before = (pal_field)c->view[part];
+    if (field == before) return;
+    if (before != PAL_FIELD_NONE) c->room->n_subscriber[part][before]--;
+    if (field != PAL_FIELD_NONE) c->room->n_subscriber[part][field]++;
+    c->view[part] = (uint8_t)field;
+    c->sent_field[part] = 0;
+}
+
+void pal_hub_set_estimate(pal_client *c, int body, bool wanted)
+{
+    if (c->estimate[body] == wanted) return;
+    c->room->n_estimate[body] += wanted ? 1 : -1;
+    c->estimate[body] = wanted;
+    if (!wanted) c->estimate_due[body] = false;
+}
+
+static void unsubscribe_all(pal_client *c)
+{
+    for (int b = 0; b < c->room->stream->n_part; b++) {
+        pal_hub_set_field(c, b, PAL_FIELD_NONE);
+        pal_hub_set_estimate(c, b, false);
+    }
+    pal_hub_update_subscriptions(c->room);
+}
+
+/* a dropped member leaves at once, before its socket closes */
+void pal_hub_leave_room(pal_client *c)
+{
+    pal_hub_room *room = c->room;
+    while (c->n_queue > 0) pal_packet_drop(c->queue[--c->n_queue]);
     for (; c->out_begin < c->n_out; c->out_begin++) pal_packet_drop(c->out[c->out_begin]);
     c->out_begin = c->n_out = 0;
     pal_packet_replace(&c->haptic, NULL);
     c->members_due = c->status_due = false;
-}
-
-/* a dropped member leaves at once, before its socket closes */
-void pal_hub_leave_room(pal_hub *hub, pal_client *c)
-{
-    pal_hub_room *room = c->room;
-    empty(c);
     if (!c->id) return;
-    pal_hub_unsubscribe_all(c);
+    unsubscribe_all(c);
     pal_member_entry *member = pal_members_find(&room->members, c->id);
     int tool = member ? member->tool : -1;
     pal_members_leave(&room->members, c->id);
@@ -48,10 +84,10 @@ void pal_hub_leave_room(pal_hub *hub, pal_client *c)
     room->tier_users[c->tier]--;
     pal_session_observe(room->session, false);
     c->id = 0;
-    pal_hub_members_changed(hub, room);
+    pal_hub_members_changed(room);
 }
 
-void pal_hub_drop(pal_hub *hub, pal_client *client, int code, const char *format, ...)
+void pal_hub_drop(pal_client *client, int code, const char *format, ...)
 {
     char reason[PAL_PEER_REASON];
     va_list args;
@@ -61,18 +97,18 @@ void pal_hub_drop(pal_hub *hub, pal_client *client, int code, const char *format
     va_end(args);
     pal_log(PAL_LOG_DEBUG, "drop", "a client is closed with %d: %s", code, reason);
     pal_peer_drop(client->peer, code, "%s", reason);
-    pal_hub_leave_room(hub, client);
+    pal_hub_leave_room(client);
 }
 
-static void queue(pal_hub *hub, pal_client *c, pal_packet *packet)
+static void queue(pal_client *c, pal_packet *packet)
 {
     if (c->n_queue == PAL_HUB_QUEUE || !packet) {
         pal_packet_drop(packet);
-        hub->count.n_overflow++;
-        pal_hub_drop(hub, c, PAL_WIRE_CLOSE_POLICY, "too many answers wait to be read");
+        c->hub->count.n_overflow++;
+        pal_hub_drop(c, PAL_WIRE_CLOSE_POLICY, "too many answers wait to be read");
         return;
     }
-    c->queue[(c->queue_begin + c->n_queue++) % PAL_HUB_QUEUE] = packet;
+    c->queue[c->n_queue++] = packet;
     c->peer->ops->ready(c->peer);
 }
 
@@ -83,42 +119,48 @@ pal_control *pal_hub_message(pal_hub *hub, pal_control_type type)
     return hub->control;
 }
 
-pal_packet *pal_hub_encode(pal_hub *hub, const pal_control *control)
+pal_packet *pal_hub_encode(pal_hub *hub)
 {
     size_t n = 0;
-    int refusal = pal_control_put(hub->text, PAL_CONTROL_OUT_MAX + 1, control, &n);
+    int refusal = pal_control_put(hub->text, PAL_CONTROL_OUT_MAX + 1, hub->control, &n);
     if (refusal) {
-        pal_log(PAL_LOG_ERROR, "control", "%s is not sent: %s", pal_control_name(control->type),
+        pal_log(PAL_LOG_ERROR, "control", "%s is not sent: %s", pal_control_name(hub->control->type),
                 pal_refusal_text(refusal));
         return NULL;
     }
     return pal_packet_create(hub->text, n, true);
 }
 
-void pal_hub_send(pal_hub *hub, pal_client *client, const pal_control *control)
+void pal_hub_send(pal_client *client)
 {
-    if (client->peer->drop_code) return;
-    queue(hub, client, pal_hub_encode(hub, control));
+    if (!client->peer->drop_code) queue(client, pal_hub_encode(client->hub));
 }
 
-void pal_hub_send_error(pal_hub *hub, pal_client *client, const char *code, const char *format, ...)
+bool pal_hub_refuse(pal_client *client, const char *code, const char *format, ...)
 {
     char text[512];
     va_list args;
     va_start(args, format);
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
-    pal_wire_error *error = &pal_hub_message(hub, PAL_CONTROL_ERROR)->error;
+    pal_wire_error *error = &pal_hub_message(client->hub, PAL_CONTROL_ERROR)->error;
     pal_plain_text(error->code, sizeof error->code, code);
     pal_plain_text(error->text, sizeof error->text, text);
-    pal_hub_send(hub, client, hub->control);
+    pal_hub_send(client);
+    return false;
 }
 
-void pal_hub_members_changed(pal_hub *hub, pal_hub_room *room)
+pal_client *pal_hub_next_member(const pal_hub_room *room, pal_client *after)
 {
-    for (int i = 0; i < hub->max_clients; i++) {
-        pal_client *c = &hub->client[i];
-        if (!c->peer || c->room != room || !c->id || c->peer->drop_code) continue;
+    pal_client *end = room->hub->client + room->hub->max_clients;
+    for (pal_client *c = after ? after + 1 : room->hub->client; c < end; c++)
+        if (c->peer && c->room == room && c->id && !c->peer->drop_code) return c;
+    return NULL;
+}
+
+void pal_hub_members_changed(const pal_hub_room *room)
+{
+    for (pal_client *c = NULL; (c = pal_hub_next_member(room, c));) {
         c->members_due = true;
         c->peer->ops->ready(c->peer);
     }

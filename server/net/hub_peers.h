@@ -1,20 +1,27 @@
-/* Operations on a client: send, refuse, drop. Thread: [net]. */
+/* Operations on a client: send, refuse, subscribe, drop. A session neither computes nor encodes a field or an estimate
+ * without a subscriber. Thread: [net]. */
 #ifndef PAL_NET_HUB_PEERS_H
 #define PAL_NET_HUB_PEERS_H
 #include "server/net/hub_core.h"
 
 /* the hub's scratch message, empty but for its type */
 pal_control *pal_hub_message(pal_hub *hub, pal_control_type type);
-pal_packet *pal_hub_encode(pal_hub *hub, const pal_control *control); /* NULL: encoding failed, logged */
-void pal_hub_send(pal_hub *hub, pal_client *client,
-                  const pal_control *control); /* queues a message; overflow drops the client */
-void pal_hub_send_error(pal_hub *hub, pal_client *client, const char *code, const char *format, ...)
-    __attribute__((format(printf, 4, 5)));
+pal_packet *pal_hub_encode(pal_hub *hub); /* encodes that message; NULL: failed, logged */
+void pal_hub_send(pal_client *client);    /* queues the hub's message; overflow drops the client */
+/* queues an error; returns false, so that a function that refuses can return it */
+bool pal_hub_refuse(pal_client *client, const char *code, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+/* field NONE: ends the subscription for this part */
+void pal_hub_set_field(pal_client *client, int part, pal_field field);
+void pal_hub_set_estimate(pal_client *client, int body, bool wanted);
+/* requests subscribed data from the session; retried at the next tick when its queue is full */
+void pal_hub_update_subscriptions(pal_hub_room *room);
 /* closes the connection; the member leaves its room at once, before the socket closes */
-void pal_hub_drop(pal_hub *hub, pal_client *client, int code, const char *format, ...)
-    __attribute__((format(printf, 4, 5)));
-void pal_hub_leave_room(pal_hub *hub, pal_client *client);
-void pal_hub_members_changed(pal_hub *hub, pal_hub_room *room);
+void pal_hub_drop(pal_client *client, int code, const char *format, ...) __attribute__((format(printf, 3, 4)));
+void pal_hub_leave_room(pal_client *client);
+/* next client that has joined the room and is not being closed; after NULL: the first; NULL: no more */
+pal_client *pal_hub_next_member(const pal_hub_room *room, pal_client *after);
+void pal_hub_members_changed(const pal_hub_room *room);
 void pal_hub_release_tool(pal_hub_room *room, int tool); /* the tool has no holder any more and leaves the scene */
 uint32_t pal_hub_colour(int member);                     /* 0xRRGGBB */
 #endif

@@ -8,24 +8,15 @@
 
 #include <string.h>
 
-static int body_of(const pal_session *session, const char *name)
-{
-    const pal_scene *scene = pal_session_scene(session);
-    for (int b = 0; b < scene->n_body; b++)
-        if (!strcmp(scene->body[b].name, name)) return b;
-    return -1;
-}
-
 void pal_hub_put_plan(const pal_hub_room *room, pal_wire_plan *out)
 {
-    int n = pal_session_component_count(room->session);
-    for (int r = 0; r < n && r < PAL_WIRE_COMPONENT_MAX; r++) {
-        pal_component_info component;
-        pal_session_component_info(room->session, r, &component);
-        pal_plain_text(out->component[r], PAL_WIRE_NAME_BYTES, component.name);
-        pal_plain_text(out->reason[r], PAL_WIRE_REASON_BYTES, component.reason);
-        out->part[r] = body_of(room->session, component.body);
-        out->required[r] = component.fixed || out->part[r] < 0;
+    const pal_session_outline *outline = pal_session_view_outline(room->session);
+    for (int r = 0; r < outline->n_component && r < PAL_WIRE_COMPONENT_MAX; r++) {
+        const pal_component_info *component = &outline->component[r];
+        pal_plain_text(out->component[r], PAL_WIRE_NAME_BYTES, component->name);
+        pal_plain_text(out->reason[r], PAL_WIRE_REASON_BYTES, component->reason);
+        out->part[r] = pal_scene_find_body(pal_session_scene(room->session), component->body);
+        out->required[r] = component->fixed || out->part[r] < 0;
         out->n_component = out->n_part = out->n_reason = out->n_required = (uint32_t)r + 1;
     }
 }
@@ -34,18 +25,17 @@ void pal_hub_put_plan(const pal_hub_room *room, pal_wire_plan *out)
  * brushes). Both lists have the order of the plan. */
 static void report_components(const pal_hub_room *room, const pal_frame *f, pal_wire_status *w)
 {
-    int n = pal_session_component_count(room->session), n_found = 0;
+    const pal_session_outline *outline = pal_session_view_outline(room->session);
+    int n = outline->n_component, n_found = 0;
     bool same = n == f->n_row && !room->own;
     for (int r = 0, at = 0; r < n; r++) {
-        pal_component_info component;
-        int i = at;
-        pal_session_component_info(room->session, r, &component);
-        int body = body_of(room->session, component.body);
-        while (i < f->n_row && (strcmp(f->component_name[i], component.name) || f->component_body[i] != body)) i++;
+        const pal_component_info *component = &outline->component[r];
+        int i = at, body = pal_scene_find_body(pal_session_scene(room->session), component->body);
+        while (i < f->n_row && (strcmp(f->component_name[i], component->name) || f->component_body[i] != body)) i++;
         if (i < f->n_row) {
             at = i + 1, n_found++;
         } else if (w->n_disabled < PAL_WIRE_COMPONENT_MAX) {
-            pal_plain_text(w->disabled[w->n_disabled].component, PAL_WIRE_NAME_BYTES, component.name);
+            pal_plain_text(w->disabled[w->n_disabled].component, PAL_WIRE_NAME_BYTES, component->name);
             w->disabled[w->n_disabled++].part = body < 0 ? 0 : (uint32_t)body;
         }
     }
@@ -90,39 +80,30 @@ void pal_hub_count_unobserved(pal_hub_room *room)
     room->was_unobserved = room->members.n_member == 0;
 }
 
-/* the world answers between two steps, with a count of refusals and the last diagnostic */
-static void note_asked(const pal_hub *hub, pal_client *c)
-{
-    const pal_frame *f = c->room->stream->frame;
-    c->component_until_ns = pal_loop_now_ns(hub->loop) + PAL_ANSWER_NS;
-    c->component_refused = f ? f->n_refused : 0;
-}
-
-void pal_hub_component_result(pal_hub *hub, pal_client *c)
+void pal_hub_component_result(pal_client *c)
 {
     const pal_frame *f = c->room->stream->frame;
     pal_diagnostic diag = {""};
     if (!c->component_until_ns || !f) return;
     bool refused = f->n_refused > c->component_refused;
     if (refused) pal_session_last_diagnostic(c->room->session, &diag);
-    if (diag.text[0]) pal_hub_send_error(hub, c, "refused", "component: %s", diag.text);
-    if (refused || pal_loop_now_ns(hub->loop) > c->component_until_ns) c->component_until_ns = 0;
+    if (diag.text[0]) pal_hub_refuse(c, "refused", "component: %s", diag.text);
+    if (refused || pal_loop_now_ns(c->hub->loop) > c->component_until_ns) c->component_until_ns = 0;
 }
 
-void pal_hub_run_component(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
+bool pal_hub_run_component(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
+    const pal_frame *f = c->room->stream->frame;
     double part = pal_hub_arg(command, "part", -1);
     pal_command order = {.kind = PAL_COMMAND_COMPONENT, .wanted = pal_hub_arg(command, "enabled", 0) != 0};
-    if (!(part >= 0 && part < c->room->stream->n_part)) {
-        pal_hub_send_error(hub, c, "args", "component: part %g, wanted 0 to %d", part, c->room->stream->n_part - 1);
-        return;
-    }
-    if (strlen(command->target) >= sizeof order.component) {
-        pal_hub_send_error(hub, c, "target", "there is no component %s", command->target);
-        return;
-    }
+    if (!(part >= 0 && part < c->room->stream->n_part))
+        return pal_hub_refuse(c, "args", "component: part %g, wanted 0 to %d", part, c->room->stream->n_part - 1);
+    if (strlen(command->target) >= sizeof order.component)
+        return pal_hub_refuse(c, "target", "there is no component %s", command->target);
     order.body = (int)part;
     strcpy(order.component, command->target);
-    note_asked(hub, c);
-    pal_hub_session_command(hub, c, verb->name, &order);
+    /* the world answers between two steps, with a count of refusals and the last diagnostic */
+    c->component_until_ns = pal_loop_now_ns(c->hub->loop) + PAL_ANSWER_NS;
+    c->component_refused = f ? f->n_refused : 0;
+    return pal_hub_session_command(c, verb->name, &order);
 }

@@ -7,5 +7,5 @@ void pal_hub_put_plan(const pal_hub_room *room, pal_wire_plan *out); /* as at op
 void pal_hub_status_plan(const pal_hub_room *room, const pal_frame *frame, pal_wire_status *out);
 void pal_hub_count_unobserved(pal_hub_room *room); /* called at every tick */
 /* sends the refusal of the client's last command about a component, once the world has reported it */
-void pal_hub_component_result(pal_hub *hub, pal_client *client);
+void pal_hub_component_result(pal_client *client);
 #endif

@@ -14,7 +14,7 @@
 #include <string.h>
 
 /* the named body, or the first that can be sculpted; -1: an error was sent */
-static int find_body(pal_hub *hub, pal_client *c, const pal_wire_command *command)
+static int find_body(pal_client *c, const pal_wire_command *command)
 {
     const pal_stream *s = c->room->stream;
     for (int b = 0; b < s->n_part; b++) {
@@ -24,9 +24,9 @@ static int find_body(pal_hub *hub, pal_client *c, const pal_wire_command *comman
         if (named) break;
     }
     if (command->target[0])
-        pal_hub_send_error(hub, c, "target", "%s cannot be sculpted", command->target);
+        pal_hub_refuse(c, "target", "%s cannot be sculpted", command->target);
     else
-        pal_hub_send_error(hub, c, "target", "nothing here can be sculpted");
+        pal_hub_refuse(c, "target", "nothing here can be sculpted");
     return -1;
 }
 
@@ -46,23 +46,20 @@ static double frame_offset(const pal_hub_room *room, int body, const double dire
 
 /* picks the nearest point of the displayed surface, as a control face and a rest position in the body's frame; false:
  * the surface is too far away, an error was sent */
-static bool pick(pal_hub *hub, pal_client *c, int body, const pal_wire_command *command, bool second, pal_pick *out)
+static bool pick(pal_client *c, int body, const pal_wire_command *command, bool second, pal_pick *out)
 {
     const double at[3] = {pal_hub_arg(command, second ? "x2_m" : "x_m", 0),
                           pal_hub_arg(command, second ? "y2_m" : "y_m", 0),
                           pal_hub_arg(command, second ? "z2_m" : "z_m", 0)};
     const pal_stream *s = c->room->stream;
-    pal_shown shown;
+    const pal_shown *shown = &pal_session_view_outline(c->room->session)->part[body];
     double origin[3], reach_m = PAL_PICK_REACH * pal_dist3(s->box_min_m, s->box_max_m);
-    pal_session_shown(c->room->session, body, &shown);
-    bool moved = s->frame && s->frame->part[body].n_vertex == shown.n_vertex;
-    bool found = shown.face && pal_pick_nearest(&shown, moved ? s->frame->part[body].position_m : NULL, at, out) &&
+    bool moved = s->frame && s->frame->part[body].n_vertex == shown->n_vertex;
+    bool found = shown->face && pal_pick_nearest(shown, moved ? s->frame->part[body].position_m : NULL, at, out) &&
                  out->distance_m <= reach_m;
-    if (!found) {
-        pal_hub_send_error(hub, c, "refused", "%s: nothing of %s is at %g %g %g m", command->verb,
-                           s->part[body].info.name, at[0], at[1], at[2]);
-        return false;
-    }
+    if (!found)
+        return pal_hub_refuse(c, "refused", "%s: nothing of %s is at %g %g %g m", command->verb,
+                              s->part[body].info.name, at[0], at[1], at[2]);
     body_origin(pal_session_scene(c->room->session), body, origin);
     pal_axpy3(out->rest_m, -1, origin);
     return true;
@@ -81,36 +78,31 @@ static double *points_now(const pal_hub_room *room, int body, int *n)
 /* ---- edits ---- */
 
 /* builds a cell edit from the picked points; false: an error was sent */
-static bool read_cells(pal_hub *hub, pal_client *c, int kind, const pal_wire_command *command, pal_job *job)
+static bool read_cells(pal_client *c, int kind, const pal_wire_command *command, pal_job *job)
 {
     pal_pick a, b = {.face = -1};
-    if (!pick(hub, c, job->body, command, false, &a)) return false;
+    if (!pick(c, job->body, command, false, &a)) return false;
     bool two = kind == PAL_CELLS_MERGE || kind == PAL_CELLS_BRIDGE;
-    if (two && !pick(hub, c, job->body, command, true, &b)) return false;
+    if (two && !pick(c, job->body, command, true, &b)) return false;
     double entity = pal_hub_arg(command, "entity", 0);
-    if (entity != 0 && entity != 1 && entity != 2) {
-        pal_hub_send_error(hub, c, "args", "sharpen: entity is %g, wanted 0 (vertex), 1 (edge) or 2 (face)", entity);
-        return false;
-    }
+    if (entity != 0 && entity != 1 && entity != 2)
+        return pal_hub_refuse(c, "args", "sharpen: entity is %g, wanted 0 (vertex), 1 (edge) or 2 (face)", entity);
     if (entity == 1) kind = PAL_CELLS_SHARPEN_EDGE;
     if (entity == 2) kind = PAL_CELLS_SHARPEN_FACE;
     job->command.kind = PAL_SCULPT_CELLS;
     job->command.cells = (pal_cells_command){.kind = (pal_cells_command_kind)kind,
-                                             .cell = pal_sculptor_cell(job->sculptor, a.face),
-                                             .face = a.face,
                                              .other_face = b.face,
-                                             .edge = pal_sculptor_nearest_edge(job->sculptor, a.face, a.rest_m),
-                                             .vertex = pal_sculptor_nearest_vertex(job->sculptor, a.face, a.rest_m),
                                              .distance_m = pal_hub_arg(command, "distance_m", 0),
                                              .scale = pal_hub_arg(command, "scale", 1),
                                              .sharp = (float)pal_hub_arg(command, "sharpness", 0)};
+    pal_sculptor_find(job->sculptor, a.face, a.rest_m, &job->command.cells);
     return true;
 }
 
-static bool read_paint(pal_hub *hub, pal_client *c, const pal_wire_command *command, pal_job *job)
+static bool read_paint(pal_client *c, const pal_wire_command *command, pal_job *job)
 {
     pal_pick at;
-    if (!pick(hub, c, job->body, command, false, &at)) return false;
+    if (!pick(c, job->body, command, false, &at)) return false;
     job->command.kind = PAL_SCULPT_PAINT;
     job->command.stroke = (pal_stroke){.radius_m = pal_hub_arg(command, "radius_m", 0),
                                        .softness = pal_hub_arg(command, "softness", PAL_BRUSH_SOFTNESS),
@@ -120,19 +112,16 @@ static bool read_paint(pal_hub *hub, pal_client *c, const pal_wire_command *comm
     return true;
 }
 
-static bool read_edit(pal_hub *hub, pal_client *c, const pal_wire_command *command, pal_job *job)
+static bool read_edit(pal_client *c, const pal_wire_command *command, pal_job *job)
 {
-    const pal_verb *verb = hub->verb;
+    const pal_verb *verb = c->hub->verb;
     pal_sculpt *to = &job->command;
     while (strcmp(verb->name, command->verb)) verb++;
-    job->body = find_body(hub, c, command);
+    job->body = find_body(c, command);
     if (job->body < 0) return false;
-    pal_hub_body_edits *at = pal_hub_edits(hub, c->room, job->body);
-    if (!at->sculptor &&
-        pal_sculptor_create(pal_session_scene(c->room->session), job->body, &job->diag, &at->sculptor)) {
-        pal_hub_send_error(hub, c, "refused", "%s: %s", command->verb, job->diag.text);
-        return false;
-    }
+    pal_hub_body_edits *at = &c->room->edits[job->body];
+    if (!at->sculptor && pal_sculptor_create(pal_session_scene(c->room->session), job->body, &job->diag, &at->sculptor))
+        return pal_hub_refuse(c, "refused", "%s: %s", command->verb, job->diag.text);
     job->sculptor = at->sculptor;
     switch (verb->detail) {
     case PAL_EDIT_UNDO:
@@ -154,37 +143,37 @@ static bool read_edit(pal_hub *hub, pal_client *c, const pal_wire_command *comma
         to->point_m = job->point_m = points_now(c->room, job->body, &to->n_point);
         return true;
     case PAL_EDIT_PAINT:
-        return read_paint(hub, c, command, job);
+        return read_paint(c, command, job);
     default:
-        return read_cells(hub, c, verb->detail, command, job);
+        return read_cells(c, verb->detail, command, job);
     }
 }
 
 static pal_err prepare_edit(pal_job *job, const pal_scene **scene)
 {
-    PAL_TRY(pal_sculptor_prepare(job->sculptor, job->scene, &job->command, &job->diag, &job->edit));
-    *scene = pal_sculpt_edit_scene(job->edit);
+    PAL_TRY(pal_sculptor_prepare(job->sculptor, job->scene, &job->command, &job->diag, &job->made.edit));
+    *scene = pal_sculpt_edit_scene(job->made.edit);
     return PAL_ERR_OK;
 }
 
 static void transfer_edit(pal_job *job)
 {
-    pal_session_transfer_begin(job->next, job->session, pal_sculpt_transfer, job->edit);
+    pal_session_transfer_begin(job->made.session, job->session, pal_sculpt_transfer, job->made.edit);
 }
 
-static void commit_edit(pal_hub_body_edits *at, pal_job *job, pal_retired *retired)
+static void commit_edit(pal_hub_body_edits *at, pal_job *job, pal_job_products *retired)
 {
-    pal_sculptor_commit(at->sculptor, job->edit);
+    pal_sculptor_commit(at->sculptor, job->made.edit);
     retired->edit = at->edit, retired->change = at->change;
-    at->edit = job->edit, at->change = NULL;
+    at->edit = job->made.edit, at->change = NULL;
     free(at->base);
     at->base = NULL;
-    job->edit = NULL;
+    job->made.edit = NULL;
 }
 
-static void answer_edit(pal_hub *hub, pal_client *c, const pal_job *job)
+static void answer_edit(pal_client *c, const pal_job *job)
 {
-    pal_wire_answer *a = pal_hub_answer_begin(hub, job->verb);
+    pal_wire_answer *a = pal_hub_answer_begin(c, job->verb);
     double prepare_ms = 1e-6 * (double)(job->made_ns - job->asked_ns);
     int n_cell = pal_sculptor_cells(job->sculptor)->n_cell;
     snprintf(a->text, sizeof a->text, "%s: %d control cells, prepared in %.0f ms", job->verb, n_cell, prepare_ms);
@@ -192,7 +181,7 @@ static void answer_edit(pal_hub *hub, pal_client *c, const pal_job *job)
     pal_hub_answer_arg(a, "can_undo", pal_sculptor_undo_count(job->sculptor));
     pal_hub_answer_arg(a, "can_redo", pal_sculptor_redo_count(job->sculptor));
     pal_hub_answer_arg(a, "prepare_ms", prepare_ms);
-    pal_hub_send(hub, c, hub->control);
+    pal_hub_send(c);
 }
 
 static const pal_job_type edit_job = {.read = read_edit,
@@ -201,42 +190,39 @@ static const pal_job_type edit_job = {.read = read_edit,
                                       .commit = commit_edit,
                                       .answer = answer_edit};
 
-void pal_hub_run_edit(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
+bool pal_hub_run_edit(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
     (void)verb;
-    if (find_body(hub, c, command) >= 0) pal_hub_jobs_enqueue(hub, c, &edit_job, command);
+    return find_body(c, command) >= 0 && pal_hub_jobs_enqueue(c, &edit_job, command);
 }
 
 /* ---- immediate commands ---- */
 
-void pal_hub_run_probe(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
+bool pal_hub_run_probe(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
-    int body = find_body(hub, c, command);
+    int body = find_body(c, command);
     pal_material m;
     pal_pick at;
-    if (body < 0 || !pick(hub, c, body, command, false, &at)) return;
+    if (body < 0 || !pick(c, body, command, false, &at)) return false;
     pal_body_def *def = malloc(sizeof *def);
-    if (!def) {
-        pal_hub_send_error(hub, c, "refused", "%s: %s", verb->name, pal_err_text(PAL_ERR_MEMORY));
-        return;
-    }
+    if (!def) return pal_hub_refuse(c, "refused", "%s: %s", verb->name, pal_err_text(PAL_ERR_MEMORY));
     *def = pal_session_scene(c->room->session)->body[body];
     pal_session_material(c->room->session, body, &def->material);
     pal_material_painted(def, at.rest_m, &m);
     free(def);
-    pal_wire_answer *to = pal_hub_answer_begin(hub, verb->name);
+    pal_wire_answer *to = pal_hub_answer_begin(c, verb->name);
     snprintf(to->text, sizeof to->text, "probe: E %.4g Pa, density %.4g kg/m3", m.young_Pa, m.density_kg_m3);
     pal_hub_answer_arg(to, "young_Pa", m.young_Pa);
     pal_hub_answer_arg(to, "poisson", m.poisson);
     pal_hub_answer_arg(to, "density_kg_m3", m.density_kg_m3);
     pal_hub_answer_arg(to, "face", at.face);
-    pal_hub_send(hub, c, hub->control);
+    pal_hub_send(c);
+    return true;
 }
 
 /* Sets the rest positions of a brush. A repeat of the tool's last request keeps its positions, however far the surface
  * has moved since. false: an error was sent */
-static bool place_brush(pal_hub *hub, pal_client *c, int body, const pal_wire_command *command, pal_hub_tool_brush *h,
-                        pal_brush *to)
+static bool place_brush(pal_client *c, int body, const pal_wire_command *command, pal_hub_tool_brush *h, pal_brush *to)
 {
     static const char *const key[6] = {"x_m", "y_m", "z_m", "x2_m", "y2_m", "z2_m"};
     bool same = h->brush.kind == to->kind && h->member == c->id && h->body == body;
@@ -249,8 +235,8 @@ static bool place_brush(pal_hub *hub, pal_client *c, int body, const pal_wire_co
     if (same) {
         pal_copy3(to->at_m, h->brush.at_m), pal_copy3(to->to_m, h->brush.to_m);
     } else {
-        if (!pick(hub, c, body, command, false, &a)) return false;
-        if (to->kind == PAL_BRUSH_CURVE && !pick(hub, c, body, command, true, &b)) return false;
+        if (!pick(c, body, command, false, &a)) return false;
+        if (to->kind == PAL_BRUSH_CURVE && !pick(c, body, command, true, &b)) return false;
         pal_copy3(to->at_m, a.rest_m);
         if (b.face >= 0) pal_copy3(to->to_m, b.rest_m);
     }
@@ -259,16 +245,12 @@ static bool place_brush(pal_hub *hub, pal_client *c, int body, const pal_wire_co
     return true;
 }
 
-void pal_hub_run_brush(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
+bool pal_hub_run_brush(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
-    int body = find_body(hub, c, command), tool = pal_members_find(&c->room->members, c->id)->tool;
-    if (body < 0) return;
-    if (tool < 0) {
-        pal_hub_send_error(hub, c, "tool", "%s: take a tool first", verb->name);
-        return;
-    }
-    if (!pal_hub_jobs_create(hub, c, verb->name)) return;
-    pal_hub_tool_brush *h = &hub->jobs->brush[c->room - hub->room][tool], next = *h;
+    int body = find_body(c, command), tool = pal_members_find(&c->room->members, c->id)->tool;
+    if (body < 0) return false;
+    if (tool < 0) return pal_hub_refuse(c, "tool", "%s: take a tool first", verb->name);
+    pal_hub_tool_brush *h = &c->room->brush[tool], next = *h;
     pal_diagnostic diag = {""};
     pal_command order = {.kind = PAL_COMMAND_BRUSH, .body = body, .slot = tool};
     pal_brush *b = &order.brush;
@@ -279,19 +261,17 @@ void pal_hub_run_brush(pal_hub *hub, pal_client *c, const pal_verb *verb, const 
     b->stiffness_N_m = pal_hub_arg(command, "stiffness_N_m", 0);
     pal_set3(b->lift_m, pal_hub_arg(command, "dx_m", 0), pal_hub_arg(command, "dy_m", 0),
              pal_hub_arg(command, "dz_m", 0));
-    if (b->kind != PAL_BRUSH_NONE && !place_brush(hub, c, body, command, &next, b)) return;
+    if (b->kind != PAL_BRUSH_NONE && !place_brush(c, body, command, &next, b)) return false;
     /* a tool has one brush, on one body */
     pal_command before = {.kind = PAL_COMMAND_BRUSH, .body = h->body, .slot = tool};
     if (h->brush.kind != PAL_BRUSH_NONE && h->body != body) (void)pal_session_command(c->room->session, &before);
     pal_err err = b->kind == PAL_BRUSH_NONE ? PAL_ERR_OK : pal_brush_check(b, &diag);
     if (!err) err = pal_session_command(c->room->session, &order);
-    if (err) {
-        pal_hub_send_error(hub, c, "refused", "%s: %s", verb->name, diag.text[0] ? diag.text : pal_err_text(err));
-        return;
-    }
+    if (err) return pal_hub_refuse(c, "refused", "%s: %s", verb->name, diag.text[0] ? diag.text : pal_err_text(err));
     *h = next;
     h->brush = *b;
-    pal_wire_answer *a = pal_hub_answer_begin(hub, verb->name);
+    pal_wire_answer *a = pal_hub_answer_begin(c, verb->name);
     snprintf(a->text, sizeof a->text, "%s: tool %d", verb->name, tool);
-    pal_hub_send(hub, c, hub->control);
+    pal_hub_send(c);
+    return true;
 }

@@ -3,38 +3,38 @@
 
 #include "server/net/hub_peers.h"
 
-void pal_hub_run_steering(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
+bool pal_hub_run_steering(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
     (void)command;
-    pal_hub_session_command(hub, c, verb->name, &(pal_command){.kind = (pal_command_kind)verb->detail});
+    return pal_hub_session_command(c, verb->name, &(pal_command){.kind = (pal_command_kind)verb->detail});
 }
 
 /* a body is frozen for everybody, so everybody may reset it */
-void pal_hub_run_reset(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
+bool pal_hub_run_reset(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
     const pal_frame *f = c->room->stream->frame;
     bool whole = !command->target[0];
-    int body = pal_hub_find_body(hub, c, command->target, 0);
-    if (body < 0) return;
-    if (!pal_members_may_command(&c->room->members, c->id) &&
-        (whole || !f || body >= f->n_part || !f->part[body].frozen)) {
-        pal_hub_send_error(hub, c, "role", "reset: a viewer resets nothing but a frozen body");
-        return;
-    }
-    pal_hub_session_command(
-        hub, c, verb->name,
+    int body = pal_hub_find_body(c, command->target, 0);
+    if (body < 0) return false;
+    if (pal_members_find(&c->room->members, c->id)->role == PAL_MEMBER_VIEWER &&
+        (whole || !f || body >= f->n_part || !f->part[body].frozen))
+        return pal_hub_refuse(c, "role", "reset: a viewer resets nothing but a frozen body");
+    return pal_hub_session_command(
+        c, verb->name,
         &(pal_command){.kind = whole ? PAL_COMMAND_RESET : PAL_COMMAND_RESET_BODY, .body = whole ? 0 : body});
 }
 
-void pal_hub_run_material(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
+bool pal_hub_run_material(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
-    int body = pal_hub_find_body(hub, c, command->target, 0);
-    if (body < 0) return;
+    int body = pal_hub_find_body(c, command->target, 0);
+    if (body < 0) return false;
     pal_material m = c->room->material[body];
     m.young_Pa = pal_hub_arg(command, "young_Pa", m.young_Pa);
     m.poisson = pal_hub_arg(command, "poisson", m.poisson);
     m.density_kg_m3 = pal_hub_arg(command, "density_kg_m3", m.density_kg_m3);
     m.damping_1_s = pal_hub_arg(command, "damping_1_s", m.damping_1_s);
     pal_command order = {.kind = PAL_COMMAND_MATERIAL, .body = body, .material = m};
-    if (pal_hub_session_command(hub, c, verb->name, &order)) c->room->material[body] = m;
+    if (!pal_hub_session_command(c, verb->name, &order)) return false;
+    c->room->material[body] = m;
+    return true;
 }

@@ -11,88 +11,80 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* finds a point of the room's study; -1: an error was sent */
-static int read_point(pal_hub *hub, pal_client *c, int body, const pal_wire_command *command)
+/* finds a point of the room's study; false: an error was sent */
+static bool read_point(pal_client *c, int body, const pal_wire_command *command, int *point, pal_configuration *to)
 {
     const pal_hub_room *room = c->room;
     double index = pal_hub_arg(command, "index", -1);
-    if (!room->study.configuration || body != room->study.body) {
-        pal_hub_send_error(hub, c, "refused", "study_point: there is no study of %s here",
-                           pal_session_scene(room->session)->body[body].name);
-        return -1;
-    }
-    if (!(index >= 0 && index < room->study.n && index == floor(index))) {
-        pal_hub_send_error(hub, c, "args", "study_point: index %g, wanted 0 to %d", index, room->study.n - 1);
-        return -1;
-    }
-    return (int)index;
+    if (!room->study.configuration || body != room->study.body)
+        return pal_hub_refuse(c, "refused", "study_point: there is no study of %s here",
+                              pal_session_scene(room->session)->body[body].name);
+    if (!(index >= 0 && index < room->study.n && index == floor(index)))
+        return pal_hub_refuse(c, "args", "study_point: index %g, wanted 0 to %d", index, room->study.n - 1);
+    *point = (int)index;
+    *to = room->study.configuration[*point].configuration;
+    return true;
 }
 
 /* the current configuration with the given parameters changed; false: an error was sent */
-static bool read_parameters(pal_hub *hub, pal_client *c, int body, const pal_wire_command *command,
-                            pal_configuration *to)
+static bool read_parameters(pal_client *c, int body, const pal_wire_command *command, pal_configuration *to)
 {
     double size = pal_hub_arg(command, "size", 0), step_ms = pal_hub_arg(command, "step_ms", 0),
            tolerance = pal_hub_arg(command, "tolerance", 0);
     pal_configuration_of(pal_session_scene(c->room->session), body, to);
-    if (!(size >= -1 && size <= 10000 && size == floor(size))) {
-        pal_hub_send_error(hub, c, "args", "configure: size %g is no number of voxels or levels", size);
-        return false;
-    }
+    if (!(size >= -1 && size <= 10000 && size == floor(size)))
+        return pal_hub_refuse(c, "args", "configure: size %g is no number of voxels or levels", size);
     bool other = size != 0 && (int)size != to->size;
-    if (other && to->k_distance_J > 0) {
-        pal_hub_send_error(
-            hub, c, "refused",
+    if (other && to->k_distance_J > 0)
+        return pal_hub_refuse(
+            c, "refused",
             "configure: the springs are calibrated for %d voxels, and their constants hold for no other size",
             to->size);
-        return false;
-    }
     if (other) to->size = (int)size;
     if (step_ms != 0) to->step_s = 1e-3 * step_ms;
     if (tolerance != 0) to->tolerance = tolerance;
     return true;
 }
 
-static bool read_switch(pal_hub *hub, pal_client *c, const pal_wire_command *command, pal_job *job)
+static bool read_switch(pal_client *c, const pal_wire_command *command, pal_job *job)
 {
-    bool by_point = pal_hub_has_arg(command, "index");
-    job->body = pal_hub_find_body(hub, c, command->target, c->room->study.configuration ? c->room->study.body : 0);
+    int point = -1;
+    job->body = pal_hub_find_body(c, command->target, c->room->study.configuration ? c->room->study.body : 0);
     if (job->body < 0) return false;
-    int point = by_point ? read_point(hub, c, job->body, command) : -1;
-    if (by_point ? point < 0 : !read_parameters(hub, c, job->body, command, &job->configuration)) return false;
-    if (by_point) job->configuration = c->room->study.configuration[point].configuration;
+    if (!isnan(pal_hub_arg(command, "index", NAN)) ? !read_point(c, job->body, command, &point, &job->configuration)
+                                                   : !read_parameters(c, job->body, command, &job->configuration))
+        return false;
     pal_hub_shown_errors(c->room, job->body, point, &job->configuration, &job->error_now_m, &job->error_then_m);
-    job->was = pal_hub_edits(hub, c->room, job->body)->base;
+    job->was = c->room->edits[job->body].base;
     if (job->was) return true;
     /* first switch: keeps the body as it is, so that the switch can be reverted */
     job->was = job->base = malloc(sizeof *job->base);
     if (job->base) *job->base = pal_session_scene(c->room->session)->body[job->body];
-    if (!job->base) pal_hub_send_error(hub, c, "refused", "%s: %s", command->verb, pal_err_text(PAL_ERR_MEMORY));
-    return job->base != NULL;
+    return job->base || pal_hub_refuse(c, "refused", "%s: %s", command->verb, pal_err_text(PAL_ERR_MEMORY));
 }
 
 static pal_err prepare_switch(pal_job *job, const pal_scene **scene)
 {
     PAL_TRY(pal_configuration_switch_prepare(job->scene, job->was, job->body, &job->configuration, &job->diag,
-                                             &job->change));
-    *scene = pal_configuration_switch_scene(job->change);
+                                             &job->made.change));
+    *scene = &job->made.change->set->scene;
     return PAL_ERR_OK;
 }
 
 static void transfer_switch(pal_job *job)
 {
-    pal_session_rehearse(job->next, job->session, pal_configuration_switch_snapshot, pal_configuration_switch_rehearse,
-                         job->change);
-    pal_session_transfer_begin(job->next, job->session, pal_configuration_switch_transfer, job->change);
-    job->report = *pal_configuration_switch_report(job->change);
+    pal_session_rehearse(job->made.session, job->session, pal_configuration_switch_snapshot,
+                         pal_configuration_switch_rehearse, job->made.change);
+    pal_session_transfer_begin(job->made.session, job->session, pal_configuration_switch_transfer, job->made.change);
+    job->report = job->made.change->report;
 }
 
-static void commit_switch(pal_hub_body_edits *at, pal_job *job, pal_retired *retired)
+static void commit_switch(pal_hub_body_edits *at, pal_job *job, pal_job_products *retired)
 {
     retired->change = at->change;
-    at->change = job->change;
+    at->change = job->made.change;
     at->base = job->base ? job->base : at->base;
-    job->change = NULL, job->base = NULL;
+    job->made.change = NULL, job->base = NULL;
 }
 
 /* adds the displacement caused by the switch, and its bound from the displayed errors */
@@ -122,7 +114,7 @@ static void put_jump(const pal_hub *hub, const pal_job *job, double change, pal_
     pal_hub_answer_arg(a, "bound_m", bound_m);
 }
 
-static void answer_switch(pal_hub *hub, pal_client *c, const pal_job *job)
+static void answer_switch(pal_client *c, const pal_job *job)
 {
     const pal_transfer_report *r = &job->report;
     char text[PAL_CONFIGURATION_TEXT];
@@ -134,10 +126,10 @@ static void answer_switch(pal_hub *hub, pal_client *c, const pal_job *job)
     double prepare_ms = 1e-6 * (double)(job->made_ns - job->asked_ns),
            pause_ms = 1e3 * pal_session_pause_s(c->room->session, &n_rehearsed);
     pal_configuration_of(pal_session_scene(c->room->session), job->body, &now);
-    pal_wire_answer *a = pal_hub_answer_begin(hub, job->verb);
+    pal_wire_answer *a = pal_hub_answer_begin(c, job->verb);
     snprintf(a->text, sizeof a->text, "%s: %s; prepared in %.0f ms, paused for %.0f ms; energy %+.2f %%%s, ", job->verb,
              pal_configuration_text(&now, text), prepare_ms, pause_ms, change, fabs(change) > 2 ? ", beyond 2 %" : "");
-    put_jump(hub, job, change, a);
+    put_jump(c->hub, job, change, a);
     if (job->n_brush_ended > 0) {
         size_t n = strlen(a->text);
         snprintf(a->text + n, sizeof a->text - n, "; brushes that ended: %d", job->n_brush_ended);
@@ -145,7 +137,7 @@ static void answer_switch(pal_hub *hub, pal_client *c, const pal_job *job)
     pal_hub_answer_arg(a, "brushes_ended", job->n_brush_ended);
     pal_hub_answer_arg(a, "prepare_ms", prepare_ms);
     pal_hub_answer_arg(a, "pause_ms", pause_ms);
-    pal_hub_send(hub, c, hub->control);
+    pal_hub_send(c);
 }
 
 static const pal_job_type switch_job = {.read = read_switch,
@@ -155,10 +147,8 @@ static const pal_job_type switch_job = {.read = read_switch,
                                         .answer = answer_switch,
                                         .keeps_brushes = true};
 
-void pal_hub_run_switch(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
+bool pal_hub_run_switch(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
-    if (command->n_arg == 0)
-        pal_hub_send_error(hub, c, "args", "%s takes %s", verb->name, verb->args + strlen("| "));
-    else
-        pal_hub_jobs_enqueue(hub, c, &switch_job, command);
+    if (command->n_arg == 0) return pal_hub_refuse(c, "args", "%s takes %s", verb->name, verb->args + strlen("| "));
+    return pal_hub_jobs_enqueue(c, &switch_job, command);
 }

@@ -20,13 +20,8 @@ double pal_hub_arg(const pal_wire_command *command, const char *key, double othe
     return arg ? arg->value : otherwise;
 }
 
-bool pal_hub_has_arg(const pal_wire_command *command, const char *key)
-{
-    return find_arg(command, key) != NULL;
-}
-
 /* are all required arguments present, and no unknown ones? */
-static bool check_args(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
+static bool check_args(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
     bool required = true;
     uint32_t n_known = 0;
@@ -42,43 +37,35 @@ static bool check_args(pal_hub *hub, pal_client *c, const pal_verb *verb, const 
         bool there = find_arg(command, key) != NULL;
         n_known += there;
         if (there || !required) continue;
-        pal_hub_send_error(hub, c, "args", "%s: %s is missing", verb->name, key);
-        return false;
+        return pal_hub_refuse(c, "args", "%s: %s is missing", verb->name, key);
     }
-    if (n_known == command->n_arg) return true;
-    pal_hub_send_error(hub, c, "args", "%s takes %s", verb->name, verb->args[0] ? verb->args : "no numbers");
-    return false;
+    return n_known == command->n_arg ||
+           pal_hub_refuse(c, "args", "%s takes %s", verb->name, verb->args[0] ? verb->args : "no numbers");
 }
 
-static bool check_right(pal_hub *hub, pal_client *c, const pal_verb *verb)
+static bool check_right(pal_client *c, const pal_verb *verb)
 {
     const pal_member_entry *m = pal_members_find(&c->room->members, c->id);
     bool instructs = m->role == PAL_MEMBER_INSTRUCTOR;
     bool may = verb->right == PAL_RIGHT_EVERYBODY || instructs ||
                (verb->right == PAL_RIGHT_TRAINEE && m->role != PAL_MEMBER_VIEWER) ||
                (verb->right == PAL_RIGHT_TOOL && m->tool >= 0);
-    if (!may) pal_hub_send_error(hub, c, "role", "%s: only for %s", verb->name, pal_right_text(verb->right));
-    return may;
+    return may || pal_hub_refuse(c, "role", "%s: only for %s", verb->name, pal_right_text[verb->right]);
 }
 
-void pal_hub_execute(pal_hub *hub, pal_client *c, const pal_wire_command *command)
+bool pal_hub_execute(pal_client *c, const pal_wire_command *command)
 {
-    const pal_verb *verb = hub->verb, *end = hub->verb + hub->n_verb;
+    const pal_verb *verb = c->hub->verb, *end = verb + c->hub->n_verb;
     while (verb < end && strcmp(verb->name, command->verb)) verb++;
-    if (verb == end)
-        pal_hub_send_error(hub, c, "verb", "there is no command %s", command->verb);
-    else if (check_right(hub, c, verb) && check_args(hub, c, verb, command))
-        verb->run(hub, c, verb, command);
+    if (verb == end) return pal_hub_refuse(c, "verb", "there is no command %s", command->verb);
+    return check_right(c, verb) && check_args(c, verb, command) && verb->run(c, verb, command);
 }
 
-int pal_hub_find_body(pal_hub *hub, pal_client *c, const char *name, int otherwise)
+int pal_hub_find_body(pal_client *c, const char *name, int otherwise)
 {
-    const pal_scene *scene = pal_session_scene(c->room->session);
-    if (!name[0]) return otherwise;
-    for (int b = 0; b < scene->n_body; b++)
-        if (!strcmp(scene->body[b].name, name)) return b;
-    pal_hub_send_error(hub, c, "target", "there is no body %s", name);
-    return -1;
+    int body = name[0] ? pal_scene_find_body(pal_session_scene(c->room->session), name) : otherwise;
+    if (body < 0) pal_hub_refuse(c, "target", "there is no body %s", name);
+    return body;
 }
 
 void pal_hub_answer_arg(pal_wire_answer *answer, const char *key, double value)
@@ -88,16 +75,15 @@ void pal_hub_answer_arg(pal_wire_answer *answer, const char *key, double value)
     to->value = value;
 }
 
-pal_wire_answer *pal_hub_answer_begin(pal_hub *hub, const char *verb)
+pal_wire_answer *pal_hub_answer_begin(pal_client *c, const char *verb)
 {
-    pal_wire_answer *answer = &pal_hub_message(hub, PAL_CONTROL_ANSWER)->answer;
+    pal_wire_answer *answer = &pal_hub_message(c->hub, PAL_CONTROL_ANSWER)->answer;
     pal_plain_text(answer->verb, sizeof answer->verb, verb);
     return answer;
 }
 
-bool pal_hub_session_command(pal_hub *hub, pal_client *c, const char *verb, const pal_command *command)
+bool pal_hub_session_command(pal_client *c, const char *verb, const pal_command *command)
 {
     pal_err err = pal_session_command(c->room->session, command);
-    if (err) pal_hub_send_error(hub, c, err == PAL_ERR_FULL ? "busy" : "refused", "%s: %s", verb, pal_err_text(err));
-    return !err;
+    return !err || pal_hub_refuse(c, err == PAL_ERR_FULL ? "busy" : "refused", "%s: %s", verb, pal_err_text(err));
 }

@@ -5,22 +5,11 @@
 #include "server/mesh/cells/cell_edits.h"
 #include "server/net/hub_core.h"
 
-/* X(right, who, in plain words) */
-#define PAL_RIGHT_TABLE(X)                                                                                             \
-    X(EVERYBODY, "everybody")                                                                                          \
-    X(TRAINEE, "trainees and instructors")                                                                             \
-    X(TOOL, "instructors and holders of a tool")                                                                       \
-    X(INSTRUCTOR, "instructors")
+/* who may give a command */
+typedef enum pal_right { PAL_RIGHT_EVERYBODY, PAL_RIGHT_TRAINEE, PAL_RIGHT_TOOL, PAL_RIGHT_INSTRUCTOR } pal_right;
 
-typedef enum pal_right {
-#define X(name, who) PAL_RIGHT_##name,
-    PAL_RIGHT_TABLE(X)
-#undef X
-        PAL_RIGHT_COUNT
-} pal_right;
-
-/* called after permission and keys are checked; sends an answer or an error */
-typedef void pal_verb_run(pal_hub *hub, pal_client *client, const pal_verb *verb, const pal_wire_command *command);
+/* called after permission and keys are checked; sends an answer or an error. false: an error */
+typedef bool pal_verb_run(pal_client *client, const pal_verb *verb, const pal_wire_command *command);
 
 struct pal_verb {
     const char *name;
@@ -36,8 +25,7 @@ extern const int pal_verb_count;
 /* formats a table as text, one line per verb with tab-separated name, permission, arguments and description; returns
  * the number of bytes of the whole text, as snprintf does. Thread: any */
 int pal_verb_describe(const pal_verb *verb, int n_verb, char *text, size_t cap);
-/* who may give a command, in words */
-const char *pal_right_text(pal_right right);
+extern const char *const pal_right_text[]; /* the same in words, by pal_right */
 
 /* functions of the table, in hub_steering.c, hub_plan.c, hub_accuracy.c, hub_switch.c and hub_sculpt.c */
 pal_verb_run pal_hub_run_steering, pal_hub_run_reset, pal_hub_run_material, pal_hub_run_component, pal_hub_run_estimate,
@@ -45,16 +33,15 @@ pal_verb_run pal_hub_run_steering, pal_hub_run_reset, pal_hub_run_material, pal_
 /* detail of a brush is a pal_brush_kind, of an edit a pal_cells_command_kind or one of these */
 enum { PAL_EDIT_PAINT = 100, PAL_EDIT_SET_REST, PAL_EDIT_CUT, PAL_EDIT_UNCUT, PAL_EDIT_UNDO, PAL_EDIT_REDO };
 
-/* finds the verb, checks permission and keys, and runs it; sends an error on failure */
-void pal_hub_execute(pal_hub *hub, pal_client *client, const pal_wire_command *command);
+/* finds the verb, checks permission and keys, and runs it; false: an error was sent */
+bool pal_hub_execute(pal_client *client, const pal_wire_command *command);
 /* value of an argument; otherwise: its default */
 double pal_hub_arg(const pal_wire_command *command, const char *key, double otherwise);
-bool pal_hub_has_arg(const pal_wire_command *command, const char *key);
 /* body of that name; "": otherwise. -1: no such body, an error was sent */
-int pal_hub_find_body(pal_hub *hub, pal_client *client, const char *name, int otherwise);
+int pal_hub_find_body(pal_client *client, const char *name, int otherwise);
 /* starts an answer in hub->control, which pal_hub_send sends */
-pal_wire_answer *pal_hub_answer_begin(pal_hub *hub, const char *verb);
+pal_wire_answer *pal_hub_answer_begin(pal_client *client, const char *verb);
 void pal_hub_answer_arg(pal_wire_answer *answer, const char *key, double value);
 /* forwards a command to the session; sends an error when the session refuses it. true: accepted */
-bool pal_hub_session_command(pal_hub *hub, pal_client *client, const char *verb, const pal_command *command);
+bool pal_hub_session_command(pal_client *client, const char *verb, const pal_command *command);
 #endif

@@ -5,16 +5,8 @@
 
 #include <arpa/inet.h>
 #include <sched.h>
-#include <stdatomic.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* users counts the threads inside wake: disconnecting waits for them, wake waits for nobody */
-struct pal_server_gate {
-    _Atomic(pal_loop *) loop;
-    _Atomic int users;
-};
 
 struct pal_server {
     pal_loop *loop;
@@ -23,17 +15,8 @@ struct pal_server {
     const pal_transport_ops *ops;
     pal_transport *transport;
     pal_server_gate *gate;
+    pal_listen_address address;
 };
-
-pal_server_gate *pal_server_gate_create(void)
-{
-    return calloc(1, sizeof(pal_server_gate));
-}
-
-void pal_server_gate_destroy(pal_server_gate *gate)
-{
-    free(gate);
-}
 
 void pal_server_gate_wake(void *gate)
 {
@@ -52,13 +35,6 @@ void pal_server_connect(pal_server *server, pal_server_gate *gate)
     pal_loop_wake(server->loop);
 }
 
-static void disconnect(pal_server *server)
-{
-    if (!server->gate) return;
-    atomic_store(&server->gate->loop, NULL);
-    while (atomic_load(&server->gate->users)) sched_yield();
-}
-
 static bool is_loopback(const char *listen)
 {
     struct in_addr v4;
@@ -73,7 +49,7 @@ static bool is_address(const char *listen)
     return inet_pton(AF_INET, listen, bytes) == 1 || inet_pton(AF_INET6, listen, bytes) == 1;
 }
 
-static pal_err make_url(const pal_server_options *options, char *url, size_t cap, pal_diagnostic *diag)
+static pal_err choose_address(const pal_server_options *options, pal_listen_address *out, pal_diagnostic *diag)
 {
     const char *listen = options->listen && options->listen[0] ? options->listen : "127.0.0.1";
     if (!strcmp(listen, "localhost")) listen = "127.0.0.1";
@@ -85,24 +61,22 @@ static pal_err make_url(const pal_server_options *options, char *url, size_t cap
                           "listening on %s lets other machines in, without password or encryption: add "
                           "--allow-remote if that is meant",
                           listen);
-    snprintf(url, cap, strchr(listen, ':') ? "ws://[%.80s]:%d%s" : "ws://%.80s:%d%s", listen, options->port,
-             options->allow_remote ? "?hosts=any" : "");
+    *out = (pal_listen_address){listen, options->port, options->allow_remote};
     return PAL_ERR_OK;
 }
 
 static pal_err open_parts(pal_server *s, const pal_server_options *options, pal_session **session, int n_session,
                           pal_diagnostic *diag)
 {
-    char url[160];
     pal_peer_events events;
-    PAL_TRY(make_url(options, url, sizeof url, diag));
+    PAL_TRY(choose_address(options, &s->address, diag));
     if (options->viewer_folder) PAL_TRY(pal_site_open(options->viewer_folder, diag, &s->site));
     /* besides the clients: page loads, and what lws needs itself */
     int max_socket = (options->max_clients > 0 ? options->max_clients : PAL_HUB_CLIENTS) + 128;
     PAL_TRY(pal_loop_create(s->ops->sockets, max_socket, pal_session_clock(session[0]), diag, &s->loop));
     PAL_TRY(pal_hub_create(s->loop, options, s->site, session, n_session, diag, &s->hub));
     pal_hub_events(s->hub, &events);
-    return s->ops->open(s->loop, url, &events, diag, &s->transport);
+    return s->ops->open(s->loop, &s->address, &events, diag, &s->transport);
 }
 
 pal_err pal_server_open(const pal_server_options *options, pal_session **session, int n_session, pal_diagnostic *diag,
@@ -136,13 +110,14 @@ void pal_server_stop(pal_server *server)
 
 int pal_server_port(const pal_server *server)
 {
-    return server->ops->port(server->transport);
+    return server->address.port;
 }
 
 void pal_server_close(pal_server *server)
 {
     if (!server) return;
-    disconnect(server);
+    if (server->gate) atomic_store(&server->gate->loop, NULL);
+    while (server->gate && atomic_load(&server->gate->users)) sched_yield();
     pal_loop_shut(server->loop);
     if (server->transport) server->ops->close(server->transport);
     pal_hub_destroy(server->hub);

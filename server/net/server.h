@@ -4,18 +4,22 @@
 #define PAL_NET_SERVER_H
 #include "server/net/hub.h"
 
+#include <stdatomic.h>
+
 typedef struct pal_server pal_server;
 
 /* REFUSED: the address needs allow_remote, or the port is in use (the diagnostic names it). Borrows sessions until
  * close. [load] */
 pal_err pal_server_open(const pal_server_options *options, pal_session **session, int n_session, pal_diagnostic *diag,
                         pal_server **out);
-/* The wake callback of sessions; user: a pal_server_gate. It is created before the sessions, because they start before
- * the server exists. Waking an unconnected gate does nothing. A closing server disconnects its gate first, so sessions
- * and server may be closed in either order; the gate is destroyed last. */
-typedef struct pal_server_gate pal_server_gate;
-pal_server_gate *pal_server_gate_create(void);                      /* NULL: out of memory */
-void pal_server_gate_destroy(pal_server_gate *gate);                /* after the sessions that wake it */
+/* The wake callback of sessions; user: a zeroed pal_server_gate. It exists before the sessions, because they start
+ * before the server exists. Waking an unconnected gate does nothing. A closing server disconnects its gate first, so
+ * sessions and server may be closed in either order; the gate outlives both. */
+typedef struct pal_server_gate {
+    _Atomic(pal_loop *) loop; /* NULL: unconnected */
+    /* threads inside wake: disconnecting waits for them, wake waits for nobody */
+    _Atomic int users;
+} pal_server_gate;
 void pal_server_gate_wake(void *gate);                              /* [any] */
 void pal_server_connect(pal_server *server, pal_server_gate *gate); /* [load] */
 

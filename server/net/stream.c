@@ -3,7 +3,6 @@
 
 #include "protocol/asset.h"
 #include "protocol/field_codec.h"
-#include "protocol/frame_codec.h"
 #include "server/base/clock.h"
 #include "server/base/log.h"
 #include "server/net/transport/plain_text.h"
@@ -16,17 +15,6 @@
 #include <string.h>
 
 static const double tier_factor[PAL_STREAM_TIER_COUNT] = PAL_TIER_FACTORS;
-
-struct pal_stream_coder {
-    pal_frame_encoder *encoder[PAL_BODY_MAX][PAL_STREAM_TIER_COUNT];
-    uint32_t seq[PAL_BODY_MAX]; /* per part, across all tiers */
-    uint8_t *buffer;            /* [cap] */
-    size_t cap;
-    uint32_t haptic_seq;
-    uint64_t field_seq;
-    uint64_t rate_tick, rate_ns;
-    int n_component; /* of the last frame */
-};
 
 static pal_err refuse(pal_diagnostic *diag, int refusal, const char *part, const char *what)
 {
@@ -55,7 +43,7 @@ static pal_err open_part(pal_stream *s, int index, const pal_shown *shown, pal_d
     refusal = pal_asset_encode(shown->rest_m, order, tri, (uint32_t)shown->n_tri, &bytes, &n_byte);
     if (refusal) err = refuse(diag, refusal, shown->name, "no asset");
     for (int t = 0; !err && t < PAL_STREAM_TIER_COUNT; t++) {
-        refusal = pal_frame_encoder_create(shown->rest_m, order, &s->coder->encoder[index][t]);
+        refusal = pal_frame_encoder_create(shown->rest_m, order, &s->encoder[index][t]);
         if (refusal) err = refuse(diag, refusal, shown->name, "no encoder");
     }
     if (!err && !(part->asset = pal_packet_create(bytes, n_byte, false))) err = PAL_ERR_MEMORY;
@@ -94,40 +82,36 @@ static pal_err open_parts(pal_stream *s, double error_m, pal_diagnostic *diag)
     double side = 0;
     for (int c = 0; c < 3; c++) s->box_min_m[c] = HUGE_VAL, s->box_max_m[c] = -HUGE_VAL;
     for (int p = 0; p < s->n_part; p++) {
-        pal_shown shown;
-        pal_session_shown(s->session, p, &shown);
-        if (shown.n_vertex < 1 || (uint32_t)shown.n_vertex > PAL_WIRE_VERTEX_MAX)
+        const pal_shown *shown = &pal_session_view_outline(s->session)->part[p];
+        if (shown->n_vertex < 1 || (uint32_t)shown->n_vertex > PAL_WIRE_VERTEX_MAX)
             return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "part %s: %d shown vertices, 1 to %u can be streamed",
-                                      shown.name, shown.n_vertex, PAL_WIRE_VERTEX_MAX);
-        PAL_TRY(open_part(s, p, &shown, diag));
-        widen_box(s, &shown);
+                                      shown->name, shown->n_vertex, PAL_WIRE_VERTEX_MAX);
+        PAL_TRY(open_part(s, p, shown, diag));
+        widen_box(s, shown);
         if (s->part[p].info.n_vertex > max) max = s->part[p].info.n_vertex;
     }
     for (int c = 0; c < 3; c++) side = fmax(side, s->box_max_m[c] - s->box_min_m[c]);
     s->error_m = side > 0 ? fmin(PAL_POSITION_ERROR_M, side / PAL_POSITIONS_IN_LENGTH) : PAL_POSITION_ERROR_M;
     if (error_m > 0) s->error_m = error_m;
     for (int p = 0; p < s->n_part; p++) s->part[p].info.error_m = s->error_m;
-    s->coder->cap = pal_frame_bound(max);
-    if (s->coder->cap < pal_field_bound(max)) s->coder->cap = pal_field_bound(max);
-    if (s->coder->cap < PAL_WIRE_TOOLS_MAX) s->coder->cap = PAL_WIRE_TOOLS_MAX;
-    s->coder->buffer = malloc(s->coder->cap);
-    return s->coder->buffer ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    s->cap = pal_frame_bound(max);
+    if (s->cap < pal_field_bound(max)) s->cap = pal_field_bound(max);
+    if (s->cap < PAL_WIRE_TOOLS_MAX) s->cap = PAL_WIRE_TOOLS_MAX;
+    s->buffer = malloc(s->cap);
+    return s->buffer ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 pal_err pal_stream_open(pal_session *session, double error_m, pal_diagnostic *diag, pal_stream **out)
 {
+    const pal_scene *scene = pal_session_scene(session);
+    int n_part = pal_session_view_outline(session)->n_part;
+    if (n_part < 1 || n_part > PAL_BODY_MAX)
+        return PAL_REFUSE(diag, "session %s shows %d parts, 1 to %d can be streamed", scene->name, n_part,
+                          PAL_BODY_MAX);
     pal_stream *s = calloc(1, sizeof *s);
     if (!s) return PAL_ERR_MEMORY;
-    s->session = session;
-    s->scene = pal_session_scene(session);
-    s->n_part = pal_session_part_count(session);
-    s->part = calloc((size_t)(s->n_part ? s->n_part : 1), sizeof *s->part);
-    s->coder = calloc(1, sizeof *s->coder);
-    pal_err err = s->part && s->coder ? PAL_ERR_OK : PAL_ERR_MEMORY;
-    if (!err && (s->n_part < 1 || s->n_part > PAL_BODY_MAX))
-        err = PAL_REFUSE(diag, "session %s shows %d parts, 1 to %d can be streamed", s->scene->name, s->n_part,
-                         PAL_BODY_MAX);
-    if (!err) err = open_parts(s, error_m, diag);
+    s->session = session, s->scene = scene, s->n_part = n_part;
+    pal_err err = open_parts(s, error_m, diag);
     if (err) return pal_stream_close(s), err;
     *out = s;
     return PAL_ERR_OK;
@@ -136,37 +120,34 @@ pal_err pal_stream_open(pal_session *session, double error_m, pal_diagnostic *di
 void pal_stream_close(pal_stream *stream)
 {
     if (!stream) return;
-    for (int p = 0; stream->part && p < stream->n_part; p++) {
+    for (int p = 0; p < stream->n_part; p++) {
         pal_packet_drop(stream->part[p].asset);
         pal_triangle_slots_free(stream->part[p].slots);
         for (int k = 0; k < PAL_FIELD_COUNT; k++) pal_packet_drop(stream->part[p].field[k]);
         for (int t = 0; t < PAL_STREAM_TIER_COUNT; t++) {
             pal_packet_drop(stream->part[p].frame[t]);
-            if (stream->coder && p < PAL_BODY_MAX) pal_frame_encoder_destroy(stream->coder->encoder[p][t]);
+            pal_frame_encoder_destroy(stream->encoder[p][t]);
         }
     }
     for (int t = 0; t < PAL_TOOL_MAX; t++) pal_packet_drop(stream->haptic[t]);
     pal_packet_drop(stream->tools);
-    if (stream->coder) free(stream->coder->buffer);
-    free(stream->coder);
-    free(stream->part);
+    free(stream->buffer);
     free(stream);
 }
 
 void pal_stream_transfer(pal_stream *stream, const pal_stream *before)
 {
-    struct pal_stream_coder *coder = stream->coder;
     stream->cycle = before->cycle, stream->cycle_ns = before->cycle_ns;
     stream->step_ms = before->step_ms, stream->step_rate_hz = before->step_rate_hz;
     memcpy(stream->component_ms, before->component_ms, sizeof stream->component_ms);
     stream->count = before->count;
-    coder->haptic_seq = before->coder->haptic_seq, coder->field_seq = before->coder->field_seq;
-    coder->rate_tick = before->coder->rate_tick, coder->rate_ns = before->coder->rate_ns;
+    stream->haptic_seq = before->haptic_seq, stream->field_seq = before->field_seq;
+    stream->rate_tick = before->rate_tick, stream->rate_ns = before->rate_ns;
     for (int p = 0; p < stream->n_part && p < before->n_part; p++) {
         pal_stream_part *part = &stream->part[p];
         part->info.epoch = before->part[p].info.epoch + 1;
         if (part->slots) part->slots->epoch = part->info.epoch;
-        coder->seq[p] = before->coder->seq[p];
+        stream->seq[p] = before->seq[p];
     }
 }
 
@@ -185,9 +166,9 @@ uint16_t pal_stream_wire_id(int member)
     return (uint16_t)(member > 0 ? (member - 1) % UINT16_MAX + 1 : 0);
 }
 
-static uint64_t time_us(const pal_frame *frame)
+static uint64_t time_us(double time_s)
 {
-    return frame->time_s > 0 ? (uint64_t)(frame->time_s * 1e6) : 0;
+    return time_s > 0 ? (uint64_t)(time_s * 1e6) : 0;
 }
 
 /* Encodes one part at one tier. A frame identical to the last is discarded, so the older message stays the newest,
@@ -198,9 +179,9 @@ static void encode_part(pal_stream *s, int p, int tier, bool again)
     const pal_frame_part *from = &s->frame->part[p];
     pal_frame_input given = {.part = (uint16_t)p,
                              .epoch = part->info.epoch,
-                             .seq = s->coder->seq[p] + 1,
+                             .seq = s->seq[p] + 1,
                              .cycle = s->cycle,
-                             .sim_time_us = time_us(s->frame),
+                             .sim_time_us = time_us(s->frame->time_s),
                              .error_m = pal_stream_tier_error_m(s, tier),
                              .position_m = from->position_m,
                              .hidden = part->slots ? part->slots->hidden : NULL};
@@ -212,7 +193,7 @@ static void encode_part(pal_stream *s, int p, int tier, bool again)
     bool same = part->frame_output[tier] == from->n_output && part->frame_change[tier] == change;
     if (part->frame[tier] && same && !again) return;
     uint64_t begin = pal_clock_ns();
-    int refusal = pal_frame_put(s->coder->encoder[p][tier], &given, s->coder->buffer, s->coder->cap, &result);
+    int refusal = pal_frame_put(s->encoder[p][tier], &given, s->buffer, s->cap, &result);
     s->count.n_encode++;
     s->count.encode_ns += pal_clock_ns() - begin;
     if (refusal) {
@@ -222,12 +203,12 @@ static void encode_part(pal_stream *s, int p, int tier, bool again)
     }
     part->frame_output[tier] = from->n_output;
     if (!result.changed && part->frame[tier] && part->frame_change[tier] == change && !again) return;
-    pal_packet *packet = pal_packet_create(s->coder->buffer, result.n_byte, false);
+    pal_packet *packet = pal_packet_create(s->buffer, result.n_byte, false);
     if (!packet) return;
     pal_packet_replace(&part->frame[tier], packet);
     part->frame_cycle[tier] = s->cycle;
     part->frame_change[tier] = change;
-    part->frame_seq[tier] = ++s->coder->seq[p];
+    part->frame_seq[tier] = ++s->seq[p];
     s->count.n_frame_byte += result.n_byte;
 }
 
@@ -258,7 +239,8 @@ static uint32_t hold_us(const pal_frame_tool *f, uint64_t now_ns)
 
 static void put_tools(pal_stream *s, uint64_t now_ns, const pal_stream_tool tool[PAL_TOOL_MAX])
 {
-    pal_wire_tools w = {.cycle = s->cycle, .n_tool = (uint32_t)s->frame->n_tool, .sim_time_us = time_us(s->frame)};
+    pal_wire_tools w = {
+        .cycle = s->cycle, .n_tool = (uint32_t)s->frame->n_tool, .sim_time_us = time_us(s->frame->time_s)};
     for (int i = 0; i < s->frame->n_tool; i++) {
         const pal_frame_tool *f = &s->frame->tool[i];
         pal_wire_tool *to = &w.tool[i];
@@ -276,8 +258,8 @@ static void put_tools(pal_stream *s, uint64_t now_ns, const pal_stream_tool tool
         to->echo_stamp_us = f->pose.stamp_us;
         to->hold_us = hold_us(f, now_ns);
     }
-    size_t n = pal_wire_put_tools(s->coder->buffer, s->coder->cap, &w);
-    pal_packet *packet = n ? pal_packet_create(s->coder->buffer, n, false) : NULL;
+    size_t n = pal_wire_put_tools(s->buffer, s->cap, &w);
+    pal_packet *packet = n ? pal_packet_create(s->buffer, n, false) : NULL;
     if (packet) pal_packet_replace(&s->tools, packet);
 }
 
@@ -310,7 +292,7 @@ static void put_haptic(pal_stream *s, int i, uint64_t now_ns, const pal_stream_t
         return;
     }
     pal_wire_haptic w = {.tool = (uint16_t)i,
-                         .seq = ++s->coder->haptic_seq,
+                         .seq = ++s->haptic_seq,
                          .flags =
                              (s->frame->paused ? PAL_WIRE_HAPTIC_FREEZE : 0) | (frozen ? PAL_WIRE_HAPTIC_FORCE_OFF : 0),
                          .stamp_us = now_ns / 1000,
@@ -334,8 +316,8 @@ static void put_haptic(pal_stream *s, int i, uint64_t now_ns, const pal_stream_t
     copy_f3(w.grasp_k_N_m + 3, f->grasp_k_N_m + 3);
     for (int k = 0; k < f->n_patch && k < PAL_CONTACT_PATCH_MAX; k++)
         copy_patch(&w.patch[w.n_patch++], &f->patch[k], w.origin_m);
-    size_t n = pal_wire_put_haptic(s->coder->buffer, s->coder->cap, &w);
-    pal_packet_replace(&s->haptic[i], n ? pal_packet_create(s->coder->buffer, n, false) : NULL);
+    size_t n = pal_wire_put_haptic(s->buffer, s->cap, &w);
+    pal_packet_replace(&s->haptic[i], n ? pal_packet_create(s->buffer, n, false) : NULL);
 }
 
 bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_STREAM_TIER_COUNT],
@@ -356,8 +338,8 @@ bool pal_stream_update(pal_stream *stream, uint64_t now_ns, const bool used[PAL_
     put_tools(stream, now_ns, tool);
     for (int i = 0; i < frame->n_tool; i++) put_haptic(stream, i, now_ns, &tool[i]);
     /* components have changed, so the entries have other meanings */
-    if (frame->n_row != stream->coder->n_component) memset(stream->component_ms, 0, sizeof stream->component_ms);
-    stream->coder->n_component = frame->n_row;
+    if (frame->n_row != stream->n_component) memset(stream->component_ms, 0, sizeof stream->component_ms);
+    stream->n_component = frame->n_row;
     for (int r = 0; r < frame->n_row; r++) {
         stream->component_ms[r] += 0.2 * (frame->component_ns[r] * 1e-6 - stream->component_ms[r]);
         /* below the clock resolution, the mean has decayed to zero */
@@ -375,21 +357,20 @@ static bool encode_field(pal_stream *s, int p, int k, uint64_t now_ns)
     pal_field_head head = {.part = (uint16_t)p,
                            .field = (pal_wire_field)k,
                            .epoch = part->info.epoch,
-                           .sim_time_us = from->time_s > 0 ? (uint64_t)(from->time_s * 1e6) : 0,
+                           .sim_time_us = time_us(from->time_s),
                            .n_vertex = part->info.n_vertex};
     uint8_t *work = malloc(part->info.n_vertex);
     size_t n_byte = 0;
-    int refusal =
-        work ? pal_field_put(from->value, &head, work, s->coder->buffer, s->coder->cap, &n_byte) : PAL_REFUSAL_MEMORY;
+    int refusal = work ? pal_field_put(from->value, &head, work, s->buffer, s->cap, &n_byte) : PAL_REFUSAL_MEMORY;
     free(work);
-    pal_packet *packet = refusal ? NULL : pal_packet_create(s->coder->buffer, n_byte, false);
+    pal_packet *packet = refusal ? NULL : pal_packet_create(s->buffer, n_byte, false);
     /* a slightly late message does not delay the next, so the mean rate is kept and exceeded only briefly */
     uint64_t *due = &part->field_due_ns[k], apart = (uint64_t)(1e9 / PAL_STREAM_FIELD_HZ), slack = apart / 10;
     *due = now_ns > *due + slack ? now_ns + apart - slack : *due + apart;
     part->field_revision[k] = from->revision;
     if (!packet) return false;
     pal_packet_replace(&part->field[k], packet);
-    part->field_made[k] = ++s->coder->field_seq;
+    part->field_made[k] = ++s->field_seq;
     s->count.n_field++;
     return true;
 }
@@ -431,13 +412,13 @@ void pal_stream_begin_tier(pal_stream *stream, int tier)
 
 void pal_stream_measure(pal_stream *stream, uint64_t now_ns)
 {
-    struct pal_stream_coder *c = stream->coder;
     if (!stream->frame) return;
     uint64_t tick = stream->frame->tick;
-    double past_s = (double)(now_ns - c->rate_ns) * 1e-9;
-    if (c->rate_ns && tick >= c->rate_tick && past_s > 0) stream->step_rate_hz = (double)(tick - c->rate_tick) / past_s;
-    c->rate_tick = tick;
-    c->rate_ns = now_ns;
+    double past_s = (double)(now_ns - stream->rate_ns) * 1e-9;
+    if (stream->rate_ns && tick >= stream->rate_tick && past_s > 0)
+        stream->step_rate_hz = (double)(tick - stream->rate_tick) / past_s;
+    stream->rate_tick = tick;
+    stream->rate_ns = now_ns;
 }
 
 void pal_stream_hello(const pal_stream *stream, pal_wire_hello *out)

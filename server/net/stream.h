@@ -10,6 +10,7 @@
 #ifndef PAL_NET_STREAM_H
 #define PAL_NET_STREAM_H
 #include "protocol/control.h"
+#include "protocol/frame_codec.h"
 #include "server/net/transport/packet.h"
 #include "server/net/triangle_slots.h"
 #include "server/session/members.h"
@@ -44,15 +45,23 @@ typedef struct pal_stream {
     uint32_t cycle;         /* increases by one per frame taken; 0: none yet */
     uint64_t cycle_ns;      /* time of the last cycle */
     int n_part;
-    pal_stream_part *part;            /* [n_part] */
-    pal_packet *tools;                /* completes the newest cycle */
-    pal_packet *haptic[PAL_TOOL_MAX]; /* newest contact model of each tool in the scene; NULL: none */
+    pal_stream_part part[PAL_BODY_MAX]; /* [n_part] */
+    pal_packet *tools;                  /* completes the newest cycle */
+    pal_packet *haptic[PAL_TOOL_MAX];   /* newest contact model of each tool in the scene; NULL: none */
     double box_min_m[3], box_max_m[3];
     double error_m;
     /* smoothed, for status */
     double component_ms[PAL_FRAME_COMPONENT_MAX], step_ms, step_rate_hz;
     pal_stream_count count;
-    struct pal_stream_coder *coder; /* encoders and their buffer */
+    /* encoders and their buffer */
+    pal_frame_encoder *encoder[PAL_BODY_MAX][PAL_STREAM_TIER_COUNT];
+    uint32_t seq[PAL_BODY_MAX]; /* of the last frame, per part, across all tiers */
+    uint8_t *buffer;            /* [cap] */
+    size_t cap;
+    uint32_t haptic_seq;
+    uint64_t field_seq;
+    uint64_t rate_tick, rate_ns;
+    int n_component; /* of the last frame */
 } pal_stream;
 
 /* Builds the assets (about 0.2 s for 50,000 displayed vertices) and the encoders. Borrows the session. error_m 0:

@@ -47,22 +47,15 @@ const pal_verb pal_verb_table[] = {
 };
 const int pal_verb_count = sizeof pal_verb_table / sizeof *pal_verb_table;
 
-const char *pal_right_text(pal_right right)
-{
-    static const char *const who[PAL_RIGHT_COUNT] = {
-#define X(name, in_words) in_words,
-        PAL_RIGHT_TABLE(X)
-#undef X
-    };
-    return who[right];
-}
+const char *const pal_right_text[] = {"everybody", "trainees and instructors", "instructors and holders of a tool",
+                                      "instructors"};
 
 int pal_verb_describe(const pal_verb *verb, int n_verb, char *text, size_t cap)
 {
     int n = 0;
     for (const pal_verb *v = verb; v < verb + n_verb; v++) {
         size_t used = (size_t)n < cap ? (size_t)n : cap;
-        n += snprintf(cap ? text + used : NULL, cap - used, "%s\t%s\t%s\t%s\n", v->name, pal_right_text(v->right),
+        n += snprintf(cap ? text + used : NULL, cap - used, "%s\t%s\t%s\t%s\n", v->name, pal_right_text[v->right],
                       v->args, v->about);
     }
     return n;

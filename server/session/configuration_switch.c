@@ -5,15 +5,6 @@
 
 #include <stdlib.h>
 
-struct pal_configuration_switch {
-    int body;
-    bool has_rehearsed;
-    pal_scene from; /* the new scene */
-    pal_configured_scene *set;
-    pal_transfer *transfer;
-    pal_transfer_report report;
-};
-
 static pal_err prepare(const pal_scene *scene, const pal_body_def *base, int body, const pal_configuration *to,
                        pal_diagnostic *diag, pal_configuration_switch *s)
 {
@@ -51,11 +42,6 @@ pal_err pal_configuration_switch_prepare(const pal_scene *scene, const pal_body_
     return err;
 }
 
-const pal_scene *pal_configuration_switch_scene(const pal_configuration_switch *change)
-{
-    return &change->set->scene;
-}
-
 bool pal_configuration_switch_snapshot(void *change, const pal_world *before)
 {
     pal_configuration_switch *s = change;
@@ -83,11 +69,6 @@ void pal_configuration_switch_transfer(void *change, pal_world *next, const pal_
     pal_configuration_switch *s = change;
     n_transfer++;
     pal_transfer_apply(s->transfer, next, before, &s->report);
-}
-
-const pal_transfer_report *pal_configuration_switch_report(const pal_configuration_switch *change)
-{
-    return &change->report;
 }
 
 void pal_configuration_switch_free(pal_configuration_switch *change)

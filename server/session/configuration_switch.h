@@ -17,7 +17,14 @@
 #include "server/sim/transfer/transfer.h"
 #include "server/sim/world/world.h"
 
-typedef struct pal_configuration_switch pal_configuration_switch;
+typedef struct pal_configuration_switch {
+    int body;
+    bool has_rehearsed;
+    pal_scene from;            /* the running scene, with the body before its first switch */
+    pal_configured_scene *set; /* set->scene: the new scene */
+    pal_transfer *transfer;
+    pal_transfer_report report; /* valid after the transfer */
+} pal_configuration_switch;
 /* Builds the scene with configuration `to`, its mesh, and the interpolation from the old body to every new node.
  * `scene` is the scene of the running world; its materials and step are used. `base` is the body before its first
  * switch, with its original control cells and voxels, so that every configuration can be restored; NULL: the body as
@@ -27,8 +34,6 @@ typedef struct pal_configuration_switch pal_configuration_switch;
 pal_err pal_configuration_switch_prepare(const pal_scene *scene, const pal_body_def *base, int body,
                                          const pal_configuration *to, pal_diagnostic *diag,
                                          pal_configuration_switch **out);
-const pal_scene *
-pal_configuration_switch_scene(const pal_configuration_switch *change); /* lives as long as the switch */
 /* pal_session_snapshot_fn and pal_session_rehearse_fn; user: a pal_configuration_switch. The snapshot asks for another
  * rehearsal while the body has moved by more than PAL_CONFIGURATION_SWITCH_MAX_DRIFT since the last snapshot. */
 bool pal_configuration_switch_snapshot(void *change, const pal_world *before);
@@ -36,8 +41,6 @@ void pal_configuration_switch_rehearse(void *change, pal_world *next);
 /* pal_session_transfer_fn; user: a pal_configuration_switch */
 void pal_configuration_switch_transfer(void *change, pal_world *next, const pal_world *before);
 uint64_t pal_configuration_switch_transfer_count(void); /* transfers made by the calling thread, for tests [any] */
-/* result of the transfer, valid after it */
-const pal_transfer_report *pal_configuration_switch_report(const pal_configuration_switch *change);
 void pal_configuration_switch_free(
     pal_configuration_switch *change); /* NULL is fine; only after every world of its scene is destroyed */
 #endif

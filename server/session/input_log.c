@@ -28,67 +28,52 @@ struct pal_input_log {
     uint64_t n_dropped;
 };
 
-/* ---- little-endian ---- */
+/* ---- bytes ---- */
 
-static void put_u(uint8_t **at, uint64_t value, int n_byte)
-{
-    for (int k = 0; k < n_byte; k++) *(*at)++ = (uint8_t)(value >> 8 * k);
-}
-static uint64_t get_u(const uint8_t **at, int n_byte)
-{
-    uint64_t value = 0;
-    for (int k = 0; k < n_byte; k++) value |= (uint64_t) * (*at)++ << 8 * k;
-    return value;
-}
-static uint64_t load(const uint8_t *from, size_t size)
-{
-    uint32_t u32;
-    uint64_t u64;
-    if (size == 1) return *from;
-    if (size == 4) return memcpy(&u32, from, size), u32;
-    return memcpy(&u64, from, size), u64;
-}
-static void store(uint8_t *to, uint64_t value, size_t size)
-{
-    const uint8_t u8 = (uint8_t)value;
-    const uint32_t u32 = (uint32_t)value;
-    memcpy(to, size == 1 ? (const void *)&u8 : size == 4 ? (const void *)&u32 : &value, size);
-}
+_Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "logs are written in the host's order");
 
-/* payload of each kind, in order: a member, of numbers of `size` bytes each */
+typedef struct record_head {
+    uint8_t kind, index;
+    uint16_t n_byte;
+    uint32_t zero;
+    uint64_t step;
+} record_head;
+_Static_assert(sizeof(pal_input_header) == PAL_INPUT_HEADER && sizeof(record_head) == PAL_INPUT_HEAD,
+               "without padding");
+
+/* payload of each kind, in order: a member */
 static const struct field {
     pal_input_kind kind;
-    size_t size, offset, n_byte;
+    size_t offset, n_byte;
 } fields[] = {
-#define FIELD(kind, size, member)                                                                                      \
-    PAL_INPUT_##kind, size, offsetof(pal_input_record, member), sizeof(((pal_input_record *)0)->member)
-    {FIELD(POSE, 8, pose.position_m)},
-    {FIELD(POSE, 8, pose.quat)},
-    {FIELD(POSE, 8, pose.velocity_m_s)},
-    {FIELD(POSE, 4, pose.buttons)},
-    {FIELD(POSE, 4, pose.seq)},
-    {FIELD(MATERIAL, 8, material.young_Pa)},
-    {FIELD(MATERIAL, 8, material.poisson)},
-    {FIELD(MATERIAL, 8, material.density_kg_m3)},
-    {FIELD(MATERIAL, 8, material.damping_1_s)},
-    {FIELD(BRUSH, 4, slot)},
-    {FIELD(BRUSH, 4, brush.kind)},
-    {FIELD(BRUSH, 8, brush.at_m)},
-    {FIELD(BRUSH, 8, brush.to_m)},
-    {FIELD(BRUSH, 8, brush.radius_m)},
-    {FIELD(BRUSH, 8, brush.softness)},
-    {FIELD(BRUSH, 8, brush.pressure_Pa)},
-    {FIELD(BRUSH, 8, brush.lift_m)},
-    {FIELD(BRUSH, 8, brush.stiffness_N_m)},
-    {FIELD(COMPONENT, 4, wanted)},
-    {FIELD(COMPONENT, 1, component)},
-    {FIELD(HASH, 8, hash)},
-    {FIELD(END, 8, hash)},
-    {FIELD(END, 8, n_dropped)},
+#define FIELD(kind, member)                                                                                            \
+    PAL_INPUT_##kind, offsetof(pal_input_record, member), sizeof(((pal_input_record *)0)->member)
+    {FIELD(POSE, pose.position_m)},
+    {FIELD(POSE, pose.quat)},
+    {FIELD(POSE, pose.velocity_m_s)},
+    {FIELD(POSE, pose.buttons)},
+    {FIELD(POSE, pose.seq)},
+    {FIELD(MATERIAL, material)},
+    {FIELD(BRUSH, slot)},
+    {FIELD(BRUSH, brush.kind)},
+    {FIELD(BRUSH, brush.at_m)},
+    {FIELD(BRUSH, brush.to_m)},
+    {FIELD(BRUSH, brush.radius_m)},
+    {FIELD(BRUSH, brush.softness)},
+    {FIELD(BRUSH, brush.pressure_Pa)},
+    {FIELD(BRUSH, brush.lift_m)},
+    {FIELD(BRUSH, brush.stiffness_N_m)},
+    {FIELD(COMPONENT, wanted)},
+    {FIELD(COMPONENT, component)},
+    {FIELD(HASH, hash)},
+    {FIELD(END, hash)},
+    {FIELD(END, n_dropped)},
 #undef FIELD
 };
 enum { N_FIELD = sizeof fields / sizeof *fields };
-_Static_assert(sizeof(pal_brush_kind) == 4 && sizeof(int) == 4, "members have the size of the log's numbers");
+_Static_assert(sizeof(pal_brush_kind) == 4 && sizeof(int) == 4 && sizeof(pal_material) == 32 &&
+                   sizeof(pal_stroke) == 56,
+               "members have the size of the log's numbers, and no padding");
 
 /* -1: no such kind */
 static int payload_of(pal_input_kind kind)
@@ -96,6 +81,31 @@ static int payload_of(pal_input_kind kind)
     size_t n_byte = 0;
     for (int i = 0; i < N_FIELD; i++) n_byte += fields[i].kind == kind ? fields[i].n_byte : 0;
     return kind < PAL_INPUT_POSE || kind > PAL_INPUT_COMPONENT ? -1 : (int)n_byte;
+}
+
+pal_err pal_input_apply(pal_world *world, const pal_scene *scene, const pal_input_record *record, pal_diagnostic *diag)
+{
+    switch (record->kind) {
+    case PAL_INPUT_POSE:
+        return pal_world_pose(world, record->index, &record->pose);
+    case PAL_INPUT_RELEASE:
+        return pal_world_pose(world, record->index, NULL);
+    case PAL_INPUT_RESET:
+        pal_world_reset(world);
+        return PAL_ERR_OK;
+    case PAL_INPUT_RESET_BODY:
+        return pal_world_reset_body(world, record->index);
+    case PAL_INPUT_MATERIAL:
+        return pal_world_material(world, record->index, &record->material, diag);
+    case PAL_INPUT_BRUSH:
+        return pal_world_brush(world, record->index, record->slot, &record->brush, diag);
+    case PAL_INPUT_COMPONENT:
+        return pal_world_switch_component(world, scene, record->index, record->component, record->wanted, diag);
+    case PAL_INPUT_HASH:
+    case PAL_INPUT_END:
+        break;
+    }
+    return PAL_ERR_OK;
 }
 
 /* ---- fingerprint: FNV-1a over 64-bit words and bytes ---- */
@@ -117,11 +127,6 @@ static uint64_t mix_item(uint64_t h, const pal_config_entry *item)
         if (v->kind == PAL_VALUE_NUMBERS) h = pal_hash_bytes(h, v->number, (size_t)v->n_number * sizeof v->number[0]);
     }
     return h;
-}
-static uint64_t mix_material(uint64_t h, const pal_material *m)
-{
-    double number[4] = {m->young_Pa, m->poisson, m->density_kg_m3, m->damping_1_s};
-    return pal_hash_bytes(h, number, sizeof number);
 }
 static uint64_t mix_mesh(uint64_t h, const pal_prepared *mesh)
 {
@@ -154,13 +159,7 @@ static uint64_t mix_cells(uint64_t h, const pal_body_def *def)
     /* removed tissue has no contact */
     const double cut[4] = {def->cut_normal[0], def->cut_normal[1], def->cut_normal[2], def->cut_m};
     if (def->cut) h = pal_hash_bytes(h, cut, sizeof cut);
-    for (int i = 0; i < def->n_stroke; i++) {
-        const pal_stroke *s = &def->stroke[i];
-        double number[7] = {s->at_m[0],  s->at_m[1],      s->at_m[2],       s->radius_m,
-                            s->softness, s->young_factor, s->density_factor};
-        h = pal_hash_bytes(h, number, sizeof number);
-    }
-    return h;
+    return pal_hash_bytes(h, def->stroke, (size_t)def->n_stroke * sizeof *def->stroke);
 }
 
 uint64_t pal_scene_fingerprint(const pal_scene *scene)
@@ -174,7 +173,7 @@ uint64_t pal_scene_fingerprint(const pal_scene *scene)
         const pal_body_def *def = &scene->body[b];
         h = mix_mesh(h, def->mesh);
         h = mix_cells(h, def);
-        h = mix_material(h, &def->material);
+        h = pal_hash_bytes(h, &def->material, sizeof def->material);
         h = mix_item(mix_item(mix_item(h, &def->model), &def->solver), &def->output);
         for (int k = 0; k < def->n_support; k++) {
             const pal_support_def *s = &def->support[k];
@@ -234,15 +233,14 @@ static void *writer(void *user)
 
 static bool write_header(pal_input_log *log, const pal_scene *scene)
 {
-    uint8_t bytes[PAL_INPUT_HEADER], *at = bytes;
-    memcpy(at, magic, sizeof magic), at += sizeof magic;
-    put_u(&at, VERSION, 4);
-    put_u(&at, PAL_INPUT_HASH_STEPS, 4);
-    put_u(&at, load((const uint8_t *)&scene->step_s, 8), 8);
-    put_u(&at, pal_scene_fingerprint(scene), 8);
-    put_u(&at, (uint64_t)scene->n_body, 4);
-    put_u(&at, (uint64_t)scene->n_tool, 4);
-    return write_all(log->file, bytes, sizeof bytes);
+    pal_input_header header = {.version = VERSION,
+                               .hash_steps = PAL_INPUT_HASH_STEPS,
+                               .step_s = scene->step_s,
+                               .fingerprint = pal_scene_fingerprint(scene),
+                               .n_body = (uint32_t)scene->n_body,
+                               .n_tool = (uint32_t)scene->n_tool};
+    memcpy(header.magic, magic, sizeof magic);
+    return write_all(log->file, (const uint8_t *)&header, sizeof header);
 }
 
 pal_err pal_input_log_open(const char *path, const pal_scene *scene, size_t ring_byte, pal_diagnostic *diag,
@@ -272,16 +270,18 @@ pal_err pal_input_log_open(const char *path, const pal_scene *scene, size_t ring
 
 static size_t encode(const pal_input_record *record, uint8_t bytes[PAL_INPUT_HEAD + PAL_INPUT_PAYLOAD])
 {
-    uint8_t *at = bytes;
-    put_u(&at, (uint64_t)record->kind, 1);
-    put_u(&at, (uint64_t)record->index, 1);
-    put_u(&at, (uint64_t)payload_of(record->kind), 2);
-    put_u(&at, 0, 4);
-    put_u(&at, record->step, 8);
-    for (const struct field *f = fields; f < fields + N_FIELD; f++)
-        for (size_t k = 0; f->kind == record->kind && k < f->n_byte; k += f->size)
-            put_u(&at, load((const uint8_t *)record + f->offset + k, f->size), (int)f->size);
-    return (size_t)(at - bytes);
+    record_head head = {.kind = (uint8_t)record->kind,
+                        .index = (uint8_t)record->index,
+                        .n_byte = (uint16_t)payload_of(record->kind),
+                        .step = record->step};
+    size_t at = sizeof head;
+    memcpy(bytes, &head, sizeof head);
+    for (const struct field *f = fields; f < fields + N_FIELD; f++) {
+        if (f->kind != record->kind) continue;
+        memcpy(bytes + at, (const uint8_t *)record + f->offset, f->n_byte);
+        at += f->n_byte;
+    }
+    return at;
 }
 
 void pal_input_log_put(pal_input_log *log, const pal_input_record *record)
@@ -323,19 +323,14 @@ pal_err pal_input_log_close(pal_input_log *log, uint64_t step, uint64_t hash)
 pal_err pal_input_get_header(const char *name, const uint8_t *bytes, size_t n_byte, pal_input_header *out, size_t *at,
                              pal_diagnostic *diag)
 {
-    const uint8_t *from = bytes + sizeof magic;
+    pal_input_header header;
     if (n_byte < sizeof magic || memcmp(bytes, magic, sizeof magic) != 0)
         return PAL_REFUSE(diag, "%s: byte 0: not an input log", name);
     if (n_byte < PAL_INPUT_HEADER) return PAL_REFUSE(diag, "%s: byte %zu: the log is cut in its header", name, n_byte);
-    uint64_t version = get_u(&from, 4);
-    if (version < OLDEST || version > VERSION)
-        return PAL_REFUSE(diag, "%s: byte 8: log version %llu, this program reads %d to %d", name,
-                          (unsigned long long)version, OLDEST, VERSION);
-    pal_input_header header = {.hash_steps = (uint32_t)get_u(&from, 4)};
-    store((uint8_t *)&header.step_s, get_u(&from, 8), 8);
-    header.fingerprint = get_u(&from, 8);
-    header.n_body = (uint32_t)get_u(&from, 4);
-    header.n_tool = (uint32_t)get_u(&from, 4);
+    memcpy(&header, bytes, sizeof header);
+    if (header.version < OLDEST || header.version > VERSION)
+        return PAL_REFUSE(diag, "%s: byte 8: log version %u, this program reads %d to %d", name, header.version, OLDEST,
+                          VERSION);
     if (header.hash_steps < 1 || header.hash_steps > PAL_INPUT_HASH_MAX)
         return PAL_REFUSE(diag, "%s: byte 12: %u steps between hashes are outside 1 .. %d", name, header.hash_steps,
                           PAL_INPUT_HASH_MAX);
@@ -349,25 +344,25 @@ pal_err pal_input_get_record(const char *name, const uint8_t *bytes, size_t n_by
 {
     if (n_byte - *at < PAL_INPUT_HEAD)
         return PAL_REFUSE(diag, "%s: byte %zu: the log is cut: it has no end record", name, *at);
-    const uint8_t *from = bytes + *at;
-    pal_input_record record = {.kind = (pal_input_kind)get_u(&from, 1)};
-    record.index = (int)get_u(&from, 1);
-    int n = (int)get_u(&from, 2);
-    uint64_t zero = get_u(&from, 4);
-    record.step = get_u(&from, 8);
-    if (payload_of(record.kind) != n || zero)
-        return PAL_REFUSE(diag, "%s: byte %zu: no record of kind %d has %d bytes", name, *at, (int)record.kind, n);
-    if (n_byte - *at - PAL_INPUT_HEAD < (size_t)n)
+    record_head head;
+    memcpy(&head, bytes + *at, sizeof head);
+    pal_input_record record = {.kind = (pal_input_kind)head.kind, .index = head.index, .step = head.step};
+    if (payload_of(record.kind) != head.n_byte || head.zero)
+        return PAL_REFUSE(diag, "%s: byte %zu: no record of kind %d has %d bytes", name, *at, head.kind, head.n_byte);
+    if (n_byte - *at - PAL_INPUT_HEAD < head.n_byte)
         return PAL_REFUSE(diag, "%s: byte %zu: the log is cut in a record", name, *at);
-    for (const struct field *f = fields; f < fields + N_FIELD; f++)
-        for (size_t k = 0; f->kind == record.kind && k < f->n_byte; k += f->size)
-            store((uint8_t *)&record + f->offset + k, get_u(&from, (int)f->size), f->size);
+    const uint8_t *from = bytes + *at + sizeof head;
+    for (const struct field *f = fields; f < fields + N_FIELD; f++) {
+        if (f->kind != record.kind) continue;
+        memcpy((uint8_t *)&record + f->offset, from, f->n_byte);
+        from += f->n_byte;
+    }
     if (record.slot < 0 || record.slot >= PAL_TOOL_MAX || (unsigned)record.brush.kind >= PAL_BRUSH_COUNT)
         return PAL_REFUSE(diag, "%s: byte %zu: there is no brush of kind %u on tool %u", name, *at,
                           (unsigned)record.brush.kind, (unsigned)record.slot);
     if (record.wanted > 1 || record.component[PAL_NAME - 1] != 0)
         return PAL_REFUSE(diag, "%s: byte %zu: a component that is neither on nor off, or no name", name, *at);
-    *at += PAL_INPUT_HEAD + (size_t)n;
+    *at = (size_t)(from - bytes);
     *out = record;
     return PAL_ERR_OK;
 }

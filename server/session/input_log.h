@@ -1,5 +1,5 @@
-/* Byte format of the input log, its writer and its reader. Private to server/session; replay.h is the public
- * interface.
+/* Byte format of the input log, its writer and its reader, and what a record does. Private to server/session; replay.h
+ * is the public interface.
  *
  * Little-endian. Header, 40 bytes: "palinlog", u32 version 4 (1 lacks BRUSH, 2 lacks RESET_BODY, 3 lacks COMPONENT),
  * u32 hash interval in steps, f64 step_s, u64 scene fingerprint, u32 bodies, u32 tools. Records follow: u8 kind, u8
@@ -21,8 +21,7 @@
  * file. A record that does not fit is dropped and counted, and END reports it. */
 #ifndef PAL_SESSION_INPUT_LOG_H
 #define PAL_SESSION_INPUT_LOG_H
-#include "server/sim/core/brush.h"
-#include "server/sim/core/definition.h"
+#include "server/sim/world/world.h"
 
 enum {
     PAL_INPUT_HEADER = 40,
@@ -57,6 +56,10 @@ typedef struct pal_input_record {
     char component[PAL_NAME];
 } pal_input_record;
 
+/* Applies any record but HASH and END to a world of the scene, as session and replay do. Errors as of the world's
+ * function. [sim] */
+pal_err pal_input_apply(pal_world *world, const pal_scene *scene, const pal_input_record *record, pal_diagnostic *diag);
+
 /* hash of everything in a scene that decides the simulation: steps, meshes, materials, entries; texts are excluded */
 uint64_t pal_scene_fingerprint(const pal_scene *scene);
 
@@ -70,9 +73,11 @@ uint64_t pal_input_log_dropped(const pal_input_log *log);                   /* [
 pal_err pal_input_log_close(pal_input_log *log, uint64_t step, uint64_t hash);
 
 typedef struct pal_input_header {
-    uint32_t hash_steps, n_body, n_tool;
+    char magic[8];
+    uint32_t version, hash_steps;
     double step_s;
     uint64_t fingerprint;
+    uint32_t n_body, n_tool;
 } pal_input_header;
 /* bounds-checked; advance *at; REFUSED gives the byte offset */
 pal_err pal_input_get_header(const char *name, const uint8_t *bytes, size_t n_byte, pal_input_header *out, size_t *at,

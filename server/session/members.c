@@ -101,10 +101,3 @@ pal_err pal_members_take_tool(pal_member_list *members, int id, int tool, int *t
     *taken = tool;
     return PAL_ERR_OK;
 }
-
-bool pal_members_may_command(const pal_member_list *members, int id)
-{
-    for (int k = 0; id > 0 && k < PAL_MEMBER_LIST_MAX; k++)
-        if (members->member[k].id == id) return members->member[k].role != PAL_MEMBER_VIEWER;
-    return false;
-}

@@ -31,5 +31,4 @@ pal_member_entry *pal_members_find(pal_member_list *members, int id);
  * Releases the tool held before. */
 pal_err pal_members_take_tool(pal_member_list *members, int id, int tool, int *taken);
 void pal_members_release_tool(pal_member_list *members, int id);
-bool pal_members_may_command(const pal_member_list *members, int id); /* true for trainees and instructors */
 #endif

@@ -45,43 +45,23 @@ static pal_err check(const char *name, const uint8_t *bytes, size_t n_byte, pal_
 static pal_err apply(pal_world *world, const pal_scene *scene, const pal_input_record *record,
                      pal_replay_report *report, pal_diagnostic *diag)
 {
-    uint64_t hash;
-    switch (record->kind) {
-    case PAL_INPUT_POSE:
-        report->n_pose++;
-        if (pal_world_pose(world, record->index, &record->pose))
-            return PAL_REFUSE(diag, "step %llu: the world refuses a pose that the log says it took",
-                              (unsigned long long)record->step);
-        break;
-    case PAL_INPUT_RELEASE:
-        return pal_world_pose(world, record->index, NULL);
-    case PAL_INPUT_RESET:
-        report->n_command++, pal_world_reset(world);
-        break;
-    case PAL_INPUT_RESET_BODY:
-        report->n_command++;
-        return pal_world_reset_body(world, record->index);
-    case PAL_INPUT_MATERIAL:
-        report->n_command++;
-        return pal_world_material(world, record->index, &record->material, diag);
-    case PAL_INPUT_BRUSH:
-        report->n_command++;
-        return pal_world_brush(world, record->index, record->slot, &record->brush, diag);
-    case PAL_INPUT_COMPONENT:
-        report->n_command++;
-        return pal_world_switch_component(world, scene, record->index, record->component, record->wanted, diag);
-    case PAL_INPUT_HASH:
-    case PAL_INPUT_END:
-        hash = pal_world_hash(world);
+    if (record->kind == PAL_INPUT_HASH || record->kind == PAL_INPUT_END) {
         report->n_hash++;
-        report->last_hash = hash;
-        if (hash == record->hash)
+        report->last_hash = pal_world_hash(world);
+        if (report->last_hash == record->hash)
             report->n_hash_equal++;
         else if (report->first_difference == UINT64_MAX)
             report->first_difference = record->step;
-        break;
+        return PAL_ERR_OK;
     }
-    return PAL_ERR_OK;
+    bool pose = record->kind == PAL_INPUT_POSE;
+    report->n_pose += pose;
+    report->n_command += !pose && record->kind != PAL_INPUT_RELEASE;
+    pal_err err = pal_input_apply(world, scene, record, diag);
+    if (err && pose)
+        return PAL_REFUSE(diag, "step %llu: the world refuses a pose that the log says it took",
+                          (unsigned long long)record->step);
+    return err;
 }
 
 static pal_err run(const char *name, const uint8_t *bytes, size_t n_byte, const pal_scene *scene, pal_world *world,

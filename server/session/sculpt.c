@@ -15,13 +15,18 @@ typedef struct shape {
     double *x, *v; /* state when it was replaced; NULL: never replaced [cells.n_vertex][3] */
 } shape;
 
+/* as in pal_body_def */
+typedef struct cut_plane {
+    bool cut;
+    double normal[3], at_m;
+} cut_plane;
+
 struct pal_sculptor {
     int body;
     double origin_m[3]; /* of the body's frame, independent of the shape */
-    bool cut;
-    double cut_normal[3], cut_m;
+    cut_plane cut;
     shape now, past[PAL_SCULPT_HISTORY], future[PAL_SCULPT_HISTORY]; /* newest last */
-    int n_old_asset, n_future;
+    int n_past, n_future;
 };
 
 struct pal_sculpt_edit {
@@ -33,12 +38,10 @@ struct pal_sculpt_edit {
     double *x, *v;             /* replaced state [points before] */
     double *next_x, *next_v;   /* new state [points after] */
     int n_before;
-    bool cut;
-    double cut_normal[3], cut_m;
+    cut_plane cut;
     /* the scene and what its body borrows */
     pal_scene scene;
-    pal_cells cells;
-    pal_stroke *stroke;
+    shape shown; /* a copy of `to` */
     pal_prepared mesh;
 };
 
@@ -90,8 +93,7 @@ pal_err pal_sculptor_create(const pal_scene *scene, int body, pal_diagnostic *di
     const pal_body_def *def = &scene->body[body];
     s->body = body;
     pal_copy3(s->origin_m, def->mesh->surface.origin_m);
-    s->cut = def->cut, s->cut_m = def->cut_m;
-    pal_copy3(s->cut_normal, def->cut_normal);
+    s->cut = (cut_plane){def->cut, {def->cut_normal[0], def->cut_normal[1], def->cut_normal[2]}, def->cut_m};
     shape from = {.cells = *def->cells, .n_stroke = def->n_stroke};
     from.stroke = (pal_stroke *)(uintptr_t)def->stroke;
     pal_err err = copy_shape(&from, &s->now);
@@ -106,7 +108,7 @@ void pal_sculptor_destroy(pal_sculptor *sculptor)
 {
     if (!sculptor) return;
     free_shape(&sculptor->now);
-    for (int i = 0; i < sculptor->n_old_asset; i++) free_shape(&sculptor->past[i]);
+    for (int i = 0; i < sculptor->n_past; i++) free_shape(&sculptor->past[i]);
     for (int i = 0; i < sculptor->n_future; i++) free_shape(&sculptor->future[i]);
     free(sculptor);
 }
@@ -118,7 +120,7 @@ const pal_cells *pal_sculptor_cells(const pal_sculptor *sculptor)
 
 int pal_sculptor_undo_count(const pal_sculptor *sculptor)
 {
-    return sculptor->n_old_asset;
+    return sculptor->n_past;
 }
 
 int pal_sculptor_redo_count(const pal_sculptor *sculptor)
@@ -174,24 +176,23 @@ static pal_err restore_shape(const shape *list, int n, const char *what, pal_scu
 static pal_err set_cut(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt_edit *edit, pal_diagnostic *diag)
 {
     double length = pal_norm3(command->cut_normal);
-    edit->cut = command->cut;
+    edit->cut.cut = command->cut;
     if (command->cut && !(length > 1e-12 && length < 1e12 && fabs(command->cut_m) <= 1e9))
         return PAL_REFUSE(diag, "a cut has a direction and an offset: %g %g %g at %g m", command->cut_normal[0],
                           command->cut_normal[1], command->cut_normal[2], command->cut_m);
-    if (command->cut) pal_scale3(edit->cut_normal, 1 / length, command->cut_normal);
-    edit->cut_m = command->cut_m;
+    if (command->cut) pal_scale3(edit->cut.normal, 1 / length, command->cut_normal);
+    edit->cut.at_m = command->cut_m;
     return copy_shape(&s->now, &edit->to);
 }
 
 static pal_err execute(const pal_sculptor *s, const pal_sculpt *command, pal_sculpt_edit *edit, pal_diagnostic *diag)
 {
+    shape from;
     switch (command->kind) {
     case PAL_SCULPT_CELLS:
         PAL_TRY(pal_cells_apply(&s->now.cells, &command->cells, &edit->cells_edit, diag));
-        edit->to.stroke = copied(s->now.stroke, sizeof *edit->to.stroke * (size_t)s->now.n_stroke);
-        edit->to.n_stroke = s->now.n_stroke;
-        PAL_TRY(edit->to.stroke ? PAL_ERR_OK : PAL_ERR_MEMORY);
-        return pal_cells_copy(&edit->cells_edit.cells, &edit->to.cells);
+        from = (shape){.cells = edit->cells_edit.cells, .stroke = s->now.stroke, .n_stroke = s->now.n_stroke};
+        return copy_shape(&from, &edit->to);
     case PAL_SCULPT_PAINT:
         return paint(s, &command->stroke, &edit->to, diag);
     case PAL_SCULPT_SET_REST:
@@ -199,7 +200,7 @@ static pal_err execute(const pal_sculptor *s, const pal_sculpt *command, pal_scu
     case PAL_SCULPT_CUT:
         return set_cut(s, command, edit, diag);
     case PAL_SCULPT_UNDO:
-        return restore_shape(s->past, s->n_old_asset, "undo", edit, diag);
+        return restore_shape(s->past, s->n_past, "undo", edit, diag);
     case PAL_SCULPT_REDO:
         return restore_shape(s->future, s->n_future, "redo", edit, diag);
     case PAL_SCULPT_KINDS:
@@ -216,19 +217,17 @@ static pal_err make_scene(const pal_sculptor *s, const pal_scene *scene, pal_scu
     pal_surface surface = {0};
     edit->scene = *scene;
     pal_body_def *def = &edit->scene.body[s->body];
-    PAL_TRY(pal_cells_copy(&edit->to.cells, &edit->cells));
-    edit->stroke = copied(edit->to.stroke, sizeof *edit->stroke * (size_t)edit->to.n_stroke);
-    if (!edit->stroke) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_cells_boundary(&edit->cells, &surface, NULL, NULL));
+    PAL_TRY(copy_shape(&edit->to, &edit->shown));
+    PAL_TRY(pal_cells_boundary(&edit->shown.cells, &surface, NULL, NULL));
     /* the body's frame does not move */
     pal_copy3(surface.origin_m, s->origin_m);
     pal_err err = pal_prepared_surface(&surface, &edit->mesh);
     pal_surface_free(&surface);
-    def->cells = &edit->cells;
-    def->stroke = edit->stroke, def->n_stroke = edit->to.n_stroke;
+    def->cells = &edit->shown.cells;
+    def->stroke = edit->shown.stroke, def->n_stroke = edit->shown.n_stroke;
     def->mesh = &edit->mesh;
-    def->cut = edit->cut, def->cut_m = edit->cut_m;
-    pal_copy3(def->cut_normal, edit->cut_normal);
+    def->cut = edit->cut.cut, def->cut_m = edit->cut.at_m;
+    pal_copy3(def->cut_normal, edit->cut.normal);
     return err;
 }
 
@@ -252,8 +251,7 @@ pal_err pal_sculptor_prepare(const pal_sculptor *sculptor, const pal_scene *scen
     edit->kind = command->kind;
     edit->from = &s->now.cells;
     edit->body = s->body;
-    edit->cut = s->cut, edit->cut_m = s->cut_m;
-    pal_copy3(edit->cut_normal, s->cut_normal);
+    edit->cut = s->cut;
     pal_err err = execute(s, command, edit, diag);
     if (!err) err = make_room(s, edit);
     if (!err) err = make_scene(s, scene, edit);
@@ -298,8 +296,7 @@ void pal_sculpt_transfer(void *user, pal_world *next, const pal_world *before)
 void pal_sculptor_commit(pal_sculptor *sculptor, pal_sculpt_edit *edit)
 {
     pal_sculptor *s = sculptor;
-    s->cut = edit->cut, s->cut_m = edit->cut_m;
-    pal_copy3(s->cut_normal, edit->cut_normal);
+    s->cut = edit->cut;
     if (edit->kind == PAL_SCULPT_CUT) return;
     shape left = s->now;
     left.x = edit->x, left.v = edit->v;
@@ -307,7 +304,7 @@ void pal_sculptor_commit(pal_sculptor *sculptor, pal_sculpt_edit *edit)
     s->now = edit->to;
     edit->to = (shape){.n_stroke = 0};
     if (edit->kind == PAL_SCULPT_UNDO) {
-        free_shape(&s->past[--s->n_old_asset]);
+        free_shape(&s->past[--s->n_past]);
         push(s->future, &s->n_future, &left);
         return;
     }
@@ -316,7 +313,7 @@ void pal_sculptor_commit(pal_sculptor *sculptor, pal_sculpt_edit *edit)
     } else {
         while (s->n_future > 0) free_shape(&s->future[--s->n_future]);
     }
-    push(s->past, &s->n_old_asset, &left);
+    push(s->past, &s->n_past, &left);
 }
 
 void pal_sculpt_edit_free(pal_sculpt_edit *edit)
@@ -325,8 +322,7 @@ void pal_sculpt_edit_free(pal_sculpt_edit *edit)
     free_shape(&edit->to);
     pal_cells_edit_free(&edit->cells_edit);
     free(edit->x), free(edit->v), free(edit->next_x), free(edit->next_v);
-    pal_cells_free(&edit->cells);
-    free(edit->stroke);
+    free_shape(&edit->shown);
     pal_prepared_free(&edit->mesh);
     free(edit);
 }
@@ -346,37 +342,20 @@ static double off_edge(const pal_cells *c, int32_t edge, const double at[3])
     return pal_dist3(near, at);
 }
 
-/* the edge use of the face with the nearest edge or start vertex; -1: no such face */
-static int32_t nearest_use(const pal_cells *c, int32_t face, const double at[3], bool vertex)
+void pal_sculptor_find(const pal_sculptor *sculptor, int32_t face, const double at_m[3], pal_cells_command *out)
 {
-    int32_t first, best = -1;
-    double min = INFINITY;
-    if (face < 0 || face >= c->n_face) return -1;
+    const pal_cells *c = &sculptor->now.cells;
+    int32_t first;
+    double min_edge = INFINITY, min_vertex = INFINITY;
+    out->face = face;
+    out->cell = out->edge = out->vertex = -1;
+    if (face < 0 || face >= c->n_face) return;
+    out->cell = c->face_use[c->face[face].use[0]].cell;
     int32_t n = pal_cells_face_loop(c, face, &first);
     for (int32_t use = first; use < first + n; use++) {
-        const double *x = c->x + 3 * (size_t)c->edge_use[use].vertex;
-        double off = vertex ? pal_dist3(x, at) : off_edge(c, c->edge_use[use].edge, at);
-        if (off < min) min = off, best = use;
+        const pal_edge_use *u = &c->edge_use[use];
+        double off_vertex = pal_dist3(c->x + 3 * (size_t)u->vertex, at_m), off = off_edge(c, u->edge, at_m);
+        if (off < min_edge) min_edge = off, out->edge = u->edge;
+        if (off_vertex < min_vertex) min_vertex = off_vertex, out->vertex = u->vertex;
     }
-    return best;
-}
-
-int32_t pal_sculptor_nearest_edge(const pal_sculptor *sculptor, int32_t face, const double at_m[3])
-{
-    const pal_cells *c = &sculptor->now.cells;
-    int32_t use = nearest_use(c, face, at_m, false);
-    return use < 0 ? -1 : c->edge_use[use].edge;
-}
-
-int32_t pal_sculptor_nearest_vertex(const pal_sculptor *sculptor, int32_t face, const double at_m[3])
-{
-    const pal_cells *c = &sculptor->now.cells;
-    int32_t use = nearest_use(c, face, at_m, true);
-    return use < 0 ? -1 : c->edge_use[use].vertex;
-}
-
-int32_t pal_sculptor_cell(const pal_sculptor *sculptor, int32_t face)
-{
-    const pal_cells *c = &sculptor->now.cells;
-    return face < 0 || face >= c->n_face ? -1 : c->face_use[c->face[face].use[0]].cell;
 }

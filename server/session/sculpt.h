@@ -57,9 +57,7 @@ void pal_sculptor_commit(pal_sculptor *sculptor, pal_sculpt_edit *edit);
 /* frees an edit and its scene: one that was not committed, or one whose scene no world uses any more; NULL is fine */
 void pal_sculpt_edit_free(pal_sculpt_edit *edit);
 
-/* control edge or vertex of a control face nearest to a rest position, body frame; -1: no such face */
-int32_t pal_sculptor_nearest_edge(const pal_sculptor *sculptor, int32_t face, const double at_m[3]);
-int32_t pal_sculptor_nearest_vertex(const pal_sculptor *sculptor, int32_t face, const double at_m[3]);
-/* control cell that owns a boundary face; -1: no such face */
-int32_t pal_sculptor_cell(const pal_sculptor *sculptor, int32_t face);
+/* sets a boundary face, the control cell that owns it, and its edge and its vertex nearest to a rest position, body
+ * frame; -1: no such face */
+void pal_sculptor_find(const pal_sculptor *sculptor, int32_t face, const double at_m[3], pal_cells_command *out);
 #endif

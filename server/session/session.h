@@ -24,8 +24,8 @@ typedef struct pal_session pal_session;
 typedef enum pal_command_kind {
     PAL_COMMAND_PAUSE,
     PAL_COMMAND_RESUME,
-    PAL_COMMAND_STEP, /* one step while paused, else ignored */
-    PAL_COMMAND_RESET,
+    PAL_COMMAND_STEP,     /* one step while paused, else ignored */
+    PAL_COMMAND_RESET,    /* the commands up to here name no body */
     PAL_COMMAND_MATERIAL, /* body, material        */
     PAL_COMMAND_FIELD, /* body, field, wanted: adds or removes a subscriber; the component exists while there is one */
     PAL_COMMAND_BRUSH, /* body, slot, brush: applies a brush with tool `slot` (world.h). It ends with the tool's release
@@ -99,11 +99,12 @@ const pal_scene *pal_session_scene(const pal_session *session); /* [any] */
 const pal_clock *pal_session_clock(const pal_session *session); /* [any] */
 /* The plan at open and the displayed parts; constant while the session lives. Frames name the current components,
  * including those of fields. [any] */
-int pal_session_component_count(const pal_session *session);
-void pal_session_component_info(const pal_session *session, int component,
-                                pal_component_info *out); /* spent_ns is 0: see frames */
-int pal_session_part_count(const pal_session *session);
-void pal_session_shown(const pal_session *session, int part, pal_shown *out);
+typedef struct pal_session_outline {
+    int n_component, n_part;
+    pal_component_info *component; /* [n_component]; spent_ns is 0: see frames */
+    pal_shown part[PAL_BODY_MAX];  /* [n_part] */
+} pal_session_outline;
+const pal_session_outline *pal_session_view_outline(const pal_session *session);
 bool pal_session_has_field(const pal_session *session, int body, pal_field field); /* can it be displayed? */
 
 /* Newest pose of a tool; the latest wins, never waits; NULL releases the tool. REFUSED: not finite, out of reach, no

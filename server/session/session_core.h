@@ -4,7 +4,6 @@
 #include "server/base/command_queue.h"
 #include "server/base/triple_buffer.h"
 #include "server/estimate/estimator_set.h"
-#include "server/session/disabled_components.h"
 #include "server/session/input_log.h"
 #include "server/session/session.h"
 
@@ -28,6 +27,16 @@ typedef struct session_tool {
     bool present, brushes; /* brushes: a brush began since the last release */
 } session_tool;
 
+/* Disabled components of the plan, by name: they stay disabled across any number of successive sessions, including
+ * sessions whose method has no such component */
+enum { DISABLED_MAX = 64 };
+typedef struct disabled_components {
+    int n;
+    struct {
+        char body[PAL_NAME], component[PAL_NAME];
+    } at[DISABLED_MAX]; /* any beyond these are enabled again by a switch */
+} disabled_components;
+
 /* a time and the number of steps taken until then */
 typedef struct mark {
     uint64_t ns, step;
@@ -39,12 +48,9 @@ struct pal_session {
     pal_world *world;
     double reach_m;
     uint64_t step_ns, lease_ns;
-    pal_component_info *component;
-    int n_component;
-    pal_disabled_components off; /* inherited from earlier sessions */
-    pal_shown part[PAL_BODY_MAX];
+    pal_session_outline outline;
+    disabled_components off; /* inherited from earlier sessions */
     bool gives[PAL_BODY_MAX][PAL_FIELD_COUNT];
-    int n_part;
     pthread_t thread;
     bool running; /* the thread exists: for the thread that opens, transfers and closes */
 

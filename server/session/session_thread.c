@@ -28,11 +28,6 @@ static void count_refusal(pal_session *s)
     atomic_fetch_add_explicit(&s->n_refused, 1, memory_order_relaxed);
 }
 
-static void reset_pace(pal_session *s)
-{
-    s->first = s->n_marks = 0;
-}
-
 /* sets a mark every 1/16 s; of the marks older than 1 s, keeps only the newest */
 static void mark_pace(pal_session *s, uint64_t now)
 {
@@ -115,17 +110,6 @@ static bool take_poses(pal_session *s, uint64_t now)
     return changed;
 }
 
-/* the end of a command: records an accepted one, counts a refused one */
-static void conclude(pal_session *s, pal_err err, pal_diagnostic *diag, pal_input_record record)
-{
-    record.step = s->step;
-    if (err)
-        count_refusal(s);
-    else
-        diag->text[0] = 0, pal_input_log_put(s->log, &record);
-    put_diagnostic(s, diag);
-}
-
 /* the first subscriber creates the component, the last removes it; creation that failed is retried by the next
  * subscriber */
 static void subscribe(pal_session *s, const pal_command *command)
@@ -150,19 +134,42 @@ static bool update_observed(pal_session *s)
     return observed;
 }
 
-static void put_material(pal_session *s, int body, const pal_material *material)
+/* commands that are input, with their records; 0: others */
+static const pal_input_kind record_of[PAL_COMMAND_COUNT] = {[PAL_COMMAND_RESET] = PAL_INPUT_RESET,
+                                                            [PAL_COMMAND_RESET_BODY] = PAL_INPUT_RESET_BODY,
+                                                            [PAL_COMMAND_MATERIAL] = PAL_INPUT_MATERIAL,
+                                                            [PAL_COMMAND_BRUSH] = PAL_INPUT_BRUSH,
+                                                            [PAL_COMMAND_COMPONENT] = PAL_INPUT_COMPONENT};
+
+/* records an accepted input, counts a refused one */
+static void apply(pal_session *s, const pal_command *command)
 {
+    pal_diagnostic diag = {""};
+    pal_input_record record = {.kind = record_of[command->kind],
+                               .index = command->kind == PAL_COMMAND_RESET ? 0 : command->body,
+                               .step = s->step,
+                               .material = command->material,
+                               .slot = command->slot,
+                               .brush = command->brush,
+                               .wanted = command->wanted};
+    memcpy(record.component, command->component, sizeof record.component);
+    pal_err err = pal_input_apply(s->world, s->scene, &record, &diag);
+    if (err)
+        count_refusal(s);
+    else
+        diag.text[0] = 0, pal_input_log_put(s->log, &record);
+    for (int t = 0; t < s->scene->n_tool && command->kind == PAL_COMMAND_RESET; t++)
+        s->tool[t].present = s->tool[t].brushes = false;
+    if (!err && command->kind == PAL_COMMAND_BRUSH)
+        s->tool[command->slot].brushes |= command->brush.kind != PAL_BRUSH_NONE;
     pthread_mutex_lock(&s->lock);
-    s->material[body] = *material;
+    s->diag = diag;
+    if (!err && command->kind == PAL_COMMAND_MATERIAL) s->material[command->body] = command->material;
     pthread_mutex_unlock(&s->lock);
 }
 
 static void execute(pal_session *s, const pal_command *command)
 {
-    pal_diagnostic diag = {""};
-    pal_input_record record;
-    pal_err err;
-    int body = command->body;
     switch (command->kind) {
     case PAL_COMMAND_PAUSE:
         s->paused = true;
@@ -173,41 +180,14 @@ static void execute(pal_session *s, const pal_command *command)
     case PAL_COMMAND_STEP:
         if (s->paused) s->single++;
         break;
-    case PAL_COMMAND_RESET:
-        pal_world_reset(s->world);
-        for (int t = 0; t < s->scene->n_tool; t++) s->tool[t].present = s->tool[t].brushes = false;
-        conclude(s, PAL_ERR_OK, &diag, (pal_input_record){.kind = PAL_INPUT_RESET});
-        break;
-    case PAL_COMMAND_RESET_BODY:
-        (void)pal_world_reset_body(s->world, body);
-        conclude(s, PAL_ERR_OK, &diag, (pal_input_record){.kind = PAL_INPUT_RESET_BODY, .index = body});
-        break;
-    case PAL_COMMAND_MATERIAL:
-        err = pal_world_material(s->world, body, &command->material, &diag);
-        if (!err) put_material(s, body, &command->material);
-        conclude(s, err, &diag,
-                 (pal_input_record){.kind = PAL_INPUT_MATERIAL, .index = body, .material = command->material});
-        break;
     case PAL_COMMAND_FIELD:
         subscribe(s, command);
         break;
-    case PAL_COMMAND_BRUSH:
-        err = pal_world_brush(s->world, body, command->slot, &command->brush, &diag);
-        if (!err) s->tool[command->slot].brushes |= command->brush.kind != PAL_BRUSH_NONE;
-        conclude(
-            s, err, &diag,
-            (pal_input_record){.kind = PAL_INPUT_BRUSH, .index = body, .slot = command->slot, .brush = command->brush});
-        break;
     case PAL_COMMAND_ESTIMATE:
-        pal_estimator_set_request(&s->estimators, body, command->wanted);
+        pal_estimator_set_request(&s->estimators, command->body, command->wanted);
         break;
-    case PAL_COMMAND_COMPONENT:
-        err = pal_world_switch_component(s->world, s->scene, body, command->component, command->wanted, &diag);
-        record = (pal_input_record){.kind = PAL_INPUT_COMPONENT, .index = body, .wanted = command->wanted};
-        memcpy(record.component, command->component, sizeof record.component);
-        conclude(s, err, &diag, record);
-        break;
-    case PAL_COMMAND_COUNT:
+    default:
+        apply(s, command);
         break;
     }
 }
@@ -218,7 +198,7 @@ static bool take_commands(pal_session *s)
     bool any = false, was_paused = s->paused;
     /* bounded, so that a flood of commands cannot delay the step */
     for (int k = 0; k < N_COMMAND && pal_command_queue_get(s->command, &command); k++, any = true) execute(s, &command);
-    if (was_paused != s->paused) reset_pace(s);
+    if (was_paused != s->paused) s->first = s->n_marks = 0; /* the pace is measured again */
     return any;
 }
 
@@ -306,19 +286,20 @@ static void *simulate(void *user)
 
 static pal_err copy_plan(pal_session *s)
 {
-    s->n_component = pal_world_component_count(s->world);
-    s->component = calloc((size_t)s->n_component + 1, sizeof *s->component);
-    if (!s->component) return PAL_ERR_MEMORY;
-    for (int k = 0; k < s->n_component; k++) {
-        pal_world_component_info(s->world, k, &s->component[k]);
-        s->component[k].spent_ns = s->component[k].n_run = 0;
+    pal_session_outline *o = &s->outline;
+    o->n_component = pal_world_component_count(s->world);
+    o->component = calloc((size_t)o->n_component + 1, sizeof *o->component);
+    if (!o->component) return PAL_ERR_MEMORY;
+    for (int k = 0; k < o->n_component; k++) {
+        pal_world_component_info(s->world, k, &o->component[k]);
+        o->component[k].spent_ns = o->component[k].n_run = 0;
     }
-    s->n_part = pal_world_body_count(s->world);
-    for (int k = 0; k < s->n_part; k++) pal_world_shown(s->world, k, &s->part[k]);
-    for (int b = 0; b < pal_world_body_count(s->world); b++)
+    o->n_part = pal_world_body_count(s->world);
+    for (int b = 0; b < o->n_part; b++) {
+        pal_world_shown(s->world, b, &o->part[b]);
         for (int k = 0; k < PAL_FIELD_COUNT; k++) s->gives[b][k] = pal_world_has_field(s->world, b, (pal_field)k);
-    for (int b = 0; b < pal_world_body_count(s->world); b++)
         s->reach_m = fmax(s->reach_m, PAL_POSE_REACH * pal_world_body(s->world, b)->length_scale_m);
+    }
     return PAL_ERR_OK;
 }
 
@@ -361,7 +342,7 @@ static void release(pal_session *s)
     pal_estimator_set_close(&s->estimators);
     pthread_mutex_destroy(&s->lock);
     free((void *)(uintptr_t)s->options.record_path);
-    free(s->component);
+    free(s->outline.component);
     free(s);
 }
 
@@ -429,26 +410,9 @@ const pal_clock *pal_session_clock(const pal_session *s)
     return s->options.clock;
 }
 
-int pal_session_component_count(const pal_session *s)
+const pal_session_outline *pal_session_view_outline(const pal_session *s)
 {
-    return s->n_component;
-}
-
-void pal_session_component_info(const pal_session *s, int component, pal_component_info *out)
-{
-    *out = component >= 0 && component < s->n_component
-               ? s->component[component]
-               : (pal_component_info){.name = "", .body = "", .stage = "", .reason = ""};
-}
-
-int pal_session_part_count(const pal_session *s)
-{
-    return s->n_part;
-}
-
-void pal_session_shown(const pal_session *s, int part, pal_shown *out)
-{
-    *out = part >= 0 && part < s->n_part ? s->part[part] : (pal_shown){.name = ""};
+    return &s->outline;
 }
 
 bool pal_session_has_field(const pal_session *s, int body, pal_field field)
@@ -478,28 +442,21 @@ static bool is_valid(const pal_session *s, const pal_command *command)
 {
     bool has_body = command->body >= 0 && command->body < s->scene->n_body;
     pal_material material = command->material; /* the check may clamp it */
+    if ((int)command->kind < 0 || command->kind >= PAL_COMMAND_COUNT) return false;
+    if (command->kind > PAL_COMMAND_RESET && !has_body) return false;
     switch (command->kind) {
-    case PAL_COMMAND_PAUSE:
-    case PAL_COMMAND_RESUME:
-    case PAL_COMMAND_STEP:
-    case PAL_COMMAND_RESET:
-        return true;
     case PAL_COMMAND_MATERIAL:
-        return has_body && !pal_material_check(&material, NULL);
+        return !pal_material_check(&material, NULL);
     case PAL_COMMAND_FIELD:
         return pal_session_has_field(s, command->body, command->field);
     case PAL_COMMAND_BRUSH:
-        return has_body && command->slot >= 0 && command->slot < s->scene->n_tool &&
+        return command->slot >= 0 && command->slot < s->scene->n_tool &&
                (command->brush.kind == PAL_BRUSH_NONE || !pal_brush_check(&command->brush, NULL));
-    case PAL_COMMAND_ESTIMATE:
-    case PAL_COMMAND_RESET_BODY:
-        return has_body;
     case PAL_COMMAND_COMPONENT:
-        return has_body && memchr(command->component, 0, sizeof command->component);
-    case PAL_COMMAND_COUNT:
-        break;
+        return memchr(command->component, 0, sizeof command->component);
+    default:
+        return true;
     }
-    return false;
 }
 
 pal_err pal_session_command(pal_session *s, const pal_command *command)

@@ -3,6 +3,7 @@
 
 #include "server/base/log.h"
 
+#include <stdio.h>
 #include <string.h>
 
 static uint64_t later(uint64_t ns, uint64_t by_ns, uint64_t max_ns)
@@ -28,13 +29,39 @@ static void transfer_tools(pal_session *to, pal_session *from, uint64_t now_ns)
     }
 }
 
+/* lists a component of `from`, unless it is enabled there or listed already */
+static void list_disabled(pal_session *to, const pal_session *from, const char *body, const char *component)
+{
+    disabled_components *off = &to->off;
+    int b = pal_scene_find_body(from->scene, body);
+    if (b >= 0 && pal_world_find_component(from->world, b, component) >= 0) return;
+    for (int i = 0; i < off->n; i++)
+        if (!strcmp(off->at[i].body, body) && !strcmp(off->at[i].component, component)) return;
+    if (off->n == DISABLED_MAX) return;
+    snprintf(off->at[off->n].body, PAL_NAME, "%s", body);
+    snprintf(off->at[off->n++].component, PAL_NAME, "%s", component);
+}
+
+/* disables what is disabled in `from`: listed there, or in its plan at open and no longer in its world */
+static void transfer_disabled(pal_session *to, const pal_session *from)
+{
+    for (int i = 0; i < from->off.n; i++) list_disabled(to, from, from->off.at[i].body, from->off.at[i].component);
+    /* components of services belong to no body and cannot be disabled */
+    for (int k = 0; k < from->outline.n_component; k++)
+        if (pal_scene_find_body(to->scene, from->outline.component[k].body) >= 0)
+            list_disabled(to, from, from->outline.component[k].body, from->outline.component[k].name);
+    for (int i = 0; i < to->off.n; i++) {
+        int b = pal_scene_find_body(to->scene, to->off.at[i].body);
+        if (b >= 0) (void)pal_world_switch_component(to->world, to->scene, b, to->off.at[i].component, false, NULL);
+    }
+}
+
 /* transfers the state of the simulation thread, before the world's state */
 static void transfer_state(pal_session *to, pal_session *from)
 {
     to->paused = from->paused, to->single = from->single;
     to->step = from->step, to->n_late = from->n_late, to->work_ns = from->work_ns;
-    pal_disabled_components_transfer(&to->off, &from->off, from->component, from->n_component, from->world, to->world,
-                                     to->scene);
+    transfer_disabled(to, from);
     memcpy(to->n_subscriber, from->n_subscriber, sizeof to->n_subscriber);
     memcpy(to->material, from->material, sizeof to->material); /* neither thread runs */
     for (int b = 0; b < to->scene->n_body; b++)
@@ -45,10 +72,8 @@ static void transfer_state(pal_session *to, pal_session *from)
 /* transfers what other threads may have changed, and pending commands */
 static void transfer_commands(pal_session *to, pal_session *from)
 {
-    atomic_store_explicit(&to->n_refused, atomic_load_explicit(&from->n_refused, memory_order_relaxed),
-                          memory_order_relaxed);
-    atomic_store_explicit(&to->n_observer, atomic_load_explicit(&from->n_observer, memory_order_relaxed),
-                          memory_order_relaxed);
+    atomic_store(&to->n_refused, atomic_load(&from->n_refused));
+    atomic_store(&to->n_observer, atomic_load(&from->n_observer));
     pal_estimator_set_transfer(&to->estimators, &from->estimators);
     pal_command command;
     for (int k = 0; k < N_COMMAND && pal_command_queue_get(from->command, &command); k++)

@@ -212,7 +212,7 @@ static void neighbours_are_what_a_switch_makes(void)
             pal_world *next = NULL;
             pal_diagnostic diag = {""};
             pal_err err = pal_configuration_switch_prepare(at, NULL, 0, to, &diag, &change);
-            if (!err) err = pal_world_create(pal_configuration_switch_scene(change), &diag, &next);
+            if (!err) err = pal_world_create(&change->set->scene, &diag, &next);
             if (err) CHECK_FAIL("%s", diag.text);
             double nodes = pal_world_view_body(next, 0)->n_node;
             printf("  %s %d voxels, %g ms: nodes %d foreseen, %g made, sub-steps %d, %d\n", to->model, to->size,

@@ -21,10 +21,10 @@ struct pal_transport {
     pal_mem_peer *first;
 };
 
-static inline pal_err mem_open(pal_loop *loop, const char *url, const pal_peer_events *events, pal_diagnostic *diag,
-                               pal_transport **out)
+static inline pal_err mem_open(pal_loop *loop, pal_listen_address *address, const pal_peer_events *events,
+                               pal_diagnostic *diag, pal_transport **out)
 {
-    (void)loop, (void)url, (void)diag;
+    (void)loop, (void)address, (void)diag;
     pal_transport *t = calloc(1, sizeof *t);
     if (!t) return PAL_ERR_MEMORY;
     t->events = *events;
@@ -45,12 +45,6 @@ static inline void mem_ignore(pal_peer *peer)
     (void)peer;
 }
 
-static inline int mem_port(const pal_transport *transport)
-{
-    (void)transport;
-    return 0;
-}
-
 static inline void pal_mem_leave(pal_mem_peer *peer);
 
 static inline void mem_close(pal_transport *transport)
@@ -60,7 +54,7 @@ static inline void mem_close(pal_transport *transport)
     free(transport);
 }
 
-static const pal_transport_ops pal_mem_transport = {false, mem_open, mem_port, mem_ignore, mem_ignore, mem_close};
+static const pal_transport_ops pal_mem_transport = {false, mem_open, mem_ignore, mem_ignore, mem_close};
 
 /* calls opened before it returns; session "": the first. NULL: out of memory. pal_mem_leave or closing the transport
  * frees the peer. */

@@ -10,7 +10,7 @@
 
 static pal_session *session;
 static pal_server *server;
-static pal_server_gate *gate;
+static pal_server_gate gate;
 static pal_transport *transport;
 static manual_clock served_clock;
 static uint64_t served_step_ns; /* of the scene as opened */
@@ -20,9 +20,8 @@ static inline void served_session(const pal_scene *scene, pal_session_options op
     pal_diagnostic diag = {""};
     manual_clock_init(&served_clock, 1000000000u);
     served_step_ns = (uint64_t)(1e9 * scene->step_s + 0.5);
-    gate = pal_server_gate_create();
     options.clock = &served_clock.clock;
-    options.lease_s = 60, options.wake = pal_server_gate_wake, options.user = gate;
+    options.lease_s = 60, options.wake = pal_server_gate_wake, options.user = &gate;
     if (pal_session_open(scene, &options, &diag, &session)) CHECK_FAIL("no session: %s", diag.text);
     manual_clock_settle(&served_clock, 1);
 }
@@ -33,7 +32,7 @@ static inline void served_open(pal_server_options net)
     pal_diagnostic diag = {""};
     net.transport = &pal_mem_transport;
     if (pal_server_open(&net, &session, 1, &diag, &server)) CHECK_FAIL("no server: %s", diag.text);
-    pal_server_connect(server, gate);
+    pal_server_connect(server, &gate);
     transport = pal_server_transport(server);
 }
 
@@ -47,7 +46,6 @@ static inline void end(void)
 {
     pal_server_close(server);
     pal_session_close(session);
-    pal_server_gate_destroy(gate);
     CHECK_INT(pal_packet_total(), 0);
 }
 

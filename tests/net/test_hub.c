@@ -53,7 +53,6 @@ static void frames_decode_to_the_sessions_positions(void)
     pal_asset_destroy(asset);
     pal_stream_close(s);
     pal_session_close(session);
-    pal_server_gate_destroy(gate);
 }
 
 static void newcomer_gets_hello_members_frame_and_tools_in_this_order(void)

@@ -126,10 +126,6 @@ static void text_becomes_valid_without_control_characters(void)
     CHECK_TEXT(out, "?x??????y");
     pal_plain_text(out, 6, "ab\xC3\xA4\xC3\xB6");
     CHECK_TEXT(out, "ab\xC3\xA4"); /* cut at a character */
-    pal_plain_json(out, sizeof out, "say \"a\\b\"");
-    CHECK_TEXT(out, "say \\\"a\\\\b\\\"");
-    pal_plain_json(out, 6, "abcd\"");
-    CHECK_TEXT(out, "abcd");
 }
 
 static void put(const char *folder, const char *name, const char *text)
@@ -147,7 +143,7 @@ static void files_come_only_from_inside_the_folder(void)
                    "//index.html", "/%2e%2e/x.html", "index.html", "/a b.html",       "/noise",
                    "/noise.exe",   "/sub",           "/sub/",      "/up/passwd.html", ""};
     pal_site *site = NULL;
-    pal_site_file file;
+    pal_reply file;
     REQUIRE(mkdtemp(folder));
     CHECK_INT(pal_site_open(folder, NULL, &site), PAL_ERR_IO); /* no index.html */
     put(folder, "index.html", "<p>one");
@@ -161,11 +157,13 @@ static void files_come_only_from_inside_the_folder(void)
     snprintf(path, sizeof path, "%s/up", folder);
     CHECK_INT(symlink("/etc", path), 0);
     REQUIRE(pal_site_open(folder, NULL, &site) == PAL_ERR_OK);
-    CHECK(pal_site_get(site, "/", &file));
+    REQUIRE(pal_site_get(site, "/", &file));
     CHECK_TEXT(file.type, "text/html; charset=utf-8");
-    CHECK(pal_site_get(site, "/sub/code.mjs", &file));
+    pal_packet_drop(file.body);
+    REQUIRE(pal_site_get(site, "/sub/code.mjs", &file));
     CHECK_TEXT(file.type, "text/javascript; charset=utf-8");
-    CHECK(file.bytes->n_byte == 9 && strlen(file.etag) == 34);
+    CHECK(file.body->n_byte == 9 && strlen(file.etag) == 34);
+    pal_packet_drop(file.body);
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         if (pal_site_get(site, bad[i], &file)) CHECK_FAIL("%s was served", bad[i]);
     snprintf(path, sizeof path, "rm -r %s", folder);
@@ -177,21 +175,23 @@ static void changed_file_has_another_tag(void)
 {
     char folder[] = "/tmp/palpate_site_XXXXXX", path[300], tag[64];
     pal_site *site = NULL;
-    pal_site_file file;
+    pal_reply file;
     REQUIRE(mkdtemp(folder));
     put(folder, "index.html", "<p>one");
     REQUIRE(pal_site_open(folder, NULL, &site) == PAL_ERR_OK);
     REQUIRE(pal_site_get(site, "/index.html", &file));
     snprintf(tag, sizeof tag, "%s", file.etag);
-    pal_packet *fixed = pal_packet_hold(file.bytes);
+    pal_packet *fixed = file.body;
     REQUIRE(pal_site_get(site, "/", &file));
     CHECK_TEXT(file.etag, tag);
-    CHECK(file.bytes == fixed); /* not read again */
+    CHECK(file.body == fixed); /* not read again */
+    pal_packet_drop(file.body);
     put(folder, "index.html", "<p>three");
     REQUIRE(pal_site_get(site, "/", &file));
     CHECK(strcmp(file.etag, tag) != 0);
-    CHECK(file.bytes->n_byte == 8 && fixed->n_byte == 6); /* a reply that is under way keeps its bytes */
+    CHECK(file.body->n_byte == 8 && fixed->n_byte == 6); /* a reply that is under way keeps its bytes */
     pal_packet_drop(fixed);
+    pal_packet_drop(file.body);
     snprintf(path, sizeof path, "%s/index.html", folder);
     unlink(path);
     CHECK(!pal_site_get(site, "/", &file));

@@ -151,7 +151,6 @@ static void tables_are_the_worlds_after_many_changes(void)
     pal_asset_destroy(asset);
     pal_stream_close(s);
     pal_session_close(session);
-    pal_server_gate_destroy(gate);
 }
 
 static void who_skips_cycles_gets_one_patch_with_all_of_it(void)

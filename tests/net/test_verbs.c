@@ -6,12 +6,13 @@
 
 static int n_run;
 
-static void run_whistle(pal_hub *hub, pal_client *c, const pal_verb *verb, const pal_wire_command *command)
+static bool run_whistle(pal_client *c, const pal_verb *verb, const pal_wire_command *command)
 {
     n_run++;
-    pal_wire_answer *a = pal_hub_answer_begin(hub, verb->name);
+    pal_wire_answer *a = pal_hub_answer_begin(c, verb->name);
     pal_hub_answer_arg(a, "pitch_Hz", 2 * pal_hub_arg(command, "pitch_Hz", 0) + verb->detail);
-    pal_hub_send(hub, c, hub->control);
+    pal_hub_send(c);
+    return true;
 }
 
 static const pal_verb own[] = {

@@ -15,7 +15,7 @@
 static small_scene organ;
 static pal_session *session;
 static pal_server *server;
-static pal_server_gate *gate;
+static pal_server_gate gate;
 static pthread_t net;
 static int port;
 static char folder[] = "/tmp/palpate_ws_XXXXXX";
@@ -34,15 +34,14 @@ static pal_err net_err;
 static void begin(void)
 {
     pal_diagnostic diag = {""};
-    gate = pal_server_gate_create();
-    pal_session_options options = {.lease_s = 60, .wake = pal_server_gate_wake, .user = gate};
+    pal_session_options options = {.lease_s = 60, .wake = pal_server_gate_wake, .user = &gate};
     pal_server_options net_options = {.port = 0, .viewer_folder = folder};
     if (pal_session_open(&organ.scene, &options, &diag, &session)) CHECK_FAIL("no session: %s", diag.text);
     if (pal_server_open(&net_options, &session, 1, &diag, &server)) {
         CHECK_FAIL("no server: %s", diag.text);
         exit(1);
     }
-    pal_server_connect(server, gate);
+    pal_server_connect(server, &gate);
     port = pal_server_port(server);
     pthread_create(&net, NULL, net_main, &net_err);
 }
@@ -54,7 +53,6 @@ static void end(void)
     CHECK_INT(net_err, PAL_ERR_OK);
     pal_server_close(server);
     pal_session_close(session);
-    pal_server_gate_destroy(gate);
 }
 
 static int get(const char *path, const char *extra, char *body, size_t cap, size_t *n)

@@ -23,7 +23,7 @@ static pal_session *change_to(pal_session *s, const pal_configuration *to, pal_c
     pal_diagnostic diag = {""};
     pal_session *next = NULL;
     if (pal_configuration_switch_prepare(pal_session_scene(s), &scene.body[0], 0, to, &diag, change) ||
-        pal_session_open_after(s, pal_configuration_switch_scene(*change), &diag, &next)) {
+        pal_session_open_after(s, &(*change)->set->scene, &diag, &next)) {
         CHECK_FAIL("%s", diag.text);
         return NULL;
     }
@@ -54,7 +54,7 @@ static void a_session_changes_its_method_and_comes_back(bool paused)
         pal_transfer_report r;
         pal_session *next = change_to(s, &list[i], &change);
         REQUIRE(next);
-        r = *pal_configuration_switch_report(change);
+        r = change->report;
         /* the springs' own voxels are full to their border: another mass, and held farther out */
         CHECK_NEAR(r.energy_after_J / r.energy_before_J, 1, 0.02);
         CHECK_LE(fmax(r.scale, 1 / r.scale), PAL_TRANSFER_MAX_SCALE * (1 + 1e-9));
@@ -106,7 +106,7 @@ static void beyond_the_bound_of_displacements_the_velocity_makes_up(void)
     take_steps(s, true, tick, 1);
     pal_session *next = change_to(s, &(pal_configuration){.model = "fem", .element = "hex8_bbar", .size = 7}, &change);
     REQUIRE(next);
-    r = *pal_configuration_switch_report(change);
+    r = change->report;
     CHECK_NEAR(r.scale, PAL_TRANSFER_MAX_SCALE, 1e-9);
     CHECK_NEAR(r.energy_after_J / r.energy_before_J, 1, 0.02);
     pal_session_close(s);
@@ -134,7 +134,7 @@ static void a_tool_is_held_on_however_long_it_takes(void)
     pal_configuration_switch *change = NULL;
     pal_diagnostic diag = {""};
     REQUIRE(s && !pal_configuration_switch_prepare(&scene, NULL, 0, &to, &diag, &change));
-    REQUIRE(!pal_session_open_after(s, pal_configuration_switch_scene(change), &diag, &next));
+    REQUIRE(!pal_session_open_after(s, &change->set->scene, &diag, &next));
     CHECK(!pal_session_request_pose(s, 0, &pose));
     CHECK(stepped_steps(s, 1)->tool[0].present);
     REQUIRE(stepped_transfer(next, s, transfer_slowly, change));
@@ -172,7 +172,7 @@ static void a_switch_is_rehearsed_while_the_session_runs_on(void)
     CHECK(!pal_session_request_pose(s, 0, &pose));
     stepped_steps(s, 20);
     REQUIRE(!pal_configuration_switch_prepare(&scene, NULL, 0, &to, &diag, &change));
-    REQUIRE(!pal_session_open_after(s, pal_configuration_switch_scene(change), &diag, &next));
+    REQUIRE(!pal_session_open_after(s, &change->set->scene, &diag, &next));
     rehearsed = s;
     pal_session_rehearse(next, s, pal_configuration_switch_snapshot, rehearse_slowly, change);
     pal_session_transfer_begin(next, s, pal_configuration_switch_transfer, change);
@@ -180,7 +180,7 @@ static void a_switch_is_rehearsed_while_the_session_runs_on(void)
     CHECK_NEAR(pal_session_pause_s(next, &n_rehearsed), 0, 0); /* no time passes in a transfer of this test */
     CHECK_INT(n_rehearsed, n_rehearsal);
     CHECK(n_rehearsed >= 1 && n_rehearsed <= PAL_SESSION_REHEARSALS_MAX);
-    r = *pal_configuration_switch_report(change);
+    r = change->report;
     CHECK_NEAR(r.energy_after_J / r.energy_before_J, 1, 0.02);
     manual_clock_settle(&stepped_clock, 1);
     const pal_frame *f = stepped_steps(next, 15);
@@ -288,7 +288,7 @@ static void what_is_not_taken_changes_nothing(void)
     const pal_configuration good = {.model = "fem", .size = 6}, bad = {.model = "fem", .element = "tet5", .size = 6};
     CHECK_INT(pal_configuration_switch_prepare(&scene, NULL, 0, &bad, &diag, &change), PAL_ERR_REFUSED);
     REQUIRE(!pal_configuration_switch_prepare(&scene, NULL, 0, &good, &diag, &change));
-    REQUIRE(!pal_world_create(pal_configuration_switch_scene(change), &diag, &next));
+    REQUIRE(!pal_world_create(&change->set->scene, &diag, &next));
     pal_configuration_switch_transfer(change, next, w);
     CHECK(pal_world_hash(w) == hash);
     for (int k = 0; k < 5; k++) CHECK(!pal_world_step(w, scene.step_s));

@@ -76,10 +76,9 @@ static void components_are_switched_by_command(void)
     REQUIRE(s);
     const pal_frame *f = stepped_steps(s, 3);
     int n_component = f->n_row;
-    CHECK_INT(n_component, pal_session_component_count(s));
-    pal_component_info info;
-    pal_session_component_info(s, 0, &info);
-    CHECK(info.reason && info.reason[0]);
+    CHECK_INT(n_component, pal_session_view_outline(s)->n_component);
+    const char *reason = pal_session_view_outline(s)->component[0].reason;
+    CHECK(reason && reason[0]);
     pal_command command = {.kind = PAL_COMMAND_COMPONENT, .component = "gravity"};
     CHECK_INT(pal_session_command(s, &command), 0);
     f = stepped_steps(s, 1);

@@ -134,10 +134,9 @@ static void a_session_that_starts_paused_shows_rest_and_steps_one_by_one(void)
 
 static void reset_brings_the_rest_shape_back(void)
 {
-    pal_shown shown;
     pal_session *s = open_with((pal_session_options){0});
     REQUIRE(s != NULL);
-    pal_session_shown(s, 0, &shown);
+    const pal_shown shown = pal_session_view_outline(s)->part[0];
     const pal_frame *f = stepped_steps(s, 100);
     double sag = 0, back = 0;
     for (int k = 0; k < 3 * shown.n_vertex; k++)
@@ -413,22 +412,15 @@ static void components_and_parts_are_known_to_every_thread(void)
 {
     pal_session *s = open_with((pal_session_options){.start_paused = true});
     REQUIRE(s != NULL);
-    pal_component_info row;
-    pal_shown shown;
     bool gravity = false;
-    for (int k = 0; k < pal_session_component_count(s); k++) {
-        pal_session_component_info(s, k, &row);
-        gravity = gravity || !strcmp(row.name, "gravity");
-        CHECK_INT(row.spent_ns, 0);
+    const pal_session_outline *outline = pal_session_view_outline(s);
+    for (int k = 0; k < outline->n_component; k++) {
+        gravity = gravity || !strcmp(outline->component[k].name, "gravity");
+        CHECK_INT(outline->component[k].spent_ns, 0);
     }
     CHECK(gravity);
-    CHECK_INT(pal_session_part_count(s), 1);
-    pal_session_shown(s, 0, &shown);
-    CHECK_INT(shown.n_vertex, mesh.surface.n_vertex);
-    pal_session_component_info(s, 1000, &row);
-    CHECK_TEXT(row.name, "");
-    pal_session_shown(s, -1, &shown);
-    CHECK_INT(shown.n_vertex, 0);
+    CHECK_INT(outline->n_part, 1);
+    CHECK_INT(outline->part[0].n_vertex, mesh.surface.n_vertex);
     CHECK(pal_session_scene(s) == &scene);
     pal_session_close(s);
 }
@@ -446,7 +438,7 @@ static void a_field_exists_while_somebody_subscribes(void)
     const pal_frame *f = stepped_newest(s);
     int n_component = f->n_row;
     CHECK(!shows_displacement(f));
-    CHECK_INT(n_component, pal_session_component_count(s));
+    CHECK_INT(n_component, pal_session_view_outline(s)->n_component);
     CHECK(pal_session_has_field(s, 0, PAL_FIELD_DISPLACEMENT_M) && !pal_session_has_field(s, 0, PAL_FIELD_ENERGY_J_M3));
     CHECK(!pal_session_has_field(s, 1, PAL_FIELD_DISPLACEMENT_M) &&
           !pal_session_has_field(s, -1, PAL_FIELD_DISPLACEMENT_M));

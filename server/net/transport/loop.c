@@ -19,11 +19,6 @@ struct pal_loop {
     uint64_t due_ns, tick_ns; /* without sockets; due_ns 0: none */
 };
 
-static pal_loop *loop_of(struct lws *wsi)
-{
-    return lws_context_user(lws_get_context(wsi));
-}
-
 static void serve_wake(pal_loop *loop)
 {
     /* cleared before serving, so that a wake during the service is served again */
@@ -33,7 +28,7 @@ static void serve_wake(pal_loop *loop)
 static int wake_callback(struct lws *wsi, enum lws_callback_reasons reason, void *own, void *in, size_t n_byte)
 {
     (void)own, (void)in, (void)n_byte;
-    if (reason == LWS_CALLBACK_EVENT_WAIT_CANCELLED) serve_wake(loop_of(wsi));
+    if (reason == LWS_CALLBACK_EVENT_WAIT_CANCELLED) serve_wake(lws_context_user(lws_get_context(wsi)));
     return 0;
 }
 

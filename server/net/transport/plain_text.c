@@ -5,30 +5,18 @@
 
 #include <string.h>
 
-static void copy(char *to, size_t cap, const char *from, bool json)
+void pal_plain_text(char *to, size_t cap, const char *from)
 {
     size_t at = 0, n_byte = strlen(from);
     while (n_byte > 0) {
         uint32_t code = 0;
         int n = pal_utf8_next(from, n_byte, &code);
         bool control = n > 0 && (code < 0x20 || (code >= 0x7F && code < 0xA0));
-        bool escaped = json && (*from == '"' || *from == '\\');
         size_t need = n > 0 && !control ? (size_t)n : 1;
-        if (at + need + escaped >= cap) break;
-        if (escaped) to[at++] = '\\';
+        if (at + need >= cap) break;
         memcpy(to + at, control ? " " : n ? from : "?", need);
         at += need;
         from += n ? n : 1, n_byte -= n ? (size_t)n : 1;
     }
     to[at] = 0;
-}
-
-void pal_plain_text(char *to, size_t cap, const char *from)
-{
-    copy(to, cap, from, false);
-}
-
-void pal_plain_json(char *to, size_t cap, const char *from)
-{
-    copy(to, cap, from, true);
 }

@@ -6,6 +6,4 @@
 
 /* writes at most cap - 1 bytes; each byte outside valid UTF-8 and each control character becomes one '?' or blank */
 void pal_plain_text(char *to, size_t cap, const char *from);
-/* the same for the inside of a JSON string: also escapes quotes and backslashes */
-void pal_plain_json(char *to, size_t cap, const char *from);
 #endif

@@ -16,7 +16,6 @@ enum { MAX_FILES = 512, MAX_FILE_BYTES = 16 << 20, MAX_BYTES = 64 << 20, ETAG = 
 typedef struct entry {
     char path[PATH], etag[ETAG];
     struct timespec changed;
-    off_t n_byte;
     pal_packet *bytes;
 } entry;
 
@@ -27,7 +26,8 @@ struct pal_site {
     entry entry[MAX_FILES];
 };
 
-const char *pal_site_type(const char *name)
+/* content type by file extension; NULL: not declared */
+static const char *type_of(const char *name)
 {
     static const char *const types[][2] = {{".html", "text/html; charset=utf-8"},
                                            {".css", "text/css; charset=utf-8"},
@@ -59,15 +59,15 @@ static bool good_path(const char *path)
 pal_err pal_site_open(const char *folder, pal_diagnostic *diag, pal_site **out)
 {
     pal_site *site = calloc(1, sizeof *site);
-    pal_site_file index;
+    pal_reply index = {.body = NULL};
     if (!site) return PAL_ERR_MEMORY;
-    if (!realpath(folder, site->root)) {
+    const char *fault = !realpath(folder, site->root)      ? "cannot be opened"
+                        : !pal_site_get(site, "/", &index) ? "has no index.html"
+                                                           : NULL;
+    pal_packet_drop(index.body);
+    if (fault) {
         free(site);
-        return pal_diagnostic_set(diag, PAL_ERR_IO, "the viewer's folder %s cannot be opened", folder);
-    }
-    if (!pal_site_get(site, "/", &index)) {
-        free(site);
-        return pal_diagnostic_set(diag, PAL_ERR_IO, "the viewer's folder %s has no index.html", folder);
+        return pal_diagnostic_set(diag, PAL_ERR_IO, "the viewer's folder %s %s", folder, fault);
     }
     *out = site;
     return PAL_ERR_OK;
@@ -119,7 +119,6 @@ static bool fill(pal_site *site, entry *e, int fd, const struct stat *stat)
     site->n_byte += n - old;
     pal_packet_replace(&e->bytes, bytes);
     e->changed = stat->st_mtim;
-    e->n_byte = stat->st_size;
     pal_sha256(bytes->bytes, n, digest);
     e->etag[0] = '"';
     for (int i = 0; i < 16; i++) snprintf(e->etag + 1 + 2 * i, 3, "%02x", digest[i]);
@@ -127,12 +126,12 @@ static bool fill(pal_site *site, entry *e, int fd, const struct stat *stat)
     return true;
 }
 
-bool pal_site_get(pal_site *site, const char *path, pal_site_file *out)
+bool pal_site_get(pal_site *site, const char *path, pal_reply *out)
 {
     struct stat stat;
     entry *e = NULL;
     if (!strcmp(path, "/")) path = "/index.html";
-    const char *type = pal_site_type(path);
+    const char *type = type_of(path);
     if (!type || strlen(path) >= PATH || !good_path(path)) return false;
     int fd = open_inside(site, path, &stat);
     if (fd < 0) return false;
@@ -145,11 +144,12 @@ bool pal_site_get(pal_site *site, const char *path, pal_site_file *out)
     }
     if (!e)
         good = false;
-    else if (!known || e->n_byte != stat.st_size || memcmp(&e->changed, &stat.st_mtim, sizeof e->changed))
+    else if (!known || (off_t)e->bytes->n_byte != stat.st_size || memcmp(&e->changed, &stat.st_mtim, sizeof e->changed))
         good = fill(site, e, fd, &stat);
     close(fd);
     if (!good) return false;
     if (!known) site->n_entry++;
-    *out = (pal_site_file){type, e->etag, e->bytes};
+    *out = (pal_reply){.status = 200, .type = type, .caching = "no-cache", .body = pal_packet_hold(e->bytes)};
+    memcpy(out->etag, e->etag, sizeof e->etag);
     return true;
 }

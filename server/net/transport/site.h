@@ -6,21 +6,13 @@
 #ifndef PAL_NET_TRANSPORT_SITE_H
 #define PAL_NET_TRANSPORT_SITE_H
 #include "server/base/err.h"
-#include "server/net/transport/packet.h"
+#include "server/net/transport/transport.h"
 
 typedef struct pal_site pal_site;
-
-typedef struct pal_site_file {
-    const char *type;
-    const char *etag;  /* quoted; valid until the next get */
-    pal_packet *bytes; /* borrowed; hold it to keep it */
-} pal_site_file;
 
 /* IO: not a folder, or it has no index.html; copies folder. [load] */
 pal_err pal_site_open(const char *folder, pal_diagnostic *diag, pal_site **out);
 void pal_site_close(pal_site *site); /* NULL is fine */
-/* path: as in the request, decoded, from the first slash; false: no such file */
-bool pal_site_get(pal_site *site, const char *path, pal_site_file *out);
-/* content type by file extension; NULL: not declared */
-const char *pal_site_type(const char *name);
+/* path: as in the request, decoded, from the first slash; false: no such file. out->body belongs to the caller */
+bool pal_site_get(pal_site *site, const char *path, pal_reply *out);
 #endif

@@ -44,15 +44,21 @@ typedef struct pal_peer_events {
     void *user;
 } pal_peer_events;
 
+/* where to listen */
+typedef struct pal_listen_address {
+    const char *ip; /* "127.0.0.1", "::1" */
+    int port;       /* 0: any, and open sets the one chosen */
+    bool any_host;  /* accepts any Host name (for a proxy), not only loopback names */
+} pal_listen_address;
+
 struct pal_transport_ops {
     bool sockets; /* needs a loop with sockets */
-    /* url: "ws://127.0.0.1:8090" (port 0: any); copies events. REFUSED: names address and reason. [load] */
-    pal_err (*open)(pal_loop *loop, const char *url, const pal_peer_events *events, pal_diagnostic *diag,
+    /* copies events. REFUSED: names address and reason. [load] */
+    pal_err (*open)(pal_loop *loop, pal_listen_address *address, const pal_peer_events *events, pal_diagnostic *diag,
                     pal_transport **out);
-    int (*port)(const pal_transport *transport); /* 0: none */
-    void (*ready)(pal_peer *peer);               /* next has a message */
-    void (*drop)(pal_peer *peer);                /* drop_code is set: close as soon as possible */
-    void (*close)(pal_transport *transport);     /* after pal_loop_shut; closes the remaining peers. [load] */
+    void (*ready)(pal_peer *peer);           /* next has a message */
+    void (*drop)(pal_peer *peer);            /* drop_code is set: close as soon as possible */
+    void (*close)(pal_transport *transport); /* after pal_loop_shut; closes the remaining peers. [load] */
 };
 
 /* websockets; LCM peers use clients/lcm_bridge, which speaks ws. Tests have one without sockets

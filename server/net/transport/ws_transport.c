@@ -15,6 +15,7 @@
 #include <fcntl.h>
 #include <libwebsockets.h>
 #include <netinet/tcp.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -25,12 +26,10 @@ enum { CHUNK = 64 << 10, HEADERS = 4096, SEND_QUEUE = 16 << 10, UNACKED_MS = 150
 _Static_assert((int)PAL_PACKET_HEADROOM >= LWS_PRE, "a packet has room for the websocket header");
 
 struct pal_transport {
-    pal_loop *loop;
     pal_peer_events events;
     struct lws_vhost *vhost;
     int listen_fd, spare_fd; /* spare: given up to turn a caller away when descriptors run out */
-    int port;
-    bool any_host, adopted; /* adopted: lws closes listen_fd with the loop */
+    bool any_host, adopted;  /* adopted: lws closes listen_fd with the loop */
     uint8_t chunk[LWS_PRE + CHUNK];
 };
 
@@ -54,13 +53,6 @@ static pal_transport *transport_of(struct lws *wsi)
 
 /* ---- who may come ---- */
 
-/* host of the request, made of harmless characters; false: none or hostile */
-static bool read_host(struct lws *wsi, char *host, int cap)
-{
-    if (lws_hdr_copy(wsi, host, cap, WSI_TOKEN_HOST) <= 0) return false;
-    return host[strspn(host, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-_:[]")] == 0;
-}
-
 static bool loopback_host(const char *host)
 {
     const char *end = *host == '[' ? strchr(host, ']') : strchr(host, ':');
@@ -74,9 +66,12 @@ static bool loopback_host(const char *host)
     return inet_pton(AF_INET, name, &v4) == 1 && ntohl(v4.s_addr) >> 24 == 127;
 }
 
+/* copies the host of the request; false: there is none, it has other than harmless characters, or it is not allowed */
 static bool host_allowed(struct lws *wsi, char *host, int cap)
 {
-    return read_host(wsi, host, cap) && (transport_of(wsi)->any_host || loopback_host(host));
+    static const char harmless[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-_:[]";
+    if (lws_hdr_copy(wsi, host, cap, WSI_TOKEN_HOST) <= 0 || host[strspn(host, harmless)]) return false;
+    return transport_of(wsi)->any_host || loopback_host(host);
 }
 
 /* native clients send no Origin; a page's must be this very host */
@@ -340,58 +335,36 @@ static const struct lws_protocols protocols[] = {
 
 static const lws_retry_bo_t alive = {.secs_since_valid_ping = 20, .secs_since_valid_hangup = 40};
 
-/* "ws://A.B.C.D:PORT", "ws://[V6]:PORT", each with "?hosts=any" or without; false: neither */
-static bool parse_url(const char *url, struct sockaddr_storage *address, socklen_t *n_address, bool *any_host)
+static pal_err open_socket(pal_transport *t, pal_listen_address *from, pal_diagnostic *diag)
 {
-    char text[128], *host = text, *port;
-    size_t n = strcspn(url, "?");
-    char *end;
-    if (n < 5 || n >= sizeof text || strncmp(url, "ws://", 5)) return false;
-    memcpy(text, url + 5, n - 5);
-    text[n - 5] = 0;
-    *any_host = !strcmp(url + n, "?hosts=any");
-    if (!(port = strrchr(text, ':'))) return false;
-    *port++ = 0;
-    long number = strtol(port, &end, 10);
-    if (end == port || *end || number < 0 || number > 65535) return false;
-    memset(address, 0, sizeof *address);
-    if (*host == '[' && port > host + 2 && port[-2] == ']') {
-        struct sockaddr_in6 *v6 = (struct sockaddr_in6 *)address;
-        port[-2] = 0;
-        v6->sin6_family = AF_INET6;
-        v6->sin6_port = htons((uint16_t)number);
-        *n_address = sizeof *v6;
-        return inet_pton(AF_INET6, host + 1, &v6->sin6_addr) == 1;
-    }
-    struct sockaddr_in *v4 = (struct sockaddr_in *)address;
-    v4->sin_family = AF_INET;
-    v4->sin_port = htons((uint16_t)number);
-    *n_address = sizeof *v4;
-    return inet_pton(AF_INET, host, &v4->sin_addr) == 1;
-}
-
-static pal_err open_socket(pal_transport *t, const char *url, pal_diagnostic *diag)
-{
-    struct sockaddr_storage address;
-    socklen_t n = 0;
+    const bool is_v6 = strchr(from->ip, ':') != NULL;
+    union {
+        struct sockaddr any;
+        struct sockaddr_in v4;
+        struct sockaddr_in6 v6;
+    } address = {.v6 = {.sin6_family = is_v6 ? AF_INET6 : AF_INET}};
+    socklen_t n = is_v6 ? sizeof address.v6 : sizeof address.v4;
+    in_port_t *port = is_v6 ? &address.v6.sin6_port : &address.v4.sin_port;
+    void *ip = is_v6 ? (void *)&address.v6.sin6_addr : (void *)&address.v4.sin_addr;
+    char name[INET6_ADDRSTRLEN + 16];
     int on = 1;
-    if (!parse_url(url, &address, &n, &t->any_host)) return PAL_REFUSE(diag, "%s is not an address to listen on", url);
+    snprintf(name, sizeof name, is_v6 ? "[%s]:%d" : "%s:%d", from->ip, from->port);
+    if (from->port < 0 || from->port > UINT16_MAX || inet_pton(address.any.sa_family, from->ip, ip) != 1)
+        return PAL_REFUSE(diag, "%s is not an address to listen on", name);
+    *port = htons((uint16_t)from->port);
+    t->any_host = from->any_host;
     t->spare_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
-    t->listen_fd = socket(address.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    t->listen_fd = socket(address.any.sa_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (t->listen_fd < 0) return pal_diagnostic_set(diag, PAL_ERR_IO, "no socket: %s", strerror(errno));
     (void)setsockopt(t->listen_fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    int n_text = (int)strcspn(url, "?");
-    if (bind(t->listen_fd, (struct sockaddr *)&address, n) || listen(t->listen_fd, BACKLOG)) {
+    if (bind(t->listen_fd, &address.any, n) || listen(t->listen_fd, BACKLOG)) {
         if (errno == EADDRINUSE)
-            return PAL_REFUSE(diag,
-                              "%.*s is in use by another program; choose another port with --port (0: any free one)",
-                              n_text - 5, url + 5);
-        return PAL_REFUSE(diag, "cannot listen on %.*s: %s", n_text - 5, url + 5, strerror(errno));
+            return PAL_REFUSE(
+                diag, "%s is in use by another program; choose another port with --port (0: any free one)", name);
+        return PAL_REFUSE(diag, "cannot listen on %s: %s", name, strerror(errno));
     }
-    n = sizeof address;
-    if (getsockname(t->listen_fd, (struct sockaddr *)&address, &n)) return PAL_ERR_IO;
-    t->port = ntohs(address.ss_family == AF_INET6 ? ((struct sockaddr_in6 *)&address)->sin6_port
-                                                  : ((struct sockaddr_in *)&address)->sin_port);
+    if (getsockname(t->listen_fd, &address.any, &n)) return PAL_ERR_IO;
+    from->port = ntohs(*port);
     return PAL_ERR_OK;
 }
 
@@ -403,16 +376,15 @@ static void ws_close(pal_transport *transport)
     free(transport);
 }
 
-static pal_err ws_open(pal_loop *loop, const char *url, const pal_peer_events *events, pal_diagnostic *diag,
+static pal_err ws_open(pal_loop *loop, pal_listen_address *address, const pal_peer_events *events, pal_diagnostic *diag,
                        pal_transport **out)
 {
     struct lws_context_creation_info info;
     pal_transport *t = calloc(1, sizeof *t);
     if (!t) return PAL_ERR_MEMORY;
-    t->loop = loop;
     t->events = *events;
     t->listen_fd = t->spare_fd = -1;
-    pal_err err = open_socket(t, url, diag);
+    pal_err err = open_socket(t, address, diag);
     if (err) return ws_close(t), err;
     memset(&info, 0, sizeof info);
     info.port = CONTEXT_PORT_NO_LISTEN_SERVER;
@@ -435,11 +407,6 @@ static pal_err ws_open(pal_loop *loop, const char *url, const pal_peer_events *e
     return PAL_ERR_OK;
 }
 
-static int ws_port(const pal_transport *transport)
-{
-    return transport->port;
-}
-
 static void ws_ready(pal_peer *peer)
 {
     lws_callback_on_writable(((connection *)(void *)peer)->wsi);
@@ -453,4 +420,4 @@ static void ws_drop(pal_peer *peer)
     lws_callback_on_writable(c->wsi);
 }
 
-const pal_transport_ops pal_ws_transport = {true, ws_open, ws_port, ws_ready, ws_drop, ws_close};
+const pal_transport_ops pal_ws_transport = {true, ws_open, ws_ready, ws_drop, ws_close};

@@ -76,6 +76,13 @@ pal_err pal_material_check(pal_material *material, pal_diagnostic *diag)
     return PAL_ERR_OK;
 }
 
+int pal_scene_find_body(const pal_scene *scene, const char *name)
+{
+    for (int b = 0; b < scene->n_body; b++)
+        if (!strcmp(scene->body[b].name, name)) return b;
+    return -1;
+}
+
 void pal_support_mark_fixed(const pal_support_def *support, const double up[3], const double *x, int n, uint8_t *fixed)
 {
     double low = INFINITY, high = -INFINITY;

@@ -113,6 +113,7 @@ typedef struct pal_scene {
     pal_tool_def tool[PAL_TOOL_MAX];
 } pal_scene;
 
+int pal_scene_find_body(const pal_scene *scene, const char *name); /* -1: none has that name */
 /* an empty scene with defaults, and a body with defaults: material above, model tet_springs, output skin_output, lowest
  * 5 % fixed, effects gravity, tool_push, tool_grasp, finite_guard */
 void pal_scene_default(pal_scene *scene);
