@@ -80,11 +80,11 @@ pal_err pal_convergence(const pal_problem *problem, const pal_problem_case *load
     int n_point = 0, done = 0;
     if (n_done) *n_done = 0;
     if (n < 1 || n > PAL_CONVERGENCE_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d resolutions, wanted 1 to %d", n, PAL_CONVERGENCE_MAX);
+        return PAL_REFUSE(diag, "%d resolutions, wanted 1 to %d", n, PAL_CONVERGENCE_MAX);
     for (int k = 1; k < n; k++)
         if (resolution[k] <= resolution[k - 1])
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "resolution %d comes after %d: wanted ascending ones",
-                                      resolution[k], resolution[k - 1]);
+            return PAL_REFUSE(diag, "resolution %d comes after %d: wanted ascending ones", resolution[k],
+                              resolution[k - 1]);
     pal_err err = choose_points(surface, samples, &x, &n_point);
     for (int k = 0; k < 2 && !err; k++) {
         u[k] = malloc(3 * (size_t)(n_point > 0 ? n_point : 1) * sizeof *u[k]);

@@ -70,21 +70,18 @@ static pal_err read_cells(csv *c, double *out)
     char word[WORD], *end;
     for (int k = 0; k < COLUMNS; k++) {
         if (!next_cell(c, word))
-            return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: %d columns, wanted 6: x,y,z,ux,uy,uz",
-                                      c->name, c->line, k);
+            return PAL_REFUSE(c->diag, "%s: line %d: %d columns, wanted 6: x,y,z,ux,uy,uz", c->name, c->line, k);
         if (!out && strcmp(word, column_name[k]))
-            return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED,
-                                      "%s: line %d: column %d is \"%s\", wanted \"%s\" (x,y,z,ux,uy,uz)", c->name,
-                                      c->line, k + 1, shown(word), column_name[k]);
+            return PAL_REFUSE(c->diag, "%s: line %d: column %d is \"%s\", wanted \"%s\" (x,y,z,ux,uy,uz)", c->name,
+                              c->line, k + 1, shown(word), column_name[k]);
         if (!out) continue;
         out[k] = strtod(word, &end);
         if (end == word || *end || !isfinite(out[k]))
-            return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: column %d (%s): \"%s\" is not a number",
-                                      c->name, c->line, k + 1, column_name[k], shown(word));
+            return PAL_REFUSE(c->diag, "%s: line %d: column %d (%s): \"%s\" is not a number", c->name, c->line, k + 1,
+                              column_name[k], shown(word));
     }
     if (next_cell(c, word))
-        return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: column 7, \"%s\", is one too many", c->name,
-                                  c->line, shown(word));
+        return PAL_REFUSE(c->diag, "%s: line %d: column 7, \"%s\", is one too many", c->name, c->line, shown(word));
     return PAL_ERR_OK;
 }
 
@@ -113,10 +110,9 @@ static pal_err read_all(csv *c, const char *text, const char *last, pal_samples 
         out->n++;
     }
     if (!header)
-        return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: empty, wanted the header x,y,z,ux,uy,uz",
-                                  c->name, c->line ? c->line : 1);
-    if (out->n == 0)
-        return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: no row below the header", c->name, c->line);
+        return PAL_REFUSE(c->diag, "%s: line %d: empty, wanted the header x,y,z,ux,uy,uz", c->name,
+                          c->line ? c->line : 1);
+    if (out->n == 0) return PAL_REFUSE(c->diag, "%s: line %d: no row below the header", c->name, c->line);
     return PAL_ERR_OK;
 }
 

@@ -55,13 +55,12 @@ static pal_err material_of(const job *j, int index, pal_material *out)
     pal_diagnostic reason = {""};
     double asked = out->poisson;
     if (!(asked > -1 && asked < 0.5))
-        return pal_diagnostic_set(
-            j->diag, PAL_ERR_REFUSED,
-            "material \"%s\": nu %g is not a Poisson ratio: wanted more than -1 and less than 0.5", m->id, asked);
+        return PAL_REFUSE(j->diag,
+                          "material \"%s\": nu %g is not a Poisson ratio: wanted more than -1 and less than 0.5", m->id,
+                          asked);
     if (!(out->young_Pa > 0))
-        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED,
-                                  "material \"%s\": E %g Pa is not a stiffness: wanted more than 0", m->id,
-                                  out->young_Pa);
+        return PAL_REFUSE(j->diag, "material \"%s\": E %g Pa is not a stiffness: wanted more than 0", m->id,
+                          out->young_Pa);
     pal_err err = pal_material_check(out, &reason);
     j->result->clamped |= out->poisson != asked;
     return err ? pal_diagnostic_set(j->diag, err, "material \"%s\": %s", m->id, reason.text) : PAL_ERR_OK;
@@ -73,8 +72,7 @@ static pal_err set_materials(const job *j, pal_body_def *body)
     const pal_problem *p = j->problem;
     const double *origin = j->s->mesh.tets.origin_m;
     if (p->n_material > 1 && (!isnan(j->options->young_Pa) || !isnan(j->options->poisson)))
-        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "E or nu is given, but the problem has %d materials",
-                                  p->n_material);
+        return PAL_REFUSE(j->diag, "E or nu is given, but the problem has %d materials", p->n_material);
     PAL_TRY(material_of(j, 0, &body->material));
     for (int k = 1; k < p->n_material; k++) {
         pal_material m;
@@ -90,8 +88,8 @@ static pal_err set_materials(const job *j, pal_body_def *body)
     double x[3];
     for (int e = 0; e < t->n_tet && !p->material[0].region.all; e++)
         if (!pal_case_material_of(p, t, e, x))
-            return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "materials: none of the %d regions holds (%g, %g, %g)",
-                                      p->n_material, x[0], x[1], x[2]);
+            return PAL_REFUSE(j->diag, "materials: none of the %d regions holds (%g, %g, %g)", p->n_material, x[0],
+                              x[1], x[2]);
     return PAL_ERR_OK;
 }
 
@@ -114,10 +112,9 @@ static pal_err set_entries(const job *j, pal_body_def *body)
 static pal_err make_world(const job *j)
 {
     if (j->problem->n_support == 0 && !j->options->inertia_relief)
-        return pal_diagnostic_set(
-            j->diag, PAL_ERR_REFUSED,
-            "supports: none, so the body is free and nothing holds it against its loads (inertia relief "
-            "balances them by its mass)");
+        return PAL_REFUSE(j->diag,
+                          "supports: none, so the body is free and nothing holds it against its loads (inertia relief "
+                          "balances them by its mass)");
     pal_scene *scene = calloc(1, sizeof *scene);
     if (!scene) return pal_diagnostic_set(j->diag, PAL_ERR_MEMORY, "no memory for the scene");
     pal_scene_default(scene);
