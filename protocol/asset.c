@@ -7,11 +7,11 @@
 
 #include "protocol/bytes.h"
 #include "protocol/planes.h"
-#include "protocol/sha256.h"
 
 #include <lz4.h>
 #include <lz4hc.h>
 #include <math.h>
+#include <openssl/sha.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -220,7 +220,7 @@ void pal_asset_destroy(pal_asset *asset)
 
 void pal_asset_hash(const uint8_t *bytes, size_t n_byte, char hash[PAL_ASSET_HASH_CHARS])
 {
-    uint8_t digest[32];
-    pal_sha256(bytes, n_byte, digest);
+    uint8_t digest[SHA256_DIGEST_LENGTH];
+    SHA256(bytes, n_byte, digest);
     for (int i = 0; i < PAL_ASSET_HASH_CHARS / 2; i++) snprintf(hash + 2 * i, 3, "%02x", digest[i]);
 }
