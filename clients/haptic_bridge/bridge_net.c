@@ -153,9 +153,9 @@ static void lcm_refused(void *user, const char *channel, pal_walk reason)
     ((pal_bridge_net *)user)->count.n_refused++;
 }
 
-static void net_channel(const pal_bridge_net *n, char channel[PAL_LCM_CHANNEL_MAX + 1], const char *what)
+static pal_err net_publish(pal_bridge_net *n, const char *what, const lcm_type_info_t *type, const void *message)
 {
-    pal_lcm_channel(channel, n->o.session, what, n->o.tool);
+    return pal_lcm_link_publish(n->lcm, n->o.session, what, n->o.tool, type, message);
 }
 
 /* 250 Hz: newest pose and force to the server */
@@ -188,10 +188,8 @@ static void net_send_pose(void *user)
     pal_err err;
     if (n->lcm) {
         palpate_tool_state_t state;
-        char channel[PAL_LCM_CHANNEL_MAX + 1];
         pal_lcm_from_pose(&pose, &state);
-        net_channel(n, channel, "TOOL");
-        err = pal_lcm_link_publish(n->lcm, channel, palpate_tool_state_t_get_type_info(), &state);
+        err = net_publish(n, "TOOL", palpate_tool_state_t_get_type_info(), &state);
     } else {
         err = pal_link_send_pose(n->link, &pose);
     }
@@ -220,17 +218,15 @@ static void net_send_events(void *user)
                                                           .text = (char *)(uintptr_t)event.text};
     }
     if (!n->lcm) return;
-    char channel[PAL_LCM_CHANNEL_MAX + 1];
-    net_channel(n, channel, "HEVENT");
     for (int i = 0; i < EVENT_KEEP; i++)
         if (n->pending[i].left > 0 && n->pending[i].left--)
-            pal_lcm_link_publish(n->lcm, channel, palpate_haptic_event_t_get_type_info(), &n->pending[i].event);
+            net_publish(n, "HEVENT", palpate_haptic_event_t_get_type_info(), &n->pending[i].event);
 }
 
 static void net_send_config(pal_bridge_net *n)
 {
     const pal_servo_options *s = &n->o.servo;
-    char name[64], channel[PAL_LCM_CHANNEL_MAX + 1];
+    char name[64];
     memcpy(name, s->info.name, sizeof name);
     palpate_haptic_config_t config = {.utime = (int64_t)(pal_clock_ns() / 1000),
                                       .seq = (int32_t)n->status_seq,
@@ -252,8 +248,7 @@ static void net_send_config(pal_bridge_net *n)
         config.ws_max[k] = (float)s->info.high_m[k];
         config.origin[k] = s->origin_m[k];
     }
-    net_channel(n, channel, "HCONFIG");
-    pal_lcm_link_publish(n->lcm, channel, palpate_haptic_config_t_get_type_info(), &config);
+    net_publish(n, "HCONFIG", palpate_haptic_config_t_get_type_info(), &config);
 }
 
 /* 10 Hz: health; 1 Hz: limits */
@@ -266,7 +261,7 @@ static void net_send_status(void *user)
     const pal_servo_view *v = &n->view;
     const pal_jitter *p = &n->timing.period;
     const double ticks = v->n_tick ? (double)v->n_tick : 1;
-    char name[64], channel[PAL_LCM_CHANNEL_MAX + 1];
+    char name[64];
     memcpy(name, n->o.servo.info.name, sizeof name);
     const double seconds = n->joined_ns ? (double)(pal_clock_ns() - n->joined_ns) * 1e-9 : 0;
     const palpate_haptic_status_t status = {
@@ -292,8 +287,7 @@ static void net_send_status(void *user)
         .stiff_clamped = (float)((double)v->n_clamped / ticks),
         .motor_temp = (float)v->motor_temperature,
         .device = name};
-    net_channel(n, channel, "HSTATUS");
-    pal_lcm_link_publish(n->lcm, channel, palpate_haptic_status_t_get_type_info(), &status);
+    net_publish(n, "HSTATUS", palpate_haptic_status_t_get_type_info(), &status);
     if (n->n_status++ % 10 == 0) net_send_config(n);
 }
 
@@ -316,7 +310,7 @@ static pal_err net_open_lcm(pal_bridge_net *n, pal_diagnostic *diag)
     static const pal_lcm_events events = {lcm_model, lcm_refused};
     char channel[PAL_LCM_CHANNEL_MAX + 1];
     PAL_TRY(pal_lcm_link_open(n->loop, n->o.server, &events, n, diag, &n->lcm));
-    net_channel(n, channel, "HMODEL");
+    pal_lcm_channel(channel, n->o.session, "HMODEL", n->o.tool);
     return pal_lcm_link_subscribe(n->lcm, channel, palpate_haptic_model_t_get_type_info());
 }
 

@@ -37,17 +37,12 @@ typedef struct bridge {
 static const char *const until_name[] = {"models", "poses", "force_N", "stale", "free"};
 
 /* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
-static atomic_int main_signal;
 static pal_servo *_Atomic main_servo; /* for the emergency stop */
 
 static void main_on_signal(int number)
 {
-    if (number == SIGUSR1 && main_servo)
-        pal_servo_estop(main_servo);
-    else if (number == SIGUSR2 && main_servo)
-        pal_servo_rearm(main_servo);
-    else
-        main_signal = number;
+    if (number == SIGUSR1 && main_servo) pal_servo_estop(main_servo);
+    if (number == SIGUSR2 && main_servo) pal_servo_rearm(main_servo);
 }
 
 static void main_watch(void *user)
@@ -56,7 +51,7 @@ static void main_watch(void *user)
     const pal_servo_view *v = pal_bridge_net_view(b->net);
     const double seen[] = {(double)v->n_model, (double)pal_bridge_net_count(b->net).n_pose, v->force_max_N,
                            (double)v->n_stale, v->state == PAL_SERVO_FREE};
-    if (main_signal || pal_end_condition_met(&b->until, seen)) pal_link_stop(b->loop);
+    if (pal_end_condition_met(&b->until, seen)) pal_link_stop(b->loop);
 }
 
 /* closed standard input is an emergency stop: whoever held it open is gone */
@@ -184,6 +179,7 @@ static pal_err main_start(bridge *b, pal_diagnostic *diag)
     PAL_TRY(pal_servo_create(o, &b->servo));
     main_servo = b->servo;
     PAL_TRY(pal_link_loop_create(&b->loop));
+    PAL_TRY(pal_link_stop_on_signals(b->loop));
     pal_diagnostic refused = {""};
     PAL_TRY(pal_servo_thread_start(b->servo, o, &refused, &b->thread));
     snprintf(b->rt_refused, sizeof b->rt_refused, "%s", refused.text);
@@ -199,8 +195,7 @@ static int main_run(bridge *b)
 {
     pal_diagnostic diag = {""};
     pal_err err = main_start(b, &diag);
-    if (!err && b->seconds > 0) pal_link_run_for(b->loop, b->seconds);
-    if (!err && b->seconds <= 0) pal_link_run(b->loop);
+    if (!err) pal_link_run_for(b->loop, b->seconds);
     pal_servo_timing timing = {0};
     pal_servo_view view = {0};
     pal_bridge_net_counts counts = {0};
@@ -331,8 +326,6 @@ int main(int argc, char **argv)
     }
     pal_log_set_level(b.quiet || b.json ? PAL_LOG_ERROR : PAL_LOG_INFO);
     if (b.doctor) return main_doctor(&b);
-    signal(SIGINT, main_on_signal);
-    signal(SIGTERM, main_on_signal);
     signal(SIGUSR1, main_on_signal);
     signal(SIGUSR2, main_on_signal);
     return main_run(&b);

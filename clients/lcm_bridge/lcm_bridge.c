@@ -49,7 +49,6 @@ struct pal_lcm_bridge {
 static void bridge_body(pal_lcm_bridge *b, uint32_t index)
 {
     bridge_part *part = &b->part[index];
-    char channel[PAL_LCM_CHANNEL_MAX + 1];
     part->sent_ns = pal_clock_ns();
     if (part->n_byte > PAL_LCM_DATAGRAM_MAX) {
         b->count.n_frame_dropped++;
@@ -67,8 +66,8 @@ static void bridge_body(pal_lcm_bridge *b, uint32_t index)
                                         .cycle = (int32_t)part->head.cycle,
                                         .size = (int32_t)part->n_byte,
                                         .payload = part->bytes};
-    pal_lcm_channel(channel, b->session, "BODY", (int)index);
-    if (!pal_lcm_link_publish(b->lcm, channel, palpate_body_frame_t_get_type_info(), &frame)) b->count.n_frame++;
+    if (!pal_lcm_link_publish(b->lcm, b->session, "BODY", (int)index, palpate_body_frame_t_get_type_info(), &frame))
+        b->count.n_frame++;
 }
 
 /* server's status, or NULL when there is no server */
@@ -84,7 +83,7 @@ static void bridge_status(pal_lcm_bridge *b, const pal_wire_status *s)
         epoch[i] = (int32_t)b->topology.part[i].epoch;
         asset[i] = b->topology.part[i].asset;
     }
-    char diag[PAL_WIRE_TEXT_BYTES], channel[PAL_LCM_CHANNEL_MAX + 1];
+    char diag[PAL_WIRE_TEXT_BYTES];
     memcpy(diag, s->diag, sizeof diag);
     const palpate_session_status_t status = {.utime = (int64_t)(pal_clock_ns() / 1000),
                                              .seq = (int32_t)++b->status_seq,
@@ -111,9 +110,9 @@ static void bridge_status(pal_lcm_bridge *b, const pal_wire_status *s)
                                              .epoch = epoch,
                                              .asset = asset,
                                              .diag = diag};
-    pal_lcm_channel(channel, b->session, "STATUS", -1);
     b->status_ns = pal_clock_ns();
-    if (!pal_lcm_link_publish(b->lcm, channel, palpate_session_status_t_get_type_info(), &status)) b->count.n_status++;
+    if (!pal_lcm_link_publish(b->lcm, b->session, "STATUS", -1, palpate_session_status_t_get_type_info(), &status))
+        b->count.n_status++;
 }
 
 static void bridge_frame(pal_lcm_bridge *b, const uint8_t *bytes, size_t n_byte)
@@ -180,10 +179,10 @@ static void tool_message(void *user, pal_link *link, const pal_wire_head *head, 
         return;
     palpate_haptic_model_t model;
     palpate_contact_patch_t patch[PAL_WIRE_CONTACT_PATCH_MAX];
-    char channel[PAL_LCM_CHANNEL_MAX + 1];
     pal_lcm_from_haptic(&haptic, &model, patch);
-    pal_lcm_channel(channel, b->session, "HMODEL", tool->index);
-    if (!pal_lcm_link_publish(b->lcm, channel, palpate_haptic_model_t_get_type_info(), &model)) b->count.n_model++;
+    if (!pal_lcm_link_publish(b->lcm, b->session, "HMODEL", tool->index, palpate_haptic_model_t_get_type_info(),
+                              &model))
+        b->count.n_model++;
 }
 
 static void tool_control(void *user, pal_link *link, const pal_control *c)

@@ -4,22 +4,7 @@
 #include "clients/link/client_flags.h"
 #include "server/base/log.h"
 
-#include <signal.h>
-#include <stdatomic.h>
 #include <stdio.h>
-
-/* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
-static atomic_int main_signal;
-
-static void main_on_signal(int number)
-{
-    main_signal = number;
-}
-
-static void main_watch(void *loop)
-{
-    if (main_signal) pal_link_stop(loop);
-}
 
 int main(int argc, char **argv)
 {
@@ -47,21 +32,16 @@ int main(int argc, char **argv)
     const int code = pal_client_flags_parse(&table, argc, argv, NULL, &n_operand);
     if (code >= 0) return code;
     pal_log_set_level(quiet || json ? PAL_LOG_WARN : PAL_LOG_INFO);
-    signal(SIGINT, main_on_signal);
-    signal(SIGTERM, main_on_signal);
     pal_diagnostic diag = {""};
     pal_link_loop *loop = NULL;
     pal_lcm_bridge *bridge = NULL;
     pal_err err = pal_link_loop_create(&loop);
     if (!err) err = pal_lcm_bridge_open(loop, &(pal_lcm_bridge_options){server, lcm, session}, &diag, &bridge);
-    if (!err && !pal_link_add_timer(loop, 50000, main_watch, loop)) err = PAL_ERR_MEMORY;
-    if (err) {
+    if (!err) err = pal_link_stop_on_signals(loop);
+    if (err)
         fprintf(stderr, "palpate-lcm: %s\n", diag.text[0] ? diag.text : pal_err_text(err));
-    } else if (seconds > 0) {
+    else
         pal_link_run_for(loop, seconds);
-    } else {
-        pal_link_run(loop);
-    }
     if (!err && json) {
         const pal_lcm_bridge_counts c = pal_lcm_bridge_count(bridge);
         printf("{\"frames\":%llu,\"frames_dropped\":%llu,\"states\":%llu,\"states_refused\":%llu,\"models\":%llu,"

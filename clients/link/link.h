@@ -30,7 +30,8 @@ typedef struct pal_link_timer pal_link_timer;
 pal_err pal_link_loop_create(pal_link_loop **out);          /* [load] MEMORY */
 void pal_link_loop_destroy(pal_link_loop *loop);            /* [load] after pal_link_run has returned; NULL is fine */
 void pal_link_run(pal_link_loop *loop);                     /* the calling thread is [net] until pal_link_stop */
-void pal_link_run_for(pal_link_loop *loop, double seconds); /* the same, for at most that time (tests) */
+void pal_link_run_for(pal_link_loop *loop, double seconds); /* the same, for at most that time; 0: without limit */
+pal_err pal_link_stop_on_signals(pal_link_loop *loop);      /* [load] SIGINT and SIGTERM stop the loop; MEMORY */
 void pal_link_stop(pal_link_loop *loop);                    /* [any] */
 
 typedef enum pal_link_state {
@@ -60,7 +61,6 @@ typedef struct pal_link_options {
     int tool;             /* requested: index, PAL_WIRE_TOOL_ANY or PAL_WIRE_TOOL_NONE */
     bool topology_deltas; /* accepts TOPOLOGY_DELTA (triangle_table.h); without it, adaptive parts keep the triangles of
                              their asset */
-    bool once;            /* does not reconnect after the first loss */
     double read_bytes_s;  /* > 0: read limit, bytes per second (a slow client) */
     const pal_link_events *events; /* borrowed while the link lives */
     void *user;

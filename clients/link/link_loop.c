@@ -7,6 +7,7 @@
 #include "server/base/clock.h"
 #include "server/base/log.h"
 
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -98,6 +99,10 @@ static void link_time_is_up(void *loop)
 
 void pal_link_run_for(pal_link_loop *loop, double seconds)
 {
+    if (seconds <= 0) {
+        pal_link_run(loop);
+        return;
+    }
     pal_link_timer *timer = pal_link_add_timer(loop, (uint64_t)(seconds * 1e6), link_time_is_up, loop);
     if (timer) pal_link_run(loop);
     pal_link_remove_timer(timer);
@@ -108,6 +113,26 @@ void pal_link_stop(pal_link_loop *loop)
 {
     atomic_store(&loop->stop, true);
     lws_cancel_service(loop->context);
+}
+
+/* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
+static atomic_int link_signal;
+
+static void link_on_signal(int number)
+{
+    link_signal = number;
+}
+
+static void link_check_signal(void *loop)
+{
+    if (link_signal) pal_link_stop(loop);
+}
+
+pal_err pal_link_stop_on_signals(pal_link_loop *loop)
+{
+    signal(SIGINT, link_on_signal);
+    signal(SIGTERM, link_on_signal);
+    return pal_link_add_timer(loop, 50000, link_check_signal, loop) ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 static void link_timer_fired(lws_sorted_usec_list_t *sul)

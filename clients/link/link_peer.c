@@ -21,14 +21,10 @@ struct pal_link {
     struct lws *wsi;
     link_address address;
     char name[PAL_WIRE_MEMBER_NAME];
-    pal_wire_role role;
-    int tool;
-    bool topology_deltas;
-    bool once, closing, up, fixed, pause_reading;
-    double read_bytes_s, read_budget;
+    pal_link_options o; /* without url and name, which are copied */
+    bool closing, up, fixed, pause_reading;
+    double read_budget;
     uint64_t read_ns;
-    const pal_link_events *events;
-    void *user;
     pal_link_state state;
     int close_code;
     char close_why[128];
@@ -53,8 +49,8 @@ static void link_connect(pal_link *link);
 static void link_report(pal_link *link, pal_link_state state, const char *reason)
 {
     link->state = state;
-    if (!link->closing && link->events->state)
-        link->events->state(link->user, link, state, link->close_code, reason ? reason : "");
+    if (!link->closing && link->o.events->state)
+        link->o.events->state(link->o.user, link, state, link->close_code, reason ? reason : "");
 }
 
 static void link_want_write(pal_link *link)
@@ -104,7 +100,7 @@ static void link_lost(pal_link *link, const char *reason)
         link_free(link);
         return;
     }
-    if (link->once || !link_may_return(link->close_code)) {
+    if (!link_may_return(link->close_code)) {
         link_report(link, PAL_LINK_ENDED, reason);
         return;
     }
@@ -144,14 +140,9 @@ pal_err pal_link_open(pal_link_loop *loop, const pal_link_options *options, pal_
     }
     link->loop = loop;
     strncpy(link->name, options->name ? options->name : "client", sizeof link->name - 1);
-    link->role = options->role;
-    link->tool = options->tool;
-    link->topology_deltas = options->topology_deltas;
-    link->once = options->once;
-    link->read_bytes_s = options->read_bytes_s;
+    link->o = *options;
+    link->o.url = link->o.name = NULL;
     link->read_budget = options->read_bytes_s / 4;
-    link->events = options->events;
-    link->user = options->user;
     link->held = PAL_WIRE_TOOL_NONE;
     link->pause_ms = LINK_PAUSE_FIRST_MS;
     link->next = loop->links;
@@ -294,7 +285,7 @@ static int link_write(pal_link *link, struct lws *wsi)
 
 static void link_fault(pal_link *link, int refusal)
 {
-    if (link->events->fault) link->events->fault(link->user, link, refusal);
+    if (link->o.events->fault) link->o.events->fault(link->o.user, link, refusal);
 }
 
 static void link_text(pal_link *link)
@@ -314,7 +305,7 @@ static void link_text(pal_link *link)
         link->pause_ms = LINK_PAUSE_FIRST_MS;
         link->count.joins++;
     }
-    if (link->events->control) link->events->control(link->user, link, &link->control);
+    if (link->o.events->control) link->o.events->control(link->o.user, link, &link->control);
     if (hello && !link->closing) link_report(link, PAL_LINK_JOINED, "");
 }
 
@@ -325,30 +316,30 @@ static void link_binary(pal_link *link)
     if (!refusal && head.kind >= PAL_WIRE_POSE) refusal = PAL_REFUSAL_KIND;
     if (refusal)
         link_fault(link, refusal);
-    else if (link->events->message)
-        link->events->message(link->user, link, &head, link->in, link->n_in);
+    else if (link->o.events->message)
+        link->o.events->message(link->o.user, link, &head, link->in, link->n_in);
 }
 
 /* token bucket of a slow client: read_bytes_s fills it, messages empty it; reading pauses while it is empty */
 static void link_spend(pal_link *link, struct lws *wsi, size_t n_byte)
 {
     const uint64_t now = pal_clock_ns();
-    link->read_budget += link->read_bytes_s * 1e-9 * (double)(now - link->read_ns);
-    if (link->read_budget > link->read_bytes_s / 4) link->read_budget = link->read_bytes_s / 4;
+    link->read_budget += link->o.read_bytes_s * 1e-9 * (double)(now - link->read_ns);
+    if (link->read_budget > link->o.read_bytes_s / 4) link->read_budget = link->o.read_bytes_s / 4;
     link->read_ns = now;
     link->read_budget -= (double)n_byte;
     if (link->read_budget >= 0 || link->pause_reading) return;
     link->pause_reading = true;
     lws_rx_flow_control(wsi, 0);
     lws_sul_schedule(link->loop->context, 0, &link->resume, link_resume_fired,
-                     (lws_usec_t)(-link->read_budget / link->read_bytes_s * 1e6) + 1);
+                     (lws_usec_t)(-link->read_budget / link->o.read_bytes_s * 1e6) + 1);
 }
 
 /* pieces of a message are put together, memory follows what really came */
 static void link_receive(pal_link *link, struct lws *wsi, const uint8_t *bytes, size_t n_byte)
 {
     link->count.bytes_in += n_byte;
-    if (link->read_bytes_s > 0) link_spend(link, wsi, n_byte);
+    if (link->o.read_bytes_s > 0) link_spend(link, wsi, n_byte);
     if (lws_is_first_fragment(wsi)) {
         link->n_in = 0;
         link->in_drop = false;
@@ -379,15 +370,15 @@ static void link_established(pal_link *link, struct lws *wsi)
     link->up = true;
     link->pause_reading = false;
     link->read_ns = pal_clock_ns();
-    if (link->read_bytes_s > 0) {
+    if (link->o.read_bytes_s > 0) {
         const int small = LINK_SMALL_SOCKET;
         setsockopt(lws_get_socket_fd(wsi), SOL_SOCKET, SO_RCVBUF, &small, sizeof small);
     }
     pal_control join = {.type = PAL_CONTROL_JOIN};
     memcpy(join.join.name, link->name, sizeof join.join.name);
-    join.join.role = link->role;
-    join.join.tool = link->tool;
-    join.join.topology_deltas = link->topology_deltas;
+    join.join.role = link->o.role;
+    join.join.tool = link->o.tool;
+    join.join.topology_deltas = link->o.topology_deltas;
     pal_link_send_control(link, &join);
     link_report(link, PAL_LINK_OPEN, "");
     if (link->fixed) lws_rx_flow_control(wsi, 0);

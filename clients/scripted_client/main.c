@@ -7,8 +7,6 @@
 #include "server/base/log.h"
 #include "server/base/vec3.h"
 
-#include <signal.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,21 +22,13 @@ typedef struct crowd {
     pal_end_condition until;
 } crowd;
 
-/* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
-static atomic_int main_signal;
-
-static void main_on_signal(int number)
-{
-    main_signal = number;
-}
-
 static void main_asset(void *user, const pal_stored_asset *asset)
 {
     crowd *c = user;
     for (int i = 0; i < c->n; i++) pal_scripted_client_asset_changed(c->trainee[i], asset);
 }
 
-/* ends early when asked to, when nobody is left, or when all have seen what they are there for */
+/* ends early when nobody is left, or when all have seen what they are there for */
 static void main_watch(void *user)
 {
     crowd *c = user;
@@ -49,7 +39,7 @@ static void main_watch(void *user)
         pal_client_seen(pal_scripted_client_get_result(c->trainee[i]), seen);
         reached = reached && pal_end_condition_met(&c->until, seen);
     }
-    if (main_signal || all || reached) pal_link_stop(c->loop);
+    if (all || reached) pal_link_stop(c->loop);
 }
 
 typedef struct totals {
@@ -220,6 +210,7 @@ static int main_run(crowd *c, const pal_scripted_client_options *base, double se
     pal_log_set_level(PAL_LOG_WARN);
     pal_err err = pal_link_loop_create(&c->loop);
     const int wanted = base->n_client;
+    if (!err) err = pal_link_stop_on_signals(c->loop);
     if (!err) c->store = pal_asset_store_create(c->loop, base->url, main_asset, c);
     if (!err && !c->store) err = PAL_ERR_MEMORY;
     for (int i = 0; i < wanted && !err; i++) {
@@ -333,8 +324,6 @@ int main(int argc, char **argv)
     if (bad) return bad;
     if (sculpt) base.orders = &orders;
     if (!quiet) base.reported = main_reported, base.user = &json;
-    signal(SIGINT, main_on_signal);
-    signal(SIGTERM, main_on_signal);
     crowd c = {.trainee = calloc((size_t)base.n_client, sizeof *c.trainee),
                .name = calloc((size_t)base.n_client, sizeof *c.name),
                .until = seen};
