@@ -1,6 +1,5 @@
 /* One link: connect, join, messages in and out, reconnect (link.h). */
 #include "clients/link/link_core.h"
-#include "protocol/frame_codec.h"
 #include "server/base/clock.h"
 
 #include <stdlib.h>

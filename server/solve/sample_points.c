@@ -2,12 +2,11 @@
  * order is refused. Numbers are read by strtod in the C locale, which the commands never change. */
 #include "server/solve/sample_points.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/files/file_bytes.h"
 
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { COLUMNS = 6, WORD = 64 };
 static const char *const column_name[COLUMNS] = {"x", "y", "z", "ux", "uy", "uz"};
@@ -87,7 +86,6 @@ static pal_err read_cells(csv *c, double *out)
 
 static pal_err read_all(csv *c, const char *text, const char *last, pal_samples *out)
 {
-    size_t cap = 0;
     bool header = false;
     while (next_line(c, &text, last)) {
         double row[COLUMNS];
@@ -97,14 +95,9 @@ static pal_err read_all(csv *c, const char *text, const char *last, pal_samples 
             header = true;
             continue;
         }
-        if ((size_t)out->n == cap) {
-            cap = cap ? 2 * cap : 256;
-            double *x = realloc(out->x, 3 * cap * sizeof *x);
-            if (x) out->x = x;
-            double *u = realloc(out->u, 3 * cap * sizeof *u);
-            if (u) out->u = u;
-            if (!x || !u) return pal_diagnostic_set(c->diag, PAL_ERR_MEMORY, "%s: no memory for its samples", c->name);
-        }
+        if (!pal_heap_grow(&out->x, (size_t)out->n, sizeof row / 2) ||
+            !pal_heap_grow(&out->u, (size_t)out->n, sizeof row / 2))
+            return pal_diagnostic_set(c->diag, PAL_ERR_MEMORY, "%s: no memory for its samples", c->name);
         pal_copy3(out->x + 3 * out->n, row);
         pal_copy3(out->u + 3 * out->n, row + 3);
         out->n++;
@@ -155,8 +148,7 @@ pal_err pal_samples_write(const pal_samples *samples, const char *path, pal_diag
 
 void pal_samples_free(pal_samples *samples)
 {
-    free(samples->x);
-    free(samples->u);
+    PAL_FREE(samples->x, samples->u);
     *samples = (pal_samples){0};
 }
 

@@ -6,14 +6,13 @@
 #include "server/solve/solve.h"
 
 #include "server/base/clock.h"
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/files/vtk_file.h"
 #include "server/sim/world/world.h"
 #include "server/solve/voxel_refinement.h"
 
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { NEWTON_A_STEP = 4, MAX_NEWTON = 400, MAX_RAMP = 40 };
 static const double step_s = 1.0 / 60; /* not used by a static solver */
@@ -331,11 +330,11 @@ void pal_solution_at(const pal_solution *s, const double x[3], double u[3])
 pal_err pal_solution_csv(const pal_solution *s, const char *path, pal_diagnostic *diag)
 {
     const pal_body *b = s->body;
-    size_t n = 3 * (size_t)b->n_node;
-    pal_samples all = {.n = b->n_node, .x = malloc(n * sizeof(double)), .u = malloc(n * sizeof(double))};
-    pal_err err = all.x && all.u
-                      ? PAL_ERR_OK
-                      : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for %d nodes", path, b->n_node);
+    pal_samples all = {.n = b->n_node};
+    pal_err err = PAL_ERR_OK;
+    PAL_ARRAY(&err, all.x, 3 * (size_t)b->n_node);
+    PAL_ARRAY(&err, all.u, 3 * (size_t)b->n_node);
+    if (err) pal_diagnostic_set(diag, err, "%s: no memory for %d nodes", path, b->n_node);
     for (int i = 0; i < b->n_node && !err; i++) {
         pal_add3(all.x + 3 * i, b->x_rest + 3 * i, s->mesh.tets.origin_m);
         pal_sub3(all.u + 3 * i, b->x + 3 * i, b->x_rest + 3 * i);
@@ -378,15 +377,15 @@ pal_err pal_solution_vtk(const pal_solution *s, const char *path, pal_diagnostic
 {
     const pal_body *b = s->body;
     size_t n = (size_t)b->n_node;
-    double *stress = calloc(n, sizeof *stress), *volume = calloc(n, sizeof *volume), *moved = calloc(3 * n, 8);
-    pal_err err = stress && volume && moved
-                      ? PAL_ERR_OK
-                      : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for %d nodes", path, b->n_node);
+    double *stress, *volume, *moved;
+    pal_err err = PAL_ERR_OK;
+    PAL_ZEROED(&err, stress, n);
+    PAL_ZEROED(&err, volume, n);
+    PAL_ZEROED(&err, moved, 3 * n);
+    if (err) pal_diagnostic_set(diag, err, "%s: no memory for %d nodes", path, b->n_node);
     if (!err) measure_stress(s, stress, volume);
     for (size_t k = 0; k < 3 * n && !err; k++) moved[k] = b->x[k] - b->x_rest[k];
     if (!err) err = write_vtk(s, path, moved, stress, diag);
-    free(moved);
-    free(stress);
-    free(volume);
+    PAL_FREE(moved, stress, volume);
     return err;
 }
