@@ -52,19 +52,6 @@ static size_t find(const char *key)
     return k;
 }
 
-static pal_err check_text(const char *text, size_t n, const char *where, pal_diagnostic *diag)
-{
-    uint32_t code;
-    if (n >= PAL_CONFIG_TEXT)
-        return PAL_REFUSE(diag, "%s: %zu bytes of text, more than %d", where, n, PAL_CONFIG_TEXT - 1);
-    for (size_t k = 0; k < n;) {
-        int size = pal_utf8_next(text + k, n - k, &code);
-        if (size == 0 || !pal_utf8_printable(code)) return PAL_REFUSE(diag, "%s: has a control character", where);
-        k += (size_t)size;
-    }
-    return PAL_ERR_OK;
-}
-
 pal_err pal_config_set(pal_config *config, const char *key, const char *text, const char *where, pal_diagnostic *diag)
 {
     size_t k = find(key), n = strlen(text);
@@ -72,7 +59,9 @@ pal_err pal_config_set(pal_config *config, const char *key, const char *text, co
     void *out = (char *)config + place[k];
     PAL_TRY(pal_flag_read(&pal_config_keys[k], text, where, out, diag));
     if (pal_config_keys[k].kind != PAL_FLAG_TEXT && pal_config_keys[k].kind != PAL_FLAG_WORD) return PAL_ERR_OK;
-    PAL_TRY(check_text(text, n, where, diag));
+    if (n >= PAL_CONFIG_TEXT)
+        return PAL_REFUSE(diag, "%s: %zu bytes of text, more than %d", where, n, PAL_CONFIG_TEXT - 1);
+    if (!pal_utf8_all_printable(text, n)) return PAL_REFUSE(diag, "%s: has a control character", where);
     if (out == config->listen && n == 0) return PAL_REFUSE(diag, "%s: is empty", where);
     memcpy(out, text, n + 1);
     return PAL_ERR_OK;

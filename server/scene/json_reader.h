@@ -30,7 +30,7 @@ pal_err pal_json_read(const char *path, char *folder, size_t n_folder, char **te
 pal_err pal_json_parse(pal_json *root, const char *text, size_t n_byte, cJSON **tree);
 
 /* "file: path: sentence", REFUSED; and for a key of the object */
-pal_err pal_json_refuse(const pal_json *at, const char *format, ...) __attribute__((format(printf, 2, 3)));
+#define pal_json_refuse(at, ...) pal_json_refuse_key(at, "", __VA_ARGS__)
 pal_err pal_json_refuse_key(const pal_json *at, const char *key, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 /* an error of another reader, about the file that a key names; OK stays OK */

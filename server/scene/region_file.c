@@ -238,15 +238,6 @@ pal_err pal_region_read(const pal_json *body, pal_loaded_scene *scene, int index
     return PAL_ERR_OK;
 }
 
-void pal_region_free(pal_loaded_scene *scene, int index)
-{
-    for (int k = 0; k < PAL_REGION_MAX; k++) {
-        free(scene->region[index][k].label);
-        free(scene->region[index][k].grid);
-        scene->region[index][k] = (pal_loaded_region){NULL, NULL};
-    }
-}
-
 pal_err pal_spring_grid_read(const pal_json *model, pal_loaded_scene *scene, int index)
 {
     pal_body_def *def = &scene->scene.body[index];
@@ -264,12 +255,6 @@ pal_err pal_spring_grid_read(const pal_json *model, pal_loaded_scene *scene, int
         if (out->k_J[k] && pal_entry_has(&def->model, spring_values.key[k]))
             return pal_json_refuse_key(model, spring_values.key[k], "stands beside a grid that gives the same");
     return PAL_ERR_OK;
-}
-
-void pal_spring_grid_free(pal_loaded_scene *scene, int index)
-{
-    free(scene->spring_grid[index]);
-    scene->spring_grid[index] = NULL;
 }
 
 /* ---- writing ---- */

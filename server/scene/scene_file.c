@@ -2,7 +2,7 @@
  * that belong to the simulation are checked by pal_scene_check at the end. */
 #include "server/scene/scene_file.h"
 
-#include "server/mesh/files/file_bytes.h"
+#include "server/base/heap.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/json_reader.h"
 #include "server/scene/region_file.h"
@@ -11,8 +11,6 @@
 #include "server/scene/subdivision_file.h"
 
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { FOLDER = 1024 };
 
@@ -307,9 +305,9 @@ void pal_scene_free(pal_loaded_scene *loaded)
 {
     if (!loaded) return;
     for (int k = 0; k < PAL_BODY_MAX; k++) {
-        pal_region_free(loaded, k);
-        pal_spring_grid_free(loaded, k);
-        pal_subdivision_unload(loaded, k);
+        for (int r = 0; r < PAL_REGION_MAX; r++) PAL_FREE(loaded->region[k][r].label, loaded->region[k][r].grid);
+        PAL_FREE(loaded->spring_grid[k], loaded->stroke[k]);
+        pal_cells_free(&loaded->cells[k]);
         pal_prepared_free(&loaded->mesh[k]);
     }
     free(loaded);

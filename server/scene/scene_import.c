@@ -14,6 +14,7 @@
 #include "server/mesh/files/mesh_file.h"
 #include "server/mesh/geometry/organ.h"
 #include "server/mesh/scan/label_volume.h"
+#include "server/num/sort.h"
 #include "server/scene/subdivision_file.h"
 #include "server/scene/tuning.h"
 
@@ -273,12 +274,6 @@ static pal_err choose_model(pal_body_def *body, const pal_surface_scene *options
     return PAL_ERR_OK;
 }
 
-static int by_height(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* a solid that stands on a thin part, as a kidney on its ureter, would sway on it for half a minute: what is held is
  * the part of the height that has an eighth of the control vertices */
 static pal_err hold_an_eighth(const pal_cells *cells, const double up[3], double *fraction)
@@ -287,7 +282,7 @@ static pal_err hold_an_eighth(const pal_cells *cells, const double up[3], double
     double *height = malloc(sizeof(double) * (size_t)n);
     if (!height) return PAL_ERR_MEMORY;
     for (int i = 0; i < n; i++) height[i] = pal_dot3(cells->x + 3 * (size_t)i, up);
-    qsort(height, (size_t)n, sizeof(double), by_height);
+    qsort(height, (size_t)n, sizeof(double), pal_compare_double);
     double part = (height[(n - 1) / 8] - height[0]) / (height[n - 1] - height[0]);
     *fraction = fmax(*fraction, part);
     free(height);
@@ -343,10 +338,9 @@ static pal_err make_body(pal_loaded_scene *loaded, const char *name, const pal_s
 
 static pal_err check_shown(const char *what, const char *text, size_t n_byte, pal_diagnostic *diag)
 {
-    char shown[256];
     if (strlen(text) >= n_byte) return PAL_REFUSE(diag, "%s: %zu bytes, more than %zu", what, strlen(text), n_byte - 1);
-    shown_text(text, shown, sizeof shown);
-    if (strcmp(text, shown)) return PAL_REFUSE(diag, "%s: has characters that cannot be shown", what);
+    if (!pal_utf8_all_printable(text, strlen(text)))
+        return PAL_REFUSE(diag, "%s: has characters that cannot be shown", what);
     return PAL_ERR_OK;
 }
 

@@ -19,14 +19,10 @@ enum { PATH = 1600 };
 /* the middle of the vertices' box */
 static void middle_of(const pal_cells *cells, double out[3])
 {
-    for (int c = 0; c < 3; c++) {
-        double low = INFINITY, high = -INFINITY;
-        for (int32_t i = 0; i < cells->n_vertex; i++) {
-            low = fmin(low, cells->x[3 * (size_t)i + (size_t)c]);
-            high = fmax(high, cells->x[3 * (size_t)i + (size_t)c]);
-        }
-        out[c] = 0.5 * (low + high);
-    }
+    double low[3], high[3];
+    pal_box3_empty(low, high);
+    for (int32_t i = 0; i < cells->n_vertex; i++) pal_box3_add(low, high, cells->x + 3 * (size_t)i);
+    for (int c = 0; c < 3; c++) out[c] = 0.5 * (low[c] + high[c]);
 }
 
 /* the boundary's triangles as the body's mesh */
@@ -94,13 +90,6 @@ pal_err pal_subdivision_read(const pal_json *at, pal_loaded_scene *scene, int in
     pal_diagnostic reason = {""};
     pal_err err = pal_subdivision_load(file, unit_m, about ? origin_m : NULL, scene, index, &reason);
     return pal_json_forward(at, "cells", err, &reason);
-}
-
-void pal_subdivision_unload(pal_loaded_scene *scene, int index)
-{
-    pal_cells_free(&scene->cells[index]);
-    free(scene->stroke[index]);
-    scene->stroke[index] = NULL;
 }
 
 /* ---- strokes ---- */
