@@ -89,10 +89,10 @@ static void net_joined(pal_bridge_net *n)
     pal_servo_put_generation(n->servo, n->generation);
 }
 
-static void ws_control(void *user, pal_link *link, const pal_control *c)
+static void ws_control(void *user, const pal_control *c)
 {
     pal_bridge_net *n = user;
-    if (c->type == PAL_CONTROL_HELLO || c->type == PAL_CONTROL_MEMBERS) n->count.tool = pal_link_tool(link);
+    if (c->type == PAL_CONTROL_HELLO || c->type == PAL_CONTROL_MEMBERS) n->count.tool = pal_link_tool(n->link);
     if (c->type == PAL_CONTROL_HELLO) {
         const pal_wire_hello *hello = &c->hello;
         n->radius_m = hello->you_tool >= 0 && (uint32_t)hello->you_tool < hello->n_tool
@@ -109,11 +109,11 @@ static void ws_control(void *user, pal_link *link, const pal_control *c)
     if (c->type == PAL_CONTROL_ERROR) pal_log(PAL_LOG_WARN, "server", "%s", c->error.text);
 }
 
-static void ws_message(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
+static void ws_message(void *user, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
 {
     pal_bridge_net *n = user;
     if (head->kind == PAL_WIRE_TOOLS) {
-        pal_link_acknowledge(link, bytes, n_byte);
+        pal_link_acknowledge(n->link, bytes, n_byte);
     } else if (head->kind == PAL_WIRE_HAPTIC) {
         pal_wire_haptic haptic;
         if (pal_wire_get_haptic(bytes, n_byte, &haptic))
@@ -123,9 +123,8 @@ static void ws_message(void *user, pal_link *link, const pal_wire_head *head, co
     }
 }
 
-static void ws_state(void *user, pal_link *link, pal_link_state state, int code, const char *reason)
+static void ws_state(void *user, pal_link_state state, int code, const char *reason)
 {
-    (void)link;
     pal_bridge_net *n = user;
     if (state != PAL_LINK_LOST && state != PAL_LINK_ENDED) return;
     snprintf(n->count.reason, sizeof n->count.reason, "%d %.100s", code, reason);

@@ -132,15 +132,15 @@ static void bridge_frame(pal_lcm_bridge *b, const uint8_t *bytes, size_t n_byte)
     bridge_body(b, head.part);
 }
 
-static void watcher_message(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
+static void watcher_message(void *user, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
 {
-    if (head->kind == PAL_WIRE_FRAME) bridge_frame(user, bytes, n_byte);
-    if (head->kind == PAL_WIRE_TOOLS) pal_link_acknowledge(link, bytes, n_byte);
+    pal_lcm_bridge *b = user;
+    if (head->kind == PAL_WIRE_FRAME) bridge_frame(b, bytes, n_byte);
+    if (head->kind == PAL_WIRE_TOOLS) pal_link_acknowledge(b->watcher, bytes, n_byte);
 }
 
-static void watcher_control(void *user, pal_link *link, const pal_control *c)
+static void watcher_control(void *user, const pal_control *c)
 {
-    (void)link;
     pal_lcm_bridge *b = user;
     if (c->type == PAL_CONTROL_HELLO) {
         if (!b->named) memcpy(b->session, c->hello.session, sizeof b->session);
@@ -155,9 +155,8 @@ static void watcher_control(void *user, pal_link *link, const pal_control *c)
     if (c->type == PAL_CONTROL_STATUS) bridge_status(b, &c->status);
 }
 
-static void watcher_state(void *user, pal_link *link, pal_link_state state, int code, const char *reason)
+static void watcher_state(void *user, pal_link_state state, int code, const char *reason)
 {
-    (void)link;
     pal_lcm_bridge *b = user;
     if (state == PAL_LINK_LOST || state == PAL_LINK_ENDED) {
         pal_log(state == PAL_LINK_ENDED ? PAL_LOG_WARN : PAL_LOG_DEBUG, "lcm_server", "%d %s", code, reason);
@@ -169,12 +168,12 @@ static void watcher_state(void *user, pal_link *link, pal_link_state state, int 
 }
 
 /* the member of one tool */
-static void tool_message(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
+static void tool_message(void *user, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
 {
     bridge_tool *tool = user;
     pal_lcm_bridge *b = tool->bridge;
     pal_wire_haptic haptic;
-    if (head->kind == PAL_WIRE_TOOLS) pal_link_acknowledge(link, bytes, n_byte);
+    if (head->kind == PAL_WIRE_TOOLS) pal_link_acknowledge(tool->link, bytes, n_byte);
     if (head->kind != PAL_WIRE_HAPTIC || pal_wire_get_haptic(bytes, n_byte, &haptic) || haptic.tool != tool->index)
         return;
     palpate_haptic_model_t model;
@@ -185,16 +184,14 @@ static void tool_message(void *user, pal_link *link, const pal_wire_head *head, 
         b->count.n_model++;
 }
 
-static void tool_control(void *user, pal_link *link, const pal_control *c)
+static void tool_control(void *user, const pal_control *c)
 {
-    (void)link;
     bridge_tool *tool = user;
     if (c->type == PAL_CONTROL_ERROR) pal_log(PAL_LOG_WARN, "lcm_tool", "tool %d: %s", tool->index, c->error.text);
 }
 
-static void tool_state(void *user, pal_link *link, pal_link_state state, int code, const char *reason)
+static void tool_state(void *user, pal_link_state state, int code, const char *reason)
 {
-    (void)link;
     bridge_tool *tool = user;
     if (state == PAL_LINK_ENDED) pal_log(PAL_LOG_WARN, "lcm_tool", "tool %d: %d %s", tool->index, code, reason);
 }

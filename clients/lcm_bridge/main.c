@@ -11,25 +11,23 @@ int main(int argc, char **argv)
     const char *server = "ws://127.0.0.1:8090/ws", *lcm = "udpm://239.255.76.67:7667?ttl=0", *session = NULL;
     bool json = false, quiet = false;
     double seconds = 0;
-    int n_operand;
     const pal_client_flag flag[] = {
-        {"--server", "URL", PAL_CLIENT_TEXT, &server, 0, 0, NULL, "palpate server (ws://127.0.0.1:8090/ws)"},
-        {"--lcm", "URL", PAL_CLIENT_TEXT, &lcm, 0, 0, NULL, "LCM bus (udpm://239.255.76.67:7667?ttl=0)"},
-        {"--session", "NAME", PAL_CLIENT_TEXT, &session, 0, 0, NULL, "name in the channels (the server's)"},
-        {"--seconds", "S", PAL_CLIENT_NUMBER, &seconds, 0.1, 1e6, NULL, "end after this time (never)"},
-        {"--json", NULL, PAL_CLIENT_SWITCH, &json, 0, 0, NULL, "counts as one JSON object at the end"},
-        {"--quiet", NULL, PAL_CLIENT_SWITCH, &quiet, 0, 0, NULL, "say nothing but warnings"},
+        {"--server", "URL", &server, 0, 0, NULL, "palpate server (ws://127.0.0.1:8090/ws)"},
+        {"--lcm", "URL", &lcm, 0, 0, NULL, "LCM bus (udpm://239.255.76.67:7667?ttl=0)"},
+        {"--session", "NAME", &session, 0, 0, NULL, "name in the channels (the server's)"},
+        {"--seconds", "S", &seconds, 0.1, 1e6, NULL, "end after this time (never)"},
+        {"--json", NULL, &json, 0, 0, NULL, "counts as one JSON object at the end"},
+        {"--quiet", NULL, &quiet, 0, 0, NULL, "say nothing but warnings"},
     };
     const pal_client_table table = {
-        "palpate-lcm",
-        "[flags]",
-        "Takes a session to an LCM bus: body frames, status and haptic models out, tool states in, on channels\n"
-        "PALPATE1/<session>/...; the types are in lcmtypes/.",
-        flag,
-        sizeof flag / sizeof flag[0],
-        0,
-        0};
-    const int code = pal_client_flags_parse(&table, argc, argv, NULL, &n_operand);
+        .program = "palpate-lcm",
+        .usage = "[flags]",
+        .about =
+            "Takes a session to an LCM bus: body frames, status and haptic models out, tool states in, on channels\n"
+            "PALPATE1/<session>/...; the types are in lcmtypes/.",
+        .flag = flag,
+        .n_flag = sizeof flag / sizeof flag[0]};
+    const int code = pal_client_flags_parse(&table, argc, argv, NULL);
     if (code >= 0) return code;
     pal_log_set_level(quiet || json ? PAL_LOG_WARN : PAL_LOG_INFO);
     pal_diagnostic diag = {""};

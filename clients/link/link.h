@@ -45,13 +45,13 @@ typedef enum pal_link_state {
 /* all called [net]; any may be NULL; bytes and messages are borrowed for the call */
 typedef struct pal_link_events {
     /* reason: a sentence for the user; code: websocket close code, 0: none */
-    void (*state)(void *user, pal_link *link, pal_link_state state, int code, const char *reason);
+    void (*state)(void *user, pal_link_state state, int code, const char *reason);
     /* every well-formed text message of the server; hello too, before state JOINED */
-    void (*control)(void *user, pal_link *link, const pal_control *c);
+    void (*control)(void *user, const pal_control *c);
     /* every whole binary message of a server kind with a valid header; the body is unchecked */
-    void (*message)(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte);
+    void (*message)(void *user, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte);
     /* a malformed message of the server (pal_refusal); it is dropped, the connection stays open */
-    void (*fault)(void *user, pal_link *link, int refusal);
+    void (*fault)(void *user, int refusal);
 } pal_link_events;
 
 typedef struct pal_link_options {

@@ -49,7 +49,7 @@ static void link_report(pal_link *link, pal_link_state state, const char *reason
 {
     link->state = state;
     if (!link->closing && link->o.events->state)
-        link->o.events->state(link->o.user, link, state, link->close_code, reason ? reason : "");
+        link->o.events->state(link->o.user, state, link->close_code, reason ? reason : "");
 }
 
 static void link_want_write(pal_link *link)
@@ -254,7 +254,8 @@ void pal_link_pause_reading(pal_link *link, bool hold)
 static int link_write(pal_link *link, struct lws *wsi)
 {
     uint8_t buffer[LWS_PRE + PAL_CONTROL_IN_MAX];
-    size_t n = 0;
+    const void *from;
+    size_t n;
     enum lws_write_protocol kind = LWS_WRITE_BINARY;
     if (link->closing) {
         lws_close_reason(wsi, LWS_CLOSE_STATUS_NORMAL, NULL, 0);
@@ -262,21 +263,22 @@ static int link_write(pal_link *link, struct lws *wsi)
     }
     if (link->n_queued > 0) {
         n = link->queued_bytes[link->queue_first];
-        memcpy(buffer + LWS_PRE, link->queued[link->queue_first], n);
+        from = link->queued[link->queue_first];
         link->queue_first = (link->queue_first + 1) % LINK_QUEUE;
         link->n_queued--;
         kind = LWS_WRITE_TEXT;
     } else if (link->has_pose) {
         n = sizeof link->pose;
-        memcpy(buffer + LWS_PRE, link->pose, n);
+        from = link->pose;
         link->has_pose = false;
     } else if (link->has_ack) {
         n = sizeof link->ack;
-        memcpy(buffer + LWS_PRE, link->ack, n);
+        from = link->ack;
         link->has_ack = false;
     } else {
         return 0;
     }
+    memcpy(buffer + LWS_PRE, from, n);
     if (lws_write(wsi, buffer + LWS_PRE, n, kind) < 0) return -1;
     if (link->n_queued > 0 || link->has_pose || link->has_ack) lws_callback_on_writable(wsi);
     return 0;
@@ -284,7 +286,7 @@ static int link_write(pal_link *link, struct lws *wsi)
 
 static void link_fault(pal_link *link, int refusal)
 {
-    if (link->o.events->fault) link->o.events->fault(link->o.user, link, refusal);
+    if (link->o.events->fault) link->o.events->fault(link->o.user, refusal);
 }
 
 static void link_text(pal_link *link)
@@ -304,7 +306,7 @@ static void link_text(pal_link *link)
         link->pause_ms = LINK_PAUSE_FIRST_MS;
         link->count.joins++;
     }
-    if (link->o.events->control) link->o.events->control(link->o.user, link, &link->control);
+    if (link->o.events->control) link->o.events->control(link->o.user, &link->control);
     if (hello && !link->closing) link_report(link, PAL_LINK_JOINED, "");
 }
 
@@ -316,7 +318,7 @@ static void link_binary(pal_link *link)
     if (refusal)
         link_fault(link, refusal);
     else if (link->o.events->message)
-        link->o.events->message(link->o.user, link, &head, link->in, link->n_in);
+        link->o.events->message(link->o.user, &head, link->in, link->n_in);
 }
 
 /* token bucket of a slow client: read_bytes_s fills it, messages empty it; reading pauses while it is empty */

@@ -378,10 +378,8 @@ static void client_subscribe(pal_scripted_client *t, const pal_wire_part_info *i
     }
 }
 
-static void client_on_message(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes,
-                              size_t n_byte)
+static void client_on_message(void *user, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
 {
-    (void)link;
     pal_scripted_client *t = user;
     pal_wire_haptic haptic;
     if (head->kind == PAL_WIRE_FRAME) client_frame(t, bytes, n_byte);
@@ -465,10 +463,10 @@ static void client_hello(pal_scripted_client *t, const pal_wire_hello *hello)
     client_subscribe(t, hello->part, t->n_part);
 }
 
-static void client_on_control(void *user, pal_link *link, const pal_control *c)
+static void client_on_control(void *user, const pal_control *c)
 {
     pal_scripted_client *t = user;
-    if (c->type == PAL_CONTROL_HELLO || c->type == PAL_CONTROL_MEMBERS) t->result.tool = pal_link_tool(link);
+    if (c->type == PAL_CONTROL_HELLO || c->type == PAL_CONTROL_MEMBERS) t->result.tool = pal_link_tool(t->link);
     if (c->type == PAL_CONTROL_MEMBERS) t->result.n_member = c->members.n_member;
     if (c->type == PAL_CONTROL_HELLO) client_hello(t, &c->hello);
     if (c->type == PAL_CONTROL_TOPOLOGY) {
@@ -480,9 +478,8 @@ static void client_on_control(void *user, pal_link *link, const pal_control *c)
     if (c->type == PAL_CONTROL_ANSWER || c->type == PAL_CONTROL_ERROR) client_answered(t, c);
 }
 
-static void client_on_state(void *user, pal_link *link, pal_link_state state, int code, const char *reason)
+static void client_on_state(void *user, pal_link_state state, int code, const char *reason)
 {
-    (void)link;
     pal_scripted_client *t = user;
     if (state != PAL_LINK_LOST && state != PAL_LINK_ENDED) return;
     snprintf(t->result.closed, sizeof t->result.closed, "%d %.150s", code, reason);
@@ -492,9 +489,8 @@ static void client_on_state(void *user, pal_link *link, pal_link_state state, in
     }
 }
 
-static void client_on_fault(void *user, pal_link *link, int refusal)
+static void client_on_fault(void *user, int refusal)
 {
-    (void)link;
     client_fault(user, PAL_FAULT_MALFORMED, "%s", pal_refusal_text(refusal));
 }
 

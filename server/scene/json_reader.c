@@ -100,6 +100,7 @@ pal_json pal_json_entry(const pal_json *list, int index, const cJSON *value)
 {
     pal_json entry = *list;
     entry.value = value;
+    entry.index = index;
     if (snprintf(entry.path, sizeof entry.path, "%s[%d]", list->path, index) < 0) entry.path[0] = 0;
     return entry;
 }
@@ -127,8 +128,7 @@ pal_err pal_json_object(const pal_json *at, const char *const *known)
     char list[256], key[64];
     if (!cJSON_IsObject(at->value)) return pal_json_refuse(at, "is not an object {...}");
     if (cJSON_GetArraySize(at->value) > PAL_JSON_KEYS) return pal_json_refuse(at, "more than %d keys", PAL_JSON_KEYS);
-    PAL_JSON_EACH(child, at)
-    {
+    PAL_JSON_EACH (child, at) {
         bool found = !known;
         for (int k = 0; known && known[k] && !found; k++) found = !strcmp(child->string, known[k]);
         clean_key(child->string, key);

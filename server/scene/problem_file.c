@@ -202,11 +202,7 @@ static pal_err read_case(const pal_json *at, pal_problem *out, int index)
     PAL_TRY(read_id(at, out, c->id));
     PAL_TRY(pal_json_list(at, "loads", PAL_PROBLEM_LOADS, &list));
     if (!list.value || !list.value->child) return pal_json_refuse(&list, "a load case needs at least one load");
-    PAL_JSON_EACH(child, &list)
-    {
-        const pal_json load = pal_json_entry(&list, c->n_load, child);
-        PAL_TRY(read_load(&load, &c->load[c->n_load++]));
-    }
+    PAL_JSON_ENTRIES (load, &list) PAL_TRY(read_load(&load, &c->load[c->n_load++]));
     return PAL_ERR_OK;
 }
 
@@ -292,8 +288,8 @@ static pal_err check_frequencies(const pal_json *at, pal_problem *out, int index
     PAL_TRY(read_object(at, WORDS("nu", "density", "E", "hz", "note"), NULL));
     PAL_TRY(check_numbers(at, WORDS("nu", "density", "E")));
     PAL_TRY(pal_json_list(at, "hz", 256, &hz));
-    PAL_JSON_EACH(f, &hz)
-    if (!cJSON_IsNumber(f) || !(f->valuedouble >= 0)) return pal_json_refuse(&hz, "is not a list of frequencies");
+    PAL_JSON_EACH (f, &hz)
+        if (!cJSON_IsNumber(f) || !(f->valuedouble >= 0)) return pal_json_refuse(&hz, "is not a list of frequencies");
     return PAL_ERR_OK;
 }
 
@@ -306,9 +302,7 @@ static pal_err read_list(const pal_json *root, pal_problem *out, const char *key
     if (min >= 0) PAL_TRY(pal_json_need(root, key));
     int n = list.value ? cJSON_GetArraySize(list.value) : 0;
     if (n < min) return pal_json_refuse(&list, "%d entries, wanted at least %d", n, min);
-    PAL_JSON_EACH(child, &list)
-    {
-        const pal_json at = pal_json_entry(&list, *count, child);
+    PAL_JSON_ENTRIES (at, &list) {
         PAL_TRY(read(&at, out, *count));
         ++*count;
     }

@@ -72,8 +72,7 @@ static pal_err read_values(const pal_json *at, const grid_values *wanted, const 
         if (cJSON_GetArraySize(list.value) != n)
             return pal_json_refuse(&list, "%d numbers, wanted %d (n[0] n[1] n[2])", cJSON_GetArraySize(list.value), n);
         int k = 0;
-        PAL_JSON_EACH(child, &list)
-        {
+        PAL_JSON_EACH (child, &list) {
             if (!cJSON_IsNumber(child)) return pal_json_refuse(&list, "entry %d is not a number", k + 1);
             own[k] = child->valuedouble;
             if (!(own[k] >= wanted->low[v] && own[k] <= wanted->high[v]))
@@ -229,10 +228,8 @@ pal_err pal_region_read(const pal_json *body, pal_loaded_scene *scene, int index
     if (list.value && list.value->child && strcmp(def->model.name, "fem") != 0 &&
         strcmp(def->model.name, "subdivision_fem") != 0)
         return pal_json_refuse(&list, "model \"%s\" has one material; model \"fem\" takes regions", def->model.name);
-    PAL_JSON_EACH(child, &list)
-    {
+    PAL_JSON_ENTRIES (at, &list) {
         const int k = def->n_region++;
-        const pal_json at = pal_json_entry(&list, k, child);
         PAL_TRY(read_region(&at, origin_of(def), &def->region[k], &scene->region[index][k]));
     }
     return PAL_ERR_OK;

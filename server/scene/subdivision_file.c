@@ -123,11 +123,7 @@ pal_err pal_strokes_read(const pal_json *body, pal_loaded_scene *scene, int inde
     if (!stroke) return pal_diagnostic_set(body->diag, PAL_ERR_MEMORY, "%s: no memory for %s", body->file, list.path);
     scene->stroke[index] = stroke;
     def->stroke = stroke;
-    PAL_JSON_EACH(child, &list)
-    {
-        const pal_json at = pal_json_entry(&list, def->n_stroke, child);
-        PAL_TRY(read_stroke(&at, &stroke[def->n_stroke++]));
-    }
+    PAL_JSON_ENTRIES (at, &list) PAL_TRY(read_stroke(&at, &stroke[def->n_stroke++]));
     return PAL_ERR_OK;
 }
 
