@@ -72,8 +72,6 @@ static bool good_text(const char *text, size_t n)
     return true;
 }
 
-/* ---- writer ---- */
-
 typedef struct writer {
     char *dst;
     size_t cap, n;
@@ -242,8 +240,6 @@ int pal_control_put(char *dst, size_t cap, const pal_control *c, size_t *n_byte)
     if (!w.refusal) *n_byte = w.n;
     return w.refusal;
 }
-
-/* ---- reader ---- */
 
 /* size of the structure without parsing it: nesting, number of values, UTF-8 */
 static int scan(const char *text, size_t n, uint32_t n_value_max)

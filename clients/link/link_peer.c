@@ -1,4 +1,3 @@
-/* One link: connect, join, messages in and out, reconnect (link.h). */
 #include "clients/link/link_core.h"
 #include "server/base/clock.h"
 

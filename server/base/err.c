@@ -1,4 +1,3 @@
-/* The error table as text. */
 #include "server/base/err.h"
 
 #include <stdarg.h>

@@ -22,8 +22,6 @@ typedef struct parse {
     char name[PAL_CONFIG_KEYS][KEY];                  /* "--allow-remote"                               */
 } parse;
 
-/* ---- manual ---- */
-
 static void manual_line(const char *name, const char *value, const char *help)
 {
     char left[80];
@@ -56,8 +54,6 @@ static int manual(const parse *p)
     printf("\nExit code: 0 ok, 1 input refused, 2 wrong usage, 3 internal error\n");
     return 0;
 }
-
-/* ---- parsing ---- */
 
 int pal_flags_wrong(const pal_flag_common *common, const char *format, ...)
 {

@@ -1,12 +1,9 @@
-/* Cholesky factors in envelope storage. */
 #include "server/num/envelope.h"
 
 #include "server/base/heap.h"
 #include "server/num/conjugate_gradient.h"
 
 #include <math.h>
-
-/* ---- the order ---- */
 
 typedef struct graph {
     int n;
@@ -100,8 +97,6 @@ pal_err pal_envelope_make(int n, const int32_t *start, const int32_t *point, int
     PAL_FREE(index, row);
     return err;
 }
-
-/* ---- the factor ---- */
 
 static void load_values(pal_envelope *e, const int32_t *start, const int32_t *point, const double *value,
                         const uint8_t *skip)

@@ -22,8 +22,6 @@ size_t pal_interpolation_bytes(const pal_interpolation *rows)
     return ((size_t)rows->n_row + 1) * sizeof *rows->start + n * (sizeof *rows->point + sizeof *rows->weight);
 }
 
-/* ---- row by row ---- */
-
 pal_err pal_interpolation_builder_begin(pal_interpolation_builder *b, int32_t n_row, int32_t n_point, int64_t max_entry)
 {
     memset(b, 0, sizeof *b);
@@ -76,8 +74,6 @@ pal_err pal_interpolation_builder_finish(pal_interpolation_builder *b, pal_inter
     memset(b, 0, sizeof *b);
     return err;
 }
-
-/* ---- whole ---- */
 
 pal_err pal_interpolation_identity(int32_t n, pal_interpolation *out)
 {

@@ -1,4 +1,3 @@
-/* The pattern of panels.h. */
 #include "server/num/panels.h"
 
 #include "server/base/heap.h"

@@ -13,8 +13,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- kinds of values ---- */
-
 #define WORDS(...) ((const char *const[]){__VA_ARGS__, NULL})
 
 /* an object of known keys with those that it must have, both NULL-terminated; its note is a text */
@@ -98,8 +96,6 @@ static pal_err read_region(const pal_json *parent, pal_box *out)
             return pal_json_refuse(at, "min[%d] %g is above max[%d] %g", c, out->low_m[c], c, out->high_m[c]);
     return PAL_ERR_OK;
 }
-
-/* ---- entries ---- */
 
 static pal_err read_material(const pal_json *at, pal_problem *out, int index)
 {
@@ -261,8 +257,6 @@ static pal_err read_reference(const pal_json *at, pal_problem *out, int index)
     return check_origin(at);
 }
 
-/* ---- the root ---- */
-
 static pal_err check_units(const pal_json *root)
 {
     static const char *const known[] = {"length", "force", "stress", "density", "note", NULL};
@@ -332,8 +326,6 @@ static pal_err read_problem(const pal_json *at, pal_problem *p)
     PAL_TRY(read_list(at, p, "load_cases", 1, PAL_PROBLEM_CASES, &p->n_case, read_case));
     return read_list(at, p, "references", -1, PAL_PROBLEM_REFERENCES, &p->n_reference, read_reference);
 }
-
-/* ---- public functions ---- */
 
 pal_err pal_problem_parse(const char *name, const char *text, size_t n_byte, const char *folder, pal_problem **out,
                           pal_diagnostic *diag)

@@ -24,8 +24,6 @@ static const double *origin_of(const pal_body_def *def)
     return def->cells ? def->mesh->surface.origin_m : def->mesh->tets.origin_m;
 }
 
-/* ---- reading ---- */
-
 /* keys and ranges of the numbers at the nodes of a grid */
 typedef struct grid_values {
     const char *key[3];
@@ -253,8 +251,6 @@ pal_err pal_spring_grid_read(const pal_json *model, pal_loaded_scene *scene, int
             return pal_json_refuse_key(model, spring_values.key[k], "stands beside a grid that gives the same");
     return PAL_ERR_OK;
 }
-
-/* ---- writing ---- */
 
 void pal_region_volume(const char *stem, int region, char *out, size_t n_byte)
 {

@@ -13,8 +13,6 @@
 enum { SHEET = 17 }; /* vertices on a side of the sheet of paper C */
 static const double sphere_m = 0.05, sheet_m = 0.2;
 
-/* ---- surfaces ---- */
-
 /* drops the triangles of all pieces but the one of the largest area, and vertices of none */
 static pal_err keep_largest(pal_surface *surface, pal_diagnostic *diag)
 {
@@ -110,8 +108,6 @@ pal_err pal_scene_adaptive_defaults(pal_body_def *body, const pal_surface_scene 
     pal_entry_init(inflate, "", "inflate");
     return pal_entry_put_number(inflate, "pressure_Pa", options->inflate_Pa, diag);
 }
-
-/* ---- shapes ---- */
 
 /* the box around an opening's ring and cap */
 static pal_support_def around(const pal_surface *surface, const int32_t ring[PAL_STOMACH_RING], int32_t cap)

@@ -33,8 +33,6 @@ static void report_progress(const pal_surface_scene *options, const char *what, 
     if (options->progress) options->progress(what, fraction, options->user);
 }
 
-/* ---- names ---- */
-
 void pal_scene_stem(const char *path, char *out, size_t n_byte)
 {
     static const char *const endings[] = {".gz",  ".nii", ".inr", ".obj", ".stl",     ".ply",     ".off",
@@ -75,8 +73,6 @@ static void shown_text(const char *from, char *out, size_t n_byte)
     }
     out[n] = 0;
 }
-
-/* ---- resolution ---- */
 
 static int first_resolution(const pal_surface *surface)
 {
@@ -154,8 +150,6 @@ static pal_err choose_resolution(const pal_surface *surface, const pal_surface_s
     *out = best;
     return PAL_ERR_OK;
 }
-
-/* ---- reading ---- */
 
 /* the label asked for, or the most frequent one */
 static pal_err read_volume(const char *path, const pal_surface_scene *options, pal_surface *out,
@@ -245,8 +239,6 @@ pal_err pal_scene_prepare_file(const char *path, const pal_surface_scene *option
     pal_surface_free(&surface);
     return err;
 }
-
-/* ---- scenes ---- */
 
 /* A shape that was scanned, or drawn as it lies, is in balance with its weight: pulling it down once more would count
  * gravity twice (and let 5 kPa tissue sag by a third of its height). */

@@ -1,4 +1,3 @@
-/* Drops the components of a body that have no support. */
 #include "server/scene/scene_import.h"
 #include "server/scene/subdivision_file.h"
 

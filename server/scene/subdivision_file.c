@@ -14,8 +14,6 @@
 
 enum { PATH = 1600 };
 
-/* ---- cells ---- */
-
 /* the middle of the vertices' box */
 static void middle_of(const pal_cells *cells, double out[3])
 {
@@ -92,8 +90,6 @@ pal_err pal_subdivision_read(const pal_json *at, pal_loaded_scene *scene, int in
     return pal_json_forward(at, "cells", err, &reason);
 }
 
-/* ---- strokes ---- */
-
 static pal_err read_stroke(const pal_json *at, pal_stroke *out)
 {
     const char *const *known = pal_scene_keys(PAL_KEYS_STROKE, NULL);
@@ -127,8 +123,6 @@ pal_err pal_strokes_read(const pal_json *body, pal_loaded_scene *scene, int inde
     return PAL_ERR_OK;
 }
 
-/* ---- the cut ---- */
-
 pal_err pal_cut_read(const pal_json *body, pal_body_def *def)
 {
     const char *const *known = pal_scene_keys(PAL_KEYS_CUT, NULL);
@@ -147,8 +141,6 @@ pal_err pal_cut_read(const pal_json *body, pal_body_def *def)
     def->cut = true;
     return PAL_ERR_OK;
 }
-
-/* ---- writing ---- */
 
 void pal_subdivision_append(cJSON *object, const pal_body_def *body, const char *file)
 {

@@ -57,8 +57,6 @@ double pal_case_tolerance_m(const pal_tets *tets)
     return 1e-6 * tets->edge_m;
 }
 
-/* ---- voxels ---- */
-
 /* Aligns grid planes with the border of the first support (else material) that cuts the body on an axis. A support
  * that ends within a voxel has the error of one moved by up to a voxel. */
 static void align(const pal_problem *p, int resolution, const pal_surface *surface, double ahead[3])
@@ -150,8 +148,6 @@ pal_err pal_case_supports(const pal_problem *problem, const pal_tets *tets, pal_
     }
     return PAL_ERR_OK;
 }
-
-/* ---- loads ---- */
 
 int pal_case_shape_functions(const pal_body *body, int element, const double local[4], double shape[10],
                              const int32_t **node)

@@ -41,8 +41,6 @@ static bool report_progress(const job *j, const char *what, double fraction)
     return !j->options->progress || j->options->progress(what, fraction, j->options->user);
 }
 
-/* ---- scene ---- */
-
 /* material `index` with the replacements of the options */
 static pal_err material_of(const job *j, int index, pal_material *out)
 {
@@ -154,8 +152,6 @@ static pal_err set_loads(const job *j)
     return err;
 }
 
-/* ---- solving ---- */
-
 /* moves the nodes of moved supports to rest + share * move; later supports win */
 static void move_supports(const job *j, double share)
 {
@@ -236,8 +232,6 @@ static void sum_up(const job *j)
     }
     r->energy_J = pal_world_energy_J(j->s->world);
 }
-
-/* ---- public functions ---- */
 
 /* volume of the material: each element by its filled share */
 static double volume_of(const pal_solution *s)

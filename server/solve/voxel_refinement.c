@@ -1,4 +1,3 @@
-/* Splits voxels into equal parts on the grid they came from. */
 #include "server/solve/voxel_refinement.h"
 
 #include "server/base/vec3.h"
