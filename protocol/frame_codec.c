@@ -315,11 +315,7 @@ typedef struct bit_writer {
 
 static inline void flush(bit_writer *w)
 {
-#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
-    memcpy(w->at, &w->word, 8);
-#else
     pal_put_u64(w->at, w->word);
-#endif
     w->at += w->n >> 3;
     w->word >>= w->n & ~7u;
     w->n &= 7;
@@ -502,20 +498,9 @@ void pal_frame_decoder_destroy(pal_frame_decoder *d)
     free(d);
 }
 
-static inline uint64_t load64(const uint8_t *b)
-{
-#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
-    uint64_t word;
-    memcpy(&word, b, 8);
-    return word;
-#else
-    return pal_get_u64(b);
-#endif
-}
-
 static inline uint64_t bits_at(const uint8_t *codes, size_t bit)
 {
-    return load64(codes + (bit >> 3)) >> (bit & 7);
+    return pal_get_u64(codes + (bit >> 3)) >> (bit & 7);
 }
 
 /* three codes from bit position `bit`; returns the position behind, 0 for a code that is none */

@@ -43,8 +43,7 @@ pal_err link_address_parse(const char *url, link_address *out, pal_diagnostic *d
 int link_ws_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len);
 int link_get_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len);
 
-void link_close_all(pal_link_loop *loop);      /* closes every connection with 1000 */
-bool link_any_open(const pal_link_loop *loop); /* a websocket is still open */
-void link_free_all(pal_link_loop *loop);       /* after the context is destroyed */
+bool link_close_all(pal_link_loop *loop); /* closes every connection with 1000; true while a websocket is open */
+void link_free_all(pal_link_loop *loop);  /* after the context is destroyed */
 void link_get_free_all(pal_link_loop *loop);
 #endif

@@ -70,9 +70,8 @@ void pal_link_loop_destroy(pal_link_loop *loop)
     if (!loop) return;
     while (loop->timers) pal_link_remove_timer(loop->timers);
     /* goodbyes get a fifth of a second; a cancelled wait keeps the service call from sleeping longer */
-    link_close_all(loop);
     const uint64_t end = pal_clock_ns() + 200000000;
-    while (link_any_open(loop) && pal_clock_ns() < end) {
+    while (link_close_all(loop) && pal_clock_ns() < end) {
         lws_cancel_service(loop->context);
         lws_service(loop->context, 0);
     }

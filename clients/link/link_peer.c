@@ -169,19 +169,15 @@ void pal_link_close(pal_link *link)
     link_free(link);
 }
 
-void link_close_all(pal_link_loop *loop)
+bool link_close_all(pal_link_loop *loop)
 {
+    bool open = false;
     for (pal_link *link = loop->links, *next; link; link = next) {
         next = link->next;
+        open = open || link->up;
         pal_link_close(link);
     }
-}
-
-bool link_any_open(const pal_link_loop *loop)
-{
-    for (const pal_link *link = loop->links; link; link = link->next)
-        if (link->up) return true;
-    return false;
+    return open;
 }
 
 void link_free_all(pal_link_loop *loop)

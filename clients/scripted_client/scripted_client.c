@@ -1,12 +1,11 @@
 #include "clients/scripted_client/scripted_client.h"
 #include "protocol/field_codec.h"
 #include "server/base/clock.h"
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 
 #include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 /* a client that cannot keep up is served with larger steps, at most this many times the stated error */
 #define COARSEST 10.0
@@ -51,14 +50,17 @@ struct pal_scripted_client {
     pal_scripted_client_result result;
 };
 
+static const struct {
+    const char *name, *text;
+} fault_table[] = {
+#define X(code, sentence) {#code, sentence},
+    PAL_FAULT_TABLE(X)
+#undef X
+};
+
 const char *pal_fault_name(pal_fault fault)
 {
-    static const char *const name[] = {
-#define X(code, text) #code,
-        PAL_FAULT_TABLE(X)
-#undef X
-    };
-    return name[fault];
+    return fault_table[fault].name;
 }
 
 const char *const pal_client_seen_name[PAL_CLIENT_SEEN_COUNT] = {
@@ -74,16 +76,6 @@ void pal_client_seen(const pal_scripted_client_result *r, double seen[PAL_CLIENT
 #undef X
 }
 
-static const char *client_fault_text(pal_fault fault)
-{
-    static const char *const text[] = {
-#define X(code, sentence) sentence,
-        PAL_FAULT_TABLE(X)
-#undef X
-    };
-    return text[fault];
-}
-
 static void __attribute__((format(printf, 3, 4)))
 client_fault(pal_scripted_client *t, pal_fault fault, const char *format, ...)
 {
@@ -93,7 +85,7 @@ client_fault(pal_scripted_client *t, pal_fault fault, const char *format, ...)
     va_start(arguments, format);
     vsnprintf(detail, sizeof detail, format, arguments);
     va_end(arguments);
-    snprintf(t->result.first_fault, sizeof t->result.first_fault, "%s: %s", client_fault_text(fault), detail);
+    snprintf(t->result.first_fault, sizeof t->result.first_fault, "%s: %s", fault_table[fault].text, detail);
 }
 
 /* touched place: the vertex furthest along up, for several trainees around it */
@@ -413,8 +405,7 @@ static void client_parts(pal_scripted_client *t, const pal_wire_part_info *info,
         part->asset = pal_asset_store_request(t->store, info[i].asset);
         client_table(t, &info[i], i);
         if (part->now_m && part->epoch == info[i].epoch && part->n_vertex == info[i].n_vertex) continue;
-        free(part->now_m);
-        free(part->first_m);
+        PAL_FREE(part->now_m, part->first_m);
         part->epoch = info[i].epoch;
         part->n_vertex = info[i].n_vertex;
         part->seen = false;
@@ -596,9 +587,7 @@ void pal_scripted_client_destroy(pal_scripted_client *t)
 {
     if (!t) return;
     for (int i = 0; i < PAL_WIRE_PART_MAX; i++) {
-        free(t->part[i].now_m);
-        free(t->part[i].first_m);
-        free(t->part[i].kept);
+        PAL_FREE(t->part[i].now_m, t->part[i].first_m, t->part[i].kept);
         pal_triangle_table_free(&t->part[i].table);
     }
     pal_samples_free(&t->result.latency_ms);

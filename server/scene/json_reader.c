@@ -105,13 +105,12 @@ pal_json pal_json_entry(const pal_json *list, int index, const cJSON *value)
     return entry;
 }
 
-/* "a, b, c" of the known keys, for the sentence about an unknown one */
-static void list_known(const char *const *known, char *out, size_t n_byte)
+void pal_json_list_words(const char *const *words, const char *quote, char *out, size_t n_byte)
 {
     size_t n = 0;
     out[0] = 0;
-    for (int k = 0; known[k] && n < n_byte; k++)
-        n += (size_t)snprintf(out + n, n_byte - n, "%s%s", k ? ", " : "", known[k]);
+    for (int k = 0; words[k] && n < n_byte; k++)
+        n += (size_t)snprintf(out + n, n_byte - n, "%s%s%s%s", k ? ", " : "", quote, words[k], quote);
 }
 
 /* a key as it may be printed: at most 40 characters without control characters */
@@ -133,7 +132,7 @@ pal_err pal_json_object(const pal_json *at, const char *const *known)
         for (int k = 0; known && known[k] && !found; k++) found = !strcmp(child->string, known[k]);
         clean_key(child->string, key);
         if (!found) {
-            list_known(known, list, sizeof list);
+            pal_json_list_words(known, "", list, sizeof list);
             return pal_json_refuse_key(at, key, "unknown key; known are %s", list);
         }
         for (const cJSON *other = at->value->child; other != child; other = other->next)

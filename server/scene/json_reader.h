@@ -45,6 +45,9 @@ pal_json pal_json_entry(const pal_json *list, int index, const cJSON *value);
     for (pal_json at = pal_json_entry(list, 0, (list)->value ? (list)->value->child : NULL); at.value;                 \
          at = pal_json_entry(list, at.index + 1, at.value->next))
 
+/* "a, b, c" of a NULL-terminated list, for the sentence about an unknown one; quote: around each */
+void pal_json_list_words(const char *const *words, const char *quote, char *out, size_t n_byte);
+
 /* is it an object with no key beside those of the NULL-terminated list, and none twice? known NULL: any key */
 pal_err pal_json_object(const pal_json *at, const char *const *known);
 bool pal_json_has(const pal_json *at, const char *key);

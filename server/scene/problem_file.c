@@ -46,13 +46,11 @@ static pal_err check_numbers(const pal_json *at, const char *const *keys)
 /* one of a NULL-terminated list of words */
 static pal_err read_word(const pal_json *at, const char *key, const char *const *words, char *out, size_t n_byte)
 {
-    char list[160] = "";
-    size_t n = 0;
+    char list[160];
     PAL_TRY(pal_json_text(at, key, false, out, n_byte));
-    for (int k = 0; words[k]; k++) {
+    for (int k = 0; words[k]; k++)
         if (!strcmp(words[k], out)) return PAL_ERR_OK;
-        n += (size_t)snprintf(list + n, sizeof list - n, "%s\"%s\"", k ? ", " : "", words[k]);
-    }
+    pal_json_list_words(words, "\"", list, sizeof list);
     return pal_json_refuse_key(at, key, "\"%s\" is not known; known are %s", out, list);
 }
 
@@ -376,11 +374,11 @@ const pal_problem_reference *pal_problem_reference_find(const pal_problem *probl
 
 pal_err pal_problem_refuse_case(const pal_problem *p, const char *flag, const char *id, pal_diagnostic *diag)
 {
-    char list[320] = "";
-    size_t n = 0;
-    for (int k = 0; k < p->n_case + p->n_reference && n < sizeof list; k++)
-        n += (size_t)snprintf(list + n, sizeof list - n, "%s%s", k ? ", " : "",
-                              k < p->n_case ? p->load_case[k].id : p->reference[k - p->n_case].id);
+    char list[320];
+    const char *known[PAL_PROBLEM_CASES + PAL_PROBLEM_REFERENCES + 1] = {NULL};
+    for (int k = 0; k < p->n_case; k++) known[k] = p->load_case[k].id;
+    for (int k = 0; k < p->n_reference; k++) known[p->n_case + k] = p->reference[k].id;
+    pal_json_list_words(known, "", list, sizeof list);
     if (!id) return PAL_REFUSE(diag, "%s: %s is missing; known are %s", p->path, flag, list);
     return PAL_REFUSE(diag, "%s: %s: there is no load case or reference \"%.40s\"; known are %s", p->path, flag, id,
                       list);
