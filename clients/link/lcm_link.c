@@ -92,17 +92,14 @@ static void lcm_readable(void *user)
 
 static bool lcm_try(pal_lcm_link *link)
 {
-    if (!link->memory && !lcm_route(link->url)) {
-        if (!link->warned)
+    const bool route = link->memory || lcm_route(link->url);
+    if (route) link->lcm = lcm_create(link->url);
+    if (!link->lcm) {
+        if (!link->warned && !route)
             pal_log(PAL_LOG_WARN, "lcm_route",
                     "no multicast route, LCM stays off (all else runs); add one with `ip route add 224.0.0.0/4 dev "
                     "lo` (or the rig's interface)");
-        link->warned = true;
-        return false;
-    }
-    link->lcm = lcm_create(link->url);
-    if (!link->lcm) {
-        if (!link->warned)
+        else if (!link->warned)
             pal_log(PAL_LOG_WARN, "lcm_open", "%s: LCM cannot be opened, it will be tried again", link->url);
         link->warned = true;
         return false;

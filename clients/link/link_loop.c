@@ -185,6 +185,19 @@ pal_err pal_link_poll_fd(pal_link_loop *loop, int fd, void (*fn)(void *user), vo
     return PAL_ERR_OK;
 }
 
+struct lws_client_connect_info link_connect_info(pal_link_loop *loop, const link_address *to,
+                                                 const char *local_protocol, void *object, struct lws **wsi)
+{
+    return (struct lws_client_connect_info){.context = loop->context,
+                                            .vhost = loop->vhost,
+                                            .address = to->host,
+                                            .host = to->host,
+                                            .port = to->port,
+                                            .local_protocol_name = local_protocol,
+                                            .opaque_user_data = object,
+                                            .pwsi = wsi};
+}
+
 pal_err link_address_parse(const char *url, link_address *out, pal_diagnostic *diag)
 {
     const char *host = NULL;

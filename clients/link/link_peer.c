@@ -28,8 +28,7 @@ struct pal_link {
     char close_why[128];
     uint32_t pause_ms;
     lws_sorted_usec_list_t retry, resume;
-    uint8_t *in; /* message being put together  [in_cap] */
-    size_t n_in, in_cap;
+    link_bytes in; /* message being put together */
     bool in_drop;
     bool has_pose, has_ack;
     uint8_t pose[PAL_WIRE_POSE_BYTES], ack[PAL_WIRE_ACK_BYTES];
@@ -73,7 +72,7 @@ static void link_free(pal_link *link)
     pal_link **place = &link->loop->links;
     while (*place && *place != link) place = &(*place)->next;
     if (*place) *place = link->next;
-    free(link->in);
+    free(link->in.at);
     free(link);
 }
 
@@ -90,7 +89,7 @@ static void link_lost(pal_link *link, const char *reason)
     link->wsi = NULL;
     link->up = link->has_pose = link->has_ack = false;
     link->n_queued = 0;
-    link->n_in = 0;
+    link->in.n = 0;
     link->in_drop = false;
     link->held = PAL_WIRE_TOOL_NONE;
     lws_sul_schedule(link->loop->context, 0, &link->resume, link_resume_fired, LWS_SET_TIMER_USEC_CANCEL);
@@ -112,17 +111,11 @@ static void link_connect(pal_link *link)
     link->close_code = 0;
     link->close_why[0] = 0;
     link_report(link, PAL_LINK_CONNECTING, "");
-    struct lws_client_connect_info info = {0};
-    info.context = link->loop->context;
-    info.vhost = link->loop->vhost;
-    info.address = link->address.host, info.host = link->address.host;
-    info.port = link->address.port;
+    struct lws_client_connect_info info =
+        link_connect_info(link->loop, &link->address, PAL_PROTOCOL_NAME, link, &link->wsi);
     info.path = link->address.path;
     info.protocol = PAL_PROTOCOL_NAME;
-    info.local_protocol_name = PAL_PROTOCOL_NAME;
     info.ietf_version_or_minus_one = -1;
-    info.opaque_user_data = link;
-    info.pwsi = &link->wsi;
     /* on failure the callback has reported it */
     lws_client_connect_via_info(&info);
 }
@@ -286,7 +279,7 @@ static void link_fault(pal_link *link, int refusal)
 
 static void link_text(pal_link *link)
 {
-    const int refusal = pal_control_get((const char *)link->in, link->n_in, true, &link->control);
+    const int refusal = pal_control_get((const char *)link->in.at, link->in.n, true, &link->control);
     if (refusal) {
         link_fault(link, refusal);
         return;
@@ -308,12 +301,12 @@ static void link_text(pal_link *link)
 static void link_binary(pal_link *link)
 {
     pal_wire_head head;
-    int refusal = pal_wire_get_head(link->in, link->n_in, &head);
+    int refusal = pal_wire_get_head(link->in.at, link->in.n, &head);
     if (!refusal && head.kind >= PAL_WIRE_POSE) refusal = PAL_REFUSAL_KIND;
     if (refusal)
         link_fault(link, refusal);
     else if (link->o.events->message)
-        link->o.events->message(link->o.user, &head, link->in, link->n_in);
+        link->o.events->message(link->o.user, &head, link->in.at, link->in.n);
 }
 
 /* token bucket of a slow client: read_bytes_s fills it, messages empty it; reading pauses while it is empty */
@@ -331,26 +324,15 @@ static void link_spend(pal_link *link, struct lws *wsi, size_t n_byte)
                      (lws_usec_t)(-link->read_budget / link->o.read_bytes_s * 1e6) + 1);
 }
 
-/* pieces of a message are put together, memory follows what really came */
 static void link_receive(pal_link *link, struct lws *wsi, const uint8_t *bytes, size_t n_byte)
 {
     link->count.bytes_in += n_byte;
     if (link->o.read_bytes_s > 0) link_spend(link, wsi, n_byte);
     if (lws_is_first_fragment(wsi)) {
-        link->n_in = 0;
+        link->in.n = 0;
         link->in_drop = false;
     }
-    const size_t wanted = link->n_in + n_byte;
-    if (!link->in_drop && wanted > link->in_cap) {
-        const size_t cap = wanted > 2 * link->in_cap ? wanted : 2 * link->in_cap;
-        uint8_t *grown = wanted <= LINK_MESSAGE_MAX ? realloc(link->in, cap) : NULL;
-        link->in_drop = grown == NULL;
-        if (grown) link->in = grown, link->in_cap = cap;
-    }
-    if (!link->in_drop) {
-        memcpy(link->in + link->n_in, bytes, n_byte);
-        link->n_in += n_byte;
-    }
+    link->in_drop = link->in_drop || !link_bytes_append(&link->in, bytes, n_byte, LINK_MESSAGE_MAX);
     if (!lws_is_final_fragment(wsi) || lws_remaining_packet_payload(wsi) > 0) return;
     if (link->in_drop)
         link_fault(link, PAL_REFUSAL_LONG);
@@ -358,7 +340,7 @@ static void link_receive(pal_link *link, struct lws *wsi, const uint8_t *bytes, 
         link_binary(link);
     else
         link_text(link);
-    link->n_in = 0;
+    link->in.n = 0;
 }
 
 static void link_established(pal_link *link, struct lws *wsi)

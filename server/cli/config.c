@@ -70,22 +70,17 @@ pal_err pal_config_set(pal_config *config, const char *key, const char *text, co
 /* a value of the file as text; NULL: of the wrong kind, and *fault says so */
 static const char *text_of(const cJSON *item, pal_flag_kind kind, char number[32], const char **fault)
 {
-    switch (kind) {
-    case PAL_FLAG_SWITCH:
+    if (kind == PAL_FLAG_SWITCH) {
         *fault = "is not true or false";
         return cJSON_IsBool(item) ? cJSON_IsTrue(item) ? "true" : "false" : NULL;
-    case PAL_FLAG_TEXT:
-    case PAL_FLAG_WORD:
+    }
+    if (kind == PAL_FLAG_TEXT || kind == PAL_FLAG_WORD) {
         *fault = "is not a text";
-        return cJSON_IsString(item) ? item->valuestring : NULL;
-    case PAL_FLAG_NUMBER:
-    case PAL_FLAG_COUNT:
-        break;
+        return cJSON_GetStringValue(item);
     }
     *fault = "is not a number";
-    if (!cJSON_IsNumber(item)) return NULL;
     snprintf(number, 32, "%.17g", item->valuedouble);
-    return number;
+    return cJSON_IsNumber(item) ? number : NULL;
 }
 
 static pal_err read_keys(pal_config *config, const char *name, const cJSON *root, pal_diagnostic *diag)

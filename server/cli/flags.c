@@ -80,17 +80,12 @@ static void list_flags(parse *p)
         flag->name = p->name[k], flag->kind = PAL_FLAG_TEXT;
         flag++->out = &p->given[k];
     }
-    if (p->table->config)
-        *flag++ = (pal_flag){"--config",
-                             "FILE",
-                             PAL_FLAG_TEXT,
-                             &p->config_file,
-                             0,
-                             0,
-                             "JSON file of these keys (PALPATE_CONFIG, or none)"};
-    *flag++ = (pal_flag){
-        "--json", NULL, PAL_FLAG_SWITCH, &p->common->json, 0, 0, "one JSON object on stdout and nothing else"};
-    *flag++ = (pal_flag){"--quiet", NULL, PAL_FLAG_SWITCH, &p->common->quiet, 0, 0, "print nothing but a refusal"};
+    const char *keys = "JSON file of these keys (PALPATE_CONFIG, or none)";
+    const pal_flag last[] = {
+        {"--config", "FILE", PAL_FLAG_TEXT, &p->config_file, 0, 0, keys},
+        {"--json", NULL, PAL_FLAG_SWITCH, &p->common->json, 0, 0, "one JSON object on stdout and nothing else"},
+        {"--quiet", NULL, PAL_FLAG_SWITCH, &p->common->quiet, 0, 0, "print nothing but a refusal"}};
+    for (int k = p->table->config ? 0 : 1; k < 3; k++) *flag++ = last[k];
     p->n_flag = (int)(flag - p->flag);
 }
 
