@@ -1,9 +1,8 @@
-/* Little-endian numbers in byte buffers, the same on any host, and heads of binary messages. Private to this room. */
+/* Little-endian numbers in byte buffers, the same on any host. Private to this room. */
 #ifndef PAL_PROTOCOL_BYTES_H
 #define PAL_PROTOCOL_BYTES_H
-#include "protocol/wire.h"
-
 #include <endian.h>
+#include <stdint.h>
 #include <string.h>
 
 static inline void pal_put_u16(uint8_t *b, uint16_t v)
@@ -59,11 +58,4 @@ static inline double pal_get_f64(const uint8_t *b)
     memcpy(&v, &bits, sizeof v);
     return v;
 }
-
-/* writes a head; returns the place behind it */
-uint8_t *pal_put_head(uint8_t *at, uint8_t kind, uint8_t flags, uint16_t index);
-/* head of a message of one kind with no other flags than these */
-int pal_get_head(const uint8_t *bytes, size_t n_byte, uint8_t kind, uint8_t flags, pal_wire_head *out);
-/* SHORT or LONG where n_byte is not what is wanted */
-int pal_check_size(size_t n_byte, size_t wanted);
 #endif

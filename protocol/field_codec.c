@@ -61,7 +61,7 @@ int pal_field_put(const float *value, pal_field_head *head, uint8_t *work, uint8
     head->low = low;
     head->high = high;
     head->n_lz4 = (uint32_t)packed;
-    pal_put_head(dst, PAL_WIRE_FIELD, 0, head->part);
+    pal_wire_put_head(dst, PAL_WIRE_FIELD, 0, head->part);
     pal_put_u32(dst + 8, head->epoch);
     pal_put_u32(dst + 12, (uint32_t)head->field);
     pal_put_u64(dst + 16, head->sim_time_us);
@@ -76,7 +76,7 @@ int pal_field_put(const float *value, pal_field_head *head, uint8_t *work, uint8
 int pal_field_get_head(const uint8_t *bytes, size_t n_byte, pal_field_head *out)
 {
     pal_wire_head wire;
-    int refusal = pal_get_head(bytes, n_byte, PAL_WIRE_FIELD, 0, &wire);
+    int refusal = pal_wire_get_head_of(bytes, n_byte, PAL_WIRE_FIELD, 0, &wire);
     if (refusal) return refusal;
     if (n_byte < PAL_FIELD_HEAD_BYTES) return PAL_REFUSAL_SHORT;
     uint32_t field = pal_get_u32(bytes + 12);
@@ -92,7 +92,7 @@ int pal_field_get_head(const uint8_t *bytes, size_t n_byte, pal_field_head *out)
     if (h.part >= PAL_WIRE_PART_MAX || !known(field) || h.sim_time_us >= STAMP_MAX || !(h.low <= h.high))
         return PAL_REFUSAL_RANGE;
     if (h.n_vertex == 0 || h.n_vertex > PAL_WIRE_VERTEX_MAX) return PAL_REFUSAL_COUNT;
-    refusal = pal_check_size(n_byte - PAL_FIELD_HEAD_BYTES, h.n_lz4);
+    refusal = pal_wire_check_size(n_byte - PAL_FIELD_HEAD_BYTES, h.n_lz4);
     if (!refusal) *out = h;
     return refusal;
 }

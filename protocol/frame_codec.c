@@ -372,7 +372,7 @@ static size_t write_body(const pal_frame_encoder *e)
 
 static void write_head(uint8_t *dst, const pal_frame_head *head)
 {
-    pal_put_head(dst, PAL_WIRE_FRAME, head->flags, head->part);
+    pal_wire_put_head(dst, PAL_WIRE_FRAME, head->flags, head->part);
     pal_put_u32(dst + 8, head->epoch);
     pal_put_u32(dst + 12, head->seq);
     pal_put_u64(dst + 16, head->sim_time_us);
@@ -446,7 +446,7 @@ int pal_frame_put(pal_frame_encoder *e, const pal_frame_input *given, uint8_t *d
 int pal_frame_get_head(const uint8_t *bytes, size_t n_byte, pal_frame_head *out)
 {
     pal_wire_head wire;
-    int refusal = pal_get_head(bytes, n_byte, PAL_WIRE_FRAME, PAL_FRAME_FLAGS, &wire);
+    int refusal = pal_wire_get_head_of(bytes, n_byte, PAL_WIRE_FRAME, PAL_FRAME_FLAGS, &wire);
     if (refusal) return refusal;
     size_t at = PAL_FRAME_HEAD_BYTES + (wire.flags ? PAL_FRAME_AFFINE_BYTES : 0);
     if (n_byte < at) return PAL_REFUSAL_SHORT;
