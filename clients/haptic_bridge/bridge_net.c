@@ -43,20 +43,16 @@ struct pal_bridge_net {
     pal_bridge_net_counts count;
 };
 
-static void net_round_trip(pal_bridge_net *n, uint32_t echo_seq, uint64_t echo_us, uint32_t hold_us)
-{
-    const uint64_t now_us = pal_clock_ns() / 1000;
-    if (echo_seq == 0 || echo_seq == n->echo_seq || echo_us + hold_us > now_us) return;
-    n->echo_seq = echo_seq;
-    pal_jitter_add(&n->count.rtt, (now_us - echo_us - hold_us) * 1000);
-}
-
 static void net_model(pal_bridge_net *n, const pal_wire_haptic *model)
 {
     n->count.n_model++;
     n->model_ns = pal_clock_ns();
     n->model_newest = model->seq;
-    net_round_trip(n, model->echo_seq, model->echo_stamp_us, model->hold_us);
+    const uint64_t now_us = n->model_ns / 1000, back_us = model->echo_stamp_us + model->hold_us;
+    if (model->echo_seq != 0 && model->echo_seq != n->echo_seq && back_us <= now_us) {
+        n->echo_seq = model->echo_seq;
+        pal_jitter_add(&n->count.rtt, (now_us - back_us) * 1000);
+    }
     pal_servo_put_model(n->servo, model, n->generation, pal_clock_now_ns(n->o.servo.clock));
 }
 

@@ -68,11 +68,6 @@ static double acceptance_temperature(const walk *w)
     return w->t0 * cool(w->o->cost_scale * rate(w->o), w->n, w->k_accept, ANNEAL_COLDEST);
 }
 
-static bool has_value(double cost)
-{
-    return isfinite(cost) && cost < DBL_MAX;
-}
-
 static uint64_t key_of(const walk *w, int64_t number)
 {
     return pal_random_bits(w->o->seed, (uint64_t)number);
@@ -118,7 +113,7 @@ static pal_err evaluate(walk *w, int m)
     w->r->n_spent += m;
     PAL_TRY(w->o->evaluate(w->o->user, w->p, m, w->cost));
     for (int j = 0; j < m; j++)
-        if (!has_value(w->cost[j])) w->cost[j] = DBL_MAX;
+        if (!isfinite(w->cost[j])) w->cost[j] = DBL_MAX;
     return PAL_ERR_OK;
 }
 

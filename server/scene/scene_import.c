@@ -281,12 +281,6 @@ static pal_err hold_an_eighth(const pal_cells *cells, const double up[3], double
     return PAL_ERR_OK;
 }
 
-/* as many levels as run in real time; cells that are no hexahedra need one */
-static int choose_levels(const pal_cells *cells)
-{
-    return cells->n_cell <= PAL_WANTED_ELEMENTS / 64 ? 2 : 1;
-}
-
 /* one body with defaults around the prepared mesh in mesh[0], or, where report is NULL, the control cells in cells[0]
  */
 static pal_err make_body(pal_loaded_scene *loaded, const char *name, const pal_surface_scene *options,
@@ -307,11 +301,12 @@ static pal_err make_body(pal_loaded_scene *loaded, const char *name, const pal_s
     else
         pal_body_default(body, plain, &loaded->mesh[0]);
     if (!options->gravity) leave_gravity_out(body);
-    if (cells)
-        PAL_TRY(pal_entry_put_number(&body->model, "levels", options->n_level ? options->n_level : choose_levels(cells),
-                                     diag));
-    else
-        PAL_TRY(choose_model(body, options, report, diag));
+    /* as many levels as run in real time; cells that are no hexahedra need one */
+    const int n_level = options->n_level                                     ? options->n_level
+                        : cells && cells->n_cell <= PAL_WANTED_ELEMENTS / 64 ? 2
+                                                                             : 1;
+    PAL_TRY(cells ? pal_entry_put_number(&body->model, "levels", n_level, diag)
+                  : choose_model(body, options, report, diag));
     /* a body at rest costs nothing until it is touched */
     pal_entry_init(&body->effect[body->n_effect++], "", "sleep");
     for (int k = 0; k < body->n_effect; k++) snprintf(body->effect[k].path, PAL_ENTRY_TEXT, "bodies[0].effects[%d]", k);
