@@ -23,7 +23,6 @@ typedef struct client_part {
 } client_part;
 
 struct pal_scripted_client {
-    pal_link_loop *loop;
     pal_asset_store *store;
     pal_scripted_client_options options;
     pal_link *link;
@@ -552,7 +551,6 @@ pal_err pal_scripted_client_open(pal_link_loop *loop, pal_asset_store *store,
     static const pal_link_events events = {client_on_state, client_on_control, client_on_message, client_on_fault};
     pal_scripted_client *t = calloc(1, sizeof *t);
     if (!t) return PAL_ERR_MEMORY;
-    t->loop = loop;
     t->store = store;
     t->options = *options;
     t->result.tool = PAL_WIRE_TOOL_NONE;

@@ -23,7 +23,6 @@ struct pal_solution {
     pal_locate *locate;
     pal_body *body;
     bool hex;
-    const char *element;
 };
 
 /* input of every function of one solve */
@@ -254,7 +253,6 @@ static pal_err prepare(const job *j, const pal_surface *surface)
     PAL_TRY(make_world(j));
     const pal_body *b = s->body;
     s->hex = b->n_corner == 8;
-    s->element = o->element;
     j->result->n_node = b->n_node;
     j->result->n_element = b->n_element;
     j->result->edge_m = b->edge_m;
