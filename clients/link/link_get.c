@@ -30,6 +30,7 @@ static void link_get_end(link_get *get, int status, const char *reason)
 bool link_bytes_append(link_bytes *to, const void *bytes, size_t n_byte, size_t max)
 {
     if (n_byte > max - to->n) return false;
+    if (n_byte == 0) return true;
     if (to->n + n_byte > to->cap) {
         const size_t wanted = to->n + n_byte, cap = wanted > 2 * to->cap ? wanted : 2 * to->cap;
         uint8_t *grown = realloc(to->at, cap);
