@@ -7,11 +7,11 @@
 
 #include "protocol/bytes.h"
 #include "protocol/planes.h"
-#include "protocol/sha256.h"
 
 #include <lz4.h>
 #include <lz4hc.h>
 #include <math.h>
+#include <openssl/sha.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -122,27 +122,14 @@ static int read_head(const uint8_t *bytes, size_t n_byte, uint32_t head[10])
 
 static int allocate(const uint32_t head[10], pal_asset **out)
 {
-    size_t n = head[2];
     pal_asset *a = calloc(1, sizeof *a);
-    pal_frame_order *o = calloc(1, sizeof *o);
-    if (!a || !o) {
-        free(a);
-        free(o);
-        return PAL_REFUSAL_MEMORY;
-    }
-    a->order = o;
+    if (!a) return PAL_REFUSAL_MEMORY;
     a->n_triangle = head[3];
-    o->n_vertex = head[2];
-    o->n_level = head[4];
-    a->rest_m = malloc(3 * n * sizeof *a->rest_m);
+    a->order = pal_frame_order_allocate(head[2], head[4]);
+    a->rest_m = malloc(3 * (size_t)head[2] * sizeof *a->rest_m);
     a->triangle = malloc((3 * (size_t)head[3] + 1) * sizeof *a->triangle);
-    o->vertex_of = malloc(n * sizeof *o->vertex_of);
-    o->neighbour = malloc(4 * n * sizeof *o->neighbour);
-    o->weight = malloc(4 * n * sizeof *o->weight);
-    o->level_begin = malloc(((size_t)head[4] + 1) * sizeof *o->level_begin);
     *out = a;
-    return a->rest_m && a->triangle && o->vertex_of && o->neighbour && o->weight && o->level_begin ? PAL_REFUSAL_NONE
-                                                                                                   : PAL_REFUSAL_MEMORY;
+    return a->order && a->rest_m && a->triangle ? PAL_REFUSAL_NONE : PAL_REFUSAL_MEMORY;
 }
 
 static void read_planes(const uint8_t *at, pal_asset *a)
@@ -220,7 +207,7 @@ void pal_asset_destroy(pal_asset *asset)
 
 void pal_asset_hash(const uint8_t *bytes, size_t n_byte, char hash[PAL_ASSET_HASH_CHARS])
 {
-    uint8_t digest[32];
-    pal_sha256(bytes, n_byte, digest);
+    uint8_t digest[SHA256_DIGEST_LENGTH];
+    SHA256(bytes, n_byte, digest);
     for (int i = 0; i < PAL_ASSET_HASH_CHARS / 2; i++) snprintf(hash + 2 * i, 3, "%02x", digest[i]);
 }

@@ -28,6 +28,6 @@ int pal_asset_encode(const float *rest_m, const pal_frame_order *order, const ui
 int pal_asset_decode(const uint8_t *bytes, size_t n_byte, pal_asset **out);
 void pal_asset_destroy(pal_asset *asset); /* NULL allowed */
 
-/* the name of an encoded asset */
+/* the name of an encoded asset: SHA-256 (FIPS 180-4, by OpenSSL), its first 128 bits in hexadecimal digits */
 void pal_asset_hash(const uint8_t *bytes, size_t n_byte, char hash[PAL_ASSET_HASH_CHARS]);
 #endif

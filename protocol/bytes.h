@@ -1,21 +1,24 @@
 /* Little-endian numbers in byte buffers, the same on any host. Private to this room. */
 #ifndef PAL_PROTOCOL_BYTES_H
 #define PAL_PROTOCOL_BYTES_H
+#include <endian.h>
 #include <stdint.h>
 #include <string.h>
 
 static inline void pal_put_u16(uint8_t *b, uint16_t v)
 {
-    b[0] = (uint8_t)v;
-    b[1] = (uint8_t)(v >> 8);
+    v = htole16(v);
+    memcpy(b, &v, sizeof v);
 }
 static inline void pal_put_u32(uint8_t *b, uint32_t v)
 {
-    for (int i = 0; i < 4; i++) b[i] = (uint8_t)(v >> (8 * i));
+    v = htole32(v);
+    memcpy(b, &v, sizeof v);
 }
 static inline void pal_put_u64(uint8_t *b, uint64_t v)
 {
-    for (int i = 0; i < 8; i++) b[i] = (uint8_t)(v >> (8 * i));
+    v = htole64(v);
+    memcpy(b, &v, sizeof v);
 }
 static inline void pal_put_f32(uint8_t *b, float v)
 {
@@ -25,15 +28,21 @@ static inline void pal_put_f32(uint8_t *b, float v)
 }
 static inline uint16_t pal_get_u16(const uint8_t *b)
 {
-    return (uint16_t)(b[0] | b[1] << 8);
+    uint16_t v;
+    memcpy(&v, b, sizeof v);
+    return le16toh(v);
 }
 static inline uint32_t pal_get_u32(const uint8_t *b)
 {
-    return b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
+    uint32_t v;
+    memcpy(&v, b, sizeof v);
+    return le32toh(v);
 }
 static inline uint64_t pal_get_u64(const uint8_t *b)
 {
-    return pal_get_u32(b) | (uint64_t)pal_get_u32(b + 4) << 32;
+    uint64_t v;
+    memcpy(&v, b, sizeof v);
+    return le64toh(v);
 }
 static inline float pal_get_f32(const uint8_t *b)
 {

@@ -12,6 +12,25 @@
 enum { DEPTH_MAX = 8, VALUES_IN = 256, VALUES_OUT = 4096 };
 #define INTEGER_MAX 9007199254740992.0 /* 2^53 */
 
+/* one value of a struct, and the bytes that it has there */
+typedef union scalar {
+    uint16_t u16;
+    uint32_t u32;
+    uint64_t u64;
+    double f64;
+    bool flag;
+    pal_wire_role role;
+    int tool;
+} scalar;
+static const size_t size_of[] = {[U16] = 2,
+                                 [U32] = 4,
+                                 [U64] = 8,
+                                 [F64] = 8,
+                                 [NUMBER_OR_NAN] = 8,
+                                 [BOOL] = sizeof(bool),
+                                 [ROLE] = sizeof(pal_wire_role),
+                                 [TOOL] = sizeof(int)};
+
 static const char *const role_name[PAL_WIRE_ROLE_COUNT] = {"viewer", "trainee", "instructor"};
 
 const char *pal_wire_role_name(pal_wire_role role)
@@ -52,8 +71,6 @@ static bool good_text(const char *text, size_t n)
     }
     return true;
 }
-
-/* ---- writer ---- */
 
 typedef struct writer {
     char *dst;
@@ -128,40 +145,19 @@ static void add_key(writer *w, const char *key, bool first)
 
 static void add_scalar(writer *w, const pal_control_field *f, const uint8_t *at)
 {
-    uint16_t u16;
-    uint32_t u32;
-    uint64_t u64;
-    double f64;
-    pal_wire_role role;
-    int tool;
-    switch (f->type) {
-    case U16:
-        memcpy(&u16, at, sizeof u16);
-        add_number(w, u16);
-        break;
-    case U32:
-        memcpy(&u32, at, sizeof u32);
-        add_number(w, u32);
-        break;
-    case U64:
-        memcpy(&u64, at, sizeof u64);
-        if (u64 > (uint64_t)INTEGER_MAX) w->refusal = PAL_REFUSAL_RANGE;
-        add_number(w, (double)u64);
-        break;
-    case F64:
-    case NUMBER_OR_NAN:
-        memcpy(&f64, at, sizeof f64);
-        add_number(w, f64);
-        break;
-    case ROLE:
-        memcpy(&role, at, sizeof role);
-        if ((unsigned)role >= PAL_WIRE_ROLE_COUNT) w->refusal = PAL_REFUSAL_RANGE;
-        add_text(w, pal_wire_role_name(role), PAL_WIRE_NAME_BYTES);
-        break;
-    default:
-        memcpy(&tool, at, sizeof tool);
-        add_tool(w, tool);
-    }
+    scalar v = {.u64 = 0};
+    memcpy(&v, at, size_of[f->type]);
+    if ((f->type == U64 && v.u64 > (uint64_t)INTEGER_MAX) ||
+        (f->type == ROLE && (unsigned)v.role >= PAL_WIRE_ROLE_COUNT))
+        w->refusal = PAL_REFUSAL_RANGE;
+    if (f->type == BOOL)
+        add(w, v.flag ? "true" : "false", v.flag ? 4 : 5);
+    else if (f->type == ROLE)
+        add_text(w, pal_wire_role_name(v.role), PAL_WIRE_NAME_BYTES);
+    else if (f->type == TOOL)
+        add_tool(w, v.tool);
+    else
+        add_number(w, f->type == U16 ? v.u16 : f->type == U32 ? v.u32 : f->type == U64 ? (double)v.u64 : v.f64);
 }
 
 static void add_fields(writer *w, const pal_control_field *f, const uint8_t *base, bool first);
@@ -172,7 +168,7 @@ static void add_list(writer *w, const pal_control_field *f, const uint8_t *base)
     const uint8_t *at = base + f->offset;
     add(w, f->type == ARGS ? "{" : "[", 1);
     for (uint32_t i = 0; i < n && !w->refusal; i++) {
-        if (i && f->type != ARGS) add(w, ",", 1);
+        if (i) add(w, ",", 1);
         if (f->type == NUMBERS) {
             add_number(w, ((const double *)(const void *)at)[i]);
         } else if (f->type == TEXTS || f->type == TEXTS_OR_EMPTY) {
@@ -183,7 +179,6 @@ static void add_list(writer *w, const pal_control_field *f, const uint8_t *base)
             add(w, "}", 1);
         } else {
             const pal_wire_arg *arg = (const pal_wire_arg *)(const void *)at + i;
-            if (i) add(w, ",", 1);
             add_text(w, arg->key, sizeof arg->key);
             add(w, ":", 1);
             add_number(w, arg->value);
@@ -195,7 +190,6 @@ static void add_list(writer *w, const pal_control_field *f, const uint8_t *base)
 /* what nobody said is not written */
 static bool left_out(const pal_control_field *f, const uint8_t *base)
 {
-    static const size_t size[] = {[U16] = 2, [U32] = 4, [U64] = 8, [F64] = 8, [BOOL] = sizeof(bool)};
     static const uint8_t zero[8] = {0};
     uint32_t n = 1;
     double value = 0;
@@ -205,7 +199,7 @@ static bool left_out(const pal_control_field *f, const uint8_t *base)
         memcpy(&value, base + f->offset, sizeof value);
         return isnan(value);
     }
-    if (f->type <= BOOL) return memcmp(base + f->offset, zero, size[f->type]) == 0;
+    if (f->type <= BOOL) return memcmp(base + f->offset, zero, size_of[f->type]) == 0;
     if (f->type == OBJECTS || f->type == NUMBERS || f->type == TEXTS_OR_EMPTY) memcpy(&n, base + f->count, sizeof n);
     return n == 0;
 }
@@ -216,11 +210,7 @@ static void add_fields(writer *w, const pal_control_field *f, const uint8_t *bas
         if (left_out(f, base)) continue;
         add_key(w, f->key, first);
         first = false;
-        if (f->type == BOOL) {
-            bool value;
-            memcpy(&value, base + f->offset, sizeof value);
-            add(w, value ? "true" : "false", value ? 4 : 5);
-        } else if (f->type == TEXT || f->type == TEXT_OR_EMPTY) {
+        if (f->type == TEXT || f->type == TEXT_OR_EMPTY) {
             add_text(w, (const char *)base + f->offset, f->size);
         } else if (f->type == OBJECT) {
             add(w, "{", 1);
@@ -238,19 +228,18 @@ int pal_control_put(char *dst, size_t cap, const pal_control *c, size_t *n_byte)
 {
     writer w = {dst, cap, 0, 0};
     if ((unsigned)c->type >= PAL_CONTROL_COUNT) return PAL_REFUSAL_KIND;
-    size_t limit = pal_control_message_table[c->type].from_server ? PAL_CONTROL_OUT_MAX : PAL_CONTROL_IN_MAX;
+    const pal_control_message *message = &pal_control_message_table[c->type];
+    size_t limit = message->from_server ? PAL_CONTROL_OUT_MAX : PAL_CONTROL_IN_MAX;
     if (w.cap > limit + 1) w.cap = limit + 1;
     if (w.cap == 0) return PAL_REFUSAL_SPACE;
     add(&w, "{\"type\":\"", 9);
-    add(&w, pal_control_message_table[c->type].name, strlen(pal_control_message_table[c->type].name));
+    add(&w, message->name, strlen(message->name));
     add(&w, "\"", 1);
-    add_fields(&w, pal_control_message_table[c->type].fields, (const uint8_t *)&c->hello, false);
+    add_fields(&w, message->fields, (const uint8_t *)&c->hello, false);
     add(&w, "}", 1);
     if (!w.refusal) *n_byte = w.n;
     return w.refusal;
 }
-
-/* ---- reader ---- */
 
 /* size of the structure without parsing it: nesting, number of values, UTF-8 */
 static int scan(const char *text, size_t n, uint32_t n_value_max)
@@ -323,32 +312,26 @@ static int read_role(const cJSON *item, pal_wire_role *out)
 static int read_scalar(const pal_control_field *f, const cJSON *item, uint8_t *at)
 {
     static const double max[] = {[U16] = 65535, [U32] = 4294967295.0, [U64] = INTEGER_MAX};
-    double v = 0;
+    double number = 0;
+    scalar v = {.u64 = 0};
     int refusal = 0;
-    if (f->type <= U64) {
-        refusal = read_integer(item, 0, max[f->type], &v);
-        const uint64_t u64 = (uint64_t)v;
-        const uint32_t u32 = (uint32_t)u64;
-        const uint16_t u16 = (uint16_t)u64;
-        if (f->type == U16) memcpy(at, &u16, sizeof u16);
-        if (f->type == U32) memcpy(at, &u32, sizeof u32);
-        if (f->type == U64) memcpy(at, &u64, sizeof u64);
-    } else if (f->type == F64 || f->type == NUMBER_OR_NAN) {
-        refusal = read_number(item, &v);
-        memcpy(at, &v, sizeof v);
-    } else if (f->type == BOOL) {
-        const bool value = cJSON_IsTrue(item);
-        if (!cJSON_IsBool(item)) return PAL_REFUSAL_FIELD;
-        memcpy(at, &value, sizeof value);
+    if (f->type == BOOL) {
+        v.flag = cJSON_IsTrue(item);
+        refusal = cJSON_IsBool(item) ? PAL_REFUSAL_NONE : PAL_REFUSAL_FIELD;
     } else if (f->type == ROLE) {
-        pal_wire_role role = PAL_WIRE_ROLE_VIEWER;
-        refusal = read_role(item, &role);
-        memcpy(at, &role, sizeof role);
+        refusal = read_role(item, &v.role);
+    } else if (f->type == TOOL) {
+        refusal = read_integer(item, PAL_WIRE_TOOL_ANY, PAL_WIRE_TOOL_MAX - 1, &number);
+        v.tool = (int)number;
+    } else if (f->type == F64 || f->type == NUMBER_OR_NAN) {
+        refusal = read_number(item, &v.f64);
     } else {
-        refusal = read_integer(item, PAL_WIRE_TOOL_ANY, PAL_WIRE_TOOL_MAX - 1, &v);
-        const int tool = (int)v;
-        memcpy(at, &tool, sizeof tool);
+        refusal = read_integer(item, 0, max[f->type], &number);
+        if (f->type == U16) v.u16 = (uint16_t)number;
+        if (f->type == U32) v.u32 = (uint32_t)number;
+        if (f->type == U64) v.u64 = (uint64_t)number;
     }
+    if (!refusal) memcpy(at, &v, size_of[f->type]);
     return refusal;
 }
 

@@ -61,10 +61,7 @@ int pal_field_put(const float *value, pal_field_head *head, uint8_t *work, uint8
     head->low = low;
     head->high = high;
     head->n_lz4 = (uint32_t)packed;
-    memset(dst, 0, PAL_FIELD_HEAD_BYTES);
-    pal_put_u32(dst, PAL_WIRE_MAGIC);
-    dst[4] = PAL_WIRE_FIELD;
-    pal_put_u16(dst + 6, head->part);
+    pal_wire_put_head(dst, PAL_WIRE_FIELD, 0, head->part);
     pal_put_u32(dst + 8, head->epoch);
     pal_put_u32(dst + 12, (uint32_t)head->field);
     pal_put_u64(dst + 16, head->sim_time_us);
@@ -79,10 +76,8 @@ int pal_field_put(const float *value, pal_field_head *head, uint8_t *work, uint8
 int pal_field_get_head(const uint8_t *bytes, size_t n_byte, pal_field_head *out)
 {
     pal_wire_head wire;
-    int refusal = pal_wire_get_head(bytes, n_byte, &wire);
+    int refusal = pal_wire_get_head_of(bytes, n_byte, PAL_WIRE_FIELD, 0, &wire);
     if (refusal) return refusal;
-    if (wire.kind != PAL_WIRE_FIELD) return PAL_REFUSAL_KIND;
-    if (wire.flags) return PAL_REFUSAL_FLAGS;
     if (n_byte < PAL_FIELD_HEAD_BYTES) return PAL_REFUSAL_SHORT;
     uint32_t field = pal_get_u32(bytes + 12);
     pal_field_head h = {.part = wire.index,
@@ -93,15 +88,13 @@ int pal_field_get_head(const uint8_t *bytes, size_t n_byte, pal_field_head *out)
                         .high = pal_get_f32(bytes + 28),
                         .n_vertex = pal_get_u32(bytes + 32),
                         .n_lz4 = pal_get_u32(bytes + 36)};
-    size_t rest = n_byte - PAL_FIELD_HEAD_BYTES;
     if (!isfinite(h.low) || !isfinite(h.high)) return PAL_REFUSAL_NAN;
     if (h.part >= PAL_WIRE_PART_MAX || !known(field) || h.sim_time_us >= STAMP_MAX || !(h.low <= h.high))
         return PAL_REFUSAL_RANGE;
     if (h.n_vertex == 0 || h.n_vertex > PAL_WIRE_VERTEX_MAX) return PAL_REFUSAL_COUNT;
-    if (h.n_lz4 > rest) return PAL_REFUSAL_SHORT;
-    if (h.n_lz4 < rest) return PAL_REFUSAL_LONG;
-    *out = h;
-    return 0;
+    refusal = pal_wire_check_size(n_byte - PAL_FIELD_HEAD_BYTES, h.n_lz4);
+    if (!refusal) *out = h;
+    return refusal;
 }
 
 int pal_field_get(const uint8_t *bytes, size_t n_byte, uint32_t n_vertex, pal_field_head *head, uint8_t *level)

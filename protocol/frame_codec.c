@@ -315,11 +315,7 @@ typedef struct bit_writer {
 
 static inline void flush(bit_writer *w)
 {
-#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
-    memcpy(w->at, &w->word, 8);
-#else
     pal_put_u64(w->at, w->word);
-#endif
     w->at += w->n >> 3;
     w->word >>= w->n & ~7u;
     w->n &= 7;
@@ -376,10 +372,7 @@ static size_t write_body(const pal_frame_encoder *e)
 
 static void write_head(uint8_t *dst, const pal_frame_head *head)
 {
-    pal_put_u32(dst, PAL_WIRE_MAGIC);
-    dst[4] = PAL_WIRE_FRAME;
-    dst[5] = head->flags;
-    pal_put_u16(dst + 6, head->part);
+    pal_wire_put_head(dst, PAL_WIRE_FRAME, head->flags, head->part);
     pal_put_u32(dst + 8, head->epoch);
     pal_put_u32(dst + 12, head->seq);
     pal_put_u64(dst + 16, head->sim_time_us);
@@ -453,10 +446,8 @@ int pal_frame_put(pal_frame_encoder *e, const pal_frame_input *given, uint8_t *d
 int pal_frame_get_head(const uint8_t *bytes, size_t n_byte, pal_frame_head *out)
 {
     pal_wire_head wire;
-    int refusal = pal_wire_get_head(bytes, n_byte, &wire);
+    int refusal = pal_wire_get_head_of(bytes, n_byte, PAL_WIRE_FRAME, PAL_FRAME_FLAGS, &wire);
     if (refusal) return refusal;
-    if (wire.kind != PAL_WIRE_FRAME) return PAL_REFUSAL_KIND;
-    if (wire.flags & ~PAL_FRAME_FLAGS) return PAL_REFUSAL_FLAGS;
     size_t at = PAL_FRAME_HEAD_BYTES + (wire.flags ? PAL_FRAME_AFFINE_BYTES : 0);
     if (n_byte < at) return PAL_REFUSAL_SHORT;
     pal_frame_head head = {.part = wire.index,
@@ -507,20 +498,9 @@ void pal_frame_decoder_destroy(pal_frame_decoder *d)
     free(d);
 }
 
-static inline uint64_t load64(const uint8_t *b)
-{
-#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
-    uint64_t word;
-    memcpy(&word, b, 8);
-    return word;
-#else
-    return pal_get_u64(b);
-#endif
-}
-
 static inline uint64_t bits_at(const uint8_t *codes, size_t bit)
 {
-    return load64(codes + (bit >> 3)) >> (bit & 7);
+    return pal_get_u64(codes + (bit >> 3)) >> (bit & 7);
 }
 
 /* three codes from bit position `bit`; returns the position behind, 0 for a code that is none */

@@ -26,8 +26,9 @@ typedef struct graph { /* undirected, both directions stored */
 
 typedef struct builder {
     uint32_t n;
-    const float *rest; /* [n][3] */
-    pal_frame_order *order;
+    const float *rest;   /* [n][3] */
+    uint32_t *neighbour; /* predictors by vertex, of vertices; GONE: none [n][4] */
+    int16_t *weight;     /* [n][4] */
     graph now, next;
     uint32_t *active, n_active; /* vertices not yet peeled      [n] */
     uint32_t *target;           /* where a peeled vertex went, itself while active [n] */
@@ -115,9 +116,10 @@ static bool quantise(const double *y, double sum, int n, int16_t *weight)
 }
 
 /* predictor of vertex v from candidates [n]: four vertices and weights */
-static void predict(const builder *b, uint32_t v, const uint32_t *candidate, int n, uint32_t *neighbour,
-                    int16_t *weight)
+static void predict(const builder *b, uint32_t v, const uint32_t *candidate, int n)
 {
+    uint32_t *neighbour = b->neighbour + 4 * (size_t)v;
+    int16_t *weight = b->weight + 4 * (size_t)v;
     double d[N_CANDIDATE][3], m[N_CANDIDATE][N_CANDIDATE], y[4], s2 = 0;
     int pick[4] = {0, 1, 2, 3}, n_pick = n < 4 ? n : 4;
     for (int j = 0; j < 4; j++) neighbour[j] = GONE, weight[j] = 0;
@@ -253,7 +255,7 @@ static bool peel(builder *b)
         int n = 0;
         for (uint32_t e = b->now.begin[v]; e < b->now.begin[v + 1]; e++)
             offer(candidate, far, &n, b->now.to[e], distance2(b, v, b->now.to[e]));
-        predict(b, v, candidate, n, b->order->neighbour + 4 * (size_t)v, b->order->weight + 4 * (size_t)v);
+        predict(b, v, candidate, n);
         b->target[v] = candidate[0];
     }
     uint32_t n_kept = 0;
@@ -277,24 +279,16 @@ static void finish_base(builder *b)
         int n = 0;
         for (uint32_t k = i < BASE_WINDOW ? 0 : i - BASE_WINDOW; k < i; k++)
             offer(candidate, far, &n, b->active[k], distance2(b, v, b->active[k]));
-        predict(b, v, candidate, n, b->order->neighbour + 4 * (size_t)v, b->order->weight + 4 * (size_t)v);
+        predict(b, v, candidate, n);
     }
 }
 
 /* wire order: the base, then the levels from coarse to fine; predictors from vertices to wire indices */
-static int write_order(builder *b)
+static int write_order(const builder *b, pal_frame_order **out)
 {
-    pal_frame_order *o = b->order;
+    pal_frame_order *o = pal_frame_order_allocate(b->n, b->n_level + 1);
     uint32_t *rank = b->mark, at = 0;
-    size_t n4 = 4 * (size_t)b->n;
-    uint32_t *neighbour = malloc(n4 * sizeof *neighbour);
-    int16_t *weight = malloc(n4 * sizeof *weight);
-    o->level_begin = malloc(((size_t)b->n_level + 2) * sizeof *o->level_begin);
-    if (!neighbour || !weight || !o->level_begin) {
-        free(neighbour);
-        free(weight);
-        return PAL_REFUSAL_MEMORY;
-    }
+    if (!o) return PAL_REFUSAL_MEMORY;
     o->n_level = 0;
     if (b->n_active) o->level_begin[o->n_level++] = 0;
     memcpy(o->vertex_of, b->active, b->n_active * sizeof *o->vertex_of);
@@ -311,15 +305,12 @@ static int write_order(builder *b)
     for (uint32_t i = 0; i < b->n; i++) {
         size_t v = o->vertex_of[i];
         for (size_t j = 0; j < 4; j++) {
-            uint32_t from = o->neighbour[4 * v + j];
-            neighbour[4 * (size_t)i + j] = from == GONE ? 0 : rank[from];
-            weight[4 * (size_t)i + j] = o->weight[4 * v + j];
+            uint32_t from = b->neighbour[4 * v + j];
+            o->neighbour[4 * (size_t)i + j] = from == GONE ? 0 : rank[from];
+            o->weight[4 * (size_t)i + j] = b->weight[4 * v + j];
         }
     }
-    free(o->neighbour);
-    free(o->weight);
-    o->neighbour = neighbour;
-    o->weight = weight;
+    *out = o;
     return 0;
 }
 
@@ -357,12 +348,10 @@ static void first_graph(builder *b, const uint32_t *triangle, uint32_t n_triangl
 
 static bool allocate(builder *b, size_t n, size_t n_edge)
 {
-    pal_frame_order *o = b->order;
     bool good = true;
 #define TAKE(pointer, count) good &= (pointer = malloc(((count) + 1) * sizeof *(pointer))) != NULL
-    TAKE(o->vertex_of, n);
-    TAKE(o->neighbour, 4 * n);
-    TAKE(o->weight, 4 * n);
+    TAKE(b->neighbour, 4 * n);
+    TAKE(b->weight, 4 * n);
     TAKE(b->now.begin, n);
     TAKE(b->next.begin, n);
     TAKE(b->now.to, n_edge);
@@ -380,8 +369,9 @@ static bool allocate(builder *b, size_t n, size_t n_edge)
 
 static void release(builder *b)
 {
-    void *const block[] = {b->now.begin, b->next.begin, b->now.to, b->next.to,         b->active, b->target,
-                           b->mark,      b->sorted,     b->peeled, b->level_of_peeled, b->key};
+    void *const block[] = {b->now.begin, b->next.begin, b->now.to, b->next.to, b->active,
+                           b->target,    b->mark,       b->sorted, b->peeled,  b->level_of_peeled,
+                           b->key,       b->neighbour,  b->weight};
     for (size_t i = 0; i < sizeof block / sizeof *block; i++) free(block[i]);
 }
 
@@ -395,23 +385,15 @@ int pal_frame_order_create(const float *rest_m, uint32_t n_vertex, const uint32_
     for (size_t e = 0; !refusal && e < 3 * (size_t)n_triangle; e++)
         if (triangle[e] >= n_vertex) refusal = PAL_REFUSAL_RANGE;
     if (refusal) return refusal;
-
-    b.order = calloc(1, sizeof *b.order);
-    if (!b.order) return PAL_REFUSAL_MEMORY;
-    b.order->n_vertex = n_vertex;
     if (allocate(&b, n_vertex, 6 * (size_t)n_triangle)) {
         first_graph(&b, triangle, n_triangle);
         while (peel(&b)) continue;
         finish_base(&b);
-        refusal = write_order(&b);
+        refusal = write_order(&b, out);
     } else {
         refusal = PAL_REFUSAL_MEMORY;
     }
     release(&b);
-    if (refusal)
-        pal_frame_order_destroy(b.order);
-    else
-        *out = b.order;
     return refusal;
 }
 
@@ -433,19 +415,14 @@ static uint32_t midpoint_levels(const pal_frame_order *coarse, const uint32_t *p
     return n_level;
 }
 
-static int extend(const pal_frame_order *coarse, const uint32_t *parent, uint32_t n, pal_frame_order *o)
+static int extend(const pal_frame_order *coarse, const uint32_t *parent, uint32_t n, pal_frame_order **out)
 {
     const int16_t half[4] = {PAL_ORDER_ONE / 2, PAL_ORDER_ONE / 2, 0, 0};
     uint32_t n_coarse = coarse->n_vertex, *rank = malloc(n_coarse * sizeof *rank);
     if (!rank) return PAL_REFUSAL_MEMORY;
     for (uint32_t i = 0; i < n_coarse; i++) rank[coarse->vertex_of[i]] = i;
-    o->n_vertex = n;
-    o->n_level = midpoint_levels(coarse, parent, rank, n, NULL);
-    o->level_begin = malloc(((size_t)o->n_level + 1) * sizeof *o->level_begin);
-    o->vertex_of = malloc(n * sizeof *o->vertex_of);
-    o->neighbour = calloc(4 * (size_t)n, sizeof *o->neighbour);
-    o->weight = calloc(4 * (size_t)n, sizeof *o->weight);
-    if (!o->level_begin || !o->vertex_of || !o->neighbour || !o->weight) return free(rank), PAL_REFUSAL_MEMORY;
+    pal_frame_order *o = pal_frame_order_allocate(n, midpoint_levels(coarse, parent, rank, n, NULL));
+    if (!o) return free(rank), PAL_REFUSAL_MEMORY;
     memcpy(o->level_begin, coarse->level_begin, coarse->n_level * sizeof *o->level_begin);
     memcpy(o->vertex_of, coarse->vertex_of, n_coarse * sizeof *o->vertex_of);
     memcpy(o->neighbour, coarse->neighbour, 4 * (size_t)n_coarse * sizeof *o->neighbour);
@@ -460,13 +437,14 @@ static int extend(const pal_frame_order *coarse, const uint32_t *parent, uint32_
         memcpy(o->weight + 4 * (size_t)i, half, sizeof half);
     }
     free(rank);
+    *out = o;
     return 0;
 }
 
 int pal_frame_order_hierarchy(const float *rest_m, uint32_t n_vertex, uint32_t n_coarse, const uint32_t *parent,
                               const uint32_t *coarse_triangle, uint32_t n_coarse_triangle, pal_frame_order **out)
 {
-    pal_frame_order *coarse = NULL, *o = NULL;
+    pal_frame_order *coarse = NULL;
     if (n_coarse == 0 || n_coarse > n_vertex || n_vertex > PAL_ORDER_VERTEX_MAX) return PAL_REFUSAL_COUNT;
     for (uint32_t i = n_coarse; i < n_vertex; i++)
         for (int k = 0; k < 2; k++)
@@ -474,14 +452,25 @@ int pal_frame_order_hierarchy(const float *rest_m, uint32_t n_vertex, uint32_t n
     for (size_t i = 3 * (size_t)n_coarse; i < 3 * (size_t)n_vertex; i++)
         if (!isfinite(rest_m[i])) return PAL_REFUSAL_NAN;
     int refusal = pal_frame_order_create(rest_m, n_coarse, coarse_triangle, n_coarse_triangle, &coarse);
-    if (!refusal && !(o = calloc(1, sizeof *o))) refusal = PAL_REFUSAL_MEMORY;
-    if (!refusal) refusal = extend(coarse, parent, n_vertex, o);
+    if (!refusal) refusal = extend(coarse, parent, n_vertex, out);
     pal_frame_order_destroy(coarse);
-    if (refusal)
-        pal_frame_order_destroy(o);
-    else
-        *out = o;
     return refusal;
+}
+
+pal_frame_order *pal_frame_order_allocate(uint32_t n_vertex, uint32_t n_level)
+{
+    const size_t n = n_vertex;
+    pal_frame_order *o = calloc(1, sizeof *o);
+    if (!o) return NULL;
+    o->n_vertex = n_vertex;
+    o->n_level = n_level;
+    o->level_begin = malloc(((size_t)n_level + 1) * sizeof *o->level_begin);
+    o->vertex_of = malloc(n * sizeof *o->vertex_of);
+    o->neighbour = calloc(4 * n, sizeof *o->neighbour);
+    o->weight = calloc(4 * n, sizeof *o->weight);
+    if (o->level_begin && o->vertex_of && o->neighbour && o->weight) return o;
+    pal_frame_order_destroy(o);
+    return NULL;
 }
 
 void pal_frame_order_destroy(pal_frame_order *order)

@@ -36,6 +36,8 @@ int pal_frame_order_create(const float *rest_m, uint32_t n_vertex, const uint32_
  * pal_frame_order_create */
 int pal_frame_order_hierarchy(const float *rest_m, uint32_t n_vertex, uint32_t n_coarse, const uint32_t *parent,
                               const uint32_t *coarse_triangle, uint32_t n_coarse_triangle, pal_frame_order **out);
+/* [load] an order of so many vertices and levels to be filled, all predicted as rest; NULL: no memory */
+pal_frame_order *pal_frame_order_allocate(uint32_t n_vertex, uint32_t n_level);
 void pal_frame_order_destroy(pal_frame_order *order); /* NULL allowed */
 
 /* Checks all that a frame decoder trusts: vertex_of is a permutation, every neighbour is smaller than its own index,

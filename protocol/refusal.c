@@ -1,4 +1,3 @@
-/* The table of refusals as sentences. */
 #include "protocol/refusal.h"
 
 const char *pal_refusal_text(int code)

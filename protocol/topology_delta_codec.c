@@ -48,10 +48,7 @@ int pal_topology_delta_put(const uint32_t *slot, const uint32_t *table, pal_topo
                                       (int)(pal_topology_delta_bound(n) - PAL_TOPOLOGY_DELTA_HEAD_BYTES));
     if (packed <= 0) return PAL_REFUSAL_SPACE;
     head->n_lz4 = (uint32_t)packed;
-    pal_put_u32(dst, PAL_WIRE_MAGIC);
-    dst[4] = PAL_WIRE_TOPOLOGY_DELTA;
-    dst[5] = 0;
-    pal_put_u16(dst + 6, head->part);
+    pal_wire_put_head(dst, PAL_WIRE_TOPOLOGY_DELTA, 0, head->part);
     pal_put_u32(dst + 8, head->epoch);
     pal_put_u32(dst + 12, n);
     pal_put_u64(dst + 16, head->revision);
@@ -64,22 +61,19 @@ int pal_topology_delta_put(const uint32_t *slot, const uint32_t *table, pal_topo
 int pal_topology_delta_get_head(const uint8_t *bytes, size_t n_byte, pal_topology_delta_head *out)
 {
     pal_wire_head wire;
-    int refusal = pal_wire_get_head(bytes, n_byte, &wire);
+    int refusal = pal_wire_get_head_of(bytes, n_byte, PAL_WIRE_TOPOLOGY_DELTA, 0, &wire);
     if (refusal) return refusal;
-    if (wire.kind != PAL_WIRE_TOPOLOGY_DELTA) return PAL_REFUSAL_KIND;
-    if (wire.flags) return PAL_REFUSAL_FLAGS;
     if (n_byte < PAL_TOPOLOGY_DELTA_HEAD_BYTES) return PAL_REFUSAL_SHORT;
     pal_topology_delta_head h = {.part = wire.index,
                                  .epoch = pal_get_u32(bytes + 8),
                                  .n_changed = pal_get_u32(bytes + 12),
                                  .revision = pal_get_u64(bytes + 16),
                                  .n_lz4 = pal_get_u32(bytes + 28)};
-    size_t rest = n_byte - PAL_TOPOLOGY_DELTA_HEAD_BYTES;
     if (h.part >= PAL_WIRE_PART_MAX || h.revision >= REVISION_MAX) return PAL_REFUSAL_RANGE;
     if (h.n_changed == 0 || h.n_changed > PAL_TRIANGLE_SLOT_MAX) return PAL_REFUSAL_COUNT;
     if (pal_get_u32(bytes + 24) != PAL_TOPOLOGY_DELTA_WORK_BYTES(h.n_changed)) return PAL_REFUSAL_COUNT;
-    if (h.n_lz4 > rest) return PAL_REFUSAL_SHORT;
-    if (h.n_lz4 < rest) return PAL_REFUSAL_LONG;
+    refusal = pal_wire_check_size(n_byte - PAL_TOPOLOGY_DELTA_HEAD_BYTES, h.n_lz4);
+    if (refusal) return refusal;
     /* one byte of LZ4 gives at most 255 bytes */
     if (PAL_TOPOLOGY_DELTA_WORK_BYTES(h.n_changed) / 255 > h.n_lz4) return PAL_REFUSAL_COUNT;
     *out = h;

@@ -62,11 +62,11 @@ static const field patch_fields[] = {{PATCH(U16, id)},
                                      {PATCH(F32, radius_m)},
                                      {0}};
 
-static uint8_t *put_head(uint8_t *at, uint8_t kind, uint16_t index)
+uint8_t *pal_wire_put_head(uint8_t *at, uint8_t kind, uint8_t flags, uint16_t index)
 {
     pal_put_u32(at, PAL_WIRE_MAGIC);
     at[4] = kind;
-    at[5] = 0;
+    at[5] = flags;
     pal_put_u16(at + 6, index);
     return at + PAL_WIRE_HEAD_BYTES;
 }
@@ -121,20 +121,26 @@ int pal_wire_get_head(const uint8_t *bytes, size_t n_byte, pal_wire_head *out)
     return 0;
 }
 
+int pal_wire_get_head_of(const uint8_t *bytes, size_t n_byte, uint8_t kind, uint8_t flags, pal_wire_head *out)
+{
+    int refusal = pal_wire_get_head(bytes, n_byte, out);
+    if (!refusal && out->kind != kind) refusal = PAL_REFUSAL_KIND;
+    if (!refusal && out->flags & ~flags) refusal = PAL_REFUSAL_FLAGS;
+    return refusal;
+}
+
 /* head of a message of this kind that has no flags */
 static int take_head(const uint8_t **at, size_t n_byte, uint8_t kind, uint16_t *index)
 {
     pal_wire_head head;
-    int refusal = pal_wire_get_head(*at, n_byte, &head);
+    int refusal = pal_wire_get_head_of(*at, n_byte, kind, 0, &head);
     if (refusal) return refusal;
-    if (head.kind != kind) return PAL_REFUSAL_KIND;
-    if (head.flags) return PAL_REFUSAL_FLAGS;
     *index = head.index;
     *at += PAL_WIRE_HEAD_BYTES;
     return 0;
 }
 
-static int exact(size_t n_byte, size_t wanted)
+int pal_wire_check_size(size_t n_byte, size_t wanted)
 {
     return n_byte < wanted ? PAL_REFUSAL_SHORT : n_byte > wanted ? PAL_REFUSAL_LONG : PAL_REFUSAL_NONE;
 }
@@ -142,7 +148,7 @@ static int exact(size_t n_byte, size_t wanted)
 size_t pal_wire_put_pose(uint8_t *dst, size_t cap, const pal_wire_pose *p)
 {
     if (cap < PAL_WIRE_POSE_BYTES) return 0;
-    put_fields(put_head(dst, PAL_WIRE_POSE, p->tool), pose_fields, p);
+    put_fields(pal_wire_put_head(dst, PAL_WIRE_POSE, 0, p->tool), pose_fields, p);
     return PAL_WIRE_POSE_BYTES;
 }
 
@@ -150,7 +156,7 @@ int pal_wire_get_pose(const uint8_t *bytes, size_t n_byte, pal_wire_pose *out)
 {
     pal_wire_pose p;
     int refusal = take_head(&bytes, n_byte, PAL_WIRE_POSE, &p.tool);
-    if (!refusal) refusal = exact(n_byte, PAL_WIRE_POSE_BYTES);
+    if (!refusal) refusal = pal_wire_check_size(n_byte, PAL_WIRE_POSE_BYTES);
     if (refusal) return refusal;
     if (!take_fields(&bytes, pose_fields, &p)) return PAL_REFUSAL_NAN;
     if (p.flags & ~(uint32_t)PAL_WIRE_POSE_FLAGS || p.buttons & ~(uint32_t)PAL_WIRE_GRASP) return PAL_REFUSAL_FLAGS;
@@ -167,7 +173,7 @@ int pal_wire_get_pose(const uint8_t *bytes, size_t n_byte, pal_wire_pose *out)
 size_t pal_wire_put_ack(uint8_t *dst, size_t cap, const pal_wire_ack *a)
 {
     if (cap < PAL_WIRE_ACK_BYTES) return 0;
-    put_fields(put_head(dst, PAL_WIRE_ACK, 0), ack_fields, a);
+    put_fields(pal_wire_put_head(dst, PAL_WIRE_ACK, 0, 0), ack_fields, a);
     return PAL_WIRE_ACK_BYTES;
 }
 
@@ -175,7 +181,7 @@ int pal_wire_get_ack(const uint8_t *bytes, size_t n_byte, pal_wire_ack *out)
 {
     uint16_t index;
     int refusal = take_head(&bytes, n_byte, PAL_WIRE_ACK, &index);
-    if (!refusal) refusal = exact(n_byte, PAL_WIRE_ACK_BYTES);
+    if (!refusal) refusal = pal_wire_check_size(n_byte, PAL_WIRE_ACK_BYTES);
     if (!refusal && index) refusal = PAL_REFUSAL_RANGE;
     if (!refusal) take_fields(&bytes, ack_fields, out);
     return refusal;
@@ -184,7 +190,7 @@ int pal_wire_get_ack(const uint8_t *bytes, size_t n_byte, pal_wire_ack *out)
 size_t pal_wire_put_tools(uint8_t *dst, size_t cap, const pal_wire_tools *t)
 {
     if (t->n_tool > PAL_WIRE_TOOL_MAX || cap < PAL_WIRE_TOOLS_BYTES(t->n_tool)) return 0;
-    dst = put_head(dst, PAL_WIRE_TOOLS, (uint16_t)t->n_tool);
+    dst = pal_wire_put_head(dst, PAL_WIRE_TOOLS, 0, (uint16_t)t->n_tool);
     pal_put_u32(dst, t->cycle);
     pal_put_u32(dst + 4, 0);
     pal_put_u64(dst + 8, t->sim_time_us);
@@ -209,7 +215,7 @@ int pal_wire_get_tools(const uint8_t *bytes, size_t n_byte, pal_wire_tools *out)
     if (refusal) return refusal;
     if (n_tool > PAL_WIRE_TOOL_MAX) return PAL_REFUSAL_COUNT;
     t.n_tool = n_tool;
-    refusal = exact(n_byte, PAL_WIRE_TOOLS_BYTES(t.n_tool));
+    refusal = pal_wire_check_size(n_byte, PAL_WIRE_TOOLS_BYTES(t.n_tool));
     if (refusal) return refusal;
     t.cycle = pal_get_u32(bytes);
     t.sim_time_us = pal_get_u64(bytes + 8);
@@ -223,7 +229,7 @@ int pal_wire_get_tools(const uint8_t *bytes, size_t n_byte, pal_wire_tools *out)
 size_t pal_wire_put_haptic(uint8_t *dst, size_t cap, const pal_wire_haptic *h)
 {
     if (h->n_patch > PAL_WIRE_CONTACT_PATCH_MAX || cap < PAL_WIRE_HAPTIC_BYTES(h->n_patch)) return 0;
-    dst = put_fields(put_head(dst, PAL_WIRE_HAPTIC, h->tool), haptic_fields, h);
+    dst = put_fields(pal_wire_put_head(dst, PAL_WIRE_HAPTIC, 0, h->tool), haptic_fields, h);
     for (uint32_t i = 0; i < h->n_patch; i++) dst = put_fields(dst, patch_fields, &h->patch[i]);
     return PAL_WIRE_HAPTIC_BYTES(h->n_patch);
 }
@@ -245,7 +251,7 @@ int pal_wire_get_haptic(const uint8_t *bytes, size_t n_byte, pal_wire_haptic *ou
     if (n_byte < PAL_WIRE_HAPTIC_BYTES(0)) return PAL_REFUSAL_SHORT;
     bool finite = take_fields(&bytes, haptic_fields, &h);
     if (h.n_patch > PAL_WIRE_CONTACT_PATCH_MAX) return PAL_REFUSAL_COUNT;
-    refusal = exact(n_byte, PAL_WIRE_HAPTIC_BYTES(h.n_patch));
+    refusal = pal_wire_check_size(n_byte, PAL_WIRE_HAPTIC_BYTES(h.n_patch));
     if (refusal) return refusal;
     for (uint32_t i = 0; i < h.n_patch; i++) finite &= take_fields(&bytes, patch_fields, &h.patch[i]);
     if (!finite) return PAL_REFUSAL_NAN;

@@ -59,6 +59,11 @@ typedef struct pal_wire_head {
 } pal_wire_head;
 /* head of any message, e.g. to dispatch on kind: SHORT, MAGIC or KIND refused */
 int pal_wire_get_head(const uint8_t *bytes, size_t n_byte, pal_wire_head *out);
+/* private to this room: the head of a message of one kind with no other flags than these; writes a head and returns the
+ * place behind it; SHORT or LONG where n_byte is not what is wanted */
+int pal_wire_get_head_of(const uint8_t *bytes, size_t n_byte, uint8_t kind, uint8_t flags, pal_wire_head *out);
+uint8_t *pal_wire_put_head(uint8_t *at, uint8_t kind, uint8_t flags, uint16_t index);
+int pal_wire_check_size(size_t n_byte, size_t wanted);
 
 /* pal_wire_pose.flags: those of tool_state_t (lcmtypes/) and AWAY */
 enum {

@@ -43,20 +43,16 @@ struct pal_bridge_net {
     pal_bridge_net_counts count;
 };
 
-static void net_round_trip(pal_bridge_net *n, uint32_t echo_seq, uint64_t echo_us, uint32_t hold_us)
-{
-    const uint64_t now_us = pal_clock_ns() / 1000;
-    if (echo_seq == 0 || echo_seq == n->echo_seq || echo_us + hold_us > now_us) return;
-    n->echo_seq = echo_seq;
-    pal_jitter_add(&n->count.rtt, (now_us - echo_us - hold_us) * 1000);
-}
-
 static void net_model(pal_bridge_net *n, const pal_wire_haptic *model)
 {
     n->count.n_model++;
     n->model_ns = pal_clock_ns();
     n->model_newest = model->seq;
-    net_round_trip(n, model->echo_seq, model->echo_stamp_us, model->hold_us);
+    const uint64_t now_us = n->model_ns / 1000, back_us = model->echo_stamp_us + model->hold_us;
+    if (model->echo_seq != 0 && model->echo_seq != n->echo_seq && back_us <= now_us) {
+        n->echo_seq = model->echo_seq;
+        pal_jitter_add(&n->count.rtt, (now_us - back_us) * 1000);
+    }
     pal_servo_put_model(n->servo, model, n->generation, pal_clock_now_ns(n->o.servo.clock));
 }
 
@@ -89,10 +85,10 @@ static void net_joined(pal_bridge_net *n)
     pal_servo_put_generation(n->servo, n->generation);
 }
 
-static void ws_control(void *user, pal_link *link, const pal_control *c)
+static void ws_control(void *user, const pal_control *c)
 {
     pal_bridge_net *n = user;
-    if (c->type == PAL_CONTROL_HELLO || c->type == PAL_CONTROL_MEMBERS) n->count.tool = pal_link_tool(link);
+    if (c->type == PAL_CONTROL_HELLO || c->type == PAL_CONTROL_MEMBERS) n->count.tool = pal_link_tool(n->link);
     if (c->type == PAL_CONTROL_HELLO) {
         const pal_wire_hello *hello = &c->hello;
         n->radius_m = hello->you_tool >= 0 && (uint32_t)hello->you_tool < hello->n_tool
@@ -109,11 +105,11 @@ static void ws_control(void *user, pal_link *link, const pal_control *c)
     if (c->type == PAL_CONTROL_ERROR) pal_log(PAL_LOG_WARN, "server", "%s", c->error.text);
 }
 
-static void ws_message(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
+static void ws_message(void *user, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
 {
     pal_bridge_net *n = user;
     if (head->kind == PAL_WIRE_TOOLS) {
-        pal_link_acknowledge(link, bytes, n_byte);
+        pal_link_acknowledge(n->link, bytes, n_byte);
     } else if (head->kind == PAL_WIRE_HAPTIC) {
         pal_wire_haptic haptic;
         if (pal_wire_get_haptic(bytes, n_byte, &haptic))
@@ -123,9 +119,8 @@ static void ws_message(void *user, pal_link *link, const pal_wire_head *head, co
     }
 }
 
-static void ws_state(void *user, pal_link *link, pal_link_state state, int code, const char *reason)
+static void ws_state(void *user, pal_link_state state, int code, const char *reason)
 {
-    (void)link;
     pal_bridge_net *n = user;
     if (state != PAL_LINK_LOST && state != PAL_LINK_ENDED) return;
     snprintf(n->count.reason, sizeof n->count.reason, "%d %.100s", code, reason);
@@ -153,9 +148,9 @@ static void lcm_refused(void *user, const char *channel, pal_walk reason)
     ((pal_bridge_net *)user)->count.n_refused++;
 }
 
-static void net_channel(const pal_bridge_net *n, char channel[PAL_LCM_CHANNEL_MAX + 1], const char *what)
+static pal_err net_publish(pal_bridge_net *n, const char *what, const lcm_type_info_t *type, const void *message)
 {
-    pal_lcm_channel(channel, n->o.session, what, n->o.tool);
+    return pal_lcm_link_publish(n->lcm, n->o.session, what, n->o.tool, type, message);
 }
 
 /* 250 Hz: newest pose and force to the server */
@@ -188,10 +183,8 @@ static void net_send_pose(void *user)
     pal_err err;
     if (n->lcm) {
         palpate_tool_state_t state;
-        char channel[PAL_LCM_CHANNEL_MAX + 1];
         pal_lcm_from_pose(&pose, &state);
-        net_channel(n, channel, "TOOL");
-        err = pal_lcm_link_publish(n->lcm, channel, palpate_tool_state_t_get_type_info(), &state);
+        err = net_publish(n, "TOOL", palpate_tool_state_t_get_type_info(), &state);
     } else {
         err = pal_link_send_pose(n->link, &pose);
     }
@@ -220,17 +213,15 @@ static void net_send_events(void *user)
                                                           .text = (char *)(uintptr_t)event.text};
     }
     if (!n->lcm) return;
-    char channel[PAL_LCM_CHANNEL_MAX + 1];
-    net_channel(n, channel, "HEVENT");
     for (int i = 0; i < EVENT_KEEP; i++)
         if (n->pending[i].left > 0 && n->pending[i].left--)
-            pal_lcm_link_publish(n->lcm, channel, palpate_haptic_event_t_get_type_info(), &n->pending[i].event);
+            net_publish(n, "HEVENT", palpate_haptic_event_t_get_type_info(), &n->pending[i].event);
 }
 
 static void net_send_config(pal_bridge_net *n)
 {
     const pal_servo_options *s = &n->o.servo;
-    char name[64], channel[PAL_LCM_CHANNEL_MAX + 1];
+    char name[64];
     memcpy(name, s->info.name, sizeof name);
     palpate_haptic_config_t config = {.utime = (int64_t)(pal_clock_ns() / 1000),
                                       .seq = (int32_t)n->status_seq,
@@ -252,8 +243,7 @@ static void net_send_config(pal_bridge_net *n)
         config.ws_max[k] = (float)s->info.high_m[k];
         config.origin[k] = s->origin_m[k];
     }
-    net_channel(n, channel, "HCONFIG");
-    pal_lcm_link_publish(n->lcm, channel, palpate_haptic_config_t_get_type_info(), &config);
+    net_publish(n, "HCONFIG", palpate_haptic_config_t_get_type_info(), &config);
 }
 
 /* 10 Hz: health; 1 Hz: limits */
@@ -266,7 +256,7 @@ static void net_send_status(void *user)
     const pal_servo_view *v = &n->view;
     const pal_jitter *p = &n->timing.period;
     const double ticks = v->n_tick ? (double)v->n_tick : 1;
-    char name[64], channel[PAL_LCM_CHANNEL_MAX + 1];
+    char name[64];
     memcpy(name, n->o.servo.info.name, sizeof name);
     const double seconds = n->joined_ns ? (double)(pal_clock_ns() - n->joined_ns) * 1e-9 : 0;
     const palpate_haptic_status_t status = {
@@ -292,8 +282,7 @@ static void net_send_status(void *user)
         .stiff_clamped = (float)((double)v->n_clamped / ticks),
         .motor_temp = (float)v->motor_temperature,
         .device = name};
-    net_channel(n, channel, "HSTATUS");
-    pal_lcm_link_publish(n->lcm, channel, palpate_haptic_status_t_get_type_info(), &status);
+    net_publish(n, "HSTATUS", palpate_haptic_status_t_get_type_info(), &status);
     if (n->n_status++ % 10 == 0) net_send_config(n);
 }
 
@@ -316,7 +305,7 @@ static pal_err net_open_lcm(pal_bridge_net *n, pal_diagnostic *diag)
     static const pal_lcm_events events = {lcm_model, lcm_refused};
     char channel[PAL_LCM_CHANNEL_MAX + 1];
     PAL_TRY(pal_lcm_link_open(n->loop, n->o.server, &events, n, diag, &n->lcm));
-    net_channel(n, channel, "HMODEL");
+    pal_lcm_channel(channel, n->o.session, "HMODEL", n->o.tool);
     return pal_lcm_link_subscribe(n->lcm, channel, palpate_haptic_model_t_get_type_info());
 }
 

@@ -50,8 +50,6 @@ typedef struct pal_haptic_v1 {
     const char *(*strerror)(void *handle, int error);
 } pal_haptic_v1;
 
-typedef const pal_haptic_v1 *(*pal_haptic_entry_fn)(void);
-
 /* back ends of this build; NULL beyond the last */
 const pal_haptic_v1 *pal_device_backend(int index);
 /* finds a back end by name of n_name bytes; NULL: none */

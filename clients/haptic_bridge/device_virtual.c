@@ -333,14 +333,6 @@ void pal_virtual_place(void *handle, const double position_m[3])
     pal_set3(s->vh, 0, 0, 0);
 }
 
-void pal_virtual_plant(void *handle, double *mass_kg, double *viscous_Ns_m, double *coulomb_N)
-{
-    const virtual_state *s = handle;
-    *mass_kg = s->device->mass_kg;
-    *viscous_Ns_m = s->viscous;
-    *coulomb_N = s->coulomb;
-}
-
 void pal_virtual_set_friction(void *handle, double viscous_Ns_m, double coulomb_N)
 {
     virtual_state *s = handle;

@@ -33,7 +33,6 @@ void pal_virtual_truth(void *handle, double position_m[3], double velocity_m_s[3
 void pal_virtual_push(void *handle, const double force_N[3]);
 /* sets the position of the plant, at rest (tests) */
 void pal_virtual_place(void *handle, const double position_m[3]);
-/* plant parameters for the analytic tests: mass kg, viscous N s/m, Coulomb N */
-void pal_virtual_plant(void *handle, double *mass_kg, double *viscous_Ns_m, double *coulomb_N);
+/* friction of the plant (tests) */
 void pal_virtual_set_friction(void *handle, double viscous_Ns_m, double coulomb_N);
 #endif

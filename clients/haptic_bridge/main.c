@@ -18,12 +18,10 @@
 #include <unistd.h>
 
 typedef struct bridge {
-    const char *device, *server, *session, *name, *tool, *hand, *script, *origin, *up, *options;
-    double rate_hz, seconds, cap_N, scale, force_scale;
-    bool json, quiet, list, doctor, pose_only, stdin_stop;
-    const pal_haptic_v1 *backend;
-    void *handle;
-    pal_servo_options servo_options;
+    const char *device, *tool, *hand, *script, *origin, *up, *options;
+    double seconds;
+    bool json, quiet, list, doctor, stdin_stop;
+    pal_bridge_net_options net_options; /* the servo's among them */
     pal_servo *servo;
     pal_servo_thread *thread;
     pal_link_loop *loop;
@@ -37,17 +35,12 @@ typedef struct bridge {
 static const char *const until_name[] = {"models", "poses", "force_N", "stale", "free"};
 
 /* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
-static atomic_int main_signal;
 static pal_servo *_Atomic main_servo; /* for the emergency stop */
 
 static void main_on_signal(int number)
 {
-    if (number == SIGUSR1 && main_servo)
-        pal_servo_estop(main_servo);
-    else if (number == SIGUSR2 && main_servo)
-        pal_servo_rearm(main_servo);
-    else
-        main_signal = number;
+    if (number == SIGUSR1 && main_servo) pal_servo_estop(main_servo);
+    if (number == SIGUSR2 && main_servo) pal_servo_rearm(main_servo);
 }
 
 static void main_watch(void *user)
@@ -56,7 +49,7 @@ static void main_watch(void *user)
     const pal_servo_view *v = pal_bridge_net_view(b->net);
     const double seen[] = {(double)v->n_model, (double)pal_bridge_net_count(b->net).n_pose, v->force_max_N,
                            (double)v->n_stale, v->state == PAL_SERVO_FREE};
-    if (main_signal || pal_end_condition_met(&b->until, seen)) pal_link_stop(b->loop);
+    if (pal_end_condition_met(&b->until, seen)) pal_link_stop(b->loop);
 }
 
 /* closed standard input is an emergency stop: whoever held it open is gone */
@@ -84,21 +77,23 @@ static pal_err main_open_device(bridge *b, pal_diagnostic *diag)
 {
     const size_t n_name = strcspn(b->device, ":");
     const char *which = b->device[n_name] ? b->device + n_name + 1 : "touch";
-    b->backend = pal_device_find(b->device, n_name);
-    if (!b->backend) return PAL_REFUSE(diag, "no back end \"%.*s\" (--list-devices)", (int)n_name, b->device);
+    pal_servo_options *o = &b->net_options.servo;
+    o->backend = pal_device_find(b->device, n_name);
+    if (!o->backend) return PAL_REFUSE(diag, "no back end \"%.*s\" (--list-devices)", (int)n_name, b->device);
     char id[256];
     const int n = snprintf(id, sizeof id, "%s,hand=%s,script=%s%s%s", which, b->hand, b->script, b->options ? "," : "",
                            b->options ? b->options : "");
     if (n >= (int)sizeof id) return PAL_REFUSE(diag, "device description is too long");
-    const int error = b->backend->open(&b->handle, id, &b->servo_options.info);
-    if (error < 0) return PAL_REFUSE(diag, "%s: %s", id, b->backend->strerror(NULL, error));
+    const int error = o->backend->open(&o->device, id, &o->info);
+    if (error < 0) return PAL_REFUSE(diag, "%s: %s", id, o->backend->strerror(NULL, error));
     return PAL_ERR_OK;
 }
 
 /* axes of the device (x to the user, y right, z up) to the world: z to up */
-static pal_err main_workspace(bridge *b, pal_bridge_net_options *net, pal_diagnostic *diag)
+static pal_err main_workspace(bridge *b, pal_diagnostic *diag)
 {
-    pal_servo_options *o = &b->servo_options;
+    pal_bridge_net_options *net = &b->net_options;
+    pal_servo_options *o = &net->servo;
     double ex[3], ey[3];
     if (!pal_client_parse_vector(b->up, net->up) || !pal_unit3(net->up, net->up, 1e-9))
         return PAL_REFUSE(diag, "--up wants three numbers, not \"%s\"", b->up);
@@ -129,7 +124,7 @@ static void main_json(const bridge *b, const pal_servo_timing *t, const pal_serv
                                                         : "full";
     pal_client_print_json(PAL_JSON(
         {"ok", JSON_BOOL(reason == NULL)}, {"reason", reason ? JSON_TEXT(reason) : NULL},
-        {"device", JSON_TEXT(b->servo_options.info.name)}, {"rate_hz", JSON_NUMBER(b->rate_hz)},
+        {"device", JSON_TEXT(b->net_options.servo.info.name)}, {"rate_hz", JSON_NUMBER(b->net_options.servo.rate_hz)},
         {"fifo", JSON_BOOL(t->rt_flags & PAL_RT_FIFO)}, {"memory_locked", JSON_BOOL(t->rt_flags & PAL_RT_LOCKED)},
         {"real_time_refused", JSON_TEXT(b->rt_refused)}, {"forces", JSON_TEXT(forces)},
         {"ticks", JSON_NUMBER(t->n_tick)}, {"missed", JSON_NUMBER(t->n_missed)},
@@ -147,8 +142,9 @@ static void main_json(const bridge *b, const pal_servo_timing *t, const pal_serv
 static void main_table(const bridge *b, const pal_servo_timing *t, const pal_servo_view *v,
                        const pal_bridge_net_counts *c)
 {
-    printf("%s at %g Hz: %llu ticks, %llu missed, watchdog %llu; %s%s\n", b->servo_options.info.name, b->rate_hz,
-           (unsigned long long)t->n_tick, (unsigned long long)t->n_missed, (unsigned long long)t->n_watchdog,
+    printf("%s at %g Hz: %llu ticks, %llu missed, watchdog %llu; %s%s\n", b->net_options.servo.info.name,
+           b->net_options.servo.rate_hz, (unsigned long long)t->n_tick, (unsigned long long)t->n_missed,
+           (unsigned long long)t->n_watchdog,
            t->rt_flags & PAL_RT_FIFO ? "SCHED_FIFO" : "no real time: ", t->rt_flags & PAL_RT_FIFO ? "" : b->rt_refused);
     const pal_jitter *row[] = {&t->period, &t->lateness, &c->rtt};
     const char *name[] = {"period", "lateness", "round trip"};
@@ -164,33 +160,25 @@ static void main_table(const bridge *b, const pal_servo_timing *t, const pal_ser
 
 static pal_err main_start(bridge *b, pal_diagnostic *diag)
 {
-    pal_bridge_net_options net = {.server = b->server,
-                                  .session = b->session,
-                                  .name = b->name,
-                                  .tool = strcmp(b->tool, "any") ? atoi(b->tool) : PAL_WIRE_TOOL_ANY};
-    pal_servo_options *o = &b->servo_options;
-    PAL_TRY(main_workspace(b, &net, diag));
+    pal_servo_options *o = &b->net_options.servo;
+    b->net_options.tool = strcmp(b->tool, "any") ? atoi(b->tool) : PAL_WIRE_TOOL_ANY;
+    PAL_TRY(main_workspace(b, diag));
     PAL_TRY(main_open_device(b, diag));
-    o->backend = b->backend;
-    o->device = b->handle;
-    o->rate_hz = b->rate_hz;
-    o->force_cap_N = fmin(b->cap_N, o->info.peak_N);
-    o->scale = b->scale;
-    o->force_scale = b->force_scale;
-    o->pose_only = b->pose_only || o->info.pose_only;
+    o->force_cap_N = fmin(o->force_cap_N, o->info.peak_N);
+    o->pose_only = o->pose_only || o->info.pose_only;
     o->hand_off = !strcmp(b->hand, "off");
-    o->clock = b->backend == pal_device_virtual() ? pal_virtual_clock(b->handle) : NULL;
+    o->clock = o->backend == pal_device_virtual() ? pal_virtual_clock(o->device) : NULL;
     o->no_watchdog = o->clock != NULL;
     PAL_TRY(pal_servo_create(o, &b->servo));
     main_servo = b->servo;
     PAL_TRY(pal_link_loop_create(&b->loop));
+    PAL_TRY(pal_link_stop_on_signals(b->loop));
     pal_diagnostic refused = {""};
     PAL_TRY(pal_servo_thread_start(b->servo, o, &refused, &b->thread));
     snprintf(b->rt_refused, sizeof b->rt_refused, "%s", refused.text);
     if (refused.text[0])
         pal_log(PAL_LOG_WARN, "real_time", "%s: forces are limited when the loop is late", refused.text);
-    net.servo = *o;
-    PAL_TRY(pal_bridge_net_open(b->loop, b->servo, b->thread, &net, diag, &b->net));
+    PAL_TRY(pal_bridge_net_open(b->loop, b->servo, b->thread, &b->net_options, diag, &b->net));
     if (b->stdin_stop) PAL_TRY(pal_link_poll_fd(b->loop, STDIN_FILENO, main_stdin, b));
     return pal_link_add_timer(b->loop, 50000, main_watch, b) ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
@@ -199,8 +187,7 @@ static int main_run(bridge *b)
 {
     pal_diagnostic diag = {""};
     pal_err err = main_start(b, &diag);
-    if (!err && b->seconds > 0) pal_link_run_for(b->loop, b->seconds);
-    if (!err && b->seconds <= 0) pal_link_run(b->loop);
+    if (!err) pal_link_run_for(b->loop, b->seconds);
     pal_servo_timing timing = {0};
     pal_servo_view view = {0};
     pal_bridge_net_counts counts = {0};
@@ -213,11 +200,12 @@ static int main_run(bridge *b)
     pal_link_loop_destroy(b->loop);
     pal_bridge_net_close(b->net);
     pal_servo_destroy(b->servo);
-    if (b->handle) b->backend->close(b->handle);
+    const pal_servo_options *o = &b->net_options.servo;
+    if (o->device) o->backend->close(o->device);
     const char *reason = err ? (diag.text[0] ? diag.text : pal_err_text(err)) : NULL;
     char lost[192];
     if (!err && !counts.joined) {
-        snprintf(lost, sizeof lost, "no server at %.100s: %.60s", b->server,
+        snprintf(lost, sizeof lost, "no server at %.100s: %.60s", b->net_options.server,
                  counts.reason[0] ? counts.reason : "no answer");
         reason = lost;
     }
@@ -238,18 +226,17 @@ static int main_doctor(bridge *b)
            geteuid() == 0 ? " (root)" : "", (unsigned long long)locked.rlim_cur / 1024);
     pal_diagnostic diag = {""};
     pal_err err = main_open_device(b, &diag);
+    pal_servo_options o = b->net_options.servo;
     pal_dev_state state;
-    if (!err && b->backend->read(b->handle, &state) < 0) err = pal_diagnostic_set(&diag, PAL_ERR_IO, "no first pose");
+    if (!err && o.backend->read(o.device, &state) < 0) err = pal_diagnostic_set(&diag, PAL_ERR_IO, "no first pose");
     if (err) {
         printf("device: %s\n", diag.text);
         return 1;
     }
-    printf("device: %s, peak %g N, continuous %g N, stiffness %g N/m; first pose %.1f %.1f %.1f mm\n",
-           b->servo_options.info.name, b->servo_options.info.peak_N, b->servo_options.info.continuous_N,
-           b->servo_options.info.stiffness_max_N_m, state.position_m[0] * 1e3, state.position_m[1] * 1e3,
-           state.position_m[2] * 1e3);
-    pal_servo_options o = b->servo_options;
-    o.backend = b->backend, o.device = b->handle, o.rate_hz = b->rate_hz, o.pose_only = true;
+    printf("device: %s, peak %g N, continuous %g N, stiffness %g N/m; first pose %.1f %.1f %.1f mm\n", o.info.name,
+           o.info.peak_N, o.info.continuous_N, o.info.stiffness_max_N_m, state.position_m[0] * 1e3,
+           state.position_m[1] * 1e3, state.position_m[2] * 1e3);
+    o.pose_only = true;
     o.rotation[0] = o.rotation[4] = o.rotation[8] = 1;
     pal_servo_timing timing = {0};
     err = pal_servo_create(&o, &b->servo);
@@ -257,7 +244,7 @@ static int main_doctor(bridge *b)
     if (!err) sleep(1);
     pal_servo_thread_stop(b->thread, &timing);
     pal_servo_destroy(b->servo);
-    b->backend->close(b->handle);
+    o.backend->close(o.device);
     if (err) return 1;
     printf("real time: %s%s, memory %s; %llu ticks, %llu missed, lateness p50 %.0f p99.9 %.0f max %.0f us\n",
            timing.rt_flags & PAL_RT_FIFO ? "SCHED_FIFO" : "refused: ", timing.rt_flags & PAL_RT_FIFO ? "" : diag.text,
@@ -270,57 +257,49 @@ static int main_doctor(bridge *b)
 int main(int argc, char **argv)
 {
     bridge b = {.device = "virtual:touch",
-                .server = "ws://127.0.0.1:8090/ws",
-                .session = "main",
-                .name = "haptic bridge",
                 .tool = "any",
                 .hand = "average",
                 .script = "press-hold",
                 .up = "0,0,1",
-                .rate_hz = 1000,
-                .cap_N = 3,
-                .scale = 1,
-                .force_scale = 1};
-    int n_operand;
+                .net_options = {.server = "ws://127.0.0.1:8090/ws",
+                                .session = "main",
+                                .name = "haptic bridge",
+                                .servo = {.rate_hz = 1000, .force_cap_N = 3, .scale = 1, .force_scale = 1}}};
+    pal_bridge_net_options *net = &b.net_options;
+    pal_servo_options *servo = &net->servo;
     const pal_client_flag flag[] = {
-        {"--device", "BACKEND:ID", PAL_CLIENT_TEXT, &b.device, 0, 0, NULL,
+        {"--device", "BACKEND:ID", &b.device, 0, 0, NULL,
          "virtual:touch | premium | omega3 | inverse3 | falcon (virtual:touch)"},
-        {"--server", "URL", PAL_CLIENT_TEXT, &b.server, 0, 0, NULL, "ws://host:port/ws or lcm://group:port?ttl=0"},
-        {"--session", "NAME", PAL_CLIENT_TEXT, &b.session, 0, 0, NULL, "LCM: name in the channels (main)"},
-        {"--name", "NAME", PAL_CLIENT_TEXT, &b.name, 0, 0, NULL, "name among the members"},
-        {"--tool", "N", PAL_CLIENT_TEXT, &b.tool, 0, 0, NULL, "tool to take: index or any; LCM: index (any, 0)"},
-        {"--hand", "NAME", PAL_CLIENT_TEXT, &b.hand, 0, 0, NULL, "virtual: average | light | firm | off"},
-        {"--script", "NAME", PAL_CLIENT_TEXT, &b.script, 0, 0, NULL,
-         "virtual: still | press-hold | cycle | ramp | stroke | tap"},
-        {"--options", "K=V,...", PAL_CLIENT_TEXT, &b.options, 0, 0, NULL,
-         "virtual: depth, height mm, wait s, lag ms, clock"},
-        {"--rate", "HZ", PAL_CLIENT_NUMBER, &b.rate_hz, 500, 4000, NULL, "servo rate (1000)"},
-        {"--seconds", "S", PAL_CLIENT_NUMBER, &b.seconds, 0.1, 86400, NULL, "end after this time (never)"},
-        {"--until", "NAME=N,...", PAL_CLIENT_TEXT, &b.until_text, 0, 0, NULL,
+        {"--server", "URL", &net->server, 0, 0, NULL, "ws://host:port/ws or lcm://group:port?ttl=0"},
+        {"--session", "NAME", &net->session, 0, 0, NULL, "LCM: name in the channels (main)"},
+        {"--name", "NAME", &net->name, 0, 0, NULL, "name among the members"},
+        {"--tool", "N", &b.tool, 0, 0, NULL, "tool to take: index or any; LCM: index (any, 0)"},
+        {"--hand", "NAME", &b.hand, 0, 0, NULL, "virtual: average | light | firm | off"},
+        {"--script", "NAME", &b.script, 0, 0, NULL, "virtual: still | press-hold | cycle | ramp | stroke | tap"},
+        {"--options", "K=V,...", &b.options, 0, 0, NULL, "virtual: depth, height mm, wait s, lag ms, clock"},
+        {"--rate", "HZ", &servo->rate_hz, 500, 4000, NULL, "servo rate (1000)"},
+        {"--seconds", "S", &b.seconds, 0.1, 86400, NULL, "end after this time (never)"},
+        {"--until", "NAME=N,...", &b.until_text, 0, 0, NULL,
          "end before that once all is reached: models, poses, force_N, stale, free=1"},
-        {"--force-cap", "N", PAL_CLIENT_NUMBER, &b.cap_N, 0, 20, NULL, "largest force (3, and the device's peak)"},
-        {"--origin", "X,Y,Z", PAL_CLIENT_TEXT, &b.origin, 0, 0, NULL, "world place of the workspace's centre, m"},
-        {"--up", "X,Y,Z", PAL_CLIENT_TEXT, &b.up, 0, 0, NULL, "world direction of the device's up (0,0,1)"},
-        {"--scale", "S", PAL_CLIENT_NUMBER, &b.scale, 0.01, 100, NULL, "world metres per device metre (1)"},
-        {"--force-scale", "S", PAL_CLIENT_NUMBER, &b.force_scale, 0.01, 100, NULL,
-         "device newtons per world newton (1)"},
-        {"--pose-only", NULL, PAL_CLIENT_SWITCH, &b.pose_only, 0, 0, NULL, "no force"},
-        {"--stdin-stop", NULL, PAL_CLIENT_SWITCH, &b.stdin_stop, 0, 0, NULL,
-         "closed standard input is an emergency stop"},
-        {"--list-devices", NULL, PAL_CLIENT_SWITCH, &b.list, 0, 0, NULL, "which back ends there are, or why not"},
-        {"--doctor", NULL, PAL_CLIENT_SWITCH, &b.doctor, 0, 0, NULL, "check limits, device and one second of servo"},
-        {"--json", NULL, PAL_CLIENT_SWITCH, &b.json, 0, 0, NULL, "one JSON object on stdout at the end"},
-        {"--quiet", NULL, PAL_CLIENT_SWITCH, &b.quiet, 0, 0, NULL, "say nothing unless something fails"},
+        {"--force-cap", "N", &servo->force_cap_N, 0, 20, NULL, "largest force (3, and the device's peak)"},
+        {"--origin", "X,Y,Z", &b.origin, 0, 0, NULL, "world place of the workspace's centre, m"},
+        {"--up", "X,Y,Z", &b.up, 0, 0, NULL, "world direction of the device's up (0,0,1)"},
+        {"--scale", "S", &servo->scale, 0.01, 100, NULL, "world metres per device metre (1)"},
+        {"--force-scale", "S", &servo->force_scale, 0.01, 100, NULL, "device newtons per world newton (1)"},
+        {"--pose-only", NULL, &servo->pose_only, 0, 0, NULL, "no force"},
+        {"--stdin-stop", NULL, &b.stdin_stop, 0, 0, NULL, "closed standard input is an emergency stop"},
+        {"--list-devices", NULL, &b.list, 0, 0, NULL, "which back ends there are, or why not"},
+        {"--doctor", NULL, &b.doctor, 0, 0, NULL, "check limits, device and one second of servo"},
+        {"--json", NULL, &b.json, 0, 0, NULL, "one JSON object on stdout at the end"},
+        {"--quiet", NULL, &b.quiet, 0, 0, NULL, "say nothing unless something fails"},
     };
-    const pal_client_table table = {"palpate-bridge",
-                                    "[flags]",
-                                    "Renders a session's contact models on a haptic device at 1 kHz. SIGUSR1 is the "
-                                    "emergency stop, SIGUSR2 re-arms.",
-                                    flag,
-                                    sizeof flag / sizeof flag[0],
-                                    0,
-                                    0};
-    const int code = pal_client_flags_parse(&table, argc, argv, NULL, &n_operand);
+    const pal_client_table table = {.program = "palpate-bridge",
+                                    .usage = "[flags]",
+                                    .about = "Renders a session's contact models on a haptic device at 1 kHz. SIGUSR1 "
+                                             "is the emergency stop, SIGUSR2 re-arms.",
+                                    .flag = flag,
+                                    .n_flag = sizeof flag / sizeof flag[0]};
+    const int code = pal_client_flags_parse(&table, argc, argv, NULL);
     if (code >= 0) return code;
     if (b.list) return main_list();
     pal_diagnostic diag = {""};
@@ -331,8 +310,6 @@ int main(int argc, char **argv)
     }
     pal_log_set_level(b.quiet || b.json ? PAL_LOG_ERROR : PAL_LOG_INFO);
     if (b.doctor) return main_doctor(&b);
-    signal(SIGINT, main_on_signal);
-    signal(SIGTERM, main_on_signal);
     signal(SIGUSR1, main_on_signal);
     signal(SIGUSR2, main_on_signal);
     return main_run(&b);

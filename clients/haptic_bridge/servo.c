@@ -37,17 +37,13 @@ typedef struct servo_model {
     pal_wire_haptic haptic;
 } servo_model;
 
-typedef struct servo_origin {
-    double m[3];
-} servo_origin;
-
 struct pal_servo {
     pal_servo_options o;
     double cap_N;
     pal_triple_buffer models, views, origins;
     servo_model model_slot[3];
     pal_servo_view view_slot[3];
-    servo_origin origin_slot[3];
+    double origin_slot[3][3]; /* m */
     pal_command_queue *events;
     atomic_bool estop, rearm, stalled;
     _Atomic uint64_t ticks;
@@ -88,7 +84,7 @@ pal_err pal_servo_create(const pal_servo_options *options, pal_servo **out)
     }
     pal_triple_buffer_init(&s->models, &s->model_slot[0], &s->model_slot[1], &s->model_slot[2]);
     pal_triple_buffer_init(&s->views, &s->view_slot[0], &s->view_slot[1], &s->view_slot[2]);
-    pal_triple_buffer_init(&s->origins, &s->origin_slot[0], &s->origin_slot[1], &s->origin_slot[2]);
+    pal_triple_buffer_init(&s->origins, s->origin_slot[0], s->origin_slot[1], s->origin_slot[2]);
     s->model.empty = true;
     s->first = true;
     s->clutch_fade = s->scale_down = 1;
@@ -124,8 +120,7 @@ void pal_servo_put_generation(pal_servo *servo, uint32_t generation)
 
 void pal_servo_put_origin(pal_servo *servo, const double origin_m[3])
 {
-    servo_origin *slot = pal_triple_buffer_slot(&servo->origins);
-    pal_copy3(slot->m, origin_m);
+    pal_copy3(pal_triple_buffer_slot(&servo->origins), origin_m);
     pal_triple_buffer_publish(&servo->origins);
 }
 
@@ -448,9 +443,9 @@ void pal_servo_tick(pal_servo *s, uint64_t now_ns)
     if (good) {
         s->bad_reads = 0;
         /* the workspace may move only while no force is rendered */
-        const servo_origin *origin = pal_norm3(s->force_prev) < 0.01 ? pal_triple_buffer_take(&s->origins) : NULL;
+        const double *origin = pal_norm3(s->force_prev) < 0.01 ? pal_triple_buffer_take(&s->origins) : NULL;
         if (origin) {
-            pal_copy3(s->o.origin_m, origin->m);
+            pal_copy3(s->o.origin_m, origin);
             s->has_position = false;
         }
         if (servo_states(s, now_ns, dt)) servo_render(s, now_ns, dt, force_d);

@@ -1,7 +1,6 @@
 #include "clients/haptic_bridge/servo_thread.h"
 #include "server/base/triple_buffer.h"
 
-#include <errno.h>
 #include <pthread.h>
 #include <sched.h>
 #include <stdatomic.h>

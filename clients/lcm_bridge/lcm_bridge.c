@@ -49,7 +49,6 @@ struct pal_lcm_bridge {
 static void bridge_body(pal_lcm_bridge *b, uint32_t index)
 {
     bridge_part *part = &b->part[index];
-    char channel[PAL_LCM_CHANNEL_MAX + 1];
     part->sent_ns = pal_clock_ns();
     if (part->n_byte > PAL_LCM_DATAGRAM_MAX) {
         b->count.n_frame_dropped++;
@@ -67,8 +66,8 @@ static void bridge_body(pal_lcm_bridge *b, uint32_t index)
                                         .cycle = (int32_t)part->head.cycle,
                                         .size = (int32_t)part->n_byte,
                                         .payload = part->bytes};
-    pal_lcm_channel(channel, b->session, "BODY", (int)index);
-    if (!pal_lcm_link_publish(b->lcm, channel, palpate_body_frame_t_get_type_info(), &frame)) b->count.n_frame++;
+    if (!pal_lcm_link_publish(b->lcm, b->session, "BODY", (int)index, palpate_body_frame_t_get_type_info(), &frame))
+        b->count.n_frame++;
 }
 
 /* server's status, or NULL when there is no server */
@@ -84,7 +83,7 @@ static void bridge_status(pal_lcm_bridge *b, const pal_wire_status *s)
         epoch[i] = (int32_t)b->topology.part[i].epoch;
         asset[i] = b->topology.part[i].asset;
     }
-    char diag[PAL_WIRE_TEXT_BYTES], channel[PAL_LCM_CHANNEL_MAX + 1];
+    char diag[PAL_WIRE_TEXT_BYTES];
     memcpy(diag, s->diag, sizeof diag);
     const palpate_session_status_t status = {.utime = (int64_t)(pal_clock_ns() / 1000),
                                              .seq = (int32_t)++b->status_seq,
@@ -111,9 +110,9 @@ static void bridge_status(pal_lcm_bridge *b, const pal_wire_status *s)
                                              .epoch = epoch,
                                              .asset = asset,
                                              .diag = diag};
-    pal_lcm_channel(channel, b->session, "STATUS", -1);
     b->status_ns = pal_clock_ns();
-    if (!pal_lcm_link_publish(b->lcm, channel, palpate_session_status_t_get_type_info(), &status)) b->count.n_status++;
+    if (!pal_lcm_link_publish(b->lcm, b->session, "STATUS", -1, palpate_session_status_t_get_type_info(), &status))
+        b->count.n_status++;
 }
 
 static void bridge_frame(pal_lcm_bridge *b, const uint8_t *bytes, size_t n_byte)
@@ -133,15 +132,15 @@ static void bridge_frame(pal_lcm_bridge *b, const uint8_t *bytes, size_t n_byte)
     bridge_body(b, head.part);
 }
 
-static void watcher_message(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
+static void watcher_message(void *user, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
 {
-    if (head->kind == PAL_WIRE_FRAME) bridge_frame(user, bytes, n_byte);
-    if (head->kind == PAL_WIRE_TOOLS) pal_link_acknowledge(link, bytes, n_byte);
+    pal_lcm_bridge *b = user;
+    if (head->kind == PAL_WIRE_FRAME) bridge_frame(b, bytes, n_byte);
+    if (head->kind == PAL_WIRE_TOOLS) pal_link_acknowledge(b->watcher, bytes, n_byte);
 }
 
-static void watcher_control(void *user, pal_link *link, const pal_control *c)
+static void watcher_control(void *user, const pal_control *c)
 {
-    (void)link;
     pal_lcm_bridge *b = user;
     if (c->type == PAL_CONTROL_HELLO) {
         if (!b->named) memcpy(b->session, c->hello.session, sizeof b->session);
@@ -156,9 +155,8 @@ static void watcher_control(void *user, pal_link *link, const pal_control *c)
     if (c->type == PAL_CONTROL_STATUS) bridge_status(b, &c->status);
 }
 
-static void watcher_state(void *user, pal_link *link, pal_link_state state, int code, const char *reason)
+static void watcher_state(void *user, pal_link_state state, int code, const char *reason)
 {
-    (void)link;
     pal_lcm_bridge *b = user;
     if (state == PAL_LINK_LOST || state == PAL_LINK_ENDED) {
         pal_log(state == PAL_LINK_ENDED ? PAL_LOG_WARN : PAL_LOG_DEBUG, "lcm_server", "%d %s", code, reason);
@@ -170,32 +168,30 @@ static void watcher_state(void *user, pal_link *link, pal_link_state state, int 
 }
 
 /* the member of one tool */
-static void tool_message(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
+static void tool_message(void *user, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
 {
     bridge_tool *tool = user;
     pal_lcm_bridge *b = tool->bridge;
     pal_wire_haptic haptic;
-    if (head->kind == PAL_WIRE_TOOLS) pal_link_acknowledge(link, bytes, n_byte);
+    if (head->kind == PAL_WIRE_TOOLS) pal_link_acknowledge(tool->link, bytes, n_byte);
     if (head->kind != PAL_WIRE_HAPTIC || pal_wire_get_haptic(bytes, n_byte, &haptic) || haptic.tool != tool->index)
         return;
     palpate_haptic_model_t model;
     palpate_contact_patch_t patch[PAL_WIRE_CONTACT_PATCH_MAX];
-    char channel[PAL_LCM_CHANNEL_MAX + 1];
     pal_lcm_from_haptic(&haptic, &model, patch);
-    pal_lcm_channel(channel, b->session, "HMODEL", tool->index);
-    if (!pal_lcm_link_publish(b->lcm, channel, palpate_haptic_model_t_get_type_info(), &model)) b->count.n_model++;
+    if (!pal_lcm_link_publish(b->lcm, b->session, "HMODEL", tool->index, palpate_haptic_model_t_get_type_info(),
+                              &model))
+        b->count.n_model++;
 }
 
-static void tool_control(void *user, pal_link *link, const pal_control *c)
+static void tool_control(void *user, const pal_control *c)
 {
-    (void)link;
     bridge_tool *tool = user;
     if (c->type == PAL_CONTROL_ERROR) pal_log(PAL_LOG_WARN, "lcm_tool", "tool %d: %s", tool->index, c->error.text);
 }
 
-static void tool_state(void *user, pal_link *link, pal_link_state state, int code, const char *reason)
+static void tool_state(void *user, pal_link_state state, int code, const char *reason)
 {
-    (void)link;
     bridge_tool *tool = user;
     if (state == PAL_LINK_ENDED) pal_log(PAL_LOG_WARN, "lcm_tool", "tool %d: %d %s", tool->index, code, reason);
 }

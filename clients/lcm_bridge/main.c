@@ -4,64 +4,42 @@
 #include "clients/link/client_flags.h"
 #include "server/base/log.h"
 
-#include <signal.h>
-#include <stdatomic.h>
 #include <stdio.h>
-
-/* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
-static atomic_int main_signal;
-
-static void main_on_signal(int number)
-{
-    main_signal = number;
-}
-
-static void main_watch(void *loop)
-{
-    if (main_signal) pal_link_stop(loop);
-}
 
 int main(int argc, char **argv)
 {
     const char *server = "ws://127.0.0.1:8090/ws", *lcm = "udpm://239.255.76.67:7667?ttl=0", *session = NULL;
     bool json = false, quiet = false;
     double seconds = 0;
-    int n_operand;
     const pal_client_flag flag[] = {
-        {"--server", "URL", PAL_CLIENT_TEXT, &server, 0, 0, NULL, "palpate server (ws://127.0.0.1:8090/ws)"},
-        {"--lcm", "URL", PAL_CLIENT_TEXT, &lcm, 0, 0, NULL, "LCM bus (udpm://239.255.76.67:7667?ttl=0)"},
-        {"--session", "NAME", PAL_CLIENT_TEXT, &session, 0, 0, NULL, "name in the channels (the server's)"},
-        {"--seconds", "S", PAL_CLIENT_NUMBER, &seconds, 0.1, 1e6, NULL, "end after this time (never)"},
-        {"--json", NULL, PAL_CLIENT_SWITCH, &json, 0, 0, NULL, "counts as one JSON object at the end"},
-        {"--quiet", NULL, PAL_CLIENT_SWITCH, &quiet, 0, 0, NULL, "say nothing but warnings"},
+        {"--server", "URL", &server, 0, 0, NULL, "palpate server (ws://127.0.0.1:8090/ws)"},
+        {"--lcm", "URL", &lcm, 0, 0, NULL, "LCM bus (udpm://239.255.76.67:7667?ttl=0)"},
+        {"--session", "NAME", &session, 0, 0, NULL, "name in the channels (the server's)"},
+        {"--seconds", "S", &seconds, 0.1, 1e6, NULL, "end after this time (never)"},
+        {"--json", NULL, &json, 0, 0, NULL, "counts as one JSON object at the end"},
+        {"--quiet", NULL, &quiet, 0, 0, NULL, "say nothing but warnings"},
     };
     const pal_client_table table = {
-        "palpate-lcm",
-        "[flags]",
-        "Takes a session to an LCM bus: body frames, status and haptic models out, tool states in, on channels\n"
-        "PALPATE1/<session>/...; the types are in lcmtypes/.",
-        flag,
-        sizeof flag / sizeof flag[0],
-        0,
-        0};
-    const int code = pal_client_flags_parse(&table, argc, argv, NULL, &n_operand);
+        .program = "palpate-lcm",
+        .usage = "[flags]",
+        .about =
+            "Takes a session to an LCM bus: body frames, status and haptic models out, tool states in, on channels\n"
+            "PALPATE1/<session>/...; the types are in lcmtypes/.",
+        .flag = flag,
+        .n_flag = sizeof flag / sizeof flag[0]};
+    const int code = pal_client_flags_parse(&table, argc, argv, NULL);
     if (code >= 0) return code;
     pal_log_set_level(quiet || json ? PAL_LOG_WARN : PAL_LOG_INFO);
-    signal(SIGINT, main_on_signal);
-    signal(SIGTERM, main_on_signal);
     pal_diagnostic diag = {""};
     pal_link_loop *loop = NULL;
     pal_lcm_bridge *bridge = NULL;
     pal_err err = pal_link_loop_create(&loop);
     if (!err) err = pal_lcm_bridge_open(loop, &(pal_lcm_bridge_options){server, lcm, session}, &diag, &bridge);
-    if (!err && !pal_link_add_timer(loop, 50000, main_watch, loop)) err = PAL_ERR_MEMORY;
-    if (err) {
+    if (!err) err = pal_link_stop_on_signals(loop);
+    if (err)
         fprintf(stderr, "palpate-lcm: %s\n", diag.text[0] ? diag.text : pal_err_text(err));
-    } else if (seconds > 0) {
+    else
         pal_link_run_for(loop, seconds);
-    } else {
-        pal_link_run(loop);
-    }
     if (!err && json) {
         const pal_lcm_bridge_counts c = pal_lcm_bridge_count(bridge);
         printf("{\"frames\":%llu,\"frames_dropped\":%llu,\"states\":%llu,\"states_refused\":%llu,\"models\":%llu,"

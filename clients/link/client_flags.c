@@ -36,7 +36,7 @@ static const pal_client_flag *flags_find(const pal_client_table *table, const ch
 
 static int flags_set(const pal_client_table *table, const pal_client_flag *flag, const char *text)
 {
-    if (flag->kind == PAL_CLIENT_TEXT) {
+    if (flag->low >= flag->high) {
         *(const char **)flag->out = text;
         return -1;
     }
@@ -50,7 +50,7 @@ static int flags_set(const pal_client_table *table, const pal_client_flag *flag,
     return -1;
 }
 
-int pal_client_flags_parse(const pal_client_table *table, int argc, char **argv, const char **operand, int *n_operand)
+int pal_client_flags_parse(const pal_client_table *table, int argc, char **argv, const char **operand)
 {
     int n = 0;
     for (int i = 1; i < argc; i++) {
@@ -67,7 +67,7 @@ int pal_client_flags_parse(const pal_client_table *table, int argc, char **argv,
         const size_t n_name = strcspn(word, "=");
         const pal_client_flag *flag = flags_find(table, word, n_name);
         if (!flag) return flags_refuse(table, word, "no such flag");
-        if (flag->kind == PAL_CLIENT_SWITCH) {
+        if (!flag->value) {
             if (word[n_name]) return flags_refuse(table, word, "takes no value");
             *(bool *)flag->out = true;
             continue;
@@ -80,7 +80,6 @@ int pal_client_flags_parse(const pal_client_table *table, int argc, char **argv,
         if (code >= 0) return code;
     }
     if (n < table->min_operand) return flags_refuse(table, "operand missing", table->usage);
-    *n_operand = n;
     return -1;
 }
 

@@ -6,16 +6,13 @@
 #include <cjson/cJSON.h>
 #include <stdbool.h>
 
-typedef enum pal_client_flag_kind { PAL_CLIENT_SWITCH, PAL_CLIENT_TEXT, PAL_CLIENT_NUMBER } pal_client_flag_kind;
-
 typedef struct pal_client_flag {
     const char *name;  /* "--rate"                                       */
     const char *value; /* placeholder of the value in the help; NULL: switch */
-    pal_client_flag_kind kind;
-    void *out;        /* bool *, const char ** or double *; unchanged when absent */
-    double low, high; /* range of a number */
-    const char *bare; /* value of the flag alone (as last word or before another flag), or NULL */
-    const char *help; /* one or more lines */
+    void *out;         /* bool * of a switch, double * where low < high, else const char **; unchanged when absent */
+    double low, high;  /* range of a number; both 0 otherwise */
+    const char *bare;  /* value of the flag alone (as last word or before another flag), or NULL */
+    const char *help;  /* one or more lines */
 } pal_client_flag;
 
 typedef struct pal_client_table {
@@ -25,8 +22,9 @@ typedef struct pal_client_table {
     int min_operand, max_operand;
 } pal_client_table;
 
-/* -1: continue; else the exit code (0 after --help, 2 after one line on stderr). operand: [max_operand] */
-int pal_client_flags_parse(const pal_client_table *table, int argc, char **argv, const char **operand, int *n_operand);
+/* -1: continue; else the exit code (0 after --help, 2 after one line on stderr). operand: [max_operand], NULL where
+ * that is 0 */
+int pal_client_flags_parse(const pal_client_table *table, int argc, char **argv, const char **operand);
 /* prints a tree as one line on stdout; takes it */
 void pal_client_print_json(cJSON *taken);
 /* three numbers "x,y,z"; false: malformed */

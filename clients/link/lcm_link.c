@@ -92,17 +92,14 @@ static void lcm_readable(void *user)
 
 static bool lcm_try(pal_lcm_link *link)
 {
-    if (!link->memory && !lcm_route(link->url)) {
-        if (!link->warned)
+    const bool route = link->memory || lcm_route(link->url);
+    if (route) link->lcm = lcm_create(link->url);
+    if (!link->lcm) {
+        if (!link->warned && !route)
             pal_log(PAL_LOG_WARN, "lcm_route",
                     "no multicast route, LCM stays off (all else runs); add one with `ip route add 224.0.0.0/4 dev "
                     "lo` (or the rig's interface)");
-        link->warned = true;
-        return false;
-    }
-    link->lcm = lcm_create(link->url);
-    if (!link->lcm) {
-        if (!link->warned)
+        else if (!link->warned)
             pal_log(PAL_LOG_WARN, "lcm_open", "%s: LCM cannot be opened, it will be tried again", link->url);
         link->warned = true;
         return false;
@@ -183,14 +180,17 @@ pal_err pal_lcm_link_subscribe(pal_lcm_link *link, const char *channel, const lc
     return link->lcm ? lcm_attach(link, s) : PAL_ERR_OK;
 }
 
-pal_err pal_lcm_link_publish(pal_lcm_link *link, const char *channel, const lcm_type_info_t *type, const void *message)
+pal_err pal_lcm_link_publish(pal_lcm_link *link, const char *session, const char *what, int n,
+                             const lcm_type_info_t *type, const void *message)
 {
+    char channel[PAL_LCM_CHANNEL_MAX + 1];
     if (!link->lcm) return PAL_ERR_STATE;
     const int wanted = type->encoded_size(message);
     if (wanted < 0 || wanted > PAL_LCM_DATAGRAM_MAX + 512 - 128) return PAL_ERR_REFUSED;
-    const int n = type->encode(link->buffer, 0, wanted, message);
-    if (n < 0) return PAL_ERR_REFUSED;
-    return lcm_publish(link->lcm, channel, link->buffer, (unsigned)n) == 0 ? PAL_ERR_OK : PAL_ERR_IO;
+    const int n_byte = type->encode(link->buffer, 0, wanted, message);
+    if (n_byte < 0) return PAL_ERR_REFUSED;
+    pal_lcm_channel(channel, session, what, n);
+    return lcm_publish(link->lcm, channel, link->buffer, (unsigned)n_byte) == 0 ? PAL_ERR_OK : PAL_ERR_IO;
 }
 
 void pal_lcm_link_handle(pal_lcm_link *link)

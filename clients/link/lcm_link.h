@@ -34,8 +34,10 @@ void pal_lcm_link_close(pal_lcm_link *link); /* after the loop is destroyed; NUL
 
 /* channel: an LCM regular expression, kept when the bus reopens; at most 8. type: expected by the length check. */
 pal_err pal_lcm_link_subscribe(pal_lcm_link *link, const char *channel, const lcm_type_info_t *type);
-/* encodes by type and publishes; STATE: the bus is not up; REFUSED: exceeds a datagram; IO */
-pal_err pal_lcm_link_publish(pal_lcm_link *link, const char *channel, const lcm_type_info_t *type, const void *message);
+/* encodes by type and publishes on the channel of pal_lcm_channel; STATE: the bus is not up; REFUSED: exceeds a
+ * datagram; IO */
+pal_err pal_lcm_link_publish(pal_lcm_link *link, const char *session, const char *what, int n,
+                             const lcm_type_info_t *type, const void *message);
 /* delivers messages of memq; every other bus delivers by itself */
 void pal_lcm_link_handle(pal_lcm_link *link);
 

@@ -30,7 +30,8 @@ typedef struct pal_link_timer pal_link_timer;
 pal_err pal_link_loop_create(pal_link_loop **out);          /* [load] MEMORY */
 void pal_link_loop_destroy(pal_link_loop *loop);            /* [load] after pal_link_run has returned; NULL is fine */
 void pal_link_run(pal_link_loop *loop);                     /* the calling thread is [net] until pal_link_stop */
-void pal_link_run_for(pal_link_loop *loop, double seconds); /* the same, for at most that time (tests) */
+void pal_link_run_for(pal_link_loop *loop, double seconds); /* the same, for at most that time; 0: without limit */
+pal_err pal_link_stop_on_signals(pal_link_loop *loop);      /* [load] SIGINT and SIGTERM stop the loop; MEMORY */
 void pal_link_stop(pal_link_loop *loop);                    /* [any] */
 
 typedef enum pal_link_state {
@@ -44,13 +45,13 @@ typedef enum pal_link_state {
 /* all called [net]; any may be NULL; bytes and messages are borrowed for the call */
 typedef struct pal_link_events {
     /* reason: a sentence for the user; code: websocket close code, 0: none */
-    void (*state)(void *user, pal_link *link, pal_link_state state, int code, const char *reason);
+    void (*state)(void *user, pal_link_state state, int code, const char *reason);
     /* every well-formed text message of the server; hello too, before state JOINED */
-    void (*control)(void *user, pal_link *link, const pal_control *c);
+    void (*control)(void *user, const pal_control *c);
     /* every whole binary message of a server kind with a valid header; the body is unchecked */
-    void (*message)(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte);
+    void (*message)(void *user, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte);
     /* a malformed message of the server (pal_refusal); it is dropped, the connection stays open */
-    void (*fault)(void *user, pal_link *link, int refusal);
+    void (*fault)(void *user, int refusal);
 } pal_link_events;
 
 typedef struct pal_link_options {
@@ -60,7 +61,6 @@ typedef struct pal_link_options {
     int tool;             /* requested: index, PAL_WIRE_TOOL_ANY or PAL_WIRE_TOOL_NONE */
     bool topology_deltas; /* accepts TOPOLOGY_DELTA (triangle_table.h); without it, adaptive parts keep the triangles of
                              their asset */
-    bool once;            /* does not reconnect after the first loss */
     double read_bytes_s;  /* > 0: read limit, bytes per second (a slow client) */
     const pal_link_events *events; /* borrowed while the link lives */
     void *user;

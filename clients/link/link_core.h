@@ -36,6 +36,17 @@ typedef struct link_address {
     int port;
 } link_address;
 pal_err link_address_parse(const char *url, link_address *out, pal_diagnostic *diag);
+/* what both kinds of connection ask for; object: of the callback, wsi: where it is kept */
+struct lws_client_connect_info link_connect_info(pal_link_loop *loop, const link_address *to,
+                                                 const char *local_protocol, void *object, struct lws **wsi);
+
+/* bytes that come in pieces */
+typedef struct link_bytes {
+    uint8_t *at;
+    size_t n, cap;
+} link_bytes;
+/* false: more than max in all, or no memory. Memory follows what really came */
+bool link_bytes_append(link_bytes *to, const void *bytes, size_t n_byte, size_t max);
 
 /* names of the local protocols; the user data is the connection's own object */
 #define LINK_LOCAL_GET   "pal-get"
@@ -43,8 +54,7 @@ pal_err link_address_parse(const char *url, link_address *out, pal_diagnostic *d
 int link_ws_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len);
 int link_get_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len);
 
-void link_close_all(pal_link_loop *loop);      /* closes every connection with 1000 */
-bool link_any_open(const pal_link_loop *loop); /* a websocket is still open */
-void link_free_all(pal_link_loop *loop);       /* after the context is destroyed */
+bool link_close_all(pal_link_loop *loop); /* closes every connection with 1000; true while a websocket is open */
+void link_free_all(pal_link_loop *loop);  /* after the context is destroyed */
 void link_get_free_all(pal_link_loop *loop);
 #endif

@@ -10,8 +10,8 @@ struct link_get {
     struct lws *wsi;
     pal_link_get_done done;
     void *user;
-    size_t max, n_byte, cap;
-    uint8_t *bytes;
+    size_t max;
+    link_bytes body;
     int status;
 };
 
@@ -22,25 +22,24 @@ static void link_get_end(link_get *get, int status, const char *reason)
     while (*place && *place != get) place = &(*place)->next;
     if (*place) *place = get->next;
     if (get->wsi) lws_set_opaque_user_data(get->wsi, NULL);
-    get->done(get->user, status, status == 200 ? get->bytes : NULL, status == 200 ? get->n_byte : 0, reason);
-    free(get->bytes);
+    get->done(get->user, status, status == 200 ? get->body.at : NULL, status == 200 ? get->body.n : 0, reason);
+    free(get->body.at);
     free(get);
 }
 
-/* grows by doubling, so memory follows what really came */
-static bool link_get_append(link_get *get, const void *bytes, size_t n_byte)
+bool link_bytes_append(link_bytes *to, const void *bytes, size_t n_byte, size_t max)
 {
-    if (n_byte > get->max - get->n_byte) return false;
-    if (get->n_byte + n_byte > get->cap) {
-        size_t cap = get->cap ? get->cap : 65536;
-        while (cap < get->n_byte + n_byte) cap *= 2;
-        uint8_t *grown = realloc(get->bytes, cap);
+    if (n_byte > max - to->n) return false;
+    if (n_byte == 0) return true;
+    if (to->n + n_byte > to->cap) {
+        const size_t wanted = to->n + n_byte, cap = wanted > 2 * to->cap ? wanted : 2 * to->cap;
+        uint8_t *grown = realloc(to->at, cap);
         if (!grown) return false;
-        get->bytes = grown;
-        get->cap = cap;
+        to->at = grown;
+        to->cap = cap;
     }
-    memcpy(get->bytes + get->n_byte, bytes, n_byte);
-    get->n_byte += n_byte;
+    memcpy(to->at + to->n, bytes, n_byte);
+    to->n += n_byte;
     return true;
 }
 
@@ -63,7 +62,7 @@ int link_get_callback(struct lws *wsi, enum lws_callback_reasons reason, void *u
     case LWS_CALLBACK_RECEIVE_CLIENT_HTTP:
         return link_get_read(wsi);
     case LWS_CALLBACK_RECEIVE_CLIENT_HTTP_READ:
-        if (link_get_append(get, in, len)) break;
+        if (link_bytes_append(&get->body, in, len, get->max)) break;
         link_get_end(get, 0, "answer is longer than allowed");
         return -1;
     case LWS_CALLBACK_COMPLETED_CLIENT_HTTP:
@@ -96,17 +95,11 @@ pal_err pal_link_get(pal_link_loop *loop, const char *url, const char *path, siz
     get->max = max;
     get->next = loop->gets;
     loop->gets = get;
-    struct lws_client_connect_info info = {0};
-    info.context = loop->context;
-    info.vhost = loop->vhost;
-    info.address = address.host, info.host = address.host, info.origin = address.host;
-    info.port = address.port;
+    struct lws_client_connect_info info = link_connect_info(loop, &address, LINK_LOCAL_GET, get, &get->wsi);
+    info.origin = address.host;
     info.path = path;
     info.method = "GET";
     info.alpn = "http/1.1";
-    info.local_protocol_name = LINK_LOCAL_GET;
-    info.opaque_user_data = get;
-    info.pwsi = &get->wsi;
     /* on failure the callback has reported it */
     lws_client_connect_via_info(&info);
     return PAL_ERR_OK;
@@ -116,7 +109,7 @@ void link_get_free_all(pal_link_loop *loop)
 {
     for (link_get *get = loop->gets, *next; get; get = next) {
         next = get->next;
-        free(get->bytes);
+        free(get->body.at);
         free(get);
     }
     loop->gets = NULL;

@@ -7,6 +7,7 @@
 #include "server/base/clock.h"
 #include "server/base/log.h"
 
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -69,9 +70,8 @@ void pal_link_loop_destroy(pal_link_loop *loop)
     if (!loop) return;
     while (loop->timers) pal_link_remove_timer(loop->timers);
     /* goodbyes get a fifth of a second; a cancelled wait keeps the service call from sleeping longer */
-    link_close_all(loop);
     const uint64_t end = pal_clock_ns() + 200000000;
-    while (link_any_open(loop) && pal_clock_ns() < end) {
+    while (link_close_all(loop) && pal_clock_ns() < end) {
         lws_cancel_service(loop->context);
         lws_service(loop->context, 0);
     }
@@ -98,6 +98,10 @@ static void link_time_is_up(void *loop)
 
 void pal_link_run_for(pal_link_loop *loop, double seconds)
 {
+    if (seconds <= 0) {
+        pal_link_run(loop);
+        return;
+    }
     pal_link_timer *timer = pal_link_add_timer(loop, (uint64_t)(seconds * 1e6), link_time_is_up, loop);
     if (timer) pal_link_run(loop);
     pal_link_remove_timer(timer);
@@ -108,6 +112,26 @@ void pal_link_stop(pal_link_loop *loop)
 {
     atomic_store(&loop->stop, true);
     lws_cancel_service(loop->context);
+}
+
+/* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
+static atomic_int link_signal;
+
+static void link_on_signal(int number)
+{
+    link_signal = number;
+}
+
+static void link_check_signal(void *loop)
+{
+    if (link_signal) pal_link_stop(loop);
+}
+
+pal_err pal_link_stop_on_signals(pal_link_loop *loop)
+{
+    signal(SIGINT, link_on_signal);
+    signal(SIGTERM, link_on_signal);
+    return pal_link_add_timer(loop, 50000, link_check_signal, loop) ? PAL_ERR_OK : PAL_ERR_MEMORY;
 }
 
 static void link_timer_fired(lws_sorted_usec_list_t *sul)
@@ -159,6 +183,19 @@ pal_err pal_link_poll_fd(pal_link_loop *loop, int fd, void (*fn)(void *user), vo
     watch->next = loop->watches;
     loop->watches = watch;
     return PAL_ERR_OK;
+}
+
+struct lws_client_connect_info link_connect_info(pal_link_loop *loop, const link_address *to,
+                                                 const char *local_protocol, void *object, struct lws **wsi)
+{
+    return (struct lws_client_connect_info){.context = loop->context,
+                                            .vhost = loop->vhost,
+                                            .address = to->host,
+                                            .host = to->host,
+                                            .port = to->port,
+                                            .local_protocol_name = local_protocol,
+                                            .opaque_user_data = object,
+                                            .pwsi = wsi};
 }
 
 pal_err link_address_parse(const char *url, link_address *out, pal_diagnostic *diag)

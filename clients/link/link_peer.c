@@ -1,6 +1,4 @@
-/* One link: connect, join, messages in and out, reconnect (link.h). */
 #include "clients/link/link_core.h"
-#include "protocol/frame_codec.h"
 #include "server/base/clock.h"
 
 #include <stdlib.h>
@@ -21,21 +19,16 @@ struct pal_link {
     struct lws *wsi;
     link_address address;
     char name[PAL_WIRE_MEMBER_NAME];
-    pal_wire_role role;
-    int tool;
-    bool topology_deltas;
-    bool once, closing, up, fixed, pause_reading;
-    double read_bytes_s, read_budget;
+    pal_link_options o; /* without url and name, which are copied */
+    bool closing, up, fixed, pause_reading;
+    double read_budget;
     uint64_t read_ns;
-    const pal_link_events *events;
-    void *user;
     pal_link_state state;
     int close_code;
     char close_why[128];
     uint32_t pause_ms;
     lws_sorted_usec_list_t retry, resume;
-    uint8_t *in; /* message being put together  [in_cap] */
-    size_t n_in, in_cap;
+    link_bytes in; /* message being put together */
     bool in_drop;
     bool has_pose, has_ack;
     uint8_t pose[PAL_WIRE_POSE_BYTES], ack[PAL_WIRE_ACK_BYTES];
@@ -53,8 +46,8 @@ static void link_connect(pal_link *link);
 static void link_report(pal_link *link, pal_link_state state, const char *reason)
 {
     link->state = state;
-    if (!link->closing && link->events->state)
-        link->events->state(link->user, link, state, link->close_code, reason ? reason : "");
+    if (!link->closing && link->o.events->state)
+        link->o.events->state(link->o.user, state, link->close_code, reason ? reason : "");
 }
 
 static void link_want_write(pal_link *link)
@@ -79,7 +72,7 @@ static void link_free(pal_link *link)
     pal_link **place = &link->loop->links;
     while (*place && *place != link) place = &(*place)->next;
     if (*place) *place = link->next;
-    free(link->in);
+    free(link->in.at);
     free(link);
 }
 
@@ -96,7 +89,7 @@ static void link_lost(pal_link *link, const char *reason)
     link->wsi = NULL;
     link->up = link->has_pose = link->has_ack = false;
     link->n_queued = 0;
-    link->n_in = 0;
+    link->in.n = 0;
     link->in_drop = false;
     link->held = PAL_WIRE_TOOL_NONE;
     lws_sul_schedule(link->loop->context, 0, &link->resume, link_resume_fired, LWS_SET_TIMER_USEC_CANCEL);
@@ -104,7 +97,7 @@ static void link_lost(pal_link *link, const char *reason)
         link_free(link);
         return;
     }
-    if (link->once || !link_may_return(link->close_code)) {
+    if (!link_may_return(link->close_code)) {
         link_report(link, PAL_LINK_ENDED, reason);
         return;
     }
@@ -118,17 +111,11 @@ static void link_connect(pal_link *link)
     link->close_code = 0;
     link->close_why[0] = 0;
     link_report(link, PAL_LINK_CONNECTING, "");
-    struct lws_client_connect_info info = {0};
-    info.context = link->loop->context;
-    info.vhost = link->loop->vhost;
-    info.address = link->address.host, info.host = link->address.host;
-    info.port = link->address.port;
+    struct lws_client_connect_info info =
+        link_connect_info(link->loop, &link->address, PAL_PROTOCOL_NAME, link, &link->wsi);
     info.path = link->address.path;
     info.protocol = PAL_PROTOCOL_NAME;
-    info.local_protocol_name = PAL_PROTOCOL_NAME;
     info.ietf_version_or_minus_one = -1;
-    info.opaque_user_data = link;
-    info.pwsi = &link->wsi;
     /* on failure the callback has reported it */
     lws_client_connect_via_info(&info);
 }
@@ -144,14 +131,9 @@ pal_err pal_link_open(pal_link_loop *loop, const pal_link_options *options, pal_
     }
     link->loop = loop;
     strncpy(link->name, options->name ? options->name : "client", sizeof link->name - 1);
-    link->role = options->role;
-    link->tool = options->tool;
-    link->topology_deltas = options->topology_deltas;
-    link->once = options->once;
-    link->read_bytes_s = options->read_bytes_s;
+    link->o = *options;
+    link->o.url = link->o.name = NULL;
     link->read_budget = options->read_bytes_s / 4;
-    link->events = options->events;
-    link->user = options->user;
     link->held = PAL_WIRE_TOOL_NONE;
     link->pause_ms = LINK_PAUSE_FIRST_MS;
     link->next = loop->links;
@@ -180,19 +162,15 @@ void pal_link_close(pal_link *link)
     link_free(link);
 }
 
-void link_close_all(pal_link_loop *loop)
+bool link_close_all(pal_link_loop *loop)
 {
+    bool open = false;
     for (pal_link *link = loop->links, *next; link; link = next) {
         next = link->next;
+        open = open || link->up;
         pal_link_close(link);
     }
-}
-
-bool link_any_open(const pal_link_loop *loop)
-{
-    for (const pal_link *link = loop->links; link; link = link->next)
-        if (link->up) return true;
-    return false;
+    return open;
 }
 
 void link_free_all(pal_link_loop *loop)
@@ -264,7 +242,8 @@ void pal_link_pause_reading(pal_link *link, bool hold)
 static int link_write(pal_link *link, struct lws *wsi)
 {
     uint8_t buffer[LWS_PRE + PAL_CONTROL_IN_MAX];
-    size_t n = 0;
+    const void *from;
+    size_t n;
     enum lws_write_protocol kind = LWS_WRITE_BINARY;
     if (link->closing) {
         lws_close_reason(wsi, LWS_CLOSE_STATUS_NORMAL, NULL, 0);
@@ -272,21 +251,22 @@ static int link_write(pal_link *link, struct lws *wsi)
     }
     if (link->n_queued > 0) {
         n = link->queued_bytes[link->queue_first];
-        memcpy(buffer + LWS_PRE, link->queued[link->queue_first], n);
+        from = link->queued[link->queue_first];
         link->queue_first = (link->queue_first + 1) % LINK_QUEUE;
         link->n_queued--;
         kind = LWS_WRITE_TEXT;
     } else if (link->has_pose) {
         n = sizeof link->pose;
-        memcpy(buffer + LWS_PRE, link->pose, n);
+        from = link->pose;
         link->has_pose = false;
     } else if (link->has_ack) {
         n = sizeof link->ack;
-        memcpy(buffer + LWS_PRE, link->ack, n);
+        from = link->ack;
         link->has_ack = false;
     } else {
         return 0;
     }
+    memcpy(buffer + LWS_PRE, from, n);
     if (lws_write(wsi, buffer + LWS_PRE, n, kind) < 0) return -1;
     if (link->n_queued > 0 || link->has_pose || link->has_ack) lws_callback_on_writable(wsi);
     return 0;
@@ -294,12 +274,12 @@ static int link_write(pal_link *link, struct lws *wsi)
 
 static void link_fault(pal_link *link, int refusal)
 {
-    if (link->events->fault) link->events->fault(link->user, link, refusal);
+    if (link->o.events->fault) link->o.events->fault(link->o.user, refusal);
 }
 
 static void link_text(pal_link *link)
 {
-    const int refusal = pal_control_get((const char *)link->in, link->n_in, true, &link->control);
+    const int refusal = pal_control_get((const char *)link->in.at, link->in.n, true, &link->control);
     if (refusal) {
         link_fault(link, refusal);
         return;
@@ -314,56 +294,45 @@ static void link_text(pal_link *link)
         link->pause_ms = LINK_PAUSE_FIRST_MS;
         link->count.joins++;
     }
-    if (link->events->control) link->events->control(link->user, link, &link->control);
+    if (link->o.events->control) link->o.events->control(link->o.user, &link->control);
     if (hello && !link->closing) link_report(link, PAL_LINK_JOINED, "");
 }
 
 static void link_binary(pal_link *link)
 {
     pal_wire_head head;
-    int refusal = pal_wire_get_head(link->in, link->n_in, &head);
+    int refusal = pal_wire_get_head(link->in.at, link->in.n, &head);
     if (!refusal && head.kind >= PAL_WIRE_POSE) refusal = PAL_REFUSAL_KIND;
     if (refusal)
         link_fault(link, refusal);
-    else if (link->events->message)
-        link->events->message(link->user, link, &head, link->in, link->n_in);
+    else if (link->o.events->message)
+        link->o.events->message(link->o.user, &head, link->in.at, link->in.n);
 }
 
 /* token bucket of a slow client: read_bytes_s fills it, messages empty it; reading pauses while it is empty */
 static void link_spend(pal_link *link, struct lws *wsi, size_t n_byte)
 {
     const uint64_t now = pal_clock_ns();
-    link->read_budget += link->read_bytes_s * 1e-9 * (double)(now - link->read_ns);
-    if (link->read_budget > link->read_bytes_s / 4) link->read_budget = link->read_bytes_s / 4;
+    link->read_budget += link->o.read_bytes_s * 1e-9 * (double)(now - link->read_ns);
+    if (link->read_budget > link->o.read_bytes_s / 4) link->read_budget = link->o.read_bytes_s / 4;
     link->read_ns = now;
     link->read_budget -= (double)n_byte;
     if (link->read_budget >= 0 || link->pause_reading) return;
     link->pause_reading = true;
     lws_rx_flow_control(wsi, 0);
     lws_sul_schedule(link->loop->context, 0, &link->resume, link_resume_fired,
-                     (lws_usec_t)(-link->read_budget / link->read_bytes_s * 1e6) + 1);
+                     (lws_usec_t)(-link->read_budget / link->o.read_bytes_s * 1e6) + 1);
 }
 
-/* pieces of a message are put together, memory follows what really came */
 static void link_receive(pal_link *link, struct lws *wsi, const uint8_t *bytes, size_t n_byte)
 {
     link->count.bytes_in += n_byte;
-    if (link->read_bytes_s > 0) link_spend(link, wsi, n_byte);
+    if (link->o.read_bytes_s > 0) link_spend(link, wsi, n_byte);
     if (lws_is_first_fragment(wsi)) {
-        link->n_in = 0;
+        link->in.n = 0;
         link->in_drop = false;
     }
-    const size_t wanted = link->n_in + n_byte;
-    if (!link->in_drop && wanted > link->in_cap) {
-        const size_t cap = wanted > 2 * link->in_cap ? wanted : 2 * link->in_cap;
-        uint8_t *grown = wanted <= LINK_MESSAGE_MAX ? realloc(link->in, cap) : NULL;
-        link->in_drop = grown == NULL;
-        if (grown) link->in = grown, link->in_cap = cap;
-    }
-    if (!link->in_drop) {
-        memcpy(link->in + link->n_in, bytes, n_byte);
-        link->n_in += n_byte;
-    }
+    link->in_drop = link->in_drop || !link_bytes_append(&link->in, bytes, n_byte, LINK_MESSAGE_MAX);
     if (!lws_is_final_fragment(wsi) || lws_remaining_packet_payload(wsi) > 0) return;
     if (link->in_drop)
         link_fault(link, PAL_REFUSAL_LONG);
@@ -371,7 +340,7 @@ static void link_receive(pal_link *link, struct lws *wsi, const uint8_t *bytes, 
         link_binary(link);
     else
         link_text(link);
-    link->n_in = 0;
+    link->in.n = 0;
 }
 
 static void link_established(pal_link *link, struct lws *wsi)
@@ -379,15 +348,15 @@ static void link_established(pal_link *link, struct lws *wsi)
     link->up = true;
     link->pause_reading = false;
     link->read_ns = pal_clock_ns();
-    if (link->read_bytes_s > 0) {
+    if (link->o.read_bytes_s > 0) {
         const int small = LINK_SMALL_SOCKET;
         setsockopt(lws_get_socket_fd(wsi), SOL_SOCKET, SO_RCVBUF, &small, sizeof small);
     }
     pal_control join = {.type = PAL_CONTROL_JOIN};
     memcpy(join.join.name, link->name, sizeof join.join.name);
-    join.join.role = link->role;
-    join.join.tool = link->tool;
-    join.join.topology_deltas = link->topology_deltas;
+    join.join.role = link->o.role;
+    join.join.tool = link->o.tool;
+    join.join.topology_deltas = link->o.topology_deltas;
     pal_link_send_control(link, &join);
     link_report(link, PAL_LINK_OPEN, "");
     if (link->fixed) lws_rx_flow_control(wsi, 0);

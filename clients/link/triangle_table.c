@@ -1,8 +1,6 @@
 /* Before the asset is there, a corner that no table has marks a slot that no delta has named. */
 #include "clients/link/triangle_table.h"
-
-#include <stdlib.h>
-#include <string.h>
+#include "server/base/heap.h"
 
 #define UNNAMED UINT32_MAX
 
@@ -10,23 +8,19 @@ pal_err pal_triangle_table_init(pal_triangle_table *table, uint32_t n_slot, uint
 {
     memset(table, 0, sizeof *table);
     if (n_slot > PAL_TRIANGLE_SLOT_MAX || n_vertex > PAL_WIRE_VERTEX_MAX) return PAL_ERR_REFUSED;
-    size_t n_byte = 3 * (size_t)n_slot * sizeof *table->tri;
+    pal_err err = PAL_ERR_OK;
     table->n_slot = n_slot;
     table->n_vertex = n_vertex;
-    table->tri = malloc(n_byte + 1);
-    table->work = malloc(PAL_TOPOLOGY_DELTA_WORK_BYTES(n_slot) + 1);
-    if (!table->tri || !table->work) {
-        pal_triangle_table_free(table);
-        return PAL_ERR_MEMORY;
-    }
-    memset(table->tri, 0xFF, n_byte);
-    return PAL_ERR_OK;
+    PAL_ARRAY(&err, table->tri, 3 * (size_t)n_slot);
+    PAL_ARRAY(&err, table->work, PAL_TOPOLOGY_DELTA_WORK_BYTES(n_slot));
+    for (size_t i = 0; i < 3 * (size_t)n_slot && !err; i++) table->tri[i] = UNNAMED;
+    if (err) pal_triangle_table_free(table);
+    return err;
 }
 
 void pal_triangle_table_free(pal_triangle_table *table)
 {
-    free(table->tri);
-    free(table->work);
+    PAL_FREE(table->tri, table->work);
     memset(table, 0, sizeof *table);
 }
 

@@ -7,8 +7,6 @@
 #include "server/base/log.h"
 #include "server/base/vec3.h"
 
-#include <signal.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,21 +22,13 @@ typedef struct crowd {
     pal_end_condition until;
 } crowd;
 
-/* a handler runs on any thread: lock-free atomics are safe there, and between threads as well */
-static atomic_int main_signal;
-
-static void main_on_signal(int number)
-{
-    main_signal = number;
-}
-
 static void main_asset(void *user, const pal_stored_asset *asset)
 {
     crowd *c = user;
     for (int i = 0; i < c->n; i++) pal_scripted_client_asset_changed(c->trainee[i], asset);
 }
 
-/* ends early when asked to, when nobody is left, or when all have seen what they are there for */
+/* ends early when nobody is left, or when all have seen what they are there for */
 static void main_watch(void *user)
 {
     crowd *c = user;
@@ -49,7 +39,7 @@ static void main_watch(void *user)
         pal_client_seen(pal_scripted_client_get_result(c->trainee[i]), seen);
         reached = reached && pal_end_condition_met(&c->until, seen);
     }
-    if (main_signal || all || reached) pal_link_stop(c->loop);
+    if (all || reached) pal_link_stop(c->loop);
 }
 
 typedef struct totals {
@@ -220,6 +210,7 @@ static int main_run(crowd *c, const pal_scripted_client_options *base, double se
     pal_log_set_level(PAL_LOG_WARN);
     pal_err err = pal_link_loop_create(&c->loop);
     const int wanted = base->n_client;
+    if (!err) err = pal_link_stop_on_signals(c->loop);
     if (!err) c->store = pal_asset_store_create(c->loop, base->url, main_asset, c);
     if (!err && !c->store) err = PAL_ERR_MEMORY;
     for (int i = 0; i < wanted && !err; i++) {
@@ -266,33 +257,32 @@ static int main_read(const char *sculpt, pal_orders *orders, const char *until, 
 
 int main(int argc, char **argv)
 {
-    const char *url = NULL, *name = "trainee", *script = "press", *tool = "any", *up = "0,0,1", *stall = NULL,
-               *field = NULL, *sculpt = NULL, *until = NULL;
-    double seconds = 5, rate = 120, clients = 1, slow = 0, depth = 0;
+    const char *tool = "any", *up = "0,0,1", *stall = NULL, *sculpt = NULL, *until = NULL;
+    double seconds = 5, clients = 1;
     bool json = false, quiet = false;
-    int n_operand;
+    pal_scripted_client_options base = {
+        .name = "trainee", .script = "press", .tool = PAL_WIRE_TOOL_ANY, .rate_hz = 120};
     const pal_client_flag flag[] = {
-        {"--script", "NAME", PAL_CLIENT_TEXT, &script, 0, 0, NULL, "press | pull | circle | idle | FILE (press)"},
-        {"--name", "NAME", PAL_CLIENT_TEXT, &name, 0, 0, NULL, "name among the members"},
-        {"--tool", "N", PAL_CLIENT_TEXT, &tool, 0, 0, NULL, "tool to take: its index or any (any)"},
-        {"--seconds", "S", PAL_CLIENT_NUMBER, &seconds, 0.1, 86400, NULL, "how long (5)"},
-        {"--until", "NAME=N,...", PAL_CLIENT_TEXT, &until, 0, 0, NULL,
+        {"--script", "NAME", &base.script, 0, 0, NULL, "press | pull | circle | idle | FILE (press)"},
+        {"--name", "NAME", &base.name, 0, 0, NULL, "name among the members"},
+        {"--tool", "N", &tool, 0, 0, NULL, "tool to take: its index or any (any)"},
+        {"--seconds", "S", &seconds, 0.1, 86400, NULL, "how long (5)"},
+        {"--until", "NAME=N,...", &until, 0, 0, NULL,
          "end before that once each client has seen so much:\n"
          "cycles, frames, answered, fields, deltas, triangles, orders, topologies,\n"
          "cycles_of_it (the last topology's), members, joins, stalls, cycles_after_stall,\n"
          "moved_mm, force_N, field_high"},
-        {"--rate", "HZ", PAL_CLIENT_NUMBER, &rate, 1, 240, NULL, "poses per second (120)"},
-        {"--clients", "N", PAL_CLIENT_NUMBER, &clients, 1, CLIENTS_MAX, NULL, "so many at once (1)"},
-        {"--depth", "M", PAL_CLIENT_NUMBER, &depth, 1e-5, 1, NULL, "depth of a press in metres (8 % of the box)"},
-        {"--up", "X,Y,Z", PAL_CLIENT_TEXT, &up, 0, 0, NULL, "from which side the organ is touched (0,0,1)"},
-        {"--field", "NAME", PAL_CLIENT_TEXT, &field, 0, 0, NULL,
+        {"--rate", "HZ", &base.rate_hz, 1, 240, NULL, "poses per second (120)"},
+        {"--clients", "N", &clients, 1, CLIENTS_MAX, NULL, "so many at once (1)"},
+        {"--depth", "M", &base.depth_m, 1e-5, 1, NULL, "depth of a press in metres (8 % of the box)"},
+        {"--up", "X,Y,Z", &up, 0, 0, NULL, "from which side the organ is touched (0,0,1)"},
+        {"--field", "NAME", &base.field, 0, 0, NULL,
          "ask for displacement | von_mises | energy | stiffness | strain | distortion, check it"},
-        {"--sculpt", "FILE", PAL_CLIENT_TEXT, &sculpt, 0, 0, NULL,
-         "give these orders: lines of SECONDS VERB key=value ... [at=top]"},
-        {"--slow", "BYTES_S", PAL_CLIENT_NUMBER, &slow, 1, 1e9, NULL, "read no faster than this"},
-        {"--stall", "S", PAL_CLIENT_TEXT, &stall, 0, 0, "3", "read nothing for S seconds (3), then go on"},
-        {"--json", NULL, PAL_CLIENT_SWITCH, &json, 0, 0, NULL, "one JSON object on stdout"},
-        {"--quiet", NULL, PAL_CLIENT_SWITCH, &quiet, 0, 0, NULL, "say nothing unless something fails"},
+        {"--sculpt", "FILE", &sculpt, 0, 0, NULL, "give these orders: lines of SECONDS VERB key=value ... [at=top]"},
+        {"--slow", "BYTES_S", &base.read_bytes_s, 1, 1e9, NULL, "read no faster than this"},
+        {"--stall", "S", &stall, 0, 0, "3", "read nothing for S seconds (3), then go on"},
+        {"--json", NULL, &json, 0, 0, NULL, "one JSON object on stdout"},
+        {"--quiet", NULL, &quiet, 0, 0, NULL, "say nothing unless something fails"},
     };
     const pal_client_table table = {
         "palpate-client",
@@ -303,28 +293,20 @@ int main(int argc, char **argv)
         sizeof flag / sizeof flag[0],
         1,
         1};
-    const int code = pal_client_flags_parse(&table, argc, argv, &url, &n_operand);
+    const int code = pal_client_flags_parse(&table, argc, argv, &base.url);
     if (code >= 0) return code;
-    pal_scripted_client_options base = {.url = url,
-                                        .name = name,
-                                        .script = script,
-                                        .field = field,
-                                        .tool = PAL_WIRE_TOOL_ANY,
-                                        .rate_hz = rate,
-                                        .depth_m = depth,
-                                        .n_client = (int)clients,
-                                        .read_bytes_s = slow,
-                                        .stall_s = stall ? atof(stall) : 0};
+    base.n_client = (int)clients;
+    base.stall_s = stall ? atof(stall) : 0;
     if (strcmp(tool, "any")) base.tool = atoi(tool);
     if (!pal_client_parse_vector(up, base.up) || !pal_unit3(base.up, base.up, 1e-9) || base.tool >= PAL_WIRE_TOOL_MAX) {
         fprintf(stderr, "palpate-client: --up wants three numbers, --tool an index or any\n");
         return 2;
     }
-    if (field && (pal_wire_field_find(field) == PAL_WIRE_FIELD_COUNT || !strcmp(field, "none"))) {
+    if (base.field && (pal_wire_field_find(base.field) == PAL_WIRE_FIELD_COUNT || !strcmp(base.field, "none"))) {
         fprintf(stderr,
                 "palpate-client: --field wants displacement, von_mises, energy, stiffness, strain or distortion, not "
                 "\"%s\"\n",
-                field);
+                base.field);
         return 2;
     }
     pal_orders orders = {.n_line = 0};
@@ -333,8 +315,6 @@ int main(int argc, char **argv)
     if (bad) return bad;
     if (sculpt) base.orders = &orders;
     if (!quiet) base.reported = main_reported, base.user = &json;
-    signal(SIGINT, main_on_signal);
-    signal(SIGTERM, main_on_signal);
     crowd c = {.trainee = calloc((size_t)base.n_client, sizeof *c.trainee),
                .name = calloc((size_t)base.n_client, sizeof *c.name),
                .until = seen};

@@ -1,6 +1,6 @@
 #include "clients/scripted_client/samples.h"
 
-#include <stdlib.h>
+#include "server/base/heap.h"
 
 enum { SAMPLES_MAX = 1 << 20 };
 
@@ -9,14 +9,7 @@ void pal_samples_add(pal_samples *s, double value)
     s->n++;
     s->sum += value;
     if (s->n == 1 || value > s->max) s->max = value;
-    if (s->n_kept == SAMPLES_MAX) return;
-    if (s->n_kept == s->cap) {
-        const size_t cap = s->cap ? 2 * s->cap : 1024;
-        float *grown = realloc(s->value, cap * sizeof *grown);
-        if (!grown) return;
-        s->value = grown;
-        s->cap = cap;
-    }
+    if (s->n_kept == SAMPLES_MAX || !PAL_GROW(s->value, s->n_kept)) return;
     s->value[s->n_kept++] = (float)value;
 }
 

@@ -6,7 +6,7 @@
 
 typedef struct pal_samples {
     float *value;
-    size_t n_kept, cap;
+    size_t n_kept;
     uint64_t n;
     double sum, max;
 } pal_samples;

@@ -10,26 +10,23 @@ static void script_add(pal_script *script, double t_s, double x, double y, doubl
     script->key[script->n_key++] = (pal_script_key){t_s, {x, y, z}, buttons};
 }
 
-/* down to `depth` below the rest surface, hold, up again */
-static void script_press(pal_script *script, double radius, double depth)
-{
-    script_add(script, 0.0, 0, 0, radius + 0.01, 0);
-    script_add(script, 0.8, 0, 0, radius - depth, 0);
-    script_add(script, 1.2, 0, 0, radius - depth, 0);
-    script_add(script, 1.8, 0, 0, radius + 0.01, 0);
-    script_add(script, 2.0, 0, 0, radius + 0.01, 0);
-}
+/* a key point: along e1 in depths, along up in depths and m above the radius */
+typedef struct script_point {
+    double t_s, x_depth, up_depth, up_m;
+    uint32_t buttons;
+} script_point;
 
+/* down to the depth below the rest surface, hold, up again */
+static const script_point press[] = {
+    {0, 0, 0, 0.01, 0}, {0.8, 0, -1, 0, 0}, {1.2, 0, -1, 0, 0}, {1.8, 0, 0, 0.01, 0}, {2, 0, 0, 0.01, 0}};
 /* touch, grab, lift, hold, let go */
-static void script_pull(pal_script *script, double radius, double depth)
+static const script_point pull[] = {{0, 0, 0, 0.01, 0}, {0.4, 0, -0.2, 0, 0}, {0.5, 0, -0.2, 0, 1}, {1.4, 0, 2, 0, 1},
+                                    {2, 0.5, 2, 0, 1},  {2.1, 0.5, 2, 0, 0},  {3, 0, 0, 0.01, 0}};
+
+static void script_points(pal_script *script, const script_point *p, size_t n, double radius, double depth)
 {
-    script_add(script, 0.0, 0, 0, radius + 0.01, 0);
-    script_add(script, 0.4, 0, 0, radius - 0.2 * depth, 0);
-    script_add(script, 0.5, 0, 0, radius - 0.2 * depth, 1);
-    script_add(script, 1.4, 0, 0, radius + 2 * depth, 1);
-    script_add(script, 2.0, 0.5 * depth, 0, radius + 2 * depth, 1);
-    script_add(script, 2.1, 0.5 * depth, 0, radius + 2 * depth, 0);
-    script_add(script, 3.0, 0, 0, radius + 0.01, 0);
+    for (; n-- > 0; p++)
+        script_add(script, p->t_s, p->x_depth * depth, 0, radius + p->up_depth * depth + p->up_m, p->buttons);
 }
 
 static void script_circle(pal_script *script, double radius, double depth)
@@ -79,9 +76,9 @@ pal_err pal_script_load(pal_script *script, const char *name, double radius_m, d
     if (script->idle)
         script_add(script, 0, 0, 0, radius_m + 0.05, 0);
     else if (!strcmp(name, "press"))
-        script_press(script, radius_m, depth_m);
+        script_points(script, press, sizeof press / sizeof *press, radius_m, depth_m);
     else if (!strcmp(name, "pull"))
-        script_pull(script, radius_m, depth_m);
+        script_points(script, pull, sizeof pull / sizeof *pull, radius_m, depth_m);
     else if (!strcmp(name, "circle"))
         script_circle(script, radius_m, depth_m);
     else

@@ -1,12 +1,11 @@
 #include "clients/scripted_client/scripted_client.h"
 #include "protocol/field_codec.h"
 #include "server/base/clock.h"
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 
 #include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 /* a client that cannot keep up is served with larger steps, at most this many times the stated error */
 #define COARSEST 10.0
@@ -24,7 +23,6 @@ typedef struct client_part {
 } client_part;
 
 struct pal_scripted_client {
-    pal_link_loop *loop;
     pal_asset_store *store;
     pal_scripted_client_options options;
     pal_link *link;
@@ -51,14 +49,17 @@ struct pal_scripted_client {
     pal_scripted_client_result result;
 };
 
+static const struct {
+    const char *name, *text;
+} fault_table[] = {
+#define X(code, sentence) {#code, sentence},
+    PAL_FAULT_TABLE(X)
+#undef X
+};
+
 const char *pal_fault_name(pal_fault fault)
 {
-    static const char *const name[] = {
-#define X(code, text) #code,
-        PAL_FAULT_TABLE(X)
-#undef X
-    };
-    return name[fault];
+    return fault_table[fault].name;
 }
 
 const char *const pal_client_seen_name[PAL_CLIENT_SEEN_COUNT] = {
@@ -74,16 +75,6 @@ void pal_client_seen(const pal_scripted_client_result *r, double seen[PAL_CLIENT
 #undef X
 }
 
-static const char *client_fault_text(pal_fault fault)
-{
-    static const char *const text[] = {
-#define X(code, sentence) sentence,
-        PAL_FAULT_TABLE(X)
-#undef X
-    };
-    return text[fault];
-}
-
 static void __attribute__((format(printf, 3, 4)))
 client_fault(pal_scripted_client *t, pal_fault fault, const char *format, ...)
 {
@@ -93,7 +84,7 @@ client_fault(pal_scripted_client *t, pal_fault fault, const char *format, ...)
     va_start(arguments, format);
     vsnprintf(detail, sizeof detail, format, arguments);
     va_end(arguments);
-    snprintf(t->result.first_fault, sizeof t->result.first_fault, "%s: %s", client_fault_text(fault), detail);
+    snprintf(t->result.first_fault, sizeof t->result.first_fault, "%s: %s", fault_table[fault].text, detail);
 }
 
 /* touched place: the vertex furthest along up, for several trainees around it */
@@ -378,10 +369,8 @@ static void client_subscribe(pal_scripted_client *t, const pal_wire_part_info *i
     }
 }
 
-static void client_on_message(void *user, pal_link *link, const pal_wire_head *head, const uint8_t *bytes,
-                              size_t n_byte)
+static void client_on_message(void *user, const pal_wire_head *head, const uint8_t *bytes, size_t n_byte)
 {
-    (void)link;
     pal_scripted_client *t = user;
     pal_wire_haptic haptic;
     if (head->kind == PAL_WIRE_FRAME) client_frame(t, bytes, n_byte);
@@ -415,8 +404,7 @@ static void client_parts(pal_scripted_client *t, const pal_wire_part_info *info,
         part->asset = pal_asset_store_request(t->store, info[i].asset);
         client_table(t, &info[i], i);
         if (part->now_m && part->epoch == info[i].epoch && part->n_vertex == info[i].n_vertex) continue;
-        free(part->now_m);
-        free(part->first_m);
+        PAL_FREE(part->now_m, part->first_m);
         part->epoch = info[i].epoch;
         part->n_vertex = info[i].n_vertex;
         part->seen = false;
@@ -465,10 +453,10 @@ static void client_hello(pal_scripted_client *t, const pal_wire_hello *hello)
     client_subscribe(t, hello->part, t->n_part);
 }
 
-static void client_on_control(void *user, pal_link *link, const pal_control *c)
+static void client_on_control(void *user, const pal_control *c)
 {
     pal_scripted_client *t = user;
-    if (c->type == PAL_CONTROL_HELLO || c->type == PAL_CONTROL_MEMBERS) t->result.tool = pal_link_tool(link);
+    if (c->type == PAL_CONTROL_HELLO || c->type == PAL_CONTROL_MEMBERS) t->result.tool = pal_link_tool(t->link);
     if (c->type == PAL_CONTROL_MEMBERS) t->result.n_member = c->members.n_member;
     if (c->type == PAL_CONTROL_HELLO) client_hello(t, &c->hello);
     if (c->type == PAL_CONTROL_TOPOLOGY) {
@@ -480,9 +468,8 @@ static void client_on_control(void *user, pal_link *link, const pal_control *c)
     if (c->type == PAL_CONTROL_ANSWER || c->type == PAL_CONTROL_ERROR) client_answered(t, c);
 }
 
-static void client_on_state(void *user, pal_link *link, pal_link_state state, int code, const char *reason)
+static void client_on_state(void *user, pal_link_state state, int code, const char *reason)
 {
-    (void)link;
     pal_scripted_client *t = user;
     if (state != PAL_LINK_LOST && state != PAL_LINK_ENDED) return;
     snprintf(t->result.closed, sizeof t->result.closed, "%d %.150s", code, reason);
@@ -492,9 +479,8 @@ static void client_on_state(void *user, pal_link *link, pal_link_state state, in
     }
 }
 
-static void client_on_fault(void *user, pal_link *link, int refusal)
+static void client_on_fault(void *user, int refusal)
 {
-    (void)link;
     client_fault(user, PAL_FAULT_MALFORMED, "%s", pal_refusal_text(refusal));
 }
 
@@ -565,7 +551,6 @@ pal_err pal_scripted_client_open(pal_link_loop *loop, pal_asset_store *store,
     static const pal_link_events events = {client_on_state, client_on_control, client_on_message, client_on_fault};
     pal_scripted_client *t = calloc(1, sizeof *t);
     if (!t) return PAL_ERR_MEMORY;
-    t->loop = loop;
     t->store = store;
     t->options = *options;
     t->result.tool = PAL_WIRE_TOOL_NONE;
@@ -600,9 +585,7 @@ void pal_scripted_client_destroy(pal_scripted_client *t)
 {
     if (!t) return;
     for (int i = 0; i < PAL_WIRE_PART_MAX; i++) {
-        free(t->part[i].now_m);
-        free(t->part[i].first_m);
-        free(t->part[i].kept);
+        PAL_FREE(t->part[i].now_m, t->part[i].first_m, t->part[i].kept);
         pal_triangle_table_free(&t->part[i].table);
     }
     pal_samples_free(&t->result.latency_ms);

@@ -1,4 +1,3 @@
-/* Monotonic time and pacing on POSIX clocks. */
 #include "server/base/clock.h"
 
 #include <errno.h>

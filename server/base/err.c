@@ -1,29 +1,25 @@
-/* The error table as text. */
 #include "server/base/err.h"
 
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-static const char *const names[] = {
-#define X(code, text) #code,
-    PAL_ERR_TABLE(X)
-#undef X
-};
-static const char *const texts[] = {
-#define X(code, text) text,
+static const struct {
+    const char *name, *text;
+} table[] = {
+#define X(code, text) {#code, text},
     PAL_ERR_TABLE(X)
 #undef X
 };
 
 const char *pal_err_name(pal_err err)
 {
-    return (unsigned)err < PAL_ERR_COUNT ? names[err] : "UNKNOWN";
+    return (unsigned)err < PAL_ERR_COUNT ? table[err].name : "UNKNOWN";
 }
 
 const char *pal_err_text(pal_err err)
 {
-    return (unsigned)err < PAL_ERR_COUNT ? texts[err] : "unknown error code";
+    return (unsigned)err < PAL_ERR_COUNT ? table[err].text : "unknown error code";
 }
 
 pal_err pal_diagnostic_set(pal_diagnostic *diag, pal_err err, const char *format, ...)

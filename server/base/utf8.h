@@ -31,4 +31,14 @@ static inline bool pal_utf8_printable(uint32_t c)
     return !(c < 0x20 || (c >= 0x7f && c < 0xa0) || (c >= 0x200b && c <= 0x200f) || (c >= 0x2028 && c <= 0x202e) ||
              (c >= 0x2060 && c <= 0x206f) || c == 0xfeff);
 }
+
+/* is all of a text well-formed and printable? */
+static inline bool pal_utf8_all_printable(const char *text, size_t n_byte)
+{
+    uint32_t code;
+    size_t at = 0;
+    for (int n; at < n_byte && (n = pal_utf8_next(text + at, n_byte - at, &code)) && pal_utf8_printable(code);)
+        at += (size_t)n;
+    return at == n_byte;
+}
 #endif

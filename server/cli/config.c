@@ -52,30 +52,17 @@ static size_t find(const char *key)
     return k;
 }
 
-static pal_err check_text(const char *text, size_t n, const char *where, pal_diagnostic *diag)
-{
-    uint32_t code;
-    if (n >= PAL_CONFIG_TEXT)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %zu bytes of text, more than %d", where, n,
-                                  PAL_CONFIG_TEXT - 1);
-    for (size_t k = 0; k < n;) {
-        int size = pal_utf8_next(text + k, n - k, &code);
-        if (size == 0 || !pal_utf8_printable(code))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: has a control character", where);
-        k += (size_t)size;
-    }
-    return PAL_ERR_OK;
-}
-
 pal_err pal_config_set(pal_config *config, const char *key, const char *text, const char *where, pal_diagnostic *diag)
 {
     size_t k = find(key), n = strlen(text);
-    if (k == PAL_CONFIG_KEYS) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: unknown key", where);
+    if (k == PAL_CONFIG_KEYS) return PAL_REFUSE(diag, "%s: unknown key", where);
     void *out = (char *)config + place[k];
     PAL_TRY(pal_flag_read(&pal_config_keys[k], text, where, out, diag));
     if (pal_config_keys[k].kind != PAL_FLAG_TEXT && pal_config_keys[k].kind != PAL_FLAG_WORD) return PAL_ERR_OK;
-    PAL_TRY(check_text(text, n, where, diag));
-    if (out == config->listen && n == 0) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: is empty", where);
+    if (n >= PAL_CONFIG_TEXT)
+        return PAL_REFUSE(diag, "%s: %zu bytes of text, more than %d", where, n, PAL_CONFIG_TEXT - 1);
+    if (!pal_utf8_all_printable(text, n)) return PAL_REFUSE(diag, "%s: has a control character", where);
+    if (out == config->listen && n == 0) return PAL_REFUSE(diag, "%s: is empty", where);
     memcpy(out, text, n + 1);
     return PAL_ERR_OK;
 }
@@ -83,37 +70,32 @@ pal_err pal_config_set(pal_config *config, const char *key, const char *text, co
 /* a value of the file as text; NULL: of the wrong kind, and *fault says so */
 static const char *text_of(const cJSON *item, pal_flag_kind kind, char number[32], const char **fault)
 {
-    switch (kind) {
-    case PAL_FLAG_SWITCH:
+    if (kind == PAL_FLAG_SWITCH) {
         *fault = "is not true or false";
         return cJSON_IsBool(item) ? cJSON_IsTrue(item) ? "true" : "false" : NULL;
-    case PAL_FLAG_TEXT:
-    case PAL_FLAG_WORD:
+    }
+    if (kind == PAL_FLAG_TEXT || kind == PAL_FLAG_WORD) {
         *fault = "is not a text";
-        return cJSON_IsString(item) ? item->valuestring : NULL;
-    case PAL_FLAG_NUMBER:
-    case PAL_FLAG_COUNT:
-        break;
+        return cJSON_GetStringValue(item);
     }
     *fault = "is not a number";
-    if (!cJSON_IsNumber(item)) return NULL;
     snprintf(number, 32, "%.17g", item->valuedouble);
-    return number;
+    return cJSON_IsNumber(item) ? number : NULL;
 }
 
 static pal_err read_keys(pal_config *config, const char *name, const cJSON *root, pal_diagnostic *diag)
 {
     char where[PAL_CONFIG_TEXT], number[32];
     const char *fault;
-    if (!cJSON_IsObject(root)) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: not a JSON object", name);
+    if (!cJSON_IsObject(root)) return PAL_REFUSE(diag, "%s: not a JSON object", name);
     for (const cJSON *item = root->child; item; item = item->next) {
         size_t k = find(item->string);
         snprintf(where, sizeof where, "%.180s: %.60s", name, item->string);
-        if (k == PAL_CONFIG_KEYS) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: unknown key", where);
+        if (k == PAL_CONFIG_KEYS) return PAL_REFUSE(diag, "%s: unknown key", where);
         if (cJSON_GetObjectItemCaseSensitive(root, item->string) != item)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: the key is given twice", where);
+            return PAL_REFUSE(diag, "%s: the key is given twice", where);
         const char *text = text_of(item, pal_config_keys[k].kind, number, &fault);
-        if (!text) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s", where, fault);
+        if (!text) return PAL_REFUSE(diag, "%s: %s", where, fault);
         PAL_TRY(pal_config_set(config, item->string, text, where, diag));
     }
     return PAL_ERR_OK;
@@ -123,15 +105,14 @@ pal_err pal_config_parse(pal_config *config, const char *name, const char *json,
 {
     const char *end = json;
     int line = 1;
-    if (n_byte > FILE_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %zu bytes, more than %d", name, n_byte, FILE_MAX);
+    if (n_byte > FILE_MAX) return PAL_REFUSE(diag, "%s: %zu bytes, more than %d", name, n_byte, FILE_MAX);
     cJSON *root = n_byte ? cJSON_ParseWithLengthOpts(json, n_byte, &end, false) : NULL;
     size_t at = end >= json ? (size_t)(end - json) : 0;
     while (root && at < n_byte && strchr(" \t\r\n", json[at])) at++;
     if (!root || at < n_byte) {
         for (size_t k = 0; k < at && k < n_byte; k++) line += json[k] == '\n';
         cJSON_Delete(root);
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: line %d: not JSON", name, line);
+        return PAL_REFUSE(diag, "%s: line %d: not JSON", name, line);
     }
     pal_config fresh = *config;
     pal_err err = read_keys(&fresh, name, root, diag);

@@ -44,16 +44,14 @@ static pal_err read_number(const pal_flag *flag, const char *text, const char *w
     char *end;
     double number = strtod(text, &end);
     if (end == text || *end || isspace((unsigned char)*text) || !isfinite(number))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: \"%.60s\" is not a number", where, text);
+        return PAL_REFUSE(diag, "%s: \"%.60s\" is not a number", where, text);
     if (!(number >= flag->low && number <= flag->high))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.15g is outside %.10g .. %.10g", where, number,
-                                  flag->low, flag->high);
+        return PAL_REFUSE(diag, "%s: %.15g is outside %.10g .. %.10g", where, number, flag->low, flag->high);
     if (flag->kind == PAL_FLAG_NUMBER) {
         *(double *)out = number;
         return PAL_ERR_OK;
     }
-    if (number != floor(number))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %.15g is not a whole number", where, number);
+    if (number != floor(number)) return PAL_REFUSE(diag, "%s: %.15g is not a whole number", where, number);
     *(int *)out = (int)number;
     return PAL_ERR_OK;
 }
@@ -62,21 +60,16 @@ pal_err pal_flag_read(const pal_flag *flag, const char *text, const char *where,
 {
     char list[200];
     bool yes = !strcmp(text, "true") || !strcmp(text, "1");
-    switch (flag->kind) {
-    case PAL_FLAG_SWITCH:
+    if (flag->kind == PAL_FLAG_SWITCH) {
         if (!yes && strcmp(text, "false") != 0 && strcmp(text, "0") != 0)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: \"%.40s\" is not true or false", where, text);
+            return PAL_REFUSE(diag, "%s: \"%.40s\" is not true or false", where, text);
         *(bool *)out = yes;
         return PAL_ERR_OK;
-    case PAL_FLAG_WORD:
-        if (pal_flag_word(flag->value, text) >= 0) return PAL_ERR_OK;
-        list_words(flag->value, list, sizeof list);
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: \"%.60s\" is not %s", where, text, list);
-    case PAL_FLAG_TEXT:
-        return PAL_ERR_OK;
-    case PAL_FLAG_NUMBER:
-    case PAL_FLAG_COUNT:
-        break;
     }
-    return read_number(flag, text, where, out, diag);
+    if (flag->kind == PAL_FLAG_WORD && pal_flag_word(flag->value, text) < 0) {
+        list_words(flag->value, list, sizeof list);
+        return PAL_REFUSE(diag, "%s: \"%.60s\" is not %s", where, text, list);
+    }
+    const bool number = flag->kind == PAL_FLAG_NUMBER || flag->kind == PAL_FLAG_COUNT;
+    return number ? read_number(flag, text, where, out, diag) : PAL_ERR_OK;
 }

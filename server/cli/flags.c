@@ -22,8 +22,6 @@ typedef struct parse {
     char name[PAL_CONFIG_KEYS][KEY];                  /* "--allow-remote"                               */
 } parse;
 
-/* ---- manual ---- */
-
 static void manual_line(const char *name, const char *value, const char *help)
 {
     char left[80];
@@ -57,8 +55,6 @@ static int manual(const parse *p)
     return 0;
 }
 
-/* ---- parsing ---- */
-
 int pal_flags_wrong(const pal_flag_common *common, const char *format, ...)
 {
     char text[400];
@@ -84,17 +80,12 @@ static void list_flags(parse *p)
         flag->name = p->name[k], flag->kind = PAL_FLAG_TEXT;
         flag++->out = &p->given[k];
     }
-    if (p->table->config)
-        *flag++ = (pal_flag){"--config",
-                             "FILE",
-                             PAL_FLAG_TEXT,
-                             &p->config_file,
-                             0,
-                             0,
-                             "JSON file of these keys (PALPATE_CONFIG, or none)"};
-    *flag++ = (pal_flag){
-        "--json", NULL, PAL_FLAG_SWITCH, &p->common->json, 0, 0, "one JSON object on stdout and nothing else"};
-    *flag++ = (pal_flag){"--quiet", NULL, PAL_FLAG_SWITCH, &p->common->quiet, 0, 0, "print nothing but a refusal"};
+    const char *keys = "JSON file of these keys (PALPATE_CONFIG, or none)";
+    const pal_flag last[] = {
+        {"--config", "FILE", PAL_FLAG_TEXT, &p->config_file, 0, 0, keys},
+        {"--json", NULL, PAL_FLAG_SWITCH, &p->common->json, 0, 0, "one JSON object on stdout and nothing else"},
+        {"--quiet", NULL, PAL_FLAG_SWITCH, &p->common->quiet, 0, 0, "print nothing but a refusal"}};
+    for (int k = p->table->config ? 0 : 1; k < 3; k++) *flag++ = last[k];
     p->n_flag = (int)(flag - p->flag);
 }
 

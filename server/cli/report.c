@@ -10,15 +10,7 @@
 
 int pal_report_code(pal_err err)
 {
-    switch (err) {
-    case PAL_ERR_OK:
-        return 0;
-    case PAL_ERR_MEMORY:
-    case PAL_ERR_INTERNAL:
-        return 3;
-    default:
-        return 1;
-    }
+    return err == PAL_ERR_MEMORY || err == PAL_ERR_INTERNAL ? 3 : err != PAL_ERR_OK;
 }
 
 int pal_report_refusal(const pal_flag_common *common, pal_err err, const pal_diagnostic *diag)
@@ -60,12 +52,8 @@ void pal_report_progress(const char *what, double fraction, void *user)
     const pal_flag_common *common = user;
     if (common->quiet || common->json || !isatty(STDERR_FILENO)) return;
     if (!what && !shown) return;
-    if (!what)
-        fprintf(stderr, "\r\033[K");
-    else if (fraction > 0)
-        fprintf(stderr, "\r\033[K%s %.0f %%", what, 100 * fraction);
-    else
-        fprintf(stderr, "\r\033[K%s", what);
+    fprintf(stderr, "\r\033[K%s", what ? what : "");
+    if (what && fraction > 0) fprintf(stderr, " %.0f %%", 100 * fraction);
     fflush(stderr);
     shown = what != NULL;
 }

@@ -68,11 +68,6 @@ static double acceptance_temperature(const walk *w)
     return w->t0 * cool(w->o->cost_scale * rate(w->o), w->n, w->k_accept, ANNEAL_COLDEST);
 }
 
-static bool has_value(double cost)
-{
-    return isfinite(cost) && cost < DBL_MAX;
-}
-
 static uint64_t key_of(const walk *w, int64_t number)
 {
     return pal_random_bits(w->o->seed, (uint64_t)number);
@@ -118,7 +113,7 @@ static pal_err evaluate(walk *w, int m)
     w->r->n_spent += m;
     PAL_TRY(w->o->evaluate(w->o->user, w->p, m, w->cost));
     for (int j = 0; j < m; j++)
-        if (!has_value(w->cost[j])) w->cost[j] = DBL_MAX;
+        if (!isfinite(w->cost[j])) w->cost[j] = DBL_MAX;
     return PAL_ERR_OK;
 }
 
@@ -278,17 +273,14 @@ static pal_err advance(walk *w)
 static pal_err check_box(const pal_anneal_options *o, pal_diagnostic *diag)
 {
     if (o->n_parameter < 1 || !o->low || !o->high)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "annealing: %d parameters, wanted 1 at least", o->n_parameter);
+        return PAL_REFUSE(diag, "annealing: %d parameters, wanted 1 at least", o->n_parameter);
     for (int i = 0; i < o->n_parameter; i++) {
         double low = o->low[i], high = o->high[i];
         if (!(low < high) || !isfinite(high - low))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                      "annealing: parameter %d lies between %g and %g, which is no range", i, low,
-                                      high);
+            return PAL_REFUSE(diag, "annealing: parameter %d lies between %g and %g, which is no range", i, low, high);
         if (o->first && !(o->first[i] >= low && o->first[i] <= high))
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                      "annealing: parameter %d begins at %g, outside of %g to %g", i, o->first[i], low,
-                                      high);
+            return PAL_REFUSE(diag, "annealing: parameter %d begins at %g, outside of %g to %g", i, o->first[i], low,
+                              high);
     }
     return PAL_ERR_OK;
 }
@@ -296,9 +288,8 @@ static pal_err check_box(const pal_anneal_options *o, pal_diagnostic *diag)
 static pal_err check_numbers(const pal_anneal_options *o, pal_diagnostic *diag)
 {
     if (o->n_start < 0 || o->n_temperature_sample < 1 || o->n_batch < 1 || o->n_batch > PAL_ANNEAL_MAX_BATCH)
-        return pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED,
-            "annealing: n_start %d, n_temper %d, n_batch %d, wanted 0, 1 and 1 at least, n_batch at most %d",
+        return PAL_REFUSE(
+            diag, "annealing: n_start %d, n_temper %d, n_batch %d, wanted 0, 1 and 1 at least, n_batch at most %d",
             o->n_start, o->n_temperature_sample, o->n_batch, (int)PAL_ANNEAL_MAX_BATCH);
     const double ratio = o->ratio_scale, scale = o->anneal_scale, c = rate(o), cost = o->cost_scale,
                  coldest = o->min_temperature_ratio, h = o->difference;
@@ -313,14 +304,11 @@ static pal_err check_numbers(const pal_anneal_options *o, pal_diagnostic *diag)
                   {h > 0 && h <= 0.5, "difference", "above 0 and at most 0.5", h}};
     for (size_t k = 0; k < sizeof number / sizeof *number; k++)
         if (!number[k].valid)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "annealing: %s %g, wanted %s", number[k].name,
-                                      number[k].value, number[k].wanted);
+            return PAL_REFUSE(diag, "annealing: %s %g, wanted %s", number[k].name, number[k].value, number[k].wanted);
     if (isnan(o->enough) || !o->evaluate)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "annealing: enough is no number, or there is nothing to evaluate");
+        return PAL_REFUSE(diag, "annealing: enough is no number, or there is nothing to evaluate");
     if (o->max_evaluation <= 0 && o->stall <= 0 && !o->step)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "annealing: no limit of evaluations, no stall and no step: no end");
+        return PAL_REFUSE(diag, "annealing: no limit of evaluations, no stall and no step: no end");
     return PAL_ERR_OK;
 }
 

@@ -15,25 +15,24 @@ typedef struct incidence {
 
 static pal_err find_items(int n, const pal_cliques *list, int n_list, incidence *out)
 {
-    int64_t *start = calloc((size_t)n + 2, sizeof *start), *item = NULL;
-    if (!start) return PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    int64_t *start, *item;
+    PAL_ZEROED(&err, start, n + 2);
+    if (err) return err;
     for (int l = 0; l < n_list; l++) {
         int64_t n_node = (int64_t)list[l].n_item * list[l].n_corner;
         for (int64_t k = 0; k < n_node; k++) start[list[l].node[k] + 2]++;
     }
     for (int i = 0; i < n; i++) start[i + 2] += start[i + 1];
-    item = malloc(sizeof *item * (size_t)(start[n + 1] + 1));
-    if (!item) {
-        free(start);
-        return PAL_ERR_MEMORY;
-    }
-    for (int l = 0; l < n_list; l++) {
+    PAL_ARRAY(&err, item, start[n + 1]);
+    if (err) free(start);
+    for (int l = 0; l < n_list && !err; l++) {
         const int32_t *node = list[l].node;
         for (int64_t e = 0; e < list[l].n_item; e++)
             for (int c = 0; c < list[l].n_corner; c++) item[start[*node++ + 1]++] = (int64_t)l << 40 | e;
     }
     *out = (incidence){start, item};
-    return PAL_ERR_OK;
+    return err;
 }
 
 /* column[j] += 1 for every pair (i, j <= i); with row: row[column[j]++] = i as well */

@@ -1,4 +1,3 @@
-/* Conjugate gradients. */
 #include "server/num/conjugate_gradient.h"
 
 #include <math.h>

@@ -1,13 +1,9 @@
-/* Cholesky factors in envelope storage. */
 #include "server/num/envelope.h"
 
+#include "server/base/heap.h"
 #include "server/num/conjugate_gradient.h"
 
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
-/* ---- the order ---- */
 
 typedef struct graph {
     int n;
@@ -75,9 +71,11 @@ pal_err pal_envelope_make(int n, const int32_t *start, const int32_t *point, int
                           pal_envelope *out)
 {
     const graph g = {n, start, point};
-    int32_t *index = malloc(3 * sizeof *index * (size_t)n + 1);
-    int64_t *row = malloc(sizeof *row * ((size_t)n + 1));
-    pal_err err = index && row ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    int32_t *index;
+    int64_t *row;
+    PAL_ARRAY(&err, index, 3 * (size_t)n);
+    PAL_ARRAY(&err, row, n + 1);
     int32_t *order = index, *position = index + n, *first = index + 2 * (size_t)n;
     if (!err) {
         find_order(&g, position, order);
@@ -96,11 +94,9 @@ pal_err pal_envelope_make(int n, const int32_t *start, const int32_t *point, int
         memcpy(out->start, row, sizeof *row * ((size_t)n + 1));
         out->position = out->order + n, out->first = out->order + 2 * (size_t)n;
     }
-    free(index), free(row);
+    PAL_FREE(index, row);
     return err;
 }
-
-/* ---- the factor ---- */
 
 static void load_values(pal_envelope *e, const int32_t *start, const int32_t *point, const double *value,
                         const uint8_t *skip)

@@ -22,42 +22,18 @@ size_t pal_interpolation_bytes(const pal_interpolation *rows)
     return ((size_t)rows->n_row + 1) * sizeof *rows->start + n * (sizeof *rows->point + sizeof *rows->weight);
 }
 
-/* ---- row by row ---- */
-
 pal_err pal_interpolation_builder_begin(pal_interpolation_builder *b, int32_t n_row, int32_t n_point, int64_t max_entry)
 {
     memset(b, 0, sizeof *b);
     b->rows.n_point = n_point, b->row_cap = n_row;
     b->max = max_entry < INT32_MAX ? max_entry : INT32_MAX;
-    b->cap = 8 * (int64_t)n_row + 16;
-    if (b->cap > b->max) b->cap = b->max;
     PAL_ZEROED(&b->err, b->rows.start, (size_t)n_row + 1);
-    PAL_ARRAY(&b->err, b->rows.point, b->cap);
-    PAL_ARRAY(&b->err, b->rows.weight, b->cap);
+    PAL_ARRAY(&b->err, b->rows.point, 1);
+    PAL_ARRAY(&b->err, b->rows.weight, 1);
     PAL_ARRAY(&b->err, b->open, n_point);
     PAL_ZEROED(&b->err, b->sum, n_point);
     PAL_ZEROED(&b->err, b->in, n_point);
     return b->err;
-}
-
-/* room for n more entries */
-static void grow(pal_interpolation_builder *b, int64_t n)
-{
-    int64_t need = b->rows.start[b->rows.n_row] + n;
-    if (need <= b->cap) return;
-    if (need > b->max) {
-        b->err = PAL_ERR_BUDGET;
-        return;
-    }
-    int64_t cap = need + need / 2 < b->max ? need + need / 2 : b->max;
-    int32_t *point = realloc(b->rows.point, (size_t)cap * sizeof *point);
-    if (point) b->rows.point = point;
-    double *weight = realloc(b->rows.weight, (size_t)cap * sizeof *weight);
-    if (weight) b->rows.weight = weight;
-    if (point && weight)
-        b->cap = cap;
-    else
-        b->err = PAL_ERR_MEMORY;
 }
 
 PAL_SORT(sort, int32_t, pal_compare_int32)
@@ -65,13 +41,16 @@ PAL_SORT(sort, int32_t, pal_compare_int32)
 void pal_interpolation_builder_end_row(pal_interpolation_builder *b)
 {
     PAL_ASSERT(b->rows.n_row < b->row_cap);
-    if (!b->err) grow(b, b->n_open);
     if (b->err) return;
-    sort(b->open, (size_t)b->n_open);
     int32_t n = b->rows.start[b->rows.n_row];
-    for (int32_t k = 0; k < b->n_open; k++) {
+    if ((int64_t)n + b->n_open > b->max) b->err = PAL_ERR_BUDGET;
+    sort(b->open, (size_t)b->n_open);
+    for (int32_t k = 0; k < b->n_open && !b->err; k++) {
         int32_t i = b->open[k];
-        if (fabs(b->sum[i]) > GONE) b->rows.point[n] = i, b->rows.weight[n++] = b->sum[i];
+        if (fabs(b->sum[i]) > GONE) {
+            if (!PAL_GROW(b->rows.point, n) || !PAL_GROW(b->rows.weight, n)) b->err = PAL_ERR_MEMORY;
+            if (!b->err) b->rows.point[n] = i, b->rows.weight[n++] = b->sum[i];
+        }
         b->sum[i] = 0, b->in[i] = 0;
     }
     b->n_open = 0;
@@ -95,8 +74,6 @@ pal_err pal_interpolation_builder_finish(pal_interpolation_builder *b, pal_inter
     memset(b, 0, sizeof *b);
     return err;
 }
-
-/* ---- whole ---- */
 
 pal_err pal_interpolation_identity(int32_t n, pal_interpolation *out)
 {

@@ -32,7 +32,7 @@ size_t pal_interpolation_bytes(const pal_interpolation *rows);
  * error is kept; later calls have no effect. */
 typedef struct pal_interpolation_builder {
     pal_interpolation rows;
-    int64_t cap, max;
+    int64_t max; /* entries */
     int32_t row_cap, n_open;
     int32_t *open; /* points of the open row                 [n_point] */
     double *sum;   /* their weights, 0 for all others        [n_point] */

@@ -1,4 +1,3 @@
-/* The pattern of panels.h. */
 #include "server/num/panels.h"
 
 #include "server/base/heap.h"
@@ -21,13 +20,6 @@ static bool in_threes(const int *s, int n)
     return true;
 }
 
-/* numbers of a panel of k columns over r rows, with vectors of lanes numbers */
-static int64_t panel_numbers(int k, int r, int lanes)
-{
-    int64_t own = (k + lanes - 1) / lanes, below = (r + lanes - 1) / lanes;
-    return lanes * k * (2 * own + below);
-}
-
 static pal_err fill_pattern(const int *super, const int *pi, const int *s, pal_panels *p)
 {
     for (int i = 0; i <= p->n_super; i++) p->first[i] = super[i] / 3, p->start[i] = pi[i] / 3;
@@ -39,8 +31,8 @@ static pal_err fill_pattern(const int *super, const int *pi, const int *s, pal_p
         for (int c = 0, m; c < n_col; c += m) {
             m = next_width(n_col - c);
             p->width[p->n_panel++] = (uint8_t)m;
-            p->n_value[0] += panel_numbers(3 * m, 3 * (n_row - c - m), 4);
-            p->n_value[1] += panel_numbers(3 * m, 3 * (n_row - c - m), 8);
+            p->n_value[0] += 4 * pal_panel_vectors(3 * m, 3 * (n_row - c - m), 4);
+            p->n_value[1] += 8 * pal_panel_vectors(3 * m, 3 * (n_row - c - m), 8);
         }
     }
     return PAL_ERR_OK;

@@ -27,6 +27,12 @@ typedef struct pal_panels {
 
 enum { PAL_PANEL_PADDING = 16 }; /* numbers behind the working vector of a solve that chunks may touch */
 
+/* vectors of so many lanes in a panel of k columns over r rows */
+static inline int64_t pal_panel_vectors(int k, int r, int lanes)
+{
+    return (int64_t)k * (2 * ((k + lanes - 1) / lanes) + (r + lanes - 1) / lanes);
+}
+
 /* from supernodes of scalar columns: super [n_super + 1] first columns, pi [n_super + 1] first rows in s, whose entries
  * come in threes. INTERNAL: they do not; MEMORY */
 pal_err pal_panels_make(int n_super, const int *super, const int *pi, const int *s, pal_panels *out);

@@ -61,12 +61,6 @@ static inline __attribute__((always_inline)) void backward(int k, int r, const v
     memcpy(t, y, sizeof(REAL) * (size_t)k);
 }
 
-/* vectors in a panel of k columns over r rows */
-static inline int64_t panel_size(int k, int r)
-{
-    return 2 * (int64_t)k * chunks_of(k) + (int64_t)k * chunks_of(r);
-}
-
 /* a pass with its number of columns as a constant */
 #define WITH_CONSTANT(pass, k, r, l, t)                                                                                \
     ((k) == 3 ? pass(3, r, l, t) : (k) == 6 ? pass(6, r, l, t) : (k) == 9 ? pass(9, r, l, t) : pass(12, r, l, t))
@@ -106,14 +100,15 @@ static void solve_all(const pal_panels *p, const REAL *value, REAL *y, REAL *wor
         int n_col = p->first[s + 1] - p->first[s], n_row = (int)(p->start[s + 1] - p->start[s]);
         REAL *own = y + 3 * (size_t)p->first[s];
         if (all_zero(own, 3 * n_col)) { /* a load on few points leaves most of the tree alone */
-            for (int c = 0; c < n_col; c += *width++) l += panel_size(3 * *width, 3 * (n_row - c - *width));
+            for (int c = 0; c < n_col; c += *width++)
+                l += pal_panel_vectors(3 * *width, 3 * (n_row - c - *width), LANES);
             continue;
         }
         gather(row, n_col, n_row, own, y, work);
         for (int c = 0, m; c < n_col; c += m) {
             m = *width++;
             forward_panel(3 * m, 3 * (n_row - c - m), l, work + 3 * c);
-            l += panel_size(3 * m, 3 * (n_row - c - m));
+            l += pal_panel_vectors(3 * m, 3 * (n_row - c - m), LANES);
         }
         memcpy(own, work, sizeof(REAL) * 3 * (size_t)n_col);
         for (int i = n_col; i < n_row; i++)
@@ -126,7 +121,7 @@ static void solve_all(const pal_panels *p, const REAL *value, REAL *y, REAL *wor
         gather(row, n_col, n_row, own, y, work);
         for (int c = n_col, m; c > 0; c -= m) {
             m = *--width;
-            l -= panel_size(3 * m, 3 * (n_row - c));
+            l -= pal_panel_vectors(3 * m, 3 * (n_row - c), LANES);
             backward_panel(3 * m, 3 * (n_row - c), l, work + 3 * (c - m));
         }
         memcpy(own, work, sizeof(REAL) * 3 * (size_t)n_col);

@@ -14,7 +14,6 @@
 #include "server/base/vec3.h"
 
 #include <float.h>
-#include <string.h>
 
 double pal_det3(const double f[9])
 {
@@ -85,18 +84,19 @@ static void any_normal(const double u[3], double r[3])
     pal_scale3(r, 1 / pal_norm3(r), r);
 }
 
-static double largest(const double f[9])
+/* the largest |entry|; *sum is 0, or no number where an entry is not finite */
+static double largest(const double f[9], double *sum)
 {
     double max = 0;
-    for (int i = 0; i < 9; i++) max = fmax(max, fabs(f[i]));
+    *sum = 0;
+    for (int i = 0; i < 9; i++) max = fmax(max, fabs(f[i])), *sum += 0 * f[i];
     return max;
 }
 
 void pal_svd3(const double f[9], double u[9], double s[3], double v[9])
 {
     double b[3][3], w[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, r[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    double max = largest(f), sum = 0;
-    for (int i = 0; i < 9; i++) sum += 0 * f[i];
+    double sum, max = largest(f, &sum);
     if (!(max > 0) || sum != 0) { /* zero or not finite */
         for (int i = 0; i < 9; i++) u[i] = v[i] = i % 4 == 0;
         for (int i = 0; i < 3; i++) s[i] = sum;
@@ -137,9 +137,8 @@ void pal_svd3(const double f[9], double u[9], double s[3], double v[9])
         up = ldexp(1, e / 2), up2 = ldexp(1, e - e / 2);
         for (int i = 0; i < 3; i++) s[i] = s[i] * up * up2;
     }
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) u[3 * k + i] = r[i][k], v[3 * k + i] = w[i][k];
-    }
 }
 
 /* One Jacobi rotation of the symmetric a, entries about 1, in the plane p, q; rows p, q of v follow. True as above */
@@ -165,8 +164,7 @@ static inline bool jacobi_rotation(double a[3][3], double v[3][3], int p, int q)
 void pal_eigen3(const double f[9], double w[3], double v[9])
 {
     double a[3][3], b[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    double max = largest(f), sum = 0;
-    for (int i = 0; i < 9; i++) sum += 0 * f[i];
+    double sum, max = largest(f, &sum);
     if (!(max > 0) || sum != 0) {
         for (int i = 0; i < 9; i++) v[i] = i % 4 == 0;
         for (int i = 0; i < 3; i++) w[i] = sum;
@@ -266,8 +264,7 @@ int pal_polar_rotation(const double f[9], double q[4], int max)
     for (int i = 0; i < 9; i++) square += f[i] * f[i];
     double scale = 1 / sqrt(square);
     if (!(square > 1e-280 && square < 1e280)) {
-        double top = largest(f), sum = 0;
-        for (int i = 0; i < 9; i++) sum += 0 * f[i];
+        double sum, top = largest(f, &sum);
         if (!(top >= DBL_MIN) || sum != 0) return 0;
         scale = 1 / top;
     }

@@ -1,7 +1,6 @@
 /* Rotations of 3x3 matrices, row-major F[3 r + c]. Thread: any. */
 #ifndef PAL_NUM_POLAR_H
 #define PAL_NUM_POLAR_H
-#include <stdbool.h>
 
 /* The rotation R that maximises R : F (the polar rotation where det F > 0), by quaternion iteration (Mueller et al.
  * 2016) from q (w x y z, unit, in and out: warm start), until a step is below 1e-10 rad or `max` steps are made. It

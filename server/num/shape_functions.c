@@ -5,8 +5,6 @@
  * 5) / 20, b = (5 - sqrt 5) / 20; triangle of degree 4 with 6 points (Dunavant 1985). */
 #include "server/num/shape_functions.h"
 
-#include <stddef.h>
-
 #define G 0.57735026918962576451
 #define A 0.58541019662496845446
 #define B 0.13819660112501051518

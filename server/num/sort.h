@@ -12,6 +12,11 @@ static inline int pal_compare_int32(const void *a, const void *b)
     return PAL_COMPARE(*(const int32_t *)a, *(const int32_t *)b);
 }
 
+static inline int pal_compare_double(const void *a, const void *b)
+{
+    return PAL_COMPARE(*(const double *)a, *(const double *)b);
+}
+
 /* three numbers in ascending order */
 static inline void pal_sort3(int32_t r[3], const int32_t c[3])
 {

@@ -1,4 +1,3 @@
-/* Shape functions of subdivided solids and their quadrature. */
 #include "server/num/spline.h"
 
 #include <stdbool.h>

@@ -70,30 +70,15 @@ pal_err pal_json_parse(pal_json *json, const char *text, size_t n_byte, cJSON **
     return PAL_ERR_OK;
 }
 
-static pal_err refuse(const pal_json *at, const char *key, const char *format, va_list args)
-{
-    char sentence[384], path[PAL_JSON_PATH];
-    vsnprintf(sentence, sizeof sentence, format, args);
-    join(path, at->path, key);
-    return PAL_REFUSE(at->diag, "%s: %s%s%s", at->file, path, *path ? ": " : "", sentence);
-}
-
-pal_err pal_json_refuse(const pal_json *at, const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    pal_err err = refuse(at, "", format, args);
-    va_end(args);
-    return err;
-}
-
 pal_err pal_json_refuse_key(const pal_json *at, const char *key, const char *format, ...)
 {
+    char sentence[384], path[PAL_JSON_PATH];
     va_list args;
     va_start(args, format);
-    pal_err err = refuse(at, key, format, args);
+    vsnprintf(sentence, sizeof sentence, format, args);
     va_end(args);
-    return err;
+    join(path, at->path, key);
+    return PAL_REFUSE(at->diag, "%s: %s%s%s", at->file, path, *path ? ": " : "", sentence);
 }
 
 pal_err pal_json_forward(const pal_json *at, const char *key, pal_err err, const pal_diagnostic *reason)
@@ -115,17 +100,17 @@ pal_json pal_json_entry(const pal_json *list, int index, const cJSON *value)
 {
     pal_json entry = *list;
     entry.value = value;
+    entry.index = index;
     if (snprintf(entry.path, sizeof entry.path, "%s[%d]", list->path, index) < 0) entry.path[0] = 0;
     return entry;
 }
 
-/* "a, b, c" of the known keys, for the sentence about an unknown one */
-static void list_known(const char *const *known, char *out, size_t n_byte)
+void pal_json_list_words(const char *const *words, const char *quote, char *out, size_t n_byte)
 {
     size_t n = 0;
     out[0] = 0;
-    for (int k = 0; known[k] && n < n_byte; k++)
-        n += (size_t)snprintf(out + n, n_byte - n, "%s%s", k ? ", " : "", known[k]);
+    for (int k = 0; words[k] && n < n_byte; k++)
+        n += (size_t)snprintf(out + n, n_byte - n, "%s%s%s%s", k ? ", " : "", quote, words[k], quote);
 }
 
 /* a key as it may be printed: at most 40 characters without control characters */
@@ -142,13 +127,12 @@ pal_err pal_json_object(const pal_json *at, const char *const *known)
     char list[256], key[64];
     if (!cJSON_IsObject(at->value)) return pal_json_refuse(at, "is not an object {...}");
     if (cJSON_GetArraySize(at->value) > PAL_JSON_KEYS) return pal_json_refuse(at, "more than %d keys", PAL_JSON_KEYS);
-    PAL_JSON_EACH(child, at)
-    {
+    PAL_JSON_EACH (child, at) {
         bool found = !known;
         for (int k = 0; known && known[k] && !found; k++) found = !strcmp(child->string, known[k]);
         clean_key(child->string, key);
         if (!found) {
-            list_known(known, list, sizeof list);
+            pal_json_list_words(known, "", list, sizeof list);
             return pal_json_refuse_key(at, key, "unknown key; known are %s", list);
         }
         for (const cJSON *other = at->value->child; other != child; other = other->next)
@@ -200,13 +184,11 @@ pal_err pal_json_vector(const pal_json *at, const char *key, double out[3])
     double number[3];
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(at->value, key);
     if (!item) return PAL_ERR_OK;
+    int n = 0;
     const cJSON *child = cJSON_IsArray(item) ? item->child : NULL;
-    for (int k = 0; k < 3; k++, child = child->next) {
-        if (!child || !cJSON_IsNumber(child) || !isfinite(child->valuedouble))
-            return pal_json_refuse_key(at, key, "is not a list of three numbers");
-        number[k] = child->valuedouble;
-    }
-    if (child) return pal_json_refuse_key(at, key, "is not a list of three numbers");
+    for (; n < 3 && cJSON_IsNumber(child) && isfinite(child->valuedouble); child = child->next)
+        number[n++] = child->valuedouble;
+    if (n < 3 || child) return pal_json_refuse_key(at, key, "is not a list of three numbers");
     memcpy(out, number, sizeof number);
     return PAL_ERR_OK;
 }
@@ -225,18 +207,13 @@ pal_err pal_json_box(const pal_json *at, const char *low_key, const char *high_k
 
 pal_err pal_json_text(const pal_json *at, const char *key, bool may_be_empty, char *out, size_t n_byte)
 {
-    uint32_t code;
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(at->value, key);
     if (!item) return PAL_ERR_OK;
     if (!cJSON_IsString(item)) return pal_json_refuse_key(at, key, "is not a text");
     size_t n = strlen(item->valuestring);
     if (n >= n_byte) return pal_json_refuse_key(at, key, "%zu bytes of text, more than %zu", n, n_byte - 1);
     if (n == 0 && !may_be_empty) return pal_json_refuse_key(at, key, "is empty");
-    for (size_t k = 0; k < n;) {
-        int size = pal_utf8_next(item->valuestring + k, n - k, &code);
-        if (size == 0 || !pal_utf8_printable(code)) return pal_json_refuse_key(at, key, "has a control character");
-        k += (size_t)size;
-    }
+    if (!pal_utf8_all_printable(item->valuestring, n)) return pal_json_refuse_key(at, key, "has a control character");
     memcpy(out, item->valuestring, n + 1);
     return PAL_ERR_OK;
 }

@@ -16,6 +16,7 @@ typedef struct pal_json {
     const char *folder;       /* of relative file names */
     const cJSON *value;       /* NULL: absent */
     char path[PAL_JSON_PATH]; /* "bodies[0].model"; "": the root */
+    int index;                /* of an entry in its list */
 } pal_json;
 
 /* the folder of a file, "." for one without; false: longer than out */
@@ -30,16 +31,22 @@ pal_err pal_json_read(const char *path, char *folder, size_t n_folder, char **te
 pal_err pal_json_parse(pal_json *root, const char *text, size_t n_byte, cJSON **tree);
 
 /* "file: path: sentence", REFUSED; and for a key of the object */
-pal_err pal_json_refuse(const pal_json *at, const char *format, ...) __attribute__((format(printf, 2, 3)));
+#define pal_json_refuse(at, ...) pal_json_refuse_key(at, "", __VA_ARGS__)
 pal_err pal_json_refuse_key(const pal_json *at, const char *key, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 /* an error of another reader, about the file that a key names; OK stays OK */
 pal_err pal_json_forward(const pal_json *at, const char *key, pal_err err, const pal_diagnostic *reason);
-/* the value of a key of an object, an entry of a list, and the loop over children */
+/* the value of a key of an object, an entry of a list, and the loops over children and over entries with their paths */
 pal_json pal_json_at(const pal_json *object, const char *key);
 pal_json pal_json_entry(const pal_json *list, int index, const cJSON *value);
 #define PAL_JSON_EACH(item, list)                                                                                      \
     for (const cJSON *item = (list)->value ? (list)->value->child : NULL; item; item = item->next)
+#define PAL_JSON_ENTRIES(at, list)                                                                                     \
+    for (pal_json at = pal_json_entry(list, 0, (list)->value ? (list)->value->child : NULL); at.value;                 \
+         at = pal_json_entry(list, at.index + 1, at.value->next))
+
+/* "a, b, c" of a NULL-terminated list, for the sentence about an unknown one; quote: around each */
+void pal_json_list_words(const char *const *words, const char *quote, char *out, size_t n_byte);
 
 /* is it an object with no key beside those of the NULL-terminated list, and none twice? known NULL: any key */
 pal_err pal_json_object(const pal_json *at, const char *const *known);

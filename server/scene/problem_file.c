@@ -13,13 +13,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- kinds of values ---- */
+#define WORDS(...) ((const char *const[]){__VA_ARGS__, NULL})
 
-/* the first key of a NULL-terminated list that is not there is refused */
-static pal_err need(const pal_json *at, const char *const *keys)
+/* an object of known keys with those that it must have, both NULL-terminated; its note is a text */
+static pal_err read_object(const pal_json *at, const char *const *known, const char *const *needed)
 {
-    for (; *keys; keys++) PAL_TRY(pal_json_need(at, *keys));
-    return PAL_ERR_OK;
+    char note[1024];
+    PAL_TRY(pal_json_object(at, known));
+    for (; needed && *needed; needed++) PAL_TRY(pal_json_need(at, *needed));
+    return pal_json_text(at, "note", true, note, sizeof note);
 }
 
 /* a required vector whose numbers are at most max */
@@ -41,22 +43,14 @@ static pal_err check_numbers(const pal_json *at, const char *const *keys)
     return PAL_ERR_OK;
 }
 
-static pal_err check_note(const pal_json *at)
-{
-    char text[1024];
-    return pal_json_text(at, "note", true, text, sizeof text);
-}
-
 /* one of a NULL-terminated list of words */
 static pal_err read_word(const pal_json *at, const char *key, const char *const *words, char *out, size_t n_byte)
 {
-    char list[160] = "";
-    size_t n = 0;
+    char list[160];
     PAL_TRY(pal_json_text(at, key, false, out, n_byte));
-    for (int k = 0; words[k]; k++) {
+    for (int k = 0; words[k]; k++)
         if (!strcmp(words[k], out)) return PAL_ERR_OK;
-        n += (size_t)snprintf(list + n, sizeof list - n, "%s\"%s\"", k ? ", " : "", words[k]);
-    }
+    pal_json_list_words(words, "\"", list, sizeof list);
     return pal_json_refuse_key(at, key, "\"%s\" is not known; known are %s", out, list);
 }
 
@@ -81,13 +75,11 @@ static pal_err read_poisson(const pal_json *at, double *out)
 
 static pal_err read_region(const pal_json *parent, pal_box *out)
 {
-    static const char *const known[] = {"type", "min", "max", "note", NULL}, *const types[] = {"all", "box", NULL};
     char type[8] = "";
     const pal_json region = pal_json_at(parent, "region"), *at = &region;
     PAL_TRY(pal_json_need(parent, "region"));
-    PAL_TRY(pal_json_object(at, known));
-    PAL_TRY(check_note(at));
-    PAL_TRY(read_word(at, "type", types, type, sizeof type));
+    PAL_TRY(read_object(at, WORDS("type", "min", "max", "note"), NULL));
+    PAL_TRY(read_word(at, "type", WORDS("all", "box"), type, sizeof type));
     *out = (pal_box){.all = !strcmp(type, "all")};
     if (out->all) {
         const char *extra = pal_json_has(at, "min") ? "min" : pal_json_has(at, "max") ? "max" : NULL;
@@ -103,16 +95,10 @@ static pal_err read_region(const pal_json *parent, pal_box *out)
     return PAL_ERR_OK;
 }
 
-/* ---- entries ---- */
-
 static pal_err read_material(const pal_json *at, pal_problem *out, int index)
 {
-    static const char *const known[] = {"id", "region", "E", "nu", "density", "note", NULL};
-    static const char *const needed[] = {"id", "region", "E", "nu", NULL};
     pal_problem_material *m = &out->material[index];
-    PAL_TRY(pal_json_object(at, known));
-    PAL_TRY(need(at, needed));
-    PAL_TRY(check_note(at));
+    PAL_TRY(read_object(at, WORDS("id", "region", "E", "nu", "density", "note"), WORDS("id", "region", "E", "nu")));
     PAL_TRY(pal_json_text(at, "id", false, m->id, sizeof m->id));
     for (int k = 0; k < index; k++)
         if (!strcmp(out->material[k].id, m->id))
@@ -126,13 +112,10 @@ static pal_err read_material(const pal_json *at, pal_problem *out, int index)
 
 static pal_err read_support(const pal_json *at, pal_problem *out, int index)
 {
-    static const char *const known[] = {"type", "region", "move", "note", NULL};
-    static const char *const types[] = {"fixed", "moved", NULL};
     pal_problem_support *s = &out->support[index];
     char type[16] = "";
-    PAL_TRY(pal_json_object(at, known));
-    PAL_TRY(check_note(at));
-    PAL_TRY(read_word(at, "type", types, type, sizeof type));
+    PAL_TRY(read_object(at, WORDS("type", "region", "move", "note"), NULL));
+    PAL_TRY(read_word(at, "type", WORDS("fixed", "moved"), type, sizeof type));
     PAL_TRY(read_region(at, &s->region));
     s->moved = !strcmp(type, "moved");
     if (s->moved) return read_vector(at, "move", PAL_LENGTH_MAX_M, s->move_m);
@@ -156,9 +139,7 @@ static pal_err check_total(const pal_json *at, const pal_problem_load *load)
 
 static pal_err read_traction(const pal_json *at, pal_problem_load *load)
 {
-    static const char *const known[] = {"type",        "region", "surface_normal", "traction",
-                                        "total_force", "area",   "note",           NULL};
-    PAL_TRY(pal_json_object(at, known));
+    PAL_TRY(pal_json_object(at, WORDS("type", "region", "surface_normal", "traction", "total_force", "area", "note")));
     PAL_TRY(read_region(at, &load->region));
     load->has_normal = pal_json_has(at, "surface_normal");
     load->has_traction = pal_json_has(at, "traction");
@@ -177,23 +158,19 @@ static pal_err read_traction(const pal_json *at, pal_problem_load *load)
 
 static pal_err read_load(const pal_json *at, pal_problem_load *load)
 {
-    static const char *const point[] = {"type", "point", "force", "note", NULL};
-    static const char *const gravity[] = {"type", "acceleration", "note", NULL};
-    static const char *const types[] = {"dead_traction", "point", "gravity", NULL};
     char type[24] = "";
     *load = (pal_problem_load){.kind = PAL_LOAD_TRACTION};
-    PAL_TRY(pal_json_object(at, NULL));
-    PAL_TRY(check_note(at));
-    PAL_TRY(read_word(at, "type", types, type, sizeof type));
+    PAL_TRY(read_object(at, NULL, NULL));
+    PAL_TRY(read_word(at, "type", WORDS("dead_traction", "point", "gravity"), type, sizeof type));
     if (!strcmp(type, "dead_traction")) return read_traction(at, load);
     if (!strcmp(type, "point")) {
         load->kind = PAL_LOAD_POINT;
-        PAL_TRY(pal_json_object(at, point));
+        PAL_TRY(pal_json_object(at, WORDS("type", "point", "force", "note")));
         PAL_TRY(read_vector(at, "point", PAL_LENGTH_MAX_M, load->point_m));
         return read_vector(at, "force", 1e15, load->force_N);
     }
     load->kind = PAL_LOAD_GRAVITY;
-    PAL_TRY(pal_json_object(at, gravity));
+    PAL_TRY(pal_json_object(at, WORDS("type", "acceleration", "note")));
     return read_vector(at, "acceleration", 1e9, load->gravity_m_s2);
 }
 
@@ -213,29 +190,22 @@ static pal_err read_id(const pal_json *at, const pal_problem *problem, char out[
 
 static pal_err read_case(const pal_json *at, pal_problem *out, int index)
 {
-    static const char *const known[] = {"id", "loads", "note", NULL};
     pal_problem_case *c = &out->load_case[index];
     pal_json list;
-    PAL_TRY(pal_json_object(at, known));
-    PAL_TRY(check_note(at));
+    PAL_TRY(read_object(at, WORDS("id", "loads", "note"), NULL));
     PAL_TRY(read_id(at, out, c->id));
     PAL_TRY(pal_json_list(at, "loads", PAL_PROBLEM_LOADS, &list));
     if (!list.value || !list.value->child) return pal_json_refuse(&list, "a load case needs at least one load");
-    PAL_JSON_EACH(child, &list)
-    {
-        const pal_json load = pal_json_entry(&list, c->n_load, child);
-        PAL_TRY(read_load(&load, &c->load[c->n_load++]));
-    }
+    PAL_JSON_ENTRIES (load, &list) PAL_TRY(read_load(&load, &c->load[c->n_load++]));
     return PAL_ERR_OK;
 }
 
 /* {"rms": .., "max": ..} */
 static pal_err read_error(const pal_json *parent, const char *key, double *rms, double *max)
 {
-    static const char *const known[] = {"rms", "max", NULL};
     const pal_json at = pal_json_at(parent, key);
     if (!at.value) return PAL_ERR_OK;
-    PAL_TRY(pal_json_object(&at, known));
+    PAL_TRY(pal_json_object(&at, WORDS("rms", "max")));
     PAL_TRY(pal_json_number(&at, "rms", 0, 1e9, rms));
     return pal_json_number(&at, "max", 0, 1e9, max);
 }
@@ -243,53 +213,35 @@ static pal_err read_error(const pal_json *parent, const char *key, double *rms, 
 /* the informative keys of a reference */
 static pal_err check_origin(const pal_json *at)
 {
-    static const char *const known[] = {"element", "nodes", "elements", "coarser_nodes", "note", NULL};
-    static const char *const plain[] = {"points", "max_displacement", "work_f_dot_u", "order_used", NULL};
     char text[64];
     double rms, max;
     const pal_json mesh = pal_json_at(at, "mesh");
-    PAL_TRY(check_note(at));
-    PAL_TRY(check_numbers(at, plain));
+    PAL_TRY(check_numbers(at, WORDS("points", "max_displacement", "work_f_dot_u", "order_used")));
     PAL_TRY(read_error(at, "difference_two_finest", &rms, &max));
     if (!mesh.value) return PAL_ERR_OK;
-    PAL_TRY(pal_json_object(&mesh, known));
+    PAL_TRY(read_object(&mesh, WORDS("element", "nodes", "elements", "coarser_nodes", "note"), NULL));
     PAL_TRY(pal_json_text(&mesh, "element", true, text, sizeof text));
-    PAL_TRY(check_note(&mesh));
-    return check_numbers(&mesh, (const char *const[]){"nodes", "elements", "coarser_nodes", NULL});
+    return check_numbers(&mesh, WORDS("nodes", "elements", "coarser_nodes"));
 }
 
 static pal_err read_reference(const pal_json *at, pal_problem *out, int index)
 {
-    static const char *const known[] = {"id",
-                                        "file",
-                                        "load_case",
-                                        "kinematics",
-                                        "law",
-                                        "E",
-                                        "nu",
-                                        "estimated_error",
-                                        "mesh",
-                                        "points",
-                                        "max_displacement",
-                                        "work_f_dot_u",
-                                        "note",
-                                        "order_used",
-                                        "difference_two_finest",
-                                        NULL};
-    static const char *const needed[] = {"file", "load_case", "kinematics", "law", NULL};
-    static const char *const kinematics[] = {"linear", "finite", NULL};
-    static const char *const laws[] = {"hooke", "neo-hookean", "st-venant-kirchhoff", "corotational", NULL};
     pal_problem_reference *ref = &out->reference[index];
     char word[16] = "";
-    PAL_TRY(pal_json_object(at, known));
+    PAL_TRY(
+        read_object(at,
+                    WORDS("id", "file", "load_case", "kinematics", "law", "E", "nu", "estimated_error", "mesh",
+                          "points", "max_displacement", "work_f_dot_u", "note", "order_used", "difference_two_finest"),
+                    NULL));
     PAL_TRY(read_id(at, out, ref->id));
-    PAL_TRY(need(at, needed));
+    PAL_TRY(read_object(at, NULL, WORDS("file", "load_case", "kinematics", "law")));
     PAL_TRY(pal_json_file_name(at, "file", ref->file, sizeof ref->file));
     PAL_TRY(pal_json_text(at, "load_case", false, ref->load_case, sizeof ref->load_case));
     if (!pal_problem_case_find(out, ref->load_case))
         return pal_json_refuse_key(at, "load_case", "there is no load case \"%s\"", ref->load_case);
-    PAL_TRY(read_word(at, "kinematics", kinematics, word, sizeof word));
-    PAL_TRY(read_word(at, "law", laws, ref->law, sizeof ref->law));
+    PAL_TRY(read_word(at, "kinematics", WORDS("linear", "finite"), word, sizeof word));
+    PAL_TRY(read_word(at, "law", WORDS("hooke", "neo-hookean", "st-venant-kirchhoff", "corotational"), ref->law,
+                      sizeof ref->law));
     ref->finite = !strcmp(word, "finite");
     if (ref->finite == !strcmp(ref->law, "hooke"))
         return pal_json_refuse_key(at, "law", "\"%s\" does not go with %s kinematics", ref->law, word);
@@ -303,8 +255,6 @@ static pal_err read_reference(const pal_json *at, pal_problem *out, int index)
     return check_origin(at);
 }
 
-/* ---- the root ---- */
-
 static pal_err check_units(const pal_json *root)
 {
     static const char *const known[] = {"length", "force", "stress", "density", "note", NULL};
@@ -312,8 +262,7 @@ static pal_err check_units(const pal_json *root)
     char text[32];
     const pal_json at = pal_json_at(root, "units");
     if (!at.value) return PAL_ERR_OK;
-    PAL_TRY(pal_json_object(&at, known));
-    PAL_TRY(check_note(&at));
+    PAL_TRY(read_object(&at, known, NULL));
     for (int k = 0; k < 4; k++) {
         snprintf(text, sizeof text, "%s", unit[k]);
         PAL_TRY(pal_json_text(&at, known[k], false, text, sizeof text));
@@ -326,15 +275,13 @@ static pal_err check_units(const pal_json *root)
 
 static pal_err check_frequencies(const pal_json *at, pal_problem *out, int index)
 {
-    static const char *const known[] = {"nu", "density", "E", "hz", "note", NULL};
     pal_json hz;
     (void)out, (void)index;
-    PAL_TRY(pal_json_object(at, known));
-    PAL_TRY(check_note(at));
-    PAL_TRY(check_numbers(at, (const char *const[]){"nu", "density", "E", NULL}));
+    PAL_TRY(read_object(at, WORDS("nu", "density", "E", "hz", "note"), NULL));
+    PAL_TRY(check_numbers(at, WORDS("nu", "density", "E")));
     PAL_TRY(pal_json_list(at, "hz", 256, &hz));
-    PAL_JSON_EACH(f, &hz)
-    if (!cJSON_IsNumber(f) || !(f->valuedouble >= 0)) return pal_json_refuse(&hz, "is not a list of frequencies");
+    PAL_JSON_EACH (f, &hz)
+        if (!cJSON_IsNumber(f) || !(f->valuedouble >= 0)) return pal_json_refuse(&hz, "is not a list of frequencies");
     return PAL_ERR_OK;
 }
 
@@ -347,9 +294,7 @@ static pal_err read_list(const pal_json *root, pal_problem *out, const char *key
     if (min >= 0) PAL_TRY(pal_json_need(root, key));
     int n = list.value ? cJSON_GetArraySize(list.value) : 0;
     if (n < min) return pal_json_refuse(&list, "%d entries, wanted at least %d", n, min);
-    PAL_JSON_EACH(child, &list)
-    {
-        const pal_json at = pal_json_entry(&list, *count, child);
+    PAL_JSON_ENTRIES (at, &list) {
         PAL_TRY(read(&at, out, *count));
         ++*count;
     }
@@ -358,16 +303,12 @@ static pal_err read_list(const pal_json *root, pal_problem *out, const char *key
 
 static pal_err read_problem(const pal_json *at, pal_problem *p)
 {
-    static const char *const known[] = {
-        "format",   "name",       "units",      "surface",  "surface_unit", "materials",
-        "supports", "load_cases", "references", "geometry", "note",         "undamped_natural_frequencies",
-        NULL};
-    static const char *const formats[] = {"palpate-reference-1", NULL};
     char word[32] = "", unit[16] = "m";
-    PAL_TRY(pal_json_object(at, known));
-    PAL_TRY(need(at, (const char *const[]){"format", "surface", NULL}));
-    PAL_TRY(read_word(at, "format", formats, word, sizeof word));
-    PAL_TRY(check_note(at));
+    PAL_TRY(read_object(at,
+                        WORDS("format", "name", "units", "surface", "surface_unit", "materials", "supports",
+                              "load_cases", "references", "geometry", "note", "undamped_natural_frequencies"),
+                        WORDS("format", "surface")));
+    PAL_TRY(read_word(at, "format", WORDS("palpate-reference-1"), word, sizeof word));
     PAL_TRY(pal_json_text(at, "name", false, p->name, sizeof p->name));
     PAL_TRY(check_units(at));
     PAL_TRY(pal_json_file_name(at, "surface", p->surface, sizeof p->surface));
@@ -383,8 +324,6 @@ static pal_err read_problem(const pal_json *at, pal_problem *p)
     PAL_TRY(read_list(at, p, "load_cases", 1, PAL_PROBLEM_CASES, &p->n_case, read_case));
     return read_list(at, p, "references", -1, PAL_PROBLEM_REFERENCES, &p->n_reference, read_reference);
 }
-
-/* ---- public functions ---- */
 
 pal_err pal_problem_parse(const char *name, const char *text, size_t n_byte, const char *folder, pal_problem **out,
                           pal_diagnostic *diag)
@@ -435,11 +374,11 @@ const pal_problem_reference *pal_problem_reference_find(const pal_problem *probl
 
 pal_err pal_problem_refuse_case(const pal_problem *p, const char *flag, const char *id, pal_diagnostic *diag)
 {
-    char list[320] = "";
-    size_t n = 0;
-    for (int k = 0; k < p->n_case + p->n_reference && n < sizeof list; k++)
-        n += (size_t)snprintf(list + n, sizeof list - n, "%s%s", k ? ", " : "",
-                              k < p->n_case ? p->load_case[k].id : p->reference[k - p->n_case].id);
+    char list[320];
+    const char *known[PAL_PROBLEM_CASES + PAL_PROBLEM_REFERENCES + 1] = {NULL};
+    for (int k = 0; k < p->n_case; k++) known[k] = p->load_case[k].id;
+    for (int k = 0; k < p->n_reference; k++) known[p->n_case + k] = p->reference[k].id;
+    pal_json_list_words(known, "", list, sizeof list);
     if (!id) return PAL_REFUSE(diag, "%s: %s is missing; known are %s", p->path, flag, list);
     return PAL_REFUSE(diag, "%s: %s: there is no load case or reference \"%.40s\"; known are %s", p->path, flag, id,
                       list);

@@ -24,8 +24,6 @@ static const double *origin_of(const pal_body_def *def)
     return def->cells ? def->mesh->surface.origin_m : def->mesh->tets.origin_m;
 }
 
-/* ---- reading ---- */
-
 /* keys and ranges of the numbers at the nodes of a grid */
 typedef struct grid_values {
     const char *key[3];
@@ -72,8 +70,7 @@ static pal_err read_values(const pal_json *at, const grid_values *wanted, const 
         if (cJSON_GetArraySize(list.value) != n)
             return pal_json_refuse(&list, "%d numbers, wanted %d (n[0] n[1] n[2])", cJSON_GetArraySize(list.value), n);
         int k = 0;
-        PAL_JSON_EACH(child, &list)
-        {
+        PAL_JSON_EACH (child, &list) {
             if (!cJSON_IsNumber(child)) return pal_json_refuse(&list, "entry %d is not a number", k + 1);
             own[k] = child->valuedouble;
             if (!(own[k] >= wanted->low[v] && own[k] <= wanted->high[v]))
@@ -229,22 +226,11 @@ pal_err pal_region_read(const pal_json *body, pal_loaded_scene *scene, int index
     if (list.value && list.value->child && strcmp(def->model.name, "fem") != 0 &&
         strcmp(def->model.name, "subdivision_fem") != 0)
         return pal_json_refuse(&list, "model \"%s\" has one material; model \"fem\" takes regions", def->model.name);
-    PAL_JSON_EACH(child, &list)
-    {
+    PAL_JSON_ENTRIES (at, &list) {
         const int k = def->n_region++;
-        const pal_json at = pal_json_entry(&list, k, child);
         PAL_TRY(read_region(&at, origin_of(def), &def->region[k], &scene->region[index][k]));
     }
     return PAL_ERR_OK;
-}
-
-void pal_region_free(pal_loaded_scene *scene, int index)
-{
-    for (int k = 0; k < PAL_REGION_MAX; k++) {
-        free(scene->region[index][k].label);
-        free(scene->region[index][k].grid);
-        scene->region[index][k] = (pal_loaded_region){NULL, NULL};
-    }
 }
 
 pal_err pal_spring_grid_read(const pal_json *model, pal_loaded_scene *scene, int index)
@@ -265,14 +251,6 @@ pal_err pal_spring_grid_read(const pal_json *model, pal_loaded_scene *scene, int
             return pal_json_refuse_key(model, spring_values.key[k], "stands beside a grid that gives the same");
     return PAL_ERR_OK;
 }
-
-void pal_spring_grid_free(pal_loaded_scene *scene, int index)
-{
-    free(scene->spring_grid[index]);
-    scene->spring_grid[index] = NULL;
-}
-
-/* ---- writing ---- */
 
 void pal_region_volume(const char *stem, int region, char *out, size_t n_byte)
 {

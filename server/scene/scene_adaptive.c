@@ -13,8 +13,6 @@
 enum { SHEET = 17 }; /* vertices on a side of the sheet of paper C */
 static const double sphere_m = 0.05, sheet_m = 0.2;
 
-/* ---- surfaces ---- */
-
 /* drops the triangles of all pieces but the one of the largest area, and vertices of none */
 static pal_err keep_largest(pal_surface *surface, pal_diagnostic *diag)
 {
@@ -26,10 +24,8 @@ static pal_err keep_largest(pal_surface *surface, pal_diagnostic *diag)
     for (int t = 0; area && t < surface->n_tri; t++) {
         const double *x = surface->x;
         const int32_t *c = surface->tri + 3 * (size_t)t;
-        double a[3], b[3], n[3];
-        pal_sub3(a, x + 3 * (size_t)c[1], x + 3 * (size_t)c[0]);
-        pal_sub3(b, x + 3 * (size_t)c[2], x + 3 * (size_t)c[0]);
-        pal_cross3(n, a, b);
+        double n[3];
+        pal_normal3(n, x + 3 * (size_t)c[0], x + 3 * (size_t)c[1], x + 3 * (size_t)c[2]);
         area[label[t]] += pal_norm3(n);
     }
     for (int k = 1; area && k < n_piece; k++) best = area[k] > area[best] ? k : best;
@@ -113,20 +109,14 @@ pal_err pal_scene_adaptive_defaults(pal_body_def *body, const pal_surface_scene 
     return pal_entry_put_number(inflate, "pressure_Pa", options->inflate_Pa, diag);
 }
 
-/* ---- shapes ---- */
-
 /* the box around an opening's ring and cap */
 static pal_support_def around(const pal_surface *surface, const int32_t ring[PAL_STOMACH_RING], int32_t cap)
 {
     pal_support_def box = {.lowest = false};
-    for (int c = 0; c < 3; c++) {
-        box.low_m[c] = box.high_m[c] = surface->x[3 * (size_t)cap + (size_t)c];
-        for (int k = 0; k < PAL_STOMACH_RING; k++) {
-            double x = surface->x[3 * (size_t)ring[k] + (size_t)c];
-            box.low_m[c] = fmin(box.low_m[c], x), box.high_m[c] = fmax(box.high_m[c], x);
-        }
-        box.low_m[c] -= PAL_OPENING_M, box.high_m[c] += PAL_OPENING_M;
-    }
+    pal_box3_empty(box.low_m, box.high_m);
+    pal_box3_add(box.low_m, box.high_m, surface->x + 3 * (size_t)cap);
+    for (int k = 0; k < PAL_STOMACH_RING; k++) pal_box3_add(box.low_m, box.high_m, surface->x + 3 * (size_t)ring[k]);
+    for (int c = 0; c < 3; c++) box.low_m[c] -= PAL_OPENING_M, box.high_m[c] += PAL_OPENING_M;
     return box;
 }
 

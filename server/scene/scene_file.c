@@ -2,7 +2,7 @@
  * that belong to the simulation are checked by pal_scene_check at the end. */
 #include "server/scene/scene_file.h"
 
-#include "server/mesh/files/file_bytes.h"
+#include "server/base/heap.h"
 #include "server/mesh/files/mesh_file.h"
 #include "server/scene/json_reader.h"
 #include "server/scene/region_file.h"
@@ -11,8 +11,6 @@
 #include "server/scene/subdivision_file.h"
 
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { FOLDER = 1024 };
 
@@ -25,8 +23,7 @@ static pal_err read_item(const pal_json *at, const char *other, pal_config_entry
     PAL_TRY(pal_json_text(at, "name", false, name, sizeof name));
     if (!*name) return pal_json_refuse(at, "has no name");
     pal_entry_init(out, at->path, name);
-    PAL_JSON_EACH(child, at)
-    {
+    PAL_JSON_EACH (child, at) {
         const char *key = child->string;
         double number[PAL_ENTRY_NUMBERS];
         char text[PAL_ENTRY_TEXT];
@@ -136,21 +133,13 @@ static pal_err read_mesh(const pal_json *at, const pal_config_entry *model, pal_
 
 static pal_err read_lists(const pal_json *at, pal_body_def *body)
 {
-    pal_json list, entry;
+    pal_json list;
     PAL_TRY(pal_json_list(at, "supports", PAL_SUPPORT_MAX, &list));
     if (list.value) body->n_support = 0;
-    PAL_JSON_EACH(child, &list)
-    {
-        entry = pal_json_entry(&list, body->n_support, child);
-        PAL_TRY(read_support(&entry, &body->support[body->n_support++]));
-    }
+    PAL_JSON_ENTRIES (entry, &list) PAL_TRY(read_support(&entry, &body->support[body->n_support++]));
     PAL_TRY(pal_json_list(at, "effects", PAL_ENTRIES_MAX, &list));
     if (list.value) body->n_effect = 0;
-    PAL_JSON_EACH(child, &list)
-    {
-        entry = pal_json_entry(&list, body->n_effect, child);
-        PAL_TRY(read_item(&entry, NULL, &body->effect[body->n_effect++]));
-    }
+    PAL_JSON_ENTRIES (entry, &list) PAL_TRY(read_item(&entry, NULL, &body->effect[body->n_effect++]));
     /* default entries get their path in this scene as well */
     for (int k = 0; k < body->n_effect && !list.value; k++)
         snprintf(body->effect[k].path, sizeof body->effect[k].path, "%.40s", pal_json_entry(&list, k, NULL).path);
@@ -194,9 +183,7 @@ static pal_err read_tools(const pal_json *root, pal_scene *scene)
     PAL_TRY(pal_json_list(root, "tools", PAL_TOOL_MAX, &list));
     pal_tools_default(scene, list.value ? cJSON_GetArraySize(list.value) : 3);
     pal_tool_def *tool = scene->tool;
-    PAL_JSON_EACH(child, &list)
-    {
-        const pal_json at = pal_json_entry(&list, (int)(tool - scene->tool), child);
+    PAL_JSON_ENTRIES (at, &list) {
         PAL_TRY(pal_json_object(&at, pal_scene_keys(PAL_KEYS_TOOL, NULL)));
         PAL_TRY(pal_json_text(&at, "name", false, tool->name, sizeof tool->name));
         PAL_TRY(pal_json_number(&at, "radius_m", 0, 1, &tool->radius_m));
@@ -264,11 +251,7 @@ static pal_err read_scene(const pal_json *at, pal_loaded_scene *loaded)
     PAL_TRY(read_tools(at, scene));
     PAL_TRY(pal_json_list(at, "bodies", PAL_BODY_MAX, &list));
     if (!list.value || !list.value->child) return pal_json_refuse(&list, "a scene needs at least one body");
-    PAL_JSON_EACH(child, &list)
-    {
-        const pal_json body = pal_json_entry(&list, scene->n_body, child);
-        PAL_TRY(read_body(&body, scene->n_body++, loaded));
-    }
+    PAL_JSON_ENTRIES (body, &list) PAL_TRY(read_body(&body, scene->n_body++, loaded));
     pal_diagnostic reason = {""};
     pal_err err = pal_scene_check(scene, &reason);
     return err ? pal_diagnostic_set(at->diag, err, "%s: %s", at->file, reason.text) : PAL_ERR_OK;
@@ -307,9 +290,9 @@ void pal_scene_free(pal_loaded_scene *loaded)
 {
     if (!loaded) return;
     for (int k = 0; k < PAL_BODY_MAX; k++) {
-        pal_region_free(loaded, k);
-        pal_spring_grid_free(loaded, k);
-        pal_subdivision_unload(loaded, k);
+        for (int r = 0; r < PAL_REGION_MAX; r++) PAL_FREE(loaded->region[k][r].label, loaded->region[k][r].grid);
+        PAL_FREE(loaded->spring_grid[k], loaded->stroke[k]);
+        pal_cells_free(&loaded->cells[k]);
         pal_prepared_free(&loaded->mesh[k]);
     }
     free(loaded);

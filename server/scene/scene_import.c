@@ -14,6 +14,7 @@
 #include "server/mesh/files/mesh_file.h"
 #include "server/mesh/geometry/organ.h"
 #include "server/mesh/scan/label_volume.h"
+#include "server/num/sort.h"
 #include "server/scene/subdivision_file.h"
 #include "server/scene/tuning.h"
 
@@ -31,8 +32,6 @@ static void report_progress(const pal_surface_scene *options, const char *what, 
 {
     if (options->progress) options->progress(what, fraction, options->user);
 }
-
-/* ---- names ---- */
 
 void pal_scene_stem(const char *path, char *out, size_t n_byte)
 {
@@ -74,8 +73,6 @@ static void shown_text(const char *from, char *out, size_t n_byte)
     }
     out[n] = 0;
 }
-
-/* ---- resolution ---- */
 
 static int first_resolution(const pal_surface *surface)
 {
@@ -153,8 +150,6 @@ static pal_err choose_resolution(const pal_surface *surface, const pal_surface_s
     *out = best;
     return PAL_ERR_OK;
 }
-
-/* ---- reading ---- */
 
 /* the label asked for, or the most frequent one */
 static pal_err read_volume(const char *path, const pal_surface_scene *options, pal_surface *out,
@@ -245,8 +240,6 @@ pal_err pal_scene_prepare_file(const char *path, const pal_surface_scene *option
     return err;
 }
 
-/* ---- scenes ---- */
-
 /* A shape that was scanned, or drawn as it lies, is in balance with its weight: pulling it down once more would count
  * gravity twice (and let 5 kPa tissue sag by a third of its height). */
 static void leave_gravity_out(pal_body_def *body)
@@ -273,12 +266,6 @@ static pal_err choose_model(pal_body_def *body, const pal_surface_scene *options
     return PAL_ERR_OK;
 }
 
-static int by_height(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* a solid that stands on a thin part, as a kidney on its ureter, would sway on it for half a minute: what is held is
  * the part of the height that has an eighth of the control vertices */
 static pal_err hold_an_eighth(const pal_cells *cells, const double up[3], double *fraction)
@@ -287,17 +274,11 @@ static pal_err hold_an_eighth(const pal_cells *cells, const double up[3], double
     double *height = malloc(sizeof(double) * (size_t)n);
     if (!height) return PAL_ERR_MEMORY;
     for (int i = 0; i < n; i++) height[i] = pal_dot3(cells->x + 3 * (size_t)i, up);
-    qsort(height, (size_t)n, sizeof(double), by_height);
+    qsort(height, (size_t)n, sizeof(double), pal_compare_double);
     double part = (height[(n - 1) / 8] - height[0]) / (height[n - 1] - height[0]);
     *fraction = fmax(*fraction, part);
     free(height);
     return PAL_ERR_OK;
-}
-
-/* as many levels as run in real time; cells that are no hexahedra need one */
-static int choose_levels(const pal_cells *cells)
-{
-    return cells->n_cell <= PAL_WANTED_ELEMENTS / 64 ? 2 : 1;
 }
 
 /* one body with defaults around the prepared mesh in mesh[0], or, where report is NULL, the control cells in cells[0]
@@ -320,11 +301,12 @@ static pal_err make_body(pal_loaded_scene *loaded, const char *name, const pal_s
     else
         pal_body_default(body, plain, &loaded->mesh[0]);
     if (!options->gravity) leave_gravity_out(body);
-    if (cells)
-        PAL_TRY(pal_entry_put_number(&body->model, "levels", options->n_level ? options->n_level : choose_levels(cells),
-                                     diag));
-    else
-        PAL_TRY(choose_model(body, options, report, diag));
+    /* as many levels as run in real time; cells that are no hexahedra need one */
+    const int n_level = options->n_level                                     ? options->n_level
+                        : cells && cells->n_cell <= PAL_WANTED_ELEMENTS / 64 ? 2
+                                                                             : 1;
+    PAL_TRY(cells ? pal_entry_put_number(&body->model, "levels", n_level, diag)
+                  : choose_model(body, options, report, diag));
     /* a body at rest costs nothing until it is touched */
     pal_entry_init(&body->effect[body->n_effect++], "", "sleep");
     for (int k = 0; k < body->n_effect; k++) snprintf(body->effect[k].path, PAL_ENTRY_TEXT, "bodies[0].effects[%d]", k);
@@ -343,10 +325,9 @@ static pal_err make_body(pal_loaded_scene *loaded, const char *name, const pal_s
 
 static pal_err check_shown(const char *what, const char *text, size_t n_byte, pal_diagnostic *diag)
 {
-    char shown[256];
     if (strlen(text) >= n_byte) return PAL_REFUSE(diag, "%s: %zu bytes, more than %zu", what, strlen(text), n_byte - 1);
-    shown_text(text, shown, sizeof shown);
-    if (strcmp(text, shown)) return PAL_REFUSE(diag, "%s: has characters that cannot be shown", what);
+    if (!pal_utf8_all_printable(text, strlen(text)))
+        return PAL_REFUSE(diag, "%s: has characters that cannot be shown", what);
     return PAL_ERR_OK;
 }
 
@@ -365,6 +346,33 @@ pal_err pal_scene_rename(pal_loaded_scene *loaded, const char *name, const char 
     if (title) snprintf(scene->title, sizeof scene->title, "%s", title);
     if (source) snprintf(scene->source, sizeof scene->source, "%s", source);
     return PAL_ERR_OK;
+}
+
+pal_err pal_scene_drop_loose(pal_loaded_scene *loaded, int index, bool largest_only, pal_diagnostic *diag)
+{
+    const pal_body_def *def = &loaded->scene.body[index];
+    pal_prepared *mesh = &loaded->mesh[index];
+    pal_cells *cells = &loaded->cells[index];
+    pal_loose_components *parts = &loaded->loose[index];
+    pal_diagnostic reason = {""};
+    *parts = (pal_loose_components){0};
+    /* anchors of the surface hold every piece of it */
+    if (!strcmp(def->model.name, "adaptive_springs")) return PAL_ERR_OK;
+    const int n = def->cells ? cells->n_vertex : mesh->tets.n_node;
+    uint8_t *fixed = calloc((size_t)n + 1, sizeof *fixed);
+    if (!fixed)
+        return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "body \"%s\": no memory to find what is held", def->name);
+    pal_body_def_mark_fixed(def, loaded->scene.up, def->cells ? cells->x : mesh->tets.x, n, fixed);
+    pal_err err = def->cells ? pal_loose_cells_drop(def->name, fixed, largest_only, cells, parts, &reason)
+                             : pal_loose_components_drop(def->name, fixed, largest_only, mesh, parts, &reason);
+    free(fixed);
+    if (err == PAL_ERR_REFUSED)
+        pal_diagnostic_set(diag, err, "%s, or keep only the largest one (--largest, \"largest\": true in a scene)",
+                           reason.text);
+    else if (err)
+        pal_diagnostic_set(diag, err, "%s", reason.text);
+    if (!err && def->cells && parts->n_dropped > 0) err = pal_subdivision_update_surface(loaded, index, diag);
+    return err;
 }
 
 /* title and source from a file's name; or, after an error, nothing is left of the scene */

@@ -31,7 +31,7 @@ void pal_scene_plain_name(const char *text, const char *otherwise, char out[PAL_
 /* reads, contours a label if it is a volume, chooses the resolution, makes tetrahedra and skin; report may be NULL */
 pal_err pal_scene_prepare_file(const char *path, const pal_surface_scene *options, pal_prepared *out,
                                pal_surface_scene_report *report, pal_diagnostic *diag);
-/* Leaves out what of body `index` nothing holds (scene_loose.c, mesh/volume/loose_components.h), once its supports and
+/* Leaves out what of body `index` nothing holds (mesh/volume/loose_components.h), once its supports and
  * effects are there, and records it in loaded->loose. Model adaptive_springs keeps all pieces. Errors name the
  * body */
 pal_err pal_scene_drop_loose(pal_loaded_scene *loaded, int index, bool largest_only, pal_diagnostic *diag);

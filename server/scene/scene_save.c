@@ -28,10 +28,7 @@ static void stem_of(const pal_scene *scene, int body, char out[MESH_NAME])
         pal_scene_plain_name(scene->body[k].name, "organ", other);
         twice = twice || (k != body && !strcmp(plain, other));
     }
-    if (twice)
-        snprintf(out, MESH_NAME, "%s_%d", plain, body);
-    else
-        snprintf(out, MESH_NAME, "%s", plain);
+    snprintf(out, MESH_NAME, twice ? "%s_%d" : "%s", plain, body);
 }
 
 static void mesh_name(const pal_scene *scene, int body, char out[MESH_NAME])

@@ -14,19 +14,13 @@
 
 enum { PATH = 1600 };
 
-/* ---- cells ---- */
-
 /* the middle of the vertices' box */
 static void middle_of(const pal_cells *cells, double out[3])
 {
-    for (int c = 0; c < 3; c++) {
-        double low = INFINITY, high = -INFINITY;
-        for (int32_t i = 0; i < cells->n_vertex; i++) {
-            low = fmin(low, cells->x[3 * (size_t)i + (size_t)c]);
-            high = fmax(high, cells->x[3 * (size_t)i + (size_t)c]);
-        }
-        out[c] = 0.5 * (low + high);
-    }
+    double low[3], high[3];
+    pal_box3_empty(low, high);
+    for (int32_t i = 0; i < cells->n_vertex; i++) pal_box3_add(low, high, cells->x + 3 * (size_t)i);
+    for (int c = 0; c < 3; c++) out[c] = 0.5 * (low[c] + high[c]);
 }
 
 /* the boundary's triangles as the body's mesh */
@@ -96,15 +90,6 @@ pal_err pal_subdivision_read(const pal_json *at, pal_loaded_scene *scene, int in
     return pal_json_forward(at, "cells", err, &reason);
 }
 
-void pal_subdivision_unload(pal_loaded_scene *scene, int index)
-{
-    pal_cells_free(&scene->cells[index]);
-    free(scene->stroke[index]);
-    scene->stroke[index] = NULL;
-}
-
-/* ---- strokes ---- */
-
 static pal_err read_stroke(const pal_json *at, pal_stroke *out)
 {
     const char *const *known = pal_scene_keys(PAL_KEYS_STROKE, NULL);
@@ -134,15 +119,9 @@ pal_err pal_strokes_read(const pal_json *body, pal_loaded_scene *scene, int inde
     if (!stroke) return pal_diagnostic_set(body->diag, PAL_ERR_MEMORY, "%s: no memory for %s", body->file, list.path);
     scene->stroke[index] = stroke;
     def->stroke = stroke;
-    PAL_JSON_EACH(child, &list)
-    {
-        const pal_json at = pal_json_entry(&list, def->n_stroke, child);
-        PAL_TRY(read_stroke(&at, &stroke[def->n_stroke++]));
-    }
+    PAL_JSON_ENTRIES (at, &list) PAL_TRY(read_stroke(&at, &stroke[def->n_stroke++]));
     return PAL_ERR_OK;
 }
-
-/* ---- the cut ---- */
 
 pal_err pal_cut_read(const pal_json *body, pal_body_def *def)
 {
@@ -162,8 +141,6 @@ pal_err pal_cut_read(const pal_json *body, pal_body_def *def)
     def->cut = true;
     return PAL_ERR_OK;
 }
-
-/* ---- writing ---- */
 
 void pal_subdivision_append(cJSON *object, const pal_body_def *body, const char *file)
 {

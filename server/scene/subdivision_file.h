@@ -18,8 +18,6 @@ pal_err pal_subdivision_read(const pal_json *body, pal_loaded_scene *scene, int 
 pal_err pal_strokes_read(const pal_json *body, pal_loaded_scene *scene, int index);
 /* the key "cut" of a body: {"normal": [..], "offset_m": 0} */
 pal_err pal_cut_read(const pal_json *body, pal_body_def *def);
-/* frees what a body owns of this */
-void pal_subdivision_unload(pal_loaded_scene *scene, int index);
 /* adds "cells" with this file's name, "origin_m", and "cut" and "strokes" where there are such, to a body's object */
 void pal_subdivision_append(cJSON *object, const pal_body_def *body, const char *file);
 #endif

@@ -5,10 +5,8 @@
  * two kinds cancel (cut voxels and their interior), no p fits and no order is reported. */
 #include "server/solve/convergence.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
-
-#include <stdlib.h>
-#include <string.h>
 
 enum { POINTS_MAX = 4096 };
 
@@ -52,11 +50,11 @@ static pal_err choose_points(const pal_surface *surface, const pal_samples *samp
 {
     int n = samples ? samples->n : surface->n_vertex, step = samples ? 1 : (n + POINTS_MAX - 1) / POINTS_MAX;
     *n_out = n = samples ? n : n / (step > 0 ? step : 1);
-    *x = malloc(3 * (size_t)(n > 0 ? n : 1) * sizeof **x);
-    if (!*x) return PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    if (!PAL_ARRAY(&err, *x, 3 * (size_t)n)) return err;
     if (samples) memcpy(*x, samples->x, 3 * sizeof **x * (size_t)n);
     for (int i = 0; i < n && !samples; i++) pal_add3(*x + 3 * i, surface->x + 3 * (i * step), surface->origin_m);
-    return PAL_ERR_OK;
+    return err;
 }
 
 /* Writes displacements to u [n][3], and their differences from `before` [n][3] (NULL: none) and from the samples to
@@ -80,16 +78,13 @@ pal_err pal_convergence(const pal_problem *problem, const pal_problem_case *load
     int n_point = 0, done = 0;
     if (n_done) *n_done = 0;
     if (n < 1 || n > PAL_CONVERGENCE_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d resolutions, wanted 1 to %d", n, PAL_CONVERGENCE_MAX);
+        return PAL_REFUSE(diag, "%d resolutions, wanted 1 to %d", n, PAL_CONVERGENCE_MAX);
     for (int k = 1; k < n; k++)
         if (resolution[k] <= resolution[k - 1])
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "resolution %d comes after %d: wanted ascending ones",
-                                      resolution[k], resolution[k - 1]);
+            return PAL_REFUSE(diag, "resolution %d comes after %d: wanted ascending ones", resolution[k],
+                              resolution[k - 1]);
     pal_err err = choose_points(surface, samples, &x, &n_point);
-    for (int k = 0; k < 2 && !err; k++) {
-        u[k] = malloc(3 * (size_t)(n_point > 0 ? n_point : 1) * sizeof *u[k]);
-        if (!u[k]) err = PAL_ERR_MEMORY;
-    }
+    for (int k = 0; k < 2; k++) PAL_ARRAY(&err, u[k], 3 * (size_t)n_point);
     if (err) pal_diagnostic_set(diag, err, "no memory for %d points", n_point);
     for (; done < n && !err; done++) {
         pal_solution *s = NULL;
@@ -103,8 +98,6 @@ pal_err pal_convergence(const pal_problem *problem, const pal_problem_case *load
     }
     pal_convergence_orders(out, done);
     if (n_done) *n_done = done;
-    free(x);
-    free(u[0]);
-    free(u[1]);
+    PAL_FREE(x, u[0], u[1]);
     return err;
 }

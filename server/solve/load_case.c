@@ -57,8 +57,6 @@ double pal_case_tolerance_m(const pal_tets *tets)
     return 1e-6 * tets->edge_m;
 }
 
-/* ---- voxels ---- */
-
 /* Aligns grid planes with the border of the first support (else material) that cuts the body on an axis. A support
  * that ends within a voxel has the error of one moved by up to a voxel. */
 static void align(const pal_problem *p, int resolution, const pal_surface *surface, double ahead[3])
@@ -141,9 +139,8 @@ pal_err pal_case_supports(const pal_problem *problem, const pal_tets *tets, pal_
             found = pal_box_contains(box, x, slack);
         }
         if (!found)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                      "supports[%d]: no node of the body lies in %s (voxels of %g m)", k,
-                                      pal_box_describe(box).text, tets->edge_m);
+            return PAL_REFUSE(diag, "supports[%d]: no node of the body lies in %s (voxels of %g m)", k,
+                              pal_box_describe(box).text, tets->edge_m);
         out[k] = (pal_support_def){.lowest = false};
         pal_sub3(out[k].low_m, box->low_m, tets->origin_m);
         pal_sub3(out[k].high_m, box->high_m, tets->origin_m);
@@ -151,8 +148,6 @@ pal_err pal_case_supports(const pal_problem *problem, const pal_tets *tets, pal_
     }
     return PAL_ERR_OK;
 }
-
-/* ---- loads ---- */
 
 int pal_case_shape_functions(const pal_body *body, int element, const double local[4], double shape[10],
                              const int32_t **node)
@@ -221,8 +216,8 @@ static pal_err add_traction(const job *j, double *area_m2)
         if (load->has_normal)
             snprintf(facing, sizeof facing, " that faces (%g, %g, %g)", load->normal[0], load->normal[1],
                      load->normal[2]);
-        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "%s: the region %s meets no surface%s", path_of(j).text,
-                                  pal_box_describe(&load->region).text, facing);
+        return PAL_REFUSE(j->diag, "%s: the region %s meets no surface%s", path_of(j).text,
+                          pal_box_describe(&load->region).text, facing);
     }
     if (load->has_traction)
         pal_copy3(per_area, load->traction_Pa);
@@ -244,9 +239,9 @@ static pal_err add_point(const job *j)
     pal_sub3(x, load->point_m, j->body->tets->origin_m);
     int element = pal_locate_point(j->locate, x, local, &outside);
     if (outside > j->body->edge_m)
-        return pal_diagnostic_set(
-            j->diag, PAL_ERR_REFUSED, "%s: the point (%g, %g, %g) lies %g m outside the body, more than a voxel (%g m)",
-            path_of(j).text, load->point_m[0], load->point_m[1], load->point_m[2], outside, j->body->edge_m);
+        return PAL_REFUSE(j->diag, "%s: the point (%g, %g, %g) lies %g m outside the body, more than a voxel (%g m)",
+                          path_of(j).text, load->point_m[0], load->point_m[1], load->point_m[2], outside,
+                          j->body->edge_m);
     spread(j, element, local, load->force_N);
     return PAL_ERR_OK;
 }

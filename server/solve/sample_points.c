@@ -2,12 +2,11 @@
  * order is refused. Numbers are read by strtod in the C locale, which the commands never change. */
 #include "server/solve/sample_points.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/files/file_bytes.h"
 
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { COLUMNS = 6, WORD = 64 };
 static const char *const column_name[COLUMNS] = {"x", "y", "z", "ux", "uy", "uz"};
@@ -70,27 +69,23 @@ static pal_err read_cells(csv *c, double *out)
     char word[WORD], *end;
     for (int k = 0; k < COLUMNS; k++) {
         if (!next_cell(c, word))
-            return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: %d columns, wanted 6: x,y,z,ux,uy,uz",
-                                      c->name, c->line, k);
+            return PAL_REFUSE(c->diag, "%s: line %d: %d columns, wanted 6: x,y,z,ux,uy,uz", c->name, c->line, k);
         if (!out && strcmp(word, column_name[k]))
-            return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED,
-                                      "%s: line %d: column %d is \"%s\", wanted \"%s\" (x,y,z,ux,uy,uz)", c->name,
-                                      c->line, k + 1, shown(word), column_name[k]);
+            return PAL_REFUSE(c->diag, "%s: line %d: column %d is \"%s\", wanted \"%s\" (x,y,z,ux,uy,uz)", c->name,
+                              c->line, k + 1, shown(word), column_name[k]);
         if (!out) continue;
         out[k] = strtod(word, &end);
         if (end == word || *end || !isfinite(out[k]))
-            return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: column %d (%s): \"%s\" is not a number",
-                                      c->name, c->line, k + 1, column_name[k], shown(word));
+            return PAL_REFUSE(c->diag, "%s: line %d: column %d (%s): \"%s\" is not a number", c->name, c->line, k + 1,
+                              column_name[k], shown(word));
     }
     if (next_cell(c, word))
-        return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: column 7, \"%s\", is one too many", c->name,
-                                  c->line, shown(word));
+        return PAL_REFUSE(c->diag, "%s: line %d: column 7, \"%s\", is one too many", c->name, c->line, shown(word));
     return PAL_ERR_OK;
 }
 
 static pal_err read_all(csv *c, const char *text, const char *last, pal_samples *out)
 {
-    size_t cap = 0;
     bool header = false;
     while (next_line(c, &text, last)) {
         double row[COLUMNS];
@@ -100,23 +95,17 @@ static pal_err read_all(csv *c, const char *text, const char *last, pal_samples 
             header = true;
             continue;
         }
-        if ((size_t)out->n == cap) {
-            cap = cap ? 2 * cap : 256;
-            double *x = realloc(out->x, 3 * cap * sizeof *x);
-            if (x) out->x = x;
-            double *u = realloc(out->u, 3 * cap * sizeof *u);
-            if (u) out->u = u;
-            if (!x || !u) return pal_diagnostic_set(c->diag, PAL_ERR_MEMORY, "%s: no memory for its samples", c->name);
-        }
+        if (!pal_heap_grow(&out->x, (size_t)out->n, sizeof row / 2) ||
+            !pal_heap_grow(&out->u, (size_t)out->n, sizeof row / 2))
+            return pal_diagnostic_set(c->diag, PAL_ERR_MEMORY, "%s: no memory for its samples", c->name);
         pal_copy3(out->x + 3 * out->n, row);
         pal_copy3(out->u + 3 * out->n, row + 3);
         out->n++;
     }
     if (!header)
-        return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: empty, wanted the header x,y,z,ux,uy,uz",
-                                  c->name, c->line ? c->line : 1);
-    if (out->n == 0)
-        return pal_diagnostic_set(c->diag, PAL_ERR_REFUSED, "%s: line %d: no row below the header", c->name, c->line);
+        return PAL_REFUSE(c->diag, "%s: line %d: empty, wanted the header x,y,z,ux,uy,uz", c->name,
+                          c->line ? c->line : 1);
+    if (out->n == 0) return PAL_REFUSE(c->diag, "%s: line %d: no row below the header", c->name, c->line);
     return PAL_ERR_OK;
 }
 
@@ -159,8 +148,7 @@ pal_err pal_samples_write(const pal_samples *samples, const char *path, pal_diag
 
 void pal_samples_free(pal_samples *samples)
 {
-    free(samples->x);
-    free(samples->u);
+    PAL_FREE(samples->x, samples->u);
     *samples = (pal_samples){0};
 }
 

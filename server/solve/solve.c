@@ -6,14 +6,13 @@
 #include "server/solve/solve.h"
 
 #include "server/base/clock.h"
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/files/vtk_file.h"
 #include "server/sim/world/world.h"
 #include "server/solve/voxel_refinement.h"
 
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { NEWTON_A_STEP = 4, MAX_NEWTON = 400, MAX_RAMP = 40 };
 static const double step_s = 1.0 / 60; /* not used by a static solver */
@@ -24,7 +23,6 @@ struct pal_solution {
     pal_locate *locate;
     pal_body *body;
     bool hex;
-    const char *element;
 };
 
 /* input of every function of one solve */
@@ -42,8 +40,6 @@ static bool report_progress(const job *j, const char *what, double fraction)
     return !j->options->progress || j->options->progress(what, fraction, j->options->user);
 }
 
-/* ---- scene ---- */
-
 /* material `index` with the replacements of the options */
 static pal_err material_of(const job *j, int index, pal_material *out)
 {
@@ -55,13 +51,12 @@ static pal_err material_of(const job *j, int index, pal_material *out)
     pal_diagnostic reason = {""};
     double asked = out->poisson;
     if (!(asked > -1 && asked < 0.5))
-        return pal_diagnostic_set(
-            j->diag, PAL_ERR_REFUSED,
-            "material \"%s\": nu %g is not a Poisson ratio: wanted more than -1 and less than 0.5", m->id, asked);
+        return PAL_REFUSE(j->diag,
+                          "material \"%s\": nu %g is not a Poisson ratio: wanted more than -1 and less than 0.5", m->id,
+                          asked);
     if (!(out->young_Pa > 0))
-        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED,
-                                  "material \"%s\": E %g Pa is not a stiffness: wanted more than 0", m->id,
-                                  out->young_Pa);
+        return PAL_REFUSE(j->diag, "material \"%s\": E %g Pa is not a stiffness: wanted more than 0", m->id,
+                          out->young_Pa);
     pal_err err = pal_material_check(out, &reason);
     j->result->clamped |= out->poisson != asked;
     return err ? pal_diagnostic_set(j->diag, err, "material \"%s\": %s", m->id, reason.text) : PAL_ERR_OK;
@@ -73,8 +68,7 @@ static pal_err set_materials(const job *j, pal_body_def *body)
     const pal_problem *p = j->problem;
     const double *origin = j->s->mesh.tets.origin_m;
     if (p->n_material > 1 && (!isnan(j->options->young_Pa) || !isnan(j->options->poisson)))
-        return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "E or nu is given, but the problem has %d materials",
-                                  p->n_material);
+        return PAL_REFUSE(j->diag, "E or nu is given, but the problem has %d materials", p->n_material);
     PAL_TRY(material_of(j, 0, &body->material));
     for (int k = 1; k < p->n_material; k++) {
         pal_material m;
@@ -90,8 +84,8 @@ static pal_err set_materials(const job *j, pal_body_def *body)
     double x[3];
     for (int e = 0; e < t->n_tet && !p->material[0].region.all; e++)
         if (!pal_case_material_of(p, t, e, x))
-            return pal_diagnostic_set(j->diag, PAL_ERR_REFUSED, "materials: none of the %d regions holds (%g, %g, %g)",
-                                      p->n_material, x[0], x[1], x[2]);
+            return PAL_REFUSE(j->diag, "materials: none of the %d regions holds (%g, %g, %g)", p->n_material, x[0],
+                              x[1], x[2]);
     return PAL_ERR_OK;
 }
 
@@ -114,10 +108,9 @@ static pal_err set_entries(const job *j, pal_body_def *body)
 static pal_err make_world(const job *j)
 {
     if (j->problem->n_support == 0 && !j->options->inertia_relief)
-        return pal_diagnostic_set(
-            j->diag, PAL_ERR_REFUSED,
-            "supports: none, so the body is free and nothing holds it against its loads (inertia relief "
-            "balances them by its mass)");
+        return PAL_REFUSE(j->diag,
+                          "supports: none, so the body is free and nothing holds it against its loads (inertia relief "
+                          "balances them by its mass)");
     pal_scene *scene = calloc(1, sizeof *scene);
     if (!scene) return pal_diagnostic_set(j->diag, PAL_ERR_MEMORY, "no memory for the scene");
     pal_scene_default(scene);
@@ -157,8 +150,6 @@ static pal_err set_loads(const job *j)
     free(f);
     return err;
 }
-
-/* ---- solving ---- */
 
 /* moves the nodes of moved supports to rest + share * move; later supports win */
 static void move_supports(const job *j, double share)
@@ -241,8 +232,6 @@ static void sum_up(const job *j)
     r->energy_J = pal_world_energy_J(j->s->world);
 }
 
-/* ---- public functions ---- */
-
 /* volume of the material: each element by its filled share */
 static double volume_of(const pal_solution *s)
 {
@@ -264,7 +253,6 @@ static pal_err prepare(const job *j, const pal_surface *surface)
     PAL_TRY(make_world(j));
     const pal_body *b = s->body;
     s->hex = b->n_corner == 8;
-    s->element = o->element;
     j->result->n_node = b->n_node;
     j->result->n_element = b->n_element;
     j->result->edge_m = b->edge_m;
@@ -334,11 +322,11 @@ void pal_solution_at(const pal_solution *s, const double x[3], double u[3])
 pal_err pal_solution_csv(const pal_solution *s, const char *path, pal_diagnostic *diag)
 {
     const pal_body *b = s->body;
-    size_t n = 3 * (size_t)b->n_node;
-    pal_samples all = {.n = b->n_node, .x = malloc(n * sizeof(double)), .u = malloc(n * sizeof(double))};
-    pal_err err = all.x && all.u
-                      ? PAL_ERR_OK
-                      : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for %d nodes", path, b->n_node);
+    pal_samples all = {.n = b->n_node};
+    pal_err err = PAL_ERR_OK;
+    PAL_ARRAY(&err, all.x, 3 * (size_t)b->n_node);
+    PAL_ARRAY(&err, all.u, 3 * (size_t)b->n_node);
+    if (err) pal_diagnostic_set(diag, err, "%s: no memory for %d nodes", path, b->n_node);
     for (int i = 0; i < b->n_node && !err; i++) {
         pal_add3(all.x + 3 * i, b->x_rest + 3 * i, s->mesh.tets.origin_m);
         pal_sub3(all.u + 3 * i, b->x + 3 * i, b->x_rest + 3 * i);
@@ -381,15 +369,15 @@ pal_err pal_solution_vtk(const pal_solution *s, const char *path, pal_diagnostic
 {
     const pal_body *b = s->body;
     size_t n = (size_t)b->n_node;
-    double *stress = calloc(n, sizeof *stress), *volume = calloc(n, sizeof *volume), *moved = calloc(3 * n, 8);
-    pal_err err = stress && volume && moved
-                      ? PAL_ERR_OK
-                      : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for %d nodes", path, b->n_node);
+    double *stress, *volume, *moved;
+    pal_err err = PAL_ERR_OK;
+    PAL_ZEROED(&err, stress, n);
+    PAL_ZEROED(&err, volume, n);
+    PAL_ZEROED(&err, moved, 3 * n);
+    if (err) pal_diagnostic_set(diag, err, "%s: no memory for %d nodes", path, b->n_node);
     if (!err) measure_stress(s, stress, volume);
     for (size_t k = 0; k < 3 * n && !err; k++) moved[k] = b->x[k] - b->x_rest[k];
     if (!err) err = write_vtk(s, path, moved, stress, diag);
-    free(moved);
-    free(stress);
-    free(volume);
+    PAL_FREE(moved, stress, volume);
     return err;
 }

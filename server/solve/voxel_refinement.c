@@ -1,4 +1,3 @@
-/* Splits voxels into equal parts on the grid they came from. */
 #include "server/solve/voxel_refinement.h"
 
 #include "server/base/vec3.h"
@@ -71,8 +70,7 @@ pal_err pal_refine_voxels(pal_prepared *mesh, int split, pal_diagnostic *diag)
     pal_voxels fine = {0};
     pal_tets tets = {0};
     pal_hexes hexes = {0};
-    if (n_hex == 0 || split < 1)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there are no voxels to split by %d", split);
+    if (n_hex == 0 || split < 1) return PAL_REFUSE(diag, "there are no voxels to split by %d", split);
     if ((double)n_hex * split * split * split > MAX_HEXAHEDRA)
         return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "%d voxels split by %d on each axis are more than %d", n_hex,
                                   split, MAX_HEXAHEDRA);

@@ -331,8 +331,7 @@ static pal_err get_points(const pal_json *root, pal_study *s)
     pal_json list;
     PAL_TRY(need(root, "points"));
     PAL_TRY(pal_json_list(root, "points", PAL_STUDY_POINTS, &list));
-    PAL_JSON_EACH(child, &list)
-    {
+    PAL_JSON_EACH (child, &list) {
         pal_study_point *p = &s->point[s->n_point];
         const pal_json at = pal_json_entry(&list, s->n_point, child);
         PAL_TRY(get_fields(&at, none, point_field, N_POINT, p));

@@ -16,12 +16,11 @@ static void push_against_viscous_friction_follows_the_exponential(void)
     pal_dev_info info;
     void *d = opened("premium,hand=off,clock=virtual", &info);
     REQUIRE(d);
-    double mass, viscous, coulomb, v[3];
+    const double mass = 0.075; /* clients/haptic_bridge/README.md, "Devices" */
+    double v[3];
     const double push[3] = {0.2, 0, 0};
     pal_virtual_set_friction(d, 1.5, 0);
     pal_virtual_push(d, push);
-    pal_virtual_plant(d, &mass, &viscous, &coulomb);
-    CHECK_NEAR(mass, 0.075, 0);
     for (int i = 1; i <= 200; i++) {
         pal_virtual_advance(d, 1e-3);
         pal_virtual_truth(d, NULL, v, NULL);
@@ -64,8 +63,8 @@ static void coulomb_friction_holds_below_its_force_and_gives_way_above(void)
     pal_dev_info info;
     void *d = opened("touch,hand=off,clock=virtual", &info);
     REQUIRE(d);
-    double mass, viscous, coulomb, x[3], v[3];
-    pal_virtual_plant(d, &mass, &viscous, &coulomb);
+    const double mass = 0.045, coulomb = 0.26; /* clients/haptic_bridge/README.md, "Devices" */
+    double x[3], v[3];
     const double home[3] = {0, 0, 0}, weak[3] = {0.9 * coulomb, 0, 0}, strong[3] = {1.5 * coulomb, 0, 0};
     pal_virtual_place(d, home);
     pal_virtual_push(d, weak);

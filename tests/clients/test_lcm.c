@@ -310,10 +310,9 @@ static void states_of_many_tools_come_through_the_memory_bus(void)
     CHECK_INT(pal_lcm_link_subscribe(link, "PALPATE1/.*/TOOL/.*", palpate_tool_state_t_get_type_info()), PAL_ERR_OK);
     for (int tool = 0; tool < 8; tool++) {
         palpate_tool_state_t state = a_state();
-        char channel[PAL_LCM_CHANNEL_MAX + 1];
         state.tool = (int16_t)tool;
-        pal_lcm_channel(channel, "main", "TOOL", tool);
-        CHECK_INT(pal_lcm_link_publish(link, channel, palpate_tool_state_t_get_type_info(), &state), PAL_ERR_OK);
+        CHECK_INT(pal_lcm_link_publish(link, "main", "TOOL", tool, palpate_tool_state_t_get_type_info(), &state),
+                  PAL_ERR_OK);
         pal_lcm_link_handle(link);
         CHECK_INT(heard, tool + 1);
         CHECK_INT(heard_pose.tool, tool);
@@ -321,7 +320,7 @@ static void states_of_many_tools_come_through_the_memory_bus(void)
     }
     /* another type on the same channel never reaches the decoder */
     const palpate_haptic_event_t event = {.text = text3};
-    CHECK_INT(pal_lcm_link_publish(link, "PALPATE1/main/TOOL/0", palpate_haptic_event_t_get_type_info(), &event),
+    CHECK_INT(pal_lcm_link_publish(link, "main", "TOOL", 0, palpate_haptic_event_t_get_type_info(), &event),
               PAL_ERR_OK);
     pal_lcm_link_handle(link);
     CHECK_INT(refused, 1);
@@ -329,7 +328,7 @@ static void states_of_many_tools_come_through_the_memory_bus(void)
     /* longer than a datagram */
     static uint8_t payload[70000];
     const palpate_body_frame_t frame = {.size = 70000, .payload = payload};
-    CHECK_INT(pal_lcm_link_publish(link, "PALPATE1/main/BODY/0", palpate_body_frame_t_get_type_info(), &frame),
+    CHECK_INT(pal_lcm_link_publish(link, "main", "BODY", 0, palpate_body_frame_t_get_type_info(), &frame),
               PAL_ERR_REFUSED);
     pal_lcm_link_close(link);
 }

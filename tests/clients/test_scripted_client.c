@@ -37,20 +37,19 @@ static void addresses_are_understood_or_refused_by_name(void)
 
 typedef struct seen {
     pal_link_loop *loop;
-    int connecting, lost, ended, ticks, ticks_between;
+    int connecting, lost, ticks, ticks_between;
 } seen;
-static void on_state(void *user, pal_link *link, pal_link_state state, int code, const char *reason)
+static void on_state(void *user, pal_link_state state, int code, const char *reason)
 {
     seen *s = user;
-    (void)link, (void)code;
+    (void)code;
     s->connecting += state == PAL_LINK_CONNECTING;
     /* timers fire in the order of their times: one of 5 ms comes before the next try */
     if (state == PAL_LINK_CONNECTING && s->lost > 0) CHECK(s->ticks > s->ticks_between);
     s->ticks_between = s->ticks;
     s->lost += state == PAL_LINK_LOST;
-    s->ended += state == PAL_LINK_ENDED;
     if (state == PAL_LINK_LOST) CHECK(reason[0] != 0);
-    if (s->lost == 3 || s->ended) pal_link_stop(s->loop);
+    if (s->lost == 3) pal_link_stop(s->loop);
 }
 static void on_tick(void *user)
 {
@@ -72,11 +71,6 @@ static void link_without_a_server_tries_again_and_blocks_nobody(void)
     CHECK_INT(s.lost, 3);
     CHECK_INT(s.connecting, 3);
     pal_link_close(link);
-    s.lost = 0;
-    o.once = true;
-    REQUIRE(pal_link_open(s.loop, &o, NULL, &link) == PAL_ERR_OK);
-    pal_link_run_for(s.loop, 150);
-    CHECK_INT(s.ended, 1);
     pal_link_loop_destroy(s.loop);
 }
 
@@ -101,15 +95,14 @@ static void flags_are_taken_from_the_table_and_the_rest_refused(void)
     bool loud = false;
     double rate = 5;
     const char *name = "x", *stall = NULL, *operand[1] = {NULL};
-    int n = 0;
-    const pal_client_flag flag[] = {{"--loud", NULL, PAL_CLIENT_SWITCH, &loud, 0, 0, NULL, ""},
-                                    {"--rate", "HZ", PAL_CLIENT_NUMBER, &rate, 1, 100, NULL, ""},
-                                    {"--name", "N", PAL_CLIENT_TEXT, &name, 0, 0, NULL, ""},
-                                    {"--stall", "S", PAL_CLIENT_TEXT, &stall, 0, 0, "3", ""}};
+    const pal_client_flag flag[] = {{"--loud", NULL, &loud, 0, 0, NULL, ""},
+                                    {"--rate", "HZ", &rate, 1, 100, NULL, ""},
+                                    {"--name", "N", &name, 0, 0, NULL, ""},
+                                    {"--stall", "S", &stall, 0, 0, "3", ""}};
     const pal_client_table table = {"test", "URL", "", flag, 4, 1, 1};
     char *good[] = {"test", "--rate=7", "url", "--stall", "--loud", "--name", "Ada"};
-    CHECK_INT(pal_client_flags_parse(&table, 7, good, operand, &n), -1);
-    CHECK(loud && rate == 7 && n == 1);
+    CHECK_INT(pal_client_flags_parse(&table, 7, good, operand), -1);
+    CHECK(loud && rate == 7);
     CHECK_TEXT(operand[0], "url");
     CHECK_TEXT(name, "Ada");
     CHECK_TEXT(stall, "3");
@@ -120,7 +113,7 @@ static void flags_are_taken_from_the_table_and_the_rest_refused(void)
     CHECK(quiet != NULL);
     for (int i = 0; i < 7; i++) {
         char *words[3] = {bad[i][0], bad[i][1], bad[i][2]};
-        CHECK_INT(pal_client_flags_parse(&table, 3, words, operand, &n), 2);
+        CHECK_INT(pal_client_flags_parse(&table, 3, words, operand), 2);
     }
     double triple[3];
     CHECK(pal_client_parse_vector("1,-2,3e-1", triple) && triple[1] == -2 && triple[2] == 0.3);

@@ -1,7 +1,7 @@
 /* Files are kept in a small table; stat decides whether to read again. */
 #include "server/net/transport/site.h"
 
-#include "protocol/sha256.h"
+#include "protocol/asset.h"
 
 #include <fcntl.h>
 #include <limits.h>
@@ -111,7 +111,6 @@ static pal_packet *read_all(int fd, size_t n_byte)
 
 static bool fill(pal_site *site, entry *e, int fd, const struct stat *stat)
 {
-    uint8_t digest[32];
     size_t n = (size_t)stat->st_size, old = e->bytes ? e->bytes->n_byte : 0;
     if (site->n_byte - old + n > MAX_BYTES) return false;
     pal_packet *bytes = read_all(fd, n);
@@ -119,9 +118,8 @@ static bool fill(pal_site *site, entry *e, int fd, const struct stat *stat)
     site->n_byte += n - old;
     pal_packet_replace(&e->bytes, bytes);
     e->changed = stat->st_mtim;
-    pal_sha256(bytes->bytes, n, digest);
     e->etag[0] = '"';
-    for (int i = 0; i < 16; i++) snprintf(e->etag + 1 + 2 * i, 3, "%02x", digest[i]);
+    pal_asset_hash(bytes->bytes, n, e->etag + 1);
     memcpy(e->etag + 33, "\"", 2);
     return true;
 }
