@@ -13,8 +13,6 @@
 
 #include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 typedef struct builder {
     const pal_cell_loops *in;
@@ -53,9 +51,8 @@ static pal_err refuse_at(const builder *b, int32_t cell, int32_t loop, const cha
     const pal_cell_loops *in = b->in;
     vsnprintf(sentence, sizeof sentence, format, list);
     if (loop >= 0) snprintf(face, sizeof face, ", face %d:", file_number(b, loop - in->cell[cell]));
-    return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: cell %d%s %s",
-                              line_of(in->line, loop >= 0 ? loop : in->cell[cell]).text, file_number(b, cell), face,
-                              sentence);
+    return PAL_REFUSE(b->diag, "%s: cell %d%s %s", line_of(in->line, loop >= 0 ? loop : in->cell[cell]).text,
+                      file_number(b, cell), face, sentence);
 }
 
 static pal_err __attribute__((format(printf, 3, 4)))
@@ -87,11 +84,11 @@ static pal_err check_counts(const builder *b)
     const pal_cell_loops *in = b->in;
     pal_diagnostic *diag = b->diag;
     if (in->n_vertex < 1 || in->n_cell < 1 || in->n_vertex > CELL_MAX_ITEM || in->n_cell > CELL_MAX_ITEM)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "cells: %d vertices and %d cells, each must be 1 to %d",
-                                  in->n_vertex, in->n_cell, CELL_MAX_ITEM);
+        return PAL_REFUSE(diag, "cells: %d vertices and %d cells, each must be 1 to %d", in->n_vertex, in->n_cell,
+                          CELL_MAX_ITEM);
     for (int32_t c = 0; c < in->n_cell; c++)
         if (in->cell[0] != 0 || in->cell[c + 1] <= in->cell[c] || in->cell[c + 1] > CELL_MAX_ITEM)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "cells: cell %d has no faces", file_number(b, c));
+            return PAL_REFUSE(diag, "cells: cell %d has no faces", file_number(b, c));
     for (int32_t l = 0; l < in->cell[in->n_cell]; l++) {
         int64_t n = (int64_t)in->loop[l + 1] - in->loop[l];
         if (in->loop[0] != 0 || n < 3 || n > PAL_CELL_LOOP_MAX || in->loop[l + 1] > CELL_MAX_ITEM)
@@ -107,9 +104,8 @@ static pal_err check_corners(const builder *b)
     for (int32_t v = 0; v < in->n_vertex; v++) {
         const double *x = in->x + 3 * (size_t)v;
         if (!(fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2]))) <= MAX_COORDINATE_M && pal_finite3(x)))
-            return pal_diagnostic_set(
-                b->diag, PAL_ERR_REFUSED, "%s: vertex %d is at %g %g %g m, must be within %g m of the origin",
-                line_of(in->vertex_line, v).text, file_number(b, v), x[0], x[1], x[2], MAX_COORDINATE_M);
+            return PAL_REFUSE(b->diag, "%s: vertex %d is at %g %g %g m, must be within %g m of the origin",
+                              line_of(in->vertex_line, v).text, file_number(b, v), x[0], x[1], x[2], MAX_COORDINATE_M);
         b->stamp[v] = -1;
     }
     for (int32_t l = 0; l < in->cell[in->n_cell]; l++)
@@ -122,8 +118,8 @@ static pal_err check_corners(const builder *b)
         }
     for (int32_t v = 0; v < in->n_vertex; v++)
         if (b->stamp[v] < 0)
-            return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: vertex %d belongs to no cell",
-                                      line_of(in->vertex_line, v).text, file_number(b, v));
+            return PAL_REFUSE(b->diag, "%s: vertex %d belongs to no cell", line_of(in->vertex_line, v).text,
+                              file_number(b, v));
     return PAL_ERR_OK;
 }
 
@@ -549,9 +545,9 @@ static pal_err set_sharpness(builder *b)
     for (int32_t v = 0; in->vertex_sharpness && v < c->n_vertex; v++) {
         c->vertex_sharpness[v] = in->vertex_sharpness[v];
         if (!sharpness_valid(in->vertex_sharpness[v]))
-            return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: vertex %d has sharpness %g, must be 0 to %g",
-                                      line_of(in->vertex_line, v).text, file_number(b, v),
-                                      (double)in->vertex_sharpness[v], (double)PAL_SHARPNESS_MAX);
+            return PAL_REFUSE(b->diag, "%s: vertex %d has sharpness %g, must be 0 to %g",
+                              line_of(in->vertex_line, v).text, file_number(b, v), (double)in->vertex_sharpness[v],
+                              (double)PAL_SHARPNESS_MAX);
     }
     memset(b->table, 0, (b->mask + 1) * sizeof *b->table);
     for (int32_t e = 0; in->n_edge_tag > 0 && e < c->n_edge; e++)
@@ -560,17 +556,15 @@ static pal_err set_sharpness(builder *b)
         const pal_cell_tag *tag = &in->edge_tag[k];
         int32_t e = b->table[edge_place(b, tag->a, tag->b)] - 1;
         if (e < 0 || !sharpness_valid(tag->sharp))
-            return pal_diagnostic_set(
-                b->diag, PAL_ERR_REFUSED, "%s: sharpness %g of an edge of vertices %lld and %lld: %s",
-                line_of(in->tag_line, k).text, (double)tag->sharp, (long long)tag->a + in->count_from,
-                (long long)tag->b + in->count_from, e < 0 ? "no cell has it" : "must be 0 to 1000000");
+            return PAL_REFUSE(b->diag, "%s: sharpness %g of an edge of vertices %lld and %lld: %s",
+                              line_of(in->tag_line, k).text, (double)tag->sharp, (long long)tag->a + in->count_from,
+                              (long long)tag->b + in->count_from, e < 0 ? "no cell has it" : "must be 0 to 1000000");
         c->edge[e].sharp = fmaxf(c->edge[e].sharp, tag->sharp);
     }
     for (int32_t k = 0; k < in->n_face_tag; k++) {
         const pal_cell_tag *tag = &in->face_tag[k];
         if (tag->a < 0 || tag->a >= c->n_face_use)
-            return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "cells: sharpness of loop %lld, there are %d",
-                                      (long long)tag->a, c->n_face_use);
+            return PAL_REFUSE(b->diag, "cells: sharpness of loop %lld, there are %d", (long long)tag->a, c->n_face_use);
         if (!sharpness_valid(tag->sharp))
             return refuse_loop(b, tag->a, "has sharpness %g, must be 0 to %g", (double)tag->sharp,
                                (double)PAL_SHARPNESS_MAX);
@@ -617,10 +611,10 @@ static pal_err check_shape(const builder *b)
     if (fault.face_use >= 0)
         return refuse_loop(b, fault.face_use, "has no area (%.3g m^2, longest edge %.3g m)", fault.measure,
                            fault.length_scale_m);
-    return refuse_cell(b, fault.cell,
-                       "has no positive volume (%.3g m^3, %.3g m across): its faces must run "
-                       "counter-clockwise seen from outside",
-                       fault.measure, fault.length_scale_m);
+    return refuse_cell(
+        b, fault.cell,
+        "has no positive volume (%.3g m^3, %.3g m across): its faces must run counter-clockwise seen from outside",
+        fault.measure, fault.length_scale_m);
 }
 
 pal_err pal_cells_make(const pal_cell_loops *loops, pal_cells *out, pal_diagnostic *diag)

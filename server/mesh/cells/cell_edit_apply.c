@@ -108,9 +108,7 @@ pal_err pal_cells_apply(const pal_cells *from, const pal_cells_command *command,
     pal_err err = PAL_ERR_OK;
     pal_edit_work w;
     memset(out, 0, sizeof *out);
-    if (!name)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "edit: kind %d, there are %d", (int)k->kind,
-                                  PAL_CELLS_COMMAND_KINDS);
+    if (!name) return PAL_REFUSE(diag, "edit: kind %d, there are %d", (int)k->kind, PAL_CELLS_COMMAND_KINDS);
     switch (k->kind) {
     case PAL_CELLS_DELETE:
         w = pal_edit_begin(from, diag, "delete cell %d", k->cell);

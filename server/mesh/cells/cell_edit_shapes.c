@@ -3,7 +3,6 @@
 #include "server/mesh/cells/cell_edit_work.h"
 #include "server/mesh/geometry/tuning.h"
 
-#include <math.h>
 #include <stdlib.h>
 
 static pal_err check_boundary_face(const pal_edit_work *w, int32_t face)

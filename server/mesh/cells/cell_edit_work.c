@@ -45,7 +45,7 @@ pal_err pal_edit_refuse(const pal_edit_work *w, const char *format, ...)
     va_start(args, format);
     vsnprintf(sentence, sizeof sentence, format, args);
     va_end(args);
-    return pal_diagnostic_set(w->diag, PAL_ERR_REFUSED, "%s: %s", w->what, sentence);
+    return PAL_REFUSE(w->diag, "%s: %s", w->what, sentence);
 }
 
 pal_err pal_edit_check_number(const pal_edit_work *w, const char *what, int32_t i, int32_t n)

@@ -12,9 +12,6 @@
 
 #include "server/base/heap.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 /* ---- walks in hexahedra ---- */
 
 enum { U, V, W };
@@ -132,10 +129,8 @@ static pal_err check_quads(const pal_cells *c, int32_t cell, pal_diagnostic *dia
     for (int32_t u = c->cell_use[cell]; u < c->cell_use[cell + 1]; u++) {
         int n = c->face_use[u + 1].first_use - c->face_use[u].first_use;
         if (n != 4)
-            return pal_diagnostic_set(
-                diag, PAL_ERR_REFUSED,
-                "elements: cell %d is no hexahedron and its face %d has %d corners: subdivide once", cell,
-                c->face_use[u].face, n);
+            return PAL_REFUSE(diag, "elements: cell %d is no hexahedron and its face %d has %d corners: subdivide once",
+                              cell, c->face_use[u].face, n);
     }
     return PAL_ERR_OK;
 }

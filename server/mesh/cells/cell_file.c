@@ -7,9 +7,6 @@
 #include "server/mesh/files/file_bytes.h"
 #include "server/mesh/geometry/tuning.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 pal_err pal_cell_reader_refuse(const pal_cell_reader *reader, const char *format, ...)
 {
     va_list list;
@@ -278,8 +275,7 @@ pal_err pal_cell_file_save(const pal_cells *cells, const char *path, pal_diagnos
     char shown[128];
     uint8_t *bytes;
     pal_file_printable_name(shown, path);
-    if (!vtk && !ours)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: cells are written to .palcells or .vtk files", shown);
+    if (!vtk && !ours) return PAL_REFUSE(diag, "%s: cells are written to .palcells or .vtk files", shown);
     if (pal_cell_file_bytes(cells, vtk, &bytes, &n_byte))
         return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for the text of %d cells", shown, cells->n_cell);
     pal_err err = pal_file_write(path, bytes, n_byte, diag);

@@ -8,9 +8,6 @@
 #include "server/mesh/cells/cell_reader.h"
 #include "server/mesh/files/file_bytes.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 enum { TETRAHEDRON = 10, HEXAHEDRON = 12, WEDGE = 13, PYRAMID = 14, POLYHEDRON = 42 };
 
 /* faces of VTK's corners, counter-clockwise from outside; -1 ends a face */

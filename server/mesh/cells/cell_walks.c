@@ -5,9 +5,6 @@
 #include "server/base/vec3.h"
 #include "server/num/union_find.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 /* ---- pieces and holes ---- */
 
 int32_t pal_cells_label(const pal_cells *c, int32_t *label)

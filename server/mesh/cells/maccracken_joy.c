@@ -12,8 +12,6 @@
 #include "server/mesh/geometry/tuning.h"
 
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 /* one level in the making: the old cells, the rows, and where each new kind of vertex begins */
 typedef struct level {
@@ -335,8 +333,8 @@ static double rows_bytes(double entries)
 
 static pal_err refuse(double byte, double budget, int at, const pal_subdivision_options *o, pal_diagnostic *diag)
 {
-    static const char format[] = "subdivision: level %d of %d needs %.4g MiB, the budget is %.4g MiB: ask for fewer "
-                                 "levels";
+    static const char format[] =
+        "subdivision: level %d of %d needs %.4g MiB, the budget is %.4g MiB: ask for fewer levels";
     return pal_diagnostic_set(diag, PAL_ERR_BUDGET, format, at, o->n_level, byte / 1048576, budget / 1048576);
 }
 
@@ -416,9 +414,9 @@ pal_err pal_subdivision_make(const pal_cells *control, const pal_subdivision_opt
     pal_subdivision s = {0};
     double budget = (double)(options->budget_byte ? options->budget_byte : HIERARCHY_BUDGET_BYTE);
     if (options->n_level < 0 || options->n_level > PAL_SUBDIVISION_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "subdivision: %d levels asked for, 0 to %d are made",
-                                  options->n_level, PAL_SUBDIVISION_MAX);
-    if (control->n_cell < 1) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "subdivision: there is no cell");
+        return PAL_REFUSE(diag, "subdivision: %d levels asked for, 0 to %d are made", options->n_level,
+                          PAL_SUBDIVISION_MAX);
+    if (control->n_cell < 1) return PAL_REFUSE(diag, "subdivision: there is no cell");
     double byte = bytes_of(control->n_edge_use, true);
     if (byte > budget) return refuse(byte, budget, 0, options, diag);
     pal_err err = begin(control, &s);

@@ -122,5 +122,5 @@ pal_err pal_file_refuse(pal_diagnostic *diag, const char *name, const char *unit
     if (!diag) return PAL_ERR_REFUSED;
     char sentence[320];
     vsnprintf(sentence, sizeof sentence, format, list);
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s %lld: %s", name, unit, (long long)at, sentence);
+    return PAL_REFUSE(diag, "%s: %s %lld: %s", name, unit, (long long)at, sentence);
 }

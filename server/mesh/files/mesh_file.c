@@ -5,7 +5,6 @@
 #include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/mesh_build.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 /* no file is read beyond this */

@@ -146,7 +146,7 @@ pal_err pal_mesh_file_write(const char *path, const pal_surface *surface, pal_di
     if (pal_file_ends_with(path, ".obj")) return write_obj(path, surface, diag);
     if (pal_file_ends_with(path, ".stl")) return write_stl(path, surface, diag);
     pal_file_printable_name(shown, path);
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: surfaces are written to .ply, .obj or .stl files", shown);
+    return PAL_REFUSE(diag, "%s: surfaces are written to .ply, .obj or .stl files", shown);
 }
 
 pal_err pal_mesh_file_write_tetgen(const char *stem, const pal_tets *tets, pal_diagnostic *diag)

@@ -55,8 +55,8 @@ static pal_err check_fields(const pal_vtk_field *field, int n, const char *path,
 {
     for (int f = 0; f < n; f++)
         if (field[f].n_component != 1 && field[f].n_component != 3)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: field %.60s has %d components, not 1 or 3", path,
-                                      field[f].name, field[f].n_component);
+            return PAL_REFUSE(diag, "%s: field %.60s has %d components, not 1 or 3", path, field[f].name,
+                              field[f].n_component);
     return PAL_ERR_OK;
 }
 
@@ -64,8 +64,7 @@ pal_err pal_mesh_write_vtk(const char *path, const pal_vtk_grid *grid, pal_diagn
 {
     const pal_vtk_grid *g = grid;
     pal_file_out out;
-    if (!cell_type(g->n_corner))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: elements of %d corners", path, g->n_corner);
+    if (!cell_type(g->n_corner)) return PAL_REFUSE(diag, "%s: elements of %d corners", path, g->n_corner);
     PAL_TRY(check_fields(g->point, g->n_point, path, diag));
     PAL_TRY(check_fields(g->cell, g->n_cell, path, diag));
     PAL_TRY(pal_file_begin(&out, path, diag));

@@ -9,10 +9,6 @@
 #include "server/mesh/geometry/kd_tree.h"
 #include "server/mesh/geometry/tuning.h"
 
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
 enum { LEAF = 4, STACK = 128 };
 
 typedef struct node {

@@ -207,6 +207,6 @@ pal_err pal_contour(pal_contour_field *field, const void *self, const pal_contou
         return PAL_ERR_OK;
     }
     PAL_FREE(l.x, l.tri);
-    return good ? pal_diagnostic_set(diag, PAL_ERR_REFUSED, "contour of a field that is positive nowhere")
+    return good ? PAL_REFUSE(diag, "contour of a field that is positive nowhere")
                 : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a contour of %.3g points", n_point);
 }

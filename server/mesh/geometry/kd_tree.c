@@ -5,8 +5,6 @@
 #include "server/base/heap.h"
 #include "server/base/vec3.h"
 
-#include <stdbool.h>
-
 enum { LEAF = 8 };
 
 struct pal_kd_tree {

@@ -6,9 +6,6 @@
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/tuning.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 #define OFFER "prepare it as voxels: palpate prepare"
 
 void pal_levels_free(pal_levels *l)
@@ -25,29 +22,24 @@ static pal_err check_face(const pal_surface *s, int t, pal_diagnostic *diag)
     const int32_t *c = s->tri + 3 * (size_t)t;
     for (int k = 0; k < 3; k++) {
         if (c[k] < 0 || c[k] >= s->n_vertex)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: triangle %d has vertex %d, there are %d", t, c[k],
-                                      s->n_vertex);
-        if (c[k] == c[(k + 1) % 3])
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: triangle %d has vertex %d twice", t, c[k]);
+            return PAL_REFUSE(diag, "levels: triangle %d has vertex %d, there are %d", t, c[k], s->n_vertex);
+        if (c[k] == c[(k + 1) % 3]) return PAL_REFUSE(diag, "levels: triangle %d has vertex %d twice", t, c[k]);
     }
     double longest = 0, n[3];
     for (int k = 0; k < 3; k++)
         longest = fmax(longest, pal_dist3(s->x + 3 * (size_t)c[k], s->x + 3 * (size_t)c[(k + 1) % 3]));
     pal_normal3(n, s->x + 3 * (size_t)c[0], s->x + 3 * (size_t)c[1], s->x + 3 * (size_t)c[2]);
     if (pal_norm3(n) > LEVEL_FLAT * longest * longest) return PAL_ERR_OK;
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                              "levels: triangle %d (vertices %d, %d, %d) has no area: clean the surface", t, c[0], c[1],
-                              c[2]);
+    return PAL_REFUSE(diag, "levels: triangle %d (vertices %d, %d, %d) has no area: clean the surface", t, c[0], c[1],
+                      c[2]);
 }
 
 static pal_err check_input(const pal_surface *s, const pal_levels_options *o, pal_diagnostic *diag)
 {
     if (o->n_level < 1 || o->n_level > PAL_LEVELS_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: %d levels asked for, 1 to %d are made", o->n_level,
-                                  PAL_LEVELS_MAX);
+        return PAL_REFUSE(diag, "levels: %d levels asked for, 1 to %d are made", o->n_level, PAL_LEVELS_MAX);
     if (s->n_tri < 1 || s->n_vertex < 3)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: a surface of %d vertices and %d triangles",
-                                  s->n_vertex, s->n_tri);
+        return PAL_REFUSE(diag, "levels: a surface of %d vertices and %d triangles", s->n_vertex, s->n_tri);
     if (s->n_tri > INT32_MAX / 8 || s->n_vertex > INT32_MAX / 8)
         return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "levels: %d vertices and %d triangles, at most %d are taken",
                                   s->n_vertex, s->n_tri, INT32_MAX / 8);
@@ -55,8 +47,7 @@ static pal_err check_input(const pal_surface *s, const pal_levels_options *o, pa
         const double *x = s->x + 3 * (size_t)v;
         for (int a = 0; a < 3; a++)
             if (!(fabs(x[a]) <= MAX_COORDINATE_M))
-                return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: vertex %d stands at (%g, %g, %g) m", v, x[0],
-                                          x[1], x[2]);
+                return PAL_REFUSE(diag, "levels: vertex %d stands at (%g, %g, %g) m", v, x[0], x[1], x[2]);
     }
     for (int t = 0; t < s->n_tri; t++) PAL_TRY(check_face(s, t, diag));
     return PAL_ERR_OK;
@@ -70,17 +61,16 @@ static pal_err make_edge(const pal_surface *s, int32_t low, const pal_surface_si
 {
     int32_t high = side->high, a = s->tri[side->corner];
     if (n > 2)
-        return pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED,
-            "levels: %d triangles (%d, %d, %d%s) share the edge of vertices %d and %d, a surface has two "
-            "at most; " OFFER,
-            n, side[0].corner / 3, side[1].corner / 3, side[2].corner / 3, n > 3 ? ", ..." : "", low, high);
+        return PAL_REFUSE(diag,
+                          "levels: %d triangles (%d, %d, %d%s) share the edge of vertices %d and %d, a surface has two "
+                          "at most; " OFFER,
+                          n, side[0].corner / 3, side[1].corner / 3, side[2].corner / 3, n > 3 ? ", ..." : "", low,
+                          high);
     if (n == 2 && s->tri[side[1].corner] == a)
-        return pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED,
-            "levels: triangles %d and %d run the same way through the edge of vertices %d and %d: turn "
-            "one over, or " OFFER,
-            side[0].corner / 3, side[1].corner / 3, low, high);
+        return PAL_REFUSE(diag,
+                          "levels: triangles %d and %d run the same way through the edge of vertices %d and %d: turn "
+                          "one over, or " OFFER,
+                          side[0].corner / 3, side[1].corner / 3, low, high);
     edge[e] = (pal_winged_edge){.vertex = {a, a == low ? high : low},
                                 .face = {side[0].corner / 3, n == 2 ? side[1].corner / 3 : -1}};
     for (int k = 0; k < n; k++) face_edge[side[k].corner] = e;
@@ -139,8 +129,7 @@ static bool link_level(pal_levels *l, int level, int32_t *bad)
 
 static pal_err refuse_fans(int32_t v, pal_diagnostic *diag)
 {
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                              "levels: parts of the surface touch in vertex %d only: split that vertex, or " OFFER, v);
+    return PAL_REFUSE(diag, "levels: parts of the surface touch in vertex %d only: split that vertex, or " OFFER, v);
 }
 
 /* every vertex has one fan of at least three faces, or one or more at the boundary; irregular: K (K + 1), summed over
@@ -155,8 +144,7 @@ static pal_err check_fans(const pal_levels *l, int64_t *irregular, pal_diagnosti
     int64_t sum = 0;
     for (int32_t v = 0; v < n && !err; v++) {
         if (count[v] == 0) {
-            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                     "levels: vertex %d belongs to no triangle: clean the surface", v);
+            err = PAL_REFUSE(diag, "levels: vertex %d belongs to no triangle: clean the surface", v);
             break;
         }
         int32_t e = l->spoke[v], n_face = 0, n_edge = 0;
@@ -167,8 +155,8 @@ static pal_err check_fans(const pal_levels *l, int64_t *irregular, pal_diagnosti
         if (n_face != count[v])
             err = refuse_fans(v, diag);
         else if (n_edge < 3 && n_face == n_edge)
-            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: triangles %d and %d have the same corners",
-                                     l->edge[l->spoke[v]].face[0], l->edge[l->spoke[v]].face[1]);
+            err = PAL_REFUSE(diag, "levels: triangles %d and %d have the same corners", l->edge[l->spoke[v]].face[0],
+                             l->edge[l->spoke[v]].face[1]);
         else if (n_edge != (n_face == n_edge ? 6 : 4))
             sum += (int64_t)n_edge * (n_edge + 1);
     }
@@ -223,8 +211,7 @@ static pal_err refuse_budget(double byte, size_t budget, const pal_levels *l, pa
 {
     return pal_diagnostic_set(
         diag, PAL_ERR_BUDGET,
-        "levels: %d levels need %.4g MiB, the budget is %.4g MiB: ask for fewer levels or a coarser "
-        "surface",
+        "levels: %d levels need %.4g MiB, the budget is %.4g MiB: ask for fewer levels or a coarser surface",
         l->n_level, byte / 1048576, (double)budget / 1048576);
 }
 
@@ -334,11 +321,10 @@ static pal_err check_edges(const pal_levels *l, double diagonal, pal_diagnostic 
         const int32_t *end = l->edge[e].vertex;
         double length = pal_dist3(l->x + 3 * (size_t)end[0], l->x + 3 * (size_t)end[1]);
         if (!(length > LEVEL_FLAT * diagonal))
-            return pal_diagnostic_set(
-                diag, PAL_ERR_REFUSED,
-                "levels: the edge of vertices %d and %d of level %d is %.3g m long in a surface of %.3g "
-                "m: smooth the surface or ask for fewer levels",
-                end[0], end[1], l->edge_level[e], length, diagonal);
+            return PAL_REFUSE(diag,
+                              "levels: the edge of vertices %d and %d of level %d is %.3g m long in a surface of %.3g "
+                              "m: smooth the surface or ask for fewer levels",
+                              end[0], end[1], l->edge_level[e], length, diagonal);
     }
     return PAL_ERR_OK;
 }

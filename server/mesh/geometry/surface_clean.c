@@ -8,9 +8,6 @@
 #include "server/mesh/geometry/tuning.h"
 #include "server/num/sort.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 typedef struct cleaner {
     pal_surface *surface;
     double eps;        /* welding distance; 0: equal positions only                            */
@@ -318,9 +315,9 @@ pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_re
     }
     if (err) pal_diagnostic_set(diag, err, "no memory to clean %d triangles", surface->n_tri);
     if (!err && surface->n_tri == 0)
-        err = pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED, "no triangle is left: %lld without area, %lld doubled, %lld not finite",
-            (long long)k.count->n_degenerate, (long long)k.count->n_duplicate, (long long)k.count->n_nonfinite);
+        err = PAL_REFUSE(diag, "no triangle is left: %lld without area, %lld doubled, %lld not finite",
+                         (long long)k.count->n_degenerate, (long long)k.count->n_duplicate,
+                         (long long)k.count->n_nonfinite);
     PAL_FREE(k.map, k.next, k.bucket);
     return err;
 }

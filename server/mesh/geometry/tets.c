@@ -336,29 +336,21 @@ pal_err pal_tets_check(const pal_tets *tets, pal_diagnostic *diag)
     int32_t node[3] = {0};
     check_corners(tets, &index, &repeated);
     if (index.n)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "%lld index%s out of range of %d nodes, the first in element %d", index.n,
-                                  index.n > 1 ? "es" : "", tets->n_node, index.first);
+        return PAL_REFUSE(diag, "%lld index%s out of range of %d nodes, the first in element %d", index.n,
+                          index.n > 1 ? "es" : "", tets->n_node, index.first);
     if (repeated.n)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%lld tetrahedra with a corner used twice, the first is %d",
-                                  repeated.n, repeated.first);
+        return PAL_REFUSE(diag, "%lld tetrahedra with a corner used twice, the first is %d", repeated.n,
+                          repeated.first);
     for (int t = 0; t < tets->n_tet; t++)
         if (!(pal_tet_volume(tets->x, tets->tet + 4 * (size_t)t) > 0)) count_fault(&flat, t);
-    if (flat.n)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%lld tetrahedra without positive volume, the first is %d",
-                                  flat.n, flat.first);
+    if (flat.n) return PAL_REFUSE(diag, "%lld tetrahedra without positive volume, the first is %d", flat.n, flat.first);
     PAL_TRY(check_sides(tets, &crowded, node));
     if (crowded.n)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "%lld faces of more than two tetrahedra, the first has nodes %d %d %d", crowded.n,
-                                  node[0], node[1], node[2]);
+        return PAL_REFUSE(diag, "%lld faces of more than two tetrahedra, the first has nodes %d %d %d", crowded.n,
+                          node[0], node[1], node[2]);
     PAL_TRY(check_boundary(tets, &n_open));
-    if (n_open)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "the boundary is not closed: %lld edges without a partner",
-                                  n_open);
+    if (n_open) return PAL_REFUSE(diag, "the boundary is not closed: %lld edges without a partner", n_open);
     PAL_TRY(check_unused(tets, &unused));
-    if (unused.n)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%lld nodes of no tetrahedron, the first is %d", unused.n,
-                                  unused.first);
+    if (unused.n) return PAL_REFUSE(diag, "%lld nodes of no tetrahedron, the first is %d", unused.n, unused.first);
     return PAL_ERR_OK;
 }

@@ -103,8 +103,8 @@ static pal_err refuse_label(const pal_label_volume *volume, int32_t label, pal_d
     for (int i = 0; i < n; i++)
         used += snprintf(text + used, sizeof text - (size_t)used, "%s%d (%.3g ml)", i ? ", " : "", list[i].label,
                          1e6 * list[i].volume_m3);
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "label %d is not in the scan, %s%s", label,
-                              n ? "the largest there are " : "which holds no label at all", text);
+    return PAL_REFUSE(diag, "label %d is not in the scan, %s%s", label,
+                      n ? "the largest there are " : "which holds no label at all", text);
 }
 
 /* the label's box with one voxel of room, and its mask */

@@ -11,8 +11,6 @@
 #include "server/mesh/files/text_scan.h"
 
 #include <limits.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <zlib.h>

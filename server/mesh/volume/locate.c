@@ -7,9 +7,6 @@
 #include "server/base/heap.h"
 #include "server/base/vec3.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 /* the margin, in cells; tolerance of inside, in edges; cells per element */
 #define HAIR   1e-6
 #define INSIDE 1e-9

@@ -5,10 +5,6 @@
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/tuning.h"
 
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
 typedef struct component {
     double volume_m3, moment[3]; /* moment: volume times centre, m^4 */
     bool fixed, keep;
@@ -22,12 +18,11 @@ static pal_err refuse(const char *name, const component *part, const pal_loose_c
     const component *p = &part[bad];
     double middle[3];
     pal_scale3(middle, 1 / p->volume_m3, p->moment);
-    return pal_diagnostic_set(
-        diag, PAL_ERR_REFUSED,
-        "body \"%.60s\": %d of %d components ha%s no support, the largest of %.3g ml (%.3g %% of the "
-        "body) around (%.4f, %.4f, %.4f) m: hold each component by a support",
-        name, n_bad, all->n_component, n_bad == 1 ? "s" : "ve", 1e6 * p->volume_m3, 100 * p->volume_m3 / all->volume_m3,
-        middle[0], middle[1], middle[2]);
+    return PAL_REFUSE(diag,
+                      "body \"%.60s\": %d of %d components ha%s no support, the largest of %.3g ml (%.3g %% of the "
+                      "body) around (%.4f, %.4f, %.4f) m: hold each component by a support",
+                      name, n_bad, all->n_component, n_bad == 1 ? "s" : "ve", 1e6 * p->volume_m3,
+                      100 * p->volume_m3 / all->volume_m3, middle[0], middle[1], middle[2]);
 }
 
 static pal_err choose(const char *name, bool largest_only, component *part, int n, pal_loose_components *out,

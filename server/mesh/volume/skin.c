@@ -10,9 +10,6 @@
 #include "server/mesh/geometry/kd_tree.h"
 #include "server/mesh/geometry/tuning.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 /* distance to a node, in voxel edges, at which a vertex lies on it */
 #define ON_NODE 1e-7
 

@@ -84,7 +84,7 @@ pal_err pal_voxels_coarsen(const pal_tets *tets, const pal_hexes *hexes, const i
 {
     grid g = {.fill = NULL};
     pal_prepared p = {0};
-    if (hexes->n_hex == 0) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there are no voxels to make larger");
+    if (hexes->n_hex == 0) return PAL_REFUSE(diag, "there are no voxels to make larger");
     pal_err err = make_grid(tets, hexes, shift, &g);
     if (!err) drop(&g, min_fill);
     if (!err) err = split(&g, tets, &p, diag);

@@ -9,10 +9,6 @@
 #include "server/base/vec3.h"
 #include "server/num/union_find.h"
 
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
 typedef struct edge_entry {
     uint64_t key; /* 0: free */
     int32_t tri[2];

@@ -268,27 +268,24 @@ static pal_err check_encloses(decision *d, bool open, int resolution)
         if (n_inside > 0 && sided <= MAX_ONE_SIDED && (double)d->n_sure >= SURE_FRACTION * (double)n_inside &&
             (double)d->n_sure >= SURE_FRACTION * (double)d->n_claimed)
             return PAL_ERR_OK;
-        return pal_diagnostic_set(
-            d->diag, PAL_ERR_REFUSED,
-            "no volume (reason 3): the surface of %d triangles is open and encloses nothing: %.2f of its "
-            "area faces one way (limit %.2f), the largest winding number is %.2f, %lld of %lld voxels "
-            "are inside beyond doubt, two axes claim %lld",
-            d->scan->n_tri, sided, MAX_ONE_SIDED, d->max_winding, (long long)d->n_sure, (long long)n_inside,
-            (long long)d->n_claimed);
+        return PAL_REFUSE(d->diag,
+                          "no volume (reason 3): the surface of %d triangles is open and encloses nothing: %.2f of its "
+                          "area faces one way (limit %.2f), the largest winding number is %.2f, %lld of %lld voxels "
+                          "are inside beyond doubt, two axes claim %lld",
+                          d->scan->n_tri, sided, MAX_ONE_SIDED, d->max_winding, (long long)d->n_sure,
+                          (long long)n_inside, (long long)d->n_claimed);
     }
     if (n_inside > 0) return PAL_ERR_OK;
     double volume = d->report->surface_volume_m3, thick = area > 0 ? 2 * volume / area : 0;
     double needed = thick > 0 ? ceil(resolution * d->grid->edge_m / thick) : INFINITY;
     if (needed > 1024)
-        return pal_diagnostic_set(
-            d->diag, PAL_ERR_REFUSED,
-            "no volume (reason 2): the closed surface of %d triangles encloses %.3g m3, %.3g m thick", d->scan->n_tri,
-            volume, thick);
-    return pal_diagnostic_set(
-        d->diag, PAL_ERR_REFUSED,
-        "no volume (reason 2): no centre of a %.3g m voxel lies inside the closed surface, which is "
-        "about %.3g m thick: resolution %d may do",
-        d->grid->edge_m, thick, (int)needed);
+        return PAL_REFUSE(d->diag,
+                          "no volume (reason 2): the closed surface of %d triangles encloses %.3g m3, %.3g m thick",
+                          d->scan->n_tri, volume, thick);
+    return PAL_REFUSE(d->diag,
+                      "no volume (reason 2): no centre of a %.3g m voxel lies inside the closed surface, which is "
+                      "about %.3g m thick: resolution %d may do",
+                      d->grid->edge_m, thick, (int)needed);
 }
 
 /* the requested method, or the first that applies */

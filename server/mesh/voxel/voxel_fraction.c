@@ -283,8 +283,8 @@ pal_err pal_voxels_fraction(const pal_surface *surface, const pal_voxels *grid, 
     pal_scan_surface scan;
     bool plain = false;
     if (!fits(surface, grid))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "the surface reaches %d voxels of %g m beyond the mesh",
-                                  MAX_PLACE / PAL_SCAN_ONE, grid->edge_m);
+        return PAL_REFUSE(diag, "the surface reaches %d voxels of %g m beyond the mesh", MAX_PLACE / PAL_SCAN_ONE,
+                          grid->edge_m);
     PAL_TRY(pal_scan_snap(surface, grid->low_m, grid->edge_m, &scan));
     pal_err err = find_plain(&scan, grid, &plain);
     if (!err && plain) err = fractions_exactly(&scan, grid, closed_volume(&scan) < 0 ? -1 : 1, take, self);
