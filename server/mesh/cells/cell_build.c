@@ -44,37 +44,21 @@ static where line_of(const int64_t *line, int32_t i)
     return at;
 }
 
-/* about a loop, or a whole cell (loop -1) */
-static pal_err refuse_at(const builder *b, int32_t cell, int32_t loop, const char *format, va_list list)
+/* about a loop (cell -1), or a whole cell (loop -1) */
+static pal_err __attribute__((format(printf, 4, 5)))
+refuse(const builder *b, int32_t cell, int32_t loop, const char *format, ...)
 {
     char sentence[320], face[32] = "";
     const pal_cell_loops *in = b->in;
+    va_list list;
+    va_start(list, format);
     vsnprintf(sentence, sizeof sentence, format, list);
+    va_end(list);
+    if (cell < 0) cell = 0;
+    while (loop >= in->cell[cell + 1]) cell++;
     if (loop >= 0) snprintf(face, sizeof face, ", face %d:", file_number(b, loop - in->cell[cell]));
     return PAL_REFUSE(b->diag, "%s: cell %d%s %s", line_of(in->line, loop >= 0 ? loop : in->cell[cell]).text,
                       file_number(b, cell), face, sentence);
-}
-
-static pal_err __attribute__((format(printf, 3, 4)))
-refuse_loop(const builder *b, int32_t loop, const char *format, ...)
-{
-    int32_t cell = 0;
-    va_list list;
-    va_start(list, format);
-    while (b->in->cell[cell + 1] <= loop) cell++;
-    pal_err err = refuse_at(b, cell, loop, format, list);
-    va_end(list);
-    return err;
-}
-
-static pal_err __attribute__((format(printf, 3, 4)))
-refuse_cell(const builder *b, int32_t cell, const char *format, ...)
-{
-    va_list list;
-    va_start(list, format);
-    pal_err err = refuse_at(b, cell, -1, format, list);
-    va_end(list);
-    return err;
 }
 
 /* ---- checks of the input ---- */
@@ -92,7 +76,7 @@ static pal_err check_counts(const builder *b)
     for (int32_t l = 0; l < in->cell[in->n_cell]; l++) {
         int64_t n = (int64_t)in->loop[l + 1] - in->loop[l];
         if (in->loop[0] != 0 || n < 3 || n > PAL_CELL_LOOP_MAX || in->loop[l + 1] > CELL_MAX_ITEM)
-            return refuse_loop(b, l, "%lld corners, must be 3 to %d", (long long)n, PAL_CELL_LOOP_MAX);
+            return refuse(b, -1, l, "%lld corners, must be 3 to %d", (long long)n, PAL_CELL_LOOP_MAX);
     }
     return PAL_ERR_OK;
 }
@@ -112,8 +96,8 @@ static pal_err check_corners(const builder *b)
         for (int32_t k = in->loop[l]; k < in->loop[l + 1]; k++) {
             int32_t v = in->corner[k];
             if (v < 0 || v >= in->n_vertex)
-                return refuse_loop(b, l, "vertex %lld, there are %d", (long long)v + in->count_from, in->n_vertex);
-            if (b->stamp[v] == l) return refuse_loop(b, l, "has vertex %d twice", file_number(b, v));
+                return refuse(b, -1, l, "vertex %lld, there are %d", (long long)v + in->count_from, in->n_vertex);
+            if (b->stamp[v] == l) return refuse(b, -1, l, "has vertex %d twice", file_number(b, v));
             b->stamp[v] = l;
         }
     for (int32_t v = 0; v < in->n_vertex; v++)
@@ -200,15 +184,15 @@ static pal_err join_face(builder *b, int32_t l, int32_t f, loop_relation like)
     pal_face_use *use = b->c->face_use;
     int32_t cell = use[face->use[0]].cell, vertex = b->in->corner[b->in->loop[l]];
     if (like == SHUFFLED)
-        return refuse_loop(b, l, "has the corners of a face of cell %d in another order", file_number(b, cell));
+        return refuse(b, -1, l, "has the corners of a face of cell %d in another order", file_number(b, cell));
     if (cell == use[l].cell || (face->use[1] >= 0 && use[face->use[1]].cell == use[l].cell))
-        return refuse_loop(b, l, "is a face of the same cell already, from vertex %d on", file_number(b, vertex));
+        return refuse(b, -1, l, "is a face of the same cell already, from vertex %d on", file_number(b, vertex));
     if (face->use[1] >= 0)
-        return refuse_loop(b, l, "is a face of cells %d and %d already, a face has two cells at most",
-                           file_number(b, cell), file_number(b, use[face->use[1]].cell));
+        return refuse(b, -1, l, "is a face of cells %d and %d already, a face has two cells at most",
+                      file_number(b, cell), file_number(b, use[face->use[1]].cell));
     if (like == EQUAL)
-        return refuse_loop(b, l, "runs the same way round in cell %d: one of the two is inside out",
-                           file_number(b, cell));
+        return refuse(b, -1, l, "runs the same way round in cell %d: one of the two is inside out",
+                      file_number(b, cell));
     face->use[1] = l;
     use[l].face = f, use[l].sign = -1, use[l].mate = face->use[0];
     use[face->use[0]].mate = l;
@@ -300,18 +284,18 @@ static pal_err join_radials(builder *b, int32_t cell)
         pal_edge_use *o = &c->edge_use[other];
         int32_t v = file_number(b, use->vertex), w = file_number(b, pal_cells_end_vertex(c, u));
         if (o->radial >= 0)
-            return refuse_loop(b, use->face_use, "the cell's third face at the edge of vertices %d and %d", v, w);
+            return refuse(b, -1, use->face_use, "the cell's third face at the edge of vertices %d and %d", v, w);
         if (o->vertex == use->vertex)
-            return refuse_loop(b, use->face_use,
-                               "runs from vertex %d to %d as face %d of the cell does: one of the two is inside out", v,
-                               w, file_number(b, o->face_use - c->cell_use[cell]));
+            return refuse(b, -1, use->face_use,
+                          "runs from vertex %d to %d as face %d of the cell does: one of the two is inside out", v, w,
+                          file_number(b, o->face_use - c->cell_use[cell]));
         o->radial = u, use->radial = other;
     }
     for (int32_t u = first; u < end; u++)
         if (c->edge_use[u].radial < 0)
-            return refuse_loop(b, c->edge_use[u].face_use,
-                               "no other face of the cell at the edge of vertices %d and %d: it is not closed",
-                               file_number(b, c->edge_use[u].vertex), file_number(b, pal_cells_end_vertex(c, u)));
+            return refuse(b, -1, c->edge_use[u].face_use,
+                          "no other face of the cell at the edge of vertices %d and %d: it is not closed",
+                          file_number(b, c->edge_use[u].vertex), file_number(b, pal_cells_end_vertex(c, u)));
     return PAL_ERR_OK;
 }
 
@@ -378,10 +362,10 @@ static pal_err find_cells(builder *b)
         int32_t n_face = c->cell_use[i + 1] - c->cell_use[i];
         int32_t n_edge = (c->face_use[c->cell_use[i + 1]].first_use - c->face_use[c->cell_use[i]].first_use) / 2;
         int32_t n_vertex = c->cell_vertex.start[i + 1] - c->cell_vertex.start[i];
-        if (count_reached(b, i) != n_face) return refuse_cell(b, i, "is in pieces: its faces do not hang together");
+        if (count_reached(b, i) != n_face) return refuse(b, i, -1, "is in pieces: its faces do not hang together");
         if (n_vertex - n_edge + n_face != 2)
-            return refuse_cell(b, i, "is no ball: %d vertices - %d edges + %d faces make %d, not 2", n_vertex, n_edge,
-                               n_face, n_vertex - n_edge + n_face);
+            return refuse(b, i, -1, "is no ball: %d vertices - %d edges + %d faces make %d, not 2", n_vertex, n_edge,
+                          n_face, n_vertex - n_edge + n_face);
     }
     return PAL_ERR_OK;
 }
@@ -483,6 +467,7 @@ static void find_pinched(builder *b)
             at = pal_cells_across_edge(c, pal_cells_prev(c, at));
         } while (at != u);
         if (b->stamp[v]++) c->vertex_pinched[v] = true;
+        c->n_boundary_fan++;
     }
     for (int32_t v = 0; v < c->n_vertex; v++) c->n_pinched_vertex += c->vertex_pinched[v];
 }
@@ -519,9 +504,9 @@ static pal_err check_neighbourhoods(builder *b)
     for (int32_t e = 0; e < c->n_edge; e++) {
         int32_t n = c->edge_cell.start[e + 1] - c->edge_cell.start[e], first = b->last[e];
         if (count_around(c, e, first) != n)
-            return refuse_loop(b, c->edge_use[first].face_use,
-                               "cells go more than once round the edge of vertices %d and %d",
-                               file_number(b, c->edge[e].vertex[0]), file_number(b, c->edge[e].vertex[1]));
+            return refuse(b, -1, c->edge_use[first].face_use,
+                          "cells go more than once round the edge of vertices %d and %d",
+                          file_number(b, c->edge[e].vertex[0]), file_number(b, c->edge[e].vertex[1]));
     }
     for (int32_t v = 0; v < c->n_vertex; v++) {
         if (c->vertex_pinched[v]) continue;
@@ -529,9 +514,9 @@ static pal_err check_neighbourhoods(builder *b)
         int32_t n_face = c->vertex_face.start[v + 1] - c->vertex_face.start[v];
         int32_t first = c->vertex_cell.start[v], n_cell = c->vertex_cell.start[v + 1] - first;
         if (n_edge - n_face + n_cell != (c->vertex_boundary[v] ? 1 : 2))
-            return refuse_cell(b, c->vertex_cell.item[first],
-                               "and others go round vertex %d more than once: %d edges - %d faces + %d cells there",
-                               file_number(b, v), n_edge, n_face, n_cell);
+            return refuse(b, c->vertex_cell.item[first], -1,
+                          "and others go round vertex %d more than once: %d edges - %d faces + %d cells there",
+                          file_number(b, v), n_edge, n_face, n_cell);
     }
     return PAL_ERR_OK;
 }
@@ -566,8 +551,8 @@ static pal_err set_sharpness(builder *b)
         if (tag->a < 0 || tag->a >= c->n_face_use)
             return PAL_REFUSE(b->diag, "cells: sharpness of loop %lld, there are %d", (long long)tag->a, c->n_face_use);
         if (!sharpness_valid(tag->sharp))
-            return refuse_loop(b, tag->a, "has sharpness %g, must be 0 to %g", (double)tag->sharp,
-                               (double)PAL_SHARPNESS_MAX);
+            return refuse(b, -1, tag->a, "has sharpness %g, must be 0 to %g", (double)tag->sharp,
+                          (double)PAL_SHARPNESS_MAX);
         pal_cell_face *face = &c->face[c->face_use[tag->a].face];
         face->sharp = fmaxf(face->sharp, tag->sharp);
     }
@@ -579,8 +564,9 @@ static pal_err set_sharpness(builder *b)
 static pal_err build(builder *b)
 {
     PAL_TRY(check_counts(b));
-    b->stamp = malloc((size_t)b->in->n_vertex * sizeof *b->stamp);
-    if (!b->stamp) return PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    PAL_ARRAY(&err, b->stamp, b->in->n_vertex);
+    if (err) return err;
     PAL_TRY(check_corners(b));
     pal_cells *c = b->c;
     c->n_vertex = b->in->n_vertex, c->n_cell = b->in->n_cell;
@@ -609,10 +595,10 @@ static pal_err check_shape(const builder *b)
     pal_cells_fault fault;
     if (pal_cells_shape_valid(b->c, NULL, &fault)) return PAL_ERR_OK;
     if (fault.face_use >= 0)
-        return refuse_loop(b, fault.face_use, "has no area (%.3g m^2, longest edge %.3g m)", fault.measure,
-                           fault.length_scale_m);
-    return refuse_cell(
-        b, fault.cell,
+        return refuse(b, -1, fault.face_use, "has no area (%.3g m^2, longest edge %.3g m)", fault.measure,
+                      fault.length_scale_m);
+    return refuse(
+        b, fault.cell, -1,
         "has no positive volume (%.3g m^3, %.3g m across): its faces must run counter-clockwise seen from outside",
         fault.measure, fault.length_scale_m);
 }

@@ -7,28 +7,20 @@
 
 /* ---- delete ---- */
 
-static pal_err add_kept(pal_edit_work *w, int32_t cell, bool *keep, int32_t *kept)
-{
-    const pal_cells *c = w->from;
-    memset(keep, 1, (size_t)c->n_cell);
-    keep[cell] = false;
-    PAL_TRY(pal_cells_loops(c, &w->to));
-    PAL_TRY(pal_cell_loops_keep(&w->to, keep, kept));
-    PAL_TRY(pal_edit_reserve(w, w->to.n_vertex, w->to.n_cell));
-    for (int32_t i = 0; i < w->to.n_vertex; i++) pal_interpolation_builder_mean(&w->rows, &kept[i], 1);
-    for (int32_t i = cell; i < w->to.n_cell; i++) w->cell_from[i]++;
-    return PAL_ERR_OK;
-}
-
 static pal_err delete_cell(pal_edit_work *w, int32_t cell)
 {
-    pal_err err = pal_edit_check_number(w, "cell", cell, w->from->n_cell);
+    const pal_cells *c = w->from;
+    pal_err err = pal_edit_check_number(w, "cell", cell, c->n_cell);
     bool *keep;
     int32_t *kept;
-    if (!err && w->from->n_cell == 1) err = pal_edit_refuse(w, "it is the last one, a solid needs a cell");
-    PAL_ARRAY(&err, keep, w->from->n_cell);
-    PAL_ARRAY(&err, kept, w->from->n_vertex);
-    if (!err) err = add_kept(w, cell, keep, kept);
+    if (!err && c->n_cell == 1) err = pal_edit_refuse(w, "it is the last one, a solid needs a cell");
+    PAL_ARRAY(&err, keep, c->n_cell);
+    PAL_ARRAY(&err, kept, c->n_vertex);
+    for (int32_t i = 0; !err && i < c->n_cell; i++) keep[i] = i != cell;
+    if (!err) err = pal_cells_loops(c, keep, &w->to, kept);
+    if (!err) err = pal_edit_reserve(w, w->to.n_vertex, w->to.n_cell);
+    for (int32_t i = 0; !err && i < w->to.n_vertex; i++) pal_interpolation_builder_mean(&w->rows, &kept[i], 1);
+    for (int32_t i = cell; !err && i < w->to.n_cell; i++) w->cell_from[i]++;
     PAL_FREE(keep, kept);
     return err;
 }

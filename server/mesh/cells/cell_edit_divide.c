@@ -261,17 +261,12 @@ static void add_midpoints(pal_edit_work *w, division *s)
 
 /* ---- the new cells ---- */
 
-static void add_quad(pal_edit_work *w, float sharp, int32_t a, int32_t b, int32_t c, int32_t d)
-{
-    pal_cell_loops_face(&w->to, sharp);
-    pal_cell_loops_corners(&w->to, (const int32_t[]){a, b, c, d}, 4);
-}
-
 /* the quad of a side at its corner i; reversed: as the neighbour sees it */
 static void add_outer_vertices(pal_edit_work *w, const division *s, int32_t side, int32_t i, bool reversed)
 {
     int32_t before = s->mid[i > s->start[side] ? i - 1 : s->start[side + 1] - 1], after = s->mid[i];
-    add_quad(w, s->sharp[i], s->corner[i], reversed ? before : after, s->centre[side], reversed ? after : before);
+    pal_cell_loops_quad(&w->to, s->sharp[i], s->corner[i], reversed ? before : after, s->centre[side],
+                        reversed ? after : before);
 }
 
 /* middle of the side that runs to a corner over the edge of vertex mid */
@@ -291,7 +286,7 @@ static void add_part(pal_edit_work *w, const division *s, int32_t corner)
         for (int32_t i = s->start[side]; i < s->start[side + 1]; i++) {
             if (s->corner[i] != corner) continue;
             add_outer_vertices(w, s, side, i, false);
-            add_quad(w, 0, s->mid[i], centre_across(s, corner, s->mid[i]), s->middle, s->centre[side]);
+            pal_cell_loops_quad(&w->to, 0, s->mid[i], centre_across(s, corner, s->mid[i]), s->middle, s->centre[side]);
         }
 }
 

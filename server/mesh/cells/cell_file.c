@@ -63,7 +63,7 @@ static pal_err read_vertex(pal_cell_reader *r)
             return pal_cell_reader_refuse(r, "a position needs three numbers, found %s",
                                           pal_text_excerpt_at(&r->scan).text);
     pal_cell_reader_vertex(r, x);
-    return end_line(r);
+    return PAL_ERR_OK;
 }
 
 /* a number from 1 to most, as one from 0 */
@@ -127,28 +127,29 @@ static pal_err read_face_sharp(pal_cell_reader *r)
     return add_tag(&r->l.face_tag, &r->l.n_face_tag, tag);
 }
 
-static pal_err read_line(pal_cell_reader *r)
+static pal_err read_cell(pal_cell_reader *r)
 {
-    static const struct {
-        const char *word;
-        pal_err (*read)(pal_cell_reader *r);
-    } numbers[] = {{"sv", read_vertex_sharp}, {"se", read_edge_sharp}, {"sf", read_face_sharp}};
-    pal_text_scan *scan = &r->scan;
-    if (pal_text_is(scan, "v")) return read_vertex(r);
-    if (pal_text_is(scan, "f")) return read_face(r);
-    for (int k = 0; k < 3; k++) {
-        if (!pal_text_is(scan, numbers[k].word)) continue;
-        PAL_TRY(numbers[k].read(r));
-        return end_line(r);
-    }
-    if (!pal_text_is(scan, "c"))
-        return pal_cell_reader_refuse(r, "a line begins with %s, known are v, c, f, sv, se, sf",
-                                      pal_text_excerpt_at(scan).text);
     PAL_TRY(end_line(r));
     if (r->l.n_cell > 0 && r->l.cell[r->l.n_cell - 1] == r->l.n_loop)
         return pal_cell_reader_refuse(r, "cell %d has no faces", r->l.n_cell);
     pal_cell_loops_cell(&r->l);
     return PAL_ERR_OK;
+}
+
+static pal_err read_line(pal_cell_reader *r)
+{
+    static const struct {
+        const char *word;
+        pal_err (*read)(pal_cell_reader *r);
+    } known[] = {{"v", read_vertex},        {"c", read_cell},        {"f", read_face},
+                 {"sv", read_vertex_sharp}, {"se", read_edge_sharp}, {"sf", read_face_sharp}};
+    for (size_t k = 0; k < sizeof known / sizeof *known; k++) {
+        if (!pal_text_is(&r->scan, known[k].word)) continue;
+        PAL_TRY(known[k].read(r));
+        return end_line(r);
+    }
+    return pal_cell_reader_refuse(r, "a line begins with %s, known are v, c, f, sv, se, sf",
+                                  pal_text_excerpt_at(&r->scan).text);
 }
 
 static pal_err read_palcells(pal_cell_reader *r)
@@ -175,7 +176,7 @@ static pal_err finish(pal_cell_reader *r, bool vtk, pal_cells *out)
         return pal_cell_reader_refuse(r, "the file ends with %d vertices and %d cells", r->l.n_vertex, r->l.n_cell);
     if (r->l.n_loop == 0) return pal_cell_reader_refuse(r, "the file ends without a face");
     if (r->l.n_corner == 0) return pal_cell_reader_refuse(r, "the file ends without a corner");
-    if (vtk) PAL_TRY(pal_cell_loops_keep(&r->l, NULL, NULL));
+    if (vtk) PAL_TRY(pal_cell_loops_drop_unused(&r->l, NULL));
     pal_diagnostic inner = {""};
     err = pal_cells_make(&r->l, out, &inner);
     const char *text = inner.text + (strncmp(inner.text, "cells: ", 7) ? 0 : 7);

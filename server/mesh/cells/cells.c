@@ -4,7 +4,6 @@
 #include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/tuning.h"
-#include "server/num/sort.h"
 
 /* ---- arrays ---- */
 
@@ -127,6 +126,12 @@ void pal_cell_loops_corners(pal_cell_loops *l, const int32_t *vertex, int n)
     }
 }
 
+void pal_cell_loops_quad(pal_cell_loops *l, float sharp, int32_t a, int32_t b, int32_t c, int32_t d)
+{
+    pal_cell_loops_face(l, sharp);
+    pal_cell_loops_corners(l, (const int32_t[]){a, b, c, d}, 4);
+}
+
 void pal_cell_loops_edge(pal_cell_loops *l, int32_t a, int32_t b, float sharp)
 {
     if (sharp > 0 && ROOM(l, edge_tag, l->n_edge_tag)) l->edge_tag[l->n_edge_tag++] = (pal_cell_tag){a, b, sharp};
@@ -144,9 +149,17 @@ void pal_cell_loops_hex(pal_cell_loops *l, const int32_t vertex[8])
     }
 }
 
-void pal_cell_loops_append(pal_cell_loops *l, const pal_cells *c, const int32_t *map)
+static bool is_edge_kept(const pal_cells *c, const bool *keep, int32_t e)
+{
+    int32_t k = c->edge_cell.start[e], after = c->edge_cell.start[e + 1];
+    while (k < after && !keep[c->edge_cell.item[k]]) k++;
+    return k < after;
+}
+
+void pal_cell_loops_append(pal_cell_loops *l, const pal_cells *c, const bool *keep, const int32_t *map)
 {
     for (int32_t i = 0; i < c->n_cell; i++) {
+        if (keep && !keep[i]) continue;
         pal_cell_loops_cell(l);
         for (int32_t f = c->cell_use[i]; f < c->cell_use[i + 1]; f++) {
             pal_cell_loops_face(l, c->face[c->face_use[f].face].sharp);
@@ -156,6 +169,7 @@ void pal_cell_loops_append(pal_cell_loops *l, const pal_cells *c, const int32_t 
     }
     for (int32_t e = 0; e < c->n_edge; e++) {
         const int32_t *end = c->edge[e].vertex;
+        if (keep && !is_edge_kept(c, keep, e)) continue;
         pal_cell_loops_edge(l, map ? map[end[0]] : end[0], map ? map[end[1]] : end[1], c->edge[e].sharp);
     }
 }
@@ -168,13 +182,14 @@ pal_err pal_cell_loops_finish(pal_cell_loops *l, pal_cells *out, pal_diagnostic 
     return err;
 }
 
-pal_err pal_cells_loops(const pal_cells *cells, pal_cell_loops *out)
+pal_err pal_cells_loops(const pal_cells *cells, const bool *keep, pal_cell_loops *out, int32_t *kept)
 {
     pal_cell_loops l = {0};
     for (int32_t v = 0; v < cells->n_vertex; v++)
         pal_cell_loops_vertex(&l, cells->x + 3 * (size_t)v, cells->vertex_sharpness[v]);
-    pal_cell_loops_append(&l, cells, NULL);
+    pal_cell_loops_append(&l, cells, keep, NULL);
     pal_err err = l.err;
+    if (!err && keep) err = pal_cell_loops_drop_unused(&l, kept);
     if (err)
         pal_cell_loops_free(&l);
     else
@@ -182,98 +197,26 @@ pal_err pal_cells_loops(const pal_cells *cells, pal_cell_loops *out)
     return err;
 }
 
-typedef struct side {
-    int32_t low, high;
-} side;
-
-static int compare_sides(const void *a, const void *b)
+pal_err pal_cell_loops_drop_unused(pal_cell_loops *l, int32_t *kept)
 {
-    const side *p = a, *q = b;
-    return p->low != q->low ? PAL_COMPARE(p->low, q->low) : PAL_COMPARE(p->high, q->high);
-}
-
-static side make_side(int32_t v, int32_t w)
-{
-    return v < w ? (side){v, w} : (side){w, v};
-}
-
-/* keeps the tags of edges that some loop still has; sides [corners] is scratch */
-static void keep_edge_tags(pal_cell_loops *l, side *sides)
-{
-    int32_t n_loop = l->cell[l->n_cell], n_kept = 0;
-    if (l->n_edge_tag == 0) return;
-    for (int32_t i = 0; i < n_loop; i++)
-        for (int32_t k = l->loop[i]; k < l->loop[i + 1]; k++)
-            sides[k] = make_side(l->corner[k], l->corner[k + 1 < l->loop[i + 1] ? k + 1 : l->loop[i]]);
-    qsort(sides, (size_t)l->loop[n_loop], sizeof *sides, compare_sides);
-    for (int32_t t = 0; t < l->n_edge_tag; t++) {
-        side want = make_side(l->edge_tag[t].a, l->edge_tag[t].b);
-        if (!bsearch(&want, sides, (size_t)l->loop[n_loop], sizeof *sides, compare_sides)) continue;
-        if (l->tag_line) l->tag_line[n_kept] = l->tag_line[t];
-        l->edge_tag[n_kept++] = l->edge_tag[t];
-    }
-    l->n_edge_tag = n_kept;
-}
-
-/* compacts the kept cells, their loops, corners, lines and face tags; number [loops + 1] is scratch */
-static void keep_cells(pal_cell_loops *l, const bool *keep, int32_t *number)
-{
-    int32_t n_cell = 0, n_loop = 0, n_corner = 0, n_tag = 0;
-    for (int32_t i = 0; i < l->n_cell; i++) {
-        int32_t first = l->cell[i], end = l->cell[i + 1];
-        for (int32_t k = first; k < end; k++) number[k] = -1;
-        if (!keep[i]) continue;
-        /* starts of later cells and loops are still the old ones: nothing moves up */
-        for (int32_t k = first; k < end; k++) {
-            int32_t from = l->loop[k], n = l->loop[k + 1] - from;
-            memmove(l->corner + n_corner, l->corner + from, (size_t)n * sizeof *l->corner);
-            if (l->line) l->line[n_loop] = l->line[k];
-            number[k] = n_loop;
-            l->loop[n_loop++] = n_corner;
-            n_corner += n;
-        }
-        l->cell[n_cell++] = n_loop - (end - first);
-    }
-    for (int32_t t = 0; t < l->n_face_tag; t++) {
-        int32_t k = number[l->face_tag[t].a];
-        if (k >= 0) l->face_tag[n_tag++] = (pal_cell_tag){k, 0, l->face_tag[t].sharp};
-    }
-    l->n_face_tag = n_tag, l->n_cell = n_cell;
-    l->cell[n_cell] = n_loop, l->loop[n_loop] = n_corner;
-}
-
-pal_err pal_cell_loops_keep(pal_cell_loops *loops, const bool *keep, int32_t *kept)
-{
-    pal_cell_loops *l = loops;
-    size_t n_loop = (size_t)l->cell[l->n_cell], n_number = (size_t)l->n_vertex + 1;
-    if (n_loop + 1 > n_number) n_number = n_loop + 1;
     pal_err err = PAL_ERR_OK;
-    int32_t *number;
-    side *sides;
-    PAL_ZEROED(&err, number, n_number);
-    PAL_ARRAY(&err, sides, l->loop[n_loop]);
-    if (err) {
-        PAL_FREE(number, sides);
-        return err;
-    }
-    if (keep) keep_cells(l, keep, number);
-    keep_edge_tags(l, sides);
-    int32_t n_corner = l->loop[l->cell[l->n_cell]], n = 0;
-    memset(number, 0, n_number * sizeof *number);
-    for (int32_t k = 0; k < n_corner; k++) number[l->corner[k]] = 1;
+    int32_t *number, n = 0;
+    PAL_ZEROED(&err, number, l->n_vertex);
+    if (err) return err;
+    for (int32_t k = 0; k < l->n_corner; k++) number[l->corner[k]] = 1;
     for (int32_t v = 0; v < l->n_vertex; v++) {
         if (!number[v]) continue;
-        memmove(l->x + 3 * (size_t)n, l->x + 3 * (size_t)v, 3 * sizeof *l->x);
-        if (l->vertex_sharpness) l->vertex_sharpness[n] = l->vertex_sharpness[v];
+        pal_copy3(l->x + 3 * (size_t)n, l->x + 3 * (size_t)v);
+        l->vertex_sharpness[n] = l->vertex_sharpness[v];
         if (l->vertex_line) l->vertex_line[n] = l->vertex_line[v];
         if (kept) kept[n] = v;
         number[v] = n++;
     }
-    for (int32_t k = 0; k < n_corner; k++) l->corner[k] = number[l->corner[k]];
+    for (int32_t k = 0; k < l->n_corner; k++) l->corner[k] = number[l->corner[k]];
     for (int32_t t = 0; t < l->n_edge_tag; t++)
         l->edge_tag[t].a = number[l->edge_tag[t].a], l->edge_tag[t].b = number[l->edge_tag[t].b];
     l->n_vertex = n;
-    PAL_FREE(number, sides);
+    free(number);
     return PAL_ERR_OK;
 }
 

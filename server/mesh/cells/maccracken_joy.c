@@ -277,12 +277,6 @@ static float after(float s)
     return s >= PAL_SHARPNESS_MAX ? PAL_SHARPNESS_MAX : s > 1 ? s - 1 : 0;
 }
 
-static void add_part_quad(pal_cell_loops *to, float sharp, int32_t a, int32_t b, int32_t c, int32_t d)
-{
-    pal_cell_loops_face(to, sharp);
-    pal_cell_loops_corners(to, (const int32_t[]){a, b, c, d}, 4);
-}
-
 /* The level's loops but for positions, with both halves of sharp edges and all parts of sharp faces, and the origins of
  * the cells and of the loops (a control face, or -1) */
 static void add_loops(const pal_subdivision *from, pal_cell_loops *to, int32_t *cell_origin, int32_t *loop_origin)
@@ -298,16 +292,16 @@ static void add_loops(const pal_subdivision *from, pal_cell_loops *to, int32_t *
             do {
                 int32_t before = pal_cells_prev(c, use), f = pal_cells_face_of(c, use);
                 loop_origin[to->n_loop] = from->face_origin[f];
-                add_part_quad(to, after(c->face[f].sharp), v, l.first_edge + c->edge_use[use].edge, l.first_face + f,
-                              l.first_edge + c->edge_use[before].edge);
+                pal_cell_loops_quad(to, after(c->face[f].sharp), v, l.first_edge + c->edge_use[use].edge,
+                                    l.first_face + f, l.first_edge + c->edge_use[before].edge);
                 use = pal_cells_next_around(c, use);
             } while (use != first);
             /* the inner quads cross the edges: from the face on their left to the one on their right */
             do {
                 int32_t right = pal_cells_face_of(c, c->edge_use[use].radial), f = pal_cells_face_of(c, use);
                 loop_origin[to->n_loop] = -1;
-                add_part_quad(to, 0, l.first_edge + c->edge_use[use].edge, l.first_face + right, l.first_cell + cell,
-                              l.first_face + f);
+                pal_cell_loops_quad(to, 0, l.first_edge + c->edge_use[use].edge, l.first_face + right,
+                                    l.first_cell + cell, l.first_face + f);
                 use = pal_cells_next_around(c, use);
             } while (use != first);
         }

@@ -166,8 +166,7 @@ static pal_err keep_cells(pal_cells *cells, const int32_t *label, const componen
     pal_cells kept = {0};
     bool *keep = malloc((size_t)cells->n_cell * sizeof *keep);
     for (int32_t c = 0; keep && c < cells->n_cell; c++) keep[c] = part[label[c]].keep;
-    pal_err err = keep ? pal_cells_loops(cells, &loops) : PAL_ERR_MEMORY;
-    if (!err) err = pal_cell_loops_keep(&loops, keep, NULL);
+    pal_err err = keep ? pal_cells_loops(cells, keep, &loops, NULL) : PAL_ERR_MEMORY;
     if (!err) err = pal_cells_make(&loops, &kept, NULL);
     pal_cell_loops_free(&loops);
     free(keep);
