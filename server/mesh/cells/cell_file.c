@@ -4,17 +4,7 @@
 
 #include "server/base/heap.h"
 #include "server/mesh/cells/cell_reader.h"
-#include "server/mesh/files/file_bytes.h"
 #include "server/mesh/geometry/tuning.h"
-
-pal_err pal_cell_reader_refuse(const pal_cell_reader *reader, const char *format, ...)
-{
-    va_list list;
-    va_start(list, format);
-    pal_err err = pal_file_refuse(reader->diag, reader->name, "line", reader->scan.line, format, list);
-    va_end(list);
-    return err;
-}
 
 /* keeps the line of item n */
 static void add_line(pal_cell_reader *r, int64_t **line, int32_t n, int64_t number)
@@ -39,10 +29,10 @@ pal_err pal_cell_reader_sharp(pal_cell_reader *reader, float *out)
 {
     double sharp;
     if (!pal_text_double(&reader->scan, &sharp))
-        return pal_cell_reader_refuse(reader, "a sharpness must be a number, found %s",
-                                      pal_text_excerpt_at(&reader->scan).text);
+        return PAL_CELL_REFUSE(reader, "a sharpness must be a number, found %s",
+                               pal_text_excerpt_at(&reader->scan).text);
     if (!(sharp >= 0 && sharp <= (double)PAL_SHARPNESS_MAX))
-        return pal_cell_reader_refuse(reader, "sharpness %g, must be 0 to %g", sharp, (double)PAL_SHARPNESS_MAX);
+        return PAL_CELL_REFUSE(reader, "sharpness %g, must be 0 to %g", sharp, (double)PAL_SHARPNESS_MAX);
     *out = (float)sharp;
     return PAL_ERR_OK;
 }
@@ -52,7 +42,7 @@ pal_err pal_cell_reader_sharp(pal_cell_reader *reader, float *out)
 static pal_err end_line(pal_cell_reader *r)
 {
     if (!pal_text_more(&r->scan)) return PAL_ERR_OK;
-    return pal_cell_reader_refuse(r, "%s at the end of the line", pal_text_excerpt_at(&r->scan).text);
+    return PAL_CELL_REFUSE(r, "%s at the end of the line", pal_text_excerpt_at(&r->scan).text);
 }
 
 static pal_err read_vertex(pal_cell_reader *r)
@@ -60,8 +50,7 @@ static pal_err read_vertex(pal_cell_reader *r)
     double x[3];
     for (int a = 0; a < 3; a++)
         if (!pal_text_double(&r->scan, &x[a]))
-            return pal_cell_reader_refuse(r, "a position needs three numbers, found %s",
-                                          pal_text_excerpt_at(&r->scan).text);
+            return PAL_CELL_REFUSE(r, "a position needs three numbers, found %s", pal_text_excerpt_at(&r->scan).text);
     pal_cell_reader_vertex(r, x);
     return PAL_ERR_OK;
 }
@@ -71,17 +60,16 @@ static pal_err read_number(pal_cell_reader *r, const char *what, int64_t max, in
 {
     int64_t i;
     if (!pal_text_int(&r->scan, &i))
-        return pal_cell_reader_refuse(r, "%s must be a number, found %s", what, pal_text_excerpt_at(&r->scan).text);
+        return PAL_CELL_REFUSE(r, "%s must be a number, found %s", what, pal_text_excerpt_at(&r->scan).text);
     if (i < 1 || i > max)
-        return pal_cell_reader_refuse(r, "%s %lld, there are %lld before this line", what, (long long)i,
-                                      (long long)max);
+        return PAL_CELL_REFUSE(r, "%s %lld, there are %lld before this line", what, (long long)i, (long long)max);
     *out = (int32_t)(i - 1);
     return PAL_ERR_OK;
 }
 
 static pal_err read_face(pal_cell_reader *r)
 {
-    if (r->l.n_cell == 0) return pal_cell_reader_refuse(r, "a face before the first cell");
+    if (r->l.n_cell == 0) return PAL_CELL_REFUSE(r, "a face before the first cell");
     pal_cell_reader_face(r, r->scan.line);
     while (pal_text_more(&r->scan)) {
         int32_t v = 0;
@@ -131,7 +119,7 @@ static pal_err read_cell(pal_cell_reader *r)
 {
     PAL_TRY(end_line(r));
     if (r->l.n_cell > 0 && r->l.cell[r->l.n_cell - 1] == r->l.n_loop)
-        return pal_cell_reader_refuse(r, "cell %d has no faces", r->l.n_cell);
+        return PAL_CELL_REFUSE(r, "cell %d has no faces", r->l.n_cell);
     pal_cell_loops_cell(&r->l);
     return PAL_ERR_OK;
 }
@@ -148,8 +136,8 @@ static pal_err read_line(pal_cell_reader *r)
         PAL_TRY(known[k].read(r));
         return end_line(r);
     }
-    return pal_cell_reader_refuse(r, "a line begins with %s, known are v, c, f, sv, se, sf",
-                                  pal_text_excerpt_at(&r->scan).text);
+    return PAL_CELL_REFUSE(r, "a line begins with %s, known are v, c, f, sv, se, sf",
+                           pal_text_excerpt_at(&r->scan).text);
 }
 
 static pal_err read_palcells(pal_cell_reader *r)
@@ -157,7 +145,7 @@ static pal_err read_palcells(pal_cell_reader *r)
     int64_t version;
     r->scan.hash = true;
     if (!pal_text_is(&r->scan, "palcells") || !pal_text_int(&r->scan, &version) || version != 1)
-        return pal_cell_reader_refuse(r, "the first line must be 'palcells 1'");
+        return PAL_CELL_REFUSE(r, "the first line must be 'palcells 1'");
     PAL_TRY(end_line(r));
     while (!r->l.err && pal_text_next_line(&r->scan))
         if (pal_text_more(&r->scan)) PAL_TRY(read_line(r));
@@ -173,9 +161,9 @@ static pal_err finish(pal_cell_reader *r, bool vtk, pal_cells *out)
     pal_err err = r->l.err;
     if (err) return pal_diagnostic_set(r->diag, err, "%s: no memory for its %d cells", r->name, r->l.n_cell);
     if (r->l.n_vertex == 0 || r->l.n_cell == 0)
-        return pal_cell_reader_refuse(r, "the file ends with %d vertices and %d cells", r->l.n_vertex, r->l.n_cell);
-    if (r->l.n_loop == 0) return pal_cell_reader_refuse(r, "the file ends without a face");
-    if (r->l.n_corner == 0) return pal_cell_reader_refuse(r, "the file ends without a corner");
+        return PAL_CELL_REFUSE(r, "the file ends with %d vertices and %d cells", r->l.n_vertex, r->l.n_cell);
+    if (r->l.n_loop == 0) return PAL_CELL_REFUSE(r, "the file ends without a face");
+    if (r->l.n_corner == 0) return PAL_CELL_REFUSE(r, "the file ends without a corner");
     if (vtk) PAL_TRY(pal_cell_loops_drop_unused(&r->l, NULL));
     pal_diagnostic inner = {""};
     err = pal_cells_make(&r->l, out, &inner);

@@ -6,7 +6,6 @@
 #include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/cells/cell_reader.h"
-#include "server/mesh/files/file_bytes.h"
 
 enum { TETRAHEDRON = 10, HEXAHEDRON = 12, WEDGE = 13, PYRAMID = 14, POLYHEDRON = 42 };
 
@@ -37,8 +36,8 @@ typedef struct lists {
 
 static pal_err refuse_number(const pal_cell_reader *r, const char *what)
 {
-    if (r->scan.at == r->scan.end) return pal_cell_reader_refuse(r, "the file ends where %s should be", what);
-    return pal_cell_reader_refuse(r, "%s must be a number, found %s", what, pal_text_excerpt_at(&r->scan).text);
+    if (r->scan.at == r->scan.end) return PAL_CELL_REFUSE(r, "the file ends where %s should be", what);
+    return PAL_CELL_REFUSE(r, "%s must be a number, found %s", what, pal_text_excerpt_at(&r->scan).text);
 }
 
 /* a number from min to max, on this line or a later one */
@@ -46,15 +45,15 @@ static pal_err take_int(pal_cell_reader *r, const char *what, int64_t min, int64
 {
     if (!pal_text_seek(&r->scan) || !pal_text_int(&r->scan, out)) return refuse_number(r, what);
     if (*out < min || *out > max)
-        return pal_cell_reader_refuse(r, "%s is %lld, must be %lld to %lld", what, (long long)*out, (long long)min,
-                                      (long long)max);
+        return PAL_CELL_REFUSE(r, "%s is %lld, must be %lld to %lld", what, (long long)*out, (long long)min,
+                               (long long)max);
     return PAL_ERR_OK;
 }
 
 static pal_err take_word(pal_cell_reader *r, const char *word)
 {
     if (pal_text_seek(&r->scan) && pal_text_is(&r->scan, word)) return PAL_ERR_OK;
-    return pal_cell_reader_refuse(r, "%s should be here, found %s", word, pal_text_excerpt_at(&r->scan).text);
+    return PAL_CELL_REFUSE(r, "%s should be here, found %s", word, pal_text_excerpt_at(&r->scan).text);
 }
 
 /* every number takes two bytes at least, so counts beyond that lie */
@@ -68,14 +67,14 @@ static pal_err read_head(pal_cell_reader *r)
     static const char head[] = "# vtk DataFile Version ";
     double version = 0;
     size_t n = sizeof head - 1, left = (size_t)(r->scan.end - r->scan.at);
-    if (left < n || memcmp(r->scan.at, head, n)) return pal_cell_reader_refuse(r, "the first line must be '%sN'", head);
+    if (left < n || memcmp(r->scan.at, head, n)) return PAL_CELL_REFUSE(r, "the first line must be '%sN'", head);
     r->scan.at += n;
     if (!pal_text_double(&r->scan, &version) || !(version >= 1 && version < 5))
-        return pal_cell_reader_refuse(r, "VTK version %g, versions 1 to 4.2 are read", version);
+        return PAL_CELL_REFUSE(r, "VTK version %g, versions 1 to 4.2 are read", version);
     pal_text_next_line(&r->scan);
     pal_text_next_line(&r->scan);
     if (pal_text_is(&r->scan, "BINARY"))
-        return pal_cell_reader_refuse(r, "a binary VTK file: save it as ASCII, that is what is read");
+        return PAL_CELL_REFUSE(r, "a binary VTK file: save it as ASCII, that is what is read");
     PAL_TRY(take_word(r, "ASCII"));
     PAL_TRY(take_word(r, "DATASET"));
     return take_word(r, "UNSTRUCTURED_GRID");
@@ -86,7 +85,7 @@ static pal_err read_points(pal_cell_reader *r)
     int64_t n;
     PAL_TRY(take_word(r, "POINTS"));
     PAL_TRY(take_int(r, "the number of points", 1, max_numbers(r), &n));
-    if (pal_text_word(&r->scan) == 0) return pal_cell_reader_refuse(r, "POINTS must say float or double");
+    if (pal_text_word(&r->scan) == 0) return PAL_CELL_REFUSE(r, "POINTS must say float or double");
     for (int64_t i = 0; i < n; i++) {
         double x[3];
         for (int a = 0; a < 3; a++)
@@ -109,7 +108,7 @@ static pal_err read_lists(pal_cell_reader *r, lists *at)
         at->line[at->n_cell] = r->scan.line;
         at->start[at->n_cell++] = (int32_t)at->n_item;
         n_number -= left + 1;
-        if (n_number < 0) return pal_cell_reader_refuse(r, "cells have more numbers than CELLS says");
+        if (n_number < 0) return PAL_CELL_REFUSE(r, "cells have more numbers than CELLS says");
         for (; left > 0; left--) {
             PAL_TRY(take_int(r, "a corner", 0, INT32_MAX, &value));
             if (!PAL_GROW(at->item, at->n_item)) return PAL_ERR_MEMORY;
@@ -125,7 +124,7 @@ static pal_err refuse_cell(const pal_cell_reader *r, const lists *at, size_t i, 
 {
     pal_cell_reader there = *r;
     there.scan.line = at->line[i];
-    return pal_cell_reader_refuse(&there, "cell %zu: %s %lld", i, what, (long long)number);
+    return PAL_CELL_REFUSE(&there, "cell %zu: %s %lld", i, what, (long long)number);
 }
 
 static pal_err add_polyhedron(pal_cell_reader *r, const lists *at, size_t i)
@@ -223,12 +222,12 @@ static pal_err read_sharp(pal_cell_reader *r)
             break;
         if (!pal_text_next_line(&r->scan)) return PAL_ERR_OK;
     }
-    if (pal_text_word(&r->scan) == 0) return pal_cell_reader_refuse(r, "SCALARS sharp must say float or double");
+    if (pal_text_word(&r->scan) == 0) return PAL_CELL_REFUSE(r, "SCALARS sharp must say float or double");
     if (pal_text_more(&r->scan)) PAL_TRY(take_int(r, "the number of components", 1, 1, &n));
     PAL_TRY(take_word(r, "LOOKUP_TABLE"));
     pal_text_next_line(&r->scan);
     for (int32_t v = 0; v < r->l.n_vertex; v++) {
-        if (!pal_text_seek(&r->scan)) return pal_cell_reader_refuse(r, "the file ends where a sharpness should be");
+        if (!pal_text_seek(&r->scan)) return PAL_CELL_REFUSE(r, "the file ends where a sharpness should be");
         PAL_TRY(pal_cell_reader_sharp(r, &r->l.vertex_sharpness[v]));
     }
     return PAL_ERR_OK;

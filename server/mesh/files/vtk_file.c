@@ -80,5 +80,5 @@ pal_err pal_mesh_write_vtk(const char *path, const pal_vtk_grid *grid, pal_diagn
     write_cells(out.file, g);
     write_fields(out.file, "POINT_DATA", g->point, g->n_point, g->n_node);
     write_fields(out.file, "CELL_DATA", g->cell, g->n_cell, g->n_element);
-    return pal_file_end(&out, PAL_ERR_OK, diag);
+    return pal_file_end(&out, diag);
 }

@@ -92,10 +92,7 @@ static pal_err sides_make(const pal_tets *tets, sides *out)
     side *item;
     PAL_ZEROED(&err, start, n_node + 1);
     PAL_ARRAY(&err, item, 4 * n_tet);
-    if (err) {
-        PAL_FREE(start, item);
-        return err;
-    }
+    if (err) return PAL_FREED(err, start, item);
     int32_t node[3];
     for (size_t t = 0; t < n_tet; t++)
         for (int k = 0; k < 4; k++) {
@@ -146,10 +143,7 @@ pal_err pal_tets_find_boundary(pal_tets *tets)
             }
     sides_free(&s);
     PAL_ARRAY(&err, face, 3 * n_face);
-    if (err) {
-        PAL_FREE(alone, on_surface, face);
-        return err;
-    }
+    if (err) return PAL_FREED(err, alone, on_surface, face);
     int32_t *to = face;
     for (size_t from = 0; from < n_side; from++)
         if (alone[from])
@@ -172,10 +166,7 @@ pal_err pal_tets_edges(const pal_tets *tets, int32_t **out, int *n_edge)
     int32_t *end;
     PAL_ZEROED(&err, start, n_node + 1);
     PAL_ARRAY(&err, end, 6 * n_tet);
-    if (err) {
-        PAL_FREE(start, end);
-        return err;
-    }
+    if (err) return PAL_FREED(err, start, end);
     for (int pass = 0; pass < 2; pass++) {
         for (size_t t = 0; t < n_tet; t++)
             for (int k = 0; k < 6; k++) {

@@ -90,10 +90,7 @@ pal_err pal_scan_drop_copies(pal_scan_surface *scan, int n_vertex)
     PAL_ARRAY(&err, fewer.tri, 3 * n);
     PAL_ARRAY(&err, hash, n_vertex);
     PAL_ARRAY(&err, list, n);
-    if (err) {
-        PAL_FREE(fewer.tri, hash, list);
-        return err;
-    }
+    if (err) return PAL_FREED(err, fewer.tri, hash, list);
     for (size_t v = 0; v < (size_t)n_vertex; v++) hash[v] = hash_point(scan->point + 3 * v);
     for (size_t t = 0; t < n; t++) {
         const int32_t *c = scan->tri + 3 * t;
@@ -311,10 +308,7 @@ static pal_err sort_rows(const scanner *s, pal_crossings *out)
     pal_crossing *item;
     PAL_ZEROED(&err, start, n_row + 2);
     PAL_ARRAY(&err, item, s->n);
-    if (err) {
-        PAL_FREE(start, item);
-        return err;
-    }
+    if (err) return PAL_FREED(err, start, item);
     for (int64_t i = 0; i < s->n; i++) start[s->item[i].row + 2]++;
     for (int i = 0; i < n_row; i++) start[i + 2] += start[i + 1];
     for (int64_t i = 0; i < s->n; i++) item[start[s->item[i].row + 1]++] = s->item[i].crossing;
