@@ -93,7 +93,7 @@ static int find_candidates(const pal_tets *tets, const int32_t *start, const int
     return n;
 }
 
-/* the five nearest candidates of every vertex into near (as candidates), distances squared into coef[..][3] */
+/* the five nearest candidates of every vertex into near, as nodes, and their weights into coef[..][3] */
 static pal_err find_near(const pal_tets *tets, const int32_t *candidate, int n_candidate, const double *x,
                          pal_skin *skin)
 {
@@ -164,26 +164,21 @@ static pal_err make_frames(const pal_tets *tets, const int32_t *start, const int
     int n_frame = 0;
     memset(place, 0, (size_t)tets->n_node * sizeof *place);
     for (size_t i = 0; i < n_near; i++) place[skin->near[i]] = 1;
-    for (int i = 0; i < tets->n_node; i++)
-        if (place[i]) {
-            place[i] = n_frame++;
-            n_fan += (size_t)(start[i + 1] - start[i]);
-        } else {
-            place[i] = -1;
-        }
+    for (int i = 0; i < tets->n_node; i++) {
+        if (place[i]) n_fan += (size_t)(start[i + 1] - start[i]);
+        place[i] = place[i] ? n_frame++ : -1;
+    }
     for (size_t i = 0; i < n_near; i++) skin->near[i] = place[skin->near[i]];
 
-    size_t room = n_frame ? (size_t)n_frame : 1;
+    pal_err err = PAL_ERR_OK;
     skin->n_frame = n_frame;
-    skin->frame = malloc(room * sizeof *skin->frame);
-    skin->frame_edge = malloc(room * 2 * sizeof *skin->frame_edge);
-    skin->frame_rotation = malloc(room * 2 * sizeof *skin->frame_rotation);
-    skin->frame_rest = malloc(room * 3 * sizeof *skin->frame_rest);
-    skin->fan_start = malloc((room + 1) * sizeof *skin->fan_start);
-    skin->fan = malloc((n_fan ? n_fan : 1) * 2 * sizeof *skin->fan);
-    if (!skin->frame || !skin->frame_edge || !skin->frame_rotation || !skin->frame_rest || !skin->fan_start ||
-        !skin->fan)
-        return PAL_ERR_MEMORY;
+    PAL_ARRAY(&err, skin->frame, n_frame);
+    PAL_ARRAY(&err, skin->frame_edge, 2 * n_frame);
+    PAL_ARRAY(&err, skin->frame_rotation, 2 * n_frame);
+    PAL_ARRAY(&err, skin->frame_rest, 3 * n_frame);
+    PAL_ARRAY(&err, skin->fan_start, n_frame + 1);
+    PAL_ARRAY(&err, skin->fan, 2 * n_fan);
+    if (err) return err;
     skin->fan_start[0] = 0;
     for (int i = 0; i < tets->n_node; i++) {
         if (place[i] < 0) continue;
@@ -224,16 +219,13 @@ pal_err pal_skin_bind(const pal_tets *tets, const double *x, int n_vertex, pal_s
 {
     if (tets->n_face == 0 || tets->n_node == 0) return PAL_ERR_REFUSED;
     pal_skin skin = {.n_vertex = n_vertex, .n_node = tets->n_node};
-    size_t n = n_vertex ? (size_t)n_vertex : 1;
-    int32_t *start = NULL, *fan = NULL, *candidate = malloc((size_t)tets->n_node * sizeof *candidate);
-    skin.near = malloc(n * PAL_SKIN_NEIGHBOURS * sizeof *skin.near);
-    skin.coef = calloc(n * PAL_SKIN_NEIGHBOURS * 4, sizeof *skin.coef);
-    pal_err err = candidate && skin.near && skin.coef ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    int32_t *start = NULL, *fan = NULL, *candidate;
+    PAL_ARRAY(&err, candidate, tets->n_node);
+    PAL_ARRAY(&err, skin.near, PAL_SKIN_NEIGHBOURS * (size_t)n_vertex);
+    PAL_ZEROED(&err, skin.coef, 4 * PAL_SKIN_NEIGHBOURS * (size_t)n_vertex);
     if (!err) err = node_fans(tets, &start, &fan);
-    if (!err) {
-        int n_candidate = find_candidates(tets, start, fan, candidate);
-        err = find_near(tets, candidate, n_candidate, x, &skin);
-    }
+    if (!err) err = find_near(tets, candidate, find_candidates(tets, start, fan, candidate), x, &skin);
     if (!err) err = make_frames(tets, start, fan, candidate, &skin);
     if (!err) err = store_offsets(tets, x, &skin);
     PAL_FREE(start, fan, candidate);

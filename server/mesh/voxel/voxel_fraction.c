@@ -64,10 +64,7 @@ static void add_row(const sweep *s, pal_polygon *p, int y)
     pal_polygon_range(p, 0, &min, &max);
     if (max <= 0) return;
     pal_polygon low, high;
-    if (min < 0) {
-        pal_polygon_cut_axis(p, 0, 0, NULL, &high);
-        *p = high;
-    }
+    pal_polygon_clip(p, 0, 0, INFINITY);
     int from = clamp_int(floor(min), 0, s->n[0]), to = clamp_int(ceil(max) - 1, from, s->n[0]);
     for (int x = from; x < to; x++) {
         pal_polygon_cut_axis(p, 0, x + 1, &low, &high);
@@ -85,23 +82,12 @@ static void add_triangle(const sweep *s, size_t t, int z)
         for (int k = 0; k < 3; k++)
             p.x[c][k] = grid_units(s->scan->point[3 * (size_t)s->scan->tri[3 * t + (size_t)c] + (size_t)k]);
     double min, max;
-    pal_polygon_range(&p, 2, &min, &max);
-    if (min < z) {
-        pal_polygon_cut_axis(&p, 2, z, NULL, &high);
-        p = high;
-    }
-    if (max > z + 1 && p.n >= 3) {
-        pal_polygon_cut_axis(&p, 2, z + 1, &low, NULL);
-        p = low;
-    }
+    pal_polygon_clip(&p, 2, z, z + 1);
     if (p.n < 3) return;
     pal_polygon_range(&p, 1, &min, &max);
     if (max <= 0 || min >= s->n[1]) return;
     int from = clamp_int(floor(min), 0, s->n[1] - 1), to = clamp_int(ceil(max) - 1, from, s->n[1] - 1);
-    if (min < 0) {
-        pal_polygon_cut_axis(&p, 1, 0, NULL, &high);
-        p = high;
-    }
+    pal_polygon_clip(&p, 1, 0, INFINITY);
     for (int y = from; y <= to && p.n >= 3; y++) {
         pal_polygon_cut_axis(&p, 1, y + 1, &low, &high);
         add_row(s, &low, y);

@@ -45,7 +45,9 @@ static void check_whole(const pal_prepared *mesh, int n_hex, int n_component)
     CHECK_INT(mesh->hexes.n_hex, n_hex);
     CHECK_INT(mesh->tets.n_tet, 5 * n_hex);
     CHECK_INT(pal_tets_check(&mesh->tets, &diag), PAL_ERR_OK);
-    REQUIRE(!pal_tets_components(&mesh->tets, NULL, &n));
+    int32_t *label = calloc((size_t)mesh->tets.n_tet, sizeof *label);
+    REQUIRE(label && !pal_tets_components(&mesh->tets, label, &n));
+    free(label);
     CHECK_INT(n, n_component);
     CHECK_NEAR(pal_tets_volume(&mesh->tets), n_hex * 1e-9, 1e-15);
     CHECK_INT(mesh->skin.n_vertex, mesh->surface.n_vertex);
