@@ -24,8 +24,6 @@ typedef struct builder {
     pal_diagnostic *diag;
 } builder;
 
-/* ---- messages ---- */
-
 /* number n as messages show it */
 static int file_number(const builder *b, int32_t n)
 {
@@ -60,8 +58,6 @@ refuse(const builder *b, int32_t cell, int32_t loop, const char *format, ...)
     return PAL_REFUSE(b->diag, "%s: cell %d%s %s", line_of(in->line, loop >= 0 ? loop : in->cell[cell]).text,
                       file_number(b, cell), face, sentence);
 }
-
-/* ---- checks of the input ---- */
 
 static pal_err check_counts(const builder *b)
 {
@@ -112,8 +108,6 @@ static bool sharpness_valid(float s)
     return s >= 0 && s <= PAL_SHARPNESS_MAX;
 }
 
-/* ---- memory ---- */
-
 static pal_err get_memory(builder *b)
 {
     pal_cells *c = b->c;
@@ -150,8 +144,6 @@ static void copy_loops(builder *b)
         }
     c->face_use[c->n_face_use] = (pal_face_use){.cell = -1, .face = -1, .first_use = c->n_edge_use, .mate = -1};
 }
-
-/* ---- faces and edges ---- */
 
 typedef enum loop_relation { OTHER, OPPOSITE, EQUAL, SHUFFLED } loop_relation;
 
@@ -267,8 +259,6 @@ static void join_mates(pal_cells *c)
     }
 }
 
-/* ---- cells ---- */
-
 /* the two uses of every edge in a cell */
 static pal_err join_radials(builder *b, int32_t cell)
 {
@@ -370,66 +360,53 @@ static pal_err find_cells(builder *b)
     return PAL_ERR_OK;
 }
 
-/* ---- incidence lists ---- */
-
-/* transposes lists: to[b] lists the a with b in from[a], ascending */
-static pal_err transpose_lists(const pal_cell_rows *from, int32_t n_from, int32_t n_to, pal_cell_rows *to)
+/* lists in row r the items of the pairs with row[k] = r, in their order */
+static pal_err make_rows(int32_t n_row, int32_t n, const int32_t *row, const int32_t *item, pal_cell_rows *to)
 {
-    int32_t n = from->start[n_from];
     pal_err err = PAL_ERR_OK;
-    PAL_ZEROED(&err, to->start, n_to + 2);
+    PAL_ZEROED(&err, to->start, n_row + 2);
     PAL_ARRAY(&err, to->item, n);
     if (err) return err;
-    for (int32_t k = 0; k < n; k++) to->start[from->item[k] + 2]++;
-    for (int32_t i = 1; i <= n_to; i++) to->start[i + 1] += to->start[i];
-    for (int32_t a = 0; a < n_from; a++)
-        for (int32_t k = from->start[a]; k < from->start[a + 1]; k++) to->item[to->start[from->item[k] + 1]++] = a;
+    for (int32_t k = 0; k < n; k++) to->start[row[k] + 2]++;
+    for (int32_t i = 1; i <= n_row; i++) to->start[i + 1] += to->start[i];
+    for (int32_t k = 0; k < n; k++) to->item[to->start[row[k] + 1]++] = item[k];
     return PAL_ERR_OK;
 }
 
-/* transposes of: vertices of edges, vertices and edges of faces, edges of cells; rows is scratch */
-static pal_err transpose_all(pal_cells *c, pal_cell_rows rows)
+/* from pairs: vertices of edges, vertices and edges of faces, edges and vertices of cells; an edge has two uses or
+ * more, so row and item [n_edge_use] hold the pairs of each */
+static pal_err fill_incidence(pal_cells *c, int32_t *row, int32_t *item)
 {
-    int32_t n = 0, end;
-    for (int32_t e = 0; e <= c->n_edge; e++) rows.start[e] = 2 * e;
-    for (int32_t e = 0; e < 2 * c->n_edge; e++) rows.item[e] = c->edge[e / 2].vertex[e % 2];
-    PAL_TRY(transpose_lists(&rows, c->n_edge, c->n_vertex, &c->vertex_edge));
+    for (int32_t k = 0; k < 2 * c->n_edge; k++) row[k] = c->edge[k / 2].vertex[k % 2], item[k] = k / 2;
+    PAL_TRY(make_rows(c->n_vertex, 2 * c->n_edge, row, item, &c->vertex_edge));
     for (int edges = 0; edges < 2; edges++) {
-        n = 0;
+        int32_t n = 0;
         for (int32_t f = 0; f < c->n_face; f++) {
             int32_t first, m = pal_cells_face_loop(c, f, &first);
-            rows.start[f] = n;
             for (int32_t u = first; u < first + m; u++)
-                rows.item[n++] = edges ? c->edge_use[u].edge : c->edge_use[u].vertex;
+                row[n] = edges ? c->edge_use[u].edge : c->edge_use[u].vertex, item[n++] = f;
         }
-        rows.start[c->n_face] = n;
-        PAL_TRY(transpose_lists(&rows, c->n_face, edges ? c->n_edge : c->n_vertex,
-                                edges ? &c->edge_face : &c->vertex_face));
+        PAL_TRY(make_rows(edges ? c->n_edge : c->n_vertex, n, row, item, edges ? &c->edge_face : &c->vertex_face));
     }
-    n = 0;
-    for (int32_t i = 0; i < c->n_cell; i++) {
-        rows.start[i] = n;
-        for (int32_t u = pal_cells_cell_loops(c, i, &end); u < end; u++)
-            if (u < c->edge_use[u].radial) rows.item[n++] = c->edge_use[u].edge;
-    }
-    rows.start[c->n_cell] = n;
-    PAL_TRY(transpose_lists(&rows, c->n_cell, c->n_edge, &c->edge_cell));
-    return transpose_lists(&c->cell_vertex, c->n_cell, c->n_vertex, &c->vertex_cell);
+    int32_t n = 0;
+    for (int32_t u = 0; u < c->n_edge_use; u++)
+        if (u < c->edge_use[u].radial)
+            row[n] = c->edge_use[u].edge, item[n++] = c->face_use[c->edge_use[u].face_use].cell;
+    PAL_TRY(make_rows(c->n_edge, n, row, item, &c->edge_cell));
+    for (int32_t i = 0, k = 0; i < c->n_cell; i++)
+        for (; k < c->cell_vertex.start[i + 1]; k++) item[k] = i;
+    return make_rows(c->n_vertex, c->cell_vertex.start[c->n_cell], c->cell_vertex.item, item, &c->vertex_cell);
 }
 
 static pal_err find_incidence(pal_cells *c)
 {
-    pal_cell_rows rows;
     pal_err err = PAL_ERR_OK;
-    /* no complex has more edges, faces or cells than edge uses */
-    PAL_ARRAY(&err, rows.start, c->n_edge_use + 1);
-    PAL_ARRAY(&err, rows.item, 2 * (size_t)c->n_edge_use);
-    if (!err) err = transpose_all(c, rows);
-    PAL_FREE(rows.start, rows.item);
-    return err;
+    int32_t *row, *item;
+    PAL_ARRAY(&err, row, c->n_edge_use);
+    PAL_ARRAY(&err, item, c->n_edge_use);
+    if (!err) err = fill_incidence(c, row, item);
+    return PAL_FREED(err, row, item);
 }
-
-/* ---- boundary ---- */
 
 static void find_boundary(pal_cells *c)
 {
@@ -521,8 +498,6 @@ static pal_err check_neighbourhoods(builder *b)
     return PAL_ERR_OK;
 }
 
-/* ---- sharpness ---- */
-
 static pal_err set_sharpness(builder *b)
 {
     const pal_cell_loops *in = b->in;
@@ -558,8 +533,6 @@ static pal_err set_sharpness(builder *b)
     }
     return PAL_ERR_OK;
 }
-
-/* ---- the whole ---- */
 
 static pal_err build(builder *b)
 {

@@ -5,8 +5,6 @@
 #include "server/mesh/geometry/tuning.h"
 #include "server/num/polar.h"
 
-/* ---- delete ---- */
-
 static pal_err delete_cell(pal_edit_work *w, int32_t cell)
 {
     const pal_cells *c = w->from;
@@ -24,8 +22,6 @@ static pal_err delete_cell(pal_edit_work *w, int32_t cell)
     PAL_FREE(keep, kept);
     return err;
 }
-
-/* ---- sharpen, move: the same complex ---- */
 
 /* the complex as it is, every vertex and cell itself */
 static pal_err copy_all(const pal_edit_work *w, pal_cells_edit *out)
@@ -77,8 +73,6 @@ static pal_err move(pal_edit_work *w, int32_t vertex, const double to_m[3], pal_
                            fault.length_scale_m);
 }
 
-/* ---- commands ---- */
-
 static const char *const names[] = {
 #define X(kind, name) name,
     PAL_CELLS_COMMAND_TABLE(X)
@@ -128,8 +122,6 @@ pal_err pal_cells_apply(const pal_cells *from, const pal_cells_command *command,
     if (err) pal_cells_edit_free(out);
     return err;
 }
-
-/* ---- deformed states ---- */
 
 /* rotation of the corners and normal of a face from rest to positions x; the identity where x has no area */
 static void face_rotation(const pal_cells *from, int32_t face, const double *x, double r[9])

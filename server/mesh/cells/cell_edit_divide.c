@@ -48,8 +48,6 @@ static pal_err division_reserve(const pal_cells *c, int32_t cell, division *s)
     return err;
 }
 
-/* ---- existing cuts ---- */
-
 static const double *at(const pal_cells *c, int32_t vertex)
 {
     return c->x + 3 * (size_t)vertex;
@@ -171,8 +169,6 @@ static void find_roles(division *s)
     }
 }
 
-/* ---- sides, and the numbers and rows of new vertices ---- */
-
 /* a vertex of the open side, in order; hanging ones go between */
 static void add_side_vertex(division *s, int32_t vertex, float sharp)
 {
@@ -258,8 +254,6 @@ static void add_midpoints(pal_edit_work *w, division *s)
         if (s->role[s->order[i]] == CORNER) s->order[n_corner++] = s->order[i];
     pal_interpolation_builder_mean(&w->rows, s->order, n_corner);
 }
-
-/* ---- the new cells ---- */
 
 /* the quad of a side at its corner i; reversed: as the neighbour sees it */
 static void add_outer_vertices(pal_edit_work *w, const division *s, int32_t side, int32_t i, bool reversed)
@@ -360,8 +354,6 @@ static pal_err divide_one(const pal_cells *from, int32_t cell, pal_cells_edit *o
     PAL_FREE(s.edge, s.face, s.role, s.order, s.start, s.corner, s.mid, s.centre, s.sharp);
     return pal_edit_finish(&w, err, out);
 }
-
-/* ---- many cells ---- */
 
 /* edit becomes the division `edit` followed by `next`; takes next. Both are freed on failure */
 static pal_err join_edits(pal_cells_edit *edit, pal_cells_edit *next)

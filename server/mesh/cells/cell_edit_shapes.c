@@ -41,8 +41,6 @@ static int32_t list_corners(const pal_cells *c, int32_t face, int32_t corner[PAL
     return n;
 }
 
-/* ---- extrude ---- */
-
 pal_err pal_edit_extrude(pal_edit_work *w, int32_t face, double distance_m, double scale)
 {
     const pal_cells *c = w->from;
@@ -71,8 +69,6 @@ pal_err pal_edit_extrude(pal_edit_work *w, int32_t face, double distance_m, doub
     add_prism(w, n, base, tip, face);
     return PAL_ERR_OK;
 }
-
-/* ---- merge, bridge ---- */
 
 /* Corners of two faces: b[k] is paired with a[k]. The loops run opposite ways; of the n cyclic shifts the nearest is
  * taken. */

@@ -37,8 +37,6 @@ pal_err pal_cell_reader_sharp(pal_cell_reader *reader, float *out)
     return PAL_ERR_OK;
 }
 
-/* ---- palcells ---- */
-
 static pal_err end_line(pal_cell_reader *r)
 {
     if (!pal_text_more(&r->scan)) return PAL_ERR_OK;
@@ -153,8 +151,6 @@ static pal_err read_palcells(pal_cell_reader *r)
     return PAL_ERR_OK;
 }
 
-/* ---- reading ---- */
-
 /* builds the complex from the loops; the builder's message follows the file's name */
 static pal_err finish(pal_cell_reader *r, bool vtk, pal_cells *out)
 {
@@ -199,8 +195,6 @@ pal_err pal_cell_file_load(const char *path, pal_cells *out, pal_diagnostic *dia
     free(bytes);
     return err;
 }
-
-/* ---- writing ---- */
 
 static void write_palcells(const pal_cells *c, FILE *file)
 {

@@ -25,8 +25,6 @@ static const kind KINDS[4] = {
     {PYRAMID, 5, 5, {{0, 3, 2, 1, -1}, {0, 1, 4, -1}, {1, 2, 4, -1}, {2, 3, 4, -1}, {3, 0, 4, -1}}},
 };
 
-/* ---- reading ---- */
-
 /* the numbers of CELLS, cell after cell, and where each cell's begin */
 typedef struct lists {
     int32_t *item, *start;
@@ -243,8 +241,6 @@ pal_err pal_cell_vtk_read(pal_cell_reader *reader)
     PAL_FREE(at.item, at.start, at.line);
     return err ? err : read_sharp(reader);
 }
-
-/* ---- writing ---- */
 
 /* VTK's corners of a cell that is one of KINDS, from the loop of its first face with as many corners as the base; the
  * vertex opposite a corner is at the third edge there. NULL: a polyhedron */

@@ -5,8 +5,6 @@
 #include "server/base/vec3.h"
 #include "server/num/union_find.h"
 
-/* ---- pieces and holes ---- */
-
 int32_t pal_cells_label(const pal_cells *c, int32_t *label)
 {
     pal_union_find_init(label, c->n_cell);
@@ -40,8 +38,6 @@ pal_err pal_cells_find_topology(const pal_cells *cells, pal_cells_topology *out)
     *out = t;
     return PAL_ERR_OK;
 }
-
-/* ---- the boundary as triangles ---- */
 
 /* the corner from which a fan of triangles covers the face best */
 static int fan_corner(const pal_cells *c, int32_t face)

@@ -5,8 +5,6 @@
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/tuning.h"
 
-/* ---- arrays ---- */
-
 enum { N_ARRAY = 22 };
 
 typedef struct array {
@@ -72,8 +70,6 @@ pal_err pal_cells_copy(const pal_cells *from, pal_cells *to)
     if (!err) *to = copy;
     return err;
 }
-
-/* ---- loops ---- */
 
 void pal_cell_loops_free(pal_cell_loops *loops)
 {
@@ -219,8 +215,6 @@ pal_err pal_cell_loops_drop_unused(pal_cell_loops *l, int32_t *kept)
     free(number);
     return PAL_ERR_OK;
 }
-
-/* ---- measures ---- */
 
 void pal_cells_use_centre(const pal_cells *c, const double *x, int32_t face_use, double out[3])
 {

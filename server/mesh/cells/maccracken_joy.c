@@ -30,8 +30,7 @@ static level level_of(const pal_cells *c)
     return l;
 }
 
-/* ---- weights: s times a point, added to the open row ---- */
-
+/* weights: s times a point, added to the open row */
 static void add_mid(const level *l, int32_t e, double s)
 {
     for (int k = 0; k < 2; k++) pal_interpolation_builder_add(l->row, l->c->edge[e].vertex[k], s / 2);
@@ -96,8 +95,7 @@ static int32_t face_corner(const pal_cells *c, int32_t face, int32_t vertex)
     return use;
 }
 
-/* ---- the four rules; s is the weight that the row's other rules leave ---- */
-
+/* the four rules; s is the weight that the row's other rules leave */
 static void cell_rule(const level *l, int32_t cell)
 {
     const int32_t *start = l->c->cell_vertex.start + cell;
@@ -133,20 +131,31 @@ static void boundary_edge(const level *l, int32_t e, double s)
     }
 }
 
+static int32_t row_length(const pal_cell_rows *rows, int32_t i)
+{
+    return rows->start[i + 1] - rows->start[i];
+}
+
+/* weight s for each item of a row */
+static void add_row(const level *l, void (*add)(const level *l, int32_t item, double s), const pal_cell_rows *rows,
+                    int32_t i, double s)
+{
+    for (int32_t k = rows->start[i]; k < rows->start[i + 1]; k++) add(l, rows->item[k], s);
+}
+
 static void inner_edge(const level *l, int32_t e, double s)
 {
     const pal_cells *c = l->c;
-    int32_t n = c->edge_face.start[e + 1] - c->edge_face.start[e];
-    int32_t n_cell = c->edge_cell.start[e + 1] - c->edge_cell.start[e];
-    for (int32_t k = c->edge_cell.start[e]; k < c->edge_cell.start[e + 1]; k++) {
-        int32_t cell = c->edge_cell.item[k];
-        if (!l->averaging) add_cell(l, cell, s / n / n_cell);
-        for (int end = 0; end < 2 && l->averaging; end++)
-            add_part(l, cell, corner_of(c, cell, c->edge[e].vertex[end]), s / (2 * n_cell));
+    int32_t n = row_length(&c->edge_face, e), n_cell = row_length(&c->edge_cell, e);
+    if (l->averaging) {
+        for (int32_t k = 0; k < 2 * n_cell; k++) {
+            int32_t cell = c->edge_cell.item[c->edge_cell.start[e] + k / 2];
+            add_part(l, cell, corner_of(c, cell, c->edge[e].vertex[k % 2]), s / (2 * n_cell));
+        }
+        return;
     }
-    if (l->averaging) return;
-    for (int32_t k = c->edge_face.start[e]; k < c->edge_face.start[e + 1]; k++)
-        add_face(l, c->edge_face.item[k], 2 * s / n / n);
+    add_row(l, add_cell, &c->edge_cell, e, s / n / n_cell);
+    add_row(l, add_face, &c->edge_face, e, 2 * s / n / n);
     add_mid(l, e, s * (n - 3) / n);
 }
 
@@ -185,19 +194,13 @@ static void boundary_vertex(const level *l, int32_t v, double s)
 static void inner_vertex(const level *l, int32_t v, double s)
 {
     const pal_cells *c = l->c;
-    const pal_cell_rows *cells = &c->vertex_cell, *faces = &c->vertex_face, *edges = &c->vertex_edge;
-    int32_t n_cell = cells->start[v + 1] - cells->start[v], n_face = faces->start[v + 1] - faces->start[v];
-    int32_t n_edge = edges->start[v + 1] - edges->start[v];
-    for (int32_t k = cells->start[v]; k < cells->start[v + 1]; k++) {
-        int32_t cell = cells->item[k];
-        if (l->averaging)
-            add_part(l, cell, corner_of(c, cell, v), s / n_cell);
-        else
-            add_cell(l, cell, s / 8 / n_cell);
-    }
+    int32_t first = c->vertex_cell.start[v], n_cell = row_length(&c->vertex_cell, v);
+    for (int32_t k = first; l->averaging && k < first + n_cell; k++)
+        add_part(l, c->vertex_cell.item[k], corner_of(c, c->vertex_cell.item[k], v), s / n_cell);
     if (l->averaging) return;
-    for (int32_t k = faces->start[v]; k < faces->start[v + 1]; k++) add_face(l, faces->item[k], 3 * s / 8 / n_face);
-    for (int32_t k = edges->start[v]; k < edges->start[v + 1]; k++) add_mid(l, edges->item[k], 3 * s / 8 / n_edge);
+    add_row(l, add_cell, &c->vertex_cell, v, s / 8 / n_cell);
+    add_row(l, add_face, &c->vertex_face, v, 3 * s / 8 / row_length(&c->vertex_face, v));
+    add_row(l, add_mid, &c->vertex_edge, v, 3 * s / 8 / row_length(&c->vertex_edge, v));
     pal_interpolation_builder_add(l->row, v, s / 8);
 }
 
@@ -269,8 +272,6 @@ static pal_err make_rows(const pal_cells *c, bool averaging, int64_t max_entry, 
     return pal_interpolation_builder_finish(&build, out);
 }
 
-/* ---- the new cells ---- */
-
 /* sharpness that remains a level later */
 static float after(float s)
 {
@@ -310,8 +311,6 @@ static void add_loops(const pal_subdivision *from, pal_cell_loops *to, int32_t *
             pal_cell_loops_edge(to, c->edge[e].vertex[end], l.first_edge + e, after(c->edge[e].sharp));
     for (int32_t v = 0; v < c->n_vertex; v++) to->vertex_sharpness[v] = after(c->vertex_sharpness[v]);
 }
-
-/* ---- level after level ---- */
 
 /* memory of a complex of so many edge uses, about: that of bricks inside a solid, and half as much more for loops,
  * origins and tables while it is made */

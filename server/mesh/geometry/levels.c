@@ -15,8 +15,6 @@ void pal_levels_free(pal_levels *l)
     memset(l, 0, sizeof *l);
 }
 
-/* ---- checks before any edge is known ---- */
-
 static pal_err check_face(const pal_surface *s, int t, pal_diagnostic *diag)
 {
     const int32_t *c = s->tri + 3 * (size_t)t;
@@ -52,8 +50,6 @@ static pal_err check_input(const pal_surface *s, const pal_levels_options *o, pa
     for (int t = 0; t < s->n_tri; t++) PAL_TRY(check_face(s, t, diag));
     return PAL_ERR_OK;
 }
-
-/* ---- edges of the coarse surface ---- */
 
 /* one edge of a vertex from its n sides; the first gives its direction */
 static pal_err make_edge(const pal_surface *s, int32_t low, const pal_surface_side *side, int n, int32_t e,
@@ -94,8 +90,6 @@ static pal_err find_edges(const pal_surface *s, pal_winged_edge *edge, int32_t *
     PAL_FREE(start, side);
     return err;
 }
-
-/* ---- one level's adjacency ---- */
 
 /* faces, walks and spokes of a level from its faces' edges and its edges' ends; edge e of the level has face[1] = -1
  * when it is a boundary edge. False when two boundary edges start at one vertex, *bad. */
@@ -176,8 +170,6 @@ static void find_corners(pal_levels *l)
         l->corner[v] = pal_dot3(a, b) < CORNER_COS * pal_norm3(a) * pal_norm3(b);
     }
 }
-
-/* ---- memory ---- */
 
 /* counts of all levels; false beyond int32 */
 static bool count_levels(pal_levels *l, int32_t n_vertex, int32_t n_edge, int32_t n_face)
@@ -263,8 +255,6 @@ static void trim_entries(pal_levels *l)
     if (weight) l->stencil_weight = weight;
     l->n_byte = plain_bytes(l) + n * ENTRY_BYTES;
 }
-
-/* ---- splitting ---- */
 
 /* entry: room for the largest stencil */
 static void place_midpoints(pal_levels *l, int level, pal_stencil_entry *entry)

@@ -30,8 +30,6 @@ typedef struct hollow {
     double reach;     /* maximum displacement in a step, m */
 } hollow;
 
-/* ---- rings ---- */
-
 static void spine_at(const node *spine, int n, double along, node *out, double axis[3])
 {
     int i = along < n - 2 ? (int)along : n - 2;
@@ -95,8 +93,6 @@ static pal_err make_tube(const ring *rings, int n_ring, const node *spine, int n
     }
     return PAL_ERR_OK;
 }
-
-/* ---- spreading ---- */
 
 static void gradient(shape inside, const double p[3], double g[3])
 {
@@ -285,8 +281,6 @@ static pal_err make_hollow_body(const ring *rings, int n_ring, const node *spine
         *out = s;
     return err;
 }
-
-/* ---- bodies ---- */
 
 static double unit_ball(const double p[3])
 {

@@ -10,8 +10,6 @@ typedef struct component {
     bool fixed, keep;
 } component;
 
-/* ---- the rule ---- */
-
 static pal_err refuse(const char *name, const component *part, const pal_loose_components *all, int n_bad, int bad,
                       pal_diagnostic *diag)
 {
@@ -60,8 +58,6 @@ void pal_loose_components_describe(const pal_loose_components *parts, const char
                        100 * parts->dropped_m3 / parts->volume_m3,
                        parts->largest_only ? ": only the largest is kept" : ": small and without support");
 }
-
-/* ---- tetrahedra ---- */
 
 static void add_tet(const pal_tets *tets, const uint8_t *fixed, const int32_t *corner, component *to)
 {
@@ -157,8 +153,6 @@ pal_err pal_loose_components_drop(const char *name, const uint8_t *fixed, bool l
     PAL_FREE(label, part);
     return err;
 }
-
-/* ---- control cells ---- */
 
 static pal_err keep_cells(pal_cells *cells, const int32_t *label, const component *part)
 {

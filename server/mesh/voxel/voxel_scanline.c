@@ -69,48 +69,33 @@ static void find_closed(pal_scan_surface *scan, const uint64_t *hash)
     scan->even = odd == 0;
 }
 
-typedef struct numbered {
-    uint64_t key;
-    int32_t tri;
-} numbered;
-
-static int compare_numbered(const void *a, const void *b)
-{
-    const numbered *s = a, *t = b;
-    return s->key != t->key ? PAL_COMPARE(s->key, t->key) : PAL_COMPARE(s->tri, t->tri);
-}
-
 pal_err pal_scan_drop_copies(pal_scan_surface *scan, int n_vertex)
 {
-    size_t n = (size_t)scan->n_tri;
+    size_t n = (size_t)scan->n_tri, cap = 16;
     pal_scan_surface fewer = *scan;
     pal_err err = PAL_ERR_OK;
-    uint64_t *hash;
-    numbered *list;
+    uint64_t *hash, *seen; /* of vertices; of triangles so far, 0: free */
+    while (cap < 2 * n) cap *= 2;
     PAL_ARRAY(&err, fewer.tri, 3 * n);
     PAL_ARRAY(&err, hash, n_vertex);
-    PAL_ARRAY(&err, list, n);
-    if (err) return PAL_FREED(err, fewer.tri, hash, list);
+    PAL_ZEROED(&err, seen, cap);
+    if (err) return PAL_FREED(err, fewer.tri, hash, seen);
     for (size_t v = 0; v < (size_t)n_vertex; v++) hash[v] = hash_point(scan->point + 3 * v);
+    fewer.n_tri = 0;
     for (size_t t = 0; t < n; t++) {
         const int32_t *c = scan->tri + 3 * t;
         /* the same for the three corners in any order */
-        uint64_t a = hash[c[0]], b = hash[c[1]], e = hash[c[2]];
-        list[t] = (numbered){(a + b + e) ^ (a ^ b ^ e) * 0x9E3779B97F4A7C15u, (int32_t)t};
+        uint64_t a = hash[c[0]], b = hash[c[1]], e = hash[c[2]], key = (a + b + e) ^ (a ^ b ^ e) * 0x9E3779B97F4A7C15u;
+        key += !key;
+        size_t at = key & (cap - 1);
+        while (seen[at] && seen[at] != key) at = (at + 1) & (cap - 1);
+        if (seen[at]) continue;
+        seen[at] = key;
+        memcpy(fewer.tri + 3 * (size_t)fewer.n_tri++, c, 3 * sizeof *c);
     }
-    qsort(list, n, sizeof *list, compare_numbered);
-    /* sorting back by number leaves the first of each set in the order of the file */
-    size_t n_kept = 0;
-    for (size_t i = 0; i < n; i++)
-        if (n_kept == 0 || list[i].key != list[n_kept - 1].key) list[n_kept++] = list[i];
-    for (size_t i = 0; i < n_kept; i++) list[i].key = 0;
-    qsort(list, n_kept, sizeof *list, compare_numbered);
-    for (size_t i = 0; i < n_kept; i++)
-        memcpy(fewer.tri + 3 * i, scan->tri + 3 * (size_t)list[i].tri, 3 * sizeof *fewer.tri);
-    fewer.n_tri = (int)n_kept;
     find_closed(&fewer, hash);
     bool better = fewer.even || !scan->even;
-    PAL_FREE(hash, list, better ? scan->tri : fewer.tri);
+    PAL_FREE(hash, seen, better ? scan->tri : fewer.tri);
     if (better) *scan = fewer;
     return PAL_ERR_OK;
 }
