@@ -465,11 +465,7 @@ static int32_t count_around(const pal_cells *c, int32_t e, int32_t first)
         if (!pal_cells_face_boundary(c, c->edge_face.item[k])) continue;
         pal_cells_face_loop(c, c->edge_face.item[k], &u);
         while (c->edge_use[u].edge != e) u++;
-        for (;;) {
-            n++;
-            u = c->edge_use[c->edge_use[u].radial].mate;
-            if (u < 0) break;
-        }
+        for (; u >= 0; u = c->edge_use[c->edge_use[u].radial].mate) n++;
     }
     return n / 2;
 }

@@ -84,10 +84,8 @@ const char *pal_cells_command_name(pal_cells_command_kind kind)
     return (unsigned)kind < PAL_CELLS_COMMAND_KINDS ? names[kind] : NULL;
 }
 
-pal_err pal_cells_apply(const pal_cells *from, const pal_cells_command *command, pal_cells_edit *out,
-                        pal_diagnostic *diag)
+pal_err pal_cells_apply(const pal_cells *from, const pal_cells_command *k, pal_cells_edit *out, pal_diagnostic *diag)
 {
-    const pal_cells_command *k = command;
     const char *name = pal_cells_command_name(k->kind);
     const int32_t item[] = {k->vertex, k->edge, k->face};
     int element = (int)k->kind - PAL_CELLS_SHARPEN_VERTEX;

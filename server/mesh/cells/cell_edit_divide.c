@@ -175,10 +175,7 @@ static void add_side_vertex(division *s, int32_t vertex, float sharp)
     int32_t *end = &s->start[s->n_side + 1];
     if (s->role[vertex] == HANGING) {
         /* before the first corner: kept until the side is closed, in the slot of a missing midpoint */
-        if (*end == s->start[s->n_side])
-            s->centre[s->n_side] = vertex;
-        else
-            s->mid[*end - 1] = vertex;
+        *(*end == s->start[s->n_side] ? &s->centre[s->n_side] : &s->mid[*end - 1]) = vertex;
         return;
     }
     s->corner[*end] = vertex, s->mid[*end] = -1, s->sharp[*end] = sharp;

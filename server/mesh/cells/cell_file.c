@@ -6,7 +6,6 @@
 #include "server/mesh/cells/cell_reader.h"
 #include "server/mesh/geometry/tuning.h"
 
-/* keeps the line of item n */
 static void add_line(pal_cell_reader *r, int64_t **line, int32_t n, int64_t number)
 {
     if (!r->l.err && !PAL_GROW(*line, n)) r->l.err = PAL_ERR_MEMORY;
@@ -173,14 +172,10 @@ pal_err pal_cell_file_parse(const char *name, const uint8_t *bytes, size_t n_byt
     pal_file_printable_name(shown, name);
     pal_cell_reader r = {.name = shown, .diag = diag, .scan = {.at = bytes, .end = bytes + n_byte, .line = 1}};
     bool vtk = n_byte >= 5 && !memcmp(bytes, "# vtk", 5);
-    pal_err err = PAL_ERR_OK;
     if (n_byte > CELL_MAX_BYTE)
-        err = pal_diagnostic_set(diag, PAL_ERR_BUDGET, "%s: %zu bytes, at most %zu are read", shown, n_byte,
-                                 CELL_MAX_BYTE);
-    else if (vtk)
-        err = pal_cell_vtk_read(&r);
-    else
-        err = read_palcells(&r);
+        return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "%s: %zu bytes, at most %zu are read", shown, n_byte,
+                                  CELL_MAX_BYTE);
+    pal_err err = (vtk ? pal_cell_vtk_read : read_palcells)(&r);
     if (!err) err = finish(&r, vtk, out);
     pal_cell_loops_free(&r.l);
     return err;
@@ -237,16 +232,10 @@ pal_err pal_cell_file_bytes(const pal_cells *cells, bool vtk, uint8_t **bytes, s
     size_t n = 0;
     FILE *file = open_memstream(&text, &n);
     if (!file) return PAL_ERR_MEMORY;
-    if (vtk)
-        pal_cell_vtk_write(cells, file);
-    else
-        write_palcells(cells, file);
+    (vtk ? pal_cell_vtk_write : write_palcells)(cells, file);
     bool bad = ferror(file) != 0;
     bad |= fclose(file) != 0;
-    if (bad) {
-        free(text);
-        return PAL_ERR_MEMORY;
-    }
+    if (bad) return PAL_FREED(PAL_ERR_MEMORY, text);
     *bytes = (uint8_t *)text, *n_byte = n;
     return PAL_ERR_OK;
 }

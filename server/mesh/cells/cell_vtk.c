@@ -292,9 +292,8 @@ static void write_polyhedron(const pal_cells *c, int32_t cell, FILE *file)
     }
 }
 
-void pal_cell_vtk_write(const pal_cells *cells, FILE *file)
+void pal_cell_vtk_write(const pal_cells *c, FILE *file)
 {
-    const pal_cells *c = cells;
     int64_t n_number = 0;
     int32_t corner[8];
     bool sharp = false;

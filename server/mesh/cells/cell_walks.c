@@ -14,9 +14,8 @@ int32_t pal_cells_label(const pal_cells *c, int32_t *label)
     return pal_union_find_label(label, c->n_cell);
 }
 
-pal_err pal_cells_find_topology(const pal_cells *cells, pal_cells_topology *out)
+pal_err pal_cells_find_topology(const pal_cells *c, pal_cells_topology *out)
 {
-    const pal_cells *c = cells;
     pal_cells_topology t = {.euler = (int64_t)c->n_vertex - c->n_edge + c->n_face - c->n_cell};
     pal_err err = PAL_ERR_OK;
     int32_t *label;
@@ -82,9 +81,8 @@ static void write_triangles(const pal_cells *c, const int32_t *number, pal_surfa
     }
 }
 
-pal_err pal_cells_boundary(const pal_cells *cells, pal_surface *out, int32_t **vertex, int32_t **face)
+pal_err pal_cells_boundary(const pal_cells *c, pal_surface *out, int32_t **vertex, int32_t **face)
 {
-    const pal_cells *c = cells;
     pal_surface s = {0};
     for (int32_t v = 0; v < c->n_vertex; v++) s.n_vertex += c->vertex_boundary[v];
     for (int32_t f = 0; f < c->n_face; f++) {

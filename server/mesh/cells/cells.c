@@ -292,9 +292,8 @@ double pal_cells_volume(const pal_cells *cells, const double *x)
     return sum;
 }
 
-bool pal_cells_shape_valid(const pal_cells *cells, const double *x, pal_cells_fault *fault)
+bool pal_cells_shape_valid(const pal_cells *c, const double *x, pal_cells_fault *fault)
 {
-    const pal_cells *c = cells;
     const double *p = x ? x : c->x;
     pal_cells_fault f = {.cell = -1, .face_use = -1};
     for (int32_t k = 0; k < c->n_face && f.cell < 0; k++) {

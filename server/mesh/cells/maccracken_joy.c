@@ -165,10 +165,7 @@ static void edge_rule(const level *l, int32_t e)
     double sharp = edge->pinched ? 1 : fmin(edge->sharp, 1);
     if (sharp > 0) add_mid(l, e, sharp);
     if (sharp >= 1) return;
-    if (edge->boundary)
-        boundary_edge(l, e, 1 - sharp);
-    else
-        inner_edge(l, e, 1 - sharp);
+    (edge->boundary ? boundary_edge : inner_edge)(l, e, 1 - sharp);
 }
 
 static void boundary_vertex(const level *l, int32_t v, double s)
@@ -245,10 +242,7 @@ static void vertex_rule(const level *l, int32_t v)
         for (int k = 0; k < 2; k++) add_mid(l, at.edge[k], on / 4);
     }
     if (smooth <= 0) return;
-    if (c->vertex_boundary[v])
-        boundary_vertex(l, v, smooth);
-    else
-        inner_vertex(l, v, smooth);
+    (c->vertex_boundary[v] ? boundary_vertex : inner_vertex)(l, v, smooth);
 }
 
 /* the level's rows, in the order of the new vertices */

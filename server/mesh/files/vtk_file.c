@@ -60,9 +60,8 @@ static pal_err check_fields(const pal_vtk_field *field, int n, const char *path,
     return PAL_ERR_OK;
 }
 
-pal_err pal_mesh_write_vtk(const char *path, const pal_vtk_grid *grid, pal_diagnostic *diag)
+pal_err pal_mesh_write_vtk(const char *path, const pal_vtk_grid *g, pal_diagnostic *diag)
 {
-    const pal_vtk_grid *g = grid;
     pal_file_out out;
     if (!cell_type(g->n_corner)) return PAL_REFUSE(diag, "%s: elements of %d corners", path, g->n_corner);
     PAL_TRY(check_fields(g->point, g->n_point, path, diag));

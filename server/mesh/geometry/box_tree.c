@@ -65,10 +65,7 @@ static void measure_leaf(const builder *b, node *to)
         pal_add3(middle, middle, g);
         to->area += area;
     }
-    if (to->area > 0)
-        pal_scale3(to->centre, 1 / to->area, to->centre);
-    else
-        pal_scale3(to->centre, 1.0 / to->n_item, middle);
+    pal_scale3(to->centre, to->area > 0 ? 1 / to->area : 1.0 / to->n_item, to->area > 0 ? to->centre : middle);
     find_radius(to);
 }
 

@@ -66,7 +66,6 @@ static size_t slot_of(const lattice *l, uint64_t key)
     return slot;
 }
 
-/* makes the hash twice as large */
 static bool rehash(lattice *l)
 {
     lattice old = *l;

@@ -51,44 +51,52 @@ static pal_err check_input(const pal_surface *s, const pal_levels_options *o, pa
     return PAL_ERR_OK;
 }
 
+/* what the coarse surface gives: its edges with their ends and faces, the edges of its faces, room for the largest
+ * stencil (no vertex has more edges than 3 n_tri) */
+typedef struct coarse {
+    const pal_surface *s;
+    pal_winged_edge *edge;    /* [3 n_tri]      */
+    int32_t *face_edge;       /* [3 n_tri]      */
+    pal_stencil_entry *entry; /* [6 n_tri + 16] */
+    int32_t n_edge;
+    int64_t irregular; /* K (K + 1), summed over irregular vertices of K edges */
+    pal_diagnostic *diag;
+} coarse;
+
 /* one edge of a vertex from its n sides; the first gives its direction */
-static pal_err make_edge(const pal_surface *s, int32_t low, const pal_surface_side *side, int n, int32_t e,
-                         pal_winged_edge *edge, int32_t *face_edge, pal_diagnostic *diag)
+static pal_err make_edge(coarse *c, int32_t low, const pal_surface_side *side, int n)
 {
-    int32_t high = side->high, a = s->tri[side->corner];
+    int32_t high = side->high, a = c->s->tri[side->corner];
     if (n > 2)
-        return PAL_REFUSE(diag,
+        return PAL_REFUSE(c->diag,
                           "levels: %d triangles (%d, %d, %d%s) share the edge of vertices %d and %d, a surface has two "
                           "at most; " OFFER,
                           n, side[0].corner / 3, side[1].corner / 3, side[2].corner / 3, n > 3 ? ", ..." : "", low,
                           high);
-    if (n == 2 && s->tri[side[1].corner] == a)
-        return PAL_REFUSE(diag,
+    if (n == 2 && c->s->tri[side[1].corner] == a)
+        return PAL_REFUSE(c->diag,
                           "levels: triangles %d and %d run the same way through the edge of vertices %d and %d: turn "
                           "one over, or " OFFER,
                           side[0].corner / 3, side[1].corner / 3, low, high);
-    edge[e] = (pal_winged_edge){.vertex = {a, a == low ? high : low},
-                                .face = {side[0].corner / 3, n == 2 ? side[1].corner / 3 : -1}};
-    for (int k = 0; k < n; k++) face_edge[side[k].corner] = e;
+    c->edge[c->n_edge] = (pal_winged_edge){.vertex = {a, a == low ? high : low},
+                                           .face = {side[0].corner / 3, n == 2 ? side[1].corner / 3 : -1}};
+    for (int k = 0; k < n; k++) c->face_edge[side[k].corner] = c->n_edge;
+    c->n_edge++;
     return PAL_ERR_OK;
 }
 
-/* edges with their ends and faces, and face_edge; room for 3 n_tri edges */
-static pal_err find_edges(const pal_surface *s, pal_winged_edge *edge, int32_t *face_edge, int32_t *n_edge,
-                          pal_diagnostic *diag)
+static pal_err find_edges(coarse *c)
 {
     int32_t *start;
     pal_surface_side *side;
-    pal_err err = pal_surface_sides(s, &start, &side);
+    pal_err err = pal_surface_sides(c->s, &start, &side);
     if (err) return err;
-    *n_edge = 0;
-    for (int32_t v = 0; v < s->n_vertex; v++)
+    for (int32_t v = 0; v < c->s->n_vertex; v++)
         for (int32_t i = start[v], end = i; !err && i < start[v + 1]; i = end) {
             while (end < start[v + 1] && side[end].high == side[i].high) end++;
-            err = make_edge(s, v, side + i, end - i, (*n_edge)++, edge, face_edge, diag);
+            err = make_edge(c, v, side + i, end - i);
         }
-    PAL_FREE(start, side);
-    return err;
+    return PAL_FREED(err, start, side);
 }
 
 /* faces, walks and spokes of a level from its faces' edges and its edges' ends; edge e of the level has face[1] = -1
@@ -126,37 +134,31 @@ static pal_err refuse_fans(int32_t v, pal_diagnostic *diag)
     return PAL_REFUSE(diag, "levels: parts of the surface touch in vertex %d only: split that vertex, or " OFFER, v);
 }
 
-/* every vertex has one fan of at least three faces, or one or more at the boundary; irregular: K (K + 1), summed over
- * irregular vertices of K edges */
-static pal_err check_fans(const pal_levels *l, int64_t *irregular, pal_diagnostic *diag)
+/* every vertex has one fan of at least three faces, or one or more at the boundary */
+static pal_err check_fans(const pal_levels *l, coarse *from)
 {
-    const int32_t n = l->n_vertex[0];
-    int32_t *count = calloc((size_t)n, sizeof *count);
-    if (!count) return PAL_ERR_MEMORY;
-    for (int32_t c = 0; c < 3 * l->first_face[1]; c++) count[l->face[c]]++;
     pal_err err = PAL_ERR_OK;
-    int64_t sum = 0;
-    for (int32_t v = 0; v < n && !err; v++) {
-        if (count[v] == 0) {
-            err = PAL_REFUSE(diag, "levels: vertex %d belongs to no triangle: clean the surface", v);
-            break;
-        }
+    int32_t *count;
+    PAL_ZEROED(&err, count, l->n_vertex[0]);
+    for (int32_t c = 0; c < 3 * l->first_face[1] && !err; c++) count[l->face[c]]++;
+    for (int32_t v = 0; v < l->n_vertex[0] && !err; v++) {
+        if (count[v] == 0)
+            return PAL_FREED(PAL_REFUSE(from->diag, "levels: vertex %d belongs to no triangle: clean the surface", v),
+                             count);
         int32_t e = l->spoke[v], n_face = 0, n_edge = 0;
         do {
             n_face += pal_wing_face(l->edge, e, v) >= 0, n_edge++;
             e = pal_wing_next_around(l->edge, e, v);
         } while (e != l->spoke[v] && n_edge <= count[v] + 1);
         if (n_face != count[v])
-            err = refuse_fans(v, diag);
+            err = refuse_fans(v, from->diag);
         else if (n_edge < 3 && n_face == n_edge)
-            err = PAL_REFUSE(diag, "levels: triangles %d and %d have the same corners", l->edge[l->spoke[v]].face[0],
-                             l->edge[l->spoke[v]].face[1]);
+            err = PAL_REFUSE(from->diag, "levels: triangles %d and %d have the same corners",
+                             l->edge[l->spoke[v]].face[0], l->edge[l->spoke[v]].face[1]);
         else if (n_edge != (n_face == n_edge ? 6 : 4))
-            sum += (int64_t)n_edge * (n_edge + 1);
+            from->irregular += (int64_t)n_edge * (n_edge + 1);
     }
-    free(count);
-    *irregular = sum;
-    return err;
+    return PAL_FREED(err, count);
 }
 
 static void find_corners(pal_levels *l)
@@ -320,52 +322,50 @@ static pal_err check_edges(const pal_levels *l, double diagonal, pal_diagnostic 
 }
 
 /* the coarse level in l's arrays, linked and checked */
-static pal_err take_coarse(const pal_surface *s, pal_levels *l, const pal_winged_edge *edge, const int32_t *face_edge,
-                           int64_t *irregular, pal_diagnostic *diag)
+static pal_err take_coarse(pal_levels *l, coarse *from)
 {
+    const pal_surface *s = from->s;
     size_t n_corner = 3 * (size_t)s->n_tri;
-    int32_t bad;
+    int32_t bad, *label;
     memcpy(l->x, s->x, 3 * (size_t)s->n_vertex * sizeof *l->x);
     memcpy(l->face, s->tri, n_corner * sizeof *l->face);
-    memcpy(l->face_edge, face_edge, n_corner * sizeof *l->face_edge);
-    memcpy(l->edge, edge, (size_t)l->first_edge[1] * sizeof *l->edge);
+    memcpy(l->face_edge, from->face_edge, n_corner * sizeof *l->face_edge);
+    memcpy(l->edge, from->edge, (size_t)from->n_edge * sizeof *l->edge);
     memcpy(l->origin_m, s->origin_m, sizeof l->origin_m);
-    if (!link_level(l, 0, &bad)) return refuse_fans(bad, diag);
-    PAL_TRY(check_fans(l, irregular, diag));
+    if (!link_level(l, 0, &bad)) return refuse_fans(bad, from->diag);
+    PAL_TRY(check_fans(l, from));
     find_corners(l);
     l->closed = true;
-    for (int32_t e = 0; e < l->first_edge[1]; e++) l->closed = l->closed && l->edge[e].face[1] >= 0;
-    int32_t *label = malloc((size_t)s->n_tri * sizeof *label);
-    pal_err err = label ? pal_surface_components(s, label, &l->n_component) : PAL_ERR_MEMORY;
-    free(label);
-    return err;
+    for (int32_t e = 0; e < from->n_edge; e++) l->closed = l->closed && l->edge[e].face[1] >= 0;
+    pal_err err = PAL_ERR_OK;
+    PAL_ARRAY(&err, label, s->n_tri);
+    if (!err) err = pal_surface_components(s, label, &l->n_component);
+    return PAL_FREED(err, label);
 }
 
-/* scratch: edge and face_edge [3 n_tri]; entry [6 n_tri + 16], since no vertex has more edges than 3 n_tri */
-static pal_err make_levels(const pal_surface *s, const pal_levels_options *o, pal_levels *l, pal_winged_edge *edge,
-                           int32_t *face_edge, pal_stencil_entry *entry, pal_diagnostic *diag)
+static pal_err make_levels(const pal_levels_options *o, pal_levels *l, coarse *from)
 {
+    const pal_surface *s = from->s;
     size_t budget = o->budget_byte ? o->budget_byte : HIERARCHY_BUDGET_BYTE;
-    int32_t n_edge;
-    int64_t irregular = 0;
-    PAL_TRY(find_edges(s, edge, face_edge, &n_edge, diag));
-    if (!count_levels(l, s->n_vertex, n_edge, s->n_tri))
-        return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "levels: %d levels of %d triangles make more than %d edges",
-                                  l->n_level, s->n_tri, INT32_MAX / 8);
-    if (plain_bytes(l) > budget) return refuse_budget((double)plain_bytes(l), budget, l, diag);
+    double low[3], high[3];
+    PAL_TRY(find_edges(from));
+    if (!count_levels(l, s->n_vertex, from->n_edge, s->n_tri))
+        return pal_diagnostic_set(from->diag, PAL_ERR_BUDGET,
+                                  "levels: %d levels of %d triangles make more than %d edges", l->n_level, s->n_tri,
+                                  INT32_MAX / 8);
+    if (plain_bytes(l) > budget) return refuse_budget((double)plain_bytes(l), budget, l, from->diag);
     PAL_TRY(get_memory(l));
-    PAL_TRY(take_coarse(s, l, edge, face_edge, &irregular, diag));
-    PAL_TRY(get_entries(l, irregular, budget, diag));
+    PAL_TRY(take_coarse(l, from));
+    PAL_TRY(get_entries(l, from->irregular, budget, from->diag));
     for (int k = 0; k + 1 < l->n_level; k++) {
         int32_t none;
-        place_midpoints(l, k, entry);
+        place_midpoints(l, k, from->entry);
         split_level(l, k);
         if (!link_level(l, k + 1, &none)) return PAL_ERR_INTERNAL;
     }
     trim_entries(l);
-    double low[3], high[3];
     pal_surface_box(s, low, high);
-    return check_edges(l, pal_dist3(low, high), diag);
+    return check_edges(l, pal_dist3(low, high), from->diag);
 }
 
 pal_err pal_levels_make(const pal_surface *surface, const pal_levels_options *options, pal_levels *out,
@@ -373,22 +373,19 @@ pal_err pal_levels_make(const pal_surface *surface, const pal_levels_options *op
 {
     PAL_TRY(check_input(surface, options, diag));
     pal_levels l = {.n_level = options->n_level};
+    coarse from = {.s = surface, .diag = diag};
     size_t n_corner = 3 * (size_t)surface->n_tri;
     pal_err err = PAL_ERR_OK;
-    pal_winged_edge *edge;
-    int32_t *face_edge;
-    pal_stencil_entry *entry;
-    PAL_ARRAY(&err, edge, n_corner);
-    PAL_ARRAY(&err, face_edge, n_corner);
-    PAL_ARRAY(&err, entry, 2 * n_corner + 16);
-    if (!err) err = make_levels(surface, options, &l, edge, face_edge, entry, diag);
-    PAL_FREE(edge, face_edge, entry);
-    if (err) {
+    PAL_ARRAY(&err, from.edge, n_corner);
+    PAL_ARRAY(&err, from.face_edge, n_corner);
+    PAL_ARRAY(&err, from.entry, 2 * n_corner + 16);
+    if (!err) err = make_levels(options, &l, &from);
+    PAL_FREE(from.edge, from.face_edge, from.entry);
+    if (err)
         pal_levels_free(&l);
-        return err;
-    }
-    *out = l;
-    return PAL_ERR_OK;
+    else
+        *out = l;
+    return err;
 }
 
 pal_err pal_levels_surface(const pal_levels *levels, int level, pal_surface *out)

@@ -374,7 +374,6 @@ static pal_contour_box box_of(const crop *c, const double m[12], int target_tri)
     return box;
 }
 
-/* keeps the component with the most triangles */
 static pal_err keep_largest_component(pal_surface *s)
 {
     pal_err err = PAL_ERR_OK;

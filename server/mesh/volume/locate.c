@@ -223,9 +223,8 @@ static void search_outward(const pal_locate *l, const int c[3], int r, const dou
         }
 }
 
-int pal_locate_point(const pal_locate *locate, const double x[3], double local[4], double *outside_m)
+int pal_locate_point(const pal_locate *l, const double x[3], double local[4], double *outside_m)
 {
-    const pal_locate *l = locate;
     nearest best = {0, INFINITY};
     int from[3], to[3], max = 0;
     cell_range(l, x, x, -2 * HAIR * l->cell_m, from, to);

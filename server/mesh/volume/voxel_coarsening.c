@@ -20,7 +20,6 @@ static size_t cell(const grid *g, const double *x)
     return at[0] + (size_t)v->n[0] * (at[1] + (size_t)v->n[1] * at[2]);
 }
 
-/* middle of hexahedron e */
 static void middle(const pal_tets *tets, const pal_hexes *hexes, int e, double x[3])
 {
     const double *corner = tets->x + 3 * (size_t)hexes->node[8 * (size_t)e];

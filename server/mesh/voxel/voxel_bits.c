@@ -79,7 +79,6 @@ static bool runs_of_row(runs *r, const uint64_t *row, int n_word)
     return open < 0 || add_run(r, open, 64 * n_word);
 }
 
-/* joins overlapping runs of two rows */
 static void join_rows(const runs *r, int32_t *parent, int64_t row, int64_t other)
 {
     int64_t i = r->start[row], j = r->start[other];
