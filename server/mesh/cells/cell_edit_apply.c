@@ -19,8 +19,7 @@ static pal_err delete_cell(pal_edit_work *w, int32_t cell)
     if (!err) err = pal_edit_reserve(w, w->to.n_vertex, w->to.n_cell);
     for (int32_t i = 0; !err && i < w->to.n_vertex; i++) pal_interpolation_builder_mean(&w->rows, &kept[i], 1);
     for (int32_t i = cell; !err && i < w->to.n_cell; i++) w->cell_from[i]++;
-    PAL_FREE(keep, kept);
-    return err;
+    return PAL_FREED(err, keep, kept);
 }
 
 /* the complex as it is, every vertex and cell itself */

@@ -438,6 +438,5 @@ pal_err pal_edit_divide_near(pal_edit_work *w, int32_t cell, int32_t rings, pal_
         list[0] = cell;
         err = pal_cells_divide(c, list_near(c, rings, list, listed), list, out, w->diag);
     }
-    PAL_FREE(list, listed);
-    return err;
+    return PAL_FREED(err, list, listed);
 }

@@ -187,8 +187,7 @@ pal_err pal_cell_file_load(const char *path, pal_cells *out, pal_diagnostic *dia
     size_t n_byte;
     PAL_TRY(pal_file_read(path, CELL_MAX_BYTE, &bytes, &n_byte, diag));
     pal_err err = pal_cell_file_parse(path, bytes, n_byte, out, diag);
-    free(bytes);
-    return err;
+    return PAL_FREED(err, bytes);
 }
 
 static void write_palcells(const pal_cells *c, FILE *file)
@@ -251,6 +250,5 @@ pal_err pal_cell_file_save(const pal_cells *cells, const char *path, pal_diagnos
     if (pal_cell_file_bytes(cells, vtk, &bytes, &n_byte))
         return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for the text of %d cells", shown, cells->n_cell);
     pal_err err = pal_file_write(path, bytes, n_byte, diag);
-    free(bytes);
-    return err;
+    return PAL_FREED(err, bytes);
 }

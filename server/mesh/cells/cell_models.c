@@ -53,15 +53,13 @@ static void swell(double u[3], double share)
 
 /* ---- soccer player: kicks a ball that his foot holds ---- */
 
-static const char *const soccer_row[] = {
-    /* feet and ball */ ".....#.", ".....#.", "...#.#.", "...#.#.",
-    /* shins         */ ".",       ".",       ".",       "...#.#.",
-    /* thighs        */ ".",       ".",       ".",       "...#.#.",
-    /* hips          */ ".",       ".",       ".",       "...###.",
-    /* shoulders     */ ".",       ".",       ".",       "#########",
-    /* neck          */ ".",       ".",       ".",       "....#.",
-    /* head          */ ".",       ".",       ".",       "....#.",
-};
+static const char soccer_rows[] = ".....#./.....#./...#.#./...#.#. " /* feet and ball */
+                                  "./././...#.#. "                   /* shins */
+                                  "./././...#.#. "                   /* thighs */
+                                  "./././...###. "                   /* hips */
+                                  "./././######### "                 /* shoulders */
+                                  "./././....#. "                    /* neck */
+                                  "./././....#.";                    /* head */
 
 static void place_soccer(const double at[3], double x[3])
 {
@@ -96,20 +94,10 @@ static void place_soccer(const double at[3], double x[3])
 
 /* ---- sea monster: a spine that winds, all else stands out from it ---- */
 
-static const char *const monster_row[] = {
-    /* chin            */ ".",
-    "...................##.",
-    ".",
-    /* spine and fins  */ "#....#........#.",
-    "####################.",
-    "#....#........#.",
-    /* posts and snout */ ".",
-    "........#.#........###",
-    ".",
-    /* loop and horns  */ ".",
-    "........###........UU.",
-    ".",
-};
+static const char monster_rows[] = "./...................##./. "                              /* chin */
+                                   "#....#........#./####################./#....#........#. " /* spine and fins */
+                                   "./........#.#........###/. "                              /* posts and snout */
+                                   "./........###........UU./.";                              /* loop and horns */
 
 static void place_monster(const double at[3], double x[3])
 {
@@ -148,17 +136,15 @@ static void place_monster(const double at[3], double x[3])
 
 /* ---- chair ---- */
 
-static const char *const chair_row[] = {
-    /* feet        */ "#...#", ".",     ".",     "#...#",
-    /* stretchers  */ "#...#", "#...#", "#####", "#...#",
-    /* legs        */ "#...#", ".",     ".",     "#...#",
-    /* legs        */ "#...#", ".",     ".",     "#...#",
-    /* seat        */ "#",     "#X#X#", "#X#X#", "#",
-    /* posts, slat */ ".",     ".",     ".",     "#.#.#",
-    /* posts, slat */ ".",     ".",     ".",     "#.#.#",
-    /* rail        */ ".",     ".",     ".",     "#",
-    /* knobs       */ ".",     ".",     ".",     "U...U",
-};
+static const char chair_rows[] = "#...#/././#...# "         /* feet */
+                                 "#...#/#...#/#####/#...# " /* stretchers */
+                                 "#...#/././#...# "         /* legs */
+                                 "#...#/././#...# "         /* legs */
+                                 "#/#X#X#/#X#X#/# "         /* seat */
+                                 "./././#.#.# "             /* posts, slat */
+                                 "./././#.#.# "             /* posts, slat */
+                                 "./././# "                 /* rail */
+                                 "./././U...U";             /* knobs */
 
 static void place_chair(const double at[3], double x[3])
 {
@@ -175,14 +161,12 @@ static void place_chair(const double at[3], double x[3])
 
 /* ---- head: open mouth, eyes are pyramids in their sockets, ears, a nose of brick, wedge and pyramid ---- */
 
-static const char *const head_row[] = {
-    /* neck  */ ".",     ".",     ".",       "..###..", "..###..", ".",
-    /* chin  */ ".",     ".",     ".#####.", ".#####.", ".#####.", ".#####.",
-    /* mouth */ ".",     ".",     ".#...#.", ".#####.", ".#####.", ".#####.",
-    /* nose  */ "...S.", "...#.", ".#####.", ".#####.", ".#####.", ".#####.",
-    /* eyes  */ ".",     "...c.", ".#S#S#.", "W#####E", ".#XXX#.", ".#####.",
-    /* crown */ ".",     ".",     ".#####.", ".#####.", ".#####.", ".#####.",
-};
+static const char head_rows[] = "./././..###../..###../. "                     /* neck */
+                                "././.#####./.#####./.#####./.#####. "         /* chin */
+                                "././.#...#./.#####./.#####./.#####. "         /* mouth */
+                                "...S./...#./.#####./.#####./.#####./.#####. " /* nose */
+                                "./...c./.#S#S#./W#####E/.#XXX#./.#####. "     /* eyes */
+                                "././.#####./.#####./.#####./.#####.";         /* crown */
 
 static void place_head(const double at[3], double x[3])
 {
@@ -200,26 +184,12 @@ static void place_head(const double at[3], double x[3])
 
 /* ---- bridge: deck on two pylons, hung from cables; gaps between all that stands ---- */
 
-static const char *const bridge_row[] = {
-    /* pylons  */ "....#..........#.",
-    ".",
-    "....#..........#.",
-    /* pylons  */ "....#..........#.",
-    ".",
-    "....#..........#.",
-    /* deck    */ "#",
-    "#",
-    "#",
-    /* hangers */ "#.#.#.#.#..#.#.#.#.#",
-    ".",
-    "#.#.#.#.#..#.#.#.#.#",
-    /* hangers */ "#.#.#.#.#..#.#.#.#.#",
-    ".",
-    "#.#.#.#.#..#.#.#.#.#",
-    /* cables  */ "#",
-    "....#..........#.",
-    "#",
-};
+static const char bridge_rows[] = "....#..........#././....#..........#. "       /* pylons */
+                                  "....#..........#././....#..........#. "       /* pylons */
+                                  "#/#/# "                                       /* deck */
+                                  "#.#.#.#.#..#.#.#.#.#/./#.#.#.#.#..#.#.#.#.# " /* hangers */
+                                  "#.#.#.#.#..#.#.#.#.#/./#.#.#.#.#..#.#.#.#.# " /* hangers */
+                                  "#/....#..........#./#";                       /* cables */
 
 static void place_bridge(const double at[3], double x[3])
 {
@@ -238,10 +208,7 @@ static void place_bridge(const double at[3], double x[3])
 
 /* ---- nozzle: nine sectors of a wall that narrows and widens, and a flange ---- */
 
-static const char *const nozzle_row[] = {
-    "#", "#", "#", "#", ".", ".", "#", ".", ".", "#", ".", ".", "#", ".",
-    ".", "#", ".", ".", "#", ".", ".", "#", ".", ".", "#", ".", ".",
-};
+static const char nozzle_rows[] = "#/#/# #/./. #/./. #/./. #/./. #/./. #/./. #/./. #/./.";
 
 static void place_nozzle(const double at[3], double x[3])
 {
@@ -253,16 +220,14 @@ static void place_nozzle(const double at[3], double x[3])
 
 /* ---- kidney: a bean, hollow behind its hilum, with an artery and a ureter ---- */
 
-static const char *const kidney_row[] = {
-    /* ureter */ ".",   ".",      "#.",     ".",
-    /* ureter */ ".",   ".",      "#.",     ".",
-    /* lowest */ "..#", "..#",    "#.#",    "..#",
-    /* ureter */ "..#", "..#..#", "###..#", "..#",
-    /* hilum  */ "..#", ".....#", ".....#", "..#",
-    /* hilum  */ "..#", ".....#", ".....#", "..#",
-    /* artery */ "..#", "###..#", "..#..#", "..#",
-    /* top    */ "..#", "..#",    "..#",    "..#",
-};
+static const char kidney_rows[] = "././#./. "              /* ureter */
+                                  "././#./. "              /* ureter */
+                                  "..#/..#/#.#/..# "       /* lowest */
+                                  "..#/..#..#/###..#/..# " /* ureter */
+                                  "..#/.....#/.....#/..# " /* hilum */
+                                  "..#/.....#/.....#/..# " /* hilum */
+                                  "..#/###..#/..#..#/..# " /* artery */
+                                  "..#/..#/..#/..#";       /* top */
 
 static void place_kidney(const double at[3], double x[3])
 {
@@ -290,15 +255,15 @@ const pal_cell_model pal_cell_model_list[PAL_CELL_MODELS] = {
 };
 
 static const pal_cell_lattice lattice_list[PAL_CELL_MODELS] = {
-    {{9, 4, 7}, false, soccer_row, place_soccer, {0}, {0}},
-    {{22, 3, 4}, false, monster_row, place_monster, {0}, {0}},
+    {{9, 4, 7}, false, soccer_rows, place_soccer, {0}, {0}},
+    {{22, 3, 4}, false, monster_rows, place_monster, {0}, {0}},
     {{3, 3, 3}, false, NULL, NULL, {-0.05, -0.05, -0.05}, {0.05, 0.05, 0.05}},
-    {{5, 4, 9}, false, chair_row, place_chair, {0}, {0}},
+    {{5, 4, 9}, false, chair_rows, place_chair, {0}, {0}},
     {{4, 4, 4}, false, NULL, NULL, {-0.05, -0.05, -0.05}, {0.05, 0.05, 0.05}},
-    {{7, 6, 6}, false, head_row, place_head, {0}, {0}},
-    {{20, 3, 6}, false, bridge_row, place_bridge, {0}, {0}},
-    {{9, 3, 9}, true, nozzle_row, place_nozzle, {0}, {0}},
-    {{6, 4, 8}, false, kidney_row, place_kidney, {0}, {0}},
+    {{7, 6, 6}, false, head_rows, place_head, {0}, {0}},
+    {{20, 3, 6}, false, bridge_rows, place_bridge, {0}, {0}},
+    {{9, 3, 9}, true, nozzle_rows, place_nozzle, {0}, {0}},
+    {{6, 4, 8}, false, kidney_rows, place_kidney, {0}, {0}},
 };
 
 const pal_cell_model *pal_cell_model_find(const char *name)

@@ -111,6 +111,5 @@ pal_err pal_cells_boundary(const pal_cells *c, pal_surface *out, int32_t **verte
     } else {
         pal_surface_free(&s);
     }
-    PAL_FREE(number, old, of);
-    return err;
+    return PAL_FREED(err, number, old, of);
 }

@@ -346,8 +346,7 @@ static pal_err make_level(const pal_subdivision *s, const pal_interpolation *ste
     PAL_ARRAY(&err, next->face_origin, next->cells.n_face);
     for (int32_t u = 0; !err && u < next->cells.n_face_use; u++)
         next->face_origin[next->cells.face_use[u].face] = loop_origin[u];
-    free(loop_origin);
-    return err;
+    return PAL_FREED(err, loop_origin);
 }
 
 /* replaces s by its next level; s is unchanged on failure */

@@ -364,6 +364,5 @@ pal_err pal_surface_decimate(pal_surface *surface, int n_tri)
     } else {
         pal_surface_free(&work);
     }
-    PAL_FREE(p.q, p.remap, p.locked, p.edge, p.cost, p.order);
-    return err;
+    return PAL_FREED(err, p.q, p.remap, p.locked, p.edge, p.cost, p.order);
 }

@@ -390,8 +390,7 @@ static pal_err keep_largest_component(pal_surface *s)
     for (size_t t = 0; !err && n > 1 && t < (size_t)s->n_tri; t++)
         if (label[t] == best) memmove(s->tri + 3 * kept++, s->tri + 3 * t, 3 * sizeof *s->tri);
     if (!err && n > 1) s->n_tri = (int)kept;
-    PAL_FREE(label, count);
-    return err;
+    return PAL_FREED(err, label, count);
 }
 
 /* relaxes every vertex within SMOOTH_MAX_VOXEL of a voxel's extent along its normal */

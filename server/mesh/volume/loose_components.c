@@ -150,8 +150,7 @@ pal_err pal_loose_components_drop(const char *name, const uint8_t *fixed, bool l
     if (!err) err = choose(name, largest_only, part, n, out, diag);
     if (!err && out->n_dropped > 0) err = keep_mesh(mesh, label, part);
     if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "body \"%.60s\": no memory to find its components", name);
-    PAL_FREE(label, part);
-    return err;
+    return PAL_FREED(err, label, part);
 }
 
 static pal_err keep_cells(pal_cells *cells, const int32_t *label, const component *part)
@@ -190,6 +189,5 @@ pal_err pal_loose_cells_drop(const char *name, const uint8_t *fixed, bool larges
     if (!err) err = choose(name, largest_only, part, n, out, diag);
     if (!err && out->n_dropped > 0) err = keep_cells(cells, label, part);
     if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "body \"%.60s\": no memory to find its components", name);
-    PAL_FREE(label, part);
-    return err;
+    return PAL_FREED(err, label, part);
 }

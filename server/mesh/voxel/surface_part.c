@@ -205,8 +205,7 @@ static pal_err close_holes(const finder *f, chain *chains)
         }
         c->volume += triple_product(p[0], p[1], p[2]) / 6;
     }
-    PAL_FREE(open, root, holes);
-    return err;
+    return PAL_FREED(err, open, root, holes);
 }
 
 /* determines the kind of each part and orients its triangles consistently, then outward; MEMORY */
@@ -429,6 +428,5 @@ pal_err pal_parts_nest(pal_parts *parts, const pal_crossings *rows)
     }
     for (int i = 0; !err && i < parts->n; i++) parts->part[i].cavity = votes[i] > 0;
     pal_parts_work_destroy(w);
-    free(votes);
-    return err;
+    return PAL_FREED(err, votes);
 }

@@ -140,6 +140,5 @@ pal_err pal_bits_components(pal_bits *bits, bool largest_only, int *n_component)
         if (largest_only && n > 1) clear_smaller(bits, &r, parent, size);
         *n_component = n;
     }
-    PAL_FREE(r.item, r.start, parent, size);
-    return err;
+    return PAL_FREED(err, r.item, r.start, parent, size);
 }

@@ -170,8 +170,7 @@ static pal_err fractions_exactly(const pal_scan_surface *scan, const pal_voxels 
     PAL_ARRAY(&err, s.own, n_plane);
     PAL_ARRAY(&err, s.pass, n_plane + (size_t)grid->n[1]);
     if (!err) sweep_layers(&s, take, self);
-    PAL_FREE(s.tri, s.live, s.from, s.own, s.pass);
-    return err;
+    return PAL_FREED(err, s.tri, s.live, s.from, s.own, s.pass);
 }
 
 /* volume of a closed surface in grid units */
@@ -247,8 +246,7 @@ static pal_err fractions_by_samples(const pal_surface *surface, const pal_voxels
         }
         pal_bits_free(&sample);
     }
-    free(fraction);
-    return err;
+    return PAL_FREED(err, fraction);
 }
 
 /* does every finite corner lie where crossings are exact? */

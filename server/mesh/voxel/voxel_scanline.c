@@ -313,8 +313,7 @@ pal_err pal_scan_axis(const pal_scan_surface *scan, const int n[3], int axis, pa
                            scan->point + 3 * (size_t)c[2], scan->part ? scan->part[t] : 0);
     }
     pal_err err = ok ? sort_rows(&s, out) : s.n == s.max ? PAL_ERR_BUDGET : PAL_ERR_MEMORY;
-    free(s.item);
-    return err;
+    return PAL_FREED(err, s.item);
 }
 
 void pal_crossings_free(pal_crossings *crossings)

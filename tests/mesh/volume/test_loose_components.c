@@ -201,15 +201,15 @@ static void narrow(const double at[3], double x[3])
     if (at[0] > 2) x[0] = 0.01 * (2 + last_width * (at[0] - 2));
 }
 
-static bool make_cells(const char *const *row, pal_cells *out)
+static bool make_cells(const char *rows, pal_cells *out)
 {
-    pal_cell_lattice lattice = {.n = {3, 2, 1}, .row = row, .place = narrow};
+    pal_cell_lattice lattice = {.n = {3, 2, 1}, .rows = rows, .place = narrow};
     return !pal_cell_lattice_make(&lattice, out, &diag);
 }
 
 static void control_cells_are_kept_by_the_same_rule(void)
 {
-    static const char *const apart[2] = {"##.", "..#"}; /* in an edge */
+    static const char apart[] = "##./..#"; /* in an edge */
     static const struct {
         double width;
         bool largest_only, fixed[2];
