@@ -51,8 +51,7 @@ static void swell(double u[3], double share)
     for (int a = 0; a < 3; a++) u[a] *= s;
 }
 
-/* ---- soccer player: kicks a ball that his foot holds ---- */
-
+/* soccer player: kicks a ball that his foot holds */
 static const char soccer_rows[] = ".....#./.....#./...#.#./...#.#. " /* feet and ball */
                                   "./././...#.#. "                   /* shins */
                                   "./././...#.#. "                   /* thighs */
@@ -92,8 +91,7 @@ static void place_soccer(const double at[3], double x[3])
     }
 }
 
-/* ---- sea monster: a spine that winds, all else stands out from it ---- */
-
+/* sea monster: a spine that winds, all else stands out from it */
 static const char monster_rows[] = "./...................##./. "                              /* chin */
                                    "#....#........#./####################./#....#........#. " /* spine and fins */
                                    "./........#.#........###/. "                              /* posts and snout */
@@ -134,8 +132,7 @@ static void place_monster(const double at[3], double x[3])
     }
 }
 
-/* ---- chair ---- */
-
+/* chair */
 static const char chair_rows[] = "#...#/././#...# "         /* feet */
                                  "#...#/#...#/#####/#...# " /* stretchers */
                                  "#...#/././#...# "         /* legs */
@@ -159,8 +156,7 @@ static void place_chair(const double at[3], double x[3])
     x[0] *= 1 + 0.1 * ramp(z, 0.09, 0.15);
 }
 
-/* ---- head: open mouth, eyes are pyramids in their sockets, ears, a nose of brick, wedge and pyramid ---- */
-
+/* head: open mouth, eyes are pyramids in their sockets, ears, a nose of brick, wedge and pyramid */
 static const char head_rows[] = "./././..###../..###../. "                     /* neck */
                                 "././.#####./.#####./.#####./.#####. "         /* chin */
                                 "././.#...#./.#####./.#####./.#####. "         /* mouth */
@@ -182,8 +178,7 @@ static void place_head(const double at[3], double x[3])
     x[0] = 0.078 * u[0] * jaw, x[1] = 0.092 * u[1] * (1 - 0.1 * ramp(-u[2], 0, 1)), x[2] = 0.11 * u[2];
 }
 
-/* ---- bridge: deck on two pylons, hung from cables; gaps between all that stands ---- */
-
+/* bridge: deck on two pylons, hung from cables; gaps between all that stands */
 static const char bridge_rows[] = "....#..........#././....#..........#. "       /* pylons */
                                   "....#..........#././....#..........#. "       /* pylons */
                                   "#/#/# "                                       /* deck */
@@ -206,8 +201,7 @@ static void place_bridge(const double at[3], double x[3])
     if (at[2] < 2) x[1] *= 1 + 0.15 * (2 - at[2]);
 }
 
-/* ---- nozzle: nine sectors of a wall that narrows and widens, and a flange ---- */
-
+/* nozzle: nine sectors of a wall that narrows and widens, and a flange */
 static const char nozzle_rows[] = "#/#/# #/./. #/./. #/./. #/./. #/./. #/./. #/./. #/./.";
 
 static void place_nozzle(const double at[3], double x[3])
@@ -218,8 +212,7 @@ static void place_nozzle(const double at[3], double x[3])
     x[0] = -r * cos(angle), x[1] = r * sin(angle), x[2] = LINE(height, at[2]);
 }
 
-/* ---- kidney: a bean, hollow behind its hilum, with an artery and a ureter ---- */
-
+/* kidney: a bean, hollow behind its hilum, with an artery and a ureter */
 static const char kidney_rows[] = "././#./. "              /* ureter */
                                   "././#./. "              /* ureter */
                                   "..#/..#/#.#/..# "       /* lowest */
@@ -239,8 +232,6 @@ static void place_kidney(const double at[3], double x[3])
     for (int a = 0; a < 3; a++) u[a] += more[a];
     x[0] = 0.032 * u[0] - bean, x[1] = 0.026 * u[1], x[2] = 0.058 * u[2];
 }
-
-/* ---- the list ---- */
 
 const pal_cell_model pal_cell_model_list[PAL_CELL_MODELS] = {
     {"soccer", "a player who kicks a ball", 2, 24, 1536, {24, 76, 0}},

@@ -4,7 +4,6 @@
  * cell with negative volume is reversed. Cells that are no tetrahedron, hexahedron, wedge or pyramid are written as
  * polyhedra. */
 #include "server/base/heap.h"
-#include "server/base/vec3.h"
 #include "server/mesh/cells/cell_reader.h"
 
 enum { TETRAHEDRON = 10, HEXAHEDRON = 12, WEDGE = 13, PYRAMID = 14, POLYHEDRON = 42 };
@@ -168,18 +167,8 @@ static void reverse_cell(pal_cell_reader *r)
     double sum = 0;
     if (first == l->n_loop || l->loop[first] == l->n_corner) return;
     const double *o = l->x + 3 * (size_t)corner[l->loop[first]];
-    for (int32_t i = first; i < l->n_loop; i++) {
-        int32_t from = l->loop[i], end = l->loop[i + 1];
-        double centre[3] = {0, 0, 0}, p[3], n[3];
-        for (int32_t k = from; k < end; k++) {
-            pal_sub3(p, l->x + 3 * (size_t)corner[k], o);
-            pal_axpy3(centre, 1.0 / (double)(end - from), p);
-        }
-        for (int32_t k = from; k < end; k++) {
-            pal_normal3(n, o, l->x + 3 * (size_t)corner[k], l->x + 3 * (size_t)corner[k + 1 < end ? k + 1 : from]);
-            sum += pal_dot3(n, centre);
-        }
-    }
+    for (int32_t i = first; i < l->n_loop; i++)
+        sum += pal_cells_cone(l->x, corner + l->loop[i], 1, l->loop[i + 1] - l->loop[i], o);
     if (!(sum < 0)) return;
     for (int32_t i = first; i < l->n_loop; i++)
         for (int32_t a = l->loop[i], b = l->loop[i + 1]; a + 1 < b; a++) {

@@ -261,27 +261,28 @@ void pal_cells_face_area(const pal_cells *cells, const double *x, int32_t face, 
     use_area(cells, x ? x : cells->x, cells->face[face].use[0], out);
 }
 
-/* six times the volume of the cone from o over a face use, as triangles about the mean of its corners */
-static double cone(const pal_cells *c, const double *x, int32_t face_use, const double o[3])
+double pal_cells_cone(const double *x, const int32_t *corner, int stride, int n, const double o[3])
 {
-    int32_t first = c->face_use[face_use].first_use, end = c->face_use[face_use + 1].first_use;
-    double centre[3], n[3], sum = 0;
-    pal_cells_use_centre(c, x, face_use, centre);
+    double centre[3] = {0}, normal[3], sum = 0;
+    for (int k = 0; k < n; k++) pal_add3(centre, centre, x + 3 * (size_t)corner[k * stride]);
+    pal_scale3(centre, 1.0 / n, centre);
     pal_sub3(centre, centre, o);
-    for (int32_t u = first; u < end; u++) {
-        pal_normal3(n, o, x + 3 * (size_t)c->edge_use[u].vertex,
-                    x + 3 * (size_t)c->edge_use[u + 1 < end ? u + 1 : first].vertex);
-        sum += pal_dot3(n, centre);
+    for (int k = 0; k < n; k++) {
+        pal_normal3(normal, o, x + 3 * (size_t)corner[k * stride],
+                    x + 3 * (size_t)corner[(k + 1 < n ? k + 1 : 0) * stride]);
+        sum += pal_dot3(normal, centre);
     }
     return sum;
 }
 
-double pal_cells_cell_volume(const pal_cells *cells, const double *x, int32_t cell)
+double pal_cells_cell_volume(const pal_cells *c, const double *x, int32_t cell)
 {
-    const double *p = x ? x : cells->x;
+    const double *p = x ? x : c->x;
     double o[3], sum = 0;
-    pal_cells_cell_centre(cells, p, cell, o);
-    for (int32_t l = cells->cell_use[cell]; l < cells->cell_use[cell + 1]; l++) sum += cone(cells, p, l, o);
+    const int stride = sizeof *c->edge_use / sizeof c->edge_use->vertex;
+    pal_cells_cell_centre(c, p, cell, o);
+    for (const pal_face_use *f = c->face_use + c->cell_use[cell]; f < c->face_use + c->cell_use[cell + 1]; f++)
+        sum += pal_cells_cone(p, &c->edge_use[f->first_use].vertex, stride, f[1].first_use - f->first_use, o);
     return sum / 6;
 }
 

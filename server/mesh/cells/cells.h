@@ -18,8 +18,6 @@
 #define PAL_MESH_CELLS_CELLS_H
 #include "server/mesh/geometry/surface.h"
 
-#include <stddef.h>
-
 enum { PAL_CELL_LOOP_MAX = 256 }; /* corners of a face */
 #define PAL_SHARPNESS_MAX 1e6f    /* maximum sharpness: as many levels of subdivision */
 
@@ -153,6 +151,8 @@ void pal_cells_cell_centre(const pal_cells *cells, const double *x, int32_t cell
 void pal_cells_use_centre(const pal_cells *cells, const double *x, int32_t face_use, double out[3]); /* x not NULL */
 /* vector area, m^2, out of the face's first cell */
 void pal_cells_face_area(const pal_cells *cells, const double *x, int32_t face, double out[3]);
+/* six times the volume of the cone from o over a loop of n corners, each `stride` numbers after the one before */
+double pal_cells_cone(const double *x, const int32_t *corner, int stride, int n, const double o[3]);
 double pal_cells_cell_volume(const pal_cells *cells, const double *x, int32_t cell); /* m^3 */
 double pal_cells_volume(const pal_cells *cells, const double *x);
 

@@ -2,7 +2,6 @@
  * name the file and the position. Private to the readers of this room. Thread: [load]. */
 #ifndef PAL_MESH_FILES_MESH_BUILD_H
 #define PAL_MESH_FILES_MESH_BUILD_H
-#include "server/base/err.h"
 #include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/text_scan.h"
 

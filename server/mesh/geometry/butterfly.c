@@ -11,6 +11,7 @@
 #include "server/num/sort.h"
 
 #include <math.h>
+#include <stdbool.h>
 
 double pal_butterfly_ring(int K, int i)
 {

@@ -7,7 +7,6 @@
  * of faces. Thread: [any], no state. */
 #ifndef PAL_MESH_GEOMETRY_BUTTERFLY_H
 #define PAL_MESH_GEOMETRY_BUTTERFLY_H
-#include <stdbool.h>
 #include <stdint.h>
 
 typedef struct pal_winged_edge {

@@ -7,6 +7,7 @@
 
 #include "server/base/heap.h"
 #include "server/base/vec3.h"
+#include "server/mesh/voxel/voxel_bits.h"
 #include "server/mesh/voxel/voxel_fraction.h"
 
 /* relative to edge_m: error of node positions from single precision in a file, at some hundred voxels across */

@@ -26,16 +26,13 @@ void pal_skin_free(pal_skin *skin)
 static double fan_normal(const double *x, int node, const int32_t *fan, int n, double normal[3])
 {
     const double *o = x + 3 * (size_t)node;
-    double sx = 0, sy = 0, sz = 0, squares = 0;
+    double sum[3] = {0}, c[3], squares = 0;
     for (int i = 0; i < n; i++) {
-        const double *a = x + 3 * (size_t)fan[2 * i], *b = x + 3 * (size_t)fan[2 * i + 1];
-        double ax = a[0] - o[0], ay = a[1] - o[1], az = a[2] - o[2];
-        double bx = b[0] - o[0], by = b[1] - o[1], bz = b[2] - o[2];
-        double cx = ay * bz - az * by, cy = az * bx - ax * bz, cz = ax * by - ay * bx;
-        sx += cx, sy += cy, sz += cz;
-        squares += cx * cx + cy * cy + cz * cz;
+        pal_normal3(c, o, x + 3 * (size_t)fan[2 * i], x + 3 * (size_t)fan[2 * i + 1]);
+        pal_add3(sum, sum, c);
+        squares += pal_dot3(c, c);
     }
-    normal[0] = sx, normal[1] = sy, normal[2] = sz;
+    pal_copy3(normal, sum);
     return squares;
 }
 

@@ -31,9 +31,10 @@ static inline uint64_t run_mask(int w, int from, int to)
     return mask;
 }
 
-void pal_bits_set_run(uint64_t *row, int from, int to)
+void pal_bits_set_run(void *row, int from, int to)
 {
-    for (int w = from >> 6; from < to && w <= (to - 1) >> 6; w++) row[w] |= run_mask(w, from, to);
+    uint64_t *word = row;
+    for (int w = from >> 6; from < to && w <= (to - 1) >> 6; w++) word[w] |= run_mask(w, from, to);
 }
 
 int64_t pal_bits_count(const pal_bits *bits)

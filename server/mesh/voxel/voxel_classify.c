@@ -58,11 +58,6 @@ static pal_err scan_parts(decision *d, int axis, pal_crossings *rows)
     return err;
 }
 
-static void set_word_run(void *self, int from, int to)
-{
-    pal_bits_set_run(self, from, to);
-}
-
 /* calls take for the n crossings of each row along an axis that has any */
 static pal_err each_row(decision *d, int axis, uint8_t *vote,
                         void (*take)(decision *d, int axis, uint8_t *vote, pal_parts_work *work, int row,
@@ -85,7 +80,8 @@ static void fill_row(decision *d, int axis, uint8_t *vote, pal_parts_work *work,
                      int64_t n)
 {
     (void)axis, (void)vote;
-    pal_parts_row(&d->parts, work, item, n, set_word_run, d->inside->word + (size_t)d->inside->n_word * (size_t)row);
+    pal_parts_row(&d->parts, work, item, n, pal_bits_set_run,
+                  d->inside->word + (size_t)d->inside->n_word * (size_t)row);
 }
 
 /* votes of the three axes: low four bits inside, high four abstained; the rest say outside */
@@ -303,7 +299,7 @@ static pal_err run_method(decision *d, pal_voxel_method method, bool *open)
         if (plain) return PAL_ERR_OK;
         memset(d->inside->word, 0, pal_bits_words(d->inside) * sizeof *d->inside->word);
     }
-    PAL_TRY(pal_scan_drop_copies(d->scan, d->surface->n_vertex));
+    PAL_TRY(pal_scan_drop_copies(d->scan));
     PAL_TRY(pal_parts_find(d->scan, &d->parts));
     pal_err err;
     bool even = d->scan->even;
