@@ -38,5 +38,13 @@ static inline void pal_heap_free(void *const *list, size_t n)
 {
     for (size_t k = 0; k < n; k++) free(list[k]);
 }
-#define PAL_FREE(...) pal_heap_free((void *[]){__VA_ARGS__}, sizeof((void *[]){__VA_ARGS__}) / sizeof(void *))
+/* the same, and the error back, for a function that gives up */
+static inline pal_err pal_heap_freed(pal_err err, void *const *list, size_t n)
+{
+    pal_heap_free(list, n);
+    return err;
+}
+#define PAL_LIST(...)       (void *[]){__VA_ARGS__}, sizeof((void *[]){__VA_ARGS__}) / sizeof(void *)
+#define PAL_FREED(err, ...) pal_heap_freed((err), PAL_LIST(__VA_ARGS__))
+#define PAL_FREE(...)       pal_heap_free(PAL_LIST(__VA_ARGS__))
 #endif

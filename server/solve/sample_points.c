@@ -143,7 +143,7 @@ pal_err pal_samples_write(const pal_samples *samples, const char *path, pal_diag
         const double *x = samples->x + 3 * i, *u = samples->u + 3 * i;
         fprintf(out.file, "%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n", x[0], x[1], x[2], u[0], u[1], u[2]);
     }
-    return pal_file_end(&out, PAL_ERR_OK, diag);
+    return pal_file_end(&out, diag);
 }
 
 void pal_samples_free(pal_samples *samples)

@@ -401,7 +401,7 @@ pal_err pal_study_publish(const pal_study_file *file, const char *stem, pal_diag
     pal_file_out page;
     if (!err && !(err = pal_file_begin(&page, path, diag))) {
         put_page(page.file, file, svg);
-        err = pal_file_end(&page, PAL_ERR_OK, diag);
+        err = pal_file_end(&page, diag);
     }
     free(svg);
     return err;

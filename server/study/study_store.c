@@ -270,7 +270,7 @@ pal_err pal_study_file_csv(const pal_study_file *file, const char *path, pal_dia
     fputc('\n', out.file);
     pal_study_order(&file->study, order);
     for (int k = 0; k < file->study.n_point; k++) put_row(out.file, &file->study.point[order[k]]);
-    return pal_file_end(&out, PAL_ERR_OK, diag);
+    return pal_file_end(&out, diag);
 }
 
 /* ---- reading ---- */

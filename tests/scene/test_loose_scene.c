@@ -263,8 +263,7 @@ static void narrow(const double at[3], double x[3])
 /* two cells, and another one above that meets them in an edge, as a file */
 static bool write_cells(double width)
 {
-    static const char *const row[6] = {"#.", "..", "#.", "..", ".#", ".."};
-    pal_cell_lattice lattice = {.n = {2, 2, 3}, .row = row, .place = narrow};
+    pal_cell_lattice lattice = {.n = {2, 2, 3}, .rows = "#./.. #./.. .#/..", .place = narrow};
     pal_cells cells;
     last_width = width;
     if (pal_cell_lattice_make(&lattice, &cells, &diag)) return false;

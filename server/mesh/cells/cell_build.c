@@ -13,8 +13,6 @@
 
 #include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 typedef struct builder {
     const pal_cell_loops *in;
@@ -25,8 +23,6 @@ typedef struct builder {
     size_t mask;
     pal_diagnostic *diag;
 } builder;
-
-/* ---- messages ---- */
 
 /* number n as messages show it */
 static int file_number(const builder *b, int32_t n)
@@ -46,56 +42,37 @@ static where line_of(const int64_t *line, int32_t i)
     return at;
 }
 
-/* about a loop, or a whole cell (loop -1) */
-static pal_err refuse_at(const builder *b, int32_t cell, int32_t loop, const char *format, va_list list)
+/* about a loop (cell -1), or a whole cell (loop -1) */
+static pal_err __attribute__((format(printf, 4, 5)))
+refuse(const builder *b, int32_t cell, int32_t loop, const char *format, ...)
 {
     char sentence[320], face[32] = "";
     const pal_cell_loops *in = b->in;
+    va_list list;
+    va_start(list, format);
     vsnprintf(sentence, sizeof sentence, format, list);
+    va_end(list);
+    if (cell < 0) cell = 0;
+    while (loop >= in->cell[cell + 1]) cell++;
     if (loop >= 0) snprintf(face, sizeof face, ", face %d:", file_number(b, loop - in->cell[cell]));
-    return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: cell %d%s %s",
-                              line_of(in->line, loop >= 0 ? loop : in->cell[cell]).text, file_number(b, cell), face,
-                              sentence);
+    return PAL_REFUSE(b->diag, "%s: cell %d%s %s", line_of(in->line, loop >= 0 ? loop : in->cell[cell]).text,
+                      file_number(b, cell), face, sentence);
 }
-
-static pal_err __attribute__((format(printf, 3, 4)))
-refuse_loop(const builder *b, int32_t loop, const char *format, ...)
-{
-    int32_t cell = 0;
-    va_list list;
-    va_start(list, format);
-    while (b->in->cell[cell + 1] <= loop) cell++;
-    pal_err err = refuse_at(b, cell, loop, format, list);
-    va_end(list);
-    return err;
-}
-
-static pal_err __attribute__((format(printf, 3, 4)))
-refuse_cell(const builder *b, int32_t cell, const char *format, ...)
-{
-    va_list list;
-    va_start(list, format);
-    pal_err err = refuse_at(b, cell, -1, format, list);
-    va_end(list);
-    return err;
-}
-
-/* ---- checks of the input ---- */
 
 static pal_err check_counts(const builder *b)
 {
     const pal_cell_loops *in = b->in;
     pal_diagnostic *diag = b->diag;
     if (in->n_vertex < 1 || in->n_cell < 1 || in->n_vertex > CELL_MAX_ITEM || in->n_cell > CELL_MAX_ITEM)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "cells: %d vertices and %d cells, each must be 1 to %d",
-                                  in->n_vertex, in->n_cell, CELL_MAX_ITEM);
+        return PAL_REFUSE(diag, "cells: %d vertices and %d cells, each must be 1 to %d", in->n_vertex, in->n_cell,
+                          CELL_MAX_ITEM);
     for (int32_t c = 0; c < in->n_cell; c++)
         if (in->cell[0] != 0 || in->cell[c + 1] <= in->cell[c] || in->cell[c + 1] > CELL_MAX_ITEM)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "cells: cell %d has no faces", file_number(b, c));
+            return PAL_REFUSE(diag, "cells: cell %d has no faces", file_number(b, c));
     for (int32_t l = 0; l < in->cell[in->n_cell]; l++) {
         int64_t n = (int64_t)in->loop[l + 1] - in->loop[l];
         if (in->loop[0] != 0 || n < 3 || n > PAL_CELL_LOOP_MAX || in->loop[l + 1] > CELL_MAX_ITEM)
-            return refuse_loop(b, l, "%lld corners, must be 3 to %d", (long long)n, PAL_CELL_LOOP_MAX);
+            return refuse(b, -1, l, "%lld corners, must be 3 to %d", (long long)n, PAL_CELL_LOOP_MAX);
     }
     return PAL_ERR_OK;
 }
@@ -107,23 +84,22 @@ static pal_err check_corners(const builder *b)
     for (int32_t v = 0; v < in->n_vertex; v++) {
         const double *x = in->x + 3 * (size_t)v;
         if (!(fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2]))) <= MAX_COORDINATE_M && pal_finite3(x)))
-            return pal_diagnostic_set(
-                b->diag, PAL_ERR_REFUSED, "%s: vertex %d is at %g %g %g m, must be within %g m of the origin",
-                line_of(in->vertex_line, v).text, file_number(b, v), x[0], x[1], x[2], MAX_COORDINATE_M);
+            return PAL_REFUSE(b->diag, "%s: vertex %d is at %g %g %g m, must be within %g m of the origin",
+                              line_of(in->vertex_line, v).text, file_number(b, v), x[0], x[1], x[2], MAX_COORDINATE_M);
         b->stamp[v] = -1;
     }
     for (int32_t l = 0; l < in->cell[in->n_cell]; l++)
         for (int32_t k = in->loop[l]; k < in->loop[l + 1]; k++) {
             int32_t v = in->corner[k];
             if (v < 0 || v >= in->n_vertex)
-                return refuse_loop(b, l, "vertex %lld, there are %d", (long long)v + in->count_from, in->n_vertex);
-            if (b->stamp[v] == l) return refuse_loop(b, l, "has vertex %d twice", file_number(b, v));
+                return refuse(b, -1, l, "vertex %lld, there are %d", (long long)v + in->count_from, in->n_vertex);
+            if (b->stamp[v] == l) return refuse(b, -1, l, "has vertex %d twice", file_number(b, v));
             b->stamp[v] = l;
         }
     for (int32_t v = 0; v < in->n_vertex; v++)
         if (b->stamp[v] < 0)
-            return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: vertex %d belongs to no cell",
-                                      line_of(in->vertex_line, v).text, file_number(b, v));
+            return PAL_REFUSE(b->diag, "%s: vertex %d belongs to no cell", line_of(in->vertex_line, v).text,
+                              file_number(b, v));
     return PAL_ERR_OK;
 }
 
@@ -131,8 +107,6 @@ static bool sharpness_valid(float s)
 {
     return s >= 0 && s <= PAL_SHARPNESS_MAX;
 }
-
-/* ---- memory ---- */
 
 static pal_err get_memory(builder *b)
 {
@@ -171,8 +145,6 @@ static void copy_loops(builder *b)
     c->face_use[c->n_face_use] = (pal_face_use){.cell = -1, .face = -1, .first_use = c->n_edge_use, .mate = -1};
 }
 
-/* ---- faces and edges ---- */
-
 typedef enum loop_relation { OTHER, OPPOSITE, EQUAL, SHUFFLED } loop_relation;
 
 /* relation of two loops of the same complex */
@@ -204,15 +176,15 @@ static pal_err join_face(builder *b, int32_t l, int32_t f, loop_relation like)
     pal_face_use *use = b->c->face_use;
     int32_t cell = use[face->use[0]].cell, vertex = b->in->corner[b->in->loop[l]];
     if (like == SHUFFLED)
-        return refuse_loop(b, l, "has the corners of a face of cell %d in another order", file_number(b, cell));
+        return refuse(b, -1, l, "has the corners of a face of cell %d in another order", file_number(b, cell));
     if (cell == use[l].cell || (face->use[1] >= 0 && use[face->use[1]].cell == use[l].cell))
-        return refuse_loop(b, l, "is a face of the same cell already, from vertex %d on", file_number(b, vertex));
+        return refuse(b, -1, l, "is a face of the same cell already, from vertex %d on", file_number(b, vertex));
     if (face->use[1] >= 0)
-        return refuse_loop(b, l, "is a face of cells %d and %d already, a face has two cells at most",
-                           file_number(b, cell), file_number(b, use[face->use[1]].cell));
+        return refuse(b, -1, l, "is a face of cells %d and %d already, a face has two cells at most",
+                      file_number(b, cell), file_number(b, use[face->use[1]].cell));
     if (like == EQUAL)
-        return refuse_loop(b, l, "runs the same way round in cell %d: one of the two is inside out",
-                           file_number(b, cell));
+        return refuse(b, -1, l, "runs the same way round in cell %d: one of the two is inside out",
+                      file_number(b, cell));
     face->use[1] = l;
     use[l].face = f, use[l].sign = -1, use[l].mate = face->use[0];
     use[face->use[0]].mate = l;
@@ -287,8 +259,6 @@ static void join_mates(pal_cells *c)
     }
 }
 
-/* ---- cells ---- */
-
 /* the two uses of every edge in a cell */
 static pal_err join_radials(builder *b, int32_t cell)
 {
@@ -304,18 +274,18 @@ static pal_err join_radials(builder *b, int32_t cell)
         pal_edge_use *o = &c->edge_use[other];
         int32_t v = file_number(b, use->vertex), w = file_number(b, pal_cells_end_vertex(c, u));
         if (o->radial >= 0)
-            return refuse_loop(b, use->face_use, "the cell's third face at the edge of vertices %d and %d", v, w);
+            return refuse(b, -1, use->face_use, "the cell's third face at the edge of vertices %d and %d", v, w);
         if (o->vertex == use->vertex)
-            return refuse_loop(b, use->face_use,
-                               "runs from vertex %d to %d as face %d of the cell does: one of the two is inside out", v,
-                               w, file_number(b, o->face_use - c->cell_use[cell]));
+            return refuse(b, -1, use->face_use,
+                          "runs from vertex %d to %d as face %d of the cell does: one of the two is inside out", v, w,
+                          file_number(b, o->face_use - c->cell_use[cell]));
         o->radial = u, use->radial = other;
     }
     for (int32_t u = first; u < end; u++)
         if (c->edge_use[u].radial < 0)
-            return refuse_loop(b, c->edge_use[u].face_use,
-                               "no other face of the cell at the edge of vertices %d and %d: it is not closed",
-                               file_number(b, c->edge_use[u].vertex), file_number(b, pal_cells_end_vertex(c, u)));
+            return refuse(b, -1, c->edge_use[u].face_use,
+                          "no other face of the cell at the edge of vertices %d and %d: it is not closed",
+                          file_number(b, c->edge_use[u].vertex), file_number(b, pal_cells_end_vertex(c, u)));
     return PAL_ERR_OK;
 }
 
@@ -382,74 +352,61 @@ static pal_err find_cells(builder *b)
         int32_t n_face = c->cell_use[i + 1] - c->cell_use[i];
         int32_t n_edge = (c->face_use[c->cell_use[i + 1]].first_use - c->face_use[c->cell_use[i]].first_use) / 2;
         int32_t n_vertex = c->cell_vertex.start[i + 1] - c->cell_vertex.start[i];
-        if (count_reached(b, i) != n_face) return refuse_cell(b, i, "is in pieces: its faces do not hang together");
+        if (count_reached(b, i) != n_face) return refuse(b, i, -1, "is in pieces: its faces do not hang together");
         if (n_vertex - n_edge + n_face != 2)
-            return refuse_cell(b, i, "is no ball: %d vertices - %d edges + %d faces make %d, not 2", n_vertex, n_edge,
-                               n_face, n_vertex - n_edge + n_face);
+            return refuse(b, i, -1, "is no ball: %d vertices - %d edges + %d faces make %d, not 2", n_vertex, n_edge,
+                          n_face, n_vertex - n_edge + n_face);
     }
     return PAL_ERR_OK;
 }
 
-/* ---- incidence lists ---- */
-
-/* transposes lists: to[b] lists the a with b in from[a], ascending */
-static pal_err transpose_lists(const pal_cell_rows *from, int32_t n_from, int32_t n_to, pal_cell_rows *to)
+/* lists in row r the items of the pairs with row[k] = r, in their order */
+static pal_err make_rows(int32_t n_row, int32_t n, const int32_t *row, const int32_t *item, pal_cell_rows *to)
 {
-    int32_t n = from->start[n_from];
     pal_err err = PAL_ERR_OK;
-    PAL_ZEROED(&err, to->start, n_to + 2);
+    PAL_ZEROED(&err, to->start, n_row + 2);
     PAL_ARRAY(&err, to->item, n);
     if (err) return err;
-    for (int32_t k = 0; k < n; k++) to->start[from->item[k] + 2]++;
-    for (int32_t i = 1; i <= n_to; i++) to->start[i + 1] += to->start[i];
-    for (int32_t a = 0; a < n_from; a++)
-        for (int32_t k = from->start[a]; k < from->start[a + 1]; k++) to->item[to->start[from->item[k] + 1]++] = a;
+    for (int32_t k = 0; k < n; k++) to->start[row[k] + 2]++;
+    for (int32_t i = 1; i <= n_row; i++) to->start[i + 1] += to->start[i];
+    for (int32_t k = 0; k < n; k++) to->item[to->start[row[k] + 1]++] = item[k];
     return PAL_ERR_OK;
 }
 
-/* transposes of: vertices of edges, vertices and edges of faces, edges of cells; rows is scratch */
-static pal_err transpose_all(pal_cells *c, pal_cell_rows rows)
+/* from pairs: vertices of edges, vertices and edges of faces, edges and vertices of cells; an edge has two uses or
+ * more, so row and item [n_edge_use] hold the pairs of each */
+static pal_err fill_incidence(pal_cells *c, int32_t *row, int32_t *item)
 {
-    int32_t n = 0, end;
-    for (int32_t e = 0; e <= c->n_edge; e++) rows.start[e] = 2 * e;
-    for (int32_t e = 0; e < 2 * c->n_edge; e++) rows.item[e] = c->edge[e / 2].vertex[e % 2];
-    PAL_TRY(transpose_lists(&rows, c->n_edge, c->n_vertex, &c->vertex_edge));
+    for (int32_t k = 0; k < 2 * c->n_edge; k++) row[k] = c->edge[k / 2].vertex[k % 2], item[k] = k / 2;
+    PAL_TRY(make_rows(c->n_vertex, 2 * c->n_edge, row, item, &c->vertex_edge));
     for (int edges = 0; edges < 2; edges++) {
-        n = 0;
+        int32_t n = 0;
         for (int32_t f = 0; f < c->n_face; f++) {
             int32_t first, m = pal_cells_face_loop(c, f, &first);
-            rows.start[f] = n;
             for (int32_t u = first; u < first + m; u++)
-                rows.item[n++] = edges ? c->edge_use[u].edge : c->edge_use[u].vertex;
+                row[n] = edges ? c->edge_use[u].edge : c->edge_use[u].vertex, item[n++] = f;
         }
-        rows.start[c->n_face] = n;
-        PAL_TRY(transpose_lists(&rows, c->n_face, edges ? c->n_edge : c->n_vertex,
-                                edges ? &c->edge_face : &c->vertex_face));
+        PAL_TRY(make_rows(edges ? c->n_edge : c->n_vertex, n, row, item, edges ? &c->edge_face : &c->vertex_face));
     }
-    n = 0;
-    for (int32_t i = 0; i < c->n_cell; i++) {
-        rows.start[i] = n;
-        for (int32_t u = pal_cells_cell_loops(c, i, &end); u < end; u++)
-            if (u < c->edge_use[u].radial) rows.item[n++] = c->edge_use[u].edge;
-    }
-    rows.start[c->n_cell] = n;
-    PAL_TRY(transpose_lists(&rows, c->n_cell, c->n_edge, &c->edge_cell));
-    return transpose_lists(&c->cell_vertex, c->n_cell, c->n_vertex, &c->vertex_cell);
+    int32_t n = 0;
+    for (int32_t u = 0; u < c->n_edge_use; u++)
+        if (u < c->edge_use[u].radial)
+            row[n] = c->edge_use[u].edge, item[n++] = c->face_use[c->edge_use[u].face_use].cell;
+    PAL_TRY(make_rows(c->n_edge, n, row, item, &c->edge_cell));
+    for (int32_t i = 0, k = 0; i < c->n_cell; i++)
+        for (; k < c->cell_vertex.start[i + 1]; k++) item[k] = i;
+    return make_rows(c->n_vertex, c->cell_vertex.start[c->n_cell], c->cell_vertex.item, item, &c->vertex_cell);
 }
 
 static pal_err find_incidence(pal_cells *c)
 {
-    pal_cell_rows rows;
     pal_err err = PAL_ERR_OK;
-    /* no complex has more edges, faces or cells than edge uses */
-    PAL_ARRAY(&err, rows.start, c->n_edge_use + 1);
-    PAL_ARRAY(&err, rows.item, 2 * (size_t)c->n_edge_use);
-    if (!err) err = transpose_all(c, rows);
-    PAL_FREE(rows.start, rows.item);
-    return err;
+    int32_t *row, *item;
+    PAL_ARRAY(&err, row, c->n_edge_use);
+    PAL_ARRAY(&err, item, c->n_edge_use);
+    if (!err) err = fill_incidence(c, row, item);
+    return PAL_FREED(err, row, item);
 }
-
-/* ---- boundary ---- */
 
 static void find_boundary(pal_cells *c)
 {
@@ -487,6 +444,7 @@ static void find_pinched(builder *b)
             at = pal_cells_across_edge(c, pal_cells_prev(c, at));
         } while (at != u);
         if (b->stamp[v]++) c->vertex_pinched[v] = true;
+        c->n_boundary_fan++;
     }
     for (int32_t v = 0; v < c->n_vertex; v++) c->n_pinched_vertex += c->vertex_pinched[v];
 }
@@ -507,11 +465,7 @@ static int32_t count_around(const pal_cells *c, int32_t e, int32_t first)
         if (!pal_cells_face_boundary(c, c->edge_face.item[k])) continue;
         pal_cells_face_loop(c, c->edge_face.item[k], &u);
         while (c->edge_use[u].edge != e) u++;
-        for (;;) {
-            n++;
-            u = c->edge_use[c->edge_use[u].radial].mate;
-            if (u < 0) break;
-        }
+        for (; u >= 0; u = c->edge_use[c->edge_use[u].radial].mate) n++;
     }
     return n / 2;
 }
@@ -523,9 +477,9 @@ static pal_err check_neighbourhoods(builder *b)
     for (int32_t e = 0; e < c->n_edge; e++) {
         int32_t n = c->edge_cell.start[e + 1] - c->edge_cell.start[e], first = b->last[e];
         if (count_around(c, e, first) != n)
-            return refuse_loop(b, c->edge_use[first].face_use,
-                               "cells go more than once round the edge of vertices %d and %d",
-                               file_number(b, c->edge[e].vertex[0]), file_number(b, c->edge[e].vertex[1]));
+            return refuse(b, -1, c->edge_use[first].face_use,
+                          "cells go more than once round the edge of vertices %d and %d",
+                          file_number(b, c->edge[e].vertex[0]), file_number(b, c->edge[e].vertex[1]));
     }
     for (int32_t v = 0; v < c->n_vertex; v++) {
         if (c->vertex_pinched[v]) continue;
@@ -533,14 +487,12 @@ static pal_err check_neighbourhoods(builder *b)
         int32_t n_face = c->vertex_face.start[v + 1] - c->vertex_face.start[v];
         int32_t first = c->vertex_cell.start[v], n_cell = c->vertex_cell.start[v + 1] - first;
         if (n_edge - n_face + n_cell != (c->vertex_boundary[v] ? 1 : 2))
-            return refuse_cell(b, c->vertex_cell.item[first],
-                               "and others go round vertex %d more than once: %d edges - %d faces + %d cells there",
-                               file_number(b, v), n_edge, n_face, n_cell);
+            return refuse(b, c->vertex_cell.item[first], -1,
+                          "and others go round vertex %d more than once: %d edges - %d faces + %d cells there",
+                          file_number(b, v), n_edge, n_face, n_cell);
     }
     return PAL_ERR_OK;
 }
-
-/* ---- sharpness ---- */
 
 static pal_err set_sharpness(builder *b)
 {
@@ -549,9 +501,9 @@ static pal_err set_sharpness(builder *b)
     for (int32_t v = 0; in->vertex_sharpness && v < c->n_vertex; v++) {
         c->vertex_sharpness[v] = in->vertex_sharpness[v];
         if (!sharpness_valid(in->vertex_sharpness[v]))
-            return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "%s: vertex %d has sharpness %g, must be 0 to %g",
-                                      line_of(in->vertex_line, v).text, file_number(b, v),
-                                      (double)in->vertex_sharpness[v], (double)PAL_SHARPNESS_MAX);
+            return PAL_REFUSE(b->diag, "%s: vertex %d has sharpness %g, must be 0 to %g",
+                              line_of(in->vertex_line, v).text, file_number(b, v), (double)in->vertex_sharpness[v],
+                              (double)PAL_SHARPNESS_MAX);
     }
     memset(b->table, 0, (b->mask + 1) * sizeof *b->table);
     for (int32_t e = 0; in->n_edge_tag > 0 && e < c->n_edge; e++)
@@ -560,33 +512,30 @@ static pal_err set_sharpness(builder *b)
         const pal_cell_tag *tag = &in->edge_tag[k];
         int32_t e = b->table[edge_place(b, tag->a, tag->b)] - 1;
         if (e < 0 || !sharpness_valid(tag->sharp))
-            return pal_diagnostic_set(
-                b->diag, PAL_ERR_REFUSED, "%s: sharpness %g of an edge of vertices %lld and %lld: %s",
-                line_of(in->tag_line, k).text, (double)tag->sharp, (long long)tag->a + in->count_from,
-                (long long)tag->b + in->count_from, e < 0 ? "no cell has it" : "must be 0 to 1000000");
+            return PAL_REFUSE(b->diag, "%s: sharpness %g of an edge of vertices %lld and %lld: %s",
+                              line_of(in->tag_line, k).text, (double)tag->sharp, (long long)tag->a + in->count_from,
+                              (long long)tag->b + in->count_from, e < 0 ? "no cell has it" : "must be 0 to 1000000");
         c->edge[e].sharp = fmaxf(c->edge[e].sharp, tag->sharp);
     }
     for (int32_t k = 0; k < in->n_face_tag; k++) {
         const pal_cell_tag *tag = &in->face_tag[k];
         if (tag->a < 0 || tag->a >= c->n_face_use)
-            return pal_diagnostic_set(b->diag, PAL_ERR_REFUSED, "cells: sharpness of loop %lld, there are %d",
-                                      (long long)tag->a, c->n_face_use);
+            return PAL_REFUSE(b->diag, "cells: sharpness of loop %lld, there are %d", (long long)tag->a, c->n_face_use);
         if (!sharpness_valid(tag->sharp))
-            return refuse_loop(b, tag->a, "has sharpness %g, must be 0 to %g", (double)tag->sharp,
-                               (double)PAL_SHARPNESS_MAX);
+            return refuse(b, -1, tag->a, "has sharpness %g, must be 0 to %g", (double)tag->sharp,
+                          (double)PAL_SHARPNESS_MAX);
         pal_cell_face *face = &c->face[c->face_use[tag->a].face];
         face->sharp = fmaxf(face->sharp, tag->sharp);
     }
     return PAL_ERR_OK;
 }
 
-/* ---- the whole ---- */
-
 static pal_err build(builder *b)
 {
     PAL_TRY(check_counts(b));
-    b->stamp = malloc((size_t)b->in->n_vertex * sizeof *b->stamp);
-    if (!b->stamp) return PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    PAL_ARRAY(&err, b->stamp, b->in->n_vertex);
+    if (err) return err;
     PAL_TRY(check_corners(b));
     pal_cells *c = b->c;
     c->n_vertex = b->in->n_vertex, c->n_cell = b->in->n_cell;
@@ -615,12 +564,12 @@ static pal_err check_shape(const builder *b)
     pal_cells_fault fault;
     if (pal_cells_shape_valid(b->c, NULL, &fault)) return PAL_ERR_OK;
     if (fault.face_use >= 0)
-        return refuse_loop(b, fault.face_use, "has no area (%.3g m^2, longest edge %.3g m)", fault.measure,
-                           fault.length_scale_m);
-    return refuse_cell(b, fault.cell,
-                       "has no positive volume (%.3g m^3, %.3g m across): its faces must run "
-                       "counter-clockwise seen from outside",
-                       fault.measure, fault.length_scale_m);
+        return refuse(b, -1, fault.face_use, "has no area (%.3g m^2, longest edge %.3g m)", fault.measure,
+                      fault.length_scale_m);
+    return refuse(
+        b, fault.cell, -1,
+        "has no positive volume (%.3g m^3, %.3g m across): its faces must run counter-clockwise seen from outside",
+        fault.measure, fault.length_scale_m);
 }
 
 pal_err pal_cells_make(const pal_cell_loops *loops, pal_cells *out, pal_diagnostic *diag)

@@ -5,35 +5,22 @@
 #include "server/mesh/geometry/tuning.h"
 #include "server/num/polar.h"
 
-/* ---- delete ---- */
-
-static pal_err add_kept(pal_edit_work *w, int32_t cell, bool *keep, int32_t *kept)
-{
-    const pal_cells *c = w->from;
-    memset(keep, 1, (size_t)c->n_cell);
-    keep[cell] = false;
-    PAL_TRY(pal_cells_loops(c, &w->to));
-    PAL_TRY(pal_cell_loops_keep(&w->to, keep, kept));
-    PAL_TRY(pal_edit_reserve(w, w->to.n_vertex, w->to.n_cell));
-    for (int32_t i = 0; i < w->to.n_vertex; i++) pal_interpolation_builder_mean(&w->rows, &kept[i], 1);
-    for (int32_t i = cell; i < w->to.n_cell; i++) w->cell_from[i]++;
-    return PAL_ERR_OK;
-}
-
 static pal_err delete_cell(pal_edit_work *w, int32_t cell)
 {
-    pal_err err = pal_edit_check_number(w, "cell", cell, w->from->n_cell);
+    const pal_cells *c = w->from;
+    pal_err err = pal_edit_check_number(w, "cell", cell, c->n_cell);
     bool *keep;
     int32_t *kept;
-    if (!err && w->from->n_cell == 1) err = pal_edit_refuse(w, "it is the last one, a solid needs a cell");
-    PAL_ARRAY(&err, keep, w->from->n_cell);
-    PAL_ARRAY(&err, kept, w->from->n_vertex);
-    if (!err) err = add_kept(w, cell, keep, kept);
-    PAL_FREE(keep, kept);
-    return err;
+    if (!err && c->n_cell == 1) err = pal_edit_refuse(w, "it is the last one, a solid needs a cell");
+    PAL_ARRAY(&err, keep, c->n_cell);
+    PAL_ARRAY(&err, kept, c->n_vertex);
+    for (int32_t i = 0; !err && i < c->n_cell; i++) keep[i] = i != cell;
+    if (!err) err = pal_cells_loops(c, keep, &w->to, kept);
+    if (!err) err = pal_edit_reserve(w, w->to.n_vertex, w->to.n_cell);
+    for (int32_t i = 0; !err && i < w->to.n_vertex; i++) pal_interpolation_builder_mean(&w->rows, &kept[i], 1);
+    for (int32_t i = cell; !err && i < w->to.n_cell; i++) w->cell_from[i]++;
+    return PAL_FREED(err, keep, kept);
 }
-
-/* ---- sharpen, move: the same complex ---- */
 
 /* the complex as it is, every vertex and cell itself */
 static pal_err copy_all(const pal_edit_work *w, pal_cells_edit *out)
@@ -85,8 +72,6 @@ static pal_err move(pal_edit_work *w, int32_t vertex, const double to_m[3], pal_
                            fault.length_scale_m);
 }
 
-/* ---- commands ---- */
-
 static const char *const names[] = {
 #define X(kind, name) name,
     PAL_CELLS_COMMAND_TABLE(X)
@@ -98,19 +83,15 @@ const char *pal_cells_command_name(pal_cells_command_kind kind)
     return (unsigned)kind < PAL_CELLS_COMMAND_KINDS ? names[kind] : NULL;
 }
 
-pal_err pal_cells_apply(const pal_cells *from, const pal_cells_command *command, pal_cells_edit *out,
-                        pal_diagnostic *diag)
+pal_err pal_cells_apply(const pal_cells *from, const pal_cells_command *k, pal_cells_edit *out, pal_diagnostic *diag)
 {
-    const pal_cells_command *k = command;
     const char *name = pal_cells_command_name(k->kind);
     const int32_t item[] = {k->vertex, k->edge, k->face};
     int element = (int)k->kind - PAL_CELLS_SHARPEN_VERTEX;
     pal_err err = PAL_ERR_OK;
     pal_edit_work w;
     memset(out, 0, sizeof *out);
-    if (!name)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "edit: kind %d, there are %d", (int)k->kind,
-                                  PAL_CELLS_COMMAND_KINDS);
+    if (!name) return PAL_REFUSE(diag, "edit: kind %d, there are %d", (int)k->kind, PAL_CELLS_COMMAND_KINDS);
     switch (k->kind) {
     case PAL_CELLS_DELETE:
         w = pal_edit_begin(from, diag, "delete cell %d", k->cell);
@@ -138,8 +119,6 @@ pal_err pal_cells_apply(const pal_cells *from, const pal_cells_command *command,
     if (err) pal_cells_edit_free(out);
     return err;
 }
-
-/* ---- deformed states ---- */
 
 /* rotation of the corners and normal of a face from rest to positions x; the identity where x has no area */
 static void face_rotation(const pal_cells *from, int32_t face, const double *x, double r[9])

@@ -48,8 +48,6 @@ static pal_err division_reserve(const pal_cells *c, int32_t cell, division *s)
     return err;
 }
 
-/* ---- existing cuts ---- */
-
 static const double *at(const pal_cells *c, int32_t vertex)
 {
     return c->x + 3 * (size_t)vertex;
@@ -171,18 +169,13 @@ static void find_roles(division *s)
     }
 }
 
-/* ---- sides, and the numbers and rows of new vertices ---- */
-
 /* a vertex of the open side, in order; hanging ones go between */
 static void add_side_vertex(division *s, int32_t vertex, float sharp)
 {
     int32_t *end = &s->start[s->n_side + 1];
     if (s->role[vertex] == HANGING) {
         /* before the first corner: kept until the side is closed, in the slot of a missing midpoint */
-        if (*end == s->start[s->n_side])
-            s->centre[s->n_side] = vertex;
-        else
-            s->mid[*end - 1] = vertex;
+        *(*end == s->start[s->n_side] ? &s->centre[s->n_side] : &s->mid[*end - 1]) = vertex;
         return;
     }
     s->corner[*end] = vertex, s->mid[*end] = -1, s->sharp[*end] = sharp;
@@ -259,19 +252,12 @@ static void add_midpoints(pal_edit_work *w, division *s)
     pal_interpolation_builder_mean(&w->rows, s->order, n_corner);
 }
 
-/* ---- the new cells ---- */
-
-static void add_quad(pal_edit_work *w, float sharp, int32_t a, int32_t b, int32_t c, int32_t d)
-{
-    pal_cell_loops_face(&w->to, sharp);
-    pal_cell_loops_corners(&w->to, (const int32_t[]){a, b, c, d}, 4);
-}
-
 /* the quad of a side at its corner i; reversed: as the neighbour sees it */
 static void add_outer_vertices(pal_edit_work *w, const division *s, int32_t side, int32_t i, bool reversed)
 {
     int32_t before = s->mid[i > s->start[side] ? i - 1 : s->start[side + 1] - 1], after = s->mid[i];
-    add_quad(w, s->sharp[i], s->corner[i], reversed ? before : after, s->centre[side], reversed ? after : before);
+    pal_cell_loops_quad(&w->to, s->sharp[i], s->corner[i], reversed ? before : after, s->centre[side],
+                        reversed ? after : before);
 }
 
 /* middle of the side that runs to a corner over the edge of vertex mid */
@@ -291,7 +277,7 @@ static void add_part(pal_edit_work *w, const division *s, int32_t corner)
         for (int32_t i = s->start[side]; i < s->start[side + 1]; i++) {
             if (s->corner[i] != corner) continue;
             add_outer_vertices(w, s, side, i, false);
-            add_quad(w, 0, s->mid[i], centre_across(s, corner, s->mid[i]), s->middle, s->centre[side]);
+            pal_cell_loops_quad(&w->to, 0, s->mid[i], centre_across(s, corner, s->mid[i]), s->middle, s->centre[side]);
         }
 }
 
@@ -365,8 +351,6 @@ static pal_err divide_one(const pal_cells *from, int32_t cell, pal_cells_edit *o
     PAL_FREE(s.edge, s.face, s.role, s.order, s.start, s.corner, s.mid, s.centre, s.sharp);
     return pal_edit_finish(&w, err, out);
 }
-
-/* ---- many cells ---- */
 
 /* edit becomes the division `edit` followed by `next`; takes next. Both are freed on failure */
 static pal_err join_edits(pal_cells_edit *edit, pal_cells_edit *next)
@@ -454,6 +438,5 @@ pal_err pal_edit_divide_near(pal_edit_work *w, int32_t cell, int32_t rings, pal_
         list[0] = cell;
         err = pal_cells_divide(c, list_near(c, rings, list, listed), list, out, w->diag);
     }
-    PAL_FREE(list, listed);
-    return err;
+    return PAL_FREED(err, list, listed);
 }

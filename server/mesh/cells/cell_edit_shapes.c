@@ -3,7 +3,6 @@
 #include "server/mesh/cells/cell_edit_work.h"
 #include "server/mesh/geometry/tuning.h"
 
-#include <math.h>
 #include <stdlib.h>
 
 static pal_err check_boundary_face(const pal_edit_work *w, int32_t face)
@@ -21,7 +20,7 @@ static void add_prism(pal_edit_work *w, int32_t n, const int32_t *base, const in
 {
     const pal_cells *c = w->from;
     pal_cell_loops *to = &w->to;
-    pal_cell_loops_append(to, c, NULL);
+    pal_cell_loops_append(to, c, NULL, NULL);
     pal_cell_loops_cell(to);
     pal_cell_loops_face(to, 0);
     for (int32_t k = n - 1; k >= 0; k--) pal_cell_loops_corners(to, &base[k], 1);
@@ -29,8 +28,7 @@ static void add_prism(pal_edit_work *w, int32_t n, const int32_t *base, const in
     pal_cell_loops_corners(to, tip, n);
     for (int32_t k = 0; k < n; k++) {
         int32_t next = k + 1 < n ? k + 1 : 0;
-        pal_cell_loops_face(to, 0);
-        pal_cell_loops_corners(to, (const int32_t[]){base[k], base[next], tip[next], tip[k]}, 4);
+        pal_cell_loops_quad(to, 0, base[k], base[next], tip[next], tip[k]);
     }
     w->first_new = c->n_cell;
     w->cell_from[c->n_cell] = c->face_use[c->face[face].use[0]].cell;
@@ -42,8 +40,6 @@ static int32_t list_corners(const pal_cells *c, int32_t face, int32_t corner[PAL
     for (int32_t k = 0; k < n; k++) corner[k] = c->edge_use[first + k].vertex;
     return n;
 }
-
-/* ---- extrude ---- */
 
 pal_err pal_edit_extrude(pal_edit_work *w, int32_t face, double distance_m, double scale)
 {
@@ -73,8 +69,6 @@ pal_err pal_edit_extrude(pal_edit_work *w, int32_t face, double distance_m, doub
     add_prism(w, n, base, tip, face);
     return PAL_ERR_OK;
 }
-
-/* ---- merge, bridge ---- */
 
 /* Corners of two faces: b[k] is paired with a[k]. The loops run opposite ways; of the n cyclic shifts the nearest is
  * taken. */
@@ -145,7 +139,7 @@ static void add_merged(pal_edit_work *w, const pairs *p, int32_t *map)
         float *sharp = &w->to.vertex_sharpness[map[v]];
         *sharp = fmaxf(*sharp, c->vertex_sharpness[v]);
     }
-    pal_cell_loops_append(&w->to, c, map);
+    pal_cell_loops_append(&w->to, c, NULL, map);
 }
 
 pal_err pal_edit_merge(pal_edit_work *w, int32_t face, int32_t other_face)

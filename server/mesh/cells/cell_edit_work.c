@@ -45,15 +45,13 @@ pal_err pal_edit_refuse(const pal_edit_work *w, const char *format, ...)
     va_start(args, format);
     vsnprintf(sentence, sizeof sentence, format, args);
     va_end(args);
-    return pal_diagnostic_set(w->diag, PAL_ERR_REFUSED, "%s: %s", w->what, sentence);
+    return PAL_REFUSE(w->diag, "%s: %s", w->what, sentence);
 }
 
 pal_err pal_edit_check_number(const pal_edit_work *w, const char *what, int32_t i, int32_t n)
 {
     return i >= 0 && i < n ? PAL_ERR_OK : pal_edit_refuse(w, "%s %d, there are %d", what, i, n);
 }
-
-/* ---- folds ---- */
 
 /* can all faces of a cell be seen from its centroid? positions x [n_vertex][3] */
 static bool is_star_shaped(const pal_cells *c, const double *x, int32_t cell)
@@ -94,8 +92,6 @@ pal_err pal_edit_check_folds(const pal_edit_work *w, const pal_cells *to)
     }
     return PAL_ERR_OK;
 }
-
-/* ---- the end of a work ---- */
 
 static pal_err make_result(pal_edit_work *w, pal_cells_edit *edit)
 {

@@ -12,11 +12,6 @@
 
 #include "server/base/heap.h"
 
-#include <stdlib.h>
-#include <string.h>
-
-/* ---- walks in hexahedra ---- */
-
 enum { U, V, W };
 
 static int32_t next_twice(const pal_cells *c, int32_t h)
@@ -28,10 +23,6 @@ static int32_t next_twice(const pal_cells *c, int32_t h)
 static int32_t first_axis(const pal_cells *c, int32_t h, int axis)
 {
     return axis == U ? h : axis == W ? pal_cells_next_around(c, h) : next_twice(c, h);
-}
-static int32_t back_axis(const pal_cells *c, int32_t h, int axis)
-{
-    return axis == U ? h : axis == W ? next_twice(c, h) : pal_cells_next_around(c, h);
 }
 
 /* the cell across the face at the far (ahead) or near end of an axis */
@@ -46,7 +37,7 @@ static int32_t step(const pal_cells *c, int32_t h, int axis, bool ahead)
         int32_t far = c->edge_use[pal_cells_next_around(c, h)].mate;
         h = pal_cells_prev(c, c->edge_use[far].radial);
     }
-    return back_axis(c, h, axis);
+    return first_axis(c, h, (3 - axis) % 3); /* back */
 }
 
 /* vertices at corner bits u = 1, v = 2, w = 4 */
@@ -65,8 +56,6 @@ static void corners(const pal_cells *c, int32_t h, int32_t out[8])
     out[6] = c->edge_use[use = pal_cells_next(c, use)].vertex;
     out[2] = c->edge_use[pal_cells_next(c, use)].vertex;
 }
-
-/* ---- the kind of a cell ---- */
 
 /* six quads, three at every vertex: combinatorially a cube */
 static bool is_hex(const pal_cells *c, int32_t cell)
@@ -125,17 +114,13 @@ static bool label_nodes(const pal_cells *c, int32_t cell, int32_t *stamp, int32_
     return true;
 }
 
-/* ---- the lists ---- */
-
 static pal_err check_quads(const pal_cells *c, int32_t cell, pal_diagnostic *diag)
 {
     for (int32_t u = c->cell_use[cell]; u < c->cell_use[cell + 1]; u++) {
         int n = c->face_use[u + 1].first_use - c->face_use[u].first_use;
         if (n != 4)
-            return pal_diagnostic_set(
-                diag, PAL_ERR_REFUSED,
-                "elements: cell %d is no hexahedron and its face %d has %d corners: subdivide once", cell,
-                c->face_use[u].face, n);
+            return PAL_REFUSE(diag, "elements: cell %d is no hexahedron and its face %d has %d corners: subdivide once",
+                              cell, c->face_use[u].face, n);
     }
     return PAL_ERR_OK;
 }
@@ -232,8 +217,6 @@ void pal_cell_elements_free(pal_cell_elements *e)
     pal_interpolation_free(&e->virtual_rows);
     memset(e, 0, sizeof *e);
 }
-
-/* ---- rows of all nodes ---- */
 
 pal_err pal_cell_elements_interpolation(const pal_cell_elements *e, const pal_interpolation *vertices,
                                         pal_interpolation *out)

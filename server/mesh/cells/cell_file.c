@@ -4,22 +4,8 @@
 
 #include "server/base/heap.h"
 #include "server/mesh/cells/cell_reader.h"
-#include "server/mesh/files/file_bytes.h"
 #include "server/mesh/geometry/tuning.h"
 
-#include <stdlib.h>
-#include <string.h>
-
-pal_err pal_cell_reader_refuse(const pal_cell_reader *reader, const char *format, ...)
-{
-    va_list list;
-    va_start(list, format);
-    pal_err err = pal_file_refuse(reader->diag, reader->name, "line", reader->scan.line, format, list);
-    va_end(list);
-    return err;
-}
-
-/* keeps the line of item n */
 static void add_line(pal_cell_reader *r, int64_t **line, int32_t n, int64_t number)
 {
     if (!r->l.err && !PAL_GROW(*line, n)) r->l.err = PAL_ERR_MEMORY;
@@ -42,20 +28,18 @@ pal_err pal_cell_reader_sharp(pal_cell_reader *reader, float *out)
 {
     double sharp;
     if (!pal_text_double(&reader->scan, &sharp))
-        return pal_cell_reader_refuse(reader, "a sharpness must be a number, found %s",
-                                      pal_text_excerpt_at(&reader->scan).text);
+        return PAL_CELL_REFUSE(reader, "a sharpness must be a number, found %s",
+                               pal_text_excerpt_at(&reader->scan).text);
     if (!(sharp >= 0 && sharp <= (double)PAL_SHARPNESS_MAX))
-        return pal_cell_reader_refuse(reader, "sharpness %g, must be 0 to %g", sharp, (double)PAL_SHARPNESS_MAX);
+        return PAL_CELL_REFUSE(reader, "sharpness %g, must be 0 to %g", sharp, (double)PAL_SHARPNESS_MAX);
     *out = (float)sharp;
     return PAL_ERR_OK;
 }
 
-/* ---- palcells ---- */
-
 static pal_err end_line(pal_cell_reader *r)
 {
     if (!pal_text_more(&r->scan)) return PAL_ERR_OK;
-    return pal_cell_reader_refuse(r, "%s at the end of the line", pal_text_excerpt_at(&r->scan).text);
+    return PAL_CELL_REFUSE(r, "%s at the end of the line", pal_text_excerpt_at(&r->scan).text);
 }
 
 static pal_err read_vertex(pal_cell_reader *r)
@@ -63,10 +47,9 @@ static pal_err read_vertex(pal_cell_reader *r)
     double x[3];
     for (int a = 0; a < 3; a++)
         if (!pal_text_double(&r->scan, &x[a]))
-            return pal_cell_reader_refuse(r, "a position needs three numbers, found %s",
-                                          pal_text_excerpt_at(&r->scan).text);
+            return PAL_CELL_REFUSE(r, "a position needs three numbers, found %s", pal_text_excerpt_at(&r->scan).text);
     pal_cell_reader_vertex(r, x);
-    return end_line(r);
+    return PAL_ERR_OK;
 }
 
 /* a number from 1 to most, as one from 0 */
@@ -74,17 +57,16 @@ static pal_err read_number(pal_cell_reader *r, const char *what, int64_t max, in
 {
     int64_t i;
     if (!pal_text_int(&r->scan, &i))
-        return pal_cell_reader_refuse(r, "%s must be a number, found %s", what, pal_text_excerpt_at(&r->scan).text);
+        return PAL_CELL_REFUSE(r, "%s must be a number, found %s", what, pal_text_excerpt_at(&r->scan).text);
     if (i < 1 || i > max)
-        return pal_cell_reader_refuse(r, "%s %lld, there are %lld before this line", what, (long long)i,
-                                      (long long)max);
+        return PAL_CELL_REFUSE(r, "%s %lld, there are %lld before this line", what, (long long)i, (long long)max);
     *out = (int32_t)(i - 1);
     return PAL_ERR_OK;
 }
 
 static pal_err read_face(pal_cell_reader *r)
 {
-    if (r->l.n_cell == 0) return pal_cell_reader_refuse(r, "a face before the first cell");
+    if (r->l.n_cell == 0) return PAL_CELL_REFUSE(r, "a face before the first cell");
     pal_cell_reader_face(r, r->scan.line);
     while (pal_text_more(&r->scan)) {
         int32_t v = 0;
@@ -130,28 +112,29 @@ static pal_err read_face_sharp(pal_cell_reader *r)
     return add_tag(&r->l.face_tag, &r->l.n_face_tag, tag);
 }
 
+static pal_err read_cell(pal_cell_reader *r)
+{
+    PAL_TRY(end_line(r));
+    if (r->l.n_cell > 0 && r->l.cell[r->l.n_cell - 1] == r->l.n_loop)
+        return PAL_CELL_REFUSE(r, "cell %d has no faces", r->l.n_cell);
+    pal_cell_loops_cell(&r->l);
+    return PAL_ERR_OK;
+}
+
 static pal_err read_line(pal_cell_reader *r)
 {
     static const struct {
         const char *word;
         pal_err (*read)(pal_cell_reader *r);
-    } numbers[] = {{"sv", read_vertex_sharp}, {"se", read_edge_sharp}, {"sf", read_face_sharp}};
-    pal_text_scan *scan = &r->scan;
-    if (pal_text_is(scan, "v")) return read_vertex(r);
-    if (pal_text_is(scan, "f")) return read_face(r);
-    for (int k = 0; k < 3; k++) {
-        if (!pal_text_is(scan, numbers[k].word)) continue;
-        PAL_TRY(numbers[k].read(r));
+    } known[] = {{"v", read_vertex},        {"c", read_cell},        {"f", read_face},
+                 {"sv", read_vertex_sharp}, {"se", read_edge_sharp}, {"sf", read_face_sharp}};
+    for (size_t k = 0; k < sizeof known / sizeof *known; k++) {
+        if (!pal_text_is(&r->scan, known[k].word)) continue;
+        PAL_TRY(known[k].read(r));
         return end_line(r);
     }
-    if (!pal_text_is(scan, "c"))
-        return pal_cell_reader_refuse(r, "a line begins with %s, known are v, c, f, sv, se, sf",
-                                      pal_text_excerpt_at(scan).text);
-    PAL_TRY(end_line(r));
-    if (r->l.n_cell > 0 && r->l.cell[r->l.n_cell - 1] == r->l.n_loop)
-        return pal_cell_reader_refuse(r, "cell %d has no faces", r->l.n_cell);
-    pal_cell_loops_cell(&r->l);
-    return PAL_ERR_OK;
+    return PAL_CELL_REFUSE(r, "a line begins with %s, known are v, c, f, sv, se, sf",
+                           pal_text_excerpt_at(&r->scan).text);
 }
 
 static pal_err read_palcells(pal_cell_reader *r)
@@ -159,7 +142,7 @@ static pal_err read_palcells(pal_cell_reader *r)
     int64_t version;
     r->scan.hash = true;
     if (!pal_text_is(&r->scan, "palcells") || !pal_text_int(&r->scan, &version) || version != 1)
-        return pal_cell_reader_refuse(r, "the first line must be 'palcells 1'");
+        return PAL_CELL_REFUSE(r, "the first line must be 'palcells 1'");
     PAL_TRY(end_line(r));
     while (!r->l.err && pal_text_next_line(&r->scan))
         if (pal_text_more(&r->scan)) PAL_TRY(read_line(r));
@@ -167,18 +150,16 @@ static pal_err read_palcells(pal_cell_reader *r)
     return PAL_ERR_OK;
 }
 
-/* ---- reading ---- */
-
 /* builds the complex from the loops; the builder's message follows the file's name */
 static pal_err finish(pal_cell_reader *r, bool vtk, pal_cells *out)
 {
     pal_err err = r->l.err;
     if (err) return pal_diagnostic_set(r->diag, err, "%s: no memory for its %d cells", r->name, r->l.n_cell);
     if (r->l.n_vertex == 0 || r->l.n_cell == 0)
-        return pal_cell_reader_refuse(r, "the file ends with %d vertices and %d cells", r->l.n_vertex, r->l.n_cell);
-    if (r->l.n_loop == 0) return pal_cell_reader_refuse(r, "the file ends without a face");
-    if (r->l.n_corner == 0) return pal_cell_reader_refuse(r, "the file ends without a corner");
-    if (vtk) PAL_TRY(pal_cell_loops_keep(&r->l, NULL, NULL));
+        return PAL_CELL_REFUSE(r, "the file ends with %d vertices and %d cells", r->l.n_vertex, r->l.n_cell);
+    if (r->l.n_loop == 0) return PAL_CELL_REFUSE(r, "the file ends without a face");
+    if (r->l.n_corner == 0) return PAL_CELL_REFUSE(r, "the file ends without a corner");
+    if (vtk) PAL_TRY(pal_cell_loops_drop_unused(&r->l, NULL));
     pal_diagnostic inner = {""};
     err = pal_cells_make(&r->l, out, &inner);
     const char *text = inner.text + (strncmp(inner.text, "cells: ", 7) ? 0 : 7);
@@ -191,14 +172,10 @@ pal_err pal_cell_file_parse(const char *name, const uint8_t *bytes, size_t n_byt
     pal_file_printable_name(shown, name);
     pal_cell_reader r = {.name = shown, .diag = diag, .scan = {.at = bytes, .end = bytes + n_byte, .line = 1}};
     bool vtk = n_byte >= 5 && !memcmp(bytes, "# vtk", 5);
-    pal_err err = PAL_ERR_OK;
     if (n_byte > CELL_MAX_BYTE)
-        err = pal_diagnostic_set(diag, PAL_ERR_BUDGET, "%s: %zu bytes, at most %zu are read", shown, n_byte,
-                                 CELL_MAX_BYTE);
-    else if (vtk)
-        err = pal_cell_vtk_read(&r);
-    else
-        err = read_palcells(&r);
+        return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "%s: %zu bytes, at most %zu are read", shown, n_byte,
+                                  CELL_MAX_BYTE);
+    pal_err err = (vtk ? pal_cell_vtk_read : read_palcells)(&r);
     if (!err) err = finish(&r, vtk, out);
     pal_cell_loops_free(&r.l);
     return err;
@@ -210,11 +187,8 @@ pal_err pal_cell_file_load(const char *path, pal_cells *out, pal_diagnostic *dia
     size_t n_byte;
     PAL_TRY(pal_file_read(path, CELL_MAX_BYTE, &bytes, &n_byte, diag));
     pal_err err = pal_cell_file_parse(path, bytes, n_byte, out, diag);
-    free(bytes);
-    return err;
+    return PAL_FREED(err, bytes);
 }
-
-/* ---- writing ---- */
 
 static void write_palcells(const pal_cells *c, FILE *file)
 {
@@ -257,16 +231,10 @@ pal_err pal_cell_file_bytes(const pal_cells *cells, bool vtk, uint8_t **bytes, s
     size_t n = 0;
     FILE *file = open_memstream(&text, &n);
     if (!file) return PAL_ERR_MEMORY;
-    if (vtk)
-        pal_cell_vtk_write(cells, file);
-    else
-        write_palcells(cells, file);
+    (vtk ? pal_cell_vtk_write : write_palcells)(cells, file);
     bool bad = ferror(file) != 0;
     bad |= fclose(file) != 0;
-    if (bad) {
-        free(text);
-        return PAL_ERR_MEMORY;
-    }
+    if (bad) return PAL_FREED(PAL_ERR_MEMORY, text);
     *bytes = (uint8_t *)text, *n_byte = n;
     return PAL_ERR_OK;
 }
@@ -278,11 +246,9 @@ pal_err pal_cell_file_save(const pal_cells *cells, const char *path, pal_diagnos
     char shown[128];
     uint8_t *bytes;
     pal_file_printable_name(shown, path);
-    if (!vtk && !ours)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: cells are written to .palcells or .vtk files", shown);
+    if (!vtk && !ours) return PAL_REFUSE(diag, "%s: cells are written to .palcells or .vtk files", shown);
     if (pal_cell_file_bytes(cells, vtk, &bytes, &n_byte))
         return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for the text of %d cells", shown, cells->n_cell);
     pal_err err = pal_file_write(path, bytes, n_byte, diag);
-    free(bytes);
-    return err;
+    return PAL_FREED(err, bytes);
 }

@@ -116,15 +116,16 @@ static pal_err add_place(builder *b, char what, pal_diagnostic *diag)
 static pal_err add_all(builder *b, pal_diagnostic *diag)
 {
     const pal_cell_lattice *l = b->lattice;
+    const char *row = l->rows ? l->rows : "#";
     int32_t *at = b->brick;
     for (at[2] = 0; at[2] < l->n[2]; at[2]++)
         for (at[1] = 0; at[1] < l->n[1]; at[1]++) {
-            const char *row = l->row ? l->row[at[2] * l->n[1] + at[1]] : "#";
-            int32_t max = (int32_t)strlen(row) - 1;
+            int32_t max = (int32_t)strcspn(row, "/ ") - 1;
             for (at[0] = 0; at[0] < l->n[0]; at[0]++) {
                 char what = row[at[0] < max ? at[0] : max];
                 if (what != '.') PAL_TRY(add_place(b, what, diag));
             }
+            if (row[max + 1]) row += max + 2;
         }
     return PAL_ERR_OK;
 }
@@ -141,7 +142,7 @@ pal_err pal_cell_lattice_make(const pal_cell_lattice *lattice, pal_cells *out, p
         /* where all corners are used, they are numbered in rows */
         const int32_t *n = lattice->n;
         int32_t *at = b.brick;
-        for (at[2] = 0; !lattice->row && at[2] <= n[2]; at[2]++)
+        for (at[2] = 0; !lattice->rows && at[2] <= n[2]; at[2]++)
             for (at[1] = 0; at[1] <= n[1]; at[1]++)
                 for (at[0] = 0; at[0] <= n[0] - lattice->round; at[0]++) corner_vertex(&b, 0);
         err = add_all(&b, diag);

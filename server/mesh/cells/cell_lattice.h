@@ -14,9 +14,10 @@
 
 typedef struct pal_cell_lattice {
     int32_t n[3];
-    bool round;             /* the first direction closes in itself                                              */
-    const char *const *row; /* NULL: bricks everywhere, vertices in rows, x fastest. Layers from low z, rows from low y,
-                             * a letter for each x; the last letter stands for those that are missing [n[2] n[1]] */
+    bool round;       /* the first direction closes in itself                                              */
+    const char *rows; /* NULL: bricks everywhere, vertices in rows, x fastest. A letter for each x; the last letter of
+                       * a row stands for those that are missing. '/' ends a row, rows run from low y, and ' ' a
+                       * layer, layers from low z; the last row stands for those that are missing */
     /* from lattice numbers, corners being whole, to metres; NULL: equal steps from low to high, of round ones clockwise
      * about z, from inner to outer radius and along z */
     void (*place)(const double at[3], double x[3]);

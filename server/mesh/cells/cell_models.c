@@ -51,17 +51,14 @@ static void swell(double u[3], double share)
     for (int a = 0; a < 3; a++) u[a] *= s;
 }
 
-/* ---- soccer player: kicks a ball that his foot holds ---- */
-
-static const char *const soccer_row[] = {
-    /* feet and ball */ ".....#.", ".....#.", "...#.#.", "...#.#.",
-    /* shins         */ ".",       ".",       ".",       "...#.#.",
-    /* thighs        */ ".",       ".",       ".",       "...#.#.",
-    /* hips          */ ".",       ".",       ".",       "...###.",
-    /* shoulders     */ ".",       ".",       ".",       "#########",
-    /* neck          */ ".",       ".",       ".",       "....#.",
-    /* head          */ ".",       ".",       ".",       "....#.",
-};
+/* soccer player: kicks a ball that his foot holds */
+static const char soccer_rows[] = ".....#./.....#./...#.#./...#.#. " /* feet and ball */
+                                  "./././...#.#. "                   /* shins */
+                                  "./././...#.#. "                   /* thighs */
+                                  "./././...###. "                   /* hips */
+                                  "./././######### "                 /* shoulders */
+                                  "./././....#. "                    /* neck */
+                                  "./././....#.";                    /* head */
 
 static void place_soccer(const double at[3], double x[3])
 {
@@ -94,22 +91,11 @@ static void place_soccer(const double at[3], double x[3])
     }
 }
 
-/* ---- sea monster: a spine that winds, all else stands out from it ---- */
-
-static const char *const monster_row[] = {
-    /* chin            */ ".",
-    "...................##.",
-    ".",
-    /* spine and fins  */ "#....#........#.",
-    "####################.",
-    "#....#........#.",
-    /* posts and snout */ ".",
-    "........#.#........###",
-    ".",
-    /* loop and horns  */ ".",
-    "........###........UU.",
-    ".",
-};
+/* sea monster: a spine that winds, all else stands out from it */
+static const char monster_rows[] = "./...................##./. "                              /* chin */
+                                   "#....#........#./####################./#....#........#. " /* spine and fins */
+                                   "./........#.#........###/. "                              /* posts and snout */
+                                   "./........###........UU./.";                              /* loop and horns */
 
 static void place_monster(const double at[3], double x[3])
 {
@@ -146,19 +132,16 @@ static void place_monster(const double at[3], double x[3])
     }
 }
 
-/* ---- chair ---- */
-
-static const char *const chair_row[] = {
-    /* feet        */ "#...#", ".",     ".",     "#...#",
-    /* stretchers  */ "#...#", "#...#", "#####", "#...#",
-    /* legs        */ "#...#", ".",     ".",     "#...#",
-    /* legs        */ "#...#", ".",     ".",     "#...#",
-    /* seat        */ "#",     "#X#X#", "#X#X#", "#",
-    /* posts, slat */ ".",     ".",     ".",     "#.#.#",
-    /* posts, slat */ ".",     ".",     ".",     "#.#.#",
-    /* rail        */ ".",     ".",     ".",     "#",
-    /* knobs       */ ".",     ".",     ".",     "U...U",
-};
+/* chair */
+static const char chair_rows[] = "#...#/././#...# "         /* feet */
+                                 "#...#/#...#/#####/#...# " /* stretchers */
+                                 "#...#/././#...# "         /* legs */
+                                 "#...#/././#...# "         /* legs */
+                                 "#/#X#X#/#X#X#/# "         /* seat */
+                                 "./././#.#.# "             /* posts, slat */
+                                 "./././#.#.# "             /* posts, slat */
+                                 "./././# "                 /* rail */
+                                 "./././U...U";             /* knobs */
 
 static void place_chair(const double at[3], double x[3])
 {
@@ -173,16 +156,13 @@ static void place_chair(const double at[3], double x[3])
     x[0] *= 1 + 0.1 * ramp(z, 0.09, 0.15);
 }
 
-/* ---- head: open mouth, eyes are pyramids in their sockets, ears, a nose of brick, wedge and pyramid ---- */
-
-static const char *const head_row[] = {
-    /* neck  */ ".",     ".",     ".",       "..###..", "..###..", ".",
-    /* chin  */ ".",     ".",     ".#####.", ".#####.", ".#####.", ".#####.",
-    /* mouth */ ".",     ".",     ".#...#.", ".#####.", ".#####.", ".#####.",
-    /* nose  */ "...S.", "...#.", ".#####.", ".#####.", ".#####.", ".#####.",
-    /* eyes  */ ".",     "...c.", ".#S#S#.", "W#####E", ".#XXX#.", ".#####.",
-    /* crown */ ".",     ".",     ".#####.", ".#####.", ".#####.", ".#####.",
-};
+/* head: open mouth, eyes are pyramids in their sockets, ears, a nose of brick, wedge and pyramid */
+static const char head_rows[] = "./././..###../..###../. "                     /* neck */
+                                "././.#####./.#####./.#####./.#####. "         /* chin */
+                                "././.#...#./.#####./.#####./.#####. "         /* mouth */
+                                "...S./...#./.#####./.#####./.#####./.#####. " /* nose */
+                                "./...c./.#S#S#./W#####E/.#XXX#./.#####. "     /* eyes */
+                                "././.#####./.#####./.#####./.#####.";         /* crown */
 
 static void place_head(const double at[3], double x[3])
 {
@@ -198,28 +178,13 @@ static void place_head(const double at[3], double x[3])
     x[0] = 0.078 * u[0] * jaw, x[1] = 0.092 * u[1] * (1 - 0.1 * ramp(-u[2], 0, 1)), x[2] = 0.11 * u[2];
 }
 
-/* ---- bridge: deck on two pylons, hung from cables; gaps between all that stands ---- */
-
-static const char *const bridge_row[] = {
-    /* pylons  */ "....#..........#.",
-    ".",
-    "....#..........#.",
-    /* pylons  */ "....#..........#.",
-    ".",
-    "....#..........#.",
-    /* deck    */ "#",
-    "#",
-    "#",
-    /* hangers */ "#.#.#.#.#..#.#.#.#.#",
-    ".",
-    "#.#.#.#.#..#.#.#.#.#",
-    /* hangers */ "#.#.#.#.#..#.#.#.#.#",
-    ".",
-    "#.#.#.#.#..#.#.#.#.#",
-    /* cables  */ "#",
-    "....#..........#.",
-    "#",
-};
+/* bridge: deck on two pylons, hung from cables; gaps between all that stands */
+static const char bridge_rows[] = "....#..........#././....#..........#. "       /* pylons */
+                                  "....#..........#././....#..........#. "       /* pylons */
+                                  "#/#/# "                                       /* deck */
+                                  "#.#.#.#.#..#.#.#.#.#/./#.#.#.#.#..#.#.#.#.# " /* hangers */
+                                  "#.#.#.#.#..#.#.#.#.#/./#.#.#.#.#..#.#.#.#.# " /* hangers */
+                                  "#/....#..........#./#";                       /* cables */
 
 static void place_bridge(const double at[3], double x[3])
 {
@@ -236,12 +201,8 @@ static void place_bridge(const double at[3], double x[3])
     if (at[2] < 2) x[1] *= 1 + 0.15 * (2 - at[2]);
 }
 
-/* ---- nozzle: nine sectors of a wall that narrows and widens, and a flange ---- */
-
-static const char *const nozzle_row[] = {
-    "#", "#", "#", "#", ".", ".", "#", ".", ".", "#", ".", ".", "#", ".",
-    ".", "#", ".", ".", "#", ".", ".", "#", ".", ".", "#", ".", ".",
-};
+/* nozzle: nine sectors of a wall that narrows and widens, and a flange */
+static const char nozzle_rows[] = "#/#/# #/./. #/./. #/./. #/./. #/./. #/./. #/./. #/./.";
 
 static void place_nozzle(const double at[3], double x[3])
 {
@@ -251,18 +212,15 @@ static void place_nozzle(const double at[3], double x[3])
     x[0] = -r * cos(angle), x[1] = r * sin(angle), x[2] = LINE(height, at[2]);
 }
 
-/* ---- kidney: a bean, hollow behind its hilum, with an artery and a ureter ---- */
-
-static const char *const kidney_row[] = {
-    /* ureter */ ".",   ".",      "#.",     ".",
-    /* ureter */ ".",   ".",      "#.",     ".",
-    /* lowest */ "..#", "..#",    "#.#",    "..#",
-    /* ureter */ "..#", "..#..#", "###..#", "..#",
-    /* hilum  */ "..#", ".....#", ".....#", "..#",
-    /* hilum  */ "..#", ".....#", ".....#", "..#",
-    /* artery */ "..#", "###..#", "..#..#", "..#",
-    /* top    */ "..#", "..#",    "..#",    "..#",
-};
+/* kidney: a bean, hollow behind its hilum, with an artery and a ureter */
+static const char kidney_rows[] = "././#./. "              /* ureter */
+                                  "././#./. "              /* ureter */
+                                  "..#/..#/#.#/..# "       /* lowest */
+                                  "..#/..#..#/###..#/..# " /* ureter */
+                                  "..#/.....#/.....#/..# " /* hilum */
+                                  "..#/.....#/.....#/..# " /* hilum */
+                                  "..#/###..#/..#..#/..# " /* artery */
+                                  "..#/..#/..#/..#";       /* top */
 
 static void place_kidney(const double at[3], double x[3])
 {
@@ -274,8 +232,6 @@ static void place_kidney(const double at[3], double x[3])
     for (int a = 0; a < 3; a++) u[a] += more[a];
     x[0] = 0.032 * u[0] - bean, x[1] = 0.026 * u[1], x[2] = 0.058 * u[2];
 }
-
-/* ---- the list ---- */
 
 const pal_cell_model pal_cell_model_list[PAL_CELL_MODELS] = {
     {"soccer", "a player who kicks a ball", 2, 24, 1536, {24, 76, 0}},
@@ -290,15 +246,15 @@ const pal_cell_model pal_cell_model_list[PAL_CELL_MODELS] = {
 };
 
 static const pal_cell_lattice lattice_list[PAL_CELL_MODELS] = {
-    {{9, 4, 7}, false, soccer_row, place_soccer, {0}, {0}},
-    {{22, 3, 4}, false, monster_row, place_monster, {0}, {0}},
+    {{9, 4, 7}, false, soccer_rows, place_soccer, {0}, {0}},
+    {{22, 3, 4}, false, monster_rows, place_monster, {0}, {0}},
     {{3, 3, 3}, false, NULL, NULL, {-0.05, -0.05, -0.05}, {0.05, 0.05, 0.05}},
-    {{5, 4, 9}, false, chair_row, place_chair, {0}, {0}},
+    {{5, 4, 9}, false, chair_rows, place_chair, {0}, {0}},
     {{4, 4, 4}, false, NULL, NULL, {-0.05, -0.05, -0.05}, {0.05, 0.05, 0.05}},
-    {{7, 6, 6}, false, head_row, place_head, {0}, {0}},
-    {{20, 3, 6}, false, bridge_row, place_bridge, {0}, {0}},
-    {{9, 3, 9}, true, nozzle_row, place_nozzle, {0}, {0}},
-    {{6, 4, 8}, false, kidney_row, place_kidney, {0}, {0}},
+    {{7, 6, 6}, false, head_rows, place_head, {0}, {0}},
+    {{20, 3, 6}, false, bridge_rows, place_bridge, {0}, {0}},
+    {{9, 3, 9}, true, nozzle_rows, place_nozzle, {0}, {0}},
+    {{6, 4, 8}, false, kidney_rows, place_kidney, {0}, {0}},
 };
 
 const pal_cell_model *pal_cell_model_find(const char *name)

@@ -2,9 +2,8 @@
 #ifndef PAL_MESH_CELLS_CELL_READER_H
 #define PAL_MESH_CELLS_CELL_READER_H
 #include "server/mesh/cells/cells.h"
+#include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/text_scan.h"
-
-#include <stdio.h>
 
 typedef struct pal_cell_reader {
     const char *name; /* as messages show it */
@@ -14,8 +13,8 @@ typedef struct pal_cell_reader {
 } pal_cell_reader;
 
 /* REFUSED with "NAME: line N: sentence" at the scan's line */
-pal_err pal_cell_reader_refuse(const pal_cell_reader *reader, const char *format, ...)
-    __attribute__((format(printf, 2, 3)));
+#define PAL_CELL_REFUSE(reader, ...)                                                                                   \
+    pal_file_refuse((reader)->diag, (reader)->name, "line", (reader)->scan.line, __VA_ARGS__)
 /* a vertex, or the next face of the cell, with its line */
 void pal_cell_reader_vertex(pal_cell_reader *reader, const double x[3]);
 void pal_cell_reader_face(pal_cell_reader *reader, int64_t line);

@@ -5,7 +5,6 @@
 #include "server/mesh/cells/cell_lattice.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 static pal_err check_count(const char *name, int32_t n, int32_t min, pal_diagnostic *diag)
 {
@@ -18,8 +17,7 @@ static pal_err check_count(const char *name, int32_t n, int32_t min, pal_diagnos
 static pal_err check_length(const char *name, double length, double above, pal_diagnostic *diag)
 {
     if (length > above && length <= 1e8) return PAL_ERR_OK;
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "cells: %s is %g m, must be above %g and at most 1e8", name,
-                              length, above);
+    return PAL_REFUSE(diag, "cells: %s is %g m, must be above %g and at most 1e8", name, length, above);
 }
 
 /* corner i of n equal steps from low to high, both ends to the bit */

@@ -4,12 +4,7 @@
  * cell with negative volume is reversed. Cells that are no tetrahedron, hexahedron, wedge or pyramid are written as
  * polyhedra. */
 #include "server/base/heap.h"
-#include "server/base/vec3.h"
 #include "server/mesh/cells/cell_reader.h"
-#include "server/mesh/files/file_bytes.h"
-
-#include <stdlib.h>
-#include <string.h>
 
 enum { TETRAHEDRON = 10, HEXAHEDRON = 12, WEDGE = 13, PYRAMID = 14, POLYHEDRON = 42 };
 
@@ -29,8 +24,6 @@ static const kind KINDS[4] = {
     {PYRAMID, 5, 5, {{0, 3, 2, 1, -1}, {0, 1, 4, -1}, {1, 2, 4, -1}, {2, 3, 4, -1}, {3, 0, 4, -1}}},
 };
 
-/* ---- reading ---- */
-
 /* the numbers of CELLS, cell after cell, and where each cell's begin */
 typedef struct lists {
     int32_t *item, *start;
@@ -40,8 +33,8 @@ typedef struct lists {
 
 static pal_err refuse_number(const pal_cell_reader *r, const char *what)
 {
-    if (r->scan.at == r->scan.end) return pal_cell_reader_refuse(r, "the file ends where %s should be", what);
-    return pal_cell_reader_refuse(r, "%s must be a number, found %s", what, pal_text_excerpt_at(&r->scan).text);
+    if (r->scan.at == r->scan.end) return PAL_CELL_REFUSE(r, "the file ends where %s should be", what);
+    return PAL_CELL_REFUSE(r, "%s must be a number, found %s", what, pal_text_excerpt_at(&r->scan).text);
 }
 
 /* a number from min to max, on this line or a later one */
@@ -49,15 +42,15 @@ static pal_err take_int(pal_cell_reader *r, const char *what, int64_t min, int64
 {
     if (!pal_text_seek(&r->scan) || !pal_text_int(&r->scan, out)) return refuse_number(r, what);
     if (*out < min || *out > max)
-        return pal_cell_reader_refuse(r, "%s is %lld, must be %lld to %lld", what, (long long)*out, (long long)min,
-                                      (long long)max);
+        return PAL_CELL_REFUSE(r, "%s is %lld, must be %lld to %lld", what, (long long)*out, (long long)min,
+                               (long long)max);
     return PAL_ERR_OK;
 }
 
 static pal_err take_word(pal_cell_reader *r, const char *word)
 {
     if (pal_text_seek(&r->scan) && pal_text_is(&r->scan, word)) return PAL_ERR_OK;
-    return pal_cell_reader_refuse(r, "%s should be here, found %s", word, pal_text_excerpt_at(&r->scan).text);
+    return PAL_CELL_REFUSE(r, "%s should be here, found %s", word, pal_text_excerpt_at(&r->scan).text);
 }
 
 /* every number takes two bytes at least, so counts beyond that lie */
@@ -71,14 +64,14 @@ static pal_err read_head(pal_cell_reader *r)
     static const char head[] = "# vtk DataFile Version ";
     double version = 0;
     size_t n = sizeof head - 1, left = (size_t)(r->scan.end - r->scan.at);
-    if (left < n || memcmp(r->scan.at, head, n)) return pal_cell_reader_refuse(r, "the first line must be '%sN'", head);
+    if (left < n || memcmp(r->scan.at, head, n)) return PAL_CELL_REFUSE(r, "the first line must be '%sN'", head);
     r->scan.at += n;
     if (!pal_text_double(&r->scan, &version) || !(version >= 1 && version < 5))
-        return pal_cell_reader_refuse(r, "VTK version %g, versions 1 to 4.2 are read", version);
+        return PAL_CELL_REFUSE(r, "VTK version %g, versions 1 to 4.2 are read", version);
     pal_text_next_line(&r->scan);
     pal_text_next_line(&r->scan);
     if (pal_text_is(&r->scan, "BINARY"))
-        return pal_cell_reader_refuse(r, "a binary VTK file: save it as ASCII, that is what is read");
+        return PAL_CELL_REFUSE(r, "a binary VTK file: save it as ASCII, that is what is read");
     PAL_TRY(take_word(r, "ASCII"));
     PAL_TRY(take_word(r, "DATASET"));
     return take_word(r, "UNSTRUCTURED_GRID");
@@ -89,7 +82,7 @@ static pal_err read_points(pal_cell_reader *r)
     int64_t n;
     PAL_TRY(take_word(r, "POINTS"));
     PAL_TRY(take_int(r, "the number of points", 1, max_numbers(r), &n));
-    if (pal_text_word(&r->scan) == 0) return pal_cell_reader_refuse(r, "POINTS must say float or double");
+    if (pal_text_word(&r->scan) == 0) return PAL_CELL_REFUSE(r, "POINTS must say float or double");
     for (int64_t i = 0; i < n; i++) {
         double x[3];
         for (int a = 0; a < 3; a++)
@@ -112,7 +105,7 @@ static pal_err read_lists(pal_cell_reader *r, lists *at)
         at->line[at->n_cell] = r->scan.line;
         at->start[at->n_cell++] = (int32_t)at->n_item;
         n_number -= left + 1;
-        if (n_number < 0) return pal_cell_reader_refuse(r, "cells have more numbers than CELLS says");
+        if (n_number < 0) return PAL_CELL_REFUSE(r, "cells have more numbers than CELLS says");
         for (; left > 0; left--) {
             PAL_TRY(take_int(r, "a corner", 0, INT32_MAX, &value));
             if (!PAL_GROW(at->item, at->n_item)) return PAL_ERR_MEMORY;
@@ -128,7 +121,7 @@ static pal_err refuse_cell(const pal_cell_reader *r, const lists *at, size_t i, 
 {
     pal_cell_reader there = *r;
     there.scan.line = at->line[i];
-    return pal_cell_reader_refuse(&there, "cell %zu: %s %lld", i, what, (long long)number);
+    return PAL_CELL_REFUSE(&there, "cell %zu: %s %lld", i, what, (long long)number);
 }
 
 static pal_err add_polyhedron(pal_cell_reader *r, const lists *at, size_t i)
@@ -174,18 +167,8 @@ static void reverse_cell(pal_cell_reader *r)
     double sum = 0;
     if (first == l->n_loop || l->loop[first] == l->n_corner) return;
     const double *o = l->x + 3 * (size_t)corner[l->loop[first]];
-    for (int32_t i = first; i < l->n_loop; i++) {
-        int32_t from = l->loop[i], end = l->loop[i + 1];
-        double centre[3] = {0, 0, 0}, p[3], n[3];
-        for (int32_t k = from; k < end; k++) {
-            pal_sub3(p, l->x + 3 * (size_t)corner[k], o);
-            pal_axpy3(centre, 1.0 / (double)(end - from), p);
-        }
-        for (int32_t k = from; k < end; k++) {
-            pal_normal3(n, o, l->x + 3 * (size_t)corner[k], l->x + 3 * (size_t)corner[k + 1 < end ? k + 1 : from]);
-            sum += pal_dot3(n, centre);
-        }
-    }
+    for (int32_t i = first; i < l->n_loop; i++)
+        sum += pal_cells_cone(l->x, corner + l->loop[i], 1, l->loop[i + 1] - l->loop[i], o);
     if (!(sum < 0)) return;
     for (int32_t i = first; i < l->n_loop; i++)
         for (int32_t a = l->loop[i], b = l->loop[i + 1]; a + 1 < b; a++) {
@@ -226,12 +209,12 @@ static pal_err read_sharp(pal_cell_reader *r)
             break;
         if (!pal_text_next_line(&r->scan)) return PAL_ERR_OK;
     }
-    if (pal_text_word(&r->scan) == 0) return pal_cell_reader_refuse(r, "SCALARS sharp must say float or double");
+    if (pal_text_word(&r->scan) == 0) return PAL_CELL_REFUSE(r, "SCALARS sharp must say float or double");
     if (pal_text_more(&r->scan)) PAL_TRY(take_int(r, "the number of components", 1, 1, &n));
     PAL_TRY(take_word(r, "LOOKUP_TABLE"));
     pal_text_next_line(&r->scan);
     for (int32_t v = 0; v < r->l.n_vertex; v++) {
-        if (!pal_text_seek(&r->scan)) return pal_cell_reader_refuse(r, "the file ends where a sharpness should be");
+        if (!pal_text_seek(&r->scan)) return PAL_CELL_REFUSE(r, "the file ends where a sharpness should be");
         PAL_TRY(pal_cell_reader_sharp(r, &r->l.vertex_sharpness[v]));
     }
     return PAL_ERR_OK;
@@ -247,8 +230,6 @@ pal_err pal_cell_vtk_read(pal_cell_reader *reader)
     PAL_FREE(at.item, at.start, at.line);
     return err ? err : read_sharp(reader);
 }
-
-/* ---- writing ---- */
 
 /* VTK's corners of a cell that is one of KINDS, from the loop of its first face with as many corners as the base; the
  * vertex opposite a corner is at the third edge there. NULL: a polyhedron */
@@ -300,9 +281,8 @@ static void write_polyhedron(const pal_cells *c, int32_t cell, FILE *file)
     }
 }
 
-void pal_cell_vtk_write(const pal_cells *cells, FILE *file)
+void pal_cell_vtk_write(const pal_cells *c, FILE *file)
 {
-    const pal_cells *c = cells;
     int64_t n_number = 0;
     int32_t corner[8];
     bool sharp = false;

@@ -5,11 +5,6 @@
 #include "server/base/vec3.h"
 #include "server/num/union_find.h"
 
-#include <stdlib.h>
-#include <string.h>
-
-/* ---- pieces and holes ---- */
-
 int32_t pal_cells_label(const pal_cells *c, int32_t *label)
 {
     pal_union_find_init(label, c->n_cell);
@@ -19,49 +14,29 @@ int32_t pal_cells_label(const pal_cells *c, int32_t *label)
     return pal_union_find_label(label, c->n_cell);
 }
 
-/* sheets of the boundary, and V - E + F summed over them; parent [n_face], seen [n_edge_use] are scratch */
-static void walk_sheets(const pal_cells *c, int32_t *parent, bool *seen, pal_cells_topology *out)
+pal_err pal_cells_find_topology(const pal_cells *c, pal_cells_topology *out)
 {
-    int64_t n_vertex = 0, n_half = 0;
-    for (int32_t f = 0; f < c->n_face; f++) parent[f] = pal_cells_face_boundary(c, f) ? f : -1;
+    pal_cells_topology t = {.euler = (int64_t)c->n_vertex - c->n_edge + c->n_face - c->n_cell};
+    pal_err err = PAL_ERR_OK;
+    int32_t *label;
+    int64_t n_side = 0; /* uses of edges by boundary faces: each edge of a sheet has two */
+    PAL_ARRAY(&err, label, c->n_face > c->n_cell ? c->n_face : c->n_cell);
+    if (err) return err;
+    t.n_piece = pal_cells_label(c, label);
+    pal_union_find_init(label, c->n_face);
     for (int32_t u = 0; u < c->n_edge_use; u++) {
         if (c->edge_use[u].mate >= 0) continue;
-        n_half++;
-        pal_union_find_join(parent, pal_cells_face_of(c, u), pal_cells_face_of(c, pal_cells_across_edge(c, u)));
-        if (seen[u]) continue;
-        n_vertex++;
-        int32_t at = u;
-        do {
-            seen[at] = true;
-            at = pal_cells_across_edge(c, pal_cells_prev(c, at));
-        } while (at != u);
+        n_side++;
+        pal_union_find_join(label, pal_cells_face_of(c, u), pal_cells_face_of(c, pal_cells_across_edge(c, u)));
     }
-    for (int32_t f = 0; f < c->n_face; f++) out->n_sheet += parent[f] == f;
-    out->sheet_euler = n_vertex - n_half / 2 + c->n_boundary_face;
+    for (int32_t f = 0; f < c->n_face; f++) t.n_sheet += label[f] == f && pal_cells_face_boundary(c, f);
+    free(label);
+    t.sheet_euler = c->n_boundary_fan - n_side / 2 + c->n_boundary_face;
+    t.n_cavity = t.n_sheet - t.n_piece;
+    t.genus = (int32_t)(t.n_sheet - t.sheet_euler / 2);
+    *out = t;
+    return PAL_ERR_OK;
 }
-
-pal_err pal_cells_find_topology(const pal_cells *cells, pal_cells_topology *out)
-{
-    const pal_cells *c = cells;
-    pal_cells_topology t = {.euler = (int64_t)c->n_vertex - c->n_edge + c->n_face - c->n_cell};
-    size_t n = (size_t)(c->n_face > c->n_cell ? c->n_face : c->n_cell);
-    pal_err err = PAL_ERR_OK;
-    int32_t *parent;
-    bool *seen;
-    PAL_ARRAY(&err, parent, n);
-    PAL_ZEROED(&err, seen, c->n_edge_use);
-    if (!err) {
-        t.n_piece = pal_cells_label(c, parent);
-        walk_sheets(c, parent, seen, &t);
-        t.n_cavity = t.n_sheet - t.n_piece;
-        t.genus = (int32_t)(t.n_sheet - t.sheet_euler / 2);
-        *out = t;
-    }
-    PAL_FREE(parent, seen);
-    return err;
-}
-
-/* ---- the boundary as triangles ---- */
 
 /* the corner from which a fan of triangles covers the face best */
 static int fan_corner(const pal_cells *c, int32_t face)
@@ -106,9 +81,8 @@ static void write_triangles(const pal_cells *c, const int32_t *number, pal_surfa
     }
 }
 
-pal_err pal_cells_boundary(const pal_cells *cells, pal_surface *out, int32_t **vertex, int32_t **face)
+pal_err pal_cells_boundary(const pal_cells *c, pal_surface *out, int32_t **vertex, int32_t **face)
 {
-    const pal_cells *c = cells;
     pal_surface s = {0};
     for (int32_t v = 0; v < c->n_vertex; v++) s.n_vertex += c->vertex_boundary[v];
     for (int32_t f = 0; f < c->n_face; f++) {
@@ -137,6 +111,5 @@ pal_err pal_cells_boundary(const pal_cells *cells, pal_surface *out, int32_t **v
     } else {
         pal_surface_free(&s);
     }
-    PAL_FREE(number, old, of);
-    return err;
+    return PAL_FREED(err, number, old, of);
 }

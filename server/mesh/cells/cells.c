@@ -4,9 +4,6 @@
 #include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/tuning.h"
-#include "server/num/sort.h"
-
-/* ---- arrays ---- */
 
 enum { N_ARRAY = 22 };
 
@@ -74,8 +71,6 @@ pal_err pal_cells_copy(const pal_cells *from, pal_cells *to)
     return err;
 }
 
-/* ---- loops ---- */
-
 void pal_cell_loops_free(pal_cell_loops *loops)
 {
     PAL_FREE(loops->x, loops->cell, loops->loop, loops->corner, loops->vertex_sharpness, loops->edge_tag,
@@ -127,6 +122,12 @@ void pal_cell_loops_corners(pal_cell_loops *l, const int32_t *vertex, int n)
     }
 }
 
+void pal_cell_loops_quad(pal_cell_loops *l, float sharp, int32_t a, int32_t b, int32_t c, int32_t d)
+{
+    pal_cell_loops_face(l, sharp);
+    pal_cell_loops_corners(l, (const int32_t[]){a, b, c, d}, 4);
+}
+
 void pal_cell_loops_edge(pal_cell_loops *l, int32_t a, int32_t b, float sharp)
 {
     if (sharp > 0 && ROOM(l, edge_tag, l->n_edge_tag)) l->edge_tag[l->n_edge_tag++] = (pal_cell_tag){a, b, sharp};
@@ -144,9 +145,17 @@ void pal_cell_loops_hex(pal_cell_loops *l, const int32_t vertex[8])
     }
 }
 
-void pal_cell_loops_append(pal_cell_loops *l, const pal_cells *c, const int32_t *map)
+static bool is_edge_kept(const pal_cells *c, const bool *keep, int32_t e)
+{
+    int32_t k = c->edge_cell.start[e], after = c->edge_cell.start[e + 1];
+    while (k < after && !keep[c->edge_cell.item[k]]) k++;
+    return k < after;
+}
+
+void pal_cell_loops_append(pal_cell_loops *l, const pal_cells *c, const bool *keep, const int32_t *map)
 {
     for (int32_t i = 0; i < c->n_cell; i++) {
+        if (keep && !keep[i]) continue;
         pal_cell_loops_cell(l);
         for (int32_t f = c->cell_use[i]; f < c->cell_use[i + 1]; f++) {
             pal_cell_loops_face(l, c->face[c->face_use[f].face].sharp);
@@ -156,6 +165,7 @@ void pal_cell_loops_append(pal_cell_loops *l, const pal_cells *c, const int32_t 
     }
     for (int32_t e = 0; e < c->n_edge; e++) {
         const int32_t *end = c->edge[e].vertex;
+        if (keep && !is_edge_kept(c, keep, e)) continue;
         pal_cell_loops_edge(l, map ? map[end[0]] : end[0], map ? map[end[1]] : end[1], c->edge[e].sharp);
     }
 }
@@ -168,13 +178,14 @@ pal_err pal_cell_loops_finish(pal_cell_loops *l, pal_cells *out, pal_diagnostic 
     return err;
 }
 
-pal_err pal_cells_loops(const pal_cells *cells, pal_cell_loops *out)
+pal_err pal_cells_loops(const pal_cells *cells, const bool *keep, pal_cell_loops *out, int32_t *kept)
 {
     pal_cell_loops l = {0};
     for (int32_t v = 0; v < cells->n_vertex; v++)
         pal_cell_loops_vertex(&l, cells->x + 3 * (size_t)v, cells->vertex_sharpness[v]);
-    pal_cell_loops_append(&l, cells, NULL);
+    pal_cell_loops_append(&l, cells, keep, NULL);
     pal_err err = l.err;
+    if (!err && keep) err = pal_cell_loops_drop_unused(&l, kept);
     if (err)
         pal_cell_loops_free(&l);
     else
@@ -182,102 +193,28 @@ pal_err pal_cells_loops(const pal_cells *cells, pal_cell_loops *out)
     return err;
 }
 
-typedef struct side {
-    int32_t low, high;
-} side;
-
-static int compare_sides(const void *a, const void *b)
+pal_err pal_cell_loops_drop_unused(pal_cell_loops *l, int32_t *kept)
 {
-    const side *p = a, *q = b;
-    return p->low != q->low ? PAL_COMPARE(p->low, q->low) : PAL_COMPARE(p->high, q->high);
-}
-
-static side make_side(int32_t v, int32_t w)
-{
-    return v < w ? (side){v, w} : (side){w, v};
-}
-
-/* keeps the tags of edges that some loop still has; sides [corners] is scratch */
-static void keep_edge_tags(pal_cell_loops *l, side *sides)
-{
-    int32_t n_loop = l->cell[l->n_cell], n_kept = 0;
-    if (l->n_edge_tag == 0) return;
-    for (int32_t i = 0; i < n_loop; i++)
-        for (int32_t k = l->loop[i]; k < l->loop[i + 1]; k++)
-            sides[k] = make_side(l->corner[k], l->corner[k + 1 < l->loop[i + 1] ? k + 1 : l->loop[i]]);
-    qsort(sides, (size_t)l->loop[n_loop], sizeof *sides, compare_sides);
-    for (int32_t t = 0; t < l->n_edge_tag; t++) {
-        side want = make_side(l->edge_tag[t].a, l->edge_tag[t].b);
-        if (!bsearch(&want, sides, (size_t)l->loop[n_loop], sizeof *sides, compare_sides)) continue;
-        if (l->tag_line) l->tag_line[n_kept] = l->tag_line[t];
-        l->edge_tag[n_kept++] = l->edge_tag[t];
-    }
-    l->n_edge_tag = n_kept;
-}
-
-/* compacts the kept cells, their loops, corners, lines and face tags; number [loops + 1] is scratch */
-static void keep_cells(pal_cell_loops *l, const bool *keep, int32_t *number)
-{
-    int32_t n_cell = 0, n_loop = 0, n_corner = 0, n_tag = 0;
-    for (int32_t i = 0; i < l->n_cell; i++) {
-        int32_t first = l->cell[i], end = l->cell[i + 1];
-        for (int32_t k = first; k < end; k++) number[k] = -1;
-        if (!keep[i]) continue;
-        /* starts of later cells and loops are still the old ones: nothing moves up */
-        for (int32_t k = first; k < end; k++) {
-            int32_t from = l->loop[k], n = l->loop[k + 1] - from;
-            memmove(l->corner + n_corner, l->corner + from, (size_t)n * sizeof *l->corner);
-            if (l->line) l->line[n_loop] = l->line[k];
-            number[k] = n_loop;
-            l->loop[n_loop++] = n_corner;
-            n_corner += n;
-        }
-        l->cell[n_cell++] = n_loop - (end - first);
-    }
-    for (int32_t t = 0; t < l->n_face_tag; t++) {
-        int32_t k = number[l->face_tag[t].a];
-        if (k >= 0) l->face_tag[n_tag++] = (pal_cell_tag){k, 0, l->face_tag[t].sharp};
-    }
-    l->n_face_tag = n_tag, l->n_cell = n_cell;
-    l->cell[n_cell] = n_loop, l->loop[n_loop] = n_corner;
-}
-
-pal_err pal_cell_loops_keep(pal_cell_loops *loops, const bool *keep, int32_t *kept)
-{
-    pal_cell_loops *l = loops;
-    size_t n_loop = (size_t)l->cell[l->n_cell], n_number = (size_t)l->n_vertex + 1;
-    if (n_loop + 1 > n_number) n_number = n_loop + 1;
     pal_err err = PAL_ERR_OK;
-    int32_t *number;
-    side *sides;
-    PAL_ZEROED(&err, number, n_number);
-    PAL_ARRAY(&err, sides, l->loop[n_loop]);
-    if (err) {
-        PAL_FREE(number, sides);
-        return err;
-    }
-    if (keep) keep_cells(l, keep, number);
-    keep_edge_tags(l, sides);
-    int32_t n_corner = l->loop[l->cell[l->n_cell]], n = 0;
-    memset(number, 0, n_number * sizeof *number);
-    for (int32_t k = 0; k < n_corner; k++) number[l->corner[k]] = 1;
+    int32_t *number, n = 0;
+    PAL_ZEROED(&err, number, l->n_vertex);
+    if (err) return err;
+    for (int32_t k = 0; k < l->n_corner; k++) number[l->corner[k]] = 1;
     for (int32_t v = 0; v < l->n_vertex; v++) {
         if (!number[v]) continue;
-        memmove(l->x + 3 * (size_t)n, l->x + 3 * (size_t)v, 3 * sizeof *l->x);
-        if (l->vertex_sharpness) l->vertex_sharpness[n] = l->vertex_sharpness[v];
+        pal_copy3(l->x + 3 * (size_t)n, l->x + 3 * (size_t)v);
+        l->vertex_sharpness[n] = l->vertex_sharpness[v];
         if (l->vertex_line) l->vertex_line[n] = l->vertex_line[v];
         if (kept) kept[n] = v;
         number[v] = n++;
     }
-    for (int32_t k = 0; k < n_corner; k++) l->corner[k] = number[l->corner[k]];
+    for (int32_t k = 0; k < l->n_corner; k++) l->corner[k] = number[l->corner[k]];
     for (int32_t t = 0; t < l->n_edge_tag; t++)
         l->edge_tag[t].a = number[l->edge_tag[t].a], l->edge_tag[t].b = number[l->edge_tag[t].b];
     l->n_vertex = n;
-    PAL_FREE(number, sides);
+    free(number);
     return PAL_ERR_OK;
 }
-
-/* ---- measures ---- */
 
 void pal_cells_use_centre(const pal_cells *c, const double *x, int32_t face_use, double out[3])
 {
@@ -324,27 +261,28 @@ void pal_cells_face_area(const pal_cells *cells, const double *x, int32_t face, 
     use_area(cells, x ? x : cells->x, cells->face[face].use[0], out);
 }
 
-/* six times the volume of the cone from o over a face use, as triangles about the mean of its corners */
-static double cone(const pal_cells *c, const double *x, int32_t face_use, const double o[3])
+double pal_cells_cone(const double *x, const int32_t *corner, int stride, int n, const double o[3])
 {
-    int32_t first = c->face_use[face_use].first_use, end = c->face_use[face_use + 1].first_use;
-    double centre[3], n[3], sum = 0;
-    pal_cells_use_centre(c, x, face_use, centre);
+    double centre[3] = {0}, normal[3], sum = 0;
+    for (int k = 0; k < n; k++) pal_add3(centre, centre, x + 3 * (size_t)corner[k * stride]);
+    pal_scale3(centre, 1.0 / n, centre);
     pal_sub3(centre, centre, o);
-    for (int32_t u = first; u < end; u++) {
-        pal_normal3(n, o, x + 3 * (size_t)c->edge_use[u].vertex,
-                    x + 3 * (size_t)c->edge_use[u + 1 < end ? u + 1 : first].vertex);
-        sum += pal_dot3(n, centre);
+    for (int k = 0; k < n; k++) {
+        pal_normal3(normal, o, x + 3 * (size_t)corner[k * stride],
+                    x + 3 * (size_t)corner[(k + 1 < n ? k + 1 : 0) * stride]);
+        sum += pal_dot3(normal, centre);
     }
     return sum;
 }
 
-double pal_cells_cell_volume(const pal_cells *cells, const double *x, int32_t cell)
+double pal_cells_cell_volume(const pal_cells *c, const double *x, int32_t cell)
 {
-    const double *p = x ? x : cells->x;
+    const double *p = x ? x : c->x;
     double o[3], sum = 0;
-    pal_cells_cell_centre(cells, p, cell, o);
-    for (int32_t l = cells->cell_use[cell]; l < cells->cell_use[cell + 1]; l++) sum += cone(cells, p, l, o);
+    const int stride = sizeof *c->edge_use / sizeof c->edge_use->vertex;
+    pal_cells_cell_centre(c, p, cell, o);
+    for (const pal_face_use *f = c->face_use + c->cell_use[cell]; f < c->face_use + c->cell_use[cell + 1]; f++)
+        sum += pal_cells_cone(p, &c->edge_use[f->first_use].vertex, stride, f[1].first_use - f->first_use, o);
     return sum / 6;
 }
 
@@ -355,9 +293,8 @@ double pal_cells_volume(const pal_cells *cells, const double *x)
     return sum;
 }
 
-bool pal_cells_shape_valid(const pal_cells *cells, const double *x, pal_cells_fault *fault)
+bool pal_cells_shape_valid(const pal_cells *c, const double *x, pal_cells_fault *fault)
 {
-    const pal_cells *c = cells;
     const double *p = x ? x : c->x;
     pal_cells_fault f = {.cell = -1, .face_use = -1};
     for (int32_t k = 0; k < c->n_face && f.cell < 0; k++) {

@@ -18,8 +18,6 @@
 #define PAL_MESH_CELLS_CELLS_H
 #include "server/mesh/geometry/surface.h"
 
-#include <stddef.h>
-
 enum { PAL_CELL_LOOP_MAX = 256 }; /* corners of a face */
 #define PAL_SHARPNESS_MAX 1e6f    /* maximum sharpness: as many levels of subdivision */
 
@@ -82,6 +80,7 @@ typedef struct pal_cell_rows {
 typedef struct pal_cells {
     int32_t n_vertex, n_edge, n_face, n_cell, n_face_use, n_edge_use;
     int32_t n_boundary_face, n_pinched_edge, n_pinched_vertex;
+    int32_t n_boundary_fan;  /* closed fans of boundary faces around the vertices: one at each, more at a pinched one */
     double *x;               /* position, m                                       [n_vertex][3]     */
     float *vertex_sharpness; /* as edges' sharp                                   [n_vertex]        */
     bool *vertex_boundary;   /* of a boundary face                                [n_vertex]        */
@@ -110,29 +109,32 @@ void pal_cells_free(pal_cells *cells);
 /* deep copy; MEMORY */
 pal_err pal_cells_copy(const pal_cells *from, pal_cells *to);
 
-/* the complex as loops again, loop l being face use l, with tags of everything that is not smooth (a face has one for
- * each of its loops, so that a loop may be removed), lines NULL; MEMORY */
-pal_err pal_cells_loops(const pal_cells *cells, pal_cell_loops *out);
+/* the complex as loops again, of all cells or of those with keep [n_cell] true and their vertices, with tags of
+ * everything that is not smooth (a face has one for each of its loops, so that a loop may be removed), lines NULL. keep
+ * NULL: loop l is face use l. kept [n_vertex] (may be NULL) receives the old number of each vertex that stays; MEMORY
+ */
+pal_err pal_cells_loops(const pal_cells *cells, const bool *keep, pal_cell_loops *out, int32_t *kept);
 void pal_cell_loops_free(pal_cell_loops *loops);
 /* Loops one by one, from a zeroed struct: a vertex, whose number is returned; the next cell; its next face with its
- * sharpness; the face's next corners; the sharpness of an edge, unless it is 0. The arrays grow. The first error is
- * kept in err (MEMORY, BUDGET: too many), after which nothing is added. */
+ * sharpness; the face's next corners; a face of four; the sharpness of an edge, unless it is 0. The arrays grow. The
+ * first error is kept in err (MEMORY, BUDGET: too many), after which nothing is added. */
 int32_t pal_cell_loops_vertex(pal_cell_loops *loops, const double x[3], float sharp);
 void pal_cell_loops_cell(pal_cell_loops *loops);
 void pal_cell_loops_face(pal_cell_loops *loops, float sharp);
 void pal_cell_loops_corners(pal_cell_loops *loops, const int32_t *vertex, int n);
+void pal_cell_loops_quad(pal_cell_loops *loops, float sharp, int32_t a, int32_t b, int32_t c, int32_t d);
 void pal_cell_loops_edge(pal_cell_loops *loops, int32_t a, int32_t b, float sharp);
 /* the faces of a hexahedron with corner c at bits 0, 1, 2 of three right-handed directions, as the next cell; loop 2 a
  * + s is its side s of direction a */
 extern const int32_t pal_cell_hex_loop[6][4];
 void pal_cell_loops_hex(pal_cell_loops *loops, const int32_t vertex[8]);
-/* all cells and edges of a complex, vertices renumbered by map [n_vertex] (NULL: unchanged) */
-void pal_cell_loops_append(pal_cell_loops *loops, const pal_cells *cells, const int32_t *map);
+/* all cells of a complex, or those with keep [n_cell] true, and their edges; vertices are renumbered by map [n_vertex]
+ * (NULL: unchanged) */
+void pal_cell_loops_append(pal_cell_loops *loops, const pal_cells *cells, const bool *keep, const int32_t *map);
 /* builds the complex from them unless there was an error, and frees them in any case */
 pal_err pal_cell_loops_finish(pal_cell_loops *loops, pal_cells *out, pal_diagnostic *diag);
-/* Removes the cells with keep [n_cell] false (NULL: none), then unused vertices and tags; in place. kept [n_vertex
- * before] (may be NULL) receives the old number of each vertex that stays. MEMORY */
-pal_err pal_cell_loops_keep(pal_cell_loops *loops, const bool *keep, int32_t *kept);
+/* removes the vertices of no loop; kept as above. MEMORY */
+pal_err pal_cell_loops_drop_unused(pal_cell_loops *loops, int32_t *kept);
 
 /* the first face without area or cell without positive volume, relative to its size */
 typedef struct pal_cells_fault {
@@ -149,6 +151,8 @@ void pal_cells_cell_centre(const pal_cells *cells, const double *x, int32_t cell
 void pal_cells_use_centre(const pal_cells *cells, const double *x, int32_t face_use, double out[3]); /* x not NULL */
 /* vector area, m^2, out of the face's first cell */
 void pal_cells_face_area(const pal_cells *cells, const double *x, int32_t face, double out[3]);
+/* six times the volume of the cone from o over a loop of n corners, each `stride` numbers after the one before */
+double pal_cells_cone(const double *x, const int32_t *corner, int stride, int n, const double o[3]);
 double pal_cells_cell_volume(const pal_cells *cells, const double *x, int32_t cell); /* m^3 */
 double pal_cells_volume(const pal_cells *cells, const double *x);
 

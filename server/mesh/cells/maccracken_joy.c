@@ -12,8 +12,6 @@
 #include "server/mesh/geometry/tuning.h"
 
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 /* one level in the making: the old cells, the rows, and where each new kind of vertex begins */
 typedef struct level {
@@ -32,8 +30,7 @@ static level level_of(const pal_cells *c)
     return l;
 }
 
-/* ---- weights: s times a point, added to the open row ---- */
-
+/* weights: s times a point, added to the open row */
 static void add_mid(const level *l, int32_t e, double s)
 {
     for (int k = 0; k < 2; k++) pal_interpolation_builder_add(l->row, l->c->edge[e].vertex[k], s / 2);
@@ -98,8 +95,7 @@ static int32_t face_corner(const pal_cells *c, int32_t face, int32_t vertex)
     return use;
 }
 
-/* ---- the four rules; s is the weight that the row's other rules leave ---- */
-
+/* the four rules; s is the weight that the row's other rules leave */
 static void cell_rule(const level *l, int32_t cell)
 {
     const int32_t *start = l->c->cell_vertex.start + cell;
@@ -135,20 +131,31 @@ static void boundary_edge(const level *l, int32_t e, double s)
     }
 }
 
+static int32_t row_length(const pal_cell_rows *rows, int32_t i)
+{
+    return rows->start[i + 1] - rows->start[i];
+}
+
+/* weight s for each item of a row */
+static void add_row(const level *l, void (*add)(const level *l, int32_t item, double s), const pal_cell_rows *rows,
+                    int32_t i, double s)
+{
+    for (int32_t k = rows->start[i]; k < rows->start[i + 1]; k++) add(l, rows->item[k], s);
+}
+
 static void inner_edge(const level *l, int32_t e, double s)
 {
     const pal_cells *c = l->c;
-    int32_t n = c->edge_face.start[e + 1] - c->edge_face.start[e];
-    int32_t n_cell = c->edge_cell.start[e + 1] - c->edge_cell.start[e];
-    for (int32_t k = c->edge_cell.start[e]; k < c->edge_cell.start[e + 1]; k++) {
-        int32_t cell = c->edge_cell.item[k];
-        if (!l->averaging) add_cell(l, cell, s / n / n_cell);
-        for (int end = 0; end < 2 && l->averaging; end++)
-            add_part(l, cell, corner_of(c, cell, c->edge[e].vertex[end]), s / (2 * n_cell));
+    int32_t n = row_length(&c->edge_face, e), n_cell = row_length(&c->edge_cell, e);
+    if (l->averaging) {
+        for (int32_t k = 0; k < 2 * n_cell; k++) {
+            int32_t cell = c->edge_cell.item[c->edge_cell.start[e] + k / 2];
+            add_part(l, cell, corner_of(c, cell, c->edge[e].vertex[k % 2]), s / (2 * n_cell));
+        }
+        return;
     }
-    if (l->averaging) return;
-    for (int32_t k = c->edge_face.start[e]; k < c->edge_face.start[e + 1]; k++)
-        add_face(l, c->edge_face.item[k], 2 * s / n / n);
+    add_row(l, add_cell, &c->edge_cell, e, s / n / n_cell);
+    add_row(l, add_face, &c->edge_face, e, 2 * s / n / n);
     add_mid(l, e, s * (n - 3) / n);
 }
 
@@ -158,10 +165,7 @@ static void edge_rule(const level *l, int32_t e)
     double sharp = edge->pinched ? 1 : fmin(edge->sharp, 1);
     if (sharp > 0) add_mid(l, e, sharp);
     if (sharp >= 1) return;
-    if (edge->boundary)
-        boundary_edge(l, e, 1 - sharp);
-    else
-        inner_edge(l, e, 1 - sharp);
+    (edge->boundary ? boundary_edge : inner_edge)(l, e, 1 - sharp);
 }
 
 static void boundary_vertex(const level *l, int32_t v, double s)
@@ -187,19 +191,13 @@ static void boundary_vertex(const level *l, int32_t v, double s)
 static void inner_vertex(const level *l, int32_t v, double s)
 {
     const pal_cells *c = l->c;
-    const pal_cell_rows *cells = &c->vertex_cell, *faces = &c->vertex_face, *edges = &c->vertex_edge;
-    int32_t n_cell = cells->start[v + 1] - cells->start[v], n_face = faces->start[v + 1] - faces->start[v];
-    int32_t n_edge = edges->start[v + 1] - edges->start[v];
-    for (int32_t k = cells->start[v]; k < cells->start[v + 1]; k++) {
-        int32_t cell = cells->item[k];
-        if (l->averaging)
-            add_part(l, cell, corner_of(c, cell, v), s / n_cell);
-        else
-            add_cell(l, cell, s / 8 / n_cell);
-    }
+    int32_t first = c->vertex_cell.start[v], n_cell = row_length(&c->vertex_cell, v);
+    for (int32_t k = first; l->averaging && k < first + n_cell; k++)
+        add_part(l, c->vertex_cell.item[k], corner_of(c, c->vertex_cell.item[k], v), s / n_cell);
     if (l->averaging) return;
-    for (int32_t k = faces->start[v]; k < faces->start[v + 1]; k++) add_face(l, faces->item[k], 3 * s / 8 / n_face);
-    for (int32_t k = edges->start[v]; k < edges->start[v + 1]; k++) add_mid(l, edges->item[k], 3 * s / 8 / n_edge);
+    add_row(l, add_cell, &c->vertex_cell, v, s / 8 / n_cell);
+    add_row(l, add_face, &c->vertex_face, v, 3 * s / 8 / row_length(&c->vertex_face, v));
+    add_row(l, add_mid, &c->vertex_edge, v, 3 * s / 8 / row_length(&c->vertex_edge, v));
     pal_interpolation_builder_add(l->row, v, s / 8);
 }
 
@@ -244,10 +242,7 @@ static void vertex_rule(const level *l, int32_t v)
         for (int k = 0; k < 2; k++) add_mid(l, at.edge[k], on / 4);
     }
     if (smooth <= 0) return;
-    if (c->vertex_boundary[v])
-        boundary_vertex(l, v, smooth);
-    else
-        inner_vertex(l, v, smooth);
+    (c->vertex_boundary[v] ? boundary_vertex : inner_vertex)(l, v, smooth);
 }
 
 /* the level's rows, in the order of the new vertices */
@@ -271,18 +266,10 @@ static pal_err make_rows(const pal_cells *c, bool averaging, int64_t max_entry, 
     return pal_interpolation_builder_finish(&build, out);
 }
 
-/* ---- the new cells ---- */
-
 /* sharpness that remains a level later */
 static float after(float s)
 {
     return s >= PAL_SHARPNESS_MAX ? PAL_SHARPNESS_MAX : s > 1 ? s - 1 : 0;
-}
-
-static void add_part_quad(pal_cell_loops *to, float sharp, int32_t a, int32_t b, int32_t c, int32_t d)
-{
-    pal_cell_loops_face(to, sharp);
-    pal_cell_loops_corners(to, (const int32_t[]){a, b, c, d}, 4);
 }
 
 /* The level's loops but for positions, with both halves of sharp edges and all parts of sharp faces, and the origins of
@@ -300,16 +287,16 @@ static void add_loops(const pal_subdivision *from, pal_cell_loops *to, int32_t *
             do {
                 int32_t before = pal_cells_prev(c, use), f = pal_cells_face_of(c, use);
                 loop_origin[to->n_loop] = from->face_origin[f];
-                add_part_quad(to, after(c->face[f].sharp), v, l.first_edge + c->edge_use[use].edge, l.first_face + f,
-                              l.first_edge + c->edge_use[before].edge);
+                pal_cell_loops_quad(to, after(c->face[f].sharp), v, l.first_edge + c->edge_use[use].edge,
+                                    l.first_face + f, l.first_edge + c->edge_use[before].edge);
                 use = pal_cells_next_around(c, use);
             } while (use != first);
             /* the inner quads cross the edges: from the face on their left to the one on their right */
             do {
                 int32_t right = pal_cells_face_of(c, c->edge_use[use].radial), f = pal_cells_face_of(c, use);
                 loop_origin[to->n_loop] = -1;
-                add_part_quad(to, 0, l.first_edge + c->edge_use[use].edge, l.first_face + right, l.first_cell + cell,
-                              l.first_face + f);
+                pal_cell_loops_quad(to, 0, l.first_edge + c->edge_use[use].edge, l.first_face + right,
+                                    l.first_cell + cell, l.first_face + f);
                 use = pal_cells_next_around(c, use);
             } while (use != first);
         }
@@ -318,8 +305,6 @@ static void add_loops(const pal_subdivision *from, pal_cell_loops *to, int32_t *
             pal_cell_loops_edge(to, c->edge[e].vertex[end], l.first_edge + e, after(c->edge[e].sharp));
     for (int32_t v = 0; v < c->n_vertex; v++) to->vertex_sharpness[v] = after(c->vertex_sharpness[v]);
 }
-
-/* ---- level after level ---- */
 
 /* memory of a complex of so many edge uses, about: that of bricks inside a solid, and half as much more for loops,
  * origins and tables while it is made */
@@ -335,8 +320,8 @@ static double rows_bytes(double entries)
 
 static pal_err refuse(double byte, double budget, int at, const pal_subdivision_options *o, pal_diagnostic *diag)
 {
-    static const char format[] = "subdivision: level %d of %d needs %.4g MiB, the budget is %.4g MiB: ask for fewer "
-                                 "levels";
+    static const char format[] =
+        "subdivision: level %d of %d needs %.4g MiB, the budget is %.4g MiB: ask for fewer levels";
     return pal_diagnostic_set(diag, PAL_ERR_BUDGET, format, at, o->n_level, byte / 1048576, budget / 1048576);
 }
 
@@ -361,8 +346,7 @@ static pal_err make_level(const pal_subdivision *s, const pal_interpolation *ste
     PAL_ARRAY(&err, next->face_origin, next->cells.n_face);
     for (int32_t u = 0; !err && u < next->cells.n_face_use; u++)
         next->face_origin[next->cells.face_use[u].face] = loop_origin[u];
-    free(loop_origin);
-    return err;
+    return PAL_FREED(err, loop_origin);
 }
 
 /* replaces s by its next level; s is unchanged on failure */
@@ -416,9 +400,9 @@ pal_err pal_subdivision_make(const pal_cells *control, const pal_subdivision_opt
     pal_subdivision s = {0};
     double budget = (double)(options->budget_byte ? options->budget_byte : HIERARCHY_BUDGET_BYTE);
     if (options->n_level < 0 || options->n_level > PAL_SUBDIVISION_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "subdivision: %d levels asked for, 0 to %d are made",
-                                  options->n_level, PAL_SUBDIVISION_MAX);
-    if (control->n_cell < 1) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "subdivision: there is no cell");
+        return PAL_REFUSE(diag, "subdivision: %d levels asked for, 0 to %d are made", options->n_level,
+                          PAL_SUBDIVISION_MAX);
+    if (control->n_cell < 1) return PAL_REFUSE(diag, "subdivision: there is no cell");
     double byte = bytes_of(control->n_edge_use, true);
     if (byte > budget) return refuse(byte, budget, 0, options, diag);
     pal_err err = begin(control, &s);

@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -66,14 +67,14 @@ pal_err pal_file_begin(pal_file_out *out, const char *path, pal_diagnostic *diag
     return pal_diagnostic_set(diag, PAL_ERR_MEMORY, "%s: no memory for a stream", path);
 }
 
-pal_err pal_file_end(pal_file_out *out, pal_err err, pal_diagnostic *diag)
+pal_err pal_file_end(pal_file_out *out, pal_diagnostic *diag)
 {
     bool bad = ferror(out->file) != 0;
     bad |= fclose(out->file) != 0;
     out->file = NULL;
-    if (!err && (bad || rename(out->temporary, out->path)))
-        err = pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s", out->path, strerror(errno));
-    if (err) unlink(out->temporary);
+    if (!bad && !rename(out->temporary, out->path)) return PAL_ERR_OK;
+    pal_err err = pal_diagnostic_set(diag, PAL_ERR_IO, "%s: %s", out->path, strerror(errno));
+    unlink(out->temporary);
     return err;
 }
 
@@ -82,23 +83,17 @@ pal_err pal_file_write(const char *path, const void *bytes, size_t n_byte, pal_d
     pal_file_out out;
     PAL_TRY(pal_file_begin(&out, path, diag));
     if (n_byte) fwrite(bytes, 1, n_byte, out.file);
-    return pal_file_end(&out, PAL_ERR_OK, diag);
-}
-
-void pal_file_put_number(FILE *file, double value)
-{
-    char text[40];
-    snprintf(text, sizeof text, "%.17g", value);
-    for (char *c = text; *c; c++)
-        if (*c == ',') *c = '.';
-    fputs(text, file);
+    return pal_file_end(&out, diag);
 }
 
 void pal_file_put_line(FILE *file, const double *value, int n)
 {
     for (int k = 0; k < n; k++) {
-        pal_file_put_number(file, value[k]);
-        fputc(k + 1 < n ? ' ' : '\n', file);
+        char text[40];
+        snprintf(text, sizeof text, "%.17g%c", value[k], k + 1 < n ? ' ' : '\n');
+        for (char *c = text; *c; c++)
+            if (*c == ',') *c = '.';
+        fputs(text, file);
     }
 }
 
@@ -116,11 +111,12 @@ void pal_file_printable_name(char out[128], const char *name)
         if ((unsigned char)*c < 0x20 || *c == 0x7F) *c = '?';
 }
 
-pal_err pal_file_refuse(pal_diagnostic *diag, const char *name, const char *unit, int64_t at, const char *format,
-                        va_list list)
+pal_err pal_file_refuse(pal_diagnostic *diag, const char *name, const char *unit, int64_t at, const char *format, ...)
 {
-    if (!diag) return PAL_ERR_REFUSED;
     char sentence[320];
+    va_list list;
+    va_start(list, format);
     vsnprintf(sentence, sizeof sentence, format, list);
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s %lld: %s", name, unit, (long long)at, sentence);
+    va_end(list);
+    return PAL_REFUSE(diag, "%s: %s %lld: %s", name, unit, (long long)at, sentence);
 }

@@ -4,7 +4,6 @@
 #define PAL_MESH_FILES_FILE_BYTES_H
 #include "server/base/err.h"
 
-#include <stdarg.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -21,11 +20,10 @@ typedef struct pal_file_out {
 } pal_file_out;
 
 pal_err pal_file_begin(pal_file_out *out, const char *path, pal_diagnostic *diag);
-/* closes; with err == 0 and every write good the file takes its name, else the temporary one is removed. IO or err */
-pal_err pal_file_end(pal_file_out *out, pal_err err, pal_diagnostic *diag);
+/* closes; with every write good the file takes its name, else the temporary one is removed; IO */
+pal_err pal_file_end(pal_file_out *out, pal_diagnostic *diag);
 
-/* writes a number with 17 digits, which read back equal, and a decimal point whatever the locale; or a line of n */
-void pal_file_put_number(FILE *file, double value);
+/* writes a line of n numbers of 17 digits, which read back equal, with a decimal point whatever the locale */
 void pal_file_put_line(FILE *file, const double *value, int n);
 /* does the name end like this, in any case? */
 bool pal_file_ends_with(const char *name, const char *tail);
@@ -33,6 +31,6 @@ bool pal_file_ends_with(const char *name, const char *tail);
 /* the name as messages show it: printable, one line, its end when it is long */
 void pal_file_printable_name(char out[128], const char *name);
 /* REFUSED with "NAME: UNIT AT: sentence"; unit is "line" or "byte", diag may be NULL */
-pal_err pal_file_refuse(pal_diagnostic *diag, const char *name, const char *unit, int64_t at, const char *format,
-                        va_list list) __attribute__((format(printf, 5, 0)));
+pal_err pal_file_refuse(pal_diagnostic *diag, const char *name, const char *unit, int64_t at, const char *format, ...)
+    __attribute__((format(printf, 5, 6)));
 #endif

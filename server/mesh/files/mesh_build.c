@@ -2,19 +2,9 @@
 #include "server/mesh/files/mesh_build.h"
 
 #include "server/base/heap.h"
-#include "server/mesh/files/file_bytes.h"
 
 /* three corners of this many triangles still count in an int32 */
 static const size_t max_piece = 700000000;
-
-pal_err pal_mesh_refuse(pal_mesh_build *build, int64_t at, const char *format, ...)
-{
-    va_list list;
-    va_start(list, format);
-    pal_err err = pal_file_refuse(build->diag, build->name, build->binary ? "byte" : "line", at, format, list);
-    va_end(list);
-    return err;
-}
 
 /* room for one more piece of three numbers; pointer: address of the array's pointer */
 static pal_err grow(pal_mesh_build *build, void *pointer, size_t n, size_t size)
@@ -37,7 +27,7 @@ pal_err pal_mesh_position(pal_mesh_build *build, pal_text_scan *scan, const char
     double p[3];
     for (int a = 0; a < 3; a++)
         if (!pal_text_double(scan, &p[a]))
-            return pal_mesh_refuse(build, scan->line, "%s needs three numbers, found %s", what,
+            return PAL_MESH_REFUSE(build, scan->line, "%s needs three numbers, found %s", what,
                                    pal_text_excerpt_at(scan).text);
     return pal_mesh_vertex(build, p);
 }
@@ -61,7 +51,7 @@ void pal_mesh_fan_begin(pal_mesh_build *build, int64_t at)
 pal_err pal_mesh_fan_corner(pal_mesh_build *build, int64_t at, int64_t index)
 {
     if (index < 0 || index > INT32_MAX - 1)
-        return pal_mesh_refuse(build, at, "a face uses vertex index %lld", (long long)index);
+        return PAL_MESH_REFUSE(build, at, "a face uses vertex index %lld", (long long)index);
     if (index > build->max_index) {
         build->max_index = index;
         build->max_index_at = at;

@@ -2,7 +2,7 @@
  * name the file and the position. Private to the readers of this room. Thread: [load]. */
 #ifndef PAL_MESH_FILES_MESH_BUILD_H
 #define PAL_MESH_FILES_MESH_BUILD_H
-#include "server/base/err.h"
+#include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/text_scan.h"
 
 typedef struct pal_mesh_build {
@@ -22,8 +22,8 @@ typedef struct pal_mesh_build {
 } pal_mesh_build;
 
 /* REFUSED with "NAME: line AT: sentence" or "NAME: byte AT: sentence" */
-pal_err pal_mesh_refuse(pal_mesh_build *build, int64_t at, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
+#define PAL_MESH_REFUSE(build, at, ...)                                                                                \
+    pal_file_refuse((build)->diag, (build)->name, (build)->binary ? "byte" : "line", (at), __VA_ARGS__)
 
 /* BUDGET, MEMORY */
 pal_err pal_mesh_vertex(pal_mesh_build *build, const double p[3]);

@@ -5,7 +5,6 @@
 #include "server/mesh/files/file_bytes.h"
 #include "server/mesh/files/mesh_build.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 /* no file is read beyond this */
@@ -27,12 +26,12 @@ static reader *choose(const char *name, const uint8_t *bytes, size_t n_byte)
 
 static pal_err parse(pal_mesh_build *build)
 {
-    if (build->n_byte == 0) return pal_mesh_refuse(build, 0, "the file is empty");
+    if (build->n_byte == 0) return PAL_MESH_REFUSE(build, 0, "the file is empty");
     reader *read = choose(build->name, build->bytes, build->n_byte);
-    if (!read) return pal_mesh_refuse(build, 0, "neither OBJ, STL, PLY nor OFF");
+    if (!read) return PAL_MESH_REFUSE(build, 0, "neither OBJ, STL, PLY nor OFF");
     PAL_TRY(read(build));
     if (build->max_index >= (int64_t)build->n_vertex)
-        return pal_mesh_refuse(build, build->max_index_at,
+        return PAL_MESH_REFUSE(build, build->max_index_at,
                                "a face uses vertex index %lld (from 0) of only %zu vertices",
                                (long long)build->max_index, build->n_vertex);
     return PAL_ERR_OK;
@@ -45,7 +44,7 @@ static pal_err finish(pal_mesh_build *build, const pal_mesh_file_options *option
     if (options->weld >= 0) {
         pal_diagnostic reason = {{0}};
         pal_err err = pal_surface_clean(s, options->weld, report, &reason);
-        if (err == PAL_ERR_REFUSED) return pal_mesh_refuse(build, build->first_at, "%s", reason.text);
+        if (err == PAL_ERR_REFUSED) return PAL_MESH_REFUSE(build, build->first_at, "%s", reason.text);
         if (err) return pal_diagnostic_set(build->diag, err, "%s: %s", build->name, reason.text);
     }
     double low[3], high[3], unit = options->unit_m;

@@ -7,11 +7,9 @@
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "files are written in the host's order");
 
-static pal_err write_ply(const char *path, const pal_surface *surface, pal_diagnostic *diag)
+static void write_ply(FILE *file, const pal_surface *surface)
 {
-    pal_file_out out;
-    PAL_TRY(pal_file_begin(&out, path, diag));
-    fprintf(out.file,
+    fprintf(file,
             "ply\nformat binary_little_endian 1.0\ncomment metres\nelement vertex %d\nproperty float x\n"
             "property float y\nproperty float z\nelement face %d\nproperty list uchar int vertex_indices\n"
             "end_header\n",
@@ -19,14 +17,13 @@ static pal_err write_ply(const char *path, const pal_surface *surface, pal_diagn
     for (size_t i = 0; i < (size_t)surface->n_vertex; i++) {
         float p[3];
         for (size_t a = 0; a < 3; a++) p[a] = (float)(surface->x[3 * i + a] + surface->origin_m[a]);
-        fwrite(p, sizeof p, 1, out.file);
+        fwrite(p, sizeof p, 1, file);
     }
     for (size_t t = 0; t < (size_t)surface->n_tri; t++) {
         uint8_t row[13] = {3};
         memcpy(row + 1, surface->tri + 3 * t, 12);
-        fwrite(row, sizeof row, 1, out.file);
+        fwrite(row, sizeof row, 1, file);
     }
-    return pal_file_end(&out, PAL_ERR_OK, diag);
 }
 
 /* writes a number and a blank at p and returns the end; about ten times as fast as printf */
@@ -92,35 +89,30 @@ static void write_corners(FILE *file, const int32_t *corner, int n_row, size_t n
     }
 }
 
-static pal_err write_obj(const char *path, const pal_surface *surface, pal_diagnostic *diag)
+static void write_obj(FILE *file, const pal_surface *surface)
 {
-    pal_file_out out;
     char row[160];
-    PAL_TRY(pal_file_begin(&out, path, diag));
-    fprintf(out.file, "# metres\n");
+    fprintf(file, "# metres\n");
     for (size_t i = 0; i < (size_t)surface->n_vertex; i++) {
         char *p = row + 2;
         row[0] = 'v', row[1] = ' ';
         for (size_t a = 0; a < 3; a++) p = put_metres(p, surface->x[3 * i + a] + surface->origin_m[a], false);
-        end_row(out.file, row, p);
+        end_row(file, row, p);
     }
     for (size_t t = 0; t < (size_t)surface->n_tri; t++) {
         char *p = row + 2;
         row[0] = 'f', row[1] = ' ';
         for (size_t k = 0; k < 3; k++) p = put_int(p, (int64_t)surface->tri[3 * t + k] + 1);
-        end_row(out.file, row, p);
+        end_row(file, row, p);
     }
-    return pal_file_end(&out, PAL_ERR_OK, diag);
 }
 
-static pal_err write_stl(const char *path, const pal_surface *surface, pal_diagnostic *diag)
+static void write_stl(FILE *file, const pal_surface *surface)
 {
-    pal_file_out out;
-    PAL_TRY(pal_file_begin(&out, path, diag));
     char head[80] = "binary, metres";
     uint32_t n_tri = (uint32_t)surface->n_tri;
-    fwrite(head, sizeof head, 1, out.file);
-    fwrite(&n_tri, sizeof n_tri, 1, out.file);
+    fwrite(head, sizeof head, 1, file);
+    fwrite(&n_tri, sizeof n_tri, 1, file);
     for (size_t t = 0; t < (size_t)surface->n_tri; t++) {
         double normal[3];
         float row[12];
@@ -134,19 +126,26 @@ static pal_err write_stl(const char *path, const pal_surface *surface, pal_diagn
         }
         uint8_t packed[50] = {0};
         memcpy(packed, row, sizeof row);
-        fwrite(packed, sizeof packed, 1, out.file);
+        fwrite(packed, sizeof packed, 1, file);
     }
-    return pal_file_end(&out, PAL_ERR_OK, diag);
 }
 
 pal_err pal_mesh_file_write(const char *path, const pal_surface *surface, pal_diagnostic *diag)
 {
+    static const struct {
+        const char *tail;
+        void (*write)(FILE *file, const pal_surface *surface);
+    } known[] = {{".ply", write_ply}, {".obj", write_obj}, {".stl", write_stl}};
+    for (size_t k = 0; k < sizeof known / sizeof *known; k++) {
+        pal_file_out out;
+        if (!pal_file_ends_with(path, known[k].tail)) continue;
+        PAL_TRY(pal_file_begin(&out, path, diag));
+        known[k].write(out.file, surface);
+        return pal_file_end(&out, diag);
+    }
     char shown[128];
-    if (pal_file_ends_with(path, ".ply")) return write_ply(path, surface, diag);
-    if (pal_file_ends_with(path, ".obj")) return write_obj(path, surface, diag);
-    if (pal_file_ends_with(path, ".stl")) return write_stl(path, surface, diag);
     pal_file_printable_name(shown, path);
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: surfaces are written to .ply, .obj or .stl files", shown);
+    return PAL_REFUSE(diag, "%s: surfaces are written to .ply, .obj or .stl files", shown);
 }
 
 pal_err pal_mesh_file_write_tetgen(const char *stem, const pal_tets *tets, pal_diagnostic *diag)
@@ -168,7 +167,7 @@ pal_err pal_mesh_file_write_tetgen(const char *stem, const pal_tets *tets, pal_d
             fprintf(out.file, "%d 1\n", tets->n_face);
             write_corners(out.file, tets->face, tets->n_face, 3, true);
         }
-        PAL_TRY(pal_file_end(&out, PAL_ERR_OK, diag));
+        PAL_TRY(pal_file_end(&out, diag));
     }
     return PAL_ERR_OK;
 }

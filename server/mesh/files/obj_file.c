@@ -38,15 +38,15 @@ static bool read_corner(pal_text_scan *scan, int64_t *index)
 
 static pal_err read_face(pal_mesh_build *build, pal_text_scan *scan)
 {
-    if (!pal_text_more(scan)) return pal_mesh_refuse(build, scan->line, "a face without corners");
+    if (!pal_text_more(scan)) return PAL_MESH_REFUSE(build, scan->line, "a face without corners");
     pal_mesh_fan_begin(build, scan->line);
     while (pal_text_more(scan)) {
         int64_t index;
         if (!read_corner(scan, &index))
-            return pal_mesh_refuse(build, scan->line, "a face corner is %s", pal_text_excerpt_at(scan).text);
-        if (index == 0) return pal_mesh_refuse(build, scan->line, "a face uses vertex 0, the first is 1");
+            return PAL_MESH_REFUSE(build, scan->line, "a face corner is %s", pal_text_excerpt_at(scan).text);
+        if (index == 0) return PAL_MESH_REFUSE(build, scan->line, "a face uses vertex 0, the first is 1");
         if (index < 0 && -index > (int64_t)build->n_vertex)
-            return pal_mesh_refuse(build, scan->line, "a face uses vertex %lld, only %zu came before", (long long)index,
+            return PAL_MESH_REFUSE(build, scan->line, "a face uses vertex %lld, only %zu came before", (long long)index,
                                    build->n_vertex);
         PAL_TRY(pal_mesh_fan_corner(build, scan->line, index < 0 ? (int64_t)build->n_vertex + index : index - 1));
     }
@@ -58,7 +58,7 @@ static pal_err skip_line(pal_mesh_build *build, pal_text_scan *scan)
 {
     for (const uint8_t *p = scan->at; p < scan->end && *p != '\n' && *p != '\r'; p++)
         if (*p < 0x20 && *p != '\t' && *p != '\v' && *p != '\f')
-            return pal_mesh_refuse(build, scan->line, "byte 0x%02x in a text file", *p);
+            return PAL_MESH_REFUSE(build, scan->line, "byte 0x%02x in a text file", *p);
     return PAL_ERR_OK;
 }
 
@@ -77,6 +77,6 @@ pal_err pal_obj_parse(pal_mesh_build *build)
             PAL_TRY(skip_line(build, &scan));
     } while (pal_text_next_line(&scan));
     if (build->n_tri == 0)
-        return pal_mesh_refuse(build, scan.line, "the file ends after %zu positions without a face", build->n_vertex);
+        return PAL_MESH_REFUSE(build, scan.line, "the file ends after %zu positions without a face", build->n_vertex);
     return PAL_ERR_OK;
 }

@@ -33,12 +33,12 @@ static pal_err read_counts(pal_mesh_build *build, pal_text_scan *scan, int64_t n
     static const char *const what[2] = {"vertices", "faces"};
     for (int k = 0; k < 2; k++) {
         if (!pal_text_seek(scan) || !pal_text_int(scan, &n[k]) || n[k] < 0)
-            return pal_mesh_refuse(build, scan->line, "the number of %s is %s", what[k],
+            return PAL_MESH_REFUSE(build, scan->line, "the number of %s is %s", what[k],
                                    pal_text_excerpt_at(scan).text);
         /* a vertex takes at least six bytes, a face at least two */
         int64_t max = (scan->end - scan->at) / (k == 0 ? 6 : 2) + 1;
         if (n[k] > max)
-            return pal_mesh_refuse(build, scan->line, "claims %lld %s, but only %lld bytes follow", (long long)n[k],
+            return PAL_MESH_REFUSE(build, scan->line, "claims %lld %s, but only %lld bytes follow", (long long)n[k],
                                    what[k], (long long)(scan->end - scan->at));
     }
     return PAL_ERR_OK;
@@ -51,7 +51,7 @@ static pal_err read_vertices(pal_mesh_build *build, pal_text_scan *scan, int64_t
         snprintf(what, sizeof what, "vertex %lld", (long long)i);
         pal_text_next_line(scan);
         if (!pal_text_seek(scan))
-            return pal_mesh_refuse(build, scan->line, "the file ends after %lld of %lld vertices", (long long)i,
+            return PAL_MESH_REFUSE(build, scan->line, "the file ends after %lld of %lld vertices", (long long)i,
                                    (long long)n);
         PAL_TRY(pal_mesh_position(build, scan, what));
     }
@@ -62,12 +62,12 @@ static pal_err read_face(pal_mesh_build *build, pal_text_scan *scan, int64_t fac
 {
     int64_t n, index;
     if (!pal_text_int(scan, &n) || n < 0)
-        return pal_mesh_refuse(build, scan->line, "face %lld begins with %s, not its number of corners",
+        return PAL_MESH_REFUSE(build, scan->line, "face %lld begins with %s, not its number of corners",
                                (long long)face, pal_text_excerpt_at(scan).text);
     pal_mesh_fan_begin(build, scan->line);
     for (int64_t k = 0; k < n; k++) {
         if (!pal_text_int(scan, &index))
-            return pal_mesh_refuse(build, scan->line, "corner %lld of %lld of face %lld is %s", (long long)k + 1,
+            return PAL_MESH_REFUSE(build, scan->line, "corner %lld of %lld of face %lld is %s", (long long)k + 1,
                                    (long long)n, (long long)face, pal_text_excerpt_at(scan).text);
         PAL_TRY(pal_mesh_fan_corner(build, scan->line, index));
     }
@@ -79,17 +79,17 @@ pal_err pal_off_parse(pal_mesh_build *build)
     build->format = "off";
     build->binary = false;
     pal_text_scan scan = {.at = build->bytes, .end = build->bytes + build->n_byte, .line = 1, .hash = true};
-    if (take_header(&scan) < 0) return pal_mesh_refuse(build, scan.line, "only three-dimensional text OFF is read");
+    if (take_header(&scan) < 0) return PAL_MESH_REFUSE(build, scan.line, "only three-dimensional text OFF is read");
     int64_t n[2];
     PAL_TRY(read_counts(build, &scan, n));
     PAL_TRY(read_vertices(build, &scan, n[0]));
     for (int64_t face = 0; face < n[1]; face++) {
         pal_text_next_line(&scan);
         if (!pal_text_seek(&scan))
-            return pal_mesh_refuse(build, scan.line, "the file ends after %lld of %lld faces", (long long)face,
+            return PAL_MESH_REFUSE(build, scan.line, "the file ends after %lld of %lld faces", (long long)face,
                                    (long long)n[1]);
         PAL_TRY(read_face(build, &scan, face));
     }
-    if (build->n_tri == 0) return pal_mesh_refuse(build, scan.line, "the file has no face");
+    if (build->n_tri == 0) return PAL_MESH_REFUSE(build, scan.line, "the file has no face");
     return PAL_ERR_OK;
 }

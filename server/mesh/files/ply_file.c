@@ -56,7 +56,7 @@ static bool take_type(pal_text_scan *scan, pal_scalar *out)
 static pal_err refuse_header(ply *p, const char *what)
 {
     p->build->binary = false;
-    return pal_mesh_refuse(p->build, p->scan.line, "%s, found %s", what, pal_text_excerpt_at(&p->scan).text);
+    return PAL_MESH_REFUSE(p->build, p->scan.line, "%s, found %s", what, pal_text_excerpt_at(&p->scan).text);
 }
 
 static pal_err read_format(ply *p)
@@ -149,13 +149,13 @@ static pal_err take_value(ply *p, pal_scalar type, double *out)
 {
     if (p->ascii) {
         if (pal_text_seek(&p->scan) && pal_text_double(&p->scan, out)) return PAL_ERR_OK;
-        if (p->scan.at == p->scan.end) return pal_mesh_refuse(p->build, p->scan.line, "the file ends inside the body");
-        return pal_mesh_refuse(p->build, p->scan.line, "expected a number, found %s",
+        if (p->scan.at == p->scan.end) return PAL_MESH_REFUSE(p->build, p->scan.line, "the file ends inside the body");
+        return PAL_MESH_REFUSE(p->build, p->scan.line, "expected a number, found %s",
                                pal_text_excerpt_at(&p->scan).text);
     }
     const uint8_t *end = p->build->bytes + p->build->n_byte;
     if (end - p->at < pal_scalar_size(type))
-        return pal_mesh_refuse(p->build, place(p), "the file ends inside the body");
+        return PAL_MESH_REFUSE(p->build, place(p), "the file ends inside the body");
     *out = pal_scalar_at(p->at, type, p->big);
     p->at += pal_scalar_size(type);
     return PAL_ERR_OK;
@@ -192,7 +192,7 @@ static pal_err read_indices(ply *p, const element *e, const property *q, int64_t
         PAL_TRY(take_value(p, q->type, &value));
         int64_t at = p->ascii ? p->scan.line : place(p) - pal_scalar_size(q->type);
         if (!(fabs(value) < 4294967296.0) || value != floor(value))
-            return pal_mesh_refuse(p->build, at, "vertex index %g is no whole number in range", value);
+            return PAL_MESH_REFUSE(p->build, at, "vertex index %g is no whole number in range", value);
         if (e->what == STRIP)
             PAL_TRY(strip_corner(p, at, value, last, &n_strip));
         else
@@ -207,11 +207,11 @@ static pal_err read_list(ply *p, const element *e, const property *q)
     int64_t at = place(p);
     PAL_TRY(take_value(p, q->count_type, &count));
     if (!(count >= 0 && count < 4294967296.0) || count != floor(count))
-        return pal_mesh_refuse(p->build, at, "a list of %g entries", count);
+        return PAL_MESH_REFUSE(p->build, at, "a list of %g entries", count);
     int64_t n = (int64_t)count,
             left = (p->ascii ? p->scan.end : p->build->bytes + p->build->n_byte) - (p->ascii ? p->scan.at : p->at);
     if (n > left / (p->ascii ? 2 : pal_scalar_size(q->type)))
-        return pal_mesh_refuse(p->build, at, "a list of %lld entries, but only %lld bytes follow", (long long)n,
+        return PAL_MESH_REFUSE(p->build, at, "a list of %lld entries, but only %lld bytes follow", (long long)n,
                                (long long)left);
     if (q->use == INDICES) return read_indices(p, e, q, n);
     if (!p->ascii) {
@@ -245,7 +245,7 @@ static pal_err read_rows(ply *p, const element *e)
     /* in text a value takes at least two bytes, its blank included (the very last one may lack it) */
     int64_t max = p->ascii ? (end - at + 1) / 2 / e->n : (end - at) / e->min;
     if (e->n_row > max)
-        return pal_mesh_refuse(p->build, place(p), "the header claims %lld rows, but at most %lld fit in the rest",
+        return PAL_MESH_REFUSE(p->build, place(p), "the header claims %lld rows, but at most %lld fit in the rest",
                                (long long)e->n_row, (long long)max);
     for (int64_t row = 0; row < e->n_row; row++) PAL_TRY(read_row(p, e));
     return PAL_ERR_OK;
@@ -263,10 +263,10 @@ static pal_err check_header(ply *p)
         n_vertex += e->what == VERTEX;
         n_face += use[INDICES];
         if (e->what == VERTEX && (use[X] != 1 || use[Y] != 1 || use[Z] != 1))
-            return pal_mesh_refuse(p->build, e->line, "the vertex element needs x, y and z once each");
+            return PAL_MESH_REFUSE(p->build, e->line, "the vertex element needs x, y and z once each");
     }
-    if (n_vertex != 1) return pal_mesh_refuse(p->build, 1, "the header declares %d vertex elements", n_vertex);
-    if (n_face == 0) return pal_mesh_refuse(p->build, 1, "the header declares no faces");
+    if (n_vertex != 1) return PAL_MESH_REFUSE(p->build, 1, "the header declares %d vertex elements", n_vertex);
+    if (n_face == 0) return PAL_MESH_REFUSE(p->build, 1, "the header declares no faces");
     return PAL_ERR_OK;
 }
 
@@ -278,7 +278,7 @@ static pal_err read_ply(ply *p)
     p->scan.line = line;
     p->build->binary = !p->ascii;
     for (int i = 0; i < p->n_element; i++) PAL_TRY(read_rows(p, &p->elements[i]));
-    if (p->build->n_tri == 0) return pal_mesh_refuse(p->build, place(p), "the file has no face");
+    if (p->build->n_tri == 0) return PAL_MESH_REFUSE(p->build, place(p), "the file has no face");
     return PAL_ERR_OK;
 }
 

@@ -36,11 +36,11 @@ static pal_err parse_binary(pal_mesh_build *build)
     build->format = "stl binary";
     build->binary = true;
     if (build->n_byte < HEAD)
-        return pal_mesh_refuse(build, (int64_t)build->n_byte, "the file ends inside the 84 byte head");
+        return PAL_MESH_REFUSE(build, (int64_t)build->n_byte, "the file ends inside the 84 byte head");
     size_t n_tri = triangle_count(build->bytes), room = (build->n_byte - HEAD) / RECORD;
-    if (n_tri == 0) return pal_mesh_refuse(build, 80, "the file has no triangle");
+    if (n_tri == 0) return PAL_MESH_REFUSE(build, 80, "the file has no triangle");
     if (n_tri > room)
-        return pal_mesh_refuse(build, 80, "claims %zu triangles, but the file ends after %zu", n_tri, room);
+        return PAL_MESH_REFUSE(build, 80, "claims %zu triangles, but the file ends after %zu", n_tri, room);
     for (size_t t = 0; t < n_tri; t++) {
         const uint8_t *record = build->bytes + HEAD + RECORD * t + 12;
         int64_t at = (int64_t)(HEAD + RECORD * t);
@@ -64,7 +64,7 @@ static pal_err read_loop(pal_mesh_build *build, pal_text_scan *scan)
         PAL_TRY(pal_mesh_fan_corner(build, scan->line, (int64_t)build->n_vertex - 1));
     }
     if (!pal_text_is(scan, "endloop"))
-        return pal_mesh_refuse(build, scan->line, "expected vertex or endloop, found %s",
+        return PAL_MESH_REFUSE(build, scan->line, "expected vertex or endloop, found %s",
                                pal_text_excerpt_at(scan).text);
     return pal_mesh_fan_end(build);
 }
@@ -85,17 +85,17 @@ static pal_err parse_ascii(pal_mesh_build *build)
             open = true;
         } else if (pal_text_is(&scan, "outer")) {
             if (!pal_text_is(&scan, "loop"))
-                return pal_mesh_refuse(build, scan.line, "expected loop, found %s", pal_text_excerpt_at(&scan).text);
+                return PAL_MESH_REFUSE(build, scan.line, "expected loop, found %s", pal_text_excerpt_at(&scan).text);
             PAL_TRY(read_loop(build, &scan));
         } else if (pal_text_is(&scan, "endfacet")) {
             open = false;
         } else {
-            return pal_mesh_refuse(build, scan.line, "expected facet or endsolid, found %s",
+            return PAL_MESH_REFUSE(build, scan.line, "expected facet or endsolid, found %s",
                                    pal_text_excerpt_at(&scan).text);
         }
     }
-    if (open) return pal_mesh_refuse(build, scan.line, "the file ends inside a facet");
-    if (build->n_tri == 0) return pal_mesh_refuse(build, scan.line, "the file has no facet");
+    if (open) return PAL_MESH_REFUSE(build, scan.line, "the file ends inside a facet");
+    if (build->n_tri == 0) return PAL_MESH_REFUSE(build, scan.line, "the file has no facet");
     return PAL_ERR_OK;
 }
 

@@ -22,7 +22,6 @@ static bool is_blank(uint8_t c)
     return c == ' ' || c == '\t' || c == '\v' || c == '\f';
 }
 
-/* steps over one line end at the scan */
 static void take_line_end(pal_text_scan *scan)
 {
     bool two = scan->end - scan->at > 1 && scan->at[0] == '\r' && scan->at[1] == '\n';

@@ -55,17 +55,15 @@ static pal_err check_fields(const pal_vtk_field *field, int n, const char *path,
 {
     for (int f = 0; f < n; f++)
         if (field[f].n_component != 1 && field[f].n_component != 3)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: field %.60s has %d components, not 1 or 3", path,
-                                      field[f].name, field[f].n_component);
+            return PAL_REFUSE(diag, "%s: field %.60s has %d components, not 1 or 3", path, field[f].name,
+                              field[f].n_component);
     return PAL_ERR_OK;
 }
 
-pal_err pal_mesh_write_vtk(const char *path, const pal_vtk_grid *grid, pal_diagnostic *diag)
+pal_err pal_mesh_write_vtk(const char *path, const pal_vtk_grid *g, pal_diagnostic *diag)
 {
-    const pal_vtk_grid *g = grid;
     pal_file_out out;
-    if (!cell_type(g->n_corner))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: elements of %d corners", path, g->n_corner);
+    if (!cell_type(g->n_corner)) return PAL_REFUSE(diag, "%s: elements of %d corners", path, g->n_corner);
     PAL_TRY(check_fields(g->point, g->n_point, path, diag));
     PAL_TRY(check_fields(g->cell, g->n_cell, path, diag));
     PAL_TRY(pal_file_begin(&out, path, diag));
@@ -81,5 +79,5 @@ pal_err pal_mesh_write_vtk(const char *path, const pal_vtk_grid *grid, pal_diagn
     write_cells(out.file, g);
     write_fields(out.file, "POINT_DATA", g->point, g->n_point, g->n_node);
     write_fields(out.file, "CELL_DATA", g->cell, g->n_cell, g->n_element);
-    return pal_file_end(&out, PAL_ERR_OK, diag);
+    return pal_file_end(&out, diag);
 }

@@ -9,10 +9,6 @@
 #include "server/mesh/geometry/kd_tree.h"
 #include "server/mesh/geometry/tuning.h"
 
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
 enum { LEAF = 4, STACK = 128 };
 
 typedef struct node {
@@ -69,10 +65,7 @@ static void measure_leaf(const builder *b, node *to)
         pal_add3(middle, middle, g);
         to->area += area;
     }
-    if (to->area > 0)
-        pal_scale3(to->centre, 1 / to->area, to->centre);
-    else
-        pal_scale3(to->centre, 1.0 / to->n_item, middle);
+    pal_scale3(to->centre, to->area > 0 ? 1 / to->area : 1.0 / to->n_item, to->area > 0 ? to->centre : middle);
     find_radius(to);
 }
 

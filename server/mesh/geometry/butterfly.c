@@ -11,6 +11,7 @@
 #include "server/num/sort.h"
 
 #include <math.h>
+#include <stdbool.h>
 
 double pal_butterfly_ring(int K, int i)
 {
@@ -65,20 +66,9 @@ typedef struct entries {
     pal_stencil_entry *item;
 } entries;
 
-static void set_entry(entries *to, int32_t vertex, double weight)
-{
-    if (weight != 0) to->item[to->n++] = (pal_stencil_entry){vertex, weight};
-}
-
-/* adds to the entry of this vertex, for the few of the short rules */
 static void add(entries *to, int32_t vertex, double weight)
 {
-    int k = 0;
-    while (k < to->n && to->item[k].vertex != vertex) k++;
-    if (k == to->n)
-        set_entry(to, vertex, weight);
-    else
-        to->item[k].weight += weight;
+    if (weight != 0) to->item[to->n++] = (pal_stencil_entry){vertex, weight};
 }
 
 /* third vertex of the face on one side of an edge */
@@ -115,19 +105,19 @@ static void end_rule(const pal_winged_mesh *w, int32_t e, int32_t v, double shar
 {
     fan f = fan_of(w, e, v);
     if (!f.rim) {
-        set_entry(to, v, 0.75 * share);
+        add(to, v, 0.75 * share);
         int32_t at = e;
         for (int i = 0; i < f.n_edge; i++, at = pal_wing_next_around(w->edge, at, v))
-            set_entry(to, pal_wing_other_end(w->edge, at, v), share * pal_butterfly_ring(f.n_edge, i));
+            add(to, pal_wing_other_end(w->edge, at, v), share * pal_butterfly_ring(f.n_edge, i));
         return;
     }
     int k = f.n_edge - 1, place = 0;
     int32_t at = f.first;
     while (at != e) at = pal_wing_next_around(w->edge, at, v), place++;
-    set_entry(to, v, share * pal_butterfly_boundary(k, place, -1));
+    add(to, v, share * pal_butterfly_boundary(k, place, -1));
     at = f.first;
     for (int j = 0; j <= k; j++, at = pal_wing_next_around(w->edge, at, v))
-        set_entry(to, pal_wing_other_end(w->edge, at, v), share * pal_butterfly_boundary(k, place, j));
+        add(to, pal_wing_other_end(w->edge, at, v), share * pal_butterfly_boundary(k, place, j));
 }
 
 /* the four-point rule; the boundary ends at its corners */
@@ -175,8 +165,8 @@ int pal_butterfly_stencil(const pal_winged_mesh *wings, int32_t e, pal_stencil_e
     if (at->face[1] < 0)
         boundary_rule(wings, e, &to);
     else if (is_corner(wings, a) || is_corner(wings, b)) {
-        set_entry(&to, a, 0.5);
-        set_entry(&to, b, 0.5);
+        add(&to, a, 0.5);
+        add(&to, b, 0.5);
     } else {
         fan left = fan_of(wings, e, a), right = fan_of(wings, e, b);
         bool odd_a = !is_regular(&left), odd_b = !is_regular(&right);

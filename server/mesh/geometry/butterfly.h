@@ -7,7 +7,6 @@
  * of faces. Thread: [any], no state. */
 #ifndef PAL_MESH_GEOMETRY_BUTTERFLY_H
 #define PAL_MESH_GEOMETRY_BUTTERFLY_H
-#include <stdbool.h>
 #include <stdint.h>
 
 typedef struct pal_winged_edge {
@@ -57,6 +56,6 @@ typedef struct pal_stencil_entry {
     double weight;
 } pal_stencil_entry;
 /* The stencil of the midpoint of edge e, vertices ascending and each once; returns the number of entries. Weights sum
- * to 1. entry has room for 8 and for K + 1 more of each end of K edges that is irregular. */
+ * to 1. entry has room for 16 and for K + 1 more of each end of K edges that is irregular. */
 int pal_butterfly_stencil(const pal_winged_mesh *wings, int32_t e, pal_stencil_entry *entry);
 #endif

@@ -22,14 +22,10 @@ typedef struct lattice {
     size_t n_vertex, n_tri;
 } lattice;
 
-static int64_t corner_id(const lattice *l, const int64_t c[3])
+/* number of the low corner, or of the centre, of a cell */
+static int64_t point_id(const lattice *l, const int64_t c[3], bool centre)
 {
-    return (c[2] * (l->n[1] + 1) + c[1]) * (l->n[0] + 1) + c[0];
-}
-
-static int64_t centre_id(const lattice *l, const int64_t c[3])
-{
-    return l->n_corner + (c[2] * l->n[1] + c[1]) * l->n[0] + c[0];
+    return (centre ? l->n_corner : 0) + (c[2] * (l->n[1] + !centre) + c[1]) * (l->n[0] + !centre) + c[0];
 }
 
 static void position(const lattice *l, int64_t id, double p[3])
@@ -70,7 +66,6 @@ static size_t slot_of(const lattice *l, uint64_t key)
     return slot;
 }
 
-/* makes the hash twice as large */
 static bool rehash(lattice *l)
 {
     lattice old = *l;
@@ -153,9 +148,9 @@ static bool march_face(lattice *l, const int64_t c[3], int d)
 {
     /* the face's corners in order, then the centres on both sides */
     int64_t step[3] = {1, l->n[0] + 1, (l->n[0] + 1) * (l->n[1] + 1)}, before[3] = {c[0], c[1], c[2]};
-    int64_t u = step[(d + 1) % 3], v = step[(d + 2) % 3], first = corner_id(l, c);
+    int64_t u = step[(d + 1) % 3], v = step[(d + 2) % 3], first = point_id(l, c, false);
     before[d]--;
-    const int64_t id[6] = {first, first + u, first + u + v, first + v, centre_id(l, before), centre_id(l, c)};
+    const int64_t id[6] = {first, first + u, first + u + v, first + v, point_id(l, before, true), point_id(l, c, true)};
     int inside[6], sum = 0;
     for (int k = 0; k < 6; k++) sum += inside[k] = l->value[id[k]] > 0;
     if (sum == 0 || sum == 6) return true;
@@ -207,6 +202,6 @@ pal_err pal_contour(pal_contour_field *field, const void *self, const pal_contou
         return PAL_ERR_OK;
     }
     PAL_FREE(l.x, l.tri);
-    return good ? pal_diagnostic_set(diag, PAL_ERR_REFUSED, "contour of a field that is positive nowhere")
+    return good ? PAL_REFUSE(diag, "contour of a field that is positive nowhere")
                 : pal_diagnostic_set(diag, PAL_ERR_MEMORY, "no memory for a contour of %.3g points", n_point);
 }

@@ -185,7 +185,6 @@ static bool keeps_orientation(const pass *p, int32_t u, int32_t other, int32_t r
     return true;
 }
 
-/* collapses u into v if that is allowed */
 static bool collapse(pass *p, int32_t u, int32_t v)
 {
     int32_t ru[MAX_RING][2], rv[MAX_RING][2];
@@ -365,6 +364,5 @@ pal_err pal_surface_decimate(pal_surface *surface, int n_tri)
     } else {
         pal_surface_free(&work);
     }
-    PAL_FREE(p.q, p.remap, p.locked, p.edge, p.cost, p.order);
-    return err;
+    return PAL_FREED(err, p.q, p.remap, p.locked, p.edge, p.cost, p.order);
 }

@@ -5,8 +5,6 @@
 #include "server/base/heap.h"
 #include "server/base/vec3.h"
 
-#include <stdbool.h>
-
 enum { LEAF = 8 };
 
 struct pal_kd_tree {
@@ -124,15 +122,11 @@ static void descend(query *q, int low, int high)
     int middle = low + (high - low) / 2, axis = q->tree->axis[middle];
     double to_plane = q->p[axis] - q->tree->x[3 * (size_t)middle + axis];
     consider(q, middle);
-    bool first_low = to_plane < 0;
-    for (int side = 0; side < 2; side++) {
-        bool far_side = side == 1;
+    for (int far = 0; far < 2; far++) {
+        bool lower = (to_plane < 0) != far;
         /* equal distances count, so that ties go to the smaller index wherever it is stored */
-        if (far_side && q->found == q->k && to_plane * to_plane > q->distance2[q->k - 1]) return;
-        if (first_low != far_side)
-            descend(q, low, middle - 1);
-        else
-            descend(q, middle + 1, high);
+        if (far && q->found == q->k && to_plane * to_plane > q->distance2[q->k - 1]) return;
+        descend(q, lower ? low : middle + 1, lower ? middle - 1 : high);
     }
 }
 

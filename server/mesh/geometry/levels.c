@@ -6,9 +6,6 @@
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/tuning.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 #define OFFER "prepare it as voxels: palpate prepare"
 
 void pal_levels_free(pal_levels *l)
@@ -18,36 +15,29 @@ void pal_levels_free(pal_levels *l)
     memset(l, 0, sizeof *l);
 }
 
-/* ---- checks before any edge is known ---- */
-
 static pal_err check_face(const pal_surface *s, int t, pal_diagnostic *diag)
 {
     const int32_t *c = s->tri + 3 * (size_t)t;
     for (int k = 0; k < 3; k++) {
         if (c[k] < 0 || c[k] >= s->n_vertex)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: triangle %d has vertex %d, there are %d", t, c[k],
-                                      s->n_vertex);
-        if (c[k] == c[(k + 1) % 3])
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: triangle %d has vertex %d twice", t, c[k]);
+            return PAL_REFUSE(diag, "levels: triangle %d has vertex %d, there are %d", t, c[k], s->n_vertex);
+        if (c[k] == c[(k + 1) % 3]) return PAL_REFUSE(diag, "levels: triangle %d has vertex %d twice", t, c[k]);
     }
     double longest = 0, n[3];
     for (int k = 0; k < 3; k++)
         longest = fmax(longest, pal_dist3(s->x + 3 * (size_t)c[k], s->x + 3 * (size_t)c[(k + 1) % 3]));
     pal_normal3(n, s->x + 3 * (size_t)c[0], s->x + 3 * (size_t)c[1], s->x + 3 * (size_t)c[2]);
     if (pal_norm3(n) > LEVEL_FLAT * longest * longest) return PAL_ERR_OK;
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                              "levels: triangle %d (vertices %d, %d, %d) has no area: clean the surface", t, c[0], c[1],
-                              c[2]);
+    return PAL_REFUSE(diag, "levels: triangle %d (vertices %d, %d, %d) has no area: clean the surface", t, c[0], c[1],
+                      c[2]);
 }
 
 static pal_err check_input(const pal_surface *s, const pal_levels_options *o, pal_diagnostic *diag)
 {
     if (o->n_level < 1 || o->n_level > PAL_LEVELS_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: %d levels asked for, 1 to %d are made", o->n_level,
-                                  PAL_LEVELS_MAX);
+        return PAL_REFUSE(diag, "levels: %d levels asked for, 1 to %d are made", o->n_level, PAL_LEVELS_MAX);
     if (s->n_tri < 1 || s->n_vertex < 3)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: a surface of %d vertices and %d triangles",
-                                  s->n_vertex, s->n_tri);
+        return PAL_REFUSE(diag, "levels: a surface of %d vertices and %d triangles", s->n_vertex, s->n_tri);
     if (s->n_tri > INT32_MAX / 8 || s->n_vertex > INT32_MAX / 8)
         return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "levels: %d vertices and %d triangles, at most %d are taken",
                                   s->n_vertex, s->n_tri, INT32_MAX / 8);
@@ -55,57 +45,59 @@ static pal_err check_input(const pal_surface *s, const pal_levels_options *o, pa
         const double *x = s->x + 3 * (size_t)v;
         for (int a = 0; a < 3; a++)
             if (!(fabs(x[a]) <= MAX_COORDINATE_M))
-                return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: vertex %d stands at (%g, %g, %g) m", v, x[0],
-                                          x[1], x[2]);
+                return PAL_REFUSE(diag, "levels: vertex %d stands at (%g, %g, %g) m", v, x[0], x[1], x[2]);
     }
     for (int t = 0; t < s->n_tri; t++) PAL_TRY(check_face(s, t, diag));
     return PAL_ERR_OK;
 }
 
-/* ---- edges of the coarse surface ---- */
+/* what the coarse surface gives: its edges with their ends and faces, the edges of its faces, room for the largest
+ * stencil (no vertex has more edges than 3 n_tri) */
+typedef struct coarse {
+    const pal_surface *s;
+    pal_winged_edge *edge;    /* [3 n_tri]      */
+    int32_t *face_edge;       /* [3 n_tri]      */
+    pal_stencil_entry *entry; /* [6 n_tri + 16] */
+    int32_t n_edge;
+    int64_t irregular; /* K (K + 1), summed over irregular vertices of K edges */
+    pal_diagnostic *diag;
+} coarse;
 
 /* one edge of a vertex from its n sides; the first gives its direction */
-static pal_err make_edge(const pal_surface *s, int32_t low, const pal_surface_side *side, int n, int32_t e,
-                         pal_winged_edge *edge, int32_t *face_edge, pal_diagnostic *diag)
+static pal_err make_edge(coarse *c, int32_t low, const pal_surface_side *side, int n)
 {
-    int32_t high = side->high, a = s->tri[side->corner];
+    int32_t high = side->high, a = c->s->tri[side->corner];
     if (n > 2)
-        return pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED,
-            "levels: %d triangles (%d, %d, %d%s) share the edge of vertices %d and %d, a surface has two "
-            "at most; " OFFER,
-            n, side[0].corner / 3, side[1].corner / 3, side[2].corner / 3, n > 3 ? ", ..." : "", low, high);
-    if (n == 2 && s->tri[side[1].corner] == a)
-        return pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED,
-            "levels: triangles %d and %d run the same way through the edge of vertices %d and %d: turn "
-            "one over, or " OFFER,
-            side[0].corner / 3, side[1].corner / 3, low, high);
-    edge[e] = (pal_winged_edge){.vertex = {a, a == low ? high : low},
-                                .face = {side[0].corner / 3, n == 2 ? side[1].corner / 3 : -1}};
-    for (int k = 0; k < n; k++) face_edge[side[k].corner] = e;
+        return PAL_REFUSE(c->diag,
+                          "levels: %d triangles (%d, %d, %d%s) share the edge of vertices %d and %d, a surface has two "
+                          "at most; " OFFER,
+                          n, side[0].corner / 3, side[1].corner / 3, side[2].corner / 3, n > 3 ? ", ..." : "", low,
+                          high);
+    if (n == 2 && c->s->tri[side[1].corner] == a)
+        return PAL_REFUSE(c->diag,
+                          "levels: triangles %d and %d run the same way through the edge of vertices %d and %d: turn "
+                          "one over, or " OFFER,
+                          side[0].corner / 3, side[1].corner / 3, low, high);
+    c->edge[c->n_edge] = (pal_winged_edge){.vertex = {a, a == low ? high : low},
+                                           .face = {side[0].corner / 3, n == 2 ? side[1].corner / 3 : -1}};
+    for (int k = 0; k < n; k++) c->face_edge[side[k].corner] = c->n_edge;
+    c->n_edge++;
     return PAL_ERR_OK;
 }
 
-/* edges with their ends and faces, and face_edge; room for 3 n_tri edges */
-static pal_err find_edges(const pal_surface *s, pal_winged_edge *edge, int32_t *face_edge, int32_t *n_edge,
-                          pal_diagnostic *diag)
+static pal_err find_edges(coarse *c)
 {
     int32_t *start;
     pal_surface_side *side;
-    pal_err err = pal_surface_sides(s, &start, &side);
+    pal_err err = pal_surface_sides(c->s, &start, &side);
     if (err) return err;
-    *n_edge = 0;
-    for (int32_t v = 0; v < s->n_vertex; v++)
+    for (int32_t v = 0; v < c->s->n_vertex; v++)
         for (int32_t i = start[v], end = i; !err && i < start[v + 1]; i = end) {
             while (end < start[v + 1] && side[end].high == side[i].high) end++;
-            err = make_edge(s, v, side + i, end - i, (*n_edge)++, edge, face_edge, diag);
+            err = make_edge(c, v, side + i, end - i);
         }
-    PAL_FREE(start, side);
-    return err;
+    return PAL_FREED(err, start, side);
 }
-
-/* ---- one level's adjacency ---- */
 
 /* faces, walks and spokes of a level from its faces' edges and its edges' ends; edge e of the level has face[1] = -1
  * when it is a boundary edge. False when two boundary edges start at one vertex, *bad. */
@@ -139,42 +131,34 @@ static bool link_level(pal_levels *l, int level, int32_t *bad)
 
 static pal_err refuse_fans(int32_t v, pal_diagnostic *diag)
 {
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                              "levels: parts of the surface touch in vertex %d only: split that vertex, or " OFFER, v);
+    return PAL_REFUSE(diag, "levels: parts of the surface touch in vertex %d only: split that vertex, or " OFFER, v);
 }
 
-/* every vertex has one fan of at least three faces, or one or more at the boundary; irregular: K (K + 1), summed over
- * irregular vertices of K edges */
-static pal_err check_fans(const pal_levels *l, int64_t *irregular, pal_diagnostic *diag)
+/* every vertex has one fan of at least three faces, or one or more at the boundary */
+static pal_err check_fans(const pal_levels *l, coarse *from)
 {
-    const int32_t n = l->n_vertex[0];
-    int32_t *count = calloc((size_t)n, sizeof *count);
-    if (!count) return PAL_ERR_MEMORY;
-    for (int32_t c = 0; c < 3 * l->first_face[1]; c++) count[l->face[c]]++;
     pal_err err = PAL_ERR_OK;
-    int64_t sum = 0;
-    for (int32_t v = 0; v < n && !err; v++) {
-        if (count[v] == 0) {
-            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                     "levels: vertex %d belongs to no triangle: clean the surface", v);
-            break;
-        }
+    int32_t *count;
+    PAL_ZEROED(&err, count, l->n_vertex[0]);
+    for (int32_t c = 0; c < 3 * l->first_face[1] && !err; c++) count[l->face[c]]++;
+    for (int32_t v = 0; v < l->n_vertex[0] && !err; v++) {
+        if (count[v] == 0)
+            return PAL_FREED(PAL_REFUSE(from->diag, "levels: vertex %d belongs to no triangle: clean the surface", v),
+                             count);
         int32_t e = l->spoke[v], n_face = 0, n_edge = 0;
         do {
             n_face += pal_wing_face(l->edge, e, v) >= 0, n_edge++;
             e = pal_wing_next_around(l->edge, e, v);
         } while (e != l->spoke[v] && n_edge <= count[v] + 1);
         if (n_face != count[v])
-            err = refuse_fans(v, diag);
+            err = refuse_fans(v, from->diag);
         else if (n_edge < 3 && n_face == n_edge)
-            err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "levels: triangles %d and %d have the same corners",
-                                     l->edge[l->spoke[v]].face[0], l->edge[l->spoke[v]].face[1]);
+            err = PAL_REFUSE(from->diag, "levels: triangles %d and %d have the same corners",
+                             l->edge[l->spoke[v]].face[0], l->edge[l->spoke[v]].face[1]);
         else if (n_edge != (n_face == n_edge ? 6 : 4))
-            sum += (int64_t)n_edge * (n_edge + 1);
+            from->irregular += (int64_t)n_edge * (n_edge + 1);
     }
-    free(count);
-    *irregular = sum;
-    return err;
+    return PAL_FREED(err, count);
 }
 
 static void find_corners(pal_levels *l)
@@ -188,8 +172,6 @@ static void find_corners(pal_levels *l)
         l->corner[v] = pal_dot3(a, b) < CORNER_COS * pal_norm3(a) * pal_norm3(b);
     }
 }
-
-/* ---- memory ---- */
 
 /* counts of all levels; false beyond int32 */
 static bool count_levels(pal_levels *l, int32_t n_vertex, int32_t n_edge, int32_t n_face)
@@ -223,8 +205,7 @@ static pal_err refuse_budget(double byte, size_t budget, const pal_levels *l, pa
 {
     return pal_diagnostic_set(
         diag, PAL_ERR_BUDGET,
-        "levels: %d levels need %.4g MiB, the budget is %.4g MiB: ask for fewer levels or a coarser "
-        "surface",
+        "levels: %d levels need %.4g MiB, the budget is %.4g MiB: ask for fewer levels or a coarser surface",
         l->n_level, byte / 1048576, (double)budget / 1048576);
 }
 
@@ -276,8 +257,6 @@ static void trim_entries(pal_levels *l)
     if (weight) l->stencil_weight = weight;
     l->n_byte = plain_bytes(l) + n * ENTRY_BYTES;
 }
-
-/* ---- splitting ---- */
 
 /* entry: room for the largest stencil */
 static void place_midpoints(pal_levels *l, int level, pal_stencil_entry *entry)
@@ -334,62 +313,59 @@ static pal_err check_edges(const pal_levels *l, double diagonal, pal_diagnostic 
         const int32_t *end = l->edge[e].vertex;
         double length = pal_dist3(l->x + 3 * (size_t)end[0], l->x + 3 * (size_t)end[1]);
         if (!(length > LEVEL_FLAT * diagonal))
-            return pal_diagnostic_set(
-                diag, PAL_ERR_REFUSED,
-                "levels: the edge of vertices %d and %d of level %d is %.3g m long in a surface of %.3g "
-                "m: smooth the surface or ask for fewer levels",
-                end[0], end[1], l->edge_level[e], length, diagonal);
+            return PAL_REFUSE(diag,
+                              "levels: the edge of vertices %d and %d of level %d is %.3g m long in a surface of %.3g "
+                              "m: smooth the surface or ask for fewer levels",
+                              end[0], end[1], l->edge_level[e], length, diagonal);
     }
     return PAL_ERR_OK;
 }
 
 /* the coarse level in l's arrays, linked and checked */
-static pal_err take_coarse(const pal_surface *s, pal_levels *l, const pal_winged_edge *edge, const int32_t *face_edge,
-                           int64_t *irregular, pal_diagnostic *diag)
+static pal_err take_coarse(pal_levels *l, coarse *from)
 {
+    const pal_surface *s = from->s;
     size_t n_corner = 3 * (size_t)s->n_tri;
-    int32_t bad;
+    int32_t bad, *label;
     memcpy(l->x, s->x, 3 * (size_t)s->n_vertex * sizeof *l->x);
     memcpy(l->face, s->tri, n_corner * sizeof *l->face);
-    memcpy(l->face_edge, face_edge, n_corner * sizeof *l->face_edge);
-    memcpy(l->edge, edge, (size_t)l->first_edge[1] * sizeof *l->edge);
+    memcpy(l->face_edge, from->face_edge, n_corner * sizeof *l->face_edge);
+    memcpy(l->edge, from->edge, (size_t)from->n_edge * sizeof *l->edge);
     memcpy(l->origin_m, s->origin_m, sizeof l->origin_m);
-    if (!link_level(l, 0, &bad)) return refuse_fans(bad, diag);
-    PAL_TRY(check_fans(l, irregular, diag));
+    if (!link_level(l, 0, &bad)) return refuse_fans(bad, from->diag);
+    PAL_TRY(check_fans(l, from));
     find_corners(l);
     l->closed = true;
-    for (int32_t e = 0; e < l->first_edge[1]; e++) l->closed = l->closed && l->edge[e].face[1] >= 0;
-    int32_t *label = malloc((size_t)s->n_tri * sizeof *label);
-    pal_err err = label ? pal_surface_components(s, label, &l->n_component) : PAL_ERR_MEMORY;
-    free(label);
-    return err;
+    for (int32_t e = 0; e < from->n_edge; e++) l->closed = l->closed && l->edge[e].face[1] >= 0;
+    pal_err err = PAL_ERR_OK;
+    PAL_ARRAY(&err, label, s->n_tri);
+    if (!err) err = pal_surface_components(s, label, &l->n_component);
+    return PAL_FREED(err, label);
 }
 
-/* scratch: edge and face_edge [3 n_tri]; entry [6 n_tri + 16], since no vertex has more edges than 3 n_tri */
-static pal_err make_levels(const pal_surface *s, const pal_levels_options *o, pal_levels *l, pal_winged_edge *edge,
-                           int32_t *face_edge, pal_stencil_entry *entry, pal_diagnostic *diag)
+static pal_err make_levels(const pal_levels_options *o, pal_levels *l, coarse *from)
 {
+    const pal_surface *s = from->s;
     size_t budget = o->budget_byte ? o->budget_byte : HIERARCHY_BUDGET_BYTE;
-    int32_t n_edge;
-    int64_t irregular = 0;
-    PAL_TRY(find_edges(s, edge, face_edge, &n_edge, diag));
-    if (!count_levels(l, s->n_vertex, n_edge, s->n_tri))
-        return pal_diagnostic_set(diag, PAL_ERR_BUDGET, "levels: %d levels of %d triangles make more than %d edges",
-                                  l->n_level, s->n_tri, INT32_MAX / 8);
-    if (plain_bytes(l) > budget) return refuse_budget((double)plain_bytes(l), budget, l, diag);
+    double low[3], high[3];
+    PAL_TRY(find_edges(from));
+    if (!count_levels(l, s->n_vertex, from->n_edge, s->n_tri))
+        return pal_diagnostic_set(from->diag, PAL_ERR_BUDGET,
+                                  "levels: %d levels of %d triangles make more than %d edges", l->n_level, s->n_tri,
+                                  INT32_MAX / 8);
+    if (plain_bytes(l) > budget) return refuse_budget((double)plain_bytes(l), budget, l, from->diag);
     PAL_TRY(get_memory(l));
-    PAL_TRY(take_coarse(s, l, edge, face_edge, &irregular, diag));
-    PAL_TRY(get_entries(l, irregular, budget, diag));
+    PAL_TRY(take_coarse(l, from));
+    PAL_TRY(get_entries(l, from->irregular, budget, from->diag));
     for (int k = 0; k + 1 < l->n_level; k++) {
         int32_t none;
-        place_midpoints(l, k, entry);
+        place_midpoints(l, k, from->entry);
         split_level(l, k);
         if (!link_level(l, k + 1, &none)) return PAL_ERR_INTERNAL;
     }
     trim_entries(l);
-    double low[3], high[3];
     pal_surface_box(s, low, high);
-    return check_edges(l, pal_dist3(low, high), diag);
+    return check_edges(l, pal_dist3(low, high), from->diag);
 }
 
 pal_err pal_levels_make(const pal_surface *surface, const pal_levels_options *options, pal_levels *out,
@@ -397,22 +373,19 @@ pal_err pal_levels_make(const pal_surface *surface, const pal_levels_options *op
 {
     PAL_TRY(check_input(surface, options, diag));
     pal_levels l = {.n_level = options->n_level};
+    coarse from = {.s = surface, .diag = diag};
     size_t n_corner = 3 * (size_t)surface->n_tri;
     pal_err err = PAL_ERR_OK;
-    pal_winged_edge *edge;
-    int32_t *face_edge;
-    pal_stencil_entry *entry;
-    PAL_ARRAY(&err, edge, n_corner);
-    PAL_ARRAY(&err, face_edge, n_corner);
-    PAL_ARRAY(&err, entry, 2 * n_corner + 16);
-    if (!err) err = make_levels(surface, options, &l, edge, face_edge, entry, diag);
-    PAL_FREE(edge, face_edge, entry);
-    if (err) {
+    PAL_ARRAY(&err, from.edge, n_corner);
+    PAL_ARRAY(&err, from.face_edge, n_corner);
+    PAL_ARRAY(&err, from.entry, 2 * n_corner + 16);
+    if (!err) err = make_levels(options, &l, &from);
+    PAL_FREE(from.edge, from.face_edge, from.entry);
+    if (err)
         pal_levels_free(&l);
-        return err;
-    }
-    *out = l;
-    return PAL_ERR_OK;
+    else
+        *out = l;
+    return err;
 }
 
 pal_err pal_levels_surface(const pal_levels *levels, int level, pal_surface *out)

@@ -19,8 +19,6 @@
 #include "server/mesh/geometry/butterfly.h"
 #include "server/mesh/geometry/surface.h"
 
-#include <stddef.h>
-
 #define PAL_LEVELS_MAX 10
 
 typedef struct pal_levels_options {

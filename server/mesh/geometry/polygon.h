@@ -53,4 +53,15 @@ static inline void pal_polygon_range(const pal_polygon *p, int axis, double *min
         if (p->x[i][axis] > *max) *max = p->x[i][axis];
     }
 }
+
+/* keeps the part between two planes of an axis */
+static inline void pal_polygon_clip(pal_polygon *p, int axis, double low, double high)
+{
+    double min, max;
+    pal_polygon part;
+    if (p->n == 0) return;
+    pal_polygon_range(p, axis, &min, &max);
+    if (min < low) pal_polygon_cut_axis(p, axis, low, NULL, &part), *p = part;
+    if (max > high) pal_polygon_cut_axis(p, axis, high, &part, NULL), *p = part;
+}
 #endif

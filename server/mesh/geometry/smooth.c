@@ -80,6 +80,5 @@ pal_err pal_surface_smooth(pal_surface *surface, int rounds, const double *reach
                 step(surface, SMOOTH_BACK, sum, degree, fixed);
         }
     }
-    PAL_FREE(sum, start, normal, degree, balance, fixed);
-    return err;
+    return PAL_FREED(err, sum, start, normal, degree, balance, fixed);
 }

@@ -30,8 +30,6 @@ typedef struct hollow {
     double reach;     /* maximum displacement in a step, m */
 } hollow;
 
-/* ---- rings ---- */
-
 static void spine_at(const node *spine, int n, double along, node *out, double axis[3])
 {
     int i = along < n - 2 ? (int)along : n - 2;
@@ -95,8 +93,6 @@ static pal_err make_tube(const ring *rings, int n_ring, const node *spine, int n
     }
     return PAL_ERR_OK;
 }
-
-/* ---- spreading ---- */
 
 static void gradient(shape inside, const double p[3], double g[3])
 {
@@ -286,8 +282,6 @@ static pal_err make_hollow_body(const ring *rings, int n_ring, const node *spine
     return err;
 }
 
-/* ---- bodies ---- */
-
 static double unit_ball(const double p[3])
 {
     return 1 - pal_norm3(p);
@@ -360,11 +354,10 @@ pal_err pal_stomach_make(pal_stomach *out)
 pal_err pal_sheet_make(int n, int m, double width_m, double height_m, pal_surface *out, pal_diagnostic *diag)
 {
     if (n < 2 || m < 2 || n > 20000 || m > 20000 || (double)n * m > 1e7)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "sheet: %d x %d vertices, 2 to 20000 along a side and 10 million together are made",
-                                  n, m);
+        return PAL_REFUSE(diag, "sheet: %d x %d vertices, 2 to 20000 along a side and 10 million together are made", n,
+                          m);
     if (!(width_m > 0 && width_m <= 1e6 && height_m > 0 && height_m <= 1e6))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "sheet: a size of %g x %g m", width_m, height_m);
+        return PAL_REFUSE(diag, "sheet: a size of %g x %g m", width_m, height_m);
     pal_surface s = {.n_vertex = n * m, .n_tri = 2 * (n - 1) * (m - 1)};
     pal_err err = PAL_ERR_OK;
     PAL_ARRAY(&err, s.x, 3 * (size_t)s.n_vertex);

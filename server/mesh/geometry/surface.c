@@ -116,10 +116,7 @@ pal_err pal_surface_fans(const pal_surface *surface, int32_t **start, int32_t **
     pal_err err = PAL_ERR_OK;
     PAL_ZEROED(&err, *start, n_vertex + 2);
     PAL_ARRAY(&err, *item, n_corner);
-    if (err) {
-        PAL_FREE(*start, *item);
-        return err;
-    }
+    if (err) return PAL_FREED(err, *start, *item);
     int32_t *row = *start;
     /* counts are shifted by two entries, so that filling leaves each row's start in place */
     for (size_t c = 0; c < n_corner; c++) row[surface->tri[c] + 2]++;
@@ -147,10 +144,7 @@ pal_err pal_surface_sides(const pal_surface *surface, int32_t **start, pal_surfa
     pal_err err = PAL_ERR_OK;
     PAL_ZEROED(&err, *start, n_vertex + 2);
     PAL_ARRAY(&err, *side, n_corner);
-    if (err) {
-        PAL_FREE(*start, *side);
-        return err;
-    }
+    if (err) return PAL_FREED(err, *start, *side);
     int32_t *row = *start;
     for (int pass = 0; pass < 2; pass++) {
         for (size_t c = 0; c < n_corner; c++) {
@@ -201,10 +195,7 @@ pal_err pal_surface_check(const pal_surface *surface, pal_surface_topology *out)
     pal_err err = pal_surface_sides(surface, &row, &sides);
     if (err) return err;
     PAL_ARRAY(&err, parent, n_corner);
-    if (err) {
-        PAL_FREE(row, sides);
-        return err;
-    }
+    if (err) return PAL_FREED(err, row, sides);
     pal_surface_topology found = {0};
     pal_union_find_init(parent, n_corner);
     for (int i = 0; i < surface->n_vertex; i++)

@@ -8,9 +8,6 @@
 #include "server/mesh/geometry/tuning.h"
 #include "server/num/sort.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 typedef struct cleaner {
     pal_surface *surface;
     double eps;        /* welding distance; 0: equal positions only                            */
@@ -239,8 +236,7 @@ static pal_err drop_folded(cleaner *k, const int8_t *balance)
         k->count->n_folded += s->n_tri - rest.n_tri;
         s->n_tri = rest.n_tri;
     }
-    free(rest.tri);
-    return err;
+    return PAL_FREED(err, rest.tri);
 }
 
 /* keeps the first of the triangles with the same three corners; open addressing, at most half full */
@@ -274,8 +270,7 @@ static pal_err drop_duplicate(cleaner *k)
     k->count->n_duplicate += s->n_tri - n;
     s->n_tri = n;
     pal_err err = again ? drop_folded(k, balance) : PAL_ERR_OK;
-    free(balance);
-    return err;
+    return PAL_FREED(err, balance);
 }
 
 /* keeps the vertices in use, in their order, and puts the box centre at zero */
@@ -318,9 +313,8 @@ pal_err pal_surface_clean(pal_surface *surface, double tolerance, pal_surface_re
     }
     if (err) pal_diagnostic_set(diag, err, "no memory to clean %d triangles", surface->n_tri);
     if (!err && surface->n_tri == 0)
-        err = pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED, "no triangle is left: %lld without area, %lld doubled, %lld not finite",
-            (long long)k.count->n_degenerate, (long long)k.count->n_duplicate, (long long)k.count->n_nonfinite);
-    PAL_FREE(k.map, k.next, k.bucket);
-    return err;
+        err = PAL_REFUSE(diag, "no triangle is left: %lld without area, %lld doubled, %lld not finite",
+                         (long long)k.count->n_degenerate, (long long)k.count->n_duplicate,
+                         (long long)k.count->n_nonfinite);
+    return PAL_FREED(err, k.map, k.next, k.bucket);
 }

@@ -15,16 +15,11 @@
 static const uint8_t OPPOSITE[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
 static const uint8_t EDGE[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
-/* one face in the bucket of its smallest node */
+/* a face as one tet has it */
 typedef struct side {
-    int32_t middle, largest; /* its other nodes, ascending */
-    uint32_t from;           /* tet * 4 + opposite corner  */
+    int32_t node[3]; /* ascending                 */
+    uint32_t from;   /* tet * 4 + opposite corner */
 } side;
-
-typedef struct sides {
-    int64_t *start; /* bucket of each node [n_node+1] */
-    side *item;     /* [4 n_tet]                      */
-} sides;
 
 void pal_tets_free(pal_tets *tets)
 {
@@ -51,82 +46,55 @@ double pal_tets_volume(const pal_tets *tets)
 static int compare_sides(const void *a, const void *b)
 {
     const side *s = a, *t = b;
-    if (s->middle != t->middle) return PAL_COMPARE(s->middle, t->middle);
-    if (s->largest != t->largest) return PAL_COMPARE(s->largest, t->largest);
+    if (s->node[1] != t->node[1]) return PAL_COMPARE(s->node[1], t->node[1]);
+    if (s->node[2] != t->node[2]) return PAL_COMPARE(s->node[2], t->node[2]);
     return PAL_COMPARE(s->from, t->from);
 }
 
 PAL_SORT(sort_nodes, int32_t, pal_compare_int32)
 PAL_SORT(sort_sides, side, compare_sides)
 
-/* smallest, middle, largest node of a face */
-static void sort_face(const int32_t *corner, int opposite, int32_t node[3])
+/* the sides of all tets [4 n_tet], equal faces one after another, ascending; the caller frees them */
+static pal_err list_sides(const pal_tets *tets, side **out)
 {
-    const uint8_t *o = OPPOSITE[opposite];
-    pal_sort3(node, (const int32_t[3]){corner[o[0]], corner[o[1]], corner[o[2]]});
-}
-
-/* turns counts at start[i + 1] into starts */
-static void prefix_sum(int64_t *start, int n)
-{
-    for (int i = 0; i < n; i++) start[i + 1] += start[i];
-}
-
-/* undoes the filling pass, which moved every start to its bucket's end */
-static void restore_starts(int64_t *start, int n)
-{
-    memmove(start + 1, start, sizeof *start * (size_t)n);
-    start[0] = 0;
-}
-
-static void sides_free(sides *s)
-{
-    PAL_FREE(s->start, s->item);
-}
-
-static pal_err sides_make(const pal_tets *tets, sides *out)
-{
-    size_t n_node = (size_t)tets->n_node, n_tet = (size_t)tets->n_tet;
     pal_err err = PAL_ERR_OK;
-    int64_t *start;
+    int32_t n_node = tets->n_node;
+    int64_t *start; /* bucket of each smallest node */
     side *item;
-    PAL_ZEROED(&err, start, n_node + 1);
-    PAL_ARRAY(&err, item, 4 * n_tet);
-    if (err) {
-        PAL_FREE(start, item);
-        return err;
+    PAL_ZEROED(&err, start, n_node + 2);
+    PAL_ARRAY(&err, item, 4 * (size_t)tets->n_tet);
+    if (err) return PAL_FREED(err, start, item);
+    for (int pass = 0; pass < 2; pass++) {
+        for (uint32_t from = 0; from < 4 * (uint32_t)tets->n_tet; from++) {
+            const int32_t *c = tets->tet + (from & ~3u);
+            const uint8_t *o = OPPOSITE[from & 3];
+            side s = {.from = from};
+            pal_sort3(s.node, (const int32_t[3]){c[o[0]], c[o[1]], c[o[2]]});
+            if (pass == 0)
+                start[s.node[0] + 2]++;
+            else
+                item[start[s.node[0] + 1]++] = s;
+        }
+        for (int32_t i = 0; pass == 0 && i < n_node; i++) start[i + 2] += start[i + 1];
     }
-    int32_t node[3];
-    for (size_t t = 0; t < n_tet; t++)
-        for (int k = 0; k < 4; k++) {
-            sort_face(tets->tet + 4 * t, k, node);
-            start[node[0] + 1]++;
-        }
-    prefix_sum(start, tets->n_node);
-    for (size_t t = 0; t < n_tet; t++)
-        for (int k = 0; k < 4; k++) {
-            sort_face(tets->tet + 4 * t, k, node);
-            item[start[node[0]]++] = (side){node[1], node[2], (uint32_t)(4 * t) + (uint32_t)k};
-        }
-    restore_starts(start, tets->n_node);
-
-    for (size_t i = 0; i < n_node; i++) sort_sides(item + start[i], (size_t)(start[i + 1] - start[i]));
-    *out = (sides){start, item};
+    for (int32_t i = 0; i < n_node; i++) sort_sides(item + start[i], (size_t)(start[i + 1] - start[i]));
+    free(start);
+    *out = item;
     return PAL_ERR_OK;
 }
 
-/* number of sides from item a on (before end) that are the same face */
-static int64_t same_sides(const sides *s, int64_t a, int64_t end)
+/* how many of the sides from a on (before end) are the same face */
+static int64_t count_equal(const side *a, const side *end)
 {
-    int64_t b = a + 1;
-    while (b < end && s->item[b].middle == s->item[a].middle && s->item[b].largest == s->item[a].largest) b++;
+    const side *b = a + 1;
+    while (b < end && !memcmp(b->node, a->node, sizeof a->node)) b++;
     return b - a;
 }
 
 pal_err pal_tets_find_boundary(pal_tets *tets)
 {
-    sides s;
-    PAL_TRY(sides_make(tets, &s));
+    side *sides;
+    PAL_TRY(list_sides(tets, &sides));
 
     /* a face of one tet only is boundary; mark it by its tet and opposite corner, so that the faces come out in the
      * order of the tets */
@@ -136,27 +104,19 @@ pal_err pal_tets_find_boundary(pal_tets *tets)
     int32_t *face;
     PAL_ZEROED(&err, alone, n_side);
     PAL_ZEROED(&err, on_surface, tets->n_node);
-    if (!err)
-        for (int i = 0; i < tets->n_node; i++)
-            for (int64_t a = s.start[i], n; a < s.start[i + 1]; a += n) {
-                n = same_sides(&s, a, s.start[i + 1]);
-                if (n != 1) continue;
-                alone[s.item[a].from] = 1;
-                n_face++;
-            }
-    sides_free(&s);
-    PAL_ARRAY(&err, face, 3 * n_face);
-    if (err) {
-        PAL_FREE(alone, on_surface, face);
-        return err;
+    for (int64_t n, k = 0; !err && k < (int64_t)n_side; k += n) {
+        n = count_equal(sides + k, sides + n_side);
+        n_face += alone[sides[k].from] = n == 1;
     }
+    free(sides);
+    PAL_ARRAY(&err, face, 3 * n_face);
+    if (err) return PAL_FREED(err, alone, on_surface, face);
     int32_t *to = face;
     for (size_t from = 0; from < n_side; from++)
-        if (alone[from])
-            for (int k = 0; k < 3; k++, to++) {
-                *to = tets->tet[(from & ~(size_t)3) + OPPOSITE[from & 3][k]];
-                on_surface[*to] = 1;
-            }
+        for (int k = 0; alone[from] && k < 3; k++, to++) {
+            *to = tets->tet[(from & ~(size_t)3) + OPPOSITE[from & 3][k]];
+            on_surface[*to] = 1;
+        }
     PAL_FREE(alone, tets->face, tets->on_surface);
     tets->face = face;
     tets->on_surface = on_surface;
@@ -169,46 +129,35 @@ pal_err pal_tets_edges(const pal_tets *tets, int32_t **out, int *n_edge)
     size_t n_node = (size_t)tets->n_node, n_tet = (size_t)tets->n_tet;
     pal_err err = PAL_ERR_OK;
     int64_t *start;
-    int32_t *end;
-    PAL_ZEROED(&err, start, n_node + 1);
+    int32_t *end, *edge;
+    PAL_ZEROED(&err, start, n_node + 2);
     PAL_ARRAY(&err, end, 6 * n_tet);
-    if (err) {
-        PAL_FREE(start, end);
-        return err;
+    for (int pass = 0; pass < 2 && !err; pass++) {
+        for (size_t k = 0; k < 6 * n_tet; k++) {
+            int32_t a = tets->tet[k / 6 * 4 + EDGE[k % 6][0]], b = tets->tet[k / 6 * 4 + EDGE[k % 6][1]];
+            if (pass == 0)
+                start[(a < b ? a : b) + 2]++;
+            else
+                end[start[(a < b ? a : b) + 1]++] = a < b ? b : a;
+        }
+        for (size_t i = 0; pass == 0 && i < n_node; i++) start[i + 2] += start[i + 1];
     }
-    for (int pass = 0; pass < 2; pass++) {
-        for (size_t t = 0; t < n_tet; t++)
-            for (int k = 0; k < 6; k++) {
-                int32_t a = tets->tet[4 * t + EDGE[k][0]], b = tets->tet[4 * t + EDGE[k][1]];
-                int32_t low = a < b ? a : b;
-                if (pass == 0)
-                    start[low + 1]++;
-                else
-                    end[start[low]++] = a < b ? b : a;
-            }
-        if (pass == 0) prefix_sum(start, tets->n_node);
-    }
-    restore_starts(start, tets->n_node);
 
     /* sort each bucket and keep the different ends, packed to the front of the same array */
     int64_t n_kept = 0;
-    for (size_t i = 0; i < n_node; i++) {
+    for (size_t i = 0; i < n_node && !err; i++) {
         int64_t a = start[i], b = start[i + 1];
         sort_nodes(end + a, (size_t)(b - a));
         start[i] = n_kept;
         for (int64_t k = a; k < b; k++)
             if (k == a || end[k] != end[k - 1]) end[n_kept++] = end[k];
     }
+    PAL_ARRAY(&err, edge, 2 * n_kept);
+    if (err) return PAL_FREED(err, start, end, edge);
     start[n_node] = n_kept;
-    int32_t *edge = malloc((n_kept ? (size_t)n_kept : 1) * 2 * sizeof *edge);
-    if (edge)
-        for (size_t i = 0; i < n_node; i++)
-            for (int64_t k = start[i]; k < start[i + 1]; k++) {
-                edge[2 * k] = (int32_t)i;
-                edge[2 * k + 1] = end[k];
-            }
+    for (size_t i = 0; i < n_node; i++)
+        for (int64_t k = start[i]; k < start[i + 1]; k++) edge[2 * k] = (int32_t)i, edge[2 * k + 1] = end[k];
     PAL_FREE(start, end);
-    if (!edge) return PAL_ERR_MEMORY;
     *out = edge;
     *n_edge = (int)n_kept;
     return PAL_ERR_OK;
@@ -216,21 +165,16 @@ pal_err pal_tets_edges(const pal_tets *tets, int32_t **out, int *n_edge)
 
 pal_err pal_tets_faces(const pal_tets *tets, int32_t **out, int *n_face)
 {
-    sides s;
-    PAL_TRY(sides_make(tets, &s));
-    size_t n = 0;
-    for (int i = 0; i < tets->n_node; i++)
-        for (int64_t a = s.start[i]; a < s.start[i + 1]; a += same_sides(&s, a, s.start[i + 1])) n++;
-    int32_t *face = malloc((n ? n : 1) * 3 * sizeof *face), *to = face;
-    if (face)
-        for (int i = 0; i < tets->n_node; i++)
-            for (int64_t a = s.start[i]; a < s.start[i + 1]; a += same_sides(&s, a, s.start[i + 1])) {
-                *to++ = i;
-                *to++ = s.item[a].middle;
-                *to++ = s.item[a].largest;
-            }
-    sides_free(&s);
-    if (!face) return PAL_ERR_MEMORY;
+    side *sides;
+    pal_err err = list_sides(tets, &sides);
+    if (err) return err;
+    int64_t n_side = 4 * (int64_t)tets->n_tet, n = 0;
+    int32_t *face;
+    for (int64_t k = 0; k < n_side; k += count_equal(sides + k, sides + n_side)) sides[n++] = sides[k];
+    PAL_ARRAY(&err, face, 3 * n);
+    if (err) return PAL_FREED(err, sides);
+    for (int64_t k = 0; k < n; k++) memcpy(face + 3 * k, sides[k].node, sizeof sides[k].node);
+    free(sides);
     *out = face;
     *n_face = (int)n;
     return PAL_ERR_OK;
@@ -238,23 +182,14 @@ pal_err pal_tets_faces(const pal_tets *tets, int32_t **out, int *n_face)
 
 pal_err pal_tets_components(const pal_tets *tets, int32_t *label, int *n_component)
 {
-    sides s;
-    PAL_TRY(sides_make(tets, &s));
-    int32_t *parent = malloc((tets->n_tet ? (size_t)tets->n_tet : 1) * sizeof *parent);
-    if (!parent) {
-        sides_free(&s);
-        return PAL_ERR_MEMORY;
-    }
-    pal_union_find_init(parent, tets->n_tet);
-    for (int i = 0; i < tets->n_node; i++)
-        for (int64_t a = s.start[i]; a + 1 < s.start[i + 1]; a++) {
-            if (same_sides(&s, a, a + 2) < 2) continue;
-            pal_union_find_join(parent, (int32_t)(s.item[a].from >> 2), (int32_t)(s.item[a + 1].from >> 2));
-        }
-    sides_free(&s);
-    *n_component = pal_union_find_label(parent, tets->n_tet);
-    if (label) memcpy(label, parent, (size_t)tets->n_tet * sizeof *label);
-    free(parent);
+    side *sides;
+    PAL_TRY(list_sides(tets, &sides));
+    pal_union_find_init(label, tets->n_tet);
+    for (size_t k = 1; k < 4 * (size_t)tets->n_tet; k++)
+        if (count_equal(&sides[k - 1], &sides[k + 1]) == 2)
+            pal_union_find_join(label, (int32_t)(sides[k - 1].from >> 2), (int32_t)(sides[k].from >> 2));
+    free(sides);
+    *n_component = pal_union_find_label(label, tets->n_tet);
     return PAL_ERR_OK;
 }
 
@@ -288,16 +223,17 @@ static void check_corners(const pal_tets *tets, faults *index, faults *repeated)
 /* faces of more than two tets, and the nodes of the first */
 static pal_err check_sides(const pal_tets *tets, faults *f, int32_t node[3])
 {
-    sides s;
-    PAL_TRY(sides_make(tets, &s));
-    for (int i = 0; i < tets->n_node; i++)
-        for (int64_t a = s.start[i], n; a < s.start[i + 1]; a += n) {
-            n = same_sides(&s, a, s.start[i + 1]);
-            if (n <= 2) continue;
-            if (f->n == 0) node[0] = i, node[1] = s.item[a].middle, node[2] = s.item[a].largest;
-            count_fault(f, 0);
-        }
-    sides_free(&s);
+    side *sides;
+    PAL_TRY(list_sides(tets, &sides));
+    const side *end = sides + 4 * (size_t)tets->n_tet;
+    int64_t n;
+    for (const side *s = sides; s < end; s += n) {
+        n = count_equal(s, end);
+        if (n <= 2) continue;
+        if (f->n == 0) memcpy(node, s->node, sizeof s->node);
+        count_fault(f, 0);
+    }
+    free(sides);
     return PAL_ERR_OK;
 }
 
@@ -320,8 +256,10 @@ static pal_err check_boundary(const pal_tets *tets, long long *n_open)
 
 static pal_err check_unused(const pal_tets *tets, faults *f)
 {
-    uint8_t *used = calloc(tets->n_node ? (size_t)tets->n_node : 1, 1);
-    if (!used) return PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    uint8_t *used;
+    PAL_ZEROED(&err, used, tets->n_node);
+    if (err) return err;
     for (size_t k = 0; k < 4 * (size_t)tets->n_tet; k++) used[tets->tet[k]] = 1;
     for (int i = 0; i < tets->n_node; i++)
         if (!used[i]) count_fault(f, i);
@@ -336,29 +274,21 @@ pal_err pal_tets_check(const pal_tets *tets, pal_diagnostic *diag)
     int32_t node[3] = {0};
     check_corners(tets, &index, &repeated);
     if (index.n)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "%lld index%s out of range of %d nodes, the first in element %d", index.n,
-                                  index.n > 1 ? "es" : "", tets->n_node, index.first);
+        return PAL_REFUSE(diag, "%lld index%s out of range of %d nodes, the first in element %d", index.n,
+                          index.n > 1 ? "es" : "", tets->n_node, index.first);
     if (repeated.n)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%lld tetrahedra with a corner used twice, the first is %d",
-                                  repeated.n, repeated.first);
+        return PAL_REFUSE(diag, "%lld tetrahedra with a corner used twice, the first is %d", repeated.n,
+                          repeated.first);
     for (int t = 0; t < tets->n_tet; t++)
         if (!(pal_tet_volume(tets->x, tets->tet + 4 * (size_t)t) > 0)) count_fault(&flat, t);
-    if (flat.n)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%lld tetrahedra without positive volume, the first is %d",
-                                  flat.n, flat.first);
+    if (flat.n) return PAL_REFUSE(diag, "%lld tetrahedra without positive volume, the first is %d", flat.n, flat.first);
     PAL_TRY(check_sides(tets, &crowded, node));
     if (crowded.n)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "%lld faces of more than two tetrahedra, the first has nodes %d %d %d", crowded.n,
-                                  node[0], node[1], node[2]);
+        return PAL_REFUSE(diag, "%lld faces of more than two tetrahedra, the first has nodes %d %d %d", crowded.n,
+                          node[0], node[1], node[2]);
     PAL_TRY(check_boundary(tets, &n_open));
-    if (n_open)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "the boundary is not closed: %lld edges without a partner",
-                                  n_open);
+    if (n_open) return PAL_REFUSE(diag, "the boundary is not closed: %lld edges without a partner", n_open);
     PAL_TRY(check_unused(tets, &unused));
-    if (unused.n)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%lld nodes of no tetrahedron, the first is %d", unused.n,
-                                  unused.first);
+    if (unused.n) return PAL_REFUSE(diag, "%lld nodes of no tetrahedron, the first is %d", unused.n, unused.first);
     return PAL_ERR_OK;
 }

@@ -34,6 +34,6 @@ pal_err pal_tets_faces(const pal_tets *tets, int32_t **out, int *n_face);
  * a node of no tet. REFUSED names the first and counts all. */
 pal_err pal_tets_check(const pal_tets *tets, pal_diagnostic *diag);
 
-/* face-connected components of the tets: label [n_tet] may be NULL; MEMORY */
+/* face-connected components of the tets: label [n_tet], number out; MEMORY */
 pal_err pal_tets_components(const pal_tets *tets, int32_t *label, int *n_component);
 #endif

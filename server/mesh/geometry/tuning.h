@@ -24,8 +24,8 @@
 /* of the square or cube of its size: a triangle or face has no area, a cell no volume or folds below it; what rounding
  * leaves of flat ones is 1e-15 (geometry/test_surface, cells/test_cells, cells/test_cell_edits) */
 #define MIN_SHAPE 1e-12
-/* flat triangles at a vertex of more triangles than this are dropped, not repaired, so that the time stays linear
- * (geometry/test_surface) */
+/* triangles at a vertex; flat ones at a vertex of more are dropped, not repaired, so that the time stays linear
+ * (geometry/test_surface, flat_triangles_at_a_crowded_vertex_are_dropped) */
 #define MAX_FAN 64
 /* radii beyond which a box of the tree counts as a dipole; the winding number then errs by at most 0.03
  * (geometry/test_box_tree) */
@@ -45,7 +45,7 @@
 #define SMOOTH_STEP 0.5
 #define SMOOTH_BACK (-0.53)
 /* weight of the edge's midpoint, of the quadric's area: spreads vertices evenly where the surface is flat
- * (geometry/test_contour) */
+ * (geometry/test_contour, decimation_spreads_the_vertices_of_a_flat_sheet) */
 #define MIDPOINT_WEIGHT 1e-3
 
 /* ---- voxels (voxel/test_voxels) ---- */

@@ -103,8 +103,8 @@ static pal_err refuse_label(const pal_label_volume *volume, int32_t label, pal_d
     for (int i = 0; i < n; i++)
         used += snprintf(text + used, sizeof text - (size_t)used, "%s%d (%.3g ml)", i ? ", " : "", list[i].label,
                          1e6 * list[i].volume_m3);
-    return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "label %d is not in the scan, %s%s", label,
-                              n ? "the largest there are " : "which holds no label at all", text);
+    return PAL_REFUSE(diag, "label %d is not in the scan, %s%s", label,
+                      n ? "the largest there are " : "which holds no label at all", text);
 }
 
 /* the label's box with one voxel of room, and its mask */
@@ -374,7 +374,6 @@ static pal_contour_box box_of(const crop *c, const double m[12], int target_tri)
     return box;
 }
 
-/* keeps the component with the most triangles */
 static pal_err keep_largest_component(pal_surface *s)
 {
     pal_err err = PAL_ERR_OK;
@@ -391,8 +390,7 @@ static pal_err keep_largest_component(pal_surface *s)
     for (size_t t = 0; !err && n > 1 && t < (size_t)s->n_tri; t++)
         if (label[t] == best) memmove(s->tri + 3 * kept++, s->tri + 3 * t, 3 * sizeof *s->tri);
     if (!err && n > 1) s->n_tri = (int)kept;
-    PAL_FREE(label, count);
-    return err;
+    return PAL_FREED(err, label, count);
 }
 
 /* relaxes every vertex within SMOOTH_MAX_VOXEL of a voxel's extent along its normal */

@@ -11,8 +11,6 @@
 #include "server/mesh/files/text_scan.h"
 
 #include <limits.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <zlib.h>
@@ -40,15 +38,7 @@ typedef struct source {
     bool packed;
 } source;
 
-static pal_err __attribute__((format(printf, 4, 5)))
-refuse(const source *s, const char *unit, int64_t at, const char *format, ...)
-{
-    va_list list;
-    va_start(list, format);
-    pal_err err = pal_file_refuse(s->diag, s->name, unit, at, format, list);
-    va_end(list);
-    return err;
-}
+#define REFUSE(s, unit, at, ...) pal_file_refuse((s)->diag, (s)->name, (unit), (at), __VA_ARGS__)
 
 static pal_err no_memory(const source *s, size_t n)
 {
@@ -96,7 +86,7 @@ static pal_err inflate_next(unpacker *u, uint8_t *to, size_t max, size_t *n_out)
         if (state == Z_BUF_ERROR) u->ended = true;
         if (state == Z_MEM_ERROR) return no_memory(s, max);
         if (state != Z_OK && state != Z_BUF_ERROR)
-            return refuse(s, "byte", (int64_t)u->n_in, "the compressed data are damaged");
+            return REFUSE(s, "byte", (int64_t)u->n_in, "the compressed data are damaged");
     }
     *n_out = n;
     return PAL_ERR_OK;
@@ -171,33 +161,33 @@ static pal_err nifti_header(const source *s, const uint8_t *b, size_t n, header 
     } known[] = {{2, PAL_SCALAR_U8},     {4, PAL_SCALAR_I16},   {8, PAL_SCALAR_I32},   {16, PAL_SCALAR_F32},
                  {64, PAL_SCALAR_F64},   {256, PAL_SCALAR_I8},  {512, PAL_SCALAR_U16}, {768, PAL_SCALAR_U32},
                  {1024, PAL_SCALAR_I64}, {1280, PAL_SCALAR_U64}};
-    if (n < NIFTI_HEAD) return refuse(s, "byte", (int64_t)n, "the file ends inside the 348 byte head");
+    if (n < NIFTI_HEAD) return REFUSE(s, "byte", (int64_t)n, "the file ends inside the 348 byte head");
     bool big = h->big = pal_word_at(b, 4, true) == NIFTI_HEAD;
     h->format = "nifti";
-    if (memcmp(b + 344, "n+1", 4)) return refuse(s, "byte", 344, "not a NIfTI-1 file with its voxels inside (n+1)");
+    if (memcmp(b + 344, "n+1", 4)) return REFUSE(s, "byte", 344, "not a NIfTI-1 file with its voxels inside (n+1)");
     int n_axis = (int16_t)pal_word_at(b + 40, 2, big);
-    if (n_axis < 3 || n_axis > 7) return refuse(s, "byte", 40, "%d axes, three are read", n_axis);
+    if (n_axis < 3 || n_axis > 7) return REFUSE(s, "byte", 40, "%d axes, three are read", n_axis);
     for (int a = 0; a < n_axis; a++) {
         int64_t size = (int16_t)pal_word_at(b + 42 + 2 * a, 2, big);
         if (size < 1 || (a >= 3 && size > 1))
-            return refuse(s, "byte", 42 + 2 * a, "axis %d has %lld voxels%s", a + 1, (long long)size,
+            return REFUSE(s, "byte", 42 + 2 * a, "axis %d has %lld voxels%s", a + 1, (long long)size,
                           a < 3 ? "" : ", one is read beyond the third axis");
         if (a < 3) h->n[a] = size;
     }
     int code = (int16_t)pal_word_at(b + 70, 2, big);
     size_t k = 0, n_known = sizeof known / sizeof *known;
     while (k < n_known && known[k].code != code) k++;
-    if (k == n_known) return refuse(s, "byte", 70, "voxel type %d is not read", code);
+    if (k == n_known) return REFUSE(s, "byte", 70, "voxel type %d is not read", code);
     h->type = known[k].type;
     double offset = pal_float_at(b + 108, big);
-    if (!(offset >= NIFTI_HEAD && offset < 1e9)) return refuse(s, "byte", 108, "voxels begin at byte %g", offset);
+    if (!(offset >= NIFTI_HEAD && offset < 1e9)) return REFUSE(s, "byte", 108, "voxels begin at byte %g", offset);
     h->offset = (size_t)offset;
     h->slope = pal_float_at(b + 112, big);
     h->shift = pal_float_at(b + 116, big);
-    if (!isfinite(h->slope) || !isfinite(h->shift)) return refuse(s, "byte", 112, "the scale is not finite");
+    if (!isfinite(h->slope) || !isfinite(h->shift)) return REFUSE(s, "byte", 112, "the scale is not finite");
     if (h->slope == 0) h->slope = 1, h->shift = 0;
     nifti_axes(b, big, h->to_m);
-    return axes_usable(h->to_m) ? PAL_ERR_OK : refuse(s, "byte", 76, "the voxel axes are flat or not finite");
+    return axes_usable(h->to_m) ? PAL_ERR_OK : REFUSE(s, "byte", 76, "the voxel axes are flat or not finite");
 }
 
 static bool is_inr(const uint8_t *b, size_t n)
@@ -250,22 +240,22 @@ static pal_err inr_check(const source *s, const inr_words *w, header *h)
     static const char *const axis = "XYZ";
     for (int a = 0; a < 3; a++) {
         if (!(w->dim[a] >= 1 && w->dim[a] <= 1e6) || w->dim[a] != floor(w->dim[a]))
-            return refuse(s, "line", w->dim_line[a], "%cDIM is %g", axis[a], w->dim[a]);
+            return REFUSE(s, "line", w->dim_line[a], "%cDIM is %g", axis[a], w->dim[a]);
         h->n[a] = (int64_t)w->dim[a];
         h->to_m[5 * a] = 1e-3 * w->size[a];
     }
-    if (w->vdim != 1) return refuse(s, "line", w->vdim_line, "VDIM is %g, one value in a voxel is read", w->vdim);
+    if (w->vdim != 1) return REFUSE(s, "line", w->vdim_line, "VDIM is %g, one value in a voxel is read", w->vdim);
     int odd = 0;
     while (odd < 2 && w->size[odd] > 0 && w->size[odd] < 1e5) odd++;
     if (!axes_usable(h->to_m))
-        return refuse(s, "line", w->size_line[odd], "a voxel of %g x %g x %g mm", w->size[0], w->size[1], w->size[2]);
+        return REFUSE(s, "line", w->size_line[odd], "a voxel of %g x %g x %g mm", w->size[0], w->size[1], w->size[2]);
     bool fixed = w->type == UNSIGNED || w->type == SIGNED;
     if (w->type == FLOATING && (w->bits == 32 || w->bits == 64))
         h->type = w->bits == 32 ? PAL_SCALAR_F32 : PAL_SCALAR_F64;
     else if (fixed && (w->bits == 8 || w->bits == 16 || w->bits == 32 || w->bits == 64))
         h->type = (pal_scalar)(2 * __builtin_ctzll((uint64_t)w->bits / 8) + (w->type == SIGNED));
     else
-        return refuse(s, "line", w->type_line, "TYPE and PIXSIZE do not name a voxel type (%lld bits)",
+        return REFUSE(s, "line", w->type_line, "TYPE and PIXSIZE do not name a voxel type (%lld bits)",
                       (long long)w->bits);
     return PAL_ERR_OK;
 }
@@ -276,7 +266,7 @@ static pal_err inr_header(const source *s, const uint8_t *b, size_t n, header *h
     /* the header fills blocks of 256 bytes and ends with the last one */
     for (size_t end = 256; end <= n && h->offset == 0; end += 256)
         if (memcmp(b + end - 4, "##}\n", 4) == 0) h->offset = end;
-    if (h->offset == 0) return refuse(s, "byte", (int64_t)n, "no end of the header (##}) at a multiple of 256 bytes");
+    if (h->offset == 0) return REFUSE(s, "byte", (int64_t)n, "no end of the header (##}) at a multiple of 256 bytes");
     inr_words w = {
         .vdim = 1, .size = {1, 1, 1}, .dim_line = {1, 1, 1}, .size_line = {1, 1, 1}, .vdim_line = 1, .type_line = 1};
     pal_text_scan scan = {.at = b, .end = b + h->offset - 4, .line = 1};
@@ -284,11 +274,11 @@ static pal_err inr_header(const source *s, const uint8_t *b, size_t n, header *h
         if (!pal_text_more(&scan) || *scan.at == '#') continue;
         const uint8_t *key = scan.at;
         while (scan.at < scan.end && *scan.at >= ' ' && *scan.at != '=') scan.at++;
-        if (scan.at == scan.end || *scan.at != '=') return refuse(s, "line", scan.line, "expected KEY=value");
+        if (scan.at == scan.end || *scan.at != '=') return REFUSE(s, "line", scan.line, "expected KEY=value");
         size_t n_key = (size_t)(scan.at++ - key);
         while (n_key > 0 && key[n_key - 1] == ' ') n_key--;
         if (!inr_entry((const char *)key, n_key, &scan, &w, h))
-            return refuse(s, "line", scan.line, "the value of %.*s is %s", (int)(n_key < 20 ? n_key : 20),
+            return REFUSE(s, "line", scan.line, "the value of %.*s is %s", (int)(n_key < 20 ? n_key : 20),
                           (const char *)key, pal_text_excerpt_at(&scan).text);
     }
     return inr_check(s, &w, h);
@@ -318,7 +308,7 @@ static pal_err copy_voxels(const source *s, const header *h, unpacker *u, size_t
         size_t max = at < h->offset ? h->offset - at : need - at, got;
         PAL_TRY(unpack_next(u, room, max < PIECE ? max : PIECE, &bytes, &got));
         if (got == 0 || (at >= h->offset && got % size))
-            return refuse(s, "byte", (int64_t)(at + got),
+            return REFUSE(s, "byte", (int64_t)(at + got),
                           "the %sfile ends, but %lld x %lld x %lld voxels need %zu bytes", s->packed ? "unpacked " : "",
                           (long long)h->n[0], (long long)h->n[1], (long long)h->n[2], need);
         at += got;
@@ -377,7 +367,7 @@ pal_err pal_label_volume_parse(const char *name, const uint8_t *bytes, size_t n_
     char shown[128];
     pal_file_printable_name(shown, name);
     source s = {.name = shown, .diag = diag, .bytes = bytes, .n_byte = n_byte, .packed = is_gzip(bytes, n_byte)};
-    if (n_byte == 0) return refuse(&s, "byte", 0, "the file is empty");
+    if (n_byte == 0) return REFUSE(&s, "byte", 0, "the file is empty");
     uint8_t room[MAX_HEADER];
     const uint8_t *head;
     size_t n_head;
@@ -388,7 +378,7 @@ pal_err pal_label_volume_parse(const char *name, const uint8_t *bytes, size_t n_
     else if (!err && is_inr(head, n_head))
         err = inr_header(&s, head, n_head, &h);
     else if (!err)
-        err = refuse(&s, "byte", 0, "neither NIfTI-1 nor INRIMAGE-4");
+        err = REFUSE(&s, "byte", 0, "neither NIfTI-1 nor INRIMAGE-4");
     return err ? err : read_voxels(&s, &h, out);
 }
 

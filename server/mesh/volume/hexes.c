@@ -7,10 +7,8 @@
 
 #include "server/base/heap.h"
 #include "server/base/vec3.h"
+#include "server/mesh/voxel/voxel_bits.h"
 #include "server/mesh/voxel/voxel_fraction.h"
-
-#include <stdlib.h>
-#include <string.h>
 
 /* relative to edge_m: error of node positions from single precision in a file, at some hundred voxels across */
 #define AWAY 1e-4
@@ -75,7 +73,7 @@ static bool find_corners(const pal_tets *tets, const int32_t *five, int32_t node
 pal_err pal_hexes_find(const pal_tets *tets, pal_hexes *out, pal_diagnostic *diag)
 {
     if (tets->n_tet == 0 || tets->n_tet % 5 || !(tets->edge_m > 0))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%d tetrahedra are no voxels of five each", tets->n_tet);
+        return PAL_REFUSE(diag, "%d tetrahedra are no voxels of five each", tets->n_tet);
     pal_hexes hexes = {.n_hex = tets->n_tet / 5};
     hexes.node = pal_voxels_array((size_t)hexes.n_hex * 8 * sizeof *hexes.node);
     hexes.fill = pal_voxels_array((size_t)hexes.n_hex * sizeof *hexes.fill);
@@ -88,8 +86,7 @@ pal_err pal_hexes_find(const pal_tets *tets, pal_hexes *out, pal_diagnostic *dia
         const int32_t *five = tets->tet + 20 * e;
         if (read_pattern(tets, five, hexes.node + 8 * e) || find_corners(tets, five, hexes.node + 8 * e)) continue;
         pal_hexes_free(&hexes);
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "tetrahedra %zu to %zu do not fill a voxel of %g m", 5 * e,
-                                  5 * e + 4, tets->edge_m);
+        return PAL_REFUSE(diag, "tetrahedra %zu to %zu do not fill a voxel of %g m", 5 * e, 5 * e + 4, tets->edge_m);
     }
     *out = hexes;
     return PAL_ERR_OK;
@@ -105,7 +102,7 @@ static pal_err find_grid(const pal_hexes *hexes, const pal_tets *tets, const pal
     grid->edge_m = h;
     for (int k = 0; k < 3; k++) {
         double n = (high[k] - low[k]) / h;
-        if (!(n < 2000)) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "the mesh is %.0f voxels across", n);
+        if (!(n < 2000)) return PAL_REFUSE(diag, "the mesh is %.0f voxels across", n);
         grid->n[k] = (int)(n + 0.5) + 2;
         grid->low_m[k] = low[k] - h + tets->origin_m[k] - surface->origin_m[k];
     }

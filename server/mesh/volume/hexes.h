@@ -2,8 +2,6 @@
  * Hexahedron e is the voxel of tetrahedra 5 e .. 5 e + 4. A pal_hexes owns its arrays (heap). Thread: [load]. */
 #ifndef PAL_MESH_VOLUME_HEXES_H
 #define PAL_MESH_VOLUME_HEXES_H
-#include "server/mesh/geometry/surface.h"
-#include "server/mesh/geometry/tets.h"
 #include "server/mesh/voxel/voxels.h"
 
 typedef struct pal_hexes {

@@ -7,9 +7,6 @@
 #include "server/base/heap.h"
 #include "server/base/vec3.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 /* the margin, in cells; tolerance of inside, in edges; cells per element */
 #define HAIR   1e-6
 #define INSIDE 1e-9
@@ -117,48 +114,37 @@ pal_err pal_locate_create(const pal_tets *tets, const pal_hexes *hexes, pal_loca
     l->tets = tets, l->hexes = hexes, l->n_element = n_element;
     make_cells(l);
     size_t n_cell = (size_t)l->n[0] * (size_t)l->n[1] * (size_t)l->n[2];
-    l->start = calloc(n_cell + 2, sizeof *l->start);
-    if (l->start) {
+    pal_err err = PAL_ERR_OK;
+    PAL_ZEROED(&err, l->start, n_cell + 2);
+    if (!err) {
         fill_cells(l, l->start);
         for (size_t c = 0; c < n_cell; c++) l->start[c + 2] += l->start[c + 1];
-        l->element = malloc((size_t)(l->start[n_cell + 1] + 1) * sizeof *l->element);
+        PAL_ARRAY(&err, l->element, l->start[n_cell + 1]);
     }
-    if (!l->element) {
-        pal_locate_destroy(l);
-        return PAL_ERR_MEMORY;
-    }
+    if (err) return PAL_FREED(err, l->start, l);
     fill_cells(l, l->start);
     *out = l;
     return PAL_ERR_OK;
 }
 
-static void hex_local(const pal_locate *l, int element, const double x[3], double local[4])
-{
-    const double *low = corner(l, element, 0), *high = corner(l, element, 7);
-    for (int k = 0; k < 3; k++) local[k] = ((x[k] - low[k]) + (x[k] - high[k])) / (high[k] - low[k]);
-    local[3] = 0;
-}
-
-static void tet_local(const pal_locate *l, int element, const double x[3], double local[4])
+void pal_locate_local(const pal_locate *l, int element, const double x[3], double local[4])
 {
     double e[3][3], d[3], cross[3], six = 0;
-    const double *origin = corner(l, element, 0);
-    for (int k = 0; k < 3; k++) pal_sub3(e[k], corner(l, element, k + 1), origin);
-    pal_sub3(d, x, origin);
+    const double *low = corner(l, element, 0);
+    if (l->hexes) {
+        const double *high = corner(l, element, 7);
+        for (int k = 0; k < 3; k++) local[k] = ((x[k] - low[k]) + (x[k] - high[k])) / (high[k] - low[k]);
+        local[3] = 0;
+        return;
+    }
+    for (int k = 0; k < 3; k++) pal_sub3(e[k], corner(l, element, k + 1), low);
+    pal_sub3(d, x, low);
     for (int k = 0; k < 3; k++) {
         pal_cross3(cross, e[(k + 1) % 3], e[(k + 2) % 3]);
         if (k == 0) six = pal_dot3(e[0], cross);
         local[k + 1] = pal_dot3(d, cross) / six;
     }
     local[0] = 1 - local[1] - local[2] - local[3];
-}
-
-void pal_locate_local(const pal_locate *locate, int element, const double x[3], double local[4])
-{
-    if (locate->hexes)
-        hex_local(locate, element, x, local);
-    else
-        tet_local(locate, element, x, local);
 }
 
 static double segment_distance(const double p[3], const double a[3], const double b[3])
@@ -198,7 +184,7 @@ static double element_distance(const pal_locate *l, int element, const double x[
         return pal_norm3(away);
     }
     double local[4], best = INFINITY;
-    tet_local(l, element, x, local);
+    pal_locate_local(l, element, x, local);
     if (local[0] >= 0 && local[1] >= 0 && local[2] >= 0 && local[3] >= 0) return 0;
     for (int f = 0; f < 4; f++) {
         if (local[f] > 0) continue;
@@ -237,9 +223,8 @@ static void search_outward(const pal_locate *l, const int c[3], int r, const dou
         }
 }
 
-int pal_locate_point(const pal_locate *locate, const double x[3], double local[4], double *outside_m)
+int pal_locate_point(const pal_locate *l, const double x[3], double local[4], double *outside_m)
 {
-    const pal_locate *l = locate;
     nearest best = {0, INFINITY};
     int from[3], to[3], max = 0;
     cell_range(l, x, x, -2 * HAIR * l->cell_m, from, to);

@@ -126,7 +126,7 @@ static void cut_lattice(cutter *c, pal_polygon *p, int axis)
 static void add_triangle(cutter *c, const pal_surface *surface, size_t t, const double low[3], const double high[3],
                          const double *normal)
 {
-    pal_polygon p = {.n = 3}, cut;
+    pal_polygon p = {.n = 3};
     double cross[3];
     for (int k = 0; k < 3; k++)
         for (int d = 0; d < 3; d++)
@@ -136,10 +136,7 @@ static void add_triangle(cutter *c, const pal_surface *surface, size_t t, const 
     if (!pal_unit3(c->normal, cross, 0)) return;
     if (normal && pal_dot3(c->normal, normal) < COS_OFF) return;
     c->crumb_m2 = CRUMB * pal_norm3(cross) / 2;
-    for (int k = 0; k < 3 && p.n >= 3; k++) {
-        pal_polygon_cut_axis(&p, k, low[k], NULL, &cut);
-        pal_polygon_cut_axis(&cut, k, high[k], &p, NULL);
-    }
+    for (int k = 0; k < 3; k++) pal_polygon_clip(&p, k, low[k], high[k]);
     cut_lattice(c, &p, 0);
 }
 

@@ -5,16 +5,10 @@
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/tuning.h"
 
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
 typedef struct component {
     double volume_m3, moment[3]; /* moment: volume times centre, m^4 */
     bool fixed, keep;
 } component;
-
-/* ---- the rule ---- */
 
 static pal_err refuse(const char *name, const component *part, const pal_loose_components *all, int n_bad, int bad,
                       pal_diagnostic *diag)
@@ -22,12 +16,11 @@ static pal_err refuse(const char *name, const component *part, const pal_loose_c
     const component *p = &part[bad];
     double middle[3];
     pal_scale3(middle, 1 / p->volume_m3, p->moment);
-    return pal_diagnostic_set(
-        diag, PAL_ERR_REFUSED,
-        "body \"%.60s\": %d of %d components ha%s no support, the largest of %.3g ml (%.3g %% of the "
-        "body) around (%.4f, %.4f, %.4f) m: hold each component by a support",
-        name, n_bad, all->n_component, n_bad == 1 ? "s" : "ve", 1e6 * p->volume_m3, 100 * p->volume_m3 / all->volume_m3,
-        middle[0], middle[1], middle[2]);
+    return PAL_REFUSE(diag,
+                      "body \"%.60s\": %d of %d components ha%s no support, the largest of %.3g ml (%.3g %% of the "
+                      "body) around (%.4f, %.4f, %.4f) m: hold each component by a support",
+                      name, n_bad, all->n_component, n_bad == 1 ? "s" : "ve", 1e6 * p->volume_m3,
+                      100 * p->volume_m3 / all->volume_m3, middle[0], middle[1], middle[2]);
 }
 
 static pal_err choose(const char *name, bool largest_only, component *part, int n, pal_loose_components *out,
@@ -65,8 +58,6 @@ void pal_loose_components_describe(const pal_loose_components *parts, const char
                        100 * parts->dropped_m3 / parts->volume_m3,
                        parts->largest_only ? ": only the largest is kept" : ": small and without support");
 }
-
-/* ---- tetrahedra ---- */
 
 static void add_tet(const pal_tets *tets, const uint8_t *fixed, const int32_t *corner, component *to)
 {
@@ -159,11 +150,8 @@ pal_err pal_loose_components_drop(const char *name, const uint8_t *fixed, bool l
     if (!err) err = choose(name, largest_only, part, n, out, diag);
     if (!err && out->n_dropped > 0) err = keep_mesh(mesh, label, part);
     if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "body \"%.60s\": no memory to find its components", name);
-    PAL_FREE(label, part);
-    return err;
+    return PAL_FREED(err, label, part);
 }
-
-/* ---- control cells ---- */
 
 static pal_err keep_cells(pal_cells *cells, const int32_t *label, const component *part)
 {
@@ -171,8 +159,7 @@ static pal_err keep_cells(pal_cells *cells, const int32_t *label, const componen
     pal_cells kept = {0};
     bool *keep = malloc((size_t)cells->n_cell * sizeof *keep);
     for (int32_t c = 0; keep && c < cells->n_cell; c++) keep[c] = part[label[c]].keep;
-    pal_err err = keep ? pal_cells_loops(cells, &loops) : PAL_ERR_MEMORY;
-    if (!err) err = pal_cell_loops_keep(&loops, keep, NULL);
+    pal_err err = keep ? pal_cells_loops(cells, keep, &loops, NULL) : PAL_ERR_MEMORY;
     if (!err) err = pal_cells_make(&loops, &kept, NULL);
     pal_cell_loops_free(&loops);
     free(keep);
@@ -202,6 +189,5 @@ pal_err pal_loose_cells_drop(const char *name, const uint8_t *fixed, bool larges
     if (!err) err = choose(name, largest_only, part, n, out, diag);
     if (!err && out->n_dropped > 0) err = keep_cells(cells, label, part);
     if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "body \"%.60s\": no memory to find its components", name);
-    PAL_FREE(label, part);
-    return err;
+    return PAL_FREED(err, label, part);
 }

@@ -11,7 +11,6 @@
 #include "server/base/vec3.h"
 #include "server/mesh/files/file_bytes.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -304,25 +303,22 @@ static pal_err read_head(const char *name, const uint8_t *bytes, size_t n_byte, 
 {
     head h = {0};
     if (n_byte >= HEAD) memcpy(&h, bytes, HEAD);
-    if (memcmp(h.magic, MAGIC, sizeof h.magic))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte 0: not a prepared mesh", name);
+    if (memcmp(h.magic, MAGIC, sizeof h.magic)) return PAL_REFUSE(diag, "%s: byte 0: not a prepared mesh", name);
     *l = layout_of(h.version);
     if ((h.version != VERSION && h.version != VERSION_2) || h.n_section != (uint32_t)l->n_section)
-        return pal_diagnostic_set(
-            diag, PAL_ERR_REFUSED,
-            "%s: byte 8: version %u with %u sections, this program reads %d with %d and %d with %d", name, h.version,
-            h.n_section, VERSION, N_SECTION, VERSION_2, N_SECTION_2);
+        return PAL_REFUSE(diag, "%s: byte 8: version %u with %u sections, this program reads %d with %d and %d with %d",
+                          name, h.version, h.n_section, VERSION, N_SECTION, VERSION_2, N_SECTION_2);
     if (h.n_byte != n_byte || n_byte < l->table + ENTRY * (size_t)l->n_section)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte 16: %llu bytes announced, %zu are there", name,
-                                  (unsigned long long)h.n_byte, n_byte);
+        return PAL_REFUSE(diag, "%s: byte 16: %llu bytes announced, %zu are there", name, (unsigned long long)h.n_byte,
+                          n_byte);
     if (h.checksum != pal_prepared_checksum(bytes, n_byte))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte 24: the checksum does not fit the content", name);
+        return PAL_REFUSE(diag, "%s: byte 24: the checksum does not fit the content", name);
     memset(count, 0, N_COUNT * sizeof *count);
     memcpy(count, bytes + HEAD, (size_t)l->n_count * sizeof *count);
     for (int k = 0; k < l->n_count; k++)
         if (count[k] > INT32_MAX / 8)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: byte %d: count %llu is too large", name, HEAD + 8 * k,
-                                      (unsigned long long)count[k]);
+            return PAL_REFUSE(diag, "%s: byte %d: count %llu is too large", name, HEAD + 8 * k,
+                              (unsigned long long)count[k]);
     return PAL_ERR_OK;
 }
 
@@ -338,9 +334,7 @@ static pal_err read_sections(const char *name, const uint8_t *bytes, size_t n_by
         memcpy(&e, bytes + place, ENTRY);
         if (e.number != (uint32_t)k + 1 || e.item_byte != s[k].n_byte || e.n != s[k].n || e.at < end || e.at % 64 ||
             e.at > n_byte || size > n_byte - e.at)
-            return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                      "%s: byte %zu: section %d does not fit the counts or the file", name, place,
-                                      k + 1);
+            return PAL_REFUSE(diag, "%s: byte %zu: section %d does not fit the counts or the file", name, place, k + 1);
         end = e.at + size;
         void *array = malloc(size ? size : 1);
         memcpy(s[k].pointer, &array, sizeof array);
@@ -359,8 +353,8 @@ static pal_err read_hexes(const char *name, uint64_t n_fill, pal_prepared *p, pa
     if (err == PAL_ERR_MEMORY) pal_diagnostic_set(diag, err, "%s: out of memory for the voxels", name);
     if (err == PAL_ERR_REFUSED && n_fill == 0) err = PAL_ERR_OK;
     if (err == PAL_ERR_REFUSED || (!err && n_fill > 0 && n_fill != (uint64_t)p->hexes.n_hex))
-        err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: fill of %llu voxels, the mesh has %d", name,
-                                 (unsigned long long)n_fill, p->hexes.n_hex);
+        err = PAL_REFUSE(diag, "%s: fill of %llu voxels, the mesh has %d", name, (unsigned long long)n_fill,
+                         p->hexes.n_hex);
     if (err || n_fill == 0) {
         free(fill);
         return err;
@@ -388,7 +382,7 @@ pal_err pal_prepared_parse(const char *name, const uint8_t *bytes, size_t n_byte
         memcpy(p.surface.origin_m, p.tets.origin_m, 24);
         memcpy(&p.tets.edge_m, place + 24, 8);
         const char *fault = find_fault(&p, count);
-        if (fault) err = pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: %s", name, fault);
+        if (fault) err = PAL_REFUSE(diag, "%s: %s", name, fault);
     }
     if (!err && (err = pal_tets_check(&p.tets, NULL)) == PAL_ERR_REFUSED) {
         pal_diagnostic inner;

@@ -2,11 +2,8 @@
  * that is simulated on the surface itself (model adaptive_springs) it is the surface alone. Thread: [load]. */
 #ifndef PAL_MESH_VOLUME_PREPARED_H
 #define PAL_MESH_VOLUME_PREPARED_H
-#include "server/mesh/geometry/surface.h"
-#include "server/mesh/geometry/tets.h"
 #include "server/mesh/volume/hexes.h"
 #include "server/mesh/volume/skin.h"
-#include "server/mesh/voxel/voxels.h"
 
 typedef struct pal_prepared {
     pal_surface surface; /* the displayed surface */

@@ -10,9 +10,6 @@
 #include "server/mesh/geometry/kd_tree.h"
 #include "server/mesh/geometry/tuning.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 /* distance to a node, in voxel edges, at which a vertex lies on it */
 #define ON_NODE 1e-7
 
@@ -29,16 +26,13 @@ void pal_skin_free(pal_skin *skin)
 static double fan_normal(const double *x, int node, const int32_t *fan, int n, double normal[3])
 {
     const double *o = x + 3 * (size_t)node;
-    double sx = 0, sy = 0, sz = 0, squares = 0;
+    double sum[3] = {0}, c[3], squares = 0;
     for (int i = 0; i < n; i++) {
-        const double *a = x + 3 * (size_t)fan[2 * i], *b = x + 3 * (size_t)fan[2 * i + 1];
-        double ax = a[0] - o[0], ay = a[1] - o[1], az = a[2] - o[2];
-        double bx = b[0] - o[0], by = b[1] - o[1], bz = b[2] - o[2];
-        double cx = ay * bz - az * by, cy = az * bx - ax * bz, cz = ax * by - ay * bx;
-        sx += cx, sy += cy, sz += cz;
-        squares += cx * cx + cy * cy + cz * cz;
+        pal_normal3(c, o, x + 3 * (size_t)fan[2 * i], x + 3 * (size_t)fan[2 * i + 1]);
+        pal_add3(sum, sum, c);
+        squares += pal_dot3(c, c);
     }
-    normal[0] = sx, normal[1] = sy, normal[2] = sz;
+    pal_copy3(normal, sum);
     return squares;
 }
 
@@ -96,7 +90,7 @@ static int find_candidates(const pal_tets *tets, const int32_t *start, const int
     return n;
 }
 
-/* the five nearest candidates of every vertex into near (as candidates), distances squared into coef[..][3] */
+/* the five nearest candidates of every vertex into near, as nodes, and their weights into coef[..][3] */
 static pal_err find_near(const pal_tets *tets, const int32_t *candidate, int n_candidate, const double *x,
                          pal_skin *skin)
 {
@@ -167,26 +161,21 @@ static pal_err make_frames(const pal_tets *tets, const int32_t *start, const int
     int n_frame = 0;
     memset(place, 0, (size_t)tets->n_node * sizeof *place);
     for (size_t i = 0; i < n_near; i++) place[skin->near[i]] = 1;
-    for (int i = 0; i < tets->n_node; i++)
-        if (place[i]) {
-            place[i] = n_frame++;
-            n_fan += (size_t)(start[i + 1] - start[i]);
-        } else {
-            place[i] = -1;
-        }
+    for (int i = 0; i < tets->n_node; i++) {
+        if (place[i]) n_fan += (size_t)(start[i + 1] - start[i]);
+        place[i] = place[i] ? n_frame++ : -1;
+    }
     for (size_t i = 0; i < n_near; i++) skin->near[i] = place[skin->near[i]];
 
-    size_t room = n_frame ? (size_t)n_frame : 1;
+    pal_err err = PAL_ERR_OK;
     skin->n_frame = n_frame;
-    skin->frame = malloc(room * sizeof *skin->frame);
-    skin->frame_edge = malloc(room * 2 * sizeof *skin->frame_edge);
-    skin->frame_rotation = malloc(room * 2 * sizeof *skin->frame_rotation);
-    skin->frame_rest = malloc(room * 3 * sizeof *skin->frame_rest);
-    skin->fan_start = malloc((room + 1) * sizeof *skin->fan_start);
-    skin->fan = malloc((n_fan ? n_fan : 1) * 2 * sizeof *skin->fan);
-    if (!skin->frame || !skin->frame_edge || !skin->frame_rotation || !skin->frame_rest || !skin->fan_start ||
-        !skin->fan)
-        return PAL_ERR_MEMORY;
+    PAL_ARRAY(&err, skin->frame, n_frame);
+    PAL_ARRAY(&err, skin->frame_edge, 2 * n_frame);
+    PAL_ARRAY(&err, skin->frame_rotation, 2 * n_frame);
+    PAL_ARRAY(&err, skin->frame_rest, 3 * n_frame);
+    PAL_ARRAY(&err, skin->fan_start, n_frame + 1);
+    PAL_ARRAY(&err, skin->fan, 2 * n_fan);
+    if (err) return err;
     skin->fan_start[0] = 0;
     for (int i = 0; i < tets->n_node; i++) {
         if (place[i] < 0) continue;
@@ -227,16 +216,13 @@ pal_err pal_skin_bind(const pal_tets *tets, const double *x, int n_vertex, pal_s
 {
     if (tets->n_face == 0 || tets->n_node == 0) return PAL_ERR_REFUSED;
     pal_skin skin = {.n_vertex = n_vertex, .n_node = tets->n_node};
-    size_t n = n_vertex ? (size_t)n_vertex : 1;
-    int32_t *start = NULL, *fan = NULL, *candidate = malloc((size_t)tets->n_node * sizeof *candidate);
-    skin.near = malloc(n * PAL_SKIN_NEIGHBOURS * sizeof *skin.near);
-    skin.coef = calloc(n * PAL_SKIN_NEIGHBOURS * 4, sizeof *skin.coef);
-    pal_err err = candidate && skin.near && skin.coef ? PAL_ERR_OK : PAL_ERR_MEMORY;
+    pal_err err = PAL_ERR_OK;
+    int32_t *start = NULL, *fan = NULL, *candidate;
+    PAL_ARRAY(&err, candidate, tets->n_node);
+    PAL_ARRAY(&err, skin.near, PAL_SKIN_NEIGHBOURS * (size_t)n_vertex);
+    PAL_ZEROED(&err, skin.coef, 4 * PAL_SKIN_NEIGHBOURS * (size_t)n_vertex);
     if (!err) err = node_fans(tets, &start, &fan);
-    if (!err) {
-        int n_candidate = find_candidates(tets, start, fan, candidate);
-        err = find_near(tets, candidate, n_candidate, x, &skin);
-    }
+    if (!err) err = find_near(tets, candidate, find_candidates(tets, start, fan, candidate), x, &skin);
     if (!err) err = make_frames(tets, start, fan, candidate, &skin);
     if (!err) err = store_offsets(tets, x, &skin);
     PAL_FREE(start, fan, candidate);

@@ -6,7 +6,6 @@
  * frames buffer. */
 #ifndef PAL_MESH_VOLUME_SKIN_H
 #define PAL_MESH_VOLUME_SKIN_H
-#include "server/base/arena.h"
 #include "server/mesh/geometry/surface.h"
 #include "server/mesh/geometry/tets.h"
 

@@ -1,27 +1,25 @@
 /* Voxels of twice the edge, by way of a grid. */
 #include "server/mesh/volume/voxel_coarsening.h"
 
+#include "server/base/heap.h"
 #include "server/base/vec3.h"
 #include "server/mesh/geometry/tuning.h"
 
-#include <stdlib.h>
-#include <string.h>
-
+/* the coarse lattice and the fill of its cells */
 typedef struct grid {
-    int n[3];
-    double low[3]; /* corner of cell 0 0 0 */
-    double edge_m; /* edge of a coarse cell */
-    float *fill;   /* [n2][n1][n0]         */
+    pal_voxels voxels; /* kind is set last    */
+    size_t n_cell;
+    float *fill; /* [n2][n1][n0]        */
 } grid;
 
 static size_t cell(const grid *g, const double *x)
 {
+    const pal_voxels *v = &g->voxels;
     size_t at[3];
-    for (int c = 0; c < 3; c++) at[c] = (size_t)floor((x[c] - g->low[c]) / g->edge_m);
-    return at[0] + (size_t)g->n[0] * (at[1] + (size_t)g->n[1] * at[2]);
+    for (int c = 0; c < 3; c++) at[c] = (size_t)floor((x[c] - v->low_m[c]) / v->edge_m);
+    return at[0] + (size_t)v->n[0] * (at[1] + (size_t)v->n[1] * at[2]);
 }
 
-/* middle of hexahedron e */
 static void middle(const pal_tets *tets, const pal_hexes *hexes, int e, double x[3])
 {
     const double *corner = tets->x + 3 * (size_t)hexes->node[8 * (size_t)e];
@@ -30,53 +28,40 @@ static void middle(const pal_tets *tets, const pal_hexes *hexes, int e, double x
 
 static pal_err make_grid(const pal_tets *tets, const pal_hexes *hexes, const int shift[3], grid *g)
 {
+    pal_voxels *v = &g->voxels;
     double high[3], h = tets->edge_m;
-    pal_box3_empty(g->low, high);
-    for (size_t i = 0; i < (size_t)tets->n_node; i++) pal_box3_add(g->low, high, tets->x + 3 * i);
-    g->edge_m = 2 * h;
-    size_t n_cell = 1;
+    pal_err err = PAL_ERR_OK;
+    pal_box3_empty(v->low_m, high);
+    for (size_t i = 0; i < (size_t)tets->n_node; i++) pal_box3_add(v->low_m, high, tets->x + 3 * i);
+    v->edge_m = 2 * h;
+    g->n_cell = 1;
     for (int c = 0; c < 3; c++) {
-        g->low[c] -= shift[c] ? h : 0;
-        g->n[c] = (int)ceil((high[c] - g->low[c]) / g->edge_m - 1e-6);
-        n_cell *= (size_t)g->n[c];
+        v->origin_m[c] = tets->origin_m[c];
+        v->low_m[c] -= shift[c] ? h : 0;
+        v->n[c] = (int)ceil((high[c] - v->low_m[c]) / v->edge_m - 1e-6);
+        g->n_cell *= (size_t)v->n[c];
     }
-    g->fill = calloc(n_cell, sizeof *g->fill);
-    if (!g->fill) return PAL_ERR_MEMORY;
-    for (int e = 0; e < hexes->n_hex; e++) {
+    PAL_ZEROED(&err, g->fill, g->n_cell);
+    PAL_ZEROED(&err, v->kind, g->n_cell);
+    for (int e = 0; e < hexes->n_hex && !err; e++) {
         double x[3];
         middle(tets, hexes, e, x);
         g->fill[cell(g, x)] += fmaxf(hexes->fill[e], 1e-6f) / 8;
     }
-    return PAL_ERR_OK;
+    return err;
 }
 
-static void drop(grid *g, double min_fill)
+/* the voxels, without those of too little fill */
+static void keep_voxels(grid *g, double min_fill)
 {
-    size_t n_cell = (size_t)g->n[0] * (size_t)g->n[1] * (size_t)g->n[2];
     double all = 0, gone = 0;
-    for (size_t i = 0; i < n_cell; i++) {
+    for (size_t i = 0; i < g->n_cell; i++) {
         all += (double)g->fill[i];
         if ((double)g->fill[i] < min_fill) gone += (double)g->fill[i];
     }
-    for (size_t i = 0; i < n_cell && gone <= COARSE_MAX_LOSS * all; i++)
-        if ((double)g->fill[i] < min_fill) g->fill[i] = 0;
-}
-
-static pal_err split(const grid *g, const pal_tets *fine, pal_prepared *out, pal_diagnostic *diag)
-{
-    size_t n_cell = (size_t)g->n[0] * (size_t)g->n[1] * (size_t)g->n[2];
-    pal_voxels voxels = {.edge_m = g->edge_m};
-    memcpy(voxels.n, g->n, sizeof voxels.n);
-    memcpy(voxels.low_m, g->low, sizeof voxels.low_m);
-    memcpy(voxels.origin_m, fine->origin_m, sizeof voxels.origin_m);
-    voxels.kind = calloc(n_cell, 1);
-    if (!voxels.kind) return PAL_ERR_MEMORY;
-    for (size_t i = 0; i < n_cell; i++)
-        if (g->fill[i] > 0) voxels.kind[i] = 2, voxels.n_inside++;
-    pal_err err = pal_voxels_split(&voxels, &out->tets);
-    pal_voxels_free(&voxels);
-    if (!err) err = pal_hexes_find(&out->tets, &out->hexes, diag);
-    return err;
+    if (gone > COARSE_MAX_LOSS * all) min_fill = 0;
+    for (size_t i = 0; i < g->n_cell; i++)
+        if (g->fill[i] > 0 && !((double)g->fill[i] < min_fill)) g->voxels.kind[i] = 2, g->voxels.n_inside++;
 }
 
 pal_err pal_voxels_coarsen(const pal_tets *tets, const pal_hexes *hexes, const int shift[3], double min_fill,
@@ -84,16 +69,20 @@ pal_err pal_voxels_coarsen(const pal_tets *tets, const pal_hexes *hexes, const i
 {
     grid g = {.fill = NULL};
     pal_prepared p = {0};
-    if (hexes->n_hex == 0) return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "there are no voxels to make larger");
+    if (hexes->n_hex == 0) return PAL_REFUSE(diag, "there are no voxels to make larger");
     pal_err err = make_grid(tets, hexes, shift, &g);
-    if (!err) drop(&g, min_fill);
-    if (!err) err = split(&g, tets, &p, diag);
+    if (!err) {
+        keep_voxels(&g, min_fill);
+        err = pal_voxels_split(&g.voxels, &p.tets);
+    }
+    if (!err) err = pal_hexes_find(&p.tets, &p.hexes, diag);
     for (int e = 0; e < p.hexes.n_hex && !err; e++) {
         double x[3];
         middle(&p.tets, &p.hexes, e, x);
         p.hexes.fill[e] = fminf(g.fill[cell(&g, x)], 1);
     }
     free(g.fill);
+    pal_voxels_free(&g.voxels);
     p.hexes.measured = true;
     if (err) {
         pal_prepared_free(&p);

@@ -9,10 +9,6 @@
 #include "server/base/vec3.h"
 #include "server/num/union_find.h"
 
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
 typedef struct edge_entry {
     uint64_t key; /* 0: free */
     int32_t tri[2];
@@ -46,11 +42,6 @@ static int32_t find_patch(finder *f, int32_t i, uint8_t *reversed)
         i = next;
     }
     return root;
-}
-
-static const int32_t *corner(const pal_scan_surface *scan, int32_t tri, int k)
-{
-    return scan->point + 3 * (size_t)scan->tri[3 * (size_t)tri + (size_t)(k == 3 ? 0 : k)];
 }
 
 static void add_edge(finder *f, int32_t tri, uint64_t key, int sign)
@@ -99,7 +90,7 @@ static pal_err find_edges(finder *f)
     for (int32_t t = 0; t < f->scan->n_tri; t++)
         for (int k = 0; k < 3; k++) {
             int sign;
-            uint64_t key = pal_scan_edge(corner(f->scan, t, k), corner(f->scan, t, k + 1), &sign);
+            uint64_t key = pal_scan_edge(f->scan, t, k, &sign);
             if (key) add_edge(f, t, key, sign);
         }
     join_patches(f);
@@ -117,13 +108,13 @@ static void add_edges(const pal_scan_surface *scan, int32_t tri, bool reversed_o
 {
     for (int k = 0; k < 3; k++) {
         int sign;
-        uint64_t h = pal_scan_edge(corner(scan, tri, k), corner(scan, tri, k + 1), &sign);
+        uint64_t h = pal_scan_edge(scan, tri, k, &sign);
         c->sum += sign > 0 ? h : 0 - h;
         c->repaired += (sign > 0) != reversed_of ? h : 0 - h;
         c->odd ^= h;
     }
     for (int d = 0; d < 3; d++)
-        for (int k = 0; k < 3; k++) c->centre[d] += corner(scan, tri, k)[d];
+        for (int k = 0; k < 3; k++) c->centre[d] += pal_scan_corner(scan, (size_t)tri, k)[d];
 }
 
 static void reverse_triangle(int32_t *tri)
@@ -152,20 +143,18 @@ typedef struct hole {
     double sum[3];
 } hole;
 
-/* the open edges in the current orientation of their triangles; returns how many */
-static size_t list_open(const finder *f, open_edge *out)
+/* the open edges in the current orientation of their triangles */
+static void list_open(const finder *f, open_edge *out)
 {
-    size_t n = 0;
     for (size_t i = 0; i <= f->mask; i++) {
         const edge_entry *e = &f->table[i];
         int32_t t = e->tri[0];
         const int32_t *c = f->scan->tri + 3 * (size_t)t;
         int k = 0, sign;
         if (e->n != 1) continue;
-        while (k < 2 && pal_scan_edge(corner(f->scan, t, k), corner(f->scan, t, k + 1), &sign) != e->key) k++;
-        out[n++] = (open_edge){t, c[k], c[(k + 1) % 3]};
+        while (k < 2 && pal_scan_edge(f->scan, t, k, &sign) != e->key) k++;
+        *out++ = (open_edge){t, c[k], c[(k + 1) % 3]};
     }
-    return n;
 }
 
 /* adds the volumes between the fans that close the holes and the centre of each part to the volumes of the parts;
@@ -173,22 +162,19 @@ static size_t list_open(const finder *f, open_edge *out)
 static pal_err close_holes(const finder *f, chain *chains)
 {
     const pal_scan_surface *scan = f->scan;
-    int n_vertex = 0;
     size_t n_open = 0;
     pal_err err = PAL_ERR_OK;
-    for (size_t i = 0; i < 3 * (size_t)scan->n_tri; i++)
-        if (scan->tri[i] >= n_vertex) n_vertex = scan->tri[i] + 1;
     for (size_t i = 0; i <= f->mask; i++) n_open += f->table[i].n == 1;
     if (n_open == 0) return PAL_ERR_OK;
     open_edge *open;
     int32_t *root;
     hole *holes; /* at their roots */
     PAL_ARRAY(&err, open, n_open);
-    PAL_ARRAY(&err, root, n_vertex);
-    PAL_ZEROED(&err, holes, n_vertex);
+    PAL_ARRAY(&err, root, scan->n_vertex);
+    PAL_ZEROED(&err, holes, scan->n_vertex);
     if (!err) {
         list_open(f, open);
-        pal_union_find_init(root, n_vertex);
+        pal_union_find_init(root, scan->n_vertex);
     }
     for (size_t i = 0; i < n_open && !err; i++) pal_union_find_join(root, open[i].a, open[i].b);
     for (size_t i = 0; i < n_open && !err; i++) {
@@ -209,8 +195,7 @@ static pal_err close_holes(const finder *f, chain *chains)
         }
         c->volume += triple_product(p[0], p[1], p[2]) / 6;
     }
-    PAL_FREE(open, root, holes);
-    return err;
+    return PAL_FREED(err, open, root, holes);
 }
 
 /* determines the kind of each part and orients its triangles consistently, then outward; MEMORY */
@@ -236,7 +221,7 @@ static pal_err orient(pal_scan_surface *scan, finder *f, pal_parts *parts, chain
         if (reversed && c->sum != 0 && !c->inconsistent) reverse_triangle(scan->tri + 3 * (size_t)t);
         double p[3][3];
         for (int k = 0; k < 3; k++)
-            for (int d = 0; d < 3; d++) p[k][d] = corner(scan, t, k)[d] - c->centre[d];
+            for (int d = 0; d < 3; d++) p[k][d] = pal_scan_corner(scan, (size_t)t, k)[d] - c->centre[d];
         c->volume += triple_product(p[0], p[1], p[2]) / 6;
     }
     PAL_TRY(close_holes(f, chains));
@@ -433,6 +418,5 @@ pal_err pal_parts_nest(pal_parts *parts, const pal_crossings *rows)
     }
     for (int i = 0; !err && i < parts->n; i++) parts->part[i].cavity = votes[i] > 0;
     pal_parts_work_destroy(w);
-    free(votes);
-    return err;
+    return PAL_FREED(err, votes);
 }

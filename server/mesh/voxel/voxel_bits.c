@@ -31,9 +31,10 @@ static inline uint64_t run_mask(int w, int from, int to)
     return mask;
 }
 
-void pal_bits_set_run(uint64_t *row, int from, int to)
+void pal_bits_set_run(void *row, int from, int to)
 {
-    for (int w = from >> 6; from < to && w <= (to - 1) >> 6; w++) row[w] |= run_mask(w, from, to);
+    uint64_t *word = row;
+    for (int w = from >> 6; from < to && w <= (to - 1) >> 6; w++) word[w] |= run_mask(w, from, to);
 }
 
 int64_t pal_bits_count(const pal_bits *bits)
@@ -79,7 +80,6 @@ static bool runs_of_row(runs *r, const uint64_t *row, int n_word)
     return open < 0 || add_run(r, open, 64 * n_word);
 }
 
-/* joins overlapping runs of two rows */
 static void join_rows(const runs *r, int32_t *parent, int64_t row, int64_t other)
 {
     int64_t i = r->start[row], j = r->start[other];
@@ -141,6 +141,5 @@ pal_err pal_bits_components(pal_bits *bits, bool largest_only, int *n_component)
         if (largest_only && n > 1) clear_smaller(bits, &r, parent, size);
         *n_component = n;
     }
-    PAL_FREE(r.item, r.start, parent, size);
-    return err;
+    return PAL_FREED(err, r.item, r.start, parent, size);
 }

@@ -23,7 +23,7 @@ static inline size_t pal_bits_words(const pal_bits *bits) /* of all rows */
 {
     return (size_t)bits->n_word * (size_t)bits->n[1] * (size_t)bits->n[2];
 }
-void pal_bits_set_run(uint64_t *row, int from, int to); /* bits from..to-1 */
+void pal_bits_set_run(void *row, int from, int to); /* bits from..to-1 of a row of words */
 static inline bool pal_bits_get(const pal_bits *bits, int x, int y, int z)
 {
     return pal_bits_row(bits, y, z)[x >> 6] >> (x & 63) & 1;

@@ -58,11 +58,6 @@ static pal_err scan_parts(decision *d, int axis, pal_crossings *rows)
     return err;
 }
 
-static void set_word_run(void *self, int from, int to)
-{
-    pal_bits_set_run(self, from, to);
-}
-
 /* calls take for the n crossings of each row along an axis that has any */
 static pal_err each_row(decision *d, int axis, uint8_t *vote,
                         void (*take)(decision *d, int axis, uint8_t *vote, pal_parts_work *work, int row,
@@ -85,7 +80,8 @@ static void fill_row(decision *d, int axis, uint8_t *vote, pal_parts_work *work,
                      int64_t n)
 {
     (void)axis, (void)vote;
-    pal_parts_row(&d->parts, work, item, n, set_word_run, d->inside->word + (size_t)d->inside->n_word * (size_t)row);
+    pal_parts_row(&d->parts, work, item, n, pal_bits_set_run,
+                  d->inside->word + (size_t)d->inside->n_word * (size_t)row);
 }
 
 /* votes of the three axes: low four bits inside, high four abstained; the rest say outside */
@@ -268,27 +264,24 @@ static pal_err check_encloses(decision *d, bool open, int resolution)
         if (n_inside > 0 && sided <= MAX_ONE_SIDED && (double)d->n_sure >= SURE_FRACTION * (double)n_inside &&
             (double)d->n_sure >= SURE_FRACTION * (double)d->n_claimed)
             return PAL_ERR_OK;
-        return pal_diagnostic_set(
-            d->diag, PAL_ERR_REFUSED,
-            "no volume (reason 3): the surface of %d triangles is open and encloses nothing: %.2f of its "
-            "area faces one way (limit %.2f), the largest winding number is %.2f, %lld of %lld voxels "
-            "are inside beyond doubt, two axes claim %lld",
-            d->scan->n_tri, sided, MAX_ONE_SIDED, d->max_winding, (long long)d->n_sure, (long long)n_inside,
-            (long long)d->n_claimed);
+        return PAL_REFUSE(d->diag,
+                          "no volume (reason 3): the surface of %d triangles is open and encloses nothing: %.2f of its "
+                          "area faces one way (limit %.2f), the largest winding number is %.2f, %lld of %lld voxels "
+                          "are inside beyond doubt, two axes claim %lld",
+                          d->scan->n_tri, sided, MAX_ONE_SIDED, d->max_winding, (long long)d->n_sure,
+                          (long long)n_inside, (long long)d->n_claimed);
     }
     if (n_inside > 0) return PAL_ERR_OK;
     double volume = d->report->surface_volume_m3, thick = area > 0 ? 2 * volume / area : 0;
     double needed = thick > 0 ? ceil(resolution * d->grid->edge_m / thick) : INFINITY;
     if (needed > 1024)
-        return pal_diagnostic_set(
-            d->diag, PAL_ERR_REFUSED,
-            "no volume (reason 2): the closed surface of %d triangles encloses %.3g m3, %.3g m thick", d->scan->n_tri,
-            volume, thick);
-    return pal_diagnostic_set(
-        d->diag, PAL_ERR_REFUSED,
-        "no volume (reason 2): no centre of a %.3g m voxel lies inside the closed surface, which is "
-        "about %.3g m thick: resolution %d may do",
-        d->grid->edge_m, thick, (int)needed);
+        return PAL_REFUSE(d->diag,
+                          "no volume (reason 2): the closed surface of %d triangles encloses %.3g m3, %.3g m thick",
+                          d->scan->n_tri, volume, thick);
+    return PAL_REFUSE(d->diag,
+                      "no volume (reason 2): no centre of a %.3g m voxel lies inside the closed surface, which is "
+                      "about %.3g m thick: resolution %d may do",
+                      d->grid->edge_m, thick, (int)needed);
 }
 
 /* the requested method, or the first that applies */
@@ -306,7 +299,7 @@ static pal_err run_method(decision *d, pal_voxel_method method, bool *open)
         if (plain) return PAL_ERR_OK;
         memset(d->inside->word, 0, pal_bits_words(d->inside) * sizeof *d->inside->word);
     }
-    PAL_TRY(pal_scan_drop_copies(d->scan, d->surface->n_vertex));
+    PAL_TRY(pal_scan_drop_copies(d->scan));
     PAL_TRY(pal_parts_find(d->scan, &d->parts));
     pal_err err;
     bool even = d->scan->even;

@@ -22,8 +22,7 @@ static pal_err make_grid(const pal_surface *surface, const pal_voxel_options *op
 {
     double low[3], high[3], longest = 0;
     if (options->resolution < 1 || options->resolution > MAX_RESOLUTION)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "resolution %d is not within 1..%d", options->resolution,
-                                  MAX_RESOLUTION);
+        return PAL_REFUSE(diag, "resolution %d is not within 1..%d", options->resolution, MAX_RESOLUTION);
     /* the box of the finite corners of triangles: vertices of no triangle do not count */
     pal_box3_empty(low, high);
     for (size_t i = 0; i < 3 * (size_t)surface->n_tri; i++) {
@@ -31,13 +30,11 @@ static pal_err make_grid(const pal_surface *surface, const pal_voxel_options *op
         if (pal_finite3(x)) pal_box3_add(low, high, x);
     }
     if (!(low[0] <= high[0]))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "no volume (reason 1): none of %d triangles has finite corners", surface->n_tri);
+        return PAL_REFUSE(diag, "no volume (reason 1): none of %d triangles has finite corners", surface->n_tri);
     for (int k = 0; k < 3; k++) longest = fmax(longest, high[k] - low[k]);
     if (!(longest > 0) || !isfinite(longest) || !isnormal(longest / MAX_RESOLUTION / PAL_SCAN_ONE))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED,
-                                  "no volume (reason 1): the box of %d triangles is %g x %g x %g m across",
-                                  surface->n_tri, high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+        return PAL_REFUSE(diag, "no volume (reason 1): the box of %d triangles is %g x %g x %g m across",
+                          surface->n_tri, high[0] - low[0], high[1] - low[1], high[2] - low[2]);
     grid->edge_m = longest / options->resolution;
     for (int k = 0; k < 3; k++) {
         double ahead = fmin(fmax(options->ahead[k], 0), 1);

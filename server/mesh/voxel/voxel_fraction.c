@@ -10,6 +10,7 @@
 #include "server/base/heap.h"
 #include "server/mesh/geometry/polygon.h"
 #include "server/mesh/voxel/voxel_classify.h"
+#include "server/num/sort.h"
 
 #include <math.h>
 
@@ -64,10 +65,7 @@ static void add_row(const sweep *s, pal_polygon *p, int y)
     pal_polygon_range(p, 0, &min, &max);
     if (max <= 0) return;
     pal_polygon low, high;
-    if (min < 0) {
-        pal_polygon_cut_axis(p, 0, 0, NULL, &high);
-        *p = high;
-    }
+    pal_polygon_clip(p, 0, 0, INFINITY);
     int from = clamp_int(floor(min), 0, s->n[0]), to = clamp_int(ceil(max) - 1, from, s->n[0]);
     for (int x = from; x < to; x++) {
         pal_polygon_cut_axis(p, 0, x + 1, &low, &high);
@@ -81,27 +79,14 @@ static void add_row(const sweep *s, pal_polygon *p, int y)
 static void add_triangle(const sweep *s, size_t t, int z)
 {
     pal_polygon p = {.n = 3}, low, high;
-    for (int c = 0; c < 3; c++)
-        for (int k = 0; k < 3; k++)
-            p.x[c][k] = grid_units(s->scan->point[3 * (size_t)s->scan->tri[3 * t + (size_t)c] + (size_t)k]);
+    for (int k = 0; k < 9; k++) p.x[k / 3][k % 3] = grid_units(pal_scan_corner(s->scan, t, k / 3)[k % 3]);
     double min, max;
-    pal_polygon_range(&p, 2, &min, &max);
-    if (min < z) {
-        pal_polygon_cut_axis(&p, 2, z, NULL, &high);
-        p = high;
-    }
-    if (max > z + 1 && p.n >= 3) {
-        pal_polygon_cut_axis(&p, 2, z + 1, &low, NULL);
-        p = low;
-    }
+    pal_polygon_clip(&p, 2, z, z + 1);
     if (p.n < 3) return;
     pal_polygon_range(&p, 1, &min, &max);
     if (max <= 0 || min >= s->n[1]) return;
     int from = clamp_int(floor(min), 0, s->n[1] - 1), to = clamp_int(ceil(max) - 1, from, s->n[1] - 1);
-    if (min < 0) {
-        pal_polygon_cut_axis(&p, 1, 0, NULL, &high);
-        p = high;
-    }
+    pal_polygon_clip(&p, 1, 0, INFINITY);
     for (int y = from; y <= to && p.n >= 3; y++) {
         pal_polygon_cut_axis(&p, 1, y + 1, &low, &high);
         add_row(s, &low, y);
@@ -112,16 +97,15 @@ static void add_triangle(const sweep *s, size_t t, int z)
 /* first and last layer of a triangle; false when it is parallel to the rows or outside the grid */
 static bool find_layers(const sweep *s, size_t t, int *from, int *to)
 {
-    const int32_t *c = s->scan->tri + 3 * t, *p = s->scan->point;
-    const int32_t *a = p + 3 * (size_t)c[0], *b = p + 3 * (size_t)c[1], *e = p + 3 * (size_t)c[2];
+    const int32_t *a = pal_scan_corner(s->scan, t, 0), *b = pal_scan_corner(s->scan, t, 1),
+                  *e = pal_scan_corner(s->scan, t, 2);
+    int32_t layer[3];
     if (((int64_t)b[1] - a[1]) * ((int64_t)e[2] - a[2]) == ((int64_t)b[2] - a[2]) * ((int64_t)e[1] - a[1]))
         return false;
-    int32_t min = a[2] < b[2] ? a[2] : b[2], max = a[2] < b[2] ? b[2] : a[2];
-    min = e[2] < min ? e[2] : min;
-    max = e[2] > max ? e[2] : max;
-    if (max <= 0 || min >= s->n[2] * (int64_t)PAL_SCAN_ONE) return false;
-    *from = clamp_int(floor(grid_units(min)), 0, s->n[2] - 1);
-    *to = clamp_int(ceil(grid_units(max)) - 1, *from, s->n[2] - 1);
+    pal_sort3(layer, (const int32_t[3]){a[2], b[2], e[2]});
+    if (layer[2] <= 0 || layer[0] >= s->n[2] * (int64_t)PAL_SCAN_ONE) return false;
+    *from = clamp_int(floor(grid_units(layer[0])), 0, s->n[2] - 1);
+    *to = clamp_int(ceil(grid_units(layer[2])) - 1, *from, s->n[2] - 1);
     return true;
 }
 
@@ -184,8 +168,7 @@ static pal_err fractions_exactly(const pal_scan_surface *scan, const pal_voxels 
     PAL_ARRAY(&err, s.own, n_plane);
     PAL_ARRAY(&err, s.pass, n_plane + (size_t)grid->n[1]);
     if (!err) sweep_layers(&s, take, self);
-    PAL_FREE(s.tri, s.live, s.from, s.own, s.pass);
-    return err;
+    return PAL_FREED(err, s.tri, s.live, s.from, s.own, s.pass);
 }
 
 /* volume of a closed surface in grid units */
@@ -194,9 +177,7 @@ static double closed_volume(const pal_scan_surface *scan)
     double sum = 0;
     for (size_t t = 0; t < (size_t)scan->n_tri; t++) {
         double x[3][3];
-        for (int c = 0; c < 3; c++)
-            for (int k = 0; k < 3; k++)
-                x[c][k] = grid_units(scan->point[3 * (size_t)scan->tri[3 * t + (size_t)c] + (size_t)k]);
+        for (int k = 0; k < 9; k++) x[k / 3][k % 3] = grid_units(pal_scan_corner(scan, t, k / 3)[k % 3]);
         sum += (x[0][0] + x[1][0] + x[2][0]) *
                ((x[1][1] - x[0][1]) * (x[2][2] - x[0][2]) - (x[1][2] - x[0][2]) * (x[2][1] - x[0][1])) / 6;
     }
@@ -261,8 +242,7 @@ static pal_err fractions_by_samples(const pal_surface *surface, const pal_voxels
         }
         pal_bits_free(&sample);
     }
-    free(fraction);
-    return err;
+    return PAL_FREED(err, fraction);
 }
 
 /* does every finite corner lie where crossings are exact? */
@@ -283,8 +263,8 @@ pal_err pal_voxels_fraction(const pal_surface *surface, const pal_voxels *grid, 
     pal_scan_surface scan;
     bool plain = false;
     if (!fits(surface, grid))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "the surface reaches %d voxels of %g m beyond the mesh",
-                                  MAX_PLACE / PAL_SCAN_ONE, grid->edge_m);
+        return PAL_REFUSE(diag, "the surface reaches %d voxels of %g m beyond the mesh", MAX_PLACE / PAL_SCAN_ONE,
+                          grid->edge_m);
     PAL_TRY(pal_scan_snap(surface, grid->low_m, grid->edge_m, &scan));
     pal_err err = find_plain(&scan, grid, &plain);
     if (!err && plain) err = fractions_exactly(&scan, grid, closed_volume(&scan) < 0 ? -1 : 1, take, self);

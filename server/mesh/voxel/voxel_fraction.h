@@ -1,7 +1,6 @@
 /* Private to the voxel files: the fraction of each voxel of a grid that lies inside a surface. Thread: [load]. */
 #ifndef PAL_MESH_VOXEL_VOXEL_FRACTION_H
 #define PAL_MESH_VOXEL_VOXEL_FRACTION_H
-#include "server/mesh/voxel/voxel_bits.h"
 #include "server/mesh/voxel/voxels.h"
 
 /* receives the fractions of layer z, 0..1, x fastest; valid during the call */

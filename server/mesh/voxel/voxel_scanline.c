@@ -46,9 +46,10 @@ static uint64_t hash_pair(uint64_t a, uint64_t b, int *sign)
     return h * 0xC4CEB9FE1A85EC53u;
 }
 
-uint64_t pal_scan_edge(const int32_t a[3], const int32_t b[3], int *sign)
+uint64_t pal_scan_edge(const pal_scan_surface *scan, int32_t tri, int k, int *sign)
 {
-    return hash_pair(hash_point(a), hash_point(b), sign);
+    size_t t = (size_t)tri;
+    return hash_pair(hash_point(pal_scan_corner(scan, t, k)), hash_point(pal_scan_corner(scan, t, k + 1)), sign);
 }
 
 /* sums of edge hashes over all triangles: a closed chain's signed sum is 0, and an even one's exclusive or; hash of
@@ -69,51 +70,33 @@ static void find_closed(pal_scan_surface *scan, const uint64_t *hash)
     scan->even = odd == 0;
 }
 
-typedef struct numbered {
-    uint64_t key;
-    int32_t tri;
-} numbered;
-
-static int compare_numbered(const void *a, const void *b)
+pal_err pal_scan_drop_copies(pal_scan_surface *scan)
 {
-    const numbered *s = a, *t = b;
-    return s->key != t->key ? PAL_COMPARE(s->key, t->key) : PAL_COMPARE(s->tri, t->tri);
-}
-
-pal_err pal_scan_drop_copies(pal_scan_surface *scan, int n_vertex)
-{
-    size_t n = (size_t)scan->n_tri;
+    size_t n = (size_t)scan->n_tri, cap = 16;
     pal_scan_surface fewer = *scan;
     pal_err err = PAL_ERR_OK;
-    uint64_t *hash;
-    numbered *list;
+    uint64_t *hash, *seen; /* of vertices; of triangles so far, 0: free */
+    while (cap < 2 * n) cap *= 2;
     PAL_ARRAY(&err, fewer.tri, 3 * n);
-    PAL_ARRAY(&err, hash, n_vertex);
-    PAL_ARRAY(&err, list, n);
-    if (err) {
-        PAL_FREE(fewer.tri, hash, list);
-        return err;
-    }
-    for (size_t v = 0; v < (size_t)n_vertex; v++) hash[v] = hash_point(scan->point + 3 * v);
+    PAL_ARRAY(&err, hash, scan->n_vertex);
+    PAL_ZEROED(&err, seen, cap);
+    if (err) return PAL_FREED(err, fewer.tri, hash, seen);
+    for (size_t v = 0; v < (size_t)scan->n_vertex; v++) hash[v] = hash_point(scan->point + 3 * v);
+    fewer.n_tri = 0;
     for (size_t t = 0; t < n; t++) {
         const int32_t *c = scan->tri + 3 * t;
         /* the same for the three corners in any order */
-        uint64_t a = hash[c[0]], b = hash[c[1]], e = hash[c[2]];
-        list[t] = (numbered){(a + b + e) ^ (a ^ b ^ e) * 0x9E3779B97F4A7C15u, (int32_t)t};
+        uint64_t a = hash[c[0]], b = hash[c[1]], e = hash[c[2]], key = (a + b + e) ^ (a ^ b ^ e) * 0x9E3779B97F4A7C15u;
+        key += !key;
+        size_t at = key & (cap - 1);
+        while (seen[at] && seen[at] != key) at = (at + 1) & (cap - 1);
+        if (seen[at]) continue;
+        seen[at] = key;
+        memcpy(fewer.tri + 3 * (size_t)fewer.n_tri++, c, 3 * sizeof *c);
     }
-    qsort(list, n, sizeof *list, compare_numbered);
-    /* sorting back by number leaves the first of each set in the order of the file */
-    size_t n_kept = 0;
-    for (size_t i = 0; i < n; i++)
-        if (n_kept == 0 || list[i].key != list[n_kept - 1].key) list[n_kept++] = list[i];
-    for (size_t i = 0; i < n_kept; i++) list[i].key = 0;
-    qsort(list, n_kept, sizeof *list, compare_numbered);
-    for (size_t i = 0; i < n_kept; i++)
-        memcpy(fewer.tri + 3 * i, scan->tri + 3 * (size_t)list[i].tri, 3 * sizeof *fewer.tri);
-    fewer.n_tri = (int)n_kept;
     find_closed(&fewer, hash);
     bool better = fewer.even || !scan->even;
-    PAL_FREE(hash, list, better ? scan->tri : fewer.tri);
+    PAL_FREE(hash, seen, better ? scan->tri : fewer.tri);
     if (better) *scan = fewer;
     return PAL_ERR_OK;
 }
@@ -121,7 +104,7 @@ pal_err pal_scan_drop_copies(pal_scan_surface *scan, int n_vertex)
 pal_err pal_scan_snap(const pal_surface *surface, const double low[3], double h, pal_scan_surface *out)
 {
     size_t n_vertex = (size_t)surface->n_vertex, n_tri = (size_t)surface->n_tri;
-    pal_scan_surface scan = {.n_tri = 0};
+    pal_scan_surface scan = {.n_vertex = surface->n_vertex};
     pal_err err = PAL_ERR_OK;
     uint64_t *hash;
     PAL_ARRAY(&err, scan.point, 3 * n_vertex);
@@ -145,8 +128,7 @@ pal_err pal_scan_snap(const pal_surface *surface, const double low[3], double h,
     for (size_t t = 0; t < n_tri; t++) {
         const int32_t *c = surface->tri + 3 * t;
         bool finite = true;
-        for (int k = 0; k < 3; k++)
-            for (int d = 0; d < 3; d++) finite &= scan.point[3 * (size_t)c[k] + (size_t)d] != INT32_MIN;
+        for (int k = 0; k < 9; k++) finite &= scan.point[3 * (size_t)c[k / 3] + (size_t)(k % 3)] != INT32_MIN;
         if (!finite) continue;
         memcpy(scan.tri + 3 * (size_t)scan.n_tri++, c, 3 * sizeof *c);
     }
@@ -234,10 +216,10 @@ static void narrow(const edge_rule *e, int64_t *from, int64_t *to)
 /* first and last centre within the range of three coordinates, within 0..n-1 */
 static bool centre_range(int32_t a, int32_t b, int32_t c, int n, int *from, int *to)
 {
-    int32_t low = a < b ? a : b, high = a < b ? b : a;
-    low = c < low ? c : low, high = c > high ? c : high;
-    *from = (low - PAL_SCAN_HALF + PAL_SCAN_ONE - 1) >> 16;
-    *to = (high - PAL_SCAN_HALF) >> 16;
+    int32_t sorted[3];
+    pal_sort3(sorted, (const int32_t[3]){a, b, c});
+    *from = (sorted[0] - PAL_SCAN_HALF + PAL_SCAN_ONE - 1) >> 16;
+    *to = (sorted[2] - PAL_SCAN_HALF) >> 16;
     if (*from < 0) *from = 0;
     if (*to > n - 1) *to = n - 1;
     return *from <= *to;
@@ -311,10 +293,7 @@ static pal_err sort_rows(const scanner *s, pal_crossings *out)
     pal_crossing *item;
     PAL_ZEROED(&err, start, n_row + 2);
     PAL_ARRAY(&err, item, s->n);
-    if (err) {
-        PAL_FREE(start, item);
-        return err;
-    }
+    if (err) return PAL_FREED(err, start, item);
     for (int64_t i = 0; i < s->n; i++) start[s->item[i].row + 2]++;
     for (int i = 0; i < n_row; i++) start[i + 2] += start[i + 1];
     for (int64_t i = 0; i < s->n; i++) item[start[s->item[i].row + 1]++] = s->item[i].crossing;
@@ -328,14 +307,11 @@ pal_err pal_scan_axis(const pal_scan_surface *scan, const int n[3], int axis, pa
     scanner s = {.n_p = n[ACROSS[axis][0]], .n_q = n[ACROSS[axis][1]], .n_place = n[axis], .axis = axis};
     s.max = (int64_t)CROSSINGS_PER_ROW * s.n_p * s.n_q + (int64_t)CROSSINGS_PER_TRI * scan->n_tri + 4096;
     bool ok = true;
-    for (size_t t = 0; ok && t < (size_t)scan->n_tri; t++) {
-        const int32_t *c = scan->tri + 3 * t;
-        ok = scan_triangle(&s, scan->point + 3 * (size_t)c[0], scan->point + 3 * (size_t)c[1],
-                           scan->point + 3 * (size_t)c[2], scan->part ? scan->part[t] : 0);
-    }
+    for (size_t t = 0; ok && t < (size_t)scan->n_tri; t++)
+        ok = scan_triangle(&s, pal_scan_corner(scan, t, 0), pal_scan_corner(scan, t, 1), pal_scan_corner(scan, t, 2),
+                           scan->part ? scan->part[t] : 0);
     pal_err err = ok ? sort_rows(&s, out) : s.n == s.max ? PAL_ERR_BUDGET : PAL_ERR_MEMORY;
-    free(s.item);
-    return err;
+    return PAL_FREED(err, s.item);
 }
 
 void pal_crossings_free(pal_crossings *crossings)

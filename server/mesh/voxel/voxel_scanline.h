@@ -9,7 +9,7 @@ enum { PAL_SCAN_ONE = 65536, PAL_SCAN_HALF = PAL_SCAN_ONE / 2 };
 
 /* a surface in grid units; triangles with a non-finite corner are left out */
 typedef struct pal_scan_surface {
-    int n_tri;
+    int n_vertex, n_tri;
     int32_t *point; /* [n_vertex][3]                                         */
     int32_t *tri;   /* [n_tri][3]                                            */
     int32_t *part;  /* part of each triangle [n_tri], or NULL: all part 0    */
@@ -21,10 +21,15 @@ pal_err pal_scan_snap(const pal_surface *surface, const double low[3], double h,
 void pal_scan_surface_free(pal_scan_surface *scan);
 /* Keeps one of each set of triangles with the same three corner positions, in either orientation, unless the surface is
  * even with them and not without (two copies that close a fin); updates closed and even; MEMORY */
-pal_err pal_scan_drop_copies(pal_scan_surface *scan, int n_vertex);
+pal_err pal_scan_drop_copies(pal_scan_surface *scan);
 
-/* hash of the edge between two points; *sign is +1 or -1 by its direction; collapsed edges give 0 */
-uint64_t pal_scan_edge(const int32_t a[3], const int32_t b[3], int *sign);
+/* corner k of a triangle; corner 3 is corner 0 again */
+static inline const int32_t *pal_scan_corner(const pal_scan_surface *scan, size_t tri, int k)
+{
+    return scan->point + 3 * (size_t)scan->tri[3 * tri + (size_t)(k % 3)];
+}
+/* hash of the edge from corner k to the next; *sign is +1 or -1 by its direction; collapsed edges give 0 */
+uint64_t pal_scan_edge(const pal_scan_surface *scan, int32_t tri, int k, int *sign);
 
 typedef struct pal_crossing {
     int32_t place; /* first voxel of the row whose centre lies behind the crossing */

@@ -56,7 +56,7 @@ static pal_cells shuffled(pal_cells from, uint64_t seed)
     pal_cell_loops l = {0}, t = {0};
     pal_diagnostic diag = {"no note"};
     uint64_t draw = 0;
-    if (pal_cells_loops(&from, &l) || pal_cells_loops(&from, &t)) CHECK_FAIL("%s", "no loops");
+    if (pal_cells_loops(&from, NULL, &l, NULL) || pal_cells_loops(&from, NULL, &t, NULL)) CHECK_FAIL("%s", "no loops");
     int32_t *order = malloc((size_t)(l.n_vertex + l.n_cell) * sizeof *order), *cell = order + l.n_vertex;
     if (!order) abort();
     for (int32_t v = 0; v < l.n_vertex; v++) {

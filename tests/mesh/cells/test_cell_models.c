@@ -223,8 +223,8 @@ static void letters_of_a_lattice_are_bricks_pyramids_and_wedges(void)
 {
     static const char letter[] = "#XEWNSUDabcdefghijkl";
     for (const char *at = letter; *at; at++) {
-        const char text[2] = {*at, 0}, *const row[1] = {text};
-        const pal_cell_lattice lattice = {.n = {1, 1, 1}, .row = row, .place = place_as_it_is};
+        const char rows[2] = {*at, 0};
+        const pal_cell_lattice lattice = {.n = {1, 1, 1}, .rows = rows, .place = place_as_it_is};
         pal_cells c = {0};
         pal_diagnostic diag = {"no note"};
         if (pal_cell_lattice_make(&lattice, &c, &diag)) CHECK_FAIL("%c: %s", *at, diag.text);
@@ -251,8 +251,7 @@ static void letters_of_a_lattice_are_bricks_pyramids_and_wedges(void)
         }
         pal_cells_free(&c);
     }
-    const char *const bad[1] = {"#?"};
-    const pal_cell_lattice lattice = {.n = {2, 1, 1}, .row = bad, .place = place_as_it_is};
+    const pal_cell_lattice lattice = {.n = {2, 1, 1}, .rows = "#?", .place = place_as_it_is};
     pal_cells c = {0};
     pal_diagnostic diag = {""};
     CHECK_INT(pal_cell_lattice_make(&lattice, &c, &diag), PAL_ERR_INTERNAL);

@@ -25,7 +25,7 @@ static pal_cells cubes(int n, bool (*keep)(int, int, int), pal_err *err)
     pal_cell_loops loops;
     bool flag[1000];
     for (int i = 0; i < n * n * n; i++) flag[i] = keep(i % n, i / n % n, i / n / n);
-    if (pal_cells_loops(&whole, &loops) || pal_cell_loops_keep(&loops, flag, NULL)) abort();
+    if (pal_cells_loops(&whole, flag, &loops, NULL)) abort();
     *err = pal_cells_make(&loops, &c, &diag);
     pal_cell_loops_free(&loops);
     pal_cells_free(&whole);
@@ -278,7 +278,7 @@ static void loops_give_the_same_complex_again(void)
     pal_cell_loops loops;
     c.vertex_sharpness[3] = 2, c.edge[5].sharp = .5f, c.face[7].sharp = PAL_SHARPNESS_MAX;
     c.x[4] = nextafter(c.x[4], 9);
-    REQUIRE(!pal_cells_loops(&c, &loops));
+    REQUIRE(!pal_cells_loops(&c, NULL, &loops, NULL));
     REQUIRE(!pal_cells_make(&loops, &again, &diag));
     CHECK(cells_equal(&c, &again));
     CHECK(again.edge[5].sharp == .5f && again.face[7].sharp == PAL_SHARPNESS_MAX && again.vertex_sharpness[3] == 2);
@@ -304,8 +304,7 @@ static void deleting_cells_keeps_what_is_left_as_it_was(void)
     for (int v = 0; v < c.n_vertex; v++) c.vertex_sharpness[v] = (float)v;
     for (int e = 0; e < c.n_edge; e++) c.edge[e].sharp = (float)(1 + e);
     for (int f = 0; f < c.n_face; f++) c.face[f].sharp = (float)(1 + f);
-    REQUIRE(!pal_cells_loops(&c, &loops));
-    REQUIRE(!pal_cell_loops_keep(&loops, keep, kept));
+    REQUIRE(!pal_cells_loops(&c, keep, &loops, kept));
     REQUIRE(!pal_cells_make(&loops, &left, &diag));
     CHECK_INT(left.n_cell, 2);
     CHECK_INT(left.n_vertex, 12);
@@ -381,7 +380,7 @@ static pal_cell_loops open_block(int x, int y, int z)
 {
     pal_cells c = block(x, y, z);
     pal_cell_loops l;
-    if (pal_cells_loops(&c, &l)) abort();
+    if (pal_cells_loops(&c, NULL, &l, NULL)) abort();
     pal_cells_free(&c);
     return l;
 }
@@ -495,15 +494,17 @@ static void faces_of_three_cells_and_cells_twice_round_are_refused(void)
     CHECK_INT(c.n_face - c.n_boundary_face, 3);
     pal_cells_free(&c);
     /* one cell of two cubes that share only a corner, or nothing */
-    pal_cell_loops l = open_block(2, 2, 2);
-    bool keep[8] = {true, false, false, false, false, false, false, true};
-    REQUIRE(!pal_cell_loops_keep(&l, keep, NULL));
+    pal_cells eight = block(2, 2, 2);
+    pal_cell_loops l;
+    const bool keep[8] = {true, false, false, false, false, false, false, true};
+    REQUIRE(!pal_cells_loops(&eight, keep, &l, NULL));
+    pal_cells_free(&eight);
     l.cell[1] = 12, l.n_cell = 1;
     refused(l, "cells: cell 0 is in pieces");
     /* a cell that is a ring: three bricks in a circle as one, their common faces left out */
     pal_cells ring3;
     REQUIRE(!pal_cells_ring(3, 1, .3, &ring3, &diag));
-    REQUIRE(!pal_cells_loops(&ring3, &l));
+    REQUIRE(!pal_cells_loops(&ring3, NULL, &l, NULL));
     int n = 0, n_corner = 0;
     for (int f = 0; f < ring3.n_face_use; f++) {
         if (ring3.face_use[f].mate >= 0) continue;

@@ -39,7 +39,8 @@ static void five_of_a_cube_have_18_edges_16_faces_12_outside(void)
         CHECK(edge[2 * k] < edge[2 * k + 1]);
         if (k > 0) CHECK(edge[2 * k] > edge[2 * k - 2] || edge[2 * k + 1] > edge[2 * k - 1]);
     }
-    REQUIRE(!pal_tets_components(&t, NULL, &n_part));
+    int32_t label[5];
+    REQUIRE(!pal_tets_components(&t, label, &n_part));
     CHECK_INT(n_part, 1);
     pal_surface hull = {.n_vertex = 8, .n_tri = 12, .x = t.x, .tri = t.face};
     CHECK_NEAR(pal_surface_volume(&hull), 1, 1e-15);

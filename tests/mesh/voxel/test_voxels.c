@@ -259,7 +259,10 @@ static void components_are_counted_with_their_border(void)
         CHECK_INT(report.n_component, gap == 3 ? 2 : 1);
         pal_tets t;
         int n_part = 0;
-        REQUIRE(!pal_voxels_split(&v, &t) && !pal_tets_components(&t, NULL, &n_part));
+        REQUIRE(!pal_voxels_split(&v, &t));
+        int32_t *label = calloc((size_t)t.n_tet, sizeof *label);
+        REQUIRE(label && !pal_tets_components(&t, label, &n_part));
+        free(label);
         CHECK_INT(report.n_component, n_part);
         pal_tets_free(&t);
         pal_voxels_free(&v);
