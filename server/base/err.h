@@ -40,6 +40,7 @@ typedef struct pal_diagnostic {
 pal_err pal_diagnostic_set(pal_diagnostic *diag, pal_err err, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
+/* the sentence of a refusal: return PAL_REFUSE(diag, "...", ...); */
 #define PAL_REFUSE(diag, ...) pal_diagnostic_set(diag, PAL_ERR_REFUSED, __VA_ARGS__)
 
 #define PAL_TRY(call)                                                                                                  \

@@ -66,7 +66,7 @@ struct pal_grasps {
 void pal_grasp_act_explicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *tool, pal_step *step);
 void pal_grasp_act_implicit(const pal_grasps *grasps, pal_grasp *g, pal_tool *tool, pal_step *step);
 /* pal_tangent of the implicit regime */
-void pal_grasp_multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out);
+void pal_grasp_multiply(void *self, const pal_body *body, double k, const double *p, double *out);
 bool pal_grasp_settle(void *self, pal_step *step, const double *moved, bool last);
 
 /* ---- for the regimes ---- */

@@ -6,9 +6,8 @@ pal_err pal_rest_region_find(pal_config_entry *entry, const double *x, int n, co
     const bool low = pal_entry_has(entry, "low_m"), high = pal_entry_has(entry, "high_m");
     pal_support_def region = {.lowest = !low && !high, .fraction = 0.05};
     if (!region.lowest && pal_entry_has(entry, "lowest"))
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: either low_m and high_m or lowest", entry->path);
-    if (low != high)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: low_m and high_m belong together", entry->path);
+        return PAL_REFUSE(build->diag, "%s: either low_m and high_m or lowest", entry->path);
+    if (low != high) return PAL_REFUSE(build->diag, "%s: low_m and high_m belong together", entry->path);
     PAL_TRY(pal_entry_read_numbers(entry, "low_m", 3, region.low_m, build->diag));
     PAL_TRY(pal_entry_read_numbers(entry, "high_m", 3, region.high_m, build->diag));
     PAL_TRY(pal_entry_read_number(entry, "lowest", 0, 1, &region.fraction, build->diag));

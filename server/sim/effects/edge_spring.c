@@ -85,8 +85,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     const pal_adaptive_surface *adaptive = build->body->model.adaptive;
     if (!adaptive)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: \"%s\" needs a body of model adaptive_springs",
-                                  item->path, item->name);
+        return PAL_REFUSE(build->diag, "%s: \"%s\" needs a body of model adaptive_springs", item->path, item->name);
     edge_spring *e = PAL_NEW(build->arena, edge_spring, 1);
     if (!e) return PAL_ERR_MEMORY;
     e->adaptive = adaptive;

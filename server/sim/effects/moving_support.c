@@ -31,8 +31,7 @@ static pal_err read_keys(moving_support *m, pal_config_entry *entry, pal_diagnos
     PAL_TRY(pal_entry_read_number(entry, "period_s", 0, 1e6, &m->period_s, diag));
     PAL_TRY(pal_entry_check_unused(entry, diag));
     m->angle = degrees * M_PI / 180;
-    if (!pal_unit3(m->axis, m->axis, 0))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "%s: turn_axis has no direction", entry->path);
+    if (!pal_unit3(m->axis, m->axis, 0)) return PAL_REFUSE(diag, "%s: turn_axis has no direction", entry->path);
     return PAL_ERR_OK;
 }
 
@@ -56,8 +55,8 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
         m->node[m->n_node++] = i;
     }
     if (m->n_node == 0)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: moving_support holds none of the body's %d nodes",
-                                  entry->path, body->n_dof);
+        return PAL_REFUSE(build->diag, "%s: moving_support holds none of the body's %d nodes", entry->path,
+                          body->n_dof);
     pal_scale3(m->centre, 1.0 / m->n_node, m->centre);
     *self = m;
     return PAL_ERR_OK;

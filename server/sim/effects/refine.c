@@ -130,8 +130,7 @@ static pal_err make(pal_config_entry *item, pal_build *build, void **self)
 {
     pal_adaptive_surface *adaptive = build->body->model.adaptive;
     if (!adaptive)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED,
-                                  "%s: refine needs a surface of levels, model adaptive_springs", item->path);
+        return PAL_REFUSE(build->diag, "%s: refine needs a surface of levels, model adaptive_springs", item->path);
     const pal_levels *levels = &adaptive->levels;
     size_t n_vertex = (size_t)levels->n_vertex[levels->n_level - 1];
     refine *row = PAL_NEW(build->arena, refine, 1);

@@ -72,8 +72,7 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
     PAL_TRY(pal_entry_read_number(entry, "reach_m", 0, 10, &grasps->asked_reach_m, build->diag));
     PAL_TRY(pal_entry_check_unused(entry, build->diag));
     if (build->body->display.n_shown == 0)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: tool_grasp needs a body with a shown surface",
-                                  entry->path);
+        return PAL_REFUSE(build->diag, "%s: tool_grasp needs a body with a shown surface", entry->path);
     size_t n_node = (size_t)build->body->n_node, scratch = 6 * sizeof(double) * n_node + 256;
     if (build->body->implicit) {
         build->body->wants_compliance = true;

@@ -62,8 +62,7 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
     if (!push) return PAL_ERR_MEMORY;
     PAL_TRY(read_keys(push, entry, build->diag));
     if (build->body->display.n_shown == 0)
-        return pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "%s: tool_push needs a body with a shown surface",
-                                  entry->path);
+        return PAL_REFUSE(build->diag, "%s: tool_push needs a body with a shown surface", entry->path);
     PAL_TRY(material(push, build->body, &build->def->material, NULL));
     push->n_tool = scene->n_tool;
     push->body_index = (int)(build->def - scene->body);
@@ -219,9 +218,9 @@ static void wanted(void *self, const pal_body *body, double *bound_N_m)
     if (push->regime == &pal_push_interpolated) pal_push_want(push, body, bound_N_m);
 }
 
-static void multiply(void *self, const pal_body *body, double k, double c, const double *p, double *out)
+static void multiply(void *self, const pal_body *body, double k, const double *p, double *out)
 {
-    (void)body, (void)c;
+    (void)body;
     pal_contact_springs_multiply(((pal_push *)self)->springs, k, p, out);
 }
 

@@ -148,8 +148,7 @@ static pal_err show_boundary(const pal_config_entry *item, pal_build *build)
     pal_err err =
         build->def->cut ? find_cut(cells, build->def, &b) : pal_cells_boundary(cells, &b.surface, &b.node, &b.face);
     if (!err && b.surface.n_tri == 0)
-        err = pal_diagnostic_set(build->diag, PAL_ERR_REFUSED, "body \"%s\" %s: the cut leaves nothing of it",
-                                 build->def->name, item->path);
+        err = PAL_REFUSE(build->diag, "body \"%s\" %s: the cut leaves nothing of it", build->def->name, item->path);
     if (!err) err = keep_boundary(&b, build);
     pal_surface_free(&b.surface);
     free(b.node), free(b.face);

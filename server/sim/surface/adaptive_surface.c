@@ -24,10 +24,10 @@ enum { CHAIN = 1 << (PAL_LEVELS_MAX - 1), FRESH = 3 * CHAIN };
 static pal_err check_options(const pal_adaptive_options *o, pal_diagnostic *diag)
 {
     if (!(o->mass_kg > 0) || !isfinite(o->mass_kg))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "adaptive surface: a mass of %g kg", o->mass_kg);
+        return PAL_REFUSE(diag, "adaptive surface: a mass of %g kg", o->mass_kg);
     if (o->n_level >= 1 && (o->start_level < 0 || o->start_level >= o->n_level))
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "adaptive surface: start level %d, there are levels 0 to %d",
-                                  o->start_level, o->n_level - 1);
+        return PAL_REFUSE(diag, "adaptive surface: start level %d, there are levels 0 to %d", o->start_level,
+                          o->n_level - 1);
     return PAL_ERR_OK;
 }
 
@@ -122,11 +122,10 @@ static pal_err make_body(pal_adaptive_surface *s, pal_body *body, pal_arena *are
 
 static pal_err refuse_bytes(int n_level, const char *what, size_t n_byte, size_t budget, pal_diagnostic *diag)
 {
-    return pal_diagnostic_set(
-        diag, PAL_ERR_BUDGET,
-        "adaptive surface: %d levels need %s%.4g MiB, the budget is %.4g MiB: ask for fewer levels or a coarser "
-        "surface",
-        n_level, what, (double)n_byte / (1 << 20), (double)budget / (1 << 20));
+    return pal_diagnostic_set(diag, PAL_ERR_BUDGET,
+                              "adaptive surface: %d levels need %s%.4g MiB, the budget is %.4g MiB: ask for fewer "
+                              "levels or a coarser surface",
+                              n_level, what, (double)n_byte / (1 << 20), (double)budget / (1 << 20));
 }
 
 pal_err pal_adaptive_make(const pal_surface *surface, const pal_adaptive_options *options, pal_body *body,

@@ -22,10 +22,8 @@ static pal_err make(void *user, pal_plan *plan, int b, pal_arena *arena, void **
 pal_err pal_brush_components_set(pal_brush_components *rows, pal_plan *plan, int body, int slot, const pal_brush *brush,
                                  pal_diagnostic *diag)
 {
-    if (body < 0 || body >= plan->n_body)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "body %d does not exist", body);
-    if (slot < 0 || slot >= PAL_TOOL_MAX)
-        return pal_diagnostic_set(diag, PAL_ERR_REFUSED, "tool %d does not exist", slot);
+    if (body < 0 || body >= plan->n_body) return PAL_REFUSE(diag, "body %d does not exist", body);
+    if (slot < 0 || slot >= PAL_TOOL_MAX) return PAL_REFUSE(diag, "tool %d does not exist", slot);
     if (!brush || brush->kind == PAL_BRUSH_NONE) {
         if (rows->self[body]) pal_brush_end(rows->self[body], slot);
         return PAL_ERR_OK;

@@ -104,12 +104,11 @@ pal_err pal_world_check_budget(pal_world *w, pal_diagnostic *diag)
     if (!(limit > 0) || n > w->max_substep) {
         char who[120];
         pal_world_describe_limit(w, who, sizeof who);
-        return pal_diagnostic_set(
-            diag, PAL_ERR_BUDGET,
-            "a step of %g s needs %.0f sub-steps of %.3g s%s%s, max_substep allows %d: take a softer or "
-            "denser material, larger elements%s or a shorter step",
-            w->step_s, ceil(w->step_s / limit), limit, is_adaptive ? " on the finest level" : "", who, w->max_substep,
-            is_adaptive ? ", fewer levels" : "");
+        return pal_diagnostic_set(diag, PAL_ERR_BUDGET,
+                                  "a step of %g s needs %.0f sub-steps of %.3g s%s%s, max_substep allows %d: take a "
+                                  "softer or denser material, larger elements%s or a shorter step",
+                                  w->step_s, ceil(w->step_s / limit), limit, is_adaptive ? " on the finest level" : "",
+                                  who, w->max_substep, is_adaptive ? ", fewer levels" : "");
     }
     w->rest_limit_s = limit;
     return PAL_ERR_OK;
