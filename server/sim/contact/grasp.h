@@ -7,7 +7,6 @@
 #ifndef PAL_SIM_CONTACT_GRASP_H
 #define PAL_SIM_CONTACT_GRASP_H
 #include "server/sim/contact/haptic_stiffness.h"
-#include "server/sim/contact/tool_force.h"
 #include "server/sim/core/effect.h"
 #include "server/sim/surface/adaptive_grasp.h"
 
@@ -72,7 +71,7 @@ bool pal_grasp_settle(void *self, pal_step *step, const double *moved, bool last
 /* ---- for the regimes ---- */
 
 double pal_grasp_reach_m(const pal_grasps *grasps, const pal_tool *tool);
-/* k as the scene says, or GRASP_STIFFNESS E reach */
+/* k as the scene says, or TISSUE_RATIO E reach */
 double pal_grasp_stiffness_N_m(const pal_grasps *grasps, double reach_m);
 /* weighted mean of p [n_node][3] over the nodes held */
 void pal_grasp_mean(const pal_grasp *g, const double *p, double mean[3]);

@@ -351,11 +351,10 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
         for (int k = 0; k < s->n && s->brush.kind == PAL_BRUSH_CURVE; k++)
             bound_N_m[s->item[k]] += soon * s->brush.stiffness_N_m * s->weight[k];
         const double p = soon * fmax(fabs(s->now[0]), fabs(s->brush.pressure_Pa)) / 6;
-        for (int k = 0; k < 3 * s->n && s->brush.kind == PAL_BRUSH_INFLATE; k++) {
-            const int t = s->item[k / 3];
-            const int32_t node[3] = {corner_node(body, t, k % 3), corner_node(body, t, (k + 1) % 3),
-                                     corner_node(body, t, (k + 2) % 3)};
-            pal_pressure_bound(body->d, node, p * s->weight[k / 3], bound_N_m);
+        for (int k = 0; k < s->n && s->brush.kind == PAL_BRUSH_INFLATE; k++) {
+            const int t = s->item[k];
+            const int32_t node[3] = {corner_node(body, t, 0), corner_node(body, t, 1), corner_node(body, t, 2)};
+            pal_pressure_bound(body->d, node, p * s->weight[k], bound_N_m);
         }
     }
 }

@@ -199,11 +199,8 @@ static void stiffness(void *self, const pal_body *body, double *bound_N_m)
         int i = pal_body_point(body, n);
         bound_N_m[i] += k * sum * body->mass_kg[i];
     }
-    for (int t = 0; t < adaptive->n_tri && p != 0; t++) {
-        const int32_t *tri = adaptive->tri + 3 * (size_t)t;
-        for (int c = 0; c < 3; c++)
-            pal_pressure_bound(body->d, (int32_t[3]){tri[c], tri[(c + 1) % 3], tri[(c + 2) % 3]}, p / 6, bound_N_m);
-    }
+    for (int t = 0; t < adaptive->n_tri && p != 0; t++)
+        pal_pressure_bound(body->d, adaptive->tri + 3 * (size_t)t, p / 6, bound_N_m);
 }
 
 static double settled_s(const void *self)

@@ -6,10 +6,9 @@
  * k is the stiffness against a translation of all nodes: under a force f they move by f / k. Explicit solvers derive
  * their step from it: a stiffer component needs more sub-steps.
  *
- * Keys: those of rest_region.h, k_N_m (100 E S, S the box diagonal: a body's weight moves it by less than 0.1 % of its
- * size). A k that is not given follows a live material edit. */
+ * Keys: those of pal_support_read (definition.h), k_N_m (100 E S, S the box diagonal: a body's weight moves it by less
+ * than 0.1 % of its size). A k that is not given follows a live material edit. */
 #include "server/base/vec3.h"
-#include "server/sim/contact/rest_region.h"
 #include "server/sim/core/effect_list.h"
 
 typedef struct penalty {
@@ -23,10 +22,13 @@ static pal_err make(pal_config_entry *entry, pal_build *build, void **self)
 {
     const pal_body *body = build->body;
     double mass = 0;
+    pal_support_def support;
     uint8_t *held;
     penalty *p = PAL_NEW(build->arena, penalty, 1);
     if (!p) return PAL_ERR_MEMORY;
-    PAL_TRY(pal_rest_region_find(entry, body->node_rest, body->n_node, build, &held));
+    PAL_TRY(pal_support_read(entry, &support, build->diag));
+    if (!(held = PAL_NEW(build->arena, uint8_t, body->n_node))) return PAL_ERR_MEMORY;
+    pal_support_mark_fixed(&support, build->scene->up, body->node_rest, body->n_node, held);
     p->per_young = pal_entry_has(entry, "k_N_m") ? 0 : 100 * body->length_scale_m;
     p->k_N_m = p->per_young * build->def->material.young_Pa;
     PAL_TRY(pal_entry_read_number(entry, "k_N_m", 1e-12, 1e60, &p->k_N_m, build->diag));

@@ -165,7 +165,7 @@ static void close_grasp(pal_grasps *grasps, pal_grasp *g, const pal_tool *tool, 
     g->closed = true;
     double k = pal_grasp_stiffness_N_m(grasps, reach),
            tissue = 2 * grasps->young_Pa * reach / (1 - grasps->poisson * grasps->poisson);
-    pal_stiffness_fit_start(&g->fit, fmax(MIN_STIFFNESS_N_M, k * tissue / (k + tissue)));
+    pal_stiffness_fit_start(&g->fit, fmax(STIFFNESS_N_M.low, k * tissue / (k + tissue)));
     pal_stiffness_fit_add(&g->fit, tool->last.position_m, (double[3]){0}, tool->radius_m);
     if (g->implicit) *g->implicit = (pal_grasp_implicit){.pulls = false};
 }

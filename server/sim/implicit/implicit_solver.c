@@ -525,7 +525,7 @@ static void update_probed(pal_implicit *core, pal_step *step)
  * for ever; an inverted body needs a few such sub-steps to recover */
 static bool is_cycling(pal_implicit *core, double dt_s)
 {
-    const double limit_s = PAL_ENERGY_RISE_S * (1 + 1e-9);
+    const double limit_s = PAL_PAUSE_S * (1 + 1e-9);
     core->steady_s = core->energy_rose ? 0 : core->steady_s + dt_s;
     if (core->energy_rose) core->energy_rise_s += dt_s;
     if (core->steady_s > limit_s) core->energy_rise_s = 0;

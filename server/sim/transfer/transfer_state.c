@@ -13,9 +13,6 @@
 #include <float.h>
 #include <string.h>
 
-/* relative difference of energies that counts as none: an energy is quadratic in a solution of this accuracy */
-static const double same_energy = PAL_SOLVER_TOLERANCE * PAL_SOLVER_TOLERANCE;
-
 /* ---- sums ---- */
 
 static bool elastic(const pal_effect *e)
@@ -219,10 +216,10 @@ static int smooth(pal_transfer *t, pal_world *next, double want_J)
     int n = 0;
     if (to->interpolation || !find_bound(next, t->body, t->bound)) return 0;
     memset(step, 0, 3 * sizeof *step * (size_t)to->n_dof);
-    int n_max = now_J > PAL_TRANSFER_MAX_SCALE * want_J ? 5 * PAL_TRANSFER_ROUNDS
-                : t->has_rehearsed                      ? PAL_TRANSFER_ROUNDS / 4
-                                                        : PAL_TRANSFER_ROUNDS;
-    for (; n < n_max && now_J > (1 + same_energy) * want_J && now_J < max_J; n++) {
+    int n_max = now_J > PAL_CHANGE_MAX * want_J ? 5 * PAL_TRANSFER_ROUNDS
+                : t->has_rehearsed              ? PAL_TRANSFER_ROUNDS / 4
+                                                : PAL_TRANSFER_ROUNDS;
+    for (; n < n_max && now_J > (1 + PAL_SOLVER_TOLERANCE * PAL_SOLVER_TOLERANCE) * want_J && now_J < max_J; n++) {
         for (int k = 0; k < to->n_active; k++) {
             int i = pal_body_point(to, k);
             if (to->support[i] || !(t->bound[i] > 0)) continue;
@@ -273,12 +270,13 @@ static double scale_displacement(pal_transfer *t, pal_world *next, double want_J
     memcpy(base, to->x, 3 * sizeof *base * (size_t)to->n_dof);
     for (int round = 0; round < PAL_TRANSFER_SCALE_ROUNDS; round++) {
         double now_J = elastic_energy_J(next, t->body);
-        if (!(now_J > 0) || !(want_J > 0) || fabs(now_J / want_J - 1) <= same_energy) break;
+        if (!(now_J > 0) || !(want_J > 0) || fabs(now_J / want_J - 1) <= PAL_SOLVER_TOLERANCE * PAL_SOLVER_TOLERANCE)
+            break;
         /* the energy goes with a power of the length: 2 where little is bent, more beyond */
         if (last_J > 0 && s != last_s && now_J != last_J) power = log(now_J / last_J) / log(s / last_s);
         power = fmin(fmax(power, 1), 8);
         last_J = now_J, last_s = s;
-        s = within(s * pow(want_J / now_J, 1 / power), PAL_TRANSFER_MAX_SCALE);
+        s = within(s * pow(want_J / now_J, 1 / power), PAL_CHANGE_MAX);
         for (int k = 0; k < to->n_active; k++) {
             size_t i = (size_t)pal_body_point(to, k);
             if (to->support[i]) continue;
@@ -312,8 +310,7 @@ static void scale_velocity(pal_transfer *t, pal_body *to, double want_J)
         memcpy(to->v, t->work[1], n_byte);
     }
     double s = 1;
-    if (all_J > rigid_J * (1 + 1e-9))
-        s = within(sqrt(fmax(want_J - rigid_J, 0) / (all_J - rigid_J)), PAL_TRANSFER_MAX_SCALE);
+    if (all_J > rigid_J * (1 + 1e-9)) s = within(sqrt(fmax(want_J - rigid_J, 0) / (all_J - rigid_J)), PAL_CHANGE_MAX);
     for (int i = 0; i < 3 * to->n_dof; i++) to->v[i] = v[i] + s * (to->v[i] - v[i]);
     pal_body_update_nodes(to);
 }
@@ -394,7 +391,7 @@ void pal_transfer_apply(pal_transfer *transfer, pal_world *next, const pal_world
     pal_body *from = &old->plan.body[t->body], *to = &next->plan.body[t->body];
     *out = (pal_transfer_report){.scale = 1};
     double elastic_before_J = evaluate_old(t, old, &out->energy_before_J), kinetic_J = pal_body_kinetic_J(from);
-    double spare_J = same_energy * (elastic_before_J + kinetic_J);
+    double spare_J = PAL_SOLVER_TOLERANCE * PAL_SOLVER_TOLERANCE * (elastic_before_J + kinetic_J);
     place_points(t, from, next);
     pal_world_transfer(next, before, t->body, t->x, t->v);
     out->interpolated_J = world_energy_J(next);

@@ -1,5 +1,5 @@
 /* Components field_output inserted and removed at run time. */
-#include "server/sim/world/field_components.h"
+#include "server/sim/world/inserted_components.h"
 
 #include "server/sim/core/effect_list.h"
 
