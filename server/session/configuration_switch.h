@@ -4,7 +4,7 @@
  * with pal_configuration_switch_transfer then replaces the running world between two steps, without a jump:
  *   - Displacement and velocity are interpolated in the elements of the old body.
  *   - Energy is preserved to 2 %. For this, displacements and velocities are rescaled within the bounds
- *     PAL_CHANGE_MAX (server/sim/core/tuning.h); the report gives the result.
+ *     PAL_TRANSFER_MAX_SCALE (server/sim/transfer/tuning.h); the report gives the result.
  *   - The residual force and the offset of the displayed surface are blended out over PAL_BLEND_S
  *     (server/sim/core/blend.h).
  *   - Grasps, tool contacts with friction and lasting loads continue.

@@ -57,7 +57,7 @@ static void a_session_changes_its_method_and_comes_back(bool paused)
         r = *pal_configuration_switch_report(change);
         /* the springs' own voxels are full to their border: another mass, and held farther out */
         CHECK_NEAR(r.energy_after_J / r.energy_before_J, 1, 0.02);
-        CHECK_LE(fmax(r.scale, 1 / r.scale), PAL_CHANGE_MAX * (1 + 1e-9));
+        CHECK_LE(fmax(r.scale, 1 / r.scale), PAL_TRANSFER_MAX_SCALE * (1 + 1e-9));
         CHECK(r.energy_before_J > 0 && isfinite(r.energy_after_J));
         CHECK_LE(r.max_move_m, 0.005); /* of a ball of 100 mm that a tool presses */
         pal_session_close(s);
@@ -107,7 +107,7 @@ static void beyond_the_bound_of_displacements_the_velocity_makes_up(void)
     pal_session *next = change_to(s, &(pal_configuration){.model = "fem", .element = "hex8_bbar", .size = 7}, &change);
     REQUIRE(next);
     r = *pal_configuration_switch_report(change);
-    CHECK_NEAR(r.scale, PAL_CHANGE_MAX, 1e-9);
+    CHECK_NEAR(r.scale, PAL_TRANSFER_MAX_SCALE, 1e-9);
     CHECK_NEAR(r.energy_after_J / r.energy_before_J, 1, 0.02);
     pal_session_close(s);
     pal_session_close(next);

@@ -330,7 +330,7 @@ static pal_err fill_voxels(const pal_body_def *body, const double up[3], const p
     align(body, surface, size, voxel.ahead);
     pal_err err = pal_prepared_make(surface, &voxel, out, &report, &reason);
     /* thin parts consist of voxels with little inside */
-    if (!err && missing(out) > PAL_FILL_MIN) {
+    if (!err && missing(out) > PAL_VOXEL_MAX_MISSING) {
         pal_prepared_free(out);
         voxel.min_fill = PAL_FILL_MIN;
         err = pal_prepared_make(surface, &voxel, out, &report, &reason);

@@ -35,9 +35,9 @@ enum { PAL_SPRING_GRID_NODES_MAX = 1 << 20 };
  * shorter than so much of their length have no direction, a body smaller than so much of its size is a point
  * (tests/sim/surface/test_edge_spring.c, test_adaptive_geometry.c) */
 #define PAL_ROUNDING 1e-9
-/* largest factor, up or down, on velocities and displacements that restores the energy of a body after a change of its
- * level or of its method, and on the force of old nodes that lighter new ones take over: beyond it they would be thrown
- * (tests/sim/surface/test_refine.c, tests/stability/test_switch_slider.c, test_switch_pairs.c) */
+/* largest factor, up or down, on velocities that restores the energy of a body after a change of its level, and of the
+ * mass of old nodes over that of the new ones which take over their force: beyond it nodes would be thrown
+ * (tests/sim/surface/test_refine.c, tests/stability/test_switch_pairs.c) */
 #define PAL_CHANGE_MAX 2.0
 /* cosine of the largest angle, 45 degrees, between two directions or loads that count as the same one
  * (tests/sim/contact/test_contact_implicit.c, tests/sim/solvers/test_fem_static.c) */
@@ -56,7 +56,8 @@ enum { PAL_SPRING_GRID_NODES_MAX = 1 << 20 };
  * left nearly without stiffness and mass (tests/sim/solvers/test_fem_dynamic.c,
  * tests/sim/springs/test_spring_recovery.c) */
 #define PAL_FILL_MIN 0.02
-/* cut voxels with less inside are dropped, unless more than PAL_FILL_MIN of the volume would go; then those below
- * PAL_FILL_MIN (tests/sim/core/test_configuration.c) */
-#define PAL_VOXEL_DROP_FILL 0.25
+/* cut voxels with less inside are dropped, unless more than MAX_MISSING of the volume would go; then those below
+ * PAL_FILL_MIN (tests/sim/core/test_configuration.c, at 0.02 tests/stability/test_switch_ball.c) */
+#define PAL_VOXEL_DROP_FILL   0.25
+#define PAL_VOXEL_MAX_MISSING (PAL_VOXEL_DROP_FILL / 10)
 #endif

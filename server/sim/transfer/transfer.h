@@ -14,7 +14,7 @@
  * that the old elements left free, a sharp tip under a tool). First every node moves by its force residual over a bound
  * of its stiffness, which removes kinks first, until the elastic energy equals that before. Then the displacement from
  * rest (of a free body, from the best-fitting rigid placement) is scaled, and the velocity for the difference that
- * remains, both by at most PAL_CHANGE_MAX. A body at rest whose scale reaches its bound has a different energy,
+ * remains, both by at most PAL_TRANSFER_MAX_SCALE. A body at rest whose scale reaches its bound has a different energy,
  * which the report shows. A body that rests under a load with the same elastic energy is about half way between its old
  * and its new equilibrium; the other half follows as the difference of forces is released (inserted_components.h). A
  * free body keeps its momentum and angular momentum.

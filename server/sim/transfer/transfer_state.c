@@ -216,9 +216,9 @@ static int smooth(pal_transfer *t, pal_world *next, double want_J)
     int n = 0;
     if (to->interpolation || !find_bound(next, t->body, t->bound)) return 0;
     memset(step, 0, 3 * sizeof *step * (size_t)to->n_dof);
-    int n_max = now_J > PAL_CHANGE_MAX * want_J ? 5 * PAL_TRANSFER_ROUNDS
-                : t->has_rehearsed              ? PAL_TRANSFER_ROUNDS / 4
-                                                : PAL_TRANSFER_ROUNDS;
+    int n_max = now_J > PAL_TRANSFER_MAX_SCALE * want_J ? 5 * PAL_TRANSFER_ROUNDS
+                : t->has_rehearsed                      ? PAL_TRANSFER_ROUNDS / 4
+                                                        : PAL_TRANSFER_ROUNDS;
     for (; n < n_max && now_J > (1 + PAL_SOLVER_TOLERANCE * PAL_SOLVER_TOLERANCE) * want_J && now_J < max_J; n++) {
         for (int k = 0; k < to->n_active; k++) {
             int i = pal_body_point(to, k);
@@ -276,7 +276,7 @@ static double scale_displacement(pal_transfer *t, pal_world *next, double want_J
         if (last_J > 0 && s != last_s && now_J != last_J) power = log(now_J / last_J) / log(s / last_s);
         power = fmin(fmax(power, 1), 8);
         last_J = now_J, last_s = s;
-        s = within(s * pow(want_J / now_J, 1 / power), PAL_CHANGE_MAX);
+        s = within(s * pow(want_J / now_J, 1 / power), PAL_TRANSFER_MAX_SCALE);
         for (int k = 0; k < to->n_active; k++) {
             size_t i = (size_t)pal_body_point(to, k);
             if (to->support[i]) continue;
@@ -310,7 +310,8 @@ static void scale_velocity(pal_transfer *t, pal_body *to, double want_J)
         memcpy(to->v, t->work[1], n_byte);
     }
     double s = 1;
-    if (all_J > rigid_J * (1 + 1e-9)) s = within(sqrt(fmax(want_J - rigid_J, 0) / (all_J - rigid_J)), PAL_CHANGE_MAX);
+    if (all_J > rigid_J * (1 + 1e-9))
+        s = within(sqrt(fmax(want_J - rigid_J, 0) / (all_J - rigid_J)), PAL_TRANSFER_MAX_SCALE);
     for (int i = 0; i < 3 * to->n_dof; i++) to->v[i] = v[i] + s * (to->v[i] - v[i]);
     pal_body_update_nodes(to);
 }
